@@ -1,0 +1,57 @@
+# Every verb does its own set-up: a virtual environment with the locked versions, made once and kept in .venv.
+
+PYTHON ?= python3
+ARM ?= sasaki2012-lab
+
+BIN := .venv/bin
+INSTALLED := .venv/.installed
+BENCH_INSTALLED := .venv/.bench
+PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check install -c requirements.lock
+
+.PHONY: help install reports modes bode test lint bench clean
+
+help: ## list these verbs
+	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile | while IFS="$$(printf '\t')" read -r verb what; do \
+		printf '  make %-9s %s\n' "$$verb" "$$what"; done
+
+install: $(INSTALLED) ## set up .venv with the locked versions and the tfarm command
+
+reports: $(INSTALLED) ## write every preset's report to reports/index.html
+	@$(BIN)/tfarm report --out reports
+
+modes: $(INSTALLED) ## write one arm's modal tables and shapes (ARM=name-or-file)
+	@$(BIN)/tfarm report '$(ARM)' --only modes --out reports
+
+bode: $(INSTALLED) ## write one arm's Bode plots (ARM=name-or-file)
+	@$(BIN)/tfarm report '$(ARM)' --only bode --out reports
+
+test: $(INSTALLED) ## run the tests
+	@$(BIN)/python -m pytest -n 2
+
+lint: $(INSTALLED) ## check style, types and which room imports which
+	@$(BIN)/ruff check .
+	@$(BIN)/ruff format --check .
+	@$(BIN)/mypy
+	@$(BIN)/lint-imports
+
+bench: $(BENCH_INSTALLED) ## measure speed and memory, beside other packages
+	@$(BIN)/python -m pytest tests/bench -n 0 -s -o 'python_files=bench_*.py'
+
+clean: ## remove everything that was generated
+	@rm -rf .venv build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	@find reports -mindepth 1 -maxdepth 1 ! -name README.md ! -name pictures -exec rm -rf {} +
+	@find tfarm tests -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# The last step compiles the numerical kernels, which numba then keeps on disk.
+$(INSTALLED): pyproject.toml requirements.lock
+	$(if $(shell $(PYTHON) -c 'import sys; print("yes" * (sys.version_info >= (3, 11)))' 2>/dev/null),,$(error \
+		tfarm needs Python 3.11 or newer; name one, e.g. make PYTHON=python3.12))
+	@echo "setting up .venv (once; a minute or two)"
+	@$(PYTHON) -m venv .venv
+	@$(PIP) -e '.[dev]'
+	@touch $@
+	@$(BIN)/tfarm modes sasaki2012 --count 1 --json > /dev/null
+
+$(BENCH_INSTALLED): $(INSTALLED)
+	@$(PIP) -e '.[bench]'
+	@touch $@

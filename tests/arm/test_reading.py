@@ -1,0 +1,365 @@
+import math
+import os
+import time
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tfarm.arm import Arm, Hub, Link, Payload, Section, load, presets, to_toml
+from tfarm.arm.reading import MOST_BYTES
+from tfarm.errors import ParameterError
+
+# The example of the documentation, letter by letter
+EXAMPLE = """\
+name = "sasaki2012"
+assumptions = ["density read as 2766.7 kg/m^3 (Table 1 prints 2.7667)", "..."]
+[link]
+length = 1.0               # m
+density = 2766.7           # kg/m^3
+youngs_modulus = 6.8944e10 # Pa
+shear_modulus = 2.6517e10  # Pa; or poissons_ratio
+damping = 0.0              # C [s], Kelvin-Voigt on bending
+[link.section]             # shape = "rectangle": width, depth (in the plane of bending); "round", "tube"
+shape = "general"
+area = 6.0e-4              # m^2
+second_moment = 1.8e-9     # m^4
+shear_factor = 0.8333333333333334   # optional for the named shapes
+[hub]
+inertia = 0.1              # kg m^2; inf = locked, 0 = free pin
+[payload]                  # optional
+mass = 0.0                 # kg; inf = tip pinned
+inertia = 0.0              # kg m^2; inf = tip cannot rotate
+"""
+GENERAL = EXAMPLE[EXAMPLE.index('shape = "general"') : EXAMPLE.index("[hub]")]
+
+
+@pytest.fixture
+def refused(tmp_path):
+    """Loads a file with this content, and gives the one line with which it is refused, within a second."""
+
+    def refuse(content):
+        path = tmp_path / "arm.toml"
+        path.write_bytes(content if isinstance(content, bytes) else content.encode("utf-8"))
+        began = time.perf_counter()
+        with pytest.raises(ParameterError) as caught:
+            load(path)
+        assert time.perf_counter() - began < 1.0
+        text = str(caught.value)
+        assert text.startswith(f"{path}: ")
+        assert text.isprintable()
+        assert len(text) < 1000
+        return text.removeprefix(f"{path}: ")
+
+    return refuse
+
+
+@pytest.fixture
+def accepted(tmp_path):
+    """Loads a file with this content."""
+
+    def accept(content):
+        path = tmp_path / "arm.toml"
+        path.write_bytes(content if isinstance(content, bytes) else content.encode("utf-8"))
+        return load(str(path))
+
+    return accept
+
+
+def edited(old, new):
+    assert EXAMPLE.count(old) == 1
+    return EXAMPLE.replace(old, new)
+
+
+def test_the_documented_file(accepted):
+    arm = accepted(EXAMPLE)
+    section = Section.general(area=6e-4, second_moment=1.8e-9, shear_factor=0.8333333333333334)
+    assert arm == Arm(
+        name="sasaki2012",
+        assumptions=("density read as 2766.7 kg/m^3 (Table 1 prints 2.7667)", "..."),
+        link=Link(
+            length=1.0,
+            density=2766.7,
+            youngs_modulus=6.8944e10,
+            shear_modulus=2.6517e10,
+            section=section,
+            damping=0.0,
+        ),
+        hub=Hub(inertia=0.1),
+        payload=Payload(mass=0.0, inertia=0.0),
+    )
+
+
+def test_what_is_optional(accepted):
+    short = EXAMPLE[: EXAMPLE.index("[payload]")].replace("damping = 0.0 ", "# ")
+    short = short.replace(short[short.index("assumptions") : short.index("[link]")], "")
+    assert accepted(short).payload == Payload()
+    assert accepted(short).assumptions == ()
+    assert accepted(short + "[payload]\nmass = 2\n").payload == Payload(mass=2.0)
+
+
+def test_poissons_ratio_instead_of_the_shear_modulus(accepted):
+    link = accepted(edited("shear_modulus = 2.6517e10", "poissons_ratio = 0.25")).link
+    assert link.shear_modulus == 6.8944e10 / 2.5
+
+
+@pytest.mark.parametrize(
+    ("table", "section"),
+    [
+        ('shape = "rectangle"\nwidth = 0.1\ndepth = 0.006\n', Section.rectangle(width=0.1, depth=0.006)),
+        (
+            'shape = "rectangle"\nwidth = 0.1\ndepth = 0.006\nshear_factor = 0.8\n',
+            Section.rectangle(width=0.1, depth=0.006, shear_factor=0.8),
+        ),
+        ('shape = "round"\ndiameter = 0.02\n', Section.round(diameter=0.02)),
+        (
+            'shape = "tube"\nouter_diameter = 0.02\ninner_diameter = 0.01\n',
+            Section.tube(outer_diameter=0.02, inner_diameter=0.01),
+        ),
+    ],
+)
+def test_the_named_shapes(accepted, table, section):
+    assert accepted(edited(GENERAL, table)).link.section == section
+
+
+def test_whole_numbers_infinities_and_foreign_line_ends(accepted):
+    assert accepted(edited("length = 1.0 ", "length = 1 ")).link.length == 1.0
+    assert accepted(edited("inertia = 0.1", "inertia = inf")).is_locked
+    assert accepted(edited("mass = 0.0", "mass = inf")).payload.mass == math.inf
+    assert accepted(b"\xef\xbb\xbf" + EXAMPLE.replace("\n", "\r\n").encode()) == accepted(EXAMPLE)
+
+
+BAD_EDITS = {
+    # what: (in the example, instead, what the message says)
+    "missing key": ("length = 1.0 ", "# ", "link.length is missing: give a number without quotes"),
+    "missing table": ("[hub]\ninertia = 0.1", "", "hub is missing: give a table, headed [hub]"),
+    "missing name": ('name = "sasaki2012"', "", "name is missing: give a text such as"),
+    "missing shape": ('shape = "general"', "", "link.section.shape is missing: give one of rectangle, round"),
+    "missing shear factor": ("shear_factor = 0.8333333333333334", "", "link.section.shear_factor is missing"),
+    "no shear modulus": ("shear_modulus = 2.6517e10", "", "link.shear_modulus is missing: give it in Pa, or"),
+    "unknown key": ("density =", "densty =", 'link.densty = 2766.7: unknown key; did you mean "density"?'),
+    "unknown table": ("[payload]", "[payloads]", 'unknown key; did you mean "payload"?'),
+    "unknown section key": (
+        "area =",
+        "aera =",
+        'link.section.aera = 0.0006: unknown key; did you mean "area"?',
+    ),
+    "unknown shape": (
+        '"general"',
+        '"rectangel"',
+        "shape = 'rectangel': unknown shape; did you mean \"rectangle\"?",
+    ),
+    "text for a number": (
+        "length = 1.0 ",
+        'length = "1.0" ',
+        "link.length = '1.0': wrong type; give a number",
+    ),
+    "true for a number": ("length = 1.0 ", "length = true ", "link.length = true: wrong type; give a number"),
+    "date for a number": ("length = 1.0 ", "length = 2012-01-01 ", "link.length = datetime.date"),
+    "list for a number": ("length = 1.0 ", "length = [1.0] ", "link.length = [1.0]: wrong type"),
+    "number for a table": ("[payload]", "payload = 1\n[other]", "unknown key"),
+    "number for a text": ('name = "sasaki2012"', "name = 1", "name = 1: wrong type; give a text"),
+    "number for an assumption": ('"..."', "3", "assumptions.1 = 3: wrong type; give a text in double quotes"),
+    "text for assumptions": (
+        ', "..."]',
+        ', "..."]\nx = 1',
+        "x = 1: unknown key; known are: name, assumptions",
+    ),
+    "nan": ("length = 1.0 ", "length = nan ", "link.length = nan: a length is a positive, finite number"),
+    "negative length": (
+        "length = 1.0 ",
+        "length = -1.0 ",
+        "link.length = -1.0: a length is a positive, finite",
+    ),
+    "infinite density": ("density = 2766.7", "density = inf", "link.density = inf: a density is a positive"),
+    "zero modulus": (
+        "youngs_modulus = 6.8944e10",
+        "youngs_modulus = 0",
+        "link.youngs_modulus = 0.0: Young's",
+    ),
+    "zero area": (
+        "area = 6.0e-4",
+        "area = 0",
+        "link.section.area = 0.0: a section has a positive, finite area",
+    ),
+    "negative damping": ("damping = 0.0", "damping = -1e-4", "link.damping = -0.0001: damping C is zero or"),
+    "negative hub": (
+        "inertia = 0.1",
+        "inertia = -0.1",
+        "hub.inertia = -0.1: a hub inertia is zero (free pin)",
+    ),
+    "negative mass": (
+        "mass = 0.0",
+        "mass = -1",
+        "payload.mass = -1.0: a payload mass is zero, positive in kg",
+    ),
+    "rubber": (
+        "shear_modulus = 2.6517e10",
+        "poissons_ratio = 0.7",
+        "link.poissons_ratio = 0.7: Poisson's ratio",
+    ),
+    "both": (
+        "damping",
+        "poissons_ratio = 0.3\ndamping",
+        "link.poissons_ratio = 0.3: shear_modulus is given too",
+    ),
+    "huge number": ("length = 1.0 ", "length = 1e300 ", "link.length = 1e+300: beyond any arm"),
+    "long number": ("length = 1.0 ", f"length = 1{'0' * 5000} ", "TOML = "),
+    "path as name": ('"sasaki2012"', '"../../x"', "name = '../../x': a name has 1 to 80 characters"),
+    "control character": ('"..."', '"\\u001b[31m"', "assumptions = '\\x1b[31m': assumptions are a list of"),
+    "twice": ("[hub]", "[link]", "is not TOML: Cannot declare ('link',) twice"),
+    "no TOML": ("[hub]", "hub]", "line 14, column 4 = 'hub]': is not TOML: Expected '='"),
+    "open text": ('name = "sasaki2012"', 'name = "sasaki', "is not TOML"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_EDITS)
+def test_a_bad_file_is_refused_in_one_line_with_its_key_value_and_remedy(refused, case):
+    old, new, message = BAD_EDITS[case]
+    content = EXAMPLE.replace(old, new, 1)
+    assert content != EXAMPLE
+    assert message in refused(content)
+
+
+def test_a_tube_thinner_than_nothing(refused):
+    table = 'shape = "tube"\nouter_diameter = 0.01\ninner_diameter = 0.02\n'
+    assert "link.section.inner_diameter = 0.02: a tube is hollow" in refused(edited(GENERAL, table))
+
+
+CHOKING = {
+    "nothing": (b"", "name is missing"),
+    "more than 64 KiB": (b"#" * (MOST_BYTES + 1), "size in bytes = 65537: an arm's file has at most 65536"),
+    "not UTF-8": (b'name = "\xff"', "byte 8 = b'\\xff': is not UTF-8; save the file as UTF-8"),
+    "UTF-16": (EXAMPLE.encode("utf-16"), "is not UTF-8"),
+    "zeros": (b"\0" * 1000, "is not TOML"),
+    "a key of 40 KB": (("a." * 20_000 + "b = 1").encode(), "40005 characters in a line; at most 8192"),
+    "a key of 8 KB": (("a." * 4_000 + "b = 1").encode(), "4000 dots in a line; at most 200"),
+    "many long keys": ("".join(f"{'a.' * 199}b{i} = 1\n" for i in range(150)).encode(), "a = {'a'"),
+    "long keys in long tables": (
+        "".join(f"[{'a.' * 199}b{i}]\n{'c.' * 199}d = 1\n" for i in range(75)).encode(),
+        "a = {'a'",
+    ),
+    "50,000 brackets in a line": (b"a = " + b"[" * 50_000 + b"]" * 50_000, "size in bytes = 100004"),
+    "30,000 brackets in a line": (b"a = " + b"[" * 30_000 + b"]" * 30_000, "characters in a line"),
+    "brackets in lines": (b"a = " + b"[\n" * 30_000, "more than 16 brackets open"),
+    "braces": (b"a = " + b"{a = " * 1000 + b"}" * 1000, "more than 16 brackets open"),
+    "brackets closed in comments": (b"a = " + b"[ #]\n" * 12_000, "brackets nested too deep"),
+    "many tables": ("".join(f"[a.b{i}]\nc.d = 1\n" for i in range(3500)).encode(), "unknown key"),
+    "many empty tables": (b"[[a]]\n" * 10_000, "unknown key"),
+}
+
+
+@pytest.mark.parametrize("case", CHOKING)
+def test_a_file_that_chokes_a_parser_is_refused_at_once(refused, case):
+    content, message = CHOKING[case]
+    assert message in refused(content)
+
+
+def refusal(name):
+    with pytest.raises(ParameterError) as caught:
+        load(name)
+    assert str(caught.value).isprintable()
+    return str(caught.value)
+
+
+def test_a_misspelt_preset():
+    text = refusal("saski2012")
+    assert text.startswith("arm = 'saski2012': no such preset: did you mean \"sasaki2012\"?")
+    assert all(name in text for name in presets())
+
+
+@pytest.mark.parametrize("name", ["", "  ", "a\0b.toml", None, 3])
+def test_what_can_be_no_name(name):
+    assert "give a preset (sasaki2012, " in refusal(name)
+
+
+def test_what_is_no_regular_file(tmp_path):
+    os.mkfifo(tmp_path / "pipe.toml")
+    os.symlink("loop.toml", tmp_path / "loop.toml")
+    assert "is a folder; give a .toml file" in refusal(tmp_path)
+    assert "is no regular file" in refusal(tmp_path / "pipe.toml")
+    assert "is no regular file" in refusal("/dev/zero")
+    assert "cannot be read (Too many levels of symbolic links)" in refusal(tmp_path / "loop.toml")
+    assert "cannot be read (No such file or directory)" in refusal(tmp_path / "none.toml")
+    assert "cannot be read (No such file or directory)" in refusal("two\nlines.toml")
+    assert "cannot be read (File name too long)" in refusal("x" * 5000 + ".toml")
+
+
+def test_a_file_without_permission(tmp_path, monkeypatch):
+    def denied(*_):
+        raise PermissionError(13, "Permission denied")
+
+    path = tmp_path / "arm.toml"
+    path.write_text(EXAMPLE)
+    monkeypatch.setattr("builtins.open", denied)
+    assert "cannot be read (Permission denied); check the path and its permissions" in refusal(path)
+
+
+def test_a_file_without_the_ending_and_a_preset_beside_a_file_of_its_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    other = EXAMPLE.replace("sasaki2012", "other")
+    Path("my-arm").write_text(other)
+    Path("sasaki2012").write_text(other)
+    assert load("my-arm").name == "other"
+    assert load("sasaki2012").name == "sasaki2012"
+    assert load("./sasaki2012").name == "other"
+    assert load(Path("sasaki2012")).name == "other"
+
+
+positive = st.floats(1e-3, 1e3)
+inertias = st.one_of(st.just(0.0), st.just(math.inf), st.floats(1e-9, 1e9))
+factors = st.one_of(st.none(), st.floats(0.1, 1.0))
+sections = st.one_of(
+    st.builds(Section.rectangle, width=positive, depth=positive, shear_factor=factors),
+    st.builds(Section.round, diameter=positive, shear_factor=factors),
+    st.builds(
+        lambda outer, ratio, factor: Section.tube(
+            outer_diameter=outer, inner_diameter=outer * ratio, shear_factor=factor
+        ),
+        positive,
+        st.floats(0.1, 0.99),
+        factors,
+    ),
+    st.builds(Section.general, area=positive, second_moment=positive, shear_factor=st.floats(0.1, 1.0)),
+)
+arms = st.builds(
+    Arm,
+    name=st.from_regex(r"[A-Za-z0-9][A-Za-z0-9 _.-]{0,20}[a-z]", fullmatch=True),
+    assumptions=st.lists(st.text(st.characters(categories=("L", "N", "P", "S"))), max_size=3).map(tuple),
+    link=st.builds(
+        Link.isotropic,
+        length=positive,
+        density=positive,
+        youngs_modulus=positive,
+        poissons_ratio=st.floats(-0.9, 0.5),
+        damping=st.one_of(st.just(0.0), positive),
+        section=sections,
+    ),
+    hub=st.builds(Hub, inertia=inertias),
+    payload=st.builds(Payload, mass=inertias, inertia=inertias),
+)
+
+
+@given(arm=arms)
+def test_an_arm_written_and_read_is_the_same_to_the_last_bit(tmp_path_factory, arm):
+    path = tmp_path_factory.getbasetemp() / "round-trip.toml"
+    path.write_text(to_toml(arm), encoding="utf-8")
+    assert load(path) == arm
+
+
+@pytest.mark.parametrize("name", presets())
+def test_a_preset_written_and_read_is_the_same(accepted, name):
+    assert accepted(to_toml(load(name))) == load(name)
+
+
+@given(place=st.integers(0, len(EXAMPLE)), cut=st.integers(0, 12), noise=st.binary(max_size=12))
+def test_a_damaged_file_is_read_or_refused_and_nothing_else(tmp_path_factory, place, cut, noise):
+    path = tmp_path_factory.getbasetemp() / "damaged.toml"
+    good = EXAMPLE.encode()
+    path.write_bytes(good[:place] + noise + good[place + cut :])
+    try:
+        assert isinstance(load(path), Arm)
+    except ParameterError as error:
+        assert str(error).isprintable()
+        assert error.file == str(path)

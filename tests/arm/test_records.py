@@ -1,0 +1,183 @@
+import math
+import pickle
+from dataclasses import FrozenInstanceError, replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from tfarm.arm import Arm, Hub, Link, Payload, Section
+from tfarm.errors import ParameterError
+
+LINK = Link(
+    length=2,
+    density=3,
+    youngs_modulus=26,
+    shear_modulus=10,
+    section=Section.general(area=0.5, second_moment=0.25, shear_factor=0.5),
+)
+ARM = Arm(link=LINK, hub=Hub(inertia=7), payload=Payload(mass=11, inertia=13))
+STEEL = {"length": 1.0, "density": 7850.0, "youngs_modulus": 2.1e11, "section": Section.round(diameter=0.02)}
+
+
+def test_stiffness_and_inertia_per_length():
+    assert (LINK.EI, LINK.kGA, LINK.rhoA, LINK.rhoI) == (6.5, 2.5, 1.5, 0.75)
+    assert LINK.poissons_ratio == pytest.approx(0.3, rel=1e-15)
+    assert LINK.slenderness == pytest.approx(2 * math.sqrt(2), rel=1e-15)
+
+
+def test_total_inertia_is_the_integral_over_the_rigid_arm():
+    """dJ = rho (x^2 + z^2) dV, by quadrature over a bar of square section, plus hub and payload."""
+    bar = Link(
+        length=1.5,
+        density=8.0,
+        youngs_modulus=1.0,
+        shear_modulus=0.4,
+        section=Section.rectangle(width=0.2, depth=0.2),
+    )
+    nodes, weights = np.polynomial.legendre.leggauss(4)
+    x, z = 0.75 * (nodes + 1), 0.1 * nodes
+    per_volume = np.add.outer(x**2, z**2)
+    beam = 8.0 * 0.2 * np.einsum("i,j,ij", 0.75 * weights, 0.1 * weights, per_volume)
+    arm = Arm(link=bar, hub=Hub(inertia=0.3), payload=Payload(mass=0.7, inertia=0.11))
+    assert arm.total_inertia == pytest.approx(0.3 + beam + 0.7 * 1.5**2 + 0.11, rel=4e-16 * 4)
+
+
+def test_shear_cutoff_is_where_one_wave_number_vanishes():
+    """The product of the squared wave numbers, s^2 rhoA/EI (1 + s^2 rhoI/kGA), is zero at s = i w."""
+    w = ARM.shear_cutoff
+    assert 1 - w**2 * LINK.rhoI / LINK.kGA == pytest.approx(0.0, abs=4e-16)
+
+
+@pytest.mark.parametrize(
+    ("hub", "mass", "inertia", "rigid"),
+    [
+        (1, 1, 1, True),
+        (0, 0, 0, True),
+        (math.inf, 0, 0, False),
+        (1, math.inf, 0, False),
+        (1, 0, math.inf, False),
+    ],
+)
+def test_the_arm_turns_rigidly_unless_something_holds_it(hub, mass, inertia, rigid):
+    arm = Arm(link=LINK, hub=Hub(inertia=hub), payload=Payload(mass=mass, inertia=inertia))
+    assert arm.has_rigid_mode is rigid
+    assert arm.is_locked is (hub == math.inf)
+
+
+def test_poissons_ratio_gives_the_shear_modulus():
+    link = Link.isotropic(**STEEL, poissons_ratio=0.3)
+    assert link.shear_modulus == 2.1e11 / 2.6
+    assert link.poissons_ratio == pytest.approx(0.3, abs=4e-16)
+    assert Link.isotropic(**STEEL, poissons_ratio=0.5).shear_factor == pytest.approx(0.9, rel=4e-16)
+
+
+def test_a_material_that_is_not_isotropic_needs_its_shear_factor():
+    with pytest.raises(
+        ParameterError, match=r"link\.shear_modulus = 5e\+09: .* ratio of 20, outside \(-1, 0\.5\]"
+    ):
+        Link(**STEEL, shear_modulus=5e9)
+    with pytest.raises(ParameterError, match=r"link\.shear_modulus = 1e\+25: .* ratio of -1"):
+        Link(**STEEL, shear_modulus=1e25)
+    given = Section.round(diameter=0.02, shear_factor=0.9)
+    assert Link(**{**STEEL, "section": given}, shear_modulus=5e9).shear_factor == 0.9
+
+
+def test_records_are_frozen_hashable_and_survive_pickling():
+    with pytest.raises(FrozenInstanceError):
+        LINK.length = 3.0
+    assert hash(ARM) == hash(replace(ARM))
+    assert pickle.loads(pickle.dumps(ARM)) == ARM
+    assert replace(ARM, hub=Hub(inertia=8)) != ARM
+
+
+@pytest.mark.parametrize("two", [2, np.float64(2), np.float32(2), np.int64(2), Fraction(2)])
+def test_every_real_number_becomes_a_float(two):
+    link = replace(LINK, length=two)
+    assert type(link.length) is float
+    assert link == LINK
+
+
+BAD_NUMBERS = {
+    "nan": (math.nan, "nan"),
+    "negative": (-1.0, "-1.0"),
+    "zero": (0.0, "0.0"),
+    "infinite": (math.inf, "inf"),
+    "true": (True, "true"),
+    "numpy true": (np.True_, "True"),
+    "text": ("1.0", "'1.0'"),
+    "nothing": (None, "None"),
+    "complex": (1 + 0j, "(1+0j)"),
+    "huge": (1e300, "1e+300"),
+    "tiny": (5e-324, "5e-324"),
+    "beyond a float": (10**400, "1000000"),
+}
+
+
+@pytest.mark.parametrize("kind", BAD_NUMBERS)
+@pytest.mark.parametrize("name", ["length", "density", "youngs_modulus", "shear_modulus"])
+def test_a_link_refuses_what_is_no_positive_number(name, kind):
+    value, text = BAD_NUMBERS[kind]
+    with pytest.raises(ParameterError) as caught:
+        replace(LINK, **{name: value})
+    assert str(caught.value).startswith(f"link.{name} = ")
+    assert text in str(caught.value)
+    assert str(caught.value).isprintable()
+
+
+@pytest.mark.parametrize("nu", [0.7, 0.5000001, -1.0, -3, math.nan, math.inf, "0.3", True])
+def test_poissons_ratio_lies_above_minus_one_up_to_a_half(nu):
+    with pytest.raises(ParameterError, match=r"link\.poissons_ratio = .*above -1, up to 0\.5"):
+        Link.isotropic(**STEEL, poissons_ratio=nu)
+
+
+@pytest.mark.parametrize("value", [-1e-4, math.nan, math.inf, -math.inf, True, "0", 1e-300])
+def test_damping_is_zero_or_a_positive_time(value):
+    with pytest.raises(ParameterError, match=r"^link\.damping = "):
+        replace(LINK, damping=value)
+    assert replace(LINK, damping=0).damping == 0.0
+    assert math.copysign(1.0, replace(LINK, damping=-0.0).damping) == 1.0
+
+
+@pytest.mark.parametrize("value", [-1e-4, math.nan, -math.inf, False, "inf", 1e300])
+def test_inertias_are_zero_positive_or_infinite(value):
+    with pytest.raises(ParameterError, match=r"^hub\.inertia = .*(locked|check the unit)"):
+        Hub(inertia=value)
+    with pytest.raises(ParameterError, match=r"^payload\.mass = .*(tip pinned|check the unit)"):
+        Payload(mass=value)
+    with pytest.raises(ParameterError, match=r"^payload\.inertia = .*(cannot rotate|check the unit)"):
+        Payload(inertia=value)
+
+
+def test_nothing_that_is_accepted_overflows():
+    for big in (1e-40, 1e40):
+        section = Section.general(area=big, second_moment=big, shear_factor=1.0)
+        link = Link(length=1.0, density=big, youngs_modulus=big, shear_modulus=big, section=section)
+        arm = Arm(link=link, hub=Hub(inertia=big), payload=Payload(mass=big, inertia=big))
+        for x in (link.EI, link.kGA, link.rhoA, link.rhoI, arm.total_inertia, arm.shear_cutoff):
+            assert 0.0 < x < math.inf
+
+
+@pytest.mark.parametrize("length", [1e-9, 1e20])
+def test_a_plate_or_an_endless_thread_is_no_beam(length):
+    with pytest.raises(ParameterError, match=r"^link\.length = .*radius of gyration is no beam"):
+        replace(LINK, length=length)
+
+
+@pytest.mark.parametrize(
+    "name", ["", "../up", "a/b", "a\\b", ".hidden", "end.", "two\nlines", "\x1b[1m", "x" * 81, 3, "a:b"]
+)
+def test_a_name_can_be_a_folder_on_any_machine(name):
+    with pytest.raises(ParameterError, match=r"^name = .*begins with a letter or digit"):
+        replace(ARM, name=name)
+    assert replace(ARM, name="Arm nº 2 (β)").name == "Arm nº 2 (β)"
+
+
+@pytest.mark.parametrize("assumptions", ["one text", [3], ["\x1b[31m"], None])
+def test_assumptions_are_plain_texts(assumptions):
+    with pytest.raises(ParameterError, match=r"^assumptions = .*list of plain texts"):
+        replace(ARM, assumptions=assumptions)
+
+
+def test_assumptions_become_a_tuple_of_single_lines():
+    assert replace(ARM, assumptions=["two\n  lines", "one"]).assumptions == ("two lines", "one")

@@ -1,0 +1,51 @@
+"""tfarm: a rotating flexible Timoshenko arm in the frequency domain, from its exact solution.
+
+    arm = tfarm.load("sasaki2012")            # a preset or a TOML file
+    G = tfarm.transfer(arm, "root_moment")    # exact; callable at any complex s
+    modes = tfarm.modes(arm, count=10)        # complete by construction
+
+What is not needed is not imported: each name below is fetched at its first use.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from tfarm.arm import Arm, Hub, Link, Payload, Section, load, presets
+    from tfarm.errors import CertificationError, ConvergenceError, ParameterError
+    from tfarm.response import transfer
+    from tfarm.spectrum import modes
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "Arm",
+    "CertificationError",
+    "ConvergenceError",
+    "Hub",
+    "Link",
+    "ParameterError",
+    "Payload",
+    "Section",
+    "load",
+    "modes",
+    "presets",
+    "transfer",
+]
+
+_ROOMS = {"modes": "spectrum", "transfer": "response"}
+
+
+def __getattr__(name: str) -> object:
+    if name not in __all__:
+        raise AttributeError(f"module 'tfarm' has no attribute {name!r}")
+    room = _ROOMS.get(name, "errors" if name.endswith("Error") else "arm")
+    value = getattr(import_module(f"tfarm.{room}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]

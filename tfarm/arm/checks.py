@@ -1,0 +1,58 @@
+"""The checks of a single number, each made once, where a record is built.
+
+Everywhere `key` is the name as in the TOML file and `meaning` says, in the language of physics, what
+would be right.
+"""
+
+from __future__ import annotations
+
+import math
+from numbers import Real
+
+from tfarm.errors import ParameterError
+
+SMALLEST, LARGEST = 1e-40, 1e40  # far outside any arm, yet no product of a few such numbers overflows
+
+
+def number(key: str, value: object, meaning: str) -> float:
+    """`value` as a float; a bool, a text or nan is refused."""
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise ParameterError(key=key, value=value, remedy=f"{meaning}; write a plain number, no text or true")
+    try:
+        x = float(value)
+    except OverflowError:
+        raise _too_far(key, value) from None
+    if math.isnan(x):
+        raise ParameterError(key=key, value=value, remedy=f"{meaning}; nan is none")
+    return x
+
+
+def positive(key: str, value: object, meaning: str) -> float:
+    """A number above zero, finite and of a sane magnitude."""
+    x = number(key, value, meaning)
+    if x <= 0.0 or math.isinf(x):
+        raise ParameterError(key=key, value=x, remedy=meaning)
+    return _sane(key, x)
+
+
+def not_negative(key: str, value: object, meaning: str) -> float:
+    """Zero, or a positive number."""
+    x = number(key, value, meaning)
+    return 0.0 if x == 0.0 else positive(key, x, meaning)
+
+
+def extended(key: str, value: object, meaning: str) -> float:
+    """Zero, a positive number, or inf."""
+    x = number(key, value, meaning)
+    return x if x == math.inf else not_negative(key, x, meaning)
+
+
+def _sane(key: str, x: float) -> float:
+    if not SMALLEST <= x <= LARGEST:
+        raise _too_far(key, x)
+    return x
+
+
+def _too_far(key: str, value: object) -> ParameterError:
+    remedy = f"beyond any arm ({SMALLEST:g} to {LARGEST:g}); check the unit: m, kg, s, Pa throughout"
+    return ParameterError(key=key, value=value, remedy=remedy)

@@ -1,0 +1,89 @@
+"""What can go wrong: bad input, a search that stopped short, a proof that failed."""
+
+from __future__ import annotations
+
+import difflib
+import os
+from collections.abc import Iterable
+from enum import Enum
+from functools import partial
+from typing import Any, Final
+
+
+class Missing(Enum):
+    """The value of a key that is not there."""
+
+    MISSING = "missing"
+
+
+MISSING: Final = Missing.MISSING
+
+
+class TfarmError(Exception):
+    """Base of every error that tfarm raises on purpose."""
+
+
+class ParameterError(TfarmError, ValueError):
+    """Bad input.  Its text is one line: the file (if there is one), the key, the value and the remedy."""
+
+    def __init__(
+        self, *, key: str, value: object, remedy: str, file: str | os.PathLike[str] | None = None
+    ) -> None:
+        self.key, self.value, self.remedy = key, value, remedy
+        self.file = None if file is None else os.fspath(file)
+        super().__init__(str(self))
+
+    def __str__(self) -> str:
+        where = "" if self.file is None else f"{one_line(self.file, 240)}: "
+        key = one_line(self.key, 80)
+        what = f"{key} is missing" if self.value is MISSING else f"{key} = {shown(self.value)}"
+        return f"{where}{what}: {one_line(self.remedy, 480)}"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        again = partial(type(self), key=self.key, value=self.value, remedy=self.remedy, file=self.file)
+        return again, ()
+
+    def in_file(self, file: str | os.PathLike[str]) -> ParameterError:
+        """The same error, with the file it was found in."""
+        return type(self)(key=self.key, value=self.value, remedy=self.remedy, file=file)
+
+
+class ConvergenceError(TfarmError):
+    """A search stopped short.  Carries the best value found and its residual."""
+
+    def __init__(self, message: str, best: Any, residual: Any) -> None:
+        super().__init__(message, best, residual)
+        self.message, self.best, self.residual = message, best, residual
+
+    def __str__(self) -> str:
+        return self.message
+
+
+class CertificationError(TfarmError):
+    """A result could not be proven."""
+
+
+def did_you_mean(word: str, choices: Iterable[str]) -> str:
+    """The remedy for a misspelt word: the nearest choice, if one is near, and all of them."""
+    known = list(choices)
+    near = difflib.get_close_matches(word[:80], known, n=1)
+    hint = f'did you mean "{near[0]}"? ' if near else ""
+    return f"{hint}known are: {', '.join(known)}"
+
+
+def one_line(text: str, longest: int) -> str:
+    """`text` with what does not print escaped, cut in its middle to `longest` characters."""
+    if len(text) > longest:
+        half = (longest - 5) // 2
+        text = f"{text[:half]} ... {text[-half:]}"
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
+
+
+def shown(value: object) -> str:
+    """A value as a person would type it, in at most 60 characters."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    try:
+        return one_line(repr(value), 60)
+    except (ValueError, RecursionError):  # an integer of more than 4300 digits, a very deep table
+        return f"<{type(value).__name__}>"

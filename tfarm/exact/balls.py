@@ -1,0 +1,142 @@
+"""The exact solution in ball arithmetic (python-flint): every number comes with a bound on its error.
+
+No wave is ever separated here.  With z1 + z2 and z1 z2 from the dispersion relation, the functions F0..F3 of
+`waves.from_transition` are the last column of the exponential of a 4x4 companion matrix, entire in
+s^2/(1 + C s): there is no cut-off, no pair of equal waves and no low frequency where this form loses
+its meaning, only digits, and then the precision is raised until the digits asked for are proven.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from fractions import Fraction
+from typing import Any
+
+import flint
+
+from tfarm.errors import CertificationError
+
+from .coefficients import Coefficients, Condition
+from .compiled import plain
+from .outputs import Output, Quantity, unit_scale
+from .waves import from_transition
+
+_algebra = plain(from_transition)
+Ball = Any  # flint.acb or flint.arb, which come without types
+
+MOST_BITS = 1 << 18
+
+
+@contextmanager
+def precision(bits: int) -> Iterator[None]:
+    """flint's working precision inside the block, restored after it."""
+    with flint.ctx.workprec(bits):
+        yield
+
+
+def rational(value: Fraction | float) -> Ball:
+    """The ball of a fraction or float, at the working precision."""
+    exact = Fraction(value)
+    return flint.arb(flint.fmpq(exact.numerator, exact.denominator))
+
+
+def point(s: complex) -> Ball:
+    """The exact ball of a complex float."""
+    return flint.acb(flint.arb(s.real), flint.arb(s.imag))
+
+
+def transition(z_sum: Ball, z_product: Ball, x: Ball) -> tuple[Ball, Ball, Ball, Ball]:
+    """F0..F3 at x (0..1), by the two waves where they differ and by the matrix exponential where they may not."""
+    spread = (z_sum * z_sum / 4 - z_product).sqrt()
+    z1, z2 = z_sum / 2 + spread, z_sum / 2 - spread
+    if (z1 - z2).contains(0) or z1.contains(0) or z2.contains(0):
+        return _transition_by_exponential(z_sum, z_product, x)
+    t1, t2 = z1.sqrt(), z2.sqrt()
+    (h1, c1), (h2, c2) = (t1 * x).sinh_cosh(), (t2 * x).sinh_cosh()
+    over = 1 / (z1 - z2)
+    return (h1 / t1 - h2 / t2) * over, (c1 - c2) * over, (t1 * h1 - t2 * h2) * over, (z1 * c1 - z2 * c2) * over
+
+
+def _transition_by_exponential(z_sum: Ball, z_product: Ball, x: Ball) -> tuple[Ball, Ball, Ball, Ball]:
+    """F'''' = (z1 + z2) F'' - z1 z2 F as a first-order system, with F'''(0) = 1."""
+    zero, one = flint.acb(0), flint.acb(x)
+    system = flint.acb_mat(
+        [[zero, one, zero, zero], [zero, zero, one, zero], [zero, zero, zero, one], [-z_product * x, zero, z_sum * x, zero]]
+    )
+    exponential = system.exp()
+    return tuple(exponential[row, 3] for row in range(4))  # type: ignore[return-value]
+
+
+class State:
+    """The free response of the arm at one s: root values, and by them the fields at any x."""
+
+    def __init__(self, k: Coefficients, s: Ball) -> None:
+        self.k, self.s = k, s
+        self.S, self.d = s * s, 1 + rational(k.damping) * s
+        self.a, self.b, self.g, self.sigma = (rational(value) for value in (k.a, k.b, k.g, k.sigma))
+        S, over_d = self.S, 1 / self.d
+        self.z_sum = S * (self.b + self.a * over_d)
+        self.z_product = S * (self.a * self.b * S + self.g) * over_d
+        mass, inertia = Condition.of(k.tip_mass), Condition.of(k.tip_inertia)
+        F0, F1, F2, F3 = transition(self.z_sum, self.z_product, flint.arb(1))
+        self.theta, self.M0, self.Q0, self.W1, self.Y1 = _algebra(
+            F0, F1, F2, F3, F2 - 1, S, over_d, self.a, self.b, self.g, self.sigma,
+            self._end(mass), rational(mass.force), self._end(inertia), rational(inertia.force),
+        )  # fmt: skip
+
+    def _end(self, condition: Condition) -> Ball:
+        return rational(condition.rest) + rational(condition.inertia) * self.S
+
+    @property
+    def input(self) -> Ball:
+        """The torque behind this response, or the hub angle where the hub is locked: zero at a pole."""
+        hub = Condition.of(self.k.hub_inertia)
+        drive = self._end(hub) * self.theta - rational(hub.force) * self.M0
+        return drive if hub.rest else drive / rational(hub.force)
+
+    def field(self, quantity: Quantity, x: float) -> Ball:
+        """The quantity at x (a share of the length, 0..1), from the root by the state-transition matrix."""
+        F0, F1, F2, F3 = transition(self.z_sum, self.z_product, rational(x))
+        S, over_d, M, Q = self.S, 1 / self.d, self.M0, self.Q0
+        a, b, g, sigma, theta = self.a, self.b, self.g, self.sigma, self.theta
+        if quantity == "Y":
+            lift = sigma * F2 - (1 + sigma * a * S) * over_d * F0
+            return theta * (F2 - rational(x)) + M * F1 * over_d + Q * lift
+        if quantity == "Phi":
+            return theta * (F3 - b * S * F1 - 1) + over_d * (M * (F2 - b * S * F0) - Q * F1)
+        if quantity == "M":
+            return theta * S * (a * (F2 - b * S * F0) - g * F0) + M * (F3 - b * S * F1) - Q * F2
+        return g * S * (theta * F1 + M * F0 * over_d) + Q * (F3 - a * S * over_d * F1)
+
+    def value(self, output: Output, x: float = 0.0) -> Ball:
+        """The output for a unit input, in SI units; x is a share of the length."""
+        if output.place == "x":
+            quantity = self.field(output.quantity, x)
+        else:
+            quantity = {"theta": self.theta, "M": self.M0, "Q": self.Q0, "W": self.W1, "Y": self.Y1}[output.quantity]
+        ratio = quantity * self.s**output.power / self.input
+        ratio = ratio / self.d if output.gauge else ratio
+        return ratio * rational(unit_scale(output, self.k))
+
+
+def enclose(k: Coefficients, wanted: Output, s: complex, *, bits: int, x: float = 0.0) -> Ball:
+    """A ball around the output at s whose relative radius is below 2^-bits.
+
+    Raises CertificationError where no precision up to `MOST_BITS` gives one: at a pole, or at an exact zero.
+    """
+    working = 2 * bits + 64
+    while working < MOST_BITS:
+        with precision(working):
+            state = State(k, point(s))
+            if not state.input.contains(0):
+                value = state.value(wanted, x)
+                if value.rel_accuracy_bits() >= bits:
+                    return value
+        working *= 2
+    raise CertificationError(f"no {bits} bits at s = {s:g} 1/s: it is a pole or a zero, or too close to one")
+
+
+def nearest(ball: Ball) -> complex:
+    """The complex float at the middle of a ball."""
+    return complex(float(ball.real.mid()), float(ball.imag.mid()))

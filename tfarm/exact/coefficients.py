@@ -1,0 +1,116 @@
+"""The arm's numbers without dimensions, once, for every way of evaluating the exact solution.
+
+Lengths in L, moments in EI/L, forces in EI/L^2, time in seconds.  The four beam theories are four choices of
+two numbers: rotary inertia a (0 without it) and shear flexibility b, sigma (0 without it).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import Arm
+from tfarm.errors import ParameterError
+
+Theory = Literal["timoshenko", "shear", "rayleigh", "euler-bernoulli"]
+THEORIES: tuple[Theory, ...] = get_args(Theory)
+
+
+Inertia = Fraction | float  # a fraction, or math.inf
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Condition:
+    """An end condition  (rest + inertia s^2) motion + force_weight force = 0, scaled to stay near one.
+
+    A finite dimensionless inertia n gives (0, n, 1)/(1 + n), an infinite one (1, 0, 0): motion = 0.
+    """
+
+    rest: Fraction
+    inertia: Fraction
+    force: Fraction
+
+    @classmethod
+    def of(cls, inertia: Inertia) -> Condition:
+        """The condition of a body of that dimensionless inertia (0..inf)."""
+        if not isinstance(inertia, Fraction):
+            return cls(rest=Fraction(1), inertia=Fraction(0), force=Fraction(0))
+        return cls(rest=Fraction(0), inertia=inertia / (1 + inertia), force=1 / (1 + inertia))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Coefficients:
+    """Dimensionless coefficients of an arm, exact as fractions of its float64 parameters.
+
+    a = rho L^2/E, b = rho L^2/(kappa G) and g = rho A L^4/(E I) in s^2, sigma = EI/(kappa G A L^2),
+    damping C in s; mass m L^3/EI, tip and hub inertia I L/EI in s^2 (inf where the arm says so).
+    """
+
+    a: Fraction
+    b: Fraction
+    g: Fraction
+    sigma: Fraction
+    damping: float
+    tip_mass: Inertia
+    tip_inertia: Inertia
+    hub_inertia: Inertia
+    length: Fraction
+    EI: Fraction
+
+    @property
+    def is_locked(self) -> bool:
+        """Whether the hub cannot turn, so that its angle is the input."""
+        return not isinstance(self.hub_inertia, Fraction)
+
+    @property
+    def kernel(self) -> NDArray[np.float64]:
+        """The vector that the compiled functions of `waves` read (see the indices there)."""
+        split = [part for value in (self.a, self.b, self.g) for part in double_double(value)]
+        ends = [Condition.of(inertia) for inertia in (self.tip_mass, self.tip_inertia, self.hub_inertia)]
+        numbers = [float(number) for end in ends for number in (end.rest, end.inertia, end.force)]
+        gain = 1.0 if self.is_locked else float(ends[2].force)
+        return np.array([*split, float(self.sigma), self.damping, *numbers, gain])
+
+
+def double_double(value: Fraction) -> tuple[float, float]:
+    """The two floats whose sum is nearest to the fraction."""
+    high = float(value)
+    return high, float(value - Fraction(high))
+
+
+def coefficients(arm: Arm, theory: Theory = "timoshenko") -> Coefficients:
+    """The coefficients of the arm under one of `THEORIES`.
+
+    "shear" leaves out rotary inertia, "rayleigh" shear flexibility, "euler-bernoulli" both (Han, Benaroya
+    and Wei 1999).  Raises ParameterError for another name.
+    """
+    if theory not in THEORIES:
+        raise ParameterError(key="theory", value=theory, remedy=f"use one of {', '.join(THEORIES)}")
+    link = arm.link
+    length, density, E = Fraction(link.length), Fraction(link.density), Fraction(link.youngs_modulus)
+    kG = Fraction(link.shear_factor) * Fraction(link.shear_modulus)
+    area, second_moment = Fraction(link.section.area), Fraction(link.section.second_moment)
+    rotary = theory in ("timoshenko", "rayleigh")
+    flexible = theory in ("timoshenko", "shear")
+    EI = E * second_moment
+    return Coefficients(
+        a=density * length**2 / E * rotary,
+        b=density * length**2 / kG * flexible,
+        g=density * area * length**4 / EI,
+        sigma=EI / (kG * area * length**2) * flexible,
+        damping=link.damping,
+        tip_mass=_inertia(arm.payload.mass, length**3 / EI),
+        tip_inertia=_inertia(arm.payload.inertia, length / EI),
+        hub_inertia=_inertia(arm.hub.inertia, length / EI),
+        length=length,
+        EI=EI,
+    )
+
+
+def _inertia(value: float, unit: Fraction) -> Inertia:
+    return math.inf if math.isinf(value) else Fraction(value) * unit
