@@ -35,7 +35,7 @@ def test_whatever_the_input_the_text_is_one_printable_line(word):
     text.encode("utf-8")
 
 
-@pytest.mark.parametrize("long", ["x" * 50_000, 10**5000, ["a"] * 50_000])
+@pytest.mark.parametrize("long", ["x" * 50_000, 10**5000, ["a"] * 50_000], ids=["text", "integer", "list"])
 def test_long_values_are_shortened(long):
     assert len(str(error(value=long))) < 120
 

@@ -21,7 +21,7 @@ PRESETS = files("tfarm.arm") / "presets"
 MOST_BYTES = 64 * 1024
 # tomllib takes seconds on one dotted key of 40 KB and recurses on every bracket; an arm's file needs
 # a line of text and a depth of two.
-LONGEST_LINE, MOST_DOTS, DEEPEST = 8192, 200, 16
+LONGEST_LINE, MOST_DOTS, DEEPEST = 8192, 64, 16
 
 
 @cache

@@ -12,36 +12,42 @@ from tfarm.arm.sections import Section
 def to_toml(arm: Arm) -> str:
     """The arm as a TOML file; equal arms give equal text, so its hash names the inputs."""
     link = arm.link
-    return (
-        f"name = {_text(arm.name)}\n"
-        f"assumptions = [{', '.join(map(_text, arm.assumptions))}]\n"
-        + "\n[link]\n"
-        + _lines(
-            ("length", link.length),
-            ("density", link.density),
-            ("youngs_modulus", link.youngs_modulus),
-            ("shear_modulus", link.shear_modulus),
-            ("damping", link.damping),
-        )
-        + "\n[link.section]\n"
-        + f"shape = {_text(link.section.shape)}\n"
-        + _lines(*_section(link.section))
-        + "\n[hub]\n"
-        + _lines(("inertia", arm.hub.inertia))
-        + "\n[payload]\n"
-        + _lines(("mass", arm.payload.mass), ("inertia", arm.payload.inertia))
-    )
+    lines = [
+        f"name = {_text(arm.name)}",
+        "assumptions = [",
+        *(f"    {_text(assumption)}," for assumption in arm.assumptions),
+        "]",
+        "",
+        "[link]",
+        *_numbers(link, "length", "density", "youngs_modulus", "shear_modulus", "damping"),
+        "",
+        "[link.section]",
+        f"shape = {_text(link.section.shape)}",
+        *_section(link.section),
+        "",
+        "[hub]",
+        *_numbers(arm.hub, "inertia"),
+        "",
+        "[payload]",
+        *_numbers(arm.payload, "mass", "inertia"),
+        "",
+    ]
+    return "\n".join(lines)
 
 
-def _section(section: Section) -> Iterable[tuple[str, float]]:
+def _numbers(record: object, *names: str) -> Iterable[str]:
+    """Python's shortest exact digits are TOML's too, and so is inf."""
+    return (f"{name} = {getattr(record, name)!r}" for name in names)
+
+
+def _section(section: Section) -> Iterable[str]:
     """The numbers that define a section: its dimensions, or else its area and second moment."""
-    yield from section.dimensions or (("area", section.area), ("second_moment", section.second_moment))
+    if section.dimensions:
+        yield from (f"{name} = {value!r}" for name, value in section.dimensions)
+    else:
+        yield from _numbers(section, "area", "second_moment")
     if section.shear_factor is not None:
-        yield "shear_factor", section.shear_factor
-
-
-def _lines(*pairs: tuple[str, float]) -> str:
-    return "".join(f"{key} = {value!r}\n" for key, value in pairs)
+        yield from _numbers(section, "shear_factor")
 
 
 def _text(text: str) -> str:

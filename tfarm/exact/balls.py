@@ -20,9 +20,9 @@ from tfarm.errors import CertificationError
 from .coefficients import Coefficients, Condition
 from .compiled import plain
 from .outputs import Output, Quantity, unit_scale
-from .waves import from_transition
+from .waves import fields_from_root, from_transition
 
-_algebra = plain(from_transition)
+_algebra, _fields = plain(from_transition), plain(fields_from_root)
 Ball = Any  # flint.acb or flint.arb, which come without types
 
 MOST_BITS = 1 << 18
@@ -97,17 +97,13 @@ class State:
 
     def field(self, quantity: Quantity, x: float) -> Ball:
         """The quantity at x (a share of the length, 0..1), from the root by the state-transition matrix."""
-        F0, F1, F2, F3 = transition(self.z_sum, self.z_product, rational(x))
-        S, over_d, M, Q = self.S, 1 / self.d, self.M0, self.Q0
-        a, b, g, sigma, theta = self.a, self.b, self.g, self.sigma, self.theta
-        if quantity == "Y":
-            lift = sigma * F2 - (1 + sigma * a * S) * over_d * F0
-            return theta * (F2 - rational(x)) + M * F1 * over_d + Q * lift
-        if quantity == "Phi":
-            return theta * (F3 - b * S * F1 - 1) + over_d * (M * (F2 - b * S * F0) - Q * F1)
-        if quantity == "M":
-            return theta * S * (a * (F2 - b * S * F0) - g * F0) + M * (F3 - b * S * F1) - Q * F2
-        return g * S * (theta * F1 + M * F0 * over_d) + Q * (F3 - a * S * over_d * F1)
+        at = rational(x)
+        F0, F1, F2, F3 = transition(self.z_sum, self.z_product, at)
+        fields = _fields(
+            at, F0, F1, F2, F3, F2 - at, F3 - 1, self.S, 1 / self.d, self.a, self.b, self.g, self.sigma,
+            self.theta, self.M0, self.Q0,
+        )  # fmt: skip
+        return fields[("Y", "Phi", "M", "Q").index(quantity)]
 
     def value(self, output: Output, x: float = 0.0) -> Ball:
         """The output for a unit input, in SI units; x is a share of the length."""

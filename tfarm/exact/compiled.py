@@ -1,28 +1,32 @@
 """Numba with its disk cache where a folder for it can be written, and without it where none can.
 
-Two facts decide the shape of the files that use this module (measured with numba 0.68):
-the cache is keyed by the file of the *calling* function, so an edited callee in another file would
-go unnoticed, hence compiled functions that call each other share one file (`fma` below is a
-leaf that does not change); and a package installed read-only must still import.
+numba keys a cached function by its own file only: an edited callee in another file would go unnoticed
+(measured with numba 0.68).  So the cache of this package lies in a folder named by a hash of all the sources
+that compiled code can come from.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import hashlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from numba import njit
+from numba import config, njit
 from numba.core import types
 from numba.core.extending import intrinsic
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
+_HERE = Path(__file__).parent
 
 
 def compiled(function: _Function) -> _Function:
     """The function compiled by numba (nopython, IEEE arithmetic, NumPy's rules for division)."""
     try:
-        return njit(cache=True, error_model="numpy", nogil=True)(function)  # type: ignore[no-any-return]
-    except RuntimeError:  # no folder for the cache can be written
+        with _cache_folder():
+            return njit(cache=True, error_model="numpy", nogil=True)(function)  # type: ignore[no-any-return]
+    except (RuntimeError, OSError):  # no folder for the cache can be written
         return njit(error_model="numpy", nogil=True)(function)  # type: ignore[no-any-return]
 
 
@@ -35,6 +39,26 @@ def plain(function: _Function) -> _Function:
     """The Python function behind a compiled one, for numbers that numba does not know."""
     return getattr(function, "py_func", function)
 
+
+def _source_hash() -> str:
+    digest = hashlib.sha256()
+    for source in sorted(_HERE.glob("*.py")):
+        digest.update(source.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+@contextmanager
+def _cache_folder() -> Iterator[None]:
+    """numba's cache folder for the functions decorated inside; a folder the user chose stays its parent."""
+    chosen = config.CACHE_DIR
+    config.CACHE_DIR = str(Path(chosen or _HERE / "__pycache__") / f"tfarm-{_SOURCE_HASH}")
+    try:
+        yield
+    finally:
+        config.CACHE_DIR = chosen
+
+
+_SOURCE_HASH = _source_hash()
 
 if TYPE_CHECKING:
 

@@ -98,7 +98,25 @@ def from_transition(
     M0 = row1_theta * row2_Q0 - row1_Q0 * row2_theta
     Q0 = row1_M0 * row2_theta - row1_theta * row2_M0
     rest = M0 * F1 * over_d + Q0 * lift
-    return theta, M0, Q0, theta * F2 + rest, theta * F2_less_1 + rest
+    W1 = shear * (moment * F2 + tip_inertia * over_d * F1)  # not theta F2 + rest: that cancels for a heavy payload
+    return theta, M0, Q0, W1, theta * F2_less_1 + rest
+
+
+@inlined
+def fields_from_root(
+    x: Number, F0: Number, F1: Number, F2: Number, F3: Number, F2_less_x: Number, F3_less_1: Number,
+    S: Number, over_d: Number, a: float, b: float, g: float, sigma: float, theta: Number, M0: Number, Q0: Number,
+) -> tuple[Number, Number, Number, Number]:
+    """Deflection W - x theta, rotation Psi - theta, moment M and shear force Q at x from the root's values.
+
+    F0..F3 are the transition functions at x.  For |t| x small; further out the waves separate better.
+    """  # fmt: skip
+    bS, gS, aS = b * S, g * S, a * S
+    Y = theta * F2_less_x + over_d * (M0 * F1 - Q0 * F0) + Q0 * sigma * (F2 - aS * over_d * F0)
+    Phi = theta * (F3_less_1 - bS * F1) + over_d * (M0 * (F2 - bS * F0) - Q0 * F1)
+    M = theta * (aS * (F2 - bS * F0) - gS * F0) + M0 * (F3 - bS * F1) - Q0 * F2
+    Q = gS * (theta * F1 + over_d * M0 * F0) + Q0 * (F3 - aS * over_d * F1)
+    return Y, Phi, M, Q
 
 
 @inlined
@@ -115,13 +133,13 @@ def _series(shift: int, z_sum: Number, z_product: Number) -> tuple[Number, Numbe
 
 
 @inlined
-def transition_series(z_sum: Number, z_product: Number) -> tuple[Number, Number, Number, Number, Number]:
-    """F0, F1, F2, F3 and F2 - 1 of `from_transition` as series, exact to 1e-17 for |z| < 6."""
+def transition_series(z_sum: Number, z_product: Number) -> tuple[Number, Number, Number, Number, Number, Number]:
+    """F0, F1, F2, F3 at the tip, F2 - 1 and F3 - 1 as series, exact to 1e-17 for |z| < 6."""
     F0, _ = _series(3, z_sum, z_product)
     F1, _ = _series(2, z_sum, z_product)
     F2, F2_less_1 = _series(1, z_sum, z_product)
-    F3, _ = _series(0, z_sum, z_product)
-    return F0, F1, F2, F3, F2_less_1
+    F3, F3_less_1 = _series(0, z_sum, z_product)
+    return F0, F1, F2, F3, F2_less_1, F3_less_1
 
 
 # ---------------------------------------------------------------- wave numbers with a compensated phase
@@ -229,14 +247,14 @@ def _wave_functions(z: complex, t: complex, dt: complex) -> tuple[complex, compl
     e = decay * complex(math.cos(t.imag), -math.sin(t.imag))
     e = e - e * dt
     if abs(z.real) + abs(z.imag) < 1.0:  # 1 - e^2 would cancel
-        c, s = _even_functions(z)
+        c, s = even_functions(z)
         return e * c, e * s, e
     half_square = 0.5 * (e * e)
     return 0.5 + half_square, (0.5 - half_square) * _reciprocal(t + dt), e
 
 
 @inlined
-def _even_functions(z: Number) -> tuple[Number, Number]:
+def even_functions(z: Number) -> tuple[Number, Number]:
     """cosh sqrt z and sinh sqrt z / sqrt z by Horner's rule; ten terms are exact to 1e-19 for |z| < 1."""
     c = s = 1.0 + 0.0 * z
     for k in range(10, 0, -1):
@@ -352,7 +370,7 @@ def _series_states(points: Any, k: Any, states: Any) -> None:
         over_d = _reciprocal(d)
         z_sum = S * (k[2] + k[0] * over_d)
         z_product = S * (k[0] * k[2] * S + k[4]) * over_d
-        F0, F1, F2, F3, F2_less_1 = transition_series(z_sum, z_product)
+        F0, F1, F2, F3, F2_less_1, _ = transition_series(z_sum, z_product)
         theta, M0, Q0, W1, Y1 = from_transition(
             F0, F1, F2, F3, F2_less_1, S, over_d, k[0], k[2], k[4], k[6],
             _end(k, 8, S), k[10], _end(k, 11, S), k[13],
@@ -365,3 +383,18 @@ def _series_states(points: Any, k: Any, states: Any) -> None:
 def _store(i: int, states: Any, scale: complex, theta: complex, M0: complex, Q0: complex, W1: complex, Y1: complex) -> None:
     states[i], states[BLOCK + i], states[2 * BLOCK + i] = scale * theta, scale * M0, scale * Q0
     states[3 * BLOCK + i], states[4 * BLOCK + i] = scale * W1, scale * Y1
+
+
+# ---------------------------------------------------------------- what the fields along the arm need
+
+
+@compiled
+def separated(s: Any, k: Any, numbers: Any, functions: Any) -> None:
+    """Columns of numbers[:, i] and functions[:, i] at s[i]: S, d, g S, z, v, t, dt of both waves; c, S, e of both."""
+    for i in range(s.size):
+        S, d, _, gS, z1, v1, t1, dt1, z2, v2, t2, dt2 = dispersion(s[i], k)
+        numbers[0, i], numbers[1, i], numbers[2, i] = S, d, gS
+        numbers[3, i], numbers[4, i], numbers[5, i], numbers[6, i] = z1, v1, t1, dt1
+        numbers[7, i], numbers[8, i], numbers[9, i], numbers[10, i] = z2, v2, t2, dt2
+        functions[0, i], functions[1, i], functions[2, i] = _wave_functions(z1, t1, dt1)
+        functions[3, i], functions[4, i], functions[5, i] = _wave_functions(z2, t2, dt2)

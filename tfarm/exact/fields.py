@@ -1,0 +1,152 @@
+"""Deflection, rotation, moment and shear force along the arm, in float64.
+
+Near the root, where |t| x is small, the root's exact values are carried along by the transition functions.
+Further out that would multiply rounding by e^{t x}; there each wave is written as what decays from the root
+and what decays from the tip,
+
+    W(x) = sum_j P_j e^{-t_j x} + R_j e^{-t_j (1 - x)},
+
+with P and R again free of products of a wave with itself (derived from the minors in `waves.from_waves`).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .coefficients import Coefficients
+from .compiled import plain
+from .waves import (
+    SERIES_RADIUS,
+    evaluate,
+    fields_from_root,
+    from_transition,
+    from_waves,
+    separated,
+    transition_series,
+)
+
+Complex = NDArray[np.complex128]
+_ROOT = np.array([[0, 0, 0, 1.0], [1, 0, 0, 1.0], [2, 0, 0, 1.0]])  # theta, M0, Q0 as `evaluate` wants them
+_ends = plain(from_transition)
+_fields = plain(fields_from_root)
+_minors = plain(from_waves)
+_transition = plain(transition_series)
+
+
+class Wave(NamedTuple):
+    """One pair of waves at each s: z = t^2, v = z - b S, and c, S, e of `waves.from_waves`."""
+
+    z: Complex
+    v: Complex
+    t: Complex
+    c: Complex
+    s: Complex
+    e: Complex
+
+
+def waves(k: Coefficients, s: Complex) -> tuple[Complex, Complex, Complex, Wave, Wave]:
+    """S, d, g S and the two waves at s, each of the shape of s (1-D)."""
+    numbers, functions = np.empty((11, s.size), complex), np.empty((6, s.size), complex)
+    separated(s, k.kernel, numbers, functions)
+    S, d, gS, z1, v1, t1, dt1, z2, v2, t2, dt2 = numbers
+    return S, d, gS, Wave(z1, v1, t1 + dt1, *functions[:3]), Wave(z2, v2, t2 + dt2, *functions[3:])
+
+
+def root_state(k: Coefficients, s: Complex) -> tuple[Complex, NDArray[np.bool_]]:
+    """theta, M0 and Q0 (dimensionless, rows) for a unit input at s (1-D), and where digits are missing."""
+    values, suspects = np.empty((3, s.size), complex), np.empty(s.size, bool)
+    evaluate(s, k.kernel, _ROOT, values, suspects)
+    return values, suspects
+
+
+def fields(k: Coefficients, s: Complex, x: float) -> tuple[Complex, NDArray[np.bool_]]:
+    """Y, Phi, M, Q (dimensionless, rows) at the share x of the length for a unit input, and where digits are missing."""
+    root, suspects = root_state(k, s)
+    S, d, gS, one, two = waves(k, s)
+    size = np.maximum(abs(one.z), abs(two.z))
+    near = (size * x * x < SERIES_RADIUS) | (size < SERIES_RADIUS)
+    result = np.empty((4, s.size), complex)
+    result[:, near] = _from_root(k, S[near], d[near], root[:, near], x)
+    if x > 0.5:
+        low = size < SERIES_RADIUS
+        result[2:, low] = _from_tip(k, S[low], d[low], root[0, low], x)
+    far = ~near
+    one, two = (Wave(*(part[far] for part in wave)) for wave in (one, two))
+    result[:, far] = _from_waves(k, S[far], d[far], gS[far], one, two, root[0, far], x)
+    return result, suspects
+
+
+def _from_root(k: Coefficients, S: Complex, d: Complex, root: Complex, x: float) -> tuple[Complex, ...]:
+    a, b, g, sigma = float(k.a), float(k.b), float(k.g), float(k.sigma)
+    fields: tuple[Complex, ...] = _fields(x, *_functions(k, S, d, x), S, 1 / d, a, b, g, sigma, *root)
+    return fields
+
+
+def _functions(k: Coefficients, S: Complex, d: Complex, x: float) -> tuple[Complex, ...]:
+    """F0, F1, F2, F3, F2 - x and F3 - 1 at x, by their series."""
+    a, b, g = float(k.a), float(k.b), float(k.g)
+    z_sum, z_product = S * (b + a / d), S * (a * b * S + g) / d
+    F0, F1, F2, F3, F2_less_1, F3_less_1 = _transition(z_sum * x**2, z_product * x**4)
+    return x**3 * F0, x**2 * F1, x * F2, F3, x * F2_less_1, F3_less_1
+
+
+def _from_tip(k: Coefficients, S: Complex, d: Complex, theta: Complex, x: float) -> tuple[Complex, Complex]:
+    """M and Q near the tip at low frequency, carried back from it: from the root they would be small differences.
+
+    The tip's two conditions leave it W = shear Y, Q = -tip_mass Y, Psi = moment X, M = -tip_inertia X; seen from
+    the tip, Psi and Q change sign.
+    """
+    a, b, g, sigma = float(k.a), float(k.b), float(k.g), float(k.sigma)
+    tip_mass, shear, tip_inertia, moment = _tip(k, S)
+    over_d, aS, bS, gS = 1 / d, a * S, b * S, g * S
+    F0, F1, F2, F3, *_ = functions = _functions(k, S, d, 1.0)
+    bend, turn = F2 - bS * F0, F3 - bS * F1
+    drop = aS * bend - gS * F0
+    row = (
+        shear * gS * F1 + tip_mass * F2,
+        (shear * gS * F0 + tip_mass * F1) * over_d,
+        shear * (F3 - aS * over_d * F1) + tip_mass * (sigma * F2 - (1 + sigma * aS) * over_d * F0),
+    )
+    free, *_ = _ends(*functions[:4], functions[4], S, over_d, a, b, g, sigma, tip_mass, shear, tip_inertia, moment)
+    cross = over_d * (F1 * turn - F2 * bend), F2 * turn - over_d * drop * F1, turn**2 - over_d * drop * bend
+    X = sum(one * other for one, other in zip(row, cross, strict=True)) * theta / free
+    Y = (moment * F2 + tip_inertia * over_d * F1) * theta / free
+    F0, F1, F2, F3, *_ = functions = _functions(k, S, d, 1 - x)
+    fields = _fields(1 - x, *functions, S, over_d, a, b, g, sigma, -moment * X, -tip_inertia * X, tip_mass * Y)
+    W = shear * Y
+    return fields[2] - gS * F1 * W, -fields[3] - gS * (F2 - aS * over_d * F0) * W
+
+
+def _tip(k: Coefficients, S: Complex) -> tuple[Complex, float, Complex, float]:
+    """tip_mass, shear, tip_inertia and moment of the tip's conditions, as `waves.from_waves` takes them."""
+    ends = k.kernel[8:14]
+    return ends[0] + ends[1] * S, ends[2], ends[3] + ends[4] * S, ends[5]
+
+
+def _from_waves(
+    k: Coefficients, S: Complex, d: Complex, gS: Complex, one: Wave, two: Wave, theta: Complex, x: float
+) -> tuple[Complex, ...]:
+    tip = _tip(k, S)
+    free, *_ = _minors(one.c, one.s, one.z, one.v, one.e, two.c, two.s, two.z, two.v, two.e, gS, d, *tip)
+    parts = [_wave(one, two, gS, d, *tip, x), _wave(two, one, gS, d, *tip, x)]
+    W, Psi, M, Q = (sum(part[i] for part in parts) * (theta / free) for i in range(4))
+    return W - x * theta, Psi - theta, M, Q
+
+
+def _wave(
+    one: Wave, two: Wave, gS: Complex, d: Complex,
+    tip_mass: Complex, shear: float, tip_inertia: Complex, moment: float, x: float,
+) -> tuple[Complex, ...]:
+    """W, Psi, M, Q of wave `one` in the free response, scaled as the minors of `waves.from_waves` are."""  # fmt: skip
+    bare = one.t * two.v * (tip_mass * tip_inertia - shear * moment * d * gS)
+    So = tip_mass * two.z * two.s + shear * gS * two.c
+    Mo = two.v * (tip_inertia * two.c + moment * d * two.z * two.s)
+    force, couple = shear * gS, tip_mass * one.t
+    turn, bend = one.v * tip_inertia, one.v * moment * d * one.t
+    decaying = Mo * (force + couple) - So * (turn + bend) - one.e * two.e * bare
+    growing = one.e * (Mo * (force - couple) - So * (turn - bend)) + two.e * bare
+    P, R = decaying * np.exp(-one.t * x) / 2, growing * np.exp(-one.t * (1 - x)) / 2
+    return P + R, one.v / one.t * (R - P), d * one.v * (P + R), gS / one.t * (R - P)

@@ -1,0 +1,59 @@
+"""How many natural frequencies lie below a given one: a count, not a search.
+
+Wittrick and Williams (1971) count through the pivots of a dynamic stiffness; Howson and Williams (1973) start from the
+beam whose frequencies are known in closed form.  Put together for this arm the count becomes a chain of signs:
+
+* with both ends pinned, n pi < k counts the waves that fit (and W = 0, Psi = const above the cut-off);
+* adding inertia to one motion of the tip or the root, or releasing it, raises the count by 0 or 1, holding
+  it lowers the count by 0 or 1 (Rayleigh's theorem on one constraint);
+* the parity of each count is the sign of that arm's characteristic function D(i w).
+
+So four signs of D, for four neighbouring arms, turn a closed form into the count for any hub and payload.  A
+double root changes no sign and still raises the count by two.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.exact.axis import drives
+from tfarm.exact.coefficients import Coefficients, Condition
+
+
+class Counter:
+    """N(omega) of one arm: how many natural frequencies [rad/s] lie below omega, the rigid-body mode included."""
+
+    def __init__(self, k: Coefficients) -> None:
+        self._kernel = k.kernel
+        self._ends, self._steps = _chain(k)
+
+    def __call__(self, omega: NDArray[np.float64]) -> NDArray[np.int64]:
+        """The counts, in the shape of omega (1-D, rad/s, positive)."""
+        values, count = drives(omega, self._kernel, self._ends)
+        for value, step in zip(values, self._steps, strict=True):
+            count = count + step * ((count % 2 == 1) != (value < 0))
+        return count
+
+
+def _chain(k: Coefficients) -> tuple[NDArray[np.float64], list[int]]:
+    """The arms from pinned-pinned to this one, as rows of end conditions, and by how much each may change the count."""
+    none = Fraction(0)
+    arm = replace(k, tip_mass=math.inf, tip_inertia=none, hub_inertia=none)
+    rows, steps = [], []
+    for part in ("tip_inertia", "tip_mass", "hub_inertia"):
+        inertia = getattr(k, part)
+        if inertia != getattr(arm, part):
+            arm = replace(arm, **{part: inertia})
+            rows.append(_row(arm))
+            steps.append(-1 if inertia == math.inf else 1)
+    return np.array(rows, dtype=float).reshape(-1, 9), steps
+
+
+def _row(k: Coefficients) -> list[float]:
+    ends = (Condition.of(inertia) for inertia in (k.tip_mass, k.tip_inertia, k.hub_inertia))
+    return [float(number) for end in ends for number in (end.rest, end.inertia, end.force)]
