@@ -11,7 +11,7 @@ with P and R again free of products of a wave with itself (derived from the mino
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,7 +69,7 @@ def fields(k: Coefficients, s: Complex, x: float) -> tuple[Complex, NDArray[np.b
     size = np.maximum(abs(one.z), abs(two.z))
     near = (size * x * x < SERIES_RADIUS) | (size < SERIES_RADIUS)
     result = np.empty((4, s.size), complex)
-    result[:, near] = _from_root(k, S[near], d[near], root[:, near], x)
+    result[:, near] = from_root(k, S[near], d[near], root[:, near], x)
     if x > 0.5:
         low = size < SERIES_RADIUS
         result[2:, low] = _from_tip(k, S[low], d[low], root[0, low], x)
@@ -79,13 +79,14 @@ def fields(k: Coefficients, s: Complex, x: float) -> tuple[Complex, NDArray[np.b
     return result, suspects
 
 
-def _from_root(k: Coefficients, S: Complex, d: Complex, root: Complex, x: float) -> tuple[Complex, ...]:
+def from_root(k: Coefficients, S: Any, d: Any, root: Any, x: Any) -> tuple[Any, ...]:
+    """Y, Phi, M, Q at x from the root's theta, M0, Q0 where |z| x^2 < `SERIES_RADIUS`; the shapes broadcast."""
     a, b, g, sigma = float(k.a), float(k.b), float(k.g), float(k.sigma)
-    fields: tuple[Complex, ...] = _fields(x, *_functions(k, S, d, x), S, 1 / d, a, b, g, sigma, *root)
+    fields: tuple[Any, ...] = _fields(x, *_functions(k, S, d, x), S, 1 / d, a, b, g, sigma, *root)
     return fields
 
 
-def _functions(k: Coefficients, S: Complex, d: Complex, x: float) -> tuple[Complex, ...]:
+def _functions(k: Coefficients, S: Any, d: Any, x: Any) -> tuple[Any, ...]:
     """F0, F1, F2, F3, F2 - x and F3 - 1 at x, by their series."""
     a, b, g = float(k.a), float(k.b), float(k.g)
     z_sum, z_product = S * (b + a / d), S * (a * b * S + g) / d
@@ -100,7 +101,7 @@ def _from_tip(k: Coefficients, S: Complex, d: Complex, theta: Complex, x: float)
     the tip, Psi and Q change sign.
     """
     a, b, g, sigma = float(k.a), float(k.b), float(k.g), float(k.sigma)
-    tip_mass, shear, tip_inertia, moment = _tip(k, S)
+    tip_mass, shear, tip_inertia, moment = tip_condition(k, S)
     over_d, aS, bS, gS = 1 / d, a * S, b * S, g * S
     F0, F1, F2, F3, *_ = functions = _functions(k, S, d, 1.0)
     bend, turn = F2 - bS * F0, F3 - bS * F1
@@ -120,7 +121,15 @@ def _from_tip(k: Coefficients, S: Complex, d: Complex, theta: Complex, x: float)
     return fields[2] - gS * F1 * W, -fields[3] - gS * (F2 - aS * over_d * F0) * W
 
 
-def _tip(k: Coefficients, S: Complex) -> tuple[Complex, float, Complex, float]:
+def free_root(k: Coefficients, S: Any, d: Any) -> tuple[Any, Any, Any]:
+    """theta, M0, Q0 of the free response at low frequency, up to one factor."""
+    functions = _functions(k, S, d, 1.0)
+    constants = float(k.a), float(k.b), float(k.g), float(k.sigma)
+    theta, M0, Q0, *_ = _ends(*functions[:5], S, 1 / d, *constants, *tip_condition(k, S))
+    return theta, M0, Q0
+
+
+def tip_condition(k: Coefficients, S: Any) -> tuple[Any, float, Any, float]:
     """tip_mass, shear, tip_inertia and moment of the tip's conditions, as `waves.from_waves` takes them."""
     ends = k.kernel[8:14]
     return ends[0] + ends[1] * S, ends[2], ends[3] + ends[4] * S, ends[5]
@@ -129,7 +138,7 @@ def _tip(k: Coefficients, S: Complex) -> tuple[Complex, float, Complex, float]:
 def _from_waves(
     k: Coefficients, S: Complex, d: Complex, gS: Complex, one: Wave, two: Wave, theta: Complex, x: float
 ) -> tuple[Complex, ...]:
-    tip = _tip(k, S)
+    tip = tip_condition(k, S)
     free, *_ = _minors(one.c, one.s, one.z, one.v, one.e, two.c, two.s, two.z, two.v, two.e, gS, d, *tip)
     parts = [_wave(one, two, gS, d, *tip, x), _wave(two, one, gS, d, *tip, x)]
     W, Psi, M, Q = (sum(part[i] for part in parts) * (theta / free) for i in range(4))

@@ -1,0 +1,205 @@
+"""The modal table of an arm: frequencies, shapes, hub participation, nodes and exact sensitivities."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import Arm
+from tfarm.errors import ParameterError
+from tfarm.exact.coefficients import Coefficients, Theory, coefficients
+
+from .search import count_below, natural_frequencies
+from .shapes import Shapes
+
+Real = NDArray[np.float64]
+
+MOST_MODES = 10_000
+PARAMETERS = (
+    "length",
+    "density",
+    "youngs_modulus",
+    "shear_modulus",
+    "shear_factor",
+    "area",
+    "second_moment",
+    "hub_inertia",
+    "payload_mass",
+    "payload_inertia",
+)
+
+
+@dataclass(frozen=True)
+class Modes:
+    """The undamped modes of an arm, in ascending order, complete up to the last one.
+
+    A rigid-body mode, where there is one, comes first as index 0; flexible modes count from 1.  Every mode has
+    unit modal mass (1 kg m^2 of hub inertia counts as 1) and a positive tip displacement.
+    `natural_frequency` [rad/s] and `index` have one entry a mode; C does not enter them.
+    """
+
+    arm: Arm
+    theory: Theory
+    index: NDArray[np.int64]
+    natural_frequency: Real
+    _k: Coefficients = field(repr=False)
+
+    @property
+    def natural_frequency_hz(self) -> Real:
+        """Natural frequencies [Hz]."""
+        return self.natural_frequency / (2 * math.pi)
+
+    def __len__(self) -> int:
+        return self.index.size
+
+    # ------------------------------------------------------------ shapes
+
+    def shape(self, x: NDArray[np.float64] | float) -> Real:
+        """Total displacement w(x) [m per unit modal coordinate] at x [m]: shape (modes, *x.shape)."""
+        return self._field(0, x) * float(self._k.length)
+
+    def rotation(self, x: NDArray[np.float64] | float) -> Real:
+        """Total rotation psi(x) [rad] of the cross-section at x [m]: shape (modes, *x.shape)."""
+        return self._field(1, x)
+
+    def moment(self, x: NDArray[np.float64] | float) -> Real:
+        """Bending moment E I psi'(x) [N m] at x [m]: shape (modes, *x.shape)."""
+        return self._field(2, x) * float(self._k.EI / self._k.length)
+
+    def shear(self, x: NDArray[np.float64] | float) -> Real:
+        """Shear force kappa G A (w' - psi) [N] at x [m]: shape (modes, *x.shape)."""
+        return self._field(3, x) * float(self._k.EI / self._k.length**2)
+
+    @cached_property
+    def hub_participation(self) -> Real:
+        """b = psi(0) of each mode; b^2 is the residue of hub angle/torque in the variable s^2.  Zero if locked."""
+        rigid = 1.0 / math.sqrt(self.arm.total_inertia) if self._rigid else 0.0
+        return np.r_[[rigid] * self._rigid, self._shapes.theta() * self._unit]
+
+    @cached_property
+    def modal_moment(self) -> Real:
+        """Root moment E I psi'(0) [N m] of each mode: -I_h w^2 b where the hub is free to turn."""
+        return self.moment(0.0)
+
+    @cached_property
+    def nodes(self) -> tuple[Real, ...]:
+        """Points x [m] strictly inside the arm where the total displacement of each mode vanishes."""
+        rigid: tuple[Real, ...] = (np.empty(0),) * self._rigid
+        return rigid + tuple(self._nodes(mode) * float(self._k.length) for mode in range(len(self) - self._rigid))
+
+    def orthogonality(self) -> float:
+        """The largest entry of (modal mass matrix - identity), over the flexible modes: rounding, if all is well."""
+        mass = self._shapes.mass_matrix()
+        return float(abs(mass - np.eye(len(mass))).max(initial=0.0))
+
+    # ------------------------------------------------------------ sensitivities
+
+    @cached_property
+    def sensitivity(self) -> dict[str, Real]:
+        """d ln w / d ln p, per cent per per cent, of each frequency by each of `PARAMETERS` (zero for a rigid mode).
+
+        Exact, from the energies of the mode (Rayleigh's quotient is stationary).  Each parameter varies alone:
+        Young's modulus with G held, the area with I held.  An infinite or zero inertia counts as zero.
+        """
+        bend, shear, slide, move, turn, mass, inertia, hub = self._energies
+        by_length = -bend + shear - 2 * slide - move - turn
+        halves = {
+            "length": by_length,
+            "density": -move - turn,
+            "youngs_modulus": bend,
+            "shear_modulus": shear,
+            "shear_factor": shear,
+            "area": shear - move,
+            "second_moment": bend - turn,
+            "hub_inertia": -hub,
+            "payload_mass": -mass,
+            "payload_inertia": -inertia,
+        }
+        return {name: np.r_[[0.0] * self._rigid, halves[name] / 2] for name in PARAMETERS}
+
+    @cached_property
+    def _energies(self) -> tuple[Real, ...]:
+        """Shares of each mode's energy: bending, shear, a shear cross term, then the kinetic ones; each kind sums to 1."""
+        k, shapes = self._k, self._shapes
+        x, weight = shapes.quadrature()
+        W, Psi, M, Q = shapes(x)
+        tip, hub = shapes(np.ones(1))[..., 0], shapes.theta()
+        square = shapes.omega**2
+        sigma = float(k.sigma)
+        potential = (M**2 @ weight, sigma * Q**2 @ weight, (Q * (Psi + sigma * Q)) @ weight)
+        kinetic = [float(k.g) * W**2 @ weight, float(k.a) * Psi**2 @ weight]
+        for held, motion in ((k.tip_mass, tip[0]), (k.tip_inertia, tip[1]), (k.hub_inertia, hub)):
+            kinetic.append(float(held) * motion**2 if math.isfinite(held) else np.zeros_like(hub))
+        return *(energy / square for energy in potential), *kinetic
+
+    # ------------------------------------------------------------ inside
+
+    @property
+    def _rigid(self) -> bool:
+        return bool(self.index.size and self.index[0] == 0)
+
+    @property
+    def _unit(self) -> float:
+        """From modes of unit dimensionless mass to modes of unit modal mass."""
+        return math.sqrt(float(self._k.length / self._k.EI))
+
+    @cached_property
+    def _shapes(self) -> Shapes:
+        return Shapes(self._k, self.natural_frequency[self._rigid :])
+
+    def _field(self, which: int, x: NDArray[np.float64] | float) -> Real:
+        share = np.asarray(x, dtype=float) / float(self._k.length)
+        if not np.all((share >= 0) & (share <= 1)):
+            raise ParameterError(key="x", value=x, remedy=f"a point of the arm lies between 0 and {self._k.length} m")
+        values = self._shapes(share.ravel())[which] * self._unit
+        if self._rigid:
+            turn = 1.0 / math.sqrt(self.arm.total_inertia)
+            rigid = (turn * share.ravel(), np.full(share.size, turn), *np.zeros((2, share.size)))[which]
+            values = np.vstack([rigid, values])
+        return values.reshape(-1, *share.shape)
+
+    def _nodes(self, mode: int) -> Real:
+        """Interior zeros of W: bracketed on a grid finer than its waves, polished by Newton (W' = Psi + sigma Q)."""
+        shape = self._shapes.only(mode)
+        ends = np.geomspace(1e-9, 0.9 / (24 * (mode + 3)), 40)  # a heavy hub or payload draws a node close to it
+        grid = np.r_[ends, np.linspace(0.0, 1.0, 24 * (mode + 3))[1:-1], 1.0 - ends[::-1]]
+        W = shape(grid)[0, 0]
+        W = np.where(abs(W) < 1e-13 * abs(W).max(), 0.0, W)
+        (start,) = np.nonzero(W[:-1] * W[1:] < 0)
+        low, high = grid[start], grid[start + 1]
+        x = low + (high - low) * W[start] / (W[start] - W[start + 1])
+        for _ in range(6 if x.size else 0):
+            W, Psi, _, Q = shape(x)[:, 0]
+            x = np.clip(x - W / (Psi + float(self._k.sigma) * Q), low, high)
+        return x
+
+
+def modes(
+    arm: Arm, count: int | None = None, *, up_to: float | None = None, theory: Theory = "timoshenko"
+) -> Modes:
+    """All undamped modes of the arm: the first `count` flexible ones, or all with a frequency below `up_to` [rad/s].
+
+    Complete by construction (Wittrick and Williams 1971), for any hub and payload, above the shear cut-off, and with
+    double frequencies listed twice.  `theory` is one of timoshenko, shear, rayleigh, euler-bernoulli.
+    Raises ParameterError for a count outside 1..10000 or a frequency that is not positive.
+    """
+    k = replace(coefficients(arm, theory), damping=0.0)
+    rigid = arm.has_rigid_mode
+    if (count is None) == (up_to is None):
+        raise ParameterError(key="count", value=count, remedy="give either a count of modes or a frequency up_to")
+    if up_to is not None:
+        if not 0 < up_to < math.inf:
+            raise ParameterError(key="up_to", value=up_to, remedy="a positive, finite frequency in rad/s")
+        count = count_below(k, up_to) - rigid
+    elif isinstance(count, bool) or not isinstance(count, int) or count < 1:
+        raise ParameterError(key="count", value=count, remedy=f"a whole number of modes from 1 to {MOST_MODES}")
+    assert count is not None
+    if count > MOST_MODES:
+        raise ParameterError(key="count", value=count, remedy=f"at most {MOST_MODES} modes at a time")
+    flexible = natural_frequencies(k, rigid + 1, rigid + count)
+    index = np.arange(1 - rigid, count + 1)
+    return Modes(arm, theory, index, np.r_[[0.0] * rigid, flexible], k)

@@ -1,0 +1,168 @@
+"""Mode shapes: the null vector of the end conditions in a basis that neither grows nor becomes parallel.
+
+Where waves travel or decay appreciably each mode is a sum of four of them, two running (or decaying) from the root and
+two from the tip.  At low frequency, |z| < 6, it is carried from the root by the transition functions.
+A double frequency has two modes: its null space is taken whole and made orthogonal in the modal mass.
+"""
+
+from __future__ import annotations
+
+import math
+from copy import copy
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.exact.coefficients import Coefficients, Condition
+from tfarm.exact.compiled import plain
+from tfarm.exact.fields import Wave, free_root, from_root, tip_condition, waves
+from tfarm.exact.waves import SERIES_RADIUS, even_functions
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+_even = plain(even_functions)
+
+GAUSS = 16  # points a panel; exact for the products of waves below once a panel holds a few radians
+DOUBLE = 1e-11  # relative gap under which two frequencies are one, with two modes
+
+
+class Shapes:
+    """The modes of an undamped arm at its natural frequencies, dimensionless, of unit modal mass times EI/L.
+
+    Call it with x (shares of the length, 1-D) for W, Psi, M, Q, each of shape (modes, x).
+    """
+
+    def __init__(self, k: Coefficients, omega: Real) -> None:
+        self.k, self.omega = k, omega
+        S, _, gS, one, two = waves(k, 1j * omega)
+        self._S, self._gS, self._one, self._two = S.real, gS.real, one, two
+        self._low = np.maximum(abs(one.z), abs(two.z)) < SERIES_RADIUS
+        self._root = np.array(free_root(k, self._S[self._low], 1.0))
+        self._weights = self._null_vectors()
+        self._normalise()
+
+    def __call__(self, x: Real) -> Real:
+        result = np.empty((4, self.omega.size, x.size))
+        low, high = self._low, ~self._low
+        if low.any():
+            S, root = self._S[low, None], self._root[:, :, None]
+            Y, Phi, M, Q = from_root(self.k, S, 1.0, root, x[None, :])
+            result[:, low] = Y + x * root[0], Phi + root[0], M, Q
+        if high.any():
+            result[:, high] = np.einsum("sm,fsmx->fmx", self._weights, self._basis(x)).real
+        return result
+
+    def only(self, mode: int) -> Shapes:
+        """The same with one of the modes, as it is normalised here."""
+        one = copy(self)
+        low = bool(self._low[mode])
+        among = int(self._low[:mode].sum()) if low else mode - int(self._low[:mode].sum())
+        keep, none = slice(among, among + 1), slice(0, 0)
+        one.omega, one._S, one._gS, one._low = (v[mode : mode + 1] for v in (self.omega, self._S, self._gS, self._low))
+        one._one, one._two = (Wave(*(p[mode : mode + 1] for p in wave)) for wave in (self._one, self._two))
+        one._root = self._root[:, keep if low else none]
+        one._weights = self._weights[:, none if low else keep]
+        return one
+
+    def theta(self) -> Real:
+        """Hub angle of each mode; from the hub's own balance where its inertia leads, so that no digit is lost."""
+        root = self(np.zeros(1))[..., 0]
+        hub = Condition.of(self.k.hub_inertia)
+        if self.k.is_locked:
+            return np.zeros_like(self.omega)
+        inertia, force = float(hub.inertia) * self._S, float(hub.force)
+        heavy = abs(inertia) > force
+        return np.where(heavy, force * root[2] / np.where(heavy, inertia, 1.0), root[1])
+
+    def quadrature(self) -> tuple[Real, Real]:
+        """Gauss points and weights on 0..1, panels short against every wave of these modes."""
+        fastest = max((abs(wave.t).max(initial=0.0) for wave in (self._one, self._two)), default=0.0)
+        panels = 4 + math.ceil(fastest / 4.0)
+        nodes, weights = np.polynomial.legendre.leggauss(GAUSS)
+        start = np.arange(panels)[:, None]
+        return ((start + (nodes + 1) / 2) / panels).ravel(), np.tile(weights / 2 / panels, panels)
+
+    def mass_matrix(self) -> Real:
+        """Modal masses (diagonal) and products of different modes, in EI/L: the identity, if all is well."""
+        x, weight = self.quadrature()
+        W, Psi, _, _ = self(x)
+        tip = self(np.ones(1))[..., 0]
+        k, theta = self.k, self.theta()
+        mass = float(k.g) * (W * weight) @ W.T + float(k.a) * (Psi * weight) @ Psi.T
+        for inertia, motion in ((k.tip_mass, tip[0]), (k.tip_inertia, tip[1]), (k.hub_inertia, theta)):
+            if math.isfinite(inertia):
+                mass = mass + float(inertia) * np.outer(motion, motion)
+        return mass
+
+    def _basis(self, x: Real) -> Complex:
+        """The four waves of the modes above the low ones, at x: shape (4 waves, 4 fields, modes, x)."""
+        high = ~self._low
+        gS = self._gS[high, None]
+        pairs = [_pair(Wave(*(part[high] for part in wave)), gS, x) for wave in (self._one, self._two)]
+        return np.array([solution for pair in pairs for solution in pair]).transpose(1, 0, 2, 3)
+
+    def _null_vectors(self) -> Complex:
+        """Weights of the four waves, (4, modes), that satisfy the four end conditions."""
+        high = ~self._low
+        S = self._S[high]
+        if not S.size:
+            return np.empty((4, 0), complex)
+        root, tip = self._basis(np.zeros(1))[..., 0], self._basis(np.ones(1))[..., 0]
+        hub = Condition.of(self.k.hub_inertia)
+        tip_mass, shear, tip_inertia, moment = tip_condition(self.k, S)
+        drive = float(hub.rest) + float(hub.inertia) * S
+        rows = np.array([
+            root[0], drive * root[1] - float(hub.force) * root[2],
+            tip_mass * tip[0] + shear * tip[3], tip_inertia * tip[1] + moment * tip[2],
+        ]).transpose(2, 0, 1)  # fmt: skip
+        columns = np.maximum(abs(rows / abs(rows).max(axis=2, keepdims=True)).max(axis=1), 1e-300)
+        rows = rows / columns[:, None, :]
+        rows = rows / abs(rows).max(axis=2, keepdims=True)
+        _, _, right = np.linalg.svd(rows)
+        omega = self.omega[high]
+        second = np.r_[False, np.diff(omega) < DOUBLE * omega[1:]]  # the upper one of a double frequency
+        vectors = np.where(second[:, None], right[:, 2].conj(), right[:, 3].conj()) / columns
+        return vectors.T
+
+    def _normalise(self) -> None:
+        """Real phase, modes of a double frequency orthogonal, unit modal mass, tip (else its rotation) positive."""
+        x, _ = self.quadrature()
+        if self._weights.size:
+            fields = np.einsum("sm,fsmx->fmx", self._weights, self._basis(x))
+            W = fields[0] + fields[1] / max(1.0, abs(fields[1]).max())
+            peak = np.take_along_axis(W, abs(W).argmax(axis=1)[:, None], axis=1)[:, 0]
+            self._weights = self._weights * (abs(peak) / peak)
+        self._scale(1.0 / np.sqrt(np.diagonal(self.mass_matrix())))
+        self._orthogonalise()
+        tip, theta = self(np.ones(1))[..., 0], self.theta()
+        motion = np.where(abs(tip[0]) > 1e-9 * abs(tip[1]), tip[0], np.where(abs(tip[1]) > 1e-9 * abs(theta), tip[1], theta))
+        self._scale(np.where(motion < 0, -1.0, 1.0))
+
+    def _scale(self, factor: Real) -> None:
+        self._root = self._root * factor[self._low]
+        self._weights = self._weights * factor[~self._low]
+
+    def _orthogonalise(self) -> None:
+        """Gram-Schmidt in the modal mass within each double frequency."""
+        (pairs,) = np.nonzero(np.diff(self.omega) < DOUBLE * self.omega[1:])
+        for first in pairs:
+            overlap = self.mass_matrix()[first, first + 1]
+            above = first - int(self._low[: first + 1].sum())
+            self._weights[:, above + 1] -= overlap * self._weights[:, above]
+            factor = np.ones_like(self.omega)
+            factor[first + 1] = 1.0 / math.sqrt(self.mass_matrix()[first + 1, first + 1])
+            self._scale(factor)
+
+
+def _pair(wave: Wave, gS: Complex, x: Real) -> tuple[Any, Any]:
+    """Two independent solutions (W, Psi, M, Q) of one wave: from the root and from the tip, or even and odd in x."""
+    z, v, t = wave.z[:, None], wave.v[:, None], wave.t[:, None]
+    slow = abs(z) < 1.0
+    t = np.where(slow, 1.0, t)
+    from_start, from_end = np.exp(-t * x), np.exp(-t * (1 - x))
+    c, s = _even(np.where(slow, z, 0.0) * x**2)
+    s = x * s
+    one = np.where(slow, (c, v * s, v * c, gS * s), from_start * np.array((0 * v + 1, -v / t, v, -gS / t)))
+    two = np.where(slow, (z * s, v * c, v * z * s, gS * c), from_end * np.array((0 * v + 1, v / t, v, gS / t)))
+    return one, two
