@@ -11,6 +11,7 @@ import hashlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import FunctionType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from numba import config, njit
@@ -36,8 +37,13 @@ def inlined(function: _Function) -> _Function:
 
 
 def plain(function: _Function) -> _Function:
-    """The Python function behind a compiled one, for numbers that numba does not know."""
-    return getattr(function, "py_func", function)
+    """The Python function behind a compiled one, with those it calls, for numbers that numba does not know."""
+    python: Any = getattr(function, "py_func", function)
+    called = {name: python.__globals__[name] for name in python.__code__.co_names if name in python.__globals__}
+    replaced = {name: plain(value) for name, value in called.items() if hasattr(value, "py_func")}
+    if not replaced:
+        return python  # type: ignore[no-any-return]
+    return FunctionType(python.__code__, python.__globals__ | replaced, python.__name__)  # type: ignore[return-value]
 
 
 def _source_hash() -> str:

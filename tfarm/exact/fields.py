@@ -67,11 +67,11 @@ def fields(k: Coefficients, s: Complex, x: float) -> tuple[Complex, NDArray[np.b
     root, suspects = root_state(k, s)
     S, d, gS, one, two = waves(k, s)
     size = np.maximum(abs(one.z), abs(two.z))
-    near = (size * x * x < SERIES_RADIUS) | (size < SERIES_RADIUS)
+    low = ~(size >= SERIES_RADIUS)  # s = 0 too, where no wave is left
+    near = (size * x * x < SERIES_RADIUS) | low
     result = np.empty((4, s.size), complex)
     result[:, near] = from_root(k, S[near], d[near], root[:, near], x)
     if x > 0.5:
-        low = size < SERIES_RADIUS
         result[2:, low] = _from_tip(k, S[low], d[low], root[0, low], x)
     far = ~near
     one, two = (Wave(*(part[far] for part in wave)) for wave in (one, two))

@@ -40,7 +40,8 @@ BLOCK = 128  # points a block: its twenty work arrays stay in the first- and sec
 SERIES_RADIUS = 6.0  # |z_j| below which the series are used; 14 terms leave 6^14/31! = 1e-23
 SERIES_TERMS = 14
 INVERSE_FACTORIAL = np.array([1.0 / math.factorial(n) for n in range(2 * SERIES_TERMS + 2)])
-PARALLEL = 0.02  # |z_1 - z_2| below this share of |z_1| + |z_2|: flagged
+PARALLEL = 0.15  # |z_1 - z_2| below this share of |z_1| + |z_2|: flagged
+POLE = 1e-11  # torque below this share of its own terms: flagged, it may be a pole
 
 
 # ---------------------------------------------------------------- the algebra, for any number type
@@ -283,7 +284,7 @@ def evaluate(s: Any, k: Any, outputs: Any, values: Any, suspects: Any) -> None:
     """
     points, chosen = np.empty(BLOCK, np.complex128), np.empty(BLOCK, np.int64)
     numbers, functions = np.empty(11 * BLOCK, np.complex128), np.empty(6 * BLOCK, np.complex128)
-    states = np.empty(5 * BLOCK, np.complex128)
+    states = np.empty(6 * BLOCK, np.complex128)
     for first in range(0, s.size, BLOCK):
         for low in (True, False):
             n = 0
@@ -309,8 +310,8 @@ def evaluate(s: Any, k: Any, outputs: Any, values: Any, suspects: Any) -> None:
                     value = value * _reciprocal(1.0 + k[7] * points[i]) if gauge == 1 else value
                     values[o, chosen[i]] = value
             for i in range(n):
-                size = _size(numbers[_Z1 + i]) + _size(numbers[_Z2 + i])
-                suspects[chosen[i]] = not low and _size(numbers[_Z1 + i] - numbers[_Z2 + i]) < PARALLEL * size
+                left = states[5 * BLOCK + i]
+                suspects[chosen[i]] = left.real < POLE * left.imag or not low and _parallel(numbers, i)
 
 
 @inlined
@@ -320,6 +321,12 @@ def _is_low(s: complex, k: Any) -> bool:
     half_sum = 0.5 * _size(S * (k[2] + k[0] * over_d))
     product = _size(S * (k[0] * k[2] * S + k[4]) * over_d)
     return 1.4 * (half_sum + math.sqrt(half_sum * half_sum + 2.0 * product)) < SERIES_RADIUS
+
+
+@inlined
+def _parallel(numbers: Any, i: int) -> bool:
+    size = _size(numbers[_Z1 + i]) + _size(numbers[_Z2 + i])
+    return _size(numbers[_Z1 + i] - numbers[_Z2 + i]) < PARALLEL * size
 
 
 @inlined
@@ -357,8 +364,7 @@ def _wave_states(numbers: Any, functions: Any, k: Any, states: Any) -> None:
             functions[_C2 + i], functions[_S2 + i], numbers[_Z2 + i], numbers[_V2 + i], functions[_E2 + i],
             numbers[_GS + i], numbers[_D + i], _end(k, 8, S), k[10], _end(k, 11, S), k[13],
         )  # fmt: skip
-        over_u = k[17] * _reciprocal(_end(k, 14, S) * theta - k[16] * M0)
-        _store(i, states, over_u, theta, M0, Q0, W1, W1 - theta)
+        _store(i, states, k, S, theta, M0, Q0, W1, W1 - theta)
 
 
 @compiled
@@ -375,14 +381,20 @@ def _series_states(points: Any, k: Any, states: Any) -> None:
             F0, F1, F2, F3, F2_less_1, S, over_d, k[0], k[2], k[4], k[6],
             _end(k, 8, S), k[10], _end(k, 11, S), k[13],
         )  # fmt: skip
-        over_u = k[17] * _reciprocal(_end(k, 14, S) * theta - k[16] * M0)
-        _store(i, states, over_u, theta, M0, Q0, W1, Y1)
+        _store(i, states, k, S, theta, M0, Q0, W1, Y1)
 
 
 @inlined
-def _store(i: int, states: Any, scale: complex, theta: complex, M0: complex, Q0: complex, W1: complex, Y1: complex) -> None:
+def _store(
+    i: int, states: Any, k: Any, S: complex, theta: complex, M0: complex, Q0: complex, W1: complex, Y1: complex
+) -> None:
+    """Divide the free response by its torque (its hub angle where the hub is locked), and say what is left of that."""  # fmt: skip
+    turned, held = _end(k, 14, S) * theta, k[16] * M0
+    u = turned - held
+    scale = k[17] * _reciprocal(u)
     states[i], states[BLOCK + i], states[2 * BLOCK + i] = scale * theta, scale * M0, scale * Q0
     states[3 * BLOCK + i], states[4 * BLOCK + i] = scale * W1, scale * Y1
+    states[5 * BLOCK + i] = complex(_size(u), _size(turned) + _size(held) + _size(M0))
 
 
 # ---------------------------------------------------------------- what the fields along the arm need

@@ -194,12 +194,19 @@ def modes(
     if up_to is not None:
         if not 0 < up_to < math.inf:
             raise ParameterError(key="up_to", value=up_to, remedy="a positive, finite frequency in rad/s")
-        count = count_below(k, up_to) - rigid
+        count = modes_below(arm, up_to, theory=theory)
     elif isinstance(count, bool) or not isinstance(count, int) or count < 1:
         raise ParameterError(key="count", value=count, remedy=f"a whole number of modes from 1 to {MOST_MODES}")
     assert count is not None
+    if count == 0:
+        raise ParameterError(key="up_to", value=up_to, remedy="no flexible mode lies below it; choose a higher one")
     if count > MOST_MODES:
         raise ParameterError(key="count", value=count, remedy=f"at most {MOST_MODES} modes at a time")
     flexible = natural_frequencies(k, rigid + 1, rigid + count)
     index = np.arange(1 - rigid, count + 1)
     return Modes(arm, theory, index, np.r_[[0.0] * rigid, flexible], k)
+
+
+def modes_below(arm: Arm, up_to: float, *, theory: Theory = "timoshenko") -> int:
+    """How many flexible modes the undamped arm has below up_to [rad/s], by the count alone."""
+    return count_below(replace(coefficients(arm, theory), damping=0.0), up_to) - arm.has_rigid_mode

@@ -1,0 +1,98 @@
+"""The free response as analytic functions of s: numerators and denominator of every transfer function at the ends.
+
+With torque and hub angle left open, the arm's equations and its tip conditions leave one solution up to a
+factor.  Its root and tip values are the numerators, the torque it needs (the *drive*) the common
+denominator; all of them are entire in s^2 at C = 0, without the artefacts of single waves, once each is divided
+by g S d (z1 - z2)^2 and the scale e^{-(t1 + t2)} is taken back.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .coefficients import Coefficients
+from .compiled import plain
+from .fields import Wave, tip_condition, waves
+from .jets import Jet
+from .waves import PARALLEL, SERIES_RADIUS, from_transition, from_waves, transition_series
+
+Complex = NDArray[np.complex128]
+_from_waves, _from_transition = plain(from_waves), plain(from_transition)
+_transition = plain(transition_series)
+
+
+class Free(NamedTuple):
+    """The free response times e^{-scale}: hub angle, root moment and force, tip displacement and deflection, drive."""
+
+    theta: Any
+    M: Any
+    Q: Any
+    W: Any
+    Y: Any
+    drive: Any
+    scale: Any
+    parallel: Any  # where two waves are too nearly one for these formulas
+
+
+def free_response(k: Coefficients, s: Complex) -> Free:
+    """The free response at s (1-D), with the derivative of each entry: jets of order one but for the scale."""
+    S, d, _, one, two = waves(k, s)
+    low = ~(np.maximum(abs(one.z), abs(two.z)) >= SERIES_RADIUS)  # s = 0 too, where no wave is left
+    parts = np.empty((6, 2, s.size), complex)
+    scale = np.where(low, 0.0, one.t + two.t)
+    if low.any():
+        parts[:, :, low] = [entry.c for entry in low_frequency(k, Jet.variable(s[low], 1))]
+    high = ~low
+    parallel = high & (abs(one.z - two.z) < PARALLEL * (abs(one.z) + abs(two.z)))
+    if high.any():
+        one, two = (Wave(*(part[high] for part in wave)) for wave in (one, two))
+        parts[:, :, high] = [entry.c for entry in _by_waves(k, Jet.variable(s[high], 1), d[high], one, two)]
+    return Free(*(Jet(entry) for entry in parts), scale, parallel)
+
+
+def low_frequency(k: Coefficients, s: Jet) -> tuple[Jet, ...]:
+    """theta, M, Q, W, Y and the drive around s by the series, to the order of the jet."""
+    a, b, g, sigma = float(k.a), float(k.b), float(k.g), float(k.sigma)
+    S, over_d = s * s, 1.0 / (1.0 + k.damping * s)
+    z_sum, z_product = S * (b + a * over_d), S * (a * b * S + g) * over_d
+    F0, F1, F2, F3, F2_less_1, _ = _transition(z_sum, z_product)
+    tip = tip_condition(k, S)
+    state = _from_transition(F0, F1, F2, F3, F2_less_1, S, over_d, a, b, g, sigma, *tip)
+    return *state, drive(k, S, state[0], state[1])
+
+
+def drive(k: Coefficients, S: Any, theta: Any, M0: Any) -> Any:
+    """Torque of the free response (its hub angle where the hub is locked): the characteristic function."""
+    rest, inertia, force, gain = k.kernel[14:18]
+    return ((rest + inertia * S) * theta - force * M0) / gain
+
+
+def _by_waves(k: Coefficients, s: Jet, d: Complex, one: Wave, two: Wave) -> tuple[Jet, ...]:
+    a, b, g = float(k.a), float(k.b), float(k.g)
+    S, damper = s * s, Jet([d, k.damping * np.ones_like(d)])
+    arguments: list[Any] = []
+    for wave in (one, two):
+        u = d * wave.z - a * S.c[0]
+        slope = -(
+            k.damping * wave.z * wave.v - S.c[1] * (a * wave.v + b * u - g)
+        ) / (d * wave.v + u)  # dz/ds from the dispersion relation
+        z = Jet([wave.z, slope])
+        by_z = np.where(abs(wave.z) > 1.0, (wave.c - wave.s) / (2 * wave.z), wave.e * _slope_of_sinhc(wave.z))
+        c, sinhc = Jet([wave.c, wave.s / 2 * slope]), Jet([wave.s, by_z * slope])
+        arguments += [c, sinhc, z, Jet([wave.v, slope - b * S.c[1]]), wave.e]
+    theta, M, Q, W = _from_waves(*arguments, g * S, damper, *tip_condition(k, S))
+    gap = arguments[2] - arguments[7]
+    unit = 1.0 / (g * S * damper * gap * gap)
+    state = tuple(entry * unit for entry in (theta, M, Q, W, W - theta))
+    return *state, drive(k, S, state[0], state[1])
+
+
+def _slope_of_sinhc(z: Complex) -> Complex:
+    """d/dz of sinh sqrt z / sqrt z, by its series for |z| <= 1."""
+    slope = np.zeros_like(z)
+    for n in range(10, 0, -1):
+        slope = (n + z * slope) / ((2 * n) * (2 * n + 1))
+    return slope

@@ -1,0 +1,129 @@
+"""Outputs at any s: the fused kernel where it has all digits, ball arithmetic at the few points where it has not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.errors import ParameterError
+
+from . import balls
+from .coefficients import Coefficients
+from .fields import fields, from_root
+from .free import free_response, low_frequency
+from .jets import Jet
+from .outputs import Output, unit_scale
+from .waves import evaluate
+
+Complex = NDArray[np.complex128]
+
+AT_A_POLE = 4 * float(np.finfo(float).eps)  # nearer than this share of |s|, no digit of the answer can be right
+PROVEN_BITS = 60  # a little more than a float64 holds
+_ENDS = {"theta": 0, "M": 1, "Q": 2, "W": 3, "Y": 4}
+_FIELDS = {"Y": 0, "Phi": 1, "M": 2, "Q": 3}
+
+
+def evaluate_outputs(k: Coefficients, wanted: Sequence[Output], s: Complex, x: float = 0.0) -> Complex:
+    """Outputs (rows) for a unit input at s (1-D), SI; x is a share of the length, for outputs along the arm.
+
+    Raises ParameterError at a pole, naming it.
+    """
+    s = np.ascontiguousarray(s)
+    values, suspects = np.empty((len(wanted), s.size), complex), np.empty(s.size, bool)
+    with np.errstate(under="ignore"):
+        evaluate(s, k.kernel, np.array([_row(k, each) for each in wanted]), values, suspects)
+        for row, each in enumerate(wanted):
+            if each.place == "x":
+                values[row] = _along(k, each, s, x)
+    suspects |= s == 0
+    for i in np.nonzero(suspects)[0]:
+        values[:, i] = [value_with_care(k, each, complex(s[i]), x) for each in wanted]
+    return values
+
+
+def differentiate_outputs(k: Coefficients, wanted: Sequence[Output], s: Complex, x: float = 0.0) -> Complex:
+    """The derivatives of the outputs (rows) with respect to s, by power series at the ends and by balls along x."""
+    values = np.empty((len(wanted), s.size), complex)
+    with np.errstate(under="ignore", invalid="ignore", divide="ignore"):
+        free = free_response(k, s)
+        for row, each in enumerate(wanted):
+            if each.place != "x":
+                values[row] = _ratio(k, each, Jet.variable(s, 1), free[_ENDS[each.quantity]], free.drive).c[1]
+    suspects = free.parallel | (s == 0) | _at_pole(free.drive, s)
+    for row, each in enumerate(wanted):
+        for i in np.nonzero(suspects | (each.place == "x"))[0]:
+            values[row, i] = _slope_with_care(k, each, complex(s[i]), x)
+    return values
+
+
+def value_with_care(k: Coefficients, wanted: Output, s: complex, x: float = 0.0) -> complex:
+    """One output at one s from a proven enclosure, or from the expansion at s = 0; ParameterError at a pole."""
+    _refuse_pole(k, wanted, s, x)
+    if s == 0:
+        return complex(expansion_at_zero(k, wanted, x)[2])
+    return balls.nearest(balls.enclose(k, wanted, s, bits=PROVEN_BITS, x=x))
+
+
+def digits_of(k: Coefficients, wanted: Output, s: complex, digits: int, x: float = 0.0) -> tuple[str, str]:
+    """Real and imaginary part as decimal strings, each with that many right digits."""
+    _refuse_pole(k, wanted, s, x)
+    return balls.decimals(k, wanted, s, digits, x)
+
+
+def expansion_at_zero(k: Coefficients, wanted: Output, x: float = 0.0) -> tuple[float, float, float, float]:
+    """Coefficients of s^-2, s^-1, 1 and s in the output's expansion at s = 0."""
+    s = Jet.variable(0.0, 7)
+    *state, drive = low_frequency(k, s)
+    if wanted.place == "x":
+        quantity = from_root(k, s * s, 1.0 + k.damping * s, tuple(state[:3]), x)[_FIELDS[wanted.quantity]]
+    else:
+        quantity = state[_ENDS[wanted.quantity]]
+    order = next(n for n, coefficient in enumerate(drive.c) if coefficient != 0)
+    quotient = Jet((quantity * _power(s, wanted.power)).c[: 8 - order]) / drive.shifted(order)
+    quotient = quotient / Jet((1.0 + k.damping * s).c[: 8 - order]) if wanted.gauge else quotient
+    series = [0.0] * (2 - order) + [float(c) * float(unit_scale(wanted, k)) for c in quotient.c]
+    return series[0], series[1], series[2], series[3]
+
+
+def _row(k: Coefficients, wanted: Output) -> tuple[float, ...]:
+    return _ENDS.get(wanted.quantity, 0), wanted.power, wanted.gauge, float(unit_scale(wanted, k))
+
+
+def _along(k: Coefficients, wanted: Output, s: Complex, x: float) -> Complex:
+    values = fields(k, s, x)[0][_FIELDS[wanted.quantity]] * float(unit_scale(wanted, k)) * s**wanted.power
+    return values / (1.0 + k.damping * s) if wanted.gauge else values
+
+
+def _power(s: Any, power: int) -> Any:
+    return s * s if power == 2 else s if power == 1 else 1.0 + 0.0 * s
+
+
+def _ratio(k: Coefficients, wanted: Output, s: Jet, quantity: Jet, drive: Jet) -> Jet:
+    ratio = quantity * _power(s, wanted.power) * float(unit_scale(wanted, k)) / drive
+    return ratio / (1.0 + k.damping * s) if wanted.gauge else ratio
+
+
+def _at_pole(drive: Jet, s: Complex) -> NDArray[np.bool_]:
+    value, slope = drive.c
+    near: NDArray[np.bool_] = abs(value) <= AT_A_POLE * abs(s) * abs(slope)
+    return near
+
+
+def _refuse_pole(k: Coefficients, wanted: Output, s: complex, x: float) -> None:
+    """Raise ParameterError if s is a pole to the last digit that a float64 holds."""
+    if s == 0:
+        if any(expansion_at_zero(k, wanted, x)[:2]):
+            raise ParameterError(key="s", value=0, remedy="a pole: the arm turns as a rigid body there; choose s != 0")
+    elif _at_pole(free_response(k, np.array([s])).drive, np.array([s]))[0]:
+        name = f"a natural frequency, {abs(s):.10g} rad/s" if s.real == 0 else f"an eigenvalue, {s:.10g} 1/s"
+        raise ParameterError(key="s", value=s, remedy=f"a pole: {name}; the response is infinite there, move s")
+
+
+def _slope_with_care(k: Coefficients, wanted: Output, s: complex, x: float) -> complex:
+    _refuse_pole(k, wanted, s, x)
+    if s == 0:
+        return complex(expansion_at_zero(k, wanted, x)[3])
+    return balls.nearest(balls.slope(k, wanted, s, x=x))

@@ -1,0 +1,5 @@
+"""Exact transfer functions of the arm: values, derivatives, poles and zeros."""
+
+from tfarm.response.transfer import TransferFunction, transfer
+
+__all__ = ["TransferFunction", "transfer"]

@@ -1,0 +1,139 @@
+"""Poles and zeros: by a count where the spectrum is real, by a winding number where it is not."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import Arm, Hub
+from tfarm.exact.coefficients import Coefficients, coefficients
+from tfarm.errors import ConvergenceError
+from tfarm.exact.free import free_response, low_frequency
+from tfarm.exact.jets import Jet
+from tfarm.exact.outputs import Output
+from tfarm.spectrum import modes, modes_below
+from tfarm.spectrum.box import Analytic, Box, Function, zeros_in_box
+
+Complex = NDArray[np.complex128]
+
+CLEAR = 0.8  # how far towards the accumulation point -1/C a box may reach
+
+
+@dataclass(frozen=True, slots=True)
+class Roots:
+    """Poles or zeros `values` [1/s], with multiplicity, ascending in |Im s|: all there are in `box`.
+
+    `box` is (re_min, re_max, im_min, im_max); `proof` says how completeness is known: "count" or "winding number".
+    """
+
+    values: Complex
+    box: tuple[float, float, float, float]
+    proof: str
+
+
+def poles_of(arm: Arm, up_to: float) -> Roots:
+    """The poles of every transfer function of the arm with |Im s| <= up_to."""
+    at_zero = 2 * arm.has_rigid_mode
+    if arm.link.damping == 0:
+        return _on_axis(_frequencies(arm, up_to), at_zero, up_to)
+    return _in_box(coefficients(arm), "drive", at_zero, up_to, _damped_starts(arm, up_to))
+
+
+def zeros_of(arm: Arm, wanted: Output, up_to: float) -> Roots:
+    """The zeros of one output at the hub or the tip with |Im s| <= up_to."""
+    k = coefficients(arm)
+    if arm.is_locked and wanted.quantity == "theta" or math.isinf(arm.payload.mass) and wanted.quantity == "W":
+        return Roots(np.empty(0, complex), (-math.inf, math.inf, -up_to, up_to), "constant")
+    at_zero = max(0, _order(k, wanted.quantity) + wanted.power - _order(k, "drive"))
+    neighbour = {"theta": math.inf, "M": 0.0}.get(wanted.quantity)
+    other = arm if neighbour is None else replace(arm, hub=Hub(inertia=neighbour))
+    if neighbour is not None and arm.link.damping == 0:
+        return _on_axis(_frequencies(other, up_to), at_zero, up_to)
+    starts = _starts_by_sampling(k, wanted.quantity, up_to) if neighbour is None else _damped_starts(other, up_to)
+    return _in_box(k, wanted.quantity, at_zero, up_to, starts)
+
+
+def _frequencies(arm: Arm, up_to: float) -> NDArray[np.float64]:
+    """Flexible natural frequencies below up_to."""
+    if modes_below(arm, up_to) == 0:
+        return np.empty(0)
+    table = modes(arm, up_to=up_to)
+    return table.natural_frequency[table.index > 0]
+
+
+def _on_axis(frequencies: NDArray[np.float64], at_zero: int, up_to: float) -> Roots:
+    pairs = np.repeat(1j * frequencies, 2)
+    pairs[1::2] *= -1
+    return Roots(np.r_[np.zeros(at_zero, complex), pairs], (-math.inf, math.inf, -up_to, up_to), "count")
+
+
+def _damped_starts(arm: Arm, up_to: float) -> Complex:
+    """First-order estimates s = -C w^2/2 +- i w sqrt(1 - (C w/2)^2) from the undamped frequencies."""
+    omega, C = _frequencies(arm, 1.5 * up_to), arm.link.damping
+    root = np.sqrt((1 - (C * omega / 2) ** 2).astype(complex))
+    starts = np.r_[omega * (-C * omega / 2 + 1j * root), omega * (-C * omega / 2 - 1j * root)]
+    return np.r_[starts, np.linspace(-up_to, -up_to / 50, 40)]
+
+
+def _starts_by_sampling(k: Coefficients, name: str, up_to: float) -> Complex:
+    """Dips of the numerator along the imaginary and the real axis."""
+    line = np.r_[np.geomspace(1e-4 * up_to, up_to, 400), np.linspace(0.01 * up_to, up_to, 1600)]
+    line.sort()
+    starts = []
+    for direction in (1j, 1.0, -1.0):
+        at = _function(k, name)(direction * line)
+        size = abs(at.value)
+        dips = np.nonzero((size[1:-1] < size[:-2]) & (size[1:-1] < size[2:]))[0] + 1
+        starts.append(direction * line[dips])
+    found = np.concatenate(starts)
+    return np.r_[found, found.conj(), -found, -found.conj()]
+
+
+def _order(k: Coefficients, name: str) -> int:
+    """How often the free response's quantity vanishes at s = 0."""
+    *state, drive = low_frequency(k, Jet.variable(0.0, 6))
+    jets = dict(zip(("theta", "M", "Q", "W", "Y", "drive"), (*state, drive), strict=True))
+    return next(n for n, coefficient in enumerate(jets[name].c) if coefficient != 0)
+
+
+def _function(k: Coefficients, name: str) -> Function:
+    """The quantity of the free response with its zeros at s = 0 divided out."""
+    order = _order(k, name)
+
+    def function(s: Complex) -> Analytic:
+        free = free_response(k, s)
+        value, slope = getattr(free, name).c
+        return Analytic(value / s**order, (slope - order * value / s) / s**order, free.scale)
+
+    return function
+
+
+def _on_their_axes(found: Complex, damping: float) -> Complex:
+    """Zeros come in conjugate pairs (at C = 0 in +- pairs too), so one that is real up to rounding is real."""
+    tiny = 1e-11 * abs(found)
+    real = np.where((abs(found.real) < tiny) & (damping == 0), 0.0, found.real)
+    imag = np.where(abs(found.imag) < tiny, 0.0, found.imag)
+    on_axes: Complex = real + 1j * imag
+    return on_axes
+
+
+def _in_box(k: Coefficients, name: str, at_zero: int, up_to: float, starts: Complex) -> Roots:
+    """Zeros of the quantity in a box of that height; the box grows a little where a zero lies on its edge."""
+    function = _function(k, name)
+    for growth in (1.0, 1.0037, 1.0091, 1.0173):
+        height = up_to * growth
+        left = -min(CLEAR / k.damping, height) if k.damping else -height
+        box = Box(left, height, -height, height)
+        try:
+            found = zeros_in_box(function, box, starts)
+        except ConvergenceError:
+            if growth > 1.01:
+                raise
+            continue
+        found = _on_their_axes(found, k.damping)
+        found = found[np.lexsort((-found.imag, found.real, abs(found.imag).round(9)))]
+        return Roots(np.r_[np.zeros(at_zero, complex), found], tuple(box), "winding number")
+    raise AssertionError("unreachable")

@@ -1,0 +1,188 @@
+"""The exact transfer function, with the vocabulary of python-control and none of its approximations."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tfarm.arm import Arm
+from tfarm.errors import MISSING, ParameterError
+from tfarm.exact.coefficients import coefficients
+from tfarm.exact.outputs import Output, output
+from tfarm.exact.values import differentiate_outputs, digits_of, evaluate_outputs, expansion_at_zero
+
+from .roots import Roots, poles_of, zeros_of
+
+if TYPE_CHECKING:
+    import control
+
+Complex = NDArray[np.complex128]
+BLOCK = 1 << 16
+
+
+def transfer(arm: Arm, outputs: str | Sequence[str], *, x: float | None = None) -> TransferFunction:
+    """The exact transfer function from hub torque (hub angle where the hub is locked) to one output or several.
+
+    `outputs` are names of `tfarm.exact.outputs.OUTPUTS`; `x` [m] is the place of deflection, rotation, moment and
+    shear.  Raises ParameterError for an unknown output, or for a place missing or outside the arm.
+    """
+    return TransferFunction(arm, outputs, x=x)
+
+
+class TransferFunction:
+    """G(s), exact, for one output or a list of them (see `transfer`).
+
+    Calling it at a complex scalar or array of s [1/s] gives values of that shape; a list of outputs adds a leading
+    axis.  At a pole it raises ParameterError naming the pole; everywhere else it has full float64 accuracy.
+    """
+
+    def __init__(self, arm: Arm, outputs: str | Sequence[str], *, x: float | None = None) -> None:
+        self.arm = arm
+        self.is_single = isinstance(outputs, str)
+        self.outputs: tuple[str, ...] = (outputs,) if isinstance(outputs, str) else tuple(outputs)
+        if not self.outputs:
+            raise ParameterError(key="outputs", value=outputs, remedy="name at least one output")
+        self._wanted: tuple[Output, ...] = tuple(output(name) for name in self.outputs)
+        self._k = coefficients(arm)
+        self.x = self._place(x)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """The SI unit of each output."""
+        return tuple(wanted.unit for wanted in self._wanted)
+
+    @property
+    def input(self) -> str:
+        """The input: "hub_torque" [N m], or "hub_angle" [rad] where the hub is locked."""
+        return "hub_angle" if self.arm.is_locked else "hub_torque"
+
+    @property
+    def input_unit(self) -> str:
+        """The SI unit of the input."""
+        return "rad" if self.arm.is_locked else "N m"
+
+    def __repr__(self) -> str:
+        place = "" if self.x is None else f" at x = {self.x:g} m"
+        return f"<TransferFunction of {self.arm.name}: {self.input} -> {', '.join(self.outputs)}{place}>"
+
+    # ------------------------------------------------------------ values
+
+    def __call__(self, s: ArrayLike) -> Any:
+        """G(s) at a complex scalar or array."""
+        points = _finite(s)
+        values = self._values(points.ravel()).reshape(len(self.outputs), *points.shape)
+        return self._shaped(values)
+
+    def derivative(self, s: ArrayLike) -> Any:
+        """dG/ds at a complex scalar or array, by the same formulas carried as power series."""
+        points = _finite(s)
+        flat = differentiate_outputs(self._k, self._wanted, points.ravel(), self._share)
+        return self._shaped(flat.reshape(len(self.outputs), *points.shape))
+
+    def digits(self, s: complex, digits: int) -> Any:
+        """G(s) as pairs of decimal strings (re, im), each with that many right digits, proven in ball arithmetic.
+
+        s and the arm's parameters are taken as the float64 numbers they are.  Raises CertificationError at a pole.
+        """
+        if not isinstance(digits, int) or not 1 <= digits <= 1000:
+            raise ParameterError(key="digits", value=digits, remedy="a whole number of digits from 1 to 1000")
+        point = complex(_finite(s))
+        pairs = [digits_of(self._k, wanted, point, digits, self._share) for wanted in self._wanted]
+        return pairs[0] if self.is_single else pairs
+
+    def frequency_response(self, omega: ArrayLike) -> control.FrequencyResponseData:
+        """G(i omega) as python-control data with named signals; omega in rad/s (1-D, increasing)."""
+        import control
+
+        grid = np.atleast_1d(np.asarray(omega, dtype=float))
+        data = np.empty((len(self.outputs), 1, grid.size), complex)
+        for start in range(0, grid.size, BLOCK):
+            part = slice(start, start + BLOCK)
+            data[:, 0, part] = self._values(1j * grid[part])
+        return control.FrequencyResponseData(
+            data, grid, inputs=[self.input], outputs=list(self.outputs), name=self.arm.name
+        )
+
+    def _values(self, s: Complex) -> Complex:
+        return evaluate_outputs(self._k, self._wanted, s, self._share)
+
+    def _shaped(self, values: Complex) -> Any:
+        values = values[0] if self.is_single else values
+        return complex(values) if values.ndim == 0 else values
+
+    # ------------------------------------------------------------ s = 0, poles and zeros
+
+    @cached_property
+    def _expansion(self) -> NDArray[np.float64]:
+        return np.array([expansion_at_zero(self._k, wanted, self._share) for wanted in self._wanted])
+
+    @property
+    def rigid_body(self) -> Any:
+        """The coefficient of 1/s^2 at s = 0: the arm turning as a rigid body."""
+        return self._shaped_real(self._expansion[:, 0])
+
+    @property
+    def static(self) -> Any:
+        """The constant term of the expansion at s = 0: the static gain where the output is finite there."""
+        return self._shaped_real(self._expansion[:, 2])
+
+    def _shaped_real(self, values: NDArray[np.float64]) -> Any:
+        return float(values[0]) if self.is_single else values
+
+    def poles(self, *, up_to: float) -> Roots:
+        """The poles with |Im s| <= up_to [rad/s], complete in the box of the record (see `Roots`).
+
+        At C = 0 they are +-i times the natural frequencies, complete by their count, and 0 twice for the
+        rigid-body mode; at C > 0 complete by the winding number of the characteristic function around the box.
+        """
+        return poles_of(self.arm, _positive("up_to", up_to))
+
+    def zeros(self, *, up_to: float) -> Roots:
+        """The zeros of a single output with |Im s| <= up_to [rad/s], complete in the box of the record.
+
+        By a count for hub angle, hub rate and root moment at C = 0, else by the winding number around the box.
+        """
+        if not self.is_single:
+            raise ParameterError(key="outputs", value=self.outputs, remedy="ask for the zeros of one output at a time")
+        if self._wanted[0].place == "x":
+            raise ParameterError(key="output", value=self.outputs[0], remedy="zeros are found at the hub and the tip")
+        return zeros_of(self.arm, self._wanted[0], _positive("up_to", up_to))
+
+    # ------------------------------------------------------------ inside
+
+    @property
+    def _share(self) -> float:
+        return 0.0 if self.x is None else self.x / self.arm.link.length
+
+    def _place(self, x: float | None) -> float | None:
+        along = [name for name, wanted in zip(self.outputs, self._wanted, strict=True) if wanted.place == "x"]
+        length = self.arm.link.length
+        if not along:
+            if x is not None:
+                raise ParameterError(key="x", value=x, remedy=f"{self.outputs[0]} has its own place; leave x out")
+            return None
+        if x is None:
+            raise ParameterError(key="x", value=MISSING, remedy=f"say where {along[0]} is meant, 0 to {length:g} m")
+        if isinstance(x, bool) or not isinstance(x, int | float) or not 0 <= x <= length:
+            raise ParameterError(key="x", value=x, remedy=f"a point of the arm lies between 0 and {length:g} m")
+        return float(x)
+
+
+def _finite(s: ArrayLike) -> Complex:
+    points = np.asarray(s, dtype=complex)
+    if not np.isfinite(points).all():
+        bad = points[~np.isfinite(points)].ravel()[0]
+        raise ParameterError(key="s", value=complex(bad), remedy="a transfer function wants finite s in 1/s")
+    return points
+
+
+def _positive(key: str, value: float) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < math.inf:
+        raise ParameterError(key=key, value=value, remedy="a positive, finite frequency in rad/s")
+    return float(value)
+

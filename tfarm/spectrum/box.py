@@ -1,0 +1,151 @@
+"""Zeros of an analytic function in a box of the complex plane, complete by the argument principle.
+
+Newton's method from many starts finds most of them; the winding number of the function around the box says how
+many there are; where the two disagree the box is cut, each half counted, and the search goes on inside.
+After Kravanja and Van Barel (2000), with the function given as mantissa and exponent, so that it may be
+of any size.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.errors import ConvergenceError
+
+Complex = NDArray[np.complex128]
+
+TURN = 0.6  # rad: a longer step of the phase along the contour is halved
+FINEST = 1e-13  # a contour cannot be resolved closer to a zero than this share of the box
+SPLIT = 0.4871  # where a box is cut: off the axes, on which zeros like to lie
+
+
+class Analytic(NamedTuple):
+    """Values f e^{-scale}, their derivatives f' e^{-scale}, and scale, at given points."""
+
+    value: Complex
+    slope: Complex
+    scale: Complex
+
+
+Function = Callable[[Complex], Analytic]
+
+
+class Box(NamedTuple):
+    """re_min, re_max, im_min, im_max."""
+
+    re_min: float
+    re_max: float
+    im_min: float
+    im_max: float
+
+    def holds(self, points: Complex) -> NDArray[np.bool_]:
+        """Which points lie inside."""
+        inside: NDArray[np.bool_] = (self.re_min < points.real) & (points.real < self.re_max)
+        return inside & (self.im_min < points.imag) & (points.imag < self.im_max)
+
+    @property
+    def corners(self) -> Complex:
+        """The four corners, counter-clockwise, and the first again."""
+        left, right, low, high = self
+        return np.array([left + 1j * low, right + 1j * low, right + 1j * high, left + 1j * high, left + 1j * low])
+
+    def halves(self) -> tuple[Box, Box]:
+        """The box cut across its longer side, geometrically where that side spans decades."""
+        left, right, low, high = self
+        if high - low >= right - left:
+            cut = _between(low, high)
+            return Box(left, right, low, cut), Box(left, right, cut, high)
+        cut = _between(left, right)
+        return Box(left, cut, low, high), Box(cut, right, low, high)
+
+
+def _between(low: float, high: float) -> float:
+    if low > 0 and high > 8 * low or high < 0 and low < 8 * high:
+        return math.copysign(abs(low) ** (1 - SPLIT) * abs(high) ** SPLIT, low)
+    return low + SPLIT * (high - low)
+
+
+def winding_number(function: Function, box: Box, points: int = 40) -> int:
+    """How many zeros lie in the box, each as often as its order.
+
+    Raises ConvergenceError where a zero lies on the contour, to what float64 resolves.
+    """
+    corners = box.corners
+    path = np.concatenate([np.linspace(a, b, points, endpoint=False) for a, b in zip(corners, corners[1:], strict=False)])
+    path = np.append(path, corners[-1])
+    phase = _phase(function, path)
+    smallest = FINEST * abs(corners[2] - corners[0])
+    while True:
+        step = np.angle(np.exp(1j * np.diff(phase)))
+        (rough,) = np.nonzero(abs(step) > TURN)
+        if not rough.size:
+            return round(float(step.sum()) / (2 * math.pi))
+        if path.size > 200_000 or abs(path[rough + 1] - path[rough]).min() < smallest:
+            raise ConvergenceError(f"a zero lies on the contour near {path[rough[0]]:.6g}", path[rough[0]], step[rough[0]])
+        middle = (path[rough] + path[rough + 1]) / 2
+        phase = np.insert(phase, rough + 1, _phase(function, middle))
+        path = np.insert(path, rough + 1, middle)
+
+
+def _phase(function: Function, points: Complex) -> NDArray[np.float64]:
+    at = function(points)
+    phase: NDArray[np.float64] = np.angle(at.value) + at.scale.imag
+    return phase
+
+
+def newton(function: Function, starts: Complex, steps: int = 60) -> Complex:
+    """Newton's method from every start at once; the points that have settled, each zero once."""
+    s = np.array(starts, dtype=complex)
+    move = np.full(s.size, np.inf, complex)
+    for _ in range(steps):
+        at = function(s)
+        with np.errstate(all="ignore"):
+            move = at.value / at.slope
+        bad = ~np.isfinite(move)
+        move[bad] = 0.0
+        limit = 0.3 * abs(s)
+        move = np.where(abs(move) > limit, move * (limit / np.maximum(abs(move), 1e-300)), move)
+        s = s - move
+        if (abs(move) <= 1e-15 * abs(s)).all():
+            break
+    return distinct(s[(abs(move) < 1e-11 * abs(s)) & np.isfinite(s)])
+
+
+def distinct(points: Complex, apart: float = 1e-9) -> Complex:
+    """The points, those nearer than `apart` of their size to an earlier one left out."""
+    kept: list[complex] = []
+    for point in points:
+        if all(abs(point - other) > apart * abs(point) for other in kept):
+            kept.append(complex(point))
+    return np.array(kept, dtype=complex)
+
+
+def zeros_in_box(function: Function, box: Box, starts: Complex) -> Complex:
+    """All zeros in the box, each as often as its order, as many as the winding number says.
+
+    Raises ConvergenceError if they cannot all be found, with those that were.
+    """
+    return _search(function, box, starts, depth=0)
+
+
+def _search(function: Function, box: Box, starts: Complex, depth: int) -> Complex:
+    expected = winding_number(function, box)
+    if not expected:
+        return np.empty(0, complex)
+    grid = (box.corners[:4, None] * np.array([0.8, 0.5]) + box.corners[[2, 3, 0, 1], None] * np.array([0.2, 0.5])).ravel()
+    found = newton(function, np.concatenate([starts[box.holds(starts)], grid]))
+    found = found[box.holds(found)]
+    if found.size == expected:
+        return found
+    width = max(box.re_max - box.re_min, box.im_max - box.im_min)
+    if found.size == 1 and width < 1e-6 * abs(found[0]):
+        return np.repeat(found, expected)
+    if depth > 60:
+        raise ConvergenceError(f"{expected} zeros in {box}, {found.size} found", found, expected)
+    parts = [_search(function, half, starts, depth + 1) for half in box.halves()]
+    return np.concatenate(parts)
