@@ -13,6 +13,7 @@ from tfarm.arm import Arm
 from tfarm.errors import ParameterError
 from tfarm.exact.coefficients import Coefficients, Theory, coefficients
 
+from .precise import refine
 from .search import count_below, natural_frequencies
 from .shapes import Shapes
 
@@ -52,6 +53,14 @@ class Modes:
     def natural_frequency_hz(self) -> Real:
         """Natural frequencies [Hz]."""
         return self.natural_frequency / (2 * math.pi)
+
+    def digits(self, digits: int) -> list[str]:
+        """The frequencies [rad/s] with so many right digits, as strings, each also a root of the appendix's Delta(s).
+
+        Raises ConvergenceError where a digit cannot be told, for a double frequency for instance.
+        """
+        flexible = [refine(self._k, float(omega), digits) for omega in self.natural_frequency[self._rigid :]]
+        return ["0.0"] * self._rigid + flexible
 
     def __len__(self) -> int:
         return self.index.size

@@ -1,0 +1,81 @@
+"""What the commands print with --json: plain dictionaries of doubles, strings and lists.
+
+Infinities are the strings "inf" and "-inf"; NaN does not occur.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+
+from tfarm.arm import Arm
+from tfarm.response import TransferFunction
+from tfarm.spectrum import Modes
+
+
+def to_json(answer: dict[str, Any]) -> str:
+    """One JSON object, with infinities as strings; NaN raises ValueError."""
+    return json.dumps(_plain(answer), allow_nan=False, ensure_ascii=False)
+
+
+def modes_answer(modes: Modes, digits: int | None) -> dict[str, Any]:
+    """The modal table, frequencies as strings of so many digits where more than 15 are asked for."""
+    strings = modes.digits(digits) if digits is not None and digits > 15 else None
+    rows = []
+    for row, index in enumerate(modes.index):
+        frequency: Any = float(modes.natural_frequency[row]) if strings is None else strings[row]
+        rows.append({
+            "index": int(index),
+            "natural_frequency_rad_s": frequency,
+            "natural_frequency_hz": float(modes.natural_frequency_hz[row]),
+            "hub_participation": float(modes.hub_participation[row]),
+            "modal_moment": float(modes.modal_moment[row]),
+            "nodes_m": [float(x) for x in modes.nodes[row]],
+            "sensitivity": {name: float(values[row]) for name, values in modes.sensitivity.items()},
+        })  # fmt: skip
+    answer = {"arm": modes.arm.name, "count": int(modes.index.max()), "complete": True, "theory": modes.theory}
+    if digits is not None:
+        answer["digits"] = digits
+    return answer | {"modes": rows}
+
+
+def response_answer(G: TransferFunction, s: np.ndarray[Any, Any], digits: int | None) -> dict[str, Any]:
+    """Values of one output at the points s; pairs of strings where more than 15 digits are asked for."""
+    if digits is not None and digits > 15:
+        value: list[Any] = [list(G.digits(complex(point), digits)) for point in s]
+    else:
+        value = [[float(v.real), float(v.imag)] for v in G(s)]
+    answer = {"arm": G.arm.name, "input": G.input, "input_unit": G.input_unit, "output": G.outputs[0], "unit": G.units[0]}
+    if G.x is not None:
+        answer["x"] = G.x
+    return answer | {"s": [[float(p.real), float(p.imag)] for p in s], "value": value}
+
+
+def presets_answer(arms: list[Arm]) -> dict[str, Any]:
+    """Name, size and assumptions of each preset."""
+    return {"presets": [_arm(arm) for arm in arms]}
+
+
+def _arm(arm: Arm) -> dict[str, Any]:
+    return {
+        "name": arm.name,
+        "length": arm.link.length,
+        "damping": arm.link.damping,
+        "hub_inertia": arm.hub.inertia,
+        "payload_mass": arm.payload.mass,
+        "payload_inertia": arm.payload.inertia,
+        "assumptions": list(arm.assumptions),
+    }
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, float) and math.isinf(value):
+        return "inf" if value > 0 else "-inf"
+    if isinstance(value, dict):
+        return {key: _plain(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(entry) for entry in value]
+    return value

@@ -1,0 +1,47 @@
+"""Arguments as people type them, turned into numbers; what cannot be is refused in one line."""
+
+from __future__ import annotations
+
+import math
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.errors import ParameterError
+
+MOST_POINTS = 1_000_000
+_Number = TypeVar("_Number", float, complex)
+
+
+def s_values(text: str) -> NDArray[np.complex128]:
+    """Complex numbers separated by commas: "0.3+57.1j,10j"."""
+    return np.array([_number("--s", part, complex, "such as 0.3+57.1j (1/s)") for part in text.split(",")])
+
+
+def omega_values(text: str) -> NDArray[np.complex128]:
+    """s = i omega for frequencies in rad/s separated by commas."""
+    frequencies = [_number("--omega", part, float, "a frequency in rad/s") for part in text.split(",")]
+    return 1j * np.array(frequencies)
+
+
+def grid(start: float, stop: float, points: str) -> NDArray[np.complex128]:
+    """s = i omega for logarithmically spaced frequencies from start to stop [rad/s]."""
+    if not 0 < start < math.inf:
+        raise ParameterError(key="--from", value=start, remedy="a positive frequency in rad/s")
+    if not start < stop < math.inf:
+        raise ParameterError(key="--to", value=stop, remedy=f"a frequency above --from, {start:g} rad/s")
+    number = _number("--points", points, float, f"a whole number from 2 to {MOST_POINTS}")
+    if not (2 <= number <= MOST_POINTS and number == int(number)):
+        raise ParameterError(key="--points", value=points, remedy=f"a whole number from 2 to {MOST_POINTS}")
+    return 1j * np.geomspace(start, stop, int(number))
+
+
+def _number(key: str, text: str, kind: type[_Number], remedy: str) -> _Number:
+    try:
+        value = kind(text.strip().replace("i", "j") if kind is complex else text)
+    except ValueError:
+        raise ParameterError(key=key, value=text, remedy=remedy) from None
+    if not np.isfinite(value):
+        raise ParameterError(key=key, value=text, remedy=f"a finite number, {remedy}")
+    return value
