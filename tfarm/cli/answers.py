@@ -36,7 +36,12 @@ def modes_answer(modes: Modes, digits: int | None) -> dict[str, Any]:
             "nodes_m": [float(x) for x in modes.nodes[row]],
             "sensitivity": {name: float(values[row]) for name, values in modes.sensitivity.items()},
         })  # fmt: skip
-    answer = {"arm": modes.arm.name, "count": int(modes.index.max()), "complete": True, "theory": modes.theory}
+    answer: dict[str, Any] = {
+        "arm": modes.arm.name,
+        "count": int(modes.index.max()),
+        "complete": True,
+        "theory": modes.theory,
+    }
     if digits is not None:
         answer["digits"] = digits
     return answer | {"modes": rows}
@@ -48,7 +53,13 @@ def response_answer(G: TransferFunction, s: np.ndarray[Any, Any], digits: int | 
         value: list[Any] = [list(G.digits(complex(point), digits)) for point in s]
     else:
         value = [[float(v.real), float(v.imag)] for v in G(s)]
-    answer = {"arm": G.arm.name, "input": G.input, "input_unit": G.input_unit, "output": G.outputs[0], "unit": G.units[0]}
+    answer: dict[str, Any] = {
+        "arm": G.arm.name,
+        "input": G.input,
+        "input_unit": G.input_unit,
+        "output": G.outputs[0],
+        "unit": G.units[0],
+    }
     if G.x is not None:
         answer["x"] = G.x
     return answer | {"s": [[float(p.real), float(p.imag)] for p in s], "value": value}

@@ -7,8 +7,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import click
 import typer
+from typer.exceptions import TyperException
 
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError, TfarmError, one_line
 
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 app = typer.Typer(
     name="tfarm",
     help="Exact frequency-domain analysis of a rotating flexible Timoshenko arm.",
-    no_args_is_help=True,
     add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
@@ -108,7 +107,9 @@ def response(
 
 @app.command()
 def report(
-    arms: Annotated[list[str] | None, typer.Argument(metavar="[ARM ...]", help="presets or files; all presets if none")] = None,
+    arms: Annotated[
+        list[str] | None, typer.Argument(metavar="[ARM ...]", help="presets or files; all presets if none")
+    ] = None,
     out: Annotated[Path, typer.Option("--out", help="the folder to write to")] = Path("reports"),
     only: Annotated[str | None, typer.Option("--only", help="one page of each arm: bode or modes")] = None,
 ) -> None:
@@ -148,17 +149,16 @@ def _whole(key: str, text: str, least: int, most: int) -> int:
 
 def main(arguments: list[str] | None = None) -> None:
     """Run one command and exit: 0, 2 for bad input, 3 for what could not be solved or proven."""
-    sys.exit(_run(arguments))
+    given = sys.argv[1:] if arguments is None else arguments
+    sys.exit(_run(given or ["--help"]))
 
 
-def _run(arguments: list[str] | None) -> int:
+def _run(arguments: list[str]) -> int:
     try:
         result: Any = typer.main.get_command(app).main(arguments, prog_name="tfarm", standalone_mode=False)
         sys.stdout.flush()
-    except click.exceptions.Exit as stop:
+    except typer.Exit as stop:
         return stop.exit_code
-    except click.ClickException as error:
-        return _fail(error.format_message(), 2)
     except (ConvergenceError, CertificationError) as error:
         return _fail(str(error), 3)
     except TfarmError as error:
@@ -166,9 +166,19 @@ def _run(arguments: list[str] | None) -> int:
     except BrokenPipeError:  # the reader, head for instance, has left
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
-    except (KeyboardInterrupt, click.Abort):
+    except (KeyboardInterrupt, typer.Abort):
         return _fail("stopped", 130)
+    except TyperException as error:
+        return _fail(_usage(error), 2)
     return result if isinstance(result, int) else 0
+
+
+def _usage(error: Any) -> str:
+    """The parser's complaint, in the words of our own errors."""
+    near = getattr(error, "possibilities", None)
+    if near:
+        return f"{error.option_name}: no such option: did you mean {' or '.join(near)}?"
+    return str(error.format_message()) if hasattr(error, "format_message") else str(error)
 
 
 def _fail(message: str, code: int) -> int:

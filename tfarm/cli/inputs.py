@@ -16,13 +16,21 @@ _Number = TypeVar("_Number", float, complex)
 
 def s_values(text: str) -> NDArray[np.complex128]:
     """Complex numbers separated by commas: "0.3+57.1j,10j"."""
-    return np.array([_number("--s", part, complex, "such as 0.3+57.1j (1/s)") for part in text.split(",")])
+    return np.array(
+        [_number("--s", part, complex, "write numbers in 1/s such as 0.3+57.1j,10j") for part in text.split(",")]
+    )
 
 
 def omega_values(text: str) -> NDArray[np.complex128]:
     """s = i omega for frequencies in rad/s separated by commas."""
-    frequencies = [_number("--omega", part, float, "a frequency in rad/s") for part in text.split(",")]
-    return 1j * np.array(frequencies)
+    parts = text.split(",")
+    frequencies = [_number("--omega", part, float, "write frequencies in rad/s such as 1,10,100") for part in parts]
+    return s_on_axis(np.array(frequencies))
+
+
+def s_on_axis(omega: NDArray[np.float64]) -> NDArray[np.complex128]:
+    """i omega."""
+    return np.asarray(1j * omega, dtype=np.complex128)
 
 
 def grid(start: float, stop: float, points: str) -> NDArray[np.complex128]:
@@ -34,7 +42,8 @@ def grid(start: float, stop: float, points: str) -> NDArray[np.complex128]:
     number = _number("--points", points, float, f"a whole number from 2 to {MOST_POINTS}")
     if not (2 <= number <= MOST_POINTS and number == int(number)):
         raise ParameterError(key="--points", value=points, remedy=f"a whole number from 2 to {MOST_POINTS}")
-    return 1j * np.geomspace(start, stop, int(number))
+    frequencies: NDArray[np.float64] = np.geomspace(start, stop, int(number))
+    return s_on_axis(frequencies)
 
 
 def _number(key: str, text: str, kind: type[_Number], remedy: str) -> _Number:
@@ -43,5 +52,5 @@ def _number(key: str, text: str, kind: type[_Number], remedy: str) -> _Number:
     except ValueError:
         raise ParameterError(key=key, value=text, remedy=remedy) from None
     if not np.isfinite(value):
-        raise ParameterError(key=key, value=text, remedy=f"a finite number, {remedy}")
+        raise ParameterError(key=key, value=text, remedy=f"not finite; {remedy}")
     return value

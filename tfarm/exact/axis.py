@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .closed_form import SERIES_RADIUS, even_functions, from_transition, from_waves, transition_series
 from .compiled import compiled, inlined
-from .waves import SERIES_RADIUS, dispersion, even_functions, from_transition, from_waves, transition_series
+from .dispersion import dispersion
 
 
 def drives(
@@ -70,7 +71,7 @@ def _half_waves(z: complex, t: complex, dt: complex) -> int:
 
 @inlined
 def _real_functions(z: float, t: complex, dt: complex) -> tuple[float, float, float]:
-    """c, S and the scale e of `waves.from_waves` for real z: scaled where the wave decays, plain where it travels."""
+    """c, S, e of `closed_form.from_waves` for real z: scaled where it decays, plain where it travels."""
     if abs(z) < 1.0:
         c, s = even_functions(z)
         return c, s, 1.0

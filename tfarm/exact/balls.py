@@ -1,7 +1,7 @@
 """The exact solution in ball arithmetic (python-flint): every number comes with a bound on its error.
 
 No wave is ever separated here.  With z1 + z2 and z1 z2 from the dispersion relation, the functions F0..F3 of
-`waves.from_transition` are the last column of the exponential of a 4x4 companion matrix, entire in
+`closed_form.from_transition` are the last column of the exponential of a 4x4 companion matrix, entire in
 s^2/(1 + C s): there is no cut-off, no pair of equal waves and no low frequency where this form loses
 its meaning, only digits, and then the precision is raised until the digits asked for are proven.
 """
@@ -17,10 +17,10 @@ import flint
 
 from tfarm.errors import CertificationError
 
+from .closed_form import fields_from_root, from_transition
 from .coefficients import Coefficients, Condition
 from .compiled import plain
 from .outputs import Output, Quantity, unit_scale
-from .waves import fields_from_root, from_transition
 
 _algebra, _fields = plain(from_transition), plain(fields_from_root)
 Ball = Any  # flint.acb or flint.arb, which come without types
@@ -62,7 +62,12 @@ def _transition_by_exponential(z_sum: Ball, z_product: Ball, x: Ball) -> tuple[B
     """F'''' = (z1 + z2) F'' - z1 z2 F as a first-order system, with F'''(0) = 1."""
     zero, one = flint.acb(0), flint.acb(x)
     system = flint.acb_mat(
-        [[zero, one, zero, zero], [zero, zero, one, zero], [zero, zero, zero, one], [-z_product * x, zero, z_sum * x, zero]]
+        [
+            [zero, one, zero, zero],
+            [zero, zero, one, zero],
+            [zero, zero, zero, one],
+            [-z_product * x, zero, z_sum * x, zero],
+        ]
     )
     exponential = system.exp()
     return tuple(exponential[row, 3] for row in range(4))  # type: ignore[return-value]
@@ -157,7 +162,10 @@ def decimals(k: Coefficients, wanted: Output, s: complex, digits: int, x: float 
                 continue
             value = state.value(wanted, x)
             known_zero = _vanishing_parts(k, wanted, s)
-            texts = ["0.0" if zero else _decimal(part, digits) for zero, part in zip(known_zero, (value.real, value.imag), strict=True)]
+            texts = [
+                "0.0" if zero else _decimal(part, digits)
+                for zero, part in zip(known_zero, (value.real, value.imag), strict=True)
+            ]
             if None not in texts:
                 return str(texts[0]), str(texts[1])
     raise CertificationError(f"no {digits} digits at s = {s:g} 1/s: it is a pole or a zero, or too close to one")

@@ -26,24 +26,24 @@ def compiled(function: _Function) -> _Function:
     """The function compiled by numba (nopython, IEEE arithmetic, NumPy's rules for division)."""
     try:
         with _cache_folder():
-            return njit(cache=True, error_model="numpy", nogil=True)(function)  # type: ignore[no-any-return]
+            return njit(cache=True, error_model="numpy", nogil=True)(function)
     except (RuntimeError, OSError):  # no folder for the cache can be written
-        return njit(error_model="numpy", nogil=True)(function)  # type: ignore[no-any-return]
+        return njit(error_model="numpy", nogil=True)(function)
 
 
 def inlined(function: _Function) -> _Function:
     """The same for a small formula, melted into its callers: a loop with a call in it does not vectorise."""
-    return njit(error_model="numpy", forceinline=True)(function)  # type: ignore[no-any-return]
+    return njit(error_model="numpy", forceinline=True)(function)
 
 
-def plain(function: _Function) -> _Function:
+def plain(function: Callable[..., Any]) -> Callable[..., Any]:
     """The Python function behind a compiled one, with those it calls, for numbers that numba does not know."""
     python: Any = getattr(function, "py_func", function)
     called = {name: python.__globals__[name] for name in python.__code__.co_names if name in python.__globals__}
     replaced = {name: plain(value) for name, value in called.items() if hasattr(value, "py_func")}
     if not replaced:
-        return python  # type: ignore[no-any-return]
-    return FunctionType(python.__code__, python.__globals__ | replaced, python.__name__)  # type: ignore[return-value]
+        return python
+    return FunctionType(python.__code__, python.__globals__ | replaced, python.__name__)
 
 
 def _source_hash() -> str:

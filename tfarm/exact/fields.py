@@ -6,7 +6,7 @@ and what decays from the tip,
 
     W(x) = sum_j P_j e^{-t_j x} + R_j e^{-t_j (1 - x)},
 
-with P and R again free of products of a wave with itself (derived from the minors in `waves.from_waves`).
+with P and R again free of products of a wave with itself (derived from the minors in `closed_form.from_waves`).
 """
 
 from __future__ import annotations
@@ -16,19 +16,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .closed_form import SERIES_RADIUS, fields_from_root, from_transition, from_waves, transition_series
 from .coefficients import Coefficients
 from .compiled import plain
-from .waves import (
-    SERIES_RADIUS,
-    evaluate,
-    fields_from_root,
-    from_transition,
-    from_waves,
-    separated,
-    transition_series,
-)
+from .waves import evaluate, separated
 
-Complex = NDArray[np.complex128]
+Complex = NDArray[np.complexfloating[Any, Any]]
 _ROOT = np.array([[0, 0, 0, 1.0], [1, 0, 0, 1.0], [2, 0, 0, 1.0]])  # theta, M0, Q0 as `evaluate` wants them
 _ends = plain(from_transition)
 _fields = plain(fields_from_root)
@@ -37,7 +30,7 @@ _transition = plain(transition_series)
 
 
 class Wave(NamedTuple):
-    """One pair of waves at each s: z = t^2, v = z - b S, and c, S, e of `waves.from_waves`."""
+    """One pair of waves at each s: z = t^2, v = z - b S, and c, S, e of `closed_form.from_waves`."""
 
     z: Complex
     v: Complex
@@ -63,7 +56,7 @@ def root_state(k: Coefficients, s: Complex) -> tuple[Complex, NDArray[np.bool_]]
 
 
 def fields(k: Coefficients, s: Complex, x: float) -> tuple[Complex, NDArray[np.bool_]]:
-    """Y, Phi, M, Q (dimensionless, rows) at the share x of the length for a unit input, and where digits are missing."""
+    """Y, Phi, M, Q (dimensionless, rows) at the share x for a unit input, and where digits are missing."""
     root, suspects = root_state(k, s)
     S, d, gS, one, two = waves(k, s)
     size = np.maximum(abs(one.z), abs(two.z))
@@ -74,7 +67,7 @@ def fields(k: Coefficients, s: Complex, x: float) -> tuple[Complex, NDArray[np.b
     if x > 0.5:
         result[2:, low] = _from_tip(k, S[low], d[low], root[0, low], x)
     far = ~near
-    one, two = (Wave(*(part[far] for part in wave)) for wave in (one, two))
+    one, two = (Wave._make(part[far] for part in wave) for wave in (one, two))
     result[:, far] = _from_waves(k, S[far], d[far], gS[far], one, two, root[0, far], x)
     return result, suspects
 
@@ -130,7 +123,7 @@ def free_root(k: Coefficients, S: Any, d: Any) -> tuple[Any, Any, Any]:
 
 
 def tip_condition(k: Coefficients, S: Any) -> tuple[Any, float, Any, float]:
-    """tip_mass, shear, tip_inertia and moment of the tip's conditions, as `waves.from_waves` takes them."""
+    """tip_mass, shear, tip_inertia and moment of the tip's conditions, as `closed_form.from_waves` takes them."""
     ends = k.kernel[8:14]
     return ends[0] + ends[1] * S, ends[2], ends[3] + ends[4] * S, ends[5]
 
@@ -146,10 +139,17 @@ def _from_waves(
 
 
 def _wave(
-    one: Wave, two: Wave, gS: Complex, d: Complex,
-    tip_mass: Complex, shear: float, tip_inertia: Complex, moment: float, x: float,
+    one: Wave,
+    two: Wave,
+    gS: Complex,
+    d: Complex,
+    tip_mass: Complex,
+    shear: float,
+    tip_inertia: Complex,
+    moment: float,
+    x: float,
 ) -> tuple[Complex, ...]:
-    """W, Psi, M, Q of wave `one` in the free response, scaled as the minors of `waves.from_waves` are."""  # fmt: skip
+    """W, Psi, M, Q of wave `one` in the free response, scaled as `closed_form.from_waves` is."""
     bare = one.t * two.v * (tip_mass * tip_inertia - shear * moment * d * gS)
     So = tip_mass * two.z * two.s + shear * gS * two.c
     Mo = two.v * (tip_inertia * two.c + moment * d * two.z * two.s)

@@ -13,13 +13,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .closed_form import SERIES_RADIUS, from_transition, from_waves, transition_series
 from .coefficients import Coefficients
 from .compiled import plain
 from .fields import Wave, tip_condition, waves
 from .jets import Jet
-from .waves import PARALLEL, SERIES_RADIUS, from_transition, from_waves, transition_series
+from .waves import PARALLEL
 
-Complex = NDArray[np.complex128]
+Complex = NDArray[np.complexfloating[Any, Any]]
 _from_waves, _from_transition = plain(from_waves), plain(from_transition)
 _transition = plain(transition_series)
 
@@ -39,7 +40,7 @@ class Free(NamedTuple):
 
 def free_response(k: Coefficients, s: Complex) -> Free:
     """The free response at s (1-D), with the derivative of each entry: jets of order one but for the scale."""
-    S, d, _, one, two = waves(k, s)
+    _, d, _, one, two = waves(k, s)
     low = ~(np.maximum(abs(one.z), abs(two.z)) >= SERIES_RADIUS)  # s = 0 too, where no wave is left
     parts = np.empty((6, 2, s.size), complex)
     scale = np.where(low, 0.0, one.t + two.t)
@@ -48,9 +49,9 @@ def free_response(k: Coefficients, s: Complex) -> Free:
     high = ~low
     parallel = high & (abs(one.z - two.z) < PARALLEL * (abs(one.z) + abs(two.z)))
     if high.any():
-        one, two = (Wave(*(part[high] for part in wave)) for wave in (one, two))
+        one, two = (Wave._make(part[high] for part in wave) for wave in (one, two))
         parts[:, :, high] = [entry.c for entry in _by_waves(k, Jet.variable(s[high], 1), d[high], one, two)]
-    return Free(*(Jet(entry) for entry in parts), scale, parallel)
+    return Free._make((*(Jet(entry) for entry in parts), scale, parallel))
 
 
 def low_frequency(k: Coefficients, s: Jet) -> tuple[Jet, ...]:
@@ -76,9 +77,8 @@ def _by_waves(k: Coefficients, s: Jet, d: Complex, one: Wave, two: Wave) -> tupl
     arguments: list[Any] = []
     for wave in (one, two):
         u = d * wave.z - a * S.c[0]
-        slope = -(
-            k.damping * wave.z * wave.v - S.c[1] * (a * wave.v + b * u - g)
-        ) / (d * wave.v + u)  # dz/ds from the dispersion relation
+        by_s = k.damping * wave.z * wave.v - S.c[1] * (a * wave.v + b * u - g)
+        slope = -by_s / (d * wave.v + u)  # dz/ds from the dispersion relation
         z = Jet([wave.z, slope])
         by_z = np.where(abs(wave.z) > 1.0, (wave.c - wave.s) / (2 * wave.z), wave.e * _slope_of_sinhc(wave.z))
         c, sinhc = Jet([wave.c, wave.s / 2 * slope]), Jet([wave.s, by_z * slope])

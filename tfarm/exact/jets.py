@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Complex = NDArray[np.complex128]
+Complex = NDArray[np.complexfloating[Any, Any]]
 
 
 class Jet:
@@ -44,7 +44,8 @@ class Jet:
         return Jet([sum(self.c[i] * b[n - i] for i in range(n + 1)) for n in range(len(self.c))])
 
     def __truediv__(self, other: Any) -> Jet:
-        b, quotient = self._other(other), []
+        b = self._other(other)
+        quotient: list[Any] = []
         for n, a in enumerate(self.c):
             rest = a - sum(quotient[i] * b[n - i] for i in range(n)) if n else a
             quotient.append(rest / b[0])

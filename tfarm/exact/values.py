@@ -18,7 +18,7 @@ from .jets import Jet
 from .outputs import Output, unit_scale
 from .waves import evaluate
 
-Complex = NDArray[np.complex128]
+Complex = NDArray[np.complexfloating[Any, Any]]
 
 AT_A_POLE = 4 * float(np.finfo(float).eps)  # nearer than this share of |s|, no digit of the answer can be right
 PROVEN_BITS = 60  # a little more than a float64 holds

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm, Hub
-from tfarm.exact.coefficients import Coefficients, coefficients
 from tfarm.errors import ConvergenceError
+from tfarm.exact.coefficients import Coefficients, coefficients
 from tfarm.exact.free import free_response, low_frequency
 from tfarm.exact.jets import Jet
 from tfarm.exact.outputs import Output
 from tfarm.spectrum import modes, modes_below
 from tfarm.spectrum.box import Analytic, Box, Function, zeros_in_box
 
-Complex = NDArray[np.complex128]
+Complex = NDArray[np.complexfloating[Any, Any]]
 
 CLEAR = 0.8  # how far towards the accumulation point -1/C a box may reach
 
@@ -45,7 +46,7 @@ def poles_of(arm: Arm, up_to: float) -> Roots:
 def zeros_of(arm: Arm, wanted: Output, up_to: float) -> Roots:
     """The zeros of one output at the hub or the tip with |Im s| <= up_to."""
     k = coefficients(arm)
-    if arm.is_locked and wanted.quantity == "theta" or math.isinf(arm.payload.mass) and wanted.quantity == "W":
+    if (arm.is_locked and wanted.quantity == "theta") or (math.isinf(arm.payload.mass) and wanted.quantity == "W"):
         return Roots(np.empty(0, complex), (-math.inf, math.inf, -up_to, up_to), "constant")
     at_zero = max(0, _order(k, wanted.quantity) + wanted.power - _order(k, "drive"))
     neighbour = {"theta": math.inf, "M": 0.0}.get(wanted.quantity)
@@ -135,5 +136,5 @@ def _in_box(k: Coefficients, name: str, at_zero: int, up_to: float, starts: Comp
             continue
         found = _on_their_axes(found, k.damping)
         found = found[np.lexsort((-found.imag, found.real, abs(found.imag).round(9)))]
-        return Roots(np.r_[np.zeros(at_zero, complex), found], tuple(box), "winding number")
+        return Roots(np.r_[np.zeros(at_zero, complex), found], (*box,), "winding number")
     raise AssertionError("unreachable")

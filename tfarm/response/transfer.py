@@ -21,7 +21,7 @@ from .roots import Roots, poles_of, zeros_of
 if TYPE_CHECKING:
     import control
 
-Complex = NDArray[np.complex128]
+Complex = NDArray[np.complexfloating[Any, Any]]
 BLOCK = 1 << 16
 
 
@@ -185,4 +185,3 @@ def _positive(key: str, value: float) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < math.inf:
         raise ParameterError(key=key, value=value, remedy="a positive, finite frequency in rad/s")
     return float(value)
-

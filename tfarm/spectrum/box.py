@@ -10,14 +10,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.errors import ConvergenceError
 
-Complex = NDArray[np.complex128]
+Complex = NDArray[np.complexfloating[Any, Any]]
 
 TURN = 0.6  # rad: a longer step of the phase along the contour is halved
 FINEST = 1e-13  # a contour cannot be resolved closer to a zero than this share of the box
@@ -65,7 +66,7 @@ class Box(NamedTuple):
 
 
 def _between(low: float, high: float) -> float:
-    if low > 0 and high > 8 * low or high < 0 and low < 8 * high:
+    if (low > 0 and high > 8 * low) or (high < 0 and low < 8 * high):
         return math.copysign(abs(low) ** (1 - SPLIT) * abs(high) ** SPLIT, low)
     return low + SPLIT * (high - low)
 
@@ -76,7 +77,7 @@ def winding_number(function: Function, box: Box, points: int = 40) -> int:
     Raises ConvergenceError where a zero lies on the contour, to what float64 resolves.
     """
     corners = box.corners
-    path = np.concatenate([np.linspace(a, b, points, endpoint=False) for a, b in zip(corners, corners[1:], strict=False)])
+    path = np.concatenate([np.linspace(a, b, points, endpoint=False) for a, b in pairwise(corners)])
     path = np.append(path, corners[-1])
     phase = _phase(function, path)
     smallest = FINEST * abs(corners[2] - corners[0])
@@ -86,7 +87,9 @@ def winding_number(function: Function, box: Box, points: int = 40) -> int:
         if not rough.size:
             return round(float(step.sum()) / (2 * math.pi))
         if path.size > 200_000 or abs(path[rough + 1] - path[rough]).min() < smallest:
-            raise ConvergenceError(f"a zero lies on the contour near {path[rough[0]]:.6g}", path[rough[0]], step[rough[0]])
+            raise ConvergenceError(
+                f"a zero lies on the contour near {path[rough[0]]:.6g}", path[rough[0]], step[rough[0]]
+            )
         middle = (path[rough] + path[rough + 1]) / 2
         phase = np.insert(phase, rough + 1, _phase(function, middle))
         path = np.insert(path, rough + 1, middle)
@@ -137,7 +140,9 @@ def _search(function: Function, box: Box, starts: Complex, depth: int) -> Comple
     expected = winding_number(function, box)
     if not expected:
         return np.empty(0, complex)
-    grid = (box.corners[:4, None] * np.array([0.8, 0.5]) + box.corners[[2, 3, 0, 1], None] * np.array([0.2, 0.5])).ravel()
+    grid = (
+        box.corners[:4, None] * np.array([0.8, 0.5]) + box.corners[[2, 3, 0, 1], None] * np.array([0.2, 0.5])
+    ).ravel()
     found = newton(function, np.concatenate([starts[box.holds(starts)], grid]))
     found = found[box.holds(found)]
     if found.size == expected:

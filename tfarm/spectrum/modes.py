@@ -132,7 +132,7 @@ class Modes:
 
     @cached_property
     def _energies(self) -> tuple[Real, ...]:
-        """Shares of each mode's energy: bending, shear, a shear cross term, then the kinetic ones; each kind sums to 1."""
+        """Shares of each mode's energy: bending, shear, shear cross term; kinetic ones. Both kinds sum to 1."""
         k, shapes = self._k, self._shapes
         x, weight = shapes.quadrature()
         W, Psi, M, Q = shapes(x)
@@ -187,9 +187,7 @@ class Modes:
         return x
 
 
-def modes(
-    arm: Arm, count: int | None = None, *, up_to: float | None = None, theory: Theory = "timoshenko"
-) -> Modes:
+def modes(arm: Arm, count: int | None = None, *, up_to: float | None = None, theory: Theory = "timoshenko") -> Modes:
     """All undamped modes of the arm: the first `count` flexible ones, or all with a frequency below `up_to` [rad/s].
 
     Complete by construction (Wittrick and Williams 1971), for any hub and payload, above the shear cut-off, and with

@@ -31,7 +31,9 @@ def refine(k: Coefficients, omega: float, digits: int) -> str:
             unit = root * flint.arb(10) ** -(digits + 1)
             if _drive(k, root - unit) * _drive(k, root + unit) < 0:
                 return str(root.str(digits, radius=False))
-    raise ConvergenceError(f"no {digits} digits of the frequency near {omega:.10g} rad/s: no sign change", omega, digits)
+    raise ConvergenceError(
+        f"no {digits} digits of the frequency near {omega:.10g} rad/s: no sign change", omega, digits
+    )
 
 
 def _drive(k: Coefficients, omega: Ball) -> Ball:

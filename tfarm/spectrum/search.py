@@ -22,8 +22,7 @@ def natural_frequencies(k: Coefficients, first: int, last: int) -> NDArray[np.fl
     """
     count = Counter(k)
     number = np.arange(first, last + 1)
-    high = _upper_bound(count, k, last)
-    low, high = np.zeros(number.size), np.full(number.size, high)
+    low, high = np.zeros(number.size), np.full(number.size, _upper_bound(count, k, last))
     while True:
         middle = 0.5 * (low + high)
         open_ = (low < middle) & (middle < high)

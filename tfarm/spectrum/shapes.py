@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tfarm.exact.closed_form import SERIES_RADIUS, even_functions
 from tfarm.exact.coefficients import Coefficients, Condition
 from tfarm.exact.compiled import plain
 from tfarm.exact.fields import Wave, free_root, from_root, tip_condition, waves
-from tfarm.exact.waves import SERIES_RADIUS, even_functions
 
 Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+Complex = NDArray[np.complexfloating[Any, Any]]
 _even = plain(even_functions)
 
 GAUSS = 16  # points a panel; exact for the products of waves below once a panel holds a few radians
@@ -59,8 +59,9 @@ class Shapes:
         low = bool(self._low[mode])
         among = int(self._low[:mode].sum()) if low else mode - int(self._low[:mode].sum())
         keep, none = slice(among, among + 1), slice(0, 0)
-        one.omega, one._S, one._gS, one._low = (v[mode : mode + 1] for v in (self.omega, self._S, self._gS, self._low))
-        one._one, one._two = (Wave(*(p[mode : mode + 1] for p in wave)) for wave in (self._one, self._two))
+        here = slice(mode, mode + 1)
+        one.omega, one._S, one._gS, one._low = self.omega[here], self._S[here], self._gS[here], self._low[here]
+        one._one, one._two = (Wave._make(p[here] for p in wave) for wave in (self._one, self._two))
         one._root = self._root[:, keep if low else none]
         one._weights = self._weights[:, none if low else keep]
         return one
@@ -99,7 +100,7 @@ class Shapes:
         """The four waves of the modes above the low ones, at x: shape (4 waves, 4 fields, modes, x)."""
         high = ~self._low
         gS = self._gS[high, None]
-        pairs = [_pair(Wave(*(part[high] for part in wave)), gS, x) for wave in (self._one, self._two)]
+        pairs = [_pair(Wave._make(part[high] for part in wave), gS, x) for wave in (self._one, self._two)]
         return np.array([solution for pair in pairs for solution in pair]).transpose(1, 0, 2, 3)
 
     def _null_vectors(self) -> Complex:
@@ -136,7 +137,9 @@ class Shapes:
         self._scale(1.0 / np.sqrt(np.diagonal(self.mass_matrix())))
         self._orthogonalise()
         tip, theta = self(np.ones(1))[..., 0], self.theta()
-        motion = np.where(abs(tip[0]) > 1e-9 * abs(tip[1]), tip[0], np.where(abs(tip[1]) > 1e-9 * abs(theta), tip[1], theta))
+        motion = np.where(
+            abs(tip[0]) > 1e-9 * abs(tip[1]), tip[0], np.where(abs(tip[1]) > 1e-9 * abs(theta), tip[1], theta)
+        )
         self._scale(np.where(motion < 0, -1.0, 1.0))
 
     def _scale(self, factor: Real) -> None:
@@ -155,7 +158,7 @@ class Shapes:
             self._scale(factor)
 
 
-def _pair(wave: Wave, gS: Complex, x: Real) -> tuple[Any, Any]:
+def _pair(wave: Wave, gS: Any, x: Real) -> tuple[Any, Any]:
     """Two independent solutions (W, Psi, M, Q) of one wave: from the root and from the tip, or even and odd in x."""
     z, v, t = wave.z[:, None], wave.v[:, None], wave.t[:, None]
     slow = abs(z) < 1.0
