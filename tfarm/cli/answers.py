@@ -13,7 +13,7 @@ import numpy as np
 
 from tfarm.arm import Arm
 from tfarm.response import TransferFunction
-from tfarm.spectrum import Modes
+from tfarm.spectrum import Modes, compare_theories
 
 
 def to_json(answer: dict[str, Any]) -> str:
@@ -23,7 +23,9 @@ def to_json(answer: dict[str, Any]) -> str:
 
 def modes_answer(modes: Modes, digits: int | None) -> dict[str, Any]:
     """The modal table, frequencies as strings of so many digits where more than 15 are asked for."""
-    strings = modes.digits(digits) if digits is not None and digits > 15 else None
+    exact = modes.digits(digits) if digits is not None else []
+    strings = exact if digits is not None and digits > 15 else None
+    by_theory = compare_theories(modes)
     rows = []
     for row, index in enumerate(modes.index):
         frequency: Any = float(modes.natural_frequency[row]) if strings is None else strings[row]
@@ -34,6 +36,7 @@ def modes_answer(modes: Modes, digits: int | None) -> dict[str, Any]:
             "hub_participation": float(modes.hub_participation[row]),
             "modal_moment": float(modes.modal_moment[row]),
             "nodes_m": [float(x) for x in modes.nodes[row]],
+            "theories_rad_s": {theory: float(values[row]) for theory, values in by_theory.items()},
             "sensitivity": {name: float(values[row]) for name, values in modes.sensitivity.items()},
         })  # fmt: skip
     answer: dict[str, Any] = {

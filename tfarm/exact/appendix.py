@@ -1,8 +1,8 @@
 """The paper's appendix as it stands, letter by letter, with mpmath at any number of digits.
 
 Advances in Acoustics and Vibration, 2012, article 852780, appendix: (A.1), (A.2), the a_ij and Cramer's rule.
-It is slow and heeds no cancellation: it is what the fast roads are measured against.  Three slips of the print
-are mended: the inner square root of (A.2), the signs of k3 and k4 in Y of (A.1), and the unit of C (seconds).
+It is slow and heeds no cancellation: it is what the fast roads are measured against.  Three slips of the
+print are mended: the inner square root of (A.2), the signs of k3 and k4 in Y (A.1), and the unit of C (s).
 
 The arm's float64 parameters are taken as exact numbers.  Every public function doubles its working precision
 until two evaluations agree in the digits asked for, and gives the better one.
@@ -14,7 +14,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
-from itertools import pairwise
+from itertools import combinations, pairwise
 from typing import Any
 
 import mpmath
@@ -34,20 +34,22 @@ MOST_DIGITS = 10_000  # of working precision
 class Appendix:
     """The appendix at one s, at the working precision it is used in; the torque U is one.
 
-    With lambda_3 = -lambda_1 and lambda_4 = -lambda_2 the four columns of a_ij, printed one by one in the paper,
-    are one formula.  A row with an infinite inertia is divided by it: motion = 0 at the tip, and at a
-    locked hub Psi(0) = U, which then is the hub angle.
+    With lambda_3 = -lambda_1 and lambda_4 = -lambda_2 the four columns of a_ij, printed one by one in the
+    paper, are one formula.  A row with an infinite inertia is divided by it: motion = 0 at the tip, and
+    Psi(0) = U at a locked hub, which is so driven by its angle.
     """
 
     def __init__(self, arm: Arm, s: Number) -> None:
         link, payload = arm.link, arm.payload
         self.L, self.A, self.rho = mpf(link.length), mpf(link.section.area), mpf(link.density)
-        self.kappa_G, self.damper = mpf(link.shear_factor) * mpf(link.shear_modulus), 1 + mpf(link.damping) * s
-        self.EI, self.s = mpf(link.youngs_modulus) * mpf(link.section.second_moment), s
+        self.kappa_G = mpf(link.shear_factor) * mpf(link.shear_modulus)
+        self.EI = mpf(link.youngs_modulus) * mpf(link.section.second_moment)
+        self.s, self.damper = s, 1 + mpf(link.damping) * s
         self.ends = [_body(inertia, s) for inertia in (payload.mass, payload.inertia, arm.hub.inertia)]
         lambda_1, lambda_2 = self.wave_numbers(mpf(link.youngs_modulus) * self.damper)
         self.lambdas = (lambda_1, lambda_2, -lambda_1, -lambda_2)
         self.gammas = tuple(l - self.rho * s**2 / (self.kappa_G * l) for l in self.lambdas)
+        self.waves = tuple(zip(self.lambdas, self.gammas, strict=True))
 
     def wave_numbers(self, Ed: Number) -> tuple[Number, Number]:
         """lambda_1 and lambda_2 of (A.2), with its inner square root; Ed = E (1 + C s)."""
@@ -61,7 +63,7 @@ class Appendix:
         """a_ij: the tip's shear force, the tip's moment, W(0) = 0, the hub."""
         rhoA_s2, EI = self.rho * self.A * self.s**2, self.EI * self.damper
         (m_s2, force), (Ic_s2, moment), (Ih_s2, torque) = self.ends
-        waves = [(l, gamma, mpmath.exp(l * self.L)) for l, gamma in zip(self.lambdas, self.gammas, strict=True)]
+        waves = [(l, gamma, mpmath.exp(l * self.L)) for l, gamma in self.waves]
         return [
             [(m_s2 + force * rhoA_s2 / l) * e for l, gamma, e in waves],
             [gamma * (Ic_s2 + moment * EI * l) * e for l, gamma, e in waves],
@@ -76,8 +78,9 @@ class Appendix:
 
     def Delta_k(self, i: int) -> Number:
         """Delta with (0, 0, 0, U) for its column i."""
-        columns = range(1, 5)
-        a = [[mpf(U) if j == i else row[j - 1] for j in columns] for row, U in zip(self.a, (0, 0, 0, 1), strict=True)]
+        a = [row.copy() for row in self.a]
+        for row, right_side in zip(a, (0, 0, 0, 1), strict=True):
+            row[i - 1] = mpf(right_side)
         return _determinant(a)
 
     @cached_property
@@ -104,36 +107,36 @@ class Appendix:
         return mpmath.fsum(weight * k * mpmath.exp(l * x) for weight, k, l in terms)
 
     def value(self, wanted: Output, x: Number) -> Number:
-        """The quantity of the output at x [m]: M = E I (1 + C s) Phi' and Q = kappa G A (Y' - Phi) by their waves."""
-        pairs = list(zip(self.gammas, self.lambdas, strict=True))
-        stiffness = self.EI if wanted.gauge else self.EI * self.damper
+        """The output's quantity at x [m]; M = E I (1 + C s) Phi' and Q = kappa G A (Y' - Phi) wave by wave."""
+        EI = self.EI if wanted.gauge else self.EI * self.damper
         fields: dict[str, Callable[[], Number]] = {
             "theta": lambda: self.Theta,
             "W": lambda: self.Y(x) + x * self.Theta,
             "Y": lambda: self.Y(x),
             "Phi": lambda: self.Phi(x),
-            "M": lambda: stiffness * self.sum([gamma * l for gamma, l in pairs], x),
-            "Q": lambda: self.kappa_G * self.A * self.sum([l - gamma for gamma, l in pairs], x),
+            "M": lambda: EI * self.sum([gamma * l for l, gamma in self.waves], x),
+            "Q": lambda: self.kappa_G * self.A * self.sum([l - gamma for l, gamma in self.waves], x),
         }
         return fields[wanted.quantity]()
 
 
 def determinant(arm: Arm, s: complex, digits: int) -> Number:
-    """The paper's Delta at s [1/s], right to `digits`.  Raises ConvergenceError where it has none: s = 0, the cut-off."""
+    """The paper's Delta at s [1/s], right to `digits`; ConvergenceError at s = 0 and at the cut-off."""
     return _proven(lambda: [Appendix(arm, mpc(s)).Delta], digits, f"Delta at s = {s}")[0]
 
 
 def response(arm: Arm, output_name: str, s: complex, digits: int, x: float | None = None) -> Number:
     """An output per unit torque (per unit hub angle where the hub is locked) at s [1/s], right to `digits`.
 
-    Real and imaginary part have as many right digits each; x [m] is for the outputs along the arm.  Where two of
-    the four waves coincide the appendix is 0/0: there s is moved aside, by ever less as the precision grows.
+    Real and imaginary part have as many right digits each; x [m] is for the outputs along the arm.  Where two
+    of the four waves coincide the appendix is 0/0: s is moved aside, by ever less as the precision grows.
     Raises ConvergenceError at a pole, ParameterError for an unknown output or an x outside the arm.
     """
     wanted = output(output_name)
     place = {"root": 0.0, "tip": arm.link.length, "x": x}[wanted.place]
     if place is None or not 0.0 <= place <= arm.link.length:
-        raise ParameterError(key="x", value=x, remedy=f"a point of the arm lies between 0 and {arm.link.length} m")
+        remedy = f"a point of the arm lies between 0 and {arm.link.length} m"
+        raise ParameterError(key="x", value=x, remedy=remedy)
     if _vanishes(arm, wanted, place):
         return mpf(0)
     is_real = _is_real(arm, wanted, s, place)
@@ -149,10 +152,10 @@ def response(arm: Arm, output_name: str, s: complex, digits: int, x: float | Non
 
 
 def roots_near(arm: Arm, omega: float | str | Number, digits: int) -> int:
-    """How many roots Delta(i w), undamped, has within 10^-digits omega of omega [rad/s]: two at a double frequency.
+    """How many roots Delta(i w), undamped, has within 10^-digits omega of omega [rad/s]; two if it is double.
 
-    Delta lambda_1 lambda_2 is real for real w and has no branch; the turns of its phase along a half circle about
-    omega count its roots inside.  omega may be a text or an mpmath number, with more digits than a float.
+    Delta lambda_1 lambda_2 is real for real w and has no branch; the turns of its phase along a half circle
+    about omega count its roots inside.  omega may be a text or an mpmath number of any number of digits.
     """
     undamped = replace(arm, link=replace(arm.link, damping=0.0))
     with mpmath.workdps(2 * digits + FEWEST_DIGITS):
@@ -163,11 +166,12 @@ def roots_near(arm: Arm, omega: float | str | Number, digits: int) -> int:
         return [at.Delta * at.lambdas[0] * at.lambdas[1]]
 
     values = [_proven(lambda w=w: smooth(w), FEWEST_DIGITS, f"Delta at {w}")[0] for w in half_circle]  # type: ignore[misc]
-    return round(float(mpmath.fsum(mpmath.arg(after / before) for before, after in pairwise(values))) / math.pi)
+    turns = [float(mpmath.arg(after / before)) for before, after in pairwise(values)]
+    return round(sum(turns) / math.pi)
 
 
 def _proven(evaluate: Callable[[], list[Number]], digits: int, what: str) -> list[Number]:
-    """What evaluate() gives, at a working precision doubled until two results agree in the digits of each number."""
+    """What evaluate() gives at a working precision doubled until two results agree, each number in its digits."""
     digits = max(digits, FEWEST_DIGITS)
     work, last, misses = digits + FEWEST_DIGITS, [mpf(0)], [mpf(0)]
     while work < MOST_DIGITS + 4 * digits:
@@ -190,14 +194,13 @@ def _beside(function: Callable[[Number], Number], s: Number) -> Number:
 
 def _determinant(a: list[list[Number]]) -> Number:
     """Laplace's expansion in 2x2 minors: mpmath's own calls a badly scaled matrix singular."""
-    pairs = (0, 1, 2, 3, 1), (0, 2, 1, 3, -1), (0, 3, 1, 2, 1), (1, 2, 0, 3, 1), (1, 3, 0, 2, -1), (2, 3, 0, 1, 1)
-    upper = {(i, j): a[0][i] * a[1][j] - a[0][j] * a[1][i] for i, j, *_ in pairs}
-    lower = {(i, j): a[2][i] * a[3][j] - a[2][j] * a[3][i] for i, j, *_ in pairs}
-    return sum(sign * upper[i, j] * lower[k, l] for i, j, k, l, sign in pairs)
+    pairs = list(combinations(range(4), 2))
+    upper, lower = ([row[i] * next_[j] - row[j] * next_[i] for i, j in pairs] for row, next_ in (a[:2], a[2:]))
+    return sum(sign * m * n for sign, m, n in zip((1, -1, 1, 1, -1, 1), upper, reversed(lower), strict=True))
 
 
 def _body(inertia: float, s: Number) -> tuple[Number, Number]:
-    """What a body's row gives its motion and its force: (inertia s^2, 1), or (1, 0) for an infinite inertia."""
+    """The weights of motion and force in a body's row: (inertia s^2, 1), or (1, 0) for an infinite inertia."""
     return (mpf(1), mpf(0)) if math.isinf(inertia) else (inertia * s**2, mpf(1))
 
 
@@ -209,7 +212,10 @@ def _vanishes(arm: Arm, wanted: Output, x: float) -> bool:
 
 
 def _is_real(arm: Arm, wanted: Output, s: complex, x: float) -> bool:
-    """Whether the output over s^power is real: for a real argument s^2 or s, or because it is the input itself."""
-    is_angle = arm.is_locked and wanted.quantity == "theta"
-    is_torque = arm.hub.inertia == 0 and wanted.quantity == "M" and x == 0 and not (wanted.gauge and arm.link.damping)
-    return is_angle or is_torque or s.imag == 0 or (s.real == 0 and arm.link.damping == 0)
+    """Whether the output over s^power is real: for real s or (C = 0) s^2, or because it is the input itself."""
+    if s.imag == 0 or (s.real == 0 and arm.link.damping == 0):
+        return True
+    if arm.is_locked:
+        return wanted.quantity == "theta"
+    feels_no_damping = not wanted.gauge or arm.link.damping == 0
+    return arm.hub.inertia == 0 and wanted.quantity == "M" and x == 0 and feels_no_damping

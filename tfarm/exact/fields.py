@@ -22,6 +22,7 @@ from .compiled import plain
 from .waves import evaluate, separated
 
 Complex = NDArray[np.complexfloating[Any, Any]]
+Tip = tuple[Any, float, Any, float]  # tip_mass, shear, tip_inertia, moment
 _ROOT = np.array([[0, 0, 0, 1.0], [1, 0, 0, 1.0], [2, 0, 0, 1.0]])  # theta, M0, Q0 as `evaluate` wants them
 _ends = plain(from_transition)
 _fields = plain(fields_from_root)
@@ -61,7 +62,7 @@ def fields(k: Coefficients, s: Complex, x: float) -> tuple[Complex, NDArray[np.b
     S, d, gS, one, two = waves(k, s)
     size = np.maximum(abs(one.z), abs(two.z))
     low = ~(size >= SERIES_RADIUS)  # s = 0 too, where no wave is left
-    near = (size * x * x < SERIES_RADIUS) | low
+    near = low | (size * x * x < SERIES_RADIUS) if x <= 0.5 else low
     result = np.empty((4, s.size), complex)
     result[:, near] = from_root(k, S[near], d[near], root[:, near], x)
     if x > 0.5:
@@ -90,8 +91,7 @@ def _functions(k: Coefficients, S: Any, d: Any, x: Any) -> tuple[Any, ...]:
 def _from_tip(k: Coefficients, S: Complex, d: Complex, theta: Complex, x: float) -> tuple[Complex, Complex]:
     """M and Q near the tip at low frequency, carried back from it: from the root they would be small differences.
 
-    The tip's two conditions leave it W = shear Y, Q = -tip_mass Y, Psi = moment X, M = -tip_inertia X; seen from
-    the tip, Psi and Q change sign.
+    The tip's two conditions leave it W = shear Y, Q = -tip_mass Y, Psi = moment X, M = -tip_inertia X.
     """
     a, b, g, sigma = float(k.a), float(k.b), float(k.g), float(k.sigma)
     tip_mass, shear, tip_inertia, moment = tip_condition(k, S)
@@ -108,10 +108,20 @@ def _from_tip(k: Coefficients, S: Complex, d: Complex, theta: Complex, x: float)
     cross = over_d * (F1 * turn - F2 * bend), F2 * turn - over_d * drop * F1, turn**2 - over_d * drop * bend
     X = sum(one * other for one, other in zip(row, cross, strict=True)) * theta / free
     Y = (moment * F2 + tip_inertia * over_d * F1) * theta / free
+    _, _, M, Q = _march(k, S, d, (shear * Y, moment * X, -tip_inertia * X, -tip_mass * Y), x)
+    return M, Q
+
+
+def _march(k: Coefficients, S: Complex, d: Complex, tip: tuple[Complex, ...], x: float) -> tuple[Complex, ...]:
+    """W, Psi, M and Q at x, carried back from the tip's W, Psi, M and Q; seen from the tip, Psi and Q change sign."""
+    a, b, g, sigma = float(k.a), float(k.b), float(k.g), float(k.sigma)
+    W, Psi, M, Q = tip
     F0, F1, F2, F3, *_ = functions = _functions(k, S, d, 1 - x)
-    fields = _fields(1 - x, *functions, S, over_d, a, b, g, sigma, -moment * X, -tip_inertia * X, tip_mass * Y)
-    W = shear * Y
-    return fields[2] - gS * F1 * W, -fields[3] - gS * (F2 - aS * over_d * F0) * W
+    fields = _fields(1 - x, *functions, S, 1 / d, a, b, g, sigma, -Psi, M, -Q)
+    Y, Phi, M, Q = fields
+    W_at = Y - (1 - x) * Psi + (F3 - a * S / d * F1) * W
+    Psi_at = Psi - Phi + g * S / d * F0 * W
+    return W_at, Psi_at, M - g * S * F1 * W, -Q - g * S * (F2 - a * S / d * F0) * W
 
 
 def free_root(k: Coefficients, S: Any, d: Any) -> tuple[Any, Any, Any]:
@@ -122,7 +132,7 @@ def free_root(k: Coefficients, S: Any, d: Any) -> tuple[Any, Any, Any]:
     return theta, M0, Q0
 
 
-def tip_condition(k: Coefficients, S: Any) -> tuple[Any, float, Any, float]:
+def tip_condition(k: Coefficients, S: Any) -> Tip:
     """tip_mass, shear, tip_inertia and moment of the tip's conditions, as `closed_form.from_waves` takes them."""
     ends = k.kernel[8:14]
     return ends[0] + ends[1] * S, ends[2], ends[3] + ends[4] * S, ends[5]
@@ -132,10 +142,35 @@ def _from_waves(
     k: Coefficients, S: Complex, d: Complex, gS: Complex, one: Wave, two: Wave, theta: Complex, x: float
 ) -> tuple[Complex, ...]:
     tip = tip_condition(k, S)
-    free, *_ = _minors(one.c, one.s, one.z, one.v, one.e, two.c, two.s, two.z, two.v, two.e, gS, d, *tip)
-    parts = [_wave(one, two, gS, d, *tip, x), _wave(two, one, gS, d, *tip, x)]
-    W, Psi, M, Q = (sum(part[i] for part in parts) * (theta / free) for i in range(4))
+    free, _, _, W1 = _minors(one.c, one.s, one.z, one.v, one.e, two.c, two.s, two.z, two.v, two.e, gS, d, *tip)
+    over = theta / free
+    W, Psi, M, Q = _sum(one, two, gS, d, tip, x, over)
+    if x > 0.5:
+        size = np.maximum(abs(one.z), abs(two.z))
+        close = size * (1 - x) ** 2 < SERIES_RADIUS
+        _, Psi1, M1, _ = _sum(one, two, gS, d, tip, 1.0, over)
+        tip_mass, _, tip_inertia, moment = tip
+        light = abs(tip_inertia) < moment * np.sqrt(size)  # take from its condition what the payload makes small
+        with np.errstate(invalid="ignore", divide="ignore"):
+            M1, Psi1 = (
+                np.where(light, -tip_inertia / moment * Psi1, M1),
+                np.where(light, Psi1, -moment / tip_inertia * M1),
+            )
+            Q1 = -tip_mass * gS * (one.z - two.z) * (_r(one, d, tip) * two.e - _r(two, d, tip) * one.e) * over
+        marched = _march(k, S, d, (W1 * over, Psi1, M1, Q1), x)
+        W, Psi, M, Q = np.where(close, marched, (W, Psi, M, Q))
     return W - x * theta, Psi - theta, M, Q
+
+
+def _r(wave: Wave, d: Complex, tip: Tip) -> Complex:
+    """The tip's moment condition for W = cosh t x, over v: tip_inertia c + moment d z S."""
+    return tip[2] * wave.c + tip[3] * d * wave.z * wave.s
+
+
+def _sum(one: Wave, two: Wave, gS: Complex, d: Complex, tip: Tip, x: float, over: Complex) -> list[Complex]:
+    """W, Psi, M, Q at x of both waves together."""
+    parts = _wave(one, two, gS, d, *tip, x), _wave(two, one, gS, d, *tip, x)
+    return [(part + other) * over for part, other in zip(*parts, strict=True)]
 
 
 def _wave(

@@ -107,6 +107,7 @@ def _function(k: Coefficients, name: str) -> Function:
     def function(s: Complex) -> Analytic:
         free = free_response(k, s)
         value, slope = getattr(free, name).c
+        s = np.where(s == 0, 1e-300, s)
         return Analytic(value / s**order, (slope - order * value / s) / s**order, free.scale)
 
     return function

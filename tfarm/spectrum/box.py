@@ -107,7 +107,7 @@ def newton(function: Function, starts: Complex, steps: int = 60) -> Complex:
     move = np.full(s.size, np.inf, complex)
     for _ in range(steps):
         at = function(s)
-        with np.errstate(all="ignore"):
+        with np.errstate(all="ignore"):  # a start that runs away is dropped below
             move = at.value / at.slope
         bad = ~np.isfinite(move)
         move[bad] = 0.0
@@ -141,7 +141,7 @@ def _search(function: Function, box: Box, starts: Complex, depth: int) -> Comple
     if not expected:
         return np.empty(0, complex)
     grid = (
-        box.corners[:4, None] * np.array([0.8, 0.5]) + box.corners[[2, 3, 0, 1], None] * np.array([0.2, 0.5])
+        box.corners[:4, None] * np.array([0.8, 0.55]) + box.corners[[2, 3, 0, 1], None] * np.array([0.2, 0.45])
     ).ravel()
     found = newton(function, np.concatenate([starts[box.holds(starts)], grid]))
     found = found[box.holds(found)]

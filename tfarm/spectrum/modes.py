@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm
-from tfarm.errors import ParameterError
-from tfarm.exact.coefficients import Coefficients, Theory, coefficients
+from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.exact.appendix import roots_near
+from tfarm.exact.coefficients import THEORIES, Coefficients, Theory, coefficients
 
 from .precise import refine
 from .search import count_below, natural_frequencies
@@ -55,11 +56,16 @@ class Modes:
         return self.natural_frequency / (2 * math.pi)
 
     def digits(self, digits: int) -> list[str]:
-        """The frequencies [rad/s] with so many right digits, as strings, each also a root of the appendix's Delta(s).
+        """The frequencies [rad/s] with so many right digits (12 at least), as strings.
 
-        Raises ConvergenceError where a digit cannot be told, for a double frequency for instance.
+        Under the Timoshenko theory each is also confirmed as a root of the paper's own Delta(s), by mpmath.
+        Raises ConvergenceError where a digit cannot be told (a double frequency) or Delta has no root there.
         """
+        digits = max(digits, 12)
         flexible = [refine(self._k, float(omega), digits) for omega in self.natural_frequency[self._rigid :]]
+        for text in flexible if self.theory == "timoshenko" else ():
+            if not roots_near(self.arm, text, digits - 1):
+                raise ConvergenceError(f"Delta(s) of the appendix has no root at {text}i rad/s", text, digits)
         return ["0.0"] * self._rigid + flexible
 
     def __len__(self) -> int:
@@ -212,6 +218,17 @@ def modes(arm: Arm, count: int | None = None, *, up_to: float | None = None, the
     flexible = natural_frequencies(k, rigid + 1, rigid + count)
     index = np.arange(1 - rigid, count + 1)
     return Modes(arm, theory, index, np.r_[[0.0] * rigid, flexible], k)
+
+
+def compare_theories(table: Modes) -> dict[Theory, Real]:
+    """The same modes' frequencies [rad/s] by each of the four theories, in the order of `THEORIES`.
+
+    Modes are matched by their number; above the shear cut-off, where the Timoshenko beam alone has a second spectrum,
+    equal numbers need not mean alike shapes.
+    """
+    count = int(table.index.max())
+    by_theory = {theory: modes(table.arm, count, theory=theory) for theory in THEORIES if theory != table.theory}
+    return {theory: by_theory.get(theory, table).natural_frequency for theory in THEORIES}
 
 
 def modes_below(arm: Arm, up_to: float, *, theory: Theory = "timoshenko") -> int:

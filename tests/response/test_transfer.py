@@ -1,0 +1,237 @@
+"""Transfer functions against mpmath on the paper's determinants, limits, counts and physics."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import tfarm
+from tfarm import Arm, Hub, ParameterError, Payload
+from tfarm.exact import appendix, balls
+from tfarm.exact.coefficients import coefficients
+from tfarm.exact.outputs import OUTPUTS
+
+EPS = np.finfo(float).eps
+AT_ENDS = [name for name, output in OUTPUTS.items() if output.place != "x"]
+ALONG = [name for name, output in OUTPUTS.items() if output.place == "x"]
+POINTS = [0.3 + 57.1j, 2e-3j, 40.0 + 0.0j, -5.0 + 900.0j, 1.3e4j]
+
+
+@pytest.fixture(params=tfarm.presets())
+def arm(request: pytest.FixtureRequest) -> Arm:
+    return tfarm.load(request.param)
+
+
+@pytest.mark.parametrize("name", AT_ENDS)
+def test_values_agree_with_the_determinants_of_the_paper(arm: Arm, name: str) -> None:
+    G = tfarm.transfer(arm, name)
+    for s in POINTS:
+        expected = complex(appendix.response(arm, name, s, 20))
+        slope = abs(s * G.derivative(s) / expected)
+        assert abs(G(s) - expected) <= 90 * EPS * (1 + slope) * abs(expected)
+
+
+@pytest.mark.parametrize("name", ALONG)
+def test_values_along_the_arm_agree_with_the_paper(arm: Arm, name: str) -> None:
+    for share in (0.07, 0.6, 0.93):
+        x = share * arm.link.length
+        G = tfarm.transfer(arm, name, x=x)
+        for s in POINTS[:4]:
+            expected = complex(appendix.response(arm, name, s, 20, x=x))
+            assert abs(G(s) - expected) <= 400 * EPS * abs(expected)
+
+
+@pytest.mark.parametrize("name", AT_ENDS)
+def test_derivative_is_the_limit_of_differences_with_many_digits(arm: Arm, name: str) -> None:
+    G = tfarm.transfer(arm, name)
+    for s in (0.3 + 57.1j, 10 + 700j, 3e-3 + 1e-3j, 2e4j):
+        expected = balls.nearest(balls.slope(coefficients(arm), OUTPUTS[name], s))
+        scale = abs(G(s) / s) + abs(expected)
+        assert abs(G.derivative(s) - expected) <= 4000 * EPS * scale
+
+
+def test_derivative_along_the_arm() -> None:
+    arm = tfarm.load("sasaki2012-lab")
+    G, s, h = tfarm.transfer(arm, "moment", x=0.4), 30.0 + 40.0j, 1e-3
+    difference = (8 * (G(s + h) - G(s - h)) - (G(s + 2 * h) - G(s - 2 * h))) / (12 * h)
+    assert_allclose(G.derivative(s), difference, rtol=1e-10)
+
+
+def test_expansion_at_zero_is_the_rigid_arm(arm: Arm) -> None:
+    J, length = arm.total_inertia, arm.link.length
+    flexible = replace(arm, hub=Hub(inertia=0.0)).total_inertia
+    assert_allclose(tfarm.transfer(arm, "hub_angle").rigid_body, 1 / J, rtol=8 * EPS)
+    assert_allclose(tfarm.transfer(arm, "tip_displacement").rigid_body, length / J, rtol=8 * EPS)
+    assert_allclose(tfarm.transfer(arm, "root_moment").static, -flexible / J, rtol=16 * EPS)
+    assert tfarm.transfer(arm, "root_moment").rigid_body == 0
+    assert_allclose(tfarm.transfer(arm, "root_moment")(0), -flexible / J, rtol=16 * EPS)
+
+
+def test_static_compliance_of_a_locked_arm_is_a_cantilever_free_at_its_tip() -> None:
+    arm = replace(tfarm.load("sasaki2012"), hub=Hub(inertia=math.inf))
+    G = tfarm.transfer(arm, ["tip_displacement", "tip_deflection", "root_moment", "hub_angle"])
+    assert G.input == "hub_angle"
+    assert_allclose(G(0), [1.0, 0.0, 0.0, 1.0], atol=EPS)  # turned without acceleration it does not bend
+
+
+def test_the_constant_term_is_the_limit_of_what_is_left() -> None:
+    G = tfarm.transfer(tfarm.load("sasaki2012-lab"), "tip_displacement")
+    s = 0.01j
+    assert_allclose(G(s) - G.rigid_body / s**2, G.static, rtol=1e-4)
+
+
+@pytest.mark.parametrize("preset", ["sasaki2012", "sasaki2012-lab"])
+def test_digits_agree_with_the_paper_to_forty(preset: str) -> None:
+    import mpmath
+
+    arm = tfarm.load(preset)
+    G = tfarm.transfer(arm, "root_moment")
+    for s in (0.3 + 57.1j, 57.1j, 2.5 + 0j, 1e-5j):
+        re, im = G.digits(s, 40)
+        with mpmath.workdps(60):
+            expected = appendix.response(arm, "root_moment", s, 50)
+            for text, part in ((re, expected.real), (im, expected.imag)):
+                assert abs(mpmath.mpf(text) - part) <= abs(part) * mpmath.mpf(10) ** -39
+                assert len(text.replace("-", "").replace(".", "").lstrip("0")) >= 38 or part == 0
+
+
+# ---------------------------------------------------------------- poles, zeros, special points
+
+
+def test_a_pole_is_named() -> None:
+    arm = tfarm.load("sasaki2012")
+    omega = tfarm.modes(arm, 1).natural_frequency[1]
+    with pytest.raises(ParameterError, match=r"a pole: a natural frequency, 71\.50568247 rad/s"):
+        tfarm.transfer(arm, "root_moment")([1j, 1j * omega])
+    with pytest.raises(ParameterError, match="rigid body"):
+        tfarm.transfer(arm, "hub_angle")(0)
+
+
+def test_next_to_a_pole_there_is_a_value() -> None:
+    arm = tfarm.load("sasaki2012")
+    omega = float(tfarm.modes(arm, 1).natural_frequency[1])
+    s = 1j * omega * (1 + 1e-13)
+    expected = complex(appendix.response(arm, "root_moment", s, 20))
+    assert_allclose(tfarm.transfer(arm, "root_moment")(s), expected, rtol=64 * EPS)
+
+
+def test_where_two_waves_coincide_there_is_a_value(arm: Arm) -> None:
+    k = coefficients(arm)
+    s = 2 * math.sqrt(k.g) / abs(float(k.a - k.b))
+    G = tfarm.transfer(arm, "root_moment")
+    for near in (s, s * (1 + 1e-12), s * (1 + 1e-3j)):
+        if abs(near) < 1e5:  # e^{-t} of slender arms underflows elsewhere
+            assert_allclose(G(near), complex(appendix.response(arm, "root_moment", near, 25)), rtol=100 * EPS)
+
+
+def test_poles_without_damping_are_the_natural_frequencies() -> None:
+    arm = tfarm.load("sasaki2012")
+    poles = tfarm.transfer(arm, "hub_angle").poles(up_to=3000.0)
+    omega = tfarm.modes(arm, up_to=3000.0).natural_frequency
+    assert poles.proof == "count"
+    assert_allclose(np.sort(poles.values.imag[poles.values.imag > 0]), omega[1:], rtol=4 * EPS)
+    assert np.count_nonzero(poles.values == 0) == 2
+
+
+@pytest.mark.parametrize("name", ["hub_angle", "root_moment", "tip_displacement", "tip_deflection", "root_shear"])
+@pytest.mark.parametrize("preset", ["sasaki2012", "sasaki2012-lab"])
+def test_zeros_are_zeros_and_as_many_as_the_argument_turns(preset: str, name: str) -> None:
+    G = tfarm.transfer(tfarm.load(preset), name)
+    zeros, poles = G.zeros(up_to=1500.0), G.poles(up_to=1500.0)
+    for z in zeros.values:
+        assert abs(G(z * (1 + 1e-9))) <= 3e-9 * abs(z * G.derivative(z))
+    radius = 1290.0
+    circle = radius * np.exp(2j * np.pi * (np.arange(20000) + 0.5) / 20000)
+    turns = np.angle(np.roll(G(circle), -1) / G(circle)).sum() / (2 * np.pi)
+    inside = [np.count_nonzero(abs(roots.values) < radius) for roots in (zeros, poles)]
+    cancelled = 2 if name in ("root_moment", "root_shear", "tip_deflection") else 0
+    assert round(turns) == inside[0] - inside[1] + cancelled
+
+
+def test_the_tip_has_real_pairs_of_zeros() -> None:
+    zeros = tfarm.transfer(tfarm.load("sasaki2012"), "tip_displacement").zeros(up_to=3000.0).values
+    assert (zeros.imag == 0).all()
+    assert_allclose(np.sort(zeros.real), -np.sort(zeros.real)[::-1])
+
+
+def test_damped_poles_have_the_damping_of_the_first_order() -> None:
+    arm = tfarm.load("sasaki2012-lab")
+    poles = tfarm.transfer(arm, "hub_angle").poles(up_to=600.0)
+    omega = tfarm.modes(arm, up_to=600.0).natural_frequency[1:]
+    upper = poles.values[poles.values.imag > 0]
+    # bending carries almost all the potential energy of this slender arm, so Re s is near -C w^2/2
+    assert_allclose(upper.real, -arm.link.damping * omega**2 / 2, rtol=1e-3)
+    assert poles.proof == "winding number"
+    assert poles.box[0] > -1 / arm.link.damping
+
+
+def test_an_outermost_zero_on_the_edge_of_the_box_moves_the_box() -> None:
+    arm = tfarm.load("sasaki2012-lab")
+    pole = tfarm.transfer(arm, "hub_angle").poles(up_to=100.0).values[-1]
+    poles = tfarm.transfer(arm, "hub_angle").poles(up_to=float(abs(pole.imag)))
+    assert poles.box[3] > abs(pole.imag)
+    assert np.isclose(poles.values, pole).any()
+
+
+# ---------------------------------------------------------------- shapes, names and refusals
+
+
+def test_shapes() -> None:
+    arm = tfarm.load("sasaki2012")
+    one, two = tfarm.transfer(arm, "root_moment"), tfarm.transfer(arm, ["root_moment", "hub_rate"])
+    s = 1j * np.arange(1, 7).reshape(2, 3)
+    assert isinstance(one(1j), complex)
+    assert one(s).shape == (2, 3)
+    assert two(s).shape == (2, 2, 3)
+    assert two(1j).shape == (2,)
+    assert (two(s)[0] == one(s)).all()
+    assert one(np.empty(0, complex)).shape == (0,)
+
+
+def test_blocks_of_points_do_not_matter() -> None:
+    G = tfarm.transfer(tfarm.load("sasaki2012-lab"), "tip_displacement")
+    s = 1j * np.geomspace(0.1, 1e4, 1001)
+    assert (G(s) == np.array([G(point) for point in s])).all()
+
+
+def test_frequency_response_is_python_control_data_with_names() -> None:
+    import control
+
+    arm = tfarm.load("sasaki2012-lab")
+    omega = np.geomspace(1, 100, 7)
+    data = tfarm.transfer(arm, ["root_moment", "hub_angle"]).frequency_response(omega)
+    assert isinstance(data, control.FrequencyResponseData)
+    assert data.input_labels == ["hub_torque"]
+    assert data.output_labels == ["root_moment", "hub_angle"]
+    assert (data.frdata[:, 0] == tfarm.transfer(arm, ["root_moment", "hub_angle"])(1j * omega)).all()
+
+
+@pytest.mark.parametrize(
+    ("outputs", "x", "message"),
+    [
+        ("root_momnt", None, 'did you mean "root_moment"'),
+        ("moment", None, "say where"),
+        ("moment", 1.5, "between 0 and 1 m"),
+        ("moment", math.nan, "between 0 and 1 m"),
+        ("hub_angle", 0.5, "leave x out"),
+        ([], None, "at least one"),
+    ],
+)
+def test_refusals(outputs: str, x: float | None, message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        tfarm.transfer(tfarm.load("sasaki2012"), outputs, x=x)
+
+
+@pytest.mark.parametrize("s", [math.nan, complex(0, math.inf)])
+def test_s_is_finite(s: complex) -> None:
+    with pytest.raises(ParameterError, match="finite"):
+        tfarm.transfer(tfarm.load("sasaki2012"), "hub_rate")(s)
+
+
+def test_a_held_output_is_constant() -> None:
+    arm = replace(tfarm.load("sasaki2012"), payload=Payload(mass=math.inf))
+    G = tfarm.transfer(arm, ["tip_displacement", "tip_acceleration"])
+    assert (G([1j, 3 + 4j, 2e3j]) == 0).all()
+    assert tfarm.transfer(arm, "tip_displacement").zeros(up_to=100.0).values.size == 0
