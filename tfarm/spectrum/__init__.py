@@ -1,5 +1,5 @@
 """Natural frequencies and mode shapes: counted, so that none is missing, then found to the last digit."""
 
-from tfarm.spectrum.modes import PARAMETERS, Modes, compare_theories, modes, modes_below
+from tfarm.spectrum.table import PARAMETERS, Modes, compare_theories, modes, modes_below
 
 __all__ = ["PARAMETERS", "Modes", "compare_theories", "modes", "modes_below"]

@@ -1,0 +1,216 @@
+"""The commands as a shell sees them: standard output, standard error, exit code."""
+
+import csv
+import json
+import os
+import stat
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tfarm
+from tfarm.cli.commands import main
+
+Run = tuple[int, str, str]
+
+
+def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> Run:
+    with pytest.raises(SystemExit) as stop:
+        main(list(arguments))
+    out, err = capsys.readouterr()
+    return int(stop.value.code or 0), out, err
+
+
+def answer(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict:
+    code, out, err = run(capsys, *arguments, "--json")
+    assert (code, err) == (0, "")
+    return json.loads(out, parse_constant=lambda name: pytest.fail(f"{name} in JSON"))
+
+
+def test_modes_json_has_the_rigid_body_first_and_n_flexible_modes(capsys: pytest.CaptureFixture[str]) -> None:
+    result = answer(capsys, "modes", "sasaki2012", "--count", "4")
+    assert result["arm"] == "sasaki2012"
+    assert result["count"] == 4
+    assert result["complete"] is True
+    assert [mode["index"] for mode in result["modes"]] == [0, 1, 2, 3, 4]
+    published = [0.0, 71.505682466890, 204.333139363807, 537.952620541657, 1046.821121534289]  # theory, section 3
+    frequencies = [mode["natural_frequency_rad_s"] for mode in result["modes"]]
+    np.testing.assert_allclose(frequencies, published, rtol=1e-14)
+    for mode in result["modes"]:
+        assert mode["natural_frequency_hz"] == pytest.approx(mode["natural_frequency_rad_s"] / (2 * np.pi))
+
+
+def test_modes_with_digits_are_strings_and_right(capsys: pytest.CaptureFixture[str]) -> None:
+    result = answer(capsys, "modes", "sasaki2012", "--count", "2", "--digits", "40")
+    texts = [mode["natural_frequency_rad_s"] for mode in result["modes"]]
+    longer = answer(capsys, "modes", "sasaki2012", "--count", "2", "--digits", "60")["modes"]
+    for text, other in zip(texts[1:], longer[1:], strict=True):
+        assert isinstance(text, str)
+        assert other["natural_frequency_rad_s"].startswith(text[:-1])
+    assert len(texts[1].replace(".", "")) == 40
+
+
+def test_the_four_theories_stand_beside_each_other(capsys: pytest.CaptureFixture[str]) -> None:
+    mode = answer(capsys, "modes", "stocky-steel", "--count", "2")["modes"][2]["theories_rad_s"]
+    assert mode["timoshenko"] < mode["shear"] < mode["euler-bernoulli"]
+    assert mode["timoshenko"] < mode["rayleigh"] < mode["euler-bernoulli"]
+
+
+@pytest.mark.parametrize(
+    ("points", "expected"),
+    [
+        (["--s", "0.3+57.1j"], [[0.3, 57.1]]),
+        (["--s", "-1+2j,3"], [[-1.0, 2.0], [3.0, 0.0]]),
+        (["--omega", "1,10,100"], [[0.0, 1.0], [0.0, 10.0], [0.0, 100.0]]),
+        (["--from", "1", "--to", "100", "--points", "3"], [[0.0, 1.0], [0.0, 10.0], [0.0, 100.0]]),
+    ],
+)
+def test_response_json(capsys: pytest.CaptureFixture[str], points: list[str], expected: list[list[float]]) -> None:
+    result = answer(capsys, "response", "sasaki2012-lab", "--output", "root_moment", *points)
+    assert (result["output"], result["unit"]) == ("root_moment", "N m")
+    np.testing.assert_allclose(result["s"], expected)
+    G = tfarm.transfer(tfarm.load("sasaki2012-lab"), "root_moment")
+    assert [complex(*pair) for pair in result["value"]] == [G(complex(*pair)) for pair in result["s"]]
+
+
+def test_response_digits_are_pairs_of_strings(capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ("response", "sasaki2012", "--output", "root_moment", "--s", "0.3+57.1j", "--digits", "40")
+    ((re, im),) = answer(capsys, *arguments)["value"]
+    assert len(re.lstrip("-0.").replace(".", "")) >= 40
+    assert complex(float(re), float(im)) == pytest.approx(
+        tfarm.transfer(tfarm.load("sasaki2012"), "root_moment")(0.3 + 57.1j), rel=1e-14
+    )
+
+
+def test_csv_is_the_same_table(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    file = tmp_path / "root.csv"
+    code, out, _ = run(
+        capsys, "response", "sasaki2012", "--output", "root_moment", "--omega", "1,2", "--csv", str(file)
+    )
+    assert (code, out) == (0, "")
+    header, *rows = csv.reader(file.read_text().splitlines())
+    assert header == ["re_s [1/s]", "im_s [1/s]", "re_root_moment [N m / N m]", "im_root_moment [N m / N m]"]
+    value = tfarm.transfer(tfarm.load("sasaki2012"), "root_moment")(2j)
+    assert [float(cell) for cell in rows[1]] == [0.0, 2.0, value.real, value.imag]
+    assert list(tmp_path.iterdir()) == [file]
+
+
+def test_infinities_are_strings(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    from tfarm.cli.answers import to_json
+
+    assert to_json({"a": [float("inf"), {"b": -float("inf")}]}) == '{"a": ["inf", {"b": "-inf"}]}'
+    with pytest.raises(ValueError, match="JSON"):
+        to_json({"a": float("nan")})
+
+
+def test_presets_are_listed_with_their_assumptions(capsys: pytest.CaptureFixture[str]) -> None:
+    listed = answer(capsys, "presets")["presets"]
+    assert {arm["name"] for arm in listed} == set(tfarm.presets())
+    assert all(arm["assumptions"] for arm in listed)
+    _, out, _ = run(capsys, "presets")
+    assert "2766.7" in out
+
+
+def test_tables_for_people(capsys: pytest.CaptureFixture[str]) -> None:
+    _, out, _ = run(capsys, "modes", "sasaki2012", "--count", "2")
+    assert "71.5056824669" in out
+    assert "none missing" in out
+    _, out, _ = run(capsys, "response", "sasaki2012", "--output", "hub_rate", "--omega", "5")
+    assert "rad/s / N m" in out
+
+
+BAD = [
+    (["modes", "sasaki2021"], 'did you mean "sasaki2012"'),
+    (["modes", "sasaki2012", "--count", "0"], "--count = '0'"),
+    (["modes", "sasaki2012", "--count", "10001"], "1 to 10000"),
+    (["modes", "sasaki2012", "--count", "nan"], "--count = 'nan'"),
+    (["modes", "sasaki2012", "--count", "2.5"], "--count = '2.5'"),
+    (["modes", "sasaki2012", "--digits", "1001"], "1 to 1000"),
+    (["modes", "sasaki2012", "--cuont", "3"], "did you mean --count"),
+    (["modes", "sasaki2012", "--theory", "timo"], "timoshenko, shear, rayleigh, euler-bernoulli"),
+    (["mode", "sasaki2012"], "Did you mean 'modes'"),
+    (["modes"], "ARM"),
+    (["modes", "./no-such-file.toml"], "No such file"),
+    (["response", "sasaki2012"], "--output"),
+    (["response", "sasaki2012", "--output", "root_momnt"], 'did you mean "root_moment"'),
+    (["response", "sasaki2012", "--output", "moment"], "x is missing"),
+    (["response", "sasaki2012", "--output", "moment", "--x", "3"], "between 0 and 1 m"),
+    (["response", "sasaki2012", "--output", "root_moment", "--points", "1e12"], "2 to 1000000"),
+    (["response", "sasaki2012", "--output", "root_moment", "--from", "10", "--to", "1"], "--to = 1.0"),
+    (["response", "sasaki2012", "--output", "root_moment", "--from", "0"], "--from = 0.0"),
+    (["response", "sasaki2012", "--output", "root_moment", "--from", "abc"], "--from"),
+    (["response", "sasaki2012", "--output", "root_moment", "--to", "inf"], "--to = inf"),
+    (["response", "sasaki2012", "--output", "root_moment", "--s", "abc"], "--s = 'abc'"),
+    (["response", "sasaki2012", "--output", "root_moment", "--s", "nan"], "not finite"),
+    (["response", "sasaki2012", "--output", "root_moment", "--s", "1j", "--omega", "1"], "not both"),
+    (["response", "sasaki2012", "--output", "hub_angle", "--s", "0"], "rigid body"),
+    (["response", "sasaki2012", "--output", "root_moment", "--s", "71.50568246689015j"], "a natural frequency"),
+    (["response", "sasaki2012", "--output", "root_moment", "--csv", "/no/such/folder/a.csv"], "--csv"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "message"), BAD, ids=[" ".join(arguments) for arguments, _ in BAD])
+def test_bad_input_is_one_line_and_exit_2(
+    capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
+) -> None:
+    code, out, err = run(capsys, *arguments)
+    assert (code, out) == (2, "")
+    assert err.count("\n") == 1
+    assert message in err
+
+
+def test_what_cannot_be_told_is_exit_3(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tfarm.spectrum.table.roots_near", lambda *_: 0)
+    code, _, err = run(capsys, "modes", "sasaki2012", "--digits", "20", "--json")
+    assert code == 3
+    assert "no root" in err
+    assert err.count("\n") == 1
+
+
+def test_a_file_that_cannot_be_replaced_is_left_alone(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    folder = tmp_path / "taken.csv"
+    folder.mkdir()
+    code, _, _ = run(capsys, "response", "sasaki2012", "--output", "root_moment", "--omega", "1", "--csv", str(folder))
+    assert code == 2
+    assert list(tmp_path.iterdir()) == [folder]
+
+
+def test_files_get_the_usual_permissions(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    file, other = tmp_path / "a.csv", tmp_path / "b"
+    other.touch()
+    run(capsys, "response", "sasaki2012", "--output", "root_moment", "--omega", "1", "--csv", str(file))
+    assert stat.S_IMODE(file.stat().st_mode) == stat.S_IMODE(other.stat().st_mode)
+
+
+HEAVY = ("control", "matplotlib", "sympy", "scipy.signal")
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["presets"], ["modes", "sasaki2012", "--count", "3"], ["response", "sasaki2012", "--output", "hub_rate"]],
+)
+def test_commands_that_print_json_load_nothing_heavy(arguments: list[str]) -> None:
+    script = (
+        "import sys\nfrom tfarm.cli.commands import main\n"
+        f"try: main({[*arguments, '--json']!r})\nexcept SystemExit as stop: assert not stop.code\n"
+        f"print([name for name in {HEAVY!r} if name in sys.modules], file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=os.environ, check=True)
+    assert done.stderr.strip() == "[]"
+
+
+def test_a_reader_that_leaves_early_is_no_error() -> None:
+    command = (
+        f"{sys.executable} -c 'from tfarm.cli import main; main()' response sasaki2012 --output hub_rate | head -n 1"
+    )
+    done = subprocess.run(["bash", "-c", f"set -o pipefail; {command}"], capture_output=True, text=True, check=False)
+    assert done.stderr == ""
+
+
+def test_without_arguments_there_is_help(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = run(capsys)
+    assert (code, err) == (0, "")
+    assert "modes" in out
