@@ -21,8 +21,11 @@ def to_json(answer: dict[str, Any]) -> str:
     return json.dumps(_plain(answer), allow_nan=False, ensure_ascii=False)
 
 
-def modes_answer(modes: Modes, digits: int | None) -> dict[str, Any]:
-    """The modal table, frequencies as strings of so many digits where more than 15 are asked for."""
+def modes_answer(modes: Modes, digits: int | None, certify: bool = False) -> dict[str, Any]:
+    """The modal table, frequencies as strings of so many digits where more than 15 are asked for.
+
+    With `certify` each flexible mode gets its proven bracket, and the whole the count that proves it complete.
+    """
     exact = modes.digits(digits) if digits is not None else []
     strings = exact if digits is not None and digits > 15 else None
     by_theory = compare_theories(modes)
@@ -47,6 +50,11 @@ def modes_answer(modes: Modes, digits: int | None) -> dict[str, Any]:
     }
     if digits is not None:
         answer["digits"] = digits
+    if certify:
+        proof = modes.certify(15 if digits is None else digits)
+        for mode, (lower, upper) in zip(rows[-len(proof.brackets) :], proof.brackets, strict=True):
+            mode |= {"lower_rad_s": lower, "upper_rad_s": upper}
+        answer |= {"proven_complete": True, "proof": {"count": proof.count, "below_rad_s": proof.below}}
     return answer | {"modes": rows}
 
 

@@ -50,6 +50,7 @@ def modes(
     count: Annotated[str, typer.Option("--count", metavar="N", help="flexible modes, 1 to 10000")] = "10",
     theory: Annotated[str, typer.Option(help="timoshenko, shear, rayleigh or euler-bernoulli")] = "timoshenko",
     digits: Digits = None,
+    certify: Annotated[bool, typer.Option("--certify", help="prove each bracket, and that no mode is missing")] = False,
     json: Json = False,
 ) -> None:
     """Natural frequencies and modes, complete by construction."""
@@ -58,7 +59,7 @@ def modes(
     from tfarm.cli.answers import modes_answer, to_json
     from tfarm.spectrum import modes as find_modes
 
-    answer = modes_answer(find_modes(subject, wanted, theory=theory), right)  # type: ignore[arg-type]
+    answer = modes_answer(find_modes(subject, wanted, theory=theory), right, certify)  # type: ignore[arg-type]
     if json:
         print(to_json(answer))
     else:

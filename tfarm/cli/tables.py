@@ -41,6 +41,9 @@ def print_modes(answer: dict[str, Any]) -> None:
             " ".join(f"{x:.4f}" for x in mode["nodes_m"]) or "-",
         )
     _show(table)
+    if "proof" in answer:
+        proof = answer["proof"]
+        print(f"proven: each frequency enclosed, and {proof['count']} in all below {proof['below_rad_s']} rad/s")
     print(f"{answer['arm']}: the first {answer['count']} flexible modes, none missing ({answer['theory']} theory)")
 
 

@@ -30,7 +30,8 @@ class Counter:
 
     def __init__(self, k: Coefficients) -> None:
         self._kernel = k.kernel
-        self._ends, self._steps = _chain(k)
+        rows, self._steps = steps_of(k)
+        self._ends = np.array(rows, dtype=float).reshape(-1, 9)
 
     def __call__(self, omega: NDArray[np.float64]) -> NDArray[np.int64]:
         """The counts, in the shape of omega (1-D, rad/s, positive)."""
@@ -40,8 +41,8 @@ class Counter:
         return count
 
 
-def _chain(k: Coefficients) -> tuple[NDArray[np.float64], list[int]]:
-    """The arms from pinned-pinned to this one, as rows of end conditions, and by how much each may change the count."""
+def steps_of(k: Coefficients) -> tuple[list[list[Fraction]], list[int]]:
+    """The arms from pinned-pinned to this one, as rows of end conditions, and the step of the count at each."""
     none = Fraction(0)
     arm = replace(k, tip_mass=math.inf, tip_inertia=none, hub_inertia=none)
     rows, steps = [], []
@@ -49,11 +50,12 @@ def _chain(k: Coefficients) -> tuple[NDArray[np.float64], list[int]]:
         inertia = getattr(k, part)
         if inertia != getattr(arm, part):
             arm = replace(arm, **{part: inertia})
-            rows.append(_row(arm))
+            rows.append(row_of(arm))
             steps.append(-1 if inertia == math.inf else 1)
-    return np.array(rows, dtype=float).reshape(-1, 9), steps
+    return rows, steps
 
 
-def _row(k: Coefficients) -> list[float]:
+def row_of(k: Coefficients) -> list[Fraction]:
+    """The nine numbers of the arm's own end conditions: tip mass, tip inertia, hub."""
     ends = (Condition.of(inertia) for inertia in (k.tip_mass, k.tip_inertia, k.hub_inertia))
-    return [float(number) for end in ends for number in (end.rest, end.inertia, end.force)]
+    return [number for end in ends for number in (end.rest, end.inertia, end.force)]

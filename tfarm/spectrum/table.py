@@ -14,6 +14,7 @@ from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exact.appendix import roots_near
 from tfarm.exact.coefficients import THEORIES, Coefficients, Theory, coefficients
 
+from .certify import Certificate, certify
 from .precise import refine
 from .search import count_below, natural_frequencies
 from .shapes import Shapes
@@ -67,6 +68,14 @@ class Modes:
             if not roots_near(self.arm, text, digits - 1):
                 raise ConvergenceError(f"Delta(s) of the appendix has no root at {text}i rad/s", text, digits)
         return ["0.0"] * self._rigid + flexible
+
+    def certify(self, digits: int = 15) -> Certificate:
+        """Proven brackets of the flexible frequencies to so many digits, and the proof that none is missing.
+
+        Raises CertificationError where something cannot be proven, a double frequency for instance.
+        """
+        above = float(natural_frequencies(self._k, len(self) + 1, len(self) + 1)[0])
+        return certify(self._k, self.natural_frequency[self._rigid :], above, digits, int(self._rigid))
 
     def __len__(self) -> int:
         return self.index.size

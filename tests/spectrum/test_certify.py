@@ -1,0 +1,120 @@
+"""Certified frequencies: what is proven is true, and what cannot be proven is an error."""
+
+import math
+from dataclasses import replace
+from decimal import Decimal
+
+import mpmath
+import numpy as np
+import pytest
+
+import tfarm
+from tfarm import Arm, CertificationError, Hub, Payload
+from tfarm.exact import appendix
+from tfarm.exact.coefficients import coefficients
+from tfarm.spectrum import ball_axis as room
+from tfarm.spectrum.certify import certify
+from tfarm.spectrum.search import natural_frequencies
+
+
+def last_unit(text: str, digits: int) -> Decimal:
+    return Decimal(10) ** (Decimal(text).adjusted() - digits + 1)
+
+
+@pytest.mark.parametrize("digits", [3, 15, 30])
+@pytest.mark.parametrize("preset", tfarm.presets())
+def test_brackets_are_one_unit_wide_and_hold_a_root_of_the_papers_determinant(preset: str, digits: int) -> None:
+    arm = tfarm.load(preset)
+    modes = tfarm.modes(arm, 6)
+    proof = modes.certify(digits)
+    assert proof.count == 6 + arm.has_rigid_mode
+    undamped = replace(arm, link=replace(arm.link, damping=0.0))
+    for (lower, upper), omega in zip(proof.brackets, modes.natural_frequency[-6:], strict=True):
+        assert Decimal(upper) - Decimal(lower) == last_unit(lower, digits)
+        assert Decimal(lower) <= Decimal(float(omega)) + last_unit(lower, 15)
+        assert Decimal(upper) >= Decimal(float(omega)) - last_unit(lower, 15)
+        with mpmath.workdps(digits + 30):
+            ends = [appendix.Appendix(undamped, mpmath.mpc(0, mpmath.mpf(text))) for text in (lower, upper)]
+            signs = [(end.Delta * end.lambdas[0] * end.lambdas[1]) for end in ends]
+            assert mpmath.re(signs[0] / signs[1]) < 0
+
+
+def test_a_hundred_modes_agree_with_the_float_ones() -> None:
+    modes = tfarm.modes(tfarm.load("sasaki2012"), 100)
+    proof = modes.certify(30)
+    assert proof.count == 101
+    middle = np.array([float(lower) for lower, _ in proof.brackets])
+    np.testing.assert_allclose(modes.natural_frequency[1:], middle, rtol=4 * np.finfo(float).eps)
+
+
+@pytest.mark.parametrize("hub", [0.0, 0.3, math.inf])
+@pytest.mark.parametrize("mass", [0.0, 0.2, math.inf])
+@pytest.mark.parametrize("inertia", [0.0, 0.01, math.inf])
+def test_every_boundary_condition_is_certified(hub: float, mass: float, inertia: float) -> None:
+    arm = replace(tfarm.load("stocky-steel"), hub=Hub(inertia=hub), payload=Payload(mass=mass, inertia=inertia))
+    assert tfarm.modes(arm, 20).certify(17).count == 20 + arm.has_rigid_mode
+
+
+def test_a_list_with_a_missing_mode_is_not_certified() -> None:
+    k = coefficients(tfarm.load("sasaki2012"))
+    omega = natural_frequencies(k, 2, 7)
+    with pytest.raises(CertificationError, match=r"5 frequencies were enclosed, but 6 lie below"):
+        certify(k, np.delete(omega[:-1], 2), float(omega[-1]), 15, 1)
+
+
+def test_a_number_that_is_no_frequency_is_not_certified() -> None:
+    k = coefficients(tfarm.load("sasaki2012"))
+    omega = natural_frequencies(k, 2, 7)
+    omega[2] *= 1 + 1e-6
+    with pytest.raises(CertificationError, match="no proven sign change"):
+        certify(k, omega[:-1], float(omega[-1]), 15, 1)
+
+
+def test_a_frequency_listed_twice_is_not_certified() -> None:
+    k = coefficients(tfarm.load("sasaki2012"))
+    omega = natural_frequencies(k, 2, 7)[[0, 1, 2, 2, 3]]
+    with pytest.raises(CertificationError, match=r"overlap|enclosed"):
+        certify(k, omega, float(natural_frequencies(k, 7, 7)[0]), 15, 1)
+
+
+def crossing() -> Arm:
+    """A pinned-pinned beam whose two spectra cross: n = 1 of the second on n = m of the first, for some length."""
+    steel = tfarm.load("stocky-steel")
+    return replace(steel, hub=Hub(inertia=0.0), payload=Payload(mass=math.inf, inertia=0.0))
+
+
+def test_the_cut_off_mode_is_certified() -> None:
+    arm = crossing()
+    modes = tfarm.modes(arm, 12)
+    assert np.isclose(modes.natural_frequency, arm.shear_cutoff, rtol=1e-14).any()
+    assert modes.certify(20).count == 12
+
+
+def test_a_wrong_half_wave_count_would_be_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    honest = room.Axis._pinned
+    monkeypatch.setattr(room.Axis, "_pinned", lambda self, waves: honest(self, waves) + 2)
+    with pytest.raises(CertificationError, match="lie below"):
+        tfarm.modes(tfarm.load("sasaki2012"), 3).certify(15)
+
+
+def random_arm(generator: np.random.Generator) -> Arm:
+    def inertia(scale: float) -> float:
+        return float(generator.choice([0.0, math.inf, scale * 10 ** generator.uniform(-4, 4)]))
+
+    length, slenderness = 10 ** generator.uniform(-1, 1), 10 ** generator.uniform(0.7, 2.7)
+    section = tfarm.Section.rectangle(width=0.3 * length / slenderness, depth=length / slenderness)
+    link = tfarm.Link.isotropic(length=length, density=2700.0, youngs_modulus=7e10, poissons_ratio=0.3, section=section)
+    beam = link.rhoA * length
+    hub = Hub(inertia=inertia(beam * length**2))
+    return Arm(link=link, hub=hub, payload=Payload(mass=inertia(beam), inertia=inertia(0.01 * beam * length**2)))
+
+
+def test_random_arms_are_certified_and_agree_with_the_count() -> None:
+    generator = np.random.default_rng(20261121)
+    for _ in range(150):
+        arm = random_arm(generator)
+        modes = tfarm.modes(arm, 20)
+        proof = modes.certify(17)
+        assert proof.count == 20 + arm.has_rigid_mode
+        middle = np.array([float(lower) for lower, _ in proof.brackets])
+        np.testing.assert_allclose(modes.natural_frequency[-20:], middle, rtol=8 * np.finfo(float).eps)

@@ -1,0 +1,107 @@
+"""The undamped arm on the imaginary axis in real ball arithmetic: D(i w), the count, and a root finder."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import flint
+
+from tfarm.exact.balls import rational
+from tfarm.exact.closed_form import from_waves
+from tfarm.exact.coefficients import Coefficients
+from tfarm.exact.compiled import plain
+
+from .counting import row_of, steps_of
+
+Ball = Any
+_minors = plain(from_waves)
+
+MOST_BITS = 40_000
+
+
+class Axis:
+    """The arm on the imaginary axis in real balls, at the working precision at which it is made."""
+
+    def __init__(self, k: Coefficients) -> None:
+        self._a, self._b, self._g = rational(k.a), rational(k.b), rational(k.g)
+        rows, self._steps = steps_of(k)
+        self._rows = [[rational(number) for number in row] for row in rows]
+        self._own = [rational(number) for number in row_of(k)]
+
+    def drive(self, omega: Ball) -> Ball:
+        """D(i omega) times a positive factor."""
+        return self._drive(self._waves(omega), self._own)
+
+    def count(self, omega: Ball) -> int | None:
+        """N(omega), the rigid-body mode included; None if a sign or a half wave is not certain."""
+        waves = self._waves(omega)
+        number = self._pinned(waves)
+        for row, step in zip(self._rows, self._steps, strict=True):
+            value = self._drive(waves, row)
+            if number is None or not (value > 0 or value < 0):
+                return None
+            number += step * ((number % 2 == 1) != bool(value < 0))
+        return number
+
+    def _waves(self, omega: Ball) -> tuple[Ball, list[tuple[Ball, ...]]]:
+        S = -omega * omega
+        half, product = S * (self._a + self._b) / 2, S * (self._a * self._b * S + self._g)
+        spread = (half * half - product).sqrt()
+        return S, [self._functions(z, S) for z in (half + spread, half - spread)]
+
+    def _functions(self, z: Ball, S: Ball) -> tuple[Ball, ...]:
+        """c, sinh t / t, z, v and the scale of one wave; real, whether it decays or travels."""
+        if z < 0:
+            k = (-z).sqrt()
+            sine, cosine = k.sin_cos()
+            return cosine, sine / k, z, z - self._b * S, flint.arb(1)
+        t = z.sqrt()
+        e = (-t).exp()
+        square = e * e
+        return (1 + square) / 2, (1 - square) / (2 * t), z, z - self._b * S, e
+
+    def _drive(self, waves: tuple[Ball, list[tuple[Ball, ...]]], row: list[Ball]) -> Ball:
+        S, (one, two) = waves
+        tip = row[0] + row[1] * S, row[2], row[3] + row[4] * S, row[5]
+        theta, M0, _, _ = _minors(*one, *two, self._g * S, flint.arb(1), *tip)
+        return row[8] * M0 - (row[6] + row[7] * S) * theta  # the sign of g S is minus
+
+    def _pinned(self, waves: tuple[Ball, list[tuple[Ball, ...]]]) -> int | None:
+        """The count for both ends pinned: half waves inside the length, and one above the cut-off."""
+        number, travelling = 0, 0
+        for _, _, z, _, _ in waves[1]:
+            if z < 0:
+                whole = ((-z).sqrt() / flint.arb.pi()).floor().unique_fmpz()
+                if whole is None:
+                    return None
+                number, travelling = number + int(whole), travelling + 1
+            elif not z > 0:
+                return None
+        return number + (travelling == 2)
+
+
+def secant(axis: Axis, omega: float, digits: int) -> Ball | None:
+    """The root next to omega by the secant method on midpoints; None if it does not settle close by."""
+    before, now = flint.arb(omega), flint.arb(omega) * (1 + flint.arb(2) ** -50)
+    value_before = axis.drive(before).mid()
+    small, near = now * flint.arb(10) ** -(digits + 2), now * flint.arb(2) ** -36
+    for _ in range(40):
+        value = axis.drive(now).mid()
+        if value == value_before:
+            return now
+        step = (value * (now - before) / (value - value_before)).mid()
+        before, value_before, now = now, value, (now - step).mid()
+        if not abs(now - omega) < near:
+            return None
+        if abs(step) < small:
+            return now
+    return None
+
+
+def precisions(digits: int) -> Iterator[int]:
+    """Working precisions [bits] worth trying for so many digits, each twice the one before."""
+    bits = int(3.33 * digits) + 80
+    while bits < MOST_BITS:
+        yield bits
+        bits *= 2
