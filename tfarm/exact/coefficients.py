@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from typing import Literal, get_args
 
 import numpy as np
@@ -43,7 +44,7 @@ class Condition:
         return cls(rest=Fraction(0), inertia=inertia / (1 + inertia), force=1 / (1 + inertia))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Coefficients:
     """Dimensionless coefficients of an arm, exact as fractions of its float64 parameters.
 
@@ -67,7 +68,7 @@ class Coefficients:
         """Whether the hub cannot turn, so that its angle is the input."""
         return not isinstance(self.hub_inertia, Fraction)
 
-    @property
+    @cached_property
     def kernel(self) -> NDArray[np.float64]:
         """The vector that the compiled functions of `waves` read (see the indices there)."""
         split = [part for value in (self.a, self.b, self.g) for part in double_double(value)]
