@@ -16,7 +16,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .closed_form import SERIES_RADIUS, fields_from_root, from_transition, from_waves, transition_series
+from .closed_form import (
+    SERIES_RADIUS,
+    even_functions,
+    fields_from_root,
+    from_transition,
+    from_waves,
+    transition_series,
+)
 from .coefficients import Coefficients
 from .compiled import plain
 from .waves import evaluate, separated
@@ -28,6 +35,7 @@ _ends = plain(from_transition)
 _fields = plain(fields_from_root)
 _minors = plain(from_waves)
 _transition = plain(transition_series)
+_even = plain(even_functions)
 
 
 class Wave(NamedTuple):
@@ -184,13 +192,21 @@ def _wave(
     moment: float,
     x: float,
 ) -> tuple[Complex, ...]:
-    """W, Psi, M, Q of wave `one` in the free response, scaled as `closed_form.from_waves` is."""
-    bare = one.t * two.v * (tip_mass * tip_inertia - shear * moment * d * gS)
+    """W, Psi, M, Q of wave `one` in the free response, scaled as `closed_form.from_waves` is.
+
+    A slow wave, |z| < 1, is written in even functions of x and 1 - x: next to the cut-off P and R would cancel.
+    """
+    bare = two.v * (tip_mass * tip_inertia - shear * moment * d * gS)
     So = tip_mass * two.z * two.s + shear * gS * two.c
     Mo = two.v * (tip_inertia * two.c + moment * d * two.z * two.s)
-    force, couple = shear * gS, tip_mass * one.t
-    turn, bend = one.v * tip_inertia, one.v * moment * d * one.t
-    decaying = Mo * (force + couple) - So * (turn + bend) - one.e * two.e * bare
-    growing = one.e * (Mo * (force - couple) - So * (turn - bend)) + two.e * bare
-    P, R = decaying * np.exp(-one.t * x) / 2, growing * np.exp(-one.t * (1 - x)) / 2
-    return P + R, one.v / one.t * (R - P), d * one.v * (P + R), gS / one.t * (R - P)
+    even, odd = Mo * shear * gS - So * one.v * tip_inertia, Mo * tip_mass - So * one.v * moment * d
+    decaying = (even + one.t * odd - one.e * two.e * one.t * bare) / 2
+    growing = (one.e * (even - one.t * odd) + two.e * one.t * bare) / 2
+    P, R = decaying * np.exp(-one.t * x), growing * np.exp(-one.t * (1 - x))
+    W, slope = P + R, (R - P) / one.t  # slope: W' / z
+    slow = abs(one.z) < 1.0
+    z, y = np.where(slow, one.z, 0.0), 1 - x
+    (c_x, s_x), (c_y, s_y) = _even(z * x * x), _even(z * y * y)
+    W = np.where(slow, one.e * (even * c_y + z * (odd * y * s_y + two.e * bare * x * s_x)), W)
+    slope = np.where(slow, one.e * (two.e * bare * c_x - even * y * s_y - odd * c_y), slope)
+    return W, one.v * slope, d * one.v * W, gS * slope

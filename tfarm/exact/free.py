@@ -80,7 +80,8 @@ def _by_waves(k: Coefficients, s: Jet, d: Complex, one: Wave, two: Wave) -> tupl
         by_s = k.damping * wave.z * wave.v - S.c[1] * (a * wave.v + b * u - g)
         slope = -by_s / (d * wave.v + u)  # dz/ds from the dispersion relation
         z = Jet([wave.z, slope])
-        by_z = np.where(abs(wave.z) > 1.0, (wave.c - wave.s) / (2 * wave.z), wave.e * _slope_of_sinhc(wave.z))
+        far = np.where(abs(wave.z) > 1.0, wave.z, 1.0)
+        by_z = np.where(far == wave.z, (wave.c - wave.s) / (2 * far), wave.e * _slope_of_sinhc(wave.z))
         c, sinhc = Jet([wave.c, wave.s / 2 * slope]), Jet([wave.s, by_z * slope])
         arguments += [c, sinhc, z, Jet([wave.v, slope - b * S.c[1]]), wave.e]
     theta, M, Q, W = _from_waves(*arguments, g * S, damper, *tip_condition(k, S))
