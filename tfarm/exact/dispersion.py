@@ -110,4 +110,5 @@ def _corrected(
     t = _square_root(z)
     square, square_low = _two_product(t, t)
     remainder = ((z - square) - square_low) + step
-    return z + step, v + (v_low + step), t, 0.5 * remainder * reciprocal(t)
+    smooth = 0.5 / (t.real * t.real + t.imag * t.imag + 1e-20)  # t = 0 at the cut-off, where no dt is needed
+    return z + step, v + (v_low + step), t, remainder * complex(t.real * smooth, -t.imag * smooth)

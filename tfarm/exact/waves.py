@@ -27,6 +27,7 @@ from .dispersion import dispersion, reciprocal
 
 BLOCK = 128  # points a block: its twenty work arrays stay in the first- and second-level cache
 PARALLEL = 0.15  # |z_1 - z_2| below this share of |z_1| + |z_2|: flagged
+LIFT = 2.0**200  # W1 is held this much larger: it would underflow where s^2 W1 does not
 POLE = 1e-11  # torque below this share of its own terms: flagged, it may be a pole
 
 
@@ -35,10 +36,10 @@ def _wave_functions(z: complex, t: complex, dt: complex) -> tuple[complex, compl
     """c = cosh t e^{-t}, S = sinh t / t e^{-t} and e = e^{-t}, with t + dt for t."""
     decay = math.exp(-t.real)
     e = decay * complex(math.cos(t.imag), -math.sin(t.imag))
-    e = e - e * dt
-    if abs(z.real) + abs(z.imag) < 1.0:  # 1 - e^2 would cancel
+    if abs(z.real) + abs(z.imag) < 1.0:  # 1 - e^2 would cancel; here e is a common factor, whatever its error
         c, s = even_functions(z)
         return e * c, e * s, e
+    e = e - e * dt
     half_square = 0.5 * (e * e)
     return 0.5 + half_square, (0.5 - half_square) * reciprocal(t + dt), e
 
@@ -82,12 +83,13 @@ def evaluate(s: Any, k: Any, outputs: Any, values: Any, suspects: Any) -> None:
                 _wave_states(numbers, functions, k, states)
             for o in range(len(outputs)):
                 start, power, gauge = BLOCK * int(outputs[o, 0]), outputs[o, 1], outputs[o, 2]
+                factor = outputs[o, 3] / LIFT if outputs[o, 0] == 3 else outputs[o, 3]
                 for i in range(n):
-                    value = outputs[o, 3] * states[start + i]
+                    value = states[start + i]
                     value = value * points[i] if power == 1 else value
                     value = value * (points[i] * points[i]) if power == 2 else value
                     value = value * reciprocal(1.0 + k[7] * points[i]) if gauge == 1 else value
-                    values[o, chosen[i]] = value
+                    values[o, chosen[i]] = factor * value
             for i in range(n):
                 left = states[5 * BLOCK + i]
                 suspects[chosen[i]] = left.real < POLE * left.imag or (not low and _parallel(numbers, i))
@@ -172,7 +174,7 @@ def _store(
     u = turned - held
     scale = k[17] * reciprocal(u)
     states[i], states[BLOCK + i], states[2 * BLOCK + i] = scale * theta, scale * M0, scale * Q0
-    states[3 * BLOCK + i], states[4 * BLOCK + i] = scale * W1, scale * Y1
+    states[3 * BLOCK + i], states[4 * BLOCK + i] = (LIFT * scale) * W1, scale * Y1
     states[5 * BLOCK + i] = complex(_size(u), _size(turned) + _size(held) + _size(M0))
 
 

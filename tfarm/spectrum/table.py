@@ -191,8 +191,8 @@ class Modes:
         shape = self._shapes.only(mode)
         ends = np.geomspace(1e-9, 0.9 / (24 * (mode + 3)), 40)  # a heavy hub or payload draws a node close to it
         grid = np.r_[ends, np.linspace(0.0, 1.0, 24 * (mode + 3))[1:-1], 1.0 - ends[::-1]]
-        W = shape(grid)[0, 0]
-        W = np.where(abs(W) < 1e-13 * abs(W).max(), 0.0, W)
+        W, Psi, *_ = shape(grid)[:, 0]
+        W = np.where(abs(W) < 1e-13 * max(abs(W).max(), abs(Psi).max()), 0.0, W)  # a cut-off mode has W = 0 throughout
         (start,) = np.nonzero(W[:-1] * W[1:] < 0)
         low, high = grid[start], grid[start + 1]
         x = low + (high - low) * W[start] / (W[start] - W[start + 1])
