@@ -26,9 +26,7 @@ class TfarmError(Exception):
 class ParameterError(TfarmError, ValueError):
     """Bad input.  Its text is one line: the file (if there is one), the key, the value and the remedy."""
 
-    def __init__(
-        self, *, key: str, value: object, remedy: str, file: str | os.PathLike[str] | None = None
-    ) -> None:
+    def __init__(self, *, key: str, value: object, remedy: str, file: str | os.PathLike[str] | None = None) -> None:
         self.key, self.value, self.remedy = key, value, remedy
         self.file = None if file is None else os.fspath(file)
         super().__init__(str(self))

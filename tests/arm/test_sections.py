@@ -34,9 +34,7 @@ def test_area_and_second_moment_are_integrals_over_the_section(shape):
         # y = (depth/2) sin t takes the square roots out; the tube's inner radius is a breakpoint
         corner = math.asin(0.05 / 0.06)
         total, _ = quad(
-            lambda t: (
-                (depth / 2 * math.sin(t)) ** power * width(depth / 2 * math.sin(t)) * depth / 2 * math.cos(t)
-            ),
+            lambda t: (depth / 2 * math.sin(t)) ** power * width(depth / 2 * math.sin(t)) * depth / 2 * math.cos(t),
             -math.pi / 2,
             math.pi / 2,
             points=[-corner, corner],
@@ -83,9 +81,7 @@ def test_a_given_shear_factor_wins_over_cowper():
     section = Section.rectangle(width=0.1, depth=0.2, shear_factor=5 / 6)
     link = Link(length=2, density=7800, youngs_modulus=2.1e11, shear_modulus=8e10, section=section)
     assert link.shear_factor == 5 / 6
-    assert replace(link, section=Section.rectangle(width=0.1, depth=0.2)).shear_factor == kappa(
-        section, 0.3125
-    )
+    assert replace(link, section=Section.rectangle(width=0.1, depth=0.2)).shear_factor == kappa(section, 0.3125)
 
 
 BAD = {

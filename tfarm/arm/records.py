@@ -67,9 +67,7 @@ class Link:
 
     def _check_slenderness(self) -> None:
         if not 1e-3 <= self.slenderness <= 1e9:
-            remedy = (
-                f"{self.slenderness:.3g} times the section's radius of gyration is no beam; check the units"
-            )
+            remedy = f"{self.slenderness:.3g} times the section's radius of gyration is no beam; check the units"
             raise ParameterError(key="link.length", value=self.length, remedy=remedy)
 
     def _check_cowper(self) -> None:

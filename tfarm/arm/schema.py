@@ -75,9 +75,7 @@ class General(Table):
     shear_factor: float
 
     def build(self) -> Section:
-        return Section.general(
-            area=self.area, second_moment=self.second_moment, shear_factor=self.shear_factor
-        )
+        return Section.general(area=self.area, second_moment=self.second_moment, shear_factor=self.shear_factor)
 
 
 class LinkTable(Table):

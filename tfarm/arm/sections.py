@@ -113,9 +113,7 @@ class Section:
         return cls._named("round", shear_factor, diameter=diameter)
 
     @classmethod
-    def tube(
-        cls, *, outer_diameter: float, inner_diameter: float, shear_factor: float | None = None
-    ) -> Section:
+    def tube(cls, *, outer_diameter: float, inner_diameter: float, shear_factor: float | None = None) -> Section:
         """A round tube."""
         return cls._named("tube", shear_factor, outer_diameter=outer_diameter, inner_diameter=inner_diameter)
 
@@ -149,9 +147,7 @@ class Section:
 def _properties(shape: str, dimensions: Mapping[str, float]) -> tuple[float, float]:
     """Area [m^2] and second moment [m^4] of a named shape."""
     if shape not in SHAPES:
-        raise ParameterError(
-            key=f"{KEY}.shape", value=shape, remedy=did_you_mean(str(shape), [*SHAPES, "general"])
-        )
+        raise ParameterError(key=f"{KEY}.shape", value=shape, remedy=did_you_mean(str(shape), [*SHAPES, "general"]))
     names = SHAPES[shape].dimensions
     if set(dimensions) != set(names):
         remedy = f"a {shape} has {' and '.join(names)}: build it with Section.{shape}()"

@@ -27,7 +27,7 @@ from .dispersion import dispersion, reciprocal
 
 BLOCK = 128  # points a block: its twenty work arrays stay in the first- and second-level cache
 PARALLEL = 0.15  # |z_1 - z_2| below this share of |z_1| + |z_2|: flagged
-LIFT = 2.0**200  # W1 is held this much larger: it would underflow where s^2 W1 does not
+LIFT = 2.0**100  # W1 is held this much larger: it would underflow where s^2 W1 does not
 POLE = 1e-11  # torque below this share of its own terms: flagged, it may be a pole
 
 

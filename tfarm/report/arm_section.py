@@ -1,0 +1,144 @@
+"""The arm: its headline numbers, what was given, what follows from it, its assumptions and the paper's slips."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import tfarm
+from tfarm.arm import Arm
+from tfarm.report.digits import plain, significant, unit
+from tfarm.report.figures import Picture
+from tfarm.report.sections import Fact, Section
+from tfarm.report.sketch import draw_arm
+from tfarm.report.tables import Column, Table, text_column
+
+FIRST = 3  # natural frequencies among the headline numbers
+Row = tuple[str, str, float, str]  # quantity, symbol, value, unit
+
+
+def arm_section(arm: Arm) -> Section:
+    """The first part of every page."""
+    return Section(
+        anchor="arm",
+        title="The arm",
+        facts=headline_numbers(arm),
+        words=() if arm.assumptions else ("This arm states no assumptions.",),
+        items=arm.assumptions,
+        blocks=(_picture(arm), given_table(arm), derived_table(arm)),
+    )
+
+
+def headline_numbers(arm: Arm) -> tuple[Fact, ...]:
+    """First natural frequencies (at C = 0), total inertia, slenderness, shear cut-off, damping."""
+    modes = tfarm.modes(arm, count=FIRST)
+    frequencies = tuple(
+        Fact(
+            label=f"natural frequency {number}",
+            value=significant(omega, 8),
+            unit="rad/s",
+            beside=f"{significant(omega / (2 * math.pi), 8)} Hz",
+        )
+        for number, omega in zip(modes.index, modes.natural_frequency, strict=True)
+        if number > 0
+    )
+    return *frequencies, *_other_numbers(arm)
+
+
+def _other_numbers(arm: Arm) -> Iterator[Fact]:
+    cutoff, C = arm.shear_cutoff, arm.link.damping
+    how = "" if arm.has_rigid_mode else "the arm cannot turn as a rigid body"
+    mass = arm.link.rhoA * arm.link.length
+    yield Fact(label="total inertia J about the hub", value=significant(arm.total_inertia, 8), unit="kg m²", beside=how)
+    yield Fact(
+        label="slenderness L/√(I/A)",
+        value=significant(arm.link.slenderness, 5),
+        beside=f"depth/length {significant(math.sqrt(12) / arm.link.slenderness, 3)} as a rectangle",
+    )
+    yield Fact(
+        label="shear cut-off √(κGA/ρI)",
+        value=significant(cutoff, 8),
+        unit="rad/s",
+        beside=f"{significant(cutoff / (2 * math.pi), 6)} Hz",
+    )
+    yield Fact(label="mass of the link", value=significant(mass, 5), unit="kg")
+    yield Fact(label="damping C", value=plain(C), unit="s", beside="" if C else "none: resonances are infinite")
+
+
+def _picture(arm: Arm) -> Picture:
+    tip = "a payload" if arm.payload.mass or arm.payload.inertia else "nothing"
+    return Picture(
+        stem="arm",
+        title="The arm, its link to scale",
+        caption="The hub turns the link by the torque u (positive anticlockwise). Hub and payload are symbols; the "
+        "link's length and depth are to scale, which shows at a glance whether shear can matter.",
+        alt=f"Side view of the arm: hub at the left, a link {plain(arm.link.length, 6)} m long, {tip} at the tip.",
+        figure=draw_arm(arm),
+    )
+
+
+def given_table(arm: Arm) -> Table:
+    """The arm's file as a table."""
+    link, section = arm.link, arm.link.section
+    kappa = "shear factor, given" if section.shear_factor is not None else "shear factor, Cowper (1966)"
+    rows: list[Row] = [
+        ("length", "L", link.length, "m"),
+        ("density", "ρ", link.density, "kg/m^3"),
+        ("Young's modulus", "E", link.youngs_modulus, "Pa"),
+        ("shear modulus", "G", link.shear_modulus, "Pa"),
+        ("Kelvin-Voigt damping, on bending", "C", link.damping, "s"),
+        *((f"section ({section.shape}): {n.replace('_', ' ')}", "", value, "m") for n, value in section.dimensions),
+        ("area of the section", "A", section.area, "m^2"),
+        ("second moment of area", "I", section.second_moment, "m^4"),
+        (kappa, "κ", link.shear_factor, ""),
+        ("hub inertia", "I_h", arm.hub.inertia, "kg m^2"),
+        ("payload mass", "m", arm.payload.mass, "kg"),
+        ("payload inertia", "I_c", arm.payload.inertia, "kg m^2"),
+    ]
+    return _table(
+        "parameters",
+        "Parameters",
+        "What the arm's file says, in SI units. An infinite hub inertia locks the hub, an infinite payload mass pins "
+        "the tip, an infinite payload inertia keeps it from rotating.",
+        rows,
+    )
+
+
+def derived_table(arm: Arm) -> Table:
+    """What follows from the parameters alone."""
+    link, J = arm.link, arm.total_inertia
+    rows: list[Row] = [
+        ("mass of the link", "ρAL", link.rhoA * link.length, "kg"),
+        ("bending stiffness", "EI", link.EI, "N m^2"),
+        ("shear stiffness", "κGA", link.kGA, "N"),
+        ("Poisson's ratio of an isotropic material", "E/2G − 1", link.poissons_ratio, ""),
+        ("radius of gyration", "√(I/A)", link.section.radius_of_gyration, "m"),
+        ("slenderness", "L/√(I/A)", link.slenderness, ""),
+        ("total inertia about the hub", "J", J, "kg m^2"),
+        ("shear cut-off", "√(κGA/ρI)", arm.shear_cutoff, "rad/s"),
+        ("shear cut-off", "", arm.shear_cutoff / (2 * math.pi), "Hz"),
+    ]
+    if arm.has_rigid_mode and not arm.is_locked:
+        rows.insert(7, ("root moment per torque at rest", "−(J − I_h)/J", -(J - arm.hub.inertia) / J, "N m/(N m)"))
+    return _table(
+        "derived",
+        "What follows from them",
+        "Below the shear cut-off one pair of the beam's waves decays along it, above it both pairs travel.",
+        rows,
+        digits=8,
+    )
+
+
+def _table(stem: str, title: str, caption: str, rows: list[Row], digits: int = 10) -> Table:
+    quantity, symbol, value, units = zip(*rows, strict=True)
+    return Table(
+        stem=stem,
+        title=title,
+        caption=caption,
+        columns=(
+            text_column("quantity", "quantity", quantity),
+            text_column("symbol", "symbol", symbol),
+            Column(key="value", title="value", values=value, cells=[plain(x, digits) for x in value]),
+            text_column("unit", "unit", [unit(u) for u in units]),
+        ),
+    )

@@ -1,0 +1,169 @@
+"""Bode plots of exact responses.  An infinite resonance is drawn as one: the curve runs off the picture, broken."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, MultipleLocator, NullFormatter
+
+from tfarm.report.digits import plain
+from tfarm.report.figures import BLUE, FAINT, GREY, INK, ORANGE, blank, headline, style
+from tfarm.report.responses import Bode, Real
+
+HERTZ = 2 * math.pi
+STRIP = 0.085  # height of the strip of mode numbers above the magnitude, as a share of its axes
+NARROWEST = 0.019  # share of the width below which two mode numbers would touch
+
+
+def draw_bode(data: Bode) -> Figure:
+    """Magnitude over phase of one response."""
+    with style():
+        figure = blank(9.0, 6.2)
+        upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[1.75, 1.0])
+        magnitude(data, ax=upper)
+        phase(data, ax=lower)
+        upper.set_xlabel("")
+        upper.tick_params(labelbottom=False)
+        headline(figure, f"{data.arm.name}: {data.input_label} to {data.label}")
+    return figure
+
+
+def draw_card(data: Bode) -> Figure:
+    """The magnitude alone, small, for the index."""
+    with style():
+        figure = blank(4.4, 2.5)
+        ax = figure.subplots()
+        magnitude(data, ax=ax, is_small=True)
+    return figure
+
+
+def magnitude(data: Bode, *, ax: Axes, is_small: bool = False, label: str = "flexible arm, exact") -> None:
+    """|G| on log scales: rad/s below, Hz above; triangles where it is infinite or zero."""
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    ax.set_xlim(*data.band)
+    ax.set_ylim(*magnitude_limits(data))
+    low, high = ax.get_ylim()
+    jumps = np.r_[data.infinite, data.vanishing]
+    edges = np.r_[np.full(data.infinite.size, 10 * high), np.full(data.vanishing.size, low / 10)]
+    ax.plot(*broken(data.omega, abs(data.value), jumps, edges), color=BLUE, label=label)
+    if np.any(data.rigid):
+        ax.plot(data.omega, abs(data.rigid), color=GREY, lw=1.0, ls=(0, (4, 3)), zorder=1.5, label="rigid arm")
+    _mark_roots(data, ax)
+    _mark_cutoff(data, ax)
+    ax.set_xlabel("angular frequency [rad/s]")
+    ax.yaxis.set_minor_formatter(NullFormatter())
+    if is_small:
+        ax.set_ylabel(f"|{data.label}| [{data.gain_unit}]", fontsize=8.5)
+        return
+    ax.set_ylabel(f"|{data.label} / {data.input_label}|  [{data.gain_unit}]")
+    _number_modes(data, ax)
+    hertz_axis(ax, 1.0 + STRIP)
+    starts_low = abs(data.value[0]) < math.sqrt(low * high)
+    ax.legend(loc="upper left" if starts_low else "lower left")
+
+
+def phase(data: Bode, *, ax: Axes) -> None:
+    """The phase in degrees; at C = 0 it steps by 180 degrees at every root on the axis."""
+    ax.set_xscale("log")
+    ax.set_xlim(*data.band)
+    for root in data.infinite:
+        ax.axvline(root, color=FAINT, lw=0.8, zorder=0.5)
+    jumps = np.r_[data.infinite, data.vanishing]
+    ax.plot(data.omega, data.phase, color=BLUE, lw=0.7, ls=(0, (1, 1.5)) if jumps.size else "-")
+    ax.plot(*broken(data.omega, data.phase, jumps, np.full(jumps.size, np.nan)), color=BLUE)
+    span = float(np.ptp(data.phase))
+    ax.set_ylim(data.phase.min() - 0.08 * span - 15, data.phase.max() + 0.08 * span + 15)
+    ax.yaxis.set_major_locator(MultipleLocator(next((step for step in (90, 180, 360) if span / step <= 5), 720)))
+    ax.set_ylabel("phase [deg]")
+    ax.set_xlabel("angular frequency [rad/s]")
+
+
+def hertz_axis(ax: Axes, height: float) -> None:
+    """A second frequency axis in Hz, at that height above the axes."""
+
+    def to_hertz(omega: Any) -> Any:
+        return omega / HERTZ
+
+    def from_hertz(frequency: Any) -> Any:
+        return frequency * HERTZ
+
+    upper = ax.secondary_xaxis(height, functions=(to_hertz, from_hertz))
+    upper.set_xlabel("frequency [Hz]", labelpad=5.0)
+    upper.xaxis.set_major_formatter(FuncFormatter(lambda x, _: plain(x, 3)))
+    upper.xaxis.set_minor_formatter(NullFormatter())
+
+
+def broken(x: Real, y: Real, at: Real, limit: Real) -> tuple[Real, Real]:
+    """The curve broken at each of the places, where it runs to its `limit` from both sides (nan: it just ends)."""
+    order = np.argsort(at)
+    at, limit = at[order], limit[order]
+    where, gap = np.repeat(np.searchsorted(x, at), 3), np.full(at.size, np.nan)
+    return np.insert(x, where, np.c_[at, gap, at].ravel()), np.insert(y, where, np.c_[limit, gap, limit].ravel())
+
+
+def magnitude_limits(data: Bode) -> tuple[float, float]:
+    """Everything finite with a margin; roots on the axis run off the picture."""
+    size = abs(data.value)
+    roots = np.r_[data.infinite, data.vanishing]
+    if roots.size:
+        away = abs(data.omega[:, None] / roots - 1).min(axis=1) > 0.004
+        size = size[away] if away.any() else size
+    seen = np.r_[size[size > 0], abs(data.rigid[:1][data.rigid[:1] != 0])]
+    low, high = math.log10(seen.min()), math.log10(seen.max())
+    margin = max(0.25, 0.06 * (high - low))
+    return 10 ** (low - margin), 10 ** (high + margin)
+
+
+def _mark_roots(data: Bode, ax: Axes) -> None:
+    """Open triangles: at the top edge where |G| is infinite, at the bottom edge where it is zero."""
+    for root in (*data.infinite, *data.vanishing):
+        ax.axvline(root, color=FAINT, lw=0.8, zorder=0.5)
+    marks: Sequence[tuple[Real, float, str, str]] = (
+        (data.infinite, 1.0, "^", "infinite: pole on the imaginary axis"),
+        (data.vanishing, 0.0, "v", "zero: zero on the imaginary axis"),
+    )
+    for roots, height, marker, label in marks:
+        if roots.size:
+            ax.plot(
+                roots, np.full(roots.size, height), marker, transform=ax.get_xaxis_transform(), clip_on=False,
+                mfc="white", mec=INK, ms=6.0, mew=1.0, zorder=5, label=label,
+            )  # fmt: skip
+
+
+def _mark_cutoff(data: Bode, ax: Axes) -> None:
+    """Where the second pair of waves begins to travel, if that is in the band."""
+    if data.band[0] < data.arm.shear_cutoff < data.band[1]:
+        ax.axvline(data.arm.shear_cutoff, color=ORANGE, lw=1.0, ls="-.", label="shear cut-off")
+
+
+def _number_modes(data: Bode, ax: Axes) -> None:
+    """The number of each resonance above the axes, as many as do not touch."""
+    low, high = np.log(data.band)
+    last = -1.0
+    for number, pole in enumerate(data.resonances, 1):
+        place = (math.log(pole.imag) - low) / (high - low)
+        if place - last < NARROWEST:
+            continue
+        last = place
+        ax.text(
+            pole.imag, 1.0 + 0.38 * STRIP, str(number), transform=ax.get_xaxis_transform(), ha="center",
+            va="bottom", fontsize=8.0, color=GREY,
+        )  # fmt: skip
+        if pole.imag not in data.infinite:
+            ax.axvline(pole.imag, color=FAINT, lw=0.8, zorder=0.5)
+
+
+def draw_compared(main: Bode, other: Bode, labels: tuple[str, str]) -> Figure:
+    """Two responses of one output in one magnitude plot; the roots marked are those of the first."""
+    with style():
+        figure = blank(9.0, 5.0)
+        ax = figure.subplots()
+        ax.plot(other.omega, abs(other.value), color=ORANGE, lw=1.8, zorder=3, label=labels[1])
+        magnitude(main, ax=ax, label=labels[0])
+    return figure

@@ -1,0 +1,140 @@
+"""Frequency responses: for each output its Bode plot and its poles and zeros."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+import tfarm
+from tfarm.arm import Arm
+from tfarm.report.bode import draw_bode
+from tfarm.report.digits import aligned, plain, scientific, significant, unit
+from tfarm.report.figures import Picture
+from tfarm.report.responses import ON_AXIS, Bode, band_of, bode
+from tfarm.report.sections import Section
+from tfarm.report.tables import Table, data_column, number_column, text_column
+
+RESONANCES = 10  # flexible modes in the band
+
+ROOTS = (
+    "Those below the real axis are their mirror images. A damping ratio of 100 % is a real root in the left "
+    "half-plane, −100 % one in the right. Magnitude: at s = i Im s (real roots: at s = i |s|)."
+)
+
+
+def bode_section(arm: Arm, output: str) -> Section:
+    """One output: picture, what it means, poles and zeros."""
+    modes = tfarm.modes(arm, count=RESONANCES + 1)
+    data = bode(arm, output, band_of(modes.natural_frequency[modes.index > 0]))
+    anchor, title = f"bode-{output.replace('_', '-')}", f"From {data.input_label} to {data.label}"
+    if data.is_zero:
+        words = (f"The {data.label} is zero at every frequency: this arm's tip is pinned.",)
+        return Section(anchor=anchor, title=title, words=words)
+    picture = Picture(
+        stem=anchor,
+        title=f"{data.input_label} to {data.label}: magnitude and phase".capitalize(),
+        caption=f"{what_is_seen(data)} {what_it_means(data)}",
+        alt=alt_text(data),
+        figure=draw_bode(data),
+        data=response_table(data, f"{anchor}-data"),
+    )
+    return Section(anchor=anchor, title=title, blocks=(picture, roots_table(data, f"{anchor}-roots")))
+
+
+def what_is_seen(data: Bode) -> str:
+    """The picture in words."""
+    low, high = (plain(w, 5) for w in data.band)
+    around = f"{_many(len(data.poles), 'pole')} and {_many(len(data.zeros), 'zero')}"
+    grid = (
+        f"The exact response at {data.omega.size} frequencies from {low} to {high} rad/s, spaced geometrically around "
+        f"its {around}, so that no peak and no dip falls between two of them."
+    )
+    if data.infinite.size:
+        edges = "the top edge" if not data.vanishing.size else "the top edge, or the bottom edge where it is truly zero"
+        infinite = "Without damping every resonance is truly infinite: there the curve is broken and ends in an open "
+        return f"{grid} {infinite}triangle on {edges}."
+    if not data.resonances.size:
+        return grid
+    peaks = data.peaks[data.poles.imag > 0]
+    top = int(np.argmax(peaks))
+    highest = f"{significant(float(peaks[top]), 4)} {data.gain_unit}"
+    return f"{grid} The highest peak reaches {highest} near {significant(data.resonances[top].imag, 6)} rad/s."
+
+
+def what_it_means(data: Bode) -> str:
+    """One sentence on what the picture says about control."""
+    if not data.resonances.size:
+        return "Nothing resonates here: no pole that oscillates shows at this output."
+    turned = f"{np.ptp(data.phase):.0f} degrees over the band"
+    right = data.zeros[data.zeros.real > ON_AXIS * abs(data.zeros)]
+    if right.size:
+        count = int(np.sum(right.imag == 0) + 2 * np.sum(right.imag > 0))
+        slowest = significant(float(abs(right).min()), 4)
+        return (
+            f"{_many(count, 'zero')} in the right half-plane, the slowest at {slowest} rad/s: the phase turns by "
+            f"{turned}, and a loop closed here cannot be much faster than the slowest of them."
+        )
+    if np.ptp(data.phase) < 181:
+        return "The phase never leaves a band of 180 degrees, as for a sensor beside the motor."
+    return f"The phase turns by {turned}."
+
+
+def alt_text(data: Bode) -> str:
+    """The picture for those who cannot see it."""
+    places = ", ".join(significant(pole.imag, 4) for pole in data.resonances[:5])
+    more = " and more above" if data.resonances.size > 5 else ""
+    peaks = "infinite peaks" if data.infinite.size else "peaks"
+    where = f"{peaks} at {places} rad/s{more}" if data.resonances.size else "no peaks"
+    start = f"{significant(float(abs(data.value[0])), 3)} {data.gain_unit}"
+    return f"Bode plot of {data.input_label} to {data.label}: {where}; it begins at {start}."
+
+
+def response_table(data: Bode, stem: str) -> Table:
+    """The numbers of the picture."""
+    of = data.gain_unit
+    columns = (
+        data_column("omega_rad_s", "angular frequency", "rad/s", data.omega),
+        data_column("frequency_hz", "frequency", "Hz", data.omega / (2 * math.pi)),
+        data_column("real", "real part", of, data.value.real),
+        data_column("imaginary", "imaginary part", of, data.value.imag),
+        data_column("magnitude", "magnitude", of, abs(data.value)),
+        data_column("phase_deg", "phase", "deg", data.phase),
+    )
+    return Table(stem=stem, title=f"{data.input_label} to {data.label}", caption="", is_data=True, columns=columns)
+
+
+def roots_table(data: Bode, stem: str) -> Table:
+    """Poles, then zeros, of the upper half-plane."""
+    roots = np.r_[data.poles, data.zeros]
+    kinds = ["pole"] * data.poles.size + ["zero"] * data.zeros.size
+    gains = np.r_[data.peaks, data.dips]
+    real, hertz = roots.real + 0.0, roots.imag / (2 * math.pi)
+    ratio = -100 * real / abs(roots) + 0.0
+    magnitudes = [scientific(x, 4) for x in gains]
+    return Table(
+        stem=stem,
+        title=f"Poles and zeros, {data.input_label} to {data.label}",
+        caption=f"{completeness(data)} {ROOTS}",
+        columns=(
+            text_column("kind", "kind", kinds),
+            number_column("real_1_s", "Re s", "1/s", real, aligned(real, 8, least=4)),
+            number_column("imaginary_rad_s", "Im s", "rad/s", roots.imag, aligned(roots.imag, 8, least=7)),
+            number_column("frequency_hz", "Im s/2π", "Hz", hertz, aligned(hertz, 8, least=7)),
+            number_column("damping_percent", "damping ratio", "%", ratio, aligned(ratio, 5, least=3)),
+            number_column("magnitude", "magnitude there", unit(data.gain_unit), gains, magnitudes),
+        ),
+    )
+
+
+def completeness(data: Bode) -> str:
+    """What the list of roots holds, and how far it goes."""
+    height = f"0 ≤ Im s < {significant(data.band[1], 6)} rad/s"
+    left, right = data.width
+    width = "" if math.isinf(left) else f", {plain(left, 5)} < Re s < {plain(right, 5)} 1/s"
+    known = "counted" if math.isinf(left) else "confirmed by the winding number around the box"
+    return f"All poles and zeros that this output shows in {height}{width}, {known}; rigid-body poles at s = 0 apart."
+
+
+def _many(count: int, what: str) -> str:
+    return f"{count} {what}{'s' * (count != 1)}"

@@ -1,0 +1,85 @@
+"""Numbers as a person reads them: sensible digits, a true minus sign, powers of ten, no NaN."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable
+
+SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+SMALLEST, LARGEST = 1e-3, 1e7  # outside, powers of ten read better
+
+
+def significant(x: float, digits: int) -> str:
+    """`x` with exactly that many significant digits, e.g. 71.505682 or 1.800 × 10⁻⁹."""
+    if x == 0 or math.isinf(x):
+        return _special(x)
+    if not SMALLEST <= abs(x) < LARGEST:
+        return _power_of_ten(f"{x:.{digits - 1}e}")
+    decimals = max(0, digits - 1 - _exponent(x, digits))
+    return _signed(f"{x:.{decimals}f}")
+
+
+def plain(x: float, digits: int = 10) -> str:
+    """`x` as a person types it: no trailing zeros, e.g. 2766.7 or 6.8944 × 10¹⁰."""
+    if x == 0 or math.isinf(x):
+        return _special(x)
+    if not SMALLEST <= abs(x) < LARGEST:
+        return _power_of_ten(_bare(f"{x:.{digits - 1}e}"))
+    return _signed(_bare(f"{x:.{max(0, digits - 1 - _exponent(x, digits))}f}"))
+
+
+def aligned(values: Iterable[float], digits: int, *, least: int = 6) -> tuple[str, ...]:
+    """A column with one number of decimals: the largest has `digits` digits, the smallest at least `least`.
+
+    Where that would take more than twelve digits the column has powers of ten instead.
+    """
+    column = [float(x) for x in values]
+    finite = [abs(x) for x in column if x != 0 and math.isfinite(x)]
+    if not finite:
+        return tuple(_special(x) for x in column)
+    top, bottom = _exponent(max(finite), digits), _exponent(min(finite), least)
+    decimals = max(0, digits - 1 - top, least - 1 - bottom)
+    if top + 1 + decimals > 12 or decimals > 9 or top > 7:
+        return tuple(_special(x) if x == 0 or math.isinf(x) else scientific(x, digits) for x in column)
+    return tuple(_special(x) if x == 0 or math.isinf(x) else _signed(f"{x:.{decimals}f}") for x in column)
+
+
+def fixed(values: Iterable[float], decimals: int) -> tuple[str, ...]:
+    """A column with that many decimals; a value that rounds to zero keeps its sign off."""
+    return tuple(_signed(f"{x:.{decimals}f}") for x in values)
+
+
+def scientific(x: float, digits: int) -> str:
+    """`x` as a power of ten, e.g. 5.7456 × 10⁶."""
+    return _special(x) if x == 0 or math.isinf(x) else _power_of_ten(f"{x:.{digits - 1}e}")
+
+
+def unit(text: str) -> str:
+    """A unit with true exponents: m^2 becomes m²."""
+    return re.sub(r"\^(-?\d)", lambda power: power[1].translate(SUPERSCRIPT), text)
+
+
+def _exponent(x: float, digits: int) -> int:
+    """The power of ten of `x` once it is rounded to `digits` digits."""
+    return int(f"{x:.{digits - 1}e}".partition("e")[2])
+
+
+def _special(x: float) -> str:
+    return "0" if x == 0 else _signed("-∞" if x < 0 else "∞")
+
+
+def _signed(text: str) -> str:
+    is_zero = not text.strip("-0.")
+    return text.lstrip("-") if is_zero else text.replace("-", "−")
+
+
+def _bare(text: str) -> str:
+    """Without trailing zeros."""
+    mantissa, e, exponent = text.partition("e")
+    return (mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa) + e + exponent
+
+
+def _power_of_ten(text: str) -> str:
+    mantissa, _, exponent = text.partition("e")
+    return f"{_signed(mantissa)} × 10{str(int(exponent)).translate(SUPERSCRIPT)}"

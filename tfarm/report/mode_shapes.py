@@ -1,0 +1,130 @@
+"""Pictures of the modes: their shapes, and how far the simpler beam theories are off."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from matplotlib.ticker import FuncFormatter, MaxNLocator
+
+from tfarm.report.digits import plain, significant
+from tfarm.report.figures import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, blank, headline, style
+from tfarm.report.responses import Real
+from tfarm.spectrum import Modes
+
+POINTS = 401
+HUB = 0.06  # width of the drawn hub, as a share of the length
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shape:
+    """One mode as drawn: w(x) over its largest value, x and nodes in m."""
+
+    number: int
+    natural_frequency: float
+    x: Real
+    w: Real
+    nodes: Real
+    has_payload: bool
+
+
+def shapes_of(modes: Modes, count: int) -> tuple[Shape, ...]:
+    """The first flexible modes, each scaled to a largest displacement of one, the tip's side positive."""
+    x = np.linspace(0.0, modes.arm.link.length, POINTS)
+    payload = modes.arm.payload
+    shapes = []
+    for i, w in enumerate(modes.shape(x)):
+        if modes.index[i] == 0 or modes.index[i] > count:
+            continue
+        largest = float(abs(w).max())
+        shape = Shape(
+            number=int(modes.index[i]),
+            natural_frequency=float(modes.natural_frequency[i]),
+            x=x,
+            w=w / largest if largest > 0 else w,
+            nodes=modes.nodes[i],
+            has_payload=payload.mass > 0 or payload.inertia > 0,
+        )
+        shapes.append(shape)
+    return tuple(shapes)
+
+
+def draw_shapes(name: str, shapes: tuple[Shape, ...]) -> Figure:
+    """Small pictures, two in a row, one a mode."""
+    with style():
+        rows = math.ceil(len(shapes) / 2)
+        figure = blank(9.0, 0.7 + 1.75 * rows)
+        axes = np.atleast_1d(figure.subplots(rows, 2, sharex=True, sharey=True)).ravel()
+        for ax, shape in zip(axes, shapes, strict=False):
+            draw_shape(shape, ax=ax)
+        for ax in axes[len(shapes) :]:
+            ax.remove()
+        for ax in axes[max(0, len(shapes) - 2) : len(shapes)]:
+            ax.set_xlabel("distance from the hub, x [m]")
+            ax.tick_params(labelbottom=True)
+        figure.supylabel("displacement w(x), largest = 1 [-]", fontsize=10.0, color=INK)
+        headline(figure, f"{name}: mode shapes")
+    return figure
+
+
+def draw_shape(shape: Shape, *, ax: Axes) -> None:
+    """One mode: its line, the arm at rest, hub, payload, and the nodes with their places."""
+    length = float(shape.x[-1])
+    ax.axhline(0.0, color=GREY, lw=0.8)
+    ax.plot(shape.x, shape.w, color=BLUE, lw=1.8)
+    ax.add_patch(Rectangle((-HUB * length, -0.25), HUB * length, 0.5, fc=GREY, ec="none", zorder=3))
+    if shape.has_payload:
+        ax.plot(length, shape.w[-1], "s", ms=8.0, mfc=GREY, mec="none", zorder=3)
+    ax.plot(shape.nodes, np.zeros(len(shape.nodes)), "o", ms=5.5, mfc="white", mec=ORANGE, mew=1.3, zorder=4)
+    _place_names(shape, ax)
+    ax.set_xlim(-0.085 * length, 1.11 * length)
+    ax.set_ylim(-1.28, 1.28)
+    ax.set_yticks([-1, 0, 1])
+    w = significant(shape.natural_frequency, 7)
+    f = significant(shape.natural_frequency / (2 * math.pi), 7)
+    ax.set_title(f"Mode {shape.number}:  {w} rad/s  ({f} Hz)", fontsize=9.5)
+
+
+def _place_names(shape: Shape, ax: Axes) -> None:
+    """Where each node is [m]: at its right, on the side of the line that the curve leaves free."""
+    length = float(shape.x[-1])
+    decimals = max(0, 3 - round(math.log10(length)))
+    for node in shape.nodes:
+        slope = np.interp(node + 0.01 * length, shape.x, shape.w) - np.interp(node - 0.01 * length, shape.x, shape.w)
+        if round(float(node), decimals) > 0:
+            ax.annotate(
+                f"{node:.{decimals}f}", (node, 0.0), textcoords="offset points",
+                xytext=(4, -6 if slope > 0 else 6), va="top" if slope > 0 else "bottom", fontsize=7.5, color=ORANGE,
+            )  # fmt: skip
+
+
+def draw_differences(name: str, differences: Mapping[str, Real]) -> Figure:
+    """How far each simpler theory's frequencies lie above the Timoshenko theory's [%], mode by mode."""
+    looks = {"euler-bernoulli": (ORANGE, "s"), "rayleigh": (PURPLE, "D"), "shear": (GREEN, "o")}
+    with style():
+        figure = blank(9.0, 3.6)
+        ax = figure.subplots()
+        for theory, values in differences.items():
+            color, marker = looks[theory]
+            numbers = np.arange(1, len(values) + 1)
+            ax.plot(numbers, values, marker=marker, ms=5, lw=1.2, color=color, label=theory_name(theory))
+        if all((values > 0).all() for values in differences.values()):
+            ax.set_yscale("log")
+            ax.yaxis.set_major_formatter(FuncFormatter(lambda y, _: plain(y, 3)))
+        ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+        ax.set_xlabel("mode")
+        ax.set_ylabel("frequency above Timoshenko's [%]")
+        ax.legend(loc="upper left")
+        headline(figure, f"{name}: simpler beam theories against the Timoshenko theory")
+    return figure
+
+
+def theory_name(theory: str) -> str:
+    """As a person writes it: Euler-Bernoulli, Rayleigh, shear, Timoshenko."""
+    names = {"timoshenko": "Timoshenko", "rayleigh": "Rayleigh", "euler-bernoulli": "Euler-Bernoulli"}
+    return names.get(theory, theory)

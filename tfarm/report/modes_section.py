@@ -1,0 +1,194 @@
+"""Modes: the modal table, the shapes, the four beam theories side by side, and what each parameter does."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+import tfarm
+from tfarm.arm import Arm
+from tfarm.exact.coefficients import Theory
+from tfarm.report.digits import aligned, fixed, significant
+from tfarm.report.figures import Picture
+from tfarm.report.mode_shapes import Shape, draw_differences, draw_shapes, shapes_of, theory_name
+from tfarm.report.responses import Real
+from tfarm.report.sections import Section
+from tfarm.report.tables import Column, Table, data_column, number_column, text_column
+from tfarm.spectrum import Modes
+
+MODES, SHAPES = 10, 6
+SIMPLER: tuple[Theory, ...] = ("shear", "rayleigh", "euler-bernoulli")
+PARAMETER_NAMES = {"youngs_modulus": "Young's modulus"}
+NEGLECTED = 5e-7  # a sensitivity that never exceeds this reads as zero
+WARM, COOL = (196, 80, 10), (0, 96, 168)
+
+COMPLETE = (
+    "Free vibration of the undamped arm. The list is complete: the number of natural frequencies below any "
+    "frequency is counted, not searched for, so no mode is missing between two rows."
+)
+MODAL_TABLE = (
+    "Natural frequencies, hub participation b (hub angle of the mode), root moment of the mode and nodes. "
+    "{rigid}Modes have unit modal mass (1 kg m² of hub inertia counts as 1) and a positive tip displacement: "
+    "b² is how strongly a torque at the hub excites the mode and how well the hub angle sees it."
+)
+MODE_SHAPES = (
+    "Total displacement w(x), each mode scaled to a largest value of one; hub at the left (grey), nodes as "
+    "open circles with their distance from the hub in m. A force or a displacement sensor at a node does not "
+    "touch that mode."
+)
+FOUR_THEORIES = (
+    "The Timoshenko theory has shear and rotary inertia, the shear theory only shear, the Rayleigh theory only "
+    "rotary inertia, the Euler-Bernoulli theory neither. Over these modes Euler-Bernoulli is off by {least} % "
+    "to {most} %: what is left out makes an arm stiffer or lighter, and its frequencies too high."
+)
+DIFFERENCES = (
+    "Natural frequency of each simpler theory against Timoshenko's, in per cent, mode by mode. Where a curve "
+    "passes the accuracy you need, that theory no longer serves."
+)
+SENSITIVITIES = (
+    "Per cent of natural frequency for one per cent more of the parameter, all others held (Young's modulus "
+    "with the shear modulus held, the area with the second moment held); exact, from the energies of each "
+    "mode. Blue lowers the frequency, orange raises it: the strongest colours are the parameters worth "
+    "measuring well."
+)
+
+
+def modes_section(arm: Arm) -> Section:
+    """Everything about free vibration, at C = 0."""
+    modes = tfarm.modes(arm, count=MODES)
+    exact = _flexible(modes)
+    theories: dict[str, Real] = {t: _flexible(tfarm.modes(arm, count=MODES, theory=t)) for t in SIMPLER}
+    differences: dict[str, Real] = {theory: 100 * (simpler / exact - 1) for theory, simpler in theories.items()}
+    return Section(
+        anchor="modes",
+        title="Modes",
+        words=(COMPLETE,),
+        blocks=(
+            modal_table(modes),
+            _shapes(arm.name, shapes_of(modes, SHAPES)),
+            theories_table(exact, theories, differences),
+            _differences(arm.name, differences),
+            sensitivity_table(modes),
+        ),
+    )
+
+
+def _flexible(modes: Modes) -> Real:
+    return modes.natural_frequency[modes.index > 0]
+
+
+def modal_table(modes: Modes) -> Table:
+    """Frequencies, hub participation, modal moment and nodes."""
+    b, moment = modes.hub_participation, modes.modal_moment + 0.0
+    nodes = [", ".join(fixed(node, 4)) or "none" for node in modes.nodes]
+    at = [tuple(node.tolist()) for node in modes.nodes]
+    rigid = "Row 0 is the arm turning as a rigid body. " if modes.arm.has_rigid_mode else ""
+    return Table(
+        stem="modal-table",
+        title="Modal table",
+        caption=MODAL_TABLE.format(rigid=rigid),
+        columns=(
+            _mode_numbers("index", modes.index.tolist()),
+            _frequency("natural_frequency_rad_s", "natural frequency", "rad/s", modes.natural_frequency),
+            _frequency("natural_frequency_hz", "", "Hz", modes.natural_frequency_hz),
+            number_column("hub_participation", "hub participation b", "1/√(kg m²)", b, aligned(b, 7, least=4)),
+            number_column("modal_moment", "modal moment", "N m/√(kg m²)", moment, aligned(moment, 7, least=4)),
+            Column(key="nodes_m", title="nodes", unit="m", values=at, cells=nodes),
+        ),
+    )
+
+
+def _mode_numbers(key: str, numbers: Sequence[int]) -> Column:
+    return Column(key=key, title="mode", values=numbers, cells=[str(number) for number in numbers])
+
+
+def _frequency(key: str, title: str, of: str, values: Real, group: str = "") -> Column:
+    return number_column(key, title, of, values, aligned(values, 8, least=7), group=group)
+
+
+def _shapes(name: str, shapes: tuple[Shape, ...]) -> Picture:
+    counts = ", ".join(str(len(shape.nodes)) for shape in shapes)
+    columns = [data_column("x_m", "x", "m", shapes[0].x)]
+    columns += [data_column(f"mode_{shape.number}", f"mode {shape.number}", "", shape.w) for shape in shapes]
+    return Picture(
+        stem="mode-shapes",
+        title=f"Shapes of the first {len(shapes)} flexible modes",
+        caption=MODE_SHAPES,
+        alt=f"Mode shapes of the arm, modes 1 to {len(shapes)}; they have {counts} nodes between hub and tip.",
+        figure=draw_shapes(name, shapes),
+        data=Table(stem="mode-shapes-data", title="Mode shapes", caption="", is_data=True, columns=tuple(columns)),
+    )
+
+
+def theories_table(exact: Real, theories: Mapping[str, Real], differences: Mapping[str, Real]) -> Table:
+    """Natural frequencies by the four beam theories, and differences from the first in per cent."""
+    both = "natural frequency", "difference from Timoshenko"
+    columns = [_mode_numbers("mode", range(1, exact.size + 1))]
+    for theory, omega in {"timoshenko": exact, **theories}.items():
+        columns.append(_frequency(f"{_key(theory)}_rad_s", theory_name(theory), "rad/s", omega, both[0]))
+    for theory, percent in differences.items():
+        key, cells = f"{_key(theory)}_difference_percent", aligned(percent, 5, least=3)
+        columns.append(number_column(key, theory_name(theory), "%", percent, cells, group=both[1]))
+    worst = differences["euler-bernoulli"]
+    least, most = significant(float(worst.min()), 2), significant(float(worst.max()), 2)
+    return Table(
+        stem="theories",
+        title="Four beam theories",
+        caption=FOUR_THEORIES.format(least=least, most=most),
+        columns=tuple(columns),
+    )
+
+
+def _key(theory: str) -> str:
+    return theory.replace("-", "_")
+
+
+def _differences(name: str, differences: Mapping[str, Real]) -> Picture:
+    shown = dict(reversed(list(differences.items())))
+    words = ", ".join(f"{theory_name(theory)} {significant(float(v[-1]), 3)} %" for theory, v in shown.items())
+    columns = [_mode_numbers("mode", range(1, MODES + 1))]
+    columns += [data_column(f"{_key(t)}_difference_percent", theory_name(t), "%", v) for t, v in shown.items()]
+    return Picture(
+        stem="theory-differences",
+        title="How far the simpler theories are off",
+        caption=DIFFERENCES,
+        alt=f"Differences from the Timoshenko theory by mode; at mode {MODES}: {words}.",
+        figure=draw_differences(name, shown),
+        data=Table(
+            stem="theory-differences-data", title="Differences", caption="", is_data=True, columns=tuple(columns)
+        ),
+    )
+
+
+def sensitivity_table(modes: Modes) -> Table:
+    """Per cent of frequency per per cent of each parameter: a row a parameter, a column a mode."""
+    flexible = modes.index > 0
+    rows = {
+        PARAMETER_NAMES.get(name, name.replace("_", " ")): values[flexible] + 0.0
+        for name, values in modes.sensitivity.items()
+    }
+    shown = {name: values for name, values in rows.items() if abs(values).max() > NEGLECTED}
+    dropped = [name for name in rows if name not in shown]
+    columns = [text_column("parameter", "parameter", list(shown))]
+    for number, column in zip(modes.index[flexible], np.array(list(shown.values())).T, strict=True):
+        tints = [tint(x) for x in column]
+        columns.append(number_column(f"mode_{number}", f"mode {number}", "%/%", column, fixed(column, 3), tint=tints))
+    left_out = f" Left out, as they change no frequency here: {_list(dropped)}." if dropped else ""
+    return Table(
+        stem="sensitivities",
+        title="Sensitivity of each natural frequency",
+        caption=SENSITIVITIES + left_out,
+        columns=tuple(columns),
+    )
+
+
+def tint(x: float) -> str:
+    """Orange for a rise, blue for a fall, full at 2 %/%; light enough for dark print."""
+    strength = 0.45 * min(1.0, abs(x) / 2.0) ** 0.6
+    parts = (round(255 - strength * (255 - part)) for part in (WARM if x > 0 else COOL))
+    return "#" + "".join(f"{part:02x}" for part in parts)
+
+
+def _list(words: Sequence[str]) -> str:
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

@@ -1,0 +1,92 @@
+"""Pages from sections: HTML by templates, everything inline, nothing fetched."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup, escape
+
+import tfarm
+from tfarm.arm import Arm, load, presets, to_toml
+from tfarm.report.digits import unit
+from tfarm.report.sections import Fact, SavedSection
+
+TEMPLATES = Path(__file__).parent / "templates"
+QUESTIONS = {"bode": "Bode plots", "modes": "Modes"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Card:
+    """An arm on the index: its folder's name, a few numbers, its pages and whether there is a picture."""
+
+    name: str
+    summary: str
+    facts: Sequence[Fact]
+    pages: Sequence[tuple[str, str]]
+    picture: str
+
+
+@cache
+def _templates() -> Environment:
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.filters["symbol"] = symbol
+    return environment
+
+
+def arm_page(arm: Arm, sections: Sequence[SavedSection], only: str | None) -> str:
+    """The page of one arm, with every section or with those of one question."""
+    title = f"{arm.name}: {QUESTIONS[only].lower()}" if only else arm.name
+    return _render(
+        "arm.html", title=title, arm=arm, sections=sections, only=only, summary=summary(arm), foot=foot(arm, only)
+    )
+
+
+def index_page(cards: Sequence[Card]) -> str:
+    """The page that leads to all others."""
+    return _render("index.html", title="tfarm reports", cards=cards)
+
+
+def foot(arm: Arm, only: str | None) -> dict[str, str]:
+    """What a reader needs to make the page again: version, hash of the arm's file, command."""
+    return {"sha256": hashlib.sha256(to_toml(arm).encode()).hexdigest(), "command": command(arm, only)}
+
+
+def command(arm: Arm, only: str | None) -> str:
+    """The command that writes this page; an arm that is no preset is named by its file."""
+    is_preset = arm.name in presets() and load(arm.name) == arm
+    name = arm.name if is_preset else f"{arm.name}.toml"
+    choice = f" --only {only}" if only else ""
+    return f"tfarm report {shlex.quote(name)}{choice} --out reports"
+
+
+def summary(arm: Arm) -> str:
+    """The arm in one sentence."""
+    hub = "a locked hub" if arm.is_locked else "a free pin" if arm.hub.inertia == 0 else "a hub"
+    tip = "with a payload" if arm.payload.mass or arm.payload.inertia else "without payload"
+    damping = "damped" if arm.link.damping else "undamped"
+    return f"A flexible link on {hub}, {tip}, {damping}; Timoshenko theory, exact."
+
+
+def symbol(text: str) -> Markup:
+    """A text with true subscripts and exponents: I_h becomes I<sub>h</sub>, m^2 becomes m²."""
+    plain = unit(str(escape(text)))
+    return Markup(re.sub(r"\b([A-Za-z])_([a-z0-9])\b", r"\1<sub>\2</sub>", plain))
+
+
+def _render(template: str, **values: Any) -> str:
+    return _templates().get_template(template).render(version=tfarm.__version__, **values)

@@ -1,0 +1,40 @@
+"""The small pictures that the project's README shows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+import tfarm
+from tfarm.report.bode import draw_compared
+from tfarm.report.digits import plain
+from tfarm.report.figures import save
+from tfarm.report.mode_shapes import draw_shapes, shapes_of
+from tfarm.report.responses import band_of, bode
+
+DOTS_PER_INCH = 100
+SHOWN = 4
+
+
+def readme_pictures(out: Path) -> tuple[Path, ...]:
+    """Write bode-root-moment.png and mode-shapes.png to the folder `out`; their paths."""
+    out.mkdir(parents=True, exist_ok=True)
+    figures = {"bode-root-moment": _bode(), "mode-shapes": _shapes()}
+    for stem, figure in figures.items():
+        save(figure, out, stem, formats=("png",), dpi=DOTS_PER_INCH)
+    return tuple(out / f"{stem}.png" for stem in figures)
+
+
+def _bode() -> Figure:
+    """Torque to root moment, with and without damping."""
+    damped, undamped = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
+    modes = tfarm.modes(damped, count=7)
+    band = band_of(modes.natural_frequency[modes.index > 0])
+    labels = "exact, no damping", f"exact, damping C = {plain(damped.link.damping)} s"
+    return draw_compared(bode(undamped, "root_moment", band), bode(damped, "root_moment", band), labels)
+
+
+def _shapes() -> Figure:
+    arm = tfarm.load("sasaki2012-lab")
+    return draw_shapes(arm.name, shapes_of(tfarm.modes(arm, count=SHOWN), SHOWN))

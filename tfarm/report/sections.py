@@ -1,0 +1,84 @@
+"""What a page is made of: sections of pictures and tables, each finished and saved before the page is written."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from tfarm.report.figures import FORMATS, Picture, save
+from tfarm.report.tables import Table
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fact:
+    """One headline number, or the word for it."""
+
+    label: str
+    value: str
+    unit: str = ""
+    beside: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Section:
+    """A part of a page.  `words` are paragraphs, `items` a list; `blocks` pictures and tables in their order."""
+
+    anchor: str
+    title: str
+    words: Sequence[str] = ()
+    items: Sequence[str] = ()
+    facts: Sequence[Fact] = ()
+    blocks: Sequence[Picture | Table] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Block:
+    """A picture or table as the page refers to it, its files saved."""
+
+    stem: str
+    title: str
+    caption: str
+    table: Table | None = None
+    alt: str = ""
+    size: tuple[int, int] = (0, 0)
+    files: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SavedSection:
+    """A section without its figures: what remains to be written are words."""
+
+    section: Section
+    blocks: tuple[Block, ...]
+
+
+def save_section(section: Section, folder: Path) -> SavedSection:
+    """Every picture as SVG, PNG and PDF, every table as CSV and JSON."""
+    blocks = tuple(_save(block, folder) for block in section.blocks)
+    words = Section(
+        anchor=section.anchor,
+        title=section.title,
+        words=section.words,
+        items=section.items,
+        facts=section.facts,
+    )
+    return SavedSection(section=words, blocks=blocks)
+
+
+def _save(block: Picture | Table, folder: Path) -> Block:
+    if isinstance(block, Table):
+        files = save_table(block, folder)
+        return Block(stem=block.stem, title=block.title, caption=block.caption, table=block, files=files)
+    save(block.figure, folder, block.stem)
+    files = tuple(f"{block.stem}.{kind}" for kind in FORMATS)
+    if block.data is not None:
+        files += save_table(block.data, folder)
+    return Block(stem=block.stem, title=block.title, caption=block.caption, alt=block.alt, size=block.size, files=files)
+
+
+def save_table(table: Table, folder: Path) -> tuple[str, ...]:
+    """The table's two files."""
+    (folder / f"{table.stem}.csv").write_text(table.as_csv(), encoding="utf-8", newline="")
+    (folder / f"{table.stem}.json").write_text(table.as_json(), encoding="utf-8", newline="")
+    return f"{table.stem}.csv", f"{table.stem}.json"

@@ -1,0 +1,88 @@
+"""The arm itself, drawn: the link to scale, hub and payload as symbols with their numbers."""
+
+from __future__ import annotations
+
+import math
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, FancyArrowPatch, Polygon, Rectangle
+
+from tfarm.arm import Arm
+from tfarm.report.digits import plain, unit
+from tfarm.report.figures import BLUE, FAINT, GREY, INK, ORANGE, blank, style
+
+HUB = 0.055  # radius of the drawn hub, and half the payload's side, as shares of the length
+LOW, HIGH = -0.15, 0.16  # what is shown below and above the arm at least, as shares of its length
+LEFT, RIGHT = -0.2, 1.2
+
+
+def draw_arm(arm: Arm) -> Figure:
+    """Hub, link and payload from the side; lengths in shares of the link's."""
+    with style():
+        half = depth_of(arm) / 2
+        low, high = min(LOW, -half - 0.09), max(HIGH, half + 0.09)
+        figure = blank(9.0, 0.2 + 9.0 * (high - low) / (RIGHT - LEFT))
+        ax = figure.subplots()
+        ax.set_aspect("equal")
+        ax.set_axis_off()
+        ax.set_xlim(LEFT, RIGHT)
+        ax.set_ylim(low, high)
+        _link(arm, ax)
+        _hub(arm, ax)
+        _payload(arm, ax)
+    return figure
+
+
+def depth_of(arm: Arm) -> float:
+    """Depth over length of a rectangle of the link's radius of gyration, sqrt(12) r/L; a named shape's own."""
+    given = dict(arm.link.section.dimensions)
+    own = given.get("depth") or given.get("diameter") or given.get("outer_diameter")
+    return own / arm.link.length if own else math.sqrt(12) / arm.link.slenderness
+
+
+def _link(arm: Arm, ax: Axes) -> None:
+    depth = depth_of(arm)
+    ax.plot([-0.2, 1.2], [0, 0], color=FAINT, lw=0.8, ls=(0, (6, 3, 1, 3)), zorder=0)
+    ax.add_patch(Rectangle((0, -depth / 2), 1.0, depth, fc="#cfe0ee", ec=BLUE, lw=1.0, zorder=2))
+    below = -max(depth / 2, HUB) - 0.035
+    ax.annotate("", (0, below), (1, below), arrowprops={"arrowstyle": "<->", "color": GREY, "lw": 0.8})
+    text = f"L = {plain(arm.link.length, 6)} m,  depth {plain(depth * arm.link.length, 4)} m (to scale)"
+    ax.text(0.5, below - 0.012, text, ha="center", va="top", fontsize=9.0, color=INK)
+
+
+def _hub(arm: Arm, ax: Axes) -> None:
+    inertia = arm.hub.inertia
+    ax.add_patch(Circle((0, 0), HUB, fc="white" if inertia == 0 else "#e9e9e9", ec=INK, lw=1.2, zorder=3))
+    ax.plot(0, 0, "o", ms=3.5, color=INK, zorder=4)
+    if arm.is_locked:
+        text = "hub locked: driven by its angle"
+    else:
+        text = "free pin, no hub inertia" if inertia == 0 else f"hub  $I_h$ = {plain(inertia, 6)} {unit('kg m^2')}"
+    turn = FancyArrowPatch(
+        (0.085, -0.055), (-0.055, 0.085), connectionstyle="arc3,rad=0.75", arrowstyle="-|>", mutation_scale=11,
+        color=ORANGE, lw=1.3, zorder=4,
+    )  # fmt: skip
+    ax.add_patch(turn)
+    top = max(0.12, depth_of(arm) / 2 + 0.03)
+    ax.text(-0.07, 0.08, "θ" if arm.is_locked else "u", color=ORANGE, ha="right", va="bottom", fontsize=11)
+    ax.text(0.13, top, text, ha="left", va="bottom", fontsize=9.0, color=INK)
+
+
+def _payload(arm: Arm, ax: Axes) -> None:
+    mass, inertia = arm.payload.mass, arm.payload.inertia
+    if mass == 0 and inertia == 0:
+        text = "free tip, no payload"
+    else:
+        words = (
+            "tip pinned" if math.isinf(mass) else f"m = {plain(mass, 6)} kg",
+            "tip cannot rotate" if math.isinf(inertia) else f"$I_c$ = {plain(inertia, 6)} {unit('kg m^2')}",
+        )
+        text = "payload  " + ",  ".join(words)
+        side = max(0.03, min(HUB, depth_of(arm) * 0.75))
+        ax.add_patch(Rectangle((1 - side, -side), 2 * side, 2 * side, fc="#8c8c8c", ec=INK, lw=1.0, zorder=3))
+    if math.isinf(mass):
+        foot = ((1, 0), (0.97, -0.07), (1.03, -0.07))
+        ax.add_patch(Polygon(foot, closed=True, fc="white", ec=INK, lw=1.0, zorder=4))
+    top = max(0.12, depth_of(arm) / 2 + 0.03)
+    ax.text(1.05, top, text, ha="right", va="bottom", fontsize=9.0, color=INK)

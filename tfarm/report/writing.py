@@ -1,0 +1,223 @@
+"""From arms to a folder of pages: everything is made beside, and moved into place only when all of it is there.
+
+The work is a list of pieces, one a section of an arm's page, each independent of the others, so two processes can
+share it.  What a piece returns are words and file names; its pictures and tables are on disk already.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from functools import partial
+from multiprocessing import get_context
+from pathlib import Path
+
+from tfarm.arm import Arm, to_toml
+from tfarm.errors import ParameterError, did_you_mean
+from tfarm.report.arm_section import arm_section
+from tfarm.report.bode_section import bode_section
+from tfarm.report.card import save_card, written_cards
+from tfarm.report.modes_section import modes_section
+from tfarm.report.page import QUESTIONS, arm_page, index_page
+from tfarm.report.paper import is_from_paper, paper_section
+from tfarm.report.sections import SavedSection, Section, save_section
+
+Progress = Callable[[int, int, str], object]
+
+WORKERS = 2
+OURS = ("index.html", "README.md", "pictures", "bench.json")  # names in `out` that no arm's folder may have
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """One section of one arm's page: a name for the progress bar, and how to make it."""
+
+    name: str
+    questions: tuple[str, ...]  # the --only pages that have it; the full page has all
+    make: Callable[[Arm], Section]
+    suits: Callable[[Arm], bool] = lambda arm: True
+
+
+PIECES = (
+    Piece("the arm", ("bode", "modes"), arm_section),
+    Piece("the paper's values", (), paper_section, is_from_paper),
+    Piece("root moment", ("bode",), partial(bode_section, output="root_moment")),
+    Piece("tip displacement", ("bode",), partial(bode_section, output="tip_displacement")),
+    Piece("modes", ("modes",), modes_section),
+)
+CARD = "card"
+
+Task = tuple[int, int | str]  # which arm, which piece (or its card)
+
+
+def write(
+    arms: Sequence[Arm], out: Path, *, only: tuple[str, ...] | None = None, progress: Progress | None = None
+) -> Path:
+    """Write the report of each arm to out/<name>/ and out/index.html; the page to open first.
+
+    `only` ("bode", "modes") writes those pages alone, out/<name>/bode.html and so on.  `progress` is told (done,
+    total, what) after each piece of work.  Raises ParameterError before any work if `out` cannot be written, two
+    arms share a name or there is none.  If the work itself fails, `out` is as it was.
+    """
+    _check(arms, only)
+    out = Path(out)
+    with _beside(out, [arm.name for arm in arms]) as beside:
+        folders = [beside / str(i) for i in range(len(arms))]
+        for folder in folders:
+            folder.mkdir()
+        sections = _make_all(arms, folders, only or (), progress)
+        for arm, folder, parts in zip(arms, folders, sections, strict=True):
+            _write_pages(arm, folder, parts, only)
+        for arm, folder in zip(arms, folders, strict=True):
+            _move_into(folder, out / arm.name)
+        index = index_page(written_cards(out))
+        (beside / "index.html").write_text(index, encoding="utf-8", newline="")
+        os.replace(beside / "index.html", out / "index.html")
+    alone = len(arms) == 1 and only is not None and len(only) == 1
+    return out / arms[0].name / f"{only[0]}.html" if alone and only else out / "index.html"
+
+
+def _check(arms: Sequence[Arm], only: tuple[str, ...] | None) -> None:
+    if not arms:
+        raise ParameterError(key="arms", value=(), remedy="name at least one arm to report on")
+    for question in only or ():
+        if question not in QUESTIONS:
+            raise ParameterError(key="only", value=question, remedy=did_you_mean(str(question), QUESTIONS))
+    seen: set[str] = set()
+    for arm in arms:
+        if arm.name.casefold() in seen:
+            remedy = "two arms of this name would share one folder; give one of them another name"
+            raise ParameterError(key="name", value=arm.name, remedy=remedy)
+        if arm.name.casefold() in {name.casefold() for name in OURS}:
+            remedy = "the folder of reports has a file of this name; give the arm another name"
+            raise ParameterError(key="name", value=arm.name, remedy=remedy)
+        seen.add(arm.name.casefold())
+
+
+@contextmanager
+def _beside(out: Path, names: Sequence[str]) -> Iterator[Path]:
+    """A temporary folder in `out`, gone afterwards; what was made for it goes too if the work fails."""
+    made: list[Path] = []
+    try:
+        _make_folders(out, made)
+        beside = Path(tempfile.mkdtemp(prefix=".writing-", dir=out))
+        made.append(beside)
+        for name in names:
+            _make_folders(out / name, made)
+    except OSError as error:
+        _remove(made)
+        remedy = f"cannot be written ({error.strerror or error}); give a folder that can"
+        raise ParameterError(key="out", value=str(out), remedy=remedy) from None
+    try:
+        yield beside
+    except OSError as error:
+        remedy = f"could not be written to ({error.strerror or error}); free some space, or give another folder"
+        raise ParameterError(key="out", value=str(out), remedy=remedy) from None
+    finally:
+        shutil.rmtree(beside, ignore_errors=True)
+        _remove(made)
+
+
+def _make_folders(folder: Path, made: list[Path]) -> None:
+    """Make a folder and its parents, noting each that was not there.  Raises OSError if it cannot be written."""
+    missing = [part for part in (folder, *folder.parents) if not part.exists()]
+    for part in reversed(missing):
+        part.mkdir(exist_ok=True)
+        made.append(part)
+    if not folder.is_dir():
+        raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR))
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+
+def _remove(made: Sequence[Path]) -> None:
+    """Take back the folders that were made, last first, as far as nothing is in them."""
+    for folder in reversed(made):
+        with suppress(OSError):
+            folder.rmdir()
+
+
+def _make_all(
+    arms: Sequence[Arm], folders: Sequence[Path], only: tuple[str, ...], progress: Progress | None
+) -> list[list[SavedSection]]:
+    """The sections of each arm's page, in the order of PIECES."""
+    tasks: list[Task] = [
+        (i, j)
+        for i, arm in enumerate(arms)
+        for j, piece in enumerate(PIECES)
+        if piece.suits(arm) and (not only or set(only) & set(piece.questions))
+    ]
+    tasks += [(i, CARD) for i in range(len(arms))]
+    done: dict[Task, SavedSection | None] = {}
+    if progress is not None:
+        progress(0, len(tasks), arms[0].name)
+    for task, section in _results(arms, folders, tasks):
+        done[task] = section
+        if progress is not None:
+            progress(len(done), len(tasks), _name_of(arms, task))
+    return [
+        [s for t in sorted(t for t in tasks if t[0] == i and t[1] != CARD) if (s := done[t])] for i in range(len(arms))
+    ]
+
+
+def _results(
+    arms: Sequence[Arm], folders: Sequence[Path], tasks: Sequence[Task]
+) -> Iterator[tuple[Task, SavedSection | None]]:
+    """Each task with its result as it comes: here, or by two processes where there is more than one arm."""
+    if len(arms) == 1 or not _may_start_processes():
+        for i, piece in tasks:
+            yield (i, piece), _make(arms[i], piece, folders[i])
+        return
+    with ProcessPoolExecutor(WORKERS, mp_context=get_context("spawn")) as pool:
+        futures = {pool.submit(_make, arms[i], piece, folders[i]): (i, piece) for i, piece in tasks}
+        try:
+            for future in as_completed(futures):
+                yield futures[future], future.result()
+        except BaseException:
+            pool.shutdown(wait=True, cancel_futures=True)
+            raise
+
+
+def _may_start_processes() -> bool:
+    """A new process runs the main script again: not where that is a plain script, which may have no guard."""
+    main = sys.modules.get("__main__")
+    file = getattr(main, "__file__", None)
+    return file is None or getattr(main, "__spec__", None) is not None or not str(file).endswith(".py")
+
+
+def _make(arm: Arm, piece: int | str, folder: Path) -> SavedSection | None:
+    if isinstance(piece, str):
+        save_card(arm, folder)
+        return None
+    return save_section(PIECES[piece].make(arm), folder)
+
+
+def _name_of(arms: Sequence[Arm], task: Task) -> str:
+    piece = task[1]
+    return f"{arms[task[0]].name}: {piece if isinstance(piece, str) else PIECES[piece].name}"
+
+
+def _write_pages(arm: Arm, folder: Path, sections: Sequence[SavedSection], only: tuple[str, ...] | None) -> None:
+    """The arm's file and its page, or the page of each question asked."""
+    (folder / "arm.toml").write_text(to_toml(arm), encoding="utf-8", newline="")
+    for question in only or (None,):
+        wanted = [s for s in sections if question is None or _answers(s.section.anchor, question)]
+        page = arm_page(arm, wanted, question)
+        (folder / f"{question or 'index'}.html").write_text(page, encoding="utf-8", newline="")
+
+
+def _answers(anchor: str, question: str) -> bool:
+    return anchor == "arm" or anchor.startswith(question)
+
+
+def _move_into(made: Path, folder: Path) -> None:
+    """Every file replaced in one step each, pages last, so that a page never names a file that is not there."""
+    for file in sorted(made.iterdir(), key=lambda file: (file.suffix == ".html", file.name)):
+        os.replace(file, folder / file.name)
