@@ -1,0 +1,44 @@
+"""Measure speed, memory and accuracy, beside other packages: `make bench`.
+
+Nothing here is a test: times depend on the machine, so they are printed as ratios and medians, and kept in
+reports/bench.json.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from rich.console import Console
+
+from . import elements, memory, responses, spectra
+from .rows import Row, keep, show
+
+
+def measure() -> Iterator[Row]:
+    """All rows, group by group; memory first, while this process is small."""
+    yield memory.memory_row()
+    yield from responses.response_rows()
+    yield from responses.mpmath_rows()
+    yield from elements.response_rows()
+    yield from spectra.modes_rows()
+    yield from elements.modes_rows()
+    yield spectra.cxroots_row()
+
+
+def main(path: Path) -> None:
+    """Measure, print, keep."""
+    console, rows = Console(width=None if sys.stdout.isatty() else 150), []
+    with Console(stderr=True).status("measuring") as status:
+        for row in measure():
+            rows.append(row)
+            status.update(f"measured {row.what}")
+    show(rows, console)
+    keep(rows, path)
+    missed = [row.what for row in rows if row.target and not row.target.met]
+    console.print(f"targets missed: {', '.join(missed) or 'none'}; kept in {path}", soft_wrap=True, highlight=False)
+
+
+if __name__ == "__main__":
+    main(Path(*sys.argv[1:2] or ["reports/bench.json"]))

@@ -1,0 +1,140 @@
+"""The same arm by finite elements (scikit-fem): deflection of degree p, rotation of degree p - 1, so that w' - psi does not lock."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import skfem
+from numpy.typing import NDArray
+from scipy.sparse.linalg import eigsh, splu
+
+import tfarm
+from tfarm import Arm
+
+from . import responses, spectra
+from .reference import OUTPUTS, Complex, ExactResponse, frequency_errors
+from .rows import Row
+from .timing import interleaved
+
+MODES = 100
+MESHES = ((1000, 2), (60, 8))  # elements, degree: the textbook's choice, and the best of a dozen tried
+
+
+@dataclass(frozen=True, slots=True)
+class Elements:
+    """Matrices of bending, shear and mass with w(0) = 0 taken out; entries of the hub angle and the tip displacement."""
+
+    bending: Any
+    shear: Any
+    mass: Any
+    hub: int
+    tip: int
+
+
+def assemble(arm: Arm, elements: int, degree: int) -> Elements:
+    """The arm on equal elements: link by scikit-fem's forms, hub and payload as lumped inertias."""
+    link = arm.link
+    mesh = skfem.MeshLine(np.linspace(0.0, link.length, elements + 1))
+    pair = _pair(degree)
+    basis = skfem.Basis(mesh, pair[0] * pair[1], intorder=2 * degree)
+    bending = skfem.BilinearForm(lambda w, psi, v, phi, _: link.EI * psi.grad[0] * phi.grad[0])
+    shear = skfem.BilinearForm(lambda w, psi, v, phi, _: link.kGA * (w.grad[0] - psi) * (v.grad[0] - phi))
+    inertia = skfem.BilinearForm(lambda w, psi, v, phi, _: link.rhoA * w * v + link.rhoI * psi * phi)
+    root, tip = (basis.get_dofs(lambda x, at=at: x[0] == at).nodal for at in (0.0, link.length))
+    mass = inertia.assemble(basis).tolil()
+    for entry, body in (
+        (root["u^2"], arm.hub.inertia),
+        (tip["u^1"], arm.payload.mass),
+        (tip["u^2"], arm.payload.inertia),
+    ):
+        mass[entry[0], entry[0]] += body
+    free = np.delete(np.arange(basis.N), root["u^1"])
+    parts = (part.tocsc()[free][:, free] for part in (bending.assemble(basis), shear.assemble(basis), mass))
+    return Elements(*parts, *(int(np.searchsorted(free, entry[0])) for entry in (root["u^2"], tip["u^1"])))
+
+
+def _pair(degree: int) -> tuple[skfem.Element, skfem.Element]:
+    if degree == 2:
+        return skfem.ElementLineP2(), skfem.ElementLineP1()
+    return skfem.ElementLinePp(degree), skfem.ElementLinePp(degree - 1)
+
+
+def modes(arm: Arm, elements: int, degree: int) -> tuple[Elements, NDArray[np.float64], NDArray[np.float64]]:
+    """The rigid-body mode and the first hundred flexible ones: squared frequencies and vectors of unit modal mass."""
+    model = assemble(arm, elements, degree)
+    square, vectors = eigsh(model.bending + model.shear, MODES + 1, model.mass, sigma=-1e3)
+    square[0] = 0.0  # known, and else 1e-8 of rounding
+    return model, square, vectors
+
+
+def modal_sum(arm: Arm, s: Complex, elements: int, degree: int) -> Complex:
+    """Three outputs from a hundred modes and the rigid body; C = 0.  The moment is that of the hub's balance."""
+    model, square, vectors = modes(arm, elements, degree)
+    over = 1 / (square[:, None] + s**2)
+    angle, tip = ((vectors[entry] * vectors[model.hub]) @ over for entry in (model.hub, model.tip))
+    return np.array([angle, arm.hub.inertia * s**2 * angle - 1, tip])
+
+
+def direct(arm: Arm, s: Complex, elements: int, degree: int) -> Complex:
+    """Three outputs by one sparse factorisation a point."""
+    model = assemble(arm, elements, degree)
+    C, torque = arm.link.damping, np.zeros(model.mass.shape[0], complex)
+    torque[model.hub] = 1.0
+    values = np.empty((3, s.size), complex)
+    for i, each in enumerate(s):
+        motion = splu((1 + C * each) * model.bending + model.shear + each**2 * model.mass).solve(torque)
+        angle = motion[model.hub]
+        values[:, i] = angle, (arm.hub.inertia * each**2 * angle - 1) / (1 + C * each), motion[model.tip]
+    return values
+
+
+def modes_rows() -> Iterator[Row]:
+    """A hundred modes by shift and invert, beside tfarm's; assembly included."""
+    arm = tfarm.load("sasaki2012")
+    for elements, degree in MESHES:
+        times = interleaved(
+            {"tfarm": lambda: tfarm.modes(arm, MODES).natural_frequency,
+             "elements": lambda size=(elements, degree): modes(arm, *size)}, 5,
+        )  # fmt: skip
+        found = np.sqrt(modes(arm, elements, degree)[1][1:])
+        errors = _against_tfarm(arm, found)
+        yield Row(
+            group=spectra.GROUP, what=f"scikit-fem, {_mesh(elements, degree)}: sasaki2012", n=MODES, each="mode",
+            seconds=times.median("elements") / MODES, ratio=times.ratio("elements", "tfarm"), to="tfarm",
+            error=errors.max(), note=f"scikit-fem, {_mesh(elements, degree)}: error {errors[0]:.0e} in the first mode, "
+            f"{errors[:10].max():.0e} in the first ten.",
+        )  # fmt: skip
+
+
+def _against_tfarm(arm: Arm, found: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Errors against tfarm's frequencies, once these are known to be right to rounding."""
+    exact = tfarm.modes(arm, MODES).natural_frequency[1:]
+    assert frequency_errors(arm, exact).max() < 1e-14
+    return abs(found - exact) / exact
+
+
+def response_rows() -> Iterator[Row]:
+    """A thousand points: a modal sum at C = 0, and sparse solves at C > 0 (there modes do not diagonalise the damping)."""
+    s = 1j * np.geomspace(0.1, 1e4, 1000)
+    some = np.linspace(0, s.size - 1, responses.CHECKED).astype(int)
+    best = MESHES[-1]
+    for what, name, solve, rounds in (
+        ("modal sum", "sasaki2012", modal_sum, 5),
+        ("sparse solves", "sasaki2012-lab", direct, 2),
+    ):
+        arm = tfarm.load(name)
+        G = tfarm.transfer(arm, list(OUTPUTS))
+        calls = {"tfarm": lambda G=G: G(s), "elements": lambda arm=arm, solve=solve: solve(arm, s, *best)}
+        times = interleaved(calls, rounds)
+        error = ExactResponse(arm, s[some]).error(solve(arm, s[some], *best))
+        yield Row(
+            group=responses.GROUP, what=f"scikit-fem, {_mesh(*best)}, {what}: {name}, log grid", n=s.size, each="point",
+            seconds=times.median("elements") / s.size, ratio=times.ratio("elements", "tfarm"), to="tfarm", error=error,
+        )  # fmt: skip
+
+
+def _mesh(elements: int, degree: int) -> str:
+    return f"{elements} elements of degree {degree}/{degree - 1}"

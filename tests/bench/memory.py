@@ -1,0 +1,61 @@
+"""Peak memory of ten million frequencies, in a process of its own."""
+
+from __future__ import annotations
+
+import json
+import resource
+import subprocess
+import sys
+import time
+
+from .rows import Row, Target
+
+GROUP = "Memory"
+POINTS = 10_000_000
+LIMIT = 200.0  # MB
+
+
+def memory_row() -> Row:
+    """Three outputs at 1e7 frequencies: what the process needed at its peak, less its input and its result.
+
+    The interpreter and every library it has loaded count as "beyond", so nothing is hidden in a base line.
+    To be called early: a child's peak starts from its parent's.
+    """
+    run = subprocess.run([sys.executable, "-m", __name__], check=True, capture_output=True, text=True)
+    used = json.loads(run.stdout)
+    note = (
+        f"Peak {used['peak']:.0f} MB = input s {used['input']:.0f} MB + result {used['result']:.0f} MB + beyond {used['beyond']:.0f} MB, "
+        f"of which {used['idle']:.0f} MB were in use before: Python, the libraries and the compiled kernel."
+    )
+    return Row(
+        group=GROUP, what="tfarm: sasaki2012, three outputs, peak beyond input and result", n=POINTS, each="point",
+        seconds=used["seconds"] / POINTS, target=Target(measured=used["beyond"], limit=LIMIT, unit="MB"), note=note,
+    )  # fmt: skip
+
+
+def _measure() -> dict[str, float]:
+    """Sizes in MB (1e6 bytes) and the seconds of the one call."""
+    import numpy as np
+
+    import tfarm
+
+    from .reference import OUTPUTS
+
+    G = tfarm.transfer(tfarm.load("sasaki2012"), list(OUTPUTS))
+    G(1j * np.geomspace(0.1, 1e4, 1000))
+    idle = _peak()
+    s = 1j * np.geomspace(0.1, 1e4, POINTS)
+    start = time.perf_counter()
+    result = G(s)
+    seconds = time.perf_counter() - start
+    sizes = {"peak": _peak(), "input": s.nbytes / 1e6, "result": result.nbytes / 1e6, "idle": idle}
+    return {**sizes, "beyond": sizes["peak"] - sizes["input"] - sizes["result"], "seconds": seconds}
+
+
+def _peak() -> float:
+    unit = 1.0 if sys.platform == "darwin" else 1024.0
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e6
+
+
+if __name__ == "__main__":
+    sys.stdout.write(json.dumps(_measure()))

@@ -1,0 +1,38 @@
+"""Times that survive a busy machine: candidates take turns in one process, and medians are compared."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True)
+class Times:
+    """Seconds a call of each candidate, one entry a round."""
+
+    rounds: dict[str, NDArray[np.float64]]
+
+    def median(self, name: str) -> float:
+        """Seconds of the middle round."""
+        return float(np.median(self.rounds[name]))
+
+    def ratio(self, name: str, to: str) -> float:
+        """The median of the ratios of neighbours: what slowed one round down slowed both."""
+        return float(np.median(self.rounds[name] / self.rounds[to]))
+
+
+def interleaved(candidates: Mapping[str, Callable[[], object]], rounds: int) -> Times:
+    """Call each candidate once a round, in turn, after one call each that does not count."""
+    for call in candidates.values():
+        call()
+    seconds: dict[str, list[float]] = {name: [] for name in candidates}
+    for _ in range(rounds):
+        for name, call in candidates.items():
+            start = time.perf_counter()
+            call()
+            seconds[name].append(time.perf_counter() - start)
+    return Times({name: np.array(each) for name, each in seconds.items()})

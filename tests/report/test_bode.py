@@ -1,0 +1,95 @@
+"""What is drawn is what was computed."""
+
+import numpy as np
+import pytest
+
+import tfarm
+from tfarm.report.bode import broken, draw_bode, magnitude, magnitude_limits, phase
+from tfarm.report.figures import blank, style
+from tfarm.report.responses import band_of, bode
+
+
+@pytest.fixture(scope="module")
+def data():
+    arm = tfarm.load("sasaki2012")
+    return bode(arm, "root_moment", band_of(tfarm.modes(arm, count=5).natural_frequency[1:]))
+
+
+@pytest.fixture
+def ax():
+    with style():
+        yield blank(6, 4).subplots()
+
+
+def line(ax, label):
+    return next(line for line in ax.get_lines() if line.get_label() == label)
+
+
+def test_the_curve_is_broken_at_every_infinity_and_runs_off_the_picture(data, ax):
+    magnitude(data, ax=ax)
+    x, y = line(ax, "flexible arm, exact").get_data()
+    gaps = np.flatnonzero(np.isnan(x))
+    assert gaps.size == data.infinite.size + data.vanishing.size
+    for i in gaps:
+        assert x[i - 1] == x[i + 1]
+        assert y[i - 1] == y[i + 1]
+        is_infinite = x[i - 1] in data.infinite
+        assert y[i - 1] > ax.get_ylim()[1] if is_infinite else y[i - 1] < ax.get_ylim()[0]
+    drawn = ~np.isnan(x) & ~np.isin(x, np.r_[data.infinite, data.vanishing])
+    assert np.array_equal(x[drawn], data.omega)
+    assert np.array_equal(y[drawn], abs(data.value))
+
+
+def test_open_triangles_sit_on_the_edges(data, ax):
+    magnitude(data, ax=ax)
+    for label, roots, height in (("infinite", data.infinite, 1.0), ("zero", data.vanishing, 0.0)):
+        marks = next(line for line in ax.get_lines() if str(line.get_label()).startswith(label))
+        assert np.array_equal(marks.get_xdata(), roots)
+        assert set(marks.get_ydata()) == {height}
+        assert marks.get_markerfacecolor() == "white"
+
+
+def test_units_are_in_the_labels_and_hertz_above(data, ax):
+    magnitude(data, ax=ax)
+    assert "[N m/(N m)]" in ax.get_ylabel()
+    assert "[rad/s]" in ax.get_xlabel()
+    (hertz,) = ax.child_axes
+    assert "[Hz]" in hertz.get_xlabel()
+    ax.figure.draw_without_rendering()
+    assert np.array(hertz.get_xlim()) * 2 * np.pi == pytest.approx(ax.get_xlim())
+
+
+def test_everything_finite_is_inside_the_picture():
+    damped = tfarm.load("sasaki2012-lab")
+    shown = bode(damped, "root_moment", (1.0, 300.0))
+    low, high = magnitude_limits(shown)
+    assert low < abs(shown.value).min()
+    assert abs(shown.value).max() < high
+
+
+def test_the_phase_steps_at_every_root(data, ax):
+    phase(data, ax=ax)
+    assert "[deg]" in ax.get_ylabel()
+    x, y = ax.get_lines()[-1].get_data()
+    assert np.array_equal(y[~np.isnan(y)], data.phase)
+    assert np.isnan(x).sum() == data.infinite.size + data.vanishing.size
+
+
+def test_breaking_a_curve_keeps_every_point_in_order():
+    x, y = broken(np.array([1.0, 2, 3]), np.array([5.0, 6, 7]), np.array([2.7, 2.5]), np.array([9.0, 8]))
+    assert x == pytest.approx([1, 2, 2.5, np.nan, 2.5, 2.7, np.nan, 2.7, 3], nan_ok=True)
+    assert y == pytest.approx([5, 6, 8, np.nan, 8, 9, np.nan, 9, 7], nan_ok=True)
+
+
+def test_no_label_is_clipped_and_none_overlap(data):
+    figure = draw_bode(data)
+    figure.draw_without_rendering()
+    renderer = figure.canvas.get_renderer()
+    upper = figure.axes[0]
+    texts = [t for t in (*upper.texts, upper.yaxis.label, figure._suptitle, figure.axes[1].xaxis.label) if t.get_text()]
+    boxes = [t.get_window_extent(renderer) for t in texts]
+    for i, box in enumerate(boxes):
+        assert figure.bbox.x0 <= box.x0
+        assert box.x1 <= figure.bbox.x1
+        assert box.y1 <= figure.bbox.y1
+        assert not any(box.overlaps(other) for other in boxes[i + 1 :])

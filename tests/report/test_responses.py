@@ -1,0 +1,128 @@
+"""The data of a Bode plot: no peak and no dip between two points, and a phase that is the limit of small damping."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize_scalar
+
+import tfarm
+from tfarm.report.responses import PER_DECADE, band_of, bode, refined_grid, without_cancelled
+
+UNDAMPED = tfarm.load("sasaki2012")
+STOCKY = tfarm.load("stocky-steel")
+
+
+def damped(C, arm=UNDAMPED):
+    return replace(arm, link=replace(arm.link, damping=C))
+
+
+def response(arm, output, count=7):
+    modes = tfarm.modes(arm, count=count)
+    return bode(arm, output, band_of(modes.natural_frequency[modes.index > 0]))
+
+
+def extreme_near(G, root, sign):
+    """The largest (sign 1) or smallest (sign -1) |G| within three half-widths of a root, by a fine local search."""
+    found = minimize_scalar(
+        lambda t: -sign * math.log(abs(G(1j * (root.imag + t * abs(root.real))))),
+        bounds=(-3, 3),
+        method="bounded",
+        options={"xatol": 1e-6},
+    )
+    return math.exp(-sign * found.fun)
+
+
+@pytest.mark.parametrize(
+    ("arm", "output", "C"),
+    [
+        (UNDAMPED, "root_moment", 1e-9),
+        (UNDAMPED, "tip_displacement", 1e-6),
+        (replace(UNDAMPED, hub=tfarm.Hub(inertia=math.inf)), "root_moment", 1e-5),
+        (STOCKY, "tip_displacement", 1e-7),
+    ],
+)
+def test_no_peak_or_dip_falls_between_two_points(arm, output, C):
+    data = response(damped(C, arm), output, count=5)
+    G = tfarm.transfer(data.arm, output)
+    oscillating = data.zeros[data.zeros.imag > 1e-3 * abs(data.zeros)]
+    for root, sign in [*((p, 1) for p in data.resonances), *((z, -1) for z in oscillating)]:
+        near = abs(data.omega - root.imag) <= 3 * abs(root.real)
+        best = (abs(data.value[near]) ** sign).max() ** sign
+        assert best == pytest.approx(extreme_near(G, root, sign), rel=3e-3)
+    assert data.resonances.size >= 4
+
+
+def test_the_grid_is_dense_away_from_roots_and_holds_none_on_the_axis():
+    data = response(UNDAMPED, "root_moment")
+    step = np.diff(np.log10(data.omega))
+    assert (step > 0).all()
+    assert step.max() <= 1.0001 / PER_DECADE
+    for root in (*data.infinite, *data.vanishing):
+        gap = abs(data.omega / root - 1)
+        assert 1e-9 < gap.min() < 2e-6
+
+
+def test_the_grid_keeps_to_its_band():
+    grid = refined_grid((1.0, 10.0), np.array([10.0j, -0.01 + 9.9999j, 1.0j, -3.0 + 0j]))
+    assert grid[0] >= 1.0
+    assert grid[-1] <= 10.0
+
+
+def test_no_point_of_the_grid_is_a_root_on_the_axis():
+    band = (1.0, 10.0)
+    even = refined_grid(band, np.empty(0, complex))
+    grid = refined_grid(band, 1j * even[[3, 40]])
+    assert not np.isin(even[[3, 40]], grid).any()
+    assert np.isin(even[[2, 4, 39, 41]], grid).all()
+
+
+@pytest.mark.parametrize("arm", [UNDAMPED, STOCKY], ids=lambda arm: arm.name)
+@pytest.mark.parametrize("output", ["root_moment", "tip_displacement"])
+def test_the_counted_phase_is_the_limit_of_small_damping(arm, output):
+    """A road the code does not take: G at s = epsilon + i omega, unwrapped on a grid that resolves epsilon."""
+    data = response(arm, output)
+    epsilon = 1e-4 * data.band[0]
+    shifted = [root - epsilon for root in (*data.poles, *data.zeros)]
+    omega = refined_grid(data.band, np.array(shifted))
+    phase = np.degrees(np.unwrap(np.angle(tfarm.transfer(arm, output)(epsilon + 1j * omega))))
+    phase -= 360 * round((phase[0] - data.phase[0]) / 360)
+    away = np.array([min(abs(w - r) for r in (*data.infinite, *data.vanishing)) > 100 * epsilon for w in data.omega])
+    limit = np.interp(data.omega[away], omega, phase)
+    assert abs(limit - data.phase[away]).max() < 2.0
+
+
+def test_real_responses_have_a_phase_of_whole_half_turns():
+    data = response(STOCKY, "tip_displacement")
+    assert np.array_equal(data.phase % 180, np.zeros(data.phase.size))
+    assert np.array_equal(np.sign(data.value.real), np.where(data.phase % 360 == 0, 1.0, -1.0))
+
+
+def test_a_pole_and_a_zero_that_coincide_cancel():
+    poles, zeros = without_cancelled(np.array([1j, 2j, 2j]), np.array([2j, 3j]))
+    assert poles.tolist() == [1j, 2j]
+    assert zeros.tolist() == [3j]
+
+
+def test_with_a_free_pin_the_gauge_reads_the_torque():
+    data = response(replace(UNDAMPED, hub=tfarm.Hub(inertia=0.0)), "root_moment")
+    assert data.poles.size == data.zeros.size == 0
+    assert abs(data.value + 1).max() < 1e-12
+
+
+def test_a_pinned_tip_does_not_move():
+    assert response(replace(UNDAMPED, payload=tfarm.Payload(mass=math.inf)), "tip_displacement").is_zero
+
+
+def test_the_rigid_arm_is_the_limit_at_low_frequency():
+    for output in ("root_moment", "tip_displacement"):
+        data = response(UNDAMPED, output)
+        assert data.rigid[0] == pytest.approx(data.value[0], rel=0.01)
+
+
+def test_peaks_are_infinite_without_damping_and_dips_zero():
+    data = response(UNDAMPED, "root_moment")
+    assert np.isinf(data.peaks).all()
+    assert not data.dips.any()
+    assert np.array_equal(data.infinite, tfarm.modes(UNDAMPED, count=6).natural_frequency[1:])

@@ -1,0 +1,370 @@
+"""The pages as a reader gets them: complete, the same on every run, and all or nothing."""
+
+import csv
+import hashlib
+import json
+import math
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote
+
+import pytest
+
+import tfarm
+from tfarm.arm import to_toml
+from tfarm.report import readme_pictures, write, writing
+from tfarm.report.paper import is_from_paper, paper_section
+
+ATTACK = "<script>alert(1)</script> & <b>bold</b>, I_h in kg m^2"
+NAME = "Ärm & co's #1 $x$ 100%"
+ARM = replace(tfarm.load("stocky-steel"), name=NAME, assumptions=(ATTACK, "second assumption"))
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory):
+    """A full report on one arm."""
+    out = tmp_path_factory.mktemp("reports")
+    assert write([ARM], out) == out / "index.html"
+    return out
+
+
+def files_of(folder):
+    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+class Links(HTMLParser):
+    """Every href, src, id and tag of a page."""
+
+    def __init__(self, page):
+        super().__init__()
+        self.targets, self.ids, self.tags, self.alts = [], [], set(), []
+        self.feed(page.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.add(tag)
+        for key, value in attrs:
+            if key in ("href", "src", "srcset", "action", "data"):
+                self.targets.append(value)
+            elif key == "id":
+                self.ids.append(value)
+        if tag == "img":
+            self.alts.append(dict(attrs).get("alt"))
+
+
+# ------------------------------------------------------------ the same bytes
+
+
+def test_another_process_with_other_hashes_writes_the_same_bytes(pages, tmp_path):
+    (tmp_path / "arm.toml").write_text(to_toml(ARM), encoding="utf-8")
+    code = (
+        "import sys, tfarm; from pathlib import Path; from tfarm.report import write;"
+        "write([tfarm.load(sys.argv[1])], Path(sys.argv[2])); print('matplotlib.pyplot' in sys.modules)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(tmp_path / "arm.toml"), str(tmp_path / "out")],
+        env={**os.environ, "PYTHONHASHSEED": "12345", "TZ": "Asia/Tokyo"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert (done.stdout.strip(), done.stderr) == ("False", "")
+    assert files_of(tmp_path / "out") == files_of(pages)
+
+
+def test_two_processes_write_what_one_does(pages, tmp_path):
+    told = []
+    other = replace(ARM, name="other")
+    page = write([ARM, other], tmp_path, only=("modes",), progress=lambda *what: told.append(what))
+    assert page == tmp_path / "index.html"
+    alone = files_of(pages / NAME)
+    for name, content in files_of(tmp_path / NAME).items():
+        assert name == "modes.html" or content == alone[name], name
+    text = (tmp_path / "other" / "modes.html").read_text(encoding="utf-8")
+    assert "Modal table" in text
+    assert "Bode" not in text
+    assert "second assumption" in text
+    assert {"other/modes.html", "other/card.svg"} <= set(Links(tmp_path / "index.html").targets)
+    assert [done for done, _, _ in told] == list(range(told[0][1] + 1))
+    assert told[-1][0] == told[-1][1]
+
+
+# ------------------------------------------------------------ pages
+
+
+def test_every_link_leads_somewhere_and_none_leaves_the_disk(pages):
+    for page in pages.rglob("*.html"):
+        links = Links(page)
+        for target in links.targets:
+            assert ":" not in target.replace("%3A", ""), target
+            assert not target.startswith("//")
+            path, _, anchor = target.partition("#")
+            file = page.parent / unquote(path) if path else page
+            assert file.resolve().is_file(), target
+            assert not anchor or anchor in Links(file).ids
+        assert len(set(links.ids)) == len(links.ids)
+        assert not links.tags & {"script", "link", "iframe", "object", "b"}
+        text = page.read_text(encoding="utf-8")
+        assert "http" not in text
+        assert "@import" not in text
+        assert "url(" not in text
+
+
+def test_every_picture_has_three_formats_and_words(pages):
+    links = Links(pages / NAME / "index.html")
+    pictures = [target for target in links.targets if target.endswith(".svg")]
+    assert len(set(pictures)) >= 5
+    for picture in pictures:
+        assert {picture, picture[:-3] + "png", picture[:-3] + "pdf"} <= set(links.targets)
+    assert all(alt and len(alt) > 30 for alt in links.alts)
+
+
+def test_no_file_is_left_unlinked_or_half_written(pages):
+    linked = {unquote(target) for target in Links(pages / NAME / "index.html").targets}
+    for file in (pages / NAME).iterdir():
+        assert file.name in linked or file.name in {"index.html", "card.json", "card.svg"}
+        assert file.stat().st_size > 100
+    assert sorted(p.name for p in pages.iterdir()) == ["index.html", NAME]
+
+
+def test_assumptions_are_text_and_nothing_else(pages):
+    page = (pages / NAME / "index.html").read_text(encoding="utf-8")
+    assert "<script" not in page
+    assert "&lt;script&gt;alert(1)&lt;/script&gt; &amp; &lt;b&gt;bold&lt;/b&gt;, I<sub>h</sub> in kg m²" in page
+    assert "second assumption" in page
+    assert "&amp; co&#39;s #1 $x$ 100%" in page
+
+
+def test_the_foot_tells_how_to_write_the_page_again(pages):
+    page = (pages / NAME / "index.html").read_text(encoding="utf-8")
+    toml = (pages / NAME / "arm.toml").read_bytes()
+    assert hashlib.sha256(toml).hexdigest() in page
+    assert tfarm.load(pages / NAME / "arm.toml") == ARM
+    assert f"tfarm {tfarm.__version__}" in page
+    assert "--out reports" in page
+
+
+# ------------------------------------------------------------ tables
+
+
+def tables(pages, stem):
+    """The rows of a table's CSV and JSON file."""
+    with open(pages / NAME / f"{stem}.csv", encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    return rows, json.loads((pages / NAME / f"{stem}.json").read_text(encoding="utf-8"))["rows"]
+
+
+def from_csv(text):
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+def test_csv_and_json_hold_the_same_numbers(pages):
+    stems = {p.stem for p in (pages / NAME).glob("*.csv")}
+    assert len(stems) >= 10
+    for stem in stems:
+        rows, records = tables(pages, stem)
+        assert len(rows) == len(records) > 0
+        for row, record in zip(rows, records, strict=True):
+            assert list(row) == list(record)
+            for key, value in record.items():
+                if isinstance(value, list):
+                    assert [float(part) for part in row[key].split()] == value
+                else:
+                    assert from_csv(row[key]) == (from_csv(value) if isinstance(value, str) else value)
+        assert "nan" not in (pages / NAME / f"{stem}.json").read_text(encoding="utf-8").lower().replace("tion", "")
+
+
+def test_the_modal_table_is_the_api_to_the_last_bit(pages):
+    _, records = tables(pages, "modal-table")
+    modes = tfarm.modes(ARM, count=10)
+    assert [r["index"] for r in records] == list(range(11))
+    assert [r["natural_frequency_rad_s"] for r in records] == modes.natural_frequency.tolist()
+    assert [r["natural_frequency_hz"] for r in records] == modes.natural_frequency_hz.tolist()
+    assert [r["hub_participation"] for r in records] == modes.hub_participation.tolist()
+    assert [r["modal_moment"] for r in records] == modes.modal_moment.tolist()
+    assert [r["nodes_m"] for r in records] == [nodes.tolist() for nodes in modes.nodes]
+
+
+def test_the_theories_and_sensitivities_are_the_api_too(pages):
+    _, records = tables(pages, "theories")
+    for theory in ("shear", "rayleigh", "euler-bernoulli"):
+        key = theory.replace("-", "_")
+        omega = tfarm.modes(ARM, count=10, theory=theory).natural_frequency[1:]
+        assert [r[f"{key}_rad_s"] for r in records] == omega.tolist()
+        percent = [100 * (r[f"{key}_rad_s"] / r["timoshenko_rad_s"] - 1) for r in records]
+        assert [r[f"{key}_difference_percent"] for r in records] == pytest.approx(percent, rel=1e-12)
+    _, records = tables(pages, "sensitivities")
+    sensitivity = tfarm.modes(ARM, count=10).sensitivity
+    named = {r["parameter"].replace("'", "").replace(" ", "_").lower(): r for r in records}
+    assert set(named) == set(sensitivity)
+    for name, record in named.items():
+        assert [record[f"mode_{i}"] for i in range(1, 11)] == (sensitivity[name][1:] + 0.0).tolist()
+
+
+def test_the_responses_are_the_api_too(pages):
+    for output in ("root_moment", "tip_displacement"):
+        _, records = tables(pages, f"bode-{output.replace('_', '-')}-data")
+        s = [1j * r["omega_rad_s"] for r in records]
+        values = tfarm.transfer(ARM, output)(s)
+        assert [r["real"] for r in records] == values.real.tolist()
+        assert [r["imaginary"] for r in records] == values.imag.tolist()
+    _, roots = tables(pages, "bode-root-moment-roots")
+    assert {r["magnitude"] for r in roots if r["kind"] == "pole"} == {"inf"}
+
+
+def test_parameters_that_change_nothing_are_left_out_with_a_word():
+    from tfarm.report.modes_section import sensitivity_table
+
+    table = sensitivity_table(tfarm.modes(tfarm.load("sasaki2012"), count=3))
+    assert not any("payload" in name for name in table.columns[0].values)
+    assert (
+        "Left out, as one per cent more of it changes no frequency here: payload mass and payload inertia."
+        in table.caption
+    )
+
+
+def test_the_paper_is_corrected_where_the_arm_is_its_own():
+    assert not is_from_paper(ARM)
+    for name, density in (("sasaki2012", "2766.7 kg/m³"), ("sasaki2012-as-printed", "2.7667 kg/m³")):
+        arm = tfarm.load(name)
+        assert is_from_paper(arm)
+        (table,) = paper_section(arm).blocks
+        rows = list(zip(*(column.values for column in table.columns), strict=True))
+        (row,) = (row for row in rows if row[1] == "ρ")
+        assert row[2:4] == ("2.7667 kg/m³", density)
+        assert row[4]
+        assert [row[4] for row in rows if row[1] in ("I", "I_h")] == ["needed, but not in the paper: an assumption"] * 2
+        assert next(row for row in rows if row[1] == "C")[2:4] == ("0 kg/s", "0 s")
+
+
+# ------------------------------------------------------------ all or nothing
+
+
+@pytest.mark.parametrize("where", ["file", "file/below/it", "taken"])
+def test_an_unwritable_out_is_refused_before_any_work_and_left_alone(tmp_path, monkeypatch, where):
+    (tmp_path / "file").write_text("mine")
+    (tmp_path / "taken").mkdir()
+    (tmp_path / "taken" / NAME).write_text("mine")
+    monkeypatch.setattr(writing, "_make_all", lambda *_: pytest.fail("work began"))
+    before = files_of(tmp_path)
+    with pytest.raises(tfarm.ParameterError) as caught:
+        write([ARM], tmp_path / where)
+    assert caught.value.key == "out"
+    assert "\n" not in str(caught.value)
+    assert "Not a directory" in str(caught.value)
+    assert files_of(tmp_path) == before
+
+
+def test_a_name_too_long_for_a_folder_is_refused_too(tmp_path):
+    with pytest.raises(tfarm.ParameterError, match="out = "):
+        write([replace(ARM, name="𝒳" * 80)], tmp_path / "new" / "folder")
+    assert files_of(tmp_path) == {}
+    assert not (tmp_path / "new").exists()
+
+
+def test_work_that_fails_leaves_nothing(tmp_path, monkeypatch):
+    def fail(arm, folder):
+        (folder / "half.svg").write_text("half")
+        raise tfarm.ConvergenceError("stopped short", None, None)
+
+    monkeypatch.setattr(writing, "PIECES", ())
+    monkeypatch.setattr(writing, "save_card", fail)
+    with pytest.raises(tfarm.ConvergenceError):
+        write([ARM], tmp_path / "new" / "out")
+    assert not (tmp_path / "new").exists()
+
+
+def test_work_that_fails_leaves_an_earlier_report_as_it_was(pages, monkeypatch):
+    def fail(arm, folder):
+        raise tfarm.ConvergenceError("stopped short", None, None)
+
+    before = files_of(pages)
+    monkeypatch.setattr(writing, "save_card", fail)
+    with pytest.raises(tfarm.ConvergenceError):
+        write([ARM], pages, only=("modes",))
+    assert files_of(pages) == before
+
+
+@pytest.mark.parametrize(
+    ("arms", "only", "key"),
+    [
+        ((), None, "arms"),
+        ((ARM, replace(ARM, assumptions=())), None, "name"),
+        ((replace(ARM, name="Pictures"),), None, "name"),
+        ((ARM,), ("bodes",), "only"),
+    ],
+)
+def test_what_cannot_be_written_is_named(tmp_path, arms, only, key):
+    with pytest.raises(tfarm.ParameterError) as caught:
+        write(arms, tmp_path / "out", only=only)
+    assert caught.value.key == key
+    assert not (tmp_path / "out").exists()
+
+
+STRANGE_CARDS = (
+    "",
+    "[]",
+    "null",
+    '{"tfarm_card": 1}',
+    "[" * 5000,
+    '{"tfarm_card": 1, "name": "x5", "summary": "", "facts": 3}',
+    '{"tfarm_card": 1, "name": "elsewhere", "summary": "", "facts": []}',
+)
+
+
+def test_other_files_in_the_folder_are_kept_and_strange_cards_passed_over(tmp_path, monkeypatch):
+    monkeypatch.setattr(writing, "PIECES", ())
+    (tmp_path / NAME).mkdir()
+    (tmp_path / NAME / "mine.txt").write_text("mine")
+    for i, card in enumerate(STRANGE_CARDS):
+        (tmp_path / f"x{i}").mkdir()
+        (tmp_path / f"x{i}" / "card.json").write_text(card)
+        (tmp_path / f"x{i}" / "index.html").write_text("mine")
+    write([ARM], tmp_path)
+    assert (tmp_path / NAME / "mine.txt").read_text() == "mine"
+    links = Links(tmp_path / "index.html").targets
+    assert not any(target.startswith("x") for target in links)
+    assert len(links) > 1
+
+
+def test_a_plain_script_starts_no_processes(monkeypatch):
+    class Script:
+        __file__ = "analysis.py"
+        __spec__ = None
+
+    monkeypatch.setitem(sys.modules, "__main__", Script())
+    assert not writing._may_start_processes()
+    monkeypatch.delattr(Script, "__file__")
+    assert writing._may_start_processes()
+
+
+# ------------------------------------------------------------ odd arms, the README
+
+
+def test_an_arm_that_cannot_turn_nor_move_its_tip_is_reported_on_too(tmp_path):
+    arm = replace(
+        ARM,
+        name="held",
+        hub=tfarm.Hub(inertia=math.inf),
+        payload=tfarm.Payload(mass=math.inf, inertia=0.1),
+        assumptions=(),
+    )
+    page = write([arm], tmp_path, only=("bode",))
+    assert page == tmp_path / "held" / "bode.html"
+    text = page.read_text(encoding="utf-8")
+    assert "From hub angle to root moment" in text
+    assert "is zero at every frequency" in text
+    assert "states no assumptions" in text
+
+
+def test_the_pictures_of_the_readme(tmp_path):
+    paths = readme_pictures(tmp_path)
+    assert [path.name for path in paths] == ["bode-root-moment.png", "mode-shapes.png"]
+    kept = Path(__file__).parents[2] / "reports" / "pictures"
+    assert {path.name for path in kept.iterdir()} == {path.name for path in paths}
