@@ -26,20 +26,26 @@ _ENDS = {"theta": 0, "M": 1, "Q": 2, "W": 3, "Y": 4}
 _FIELDS = {"Y": 0, "Phi": 1, "M": 2, "Q": 3}
 
 
-def evaluate_outputs(k: Coefficients, wanted: Sequence[Output], s: Complex, x: float = 0.0) -> Complex:
+def kernel_table(k: Coefficients, wanted: Sequence[Output]) -> NDArray[np.float64]:
+    """The outputs as `waves.evaluate` reads them: worth keeping between calls."""
+    return np.array([_row(k, each) for each in wanted])
+
+
+def evaluate_outputs(
+    k: Coefficients, wanted: Sequence[Output], table: NDArray[np.float64], s: Complex, x: float = 0.0
+) -> Complex:
     """Outputs (rows) for a unit input at s (1-D), SI; x is a share of the length, for outputs along the arm.
 
-    Raises ParameterError at a pole, naming it.
+    `table` is their `kernel_table`.  Raises ParameterError at a pole, naming it.
     """
     s = np.ascontiguousarray(s)
     values, suspects = np.empty((len(wanted), s.size), complex), np.empty(s.size, bool)
     with np.errstate(under="ignore"):
-        evaluate(s, k.kernel, np.array([_row(k, each) for each in wanted]), values, suspects)
+        evaluate(s, k.kernel, table, values, suspects)
         for row, each in enumerate(wanted):
             if each.place == "x":
                 values[row] = _along(k, each, s, x)
-    suspects |= s == 0
-    for i in np.nonzero(suspects)[0]:
+    for i in np.flatnonzero(suspects):
         values[:, i] = [value_with_care(k, each, complex(s[i]), x) for each in wanted]
     return values
 

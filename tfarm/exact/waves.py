@@ -92,7 +92,7 @@ def evaluate(s: Any, k: Any, outputs: Any, values: Any, suspects: Any) -> None:
                     values[o, chosen[i]] = factor * value
             for i in range(n):
                 left = states[5 * BLOCK + i]
-                suspects[chosen[i]] = left.real < POLE * left.imag or (not low and _parallel(numbers, i))
+                suspects[chosen[i]] = not left.real > POLE * left.imag or (not low and _parallel(numbers, i))
 
 
 @inlined

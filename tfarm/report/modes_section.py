@@ -174,7 +174,7 @@ def sensitivity_table(modes: Modes) -> Table:
     for number, column in zip(modes.index[flexible], np.array(list(shown.values())).T, strict=True):
         tints = [tint(x) for x in column]
         columns.append(number_column(f"mode_{number}", f"mode {number}", "%/%", column, fixed(column, 3), tint=tints))
-    left_out = f" Left out, as they change no frequency here: {_list(dropped)}." if dropped else ""
+    left_out = f" Left out, as one per cent more of it changes no frequency here: {_list(dropped)}." if dropped else ""
     return Table(
         stem="sensitivities",
         title="Sensitivity of each natural frequency",

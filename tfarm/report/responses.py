@@ -54,6 +54,7 @@ class Bode:
 
     @property
     def band(self) -> tuple[float, float]:
+        """First and last frequency [rad/s]."""
         return float(self.omega[0]), float(self.omega[-1])
 
     @property
@@ -78,6 +79,7 @@ class Bode:
 
     @property
     def label(self) -> str:
+        """The output in words."""
         return OUTPUTS[self.output].label
 
     @property
@@ -87,6 +89,7 @@ class Bode:
 
     @property
     def input_label(self) -> str:
+        """The input in words."""
         return "hub angle" if self.arm.is_locked else "torque"
 
 

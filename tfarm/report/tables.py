@@ -36,6 +36,7 @@ class Column:
 
     @property
     def is_text(self) -> bool:
+        """Whether it is set flush left."""
         return any(isinstance(value, str | tuple) for value in self.values)
 
 

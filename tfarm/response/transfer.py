@@ -14,7 +14,13 @@ from tfarm.arm import Arm
 from tfarm.errors import MISSING, ParameterError
 from tfarm.exact.coefficients import coefficients
 from tfarm.exact.outputs import Output, output
-from tfarm.exact.values import differentiate_outputs, digits_of, evaluate_outputs, expansion_at_zero
+from tfarm.exact.values import (
+    differentiate_outputs,
+    digits_of,
+    evaluate_outputs,
+    expansion_at_zero,
+    kernel_table,
+)
 
 from .roots import Roots, poles_of, zeros_of
 
@@ -49,6 +55,7 @@ class TransferFunction:
             raise ParameterError(key="outputs", value=outputs, remedy="name at least one output")
         self._wanted: tuple[Output, ...] = tuple(output(name) for name in self.outputs)
         self._k = coefficients(arm)
+        self._table = kernel_table(self._k, self._wanted)
         self.x = self._place(x)
 
     @property
@@ -109,7 +116,13 @@ class TransferFunction:
         )
 
     def _values(self, s: Complex) -> Complex:
-        return evaluate_outputs(self._k, self._wanted, s, self._share)
+        if s.size <= BLOCK:
+            return evaluate_outputs(self._k, self._wanted, self._table, s, self._share)
+        values = np.empty((len(self.outputs), s.size), complex)
+        for start in range(0, s.size, BLOCK):
+            part = slice(start, start + BLOCK)
+            values[:, part] = evaluate_outputs(self._k, self._wanted, self._table, s[part], self._share)
+        return values
 
     def _shaped(self, values: Complex) -> Any:
         values = values[0] if self.is_single else values
@@ -175,7 +188,7 @@ class TransferFunction:
 
 def _finite(s: ArrayLike) -> Complex:
     points = np.asarray(s, dtype=complex)
-    if not np.isfinite(points).all():
+    if not np.isfinite(points.sum()) and not np.isfinite(points).all():  # the sum needs no array of its own
         bad = points[~np.isfinite(points)].ravel()[0]
         raise ParameterError(key="s", value=complex(bad), remedy="a transfer function wants finite s in 1/s")
     return points

@@ -24,7 +24,8 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 _even = plain(even_functions)
 
 GAUSS = 16  # points a panel; exact for the products of waves below once a panel holds a few radians
-DOUBLE = 1e-11  # relative gap under which two frequencies are one, with two modes
+DOUBLE = 1e-14  # relative gap under which two frequencies are one, with two modes
+CLOSE = 1e-5  # relative gap under which rounding would leave two modes not quite orthogonal
 
 
 class Shapes:
@@ -147,8 +148,8 @@ class Shapes:
         self._weights = self._weights * factor[~self._low]
 
     def _orthogonalise(self) -> None:
-        """Gram-Schmidt in the modal mass within each double frequency."""
-        (pairs,) = np.nonzero(np.diff(self.omega) < DOUBLE * self.omega[1:])
+        """Gram-Schmidt in the modal mass within each pair of close or double frequencies."""
+        (pairs,) = np.nonzero(np.diff(self.omega) < CLOSE * self.omega[1:])
         for first in pairs:
             overlap = self.mass_matrix()[first, first + 1]
             above = first - int(self._low[: first + 1].sum())
