@@ -68,6 +68,11 @@ class Coefficients:
         """Whether the hub cannot turn, so that its angle is the input."""
         return not isinstance(self.hub_inertia, Fraction)
 
+    @property
+    def has_rigid_mode(self) -> bool:
+        """Whether the arm can turn as a rigid body: every inertia is finite."""
+        return all(isinstance(end, Fraction) for end in (self.tip_mass, self.tip_inertia, self.hub_inertia))
+
     @cached_property
     def kernel(self) -> NDArray[np.float64]:
         """The vector that the compiled functions of `waves` read (see the indices there)."""

@@ -29,7 +29,8 @@ def natural_frequencies(k: Coefficients, first: int, last: int) -> NDArray[np.fl
     start value, no sign change needed, so close and double roots are like any other.
     Raises ConvergenceError if the count does not reach `last` (beyond 1e9 rad/s times the arm's own unit).
     """
-    number = np.arange(max(first - 1, 1), last + 2)  # with both neighbours: one of them may be close
+    lowest = min(first, 1 + k.has_rigid_mode)  # not the rigid body at zero: bisection would run down all exponents
+    number = np.arange(max(first - 1, lowest), last + 2)  # with both neighbours: one of them may be close
     omega = _bisect(k, number)
     close = np.diff(omega) < CLOSE * omega[1:]
     for i in np.nonzero(np.r_[close, False] | np.r_[False, close])[0]:

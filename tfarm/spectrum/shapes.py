@@ -24,7 +24,7 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 _even = plain(even_functions)
 
 GAUSS = 16  # points a panel; exact for the products of waves below once a panel holds a few radians
-DOUBLE = 1e-14  # relative gap under which two frequencies are one, with two modes
+DOUBLE = 4e-15  # relative gap under which two frequencies are one, with two modes
 CLOSE = 1e-5  # relative gap under which rounding would leave two modes not quite orthogonal
 
 
