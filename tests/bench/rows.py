@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
 
+from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
@@ -34,7 +35,10 @@ class Target:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Row:
-    """One measurement: `seconds` for each of n `each`es, `ratio` to what `to` names, `error` against a proven value."""
+    """One measurement: median `seconds` for each of n points or modes, and the largest error against a proven value.
+
+    `ratio` is to what `to` names, which took `to_seconds` a point or mode, measured in turn in the same process.
+    """
 
     group: str
     what: str
@@ -43,6 +47,7 @@ class Row:
     seconds: float
     ratio: float | None = None
     to: str = ""
+    to_seconds: float | None = None
     error: float | None = None
     target: Target | None = None
     note: str = ""
@@ -57,7 +62,9 @@ class Row:
 def show(rows: Sequence[Row], console: Console) -> None:
     """Print one table a group, the notes below it."""
     for group in dict.fromkeys(row.group for row in rows):
-        table = Table(title=group, title_justify="left", title_style="bold", header_style="", pad_edge=False)
+        table = Table(
+            title=group, title_justify="left", title_style="bold", header_style="", box=SIMPLE, pad_edge=False
+        )
         for heading in ("what", "n", "time each", "ratio", "largest error", "target"):
             table.add_column(heading, justify="left" if heading in ("what", "target") else "right")
         notes: list[str] = []
@@ -91,14 +98,17 @@ def duration(seconds: float) -> str:
 
 
 def _cells(row: Row, mark: str) -> tuple[str, ...]:
-    ratio = (
-        ""
-        if row.ratio is None
-        else f"{row.ratio:,.2f} x {row.to}"
-        if row.ratio < 100
-        else f"{row.ratio:,.0f} x {row.to}"
-    )
+    ratio = ""
+    if row.ratio is not None and row.to_seconds is not None:
+        figures = f"{row.ratio:.2f}" if row.ratio < 100 else f"{row.ratio:,.0f}"
+        ratio = f"{figures} x {row.to} ({duration(row.to_seconds)})"
     error = "" if row.error is None else f"{row.error:.1e}"
-    what = (row.what + mark).replace("[", r"\[")
     target = "" if row.target is None else str(row.target)
-    return what, f"{row.n:,}", f"{duration(row.seconds)}/{row.each}", ratio, error, target
+    return (
+        (row.what + mark).replace("[", r"\["),
+        f"{row.n:,}",
+        f"{duration(row.seconds)}/{row.each}",
+        ratio,
+        error,
+        target,
+    )

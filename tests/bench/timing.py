@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,3 +37,18 @@ def interleaved(candidates: Mapping[str, Callable[[], object]], rounds: int) -> 
             call()
             seconds[name].append(time.perf_counter() - start)
     return Times({name: np.array(each) for name, each in seconds.items()})
+
+
+@dataclass(slots=True)
+class Stopwatch:
+    """Seconds of processor time inside `once`."""
+
+    seconds: float = 0.0
+
+
+@contextmanager
+def once() -> Iterator[Stopwatch]:
+    """Time one long run, of single-threaded Python, by the processor's clock: other processes do not count."""
+    watch, start = Stopwatch(), time.process_time()
+    yield watch
+    watch.seconds = time.process_time() - start

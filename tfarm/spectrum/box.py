@@ -22,6 +22,7 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 
 TURN = 0.6  # rad: a longer step of the phase along the contour is halved
 FINEST = 1e-13  # a contour cannot be resolved closer to a zero than this share of the box
+DEAD = 1e-8  # nearer to s = 0 than this share of a box Newton's method is not believed: a zero there forces cuts
 SPLIT = 0.4871  # where a box is cut: off the axes, on which zeros like to lie
 
 
@@ -144,10 +145,10 @@ def _search(function: Function, box: Box, starts: Complex, depth: int) -> Comple
         box.corners[:4, None] * np.array([0.8, 0.55]) + box.corners[[2, 3, 0, 1], None] * np.array([0.2, 0.45])
     ).ravel()
     found = newton(function, np.concatenate([starts[box.holds(starts)], grid]))
-    found = found[box.holds(found)]
+    width = max(box.re_max - box.re_min, box.im_max - box.im_min)
+    found = found[box.holds(found) & (abs(found) > DEAD * width)]  # deflated zeros at s = 0 leave noise around it
     if found.size == expected:
         return found
-    width = max(box.re_max - box.re_min, box.im_max - box.im_min)
     if found.size == 1 and width < 1e-6 * abs(found[0]):
         return np.repeat(found, expected)
     if depth > 60:
