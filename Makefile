@@ -35,7 +35,7 @@ lint: $(INSTALLED) ## check style, types and which room imports which
 	@$(BIN)/lint-imports
 
 bench: $(BENCH_INSTALLED) ## measure speed and memory, beside other packages
-	@$(BIN)/python -m pytest tests/bench -n 0 -s -o 'python_files=bench_*.py'
+	@$(BIN)/python -m tests.bench
 
 clean: ## remove everything that was generated
 	@rm -rf .venv build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis

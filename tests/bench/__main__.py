@@ -6,6 +6,7 @@ reports/bench.json.
 
 from __future__ import annotations
 
+import logging
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -29,7 +30,8 @@ def measure() -> Iterator[Row]:
 
 def main(path: Path) -> None:
     """Measure, print, keep."""
-    console, rows = Console(width=None if sys.stdout.isatty() else 150), []
+    logging.getLogger("cxroots").setLevel(logging.CRITICAL)  # it tells of every subdivision it takes back
+    console, rows = Console(width=None if sys.stdout.isatty() else 170), []
     with Console(stderr=True).status("measuring") as status:
         for row in measure():
             rows.append(row)

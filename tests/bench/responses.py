@@ -21,8 +21,8 @@ LIMIT = 5.0  # times two complex exponentials
 CHECKED = 100  # points of each response whose error is measured
 ROUNDS = {1_000: 500, 1_000_000: 11}
 NOTE = (
-    "floor: numpy.exp of the arm's own two waves, e^{-l1 L} and e^{-l2 L}, into arrays that exist already. At C = 0 their "
-    "exponents are purely real and imaginary, which is faster than general complex ones.  "
+    "floor: numpy.exp of the arm's own two waves, e^{-l1 L} and e^{-l2 L}, into arrays that exist already. At C = 0 "
+    "their exponents are purely real and imaginary, which is faster than general complex ones.  "
     "largest error: |error/G| / (1 + |s G'/G|) over three outputs at a hundred of the points, against ball arithmetic."
 )
 GRIDS: dict[str, Callable[..., Any]] = {"log": np.geomspace, "linear": np.linspace}

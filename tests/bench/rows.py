@@ -62,9 +62,8 @@ class Row:
 def show(rows: Sequence[Row], console: Console) -> None:
     """Print one table a group, the notes below it."""
     for group in dict.fromkeys(row.group for row in rows):
-        table = Table(
-            title=group, title_justify="left", title_style="bold", header_style="", box=SIMPLE, pad_edge=False
-        )
+        console.print(group, style="bold", highlight=False)
+        table = Table(header_style="", box=SIMPLE, pad_edge=False)
         for heading in ("what", "n", "time each", "ratio", "largest error", "target"):
             table.add_column(heading, justify="left" if heading in ("what", "target") else "right")
         notes: list[str] = []
@@ -104,11 +103,5 @@ def _cells(row: Row, mark: str) -> tuple[str, ...]:
         ratio = f"{figures} x {row.to} ({duration(row.to_seconds)})"
     error = "" if row.error is None else f"{row.error:.1e}"
     target = "" if row.target is None else str(row.target)
-    return (
-        (row.what + mark).replace("[", r"\["),
-        f"{row.n:,}",
-        f"{duration(row.seconds)}/{row.each}",
-        ratio,
-        error,
-        target,
-    )
+    each = f"{duration(row.seconds)}/{row.each}"
+    return (row.what + mark).replace("[", r"\["), f"{row.n:,}", each, ratio, error, target

@@ -9,9 +9,8 @@ from collections.abc import Iterator
 import numpy as np
 
 import tfarm
-from tfarm import Arm
+from tfarm import Arm, Link
 
-from .paper import characteristic
 from .reference import Complex, frequency_errors
 from .rows import Row, Target
 from .timing import interleaved, once
@@ -35,9 +34,9 @@ def modes_rows() -> Iterator[Row]:
 
 
 def cxroots_row() -> Row:
-    """The first modes as all roots of the paper's determinant in a rectangle, by cxroots' contour integrals.
+    """The first modes as all zeros of the characteristic function in a rectangle, by cxroots' contour integrals.
 
-    It gets a function without artefacts, in the variable q = sqrt(w/unit) in which the roots are evenly spaced, and
+    It gets that function without artefacts, in the variable q = sqrt(w/unit) in which the roots are evenly spaced, and
     times e^{-q}, without which it grows by thirteen orders of magnitude over the ten modes.
     """
     import cxroots
@@ -49,16 +48,33 @@ def cxroots_row() -> Row:
     corner = math.sqrt(tfarm.modes(arm, FEW + 1).natural_frequency[-2:].mean() / unit)
     with warnings.catch_warnings(), once() as watch:
         warnings.simplefilter("ignore")
-        result = cxroots.Rectangle([1.0, corner], [-0.5, 0.5]).roots(lambda q: _scaled(arm, unit, q))
+        result = cxroots.Rectangle([1.0, corner], [-0.5, 0.5]).roots(lambda q: _characteristic(arm, q))
     found = np.sort(unit * np.array(result.roots).real ** 2)
     return Row(
         group=GROUP, what="cxroots: sasaki2012", n=found.size, each="mode", seconds=watch.seconds / found.size,
         ratio=watch.seconds / ours, to="tfarm", to_seconds=ours / FEW, error=frequency_errors(arm, found).max(),
-        note="cxroots: one run, on the paper's determinant freed of its artefacts and scaled, in q ~ sqrt(w): "
+        note="cxroots: one run, on the closed form, freed of artefacts and scaled, in q ~ sqrt(w): "
         f"real part 1 to {corner:.1f}, imaginary part -0.5 to 0.5.",
     )  # fmt: skip
 
 
-def _scaled(arm: Arm, unit: float, q: Complex) -> Complex:
-    s = 1j * unit * np.asarray(q, dtype=complex) ** 2
-    return characteristic(arm, s, number=float, sqrt=np.sqrt, exp=np.exp) * np.exp(-q)
+def _characteristic(arm: Arm, q: Complex) -> Complex:
+    """What `paper.characteristic` is, times e^{-q}, in the closed form that takes half the time.  m = I_c = 0."""
+    link, L = arm.link, arm.link.length
+    unit = math.sqrt(link.EI / link.rhoA) / L**2
+    S = -((unit * np.asarray(q, dtype=complex) ** 2) ** 2)
+    bend, turn, rest = link.density / link.youngs_modulus, link.rhoA / link.kGA, link.EI * link.rhoA * S
+    mean, spread = (bend + turn) * S / 2, np.sqrt(((bend - turn) * S) ** 2 / 4 - link.rhoA * S / link.EI)
+    l1, l2 = np.sqrt(mean + spread), np.sqrt(mean - spread)
+    (g1, So1, Se1, Mo1, Me1), (g2, So2, Se2, Mo2, Me2) = (_wave(link, S, x) for x in (l1, l2))
+    N1, N2 = Me1 * So2 - Se1 * Mo2 - g2 * rest, So1 * Me2 - Mo1 * Se2 - g1 * rest
+    gap = link.EI * (g1 * l1 - g2 * l2)
+    value = gap * (So1 * Mo2 - So2 * Mo1) - arm.hub.inertia * S * (N1 * g1 + N2 * g2)
+    return value * l1 * l2 / (rest * (l1**2 - l2**2) ** 2) * np.exp(-q)
+
+
+def _wave(link: Link, S: Complex, x: Complex) -> tuple[Complex, ...]:
+    """gamma, then what the free tip makes of one wave x: force and moment of its odd and its even part."""
+    g, cosh, sinh = x - link.rhoA / link.kGA * S / x, np.cosh(x * link.length), np.sinh(x * link.length)
+    force, moment = link.rhoA * S / x, g * link.EI * x
+    return g, force * cosh, force * sinh, moment * sinh, moment * cosh
