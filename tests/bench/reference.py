@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import mpmath
 import numpy as np
 from numpy.typing import NDArray
@@ -48,7 +50,8 @@ def frequency_errors(arm: Arm, found: NDArray[np.float64]) -> NDArray[np.float64
     The root is polished by secants with mpmath, and is one because the determinant changes sign across it.
     The frequencies have to be distinct, and they are complete if tfarm's count is, which the tests check.
     """
-    return np.array([_error(arm, omega) for omega in found])
+    undamped = replace(arm, link=replace(arm.link, damping=0.0))
+    return np.array([_error(undamped, omega) for omega in found])
 
 
 def _error(arm: Arm, omega: float) -> float:

@@ -19,7 +19,7 @@ from .timing import interleaved, once
 GROUP = "Frequency response: hub angle, root moment and tip displacement in one pass, 0.1 to 1e4 rad/s"
 LIMIT = 5.0  # times two complex exponentials
 CHECKED = 100  # points of each response whose error is measured
-ROUNDS = {1_000: 500, 1_000_000: 11}
+ROUNDS = {1_000: 100, 1_000_000: 11}
 NOTE = (
     "floor: numpy.exp of the arm's own two waves, e^{-l1 L} and e^{-l2 L}, into arrays that exist already. At C = 0 "
     "their exponents are purely real and imaginary, which is faster than general complex ones.  "
