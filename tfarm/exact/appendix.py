@@ -122,7 +122,10 @@ class Appendix:
 
 def determinant(arm: Arm, s: complex, digits: int) -> Number:
     """The paper's Delta at s [1/s], right to `digits`; ConvergenceError at s = 0 and at the cut-off."""
-    return _proven(lambda: [Appendix(arm, mpc(s)).Delta], digits, f"Delta at s = {s}")[0]
+    try:
+        return _proven(lambda: [Appendix(arm, mpc(s)).Delta], digits, f"Delta at s = {s}")[0]
+    except ZeroDivisionError:
+        raise ConvergenceError(f"Delta has no value at s = {s}, where a wave number is zero", None, None) from None
 
 
 def response(arm: Arm, output_name: str, s: complex, digits: int, x: float | None = None) -> Number:
@@ -216,6 +219,7 @@ def _is_real(arm: Arm, wanted: Output, s: complex, x: float) -> bool:
     if s.imag == 0 or (s.real == 0 and arm.link.damping == 0):
         return True
     if arm.is_locked:
-        return wanted.quantity == "theta"
+        held = {"Y": math.isinf(arm.payload.mass), "Phi": math.isinf(arm.payload.inertia)}
+        return wanted.quantity == "theta" or (x == arm.link.length and held.get(wanted.quantity, False))
     feels_no_damping = not wanted.gauge or arm.link.damping == 0
     return arm.hub.inertia == 0 and wanted.quantity == "M" and x == 0 and feels_no_damping

@@ -175,7 +175,16 @@ def _store(
     scale = k[17] * reciprocal(u)
     states[i], states[BLOCK + i], states[2 * BLOCK + i] = scale * theta, scale * M0, scale * Q0
     states[3 * BLOCK + i], states[4 * BLOCK + i] = (LIFT * scale) * W1, scale * Y1
-    states[5 * BLOCK + i] = complex(_size(u), _size(turned) + _size(held) + _size(M0))
+    impedance = _impedance(_size(S), k)  # with it, what u would be away from a pole
+    crossed = k[14] * _size(M0) / max(impedance, 1.0) + k[16] * _size(theta) * impedance
+    states[5 * BLOCK + i] = complex(_size(u), _size(turned) + _size(held) + crossed)
+
+
+@inlined
+def _impedance(S: float, k: Any) -> float:
+    """Size of M0/theta for a free tip, dimensionless: of its inertia when slow, of one wave number when fast."""
+    inertia = k[4] * S
+    return min(inertia, math.sqrt(math.sqrt(inertia)) + math.sqrt(S * (k[0] + k[2])))
 
 
 @compiled

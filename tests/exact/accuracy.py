@@ -1,0 +1,135 @@
+"""float64 against ball arithmetic at random (arm, s, x):  python -m tests.exact.accuracy 10000 [seed]
+
+The error of an output G is counted in the change of G that a relative change of its argument brings about: what is
+left of |G_64/G - 1| after division by 1 + |s dG/ds / G|, along the arm by 1 + |s dG/ds / G| + |x dG/dx / G|.  All of
+it comes from two ball evaluations, at (s, x) and next to it.
+"""
+
+import sys
+import time
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+import numpy as np
+
+from tests.strategies import some_arm, some_s
+from tfarm.exact import balls
+from tfarm.exact.coefficients import coefficients
+from tfarm.exact.fields import fields
+from tfarm.exact.outputs import OUTPUTS, unit_scale
+from tfarm.exact.waves import evaluate
+
+BOUND = 2e-14
+ENDS = {"theta": 0, "M": 1, "Q": 2, "W": 3, "Y": 4}
+FIELDS = {"Y": 0, "Phi": 1, "M": 2, "Q": 3}
+STEP = 2.0**-60
+TINY, HUGE = np.finfo(float).tiny, np.finfo(float).max
+
+
+@dataclass(frozen=True)
+class Point:
+    """One output of one arm at one s: its error, and whether the code itself asks for balls there."""
+
+    name: str
+    error: float
+    flagged: bool
+    where: tuple
+
+
+def some_share(rng):
+    """A point along the arm as a share of its length, often close to an end or on it."""
+    return float(rng.choice([rng.uniform(), 10 ** rng.uniform(-4, 0), 1 - 10 ** rng.uniform(-4, 0), 0.0, 1.0]))
+
+
+def measure(arm, s, x):
+    """All outputs of one arm at one s (and share x of the length): the representable ones as Points."""
+    k, L = coefficients(arm), arm.link.length
+    values, flagged = float_values(k, s, x)
+    points = []
+    for name, (value, condition) in exact_values(k, s, x).items():
+        error = abs(balls.point(complex(values[name])) / value - 1)
+        error = float(error.mid()) if np.isfinite(values[name]) else np.inf
+        points.append(Point(name, error / (1 + condition), flagged, (arm, s, x * L)))
+    return points
+
+
+def float_values(k, s, x):
+    """Every output in float64, SI, and whether the kernel flags s."""
+    at_ends = {name: each for name, each in OUTPUTS.items() if each.place != "x"}
+    table = [[ENDS[o.quantity], o.power, o.gauge, float(unit_scale(o, k))] for o in at_ends.values()]
+    values, flagged = np.empty((len(table), 1), complex), np.empty(1, bool)
+    with np.errstate(all="raise", under="ignore"):
+        evaluate(np.array([s]), k.kernel, np.array(table), values, flagged)
+        along = fields(k, np.array([s]), x)[0][:, 0]
+    found = dict(zip(at_ends, values[:, 0], strict=True))
+    for name, each in OUTPUTS.items():
+        if each.place == "x":
+            found[name] = along[FIELDS[each.quantity]] * float(unit_scale(each, k)) / (1 + k.damping * s * each.gauge)
+    return found, bool(flagged[0])
+
+
+def exact_values(k, s, x, bits=320):
+    """Every output that is not zero and fits into a float, as a ball, with its |s G'/G|."""
+    while True:
+        with balls.precision(bits):
+            here, there = (balls.State(k, balls.point(s) * (1 + balls.rational(step))) for step in (0.0, STEP))
+            found = {name: _value(here, there, each, x) for name, each in OUTPUTS.items()}
+            if None not in found.values():
+                return {name: pair for name, pair in found.items() if pair[1] is not None}
+        bits *= 2
+
+
+def _value(here, there, output, x):
+    """(ball, condition); condition None where G is zero or does not fit; None where the precision does not do."""
+    if _vanishes(here.k, output, x):
+        return 0, None
+    if here.input.contains(0) or there.input.contains(0):
+        return None
+    value = here.value(output, x)
+    if value.rel_accuracy_bits() < 150:
+        return None
+    neighbours = [there.value(output, x)]
+    if output.place == "x":
+        neighbours.append(here.value(output, Fraction(x) * (1 + Fraction(STEP))))
+    slopes = [abs(neighbour / value - 1) / balls.rational(STEP) for neighbour in neighbours]
+    if any(slope.rad() > 0.01 * (1 + slope.mid()) for slope in slopes):
+        return None
+    size = float(abs(value).mid())
+    return value, sum(float(slope.mid()) for slope in slopes) if TINY < size < HUGE else None
+
+
+def _vanishes(k, output, x):
+    if output.place == "root":
+        return False
+    if output.place == "x" and x == 0:
+        return output.quantity in ("Y", "Phi")
+    held = {"W": np.isinf(float(k.tip_mass)), "M": k.tip_inertia == 0, "Q": k.tip_mass == 0}
+    return (output.place == "tip" or x == 1) and held.get(output.quantity, False)
+
+
+def run(count, seed=0):
+    """The Points of `count` random arms."""
+    rng = np.random.default_rng(seed)
+    return [point for _ in range(count) for point in measure(some_arm(rng), some_s(rng), some_share(rng))]
+
+
+def main():
+    count, seed = int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 0
+    start = time.perf_counter()
+    points = run(count, seed)
+    fair = [point for point in points if not point.flagged]
+    above = sorted((p for p in fair if not p.error <= BOUND), key=lambda p: -p.error)
+    print(f"{count} random (arm, s, x) in {time.perf_counter() - start:.0f} s: {len(points)} representable values,")
+    print(f"{len(points) - len(fair)} of them flagged (the kernel asks for balls there)")
+    print(f"worst error {max(p.error for p in fair):.3g}; {len(above)} above {BOUND:g}")
+    for name in OUTPUTS:
+        print(f"  {name:18s}{max(p.error for p in fair if p.name == name):.3g}")
+    for point in above[:20]:
+        arm, s, x = point.where
+        arm = replace(arm, name="worst")
+        print(f"{point.error:.3g} {point.name} s={s!r} x={x!r}\n    {arm}")
+    return bool(above)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,226 @@
+"""The paper's appendix against balls, the matrix exponential and a Ritz model; its digits and its errors."""
+
+import math
+from dataclasses import replace
+from fractions import Fraction
+
+import mpmath
+import numpy as np
+import pytest
+
+import tfarm
+from tests.models import Ritz, shooting
+from tests.strategies import BOUNDARY_CASES, arm_of, some_arm, some_s
+from tfarm import Arm, ConvergenceError, Hub, Link, ParameterError, Payload, Section
+from tfarm.exact import appendix, balls
+from tfarm.exact.coefficients import coefficients
+from tfarm.exact.outputs import OUTPUTS
+
+EPS = np.finfo(float).eps
+
+
+def middle(ball, digits):
+    """The middle of a complex ball as an mpmath number."""
+    return mpmath.mpc(*(part.mid().str(digits, radius=False) for part in (ball.real, ball.imag)))
+
+
+@pytest.mark.parametrize("case", BOUNDARY_CASES)
+def test_forty_digits_are_those_of_the_balls(case):
+    """The balls never separate two waves; the appendix never does anything else."""
+    rng = np.random.default_rng(BOUNDARY_CASES.index(case))
+    arm, s = some_arm(rng, case), some_s(rng)
+    x = float(rng.uniform(0.05, 0.95)) * arm.link.length
+    k, compared = coefficients(arm), 0
+    for name, output in OUTPUTS.items():
+        value = appendix.response(arm, name, s, 40, x=x)
+        if value == 0:
+            assert output.place == "tip"
+            continue
+        exact = balls.enclose(k, output, s, bits=170, x=Fraction(x) / k.length)
+        with mpmath.workdps(50):
+            assert abs(value / middle(exact, 50) - 1) < mpmath.mpf(10) ** -39
+        compared += 1
+    assert compared > 6
+
+
+@pytest.mark.parametrize("s", [2.0 + 31.0j, 900.0j, -3.0 + 4000.0j, 250.0 + 0.0j])
+@pytest.mark.parametrize("preset", ["sasaki2012-lab", "stocky-steel"])
+def test_thirty_digits_are_those_of_the_state_transition_matrix(preset, s):
+    """exp(A(s) L) of the equations (1)-(7) as a first-order system, with payload and damping."""
+    arm = replace(tfarm.load(preset), payload=Payload(mass=0.3, inertia=0.02))
+    L, x = arm.link.length, 0.3
+    root, inside, tip = shooting(arm, s, x=[x * L], digits=40)
+    with mpmath.workdps(40):
+        theta, damper = root[1], 1 + mpmath.mpf(arm.link.damping) * s
+        expected = {
+            "hub_angle": theta,
+            "hub_rate": s * theta,
+            "tip_displacement": tip[0],
+            "tip_deflection": tip[0] - mpmath.mpf(L) * theta,
+            "tip_acceleration": s**2 * tip[0],
+            "root_moment": root[2] / damper,
+            "root_shear": root[3],
+            "deflection": inside[0] - mpmath.mpf(x * L) * theta,
+            "rotation": inside[1] - theta,
+            "moment": inside[2] / damper,
+            "shear": inside[3],
+        }
+        for name in OUTPUTS:
+            value = appendix.response(arm, name, s, 30, x=x * L)
+            assert abs(value / expected[name] - 1) < mpmath.mpf(10) ** -30
+
+
+@pytest.mark.parametrize("s", [3.0 + 40.0j, 700.0j, 90.0 + 0.0j])
+def test_a_ritz_model_agrees(s):
+    """Legendre polynomials for shear strain and curvature, and no wave anywhere: float64, so to rounding."""
+    arm = arm_of(
+        length=1.3, slenderness=12, width=1, density=7800, E=2e11, nu=0.3, damping=2e-5, hub=40.0, mass=0.4, inertia=2.0
+    )
+    model = Ritz(arm)
+    q = model.response(s, model.hub_psi)
+    for name, motion in (("hub_angle", model.hub_psi), ("tip_displacement", model.tip_w)):
+        assert complex(appendix.response(arm, name, s, 15)) == pytest.approx(motion @ q, rel=2e4 * EPS)
+
+
+def test_delta_is_the_characteristic_function_without_its_artefacts():
+    """Delta = 4 E I (1 + C s) rho A s^2 (l1^2 - l2^2)^2/(l1 l2) D, with D the end conditions' minor of exp(A L)."""
+    arm = replace(tfarm.load("sasaki2012-lab"), payload=Payload(mass=0.3, inertia=0.02))
+    for s in (3 + 60j, 0.2j, 5e3j):
+        Delta = appendix.determinant(arm, s, 30)
+        with mpmath.workdps(60):
+            at = appendix.Appendix(arm, mpmath.mpc(s))
+            l1, l2, rhoA = at.lambdas[0], at.lambdas[1], at.rho * at.A
+            D = Delta * l1 * l2 / (4 * at.EI * at.damper * rhoA * at.s**2 * (l1**2 - l2**2) ** 2)
+            assert abs(D / characteristic(arm, at.s) - 1) < mpmath.mpf(10) ** -29
+
+
+def characteristic(arm, s):
+    """The determinant of hub and tip conditions on exp(A(s) L), for the states (psi, M, Q) of the root."""
+    link = arm.link
+    E, I, A, rho, L = (
+        mpmath.mpf(v)
+        for v in (link.youngs_modulus, link.section.second_moment, link.section.area, link.density, link.length)
+    )
+    EI, kGA = E * I * (1 + link.damping * s), mpmath.mpf(link.shear_factor) * link.shear_modulus * A
+    march = [[0, 1, 0, 1 / kGA], [0, 0, 1 / EI, 0], [0, rho * I * s**2, 0, -1], [rho * A * s**2, 0, 0, 0]]
+    T = mpmath.expm(mpmath.matrix(march) * L)
+    rows = [
+        [arm.payload.mass * s**2 * T[0, j] + T[3, j] for j in (1, 2, 3)],
+        [arm.payload.inertia * s**2 * T[1, j] + T[2, j] for j in (1, 2, 3)],
+        [mpmath.mpf(arm.hub.inertia) * s**2, -1, 0],
+    ]
+    return mpmath.det(mpmath.matrix(rows))
+
+
+@pytest.mark.parametrize("digits", [5, 15, 40, 150])
+def test_as_many_digits_as_are_asked_for(digits):
+    arm = tfarm.load("sasaki2012-lab")
+    for name in ("hub_angle", "tip_deflection", "root_moment"):
+        for s in (0.3 + 57.1j, 1e-6j, 1e6j, 1e-3 + 1e5j):
+            value, better = (appendix.response(arm, name, s, n) for n in (digits, 2 * digits + 20))
+            with mpmath.workdps(2 * digits + 20):
+                for part, right in ((value.real, better.real), (value.imag, better.imag)):
+                    assert abs(part - right) <= abs(right) * mpmath.mpf(10) ** -digits
+
+
+def test_a_part_that_vanishes_by_symmetry_is_zero():
+    arm = tfarm.load("sasaki2012")
+    assert appendix.response(arm, "hub_angle", 40j, 20).imag == 0
+    assert appendix.response(arm, "hub_rate", 40j, 20).real == 0
+    assert appendix.response(arm, "hub_rate", 40 + 0j, 20).imag == 0
+
+
+def powers_of_two(*, damping=0.0, hub=0.25, mass=0.5, inertia=0.125):
+    """An arm whose cut-off, 3 2^16 rad/s, and whose point of equal waves at C = 0, s = 2^18, are floats."""
+    section = Section.general(area=9 * 2.0**-10, second_moment=2.0**-20, shear_factor=0.5)
+    link = Link(
+        length=1.0, density=2.0**12, youngs_modulus=2.0**36, shear_modulus=2.0**35, section=section, damping=damping
+    )
+    return Arm(link=link, hub=Hub(inertia=hub), payload=Payload(mass=mass, inertia=inertia))
+
+
+@pytest.mark.parametrize("s", [3 * 2.0**16 * 1j, 2.0**18 + 0j, -(2.0**18) + 0j])
+@pytest.mark.parametrize("name", OUTPUTS)
+def test_where_two_waves_coincide_to_the_last_bit(name, s):
+    """The cut-off, and the real s of equal waves: the appendix is 0/0, float64 flags it, and all give the value."""
+    arm, output, x = powers_of_two(), OUTPUTS[name], 0.4
+    root, inside, tip = shooting(arm, s, x=[x], digits=30)
+    place, state = {"root": (0.0, root), "tip": (1.0, tip), "x": (mpmath.mpf(x), inside)}[output.place]
+    with mpmath.workdps(30):
+        w, psi, M, Q = state
+        fields = {"theta": psi, "W": w, "Y": w - place * root[1], "Phi": psi - root[1], "M": M, "Q": Q}
+        expected = fields[output.quantity] * mpmath.mpc(s) ** output.power
+        assert abs(appendix.response(arm, name, s, 25, x=x) / expected - 1) < mpmath.mpf(10) ** -25
+    G = tfarm.transfer(arm, name, x=x if output.place == "x" else None)
+    slope = abs(s * G.derivative(s) / complex(expected))
+    assert abs(G(s) / complex(expected) - 1) <= 90 * EPS * (1 + slope)
+
+
+def test_those_two_points_are_what_they_are_said_to_be():
+    with mpmath.workdps(30):
+        with pytest.raises(ZeroDivisionError):
+            appendix.Appendix(powers_of_two(), mpmath.mpc(3 * 2.0**16 * 1j))
+        lambda_1, lambda_2, *_ = appendix.Appendix(powers_of_two(), mpmath.mpc(2.0**18)).lambdas
+        assert lambda_1 == lambda_2
+
+
+@pytest.mark.parametrize("omega", [71.505682466890, 204.333139363807, 537.952620541657, 1046.821121534289])
+def test_the_published_roots_of_the_default_arm(omega):
+    """The undamped frequencies of theory.md: 13 right digits, and the determinant has one root there, none beside."""
+    arm = tfarm.load("sasaki2012-lab")
+    assert appendix.roots_near(arm, omega, 13) == 1
+    assert appendix.roots_near(arm, omega * (1 + 1e-11), 12) == 0
+
+
+def test_roots_with_more_digits_than_a_float():
+    arm = tfarm.load("sasaki2012")
+    text = tfarm.modes(arm, 3).digits(30)[2]
+    assert appendix.roots_near(arm, text, 29) == 1
+    assert appendix.roots_near(arm, float(text), 20) == 0
+
+
+def test_the_mode_at_the_cut_off_is_a_root():
+    """The mode W = 0, Psi = const of a pinned-pinned arm at its cut-off is a root of the 4x4 determinant as well."""
+    arm = powers_of_two(hub=0.0, mass=math.inf, inertia=0.0)
+    assert appendix.roots_near(arm, 3 * 2.0**16, 12) == 1
+
+
+@pytest.mark.parametrize("name", ["hub_angle", "tip_displacement", "root_moment"])
+def test_at_s_0_the_limit_or_an_error(name):
+    arm = powers_of_two()
+    if name == "root_moment":
+        limit = -(arm.total_inertia - arm.hub.inertia) / arm.total_inertia
+        assert float(appendix.response(arm, name, 0j, 15).real) == pytest.approx(limit, rel=2 * EPS)
+    else:
+        with pytest.raises(ConvergenceError, match=r"no 15 digits of .* a pole"):
+            appendix.response(arm, name, 0j, 15)
+
+
+def test_delta_has_no_value_where_a_wave_vanishes():
+    with pytest.raises(ConvergenceError, match="no value at s = 196608j"):
+        appendix.determinant(powers_of_two(), 3 * 2.0**16 * 1j, 15)
+
+
+@pytest.mark.parametrize("x", [None, -0.1, 1.1, math.nan])
+def test_a_point_outside_the_arm(x):
+    with pytest.raises(ParameterError, match=r"x = .*: a point of the arm lies between 0 and 1.0 m"):
+        appendix.response(powers_of_two(), "moment", 5j, 15, x=x)
+
+
+def test_what_the_ends_hold_is_zero():
+    arm = powers_of_two(mass=0.0, inertia=0.0)
+    held = powers_of_two(mass=math.inf)
+    assert appendix.response(arm, "moment", 5j, 15, x=1.0) == appendix.response(arm, "shear", 5j, 15, x=1.0) == 0
+    assert appendix.response(held, "tip_displacement", 5j, 15) == 0
+    assert appendix.response(arm, "deflection", 5j, 15, x=0.0) == appendix.response(arm, "rotation", 5j, 15, x=0.0) == 0
+
+
+def test_no_overflow_at_huge_s():
+    """As s -> inf along the real axis no wave comes back from the tip: Theta of a half-infinite arm in closed form."""
+    arm = powers_of_two()
+    for s in (1e8, 1e20, 1e60):
+        with mpmath.workdps(40):
+            at = appendix.Appendix(arm, mpmath.mpc(s))
+            (l1, g1), (l2, g2), *_ = at.waves
+            expected = 1 / (arm.hub.inertia * at.s**2 + at.EI * (g1 * l1 - g2 * l2) / (g1 - g2))
+            assert abs(appendix.response(arm, "hub_angle", s + 0j, 30) / expected - 1) < mpmath.mpf(10) ** -30

@@ -1,0 +1,139 @@
+"""Two other solutions of the arm's equations, which share nothing with tfarm but the equations themselves.
+
+`Ritz`: shear strain and curvature as Legendre series, Psi and W by integration.  The strain energy is then diagonal, so
+that low frequencies keep their digits at any slenderness, and natural end conditions need nothing.
+`shooting`: the state (w, psi, M, Q) carried along the arm by the matrix exponential, in mpmath.
+"""
+
+import math
+from functools import cache
+
+import mpmath
+import numpy as np
+from numpy.polynomial import legendre
+from scipy.linalg import eigh, null_space
+
+
+class Ritz:
+    """A Galerkin model of an arm, SI, with `terms` Legendre polynomials for each of the two strains."""
+
+    def __init__(self, arm, terms=40):
+        link, payload = arm.link, arm.payload
+        self.arm, L, n = arm, link.length, terms
+        x, weight, once, twice, once_tip, twice_tip = _legendre(terms)
+        bend, slip = math.sqrt(L / link.EI), math.sqrt(L / link.kGA)  # unit energy a coordinate
+        # coordinates: (psi(0), then curvature)/bend, then shear strain/slip
+        self.psi = bend * np.hstack([np.ones((x.size, 1)), once, np.zeros((x.size, n))])
+        self.w = L * np.hstack([x[:, None] * bend, twice * bend, once * slip / L])
+        self.tip_psi = bend * np.r_[1.0, once_tip, np.zeros(n)]
+        self.tip_w = L * np.r_[bend, twice_tip * bend, once_tip * slip / L]
+        self.hub_psi = np.r_[bend, np.zeros(2 * n)]
+        if arm.hub.inertia < payload.mass * L**2 < math.inf:  # the chord's angle for psi(0): a heavy tip stays on it
+            slopes = self.tip_w[1:] / self.tip_w[0]
+            for motion in (self.psi, self.w, self.tip_psi, self.tip_w, self.hub_psi):
+                motion[..., 1:] -= motion[..., :1] * slopes
+        self.mass = L * (link.rhoA * (self.w.T * weight) @ self.w + link.rhoI * (self.psi.T * weight) @ self.psi)
+        held = []
+        ends = ((arm.hub.inertia, self.hub_psi), (payload.mass, self.tip_w), (payload.inertia, self.tip_psi))
+        for inertia, motion in ends:
+            if math.isinf(inertia):
+                held.append(motion / np.linalg.norm(motion))
+            else:
+                self.mass = self.mass + inertia * np.outer(motion, motion)
+        self.stiffness = np.r_[0.0, np.ones(2 * n)]  # the whole stiffness matrix, for these coordinates
+        self.bending = np.r_[0.0, np.ones(n), np.zeros(n)]
+        self.free = null_space(np.array(held)) if held else np.eye(2 * n + 1)
+
+    def natural_frequencies(self, count):
+        """The first frequencies [rad/s] but the rigid-body one: roots of the largest eigenvalues of K^-1 M."""
+        return np.sqrt(1.0 / self.flexibilities()[0][:count])
+
+    def flexibilities(self):
+        """1/w^2 in descending order and their modes; a rigid rotation is condensed out of the mass."""
+        K, M = self._reduced()
+        values, vectors = np.linalg.eigh(K)
+        rigid, strained = vectors[:, values < 1e-9], vectors[:, values >= 1e-9] / np.sqrt(values[values >= 1e-9])
+        mixed = rigid.T @ M @ strained
+        carried = -np.linalg.solve(rigid.T @ M @ rigid, mixed) if rigid.size else mixed
+        modes = strained + rigid @ carried
+        flexibility, coordinates = eigh(strained.T @ M @ strained + mixed.T @ carried)
+        return flexibility[::-1], self.free @ modes @ coordinates[:, ::-1]
+
+    def response(self, s, load):
+        """Coordinates under the generalised load (hub torque: `hub_psi`, tip force: `tip_w`) at s."""
+        K = np.diag(self.stiffness + self.arm.link.damping * s * self.bending)
+        A = self.free.T @ (K + s**2 * self.mass) @ self.free
+        return self.free @ np.linalg.solve(A, self.free.T @ load)
+
+    def _reduced(self):
+        return self.free.T @ np.diag(self.stiffness) @ self.free, self.free.T @ self.mass @ self.free
+
+
+@cache
+def _legendre(terms):
+    """Gauss points and weights on 0..1; first and second integrals of the orthonormal polynomials there and at 1."""
+    nodes, weights = legendre.leggauss(terms + 8)
+    series = [np.eye(terms)[j] * math.sqrt(2 * j + 1) for j in range(terms)]
+
+    def integral(order, at):
+        integrals = (legendre.legint(p, order, lbnd=-1, scl=0.5) for p in series)
+        return np.stack([legendre.legval(at, p) for p in integrals], axis=-1)
+
+    return (nodes + 1) / 2, weights / 2, *(integral(order, at) for at in (nodes, 1.0) for order in (1, 2))
+
+
+def shooting(arm, s, *, x=(), torque=1, tip_force=0, digits=40):
+    """(w, psi, M, Q) at 0, at each x and at L [m], by mpmath.expm, for a hub torque and a force on the tip.
+
+    Where the hub is locked `torque` is the hub angle.  mpmath numbers, with about `digits` right digits.
+    """
+    link, payload = arm.link, arm.payload
+    guard = int(2 * abs(link.length * max(_rates(arm, s)))) + 30 + max(0, int(-6 * math.log10(abs(s) + 1e-300)))
+    with mpmath.workdps(digits + guard):
+        s = mpmath.mpc(s)
+        E, I, A = (mpmath.mpf(v) for v in (link.youngs_modulus, link.section.second_moment, link.section.area))
+        rho, L = mpmath.mpf(link.density), mpmath.mpf(link.length)
+        kGA = mpmath.mpf(link.shear_factor) * mpmath.mpf(link.shear_modulus) * A
+        EI = E * I * (1 + mpmath.mpf(link.damping) * s)
+        march = mpmath.matrix([
+            [0, 1, 0, 1 / kGA],
+            [0, 0, 1 / EI, 0],
+            [0, rho * I * s**2, 0, -1],
+            [rho * A * s**2, 0, 0, 0],
+        ])  # fmt: skip
+        T = mpmath.expm(march * L)
+        m, m_force = _body(payload.mass, s)
+        Ic, Ic_force = _body(payload.inertia, s)
+        Ih, Ih_force = _body(arm.hub.inertia, s)
+        rows = [
+            [m * T[0, j] + m_force * T[3, j] for j in (1, 2, 3)],
+            [Ic * T[1, j] + Ic_force * T[2, j] for j in (1, 2, 3)],
+            [Ih, -Ih_force, 0],
+        ]
+        psi, M, Q = _cramer(rows, [m_force * tip_force, 0, torque])
+        root = mpmath.matrix([0, psi, M, Q])
+        return [root, *(mpmath.expm(march * mpmath.mpf(at)) * root for at in x), T * root]
+
+
+def _body(inertia, s):
+    return (mpmath.mpf(1), 0) if math.isinf(inertia) else (mpmath.mpf(inertia) * s**2, 1)
+
+
+def _cramer(a, b):
+    def det(m):
+        (a, b, c), (d, e, f), (g, h, i) = m
+        return a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
+
+    whole = det(a)
+    return [
+        det([[b[r] if j == column else a[r][j] for j in range(3)] for r in range(3)]) / whole for column in range(3)
+    ]
+
+
+def _rates(arm, s):
+    """Rough sizes of the two wave numbers [1/m]."""
+    link = arm.link
+    d = 1 + link.damping * s
+    quartic = [1, 0, -(s**2) * (link.rhoI / (link.EI * d) + link.rhoA / link.kGA), 0, 0]
+    quartic[4] = s**2 * link.rhoA / (link.EI * d) * (1 + s**2 * link.rhoI / link.kGA)
+    return abs(np.roots(quartic))

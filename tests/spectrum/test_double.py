@@ -1,0 +1,149 @@
+"""Frequencies that are double, or nearly: no sign change shows them, and each of the two keeps its digits."""
+
+import math
+
+import flint
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import tfarm
+from tests.spectrum.test_frequencies import brackets
+from tests.strategies import arm_of
+from tfarm.exact import balls
+from tfarm.exact.coefficients import coefficients
+from tfarm.spectrum.search import count_below, natural_frequencies
+
+EPS = np.finfo(float).eps
+
+
+def steel(slenderness, *, hub=0.0, mass=math.inf, inertia=0.0):
+    return arm_of(
+        length=1.0,
+        slenderness=slenderness,
+        width=1.0,
+        density=7800.0,
+        E=2e11,
+        nu=0.3,
+        damping=0.0,
+        hub=hub,
+        mass=mass,
+        inertia=inertia,
+    )
+
+
+def pinned_pinned(arm, n):
+    """Both frequencies of half wave n: rhoI/kGA w^4 - (1 + q (EI/kGA + rhoI/rhoA)) w^2 + q^2 EI/rhoA = 0."""
+    link, q = arm.link, (n * math.pi / arm.link.length) ** 2
+    a, b = link.rhoI / link.kGA, 1 + q * (link.EI / link.kGA + link.rhoI / link.rhoA)
+    c = q * q * link.EI / link.rhoA
+    upper = (b + math.sqrt(b * b - 4 * a * c)) / (2 * a)
+    return math.sqrt(c / (a * upper)), math.sqrt(upper)
+
+
+@pytest.mark.parametrize("slenderness", [1.5, 3.3, 40.0])
+def test_pinned_pinned_has_two_spectra_and_the_cut_off(slenderness):
+    """In closed form: two frequencies a half wave, and W = 0, Psi = const at the cut-off."""
+    arm = steel(slenderness)
+    branches = [pinned_pinned(arm, n) for n in range(1, 60)]
+    everything = np.sort(np.r_[np.ravel(branches), arm.shear_cutoff])[:50]
+    np.testing.assert_allclose(tfarm.modes(arm, 50).natural_frequency, everything, rtol=16 * EPS)
+
+
+@pytest.mark.parametrize(("bending", "shear"), [(3, 1), (4, 1), (4, 2), (6, 3)])
+def test_where_the_two_spectra_cross_both_are_listed(bending, shear):
+    """L/h such that half wave `bending` of one spectrum meets half wave `shear` of the other."""
+
+    def gap(slenderness):
+        arm = steel(slenderness)
+        return pinned_pinned(arm, bending)[0] / pinned_pinned(arm, shear)[1] - 1
+
+    arm = steel(brentq(gap, 1.0, 40.0, xtol=1e-15))
+    omega, _ = pinned_pinned(arm, bending)
+    k = coefficients(arm)
+    assert count_below(k, omega * (1 + 1e-12)) - count_below(k, omega * (1 - 1e-12)) == 2
+    modes = tfarm.modes(arm, bending + shear + 3)
+    pair = abs(modes.natural_frequency / omega - 1) < 1e-14
+    assert pair.sum() == 2
+    x = np.linspace(0, 1, 9)
+    assert modes.orthogonality() < 1e4 * EPS
+    shapes = modes.shape(x)[pair]
+    for half_waves in (bending, shear):  # both lie in the plane of the two
+        wave = np.sin(half_waves * math.pi * x)
+        coordinates, *_ = np.linalg.lstsq(shapes.T, wave, rcond=None)
+        assert abs(shapes.T @ coordinates - wave).max() < 1e4 * EPS
+
+
+def test_the_mode_at_the_cut_off():
+    """I_h = 0, m = inf, I_c = 0: w^2 = kGA/rhoI, W = 0, Psi constant; a frequency like any other."""
+    arm = steel(5.0)
+    modes = tfarm.modes(arm, 20)
+    (row,) = np.nonzero(abs(modes.natural_frequency / arm.shear_cutoff - 1) < 8 * EPS)[0]
+    x = np.linspace(0, 1, 11)
+    assert abs(modes.shape(x)[row]).max() < 64 * EPS * abs(modes.rotation(x)[row]).max()
+    np.testing.assert_allclose(modes.rotation(x)[row], 1 / math.sqrt(arm.link.rhoI), rtol=64 * EPS)
+
+
+@pytest.mark.parametrize("inertia", [1e-9, 1e-7, 1e-5])
+@pytest.mark.parametrize("where", ["hub", "inertia"])
+def test_a_light_body_splits_the_crossing(where, inertia):
+    """One of the pair can keep its place, the other moves in proportion: right to the last bit at any gap."""
+
+    def gap(slenderness):
+        arm = steel(slenderness)
+        return pinned_pinned(arm, 4)[0] / pinned_pinned(arm, 1)[1] - 1
+
+    arm = steel(brentq(gap, 1.0, 40.0, xtol=1e-15), **{where: inertia})
+    k = coefficients(arm)
+    omega, _ = pinned_pinned(arm, 4)
+    pair = [float(f) for f in natural_frequencies(k, 1, 9) if abs(f / omega - 1) < 2e-3]
+    assert len(pair) == 2
+    assert all(brackets(k, each, 4) for each in pair)
+
+
+def clamped(slenderness):
+    return steel(slenderness, hub=math.inf, inertia=math.inf)
+
+
+def test_a_true_crossing_of_symmetric_and_antisymmetric_modes():
+    """Clamped at both ends, modes 21 and 22 cross at L/h = 5.95724561.
+
+    There D(i w) has a double zero, which float64 alone would see to 1e-9 only: half the digits.
+    """
+
+    def signed_gap(slenderness):
+        modes = tfarm.modes(clamped(slenderness), 22)
+        lower, upper = modes.natural_frequency[-2:]
+        left, right = modes.shape(np.array([0.3, 0.7]))[-2]
+        return math.copysign(upper / lower - 1, left * right)
+
+    crossing = brentq(signed_gap, 5.957, 5.9575, xtol=1e-15)
+    assert crossing == pytest.approx(5.95724561021, abs=1e-10)
+    for away in (1e-11, 1e-9, 1e-7, 1e-5):
+        modes = tfarm.modes(clamped(crossing + away), 22)
+        lower, upper = modes.natural_frequency[-2:]
+        assert upper / lower - 1 == pytest.approx(0.0495276 * away, rel=1e-4, abs=8 * EPS)
+        k = coefficients(modes.arm)
+        assert brackets(k, lower, 8)
+        assert brackets(k, upper, 8)
+        assert modes.orthogonality() < 1e4 * EPS
+    at = tfarm.modes(clamped(crossing), 22)
+    assert at.natural_frequency[-1] / at.natural_frequency[-2] - 1 < 8 * EPS
+    assert at.orthogonality() < 1e4 * EPS
+
+
+def test_a_double_frequency_is_a_double_zero_of_the_drive():
+    """By balls: D(i w) has the same sign on both sides, and its slope in w^2 vanishes against its curvature."""
+
+    def gap(slenderness):
+        return pinned_pinned(steel(slenderness), 3)[0] / pinned_pinned(steel(slenderness), 1)[1] - 1
+
+    arm = steel(brentq(gap, 1.0, 40.0, xtol=1e-15))
+    k, omega = coefficients(arm), pinned_pinned(arm, 3)[0]
+    with balls.precision(200):
+        low, middle, high = (
+            balls.State(k, flint.acb(0, flint.arb(omega) * (1 + flint.arb(step)))).input.real
+            for step in (-1e-5, 0.0, 1e-5)
+        )
+        assert bool(low * high > 0)
+        assert bool(abs(middle) < abs(low) * 1e-9)
