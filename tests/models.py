@@ -6,7 +6,7 @@ that low frequencies keep their digits at any slenderness, and natural end condi
 """
 
 import math
-from functools import cache
+from functools import lru_cache
 
 import mpmath
 import numpy as np
@@ -15,23 +15,24 @@ from scipy.linalg import eigh, null_space
 
 
 class Ritz:
-    """A Galerkin model of an arm, SI, with `terms` Legendre polynomials for each of the two strains."""
+    """A Galerkin model of an arm, SI, with `terms` Legendre polynomials for each of the two strains.
+
+    Coordinates: psi(0) and the series of curvature, in units of unit energy, then that of the shear strain.
+    """
 
     def __init__(self, arm, terms=40):
         link, payload = arm.link, arm.payload
-        self.arm, L, n = arm, link.length, terms
-        x, weight, once, twice, once_tip, twice_tip = _legendre(terms)
-        bend, slip = math.sqrt(L / link.EI), math.sqrt(L / link.kGA)  # unit energy a coordinate
-        # coordinates: (psi(0), then curvature)/bend, then shear strain/slip
-        self.psi = bend * np.hstack([np.ones((x.size, 1)), once, np.zeros((x.size, n))])
-        self.w = L * np.hstack([x[:, None] * bend, twice * bend, once * slip / L])
-        self.tip_psi = bend * np.r_[1.0, once_tip, np.zeros(n)]
-        self.tip_w = L * np.r_[bend, twice_tip * bend, once_tip * slip / L]
-        self.hub_psi = np.r_[bend, np.zeros(2 * n)]
+        self.arm, self.terms, L = arm, terms, link.length
+        self._bend, self._slip = math.sqrt(L / link.EI), math.sqrt(L / link.kGA)
+        self._slopes = np.zeros(2 * terms)
         if arm.hub.inertia < payload.mass * L**2 < math.inf:  # the chord's angle for psi(0): a heavy tip stays on it
-            slopes = self.tip_w[1:] / self.tip_w[0]
-            for motion in (self.psi, self.w, self.tip_psi, self.tip_w, self.hub_psi):
-                motion[..., 1:] -= motion[..., :1] * slopes
+            tip_w = self.motion(np.ones(1))[0][0]
+            self._slopes = tip_w[1:] / tip_w[0]
+        points, weight = _gauss(terms + 8)
+        self.x = L * points
+        self.w, self.psi = self.motion(points)
+        (self.tip_w,), (self.tip_psi,) = self.motion(np.ones(1))
+        self.hub_psi = self.motion(np.zeros(1))[1][0]
         self.mass = L * (link.rhoA * (self.w.T * weight) @ self.w + link.rhoI * (self.psi.T * weight) @ self.psi)
         held = []
         ends = ((arm.hub.inertia, self.hub_psi), (payload.mass, self.tip_w), (payload.inertia, self.tip_psi))
@@ -40,9 +41,17 @@ class Ritz:
                 held.append(motion / np.linalg.norm(motion))
             else:
                 self.mass = self.mass + inertia * np.outer(motion, motion)
-        self.stiffness = np.r_[0.0, np.ones(2 * n)]  # the whole stiffness matrix, for these coordinates
-        self.bending = np.r_[0.0, np.ones(n), np.zeros(n)]
-        self.free = null_space(np.array(held)) if held else np.eye(2 * n + 1)
+        self.stiffness = np.r_[0.0, np.ones(2 * terms)]  # the whole stiffness matrix, for these coordinates
+        self.bending = np.r_[0.0, np.ones(terms), np.zeros(terms)]
+        self.free = null_space(np.array(held)) if held else np.eye(2 * terms + 1)
+
+    def motion(self, share):
+        """w and psi of each coordinate at shares of the length: two arrays (points, coordinates)."""
+        once, twice = _integrals(self.terms, tuple(share.tolist()))
+        one, L = np.ones((share.size, 1)), self.arm.link.length
+        w = L * np.hstack([self._bend * share[:, None], self._bend * twice, self._slip / L * once])
+        psi = self._bend * np.hstack([one, once, 0 * once])
+        return tuple(field - np.hstack([0 * one, field[:, :1] * self._slopes]) for field in (w, psi))
 
     def natural_frequencies(self, count):
         """The first frequencies [rad/s] but the rigid-body one: roots of the largest eigenvalues of K^-1 M."""
@@ -50,7 +59,7 @@ class Ritz:
 
     def flexibilities(self):
         """1/w^2 in descending order and their modes; a rigid rotation is condensed out of the mass."""
-        K, M = self._reduced()
+        K, M = self.free.T @ np.diag(self.stiffness) @ self.free, self.free.T @ self.mass @ self.free
         values, vectors = np.linalg.eigh(K)
         rigid, strained = vectors[:, values < 1e-9], vectors[:, values >= 1e-9] / np.sqrt(values[values >= 1e-9])
         mixed = rigid.T @ M @ strained
@@ -65,21 +74,23 @@ class Ritz:
         A = self.free.T @ (K + s**2 * self.mass) @ self.free
         return self.free @ np.linalg.solve(A, self.free.T @ load)
 
-    def _reduced(self):
-        return self.free.T @ np.diag(self.stiffness) @ self.free, self.free.T @ self.mass @ self.free
+
+def _gauss(points):
+    nodes, weights = legendre.leggauss(points)
+    return (nodes + 1) / 2, weights / 2
 
 
-@cache
-def _legendre(terms):
-    """Gauss points and weights on 0..1; first and second integrals of the orthonormal polynomials there and at 1."""
-    nodes, weights = legendre.leggauss(terms + 8)
+@lru_cache(maxsize=64)
+def _integrals(terms, share):
+    """First and second integral from 0 of the Legendre polynomials that are orthonormal on 0..1, at these points."""
+    at = 2 * np.array(share) - 1
     series = [np.eye(terms)[j] * math.sqrt(2 * j + 1) for j in range(terms)]
 
-    def integral(order, at):
+    def integral(order):
         integrals = (legendre.legint(p, order, lbnd=-1, scl=0.5) for p in series)
         return np.stack([legendre.legval(at, p) for p in integrals], axis=-1)
 
-    return (nodes + 1) / 2, weights / 2, *(integral(order, at) for at in (nodes, 1.0) for order in (1, 2))
+    return integral(1), integral(2)
 
 
 def shooting(arm, s, *, x=(), torque=1, tip_force=0, digits=40):

@@ -184,7 +184,7 @@ class Modes:
             turn = 1.0 / math.sqrt(self.arm.total_inertia)
             rigid = (turn * share.ravel(), np.full(share.size, turn), *np.zeros((2, share.size)))[which]
             values = np.vstack([rigid, values])
-        return values.reshape(-1, *share.shape)
+        return values.reshape(len(values), *share.shape)
 
     def _nodes(self, mode: int) -> Real:
         """Interior zeros of W: bracketed on a grid finer than its waves, polished by Newton (W' = Psi + sigma Q)."""

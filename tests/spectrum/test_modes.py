@@ -1,0 +1,253 @@
+"""Mode shapes, hub participation, energies, nodes and sensitivities, each by a road the code does not take."""
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import flint
+import mpmath
+import numpy as np
+import pytest
+from numpy.polynomial import chebyshev
+
+import tfarm
+from tests.models import Ritz
+from tests.strategies import BOUNDARY_CASES, some_arm
+from tfarm import Hub, Link, ParameterError, Payload, Section
+from tfarm.exact import balls
+from tfarm.exact.coefficients import THEORIES, coefficients
+from tfarm.spectrum import PARAMETERS
+from tfarm.spectrum.precise import refine
+
+EPS = np.finfo(float).eps
+COUNT = 10
+
+
+def arm_for(case):
+    return some_arm(np.random.default_rng(400 + BOUNDARY_CASES.index(case)), case, damping=0.0)
+
+
+@pytest.fixture(params=BOUNDARY_CASES, ids="-".join)
+def modes(request):
+    return tfarm.modes(arm_for(request.param), COUNT)
+
+
+def gauss(arm, points=120):
+    nodes, weights = np.polynomial.legendre.leggauss(points)
+    return arm.link.length * (nodes + 1) / 2, arm.link.length * weights / 2
+
+
+def modal_mass(modes):
+    """int rho A w w + rho I psi psi, and the bodies at the ends: by one Gauss rule of 120 points."""
+    arm, (x, weights) = modes.arm, gauss(modes.arm)
+    w, psi = modes.shape(x), modes.rotation(x)
+    mass = arm.link.rhoA * (w * weights) @ w.T + arm.link.rhoI * (psi * weights) @ psi.T
+    tip = arm.link.length
+    bodies = (arm.hub.inertia, modes.hub_participation), (arm.payload.mass, modes.shape(tip))
+    for inertia, motion in (*bodies, (arm.payload.inertia, modes.rotation(tip))):
+        if math.isfinite(inertia):
+            mass = mass + inertia * np.outer(motion, motion)
+    return mass
+
+
+def test_modes_are_orthogonal_and_of_unit_modal_mass(modes):
+    """The rigid-body one included; what both bodies at the ends cancel is lost, so the scale is theirs."""
+    np.testing.assert_allclose(modal_mass(modes), np.eye(len(modes)), atol=1e4 * EPS)
+
+
+def test_the_potential_energy_is_half_the_square_of_the_frequency(modes):
+    """int M^2/EI + Q^2/kGA = w^2 at unit modal mass: bending and shear, the payload and the hub have none."""
+    link, (x, weights) = modes.arm.link, gauss(modes.arm)
+    energy = modes.moment(x) ** 2 @ weights / link.EI + modes.shear(x) ** 2 @ weights / link.kGA
+    np.testing.assert_allclose(energy, modes.natural_frequency**2, rtol=1e4 * EPS)
+
+
+def test_the_fields_obey_the_equations_of_motion(modes):
+    """w' = psi + Q/kGA, psi' = M/EI, M' = -rhoI w^2 psi - Q, Q' = -rhoA w^2 w: by Chebyshev differentiation.
+
+    Differentiating n points spectrally multiplies rounding by n^2.
+    """
+    link, n = modes.arm.link, 60
+    nodes = chebyshev.chebpts1(n)
+    x, square = link.length * (nodes + 1) / 2, modes.natural_frequency[:, None] ** 2
+    fields = modes.shape(x), modes.rotation(x), modes.moment(x), modes.shear(x)
+    w, psi, M, Q = fields
+    right = (psi, Q / link.kGA), (M / link.EI,), (-link.rhoI * square * psi, -Q), (-link.rhoA * square * w,)
+    for field, terms in zip(fields, right, strict=True):
+        coefficients_of = chebyshev.chebfit(nodes, field.T, n - 1)
+        derivative = chebyshev.chebval(nodes, chebyshev.chebder(coefficients_of)) * 2 / link.length
+        scale = sum(abs(term).max(axis=1, keepdims=True) for term in (*terms, field / link.length))
+        assert (abs(derivative - sum(terms)) <= 40 * n * n * EPS * scale).all()
+
+
+def turning(arm, omega):
+    """Moment per rotation of a wave at omega: the scale of moments for the mode at the cut-off, where nothing bends."""
+    link = arm.link
+    return link.EI / link.length + omega * math.sqrt(link.EI * link.rhoI)
+
+
+def test_the_ends_hold_what_they_should(modes):
+    """w(0) = 0; I_h w^2 b = -M(0); m w^2 w(L) = Q(L); I_c w^2 psi(L) = M(L); or no motion at all."""
+    arm, L, square = modes.arm, modes.arm.link.length, modes.natural_frequency**2
+    x = np.linspace(0, L, 200)
+    peaks = {name: abs(getattr(modes, name)(x)).max(axis=1) for name in ("shape", "rotation", "moment", "shear")}
+    peaks["moment"] += turning(arm, modes.natural_frequency) * peaks["rotation"]
+    peaks["shape"] += L * peaks["rotation"]
+    assert (abs(modes.shape(0.0)) <= 1e3 * EPS * peaks["shape"]).all()
+    ends = (
+        (arm.hub.inertia, modes.rotation(0.0), -modes.moment(0.0), "rotation", "moment"),
+        (arm.payload.mass, modes.shape(L), modes.shear(L), "shape", "shear"),
+        (arm.payload.inertia, modes.rotation(L), modes.moment(L), "rotation", "moment"),
+    )
+    for inertia, motion, load, moves, loads in ends:
+        if math.isinf(inertia):
+            assert (abs(motion) <= 1e3 * EPS * peaks[moves]).all()
+        else:
+            scale = inertia * square * peaks[moves] + peaks[loads]
+            assert (abs(inertia * square * motion - load) <= 1e4 * EPS * scale).all()
+
+
+def test_the_tip_moves_up(modes):
+    tip = modes.shape(modes.arm.link.length)
+    if math.isfinite(modes.arm.payload.mass):
+        assert (tip > 0).all()
+
+
+def test_the_hub_participation_is_a_residue(modes):
+    """b^2 = lim (s^2 + w^2) theta/u, from the free response in balls: theta divided by the slope of the torque."""
+    if modes.arm.is_locked:
+        assert not modes.hub_participation.any()
+        return
+    k, squares = modes._k, []
+    for omega in modes.natural_frequency[modes.index > 0]:
+        with balls.precision(400):
+            root = flint.arb(refine(k, float(omega), 60))
+            S, step = -root * root, root * root * flint.arb(2) ** -130
+            here, there = (balls.State(k, flint.acb(0, (-at).sqrt())) for at in (S, S + step))
+            slope = (there.input - here.input).real / step
+            residue = here.theta.real / slope * balls.rational(k.length / k.EI)
+            squares.append(float(residue.mid()))
+    np.testing.assert_allclose(modes.hub_participation[modes.index > 0] ** 2, squares, rtol=1e4 * EPS)
+
+
+def test_the_modal_moment_drives_the_hub(modes):
+    """-I_h w^2 b: exact at C = 0."""
+    if modes.arm.is_locked:
+        return
+    driven = -modes.arm.hub.inertia * modes.natural_frequency**2 * modes.hub_participation
+    x = np.linspace(0, modes.arm.link.length, 100)
+    peak = abs(modes.moment(x)).max(axis=1)
+    peak += turning(modes.arm, modes.natural_frequency) * abs(modes.rotation(x)).max(axis=1)
+    assert (abs(modes.modal_moment - driven) <= 1e4 * EPS * peak).all()
+
+
+def test_modal_sums_give_the_response():
+    """theta/u = sum of b^2/(s^2 + w^2), in the limit: b^2 falls as w^-3 once the hub outweighs the arm in inertia."""
+    arm = tfarm.load("sasaki2012")
+    modes, s = tfarm.modes(arm, 60), 3.0 + 100.0j
+    terms = modes.hub_participation**2 / (s**2 + modes.natural_frequency**2)
+    exact = tfarm.transfer(arm, "hub_angle")(s)
+    left = [abs(terms[:n].sum() / exact - 1) for n in (2, 6, 18, 54)]
+    assert all(after < before / 100 for before, after in pairwise(left))
+
+
+@pytest.mark.parametrize("case", BOUNDARY_CASES, ids="-".join)
+def test_shapes_and_nodes_are_those_of_a_ritz_model(case):
+    """As many nodes as the shape of a model of polynomials changes sign, and zeros of the shape each of them."""
+    arm = arm_for(case)
+    beam = arm.link.rhoA * arm.link.length
+    bodies = {"zero": 0.0, "some": 0.7, "infinite": math.inf}  # heavier ones have a node too near an end to tell
+    hub, mass, inertia = (bodies[kind] for kind in case)
+    unit = beam * arm.link.length**2
+    arm = replace(arm, hub=Hub(inertia=hub * unit), payload=Payload(mass=mass * beam, inertia=0.01 * inertia * unit))
+    modes, model = tfarm.modes(arm, 8), Ritz(arm)
+    x = np.r_[0, np.geomspace(1e-6, 1e-2, 30), np.linspace(0.01, 1, 400)[1:]]
+    shapes = (model.motion(x)[0] @ model.flexibilities()[1][:, :8]).T
+    x = x * arm.link.length
+    for row, theirs in enumerate(shapes, int(arm.has_rigid_mode)):
+        mine, nodes = modes.shape(x)[row], modes.nodes[row]
+        if abs(mine).max() < 1e-6 * arm.link.length * abs(modes.rotation(x)[row]).max():
+            assert not nodes.size  # the mode at the cut-off
+            continue
+        scale = (mine @ theirs) / (theirs @ theirs)
+        assert abs(mine - scale * theirs).max() < 1e-7 * abs(mine).max()
+        signs = np.sign(theirs[1:-1] if math.isinf(mass) else theirs[1:])
+        assert nodes.size == (np.diff(signs) != 0).sum()
+        assert ((nodes > 0) & (nodes < arm.link.length)).all()
+        slope = modes.rotation(nodes)[row] + modes.shear(nodes)[row] / arm.link.kGA
+        rounding = 64 * EPS * (abs(slope) * arm.link.length + abs(mine).max())
+        assert (abs(modes.shape(nodes)[row]) <= rounding).all()
+
+
+def varied(arm, name, factor):
+    """The arm with one parameter multiplied."""
+    if name in ("hub_inertia", "payload_mass", "payload_inertia"):
+        hub, payload = arm.hub, arm.payload
+        if name == "hub_inertia":
+            return replace(arm, hub=Hub(inertia=hub.inertia * factor))
+        part = name.removeprefix("payload_")
+        return replace(arm, payload=replace(payload, **{part: getattr(payload, part) * factor}))
+    link, section = arm.link, arm.link.section
+    parts = {"area": section.area, "second_moment": section.second_moment, "shear_factor": link.shear_factor}
+    numbers = {n: getattr(link, n) for n in ("length", "density", "youngs_modulus", "shear_modulus")}
+    for group in (parts, numbers):
+        if name in group:
+            group[name] *= factor
+    return replace(arm, link=Link(**numbers, section=Section.general(**parts)))
+
+
+@pytest.mark.parametrize("theory", THEORIES)
+@pytest.mark.parametrize("case", [("some",) * 3, ("zero", "infinite", "some"), ("infinite", "zero", "infinite")])
+def test_sensitivities_are_central_differences(case, theory):
+    """Of the logarithms, fourth order with 4 h: their error is h^4 of the fifth derivative and eps/h."""
+    arm = arm_for(case)
+    exact, h = tfarm.modes(arm, COUNT, theory=theory), 2.0**-9
+    kept = exact.index > 0
+    for name in PARAMETERS:
+        log = {
+            n: np.log(tfarm.modes(varied(arm, name, math.exp(n * h)), COUNT, theory=theory).natural_frequency[kept])
+            for n in (-2, -1, 1, 2)
+        }
+        if math.isinf({"hub_inertia": arm.hub.inertia}.get(name, 0.0)):
+            continue
+        difference = (8 * (log[1] - log[-1]) - (log[2] - log[-2])) / (12 * h)
+        np.testing.assert_allclose(exact.sensitivity[name][kept], difference, atol=50 * (h**4 + EPS / h))
+
+
+def test_sensitivities_add_up(modes):
+    """Scaling laws: E, G and all inertias together leave w as it is; so do metres, with what they measure."""
+    sensitivity = modes.sensitivity
+    stiffness = sensitivity["youngs_modulus"] + sensitivity["shear_modulus"]
+    bodies = sum(sensitivity[name] for name in ("hub_inertia", "payload_mass", "payload_inertia"))
+    flexible = modes.index > 0
+    np.testing.assert_allclose(stiffness[flexible], 0.5, atol=1e4 * EPS)
+    np.testing.assert_allclose((sensitivity["density"] + bodies)[flexible], -0.5, atol=1e4 * EPS)
+    metres = sensitivity["length"] + 2 * sensitivity["area"] + 4 * sensitivity["second_moment"]
+    metres = metres + 3 * sensitivity["payload_mass"]
+    metres = metres + 5 * (sensitivity["hub_inertia"] + sensitivity["payload_inertia"])
+    np.testing.assert_allclose(metres[flexible], -1.0, atol=1e4 * EPS)
+
+
+def test_the_root_of_the_paper_s_determinant_is_the_frequency():
+    """With 40 digits, and confirmed by mpmath on the appendix."""
+    modes = tfarm.modes(tfarm.load("stocky-steel"), 6)
+    for text, omega in zip(modes.digits(40), modes.natural_frequency, strict=True):
+        with mpmath.workdps(50):
+            assert abs(mpmath.mpf(text) - float(omega)) <= 4 * EPS * omega
+
+
+def test_no_points_have_no_values():
+    assert tfarm.modes(tfarm.load("sasaki2012"), 3).shape(np.empty(0)).shape == (4, 0)
+
+
+@pytest.mark.parametrize("x", [-0.1, 1.1, math.nan])
+def test_a_point_outside_the_arm_has_no_shape(x):
+    with pytest.raises(ParameterError, match="a point of the arm lies between 0 and"):
+        tfarm.modes(tfarm.load("sasaki2012"), 1).shape(x)
+
+
+def test_euler_bernoulli_has_no_shear_energy():
+    arm = replace(tfarm.load("stocky-steel"), payload=Payload(mass=1.0, inertia=0.1))
+    for theory, without in (("euler-bernoulli", "shear_modulus"), ("rayleigh", "shear_modulus")):
+        assert not tfarm.modes(arm, 5, theory=theory).sensitivity[without].any()
+    assert coefficients(arm, "shear").a == 0
