@@ -101,3 +101,14 @@ def test_where_two_waves_are_equal_and_around_it():
                 assert float(abs(balls.point(complex(value)) / ball - 1).mid()) <= BOUND * (1 + condition)
     assert any(flagged)
     assert not all(flagged)
+
+
+def test_where_the_tip_hardly_moves_any_more():
+    """W falls below the smallest float while s^2 W does not: the tip's acceleration is right as long as it is one."""
+    rng, points = np.random.default_rng(8), []
+    while len(points) < 10:
+        arm = some_arm(rng, ("some", "some", "some"), damping=0.0)
+        k = coefficients(arm)
+        s = rng.uniform(690, 760) / math.sqrt(min(k.a, k.b)) + 0j
+        points += [point for point in measure(arm, s, 0.5) if point.name == "tip_acceleration"]
+    assert_accurate(points)

@@ -30,7 +30,7 @@ def fv5(shear_factor=None):
 def test_bending_frequencies_of_nafems_fv5():
     found = tfarm.modes(fv5(), 3).natural_frequency_hz
     assert found == pytest.approx(np.array([42.6449, 148.1493, 283.4684]), abs=5e-5)
-    assert found[0] == pytest.approx(TARGET[0], rel=1.25e-4)
+    assert found[0] == pytest.approx(TARGET[0], rel=1.25e-4, abs=0)
     assert found[1:] == pytest.approx(TARGET[1:], abs=5e-3)
 
 

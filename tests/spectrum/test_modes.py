@@ -52,7 +52,7 @@ def modal_mass(modes):
 
 def test_modes_are_orthogonal_and_of_unit_modal_mass(modes):
     """The rigid-body one included; what both bodies at the ends cancel is lost, so the scale is theirs."""
-    np.testing.assert_allclose(modal_mass(modes), np.eye(len(modes)), atol=1e4 * EPS)
+    np.testing.assert_allclose(modal_mass(modes), np.eye(len(modes)), rtol=0, atol=1e4 * EPS)
 
 
 def test_the_potential_energy_is_half_the_square_of_the_frequency(modes):
@@ -201,7 +201,7 @@ def varied(arm, name, factor):
 def test_sensitivities_are_central_differences(case, theory):
     """Of the logarithms, fourth order with 4 h: their error is h^4 of the fifth derivative and eps/h."""
     arm = arm_for(case)
-    exact, h = tfarm.modes(arm, COUNT, theory=theory), 2.0**-9
+    exact, h = tfarm.modes(arm, COUNT, theory=theory), 2.0**-10
     kept = exact.index > 0
     for name in PARAMETERS:
         log = {
@@ -211,7 +211,7 @@ def test_sensitivities_are_central_differences(case, theory):
         if math.isinf({"hub_inertia": arm.hub.inertia}.get(name, 0.0)):
             continue
         difference = (8 * (log[1] - log[-1]) - (log[2] - log[-2])) / (12 * h)
-        np.testing.assert_allclose(exact.sensitivity[name][kept], difference, atol=50 * (h**4 + EPS / h))
+        np.testing.assert_allclose(exact.sensitivity[name][kept], difference, rtol=0, atol=50 * (h**4 + EPS / h))
 
 
 def test_sensitivities_add_up(modes):
@@ -220,12 +220,12 @@ def test_sensitivities_add_up(modes):
     stiffness = sensitivity["youngs_modulus"] + sensitivity["shear_modulus"]
     bodies = sum(sensitivity[name] for name in ("hub_inertia", "payload_mass", "payload_inertia"))
     flexible = modes.index > 0
-    np.testing.assert_allclose(stiffness[flexible], 0.5, atol=1e4 * EPS)
-    np.testing.assert_allclose((sensitivity["density"] + bodies)[flexible], -0.5, atol=1e4 * EPS)
+    np.testing.assert_allclose(stiffness[flexible], 0.5, rtol=0, atol=1e4 * EPS)
+    np.testing.assert_allclose((sensitivity["density"] + bodies)[flexible], -0.5, rtol=0, atol=1e4 * EPS)
     metres = sensitivity["length"] + 2 * sensitivity["area"] + 4 * sensitivity["second_moment"]
     metres = metres + 3 * sensitivity["payload_mass"]
     metres = metres + 5 * (sensitivity["hub_inertia"] + sensitivity["payload_inertia"])
-    np.testing.assert_allclose(metres[flexible], -1.0, atol=1e4 * EPS)
+    np.testing.assert_allclose(metres[flexible], -1.0, rtol=0, atol=1e4 * EPS)
 
 
 def test_the_root_of_the_paper_s_determinant_is_the_frequency():
