@@ -210,6 +210,15 @@ def test_a_reader_that_leaves_early_is_no_error() -> None:
     assert done.stderr == ""
 
 
+def test_the_audit_has_a_row_an_equation(capsys: pytest.CaptureFixture[str]) -> None:
+    rows = answer(capsys, "audit")["rows"]
+    verdicts = {row["equation"]: row["verdict"] for row in rows}
+    assert {f"({n})" for n in range(1, 24)} <= set(verdicts)
+    assert verdicts["(A.1)"] == verdicts["Table 1 (rho)"] == "corrected"
+    keys = {"equation", "verdict", "printed", "corrected", "evidence", "residual_printed", "residual_corrected"}
+    assert all(set(row) == keys for row in rows)
+
+
 def test_without_arguments_there_is_help(capsys: pytest.CaptureFixture[str]) -> None:
     code, out, err = run(capsys)
     assert (code, err) == (0, "")

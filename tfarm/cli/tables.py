@@ -55,6 +55,16 @@ def print_response(answer: dict[str, Any]) -> None:
     _show(table)
 
 
+def print_audit(answer: dict[str, Any]) -> None:
+    """A row an equation: the verdict, and what it was and should be where the paper is corrected."""
+    print(answer["paper"])
+    table = _table(("equation", "verdict", "residual as printed", "as corrected"))
+    for row in answer["rows"]:
+        residuals = (Text(str(row[name])[:60]) for name in ("residual_printed", "residual_corrected"))
+        table.add_row(Text(row["equation"]), row["verdict"], *residuals)
+    _show(table)
+
+
 def write_csv(answer: dict[str, Any], path: Path) -> None:
     """The response as a table in a file, written beside and then renamed."""
     text = io.StringIO()

@@ -18,7 +18,8 @@ from tfarm.exact.coefficients import Coefficients
 from .ball_axis import Axis
 from .counting import Counter
 
-CLOSE = 1e-6  # relative gap; further apart, rounding moves neither by more than a few units in its last place
+CLOSE = 1e-3  # share of the mean spacing; further apart, rounding moves neither by more than a few last units
+REACH = 4e-6  # relative width in which float64 surely has each of a close pair
 PAIR_BITS = 256  # of working precision, for a double frequency to its last float64 digit
 
 
@@ -32,7 +33,7 @@ def natural_frequencies(k: Coefficients, first: int, last: int) -> NDArray[np.fl
     lowest = min(first, 1 + k.has_rigid_mode)  # not the rigid body at zero: bisection would run down all exponents
     number = np.arange(max(first - 1, lowest), last + 2)  # with both neighbours: one of them may be close
     omega = _bisect(k, number)
-    close = np.diff(omega) < CLOSE * omega[1:]
+    close = np.diff(omega) * number[1:] < CLOSE * omega[1:]
     for i in np.nonzero(np.r_[close, False] | np.r_[False, close])[0]:
         omega[i] = _settle(k, int(number[i]), float(omega[i]))
     return omega[(first <= number) & (number <= last)]
@@ -53,7 +54,7 @@ def _bisect(k: Coefficients, number: NDArray[np.int64]) -> NDArray[np.float64]:
 def _settle(k: Coefficients, number: int, omega: float) -> float:
     """The frequency of that number, close to omega, by the count in balls (in float64 where a ball cannot tell)."""
     count = Counter(k)
-    low, high = omega * (1 - 4 * CLOSE), omega * (1 + 4 * CLOSE)
+    low, high = omega * (1 - REACH), omega * (1 + REACH)
     with precision(PAIR_BITS):
         axis = Axis(k)
         while low < (middle := 0.5 * (low + high)) < high:

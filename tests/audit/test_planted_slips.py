@@ -1,0 +1,169 @@
+"""A slip planted in any formula of the audit is caught by its check, and no formula is compared with itself."""
+
+import re
+import sys
+
+import pytest
+
+from tfarm import audit
+from tfarm.audit import appendix, energy, formulas, motion, tuner
+from tfarm.errors import CertificationError
+
+CLAIMS = {claim.equation: claim for claim in audit.claims()}
+NOT_FORMULAS = {"section 5: inputs", "section 5: alpha_c", "section 5: eta_c"}
+FORMULAS = {
+    name: claim.corrected or claim.printed
+    for name, claim in CLAIMS.items()
+    if not name.startswith("Table") and name not in NOT_FORMULAS and "order of" not in name
+}
+CACHES = (formulas.read, motion.solved_motion, energy.energy, appendix.dispersion, appendix.relation)
+
+PLANTED = [
+    ("(1)", "x*theta_tt", "theta_tt"),
+    ("(2)", "rho*I", "rho*A"),
+    ("(3)", "E*I*phi_x", "E*A*phi_x"),
+    ("(4)", "= -kappa", "= kappa"),
+    ("(5)", "= -E", "= -2*E"),
+    ("(6)", "y(0,t)", "y_x(0,t)"),
+    ("(7)", "phi(0,t)", "phi(L,t)"),
+    ("(8)", "Phi_x", "Phi"),
+    ("(9)", "s^2", "s"),
+    ("(10)", "E*I*Phi_x", "I*Phi_x"),
+    ("(11)", "L*Theta", "Theta"),
+    ("(12)", "= -E", "= E"),
+    ("(13)", "Y(0,s)", "Y(L,s)"),
+    ("(14)", "Phi(0,s)", "Theta"),
+    ("(3), (10), (18), (19): order of arguments", "(0,s)", "(s,0)"),
+    ("(1)-(14): damping C", "C*s", "C*s^2"),
+    ("(15)", "I_c*", "2*I_c*"),
+    ("(15)", "a2/2*I_h", "a2*I_h"),
+    ("(16)", "a2*I_h", "a2/2*I_h"),
+    ("(17)", "a2*theta_t", "a1*theta_t"),
+    ("(17)", "kappa*G*A*(y_xx", "G*A*(y_xx"),
+    ("(18)", "; a3 = a1", ""),
+    ("(18)", "(a2 - a1)", "(a3 - a1)"),
+    ("(19)", "K2 < 1", "K2 < 2"),
+    ("(19)", "-oo < K2", "0 < K2"),
+    ("(19)", "0 < K1", "-1 < K1"),
+    ("(19)", "- K2*E", "+ K2*E"),
+    ("(20)", "a2*K1", "a1*K1"),
+    ("(20)", "(1 - K2)", "(1 + K2)"),
+    ("(18)-(20): damping C > 0", "C*phi_xt", "2*C*phi_xt"),
+    ("(18)-(20): constant gains, varied by the tuner", "K2_t = 0", "K2_t = 1"),
+    ("(21)", "-eta_c", "eta_c"),
+    ("(21)", "alpha_c*", ""),
+    ("(22)", "+ dw", "+ 2*dw"),
+    ("(23)", "u - K*x", "u + K*x"),
+    ("(23)", "1/2*b", "b"),
+    ("(20), (23): K", "K2*x", "K1*x"),
+    ("section 5: inputs", "u(t-1), ", ""),
+    ("Table 1 (rho)", "2766.7", "276.67"),
+    ("Table 1 (rho)", "m^3", "m^2"),
+    ("Table 1 (C's unit)", "s", "1/s"),
+    ("Table 1 (other units)", "G: Pa", "G: N"),
+    ("Table 1 (other units)", "I_c: kg m^2", "I_c: kg m"),
+    ("Table 1 (I)", "1.8e-9", "1.8e-8"),
+    ("Table 1 (I)", "0.006", "0.060"),
+    ("Table 1 (I)", "m^4", "m^3"),
+    ("Table 1 (I_h)", "kg m^2", "kg m"),
+    ("(A.1)", "- k3*", "+ k3*"),
+    ("(A.1)", "rho*s^2/(lambda_1*", "rho*s^2/("),
+    ("(A.1)", "- x*Theta", "- Theta"),
+    ("(A.2)", "4*rho", "2*rho"),
+    ("(A.2)", "2*rho^2", "rho^2"),
+    ("(A.2)", "*(1 + C*s)))))", "))))"),
+    ("a_ij", "exp(-lambda_2*L)", "exp(lambda_2*L)"),
+    ("a_ij", "a33 = 1", "a33 = -1"),
+    ("a_ij", "lambda_2^2", "lambda_2"),
+    ("Delta, Delta k_i", "U a42", "-U a42"),
+    ("Delta, Delta k_i", "a31 0", "a31 1"),
+    ("appendix as a whole", "4*rho", "4.0000000001*rho"),
+    ("appendix as a whole", "+ Delta_k3", "- Delta_k3"),
+]
+
+
+@pytest.mark.parametrize(("name", "right", "wrong"), PLANTED)
+def test_a_planted_slip_is_caught(name, right, wrong):
+    claim = CLAIMS[name]
+    text = claim.corrected or claim.printed
+    assert right in text
+    assert audit.is_zero(claim.check(text))
+    assert not audit.is_zero(claim.check(text.replace(right, wrong, 1)))
+
+
+def test_every_claim_but_counts_has_a_planted_slip():
+    assert set(CLAIMS) - {name for name, _, _ in PLANTED} == {"section 5: alpha_c", "section 5: eta_c"}
+
+
+def flips(text):
+    """The text with one of its signs turned, for every sign between two terms (but that of a ±)."""
+    for sign in re.finditer(r" ([-+]) (?!pm)", text):
+        turned = {"+": "-", "-": "+"}[sign[1]]
+        yield text[: sign.start(1)] + turned + text[sign.end(1) :]
+
+
+@pytest.mark.parametrize("name", [name for name in FORMULAS if name != "(20), (23): K"])
+def test_every_turned_sign_is_caught(name):
+    text = FORMULAS[name]  # dimensions, which part the two K, have no sign
+    missed = [turned for turned in flips(text) if audit.is_zero(CLAIMS[name].check(turned))]
+    assert missed == []
+
+
+def test_a_slip_in_a_correction_stops_the_audit():
+    claim = CLAIMS["(A.1)"]
+    wrong = type(claim)(
+        equation="(A.1)",
+        printed=claim.printed,
+        corrected=claim.printed,
+        check=claim.check,
+        evidence="the print, said to be its own correction",
+    )
+    with pytest.raises(CertificationError, match=r"\(A\.1\), as corrected, leaves"):
+        wrong.row()
+
+
+def texts_read_by(check, text):
+    """Every formula that a check reads, from empty caches."""
+    for cached in CACHES:
+        cached.cache_clear()
+    seen = set()
+
+    def watch(frame, event, _):
+        if event == "call" and frame.f_code is formulas.read.__wrapped__.__code__:
+            seen.add(frame.f_locals["text"])
+
+    sys.setprofile(watch)
+    try:
+        check(text)
+    finally:
+        sys.setprofile(None)
+    return seen
+
+
+def parts(text):
+    return {part.strip() for part in re.split(r" = |;", text)}
+
+
+@pytest.mark.parametrize("name", [name for name, text in FORMULAS.items() if any(flips(text))])
+def test_no_formula_is_compared_with_itself(name):
+    """Given a formula with a slip, the check finds it without ever reading the right one."""
+    for turned in list(flips(FORMULAS[name]))[:: max(1, len(list(flips(FORMULAS[name]))) // 4)]:
+        right, wrong = parts(FORMULAS[name]) - parts(turned), parts(turned) - parts(FORMULAS[name])
+        seen = texts_read_by(CLAIMS[name].check, turned)
+        assert wrong <= seen
+        assert not right & seen
+
+
+def test_increment_and_update_are_judged_by_descent_on_numbers():
+    """Momentum's own claim, by running the rule: the mended one falls to the minimum, the printed one runs away."""
+    ends = {}
+    for name, sign in (("printed", -1), ("mended", 1)):
+        w, dw = 1.0, 0.0
+        for _ in range(200):
+            dw = -0.1 * w + 0.6 * dw
+            w += sign * dw
+        ends[name] = abs(w)
+    assert ends["mended"] < 1e-9
+    assert ends["printed"] > 1e9
+    assert tuner.UPDATE == "w_next = w + dw"
+    assert tuner.UPDATE_PRINTED == "w_next = w - dw"

@@ -1,0 +1,103 @@
+"""Every row's verdict, and what the rows must hold."""
+
+import json
+
+import pytest
+from matplotlib.mathtext import MathTextParser
+
+from tfarm import audit
+
+VERDICTS = {
+    **dict.fromkeys([f"({n})" for n in (*range(1, 8), 9, 10, 12, 13, 16, 21)], "ok"),
+    **dict.fromkeys([f"({n})" for n in (8, 11, 14, 15, 17, 18, 19, 20, 22)], "corrected"),
+    "(23)": "undecided",
+    "(3), (10), (18), (19): order of arguments": "corrected",
+    "(1)-(14): damping C": "corrected",
+    "(18)-(20): damping C > 0": "corrected",
+    "(18)-(20): constant gains, varied by the tuner": "corrected",
+    "(20), (23): K": "corrected",
+    "section 5: inputs": "undecided",
+    "section 5: alpha_c": "undecided",
+    "section 5: eta_c": "undecided",
+    "Table 1 (rho)": "corrected",
+    "Table 1 (C's unit)": "corrected",
+    "Table 1 (other units)": "ok",
+    "Table 1 (I)": "undecided",
+    "Table 1 (I_h)": "undecided",
+    "(A.1)": "corrected",
+    "(A.2)": "undecided",
+    "a_ij": "ok",
+    "Delta, Delta k_i": "ok",
+    "appendix as a whole": "corrected",
+}
+
+
+@pytest.fixture(scope="module")
+def rows():
+    return {row.equation: row for row in audit.audit()}
+
+
+def test_there_is_a_row_for_each_and_no_other(rows):
+    assert len(rows) == len(audit.audit())
+    assert {name: row.verdict for name, row in rows.items()} == VERDICTS
+
+
+@pytest.mark.parametrize("name", VERDICTS)
+def test_residuals_tell_printed_from_corrected(rows, name):
+    row = rows[name]
+    assert audit.is_zero(row.residual_corrected)
+    assert audit.is_zero(row.residual_printed) == (row.verdict == "ok")
+    assert (row.printed == row.corrected) == (row.verdict == "ok")
+    assert row.evidence
+
+
+@pytest.mark.parametrize("name", VERDICTS)
+def test_formulas_are_typeset(rows, name):
+    for formula in (rows[name].printed_tex, rows[name].corrected_tex):
+        assert formula
+        assert formula.count("{") == formula.count("}")
+        assert formula.count(r"\left") == formula.count(r"\right")
+
+
+def test_typesetting_by_example(rows):
+    assert rows["(14)"].corrected_tex == r"\Phi \left(0,s\right) = 0"
+    assert rows["(3)"].printed_tex == (
+        r"I_{h}\,\frac{\partial^{2} \theta }{\partial t^{2}} = E\,I\,\frac{\partial \phi (t,0)}{\partial x} + u"
+    )
+
+
+def test_matplotlib_can_draw_them_but_for_the_determinants(rows):
+    parser = MathTextParser("path")
+    for row in rows.values():
+        if row.equation != "Delta, Delta k_i":
+            parser.parse(f"${row.printed_tex}$")
+            parser.parse(f"${row.corrected_tex}$")
+
+
+def test_a_square_of_a_derivative_has_brackets(rows):
+    assert r"\left(\frac{\partial \theta }{\partial t}\right)^{2}" in rows["(20)"].printed_tex
+
+
+@pytest.mark.parametrize(
+    ("name", "formula"),
+    [
+        ("Table 1 (rho)", r"\rho  = 2766.7\ \mathrm{kg/m^3}"),
+        ("Table 1 (C's unit)", r"C: \ \mathrm{s}"),
+        ("section 5: alpha_c", r"\alpha_{c} = 0.6"),
+    ],
+)
+def test_typesetting_of_values(rows, name, formula):
+    assert rows[name].corrected_tex == formula
+
+
+def test_json_has_the_keys_of_the_issue():
+    answer = json.loads(json.dumps(audit.audit_answer()))
+    assert "852780" in answer["paper"]
+    keys = ["equation", "verdict", "printed", "corrected", "evidence", "residual_printed", "residual_corrected"]
+    assert all(list(row) == keys for row in answer["rows"])
+    assert json.loads(audit.to_json(audit.audit())) == answer["rows"]
+
+
+@pytest.mark.parametrize(("residual", "zero"), [("0", True), ("1.5e-49", True), ("1e-9", False), ("K*x", False)])
+def test_what_counts_as_zero(residual, zero):
+    assert audit.is_zero(residual) == zero

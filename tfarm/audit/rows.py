@@ -1,0 +1,83 @@
+"""A claim about one equation, and the row that its check turns it into.
+
+The printed and the corrected formula are texts in one small language (`formulas`), and one check reads either of
+them.  So a check never knows which of the two it was given, and the verdict is not written down but follows:
+
+* "ok": the formula as printed leaves no residual;
+* "corrected": it leaves one, and the corrected formula none;
+* "undecided": the same, but which of several readings the paper meant cannot be told from it, or the
+  transcript itself shows damage at that place.  Then `corrected` is the reading used here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from tfarm.errors import CertificationError
+
+from .typesetting import tex
+
+NOISE = 1e-25  # relative: numbers are compared at 50 digits
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Row:
+    """One equation as printed and as corrected, with what each leaves in the check that tells them apart."""
+
+    equation: str
+    verdict: str
+    printed: str
+    corrected: str
+    evidence: str
+    residual_printed: str
+    residual_corrected: str
+    printed_tex: str
+    corrected_tex: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Claim:
+    """What is said of an equation; `check` gives the residual of a text, "0" or a number below NOISE if it is right."""
+
+    equation: str
+    printed: str
+    check: Callable[[str], str]
+    evidence: str
+    corrected: str = ""  # empty: the print is right
+    doubt: str = ""  # what cannot be decided
+    measured: Callable[[], str] | None = None  # numbers that go with the evidence
+    typeset: Callable[[str], str] = tex
+
+    def row(self) -> Row:
+        """Run the check on both texts.  Raises CertificationError where the corrected one leaves a residual."""
+        corrected = self.corrected or self.printed
+        residual_printed = self.check(self.printed)
+        residual_corrected = self.check(corrected) if self.corrected else residual_printed
+        if not is_zero(residual_corrected):
+            raise CertificationError(f"{self.equation}, as corrected, leaves {residual_corrected}")
+        numbers = "" if self.measured is None else self.measured()
+        return Row(
+            equation=self.equation,
+            verdict=self._verdict(residual_printed),
+            printed=self.printed,
+            corrected=corrected,
+            evidence=" ".join(part for part in (self.evidence, self.doubt, numbers) if part),
+            residual_printed=residual_printed,
+            residual_corrected=residual_corrected,
+            printed_tex=self.typeset(self.printed),
+            corrected_tex=self.typeset(corrected),
+        )
+
+    def _verdict(self, residual_printed: str) -> str:
+        if self.doubt:
+            return "undecided"
+        return "ok" if is_zero(residual_printed) else "corrected"
+
+
+def is_zero(residual: str) -> bool:
+    """Whether a residual says that nothing is left: "0", or a number below NOISE."""
+    try:
+        return abs(float(residual)) < NOISE
+    except ValueError:
+        return False
