@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import tfarm
-from tfarm.cli.commands import main
+from tfarm.cli import main
 
 Run = tuple[int, str, str]
 
@@ -194,7 +194,7 @@ HEAVY = ("control", "matplotlib", "sympy", "scipy.signal")
 )
 def test_commands_that_print_json_load_nothing_heavy(arguments: list[str]) -> None:
     script = (
-        "import sys\nfrom tfarm.cli.commands import main\n"
+        "import sys\nfrom tfarm.cli import main\n"
         f"try: main({[*arguments, '--json']!r})\nexcept SystemExit as stop: assert not stop.code\n"
         f"print([name for name in {HEAVY!r} if name in sys.modules], file=sys.stderr)"
     )

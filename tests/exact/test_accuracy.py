@@ -78,6 +78,16 @@ def test_overdamped_in_the_left_half_plane():
     assert_accurate(points)
 
 
+def test_next_to_the_essential_singularity():
+    """s -> -1/C, where 1 + C s keeps few digits of its own: at root and tip it costs none."""
+    rng, points = np.random.default_rng(10), []
+    while len(points) < 150:
+        arm = some_arm(rng, damping=10 ** rng.uniform(-6, -2))
+        at = measure(arm, complex(near(rng, -1 / arm.link.damping, 1e-6, 1e-3)), 0.5)
+        points += [point for point in at if OUTPUTS[point.name].place != "x"]
+    assert_accurate(points)
+
+
 def equal_waves(arm):
     """A complex s where z_1 = z_2: (k G - E d)^2 rho I s^2 = 4 A E (k G)^2 d, with d = 1 + C s."""
     link, A, I = arm.link, arm.link.section.area, arm.link.section.second_moment

@@ -1,31 +1,14 @@
-"""The verbs.  Rooms are imported inside them, so that `tfarm --help` answers at once."""
+"""The verbs that look at an arm.  Rooms are imported inside them, so that `tfarm --help` answers at once."""
 
 from __future__ import annotations
 
-import os
-import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
-from typer.exceptions import TyperException
 
-from tfarm.errors import CertificationError, ConvergenceError, ParameterError, TfarmError, one_line
-
-if TYPE_CHECKING:
-    from tfarm.arm import Arm
-
-app = typer.Typer(
-    name="tfarm",
-    help="Exact frequency-domain analysis of a rotating flexible Timoshenko arm.",
-    add_completion=False,
-    rich_markup_mode=None,
-    pretty_exceptions_enable=False,
-)
-
-ArmName = Annotated[str, typer.Argument(metavar="ARM", help="a preset's name or a TOML file", show_default=False)]
-Json = Annotated[bool, typer.Option("--json", help="one JSON object on standard output")]
-Digits = Annotated[str | None, typer.Option("--digits", metavar="D", help="right digits, proven; strings above 15")]
+from tfarm.cli.app import ArmName, Digits, Json, app, load_arm, right_digits, whole
+from tfarm.errors import ParameterError
 
 
 @app.command()
@@ -54,8 +37,8 @@ def modes(
     json: Json = False,
 ) -> None:
     """Natural frequencies and modes, complete by construction."""
-    wanted, right = _whole("--count", count, 1, 10_000), _digits(digits)
-    subject = _load(arm)
+    wanted, right = whole("--count", count, 1, 10_000), right_digits(digits)
+    subject = load_arm(arm)
     from tfarm.cli.answers import modes_answer, to_json
     from tfarm.spectrum import modes as find_modes
 
@@ -87,9 +70,9 @@ def response(
 
     if s is not None and omega is not None:
         raise ParameterError(key="--omega", value=omega, remedy="give --s or --omega, not both")
-    right = _digits(digits)
+    right = right_digits(digits)
     at = s_values(s) if s is not None else omega_values(omega) if omega is not None else grid(start, stop, points)
-    subject = _load(arm)
+    subject = load_arm(arm)
     from tfarm.cli.answers import response_answer, to_json
     from tfarm.response import transfer
 
@@ -117,87 +100,10 @@ def report(
     """Write pages with pictures, tables and data: open index.html in a browser."""
     import tfarm
 
-    subjects = [_load(name) for name in arms or tfarm.presets()]
+    subjects = [load_arm(name) for name in arms or tfarm.presets()]
     from tfarm.cli.tables import progress
     from tfarm.report import write
 
     with progress() as advance:
         page = write(subjects, out, only=None if only is None else (only,), progress=advance)
     print(page)
-
-
-@app.command()
-def audit(json: Json = False) -> None:
-    """Every equation of the paper, as printed and as corrected, with the check that tells them apart."""
-    from tfarm.audit import audit_answer
-
-    answer = audit_answer()
-    if json:
-        from tfarm.cli.answers import to_json
-
-        print(to_json(answer))
-    else:
-        from tfarm.cli.tables import print_audit
-
-        print_audit(answer)
-
-
-def _load(name: str) -> Arm:
-    import tfarm
-
-    return tfarm.load(name)
-
-
-def _digits(text: str | None) -> int | None:
-    return None if text is None else _whole("--digits", text, 1, 1000)
-
-
-def _whole(key: str, text: str, least: int, most: int) -> int:
-    """A whole number in a range; it may be typed as 1e3."""
-    remedy = f"a whole number from {least} to {most}"
-    try:
-        number = float(text)
-    except ValueError:
-        raise ParameterError(key=key, value=text, remedy=remedy) from None
-    if not (least <= number <= most and number == int(number)):
-        raise ParameterError(key=key, value=text, remedy=remedy)
-    return int(number)
-
-
-def main(arguments: list[str] | None = None) -> None:
-    """Run one command and exit: 0, 2 for bad input, 3 for what could not be solved or proven."""
-    given = sys.argv[1:] if arguments is None else arguments
-    sys.exit(_run(given or ["--help"]))
-
-
-def _run(arguments: list[str]) -> int:
-    try:
-        result: Any = typer.main.get_command(app).main(arguments, prog_name="tfarm", standalone_mode=False)
-        sys.stdout.flush()
-    except typer.Exit as stop:
-        return stop.exit_code
-    except (ConvergenceError, CertificationError) as error:
-        return _fail(str(error), 3)
-    except TfarmError as error:
-        return _fail(str(error), 2)
-    except BrokenPipeError:  # the reader, head for instance, has left
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
-    except (KeyboardInterrupt, typer.Abort):
-        return _fail("stopped", 130)
-    except TyperException as error:
-        return _fail(_usage(error), 2)
-    return result if isinstance(result, int) else 0
-
-
-def _usage(error: Any) -> str:
-    """The parser's complaint, in the words of our own errors."""
-    near = getattr(error, "possibilities", None)
-    if near:
-        return f"{error.option_name}: no such option: did you mean {' or '.join(near)}?"
-    return str(error.format_message()) if hasattr(error, "format_message") else str(error)
-
-
-def _fail(message: str, code: int) -> int:
-    print(f"tfarm: {one_line(message, 1000)}", file=sys.stderr)
-    return code
