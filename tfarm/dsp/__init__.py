@@ -1,0 +1,1 @@
+"""The sampled loop: hold, delay, converters, simulation."""

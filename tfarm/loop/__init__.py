@@ -1,0 +1,1 @@
+"""The closed loop: exact poles, loci, margins, and what the Lyapunov argument proves."""
