@@ -81,17 +81,27 @@ def digits_of(k: Coefficients, wanted: Output, s: complex, digits: int, x: float
 
 def expansion_at_zero(k: Coefficients, wanted: Output, x: float = 0.0) -> tuple[float, float, float, float]:
     """Coefficients of s^-2, s^-1, 1 and s in the output's expansion at s = 0."""
+    return expansions_at_zero(k, [wanted], x)[0]
+
+
+def expansions_at_zero(
+    k: Coefficients, wanted: Sequence[Output], x: float = 0.0
+) -> list[tuple[float, float, float, float]]:
+    """The expansions at s = 0 of several outputs, from one free response."""
     s = Jet.variable(0.0, 7)
     *state, drive = low_frequency(k, s)
-    if wanted.place == "x":
-        quantity = from_root(k, s * s, 1.0 + k.damping * s, tuple(state[:3]), x)[_FIELDS[wanted.quantity]]
-    else:
-        quantity = state[_ENDS[wanted.quantity]]
+    along = any(each.place == "x" for each in wanted)
+    fields = from_root(k, s * s, 1.0 + k.damping * s, tuple(state[:3]), x) if along else ()
     order = next(n for n, coefficient in enumerate(drive.c) if coefficient != 0)
-    quotient = Jet((quantity * _power(s, wanted.power)).c[: 8 - order]) / drive.shifted(order)
-    quotient = quotient / Jet((1.0 + k.damping * s).c[: 8 - order]) if wanted.gauge else quotient
-    series = [0.0] * (2 - order) + [float(c) * float(unit_scale(wanted, k)) for c in quotient.c]
-    return series[0], series[1], series[2], series[3]
+
+    def expand(each: Output) -> tuple[float, float, float, float]:
+        quantity = fields[_FIELDS[each.quantity]] if each.place == "x" else state[_ENDS[each.quantity]]
+        quotient = Jet((quantity * _power(s, each.power)).c[: 8 - order]) / drive.shifted(order)
+        quotient = quotient / Jet((1.0 + k.damping * s).c[: 8 - order]) if each.gauge else quotient
+        series = [0.0] * (2 - order) + [float(c) * float(unit_scale(each, k)) for c in quotient.c]
+        return series[0], series[1], series[2], series[3]
+
+    return [expand(each) for each in wanted]
 
 
 def _row(k: Coefficients, wanted: Output) -> tuple[float, ...]:

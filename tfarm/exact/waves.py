@@ -197,3 +197,27 @@ def separated(s: Any, k: Any, numbers: Any, functions: Any) -> None:
         numbers[7, i], numbers[8, i], numbers[9, i], numbers[10, i] = z2, v2, t2, dt2
         functions[0, i], functions[1, i], functions[2, i] = _wave_functions(z1, t1, dt1)
         functions[3, i], functions[4, i], functions[5, i] = _wave_functions(z2, t2, dt2)
+
+
+@inlined
+def free_ends(s: complex, k: Any) -> tuple[complex, complex, complex]:
+    """theta and M0 of the free response at one s, times e^{-scale}, and scale: entire in s^2 at C = 0 (see `free`)."""
+    S = s * s
+    if _is_low(s, k):
+        over_d = reciprocal(1.0 + k[7] * s)
+        z_sum, z_product = S * (k[2] + k[0] * over_d), S * (k[0] * k[2] * S + k[4]) * over_d
+        F0, F1, F2, F3, F2_less_1, _ = transition_series(z_sum, z_product)
+        theta, M0, _, _, _ = from_transition(
+            F0, F1, F2, F3, F2_less_1, S, over_d, k[0], k[2], k[4], k[6],
+            _end(k, 8, S), k[10], _end(k, 11, S), k[13],
+        )  # fmt: skip
+        return theta, M0, complex(0.0, 0.0)
+    S, d, _, gS, z1, v1, t1, dt1, z2, v2, t2, dt2 = dispersion(s, k)
+    c1, s1, e1 = _wave_functions(z1, t1, dt1)
+    c2, s2, e2 = _wave_functions(z2, t2, dt2)
+    theta, M0, _, _ = from_waves(
+        c1, s1, z1, v1, e1, c2, s2, z2, v2, e2, gS, d, _end(k, 8, S), k[10], _end(k, 11, S), k[13]
+    )
+    gap = z1 - z2
+    unit = reciprocal(gS * d * gap * gap)
+    return theta * unit, M0 * unit, t1 + dt1 + t2 + dt2

@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 
 from tfarm.arm import Arm, Hub
 from tfarm.errors import ConvergenceError
+from tfarm.exact.characteristic import Analytic
 from tfarm.exact.coefficients import Coefficients, coefficients
 from tfarm.exact.free import free_response, low_frequency
 from tfarm.exact.jets import Jet
 from tfarm.exact.outputs import Output
 from tfarm.spectrum import modes, modes_below
-from tfarm.spectrum.box import Analytic, Box, Function, zeros_in_box
+from tfarm.spectrum.box import Box, Function, zeros_in_box
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 

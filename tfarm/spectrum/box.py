@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.errors import ConvergenceError
+from tfarm.exact.characteristic import Analytic
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 
@@ -24,14 +25,6 @@ TURN = 0.6  # rad: a longer step of the phase along the contour is halved
 FINEST = 1e-13  # a contour cannot be resolved closer to a zero than this share of the box
 DEAD = 1e-8  # nearer to s = 0 than this share of a box Newton's method is not believed: a zero there forces cuts
 SPLIT = 0.4871  # where a box is cut: off the axes, on which zeros like to lie
-
-
-class Analytic(NamedTuple):
-    """Values f e^{-scale}, their derivatives f' e^{-scale}, and scale, at given points."""
-
-    value: Complex
-    slope: Complex
-    scale: Complex
 
 
 Function = Callable[[Complex], Analytic]

@@ -1,0 +1,232 @@
+"""Pairs of zeros followed along a parameter: from the undamped modes to the damped ones, and along a gain.
+
+A mode is a pair of zeros of a real-analytic function, conjugate or both real.  Their mean, and the square of half their
+distance or (where they are far apart) their product, stay smooth where a pair meets on the real axis and parts there,
+and for Kelvin-Voigt damping of a bending mode they are polynomials in C: so they, not the zeros, are what is predicted.
+
+The corrector is Newton's method with the repulsion of Ehrlich (1967) and Aberth (1973) between all zeros, so that two
+branches cannot fall onto one zero; two zeros close to each other are corrected together, by the cubic through both.
+A step is believed if no zero moved further from its prediction than a share of its distance to the next one, and is
+shortened otherwise.  Where a real zero runs into one of another pair, or into one that no pair holds, no step is short
+enough: then the two become one pair.  (A damped Timoshenko beam has a third, real zero for each bending wave, coming
+from s = -inf as C grows from 0.  It meets the fast zero of the overdamped mode, and together they ring again, now in shear.)
+
+None of this is a proof: a winding number is, and `damped` asks for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import combinations, product
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+from scipy.spatial import cKDTree
+
+from tfarm.errors import ConvergenceError
+
+from .box import Complex, Function
+
+Real = NDArray[np.float64]
+Family = Callable[[float], Function]
+
+NEIGHBOURS = 8  # zeros that repel each other: those further away move too little to matter
+BELIEVED = 0.2  # how far a zero may land from its prediction, in distances to the next one
+SETTLED = 1e-6  # a correction smaller than this share of that distance ends a step
+CLOSING = 0.2  # two real zeros whose distance would shrink by more than this share in a step refused are a pair
+STUCK = 1e-4  # a step this small beside the way so far ends a mode
+MOST_REFUSALS = 2_000
+
+
+class Node(NamedTuple):
+    """The pairs at one value of the parameter: zeros (n, 2), with Im > 0 first, or the slower of two real ones."""
+
+    at: float
+    zeros: Complex
+
+
+def follow(family: Family, start: Node, stop: float, first: float, wanted: int) -> list[Node]:
+    """The nodes passed from `start` to the parameter `stop`, with steps chosen on the way, the first being `first`.
+
+    Of the pairs only the first `wanted` are sure to arrive; the others keep them company, and are dropped where they
+    meet a zero that nobody follows.  Raises ConvergenceError, with the last node, where branches cannot be told apart.
+    """
+    nodes, step, refusals = [start], first, 0
+    while nodes[-1].at != stop:
+        at = nodes[-1].at + step
+        if (stop - at) * np.sign(stop - start.at) <= 1e-9 * abs(stop - nodes[-1].at):
+            at = stop
+        zeros, stray = _corrected(family(at), predicted(nodes, at))
+        if not stray.any():
+            nodes.append(Node(at, zeros))
+            step = 1.6 * (at - nodes[-2].at)
+            continue
+        refusals += 1
+        if refusals > MOST_REFUSALS:
+            raise ConvergenceError(f"branches cannot be told apart beyond {nodes[-1].at:.6g}", nodes[-1], step)
+        step = (at - nodes[-1].at) / 2.5
+        close = abs(step) < 1e-3 * abs(at - start.at)
+        if close and not _exchange(family, nodes, stray, at) and abs(step) < STUCK * abs(at - start.at):
+            nodes = [_shortened(nodes[-1], stray, wanted)]
+    return nodes
+
+
+def predicted(nodes: list[Node], at: float) -> Complex:
+    """The pairs by polynomials through the last nodes, three at most, of what stays smooth."""
+    guess = nodes[-1].zeros
+    for number in range(2, min(3, len(nodes)) + 1):
+        longer = _extrapolated(nodes[-number:], at)
+        guess = np.where(np.isnan(longer), guess, longer)
+    return guess
+
+
+def _extrapolated(nodes: list[Node], at: float) -> Complex:
+    """Mean and square of half the distance; of two real zeros far apart each itself, the slower by its inverse.
+
+    (That of an overdamped mode is nearly -1/C, with neighbours closer by than C times a step.)
+    """
+    weights = np.array([np.prod([(at - b.at) / (a.at - b.at) for b in nodes if b is not a]) for a in nodes])
+    zeros = np.stack([node.zeros for node in nodes])
+    mean, half = zeros.mean(2).real, (zeros[..., 0] - zeros[..., 1]) / 2
+    square = (half * half).real
+    pairs = _pairs(weights @ mean, weights @ square)
+    slow = zeros[..., 0].real
+    far = ((square > 0.1 * mean**2) & (slow * slow[0] > 0)).all(0)
+    inverse = weights @ np.where(far, 1 / np.where(far, slow, 1), 1)
+    apart = np.stack([1 / np.where(inverse == 0, 1, inverse), weights @ zeros[..., 1].real], 1)
+    return np.where(far[:, None], apart, pairs)
+
+
+def _pairs(mean: Real, square: Real) -> Complex:
+    """mean +- sqrt(square), with Im > 0 or the slower first."""
+    root = np.sqrt(abs(square))
+    upper, away = mean + 1j * root, np.copysign(root, mean)
+    real = np.stack([mean - away, mean + away], 1).astype(complex)
+    return np.where((square < 0)[:, None], np.stack([upper, upper.conj()], 1), real)
+
+
+def _corrected(function: Function, guess: Complex) -> tuple[Complex, NDArray[np.bool_]]:
+    """The pairs of zeros next to the guess, and which of them did not settle there."""
+    zeros = guess
+    for _ in range(12):
+        zeros, moved = improved(function, zeros)
+        if not np.isfinite(zeros).all():
+            break
+        if (moved < SETTLED).all():
+            return zeros, _strayed(guess, zeros)
+    return guess, ~(moved < SETTLED)
+
+
+def _strayed(guess: Complex, found: Complex) -> NDArray[np.bool_]:
+    gap, _ = _neighbours(found)
+    met = (guess[:, 0].imag > 0) != (found[:, 0].imag > 0)  # around a meeting on the axis only the mean is compared
+    moved = np.where(met[:, None], abs((guess - found).mean(1))[:, None], abs(guess - found))
+    strayed: NDArray[np.bool_] = ~(moved <= BELIEVED * gap).all(1)
+    return strayed
+
+
+def _exchange(family: Family, nodes: list[Node], stray: NDArray[np.bool_], at: float) -> bool:
+    """Pair a real zero of a stray mode with the one that it would run into before `at`; whether there was one.
+
+    The last node is changed, and the pairs concerned lose their history.
+    """
+    here, there, zeros = family(nodes[-1].at), family(at), nodes[-1].zeros.copy()
+    for i, j in product(np.nonzero(stray & (zeros[:, 0].imag == 0))[0], (0, 1)):
+        zero = zeros[i, j]
+        near = _next_zero(here, zero.real)
+        if near in (np.inf, zeros[i, 1 - j].real):
+            continue
+        both = np.array([zero, near])
+        move = -(there(both).value / here(both).slope * np.exp(there(both).scale - here(both).scale)).real
+        if (move[1] - move[0]) / (near - zero.real) > -CLOSING:
+            continue
+        m, n = np.unravel_index(abs(zeros - near).argmin(), zeros.shape)
+        meeting = sorted(both, key=abs)
+        if m == i or abs(zeros[m, n] - near) > 1e-6 * abs(near - zero):
+            zeros[i], changed = meeting, [i]
+        else:
+            left = sorted([zeros[i, 1 - j], zeros[m, 1 - n]], key=abs)
+            zeros[min(i, m)], zeros[max(i, m)], changed = left, meeting, [i, m]
+        for back in range(2, min(3, len(nodes)) + 1):
+            past = nodes[-back].zeros.copy()
+            past[changed] = np.nan
+            nodes[-back] = Node(nodes[-back].at, past)
+        nodes[-1] = Node(nodes[-1].at, zeros)
+        return True
+    return False
+
+
+def _shortened(node: Node, stray: NDArray[np.bool_], wanted: int) -> Node:
+    """The node without the modes from the first stray one on, if none of them is wanted."""
+    first = int(np.nonzero(stray)[0][0])
+    if first < wanted:
+        raise ConvergenceError(f"pair {first + 1} cannot be told from its neighbours", node, stray)
+    return Node(node.at, node.zeros[:first])
+
+
+def _next_zero(function: Function, zero: float) -> float:
+    """The real zero nearest to a given one, within 0.3 of its size; inf if there is none."""
+
+    def deflated(s: Real) -> Real:
+        value, _, scale = function(s.astype(complex))
+        return np.asarray((value * np.exp(1j * scale.imag)).real / (s - zero))
+
+    away = abs(zero) * np.geomspace(1e-5, 0.3, 60)
+    found = []
+    for side in (-1, 1):
+        sign = np.sign(deflated(zero + side * away))
+        for n in np.nonzero(sign[1:] != sign[:-1])[0][:1]:
+            ends = zero + side * away[n], zero + side * away[n + 1]
+            found.append(brentq(lambda s: float(deflated(np.array([s]))[0]), *ends, rtol=1e-14))
+    return min(found, key=lambda s: abs(s - zero), default=np.inf)
+
+
+def _neighbours(zeros: Complex) -> tuple[Real, Complex]:
+    """Of each zero its distance to the nearest zero of another pair, and its nearest zeros."""
+    flat = zeros.ravel()
+    plane = np.c_[flat.real, flat.imag]
+    number = min(NEIGHBOURS, flat.size)
+    distance, which = (part.reshape(flat.size, number) for part in cKDTree(plane).query(plane, k=number))
+    itself = np.arange(flat.size)[:, None]
+    gap = np.where(which // 2 == itself // 2, np.inf, distance).min(1)
+    others = np.where(which == itself, np.nan, flat[which])
+    return np.minimum(gap, 2 * abs(flat) + 1e-300).reshape(zeros.shape), others
+
+
+def improved(function: Function, zeros: Complex) -> tuple[Complex, Real]:
+    """One correction of every pair, and how far each moved, as a share of its distance to the next zero."""
+    gap, others = _neighbours(zeros)
+    is_real = zeros.imag[:, 0] == 0
+    value, slope, scale = (part.reshape(zeros.shape) for part in function(zeros.ravel()))
+    with np.errstate(all="ignore"):
+        step = value / slope
+        repulsion = np.nansum(1 / (zeros.ravel()[:, None] - others), axis=1).reshape(zeros.shape)
+        new = zeros - step / (1 - step * repulsion)
+    new[~is_real, 1] = new[~is_real, 0].conj()
+    new[is_real] = new[is_real].real
+    apart = abs(zeros[:, 0] - zeros[:, 1])
+    for i in np.nonzero((apart < gap.min(1)) & ~(abs(new - zeros).max(1) < 0.1 * apart))[0]:
+        twist = np.exp(scale[i, 1] - scale[i, 0])  # both values on the scale of the first
+        new[i] = _together(zeros[i], value[i] * [1, twist], slope[i] * [1, twist])
+    floor = 4 * np.finfo(float).eps * abs(zeros)  # nearer no zero is known
+    moved = np.where(abs(new - zeros) <= floor, 0.0, abs(new - zeros) / gap).max(1)
+    return new, moved
+
+
+def _together(zeros: Complex, value: Complex, slope: Complex) -> Complex:
+    """Two zeros, conjugate or real, near two given ones, from the cubic with the values and slopes there."""
+    middle, half = zeros.mean(), (zeros[0] - zeros[1]) / 2
+    g = slope * half
+    a2 = (g[0] - g[1]) / 4
+    a0 = (value[0] + value[1]) / 2 - a2
+    a3 = ((g[0] + g[1]) - (value[0] - value[1])) / 4
+    a1 = (value[0] - value[1]) / 2 - a3
+    if not np.isfinite([a0, a1, a2, a3]).all() or a2 == 0 == a3:
+        return zeros * np.nan
+    x = np.roots([a3, a2, a1, a0])
+    x = min(combinations(x, 2), key=lambda two: abs(two[0] + two[1]) + abs(two[0] * two[1] + 1))  # most like +-1
+    mean = (middle + half * (x[0] + x[1]) / 2).real
+    square = ((half * (x[0] - x[1]) / 2) ** 2).real
+    return _pairs(np.array([mean]), np.array([square]))[0]
