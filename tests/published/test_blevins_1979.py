@@ -12,6 +12,8 @@ import pytest
 
 import tfarm
 from tfarm import Hub, Payload
+from tfarm.audit.literature import ENDS, SOURCES, beam
+from tfarm.audit.published import computed
 
 EPS = np.finfo(float).eps
 inf = math.inf
@@ -85,3 +87,29 @@ def test_a_slender_beam_approaches_the_table(theory):
 
     assert (excess(300.0) > 0).all()
     assert excess(3000.0) == pytest.approx(excess(300.0) / 100, rel=1e-2, abs=0)
+
+
+def test_the_third_clamped_root_is_misprinted_in_its_last_digit():
+    """10.9956079: cos z cosh z - 1 changes its sign half a unit and more below it."""
+
+    def sign(z):
+        return mpmath.sign(mpmath.cos(mpmath.mpf(z)) * mpmath.cosh(mpmath.mpf(z)) - 1)
+
+    assert sign("10.99560783") != sign("10.99560784")
+    assert sign("10.99560784") == sign("10.99560785") == sign("10.9956079")
+
+
+def test_the_table_of_the_audit_is_this_one():
+    (source,) = (source for source in SOURCES if source.key == "blevins-1979")
+    plain = {case.name: case for case in source.cases if case.theory == "euler-bernoulli"}
+    for ends, case in plain.items():
+        assert tuple(float(text) for text in case.printed) == TABLE[ends][-1]
+        arm = case.arm
+        assert (arm.hub.inertia, arm.payload.mass, arm.payload.inertia) == TABLE[ends][:3]
+    slender = [case for case in source.cases if case.theory == "timoshenko"]
+    assert {case.name.split(",")[0] for case in slender} == {"clamped-free", "clamped-pinned", "pinned-free"}
+    for case in slender:  # what is left of shear and rotary inertia is far below the digits, and vanishes as (r/L)^2
+        simple = computed(replace(case, theory="euler-bernoulli"))
+        coarse = computed(replace(case, arm=beam(slenderness=1e4, **ENDS[case.name.split(",")[0]])))
+        assert (abs(computed(case) - simple) < 5e-9).all()
+        assert (simple - coarse) * 1e-4 == pytest.approx(simple - computed(case), rel=1e-2, abs=1e-14)

@@ -1,7 +1,7 @@
 """code_aster, validation manual V2.04.302 (SDLV302): vibration of a short simply supported beam by Timoshenko's theory.
 
 L = 2 m, depth 0.2 m, width 0.1 m, E = 2.1e11 Pa, nu = 0.3, rho = 7800 kg/m^3, shear factor 5/6; bending in the plane of
-the depth.  The reference values are printed with one decimal.
+the depth.  The reference values are printed with one decimal, but given to four figures: the last reads 1534.0.
 """
 
 import math
@@ -11,6 +11,7 @@ import pytest
 
 import tfarm
 from tfarm import Arm, Hub, Link, Payload, Section
+from tfarm.audit.literature import SOURCES
 
 REFERENCE = np.array([115.7, 442.2, 931.6, 1534.0])  # Hz
 
@@ -39,3 +40,22 @@ def test_thirty_digits_confirmed_by_the_determinant_of_the_paper():
     assert [float(text) for text in texts] == pytest.approx(
         tfarm.modes(sdlv302(), 4).natural_frequency, rel=1e-15, abs=0
     )
+
+
+def test_all_four_are_right_to_four_figures():
+    found = tfarm.modes(sdlv302(), 4).natural_frequency_hz
+    assert [float(f"{value:.4g}") for value in found] == REFERENCE.tolist()
+    (source,) = (source for source in SOURCES if source.key == "code-aster-sdlv302")
+    assert [float(text) for text in source.cases[0].printed] == REFERENCE.tolist()
+    assert source.cases[0].arm == sdlv302()
+
+
+def test_the_manuals_own_formula():
+    """Omega = ((g + j) q + 1 - sqrt((g - j)^2 q^2 + 2 (g + j) q + 1)) / (2 g j), q = (n pi)^2 (section 2.1)."""
+    link = sdlv302().link
+    j, g = 1 / link.slenderness**2, link.EI / (link.kGA * link.length**2)
+    q = (math.pi * np.arange(1, 5)) ** 2
+    omega2 = ((g + j) * q + 1 - np.sqrt((g - j) ** 2 * q**2 + 2 * (g + j) * q + 1)) / (2 * g * j)
+    exact = tfarm.modes(sdlv302(), 4).natural_frequency
+    unit = link.EI / (link.rhoA * link.length**4)
+    assert np.sqrt(omega2 * unit) == pytest.approx(exact, rel=1e-10)

@@ -127,7 +127,9 @@ def test_no_file_is_left_unlinked_or_half_written(pages):
     for file in (pages / NAME).iterdir():
         assert file.name in linked or file.name in {"index.html", "card.json", "card.svg"}
         assert file.stat().st_size > 100
-    assert sorted(p.name for p in pages.iterdir()) == ["index.html", NAME]
+    linked = {unquote(target) for target in Links(pages / "trust" / "index.html").targets}
+    assert {file.name for file in (pages / "trust").iterdir()} <= linked | {"index.html"}
+    assert sorted(p.name for p in pages.iterdir()) == ["index.html", "trust", NAME]
 
 
 def test_assumptions_are_text_and_nothing_else(pages):
@@ -331,6 +333,9 @@ def test_other_files_in_the_folder_are_kept_and_strange_cards_passed_over(tmp_pa
     links = Links(tmp_path / "index.html").targets
     assert not any(target.startswith("x") for target in links)
     assert len(links) > 1
+    assert NAME in (tmp_path / "trust" / "index.html").read_text(encoding="utf-8").replace("&amp;", "&").replace(
+        "&#39;", "'"
+    )
 
 
 def test_a_plain_script_starts_no_processes(monkeypatch):

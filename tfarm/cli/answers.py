@@ -13,7 +13,7 @@ import numpy as np
 
 from tfarm.arm import Arm
 from tfarm.response import TransferFunction
-from tfarm.spectrum import Modes, compare_theories
+from tfarm.spectrum import DampedModes, Modes, compare_theories, damped_modes
 
 
 def to_json(answer: dict[str, Any]) -> str:
@@ -55,7 +55,29 @@ def modes_answer(modes: Modes, digits: int | None, certify: bool = False) -> dic
         for mode, (lower, upper) in zip(rows[-len(proof.brackets) :], proof.brackets, strict=True):
             mode |= {"lower_rad_s": lower, "upper_rad_s": upper}
         answer |= {"proven_complete": True, "proof": {"count": proof.count, "below_rad_s": proof.below}}
+    if modes.arm.link.damping:
+        answer |= _damped(damped_modes(modes), rows, digits, certify)
     return answer | {"modes": rows}
+
+
+SHEAR = "complete inside the box; lightly damped shear modes exist far above any box, and overdamped ones accumulate at -1/C"
+
+
+def _damped(damped: DampedModes, rows: list[dict[str, Any]], digits: int | None, certify: bool) -> dict[str, Any]:
+    """Eigenvalues beside each mode, and the box in which they are all there are; with `certify` each in a proven disc."""
+    for row, pair, ratio in zip(rows, damped.eigenvalues, damped.damping_ratio, strict=True):
+        if pair[0].imag or not row["index"]:
+            row["eigenvalue"] = [float(pair[0].real), float(pair[0].imag)]
+        else:
+            row["eigenvalues"] = [float(zero.real) for zero in pair]
+        row["damping_ratio"] = float(ratio)
+    answer = {"box": list(damped.box), "eigenvalues_in_box": damped.count, "box_note": SHEAR}
+    if certify or (digits is not None and digits > 15):
+        discs = damped.certify(15 if digits is None else digits)
+        for row, of_mode in zip(rows[-len(discs) :], discs, strict=True):
+            row["discs"] = [{"re": disc.re, "im": disc.im, "radius": disc.radius} for disc in of_mode]
+        answer["proven_complete_in_box"] = True
+    return answer
 
 
 def response_answer(G: TransferFunction, s: np.ndarray[Any, Any], digits: int | None) -> dict[str, Any]:

@@ -7,6 +7,7 @@ import io
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -63,6 +64,58 @@ def print_audit(answer: dict[str, Any]) -> None:
         residuals = (Text(str(row[name])[:60]) for name in ("residual_printed", "residual_corrected"))
         table.add_row(Text(row["equation"]), row["verdict"], *residuals)
     _show(table)
+
+
+def print_assumptions(answer: dict[str, Any]) -> None:
+    """A table over the candidate sections and one over the hub inertias; a star marks the arm's own."""
+    section, hub = answer["section"], answer["hub"]
+    print(f"Rectangles of the arm's area, {section['area_m2']:g} m^2, shear factor {section['shear_factor']:.6g}:")
+    _print_candidates(section, ("depth_m", "width_m", "second_moment_m4"), ("depth [m]", "width [m]", "I [m^4]"), "I")
+    if hub is None:
+        print("\nHub inertia: none to choose, the hub is locked or a free pin.")
+    else:
+        print("\nHub inertias:")
+        _print_candidates(hub, ("hub_inertia_kg_m2",), ("I_h [kg m^2]",), "I_h")
+        print("limits: I_h = 0 gives " + ", ".join(f"{x:.8g}" for x in hub["pinned_rad_s"]), end=" rad/s; ")
+        print("I_h = inf gives " + ", ".join(f"{x:.8g}" for x in hub["locked_rad_s"]) + " rad/s")
+    print(
+        f"\n* is {answer['arm']} itself. Frequencies of the undamped arm, exact; behind each, per cent of frequency for"
+    )
+    print(f"one per cent more of I (with {section['held']})")
+    print("or of I_h (with all else held).")
+
+
+def _print_candidates(study: dict[str, Any], keys: tuple[str, ...], titles: tuple[str, ...], parameter: str) -> None:
+    count = len(study["candidates"][0]["sensitivity"])
+    modes = (title for i in range(1, count + 1) for title in (f"w{i} [rad/s]", f"%/% {parameter}"))
+    table = _table(("", *titles, *modes))
+    for row in study["candidates"]:
+        pairs = zip(row["natural_frequency_rad_s"], row["sensitivity"], strict=True)
+        numbers = (text for w, slope in pairs for text in (f"{w:.8g}", f"{slope:.4f}"))
+        table.add_row("*" if row["is_own"] else "", *(f"{row[key]:.4g}" for key in keys), *numbers)
+    _show(table)
+
+
+def print_validation(answer: dict[str, Any]) -> None:
+    """A table a source: their number, ours, the relative difference; below it why a row differs beyond its digits."""
+    citations = {source["key"]: source for source in answer["sources"]}
+    for key, rows in groupby(answer["rows"], key=lambda row: row["source"]):
+        print(f"{citations[key]['citation']}\n({citations[key]['reached']})")
+        _print_printed_and_exact(list(rows))
+        print()
+    print(f"{answer['agree']} agree to the last printed digit, {answer['explained']} differ for the reason given")
+
+
+def _print_printed_and_exact(rows: list[dict[str, Any]]) -> None:
+    reasons = list(dict.fromkeys(row["why"] for row in rows if row["why"]))
+    table = _table(("case", "quantity", "mode", "printed", "exact", "difference", ""))
+    for row in rows:
+        mark = "" if row["agrees"] else f"[{reasons.index(row['why']) + 1}]"
+        cells = (row["case"], row["quantity"], str(row["mode"]), row["printed"], f"{row['ours']:.10g}")
+        table.add_row(*map(Text, cells), f"{row['difference']:+.1e}", Text(mark))
+    _show(table)
+    for number, reason in enumerate(reasons, start=1):
+        print(f"[{number}] {reason}")
 
 
 def write_csv(answer: dict[str, Any], path: Path) -> None:

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from tfarm.cli.app import Json, app
+from typing import Annotated
+
+import typer
+
+from tfarm.cli.app import ArmName, Json, app, load_arm, whole
 
 
 @app.command()
@@ -19,3 +23,41 @@ def audit(json: Json = False) -> None:
         from tfarm.cli.tables import print_audit
 
         print_audit(answer)
+
+
+@app.command()
+def assumptions(
+    arm: ArmName,
+    count: Annotated[str, typer.Option("--count", metavar="N", help="flexible modes, 1 to 100")] = "4",
+    json: Json = False,
+) -> None:
+    """What the assumed section and hub do: frequencies over the candidates, with exact sensitivities."""
+    wanted = whole("--count", count, 1, 100)
+    subject = load_arm(arm)
+    from tfarm.audit.assumptions import assumptions_answer
+
+    answer = assumptions_answer(subject, wanted)
+    if json:
+        from tfarm.cli.answers import to_json
+
+        print(to_json(answer))
+    else:
+        from tfarm.cli.tables import print_assumptions
+
+        print_assumptions(answer)
+
+
+@app.command()
+def validate(json: Json = False) -> None:
+    """Natural frequencies of published tables beside the exact ones, and why where they differ."""
+    from tfarm.audit.published import validate_answer
+
+    answer = validate_answer()
+    if json:
+        from tfarm.cli.answers import to_json
+
+        print(to_json(answer))
+    else:
+        from tfarm.cli.tables import print_validation
+
+        print_validation(answer)

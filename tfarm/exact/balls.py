@@ -46,13 +46,18 @@ def point(s: complex) -> Ball:
     return flint.acb(flint.arb(s.real), flint.arb(s.imag))
 
 
+def root(z: Ball) -> Ball:
+    """A square root whose branch cut lies away from the ball; which of the two is nothing to even functions."""
+    return z.sqrt() if z.real.mid() >= 0 else (-z).sqrt() * flint.acb(0, 1)
+
+
 def transition(z_sum: Ball, z_product: Ball, x: Ball) -> tuple[Ball, Ball, Ball, Ball]:
     """F0..F3 at x (0..1), by the two waves where they differ and by the matrix exponential where they may not."""
-    spread = (z_sum * z_sum / 4 - z_product).sqrt()
+    spread = root(z_sum * z_sum / 4 - z_product)
     z1, z2 = z_sum / 2 + spread, z_sum / 2 - spread
     if (z1 - z2).contains(0) or z1.contains(0) or z2.contains(0):
         return _transition_by_exponential(z_sum, z_product, x)
-    t1, t2 = z1.sqrt(), z2.sqrt()
+    t1, t2 = root(z1), root(z2)
     (h1, c1), (h2, c2) = (t1 * x).sinh_cosh(), (t2 * x).sinh_cosh()
     over = 1 / (z1 - z2)
     return (h1 / t1 - h2 / t2) * over, (c1 - c2) * over, (t1 * h1 - t2 * h2) * over, (z1 * c1 - z2 * c2) * over
@@ -87,17 +92,18 @@ class State:
         F0, F1, F2, F3 = transition(self.z_sum, self.z_product, flint.arb(1))
         self.theta, self.M0, self.Q0, self.W1, self.Y1 = _algebra(
             F0, F1, F2, F3, F2 - 1, S, over_d, self.a, self.b, self.g, self.sigma,
-            self._end(mass), rational(mass.force), self._end(inertia), rational(inertia.force),
+            self.end(mass), rational(mass.force), self.end(inertia), rational(inertia.force),
         )  # fmt: skip
 
-    def _end(self, condition: Condition) -> Ball:
+    def end(self, condition: Condition) -> Ball:
+        """rest + inertia s^2 of an end condition."""
         return rational(condition.rest) + rational(condition.inertia) * self.S
 
     @property
     def input(self) -> Ball:
         """The torque behind this response, or the hub angle where the hub is locked: zero at a pole."""
         hub = Condition.of(self.k.hub_inertia)
-        drive = self._end(hub) * self.theta - rational(hub.force) * self.M0
+        drive = self.end(hub) * self.theta - rational(hub.force) * self.M0
         return drive if hub.rest else drive / rational(hub.force)
 
     def field(self, quantity: Quantity, x: float) -> Ball:

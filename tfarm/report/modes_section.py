@@ -15,6 +15,7 @@ from tfarm.report.mode_shapes import Shape, draw_differences, draw_shapes, shape
 from tfarm.report.responses import Real
 from tfarm.report.sections import Section
 from tfarm.report.tables import Column, Table, data_column, number_column, text_column
+from tfarm.report.trust_proofs import how_proven
 from tfarm.spectrum import Modes
 
 MODES, SHAPES = 10, 6
@@ -30,7 +31,7 @@ COMPLETE = (
 MODAL_TABLE = (
     "Natural frequencies, hub participation b (hub angle of the mode), root moment of the mode and nodes. "
     "{rigid}Modes have unit modal mass (1 kg m² of hub inertia counts as 1) and a positive tip displacement: "
-    "b² is how strongly a torque at the hub excites the mode and how well the hub angle sees it."
+    "b² is how strongly a torque at the hub excites the mode and how well the hub angle sees it. {proof}"
 )
 MODE_SHAPES = (
     "Total displacement w(x), each mode scaled to a largest value of one; hub at the left (grey), nodes as "
@@ -84,14 +85,16 @@ def modal_table(modes: Modes) -> Table:
     nodes = [", ".join(fixed(node, 4)) or "none" for node in modes.nodes]
     at = [tuple(node.tolist()) for node in modes.nodes]
     rigid = "Row 0 is the arm turning as a rigid body. " if modes.arm.has_rigid_mode else ""
+    omega = _frequency("natural_frequency_rad_s", "natural frequency", "rad/s", modes.natural_frequency)
+    hertz = _frequency("natural_frequency_hz", "", "Hz", modes.natural_frequency_hz)
     return Table(
         stem="modal-table",
         title="Modal table",
-        caption=MODAL_TABLE.format(rigid=rigid),
+        caption=MODAL_TABLE.format(rigid=rigid, proof=how_proven(modes, omega.cells, hertz.cells)),
         columns=(
             _mode_numbers("index", modes.index.tolist()),
-            _frequency("natural_frequency_rad_s", "natural frequency", "rad/s", modes.natural_frequency),
-            _frequency("natural_frequency_hz", "", "Hz", modes.natural_frequency_hz),
+            omega,
+            hertz,
             number_column("hub_participation", "hub participation b", "1/√(kg m²)", b, aligned(b, 7, least=4)),
             number_column("modal_moment", "modal moment", "N m/√(kg m²)", moment, aligned(moment, 7, least=4)),
             Column(key="nodes_m", title="nodes", unit="m", values=at, cells=nodes),

@@ -20,7 +20,7 @@ from tfarm.report.digits import unit
 from tfarm.report.sections import Fact, SavedSection
 
 TEMPLATES = Path(__file__).parent / "templates"
-QUESTIONS = {"bode": "Bode plots", "modes": "Modes"}
+QUESTIONS = {"bode": "Bode plots", "modes": "Modes", "assumptions": "What the assumptions do"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,17 +48,27 @@ def _templates() -> Environment:
     return environment
 
 
-def arm_page(arm: Arm, sections: Sequence[SavedSection], only: str | None) -> str:
-    """The page of one arm, with every section or with those of one question."""
+def arm_page(arm: Arm, sections: Sequence[SavedSection], only: str | None, *, trust: str) -> str:
+    """The page of one arm, with every section or with those of one question.
+
+    `trust` is the page that says why it can be trusted, as seen from the arm's folder; empty if there is none.
+    """
     title = f"{arm.name}: {QUESTIONS[only].lower()}" if only else arm.name
-    return _render(
-        "arm.html", title=title, arm=arm, sections=sections, only=only, summary=summary(arm), foot=foot(arm, only)
+    return render(
+        "arm.html",
+        title=title,
+        arm=arm,
+        sections=sections,
+        only=only,
+        trust=trust,
+        summary=summary(arm),
+        foot=foot(arm, only),
     )
 
 
-def index_page(cards: Sequence[Card]) -> str:
+def index_page(cards: Sequence[Card], *, trust: str) -> str:
     """The page that leads to all others."""
-    return _render("index.html", title="tfarm reports", cards=cards)
+    return render("index.html", title="tfarm reports", cards=cards, trust=trust)
 
 
 def foot(arm: Arm, only: str | None) -> dict[str, str]:
@@ -68,10 +78,24 @@ def foot(arm: Arm, only: str | None) -> dict[str, str]:
 
 def command(arm: Arm, only: str | None) -> str:
     """The command that writes this page; an arm that is no preset is named by its file."""
-    is_preset = arm.name in presets() and load(arm.name) == arm
-    name = arm.name if is_preset else f"{arm.name}.toml"
     choice = f" --only {only}" if only else ""
-    return f"tfarm report {shlex.quote(name)}{choice} --out reports"
+    return f"tfarm report {_argument(arm.name, is_preset(arm))}{choice} --out reports"
+
+
+def command_for_all(arms: Sequence[tuple[str, bool]]) -> str:
+    """The command that writes the pages of these arms, each a name and whether it is a preset."""
+    if sorted(name for name, preset in arms if preset) == sorted(presets()) and all(preset for _, preset in arms):
+        return "tfarm report --out reports"
+    return f"tfarm report {' '.join(_argument(name, preset) for name, preset in arms)} --out reports"
+
+
+def is_preset(arm: Arm) -> bool:
+    """Whether the arm comes with tfarm."""
+    return arm.name in presets() and load(arm.name) == arm
+
+
+def _argument(name: str, preset: bool) -> str:
+    return shlex.quote(name if preset else f"{name}.toml")
 
 
 def summary(arm: Arm) -> str:
@@ -88,5 +112,6 @@ def symbol(text: str) -> Markup:
     return Markup(re.sub(r"\b([A-Za-z])_([a-z0-9])\b", r"\1<sub>\2</sub>", plain))
 
 
-def _render(template: str, **values: Any) -> str:
+def render(template: str, **values: Any) -> str:
+    """A page from its template."""
     return _templates().get_template(template).render(version=tfarm.__version__, **values)

@@ -22,17 +22,20 @@ from pathlib import Path
 from tfarm.arm import Arm, to_toml
 from tfarm.errors import ParameterError, did_you_mean
 from tfarm.report.arm_section import arm_section
+from tfarm.report.assumptions_section import assumptions_section
 from tfarm.report.bode_section import bode_section
 from tfarm.report.card import save_card, written_cards
 from tfarm.report.modes_section import modes_section
 from tfarm.report.page import QUESTIONS, arm_page, index_page
 from tfarm.report.paper import is_from_paper, paper_section
 from tfarm.report.sections import SavedSection, Section, save_section
+from tfarm.report.trust import FOLDER, Evidence, gather, write_trust
+from tfarm.report.trust_proofs import save_proof, written_proofs
 
 Progress = Callable[[int, int, str], object]
 
 WORKERS = 2
-OURS = ("index.html", "README.md", "pictures", "bench.json")  # names in `out` that no arm's folder may have
+OURS = ("index.html", "README.md", "pictures", "bench.json", "trust")  # names in `out` that no arm's folder may have
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,38 +49,46 @@ class Piece:
 
 
 PIECES = (
-    Piece("the arm", ("bode", "modes"), arm_section),
+    Piece("the arm", tuple(QUESTIONS), arm_section),
     Piece("the paper's values", (), paper_section, is_from_paper),
     Piece("root moment", ("bode",), partial(bode_section, output="root_moment")),
     Piece("tip displacement", ("bode",), partial(bode_section, output="tip_displacement")),
     Piece("modes", ("modes",), modes_section),
+    Piece("assumptions", ("assumptions",), assumptions_section),
 )
 CARD = "card"
+EVIDENCE = (-1, "evidence")  # for the page on trust: of no arm
+TRUST = f"{FOLDER}/index.html"
 
-Task = tuple[int, int | str]  # which arm, which piece (or its card)
+Task = tuple[int, int | str]  # which arm, which piece (or its card and proof)
+Result = SavedSection | Evidence | None
 
 
 def write(
     arms: Sequence[Arm], out: Path, *, only: tuple[str, ...] | None = None, progress: Progress | None = None
 ) -> Path:
-    """Write the report of each arm to out/<name>/ and out/index.html; the page to open first.
+    """Write the report of each arm to out/<name>/, out/trust/ and out/index.html; the page to open first.
 
-    `only` ("bode", "modes") writes those pages alone, out/<name>/bode.html and so on.  `progress` is told (done,
-    total, what) after each piece of work.  Raises ParameterError before any work if `out` cannot be written, two
-    arms share a name or there is none.  If the work itself fails, `out` is as it was.
+    `only` ("bode", "modes", "assumptions") writes those pages alone, out/<name>/bode.html and so on.  `progress` is
+    told (done, total, what) after each piece of work.  Raises ParameterError before any work if `out` cannot be
+    written, two arms share a name or there is none.  If the work itself fails, `out` is as it was.
     """
     _check(arms, only)
     out = Path(out)
-    with _beside(out, [arm.name for arm in arms]) as beside:
+    with _beside(out, [arm.name for arm in arms] + [FOLDER] * (not only)) as beside:
         folders = [beside / str(i) for i in range(len(arms))]
         for folder in folders:
             folder.mkdir()
-        sections = _make_all(arms, folders, only or (), progress)
+        sections, evidence = _make_all(arms, folders, only or (), progress)
+        trust = TRUST if evidence is not None or (out / TRUST).is_file() else ""
         for arm, folder, parts in zip(arms, folders, sections, strict=True):
-            _write_pages(arm, folder, parts, only)
+            _write_pages(arm, folder, parts, only, trust)
         for arm, folder in zip(arms, folders, strict=True):
             _move_into(folder, out / arm.name)
-        index = index_page(written_cards(out))
+        if evidence is not None:
+            write_trust(evidence, written_proofs(out), beside / FOLDER)
+            _move_into(beside / FOLDER, out / FOLDER)
+        index = index_page(written_cards(out), trust=trust)
         (beside / "index.html").write_text(index, encoding="utf-8", newline="")
         os.replace(beside / "index.html", out / "index.html")
     alone = len(arms) == 1 and only is not None and len(only) == 1
@@ -146,34 +157,33 @@ def _remove(made: Sequence[Path]) -> None:
 
 def _make_all(
     arms: Sequence[Arm], folders: Sequence[Path], only: tuple[str, ...], progress: Progress | None
-) -> list[list[SavedSection]]:
-    """The sections of each arm's page, in the order of PIECES."""
-    tasks: list[Task] = [
+) -> tuple[list[list[SavedSection]], Evidence | None]:
+    """The sections of each arm's page, in the order of PIECES, and the evidence if whole reports are asked for."""
+    tasks: list[Task] = [] if only else [EVIDENCE]  # first: it takes longest
+    tasks += [
         (i, j)
         for i, arm in enumerate(arms)
         for j, piece in enumerate(PIECES)
         if piece.suits(arm) and (not only or set(only) & set(piece.questions))
     ]
     tasks += [(i, CARD) for i in range(len(arms))]
-    done: dict[Task, SavedSection | None] = {}
+    done: dict[Task, Result] = {}
     if progress is not None:
         progress(0, len(tasks), arms[0].name)
     for task, section in _results(arms, folders, tasks):
         done[task] = section
         if progress is not None:
             progress(len(done), len(tasks), _name_of(arms, task))
-    return [
-        [s for t in sorted(t for t in tasks if t[0] == i and t[1] != CARD) if (s := done[t])] for i in range(len(arms))
-    ]
+    sections = [[s for t in tasks if t[0] == i and isinstance(s := done[t], SavedSection)] for i in range(len(arms))]
+    evidence = done.get(EVIDENCE)
+    return sections, evidence if isinstance(evidence, Evidence) else None
 
 
-def _results(
-    arms: Sequence[Arm], folders: Sequence[Path], tasks: Sequence[Task]
-) -> Iterator[tuple[Task, SavedSection | None]]:
+def _results(arms: Sequence[Arm], folders: Sequence[Path], tasks: Sequence[Task]) -> Iterator[tuple[Task, Result]]:
     """Each task with its result as it comes: here, or by two processes where there is more than one arm."""
     if len(arms) == 1 or not _may_start_processes():
-        for i, piece in tasks:
-            yield (i, piece), _make(arms[i], piece, folders[i])
+        for task in tasks:
+            yield task, _make(arms[task[0]], task[1], folders[task[0]])
         return
     with ProcessPoolExecutor(WORKERS, mp_context=get_context("spawn")) as pool:
         futures = {pool.submit(_make, arms[i], piece, folders[i]): (i, piece) for i, piece in tasks}
@@ -192,24 +202,31 @@ def _may_start_processes() -> bool:
     return file is None or getattr(main, "__spec__", None) is not None or not str(file).endswith(".py")
 
 
-def _make(arm: Arm, piece: int | str, folder: Path) -> SavedSection | None:
+def _make(arm: Arm, piece: int | str, folder: Path) -> Result:
+    if piece == EVIDENCE[1]:
+        return gather()
     if isinstance(piece, str):
         save_card(arm, folder)
+        save_proof(arm, folder)
         return None
     return save_section(PIECES[piece].make(arm), folder)
 
 
 def _name_of(arms: Sequence[Arm], task: Task) -> str:
     piece = task[1]
+    if task == EVIDENCE:
+        return "why trust this"
     return f"{arms[task[0]].name}: {piece if isinstance(piece, str) else PIECES[piece].name}"
 
 
-def _write_pages(arm: Arm, folder: Path, sections: Sequence[SavedSection], only: tuple[str, ...] | None) -> None:
+def _write_pages(
+    arm: Arm, folder: Path, sections: Sequence[SavedSection], only: tuple[str, ...] | None, trust: str
+) -> None:
     """The arm's file and its page, or the page of each question asked."""
     (folder / "arm.toml").write_text(to_toml(arm), encoding="utf-8", newline="")
     for question in only or (None,):
         wanted = [s for s in sections if question is None or _answers(s.section.anchor, question)]
-        page = arm_page(arm, wanted, question)
+        page = arm_page(arm, wanted, question, trust=f"../{trust}" if trust else "")
         (folder / f"{question or 'index'}.html").write_text(page, encoding="utf-8", newline="")
 
 

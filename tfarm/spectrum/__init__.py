@@ -1,5 +1,6 @@
 """Natural frequencies and mode shapes: counted, so that none is missing, then found to the last digit."""
 
+from tfarm.spectrum.damped import DampedModes, damped_modes
 from tfarm.spectrum.table import PARAMETERS, Modes, compare_theories, modes, modes_below
 
-__all__ = ["PARAMETERS", "Modes", "compare_theories", "modes", "modes_below"]
+__all__ = ["PARAMETERS", "DampedModes", "Modes", "compare_theories", "damped_modes", "modes", "modes_below"]

@@ -22,6 +22,7 @@ from tfarm.exact.characteristic import Analytic
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 TURN = 0.6  # rad: a longer step of the phase along the contour is halved
+FORESEEN = 1.0  # rad: so is one whose ends turn faster than this
 FINEST = 1e-13  # a contour cannot be resolved closer to a zero than this share of the box
 DEAD = 1e-8  # nearer to s = 0 than this share of a box Newton's method is not believed: a zero there forces cuts
 SPLIT = 0.4871  # where a box is cut: off the axes, on which zeros like to lie
@@ -73,26 +74,32 @@ def winding_number(function: Function, box: Box, points: int = 40) -> int:
     corners = box.corners
     path = np.concatenate([np.linspace(a, b, points, endpoint=False) for a, b in pairwise(corners)])
     path = np.append(path, corners[-1])
-    phase = _phase(function, path)
+    phase, rate = _phase(function, path)
     smallest = FINEST * abs(corners[2] - corners[0])
     while True:
+        length = np.diff(path)
         step = np.angle(np.exp(1j * np.diff(phase)))
-        (rough,) = np.nonzero(abs(step) > TURN)
+        foreseen = np.maximum(abs((rate[:-1] * length).imag), abs((rate[1:] * length).imag))
+        (rough,) = np.nonzero((abs(step) > TURN) | (foreseen > FORESEEN))
         if not rough.size:
             return round(float(step.sum()) / (2 * math.pi))
-        if path.size > 200_000 or abs(path[rough + 1] - path[rough]).min() < smallest:
+        if path.size > 200_000 or abs(length[rough]).min() < smallest:
             raise ConvergenceError(
                 f"a zero lies on the contour near {path[rough[0]]:.6g}", path[rough[0]], step[rough[0]]
             )
         middle = (path[rough] + path[rough + 1]) / 2
-        phase = np.insert(phase, rough + 1, _phase(function, middle))
+        new_phase, new_rate = _phase(function, middle)
+        phase, rate = np.insert(phase, rough + 1, new_phase), np.insert(rate, rough + 1, new_rate)
         path = np.insert(path, rough + 1, middle)
 
 
-def _phase(function: Function, points: Complex) -> NDArray[np.float64]:
+def _phase(function: Function, points: Complex) -> tuple[NDArray[np.float64], Complex]:
+    """arg f and f'/f: the second tells where the first may have gone once around between two points."""
     at = function(points)
     phase: NDArray[np.float64] = np.angle(at.value) + at.scale.imag
-    return phase
+    with np.errstate(all="ignore"):  # a value of zero is caught as a rough step
+        rate = np.where(at.value == 0, 0.0, at.slope / at.value)
+    return phase, rate
 
 
 def newton(function: Function, starts: Complex, steps: int = 60) -> Complex:

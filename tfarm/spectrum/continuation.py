@@ -9,7 +9,7 @@ branches cannot fall onto one zero; two zeros close to each other are corrected 
 A step is believed if no zero moved further from its prediction than a share of its distance to the next one, and is
 shortened otherwise.  Where a real zero runs into one of another pair, or into one that no pair holds, no step is short
 enough: then the two become one pair.  (A damped Timoshenko beam has a third, real zero for each bending wave, coming
-from s = -inf as C grows from 0.  It meets the fast zero of the overdamped mode, and together they ring again, now in shear.)
+from s = -inf as C grows from 0.  It meets the fast zero of the overdamped mode; together they ring again, in shear.)
 
 None of this is a proof: a winding number is, and `damped` asks for it.
 """
@@ -30,7 +30,16 @@ from tfarm.errors import ConvergenceError
 from .box import Complex, Function
 
 Real = NDArray[np.float64]
-Family = Callable[[float], Function]
+
+
+class Member(NamedTuple):
+    """One function of a family, and the real point where it is singular (-1/C; -inf if it is entire)."""
+
+    function: Function
+    singular: float = -np.inf
+
+
+Family = Callable[[float], Member]
 
 NEIGHBOURS = 8  # zeros that repel each other: those further away move too little to matter
 BELIEVED = 0.2  # how far a zero may land from its prediction, in distances to the next one
@@ -107,23 +116,23 @@ def _pairs(mean: Real, square: Real) -> Complex:
     return np.where((square < 0)[:, None], np.stack([upper, upper.conj()], 1), real)
 
 
-def _corrected(function: Function, guess: Complex) -> tuple[Complex, NDArray[np.bool_]]:
+def _corrected(member: Member, guess: Complex) -> tuple[Complex, NDArray[np.bool_]]:
     """The pairs of zeros next to the guess, and which of them did not settle there."""
     zeros = guess
     for _ in range(12):
-        zeros, moved = improved(function, zeros)
+        zeros, moved = improved(member, zeros)
         if not np.isfinite(zeros).all():
             break
         if (moved < SETTLED).all():
-            return zeros, _strayed(guess, zeros)
+            return zeros, _strayed(guess, zeros, member.singular)
     return guess, ~(moved < SETTLED)
 
 
-def _strayed(guess: Complex, found: Complex) -> NDArray[np.bool_]:
-    gap, _ = _neighbours(found)
+def _strayed(guess: Complex, found: Complex, singular: float) -> NDArray[np.bool_]:
+    gap, _ = _neighbours(found, singular)
     met = (guess[:, 0].imag > 0) != (found[:, 0].imag > 0)  # around a meeting on the axis only the mean is compared
     moved = np.where(met[:, None], abs((guess - found).mean(1))[:, None], abs(guess - found))
-    strayed: NDArray[np.bool_] = ~(moved <= BELIEVED * gap).all(1)
+    strayed: NDArray[np.bool_] = np.any(~(moved <= BELIEVED * gap), axis=1)
     return strayed
 
 
@@ -132,7 +141,7 @@ def _exchange(family: Family, nodes: list[Node], stray: NDArray[np.bool_], at: f
 
     The last node is changed, and the pairs concerned lose their history.
     """
-    here, there, zeros = family(nodes[-1].at), family(at), nodes[-1].zeros.copy()
+    here, there, zeros = family(nodes[-1].at).function, family(at).function, nodes[-1].zeros.copy()
     for i, j in product(np.nonzero(stray & (zeros[:, 0].imag == 0))[0], (0, 1)):
         zero = zeros[i, j]
         near = _next_zero(here, zero.real)
@@ -162,7 +171,8 @@ def _shortened(node: Node, stray: NDArray[np.bool_], wanted: int) -> Node:
     """The node without the modes from the first stray one on, if none of them is wanted."""
     first = int(np.nonzero(stray)[0][0])
     if first < wanted:
-        raise ConvergenceError(f"pair {first + 1} cannot be told from its neighbours", node, stray)
+        text = f"the damped mode {first + 1} cannot be told from its neighbours: ask for fewer modes than that"
+        raise ConvergenceError(text, node, stray)
     return Node(node.at, node.zeros[:first])
 
 
@@ -183,23 +193,24 @@ def _next_zero(function: Function, zero: float) -> float:
     return min(found, key=lambda s: abs(s - zero), default=np.inf)
 
 
-def _neighbours(zeros: Complex) -> tuple[Real, Complex]:
-    """Of each zero its distance to the nearest zero of another pair, and its nearest zeros."""
+def _neighbours(zeros: Complex, singular: float) -> tuple[Real, Complex]:
+    """Of each zero its distance to the nearest zero of another pair or to the singular point, and its nearest zeros."""
     flat = zeros.ravel()
     plane = np.c_[flat.real, flat.imag]
     number = min(NEIGHBOURS, flat.size)
-    distance, which = (part.reshape(flat.size, number) for part in cKDTree(plane).query(plane, k=number))
+    distance, which = (np.reshape(part, (flat.size, number)) for part in cKDTree(plane).query(plane, k=number))
     itself = np.arange(flat.size)[:, None]
     gap = np.where(which // 2 == itself // 2, np.inf, distance).min(1)
     others = np.where(which == itself, np.nan, flat[which])
-    return np.minimum(gap, 2 * abs(flat) + 1e-300).reshape(zeros.shape), others
+    gap = np.minimum(gap, np.minimum(2 * abs(flat) + 1e-300, abs(flat - singular)))
+    return gap.reshape(zeros.shape), others
 
 
-def improved(function: Function, zeros: Complex) -> tuple[Complex, Real]:
+def improved(member: Member, zeros: Complex) -> tuple[Complex, Real]:
     """One correction of every pair, and how far each moved, as a share of its distance to the next zero."""
-    gap, others = _neighbours(zeros)
+    gap, others = _neighbours(zeros, member.singular)
     is_real = zeros.imag[:, 0] == 0
-    value, slope, scale = (part.reshape(zeros.shape) for part in function(zeros.ravel()))
+    value, slope, scale = (part.reshape(zeros.shape) for part in member.function(zeros.ravel()))
     with np.errstate(all="ignore"):
         step = value / slope
         repulsion = np.nansum(1 / (zeros.ravel()[:, None] - others), axis=1).reshape(zeros.shape)
@@ -225,8 +236,10 @@ def _together(zeros: Complex, value: Complex, slope: Complex) -> Complex:
     a1 = (value[0] - value[1]) / 2 - a3
     if not np.isfinite([a0, a1, a2, a3]).all() or a2 == 0 == a3:
         return zeros * np.nan
-    x = np.roots([a3, a2, a1, a0])
-    x = min(combinations(x, 2), key=lambda two: abs(two[0] + two[1]) + abs(two[0] * two[1] + 1))  # most like +-1
-    mean = (middle + half * (x[0] + x[1]) / 2).real
-    square = ((half * (x[0] - x[1]) / 2) ** 2).real
+    roots = combinations(np.roots([a3, a2, a1, a0]), 2)
+    one, two = min(
+        roots, key=lambda x: abs(x[0] + x[1]) + abs(x[0] * x[1] + 1), default=(np.nan, np.nan)
+    )  # most like +-1
+    mean = (middle + half * (one + two) / 2).real
+    square = ((half * (one - two) / 2) ** 2).real
     return _pairs(np.array([mean]), np.array([square]))[0]

@@ -52,6 +52,11 @@ class Modes:
     _k: Coefficients = field(repr=False)
 
     @property
+    def coefficients(self) -> Coefficients:
+        """The arm's dimensionless coefficients under this theory, with its damping."""
+        return replace(self._k, damping=self.arm.link.damping)
+
+    @property
     def natural_frequency_hz(self) -> Real:
         """Natural frequencies [Hz]."""
         return self.natural_frequency / (2 * math.pi)

@@ -1,0 +1,128 @@
+"""The table of published values: complete, checked both ways, and loud where it fails."""
+
+import json
+import math
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from tfarm.audit import published
+from tfarm.audit.literature import SOURCES
+from tfarm.audit.published import agrees, validate, validate_answer
+from tfarm.cli import main
+from tfarm.errors import CertificationError
+
+
+def only(key: str):
+    (source,) = (source for source in SOURCES if source.key == key)
+    return source
+
+
+def changed(key: str, **changes):
+    """A source of one case, its first, with changes."""
+    source = only(key)
+    return replace(source, cases=(replace(source.cases[0], **changes),))
+
+
+def test_every_row_agrees_or_says_why() -> None:
+    table = validate()
+    assert len(table) == sum(len(case.printed) for source in SOURCES for case in source.cases)
+    assert all(row.agrees != bool(row.why) for row in table)
+    assert sum(row.agrees for row in table) > 80
+    for row in table:
+        assert row.difference == pytest.approx(row.ours / float(row.printed) - 1, abs=1e-15)
+        assert math.isfinite(row.ours)
+
+
+def test_every_source_has_a_test_named_after_it() -> None:
+    """tests/published holds a file a source."""
+    files = {path.stem for path in (Path(__file__).parent.parent / "published").glob("test_*.py")}
+    expected = {source.key.removesuffix("-appendix-d").replace("-", "_").replace(".", "") for source in SOURCES}
+    assert {f"test_{key}" for key in expected} <= files
+
+
+def test_keys_are_unique_and_every_arm_is_whole() -> None:
+    assert len({source.key for source in SOURCES}) == len(SOURCES)
+    for source in SOURCES:
+        assert source.citation
+        assert source.reached
+        for case in source.cases:
+            assert set(case.why) <= set(range(1, len(case.printed) + 1))
+
+
+@pytest.mark.parametrize(
+    ("ours", "printed", "expected"),
+    [
+        (1.65, "1.65", True),
+        (1.65499, "1.65", True),
+        (1.6551, "1.65", False),
+        (1533.648, "1534.0", False),
+        (1533.648, "1534", True),
+        (0.125, "0.12", True),  # exactly half a unit
+        (22.0345, "22.03450", True),
+    ],
+)
+def test_half_a_unit_of_the_last_printed_digit(ours: float, printed: str, expected: bool) -> None:
+    assert agrees(ours, printed) is expected
+
+
+def test_a_wrong_digit_without_a_reason_is_named() -> None:
+    wrong = changed("code-aster-v2.05.400", printed=("3.9266", "7.06868"))
+    with pytest.raises(
+        CertificationError, match=r"code-aster-v2.05.400, pinned-free, mode 2: printed 7.06868, exact 7.06858"
+    ):
+        validate((wrong,))
+
+
+def test_a_reason_without_a_difference_is_named_too() -> None:
+    idle = changed("code-aster-v2.05.400", why={1: "for no reason"})
+    with pytest.raises(CertificationError, match=r"mode 1: .*agrees though a reason is given"):
+        validate((idle,))
+
+
+def test_another_arm_is_noticed() -> None:
+    """The rows depend on the arm: a hundredth more of tip mass and the agreement is gone."""
+    case = only("wang-2017").cases[0]
+    payload = replace(case.arm.payload, mass=1.01 * case.arm.payload.mass)
+    with pytest.raises(CertificationError, match=r"mode 1.*mode 5"):
+        validate((changed("wang-2017", arm=replace(case.arm, payload=payload)),))
+
+
+def test_the_answer_counts_its_rows() -> None:
+    answer = validate_answer()
+    assert set(answer) == {"sources", "rows", "agree", "explained"}
+    assert answer["agree"] + answer["explained"] == len(answer["rows"])
+    assert {row["source"] for row in answer["rows"]} == {source["key"] for source in answer["sources"]}
+    keys = {"source", "case", "mode", "quantity", "printed", "ours", "difference", "agrees", "why"}
+    assert all(set(row) == keys for row in answer["rows"])
+
+
+def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
+    with pytest.raises(SystemExit) as stop:
+        main(list(arguments))
+    out, err = capsys.readouterr()
+    return int(stop.value.code or 0), out, err
+
+
+def test_the_verb_prints_the_table_or_one_object(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = run(capsys, "validate")
+    assert (code, err) == (0, "")
+    assert "87 agree to the last printed digit, 21 differ for the reason given" in out
+    assert "[1] printed with the sign of the tip inertia reversed" in out
+    assert all(source.citation in out for source in SOURCES)
+    code, out, err = run(capsys, "validate", "--json")
+    assert (code, err) == (0, "")
+    assert json.loads(out)["explained"] == 21
+
+
+def test_the_verb_exits_3_and_says_which_row(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wrong = changed("nafems-fv5", why={})
+    monkeypatch.setattr(published, "validate", partial(validate, (wrong,)))
+    code, out, err = run(capsys, "validate")
+    assert (code, out) == (3, "")
+    assert "nafems-fv5, pinned-pinned, mode 1: printed 42.650, exact 42.64490922, and no reason is given" in err
+    assert err.count("\n") == 1

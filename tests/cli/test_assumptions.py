@@ -1,0 +1,60 @@
+"""`tfarm assumptions` as a shell sees it."""
+
+import json
+import math
+import subprocess
+import sys
+from dataclasses import replace
+
+import pytest
+
+import tfarm
+from tfarm.arm import to_toml
+from tfarm.audit.assumptions import assumptions_answer
+from tfarm.cli import main
+
+
+def run(capsys, *arguments):
+    with pytest.raises(SystemExit) as stop:
+        main(["assumptions", *arguments])
+    out, err = capsys.readouterr()
+    return int(stop.value.code or 0), out, err
+
+
+def test_json_is_the_room_s_answer(capsys):
+    code, out, err = run(capsys, "stocky-steel", "--count", "2", "--json")
+    assert (code, err) == (0, "")
+    assert json.loads(out) == assumptions_answer(tfarm.load("stocky-steel"), 2)
+
+
+def test_the_table_marks_the_arm_and_gives_the_limits(capsys):
+    code, out, err = run(capsys, "sasaki2012")
+    assert (code, err) == (0, "")
+    own = [line.split() for line in out.splitlines() if line.startswith("* ")]
+    assert own[0][1:6] == ["0.006", "0.1", "1.8e-09", "71.505682", "0.5000"]
+    assert own[1][1:4] == ["0.1", "71.505682", "-0.3395"]
+    assert "I_h = 0 gives 133.29705" in out
+    assert "I_h = inf gives 30.399477" in out
+    assert "area, shear factor and all else held" in out
+
+
+def test_a_locked_hub_has_none_to_choose(capsys, tmp_path):
+    arm = replace(tfarm.load("stocky-steel"), hub=tfarm.Hub(inertia=math.inf), name="held")
+    (tmp_path / "held.toml").write_text(to_toml(arm), encoding="utf-8")
+    code, out, _ = run(capsys, str(tmp_path / "held.toml"))
+    assert code == 0
+    assert "none to choose, the hub is locked or a free pin" in out
+
+
+@pytest.mark.parametrize("count", ["0", "101", "many"])
+def test_a_bad_count_is_refused_in_one_line(capsys, count):
+    code, out, err = run(capsys, "sasaki2012", "--count", count)
+    assert (code, out) == (2, "")
+    assert err.startswith(f"tfarm: --count = {count!r}: a whole number from 1 to 100")
+
+
+def test_it_loads_neither_matplotlib_nor_control():
+    code = "import sys; from tfarm.cli.app import _run; _run(['assumptions', 'sasaki2012', '--json']);"
+    code += "sys.exit(bool({'matplotlib', 'control'} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")

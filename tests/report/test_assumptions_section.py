@@ -1,0 +1,66 @@
+"""What the assumptions do, on the page: the studies' own numbers, the arm marked, and odd hubs said openly."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tfarm
+from tfarm.audit.assumptions import hub_study, section_study
+from tfarm.report.assumptions_section import assumptions_section
+
+PAPER = tfarm.load("sasaki2012")
+
+
+@pytest.fixture(scope="module")
+def section():
+    return assumptions_section(PAPER)
+
+
+def values_of(table):
+    return {column.key: list(column.values) for column in table.columns}
+
+
+def test_tables_are_the_studies_to_the_last_bit(section):
+    depth, hub = (
+        values_of(block) for block in section.blocks if block.stem in ("assumptions-section", "assumptions-hub")
+    )
+    for shown, study in ((depth, section_study(PAPER)), (hub, hub_study(PAPER))):
+        for i in range(4):
+            assert shown[f"mode_{i + 1}_rad_s"] == study.natural_frequency[:, i].tolist()
+            assert shown[f"mode_{i + 1}_sensitivity"] == study.sensitivity[:, i].tolist()
+        assert [text == "this arm" for text in shown["is"]] == study.is_own.tolist()
+    assert depth["depth_m"] == section_study(PAPER).depth.tolist()
+
+
+def test_the_words_carry_the_numbers(section):
+    words = " ".join(section.words)
+    assert "neither its second moment I nor the hub inertia I_h" in words
+    assert "from 23.836 to 713.35 rad/s" in words
+    assert "one per cent more depth changes it by 1.000 %" in words
+    assert "outside 30.399 to 133.30 rad/s" in words
+
+
+def test_the_pictures_run_over_all_candidates_and_through_the_arm(section):
+    pictures = [block for block in section.blocks if hasattr(block, "figure")]
+    assert [picture.stem for picture in pictures] == ["assumptions-depth", "assumptions-inertia"]
+    for picture, own in zip(pictures, (0.006, 0.1), strict=True):
+        (ax,) = picture.figure.axes
+        assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")
+        dashed = next(line for line in ax.lines if line.get_linestyle() == "--")
+        assert dashed.get_xdata()[0] == pytest.approx(own)
+        data = values_of(picture.data)
+        x = next(iter(data.values()))
+        omega = np.interp(math.log(own), np.log(x), np.log(data["mode_1_rad_s"]))
+        assert math.exp(omega) == pytest.approx(71.505682466890, rel=1e-3)  # linear between points of a curve
+        assert len(picture.alt) > 60
+
+
+@pytest.mark.parametrize(("inertia", "word"), [(math.inf, "locked"), (0.0, "a free pin")])
+def test_a_hub_without_an_inertia_is_said_openly(inertia, word):
+    arm = replace(tfarm.load("stocky-steel"), hub=tfarm.Hub(inertia=inertia))
+    section = assumptions_section(arm)
+    assert section.words[-1] == f"The hub of this arm is {word}, so there is no inertia to choose."
+    assert [block.stem for block in section.blocks] == ["assumptions-depth", "assumptions-section"]
+    assert "paper" not in " ".join(section.words)

@@ -1,0 +1,204 @@
+"""Why trust this: the proofs kept for each arm, the digits shown, and the page made of them."""
+
+import json
+import re
+from dataclasses import replace
+from fractions import Fraction
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+import tfarm
+from tfarm import audit
+from tfarm.arm import to_toml
+from tfarm.audit.published import Row as PublishedRow
+from tfarm.report import trust_proofs, write, writing
+from tfarm.report.modes_section import modal_table
+from tfarm.report.trust import Evidence, write_trust
+from tfarm.report.trust_proofs import digits_of, how_proven, measured, prove, rounds_to, save_proof, written_proofs
+
+ARM = tfarm.load("stocky-steel")
+BRACKET = ("71.50568246689014371", "71.505682466890143711")
+CHEAP = ("(8)", "Table 1 (rho)", "Table 1 (I_h)", "section 5: inputs", "(22)", "a_ij")
+
+
+@pytest.fixture(scope="module")
+def proof():
+    return prove(ARM)
+
+
+@pytest.fixture(scope="module")
+def evidence():
+    """The cheapest rows of the audit, and two published numbers, one of them explained."""
+    rows = tuple(claim.row() for claim in audit.claims() if claim.equation in CHEAP)
+    published = [
+        PublishedRow(
+            source="nafems-fv5", case="pinned <b>", quantity="frequency [Hz]", mode=mode, printed="42.650",
+            ours=42.6449, difference=-1.2e-4, agrees=not why, why=why,
+        )
+        for mode, why in ((1, ""), (2, "a misprint"))
+    ]  # fmt: skip
+    return Evidence(audit=rows, published=tuple(published))
+
+
+@pytest.fixture
+def page(evidence, proof, tmp_path):
+    """The page of one proven arm and one that is not."""
+    unproven = replace(proof, name="other", brackets=(), count=0, below="", failure="a double frequency near 7 rad/s")
+    write_trust(evidence, [proof, unproven], tmp_path / "trust")
+    return (tmp_path / "trust" / "index.html").read_text(encoding="utf-8")
+
+
+# ------------------------------------------------------------ proofs
+
+
+def test_the_brackets_hold_what_mpmath_finds_in_the_paper_s_determinant(proof):
+    texts = tfarm.modes(ARM, count=10).digits(30)[1:]
+    assert len(proof.brackets) == len(texts) == 10
+    for (lower, upper), text in zip(proof.brackets, texts, strict=True):
+        assert Fraction(lower) <= Fraction(text) <= Fraction(upper)
+        assert text.startswith(digits_of((lower, upper), 20))
+    assert proof.count == 11
+    assert not proof.failure
+
+
+@pytest.mark.parametrize(
+    ("lower", "text"),
+    [
+        ("71.50568246689014371", "71.505682466890143710"),
+        ("0.00071505682466890143711", "0.00071505682466890143711"),
+        ("1200000", "1200000.0000000000000"),
+    ],
+)
+def test_twenty_digits_with_their_zeros(lower, text):
+    assert digits_of((lower, ""), 20) == text
+
+
+@pytest.mark.parametrize(
+    ("cell", "right"),
+    [("71.50568", True), ("71.50569", False), ("7.151 × 10¹", True), ("7.150 × 10¹", False), ("71.505682466890", True)],
+)
+def test_a_cell_is_proven_if_both_ends_round_to_it(cell, right):
+    assert rounds_to(cell, BRACKET) == right
+
+
+def test_a_cell_is_not_proven_where_the_ends_round_apart():
+    assert not rounds_to("0.5", ("0.4499", "0.4501"))
+
+
+def test_the_modal_table_says_how_its_digits_are_known(monkeypatch):
+    modes = tfarm.modes(ARM, count=10)
+    table = modal_table(modes)
+    assert "Every printed digit of the natural frequencies is proven" in table.caption
+    omega, hertz = (column.cells for column in table.columns[1:3])
+    assert "11 lie below" in how_proven(modes, omega, hertz)
+    for i in (1, 10):  # a wrong last digit in either column is found out
+        wrong = list(hertz)
+        wrong[i] = wrong[i][:-1] + str((int(wrong[i][-1]) + 1) % 10)
+        assert "cannot be told" in how_proven(modes, omega, wrong)
+        assert "cannot be told" in how_proven(modes, wrong, hertz)
+
+    def fail(self, digits):
+        raise tfarm.CertificationError("a double frequency near 7 rad/s")
+
+    monkeypatch.setattr(type(modes), "certify", fail)
+    assert how_proven(modes, omega, hertz).endswith("not proven: a double frequency near 7 rad/s.")
+    assert prove(ARM).failure == "a double frequency near 7 rad/s"
+    assert prove(ARM).brackets == ()
+
+
+def test_the_accuracy_is_measured_and_a_wrong_digit_would_show(proof, monkeypatch):
+    assert [output for output, _ in proof.errors] == ["root_moment", "tip_displacement"]
+    assert all(0 < error < 2e-15 for _, error in proof.errors)
+
+    class Off:
+        """A response with a relative error of 1e-9."""
+
+        def __init__(self, arm, output):
+            self.G = exact(arm, output)
+            self.derivative, self.digits = self.G.derivative, self.G.digits
+
+        def __call__(self, s):
+            return self.G(s) * (1 + 1e-9)
+
+    exact = tfarm.transfer
+    monkeypatch.setattr(trust_proofs.tfarm, "transfer", Off)
+    assert 1e-10 < measured(ARM, "root_moment", proof.band) <= 1e-9
+
+
+def test_a_response_that_is_zero_throughout_has_no_error():
+    held = replace(ARM, payload=tfarm.Payload(mass=np.inf, inertia=0.1))
+    assert measured(held, "tip_displacement", (1.0, 10.0)) is None
+    assert [output for output, _ in prove(held).errors] == ["root_moment"]
+
+
+def test_a_proof_is_kept_and_read_again_and_strange_files_are_passed_over(proof, tmp_path):
+    (tmp_path / ARM.name).mkdir()
+    save_proof(ARM, tmp_path / ARM.name)
+    strange = ("", "[]", "null", "{}", '{"tfarm_proof": 1}', '{"tfarm_proof": 1, "name": "x5"}', "[" * 9999)
+    for i, text in enumerate(strange):
+        (tmp_path / f"x{i}").mkdir()
+        (tmp_path / f"x{i}" / "proof.json").write_text(text)
+    (tmp_path / "empty").mkdir()
+    (read,) = written_proofs(tmp_path)
+    assert read == proof
+    assert read.sha256 == trust_proofs.hash_of(tfarm.load("stocky-steel"))
+
+
+# ------------------------------------------------------------ the page
+
+
+def test_the_page_shows_verdicts_in_words_and_formulas_as_mathml(page):
+    for words in ("✓ right as printed", "≠ corrected", "? undecided"):
+        assert words in page
+    formulas = re.findall(r"<math.*?</math>", page, flags=re.DOTALL)
+    assert len(formulas) >= 12
+    assert all(ElementTree.fromstring(formula).tag == "math" for formula in formulas)
+    assert 'id="eq-8"' in page
+    assert 'href="#eq-8"' in page
+    assert "A*G*Phi_x*kappa" in page  # the residual of (8) as printed
+    assert page.count('class="claim"') == len(CHEAP)
+
+
+def test_what_is_not_proven_is_said(page, proof):
+    assert "Not so for other" in page
+    assert "not proven: a double frequency near 7 rad/s" in page
+    assert f"{digits_of(proof.brackets[0], 20)}…" in page
+
+
+def test_published_numbers_stand_with_their_reasons_and_are_text(page):
+    assert "1 of 2 printed natural frequencies agree" in page
+    assert "a misprint" in page
+    assert "pinned &lt;b&gt;" in page
+    assert "<b>" not in page
+
+
+def test_versions_hashes_and_the_command_are_there(page, proof, tmp_path):
+    assert "<code>tfarm report stocky-steel other.toml --out reports</code>" in page
+    assert proof.sha256 in page
+    for name in ("numpy", "scipy", "mpmath", "python-flint", "sympy", "control", "matplotlib"):
+        assert f">{name}</td>" in page
+    rows = json.loads((tmp_path / "trust" / "audit.json").read_text(encoding="utf-8"))["rows"]
+    assert {row["equation"] for row in rows} == set(CHEAP)
+
+
+def test_one_page_of_an_arm_does_not_wait_for_the_audit(tmp_path, monkeypatch, evidence):
+    """--only has no page on trust, nor a link to it, unless a whole report made it before."""
+    monkeypatch.setattr(writing, "gather", lambda: pytest.fail("the audit ran"))
+    arm = replace(ARM, name="mine")
+    page = write([arm], tmp_path, only=("assumptions",))
+    text = page.read_text(encoding="utf-8")
+    assert "why trust this" not in text
+    assert 'href="proof.json"' in text
+    assert (tmp_path / "mine" / "arm.toml").read_text(encoding="utf-8") == to_toml(arm)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["index.html", "mine"]
+    write_trust(evidence, written_proofs(tmp_path), tmp_path / "trust")
+    write([arm], tmp_path, only=("assumptions",))
+    assert "../trust/index.html" in page.read_text(encoding="utf-8")
+    assert "trust/index.html" in (tmp_path / "index.html").read_text(encoding="utf-8")
+
+
+def test_no_arm_may_be_called_trust(tmp_path):
+    with pytest.raises(tfarm.ParameterError, match="another name"):
+        write([replace(ARM, name="Trust")], tmp_path)

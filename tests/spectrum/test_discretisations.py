@@ -1,0 +1,91 @@
+"""Two discretisations that know nothing of the exact solution converge to it, each at the order of its theory."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.special import spherical_jn
+
+import tfarm
+from tests import elements
+from tests.models import Ritz
+from tfarm import Arm, Hub, Link, Payload, Section
+
+EPS = np.finfo(float).eps
+COUNT = 4
+MESHES = {1: (48, 96), 2: (24, 48), 3: (12, 16)}
+FIRST = 2  # modes below it are so near by that the rounding of the eigenvalue solver shows
+
+
+def arm(depth: float = 0.2) -> Arm:
+    """A deep arm with hub, tip mass and tip inertia, each of the order of the beam's own."""
+    section = Section.rectangle(width=0.1, depth=depth, shear_factor=5 / 6)
+    link = Link.isotropic(length=1.0, density=7800.0, youngs_modulus=2.1e11, poissons_ratio=0.3, section=section)
+    beam = link.rhoA
+    return Arm(link=link, hub=Hub(inertia=0.3 * beam), payload=Payload(mass=0.5 * beam, inertia=0.02 * beam))
+
+
+ARMS = {
+    "free": arm(),
+    "locked": Arm(link=arm().link, hub=Hub(inertia=math.inf), payload=arm().payload),
+    "slender": arm(0.02),
+}
+
+
+def exact(subject: Arm, count: int = COUNT) -> np.ndarray:
+    return tfarm.modes(subject, count).natural_frequency[-count:]
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3])
+@pytest.mark.parametrize("name", ARMS)
+def test_finite_elements_converge_at_twice_their_degree(name: str, degree: int) -> None:
+    subject, (coarse, fine) = ARMS[name], MESHES[degree]
+    true = exact(subject, 5)[FIRST:]
+    rough, close = (elements.natural_frequencies(subject, n, degree, 5)[FIRST:] for n in (coarse, fine))
+    order = np.log((rough - true) / (close - true)) / math.log(fine / coarse)
+    np.testing.assert_allclose(order, 2 * degree, atol=0.06)
+    limit = close + (close - rough) / ((fine / coarse) ** (2 * degree) - 1)  # Richardson: the two meshes alone
+    assert (abs(limit - true) < 0.03 * (close - true)).all()
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_legendre_ritz_comes_from_above_and_never_turns_back(name: str) -> None:
+    """Rayleigh and Ritz: every model is an upper bound, and more terms never raise it."""
+    subject = ARMS[name]
+    omega = np.array([Ritz(subject, terms).natural_frequencies(COUNT) for terms in range(4, 30)])
+    rounding = 64 * EPS * (exact(subject) / exact(subject)[0]) ** 2
+    assert (omega >= exact(subject) * (1 - rounding)).all()
+    assert (np.diff(omega, axis=0) <= rounding * omega[1:]).all()
+    np.testing.assert_allclose(omega[-1], exact(subject), rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["free", "locked", "slender"])
+def test_legendre_ritz_converges_as_the_legendre_series_of_its_waves(name: str) -> None:
+    """The strains of a mode are waves of wave number k; what N terms leave of cos(kx) has the square of the first
+    coefficient left out, (2 N + 1) j_N(k L/2)^2 (Gegenbauer): faster than any power, and than any geometric series.
+    """
+    subject, count = ARMS[name], 8
+    link, omega = subject.link, exact(ARMS[name], 8)
+    terms = np.arange(8, 40)
+    error = np.array([Ritz(subject, int(n)).natural_frequencies(count) for n in terms]) / omega - 1
+    for mode in (5, 7):
+        k = max(np.roots([1, 0, -_half(link, omega[mode]), 0, _product(link, omega[mode])]).imag)
+        rate = (2 * terms + 1) * spherical_jn(terms, k * link.length / 2) ** 2
+        seen = (error[:, mode] < 1e-3) & (error[:, mode] > 1e-11)
+        assert seen.sum() >= 5
+        slope = np.polyfit(np.log(rate[seen]), np.log(error[seen, mode]), 1)[0]
+        assert slope == pytest.approx(1.0, abs=0.1)
+
+
+def _half(link: Link, omega: float) -> float:
+    return -(omega**2) * (link.rhoI / link.EI + link.rhoA / link.kGA)
+
+
+def _product(link: Link, omega: float) -> float:
+    return -(omega**2) * link.rhoA / link.EI * (1 - omega**2 * link.rhoI / link.kGA)
+
+
+def test_the_two_discretisations_agree_with_each_other() -> None:
+    subject = ARMS["free"]
+    fine = elements.natural_frequencies(subject, 24, 3, COUNT)
+    np.testing.assert_allclose(fine, Ritz(subject, 30).natural_frequencies(COUNT), rtol=2e-7)

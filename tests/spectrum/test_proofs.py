@@ -1,0 +1,70 @@
+"""No proof is wrong: certified lists of random arms against an independent model, by `tests.spectrum.proofs`."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.spectrum.proofs import judge
+from tests.spectrum.test_certify import random_arm
+from tfarm import CertificationError
+from tfarm.spectrum import Modes
+from tfarm.spectrum.certify import Certificate
+
+ROOT = Path(__file__).parent.parent.parent
+
+
+def test_sixty_random_arms_are_proven_and_none_wrongly() -> None:
+    command = [sys.executable, "-m", "tests.spectrum.proofs", "60", "77"]
+    alone = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    done = subprocess.run(command, cwd=ROOT, env=alone, capture_output=True, text=True, check=True)
+    assert done.stdout.startswith("60 arms, 20 flexible modes: 60 proven, 0 refused, 0 wrong\n")
+    assert "1140 of 1140 gaps counted" in done.stdout
+
+
+def forged(monkeypatch: pytest.MonkeyPatch, change) -> None:
+    honest = Modes.certify
+    monkeypatch.setattr(Modes, "certify", lambda self: change(honest(self)))
+
+
+def moved(proof: Certificate) -> Certificate:
+    brackets = list(proof.brackets)
+    low, high = map(float, brackets[7])
+    brackets[7] = (repr(1.01 * low), repr(1.01 * high))
+    return Certificate(tuple(brackets), proof.count, proof.below)
+
+
+def shifted(proof: Certificate) -> Certificate:
+    """A list without its first mode, made up to twenty by one more above."""
+    last = float(proof.brackets[-1][0])
+    extra = (repr(1.2 * last), repr(1.2 * last * (1 + 1e-14)))
+    return Certificate((*proof.brackets[1:], extra), proof.count, proof.below)
+
+
+def miscounted(proof: Certificate) -> Certificate:
+    return Certificate(proof.brackets, proof.count + 1, proof.below)
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [(moved, "in bracket 8"), (shifted, "another count between the brackets"), (miscounted, "counted")],
+)
+def test_a_wrong_proof_would_be_seen(monkeypatch: pytest.MonkeyPatch, change, reason: str) -> None:
+    arm = random_arm(np.random.default_rng(5))
+    assert judge(arm).outcome == "proven"
+    forged(monkeypatch, change)
+    verdict = judge(arm)
+    assert verdict.outcome == "wrong"
+    assert reason in verdict.reason
+
+
+def test_a_refusal_is_tallied_with_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(proof: Certificate) -> Certificate:
+        raise CertificationError("no proven count between 1 and 2 rad/s")
+
+    forged(monkeypatch, refuse)
+    verdict = judge(random_arm(np.random.default_rng(5)))
+    assert (verdict.outcome, verdict.reason) == ("refused", "no proven count between 1 and 2 rad/s")

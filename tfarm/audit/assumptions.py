@@ -1,0 +1,204 @@
+"""What the assumptions do: natural frequencies over the sections and hubs that the paper leaves open.
+
+The paper gives an area, 6e-4 m^2, but neither the second moment I nor the hub inertia I_h.  Two studies walk through
+the candidates, one parameter at a time, everything else being the arm's own.  Both rest on the exact solution, and
+the sensitivities are exact too (`Modes.sensitivity`); frequencies are those of the undamped arm.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import Arm, Hub, Section
+from tfarm.arm.checks import positive
+from tfarm.errors import ParameterError
+from tfarm.spectrum import modes
+
+Real = NDArray[np.float64]
+
+COUNT = 4
+AREA = 6.0e-4  # m^2, the paper's
+DEPTHS = (0.002, 0.003, 0.004, 0.006, 0.008, 0.010, 0.015, 0.020, 0.030, 0.040, 0.060)  # m, for that area
+INERTIAS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # kg m^2
+SAME = 1e-9  # relative: so near to the arm's own value a candidate is that value
+HELD_SECTION = "area, shear factor and all else held: I = A depth^2/12, so one per cent of depth counts twice"
+HELD_HUB = "all else held"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SectionStudy:
+    """Frequencies over rectangles of the arm's own area, a row a candidate.
+
+    `depth` in the plane of bending, `width` = A/depth [m] and `second_moment` I = A depth^2/12 [m^4] have shape (n,);
+    `natural_frequency` [rad/s] and `sensitivity`, d ln w/d ln I with area, shear factor and all else held, have shape
+    (n, count), flexible modes from the first.  `is_own` marks the arm's own section, or for another shape the
+    rectangle with its area and second moment: only these two and the shear factor enter.
+    """
+
+    arm: Arm
+    depth: Real
+    width: Real
+    second_moment: Real
+    natural_frequency: Real
+    sensitivity: Real
+    is_own: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HubStudy:
+    """Frequencies over hub inertias, a row a candidate.
+
+    `hub_inertia` I_h [kg m^2] has shape (n,); `natural_frequency` [rad/s] and `sensitivity`, d ln w/d ln I_h, are
+    (n, count).  `locked` [rad/s] holds the frequencies for I_h = inf, `pinned` those for I_h = 0: the limits of every
+    column.  `is_own` marks the arm's own inertia.
+    """
+
+    arm: Arm
+    hub_inertia: Real
+    natural_frequency: Real
+    sensitivity: Real
+    locked: Real
+    pinned: Real
+    is_own: NDArray[np.bool_]
+
+
+def own_depth(arm: Arm) -> float:
+    """sqrt(12 I/A) [m], the depth of the rectangle with the arm's area and second moment."""
+    return math.sqrt(12.0) * arm.link.section.radius_of_gyration
+
+
+def candidate_depths(arm: Arm) -> tuple[float, ...]:
+    """Depths [m]: 2 to 60 mm for the paper's area, scaled with the root of the area to two digits; the arm's own."""
+    scale = math.sqrt(arm.link.section.area / AREA)
+    return _with_own((float(f"{depth * scale:.2g}") for depth in DEPTHS), own_depth(arm))
+
+
+def candidate_inertias(arm: Arm) -> tuple[float, ...]:
+    """Hub inertias [kg m^2]: 0.01 to 1, moved by whole decades if the arm's own lies outside, and the arm's own.
+
+    Raises ParameterError where the hub is locked or a free pin: there is no inertia to choose.
+    """
+    own = arm.hub.inertia
+    if not has_hub_inertia(arm):
+        remedy = "a locked hub or a free pin has no inertia to vary; name the inertias to try, or study the section"
+        raise ParameterError(key="hub.inertia", value=own, remedy=remedy)
+    scale = 1.0
+    while not INERTIAS[0] * scale * (1 - SAME) <= own <= INERTIAS[-1] * scale * (1 + SAME):
+        scale *= 10.0 if own > INERTIAS[-1] * scale else 0.1
+    return _with_own((inertia * scale for inertia in INERTIAS), own)
+
+
+def has_hub_inertia(arm: Arm) -> bool:
+    """Whether the hub has an inertia that could be another: neither locked (inf) nor a free pin (0)."""
+    return 0.0 < arm.hub.inertia < math.inf
+
+
+def section_study(arm: Arm, depths: Sequence[float] | None = None, *, count: int = COUNT) -> SectionStudy:
+    """The first `count` flexible frequencies over rectangles of the arm's area with these depths [m].
+
+    Without depths those of `candidate_depths`.  The shear factor is the arm's own throughout.
+    Raises ParameterError for a depth that is no positive length.
+    """
+    meaning = "the depth of a candidate section is a positive, finite number of metres"
+    chosen = [positive("depths", depth, meaning) for depth in (candidate_depths(arm) if depths is None else depths)]
+    depth = np.array(chosen)
+    link, area = arm.link, arm.link.section.area
+    second_moment = area * depth**2 / 12
+    sections = [
+        Section.general(area=area, second_moment=float(I), shear_factor=link.shear_factor) for I in second_moment
+    ]
+    arms = [replace(arm, link=replace(link, section=section)) for section in sections]
+    frequency, sensitivity = _frequencies(arms, count, "second_moment")
+    return SectionStudy(
+        arm=arm,
+        depth=depth,
+        width=area / depth,
+        second_moment=second_moment,
+        natural_frequency=frequency,
+        sensitivity=sensitivity,
+        is_own=abs(depth / own_depth(arm) - 1) < SAME,
+    )
+
+
+def hub_study(arm: Arm, inertias: Sequence[float] | None = None, *, count: int = COUNT) -> HubStudy:
+    """The first `count` flexible frequencies over hub inertias [kg m^2]; without them those of `candidate_inertias`.
+
+    Raises ParameterError for an inertia that is not positive and finite.
+    """
+    meaning = "the hub inertia of a candidate is a positive, finite number of kg m^2"
+    chosen = candidate_inertias(arm) if inertias is None else inertias
+    values = [positive("inertias", inertia, meaning) for inertia in chosen]
+    frequency, sensitivity = _frequencies([_with_hub(arm, inertia) for inertia in values], count, "hub_inertia")
+    limits, _ = _frequencies([_with_hub(arm, math.inf), _with_hub(arm, 0.0)], count, "hub_inertia")
+    return HubStudy(
+        arm=arm,
+        hub_inertia=np.array(values),
+        natural_frequency=frequency,
+        sensitivity=sensitivity,
+        locked=limits[0],
+        pinned=limits[1],
+        is_own=abs(np.array(values) - arm.hub.inertia) < SAME * np.array(values),
+    )
+
+
+def assumptions_answer(arm: Arm, count: int = COUNT) -> dict[str, Any]:
+    """The answer of `tfarm assumptions --json`; "hub" is null where the hub has no inertia to choose."""
+    study = section_study(arm, count=count)
+    section = {
+        "shape": "rectangle",
+        "area_m2": arm.link.section.area,
+        "shear_factor": arm.link.shear_factor,
+        "sensitivity_to": "second_moment",
+        "held": HELD_SECTION,
+        "candidates": [
+            {"depth_m": float(h), "width_m": float(b), "second_moment_m4": float(I), **row}
+            for h, b, I, row in zip(study.depth, study.width, study.second_moment, _rows(study), strict=True)
+        ],
+    }
+    return {"arm": arm.name, "count": count, "section": section, "hub": _hub_answer(arm, count)}
+
+
+def _hub_answer(arm: Arm, count: int) -> dict[str, Any] | None:
+    if not has_hub_inertia(arm):
+        return None
+    study = hub_study(arm, count=count)
+    return {
+        "sensitivity_to": "hub_inertia",
+        "held": HELD_HUB,
+        "candidates": [
+            {"hub_inertia_kg_m2": float(inertia), **row}
+            for inertia, row in zip(study.hub_inertia, _rows(study), strict=True)
+        ],
+        "locked_rad_s": study.locked.tolist(),
+        "pinned_rad_s": study.pinned.tolist(),
+    }
+
+
+def _rows(study: SectionStudy | HubStudy) -> list[dict[str, Any]]:
+    columns = zip(study.is_own, study.natural_frequency, study.sensitivity, strict=True)
+    return [
+        {"is_own": bool(own), "natural_frequency_rad_s": frequency.tolist(), "sensitivity": sensitivity.tolist()}
+        for own, frequency, sensitivity in columns
+    ]
+
+
+def _frequencies(arms: Sequence[Arm], count: int, parameter: str) -> tuple[Real, Real]:
+    """Flexible frequencies [rad/s] and their sensitivities to one parameter, each of shape (arms, count)."""
+    tables = [modes(arm, count) for arm in arms]
+    frequency = np.array([table.natural_frequency[-count:] for table in tables])
+    return frequency, np.array([table.sensitivity[parameter][-count:] + 0.0 for table in tables])
+
+
+def _with_hub(arm: Arm, inertia: float) -> Arm:
+    return replace(arm, hub=Hub(inertia=inertia))
+
+
+def _with_own(candidates: Any, own: float) -> tuple[float, ...]:
+    """The candidates and the arm's own value, ascending; one that is it, but for rounding, gives way."""
+    return tuple(sorted([*(value for value in candidates if abs(value / own - 1) >= SAME), own]))

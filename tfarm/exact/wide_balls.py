@@ -1,0 +1,119 @@
+"""The characteristic function D over a whole piece of a contour: balls as wide as a step, and still narrow values.
+
+Evaluated on a wide ball an expression forgets that its parts move together.  By Taylor's theorem
+
+    D(s) = D(m) + D'(m) (s - m) + ... + D^(n)(.) (s - m)^n / n!
+
+where only the last term is taken over the wide ball, so that a step may be long.
+
+The two waves are kept apart and scaled by e^{-t}: in the form of `balls.State` a wide s would lose what products of a
+wave with itself lose by cancelling, at any precision.  Where a wave is long or both may be one, that form is taken.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import flint
+
+from .balls import Ball, State, point, rational
+from .characteristic import OPEN, Gains
+from .closed_form import from_waves
+from .coefficients import Coefficients, Condition
+from .compiled import plain
+
+Series = Any  # flint.acb_series, which comes without types
+
+_separated = plain(from_waves)
+
+LONG = 0.3  # |z| below which a wave is not separated from the others
+TERMS = 4  # of the Taylor series
+
+
+def characteristic_ball(k: Coefficients, s: Ball, gains: Gains = OPEN) -> Ball:
+    """D(s) enclosed, at the working precision: for points, at any s."""
+    state = State(k, s)
+    return _fed_back(k, s, state.theta, state.M0, gains)
+
+
+def characteristic_over(k: Coefficients, s: Ball, gains: Gains = OPEN) -> Ball:
+    """D enclosed over the wide ball s, but for a factor that depends on its middle alone and is positive."""
+    middle = s.mid()
+    here = _by_waves(k, middle, gains, None, LONG)
+    if here is not None and s.real.is_exact() and s.imag.is_exact():
+        return here[0][0] * flint.acb(0, here[1].imag).exp()
+    there = None if here is None else _by_waves(k, s, gains, here[1], LONG)
+    if here is None or there is None:
+        return characteristic_ball(k, s, gains)
+    away, value = s - middle, flint.acb(0)
+    for order in range(TERMS - 1, -1, -1):
+        value = value * away + (there if order == TERMS - 1 else here)[0][order]
+    return value * flint.acb(0, here[1].imag).exp()
+
+
+def tangent(k: Coefficients, m: Ball, r: Ball, gains: Gains = OPEN) -> tuple[Ball, Ball, Ball] | None:
+    """D(m), D'(m) and D''/2 over the disc of radius r around m, apart from one factor; None where waves may be one."""
+    here = _by_waves(k, m, gains, None, 0.0)
+    disc = flint.acb(flint.arb(m.real.mid(), r), flint.arb(m.imag.mid(), r))
+    there = None if here is None else _by_waves(k, disc, gains, here[1], 0.0)
+    return None if here is None or there is None else (here[0][0], here[0][1], there[0][2])
+
+
+def _fed_back(k: Coefficients, s: Any, theta: Any, M0: Any, gains: Gains) -> Any:
+    """The drive and the feedback's torque (see `characteristic`), for balls and for series."""
+    hub = Condition.of(k.hub_inertia)
+    drive = theta * (s * s * rational(hub.inertia) + rational(hub.rest)) - M0 * rational(hub.force)
+    drive = drive if hub.rest else drive / rational(hub.force)
+    if gains.Kp or gains.K1:
+        drive = drive + theta * (s * rational(gains.K1) + rational(gains.Kp))
+    return drive + M0 * rational(gains.K2) / (s * rational(k.damping) + 1) if gains.K2 else drive
+
+
+def _by_waves(
+    k: Coefficients, at: Ball, gains: Gains, scale: Ball | None, shortest: float
+) -> tuple[Series, Ball] | None:
+    """D e^{-scale} as a series around `at`, and scale (t1 + t2 there if none is given); None where waves may be one."""
+    s = flint.acb_series([at, 1], prec=TERMS)
+    a, b, g, C = (rational(value) for value in (k.a, k.b, k.g, k.damping))
+    S, d = s * s, s * C + 1
+    if S[0].contains(0) or d[0].contains(0):
+        return None
+    half = (S * b + S * a / d) / 2
+    spread = _root(half * half - S * (S * (a * b) + g) / d)
+    if spread is None:
+        return None
+    one, two = (_wave(half + sign * spread, S, d, a, b, g, shortest) for sign in (1, -1))
+    if one is None or two is None:
+        return None
+    mass, inertia = Condition.of(k.tip_mass), Condition.of(k.tip_inertia)
+    ends = [S * rational(end.inertia) + rational(end.rest) for end in (mass, inertia)]
+    theta, M0, _, _ = _separated(
+        *one[:5], *two[:5], S * g, d, ends[0], rational(mass.force), ends[1], rational(inertia.force)
+    )
+    t = one[5] + two[5]
+    scale = t[0] if scale is None else scale
+    unit = S * d * spread * spread * (4 * g)
+    if unit[0].contains(0):
+        return None
+    return _fed_back(k, s, theta, M0, gains) * (t - scale).exp() / unit, scale
+
+
+def _root(z: Series) -> Series | None:
+    """A square root whose cut lies away from the ball (which of the two does not matter); None if it may vanish."""
+    if z[0].contains(0):
+        return None
+    root = z.sqrt() if z[0].real.mid() >= 0 else (-z).sqrt() * point(1j)
+    return root if root[0].real.mid() >= 0 else -root
+
+
+def _wave(z: Series, S: Series, d: Series, a: Ball, b: Ball, g: Ball, shortest: float) -> tuple[Series, ...] | None:
+    """c, s, z, v, e and t of one wave as `from_waves` wants them, scaled by e^{-t}."""
+    t = _root(z) if abs(z[0]).mid() > shortest else None
+    if t is None or t[0].contains(0):
+        return None
+    e = (-t).exp()
+    v, inverse = z - S * b, d * z - S * a
+    if not inverse[0].contains(0):
+        other = -(S * g) / inverse  # the same by the dispersion relation; the narrower of the two
+        v = other if other[0].rel_accuracy_bits() > v[0].rel_accuracy_bits() else v
+    return (e * e + 1) / 2, (-(e * e) + 1) / (t * 2), z, v, e, t

@@ -1,0 +1,320 @@
+"""Why trust this: one page for all reports, with proofs, published numbers, the audit and how to make it all again.
+
+What takes seconds (the audit, the published tables) is `Evidence`, made by one piece of the work; what belongs to an
+arm (`trust_proofs.Proof`) is in its folder.  This module turns both into sections.
+"""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import tfarm
+from tfarm import audit
+from tfarm.arm import load, presets
+from tfarm.audit import published
+from tfarm.report.digits import scientific, significant
+from tfarm.report.page import command_for_all, render
+from tfarm.report.sections import Fact, Section, save_section, save_table
+from tfarm.report.tables import Column, Table, text_column
+from tfarm.report.trust_audit import VERDICTS, audit_table, counts, shown
+from tfarm.report.trust_proofs import DIGITS, MODES, OUTPUTS, POINTS, Proof, digits_of, hash_of
+
+FOLDER = "trust"
+PACKAGES = ("numpy", "scipy", "numba", "mpmath", "python-flint", "sympy", "control", "matplotlib", "latex2mathml")
+UNPROVEN = "not proven"
+
+PROOFS = (
+    "Modes are counted before they are looked for: a chain of signs in the manner of Wittrick and Williams (1971) "
+    "gives the number of natural frequencies below any frequency. Here both that count and the change of sign in each "
+    "enclosure are decided in ball arithmetic (python-flint), where every number carries a rigorous bound of its "
+    "error: what follows is a proof, not an estimate. Where the enclosures are as many as the count, none is missing."
+)
+DIGITS_CAPTION = (
+    f"First {MODES} flexible modes at C = 0, angular frequency in rad/s. All {DIGITS} digits are proven; the dots "
+    "stand for those that follow (digits are cut off, not rounded)."
+)
+COUNTS_CAPTION = (
+    "The count is made at one frequency between the last mode of the list and the next; with the rigid-body mode it is "
+    "one more than the flexible modes enclosed. Each arm's folder has the enclosures as proof.json."
+)
+ACCURACY = (
+    f"The plots are computed in double precision from a closed form without cancellation. At {POINTS} frequencies of "
+    f"each response, from a tenth of the first natural frequency to beyond the tenth, it was compared with ball "
+    "arithmetic at 30 proven digits. The error is counted in the change of G that a relative change of its argument "
+    "brings about, |G₆₄/G − 1| / (1 + |s G′/G|): near an undamped resonance no more can be asked of any number format. "
+    "One unit in the last place of a double is 2.2 × 10⁻¹⁶."
+)
+PUBLISHED = (
+    "Natural frequencies of beams as others have printed them. Each beam is an arm here: a free pin is a hub without "
+    "inertia, a clamp a locked hub, a support at the tip an infinite payload mass. Ours agrees with a printed number "
+    "if it rounds to its last digit; where it does not, the reason stands beside it. A difference without a reason "
+    "would have stopped this page."
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Evidence:
+    """What the whole package shows for itself: the audit of the paper, and the tables of others."""
+
+    audit: tuple[audit.Row, ...]
+    published: tuple[published.Row, ...]
+
+
+def gather() -> Evidence:
+    """Run the audit and the comparison with published tables: some seconds.
+
+    Raises CertificationError where one of them fails.
+    """
+    return Evidence(audit=audit.audit(), published=published.validate())
+
+
+def write_trust(evidence: Evidence, proofs: Sequence[Proof], folder: Path) -> None:
+    """index.html and its tables, into a folder of their own."""
+    folder.mkdir()
+    sections = {s.anchor: save_section(s, folder) for s in _sections(evidence, proofs)}
+    files = save_table(audit_table(evidence.audit), folder)
+    page = render(
+        "trust.html",
+        title="Why trust this",
+        sections=sections,
+        short=_short(evidence, proofs),
+        counts=[(*VERDICTS[verdict], verdict, number) for verdict, number in counts(evidence.audit).items()],
+        equations=[shown(row) for row in evidence.audit],
+        audit_files=files,
+        paper=audit.PAPER,
+        command=command_for_all([(proof.name, _is_preset(proof)) for proof in proofs]),
+    )
+    (folder / "index.html").write_text(page, encoding="utf-8", newline="")
+
+
+def _sections(evidence: Evidence, proofs: Sequence[Proof]) -> list[Section]:
+    rows = evidence.published
+    return [
+        Section(anchor="proofs", title="Proofs", words=(PROOFS,), blocks=(digits_table(proofs), counts_table(proofs))),
+        Section(anchor="accuracy", title="Measured accuracy", words=(ACCURACY,), blocks=(accuracy_table(proofs),)),
+        Section(
+            anchor="published",
+            title="Published numbers",
+            words=(PUBLISHED,),
+            facts=_published_facts(rows),
+            blocks=(sources_table(rows), differences_table(rows), published_table(rows)),
+        ),
+        Section(anchor="again", title="Make it again", blocks=(inputs_table(proofs), versions_table())),
+    ]
+
+
+def _short(evidence: Evidence, proofs: Sequence[Proof]) -> dict[str, Any]:
+    """The numbers of the five sentences at the top."""
+    proven = [proof for proof in proofs if not proof.failure]
+    errors = [error for proof in proofs for _, error in proof.errors]
+    found = counts(evidence.audit)
+    return {
+        "frequencies": sum(len(proof.brackets) for proof in proven),
+        "arms": len(proven),
+        "unproven": [proof.name for proof in proofs if proof.failure],
+        "digits": DIGITS,
+        "points": POINTS,
+        "worst": scientific(max(errors), 2) if errors else "",
+        "published": len(evidence.published),
+        "agree": sum(row.agrees for row in evidence.published),
+        "rows": len(evidence.audit),
+        **found,
+    }
+
+
+# ------------------------------------------------------------ proofs and accuracy
+
+
+def digits_table(proofs: Sequence[Proof]) -> Table:
+    """A row a mode, a column an arm: every digit that is proven."""
+    numbers = list(range(1, MODES + 1))
+    columns = [Column(key="mode", title="mode", values=numbers, cells=[str(number) for number in numbers])]
+    for proof in proofs:
+        digits = [digits_of(bracket, proof.digits) for bracket in proof.brackets] or [""] * MODES
+        cells = [f"{text}…" if text else UNPROVEN for text in digits]
+        columns.append(Column(key=f"{proof.name}_rad_s", title=proof.name, unit="rad/s", values=digits, cells=cells))
+    return Table(
+        stem="digits", title=f"Natural frequencies, {DIGITS} digits", caption=DIGITS_CAPTION, columns=tuple(columns)
+    )
+
+
+def counts_table(proofs: Sequence[Proof]) -> Table:
+    """How many lie below where, and how many were enclosed."""
+    return Table(
+        stem="counts",
+        title="None missing",
+        caption=COUNTS_CAPTION,
+        columns=(
+            text_column("arm", "arm", [proof.name for proof in proofs]),
+            _numbers("rigid_body", "rigid body", [int(proof.has_rigid_mode) for proof in proofs]),
+            _numbers("enclosed", "flexible modes enclosed", [len(proof.brackets) for proof in proofs]),
+            _numbers("count", "counted", [proof.count for proof in proofs]),
+            Column(
+                key="below_rad_s",
+                title="below",
+                unit="rad/s",
+                values=[proof.below for proof in proofs],
+                cells=[significant(float(proof.below), 9) if proof.below else "" for proof in proofs],
+            ),
+            text_column("verdict", "verdict", [_verdict(proof) for proof in proofs]),
+        ),
+    )
+
+
+def _verdict(proof: Proof) -> str:
+    return f"{UNPROVEN}: {proof.failure}" if proof.failure else "complete, proven"
+
+
+def _numbers(key: str, title: str, values: Sequence[int]) -> Column:
+    return Column(key=key, title=title, values=values, cells=[str(value) for value in values])
+
+
+def accuracy_table(proofs: Sequence[Proof]) -> Table:
+    """The worst error of each arm's two responses."""
+    columns = [
+        text_column("arm", "arm", [proof.name for proof in proofs]),
+        text_column(
+            "band_rad_s", "from … to, rad/s", [" … ".join(significant(x, 4) for x in proof.band) for proof in proofs]
+        ),
+    ]
+    for output in OUTPUTS:
+        errors = [dict(proof.errors).get(output) for proof in proofs]
+        cells = ["zero throughout" if error is None else scientific(error, 2) for error in errors]
+        values = ["" if error is None else error for error in errors]
+        columns.append(Column(key=output, title=output.replace("_", " "), values=values, cells=cells))
+    caption = "Worst error of double precision over those frequencies, counted as said above."
+    return Table(
+        stem="accuracy", title="Double precision against proven digits", caption=caption, columns=tuple(columns)
+    )
+
+
+# ------------------------------------------------------------ published tables
+
+
+def sources_table(rows: Sequence[published.Row]) -> Table:
+    """Where the numbers were printed, how they came here, and how many agree."""
+    sources = [s for s in published.SOURCES if any(row.source == s.key for row in rows)]
+    of = [[row for row in rows if row.source == source.key] for source in sources]
+    return Table(
+        stem="sources",
+        title="Sources",
+        caption="Few of the originals lay open on the desk; the last column says how each table was read.",
+        columns=(
+            text_column("source", "source", [source.key for source in sources]),
+            _numbers("numbers", "numbers", [len(each) for each in of]),
+            _numbers("agree", "agree", [sum(row.agrees for row in each) for each in of]),
+            text_column("citation", "where it was printed", [source.citation for source in sources]),
+            text_column("reached", "how it was read", [source.reached for source in sources]),
+        ),
+    )
+
+
+def differences_table(rows: Sequence[published.Row]) -> Table:
+    """The printed numbers that ours does not round to, a row a reason."""
+    groups: dict[tuple[str, str, str], list[published.Row]] = {}
+    for row in rows:
+        if not row.agrees:
+            groups.setdefault((row.source, row.case, row.why), []).append(row)
+    worst = [max((row.difference for row in each), key=abs) for each in groups.values()]
+    return Table(
+        stem="differences",
+        title="Where ours differs, and why",
+        caption="Largest difference: ours over printed, less one, of the modes named. All other numbers agree.",
+        columns=(
+            text_column("source", "source", [source for source, _, _ in groups]),
+            _lettered("case", "case", [case for _, case, _ in groups]),
+            text_column("modes", "modes", [", ".join(str(row.mode) for row in each) for each in groups.values()]),
+            Column(
+                key="largest_difference",
+                title="largest difference",
+                values=worst,
+                cells=[significant(difference, 2) for difference in worst],
+            ),
+            text_column("why", "why", [why for _, _, why in groups]),
+        ),
+    )
+
+
+def published_table(rows: Sequence[published.Row]) -> Table:
+    """Every printed number beside ours."""
+    printed, agrees = [row.printed for row in rows], ["yes" if row.agrees else "no" for row in rows]
+    return Table(
+        stem="published",
+        title="All printed numbers, and ours",
+        caption="✓ agrees to the last printed digit, ≠ differs, for the reason given above. Difference: ours over "
+        "printed, less one.",
+        columns=(
+            text_column("source", "source", [row.source for row in rows]),
+            _lettered("case", "case", [row.case for row in rows]),
+            _lettered("quantity", "quantity", [row.quantity for row in rows]),
+            _numbers("mode", "mode", [row.mode for row in rows]),
+            Column(key="agrees", title="", values=agrees, cells=["✓" if row.agrees else "≠" for row in rows]),
+            Column(key="printed", title="printed", values=printed, cells=printed),
+            _measured("ours", "ours", [row.ours for row in rows], 11),
+            _measured("difference", "difference", [row.difference for row in rows], 2),
+        ),
+    )
+
+
+def _lettered(key: str, title: str, texts: Sequence[str]) -> Column:
+    """Words with formulas in plain letters, on the page with Greek ones."""
+    cells = [text.replace("rhoA", "ρA").replace("w^2", "ω^2").replace("w L", "ω L") for text in texts]
+    return Column(key=key, title=title, values=texts, cells=cells)
+
+
+def _measured(key: str, title: str, values: Sequence[float], digits: int) -> Column:
+    return Column(key=key, title=title, values=values, cells=[significant(value, digits) for value in values])
+
+
+def _published_facts(rows: Sequence[published.Row]) -> tuple[Fact, ...]:
+    agree = sum(row.agrees for row in rows)
+    return (
+        Fact(
+            label="numbers compared", value=str(len(rows)), beside=f"from {len({row.source for row in rows})} sources"
+        ),
+        Fact(label="agree to the last printed digit", value=str(agree)),
+        Fact(label="differ, with the reason", value=str(len(rows) - agree)),
+    )
+
+
+# ------------------------------------------------------------ making it again
+
+
+def inputs_table(proofs: Sequence[Proof]) -> Table:
+    """The hash of each arm's file."""
+    names, hashes = [proof.name for proof in proofs], [proof.sha256 for proof in proofs]
+    return Table(
+        stem="inputs",
+        title="Inputs",
+        caption="SHA-256 of each arm's file, arm.toml in its folder: all that its page depends on.",
+        columns=(
+            text_column("arm", "arm", names),
+            text_column("is", "where from", ["comes with tfarm" if _is_preset(p) else "a file" for p in proofs]),
+            text_column("sha256", "SHA-256 of arm.toml", hashes),
+        ),
+    )
+
+
+def versions_table() -> Table:
+    """The versions that computed this."""
+    found = {"tfarm": tfarm.__version__, "python": platform.python_version()}
+    found |= {package: version(package) for package in PACKAGES}
+    return Table(
+        stem="versions",
+        title="Versions",
+        caption="With these versions, on one machine, two runs give the same bytes: no dates, no timings, fixed seeds.",
+        columns=(
+            text_column("package", "package", list(found)),
+            text_column("version", "version", list(found.values())),
+        ),
+    )
+
+
+def _is_preset(proof: Proof) -> bool:
+    """Whether the arm's file is, byte for byte, that of a preset."""
+    return proof.name in presets() and hash_of(load(proof.name)) == proof.sha256

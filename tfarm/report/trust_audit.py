@@ -1,0 +1,99 @@
+"""The audit of the paper as the page shows it: formulas printed and corrected side by side, verdicts in words."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from markupsafe import Markup, escape
+
+from tfarm.audit import Row
+from tfarm.audit.rows import is_zero
+from tfarm.report.digits import unit
+from tfarm.report.tables import Table, text_column
+from tfarm.report.trust_math import compared, formulas, lines, width
+
+VERDICTS = {"ok": ("✓", "right as printed"), "corrected": ("≠", "corrected"), "undecided": ("?", "undecided")}
+GREEK = dict(
+    zip(
+        ("rho", "kappa", "theta", "phi", "psi", "lambda", "eta", "alpha", "nu", "Theta", "Phi", "Psi", "Delta"),
+        "ρκθφψληανΘΦΨΔ",
+        strict=True,
+    )
+)
+BESIDE = 46  # characters of the widest line up to which two formulas stand side by side
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shown:
+    """One equation of the paper on the page; `corrected` is empty where the print is right."""
+
+    anchor: str
+    equation: Markup
+    verdict: str
+    mark: str
+    words: str
+    printed: list[Markup]
+    corrected: list[Markup]
+    is_wide: bool
+    left_printed: str
+    left_corrected: str
+    evidence: Markup
+
+
+def shown(row: Row) -> Shown:
+    """A row of the audit, typeset."""
+    mark, words = VERDICTS[row.verdict]
+    is_right = row.printed == row.corrected
+    texts = (row.printed_tex,) if is_right else (row.printed_tex, row.corrected_tex)
+    printed, corrected = (formulas(texts[0]), []) if is_right else compared(*texts)
+    return Shown(
+        anchor=anchor(row.equation),
+        equation=in_letters(row.equation),
+        verdict=row.verdict,
+        mark=mark,
+        words=words,
+        printed=printed,
+        corrected=corrected,
+        is_wide=is_right or max(width(line) for tex in texts for line in lines(tex)) > BESIDE,
+        left_printed=_left(row.residual_printed),
+        left_corrected=_left(row.residual_corrected),
+        evidence=in_letters(row.evidence),
+    )
+
+
+def in_letters(text: str) -> Markup:
+    """The audit's plain text with Greek letters, subscripts and exponents: theta_t^2 becomes θ<sub>t</sub>²."""
+    greek = re.sub(
+        rf"(?<![A-Za-z])({'|'.join(GREEK)})(?![A-Za-z])", lambda name: GREEK[name[1]], unit(str(escape(text)))
+    )
+    return Markup(
+        re.sub(r"(?<![^\W\d_])([A-Za-zΑ-Ωα-ω])_([a-z]{1,2}|\d{1,2})(?![A-Za-z0-9])", r"\1<sub>\2</sub>", greek)
+    )
+
+
+def anchor(equation: str) -> str:
+    """A name for links: "(A.1)" becomes "eq-a-1"."""
+    return "eq-" + re.sub(r"[^a-z0-9]+", "-", equation.lower()).strip("-")
+
+
+def counts(rows: Sequence[Row]) -> dict[str, int]:
+    """How many rows have each verdict, in the order of VERDICTS."""
+    found = Counter(row.verdict for row in rows)
+    return {verdict: found[verdict] for verdict in VERDICTS}
+
+
+def audit_table(rows: Sequence[Row]) -> Table:
+    """Every row in plain text, for the files."""
+    names = ("equation", "verdict", "printed", "corrected", "residual_printed", "residual_corrected", "evidence")
+    columns = tuple(text_column(name, name, [getattr(row, name) for row in rows]) for name in names)
+    return Table(stem="audit", title="The paper, equation by equation", caption="", is_data=True, columns=columns)
+
+
+def _left(residual: str) -> str:
+    """What a formula leaves in the check, in words."""
+    if residual == "0":
+        return "nothing"
+    return f"nothing but rounding at 50 digits, {residual}" if is_zero(residual) else residual

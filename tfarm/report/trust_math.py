@@ -1,0 +1,133 @@
+"""Formulas for the page: TeX to MathML, which every current browser sets and reads aloud without any help.
+
+MathML has no line breaks of its own, so long formulas are broken here: between statements, and at the plus and minus
+signs that stand outside every bracket.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from difflib import SequenceMatcher
+from xml.etree import ElementTree
+
+from latex2mathml.converter import convert
+from markupsafe import Markup
+
+Element = ElementTree.Element
+
+BETWEEN = re.compile(r"([,;]\\quad)\s*")
+OPENS, CLOSES = ("\\left", "\\begin", "{"), ("\\right", "\\end", "}")
+TOKEN = re.compile(r"\\left|\\right|\\begin|\\end|[{}]|[^\\{}]|\\[A-Za-z]+|\\.")
+SIGN = re.compile(r" [-+] ")
+LEAVES = ("mi", "mo", "mn", "mtext")
+WIDEST = 92  # characters of a line, as `width` estimates them: what fits beside the margins of a desktop's page
+SHORT = 24  # statements up to that width share a line, as far as it goes
+INDENT = r"\qquad "
+
+
+def formulas(tex: str) -> list[Markup]:
+    """The TeX as MathML, a line each."""
+    return [_text(line) for line in _set(tex)]
+
+
+def compared(printed: str, corrected: str) -> tuple[list[Markup], list[Markup]]:
+    """Both as MathML, a line each, the symbols in which they differ of the class "changed"."""
+    both = _set(printed), _set(corrected)
+    left, right = ([leaf for line in lines for leaf in line.iter() if leaf.tag in LEAVES] for lines in both)
+    matcher = SequenceMatcher(a=[leaf.text for leaf in left], b=[leaf.text for leaf in right], autojunk=False)
+    for what, i, j, k, m in matcher.get_opcodes():
+        if what != "equal":
+            for leaf in (*left[i:j], *right[k:m]):
+                leaf.set("class", "changed")
+    return [_text(line) for line in both[0]], [_text(line) for line in both[1]]
+
+
+def lines(tex: str) -> list[str]:
+    """The TeX of each line: a statement, several short ones, or as many terms of a long one as fit."""
+    return [line for group in _groups(tex) for line in _broken(group)]
+
+
+def width(tex: str) -> int:
+    """About how many characters wide a line is set; the two halves of a fraction share their place."""
+    text = re.sub(r"\\begin\{vmatrix\}.*?\\end\{vmatrix\}", "x" * 16, tex, flags=re.DOTALL)
+    text = re.sub(r"\\frac\{((?:[^{}]|\{[^{}]*\})*)\}\{((?:[^{}]|\{[^{}]*\})*)\}", _wider, text)
+    text = re.sub(r"\\(?:mathrm|text|left|right|sqrt|,|quad|qquad)", "", text)
+    text = re.sub(r"\\[A-Za-z]+ ?", "x", text)
+    return len(re.sub(r"[{}^_]", "", text))
+
+
+def _wider(match: re.Match[str]) -> str:
+    return "x" * max(width(match[1]), width(match[2]))
+
+
+def _groups(tex: str) -> Iterator[str]:
+    """Statements, neighbours that are short together."""
+    group = ""
+    for statement in BETWEEN.split(tex)[::2]:
+        fits = group and width(statement) <= SHORT and width(group + statement) <= 2 * SHORT
+        if group and not (fits and _last_is_short(group)):
+            yield group
+            group = ""
+        group += rf",\quad {statement}" if group else statement
+    yield group
+
+
+def _last_is_short(group: str) -> bool:
+    return width(BETWEEN.split(group)[-1]) <= SHORT
+
+
+def _broken(statement: str) -> Iterator[str]:
+    line = ""
+    for term in _terms(statement):
+        if line and width(line + term) > WIDEST:
+            yield line
+            line = INDENT
+        line += term
+    yield line
+
+
+def _terms(statement: str) -> Iterator[str]:
+    """The terms of a sum, each with its sign in front; what is in brackets stays together."""
+    depth, start = 0, 0
+    for match in TOKEN.finditer(statement):
+        token, place = match.group(), match.start()
+        depth += (token in OPENS) - (token in CLOSES)
+        if depth == 0 and place > start and SIGN.match(statement, place):
+            yield statement[start:place]
+            start = place
+    yield statement[start:]
+
+
+def _set(tex: str) -> list[Element]:
+    return [_mathml(line) for line in lines(tex)]
+
+
+def _mathml(tex: str) -> Element:
+    """One formula, without the name space that a file of XML would need and a page of HTML does not."""
+    upright = re.sub(r"\\mathrm\{(\w)\}", r"\\text{\1}", tex.strip())  # a single letter would be slanted
+    root = ElementTree.fromstring(re.sub(r' xmlns="[^"]*"', "", convert(upright, display="block"), count=1))
+    if width(tex) > WIDEST:
+        root.set("class", "long")
+    _mend(root)
+    return root
+
+
+def _mend(root: Element) -> None:
+    """Where the converter errs: plus-minus is an operator, infinity is none, a determinant's bars are as high as it."""
+    for row in root.iter("mrow"):
+        before = None
+        for leaf in row:
+            if leaf.text == "±":
+                leaf.tag = "mo"
+                leaf.set("form", "prefix" if before is None or before.tag == "mo" else "infix")
+            elif leaf.text == "∞":
+                leaf.tag = "mi"
+            elif leaf.text == "|":
+                is_right = before is not None and before.tag == "mtable"
+                leaf.attrib = {"form": "postfix" if is_right else "prefix", "stretchy": "true", "symmetric": "true"}
+            before = leaf
+
+
+def _text(line: Element) -> Markup:
+    return Markup(ElementTree.tostring(line, encoding="unicode"))

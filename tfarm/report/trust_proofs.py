@@ -1,0 +1,164 @@
+"""What is proven and measured of one arm, kept in its folder as proof.json and read again for the page on trust.
+
+The natural frequencies are enclosed and counted in ball arithmetic; the float64 responses are measured against it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from decimal import Decimal, localcontext
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import tfarm
+from tfarm.arm import Arm, to_toml
+from tfarm.errors import CertificationError, ConvergenceError
+from tfarm.spectrum import Modes
+
+MODES, DIGITS = 10, 20
+OUTPUTS = ("root_moment", "tip_displacement")
+POINTS, POINT_DIGITS = 100, 30
+LARGEST = 1 << 20  # bytes of a proof.json worth reading
+PLAIN = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹−", "-0123456789-")
+TWO_PI = Decimal("6.2831853071795864769252867665590057683943387987502")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Proof:
+    """Of one arm: brackets (lower, upper) [rad/s] of its first flexible frequencies, the count that completes them.
+
+    `count` frequencies lie below `below` [rad/s], a rigid-body mode included if `has_rigid_mode`.  `errors` has
+    (output, worst |G_64/G - 1| / (1 + |s G'/G|)) over `points` frequencies from `band`.  `failure` says what could
+    not be proven; then there are no brackets.  `sha256` is that of the arm's file.
+    """
+
+    name: str
+    sha256: str
+    has_rigid_mode: bool
+    digits: int = DIGITS
+    brackets: tuple[tuple[str, str], ...] = ()
+    count: int = 0
+    below: str = ""
+    failure: str = ""
+    points: int = POINTS
+    band: tuple[float, float]
+    errors: tuple[tuple[str, float], ...]
+
+
+def prove(arm: Arm) -> Proof:
+    """Certify the first modes of the arm and measure its responses; what cannot be proven is said, not raised."""
+    modes = tfarm.modes(arm, count=MODES)
+    flexible = modes.natural_frequency[modes.index > 0]
+    band = float(0.1 * flexible[0]), float(1.1 * flexible[-1])
+    found: dict[str, Any] = {}
+    try:
+        proof = modes.certify(DIGITS)
+        found = {"brackets": proof.brackets, "count": proof.count, "below": proof.below}
+    except CertificationError as error:
+        found = {"failure": str(error)}
+    return Proof(
+        name=arm.name,
+        sha256=hash_of(arm),
+        has_rigid_mode=arm.has_rigid_mode,
+        band=band,
+        errors=tuple((output, worst) for output in OUTPUTS if (worst := measured(arm, output, band)) is not None),
+        **found,
+    )
+
+
+def hash_of(arm: Arm) -> str:
+    """SHA-256 of the arm's file."""
+    return hashlib.sha256(to_toml(arm).encode()).hexdigest()
+
+
+def measured(arm: Arm, output: str, band: tuple[float, float]) -> float | None:
+    """The worst error of the float64 response along the imaginary axis; None where the response is zero throughout.
+
+    Counted in the change of G that a relative change of its argument brings about: |G_64/G - 1| / (1 + |s G'/G|).
+    """
+    G = tfarm.transfer(arm, output)
+    s = 1j * np.geomspace(*band, POINTS)
+    values, slopes = G(s), G.derivative(s)
+    if not np.any(values):
+        return None
+    errors = []
+    for point, value, slope in zip(s, values, slopes, strict=True):
+        try:
+            pair = G.digits(complex(point), POINT_DIGITS)
+        except (CertificationError, ConvergenceError):  # a zero of G, where a relative error means nothing
+            continue
+        parts = zip(pair, (value.real, value.imag), strict=True)
+        off = complex(*(float(Fraction(exact) - Fraction(float(part))) for exact, part in parts))
+        errors.append(abs(off) / (abs(value) + abs(point * slope)))
+    return float(max(errors)) if errors else None
+
+
+def save_proof(arm: Arm, folder: Path) -> None:
+    """proof.json."""
+    text = json.dumps({"tfarm_proof": 1, **asdict(prove(arm))}, ensure_ascii=False, indent=1) + "\n"
+    (folder / "proof.json").write_text(text, encoding="utf-8", newline="")
+
+
+def written_proofs(out: Path) -> Sequence[Proof]:
+    """The proofs of all arms in the folder of reports, by name; what is none of ours is passed over."""
+    folders = sorted((f for f in out.iterdir() if f.is_dir() and not f.name.startswith(".")), key=lambda f: f.name)
+    return [proof for folder in folders if (proof := _read(folder)) is not None]
+
+
+def _read(folder: Path) -> Proof | None:
+    file = folder / "proof.json"
+    try:
+        if file.stat().st_size > LARGEST:
+            return None
+        read = json.loads(file.read_text(encoding="utf-8"))
+        if read.pop("tfarm_proof") != 1 or read["name"] != folder.name:
+            return None
+        read["brackets"] = tuple((str(lower), str(upper)) for lower, upper in read["brackets"])
+        read["band"] = float(read["band"][0]), float(read["band"][1])
+        read["errors"] = tuple((str(output), float(error)) for output, error in read["errors"])
+        return Proof(**read)
+    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        return None
+
+
+# ------------------------------------------------------------ digits
+
+
+def digits_of(bracket: tuple[str, str], digits: int) -> str:
+    """The leading digits that all numbers in a bracket of so many digits share: its lower end, with its zeros."""
+    lower = Decimal(bracket[0])
+    with localcontext(prec=digits + 5):
+        return f"{lower.quantize(Decimal(1).scaleb(lower.adjusted() - digits + 1)):f}"
+
+
+def how_proven(modes: Modes, cells: Sequence[str], cells_hz: Sequence[str]) -> str:
+    """Why every digit of these cells [rad/s] and [Hz] is right, or that this is not proven: a sentence or two."""
+    try:
+        proof = modes.certify(DIGITS)
+    except CertificationError as error:
+        return f"The digits are those of double precision, not proven: {error}."
+    rows = np.flatnonzero(modes.index > 0).tolist()
+    pairs = [((cells[row], cells_hz[row]), bracket) for row, bracket in zip(rows, proof.brackets, strict=True)]
+    if not all(rounds_to(w, bracket) and rounds_to(f, bracket, TWO_PI) for (w, f), bracket in pairs):
+        return f"The digits are those of double precision; in one of them rounding cannot be told at {DIGITS} digits."
+    rigid = ", the rigid body included" if modes.arm.has_rigid_mode else ""
+    return (
+        "Every printed digit of the natural frequencies is proven: each lies between two numbers that round to it "
+        f"(bounds of {DIGITS} digits, ball arithmetic). So is the list: {proof.count} lie below "
+        f"{float(proof.below):.6g} rad/s{rigid}. The other columns come from double precision and show fewer digits "
+        "than it holds."
+    )
+
+
+def rounds_to(cell: str, bracket: tuple[str, str], divisor: Decimal = Decimal(1)) -> bool:
+    """Whether every number in the bracket, divided by the divisor, is rounded to what the cell shows."""
+    mantissa, _, power = cell.partition(" × 10")
+    shown = Decimal(mantissa.translate(PLAIN)).scaleb(int(power.translate(PLAIN) or 0))
+    with localcontext(prec=45):
+        return all((Decimal(end) / divisor).quantize(shown) == shown for end in bracket)

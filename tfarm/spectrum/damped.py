@@ -1,0 +1,197 @@
+"""Damped modes: each undamped mode followed to the arm's own C, in a list complete in a printed box.
+
+With C > 0 there are two families.  Bending modes become overdamped, and their slow real eigenvalues accumulate at -1/C,
+from the left only.  Shear is undamped in this model, so at any C infinitely many lightly damped modes remain, near
+Im s = (n - 1/2) pi c/L for a free tip, c^2 = kappa G/rho, their damping vanishing as 1/w^2.  No list of damped modes
+can be complete but in a box, and no box can hold -1/C.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.errors import CertificationError, ConvergenceError, ParameterError
+from tfarm.exact.characteristic import OPEN, Gains, quick_characteristic, zeros_at_origin
+from tfarm.exact.coefficients import Coefficients
+
+from .box import Box, Complex, Function, winding_number
+from .complex_shapes import mode_field
+from .continuation import Member, Node, follow, improved
+from .enclose import Disc, disjoint, enclosed, proven_count
+from .table import Modes, modes
+
+Real = NDArray[np.float64]
+
+COMPANY = 6  # modes followed beyond those wanted, so that the last of these are not led astray
+CLEAR = 0.8  # how far towards -1/C a box may reach
+FIRST = 0.01  # the first step in C, over 1/w of the highest mode
+
+
+@dataclass(frozen=True)
+class DampedModes:
+    """The modes of an arm with its damping, in the order of the undamped modes they continue from.
+
+    `eigenvalues` (n, 2) [1/s] are both zeros of each mode: a conjugate pair with Im > 0 first, or two real ones, the
+    slower first (overdamped); 0 and 0 for the rigid body.  `box` [1/s] holds `count` eigenvalues, all of them listed.
+    """
+
+    undamped: Modes
+    eigenvalues: Complex
+    box: Box
+    count: int
+
+    @property
+    def index(self) -> NDArray[np.int64]:
+        """Numbers of the modes: 0 for the rigid body, flexible ones from 1."""
+        return self.undamped.index
+
+    @property
+    def natural_frequency(self) -> Real:
+        """Natural frequencies of the undamped arm [rad/s]."""
+        return self.undamped.natural_frequency
+
+    @property
+    def is_overdamped(self) -> NDArray[np.bool_]:
+        """Which modes do not oscillate."""
+        overdamped: NDArray[np.bool_] = (self.eigenvalues[:, 0].imag == 0) & (self.index > 0)
+        return overdamped
+
+    @cached_property
+    def damping_ratio(self) -> Real:
+        """-(p + q)/(2 sqrt(p q)) of both eigenvalues: -Re/|s| of a pair, above 1 if overdamped, 0 for a rigid body."""
+        p, q = self.eigenvalues.T
+        size = np.sqrt((p * q).real)
+        ratio: Real = np.divide(-(p + q).real / 2, size, out=np.zeros_like(size), where=size > 0)
+        return ratio
+
+    def certify(self, digits: int = 15) -> tuple[tuple[Disc, ...], ...]:
+        """A disc around each eigenvalue of the flexible modes (one for a pair), and a proof that the box has no other.
+
+        Raises CertificationError where something cannot be proven.
+        """
+        k, discs = self.undamped.coefficients, []
+        for pair in self.eigenvalues[self.index > 0]:
+            wanted = pair[:1] if pair[0].imag > 0 else pair
+            discs.append(tuple(enclosed(k, complex(zero), digits) for zero in wanted))
+        if not disjoint([disc for pair in discs for disc in pair]):
+            raise CertificationError("the discs of two eigenvalues touch: ask for more digits")
+        proven = proven_count(k, self.box)
+        if proven != self.count:
+            raise CertificationError(f"{self.count} eigenvalues in the box are listed, but {proven} are there")
+        return tuple(discs)
+
+    # ------------------------------------------------------------ shapes
+
+    def shape(self, x: NDArray[np.float64] | float) -> Complex:
+        """Total displacement w(x) [m] of both eigenvalues of each flexible mode at x [m]: shape (n, 2, *x.shape).
+
+        Scaled so that the residue of w(x) over torque is w(x) psi(0)/(2 s), as for undamped modes of unit modal mass.
+        """
+        return self._field("W", x) * float(self.undamped.coefficients.length)
+
+    def rotation(self, x: NDArray[np.float64] | float) -> Complex:
+        """Total rotation psi(x) [rad], as `shape`."""
+        return self._field("Psi", x)
+
+    def moment(self, x: NDArray[np.float64] | float) -> Complex:
+        """Elastic bending moment E I psi'(x) [N m], without its damping part, as `shape`."""
+        k = self.undamped.coefficients
+        return self._field("M", x) * float(k.EI / k.length)
+
+    def _field(self, quantity: str, x: NDArray[np.float64] | float) -> Complex:
+        k = self.undamped.coefficients
+        share = np.asarray(x, dtype=float) / float(k.length)
+        if not np.all((share >= 0) & (share <= 1)):
+            raise ParameterError(key="x", value=x, remedy=f"a point of the arm lies between 0 and {float(k.length)} m")
+        zeros = self.eigenvalues[self.index > 0]
+        values = [[mode_field(k, complex(zero), quantity, share.ravel()) for zero in pair] for pair in zeros]
+        return np.array(values, dtype=complex).reshape(*zeros.shape, *share.shape)
+
+
+def damped_modes(undamped: Modes) -> DampedModes:
+    """The modes of the arm with its own C, continued from the undamped ones.
+
+    Raises ConvergenceError if a branch is lost, or two arrive at one eigenvalue.
+    """
+    k, C = undamped.coefficients, undamped.arm.link.damping
+    flexible = undamped.natural_frequency[undamped.index > 0]
+    more = modes(undamped.arm, flexible.size + COMPANY, theory=undamped.theory)
+    omega = more.natural_frequency[more.index > 0]
+    start = Node(0.0, np.stack([1j * omega, -1j * omega], 1))
+    if C == 0:
+        zeros = start.zeros
+    else:
+        node = follow(lambda C: member(replace(k, damping=C)), start, C, min(C, FIRST / omega[-1]), flexible.size)[-1]
+        zeros = polished(member(k), node.zeros)
+    listed, company = zeros[: flexible.size], zeros[flexible.size :]
+    box, count = complete_box(member(k).function, listed, company, C)
+    rigid = np.zeros((undamped.index.size - flexible.size, 2), complex)
+    return DampedModes(undamped, np.concatenate([rigid, listed]), box, count + zeros_at_origin(k))
+
+
+def member(k: Coefficients, gains: Gains = OPEN) -> Member:
+    """The characteristic function without its zeros at the origin, to be followed."""
+    at_zero = zeros_at_origin(k, gains)
+    singular = -1.0 / k.damping if k.damping else -np.inf
+    return Member(lambda s: quick_characteristic(k, s, gains, at_zero), singular)
+
+
+def polished(last: Member, zeros: Complex) -> Complex:
+    """Every zero to the last digits that float64 has of it."""
+    for _ in range(3):
+        zeros, _ = improved(last, zeros)
+    return zeros
+
+
+def complete_box(f: Function, listed: Complex, others: Complex, C: float) -> tuple[Box, int]:
+    """The highest box in which the listed pairs are all the zeros of f, by winding number, and how many they are.
+
+    `others` are zeros known but not listed.  Raises ConvergenceError if a box holds fewer zeros than are listed.
+    """
+    known = np.concatenate([listed, others])[:, 0]
+    heights = _heights(known, np.r_[np.ones(len(listed), bool), np.zeros(len(others), bool)], C)
+    low, high = 0, len(heights) - 1
+    best: tuple[Box, int] | None = None
+    while low <= high:
+        middle = high if best is None and high == len(heights) - 1 else (low + high) // 2
+        box = _box(float(heights[middle]), known, C)
+        inside = int(box.holds(listed.ravel()).sum())
+        there = winding_number(f, box, points=40 + 8 * inside)
+        if there < inside:
+            raise ConvergenceError(
+                f"{inside} eigenvalues listed in {tuple(box)}, but only {there} there", listed, there
+            )
+        if there == inside:
+            best, low = (box, inside), middle + 1
+        else:
+            high = middle - 1
+    if best is None:
+        raise ConvergenceError("eigenvalues that continue from no listed mode lie below all of them", listed, heights)
+    return best
+
+
+def _heights(known: Complex, is_listed: NDArray[np.bool_], C: float) -> Real:
+    """Heights between the zeros to the right of -1/C, ascending, below the first one that is not listed."""
+    right = known.real > -CLEAR / C if C else np.ones(known.size, bool)
+    imag, mine = known.imag[right], is_listed[right]
+    order = np.argsort(imag)
+    imag, mine = imag[order], mine[order]
+    stop = int(np.argmin(mine)) if not mine.all() else mine.size
+    tops = np.r_[imag, imag[-1] * 1.05 if imag.size else 1.0 / C]
+    bottoms = np.r_[0.0, imag]
+    between: Real = (0.5 * (bottoms + tops))[: stop + 1]
+    return between
+
+
+def _box(height: float, known: Complex, C: float) -> Box:
+    """A box of that height, its left edge clear of -1/C and, of a few, the furthest from any known zero."""
+    reach = 1.5 * height
+    if C and reach > CLEAR / C:
+        edges = -np.array([CLEAR, 0.77, 0.74, 0.7]) / C
+        room = [abs(known.real[abs(known.imag) < height] - edge).min(initial=np.inf) for edge in edges]
+        reach = -float(edges[int(np.argmax(room))])
+    return Box(-reach, 0.1 * height, -height, height)

@@ -1,0 +1,153 @@
+"""Proofs off the axis: a disc around each complex zero, and how many lie in a box, both in ball arithmetic.
+
+*One zero in a disc.*  On |s - m| <= r the function differs from its tangent at m by no more than |D''/2| r^2, with D''
+enclosed over the disc.  If |D'(m)| r exceeds that and |D(m)| together, D has by Rouche's theorem as many zeros in the
+disc as the tangent: one.  A disc around a real m holds a real one, since zeros come in conjugate pairs.
+
+*How many in a box.*  The argument principle on its upper half, the lower being a mirror image: the contour is cut into
+pieces so short that D, enclosed over each, misses zero.  What stays in a ball off zero stays in a half-plane, so its
+argument turns by the principal argument of end over start; the sum over the half contour encloses pi times one integer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import pairwise
+
+import flint
+import numpy as np
+
+from tfarm.errors import CertificationError
+from tfarm.exact.balls import Ball, point, precision, rational
+from tfarm.exact.characteristic import OPEN, Gains
+from tfarm.exact.coefficients import Coefficients
+from tfarm.exact.wide_balls import characteristic_over, tangent
+
+from .ball_axis import precisions
+from .box import Box
+
+FINEST = 2.0**-26  # a piece of contour shorter than this share of it means a zero on it
+CONTOUR_BITS = 96
+
+
+@dataclass(frozen=True, slots=True)
+class Disc:
+    """A closed disc of the complex plane with exactly one zero, simple: middle as decimal strings, radius one."""
+
+    re: str
+    im: str
+    radius: str
+
+    @property
+    def is_real(self) -> bool:
+        """Whether the zero is real, to the last digit."""
+        return float(self.im) == 0
+
+
+def proven_count(k: Coefficients, box: Box, gains: Gains = OPEN) -> int:
+    """How many zeros of D lie in a box symmetric about the real axis, with multiplicity, those at s = 0 included.
+
+    Raises CertificationError where a zero is too near the contour, or -1/C inside.
+    """
+    if k.damping and box.re_min <= -1.0 / k.damping:
+        raise CertificationError(f"a box from {box.re_min:g} 1/s on holds or touches the accumulation point -1/C")
+    right, left, top = box.re_max, box.re_min, box.im_max
+    corners = [complex(right, 0), complex(right, top), complex(left, top), complex(left, 0)]
+    with precision(CONTOUR_BITS):
+        turned = flint.arb(0)
+        for a, b in pairwise(corners):
+            turned += _turning(k, gains, point(a), point(b))
+        number = (turned / flint.arb.pi()).unique_fmpz()
+    if number is None:
+        raise CertificationError("the turning of D around the box is no certain multiple of pi")
+    return int(number)
+
+
+def _turning(k: Coefficients, gains: Gains, a: Ball, b: Ball) -> Ball:
+    """The change of arg D along the piece from a to b."""
+    total, start, step = flint.arb(0), 0.0, 1 / 32
+    here, value = a, characteristic_over(k, a, gains)
+    while start < 1:
+        end = min(start + step, 1.0)
+        there = (a + (b - a) * end).mid()
+        over = characteristic_over(k, here.union(there), gains)
+        if not over.is_finite() or over.contains(0):
+            step /= 2
+            if step < FINEST:
+                raise CertificationError(f"a zero lies on the edge of the box, near {complex(here):.6g}")
+            continue
+        end_value = characteristic_over(k, there, gains)
+        total += (end_value / value).log().imag
+        start, here, value, step = end, there, end_value, 2 * step
+    return total
+
+
+def enclosed(k: Coefficients, near: complex, digits: int, gains: Gains = OPEN) -> Disc:
+    """A disc with one zero, its radius one unit in the last of `digits` significant digits of |s| or less.
+
+    Raises CertificationError where no disc can be proven, around a double zero for instance.
+    """
+    for bits in precisions(digits):
+        with precision(bits):
+            middle = _newton(k, gains, near, digits)
+            if middle is None:
+                continue
+            unit = Fraction(10) ** (int(np.floor(np.log10(abs(complex(middle.mid()))))) - digits + 1)
+            re, im = (_rounded(part, unit) for part in (middle.real, middle.imag))
+            if _holds_one(k, gains, flint.acb(rational(re), rational(im)), rational(unit)):
+                return Disc(_decimal(re, unit), _decimal(im, unit), f"{float(unit):.0e}")
+    raise CertificationError(
+        f"no proven disc of {digits} digits around {near:.12g} 1/s: a double zero, or close to one"
+    )
+
+
+def _newton(k: Coefficients, gains: Gains, near: complex, digits: int) -> Ball | None:
+    """Newton's method on the middles of balls; real starts stay real."""
+    s = point(near)
+    for _ in range(40):
+        parts = tangent(k, s, flint.arb(0), gains)
+        if parts is None or parts[1].contains(0):
+            return None
+        move = (parts[0] / parts[1]).mid()
+        s = (s - move).mid()
+        s = flint.acb(s.real) if near.imag == 0 else s
+        if abs(move) < abs(s) * rational(Fraction(1, 10 ** (digits + 3))):
+            return s
+    return None
+
+
+def _holds_one(k: Coefficients, gains: Gains, m: Ball, r: Ball) -> bool:
+    """Rouche's theorem with the tangent at m, on the disc of radius r."""
+    parts = tangent(k, m, r, gains)
+    if parts is None:
+        return False
+    value, slope, half_curvature = (abs(part) for part in parts)
+    return bool(slope * r > value + half_curvature * r * r)
+
+
+def _rounded(part: Ball, unit: Fraction) -> Fraction:
+    exact = flint.fmpq(*part.mid().man_exp()[:1]) * flint.fmpq(2) ** int(part.mid().man_exp()[1])
+    return round(Fraction(int(exact.p), int(exact.q)) / unit) * unit
+
+
+def _decimal(value: Fraction, unit: Fraction) -> str:
+    places = max(0, len(str(unit.denominator)) - 1)
+    scaled = value * 10**places
+    sign, digits = "-" if scaled < 0 else "", str(abs(int(scaled))).rjust(places + 1, "0")
+    return f"{sign}{digits[: len(digits) - places]}.{digits[len(digits) - places :]}" if places else f"{sign}{digits}"
+
+
+def disjoint(discs: Sequence[Disc]) -> bool:
+    """Whether no two discs touch."""
+    parts = [(Fraction(d.re), Fraction(d.im), Fraction(d.radius)) for d in discs]
+    order = sorted(range(len(parts)), key=lambda i: parts[i][0])
+    for n, i in enumerate(order):
+        for j in order[n + 1 :]:
+            if parts[j][0] - parts[i][0] > parts[i][2] + parts[j][2]:
+                break
+            apart = (parts[j][0] - parts[i][0]) ** 2 + (parts[j][1] - parts[i][1]) ** 2
+            if apart <= (parts[i][2] + parts[j][2]) ** 2:
+                return False
+    return True
