@@ -25,6 +25,7 @@ __all__ = [
     "CertificationError",
     "ConvergenceError",
     "Hub",
+    "HubFeedback",
     "Link",
     "ParameterError",
     "Payload",

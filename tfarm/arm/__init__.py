@@ -1,8 +1,9 @@
 """What is analysed: the arm as frozen records, its TOML file and the presets."""
 
+from tfarm.arm.feedback import HubFeedback
 from tfarm.arm.reading import load, presets
 from tfarm.arm.records import Arm, Hub, Link, Payload
 from tfarm.arm.sections import Section
 from tfarm.arm.writing import to_toml
 
-__all__ = ["Arm", "Hub", "Link", "Payload", "Section", "load", "presets", "to_toml"]
+__all__ = ["Arm", "Hub", "HubFeedback", "Link", "Payload", "Section", "load", "presets", "to_toml"]

@@ -41,6 +41,19 @@ def load(name_or_path: str | os.PathLike[str]) -> Arm:
     return _arm_of(_read(name), name)
 
 
+def load_tables(name_or_path: str | os.PathLike[str]) -> tuple[dict[str, Any], str]:
+    """The parsed TOML behind a preset's name or a path, and the file's name: for rooms with tables of their own."""
+    name = _text_of(name_or_path)
+    if not isinstance(name_or_path, os.PathLike) and name in presets():
+        data, name = PRESETS.joinpath(f"{name}.toml").read_bytes(), f"{name}.toml"
+    else:
+        data = _read(name)
+    try:
+        return _table_of(_decoded(data)), name
+    except ParameterError as error:
+        raise error.in_file(name) from None
+
+
 def _text_of(name_or_path: object) -> str:
     name = os.fspath(name_or_path) if isinstance(name_or_path, os.PathLike) else name_or_path
     if not isinstance(name, str) or not name.strip() or "\0" in name:

@@ -134,12 +134,14 @@ class ArmTable(Table):
 
 SHAPES: dict[str, type[Table]] = {"rectangle": Rectangle, "round": Round, "tube": Tube, "general": General}
 TABLES: dict[str, type[Table]] = {"": ArmTable, "link": LinkTable, "hub": HubTable, "payload": PayloadTable}
+LOOP_TABLES = ("sampling", "converters", "actuator", "slew")  # of the sampled loop; tfarm.dsp reads them
 
 
 def arm_of_table(table: dict[str, Any]) -> Arm:
     """The arm that a parsed TOML table describes."""
     try:
-        return ArmTable.model_validate(table).build()
+        own = {key: value for key, value in table.items() if key not in LOOP_TABLES}
+        return ArmTable.model_validate(own).build()
     except ValidationError as error:
         raise _in_one_line(error.errors(include_url=False)) from None
 

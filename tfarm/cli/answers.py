@@ -60,19 +60,19 @@ def modes_answer(modes: Modes, digits: int | None, certify: bool = False) -> dic
     return answer | {"modes": rows}
 
 
-SHEAR = "complete inside the box; lightly damped shear modes exist far above any box, and overdamped ones accumulate at -1/C"
+IN_THE_BOX = "complete in the box; lightly damped shear modes exist above any box, real eigenvalues accumulate at -1/C"
 
 
 def _damped(damped: DampedModes, rows: list[dict[str, Any]], digits: int | None, certify: bool) -> dict[str, Any]:
-    """Eigenvalues beside each mode, and the box in which they are all there are; with `certify` each in a proven disc."""
+    """Eigenvalues beside each mode, and the box where they are all there are; with `certify` each in a proven disc."""
     for row, pair, ratio in zip(rows, damped.eigenvalues, damped.damping_ratio, strict=True):
         if pair[0].imag or not row["index"]:
             row["eigenvalue"] = [float(pair[0].real), float(pair[0].imag)]
         else:
             row["eigenvalues"] = [float(zero.real) for zero in pair]
         row["damping_ratio"] = float(ratio)
-    answer = {"box": list(damped.box), "eigenvalues_in_box": damped.count, "box_note": SHEAR}
-    if certify or (digits is not None and digits > 15):
+    answer = {"box": list(damped.box), "eigenvalues_in_box": damped.count, "box_note": IN_THE_BOX}
+    if certify:
         discs = damped.certify(15 if digits is None else digits)
         for row, of_mode in zip(rows[-len(discs) :], discs, strict=True):
             row["discs"] = [{"re": disc.re, "im": disc.im, "radius": disc.radius} for disc in of_mode]

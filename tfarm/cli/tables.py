@@ -29,8 +29,10 @@ def print_presets(arms: list[Arm]) -> None:
 
 
 def print_modes(answer: dict[str, Any]) -> None:
-    """The modal table."""
-    table = _table(("mode", "rad/s", "Hz", "hub participation b", "modal moment [N m]", "nodes [m]"))
+    """The modal table; with damping, each eigenvalue beside its undamped frequency."""
+    is_damped = "box" in answer
+    last = ("eigenvalue [1/s]", "damping ratio") if is_damped else ("nodes [m]",)
+    table = _table(("mode", "rad/s", "Hz", "hub participation b", "modal moment [N m]", *last))
     for mode in answer["modes"]:
         frequency = mode["natural_frequency_rad_s"]
         table.add_row(
@@ -39,13 +41,27 @@ def print_modes(answer: dict[str, Any]) -> None:
             f"{mode['natural_frequency_hz']:.9g}",
             f"{mode['hub_participation']:.6g}",
             f"{mode['modal_moment']:.6g}",
-            " ".join(f"{x:.4f}" for x in mode["nodes_m"]) or "-",
+            *(_damping(mode) if is_damped else (" ".join(f"{x:.4f}" for x in mode["nodes_m"]) or "-",)),
         )
     _show(table)
     if "proof" in answer:
         proof = answer["proof"]
         print(f"proven: each frequency enclosed, and {proof['count']} in all below {proof['below_rad_s']} rad/s")
+    if is_damped:
+        left, right, low, high = answer["box"]
+        proven = "proven" if "proven_complete_in_box" in answer else "by winding number"
+        print(f"{answer['eigenvalues_in_box']} eigenvalues with Re s from {left:.6g} to {right:.6g} 1/s and")
+        print(f"Im s from {low:.6g} to {high:.6g} rad/s, all listed ({proven}). Beyond the box there are more:")
+        print("shear is undamped, so lightly damped modes exist above any box; real ones accumulate at -1/C.")
     print(f"{answer['arm']}: the first {answer['count']} flexible modes, none missing ({answer['theory']} theory)")
+
+
+def _damping(mode: dict[str, Any]) -> tuple[str, str]:
+    if "eigenvalues" in mode:
+        pair = " and ".join(f"{value:.8g}" for value in mode["eigenvalues"])
+        return pair, f"{mode['damping_ratio']:.6g} (overdamped)"
+    re, im = mode["eigenvalue"]
+    return f"{re:.8g} + {im:.10g}i", f"{mode['damping_ratio']:.6g}"
 
 
 def print_response(answer: dict[str, Any]) -> None:

@@ -1,1 +1,25 @@
-"""Reduced models: where the exact arm is left, by functions whose names say so, with the error of each printed."""
+"""Reduced models of the exact arm: the one place where its exactness is left, with the error printed."""
+
+from tfarm.reduced.answers import reduced_answer
+from tfarm.reduced.conversions import discrete, save_mat, to_pymor, transfer_function
+from tfarm.reduced.modal import ModalModel, modal_model, relaxed_model
+from tfarm.reduced.partial_fractions import PartialFractions
+from tfarm.reduced.rational import RationalModel, rational_model
+from tfarm.reduced.reduction import BAND, ReducedModel, reduce
+
+__all__ = [
+    "BAND",
+    "ModalModel",
+    "PartialFractions",
+    "RationalModel",
+    "ReducedModel",
+    "discrete",
+    "modal_model",
+    "rational_model",
+    "reduce",
+    "reduced_answer",
+    "relaxed_model",
+    "save_mat",
+    "to_pymor",
+    "transfer_function",
+]

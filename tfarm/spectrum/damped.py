@@ -26,7 +26,7 @@ from .table import Modes, modes
 
 Real = NDArray[np.float64]
 
-COMPANY = 6  # modes followed beyond those wanted, so that the last of these are not led astray
+COMPANY = (6, 11, 17, 29)  # modes followed beyond those wanted, lest the last be led astray: the next if that fails
 CLEAR = 0.8  # how far towards -1/C a box may reach
 FIRST = 0.01  # the first step in C, over 1/w of the highest mode
 
@@ -118,19 +118,31 @@ def damped_modes(undamped: Modes) -> DampedModes:
     Raises ConvergenceError if a branch is lost, or two arrive at one eigenvalue.
     """
     k, C = undamped.coefficients, undamped.arm.link.damping
-    flexible = undamped.natural_frequency[undamped.index > 0]
-    more = modes(undamped.arm, flexible.size + COMPANY, theory=undamped.theory)
-    omega = more.natural_frequency[more.index > 0]
-    start = Node(0.0, np.stack([1j * omega, -1j * omega], 1))
-    if C == 0:
-        zeros = start.zeros
-    else:
-        node = follow(lambda C: member(replace(k, damping=C)), start, C, min(C, FIRST / omega[-1]), flexible.size)[-1]
-        zeros = polished(member(k), node.zeros)
-    listed, company = zeros[: flexible.size], zeros[flexible.size :]
+    flexible = int((undamped.index > 0).sum())
+    zeros = _followed(undamped, k, C, flexible)
+    listed, company = zeros[:flexible], zeros[flexible:]
     box, count = complete_box(member(k).function, listed, company, C)
-    rigid = np.zeros((undamped.index.size - flexible.size, 2), complex)
+    rigid = np.zeros((undamped.index.size - flexible, 2), complex)
     return DampedModes(undamped, np.concatenate([rigid, listed]), box, count + zeros_at_origin(k))
+
+
+def _followed(undamped: Modes, k: Coefficients, C: float, wanted: int) -> Complex:
+    """The zeros that the first modes, and those in their company, arrive at."""
+    lost: ConvergenceError | None = None
+    for company in COMPANY:
+        more = modes(undamped.arm, wanted + company, theory=undamped.theory)
+        omega = more.natural_frequency[more.index > 0]
+        start = Node(0.0, np.stack([1j * omega, -1j * omega], 1))
+        if C == 0:
+            return start.zeros
+        try:
+            nodes = follow(lambda C: member(replace(k, damping=C)), start, C, min(C, FIRST / omega[-1]), wanted)
+        except ConvergenceError as error:
+            lost = error
+            continue
+        return polished(member(k), nodes[-1].zeros)
+    assert lost is not None
+    raise lost
 
 
 def member(k: Coefficients, gains: Gains = OPEN) -> Member:

@@ -1,0 +1,83 @@
+"""The printed error against errors known otherwise: planted ones, and random arms on grids of their own."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tfarm
+from tests.reduced.errors import measure
+from tfarm.reduced import modal_model, reduce
+from tfarm.reduced.accuracy import MARGIN, ROUNDING, Ruler, distance, frequencies_around, slope
+
+
+@pytest.fixture(scope="module")
+def arm():
+    return tfarm.load("sasaki2012")
+
+
+def test_a_planted_error_is_found_whole(arm):
+    """The static remainder moved by d: the error is |d|/(|G| + |w G'|), largest where that norm is smallest."""
+    model = modal_model(arm, "root_moment", 60)
+    planted = replace(model, static=model.static + 1e-3)
+    worst = Ruler(arm, "root_moment", (0.1, 1000.0)).measure(planted)
+    w = np.linspace(0.1, 1000, 100_001)
+    G = tfarm.transfer(arm, "root_moment")
+    exact = G(1j * w)
+    true = 1e-3 / (abs(exact) + abs(w * G.derivative(1j * w))).min()
+    assert true <= worst.worst[0] <= 1.03 * MARGIN * true
+
+
+def test_a_moved_pole_is_seen(arm):
+    """A mode of the band 1e-6 too high: next to it the error is without bound, and 1e-6 wide of it that large."""
+    model = modal_model(arm, "root_moment", 60)
+    p = model.eigenvalues.copy()
+    p[1] *= 1 + 1.3e-6
+    worst = Ruler(arm, "root_moment", (0.1, 1000.0)).measure(replace(model, eigenvalues=p))
+    assert worst.worst[0] > 1e-6
+    np.testing.assert_allclose(worst.at[0], p[1, 0].imag, rtol=1e-4)
+
+
+def test_peaks_between_the_samples_are_closed_in_on(arm):
+    """Next to a pole that is moved by d the error is d^2/(w |w - p|): the nearer the look, the larger."""
+    model = modal_model(arm, "root_moment", 60)
+    p = model.eigenvalues.copy()
+    p[1] *= 1 + 2.7e-5
+    planted, ruler = replace(model, eigenvalues=p), Ruler(arm, "root_moment", (0.1, 1000.0))
+    assert ruler.measure(planted).worst[0] > 10 * ruler.rough(planted)
+
+
+def test_an_exact_model_has_the_error_of_rounding(arm):
+    assert (
+        Ruler(arm, "hub_angle", (0.1, 100.0)).measure(modal_model(arm, "hub_angle", 100)).worst < 5 * ROUNDING
+    ).all()
+
+
+def test_a_lacking_mode_shows(arm):
+    """Four modes lie below 1100 rad/s: without the last one the model is far off, not at its pole but beside it."""
+    band = (0.1, 1100.0)
+    without, whole = (reduce(arm, "root_moment", order=order, method="modal", band=band) for order in (6, 8))
+    assert without.worst_error > 10 * whole.worst_error
+
+
+@pytest.mark.parametrize("preset", ["sasaki2012", "sasaki2012-lab"])
+def test_the_derivative_along_the_arm(preset):
+    """Differences across the axis against ball arithmetic, next to a pole too."""
+    arm = tfarm.load(preset)
+    G = tfarm.transfer(arm, ("moment", "deflection"), x=0.4)
+    poles = frequencies_around(arm, 1000.0)
+    w = np.array([0.3, 70.0, poles[0] * (1 + 1e-5), 600.0])
+    np.testing.assert_allclose(slope(G, w, poles), G.derivative(1j * w), rtol=1e-5)
+
+
+def test_distance_to_the_nearest():
+    np.testing.assert_allclose(distance(np.array([0.5, 1.0, 1.6, 9.0]), np.array([1.0, 2.0])), [0.5, 0.0, 0.4, 7.0])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_printed_error_contains_the_true_one(seed):
+    """Six random arms a seed; `python -m tests.reduced.errors 500` does more of the same."""
+    rng = np.random.default_rng([1, seed])
+    for _ in range(6):
+        case = measure(rng, 6000, damping=float(rng.choice([0.0, 10 ** rng.uniform(-7, -4)])))
+        assert case.found <= case.printed

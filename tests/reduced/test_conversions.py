@@ -1,0 +1,91 @@
+"""Each conversion is the same function of s (or z): checked by evaluating it."""
+
+import re
+
+import numpy as np
+import pytest
+import scipy.io
+from scipy.linalg import expm
+
+import tfarm
+from tfarm import ParameterError
+from tfarm.reduced import discrete, reduce, save_mat, to_pymor, transfer_function
+
+POINTS = np.array([3j, 60j, 0.5 + 200j])
+
+
+@pytest.fixture(scope="module")
+def reduced():
+    return reduce(tfarm.load("sasaki2012"), ["root_moment", "hub_rate"], order=10)
+
+
+def test_state_space(reduced):
+    system = reduced.state_space()
+    np.testing.assert_allclose(system(POINTS)[:, 0], reduced(POINTS), rtol=1e-9)
+    assert system.output_labels == ["root_moment", "hub_rate"]
+    assert system.name == "sasaki2012, aaa, order 10"
+
+
+def test_transfer_function(reduced):
+    system = transfer_function(reduced)
+    np.testing.assert_allclose(system(POINTS)[:, 0], reduced(POINTS), rtol=1e-8)
+    assert (system.input_labels, system.output_labels) == (["hub_torque"], ["root_moment", "hub_rate"])
+
+
+def test_discrete_is_the_zero_order_hold(reduced):
+    """By the matrix exponential of the system with its held input."""
+    system = discrete(reduced, 0.01)
+    A, B, *_ = reduced.matrices()
+    n = reduced.order
+    whole = expm(np.block([[A, B], [np.zeros((1, n + 1))]]) * 0.01)
+    np.testing.assert_allclose(system.A, whole[:n, :n], atol=1e-12)
+    np.testing.assert_allclose(system.B, whole[:n, n:], atol=1e-12)
+    assert system.dt == 0.01
+    assert system.output_labels == ["root_moment", "hub_rate"]
+    with pytest.raises(ParameterError, match="period"):
+        discrete(reduced, 0.0)
+
+
+def test_mat_file_and_its_script(reduced, tmp_path):
+    mat, script = save_mat(reduced, tmp_path / "my-arm.mat")
+    assert (mat.name, script.name) == ("my-arm.mat", "load_my_arm.m")
+    data = scipy.io.loadmat(mat, squeeze_me=True)
+    for name, matrix in zip("ABCD", reduced.matrices(), strict=True):
+        np.testing.assert_array_equal(data[name], matrix.squeeze())
+    assert list(data["output_names"]) == ["root_moment", "hub_rate"]
+    assert len(data["state_names"]) == 10
+    w = data["omega"]
+    np.testing.assert_array_equal(data["response"], tfarm.transfer(reduced.arm, reduced.outputs)(1j * w))
+    text = script.read_text()
+    assert "load(fullfile(here, 'my-arm.mat'))" in text
+    asked = set(re.findall(r"data\.(\w+)", text))
+    assert asked <= set(data)
+    assert {"A", "B", "C", "D", "omega", "response"} <= asked
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["load_my_arm.m", "my-arm.mat"]
+
+
+def test_same_inputs_same_bytes(reduced, tmp_path):
+    first, _ = save_mat(reduced, tmp_path / "a.mat")
+    content = first.read_bytes()
+    assert save_mat(reduced, tmp_path / "a")[0].read_bytes() == content
+
+
+def test_a_folder_that_is_not_there(reduced, tmp_path):
+    with pytest.raises(ParameterError, match="cannot be written"):
+        save_mat(reduced, tmp_path / "none" / "a.mat")
+
+
+def test_pymor(reduced):
+    pymor = pytest.importorskip("pymor.models.iosys", reason="pyMOR is not installed") if _has_pymor() else None
+    if pymor is None:
+        with pytest.raises(ParameterError, match="pip install pymor"):
+            to_pymor(reduced)
+    else:
+        model = to_pymor(reduced)
+        np.testing.assert_allclose(model.transfer_function.eval_tf(60j)[:, 0], reduced(60j), rtol=1e-9)
+
+
+def _has_pymor():
+    from importlib.util import find_spec
+
+    return find_spec("pymor") is not None

@@ -1,0 +1,207 @@
+"""The modal model against contour integrals, identities of the physics, limits, and its own order of convergence."""
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+from scipy.optimize import brentq
+
+import tfarm
+from tests.spectrum.test_double import pinned_pinned, steel
+from tests.strategies import BOUNDARY_CASES, some_arm
+from tfarm import Hub, ParameterError, Payload
+from tfarm.reduced import modal_model, relaxed_model
+
+ENDS = ("hub_angle", "hub_rate", "tip_displacement", "tip_deflection", "tip_acceleration", "root_moment", "root_shear")
+ALONG = ("deflection", "rotation", "moment", "shear")
+EPS = np.finfo(float).eps
+
+
+def by_contour(G, p, radius, points=64):
+    """(1 / 2 pi i) times the integral of G around p: the trapezoid rule, geometrically convergent."""
+    arrow = radius * np.exp(2j * np.pi * (np.arange(points) + 0.5) / points)
+    return (G(p + arrow) * arrow).mean(axis=-1)
+
+
+@pytest.fixture(scope="module")
+def arm():
+    return tfarm.load("sasaki2012")
+
+
+@pytest.fixture(scope="module")
+def lab():
+    return tfarm.load("sasaki2012-lab")
+
+
+def norm_error(model, w):
+    """|dG| less what its sum rounds, over |G| + |w G'|: the largest of each output."""
+    G, s = tfarm.transfer(model.arm, model.outputs, x=model.x), 1j * w
+    exact = G(s)
+    gap = abs(model(s) - exact) - 8 * EPS * model.magnitude(s)
+    return (gap / (abs(exact) + abs(w * G.derivative(s)))).max(axis=1)
+
+
+@pytest.mark.parametrize("preset", ["sasaki2012", "sasaki2012-lab", "stocky-steel"])
+@pytest.mark.parametrize("names", [ENDS, ALONG])
+def test_residues_are_the_contour_integrals_of_the_exact_function(preset, names):
+    arm = tfarm.load(preset)
+    x = 0.37 * arm.link.length if names is ALONG else None
+    model = modal_model(arm, names, 5, x)
+    G = tfarm.transfer(arm, names, x=x)
+    for k in range(5):
+        p, radius = model.eigenvalues[k, 0], 0.2 * model.natural_frequency[0]
+        size = abs(G(p + radius)) * radius  # what the integral sums
+        assert (abs(by_contour(G, p, radius) - model.residues[:, k, 0]) <= 200 * EPS * size).all()
+
+
+def test_hub_angle_residues_are_squares_of_the_participation(arm):
+    model = modal_model(arm, ("hub_angle", "root_moment"), 20)
+    b = tfarm.modes(arm, 20).hub_participation[1:]
+    w = model.natural_frequency
+    np.testing.assert_allclose(model.residues[0, :, 0] * 2j * w, b**2, rtol=1e-12)
+    np.testing.assert_allclose(model.participation, abs(b), rtol=1e-12)
+    moment = -arm.hub.inertia * w**2 * b**2  # modal moment -I_h w^2 b, times b
+    np.testing.assert_allclose(model.residues[1, :, 0] * 2j * w, moment, rtol=1e-12)
+
+
+@pytest.mark.parametrize("preset", ["sasaki2012", "sasaki2012-lab"])
+def test_the_model_is_exact_at_zero_frequency(preset):
+    arm = tfarm.load(preset)
+    model = modal_model(arm, ENDS, 3)
+    G = tfarm.transfer(arm, ENDS)
+    J = arm.total_inertia
+    np.testing.assert_allclose(model.rigid[0], [1 / J, 0], rtol=1e-14)
+    np.testing.assert_allclose(model.rigid[1], [0, 1 / J], rtol=1e-14)
+    s = 1e-5j
+    np.testing.assert_allclose(model(s)[5], -(J - arm.hub.inertia) / J, rtol=1e-8)
+    np.testing.assert_allclose(model(s), G(s), rtol=1e-8)
+
+
+def test_state_space_and_partial_fractions_are_one_model(arm, lab):
+    for each in (arm, lab, replace(arm, hub=Hub(inertia=math.inf))):
+        names = [name for name in ENDS if not (each.is_locked and name == "hub_rate")]
+        model = modal_model(each, names, 4)
+        A, B, C, D = model.matrices()
+        assert A.shape == (model.order, model.order)
+        assert len(model.states) == model.order
+        for s in (0.3 + 57.1j, -2.0 + 400j, 12.0):
+            solved = C @ np.linalg.solve(s * np.eye(model.order) - A, B) + D
+            np.testing.assert_allclose(solved[:, 0], model(s), rtol=1e-10)
+        np.testing.assert_allclose(model(np.array([[1j, 2j]]))[:, 0, 1], model(2j))
+
+
+def test_lossless_to_the_bit_at_no_damping(arm):
+    A, _, _, _ = modal_model(arm, "root_moment", 30).matrices()
+    assert (A == -A.T).all()
+    rotation = expm(A * 0.01)
+    np.testing.assert_allclose(rotation @ rotation.T, np.eye(60), atol=1e-12)
+
+
+def test_named_signals(arm):
+    system = modal_model(arm, ("root_moment", "hub_rate"), 2).state_space()
+    assert system.input_labels == ["hub_torque"]
+    assert system.output_labels == ["root_moment", "hub_rate"]
+    assert system.state_labels[:4] == ["rigid_angle", "rigid_rate", "mode1_position", "mode1_rate"]
+    assert modal_model(replace(arm, hub=Hub(inertia=math.inf)), "root_moment", 1).input == "hub_angle"
+
+
+def test_static_model_without_modes(arm):
+    model = modal_model(arm, "root_moment", 0)
+    A, B, C, D = model.matrices()
+    assert (A.size, B.size, C.size) == (0, 0, 0)
+    np.testing.assert_allclose(D, -(arm.total_inertia - arm.hub.inertia) / arm.total_inertia, rtol=1e-14)
+
+
+def test_order_of_convergence(arm):
+    """The tail of the hub angle: b^2 = (modal moment)^2/(I_h w^2)^2 with moments ~ w and w ~ k^2, so sum of k^-12."""
+    w = np.geomspace(0.1, 100, 200)
+    errors = [norm_error(modal_model(arm, "hub_angle", count), w)[0] for count in (3, 6, 12)]
+    assert all(before / after > 2**8 for before, after in pairwise(errors))
+
+
+@pytest.mark.parametrize("case", BOUNDARY_CASES)
+def test_every_boundary_case_converges(case):
+    rng = np.random.default_rng([7, *(ord(kind[0]) for kind in case)])
+    arm = some_arm(rng, case, damping=0.0)
+    names = ("root_moment", "tip_deflection", "root_shear")
+    few, many = modal_model(arm, names, 4), modal_model(arm, names, 120)
+    w = np.geomspace(0.01, 2.3, 60) * few.natural_frequency[0]
+    error, better = norm_error(few, w), norm_error(many, w)
+    assert (better <= 0.05 * error + 1e-12).all()
+
+
+def test_double_frequency_has_both_modes():
+    """Pinned at both ends, where half wave 4 of one spectrum meets half wave 2 of the other."""
+    slenderness = brentq(lambda r: np.subtract(*crossing(steel(r))), 1.0, 40.0, xtol=1e-15)
+    arm = steel(slenderness)
+    w = crossing(arm)[0]
+    model = modal_model(arm, ("hub_angle", "tip_deflection", "root_shear"), 12)
+    inside = abs(model.natural_frequency / w - 1) < 1e-9
+    G, radius = tfarm.transfer(arm, model.outputs), 0.01 * w
+    size = abs(G(1j * w + radius)) * radius
+    assert inside.sum() == 2
+    assert (abs(by_contour(G, 1j * w, radius) - model.residues[:, inside, 0].sum(axis=1)) < 1e-11 * size).all()
+
+
+def crossing(arm):
+    """The two frequencies that meet at one slenderness."""
+    return pinned_pinned(arm, 4)[0], pinned_pinned(arm, 2)[1]
+
+
+def test_locked_hub(arm):
+    locked = replace(arm, hub=Hub(inertia=math.inf))
+    model = modal_model(locked, ("root_moment", "hub_angle"), 10)
+    assert not model.has_rigid_states
+    np.testing.assert_allclose(model.participation, abs(tfarm.modes(locked, 10).modal_moment), rtol=1e-10)
+    np.testing.assert_allclose(model(3.0j)[1], 1.0, rtol=1e-14)
+    with pytest.raises(ParameterError, match="hub_rate"):
+        modal_model(locked, "hub_rate", 3)
+
+
+def test_tip_pinned_has_no_rigid_body(arm):
+    model = modal_model(replace(arm, payload=Payload(mass=math.inf)), ("hub_angle", "tip_displacement"), 5)
+    assert model.order == 10
+    assert (model(1j)[1], model(50j)[1]) == (0, 0)
+
+
+@pytest.mark.parametrize("count", [-1, 1001, 2.5, True, "3"])
+def test_count_is_checked(arm, count):
+    with pytest.raises(ParameterError, match="count"):
+        modal_model(arm, "root_moment", count)
+
+
+def test_poles_are_refused(arm):
+    model = modal_model(arm, "hub_angle", 2)
+    for s in (0.0, model.eigenvalues[1, 0]):
+        with pytest.raises(ParameterError, match="pole"):
+            model(s)
+
+
+def test_a_relaxed_model_is_exact_to_first_order(lab):
+    """Value and slope at s -> 0 of the root moment, and one more pole, at -1/C."""
+    model = relaxed_model(lab, ("root_moment", "tip_deflection"), 4)
+    G = tfarm.transfer(lab, model.outputs)
+    h = 0.01
+    slope = (model(h) - model(-h)) / (2 * h)
+    np.testing.assert_allclose(model(1e-6), G.static, rtol=1e-9)
+    np.testing.assert_allclose(slope, G.derivative(0.0), rtol=1e-4, atol=1e-9)
+    A, B, C, D = model.matrices()
+    assert model.order == len(A) == 9
+    assert model.states[-1] == "relaxation"
+    s = 3 + 200j
+    np.testing.assert_allclose((C @ np.linalg.solve(s * np.eye(9) - A, B) + D)[:, 0], model(s), rtol=1e-11)
+
+
+def test_relaxation_goes_where_the_static_remainder_cannot(lab):
+    w = np.geomspace(0.1, 1000, 300)
+    plain, relaxed = (norm_error(make(lab, "root_moment", 20), w)[0] for make in (modal_model, relaxed_model))
+    assert plain > 1e-5
+    assert relaxed < 3e-7
+
+
+def test_nothing_relaxes_without_damping(arm):
+    with pytest.raises(ParameterError, match="damping"):
+        relaxed_model(arm, "root_moment", 3)

@@ -1,0 +1,148 @@
+"""AAA in s^2: the target of accuracy, losslessness, what the checks are for, and a function with known poles."""
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import tfarm
+from tests.strategies import some_arm
+from tfarm import Hub, ParameterError, Payload
+from tfarm.reduced import modal_model, rational_model, reduce
+from tfarm.reduced.rational import aaa_poles
+
+HUB = ("root_moment", "hub_rate", "hub_angle")
+ALL = (*HUB, "tip_displacement", "tip_deflection", "tip_acceleration", "root_shear")
+
+
+@pytest.fixture(scope="module")
+def arm():
+    return tfarm.load("sasaki2012")
+
+
+def norm_error(model, w):
+    G = tfarm.transfer(model.arm, model.outputs, x=model.x)
+    exact = G(1j * w)
+    return (abs(model(1j * w) - exact) / (abs(exact) + abs(w * G.derivative(1j * w)))).max(axis=1)
+
+
+def test_order_14_is_within_1e_8(arm):
+    """On hub and root moment over 0.1 to 1000 rad/s; the modal model of that order is right to 3e-4."""
+    model = rational_model(arm, HUB, 6, 1000.0)
+    assert model.order == 14
+    w = np.r_[np.geomspace(0.1, 1000, 5000), np.linspace(0.1, 1000, 5000)]
+    error = norm_error(model, w)
+    assert (error < 1e-8).all()
+    assert (error < 1e-3 * norm_error(modal_model(arm, HUB, 6), w)).all()
+
+
+def test_each_pair_of_poles_brings_digits(arm):
+    w = np.linspace(1, 1000, 3001)
+    errors = [norm_error(rational_model(arm, HUB, pairs, 1000.0), w).max() for pairs in (4, 5, 6, 7)]
+    assert errors[0] < 1e-2
+    assert all(after < 1e-2 * before for before, after in pairwise(errors))
+    assert errors[3] < 1e-12
+
+
+def test_lossless_to_the_bit(arm):
+    """Poles on the axis, residues of the hub rate positive, and C = B' in energy coordinates (collocated)."""
+    model = rational_model(arm, ("hub_rate", "hub_angle"), 6, 1000.0)
+    assert (model.eigenvalues.real == 0).all()
+    assert (model.residues[0].imag == 0).all()
+    assert (model.residues[0].real > 0).all()  # b^2/2 of the rate at either pole
+    A, B, C, D = model.matrices()
+    flexible = A[2:, 2:]
+    assert (flexible == -flexible.T).all()
+    np.testing.assert_allclose(C[0, 2:], B[2:, 0], rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(C[1, 2::2] * model.natural_frequency, B[3::2, 0], rtol=1e-12)  # rate of that angle
+    assert (D == 0).all()
+
+
+def test_torque_work_is_the_energy_of_the_states(arm):
+    """A pulse of torque in the time domain: the integral of u times the rate is half the sum of squares."""
+    model = rational_model(arm, "hub_rate", 6, 1000.0)
+    A, B, C, _ = model.matrices()
+    J = arm.total_inertia
+
+    def slope(t, z):
+        torque = math.sin(40 * t) ** 2
+        return np.r_[A @ z[:-1] + B[:, 0] * torque, torque * (C[0] @ z[:-1])]
+
+    z = solve_ivp(slope, (0, 0.1), np.zeros(model.order + 1), rtol=1e-10, atol=1e-13).y[:, -1]
+    energy = (J * z[1] ** 2 + z[2:-1] @ z[2:-1]) / 2
+    np.testing.assert_allclose(z[-1], energy, rtol=1e-7)
+
+
+def test_modes_of_the_band_are_the_arm_s_own(arm):
+    model = rational_model(arm, ALL, 7, 1000.0)
+    own = model.index > 0
+    exact = modal_model(arm, ALL, 3)
+    assert list(model.index[:3]) == [1, 2, 3]
+    assert (model.eigenvalues[own][:3] == exact.eigenvalues).all()
+    assert (model.residues[:, :3] == exact.residues).all()
+    assert (model.natural_frequency[~own] > 1000).all()
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_random_arms(seed):
+    """At least as good as the modal model of the same order, lossless, and exact as s -> 0."""
+    rng = np.random.default_rng(seed)
+    arm = some_arm(rng, damping=0.0)
+    names = [
+        name for name in ("root_moment", "tip_deflection", "hub_rate") if not (arm.is_locked and name == "hub_rate")
+    ]
+    w1 = tfarm.modes(arm, 2).natural_frequency[-1]
+    high = 0.7 * float(w1)
+    pairs = tfarm.spectrum.modes_below(arm, 1.02 * high) + 3
+    model = rational_model(arm, names, pairs, high)
+    w = np.linspace(0.05, 1.0, 500) * high
+    floor = 1e-12
+    assert (norm_error(model, w) <= norm_error(modal_model(arm, names, pairs), w) + floor).all()
+    assert (model.eigenvalues.real == 0).all()
+    low = 1e-4j * high
+    G = tfarm.transfer(arm, names)
+    np.testing.assert_allclose(model(low), G(low), rtol=1e-5)
+
+
+def test_more_poles_than_digits_do_no_harm(arm):
+    """Froissart doublets are dropped: further modes are taken exactly instead."""
+    for order in (18, 24, 30):
+        reduced = reduce(arm, HUB, order=order, method="aaa")
+        assert reduced.worst_error < 2e-13
+        assert reduced.order <= order
+        assert reduced.order == order or "passed the checks" in reduced.note
+
+
+def test_along_the_arm(arm):
+    reduced = reduce(arm, ("moment", "deflection"), order=14, x=0.4)
+    assert reduced.method == "aaa"
+    assert reduced.worst_error < 1e-6
+
+
+def test_locked_hub_and_pinned_tip(arm):
+    locked = replace(arm, hub=Hub(inertia=math.inf))
+    assert reduce(locked, ("root_moment", "tip_displacement"), order=14).worst_error < 1e-6
+    pinned = replace(arm, payload=Payload(mass=math.inf))
+    assert reduce(pinned, ("hub_rate", "root_moment"), order=14).worst_error < 1e-7
+
+
+def test_aaa_finds_the_poles_of_a_rational_function():
+    """A Stieltjes function of three poles, sampled without noise, is recovered with its poles."""
+    S = -np.linspace(0.01, 1.0, 200)
+    poles, shares = np.array([1.5, 4.0, 30.0]), np.array([1.0, 0.3, 7.0])
+    F = np.array([(shares * S[:, None] / (S[:, None] + poles)).sum(axis=1)])
+    *_, found = aaa_poles(S, F, np.ones_like(F), 3)
+    np.testing.assert_allclose(found, poles, rtol=1e-7)
+
+
+def test_what_is_refused(arm):
+    lab = tfarm.load("sasaki2012-lab")
+    with pytest.raises(ParameterError, match="C = 0"):
+        rational_model(lab, HUB, 6, 1000.0)
+    with pytest.raises(ParameterError, match="pairs"):
+        rational_model(arm, HUB, 3, 1000.0)
+    with pytest.raises(ParameterError, match="band"):
+        rational_model(arm, HUB, 6, 1e9)

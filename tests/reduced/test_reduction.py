@@ -1,0 +1,131 @@
+"""reduce(): by order, by error, by method; what it carries, and what it refuses."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tfarm
+from tfarm import ConvergenceError, Hub, ParameterError
+from tfarm.reduced import reduce, reduced_answer, transfer_function
+
+
+@pytest.fixture(scope="module")
+def arm():
+    return tfarm.load("sasaki2012")
+
+
+def test_by_order_the_better_method(arm):
+    best = reduce(arm, ["root_moment", "hub_rate"], order=14)
+    modal = reduce(arm, ["root_moment", "hub_rate"], order=14, method="modal")
+    assert (best.method, modal.method) == ("aaa", "modal")
+    assert (best.order, modal.order) == (14, 14)
+    assert best.worst_error < 1e-8 < modal.worst_error
+    assert (modal.first_mode_lacking, best.first_mode_lacking) == (7, 5)
+    np.testing.assert_allclose(best.lacking_frequency, tfarm.modes(arm, 5).natural_frequency[-1])
+
+
+@pytest.mark.parametrize("method", ["modal", "aaa"])
+@pytest.mark.parametrize("error", [0.3, 1e-2, 1e-5])
+def test_by_error_the_smallest(arm, error, method):
+    found = reduce(arm, ["root_moment", "hub_rate"], error=error, method=method)
+    assert found.worst_error <= error
+    smaller = reduce(arm, ["root_moment", "hub_rate"], order=found.order - 2, method=method)
+    assert smaller.worst_error > error or smaller.method != method  # below the modes of the band AAA gives way
+
+
+def test_by_error_whichever_is_smaller(arm):
+    tight = reduce(arm, "root_moment", error=1e-6)
+    assert tight.method == "aaa"
+    assert tight.order < reduce(arm, "root_moment", error=1e-6, method="modal").order
+
+
+def test_what_cannot_be_reached(arm):
+    with pytest.raises(ConvergenceError, match="found no model"):
+        reduce(arm, "root_moment", error=1e-16)
+
+
+def test_aaa_below_the_modes_of_the_band_gives_way(arm):
+    reduced = reduce(arm, "root_moment", order=4, method="aaa")
+    assert reduced.method == "modal"
+    assert "3 modes in the band" in reduced.note
+
+
+def test_damped_arm_is_modal():
+    lab = tfarm.load("sasaki2012-lab")
+    reduced = reduce(lab, ["root_moment", "hub_rate"], order=16)
+    assert reduced.method == "modal"
+    assert (reduced.model.eigenvalues.real < 0).all()
+    assert reduced.worst_error < 1e-3
+    with pytest.raises(ParameterError, match="C = 0"):
+        reduce(lab, "root_moment", order=14, method="aaa")
+
+
+def test_odd_orders_are_for_damped_arms():
+    lab = tfarm.load("sasaki2012-lab")
+    odd, even = (reduce(lab, ["root_moment", "hub_rate"], order=order) for order in (21, 20))
+    assert (odd.order, odd.model.states[-1]) == (21, "relaxation")
+    assert odd.worst_error < 0.2 * even.worst_error
+    assert [-1 / lab.link.damping, 0.0] == reduced_answer(odd)["poles"][-1]
+    small = reduce(lab, ["root_moment", "hub_rate"], error=1e-5)
+    assert small.worst_error <= 1e-5
+    s = np.array([2.0j, 150j])
+    np.testing.assert_allclose(transfer_function(odd)(s)[:, 0], odd(s), rtol=1e-6)
+
+
+def test_deviation_holds_the_exact_curve(arm):
+    reduced = reduce(arm, ["root_moment", "tip_displacement"], order=10)
+    w = np.geomspace(0.1, 1000, 777)
+    gap = abs(reduced(1j * w) - tfarm.transfer(arm, reduced.outputs)(1j * w))
+    deviation = reduced.deviation(w)
+    assert (gap <= deviation).all()
+    assert deviation.shape == (2, 777)
+    with pytest.raises(ParameterError, match="omega"):
+        reduced.deviation([2000.0])
+
+
+def test_the_answer_is_whole(arm):
+    answer = reduced_answer(reduce(arm, ["root_moment", "hub_rate"], order=14))
+    assert answer["order"] == len(answer["A"]) == len(answer["states"]) == 14
+    assert len(answer["C"]) == len(answer["D"]) == len(answer["outputs"]) == 2
+    assert answer["worst_error"] == max(answer["errors"].values())
+    assert answer["band_rad_s"] == [0.1, 1000.0]
+    s = 1j * 33.0
+    A, B, C, D = (np.array(answer[name]) for name in "ABCD")
+    value = C @ np.linalg.solve(s * np.eye(14) - A, B) + D
+    np.testing.assert_allclose(value[:, 0], tfarm.transfer(arm, answer["outputs"])(s), rtol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("given", "key"),
+    [
+        ({}, "order"),
+        ({"order": 4, "error": 1e-3}, "order"),
+        ({"order": 13}, "order"),
+        ({"order": 0}, "order"),
+        ({"order": 402}, "order"),
+        ({"order": 4.0}, "order"),
+        ({"error": 0.0}, "error"),
+        ({"error": math.nan}, "error"),
+        ({"error": "1"}, "error"),
+        ({"order": 4, "band": (0.0, 1.0)}, "band"),
+        ({"order": 4, "band": (2.0, 1.0)}, "band"),
+        ({"order": 4, "band": (math.nan, 1.0)}, "band"),
+        ({"order": 4, "band": (1.0, math.inf)}, "band"),
+        ({"order": 4, "band": 3.0}, "band"),
+        ({"order": 4, "method": "balred"}, "method"),
+        ({"order": 4, "x": 0.3}, "x"),
+    ],
+)
+def test_bad_input_is_named(arm, given, key):
+    with pytest.raises(ParameterError) as caught:
+        reduce(arm, "root_moment", **given)
+    assert caught.value.key == key
+
+
+def test_outputs_without_a_model(arm):
+    with pytest.raises(ParameterError, match="hub_rate"):
+        reduce(replace(arm, hub=Hub(inertia=math.inf)), "hub_rate", order=4)
+    with pytest.raises(ParameterError, match="once"):
+        reduce(arm, ["root_moment", "root_moment"], order=4)

@@ -1,0 +1,67 @@
+"""The loop of an arm and a law: what is refused, the loop function, and the characteristic function to follow."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import Arm, HubFeedback
+from tfarm.errors import ParameterError
+from tfarm.exact.characteristic import Gains, loop_parts
+from tfarm.exact.coefficients import Coefficients, coefficients
+from tfarm.spectrum.continuation import Member
+from tfarm.spectrum.damped import member
+
+Complex = NDArray[np.complexfloating[Any, Any]]
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Loop:
+    """An arm under a law at its hub.
+
+    Raises ParameterError where there is no loop: a locked hub cannot turn; a pin without inertia has M(0) = -u at every
+    instant, so that feeding the moment back is an algebraic loop.
+    """
+
+    arm: Arm
+    law: HubFeedback
+
+    def __post_init__(self) -> None:
+        if self.arm.is_locked:
+            remedy = "a locked hub (inertia = inf) takes no torque: there is no loop; give the hub a finite inertia"
+            raise ParameterError(key="hub.inertia", value=self.arm.hub.inertia, remedy=remedy)
+        if self.arm.hub.inertia == 0 and self.law.K2:
+            remedy = "with hub.inertia = 0 the root moment is -u at once: an algebraic loop; use K2 = 0 or some inertia"
+            raise ParameterError(key="K2", value=self.law.K2, remedy=remedy)
+
+    @cached_property
+    def k(self) -> Coefficients:
+        """The arm's dimensionless coefficients."""
+        return coefficients(self.arm)
+
+    @cached_property
+    def gains(self) -> Gains:
+        """The law's dimensionless gains."""
+        return Gains.of(self.k, self.law.K1, self.law.K2, self.law.Kp)
+
+    @property
+    def member(self) -> Member:
+        """The closed loop's characteristic function, its zeros at the origin divided out."""
+        return member(self.k, self.gains)
+
+    def loop_function(self, s: Complex) -> Complex:
+        """L(s) = Kp G_theta + K1 s G_theta + K2 G_moment, so that closed-loop poles are the zeros of 1 + L."""
+        drive, theta, moment, _ = loop_parts(self.k, np.asarray(s, dtype=complex))
+        Kp, K1, K2 = float(self.gains.Kp), float(self.gains.K1), float(self.gains.K2)
+        return np.asarray(((Kp + K1 * s) * theta + K2 * moment) / drive)
+
+
+def effective_inertia(arm: Arm, K2: float) -> float:
+    """I_h + (1 - K2)(J - I_h) [kg m^2]: what slow torque turns once the moment is fed back."""
+    hub = arm.hub.inertia
+    return hub + (1.0 - K2) * (arm.total_inertia - hub)

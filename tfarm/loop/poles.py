@@ -1,0 +1,165 @@
+"""Closed-loop poles of the exact arm: zeros of a transcendental function, complete in a printed box.
+
+No reduced model takes part.  Newton's method finds zeros from many starts, and the winding number of the characteristic
+function around the box says how many there are (`spectrum.box`); where it disagrees the box is cut and searched again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import Arm, Hub, HubFeedback
+from tfarm.errors import CertificationError, ConvergenceError, ParameterError
+from tfarm.exact.characteristic import zeros_at_origin
+from tfarm.spectrum import modes
+from tfarm.spectrum.box import Box, zeros_in_box
+from tfarm.spectrum.damped import CLEAR
+from tfarm.spectrum.enclose import Disc, disjoint, enclosed, proven_count
+
+from .plant import Loop
+
+Complex = NDArray[np.complexfloating[Any, Any]]
+Real = NDArray[np.float64]
+
+ON_AXIS = 1e-12  # a pole whose real part is below this share of its size is on the imaginary axis to working precision
+MOST_POLES = 1000
+GROWTH = (1.0, 1.0041, 1.0093, 1.0171, 1.0229)  # heights tried where a zero lies on the edge of a box
+
+
+@dataclass(frozen=True)
+class Poles:
+    """Closed-loop poles [1/s] with Im >= 0, ascending in Im, those at 0 as often as they are: all there are in `box`.
+
+    A real pole stands once for each time, an oscillating one for its conjugate too.
+    """
+
+    loop: Loop
+    values: Complex
+    box: Box
+
+    @property
+    def unstable(self) -> int:
+        """How many poles of the box, conjugates counted, lie to the right of the axis, beyond working precision."""
+        right = self.values.real > ON_AXIS * abs(self.values)
+        return int((right * np.where(self.values.imag > 0, 2, 1)).sum())
+
+    @property
+    def moving(self) -> Complex:
+        """The poles apart from those at 0, which the hub angle leaves there where Kp = 0."""
+        return self.values[self.values != 0]
+
+    @property
+    def spectral_abscissa(self) -> float:
+        """The largest real part [1/s] in the box, apart from poles at 0."""
+        return float(self.moving.real.max(initial=-np.inf))
+
+    def certify(self, digits: int = 15) -> tuple[Disc, ...]:
+        """A disc around each pole with Im >= 0 apart from 0, and a proof that the box has no other.
+
+        Raises CertificationError where something cannot be proven.
+        """
+        k, gains = self.loop.k, self.loop.gains
+        discs = tuple(enclosed(k, complex(pole), digits, gains) for pole in self.moving)
+        if not disjoint(discs):
+            raise CertificationError("the discs of two poles touch: ask for more digits")
+        listed = int(np.where(self.moving.imag > 0, 2, 1).sum()) + zeros_at_origin(k, gains)
+        proven = proven_count(k, self.box, gains)
+        if proven != listed:
+            raise CertificationError(f"{listed} poles in the box are listed, but {proven} are there")
+        return discs
+
+
+def closed_loop_poles(arm: Arm, law: HubFeedback, count: int) -> Poles:
+    """The first `count` closed-loop poles with Im >= 0, ascending in Im s, complete in the box of the record.
+
+    Raises ParameterError where there is no loop, ConvergenceError where the box cannot be completed.
+    """
+    if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_POLES:
+        raise ParameterError(key="count", value=count, remedy=f"a whole number from 1 to {MOST_POLES}")
+    loop = Loop(arm, law)
+    number = count + 2
+    while True:
+        height = _height_of(arm, number)
+        poles = poles_below(loop, height)
+        if poles.values.size >= count or number > 4 * count + 40:
+            return _first(poles, count)
+        number += max(2, count // 4)
+
+
+def poles_below(loop: Loop, height: float) -> Poles:
+    """All closed-loop poles with |Im s| <= height, and more than about -1.5 heights or -0.8/C in Re s."""
+    at_zero = zeros_at_origin(loop.k, loop.gains)
+    starts = starting_points(loop, 1.3 * height)
+    for growth in GROWTH:
+        box = box_of(loop, height * growth)
+        try:
+            found = zeros_in_box(loop.member.function, box, starts)
+        except ConvergenceError:
+            if growth == GROWTH[-1]:
+                raise
+            continue
+        found = np.where(abs(found.imag) < 1e-11 * abs(found), found.real, found)
+        upper = found[found.imag >= 0]
+        upper = upper[np.lexsort((upper.real, upper.imag))]
+        return Poles(loop, np.r_[np.zeros(at_zero, complex), upper], box)
+    raise AssertionError("unreachable")
+
+
+def box_of(loop: Loop, height: float) -> Box:
+    """A box of that height which reaches far enough right for any unstable pole, and left short of -1/C."""
+    right = 0.1 * height
+    while np.any(abs(loop.loop_function(right * np.array([1.0, 2.0, 5.0, 20.0]))) > 0.5) and right < 1e3 * height:
+        right *= 1.7
+    left, C = 1.5 * height, loop.arm.link.damping
+    return Box(-min(left, CLEAR / C) if C else -left, float(right), -height, height)
+
+
+def starting_points(loop: Loop, up_to: float) -> Complex:
+    """Where Newton's method starts: the arm's own frequencies, those with the hub locked, and the rigid arm's poles."""
+    arm, C = loop.arm, loop.arm.link.damping
+    omega = np.concatenate([_frequencies(each, up_to) for each in (arm, _with_hub(arm, np.inf), _with_hub(arm, 0.0))])
+    shift = np.array([0.0, 0.02, 0.3])[:, None]
+    decay = C * omega**2 / 2
+    near = (-decay - shift * omega + 1j * omega * np.sqrt(np.maximum(1 - (C * omega / 2) ** 2, 0.0))).ravel()
+    J = arm.total_inertia if arm.has_rigid_mode else arm.hub.inertia + 1e-12
+    slow = np.roots([J, loop.law.K1, loop.law.Kp]).astype(complex)
+    real = -np.geomspace(up_to / 300, 1.4 * up_to, 25)
+    return np.concatenate([near, near.conj(), slow, real, -real])
+
+
+def _with_hub(arm: Arm, inertia: float) -> Arm:
+    from dataclasses import replace
+
+    return replace(arm, hub=Hub(inertia=inertia))
+
+
+def _frequencies(arm: Arm, up_to: float) -> Real:
+    from tfarm.spectrum import modes_below
+
+    if modes_below(arm, up_to) == 0:
+        return np.empty(0)
+    table = modes(arm, up_to=up_to)
+    return table.natural_frequency[table.index > 0]
+
+
+def _height_of(arm: Arm, number: int) -> float:
+    """Half-way between two natural frequencies, so many flexible modes up."""
+    omega = modes(arm, number + 1).natural_frequency
+    return float((omega[-1] + omega[-2]) / 2)
+
+
+def _first(poles: Poles, count: int) -> Poles:
+    """The first so many poles, and a lower box that holds just these."""
+    values = poles.values
+    if values.size < count:
+        raise ConvergenceError(f"only {values.size} poles right of -1/C were found, not {count}", values, count)
+    kept = values[:count]
+    if count < values.size and values[count].imag == kept[-1].imag == 0:
+        raise ParameterError(key="count", value=count, remedy=f"more: {int((values.imag == 0).sum())} poles are real")
+    top = poles.box.im_max if count == values.size else float((kept[-1].imag + values[count].imag) / 2)
+    left, right, _, _ = poles.box
+    return Poles(poles.loop, kept, Box(left, right, -top, top))

@@ -1,0 +1,143 @@
+"""A reduced model in the forms other tools take: python-control, MATLAB, pyMOR.
+
+The state space is the form to keep: its numbers are the poles and residues themselves.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy.io
+
+from tfarm.errors import ParameterError
+from tfarm.files import write_file
+from tfarm.response import transfer
+
+from .accuracy import AT_A_POLE, distance, frequencies_around
+from .reduction import ReducedModel
+
+if TYPE_CHECKING:
+    import control
+
+MAT_HEADER = b"MATLAB 5.0 MAT-file, written by tfarm"  # SciPy's own has the date in it: same inputs, same bytes
+POINTS = 1000
+
+
+def transfer_function(reduced: ReducedModel) -> control.TransferFunction:
+    """The model as polynomials in s, with named signals.
+
+    For hand calculations: coefficients of a high order lose digits (of order 20 a root moves by 1e-5), the state space
+    does not.
+    """
+    import control
+
+    model = reduced.model
+    pairs = [np.poly(pair).real for pair in model.eigenvalues]
+    rigid = [np.array([1.0, 0.0, 0.0])] if model.has_rigid_states else []
+    delay = [np.array([model.arm.link.damping, 1.0])] if model.relaxation is not None else []
+    denominators = [*rigid, *pairs, *delay]
+    whole = _product(denominators)
+    n1, n0 = model.numerators
+    numerators = []
+    for row in range(len(model.outputs)):
+        parts = [model.rigid[row, ::-1]] if rigid else []
+        parts += [np.array(pair) for pair in zip(n1[row], n0[row], strict=True)]
+        parts += [model.relaxation[row : row + 1]] if model.relaxation is not None else []
+        total = model.static[row] * whole
+        for place, part in enumerate(parts):
+            others = np.polymul(part, _product(denominators[:place] + denominators[place + 1 :]))
+            total = np.polyadd(total, others)
+        numerators.append([total])
+    return control.TransferFunction(
+        numerators,
+        [[whole]] * len(model.outputs),
+        inputs=[model.input],
+        outputs=list(model.outputs),
+        name=reduced.name,
+    )
+
+
+def discrete(reduced: ReducedModel, period: float) -> control.StateSpace:
+    """The model sampled every `period` seconds behind a zero-order hold, exactly (matrix exponential)."""
+    import control
+
+    if isinstance(period, bool) or not isinstance(period, int | float) or not 0 < period < math.inf:
+        raise ParameterError(key="period", value=period, remedy="a positive time in seconds, such as 0.01")
+    return control.sample_system(reduced.state_space(), period, method="zoh")
+
+
+def to_pymor(reduced: ReducedModel) -> Any:
+    """The model as a `pymor.models.iosys.LTIModel`.  Raises ParameterError where pyMOR is not installed."""
+    try:
+        from pymor.models.iosys import LTIModel  # type: ignore[import-not-found,unused-ignore]
+    except ImportError:
+        raise ParameterError(key="pymor", value=None, remedy="not installed; run: pip install pymor") from None
+    return LTIModel.from_matrices(*reduced.matrices(), name=reduced.name)
+
+
+def save_mat(reduced: ReducedModel, path: Path, *, key: str = "path") -> tuple[Path, Path]:
+    """Write a MATLAB file and, beside it, the script that makes of it `sys` (ss) and `exact` (frd).
+
+    The file holds A, B, C, D, all names, the exact response over the band, and the worst error.  Returns both paths.
+    Raises ParameterError, naming `key`, where they cannot be written.
+    """
+    path = Path(path)
+    path = path if path.suffix == ".mat" else path.with_name(path.name + ".mat")
+    script = path.with_name(f"load_{re.sub(r'[^A-Za-z0-9_]', '_', path.stem)}.m")
+    content = io.BytesIO()
+    scipy.io.savemat(content, _contents(reduced), oned_as="row")  # type: ignore[arg-type]
+    write_file(script, _script(reduced, path).encode(), key=key)
+    write_file(path, MAT_HEADER.ljust(116) + content.getvalue()[116:], key=key)
+    return path, script
+
+
+def _contents(reduced: ReducedModel) -> dict[str, Any]:
+    A, B, C, D = reduced.matrices()
+    model = reduced.model
+    omega = np.geomspace(*reduced.band, POINTS)
+    omega = omega[distance(omega, frequencies_around(model.arm, reduced.band[1])) > AT_A_POLE * omega]
+    response = transfer(model.arm, model.outputs, x=model.x)(1j * omega)
+    return {
+        "A": A,
+        "B": B,
+        "C": C,
+        "D": D,
+        "omega": omega,
+        "response": response[:, None, :],
+        "input_name": np.array([model.input], dtype=object),
+        "output_names": np.array(model.outputs, dtype=object),
+        "state_names": np.array(model.states, dtype=object),
+        "name": reduced.name,
+        "worst_error": reduced.worst_error,
+        "band": np.array(reduced.band),
+    }
+
+
+def _script(reduced: ReducedModel, path: Path) -> str:
+    file, name = (text.replace("'", "''") for text in (path.name, reduced.name))
+    low, high = reduced.band
+    return f"""% {reduced.name}: written by tfarm.
+% sys:   the reduced model (ss), worst |dG| / (|G| + |w dG/dw|) {reduced.worst_error:.3g} over {low:g} to {high:g} rad/s
+% exact: the exact frequency response (frd) over that band
+here = fileparts(mfilename('fullpath'));
+data = load(fullfile(here, '{file}'));
+sys = ss(data.A, data.B, data.C, data.D, ...
+    'InputName', data.input_name, 'OutputName', data.output_names, 'StateName', data.state_names);
+exact = frd(data.response, data.omega, ...
+    'InputName', data.input_name, 'OutputName', data.output_names);
+sys.Name = '{name}';
+exact.Name = '{name}, exact';
+clear here data
+"""
+
+
+def _product(polynomials: list[Any]) -> Any:
+    product = np.ones(1)
+    for polynomial in polynomials:
+        product = np.polymul(product, polynomial)
+    return product

@@ -1,0 +1,114 @@
+"""The modal model: exact residues, the rigid body, and a static remainder for the modes left out.
+
+    G(s) ~ R2/s^2 + R1/s + static + sum over modes of r1/(s - p1) + r2/(s - p2)
+
+A truncated Mittag-Leffler series, exact at s -> 0.  At C = 0 the poles are exactly imaginary and the model is lossless.
+At C > 0 the undamped modes do not diagonalise the damping, so the residues are those of the damped eigenvalues.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import Arm
+from tfarm.errors import ParameterError
+from tfarm.exact.coefficients import Coefficients, coefficients
+from tfarm.exact.outputs import OUTPUTS, Output
+from tfarm.exact.values import expansions_at_zero
+from tfarm.response import transfer
+from tfarm.spectrum import Modes, modes
+from tfarm.spectrum.damped import damped_modes
+
+from .partial_fractions import PartialFractions
+from .residues import contour_residues, end_residues, undamped_residues
+
+Complex = NDArray[np.complexfloating[Any, Any]]
+
+MOST_MODES = 1000
+
+
+class ModalModel(PartialFractions):
+    """The first flexible modes of the arm with their exact eigenvalues and residues (see `PartialFractions`)."""
+
+
+def modal_model(arm: Arm, outputs: str | Sequence[str], count: int, x: float | None = None) -> ModalModel:
+    """The modal model of an arm with its first `count` flexible modes (0 to 1000), for one output or several.
+
+    `x` [m] is the place of outputs along the arm.  Where the hub is locked, hub angle is the input and no rigid body is
+    left.  At C > 0 the eigenvalues and residues are those of the damped arm, overdamped modes by their two real poles.
+    Raises ParameterError for an unknown output, a count out of range, and an output that grows with s without bound.
+    """
+    G = transfer(arm, outputs, x=x)
+    if isinstance(count, bool) or not isinstance(count, int | np.integer) or not 0 <= count <= MOST_MODES:
+        raise ParameterError(key="count", value=count, remedy=f"a whole number of flexible modes, 0 to {MOST_MODES}")
+    wanted = [proper(arm, name) for name in G.outputs]
+    k, share = coefficients(arm), 0.0 if x is None else x / arm.link.length
+    table = modes(arm, max(1, int(count)))
+    flexible = slice(int(arm.has_rigid_mode), int(arm.has_rigid_mode) + int(count))
+    collocated = OUTPUTS["root_moment" if arm.is_locked else "hub_angle"]
+    p, r = _poles_and_residues(arm, table, k, [*wanted, collocated], share)
+    p, r = p[:count], r[:, :count]
+    expansion = np.array(expansions_at_zero(k, wanted, share))
+    return ModalModel(
+        arm=arm,
+        outputs=G.outputs,
+        x=G.x,
+        index=table.index[flexible],
+        natural_frequency=table.natural_frequency[flexible],
+        eigenvalues=p,
+        residues=r[:-1],
+        rigid=expansion[:, :2],
+        static=expansion[:, 2] + (r[:-1] / p).real.sum(axis=(1, 2)),
+        participation=np.sqrt(abs((r[-1] * p[:, ::-1]).real.sum(axis=-1))),
+    )
+
+
+def relaxed_model(arm: Arm, outputs: str | Sequence[str], count: int, x: float | None = None) -> ModalModel:
+    """The modal model of a damped arm with one state more, exact to first order at s -> 0.
+
+    At C > 0 the bending modes left out are overdamped and follow as c b/w^2/(1 + C s), not at once as a static
+    remainder does: their slow poles gather at -1/C.  So the remainder is D + E/(1 + C s), from G and G' at 0.
+    Raises ParameterError at C = 0.
+    """
+    model, C = modal_model(arm, outputs, count, x), arm.link.damping
+    if C == 0:
+        raise ParameterError(key="link.damping", value=C, remedy="without damping nothing relaxes; take modal_model")
+    share = 0.0 if x is None else x / arm.link.length
+    expansion = np.array(expansions_at_zero(coefficients(arm), [OUTPUTS[name] for name in model.outputs], share))
+    slope = expansion[:, 3] + (model.residues / model.eigenvalues**2).real.sum(axis=(1, 2))
+    return replace(model, static=model.static + slope / C, relaxation=-slope / C)
+
+
+def proper(arm: Arm, name: str) -> Output:
+    """The output of that name, if a state space of finite order can have it.  Raises ParameterError if not."""
+    if arm.is_locked and name in ("hub_rate",):
+        remedy = "the rate of a prescribed hub angle is s itself, which no state space has; ask for another output"
+        raise ParameterError(key="outputs", value=name, remedy=remedy)
+    return OUTPUTS[name]
+
+
+def _poles_and_residues(
+    arm: Arm, table: Modes, k: Coefficients, wanted: list[Output], share: float
+) -> tuple[Complex, Complex]:
+    """Eigenvalues (n, 2) and residues (outputs, n, 2) at them."""
+    if arm.link.damping == 0:
+        s = 1j * table.natural_frequency[table.index > 0]
+        powers = np.array([[each.power] for each in wanted])
+        upper = undamped_residues(table, wanted, k, share) * s**powers / (2 * s)
+        return np.stack([s, s.conj()], axis=1), np.stack([upper, upper.conj()], axis=2)
+    p = damped_modes(table).eigenvalues[table.index > 0]
+    along = any(each.place == "x" for each in wanted)
+    residues, doubtful = end_residues(k, wanted, p.ravel())
+    doubtful = doubtful | along
+    if doubtful.any():
+        residues[:, doubtful] = contour_residues(k, wanted, p.ravel()[doubtful], share)
+    residues = residues.reshape(len(wanted), *p.shape)
+    pair = p[:, 0].imag > 0
+    residues[:, pair, 1] = residues[:, pair, 0].conj()
+    residues[:, ~pair] = residues[:, ~pair].real
+    return p, residues

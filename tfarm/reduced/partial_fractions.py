@@ -1,0 +1,153 @@
+"""A reduced model as partial fractions: poles, residues, rigid body and static remainder; values and state space."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tfarm.arm import Arm
+from tfarm.errors import ParameterError
+
+if TYPE_CHECKING:
+    import control
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complexfloating[Any, Any]]
+Matrices = tuple[Real, Real, Real, Real]
+
+BLOCK = 1 << 18  # entries of (poles, s) held at a time
+
+
+@dataclass(frozen=True, kw_only=True)
+class PartialFractions:
+    """G_o(s) ~ rigid[o,0]/s^2 + rigid[o,1]/s + static[o] + sum of residues[o,k,i]/(s - eigenvalues[k,i]).
+
+    `eigenvalues` (n, 2) [1/s] are conjugate pairs (Im > 0 first), or two reals where a mode is overdamped; `residues`
+    (outputs, n, 2) belong to them.  `index` (n,) numbers the arm's own flexible modes from 1, and is 0 for a pole that
+    stands for all modes left out; `natural_frequency` (n,) is undamped [rad/s].  `rigid` (outputs, 2) and `static`
+    (outputs,) make the model exact at s -> 0.  `participation` (n,) is how strongly the input drives each pair:
+    |b| at C = 0, the root moment of the mode where the hub is locked.  `relaxation` (outputs,), where there is one, is
+    the share E of E/(1 + C s), which stands for what the bending modes left out do at C > 0 (see `relaxed_model`).
+    """
+
+    arm: Arm
+    outputs: tuple[str, ...]
+    x: float | None = None
+    index: NDArray[np.int64]
+    natural_frequency: Real
+    eigenvalues: Complex
+    residues: Complex
+    rigid: Real
+    static: Real
+    participation: Real
+    relaxation: Real | None = None
+
+    @property
+    def has_rigid_states(self) -> bool:
+        """Whether an output feels the arm turn as a rigid body; then angle and rate are two of the states."""
+        return bool(self.rigid.any())
+
+    @property
+    def order(self) -> int:
+        """The number of states: two a mode, two for the rigid body where an output feels it, one for a relaxation."""
+        return 2 * (self.index.size + self.has_rigid_states) + (self.relaxation is not None)
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the states, in the order of `matrices`."""
+        rigid = ("rigid_angle", "rigid_rate") if self.has_rigid_states else ()
+        tails = iter(range(1, self.index.size + 1))
+        names = [f"mode{k}" if k else f"tail{next(tails)}" for k in self.index]
+        pairs = tuple(f"{name}_{part}" for name in names for part in ("position", "rate"))
+        return rigid + pairs + (("relaxation",) if self.relaxation is not None else ())
+
+    @property
+    def input(self) -> str:
+        """The input: "hub_torque" [N m], or "hub_angle" [rad] where the hub is locked."""
+        return "hub_angle" if self.arm.is_locked else "hub_torque"
+
+    @property
+    def stiffness(self) -> Real:
+        """p1 p2 of each mode [1/s^2]: its natural frequency squared at C = 0."""
+        return (self.eigenvalues[:, 0] * self.eigenvalues[:, 1]).real
+
+    @property
+    def numerators(self) -> tuple[Real, Real]:
+        """n1, n0 (outputs, n) of each mode's share (n1 s + n0)/((s - p1)(s - p2))."""
+        r1, r2 = self.residues[..., 0], self.residues[..., 1]
+        p1, p2 = self.eigenvalues.T
+        return (r1 + r2).real, -(r1 * p2 + r2 * p1).real
+
+    def __call__(self, s: ArrayLike) -> Complex:
+        """Values (outputs, *s.shape) at complex s [1/s].  Raises ParameterError at a pole of the model."""
+        points = np.asarray(s, dtype=complex)
+        flat, values = points.ravel(), np.empty((len(self.outputs), points.size), complex)
+        step = max(1, BLOCK // max(1, self.index.size))
+        for start in range(0, flat.size, step):
+            values[:, start : start + step] = self._values(flat[start : start + step])
+        return values.reshape(len(self.outputs), *points.shape)
+
+    def _values(self, s: Complex) -> Complex:
+        p1, p2 = self.eigenvalues.T[:, :, None]
+        product = (s - p1) * (s - p2)
+        if not product.all() or (self.has_rigid_states and not s.all()):
+            pole = s[(product == 0).any(axis=0)] if not product.all() else s[s == 0]
+            raise ParameterError(key="s", value=complex(pole[0]), remedy="a pole of the reduced model; move s")
+        n1, n0 = self.numerators
+        values = s * (n1 @ (1 / product)) + n0 @ (1 / product) + self.static[:, None]
+        if self.has_rigid_states:
+            values = values + self.rigid[:, :1] / (s * s) + self.rigid[:, 1:] / s
+        if self.relaxation is not None:
+            values = values + self.relaxation[:, None] / (1 + self.arm.link.damping * s)
+        return values
+
+    def magnitude(self, s: Complex) -> Real:
+        """The sum of the sizes of all terms (outputs, s) at s (1-D): times epsilon, what their sum rounds."""
+        p1, p2 = self.eigenvalues.T[:, :, None]
+        n1, n0 = self.numerators
+        share = 1 / abs((s - p1) * (s - p2))
+        size = abs(n1) @ (abs(s) * share) + abs(n0) @ share + abs(self.static)[:, None]
+        if self.has_rigid_states:
+            size = size + abs(self.rigid[:, :1]) / abs(s) ** 2 + abs(self.rigid[:, 1:]) / abs(s)
+        if self.relaxation is not None:
+            size = size + abs(self.relaxation[:, None] / (1 + self.arm.link.damping * s))
+        return size
+
+    def matrices(self) -> Matrices:
+        """A, B, C, D of x' = A x + B u, y = C x + D u: NumPy arrays (n, n), (n, 1), (outputs, n), (outputs, 1).
+
+        Rigid body: angle and rate of an inertia J.  Each mode: (w q, q') with q'' + a q' + w^2 q = b u, that is the
+        block [[0, w], [-w, -a]]; at C = 0 half the sum of their squares is the mode's energy [J].
+        """
+        first, n = 2 * self.has_rigid_states, self.index.size
+        A, B = np.zeros((self.order, self.order)), np.zeros((self.order, 1))
+        C = np.zeros((len(self.outputs), self.order))
+        if first:
+            A[0, 1], B[1, 0] = 1.0, 1.0 / self.arm.total_inertia
+            C[:, :2] = self.rigid * self.arm.total_inertia
+        position = first + 2 * np.arange(n)
+        w = np.sqrt(self.stiffness)
+        A[position, position + 1], A[position + 1, position] = w, -w
+        A[position + 1, position + 1] = self.eigenvalues.sum(axis=1).real
+        b = np.where(self.participation > 0, self.participation, 1.0)
+        n1, n0 = self.numerators
+        B[position + 1, 0] = b
+        C[:, position], C[:, position + 1] = n0 / (w * b), n1 / b
+        if self.relaxation is not None:
+            A[-1, -1], B[-1, 0], C[:, -1] = -1 / self.arm.link.damping, 1 / self.arm.link.damping, self.relaxation
+        return A, B, C, self.static[:, None].copy()
+
+    def state_space(self, name: str | None = None) -> control.StateSpace:
+        """The model as a `control.StateSpace` with named inputs, outputs and states."""
+        import control
+
+        return control.StateSpace(
+            *self.matrices(),
+            inputs=[self.input],
+            outputs=list(self.outputs),
+            states=list(self.states),
+            name=name or f"{self.arm.name}, order {self.order}",
+        )

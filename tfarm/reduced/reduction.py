@@ -1,0 +1,264 @@
+"""From the exact arm to the smallest model that serves: by order or by error, with its error measured.
+
+This is the one door out of exactness.  What comes through carries its band, its worst error over it in the norm
+|dG| / (|G| + |w G'|), and the first mode it lacks.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tfarm.arm import Arm
+from tfarm.errors import MISSING, ConvergenceError, ParameterError
+from tfarm.response import transfer
+from tfarm.spectrum import modes
+
+from .accuracy import Ruler
+from .modal import modal_model, relaxed_model
+from .partial_fractions import Complex, Matrices, PartialFractions
+from .rational import modes_in, rational_model
+
+if TYPE_CHECKING:
+    import control
+
+Real = NDArray[np.float64]
+Method = Literal["modal", "aaa"]
+
+BAND = (0.1, 1000.0)
+MOST_ORDER = 400
+MOST_TAILS = 12  # pairs of poles above the band; more fit rounding
+SAME = 1e-6  # relative gap within which a pole of the model is a mode of the arm
+
+
+@dataclass(frozen=True)
+class ReducedModel:
+    """A reduced model and how far to trust it.
+
+    `worst_error` is an upper figure of |dG| / (|G| + |w dG/dw|) over `band` [rad/s], the largest of `errors`
+    (outputs,), which are worst at `worst_at` [rad/s].  `first_mode_lacking` is the first flexible mode of the arm that
+    no pole of the model meets to within 1e-6, `lacking_frequency` [rad/s] its undamped frequency.  `note` says what
+    was not done as asked, or is empty.
+    """
+
+    model: PartialFractions
+    method: Method
+    band: tuple[float, float]
+    errors: Real
+    worst_at: Real
+    first_mode_lacking: int
+    lacking_frequency: float
+    note: str = ""
+
+    @property
+    def worst_error(self) -> float:
+        """The largest of `errors`."""
+        return float(self.errors.max())
+
+    @property
+    def arm(self) -> Arm:
+        """The arm it stands for."""
+        return self.model.arm
+
+    @property
+    def order(self) -> int:
+        """The number of states."""
+        return self.model.order
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the outputs."""
+        return self.model.outputs
+
+    @property
+    def name(self) -> str:
+        """What it is, in a few words."""
+        return f"{self.arm.name}, {self.method}, order {self.order}"
+
+    def __call__(self, s: ArrayLike) -> Complex:
+        """Values (outputs, *s.shape) at complex s [1/s]."""
+        return self.model(s)
+
+    def deviation(self, omega: ArrayLike) -> Real:
+        """How far from the exact |G(i omega)| the printed error lets the model be: (outputs, omega), for an error band.
+
+        worst error times |G| + |w G'|; omega [rad/s] in the band, 1-D.
+        """
+        w = np.atleast_1d(np.asarray(omega, dtype=float))
+        if not ((w >= self.band[0]) & (w <= self.band[1])).all():
+            remedy = f"the error is known from {self.band[0]:g} to {self.band[1]:g} rad/s; stay in this band"
+            raise ParameterError(key="omega", value=omega, remedy=remedy)
+        return self.errors[:, None] * Ruler.of(self.model, self.band).norm(w)
+
+    def matrices(self) -> Matrices:
+        """A, B, C, D as NumPy arrays (see `PartialFractions.matrices`)."""
+        return self.model.matrices()
+
+    def state_space(self) -> control.StateSpace:
+        """The model as a `control.StateSpace` with named inputs, outputs and states."""
+        return self.model.state_space(self.name)
+
+
+def reduce(
+    arm: Arm,
+    outputs: str | Sequence[str],
+    *,
+    order: int | None = None,
+    error: float | None = None,
+    method: Method | None = None,
+    band: tuple[float, float] = BAND,
+    x: float | None = None,
+) -> ReducedModel:
+    """The reduced model of so many states, or the smallest one whose worst error over the band is within `error`.
+
+    Orders are even; at C > 0 an odd one has the relaxation of the modes left out as a state (see `relaxed_model`).
+    `band` in rad/s; `method` "modal" or "aaa" (C = 0 only), by default whichever has the smaller error; `x` [m] is the
+    place of outputs along the arm.  Raises ParameterError for what no model can be, ConvergenceError where no model of
+    up to 400 states is within the error.
+    """
+    names = transfer(arm, outputs, x=x).outputs
+    low, high = _band(band)
+    if len(set(names)) < len(names):
+        raise ParameterError(key="outputs", value=names, remedy="name each output once")
+    if method is not None and method not in get_args(Method):
+        raise ParameterError(key="method", value=method, remedy="modal or aaa, or leave it out for the better one")
+    if method == "aaa" and arm.link.damping:
+        raise ParameterError(key="method", value="aaa", remedy="AAA in s^2 is for C = 0; take modal, which has C")
+    if (order is None) == (error is None):
+        remedy = "give either an order (a number of states) or an error"
+        raise ParameterError(key="order", value=MISSING if order is None else order, remedy=remedy)
+    bench = _Bench(arm, names, (low, high), x, method)
+    return bench.of_order(order) if order is not None else bench.within(_error(error))
+
+
+class _Bench:
+    """Models of one arm over one band, tried and measured."""
+
+    def __init__(
+        self, arm: Arm, names: tuple[str, ...], band: tuple[float, float], x: float | None, method: Method | None
+    ) -> None:
+        self.arm, self.names, self.band, self.x = arm, names, band, x
+        self.rigid = modal_model(arm, names, 0, x).has_rigid_states
+        self.inside = modes_in(arm, band[1])
+        self.by_modes = method != "aaa"
+        self.by_aaa = method != "modal" and not arm.link.damping
+        self.ruler = Ruler(arm, names, band, x)
+
+    def of_order(self, order: int) -> ReducedModel:
+        """The better model of that many states."""
+        pairs = self._pairs(order)
+        if order % 2:
+            return self._measured(relaxed_model(self.arm, self.names, pairs, self.x), "modal", "")
+        found: list[ReducedModel] = []
+        if self.by_aaa and pairs > self.inside:
+            model = rational_model(self.arm, self.names, pairs, self.band[1], self.x)
+            few = "" if model.order == order else f"order {order} asked: no more poles passed the checks of AAA"
+            found.append(self._measured(model, "aaa", few))
+        if self.by_modes or not found:
+            note = "" if self.by_modes else f"modal taken: AAA wants more than the {self.inside} modes in the band"
+            found.append(self._measured(modal_model(self.arm, self.names, pairs, self.x), "modal", note))
+        return min(found, key=lambda each: each.worst_error)
+
+    def within(self, error: float) -> ReducedModel:
+        """The smallest model whose measured error is within that one."""
+        tried, most = [self._few_poles(error)], self._most()
+        if self.arm.link.damping:
+            tried.append(self._few_modes(error, relaxed_model, most))
+            most = most if tried[-1] is None else tried[-1].model.index.size
+        if self.by_modes:
+            tried.append(self._few_modes(error, modal_model, most))
+        found = [each for each in tried if each is not None]
+        if not found:
+            best = self.of_order(2 * (min(self.inside + MOST_TAILS, self._most()) + self.rigid))
+            message = (
+                f"found no model of up to {MOST_ORDER} states within {error:g} from {self.band[0]:g} to "
+                f"{self.band[1]:g} rad/s; order {best.order} has {best.worst_error:.2g}: allow more, or narrow the band"
+            )
+            raise ConvergenceError(message, best, best.worst_error)
+        return min(found, key=lambda each: (each.order, each.worst_error))
+
+    def _few_poles(self, error: float) -> ReducedModel | None:
+        """The smallest model by AAA, if one will do."""
+        if not self.by_aaa:
+            return None
+        for pairs in range(self.inside + 1, min(self.inside + MOST_TAILS, self._most()) + 1):
+            model = rational_model(self.arm, self.names, pairs, self.band[1], self.x)
+            if self.ruler.rough(model) <= error:
+                measured = self._measured(model, "aaa", "")
+                if measured.worst_error <= error:
+                    return measured
+        return None
+
+    def _few_modes(self, error: float, make: Callable[..., PartialFractions], most: int) -> ReducedModel | None:
+        """The smallest model of up to so many modes, if one will do; its error falls with each, so by bisection."""
+
+        def rough(count: int) -> float:
+            return self.ruler.rough(make(self.arm, self.names, count, self.x))
+
+        good, bad = 0, -1
+        try:
+            while rough(good) > error:
+                if good == most:
+                    return None
+                good, bad = min(good + max(good // 2, 2), most), good
+        except ConvergenceError:  # at C > 0 no more damped modes can be told apart
+            return None
+        while good - bad > 1:
+            middle = (good + bad) // 2
+            good, bad = (middle, bad) if rough(middle) <= error else (good, middle)
+        for count in range(good, min(good + 3, most + 1)):
+            measured = self._measured(make(self.arm, self.names, count, self.x), "modal", "")
+            if measured.worst_error <= error:
+                return measured
+        return None
+
+    def _measured(self, model: PartialFractions, method: Method, note: str) -> ReducedModel:
+        accuracy = self.ruler.measure(model)
+        number, frequency = first_mode_lacking(model)
+        return ReducedModel(model, method, self.band, accuracy.worst, accuracy.at, number, frequency, note)
+
+    def _most(self) -> int:
+        return MOST_ORDER // 2 - self.rigid
+
+    def _pairs(self, order: object) -> int:
+        """Flexible pairs of poles in a model of so many states."""
+        rigid = "two for the rigid body, " if self.rigid else ""
+        remedy = f"states come in pairs, {rigid}two a mode: an even number from 2 to {MOST_ORDER}"
+        if self.arm.link.damping:
+            remedy = f"two states a mode, {rigid}and one for relaxation where it is odd: from 2 to {MOST_ORDER}"
+        if isinstance(order, bool) or not isinstance(order, int | np.integer) or not 2 <= order <= MOST_ORDER:
+            raise ParameterError(key="order", value=order, remedy=remedy)
+        if order % 2 and not self.arm.link.damping:
+            raise ParameterError(key="order", value=order, remedy=remedy)
+        return int(order) // 2 - self.rigid
+
+
+def first_mode_lacking(model: PartialFractions) -> tuple[int, float]:
+    """Number and undamped frequency [rad/s] of the arm's first flexible mode that is not one of the model's."""
+    table = modes(model.arm, model.index.size + 1)
+    omega = table.natural_frequency[table.index > 0]
+    has = (abs(model.natural_frequency[:, None] - omega) <= SAME * omega).any(axis=0)
+    first = int(np.argmin(has))
+    return first + 1, float(omega[first])
+
+
+def _band(band: Any) -> tuple[float, float]:
+    remedy = "two frequencies in rad/s, 0 < low < high, such as 0.1,1000"
+    try:
+        low, high = (float(edge) for edge in band)
+    except (TypeError, ValueError):
+        raise ParameterError(key="band", value=band, remedy=remedy) from None
+    if not 0 < low < high < math.inf or high / low > 1e12:
+        raise ParameterError(key="band", value=(low, high), remedy=remedy)
+    return low, high
+
+
+def _error(error: Any) -> float:
+    if isinstance(error, bool) or not isinstance(error, int | float) or not 0 < error < math.inf:
+        raise ParameterError(key="error", value=error, remedy="a positive number, such as 1e-6")
+    return float(error)
