@@ -61,7 +61,7 @@ def characteristic(k: Coefficients, s: Complex, gains: Gains = OPEN, at_zero: in
     free = free_response(k, s)
     value, slope = closed(Jet.variable(s, 1), k.damping, free.drive, free.theta, free.M, gains).c
     if at_zero:
-        s = np.where(s == 0, 1e-300, s)
+        s = np.where(s == 0, 1e-100, s)
         value = value / s**at_zero
         slope = slope / s**at_zero - at_zero * value / s
     return Analytic(value, slope, free.scale)
@@ -80,7 +80,7 @@ def quick_characteristics(k: Coefficients, s: Complex, law: Real, at_zero: int =
     drive, theta, moment, scale = loop_parts(k, at)
     values = drive + (law[0] + law[1] * at) * theta + law[2] * moment
     if at_zero:
-        values = values / np.where(at == 0, 1e-300, at) ** at_zero
+        values = values / np.where(at == 0, 1e-100, at) ** at_zero
     up, down = (values[row] * np.exp(scale[row] - scale[0]) for row in (1, 2))
     return Analytic(values[0], (up - down) / (2 * h), scale[0])
 

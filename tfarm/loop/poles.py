@@ -27,7 +27,7 @@ Real = NDArray[np.float64]
 
 ON_AXIS = 1e-12  # a pole whose real part is below this share of its size is on the imaginary axis to working precision
 MOST_POLES = 1000
-GROWTH = (1.0, 1.0041, 1.0093, 1.0171, 1.0229)  # heights tried where a zero lies on the edge of a box
+GROWTH = (1.0, 1.0041, 1.0093, 1.0171, 1.0311, 1.0573, 1.113)  # heights tried where a zero lies on the edge of a box
 
 
 @dataclass(frozen=True)
@@ -127,6 +127,7 @@ def starting_points(loop: Loop, up_to: float) -> Complex:
     near = (-decay - shift * omega + 1j * omega * np.sqrt(np.maximum(1 - (C * omega / 2) ** 2, 0.0))).ravel()
     J = arm.total_inertia if arm.has_rigid_mode else arm.hub.inertia + 1e-12
     slow = np.roots([J, loop.law.K1, loop.law.Kp]).astype(complex)
+    slow = slow[slow != 0]  # zeros there are divided out
     real = -np.geomspace(up_to / 300, 1.4 * up_to, 25)
     return np.concatenate([near, near.conj(), slow, real, -real])
 

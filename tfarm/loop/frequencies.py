@@ -1,0 +1,65 @@
+"""Where to look along the imaginary axis, and how far up: the frequencies at which a loop function is steep, and its band.
+
+Along s = i w the loop function is steep at the arm's natural frequencies, at those with the hub locked (zeros of the hub
+angle) and with the hub free of inertia (zeros of the root moment); at small C these features are as narrow as C w^2.  So a grid
+has points at geometric distances around each.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import Arm, Hub
+from tfarm.spectrum import modes, modes_below
+
+Real = NDArray[np.float64]
+
+NARROWEST, WIDEST = 1e-10, 0.06  # distances from a steep place, as shares of its frequency
+AROUND = 14  # points on either side of it
+BETWEEN = 24  # and between two of them
+MOST_MODES = 150  # flexible modes that a band holds at most
+
+
+def natural_frequencies(arm: Arm, up_to: float) -> Real:
+    """Flexible natural frequencies [rad/s] below `up_to`."""
+    if modes_below(arm, up_to) == 0:
+        return np.empty(0)
+    table = modes(arm, up_to=up_to)
+    return table.natural_frequency[table.index > 0]
+
+
+@lru_cache(maxsize=64)
+def steep_places(arm: Arm, up_to: float) -> Any:
+    """Natural frequencies of the arm with its own hub, with the hub locked and with none, ascending, as a read-only array."""
+    others = (arm, replace(arm, hub=Hub(inertia=math.inf)), replace(arm, hub=Hub(inertia=0.0)))
+    places = np.unique(np.concatenate([natural_frequencies(each, up_to) for each in others]))
+    places.flags.writeable = False
+    return places
+
+
+@lru_cache(maxsize=64)
+def grid(arm: Arm, up_to: float) -> Any:
+    """Frequencies [rad/s] from a millionth of the first natural one to `up_to`, dense around steep places; read-only."""
+    places = np.asarray(steep_places(arm, 1.05 * up_to))
+    lowest = 1e-6 * min(up_to, places[0] if places.size else up_to)
+    away = np.geomspace(NARROWEST, WIDEST, AROUND)
+    close = (places[:, None] * (1 + np.r_[-away[::-1], away])).ravel()
+    corners = np.r_[lowest, places[places < up_to], up_to]
+    between = np.concatenate([np.linspace(a, b, BETWEEN, endpoint=False) for a, b in zip(corners, corners[1:], strict=False)])
+    slow = np.geomspace(lowest, corners[1], 60)
+    omega = np.unique(np.concatenate([close, between, slow]))
+    omega = np.append(omega[(omega >= lowest) & (omega < up_to)], up_to)
+    omega.flags.writeable = False
+    return omega
+
+
+def band_of(arm: Arm, number: int) -> float:
+    """A frequency [rad/s] half-way between two natural ones, with so many flexible modes below."""
+    omega = modes(arm, number + 1).natural_frequency
+    return float((omega[-1] + omega[-2]) / 2)

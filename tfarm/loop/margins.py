@@ -1,0 +1,143 @@
+"""Gain, phase, delay and disk margin of the exact loop function L(i w), and never without the verdict.
+
+A gain margin of an unstable loop is a number that means nothing.  At C = 0 the loop function has poles on the axis at ever
+higher frequency, so that any delay, however short, destabilises some mode: the exact delay and disk margins are 0 and
+the peak sensitivity is infinite; what the loop has up to a band is given beside them, with the band.
+
+Disk margin: the largest alpha for which the loop bears every factor (2 + alpha d)/(2 - alpha d), |d| < 1 (Seiler, Packard and
+Gahinet 2020, symmetric disks), which is 2 min |(1 + L)/(1 - L)|.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+
+from tfarm.arm import Arm, HubFeedback
+
+from .frequencies import grid
+from .lines import BISECTIONS, Line, crossings
+from .plant import Loop
+from .stability import Stability, stability
+from .windows import Windows, gain_windows
+
+Real = NDArray[np.float64]
+NONE = HubFeedback()
+LOWEST = 6  # local minima on the grid that are refined
+
+
+@dataclass(frozen=True)
+class LoopMargins:
+    """Margins of L(i w) for 0 < w <= `band` [rad/s]; inf where nothing limits.
+
+    `gain` (lowest, highest factor), `phase` [deg], `delay` [s], `disk` [-], `peak_sensitivity` [-]; `at` are the frequencies
+    [rad/s] where phase, delay, disk margin and peak sensitivity occur.
+    """
+
+    band: float
+    gain: tuple[float, float]
+    phase: float
+    delay: float
+    disk: float
+    peak_sensitivity: float
+    at: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Margins:
+    """The verdict first.  `in_band` are the margins up to its band; `exact_delay`, `exact_disk` and `exact_peak` those of
+    the whole infinite-dimensional loop.  All four are None unless the loop is stable.
+    """
+
+    stability: Stability
+    windows: dict[str, Windows]
+    in_band: LoopMargins | None
+    exact_delay: float | None
+    exact_disk: float | None
+    exact_peak: float | None
+
+
+def margins(arm: Arm, law: HubFeedback, band: float | None = None) -> Margins:
+    """Verdict, windows of each gain, and margins of the loop.  Raises what `stability` raises."""
+    verdict = stability(arm, law, band)
+    windows = {name: gain_windows(verdict, name) for name in ("K1", "K2", "Kp")}
+    if not verdict.is_stable:
+        return Margins(verdict, windows, None, None, None, None)
+    found = loop_margins(verdict)
+    if arm.link.damping == 0 and (law.K1 or law.K2):
+        return Margins(verdict, windows, found, 0.0, 0.0, math.inf)
+    return Margins(verdict, windows, found, found.delay, found.disk, found.peak_sensitivity)
+
+
+def loop_margins(verdict: Stability) -> LoopMargins:
+    """The margins of a stable loop up to the verdict's band."""
+    loop, band = verdict.loop, verdict.band
+    omega = np.asarray(grid(loop.arm, band))
+    crossed = unit_crossings(loop, omega)
+    angle = np.angle(-loop.loop_function(1j * crossed))  # 0 where L = -1
+    lag = np.mod(angle, 2 * math.pi)
+    phase, at_phase = _least(abs(angle) * 180 / math.pi, crossed)
+    delay, at_delay = _least(lag / np.where(crossed == 0, 1, crossed), crossed)
+
+    def disk_of(w: Real) -> Real:
+        L = loop.loop_function(1j * w)
+        return np.asarray(2 * abs((1 + L) / (1 - L)))
+
+    def return_difference(w: Real) -> Real:
+        return np.asarray(abs(1 + loop.loop_function(1j * w)))
+
+    disk, at_disk = lowest(disk_of, omega)
+    least, at_peak = lowest(return_difference, omega)
+    at = {"phase": at_phase, "delay": at_delay, "disk": at_disk, "peak_sensitivity": at_peak}
+    return LoopMargins(band, gain_margin(loop, band), phase, delay, disk, max(1.0, 1.0 / least), at)
+
+
+def gain_margin(loop: Loop, band: float) -> tuple[float, float]:
+    """The factors on all gains at once, below and above 1, at which a pole first reaches the axis."""
+    law, arm = loop.law, loop.arm
+    if arm.link.damping == 0:
+        return 0.0, 1.0 / law.K2 if law.K2 > 0 else math.inf
+    factors = [each.t for each in crossings(arm, Line(NONE, law), band)]
+    below = max((t for t in factors if 0 <= t < 1), default=0.0)
+    return below, min((t for t in factors if t > 1), default=math.inf)
+
+
+def unit_crossings(loop: Loop, omega: Real) -> Real:
+    """Frequencies [rad/s] where |L(i w)| = 1."""
+
+    def size(w: Real) -> Real:
+        return np.asarray(np.log(abs(loop.loop_function(1j * w))))
+
+    sign = np.sign(size(omega))
+    (before,) = np.nonzero(sign[1:] * sign[:-1] < 0)
+    low, high, start = omega[before], omega[before + 1], sign[before]
+    for _ in range(BISECTIONS if before.size else 0):
+        middle = (low + high) / 2
+        left = np.sign(size(middle)) == start
+        low, high = np.where(left, middle, low), np.where(left, high, middle)
+    return np.asarray((low + high) / 2)
+
+
+def lowest(f: Callable[[Real], Real], omega: Real) -> tuple[float, float]:
+    """The least value of f over the grid's range and where, its lowest dips refined between grid points."""
+    values = f(omega)
+    dips = np.nonzero((values[1:-1] <= values[:-2]) & (values[1:-1] <= values[2:]))[0] + 1
+    best = int(np.argmin(values))
+    least, at = float(values[best]), float(omega[best])
+    for i in dips[np.argsort(values[dips])][:LOWEST]:
+        found = minimize_scalar(lambda w: float(f(np.array([w]))[0]), bounds=(omega[i - 1], omega[i + 1]), method="bounded")
+        if found.fun < least:
+            least, at = float(found.fun), float(found.x)
+    return least, at
+
+
+def _least(values: Real, where: Real) -> tuple[float, float]:
+    if not values.size:
+        return math.inf, 0.0
+    i = int(np.argmin(values))
+    return float(values[i]), float(where[i])

@@ -1,0 +1,140 @@
+"""The (K1, K2) plane: the exact stability boundary, and how many unstable poles each point of a grid has.
+
+D-decomposition (Neimark 1948): at s = i w the characteristic function is linear in both gains, two real equations, so
+each frequency has one point (K1, K2) with poles there: a curve.  Together with K1 = 0, where a real pole passes 0, these
+curves bound regions of a constant number of unstable poles.  On a grid this number follows, column by column (one K1 each),
+from the crossings along K2 and from one count, so nothing is interpolated or missed between grid points.
+
+At C = 0 the curves collapse onto the lines K1 = 0 and K2 = 1, and beyond them every flexible mode is unstable.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import Arm, HubFeedback
+from tfarm.errors import ParameterError
+from tfarm.exact.characteristic import Gains, loop_parts
+from tfarm.exact.coefficients import coefficients
+
+from .frequencies import grid
+from .lines import BISECTIONS, along, crossing_at_zero, crossings
+from .plant import Loop
+from .stability import loop_band, stability
+
+Real = NDArray[np.float64]
+INFINITE = -1  # stands for infinitely many unstable poles
+MOST = 2000  # grid points along one gain
+
+
+@dataclass(frozen=True)
+class Region:
+    """Unstable poles over a grid: `unstable` (len(K2), len(K1)), -1 where they are infinitely many.
+
+    `boundary` (n, 3) holds K1, K2 and w [rad/s] of the D-decomposition curve; empty at C = 0.  `band` [rad/s] is how far up
+    crossings were looked for.
+    """
+
+    arm: Arm
+    Kp: float
+    K1: Real
+    K2: Real
+    unstable: NDArray[np.int64]
+    boundary: Real
+    band: float
+
+    @property
+    def stable(self) -> NDArray[np.bool_]:
+        """Where no pole is unstable."""
+        return np.asarray(self.unstable == 0)
+
+
+def region(arm: Arm, K1: Real, K2: Real, Kp: float = 0.0) -> Region:
+    """The map over the grid of K1 and K2 (1-D, ascending).
+
+    A grid line exactly on K1 = 0 or K2 = 1 at C = 0 is marginal and counts as unstable.  Raises ParameterError where there
+    is no loop or the grid is empty.
+    """
+    K1, K2 = _axis("K1", K1), _axis("K2", K2)
+    Loop(arm, HubFeedback(K1=float(K1[-1]), K2=float(K2[-1]), Kp=Kp))
+    if arm.link.damping == 0:
+        stable = (K1[None, :] > 0) & (K2[:, None] < 1) & (Kp >= 0)
+        return Region(arm, Kp, K1, K2, np.where(stable, 0, INFINITE), np.empty((0, 3)), 0.0)
+    corners = [HubFeedback(K1=float(a), K2=float(b), Kp=Kp) for a in (K1[0], K1[-1]) for b in (K2[0], K2[-1])]
+    band = max(loop_band(Loop(arm, law))[0] for law in corners)
+    omega = np.asarray(grid(arm, band))
+    base = _counts_without_K2(arm, K1, Kp, band)
+    column, at, change = _crossings_along_K2(arm, K1, Kp, omega)
+    unstable = np.repeat(base[None, :], K2.size, axis=0)
+    for n, t, step in zip(column, at, change, strict=True):
+        if t > 0:
+            unstable[K2 > t, n] += step
+        else:
+            unstable[K2 < t, n] -= step
+    return Region(arm, Kp, K1, K2, unstable, boundary(arm, omega, Kp), band)
+
+
+def _axis(name: str, values: Real) -> Real:
+    values = np.atleast_1d(np.asarray(values, dtype=float))
+    if not (2 <= values.size <= MOST and np.isfinite(values).all() and (np.diff(values) > 0).all()):
+        raise ParameterError(key=name, value=f"{values.size} values", remedy=f"an ascending range of 2 to {MOST} values")
+    return values
+
+
+def _counts_without_K2(arm: Arm, K1: Real, Kp: float, band: float) -> NDArray[np.int64]:
+    """Unstable poles at K2 = 0 for each K1: a count at the largest, and the crossings on the way down."""
+    law = HubFeedback(K1=float(K1[-1]), Kp=Kp)
+    counts = np.full(K1.size, stability(arm, law).unstable_roots)
+    for each in crossings(arm, along("K1", law), band):
+        if each.t < K1[-1]:
+            counts[K1 < each.t] -= each.change
+    return counts
+
+
+def _crossings_along_K2(arm: Arm, K1: Real, Kp: float, omega: Real) -> tuple[NDArray[np.int64], Real, NDArray[np.int64]]:
+    """Of every crossing: its column, its K2, and how many more poles are unstable above it."""
+    gains = Gains.of(coefficients(arm), 1.0, 0.0, Kp)
+    A, B = _h(arm, omega, gains)
+    sign = np.sign(A + K1[:, None] * B)
+    column, before = np.nonzero(sign[:, 1:] * sign[:, :-1] < 0)
+    low, high, start = omega[before], omega[before + 1], sign[column, before]
+    for _ in range(BISECTIONS if column.size else 0):
+        middle = (low + high) / 2
+        a, b = _h(arm, middle, gains)
+        left = np.sign(a + K1[column] * b) == start
+        low, high = np.where(left, middle, low), np.where(left, high, middle)
+    at = (low + high) / 2
+    drive, theta, moment, _ = loop_parts(coefficients(arm), 1j * at)
+    N = drive + (float(gains.Kp) + float(gains.K1) * 1j * at * K1[column]) * theta
+    K2 = -(N * moment.conj()).real / abs(moment) ** 2
+    change = np.where(start > 0, 2, -2)  # Im K2 = -h/|M|^2 grows where h falls
+    static = crossing_at_zero(arm, along("K2", HubFeedback(K1=1.0, Kp=Kp)))
+    if static is not None:
+        column = np.r_[column, np.arange(K1.size)]
+        K2, change = np.r_[K2, np.full(K1.size, static.t)], np.r_[change, np.full(K1.size, static.change)]
+    return column, K2, change
+
+
+def _h(arm: Arm, omega: Real, gains: Gains) -> tuple[Real, Real]:
+    """h(w) = Im(N P*) of `lines` along K2, split: what does not depend on K1, and what K1 multiplies."""
+    drive, theta, moment, _ = loop_parts(coefficients(arm), 1j * omega)
+    size = abs(moment) * (abs(drive) + abs(theta)) + 1e-300
+    fixed = ((drive + float(gains.Kp) * theta) * moment.conj()).imag / size
+    return np.asarray(fixed), np.asarray((float(gains.K1) * 1j * omega * theta * moment.conj()).imag / size)
+
+
+def boundary(arm: Arm, omega: Real, Kp: float = 0.0) -> Real:
+    """K1 and K2 with poles at +-i w, and w: (n, 3), in the order of omega."""
+    k = coefficients(arm)
+    gains = Gains.of(k, 1.0, 0.0, Kp)
+    drive, theta, moment, _ = loop_parts(k, 1j * omega)
+    N, a, b = drive + float(gains.Kp) * theta, float(gains.K1) * 1j * omega * theta, moment
+    determinant = (a * b.conj()).imag
+    with np.errstate(all="ignore"):  # where both equations are one, the point is far away
+        K1 = -(N * b.conj()).imag / determinant
+        K2 = (N * a.conj()).imag / determinant
+    points = np.stack([K1, K2, omega], axis=1)
+    return points[np.isfinite(points).all(1)]

@@ -1,0 +1,107 @@
+"""The verdict on a loop: stable, marginal or unstable, and for how much of the infinite spectrum that is known.
+
+Poles are computed, completely, up to a band; what lies beyond is
+
+* at C = 0 a theorem: with K1 > 0 every flexible mode is damped if K2 < 1 and driven if K2 > 1, and K2 = 1 leaves the modes
+  of the locked hub alone (`lyapunov`), so a few modes tell the rest;
+* at C > 0 bounded: from the band on |L(i w)| stays below one half, and falls (the hub's inertia against ever more heavily
+  damped bending), so that 1 + L has no zero there, nor further right.  Where the band of that would hold more modes than
+  `MOST_MODES` it is cut, and the verdict says so.
+
+A pole at 0 remains where Kp = 0, whatever K1 and K2: verdicts are apart from it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tfarm.arm import Arm, HubFeedback
+from tfarm.spectrum import modes_below
+
+from .frequencies import MOST_MODES, band_of
+from .plant import Loop
+from .poles import Poles, poles_below
+
+FEW = 12  # flexible modes in the band at C = 0, and at least
+QUIET = 0.5  # |L| beyond the band, at C > 0
+MARGIN_OF_ZERO = 1e-11  # a real part below this share of |s| is none: the poles are right to a few eps
+
+
+@dataclass(frozen=True)
+class Stability:
+    """`verdict` "stable", "marginal" or "unstable"; poles in the band; what is known beyond it, in words."""
+
+    loop: Loop
+    verdict: str
+    unstable_roots: int
+    unstable_roots_infinite: bool
+    band: float
+    tail: str
+    poles: Poles
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether every pole but that of the free hub angle lies left of the axis."""
+        return self.verdict == "stable"
+
+
+def stability(arm: Arm, law: HubFeedback, band: float | None = None) -> Stability:
+    """The verdict on the loop.  `band` [rad/s] is chosen if it is not given.
+
+    Raises ParameterError where there is no loop, ConvergenceError where poles cannot be counted.
+    """
+    loop = Loop(arm, law)
+    height, quiet = (band, False) if band is not None else loop_band(loop)
+    poles = poles_below(loop, height)
+    infinite, tail = _beyond(loop, quiet)
+    verdict = _verdict(poles, infinite, loop)
+    return Stability(loop, verdict, poles.unstable, infinite, poles.box.im_max, tail, poles)
+
+
+def _verdict(poles: Poles, infinite: bool, loop: Loop) -> str:
+    moving = poles.moving
+    if infinite or bool((moving.real > MARGIN_OF_ZERO * abs(moving)).any()):
+        return "unstable"
+    law, at_zero = loop.law, poles.values.size - moving.size
+    twice = at_zero > 1 or (at_zero == 1 and law.K1 == 0)
+    is_marginal = twice or bool((moving.real > -MARGIN_OF_ZERO * abs(moving)).any())
+    undamped = loop.arm.link.damping == 0 and (law.K1 == 0 or law.K2 == 1)
+    return "marginal" if is_marginal or undamped else "stable"
+
+
+def _beyond(loop: Loop, quiet: bool) -> tuple[bool, str]:
+    """Whether infinitely many poles are unstable, and what is known beyond the band."""
+    law = loop.law
+    if loop.arm.link.damping > 0:
+        if quiet:
+            return False, f"beyond the band |L(iw)| < {QUIET:g} and falling: no unstable pole there (small gain)"
+        return False, "beyond the band not bounded: the small-gain condition would need more modes than are looked at"
+    if law.K1 == 0:
+        return False, "C = 0 and K1 = 0: nothing takes or gives energy, modes beyond the band lie on the axis"
+    if law.K2 == 1:
+        return False, "C = 0 and K2 = 1: modes with the hub at rest stay undamped, in every band"
+    if (law.K1 > 0) == (law.K2 < 1):
+        return False, "C = 0: every mode beyond the band is damped (Lyapunov), with a decay rate that tends to 0"
+    return True, "C = 0: every flexible mode beyond the band is unstable too, with a growth rate that tends to 0"
+
+
+def loop_band(loop: Loop) -> tuple[float, bool]:
+    """The band [rad/s] in which poles are computed, and whether the loop is quiet beyond it (always False at C = 0)."""
+    few = band_of(loop.arm, FEW)
+    if loop.arm.link.damping == 0:
+        return few, False
+    band = few
+    while modes_below(loop.arm, band) <= MOST_MODES:
+        if is_quiet(loop, band):
+            return band, True
+        band *= 1.6
+    return max(few, band / 1.6), False
+
+
+def is_quiet(loop: Loop, band: float) -> bool:
+    """Whether |L(i w)| stays below `QUIET` over two decades from the band on, and falls there."""
+    omega = band * np.geomspace(1.0, 100.0, 1200)
+    size = abs(loop.loop_function(1j * omega))
+    return bool(size.max() < QUIET and size[600:].max() <= size[:600].max())

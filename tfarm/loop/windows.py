@@ -1,0 +1,126 @@
+"""Stable windows of each gain, the others held: from the crossings along it and one count of unstable poles."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tfarm.arm import HubFeedback
+from tfarm.spectrum import modes
+
+from .lines import Crossing, along, crossing_at_zero, crossings
+from .plant import Loop
+from .stability import Stability, loop_band, stability
+
+Interval = tuple[float, float]
+
+REACH = {"K1": 20.0, "K2": 50.0, "Kp": 20.0}  # how far windows are looked for: times J w1, times 1, times J w1^2
+
+
+@dataclass(frozen=True)
+class Windows:
+    """Stable windows of one gain: that around the point (None if it is not stable) and all in `looked_at`.
+
+    An end of -inf or inf is a theorem; an end of `looked_at` only says that the search stopped there.
+    """
+
+    name: str
+    around: Interval | None
+    all: tuple[Interval, ...]
+    looked_at: Interval
+    crossings: tuple[Crossing, ...]
+
+
+def gain_windows(verdict: Stability, name: str) -> Windows:
+    """The windows of "K1", "K2" or "Kp" through the loop whose verdict is given."""
+    loop, law = verdict.loop, verdict.loop.law
+    value: float = getattr(law, name)
+    if name == "K2" and loop.arm.hub.inertia == 0:
+        return Windows(name, None, (), (0.0, 0.0), ())  # an algebraic loop but for K2 = 0
+    low, high = looked_at(loop, name)
+    if loop.arm.link.damping == 0:
+        found = _undamped(loop, name)
+    else:
+        ends = (Loop(loop.arm, with_gain(law, name, end)) for end in (low, high))
+        band = max(verdict.band, *(loop_band(end)[0] for end in ends))
+        found = tuple(each for each in crossings(loop.arm, along(name, law), band) if low < each.t < high)
+    edges = [low, *sorted({each.t for each in found}), high]
+    pairs = list(zip(edges, edges[1:], strict=False))
+    stable = [pair for pair, count in zip(pairs, _counts(verdict, name, pairs, found), strict=True) if count == 0]
+    stable = [_with_proven_ends(loop, name, pair, (low, high)) for pair in stable]
+    at_edge = name == "Kp" and value == 0  # there the pole at 0 is, apart from which the verdict is
+    inside = (pair for pair in stable if pair[0] < value < pair[1] or (at_edge and pair[0] == 0))
+    around = next(inside, None) if verdict.is_stable else None
+    return Windows(name, around, tuple(stable), (low, high), found)
+
+
+def looked_at(loop: Loop, name: str) -> Interval:
+    """The range of a gain that is searched, symmetric and well beyond what matters to the first mode."""
+    first = float(modes(loop.arm, 1).natural_frequency[-1])
+    inertia = loop.arm.total_inertia if loop.arm.has_rigid_mode else loop.arm.hub.inertia + loop.arm.link.rhoA
+    unit = {"K1": inertia * first, "K2": 1.0, "Kp": inertia * first**2}[name]
+    reach = max(REACH[name] * unit, 10.0 * abs(getattr(loop.law, name)))
+    return -reach, reach
+
+
+def with_gain(law: HubFeedback, name: str, value: float) -> HubFeedback:
+    """The law with another value of one gain."""
+    return replace(law, **{name: value})
+
+
+def _undamped(loop: Loop, name: str) -> tuple[Crossing, ...]:
+    """At C = 0: every mode at once at K2 = 1 and at K1 = 0; a real pole at 0 where stiffness or inertia vanishes there."""
+    static = crossing_at_zero(loop.arm, along(name, loop.law))
+    found = [] if static is None else [static]
+    if name == "K2":
+        found.append(Crossing(1.0, math.inf, 1 if loop.law.K1 > 0 else -1))
+    if name == "K1" and (static is None or static.t != 0):
+        found.append(Crossing(0.0, math.inf, -1 if loop.law.K2 < 1 else 1))
+    return tuple(found)
+
+
+def _counts(verdict: Stability, name: str, pairs: list[Interval], found: tuple[Crossing, ...]) -> list[int]:
+    """Unstable poles in each window: counted in one, by the crossings in the others; at C = 0 whether there are any."""
+    loop, value = verdict.loop, getattr(verdict.loop.law, name)
+    if loop.arm.link.damping == 0:
+        return [0 if holds_undamped(loop, with_gain(loop.law, name, (low + high) / 2)) else 1 for low, high in pairs]
+    home = next((n for n, (low, high) in enumerate(pairs) if low < value < high), None)
+    known = verdict.unstable_roots if home is not None and verdict.verdict != "marginal" else None
+    if home is None or known is None:
+        home = len(pairs) // 2
+        known = _count_at(loop, name, (pairs[home][0] + pairs[home][1]) / 2)
+    counts = [known] * len(pairs)
+    for n in range(home + 1, len(pairs)):
+        counts[n] = counts[n - 1] + sum(each.change for each in found if each.t == pairs[n][0])
+    for n in range(home - 1, -1, -1):
+        counts[n] = counts[n + 1] - sum(each.change for each in found if each.t == pairs[n][1])
+    return counts
+
+
+def holds_undamped(loop: Loop, law: HubFeedback) -> bool:
+    """Whether the law leaves no pole right of the axis at C = 0: K1 > 0, K2 < 1 (Lyapunov), and nothing falls statically."""
+    if not (law.K1 > 0 and law.K2 < 1):
+        return False
+    small = np.array([1e-9 * float(modes(loop.arm, 1).natural_frequency[-1])], dtype=complex)
+    return bool(law.Kp >= 0 or (1 + Loop(loop.arm, law).loop_function(small)[0]).real > 0)
+
+
+def _count_at(loop: Loop, name: str, value: float) -> int:
+    there = stability(loop.arm, with_gain(loop.law, name, value))
+    return 0 if there.is_stable else max(1, there.unstable_roots)
+
+
+def _with_proven_ends(loop: Loop, name: str, pair: Interval, limits: Interval) -> Interval:
+    """Ends at the edge of the search replaced by infinity where a theorem says that nothing changes beyond it.
+
+    At C = 0 the Lyapunov argument holds for every K1 > 0, Kp >= 0, K2 < 1; at C > 0 for K2 = 0 (a passive hub).
+    """
+    low, high = pair
+    law, passive = loop.law, loop.arm.link.damping == 0 or loop.law.K2 == 0
+    if name == "K2":
+        is_proven = loop.arm.link.damping == 0 and law.K1 > 0 and law.Kp >= 0
+        return (-math.inf if is_proven and low == limits[0] else low), high
+    is_proven = passive and law.K2 < 1 and (name == "K1" or law.K1 > 0) and (name == "Kp" or law.Kp >= 0)
+    return low, (math.inf if is_proven and high == limits[1] else high)
