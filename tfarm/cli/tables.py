@@ -32,7 +32,7 @@ def print_modes(answer: dict[str, Any]) -> None:
     """The modal table; with damping, each eigenvalue beside its undamped frequency."""
     is_damped = "box" in answer
     last = ("eigenvalue [1/s]", "damping ratio") if is_damped else ("nodes [m]",)
-    table = _table(("mode", "rad/s", "Hz", "hub participation b", "modal moment [N m]", *last))
+    table = new_table(("mode", "rad/s", "Hz", "hub participation b", "modal moment [N m]", *last))
     for mode in answer["modes"]:
         frequency = mode["natural_frequency_rad_s"]
         table.add_row(
@@ -43,7 +43,7 @@ def print_modes(answer: dict[str, Any]) -> None:
             f"{mode['modal_moment']:.6g}",
             *(_damping(mode) if is_damped else (" ".join(f"{x:.4f}" for x in mode["nodes_m"]) or "-",)),
         )
-    _show(table)
+    show(table)
     if "proof" in answer:
         proof = answer["proof"]
         print(f"proven: each frequency enclosed, and {proof['count']} in all below {proof['below_rad_s']} rad/s")
@@ -66,20 +66,20 @@ def _damping(mode: dict[str, Any]) -> tuple[str, str]:
 
 def print_response(answer: dict[str, Any]) -> None:
     """The values, one row a point."""
-    table = _table(("Re s [1/s]", "Im s [1/s]", f"Re {answer['output']} [{_unit(answer)}]", "Im"))
+    table = new_table(("Re s [1/s]", "Im s [1/s]", f"Re {answer['output']} [{_unit(answer)}]", "Im"))
     for point, value in zip(answer["s"], answer["value"], strict=True):
         table.add_row(*(f"{part:.12g}" for part in point), *(_text(part) for part in value))
-    _show(table)
+    show(table)
 
 
 def print_audit(answer: dict[str, Any]) -> None:
     """A row an equation: the verdict, and what it was and should be where the paper is corrected."""
     print(answer["paper"])
-    table = _table(("equation", "verdict", "residual as printed", "as corrected"))
+    table = new_table(("equation", "verdict", "residual as printed", "as corrected"))
     for row in answer["rows"]:
         residuals = (Text(str(row[name])[:60]) for name in ("residual_printed", "residual_corrected"))
         table.add_row(Text(row["equation"]), row["verdict"], *residuals)
-    _show(table)
+    show(table)
 
 
 def print_assumptions(answer: dict[str, Any]) -> None:
@@ -104,12 +104,12 @@ def print_assumptions(answer: dict[str, Any]) -> None:
 def _print_candidates(study: dict[str, Any], keys: tuple[str, ...], titles: tuple[str, ...], parameter: str) -> None:
     count = len(study["candidates"][0]["sensitivity"])
     modes = (title for i in range(1, count + 1) for title in (f"w{i} [rad/s]", f"%/% {parameter}"))
-    table = _table(("", *titles, *modes))
+    table = new_table(("", *titles, *modes))
     for row in study["candidates"]:
         pairs = zip(row["natural_frequency_rad_s"], row["sensitivity"], strict=True)
         numbers = (text for w, slope in pairs for text in (f"{w:.8g}", f"{slope:.4f}"))
         table.add_row("*" if row["is_own"] else "", *(f"{row[key]:.4g}" for key in keys), *numbers)
-    _show(table)
+    show(table)
 
 
 def print_validation(answer: dict[str, Any]) -> None:
@@ -124,12 +124,12 @@ def print_validation(answer: dict[str, Any]) -> None:
 
 def _print_printed_and_exact(rows: list[dict[str, Any]]) -> None:
     reasons = list(dict.fromkeys(row["why"] for row in rows if row["why"]))
-    table = _table(("case", "quantity", "mode", "printed", "exact", "difference", ""))
+    table = new_table(("case", "quantity", "mode", "printed", "exact", "difference", ""))
     for row in rows:
         mark = "" if row["agrees"] else f"[{reasons.index(row['why']) + 1}]"
         cells = (row["case"], row["quantity"], str(row["mode"]), row["printed"], f"{row['ours']:.10g}")
         table.add_row(*map(Text, cells), f"{row['difference']:+.1e}", Text(mark))
-    _show(table)
+    show(table)
     for number, reason in enumerate(reasons, start=1):
         print(f"[{number}] {reason}")
 
@@ -166,13 +166,13 @@ def _text(part: float | str) -> str:
     return part if isinstance(part, str) else f"{part:.12g}"
 
 
-def _table(columns: tuple[str, ...]) -> Table:
+def new_table(columns: tuple[str, ...]) -> Table:
     table = Table(box=None, pad_edge=False)
     for column in columns:
         table.add_column(Text(column), justify="right", no_wrap=True)
     return table
 
 
-def _show(table: Table) -> None:
+def show(table: Table) -> None:
     """Whole rows, whatever the width of the terminal."""
     Console(width=None if sys.stdout.isatty() else 10_000, soft_wrap=True).print(table)

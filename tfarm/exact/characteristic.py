@@ -85,13 +85,13 @@ def quick_characteristics(k: Coefficients, s: Complex, law: Real, at_zero: int =
     return Analytic(values[0], (up - down) / (2 * h), scale[0])
 
 
-def loop_parts(k: Coefficients, s: Complex) -> tuple[Complex, Complex, Complex, Complex]:
+def loop_parts(k: Coefficients, s: NDArray[Any]) -> tuple[Complex, Complex, Complex, Complex]:
     """Drive, theta and M0/(1 + C s) of the free response times e^{-scale}, and scale, for s of any shape.
 
     What a law makes of them is linear: D = drive + (Kp + K1 s) theta + K2 M0/(1 + C s), without dimensions.
     """
     parts = np.empty((4, s.size), complex)
-    fill_loop_parts(np.ascontiguousarray(s).ravel(), k.kernel, parts)
+    fill_loop_parts(np.ascontiguousarray(s, dtype=complex).ravel(), k.kernel, parts)
     drive, theta, moment, scale = parts.reshape(4, *s.shape)
     return drive, theta, moment, scale
 

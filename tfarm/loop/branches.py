@@ -7,7 +7,7 @@ stay with the zeros: a branch is a zero followed, not a pair.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -18,7 +18,7 @@ from tfarm.arm import Arm, HubFeedback
 from tfarm.errors import ConvergenceError
 from tfarm.spectrum import modes
 from tfarm.spectrum.continuation import Node, corrected, follow, through
-from tfarm.spectrum.damped import COMPANY, damped_modes
+from tfarm.spectrum.damped import COMPANY
 
 from .plant import Loop, effective_inertia
 from .variation import Complex, Real, Variation, member_of
@@ -35,6 +35,7 @@ class Segment:
 
     nodes: list[Node]
     slots: NDArray[np.int64]
+    pinned: bool = False  # whether the first of the zeros is 0 all the way
 
     def guess(self, values: Real) -> Complex:
         """The pairs (values, n, 2), by cubics through the four nodes around each value, in the order of `ordered`."""
@@ -45,7 +46,7 @@ class Segment:
         for n in np.unique(which):
             low = max(0, min(int(n) - 1, at.size - 4))
             guess[which == n] = through(self.nodes[low : low + 4], values[which == n])
-        return ordered(guess)
+        return ordered(guess, self.pinned)
 
 
 @dataclass(frozen=True)
@@ -68,20 +69,30 @@ class Stage:
         ends = (self.start, (self.start + self.stop) / 2, self.stop)
         return self.at(self.start).arm.has_rigid_mode and any(self.turns(value) for value in ends)
 
-    def follow(self, zeros: Complex, wanted: int) -> list[Node]:
-        """All nodes; `zeros` (n, 2) at `start` hold the rigid body's pair first where it moves and already has."""
+    def follow(self, zeros: Complex, wanted: int, first: float = FIRST) -> list[Node]:
+        """All nodes; `zeros` (n, 2) at `start` hold the rigid body's pair first where it moves and already has.
+
+        `first` is the first step, as a share of the way.
+        """
         family, start, stop, way = self._member, Node(self.start, zeros), self.stop, self.stop - self.start
         if self.moves and not self.turns(self.start):
             start = self._parted(zeros)
         soft = self.moves and not self.turns(stop)
         if soft:
             stop = stop - SOFT * way
-        nodes = follow(family, start, stop, FIRST * way, wanted)
+        nodes = follow(family, start, stop, first * way, wanted)
         return [*nodes, self._met(nodes[-1])] if soft else nodes
 
+    @property
+    def at_zero(self) -> int:
+        """How many zeros are at s = 0 all the way: of one zero, followed, the partner, of two none is followed."""
+        if not self.at(self.start).arm.has_rigid_mode:
+            return 0
+        ends = (self.start, (self.start + self.stop) / 2, self.stop)
+        return 2 if not self.moves else 0 if any(self.at(value).law.Kp for value in ends) else 1
+
     def _member(self, value: float) -> Any:
-        loop = self.at(value)
-        return member_of(loop, 0 if self.moves or not loop.arm.has_rigid_mode else 2, self.free)
+        return member_of(self.at(value), self.at_zero, self.free)
 
     def _parted(self, zeros: Complex) -> Node:
         """The first node after the start, where the rigid body's zeros are those of J_eff s^2 + K1 s + Kp."""
@@ -122,28 +133,31 @@ def followed(variation: Variation, start: float, stop: float, wanted: int) -> tu
     raise lost
 
 
-def _followed(
-    variation: Variation, start: float, stop: float, wanted: int, number: int
-) -> tuple[list[Segment], float]:
+def _followed(variation: Variation, start: float, stop: float, wanted: int, number: int) -> tuple[list[Segment], float]:
     first = variation.at(start)
-    zeros, lowest = open_pairs(first.arm, number)
+    zeros, lowest = open_pairs(first.arm, number, wanted)
     free = FREE * lowest
     law = first.law
     if law.K1 or law.K2 or law.Kp:
         scaled = Stage(lambda scale: Loop(first.arm, _scaled(law, scale)), 0.0, 1.0, free)
         zeros = scaled.follow(zeros, wanted)[-1].zeros
     stage = Stage(variation.at, start, stop, free)
-    return segments(stage.follow(zeros, wanted)), lowest
+    return segments(stage.follow(zeros, wanted), stage.at_zero == 1), lowest
 
 
-def open_pairs(arm: Arm, number: int) -> tuple[Complex, float]:
-    """Pairs of the flexible modes of the arm without feedback, (number, 2), and the lowest frequency [rad/s]."""
-    table = modes(arm, number)
-    flexible = table.index > 0
-    omega = table.natural_frequency[flexible]
-    if arm.link.damping == 0:
-        return np.stack([1j * omega, -1j * omega], axis=1), float(omega[0])
-    return damped_modes(table).eigenvalues[flexible], float(omega[0])
+def open_pairs(arm: Arm, number: int, wanted: int) -> tuple[Complex, float]:
+    """Pairs of the first flexible modes of the arm without feedback, (n, 2), and the lowest frequency [rad/s].
+
+    Of the `number` of modes followed from C = 0 to the arm's own C the first `wanted` are sure to arrive.
+    """
+    undamped, C = replace(arm, link=replace(arm.link, damping=0.0)), arm.link.damping
+    table = modes(undamped, number)
+    omega = table.natural_frequency[table.index > 0]
+    zeros, lowest = np.stack([1j * omega, -1j * omega], axis=1), float(omega[0])
+    if C == 0:
+        return zeros, lowest
+    stage = Stage(Variation(arm, HubFeedback(), "damping").at, 0.0, C, FREE * lowest)
+    return stage.follow(zeros, wanted, min(1.0, FIRST / (omega[-1] * C)))[-1].zeros, lowest
 
 
 def rigid_pair(loop: Loop) -> Complex:
@@ -156,22 +170,21 @@ def rigid_pair(loop: Loop) -> Complex:
     return np.array([near, far] if root.real else [far, near], complex)
 
 
-def segments(nodes: list[Node]) -> list[Segment]:
+def segments(nodes: list[Node], pinned: bool = False) -> list[Segment]:
     """The nodes cut where zeros were paired anew, with the branches handed on from zero to zero."""
     slots = np.arange(nodes[0].zeros.size).reshape(-1, 2)
     cut: list[Segment] = []
     kept = [nodes[0]]
     for before, after in pairwise(nodes):
         if after.at == before.at:
-            cut.append(Segment(kept, slots))
-            slots, kept = _handed_on(before.zeros, after.zeros, slots), []
+            cut.append(Segment(kept, slots, pinned))
+            slots, kept = _handed_on(ordered(before.zeros, pinned), ordered(after.zeros, pinned), slots), []
         kept.append(after)
-    return [*cut, Segment(kept, slots)]
+    return [*cut, Segment(kept, slots, pinned)]
 
 
-def _handed_on(before: Complex, after: Complex, slots: NDArray[np.int64]) -> NDArray[np.int64]:
+def _handed_on(old: Complex, new: Complex, slots: NDArray[np.int64]) -> NDArray[np.int64]:
     """The branch of each zero after a new pairing: that of the same zero before it, or a new number."""
-    old, new = ordered(before), ordered(after)
     handed = slots[: len(new)].copy()
     fresh = int(slots.max()) + 1
     for i in np.nonzero((old[: len(new)] != new).any(axis=1))[0]:
@@ -182,10 +195,15 @@ def _handed_on(before: Complex, after: Complex, slots: NDArray[np.int64]) -> NDA
     return handed
 
 
-def ordered(zeros: Complex) -> Complex:
-    """The pairs with Im > 0 first, or the larger of two real ones: an order that holds while a pair stays one."""
+def ordered(zeros: Complex, pinned: bool = False) -> Complex:
+    """The pairs with Im > 0 first, or the larger of two real ones: an order that holds while a pair stays one.
+
+    `pinned`: the first pair keeps its order.
+    """
     first, second = zeros[..., 0], zeros[..., 1]
     swap = np.where((first.imag != 0) | (second.imag != 0), first.imag < second.imag, first.real < second.real)
+    if pinned:
+        swap[..., 0] = False
     return np.where(swap[..., None], zeros[..., ::-1], zeros)
 
 

@@ -1,12 +1,13 @@
-"""Where to look along the imaginary axis, and how far up: the frequencies at which a loop function is steep, and its band.
+"""Where to look along the imaginary axis, and how far up: the frequencies at which a loop function is steep.
 
-Along s = i w the loop function is steep at the arm's natural frequencies, at those with the hub locked (zeros of the hub
-angle) and with the hub free of inertia (zeros of the root moment); at small C these features are as narrow as C w^2.  So a grid
-has points at geometric distances around each.
+Along s = i w the loop function is steep at the arm's natural frequencies, at those with the hub locked (zeros of the
+hub angle) and with the hub free of inertia (zeros of the root moment); at small C these features are as narrow as C
+w^2. So a grid has points at geometric distances around each.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 from functools import lru_cache
@@ -36,7 +37,7 @@ def natural_frequencies(arm: Arm, up_to: float) -> Real:
 
 @lru_cache(maxsize=64)
 def steep_places(arm: Arm, up_to: float) -> Any:
-    """Natural frequencies of the arm with its own hub, with the hub locked and with none, ascending, as a read-only array."""
+    """Natural frequencies [rad/s] with the arm's own hub, with a locked one and with none, ascending; read-only."""
     others = (arm, replace(arm, hub=Hub(inertia=math.inf)), replace(arm, hub=Hub(inertia=0.0)))
     places = np.unique(np.concatenate([natural_frequencies(each, up_to) for each in others]))
     places.flags.writeable = False
@@ -45,13 +46,13 @@ def steep_places(arm: Arm, up_to: float) -> Any:
 
 @lru_cache(maxsize=64)
 def grid(arm: Arm, up_to: float) -> Any:
-    """Frequencies [rad/s] from a millionth of the first natural one to `up_to`, dense around steep places; read-only."""
+    """Frequencies [rad/s] from a millionth of the first natural one to `up_to`, dense at steep places; read-only."""
     places = np.asarray(steep_places(arm, 1.05 * up_to))
     lowest = 1e-6 * min(up_to, places[0] if places.size else up_to)
     away = np.geomspace(NARROWEST, WIDEST, AROUND)
     close = (places[:, None] * (1 + np.r_[-away[::-1], away])).ravel()
     corners = np.r_[lowest, places[places < up_to], up_to]
-    between = np.concatenate([np.linspace(a, b, BETWEEN, endpoint=False) for a, b in zip(corners, corners[1:], strict=False)])
+    between = np.concatenate([np.linspace(a, b, BETWEEN, endpoint=False) for a, b in itertools.pairwise(corners)])
     slow = np.geomspace(lowest, corners[1], 60)
     omega = np.unique(np.concatenate([close, between, slow]))
     omega = np.append(omega[(omega >= lowest) & (omega < up_to)], up_to)

@@ -1,9 +1,10 @@
 """Where poles cross the imaginary axis along a line of gains: solved, for all windows at once (D-decomposition).
 
-Along gains g0 + t g1 the characteristic function is N(s) + t P(s), linear in t.  A pole lies at i w where t(w) = -N/P is
-real, that is at the zeros of h(w) = Im(N P*), a real function of one variable.  As t grows, the pair of poles there
-goes right if Im t(w) grows with w, and left if it falls (differentiate N + t P = 0).  A real pole crosses at s = 0, where t(s) for
-real s has a finite limit, and goes right if t(s) grows with s.  (Neimark 1948; Gryazina, Polyak and Tremba 2008.)
+Along gains g0 + t g1 the characteristic function is N(s) + t P(s), linear in t.  A pole lies at i w where t(w) = -N/P
+is real, that is at the zeros of h(w) = Im(N P*), a real function of one variable.  As t grows, the pair of poles there
+goes right if Im t(w) grows with w, and left if it falls (differentiate N + t P = 0).  A real pole crosses at s = 0,
+where t(s) for real s has a finite limit, and goes right if t(s) grows with s.  (Neimark 1948; Gryazina, Polyak and
+Tremba 2008.)
 
 At C = 0 h vanishes identically along K2: there is no curve, only the line K2 = 1; `margins` knows that case.
 """
@@ -31,7 +32,7 @@ BISECTIONS = 60
 
 @dataclass(frozen=True, slots=True)
 class Crossing:
-    """Poles on the axis: at t along the line, at +-i omega (one at 0), `change` more unstable poles as t grows through."""
+    """Poles on the axis at t along the line: +-i omega (one at 0), `change` more of them unstable for greater t."""
 
     t: float
     omega: float
@@ -78,7 +79,7 @@ def _h(k: Coefficients, line: Line, omega: Real) -> Real:
     return np.asarray((N * P.conj()).imag)
 
 
-def _parts(k: Coefficients, line: Line, s: Complex) -> tuple[Complex, Complex]:
+def _parts(k: Coefficients, line: Line, s: NDArray[Any]) -> tuple[Complex, Complex]:
     """N and P at s, up to one common positive factor."""
     drive, theta, moment, _ = loop_parts(k, s)
     base, way = (Gains.of(k, law.K1, law.K2, law.Kp) for law in (line.base, line.direction))
@@ -100,7 +101,7 @@ def _bisected(k: Coefficients, line: Line, low: Real, high: Real) -> Real:
 def crossing_at_zero(arm: Arm, line: Line) -> Crossing | None:
     """A real pole through s = 0, where t(s) has a limit there: found from two small s."""
     small = 1e-9 * float(modes(arm, 1).natural_frequency[-1])
-    N, P = _parts(coefficients(arm), line, small * np.array([1.0, 0.5], dtype=complex))
+    N, P = _parts(coefficients(arm), line, small * np.array([1 + 0j, 0.5]))
     if not P.all():
         return None
     far, near = -(N / P).real

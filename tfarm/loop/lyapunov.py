@@ -175,7 +175,9 @@ def energy_along(arm: Arm, law: HubFeedback, duration: float, points: int = 501,
     dissipated = np.r_[0.0, np.cumsum(_form(loss, x[:-1]))]
     defect = float(abs(V + dissipated - V[0]).max() / max(abs(V).max(), size.max()))
     theta_t: Real = x @ rate
-    return EnergyBalance(np.linspace(0.0, duration, points), theta_t, V, -law.K1 * theta_t**2, dissipated, defect, modes)
+    return EnergyBalance(
+        np.linspace(0.0, duration, points), theta_t, V, -law.K1 * theta_t**2, dissipated, defect, modes
+    )
 
 
 def _closed_modal_model(loop: Loop, modes: int) -> tuple[Real, Real, Real, Real, Real]:

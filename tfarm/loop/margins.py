@@ -1,11 +1,11 @@
 """Gain, phase, delay and disk margin of the exact loop function L(i w), and never without the verdict.
 
-A gain margin of an unstable loop is a number that means nothing.  At C = 0 the loop function has poles on the axis at ever
-higher frequency, so that any delay, however short, destabilises some mode: the exact delay and disk margins are 0 and
-the peak sensitivity is infinite; what the loop has up to a band is given beside them, with the band.
+A gain margin of an unstable loop is a number that means nothing.  At C = 0 the loop function has poles on the axis at
+ever higher frequency, so that any delay, however short, destabilises some mode: the exact delay and disk margins are 0
+and the peak sensitivity is infinite; what the loop has up to a band is given beside them, with the band.
 
-Disk margin: the largest alpha for which the loop bears every factor (2 + alpha d)/(2 - alpha d), |d| < 1 (Seiler, Packard and
-Gahinet 2020, symmetric disks), which is 2 min |(1 + L)/(1 - L)|.
+Disk margin: the largest alpha for which the loop bears every factor (2 + alpha d)/(2 - alpha d), |d| < 1 (Seiler,
+Packard and Gahinet 2020, symmetric disks), which is 2 min |(1 + L)/(1 - L)|.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ LOWEST = 6  # local minima on the grid that are refined
 class LoopMargins:
     """Margins of L(i w) for 0 < w <= `band` [rad/s]; inf where nothing limits.
 
-    `gain` (lowest, highest factor), `phase` [deg], `delay` [s], `disk` [-], `peak_sensitivity` [-]; `at` are the frequencies
-    [rad/s] where phase, delay, disk margin and peak sensitivity occur.
+    `gain` (lowest, highest factor), `phase` [deg], `delay` [s], `disk` [-], `peak_sensitivity` [-]; `at` are the
+    frequencies [rad/s] where phase, delay, disk margin and peak sensitivity occur.
     """
 
     band: float
@@ -50,8 +50,8 @@ class LoopMargins:
 
 @dataclass(frozen=True)
 class Margins:
-    """The verdict first.  `in_band` are the margins up to its band; `exact_delay`, `exact_disk` and `exact_peak` those of
-    the whole infinite-dimensional loop.  All four are None unless the loop is stable.
+    """The verdict first.  `in_band` are the margins up to its band; `exact_delay`, `exact_disk` and `exact_peak` those
+    of the whole infinite-dimensional loop.  All four are None unless the loop is stable.
     """
 
     stability: Stability
@@ -81,7 +81,7 @@ def loop_margins(verdict: Stability) -> LoopMargins:
     crossed = unit_crossings(loop, omega)
     angle = np.angle(-loop.loop_function(1j * crossed))  # 0 where L = -1
     lag = np.mod(angle, 2 * math.pi)
-    phase, at_phase = _least(abs(angle) * 180 / math.pi, crossed)
+    phase, at_phase = _least(np.asarray(abs(angle) * 180 / math.pi), crossed)
     delay, at_delay = _least(lag / np.where(crossed == 0, 1, crossed), crossed)
 
     def disk_of(w: Real) -> Real:
@@ -130,7 +130,9 @@ def lowest(f: Callable[[Real], Real], omega: Real) -> tuple[float, float]:
     best = int(np.argmin(values))
     least, at = float(values[best]), float(omega[best])
     for i in dips[np.argsort(values[dips])][:LOWEST]:
-        found = minimize_scalar(lambda w: float(f(np.array([w]))[0]), bounds=(omega[i - 1], omega[i + 1]), method="bounded")
+        found = minimize_scalar(
+            lambda w: float(f(np.array([w]))[0]), bounds=(omega[i - 1], omega[i + 1]), method="bounded"
+        )
         if found.fun < least:
             least, at = float(found.fun), float(found.x)
     return least, at

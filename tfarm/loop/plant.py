@@ -54,7 +54,7 @@ class Loop:
         """The closed loop's characteristic function, its zeros at the origin divided out."""
         return member(self.k, self.gains)
 
-    def loop_function(self, s: Complex) -> Complex:
+    def loop_function(self, s: NDArray[Any]) -> Complex:
         """L(s) = Kp G_theta + K1 s G_theta + K2 G_moment, so that closed-loop poles are the zeros of 1 + L."""
         drive, theta, moment, _ = loop_parts(self.k, np.asarray(s, dtype=complex))
         Kp, K1, K2 = float(self.gains.Kp), float(self.gains.K1), float(self.gains.K2)

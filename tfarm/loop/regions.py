@@ -1,9 +1,9 @@
 """The (K1, K2) plane: the exact stability boundary, and how many unstable poles each point of a grid has.
 
 D-decomposition (Neimark 1948): at s = i w the characteristic function is linear in both gains, two real equations, so
-each frequency has one point (K1, K2) with poles there: a curve.  Together with K1 = 0, where a real pole passes 0, these
-curves bound regions of a constant number of unstable poles.  On a grid this number follows, column by column (one K1 each),
-from the crossings along K2 and from one count, so nothing is interpolated or missed between grid points.
+each frequency has one point (K1, K2) with poles there: a curve.  Together with K1 = 0, where a real pole passes 0,
+these curves bound regions of a constant number of unstable poles.  On a grid this number follows, column by column
+(one K1 each), from the crossings along K2 and from one count, so nothing is interpolated or missed between grid points.
 
 At C = 0 the curves collapse onto the lines K1 = 0 and K2 = 1, and beyond them every flexible mode is unstable.
 """
@@ -34,8 +34,8 @@ MOST = 2000  # grid points along one gain
 class Region:
     """Unstable poles over a grid: `unstable` (len(K2), len(K1)), -1 where they are infinitely many.
 
-    `boundary` (n, 3) holds K1, K2 and w [rad/s] of the D-decomposition curve; empty at C = 0.  `band` [rad/s] is how far up
-    crossings were looked for.
+    `boundary` (n, 3) holds K1, K2 and w [rad/s] of the D-decomposition curve; empty at C = 0.  `band` [rad/s] is how
+    far up crossings were looked for.
     """
 
     arm: Arm
@@ -55,8 +55,8 @@ class Region:
 def region(arm: Arm, K1: Real, K2: Real, Kp: float = 0.0) -> Region:
     """The map over the grid of K1 and K2 (1-D, ascending).
 
-    A grid line exactly on K1 = 0 or K2 = 1 at C = 0 is marginal and counts as unstable.  Raises ParameterError where there
-    is no loop or the grid is empty.
+    A grid line exactly on K1 = 0 or K2 = 1 at C = 0 is marginal and counts as unstable.  Raises ParameterError where
+    there is no loop or the grid is empty.
     """
     K1, K2 = _axis("K1", K1), _axis("K2", K2)
     Loop(arm, HubFeedback(K1=float(K1[-1]), K2=float(K2[-1]), Kp=Kp))
@@ -71,16 +71,23 @@ def region(arm: Arm, K1: Real, K2: Real, Kp: float = 0.0) -> Region:
     unstable = np.repeat(base[None, :], K2.size, axis=0)
     for n, t, step in zip(column, at, change, strict=True):
         if t > 0:
-            unstable[K2 > t, n] += step
+            unstable[t < K2, n] += step
         else:
-            unstable[K2 < t, n] -= step
+            unstable[t > K2, n] -= step
     return Region(arm, Kp, K1, K2, unstable, boundary(arm, omega, Kp), band)
+
+
+def between(low: float, high: float, number: int) -> Real:
+    """So many gains from low to high, the middles of equal parts: none of them on a line K1 = 0 unless by chance."""
+    return np.asarray(low + (high - low) * (np.arange(number) + 0.5) / number)
 
 
 def _axis(name: str, values: Real) -> Real:
     values = np.atleast_1d(np.asarray(values, dtype=float))
     if not (2 <= values.size <= MOST and np.isfinite(values).all() and (np.diff(values) > 0).all()):
-        raise ParameterError(key=name, value=f"{values.size} values", remedy=f"an ascending range of 2 to {MOST} values")
+        raise ParameterError(
+            key=name, value=f"{values.size} values", remedy=f"an ascending range of 2 to {MOST} values"
+        )
     return values
 
 
@@ -90,11 +97,13 @@ def _counts_without_K2(arm: Arm, K1: Real, Kp: float, band: float) -> NDArray[np
     counts = np.full(K1.size, stability(arm, law).unstable_roots)
     for each in crossings(arm, along("K1", law), band):
         if each.t < K1[-1]:
-            counts[K1 < each.t] -= each.change
+            counts[each.t > K1] -= each.change
     return counts
 
 
-def _crossings_along_K2(arm: Arm, K1: Real, Kp: float, omega: Real) -> tuple[NDArray[np.int64], Real, NDArray[np.int64]]:
+def _crossings_along_K2(
+    arm: Arm, K1: Real, Kp: float, omega: Real
+) -> tuple[NDArray[np.int64], Real, NDArray[np.int64]]:
     """Of every crossing: its column, its K2, and how many more poles are unstable above it."""
     gains = Gains.of(coefficients(arm), 1.0, 0.0, Kp)
     A, B = _h(arm, omega, gains)

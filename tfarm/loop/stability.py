@@ -2,11 +2,11 @@
 
 Poles are computed, completely, up to a band; what lies beyond is
 
-* at C = 0 a theorem: with K1 > 0 every flexible mode is damped if K2 < 1 and driven if K2 > 1, and K2 = 1 leaves the modes
-  of the locked hub alone (`lyapunov`), so a few modes tell the rest;
-* at C > 0 bounded: from the band on |L(i w)| stays below one half, and falls (the hub's inertia against ever more heavily
-  damped bending), so that 1 + L has no zero there, nor further right.  Where the band of that would hold more modes than
-  `MOST_MODES` it is cut, and the verdict says so.
+* at C = 0 a theorem: with K1 > 0 every flexible mode is damped if K2 < 1 and driven if K2 > 1, and K2 = 1 leaves the
+  modes of the locked hub alone (`lyapunov`), so a few modes tell the rest;
+* at C > 0 bounded: from the band on |L(i w)| stays below one half, and falls (the hub's inertia against ever more
+  heavily damped bending), so that 1 + L has no zero there, nor further right.  Where the band of that would hold more
+  modes than `MOST_MODES` it is cut, and the verdict says so.
 
 A pole at 0 remains where Kp = 0, whatever K1 and K2: verdicts are apart from it.
 """

@@ -53,7 +53,7 @@ class Variation:
             return Loop(arm, HubFeedback(K1=value * law.K1, K2=value * law.K2, Kp=value * law.Kp))
         if self.is_of_gains:
             return Loop(arm, replace(law, **{self.vary: value}))
-        room, _, name = f"link_{self.vary}".partition("_") if self.vary in ("length", "damping") else self.vary.partition("_")
+        room, name = ("link", self.vary) if self.vary in ("length", "damping") else self.vary.split("_")
         return Loop(replace(arm, **{room: replace(getattr(arm, room), **{name: value})}), law)
 
     @cached_property
@@ -94,10 +94,17 @@ class Evaluator:
 
 
 def member_of(loop: Loop, at_zero: int, free: float) -> Member:
-    """The characteristic function of one loop, to be followed."""
+    """The characteristic function D/s^at_zero of one loop, to be followed; exact zeros at s = 0 may be among the points."""
     k, law = loop.k, dimensionless(loop)
     singular = -1.0 / k.damping if k.damping else -math.inf
-    return Member(lambda s: quick_characteristics(k, s, law, at_zero), singular, free)
+
+    def function(s: Complex) -> Analytic:
+        value, slope, scale = quick_characteristics(k, s, law, at_zero)
+        if at_zero:
+            value, slope = np.where(s == 0, 0.0, value), np.where(s == 0, 1.0, slope)
+        return Analytic(value, slope, scale)
+
+    return Member(function, singular, free)
 
 
 def dimensionless(loop: Loop) -> Real:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, replace
 
@@ -47,7 +48,7 @@ def gain_windows(verdict: Stability, name: str) -> Windows:
         band = max(verdict.band, *(loop_band(end)[0] for end in ends))
         found = tuple(each for each in crossings(loop.arm, along(name, law), band) if low < each.t < high)
     edges = [low, *sorted({each.t for each in found}), high]
-    pairs = list(zip(edges, edges[1:], strict=False))
+    pairs = list(itertools.pairwise(edges))
     stable = [pair for pair, count in zip(pairs, _counts(verdict, name, pairs, found), strict=True) if count == 0]
     stable = [_with_proven_ends(loop, name, pair, (low, high)) for pair in stable]
     at_edge = name == "Kp" and value == 0  # there the pole at 0 is, apart from which the verdict is
@@ -71,7 +72,7 @@ def with_gain(law: HubFeedback, name: str, value: float) -> HubFeedback:
 
 
 def _undamped(loop: Loop, name: str) -> tuple[Crossing, ...]:
-    """At C = 0: every mode at once at K2 = 1 and at K1 = 0; a real pole at 0 where stiffness or inertia vanishes there."""
+    """At C = 0: every mode at once at K2 = 1 and K1 = 0; a real pole at 0 where stiffness or inertia vanishes."""
     static = crossing_at_zero(loop.arm, along(name, loop.law))
     found = [] if static is None else [static]
     if name == "K2":
@@ -100,7 +101,7 @@ def _counts(verdict: Stability, name: str, pairs: list[Interval], found: tuple[C
 
 
 def holds_undamped(loop: Loop, law: HubFeedback) -> bool:
-    """Whether the law leaves no pole right of the axis at C = 0: K1 > 0, K2 < 1 (Lyapunov), and nothing falls statically."""
+    """Whether no pole is right of the axis at C = 0: K1 > 0, K2 < 1 (Lyapunov), and nothing falls statically."""
     if not (law.K1 > 0 and law.K2 < 1):
         return False
     small = np.array([1e-9 * float(modes(loop.arm, 1).natural_frequency[-1])], dtype=complex)

@@ -1,0 +1,114 @@
+"""The verbs of the continuous loop: poles, margins, map and design."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from tfarm.cli.app import ArmName, Json, app, load_arm, whole
+from tfarm.errors import ParameterError
+
+K1 = Annotated[float, typer.Option("--K1", help="gain on the hub rate [N m s/rad]")]
+K2 = Annotated[float, typer.Option("--K2", help="gain on the root moment [-]; u = ... - K2 E I phi'(0)")]
+Kp = Annotated[float, typer.Option("--Kp", help="gain on the hub angle [N m/rad]")]
+
+
+@app.command()
+def poles(
+    arm: ArmName,
+    k1: K1 = 0.3,
+    k2: K2 = 0.3,
+    kp: Kp = 0.0,
+    count: Annotated[str, typer.Option("--count", metavar="N", help="poles with Im s >= 0, 1 to 1000")] = "10",
+    certify: Annotated[bool, typer.Option("--certify", help="prove each, and that none is missing")] = False,
+    json: Json = False,
+) -> None:
+    """Closed-loop poles of the exact arm, complete in a printed box."""
+    number, subject = whole("--count", count, 1, 1000), load_arm(arm)
+    from tfarm.arm import HubFeedback
+    from tfarm.loop.answers import poles_answer
+    from tfarm.loop.poles import closed_loop_poles
+
+    answer = poles_answer(closed_loop_poles(subject, HubFeedback(K1=k1, K2=k2, Kp=kp), number), certify)
+    _print(answer, json, "print_poles")
+
+
+@app.command()
+def margins(arm: ArmName, k1: K1 = 0.3, k2: K2 = 0.3, kp: Kp = 0.0, json: Json = False) -> None:
+    """The verdict on a loop, the windows of each gain, and the margins of the exact loop function."""
+    subject = load_arm(arm)
+    from tfarm.arm import HubFeedback
+    from tfarm.loop.answers import margins_answer
+    from tfarm.loop.margins import margins as find_margins
+
+    _print(margins_answer(find_margins(subject, HubFeedback(K1=k1, K2=k2, Kp=kp))), json, "print_margins")
+
+
+@app.command("map")
+def gain_map(
+    arm: ArmName,
+    k1: Annotated[str, typer.Option("--K1", metavar="LO,HI", help="range of K1")] = "-1,3",
+    k2: Annotated[str, typer.Option("--K2", metavar="LO,HI", help="range of K2")] = "-2,2",
+    kp: Kp = 0.0,
+    points: Annotated[str, typer.Option("--points", help="grid points along each gain")] = "101",
+    csv: Annotated[Path | None, typer.Option("--csv", help="write K1, K2 and the count to this file")] = None,
+    json: Json = False,
+) -> None:
+    """How many poles are unstable over the plane of K1 and K2, and the exact boundary."""
+    number, subject = whole("--points", points, 2, 2000), load_arm(arm)
+    ranges = [bounds(key, text) for key, text in (("--K1", k1), ("--K2", k2))]
+    from tfarm.loop.answers import map_answer
+    from tfarm.loop.regions import between, region
+
+    found = region(subject, between(*ranges[0], number), between(*ranges[1], number), kp)
+    if csv is not None:
+        from tfarm.cli.control_tables import write_map
+
+        write_map(map_answer(found), csv)
+    if json or csv is None:
+        _print(map_answer(found), json, "print_map")
+
+
+@app.command()
+def design(
+    arm: ArmName,
+    objective: Annotated[str, typer.Option("--objective", help="damping, margin or residual")] = "damping",
+    k1: Annotated[str | None, typer.Option("--K1", metavar="LO,HI", help="bounds of K1")] = None,
+    k2: Annotated[str | None, typer.Option("--K2", metavar="LO,HI", help="bounds of K2")] = None,
+    kp: Kp = 0.0,
+    modes: Annotated[str, typer.Option("--modes", help="flexible modes in the band, 1 to 30")] = "2",
+    json: Json = False,
+) -> None:
+    """The gains that serve an objective best, by the exact loop."""
+    number, subject = whole("--modes", modes, 1, 30), load_arm(arm)
+    limits = {name: None if text is None else bounds(f"--{name}", text) for name, text in (("K1", k1), ("K2", k2))}
+    from tfarm.loop.answers import design_answer
+    from tfarm.loop.design import design as find_gains
+
+    found = find_gains(subject, objective, Kp=kp, modes=number, **limits)  # type: ignore[arg-type]
+    _print(design_answer(found), json, "print_design")
+
+
+def bounds(key: str, text: str) -> tuple[float, float]:
+    """Two numbers separated by a comma, the lower first."""
+    remedy = "two numbers, the lower first, such as -1,3"
+    try:
+        low, high = (float(part) for part in text.split(","))
+    except ValueError:
+        raise ParameterError(key=key, value=text, remedy=remedy) from None
+    if not low < high:
+        raise ParameterError(key=key, value=text, remedy=remedy)
+    return low, high
+
+
+def _print(answer: dict[str, Any], json: bool, printer: str) -> None:
+    if json:
+        from tfarm.cli.answers import to_json
+
+        print(to_json(answer))
+    else:
+        from tfarm.cli import control_tables
+
+        getattr(control_tables, printer)(answer)

@@ -1,0 +1,91 @@
+"""What the verbs of the continuous loop print for a person."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+from typing import Any
+
+from tfarm.cli.tables import new_table, show
+from tfarm.files import write_file
+
+
+def print_poles(answer: dict[str, Any]) -> None:
+    """A row a pole, then the box."""
+    rows = new_table(("Re s [1/s]", "Im s [rad/s]", "damping ratio"))
+    for re, im in answer["poles"]:
+        size = (re * re + im * im) ** 0.5
+        rows.add_row(f"{re:.12g}", f"{im:.12g}", f"{-re / size:.6g}" if im else "-")
+    show(rows)
+    left, right, _, top = answer["box"]
+    proven = "proven" if "discs" in answer else "by winding number"
+    print(f"all poles with {left:.6g} < Re s < {right:.6g} and |Im s| < {top:.6g} ({proven}),")
+    print(f"{answer['unstable']} of them unstable")
+    print(answer["sign_convention"])
+
+
+def print_margins(answer: dict[str, Any]) -> None:
+    """The verdict, then everything else."""
+    print(f"{answer['arm']}: {answer['verdict'].upper()} (apart from the pole at 0 that Kp = 0 leaves)")
+    more = " (infinitely many in all)" if answer["unstable_roots_infinite"] else ""
+    print(f"unstable poles up to {answer['band_rad_s']:.6g} rad/s: {answer['unstable_roots']}{more}")
+    print(answer["beyond_the_band"])
+    print(f"Lyapunov: {answer['lyapunov']['reason']}")
+    rows = new_table(("gain", "value", "stable around it", "all stable windows", "looked at"))
+    for name in ("K1", "K2", "Kp"):
+        around = answer[f"{name}_interval"]
+        windows = " ".join(_pair(pair) for pair in answer[f"{name}_windows"]) or "none"
+        shown = "-" if around is None else _pair(around)
+        rows.add_row(name, f"{answer[name]:g}", shown, windows, _pair(answer[f"{name}_looked_at"]))
+    show(rows)
+    if answer["in_band"] is not None:
+        _print_loop_margins(answer)
+    print(answer["sign_convention"])
+
+
+def _print_loop_margins(answer: dict[str, Any]) -> None:
+    band = answer["in_band"]
+    rows = new_table(("margin", "exact", f"up to {band['band_rad_s']:.6g} rad/s", "at [rad/s]"))
+    names = {"delay_margin_s": "delay", "disk_margin": "disk", "peak_sensitivity": "peak_sensitivity"}
+    rows.add_row("gain (factors)", _pair(answer["gain_margin"]), "", "")
+    rows.add_row("phase [deg]", "", f"{band['phase_margin_deg']:.6g}", f"{band['at_rad_s']['phase']:.6g}")
+    for key, at in names.items():
+        rows.add_row(key.replace("_", " "), f"{answer[key]:.6g}", f"{band[key]:.6g}", f"{band['at_rad_s'][at]:.6g}")
+    show(rows)
+
+
+def _pair(pair: Any) -> str:
+    return f"({pair[0]:.8g}, {pair[1]:.8g})"
+
+
+def print_map(answer: dict[str, Any]) -> None:
+    """The shares of the plane, and a coarse picture."""
+    counts = answer["unstable_roots"]
+    flat = [count for row in counts for count in row]
+    print(f"{answer['arm']}: {flat.count(0)} of {len(flat)} gain pairs are stable")
+    step = max(1, len(counts) // 24), max(1, len(counts[0]) // 60)
+    for K2, row in list(zip(answer["K2"], counts, strict=True))[:: -step[0]]:
+        print(f"{K2:9.3g} " + "".join("." if count == 0 else "#" for count in row[:: step[1]]))
+    print(f"K2 up, K1 from {answer['K1'][0]:g} to {answer['K1'][-1]:g} to the right; . stable, # unstable")
+    print(answer["sign_convention"])
+
+
+def print_design(answer: dict[str, Any]) -> None:
+    """The gains and what they reach."""
+    print(f"{answer['arm']}, objective {answer['objective']}, {answer['modes']} modes in the band: {answer['verdict']}")
+    print(f"K1 = {answer['K1']:.6g} N m s/rad, K2 = {answer['K2']:.6g}, Kp = {answer['Kp']:.6g}: {answer['value']:.6g}")
+    print(f"within one per cent of it: K1 {_pair(answer['flat_K1'])}, K2 {_pair(answer['flat_K2'])}")
+    if answer["at_bound"]:
+        print(f"at the bound of {' and '.join(answer['at_bound'])}: wider bounds may give more")
+    print(answer["sign_convention"])
+
+
+def write_map(answer: dict[str, Any], path: Path) -> None:
+    """K1, K2 and the number of unstable poles, one row a point."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(("K1", "K2", "unstable_roots"))
+    for K2, row in zip(answer["K2"], answer["unstable_roots"], strict=True):
+        writer.writerows((repr(K1), repr(K2), count) for K1, count in zip(answer["K1"], row, strict=True))
+    write_file(path, text.getvalue().encode(), key="--csv")

@@ -1,0 +1,113 @@
+"""The damping of a band's modes for many gains at once: eigenvalues of a modal model, made exact by Newton's method.
+
+The modal model only says where to start: each closed-loop eigenvalue is corrected on the transcendental characteristic
+function, all gains and modes together; where one did not settle near its start, all are found again in a box.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import Arm, HubFeedback
+from tfarm.exact.characteristic import Gains, quick_characteristics
+from tfarm.exact.coefficients import coefficients
+from tfarm.reduced import modal_model
+
+from .frequencies import band_of
+from .plant import Loop
+from .poles import poles_below
+
+Complex = NDArray[np.complexfloating[Any, Any]]
+Real = NDArray[np.float64]
+
+BEYOND = 5  # modes of the model above those of the band
+STEPS = 6  # of Newton's method: the start is right to a few digits, so the last ones change nothing
+SETTLED, NEAR = 1e-9, 0.05  # shares of |s|: of the last correction, and of the whole way from the start
+BLOCK = 4000  # gains at a time
+
+
+def band_poles(arm: Arm, K1: Real, K2: Real, Kp: Real, number: int) -> Complex:
+    """The poles [1/s] with 0 < Im s below half-way to mode number + 1: (gains, slots), nan where there are fewer.
+
+    K1, K2 and Kp are arrays of one length.  Real poles are not among them (see `poles`).
+    """
+    Loop(arm, HubFeedback(K1=float(K1[0]), K2=float(np.max(abs(K2))), Kp=float(Kp[0])))
+    top = band_of(arm, number)
+    parts = [slice(i, i + BLOCK) for i in range(0, K1.size, BLOCK)]
+    found = [_of_block(arm, K1[part], K2[part], Kp[part], number, top) for part in parts]
+    slots = max(part.shape[1] for part in found)
+    padded = [np.pad(part, ((0, 0), (0, slots - part.shape[1])), constant_values=np.nan) for part in found]
+    return np.concatenate(padded)
+
+
+def least_damping(arm: Arm, K1: Real, K2: Real, Kp: Real, number: int) -> Real:
+    """The damping ratio of the least damped oscillating pole of the band, for each law; negative if one is unstable."""
+    poles = band_poles(arm, K1, K2, Kp, number)
+    ratio = -poles.real / abs(poles)
+    ratio = np.where(np.isnan(ratio), 1.0, ratio)
+    return np.asarray(ratio.min(axis=1, initial=1.0))
+
+
+def _of_block(arm: Arm, K1: Real, K2: Real, Kp: Real, number: int, top: float) -> Complex:
+    starts = _eigenvalues(arm, K1, K2, Kp, number)
+    upper = (starts.imag > 1e-9 * abs(starts)) & (starts.imag < 1.2 * top)
+    order = np.argsort(~upper, axis=1, kind="stable")[:, : max(1, int(upper.sum(1).max()))]
+    s = np.where(np.take_along_axis(upper, order, 1), np.take_along_axis(starts, order, 1), np.nan)
+    polished, settled = _newton(arm, s, K1, K2, Kp)
+    inside = polished.imag < top
+    poles = np.where(inside, polished, np.nan)
+    distinct = _are_distinct(poles)
+    for n in np.nonzero(~(settled.all(1) & distinct))[0]:
+        exact = poles_below(Loop(arm, HubFeedback(K1=float(K1[n]), K2=float(K2[n]), Kp=float(Kp[n]))), top).values
+        exact = exact[(exact.imag > 0) & (exact.imag < top)]
+        if exact.size > poles.shape[1]:
+            poles = np.pad(poles, ((0, 0), (0, exact.size - poles.shape[1])), constant_values=np.nan)
+        poles[n] = np.nan
+        poles[n, : exact.size] = exact
+    return poles
+
+
+def _eigenvalues(arm: Arm, K1: Real, K2: Real, Kp: Real, number: int) -> Complex:
+    """Eigenvalues of the modal model under each law: (gains, states)."""
+    A, B, C, D = _model(arm, number + BEYOND)
+    rows = Kp[:, None] * C[0] + K1[:, None] * C[1] + K2[:, None] * C[2]
+    through = Kp * D[0, 0] + K1 * D[1, 0] + K2 * D[2, 0]
+    gain = rows / (1.0 + through)[:, None]
+    return np.linalg.eigvals(A[None] - B[None] * gain[:, None, :])
+
+
+@lru_cache(maxsize=16)
+def _model(arm: Arm, count: int) -> Any:
+    return modal_model(arm, ["hub_angle", "hub_rate", "root_moment"], count).matrices()
+
+
+def _newton(arm: Arm, starts: Complex, K1: Real, K2: Real, Kp: Real) -> tuple[Complex, NDArray[np.bool_]]:
+    """The exact poles next to the starts, and which settled there (nan where there is no start)."""
+    k = coefficients(arm)
+    unit = Gains.of(k, 1.0, 1.0, 1.0)
+    law = np.stack([float(unit.Kp) * Kp, float(unit.K1) * K1, K2])
+    rows, columns = np.nonzero(~np.isnan(starts))
+    s = starts[rows, columns]
+    begin, move = s.copy(), np.zeros_like(s)
+    for _ in range(STEPS):
+        at = quick_characteristics(k, s, law[:, rows])
+        with np.errstate(all="ignore"):  # a start that runs away has not settled
+            move = at.value / at.slope
+        move = np.where(np.isfinite(move), move, 0.1 * s)
+        s = s - np.where(abs(move) > 0.1 * abs(s), move * (0.1 * abs(s) / np.maximum(abs(move), 1e-300)), move)
+    polished, settled = np.full(starts.shape, np.nan, complex), np.ones(starts.shape, bool)
+    polished[rows, columns] = s
+    settled[rows, columns] = (abs(move) < SETTLED * abs(s)) & (abs(s - begin) < NEAR * abs(s))
+    return polished, settled
+
+
+def _are_distinct(poles: Complex) -> NDArray[np.bool_]:
+    """Of each row, whether no pole stands twice."""
+    apart = abs(poles[:, :, None] - poles[:, None, :]) / abs(poles[:, :, None])
+    apart[:, np.arange(poles.shape[1]), np.arange(poles.shape[1])] = np.nan
+    close = np.where(np.isnan(apart), 1.0, apart) < 1e-7
+    return np.asarray(~close.any(axis=(1, 2)))

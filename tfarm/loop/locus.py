@@ -1,0 +1,206 @@
+"""Root loci of the exact arm: branches that keep their identity, and where they cross the imaginary axis.
+
+The branches are followed from the modes of the open arm (`branches`), with few steps; between these they are guessed by
+cubics, and every zero at every value asked for is polished at once by Newton's method on the transcendental
+characteristic function.  A guess that moves too far, or lands on a neighbour, is followed again from the last node.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import Arm, HubFeedback
+from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.spectrum.continuation import corrected, follow
+
+from .branches import FREE, Segment, followed, ordered
+from .crossings import BranchCrossing, crossings
+from .variation import Complex, Evaluator, Real, Variation, member_of
+
+MOST_POINTS = 100_000
+MOST_BRANCHES = 200
+SHARE = 0.25  # how far a zero may be polished from its guess, in distances to the next branch
+SETTLED = 1e-10  # of its size: one step more is taken where Newton's method still moves a zero by this
+STEPS = 6
+
+
+@dataclass(frozen=True)
+class Locus:
+    """The closed-loop poles of an arm under a law, as one number varies.
+
+    `gain` (n,) are the values of what `vary` names; `branches` (b, n) [1/s] are zeros followed: those at s = 0, then
+    one a mode with Im s > 0, in the order of the modes they continue from (`mode` (b,), 0 for the rigid body).  The
+    mirror image of a branch is left out, unless the two meet on the real axis and part there: then it is a branch of
+    its own, with Im s < 0 where they are a pair.  `crossings` are those of the imaginary axis, ascending along the way.
+    """
+
+    arm: Arm
+    law: HubFeedback
+    vary: str
+    gain: Real
+    branches: Complex
+    mode: NDArray[np.int64]
+    crossings: tuple[BranchCrossing, ...]
+
+    @property
+    def variation(self) -> Variation:
+        """The family of loops."""
+        return Variation(self.arm, self.law, self.vary)
+
+    @property
+    def spectral_abscissa(self) -> Real:
+        """The largest real part [1/s] of these branches at each gain, apart from zeros at s = 0."""
+        moving = np.where(self.branches == 0, -math.inf, self.branches.real)
+        return np.asarray(moving.max(axis=0))
+
+
+def locus(
+    arm: Arm, law: HubFeedback, vary: str, start: float, stop: float, points: int = 500, branches: int = 10
+) -> Locus:
+    """The exact locus at `points` equally spaced values from `start` to `stop`, of the first `branches` branches.
+
+    `vary` is K1, K2, Kp, "all" (a scale on the law) or a parameter of the arm: payload_mass, payload_inertia,
+    hub_inertia, length, damping; what it names in `arm` or `law` is replaced.  Raises ParameterError for what is no
+    loop or no range, ConvergenceError where a branch cannot be told from another.
+    """
+    points, branches = _whole("points", points, 2, MOST_POINTS), _whole("branches", branches, 1, MOST_BRANCHES)
+    variation = Variation(arm, law, vary)
+    gain = _range(variation, start, stop, points)
+    cut, lowest = followed(variation, start, stop, branches + 1)
+    evaluator = Evaluator(variation, gain)
+    curves = _Polish(variation, evaluator, FREE * lowest).curves(cut)
+    rows, mode = _listed(curves, variation.arm.has_rigid_mode, branches, variation.zeros_at_origin)
+    found = crossings(variation, gain, rows, lowest)
+    return Locus(arm, law, vary, gain, rows, mode, found)
+
+
+def _range(variation: Variation, start: float, stop: float, points: int) -> Real:
+    for key, value in (("from", start), ("to", stop)):
+        if not math.isfinite(value):
+            raise ParameterError(key=key, value=value, remedy="a finite number")
+        variation.at(value)
+    if start == stop:
+        raise ParameterError(key="to", value=stop, remedy="the range is empty: a locus runs to another value")
+    if variation.vary == "all" and variation.law == HubFeedback():
+        raise ParameterError(key="vary", value="all", remedy="every gain is 0: give K1, K2 or Kp to be scaled")
+    return np.linspace(start, stop, points)
+
+
+def _whole(key: str, value: int, least: int, most: int) -> int:
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not least <= value <= most:
+        raise ParameterError(key=key, value=value, remedy=f"a whole number from {least} to {most}")
+    return int(value)
+
+
+def _listed(curves: Complex, has_rigid: bool, number: int, at_zero: int) -> tuple[Complex, NDArray[np.int64]]:
+    """The first branches that are no mirror images, and the modes they continue from."""
+    slots = np.arange(len(curves))
+    followed_rigid = has_rigid and at_zero < 2
+    mode = slots // 2 + (not followed_rigid)
+    if has_rigid and not followed_rigid:
+        curves = np.concatenate([np.zeros((2, curves.shape[1]), complex), curves])
+        mode, slots = np.r_[0, 0, mode], np.r_[0, 1, slots]
+    real = (curves.imag == 0).any(axis=1)
+    kept = np.nonzero((slots % 2 == 0) | real)[0][:number]
+    return np.where(curves[kept] == 0, 0.0, curves[kept]), mode[kept]
+
+
+class _Polish:
+    """From the nodes of the tracker to every zero at every value."""
+
+    def __init__(self, variation: Variation, evaluator: Evaluator, free: float) -> None:
+        self.variation, self.evaluator, self.free = variation, evaluator, free
+        self.gain = evaluator.values
+        self.at_zero = variation.zeros_at_origin
+
+    def curves(self, cut: list[Segment]) -> Complex:
+        """The branches (slots, n); those which do not live all the way are left out."""
+        number = max(int(each.slots.max()) for each in cut) + 1
+        curves = np.full((number, self.gain.size), np.nan, complex)
+        way = np.sign(self.gain[-1] - self.gain[0])
+        ends = np.array([each.nodes[-1].at for each in cut[:-1]])
+        owner = np.searchsorted(way * ends, way * self.gain, side="left")
+        for n, segment in enumerate(cut):
+            (which,) = np.nonzero(owner == n)
+            if which.size:
+                pairs = self.pairs(segment, which)
+                curves[segment.slots.ravel()[:, None], which] = pairs.reshape(which.size, -1).T
+        complete = ~np.isnan(curves).any(axis=1)
+        if not complete[: 2 * int(complete.size // 2)].any():
+            raise ConvergenceError("no branch could be followed all the way", curves, cut)
+        return curves[: int(np.argmin(np.r_[complete, False]))]
+
+    def pairs(self, segment: Segment, which: NDArray[np.int64]) -> Complex:
+        """The pairs (values, n, 2) of a segment at the values of those numbers, polished."""
+        guess = segment.guess(self.gain[which])
+        origin = self._at_origin(guess, which)
+        zeros, settled = self._newton(np.where(origin, 0.0, guess), which, origin)
+        moved = abs(zeros - guess) > SHARE * _gaps(zeros)
+        parted = abs(zeros[..., 0] - zeros[..., 1]) <= 1e-3 * abs(guess[..., 0] - guess[..., 1])
+        changed = (zeros.imag > 0) != (guess.imag > 0)
+        wrong = (((moved | changed) & ~origin).any(axis=2) | (parted & ~origin.all(axis=2))).any(axis=1)
+        for n in np.nonzero(wrong | ~settled.all(axis=(1, 2)))[0]:
+            zeros[n] = self._stepped(segment, int(which[n]), guess[n])
+        return zeros
+
+    def _at_origin(self, guess: Complex, which: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Which zeros are exactly 0: the smallest, as many as the law leaves there."""
+        left = np.array([self.variation.left_at_origin(float(value)) for value in self.gain[which]])
+        if self.at_zero == 2:
+            left = np.zeros_like(left)
+        flat = abs(guess).reshape(len(guess), -1)
+        rank = flat.argsort(axis=1).argsort(axis=1)
+        return (rank < left[:, None]).reshape(guess.shape)
+
+    def _newton(
+        self, zeros: Complex, which: NDArray[np.int64], known: NDArray[np.bool_]
+    ) -> tuple[Complex, NDArray[np.bool_]]:
+        """Newton's method for every zero that is not known and no mirror image, and which of them have settled."""
+        mirrored = zeros[..., 0].imag > 0
+        wanted = ~known
+        wanted[..., 1] &= ~mirrored
+        owner = np.broadcast_to(which[:, None, None], zeros.shape)[wanted]
+        s, still = zeros[wanted], np.ones(int(wanted.sum()), bool)
+        for _ in range(STEPS):
+            value, slope, _ = self.evaluator(s[still], owner[still], self.at_zero)
+            with np.errstate(all="ignore"):
+                move = value / slope
+            move = np.where(s[still].imag == 0, move.real, move)
+            s[still] -= move
+            still[still] = ~(abs(move) <= SETTLED * abs(s[still]))
+            if not still.any():
+                break
+        found, settled = zeros.copy(), np.ones(zeros.shape, bool)
+        found[wanted], settled[wanted] = s, ~still
+        found[..., 1] = np.where(mirrored, found[..., 0].conj(), found[..., 1])
+        return found, settled
+
+    def _stepped(self, segment: Segment, number: int, guess: Complex) -> Complex:
+        """The pairs at one value, all corrected together, or followed there from the last node before it."""
+        value = float(self.gain[number])
+        member = member_of(self.variation.at(value), self.at_zero, self.free)
+        found, stray = corrected(member, guess)
+        if stray.any():
+            nodes = [node for node in segment.nodes if (value - node.at) * (self.gain[-1] - self.gain[0]) >= 0]
+            last = nodes[-1] if nodes else segment.nodes[0]
+            found = follow(self._member, last, value, (value - last.at) / 8, len(last.zeros))[-1].zeros
+        return ordered(found, segment.pinned)
+
+    def _member(self, value: float) -> object:
+        return member_of(self.variation.at(value), self.at_zero, self.free)
+
+
+def _gaps(zeros: Complex) -> Real:
+    """Of each zero (values, n, 2) the distance to the nearest zero of another pair."""
+    count = zeros.shape[1]
+    gaps = np.full(zeros.shape, np.inf)
+    own = np.eye(count, dtype=bool)
+    for i in (0, 1):
+        for j in (0, 1):
+            apart = abs(zeros[:, :, None, i] - zeros[:, None, :, j])
+            gaps[..., i] = np.minimum(gaps[..., i], np.where(own, np.inf, apart).min(axis=2))
+    return gaps
