@@ -1,1 +1,40 @@
-"""The sampled loop: hold, delay, converters, simulation."""
+"""The sampled loop of the exact arm: hold, delay, converters, verdicts and simulations at 10 ms or any other period."""
+
+from tfarm.dsp.chain import Actuator, Chain, Converters, Gains, Sampling, Slew
+from tfarm.dsp.loop import SampledLoop, closed_loop, sampled_loop
+from tfarm.dsp.margins import delay_margin, required_damping, stable_windows
+from tfarm.dsp.reading import load_chain
+from tfarm.dsp.regions import GainMap, gain_map
+from tfarm.dsp.sampling import PulseTransfer, pulse_transfer
+from tfarm.dsp.scenarios import Scenario, scenario
+from tfarm.dsp.simulate import Measurement, Simulation, Simulator
+from tfarm.dsp.verdict import Analysis, Verdict, analyse, sampled_verdict
+
+__all__ = [
+    "Actuator",
+    "Analysis",
+    "Chain",
+    "Converters",
+    "GainMap",
+    "Gains",
+    "Measurement",
+    "PulseTransfer",
+    "SampledLoop",
+    "Sampling",
+    "Scenario",
+    "Simulation",
+    "Simulator",
+    "Slew",
+    "Verdict",
+    "analyse",
+    "closed_loop",
+    "delay_margin",
+    "gain_map",
+    "load_chain",
+    "pulse_transfer",
+    "required_damping",
+    "sampled_loop",
+    "sampled_verdict",
+    "scenario",
+    "stable_windows",
+]

@@ -9,6 +9,7 @@ import numpy as np
 import tfarm
 from tfarm.arm import Arm
 from tfarm.exact.coefficients import Theory
+from tfarm.report.damped_table import damped_table
 from tfarm.report.digits import aligned, fixed, significant
 from tfarm.report.figures import Picture
 from tfarm.report.mode_shapes import Shape, draw_differences, draw_shapes, shapes_of, theory_name
@@ -56,7 +57,7 @@ SENSITIVITIES = (
 
 
 def modes_section(arm: Arm) -> Section:
-    """Everything about free vibration, at C = 0."""
+    """Everything about free vibration: at C = 0, and the eigenvalues at the arm's own C."""
     modes = tfarm.modes(arm, count=MODES)
     exact = _flexible(modes)
     theories: dict[str, Real] = {t: _flexible(tfarm.modes(arm, count=MODES, theory=t)) for t in SIMPLER}
@@ -67,6 +68,7 @@ def modes_section(arm: Arm) -> Section:
         words=(COMPLETE,),
         blocks=(
             modal_table(modes),
+            *((damped_table(modes),) if arm.link.damping else ()),
             _shapes(arm.name, shapes_of(modes, SHAPES)),
             theories_table(exact, theories, differences),
             _differences(arm.name, differences),

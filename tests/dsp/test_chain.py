@@ -1,0 +1,150 @@
+"""The records of the chain, and the TOML tables that fill them: defaults are ideal, bad input is named in one line."""
+
+import math
+
+import pytest
+
+import tfarm
+from tfarm.dsp import Actuator, Chain, Converters, Gains, Sampling, Slew, load_chain
+from tfarm.dsp.converters import MOMENT, TORQUE, quantisers
+from tfarm.dsp.reading import chain_of_tables
+from tfarm.errors import ParameterError
+
+LAB = """
+name = "bench"
+[link]
+length = 1.0
+density = 2700.0
+youngs_modulus = 7e10
+poissons_ratio = 0.3
+[link.section]
+shape = "rectangle"
+width = 0.1
+depth = 0.006
+[hub]
+inertia = 0.1
+"""
+LOOP = """
+[sampling]
+period = 0.005
+delay_samples = 0.7
+antialias_corner = 300.0
+[converters]
+encoder_counts = 20000
+hub_rate = "difference"
+rate_filter = 120.0
+moment_bits = 12
+moment_range = 20.0
+torque_bits = 14
+torque_range = 10.0
+arithmetic = "float32"
+[actuator]
+torque_limit = 6.0
+motor_constant = 0.8
+hub_damping = 0.05
+[slew]
+travel = 0.5
+rise_time = 0.8
+reading = "total"
+"""
+
+
+def test_all_is_ideal_unless_it_is_said_otherwise():
+    chain = load_chain("sasaki2012")
+    assert chain == Chain()
+    assert (chain.sampling.period, chain.sampling.delay_samples) == (0.01, 0.0)
+    assert (chain.slew.travel, chain.slew.rise_time, chain.slew.reading) == (1.15, 1.0, "vibration")
+    assert not chain.converters.is_quantised
+    assert math.isinf(chain.actuator.torque_limit)
+
+
+def test_one_file_may_hold_the_arm_and_its_loop(tmp_path):
+    file = tmp_path / "bench.toml"
+    file.write_text(LAB + LOOP, encoding="utf-8")
+    assert tfarm.load(str(file)).name == "bench"
+    chain = load_chain(str(file))
+    assert chain == Chain(
+        sampling=Sampling(period=0.005, delay_samples=0.7, antialias_corner=300.0),
+        converters=Converters(
+            encoder_counts=20000, hub_rate="difference", rate_filter=120.0, moment_bits=12, moment_range=20.0,
+            torque_bits=14, torque_range=10.0, arithmetic="float32",
+        ),
+        actuator=Actuator(torque_limit=6.0, motor_constant=0.8, hub_damping=0.05),
+        slew=Slew(travel=0.5, rise_time=0.8, reading="total"),
+    )  # fmt: skip
+    alone = tmp_path / "loop.toml"
+    alone.write_text(LOOP, encoding="utf-8")
+    assert load_chain(str(alone)) == chain
+
+
+def test_an_arm_still_refuses_other_tables(tmp_path):
+    file = tmp_path / "bench.toml"
+    file.write_text(LAB + "[samplings]\nperiod = 0.01\n", encoding="utf-8")
+    with pytest.raises(ParameterError, match="samplings"):
+        tfarm.load(str(file))
+    with pytest.raises(ParameterError, match='did you mean "sampling"'):
+        load_chain(str(file))
+
+
+BAD = [
+    ("sampling", {"period": 0.0}, "sampling.period = 0.0: a sample period is a positive"),
+    ("sampling", {"period": -0.01}, "sampling.period = -0.01"),
+    ("sampling", {"period": math.nan}, "nan is none"),
+    ("sampling", {"period": math.inf}, "sampling.period = inf"),
+    ("sampling", {"period": "0.01"}, "sampling.period = '0.01'"),
+    ("sampling", {"period": True}, "sampling.period = true"),
+    ("sampling", {"delay_samples": -1.0}, "sampling.delay_samples = -1.0: a computational delay is zero or positive"),
+    ("sampling", {"delay_samples": 1e6}, "at most 100"),
+    ("sampling", {"antialias_corner": 0.0}, "positive in rad/s, or inf"),
+    ("sampling", {"perod": 0.01}, 'did you mean "period"'),
+    ("converters", {"moment_bits": 0, "moment_range": 1.0}, "moment_bits = 0: a whole number of bits from 2 to 32"),
+    ("converters", {"moment_bits": 70, "moment_range": 1.0}, "converters.moment_bits = 70"),
+    ("converters", {"torque_bits": 12}, "converters.torque_range = None: 12 bits of what"),
+    ("converters", {"torque_range": -3.0}, "the range +-R of a converter"),
+    ("converters", {"encoder_counts": 0}, "counts a revolution from 2"),
+    ("converters", {"encoder_counts": 1.5}, "converters.encoder_counts = 1.5"),
+    ("converters", {"hub_rate": "guess"}, "converters.hub_rate = 'guess'"),
+    ("converters", {"arithmetic": "float16"}, "'float32'"),
+    ("actuator", {"torque_limit": 0.0}, "a torque limit is positive"),
+    ("actuator", {"hub_damping": -1.0}, "hub damping is zero or positive"),
+    ("actuator", {"motor_constant": 0.0}, "a motor constant is a positive number"),
+    ("slew", {"travel": 0.0}, "slew.travel"),
+    ("slew", {"rise_time": 0.0}, "a rise time is a positive"),
+    ("slew", {"reading": "both"}, "slew.reading"),
+    ("slew", 3, "give a table, headed [slew]"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("table", "content", "message"), BAD, ids=[f"{table} {content}" for table, content, _ in BAD])
+def test_bad_tables_are_named(table, content, message):
+    with pytest.raises(ParameterError) as refused:
+        chain_of_tables({table: content})
+    assert message in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, 1e13, "0.3", True])
+def test_gains_are_finite_numbers(value):
+    with pytest.raises(ParameterError, match="K2"):
+        Gains(K1=0.3, K2=value)
+
+
+def test_steps_and_ranges():
+    chain = Chain(
+        converters=Converters(moment_bits=4, moment_range=8.0, torque_bits=3, torque_range=4.0),
+        actuator=Actuator(torque_limit=2.5),
+    )
+    rows = quantisers(chain).rows
+    assert rows[MOMENT].tolist() == [1.0, -8.0, 7.0]
+    assert rows[TORQUE].tolist() == [1.0, -2.5, 2.5]
+
+
+def test_quantise_rounds_clips_and_counts():
+    import numpy as np
+
+    from tfarm.dsp.kernel import quantise
+
+    saturated, row = np.zeros(3, np.int64), np.array([0.5, -2.0, 1.5])
+    values = [quantise(x, row, saturated, 1) for x in (0.2, 0.3, -0.74, 1.6, 1.8, -2.3, 0.25)]
+    assert values == [0.0, 0.5, -0.5, 1.5, 1.5, -2.0, 0.0]
+    assert saturated.tolist() == [0, 2, 0]

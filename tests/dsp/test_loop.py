@@ -1,0 +1,157 @@
+"""Poles of the sampled loop: published figures, the first-order law, the finite-gain form, rates by difference."""
+
+import numpy as np
+import pytest
+
+import tfarm
+from tfarm.arm import Hub
+from tfarm.dsp import Actuator, Chain, Converters, Gains, Sampling, closed_loop, sampled_loop
+from tfarm.dsp.law import first_order_law, mode_table, root_locus
+from tfarm.errors import ParameterError
+
+T = 0.01
+
+
+@pytest.fixture(scope="module")
+def lab():
+    return tfarm.load("sasaki2012-lab")
+
+
+@pytest.fixture(scope="module")
+def lossless():
+    return tfarm.load("sasaki2012")
+
+
+@pytest.mark.parametrize(("K2", "growth"), [(0.05, 6e-10), (0.3, 9e-9), (0.9, 3e-7)])
+def test_mode_13_grows_as_two_prototypes_found(lossless, K2, growth):
+    poles = sampled_loop(lossless, Gains(K1=0.3, K2=K2)).poles
+    worst = poles.log_radius.argmax()
+    assert poles.mode[worst] == 13
+    assert poles.log_spectral_radius == pytest.approx(growth, rel=0.1)
+
+
+@pytest.mark.parametrize("K2", [-0.3, -1e-3, -1e-6, 0.0])
+def test_without_damping_every_negative_K2_and_zero_is_unstable(lossless, K2):
+    for K1 in (1e-6, 0.3, 3.0):
+        assert not sampled_loop(lossless, Gains(K1=K1, K2=K2)).poles.is_stable
+
+
+@pytest.mark.parametrize(("K2", "stable"), [(-0.1527, False), (-0.1525, True), (1.1638, True), (1.164, False)])
+def test_the_edges_of_the_lab_arm(lab, K2, stable):
+    assert sampled_loop(lab, Gains(K1=0.3, K2=K2), count=12).poles.is_stable is stable
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.4, 1.0, 1.3, 2.0])
+def test_small_gains_follow_the_law(lossless, delay):
+    """ln|z| = -b^2 sin(q/2) [(K1/w) cos((d + 1/2) q) + K2 I_h sin((d + 1/2) q)] for the first ten modes."""
+    chain = Chain(sampling=Sampling(delay_samples=delay))
+    modes = tfarm.modes(lossless, 10)
+    w, b = modes.natural_frequency[1:], modes.hub_participation[1:]
+    for K1, K2 in ((1e-5, 0.0), (0.0, 1e-5), (1e-6, 2e-5)):
+        table = mode_table(sampled_loop(lossless, Gains(K1=K1, K2=K2), chain, count=14))
+        law = table.first_order[:10]
+        second = 1e-4 * b**2 * (K1 / w + K2 * 0.1)  # where the law is zero, the second order is not
+        assert np.all(abs(table.log_radius[:10] - law) <= 0.01 * abs(law) + second)
+        q = w * T
+        by_hand = K1 / w * np.cos((delay + 0.5) * q) + K2 * 0.1 * np.sin((delay + 0.5) * q)
+        np.testing.assert_allclose(law, -(b**2) * np.sin(q / 2) * by_hand, rtol=1e-9, atol=1e-9 * second.max())
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.7, 1.0])
+def test_finite_gains_follow_the_finite_gain_form(lossless, delay):
+    """ln|z| = -Re[b^2 sin(q/2) (K1/w + i K2 I_h) e^{-i(d+1/2)q} / (1 + L0)], L0 the loop without that mode.
+
+    L0 is read off the loop itself by taking the mode's pole out of F next to it; modes whose pole moves little obey it.
+    """
+    gains = Gains(K1=0.3, K2=0.3)
+    loop = sampled_loop(lossless, gains, Chain(sampling=Sampling(delay_samples=delay)))
+    table, modes = mode_table(loop), tfarm.modes(lossless, 20)
+    for i in range(9, 20):
+        w, b = modes.natural_frequency[i + 1], modes.hub_participation[i + 1]
+        q = w * T
+        push = b**2 * np.sin(q / 2) * (gains.K1 / w + 1j * gains.K2 * 0.1) * np.exp(-1j * (delay + 0.5) * q)
+        step = 1e-4
+        around = np.exp(1j * q) * np.exp(step * np.exp(2j * np.pi * np.arange(16) / 16))
+        rest = loop(around).mean() - 1  # the mean over a circle has no part of the pole in its middle
+        form = -(push / (1 + rest)).real
+        size = abs(push)
+        assert table.log_radius[i] == pytest.approx(form, abs=2e-3 * size)
+
+
+def test_the_polished_poles_are_the_eigenvalues_of_the_matrix(lab):
+    """All of them, apart from the z = 1 of the hub angle, which the whole matrix has."""
+    loop = sampled_loop(lab, Gains(K1=0.3, K2=0.3), Chain(sampling=Sampling(delay_samples=1.5)), count=10)
+    whole = np.linalg.eigvals(loop.matrix())
+    ours = loop.poles.z[abs(loop.poles.z) > 0.2]
+    assert min(abs(whole - 1)) < 1e-12
+    for z in ours:
+        assert min(abs(whole - z)) < 1e-11
+    assert np.isclose(abs(loop(ours)), 0, atol=1e-9).all()
+    assert len(loop.matrix()) == len(loop.poles.z) + 1
+
+
+def test_closed_loop_is_the_matrix_of_the_law(lab):
+    sampling = Sampling(delay_samples=0.5)
+    matrix = closed_loop(lab, 0.3, 0.2, 0.7, sampling, count=10)
+    loop = sampled_loop(lab, Gains(K1=0.3, K2=0.2, Kp=0.7), Chain(sampling=sampling), count=10)
+    np.testing.assert_array_equal(matrix, loop.matrix())
+    assert not loop.has_free_angle
+    assert abs(np.linalg.eigvals(matrix)).max() == pytest.approx(np.exp(loop.poles.log_spectral_radius), rel=1e-11)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.6])
+@pytest.mark.parametrize("Kp", [0.0, 0.5])
+@pytest.mark.parametrize("hub_damping", [0.0, 0.4])
+def test_a_rate_by_difference_is_in_the_matrix_as_in_F(lab, delay, Kp, hub_damping):
+    """z = roots of 1 + Kp Theta + K1 (1 - a)(z - 1)/(T (z - a)) Theta + K2 M."""
+    chain = Chain(
+        sampling=Sampling(delay_samples=delay, antialias_corner=600.0),
+        converters=Converters(hub_rate="difference", rate_filter=200.0),
+        actuator=Actuator(hub_damping=hub_damping),
+    )
+    loop = sampled_loop(lab, Gains(K1=0.3, K2=0.25, Kp=Kp), chain, count=8)
+    z = loop.poles.z[abs(loop.poles.z) > 0.2]
+    assert z.size >= 8
+    np.testing.assert_allclose(abs(loop(z)), 0, atol=1e-8)
+    a = np.exp(-200.0 * T)
+    angle, _, moment = loop.pulse(z)
+    by_hand = 1 + Kp * angle + 0.3 * (1 - a) * (z - 1) / (T * (z - a)) * angle + 0.25 * moment
+    np.testing.assert_allclose(abs(by_hand), 0, atol=1e-7)
+
+
+def test_hub_damping_alone_damps(lossless):
+    """Analog rate feedback is collocated: it damps every mode that the hub feels, which sampled feedback does not."""
+    poles = sampled_loop(lossless, Gains(K1=0, K2=0), Chain(actuator=Actuator(hub_damping=0.3)), count=12).poles
+    assert poles.is_stable
+    assert not sampled_loop(lossless, Gains(K1=0.3, K2=0), count=12).poles.is_stable
+
+
+def test_the_locus_starts_at_the_open_loop_and_has_no_jumps(lab):
+    loop = sampled_loop(lab, Gains(K1=1e-9, K2=1.3), count=8)
+    locus = root_locus(loop, "K2", np.linspace(0.0, 1.3, 60))
+    assert np.all(abs(np.diff(locus, axis=0)) < 0.2)
+    flexible = loop.pulse.multipliers[loop.pulse.mode > 0]
+    assert max(abs(locus[0, :, None] - flexible).min(axis=0)) < 1e-9
+    assert max(np.log(abs(locus[-1]))) == pytest.approx(loop.poles.log_spectral_radius, rel=1e-9)
+    other = root_locus(loop, "K1", np.array([1e-9, 1e-3]))
+    np.testing.assert_allclose(np.sort_complex(other[0]), np.sort_complex(locus[-1]), atol=1e-12)
+
+
+def test_bands_of_the_law():
+    """K1 damps below 50 Hz and destabilises from 50 to 100 Hz; K2 > 0 never destabilises."""
+    w = 2 * np.pi * np.array([10.0, 49.0, 51.0, 99.0, 101.0])
+    by_rate, by_moment = first_order_law(w, np.ones(5), 0.1, Gains(K1=1.0, K2=1.0), T, 0.0)
+    np.testing.assert_array_equal(np.sign(by_rate), [-1, -1, 1, 1, -1])
+    assert np.all(by_moment <= 0)
+
+
+def test_a_locked_hub_has_no_loop_and_a_free_pin_none_by_moment(lab):
+    from dataclasses import replace
+
+    locked = replace(lab, hub=Hub(inertia=np.inf))
+    with pytest.raises(ParameterError, match="no loop"):
+        sampled_loop(locked, Gains(K1=0.3, K2=0.3))
+    pin = replace(lab, hub=Hub(inertia=0.0))
+    with pytest.raises(ParameterError, match="algebraic loop"):
+        sampled_loop(pin, Gains(K1=0.3, K2=0.3))
+    assert sampled_loop(pin, Gains(K1=0.1, K2=0.0), count=6).poles.z.size > 10

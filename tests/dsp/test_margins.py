@@ -1,0 +1,169 @@
+"""Edges of the gains, the map, the delay margin and the damping that cures: each against poles on both of its sides."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tfarm
+from tfarm.dsp import (
+    Chain,
+    Converters,
+    Gains,
+    Sampling,
+    analyse,
+    delay_margin,
+    gain_map,
+    required_damping,
+    sampled_loop,
+)
+from tfarm.dsp.boundary import circle_grid, crossings
+from tfarm.dsp.margins import stable_windows
+from tfarm.dsp.verdict import sampled_answer, sampled_verdict
+from tfarm.errors import ParameterError
+
+GAINS = Gains(K1=0.3, K2=0.3)
+
+
+@pytest.fixture(scope="module")
+def lab():
+    return tfarm.load("sasaki2012-lab")
+
+
+@pytest.fixture(scope="module")
+def lossless():
+    return tfarm.load("sasaki2012")
+
+
+def growing(loop):
+    return int((loop.poles.log_radius > 0).sum())
+
+
+def test_the_edges_that_two_prototypes_found(lab):
+    loop = sampled_loop(lab, GAINS, count=12)
+    ((low, high),) = stable_windows(loop, "K2")
+    assert (low, high) == (pytest.approx(-0.1526, abs=5e-5), pytest.approx(1.1639, abs=5e-5))
+    ((low, high),) = stable_windows(loop, "K1")
+    assert low == 0.0
+
+
+@pytest.mark.parametrize("gain", ["K1", "K2"])
+@pytest.mark.parametrize("name", ["sasaki2012", "sasaki2012-lab"])
+def test_an_edge_has_a_pole_on_the_circle_and_the_verdict_turns_there(name, gain):
+    loop = sampled_loop(tfarm.load(name), GAINS, Chain(sampling=Sampling(delay_samples=0.3)), count=10)
+    for window in stable_windows(loop, gain):
+        for edge, inward in zip(window, (1, -1), strict=True):
+
+            def at(value):
+                return loop.with_gains(value, 0.3) if gain == "K1" else loop.with_gains(0.3, value)
+
+            step = 1e-9 * max(1e-3, abs(edge))
+            assert at(edge + inward * step).poles.is_stable
+            assert not at(edge - inward * step).poles.is_stable
+
+
+@pytest.mark.parametrize("name", ["sasaki2012", "sasaki2012-lab"])
+@pytest.mark.parametrize("delay", [0.0, 0.3, 2.5])
+def test_between_crossings_the_counts_are_those_of_the_eigenvalues(name, delay):
+    chain = Chain(sampling=Sampling(delay_samples=delay))
+    loop = sampled_loop(tfarm.load(name), GAINS, chain, count=10)
+    grid = circle_grid(loop)
+    for gain, other in (("K2", 0.3), ("K2", 7.0), ("K1", 0.3), ("K1", -0.1)):
+        found = crossings(grid, gain, other)
+        middles = np.r_[found.gain[0] - 1, (found.gain[1:] + found.gain[:-1]) / 2, found.gain[-1] + 1]
+        counts = [growing(loop.with_gains(*((m, other) if gain == "K1" else (other, m)))) for m in middles]
+        np.testing.assert_array_equal(np.diff(counts), found.count)
+
+
+@pytest.mark.parametrize("hub_rate", ["ideal", "difference"])
+@pytest.mark.parametrize("name", ["sasaki2012", "sasaki2012-lab"])
+def test_the_map_counts_as_the_eigenvalues_do(name, hub_rate):
+    chain = Chain(converters=Converters(hub_rate=hub_rate, rate_filter=300.0))
+    loop = sampled_loop(tfarm.load(name), GAINS, chain, count=9)
+    plane = gain_map(loop, np.linspace(-2, 25, 28), np.linspace(-0.7, 2.1, 31))
+    rng = np.random.default_rng(5)
+    for i, j in zip(rng.integers(28, size=60), rng.integers(31, size=60), strict=True):
+        assert growing(loop.with_gains(float(plane.K1[i]), float(plane.K2[j]))) == plane.unstable[i, j]
+
+
+def test_the_map_has_exact_edges(lab):
+    loop = sampled_loop(lab, GAINS, count=11)
+    plane = gain_map(loop, [0.1, 0.3, 30.0], np.linspace(-0.5, 1.5, 5))
+    assert plane.stable_intervals[1] == [pytest.approx(stable_windows(loop, "K2")[0], rel=1e-12)]
+    assert plane.stable_intervals[2] == []
+    assert plane.unstable[1].tolist() == [2, 0, 0, 0, 2] or plane.unstable[1, 0] > 0
+
+
+def test_the_map_wants_ascending_gains(lab):
+    loop = sampled_loop(lab, GAINS, count=6)
+    with pytest.raises(ParameterError, match="ascend"):
+        gain_map(loop, [0.3, 0.1], [0.0, 1.0])
+    with pytest.raises(ParameterError, match="finite gains"):
+        gain_map(loop, [0.3, np.inf], [0.0, 1.0])
+
+
+@pytest.mark.parametrize("K2", [0.1, 0.3, 0.9])
+def test_the_delay_margin_is_where_the_verdict_turns(lab, K2):
+    loop = sampled_loop(lab, Gains(K1=0.3, K2=K2), count=12)
+    margin = delay_margin(loop)
+    assert not margin.is_bound
+    assert loop.with_delay(margin.samples - 1e-6).poles.is_stable
+    assert not loop.with_delay(margin.samples + 1e-6).poles.is_stable
+    earlier = np.linspace(0, margin.samples, 41)[:-1]
+    assert all(loop.with_delay(float(delay)).poles.is_stable for delay in earlier)
+
+
+def test_without_a_stable_loop_there_is_no_delay_margin(lab):
+    assert delay_margin(sampled_loop(lab, Gains(K1=0.3, K2=2.0), count=10)).samples == 0.0
+
+
+def test_the_required_damping_is_where_the_verdict_turns(lossless):
+    """At C = 0 modes grow by 1e-9 a sample; hardly any damping cures that, and the formula says how little."""
+    chain = Chain()
+    C = required_damping(lossless, GAINS, chain, count=20)
+    growth, w = 8.6238e-9, tfarm.modes(lossless, 13).natural_frequency[13]
+    assert pytest.approx(2 * growth / (0.01 * w**2), rel=0.02) == C
+
+    def at(damping):
+        return sampled_loop(replace(lossless, link=replace(lossless.link, damping=damping)), GAINS, chain).poles
+
+    assert at(1.001 * C).is_stable
+    assert not at(0.999 * C).is_stable
+
+
+def test_no_damping_cures_a_gain_far_out_and_none_is_needed_for_few_modes(lossless):
+    assert required_damping(lossless, Gains(K1=0.3, K2=3.0), Chain(), count=6) == np.inf
+    assert required_damping(lossless, GAINS, Chain(), count=6) == 0.0
+
+
+def test_the_verdict_settles_with_damping_and_names_its_modes_without(lab, lossless):
+    verdict = sampled_verdict(lab, GAINS)
+    assert verdict.is_settled
+    assert verdict.sentence.startswith("stable")
+    undamped = sampled_verdict(lossless, GAINS)
+    assert not undamped.is_settled
+    assert "mode 13 grows by 8.62e-09 a sample (holds for the first 20 modes)" in undamped.sentence
+    assert sampled_verdict(lossless, GAINS, count=12).sentence.startswith("stable")
+    assert sampled_verdict(lossless, Gains(K1=0, K2=0)).sentence.startswith("marginal")
+
+
+def test_the_answer_is_plain_and_consistent(lab):
+    answer = sampled_answer(analyse(lab, GAINS))
+    assert answer["stable"] is True
+    assert answer["spectral_radius"] < 1
+    low, high = answer["K2_interval"]
+    assert low < 0.3 < high
+    assert answer["K1_interval"][0] == 0.0
+    assert answer["first_unstable_mode"] is None
+    assert [mode["index"] for mode in answer["modes"]] == list(range(1, len(answer["modes"]) + 1))
+    unstable = sampled_answer(analyse(lab, Gains(K1=0.3, K2=1.3)))
+    assert unstable["stable"] is False
+    assert unstable["spectral_radius"] > 1
+    assert unstable["K2_interval"] is None
+    assert unstable["K2_intervals"] == answer["K2_intervals"]
+    assert unstable["delay_margin_samples"] == 0.0
+
+
+def test_a_count_of_modes_is_checked(lab):
+    with pytest.raises(ParameterError, match="1 to 400"):
+        sampled_verdict(lab, GAINS, count=0)

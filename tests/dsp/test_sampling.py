@@ -1,0 +1,203 @@
+"""The exact discretisation against the aliasing sum, an inverted Laplace transform, and a fine simulation."""
+
+import control
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+import tfarm
+from tests.dsp.roads import aliased, aliased_loop, durbin
+from tests.strategies import arm_of
+from tfarm.dsp import Chain, Gains, Sampling, pulse_transfer, sampled_loop
+from tfarm.dsp.plant import loop_plant
+from tfarm.dsp.sampling import PulseTransfer
+from tfarm.reduced import modal_model
+
+T = 0.01
+BOTH = ["hub_rate", "root_moment"]
+DELAYS = (0.0, 0.25, 0.5, 0.95, 1.0, 1.7, 2.0)
+CIRCLE = (np.exp(0.3j), np.exp(2.8j), 1.1 * np.exp(1j))
+
+
+@pytest.fixture(scope="module")
+def lab():
+    return tfarm.load("sasaki2012-lab")
+
+
+@pytest.fixture(scope="module")
+def lossless():
+    return tfarm.load("sasaki2012")
+
+
+@pytest.mark.parametrize("delay", DELAYS)
+def test_the_aliasing_sum_over_the_exact_arm(lab, delay):
+    H = pulse_transfer(lab, BOTH, Sampling(delay_samples=delay), count=14)
+    for z in CIRCLE:
+        np.testing.assert_allclose(H(z), aliased_loop(lab, z, T, delay, 16_000), rtol=1e-8)
+
+
+def test_the_aliasing_sum_converges_with_the_power_that_its_tail_has(lab):
+    """A gauge moment s^-3/2 times the hold 1/s: the sum of n^-5/2 beyond N is as N^-3/2, a factor 8 for 4 times N."""
+    H = pulse_transfer(lab, BOTH, Sampling(), count=14)(CIRCLE[0])
+    errors = [abs(aliased_loop(lab, CIRCLE[0], T, 0, terms) - H) for terms in (4000, 16_000, 64_000)]
+    rates = np.log(np.array(errors[:-1]) / np.array(errors[1:])) / np.log(4)
+    assert np.all((rates > 1.35) & (rates < 1.6)), rates
+
+
+def test_modes_left_out_of_a_lossless_arm_count_with_their_cube_at_most(lossless):
+    """b^2 falls as n^-4, so that the moment of the modes beyond N is off by N^-3, or less where they alternate."""
+    z = 1.2 * np.exp(1j)
+    exact = aliased_loop(lossless, z, T, 0.3, 2**18)
+    clock = Sampling(delay_samples=0.3)
+    errors = [abs(pulse_transfer(lossless, BOTH, clock, count=n)(z) - exact)[1] for n in (10, 40, 160)]
+    rates = np.log(np.array(errors[:-1]) / np.array(errors[1:])) / np.log(4)
+    assert np.all(rates > 2.8), rates
+    assert errors[-1] < 1e-8
+
+
+@pytest.mark.parametrize("period", [0.001, 0.003, 0.02])
+def test_any_period(lab, period):
+    H = pulse_transfer(lab, BOTH, Sampling(period=period, delay_samples=0.4), count=14)
+    np.testing.assert_allclose(H(CIRCLE[2]), aliased_loop(lab, CIRCLE[2], period, 0.4, 16_000), rtol=1e-8)
+
+
+def test_an_exact_time_response_by_the_laplace_transform(lab):
+    """A torque of 1 N m for three samples, 0.4 samples late: the exact root moment and hub angle by Durbin's FFT."""
+    delay, samples = 0.4, 3
+    G = tfarm.transfer(lab, ["root_moment", "hub_angle"])
+
+    def torque(s):
+        return (1 - np.exp(-samples * T * s)) / s * np.exp(-delay * T * s)
+
+    duration, points = 0.64, 2**19
+    H = pulse_transfer(lab, ["root_moment", "hub_angle"], Sampling(delay_samples=delay), count=14)
+    A, B, C = H.matrices()
+    x, ours = np.zeros(len(A)), []
+    for k in range(32):
+        ours.append(C @ x)
+        x = A @ x + B * (k < samples)
+    for row in (0, 1):
+        t, y = durbin(lambda s, row=row: G(s)[row] * torque(s), duration, points, 30 / duration)
+        at = np.round(np.arange(32) * T / duration * points).astype(int)
+        np.testing.assert_allclose(t[at], np.arange(32) * T, atol=1e-15)
+        np.testing.assert_allclose(np.array(ours)[:, row], y[at], atol=1e-9 * abs(y[at]).max())
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.3, 1.0, 2.6])
+def test_a_hundred_modes_stepped_in_tenths_of_a_sample(lossless, delay):
+    """Matrix exponentials of the modal state space, with the torque switched at the right tenth."""
+    model = modal_model(lossless, BOTH, 100)
+    A, B, C, D = model.matrices()
+    n = len(A)
+    step = expm(np.block([[A, B], [np.zeros((1, n + 1))]]) * T / 10)
+    torque = np.random.default_rng(3).normal(size=40)
+    late = round(10 * delay)
+    H = pulse_transfer(lossless, BOTH, Sampling(delay_samples=delay), count=100)
+    F, G, E = H.matrices()
+    x, fine, worst, size = np.zeros(len(F)), np.zeros(n), 0.0, 0.0
+    held = 0.0
+    for k in range(40):
+        expected = C @ fine + D[:, 0] * held
+        worst, size = max(worst, abs(E @ x - expected).max()), max(size, abs(expected).max())
+        x = F @ x + G * torque[k]
+        for tenth in range(10):
+            j = (10 * k + tenth - late) // 10
+            held = torque[j] if j >= 0 else 0.0
+            fine = step[:n, :n] @ fine + step[:n, n] * held
+    assert worst < 1e-9 * size
+
+
+def test_the_state_space_is_the_pulse_transfer_function(lab):
+    H = pulse_transfer(lab, ["hub_angle", *BOTH], Sampling(delay_samples=1.3), count=12)
+    system = H.state_space()
+    assert isinstance(system, control.StateSpace)
+    assert (system.dt, system.output_labels, system.input_labels) == (T, ["hub_angle", *BOTH], ["hub_torque"])
+    assert not system.D.any()
+    z = np.array([np.exp(0.1 + 0.2j), np.exp(0.01 + 2j)])
+    np.testing.assert_allclose(system(z)[:, 0], H(z), rtol=1e-12)
+
+
+def test_nothing_comes_through_before_the_next_sample(lab):
+    """The first value of the pulse response after a delay of d samples is the (d + 1)th."""
+    for delay, first in ((0.0, 1), (0.9, 1), (1.0, 2), (2.5, 3)):
+        A, B, C = pulse_transfer(lab, BOTH, Sampling(delay_samples=delay), count=8).matrices()
+        pulse = [C @ np.linalg.matrix_power(A, k - 1) @ B for k in range(1, 5)]
+        assert all(abs(pulse[k - 1]).max() < 1e-15 for k in range(1, first))
+        assert abs(pulse[first - 1]).max() > 1e-6
+
+
+def test_lossless_poles_stay_on_the_circle(lossless):
+    H = pulse_transfer(lossless, BOTH, Sampling(), count=100)
+    assert abs(abs(H.multipliers) - 1).max() <= 2 * np.finfo(float).eps
+
+
+def test_offsets_lose_nothing_next_to_a_pole(lossless):
+    """offset H at z = e^{pT} + offset tends to the residue, and does so for offsets below the last bit of z."""
+    H = pulse_transfer(lossless, BOTH, Sampling(delay_samples=0.3), count=10)
+    base = np.array([12])
+    values = []
+    for size in (1e-8, 1e-12, 1e-20):
+        offset = np.array([size * np.exp(0.4j)])
+        values.append(H.scaled(H.multipliers[base] + offset, base, offset)[:, 0])
+    np.testing.assert_allclose(values[0], values[2], rtol=1e-3)
+    np.testing.assert_allclose(values[1], values[2], rtol=1e-7)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.6, 2.0])
+def test_the_anti_alias_filter_is_a_filter(lab, delay):
+    corner = 150.0
+    chain = Chain(sampling=Sampling(delay_samples=delay, antialias_corner=corner))
+    H = PulseTransfer(loop_plant(lab, chain, 14), chain.sampling)
+    exact = tfarm.transfer(lab, ["hub_angle", "hub_rate", "root_moment"])
+    lag = np.array([[0.0], [1.0], [1.0]])
+
+    def filtered(s):
+        return exact(s) * np.where(lag, corner / (s + corner), 1.0)
+
+    for z in CIRCLE:
+        np.testing.assert_allclose(H(z), aliased(filtered, z, T, delay, 16_000), rtol=1e-8)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.6])
+def test_analog_hub_damping_moves_the_exact_arm(lab, delay):
+    """u - kb theta_t: G/(1 + kb R) of the exact arm."""
+    from tfarm.dsp import Actuator
+
+    kb = 0.8
+    chain = Chain(sampling=Sampling(delay_samples=delay), actuator=Actuator(hub_damping=kb))
+    H = PulseTransfer(loop_plant(lab, chain, 14), chain.sampling)
+    exact = tfarm.transfer(lab, ["hub_angle", "hub_rate", "root_moment"])
+
+    def damped(s):
+        values = exact(s)
+        return values / (1 + kb * values[1])
+
+    for z in CIRCLE:
+        reference = aliased(damped, z, T, delay, 60_000)
+        np.testing.assert_allclose(H(z)[[0, 2]], reference[[0, 2]], rtol=2e-6)
+        np.testing.assert_allclose(H(z)[1], reference[1], rtol=1e-4)  # a tail of 1/s: the sum itself is that short
+
+
+@pytest.mark.parametrize("delay", [0, 1, 2, 5])
+def test_a_rigid_inertia_is_stable_up_to_its_known_gain(delay):
+    """Whole delays: stable iff K1 T/J < 2 sin(pi/(2(2d + 1))), here with an arm that is as good as rigid."""
+    arm = arm_of(
+        length=0.1, slenderness=5, width=1, density=1e3, E=3e11, nu=0.3, damping=1e-6, hub=1.0, mass=0, inertia=0
+    )
+    edge = 2 * np.sin(np.pi / (2 * (2 * delay + 1))) * arm.total_inertia / T
+    chain = Chain(sampling=Sampling(delay_samples=delay))
+    for factor, stable in ((0.999, True), (1.001, False)):
+        loop = sampled_loop(arm, Gains(K1=factor * edge, K2=0.0), chain, count=2)
+        assert loop.poles.is_stable is stable
+
+
+def test_a_filter_after_an_angle_that_drifts(lab):
+    """1/s^2 wc/(s + wc) = 1/s^2 - 1/(wc s) + ...: the rigid body lags by 1/wc."""
+    from tfarm.dsp.plant import undelayed_plant, with_filter
+
+    plain = undelayed_plant(lab, Chain(), ("hub_angle", "root_moment"), 8)
+    lagged = with_filter(plain, [0], 90.0)
+    for s in (3.0 + 1j, 200j, -20.0 + 400j):
+        angle, moment = lagged(s)
+        assert angle == pytest.approx(plain(s)[0] * 90 / (s + 90), rel=1e-11)
+        assert moment == plain(s)[1]

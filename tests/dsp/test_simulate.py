@@ -1,0 +1,305 @@
+"""Simulations: energy, poles seen in time, two implementations, converters, limit cycles, running away."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+import tfarm
+from tfarm.dsp import (
+    Actuator,
+    Chain,
+    Converters,
+    Gains,
+    Sampling,
+    Simulator,
+    Slew,
+    pulse_transfer,
+    sampled_loop,
+    scenario,
+)
+from tfarm.dsp.law import growing_mode
+from tfarm.dsp.results import ideal_chain, limit_cycle, residual_moment_rms, settling_time, simulated_answer
+from tfarm.dsp.scenarios import SCENARIOS
+from tfarm.errors import ParameterError
+from tfarm.reduced import modal_model
+
+T = 0.01
+GAINS = Gains(K1=0.3, K2=0.3)
+
+
+@pytest.fixture(scope="module")
+def lab():
+    return tfarm.load("sasaki2012-lab")
+
+
+@pytest.fixture(scope="module")
+def lossless():
+    return tfarm.load("sasaki2012")
+
+
+def simulator(arm, name="slew", duration=3.0, chain=None, count=8, between=0):
+    chain = Chain() if chain is None else chain
+    return Simulator(arm, chain, scenario(name, arm, chain, duration), count=count, between=between)
+
+
+@pytest.mark.parametrize("name", list(SCENARIOS))
+@pytest.mark.parametrize("delay", [0.0, 0.4, 1.0, 2.7])
+def test_energy_is_the_work_done(lossless, name, delay):
+    chain = Chain(sampling=Sampling(delay_samples=delay))
+    run = simulator(lossless, name, 1.5, chain, count=20).linear(GAINS)
+    assert run.stopped is None
+    assert run.energy_error < 2e-14
+
+
+def test_the_trial_cost_of_two_prototypes(lab):
+    """T sum of x^2/2 + 2.6 e^2/2, e = u - K x, 3 s with 6 modes: 2.69 at K = 0, and 0.953 at K = 0.34, the best."""
+    loop, task = simulator(lab, count=6), scenario("slew", lab, Chain(), 3.0)
+
+    def cost(K):
+        run = loop.linear(Gains(K1=0.3, K2=K))
+        x = run.at_samples.root_moment - task.rigid_moment
+        e = 0.3 * (task.hub_rate - run.at_samples.hub_rate) - K * x
+        return T * np.sum(x**2 / 2 + 2.6 * e**2 / 2)
+
+    assert cost(0.0) == pytest.approx(2.69, abs=0.005)
+    assert cost(0.34) == pytest.approx(0.953, abs=0.0005)
+    assert min((0.30, 0.32, 0.34, 0.36, 0.38), key=cost) == 0.34
+
+
+@pytest.mark.parametrize("hub_rate", ["ideal", "difference"])
+@pytest.mark.parametrize("delay", [0.0, 1.3])
+def test_a_python_controller_does_what_the_compiled_law_does(lab, hub_rate, delay):
+    chain = Chain(
+        sampling=Sampling(delay_samples=delay, antialias_corner=800.0),
+        converters=Converters(
+            encoder_counts=20000, hub_rate=hub_rate, rate_filter=100.0, moment_bits=12, moment_range=20.0,
+            torque_bits=12, torque_range=10.0,
+        ),
+        actuator=Actuator(torque_limit=6.0),
+    )  # fmt: skip
+    loop = simulator(lab, chain=chain)
+    compiled = loop.linear(GAINS)
+
+    def law(m):
+        return m.feedforward + 0.3 * (m.rate_reference - m.hub_rate) - 0.3 * m.vibration
+
+    called, scheduled = loop.controller(law), loop.gain_schedule(0.3, lambda m: 0.3)
+    for other in (called, scheduled):
+        np.testing.assert_allclose(other.torque, compiled.torque, rtol=1e-12, atol=1e-13)
+        assert other.saturated == compiled.saturated
+    assert called.gain is None
+    np.testing.assert_array_equal(scheduled.gain, 0.3)
+
+
+def test_a_gain_that_varies(lab):
+    loop = simulator(lab)
+    K = 0.3 + 0.1 * np.sin(np.arange(301))
+    compiled, called = loop.linear(GAINS, K), loop.gain_schedule(0.3, lambda m: K[m.k])
+    np.testing.assert_allclose(called.torque, compiled.torque, rtol=1e-11, atol=1e-12)
+    np.testing.assert_array_equal(compiled.gain, K)
+    with pytest.raises(ParameterError, match="one finite gain a sample"):
+        loop.linear(GAINS, K[:-1])
+
+
+def test_the_samples_are_those_of_the_closed_loop_matrix(lab):
+    """The impulse scenario against powers of the matrix: a second implementation of the same loop."""
+    chain = Chain(sampling=Sampling(delay_samples=1.6))
+    run = simulator(lab, "impulse", 0.6, chain).linear(GAINS)
+    A = sampled_loop(lab, GAINS, chain, count=8).matrix()
+    H = pulse_transfer(lab, ["hub_angle", "hub_rate", "root_moment"], chain.sampling, count=8)
+    C = H.matrices()[2]
+    upper, real = H.kept()
+    x = np.zeros(len(A))
+    x[: 2 * upper.size : 2] = 0.01  # the amplitude of every pole
+    x[2 * upper.size : 2 * upper.size + real.size] = 0.01
+    x[2 * upper.size + real.size + 1] = 0.01
+    moments = []
+    for _ in run.t:
+        moments.append(C[2] @ x)
+        x = A @ x
+    np.testing.assert_allclose(run.at_samples.root_moment, moments, atol=1e-9 * np.abs(moments).max())
+
+
+def test_records_between_samples_are_exact(lossless):
+    """A step of torque, then nothing: by matrix exponentials of the modal state space at every record."""
+    chain = Chain(sampling=Sampling(delay_samples=0.3))
+    run = simulator(lossless, "step", 0.2, chain, count=12, between=4).linear(Gains(K1=0, K2=0))
+    model = modal_model(lossless, ["root_moment", "tip_displacement"], 12)
+    A, B, C, D = model.matrices()
+    n = len(A)
+    late = run.between.t - 0.3 * T
+    exact = []
+    for t in late:
+        block = expm(np.block([[A, B], [np.zeros((1, n + 1))]]) * max(t, 0.0))
+        exact.append(C @ block[:n, n] * 0.1 + D[:, 0] * 0.1 * (t >= -1e-12))
+    exact = np.array(exact)
+    np.testing.assert_allclose(run.between.root_moment, exact[:, 0], atol=1e-11)
+    np.testing.assert_allclose(run.between.tip_displacement, exact[:, 1], atol=1e-11)
+
+
+def test_records_between_do_not_change_the_samples(lab):
+    plain, fine = simulator(lab).linear(GAINS), simulator(lab, between=7).linear(GAINS)
+    np.testing.assert_allclose(fine.at_samples.root_moment, plain.at_samples.root_moment, atol=1e-12)
+    assert fine.between.t.size == 7 * plain.t.size
+
+
+def test_free_decay_is_the_damping_of_the_first_mode(lab):
+    """Without gains the released mode decays with its own eigenvalue, and starts where it was told to, at rest."""
+    run = simulator(lab, "decay", 2.0).linear(Gains(K1=0, K2=0))
+    tip = run.at_samples.tip_displacement
+    p = modal_model(lab, "hub_rate", 1).eigenvalues[0, 0]
+    expected = 0.01 * np.exp(p.real * run.t) * (np.cos(p.imag * run.t) - p.real / p.imag * np.sin(p.imag * run.t))
+    np.testing.assert_allclose(tip, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("K2", [0.1, 0.9])
+def test_the_decay_in_time_is_the_spectral_radius(lab, K2):
+    gains = Gains(K1=0.05, K2=K2)
+    loop = sampled_loop(lab, gains, count=8)
+    run = simulator(lab, "impulse", 60.0).linear(gains)
+    rate = run.at_samples.hub_rate[-200:]
+    slope = np.polyfit(np.arange(200), np.log(abs(rate)), 1)[0]
+    assert slope == pytest.approx(loop.poles.log_spectral_radius, rel=1e-6)
+
+
+def test_the_slew_arrives(lab):
+    run = simulator(lab, chain=Chain(slew=Slew(travel=-0.6, rise_time=0.83))).linear(Gains(K1=0.3, K2=0.3, Kp=2.0))
+    assert run.at_samples.tip_displacement[-1] == pytest.approx(-0.6, rel=0.01)
+    reference = scenario("slew", lab, Chain(), 3.0)
+    assert reference.hub_angle[-1] == pytest.approx(1.15, rel=1e-12)
+    assert reference.hub_rate.max() == pytest.approx(2.3)
+    assert np.sum(reference.feedforward) == pytest.approx(0, abs=1e-12)
+
+
+def test_a_rigid_arm_has_no_vibration():
+    """For an arm as stiff as can be the moment is the rigid arm's: the reading called vibration is nothing."""
+    lab = tfarm.load("sasaki2012")
+    stiff = replace(lab, link=replace(lab.link, youngs_modulus=1e16, shear_modulus=4e15, damping=2e-5))
+    run = simulator(stiff, count=3).linear(Gains(K1=0.0, K2=0.0))
+    task = run.scenario
+    total = abs(run.at_samples.root_moment).max()
+    assert total == pytest.approx((stiff.total_inertia - 0.1) * 4.6, rel=1e-3)
+    assert abs(run.at_samples.root_moment - task.rigid_moment).max() < 1e-3 * total
+
+
+def test_the_total_reading_feeds_the_whole_moment_back(lab):
+    total = simulator(lab, chain=Chain(slew=Slew(reading="total")))
+    assert not total.scenario.rigid_moment.any()
+    assert residual_moment_rms(total.linear(GAINS)) != residual_moment_rms(simulator(lab).linear(GAINS))
+
+
+def test_float32_is_close_and_not_the_same(lab):
+    single = simulator(lab, chain=Chain(converters=Converters(arithmetic="float32"))).linear(GAINS).torque
+    double = simulator(lab).linear(GAINS).torque
+    assert 0 < abs(single - double).max() < 1e-5
+    assert np.all(single == single.astype(np.float32))
+
+
+def test_converters_round_and_saturate(lab):
+    chain = Chain(
+        converters=Converters(moment_bits=8, moment_range=1.0, torque_bits=6, torque_range=2.0, encoder_counts=500),
+        actuator=Actuator(motor_constant=0.5, torque_limit=1.5),
+    )
+    run = simulator(lab, chain=chain).linear(GAINS)
+    steps = run.torque / (4.0 / 64)
+    np.testing.assert_allclose(steps, np.round(steps), atol=1e-12)
+    assert abs(run.torque).max() == 1.5
+    assert run.saturated["torque"] > 10
+    assert run.saturated["moment"] == np.count_nonzero(
+        (np.round(run.at_samples.root_moment * 128) > 127) | (np.round(run.at_samples.root_moment * 128) < -128)
+    )
+    np.testing.assert_array_equal(run.volts, run.torque / 0.5)
+
+
+def test_more_bits_come_nearer_to_the_ideal_loop(lab):
+    """Half the step, half the error, on the average: the order of convergence."""
+    ideal = simulator(lab).linear(GAINS).at_samples.root_moment
+    errors = []
+    for bits in (8, 11, 14, 17):
+        chain = Chain(converters=Converters(moment_bits=bits, moment_range=20.0))
+        errors.append(np.sqrt(np.mean((simulator(lab, chain=chain).linear(GAINS).at_samples.root_moment - ideal) ** 2)))
+    rates = np.log2(np.array(errors[:-1]) / np.array(errors[1:])) / 3
+    assert np.all((rates > 0.7) & (rates < 1.3)), rates
+
+
+def test_quantisation_keeps_a_limit_cycle_up(lab):
+    """A stable loop whose rate comes in counts a sample: it never quite stops, and finer counts make it smaller."""
+    gains = Gains(K1=1.0, K2=0.3)
+    chain = Chain(
+        sampling=Sampling(delay_samples=1.0), converters=Converters(encoder_counts=2000, hub_rate="difference")
+    )
+    run = simulator(lab, "impulse", 20.0, chain).linear(gains)
+    ideal = simulator(lab, "impulse", 20.0, ideal_chain(chain)).linear(gains)
+    assert sampled_loop(lab, gains, chain, count=8).poles.is_stable
+    cycle = limit_cycle(run, ideal)
+    assert cycle is not None
+    assert cycle.torque == pytest.approx(np.ptp(run.torque[-500:]) / 2)
+    assert 0 < cycle.frequency < np.pi / T
+    assert limit_cycle(ideal, ideal) is None
+    coarse = replace(chain, converters=replace(chain.converters, encoder_counts=500))
+    larger = limit_cycle(simulator(lab, "impulse", 20.0, coarse).linear(gains), ideal)
+    assert larger is not None
+    assert larger.root_moment > 2 * cycle.root_moment
+
+
+def test_running_away_is_said_with_its_time_and_mode(lab):
+    run = simulator(lab, duration=5.0).linear(Gains(K1=0.3, K2=1.5))
+    assert run.stopped is not None
+    assert run.stopped.time == pytest.approx(run.t.size * T)
+    assert run.stopped.mode == growing_mode(sampled_loop(lab, Gains(K1=0.3, K2=1.5), count=8))
+    for signal in (run.torque, run.at_samples.root_moment, run.at_samples.tip_displacement):
+        assert np.isfinite(signal).all()
+    answer = simulated_answer(lab, Gains(K1=0.3, K2=1.5), Chain(), "slew", 5.0, count=8)
+    assert answer["settling_time_s"] == np.inf
+    assert answer["stopped_at_s"] == run.stopped.time
+
+
+def test_settling_and_residual_by_hand(lab):
+    run = simulator(lab).linear(GAINS)
+    moment = abs(run.at_samples.root_moment)
+    assert residual_moment_rms(run) == pytest.approx(np.sqrt(np.mean(moment[100:] ** 2)), rel=1e-12)
+    k = round(settling_time(run) / T)
+    assert moment[k:].max() <= 0.05 * moment.max() < moment[k - 1]
+
+
+def test_a_controller_must_give_a_finite_torque(lab):
+    with pytest.raises(ParameterError, match="not finite"):
+        simulator(lab).controller(lambda m: np.nan)
+
+
+def test_what_cannot_be_simulated_is_refused(lab):
+    from tfarm.arm import Payload
+
+    pinned = replace(lab, payload=Payload(mass=np.inf))
+    with pytest.raises(ParameterError, match="no slew"):
+        scenario("slew", pinned, Chain(), 1.0)
+    with pytest.raises(ParameterError, match="cannot be released"):
+        simulator(pinned, "decay", 1.0, count=3).linear(GAINS)
+    with pytest.raises(ParameterError, match='did you mean "slew"'):
+        scenario("slow", lab, Chain(), 1.0)
+    with pytest.raises(ParameterError, match="at most 4000000 samples"):
+        scenario("step", lab, Chain(), 1e9)
+    with pytest.raises(ParameterError, match="duration"):
+        scenario("step", lab, Chain(), -1.0)
+    with pytest.raises(ParameterError, match="0 to 1000"):
+        simulator(lab, between=-1)
+
+
+def test_a_disturbance_is_held_over_its_sample(lossless):
+    """A torque that changes from sample to sample, as a disturbance: as the state space without delay has it."""
+    task = scenario("impulse", lossless, Chain(), 0.3)
+    torque = np.random.default_rng(4).normal(size=task.t.size)
+    task = replace(task, impulse=0.0, disturbance=torque)
+    late = Chain(sampling=Sampling(delay_samples=1.4))  # the disturbance knows nothing of the delay
+    run = Simulator(lossless, late, task, count=10).linear(Gains(K1=0, K2=0))
+    called = Simulator(lossless, late, task, count=10).controller(lambda m: 0.0)
+    A, B, C = pulse_transfer(lossless, ["root_moment", "hub_angle"], Sampling(), count=10).matrices()
+    x, expected = np.zeros(len(A)), []
+    for u in torque:
+        expected.append(C @ x)
+        x = A @ x + B * u
+    for got in (run.at_samples, called.at_samples):
+        np.testing.assert_allclose(got.root_moment, np.array(expected)[:, 0], atol=1e-11)
+        np.testing.assert_allclose(got.hub_angle, np.array(expected)[:, 1], atol=1e-12)

@@ -1,0 +1,42 @@
+"""A small sample of `python -m tests.dsp.verdicts 1000`."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.dsp.verdicts import encirclements, simulated_growth, some_case, tally
+from tfarm.dsp import Gains, sampled_loop, sampled_verdict
+
+
+def test_the_verdict_is_what_simulations_and_encirclements_say():
+    counts = tally(8, seed=7)
+    assert 2 <= counts.pop("stable") <= 6
+    assert counts == {"cases": 8, "simulation": 0, "encirclement": 0, "refused": 0}
+
+
+def test_the_sample_can_tell():
+    """With the sign of K2 mistaken in the simulation the verdicts differ: the comparison is no tautology."""
+    rng, wrong = np.random.default_rng(7), 0
+    for _ in range(8):
+        case = some_case(rng)
+        verdict = sampled_verdict(case.arm, case.gains, case.chain)
+        mistaken = replace(case, gains=Gains(K1=case.gains.K1, K2=-case.gains.K2))
+        if abs(verdict.loop.poles.log_spectral_radius) < 1e-3:
+            continue
+        growth = simulated_growth(mistaken, verdict.loop.poles.log_spectral_radius, verdict.modes_used)
+        wrong += verdict.is_stable != (growth <= 1) or encirclements(mistaken) != encirclements(case)
+    assert wrong >= 2
+
+
+def test_more_modes_do_not_change_a_settled_verdict():
+    """As many as the verdict took, against three times as many, on arms with little damping too."""
+    rng = np.random.default_rng(2)
+    for _ in range(4):
+        case = some_case(rng)
+        verdict = sampled_verdict(case.arm, case.gains, case.chain)
+        assert verdict.is_settled
+        poles = sampled_loop(case.arm, case.gains, case.chain, count=3 * verdict.modes_used).poles
+        settled = verdict.loop.poles
+        assert poles.log_spectral_radius == pytest.approx(settled.log_spectral_radius, rel=1e-4, abs=1e-12)
+        assert (poles.log_radius > 0).sum() == (settled.log_radius > 0).sum()

@@ -1,0 +1,112 @@
+"""The verbs of the sampled loop.  Rooms are imported inside them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tfarm.cli.app import ArmName, Json, app, load_arm, whole
+
+if TYPE_CHECKING:
+    from tfarm.dsp import Chain
+
+K1 = Annotated[float, typer.Option("--K1", help="hub rate gain [N m s/rad]")]
+K2 = Annotated[float, typer.Option("--K2", help="root moment gain; a positive moment accelerates the hub")]
+Kp = Annotated[float, typer.Option("--Kp", help="hub angle gain [N m/rad]")]
+Period = Annotated[
+    float | None, typer.Option("--period", help="sample period [s]; 0.01 unless the file says otherwise")
+]
+Delay = Annotated[float | None, typer.Option("--delay-samples", help="computational delay in samples, any fraction")]
+DspFile = Annotated[
+    str | None,
+    typer.Option("--dsp", help="TOML file with [sampling], [converters], [actuator], [slew]; else the arm's own file"),
+]
+Modes = Annotated[
+    str | None, typer.Option("--modes", metavar="N", help="flexible modes; as many as it takes if not said")
+]
+
+
+@app.command()
+def sampled(
+    arm: ArmName,
+    K1: K1 = 0.3,
+    K2: K2 = 0.3,
+    Kp: Kp = 0.0,
+    period: Period = None,
+    delay_samples: Delay = None,
+    dsp: DspFile = None,
+    modes: Modes = None,
+    json: Json = False,
+) -> None:
+    """Is the loop u = -Kp theta - K1 theta_t - K2 M stable when it is sampled?  Verdict, intervals, modes, margins."""
+    count = None if modes is None else whole("--modes", modes, 1, 400)
+    subject, chain = load_arm(arm), _chain(dsp or arm, period, delay_samples)
+    from tfarm.dsp.chain import Gains
+    from tfarm.dsp.verdict import analyse, sampled_answer
+
+    answer = sampled_answer(analyse(subject, Gains(K1=K1, K2=K2, Kp=Kp), chain, count=count))
+    if json:
+        from tfarm.cli.answers import to_json
+
+        print(to_json(answer))
+    else:
+        from tfarm.cli.sampling_tables import print_sampled
+
+        print_sampled(answer)
+
+
+@app.command()
+def simulate(
+    arm: ArmName,
+    K1: K1 = 0.3,
+    K2: K2 = 0.3,
+    Kp: Kp = 0.0,
+    scenario: Annotated[str, typer.Option("--scenario", help="slew, step, decay or impulse")] = "slew",
+    duration: Annotated[float, typer.Option("--duration", help="how long [s]")] = 3.0,
+    period: Period = None,
+    delay_samples: Delay = None,
+    dsp: DspFile = None,
+    modes: Modes = None,
+    between: Annotated[str, typer.Option("--between", metavar="N", help="records between two samples")] = "0",
+    csv: Annotated[Path | None, typer.Option("--csv", help="write the signals to this file")] = None,
+    mat: Annotated[Path | None, typer.Option("--mat", help="write the signals to this MATLAB file")] = None,
+    json: Json = False,
+) -> None:
+    """The sampled loop in time: hub angle, tip, root moment and torque, exact between the samples."""
+    count, records = whole("--modes", modes or "20", 1, 400), whole("--between", between, 0, 1000)
+    subject, chain = load_arm(arm), _chain(dsp or arm, period, delay_samples)
+    from tfarm.dsp.chain import Gains
+    from tfarm.dsp.results import simulated_answer
+
+    gains = Gains(K1=K1, K2=K2, Kp=Kp)
+    answer = simulated_answer(subject, gains, chain, scenario, duration, count=count, between=records)
+    from tfarm.cli import sampling_tables
+
+    if csv is not None:
+        sampling_tables.write_signals(answer, csv)
+    if mat is not None:
+        sampling_tables.write_mat(answer, mat)
+    sampling_tables.warn_if_stopped(answer)
+    if json:
+        from tfarm.cli.answers import to_json
+
+        print(to_json(answer))
+    elif csv is None and mat is None:
+        sampling_tables.print_simulation(answer)
+
+
+def _chain(source: str, period: float | None, delay_samples: float | None) -> Chain:
+    """The chain of a file, with what the command line says instead."""
+    from dataclasses import replace
+
+    from tfarm.dsp.reading import load_chain
+
+    chain = load_chain(source)
+    sampling = chain.sampling
+    if period is not None:
+        sampling = replace(sampling, period=period)
+    if delay_samples is not None:
+        sampling = replace(sampling, delay_samples=delay_samples)
+    return replace(chain, sampling=sampling)

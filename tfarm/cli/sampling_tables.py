@@ -1,0 +1,94 @@
+"""What `tfarm sampled` and `tfarm simulate` print for a person, and the files that they write."""
+
+from __future__ import annotations
+
+import csv
+import io
+import sys
+from pathlib import Path
+from typing import Any
+
+from tfarm.cli.tables import new_table, show
+from tfarm.files import write_file
+
+SIGNALS = {
+    "t": "s",
+    "hub_angle": "rad",
+    "hub_rate": "rad/s",
+    "root_moment": "N m",
+    "tip_displacement": "m",
+    "torque": "N m",
+    "gain": "-",
+    "volts": "V",
+}
+
+
+def print_sampled(answer: dict[str, Any]) -> None:
+    """A row a mode, then the verdict."""
+    table = new_table(("mode", "rad/s", "band", "ln|z| closed loop", "open loop", "first order", "by K1", "by K2"))
+    for mode in answer["modes"]:
+        names = ("log_radius_per_sample", "open_loop_log_radius", "first_order_log_radius")
+        numbers = [mode[name] for name in (*names, "first_order_by_K1", "first_order_by_K2")]
+        frequency = f"{mode['natural_frequency_rad_s']:.6g}"
+        table.add_row(str(mode["index"]), frequency, str(mode["band"]), *(f"{x:.3e}" for x in numbers))
+    show(table)
+    print(answer["law"])
+    print(f"stable at this K2 for K1 in {_texts(answer['K1_intervals'])}")
+    print(f"stable at this K1 for K2 in {_texts(answer['K2_intervals'])}")
+    more = " or more" if answer["delay_margin_is_lower_bound"] else ""
+    print(f"further delay it bears: {answer['delay_margin_samples']:.4g} samples{more}")
+    print(f"damping C from which these gains are safe: {answer['required_damping_s']:.4g} s")
+    print(f"{answer['arm']}: {answer['verdict']}; spectral radius {answer['spectral_radius']:.12g}")
+
+
+def print_simulation(answer: dict[str, Any]) -> None:
+    """What the simulation comes to."""
+    print(f"{answer['arm']}, {answer['scenario']}: {len(answer['t'])} samples of {answer['period_s']:g} s")
+    print(f"residual root moment: {answer['residual_moment_rms']:.6g} N m rms")
+    print(f"settled (5 %) at: {answer['settling_time_s']:.4g} s")
+    print(f"saturated samples: {', '.join(f'{k} {n}' for k, n in answer['saturated_samples'].items())}")
+    if answer["limit_cycle"] is not None:
+        cycle = answer["limit_cycle"]
+        at = cycle["frequency_rad_s"]
+        print(f"limit cycle: root moment +-{cycle['root_moment_amplitude']:.4g} N m at {at:.4g} rad/s")
+    print("--json, --csv or --mat give the signals")
+
+
+def warn_if_stopped(answer: dict[str, Any]) -> None:
+    """A line on standard error where the loop ran away."""
+    if answer["stopped_at_s"] is not None:
+        what = f"mode {answer['growing_mode']}" if answer["growing_mode"] else "the hub"
+        print(f"tfarm: unstable: stopped at {answer['stopped_at_s']:.6g} s, {what} grows", file=sys.stderr)
+
+
+def write_signals(answer: dict[str, Any], path: Path) -> None:
+    """The signals at the samples as a table, written beside and then renamed."""
+    names = _present(answer)
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([f"{name} [{SIGNALS[name]}]" for name in names])
+    writer.writerows(zip(*(answer[name] for name in names), strict=True))
+    write_file(path, text.getvalue().encode(), key="--csv")
+
+
+def write_mat(answer: dict[str, Any], path: Path) -> None:
+    """The signals at the samples, and those between them, as a MATLAB file (level 5)."""
+    import numpy as np
+    from scipy.io import savemat
+
+    signals: dict[str, Any] = {name: np.array(answer[name]) for name in _present(answer)}
+    if "between" in answer:
+        signals["between"] = {name: np.array(values) for name, values in answer["between"].items()}
+    data = io.BytesIO()
+    savemat(data, signals, oned_as="column")  # type: ignore[arg-type]  # a stream will do
+    content = data.getvalue()
+    header = b"MATLAB 5.0 MAT-file, tfarm".ljust(116)  # scipy writes the date here
+    write_file(path, header + content[116:], key="--mat")
+
+
+def _present(answer: dict[str, Any]) -> list[str]:
+    return [name for name in SIGNALS if answer.get(name)]
+
+
+def _texts(windows: list[list[float]]) -> str:
+    return " and ".join(f"({low:.6g}, {high:.6g})" for low, high in windows) or "no interval"

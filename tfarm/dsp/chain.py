@@ -1,0 +1,190 @@
+"""What stands between the controller and the arm: sampling, converters, actuator, and the slew it is asked to make.
+
+Everything is ideal unless it is said otherwise.  Frozen records, checked once, SI units.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal
+
+from tfarm.arm.checks import extended, not_negative, number, positive
+from tfarm.errors import ParameterError, did_you_mean
+
+Reading = Literal["vibration", "total"]
+LEAST_BITS, MOST_BITS = 2, 32
+MOST_DELAY = 100.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sampling:
+    """The clock: `period` T [s], `delay_samples` (any fraction) from a sample to the torque that answers it.
+
+    `antialias_corner` [rad/s] is a first-order analog low-pass before the sampler, on the strain gauge and on an ideal
+    (tachometer) hub rate; inf is none.  An encoder is digital and has none.
+    """
+
+    period: float = 0.01
+    delay_samples: float = 0.0
+    antialias_corner: float = math.inf
+
+    def __post_init__(self) -> None:
+        meaning = "a sample period is a positive, finite time in seconds, 0.01 for instance"
+        object.__setattr__(self, "period", positive("sampling.period", self.period, meaning))
+        meaning = f"a computational delay is zero or positive, in samples, at most {MOST_DELAY:g}"
+        delay = not_negative("sampling.delay_samples", self.delay_samples, meaning)
+        if delay > MOST_DELAY:
+            raise ParameterError(key="sampling.delay_samples", value=delay, remedy=meaning)
+        object.__setattr__(self, "delay_samples", delay)
+        meaning = "an anti-alias corner is positive in rad/s, or inf for none"
+        object.__setattr__(self, "antialias_corner", _above_zero("sampling.antialias_corner", self, meaning))
+
+    @property
+    def whole_delay(self) -> int:
+        """d: the whole samples of delay."""
+        return math.floor(self.delay_samples)
+
+    @property
+    def fraction(self) -> float:
+        """f in [0, 1): what remains of the delay, in samples."""
+        return self.delay_samples - self.whole_delay
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Converters:
+    """The sensors and the DAC; what is left out (None) is ideal.
+
+    `encoder_counts` a revolution of the hub; `hub_rate` "ideal" or "difference" (of the encoder, through a first-order
+    filter of corner `rate_filter` [rad/s], inf for none); `moment_bits` over +-`moment_range` [N m] of the strain
+    amplifier; `torque_bits` over +-`torque_range` [N m] of the DAC; `arithmetic` of the controller, "float64" or
+    "float32" (as on a TMS320C31).  A signal beyond a range saturates, and the simulation says how often.
+    """
+
+    encoder_counts: int | None = None
+    hub_rate: Literal["ideal", "difference"] = "ideal"
+    rate_filter: float = math.inf
+    moment_bits: int | None = None
+    moment_range: float | None = None
+    torque_bits: int | None = None
+    torque_range: float | None = None
+    arithmetic: Literal["float64", "float32"] = "float64"
+
+    def __post_init__(self) -> None:
+        _whole("converters.encoder_counts", self.encoder_counts, 2, 2**31, "counts a revolution")
+        _choice("converters.hub_rate", self.hub_rate, ("ideal", "difference"))
+        _choice("converters.arithmetic", self.arithmetic, ("float64", "float32"))
+        meaning = "the corner of the rate filter is positive in rad/s, or inf for a plain difference"
+        object.__setattr__(self, "rate_filter", _above_zero("converters.rate_filter", self, meaning))
+        for signal in ("moment", "torque"):
+            self._check_converter(signal)
+
+    def _check_converter(self, signal: str) -> None:
+        bits, span = getattr(self, f"{signal}_bits"), getattr(self, f"{signal}_range")
+        _whole(f"converters.{signal}_bits", bits, LEAST_BITS, MOST_BITS, "bits")
+        if span is not None:
+            meaning = "the range +-R of a converter is a positive, finite number of N m"
+            object.__setattr__(self, f"{signal}_range", positive(f"converters.{signal}_range", span, meaning))
+        elif bits is not None:
+            remedy = f"{bits} bits of what? give the range +-R in N m too, or leave converters.{signal}_bits out"
+            raise ParameterError(key=f"converters.{signal}_range", value=span, remedy=remedy)
+
+    @property
+    def is_quantised(self) -> bool:
+        """Whether a signal is rounded to steps anywhere."""
+        return any(n is not None for n in (self.encoder_counts, self.moment_bits, self.torque_bits))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Actuator:
+    """The motor: `torque_limit` [N m] (inf: none), `motor_constant` [N m/V], so that volts = torque / constant.
+
+    `hub_damping` [N m s/rad] is analog: a back-EMF torque -hub_damping theta_t that acts between the samples too.
+    """
+
+    torque_limit: float = math.inf
+    motor_constant: float | None = None
+    hub_damping: float = 0.0
+
+    def __post_init__(self) -> None:
+        meaning = "a torque limit is positive in N m, or inf for none"
+        object.__setattr__(self, "torque_limit", _above_zero("actuator.torque_limit", self, meaning))
+        meaning = "hub damping is zero or positive, in N m s/rad"
+        damping = not_negative("actuator.hub_damping", self.hub_damping, meaning)
+        object.__setattr__(self, "hub_damping", damping)
+        if self.motor_constant is not None:
+            meaning = "a motor constant is a positive number of N m a volt; leave it out if there is none"
+            constant = positive("actuator.motor_constant", self.motor_constant, meaning)
+            object.__setattr__(self, "motor_constant", constant)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Slew:
+    """A bang-bang acceleration: tip `travel` [m] within `rise_time` [s], +a for the first half and -a for the second.
+
+    `reading` says what the moment feedback sees: "vibration" (the moment less the rigid arm's) or "total" (all of it).
+    """
+
+    travel: float = 1.15
+    rise_time: float = 1.0
+    reading: Reading = "vibration"
+
+    def __post_init__(self) -> None:
+        meaning = "tip travel is a finite number of metres, other than zero"
+        travel = number("slew.travel", self.travel, meaning)
+        positive("slew.travel", abs(travel), meaning)
+        object.__setattr__(self, "travel", travel)
+        meaning = "a rise time is a positive, finite number of seconds"
+        object.__setattr__(self, "rise_time", positive("slew.rise_time", self.rise_time, meaning))
+        _choice("slew.reading", self.reading, ("vibration", "total"))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Chain:
+    """All of it: what `[sampling]`, `[converters]`, `[actuator]` and `[slew]` of a file say."""
+
+    sampling: Sampling = field(default_factory=Sampling)
+    converters: Converters = field(default_factory=Converters)
+    actuator: Actuator = field(default_factory=Actuator)
+    slew: Slew = field(default_factory=Slew)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Gains:
+    """u = -Kp theta - K1 theta_t - K2 M + r: `K1` [N m s/rad], `K2` [-], `Kp` [N m/rad].
+
+    M is the root moment E I phi'(0) as a strain gauge reads it; a positive one accelerates the hub, and a rigid arm
+    under the torque u reads -(J - I_h)/J u.  With the opposite sign of the gauge K2 changes its sign.
+    """
+
+    K1: float
+    K2: float
+    Kp: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("K1", "K2", "Kp"):
+            meaning = "a gain is a finite number"
+            value = number(name, getattr(self, name), meaning)
+            if not abs(value) <= 1e12:
+                raise ParameterError(key=name, value=value, remedy=f"{meaning}, of at most 1e12")
+            object.__setattr__(self, name, value)
+
+
+def _above_zero(key: str, record: object, meaning: str) -> float:
+    value = extended(key, getattr(record, key.split(".")[1]), meaning)
+    if value == 0.0:
+        raise ParameterError(key=key, value=value, remedy=meaning)
+    return value
+
+
+def _whole(key: str, value: object, least: int, most: int, what: str) -> None:
+    if value is None:
+        return
+    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+        remedy = f"a whole number of {what} from {least} to {most}; leave it out for an ideal converter"
+        raise ParameterError(key=key, value=value, remedy=remedy)
+
+
+def _choice(key: str, value: object, choices: tuple[str, ...]) -> None:
+    if value not in choices:
+        raise ParameterError(key=key, value=value, remedy=did_you_mean(str(value), choices))

@@ -1,0 +1,139 @@
+"""The compiled heart of the simulation: exact steps of the modal amplitudes between the samples, and the linear law.
+
+All compiled functions stand in this one file, for numba's cache does not notice an edited callee elsewhere.  Arrays:
+
+    amplitude (m,) complex      one a pole with Im p > 0 or real, a' = p a + u
+    rigid (2,)                  double integral and integral of the torque
+    turn, push (segments, m)    e^{p dt}, (e^{p dt} - 1)/p of each piece of a sample between two switches or records
+    piece (segments, 3)         its duration, 1 where the new torque acts already, 1 where it ends at a record
+    weights (outputs, m)        outputs = Re(weights amplitude) + rates (outputs, 2) rigid + static (outputs,) torque
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from tfarm.exact.compiled import compiled
+
+ANGLE, MOMENT, TORQUE = 0, 1, 2
+
+
+@compiled
+def read(weights: Any, rates: Any, static: Any, amplitude: Any, rigid: Any, torque: float, out: Any) -> None:
+    """The outputs under the torque that acts now."""
+    for o in range(weights.shape[0]):
+        value = rates[o, 0] * rigid[0] + rates[o, 1] * rigid[1] + static[o] * torque
+        for i in range(amplitude.size):
+            value += weights[o, i].real * amplitude[i].real - weights[o, i].imag * amplitude[i].imag
+        out[o] = value
+
+
+@compiled
+def advance(
+    tables: Any, amplitude: Any, rigid: Any, old: float, new: float, push_on: float, fine: Any, work: Any
+) -> None:
+    """One sample on: `old` torque up to the switch, `new` after it, `push_on` (a disturbance) throughout.
+
+    Fills a row of `fine` at each record; adds the work done on the hub [J] to work[0] and its size to work[1].
+    """
+    turn, push, piece, weights, rates, static, hub = tables
+    row = 0
+    before = _angle(hub, amplitude, rigid)
+    for s in range(piece.shape[0]):
+        torque = (new if piece[s, 1] > 0.5 else old) + push_on
+        dt = piece[s, 0]
+        for i in range(amplitude.size):
+            amplitude[i] = turn[s, i] * amplitude[i] + push[s, i] * torque
+        rigid[0] += dt * rigid[1] + 0.5 * dt * dt * torque
+        rigid[1] += dt * torque
+        after = _angle(hub, amplitude, rigid)
+        done = torque * (after - before)
+        work[0] += done
+        work[1] += abs(done)
+        before = after
+        if piece[s, 2] > 0.5 and row < fine.shape[0]:
+            read(weights, rates, static, amplitude, rigid, torque, fine[row])
+            row += 1
+
+
+@compiled
+def _angle(hub: Any, amplitude: Any, rigid: Any) -> float:
+    """The hub angle of the modes at hand, without the static remainder."""
+    value = hub[0].real * rigid[0] + hub[1].real * rigid[1]
+    for i in range(amplitude.size):
+        value += hub[i + 2].real * amplitude[i].real - hub[i + 2].imag * amplitude[i].imag
+    return value
+
+
+@compiled
+def quantise(value: float, row: Any, saturated: Any, which: int) -> float:
+    """`value` on the steps of a converter, clipped to its range; counts what is clipped."""
+    step, low, high = row[0], row[1], row[2]
+    if step > 0.0:
+        value = np.rint(value / step) * step
+    if value > high:
+        saturated[which] += 1
+        return high
+    if value < low:
+        saturated[which] += 1
+        return low
+    return value
+
+
+@compiled
+def estimate(angle: float, rate: float, memory: Any, filter_: Any) -> float:
+    """The hub rate as the controller knows it: its own reading, or the filtered difference of the encoder."""
+    if filter_[0] < 0.5:
+        return rate
+    if memory[2] < 0.5:
+        memory[0], memory[2] = angle, 1.0
+    a = filter_[1]
+    memory[1] = a * memory[1] + (1.0 - a) * (angle - memory[0]) / filter_[2]
+    memory[0] = angle
+    return memory[1]
+
+
+@compiled
+def law(gains: Any, K2: float, ideal: Any, angle: float, rate: float, moment: float, single: bool) -> float:
+    """u = r + Kp (theta_ref - theta) + K1 (theta_t_ref - theta_t) - K2 (M - M_rigid), in float64 or float32.
+
+    `gains` is Kp, K1; `ideal` is r, theta_ref, theta_t_ref, M_rigid.
+    """
+    if single:
+        f = np.float32
+        by_angle = f(gains[0]) * (f(ideal[1]) - f(angle))
+        by_rate = f(gains[1]) * (f(ideal[2]) - f(rate))
+        by_moment = f(K2) * (f(moment) - f(ideal[3]))
+        return float(f(f(f(f(ideal[0]) + by_angle) + by_rate) - by_moment))
+    by_angle = gains[0] * (ideal[1] - angle)
+    return ideal[0] + by_angle + gains[1] * (ideal[2] - rate) - K2 * (moment - ideal[3])
+
+
+@compiled
+def run(
+    tables: Any, amplitude: Any, rigid: Any, held: Any, delay: int, gains: Any, K2: Any, ideal: Any, disturbance: Any,
+    rows: Any, filter_: Any, single: bool, bound: float, record: Any, torque: Any, fine: Any, saturated: Any, work: Any,
+) -> int:  # fmt: skip
+    """The linear law over all samples; returns how many were made before the root moment passed `bound`.
+
+    Outputs 0, 1, 2 are what is measured (hub angle, hub rate, root moment through their analog filters).  `held` is a
+    ring of the last delay + 2 torques.  `record` (n, outputs), `torque` (n,) and `fine` (n, records, outputs) are
+    filled.
+    """
+    weights, rates, static = tables[3], tables[4], tables[5]
+    n, ring, memory = torque.size, held.size, np.zeros(3)
+    for k in range(n):
+        acting = held[(k - delay - 1) % ring]
+        extra = disturbance[k - 1] if k > 0 else 0.0
+        read(weights, rates, static, amplitude, rigid, acting + extra, record[k])
+        if not abs(record[k, 2]) <= bound:
+            return k
+        angle = quantise(record[k, 0], rows[ANGLE], saturated, ANGLE)
+        moment = quantise(record[k, 2], rows[MOMENT], saturated, MOMENT)
+        rate = estimate(angle, record[k, 1], memory, filter_)
+        u = quantise(law(gains, K2[k], ideal[k], angle, rate, moment, single), rows[TORQUE], saturated, TORQUE)
+        held[k % ring] = torque[k] = u
+        advance(tables, amplitude, rigid, acting, held[(k - delay) % ring], disturbance[k], fine[k], work)
+    return n

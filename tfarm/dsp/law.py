@@ -1,0 +1,138 @@
+"""What sampling does to each mode, to first order in the gains, and what it really does at finite gains.
+
+To first order a mode of frequency w and hub participation b changes by, q = w T, delay d samples (any fraction),
+
+    ln|z| per sample = -b^2 sin(q/2) [ (K1/w) cos((d + 1/2) q) + K2 I_h sin((d + 1/2) q) ]
+
+At d = 0 the hub rate damps from 0 to 1/(2T) [Hz] and destabilises from there to 1/T, and so on in bands; K2 > 0 never
+destabilises.  At finite gains the closed-loop pole itself says it: it is followed from zero gain.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+
+from tfarm.dsp.boundary import GainName
+from tfarm.dsp.chain import Gains
+from tfarm.dsp.loop import SampledLoop
+from tfarm.spectrum import modes
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complexfloating[Any, Any]]
+
+STEPS = 24  # of the continuation from zero gain
+SETTLED = -20.0  # modes that lose more than this in ln|a| between two samples are not listed
+
+
+@dataclass(frozen=True)
+class ModeTable:
+    """A row a mode that outlives a sample.
+
+    `log_radius`: ln|z| of the closed-loop pole that it becomes; `first_order` is the formula's change of it, the sum of
+    `by_rate` (K1) and `by_moment` (K2); `by_damping`: Re(p) T, from the arm's own C (and analog hub damping).
+    `band`: 0 from 0 to 1/(2T) [Hz], and so on; `aliased`: where the samples see the mode [rad/s].
+    """
+
+    index: NDArray[np.int64]
+    natural_frequency: Real
+    band: NDArray[np.int64]
+    aliased: Real
+    by_rate: Real
+    by_moment: Real
+    by_damping: Real
+    log_radius: Real
+
+    @property
+    def first_order(self) -> Real:
+        """The formula: change of ln|z| per sample by both gains."""
+        return self.by_rate + self.by_moment
+
+
+def first_order_law(w: Any, b: Any, hub_inertia: float, gains: Gains, period: float, delay: float) -> tuple[Any, Any]:
+    """The two terms of the formula, by K1 and by K2, for modes of frequency w [rad/s] and hub participation b."""
+    q = w * period
+    common = -(b**2) * np.sin(q / 2)
+    by_rate = common * gains.K1 / w * np.cos((delay + 0.5) * q)
+    return by_rate, common * gains.K2 * hub_inertia * np.sin((delay + 0.5) * q)
+
+
+def mode_table(loop: SampledLoop) -> ModeTable:
+    """The modes of a loop one by one."""
+    pulse = loop.pulse
+    own = np.asarray(pulse.poles.real * pulse.sampling.period, dtype=float)
+    upper = np.nonzero((pulse.poles.imag > 0) & (pulse.mode > 0) & (own > SETTLED))[0]
+    upper = upper[np.argsort(pulse.mode[upper])]
+    index = pulse.mode[upper]
+    table = modes(pulse.plant.arm, max(1, int(index.max(initial=1))))
+    flexible = np.searchsorted(table.index, index)
+    w, b = table.natural_frequency[flexible], table.hub_participation[flexible]
+    T, arm = pulse.sampling.period, pulse.plant.arm
+    by_rate, by_moment = first_order_law(w, b, arm.hub.inertia, loop.gains, T, pulse.sampling.delay_samples)
+    turns, origin = np.round(w * T / (2 * np.pi)), origins(loop)
+    return ModeTable(
+        index=index,
+        natural_frequency=w,
+        band=np.floor(w * T / np.pi).astype(np.int64),
+        aliased=abs(w - turns * 2 * np.pi / T),
+        by_rate=by_rate,
+        by_moment=by_moment,
+        by_damping=own[upper],
+        log_radius=loop.poles.log_radius[[int(np.nonzero(origin == i)[0][0]) for i in upper]],
+    )
+
+
+def root_locus(loop: SampledLoop, gain: GainName, values: Real) -> Complex:
+    """Closed-loop poles (values, poles) as one gain takes these values, each column one continuous branch.
+
+    The other gains are those of the loop.  Values are taken as they are: give them close enough to tell branches apart.
+    """
+    rows: list[Complex] = []
+    for value in values:
+        K1, K2 = (value, loop.gains.K2) if gain == "K1" else (loop.gains.K1, value)
+        z = loop.with_gains(float(K1), float(K2)).poles.z
+        rows.append(z if not rows else z[_matched(_ahead(rows), z)])
+    return np.array(rows)
+
+
+def origins(loop: SampledLoop) -> NDArray[np.int64]:
+    """For each closed-loop pole the open-loop pole (its number in `PulseTransfer.poles`) that it comes from, or -1.
+
+    All gains grow together from nearly zero, and each pole is followed.
+    """
+    labels = np.nonzero(loop.pulse.poles != 0)[0]
+    ahead, rows = loop.pulse.multipliers[labels], []
+    for scale in np.r_[1e-6, np.arange(1, STEPS + 1) / STEPS]:
+        poles = _scaled(loop, float(scale)).poles
+        order = _matched(ahead, poles.z)
+        rows.append(poles.z[order])
+        ahead = _ahead(rows)
+    origin = np.full(poles.z.size, -1)
+    origin[order] = labels
+    return origin
+
+
+def growing_mode(loop: SampledLoop) -> int:
+    """The flexible mode whose closed-loop pole has the largest radius; 0 for the hub, a filter or the delay."""
+    origin = int(origins(loop)[loop.poles.log_radius.argmax()])
+    return 0 if origin < 0 else int(loop.pulse.mode[origin])
+
+
+def _scaled(loop: SampledLoop, scale: float) -> SampledLoop:
+    gains = loop.gains
+    return replace(loop, gains=Gains(K1=scale * gains.K1, K2=scale * gains.K2, Kp=scale * gains.Kp))
+
+
+def _ahead(rows: list[Complex]) -> Complex:
+    """Where the branches should be next."""
+    return rows[-1] if len(rows) < 3 else 2 * rows[-1] - rows[-2]
+
+
+def _matched(ahead: Complex, z: Complex) -> NDArray[np.int64]:
+    """Which pole continues which branch: the assignment with the shortest way in all."""
+    _, order = linear_sum_assignment(abs(ahead[:, None] - z))
+    return order

@@ -1,0 +1,211 @@
+"""The sampled closed loop: its matrix, its poles with growths that are resolved below the last bit of 1, its verdict.
+
+    u_k = -Kp theta_k - K1 theta_t,k - K2 M_k + r_k,   M the root moment E I phi'(0) as a strain gauge reads it
+
+    F(z) = 1 + Kp Theta(z) + K1 R(z) + K2 M(z) = 0
+
+Matrix eigenvalues are right to about 1e-14, and a mode may grow by 1e-10 a sample.  So each is polished as an offset
+delta from the nearest open-loop pole e^{pT}, by the secant method on delta F(e^{pT} + delta), which is computed without
+loss; then ln|z| = Re(pT) + ln|1 + delta e^{-pT}|.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import Arm
+from tfarm.dsp.chain import Chain, Gains, Sampling
+from tfarm.dsp.plant import Plant, loop_plant
+from tfarm.dsp.sampling import PulseTransfer
+from tfarm.errors import ParameterError
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complexfloating[Any, Any]]
+Whole = NDArray[np.int64]
+
+ANGLE, RATE, MOMENT = 0, 1, 2
+TINY = 1e-30  # stands for zero where a root sits on the filter's own pole, which it does where nothing is fed back
+UNMOVED = 1e-50  # an offset this small is a pole that the loop does not move
+FAINT = 0.2  # a pole nearer to z = 0 decides nothing and is not polished
+
+
+@dataclass(frozen=True)
+class Poles:
+    """Closed-loop poles `z` and `log_radius` ln|z| of each, the z = 1 of a hub angle that nothing regulates left out.
+
+    `mode` is the flexible mode of the open-loop pole that is nearest (0: none).
+    """
+
+    z: Complex
+    log_radius: Real
+    mode: Whole
+
+    @property
+    def log_spectral_radius(self) -> float:
+        """The largest ln|z|."""
+        return float(self.log_radius.max())
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether all lie inside the unit circle; nothing is rounded."""
+        return self.log_spectral_radius < 0.0
+
+
+@dataclass(frozen=True)
+class SampledLoop:
+    """The arm under the control law at the samples of a chain: `plant` from torque to what is measured, and `gains`."""
+
+    plant: Plant
+    chain: Chain
+    gains: Gains
+
+    @cached_property
+    def pulse(self) -> PulseTransfer:
+        """The pulse transfer functions to hub angle, hub rate and root moment."""
+        return PulseTransfer(self.plant, self.chain.sampling).folded()
+
+    def with_gains(self, K1: float, K2: float) -> SampledLoop:
+        """The same loop with other gains."""
+        return replace(self, gains=Gains(K1=K1, K2=K2, Kp=self.gains.Kp))
+
+    def with_delay(self, samples: float) -> SampledLoop:
+        """The same loop with another computational delay."""
+        return replace(self, chain=replace(self.chain, sampling=replace(self.chain.sampling, delay_samples=samples)))
+
+    @property
+    def differences(self) -> bool:
+        """Whether the hub rate is the filtered difference of the encoder."""
+        return self.chain.converters.hub_rate == "difference"
+
+    @property
+    def has_free_angle(self) -> bool:
+        """Whether the hub angle is a pole at z = 1 that nothing regulates."""
+        return self.gains.Kp == 0.0 and bool(self.plant.rigid[ANGLE].any())
+
+    @property
+    def smoothing(self) -> float:
+        """The pole a of the rate filter (1 - a)/(1 - a/z); 0 is none."""
+        return float(np.exp(-self.chain.converters.rate_filter * self.chain.sampling.period))
+
+    # ------------------------------------------------------------ characteristic function
+
+    def signals(self, z: Complex, base: Whole | None, offset: Any) -> tuple[Complex, Complex, Complex]:
+        """offset (1 + Kp Theta), offset R and offset M at z = e^{pT} + offset, p the pole number `base`."""
+        angle, rate, moment = self.pulse.scaled(z, base, offset)
+        if self.differences:
+            a, T = self.smoothing, self.chain.sampling.period
+            step = z - 1.0
+            if base is not None:
+                step = np.where(base == self.pulse.poles.size - 1, offset, step)
+            lag = np.where(z == a, TINY, z - a)
+            rate = angle * step * ((1 - a) / T) / lag
+        return offset + self.gains.Kp * angle, rate, moment
+
+    def characteristic(self, z: Complex, base: Whole | None, offset: Any) -> Complex:
+        """offset F(z)."""
+        rest, rate, moment = self.signals(z, base, offset)
+        return rest + self.gains.K1 * rate + self.gains.K2 * moment
+
+    def __call__(self, z: Complex) -> Complex:
+        """F(z) at an array of z."""
+        z = np.asarray(z, dtype=complex)
+        return self.characteristic(z.ravel(), None, np.ones(z.size)).reshape(z.shape)
+
+    # ------------------------------------------------------------ poles
+
+    def matrix(self) -> Real:
+        """The closed-loop matrix with the hub angle: states of `PulseTransfer.matrices`, then of the rate filter."""
+        A, B, C = self.pulse.matrices()
+        K1, K2, Kp = self.gains.K1, self.gains.K2, self.gains.Kp
+        n, feedback = len(A), Kp * C[ANGLE] + K2 * C[MOMENT]
+        if not self.differences:
+            closed: Real = A - np.outer(B, feedback + K1 * C[RATE])
+            return closed
+        a, T = self.smoothing, self.chain.sampling.period
+        whole, drive = np.zeros((n + 2, n + 2)), np.r_[B, 0.0, 0.0]
+        whole[:n, :n] = A
+        rate = np.r_[(1 - a) / T * C[ANGLE], -(1 - a) / T, a]  # states: the angle and the rate of the sample before
+        whole[n, :n] = C[ANGLE]
+        whole[n + 1] = rate
+        return whole - np.outer(drive, np.r_[feedback, 0.0, 0.0] + K1 * rate)
+
+    def reduced_matrix(self) -> Real:
+        """The closed-loop matrix without the pole z = 1 of a free hub angle, or of a hub that cannot drift."""
+        A, first = self.matrix(), 2 * self.pulse.kept()[0].size + self.pulse.kept()[1].size
+        rigid = self.plant.rigid[ANGLE]
+        if not rigid.any():  # neither integral of the torque is felt
+            return np.delete(np.delete(A, [first, first + 1], 0), [first, first + 1], 1)
+        if rigid[0] == 0.0:  # a damped hub: the angle feels the single integral alone
+            A = np.delete(np.delete(A, first, 0), first, 1)
+        if not self.has_free_angle:
+            return A
+        shift = np.zeros(len(A))
+        shift[first] = 1.0
+        if self.differences:
+            shift[-2] = rigid[0] or rigid[1]
+        others = np.arange(len(A)) != first
+        quotient: Real = A[others][:, others] - np.outer(shift[others], A[first, others])
+        return quotient
+
+    @cached_property
+    def poles(self) -> Poles:
+        """The closed-loop poles, polished."""
+        z = np.linalg.eigvals(self.reduced_matrix()).astype(complex)
+        open_loop = self.pulse.multipliers
+        base = abs(z[:, None] - open_loop).argmin(axis=1)
+        with np.errstate(divide="ignore"):
+            log_radius = np.maximum(np.log(abs(z)), -745.0)
+        bright = (abs(z) > FAINT) & (abs(open_loop[base]) > FAINT)
+        if bright.any():
+            offset = self._polished(z[bright], base[bright])
+            ratio = offset / open_loop[base[bright]]
+            own = self.pulse.poles[base[bright]].real * self.chain.sampling.period
+            log_radius[bright] = own + np.log1p(2 * ratio.real + abs(ratio) ** 2) / 2
+            z[bright] = open_loop[base[bright]] + offset
+        return Poles(z, log_radius, self.pulse.mode[base])
+
+    def _polished(self, z: Complex, base: Whole) -> Complex:
+        """Offsets of the roots from their open-loop poles, by the secant method where it does not stray."""
+        open_loop = self.pulse.multipliers[base]
+        start = z - open_loop
+        start = np.where(start == 0, 1e-17, start)
+        old = start * (1 + 1e-4) + 1e-18
+        new, f_old = start, self.characteristic(open_loop + old, base, old)
+        for _ in range(8):
+            f_new = self.characteristic(open_loop + new, base, new)
+            slope = f_new - f_old
+            step = np.where(slope == 0, 0.0, f_new * (new - old) / np.where(slope == 0, 1.0, slope))
+            old, f_old, new = new, f_new, np.where(abs(new - step) < UNMOVED, UNMOVED, new - step)
+        near = abs(new - start) <= 1e-9 + 1e-3 * abs(start)
+        offset = np.where(near, new, start)
+        return np.where(abs(offset) <= UNMOVED, 0.0, offset)
+
+
+def sampled_loop(arm: Arm, gains: Gains, chain: Chain | None = None, *, count: int = 20) -> SampledLoop:
+    """The loop with `count` flexible modes.  Raises ParameterError for a locked hub, and for I_h = 0 with K2 != 0."""
+    chain = Chain() if chain is None else chain
+    check_loop(arm, gains)
+    return SampledLoop(loop_plant(arm, chain, count), chain, gains)
+
+
+def check_loop(arm: Arm, gains: Gains) -> None:
+    """Refuse the loop that does not exist: I_h = 0 and K2 != 0."""
+    if arm.hub.inertia == 0.0 and gains.K2 != 0.0:
+        remedy = (
+            "with hub.inertia = 0 the root moment is -u itself, so that moment feedback is an algebraic loop; "
+            "give the hub an inertia, or set K2 = 0"
+        )
+        raise ParameterError(key="K2", value=gains.K2, remedy=remedy)
+
+
+def closed_loop(
+    arm: Arm, K1: float, K2: float, Kp: float = 0.0, sampling: Sampling | None = None, *, count: int = 20
+) -> Real:
+    """The discrete closed-loop matrix of u = -Kp theta - K1 theta_t - K2 M with the hub angle: `SampledLoop.matrix`."""
+    chain = Chain(sampling=Sampling() if sampling is None else sampling)
+    return sampled_loop(arm, Gains(K1=K1, K2=K2, Kp=Kp), chain, count=count).matrix()

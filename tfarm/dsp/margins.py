@@ -1,0 +1,160 @@
+"""How far a sampled loop is from its edges: intervals of the gains, delay, and the damping that would make it safe."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from tfarm.arm import Arm
+from tfarm.dsp.boundary import GainName, circle_grid, crossings
+from tfarm.dsp.chain import Chain, Gains
+from tfarm.dsp.loop import MOMENT, RATE, SampledLoop, sampled_loop
+from tfarm.dsp.sampling import FORGOTTEN, held
+from tfarm.errors import ConvergenceError
+from tfarm.spectrum import modes, modes_below
+
+Window = tuple[float, float]
+
+LONGEST_DELAY = 20.0  # samples: the delay margin is looked for up to here
+MOST_STEPS = 2000
+FEW = 2  # modes kept beyond the last one that outlives a sample
+STRONGEST = 0.15  # of critical in the first mode: no stronger damping is looked at
+DECADES = 16  # down from there
+
+
+@dataclass(frozen=True)
+class DelayMargin:
+    """`samples` of further delay that the loop bears; `is_bound` where none up to there makes it unstable."""
+
+    samples: float
+    is_bound: bool
+
+
+def stable_windows(loop: SampledLoop, gain: GainName) -> list[Window]:
+    """Every open interval of one gain in which the loop is stable, the other gains as they are.
+
+    Between two crossings of the unit circle the count of unstable poles is constant: it follows from the count at one
+    gain, and where it is zero the poles themselves confirm it.
+    """
+    other = loop.gains.K2 if gain == "K1" else loop.gains.K1
+    found = crossings(circle_grid(loop), gain, other)
+    edges = np.r_[-math.inf, found.gain, math.inf]
+    middles = _middles(found.gain)
+    totals = np.r_[0, np.cumsum(found.count)]
+    lowest = totals == totals.min()  # the count is the same up to a constant: only its minima can be zero
+    windows: list[Window] = []
+    for i in np.nonzero(lowest)[0]:
+        K1, K2 = (middles[i], other) if gain == "K1" else (other, middles[i])
+        if edges[i] < edges[i + 1] and loop.with_gains(K1, K2).poles.is_stable:
+            windows.append((float(edges[i]), float(edges[i + 1])))
+    return joined(windows)
+
+
+def _middles(gain: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A gain inside each gap."""
+    if not gain.size:
+        return np.zeros(1)
+    beyond = max(1.0, abs(gain).max())
+    return np.r_[gain[0] - beyond, (gain[1:] + gain[:-1]) / 2, gain[-1] + beyond]
+
+
+def joined(windows: list[Window]) -> list[Window]:
+    """Neighbours with a common edge are one (two crossings that cancel)."""
+    merged: list[Window] = []
+    for low, high in windows:
+        if merged and merged[-1][1] == low:
+            merged[-1] = (merged[-1][0], high)
+        else:
+            merged.append((low, high))
+    return merged
+
+
+def around(windows: list[Window], gain: float) -> Window | None:
+    """The window that a gain lies in."""
+    return next((window for window in windows if window[0] < gain < window[1]), None)
+
+
+def delay_margin(loop: SampledLoop) -> DelayMargin:
+    """How many samples of further delay, any fraction, until a stable loop is stable no more; 0 if it is not stable.
+
+    Scanned finely enough for the fastest mode that the loop can drive unstable, then bisected to 1e-10.
+    """
+    now = loop.chain.sampling.delay_samples
+
+    def log_radius(more: float) -> float:
+        return loop.with_delay(now + more).poles.log_spectral_radius
+
+    if log_radius(0.0) >= 0:
+        return DelayMargin(0.0, False)
+    step = _delay_step(loop)
+    for i in range(1, MOST_STEPS + 1):
+        if i * step > LONGEST_DELAY:
+            break
+        if log_radius(i * step) >= 0:
+            return DelayMargin(float(brentq(log_radius, (i - 1) * step, i * step, xtol=1e-10)), False)
+    return DelayMargin(min(MOST_STEPS * step, LONGEST_DELAY), True)
+
+
+def _delay_step(loop: SampledLoop) -> float:
+    """A twelfth of the turn, in samples, of the fastest mode whose own damping the feedback could outweigh."""
+    plant, T = loop.plant, loop.chain.sampling.period
+    push = abs(loop.gains.K1 * plant.residues[RATE]) + abs(loop.gains.K2 * plant.residues[MOMENT])
+    reach = 4 * push * abs(held(plant.poles, T))
+    risky = (reach > -plant.poles.real * T) & (plant.poles.imag > 0)
+    fastest = (plant.poles.imag[risky] * T).max(initial=np.pi / 4)
+    return float(min(0.05, 2 * np.pi / fastest / 12))
+
+
+def required_damping(arm: Arm, gains: Gains, chain: Chain, *, count: int = 40) -> float:
+    """The smallest C [s] from which on these gains are stable on this arm (its own C is set aside).
+
+    0 where they are stable without damping, inf where none up to 15 % of critical in the first mode helps.  Every
+    decade is looked at from there down, so that larger ones on that grid are stable too; the edge is found to 1e-6.
+    """
+
+    def log_radius(log_C: float) -> float:
+        return _with_damping(arm, gains, chain, math.exp(log_C), count)
+
+    if sampled_loop(_damped(arm, 0.0), gains, chain, count=count).poles.is_stable:
+        return 0.0
+    first = float(modes(arm, 1).natural_frequency[-1])
+    high = math.log(2 * STRONGEST / first)
+    if log_radius(high) >= 0:
+        return math.inf
+    for _ in range(DECADES):
+        low = high - math.log(10)
+        if log_radius(low) >= 0:
+            return math.exp(brentq(log_radius, low, high, xtol=5e-7)) * (1 + 1e-6)
+        high = low
+    return math.exp(high)
+
+
+def _with_damping(arm: Arm, gains: Gains, chain: Chain, C: float, count: int) -> float:
+    """The log spectral radius at C; where two damped modes are one there, at a C that differs by 1e-6.
+
+    Modes that a strong C has settled before the next sample are left to the static remainder, but for a few.
+    """
+    count = min(count, FEW + alive(_damped(arm, C), chain))
+    for nudge in (0.0, 1e-6, -1e-6):
+        try:
+            loop = sampled_loop(_damped(arm, C * (1 + nudge)), gains, chain, count=count)
+        except ConvergenceError:
+            if nudge < 0:
+                raise
+            continue
+        return loop.poles.log_spectral_radius
+    raise AssertionError("unreachable")
+
+
+def alive(arm: Arm, chain: Chain) -> int:
+    """How many bending modes of a damped arm outlive the rest of a sample: C w^2 T (1 - f)/2 below 40."""
+    remaining = chain.sampling.period * (1 - chain.sampling.fraction)
+    return modes_below(arm, math.sqrt(2 * FORGOTTEN / (arm.link.damping * remaining)))
+
+
+def _damped(arm: Arm, C: float) -> Arm:
+    return replace(arm, link=replace(arm.link, damping=C))

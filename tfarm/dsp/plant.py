@@ -1,0 +1,156 @@
+"""The analog plant that is sampled: poles and residues of the modal model, with an analog filter and analog hub
+damping.
+
+    G_o(s) = rigid[o,0]/s^2 + rigid[o,1]/s + static[o] + sum over poles of residues[o,i]/(s - poles[i])
+
+A first-order filter wc/(s + wc) on an output adds one pole and changes residues; so does hub damping, which moves the
+poles.  Both stay in this form, and the discretisation knows nothing of them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+
+from tfarm.arm import Arm
+from tfarm.dsp.chain import Chain
+from tfarm.dsp.remainder import with_slow_remainder
+from tfarm.errors import ParameterError
+from tfarm.reduced import ModalModel, modal_model
+from tfarm.response import transfer
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complexfloating[Any, Any]]
+
+MEASURED = ("hub_angle", "hub_rate", "root_moment")
+RECORDED = ("hub_angle", "hub_rate", "root_moment", "tip_displacement")
+
+
+@dataclass(frozen=True)
+class Plant:
+    """Poles (m,) [1/s] other than s = 0, conjugates listed too; residues (outputs, m), rigid (outputs, 2), static
+    (outputs,).
+
+    `mode` (m,) is the flexible mode that a pole belongs to; 0 for those of a filter or the damped hub.
+    """
+
+    arm: Arm
+    outputs: tuple[str, ...]
+    poles: Complex
+    residues: Complex
+    rigid: Real
+    static: Real
+    mode: NDArray[np.int64]
+
+    def __call__(self, s: complex) -> Complex:
+        """G_o(s) of every output at one s."""
+        value: Complex = self.rigid @ np.array([1 / s**2, 1 / s]) + self.static + self.residues @ (1 / (s - self.poles))
+        return value
+
+    def rows(self, names: Sequence[str]) -> Plant:
+        """The plant with these outputs alone, in this order."""
+        at = [self.outputs.index(name) for name in names]
+        return replace(
+            self, outputs=tuple(names), residues=self.residues[at], rigid=self.rigid[at], static=self.static[at]
+        )
+
+    @property
+    def count(self) -> int:
+        """The last flexible mode in it."""
+        return int(self.mode.max(initial=0))
+
+
+def loop_plant(arm: Arm, chain: Chain, count: int) -> Plant:
+    """What the controller of a chain measures: hub angle, hub rate and root moment through their analog filters.
+
+    Raises ParameterError for a locked hub, which no torque turns.
+    """
+    return filtered(undelayed_plant(arm, chain, MEASURED, count), chain)
+
+
+def undelayed_plant(arm: Arm, chain: Chain, outputs: Sequence[str], count: int) -> Plant:
+    """The arm with `count` flexible modes and the actuator's analog hub damping, its outputs not filtered."""
+    if arm.is_locked:
+        remedy = "a locked hub has no loop: no torque turns it; give a finite inertia"
+        raise ParameterError(key="hub.inertia", value=math.inf, remedy=remedy)
+    damping = chain.actuator.hub_damping
+    if damping > 0 and arm.hub.inertia == 0.0:
+        remedy = (
+            "a hub without inertia has no model of finite order under hub damping; give hub.inertia, or leave it out"
+        )
+        raise ParameterError(key="actuator.hub_damping", value=damping, remedy=remedy)
+    model = modal_model(arm, list(outputs), count)
+    plant = _with_hub_damping(arm, outputs, count, damping) if damping > 0 else _of_model(model)
+    exact = transfer(arm, [*outputs, "hub_rate"])
+
+    def values(s: Complex) -> Complex:
+        G = exact(s)
+        damped: Complex = G[:-1] / (1 + damping * G[-1])
+        return damped
+
+    return with_slow_remainder(plant, values, float(model.natural_frequency.max(initial=0.0)))
+
+
+def filtered(plant: Plant, chain: Chain) -> Plant:
+    """The analog anti-alias filter on the strain gauge and, unless the encoder is differenced, on the hub rate."""
+    corner = chain.sampling.antialias_corner
+    if math.isinf(corner):
+        return plant
+    analog = ("root_moment",) if chain.converters.hub_rate == "difference" else ("root_moment", "hub_rate")
+    return with_filter(plant, [plant.outputs.index(name) for name in analog if name in plant.outputs], corner)
+
+
+def with_filter(plant: Plant, rows: Sequence[int], corner: float) -> Plant:
+    """wc/(s + wc) after some outputs: a pole at -wc, with the residue wc G(-wc)."""
+    residues = np.c_[plant.residues, np.zeros(len(plant.outputs), complex)]
+    rigid, static = plant.rigid.copy(), plant.static.copy()
+    at_corner = plant(-corner)
+    for row in rows:
+        residues[row, :-1] *= corner / (plant.poles + corner)
+        residues[row, -1] = corner * at_corner[row].real
+        rigid[row, 1] -= rigid[row, 0] / corner
+        static[row] = 0.0
+    return replace(
+        plant,
+        poles=np.r_[plant.poles, -corner],
+        residues=residues,
+        rigid=rigid,
+        static=static,
+        mode=np.r_[plant.mode, 0],
+    )
+
+
+def _of_model(model: ModalModel) -> Plant:
+    poles = model.eigenvalues.ravel()
+    residues = model.residues.reshape(len(model.outputs), poles.size)
+    mode = np.repeat(model.index, 2)
+    return Plant(model.arm, model.outputs, poles, residues, model.rigid, model.static, mode)
+
+
+def _with_hub_damping(arm: Arm, outputs: Sequence[str], count: int, damping: float) -> Plant:
+    """The poles and residues of the modal model under the torque -damping theta_t, by its eigenvectors."""
+    names = [*outputs, "hub_rate"]
+    model = modal_model(arm, names, count)
+    A, B, C, D = model.matrices()
+    share = 1 / (1 + damping * D[-1, 0])
+    A, C, D, B = A - damping * share * B @ C[-1:], C - damping * share * D @ C[-1:], D * share, B * share
+    poles, right = np.linalg.eig(A)
+    drive = np.linalg.solve(right, B.astype(complex))[:, 0]
+    residues = (C @ right) * drive
+    rigid = np.zeros((len(names), 2))
+    if model.has_rigid_states:  # turning the whole arm by an angle costs nothing: that pole is exactly zero
+        zero = int(np.argmin(abs(poles)))
+        rigid[:, 1] = np.where(model.rigid[:, 0] != 0, residues[:, zero].real, 0.0)
+        poles, residues = np.delete(poles, zero), np.delete(residues, zero, axis=1)
+    own = model.eigenvalues.ravel()
+    mode = np.zeros(poles.size, np.int64)
+    new, old = linear_sum_assignment(abs(poles[:, None] - own))
+    mode[new] = np.repeat(model.index, 2)[old]
+    damped = Plant(arm, tuple(names), poles, residues, rigid, D[:, 0], mode)
+    return damped.rows(outputs)

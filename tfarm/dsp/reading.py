@@ -1,0 +1,108 @@
+"""The tables [sampling], [converters], [actuator] and [slew] of a TOML file: the arm's own, or one beside it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from tfarm.arm.reading import load_tables
+from tfarm.dsp.chain import Actuator, Chain, Converters, Sampling, Slew
+from tfarm.errors import ParameterError, did_you_mean
+
+RECORDS = {"sampling": Sampling, "converters": Converters, "actuator": Actuator, "slew": Slew}
+OF_AN_ARM = ("name", "assumptions", "link", "hub", "payload")
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class SamplingTable(_Table):
+    """[sampling]."""
+
+    period: float | None = None
+    delay_samples: float | None = None
+    antialias_corner: float | None = None
+
+
+class ConvertersTable(_Table):
+    """[converters]."""
+
+    encoder_counts: int | None = None
+    hub_rate: Literal["ideal", "difference"] | None = None
+    rate_filter: float | None = None
+    moment_bits: int | None = None
+    moment_range: float | None = None
+    torque_bits: int | None = None
+    torque_range: float | None = None
+    arithmetic: Literal["float64", "float32"] | None = None
+
+
+class ActuatorTable(_Table):
+    """[actuator]."""
+
+    torque_limit: float | None = None
+    motor_constant: float | None = None
+    hub_damping: float | None = None
+
+
+class SlewTable(_Table):
+    """[slew]."""
+
+    travel: float | None = None
+    rise_time: float | None = None
+    reading: Literal["vibration", "total"] | None = None
+
+
+TABLES: dict[str, type[_Table]] = {
+    "sampling": SamplingTable,
+    "converters": ConvertersTable,
+    "actuator": ActuatorTable,
+    "slew": SlewTable,
+}
+
+
+def load_chain(name_or_path: str | os.PathLike[str]) -> Chain:
+    """The chain that an arm's file (or preset, or a file of its own) describes; ideal where it says nothing.
+
+    Raises ParameterError for an unknown key, a wrong type or a value that cannot be.
+    """
+    tables, file = load_tables(name_or_path)
+    try:
+        return chain_of_tables(tables)
+    except ParameterError as error:
+        raise error.in_file(file) from None
+
+
+def chain_of_tables(tables: Mapping[str, Any]) -> Chain:
+    """The chain of a parsed file; the tables of an arm may stand beside its own."""
+    unknown = [key for key in tables if key not in TABLES and key not in OF_AN_ARM]
+    if unknown:
+        remedy = f"unknown table; {did_you_mean(unknown[0], TABLES)}"
+        raise ParameterError(key=unknown[0], value=tables[unknown[0]], remedy=remedy)
+    return Chain(**{name: _record(name, tables[name]) for name in TABLES if name in tables})
+
+
+def _record(name: str, table: object) -> Any:
+    if not isinstance(table, dict):
+        raise ParameterError(key=name, value=table, remedy=f"give a table, headed [{name}]")
+    try:
+        given = TABLES[name].model_validate(table).model_dump(exclude_unset=True)
+    except ValidationError as error:
+        raise _in_one_line(name, error) from None
+    return RECORDS[name](**given)
+
+
+def _in_one_line(name: str, error: ValidationError) -> ParameterError:
+    problem = min(error.errors(include_url=False), key=lambda problem: problem["type"] != "extra_forbidden")
+    key = ".".join(map(str, (name, *problem["loc"])))
+    if problem["type"] == "extra_forbidden":
+        known = [entry.name for entry in fields(RECORDS[name])]
+        remedy = f"unknown key; {did_you_mean(str(problem['loc'][-1]), known)}"
+    else:
+        remedy = f"wrong value; {problem['msg'][:1].lower()}{problem['msg'][1:]}"
+    return ParameterError(key=key, value=problem["input"], remedy=remedy)

@@ -1,0 +1,110 @@
+"""The plane of both gains at a sample period: how many closed-loop poles lie outside the unit circle at each point."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.dsp.boundary import Crossings, circle_grid, crossings
+from tfarm.dsp.loop import SampledLoop
+from tfarm.dsp.margins import Window, joined
+from tfarm.errors import ConvergenceError, ParameterError
+
+Real = NDArray[np.float64]
+
+MOST_GAINS = 4000
+
+
+@dataclass(frozen=True)
+class GainMap:
+    """`unstable` (K1, K2): how many poles grow, apart from z = 1 of a free hub angle; stable where it is zero.
+
+    `crossings[i]`: at which K2 the count changes at K1[i], exact and not tied to the grid.
+    """
+
+    loop: SampledLoop
+    K1: Real
+    K2: Real
+    unstable: NDArray[np.int64]
+    crossings: list[Crossings]
+
+    @property
+    def modes_used(self) -> int:
+        """How many flexible modes the loop has."""
+        return self.loop.plant.count
+
+    @property
+    def stable_intervals(self) -> list[list[Window]]:
+        """For each K1 the intervals of K2, cut to the map, in which nothing grows: the region with exact edges."""
+        low, high = float(self.K2[0]), float(self.K2[-1])
+        return [self._intervals(i, low, high) for i in range(self.K1.size)]
+
+    def _intervals(self, i: int, low: float, high: float) -> list[Window]:
+        jumps = self.crossings[i]
+        inside = jumps.gain[(jumps.gain > low) & (jumps.gain < high)]
+        ends = np.r_[low, inside, high]
+        middles = (ends[1:] + ends[:-1]) / 2
+        counts = self.unstable[i, 0] + _passed(jumps, middles) - _passed(jumps, self.K2[:1])
+        pairs = zip(ends[:-1], ends[1:], counts, strict=True)
+        return joined([(float(a), float(b)) for a, b, n in pairs if n == 0 and b > a])
+
+
+def gain_map(loop: SampledLoop, K1: Sequence[float] | Real, K2: Sequence[float] | Real) -> GainMap:
+    """The map over the grid K1 x K2 (both ascending), the other settings as those of the loop.
+
+    From the exact crossings of every row (D-decomposition) and one count by eigenvalues; a second one, at the far
+    corner, must agree with what the crossings say, or a ConvergenceError is raised.
+    """
+    rows, columns = _ascending("K1", K1), _ascending("K2", K2)
+    grid = circle_grid(loop)
+    first, start = _off_the_edge(rows), _off_the_edge(columns)
+    along = crossings(grid, "K1", start)
+    reference = _count(loop, first, start) - _passed(along, np.array([first]))
+    at_start = reference + _passed(along, rows)
+    found = [crossings(grid, "K2", float(gain)) for gain in rows]
+    passed = np.array([_passed(jumps, np.r_[columns, start]) for jumps in found])
+    plane = GainMap(loop, rows, columns, at_start[:, None] + passed[:, :-1] - passed[:, -1:], found)
+    _check(plane)
+    return plane
+
+
+def _count(loop: SampledLoop, K1: float, K2: float) -> int:
+    return int((loop.with_gains(K1, K2).poles.log_radius > 0).sum())
+
+
+def _passed(jumps: Crossings, at: Real) -> NDArray[np.int64]:
+    """How many poles have left the circle between -infinity and each gain."""
+    total: NDArray[np.int64] = np.r_[0, np.cumsum(jumps.count)][np.searchsorted(jumps.gain, at)]
+    return total
+
+
+def _check(plane: GainMap) -> None:
+    """Counts by eigenvalues at three corners against those of the map."""
+    for i, j in ((0, 0), (-1, 0), (-1, -1)):
+        K1, K2 = float(plane.K1[i]), float(plane.K2[j])
+        poles = plane.loop.with_gains(K1, K2).poles
+        if abs(poles.log_radius).min() < 1e-9:  # on an edge, or too close to tell
+            continue
+        if (count := int((poles.log_radius > 0).sum())) != plane.unstable[i, j]:
+            message = (
+                f"at K1 = {K1:g}, K2 = {K2:g} the crossings count {plane.unstable[i, j]} growing poles, not {count}"
+            )
+            raise ConvergenceError(message, plane, abs(count - plane.unstable[i, j]))
+
+
+def _off_the_edge(values: Real) -> float:
+    """A gain inside the range that no rounded edge falls on."""
+    share = 0.6180339887498949
+    return float(values[0] + share * (values[-1] - values[0])) if values.size > 1 else float(values[0])
+
+
+def _ascending(name: str, values: Sequence[float] | Real) -> Real:
+    gains = np.array(values, dtype=float)
+    if gains.ndim != 1 or not 1 <= gains.size <= MOST_GAINS or not np.isfinite(gains).all():
+        raise ParameterError(key=name, value=gains.shape, remedy=f"a list of 1 to {MOST_GAINS} finite gains")
+    if (np.diff(gains) <= 0).any():
+        raise ParameterError(key=name, value=float(gains[0]), remedy="the gains of a map ascend, each once")
+    return gains

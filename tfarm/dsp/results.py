@@ -1,0 +1,154 @@
+"""A simulation in a few numbers: residual vibration, settling, limit cycles; and its answer as a dictionary."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import Arm
+from tfarm.dsp.chain import Chain, Gains
+from tfarm.dsp.scenarios import scenario
+from tfarm.dsp.simulate import Simulation, Simulator, Trace
+
+Real = NDArray[np.float64]
+
+SETTLED = 0.05  # of the largest root moment
+LASTING = 0.7  # a limit cycle keeps at least this much of its amplitude over a quarter of the record
+BEYOND_IDEAL = 2.0  # and is this much larger than what an ideal chain leaves at that time
+FEWEST = 40  # samples without which a limit cycle cannot be told
+
+
+@dataclass(frozen=True)
+class LimitCycle:
+    """A vibration that quantisation keeps up: half peak to peak of root moment [N m], hub rate [rad/s] and torque [N
+    m].
+
+    `frequency` [rad/s] as the samples see it, from the zero crossings of the moment about its mean.
+    """
+
+    root_moment: float
+    hub_rate: float
+    torque: float
+    frequency: float
+
+
+def residual_moment_rms(simulation: Simulation) -> float:
+    """Root mean square of the root moment [N m] from the end of the manoeuvre on (0 if it stopped before)."""
+    after = simulation.t >= simulation.scenario.busy_until * (1 - 1e-12)
+    moment = simulation.at_samples.root_moment[after]
+    return float(np.sqrt(np.mean(moment**2))) if moment.size else 0.0
+
+
+def settling_time(simulation: Simulation) -> float:
+    """The time [s] from which on the root moment stays within 5 % of its largest; inf where it does not settle."""
+    moment = abs(simulation.at_samples.root_moment)
+    (above,) = np.nonzero(moment > SETTLED * moment.max(initial=0.0))
+    if simulation.stopped or (above.size and above[-1] == moment.size - 1):
+        return math.inf
+    return float(simulation.t[above[-1] + 1]) if above.size else 0.0
+
+
+def limit_cycle(simulation: Simulation, ideal: Simulation) -> LimitCycle | None:
+    """The limit cycle in the last quarter of the record, if there is one.
+
+    It lasts (a quarter earlier it was not much larger), and the same loop with ideal converters (`ideal`) has died down
+    further.
+    """
+    n = simulation.t.size
+    if simulation.stopped or not simulation.chain.converters.is_quantised or n < FEWEST:
+        return None
+    last, before = slice(n - n // 4, n), slice(n - n // 2, n - n // 4)
+    moment = simulation.at_samples.root_moment
+    size = _half_range(moment[last])
+    linear = _half_range(ideal.at_samples.root_moment[last]) if not ideal.stopped else math.inf
+    if size == 0.0 or size < LASTING * _half_range(moment[before]) or size <= BEYOND_IDEAL * linear:
+        return None
+    about = moment[last] - moment[last].mean()
+    turns = np.count_nonzero(np.diff(np.signbit(about))) / 2
+    return LimitCycle(
+        root_moment=size,
+        hub_rate=_half_range(simulation.at_samples.hub_rate[last]),
+        torque=_half_range(simulation.torque[last]),
+        frequency=float(2 * np.pi * turns / ((about.size - 1) * simulation.scenario.period)),
+    )
+
+
+def _half_range(signal: Real) -> float:
+    return float(np.ptp(signal)) / 2 if signal.size else 0.0
+
+
+def simulation_answer(arm_name: str, gains: Gains, simulation: Simulation, cycle: LimitCycle | None) -> dict[str, Any]:
+    """The simulation as a dictionary of plain numbers, texts and lists."""
+    stopped, volts = simulation.stopped, simulation.volts
+    answer: dict[str, Any] = {
+        "arm": arm_name,
+        "law": "u = r - Kp theta - K1 theta_t - K2 M, with references; a positive root moment M accelerates the hub",
+        "scenario": simulation.scenario.name,
+        "reading": simulation.chain.slew.reading,
+        "K1": gains.K1,
+        "K2": gains.K2,
+        "Kp": gains.Kp,
+        "period_s": simulation.scenario.period,
+        **_columns(simulation.at_samples),
+        "torque": simulation.torque.tolist(),
+        "gain": [] if simulation.gain is None else simulation.gain.tolist(),
+        "residual_moment_rms": residual_moment_rms(simulation),
+        "settling_time_s": settling_time(simulation),
+        "saturated_samples": simulation.saturated,
+        "energy_error": simulation.energy_error,
+        "limit_cycle": None if cycle is None else _cycle(cycle),
+        "stopped_at_s": None if stopped is None else stopped.time,
+        "growing_mode": None if stopped is None else stopped.mode,
+    }
+    if volts is not None:
+        answer["volts"] = volts.tolist()
+    if simulation.between is not None:
+        answer["between"] = _columns(simulation.between)
+    return answer
+
+
+def _cycle(cycle: LimitCycle) -> dict[str, float]:
+    return {
+        "root_moment_amplitude": cycle.root_moment,
+        "hub_rate_amplitude": cycle.hub_rate,
+        "torque_amplitude": cycle.torque,
+        "frequency_rad_s": cycle.frequency,
+    }
+
+
+def _columns(trace: Trace) -> dict[str, list[float]]:
+    names = ("t", "hub_angle", "hub_rate", "root_moment", "tip_displacement")
+    return {name: getattr(trace, name).tolist() for name in names}
+
+
+def ideal_chain(chain: Chain) -> Chain:
+    """The same clock, filters and rate estimate, with ideal converters: no steps, no ranges, no limit, float64."""
+    converters = replace(
+        chain.converters,
+        encoder_counts=None,
+        moment_bits=None,
+        moment_range=None,
+        torque_bits=None,
+        torque_range=None,
+        arithmetic="float64",
+    )
+    return replace(chain, converters=converters, actuator=replace(chain.actuator, torque_limit=math.inf))
+
+
+def simulated_answer(
+    arm: Arm, gains: Gains, chain: Chain, name: str, duration: float, *, count: int = 20, between: int = 0
+) -> dict[str, Any]:
+    """Simulate a scenario by its name and say what came of it.
+
+    Raises ParameterError for a locked hub, for I_h = 0 with K2 != 0, and for what `scenario` and `Simulator` refuse.
+    """
+    task = scenario(name, arm, chain, duration)
+    simulation = Simulator(arm, chain, task, count=count, between=between).linear(gains)
+    cycle = None
+    if chain.converters.is_quantised:
+        cycle = limit_cycle(simulation, Simulator(arm, ideal_chain(chain), task, count=count).linear(gains))
+    return simulation_answer(arm.name, gains, simulation, cycle)

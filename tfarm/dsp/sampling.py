@@ -1,0 +1,204 @@
+"""Exact discretisation under a zero-order hold, with any sample period and any computational delay.
+
+The torque u_k, computed from the sample at t_k, acts from t_k + tau to t_{k+1} + tau, tau = (d + f) T.  A pole p with
+the amplitude a' = p a + u then steps by
+
+    a_{k+1} = e^{pT} a_k + early u_{k-d} + late u_{k-d-1},
+    early = (e^{p(1-f)T} - 1)/p,   late = e^{p(1-f)T} (e^{pfT} - 1)/p
+
+and what is measured just before the update, y_k = Re(sum r a_k) + static u_{k-d-1}, sees the torque of the *preceding*
+interval: nothing of u_k comes through at once.  At C = 0 e^{pT} has modulus one to the last bit, and is never a
+quotient.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tfarm.arm import Arm
+from tfarm.dsp.chain import Chain, Sampling
+from tfarm.dsp.plant import Plant, undelayed_plant
+
+if TYPE_CHECKING:
+    import control
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complexfloating[Any, Any]]
+
+FORGOTTEN = 40.0  # e^-40 = 4e-18: such a pole has settled before the next sample
+
+
+@dataclass(frozen=True)
+class PulseTransfer:
+    """H_o(z), the pulse transfer functions from the torque computed at a sample to what the next samples measure.
+
+    Poles at e^{pT}, those of s = 0 at z = 1, and a delay z^-d.  Callable at complex z.
+    """
+
+    plant: Plant
+    sampling: Sampling
+
+    @cached_property
+    def poles(self) -> Complex:
+        """p [1/s] of each pole, and 0, that of the turning hub, as the last one."""
+        return np.r_[self.plant.poles, 0.0]
+
+    @cached_property
+    def mode(self) -> NDArray[np.int64]:
+        """The flexible mode of each pole, 0 for none."""
+        return np.r_[self.plant.mode, 0]
+
+    @cached_property
+    def residues(self) -> Complex:
+        """(outputs, poles) of the plant, those of 1/s in the last column."""
+        return np.c_[self.plant.residues, self.plant.rigid[:, 1]]
+
+    @cached_property
+    def multipliers(self) -> Complex:
+        """e^{pT}."""
+        x = self.poles * self.sampling.period
+        return np.exp(x.real) * (np.cos(x.imag) + 1j * np.sin(x.imag))
+
+    @cached_property
+    def early(self) -> Complex:
+        """What u_{k-d} adds to an amplitude within a sample."""
+        return held(self.poles, (1 - self.sampling.fraction) * self.sampling.period)
+
+    @cached_property
+    def late(self) -> Complex:
+        """What u_{k-d-1} adds, from before the switch."""
+        T, f = self.sampling.period, self.sampling.fraction
+        return np.exp(self.poles * ((1 - f) * T)) * held(self.poles, f * T)
+
+    @property
+    def ramps(self) -> tuple[float, float]:
+        """What u_{k-d} and u_{k-d-1} add to the double integral of the torque within a sample."""
+        T, f = self.sampling.period, self.sampling.fraction
+        return (1 - f) ** 2 * T * T / 2, f * (1 - f / 2) * T * T
+
+    def __call__(self, z: ArrayLike) -> Complex:
+        """Values (outputs, *z.shape)."""
+        points = np.asarray(z, dtype=complex)
+        flat = self.scaled(points.ravel(), None, np.ones(points.size))
+        return flat.reshape(len(self.plant.outputs), *points.shape)
+
+    def scaled(self, z: Complex, base: NDArray[np.int64] | None, offset: NDArray[Any]) -> Complex:
+        """offset H(z) at z = multipliers[base] + offset, without loss however small the offset: (outputs, n).
+
+        With no `base` it is offset H(z).
+        """
+        gap = z[:, None] - self.multipliers
+        rows = np.arange(z.size)
+        if base is not None:
+            gap[rows, base] = 1.0
+        push = self.early + self.late / z[:, None]
+        weights = push * (offset[:, None] / gap)
+        if base is not None:
+            weights[rows, base] = push[rows, base]
+        value = self.residues @ weights.T + np.outer(self.plant.static, offset / z)
+        if self.plant.rigid[:, 0].any():
+            distance = z - 1.0 if base is None else np.where(base == self.poles.size - 1, offset, z - 1.0)
+            ramp = self.ramps[0] + self.ramps[1] / z
+            twice = (self.sampling.period * push[:, -1] / distance + ramp) / distance
+            value = value + np.outer(self.plant.rigid[:, 0], twice * offset)
+        return value * z ** (-self.sampling.whole_delay)
+
+    def folded(self) -> PulseTransfer:
+        """The same with every pole that a sample leaves nothing of counted as static."""
+        gone = self.plant.poles.real * (1 - self.sampling.fraction) * self.sampling.period < -FORGOTTEN
+        if not gone.any():
+            return self
+        static = self.plant.static - (self.plant.residues[:, gone] / self.plant.poles[gone]).real.sum(axis=1)
+        plant = replace(
+            self.plant,
+            poles=self.plant.poles[~gone],
+            residues=self.plant.residues[:, ~gone],
+            static=static,
+            mode=self.plant.mode[~gone],
+        )
+        return replace(self, plant=plant)
+
+    # ------------------------------------------------------------ state space
+
+    def matrices(self) -> tuple[Real, Real, Real]:
+        """A (n, n), B (n,), C (outputs, n) of x_{k+1} = A x_k + B u_k, y_k = C x_k, real.
+
+        States: real and imaginary part of the amplitude of each pole with Im p > 0, the amplitude of each real one, the
+        double integral and the integral of the torque, and u_{k-1} to u_{k-d-1}.
+        """
+        upper, real = self.kept()
+        n, d = 2 * upper.size + real.size + 2, self.sampling.whole_delay
+        A, B = np.zeros((n + d + 1, n + d + 1)), np.zeros(n + d + 1)
+        C = np.zeros((len(self.plant.outputs), n + d + 1))
+        first, second, last = 2 * np.arange(upper.size), 2 * np.arange(upper.size) + 1, n + d
+        z = self.multipliers
+        A[first, first] = A[second, second] = z[upper].real
+        A[first, second], A[second, first] = -z[upper].imag, z[upper].imag
+        C[:, first], C[:, second] = 2 * self.residues[:, upper].real, -2 * self.residues[:, upper].imag
+        single = np.arange(2 * upper.size, n - 2)
+        A[single, single], C[:, single] = z[real].real, self.residues[:, real].real
+        A[n - 2, n - 2] = A[n - 1, n - 1] = 1.0
+        A[n - 2, n - 1] = self.sampling.period
+        C[:, n - 2 : n] = self.plant.rigid
+        C[:, last] = self.plant.static
+        now, before = self._drive(upper, real)
+        A[:n, last] = before
+        if d:
+            A[:n, last - 1] = now
+            A[np.arange(n + 1, n + d + 1), np.arange(n, n + d)] = 1.0
+        else:
+            B[:n] = now
+        B[n] = 1.0
+        return A, B, C
+
+    def kept(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Indices of the poles with Im p > 0 and of the real ones, those of s = 0 apart."""
+        p = self.plant.poles
+        return np.nonzero(p.imag > 0)[0], np.nonzero(p.imag == 0)[0]
+
+    def _drive(self, upper: NDArray[np.int64], real: NDArray[np.int64]) -> tuple[Real, Real]:
+        """The columns of u_{k-d} and of u_{k-d-1}."""
+        columns = []
+        for push, ramp in ((self.early, self.ramps[0]), (self.late, self.ramps[1])):
+            pairs = np.c_[push[upper].real, push[upper].imag].ravel()
+            columns.append(np.r_[pairs, push[real].real, ramp, push[-1].real])
+        return columns[0], columns[1]
+
+    def state_space(self) -> control.StateSpace:
+        """The same as a discrete `control.StateSpace` with dt = T and named signals."""
+        import control
+
+        A, B, C = self.matrices()
+        return control.StateSpace(
+            A,
+            B[:, None],
+            C,
+            np.zeros((len(C), 1)),
+            self.sampling.period,
+            inputs=["hub_torque"],
+            outputs=list(self.plant.outputs),
+            name=f"{self.plant.arm.name} sampled",
+        )
+
+
+def pulse_transfer(
+    arm: Arm, outputs: tuple[str, ...] | list[str], sampling: Sampling | None = None, *, count: int = 20
+) -> PulseTransfer:
+    """The sampled arm with `count` flexible modes: exact for its modal model, callable at z, `.state_space()`.
+
+    Raises ParameterError for an unknown output, a locked hub or a count out of range.
+    """
+    clock = Sampling() if sampling is None else sampling
+    return PulseTransfer(undelayed_plant(arm, Chain(sampling=clock), outputs, count), clock)
+
+
+def held(p: Complex, duration: float) -> Complex:
+    """(e^{p t} - 1)/p: the amplitude that a unit torque leaves after `duration` t [s]."""
+    x = p * duration
+    safe = np.where(x == 0, 1.0, x)
+    return np.where(x == 0, duration, np.expm1(safe) / safe * duration)

@@ -1,0 +1,131 @@
+"""What the loop is asked to do: references, feedforward, disturbances and the state that it starts from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import Arm
+from tfarm.arm.checks import number, positive
+from tfarm.dsp.chain import Chain
+from tfarm.errors import ParameterError, did_you_mean
+
+Real = NDArray[np.float64]
+
+MOST_SAMPLES = 4_000_000
+STEP_TORQUE, IMPULSE, TIP_OFFSET = 0.1, 0.01, 0.01  # N m, N m s, m: what the scenarios start with unless told
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A row a sample: `feedforward` r [N m], `hub_angle` and `hub_rate` references, `rigid_moment` [N m] that the
+    moment feedback takes off, `disturbance` [N m] at the hub (held over the sample, not delayed).
+
+    It starts at rest, but for `impulse` [N m s] at the hub and the first mode released with `tip_offset` [m] at the
+    tip. `busy_until` [s]: the residual vibration is measured from there on.
+    """
+
+    name: str
+    period: float
+    feedforward: Real
+    hub_angle: Real
+    hub_rate: Real
+    rigid_moment: Real
+    disturbance: Real
+    impulse: float = 0.0
+    tip_offset: float = 0.0
+    busy_until: float = 0.0
+
+    @property
+    def t(self) -> Real:
+        """The times of the samples [s]."""
+        return np.arange(self.feedforward.size) * np.float64(self.period)
+
+
+def slew(arm: Arm, chain: Chain, duration: float) -> Scenario:
+    """The bang-bang slew: hub acceleration +-4 travel/(L rise^2), as its mean over each sample, J of it as feedforward.
+
+    What the moment feedback sees is the moment less the rigid arm's -(J - I_h) theta_dd_ref of the interval before the
+    sample ("vibration"), or all of it ("total").  Raises ParameterError for an arm that cannot turn.
+    """
+    if not arm.has_rigid_mode:
+        key, value = ("hub.inertia", arm.hub.inertia) if arm.is_locked else ("payload.mass", arm.payload.mass)
+        raise ParameterError(key=key, value=value, remedy="an arm that cannot turn has no slew; give finite inertias")
+    T, manoeuvre = chain.sampling.period, chain.slew
+    n = _samples(duration, T)
+    peak = 4 * manoeuvre.travel / (arm.link.length * manoeuvre.rise_time**2)
+    t = T * np.arange(n + 1)
+    rate = peak * np.clip(np.minimum(t, manoeuvre.rise_time - t), 0.0, None)
+    acceleration = np.diff(rate) / T
+    angle = np.r_[0.0, np.cumsum((rate[1:] + rate[:-1]) / 2 * T)][:-1]
+    before = np.r_[0.0, acceleration[:-1]]
+    rigid = -(arm.total_inertia - arm.hub.inertia) * before * (manoeuvre.reading == "vibration")
+    return Scenario(
+        name="slew",
+        period=T,
+        feedforward=arm.total_inertia * acceleration,
+        hub_angle=angle,
+        hub_rate=rate[:-1],
+        rigid_moment=rigid,
+        disturbance=np.zeros(n),
+        busy_until=manoeuvre.rise_time,
+    )
+
+
+def step(arm: Arm, chain: Chain, duration: float, torque: float = STEP_TORQUE) -> Scenario:
+    """A step of the reference torque r [N m] at t = 0."""
+    resting = _rest("step", chain, duration)
+    size = number("torque", torque, "a torque is a finite number of N m")
+    return _with(resting, feedforward=np.full(resting.feedforward.size, size))
+
+
+def decay(arm: Arm, chain: Chain, duration: float, tip_offset: float = TIP_OFFSET) -> Scenario:
+    """Free decay: the first mode released from rest with the tip displaced by `tip_offset` [m]."""
+    size = number("tip_offset", tip_offset, "a tip offset is a finite number of metres")
+    return _with(_rest("decay", chain, duration), tip_offset=size)
+
+
+def impulse(arm: Arm, chain: Chain, duration: float, impulse: float = IMPULSE) -> Scenario:
+    """A disturbance impulse [N m s] on the hub just before t = 0."""
+    size = number("impulse", impulse, "an impulse is a finite number of N m s")
+    return _with(_rest("impulse", chain, duration), impulse=size)
+
+
+SCENARIOS: dict[str, Callable[[Arm, Chain, float], Scenario]] = {
+    "slew": slew,
+    "step": step,
+    "decay": decay,
+    "impulse": impulse,
+}
+
+
+def scenario(name: str, arm: Arm, chain: Chain, duration: float) -> Scenario:
+    """The scenario of that name with its usual size.  Raises ParameterError for an unknown one."""
+    if name not in SCENARIOS:
+        raise ParameterError(key="scenario", value=name, remedy=did_you_mean(name, SCENARIOS))
+    return SCENARIOS[name](arm, chain, duration)
+
+
+def _rest(name: str, chain: Chain, duration: float) -> Scenario:
+    T = chain.sampling.period
+    zero = np.zeros(_samples(duration, T))
+    return Scenario(name, T, zero, zero, zero, zero, zero)
+
+
+def _with(resting: Scenario, **changes: Any) -> Scenario:
+
+    return replace(resting, **changes)
+
+
+def _samples(duration: float, period: float) -> int:
+    """How many samples lie in 0 .. duration, both ends counted."""
+    length = positive("duration", duration, "a duration is a positive, finite number of seconds")
+    if length / period >= MOST_SAMPLES:
+        remedy = f"at most {MOST_SAMPLES} samples of {period:g} s; a shorter one, or a longer period"
+        raise ParameterError(key="duration", value=length, remedy=remedy)
+    return math.floor(length / period * (1 + 1e-12)) + 1

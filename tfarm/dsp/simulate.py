@@ -1,0 +1,300 @@
+"""The sampled loop in time: exact between the samples, with any controller, recorded at the samples and between."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import Arm
+from tfarm.dsp import kernel
+from tfarm.dsp.chain import Chain, Gains
+from tfarm.dsp.converters import quantisers
+from tfarm.dsp.loop import check_loop
+from tfarm.dsp.plant import MEASURED, RECORDED, Plant, filtered, undelayed_plant
+from tfarm.dsp.sampling import held
+from tfarm.dsp.scenarios import Scenario
+from tfarm.errors import ParameterError
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complexfloating[Any, Any]]
+
+FOLDED_UP = 10.0  # rad: an arm bent by the moment EI/L times this is no arm any more, and the simulation stops
+MOST_BETWEEN = 1000
+
+
+class Measurement(NamedTuple):
+    """What a controller gets at sample `k`, time `t` [s]: what the sensors read, and what is wanted.
+
+    `vibration` is the root moment less `rigid_moment` (the paper's x under either reading of it); `feedforward` is r.
+    """
+
+    k: int
+    t: float
+    hub_angle: float
+    hub_rate: float
+    root_moment: float
+    vibration: float
+    feedforward: float
+    angle_reference: float
+    rate_reference: float
+    rigid_moment: float
+
+
+Controller = Callable[[Measurement], float]
+
+
+@dataclass(frozen=True)
+class Trace:
+    """Signals, not filtered, at `t` [s]: hub angle [rad], hub rate [rad/s], root moment [N m], tip displacement [m]."""
+
+    t: Real
+    hub_angle: Real
+    hub_rate: Real
+    root_moment: Real
+    tip_displacement: Real
+
+
+@dataclass(frozen=True)
+class Stop:
+    """Why a simulation ended early: at `time` [s] the arm was folded up, by `mode` above all (0: the hub)."""
+
+    time: float
+    mode: int
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """A simulated loop: `at_samples` just before each update, `between` the records asked for between the samples.
+
+    `torque` [N m] is what leaves the DAC at each sample, `gain` the K2 used there (None where a controller does not
+    say), `measured` (n, 3) what the analog filters pass of hub angle, hub rate and root moment.  `saturated` counts
+    samples at which the encoder, the strain amplifier and the torque were clipped.  `energy_error` is |energy gained -
+    work done| over the energy that went to and fro, for an arm without damping; None with damping.
+    """
+
+    scenario: Scenario
+    chain: Chain
+    at_samples: Trace
+    between: Trace | None
+    measured: Real
+    torque: Real
+    gain: Real | None
+    saturated: dict[str, int]
+    energy_error: float | None
+    stopped: Stop | None
+
+    @property
+    def t(self) -> Real:
+        """The times of the samples [s]."""
+        return self.at_samples.t
+
+    @property
+    def volts(self) -> Real | None:
+        """The motor's voltage, where the actuator has a motor constant."""
+        constant = self.chain.actuator.motor_constant
+        return None if constant is None else self.torque / constant
+
+
+class Simulator:
+    """An arm with `count` modes, a chain and a scenario, prepared once; each call simulates it from the start.
+
+    `between` asks for so many records in each sample.  Raises ParameterError for a locked hub.
+    """
+
+    def __init__(self, arm: Arm, chain: Chain, scenario: Scenario, *, count: int = 20, between: int = 0) -> None:
+        if isinstance(between, bool) or not isinstance(between, int) or not 0 <= between <= MOST_BETWEEN:
+            remedy = f"a whole number of records between two samples, 0 to {MOST_BETWEEN}"
+            raise ParameterError(key="between", value=between, remedy=remedy)
+        self.chain, self.scenario, self.between = chain, scenario, between
+        plant = undelayed_plant(arm, chain, (*MEASURED, *RECORDED), count)
+        self.plant = filtered(plant, chain)  # the first of each name: those that are recorded come later
+        self._kept = np.nonzero(self.plant.poles.imag >= 0)[0]
+        self._tables = _tables(self.plant, self._kept, chain, between)
+        self._rows = quantisers(chain).rows
+        self._ideal = np.c_[scenario.feedforward, scenario.hub_angle, scenario.hub_rate, scenario.rigid_moment]
+        self._bound = FOLDED_UP * arm.link.EI / arm.link.length
+
+    def linear(self, gains: Gains, K2: Real | None = None) -> Simulation:
+        """The law u = r + Kp (theta_ref - theta) + K1 (theta_t_ref - theta_t) - K2 x, compiled; `K2` (n,) may vary.
+
+        Raises ParameterError for I_h = 0 with moment feedback, and for gains that are not one finite number a sample.
+        """
+        check_loop(self.plant.arm, gains)
+        n = self.scenario.feedforward.size
+        gain = np.full(n, gains.K2) if K2 is None else np.array(K2, dtype=float)
+        if gain.shape != (n,) or not np.isfinite(gain).all():
+            raise ParameterError(key="K2", value=gain.shape, remedy=f"one finite gain a sample, {n} in all")
+        state = self._start()
+        c = self.chain.converters
+        done = kernel.run(
+            self._tables, state.amplitude, state.rigid, state.held, self.chain.sampling.whole_delay,
+            np.array([gains.Kp, gains.K1]), gain, self._ideal, self.scenario.disturbance, self._rows, self._filter,
+            c.arithmetic == "float32", self._bound, state.record, state.torque, state.fine, state.saturated, state.work,
+        )  # fmt: skip
+        return self._result(state, int(done), gain)
+
+    def controller(self, controller: Controller) -> Simulation:
+        """Any callable from a `Measurement` to a torque [N m]; its numbers are float32 if the arithmetic is."""
+        return self._stepped(lambda m: (float(controller(m)), 0.0), None)
+
+    def gain_schedule(self, K1: float, gain: Callable[[Measurement], float]) -> Simulation:
+        """u = r + K1 (theta_t_ref - theta_t) - K x with K = gain(measurement) at each sample, recorded as `gain`."""
+
+        def torque(m: Measurement) -> tuple[float, float]:
+            K = float(gain(m))
+            return m.feedforward + K1 * (m.rate_reference - m.hub_rate) - K * m.vibration, K
+
+        return self._stepped(torque, np.zeros(self.scenario.feedforward.size))
+
+    # ------------------------------------------------------------ inside
+
+    def _stepped(self, rule: Callable[[Measurement], tuple[float, float]], gain: Real | None) -> Simulation:
+        """The loop of `kernel.run` in Python."""
+        state, memory = self._start(), np.zeros(3)
+        d, ring, disturbance = self.chain.sampling.whole_delay, state.held.size, self.scenario.disturbance
+        single = self.chain.converters.arithmetic == "float32"
+        weights, rates, static = self._tables[3:6]
+        for k in range(state.torque.size):
+            acting = state.held[(k - d - 1) % ring]
+            extra = disturbance[k - 1] if k else 0.0
+            kernel.read(weights, rates, static, state.amplitude, state.rigid, acting + extra, state.record[k])
+            if not abs(state.record[k, 2]) <= self._bound:
+                return self._result(state, k, gain)
+            u, K = rule(self._measurement(k, state, memory, single))
+            if not math.isfinite(u):
+                raise ParameterError(key="controller", value=u, remedy=f"its torque at sample {k} is not finite")
+            u = float(np.float32(u)) if single else u
+            u = kernel.quantise(u, self._rows[kernel.TORQUE], state.saturated, kernel.TORQUE)
+            state.held[k % ring] = state.torque[k] = u
+            if gain is not None:
+                gain[k] = K
+            now = state.held[(k - d) % ring]
+            kernel.advance(
+                self._tables, state.amplitude, state.rigid, acting, now, disturbance[k], state.fine[k], state.work
+            )
+        return self._result(state, state.torque.size, gain)
+
+    def _measurement(self, k: int, state: _State, memory: Real, single: bool) -> Measurement:
+        angle = kernel.quantise(state.record[k, 0], self._rows[kernel.ANGLE], state.saturated, kernel.ANGLE)
+        moment = kernel.quantise(state.record[k, 2], self._rows[kernel.MOMENT], state.saturated, kernel.MOMENT)
+        rate = kernel.estimate(angle, state.record[k, 1], memory, self._filter)
+        forward, angle_wanted, rate_wanted, rigid = (float(value) for value in self._ideal[k])
+        values = [angle, rate, moment, moment - rigid, forward, angle_wanted, rate_wanted, rigid]
+        if single:
+            values = [float(np.float32(value)) for value in values]
+        return Measurement(k, k * self.scenario.period, *values)
+
+    @property
+    def _filter(self) -> Real:
+        c, T = self.chain.converters, self.chain.sampling.period
+        return np.array([float(c.hub_rate == "difference"), math.exp(-c.rate_filter * T), T])
+
+    def _start(self) -> _State:
+        n, outputs = self.scenario.feedforward.size, len(self.plant.outputs)
+        amplitude = np.full(self._kept.size, self.scenario.impulse, complex)
+        if self.scenario.tip_offset:
+            i, value = _released(self.plant, self._kept, self.scenario.tip_offset)
+            amplitude[i] += value
+        return _State(
+            amplitude=amplitude,
+            rigid=np.array([0.0, self.scenario.impulse]),
+            held=np.zeros(self.chain.sampling.whole_delay + 2),
+            record=np.zeros((n, outputs)),
+            torque=np.zeros(n),
+            fine=np.zeros((n, self.between, outputs)),
+            saturated=np.zeros(3, np.int64),
+            work=np.zeros(2),
+            energy=self._energy(amplitude, self.scenario.impulse),
+        )
+
+    def _energy(self, amplitude: Complex, rate: float) -> float:
+        """Of an undamped arm [J]: b^2 |a|^2/2 a mode, b^2 twice the residue of the hub rate, and the rigid arm's."""
+        row = self.plant.outputs.index("hub_rate", 3)
+        rigid = self.plant.rigid[row, 1] * rate**2 / 2
+        return float(self.plant.residues[row, self._kept].real @ abs(amplitude) ** 2 + rigid)
+
+    def _energy_error(self, state: _State) -> float | None:
+        if self.plant.arm.link.damping > 0 or self.chain.actuator.hub_damping > 0:
+            return None
+        after, (work, moved) = self._energy(state.amplitude, state.rigid[1]), state.work
+        return float(abs(after - state.energy - work) / max(state.energy + moved, 1e-300))
+
+    def _result(self, state: _State, done: int, gain: Real | None) -> Simulation:
+        stopped = None
+        if done < state.torque.size:
+            stopped = Stop(done * self.scenario.period, self._growing(state.amplitude))
+        T, m = self.scenario.period, self.between
+        between = None
+        if m:
+            at = T * (np.arange(done)[:, None] + (np.arange(m) + 1) / (m + 1))
+            between = _trace(at.ravel(), state.fine[:done].reshape(done * m, -1))
+        return Simulation(
+            scenario=self.scenario,
+            chain=self.chain,
+            at_samples=_trace(self.scenario.t[:done], state.record[:done]),
+            between=between,
+            measured=state.record[:done, :3],
+            torque=state.torque[:done],
+            gain=None if gain is None else gain[:done],
+            saturated={name: int(n) for name, n in zip(("encoder", "moment", "torque"), state.saturated, strict=True)},
+            energy_error=None if stopped else self._energy_error(state),
+            stopped=stopped,
+        )
+
+    def _growing(self, amplitude: Complex) -> int:
+        """The mode that bends the root most."""
+        size = abs(self.plant.residues[2, self._kept] * amplitude)
+        return int(self.plant.mode[self._kept][int(np.argmax(np.nan_to_num(size, nan=np.inf)))])
+
+
+@dataclass(frozen=True)
+class _State:
+    """What changes while a simulation runs."""
+
+    amplitude: Complex
+    rigid: Real
+    held: Real
+    record: Real
+    torque: Real
+    fine: Real
+    saturated: NDArray[np.int64]
+    work: Real
+    energy: float
+
+
+def _tables(plant: Plant, kept: NDArray[np.int64], chain: Chain, between: int) -> tuple[Any, ...]:
+    """The arrays of `kernel` (see there)."""
+    p, weight = plant.poles[kept], np.where(plant.poles[kept].imag > 0, 2.0, 1.0)
+    T, f = chain.sampling.period, chain.sampling.fraction
+    records = T * (np.arange(between) + 1) / (between + 1)
+    ends = np.unique(np.r_[records, [f * T] if f else [], T])
+    starts = np.r_[0.0, ends[:-1]]
+    piece = np.c_[ends - starts, starts >= f * T, np.isin(ends, records)].astype(float)
+    turn = np.exp(p * piece[:, :1])
+    push = np.array([held(p, float(duration)) for duration in piece[:, 0]])
+    weights = np.ascontiguousarray(plant.residues[:, kept] * weight)
+    row = plant.outputs.index("hub_angle", 3)
+    hub = np.r_[plant.rigid[row], weights[row]].astype(complex)
+    return turn, push, piece, weights, plant.rigid, plant.static, hub
+
+
+def _released(plant: Plant, kept: NDArray[np.int64], offset: float) -> tuple[int, complex]:
+    """The amplitude of the first mode at rest with the tip displaced: a = i x/(p r), x = offset |p|^2/(2 Im p)."""
+    row = plant.outputs.index("tip_displacement")
+    first = np.nonzero((plant.mode[kept] == 1) & (plant.poles[kept].imag > 0))[0]
+    if not first.size or plant.residues[row, kept[first[0]]] == 0:
+        remedy = "the tip cannot be released: it is pinned, or the first mode is overdamped; take another scenario"
+        raise ParameterError(key="scenario", value="decay", remedy=remedy)
+    i = int(first[0])
+    p, r = plant.poles[kept[i]], plant.residues[row, kept[i]]
+    return i, complex(1j * offset * abs(p) ** 2 / (2 * p.imag) / (p * r))
+
+
+def _trace(t: Real, record: Real) -> Trace:
+    """The recorded outputs, the last four columns."""
+    return Trace(t, *(np.ascontiguousarray(column) for column in record[:, 3:7].T))
