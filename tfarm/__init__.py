@@ -3,6 +3,8 @@
     arm = tfarm.load("sasaki2012")            # a preset or a TOML file
     G = tfarm.transfer(arm, "root_moment")    # exact; callable at any complex s
     modes = tfarm.modes(arm, count=10)        # complete by construction
+    law = tfarm.HubFeedback(K1=0.3, K2=0.3)   # u = -K1 theta_t - K2 E I phi'(0)
+    found = tfarm.margins(arm, law)           # the verdict first
 
 What is not needed is not imported: each name below is fetched at its first use.
 """
@@ -13,10 +15,13 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from tfarm.arm import Arm, Hub, Link, Payload, Section, load, presets
+    from tfarm.arm import Arm, Hub, HubFeedback, Link, Payload, Section, load, presets
     from tfarm.errors import CertificationError, ConvergenceError, ParameterError
+    from tfarm.loop.margins import margins
+    from tfarm.loop.poles import closed_loop_poles
+    from tfarm.reduced import reduce
     from tfarm.response import transfer
-    from tfarm.spectrum import modes
+    from tfarm.spectrum import damped_modes, modes
 
 __version__ = "0.1.0"
 
@@ -30,13 +35,24 @@ __all__ = [
     "ParameterError",
     "Payload",
     "Section",
+    "closed_loop_poles",
+    "damped_modes",
     "load",
+    "margins",
     "modes",
     "presets",
+    "reduce",
     "transfer",
 ]
 
-_ROOMS = {"modes": "spectrum", "transfer": "response"}
+_ROOMS = {
+    "closed_loop_poles": "loop.poles",
+    "damped_modes": "spectrum",
+    "margins": "loop.margins",
+    "modes": "spectrum",
+    "reduce": "reduced",
+    "transfer": "response",
+}
 
 
 def __getattr__(name: str) -> object:

@@ -42,6 +42,11 @@ class Verdict:
         return self.loop.poles.is_stable
 
     @property
+    def word(self) -> str:
+        """stable, marginal or unstable."""
+        return self.sentence.split(":")[0]
+
+    @property
     def sentence(self) -> str:
         """The verdict in words, beginning with stable, unstable or marginal."""
         poles = self.loop.poles
@@ -157,7 +162,8 @@ def sampled_answer(analysis: Analysis) -> dict[str, Any]:
         "Kp": gains.Kp,
         "period_s": sampling.period,
         "delay_samples": sampling.delay_samples,
-        "verdict": verdict.sentence,
+        "verdict": verdict.word,
+        "verdict_in_words": verdict.sentence,
         "stable": verdict.is_stable,
         "spectral_radius": math.exp(poles.log_spectral_radius),
         "log_spectral_radius": poles.log_spectral_radius,

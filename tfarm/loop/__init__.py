@@ -1,1 +1,4 @@
-"""The closed loop: exact poles, loci, margins, and what the Lyapunov argument proves."""
+"""The continuous loop of the exact arm: poles, verdicts, windows of gains, margins, maps, loci, Lyapunov.
+
+Import from its modules: `from tfarm.loop.margins import margins`.
+"""

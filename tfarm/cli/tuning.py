@@ -1,0 +1,68 @@
+"""The verb of the neural gain tuner.  Rooms are imported inside it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tfarm.cli.app import ArmName, Json, app, load_arm, whole
+from tfarm.cli.sampling import Delay, DspFile, Period, _chain
+
+
+@app.command()
+def tune(
+    arm: ArmName,
+    trials: Annotated[str, typer.Option("--trials", metavar="N", help="slews to learn from")] = "100",
+    mode: Annotated[str, typer.Option("--mode", help="trial: learn after each slew; online: at every sample")] = "trial",
+    signals: Annotated[str, typer.Option("--signals", help="vibration or total: what x and u contain")] = "vibration",
+    seed: Annotated[str, typer.Option("--seed", metavar="N", help="of the initial weights")] = "0",
+    guard: Annotated[str, typer.Option("--guard", help="time-varying (proven), frozen or none")] = "time-varying",
+    rule: Annotated[str, typer.Option("--rule", help="dynamic, clipped or plain: how (21) is made robust")] = "dynamic",
+    eta: Annotated[float, typer.Option("--eta", help="learning rate")] = 0.8,
+    alpha: Annotated[float, typer.Option("--alpha", help="momentum, in [0, 1)")] = 0.6,
+    a: Annotated[float, typer.Option("--a", help="weight of the root moment in the cost")] = 1.0,
+    b: Annotated[float, typer.Option("--b", help="weight of the control signal in the cost")] = 2.6,
+    K1: Annotated[float, typer.Option("--K1", help="hub rate gain [N m s/rad]")] = 0.3,
+    duration: Annotated[float, typer.Option("--duration", help="of a trial [s]")] = 3.0,
+    enough: Annotated[float, typer.Option("--enough", help="stop once the rms of x is below this [N m]")] = 0.0,
+    hidden: Annotated[str, typer.Option("--hidden", metavar="N", help="hidden neurons")] = "6",
+    seventh_input: Annotated[bool, typer.Option("--seventh-input", help="feed K(t-1) to the network too")] = False,
+    modes: Annotated[str, typer.Option("--modes", metavar="N", help="flexible modes")] = "6",
+    period: Period = None,
+    delay_samples: Delay = None,
+    dsp: DspFile = None,
+    compare: Annotated[bool, typer.Option("--compare", help="with converters, delay, and on other arms too")] = False,
+    save: Annotated[Path | None, typer.Option("--save", help="write the tuner to this JSON file")] = None,
+    json: Json = False,
+) -> None:
+    """Train the network that sets the moment gain during a slew, and hold it against simpler remedies."""
+    numbers = whole("--trials", trials, 1, 1_000_000), whole("--seed", seed, 0, 2**53), whole("--modes", modes, 1, 48)
+    neurons = whole("--hidden", hidden, 1, 1000)
+    subject, chain = load_arm(arm), _chain(dsp or arm, period, delay_samples)
+    from tfarm import tuner
+    from tfarm.tuner.tuning import comparison_answer
+
+    learning = tuner.Learning(mode=mode, rule=rule, eta=eta, alpha=alpha, enough=enough)  # type: ignore[arg-type]
+    plan = tuner.Plan(
+        cost=tuner.Cost(a=a, b=b), learning=learning, signals=signals, guard=guard,  # type: ignore[arg-type]
+        trials=numbers[0], seed=numbers[1], count=numbers[2], K1=K1, duration=duration, hidden=neurons,
+        seventh_input=seventh_input,
+    )  # fmt: skip
+    tuning = tuner.tune(subject, plan, chain)
+    answer = tuner.tune_answer(tuning)
+    if compare:
+        rows = tuner.compare(tuning.trial, tuning.gain(), tuning.training.guard)
+        answer["comparison"] = comparison_answer(rows)
+    if save is not None:
+        tuner.save(tuning.saved(), save)
+    from tfarm.cli import tuning_tables
+
+    tuning_tables.warn_if_stopped(answer)
+    if json:
+        from tfarm.cli.answers import to_json
+
+        print(to_json(answer))
+    else:
+        tuning_tables.print_tuning(answer)
