@@ -22,7 +22,7 @@ from tfarm.exact.characteristic import Analytic
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 TURN = 0.6  # rad: a longer step of the phase along the contour is halved
-FORESEEN = 1.0  # rad: so is one whose ends turn faster than this
+FORESEEN = 1.0  # so is one over which ln f, phase or size, would change by more at the rate of either end
 FINEST = 1e-13  # a contour cannot be resolved closer to a zero than this share of the box
 DEAD = 1e-8  # nearer to s = 0 than this share of a box Newton's method is not believed: a zero there forces cuts
 SPLIT = 0.4871  # where a box is cut: off the axes, on which zeros like to lie
@@ -79,7 +79,7 @@ def winding_number(function: Function, box: Box, points: int = 40) -> int:
     while True:
         length = np.diff(path)
         step = np.angle(np.exp(1j * np.diff(phase)))
-        foreseen = np.maximum(abs((rate[:-1] * length).imag), abs((rate[1:] * length).imag))
+        foreseen = np.maximum(abs(rate[:-1] * length), abs(rate[1:] * length))
         (rough,) = np.nonzero((abs(step) > TURN) | (foreseen > FORESEEN))
         if not rough.size:
             return round(float(step.sum()) / (2 * math.pi))

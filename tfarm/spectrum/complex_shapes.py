@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from tfarm.errors import ConvergenceError
 from tfarm.exact.balls import State, nearest, point, precision
 from tfarm.exact.characteristic import characteristic
-from tfarm.exact.coefficients import Coefficients
+from tfarm.exact.coefficients import Coefficients, Condition
 from tfarm.exact.free import free_response
 
 Complex = NDArray[np.complexfloating[Any, Any]]
@@ -20,19 +21,25 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 def mode_field(k: Coefficients, s: complex, quantity: str, x: NDArray[np.float64]) -> Complex:
     """ "W", "Psi" or "M" (dimensionless lengths and moments) at the shares x, of unit modal mass in SI units.
 
-    At an eigenvalue  D'(s) theta = a,  the mode's  2 s (mass) + (damping)  in the shape's own scale (reciprocity,
-    differentiated); the shape is scaled to  a = 2 s, its tip moving up.
+    At an eigenvalue  D'(s) theta = a  (locked hub: D'(s) M0 = a),  a the mode's  2 s (mass) + (damping)  in the shape's
+    own scale (reciprocity, differentiated); the shape is scaled to  a = 2 s, its tip moving up (turning, if pinned).
     """
     at = np.array([s])
     free = free_response(k, at)
-    theta, slope = complex(free.theta.c[0][0]), complex(characteristic(k, at).slope[0])
+    theta, M0, slope = (complex(part) for part in (free.theta.c[0][0], free.M.c[0][0], characteristic(k, at).slope[0]))
+    hub = Condition.of(k.hub_inertia)
+    turning, force = float(hub.inertia) * s * s, float(hub.force)
+    by_moment = k.is_locked or abs(turning) > force  # a heavy hub hardly turns: M0 keeps its digits
+    if by_moment:
+        theta = M0 if k.is_locked else M0 * force / turning
     if theta == 0 or slope == 0:
         raise ConvergenceError(f"the hub does not feel the mode at {s:.6g} 1/s, or it is double", s, slope)
-    unit = np.sqrt(2 * s / (theta * slope) * float(k.length / k.EI)) * theta
+    unit = np.sqrt(2 * s / (theta * slope) * float(k.length / k.EI)) * (M0 if by_moment else theta)
     with precision(128 + 8 * math.ceil(abs(np.real(free.scale[0])))):
         state = State(k, point(s))
-        values = [nearest(_at(state, quantity, float(share)) / state.theta) for share in x]
-        tip = nearest(_at(state, "W", 1.0) / state.theta) or nearest(_at(state, "Psi", 1.0) / state.theta)
+        one = state.M0 if by_moment else state.theta
+        values = [nearest(_at(state, quantity, float(share)) / one) for share in x]
+        tip = nearest(_at(state, "W" if isinstance(k.tip_mass, Fraction) else "Psi", 1.0) / one)
     unit = -unit if (unit * tip).real < 0 else unit
     shape: Complex = unit * np.array(values, dtype=complex)
     return shape

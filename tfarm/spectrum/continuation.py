@@ -33,10 +33,14 @@ Real = NDArray[np.float64]
 
 
 class Member(NamedTuple):
-    """One function of a family, and the real point where it is singular (-1/C; -inf if it is entire)."""
+    """One function of a family, and the real point where it is singular (-1/C; -inf if it is entire).
+
+    Zeros nearer to the origin than `free` may pass it; others may not come near it in one step.
+    """
 
     function: Function
     singular: float = -np.inf
+    free: float = 0.0
 
 
 Family = Callable[[float], Member]
@@ -56,29 +60,37 @@ class Node(NamedTuple):
     zeros: Complex
 
 
-def follow(family: Family, start: Node, stop: float, first: float, wanted: int) -> list[Node]:
+def follow(
+    family: Family, start: Node, stop: float, first: float, wanted: int, before: tuple[Node, ...] = ()
+) -> list[Node]:
     """The nodes passed from `start` to the parameter `stop`, with steps chosen on the way, the first being `first`.
 
-    Of the pairs only the first `wanted` are sure to arrive; the others keep them company, and are dropped where they
-    meet a zero that nobody follows.  Raises ConvergenceError, with the last node, where branches cannot be told apart.
+    `before` are earlier nodes, if there are any, to predict with.  Where zeros were paired anew two nodes follow each
+    other at one value, before and after it.  Of the pairs only the first `wanted` are sure to arrive; the others keep
+    them company, and are dropped where they meet a zero that nobody follows.  Raises ConvergenceError, with the last
+    node, where branches cannot be told apart.
     """
-    nodes, step, refusals = [start], first, 0
+    nodes, recent, step, refusals = [start], [*before, start][-3:], first, 0
     while nodes[-1].at != stop:
         at = nodes[-1].at + step
         if (stop - at) * np.sign(stop - start.at) <= 1e-9 * abs(stop - nodes[-1].at):
             at = stop
-        zeros, stray = _corrected(family(at), predicted(nodes, at))
+        zeros, stray = corrected(family(at), predicted(recent, at))
         if not stray.any():
+            step = 1.6 * (at - nodes[-1].at)
             nodes.append(Node(at, zeros))
-            step = 1.6 * (at - nodes[-2].at)
+            recent = [*recent[-2:], nodes[-1]]
             continue
         refusals += 1
         if refusals > MOST_REFUSALS:
             raise ConvergenceError(f"branches cannot be told apart beyond {nodes[-1].at:.6g}", nodes[-1], step)
         step = (at - nodes[-1].at) / 2.5
         close = abs(step) < 1e-3 * abs(at - start.at)
-        if close and not _exchange(family, nodes, stray, at) and abs(step) < STUCK * abs(at - start.at):
-            nodes = [_shortened(nodes[-1], stray, wanted)]
+        if close and _exchange(family, recent, stray, at):
+            nodes.append(recent[-1])
+        elif close and abs(step) < STUCK * abs(at - start.at):
+            recent = [_shortened(nodes[-1], stray, wanted)]
+            nodes.append(recent[-1])
     return nodes
 
 
@@ -86,17 +98,20 @@ def predicted(nodes: list[Node], at: float) -> Complex:
     """The pairs by polynomials through the last nodes, three at most, of what stays smooth."""
     guess = nodes[-1].zeros
     for number in range(2, min(3, len(nodes)) + 1):
-        longer = _extrapolated(nodes[-number:], at)
+        longer = through(nodes[-number:], at)
         guess = np.where(np.isnan(longer), guess, longer)
     return guess
 
 
-def _extrapolated(nodes: list[Node], at: float) -> Complex:
-    """Mean and square of half the distance; of two real zeros far apart each itself, the slower by its inverse.
+def through(nodes: list[Node], at: float | Real) -> Complex:
+    """The pairs (*at.shape, n, 2) at other values of the parameter, by polynomials through all these nodes.
 
-    (That of an overdamped mode is nearly -1/C, with neighbours closer by than C times a step.)
+    Of mean and square of half the distance; of two real zeros far apart of each itself, of the slower the inverse.
+    (That of an overdamped mode is nearly -1/C, with neighbours closer by than C times a step.)  A zero that is exactly
+    0 in all nodes stays there.
     """
-    weights = np.array([np.prod([(at - b.at) / (a.at - b.at) for b in nodes if b is not a]) for a in nodes])
+    value = np.asarray(at)
+    weights = np.array([_product([(value - b.at) / (a.at - b.at) for b in nodes if b is not a]) for a in nodes]).T
     zeros = np.stack([node.zeros for node in nodes])
     mean, half = zeros.mean(2).real, (zeros[..., 0] - zeros[..., 1]) / 2
     square = (half * half).real
@@ -104,19 +119,26 @@ def _extrapolated(nodes: list[Node], at: float) -> Complex:
     slow = zeros[..., 0].real
     far = ((square > 0.1 * mean**2) & (slow * slow[0] > 0)).all(0)
     inverse = weights @ np.where(far, 1 / np.where(far, slow, 1), 1)
-    apart = np.stack([1 / np.where(inverse == 0, 1, inverse), weights @ zeros[..., 1].real], 1)
-    return np.where(far[:, None], apart, pairs)
+    apart = np.stack([1 / np.where(inverse == 0, 1, inverse), weights @ zeros[..., 1].real], -1)
+    found = np.where(far[:, None], apart, pairs)
+    pinned = (zeros[..., 0] == 0).all(0)
+    beside = 2 * (weights @ mean)
+    return np.where(pinned[:, None], np.stack([0 * beside, beside], -1), found)
+
+
+def _product(factors: list[Real]) -> Real:
+    return np.asarray(np.prod(np.array(factors), axis=0))
 
 
 def _pairs(mean: Real, square: Real) -> Complex:
     """mean +- sqrt(square), with Im > 0 or the slower first."""
     root = np.sqrt(abs(square))
     upper, away = mean + 1j * root, np.copysign(root, mean)
-    real = np.stack([mean - away, mean + away], 1).astype(complex)
-    return np.where((square < 0)[:, None], np.stack([upper, upper.conj()], 1), real)
+    real = np.stack([mean - away, mean + away], -1).astype(complex)
+    return np.where((square < 0)[..., None], np.stack([upper, upper.conj()], -1), real)
 
 
-def _corrected(member: Member, guess: Complex) -> tuple[Complex, NDArray[np.bool_]]:
+def corrected(member: Member, guess: Complex) -> tuple[Complex, NDArray[np.bool_]]:
     """The pairs of zeros next to the guess, and which of them did not settle there."""
     zeros = guess
     for _ in range(12):
@@ -124,12 +146,12 @@ def _corrected(member: Member, guess: Complex) -> tuple[Complex, NDArray[np.bool
         if not np.isfinite(zeros).all():
             break
         if (moved < SETTLED).all():
-            return zeros, _strayed(guess, zeros, member.singular)
+            return zeros, _strayed(guess, zeros, member)
     return guess, ~(moved < SETTLED)
 
 
-def _strayed(guess: Complex, found: Complex, singular: float) -> NDArray[np.bool_]:
-    gap, _ = _neighbours(found, singular)
+def _strayed(guess: Complex, found: Complex, member: Member) -> NDArray[np.bool_]:
+    gap, _ = _neighbours(found, member)
     met = (guess[:, 0].imag > 0) != (found[:, 0].imag > 0)  # around a meeting on the axis only the mean is compared
     moved = np.where(met[:, None], abs((guess - found).mean(1))[:, None], abs(guess - found))
     strayed: NDArray[np.bool_] = np.any(~(moved <= BELIEVED * gap), axis=1)
@@ -144,6 +166,8 @@ def _exchange(family: Family, nodes: list[Node], stray: NDArray[np.bool_], at: f
     here, there, zeros = family(nodes[-1].at).function, family(at).function, nodes[-1].zeros.copy()
     for i, j in product(np.nonzero(stray & (zeros[:, 0].imag == 0))[0], (0, 1)):
         zero = zeros[i, j]
+        if zero == 0:
+            continue
         near = _next_zero(here, zero.real)
         if near in (np.inf, zeros[i, 1 - j].real):
             continue
@@ -193,7 +217,7 @@ def _next_zero(function: Function, zero: float) -> float:
     return min(found, key=lambda s: abs(s - zero), default=np.inf)
 
 
-def _neighbours(zeros: Complex, singular: float) -> tuple[Real, Complex]:
+def _neighbours(zeros: Complex, member: Member) -> tuple[Real, Complex]:
     """Of each zero its distance to the nearest zero of another pair or to the singular point, and its nearest zeros."""
     flat = zeros.ravel()
     plane = np.c_[flat.real, flat.imag]
@@ -202,13 +226,14 @@ def _neighbours(zeros: Complex, singular: float) -> tuple[Real, Complex]:
     itself = np.arange(flat.size)[:, None]
     gap = np.where(which // 2 == itself // 2, np.inf, distance).min(1)
     others = np.where(which == itself, np.nan, flat[which])
-    gap = np.minimum(gap, np.minimum(2 * abs(flat) + 1e-300, abs(flat - singular)))
+    from_origin = np.maximum(2 * abs(flat), member.free + 1e-300)
+    gap = np.minimum(gap, np.minimum(from_origin, abs(flat - member.singular)))
     return gap.reshape(zeros.shape), others
 
 
 def improved(member: Member, zeros: Complex) -> tuple[Complex, Real]:
     """One correction of every pair, and how far each moved, as a share of its distance to the next zero."""
-    gap, others = _neighbours(zeros, member.singular)
+    gap, others = _neighbours(zeros, member)
     is_real = zeros.imag[:, 0] == 0
     value, slope, scale = (part.reshape(zeros.shape) for part in member.function(zeros.ravel()))
     with np.errstate(all="ignore"):
@@ -218,7 +243,8 @@ def improved(member: Member, zeros: Complex) -> tuple[Complex, Real]:
     new[~is_real, 1] = new[~is_real, 0].conj()
     new[is_real] = new[is_real].real
     apart = abs(zeros[:, 0] - zeros[:, 1])
-    for i in np.nonzero((apart < gap.min(1)) & ~(abs(new - zeros).max(1) < 0.1 * apart))[0]:
+    close = (apart < gap.min(1)) & (zeros[:, 0] != 0)
+    for i in np.nonzero(close & ~(abs(new - zeros).max(1) < 0.1 * apart))[0]:
         twist = np.exp(scale[i, 1] - scale[i, 0])  # both values on the scale of the first
         new[i] = _together(zeros[i], value[i] * [1, twist], slope[i] * [1, twist])
     floor = 4 * np.finfo(float).eps * abs(zeros)  # nearer no zero is known

@@ -27,6 +27,7 @@ from .table import Modes, modes
 Real = NDArray[np.float64]
 
 COMPANY = (6, 11, 17, 29)  # modes followed beyond those wanted, lest the last be led astray: the next if that fails
+BESIDE = 1e-12  # how far a listed eigenvalue may be from its disc, of its size (more beside its own partner)
 CLEAR = 0.8  # how far towards -1/C a box may reach
 FIRST = 0.01  # the first step in C, over 1/w of the highest mode
 
@@ -36,7 +37,8 @@ class DampedModes:
     """The modes of an arm with its damping, in the order of the undamped modes they continue from.
 
     `eigenvalues` (n, 2) [1/s] are both zeros of each mode: a conjugate pair with Im > 0 first, or two real ones, the
-    slower first (overdamped); 0 and 0 for the rigid body.  `box` [1/s] holds `count` eigenvalues, all of them listed.
+    slower first (overdamped); 0 and 0 for the rigid body.  (An overdamped mode whose fast zero has met the third one of
+    its wave rings again, in shear: that pair is listed, not its slow zero near -1/C.)  `box` [1/s] holds `count` eigenvalues, all of them listed.
     """
 
     undamped: Modes
@@ -77,11 +79,15 @@ class DampedModes:
         for pair in self.eigenvalues[self.index > 0]:
             wanted = pair[:1] if pair[0].imag > 0 else pair
             discs.append(tuple(enclosed(k, complex(zero), digits) for zero in wanted))
+            for zero, disc in zip(wanted, discs[-1], strict=True):
+                _compared(complex(zero), disc, abs(pair[0] - pair[1]))
         if not disjoint([disc for pair in discs for disc in pair]):
             raise CertificationError("the discs of two eigenvalues touch: ask for more digits")
         proven = proven_count(k, self.box)
-        if proven != self.count:
-            raise CertificationError(f"{self.count} eigenvalues in the box are listed, but {proven} are there")
+        listed = int(self.box.holds(self.eigenvalues[self.index > 0].ravel()).sum()) + zeros_at_origin(k)
+        if not listed == self.count == proven:
+            text = f"{listed} eigenvalues in the box are listed and {self.count} claimed, but {proven} are there"
+            raise CertificationError(text)
         return tuple(discs)
 
     # ------------------------------------------------------------ shapes
@@ -110,6 +116,13 @@ class DampedModes:
         zeros = self.eigenvalues[self.index > 0]
         values = [[mode_field(k, complex(zero), quantity, share.ravel()) for zero in pair] for pair in zeros]
         return np.array(values, dtype=complex).reshape(*zeros.shape, *share.shape)
+
+
+def _compared(zero: complex, disc: Disc, apart: float) -> None:
+    """Raise CertificationError where a disc lies elsewhere than the listed eigenvalue it was sought for."""
+    away = abs(complex(float(disc.re), float(disc.im)) - zero)
+    if away > float(disc.radius) + BESIDE * abs(zero) * max(1.0, abs(zero) / max(apart, 1e-300)):
+        raise CertificationError(f"next to {zero:.12g} 1/s the eigenvalue is {disc.re} + {disc.im}i, not the one listed")
 
 
 def damped_modes(undamped: Modes) -> DampedModes:

@@ -1,0 +1,295 @@
+"""Damped modes against a Galerkin model, the paper's determinant, closed forms and perturbation theory."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tfarm
+from tests.spectrum.damped import judge, pairs, some_damped_arm
+from tests.spectrum.damped_roads import newton_step, pinned, ritz_eigenvalues, sine_waves
+from tests.strategies import arm_of, some_arm
+from tfarm import Arm
+from tfarm.spectrum.damped import DampedModes, damped_modes
+
+EPS = np.finfo(float).eps
+EXTREMES = ((0.0, 0.0, 0.0), (math.inf, math.inf, math.inf), (0.0, math.inf, 0.0), (1.0, 0.0, math.inf))
+
+
+def damped_arm(C, *, hub=1.0, mass=0.0, inertia=0.0, slenderness=50.0) -> Arm:
+    return arm_of(
+        length=1.0, slenderness=slenderness, width=3.0, density=7800.0, E=2.1e11, nu=0.3,
+        damping=C, hub=hub, mass=mass, inertia=inertia,
+    )  # fmt: skip
+
+
+def with_damping(arm: Arm, C: float) -> Arm:
+    return replace(arm, link=replace(arm.link, damping=C))
+
+
+def listed(arm: Arm, count: int, theory="timoshenko") -> DampedModes:
+    return damped_modes(tfarm.modes(arm, count, theory=theory))
+
+
+def nearest_apart(ours, theirs):
+    """Relative distance of each of ours to the nearest of theirs."""
+    return np.array([abs(theirs / zero - 1).min() for zero in np.ravel(ours)])
+
+
+# ------------------------------------------------------------ random arms, counted
+
+
+def test_random_arms_are_listed_completely() -> None:
+    rng = np.random.default_rng(41)
+    verdicts = [judge(*some_damped_arm(rng), certify=False) for _ in range(32)]
+    assert [v.reason for v in verdicts if v.outcome != "right"] == []
+    assert sum(v.inside for v in verdicts) > 450
+
+
+def test_random_arms_are_proven_complete() -> None:
+    rng = np.random.default_rng(43)
+    drawn = [some_damped_arm(rng) for _ in range(8)]
+    verdicts = [judge(arm, min(count, 5), model=False) for arm, count in drawn]
+    assert [v.reason for v in verdicts if v.outcome != "right"] == []
+
+
+@pytest.mark.parametrize("slenderness", [5.0, 500.0])
+@pytest.mark.parametrize("C", [1e-12, 1e-6, 1e-2])
+def test_extreme_ends(C: float, slenderness: float) -> None:
+    for hub, mass, inertia in EXTREMES:
+        arm = damped_arm(C, hub=hub, mass=mass, inertia=inertia, slenderness=slenderness)
+        for count in (1, 8):
+            verdict = judge(arm, count, certify=False, model=slenderness < 100)
+            assert verdict.outcome == "right", (hub, mass, inertia, count, verdict.reason)
+
+
+def test_sixty_modes_of_the_lab_arm() -> None:
+    verdict = judge(tfarm.load("sasaki2012-lab"), 60, certify=False, model=False)
+    assert (verdict.outcome, verdict.reason) == ("right", "")
+    assert (verdict.inside, verdict.overdamped) == (24, 4)
+
+
+# ------------------------------------------------------------ other solutions
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_galerkin_model_has_the_low_modes(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    arm = some_arm(rng, damping=0.0, slenderness=(5, 100))
+    omega = tfarm.modes(arm, 6).natural_frequency[-1]
+    arm = with_damping(arm, float(10 ** rng.uniform(-3, 0.3)) / omega)  # up to the edge of overdamping
+    assert nearest_apart(pairs(listed(arm, 6)), ritz_eigenvalues(arm)).max() < 1e-8
+
+
+@pytest.mark.parametrize("overdamping", [0.05, 3.0, 30.0])
+def test_the_papers_determinant_vanishes_there(overdamping: float) -> None:
+    rng = np.random.default_rng(12)
+    for case in (
+        ("some", "some", "some"),
+        ("infinite", "zero", "zero"),
+        ("zero", "infinite", "some"),
+        ("some", "zero", "infinite"),
+    ):
+        arm = some_arm(rng, case, damping=0.0, slenderness=(8, 80))
+        arm = with_damping(arm, 2 * overdamping / float(tfarm.modes(arm, 5).natural_frequency[-1]))
+        damped = listed(arm, 5)
+        steps = [newton_step(arm, zero) for zero in pairs(damped).ravel()]
+        assert max(steps) < 1e-14, (case, steps)
+
+
+# ------------------------------------------------------------ closed forms
+
+
+@pytest.mark.parametrize(
+    ("hub", "mass", "inertia"), [(math.inf, 0.0, 0.0), (0.0, 0.0, 0.0), (0.7, 0.5, 2.0), (2.0, math.inf, 0.1)]
+)
+@pytest.mark.parametrize("theory", ["euler-bernoulli", "rayleigh"])
+def test_without_shear_damping_is_proportional(theory, hub, mass, inertia) -> None:
+    """All the stiffness is damped, and no inertia is: s^2 + w^2 (1 + C s) = 0 whatever the ends carry."""
+    rigid = damped_arm(0.0, hub=hub, mass=mass, inertia=inertia)
+    omega = tfarm.modes(rigid, 10, theory=theory).natural_frequency
+    flexible = omega[omega > 0]
+    for C in (1e-3 / flexible[-1], 1.7 / flexible[4], 11 / flexible[0]):
+        damped = listed(with_damping(rigid, C), 10, theory)
+        p, q = pairs(damped).T
+        assert (abs((p + q).real + C * flexible**2) < 1e-11 * C * flexible**2 + 64 * EPS * flexible).all()
+        np.testing.assert_allclose((p * q).real, flexible**2, rtol=1e-11)
+        np.testing.assert_allclose(damped.damping_ratio[damped.index > 0], C * flexible / 2, rtol=1e-11, atol=64 * EPS)
+        np.testing.assert_array_equal(damped.is_overdamped[damped.index > 0], C * flexible > 2)
+
+
+@pytest.mark.parametrize("slenderness", [5.0, 30.0])
+@pytest.mark.parametrize("theory", ["timoshenko", "shear", "rayleigh", "euler-bernoulli"])
+def test_sine_waves_between_two_pins(theory: str, slenderness: float) -> None:
+    """Every eigenvalue listed is a root of a wave's polynomial, and every root in the box is listed."""
+    link = damped_arm(0.0, slenderness=slenderness).link
+    first = tfarm.modes(pinned(link), 1).natural_frequency[-1]
+    for C in (1e-4 / first, 0.02 / first, 0.3 / first, 4 / first):
+        arm = pinned(replace(link, damping=C))
+        waves, cut_off = sine_waves(arm, 400, theory)
+        exact = np.concatenate([waves.ravel(), cut_off])
+        damped = listed(arm, 12, theory)
+        assert nearest_apart(pairs(damped), exact).max() < 1e-9
+        assert damped.box.holds(exact).sum() == damped.count, (theory, C)
+        inside = exact[damped.box.holds(exact)]
+        assert nearest_apart(inside, pairs(damped).ravel()).max(initial=0) < 1e-9
+
+
+def test_slow_and_fast_zeros_of_overdamped_sine_waves() -> None:
+    """Slow ones lie left of -1/C and tend to it; each pair is of one wave, in shear where its fast zero met a third."""
+    C = 3e-3
+    arm = pinned(damped_arm(C, slenderness=200.0).link)
+    damped = listed(arm, 12)
+    overdamped = damped.is_overdamped
+    np.testing.assert_array_equal(damped.index[overdamped], [4, 5, 6])
+    slow, fast = damped.eigenvalues[overdamped].real.T
+    assert (slow < -1 / C).all()
+    assert (np.diff(slow) > 0).all()
+    assert (fast < slow).all()
+    for wave, pair in zip(sine_waves(arm, 12)[0], damped.eigenvalues, strict=True):
+        assert nearest_apart(pair, wave).max() < 1e-9
+
+
+# ------------------------------------------------------------ perturbation, symmetry, continuity
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_little_damping_takes_the_bending_share_of_the_energy(seed: int) -> None:
+    """Re s = -C w^2 d ln w/d ln E to first order (G held), Im s = w: the error falls with C^2."""
+    arm = some_arm(np.random.default_rng(seed), damping=0.0, slenderness=(5, 40))
+    undamped = tfarm.modes(arm, 8)
+    flexible = undamped.index > 0
+    omega, share = undamped.natural_frequency[flexible], undamped.sensitivity["youngs_modulus"][flexible]
+    errors = []
+    for Cw in (1e-3, 1e-4):
+        C = Cw / omega[-1]
+        s = pairs(damped_modes(tfarm.modes(with_damping(arm, C), 8)))[:, 0]
+        errors.append(abs(s.real / (-C * omega**2 * share) - 1).max())
+        assert abs(s.imag / omega - 1).max() < 10 * Cw**2
+    assert errors[0] < 1e-3
+    assert errors[1] < errors[0] / 50
+
+
+def test_no_damping_leaves_the_modes_on_the_axis() -> None:
+    damped = listed(damped_arm(0.0), 8)
+    np.testing.assert_array_equal(damped.eigenvalues[1:, 0], 1j * damped.natural_frequency[1:])
+    np.testing.assert_array_equal(damped.damping_ratio, 0.0)
+    assert not damped.is_overdamped.any()
+    assert damped.count == 2 * 8 + 2
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_pairs_are_conjugate_or_real_and_all_decay(seed: int) -> None:
+    arm = some_arm(np.random.default_rng(seed), damping=float(10 ** np.random.default_rng(seed).uniform(-7, -3)))
+    damped = listed(arm, 15)
+    p, q = pairs(damped).T
+    ringing = p.imag != 0
+    np.testing.assert_array_equal(q[ringing], p[ringing].conj())
+    assert (p.imag[ringing] > 0).all()
+    assert not q[~ringing].imag.any()
+    assert (abs(p) <= abs(q))[~ringing].all()
+    assert (p.real <= 0).all()
+    assert (q.real < 0).all() or (p.real[p.real == 0].size == 1 and arm.hub.inertia == 0)  # W = 0: nothing bends
+    np.testing.assert_allclose(damped.damping_ratio[damped.index > 0][ringing], (-p.real / abs(p))[ringing], rtol=1e-12)
+    if damped.index[0] == 0:
+        assert damped.damping_ratio[0] == 0
+        np.testing.assert_array_equal(damped.eigenvalues[0], 0)
+
+
+def test_eigenvalues_move_continuously_from_the_undamped_ones_in_their_order() -> None:
+    arm = damped_arm(0.0, hub=0.3, mass=0.4, inertia=0.5, slenderness=12.0)
+    undamped = tfarm.modes(arm, 14)
+    before, gap = 1j * undamped.natural_frequency[1:], np.diff(undamped.natural_frequency).min()
+    for C in np.linspace(0, 0.3 / undamped.natural_frequency[-1], 30)[1:]:
+        damped = listed(with_damping(arm, float(C)), 14)
+        after = pairs(damped)[:, 0]
+        assert abs(after - before).max() < 0.2 * gap
+        np.testing.assert_array_equal(damped.natural_frequency, undamped.natural_frequency)
+        np.testing.assert_array_equal(damped.index, undamped.index)
+        before = after
+
+
+def test_asking_for_more_modes_changes_none() -> None:
+    arm = damped_arm(2e-5, mass=0.4, slenderness=12.0)
+    few, many = pairs(listed(arm, 6)), pairs(listed(arm, 17))
+    np.testing.assert_allclose(many[:6], few, rtol=1e-13)
+
+
+def test_units_do_not_matter() -> None:
+    """Time in ten thousandths: E 1e-8, C 1e4 and every eigenvalue 1e-4 times as large."""
+    arm = damped_arm(2e-5, hub=0.3, mass=0.4, slenderness=12.0)
+    link = replace(
+        arm.link,
+        youngs_modulus=arm.link.youngs_modulus * 1e-8,
+        shear_modulus=arm.link.shear_modulus * 1e-8,
+        damping=0.2,
+    )
+    slow = replace(arm, link=link)
+    np.testing.assert_allclose(pairs(listed(slow, 10)), 1e-4 * pairs(listed(arm, 10)), rtol=1e-13)
+
+
+# ------------------------------------------------------------ shapes
+
+
+def residue(arm: Arm, output: str, pole: complex, radius: float, x=None) -> complex:
+    """By the trapezoidal rule on a circle, which converges geometrically."""
+    circle = radius * np.exp(2j * math.pi * np.arange(64) / 64)
+    values = tfarm.transfer(arm, output, x=x)(pole + circle)
+    return complex((values * circle).mean())
+
+
+SHAPED = {
+    "ringing": damped_arm(2e-5, hub=0.3, mass=0.4, inertia=0.5, slenderness=12.0),
+    "overdamped": damped_arm(6e-3, hub=0.3, mass=0.4, inertia=0.5, slenderness=60.0),
+    "pinned root": damped_arm(1e-4, hub=0.0, mass=0.4, slenderness=20.0),
+    "pinned tip": damped_arm(1e-4, hub=0.1, mass=math.inf, inertia=0.1, slenderness=20.0),
+    "undamped": damped_arm(0.0, hub=0.3, slenderness=20.0),
+}
+
+
+@pytest.mark.parametrize("name", SHAPED)
+def test_residues_are_products_of_shapes(name: str) -> None:
+    arm = SHAPED[name]
+    damped = listed(arm, 4)
+    zeros = pairs(damped)
+    x = 0.37 * arm.link.length
+    w, psi, moment = (f(np.array([0.0, x, arm.link.length])) for f in (damped.shape, damped.rotation, damped.moment))
+    others = np.r_[listed(arm, 8).eigenvalues.ravel(), -1 / arm.link.damping if arm.link.damping else np.inf]
+    for i, j in np.ndindex(*zeros.shape):
+        s = zeros[i, j]
+        away = abs(others - s)
+        radius = 0.5 * away[away > 1e-9 * abs(s)].min()
+        per = psi[i, j, 0] / (2 * s)
+        expected = {
+            "hub_angle": psi[i, j, 0] * per,
+            "tip_displacement": w[i, j, 2] * per,
+            "root_moment": moment[i, j, 0] * per,
+        }
+        for output, value in expected.items():
+            field = {"hub_angle": psi, "tip_displacement": w, "root_moment": moment}[output][i, j]
+            assert abs(residue(arm, output, s, radius) - value) < 1e-8 * abs(field * per).max(), (output, s)
+        inside = (w[i, j, 1] - x * psi[i, j, 0]) * per
+        assert residue(arm, "deflection", s, radius, x) == pytest.approx(inside, rel=1e-8)
+        assert residue(arm, "moment", s, radius, x) == pytest.approx(moment[i, j, 1] * per, rel=1e-8)
+
+
+@pytest.mark.parametrize(("hub", "mass"), [(0.3, 0.4), (0.0, 0.4), (math.inf, 0.0), (math.inf, 0.4), (0.5, math.inf)])
+def test_shapes_tend_to_the_undamped_ones(hub: float, mass: float) -> None:
+    arm = damped_arm(1e-12, hub=hub, mass=mass, inertia=0.2, slenderness=20.0)
+    damped, undamped = listed(arm, 4), tfarm.modes(arm, 4)
+    x = np.linspace(0, 1, 7)
+    for name in ("shape", "rotation", "moment"):
+        real = getattr(undamped, name)(x)[undamped.index > 0]
+        for j in (0, 1):
+            np.testing.assert_allclose(getattr(damped, name)(x)[:, j], real, rtol=1e-6, atol=1e-6 * abs(real).max())
+
+
+def test_shapes_are_conjugate_and_of_the_shape_of_x() -> None:
+    damped = listed(SHAPED["ringing"], 3)
+    assert damped.shape(1.0).shape == (3, 2)
+    assert damped.moment(np.zeros((2, 5))).shape == (3, 2, 2, 5)
+    w = damped.shape(np.linspace(0, 1, 5))
+    np.testing.assert_allclose(w[:, 1], w[:, 0].conj(), rtol=1e-12)
+    with pytest.raises(tfarm.ParameterError, match="between 0 and 1"):
+        damped.shape(1.01)

@@ -1,0 +1,292 @@
+"""Proofs off the axis: they hold where closed forms and fifty digits can check them, and refuse what is not so."""
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import flint
+import mpmath
+import numpy as np
+import pytest
+
+import tfarm
+from tests.spectrum.damped import pairs
+from tests.spectrum.damped_roads import delta, newton_root, newton_step, pinned, ritz_eigenvalues, sine_waves
+from tests.spectrum.test_damped import damped_arm, listed
+from tfarm import CertificationError
+from tfarm.exact.balls import point, precision
+from tfarm.exact.characteristic import OPEN, Gains, characteristic, zeros_at_origin
+from tfarm.exact.coefficients import coefficients
+from tfarm.spectrum import ball_axis
+from tfarm.spectrum.box import Box
+from tfarm.spectrum.enclose import Disc, _holds_one, disjoint, enclosed, proven_count
+
+LAB = tfarm.load("sasaki2012-lab")
+
+
+def box_of(height, reach):
+    """From -reach to 0.1 height."""
+    return Box(-reach, 0.1 * height, -height, height)
+
+
+# ------------------------------------------------------------ discs
+
+
+@pytest.mark.parametrize("digits", [15, 40, 200])
+def test_discs_hold_the_papers_roots(digits: int) -> None:
+    arm = damped_arm(2e-5, hub=0.3, mass=0.4, inertia=0.5, slenderness=12.0)
+    k = coefficients(arm)
+    for zero in pairs(listed(arm, 3))[[0, 2], 0]:
+        disc = enclosed(k, complex(zero), digits)
+        root = newton_root(arm, zero, digits)
+        with mpmath.workdps(2 * digits + 20):
+            miss = abs(mpmath.mpc(disc.re, disc.im) - root)
+            assert miss < mpmath.mpf(disc.radius)
+            assert mpmath.mpf(disc.radius) <= abs(root) * mpmath.mpf(10) ** (1 - digits)
+            assert mpmath.mpf(disc.radius) >= abs(root) * mpmath.mpf(10) ** (-digits - 1)
+
+
+def test_discs_of_real_zeros_are_real() -> None:
+    arm = pinned(damped_arm(3e-3, slenderness=200.0).link)
+    damped = listed(arm, 6)
+    for pair in damped.eigenvalues[damped.is_overdamped]:
+        for zero in pair:
+            disc = enclosed(damped.undamped.coefficients, complex(zero), 30)
+            assert disc.is_real
+            root = newton_root(arm, zero, 30)
+            with mpmath.workdps(60):
+                assert abs(mpmath.mpf(disc.re) - root) < mpmath.mpf(disc.radius)
+
+
+def test_without_shear_forty_digits_follow_from_the_undamped_frequency() -> None:
+    """s^2 + w^2 (1 + C s) = 0 with the forty digits that `Modes.digits` has of w."""
+    arm = damped_arm(1e-5, hub=0.7, mass=0.5, inertia=2.0)
+    damped = listed(arm, 3, "euler-bernoulli")
+    with mpmath.workdps(60):
+        C = mpmath.mpf(arm.link.damping)
+        for text, (disc,) in zip(damped.undamped.digits(45)[1:], damped.certify(40), strict=True):
+            w = mpmath.mpf(text)
+            s = -C * w**2 / 2 + 1j * w * mpmath.sqrt(1 - (C * w / 2) ** 2)
+            assert abs(mpmath.mpc(disc.re, disc.im) - s) < mpmath.mpf(disc.radius)
+
+
+def test_a_poor_start_ends_in_a_disc_around_some_zero() -> None:
+    k = coefficients(LAB)
+    for start in (0.9 + 70j, -5 + 74j, 300 + 300j, -3 - 71j):
+        disc = enclosed(k, start, 15)
+        assert newton_step(LAB, complex(float(disc.re), float(disc.im))) < 1e-13
+
+
+def test_a_double_eigenvalue_has_no_disc(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without shear and at C w = 2 exactly both zeros are -w; the double nearest to that C leaves them 1e-8 apart."""
+    rigid = damped_arm(0.0, hub=math.inf)
+    omega = tfarm.modes(rigid, 2, theory="euler-bernoulli").natural_frequency
+    arm = replace(rigid, link=replace(rigid.link, damping=2 / float(omega[1])))
+    k = coefficients(arm, "euler-bernoulli")
+    monkeypatch.setattr(ball_axis, "MOST_BITS", 1000)
+    with pytest.raises(CertificationError) as refused:
+        enclosed(k, complex(-omega[1]) * (1 + 1e-4), 5)
+    assert "\n" not in str(refused.value)
+    assert "double" in str(refused.value)
+
+
+def test_a_closed_loop_pole_is_enclosed() -> None:
+    k = coefficients(LAB)
+    gains = Gains.of(k, 0.3, 0.3, 0.0)
+    s = np.array([-3 + 70j])
+    for _ in range(60):
+        at = characteristic(k, s, gains)
+        s = s - at.value / at.slope
+    disc = enclosed(k, complex(s[0]), 30, gains)
+    near = complex(float(disc.re), float(disc.im))
+    assert newton_step(LAB, near, K1=0.3, K2=0.3) < 1e-15
+    assert abs(near - s[0]) < 1e-12 * abs(near)
+
+
+def test_touching_discs_are_seen() -> None:
+    def disc(re, im, radius="1e-3"):
+        return Disc(re, im, radius)
+
+    apart = [disc("1.000", "0"), disc("1.003", "0"), disc("1.000", "0.0021"), disc("-1.000", "0")]
+    assert disjoint(apart)
+    for other in (
+        disc("1.000", "0"),
+        disc("1.0019", "0"),
+        disc("1.002", "0"),
+        disc("1.001", "0.0015"),
+        disc("9", "0", "8.0"),
+    ):
+        assert not disjoint([*apart, other])
+    assert disjoint([])
+
+
+def test_rouches_theorem_is_right_about_discs_of_any_size() -> None:
+    """Where it says one there is one: none beside a zero, nor two together; and small discs around one are proven."""
+    rng = np.random.default_rng(6)
+    k = coefficients(LAB)
+    zeros = listed(LAB, 12).eigenvalues[1:].ravel()
+    said = 0
+    with precision(200):
+        for _ in range(150):
+            zero = zeros[rng.integers(8)]
+            radius = 10 ** rng.uniform(-4, 0.5) * abs(zero)
+            middle = complex(zero + radius * rng.uniform(0, 1.5) * np.exp(2j * math.pi * rng.random()))
+            if _holds_one(k, OPEN, point(middle), flint.arb(float(radius))):
+                assert (abs(zeros - middle) <= radius).sum() == 1
+                said += 1
+        assert all(_holds_one(k, OPEN, point(complex(z)), flint.arb(float(1e-3 * abs(z)))) for z in zeros[:8])
+    assert said > 20
+
+
+# ------------------------------------------------------------ counts
+
+
+@pytest.mark.parametrize("theory", ["timoshenko", "shear", "euler-bernoulli"])
+def test_counts_of_sine_waves_are_those_of_the_closed_form(theory: str) -> None:
+    rng = np.random.default_rng(31)
+    link = damped_arm(0.0, slenderness=15.0).link
+    first = tfarm.modes(pinned(link), 1).natural_frequency[-1]
+    for Cw in (0.0, 0.05):
+        arm = pinned(replace(link, damping=Cw / float(first)))
+        k = coefficients(arm, theory)
+        exact = np.concatenate([part.ravel() for part in sine_waves(arm, 200, theory)])
+        for _ in range(2):
+            height = float(first * 10 ** rng.uniform(-0.5, 1.2))
+            reach = height * float(rng.uniform(0.05, 1.5))
+            box = box_of(height, min(reach, 0.9 * float(first) / Cw) if Cw else reach)
+            inside = int(box.holds(exact).sum()) + zeros_at_origin(k)
+            assert proven_count(k, box) == inside, (Cw, box)
+
+
+@pytest.mark.parametrize(("hub", "mass"), [(0.0, 0.4), (math.inf, 0.0), (0.5, math.inf)])
+def test_counts_are_those_of_a_galerkin_model(hub: float, mass: float) -> None:
+    rng = np.random.default_rng(32)
+    arm = damped_arm(4e-5, hub=hub, mass=mass, inertia=0.2, slenderness=12.0)
+    k = coefficients(arm)
+    theirs = ritz_eigenvalues(arm, 48)
+    for _ in range(2):
+        height = float(10 ** rng.uniform(2.5, 4.2))
+        box = Box(-min(0.9 / 4e-5, height * float(rng.uniform(0.2, 3))), height * 0.3, -height, height)
+        assert proven_count(k, box) == box.holds(theirs).sum() + zeros_at_origin(k)
+
+
+def turns_of_ratio(arm, box, **gains):
+    """Zeros in a box of the paper's Delta with feedback less those without, by turns of their ratio: it has no cut."""
+    corners = [
+        complex(box.re_max, 0),
+        complex(box.re_max, box.im_max),
+        complex(box.re_min, box.im_max),
+        complex(box.re_min, 0),
+    ]
+
+    def ratio(s):
+        with mpmath.workdps(60):
+            return complex(delta(arm, s, **gains) / delta(arm, s))
+
+    def turned(a, b, at_a, at_b):
+        middle = (a + b) / 2
+        at = ratio(middle)
+        steps = np.angle(at / at_a), np.angle(at_b / at)
+        if abs(b - a) < 20.0 and max(map(abs, steps)) < 0.7:
+            return sum(steps)
+        return turned(a, middle, at_a, at) + turned(middle, b, at, at_b)
+
+    values = [ratio(corner) for corner in corners]
+    pieces = zip(pairwise(corners), pairwise(values), strict=True)
+    return round(sum(turned(*ends, *at) for ends, at in pieces) / math.pi)
+
+
+@pytest.mark.parametrize(("K1", "K2", "unstable"), [(-0.3, 0.9, 3)])
+def test_a_loop_has_as_many_unstable_poles_as_the_papers_matrix(K1: float, K2: float, unstable: int) -> None:
+    """Undamped: K2 > 1 and K1 < 0 destabilise (a strip beside the axis is left out)."""
+    arm = tfarm.load("sasaki2012")
+    k = coefficients(arm)
+    box = Box(0.5, 100.0, -700.0, 700.0)
+    assert turns_of_ratio(arm, box, K1=K1, K2=K2) == unstable
+    assert proven_count(k, box, Gains.of(k, K1, K2, 0.0)) == unstable
+
+
+# ------------------------------------------------------------ refusals
+
+
+def one_line(error) -> str:
+    text = str(error.value)
+    assert "\n" not in text
+    assert len(text) < 200
+    return text
+
+
+def test_a_box_through_a_zero_is_refused() -> None:
+    k = coefficients(LAB)
+    zero = pairs(listed(LAB, 3))[1, 0]
+    for box in (
+        Box(-50.0, 30.0, -zero.imag, zero.imag),
+        Box(float(zero.real), 30.0, -300.0, 300.0),
+        Box(-50.0, float(zero.real), -300.0, 300.0),
+        Box(-50.0, 0.0, -300.0, 300.0),  # through the origin's double zero
+    ):
+        with pytest.raises(CertificationError) as refused:
+            proven_count(k, box)
+        assert "edge of the box" in one_line(refused)
+
+
+def test_a_box_with_the_accumulation_point_is_refused() -> None:
+    k = coefficients(LAB)
+    for left in (-1 / LAB.link.damping, -2 / LAB.link.damping):
+        with pytest.raises(CertificationError) as refused:
+            proven_count(k, Box(left, 10.0, -300.0, 300.0))
+        assert "-1/C" in one_line(refused)
+
+
+FORGERIES = {
+    "dropped": lambda zeros: np.delete(zeros, 2, axis=0),
+    "doubled": lambda zeros: np.insert(zeros, 3, zeros[3], axis=0),
+    "one in place of another": lambda zeros: np.concatenate([zeros[:3], zeros[2:3], zeros[4:]]),
+    "one moved": lambda zeros: np.concatenate([zeros[:3], zeros[3:4] * (1 + 1e-3), zeros[4:]]),
+}
+
+
+@pytest.mark.parametrize("name", FORGERIES)
+def test_a_forged_list_is_refused(name: str) -> None:
+    damped = listed(LAB, 5)
+    zeros = np.concatenate([damped.eigenvalues[:1], FORGERIES[name](damped.eigenvalues[1:])])
+    undamped = replace(damped.undamped, index=np.arange(len(zeros)))
+    forged = replace(damped, undamped=undamped, eigenvalues=zeros)
+    consistent = int(forged.box.holds(zeros).sum()) + zeros_at_origin(damped.undamped.coefficients) - 2
+    for count in {damped.count, consistent}:
+        with pytest.raises(CertificationError) as refused:
+            replace(forged, count=count).certify()
+        one_line(refused)
+
+
+@pytest.mark.parametrize("change", [1])
+def test_a_wrong_count_or_box_is_refused(change: int) -> None:
+    damped = listed(LAB, 4)
+    with pytest.raises(CertificationError, match="are there"):
+        replace(damped, count=damped.count + change).certify()
+    lower = Box(damped.box.re_min, damped.box.re_max, damped.box.im_min * 0.6, damped.box.im_max * 0.6)
+    with pytest.raises(CertificationError, match="are there"):
+        replace(damped, box=lower).certify()
+
+
+@pytest.mark.parametrize("turn", [1, 1j])
+def test_an_eigenvalue_beside_its_zero_is_refused(turn: complex) -> None:
+    """A number that is 1e-9 off is not proven by a disc elsewhere."""
+    damped = listed(LAB, 4)
+    zeros = damped.eigenvalues.copy()
+    moved = zeros[2, 0] + abs(zeros[2, 0]) * 1e-9 * turn
+    zeros[2] = [moved, moved.conjugate()]
+    with pytest.raises(CertificationError):
+        replace(damped, eigenvalues=zeros).certify()
+
+
+def test_certified_discs_hold_the_listed_eigenvalues() -> None:
+    for arm in (LAB, pinned(damped_arm(3e-3, slenderness=200.0).link)):
+        damped = listed(arm, 6)
+        proof = damped.certify(13)
+        for pair, discs in zip(pairs(damped), proof, strict=True):
+            assert len(discs) == (1 if pair[0].imag else 2)
+            for zero, disc in zip(pair, discs, strict=False):
+                middle = complex(float(disc.re), float(disc.im))
+                assert abs(zero - middle) <= 2 * float(disc.radius)
+                assert disc.is_real == (zero.imag == 0)
