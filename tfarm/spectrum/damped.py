@@ -38,7 +38,8 @@ class DampedModes:
 
     `eigenvalues` (n, 2) [1/s] are both zeros of each mode: a conjugate pair with Im > 0 first, or two real ones, the
     slower first (overdamped); 0 and 0 for the rigid body.  (An overdamped mode whose fast zero has met the third one of
-    its wave rings again, in shear: that pair is listed, not its slow zero near -1/C.)  `box` [1/s] holds `count` eigenvalues, all of them listed.
+    its wave rings again, in shear: that pair is listed, not its slow zero near -1/C.)  `box` [1/s] holds `count`
+    eigenvalues, all of them listed.
     """
 
     undamped: Modes
@@ -122,7 +123,7 @@ def _compared(zero: complex, disc: Disc, apart: float) -> None:
     """Raise CertificationError where a disc lies elsewhere than the listed eigenvalue it was sought for."""
     away = abs(complex(float(disc.re), float(disc.im)) - zero)
     if away > float(disc.radius) + BESIDE * abs(zero) * max(1.0, abs(zero) / max(apart, 1e-300)):
-        raise CertificationError(f"next to {zero:.12g} 1/s the eigenvalue is {disc.re} + {disc.im}i, not the one listed")
+        raise CertificationError(f"next to {zero:.12g} 1/s lies {disc.re} + {disc.im}i, not the eigenvalue listed")
 
 
 def damped_modes(undamped: Modes) -> DampedModes:
