@@ -112,7 +112,10 @@ def poles_below(loop: Loop, height: float) -> Poles:
 def box_of(loop: Loop, height: float) -> Box:
     """A box of that height which reaches far enough right for any unstable pole, and left short of -1/C."""
     right = 0.1 * height
-    while np.any(abs(loop.loop_function(right * np.array([1 + 0j, 2, 5, 20]))) > 0.5) and right < 1e3 * height:
+    while right < 1e3 * height:
+        L = loop.loop_function(right * np.array([1 + 0j, 2, 5, 20]))
+        if not np.any((abs(L) > 0.5) & (L.real < 0)):  # L > 0 may stay large, as K1's on a hub without inertia
+            break
         right *= 1.7
     left, C = 1.5 * height, loop.arm.link.damping
     return Box(-min(left, CLEAR / C) if C else -left, float(right), -height, height)

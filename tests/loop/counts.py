@@ -1,0 +1,138 @@
+"""Lists of closed-loop poles, counted again by another road:  python -m tests.loop.counts 500 [seed]
+
+Random arms (slenderness L/h 5 to 100, any payload, C = 0 or up to a fifth of critical in the first mode) and gains of
+any sign; three to fifteen poles each.  The number listed must be, by Nyquist, the winding number of 1 + L(s) around the
+box, with L from the arm's public transfer functions, plus the arm's own poles inside: at C = 0 those that the count of
+Wittrick and Williams gives, at C > 0 the winding number of the open arm.  Every `PROVEN`-th loop is counted in ball
+arithmetic too.  The highest pole of each loop takes a Newton step on the paper's determinant with its hub row changed.
+"""
+
+import os
+import sys
+import time
+from collections import Counter
+from dataclasses import dataclass
+from itertools import pairwise
+
+if __name__ == "__main__":
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import numpy as np
+
+import tfarm
+from tests.loop.arms import some_loop
+from tests.spectrum.damped_roads import newton_step
+from tfarm.errors import CertificationError, ConvergenceError, ParameterError
+from tfarm.exact.coefficients import coefficients
+from tfarm.loop.poles import closed_loop_poles
+from tfarm.spectrum import modes_below
+from tfarm.spectrum.box import winding_number
+from tfarm.spectrum.damped import member
+from tfarm.spectrum.enclose import proven_count
+
+PROVEN = 20
+STEP = 0.5  # rad: longer steps of the phase are halved
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What came of one loop: "right", "refused" or "wrong", why, whether proven, and how far the last pole is off."""
+
+    outcome: str
+    reason: str = ""
+    proven: bool = False
+    poles: int = 0
+    unstable: int = 0
+    step: float = 0.0
+    milliseconds: float = 0.0
+
+
+def judge(arm, law, count, *, balls=False) -> Verdict:
+    """List the poles of one loop and count them again."""
+    start = time.perf_counter()
+    try:
+        poles = closed_loop_poles(arm, law, count)
+    except (ConvergenceError, ParameterError) as error:
+        return Verdict("refused", str(error).splitlines()[0])
+    spent = 1e3 * (time.perf_counter() - start)
+    listed = int(np.where(poles.values.imag > 0, 2, 1).sum())
+    counts = [nyquist_count(poles.loop, poles.box)]
+    if balls:
+        try:
+            counts.append(proven_count(poles.loop.k, poles.box, poles.loop.gains))
+        except CertificationError as error:
+            return Verdict("refused", f"proof: {error}")
+    step = max((newton_step(arm, complex(s), K1=law.K1, K2=law.K2, Kp=law.Kp) for s in poles.moving[-1:]), default=0.0)
+    wrong = [f"{listed} listed, {there} counted" for there in counts if there != listed]
+    if step > 1e-12:
+        wrong.append(f"no zero of the determinant: {step:.0e} off")
+    return Verdict("wrong" if wrong else "right", ", ".join(wrong), balls, listed, poles.unstable, step, spent)
+
+
+def nyquist_count(loop, box) -> int:
+    """Closed-loop poles in a box: turns of 1 + L around it, and the arm's own poles inside."""
+    arm, law = loop.arm, loop.law
+    plant = tfarm.transfer(arm, ["hub_angle", "root_moment"])
+
+    def phase(s):
+        theta, moment = plant(s)
+        return np.angle(1 + (law.Kp + law.K1 * s) * theta + law.K2 * moment)
+
+    path = np.append(np.concatenate([edge(a, b) for a, b in pairwise(box.corners)]), box.corners[0])
+    angle = phase(path)
+    for _ in range(40):
+        turn = np.angle(np.exp(1j * np.diff(angle)))
+        (rough,) = np.nonzero(abs(turn) > STEP)
+        if not rough.size:
+            return round(float(turn.sum()) / (2 * np.pi)) + own_poles(arm, box)
+        middle = (path[rough] + path[rough + 1]) / 2
+        path, angle = np.insert(path, rough + 1, middle), np.insert(angle, rough + 1, phase(middle))
+    raise AssertionError("the phase of 1 + L does not settle on the contour")
+
+
+def edge(a, b):
+    """Points from a to b, ever denser towards the axis that the edge crosses, next to which poles lie."""
+    fine = np.geomspace(1e-9, 1.0, 200)
+    crossing = (a.real / (a.real - b.real)) if a.real != b.real else 0.5
+    share = np.r_[np.linspace(0, 1, 200), crossing - crossing * fine, crossing + (1 - crossing) * fine]
+    return a + (b - a) * np.unique(share.clip(0, 1))[:-1]
+
+
+def own_poles(arm, box) -> int:
+    """How many poles the arm itself has in a box."""
+    if arm.link.damping:
+        return winding_number(member(coefficients(arm)).function, box, points=2000) + 2 * arm.has_rigid_mode
+    return 2 * modes_below(arm, box.im_max) + 2 * arm.has_rigid_mode
+
+
+def survey(number, seed):
+    """Loops and verdicts."""
+    rng = np.random.default_rng(seed)
+    drawn = [(*some_loop(rng), int(rng.integers(3, 16))) for _ in range(number)]
+    return [(case, judge(*case, balls=n % PROVEN == 0)) for n, case in enumerate(drawn)]
+
+
+def report(verdicts) -> str:
+    """The tally as text."""
+    tally = Counter(verdict.outcome for verdict in verdicts)
+    right = [verdict for verdict in verdicts if verdict.outcome == "right"]
+    spent = [verdict.milliseconds for verdict in right]
+    lines = [
+        f"{len(verdicts)} loops: {tally['right']} right, {tally['refused']} refused, {tally['wrong']} wrong",
+        f"counted again by Nyquist, {sum(v.proven for v in right)} of them proven in balls too; "
+        f"{sum(v.poles for v in right)} poles, {sum(v.unstable for v in right)} unstable",
+        f"highest poles: Newton on the paper's determinant moves them by at most {max(v.step for v in right):.1e}",
+        f"{np.median(spent):.0f} ms a list in the median, {max(spent):.0f} at most",
+    ]
+    reasons = Counter(f"{v.outcome}: {v.reason}" for v in verdicts if v.outcome != "right")
+    return "\n".join([*lines, *(f"{count} x {text}" for text, count in reasons.most_common())])
+
+
+if __name__ == "__main__":
+    NUMBER = int(sys.argv[1]) if len(sys.argv) > 1 else 500
+    SEED = int(sys.argv[2]) if len(sys.argv) > 2 else 2012
+    SURVEY = survey(NUMBER, SEED)
+    print(report([verdict for _, verdict in SURVEY]))
+    for CASE, VERDICT in SURVEY:
+        if VERDICT.outcome != "right":
+            print(VERDICT.outcome, VERDICT.reason, *CASE)

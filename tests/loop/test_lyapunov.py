@@ -1,0 +1,254 @@
+"""What V proves against the exact poles, and its balance along trajectories."""
+
+import math
+from dataclasses import replace
+
+import mpmath
+import numpy as np
+import pytest
+
+import tfarm
+from tests.loop.arms import some_loop, window_arm, with_damping
+from tests.spectrum.damped_roads import delta, newton_step
+from tfarm import Hub, HubFeedback, ParameterError, Payload
+from tfarm.loop.lyapunov import damped_gauge_equivalent, energy_along, lyapunov, lyapunov_with_damped_gauge
+from tfarm.loop.plant import Loop
+from tfarm.loop.poles import closed_loop_poles, poles_below
+from tfarm.spectrum import modes_below
+from tfarm.spectrum.enclose import enclosed
+
+ARM = tfarm.load("sasaki2012")
+LAB = tfarm.load("sasaki2012-lab")
+
+
+def law(K1=0.3, K2=0.3, Kp=0.0):
+    return HubFeedback(K1=K1, K2=K2, Kp=Kp)
+
+
+def unstable(arm, feedback, count=8):
+    return closed_loop_poles(arm, feedback, count).unstable
+
+
+# ------------------------------------------------------------ the proven region and the exact one
+
+
+@pytest.mark.parametrize("K2", [-1e6, -10.0, 0.0, 0.3, 0.999])
+def test_weights_prove_every_K2_below_one(K2: float) -> None:
+    found = lyapunov(ARM, law(K2=K2))
+    assert found.proven
+    assert found.kind == "dissipated"
+    assert found.a1_over_a2 == 1 - K2
+
+
+def test_without_K1_V_is_constant() -> None:
+    found = lyapunov(ARM, law(K1=0.0))
+    assert (found.proven, found.kind, found.a1_over_a2) == (True, "conserved", 0.7)
+    poles = closed_loop_poles(ARM, law(K1=0.0), 8)
+    assert abs(poles.values.real).max() < 1e-12 * abs(poles.values).max()
+
+
+@pytest.mark.parametrize(
+    ("arm", "feedback", "words"),
+    [
+        (ARM, law(K1=-0.1), "K1 = -0.1 feeds energy in"),
+        (ARM, law(K2=1.0), "hub alone"),
+        (ARM, law(K2=1.5), "1 - K2 = -0.5 is negative"),
+        (ARM, law(Kp=-2.0), "Kp = -2 is below"),
+        (LAB, law(K2=0.1), "gauge does not feel the damping"),
+        (LAB, law(K2=-0.1), "gauge does not feel the damping"),
+    ],
+)
+def test_where_no_weights_exist(arm, feedback, words: str) -> None:
+    found = lyapunov(arm, feedback)
+    assert (found.proven, found.a1_over_a2, found.kind) == (False, None, "unproven")
+    assert words in found.reason
+    assert "\n" not in found.reason
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_at_zero_damping_proven_is_stable_and_unproven_unstable(seed: int) -> None:
+    """On random arms, payloads and tips, off the edges K1 = 0 and K2 = 1 of the region."""
+    rng, seen = np.random.default_rng(seed), []
+    while len(seen) < 12:
+        arm, feedback = some_loop(rng, damping=0.0)
+        if feedback.K1:
+            proven = lyapunov(arm, feedback).proven
+            seen.append(proven)
+            assert proven == (unstable(arm, feedback, 6) == 0), (arm, feedback)
+    assert 0 < sum(seen) < len(seen)
+
+
+def test_a_negative_spring_is_proven_up_to_the_stiffness_of_a_held_tip() -> None:
+    """Timoshenko beam, root turned by a couple, tip pinned: theta/M = L/(3 EI) + 1/(kGA L), by unit loads."""
+    arm = replace(ARM, payload=Payload(mass=math.inf))
+    link, K2 = arm.link, 0.4
+    stiffness = 1 / (link.length / (3 * link.EI) + 1 / (link.kGA * link.length))
+    edge = -(1 - K2) * stiffness
+    for Kp, proven in ((edge * (1 - 1e-9), True), (edge * (1 + 1e-9), False)):
+        assert lyapunov(arm, law(K2=K2, Kp=Kp)).proven is proven
+    assert unstable(arm, law(K2=K2, Kp=0.999 * edge)) == 0
+    assert unstable(arm, law(K2=K2, Kp=1.001 * edge)) == 1
+
+
+# ------------------------------------------------------------ K2 = 1 and beyond
+
+
+def test_K2_of_one_leaves_the_modes_of_the_held_hub_undamped() -> None:
+    poles = closed_loop_poles(ARM, law(K2=1.0), 10)
+    held = tfarm.modes(replace(ARM, hub=Hub(inertia=math.inf)), 8).natural_frequency
+    np.testing.assert_allclose(poles.values[2:], 1j * held, rtol=1e-13)
+    assert poles.values[1] == pytest.approx(-0.3 / ARM.hub.inertia, rel=1e-13)  # the hub by itself
+    assert poles.unstable == 0
+
+
+@pytest.mark.parametrize("K2", [1.001, 1.05])
+def test_beyond_one_every_flexible_mode_is_unstable(K2: float) -> None:
+    loop = Loop(ARM, law(K2=K2))
+    for height in (1e3, 1e4):
+        poles = poles_below(loop, height)
+        flexible = poles.values.imag > 0
+        assert (poles.values.real[flexible] > 0).all()
+        assert poles.unstable == 2 * flexible.sum()
+        held = modes_below(replace(ARM, hub=Hub(inertia=math.inf)), height)
+        assert flexible.sum() == held  # none is missing, and there are ever more
+
+
+def test_one_of_them_is_proven_to_the_right_in_balls() -> None:
+    discs = closed_loop_poles(ARM, law(K2=1.001), 6).certify(25)
+    right = [float(disc.re) > float(disc.radius) for disc in discs if not disc.is_real]
+    assert len(right) == 4
+    assert all(right)
+
+
+def test_far_beyond_one_a_real_pole_is_unstable_even_without_K1() -> None:
+    J, I_h = ARM.total_inertia, ARM.hub.inertia
+    edge = 1 + I_h / (J - I_h)
+    below, above = (closed_loop_poles(ARM, law(K1=0.0, K2=edge + d), 6) for d in (-1e-3, 1e-3))
+    assert below.unstable == 0
+    real = above.values[(above.values.imag == 0) & (above.values.real > 0)]
+    assert above.unstable == real.size == 1
+    assert newton_step(ARM, complex(real[0]), K2=edge + 1e-3) < 1e-11  # steep: the pole leaves 0 as a square root
+
+
+# ------------------------------------------------------------ damping
+
+
+@pytest.mark.parametrize(("K2", "expected"), [(-8.47, 0), (-8.49, 2), (-10.0, 2), (-11.46, 2), (-11.48, 0)])
+def test_counterexample_at_positive_damping(K2: float, expected: int) -> None:
+    arm, feedback = window_arm(), law(K1=1.0, K2=K2)
+    assert not lyapunov(arm, feedback).proven
+    assert unstable(arm, feedback, 8) == expected
+    undamped = with_damping(arm, 0.0)
+    assert lyapunov(undamped, feedback).proven
+    assert unstable(undamped, feedback) == 0
+
+
+def test_the_unstable_root_of_the_counterexample() -> None:
+    poles = closed_loop_poles(window_arm(), law(K1=1.0, K2=-10.0), 8)
+    (root,) = poles.values[poles.values.real > 1]
+    assert root == pytest.approx(24.7 + 35236j, abs=0.5)
+    assert newton_step(window_arm(), root, K1=1.0, K2=-10.0) < 1e-14  # the paper's determinant, hub row changed
+    disc = enclosed(poles.loop.k, complex(root), 20, poles.loop.gains)
+    assert float(disc.re) == pytest.approx(root.real, rel=1e-9)
+
+
+@pytest.mark.parametrize("K2", [-10.0, 0.5])
+def test_a_gauge_that_feels_the_damping_is_proven_and_stable(K2: float) -> None:
+    arm, feedback = window_arm(), law(K1=1.0, K2=K2)
+    found = lyapunov_with_damped_gauge(arm, feedback)
+    assert (found.proven, found.kind, found.a1_over_a2) == (True, "dissipated", 1 - K2)
+    poles = closed_loop_poles(*damped_gauge_equivalent(arm, feedback), 12)
+    assert poles.unstable == 0
+    assert lyapunov(*damped_gauge_equivalent(arm, feedback)).proven
+
+
+def test_the_equivalent_hub_has_the_poles_of_the_damped_gauge() -> None:
+    """Against the paper's determinant with K2 (1 + C s) in the hub row."""
+    arm, feedback = window_arm(), law(K1=1.0, K2=-10.0, Kp=50.0)
+    poles = closed_loop_poles(*damped_gauge_equivalent(arm, feedback), 6).values
+    C = mpmath.mpf(arm.link.damping)
+
+    def determinant(s):
+        without, with_one = delta(arm, s, K1=1.0, Kp=50.0), delta(arm, s, K1=1.0, Kp=50.0, K2=1.0)
+        return without + (with_one - without) * feedback.K2 * (1 + C * s)
+
+    with mpmath.workdps(60):
+        for s in map(mpmath.mpc, poles):
+            h = s * mpmath.mpf(10) ** -25
+            slope = (determinant(s + h) - determinant(s - h)) / (2 * h)
+            assert abs(determinant(s) / slope / s) < 1e-13
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_without_K2_damping_does_no_harm(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    for _ in range(6):
+        arm, drawn = some_loop(rng)
+        feedback = HubFeedback(K1=abs(drawn.K1), Kp=abs(drawn.Kp))
+        assert lyapunov(arm, feedback).proven
+        assert unstable(arm, feedback, 6) == 0
+
+
+# ------------------------------------------------------------ along a trajectory
+
+
+LAWS = [law(), law(K2=-10.0), law(K2=0.95), law(K1=0.0), law(Kp=4.0), law(K1=-0.3), law(K2=1.1), law(K1=500.0)]
+
+
+@pytest.mark.parametrize("feedback", LAWS, ids=str)
+def test_energy_balance(feedback) -> None:
+    balance = energy_along(ARM, feedback, 2.0, 201, 12)
+    assert balance.defect < 1e-11
+    np.testing.assert_allclose(balance.V_t, -feedback.K1 * balance.hub_rate**2)
+    if lyapunov(ARM, feedback).proven:
+        assert (np.diff(balance.V) <= 1e-12 * balance.V[0]).all()
+        assert balance.V.min() >= -1e-12 * balance.V[0]
+
+
+def test_energy_balance_on_other_arms() -> None:
+    rng = np.random.default_rng(5)
+    for _ in range(8):
+        arm, feedback = some_loop(rng, damping=0.0)
+        feedback = replace(feedback, K2=min(feedback.K2, 0.9))
+        omega = tfarm.modes(arm, 1).natural_frequency[-1]
+        assert energy_along(arm, feedback, 5 / omega, 101, 8).defect < 1e-9, (arm, feedback)
+
+
+def test_the_impulse_goes_into_the_hub_alone_as_modes_are_added() -> None:
+    """1/(2 I_h) for every K2 < 1: the beam is at rest when the hub is struck."""
+    for K2 in (-3.0, 0.5):
+        misses = [abs(energy_along(ARM, law(K2=K2), 1.0, 2, n).V[0] * 2 * ARM.hub.inertia - 1) for n in (5, 15, 45)]
+        assert misses[2] < misses[1] / 10 < misses[0] / 100
+        assert misses[2] < 1e-5
+
+
+def test_the_decay_is_that_of_the_slowest_exact_pole() -> None:
+    """V falls as exp(2 Re s t): here a spring at the hub turns the arm as a whole, and the one mode kept is quicker."""
+    feedback = law(Kp=4.0)
+    pole = closed_loop_poles(ARM, feedback, 1).values[0]
+    period = 2 * math.pi / pole.imag
+    balance = energy_along(ARM, feedback, 6 * period, 241, 1)
+    assert np.log(balance.V[-41] / balance.V[-1]) / period == pytest.approx(-2 * pole.real, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("arm", "feedback", "options", "words"),
+    [
+        (LAB, law(), {}, "do not share out its energy"),
+        (ARM, law(), {"points": 1}, "from 2 to"),
+        (ARM, law(K2=30.0), {"modes": 1}, "more modes"),
+        (replace(ARM, hub=Hub(inertia=math.inf)), law(), {}, "there is no loop"),
+        (replace(ARM, hub=Hub(inertia=0.0)), law(), {}, "algebraic loop"),
+    ],
+)
+def test_what_is_refused(arm, feedback, options, words: str) -> None:
+    with pytest.raises(ParameterError, match=words) as refused:
+        energy_along(arm, feedback, 1.0, **options)
+    assert "\n" not in str(refused.value)
+
+
+def test_no_equivalent_hub_from_K2_of_one() -> None:
+    with pytest.raises(ParameterError, match="below 1"):
+        damped_gauge_equivalent(ARM, law(K2=1.0))
+    with pytest.raises(ParameterError, match="there is no loop"):
+        lyapunov(replace(ARM, hub=Hub(inertia=math.inf)), law())

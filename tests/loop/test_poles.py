@@ -1,0 +1,151 @@
+"""Exact closed-loop poles against the paper's determinant, modal models, winding numbers and equivalent arms."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tfarm
+from tests.loop.arms import some_loop, window_arm, with_damping
+from tests.loop.counts import survey
+from tests.spectrum.damped_roads import newton_step
+from tfarm import ConvergenceError, Hub, HubFeedback, ParameterError
+from tfarm.loop.plant import Loop
+from tfarm.loop.poles import closed_loop_poles, poles_below
+from tfarm.reduced import modal_model
+
+ARM = tfarm.load("sasaki2012")
+LAB = tfarm.load("sasaki2012-lab")
+STOCKY = tfarm.load("stocky-steel")
+LAW = HubFeedback(K1=0.3, K2=0.3)
+
+
+def same(ours, theirs, tolerance=1e-13) -> None:
+    """Both lists of poles in any order, each within a share of its own size."""
+    assert ours.size == theirs.size
+    for pole in ours:
+        assert abs(theirs - pole).min() <= tolerance * abs(pole), (pole, theirs)
+
+
+# ------------------------------------------------------------ other roads
+
+
+@pytest.mark.parametrize("feedback", [LAW, HubFeedback(K1=2.0, K2=-7.0, Kp=30.0), HubFeedback(K1=0.1, K2=1.2)], ids=str)
+@pytest.mark.parametrize("arm", [ARM, LAB, STOCKY, window_arm()], ids=["paper", "lab", "stocky", "window"])
+def test_the_papers_determinant_vanishes_at_fifty_digits(arm, feedback) -> None:
+    poles = closed_loop_poles(arm, feedback, 8).moving
+    assert max(newton_step(arm, complex(s), K1=feedback.K1, K2=feedback.K2, Kp=feedback.Kp) for s in poles) < 1e-14
+
+
+def modal_poles(arm, feedback, count):
+    """Eigenvalues of the law on a modal model with its static remainders; the angle's is left out, as Kp = 0."""
+    A, B, C, D = modal_model(arm, ["hub_rate", "root_moment"], count).matrices()
+    gains = np.array([feedback.K1, feedback.K2])
+    return np.linalg.eigvals(A - B @ (gains @ C)[None] / (1 + gains @ D[:, 0]))
+
+
+def test_modal_models_converge_to_the_exact_poles() -> None:
+    exact, misses = closed_loop_poles(ARM, LAW, 6).moving, []
+    for count in (5, 10, 20, 60):
+        model = modal_poles(ARM, LAW, count)
+        misses.append(max(abs(model - s).min() / abs(s) for s in exact))
+    assert misses[0] > 20 * misses[1] > 400 * misses[2]
+    assert misses[3] < 1e-12
+
+
+@pytest.mark.parametrize("count", [10, 40])
+@pytest.mark.parametrize("arm", [ARM, LAB], ids=["paper", "lab"])
+def test_a_modal_model_misses_by_its_own_error(arm, count: int) -> None:
+    """To first order a pole moves by (L - L_model)/L', with both loop functions at the exact pole."""
+    loop, model = Loop(arm, LAW), modal_model(arm, ["hub_rate", "root_moment"], count)
+    eigenvalues = modal_poles(arm, LAW, count)
+    for s in closed_loop_poles(arm, LAW, 6).moving:
+        rate, moment = model(s)
+        h = 1e-5 * s
+        exact, up, down = loop.loop_function(np.array([s, s + h, s - h]))
+        expected = (exact - (LAW.K1 * rate + LAW.K2 * moment)) / ((up - down) / (2 * h))
+        found = eigenvalues[abs(eigenvalues - s).argmin()] - s
+        assert abs(found - expected) < 1e-3 * abs(expected) + np.finfo(float).eps * abs(eigenvalues).max()
+
+
+def test_random_loops_counted_again() -> None:
+    """`python -m tests.loop.counts 500` for more."""
+    verdicts = [verdict for _, verdict in survey(25, 3)]
+    assert [v.reason for v in verdicts if v.outcome == "wrong"] == []
+    assert sum(v.outcome == "right" for v in verdicts) >= 24
+    assert sum(v.unstable for v in verdicts) > 10
+
+
+def test_poles_are_proven_in_balls() -> None:
+    poles = closed_loop_poles(LAB, HubFeedback(K1=0.3, K2=0.5, Kp=2.0), 4)
+    discs = poles.certify(25)
+    for disc, pole in zip(discs, poles.moving, strict=True):
+        assert abs(complex(float(disc.re), float(disc.im)) / pole - 1) < 1e-13
+
+
+# ------------------------------------------------------------ symmetry and equivalence
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_time_reversal_at_zero_damping(seed: int) -> None:
+    """s -> -s with K1 -> -K1, wherever both boxes reach."""
+    rng = np.random.default_rng(seed)
+    arm, feedback = some_loop(rng, damping=0.0)
+    height = float(tfarm.modes(arm, 6).natural_frequency[-2:].mean())
+    there, back = (poles_below(Loop(arm, law), height) for law in (feedback, replace(feedback, K1=-feedback.K1)))
+    reach = min(min(-p.box.re_min, p.box.re_max, p.box.im_max) for p in (there, back))
+    first = there.values[(abs(there.values.real) < reach) & (there.values.imag < reach)]
+    second = -back.values[(abs(back.values.real) < reach) & (back.values.imag < reach)].conj()
+    same(first, second, 1e-12)
+
+
+@pytest.mark.parametrize("K2", [-7.0, 0.3, 0.9])
+@pytest.mark.parametrize("arm", [ARM, STOCKY], ids=["paper", "stocky"])
+def test_moment_feedback_is_another_hub(arm, K2: float) -> None:
+    """Inertia, damper and spring divided by 1 - K2, at C = 0."""
+    arm, share = with_damping(arm, 0.0), 1 - K2
+    hub = replace(arm, hub=Hub(inertia=arm.hub.inertia / share))
+    fed_back = closed_loop_poles(arm, HubFeedback(K1=0.4, K2=K2, Kp=3.0), 8)
+    same(fed_back.values, closed_loop_poles(hub, HubFeedback(K1=0.4 / share, Kp=3.0 / share), 8).values)
+
+
+@pytest.mark.parametrize("arm", [ARM, STOCKY], ids=["paper", "stocky"])
+def test_without_feedback_they_are_the_arms_own(arm) -> None:
+    arm = with_damping(arm, 0.0)
+    omega = tfarm.modes(arm, 6).natural_frequency
+    poles = closed_loop_poles(arm, HubFeedback(), 8)
+    np.testing.assert_array_equal(poles.values[:2], 0)
+    np.testing.assert_allclose(poles.values[2:], 1j * omega[1:], rtol=1e-13)
+    assert poles.unstable == 0
+
+
+def test_a_strong_damper_locks_the_hub_as_one_over_K1() -> None:
+    held = 1j * tfarm.modes(replace(ARM, hub=Hub(inertia=math.inf)), 4).natural_frequency
+    misses = []
+    for K1 in (1e5, 1e6, 1e7):
+        poles = closed_loop_poles(ARM, HubFeedback(K1=K1), 6).values
+        misses.append(max(abs(poles - s).min() / abs(s) for s in held))
+    assert misses[0] > 9 * misses[1] > 81 * misses[2]
+
+
+# ------------------------------------------------------------ lists and refusals
+
+
+def test_more_poles_change_none() -> None:
+    few, many = (closed_loop_poles(LAB, LAW, n).values for n in (5, 11))
+    np.testing.assert_allclose(few, many[:5], rtol=1e-13)
+    assert (np.diff(many.imag) >= 0).all()
+
+
+@pytest.mark.parametrize("count", [0, 1001, 2.0, True])
+def test_counts_that_are_refused(count) -> None:
+    with pytest.raises(ParameterError, match="whole number") as refused:
+        closed_loop_poles(ARM, LAW, count)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_list_that_cannot_be_so_long_is_refused() -> None:
+    """Heavy damping: only poles right of -1/C can be listed."""
+    with pytest.raises(ConvergenceError, match=r"right of -1/C were found, not 20"):
+        closed_loop_poles(with_damping(ARM, 0.05), LAW, 20)
