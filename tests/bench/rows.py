@@ -13,7 +13,7 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
-PACKAGES = ("tfarm", "numpy", "numba", "scipy", "mpmath", "python-flint", "cxroots", "scikit-fem")
+PACKAGES = ("tfarm", "numpy", "numba", "scipy", "mpmath", "python-flint", "cxroots", "scikit-fem", "control")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

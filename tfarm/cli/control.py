@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -98,7 +99,7 @@ def bounds(key: str, text: str) -> tuple[float, float]:
         low, high = (float(part) for part in text.split(","))
     except ValueError:
         raise ParameterError(key=key, value=text, remedy=remedy) from None
-    if not low < high:
+    if not -math.inf < low < high < math.inf:
         raise ParameterError(key=key, value=text, remedy=remedy)
     return low, high
 

@@ -74,7 +74,7 @@ def quick_characteristic(k: Coefficients, s: Complex, gains: Gains = OPEN, at_ze
 
 
 def quick_characteristics(k: Coefficients, s: Complex, law: Real, at_zero: int = 0) -> Analytic:
-    """`quick_characteristic` with dimensionless gains of their own at each point: law (3, n) or (3, 1), Kp, K1 and K2."""
+    """`quick_characteristic` with gains of their own at each point: law (3, n) or (3, 1), dimensionless Kp, K1, K2."""
     h = STEP * np.maximum(abs(s) * np.minimum(1.0, abs(1.0 + k.damping * s)), 1e-300)
     at = np.stack([s, s + h, s - h])
     drive, theta, moment, scale = loop_parts(k, at)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -23,10 +24,18 @@ from tfarm.spectrum.damped import COMPANY
 from .plant import Loop, effective_inertia
 from .variation import Complex, Real, Variation, member_of
 
-FREE = 0.05  # of the lowest flexible frequency: zeros closer to the origin may pass it
+FREE = 1e-6  # of the lowest flexible frequency: zeros closer to the origin may pass it
 FIRST = 0.01  # the first step along a parameter, as a share of the way
-SOFT = 1e-6  # where the rigid body's double zero parts, this share of the way is left out, or less
+SOFT = 1e-6  # where the rigid body's zeros meet at s = 0, this share of the way is left out
+SMALLEST = 1e-15  # share of the way at which they are no longer looked for on the other side
+NEAR_SINGULAR = 0.01  # of 1/C: where a branch lost is said to have run into -1/C
+SAME = 1e-9  # of its size: a zero paired anew is known again so closely
+AROUND = 4  # nodes through which a guess between two of them goes
 APART = 0.02  # of the lowest flexible frequency: how far the rigid body's zeros may be there
+
+
+class AtSingularError(ConvergenceError):
+    """A branch has come to -1/C: no other company helps it across."""
 
 
 @dataclass(frozen=True)
@@ -38,80 +47,86 @@ class Segment:
     pinned: bool = False  # whether the first of the zeros is 0 all the way
 
     def guess(self, values: Real) -> Complex:
-        """The pairs (values, n, 2), by cubics through the four nodes around each value, in the order of `ordered`."""
+        """The pairs (values, n, 2), by polynomials through the nodes around each value, in the order of `ordered`."""
         at = np.array([node.at for node in self.nodes])
         way = np.sign(at[-1] - at[0]) or 1.0
         which = np.clip(np.searchsorted(way * at, way * values) - 1, 0, max(0, at.size - 2))
         guess = np.empty((values.size, *self.slots.shape), complex)
         for n in np.unique(which):
-            low = max(0, min(int(n) - 1, at.size - 4))
-            guess[which == n] = through(self.nodes[low : low + 4], values[which == n])
+            low = max(0, min(int(n) + 1 - AROUND // 2, at.size - AROUND))
+            guess[which == n] = through(self.nodes[low : low + AROUND], values[which == n])
         return ordered(guess, self.pinned)
 
 
 @dataclass(frozen=True)
 class Stage:
-    """One way of a parameter from `start` to `stop`, with the loop at each value."""
+    """One way of what varies from `start` to `stop`."""
 
-    at: Callable[[float], Loop]
+    variation: Variation
     start: float
     stop: float
-    free: float
+    lowest: float  # flexible frequency [rad/s]
 
     def turns(self, value: float) -> bool:
         """Whether the law moves the rigid body's double zero at s = 0."""
-        law = self.at(value).law
-        return bool(law.K1 or law.Kp)
+        return bool(self.variation.left_at_origin(np.array([value]))[0] < 2)
 
-    @property
+    @cached_property
     def moves(self) -> bool:
         """Whether the rigid body's zeros are followed."""
         ends = (self.start, (self.start + self.stop) / 2, self.stop)
-        return self.at(self.start).arm.has_rigid_mode and any(self.turns(value) for value in ends)
+        return self.variation.arm.has_rigid_mode and any(self.turns(value) for value in ends)
 
     def follow(self, zeros: Complex, wanted: int, first: float = FIRST) -> list[Node]:
         """All nodes; `zeros` (n, 2) at `start` hold the rigid body's pair first where it moves and already has.
 
         `first` is the first step, as a share of the way.
         """
-        family, start, stop, way = self._member, Node(self.start, zeros), self.stop, self.stop - self.start
+        way, before = self.stop - self.start, Node(self.start, zeros)
         if self.moves and not self.turns(self.start):
-            start = self._parted(zeros)
-        soft = self.moves and not self.turns(stop)
+            before = Node(self.start, np.concatenate([np.zeros((1, 2), complex), zeros]))
+            rest = self._followed(self._leaving(before, rigid_pair), wanted, FIRST * way, (before,))
+        elif self.moves and self.at_zero == 0 and zeros[0, 0] == 0:
+            rest = self._followed(self._leaving(before, _slow_zero), wanted, FIRST * way, (before,))
+        else:
+            return self._followed(before, wanted, first * way, ())
+        return [before, *rest]
+
+    def _followed(self, start: Node, wanted: int, first: float, before: tuple[Node, ...]) -> list[Node]:
+        family, stop, soft = self._member, self.stop, self.moves and not self.turns(self.stop)
         if soft:
-            stop = stop - SOFT * way
-        nodes = follow(family, start, stop, first * way, wanted)
+            stop = stop - SOFT * (self.stop - self.start)
+        nodes = follow(family, start, stop, first, wanted, before)
         return [*nodes, self._met(nodes[-1])] if soft else nodes
 
-    @property
+    @cached_property
     def at_zero(self) -> int:
         """How many zeros are at s = 0 all the way: of one zero, followed, the partner, of two none is followed."""
-        if not self.at(self.start).arm.has_rigid_mode:
+        if not self.variation.arm.has_rigid_mode:
             return 0
         ends = (self.start, (self.start + self.stop) / 2, self.stop)
-        return 2 if not self.moves else 0 if any(self.at(value).law.Kp for value in ends) else 1
+        return 2 if not self.moves else 0 if not self.variation.left_at_origin(np.array(ends)).all() else 1
 
     def _member(self, value: float) -> Any:
-        return member_of(self.at(value), self.at_zero, self.free)
+        return member_of(self.variation, value, self.at_zero, FREE * self.lowest)
 
-    def _parted(self, zeros: Complex) -> Node:
-        """The first node after the start, where the rigid body's zeros are those of J_eff s^2 + K1 s + Kp."""
-        share = SOFT
-        while True:
+    def _leaving(self, before: Node, rigid: Callable[[Loop, Complex], Complex]) -> Node:
+        """The first node after the start, where the rigid body's zeros leave s = 0 as `rigid` says."""
+        share = FIRST
+        while share > SMALLEST:
             value = self.start + share * (self.stop - self.start)
-            rigid = rigid_pair(self.at(value))
-            if abs(rigid).max() < APART * self.free / FREE:
-                break
-            share /= 100
-        guess = np.concatenate([rigid[None], zeros])
-        found, stray = corrected(self._member(value), guess)
-        if stray.any():
-            raise ConvergenceError("the rigid body's zeros cannot be told from the others at small gains", guess, found)
-        return Node(value, found)
+            guess = before.zeros.copy()
+            guess[0] = rigid(self.variation.at(value), guess[0])
+            if abs(guess[0] - before.zeros[0]).max() < APART * self.lowest:
+                found, stray = corrected(self._member(value), guess)
+                if not stray.any():
+                    return Node(value, found)
+            share /= 10
+        raise ConvergenceError("the rigid body's zeros cannot be told from the others at small gains", before, share)
 
     def _met(self, last: Node) -> Node:
         """The node at the end, where the rigid body's zeros meet again at s = 0."""
-        member = member_of(self.at(self.stop), 2, self.free)
+        member = member_of(self.variation, self.stop, 2, FREE * self.lowest)
         found, stray = corrected(member, last.zeros[1:])
         if stray.any():
             raise ConvergenceError("branches cannot be told apart at the end of the range", last.zeros, found)
@@ -127,22 +142,58 @@ def followed(variation: Variation, start: float, stop: float, wanted: int) -> tu
     for company in COMPANY:
         try:
             return _followed(variation, start, stop, wanted, wanted + company)
+        except AtSingularError:
+            raise
         except ConvergenceError as error:
-            lost = error
+            lost = lost or _explained(error, variation)
+            if isinstance(lost, AtSingularError):
+                break
     assert lost is not None
     raise lost
+
+
+def _stay_on_their_side(variation: Variation, segment: Segment) -> None:
+    """Raise ConvergenceError where a real zero has stepped over -1/C, and so over infinitely many others."""
+    for before, after in pairwise(segment.nodes):
+        sides = [ordered(node.zeros, segment.pinned).real > _singular(variation, node.at) for node in (before, after)]
+        real = (before.zeros.imag == 0) & (after.zeros.imag == 0)
+        if (real & (sides[0] != sides[1])).any():
+            raise _ends_at_singular(variation, before)
+
+
+def _singular(variation: Variation, value: float) -> float:
+    return member_of(variation, value, 0, 0.0).singular
+
+
+def _explained(error: ConvergenceError, variation: Variation) -> ConvergenceError:
+    """The same error, in better words where a branch has come to -1/C."""
+    last = error.best
+    if not isinstance(last, Node):
+        return error
+    singular = _singular(variation, last.at)
+    if abs(last.zeros - singular).min() <= NEAR_SINGULAR * abs(singular):
+        return _ends_at_singular(variation, last)
+    text = f"branches cannot be told apart beyond {variation.vary} = {last.at:.10g}: ask for fewer, or another range"
+    return ConvergenceError(text, last, error.residual)
+
+
+def _ends_at_singular(variation: Variation, last: Node) -> AtSingularError:
+    where = f"beyond {variation.vary} = {last.at:.6g} a branch comes to -1/C, where real zeros accumulate"
+    return AtSingularError(f"{where}: ask for fewer branches, or end the range there", last, NEAR_SINGULAR)
 
 
 def _followed(variation: Variation, start: float, stop: float, wanted: int, number: int) -> tuple[list[Segment], float]:
     first = variation.at(start)
     zeros, lowest = open_pairs(first.arm, number, wanted)
-    free = FREE * lowest
     law = first.law
     if law.K1 or law.K2 or law.Kp:
-        scaled = Stage(lambda scale: Loop(first.arm, _scaled(law, scale)), 0.0, 1.0, free)
+        scaled = Stage(Variation(first.arm, law, "all"), 0.0, 1.0, lowest)
         zeros = scaled.follow(zeros, wanted)[-1].zeros
-    stage = Stage(variation.at, start, stop, free)
-    return segments(stage.follow(zeros, wanted), stage.at_zero == 1), lowest
+    stage = Stage(variation, start, stop, lowest)
+    cut = segments(stage.follow(zeros, wanted), stage.at_zero == 1)
+    for segment in cut:
+        _stay_on_their_side(variation, segment)
+    return cut, lowest
 
 
 def open_pairs(arm: Arm, number: int, wanted: int) -> tuple[Complex, float]:
@@ -156,11 +207,11 @@ def open_pairs(arm: Arm, number: int, wanted: int) -> tuple[Complex, float]:
     zeros, lowest = np.stack([1j * omega, -1j * omega], axis=1), float(omega[0])
     if C == 0:
         return zeros, lowest
-    stage = Stage(Variation(arm, HubFeedback(), "damping").at, 0.0, C, FREE * lowest)
+    stage = Stage(Variation(arm, HubFeedback(), "damping"), 0.0, C, lowest)
     return stage.follow(zeros, wanted, min(1.0, FIRST / (omega[-1] * C)))[-1].zeros, lowest
 
 
-def rigid_pair(loop: Loop) -> Complex:
+def rigid_pair(loop: Loop, _: Complex) -> Complex:
     """The zeros of J_eff s^2 + K1 s + Kp: what the rigid body's become under small gains."""
     J = effective_inertia(loop.arm, loop.law.K2) or 1e-9 * loop.arm.total_inertia
     b, c = loop.law.K1 / J, loop.law.Kp / J
@@ -170,15 +221,22 @@ def rigid_pair(loop: Loop) -> Complex:
     return np.array([near, far] if root.real else [far, near], complex)
 
 
+def _slow_zero(loop: Loop, pair: Complex) -> Complex:
+    """The pair with its zero at 0 moved to -Kp/K1: where it goes at small Kp."""
+    return np.array([-loop.law.Kp / loop.law.K1, pair[1]], complex)
+
+
 def segments(nodes: list[Node], pinned: bool = False) -> list[Segment]:
     """The nodes cut where zeros were paired anew, with the branches handed on from zero to zero."""
     slots = np.arange(nodes[0].zeros.size).reshape(-1, 2)
     cut: list[Segment] = []
-    kept = [nodes[0]]
+    kept, pinned = [nodes[0]], pinned and nodes[0].zeros[0, 0] == 0
     for before, after in pairwise(nodes):
         if after.at == before.at:
             cut.append(Segment(kept, slots, pinned))
-            slots, kept = _handed_on(ordered(before.zeros, pinned), ordered(after.zeros, pinned), slots), []
+            still = pinned and after.zeros[0, 0] == 0
+            slots, kept = _handed_on(ordered(before.zeros, pinned), ordered(after.zeros, still), slots), []
+            pinned = still
         kept.append(after)
     return [*cut, Segment(kept, slots, pinned)]
 
@@ -189,9 +247,10 @@ def _handed_on(old: Complex, new: Complex, slots: NDArray[np.int64]) -> NDArray[
     fresh = int(slots.max()) + 1
     for i in np.nonzero((old[: len(new)] != new).any(axis=1))[0]:
         for j in (0, 1):
-            same = np.argwhere(old == new[i, j])
-            handed[i, j] = slots[tuple(same[0])] if same.size else fresh
-            fresh += not same.size
+            apart = abs(old - new[i, j])
+            same = apart.min() <= SAME * abs(new[i, j])
+            handed[i, j] = slots.ravel()[int(apart.argmin())] if same else fresh
+            fresh += not same
     return handed
 
 
@@ -205,7 +264,3 @@ def ordered(zeros: Complex, pinned: bool = False) -> Complex:
     if pinned:
         swap[..., 0] = False
     return np.where(swap[..., None], zeros[..., ::-1], zeros)
-
-
-def _scaled(law: HubFeedback, scale: float) -> HubFeedback:
-    return HubFeedback(K1=scale * law.K1, K2=scale * law.K2, Kp=scale * law.Kp)

@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tfarm.errors import ConvergenceError
-from tfarm.exact.characteristic import quick_characteristic
+from tfarm.exact.characteristic import loop_parts, quick_characteristics
 
 from .variation import Complex, Evaluator, Real, Variation
 
 ON_AXIS = 1e-12  # a real part below this share of a zero's size is none, to working precision
-NEAR_ZERO = 1e-7  # of the lowest frequency: where D is taken for its value at s = 0
+NEAR_ZERO = 1e-50  # of the lowest frequency: where D is taken for its value at s = 0
+SETTLED = 1e-6  # of the distance of two points: a crossing must be known so well at least
+STEP = 1e-5  # of a frequency, or of the distance of two gains, for differences
 STEPS = 30
+HALVINGS = (0, 4, 12)  # of the distance of two points, before Newton's method is tried
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BranchCrossing:
-    """One crossing of the imaginary axis, or one departure from it: what varies is `gain` there, s = +-i `omega`.
+    """One branch of a locus crosses the imaginary axis at s = i `omega` [rad/s], where what varies is `gain`.
 
     `branch` is its number in the locus; `direction` is "unstable" where the real part becomes positive as the locus
     runs, and "stable" where it becomes negative.
@@ -46,8 +50,6 @@ def crossings(variation: Variation, gain: Real, branches: Complex, lowest: float
     found = []
     for number, (sides, zeros) in enumerate(zip(side, branches, strict=True)):
         for low, high in _changes(sides, zeros):
-            if zeros[high].imag < 0:
-                continue  # the mirror image of a branch that is listed
             at, omega = _solved(variation, gain[[low, high]], zeros[[low, high]], lowest)
             direction = "unstable" if sides[high] > 0 else "stable"
             found.append(BranchCrossing(gain=at, omega=omega, branch=number, direction=direction))
@@ -55,60 +57,109 @@ def crossings(variation: Variation, gain: Real, branches: Complex, lowest: float
     return tuple(sorted(found, key=lambda each: (way * each.gain, each.omega)))
 
 
-def _changes(sides: np.ndarray, zeros: Complex) -> list[tuple[int, int]]:  # type: ignore[type-arg]
-    """Neighbours on both sides of the axis, points on it between them left out; or on it at i w, then real and off it."""
-    off = np.nonzero(sides)[0]
-    pairs = [(int(a), int(b)) for a, b in itertools.pairwise(off) if sides[a] != sides[b]]
-    for n in range(1, sides.size):
-        a, b = zeros[n - 1], zeros[n]
-        if (sides[n - 1] == 0 != sides[n]) and a.imag > 0 == b.imag:
-            pairs.append((n - 1, n))
-    return pairs
+def _changes(sides: NDArray[np.int64], zeros: Complex) -> list[tuple[int, int]]:
+    """Neighbours on both sides of the axis, points on it left out; or one on it at i w, and one real and off it.
+
+    (The mirror image of a branch that is listed, with Im s < 0, is left out.)
+    """
+    off = [int(n) for n in np.nonzero(sides)[0]]
+    across = [(a, b) for a, b in pairwise(off) if sides[a] != sides[b]]
+    left = [int(n) for n in np.nonzero((sides[:-1] == 0) & (sides[1:] != 0))[0]]
+    away = [(n, n + 1) for n in left if zeros[n].imag > 0 == zeros[n + 1].imag]
+    return [(a, b) for a, b in sorted({*across, *away}) if zeros[a].imag >= 0 <= zeros[b].imag]
 
 
 def _solved(variation: Variation, gains: Real, zeros: Complex, lowest: float) -> tuple[float, float]:
     """The gain and the frequency at which a branch between two of its points is on the axis."""
-    if (zeros.imag == 0).all() or (zeros.imag[1] == 0 and zeros.real[0] == 0):
-        return _through_origin(variation, gains, lowest), 0.0
-    share = zeros.real[0] / (zeros.real[0] - zeros.real[1])
-    g, w = float(gains[0] + share * (gains[1] - gains[0])), float((zeros[0] + share * (zeros[1] - zeros[0])).imag)
-    width = abs(gains[1] - gains[0])
-    step = math.inf
-    for _ in range(STEPS):
-        dg, dw = _newton_step(variation, g, w, width)
-        g, w = g - dg, w - dw
+    if (zeros.imag == 0).any():
+        at = _through_origin(variation, gains, lowest)
+        if at is not None:
+            return at, 0.0
+    for halvings in HALVINGS:
+        ends, points = _halved(variation, gains, zeros, halvings)
+        share = points.real[0] / (points.real[0] - points.real[1])
+        g, w = float(ends[0] + share * (ends[1] - ends[0])), float((points[0] + share * (points[1] - points[0])).imag)
+        g, w, step = _newton(variation, g, w, gains)
+        if step < SETTLED and w > 0:
+            return g, w
+    raise ConvergenceError(f"a crossing of the imaginary axis near {gains.mean():.6g} could not be solved", g, w)
+
+
+def _newton(variation: Variation, g: float, w: float, gains: Real) -> tuple[float, float, float]:
+    """Gain and frequency by Newton's method between two gains, and its last step as a share of their distance or w."""
+    low, high = float(gains.min()), float(gains.max())
+    step, width = math.inf, high - low
+    for _ in range(STEPS if w > 0 else 0):
+        dg, dw = _newton_step(variation, g, w, low, high)
+        g, w = min(max(g - dg, low), high), w - dw
         last, step = step, max(abs(dg) / width, abs(dw) / abs(w))
-        if step == 0 or (step < 1e-11 and step >= last / 2):
+        if step == 0 or (step < SETTLED and step >= last / 2):
             break
-    if not (gains.min() - 1e-9 * width <= g <= gains.max() + 1e-9 * width and step < 1e-9 and w > 0):
-        raise ConvergenceError(f"a crossing of the imaginary axis near {gains.mean():.6g} could not be solved", g, w)
-    return g, w
+    return g, w, step
 
 
-def _newton_step(variation: Variation, g: float, w: float, width: float) -> tuple[float, float]:
+def _halved(variation: Variation, gains: Real, zeros: Complex, times: int) -> tuple[Real, Complex]:
+    """The two points brought nearer to each other, on both sides of the axis, by following the branch between them."""
+    ends, points = gains.copy(), zeros.copy()
+    for _ in range(times):
+        middle, s = ends.mean(), points.mean(keepdims=True)
+        here = Evaluator(variation, np.array([middle]))
+        for _ in range(STEPS):
+            value, slope, _ = here(s, np.zeros(1, int), variation.zeros_at_origin)
+            s = s - value / slope
+        side = int(np.sign(s.real[0]) == np.sign(points.real[1]))
+        ends[side], points[side] = middle, s[0]
+    return ends, points
+
+
+def _newton_step(variation: Variation, g: float, w: float, low: float, high: float) -> tuple[float, float]:
     """Newton's step for D(i w; g) = 0, a complex equation in two real unknowns."""
-    h = 1e-5 * width
-    at = Evaluator(variation, np.array([g, g + h, g - h]))
-    value, slope, scale = at(np.full(3, 1j * w), np.arange(3), variation.zeros_at_origin)
-    value = value * np.exp(scale - scale[0])
-    by_gain, by_omega = (value[1] - value[2]) / (2 * h), 1j * slope[0]
+    dg, dw = STEP * (high - low), STEP * w
+    up, down = min(g + dg, high), max(g - dg, low)
+    values = _on_axis(variation, np.array([g, g, g, up, down]), np.array([w, w + dw, w - dw, w, w]))
+    by_omega, by_gain = (values[1] - values[2]) / (2 * dw), (values[3] - values[4]) / (up - down)
     matrix = np.array([[by_gain.real, by_omega.real], [by_gain.imag, by_omega.imag]])
     try:
-        dg, dw = np.linalg.solve(matrix, [value[0].real, value[0].imag])
+        step = np.linalg.solve(matrix, [values[0].real, values[0].imag])
     except np.linalg.LinAlgError:
         raise ConvergenceError(f"a branch touches the imaginary axis near {g:.6g}, {w:.6g} rad/s", g, w) from None
-    return float(dg), float(dw)
+    return float(step[0]), float(step[1])
 
 
-def _through_origin(variation: Variation, gains: Real, lowest: float) -> float:
-    """The gain at which D/s^n vanishes at s = 0, n zeros being there always."""
+def _on_axis(variation: Variation, gains: Real, omega: Real) -> Complex:
+    """D(i w; g) for each gain and frequency, all on the scale of the first.
+
+    At C = 0 drive, theta and M(0) are real there, and what rounding adds to them is taken off: then Im D is that of the
+    rate gain alone, and the crossings at K1 = 0 and K2 = 1 come out to the last digit.
+    """
+    values, base = np.empty(omega.size, complex), 0.0
+    for n, (gain, w) in enumerate(zip(gains, omega, strict=True)):
+        k, law = variation.system(float(gain))
+        drive, theta, moment, scale = (part[0] for part in loop_parts(k, np.array([1j * w])))
+        turn = np.exp(1j * scale.imag)
+        if k.damping == 0:
+            drive, theta, moment, turn = (drive * turn).real, (theta * turn).real, (moment * turn).real, 1.0
+        Kp, K1, K2 = law[:, 0]
+        base = base if n else float(scale.real)
+        values[n] = (drive + (Kp + 1j * w * K1) * theta + K2 * moment) * turn * np.exp(scale.real - base)
+    return values
+
+
+def _through_origin(variation: Variation, gains: Real, lowest: float) -> float | None:
+    """The gain at which D/s^n vanishes at s = 0, n zeros being there always; None if it keeps its sign."""
     from scipy.optimize import brentq
 
-    n, s = variation.zeros_at_origin, NEAR_ZERO * lowest * np.array([1.0, -1.0], complex)
+    n, s = variation.zeros_at_origin, np.array([NEAR_ZERO * lowest, -NEAR_ZERO * lowest], complex)
 
     def at_origin(gain: float) -> float:
-        loop = variation.at(gain)
-        value, _, scale = quick_characteristic(loop.k, s, loop.gains, n)
+        k, law = variation.system(gain)
+        value, _, scale = quick_characteristics(k, s, law, n)
         return float((value * np.exp(1j * scale.imag)).real.mean())
 
-    return float(brentq(at_origin, *sorted(gains), xtol=1e-300, rtol=4 * np.finfo(float).eps))
+    ends = [at_origin(float(gain)) for gain in gains]
+    if ends[0] * ends[1] > 0:
+        return None
+    if 0 in ends:
+        return float(gains[ends.index(0)])
+    low, high = float(gains.min()), float(gains.max())
+    return float(brentq(at_origin, low, high, xtol=1e-17 * max(-low, high), rtol=4 * float(np.finfo(float).eps)))

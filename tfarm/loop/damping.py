@@ -6,6 +6,7 @@ function, all gains and modes together; where one did not settle near its start,
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
@@ -23,6 +24,7 @@ from .poles import poles_below
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
+Kind = Callable[[Complex, float], NDArray[np.bool_]]  # which poles below a top frequency are meant
 
 BEYOND = 5  # modes of the model above those of the band
 STEPS = 6  # of Newton's method: the start is right to a few digits, so the last ones change nothing
@@ -33,12 +35,21 @@ BLOCK = 4000  # gains at a time
 def band_poles(arm: Arm, K1: Real, K2: Real, Kp: Real, number: int) -> Complex:
     """The poles [1/s] with 0 < Im s below half-way to mode number + 1: (gains, slots), nan where there are fewer.
 
-    K1, K2 and Kp are arrays of one length.  Real poles are not among them (see `poles`).
+    K1, K2 and Kp are arrays of one length.  Real poles are not among them (see `real_poles`).
     """
+    return _in_blocks(_oscillating, arm, K1, K2, Kp, number)
+
+
+def real_poles(arm: Arm, K1: Real, K2: Real, Kp: Real, number: int) -> Complex:
+    """The real poles [1/s] but 0, of size below half-way to mode number + 1: (gains, slots), padded with nan."""
+    return _in_blocks(_real, arm, K1, K2, Kp, number)
+
+
+def _in_blocks(kind: Kind, arm: Arm, K1: Real, K2: Real, Kp: Real, number: int) -> Complex:
     Loop(arm, HubFeedback(K1=float(K1[0]), K2=float(np.max(abs(K2))), Kp=float(Kp[0])))
     top = band_of(arm, number)
     parts = [slice(i, i + BLOCK) for i in range(0, K1.size, BLOCK)]
-    found = [_of_block(arm, K1[part], K2[part], Kp[part], number, top) for part in parts]
+    found = [_of_block(kind, arm, K1[part], K2[part], Kp[part], number, top) for part in parts]
     slots = max(part.shape[1] for part in found)
     padded = [np.pad(part, ((0, 0), (0, slots - part.shape[1])), constant_values=np.nan) for part in found]
     return np.concatenate(padded)
@@ -52,18 +63,26 @@ def least_damping(arm: Arm, K1: Real, K2: Real, Kp: Real, number: int) -> Real:
     return np.asarray(ratio.min(axis=1, initial=1.0))
 
 
-def _of_block(arm: Arm, K1: Real, K2: Real, Kp: Real, number: int, top: float) -> Complex:
+def _oscillating(s: Complex, top: float) -> NDArray[np.bool_]:
+    return np.asarray((s.imag > 1e-9 * abs(s)) & (s.imag < top))
+
+
+def _real(s: Complex, top: float) -> NDArray[np.bool_]:
+    """Real ones, apart from 0 and from what rounding makes of it."""
+    return np.asarray((abs(s.imag) <= 1e-9 * abs(s)) & (abs(s) > 1e-9 * top) & (abs(s) < top))
+
+
+def _of_block(kind: Kind, arm: Arm, K1: Real, K2: Real, Kp: Real, number: int, top: float) -> Complex:
     starts = _eigenvalues(arm, K1, K2, Kp, number)
-    upper = (starts.imag > 1e-9 * abs(starts)) & (starts.imag < 1.2 * top)
-    order = np.argsort(~upper, axis=1, kind="stable")[:, : max(1, int(upper.sum(1).max()))]
-    s = np.where(np.take_along_axis(upper, order, 1), np.take_along_axis(starts, order, 1), np.nan)
+    wanted = kind(starts, 1.2 * top)
+    order = np.argsort(~wanted, axis=1, kind="stable")[:, : max(1, int(wanted.sum(1).max()))]
+    s = np.where(np.take_along_axis(wanted, order, 1), np.take_along_axis(starts, order, 1), np.nan)
     polished, settled = _newton(arm, s, K1, K2, Kp)
-    inside = polished.imag < top
-    poles = np.where(inside, polished, np.nan)
+    poles = np.where(kind(polished, top), polished, np.nan)
     distinct = _are_distinct(poles)
     for n in np.nonzero(~(settled.all(1) & distinct))[0]:
         exact = poles_below(Loop(arm, HubFeedback(K1=float(K1[n]), K2=float(K2[n]), Kp=float(Kp[n]))), top).values
-        exact = exact[(exact.imag > 0) & (exact.imag < top)]
+        exact = exact[kind(exact, top)]
         if exact.size > poles.shape[1]:
             poles = np.pad(poles, ((0, 0), (0, exact.size - poles.shape[1])), constant_values=np.nan)
         poles[n] = np.nan

@@ -31,6 +31,8 @@ Bounds = tuple[float, float]
 OBJECTIVES = ("damping", "margin", "residual")
 COARSE = 21  # grid points along each gain
 STARTS = 3  # best grid points from which the simplex starts
+BAD = 1e9  # the score of gains that are not stable
+TIE = 0.01  # weight of the damping ratio beside the disk margin: K2 = 0 has margin 2 at every K1
 FLAT = 0.01  # gains whose value is worse by less than this share bound the flat part
 
 
@@ -58,8 +60,9 @@ def design(
     """The gains that serve an objective best within bounds.
 
     "damping" maximises the least damping ratio of the oscillating poles below mode `modes` + 1; "margin" the disk
-    margin up to there; "residual" minimises the root moment left after the slew of `residual`.  Raises ParameterError
-    for a bad objective or bounds, ConvergenceError if no gains within the bounds are stable.
+    margin up to there (of nearly equal ones that with more damping); "residual" minimises the root moment left after
+    the slew of `residual`.  Raises ParameterError for a bad objective or bounds, ConvergenceError if no gains within
+    the bounds are stable.
     """
     if objective not in OBJECTIVES:
         raise ParameterError(key="objective", value=objective, remedy=f"use one of {', '.join(OBJECTIVES)}")
@@ -75,15 +78,21 @@ def design(
     grid_K1, grid_K2 = np.meshgrid(a, b)
     values = np.full(stable.size, np.inf)
     values[stable.ravel()] = score(grid_K1[stable], grid_K2[stable])
-    best = min((_polished(score, x, K1, K2) for x in _starts(values, grid_K1, grid_K2)), key=lambda found: found[1])
-    law = HubFeedback(K1=float(best[0][0]), K2=float(best[0][1]), Kp=Kp)
+    starts = _starts(values, grid_K1, grid_K2)
+    for each in (score, _guarded(score, arm, Kp)):  # only where the simplex leaves what is stable each step is judged
+        best = min((_polished(each, x, K1, K2) for x in starts), key=lambda found: found[1])
+        law = HubFeedback(K1=float(best[0][0]), K2=float(best[0][1]), Kp=Kp)
+        if _holds(arm, law):
+            break
     verdict = stability(arm, law)
     if not verdict.is_stable:
         text = f"the best gains found, K1 = {law.K1:.6g} and K2 = {law.K2:.6g}, are not stable"
         raise ConvergenceError(text, law, best)
-    sign = 1.0 if objective == "residual" else -1.0
+    value = best[1] if objective == "residual" else -best[1]
+    if objective == "margin":
+        value = _disk(verdict.loop, np.asarray(grid(arm, band_of(arm, modes))))
     flat = [_flat(score, best, axis, bounds) for axis, bounds in enumerate((K1, K2))]
-    return Design(objective, law, sign * best[1], verdict, {"K1": K1, "K2": K2}, flat[0], flat[1], modes)
+    return Design(objective, law, value, verdict, {"K1": K1, "K2": K2}, flat[0], flat[1], modes)
 
 
 def _checked(name: str, bounds: Bounds) -> Bounds:
@@ -109,9 +118,27 @@ def _score(arm: Arm, objective: str, Kp: float, modes: int) -> Callable[[Real, R
 
     def disk(K1: Real, K2: Real) -> Real:
         loops = (Loop(arm, HubFeedback(K1=float(a), K2=float(b), Kp=Kp)) for a, b in zip(K1, K2, strict=True))
-        return np.array([-_disk(loop, omega) for loop in loops])
+        size = np.array([_disk(loop, omega) for loop in loops])
+        return -size - TIE * least_damping(arm, K1, K2, np.full(K1.size, Kp), modes)
 
     return disk
+
+
+def _guarded(score: Callable[[Real, Real], Real], arm: Arm, Kp: float) -> Callable[[Real, Real], Real]:
+    """The score where the loop is stable, and `BAD` where it is not."""
+
+    def guarded(K1: Real, K2: Real) -> Real:
+        laws = [HubFeedback(K1=float(a), K2=float(b), Kp=Kp) for a, b in zip(K1, K2, strict=True)]
+        return np.where([_holds(arm, law) for law in laws], score(K1, K2), BAD)
+
+    return guarded
+
+
+def _holds(arm: Arm, law: HubFeedback) -> bool:
+    try:
+        return stability(arm, law).is_stable
+    except ConvergenceError:  # on the edge
+        return False
 
 
 def _disk(loop: Loop, omega: Real) -> float:
@@ -150,4 +177,4 @@ def _flat(score: Callable[[Real, Real], Real], best: tuple[Real, float], axis: i
         low -= 1
     while high < values.size - 1 and good[high + 1]:
         high += 1
-    return float(values[low]), float(values[high])
+    return min(float(values[low]), float(best[0][axis])), max(float(values[high]), float(best[0][axis]))

@@ -23,6 +23,7 @@ from tfarm.exact.coefficients import Coefficients, coefficients
 from tfarm.spectrum import modes
 
 from .frequencies import grid
+from .plant import effective_inertia
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
@@ -99,14 +100,50 @@ def _bisected(k: Coefficients, line: Line, low: Real, high: Real) -> Real:
 
 
 def crossing_at_zero(arm: Arm, line: Line) -> Crossing | None:
-    """A real pole through s = 0, where t(s) has a limit there: found from two small s."""
-    small = 1e-9 * float(modes(arm, 1).natural_frequency[-1])
+    """A real pole through s = 0, if there is a t at which one passes."""
+    return _through_zero_free(arm, line) if arm.has_rigid_mode else _through_zero_held(arm, line)
+
+
+def _through_zero_free(arm: Arm, line: Line) -> Crossing | None:
+    """Of an arm that turns freely:  D/theta = Kp + K1 s + J s^2 + c s^3 + ...,  with J the effective inertia.
+
+    The lowest coefficient that does not vanish all along the line decides: the pole passes where it is 0.
+    """
+    base, way = line.base, line.direction
+    if way.Kp:
+        t = -base.Kp / way.Kp + 0.0
+        return Crossing(t, 0.0, _sign(way.Kp) * _change_with_stiffness(arm, line.at(t)))
+    if base.Kp:
+        return None
+    if way.K1:
+        t = -base.K1 / way.K1 + 0.0
+        return Crossing(t, 0.0, -_sign(way.K1 * effective_inertia(arm, line.at(t).K2)))
+    if base.K1 or not way.K2:
+        return None
+    J = arm.total_inertia
+    return Crossing((J / (J - arm.hub.inertia) - base.K2) / way.K2, 0.0, _sign(way.K2))
+
+
+def _change_with_stiffness(arm: Arm, law: HubFeedback) -> int:
+    """How many more poles are unstable above Kp = 0 than below: by K1 if not 0, else by J s^2 + c s^3, c ~ K2 C."""
+    if law.K1:
+        return -_sign(law.K1)
+    J = effective_inertia(arm, law.K2)
+    oscillating = 2 if law.K2 * arm.link.damping * J > 0 else 0  # against one real pole on the other side
+    return _sign(J) * (oscillating - 1)
+
+
+def _through_zero_held(arm: Arm, line: Line) -> Crossing | None:
+    """Of an arm whose tip is held: where the static stiffness vanishes, from t(s) at two small s."""
+    small = 1e-7 * float(modes(arm, 1).natural_frequency[-1])
     N, P = _parts(coefficients(arm), line, small * np.array([1 + 0j, 0.5]))
     if not P.all():
         return None
     far, near = -(N / P).real
     if not abs(near) < 1.5 * abs(far):
         return None
-    limit = 2 * near - far
-    limit = 0.0 if abs(limit) < 1e-3 * abs(far) else limit
-    return Crossing(float(limit), 0.0, 1 if far > limit else -1)
+    return Crossing(float(2 * near - far), 0.0, 1 if far > near else -1)
+
+
+def _sign(value: float) -> int:
+    return int(np.sign(value))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.errors import ConvergenceError, ParameterError
-from tfarm.spectrum.continuation import corrected, follow
+from tfarm.spectrum.continuation import Member, corrected, follow
 
 from .branches import FREE, Segment, followed, ordered
 from .crossings import BranchCrossing, crossings
@@ -73,7 +73,7 @@ def locus(
     cut, lowest = followed(variation, start, stop, branches + 1)
     evaluator = Evaluator(variation, gain)
     curves = _Polish(variation, evaluator, FREE * lowest).curves(cut)
-    rows, mode = _listed(curves, variation.arm.has_rigid_mode, branches, variation.zeros_at_origin)
+    rows, mode = _listed(curves, variation, branches)
     found = crossings(variation, gain, rows, lowest)
     return Locus(arm, law, vary, gain, rows, mode, found)
 
@@ -96,16 +96,22 @@ def _whole(key: str, value: int, least: int, most: int) -> int:
     return int(value)
 
 
-def _listed(curves: Complex, has_rigid: bool, number: int, at_zero: int) -> tuple[Complex, NDArray[np.int64]]:
-    """The first branches that are no mirror images, and the modes they continue from."""
-    slots = np.arange(len(curves))
-    followed_rigid = has_rigid and at_zero < 2
-    mode = slots // 2 + (not followed_rigid)
-    if has_rigid and not followed_rigid:
-        curves = np.concatenate([np.zeros((2, curves.shape[1]), complex), curves])
-        mode, slots = np.r_[0, 0, mode], np.r_[0, 1, slots]
+def _listed(curves: Complex, variation: Variation, number: int) -> tuple[Complex, NDArray[np.int64]]:
+    """The first branches that are no mirror images, and the modes they continue from; zeros nobody follows at 0 first.
+
+    Raises ConvergenceError where one of them was not followed to the end.
+    """
+    at_zero = variation.zeros_at_origin
+    mode = np.arange(len(curves)) // 2 + (at_zero == 2 or not variation.arm.has_rigid_mode)
+    idle = at_zero - (at_zero == 1 and not curves[0].any())
+    curves = np.concatenate([np.zeros((idle, curves.shape[1]), complex), curves])
+    mode = np.r_[np.zeros(idle, int), mode]
     real = (curves.imag == 0).any(axis=1)
-    kept = np.nonzero((slots % 2 == 0) | real)[0][:number]
+    kept = np.nonzero(real | ~(curves.imag < 0).any(axis=1))[0][:number]
+    if np.isnan(curves[kept]).any() or kept.size < number:
+        lost = int(np.argmax(np.isnan(curves[kept]).any(axis=1)))
+        text = f"branch {lost} meets a zero that continues from no mode: ask for fewer branches, or another range"
+        raise ConvergenceError(text, lost, number)
     return np.where(curves[kept] == 0, 0.0, curves[kept]), mode[kept]
 
 
@@ -129,15 +135,14 @@ class _Polish:
             if which.size:
                 pairs = self.pairs(segment, which)
                 curves[segment.slots.ravel()[:, None], which] = pairs.reshape(which.size, -1).T
-        complete = ~np.isnan(curves).any(axis=1)
-        if not complete[: 2 * int(complete.size // 2)].any():
-            raise ConvergenceError("no branch could be followed all the way", curves, cut)
-        return curves[: int(np.argmin(np.r_[complete, False]))]
+        if self.at_zero == 1 and cut[0].pinned:
+            curves[0] = 0.0
+        return curves
 
     def pairs(self, segment: Segment, which: NDArray[np.int64]) -> Complex:
         """The pairs (values, n, 2) of a segment at the values of those numbers, polished."""
         guess = segment.guess(self.gain[which])
-        origin = self._at_origin(guess, which)
+        origin = self._at_origin(guess, which, segment.pinned)
         zeros, settled = self._newton(np.where(origin, 0.0, guess), which, origin)
         moved = abs(zeros - guess) > SHARE * _gaps(zeros)
         parted = abs(zeros[..., 0] - zeros[..., 1]) <= 1e-3 * abs(guess[..., 0] - guess[..., 1])
@@ -147,11 +152,11 @@ class _Polish:
             zeros[n] = self._stepped(segment, int(which[n]), guess[n])
         return zeros
 
-    def _at_origin(self, guess: Complex, which: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Which zeros are exactly 0: the smallest, as many as the law leaves there."""
-        left = np.array([self.variation.left_at_origin(float(value)) for value in self.gain[which]])
-        if self.at_zero == 2:
-            left = np.zeros_like(left)
+    def _at_origin(self, guess: Complex, which: NDArray[np.int64], pinned: bool) -> NDArray[np.bool_]:
+        """Which of the zeros followed are exactly 0: the smallest, as many as the law leaves there."""
+        left = self.variation.left_at_origin(self.gain[which]) * (self.at_zero < 2)
+        if self.at_zero == 1 and not pinned:  # the zero at 0 has lost its partner, and is followed no more
+            left = left - 1
         flat = abs(guess).reshape(len(guess), -1)
         rank = flat.argsort(axis=1).argsort(axis=1)
         return (rank < left[:, None]).reshape(guess.shape)
@@ -182,7 +187,7 @@ class _Polish:
     def _stepped(self, segment: Segment, number: int, guess: Complex) -> Complex:
         """The pairs at one value, all corrected together, or followed there from the last node before it."""
         value = float(self.gain[number])
-        member = member_of(self.variation.at(value), self.at_zero, self.free)
+        member = member_of(self.variation, value, self.at_zero, self.free)
         found, stray = corrected(member, guess)
         if stray.any():
             nodes = [node for node in segment.nodes if (value - node.at) * (self.gain[-1] - self.gain[0]) >= 0]
@@ -190,17 +195,20 @@ class _Polish:
             found = follow(self._member, last, value, (value - last.at) / 8, len(last.zeros))[-1].zeros
         return ordered(found, segment.pinned)
 
-    def _member(self, value: float) -> object:
-        return member_of(self.variation.at(value), self.at_zero, self.free)
+    def _member(self, value: float) -> Member:
+        return member_of(self.variation, value, self.at_zero, self.free)
 
 
 def _gaps(zeros: Complex) -> Real:
-    """Of each zero (values, n, 2) the distance to the nearest zero of another pair."""
-    count = zeros.shape[1]
-    gaps = np.full(zeros.shape, np.inf)
-    own = np.eye(count, dtype=bool)
-    for i in (0, 1):
-        for j in (0, 1):
-            apart = abs(zeros[:, :, None, i] - zeros[:, None, :, j])
-            gaps[..., i] = np.minimum(gaps[..., i], np.where(own, np.inf, apart).min(axis=2))
+    """Of each zero (values, n, 2) the distance to the nearest zero of another pair; of conjugates the upper one's."""
+    real = (zeros.imag == 0).all(axis=2)
+    ever = np.nonzero(real.any(axis=0))[0]
+    second = np.where(real[:, ever], zeros[:, ever, 1], np.inf)
+    points, owner = np.concatenate([zeros[..., 0], second], axis=1), np.r_[np.arange(zeros.shape[1]), ever]
+    with np.errstate(invalid="ignore"):  # inf - inf: mirror images, which are not asked for
+        apart = abs(points[:, :, None] - points[:, None, :])
+    apart[:, owner[:, None] == owner] = np.inf
+    nearest = np.fmin.reduce(apart, axis=2)
+    gaps = np.repeat(nearest[:, : zeros.shape[1], None], 2, axis=2)
+    gaps[:, ever, 1] = np.where(real[:, ever], nearest[:, zeros.shape[1] :], gaps[:, ever, 1])
     return gaps

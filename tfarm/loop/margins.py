@@ -21,7 +21,7 @@ from scipy.optimize import minimize_scalar
 from tfarm.arm import Arm, HubFeedback
 
 from .frequencies import grid
-from .lines import BISECTIONS, Line, crossings
+from .lines import BISECTIONS, Line, crossing_at_zero, crossings
 from .plant import Loop
 from .stability import Stability, stability
 from .windows import Windows, gain_windows
@@ -29,6 +29,7 @@ from .windows import Windows, gain_windows
 Real = NDArray[np.float64]
 NONE = HubFeedback()
 LOWEST = 6  # local minima on the grid that are refined
+NEAR_POLES = np.geomspace(0.05, 20.0, 12)  # points about a pole, in its distances from the axis
 
 
 @dataclass(frozen=True)
@@ -77,7 +78,7 @@ def margins(arm: Arm, law: HubFeedback, band: float | None = None) -> Margins:
 def loop_margins(verdict: Stability) -> LoopMargins:
     """The margins of a stable loop up to the verdict's band."""
     loop, band = verdict.loop, verdict.band
-    omega = np.asarray(grid(loop.arm, band))
+    omega = dense(verdict)
     crossed = unit_crossings(loop, omega)
     angle = np.angle(-loop.loop_function(1j * crossed))  # 0 where L = -1
     lag = np.mod(angle, 2 * math.pi)
@@ -97,18 +98,35 @@ def loop_margins(verdict: Stability) -> LoopMargins:
     return LoopMargins(band, gain_margin(loop, band), phase, delay, disk, max(1.0, 1.0 / least), at)
 
 
+def dense(verdict: Stability) -> Real:
+    """The grid of the arm and points about every oscillating pole of the loop, as close as it is to the axis.
+
+    There |1 + L| dips, by as little damping as narrowly, and not where the arm's own functions are steep.
+    """
+    poles = verdict.poles.values[verdict.poles.values.imag > 0]
+    away = np.concatenate([-NEAR_POLES[::-1], [0.0], NEAR_POLES])
+    close = (poles.imag[:, None] + abs(poles.real[:, None]) * away).ravel()
+    omega = np.asarray(grid(verdict.loop.arm, verdict.band))
+    return np.unique(np.concatenate([omega, close[(close > omega[0]) & (close < omega[-1])]]))
+
+
 def gain_margin(loop: Loop, band: float) -> tuple[float, float]:
     """The factors on all gains at once, below and above 1, at which a pole first reaches the axis."""
-    law, arm = loop.law, loop.arm
+    law, arm, line = loop.law, loop.arm, Line(NONE, loop.law)
     if arm.link.damping == 0:
-        return 0.0, 1.0 / law.K2 if law.K2 > 0 else math.inf
-    factors = [each.t for each in crossings(arm, Line(NONE, law), band)]
+        static = crossing_at_zero(arm, line)
+        factors = [1.0 / law.K2] if law.K2 > 0 else []
+        factors += [] if static is None else [static.t]
+    else:
+        factors = [each.t for each in crossings(arm, line, band)]
     below = max((t for t in factors if 0 <= t < 1), default=0.0)
     return below, min((t for t in factors if t > 1), default=math.inf)
 
 
 def unit_crossings(loop: Loop, omega: Real) -> Real:
     """Frequencies [rad/s] where |L(i w)| = 1."""
+    if loop.law == NONE:
+        return np.empty(0)
 
     def size(w: Real) -> Real:
         return np.asarray(np.log(abs(loop.loop_function(1j * w))))

@@ -111,10 +111,10 @@ def poles_below(loop: Loop, height: float) -> Poles:
 
 def box_of(loop: Loop, height: float) -> Box:
     """A box of that height which reaches far enough right for any unstable pole, and left short of -1/C."""
-    right = 0.1 * height
+    right, edge = 0.1 * height, 1j * np.linspace(0.0, height, 40)
     while right < 1e3 * height:
-        L = loop.loop_function(right * np.array([1 + 0j, 2, 5, 20]))
-        if not np.any((abs(L) > 0.5) & (L.real < 0)):  # L > 0 may stay large, as K1's on a hub without inertia
+        L = loop.loop_function(np.r_[right + edge, right * np.array([2, 5, 20])])
+        if L.real.min() > -0.5:  # then 1 + L has no zero there; L > 0 may be large, as K1's on a hub without inertia
             break
         right *= 1.7
     left, C = 1.5 * height, loop.arm.link.damping

@@ -5,11 +5,14 @@ each frequency has one point (K1, K2) with poles there: a curve.  Together with 
 these curves bound regions of a constant number of unstable poles.  On a grid this number follows, column by column
 (one K1 each), from the crossings along K2 and from one count, so nothing is interpolated or missed between grid points.
 
-At C = 0 the curves collapse onto the lines K1 = 0 and K2 = 1, and beyond them every flexible mode is unstable.
+At C = 0 the curves collapse onto the lines K1 = 0 and K2 = 1: between them every flexible mode is damped if K1 and
+1 - K2 have one sign, and unstable if not.  With both negative the hub acts like one of negative inertia, and some real
+pole is unstable.
 """
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,21 +51,21 @@ class Region:
 
     @property
     def stable(self) -> NDArray[np.bool_]:
-        """Where no pole is unstable."""
-        return np.asarray(self.unstable == 0)
+        """Where no pole is unstable, and the free hub angle has not two poles at 0 (K1 = Kp = 0)."""
+        drifts = (self.K1 == 0) & self.arm.has_rigid_mode & (self.Kp == 0)
+        return np.asarray((self.unstable == 0) & ~drifts)
 
 
 def region(arm: Arm, K1: Real, K2: Real, Kp: float = 0.0) -> Region:
     """The map over the grid of K1 and K2 (1-D, ascending).
 
-    A grid line exactly on K1 = 0 or K2 = 1 at C = 0 is marginal and counts as unstable.  Raises ParameterError where
-    there is no loop or the grid is empty.
+    A grid line exactly on K1 = 0 or K2 = 1 at C = 0 is marginal and counts as unstable, and K1 = 0 is never stable
+    where the hub angle is free.  Raises ParameterError where there is no loop or the grid is empty.
     """
     K1, K2 = _axis("K1", K1), _axis("K2", K2)
     Loop(arm, HubFeedback(K1=float(K1[-1]), K2=float(K2[-1]), Kp=Kp))
     if arm.link.damping == 0:
-        stable = (K1[None, :] > 0) & (K2[:, None] < 1) & (Kp >= 0)
-        return Region(arm, Kp, K1, K2, np.where(stable, 0, INFINITE), np.empty((0, 3)), 0.0)
+        return Region(arm, Kp, K1, K2, _undamped_counts(arm, K1, K2, Kp), np.empty((0, 3)), 0.0)
     corners = [HubFeedback(K1=float(a), K2=float(b), Kp=Kp) for a in (K1[0], K1[-1]) for b in (K2[0], K2[-1])]
     band = max(loop_band(Loop(arm, law))[0] for law in corners)
     omega = np.asarray(grid(arm, band))
@@ -91,12 +94,26 @@ def _axis(name: str, values: Real) -> Real:
     return values
 
 
+def _undamped_counts(arm: Arm, K1: Real, K2: Real, Kp: float) -> NDArray[np.int64]:
+    """Unstable poles at C = 0: one count for each side of the static limit where they are finitely many."""
+    static = crossing_at_zero(arm, along("K2", HubFeedback(K1=1.0, Kp=Kp)))
+    side = np.zeros(K2.size, bool) if static is None else static.t < K2
+    unstable = np.full((K2.size, K1.size), INFINITE, dtype=np.int64)
+    quadrants = ((np.nonzero(K1 > 0)[0], K2 < 1), (np.nonzero(K1 < 0)[0], K2 > 1))
+    for (columns, band), each in itertools.product(quadrants, (True, False)):
+        (rows,) = np.nonzero(band & (side == each))
+        if rows.size and columns.size:
+            law = HubFeedback(K1=float(K1[columns[columns.size // 2]]), K2=float(K2[rows[rows.size // 2]]), Kp=Kp)
+            unstable[np.ix_(rows, columns)] = stability(arm, law).unstable_roots
+    return unstable
+
+
 def _counts_without_K2(arm: Arm, K1: Real, Kp: float, band: float) -> NDArray[np.int64]:
     """Unstable poles at K2 = 0 for each K1: a count at the largest, and the crossings on the way down."""
     law = HubFeedback(K1=float(K1[-1]), Kp=Kp)
     counts = np.full(K1.size, stability(arm, law).unstable_roots)
     for each in crossings(arm, along("K1", law), band):
-        if each.t < K1[-1]:
+        if each.t <= K1[-1]:
             counts[each.t > K1] -= each.change
     return counts
 
@@ -120,10 +137,12 @@ def _crossings_along_K2(
     N = drive + (float(gains.Kp) + float(gains.K1) * 1j * at * K1[column]) * theta
     K2 = -(N * moment.conj()).real / abs(moment) ** 2
     change = np.where(start > 0, 2, -2)  # Im K2 = -h/|M|^2 grows where h falls
-    static = crossing_at_zero(arm, along("K2", HubFeedback(K1=1.0, Kp=Kp)))
-    if static is not None:
-        column = np.r_[column, np.arange(K1.size)]
-        K2, change = np.r_[K2, np.full(K1.size, static.t)], np.r_[change, np.full(K1.size, static.change)]
+    if not arm.has_rigid_mode:
+        static = [crossing_at_zero(arm, along("K2", HubFeedback(K1=float(each), Kp=Kp))) for each in K1]
+        there = np.array([n for n, each in enumerate(static) if each is not None], dtype=np.int64)
+        column = np.r_[column, there]
+        K2 = np.r_[K2, [each.t for each in static if each is not None]]
+        change = np.r_[change, [each.change for each in static if each is not None]]
     return column, K2, change
 
 

@@ -3,7 +3,8 @@
 A reference slew of the hub angle with bang-bang acceleration +-a over a time T enters as r = J theta_ref_tt + K1
 theta_ref_t + Kp theta_ref.  Once it has ended, each pole p answers with  residue(p) R(p) e^{p t}, R the Laplace
 transform of r: the response of the moment after T is that sum, and its root-mean-square over one period of the first
-mode is what is left.
+mode is what is left.  Real poles count too: at K2 other than 0 the slow one of K1 and the inertia answers, as the
+reference is made for the arm's own inertia and not for the effective one.
 """
 
 from __future__ import annotations
@@ -18,28 +19,38 @@ from tfarm.exact.characteristic import Gains, loop_parts, quick_characteristics
 from tfarm.exact.coefficients import coefficients
 from tfarm.spectrum import modes
 
-from .damping import band_poles
+from .damping import band_poles, real_poles
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
 
 RISE, TRAVEL = 1.0, 1.15  # the paper's slew: rise time [s] and tip travel [m]
+MOST_EXPONENT = 100.0
 SAMPLES = 64  # of the period after the slew
 
 
 def residual_moment(arm: Arm, K1: Real, K2: Real, Kp: Real, number: int) -> Real:
     """Root-mean-square of the root moment [N m] over the first mode's period after the slew, for each law."""
-    poles = band_poles(arm, K1, K2, Kp, number)
+    oscillating, real = band_poles(arm, K1, K2, Kp, number), real_poles(arm, K1, K2, Kp, number)
+    period = 2 * np.pi / float(modes(arm, 1).natural_frequency[-1])
+    t = period * np.arange(SAMPLES) / SAMPLES
+    moment = 2 * _answers(arm, oscillating, K1, K2, Kp, t) + _answers(arm, real, K1, K2, Kp, t)
+    return np.asarray(np.sqrt((moment**2).mean(axis=1)))
+
+
+def _answers(arm: Arm, poles: Complex, K1: Real, K2: Real, Kp: Real, t: Real) -> Real:
+    """Real part of the sum over poles (gains, slots) at times t after the slew: (gains, times)."""
     rows, columns = np.nonzero(~np.isnan(poles))
     s = poles[rows, columns]
-    laws = K1[rows], K2[rows], Kp[rows]
     amplitude = np.zeros(poles.shape, complex)
-    amplitude[rows, columns] = residues(arm, s, *laws) * command(arm, s, laws[0], laws[2])
-    period = 2 * np.pi / float(modes(arm, 1).natural_frequency[-1])
-    t = RISE + period * np.arange(SAMPLES) / SAMPLES
+    amplitude[rows, columns] = residues(arm, s, K1[rows], K2[rows], Kp[rows]) * command(arm, s, K1[rows], Kp[rows])
     with np.errstate(under="ignore"):
-        ringing = 2 * (amplitude[..., None] * np.exp(np.nan_to_num(poles)[..., None] * t)).real.sum(axis=1)
-    return np.asarray(np.sqrt((ringing**2).mean(axis=1)))
+        return np.asarray((amplitude[..., None] * _exp(np.nan_to_num(poles)[..., None] * t)).real.sum(axis=1))
+
+
+def _exp(z: Complex) -> Complex:
+    """e^z; that of an unstable pole is limited, which leaves more than any other but does not overflow."""
+    return np.asarray(np.exp(np.minimum(z.real, MOST_EXPONENT) + 1j * z.imag))
 
 
 def residues(arm: Arm, s: Complex, K1: Real, K2: Real, Kp: Real) -> Complex:
@@ -51,8 +62,9 @@ def residues(arm: Arm, s: Complex, K1: Real, K2: Real, Kp: Real) -> Complex:
 
 
 def command(arm: Arm, s: Complex, K1: Real, Kp: Real) -> Complex:
-    """Laplace transform of r for the slew, at s: what it is until `RISE`, and the angle held by Kp after it."""
+    """R(s) e^{s RISE}: R the Laplace transform of r until `RISE` and, the angle held by Kp, after it."""
     acceleration = 4 * TRAVEL / (arm.link.length * RISE**2)
-    bang = acceleration * (1 - np.exp(-s * RISE / 2)) ** 2 / s
+    with np.errstate(under="ignore"):
+        bang = acceleration * (_exp(s * RISE / 2) - 1) ** 2 / s
     rate = bang / s
     return np.asarray(arm.total_inertia * bang + K1 * rate + Kp * rate / s)

@@ -18,7 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tfarm.arm import Arm, HubFeedback
-from tfarm.spectrum import modes_below
+from tfarm.errors import ConvergenceError
+from tfarm.spectrum import modes, modes_below
 
 from .frequencies import MOST_MODES, band_of
 from .plant import Loop
@@ -27,6 +28,7 @@ from .poles import Poles, poles_below
 FEW = 12  # flexible modes in the band at C = 0, and at least
 QUIET = 0.5  # |L| beyond the band, at C > 0
 MARGIN_OF_ZERO = 1e-11  # a real part below this share of |s| is none: the poles are right to a few eps
+UNFELT = 1e-9  # a hub participation below this share of an ordinary one is none
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,8 @@ class Stability:
 def stability(arm: Arm, law: HubFeedback, band: float | None = None) -> Stability:
     """The verdict on the loop.  `band` [rad/s] is chosen if it is not given.
 
-    Raises ParameterError where there is no loop, ConvergenceError where poles cannot be counted.
+    Raises ParameterError where there is no loop, ConvergenceError where poles cannot be counted, and where at C > 0 one
+    is on the axis to working precision.
     """
     loop = Loop(arm, law)
     height, quiet = (band, False) if band is not None else loop_band(loop)
@@ -61,14 +64,36 @@ def stability(arm: Arm, law: HubFeedback, band: float | None = None) -> Stabilit
 
 
 def _verdict(poles: Poles, infinite: bool, loop: Loop) -> str:
-    moving = poles.moving
+    moving, law = poles.moving, loop.law
     if infinite or bool((moving.real > MARGIN_OF_ZERO * abs(moving)).any()):
         return "unstable"
-    law, at_zero = loop.law, poles.values.size - moving.size
-    twice = at_zero > 1 or (at_zero == 1 and law.K1 == 0)
-    is_marginal = twice or bool((moving.real > -MARGIN_OF_ZERO * abs(moving)).any())
-    undamped = loop.arm.link.damping == 0 and (law.K1 == 0 or law.K2 == 1)
-    return "marginal" if is_marginal or undamped else "stable"
+    at_zero = poles.values.size - moving.size
+    if at_zero > 1 or (at_zero == 1 and law.K1 == 0):
+        return "marginal"
+    if loop.arm.link.damping == 0:
+        lossless = law.K1 == 0 or law.K2 == 1
+        return "marginal" if lossless or not is_felt(loop.arm, poles.box.im_max) else "stable"
+    on_axis = moving[moving.real > -MARGIN_OF_ZERO * abs(moving)]
+    if on_axis.size:
+        text = f"the pole at {on_axis[0]:.6g} 1/s is on the imaginary axis to working precision: neither stable nor not"
+        raise ConvergenceError(text, complex(on_axis[0]), float(on_axis[0].real))
+    return "stable"
+
+
+def is_felt(arm: Arm, up_to: float) -> bool:
+    """Whether the hub takes part in every flexible mode below `up_to` [rad/s], by rotation or by root moment.
+
+    At C = 0 a mode that it does not feel stays undamped under any law: so it is for exceptional arms only.  Both are
+    measured in those of a slender beam of the same frequency.
+    """
+    if modes_below(arm, up_to) == 0:
+        return True
+    table, link = modes(arm, up_to=up_to), arm.link
+    flexible = table.index > 0
+    omega, b = table.natural_frequency[flexible], abs(table.hub_participation[flexible])
+    rotation = b * np.sqrt(link.rhoA * link.length) * np.sqrt(np.sqrt(link.EI / link.rhoA) / omega)
+    moment = b * arm.hub.inertia * omega * np.sqrt(link.length / link.EI)
+    return bool((np.maximum(rotation, moment) > UNFELT).all())
 
 
 def _beyond(loop: Loop, quiet: bool) -> tuple[bool, str]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tfarm.arm import Arm, HubFeedback
 from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import Analytic, quick_characteristics
-from tfarm.exact.coefficients import Coefficients
+from tfarm.exact.coefficients import Coefficients, coefficients
 from tfarm.spectrum.continuation import Member
 
 from .plant import Loop
@@ -56,6 +56,31 @@ class Variation:
         room, name = ("link", self.vary) if self.vary in ("length", "damping") else self.vary.split("_")
         return Loop(replace(arm, **{room: replace(getattr(arm, room), **{name: value})}), law)
 
+    def system(self, value: float) -> tuple[Coefficients, Real]:
+        """Coefficients of the arm, and Kp, K1, K2 without dimensions (3, 1), where the varied number has that value."""
+        if self.is_of_gains:
+            return self._k, self.laws(np.array([value]))
+        k = coefficients(self.at(value).arm)
+        unit = float(k.length / k.EI)
+        return k, np.array([[unit * self.law.Kp], [unit * self.law.K1], [self.law.K2]])
+
+    def laws(self, values: Real) -> Real:
+        """The dimensionless gains (3, n) at n values of a gain: linear in it."""
+        law = self.law
+        rows = {"Kp": self._unit * law.Kp, "K1": self._unit * law.K1, "K2": law.K2}
+        if self.vary == "all":
+            return np.array([[gain] for gain in rows.values()]) * values
+        unit = 1.0 if self.vary == "K2" else self._unit
+        return np.array([unit * values if name == self.vary else np.full(values.size, rows[name]) for name in rows])
+
+    @cached_property
+    def _k(self) -> Coefficients:
+        return coefficients(self.arm)
+
+    @cached_property
+    def _unit(self) -> float:
+        return float(self._k.length / self._k.EI)
+
     @cached_property
     def zeros_at_origin(self) -> int:
         """How many zeros stay at s = 0 all the way: 2, 1 under a rate gain alone, 0 where the hub angle is held."""
@@ -64,38 +89,39 @@ class Variation:
             return 0
         return 1 if law.K1 or varied == "K1" else 2
 
-    def left_at_origin(self, value: float) -> int:
-        """How many zeros are at s = 0 at that value."""
+    def left_at_origin(self, values: Real) -> NDArray[np.int64]:
+        """How many zeros are at s = 0 at each of the values."""
         if not self.arm.has_rigid_mode:
-            return 0
-        law = self.at(value).law
-        return 0 if law.Kp else 1 if law.K1 else 2
+            return np.zeros(values.size, np.int64)
+        law, scale = self.law, values if self.vary == "all" else np.ones(values.size)
+        K1, Kp = (values if self.vary == name else scale * getattr(law, name) for name in ("K1", "Kp"))
+        return np.where(Kp != 0, 0, np.where(K1 != 0, 1, 2))
 
 
 class Evaluator:
     """The characteristic function of the loops at given values of what varies, at many points of many loops at once."""
 
     def __init__(self, variation: Variation, values: Real) -> None:
-        self.variation = variation
         self.values = values
-        of_gains = variation.is_of_gains
-        self.loops = [variation.at(float(value)) for value in (values[:1] if of_gains else values)]
-        self.laws = _laws(variation, self.loops[0].k, values) if of_gains else None
+        self.k = variation.system(float(values[0]))[0]
+        self.laws = variation.laws(values) if variation.is_of_gains else None
+        self.systems = [] if variation.is_of_gains else [variation.system(float(value)) for value in values]
 
     def __call__(self, s: Complex, which: NDArray[np.int64], at_zero: int) -> Analytic:
         """D/s^at_zero and its slope at s (1-D), each under the loop of that number in `values`."""
         if self.laws is not None:
-            return quick_characteristics(self.loops[0].k, s, self.laws[:, which], at_zero)
+            return quick_characteristics(self.k, s, self.laws[:, which], at_zero)
         parts = np.empty((3, s.size), complex)
         for number in np.unique(which):
-            here, loop = which == number, self.loops[number]
-            parts[:, here] = quick_characteristics(loop.k, s[here], dimensionless(loop), at_zero)
+            here = which == number
+            k, law = self.systems[number]
+            parts[:, here] = quick_characteristics(k, s[here], law, at_zero)
         return Analytic(*parts)
 
 
-def member_of(loop: Loop, at_zero: int, free: float) -> Member:
-    """The characteristic function D/s^at_zero of one loop, to be followed; exact zeros at s = 0 may be among the points."""
-    k, law = loop.k, dimensionless(loop)
+def member_of(variation: Variation, value: float, at_zero: int, free: float) -> Member:
+    """The characteristic function D/s^at_zero of one loop, to be followed; exact zeros at s = 0 may be asked for."""
+    k, law = variation.system(value)
     singular = -1.0 / k.damping if k.damping else -math.inf
 
     def function(s: Complex) -> Analytic:
@@ -105,20 +131,3 @@ def member_of(loop: Loop, at_zero: int, free: float) -> Member:
         return Analytic(value, slope, scale)
 
     return Member(function, singular, free)
-
-
-def dimensionless(loop: Loop) -> Real:
-    """Kp, K1 and K2 of the loop as `quick_characteristics` takes them, (3, 1)."""
-    gains = loop.gains
-    return np.array([[float(gains.Kp)], [float(gains.K1)], [float(gains.K2)]])
-
-
-def _laws(variation: Variation, k: Coefficients, values: Real) -> Real:
-    """The dimensionless gains (3, n) at n values: linear in what varies."""
-    law, unit = variation.law, float(k.length / k.EI)
-    rows = {"Kp": law.Kp, "K1": law.K1, "K2": law.K2}
-    if variation.vary == "all":
-        laws = np.array([[gain] for gain in rows.values()]) * values
-    else:
-        laws = np.array([values if name == variation.vary else np.full(values.size, rows[name]) for name in rows])
-    return laws * [[unit], [unit], [1.0]]

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tfarm.arm import HubFeedback
+from tfarm.arm.feedback import MOST_GAIN
 from tfarm.spectrum import modes
 
 from .lines import Crossing, along, crossing_at_zero, crossings
@@ -62,7 +63,7 @@ def looked_at(loop: Loop, name: str) -> Interval:
     first = float(modes(loop.arm, 1).natural_frequency[-1])
     inertia = loop.arm.total_inertia if loop.arm.has_rigid_mode else loop.arm.hub.inertia + loop.arm.link.rhoA
     unit = {"K1": inertia * first, "K2": 1.0, "Kp": inertia * first**2}[name]
-    reach = max(REACH[name] * unit, 10.0 * abs(getattr(loop.law, name)))
+    reach = min(MOST_GAIN, max(REACH[name] * unit, 10.0 * abs(getattr(loop.law, name))))
     return -reach, reach
 
 

@@ -105,19 +105,20 @@ def _phase(function: Function, points: Complex) -> tuple[NDArray[np.float64], Co
 def newton(function: Function, starts: Complex, steps: int = 60) -> Complex:
     """Newton's method from every start at once; the points that have settled, each zero once."""
     s = np.array(starts, dtype=complex)
-    move = np.full(s.size, np.inf, complex)
+    settled = np.zeros(s.size, bool)
     for _ in range(steps):
         at = function(s)
-        with np.errstate(all="ignore"):  # a start that runs away is dropped below
+        with np.errstate(all="ignore"):  # a start that runs away, or stands where f is flat, is dropped below
             move = at.value / at.slope
-        bad = ~np.isfinite(move)
-        move[bad] = 0.0
+        known = np.isfinite(move)
+        move[~known] = 0.0
         limit = 0.3 * abs(s)
         move = np.where(abs(move) > limit, move * (limit / np.maximum(abs(move), 1e-300)), move)
         s = s - move
-        if (abs(move) <= 1e-15 * abs(s)).all():
+        settled = known & (abs(move) < 1e-11 * abs(s))
+        if (~known | (abs(move) <= 1e-15 * abs(s))).all():
             break
-    return distinct(s[(abs(move) < 1e-11 * abs(s)) & np.isfinite(s)])
+    return distinct(s[settled & np.isfinite(s)])
 
 
 def distinct(points: Complex, apart: float = 1e-9) -> Complex:

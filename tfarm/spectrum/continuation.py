@@ -49,6 +49,7 @@ NEIGHBOURS = 8  # zeros that repel each other: those further away move too littl
 BELIEVED = 0.2  # how far a zero may land from its prediction, in distances to the next one
 SETTLED = 1e-6  # a correction smaller than this share of that distance ends a step
 CLOSING = 0.2  # two real zeros whose distance would shrink by more than this share in a step refused are a pair
+FINEST = 1e-10  # no step is smaller beside the way from the start
 STUCK = 1e-4  # a step this small beside the way so far ends a mode
 MOST_REFUSALS = 2_000
 
@@ -70,7 +71,7 @@ def follow(
     them company, and are dropped where they meet a zero that nobody follows.  Raises ConvergenceError, with the last
     node, where branches cannot be told apart.
     """
-    nodes, recent, step, refusals = [start], [*before, start][-3:], first, 0
+    nodes, recent, step, refusals, anchor = [start], [*before, start][-3:], first, 0, start.at
     while nodes[-1].at != stop:
         at = nodes[-1].at + step
         if (stop - at) * np.sign(stop - start.at) <= 1e-9 * abs(stop - nodes[-1].at):
@@ -85,10 +86,12 @@ def follow(
         if refusals > MOST_REFUSALS:
             raise ConvergenceError(f"branches cannot be told apart beyond {nodes[-1].at:.6g}", nodes[-1], step)
         step = (at - nodes[-1].at) / 2.5
-        close = abs(step) < 1e-3 * abs(at - start.at)
+        close = abs(step) < 1e-3 * abs(at - anchor) or abs(step) < FINEST * abs(at - start.at)
         if close and _exchange(family, recent, stray, at):
             nodes.append(recent[-1])
-        elif close and abs(step) < STUCK * abs(at - start.at):
+        elif stray[:wanted].any() and FINEST * abs(at - start.at) < abs(step) < STUCK * abs(at - anchor):
+            anchor = nodes[-1].at  # what counts as a small step is measured anew from here
+        elif close and abs(step) < STUCK * abs(at - anchor):
             recent = [_shortened(nodes[-1], stray, wanted)]
             nodes.append(recent[-1])
     return nodes

@@ -1,0 +1,136 @@
+"""The verbs of the continuous loop as a shell sees them."""
+
+import csv
+import math
+
+import numpy as np
+import pytest
+
+import tfarm
+from tests.cli.test_commands import answer, run
+from tfarm import HubFeedback
+from tfarm.loop.margins import margins
+from tfarm.loop.poles import closed_loop_poles
+
+LAW = HubFeedback(K1=0.3, K2=0.3)
+
+
+def test_poles_are_listed_with_their_box(capsys) -> None:
+    found = answer(capsys, "poles", "sasaki2012-lab", "--count", "4")
+    assert {"poles", "unstable", "complete", "box"} <= set(found)
+    there = closed_loop_poles(tfarm.load("sasaki2012-lab"), LAW, 4).values
+    assert found["poles"] == [[pole.real, pole.imag] for pole in there]
+    assert (found["unstable"], found["complete"], len(found["box"])) == (0, True, 4)
+    assert "K2" in found["sign_convention"]
+
+
+def test_poles_can_be_proven(capsys) -> None:
+    found = answer(capsys, "poles", "sasaki2012-lab", "--count", "3", "--certify")
+    assert found["proven_complete"] is True
+    assert len(found["discs"]) == 2
+
+
+KEYS = {
+    "verdict", "stable", "unstable_roots", "unstable_roots_infinite", "band_rad_s", "spectral_abscissa", "lyapunov",
+    "K1_interval", "K2_interval", "delay_margin_s", "disk_margin", "gain_margin", "phase_margin_deg",
+    "peak_sensitivity",
+}  # fmt: skip
+
+
+def test_margins_have_the_verdict_first(capsys) -> None:
+    found = answer(capsys, "margins", "sasaki2012-lab")
+    assert set(found) >= KEYS
+    assert {"proven", "a1_over_a2"} <= set(found["lyapunov"])
+    assert (found["verdict"], found["stable"], found["unstable_roots"]) == ("stable", True, 0)
+    there = margins(tfarm.load("sasaki2012-lab"), LAW)
+    assert found["K2_interval"] == list(there.windows["K2"].around)
+    assert found["delay_margin_s"] == there.exact_delay
+
+
+def test_infinities_are_strings_and_what_has_no_margin_is_null(capsys) -> None:
+    found = answer(capsys, "margins", "sasaki2012")
+    assert found["K2_interval"] == ["-inf", pytest.approx(1.0, abs=1e-9)]
+    assert found["K1_interval"] == [0.0, "inf"]
+    assert (found["delay_margin_s"], found["disk_margin"], found["peak_sensitivity"]) == (0.0, 0.0, "inf")
+    assert found["in_band"]["delay_margin_s"] > 0
+    assert found["lyapunov"]["proven"] is True
+    assert found["lyapunov"]["a1_over_a2"] == pytest.approx(0.7)
+    driven = answer(capsys, "margins", "sasaki2012", "--K2", "1.2")
+    assert driven["unstable_roots_infinite"] is True
+    assert [driven[key] for key in ("K1_interval", "K2_interval", "delay_margin_s", "disk_margin")] == [None] * 4
+
+
+def test_the_map_counts_unstable_poles_over_its_grid(capsys, tmp_path) -> None:
+    found = answer(capsys, "map", "sasaki2012", "--points", "4", "--K1", "-1,1", "--K2", "0,2")
+    assert found["K1"] == [-0.75, -0.25, 0.25, 0.75]
+    assert found["unstable_roots"] == [["inf", "inf", 0, 0]] * 2 + [[1, 1, "inf", "inf"]] * 2
+    file = tmp_path / "map.csv"
+    code, out, err = run(capsys, "map", "sasaki2012-lab", "--points", "3", "--csv", str(file))
+    assert (code, out, err) == (0, "", "")
+    rows = list(csv.reader(file.read_text().splitlines()))
+    assert rows[0] == ["K1", "K2", "unstable_roots"]
+    assert len(rows) == 10
+
+
+def test_design_prints_gains_value_and_verdict(capsys) -> None:
+    found = answer(capsys, "design", "sasaki2012", "--K1", "0,2", "--K2", "0,1", "--modes", "1")
+    assert {"K1", "K2", "Kp", "value", "verdict"} <= set(found)
+    assert found["verdict"] == "stable"
+    assert 0 < found["K1"] < 2
+    assert 0 < found["K2"] < 1
+
+
+@pytest.mark.parametrize("verb", ["poles", "margins", "map", "design"])
+def test_people_get_a_page_with_the_sign_convention(capsys, verb) -> None:
+    more = {"map": ["--points", "12"], "design": ["--modes", "1", "--K1", "0,2", "--K2", "0,1"]}.get(verb, [])
+    code, out, err = run(capsys, verb, "sasaki2012-lab", *more)
+    assert (code, err) == (0, "")
+    assert "K2 E I phi'(0)" in out
+    assert "nan" not in out
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["margins", "sasaki2012", "--K1", "nan"],
+        ["margins", "sasaki2012", "--K2", "inf"],
+        ["margins", "sasaki2012", "--Kp", "1e30"],
+        ["margins", "sasaki2012", "--K1", "much"],
+        ["poles", "sasaki2012", "--count", "0"],
+        ["poles", "sasaki2012", "--K1", "-inf"],
+        ["map", "sasaki2012", "--K1", "1,1"],
+        ["map", "sasaki2012", "--K1", "3,-1"],
+        ["map", "sasaki2012", "--K2", "0,inf"],
+        ["map", "sasaki2012", "--K2", "-inf,0"],
+        ["map", "sasaki2012", "--K2", "nan,1"],
+        ["map", "sasaki2012", "--K2", "1"],
+        ["map", "sasaki2012", "--K1", "-1e300,1e300"],
+        ["map", "sasaki2012", "--points", "1"],
+        ["map", "sasaki2012", "--Kp", "nan"],
+        ["design", "sasaki2012", "--objective", "beauty"],
+        ["design", "sasaki2012", "--K1", "0,1e300"],
+        ["design", "sasaki2012", "--K2", "2"],
+        ["design", "sasaki2012", "--modes", "0"],
+    ],
+)
+def test_bad_input_is_one_line_and_exit_2(capsys, arguments) -> None:
+    code, out, err = run(capsys, *arguments)
+    assert (code, out) == (2, "")
+    assert err.count("\n") == 1
+    assert "Traceback" not in err
+
+
+def test_what_cannot_be_decided_is_exit_3_with_its_reason(capsys) -> None:
+    code, out, err = run(capsys, "margins", "sasaki2012-lab", "--K2", "1.0305375542174282")
+    assert (code, out) == (3, "")
+    assert "on the imaginary axis to working precision" in err
+    code, _, err = run(capsys, "design", "sasaki2012", "--K1", "0.1,1", "--K2", "1.1,2")
+    assert code == 3
+    assert "widen the bounds" in err
+
+
+def test_numbers_are_finite(capsys) -> None:
+    found = answer(capsys, "margins", "stocky-steel")
+    assert found["verdict"] == "stable"
+    assert all(math.isfinite(x) for x in found.values() if isinstance(x, float))
+    assert np.isfinite(found["spectral_abscissa"])

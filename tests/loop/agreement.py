@@ -1,0 +1,119 @@
+"""Map, count and simulation of random loops against each other:  python -m tests.loop.agreement 2000 [seed]
+
+A dozen random arms (slenderness 5 to 60, free or held tip, a third of them at C = 0), and for each a grid of random
+gains: the region's number of unstable poles, that of `stability`, and the growth of the energy of a Legendre-Ritz model
+of the loop (which shares nothing with tfarm) over twenty time constants, by matrix exponentials.
+
+Left out are gains within 1e-3 (of the hub's own unit) of the boundary, and loops that grow or decay by less than 1e-5
+a sample of 10 ms.
+"""
+
+import os
+import sys
+from collections import Counter
+from dataclasses import dataclass, replace
+
+if __name__ == "__main__":
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import numpy as np
+
+from tests.loop.arms import hub_units, with_damping
+from tests.loop.ritz_loop import RitzLoop
+from tests.strategies import some_arm
+from tfarm import Hub, HubFeedback
+from tfarm.loop.regions import INFINITE, region
+from tfarm.loop.stability import stability
+
+ARMS = 12
+NEAR = 1e-3  # of the units of the gains, from the boundary
+SLOW = 1e-5 / 0.01  # 1/s
+TERMS = 24
+
+
+@dataclass(frozen=True)
+class Case:
+    """One loop and what the three roads say: `growth` is ln of the energy over the last ten time constants."""
+
+    arm: object
+    law: HubFeedback
+    of_map: int
+    verdict: str
+    unstable_roots: int
+    infinite: bool
+    growth: float
+
+    @property
+    def outcome(self) -> str:
+        """Whether map, count and simulation agree."""
+        if self.of_map != (INFINITE if self.infinite else self.unstable_roots):
+            return "map and count differ"
+        if self.verdict != ("stable" if self.of_map == 0 else "unstable"):
+            return "verdict and count differ"
+        return "agree" if (self.growth > 0) == (self.of_map != 0) else "simulation differs"
+
+
+def some_free_arm(rng, damped):
+    """An arm whose hub has a fifth to five times the beam's inertia; damping 1e-3 to 0.1 of the critical one."""
+    case = ["some", *rng.choice(["zero", "some", "infinite"], size=2, p=(0.4, 0.4, 0.2))]
+    arm = some_arm(rng, case, damping=0.0, slenderness=(5, 60))
+    beam = arm.link.rhoA * arm.link.length**3 / 3
+    arm = replace(arm, hub=Hub(inertia=beam * float(5 ** rng.uniform(-1, 1))))
+    return with_damping(arm, float(10 ** rng.uniform(-2.7, -0.7)) / hub_units(arm)[1]) if damped else arm
+
+
+def some_gains(rng, arm, number):
+    """Ascending K1 and K2 of any sign, and Kp: zero for most arms."""
+    inertia, omega = hub_units(arm)
+    K1 = inertia * omega * rng.choice([1.0, 1.0, -1.0], number) * 10 ** rng.uniform(-2, 1, number)
+    K2 = np.where(rng.random(number) < 0.7, rng.uniform(-1, 1.5, number), -(10 ** rng.uniform(0, 1.5, number)))
+    Kp = rng.choice([0.0, 1.0, -1.0], p=(0.6, 0.3, 0.1)) * inertia * omega**2 * 10 ** rng.uniform(-3, 0)
+    return np.sort(K1), np.sort(K2), float(Kp)
+
+
+def far_from_boundary(found, law, unit):
+    """Whether the gains are further than NEAR from the boundary's points and from where it collapses to lines."""
+    if abs(law.K1) < NEAR * unit or (found.arm.link.damping == 0 and abs(law.K2 - 1) < NEAR):
+        return False
+    away = np.hypot((found.boundary[:, 0] - law.K1) / unit, found.boundary[:, 1] - law.K2)
+    return bool(away.min(initial=np.inf) > NEAR)
+
+
+def survey(number, seed=2012, arms=ARMS):
+    """So many loops judged; gains too close to the boundary, or too slow to tell, drawn but left out."""
+    rng, cases = np.random.default_rng(seed), []
+    for n in range(arms):
+        arm = some_free_arm(rng, damped=n % 3 != 0)
+        size = int(np.ceil(np.sqrt(number / arms)))
+        K1, K2, Kp = some_gains(rng, arm, size)
+        found, model = region(arm, K1, K2, Kp), RitzLoop(arm, TERMS)
+        for j, i in np.ndindex(size, size):
+            law = HubFeedback(K1=float(K1[i]), K2=float(K2[j]), Kp=Kp)
+            if far_from_boundary(found, law, np.prod(hub_units(arm))):
+                case = judge(model, law, int(found.unstable[j, i]), rng)
+                cases += [] if case is None else [case]
+    return cases
+
+
+def judge(model, law, of_map, rng):
+    """One loop, or None where it grows or decays too slowly."""
+    rightmost = model.rightmost(law)
+    if abs(rightmost) < SLOW:
+        return None
+    verdict = stability(model.arm, law)
+    growth = model.energy_growth(law, rightmost, rng)
+    return Case(
+        model.arm, law, of_map, verdict.verdict, verdict.unstable_roots, verdict.unstable_roots_infinite, growth
+    )  # fmt: skip
+
+
+if __name__ == "__main__":
+    NUMBER = int(sys.argv[1]) if len(sys.argv) > 1 else 2000
+    SEED = int(sys.argv[2]) if len(sys.argv) > 2 else 2012
+    CASES = survey(NUMBER, SEED)
+    print(f"{len(CASES)} loops: {dict(Counter(case.outcome for case in CASES))}")
+    print(dict(Counter(f"{case.of_map} unstable" for case in CASES)))
+    for CASE in CASES:
+        if CASE.outcome != "agree":
+            print(CASE.outcome, CASE)
+    sys.exit(any(case.outcome != "agree" for case in CASES))

@@ -1,0 +1,49 @@
+"""Poles and damping of many laws at once, against the complete lists of `poles_below` and a Legendre-Ritz model."""
+
+import numpy as np
+import pytest
+
+import tfarm
+from tests.loop.agreement import some_free_arm, some_gains
+from tests.loop.ritz_loop import RitzLoop
+from tfarm import HubFeedback
+from tfarm.loop.damping import band_poles, least_damping, real_poles
+from tfarm.loop.frequencies import band_of
+from tfarm.loop.plant import Loop
+from tfarm.loop.poles import poles_below
+
+LAB = tfarm.load("sasaki2012-lab")
+
+
+def some_laws(rng, arm, number):
+    K1, K2, Kp = some_gains(rng, arm, number)
+    return K1, rng.permutation(K2), np.full(number, Kp)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("number", [1, 4])
+def test_they_are_the_poles_of_the_complete_list(seed, number) -> None:
+    rng = np.random.default_rng(30 + seed)
+    arm = some_free_arm(rng, damped=bool(seed % 2))
+    laws, top = some_laws(rng, arm, 6), band_of(arm, number)
+    oscillating, real = band_poles(arm, *laws, number), real_poles(arm, *laws, number)
+    for n, (K1, K2, Kp) in enumerate(zip(*laws, strict=True)):
+        complete = poles_below(Loop(arm, HubFeedback(K1=float(K1), K2=float(K2), Kp=float(Kp))), 3 * top)
+        exact, left = complete.moving, complete.box.re_min
+        for found, there in (
+            (oscillating[n], exact[(exact.imag > 0) & (exact.imag < top)]),
+            (real[n], exact[(exact.imag == 0) & (abs(exact) < top)]),
+        ):
+            found = np.sort_complex(found[found.real > left])
+            np.testing.assert_allclose(found, np.sort_complex(there), rtol=1e-8, atol=1e-9 * top)
+
+
+def test_the_least_damping_is_that_of_an_independent_model() -> None:
+    K1, K2 = np.array([0.3, 0.3, 5.0, 0.3]), np.array([0.3, -1.0, 0.5, 1.2])
+    found = least_damping(LAB, K1, K2, np.zeros(4), 2)
+    model, top = RitzLoop(LAB, 12), band_of(LAB, 2)
+    for n in range(4):
+        s = model.eigenvalues(HubFeedback(K1=float(K1[n]), K2=float(K2[n])))
+        s = s[(s.imag > 0) & (s.imag < top)]
+        assert found[n] == pytest.approx((-s.real / abs(s)).min(), rel=1e-5)
+    assert found[3] < 0

@@ -1,0 +1,119 @@
+"""Gains that serve best: never beaten by random ones, always stable, and what the slew leaves against a simulation."""
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+import tfarm
+from tests.loop.ritz_loop import RitzLoop
+from tfarm import HubFeedback
+from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.loop.damping import least_damping
+from tfarm.loop.design import design
+from tfarm.loop.frequencies import band_of
+from tfarm.loop.margins import loop_margins
+from tfarm.loop.regions import region
+from tfarm.loop.residual import RISE, SAMPLES, TRAVEL, residual_moment
+from tfarm.loop.stability import stability
+
+LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
+BOUNDS = {"K1": (0.0, 20.0), "K2": (-2.0, 1.0)}
+
+
+def slew(model, law):
+    """The Ritz model's gauge over the first period after the slew: matrix exponentials, the reference as states."""
+    arm, A, n = model.arm, model.state_matrix(law), model.n
+    torque = np.zeros(A.shape[0])
+    torque[n : 2 * n] = np.linalg.solve(model.M, model.b)
+    torque[-1] = (model.inertia * model.b @ torque[n : 2 * n] - 1) / model.damping
+    N = A.shape[0]
+    whole = np.zeros((N + 3, N + 3))  # z, then reference angle, rate and acceleration
+    whole[:N, :N] = A
+    whole[:N, N:] = np.outer(torque, [law.Kp, law.K1, arm.total_inertia])
+    whole[N, N + 1] = whole[N + 1, N + 2] = 1
+    z, half = np.zeros(N + 3), expm(whole * RISE / 2)
+    for acceleration in (1, -1):
+        z[-1] = acceleration * 4 * TRAVEL / (arm.link.length * RISE**2)
+        z = half @ z
+    assert z[N] == pytest.approx(TRAVEL / arm.link.length)
+    z[-1] = 0.0
+    step = expm(whole * 2 * np.pi / tfarm.modes(arm, 1).natural_frequency[-1] / SAMPLES)
+    moment = []
+    for _ in range(SAMPLES):
+        moment.append(z[N - 1])
+        z = step @ z
+    return np.array(moment)
+
+
+@pytest.mark.parametrize(
+    ("K1", "K2", "Kp"), [(0.3, 0.3, 0.0), (0.3, 0.0, 0.0), (5.0, 0.3, 0.0), (26.0, -3.0, 0.0), (0.3, 0.3, 5.0)]
+)
+def test_the_residual_moment_is_that_of_a_simulated_slew(K1, K2, Kp) -> None:
+    """Real poles count: at K1 = 26 and K2 = -3 they are nine tenths of what is left."""
+    moment = slew(RitzLoop(LAB, 10), HubFeedback(K1=K1, K2=K2, Kp=Kp))
+    ours = residual_moment(LAB, *(np.array([gain]) for gain in (K1, K2, Kp)), 6)[0]
+    assert ours == pytest.approx(np.sqrt((moment**2).mean()), rel=1e-3)
+
+
+def test_what_an_unstable_loop_leaves_is_huge_but_finite() -> None:
+    left = residual_moment(BARE, np.array([0.3, 0.3, -1e4]), np.array([0.3, 6.0, 0.3]), np.zeros(3), 2)
+    assert np.isfinite(left).all()
+    assert (left[1:] > left[0]).all()
+
+
+@pytest.fixture(scope="module")
+def damping():
+    return design(LAB, "damping", **BOUNDS)
+
+
+def random_gains(arm, number):
+    rng = np.random.default_rng(5)
+    K1, K2 = np.sort(rng.uniform(*BOUNDS["K1"], 15)), np.sort(rng.uniform(*BOUNDS["K2"], 15))
+    stable = region(arm, K1, K2).stable
+    a, b = np.meshgrid(K1, K2)
+    assert stable.sum() >= number
+    return a[stable][:number], b[stable][:number]
+
+
+def test_two_hundred_random_gains_damp_no_better(damping) -> None:
+    K1, K2 = random_gains(LAB, 200)
+    assert least_damping(LAB, K1, K2, np.zeros(200), 2).max() <= damping.value * (1 + 1e-9)
+    assert damping.verdict.is_stable
+    assert least_damping(LAB, *(np.array([x]) for x in (damping.law.K1, damping.law.K2, 0.0)), 2)[0] == damping.value
+
+
+def test_two_hundred_random_gains_leave_no_less(damping) -> None:
+    found = design(LAB, "residual", **BOUNDS)
+    K1, K2 = random_gains(LAB, 200)
+    assert residual_moment(LAB, K1, K2, np.zeros(200), 2).min() >= found.value * (1 - 1e-9)
+    assert found.value < residual_moment(LAB, np.array([damping.law.K1]), np.array([damping.law.K2]), np.zeros(1), 2)[0]
+
+
+def test_random_gains_have_no_better_disk_margin() -> None:
+    bounds = {"K1": (0.1, 20.0), "K2": (0.3, 1.0)}
+    found = design(LAB, "margin", **bounds)
+    rng, band = np.random.default_rng(6), band_of(LAB, 2)
+    values = []
+    for K1, K2 in zip(rng.uniform(0.1, 20.0, 30), rng.uniform(0.3, 1.0, 30), strict=True):
+        values.append(loop_margins(stability(LAB, HubFeedback(K1=K1, K2=K2), band)).disk)
+    assert max(values) <= found.value * (1 + 1e-6)
+    assert found.value == pytest.approx(loop_margins(stability(LAB, found.law, band)).disk, rel=1e-3)
+
+
+def test_gains_that_are_not_stable_never_win() -> None:
+    found = design(BARE, "residual", K1=(-1.0, 1.0), K2=(0.0, 3.0))
+    assert found.verdict.is_stable
+    assert found.law.K1 > 0
+    with pytest.raises(ConvergenceError, match="widen the bounds"):
+        design(BARE, "damping", K1=(0.1, 1.0), K2=(1.1, 3.0))
+
+
+@pytest.mark.parametrize("K1", [(1.0, 1.0), (2.0, 1.0), (float("nan"), 1.0), (0.0, float("inf"))])
+def test_empty_bounds_are_refused(K1) -> None:
+    with pytest.raises(ParameterError, match="K1"):
+        design(LAB, "damping", K1=K1)
+
+
+def test_an_unknown_objective_is_refused() -> None:
+    with pytest.raises(ParameterError, match="objective"):
+        design(LAB, "beauty")

@@ -1,0 +1,298 @@
+"""Root loci: complete by winding number, the same in both directions; ends and crossings by other roads."""
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tfarm
+from tests.loop.arms import window_arm, with_damping
+from tfarm import Hub, HubFeedback, ParameterError, Payload
+from tfarm.cli import main
+from tfarm.errors import ConvergenceError
+from tfarm.loop.lines import along
+from tfarm.loop.lines import crossings as line_crossings
+from tfarm.loop.locus import locus
+from tfarm.loop.plant import Loop
+from tfarm.loop.poles import poles_below
+from tfarm.loop.reduced_locus import reduced_locus
+from tfarm.spectrum.damped import damped_modes
+from tfarm.spectrum.enclose import enclosed
+
+EPS = np.finfo(float).eps
+LAB, PAPER, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))
+HUB = HubFeedback(K1=0.3, K2=0.3)
+RANGES = [
+    (PAPER, HubFeedback(), "K1", 0.0, 10.0),
+    (LAB, HubFeedback(), "K1", -3.0, 3.0),
+    (LAB, HubFeedback(K2=0.5, Kp=3.0), "K1", 0.0, 30.0),
+    (PAPER, HubFeedback(K1=0.3), "K2", -5.0, 5.0),
+    (STOCKY, HubFeedback(K1=0.3), "K2", -5.0, 5.0),
+    (PAPER, HubFeedback(), "K2", 0.0, 5.0),
+    (LAB, HUB, "Kp", 0.0, 100.0),
+    (LAB, HubFeedback(K1=0.3), "Kp", -5.0, 5.0),
+    (PAPER, HUB, "all", 0.0, 10.0),
+    (LAB, HubFeedback(K1=0.3, K2=0.3, Kp=3.0), "all", -2.0, 2.0),
+    (LAB, HUB, "payload_mass", 0.0, 2.0),
+    (STOCKY, HUB, "payload_inertia", 0.0, 0.1),
+    (PAPER, HUB, "hub_inertia", 0.01, 2.0),
+    (LAB, HUB, "length", 0.4, 1.2),
+    (PAPER, HUB, "damping", 0.0, 1e-3),
+]
+NAMES = [f"{arm.name}-{vary}-{n}" for n, (arm, _, vary, _, _) in enumerate(RANGES)]
+
+
+def upper(zeros):
+    """Zeros with Im >= 0, ascending."""
+    return np.sort_complex(np.where(zeros.imag < 0, zeros.conj(), zeros))
+
+
+# ------------------------------------------------------------ complete, and the same in both directions
+
+
+@pytest.mark.parametrize(("arm", "law", "vary", "start", "stop"), RANGES, ids=NAMES)
+def test_branches_are_all_poles_of_the_box_and_the_same_backwards(arm, law, vary, start, stop):
+    """Road: winding numbers, which know of no continuation; then the same way back, from other modes and gains."""
+    found = locus(arm, law, vary, start, stop, points=21, branches=8)
+    assert found.branches.shape == (8, 21)
+    for n in (0, 9, 20):
+        zeros = found.branches[:, n]
+        poles = poles_below(found.variation.at(found.gain[n]), zeros.imag.max() * (1 + 1e-6))
+        for zero in zeros[poles.box.holds(zeros)]:
+            assert abs(poles.values - zero * (zero.imag >= 0) - zero.conj() * (zero.imag < 0)).min() <= 50 * EPS * abs(
+                zero
+            )
+        for pole in poles.values:
+            assert abs(upper(zeros) - pole).min() <= 50 * EPS * abs(pole)
+    back = locus(arm, law, vary, stop, start, points=21, branches=8)
+    assert np.all(abs(found.branches - back.branches[:, ::-1]) <= 50 * EPS * abs(found.branches))
+
+
+def test_a_branch_does_not_depend_on_how_many_points_or_branches_are_asked_for():
+    fine = locus(LAB, HubFeedback(K1=0.3), "K2", -2.0, 2.0, points=201, branches=12)
+    rough = locus(LAB, HubFeedback(K1=0.3), "K2", -2.0, 2.0, points=11, branches=5)
+    assert np.all(abs(fine.branches[:5, ::20] - rough.branches) <= 50 * EPS * abs(rough.branches))
+
+
+def test_branches_are_continuous():
+    """Twice the points halve the largest step of each branch, but for square roots where two meet."""
+    steps = [abs(np.diff(locus(PAPER, HUB, "K2", -3.0, 3.0, n, 10).branches)).max(axis=1) for n in (401, 801)]
+    assert np.all(steps[1] <= 0.75 * steps[0] + EPS)
+
+
+def test_zeros_at_the_origin_stay_exactly_there():
+    assert np.all(locus(PAPER, HubFeedback(), "K1", 0.0, 5.0, 50, 3).branches[0] == 0)
+    assert np.all(locus(PAPER, HubFeedback(), "K2", 0.0, 0.9, 50, 3).branches[:2] == 0)
+    ends = locus(PAPER, HubFeedback(), "Kp", 0.0, 5.0, 50, 3).branches
+    assert ends[0, 0] == 0
+    assert np.all(ends[0, 1:].imag > 0)
+
+
+def test_a_pinned_payload_leaves_no_rigid_mode():
+    pinned = replace(LAB, payload=Payload(mass=math.inf))
+    found = locus(pinned, HubFeedback(), "K1", 0.0, 1.0, 11, 4)
+    assert list(found.mode) == [1, 2, 3, 4]
+    ends = damped_modes(tfarm.modes(pinned, 4)).eigenvalues[:, 0]
+    assert np.all(abs(found.branches[:, 0] - ends) <= 50 * EPS * abs(ends))
+
+
+# ------------------------------------------------------------ ends and limits
+
+
+CHANGED = {
+    "hub_inertia": (0.02, 3.0, lambda arm, value: replace(arm, hub=Hub(inertia=value))),
+    "payload_mass": (0.0, 2.0, lambda arm, value: replace(arm, payload=replace(arm.payload, mass=value))),
+    "payload_inertia": (0.0, 0.05, lambda arm, value: replace(arm, payload=replace(arm.payload, inertia=value))),
+    "length": (0.5, 1.1, lambda arm, value: replace(arm, link=replace(arm.link, length=value))),
+    "damping": (0.0, 3e-4, with_damping),
+}
+
+
+@pytest.mark.parametrize("vary", CHANGED)
+@pytest.mark.parametrize("arm", [PAPER, LAB], ids=["undamped", "damped"])
+def test_without_a_law_both_ends_are_the_arms_own_modes(arm, vary):
+    """Road: modes by counting at C = 0, damped modes complete by winding number, each in its own order."""
+    start, stop, changed = CHANGED[vary]
+    found = locus(arm, HubFeedback(), vary, start, stop, 15, 8)
+    for end, value in ((0, start), (-1, stop)):
+        table = tfarm.modes(changed(arm, value), 6)
+        expected = damped_modes(table).eigenvalues[:, 0] if table.arm.link.damping else 1j * table.natural_frequency
+        assert np.all(abs(found.branches[1:, end] - expected) <= 50 * EPS * abs(expected))
+
+
+def test_feeding_the_moment_back_is_another_hub():
+    """At C = 0 the arm sees a hub of inertia I_h/(1 - K2) with a damper K1/(1 - K2)."""
+    found = locus(PAPER, HubFeedback(K1=0.3), "K2", -2.0, 0.9, 30, 8)
+    for n in (0, 13, 29):
+        share = 1 - found.gain[n]
+        equal = replace(PAPER, hub=Hub(inertia=PAPER.hub.inertia / share))
+        other = locus(equal, HubFeedback(), "K1", 0.0, 0.3 / share, 3, 8).branches[:, -1]
+        assert np.all(abs(other - found.branches[:, n]) <= 200 * EPS * abs(other))
+
+
+def test_high_rate_gain_locks_the_hub():
+    """As K1 grows the oscillating branches tend to the modes of the locked hub, as 1/K1."""
+    locked = 1j * tfarm.modes(replace(STOCKY, hub=Hub(inertia=math.inf)), 3).natural_frequency
+    away = []
+    for K1 in (1e6, 1e7):
+        found = locus(STOCKY, HubFeedback(), "K1", 0.0, K1, 5, 8)
+        away.append(np.array([abs(found.branches[:, -1] - mode).min() for mode in locked]))
+    assert np.all(abs(away[0] / away[1] - 10) < 0.05)
+
+
+# ------------------------------------------------------------ crossings
+
+
+def test_the_known_edge_of_the_lab_arm_to_its_last_digits():
+    """K1 = 0.3: K2 = 1.0305, at 27.8 rad/s.  Road: proven 30-digit discs around the pole there and beside it."""
+    (found,) = locus(LAB, HubFeedback(K1=0.3), "K2", 0.5, 1.1, 40, 8).crossings
+    assert (round(found.gain, 4), round(found.omega, 1), found.direction) == (1.0305, 27.8, "unstable")
+    side = []
+    for K2 in (found.gain * (1 - 1e-13), found.gain * (1 + 1e-13)):
+        loop = Loop(LAB, HubFeedback(K1=0.3, K2=K2))
+        disc = enclosed(loop.k, 1j * found.omega, 30, loop.gains)
+        assert found.omega == pytest.approx(float(disc.im), rel=1e-12)
+        side.append(float(disc.re))
+    assert side[0] < 0 < side[1]
+
+
+@pytest.mark.parametrize(
+    ("arm", "law", "vary", "start", "stop"),
+    [
+        (window_arm(), HubFeedback(K1=1.0), "K2", -15.0, 2.0),
+        (LAB, HubFeedback(), "K1", -3.0, 3.0),
+        (LAB, HubFeedback(K1=0.3), "Kp", -5.0, 5.0),
+        (LAB, HubFeedback(), "K2", 0.5, 5.0),
+    ],
+    ids=["windows", "K1", "Kp", "static"],
+)
+def test_crossings_are_those_of_the_line_of_gains(arm, law, vary, start, stop):
+    """Road: D-decomposition, which scans frequencies and knows of no branches."""
+    found = locus(arm, law, vary, start, stop, 200, 9)
+    top = found.branches.imag.max()
+    other = [each for each in line_crossings(arm, along(vary, law), top) if start < each.t < stop]
+    ours = sorted((each.gain, each.omega, each.direction == "unstable") for each in found.crossings)
+    theirs = sorted((each.t, each.omega, each.change > 0) for each in other)
+    assert len(ours) == len(theirs) > 0
+    for (g, w, right), (t, omega, more) in zip(ours, theirs, strict=True):
+        assert right == more
+        assert abs(g - t) <= 1e-12 * max(1.0, abs(t))
+        assert abs(w - omega) <= 1e-11 * max(1.0, omega)
+
+
+def test_at_no_damping_every_mode_crosses_at_once():
+    """At C = 0 (Lyapunov): all flexible modes at K2 = 1, where they are those of the locked hub; all at K1 = 0."""
+    found = locus(PAPER, HubFeedback(K1=0.3), "K2", 0.8, 1.1, 31, 9).crossings
+    locked = tfarm.modes(replace(PAPER, hub=Hub(inertia=math.inf)), 7).natural_frequency
+    assert [each.direction for each in found] == ["unstable"] * 7
+    assert np.all(abs(np.array([each.gain for each in found]) - 1) <= 4 * EPS)
+    assert np.all(abs(np.sort([each.omega for each in found]) / locked - 1) <= 20 * EPS)
+    found = locus(PAPER, HubFeedback(), "K1", -1.0, 1.1, 30, 8).crossings
+    own = np.r_[0, tfarm.modes(PAPER, 6).natural_frequency[1:]]
+    assert np.all(abs(np.array([each.gain for each in found])) <= EPS)
+    assert np.all(abs(np.sort([each.omega for each in found]) - own) <= 20 * EPS * own)
+
+
+def test_too_much_moment_feedback_falls_statically():
+    """K2 = J/(J - I_h) = 1 + I_h/(J - I_h): torque and inertia cancel, and a real pole passes 0."""
+    (found,) = locus(PAPER, HubFeedback(), "K2", 0.5, 5.0, 60, 5).crossings
+    edge = PAPER.total_inertia / (PAPER.total_inertia - PAPER.hub.inertia)
+    assert (found.omega, found.direction) == (0.0, "unstable")
+    assert found.gain == pytest.approx(edge, rel=1e-13)
+
+
+def test_the_pole_at_zero_crosses_where_the_spring_changes_sign():
+    (found,) = locus(LAB, HubFeedback(K1=0.3), "Kp", -5.0, 5.0, 40, 4).crossings
+    assert (found.omega, found.direction) == (0.0, "stable")
+    assert abs(found.gain) <= 1e-15
+
+
+# ------------------------------------------------------------ next to a reduced model
+
+
+@pytest.mark.parametrize(
+    ("law", "vary", "stop"), [(HubFeedback(), "K1", 5.0), (HubFeedback(K1=0.3), "K2", 0.8), (HUB, "payload_mass", 1.0)]
+)
+def test_the_gap_to_the_reduced_locus_shrinks_with_its_order(law, vary, stop):
+    found = locus(PAPER, law, vary, 0.0, stop, 20, 6)
+    gaps = [reduced_locus(found, order).worst for order in (12, 18, 26)]
+    assert gaps[0] > 3 * gaps[1] > 9 * gaps[2]
+    assert gaps[2] < 1e-7
+
+
+def test_reduced_poles_are_those_of_python_control():
+    """Road: the same closed loop as matrices."""
+    from tfarm.reduced import modal_model
+
+    found = locus(LAB, HUB, "all", 0.0, 1.0, 5, 5)
+    A, B, C, D = modal_model(LAB, ["hub_rate", "root_moment"], 9).matrices()
+    row = np.array([[0.3, 0.3]])
+    poles = np.linalg.eigvals(A - B @ row @ C / (1 + row @ D))
+    mine = reduced_locus(found, 20).branches[:, -1]
+    assert max(abs(poles - pole).min() for pole in mine) < 1e-7
+
+
+# ------------------------------------------------------------ refusals and the command
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"stop": 0.0}, "empty"),
+        ({"stop": math.nan}, "finite"),
+        ({"vary": "K3"}, "payload_mass"),
+        ({"vary": "all"}, "every gain is 0"),
+        ({"vary": "payload_mass", "start": -1.0}, "payload.mass"),
+        ({"points": 1}, "points"),
+        ({"branches": 0}, "branches"),
+        ({"arm": replace(LAB, hub=Hub(inertia=math.inf))}, "locked"),
+    ],
+)
+def test_bad_input_is_refused_in_one_line(change, told):
+    given = {"arm": LAB, "law": HubFeedback(), "vary": "K1", "start": 0.0, "stop": 1.0, "points": 5, "branches": 3}
+    with pytest.raises(ParameterError, match=told) as error:
+        locus(**(given | change))
+    assert "\n" not in str(error.value)
+
+
+def test_a_branch_that_runs_into_the_accumulation_point_is_an_error():
+    """A real pole near -K1/I_h reaches -1/C at K1 = I_h/C, where real zeros accumulate."""
+    with pytest.raises(ConvergenceError, match="-1/C"):
+        locus(LAB, HubFeedback(), "K1", 0.0, 2000.0, 20, 5)
+
+
+def test_the_command_prints_one_json_object(capsys, tmp_path):
+    table = tmp_path / "locus.csv"
+    given = [
+        "locus",
+        "sasaki2012-lab",
+        "--vary",
+        "K2",
+        "--from",
+        "0.5",
+        "--to",
+        "1.1",
+        "--points",
+        "7",
+        "--branches",
+        "6",
+    ]
+    with pytest.raises(SystemExit) as done:
+        main([*given, "--csv", str(table), "--json"])
+    assert done.value.code == 0
+    answer = json.loads(capsys.readouterr().out)
+    found = locus(LAB, HUB, "K2", 0.5, 1.1, 7, 6)
+    assert answer["gain"] == found.gain.tolist()
+    assert np.array_equal(np.array(answer["branches"]) @ [1, 1j], found.branches)
+    assert [tuple(row.values()) for row in answer["crossings"]] == [
+        (each.gain, each.omega, each.omega / (2 * math.pi), each.branch, each.direction) for each in found.crossings
+    ]
+    assert 0 < answer["gap_to_reduced"] < 1e-4
+    assert answer["reduced_order"] == 20
+    assert len(table.read_text().splitlines()) == 8
+    with pytest.raises(SystemExit) as done:
+        main(["locus", "sasaki2012", "--vary", "K1", "--from", "1", "--to", "1"])
+    assert done.value.code == 2
+    assert capsys.readouterr().err.count("\n") == 1

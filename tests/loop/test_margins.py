@@ -1,0 +1,208 @@
+"""Margins of the exact loop function, against python-control, delayed and scaled loops counted again, and theory."""
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import control
+import numpy as np
+import pytest
+
+import tfarm
+from tests.loop.arms import window_arm
+from tests.loop.test_lines import held
+from tests.loop.test_stability import exceptional
+from tfarm import Arm, Hub, HubFeedback
+from tfarm.loop.answers import margins_answer
+from tfarm.loop.frequencies import grid
+from tfarm.loop.margins import gain_margin, lowest, margins, unit_crossings
+from tfarm.loop.plant import Loop
+from tfarm.loop.stability import stability
+from tfarm.reduced import relaxed_model
+
+LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
+LAW = HubFeedback(K1=0.3, K2=0.3)
+LOOPS = [
+    (LAB, LAW),
+    (LAB, HubFeedback(K1=0.3, K2=-2.0)),
+    (LAB, HubFeedback(K1=5.0, K2=0.8, Kp=20.0)),
+    (window_arm(), HubFeedback(K1=1.0, K2=-5.0)),
+    (window_arm(), HubFeedback(K1=3e4, K2=0.5)),
+    (held(), HubFeedback(K1=0.3, K2=0.3)),
+]
+
+
+def response(arm, law, up_to):
+    """The loop function from the arm's public transfer functions, on a grid six times as dense as the margins'."""
+    rough = np.asarray(grid(arm, up_to))
+    omega = np.unique((rough[:-1, None] + np.diff(rough)[:, None] * np.arange(6) / 6).ravel())
+    theta, moment = tfarm.transfer(arm, ["hub_angle", "root_moment"])(1j * omega)
+    return control.frd((law.Kp + law.K1 * 1j * omega) * theta + law.K2 * moment, omega, smooth=False)
+
+
+@pytest.mark.parametrize(("arm", "law"), LOOPS)
+def test_margins_are_those_of_python_control_on_a_fine_grid(arm, law) -> None:
+    found = margins(arm, law).in_band
+    L = response(arm, law, found.band)
+    gains, phases, _, _, at, _ = control.stability_margins(L, returnall=True)
+    assert found.phase == pytest.approx(min(abs(phases), default=math.inf), rel=2e-2)
+    lag = np.mod(phases, 360) * math.pi / 180
+    assert found.delay == pytest.approx(min(lag / at, default=math.inf), rel=2e-2)
+    at_rest = -1 / L.frdata[0, 0, 0].real  # the lowest frequency of a held arm is as good as 0, where L is real
+    above = [g for g in (*gains, at_rest) if g > 1 and (g != at_rest or not arm.has_rigid_mode)]
+    assert found.gain[1] == pytest.approx(min(above, default=math.inf), rel=1e-2)
+    peak = max(1.0, abs(1 / (1 + L.frdata[0, 0])).max())
+    assert found.peak_sensitivity == pytest.approx(peak, rel=5e-2)
+    assert found.peak_sensitivity >= peak * (1 - 1e-9)
+
+
+@pytest.mark.parametrize(("arm", "law"), LOOPS[:4])
+def test_the_disk_margin_is_that_of_python_control_for_a_modal_model(arm, law) -> None:
+    """Skew 0 is the symmetric disk; the model is right to the third digit at the frequency where it counts."""
+    found = margins(arm, law).in_band
+    A, B, C, D = relaxed_model(arm, ["hub_angle", "hub_rate", "root_moment"], 25).matrices()
+    gains = np.array([[law.Kp, law.K1, law.K2]])
+    omega = found.at["disk"] * (1 + np.linspace(-0.05, 0.05, 4001))
+    alpha = control.disk_margins(control.ss(A, B, gains @ C, gains @ D), omega)[0]
+    assert found.disk == pytest.approx(alpha, rel=5e-3)
+
+
+def turns(arm, law, delay, height) -> int:
+    """Zeros right of the axis of 1 + L e^{-s delay}: its turns around a half-disc, L's own poles at 0 left out."""
+    loop, small = Loop(arm, law), 1e-7 * height
+    omega = np.asarray(grid(arm, height))
+    axis = 1j * omega[omega > small]
+    corners = [1j * height, (1 + 1j) * height, (1 - 1j) * height, -1j * height]
+    edge = np.concatenate([np.linspace(a, b, 400, endpoint=False) for a, b in pairwise(corners)])
+    near = axis[0].imag * np.exp(1j * np.linspace(-math.pi / 2, math.pi / 2, 50))
+    path = np.concatenate([axis, edge, axis[::-1].conj(), near])
+
+    def phase(s):
+        return np.angle(1 + loop.loop_function(s) * np.exp(-s * delay))
+
+    angle = phase(path)
+    for _ in range(40):
+        turn = np.angle(np.exp(1j * np.diff(angle)))
+        (rough,) = np.nonzero(abs(turn) > 0.7)
+        if not rough.size:
+            return -round(float(turn.sum()) / (2 * math.pi))
+        middle = (path[rough] + path[rough + 1]) / 2
+        path, angle = np.insert(path, rough + 1, middle), np.insert(angle, rough + 1, phase(middle))
+    raise AssertionError("the phase does not settle")
+
+
+@pytest.mark.parametrize(("arm", "law"), LOOPS[:5])
+def test_the_loop_bears_just_less_than_the_delay_margin(arm, law) -> None:
+    found = margins(arm, law)
+    band = 1.01 * found.in_band.at["delay"] * 3
+    assert turns(arm, law, 0.0, band) == 0
+    assert turns(arm, law, found.exact_delay * (1 - 1e-5), band) == 0
+    assert turns(arm, law, found.exact_delay * (1 + 1e-5), band) == 2
+
+
+def test_the_delay_margin_of_the_lab_arm_is_about_17_ms() -> None:
+    found = margins(LAB, LAW)
+    assert found.exact_delay == found.in_band.delay == pytest.approx(0.017, abs=3e-4)
+
+
+def scaled(law, factor) -> HubFeedback:
+    return HubFeedback(K1=factor * law.K1, K2=factor * law.K2, Kp=factor * law.Kp)
+
+
+@pytest.mark.parametrize(("arm", "law"), [*LOOPS, (BARE, LAW), (held(0.0), HubFeedback(K1=0.3, Kp=-2.0))])
+def test_the_loop_bears_just_less_than_the_gain_margin(arm, law) -> None:
+    low, high = margins(arm, law).in_band.gain
+    assert 0 <= low < 1 < high
+    if high < math.inf:
+        assert stability(arm, scaled(law, high * (1 - 1e-6))).verdict == "stable"
+        assert stability(arm, scaled(law, high * (1 + 1e-6))).verdict == "unstable"
+    if low > 0:
+        assert stability(arm, scaled(law, low * (1 - 1e-6))).verdict == "unstable"
+
+
+def test_a_spring_that_pushes_limits_the_gain_of_an_undamped_held_arm() -> None:
+    link = held(0.0).link
+    stiffness = 1 / (link.length / (3 * link.EI) + 1 / (link.kGA * link.length))
+    loop = Loop(held(0.0), HubFeedback(K1=0.3, K2=0.1, Kp=-0.4 * stiffness))
+    assert gain_margin(loop, 1e3)[1] == pytest.approx(1 / (0.1 + 0.4), rel=1e-9)
+
+
+@pytest.mark.parametrize(("arm", "law"), LOOPS[:4])
+def test_the_disk_margin_is_bounded_by_the_classical_ones(arm, law) -> None:
+    """A disk of size alpha holds gains from (2 - alpha)/(2 + alpha) to its inverse and phases of 2 atan(alpha/2)."""
+    found = margins(arm, law).in_band
+    assert (2 + found.disk) / max(2 - found.disk, 1e-300) <= found.gain[1] * (1 + 1e-9)
+    assert 2 * math.degrees(math.atan(found.disk / 2)) <= found.phase * (1 + 1e-9)
+    assert 1 / found.peak_sensitivity <= 2 * math.sin(math.radians(found.phase) / 2) * (1 + 1e-9)
+    assert found.disk <= 2 / abs(1 - 1 / found.peak_sensitivity)
+
+
+def test_at_no_damping_the_exact_margins_are_none_and_those_of_the_band_are_beside_them() -> None:
+    found = margins(BARE, LAW)
+    assert (found.exact_delay, found.exact_disk, found.exact_peak) == (0.0, 0.0, math.inf)
+    assert 0 < found.in_band.delay < 1e-3
+    assert 0 < found.in_band.disk < 1e-2
+    wider = margins(BARE, LAW, band=4 * found.in_band.band)
+    assert wider.in_band.delay < found.in_band.delay
+    assert wider.in_band.disk < found.in_band.disk
+    assert found.in_band.gain == (0.0, pytest.approx(1 / 0.3))
+    assert margins(BARE, HubFeedback(K1=0.3, K2=-2.0)).in_band.gain == (0.0, math.inf)
+
+
+@pytest.mark.parametrize(
+    ("arm", "law"),
+    [
+        (LAB, HubFeedback(K1=0.3, K2=1.2)),
+        (LAB, HubFeedback(K1=-0.3, K2=0.3)),
+        (LAB, HubFeedback(K2=0.3)),
+        (LAB, HubFeedback()),
+        (BARE, HubFeedback(K1=0.3, K2=1.0)),
+        (exceptional(), LAW),
+    ],
+)
+def test_no_margin_without_stability(arm, law) -> None:
+    answer = margins_answer(margins(arm, law))
+    assert answer["verdict"] != "stable"
+    keys = ("delay_margin_s", "disk_margin", "gain_margin", "phase_margin_deg", "peak_sensitivity", "in_band")
+    intervals = (f"{name}_interval" for name in ("K1", "K2", "Kp"))
+    assert all(answer[key] is None for key in (*keys, *intervals))
+
+
+def test_a_comfortable_gain_margin_says_nothing_about_stability() -> None:
+    """python-control on 30 e^{-0.5 s}/(s + 1)^2, which is unstable; and on the arm's own unstable loop."""
+    omega = np.geomspace(1e-2, 100, 4000)
+    s = 1j * omega
+    comfortable = control.stability_margins(control.frd(30 * np.exp(-0.5 * s) / (s + 1) ** 2, omega))[0]
+    assert comfortable > 2
+    path = np.r_[-1j * omega[::-1], 1j * omega]
+    turn = np.diff(np.unwrap(np.angle(1 + 30 * np.exp(-0.5 * path) / (path + 1) ** 2)))
+    assert round(-turn.sum() / (2 * math.pi)) >= 2  # encirclements of -1, by an open loop without unstable poles
+    law = HubFeedback(K1=-0.3, K2=0.3)
+    gain, phase, *_ = control.stability_margins(response(LAB, law, 1000.0))
+    assert gain > 3
+    assert phase > 4
+    assert margins(LAB, law).in_band is None
+    assert margins(LAB, law).stability.verdict == "unstable"
+
+
+def test_the_loop_function_of_no_gains_limits_nothing() -> None:
+    pin = replace(LAB, hub=Hub(inertia=0.0), payload=held().payload)
+    found = margins(pin, HubFeedback())
+    assert found.stability.verdict == "stable"
+    assert (found.in_band.phase, found.in_band.delay) == (math.inf, math.inf)
+    assert found.in_band.peak_sensitivity == 1.0
+
+
+def test_dips_between_grid_points_are_found() -> None:
+    omega = np.linspace(1.0, 10.0, 40)
+    least, at = lowest(lambda w: (w - math.pi) ** 2 + 0.25, omega)
+    assert least == pytest.approx(0.25, abs=1e-9)
+    assert at == pytest.approx(math.pi, abs=1e-4)
+
+
+def test_of_a_rigid_rod_the_crossing_is_where_rate_meets_inertia() -> None:
+    """Far below its first mode the arm is J s^2 under K1 s: |L| = 1 at w = K1/J."""
+    loop: Loop = Loop(arm := LAB, HubFeedback(K1=1e-3))
+    crossed = unit_crossings(loop, np.asarray(grid(arm, 20.0)))
+    assert crossed[0] == pytest.approx(1e-3 / arm.total_inertia, rel=1e-6)
+    assert isinstance(arm, Arm)

@@ -1,0 +1,129 @@
+"""The (K1, K2) map, against counts of a Legendre-Ritz model, of boxes, of theory at C = 0, and along either gain."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tfarm
+from tests.loop.arms import window_arm
+from tests.loop.ritz_loop import RitzLoop
+from tests.loop.test_lines import held
+from tfarm import Hub, HubFeedback
+from tfarm.errors import ParameterError
+from tfarm.loop.plant import Loop
+from tfarm.loop.poles import poles_below
+from tfarm.loop.regions import INFINITE, between, region
+from tfarm.loop.stability import stability
+from tfarm.loop.windows import gain_windows
+
+LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
+
+
+def model_counts(arm, K1, K2, Kp, terms):
+    model = RitzLoop(arm, terms)
+    return np.array([
+        [int((model.eigenvalues(HubFeedback(K1=float(a), K2=float(b), Kp=Kp)).real > 1e-9).sum()) for a in K1]
+        for b in K2
+    ])  # fmt: skip
+
+
+@pytest.mark.parametrize("Kp", [0.0, 3.0, -0.5])
+def test_counts_of_the_lab_arm_are_those_of_an_independent_model(Kp) -> None:
+    K1, K2 = between(-1, 3, 7), between(-2, 2.5, 8)
+    found = region(LAB, K1, K2, Kp)
+    there = model_counts(LAB, K1, K2, Kp, 10)
+    low = np.array([
+        [poles_below(Loop(LAB, HubFeedback(K1=float(a), K2=float(b), Kp=Kp)), found.band).unstable for a in K1]
+        for b in K2
+    ])  # fmt: skip
+    np.testing.assert_array_equal(found.unstable, low)
+    np.testing.assert_array_equal(found.stable, there == 0)
+
+
+@pytest.mark.parametrize("Kp", [0.0, -30.0])
+def test_counts_of_a_held_arm_step_where_its_stiffness_vanishes(Kp) -> None:
+    """At K1 < 0 the real pole goes the other way there than at K1 > 0."""
+    K1, K2 = between(-6, 6, 5), between(-2, 3, 9)
+    found = region(held(1e-3), K1, K2, Kp)
+    np.testing.assert_array_equal(found.unstable, model_counts(held(1e-3), K1, K2, Kp, 10))
+
+
+def test_the_window_at_negative_k2_is_on_the_map() -> None:
+    K2 = np.array([-13.0, -11.48, -11.46, -10.0, -8.49, -8.47, -5.0, 0.0, 1.0, 1.03])
+    found = region(window_arm(), np.array([0.5, 1.0]), K2)
+    assert found.unstable[:, 1].tolist() == [0, 0, 2, 2, 2, 0, 0, 0, 0, 2]
+    close = found.boundary[abs(found.boundary[:, 0] - 1.0) < 40.0]
+    assert abs(close[:, 1] + 8.483).min() < 0.1
+
+
+def test_columns_and_rows_are_cut_where_the_windows_of_each_gain_end() -> None:
+    law = HubFeedback(K1=1.0, K2=-5.0)
+    verdict = stability(window_arm(), law)
+    K2 = np.linspace(-49.9, 3.0, 400)
+    found = region(window_arm(), np.array([1.0, 2.0]), K2)
+    of_K2 = gain_windows(verdict, "K2").all
+    assert found.stable[:, 0].tolist() == [any(a < value < b for a, b in of_K2) for value in K2]
+    K1 = np.linspace(-2e3, 4e4, 300)
+    found = region(window_arm(), K1, np.array([-10.0, -5.0]))
+    of_K1 = gain_windows(stability(window_arm(), replace(law, K2=-10.0)), "K1").all
+    assert found.stable[0].tolist() == [any(a < value < b for a, b in of_K1) for value in K1]
+
+
+@pytest.mark.parametrize("arm", [LAB, window_arm()], ids=["lab", "window"])
+def test_every_point_of_the_boundary_puts_a_pole_on_the_axis(arm) -> None:
+    found = region(arm, between(0.1, 3, 4), between(-20, 2, 4))
+    inside = found.boundary[(abs(found.boundary[:, 0]) < 1e4) & (abs(found.boundary[:, 1]) < 100)][::37]
+    assert len(inside) > 5
+    for K1, K2, omega in inside:
+        loop = Loop(arm, HubFeedback(K1=float(K1), K2=float(K2)))
+        near = abs(1 + loop.loop_function(1j * omega * np.array([1 + 1e-4, 1 - 1e-4]))).max()
+        assert abs(1 + loop.loop_function(np.array([1j * omega]))[0]) < 1e-9 * (near + abs(K1) + abs(K2) + 1) * 10
+
+
+def test_at_no_damping_the_plane_is_cut_by_two_lines() -> None:
+    K1, K2 = between(-2, 2, 6), between(-1, 3, 8)
+    found = region(BARE, K1, K2)
+    same = np.sign(K1)[None, :] == np.sign(1 - K2)[:, None]
+    np.testing.assert_array_equal(found.unstable == INFINITE, ~same)
+    np.testing.assert_array_equal(found.stable, (K1 > 0)[None, :] & (K2 < 1)[:, None])
+    assert found.boundary.size == 0
+
+
+@pytest.mark.parametrize(("arm", "Kp"), [(BARE, 0.0), (BARE, 2.0), (BARE, -2.0), (held(0.0), 5.0), (held(0.0), -30.0)])
+def test_at_no_damping_finite_counts_are_those_of_a_verdict_at_each_point(arm, Kp) -> None:
+    K1, K2 = between(-5, 5, 4), between(-2, 5, 5)
+    found = region(arm, K1, K2, Kp)
+    for (j, i), count in np.ndenumerate(found.unstable):
+        there = stability(arm, HubFeedback(K1=float(K1[i]), K2=float(K2[j]), Kp=Kp))
+        assert count == (INFINITE if there.unstable_roots_infinite else there.unstable_roots)
+        if count != INFINITE:
+            model = RitzLoop(arm, 10).eigenvalues(HubFeedback(K1=float(K1[i]), K2=float(K2[j]), Kp=Kp))
+            assert count == int((model.real > 1e-7 * abs(model)).sum())
+
+
+def test_a_range_of_k1_that_ends_at_zero_counts_as_one_that_goes_beyond() -> None:
+    K2 = np.array([-1.0, 0.5])
+    upto, beyond = (region(LAB, np.array(K1), K2).unstable[:, :2] for K1 in ([-1.0, -0.5, 0.0], [-1.0, -0.5, 0.5]))
+    np.testing.assert_array_equal(upto, beyond)
+
+
+def test_points_are_the_middles_of_equal_parts() -> None:
+    assert between(-1.0, 3.0, 4).tolist() == [-0.5, 0.5, 1.5, 2.5]
+
+
+@pytest.mark.parametrize(
+    "K1",
+    [np.array([1.0]), np.array([1.0, 1.0]), np.array([2.0, 1.0]), np.array([0.0, math.nan]), np.linspace(0, 1, 2001)],
+)
+def test_an_empty_or_unordered_range_is_refused(K1) -> None:
+    with pytest.raises(ParameterError, match="K1"):
+        region(LAB, K1, np.array([0.0, 1.0]))
+
+
+def test_where_there_is_no_loop_there_is_no_map() -> None:
+    gains = np.array([0.1, 0.2])
+    for inertia in (0.0, math.inf):
+        with pytest.raises(ParameterError):
+            region(replace(LAB, hub=Hub(inertia=inertia)), gains, gains)

@@ -1,0 +1,209 @@
+"""Verdicts, against a Legendre-Ritz model, hub equivalence, Lyapunov's theorem, and what is beyond the band."""
+
+import math
+import os
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import tfarm
+from tests.loop.agreement import some_free_arm
+from tests.loop.arms import hub_units, window_arm
+from tests.loop.ritz_loop import RitzLoop
+from tests.loop.test_lines import held
+from tfarm import Arm, Hub, HubFeedback, Link, Payload, Section
+from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.loop.plant import Loop
+from tfarm.loop.poles import poles_below
+from tfarm.loop.stability import is_felt, is_quiet, loop_band, stability
+
+LAB, BARE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))
+
+
+def test_map_count_and_simulation_agree_on_random_loops() -> None:
+    """In a process of its own: matrices of 49 rows, for which threads cost more than they bring."""
+    alone = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    command = [sys.executable, "-W", "error", "-m", "tests.loop.agreement", "60", "3"]
+    done = subprocess.run(command, capture_output=True, text=True, env=alone, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    first, tally = done.stdout.splitlines()
+    number = int(first.split()[0])
+    assert number > 40
+    assert f"{{'agree': {number}}}" in first
+    assert all(f"'{count} unstable'" in tally for count in (-1, 0, 1))
+
+
+@pytest.mark.parametrize(
+    ("K1", "K2", "Kp", "verdict"),
+    [
+        (0.3, 0.3, 0.0, "stable"),
+        (0.3, 0.999, 0.0, "stable"),
+        (0.3, -40.0, 2.0, "stable"),
+        (0.3, 1.0, 0.0, "marginal"),
+        (0.0, 0.3, 0.0, "marginal"),
+        (0.0, 0.0, 0.0, "marginal"),
+        (0.0, 0.3, 5.0, "marginal"),
+        (0.3, 1.001, 0.0, "unstable"),
+        (-1e-3, 0.3, 0.0, "unstable"),
+        (0.3, 0.3, -1e-3, "unstable"),
+        (-0.3, 1.5, 0.0, "unstable"),
+    ],
+)
+def test_verdicts_at_no_damping_are_those_of_theory(K1, K2, Kp, verdict) -> None:
+    found = stability(BARE, HubFeedback(K1=K1, K2=K2, Kp=Kp))
+    assert found.verdict == verdict
+    assert found.unstable_roots_infinite == ((K1 > 0 and K2 > 1) or (K1 < 0 and K2 < 1))
+    assert (found.unstable_roots > 0) == (verdict == "unstable")
+    assert found.is_stable == (verdict == "stable")
+
+
+@pytest.mark.parametrize("K1", [1e-9, 0.3, 1e4])
+def test_what_lyapunov_proves_is_stable_however_slowly_it_decays(K1) -> None:
+    """Of a stocky arm some modes decay by less than 1e-11 of their frequency, which no double can tell from none."""
+    found = stability(STOCKY, HubFeedback(K1=K1, K2=0.3))
+    assert found.verdict == "stable"
+
+
+def test_at_no_damping_all_modes_of_the_band_are_unstable_beyond_k2_one() -> None:
+    found = stability(BARE, HubFeedback(K1=0.3, K2=1.2))
+    moving = found.poles.moving
+    assert (moving[moving.imag > 0].real > 0).all()
+    assert found.unstable_roots_infinite
+    assert "every flexible mode" in found.tail
+
+
+def test_both_signs_wrong_leave_one_real_pole_to_a_negative_hub_inertia() -> None:
+    found = stability(BARE, HubFeedback(K1=-0.3, K2=1.5))
+    assert (found.unstable_roots, found.unstable_roots_infinite) == (1, False)
+    unstable = found.poles.values[found.poles.values.real > 1e-9 * abs(found.poles.values)]
+    model = RitzLoop(BARE, 20).eigenvalues(HubFeedback(K1=-0.3, K2=1.5))
+    assert unstable[0].real == pytest.approx(model[model.real > 1e-6 * abs(model)].real[0], rel=1e-6)
+
+
+@pytest.mark.parametrize("K2", [-3.0, 0.3, 0.9])
+def test_at_no_damping_the_gauge_is_another_hub(K2) -> None:
+    """The same poles as with a hub of inertia I_h/(1 - K2) and a damper K1/(1 - K2)."""
+    law, share = HubFeedback(K1=0.3, K2=K2, Kp=2.0), 1 / (1 - K2)
+    other = replace(BARE, hub=Hub(inertia=0.1 * share))
+    here = stability(BARE, law, band=2000.0).poles
+    there = stability(other, HubFeedback(K1=0.3 * share, Kp=2.0 * share), band=2000.0).poles
+    np.testing.assert_allclose(here.values, there.values, rtol=0, atol=1e-11 * 2000)
+
+
+def test_beyond_k2_where_inertia_cancels_a_real_pole_runs_away_even_without_k1() -> None:
+    J, hub = BARE.total_inertia, BARE.hub.inertia
+    edge = J / (J - hub)
+    below, above = (stability(BARE, HubFeedback(K2=edge * share)) for share in (0.999, 1.001))
+    assert (below.verdict, below.unstable_roots) == ("marginal", 0)
+    assert (above.verdict, above.unstable_roots) == ("unstable", 1)
+    (real,) = above.poles.values[above.poles.values.real > 1e-6]
+    assert real.imag == 0
+
+
+@pytest.mark.parametrize("C", [0.0, 1e-4])
+def test_a_negative_spring_fells_a_free_arm_but_not_a_held_one(C) -> None:
+    arm = replace(LAB, link=replace(LAB.link, damping=C))
+    assert stability(arm, HubFeedback(K1=0.3, Kp=-0.01)).unstable_roots == 1
+    link = arm.link
+    stiffness = 1 / (link.length / (3 * link.EI) + 1 / (link.kGA * link.length))
+    near, far = (stability(held(C), HubFeedback(K1=0.3, Kp=-share * stiffness)) for share in (0.999, 1.001))
+    assert (near.verdict, far.verdict, far.unstable_roots) == ("stable", "unstable", 1)
+
+
+HELD_TIPS = (Payload(mass=math.inf), Payload(inertia=math.inf), Payload(mass=math.inf, inertia=math.inf))
+
+
+@pytest.mark.parametrize("payload", HELD_TIPS)
+def test_held_tips_have_verdicts_too(payload) -> None:
+    arm = replace(LAB, payload=payload)
+    model = RitzLoop(arm, 12)
+    for law in (HubFeedback(K1=0.3, K2=0.3), HubFeedback(K1=-0.3, K2=0.3), HubFeedback(K1=0.3, K2=1.3)):
+        rightmost = model.rightmost(law)
+        found = stability(arm, law)
+        assert found.verdict == ("stable" if rightmost < 0 else "unstable")
+        assert found.poles.spectral_abscissa == pytest.approx(rightmost, rel=1e-6)
+        assert found.unstable_roots == int((model.eigenvalues(law).real > 0).sum())
+
+
+def test_the_windows_counterexample_is_unstable_as_published() -> None:
+    found = stability(window_arm(), HubFeedback(K1=1.0, K2=-10.0))
+    assert (found.verdict, found.unstable_roots, found.unstable_roots_infinite) == ("unstable", 2, False)
+    (pole,) = found.poles.values[(found.poles.values.real > 0) & (found.poles.values.imag > 0)]
+    assert pole == pytest.approx(24.676499766 + 35236.0j, abs=1.0)
+    assert pole.real == pytest.approx(RitzLoop(window_arm(), 24).rightmost(HubFeedback(K1=1.0, K2=-10.0)), rel=1e-9)
+
+
+def exceptional() -> Arm:
+    """An arm one of whose modes the hub does not feel: L/h near 2.6."""
+
+    def arm(depth: float) -> Arm:
+        section = Section.rectangle(width=0.1, depth=depth)
+        return Arm(link=replace(BARE.link, section=section), hub=Hub(inertia=0.1))
+
+    def participation(depth: float) -> float:
+        return float(tfarm.modes(arm(depth), 3).hub_participation[3])
+
+    return arm(brentq(participation, 1 / 2.6, 1 / 2.6238, xtol=1e-15, rtol=1e-15))
+
+
+def test_a_mode_that_the_hub_does_not_feel_stays_undamped_under_any_law() -> None:
+    arm = exceptional()
+    assert not is_felt(arm, 3e4)
+    assert is_felt(arm, 2e4)
+    found = stability(arm, HubFeedback(K1=20.0, K2=0.3))
+    assert found.verdict == "marginal"
+    assert found.poles.spectral_abscissa > -1e-6
+    heavy, light = (replace(BARE, hub=Hub(inertia=inertia)) for inertia in (1e6, 1e-6))
+    assert is_felt(heavy, 1e4)
+    assert is_felt(light, 1e4)
+
+
+def test_a_pole_on_the_axis_to_working_precision_is_refused_with_its_reason() -> None:
+    edge = 1.0305375542174282
+    with pytest.raises(ConvergenceError, match="on the imaginary axis to working precision"):
+        stability(LAB, HubFeedback(K1=0.3, K2=edge))
+    assert stability(LAB, HubFeedback(K1=0.3, K2=edge * (1 - 1e-9))).verdict == "stable"
+    assert stability(LAB, HubFeedback(K1=0.3, K2=edge * (1 + 1e-9))).verdict == "unstable"
+    assert stability(LAB, HubFeedback(K2=0.3)).verdict == "marginal"
+
+
+def test_beyond_the_band_the_loop_is_quiet_far_up_between_shear_resonances_too() -> None:
+    """|L| over nine decades, with points as dense as the waves along the arm need."""
+    rng = np.random.default_rng(8)
+    for arm in (LAB, window_arm(), some_free_arm(rng, True), some_free_arm(rng, True)):
+        inertia, omega = hub_units(arm)
+        loop = Loop(arm, HubFeedback(K1=inertia * omega, K2=-7.0))
+        band, quiet = loop_band(loop)
+        assert quiet
+        shear = math.pi / arm.link.length * math.sqrt(arm.link.kGA / arm.link.rhoA)
+        close = np.arange(band, band + 300 * shear, shear / 300)
+        assert abs(loop.loop_function(1j * close)).max() < 0.5
+        assert abs(loop.loop_function(1j * np.geomspace(band, 1e9 * band, 4000))).max() < 0.5
+
+
+def test_twice_the_band_holds_no_more_unstable_poles() -> None:
+    for arm, law in ((window_arm(), HubFeedback(K1=1.0, K2=-10.0)), (LAB, HubFeedback(K1=0.3, K2=1.5))):
+        found = stability(arm, law)
+        assert poles_below(Loop(arm, law), 2 * found.band).unstable == found.unstable_roots
+
+
+def test_where_the_tail_needs_too_many_modes_it_says_so() -> None:
+    thin = Link.isotropic(
+        length=1.0, density=2700.0, youngs_modulus=7e10, poissons_ratio=0.3,
+        section=Section.rectangle(width=0.1, depth=0.002), damping=1e-12,
+    )  # fmt: skip
+    found = stability(Arm(link=thin, hub=Hub(inertia=1e-4)), HubFeedback(K1=0.001, K2=0.3), band=200.0)
+    assert "not bounded" in found.tail
+    assert not is_quiet(found.loop, 200.0)
+
+
+def test_where_there_is_no_loop_one_line_says_why() -> None:
+    locked = replace(LAB, hub=Hub(inertia=math.inf))
+    with pytest.raises(ParameterError, match=r"hub\.inertia"):
+        stability(locked, HubFeedback(K1=0.3))
+    with pytest.raises(ParameterError, match="algebraic loop"):
+        stability(replace(LAB, hub=Hub(inertia=0.0)), HubFeedback(K1=0.3, K2=0.3))

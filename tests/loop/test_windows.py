@@ -1,0 +1,158 @@
+"""Stable windows of each gain, against bisection on the rightmost eigenvalue of a Legendre-Ritz model and theorems."""
+
+import itertools
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tfarm
+from tests.loop.agreement import some_free_arm, some_gains
+from tests.loop.arms import window_arm
+from tests.loop.ritz_loop import RitzLoop
+from tests.loop.test_lines import held
+from tests.strategies import some_arm
+from tfarm import Hub, HubFeedback, Payload
+from tfarm.arm.feedback import MOST_GAIN
+from tfarm.loop.plant import Loop
+from tfarm.loop.poles import poles_below
+from tfarm.loop.stability import stability
+from tfarm.loop.windows import gain_windows
+
+LAB, BARE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))
+
+
+def windows(arm, law, name):
+    return gain_windows(stability(arm, law), name)
+
+
+def edge_by_bisection(model, law, name, inside, outside):
+    """The value of a gain where the rightmost eigenvalue of the model changes sign."""
+    for _ in range(28):
+        middle = (inside + outside) / 2
+        if model.rightmost(replace(law, **{name: middle})) < 0:
+            inside = middle
+        else:
+            outside = middle
+    return inside
+
+
+@pytest.mark.parametrize("K1", [1e-6, 0.3, 100.0])
+@pytest.mark.parametrize("arm", [BARE, STOCKY], ids=["slender", "stocky"])
+def test_at_no_damping_k2_reaches_from_minus_infinity_to_one(arm, K1) -> None:
+    found = windows(arm, HubFeedback(K1=K1, K2=0.3), "K2")
+    assert found.around == (-math.inf, 1.0)
+    assert found.all == ((-math.inf, 1.0),)
+    assert windows(arm, HubFeedback(K1=K1, K2=-4.0), "K1").around == (0.0, math.inf)
+
+
+def test_so_it_does_for_any_undamped_arm() -> None:
+    rng = np.random.default_rng(17)
+    for _ in range(8):
+        case = ["some", *rng.choice(["zero", "some", "infinite"], size=2)]
+        arm = some_arm(rng, case, damping=0.0, slenderness=(5, 100))
+        K1 = float(10 ** rng.uniform(-3, 3))
+        verdict = stability(arm, HubFeedback(K1=K1, K2=float(rng.uniform(-3, 0.99))))
+        assert gain_windows(verdict, "K2").around == pytest.approx((-math.inf, 1.0), abs=1e-9)
+        assert gain_windows(verdict, "K1").around == (0.0, math.inf)
+
+
+def test_the_lab_arm_reaches_a_little_above_one() -> None:
+    found = windows(LAB, HubFeedback(K1=0.3, K2=0.3), "K2")
+    assert found.around[1] == pytest.approx(1.0305, abs=5e-5)
+    (at,) = [each for each in found.crossings if each.t == found.around[1]]
+    assert at.omega == pytest.approx(27.8, abs=0.05)
+    assert at.change == 2
+    ritz = edge_by_bisection(RitzLoop(LAB, 12), HubFeedback(K1=0.3), "K2", 0.9, 1.2)
+    assert found.around[1] == pytest.approx(ritz, rel=1e-5)
+
+
+def test_the_window_of_the_counterexample_and_those_beyond_it() -> None:
+    law = HubFeedback(K1=1.0, K2=-5.0)
+    found = windows(window_arm(), law, "K2")
+    low, high = found.all[-2][1], found.around[0]
+    assert (round(low, 2), round(high, 2)) == (-11.47, -8.48)
+    model = RitzLoop(window_arm(), 18)
+    assert high == pytest.approx(edge_by_bisection(model, law, "K2", -5.0, -10.0), rel=1e-7)
+    assert low == pytest.approx(edge_by_bisection(model, law, "K2", -12.0, -10.0), rel=1e-7)
+    assert found.around[1] == pytest.approx(edge_by_bisection(model, law, "K2", 0.5, 1.2), rel=1e-7)
+    there = windows(window_arm(), replace(law, K2=-10.0), "K2")
+    assert there.around is None
+    np.testing.assert_allclose(np.ravel(there.all)[1:], np.ravel(found.all)[1:], rtol=1e-11)
+
+
+def test_edges_put_a_pole_on_the_axis() -> None:
+    law = HubFeedback(K1=1.0, K2=-5.0)
+    for edge in np.ravel(windows(window_arm(), law, "K2").all)[1:]:
+        poles = poles_below(Loop(window_arm(), replace(law, K2=float(edge))), 8e4).moving
+        assert abs(poles.real / abs(poles)).min() < 1e-12
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_random_windows_hold_what_the_model_says(seed) -> None:
+    rng = np.random.default_rng(100 + seed)
+    arm = some_free_arm(rng, damped=True)
+    K1, K2, Kp = some_gains(rng, arm, 3)
+    law, model = HubFeedback(K1=float(K1[1]), K2=float(K2[1]), Kp=Kp), RitzLoop(arm, 18)
+    verdict = stability(arm, law)
+    for name in ("K1", "K2", "Kp"):
+        found = gain_windows(verdict, name)
+        edges = sorted({*found.looked_at, *(each.t for each in found.crossings)})
+        for low, high in itertools.pairwise(edges):
+            middle = (low + high) / 2
+            if high - low < 1e-6 * max(abs(low), abs(high)):
+                continue
+            rightmost = model.rightmost(replace(law, **{name: middle}))
+            assert any(a < middle < b for a, b in found.all) == (rightmost < 0)
+
+
+def test_kp_has_its_edge_at_zero_and_none_below() -> None:
+    found = windows(window_arm(), HubFeedback(K1=1.0, K2=-5.0), "Kp")
+    assert found.around[0] == 0
+    assert all(low >= 0 for low, _ in found.all)
+    unstable = windows(window_arm(), HubFeedback(K1=1.0, K2=-10.0), "Kp")
+    assert unstable.around is None
+    assert all(low >= 0 for low, _ in unstable.all)
+    assert max(abs(end) for end in unstable.looked_at) <= MOST_GAIN
+
+
+def test_a_held_arm_bears_a_negative_spring_down_to_its_stiffness() -> None:
+    for C in (0.0, 1e-4):
+        arm = held(C)
+        link = arm.link
+        stiffness = 1 / (link.length / (3 * link.EI) + 1 / (link.kGA * link.length))
+        found = windows(arm, HubFeedback(K1=0.3, K2=0.25, Kp=-0.1 * stiffness), "Kp")
+        assert found.around[0] == pytest.approx(-0.75 * stiffness, rel=1e-10)
+
+
+@pytest.mark.parametrize("C", [0.0, 1e-4])
+def test_a_held_arm_with_a_negative_spring_loses_k2_below_one(C) -> None:
+    """The spring k (1 - K2) + Kp of hub and gauge vanishes at K2 = 1 + Kp/k."""
+    arm = held(C)
+    link = arm.link
+    stiffness = 1 / (link.length / (3 * link.EI) + 1 / (link.kGA * link.length))
+    found = windows(arm, HubFeedback(K1=0.3, K2=0.0, Kp=-0.5 * stiffness), "K2")
+    assert found.around[1] == pytest.approx(0.5, rel=1e-9)
+
+
+def test_a_pin_without_inertia_has_no_k2_to_choose() -> None:
+    arm = replace(LAB, hub=Hub(inertia=0.0))
+    found = windows(arm, HubFeedback(K1=0.3), "K2")
+    assert (found.around, found.all) == (None, ())
+    assert windows(arm, HubFeedback(K1=0.3), "K1").around == (0.0, math.inf)
+
+
+def test_a_passive_hub_has_no_upper_end_and_an_unstable_loop_no_interval() -> None:
+    assert windows(LAB, HubFeedback(K1=0.3), "K1").around == (0.0, math.inf)
+    assert windows(LAB, HubFeedback(K1=0.3), "Kp").around == (0.0, math.inf)
+    beyond = windows(LAB, HubFeedback(K1=0.3, K2=1.2), "K2")
+    assert beyond.around is None
+    assert beyond.all[-1][1] == pytest.approx(1.03054, abs=1e-5)
+
+
+def test_gains_near_the_largest_allowed_are_looked_at_too() -> None:
+    found = windows(LAB, HubFeedback(K1=9e8), "K1")
+    assert found.looked_at == (-MOST_GAIN, MOST_GAIN)
+    heavy = replace(LAB, hub=Hub(inertia=1e7), payload=Payload(mass=1e5))
+    assert windows(heavy, HubFeedback(K1=0.3, K2=0.2), "Kp").around[0] == 0

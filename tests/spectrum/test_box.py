@@ -1,0 +1,29 @@
+"""Zeros in a box: what is no zero must not be found, whatever the function looks like."""
+
+import numpy as np
+import pytest
+
+from tfarm.exact.characteristic import Analytic
+from tfarm.spectrum.box import Box, newton, zeros_in_box
+
+
+def polynomial(*zeros, flat=0.0):
+    """A polynomial with those zeros; its slope is given as 0 for |s| < flat, as differences of a constant are."""
+    p = np.poly1d(np.poly(zeros))
+
+    def function(s):
+        slope = np.where(abs(s) < flat, 0.0, p.deriv()(s))
+        return Analytic(p(s), slope.astype(complex), np.zeros(s.size, complex))
+
+    return function
+
+
+def test_a_start_where_the_function_is_flat_is_no_zero():
+    starts = np.array([1e-3, -2e-4, 1.9], dtype=complex)
+    assert newton(polynomial(2.0, -3.0, flat=0.01), starts) == pytest.approx([2.0], rel=1e-14)
+
+
+def test_flat_starts_do_not_stand_in_for_zeros_not_yet_found():
+    zeros = np.array([2.0 + 3.0j, 2.0 - 3.0j, -1.0, -40.0])
+    found = zeros_in_box(polynomial(*zeros, flat=0.5), Box(-50.0, 10.0, -10.0, 10.0), np.array([0.1, -0.2, 0.3 + 0j]))
+    assert np.sort_complex(found) == pytest.approx(np.sort_complex(zeros), rel=1e-12)

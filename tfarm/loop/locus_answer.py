@@ -1,0 +1,45 @@
+"""What `tfarm locus` prints with --json: a plain dictionary."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .answers import law_answer
+from .locus import Locus
+from .reduced_locus import ReducedLocus
+from .variation import VARIED
+
+GAP = "largest distance of a branch from the reduced one, over |s| or the arm's first flexible frequency, the larger"
+BRANCHES = (
+    "zeros followed: those at s = 0, then one a mode with Im s > 0; its mirror image only where the two part on the "
+    "real axis. A crossing of a branch with omega > 0 is one of its mirror image too."
+)
+
+
+def locus_answer(exact: Locus, reduced: ReducedLocus) -> dict[str, Any]:
+    """The branches at each gain, where they cross the imaginary axis, and the gap to the reduced model's locus."""
+    return {
+        "arm": exact.arm.name,
+        **law_answer(exact.law),
+        "vary": exact.vary,
+        "unit": VARIED[exact.vary],
+        "gain": exact.gain.tolist(),
+        "mode": exact.mode.tolist(),
+        "branches": [[[float(s.real), float(s.imag)] for s in branch] for branch in exact.branches],
+        "branches_note": BRANCHES,
+        "crossings": [
+            {
+                "gain": each.gain,
+                "omega_rad_s": each.omega,
+                "frequency_hz": each.frequency_hz,
+                "branch": each.branch,
+                "direction": each.direction,
+            }
+            for each in exact.crossings
+        ],
+        "gap_to_reduced": reduced.worst,
+        "gap_by_branch": reduced.gap.tolist(),
+        "gap_note": GAP,
+        "reduced_order": reduced.order,
+        "reduced_points": int(reduced.gain.size),
+    }

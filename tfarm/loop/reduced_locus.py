@@ -1,0 +1,112 @@
+"""The same locus by python-control on the modal model, and how far it is from the exact one.
+
+Where a gain varies it is `control.root_locus_map` on the loop opened at that gain, the other gains closed before; for a
+parameter of the arm, which python-control cannot vary, the poles of a reduced closed loop at a few values.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+
+from tfarm.arm import Arm, HubFeedback
+from tfarm.errors import ParameterError
+from tfarm.reduced import modal_model
+from tfarm.spectrum import modes
+
+from .locus import Locus
+from .variation import GAINS, Complex, Real
+
+if TYPE_CHECKING:
+    import control
+
+LEAST_ORDER = 20
+BEYOND = 2  # modes of the reduced model above the last branch, if the order is not said
+FEW = 9  # values at which an arm is reduced anew, where a parameter of it varies
+OUTPUTS = {"Kp": "hub_angle", "K1": "hub_rate", "K2": "root_moment"}
+
+
+@dataclass(frozen=True)
+class ReducedLocus:
+    """Poles of a reduced closed loop of that `order`, next to the exact branches, at the values `gain` (m,).
+
+    `branches` (b, m) [1/s] are the reduced poles paired one to one with the exact ones so that the sum of distances is
+    least; `gap` (b,) is the largest distance of each branch, as a share of |s| or, if that is more, of the arm's first
+    flexible frequency.
+    """
+
+    order: int
+    gain: Real
+    branches: Complex
+    gap: Real
+
+    @property
+    def worst(self) -> float:
+        """The largest gap of all branches."""
+        return float(self.gap.max())
+
+
+def reduced_locus(exact: Locus, order: int | None = None) -> ReducedLocus:
+    """The locus by python-control on a modal model of that order, or of one two modes beyond the last branch.
+
+    Raises ParameterError if the order is odd or has no room for as many poles as there are branches.
+    """
+    arm, rigid = exact.arm, exact.arm.has_rigid_mode
+    least = int(exact.mode.max()) + rigid
+    if order is None:
+        order = max(LEAST_ORDER, 2 * (least + BEYOND))
+    if isinstance(order, bool) or not isinstance(order, int) or order % 2 or order < 2 * least:
+        raise ParameterError(key="order", value=order, remedy=f"an even number from {2 * least}: two a mode")
+    count = order // 2 - rigid
+    if exact.vary in GAINS:
+        which = np.arange(exact.gain.size)
+        poles = root_locus(arm, exact.law, exact.vary, exact.gain, count)
+    else:
+        which = np.unique(np.linspace(0, exact.gain.size - 1, FEW).round().astype(int))
+        loops = [exact.variation.at(float(value)) for value in exact.gain[which]]
+        poles = np.array([_closed(each.arm, each.law, "", count)[0].poles() for each in loops])
+    branches = exact.branches[:, which]
+    paired = np.array([_paired(*each) for each in zip(branches.T, poles, strict=True)]).T
+    size = np.maximum(abs(branches), modes(arm, 1).natural_frequency[-1])
+    return ReducedLocus(order, exact.gain[which], paired, (abs(paired - branches) / size).max(axis=1))
+
+
+def root_locus(arm: Arm, law: HubFeedback, vary: str, gain: Real, count: int) -> Complex:
+    """`control.root_locus_map` of the loop opened at what varies, a modal model of `count` modes: (gains, order)."""
+    import control
+
+    return np.asarray(control.root_locus_map(open_loop(arm, law, vary, count), gain).loci)
+
+
+def open_loop(arm: Arm, law: HubFeedback, vary: str, count: int) -> control.StateSpace:
+    """The loop function to be multiplied by the varied gain, all other gains closed; state space of a modal model."""
+    system, row = _closed(arm, law, vary, count)
+    return _static(row) * system
+
+
+def _closed(arm: Arm, law: HubFeedback, vary: str, count: int) -> tuple[control.StateSpace, Real]:
+    """The model with all gains closed that do not vary, and the row that the varied one makes of its outputs."""
+    import control
+
+    fixed = {name: 0.0 if vary in (name, "all") else float(getattr(law, name)) for name in OUTPUTS}
+    moving = {name: float(getattr(law, name)) if vary == "all" else float(name == vary) for name in OUTPUTS}
+    used = [name for name in OUTPUTS if fixed[name] or moving[name]] or ["K1"]
+    plant = modal_model(arm, [OUTPUTS[name] for name in used], count).state_space()
+    closed = control.feedback(plant, _static(np.array([[fixed[name] for name in used]])))
+    return closed, np.array([[moving[name] for name in used]])
+
+
+def _static(row: NDArray[Any]) -> control.StateSpace:
+    import control
+
+    return control.StateSpace([], [], [], row)
+
+
+def _paired(exact: Complex, poles: Complex) -> Complex:
+    """Of the poles the one that belongs to each exact zero."""
+    _, chosen = linear_sum_assignment(abs(exact[:, None] - poles[None, :]))
+    return np.asarray(poles[chosen])
