@@ -8,7 +8,7 @@ INSTALLED := .venv/.installed
 BENCH_INSTALLED := .venv/.bench
 PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check install -c requirements.lock
 
-.PHONY: help install reports modes bode test lint bench clean
+.PHONY: help install reports modes bode margins locus sampled tune audit test lint bench clean
 
 help: ## list these verbs
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile | while IFS="$$(printf '\t')" read -r verb what; do \
@@ -24,6 +24,21 @@ modes: $(INSTALLED) ## write one arm's modal tables and shapes (ARM=name-or-file
 
 bode: $(INSTALLED) ## write one arm's Bode plots (ARM=name-or-file)
 	@$(BIN)/tfarm report '$(ARM)' --only bode --out reports
+
+margins: $(INSTALLED) ## write one arm's map of gains, verdict and margins (ARM=name-or-file)
+	@$(BIN)/tfarm report '$(ARM)' --only margins --out reports
+
+locus: $(INSTALLED) ## write one arm's root loci (ARM=name-or-file)
+	@$(BIN)/tfarm report '$(ARM)' --only locus --out reports
+
+sampled: $(INSTALLED) ## write one arm's sampled loop: overlay, loci, time responses (ARM=name-or-file)
+	@$(BIN)/tfarm report '$(ARM)' --only sampled --out reports
+
+tune: $(INSTALLED) ## write one arm's gain tuner beside what it has to beat (ARM=name-or-file)
+	@$(BIN)/tfarm report '$(ARM)' --only tune --out reports
+
+audit: $(INSTALLED) ## check the paper equation by equation
+	@$(BIN)/tfarm audit
 
 test: $(INSTALLED) ## run the tests
 	@$(BIN)/python -m pytest -n 2

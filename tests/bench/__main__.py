@@ -13,7 +13,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from . import elements, memory, responses, spectra
+from . import elements, loci, loops, memory, responses, spectra, tuning
 from .rows import Row, keep, show
 
 
@@ -26,6 +26,9 @@ def measure() -> Iterator[Row]:
     yield from spectra.modes_rows()
     yield from elements.modes_rows()
     yield spectra.cxroots_row()
+    yield from loops.loop_rows()
+    yield from loci.locus_rows()
+    yield from tuning.tuner_rows()
 
 
 def main(path: Path) -> None:

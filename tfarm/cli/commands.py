@@ -95,7 +95,7 @@ def report(
         list[str] | None, typer.Argument(metavar="[ARM ...]", help="presets or files; all presets if none")
     ] = None,
     out: Annotated[Path, typer.Option("--out", help="the folder to write to")] = Path("reports"),
-    only: Annotated[str | None, typer.Option("--only", help="one page: bode, modes or assumptions")] = None,
+    only: Annotated[str | None, typer.Option("--only", help="one page: bode, modes, margins, locus ...")] = None,
 ) -> None:
     """Write pages with pictures, tables and data: open index.html in a browser."""
     import tfarm

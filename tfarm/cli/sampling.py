@@ -42,7 +42,7 @@ def sampled(
 ) -> None:
     """Is the loop u = -Kp theta - K1 theta_t - K2 M stable when it is sampled?  Verdict, intervals, modes, margins."""
     count = None if modes is None else whole("--modes", modes, 1, 400)
-    subject, chain = load_arm(arm), _chain(dsp or arm, period, delay_samples)
+    subject, chain = load_arm(arm), chain_of(dsp or arm, period, delay_samples)
     from tfarm.dsp.chain import Gains
     from tfarm.dsp.verdict import analyse, sampled_answer
 
@@ -72,16 +72,26 @@ def simulate(
     between: Annotated[str, typer.Option("--between", metavar="N", help="records between two samples")] = "0",
     csv: Annotated[Path | None, typer.Option("--csv", help="write the signals to this file")] = None,
     mat: Annotated[Path | None, typer.Option("--mat", help="write the signals to this MATLAB file")] = None,
+    controller: Annotated[
+        Path | None, typer.Option("--controller", help="a tuner from `tfarm tune --save`: it sets K2, with its own K1")
+    ] = None,
     json: Json = False,
 ) -> None:
     """The sampled loop in time: hub angle, tip, root moment and torque, exact between the samples."""
     count, records = whole("--modes", modes or "20", 1, 400), whole("--between", between, 0, 1000)
-    subject, chain = load_arm(arm), _chain(dsp or arm, period, delay_samples)
+    subject, chain = load_arm(arm), chain_of(dsp or arm, period, delay_samples)
     from tfarm.dsp.chain import Gains
     from tfarm.dsp.results import simulated_answer
 
-    gains = Gains(K1=K1, K2=K2, Kp=Kp)
-    answer = simulated_answer(subject, gains, chain, scenario, duration, count=count, between=records)
+    if controller is None:
+        gains = Gains(K1=K1, K2=K2, Kp=Kp)
+        answer = simulated_answer(subject, gains, chain, scenario, duration, count=count, between=records)
+    else:
+        from tfarm.tuner.saving import load_tuner
+        from tfarm.tuner.tuning import controlled_answer
+
+        saved = load_tuner(controller)
+        answer = controlled_answer(subject, saved, chain, scenario, duration, count=count, between=records)
     from tfarm.cli import sampling_tables
 
     if csv is not None:
@@ -97,7 +107,7 @@ def simulate(
         sampling_tables.print_simulation(answer)
 
 
-def _chain(source: str, period: float | None, delay_samples: float | None) -> Chain:
+def chain_of(source: str, period: float | None, delay_samples: float | None) -> Chain:
     """The chain of a file, with what the command line says instead."""
     from dataclasses import replace
 

@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, cast
 
 import typer
 
 from tfarm.cli.app import ArmName, Json, app, load_arm, whole
-from tfarm.cli.sampling import Delay, DspFile, Period, _chain
+from tfarm.cli.sampling import Delay, DspFile, Period, chain_of
 
 
 @app.command()
 def tune(
     arm: ArmName,
     trials: Annotated[str, typer.Option("--trials", metavar="N", help="slews to learn from")] = "100",
-    mode: Annotated[str, typer.Option("--mode", help="trial: learn after each slew; online: at every sample")] = "trial",
+    mode: Annotated[
+        str, typer.Option("--mode", help="trial: learn after each slew; online: at every sample")
+    ] = "trial",
     signals: Annotated[str, typer.Option("--signals", help="vibration or total: what x and u contain")] = "vibration",
     seed: Annotated[str, typer.Option("--seed", metavar="N", help="of the initial weights")] = "0",
     guard: Annotated[str, typer.Option("--guard", help="time-varying (proven), frozen or none")] = "time-varying",
     rule: Annotated[str, typer.Option("--rule", help="dynamic, clipped or plain: how (21) is made robust")] = "dynamic",
+    sensitivity: Annotated[
+        str, typer.Option("--sensitivity", help="of the plant, online: one-step (the paper's) or whole")
+    ] = "one-step",
     eta: Annotated[float, typer.Option("--eta", help="learning rate")] = 0.8,
     alpha: Annotated[float, typer.Option("--alpha", help="momentum, in [0, 1)")] = 0.6,
     a: Annotated[float, typer.Option("--a", help="weight of the root moment in the cost")] = 1.0,
@@ -40,13 +45,16 @@ def tune(
     """Train the network that sets the moment gain during a slew, and hold it against simpler remedies."""
     numbers = whole("--trials", trials, 1, 1_000_000), whole("--seed", seed, 0, 2**53), whole("--modes", modes, 1, 48)
     neurons = whole("--hidden", hidden, 1, 1000)
-    subject, chain = load_arm(arm), _chain(dsp or arm, period, delay_samples)
+    subject, chain = load_arm(arm), chain_of(dsp or arm, period, delay_samples)
     from tfarm import tuner
     from tfarm.tuner.tuning import comparison_answer
 
-    learning = tuner.Learning(mode=mode, rule=rule, eta=eta, alpha=alpha, enough=enough)  # type: ignore[arg-type]
+    learning = tuner.Learning(
+        mode=cast("Any", mode), rule=cast("Any", rule), sensitivity=cast("Any", sensitivity), eta=eta, alpha=alpha,
+        enough=enough,
+    )  # fmt: skip
     plan = tuner.Plan(
-        cost=tuner.Cost(a=a, b=b), learning=learning, signals=signals, guard=guard,  # type: ignore[arg-type]
+        cost=tuner.Cost(a=a, b=b), learning=learning, signals=cast("Any", signals), guard=cast("Any", guard),
         trials=numbers[0], seed=numbers[1], count=numbers[2], K1=K1, duration=duration, hidden=neurons,
         seventh_input=seventh_input,
     )  # fmt: skip

@@ -1,9 +1,14 @@
-"""What `tfarm tune` prints for a person."""
+"""What `tfarm tune` and `tfarm study` print for a person."""
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
+
+from rich.console import Console
+from rich.progress import Progress
 
 from tfarm.cli.tables import new_table, show
 
@@ -43,3 +48,28 @@ def _print_comparison(rows: list[dict[str, Any]]) -> None:
         costs = (f"{row[name]['cost']:.4g}" for name in names)
         table.add_row(row["condition"], *costs, "yes" if row["proven"] else "no")
     show(table)
+
+
+@contextmanager
+def progress(total: int) -> Iterator[Callable[[int, int], None]]:
+    """A progress bar on standard error; yields what a study calls after each tuning."""
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("tuning", total=total)
+        yield lambda done, _: bar.update(task, completed=done)
+
+
+def print_study(answer: dict[str, Any]) -> None:
+    """A row a group of seeds, and the verdict of the map."""
+    names = ("alpha", "eta", "a", "b", "inputs", "rule", "mode", "sensitivity")
+    shown = [name for name in names if len({str(group[name]) for group in answer["groups"]}) > 1]
+    costs = ("median", "lower quartile", "upper quartile", "best", "worst")
+    table = new_table((*shown, *costs, "below best constant", "residual [N m]", "diverged", "died"))
+    for group in answer["groups"]:
+        low, high = group["cost_quartiles"]
+        numbers = (group["cost_median"], low, high, group["cost_best"], group["cost_worst"])
+        below = f"{group['below_best_constant']} of {answer['seeds']}"
+        ends = (below, f"{group['residual_median']:.4g}", str(group["diverged"]), str(group["died"]))
+        table.add_row(*(str(group[name]) for name in shown), *(f"{x:.4g}" for x in numbers), *ends)
+    show(table)
+    if "verdict" in answer:
+        print(answer["verdict"])

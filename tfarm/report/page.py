@@ -20,7 +20,15 @@ from tfarm.report.digits import unit
 from tfarm.report.sections import Fact, SavedSection
 
 TEMPLATES = Path(__file__).parent / "templates"
-QUESTIONS = {"bode": "Bode plots", "modes": "Modes", "assumptions": "What the assumptions do"}
+QUESTIONS = {
+    "bode": "Bode plots",
+    "modes": "Modes",
+    "margins": "Gains and margins",
+    "locus": "Root loci",
+    "sampled": "The sampled loop",
+    "tune": "The gain tuner",
+    "assumptions": "What the assumptions do",
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,7 +117,7 @@ def summary(arm: Arm) -> str:
 def symbol(text: str) -> Markup:
     """A text with true subscripts and exponents: I_h becomes I<sub>h</sub>, m^2 becomes m²."""
     plain = unit(str(escape(text)))
-    return Markup(re.sub(r"\b([A-Za-z])_([a-z0-9])\b", r"\1<sub>\2</sub>", plain))
+    return Markup(re.sub(r"\b([A-Za-zθ])_([a-z0-9])\b", r"\1<sub>\2</sub>", plain))
 
 
 def render(template: str, **values: Any) -> str:

@@ -25,12 +25,17 @@ from tfarm.report.arm_section import arm_section
 from tfarm.report.assumptions_section import assumptions_section
 from tfarm.report.bode_section import bode_section
 from tfarm.report.card import save_card, written_cards
+from tfarm.report.locus_section import locus_section
+from tfarm.report.loop_laws import has_loop
+from tfarm.report.loop_section import map_section, margins_section, no_loop_section, nyquist_section
 from tfarm.report.modes_section import modes_section
 from tfarm.report.page import QUESTIONS, arm_page, index_page
 from tfarm.report.paper import is_from_paper, paper_section
+from tfarm.report.sampled_section import sampled_section
 from tfarm.report.sections import SavedSection, Section, save_section
 from tfarm.report.trust import FOLDER, Evidence, gather, write_trust
 from tfarm.report.trust_proofs import save_proof, written_proofs
+from tfarm.report.tuner_section import tuner_section
 
 Progress = Callable[[int, int, str], object]
 
@@ -49,11 +54,18 @@ class Piece:
 
 
 PIECES = (
+    Piece("map of the gains", ("margins",), map_section, has_loop),
     Piece("the arm", tuple(QUESTIONS), arm_section),
     Piece("the paper's values", (), paper_section, is_from_paper),
     Piece("root moment", ("bode",), partial(bode_section, output="root_moment")),
     Piece("tip displacement", ("bode",), partial(bode_section, output="tip_displacement")),
     Piece("modes", ("modes",), modes_section),
+    Piece("margins", ("margins",), margins_section, has_loop),
+    Piece("root loci", ("locus",), locus_section, has_loop),
+    Piece("Nyquist", ("margins",), nyquist_section, has_loop),
+    Piece("sampled loop", ("sampled",), sampled_section, has_loop),
+    Piece("gain tuner", ("tune",), tuner_section, has_loop),
+    Piece("no loop", ("margins", "locus", "sampled", "tune"), no_loop_section, lambda arm: not has_loop(arm)),
     Piece("assumptions", ("assumptions",), assumptions_section),
 )
 CARD = "card"
@@ -69,7 +81,7 @@ def write(
 ) -> Path:
     """Write the report of each arm to out/<name>/, out/trust/ and out/index.html; the page to open first.
 
-    `only` ("bode", "modes", "assumptions") writes those pages alone, out/<name>/bode.html and so on.  `progress` is
+    `only` ("bode", "modes", "margins", ...) writes those pages alone, out/<name>/bode.html and so on.  `progress` is
     told (done, total, what) after each piece of work.  Raises ParameterError before any work if `out` cannot be
     written, two arms share a name or there is none.  If the work itself fails, `out` is as it was.
     """
@@ -231,7 +243,7 @@ def _write_pages(
 
 
 def _answers(anchor: str, question: str) -> bool:
-    return anchor == "arm" or anchor.startswith(question)
+    return anchor in ("arm", "no-loop") or anchor.startswith(question)
 
 
 def _move_into(made: Path, folder: Path) -> None:

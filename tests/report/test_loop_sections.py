@@ -1,0 +1,275 @@
+"""The loop on an arm's page: what is drawn is what the loop room computes, by another road where there is one."""
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tfarm
+from tests.loop.arms import window_arm
+from tfarm.arm import Hub, HubFeedback
+from tfarm.loop.damping import least_damping
+from tfarm.loop.plant import Loop
+from tfarm.loop.poles import closed_loop_poles
+from tfarm.loop.stability import stability
+from tfarm.report import loop_laws, loop_section, map
+from tfarm.report.loci import loci, zoomed
+from tfarm.report.locus_section import beyond_table, locus_law
+from tfarm.report.loop_laws import DEFAULT, NamedLaw, has_loop, margins_of
+from tfarm.report.loop_section import map_section, margins_section, nyquist_section
+from tfarm.report.map import Axis, gain_map, map_data, moment_axis, rate_axis, stable_edge
+from tfarm.report.map_picture import nice_levels
+from tfarm.report.margins_table import NOTHING, margin_table
+from tfarm.report.nyquist import compressed, nyquist
+from tfarm.report.sections import save_section
+from tfarm.report.writing import write
+
+LAB, PURE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))
+EPS = np.finfo(float).eps
+
+
+@pytest.fixture(scope="module")
+def lab():
+    return gain_map(LAB)
+
+
+def one_law(monkeypatch):
+    """Without the search for the best gains, which takes longest and has its own tests."""
+    monkeypatch.setattr(loop_laws, "best", lambda arm: None)
+    monkeypatch.setattr(map, "best", lambda arm: None)
+    monkeypatch.setattr(loop_section, "best", lambda arm: None)
+
+
+# ------------------------------------------------------------ the map
+
+
+def test_the_edge_drawn_has_poles_on_the_axis(lab):
+    """1 + L(i w) = 0 at each point of the edge, L by the loop function, which the edge was not made with."""
+    points = stable_edge(lab)[:: max(1, len(stable_edge(lab)) // 25)]
+    assert len(points) > 10
+    for K1, K2, omega in points:
+        loop = Loop(LAB, HubFeedback(K1=K1, K2=K2))
+        parts = [abs(Loop(LAB, law).loop_function(1j * np.array([omega]))[0]) for law in _single(K1, K2)]
+        assert abs(1 + loop.loop_function(1j * np.array([omega]))[0]) < 2000 * EPS * (1 + sum(parts))
+
+
+def _single(K1, K2):
+    return HubFeedback(K1=K1), HubFeedback(K2=K2)
+
+
+def test_the_edge_is_smooth_and_inside_the_picture(lab):
+    """Neighbours lie close as seen, so that what is drawn between them is the curve itself."""
+    places = np.stack([lab.x.place(lab.edge[:, 0]), lab.y.place(lab.edge[:, 1])])
+    assert np.nanmax(np.hypot(*np.diff(places))) < map.LONG
+    assert np.isnan(lab.edge[-1]).all()
+
+
+def test_no_part_of_the_edge_is_missing(lab):
+    """Wherever the count changes between two neighbours of the grid, above or beside, the line passes between them."""
+    edge = np.stack([lab.x.place(lab.edge[:, 0]), lab.y.place(lab.edge[:, 1])], axis=1)
+    edge = edge[~np.isnan(edge[:, 0])]
+    across, up = lab.x.place(lab.region.K1), lab.y.place(lab.region.K2)
+    for axis in (0, 1):
+        for row, column in np.argwhere(np.diff(lab.region.unstable, axis=axis)):
+            if axis == 1 and lab.region.K1[column] < 0 < lab.region.K1[column + 1]:
+                continue  # the line K1 = 0 is drawn on its own
+            beside = across[column] + (0.5 / map.COLUMNS) * axis, up[row] + (0.5 / map.ROWS) * (1 - axis)
+            assert np.hypot(*(edge - beside).T).min() < map.SHORT
+
+
+@pytest.mark.parametrize("column", [20, 120, 200])
+def test_the_colours_are_the_counts_of_the_poles(lab, column):
+    """On either side of the upper edge, by finding all poles in a box."""
+    stable = lab.region.stable[:, column]
+    top = int(np.flatnonzero(stable)[-1]) if stable.any() else 100
+    for row in (50, top, min(top + 3, map.ROWS - 1)):
+        law = HubFeedback(K1=float(lab.region.K1[column]), K2=float(lab.region.K2[row]))
+        assert stability(LAB, law).unstable_roots == lab.region.unstable[row, column]
+
+
+def test_the_contours_are_the_damping_of_the_poles(lab):
+    """Least damping ratio by the exact poles in a box, below the band that the caption names."""
+    for row, column in ((5, 20), (25, 40), (30, 55)):
+        law = HubFeedback(K1=float(lab.K1[column]), K2=float(lab.K2[row]))
+        poles = closed_loop_poles(LAB, law, 6).values
+        poles = poles[(poles.imag > 0) & (poles.imag < lab.band)]
+        expected = (-poles.real / abs(poles)).min()
+        assert lab.damping[row, column] == pytest.approx(expected, rel=1e-9, abs=0)
+
+
+def test_the_data_behind_the_map_is_what_is_drawn(lab):
+    """The files hold the grid, its counts and damping, then the edge with its frequencies."""
+    rows = json.loads(map_data(lab).as_json())["rows"]
+    grid = [row for row in rows if row["what"] == "grid"]
+    edge = [row for row in rows if row["what"] == "boundary"]
+    assert len(grid) == lab.damping.size
+    assert len(edge) == int((~np.isnan(lab.edge[:, 0])).sum())
+    at = grid[7 * lab.K1.size + 31]
+    assert (at["K1_N_m_s_rad"], at["K2"]) == (lab.K1[31], lab.K2[7])
+    assert at["unstable_poles"] == lab.counts[7, 31]
+    fresh = least_damping(LAB, lab.K1[31:32], lab.K2[7:8], np.zeros(1), loop_laws.MODES)
+    assert at["least_damping_ratio"] == pytest.approx(fresh[0], rel=1e-12, abs=0)
+
+
+def test_the_ranges_show_what_there_is():
+    """K1 to ten J w1 whatever the arm; K2 as deep as the arm whose unstable windows are known."""
+    for arm in (LAB, STOCKY):
+        omega = tfarm.modes(arm, 1).natural_frequency[-1]
+        assert rate_axis(arm).high == pytest.approx(10 * arm.total_inertia * omega, rel=1e-14, abs=0)
+    assert moment_axis(LAB, rate_axis(LAB)).low == map.LOW
+    deep = moment_axis(window_arm(), rate_axis(window_arm()))
+    assert deep.low < -11.47
+    assert not deep.is_linear
+
+
+@pytest.mark.parametrize("axis", [Axis(-0.1, 500.0, 0.1), Axis(-4.0, 2.0), Axis(-50.0, 2.0, 2.0)])
+def test_a_grid_is_even_as_seen(axis):
+    places = axis.place(axis.grid(50))
+    assert np.diff(places) == pytest.approx(np.full(49, 0.02), rel=1e-12, abs=0)
+    assert axis.place(np.array([axis.low, axis.high])) == pytest.approx([0.0, 1.0], abs=4 * EPS)
+
+
+def test_levels_are_round_and_between():
+    assert nice_levels(0.004, 0.21) == pytest.approx([0.005, 0.01, 0.02, 0.05, 0.1, 0.2])
+    assert nice_levels(-1.0, -0.1) == []
+    assert nice_levels(0.04, 0.17)[-1] == pytest.approx(0.15)
+
+
+# ------------------------------------------------------------ margins
+
+
+def test_the_verdict_comes_before_any_margin():
+    """On the page and in the table; and where the loop is not stable there is no margin at all."""
+    section = margins_section(LAB)
+    assert all(fact.value == "STABLE" for fact in section.facts)
+    quantity, exact = section.blocks[0].columns[0], section.blocks[0].columns[2]
+    assert quantity.values[0] == "verdict"
+    assert exact.values[0] == "stable"
+    wrong = NamedLaw("wrong", "wrong", HubFeedback(K1=0.3, K2=1.5))
+    table = margin_table([wrong], [margins_of(PURE, wrong.law)], True)
+    assert table.columns[2].values[0] == "unstable"
+    assert table.columns[2].values[3:] == [NOTHING] * 6
+
+
+def test_margins_are_those_of_the_loop_room():
+    """Every number of the table, and 0 for the exact delay margin at C = 0."""
+    for arm in (LAB, PURE):
+        found = margins_of(arm, DEFAULT)
+        table = margin_table([NamedLaw("default gains", "default", DEFAULT)], [found], arm is PURE)
+        rows = dict(zip(table.columns[0].values, zip(*(c.values for c in table.columns[2:]), strict=True), strict=True))
+        assert rows["delay margin"] == (found.exact_delay, found.in_band.delay, found.in_band.at["delay"])
+        assert rows["phase margin"][1] == found.in_band.phase
+        assert rows["gain margin, up"][0] == found.in_band.gain[1]
+    assert rows["delay margin"][0] == 0
+    assert rows["peak sensitivity"][0] == math.inf
+
+
+# ------------------------------------------------------------ loci
+
+
+def test_the_loci_are_exact_and_the_gap_is_that_of_what_is_drawn():
+    """At the gains marked each branch is a pole found in a box; the gap is the distance of the two curves drawn."""
+    data = loci(LAB, DEFAULT, "K2", -1.0, 1.6)
+    for n in (0, 150, 299):
+        law = replace(DEFAULT, K2=float(data.exact.gain[n]))
+        poles = closed_loop_poles(LAB, law, 5).values
+        for branch in zoomed(data)[:2]:
+            here = data.exact.branches[branch, n]
+            assert abs(poles - here).min() < 1e-9 * abs(here)
+    apart = abs(data.reduced.branches - data.exact.branches).max(axis=1)
+    assert (apart > 0).any()
+    assert (
+        apart <= data.reduced.gap * np.maximum(abs(data.exact.branches).max(axis=1), data.first) * (1 + 1e-12)
+    ).all()
+    assert [round(each.gain, 4) for each in data.exact.crossings] == [1.0305]
+
+
+def test_the_law_of_the_loci_can_be_seen():
+    assert locus_law(LAB) == DEFAULT
+    assert locus_law(STOCKY).K1 > 100 * DEFAULT.K1
+
+
+def test_beyond_one_infinitely_many_poles_are_unstable_without_damping():
+    """And at K2 = 1 exactly none is: the modes with the hub at rest stay on the axis."""
+    table = beyond_table(PURE, DEFAULT)
+    columns = {column.key: column.values for column in table.columns}
+    assert columns["verdict"] == ["stable", "marginal", "unstable", "unstable", "unstable"]
+    assert columns["unstable_poles"][2:] == ["infinitely many"] * 3
+    held = tfarm.modes(replace(PURE, hub=Hub(inertia=math.inf)), 1).natural_frequency[0]
+    assert f"{held:.3f}" in columns["first_pairs"][1]
+
+
+# ------------------------------------------------------------ Nyquist
+
+
+@pytest.mark.parametrize("arm", [PURE, LAB, STOCKY], ids=lambda arm: arm.name)
+@pytest.mark.parametrize("K2", [-2.0, 0.3, 1.5])
+def test_turns_around_minus_one_are_unstable_poles(arm, K2):
+    """Two counts that share nothing: the turns of 1 + L along a contour, and all poles found in a box."""
+    law = HubFeedback(K1=0.2 * loop_laws.rate_unit(arm), K2=K2)
+    plot = nyquist(NamedLaw("", "", law), stability(arm, law))
+    assert plot.expected == plot.verdict.unstable_roots
+    assert (plot.verdict.unstable_roots > 0) == (K2 > 1)
+
+
+def test_every_pole_on_the_axis_is_passed_on_its_right():
+    """At C = 0 half a circle a natural frequency, a quarter at 0; nothing infinite is evaluated."""
+    plot = nyquist(NamedLaw("", "", DEFAULT), stability(PURE, DEFAULT))
+    omega = tfarm.modes(PURE, 12).natural_frequency
+    assert plot.poles == pytest.approx(omega, rel=4 * EPS, abs=0)
+    starts = np.flatnonzero(np.diff(np.r_[0, plot.is_arc.astype(int)]) == 1)
+    assert starts.size == omega.size
+    assert (plot.s[plot.is_arc].real >= 0).all()
+    assert np.isfinite(plot.L).all()
+    assert abs(plot.L[plot.is_arc]).min() > 10
+
+
+def test_nothing_is_cut_off_by_the_compression():
+    assert abs(compressed(np.array([1e300, -1.0, 1e-3j]))) == pytest.approx([1.0, 0.5, 1e-3 / 1.001])
+
+
+# ------------------------------------------------------------ pages
+
+
+@pytest.mark.parametrize(("inertia", "reason"), [(math.inf, "locked"), (0.0, "no inertia")])
+def test_an_arm_without_a_loop_gets_a_sentence(tmp_path, inertia, reason):
+    arm = replace(LAB, name="held", hub=Hub(inertia=inertia))
+    assert not has_loop(arm)
+    page = write([arm], tmp_path, only=("margins",)).read_text()
+    assert reason in page
+    assert "map.svg" not in page
+
+
+def test_the_map_says_what_is_proven(monkeypatch):
+    """The whole frame at C = 0; at C > 0 it is drawn dashed and called no proof, in the picture and below it."""
+    one_law(monkeypatch)
+    for arm, words, style in ((PURE, "proven", "-"), (LAB, "not a proof here", "--")):
+        picture = map_section(arm).blocks[0]
+        (frame,) = [
+            line
+            for line in picture.figure.axes[0].lines
+            if words in str(line.get_label()) and "K2 < 1" in str(line.get_label())
+        ]
+        assert frame.get_linestyle() == style
+        assert ("not a proof here" in picture.caption) == (arm is LAB)
+
+
+def test_the_sign_convention_stands_wherever_K2_does(monkeypatch):
+    one_law(monkeypatch)
+    for section in (map_section(PURE), margins_section(PURE)):
+        texts = [*section.words, *(block.caption for block in section.blocks)]
+        assert any("Sign of K2" in text for text in texts)
+
+
+def test_the_same_bytes_twice(tmp_path, monkeypatch):
+    one_law(monkeypatch)
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        for make in (map_section, nyquist_section):
+            save_section(make(LAB), tmp_path / folder)
+    files = sorted(file.name for file in (tmp_path / "a").iterdir())
+    assert {"map.svg", "map.pdf", "map-data.csv", "nyquist.png", "nyquist-count.json"} <= set(files)
+    for name in files:
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()

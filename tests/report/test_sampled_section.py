@@ -1,0 +1,217 @@
+"""The sampled loop on the page: drawn numbers are those of the rooms, verdicts say for how many modes, same bytes."""
+
+import itertools
+import math
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+import tfarm
+from tfarm.dsp import Chain, Gains, Simulator, analyse, sampled_loop, sampled_verdict, scenario, stable_windows
+from tfarm.dsp.chain import Sampling
+from tfarm.loop.stability import stability
+from tfarm.report.discrete_loci import loci, loci_table
+from tfarm.report.figures import save
+from tfarm.report.overlay import CUT, K2_RANGE, draw_overlay, overlay, overlay_table, pieces, with_damping
+from tfarm.report.sampled_section import Sampled, compared, cure, duration, interval, sampled_section, short_answer
+from tfarm.report.strip_chart import draw_strip_chart, strip_chart
+from tfarm.report.time_responses import slews
+
+LAB, PAPER = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
+GAINS = Gains(K1=0.3, K2=0.3)
+PLANE = cache(lambda: overlay(LAB, GAINS, Chain()))
+
+
+@pytest.fixture(scope="module")
+def section():
+    return sampled_section(LAB)
+
+
+def blocks_of(section):
+    return {block.stem: block for block in section.blocks}
+
+
+def values_of(table):
+    return {column.key: list(column.values) for column in table.columns}
+
+
+# ------------------------------------------------------------ the overlay
+
+
+def test_the_map_of_both_regions_is_what_poles_say():
+    data = PLANE()
+    random = np.random.default_rng(5)
+    loop = sampled_loop(LAB, GAINS, Chain(), count=16)
+    for i in random.integers(0, data.continuous.K1.size, 6):
+        K1 = float(data.continuous.K1[i])
+        for K2 in random.uniform(*K2_RANGE, 2):
+            inside = [any(a < K2 < b for a, b in layer.intervals[i]) for layer in (data.continuous, *data.sampled)]
+            law = tfarm.HubFeedback(K1=K1, K2=float(K2))
+            assert inside == [stability(LAB, law).is_stable, loop.with_gains(K1, float(K2)).poles.is_stable]
+
+
+def test_the_edges_at_the_default_gains_are_published_ones(section):
+    data = PLANE()
+    edges = [np.interp(math.log(0.3), np.log(data.continuous.K1), [c[0][1] for c in data.continuous.intervals])]
+    sampled = data.sampled[0]
+    stable = slice(0, int(np.searchsorted(sampled.K1, 5.0)))
+    for side in (0, 1):
+        ends = [column[0][side] for column in sampled.intervals[stable]]
+        edges.append(np.interp(0.3, sampled.K1[stable], ends))
+    assert edges == pytest.approx([1.0305, -0.1526, 1.1639], abs=2e-3)  # linear between columns 12 % apart
+    assert "below 1.0305" in " ".join(section.words)
+    assert "from −0.1526 to 1.1639" in " ".join(section.words)
+
+
+def test_without_damping_the_layers_are_nested_at_the_gains_and_say_for_how_many_modes(monkeypatch):
+    monkeypatch.setattr("tfarm.report.overlay.COLUMNS", 16)
+    data = overlay(PAPER, GAINS, Chain())
+    assert [layer.damping for layer in data.sampled] == [1e-4, 1e-6, 0.0]
+    assert data.sampled[-1].modes == 20
+    assert all(column == [(CUT[0], 1.0)] for column in data.continuous.intervals)
+    i = int(np.searchsorted(data.continuous.K1, 0.3))
+    widths = [sum(b - a for a, b in layer.intervals[i]) for layer in data.sampled]
+    assert widths[0] > widths[1] > 1.1
+    assert widths[2] < 0.05  # C = 0: a sliver
+
+
+def test_a_region_is_cut_into_pieces_that_cover_it_exactly():
+    K1 = np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
+    intervals = [[(0.0, 4.0)], [(0.0, 4.0)], [(0.0, 1.0), (3.0, 4.0)], [(0.0, 4.0)], [(0.0, 4.0)], []]
+    found = pieces(K1, intervals)
+    area = 0.0
+    for piece in found:
+        for (x0, a0, b0), (x1, a1, b1) in itertools.pairwise(piece.points):
+            area += (x1 - x0) * ((b0 - a0) + (b1 - a1)) / 2
+    assert area == pytest.approx(4.0 + 2.0 + 2.0 + 4.0)  # whole, split in two, joined again
+    assert [piece.begins for piece in found].count(True) == 1
+    assert [piece.ends for piece in found].count(True) == 1
+
+
+# ------------------------------------------------------------ words and tables
+
+
+def test_facts_words_and_tables_are_the_analysis(section):
+    analysis = analyse(LAB, GAINS)
+    facts = {fact.label: (fact.value, fact.beside) for fact in section.facts}
+    assert facts["does a 10 ms loop hold?"] == ("yes", "stable, all modes")
+    assert facts["stable K2"][0] == "−0.153 … 1.164"
+    assert facts["further delay it bears"] == ("12.8", "1.28 samples")
+    table = values_of(blocks_of(section)["sampled-modes"])
+    assert table["log_radius"] == analysis.modes.log_radius.tolist()
+    assert table["by_K1"] == analysis.modes.by_rate.tolist()
+    assert table["mode"] == analysis.modes.index.tolist()
+    assert all(
+        "accelerates the hub" in block.caption for stem, block in blocks_of(section).items() if "strip" not in stem
+    )
+
+
+def test_the_table_of_periods_is_each_period_by_itself(section):
+    table = values_of(blocks_of(section)["sampled-periods"])
+    assert table["period_ms"] == [1.0, 5.0, 10.0, 20.0, 50.0]
+    verdict = sampled_verdict(LAB, GAINS, Chain(sampling=Sampling(period=0.05)))
+    assert table["growth_1_s"][-1] == verdict.loop.poles.log_spectral_radius / 0.05
+    assert table["stable_K2"][-1] in stable_windows(verdict.loop, "K2")
+
+
+def test_at_zero_damping_the_verdict_names_its_modes_its_growth_and_the_cure():
+    data = Sampled(PAPER, analyse(PAPER, GAINS), (-math.inf, 1.0), PLANE(), ())
+    words = " ".join((short_answer(data), compared(data), cure(data)))
+    assert "Not strictly" in words
+    assert "as far as its first 20 modes go" in words
+    assert "Mode 13 grows by 8.62 × 10⁻⁹ a sample: it doubles in 9.3 days" in words  # ln 2/8.62e-9 * 10 ms
+    assert "C = 1.0 × 10⁻¹⁴ s" in words
+    healed = replace(PAPER, link=replace(PAPER.link, damping=1.01e-14))
+    assert sampled_loop(healed, GAINS, Chain(), count=20).poles.is_stable
+
+
+@pytest.mark.parametrize(("seconds", "text"), [(0.5, "0.50 s"), (7200.0, "2.0 hours"), (8.64e5, "10 days")])
+def test_times_are_said_in_the_unit_that_a_person_would_use(seconds, text):
+    assert duration(seconds) == text
+
+
+@pytest.mark.parametrize(
+    ("window", "text"),
+    [
+        (None, "for no K2 around this one"),
+        ((-math.inf, 1.0), "below 1.0000"),
+        ((-50.0, 1.0305), "below 1.0305 (looked at down to −50)"),
+        ((-0.1526, 1.1639), "from −0.1526 to 1.1639"),
+    ],
+)
+def test_an_end_of_the_search_is_not_sold_as_a_proof(window, text):
+    assert interval(window) == text
+
+
+# ------------------------------------------------------------ loci and time
+
+
+def test_loci_are_the_poles_at_their_gains_and_aliased_modes_are_told_apart():
+    loop = sampled_verdict(LAB, GAINS).loop
+    data = loci(loop, 20.0, (-0.5, 1.5))
+    for locus, i in itertools.product((data.by_K1, data.by_K2), (0, 45, 90)):
+        value = float(locus.values[i])
+        gains = (value, 0.3) if locus.gain == "K1" else (0.3, value)
+        assert np.sort_complex(locus.z[i]) == pytest.approx(np.sort_complex(loop.with_gains(*gains).poles.z), abs=1e-12)
+    assert [data.is_aliased(mode) for mode in (1, 2, 3, 4)] == [False, False, True, True]
+
+
+def test_the_slew_is_the_simulators_own(section):
+    simulator = Simulator(LAB, Chain(), scenario("slew", LAB, Chain(), 3.0), count=14)
+    drawn = values_of(blocks_of(section)["sampled-slew"].data)
+    for key, K2 in (("without", 0.0), ("with", 0.3)):
+        expected = simulator.linear(Gains(K1=0.3, K2=K2))
+        for name, signal in (("torque", expected.torque), ("root_moment", expected.at_samples.root_moment)):
+            assert abs(np.array(drawn[f"{name}_{key}_N_m"]) - signal).max() < 1e-12 * abs(signal).max()
+
+
+def test_the_strip_chart_has_steps_delay_and_saturation():
+    ideal = slews(LAB, GAINS, Chain(), 14)
+    chart = strip_chart(LAB, GAINS, ideal.with_moment, 14)
+    assert np.allclose(chart.read / chart.step, np.round(chart.read / chart.step), rtol=0, atol=1e-9)
+    assert abs(chart.read - chart.simulation.at_samples.root_moment).max() <= chart.step / 2 * (1 + 1e-9)
+    assert chart.saturated.sum() == chart.simulation.saturated["torque"] > 0
+    assert np.array_equal(chart.simulation.torque, np.clip(chart.asked, -chart.limit, chart.limit))
+    assert chart.simulation.chain.sampling.delay_samples == 1.0
+
+
+# ------------------------------------------------------------ bytes and odd arms
+
+
+def test_the_same_bytes_twice(tmp_path):
+    loop = sampled_verdict(LAB, GAINS).loop
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        data, found = overlay(LAB, GAINS, Chain()), loci(loop, 20.0, (-0.5, 1.5))
+        ideal = slews(LAB, GAINS, Chain(), 14)
+        figures = (draw_overlay(data), draw_strip_chart(strip_chart(LAB, GAINS, ideal.without, 14)))
+        for i, figure in enumerate(figures):
+            save(figure, tmp_path / name, str(i), formats=("svg",))
+        table = overlay_table(data, "t").as_csv() + loci_table(found, "t").as_json()
+        (tmp_path / name / "t").write_text(table, encoding="utf-8")
+    files = sorted(path.name for path in (tmp_path / "a").iterdir())
+    assert files == ["0.svg", "1.svg", "t"]
+    assert all((tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes() for name in files)
+
+
+@pytest.mark.parametrize("inertia", [math.inf, 0.0])
+def test_an_arm_without_a_loop_gets_one_sentence(inertia):
+    section = sampled_section(replace(LAB, hub=tfarm.Hub(inertia=inertia)))
+    assert len(section.words) == 1
+    assert not section.blocks
+    assert not section.facts
+
+
+def test_a_held_tip_has_a_map_but_no_slew(monkeypatch):
+    monkeypatch.setattr("tfarm.report.overlay.COLUMNS", 8)
+    monkeypatch.setattr("tfarm.report.sampled_section.PERIODS", (0.01,))
+    section = sampled_section(replace(LAB, payload=tfarm.Payload(mass=math.inf)))
+    assert "no slew" in section.words[-1]
+    assert "sampled-overlay" in blocks_of(section)
+    assert "sampled-slew" not in blocks_of(section)
+
+
+def test_with_damping_changes_nothing_else():
+    assert with_damping(PAPER, 1e-4).link == LAB.link

@@ -1,0 +1,135 @@
+"""The tuner on the page: costs are those of the tuner's room, the guard is on the map, other arms get one sentence."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tfarm
+from tfarm.report import tuner_study as study_module
+from tfarm.report.figures import save
+from tfarm.report.tuner_pictures import draw_cost_map, draw_curves
+from tfarm.report.tuner_section import section_of, tuner_section
+from tfarm.report.tuner_study import NOMINAL, CostMap, tuner_study
+from tfarm.tuner import Learning, Plan, conditions, initial_network, train, tune
+
+LAB = tfarm.load("sasaki2012-lab")
+SEEDS = 3
+
+
+@pytest.fixture(scope="module")
+def small():
+    """The section and its numbers with few seeds, few trials and the first four conditions."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(study_module, "SEEDS", SEEDS)
+        patch.setattr(study_module, "MAP_SEEDS", 1)
+        patch.setattr(study_module, "MAP_TRIALS", 3)
+        patch.setattr(study_module, "conditions", lambda arm, chain: conditions(arm, chain)[:4])
+        data = tuner_study(LAB)
+        yield data, section_of(data)
+
+
+def blocks_of(section):
+    return {block.stem: block for block in section.blocks}
+
+
+def values_of(table):
+    return {column.key: list(column.values) for column in table.columns}
+
+
+def test_what_is_drawn_is_the_tuning(small):
+    blocks, tuning = blocks_of(small[1]), tune(LAB)
+    drawn = values_of(blocks["tune-gain"].data)
+    assert drawn["K"] == tuning.training.result.K.tolist()
+    assert drawn["x_N_m"] == tuning.training.result.x.tolist()
+    guard = tuning.training.guard
+    assert f"[{guard.lo:.4g}, {guard.hi:.4g}]" in blocks["tune-gain"].caption
+    bars = [line for line in blocks["tune-gain"].figure.axes[0].lines if line.get_linewidth() == 9]
+    assert [tuple(bar.get_ydata()) for bar in bars] == [(guard.lo, guard.hi)]
+    assert [tuple(bar.get_xdata()) for bar in bars] == [(0.3, 0.3)]
+
+
+def test_the_simulated_slew_costs_what_the_trial_says(small):
+    """Two roads: the simulator with the network as a gain schedule, and the trial that the tuner learns from."""
+    data = small[0]
+    simulation, result = data.slews["with the tuner"], data.tuning.training.result
+    x = simulation.at_samples.root_moment - simulation.scenario.rigid_moment
+    scale = abs(result.x).max()
+    assert abs(x - result.x).max() < 1e-9 * scale
+    assert abs(simulation.gain - result.K).max() < 1e-9
+
+
+def test_curves_are_trainings_of_their_seeds(small):
+    data = small[0]
+    tuning = data.tuning
+    drawn = values_of(blocks_of(small[1])["tune-curves"].data)
+    seed = 2
+    trained = train(tuning.trial, initial_network(seed), tuning.training.guard, Learning(), Plan().trials)
+    assert drawn[f"default_seed_{seed}"] == trained.costs.tolist()
+    rows = np.sort([drawn[f"plain_seed_{i}"] for i in range(SEEDS)], axis=0)
+    assert drawn["plain_median"] == rows[1].tolist()
+    assert len(drawn["trial"]) == Plan().trials
+
+
+def test_the_table_of_comparison_is_the_rows(small):
+    data, section = small
+    shown = values_of(blocks_of(section)["tune-comparison"])
+    assert shown["condition"] == [row.condition for row in data.rows]
+    assert shown["condition"][0] == NOMINAL
+    for key in ("without", "best_constant", "own_constant", "tuner", "bound", "ZV", "EI"):
+        assert shown[f"{key}_cost"] == [getattr(row, key).cost for row in data.rows]
+        assert shown[f"{key}_residual"] == [getattr(row, key).residual for row in data.rows]
+    assert shown["bound_cost"][0] < shown["tuner_cost"][0] < shown["best_constant_cost"][0] < shown["without_cost"][0]
+
+
+def test_the_words_begin_with_the_answer_and_carry_the_numbers(small):
+    data, section = small
+    words = section.words
+    assert words[0].startswith("A little. A constant K2 of 0.336 already takes 65 % off")
+    assert "Nothing is below" not in words[0]
+    below = int((data.curves[0].final < data.tuning.best_constant.cost).sum())
+    assert f"{below} of {SEEDS} seeds end below the best constant gain" in words[0]
+    assert "0.256" in words[2]
+    facts = {fact.label: fact.value for fact in section.facts}
+    assert facts["cost without moment feedback"] == "2.692"
+    assert facts["best constant gain"] == "0.9531"
+    assert all(block.alt for stem, block in blocks_of(section).items() if stem != "tune-comparison")
+    assert sum("accelerates the hub" in block.caption for block in section.blocks) == 4
+
+
+def test_the_papers_pair_is_judged_by_the_map(small):
+    found = small[0].cost_map
+    assert found.median.shape == (6, 7)
+    assert (found.alphas[found.papers[0]], found.etas[found.papers[1]]) == (0.6, 0.8)
+    lower = (found.median < found.median[found.papers]).sum()
+    assert found.is_papers_best == (lower == 0)
+    assert f"rank {lower + 1} of 42" in found.verdict or lower == 0
+    at_edge = CostMap(found.alphas, found.etas, np.where(np.indices((6, 7))[1] == 6, 0.0, 1.0), "")
+    assert at_edge.best_at_edge
+    assert not replace(at_edge, median=np.where(np.indices((6, 7)).sum(axis=0) == 3, 0.0, 1.0)).best_at_edge
+
+
+def test_the_same_bytes_twice(small, tmp_path):
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        for i, draw in enumerate((draw_curves, draw_cost_map)):
+            save(draw(small[0]), tmp_path / name, str(i), formats=("svg", "png"))
+    for file in ("0.svg", "0.png", "1.svg", "1.png"):
+        assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("arm", "word"),
+    [
+        (replace(LAB, hub=tfarm.Hub(inertia=math.inf)), "locked"),
+        (replace(LAB, hub=tfarm.Hub(inertia=0.0)), "no inertia"),
+        (replace(LAB, payload=tfarm.Payload(mass=math.inf)), "held"),
+        (tfarm.load("sasaki2012"), "no damping"),
+    ],
+)
+def test_other_arms_are_told_why_there_is_no_tuner(arm, word):
+    section = tuner_section(arm)
+    assert len(section.words) == 1
+    assert word in section.words[0]
+    assert not section.blocks

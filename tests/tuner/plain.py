@@ -1,0 +1,71 @@
+"""The trial again, in plain NumPy and from nothing but the modal model: matrix exponential, slew, loop, network.
+
+Every formula is analytic, so that weights may be complex: the derivative by complex step is right to the last digits.
+"""
+
+import numpy as np
+from scipy.linalg import expm
+
+from tfarm.reduced import modal_model
+
+RISE, TRAVEL = 1.0, 1.15
+
+
+class PlainTrial:
+    """3 s of the slew with `count` modes at T = 10 ms."""
+
+    def __init__(self, arm, count=6, K1=0.3, a=1.0, b=2.6, signals="vibration", T=0.01, n=301):
+        self.K1, self.a, self.b, self.T, self.n, self.total = K1, a, b, T, n, signals == "total"
+        model = modal_model(arm, ["hub_rate", "root_moment"], count)
+        A, B, C, D = model.matrices()
+        size = len(A)
+        block = expm(np.block([[A, B], [np.zeros((1, size + 1))]]) * T)
+        self.A, self.B, self.C, self.D = block[:size, :size], block[:size, size], C, D[:, 0]
+        half, whole = round(RISE / 2 / T), round(RISE / T)
+        acceleration = np.zeros(n)
+        acceleration[:half], acceleration[half:whole] = 1.0, -1.0
+        acceleration *= 4 * TRAVEL / arm.link.length / RISE**2
+        self.rate = np.r_[0.0, np.cumsum(acceleration)[:-1]] * T
+        self.torque = arm.total_inertia * acceleration
+        inertia = arm.total_inertia - arm.hub.inertia
+        self.rigid = np.zeros(n) if self.total else -inertia * np.r_[0.0, acceleration[:-1]]
+
+    def run(self, gain):
+        """Signals x, u, e, K (n, 4) with K = gain(row of seven inputs), and the cost."""
+        state = np.zeros(len(self.A), complex)
+        before, signals = 0.0, np.zeros((self.n + 2, 4), complex)  # two empty samples first
+        for k in range(self.n):
+            rate, moment = self.C @ state + self.D * before
+            x = moment - self.rigid[k]
+            u = self.K1 * (self.rate[k] - rate) + (self.torque[k] if self.total else 0.0)
+            (_, _, e2, _), (x1, u1, e1, K1) = signals[k], signals[k + 1]
+            K = gain(np.array([u, u1, e1, e2, x, x1, K1]))
+            signals[k + 2] = x, u, u - K * x, K
+            before = signals[k + 2, 2] + (0.0 if self.total else self.torque[k])
+            state = self.A @ state + self.B * before
+        signals = signals[2:]
+        cost = self.T * np.sum(self.a * signals[:, 0] ** 2 + self.b * signals[:, 2] ** 2) / 2
+        return signals, cost
+
+    def cost(self, weights, hidden, scales, guard):
+        """The cost with a network, its weights in the order of `Network.weights`."""
+        return self.run(lambda row: plain_gain(row, weights, hidden, scales, guard))[1]
+
+
+def plain_gain(row, weights, hidden, scales, guard):
+    """The paper's network: K = ln(1 + e^z), or bent into the guard by 1 - e^-K."""
+    m = len(scales)
+    W1, w2 = weights[: hidden * m].reshape(hidden, m), weights[hidden * m :]
+    z = w2 @ (1 / (1 + np.exp(-W1 @ (row[:m] / scales))))
+    kappa = np.log(1 + np.exp(z))
+    return kappa if guard[0] == 0 else guard[1] + (guard[2] - guard[1]) * (1 - np.exp(-kappa))
+
+
+def complex_step(f, weights, step=1e-30):
+    """df/dw of an analytic real function: the imaginary part at w + i h, no difference taken."""
+    gradient = np.zeros(weights.size)
+    for i in range(weights.size):
+        shifted = weights.astype(complex)
+        shifted[i] += 1j * step
+        gradient[i] = f(shifted).imag / step
+    return gradient

@@ -1,0 +1,156 @@
+"""tfarm tune, tfarm study and tfarm simulate --controller as a shell sees them."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tfarm
+from tfarm.cli import main
+from tfarm.tuner import Plan, compare, shaped_trial, slew_trial, tune
+from tfarm.tuner.comparison import conditions
+
+
+def run(capsys, *arguments):
+    with pytest.raises(SystemExit) as stop:
+        main(list(arguments))
+    out, err = capsys.readouterr()
+    return int(stop.value.code or 0), out, err
+
+
+def answer(capsys, *arguments):
+    code, out, err = run(capsys, *arguments, "--json")
+    assert (code, err) == (0, "")
+    return json.loads(out, parse_constant=lambda name: pytest.fail(f"{name} in JSON"))
+
+
+def test_tune_lab(capsys, tmp_path):
+    """The figures of theory and prototypes, then the saved tuner in the simulator."""
+    file = tmp_path / "tuner.json"
+    result = answer(capsys, "tune", "sasaki2012-lab", "--trials", "60", "--save", str(file))
+    assert result["cost_without"] == pytest.approx(2.69, abs=0.005)
+    assert result["cost_best_constant"] == pytest.approx(0.953, abs=5e-4)
+    assert result["best_constant_gain"] == pytest.approx(0.34, abs=0.005)
+    assert result["cost_lq_bound"] == pytest.approx(0.256, abs=5e-4)
+    assert result["cost_shaped"] == min(each["cost"] for each in result["shaped"].values()) < 0.03
+    assert len(result["cost"]) == result["trials"] == 60
+    assert result["cost_lq_bound"] < result["cost_tuned"] < result["cost_best_constant"]
+    assert result["residual_moment_rms"] < 0.4 * result["residual_without"]
+    low, high = result["guard"]
+    assert low <= min(result["gain"]["K"]) <= max(result["gain"]["K"]) <= high
+    assert (result["guard_kind"], result["guard_proven"]) == ("time-varying", True)
+    assert np.array(result["weights"]["W1"]).shape == (6, 6)
+    simulated = answer(capsys, "simulate", "sasaki2012-lab", "--controller", str(file), "--modes", "6")
+    np.testing.assert_allclose(simulated["gain"], result["gain"]["K"], atol=1e-11)
+    assert simulated["controller"]["trained_on"] == "sasaki2012-lab"
+
+
+def test_without_a_guard_the_upper_end_is_inf_and_a_divergence_is_told(capsys):
+    code, out, err = run(
+        capsys, "tune", "sasaki2012-lab", "--guard", "none", "--rule", "plain", "--seed", "3", "--json"
+    )
+    result = json.loads(out)
+    assert code == 0
+    assert result["guard"] == [0.0, "inf"]
+    assert result["guard_proven"] is False
+    assert result["cost"][-1] == "inf"
+    assert (
+        f"diverged in trial {len(result['cost'])} at sample" in err == f"tfarm: {result['stopped']}; the tuner is "
+        "that of the trial before\n"
+    )
+
+
+def test_tables_for_people(capsys):
+    _, out, _ = run(capsys, "tune", "sasaki2012-lab", "--trials", "2", "--mode", "online", "--seventh-input")
+    assert "linear-quadratic bound of the unshaped slew" in out
+    assert "proven for any K(t)" in out
+    _, out, _ = run(capsys, "study", "sasaki2012-lab", "inputs", "--seeds", "2", "--trials", "2", "--guard", "none")
+    assert "below best constant" in out
+
+
+def test_study_answer(capsys, tmp_path):
+    keep = str(tmp_path / "study.jsonl")
+    arguments = (
+        "study",
+        "sasaki2012-lab",
+        "curves",
+        "--seeds",
+        "3",
+        "--trials",
+        "4",
+        "--guard",
+        "none",
+        "--keep",
+        keep,
+    )
+    code, out, _ = run(capsys, *arguments, "--json")
+    assert code == 0
+    result = json.loads(out)
+    assert len(result["median"]) == 4
+    assert result["groups"][0]["cost_median"] == pytest.approx(result["groups"][0]["cost_quartiles"][0], rel=0.5)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "word"),
+    [
+        (("--eta", "-0.8"), 2, "eta"),
+        (("--alpha", "1"), 2, "alpha"),
+        (("--trials", "0"), 2, "trials"),
+        (("--trials", "2.5"), 2, "trials"),
+        (("--mode", "batch"), 2, "mode"),
+        (("--guard", "wide"), 2, "guard"),
+        (("--signals", "both"), 2, "signals"),
+        (("--rule", "adam"), 2, "rule"),
+        (("--a", "-1"), 2, "a = -1"),
+        (("--K1", "nan"), 2, "K1"),
+        (("--duration", "0"), 2, "duration"),
+        (("--hidden", "0"), 2, "hidden"),
+        (("--seed", "-1"), 2, "seed"),
+        (("--save", "/no/such/folder/tuner.json", "--trials", "1", "--guard", "none"), 2, "save"),
+    ],
+)
+def test_bad_input_is_one_line(capsys, arguments, code, word):
+    got, out, err = run(capsys, "tune", "sasaki2012-lab", *arguments)
+    assert (got, out) == (code, "")
+    assert err.count("\n") == 1
+    assert word in err
+
+
+def test_an_empty_guard_is_exit_3(capsys):
+    code, out, err = run(capsys, "tune", "sasaki2012")
+    assert (code, out, err.count("\n")) == (3, "", 1)
+    assert "with a damping of C =" in err
+
+
+def test_a_bad_controller_is_one_line(capsys, tmp_path):
+    file = tmp_path / "tuner.json"
+    file.write_text('{"format": "tfarm tuner 1", "w2": [NaN]}')
+    code, _, err = run(capsys, "simulate", "sasaki2012-lab", "--controller", str(file))
+    assert (code, err.count("\n")) == (2, 1)
+    assert str(file) in err
+
+
+def test_the_comparison_is_of_one_run():
+    """On the arm as trained it repeats what the tuning says, by the simulator; the bound bounds every unshaped row."""
+    lab = tfarm.load("sasaki2012-lab")
+    tuning = tune(lab, Plan(trials=40, guard="frozen"))
+    listed = [each for each in conditions(lab, tuning.trial.loop.chain) if "C =" not in each.name]
+    assert len(listed) == 9
+    rows = compare(tuning.trial, tuning.gain(), tuning.training.guard, listed[:1] + listed[3:5])
+    first = rows[0]
+    assert first.without.cost == pytest.approx(tuning.without.cost, rel=1e-10)
+    assert first.best_constant.cost == pytest.approx(tuning.best_constant.cost, rel=1e-10)
+    assert first.tuner.cost == pytest.approx(tuning.training.result.cost, rel=1e-10)
+    assert first.bound.cost == pytest.approx(tuning.bound.cost, rel=1e-10)
+    for kind in ("ZV", "EI"):
+        assert getattr(first, kind).cost == pytest.approx(tuning.shaped[kind][1].cost, rel=1e-10)
+    loaded = slew_trial(listed[4].arm, known=lab)
+    assert listed[4].name == "payload 0.1 kg"
+    shaped_slew = replace(loaded, task=shaped_trial(tuning.trial, "ZV").task)  # by the poles of the arm it was made for
+    assert rows[2].ZV.cost == pytest.approx(shaped_slew.with_constant(0.0).cost, rel=1e-10)
+    assert rows[2].without.cost == pytest.approx(loaded.with_constant(0.0).cost, rel=1e-10)
+    for row in rows:
+        for each in (row.without, row.best_constant, row.own_constant, row.tuner):
+            assert each.cost > row.bound.cost
+        assert row.own_constant.cost <= row.best_constant.cost * (1 + 1e-9) or "quantised" in row.condition

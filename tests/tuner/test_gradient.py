@@ -1,0 +1,95 @@
+"""Gradients of a trial and of a sample against complex steps, and reverse against forward accumulation."""
+
+import numpy as np
+import pytest
+
+import tfarm
+from tests.tuner.plain import PlainTrial, complex_step, plain_gain
+from tfarm.dsp import Chain, Converters, Sampling
+from tfarm.tuner import initial_network, kernel, slew_trial
+
+NONE, SECTOR = np.zeros(3), np.array([1.0, 0.3, 0.64])
+
+
+@pytest.fixture(scope="module")
+def lab():
+    return tfarm.load("sasaki2012-lab")
+
+
+def some_network(seed, inputs=6, hidden=6):
+    return initial_network(seed, hidden=hidden, scales=np.linspace(0.6, 1.7, inputs))
+
+
+@pytest.mark.parametrize("signals", ["vibration", "total"])
+@pytest.mark.parametrize("guard", [NONE, SECTOR])
+@pytest.mark.parametrize("inputs", [6, 7])
+def test_the_gradient_of_a_trial_is_that_of_complex_steps(lab, signals, guard, inputs):
+    network = some_network(inputs, inputs)
+    cost, gradient = slew_trial(lab, signals=signals).gradient(network, guard)
+    plain = PlainTrial(lab, signals=signals)
+    expected = complex_step(lambda w: plain.cost(w, 6, network.scales, guard), network.weights)
+    assert cost == pytest.approx(plain.cost(network.weights, 6, network.scales, guard).real, rel=1e-11)
+    np.testing.assert_allclose(gradient, expected, atol=1e-9 * abs(expected).max())
+
+
+@pytest.mark.parametrize(
+    "chain",
+    [
+        Chain(sampling=Sampling(delay_samples=1.4)),
+        Chain(sampling=Sampling(antialias_corner=300.0)),
+        Chain(converters=Converters(hub_rate="difference", rate_filter=80.0)),
+    ],
+)
+@pytest.mark.parametrize(("inputs", "hidden"), [(6, 6), (7, 3)])
+def test_reverse_and_forward_accumulation_agree(lab, chain, inputs, hidden):
+    """With learning rates of zero the online gradients with whole sensitivities add up to that of the trial."""
+    trial, network = slew_trial(lab, chain), some_network(1, inputs, hidden)
+    cost, gradient = trial.gradient(network, SECTOR)
+    total, costs = np.zeros(gradient.size), np.zeros(1)
+    kernel.learn_by_sensitivities(
+        trial.model, trial.reference, trial.numbers, network.scales, SECTOR, network.weights, np.zeros(gradient.size),
+        0.0, np.inf, 0.0, costs, trial.run(inputs, hidden), trial.work(inputs), total,
+    )  # fmt: skip
+    assert costs[0] == cost
+    np.testing.assert_allclose(total, gradient, atol=1e-12 * abs(gradient).max())
+
+
+def test_the_gradient_falls_to_zero_where_it_should(lab):
+    """Down the gradient the cost falls by its square, to second order: the order of convergence."""
+    trial, network = slew_trial(lab), some_network(4)
+    cost, gradient = trial.gradient(network, NONE)
+    left = []
+    for step in (1e-2, 5e-3, 2.5e-3):
+        lower = trial.with_network(network.with_weights(network.weights - step * gradient), NONE).cost
+        left.append(abs(lower - cost + step * gradient @ gradient))
+    assert np.log2(left[0] / left[1]) == pytest.approx(2, abs=0.1)
+    assert np.log2(left[1] / left[2]) == pytest.approx(2, abs=0.1)
+
+
+@pytest.mark.parametrize("guard", [NONE, SECTOR])
+@pytest.mark.parametrize("k", [5, 47, 160])
+def test_the_gradient_of_a_sample_is_that_of_complex_steps(lab, guard, k):
+    """E = a x(k+1)^2/2 + b e(k)^2/2 by the gain at k: x(k+1) answers to the torque with the plant's first sample."""
+    trial, network = slew_trial(lab), some_network(2)
+    gradient = trial.sample_gradient(network, guard, k)
+    plain = PlainTrial(lab)
+    signals, _ = plain.run(lambda row: plain_gain(row, network.weights, 6, network.scales, guard))
+    x, u, e, _ = signals.real.T
+    row = np.array([u[k], u[k - 1], e[k - 1], e[k - 2], x[k], x[k - 1]])
+    reply = plain.C[1] @ plain.B + plain.D[1]
+
+    def error(weights):
+        e_k = u[k] - plain_gain(row, weights, 6, network.scales, guard) * x[k]
+        return ((x[k + 1] + reply * (e_k - e[k])) ** 2 + 2.6 * e_k**2) / 2
+
+    expected = complex_step(error, network.weights)
+    np.testing.assert_allclose(gradient, expected, atol=1e-9 * abs(expected).max())
+
+
+def test_the_gradient_of_the_gain_is_that_of_complex_steps():
+    network, row = some_network(8, 7, 4), np.linspace(-2, 3, 7)
+    for guard in (NONE, SECTOR):
+        K, gradient = network.gain_and_gradient(row, guard)
+        expected = complex_step(lambda w, g=guard: plain_gain(row, w, 4, network.scales, g), network.weights)
+        np.testing.assert_allclose(K, plain_gain(row, network.weights, 4, network.scales, guard), rtol=1e-14)
+        np.testing.assert_allclose(gradient, expected, rtol=1e-13, atol=1e-16)

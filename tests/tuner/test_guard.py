@@ -1,0 +1,210 @@
+"""The guard: sectors against the circle criterion by transfer functions, switching, exact proofs, empty guards."""
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+from scipy.linalg import solve_discrete_lyapunov
+
+import tfarm
+from tests.dsp.roads import aliased_loop
+from tfarm.dsp import Chain, Gains, Sampling, sampled_loop
+from tfarm.errors import CertificationError, ParameterError
+from tfarm.tuner import find_guard, slew_trial
+from tfarm.tuner.lyapunov import is_positive_definite, whole
+from tfarm.tuner.sector import SHARE, MovingGain
+
+FINE = np.r_[np.geomspace(1e-6, 1e-2, 500), np.linspace(1e-2, np.pi, 100_001)]
+
+
+@pytest.fixture(scope="module")
+def lab():
+    return tfarm.load("sasaki2012-lab")
+
+
+def moving(arm, count=6, delay=0.0):
+    chain = Chain(sampling=Sampling(delay_samples=delay))
+    return MovingGain(sampled_loop(arm, Gains(K1=0.3, K2=1.0), chain, count=count))
+
+
+@pytest.fixture(scope="module")
+def loop(lab):
+    return moving(lab)
+
+
+@pytest.mark.parametrize(("lo", "hi"), [(0.1, 0.326), (0.2, 0.49), (0.3, 0.642)])
+def test_sectors_of_a_prototype(loop, lo, hi):
+    m = (lo + hi) / 2
+    radius = loop.radius(m)
+    assert m - radius == pytest.approx(lo, abs=1.5e-3)
+    assert m + radius == pytest.approx(hi, abs=1.5e-3)
+
+
+@pytest.mark.parametrize("m", [0.05, 0.2, 0.47, 0.9])
+@pytest.mark.parametrize("delay", [0.0, 0.6])
+def test_the_radius_is_where_the_criterion_first_fails(lab, m, delay):
+    """The state-space peak against 1 + (lo + hi) Re H + lo hi |H|^2 by pulse transfer functions."""
+    loop = moving(lab, delay=delay)
+    radius = loop.radius(m)
+    assert loop.criterion(m - 0.998 * radius, m + 0.998 * radius, FINE).min() > 0
+    assert loop.criterion(m - 1.002 * radius, m + 1.002 * radius, FINE).min() < 0
+
+
+@pytest.mark.parametrize("m", [0.2, 0.47])
+def test_what_the_criterion_allows_is_proven_and_nothing_beyond(loop, m):
+    radius = loop.radius(m)
+    proof = loop.proof(m - SHARE * radius, m + SHARE * radius)
+    assert proof is not None
+    assert proof.contraction < 1
+    assert loop.proof(m - 1.01 * radius, m + 1.01 * radius) is None
+
+
+def test_the_lyapunov_function_falls_for_every_sequence(loop):
+    lo, hi = 0.31, 0.63
+    proof = loop.proof(lo, hi)
+    rng, state = np.random.default_rng(1), np.random.default_rng(2).normal(size=loop.drive.size)
+    size = [np.linalg.norm(proof.root.T @ state)]
+    for K in rng.choice([lo, hi, 0.4, 0.5], size=500):
+        state = loop.at(K) @ state
+        size.append(np.linalg.norm(proof.root.T @ state))
+    assert np.all(np.diff(np.log(size)) <= np.log(proof.contraction) + 1e-12)
+
+
+def growth(loop, *gains):
+    """A sample, of a periodic sequence of gains: spectral radius of the product of its matrices."""
+    product_ = np.eye(loop.drive.size)
+    for K in gains:
+        product_ = loop.at(K) @ product_
+    return abs(np.linalg.eigvals(product_)).max() ** (1 / len(gains))
+
+
+def test_switching_between_stable_gains_can_destabilise(loop):
+    """0.1 and 0.6 each for 3 and 2 samples, and 0 and 1.1: each stable when frozen, unstable when switched."""
+    for K in (0.0, 0.1, 0.6, 1.1):
+        assert growth(loop, K) < 1
+    assert growth(loop, 0.1, 0.1, 0.1, 0.6, 0.6) == pytest.approx(1.0023, abs=1e-4)
+    patterns = [p for n in range(2, 8) for p in product((0.0, 1.1), repeat=n)]
+    assert max(growth(loop, *p) for p in patterns) > 1.06
+
+
+def test_no_switching_inside_a_sector_destabilises(loop):
+    patterns = [p for n in range(2, 9) for p in product((0.3, 0.64), repeat=n)]
+    assert max(growth(loop, *p) for p in patterns) < 1
+
+
+def test_the_sector_no_longer_changes_with_the_modes(lab):
+    radii = [moving(lab, count).radius(0.471) for count in (2, 4, 6, 12, 24)]
+    changes = abs(np.diff(radii)) / radii[-1]
+    assert changes[0] > 1e-4
+    assert changes[-1] < 1e-6
+
+
+def test_the_exact_arm_obeys_the_criterion_too(lab, loop):
+    """All modes at once, by the aliasing sum over the exact transfer function: 1/|H_m| is never below the radius."""
+    m = 0.473
+    radius = loop.radius(m)
+    theta = np.r_[np.geomspace(0.01, 3.1, 25), 0.57987]
+    sizes = []
+    for z in np.exp(1j * theta):
+        rate, moment = aliased_loop(lab, z, 0.01, terms=3000)
+        H = moment / (1 + 0.3 * rate)
+        sizes.append(abs(H / (1 + m * H)))
+        assert 1 + 2 * m * H.real + (m**2 - (SHARE * radius) ** 2) * abs(H) ** 2 > 0
+    z = np.exp(1j * theta)
+    _, rate, moment = loop.loop.signals(z, None, np.ones(z.size))
+    H = moment / (1 + 0.3 * rate)
+    np.testing.assert_allclose(sizes, abs(H / (1 + m * H)), rtol=2e-4)
+    assert max(sizes) == pytest.approx(1 / radius, rel=2e-4)
+
+
+# ---------------------------------------------------------------- exact proofs
+
+
+def test_positive_definite_in_whole_numbers():
+    rng = np.random.default_rng(0)
+    for n in range(1, 9):
+        M = rng.integers(-9, 10, (n, n))
+        S = (M @ M.T + np.eye(n, dtype=int)).tolist()
+        assert is_positive_definite(S)
+        S[n // 2][n // 2] -= int(S[n // 2][n // 2]) + 1
+        assert not is_positive_definite(S)
+
+
+def test_a_singular_matrix_is_not_positive_definite():
+    """A Hilbert-like matrix whose float64 eigenvalues cannot tell: exact elimination can."""
+    M = np.array([[1, 1, 2], [1, 2, 3], [2, 3, 5]])
+    assert not is_positive_definite(M.tolist())
+    big = (M * 10**12).tolist()
+    assert not is_positive_definite(big)
+    big[2][2] += 1
+    assert is_positive_definite(big)
+
+
+def test_doubles_are_whole_numbers_over_a_power_of_two():
+    A = np.random.default_rng(0).normal(size=(5, 5)) * 10.0 ** np.arange(-8, 2, 2)
+    N, shift = whole(A)
+    np.testing.assert_array_equal(np.array([[n / 2**shift for n in row] for row in N]), A)
+
+
+def test_a_planted_unstable_end_is_not_proven(loop):
+    """P of one stable matrix does not prove an unstable one."""
+    proof = loop.proof(0.31, 0.63)
+    assert not replace(proof, high=loop.at(1.3)).is_proven()
+    alone = solve_discrete_lyapunov(loop.at(0.31).T, np.eye(loop.drive.size))
+    assert replace(proof, high=loop.at(0.31), P=alone).is_proven()
+    assert not replace(proof, high=loop.at(0.31), P=-alone).is_proven()
+
+
+# ---------------------------------------------------------------- the guard that is chosen
+
+
+def test_the_default_sector(lab):
+    guard = find_guard(slew_trial(lab).loop, "time-varying", 0.336)
+    assert guard.is_proven
+    assert guard.is_settled
+    assert guard.modes_used == 24
+    assert (guard.lo, guard.hi) == (pytest.approx(0.3034, abs=1e-3), pytest.approx(0.6427, abs=1e-3))
+    margin = 0.336 - guard.lo
+    assert 0.08 < margin / (guard.hi - guard.lo) < 0.12
+    for proof in guard.proofs:
+        assert proof.is_proven()
+    assert "proven for any K(t)" in guard.sentence
+
+
+def test_a_best_gain_of_nothing_gets_a_sector_from_zero(lab):
+    guard = find_guard(slew_trial(lab).loop, "time-varying", 0.0)
+    assert guard.lo == 0.0
+    assert 0.05 < guard.hi < 0.2
+
+
+def test_the_frozen_guard_is_stable_inside_and_not_beyond(lab):
+    loop = slew_trial(lab).loop
+    guard = find_guard(loop, "frozen", 0.336)
+    assert not guard.is_proven
+    assert "not proven for one that moves" in guard.sentence
+    for K in np.linspace(guard.lo, guard.hi, 25):
+        assert loop.with_gains(0.3, float(K)).poles.is_stable
+    assert not loop.with_gains(0.3, guard.hi * 1.02).poles.is_stable
+
+
+def test_no_guard(lab):
+    guard = find_guard(slew_trial(lab).loop, "none", 0.3)
+    assert not guard.is_proven
+    assert guard.hi == np.inf
+    assert not guard.array.any()
+
+
+def test_an_empty_guard_names_the_damping_that_would_have_one():
+    with pytest.raises(CertificationError, match=r"with a damping of C = .* s there is one"):
+        find_guard(slew_trial(tfarm.load("sasaki2012")).loop, "time-varying", 0.3)
+
+
+def test_a_loop_that_no_damping_saves(lab):
+    with pytest.raises(CertificationError, match="nor with any damping"):
+        find_guard(slew_trial(lab, K1=500.0).loop, "frozen", 0.3)
+
+
+def test_guards_have_names(lab):
+    with pytest.raises(ParameterError, match="time-varying, frozen, none"):
+        find_guard(slew_trial(lab).loop, "moving", 0.3)

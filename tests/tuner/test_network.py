@@ -1,0 +1,77 @@
+"""The network: sizes, first weights, the guard's map."""
+
+import numpy as np
+import pytest
+
+from tfarm.errors import ParameterError
+from tfarm.tuner import Network, initial_network, kernel
+
+
+def test_the_first_weights_are_uniform_and_repeatable():
+    weights = np.concatenate([initial_network(seed).weights for seed in range(200)])
+    assert abs(weights).max() < 0.5
+    assert abs(np.mean(weights)) < 4 * np.sqrt(1 / 12 / weights.size)
+    assert np.var(weights) == pytest.approx(1 / 12, rel=0.03)
+    np.testing.assert_array_equal(initial_network(7).weights, initial_network(7).weights)
+    assert (initial_network(7).weights != initial_network(8).weights).all()
+    assert np.unique(initial_network(7).weights).size == 42
+
+
+def test_sizes_are_free():
+    network = initial_network(0, hidden=11, scales=np.ones(7))
+    assert network.W1.shape == (11, 7)
+    assert network.weights.size == 88
+    again = network.with_weights(network.weights)
+    np.testing.assert_array_equal(again.W1, network.W1)
+    np.testing.assert_array_equal(again.w2, network.w2)
+
+
+def test_the_guard_is_one_minus_e_to_the_minus_softplus():
+    """lo + (hi - lo)(1 - e^-kappa), kappa = ln(1 + e^z), is the sigmoid; and its slope is right."""
+    z = np.linspace(-30, 30, 601)
+    guard = np.array([1.0, 0.2, 0.7])
+    values = np.array([kernel.guarded(each, guard) for each in z])
+    kappa = np.logaddexp(0, z)
+    np.testing.assert_allclose(values[:, 0], 0.2 + 0.5 * -np.expm1(-kappa), rtol=1e-14)
+    np.testing.assert_allclose(values[:, 1], 0.5 / (2 * np.cosh(z / 2)) ** 2, rtol=1e-13)
+    plain = np.array([kernel.guarded(each, np.zeros(3)) for each in z])
+    np.testing.assert_allclose(plain[:, 0], kappa, rtol=1e-14)
+    np.testing.assert_allclose(plain[:, 1], 1 / (1 + np.exp(-z)), rtol=1e-14)
+
+
+@pytest.mark.parametrize("z", [-1e308, -800.0, -1e-300, 0.0, 36.0, 800.0, 1e308])
+def test_no_sum_leaves_the_guard(z):
+    for lo, hi in ((0.1, 0.3), (0.1, np.nextafter(0.1, 1)), (1 / 3, 2 / 3)):
+        K, slope = kernel.guarded(z, np.array([1.0, lo, hi]))
+        assert lo <= K <= hi
+        assert slope >= 0
+
+
+@pytest.mark.parametrize(
+    ("change", "key"),
+    [
+        ({"W1": np.ones((6, 5))}, "W1"),
+        ({"W1": np.ones((0, 6)), "w2": np.ones(0)}, "W1"),
+        ({"w2": np.ones(5)}, "w2"),
+        ({"w2": np.r_[np.ones(5), np.nan]}, "w2"),
+        ({"scales": np.ones(7)}, "scales"),
+        ({"scales": np.zeros(6)}, "scales"),
+    ],
+)
+def test_weights_that_do_not_fit_are_refused(change, key):
+    good = {"W1": np.ones((6, 6)), "w2": np.ones(6), "scales": np.ones(6)}
+    with pytest.raises(ParameterError) as caught:
+        Network(**(good | change))
+    assert caught.value.key == key
+
+
+@pytest.mark.parametrize("seed", [-1, 1.5, True])
+def test_seeds_are_whole(seed):
+    with pytest.raises(ParameterError, match="seed"):
+        initial_network(seed)
+
+
+@pytest.mark.parametrize("hidden", [0, 1001, 2.0])
+def test_neurons_are_whole(hidden):
+    with pytest.raises(ParameterError, match="hidden"):
+        initial_network(0, hidden=hidden)

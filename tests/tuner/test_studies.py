@@ -1,0 +1,73 @@
+"""Studies: resumable, in order, and their verdicts."""
+
+from dataclasses import replace
+
+import pytest
+
+import tfarm
+from tfarm.errors import ParameterError
+from tfarm.tuner import Plan, tune
+from tfarm.tuner.studies import PAPER, map_verdict, plans_of, run_study, study_answer
+
+
+@pytest.fixture(scope="module")
+def lab():
+    return tfarm.load("sasaki2012-lab")
+
+
+BASE = Plan(trials=6, guard="frozen")
+
+
+def test_a_study_is_its_tunings(lab):
+    plans = plans_of("curves", BASE, 3)
+    results = run_study(lab, plans)
+    for plan, result in zip(plans, results, strict=True):
+        training = tune(lab, plan).training
+        assert result.costs == training.costs.tolist()
+        assert result.cost == training.result.cost
+    curve = study_answer("curves", results, 3)
+    assert curve["median"][0] == sorted(each.costs[0] for each in results)[1]
+
+
+def test_a_stopped_study_goes_on(lab, tmp_path):
+    keep, seen = tmp_path / "study.jsonl", []
+    plans = plans_of("rules", BASE, 2)
+    first = run_study(lab, plans[:5], keep=keep)
+    with open(keep, "a") as file:
+        file.write('{"key": "cut sh')
+    results = run_study(lab, plans, keep=keep, tell=lambda done, total: seen.append((done, total)))
+    assert results[:5] == first
+    assert seen == [(done, 12) for done in range(6, 13)]
+    kept = keep.read_text().splitlines()
+    assert len(kept) == 12
+    assert not any("cut sh" in line for line in kept)
+    assert run_study(lab, plans, keep=keep, tell=lambda *_: pytest.fail("nothing was left to do")) == results
+
+
+def test_a_file_that_is_no_study_is_refused(lab, tmp_path):
+    keep = tmp_path / "notes.txt"
+    for text in ("first\nsecond\n", "first", '{"key": "x"}\n'):
+        keep.write_text(text)
+        with pytest.raises(ParameterError, match="line 1 is no result"):
+            run_study(lab, plans_of("curves", BASE, 1), keep=keep)
+        assert keep.read_text() == text
+
+
+def test_every_study_has_its_plans():
+    sizes = {name: len(plans_of(name, BASE, 2)) for name in ("curves", "map", "weights", "inputs", "rules")}
+    assert sizes == {"curves": 2, "map": 84, "weights": 14, "inputs": 4, "rules": 12}
+    assert PAPER in [(plan.learning.alpha, plan.learning.eta) for plan in plans_of("map", BASE, 1)]
+    with pytest.raises(ParameterError, match="known are"):
+        plans_of("colours", BASE, 1)
+
+
+def test_the_verdict_on_the_best_momentum_and_rate(lab):
+    results = run_study(lab, plans_of("curves", BASE, 3))
+    other = replace(BASE, learning=replace(BASE.learning, alpha=0.1))
+
+    def moved(by):
+        return [replace(each, plan=replace(other, seed=each.plan.seed), cost=each.cost + by) for each in results]
+
+    assert "the best of 2 points" in map_verdict([results, moved(0.1)])
+    assert "rank 2 of 2; best (0.1, 0.8)" in map_verdict([results, moved(-0.5)])
+    assert "beyond the paper's quartiles" in map_verdict([results, moved(-0.5)])

@@ -1,0 +1,43 @@
+"""The verb of the tuner's studies.  Rooms are imported inside it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, cast
+
+import typer
+
+from tfarm.cli.app import ArmName, Json, app, load_arm, whole
+
+
+@app.command()
+def study(
+    arm: ArmName,
+    what: Annotated[str, typer.Argument(metavar="STUDY", help="curves, map, weights, inputs or rules")],
+    seeds: Annotated[str, typer.Option("--seeds", metavar="N", help="initial weights for each point")] = "20",
+    trials: Annotated[str, typer.Option("--trials", metavar="N", help="slews to learn from")] = "100",
+    signals: Annotated[str, typer.Option("--signals", help="vibration or total")] = "vibration",
+    guard: Annotated[str, typer.Option("--guard", help="time-varying (proven), frozen or none")] = "time-varying",
+    rule: Annotated[str, typer.Option("--rule", help="dynamic, clipped or plain")] = "dynamic",
+    keep: Annotated[Path | None, typer.Option("--keep", help="file of results; a stopped study goes on there")] = None,
+    json: Json = False,
+) -> None:
+    """Studies of the tuner on all cores: learning curves, the map of (alpha_c, eta_c), a and b, inputs, rules."""
+    number, slews = whole("--seeds", seeds, 1, 10_000), whole("--trials", trials, 1, 1_000_000)
+    subject = load_arm(arm)
+    from tfarm.tuner import Learning, Plan
+    from tfarm.tuner.studies import plans_of, run_study, study_answer
+
+    learning = Learning(rule=cast("Any", rule))
+    base = Plan(learning=learning, signals=cast("Any", signals), guard=cast("Any", guard), trials=slews)
+    plans = plans_of(what, base, number)
+    from tfarm.cli.tuning_tables import print_study, progress
+
+    with progress(len(plans)) as tell:
+        answer = study_answer(what, run_study(subject, plans, keep=keep, tell=tell), number)
+    if json:
+        from tfarm.cli.answers import to_json
+
+        print(to_json(answer))
+    else:
+        print_study(answer)

@@ -1,0 +1,219 @@
+"""Root loci drawn: exact branches, those of python-control on a reduced model, and where they cross the axis."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
+
+import tfarm
+from tfarm.arm import Arm, HubFeedback
+from tfarm.loop.locus import Locus, locus
+from tfarm.loop.reduced_locus import ReducedLocus, reduced_locus
+from tfarm.report.digits import plain, scientific, significant
+from tfarm.report.figures import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, blank, headline, style
+from tfarm.report.tables import Column, Table, data_column, number_column, text_column
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complexfloating[Any, Any]]
+
+POINTS, BRANCHES = 300, 7
+ZOOMED = 4  # modes drawn on their own
+COLORS = (INK, BLUE, GREEN, PURPLE, "#7a5a00", GREY)  # by mode
+UNITS = {"K1": "N m s/rad", "K2": ""}
+ROOM = 0.12  # around a branch, as a share of its extent
+MARKED = 5  # gains marked along each branch
+
+
+@dataclass(frozen=True)
+class Loci:
+    """The exact locus, the reduced one beside it, and the gains that are marked on both."""
+
+    exact: Locus
+    reduced: ReducedLocus
+    marked: Real
+
+    @property
+    def first(self) -> float:
+        """The first natural frequency [rad/s], of which a gap is a share where |s| is less."""
+        return float(tfarm.modes(self.exact.arm, count=1).natural_frequency[-1])
+
+    @property
+    def name(self) -> str:
+        """What varies."""
+        return self.exact.vary
+
+    @property
+    def unit(self) -> str:
+        """Of what varies."""
+        return UNITS[self.exact.vary]
+
+
+def loci(arm: Arm, law: HubFeedback, vary: str, start: float, stop: float) -> Loci:
+    """Both loci of one gain.  Raises what `locus` and `reduced_locus` raise."""
+    exact = locus(arm, law, vary, start, stop, POINTS, BRANCHES)
+    return Loci(exact, reduced_locus(exact), np.linspace(start, stop, MARKED))
+
+
+def zoomed(data: Loci) -> list[int]:
+    """The branches drawn on their own: the first that swings of each mode."""
+    imag, mode = data.exact.branches.imag, data.exact.mode
+    first = {int(mode[n]): n for n in reversed(range(mode.size)) if imag[n].max() > 0}
+    return [first[number] for number in sorted(first)][:ZOOMED]
+
+
+def color_of(data: Loci, branch: int) -> str:
+    """One colour a mode."""
+    return COLORS[int(data.exact.mode[branch]) % len(COLORS)]
+
+
+def draw_loci(data: Loci) -> Figure:
+    """All branches in one panel, and each mode enlarged beside it."""
+    exact = data.exact
+    with style():
+        figure = blank(9.0, 5.6)
+        grid = figure.add_gridspec(2, 4, width_ratios=[1.7, 1.7, 1.3, 1.3])
+        whole = figure.add_subplot(grid[:, :2])
+        numbers = range(len(exact.branches))
+        _panel(data, numbers, whole, named=sorted(set(numbers) - set(zoomed(data))))
+        _frame(exact.branches, whole)
+        whole.set_title("all of them", fontsize=9.0)
+        whole.set_xlabel("Re s [1/s]")
+        whole.set_ylabel("Im s [rad/s]")
+        for place, n in enumerate(zoomed(data)):
+            ax = figure.add_subplot(grid[place // 2, 2 + place % 2])
+            _panel(data, [n], ax, named=[n])
+            ax.xaxis.set_major_locator(MaxNLocator(3))
+            upper = exact.branches[n][exact.branches[n].imag >= 0]
+            _frame(upper, ax)
+            ax.set_title(
+                f"mode {exact.mode[n]}" if exact.mode[n] else "rigid body", fontsize=9.0, color=color_of(data, n)
+            )
+            ax.tick_params(labelsize=7.5)
+        figure.legend(*_legend(data), loc="outside lower left", ncols=5, fontsize=8.2, columnspacing=1.2)
+        headline(figure, f"{exact.arm.name}: closed-loop poles as {_range(data)}")
+    return figure
+
+
+def _range(data: Loci) -> str:
+    gain, law = data.exact.gain, data.exact.law
+    other = f"K2 = {plain(law.K2, 4)}" if data.name == "K1" else f"K1 = {plain(law.K1, 4)}"
+    return f"{data.name} goes from {plain(float(gain[0]), 4)} to {plain(float(gain[-1]), 4)}, {other} held"
+
+
+def _panel(data: Loci, numbers: Sequence[int], ax: Axes, named: Sequence[int]) -> None:
+    """Some branches, exact and reduced, with their crossings; gain and frequency beside those of the named ones."""
+    exact, reduced = data.exact.branches, data.reduced.branches
+    ax.axvline(0, color=INK, lw=0.9, zorder=1)
+    gain = data.exact.gain
+    at = [int(np.argmin(abs(gain - value))) for value in data.marked]
+    for n in numbers:
+        color = color_of(data, n)
+        ax.plot(exact[n].real, exact[n].imag, color=color, lw=2.6, alpha=0.4, zorder=2, solid_capstyle="round")
+        _band(reduced[n], data.reduced.gap[n] * np.maximum(abs(exact[n]), data.first), color, ax)
+        ax.plot(reduced[n].real, reduced[n].imag, color=color, lw=0.9, ls=(0, (2, 1.5)), zorder=3)
+        ax.plot(exact[n, 0].real, exact[n, 0].imag, "x", color=color, ms=6, mew=1.4, zorder=4)
+        ax.plot(exact[n, at[1:]].real, exact[n, at[1:]].imag, "o", color=color, ms=3.2, zorder=4)
+    for each in data.exact.crossings:
+        if each.branch in numbers:
+            ax.plot([0], [each.omega], "D", ms=6, mfc=ORANGE, mec="white", mew=0.8, zorder=6)
+            if each.branch not in named:
+                continue
+            text = f"{data.name} = {plain(each.gain, 5)}\n{significant(each.omega, 4)} rad/s"
+            ax.annotate(
+                text, (0, each.omega), textcoords="offset points", xytext=(7, 0), fontsize=7.5, va="center", zorder=6,
+                bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8, "alpha": 0.8},
+            )  # fmt: skip
+
+
+def _band(curve: Complex, width: Real, color: str, ax: Axes) -> None:
+    """The strip around a reduced branch that its printed gap allows."""
+    along = np.gradient(curve)
+    normal = 1j * along / np.where(along == 0, 1, abs(along))
+    edge = np.r_[curve + width * normal, (curve - width * normal)[::-1]]
+    ax.fill(edge.real, edge.imag, facecolor=color, alpha=0.15, lw=0, zorder=1.5)
+
+
+def _frame(points: Complex, ax: Axes) -> None:
+    """Limits with all of the branch, the axis and some room: nothing is cut off."""
+    real, imag = points.real, points.imag
+    left, right = min(float(real.min()), 0.0), max(float(real.max()), 0.0)
+    low, high = float(imag.min()), float(imag.max())
+    wide, tall = max(right - left, 1e-12 * abs(points).max()), max(high - low, 1e-9 * high)
+    ax.set_xlim(left - ROOM * wide, right + 2 * ROOM * wide)
+    ax.set_ylim(low - ROOM * tall, high + ROOM * tall)
+
+
+def _legend(data: Loci) -> tuple[list[Line2D], list[str]]:
+    values = ", ".join(plain(float(x), 3) for x in data.marked[1:])
+    handles = [
+        Line2D([], [], color=GREY, lw=2.6, alpha=0.4),
+        Line2D([], [], color=GREY, lw=0.9, ls=(0, (2, 1.5))),
+        Line2D([], [], color=GREY, ls="none", marker="x"),
+        Line2D([], [], color=GREY, ls="none", marker="o", ms=3.2),
+    ]
+    start = plain(float(data.marked[0]), 3)
+    reduced = f"python-control, order {data.reduced.order}"
+    labels = ["exact", reduced, f"{data.name} = {start}", f"{data.name} = {values}"]
+    if data.exact.crossings:
+        handles.append(Line2D([], [], color=ORANGE, ls="none", marker="D"))
+        labels.append("crosses the axis")
+    return handles, labels
+
+
+# ------------------------------------------------------------ tables
+
+
+def crossing_table(data: Loci, stem: str) -> Table:
+    """Where the branches cross the imaginary axis."""
+    found = data.exact.crossings
+    gain, omega = (np.array([getattr(each, key) for each in found]) for key in ("gain", "omega"))
+    hertz = omega / (2 * math.pi)
+    modes = [int(data.exact.mode[each.branch]) for each in found]
+    return Table(
+        stem=stem,
+        title=f"Crossings of the imaginary axis along {data.name}",
+        caption="Solved for gain and frequency together on the exact characteristic function, to the digits shown.",
+        columns=(
+            number_column(data.name, data.name, data.unit, gain, [significant(float(x), 8) for x in gain]),
+            number_column("omega_rad_s", "frequency", "rad/s", omega, [significant(float(x), 7) for x in omega]),
+            number_column("frequency_hz", "", "Hz", hertz, [significant(float(x), 7) for x in hertz]),
+            Column(key="mode", title="mode", values=modes, cells=[str(n) for n in modes]),
+            text_column("becomes", "becomes", [each.direction for each in found]),
+        ),
+    )
+
+
+def gap_table(data: Loci, stem: str) -> Table:
+    """How far each reduced branch is from the exact one."""
+    gap, mode = data.reduced.gap, data.exact.mode
+    names = [f"mode {n}" if n else "rigid body" for n in mode]
+    return Table(
+        stem=stem,
+        title=f"How far python-control's locus is from the exact one, along {data.name}",
+        caption=f"Largest distance over the whole range, as a share of |s| (or of the first natural frequency, where "
+        f"that is more). The reduced model has order {data.reduced.order}; its poles are those of "
+        "control.root_locus_map.",
+        columns=(
+            text_column("branch", "branch from", names),
+            number_column("gap", "largest gap", "of |s|", gap, [scientific(float(x), 3) for x in gap]),
+        ),
+    )
+
+
+def loci_data(data: Loci, stem: str) -> Table:
+    """The exact and the reduced branches."""
+    columns = [data_column(data.name, data.name, data.unit, data.exact.gain)]
+    for kind, branches in (("exact", data.exact.branches), ("reduced", data.reduced.branches)):
+        for n, row in enumerate(branches):
+            columns.append(data_column(f"{kind}_{n}_re", f"{kind} branch {n}, Re s", "1/s", row.real))
+            columns.append(data_column(f"{kind}_{n}_im", f"{kind} branch {n}, Im s", "rad/s", row.imag))
+    return Table(stem=stem, title=f"Loci along {data.name}", caption="", is_data=True, columns=tuple(columns))

@@ -1,0 +1,204 @@
+"""The continuous loop on an arm's page: the map of its gains, verdict and margins, Nyquist (loci: `locus_section`)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from tfarm.arm import Arm
+from tfarm.loop.stability import stability
+from tfarm.report.digits import plain, significant
+from tfarm.report.figures import Picture
+from tfarm.report.locus_section import locus_law
+from tfarm.report.loop_laws import (
+    DEFAULT,
+    MODES,
+    SIGN,
+    NamedLaw,
+    best,
+    is_weak,
+    laws,
+    margins_of,
+    rate_unit,
+    why_no_loop,
+)
+from tfarm.report.map import GainMap, gain_map, map_data
+from tfarm.report.map_picture import draw_map
+from tfarm.report.margins_table import margin_table, verdict_facts, verdict_words, window_table
+from tfarm.report.nyquist import Nyquist, count_table, curve_data, draw_nyquist, nyquist
+from tfarm.report.sections import Section
+
+UNSTABLE_K2 = 1.5  # of the law whose encirclements are counted for comparison
+
+MAP_SEEN = (
+    "Green: every pole is in the left half-plane, that of the hub angle at 0 apart; orange: the number of unstable "
+    "poles. The black edge and the counts are exact, of the arm itself and no reduced model{reach}. Blue: damping "
+    "ratio of the least damped pole below {band} rad/s. {proof} K1 is scaled by J ω₁ = {unit} N m s/rad."
+)
+ALL_MODES, UP_TO = ", with all its infinitely many modes", ", with every crossing up to {band} rad/s"
+PROOF = "The purple frame is what the Lyapunov argument proves at C = 0: K1 > 0 and K2 < 1, all of the stable region."
+NO_PROOF = (
+    "The dashed frame is what the Lyapunov argument proves for an arm without damping; it is not a proof here, because "
+    "the gauge does not feel C. At C > 0 it proves K2 = 0 alone (solid line). The true edge is the black line."
+)
+DEPTH = " Unstable windows below K2 = −50 were not looked for."
+NYQUIST_WORDS = (
+    "Every size of L(iω) from 0 to infinity is in the picture: a size r is drawn as r/(1 + r), so nothing is cut off, "
+    "and infinity is the outer rim. The loop is stable when the curve does not turn around −1. {poles}"
+)
+ONE_POLE = (
+    "L has one pole on the imaginary axis, at s = 0 (the rigid arm turning): there the contour steps to the right, and "
+    "the curve turns through a quarter circle at infinity, drawn dashed beyond the rim."
+)
+ALL_POLES = (
+    "Without damping L has a pole on the imaginary axis at 0 and at every natural frequency. At each the contour steps "
+    "to the right, and the curve turns clockwise through half a circle at infinity, drawn dashed beyond the rim, one "
+    "ring for each of the {count} poles up to {band} rad/s."
+)
+HELD_POLES = (
+    "Without damping L has a pole on the imaginary axis at every natural frequency; past each the curve turns "
+    "clockwise through half a circle at infinity, drawn dashed beyond the rim."
+)
+NO_POLE = "L has no pole on the imaginary axis."
+
+
+def no_loop_section(arm: Arm) -> Section:
+    """One sentence for an arm that has no loop."""
+    return Section(anchor="no-loop", title="The loop", words=(why_no_loop(arm),))
+
+
+# ------------------------------------------------------------ the map
+
+
+def map_section(arm: Arm) -> Section:
+    """How high may the gains go?"""
+    data = gain_map(arm)
+    picture = Picture(
+        stem="map",
+        title="The plane of both gains",
+        caption=_map_caption(data),
+        alt=_map_alt(data),
+        figure=draw_map(data),
+        data=map_data(data),
+    )
+    words = (_answer(arm), _best_words(arm), SIGN)
+    return Section(
+        anchor="margins-map", title="How high may the gains go?", words=[w for w in words if w], blocks=(picture,)
+    )
+
+
+def _answer(arm: Arm) -> str:
+    """The windows of K1 and K2 through the default gains, in words."""
+    found = margins_of(arm, DEFAULT)
+    gains = f"K1 = {plain(DEFAULT.K1)} N m s/rad and K2 = {plain(DEFAULT.K2)}"
+    start = f"With the default gains {gains} the loop is {found.stability.verdict}"
+    K1, K2 = (found.windows[name].around for name in ("K1", "K2"))
+    if K1 is None or K2 is None:
+        return f"{start}; the picture shows which gains are stable."
+    low, high = found.windows["K2"].looked_at
+    down = "as far down as one likes" if K2[0] == -np.inf else f"down to {plain(K2[0], 5)}"
+    down += " (the search ends there)" if K2[0] == low else ""
+    up = "without limit" if K1[1] == np.inf else f"up to {plain(K1[1], 5)} N m s/rad"
+    up += " (the search ends there)" if K1[1] == found.windows["K1"].looked_at[1] else ""
+    crossing = next((each for each in found.windows["K2"].crossings if each.t == K2[1]), None)
+    where = ""
+    if crossing is not None and np.isfinite(crossing.omega):
+        where = f", where poles cross at {significant(crossing.omega, 4)} rad/s"
+    elif crossing is not None:
+        where = ", where every flexible mode crosses at once"
+    top = f"{plain(K2[1], 5)}{where}" if K2[1] < high else "without limit"
+    weak = f" For this arm such a K1 is next to nothing: {plain(DEFAULT.K1 / rate_unit(arm), 2)} of J ω₁."
+    more = len(found.windows["K2"].all)
+    again = f" K2 has {more} separate stable windows at that K1, listed below." if more > 1 else ""
+    return (
+        f"{start}: at that K1, K2 may go up to {top}, and {down}; at that K2, K1 may go {up}, and must stay above "
+        f"{plain(K1[0], 4)}.{again}{weak if is_weak(arm, DEFAULT) else ''}"
+    )
+
+
+def _best_words(arm: Arm) -> str:
+    found = best(arm)
+    if found is None:
+        return ""
+    bounds = found.bounds["K2"]
+    at_edge = min(found.law.K2 - bounds[0], bounds[1] - found.law.K2) < 1e-3 * (bounds[1] - bounds[0])
+    edge = f" K2 is at the bound of the search ({plain(bounds[0])}): a wider one may give more." if at_edge else ""
+    return (
+        f"The best damping of the first {MODES} modes within the dotted frame is {significant(100 * found.value, 3)} % "
+        f"of critical, at K1 = {significant(found.law.K1, 4)} N m s/rad and K2 = {significant(found.law.K2, 4)} "
+        f"(tfarm design), a loop that is {found.verdict.verdict}.{edge}"
+    )
+
+
+def _map_caption(data: GainMap) -> str:
+    proof = PROOF if data.is_undamped else NO_PROOF
+    unit = plain(rate_unit(data.arm), 4)
+    reach = ALL_MODES if data.is_undamped else UP_TO.format(band=significant(data.region.band, 5))
+    return MAP_SEEN.format(band=significant(data.band, 5), proof=proof, unit=unit, reach=reach) + DEPTH * (
+        not data.is_undamped
+    )
+
+
+def _map_alt(data: GainMap) -> str:
+    share = significant(100 * float(data.region.stable.mean()), 2)
+    return f"Map of K1 and K2: {share} % of the area shown is stable: right of K1 = 0 and below an edge near K2 = 1."
+
+
+# ------------------------------------------------------------ margins
+
+
+def margins_section(arm: Arm) -> Section:
+    """The verdict on each law, then its margins."""
+    named = laws(arm)
+    found = [margins_of(arm, each.law) for each in named]
+    return Section(
+        anchor="margins",
+        title="Is the loop stable, and by how much?",
+        facts=tuple(verdict_facts(named, found)),
+        words=[verdict_words(*each) for each in zip(named, found, strict=True)],
+        blocks=(margin_table(named, found, arm.link.damping == 0), window_table(named, found, SIGN)),
+    )
+
+
+# ------------------------------------------------------------ Nyquist
+
+
+def nyquist_section(arm: Arm) -> Section:
+    """The loop function on a contour that hides nothing."""
+    named = laws(arm)
+    plots = [nyquist(each, margins_of(arm, each.law).stability) for each in named]
+    wrong = NamedLaw("to compare", "unstable", replace(locus_law(arm), K2=UNSTABLE_K2))
+    counted = [*plots, nyquist(wrong, stability(arm, wrong.law))]
+    picture = Picture(
+        stem="nyquist",
+        title="Nyquist plots of the exact loop function",
+        caption="Rings: sizes of L; −1 lies on the ring 1. Broad: ω > 0, arrows as ω rises; thin: its mirror image.",
+        alt="; ".join(
+            f"{p.named.name}: {p.verdict.verdict}, {p.encirclements} encirclements of −1" for p in plots
+        ),
+        figure=draw_nyquist(arm.name, plots),
+        data=curve_data(plots),
+    )  # fmt: skip
+    names = [f"{plot.named.name}: {plot.named.gains}" for plot in counted]
+    words = (_nyquist_answer(plots), NYQUIST_WORDS.format(poles=_poles_words(plots[0])))
+    title = "Nyquist: does the loop function turn around −1?"
+    return Section(anchor="margins-nyquist", title=title, words=words, blocks=(picture, count_table(counted, names)))
+
+
+def _nyquist_answer(plots: list[Nyquist]) -> str:
+    parts = [
+        f"{p.named.name}: {p.verdict.verdict}, {abs(p.encirclements) or 'no'} turn{'s' * (abs(p.encirclements) != 1)} "
+        f"around −1 and {p.verdict.unstable_roots or 'no'} unstable pole{'s' * (p.verdict.unstable_roots != 1)}"
+        for p in plots
+    ]
+    return f"{'; '.join(parts).capitalize()}."
+
+
+def _poles_words(plot: Nyquist) -> str:
+    arm, count = plot.verdict.loop.arm, plot.poles.size
+    if arm.link.damping > 0:
+        return ONE_POLE if count else NO_POLE
+    if not arm.has_rigid_mode:
+        return HELD_POLES
+    return ALL_POLES.format(count=count, band=significant(plot.verdict.band, 5))

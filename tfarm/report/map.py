@@ -1,0 +1,210 @@
+"""The (K1, K2) map: where the exact loop is stable, what its boundary is made of, and how well its modes are damped."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from matplotlib.scale import SymmetricalLogTransform
+from numpy.typing import NDArray
+
+import tfarm
+from tfarm.arm import Arm, Hub
+from tfarm.loop.damping import least_damping
+from tfarm.loop.design import Design
+from tfarm.loop.frequencies import band_of
+from tfarm.loop.regions import Region, between, boundary, region
+from tfarm.report.loop_laws import MODES, NamedLaw, best, laws, rate_unit
+from tfarm.report.tables import Column, Table, Value, data_column
+
+Real = NDArray[np.float64]
+
+COLUMNS, ROWS = 240, 200  # of the coloured grid
+SPARSE = 4  # every so many of them the damping is computed
+LOW, HIGH, DEEPEST = -4.0, 2.0, -50.0  # K2: the range shown, and how deep windows are looked for
+SHORT, LONG, ROUNDS = 0.008, 0.03, 30  # lengths of the boundary's segments, as shares of the picture
+SCAN = 32  # columns in which they are looked for
+NEAR = 1.5  # beyond this many rows from the boundary the count must have changed
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One axis of the map: linear within +-`linear`, logarithmic beyond (all linear where `linear` is infinite)."""
+
+    low: float
+    high: float
+    linear: float = math.inf
+
+    @cached_property
+    def _transform(self) -> Any:
+        return SymmetricalLogTransform(10.0, self.linear, 0.5)
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether it is linear throughout."""
+        return math.isinf(self.linear)
+
+    def place(self, x: Real) -> Real:
+        """Where values are along the axis, 0 to 1."""
+        if self.is_linear:
+            return np.asarray((x - self.low) / (self.high - self.low))
+        low, high = self._transform.transform(np.array([self.low, self.high]))
+        return np.asarray((self._transform.transform(np.asarray(x, float)) - low) / (high - low))
+
+    def grid(self, number: int) -> Real:
+        """So many values, evenly spaced as seen."""
+        if self.is_linear:
+            return between(self.low, self.high, number)
+        low, high = self._transform.transform(np.array([self.low, self.high]))
+        return np.asarray(self._transform.inverted().transform(between(low, high, number)))
+
+
+@dataclass(frozen=True)
+class GainMap:
+    """What the map shows.
+
+    `region` is the exact count on the coloured grid, `edge` (n, 3) the exact boundary K1, K2, w within the picture
+    with rows of nan where it leaves it; `damping` (rows, columns) the least damping ratio of the first `MODES` modes
+    on every fourth point of the grid; `held` [rad/s] the first frequencies with the hub at rest; `design` the best
+    gains.
+    """
+
+    arm: Arm
+    x: Axis
+    y: Axis
+    region: Region
+    edge: Real
+    K1: Real
+    K2: Real
+    damping: Real
+    laws: tuple[NamedLaw, ...]
+    design: Design | None
+    held: Real
+
+    @property
+    def is_undamped(self) -> bool:
+        """Whether C = 0."""
+        return self.arm.link.damping == 0
+
+    @property
+    def counts(self) -> NDArray[np.int64]:
+        """Unstable poles on the grid of the damping."""
+        half = SPARSE // 2
+        return np.asarray(self.region.unstable[half::SPARSE, half::SPARSE])
+
+    @property
+    def band(self) -> float:
+        """Below which [rad/s] the damping is the least."""
+        return band_of(self.arm, MODES)
+
+
+def gain_map(arm: Arm) -> GainMap:
+    """The map of an arm, its ranges chosen by J w1 and by the windows that it has."""
+    x = rate_axis(arm)
+    y = moment_axis(arm, x)
+    found = region(arm, x.grid(COLUMNS), y.grid(ROWS))
+    half = SPARSE // 2
+    K1, K2 = found.K1[half::SPARSE], found.K2[half::SPARSE]
+    a, b = (each.ravel() for each in np.meshgrid(K1, K2))
+    damping = least_damping(arm, a, b, np.zeros(a.size), MODES).reshape(K2.size, K1.size)
+    held = tfarm.modes(_held(arm), count=3).natural_frequency
+    return GainMap(arm, x, y, found, edge(found, x, y), K1, K2, damping, laws(arm), best(arm), held)
+
+
+def rate_axis(arm: Arm) -> Axis:
+    """K1 from just below 0 to 10 J w1, logarithmic from well below the default gain on."""
+    unit = rate_unit(arm)
+    linear = 10.0 ** math.floor(math.log10(min(0.3, 0.01 * unit)))
+    return Axis(-linear, max(10 * unit, 1.0), linear)
+
+
+def moment_axis(arm: Arm, x: Axis) -> Axis:
+    """K2 from -4 to 2, or as deep as unstable windows go."""
+    if arm.link.damping == 0:
+        return Axis(LOW, HIGH)
+    K1 = x.grid(SCAN)
+    deep = region(arm, K1[K1 > 0], between(DEEPEST, LOW, 400))
+    rows = np.nonzero(~deep.stable.all(axis=1))[0]
+    if not rows.size:
+        return Axis(LOW, HIGH)
+    return Axis(max(DEEPEST, 1.4 * float(deep.K2[rows[0]])), HIGH, 2.0)
+
+
+def edge(found: Region, x: Axis, y: Axis) -> Real:
+    """The boundary in the picture, finer where it is coarse, with rows of nan between its parts."""
+    points = found.boundary
+    if not points.size:
+        return points
+    for _ in range(ROUNDS):
+        length, is_seen = _segments(points, x, y)
+        (coarse,) = np.nonzero((length > SHORT) & is_seen)
+        if not coarse.size:
+            break
+        middle = np.sqrt(points[coarse, 2] * points[coarse + 1, 2])
+        middle = middle[(middle > points[coarse, 2]) & (middle < points[coarse + 1, 2])]
+        points = np.concatenate([points, boundary(found.arm, middle)])
+        points = points[np.unique(points[:, 2], return_index=True)[1]]
+    length, is_seen = _segments(points, x, y)
+    return _cut(points, is_seen & (length < LONG))
+
+
+def _segments(points: Real, x: Axis, y: Axis) -> tuple[Real, NDArray[np.bool_]]:
+    """How long each segment looks, and whether it may pass through the picture."""
+    places = np.stack([axis.place(points[:, i]) for i, axis in enumerate((x, y))])
+    low, high = np.minimum(places[:, 1:], places[:, :-1]), np.maximum(places[:, 1:], places[:, :-1])
+    return np.hypot(*np.diff(places)), np.asarray(((high >= 0) & (low <= 1)).all(axis=0))
+
+
+def _cut(points: Real, kept: NDArray[np.bool_]) -> Real:
+    """The points that belong to kept segments, a row of nan after each run."""
+    belongs = np.r_[kept, False] | np.r_[False, kept]
+    rows: list[Real] = []
+    for i in np.nonzero(belongs)[0]:
+        rows.append(points[i])
+        if i == len(points) - 1 or not kept[i]:
+            rows.append(np.full(3, np.nan))
+    return np.array(rows).reshape(-1, 3)
+
+
+def stable_edge(data: GainMap) -> Real:
+    """Points (n, 3) of the boundary with the stable region on one side."""
+    points = data.edge[~np.isnan(data.edge[:, 0])] if data.edge.size else data.edge
+    if not points.size:
+        return points
+    across = np.clip((data.x.place(points[:, 0]) * COLUMNS).astype(int), 0, COLUMNS - 1)
+    up = data.y.place(points[:, 1]) * ROWS
+    below, above = (np.clip(np.round(up + way).astype(int), 0, ROWS - 1) for way in (-NEAR - 0.5, NEAR - 0.5))
+    unstable = data.region.unstable
+    differ = (unstable[below, across] == 0) != (unstable[above, across] == 0)
+    in_view = (up >= 0) & (up <= ROWS) & (data.x.place(points[:, 0]) <= 1) & (points[:, 0] > 0)
+    return np.asarray(points[differ & in_view])
+
+
+def map_data(data: GainMap) -> Table:
+    """The grid with counts and damping, then the boundary with its frequencies, in one file."""
+    K1, K2 = (each.ravel() for each in np.meshgrid(data.K1, data.K2))
+    edge = data.edge[~np.isnan(data.edge[:, 0])] if data.edge.size else data.edge
+    counts: list[Value] = [math.inf if count < 0 else int(count) for count in data.counts.ravel()]
+    none: list[Value] = [""]
+    columns = (
+        Column(key="what", title="what", values=["grid"] * K1.size + ["boundary"] * len(edge), cells=()),
+        data_column("K1_N_m_s_rad", "K1", "N m s/rad", np.r_[K1, edge[:, 0]]),
+        data_column("K2", "K2", "", np.r_[K2, edge[:, 1]]),
+        Column(key="unstable_poles", title="unstable poles", values=counts + none * len(edge), cells=()),
+        Column(
+            key="least_damping_ratio", title="least damping ratio", cells=(),
+            values=[*data.damping.ravel().tolist(), *none * len(edge)],
+        ),
+        Column(
+            key="omega_rad_s", title="frequency", unit="rad/s", cells=(),
+            values=none * K1.size + edge[:, 2].tolist(),
+        ),
+    )  # fmt: skip
+    return Table(stem="map-data", title="The map of K1 and K2", caption="", is_data=True, columns=columns)
+
+
+def _held(arm: Arm) -> Arm:
+    return replace(arm, hub=Hub(inertia=math.inf))

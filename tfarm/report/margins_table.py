@@ -1,0 +1,155 @@
+"""Verdict, windows and margins of each law, in this order: no margin stands without its verdict."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+from tfarm.loop.lyapunov import lyapunov
+from tfarm.loop.margins import Margins
+from tfarm.loop.windows import Windows
+from tfarm.report.digits import plain, significant
+from tfarm.report.loop_laws import NamedLaw, typeset
+from tfarm.report.sections import Fact
+from tfarm.report.tables import Column, Table, Value, text_column
+
+NOTHING = "none: not stable"
+UNITS = {"K1": "N m s/rad", "K2": "", "Kp": "N m/rad"}
+MARGINS = (
+    "Exact: of the infinite-dimensional loop. In the band: as far as the poles were computed{undamped}. Gain margin: "
+    "factors on both gains at once between which the loop stays stable. Phase and delay: what may be lost at the worst "
+    "frequency. Disk margin: gain and phase may be off together by (2 + αδ)/(2 − αδ), |δ| < 1."
+)
+UNDAMPED = (
+    "; without damping (C = 0) any delay, however short, destabilises some mode far enough up, so the exact delay and "
+    "disk margins are 0, and only a band gives them a size"
+)
+WINDOWS = (
+    "The others held, each gain may move within its window before the first pole reaches the axis. Ends ±∞ are proven; "
+    "other ends that coincide with the range looked at only say where the search stopped. {sign}"
+)
+
+Row = tuple[str, str, float | str, float | str, float | str]  # quantity, unit, exact, in the band, at
+
+
+def verdict_facts(laws: Sequence[NamedLaw], found: Sequence[Margins]) -> Iterator[Fact]:
+    """The verdict of each law, large."""
+    for named, each in zip(laws, found, strict=True):
+        it = each.stability
+        count = "infinitely many unstable poles" if it.unstable_roots_infinite else _many(it.unstable_roots)
+        yield Fact(label=f"{named.name}: {named.gains}", value=it.verdict.upper(), beside=f"{count}, {_up_to(it.band)}")
+
+
+def verdict_words(named: NamedLaw, found: Margins) -> str:
+    """The verdict, what is known beyond the band, and what Lyapunov says."""
+    it = found.stability
+    proof = lyapunov(it.loop.arm, named.law)
+    proven = "proven" if proof.proven else "no proof"
+    return (
+        f"{named.name.capitalize()}, {named.gains}: {it.verdict.upper()}, with {_many(it.unstable_roots)} "
+        f"{_up_to(it.band)}, the one at 0 that the hub angle leaves apart; {typeset(it.tail)}. "
+        f"Lyapunov: {proven}, {typeset(proof.reason)}."
+    )
+
+
+def _up_to(band: float) -> str:
+    return f"up to {significant(band, 5)} rad/s"
+
+
+def _many(count: int) -> str:
+    return f"{count or 'no'} unstable pole{'s' * (count != 1)}"
+
+
+def margin_table(laws: Sequence[NamedLaw], found: Sequence[Margins], is_undamped: bool) -> Table:
+    """A row a quantity, the verdict first; for each law the exact value, that in the band, and where."""
+    rows = [list(_rows(each)) for each in found]
+    columns = [
+        text_column("quantity", "", [row[0] for row in rows[0]]),
+        text_column("unit", "unit", [row[1] for row in rows[0]]),
+    ]
+    for named, part in zip(laws, rows, strict=True):
+        group = f"{named.name}: {named.gains}"
+        for i, (key, title) in enumerate((("exact", "exact"), ("band", "in the band"), ("at_rad_s", "at rad/s")), 2):
+            values: list[Value] = [row[i] for row in part]
+            columns.append(
+                Column(key=f"{named.key}_{key}", title=title, values=values, cells=_cells(values), group=group)
+            )
+    return Table(
+        stem="margins",
+        title="Verdict and margins",
+        caption=MARGINS.format(undamped=UNDAMPED if is_undamped else ""),
+        columns=tuple(columns),
+    )
+
+
+def _rows(found: Margins) -> Iterator[Row]:
+    """The verdict before any margin."""
+    it, band = found.stability, found.in_band
+    count = math.inf if it.unstable_roots_infinite else float(it.unstable_roots)
+    yield "verdict", "", it.verdict, "", ""
+    yield "unstable poles", "", count, float(it.unstable_roots), ""
+    yield "band", "rad/s", "", it.band, ""
+    if band is None or found.exact_delay is None or found.exact_disk is None or found.exact_peak is None:
+        for name in ("gain margin, down", "gain margin, up", "phase margin", "delay margin", "disk margin α"):
+            yield name, "", NOTHING, "", ""
+        yield "peak sensitivity", "", NOTHING, "", ""
+        return
+    yield "gain margin, down", "factor", band.gain[0], "", ""
+    yield "gain margin, up", "factor", band.gain[1], "", ""
+    yield "phase margin", "deg", "" if found.exact_delay == 0 else band.phase, band.phase, band.at["phase"]
+    yield "delay margin", "s", found.exact_delay, band.delay, band.at["delay"]
+    yield "disk margin α", "", found.exact_disk, band.disk, band.at["disk"]
+    yield "peak sensitivity", "", found.exact_peak, band.peak_sensitivity, band.at["peak_sensitivity"]
+
+
+def _cells(values: Sequence[Value]) -> list[str]:
+    return [value if isinstance(value, str) else _number(value) for value in values]
+
+
+def _number(value: Value) -> str:
+    assert isinstance(value, float | int)
+    return plain(float(value), 6) if float(value).is_integer() else significant(float(value), 5)
+
+
+def window_table(laws: Sequence[NamedLaw], found: Sequence[Margins], sign: str) -> Table:
+    """A row a law and gain."""
+    rows = [(law, name, each.windows[name], each) for law, each in zip(laws, found, strict=True) for name in UNITS]
+    values = [getattr(law.law, name) for law, name, _, _ in rows]
+    around = [_pair(windows.around) if windows.around else NOTHING for _, _, windows, _ in rows]
+    return Table(
+        stem="windows",
+        title="How far each gain may go alone",
+        caption=WINDOWS.format(sign=sign),
+        columns=(
+            text_column("law", "law", [law.name for law, *_ in rows]),
+            text_column("verdict", "verdict", [each.stability.verdict for *_, each in rows]),
+            text_column("gain", "gain", [name for _, name, _, _ in rows]),
+            text_column("unit", "unit", [UNITS[name] for _, name, _, _ in rows]),
+            Column(key="value", title="value", values=values, cells=[plain(value, 5) for value in values]),
+            Column(
+                key="stable_around_it", title="stable around it", cells=around,
+                values=[_joined(windows.around) if windows.around else NOTHING for _, _, windows, _ in rows],
+            ),
+            Column(
+                key="stable_windows", title="all stable windows", cells=[_all(windows) for _, _, windows, _ in rows],
+                values=[_joined(*windows.all) or "none" for _, _, windows, _ in rows],
+            ),
+            Column(
+                key="looked_at", title="looked at", values=[_joined(windows.looked_at) for _, _, windows, _ in rows],
+                cells=[_pair(windows.looked_at) for _, _, windows, _ in rows],
+            ),
+        ),
+    )  # fmt: skip
+
+
+def _joined(*pairs: tuple[float, float]) -> str:
+    """The ends with every digit, for files."""
+    return " ".join(repr(float(end)) for pair in pairs for end in pair)
+
+
+def _all(windows: Windows) -> str:
+    return ", ".join(_pair(pair) for pair in windows.all) or "none"
+
+
+def _pair(pair: tuple[float, float]) -> str:
+    return f"({plain(pair[0], 5)}, {plain(pair[1], 5)})"

@@ -1,0 +1,154 @@
+"""The tuner drawn: its gain and its guard on the map, the slew with and without it, learning, and the final cost."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
+from numpy.typing import NDArray
+
+from tfarm.arm import Arm
+from tfarm.dsp import Simulation
+from tfarm.report.digits import plain, significant
+from tfarm.report.figures import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, blank, headline, style
+from tfarm.report.overlay import Overlay, regions
+from tfarm.report.time_responses import motor_torque, root_moment, tip_error
+from tfarm.report.tuner_study import CostMap, Curves, TunerStudy
+from tfarm.tuner import Tuning
+
+Real = NDArray[np.float64]
+
+K_RANGE = (-0.25, 1.25)
+GUARD = "#bfe3d6"
+TOP = 1.25  # of the cost without feedback: higher ones are drawn at the top edge
+
+
+def draw_gain(data: TunerStudy, plane: Overlay) -> Figure:
+    """Left the map with the tuner's path and guard, right the gain over time, on the same axis of K2."""
+    with style():
+        figure = blank(9.0, 4.9)
+        left, right = figure.subplots(1, 2, sharey=True, width_ratios=[1.0, 1.35])
+        regions(plane, ax=left)
+        left.get_legend().remove()
+        left.set_title("", loc="right")
+        path(data.tuning, ax=left)
+        gain(data.tuning, ax=right)
+        left.set_ylim(*K_RANGE)
+        right.set_ylabel("")
+        figure.legend(handles=right.get_legend_handles_labels()[0], loc="outside lower left", ncols=3)
+        headline(figure, f"{data.arm.name}: the tuner's gain, and where it is proven stable")
+    return figure
+
+
+def path(tuning: Tuning, *, ax: Axes) -> None:
+    """The guard as a bar at the loop's K1, and in it the gains that the tuner takes."""
+    K1, guard, K = tuning.plan.K1, tuning.training.guard, tuning.training.result.K
+    ax.plot([K1, K1], [guard.lo, guard.hi], color=GREEN, lw=9, solid_capstyle="butt", alpha=0.75, zorder=6)
+    ax.plot([K1, K1], [float(K.min()), float(K.max())], color=INK, lw=2.4, solid_capstyle="butt", zorder=7)
+    for line in ax.lines:
+        if line.get_marker() == "o":
+            line.remove()
+
+
+def gain(tuning: Tuning, *, ax: Axes) -> None:
+    """K over time."""
+    guard, result, task = tuning.training.guard, tuning.training.result, tuning.trial.task
+    ax.axhspan(guard.lo, guard.hi, color=GUARD, lw=0, zorder=0.5, label="guard: proven for any K(t) in it")
+    ax.step(result.t, result.K, where="post", color=INK, lw=1.4, label="the tuner's gain K(t)")
+    best = tuning.best_constant.gain
+    ax.axhline(best, color=PURPLE, lw=1.2, ls=(0, (5, 3)), label=f"best constant gain, {significant(best, 3)}")
+    ax.axvline(task.busy_until, color=INK, lw=0.8, ls=(0, (1, 2)))
+    ax.axhline(0.0, color=GREY, lw=0.7)
+    ax.set_xlim(0.0, float(result.t[-1]))
+    ax.set_xlabel("time  [s]")
+
+
+def draw_response(name: str, arm: Arm, each: Mapping[str, Simulation], what: str) -> Figure:
+    """Tip, root moment and motor torque of the slew, without and with the tuner."""
+    with style():
+        figure = blank(9.0, 6.8)
+        moment, tip, torque = figure.subplots(3, 1, sharex=True, height_ratios=[1.3, 1.0, 1.0])
+        root_moment(each, ax=moment)
+        tip_error(arm, each, ax=tip)
+        motor_torque(each, ax=torque)
+        torque.set_xlabel("time  [s]")
+        figure.legend(loc="outside lower left", ncols=3)
+        headline(figure, f"{name}: {what}")
+    return figure
+
+
+def draw_curves(data: TunerStudy) -> Figure:
+    """Learning curves, a panel a rule: each seed, median and quartiles, and what there is to beat."""
+    with style():
+        figure = blank(9.0, 4.4)
+        axes = figure.subplots(1, len(data.curves), sharey=True)
+        for curves, ax in zip(data.curves, axes, strict=True):
+            learning(curves, ax=ax)
+            yardsticks(data.tuning, ax=ax)
+            ax.set_title(curves.title, fontsize=9.5)
+        axes[0].set_ylabel("cost of a trial")
+        axes[0].set_ylim(0.0, TOP * data.tuning.without.cost)
+        figure.legend(handles=axes[0].get_legend_handles_labels()[0], loc="outside lower left", ncols=3)
+        headline(figure, f"{data.arm.name}: learning, {len(data.curves[0].finished)} seeds")
+    return figure
+
+
+def learning(curves: Curves, *, ax: Axes) -> None:
+    """Each seed thin, the quartiles as a band, the median bold; what diverged leaves through the top."""
+    trial = np.arange(1, curves.costs.shape[1] + 1)
+    far = 1e6
+    costs = np.minimum(curves.costs, far)
+    ax.plot(trial, costs.T, color="#b9b9b9", lw=0.6, zorder=1)
+    low, middle, high = (np.minimum(curves.quantile(q), far) for q in (0.25, 0.5, 0.75))
+    ax.fill_between(trial, low, high, color=BLUE, alpha=0.22, lw=0, zorder=2, label="middle half of the seeds")
+    ax.plot(trial, middle, color=BLUE, lw=1.8, zorder=3, label="median")
+    ax.set_xlim(1, trial[-1])
+    ax.set_xlabel("trial")
+
+
+def yardsticks(tuning: Tuning, *, ax: Axes) -> None:
+    """What the tuner has to beat, and what nothing beats."""
+    for cost, colour, label in (
+        (tuning.without.cost, ORANGE, "no moment feedback"),
+        (tuning.best_constant.cost, PURPLE, "best constant gain"),
+        (tuning.bound.cost, INK, "linear-quadratic optimum: nothing is below"),
+    ):
+        ax.axhline(cost, color=colour, lw=1.2, ls=(0, (5, 3)), zorder=2.5, label=f"{label}, {significant(cost, 3)}")
+
+
+def draw_cost_map(data: TunerStudy) -> Figure:
+    """Median final cost over (alpha_c, eta_c), the paper's pair framed."""
+    with style():
+        figure = blank(9.0, 4.4)
+        ax = figure.subplots()
+        cost_map(data.cost_map, ax=ax)
+        headline(figure, f"{data.arm.name}: final cost over momentum and learning rate")
+    return figure
+
+
+def cost_map(data: CostMap, *, ax: Axes) -> None:
+    """A cell a pair, its number written in it."""
+    finite = data.median[np.isfinite(data.median)]
+    low, high = float(finite.min()), float(np.quantile(finite, 0.9))
+    shown = np.where(np.isfinite(data.median), data.median, 1e9)
+    ax.pcolormesh(shown, cmap="Blues_r", vmin=low - 0.25 * (high - low), vmax=high, edgecolors="white", linewidth=1.0)
+    for i, row in enumerate(data.median):
+        for j, cost in enumerate(row):
+            colour = "white" if cost < low + 0.35 * (high - low) else INK
+            ax.text(j + 0.5, i + 0.5, significant(cost, 3), ha="center", va="center", fontsize=9, color=colour)
+    for (i, j), colour, label in (
+        (data.papers, ORANGE, "the paper's best, (0.6, 0.8)"),
+        (data.best, GREEN, "the lowest here"),
+    ):
+        ax.plot([j, j + 1, j + 1, j, j], [i, i, i + 1, i + 1, i], color=colour, lw=2.6, zorder=5, label=label)
+    ax.set_xticks(np.arange(data.etas.size) + 0.5, [plain(x) for x in data.etas])
+    ax.set_yticks(np.arange(data.alphas.size) + 0.5, [plain(x) for x in data.alphas])
+    ax.xaxis.set_minor_locator(NullLocator())
+    ax.tick_params(length=0)
+    ax.grid(False)
+    ax.set_xlabel("learning rate η_c")
+    ax.set_ylabel("momentum α_c")
+    ax.legend(loc="upper left", bbox_to_anchor=(0.0, -0.16), ncols=2, borderaxespad=0.0)

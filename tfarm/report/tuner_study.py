@@ -1,0 +1,154 @@
+"""The numbers of the tuner's section: one tuning, its simulations, its studies, and the table of comparisons."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import Arm
+from tfarm.dsp import Chain, Gains, Simulation, Simulator
+from tfarm.report.time_responses import BETWEEN
+from tfarm.tuner import Learning, Plan, Tuning, compare, conditions, tune
+from tfarm.tuner.comparison import Row
+from tfarm.tuner.guard import GuardKind
+from tfarm.tuner.studies import PAPER, Finished, map_verdict, plans_of, run_study
+from tfarm.tuner.training import Rule
+
+Real = NDArray[np.float64]
+
+SEEDS = 20  # of the learning curves
+MAP_SEEDS, MAP_TRIALS = 5, 60
+WORKERS = 2
+LEARNT: tuple[tuple[str, str, Rule, GuardKind], ...] = (
+    ("default", "default, in the guard", "dynamic", "time-varying"),
+    ("default_no_guard", "default, no guard", "dynamic", "none"),
+    ("plain", "(21) as printed, no guard", "plain", "none"),
+)
+NOMINAL, COARSE = "as trained", "quantised, one sample of delay"  # rows of the comparison
+
+
+@dataclass(frozen=True)
+class Curves:
+    """Learning curves of one rule over the seeds: `costs` (seeds, trials), inf from where a run diverged."""
+
+    key: str
+    title: str
+    costs: Real
+    finished: tuple[Finished, ...]
+
+    def quantile(self, share: float) -> Real:
+        """The cost that this share of the seeds is below, after each trial; always one of the costs."""
+        return np.asarray(np.quantile(self.costs, share, axis=0, method="nearest"))
+
+    @property
+    def final(self) -> Real:
+        """The costs with what was learnt."""
+        return np.array([each.cost for each in self.finished])
+
+    @property
+    def died(self) -> int:
+        """How many seeds ended with the gain switched off."""
+        return sum(each.died for each in self.finished)
+
+    @property
+    def diverged(self) -> int:
+        """How many ran away."""
+        return sum(each.stopped for each in self.finished)
+
+
+@dataclass(frozen=True)
+class CostMap:
+    """`median` (alphas, etas) of the final cost over the seeds, and the study's verdict on the paper's pair."""
+
+    alphas: Real
+    etas: Real
+    median: Real
+    verdict: str
+
+    @property
+    def best(self) -> tuple[int, int]:
+        """Row and column of the lowest."""
+        i, j = np.unravel_index(int(np.argmin(self.median)), self.median.shape)
+        return int(i), int(j)
+
+    @property
+    def papers(self) -> tuple[int, int]:
+        """Row and column of the paper's pair."""
+        return int(np.argmin(abs(self.alphas - PAPER[0]))), int(np.argmin(abs(self.etas - PAPER[1])))
+
+    @property
+    def is_papers_best(self) -> bool:
+        """Whether nothing is lower than the paper's pair."""
+        return bool(self.median[self.papers] <= self.median[self.best])
+
+    @property
+    def best_at_edge(self) -> bool:
+        """Whether the lowest lies at the largest momentum or learning rate of the map."""
+        return self.best[0] == self.alphas.size - 1 or self.best[1] == self.etas.size - 1
+
+
+@dataclass(frozen=True)
+class TunerStudy:
+    """All of it.  `slews` and `coarse` hold two simulations each, without and with the tuner."""
+
+    arm: Arm
+    tuning: Tuning
+    slews: Mapping[str, Simulation]
+    coarse: Mapping[str, Simulation]
+    curves: tuple[Curves, ...]
+    cost_map: CostMap
+    rows: tuple[Row, ...]
+
+
+def tuner_study(arm: Arm) -> TunerStudy:
+    """Train with the paper's figures and measure.
+
+    Raises ParameterError for an arm without a loop or a slew, CertificationError where no range of gains is proven.
+    """
+    tuning = tune(arm)
+    chain = tuning.trial.loop.chain
+    listed = conditions(arm, chain)
+    rows = compare(tuning.trial, tuning.gain(), tuning.training.guard, listed)
+    return TunerStudy(
+        arm=arm,
+        tuning=tuning,
+        slews=_simulated(tuning, chain),
+        coarse=_simulated(tuning, next(each.chain for each in listed if each.name == COARSE)),
+        curves=tuple(_curves(arm, *each) for each in LEARNT),
+        cost_map=_cost_map(arm),
+        rows=tuple(rows),
+    )
+
+
+def _simulated(tuning: Tuning, chain: Chain) -> dict[str, Simulation]:
+    trial, K1 = tuning.trial, tuning.plan.K1
+    simulator = Simulator(trial.arm, chain, trial.task, count=trial.loop.plant.count, between=BETWEEN)
+    without, tuned = simulator.linear(Gains(K1=K1, K2=0.0)), simulator.gain_schedule(K1, tuning.gain())
+    return {"without moment feedback, K2 = 0": without, "with the tuner": tuned}
+
+
+def _curves(arm: Arm, key: str, title: str, rule: Rule, guard: GuardKind) -> Curves:
+    base = Plan(learning=Learning(rule=rule), guard=guard)
+    plans = plans_of("curves", base, SEEDS)
+    finished = run_study(arm, plans, workers=WORKERS)
+    costs = np.full((SEEDS, base.trials), np.inf)
+    for row, each in zip(costs, finished, strict=True):
+        row[: len(each.costs)] = each.costs
+    return Curves(key, title, costs, tuple(finished))
+
+
+def _cost_map(arm: Arm) -> CostMap:
+    finished = run_study(arm, plans_of("map", Plan(trials=MAP_TRIALS), MAP_SEEDS), workers=WORKERS)
+    groups = [finished[i : i + MAP_SEEDS] for i in range(0, len(finished), MAP_SEEDS)]
+    medians = {
+        (group[0].plan.learning.alpha, float(np.asarray(group[0].plan.learning.eta))): float(
+            np.quantile([each.cost for each in group], 0.5, method="nearest")
+        )
+        for group in groups
+    }
+    alphas, etas = (np.array(sorted({pair[i] for pair in medians})) for i in (0, 1))
+    median = np.array([[medians[alpha, eta] for eta in etas] for alpha in alphas])
+    return CostMap(alphas, etas, median, map_verdict(groups))

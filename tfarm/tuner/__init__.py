@@ -1,0 +1,46 @@
+"""The neural gain tuner: a network that sets K2 while the arm slews, kept where the loop is proven stable."""
+
+from tfarm.tuner.bound import lq_bound
+from tfarm.tuner.comparison import compare, conditions
+from tfarm.tuner.constants import BestConstant, best_constant
+from tfarm.tuner.controller import TunedGain, simulated
+from tfarm.tuner.guard import Guard, find_guard
+from tfarm.tuner.network import Network, initial_network
+from tfarm.tuner.saving import SavedTuner, load_tuner, save
+from tfarm.tuner.shaping import extra_insensitive, shaped_trial, zero_vibration
+from tfarm.tuner.training import Learning, Stopped, Training, train
+from tfarm.tuner.trial import Cost, Record, Trial, residual_rms, slew_trial
+from tfarm.tuner.tuning import Plan, Tuning, tune, tune_answer
+
+__all__ = [
+    "BestConstant",
+    "Cost",
+    "Guard",
+    "Learning",
+    "Network",
+    "Plan",
+    "Record",
+    "SavedTuner",
+    "Stopped",
+    "Training",
+    "Trial",
+    "TunedGain",
+    "Tuning",
+    "best_constant",
+    "compare",
+    "conditions",
+    "extra_insensitive",
+    "find_guard",
+    "initial_network",
+    "load_tuner",
+    "lq_bound",
+    "residual_rms",
+    "save",
+    "shaped_trial",
+    "simulated",
+    "slew_trial",
+    "train",
+    "tune",
+    "tune_answer",
+    "zero_vibration",
+]

@@ -1,0 +1,49 @@
+"""The bound that no controller passes: the finite-horizon linear-quadratic optimum, full state and preview of the slew.
+
+    minimise T sum of a x_k^2/2 + b e_k^2/2,   s_{k+1} = A s_k + B (e_k + r_k),   x_k = c s_k - m_k,   s_0 = 0
+
+with r (feedforward not counted in u) and m (the rigid arm's moment) known beforehand.  The value of the remaining
+samples is s^T P s/2 + q^T s + a constant, and e_k = -(B^T P (A s + B r) + B^T q)/(T b + B^T P B).  It bounds
+every e(t), for this arm, slew, sampling and cost, whatever network, gain or law makes it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.tuner.trial import Record, Trial
+
+Real = NDArray[np.float64]
+
+
+def lq_bound(trial: Trial) -> Record:
+    """The optimal trial; its K is zero, for it is no moment feedback, and its u is e."""
+    _, A, B, _, c = trial.model
+    rest, rigid = trial.reference[:, 2], trial.reference[:, 3]
+    T, a, b = trial.numbers[3], trial.numbers[1], trial.numbers[2]
+    n, size = trial.n, B.size
+    gains, offsets = np.zeros((n, size)), np.zeros(n)
+    P, q = np.zeros((size, size)), np.zeros(size)
+    for k in range(n - 1, -1, -1):
+        PB, pull = P @ B, q + P @ B * rest[k]
+        weight = T * b + B @ PB
+        if weight > 0:
+            gains[k], offsets[k] = (A.T @ PB) / weight, (B @ pull) / weight
+        closed = A - np.outer(B, gains[k])
+        q = closed.T @ (q + P @ B * (rest[k] - offsets[k])) + T * b * gains[k] * offsets[k] - T * a * rigid[k] * c
+        P = closed.T @ P @ closed + T * b * np.outer(gains[k], gains[k]) + T * a * np.outer(c, c)
+        P = (P + P.T) / 2
+    return _played(trial, gains, offsets)
+
+
+def _played(trial: Trial, gains: Real, offsets: Real) -> Record:
+    """The optimal e applied forward."""
+    _, A, B, _, c = trial.model
+    s, x, e = np.zeros(B.size), np.zeros(trial.n), np.zeros(trial.n)
+    for k in range(trial.n):
+        x[k] = c @ s - trial.reference[k, 3]
+        e[k] = -(gains[k] @ s) - offsets[k]
+        s = A @ s + B * (e[k] + trial.reference[k, 2])
+    cost = float(trial.numbers[3] * np.sum(trial.cost.a * x**2 + trial.cost.b * e**2) / 2)
+    return Record(trial.task.t, x, e, e, np.zeros(trial.n), cost, None)

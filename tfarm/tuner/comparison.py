@@ -1,0 +1,141 @@
+"""The tuner beside what it has to beat, in one run: no moment feedback, the best constant gain, input shaping, and the
+linear-quadratic optimum that nothing beats; with converters and delay, on the arm it was trained on and on others.
+
+Every controller knows the arm by its name plate only: feedforward, references, shapers, gains and weights are those of
+the arm that it was trained on, whatever arm moves.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+from tfarm.arm import Arm
+from tfarm.dsp import Chain, Converters, Gains, Scenario, Simulator
+from tfarm.errors import ConvergenceError
+from tfarm.tuner.bound import lq_bound
+from tfarm.tuner.constants import best_constant
+from tfarm.tuner.controller import TunedGain, judged, simulated
+from tfarm.tuner.guard import Guard
+from tfarm.tuner.sector import MovingGain
+from tfarm.tuner.shaping import shaped, shaper
+from tfarm.tuner.trial import Record, Trial, residual_rms, slew_trial
+
+PAYLOADS = (0.1, 0.25, 0.5)  # kg
+HUBS = (0.8, 1.2)  # times the hub's inertia
+DAMPINGS = (0.0, 1e-5, 1e-3)  # s
+QUANTISED = Converters(
+    encoder_counts=8192, hub_rate="difference", moment_bits=12, moment_range=20.0, torque_bits=12, torque_range=10.0
+)  # N m
+DELAY = 1.0  # samples
+
+
+class Outcome(NamedTuple):
+    """`cost` of the trial, and root mean square of x after the slew [N m]; inf where the loop ran away."""
+
+    cost: float
+    residual: float
+
+
+@dataclass(frozen=True)
+class Row:
+    """One condition: what each controller makes of it.
+
+    `best_constant` is the best constant gain of the trained condition, used here; `own_constant` the best for this
+    condition, at `own_gain`.  `ZV` and `EI` are judged by their own, later slew, and so may pass `bound`, which is that
+    of the unshaped one.  `proven`: whether the tuner's guard is proven for this loop too.
+    """
+
+    condition: str
+    without: Outcome
+    best_constant: Outcome
+    own_constant: Outcome
+    own_gain: float
+    ZV: Outcome
+    EI: Outcome
+    tuner: Outcome
+    bound: Outcome
+    proven: bool
+
+
+@dataclass(frozen=True)
+class Condition:
+    """An arm and a chain under their name."""
+
+    name: str
+    arm: Arm
+    chain: Chain
+
+
+def conditions(arm: Arm, chain: Chain) -> list[Condition]:
+    """The trained condition, converters and delay, then the arms that it was not trained on."""
+    quantised = replace(chain, converters=QUANTISED)
+    sampling = replace(chain.sampling, delay_samples=chain.sampling.delay_samples + DELAY)
+    listed = [
+        Condition("as trained", arm, chain),
+        Condition("quantised", arm, quantised),
+        Condition("one sample of delay", arm, replace(chain, sampling=sampling)),
+        Condition("quantised, one sample of delay", arm, replace(quantised, sampling=sampling)),
+    ]
+    loads = {f"payload {mass:g} kg": replace(arm, payload=replace(arm.payload, mass=mass)) for mass in PAYLOADS}
+    inertias = {f"hub {share - 1:+.0%}": share * arm.hub.inertia for share in HUBS}
+    hubs = {name: replace(arm, hub=replace(arm.hub, inertia=inertia)) for name, inertia in inertias.items()}
+    others = [C for C in DAMPINGS if arm.link.damping != C]
+    dampings = {f"C = {C:g} s": replace(arm, link=replace(arm.link, damping=C)) for C in others}
+    return listed + [Condition(name, other, chain) for name, other in (loads | hubs | dampings).items()]
+
+
+def compare(trial: Trial, gain: TunedGain, guard: Guard, listed: list[Condition] | None = None) -> list[Row]:
+    """A row a condition; `trial` is the one that the tuner was trained on."""
+    nominal = best_constant(trial).gain
+    wanted = conditions(trial.arm, trial.loop.chain) if listed is None else listed
+    return [_row(trial, gain, guard, nominal, each) for each in wanted]
+
+
+def _row(trial: Trial, gain: TunedGain, guard: Guard, nominal: float, condition: Condition) -> Row:
+    here = slew_trial(
+        condition.arm, condition.chain, K1=gain.K1, cost=trial.cost, signals=trial.signals, known=trial.arm,
+        duration=trial.n * trial.task.period * (1 - 1e-9), count=trial.loop.plant.count,
+    )  # fmt: skip
+    here = replace(here, task=trial.task)
+    own = best_constant(here)
+    shapers = {kind: shaped(trial.task, shaper(trial.loop, kind)) for kind in ("ZV", "EI")}
+    bound = lq_bound(here)
+    return Row(
+        condition=condition.name,
+        without=_constant(here, here.task, 0.0),
+        best_constant=_constant(here, here.task, nominal),
+        own_constant=_constant(here, here.task, own.gain),
+        own_gain=own.gain,
+        ZV=_constant(here, shapers["ZV"], 0.0),
+        EI=_constant(here, shapers["EI"], 0.0),
+        tuner=_outcome(simulated(_simulator(here, here.task), gain, trial.cost), here.task),
+        bound=_outcome(bound, here.task),
+        proven=guard.is_proven and _proven(here, guard),
+    )
+
+
+def _proven(here: Trial, guard: Guard) -> bool:
+    """Whether the sector is proven for this loop, with the trial's modes."""
+    if here.arm.link.damping == 0.0:
+        return False
+    try:
+        return MovingGain(here.loop).proof(guard.lo, guard.hi) is not None
+    except ConvergenceError:
+        return False
+
+
+def _simulator(trial: Trial, task: Scenario) -> Simulator:
+    return Simulator(trial.arm, trial.loop.chain, task, count=trial.loop.plant.count)
+
+
+def _constant(trial: Trial, task: Scenario, K: float) -> Outcome:
+    run = _simulator(trial, task).linear(Gains(K1=trial.loop.gains.K1, K2=K))
+    return _outcome(judged(run, trial.cost, trial.signals), task)
+
+
+def _outcome(record: Record, task: Scenario) -> Outcome:
+    if record.stopped is not None or not math.isfinite(record.cost):
+        return Outcome(math.inf, math.inf)
+    return Outcome(record.cost, residual_rms(record, task.busy_until))

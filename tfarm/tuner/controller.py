@@ -1,0 +1,53 @@
+"""The trained network as a gain schedule of `tfarm.dsp.Simulator`: with converters, delay, on any arm."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.dsp import Measurement, Simulation, Simulator
+from tfarm.tuner.network import Network
+from tfarm.tuner.trial import Cost, Record, Signals
+
+Real = NDArray[np.float64]
+
+
+@dataclass
+class TunedGain:
+    """K for each measurement; it remembers u, e, x and K of the two samples before, and forgets them at sample 0."""
+
+    network: Network
+    guard: Real
+    K1: float
+    signals: Signals
+    _past: list[tuple[float, float, float, float]] = field(default_factory=list, init=False)
+
+    def __call__(self, m: Measurement) -> float:
+        """The gain at this sample."""
+        if m.k == 0:
+            self._past = [(0.0, 0.0, 0.0, 0.0)] * 2
+        (u1, e1, x1, K_before), (_, e2, _, _) = self._past
+        u = self.K1 * (m.rate_reference - m.hub_rate) + (m.feedforward if self.signals == "total" else 0.0)
+        row = [u, u1, e1, e2, m.vibration, x1, K_before][: self.network.scales.size]
+        K = self.network.gain(np.array(row), self.guard)
+        self._past = [(u, u - K * m.vibration, m.vibration, K), self._past[0]]
+        return K
+
+
+def judged(simulation: Simulation, cost: Cost, signals: Signals) -> Record:
+    """A simulation's x, u, e and cost: x from the moment that the arm has, e from the torque that leaves the DAC."""
+    task, done = simulation.scenario, simulation.torque.size
+    rest = 0.0 if signals == "total" else task.feedforward[:done]
+    x = simulation.at_samples.root_moment - task.rigid_moment[:done]
+    e = simulation.torque - rest
+    K = np.zeros(done) if simulation.gain is None else simulation.gain
+    total = float(task.period * np.sum(cost.a * x**2 + cost.b * e**2) / 2)
+    stopped = done if simulation.stopped is not None else None
+    return Record(simulation.t, x, e + K * x, e, K, total if stopped is None else float("inf"), stopped)
+
+
+def simulated(simulator: Simulator, gain: TunedGain, cost: Cost) -> Record:
+    """The trained network in a simulator whose chain has the same reading of the signals."""
+    return judged(simulator.gain_schedule(gain.K1, gain), cost, gain.signals)

@@ -1,0 +1,238 @@
+"""The guard: the interval that the gain is kept in, and what is proven of it.
+
+    time-varying   a sector [lo, hi] in which K may move from sample to sample as it likes: proven (see `sector`)
+    frozen         the interval of constant gains that leave the loop stable.  Nothing is proven for a K that moves:
+                   switching between two such gains can drive the loop unstable
+    none           the plain softplus, K >= 0
+
+A proven sector gives a contraction, so bounded references, and rounding by converters, leave bounded signals whatever
+K(t) does in it; a torque or a moment that saturates is not covered.  The proof is of the arm, K1, sampling and delay it
+was made for, with the modes that it names.
+
+The network's gain kappa = ln(1 + e^z) is bent into the interval by K = lo + (hi - lo)(1 - e^-kappa), which is
+lo + (hi - lo)/(1 + e^-z): smooth, so that the gradient sees it.
+
+Which sector?  They slide: the larger the middle gain, the wider.  The default is the widest that holds the best
+constant gain at least a tenth of its width away from its ends, or the one that comes nearest to it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import Arm
+from tfarm.dsp import SampledLoop, sampled_loop, stable_windows
+from tfarm.dsp.margins import around
+from tfarm.dsp.sampling import held
+from tfarm.errors import CertificationError, ConvergenceError, ParameterError, did_you_mean
+from tfarm.tuner.lyapunov import Lyapunov
+from tfarm.tuner.sector import SHARE, MovingGain
+
+Real = NDArray[np.float64]
+GuardKind = Literal["time-varying", "frozen", "none"]
+KINDS = ("time-varying", "frozen", "none")
+
+INSIDE = 0.8  # of half the width: how far the best constant gain may be from the middle
+MOST_GAIN = 10.0  # where the frozen interval has no upper end
+MIDDLES = 60
+NARROW = 1e-4  # a sector this narrow is none
+AGREE = 1e-3  # of the width: how little more modes may change it
+UNDAMPED_MODES, MOST_MODES = 20, 48
+DAMPINGS = np.geomspace(1e-12, 1e-2, 11)  # s, tried for the remedy
+
+
+@dataclass(frozen=True)
+class Guard:
+    """K stays in [lo, hi] (inf: no upper end).
+
+    `modes_used` flexible modes were looked at, `is_settled` says that more do not change it.  `proofs`, of the
+    time-varying kind only: a Lyapunov function of every model that was looked at.
+    """
+
+    kind: GuardKind
+    lo: float
+    hi: float
+    modes_used: int
+    is_settled: bool
+    proofs: tuple[Lyapunov, ...] = ()
+
+    @property
+    def is_proven(self) -> bool:
+        """Whether the loop is proven stable for every K(t) in it."""
+        return bool(self.proofs)
+
+    @property
+    def array(self) -> Real:
+        """As `kernel.guarded` takes it."""
+        return np.zeros(3) if self.kind == "none" else np.array([1.0, self.lo, self.hi])
+
+    @property
+    def sentence(self) -> str:
+        """What is proven, in words."""
+        if self.kind == "none":
+            return "no guard: K >= 0, nothing is proven"
+        held = "more change nothing" if self.is_settled else "not settled: it holds for these alone"
+        modes = f"{self.modes_used} modes, {held}"
+        if self.kind == "frozen":
+            return (
+                f"[{self.lo:.4g}, {self.hi:.4g}]: stable for every constant K, not proven for one that moves ({modes})"
+            )
+        rate = max(proof.contraction for proof in self.proofs)
+        return f"[{self.lo:.4g}, {self.hi:.4g}]: proven for any K(t), shrinking by {1 - rate:.2g} a sample ({modes})"
+
+
+def find_guard(loop: SampledLoop, kind: GuardKind, best_constant: float) -> Guard:
+    """The guard of a loop (its K1, chain and modes); its K2 does not matter.
+
+    Raises CertificationError where there is none, with the damping that would have one.
+    """
+    if kind not in KINDS:
+        raise ParameterError(key="guard", value=kind, remedy=did_you_mean(str(kind), KINDS))
+    if kind == "none":
+        return Guard("none", 0.0, math.inf, loop.plant.count, False)
+    loops = list(_larger(loop))
+    guard = _frozen(loops, best_constant) if kind == "frozen" else _moving(loops, best_constant)
+    if guard is None:
+        raise CertificationError(_remedy(loop, kind))
+    return guard
+
+
+def gain_windows(loop: SampledLoop) -> list[tuple[float, float]]:
+    """The intervals of constant gains K >= 0, up to 10, that leave the loop stable."""
+    return [(max(low, 0.0), min(high, MOST_GAIN)) for low, high in stable_windows(loop, "K2") if high > 0]
+
+
+def _frozen(loops: list[SampledLoop], best_constant: float) -> Guard | None:
+    """The interval that holds in every model, without its outermost hundredth."""
+    found = []
+    for loop in loops:
+        windows = gain_windows(loop)
+        if not windows:
+            return None
+        found.append(around(windows, best_constant) or min(windows, key=lambda w: abs(sum(w) / 2 - best_constant)))
+    low, high = max(low for low, _ in found), min(high for _, high in found)
+    edge = (1 - SHARE) * (high - low)
+    if high - low < NARROW:
+        return None
+    return Guard("frozen", low + edge * (low > 0), high - edge, loops[-1].plant.count, _settled(loops, found))
+
+
+def _moving(loops: list[SampledLoop], best_constant: float) -> Guard | None:
+    """The sector of the default rule, proven in every model; narrower where the proof needs it."""
+    models = [MovingGain(loop) for loop in loops]
+    m = _middle(models[0], best_constant)
+    if m is None:
+        return None
+    radii = [model.radius(m) for model in models]
+    found = [(m - radius, m + radius) for radius in radii]
+    share = SHARE
+    for _ in range(6):
+        half = share * min(radii)
+        lo, hi = max(0.0, m - half), m + half
+        if half < NARROW:
+            return None
+        proofs = [model.proof(lo, hi) for model in models]
+        if all(proofs):
+            whole = tuple(proof for proof in proofs if proof is not None)
+            return Guard("time-varying", lo, hi, loops[-1].plant.count, _settled(loops, found), whole)
+        share *= 0.9
+    return None
+
+
+def _middle(model: MovingGain, best_constant: float) -> float | None:
+    """The middle gain of the default rule; None where no gain is stable."""
+    windows = gain_windows(model.loop)
+    middles = np.array([m for low, high in windows for m in np.linspace(low, high, MIDDLES + 2)[1:-1]])
+    radii = np.array([model.radius(float(m)) for m in middles])
+    if not (radii > NARROW).any():
+        return None
+    beyond = abs(best_constant - middles) - INSIDE * radii
+    holds = beyond <= 0
+    if not holds.any():
+        return float(middles[int(np.argmin(beyond))])
+    best = int(np.argmax(np.where(holds, radii, -1.0)))
+    inner, outer = float(middles[best]), float(middles[min(best + 1, middles.size - 1)])
+    for _ in range(12):  # up to where the best constant gain just is inside
+        m = (inner + outer) / 2
+        radius = model.radius(m)
+        if abs(best_constant - m) <= INSIDE * radius and radius >= radii[best]:
+            inner = m
+        else:
+            outer = m
+    return inner
+
+
+def _settled(loops: list[SampledLoop], found: list[tuple[float, float]]) -> bool:
+    """Whether more modes changed nothing, and the modes left out are too damped to be driven.
+
+    At C = 0 that can never be said.
+    """
+    if loops[0].plant.arm.link.damping == 0.0 or len(found) < 2:
+        return False
+    (low, high), (before_low, before_high) = found[-1], found[-2]
+    agree = max(abs(low - before_low), abs(high - before_high)) <= AGREE * (high - low)
+    return agree and _is_quiet(loops[-1], high)
+
+
+def _is_quiet(loop: SampledLoop, highest: float) -> bool:
+    """Whether the upper half of the modes lose more in a sample by themselves than the feedback could give them."""
+    plant, T = loop.plant, loop.chain.sampling.period
+    _, rate, moment = abs(plant.residues)
+    push = 2 * (abs(loop.gains.K1) * rate + highest * moment) * abs(held(plant.poles, T))
+    upper = (plant.mode > plant.count // 2) & (plant.poles.imag > 0)
+    return bool((push[upper] < -plant.poles.real[upper] * T).all())
+
+
+def _larger(loop: SampledLoop) -> Iterator[SampledLoop]:
+    """The loop, and the same with four times the modes; at C = 0 with twenty.
+
+    Three times or twice, where two of the damped modes cannot be told apart.
+    """
+    yield loop
+    arm, count = loop.plant.arm, loop.plant.count
+    wanted = (4 * count, 3 * count, 2 * count) if arm.link.damping else (UNDAMPED_MODES,)
+    for number in (min(number, MOST_MODES) for number in wanted):
+        if number <= count:
+            return
+        try:
+            more = sampled_loop(arm, replace(loop.gains, K2=1.0), loop.chain, count=number)
+        except ConvergenceError:
+            continue
+        yield more
+        return
+
+
+def _remedy(loop: SampledLoop, kind: str) -> str:
+    """Why there is no guard, and the smallest damping tried that has one."""
+    arm = loop.plant.arm
+    what = "no sector of moving gains" if kind == "time-varying" else "no constant gain"
+    start = f"{arm.name}: {what} is proven stable at K1 = {loop.gains.K1:g}, C = {arm.link.damping:g} s"
+    for C in DAMPINGS[arm.link.damping < DAMPINGS]:
+        if _has_guard(replace(arm, link=replace(arm.link, damping=float(C))), loop, kind):
+            return f"{start}; with a damping of C = {C:.1e} s there is one"
+    return f"{start}, nor with any damping up to {DAMPINGS[-1]:g} s; take another K1, or a shorter period or delay"
+
+
+def _has_guard(arm: Arm, loop: SampledLoop, kind: str) -> bool:
+    try:
+        first = sampled_loop(arm, replace(loop.gains, K2=1.0), loop.chain, count=loop.plant.count)
+        if not gain_windows(first):
+            return False
+        loops = list(_larger(first))
+    except ConvergenceError:
+        return False
+    if kind == "frozen":
+        guard = _frozen(loops, 0.0)
+        return guard is not None and guard.is_settled
+    models = [MovingGain(each) for each in loops]
+    m = _middle(models[0], 0.0)
+    if m is None:
+        return False
+    radii = [model.radius(m) for model in models]
+    return SHARE * min(radii) > NARROW and _settled(loops, [(m - radius, m + radius) for radius in radii])

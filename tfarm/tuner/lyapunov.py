@@ -1,0 +1,124 @@
+"""One quadratic Lyapunov function for two matrices, and so for everything between them, proven in whole numbers.
+
+If P > 0 and P - A^T P A > 0 for both ends A_lo, A_hi of a segment, then V = s^T P s falls at every sample for *any*
+sequence of matrices of that segment, for A -> A^T P A is convex.  Where the ends differ by a matrix of rank one such a
+P exists exactly where the circle criterion holds (Kalman-Yakubovich-Popov lemma); P is found in float64 by a Riccati
+equation, and its inequalities are then checked without any rounding: matrices of doubles are whole numbers over a power
+of two, and Bareiss' elimination (1968) keeps them whole.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import LinAlgError, solve_discrete_are, solve_triangular
+
+Real = NDArray[np.float64]
+Whole = list[list[int]]
+
+SLACKS = (1e-3, 1e-5, 1e-7, 1e-9)  # how strictly the inequality is asked for, in balanced states
+DIGITS = 60  # bits that P is rounded to before the proof
+
+
+@dataclass(frozen=True)
+class Lyapunov:
+    """V = s^T P s falls with both matrices `low` and `high` (n, n), and with all between them.
+
+    `contraction` rho < 1: |s| in the norm of P shrinks at least by it at every sample (float64).
+    """
+
+    low: Real
+    high: Real
+    P: Real
+    contraction: float
+
+    @cached_property
+    def root(self) -> Real:
+        """L with P = L L^T: the norm is |L^T s|."""
+        return np.asarray(np.linalg.cholesky(self.P), dtype=float)
+
+    def is_proven(self) -> bool:
+        """Whether P > 0 and both inequalities hold in exact arithmetic."""
+        P, _ = whole(np.round(np.ldexp(self.P / abs(self.P).max(), DIGITS)))
+        return is_positive_definite(P) and all(_falls(P, A) for A in (self.low, self.high))
+
+
+def common_lyapunov(middle: Real, drive: Real, sense: Real, low: Real, high: Real) -> Lyapunov | None:
+    """The Lyapunov function of the segment from `low` to `high`, or None where none is found.
+
+    `middle` lies between them, and drive sense^T is half of low - high.  Of several strictnesses the best is taken.
+    """
+    scale = _sizes(middle, drive)
+    A, b, c = middle * scale / scale[:, None], (drive / scale)[:, None], (sense * scale)[None]
+    found: list[Lyapunov] = []
+    for slack in SLACKS:
+        try:
+            P = solve_discrete_are(A, b, c.T @ c + slack * (c @ c.T).item() * np.eye(len(A)), -np.eye(1))
+        except (LinAlgError, ValueError):
+            continue
+        P = (P + P.T) / 2 / scale / scale[:, None]
+        rho = _contraction(P, low, high)
+        if rho < 1.0:
+            found.append(Lyapunov(low, high, P, rho))
+    return min(found, key=lambda each: each.contraction, default=None)
+
+
+def _contraction(P: Real, low: Real, high: Real) -> float:
+    try:
+        L = np.linalg.cholesky(P)
+    except LinAlgError:
+        return np.inf
+    ends = [solve_triangular(L, (L.T @ A).T, lower=True) for A in (low, high)]
+    return float(max(np.linalg.norm(each, 2) for each in ends))
+
+
+def _sizes(A: Real, b: Real) -> Real:
+    """How far each state goes after one push: the root of its sum of squares, by doubling."""
+    total, power = np.outer(b, b), A
+    for _ in range(40):
+        total, power = total + power @ total @ power.T, power @ power
+    size: Real = np.sqrt(np.diag(total))
+    return np.where(size > 0, size, 1.0)
+
+
+# ---------------------------------------------------------------- whole numbers
+
+
+def whole(matrix: Real) -> tuple[Whole, int]:
+    """The whole numbers N and the shift k with matrix = N / 2^k, exactly."""
+    pairs = [[float(value).as_integer_ratio() for value in row] for row in matrix]
+    shift = max(bottom.bit_length() - 1 for row in pairs for _, bottom in row)
+    return [[top << (shift - bottom.bit_length() + 1) for top, bottom in row] for row in pairs], shift
+
+
+def is_positive_definite(matrix: Whole) -> bool:
+    """Whether a symmetric matrix of whole numbers has only positive leading minors (Bareiss' elimination)."""
+    M, before = [list(row) for row in matrix], 1
+    n = len(M)
+    for k in range(n):
+        pivot = M[k][k]
+        if pivot <= 0:
+            return False
+        for i in range(k + 1, n):
+            row, factor = M[i], M[k][i]
+            for j in range(i, n):
+                row[j] = (pivot * row[j] - factor * M[k][j]) // before
+        before = pivot
+    return True
+
+
+def _falls(P: Whole, A: Real) -> bool:
+    """Whether P - A^T P A > 0."""
+    N, shift = whole(A)
+    columns: Any = list(zip(*N, strict=True))
+    PN = [[sum(p * a for p, a in zip(row, column, strict=True)) for column in columns] for row in P]
+    across: Any = list(zip(*PN, strict=True))
+    scaled = [
+        [(P[i][j] << 2 * shift) - sum(a * p for a, p in zip(columns[i], across[j], strict=True)) for j in range(len(P))]
+        for i in range(len(P))
+    ]
+    return is_positive_definite(scaled)

@@ -1,0 +1,142 @@
+"""A trained tuner as a JSON file, and back: strict, finite, of shapes that fit; never pickle."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from tfarm.errors import MISSING, ParameterError, TfarmError
+from tfarm.files import write_file
+from tfarm.tuner.controller import TunedGain
+from tfarm.tuner.guard import GuardKind
+from tfarm.tuner.network import MOST_HIDDEN, Network
+from tfarm.tuner.trial import Cost, Signals
+
+FORMAT = "tfarm tuner 1"
+LARGEST = 4_000_000  # bytes
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+@dataclass(frozen=True)
+class SavedTuner:
+    """What a tuner needs to run: network, guard, K1 and the reading of the signals; and where it was trained."""
+
+    network: Network
+    guard_kind: GuardKind
+    lo: float
+    hi: float
+    K1: float
+    signals: Signals
+    cost: Cost
+    arm: str
+    period: float
+
+    def gain(self) -> TunedGain:
+        """The controller."""
+        guard = np.zeros(3) if self.guard_kind == "none" else np.array([1.0, self.lo, self.hi])
+        return TunedGain(self.network, guard, self.K1, self.signals)
+
+
+class TunerFile(BaseModel):
+    """The file."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+    format: Literal["tfarm tuner 1"]
+    arm: Annotated[str, Field(max_length=80)]
+    period: Annotated[Finite, Field(gt=0)]
+    K1: Finite
+    signals: Literal["vibration", "total"]
+    a: Annotated[Finite, Field(ge=0)]
+    b: Annotated[Finite, Field(ge=0)]
+    guard_kind: Literal["time-varying", "frozen", "none"]
+    guard: Annotated[list[Annotated[Finite, Field(ge=0)]], Field(min_length=2, max_length=2)] | None
+    scales: Annotated[list[Finite], Field(min_length=6, max_length=7)]
+    W1: Annotated[
+        list[Annotated[list[Finite], Field(min_length=6, max_length=7)]], Field(min_length=1, max_length=MOST_HIDDEN)
+    ]
+    w2: Annotated[list[Finite], Field(min_length=1, max_length=MOST_HIDDEN)]
+
+    def build(self) -> SavedTuner:
+        """The tuner; ParameterError where its parts do not fit together."""
+        if (self.guard is None) != (self.guard_kind == "none"):
+            raise ParameterError(key="guard", value=self.guard, remedy="two ends, or null with guard_kind none")
+        lo, hi = (0.0, math.inf) if self.guard is None else self.guard
+        if not lo < hi:
+            raise ParameterError(key="guard", value=self.guard, remedy="its lower end comes first")
+        widths = {len(row) for row in self.W1}
+        if widths != {len(self.scales)}:
+            raise ParameterError(
+                key="W1", value=sorted(widths), remedy=f"rows of {len(self.scales)}, one weight an input"
+            )
+        network = Network(np.array(self.W1), np.array(self.w2), np.array(self.scales))
+        cost = Cost(a=self.a, b=self.b)
+        return SavedTuner(network, self.guard_kind, lo, hi, self.K1, self.signals, cost, self.arm, self.period)
+
+
+def to_text(tuner: SavedTuner) -> str:
+    """The file's text; equal tuners give equal text, and it loads to the same bits."""
+    content = {
+        "format": FORMAT,
+        "arm": tuner.arm,
+        "period": tuner.period,
+        "K1": tuner.K1,
+        "signals": tuner.signals,
+        "a": tuner.cost.a,
+        "b": tuner.cost.b,
+        "guard_kind": tuner.guard_kind,
+        "guard": None if tuner.guard_kind == "none" else [tuner.lo, tuner.hi],
+        **weights_answer(tuner.network),
+    }
+    return json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+
+
+def weights_answer(network: Network) -> dict[str, list[float] | list[list[float]]]:
+    """scales, W1 and w2 as lists."""
+    return {name: _listed(getattr(network, name)) for name in ("scales", "W1", "w2")}
+
+
+def save(tuner: SavedTuner, path: Path) -> None:
+    """Write it beside, then rename."""
+    write_file(path, to_text(tuner).encode(), key="--save")
+
+
+def load_tuner(path: str | os.PathLike[str]) -> SavedTuner:
+    """The tuner of a file.  Raises ParameterError, in one line, for whatever is wrong with it."""
+    try:
+        with open(path, "rb") as file:
+            text = file.read(LARGEST + 1)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise ParameterError(key="controller", value=os.fspath(path), remedy=f"cannot be read ({reason})") from None
+    if len(text) > LARGEST:
+        raise ParameterError(
+            key="controller", value=os.fspath(path), remedy=f"larger than {LARGEST} bytes: no tuner's file"
+        )
+    try:
+        return TunerFile.model_validate_json(text).build()
+    except ValidationError as error:
+        problem = error.errors(include_url=False)[0]
+        key = ".".join(map(str, problem["loc"])) or "file"
+        special = {"json_invalid": os.fspath(path), "missing": MISSING}
+        what = special.get(problem["type"], problem["input"])
+        raise ParameterError(key=key, value=what, remedy=_remedy(problem["msg"]), file=path) from None
+    except TfarmError as error:
+        raise error.in_file(path) if isinstance(error, ParameterError) else error from None
+
+
+def _remedy(message: str) -> str:
+    return f"{message[:1].lower()}{message[1:]}; save it again with tfarm tune ARM --save FILE.json"
+
+
+def _listed(values: NDArray[np.float64]) -> list[float] | list[list[float]]:
+    listed: list[float] | list[list[float]] = values.tolist()
+    return listed

@@ -1,0 +1,276 @@
+"""Studies: many tunings at once, on all cores, kept line by line in a file so that a stopped study goes on.
+
+curves    learning curves over seeds: median and quartiles
+map       final cost over (alpha_c, eta_c), with the paper's (0.6, 0.8), which it calls the best, and a verdict on that
+weights   the effect of a and b of the cost
+inputs    the seventh input K(t-1) beside the six
+rules     plain (21) beside the two ways that make it robust, and learning online
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tfarm.arm import Arm
+from tfarm.arm.writing import to_toml
+from tfarm.dsp import Chain
+from tfarm.errors import ParameterError
+from tfarm.files import write_file
+from tfarm.tuner.constants import BestConstant, best_constant
+from tfarm.tuner.guard import Guard, find_guard
+from tfarm.tuner.network import initial_network
+from tfarm.tuner.training import Training, train
+from tfarm.tuner.trial import Trial, residual_rms, slew_trial
+from tfarm.tuner.tuning import Plan
+
+Tell = Callable[[int, int], None]
+
+ALPHAS = (0.0, 0.2, 0.4, 0.6, 0.8, 0.9)
+ETAS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
+PAPER = (0.6, 0.8)
+WEIGHTS = ((1.0, 0.65), (1.0, 1.3), (1.0, 2.6), (1.0, 5.2), (1.0, 10.4), (0.25, 2.6), (4.0, 2.6))
+RULES = (
+    ("dynamic", "trial", "one-step"),
+    ("clipped", "trial", "one-step"),
+    ("plain", "trial", "one-step"),
+    ("clipped", "online", "one-step"),
+    ("plain", "online", "one-step"),
+    ("clipped", "online", "whole"),
+)
+BEGINNING = b'{"key": "'  # of every line that is kept
+
+
+@dataclass(frozen=True)
+class Finished:
+    """One tuning of a study: `costs` of its trials, then a trial with what was learnt (inf where it ran away)."""
+
+    plan: Plan
+    costs: list[float]
+    cost: float
+    residual: float
+    mean_gain: float
+    stopped: bool
+    died: bool
+    best_constant_gain: float
+    best_constant_cost: float
+
+
+@dataclass(frozen=True)
+class _Ground:
+    """What tunings that differ by learning and seed alone have in common."""
+
+    trial: Trial
+    guard: Guard
+    best: BestConstant
+
+
+def run_study(
+    arm: Arm,
+    plans: Iterable[Plan],
+    chain: Chain | None = None,
+    *,
+    keep: Path | None = None,
+    tell: Tell | None = None,
+    workers: int | None = None,
+) -> list[Finished]:
+    """Each plan's tuning, in their order.  `keep` is a file of one JSON object a line that a second run starts from.
+
+    `tell(done, all)` is called after each.  Raises what `tune` raises, and ParameterError for a file that is not a
+    study's.
+    """
+    wanted = list(plans)
+    keys = [_key(arm, chain, plan) for plan in wanted]
+    known = _resumed(keep)
+    todo = {key: plan for key, plan in zip(keys, wanted, strict=True) if key not in known}
+    grounds = _grounds(arm, chain, todo.values())
+    done = len(keys) - len(todo)
+    with ThreadPoolExecutor(workers or os.cpu_count()) as pool:  # the compiled loops let other threads run
+        running = {pool.submit(_finished, grounds[_common(plan)], plan): key for key, plan in todo.items()}
+        for future in as_completed(running):
+            known[running[future]] = future.result()
+            _append(keep, running[future], known[running[future]])
+            done += 1
+            if tell is not None:
+                tell(done, len(keys))
+    return [Finished(plan, **known[key]) for key, plan in zip(keys, wanted, strict=True)]
+
+
+def _finished(ground: _Ground, plan: Plan) -> dict[str, Any]:
+    network = initial_network(plan.seed, hidden=plan.hidden, scales=plan.scales)
+    training: Training = train(ground.trial, network, ground.guard, plan.learning, plan.trials)
+    gone = training.stopped is not None
+    return {
+        "costs": training.costs.tolist(),
+        "cost": float("inf") if gone else training.result.cost,
+        "residual": float("inf") if gone else residual_rms(training.result, ground.trial.task.busy_until),
+        "mean_gain": float(training.result.K.mean()),
+        "stopped": gone,
+        "died": training.died,
+        "best_constant_gain": ground.best.gain,
+        "best_constant_cost": ground.best.cost,
+    }
+
+
+def _grounds(arm: Arm, chain: Chain | None, plans: Iterable[Plan]) -> dict[str, _Ground]:
+    grounds: dict[str, _Ground] = {}
+    for plan in plans:
+        if _common(plan) not in grounds:
+            trial = slew_trial(
+                arm, chain, K1=plan.K1, cost=plan.cost, signals=plan.signals, duration=plan.duration, count=plan.count
+            )
+            best = best_constant(trial)
+            grounds[_common(plan)] = _Ground(trial, find_guard(trial.loop, plan.guard, best.gain), best)
+    return grounds
+
+
+def _common(plan: Plan) -> str:
+    return repr((plan.cost, plan.signals, plan.guard, plan.K1, plan.duration, plan.count))
+
+
+# ---------------------------------------------------------------- what is kept
+
+
+def _key(arm: Arm, chain: Chain | None, plan: Plan) -> str:
+    text = "\n".join([to_toml(arm), repr(chain or Chain()), json.dumps(asdict(plan), default=repr)])
+    return hashlib.sha256(text.encode()).hexdigest()[:24]
+
+
+def _resumed(keep: Path | None) -> dict[str, Any]:
+    """What an earlier run kept; a last line that was cut short is taken off the file."""
+    if keep is None or not keep.exists():
+        return {}
+    try:
+        content = keep.read_bytes()
+    except OSError as error:
+        raise ParameterError(key="--keep", value=str(keep), remedy=f"cannot be read ({error.strerror})") from None
+    complete, _, cut = content.rpartition(b"\n")
+    lines, known = complete.splitlines(), {}
+    for i, line in enumerate([*lines, cut] if not BEGINNING.startswith(cut[: len(BEGINNING)]) else lines):
+        try:
+            entry = json.loads(line)
+            known[entry["key"]] = {name: entry[name] for name in Finished.__dataclass_fields__ if name != "plan"}
+        except (ValueError, KeyError, TypeError):
+            remedy = f"line {i + 1} is no result of a study; give another file"
+            raise ParameterError(key="--keep", value=str(keep), remedy=remedy) from None
+    if cut:
+        write_file(keep, complete + b"\n" * bool(complete), key="--keep")
+    return known
+
+
+def _append(keep: Path | None, key: str, result: dict[str, Any]) -> None:
+    if keep is None:
+        return
+    try:
+        with open(keep, "a", encoding="utf-8") as file:
+            file.write(json.dumps({"key": key, **result}) + "\n")
+    except OSError as error:
+        raise ParameterError(key="--keep", value=str(keep), remedy=f"cannot be written ({error.strerror})") from None
+
+
+# ---------------------------------------------------------------- which plans
+
+
+def plans_of(study: str, base: Plan, seeds: int) -> list[Plan]:
+    """The plans of a study by its name."""
+    build = {"curves": _curves, "map": _map, "weights": _weights, "inputs": _inputs, "rules": _rules}
+    if study not in build:
+        raise ParameterError(key="study", value=study, remedy=f"known are: {', '.join(build)}")
+    return [replace(plan, seed=base.seed + i) for plan in build[study](base) for i in range(seeds)]
+
+
+def _curves(base: Plan) -> list[Plan]:
+    return [base]
+
+
+def _map(base: Plan) -> list[Plan]:
+    return [replace(base, learning=replace(base.learning, alpha=alpha, eta=eta)) for alpha in ALPHAS for eta in ETAS]
+
+
+def _weights(base: Plan) -> list[Plan]:
+    return [replace(base, cost=replace(base.cost, a=a, b=b)) for a, b in WEIGHTS]
+
+
+def _inputs(base: Plan) -> list[Plan]:
+    return [replace(base, seventh_input=seventh) for seventh in (False, True)]
+
+
+def _rules(base: Plan) -> list[Plan]:
+    return [
+        replace(base, learning=replace(base.learning, rule=rule, mode=mode, sensitivity=sensitivity))  # type: ignore[arg-type]
+        for rule, mode, sensitivity in RULES
+    ]
+
+
+# ---------------------------------------------------------------- what came of them
+
+
+def study_answer(study: str, results: list[Finished], seeds: int) -> dict[str, Any]:
+    """A study's result as a dictionary: a group a plan, its seeds summed up by median and quartiles."""
+    groups = [results[i : i + seeds] for i in range(0, len(results), seeds)]
+    answer: dict[str, Any] = {"study": study, "seeds": seeds, "groups": [_group(group) for group in groups]}
+    if study == "curves":
+        answer |= _learning_curve(results)
+    if study == "map":
+        answer["verdict"] = map_verdict(groups)
+    return answer
+
+
+def _group(group: list[Finished]) -> dict[str, Any]:
+    plan, costs = group[0].plan, np.array([each.cost for each in group])
+    low, middle, high = (float(np.quantile(costs, q, method="nearest")) for q in (0.25, 0.5, 0.75))
+    return {
+        "alpha": plan.learning.alpha,
+        "eta": plan.learning.eta if isinstance(plan.learning.eta, float) else plan.learning.eta.tolist(),
+        "rule": plan.learning.rule,
+        "mode": plan.learning.mode,
+        "sensitivity": plan.learning.sensitivity,
+        "a": plan.cost.a,
+        "b": plan.cost.b,
+        "inputs": plan.scales.size,
+        "cost_median": middle,
+        "cost_quartiles": [low, high],
+        "cost_best": float(costs.min()),
+        "cost_worst": float(costs.max()),
+        "below_best_constant": int((costs < group[0].best_constant_cost).sum()),
+        "best_constant_gain": group[0].best_constant_gain,
+        "best_constant_cost": group[0].best_constant_cost,
+        "mean_gain_median": float(np.median([each.mean_gain for each in group])),
+        "residual_median": float(np.quantile([each.residual for each in group], 0.5, method="nearest")),
+        "diverged": sum(each.stopped for each in group),
+        "died": sum(each.died for each in group),
+    }
+
+
+def _learning_curve(results: list[Finished]) -> dict[str, Any]:
+    """Median and quartiles over the seeds after each trial; a run that ended early counts as inf from there on."""
+    longest = max(len(each.costs) for each in results)
+    rows = np.full((len(results), longest), np.inf)
+    for row, each in zip(rows, results, strict=True):
+        row[: len(each.costs)] = each.costs
+    low, middle, high = np.quantile(rows, [0.25, 0.5, 0.75], axis=0, method="nearest")
+    return {"median": middle.tolist(), "lower_quartile": low.tolist(), "upper_quartile": high.tolist()}
+
+
+def map_verdict(groups: list[list[Finished]]) -> str:
+    """Is the paper's (alpha_c, eta_c) the best of the map?  By medians, with the spread over the seeds beside it."""
+    medians = np.array([np.quantile([each.cost for each in group], 0.5, method="nearest") for group in groups])
+    at = [(group[0].plan.learning.alpha, group[0].plan.learning.eta) for group in groups]
+    paper, best = at.index(PAPER), int(np.argmin(medians))
+    spread = np.quantile([each.cost for each in groups[paper]], [0.25, 0.75], method="nearest")
+    rank = int((medians < medians[paper]).sum()) + 1
+    start = f"(alpha_c, eta_c) = {PAPER}: median cost {medians[paper]:.4g} (quartiles {spread[0]:.4g}, {spread[1]:.4g})"
+    if rank == 1:
+        return f"{start}, the best of {len(at)} points"
+    within = "within" if medians[best] >= spread[0] else "beyond"
+    return (
+        f"{start}, rank {rank} of {len(at)}; best {at[best]} with {medians[best]:.4g}, {within} the paper's quartiles"
+    )

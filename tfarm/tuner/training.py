@@ -1,0 +1,154 @@
+"""Learning: the paper's momentum update over trials or at every sample, and what came of it.
+
+    dw(t) = -eta_c dE/dw + alpha_c dw(t-1)   (21),      w(t+1) = w(t) + dw(t)   ((22) with its sign mended)
+
+`trial`: E is the cost of a whole slew, its gradient goes back through network, plant and time, and the weights change
+after each slew.  `online`: the paper's delta rule at every sample, with the plant's one-step sensitivity.
+
+Plain (21) often dies at K = 0 or runs away.  "The momentum alpha_c is changed dynamically", by what rule the paper does
+not say; here `dynamic` cuts the gradient to norm 0.5, and where the cost rises the step is taken back and halved and
+the momentum set to zero.  `clipped` only cuts the gradient, `plain` is (21) as it stands.  Online there is no cost to
+compare at every sample, and `dynamic` is `clipped`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm.checks import not_negative, positive
+from tfarm.errors import ParameterError, did_you_mean
+from tfarm.tuner import kernel
+from tfarm.tuner.guard import Guard
+from tfarm.tuner.network import Network
+from tfarm.tuner.trial import Record, Trial
+
+Real = NDArray[np.float64]
+Mode = Literal["trial", "online"]
+Rule = Literal["dynamic", "clipped", "plain"]
+Sensitivity = Literal["one-step", "whole"]
+
+RULES: dict[str, int] = {"dynamic": kernel.BACKTRACKING, "clipped": kernel.CLIPPED, "plain": kernel.PLAIN}
+MOST_TRIALS = 1_000_000
+
+
+@dataclass(frozen=True, kw_only=True)
+class Learning:
+    """How to learn: `eta` (one number, or one a weight as `Network.weights` lists them), `alpha`, mode and rule.
+
+    `clip` is the norm that the gradient is cut to; learning stops once the root mean square of x over a trial is below
+    `enough` [N m] (the paper's stopping rule; 0 never stops).
+    """
+
+    mode: Mode = "trial"
+    rule: Rule = "dynamic"
+    sensitivity: Sensitivity = "one-step"
+    eta: float | Real = 0.8
+    alpha: float = 0.6
+    clip: float = 0.5
+    enough: float = 0.0
+
+    def __post_init__(self) -> None:
+        wanted = {"mode": ("trial", "online"), "rule": tuple(RULES), "sensitivity": ("one-step", "whole")}
+        for key, choices in wanted.items():
+            value = getattr(self, key)
+            if value not in choices:
+                raise ParameterError(key=key, value=value, remedy=did_you_mean(str(value), choices))
+        self._check_rates()
+        momentum = not_negative("alpha", self.alpha, "the momentum factor lies in [0, 1)")
+        if not momentum < 1.0:
+            raise ParameterError(
+                key="alpha", value=momentum, remedy="the momentum factor lies in [0, 1): 1 never forgets"
+            )
+        positive("clip", self.clip, "the norm that a gradient is cut to is positive and finite")
+        not_negative("enough", self.enough, "the error to stop at is zero or positive, in N m")
+
+    def _check_rates(self) -> None:
+        remedy = "a learning rate is positive and finite, 0.8 in the paper"
+        for rate in np.atleast_1d(np.asarray(self.eta, dtype=float)).ravel():
+            if not 0.0 < rate < math.inf:
+                raise ParameterError(key="eta", value=float(rate), remedy=remedy)
+
+    def rates(self, size: int) -> Real:
+        """The learning rate of each of `size` weights."""
+        rates = np.asarray(self.eta, dtype=float)
+        if rates.shape not in ((), (size,)):
+            raise ParameterError(key="eta", value=rates.shape, remedy=f"one learning rate, or one a weight, {size}")
+        return np.ascontiguousarray(np.broadcast_to(rates, (size,)), dtype=float).copy()
+
+
+@dataclass(frozen=True)
+class Stopped:
+    """A run that diverged: at `sample` of `trial` (both from 0) the root moment passed `bound` [N m]."""
+
+    trial: int
+    sample: int
+    bound: float
+
+    def __str__(self) -> str:
+        return (
+            f"diverged in trial {self.trial + 1} at sample {self.sample}: the root moment passed {self.bound:.4g} N m, "
+            "at which the arm is folded up"
+        )
+
+
+@dataclass(frozen=True)
+class Training:
+    """`costs` of the trials as they were run, the network that came out, and a trial with it as it is.
+
+    Where learning diverged the last cost is inf and the network is that of the last trial that did not.
+    """
+
+    network: Network
+    guard: Guard
+    costs: Real
+    result: Record
+    stopped: Stopped | None
+    reached: bool
+
+    @property
+    def died(self) -> bool:
+        """Whether the gain was driven to nothing."""
+        return bool(self.result.K.max(initial=0.0) < 1e-3)
+
+
+def train(trial: Trial, network: Network, guard: Guard, learning: Learning, trials: int) -> Training:
+    """Learn for so many trials (1 to 1,000,000), starting with `network`; memory does not grow with them.
+
+    The same inputs give the same bits.  Raises ParameterError for a number of trials or rates that do not fit.
+    """
+    if isinstance(trials, bool) or not isinstance(trials, int) or not 1 <= trials <= MOST_TRIALS:
+        raise ParameterError(key="trials", value=trials, remedy=f"a whole number of trials from 1 to {MOST_TRIALS}")
+    weights, costs = network.weights, np.zeros(trials)
+    made, sample = _learn(trial, network, guard, learning, weights, costs)
+    learnt = network.with_weights(weights)
+    result = trial.with_network(learnt, guard.array)
+    stopped = Stopped(made - 1, int(sample), float(trial.numbers[4])) if sample >= 0 else None
+    return Training(learnt, guard, costs[:made], result, stopped, made < trials and stopped is None)
+
+
+def _learn(
+    trial: Trial, network: Network, guard: Guard, learning: Learning, weights: Real, costs: Real
+) -> tuple[int, int]:
+    """The compiled loop of the mode; changes `weights`, fills `costs`."""
+    rates = learning.rates(weights.size)
+    run, work = trial.run(*network.W1.shape[::-1]), trial.work(network.scales.size)
+    longest = math.inf if learning.rule == "plain" else float(learning.clip)
+    common = (trial.model, trial.reference, trial.numbers, network.scales, guard.array, weights, rates)
+    if learning.mode == "online" and learning.sensitivity == "whole":
+        total = np.zeros(weights.size)
+        return kernel.learn_by_sensitivities(
+            *common, float(learning.alpha), longest, float(learning.enough), costs, run, work, total
+        )
+    if learning.mode == "online":
+        return kernel.learn_by_samples(
+            *common, float(learning.alpha), trial.reply, longest, float(learning.enough), costs, run, work
+        )
+    rule = RULES[learning.rule]
+    return kernel.learn_by_trials(
+        *common, float(learning.alpha), rule, longest, float(learning.enough), costs, run, work
+    )

@@ -1,0 +1,229 @@
+"""A trial: the slew of an arm under u - K x, ready for the compiled loop, and what it costs.
+
+    E(t) = a x(t)^2/2 + b e(t)^2/2,   e = u - K x   (23);   cost of a trial: T times the sum of E over its samples
+
+x is the root moment, u the control input, K the gain on the moment (K2 of the law (19)).  What u and x contain during
+the slew the paper leaves open:
+
+    vibration   x: the moment less the rigid arm's; u = K1 (theta_t_ref - theta_t); torque = J theta_dd_ref + e
+    total       x: the whole moment; u holds the feedforward J theta_dd_ref too; torque = e
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import Arm
+from tfarm.arm.checks import not_negative, number, positive
+from tfarm.dsp import Chain, Gains, SampledLoop, Scenario, sampled_loop, scenario
+from tfarm.errors import ParameterError, did_you_mean
+from tfarm.tuner import kernel
+from tfarm.tuner.network import Network
+
+Real = NDArray[np.float64]
+Signals = Literal["vibration", "total"]
+
+SILENT = Network(np.zeros((1, 6)), np.zeros(1), np.ones(6))
+FOLDED_UP = 10.0  # the loop has run away where the root moment is this many times EI/L
+DURATION, MODES = 3.0, 6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cost:
+    """The weighting coefficients `a` [1/(N m)^2 s], of the root moment, and `b`, of the control signal e."""
+
+    a: float = 1.0
+    b: float = 2.6
+
+    def __post_init__(self) -> None:
+        for name in ("a", "b"):
+            meaning = f"the weighting coefficient {name} is zero or positive"
+            object.__setattr__(self, name, not_negative(name, getattr(self, name), meaning))
+        if self.a == 0.0 == self.b:
+            raise ParameterError(key="a", value=self.a, remedy="a and b are both zero: a cost of nothing")
+
+
+@dataclass(frozen=True)
+class Record:
+    """The signals of a trial at its samples: `x`, `u`, `e` [N m], gain `K`; `stopped`: the sample where it ran away."""
+
+    t: Real
+    x: Real
+    u: Real
+    e: Real
+    K: Real
+    cost: float
+    stopped: int | None
+
+
+class Run(NamedTuple):
+    """The arrays that a trial fills (see `kernel`)."""
+
+    inputs: Real
+    hidden: Real
+    signals: Real
+
+
+@dataclass(frozen=True)
+class Trial:
+    """An arm's loop with `K1`, a chain whose converters are taken as ideal, a slew `task` and a cost.
+
+    The controller knows the arm only by `task`, so the slew of one arm may be asked of another one's loop.
+    """
+
+    loop: SampledLoop
+    task: Scenario
+    cost: Cost
+    signals: Signals
+
+    @property
+    def arm(self) -> Arm:
+        """The arm that moves."""
+        return self.loop.plant.arm
+
+    @property
+    def n(self) -> int:
+        """How many samples it has."""
+        return self.task.feedforward.size
+
+    @cached_property
+    def model(self) -> tuple[Real, ...]:
+        """A^T, A, B and the rows that read rate and moment: s' = A s + B torque (see `kernel`)."""
+        A = self.loop.with_gains(0.0, 0.0).matrix()
+        upper, real = self.loop.pulse.kept()
+        last = 2 * upper.size + real.size + 2  # where the torque of the sample before is kept: B is 1 there
+        rate, moment = (-self.loop.with_gains(*gains).matrix()[last] for gains in ((1.0, 0.0), (0.0, 1.0)))
+        B = self.loop.pulse.matrices()[1]
+        drive = np.r_[B, np.zeros(len(A) - len(B))]
+        return tuple(np.ascontiguousarray(each) for each in (A.T, A, drive, rate, moment))
+
+    @cached_property
+    def reference(self) -> Real:
+        """What is wanted at each sample (see `kernel`)."""
+        task, none = self.task, np.zeros(self.n)
+        counted, rest = (task.feedforward, none) if self.signals == "total" else (none, task.feedforward)
+        return np.ascontiguousarray(np.c_[task.hub_rate, counted, rest, task.rigid_moment])
+
+    @cached_property
+    def numbers(self) -> Real:
+        """K1, a, b, T, the largest moment, and after how many samples x answers a torque."""
+        link, sampling = self.arm.link, self.loop.chain.sampling
+        bound, lag = FOLDED_UP * link.EI / link.length, 1 + sampling.whole_delay
+        return np.array([self.loop.gains.K1, self.cost.a, self.cost.b, sampling.period, bound, float(lag)])
+
+    @cached_property
+    def reply(self) -> float:
+        """dx/d(torque) at the first sample that feels it: the one-step sensitivity of the plant."""
+        _, A, B, _, moment = self.model
+        return float(moment @ np.linalg.matrix_power(A, int(self.numbers[5]) - 1) @ B)
+
+    def run(self, inputs: int = 6, hidden: int = 1) -> Run:
+        """Empty arrays for a network of that size."""
+        return Run(np.zeros((self.n, inputs)), np.zeros((self.n, hidden)), np.zeros((self.n, 5)))
+
+    def work(self, inputs: int = 6) -> tuple[Real, ...]:
+        """Room for `kernel.forward` and `kernel.backward`."""
+        size = self.model[2].size
+        return np.zeros(size), np.zeros(size), np.zeros(inputs), np.zeros(5)
+
+    # ------------------------------------------------------------ one trial
+
+    def with_network(self, network: Network, guard: Real) -> Record:
+        """The trial with a network as it is."""
+        run = self.run(*network.W1.shape[::-1])
+        done = kernel.forward(
+            self.model, self.reference, self.numbers, network.scales, guard, network.weights, run,
+            self.work(network.scales.size),
+        )  # fmt: skip
+        return self.record(done, run)
+
+    def with_constant(self, K: float) -> Record:
+        """The trial with a constant gain: a guard that leaves no choice."""
+        return self.with_network(SILENT, np.array([1.0, K, K]))
+
+    def gradient(self, network: Network, guard: Real) -> tuple[float, Real]:
+        """The cost of the trial and its derivative by every weight, exact: back through network, plant and time.
+
+        Raises ParameterError where the trial runs away: there is no cost then.
+        """
+        run, work = self.run(*network.W1.shape[::-1]), self.work(network.scales.size)
+        weights, gradient = network.weights, np.zeros(network.weights.size)
+        done = kernel.forward(self.model, self.reference, self.numbers, network.scales, guard, weights, run, work)
+        if done < self.n:
+            raise ParameterError(key="weights", value=done, remedy="the loop runs away at that sample; guard the gain")
+        kernel.backward(self.model, self.numbers, network.scales, weights, run, work, gradient)
+        return float(kernel.trial_cost(done, self.numbers, run.signals)), gradient
+
+    def sample_gradient(self, network: Network, guard: Real, k: int) -> Real:
+        """The delta rule's gradient: of a x^2/2 at the first sample that feels the torque of sample k, plus b e^2/2.
+
+        x depends on K(k) by the plant's one-step sensitivity, e directly; all earlier signals are data.
+        """
+        run, lag = self.run(*network.W1.shape[::-1]), int(self.numbers[5])
+        work, weights = self.work(network.scales.size), network.weights
+        kernel.forward(self.model, self.reference, self.numbers, network.scales, guard, weights, run, work)
+        gradient = np.zeros(weights.size)
+        x_next = float(run.signals[k + lag, kernel.X])
+        kernel.sample_gradient(k, self.numbers, self.reply, x_next, run, weights, gradient)
+        return gradient
+
+    def record(self, done: int, run: Run) -> Record:
+        """What the arrays hold, as a record; a run that was stopped costs inf."""
+        x, u, e, K = (run.signals[:done, i].copy() for i in (kernel.X, kernel.U, kernel.E, kernel.GAIN))
+        whole = done == self.n
+        cost = float(kernel.trial_cost(done, self.numbers, run.signals)) if whole else np.inf
+        return Record(self.task.t[:done], x, u, e, K, cost, None if whole else int(done))
+
+
+def slew_trial(
+    arm: Arm,
+    chain: Chain | None = None,
+    *,
+    K1: float = 0.3,
+    cost: Cost | None = None,
+    signals: Signals = "vibration",
+    duration: float = DURATION,
+    count: int = MODES,
+    known: Arm | None = None,
+) -> Trial:
+    """The slew of an arm with `count` flexible modes; `known` is the arm that the controller believes it moves.
+
+    Raises ParameterError for an arm that cannot turn, a hub without inertia, and numbers out of range.
+    """
+    if signals not in ("vibration", "total"):
+        raise ParameterError(key="signals", value=signals, remedy=did_you_mean(str(signals), ("vibration", "total")))
+    rate_gain = number("K1", K1, "the hub rate gain is a finite number of N m s/rad")
+    length = positive("duration", duration, "a trial lasts a positive number of seconds")
+    chain = with_signals(Chain() if chain is None else chain, signals)
+    if length < chain.slew.rise_time:
+        remedy = f"a trial lasts at least as long as its slew, {chain.slew.rise_time:g} s"
+        raise ParameterError(key="duration", value=length, remedy=remedy)
+    if arm.hub.inertia == 0.0:
+        remedy = "the root moment of a hub without inertia is the torque itself, and feeding it back an algebraic loop"
+        raise ParameterError(key="hub.inertia", value=0.0, remedy=f"{remedy}; give the hub an inertia")
+    loop = sampled_loop(arm, Gains(K1=rate_gain, K2=1.0), chain, count=count)
+    task = scenario("slew", arm if known is None else known, chain, length)
+    return Trial(loop, task, Cost() if cost is None else cost, signals)
+
+
+def with_signals(chain: Chain, signals: Signals) -> Chain:
+    """The chain with that reading of the moment during the slew."""
+    return replace(chain, slew=replace(chain.slew, reading=signals))
+
+
+def no_guard() -> Real:
+    """The plain softplus."""
+    return np.zeros(3)
+
+
+def residual_rms(record: Record, busy_until: float) -> float:
+    """Root mean square of x [N m] from the end of the slew on (0 if it ends with it); inf where the loop ran away."""
+    after: Any = record.x[record.t >= busy_until * (1 - 1e-12)]
+    if record.stopped is not None:
+        return float("inf")
+    return float(np.sqrt(np.mean(after**2))) if after.size else 0.0

@@ -1,0 +1,190 @@
+"""One call: the guard, the training, and what the tuner has to be held against, as a record and as a dictionary."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+
+from tfarm.arm import Arm
+from tfarm.dsp import Chain, Gains, Simulator, scenario
+from tfarm.dsp.results import simulation_answer
+from tfarm.errors import ParameterError
+from tfarm.tuner.bound import lq_bound
+from tfarm.tuner.comparison import Row
+from tfarm.tuner.constants import BestConstant, best_constant
+from tfarm.tuner.controller import TunedGain
+from tfarm.tuner.guard import GuardKind, find_guard
+from tfarm.tuner.network import initial_network
+from tfarm.tuner.saving import SavedTuner, weights_answer
+from tfarm.tuner.shaping import shaped_trial
+from tfarm.tuner.training import Learning, Training, train
+from tfarm.tuner.trial import DURATION, MODES, Cost, Record, Signals, Trial, residual_rms, slew_trial, with_signals
+
+BOUND_NOTES = {
+    "vibration": "the least cost of any control signal e on this slew, with full state and preview",
+    "total": "the least cost of any torque: under this reading the cost does not ask the arm to move, so none is best",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """What to tune and how: the paper's figures where it gives them.
+
+    `K1` [N m s/rad], `duration` of a trial [s], flexible modes `count`, `hidden` neurons; `seventh_input` feeds K(t-1)
+    back too, the gain that the paper names among its inputs; `scale` [N m] divides the other six.
+    """
+
+    cost: Cost = field(default_factory=Cost)
+    learning: Learning = field(default_factory=Learning)
+    signals: Signals = "vibration"
+    guard: GuardKind = "time-varying"
+    trials: int = 100
+    seed: int = 0
+    K1: float = 0.3
+    duration: float = DURATION
+    count: int = MODES
+    hidden: int = 6
+    seventh_input: bool = False
+    scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.scale < np.inf:
+            raise ParameterError(key="scale", value=self.scale, remedy="a scale is a positive, finite number of N m")
+
+    @property
+    def scales(self) -> np.ndarray[Any, Any]:
+        """The scales of the network's inputs."""
+        return np.r_[np.full(6, self.scale), np.ones(int(self.seventh_input))]
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """A tuner, trained, beside its yardsticks; all are of one trial.
+
+    `shaped`: the slew through the ZV and the EI shaper without moment feedback.  It arrives later, and its x and e
+    count from its own reference, so that the bound of the slew as it is does not hold for it.
+    """
+
+    trial: Trial
+    plan: Plan
+    training: Training
+    without: Record
+    best_constant: BestConstant
+    bound: Record
+    shaped: dict[str, tuple[Trial, Record]]
+
+    def saved(self) -> SavedTuner:
+        """What `saving.save` writes."""
+        guard, plan, period = self.training.guard, self.plan, self.trial.task.period
+        arm, network = self.trial.arm.name, self.training.network
+        return SavedTuner(network, guard.kind, guard.lo, guard.hi, plan.K1, plan.signals, plan.cost, arm, period)
+
+    def gain(self) -> TunedGain:
+        """The trained controller."""
+        return self.saved().gain()
+
+
+def tune(arm: Arm, plan: Plan | None = None, chain: Chain | None = None) -> Tuning:
+    """Find the guard, train, and measure the yardsticks.
+
+    Raises ParameterError for what cannot be, and CertificationError where there is no guard.
+    """
+    plan = Plan() if plan is None else plan
+    network = initial_network(plan.seed, hidden=plan.hidden, scales=plan.scales)
+    trial = slew_trial(
+        arm, chain, K1=plan.K1, cost=plan.cost, signals=plan.signals, duration=plan.duration, count=plan.count
+    )
+    best = best_constant(trial)
+    guard = find_guard(trial.loop, plan.guard, best.gain)
+    training = train(trial, network, guard, plan.learning, plan.trials)
+    shaped = {kind: shaped_trial(trial, kind) for kind in ("ZV", "EI")}
+    return Tuning(
+        trial=trial,
+        plan=plan,
+        training=training,
+        without=trial.with_constant(0.0),
+        best_constant=best,
+        bound=lq_bound(trial),
+        shaped={kind: (each, each.with_constant(0.0)) for kind, each in shaped.items()},
+    )
+
+
+def tune_answer(tuning: Tuning) -> dict[str, Any]:
+    """The tuning as a dictionary of plain numbers, texts and lists."""
+    training, plan, guard = tuning.training, tuning.plan, tuning.training.guard
+    result, busy = training.result, tuning.trial.task.busy_until
+    stopped = training.stopped
+    return {
+        "arm": tuning.trial.arm.name,
+        "mode": plan.learning.mode,
+        "rule": plan.learning.rule,
+        "sensitivity": plan.learning.sensitivity,
+        "signals": plan.signals,
+        "seed": plan.seed,
+        "K1": plan.K1,
+        "trials": int(training.costs.size),
+        "cost": training.costs.tolist(),
+        "cost_tuned": result.cost,
+        "cost_without": tuning.without.cost,
+        "cost_best_constant": tuning.best_constant.cost,
+        "best_constant_gain": tuning.best_constant.gain,
+        "cost_lq_bound": tuning.bound.cost,
+        "lq_bound_note": BOUND_NOTES[plan.signals],
+        **_shaped(tuning),
+        "gain": {"t": result.t.tolist(), "K": result.K.tolist()},
+        "residual_moment_rms": residual_rms(result, busy),
+        "residual_without": residual_rms(tuning.without, busy),
+        "guard": [guard.lo, guard.hi],
+        "guard_kind": guard.kind,
+        "guard_proven": guard.is_proven,
+        "guard_modes": guard.modes_used,
+        "guard_settled": guard.is_settled,
+        "guard_says": guard.sentence,
+        "reached_preset_error": training.reached,
+        "stopped": None if stopped is None else str(stopped),
+        "weights": weights_answer(training.network),
+    }
+
+
+def _shaped(tuning: Tuning) -> dict[str, Any]:
+    """The better shaper's cost, and both; how much later they arrive."""
+    costs = {kind: record.cost for kind, (_, record) in tuning.shaped.items()}
+    late = {kind: trial.task.busy_until - tuning.trial.task.busy_until for kind, (trial, _) in tuning.shaped.items()}
+    note = "no moment feedback; judged by the shaped slew, which arrives later, so that cost_lq_bound does not bound it"
+    return {
+        "cost_shaped": min(costs.values()),
+        "shaped": {kind: {"cost": costs[kind], "arrives_later_by_s": late[kind]} for kind in costs},
+        "shaped_note": note,
+    }
+
+
+def comparison_answer(rows: list[Row]) -> list[dict[str, Any]]:
+    """The rows of a comparison as dictionaries."""
+    return [
+        {key: value._asdict() if hasattr(value, "_asdict") else value for key, value in _items(row)} for row in rows
+    ]
+
+
+def _items(row: Row) -> list[tuple[str, Any]]:
+    return [(name, getattr(row, name)) for name in row.__dataclass_fields__]
+
+
+def controlled_answer(
+    arm: Arm, saved: SavedTuner, chain: Chain, name: str, duration: float, *, count: int = 20, between: int = 0
+) -> dict[str, Any]:
+    """A scenario simulated with a saved tuner as the gain, as `tfarm.dsp.results.simulated_answer` says it.
+
+    Its guard is proven for the loop that it was trained on, not for every arm and chain that it may be tried with.
+    """
+    chain = with_signals(chain, saved.signals)
+    task = scenario(name, arm, chain, duration)
+    run = Simulator(arm, chain, task, count=count, between=between).gain_schedule(saved.K1, saved.gain())
+    answer = simulation_answer(arm.name, Gains(K1=saved.K1, K2=0.0), run, None)
+    return answer | {"K2": None, "controller": _described(saved)}
+
+
+def _described(saved: SavedTuner) -> dict[str, Any]:
+    about = {"trained_on": saved.arm, "guard_kind": saved.guard_kind, "guard": [saved.lo, saved.hi], "K1": saved.K1}
+    return about | {"signals": saved.signals, "period_s": saved.period, **asdict(saved.cost)}
