@@ -9,11 +9,13 @@ import pytest
 
 import tfarm
 from tfarm.audit.assumptions import (
+    GAINS,
     assumptions_answer,
     candidate_depths,
     candidate_inertias,
     has_hub_inertia,
     hub_study,
+    loop_verdicts,
     own_depth,
     section_study,
 )
@@ -183,3 +185,23 @@ def test_the_answer_is_plain_json_with_the_numbers_of_the_studies():
     assert answer["hub"]["locked_rad_s"] == hub_study(PAPER, count=2).locked.tolist()
     (own,) = (row for row in answer["hub"]["candidates"] if row["is_own"])
     assert own["natural_frequency_rad_s"][0] == pytest.approx(71.505682466890, rel=1e-13)
+
+
+def test_verdicts_are_those_of_the_loop_itself():
+    """The arm's own row says what `margins` says of it, and every row what its own closed-loop poles say."""
+    arm = tfarm.load("sasaki2012-lab")
+    study = hub_study(arm, (0.05, 0.1, 0.5))
+    verdicts = loop_verdicts(study)
+    assert verdicts[1].K2_below == pytest.approx(tfarm.margins(arm, GAINS).windows["K2"].around[1], rel=1e-12)
+    for each, found in zip(study.arms, verdicts, strict=True):
+        below, above = (replace(GAINS, K2=found.K2_below * factor) for factor in (0.99, 1.01))
+        assert found.verdict == "stable"
+        assert tfarm.closed_loop_poles(each, below, 6).unstable == 0
+        assert tfarm.closed_loop_poles(each, above, 6).unstable == 2
+
+
+def test_a_locked_hub_has_no_loop():
+    arm = replace(tfarm.load("sasaki2012-lab"), hub=tfarm.Hub(inertia=math.inf))
+    assert loop_verdicts(section_study(arm, (0.006,))) is None
+    rows = assumptions_answer(arm, 1)["section"]["candidates"]
+    assert {(row["verdict"], row["K2_below"]) for row in rows} == {("no loop", None)}

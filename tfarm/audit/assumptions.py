@@ -15,9 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, Hub, Section
+from tfarm.arm import Arm, Hub, HubFeedback, Section
 from tfarm.arm.checks import positive
-from tfarm.errors import ParameterError
+from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.loop.stability import stability
+from tfarm.loop.windows import gain_windows
 from tfarm.spectrum import modes
 
 Real = NDArray[np.float64]
@@ -26,6 +28,7 @@ COUNT = 4
 AREA = 6.0e-4  # m^2, the paper's
 DEPTHS = (0.002, 0.003, 0.004, 0.006, 0.008, 0.010, 0.015, 0.020, 0.030, 0.040, 0.060)  # m, for that area
 INERTIAS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # kg m^2
+GAINS = HubFeedback(K1=0.3, K2=0.3)  # the default loop, for which each candidate gets a verdict
 SAME = 1e-9  # relative: so near to the arm's own value a candidate is that value
 HELD_SECTION = "area, shear factor and all else held: I = A depth^2/12, so one per cent of depth counts twice"
 HELD_HUB = "all else held"
@@ -42,6 +45,7 @@ class SectionStudy:
     """
 
     arm: Arm
+    arms: tuple[Arm, ...]
     depth: Real
     width: Real
     second_moment: Real
@@ -60,12 +64,40 @@ class HubStudy:
     """
 
     arm: Arm
+    arms: tuple[Arm, ...]
     hub_inertia: Real
     natural_frequency: Real
     sensitivity: Real
     locked: Real
     pinned: Real
     is_own: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class LoopVerdict:
+    """What becomes of the default loop: "stable", "marginal", "unstable" or "undecided", and the upper edge of K2.
+
+    `K2_below` is None where the loop is not stable.
+    """
+
+    verdict: str
+    K2_below: float | None
+
+
+def loop_verdicts(study: SectionStudy | HubStudy) -> tuple[LoopVerdict, ...] | None:
+    """The verdict on each candidate under `GAINS`; None where the hub is locked or a free pin: K2 has no loop there."""
+    if not all(has_hub_inertia(arm) for arm in study.arms):
+        return None
+    return tuple(_loop_verdict(arm) for arm in study.arms)
+
+
+def _loop_verdict(arm: Arm) -> LoopVerdict:
+    try:
+        found = stability(arm, GAINS)
+        window = gain_windows(found, "K2").around
+    except ConvergenceError:
+        return LoopVerdict("undecided", None)
+    return LoopVerdict(found.verdict, None if window is None else window[1])
 
 
 def own_depth(arm: Arm) -> float:
@@ -117,6 +149,7 @@ def section_study(arm: Arm, depths: Sequence[float] | None = None, *, count: int
     frequency, sensitivity = _frequencies(arms, count, "second_moment")
     return SectionStudy(
         arm=arm,
+        arms=tuple(arms),
         depth=depth,
         width=area / depth,
         second_moment=second_moment,
@@ -134,10 +167,12 @@ def hub_study(arm: Arm, inertias: Sequence[float] | None = None, *, count: int =
     meaning = "the hub inertia of a candidate is a positive, finite number of kg m^2"
     chosen = candidate_inertias(arm) if inertias is None else inertias
     values = [positive("inertias", inertia, meaning) for inertia in chosen]
-    frequency, sensitivity = _frequencies([_with_hub(arm, inertia) for inertia in values], count, "hub_inertia")
+    arms = [_with_hub(arm, inertia) for inertia in values]
+    frequency, sensitivity = _frequencies(arms, count, "hub_inertia")
     limits, _ = _frequencies([_with_hub(arm, math.inf), _with_hub(arm, 0.0)], count, "hub_inertia")
     return HubStudy(
         arm=arm,
+        arms=tuple(arms),
         hub_inertia=np.array(values),
         natural_frequency=frequency,
         sensitivity=sensitivity,
@@ -161,7 +196,8 @@ def assumptions_answer(arm: Arm, count: int = COUNT) -> dict[str, Any]:
             for h, b, I, row in zip(study.depth, study.width, study.second_moment, _rows(study), strict=True)
         ],
     }
-    return {"arm": arm.name, "count": count, "section": section, "hub": _hub_answer(arm, count)}
+    gains = {"K1": GAINS.K1, "K2": GAINS.K2}
+    return {"arm": arm.name, "count": count, "gains": gains, "section": section, "hub": _hub_answer(arm, count)}
 
 
 def _hub_answer(arm: Arm, count: int) -> dict[str, Any] | None:
@@ -181,10 +217,17 @@ def _hub_answer(arm: Arm, count: int) -> dict[str, Any] | None:
 
 
 def _rows(study: SectionStudy | HubStudy) -> list[dict[str, Any]]:
-    columns = zip(study.is_own, study.natural_frequency, study.sensitivity, strict=True)
+    verdicts = loop_verdicts(study) or (LoopVerdict("no loop", None),) * len(study.arms)
+    columns = zip(study.is_own, study.natural_frequency, study.sensitivity, verdicts, strict=True)
     return [
-        {"is_own": bool(own), "natural_frequency_rad_s": frequency.tolist(), "sensitivity": sensitivity.tolist()}
-        for own, frequency, sensitivity in columns
+        {
+            "is_own": bool(own),
+            "natural_frequency_rad_s": frequency.tolist(),
+            "sensitivity": sensitivity.tolist(),
+            "verdict": loop.verdict,
+            "K2_below": loop.K2_below,
+        }
+        for own, frequency, sensitivity, loop in columns
     ]
 
 

@@ -99,16 +99,20 @@ def print_assumptions(answer: dict[str, Any]) -> None:
     )
     print(f"one per cent more of I (with {section['held']})")
     print("or of I_h (with all else held).")
+    gains = answer["gains"]
+    print(f"loop: the verdict at K1 = {gains['K1']:g}, K2 = {gains['K2']:g}, and up to which K2 it stays stable.")
 
 
 def _print_candidates(study: dict[str, Any], keys: tuple[str, ...], titles: tuple[str, ...], parameter: str) -> None:
     count = len(study["candidates"][0]["sensitivity"])
     modes = (title for i in range(1, count + 1) for title in (f"w{i} [rad/s]", f"%/% {parameter}"))
-    table = new_table(("", *titles, *modes))
+    table = new_table(("", *titles, *modes, "loop", "K2 below"))
     for row in study["candidates"]:
         pairs = zip(row["natural_frequency_rad_s"], row["sensitivity"], strict=True)
         numbers = (text for w, slope in pairs for text in (f"{w:.8g}", f"{slope:.4f}"))
-        table.add_row("*" if row["is_own"] else "", *(f"{row[key]:.4g}" for key in keys), *numbers)
+        edge = "-" if row["K2_below"] is None else f"{row['K2_below']:.6g}"
+        values = (f"{row[key]:.4g}" for key in keys)
+        table.add_row("*" if row["is_own"] else "", *values, *numbers, row["verdict"], edge)
     show(table)
 
 

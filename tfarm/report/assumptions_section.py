@@ -10,7 +10,15 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from tfarm.arm import Arm
-from tfarm.audit.assumptions import HubStudy, SectionStudy, has_hub_inertia, hub_study, section_study
+from tfarm.audit.assumptions import (
+    GAINS,
+    HubStudy,
+    SectionStudy,
+    has_hub_inertia,
+    hub_study,
+    loop_verdicts,
+    section_study,
+)
 from tfarm.report.digits import fixed, plain, significant
 from tfarm.report.figures import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, Picture, blank, headline, style
 from tfarm.report.paper import is_from_paper
@@ -116,7 +124,7 @@ def section_table(study: SectionStudy) -> Table:
         stem="assumptions-section",
         title="Candidate sections: rectangles of this area",
         caption=SECTION_TABLE,
-        columns=(_which(study), *size, *_modes(study)),
+        columns=(_which(study), *size, *_modes(study), *_loop(study)),
     )
 
 
@@ -130,6 +138,7 @@ def hub_table(study: HubStudy) -> Table:
             _which(study),
             _value("hub_inertia_kg_m2", "I_h", "kg m²", study.hub_inertia, study),
             *_modes(study),
+            *_loop(study),
         ),
     )
 
@@ -154,6 +163,19 @@ def _modes(study: Study) -> Iterator[Column]:
         yield number_column(
             f"mode_{i}_sensitivity", f"mode {i}", "%/%", slope, fixed(slope, 4), group="sensitivity", tint=_tint(study)
         )
+
+
+def _loop(study: Study) -> Iterator[Column]:
+    """The verdict on the default loop, and up to which K2 it stays stable; nothing where there is no loop."""
+    verdicts = loop_verdicts(study)
+    if verdicts is None:
+        return
+    words = [each.verdict for each in verdicts]
+    edges = ["-" if each.K2_below is None else significant(each.K2_below, 6) for each in verdicts]
+    group = f"loop at K1 = {GAINS.K1:g}, K2 = {GAINS.K2:g}"
+    yield Column(key="verdict", title="verdict", values=words, cells=words, group=group, tint=_tint(study))
+    values = ["" if each.K2_below is None else each.K2_below for each in verdicts]
+    yield Column(key="K2_below", title="stable below K2", values=values, cells=edges, group=group, tint=_tint(study))
 
 
 def _tint(study: Study) -> list[str]:
