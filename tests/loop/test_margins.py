@@ -206,3 +206,16 @@ def test_of_a_rigid_rod_the_crossing_is_where_rate_meets_inertia() -> None:
     crossed = unit_crossings(loop, np.asarray(grid(arm, 20.0)))
     assert crossed[0] == pytest.approx(1e-3 / arm.total_inertia, rel=1e-6)
     assert isinstance(arm, Arm)
+
+
+def test_a_passive_hub_keeps_its_disk_margin_without_damping():
+    """At C = 0 and K2 = 0, L = i K1 w theta is imaginary: |S| <= 1 and disk margin 2 in any band; any delay is too long."""
+    arm = tfarm.load("sasaki2012")
+    for band in (1000.0, 20000.0):
+        found = margins(arm, HubFeedback(K1=0.3, K2=0.0), band)
+        assert (found.exact_disk, found.exact_peak) == pytest.approx(
+            (2.0, 1.0), rel=1e-7
+        )  # eps |L|, and |L| is 1e8 next to a pole
+        assert found.exact_delay == 0.0
+    both = margins(arm, HubFeedback(K1=0.3, K2=0.1))
+    assert (both.exact_delay, both.exact_disk, both.exact_peak) == (0.0, 0.0, np.inf)

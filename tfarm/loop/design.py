@@ -19,6 +19,7 @@ from tfarm.errors import ConvergenceError, ParameterError
 
 from .damping import least_damping
 from .frequencies import band_of, grid
+from .margins import disk_at
 from .plant import Loop
 from .regions import region
 from .residual import residual_moment
@@ -142,8 +143,7 @@ def _holds(arm: Arm, law: HubFeedback) -> bool:
 
 
 def _disk(loop: Loop, omega: Real) -> float:
-    L = loop.loop_function(1j * omega)
-    return float(2 * abs((1 + L) / (1 - L)).min())
+    return float(disk_at(loop, omega).min())
 
 
 def _starts(values: Real, K1: Real, K2: Real) -> list[Real]:

@@ -1,8 +1,9 @@
 """Gain, phase, delay and disk margin of the exact loop function L(i w), and never without the verdict.
 
 A gain margin of an unstable loop is a number that means nothing.  At C = 0 the loop function has poles on the axis at
-ever higher frequency, so that any delay, however short, destabilises some mode: the exact delay and disk margins are 0
-and the peak sensitivity is infinite; what the loop has up to a band is given beside them, with the band.
+ever higher frequency, so that any delay, however short, destabilises some mode: the exact delay margin is 0.  With
+K2 != 0 the disk margin is 0 too and the peak sensitivity infinite; with K2 = 0 the hub is passive, and they are not.
+What the loop has up to a band is given beside them, with the band.
 
 Disk margin: the largest alpha for which the loop bears every factor (2 + alpha d)/(2 - alpha d), |d| < 1 (Seiler,
 Packard and Gahinet 2020, symmetric disks), which is 2 min |(1 + L)/(1 - L)|.
@@ -70,8 +71,10 @@ def margins(arm: Arm, law: HubFeedback, band: float | None = None) -> Margins:
     if not verdict.is_stable:
         return Margins(verdict, windows, None, None, None, None)
     found = loop_margins(verdict)
-    if arm.link.damping == 0 and (law.K1 or law.K2):
+    if arm.link.damping == 0 and law.K2:
         return Margins(verdict, windows, found, 0.0, 0.0, math.inf)
+    if arm.link.damping == 0 and law.K1:  # 1 + L = 1 + (Kp + i K1 w) theta, theta real: no dip deepens with w
+        return Margins(verdict, windows, found, 0.0, found.disk, found.peak_sensitivity)
     return Margins(verdict, windows, found, found.delay, found.disk, found.peak_sensitivity)
 
 
@@ -85,17 +88,20 @@ def loop_margins(verdict: Stability) -> LoopMargins:
     phase, at_phase = _least(np.asarray(abs(angle) * 180 / math.pi), crossed)
     delay, at_delay = _least(lag / np.where(crossed == 0, 1, crossed), crossed)
 
-    def disk_of(w: Real) -> Real:
-        L = loop.loop_function(1j * w)
-        return np.asarray(2 * abs((1 + L) / (1 - L)))
+    def inverse_sensitivity(w: Real) -> Real:
+        drive, fed_back = loop.parts(1j * w)
+        return np.asarray(abs(drive + fed_back) / np.maximum(abs(drive), 1e-300))
 
-    def return_difference(w: Real) -> Real:
-        return np.asarray(abs(1 + loop.loop_function(1j * w)))
-
-    disk, at_disk = lowest(disk_of, omega)
-    least, at_peak = lowest(return_difference, omega)
+    disk, at_disk = lowest(lambda w: disk_at(loop, w), omega)
+    least, at_peak = lowest(inverse_sensitivity, omega)
     at = {"phase": at_phase, "delay": at_delay, "disk": at_disk, "peak_sensitivity": at_peak}
     return LoopMargins(band, gain_margin(loop, band), phase, delay, disk, max(1.0, 1.0 / least), at)
+
+
+def disk_at(loop: Loop, omega: Real) -> Real:
+    """2 |(1 + L)/(1 - L)| at i omega."""
+    drive, fed_back = loop.parts(1j * omega)
+    return np.asarray(2 * abs(drive + fed_back) / np.maximum(abs(drive - fed_back), 1e-300))
 
 
 def dense(verdict: Stability) -> Real:

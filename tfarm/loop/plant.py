@@ -55,10 +55,18 @@ class Loop:
         return member(self.k, self.gains)
 
     def loop_function(self, s: NDArray[Any]) -> Complex:
-        """L(s) = Kp G_theta + K1 s G_theta + K2 G_moment, so that closed-loop poles are the zeros of 1 + L."""
+        """L(s) = Kp G_theta + K1 s G_theta + K2 G_moment, so that closed-loop poles are the zeros of 1 + L.
+
+        Infinite at the arm's own poles.
+        """
+        drive, fed_back = self.parts(s)
+        return np.asarray(np.divide(fed_back, drive, out=np.full(drive.shape, np.inf + 0j), where=drive != 0))
+
+    def parts(self, s: NDArray[Any]) -> tuple[Complex, Complex]:
+        """Denominator and numerator of L at s, up to one factor: finite at poles too."""
         drive, theta, moment, _ = loop_parts(self.k, np.asarray(s, dtype=complex))
         Kp, K1, K2 = float(self.gains.Kp), float(self.gains.K1), float(self.gains.K2)
-        return np.asarray(((Kp + K1 * s) * theta + K2 * moment) / drive)
+        return drive, np.asarray((Kp + K1 * s) * theta + K2 * moment)
 
 
 def effective_inertia(arm: Arm, K2: float) -> float:
