@@ -209,7 +209,7 @@ def test_of_a_rigid_rod_the_crossing_is_where_rate_meets_inertia() -> None:
 
 
 def test_a_passive_hub_keeps_its_disk_margin_without_damping():
-    """At C = 0 and K2 = 0, L = i K1 w theta is imaginary: |S| <= 1 and disk margin 2 in any band; any delay is too long."""
+    """At C = 0 and K2 = 0 L = i K1 w theta is imaginary: |S| <= 1, disk margin 2 in any band; any delay is too long."""
     arm = tfarm.load("sasaki2012")
     for band in (1000.0, 20000.0):
         found = margins(arm, HubFeedback(K1=0.3, K2=0.0), band)
