@@ -14,8 +14,10 @@ from tfarm.dsp.chain import Sampling
 from tfarm.loop.stability import stability
 from tfarm.report.discrete_loci import loci, loci_table
 from tfarm.report.figures import save
-from tfarm.report.overlay import CUT, K2_RANGE, draw_overlay, overlay, overlay_table, pieces, with_damping
-from tfarm.report.sampled_section import Sampled, compared, cure, duration, interval, sampled_section, short_answer
+from tfarm.report.overlay import CUT, K2_RANGE, draw_overlay, overlay, overlay_table, with_damping
+from tfarm.report.region_pieces import pieces
+from tfarm.report.sampled_section import sampled_section
+from tfarm.report.sampled_words import Sampled, compared, cure, duration, interval, short_answer
 from tfarm.report.strip_chart import draw_strip_chart, strip_chart
 from tfarm.report.time_responses import slews
 
@@ -85,7 +87,7 @@ def test_a_region_is_cut_into_pieces_that_cover_it_exactly():
     for piece in found:
         for (x0, a0, b0), (x1, a1, b1) in itertools.pairwise(piece.points):
             area += (x1 - x0) * ((b0 - a0) + (b1 - a1)) / 2
-    assert area == pytest.approx(4.0 + 2.0 + 2.0 + 4.0)  # whole, split in two, joined again
+    assert area == pytest.approx(4.0 + 3.0 + 3.0 + 4.0)  # whole, split in two about a notch, joined again
     assert [piece.begins for piece in found].count(True) == 1
     assert [piece.ends for piece in found].count(True) == 1
 
@@ -206,7 +208,7 @@ def test_an_arm_without_a_loop_gets_one_sentence(inertia):
 
 def test_a_held_tip_has_a_map_but_no_slew(monkeypatch):
     monkeypatch.setattr("tfarm.report.overlay.COLUMNS", 8)
-    monkeypatch.setattr("tfarm.report.sampled_section.PERIODS", (0.01,))
+    monkeypatch.setattr("tfarm.report.sampled_words.PERIODS", (0.01,))
     section = sampled_section(replace(LAB, payload=tfarm.Payload(mass=math.inf)))
     assert "no slew" in section.words[-1]
     assert "sampled-overlay" in blocks_of(section)

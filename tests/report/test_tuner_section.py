@@ -9,6 +9,7 @@ import pytest
 import tfarm
 from tfarm.report import tuner_study as study_module
 from tfarm.report.figures import save
+from tfarm.report.time_responses import away
 from tfarm.report.tuner_pictures import draw_cost_map, draw_curves
 from tfarm.report.tuner_section import section_of, tuner_section
 from tfarm.report.tuner_study import NOMINAL, CostMap, tuner_study
@@ -74,7 +75,7 @@ def test_curves_are_trainings_of_their_seeds(small):
 
 def test_the_table_of_comparison_is_the_rows(small):
     data, section = small
-    shown = values_of(blocks_of(section)["tune-comparison"])
+    shown = values_of(blocks_of(section)["tune-comparison"]) | values_of(blocks_of(section)["tune-residual"])
     assert shown["condition"] == [row.condition for row in data.rows]
     assert shown["condition"][0] == NOMINAL
     for key in ("without", "best_constant", "own_constant", "tuner", "bound", "ZV", "EI"):
@@ -90,12 +91,27 @@ def test_the_words_begin_with_the_answer_and_carry_the_numbers(small):
     assert "Nothing is below" not in words[0]
     below = int((data.curves[0].final < data.tuning.best_constant.cost).sum())
     assert f"{below} of {SEEDS} seeds end below the best constant gain" in words[0]
-    assert "0.256" in words[2]
+    assert "0.256" in words[3]
     facts = {fact.label: fact.value for fact in section.facts}
     assert facts["cost without moment feedback"] == "2.692"
     assert facts["best constant gain"] == "0.9531"
-    assert all(block.alt for stem, block in blocks_of(section).items() if stem != "tune-comparison")
+    assert all(block.alt for block in section.blocks if hasattr(block, "alt"))
     assert sum("accelerates the hub" in block.caption for block in section.blocks) == 4
+
+
+def test_the_angle_that_a_moving_gain_leaves_is_its_integral_over_K1(small):
+    """At rest J theta_t = 0 = sum of torque: K1 (theta - theta_ref) = -T sum K x, the sampled law's own balance."""
+    data = small[0]
+    simulation = data.slews["with the tuner"]
+    x = simulation.at_samples.root_moment - simulation.scenario.rigid_moment
+    integral = 0.01 * float(np.sum(simulation.gain * x))
+    rate = 0.01 * float(np.sum(simulation.at_samples.hub_rate - simulation.scenario.hub_rate))
+    momentum = 0.65334498 * simulation.at_samples.hub_rate[-1]
+    assert rate == pytest.approx(-(integral + momentum) / 0.3, rel=0.02)
+    drift = away(LAB, simulation)[-1]
+    assert drift == pytest.approx(rate, rel=0.02)
+    assert abs(drift) > 50 * abs(away(LAB, data.constant)[-1])
+    assert f"the tip {1e3 * abs(drift):.0f} mm with the tuner" in small[1].words[1]
 
 
 def test_the_papers_pair_is_judged_by_the_map(small):

@@ -29,6 +29,7 @@ from .windows import Windows, gain_windows
 
 Real = NDArray[np.float64]
 NONE = HubFeedback()
+DIGITS, PLACE_DIGITS = 9, 7  # of a margin, and of the frequency of a dip, which its depth hardly feels
 LOWEST = 6  # local minima on the grid that are refined
 NEAR_POLES = np.geomspace(0.05, 20.0, 12)  # points about a pole, in its distances from the axis
 
@@ -95,7 +96,14 @@ def loop_margins(verdict: Stability) -> LoopMargins:
     disk, at_disk = lowest(lambda w: disk_at(loop, w), omega)
     least, at_peak = lowest(inverse_sensitivity, omega)
     at = {"phase": at_phase, "delay": at_delay, "disk": at_disk, "peak_sensitivity": at_peak}
-    return LoopMargins(band, gain_margin(loop, band), phase, delay, disk, max(1.0, 1.0 / least), at)
+    places = {name: _held(where, PLACE_DIGITS) for name, where in at.items()}
+    values = (_held(value, DIGITS) for value in (phase, delay, disk, max(1.0, 1.0 / least)))
+    return LoopMargins(band, gain_margin(loop, band), *values, places)
+
+
+def _held(value: float, digits: int) -> float:
+    """The value to the digits that hold: those after them are the rounding of L next to its poles."""
+    return float(f"{value:.{digits}g}")
 
 
 def disk_at(loop: Loop, omega: Real) -> Real:

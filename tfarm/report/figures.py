@@ -111,5 +111,13 @@ def save(figure: Figure, folder: Path, stem: str, formats: tuple[str, ...] = FOR
         warnings.filterwarnings("ignore", "Glyph .* missing")  # an arm's name may hold any letter
         figure.draw_without_rendering()  # lays it out; once is enough for all formats
         figure.set_layout_engine("none")
+        _settle(figure)
         for kind in formats:
             figure.savefig(folder / f"{stem}.{kind}", format=kind, dpi=dpi, metadata=METADATA[kind])
+
+
+def _settle(figure: Figure) -> None:
+    """Axes at ten digits: the layout's solver orders by address, so its last bit differs from run to run."""
+    for ax in figure.axes:
+        left, bottom, width, height = (round(float(x), 10) for x in ax.get_position(original=True).bounds)
+        ax.set_position((left, bottom, width, height))

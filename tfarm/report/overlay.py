@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,6 +26,7 @@ from tfarm.loop.lines import along, crossings
 from tfarm.loop.regions import region
 from tfarm.report.digits import plain, scientific
 from tfarm.report.figures import BLUE, GREY, INK, ORANGE, blank, headline, style
+from tfarm.report.region_pieces import pieces
 from tfarm.report.tables import Column, Table, data_column
 
 Real = NDArray[np.float64]
@@ -104,7 +104,7 @@ def _round_up(x: float) -> float:
 
 def _sampled_layer(loop: SampledLoop, K1: Real) -> Layer:
     plane = gain_map(loop, K1, np.linspace(*CUT, 3))
-    return Layer(loop.plant.arm.link.damping, K1, plane.stable_intervals[::-1], plane.modes_used)
+    return Layer(loop.plant.arm.link.damping, K1, plane.stable_intervals, plane.modes_used)
 
 
 def _continuous_layer(arm: Arm, K1: Real) -> Layer:
@@ -178,54 +178,6 @@ def _fill(ax: Axes, layer: Layer, colour: str, edge: str, label: str) -> Patch:
         for end in np.nonzero([piece.begins, piece.ends])[0]:
             ax.plot([x[-end]] * 2, [low[-end], high[-end]], color=edge, lw=0.9, zorder=2.5)
     return Patch(facecolor=colour, edgecolor=edge, linewidth=0.9, label=label)
-
-
-@dataclass
-class RegionPiece:
-    """A part of a region to fill: (K1, low, high) from column to column.
-
-    `begins`, `ends`: whether the region itself does at that side, and not only the piece.
-    """
-
-    points: list[tuple[float, float, float]]
-    begins: bool
-    ends: bool = True
-
-
-def pieces(K1: Real, intervals: Sequence[Sequence[Window]]) -> list[RegionPiece]:
-    """The region cut into parts with one interval a column; where intervals part or join, parts meet without a gap."""
-    done: list[RegionPiece] = []
-    going: list[RegionPiece] = []
-    for gain, column in zip(K1, intervals, strict=True):
-        followed, begun = [], []
-        for low, high in column:
-            here = (float(gain), low, high)
-            before = [piece for piece in going if _overlap(piece.points[-1], here)]
-            if len(before) == 1 and sum(_overlap(before[0].points[-1], (0.0, *other)) for other in column) == 1:
-                before[0].points.append(here)
-                followed.append(before[0])
-                continue
-            if len(before) > 1:  # parts join: each goes on to this column, within what it was
-                for each in before:
-                    each.points.append(_within(here, each.points[-1]))
-                begun.append(RegionPiece([here], begins=False))
-            else:
-                start = [_within(before[0].points[-1], here)] if before else []
-                begun.append(RegionPiece([*start, here], begins=not before))
-            for each in before:
-                each.ends = False
-        done += [piece for piece in going if not any(piece is each for each in followed)]
-        going = followed + begun
-    return [piece for piece in done + going if len(piece.points) > 1]
-
-
-def _within(piece: tuple[float, float, float], other: tuple[float, float, float]) -> tuple[float, float, float]:
-    """The part of an interval that is common with that of the next column, or of the one before."""
-    return (piece[0], max(piece[1], other[1]), min(piece[2], other[2]))
-
-
-def _overlap(a: tuple[float, float, float], b: tuple[float, float, float]) -> bool:
-    return a[1] < b[2] and b[1] < a[2]
 
 
 def overlay_table(data: Overlay, stem: str) -> Table:

@@ -13,12 +13,20 @@ from tfarm.report.digits import aligned, plain, significant
 from tfarm.report.figures import Picture
 from tfarm.report.loop_laws import SIGN, has_loop, why_no_loop
 from tfarm.report.overlay import overlay
-from tfarm.report.sampled_section import SHORT_SIGN
-from tfarm.report.sections import Fact, Section
+from tfarm.report.sampled_words import SHORT_SIGN, typeset
+from tfarm.report.sections import Section
 from tfarm.report.tables import Column, Table, data_column, number_column, text_column
 from tfarm.report.time_responses import signal_columns
 from tfarm.report.tuner_pictures import draw_cost_map, draw_curves, draw_gain, draw_response
-from tfarm.report.tuner_study import COARSE, MAP_SEEDS, MAP_TRIALS, NOMINAL, SEEDS, Curves, TunerStudy, tuner_study
+from tfarm.report.tuner_study import COARSE, MAP_SEEDS, MAP_TRIALS, NOMINAL, SEEDS, TunerStudy, tuner_study
+from tfarm.report.tuner_words import (
+    bound_words,
+    drift_words,
+    headline_facts,
+    learning_words,
+    shaping_words,
+    short_answer,
+)
 
 TITLE = "The gain tuner: does a self-tuning gain help?"
 UNDAMPED = (
@@ -47,12 +55,20 @@ def section_of(data: TunerStudy) -> Section:
         anchor="tune",
         title=TITLE,
         facts=headline_facts(data),
-        words=(short_answer(data), shaping_words(data), bound_words(data), learning_words(data), SIGN),
+        words=(
+            short_answer(data),
+            drift_words(data),
+            shaping_words(data),
+            bound_words(data),
+            learning_words(data),
+            SIGN,
+        ),
         blocks=(
             _gain_picture(data),
             _slew_picture(data),
             _coarse_picture(data),
             comparison_table(data),
+            residual_table(data),
             _curves_picture(data),
             _map_picture(data),
         ),
@@ -68,105 +84,6 @@ def why_not(arm: Arm) -> str:
     return UNDAMPED if arm.link.damping == 0 else ""
 
 
-# ------------------------------------------------------------ words
-
-
-def short_answer(data: TunerStudy) -> str:
-    """How much the tuner gains over the best constant gain."""
-    tuning, final = data.tuning, data.curves[0].final
-    best, without = tuning.best_constant.cost, tuning.without.cost
-    median = float(np.quantile(final, 0.5, method="nearest"))
-    free = float(np.quantile(data.curves[1].final, 0.5, method="nearest"))
-    below = int((final < best).sum())
-    taken = 100 * (1 - best / without)
-    gain = 100 * (1 - median / best)
-    lead = "A little" if 0 < gain < 15 else "Yes" if gain >= 15 else "No"
-    more = "lowers it by" if gain > 0 else "raises it by"
-    return (
-        f"{lead}. A constant K2 of {significant(tuning.best_constant.gain, 3)} already takes {significant(taken, 2)} % "
-        f"off the cost of a slew ({significant(without, 3)} without moment feedback, {significant(best, 3)} with it); "
-        f"a gain that tunes itself {more} another {significant(abs(gain), 2)} %, to {significant(median, 3)} in the "
-        f"median of {final.size} seeds. {below} of {final.size} seeds end below the best constant gain. Without the "
-        f"guard, and so without a proof, it would be {significant(100 * (1 - free / best), 2)} %."
-    )
-
-
-def shaping_words(data: TunerStudy) -> str:
-    """What input shaping does instead."""
-    costs = {kind: record.cost for kind, (_, record) in data.tuning.shaped.items()}
-    late = {
-        kind: trial.task.busy_until - data.tuning.trial.task.busy_until
-        for kind, (trial, _) in data.tuning.shaped.items()
-    }
-    told = " and ".join(
-        f"{kind} has {significant(costs[kind], 2)}, arriving {significant(1e3 * late[kind], 3)} ms later"
-        for kind in costs
-    )
-    return (
-        f"What one would try first is cheaper: shaping the reference, with no moment feedback at all, {told} (each "
-        "judged by its own slew). Shaping cannot answer disturbances, which feedback can."
-    )
-
-
-def bound_words(data: TunerStudy) -> str:
-    """How far everything is from what is possible, and what is proven."""
-    bound, guard = data.tuning.bound.cost, data.tuning.training.guard
-    return (
-        f"No controller of this slew gets below {significant(bound, 3)}, the linear-quadratic optimum that knows the "
-        f"whole state and the slew beforehand. The tuner's gain stays in {guard.sentence}."
-    )
-
-
-def learning_words(data: TunerStudy) -> str:
-    """What each rule does, and whether the paper's pair is the best."""
-    best = data.tuning.best_constant.cost
-    told = [
-        f"{curves.title[0].upper()}{curves.title[1:]}: {int((curves.final < best).sum())} of {curves.final.size} below "
-        f"the best constant gain, {_ends(curves)}"
-        for curves in data.curves
-    ]
-    found = data.cost_map
-    answer = "Yes" if found.is_papers_best else "No"
-    return (
-        f"Seed by seed. {'. '.join(told)}. The guard costs part of the gain, "
-        "and buys the proof. Is (0.6, 0.8) the best pair of momentum and learning rate? "
-        f"{answer}: {found.verdict.partition(': ')[2]}."
-    )
-
-
-def _ends(curves: Curves) -> str:
-    finite = curves.final[np.isfinite(curves.final)]
-    low, middle, high = (
-        significant(float(x), 3) for x in (finite.min(), np.quantile(curves.final, 0.5, method="nearest"), finite.max())
-    )
-    gone = [
-        f"{count} {what}" for count, what in ((curves.diverged, "diverged"), (curves.died, "died at K = 0")) if count
-    ]
-    spread = f"median {middle}, from {low} to {high}"
-    return ", ".join([*gone, spread])
-
-
-def headline_facts(data: TunerStudy) -> tuple[Fact, ...]:
-    """The costs, from nothing to what is possible."""
-    tuning, final = data.tuning, data.curves[0].final
-    median = float(np.quantile(final, 0.5, method="nearest"))
-    low, high = (float(np.quantile(final, q, method="nearest")) for q in (0.25, 0.75))
-    gain = 100 * (1 - median / tuning.best_constant.cost)
-    guard = tuning.training.guard
-    helps = f"by {significant(gain, 2)} %" if gain > 0 else "no"
-    K = significant(tuning.best_constant.gain, 3)
-    shaped = min((record.cost, kind) for kind, (_, record) in tuning.shaped.items())
-    return (
-        Fact(label="does tuning beat a constant gain?", value=helps, beside=f"median of {final.size} seeds"),
-        Fact(label="cost without moment feedback", value=significant(tuning.without.cost, 4)),
-        Fact(label="best constant gain", value=significant(tuning.best_constant.cost, 4), beside=f"K2 = {K}"),
-        Fact(label="tuner", value=significant(median, 4), beside=f"half between {low:.3f} and {high:.3f}"),
-        Fact(label="nothing is below", value=significant(tuning.bound.cost, 4), beside="linear-quadratic optimum"),
-        Fact(label="input shaping instead", value=significant(shaped[0], 3), beside=f"{shaped[1]}, a later slew"),
-        Fact(label="guard", value=f"{guard.lo:.3f} … {guard.hi:.3f}", beside="any K(t) in it: proven stable"),
-    )
-
-
 # ------------------------------------------------------------ pictures
 
 
@@ -180,7 +97,7 @@ def _gain_picture(data: TunerStudy) -> Picture:
         caption=(
             "Left: the map of both gains, sand where the continuous loop is stable, blue where the sampled one is, for "
             "constant gains. A gain that moves needs its own proof, and gets it only in the green bar: "
-            f"{guard.sentence}. Black: the gains that the tuner takes, {significant(float(K.min()), 3)} to "
+            f"{typeset(guard.sentence)}. Black: the gains that the tuner takes, {significant(float(K.min()), 3)} to "
             f"{significant(float(K.max()), 3)}, at K1 = {plain(tuning.plan.K1)}. Right: the same over time (the "
             f"paper's Figure 3), seed {tuning.plan.seed}; without the tuner K2 = 0. {SHORT_SIGN}"
         ),
@@ -299,39 +216,54 @@ def _map_picture(data: TunerStudy) -> Picture:
     )
 
 
+CONTROLLERS = {
+    "without": "none",
+    "best_constant": "constant",
+    "own_constant": "own constant",
+    "tuner": "tuner",
+    "bound": "bound",
+    "ZV": "ZV",
+    "EI": "EI",
+}
+
+
 def comparison_table(data: TunerStudy) -> Table:
-    """Cost of a slew, a row a condition, a column a controller; and what is left of the moment after it."""
-    rows = data.rows
-    kinds = (
-        ("without", "none"),
-        ("best_constant", "constant"),
-        ("own_constant", "own constant"),
-        ("tuner", "tuner"),
-        ("bound", "bound"),
-        ("ZV", "ZV"),
-        ("EI", "EI"),
-    )
-    columns = [text_column("condition", "condition", [row.condition for row in rows])]
-    for group, name, digits in (("cost of the slew", "cost", 4), ("left after it, N m rms", "residual", 3)):
-        for key, title in kinds:
-            values = np.array([getattr(getattr(row, key), name) for row in rows])
-            cells = aligned(values, digits, least=2)
-            columns.append(number_column(f"{key}_{name}", title, "", values, cells, group=group))
-    proven = ["yes" if row.proven else "no" for row in rows]
-    columns.append(text_column("guard_proven", "guard proven", proven))
-    away = "; ∞ where the loop ran away" if any(math.isinf(row.tuner.cost) for row in rows) else ""
+    """Cost of a slew, a row a condition, a column a controller, and whether the guard is proven there too."""
+    proven = ["yes" if row.proven else "no" for row in data.rows]
+    away_from_it = "; ∞ where the loop ran away" if any(math.isinf(row.tuner.cost) for row in data.rows) else ""
     return Table(
         stem="tune-comparison",
-        title="Beside what it has to beat",
+        title="Cost of the slew, beside what it has to beat",
         caption=(
             "Every controller knows the arm by its name plate only: what was trained or chosen as trained is used on "
             f"all others. None: no moment feedback. Constant: the best constant gain as trained, {_gain(data)}; own "
             "constant: the best one for that row. Bound: the linear-quadratic optimum. ZV and EI: input shaping with "
             "no moment feedback, judged by their own, later slew, so that the bound is not theirs. Guard proven: "
-            f"whether the same range of gains is proven for that arm and chain too{away}. {SHORT_SIGN}"
+            f"whether the same range of gains is proven for that arm and chain too{away_from_it}. {SHORT_SIGN}"
         ),
-        columns=tuple(columns),
+        columns=(*_of_each(data, "cost", 4), text_column("guard_proven", "guard proven", proven)),
     )
+
+
+def residual_table(data: TunerStudy) -> Table:
+    """What is left of the moment after the slew."""
+    return Table(
+        stem="tune-residual",
+        title="Root moment left after the slew",
+        caption="Root mean square of the root moment less the rigid arm's, from the end of the slew on, in N m.",
+        columns=_of_each(data, "residual", 3),
+    )
+
+
+def _of_each(data: TunerStudy, name: str, digits: int) -> tuple[Column, ...]:
+    """The condition, then one number of every controller."""
+    names = [row.condition for row in data.rows]
+    cells = [typeset(name).replace(" -", " −") for name in names]
+    columns = [Column(key="condition", title="condition", values=names, cells=cells)]
+    for key, title in CONTROLLERS.items():
+        values = np.array([getattr(getattr(row, key), name) for row in data.rows])
+        columns.append(number_column(f"{key}_{name}", title, "", values, aligned(values, digits, least=2)))
+    return tuple(columns)
 
 
 def _gain(data: TunerStudy) -> str:

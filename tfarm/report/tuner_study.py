@@ -92,11 +92,14 @@ class CostMap:
 
 @dataclass(frozen=True)
 class TunerStudy:
-    """All of it.  `slews` and `coarse` hold two simulations each, without and with the tuner."""
+    """All of it.  `slews` and `coarse` hold two simulations each, without and with the tuner; `constant` is the slew
+    with the best constant gain.
+    """
 
     arm: Arm
     tuning: Tuning
     slews: Mapping[str, Simulation]
+    constant: Simulation
     coarse: Mapping[str, Simulation]
     curves: tuple[Curves, ...]
     cost_map: CostMap
@@ -116,6 +119,7 @@ def tuner_study(arm: Arm) -> TunerStudy:
         arm=arm,
         tuning=tuning,
         slews=_simulated(tuning, chain),
+        constant=_simulator(tuning, chain).linear(Gains(K1=tuning.plan.K1, K2=tuning.best_constant.gain)),
         coarse=_simulated(tuning, next(each.chain for each in listed if each.name == COARSE)),
         curves=tuple(_curves(arm, *each) for each in LEARNT),
         cost_map=_cost_map(arm),
@@ -123,9 +127,13 @@ def tuner_study(arm: Arm) -> TunerStudy:
     )
 
 
+def _simulator(tuning: Tuning, chain: Chain) -> Simulator:
+    trial = tuning.trial
+    return Simulator(trial.arm, chain, trial.task, count=trial.loop.plant.count, between=BETWEEN)
+
+
 def _simulated(tuning: Tuning, chain: Chain) -> dict[str, Simulation]:
-    trial, K1 = tuning.trial, tuning.plan.K1
-    simulator = Simulator(trial.arm, chain, trial.task, count=trial.loop.plant.count, between=BETWEEN)
+    simulator, K1 = _simulator(tuning, chain), tuning.plan.K1
     without, tuned = simulator.linear(Gains(K1=K1, K2=0.0)), simulator.gain_schedule(K1, tuning.gain())
     return {"without moment feedback, K2 = 0": without, "with the tuner": tuned}
 
