@@ -97,8 +97,8 @@ def loop_margins(verdict: Stability) -> LoopMargins:
     least, at_peak = lowest(inverse_sensitivity, omega)
     at = {"phase": at_phase, "delay": at_delay, "disk": at_disk, "peak_sensitivity": at_peak}
     places = {name: _held(where, PLACE_DIGITS) for name, where in at.items()}
-    values = (_held(value, DIGITS) for value in (phase, delay, disk, max(1.0, 1.0 / least)))
-    return LoopMargins(band, gain_margin(loop, band), *values, places)
+    phase, delay, disk, peak = (_held(value, DIGITS) for value in (phase, delay, disk, max(1.0, 1.0 / least)))
+    return LoopMargins(band, gain_margin(loop, band), phase, delay, disk, peak, places)
 
 
 def _held(value: float, digits: int) -> float:
