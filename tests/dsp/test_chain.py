@@ -5,7 +5,8 @@ import math
 import pytest
 
 import tfarm
-from tfarm.dsp import Actuator, Chain, Converters, Gains, Sampling, Slew, load_chain
+from tfarm.arm import HubFeedback
+from tfarm.dsp import Actuator, Chain, Converters, Sampling, Slew, load_chain
 from tfarm.dsp.converters import MOMENT, TORQUE, quantisers
 from tfarm.dsp.reading import chain_of_tables
 from tfarm.errors import ParameterError
@@ -126,7 +127,7 @@ def test_bad_tables_are_named(table, content, message):
 @pytest.mark.parametrize("value", [math.nan, math.inf, 1e13, "0.3", True])
 def test_gains_are_finite_numbers(value):
     with pytest.raises(ParameterError, match="K2"):
-        Gains(K1=0.3, K2=value)
+        HubFeedback(K1=0.3, K2=value)
 
 
 def test_steps_and_ranges():

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import tfarm
-from tfarm.arm import Hub
-from tfarm.dsp import Actuator, Chain, Converters, Gains, Sampling, closed_loop, sampled_loop
+from tfarm.arm import Hub, HubFeedback
+from tfarm.dsp import Actuator, Chain, Converters, Sampling, closed_loop, sampled_loop
 from tfarm.dsp.law import first_order_law, mode_table, root_locus
 from tfarm.errors import ParameterError
 
@@ -24,7 +24,7 @@ def lossless():
 
 @pytest.mark.parametrize(("K2", "growth"), [(0.05, 6e-10), (0.3, 9e-9), (0.9, 3e-7)])
 def test_mode_13_grows_as_two_prototypes_found(lossless, K2, growth):
-    poles = sampled_loop(lossless, Gains(K1=0.3, K2=K2)).poles
+    poles = sampled_loop(lossless, HubFeedback(K1=0.3, K2=K2)).poles
     worst = poles.log_radius.argmax()
     assert poles.mode[worst] == 13
     assert poles.log_spectral_radius == pytest.approx(growth, rel=0.1)
@@ -33,12 +33,12 @@ def test_mode_13_grows_as_two_prototypes_found(lossless, K2, growth):
 @pytest.mark.parametrize("K2", [-0.3, -1e-3, -1e-6, 0.0])
 def test_without_damping_every_negative_K2_and_zero_is_unstable(lossless, K2):
     for K1 in (1e-6, 0.3, 3.0):
-        assert not sampled_loop(lossless, Gains(K1=K1, K2=K2)).poles.is_stable
+        assert not sampled_loop(lossless, HubFeedback(K1=K1, K2=K2)).poles.is_stable
 
 
 @pytest.mark.parametrize(("K2", "stable"), [(-0.1527, False), (-0.1525, True), (1.1638, True), (1.164, False)])
 def test_the_edges_of_the_lab_arm(lab, K2, stable):
-    assert sampled_loop(lab, Gains(K1=0.3, K2=K2), count=12).poles.is_stable is stable
+    assert sampled_loop(lab, HubFeedback(K1=0.3, K2=K2), count=12).poles.is_stable is stable
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.4, 1.0, 1.3, 2.0])
@@ -48,7 +48,7 @@ def test_small_gains_follow_the_law(lossless, delay):
     modes = tfarm.modes(lossless, 10)
     w, b = modes.natural_frequency[1:], modes.hub_participation[1:]
     for K1, K2 in ((1e-5, 0.0), (0.0, 1e-5), (1e-6, 2e-5)):
-        table = mode_table(sampled_loop(lossless, Gains(K1=K1, K2=K2), chain, count=14))
+        table = mode_table(sampled_loop(lossless, HubFeedback(K1=K1, K2=K2), chain, count=14))
         law = table.first_order[:10]
         second = 1e-4 * b**2 * (K1 / w + K2 * 0.1)  # where the law is zero, the second order is not
         assert np.all(abs(table.log_radius[:10] - law) <= 0.01 * abs(law) + second)
@@ -63,7 +63,7 @@ def test_finite_gains_follow_the_finite_gain_form(lossless, delay):
 
     L0 is read off the loop itself by taking the mode's pole out of F next to it; modes whose pole moves little obey it.
     """
-    gains = Gains(K1=0.3, K2=0.3)
+    gains = HubFeedback(K1=0.3, K2=0.3)
     loop = sampled_loop(lossless, gains, Chain(sampling=Sampling(delay_samples=delay)))
     table, modes = mode_table(loop), tfarm.modes(lossless, 20)
     for i in range(9, 20):
@@ -80,7 +80,7 @@ def test_finite_gains_follow_the_finite_gain_form(lossless, delay):
 
 def test_the_polished_poles_are_the_eigenvalues_of_the_matrix(lab):
     """All of them, apart from the z = 1 of the hub angle, which the whole matrix has."""
-    loop = sampled_loop(lab, Gains(K1=0.3, K2=0.3), Chain(sampling=Sampling(delay_samples=1.5)), count=10)
+    loop = sampled_loop(lab, HubFeedback(K1=0.3, K2=0.3), Chain(sampling=Sampling(delay_samples=1.5)), count=10)
     whole = np.linalg.eigvals(loop.matrix())
     ours = loop.poles.z[abs(loop.poles.z) > 0.2]
     assert min(abs(whole - 1)) < 1e-12
@@ -93,7 +93,7 @@ def test_the_polished_poles_are_the_eigenvalues_of_the_matrix(lab):
 def test_closed_loop_is_the_matrix_of_the_law(lab):
     sampling = Sampling(delay_samples=0.5)
     matrix = closed_loop(lab, 0.3, 0.2, 0.7, sampling, count=10)
-    loop = sampled_loop(lab, Gains(K1=0.3, K2=0.2, Kp=0.7), Chain(sampling=sampling), count=10)
+    loop = sampled_loop(lab, HubFeedback(K1=0.3, K2=0.2, Kp=0.7), Chain(sampling=sampling), count=10)
     np.testing.assert_array_equal(matrix, loop.matrix())
     assert not loop.has_free_angle
     assert abs(np.linalg.eigvals(matrix)).max() == pytest.approx(np.exp(loop.poles.log_spectral_radius), rel=1e-11)
@@ -109,7 +109,7 @@ def test_a_rate_by_difference_is_in_the_matrix_as_in_F(lab, delay, Kp, hub_dampi
         converters=Converters(hub_rate="difference", rate_filter=200.0),
         actuator=Actuator(hub_damping=hub_damping),
     )
-    loop = sampled_loop(lab, Gains(K1=0.3, K2=0.25, Kp=Kp), chain, count=8)
+    loop = sampled_loop(lab, HubFeedback(K1=0.3, K2=0.25, Kp=Kp), chain, count=8)
     z = loop.poles.z[abs(loop.poles.z) > 0.2]
     assert z.size >= 8
     np.testing.assert_allclose(abs(loop(z)), 0, atol=1e-8)
@@ -121,13 +121,13 @@ def test_a_rate_by_difference_is_in_the_matrix_as_in_F(lab, delay, Kp, hub_dampi
 
 def test_hub_damping_alone_damps(lossless):
     """Analog rate feedback is collocated: it damps every mode that the hub feels, which sampled feedback does not."""
-    poles = sampled_loop(lossless, Gains(K1=0, K2=0), Chain(actuator=Actuator(hub_damping=0.3)), count=12).poles
+    poles = sampled_loop(lossless, HubFeedback(K1=0, K2=0), Chain(actuator=Actuator(hub_damping=0.3)), count=12).poles
     assert poles.is_stable
-    assert not sampled_loop(lossless, Gains(K1=0.3, K2=0), count=12).poles.is_stable
+    assert not sampled_loop(lossless, HubFeedback(K1=0.3, K2=0), count=12).poles.is_stable
 
 
 def test_the_locus_starts_at_the_open_loop_and_has_no_jumps(lab):
-    loop = sampled_loop(lab, Gains(K1=1e-9, K2=1.3), count=8)
+    loop = sampled_loop(lab, HubFeedback(K1=1e-9, K2=1.3), count=8)
     locus = root_locus(loop, "K2", np.linspace(0.0, 1.3, 60))
     assert np.all(abs(np.diff(locus, axis=0)) < 0.2)
     flexible = loop.pulse.multipliers[loop.pulse.mode > 0]
@@ -140,7 +140,7 @@ def test_the_locus_starts_at_the_open_loop_and_has_no_jumps(lab):
 def test_bands_of_the_law():
     """K1 damps below 50 Hz and destabilises from 50 to 100 Hz; K2 > 0 never destabilises."""
     w = 2 * np.pi * np.array([10.0, 49.0, 51.0, 99.0, 101.0])
-    by_rate, by_moment = first_order_law(w, np.ones(5), 0.1, Gains(K1=1.0, K2=1.0), T, 0.0)
+    by_rate, by_moment = first_order_law(w, np.ones(5), 0.1, HubFeedback(K1=1.0, K2=1.0), T, 0.0)
     np.testing.assert_array_equal(np.sign(by_rate), [-1, -1, 1, 1, -1])
     assert np.all(by_moment <= 0)
 
@@ -150,8 +150,8 @@ def test_a_locked_hub_has_no_loop_and_a_free_pin_none_by_moment(lab):
 
     locked = replace(lab, hub=Hub(inertia=np.inf))
     with pytest.raises(ParameterError, match="no loop"):
-        sampled_loop(locked, Gains(K1=0.3, K2=0.3))
+        sampled_loop(locked, HubFeedback(K1=0.3, K2=0.3))
     pin = replace(lab, hub=Hub(inertia=0.0))
     with pytest.raises(ParameterError, match="algebraic loop"):
-        sampled_loop(pin, Gains(K1=0.3, K2=0.3))
-    assert sampled_loop(pin, Gains(K1=0.1, K2=0.0), count=6).poles.z.size > 10
+        sampled_loop(pin, HubFeedback(K1=0.3, K2=0.3))
+    assert sampled_loop(pin, HubFeedback(K1=0.1, K2=0.0), count=6).poles.z.size > 10

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import tfarm
+from tfarm.arm import HubFeedback
 from tfarm.dsp import (
     Chain,
     Converters,
-    Gains,
     Sampling,
     analyse,
     delay_margin,
@@ -22,7 +22,7 @@ from tfarm.dsp.margins import stable_windows
 from tfarm.dsp.verdict import sampled_answer, sampled_verdict
 from tfarm.errors import ParameterError
 
-GAINS = Gains(K1=0.3, K2=0.3)
+GAINS = HubFeedback(K1=0.3, K2=0.3)
 
 
 @pytest.fixture(scope="module")
@@ -104,7 +104,7 @@ def test_the_map_wants_ascending_gains(lab):
 
 @pytest.mark.parametrize("K2", [0.1, 0.3, 0.9])
 def test_the_delay_margin_is_where_the_verdict_turns(lab, K2):
-    loop = sampled_loop(lab, Gains(K1=0.3, K2=K2), count=12)
+    loop = sampled_loop(lab, HubFeedback(K1=0.3, K2=K2), count=12)
     margin = delay_margin(loop)
     assert not margin.is_bound
     assert loop.with_delay(margin.samples - 1e-6).poles.is_stable
@@ -114,7 +114,7 @@ def test_the_delay_margin_is_where_the_verdict_turns(lab, K2):
 
 
 def test_without_a_stable_loop_there_is_no_delay_margin(lab):
-    assert delay_margin(sampled_loop(lab, Gains(K1=0.3, K2=2.0), count=10)).samples == 0.0
+    assert delay_margin(sampled_loop(lab, HubFeedback(K1=0.3, K2=2.0), count=10)).samples == 0.0
 
 
 def test_the_required_damping_is_where_the_verdict_turns(lossless):
@@ -132,7 +132,7 @@ def test_the_required_damping_is_where_the_verdict_turns(lossless):
 
 
 def test_no_damping_cures_a_gain_far_out_and_none_is_needed_for_few_modes(lossless):
-    assert required_damping(lossless, Gains(K1=0.3, K2=3.0), Chain(), count=6) == np.inf
+    assert required_damping(lossless, HubFeedback(K1=0.3, K2=3.0), Chain(), count=6) == np.inf
     assert required_damping(lossless, GAINS, Chain(), count=6) == 0.0
 
 
@@ -144,7 +144,7 @@ def test_the_verdict_settles_with_damping_and_names_its_modes_without(lab, lossl
     assert not undamped.is_settled
     assert "mode 13 grows by 8.62e-09 a sample (holds for the first 20 modes)" in undamped.sentence
     assert sampled_verdict(lossless, GAINS, count=12).sentence.startswith("stable")
-    assert sampled_verdict(lossless, Gains(K1=0, K2=0)).sentence.startswith("marginal")
+    assert sampled_verdict(lossless, HubFeedback(K1=0, K2=0)).sentence.startswith("marginal")
 
 
 def test_the_answer_is_plain_and_consistent(lab):
@@ -156,7 +156,7 @@ def test_the_answer_is_plain_and_consistent(lab):
     assert answer["K1_interval"][0] == 0.0
     assert answer["first_unstable_mode"] is None
     assert [mode["index"] for mode in answer["modes"]] == list(range(1, len(answer["modes"]) + 1))
-    unstable = sampled_answer(analyse(lab, Gains(K1=0.3, K2=1.3)))
+    unstable = sampled_answer(analyse(lab, HubFeedback(K1=0.3, K2=1.3)))
     assert unstable["stable"] is False
     assert unstable["spectral_radius"] > 1
     assert unstable["K2_interval"] is None

@@ -8,7 +8,8 @@ from scipy.linalg import expm
 import tfarm
 from tests.dsp.roads import aliased, aliased_loop, durbin
 from tests.strategies import arm_of
-from tfarm.dsp import Chain, Gains, Sampling, pulse_transfer, sampled_loop
+from tfarm.arm import HubFeedback
+from tfarm.dsp import Chain, Sampling, pulse_transfer, sampled_loop
 from tfarm.dsp.plant import loop_plant
 from tfarm.dsp.sampling import PulseTransfer
 from tfarm.reduced import modal_model
@@ -187,7 +188,7 @@ def test_a_rigid_inertia_is_stable_up_to_its_known_gain(delay):
     edge = 2 * np.sin(np.pi / (2 * (2 * delay + 1))) * arm.total_inertia / T
     chain = Chain(sampling=Sampling(delay_samples=delay))
     for factor, stable in ((0.999, True), (1.001, False)):
-        loop = sampled_loop(arm, Gains(K1=factor * edge, K2=0.0), chain, count=2)
+        loop = sampled_loop(arm, HubFeedback(K1=factor * edge, K2=0.0), chain, count=2)
         assert loop.poles.is_stable is stable
 
 

@@ -7,11 +7,11 @@ import pytest
 from scipy.linalg import expm
 
 import tfarm
+from tfarm.arm import HubFeedback
 from tfarm.dsp import (
     Actuator,
     Chain,
     Converters,
-    Gains,
     Sampling,
     Simulator,
     Slew,
@@ -26,7 +26,7 @@ from tfarm.errors import ParameterError
 from tfarm.reduced import modal_model
 
 T = 0.01
-GAINS = Gains(K1=0.3, K2=0.3)
+GAINS = HubFeedback(K1=0.3, K2=0.3)
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +58,7 @@ def test_the_trial_cost_of_two_prototypes(lab):
     loop, task = simulator(lab, count=6), scenario("slew", lab, Chain(), 3.0)
 
     def cost(K):
-        run = loop.linear(Gains(K1=0.3, K2=K))
+        run = loop.linear(HubFeedback(K1=0.3, K2=K))
         x = run.at_samples.root_moment - task.rigid_moment
         e = 0.3 * (task.hub_rate - run.at_samples.hub_rate) - K * x
         return T * np.sum(x**2 / 2 + 2.6 * e**2 / 2)
@@ -125,7 +125,7 @@ def test_the_samples_are_those_of_the_closed_loop_matrix(lab):
 def test_records_between_samples_are_exact(lossless):
     """A step of torque, then nothing: by matrix exponentials of the modal state space at every record."""
     chain = Chain(sampling=Sampling(delay_samples=0.3))
-    run = simulator(lossless, "step", 0.2, chain, count=12, between=4).linear(Gains(K1=0, K2=0))
+    run = simulator(lossless, "step", 0.2, chain, count=12, between=4).linear(HubFeedback(K1=0, K2=0))
     model = modal_model(lossless, ["root_moment", "tip_displacement"], 12)
     A, B, C, D = model.matrices()
     n = len(A)
@@ -147,7 +147,7 @@ def test_records_between_do_not_change_the_samples(lab):
 
 def test_free_decay_is_the_damping_of_the_first_mode(lab):
     """Without gains the released mode decays with its own eigenvalue, and starts where it was told to, at rest."""
-    run = simulator(lab, "decay", 2.0).linear(Gains(K1=0, K2=0))
+    run = simulator(lab, "decay", 2.0).linear(HubFeedback(K1=0, K2=0))
     tip = run.at_samples.tip_displacement
     p = modal_model(lab, "hub_rate", 1).eigenvalues[0, 0]
     expected = 0.01 * np.exp(p.real * run.t) * (np.cos(p.imag * run.t) - p.real / p.imag * np.sin(p.imag * run.t))
@@ -156,7 +156,7 @@ def test_free_decay_is_the_damping_of_the_first_mode(lab):
 
 @pytest.mark.parametrize("K2", [0.1, 0.9])
 def test_the_decay_in_time_is_the_spectral_radius(lab, K2):
-    gains = Gains(K1=0.05, K2=K2)
+    gains = HubFeedback(K1=0.05, K2=K2)
     loop = sampled_loop(lab, gains, count=8)
     run = simulator(lab, "impulse", 60.0).linear(gains)
     rate = run.at_samples.hub_rate[-200:]
@@ -165,7 +165,9 @@ def test_the_decay_in_time_is_the_spectral_radius(lab, K2):
 
 
 def test_the_slew_arrives(lab):
-    run = simulator(lab, chain=Chain(slew=Slew(travel=-0.6, rise_time=0.83))).linear(Gains(K1=0.3, K2=0.3, Kp=2.0))
+    run = simulator(lab, chain=Chain(slew=Slew(travel=-0.6, rise_time=0.83))).linear(
+        HubFeedback(K1=0.3, K2=0.3, Kp=2.0)
+    )
     assert run.at_samples.tip_displacement[-1] == pytest.approx(-0.6, rel=0.01)
     reference = scenario("slew", lab, Chain(), 3.0)
     assert reference.hub_angle[-1] == pytest.approx(1.15, rel=1e-12)
@@ -177,7 +179,7 @@ def test_a_rigid_arm_has_no_vibration():
     """For an arm as stiff as can be the moment is the rigid arm's: the reading called vibration is nothing."""
     lab = tfarm.load("sasaki2012")
     stiff = replace(lab, link=replace(lab.link, youngs_modulus=1e16, shear_modulus=4e15, damping=2e-5))
-    run = simulator(stiff, count=3).linear(Gains(K1=0.0, K2=0.0))
+    run = simulator(stiff, count=3).linear(HubFeedback(K1=0.0, K2=0.0))
     task = run.scenario
     total = abs(run.at_samples.root_moment).max()
     assert total == pytest.approx((stiff.total_inertia - 0.1) * 4.6, rel=1e-3)
@@ -226,7 +228,7 @@ def test_more_bits_come_nearer_to_the_ideal_loop(lab):
 
 def test_quantisation_keeps_a_limit_cycle_up(lab):
     """A stable loop whose rate comes in counts a sample: it never quite stops, and finer counts make it smaller."""
-    gains = Gains(K1=1.0, K2=0.3)
+    gains = HubFeedback(K1=1.0, K2=0.3)
     chain = Chain(
         sampling=Sampling(delay_samples=1.0), converters=Converters(encoder_counts=2000, hub_rate="difference")
     )
@@ -245,13 +247,13 @@ def test_quantisation_keeps_a_limit_cycle_up(lab):
 
 
 def test_running_away_is_said_with_its_time_and_mode(lab):
-    run = simulator(lab, duration=5.0).linear(Gains(K1=0.3, K2=1.5))
+    run = simulator(lab, duration=5.0).linear(HubFeedback(K1=0.3, K2=1.5))
     assert run.stopped is not None
     assert run.stopped.time == pytest.approx(run.t.size * T)
-    assert run.stopped.mode == growing_mode(sampled_loop(lab, Gains(K1=0.3, K2=1.5), count=8))
+    assert run.stopped.mode == growing_mode(sampled_loop(lab, HubFeedback(K1=0.3, K2=1.5), count=8))
     for signal in (run.torque, run.at_samples.root_moment, run.at_samples.tip_displacement):
         assert np.isfinite(signal).all()
-    answer = simulated_answer(lab, Gains(K1=0.3, K2=1.5), Chain(), "slew", 5.0, count=8)
+    answer = simulated_answer(lab, HubFeedback(K1=0.3, K2=1.5), Chain(), "slew", 5.0, count=8)
     assert answer["settling_time_s"] == np.inf
     assert answer["stopped_at_s"] == run.stopped.time
 
@@ -293,7 +295,7 @@ def test_a_disturbance_is_held_over_its_sample(lossless):
     torque = np.random.default_rng(4).normal(size=task.t.size)
     task = replace(task, impulse=0.0, disturbance=torque)
     late = Chain(sampling=Sampling(delay_samples=1.4))  # the disturbance knows nothing of the delay
-    run = Simulator(lossless, late, task, count=10).linear(Gains(K1=0, K2=0))
+    run = Simulator(lossless, late, task, count=10).linear(HubFeedback(K1=0, K2=0))
     called = Simulator(lossless, late, task, count=10).controller(lambda m: 0.0)
     A, B, C = pulse_transfer(lossless, ["root_moment", "hub_angle"], Sampling(), count=10).matrices()
     x, expected = np.zeros(len(A)), []

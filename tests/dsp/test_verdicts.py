@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from tests.dsp.verdicts import encirclements, simulated_growth, some_case, tally
-from tfarm.dsp import Gains, sampled_loop, sampled_verdict
+from tfarm.arm import HubFeedback
+from tfarm.dsp import sampled_loop, sampled_verdict
 
 
 def test_the_verdict_is_what_simulations_and_encirclements_say():
@@ -21,7 +22,7 @@ def test_the_sample_can_tell():
     for _ in range(8):
         case = some_case(rng)
         verdict = sampled_verdict(case.arm, case.gains, case.chain)
-        mistaken = replace(case, gains=Gains(K1=case.gains.K1, K2=-case.gains.K2))
+        mistaken = replace(case, gains=HubFeedback(K1=case.gains.K1, K2=-case.gains.K2))
         if abs(verdict.loop.poles.log_spectral_radius) < 1e-3:
             continue
         growth = simulated_growth(mistaken, verdict.loop.poles.log_spectral_radius, verdict.modes_used)

@@ -14,7 +14,8 @@ import numpy as np
 import tfarm
 from tests.dsp.roads import aliased_loop
 from tests.strategies import arm_of
-from tfarm.dsp import Chain, Gains, Sampling, Simulator, sampled_verdict, scenario
+from tfarm.arm import HubFeedback
+from tfarm.dsp import Chain, Sampling, Simulator, sampled_verdict, scenario
 from tfarm.dsp.boundary import circle_grid, crossings
 from tfarm.errors import ConvergenceError
 
@@ -26,7 +27,7 @@ TURN = 0.5  # rad of phase between two points of a contour
 @dataclass(frozen=True)
 class Case:
     arm: object
-    gains: Gains
+    gains: HubFeedback
     chain: Chain
 
 
@@ -49,7 +50,7 @@ def some_case(rng):
     probe = arm_of(**draw, damping=0.0, hub=1.0)
     beam = probe.total_inertia - 1.0
     arm = arm_of(**draw, damping=log(3e-6, 3e-4), hub=beam * log(0.05, 5))
-    gains = Gains(K1=arm.total_inertia / PERIOD * log(1e-3, 3), K2=float(rng.uniform(-0.6, 1.8)))
+    gains = HubFeedback(K1=arm.total_inertia / PERIOD * log(1e-3, 3), K2=float(rng.uniform(-0.6, 1.8)))
     delay = float(rng.choice([0.0, 1.0, 2.0, rng.uniform(0, 2)]))
     return Case(arm, gains, Chain(sampling=Sampling(period=PERIOD, delay_samples=delay)))
 

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import tfarm
-from tfarm.dsp import Chain, Gains, Simulator, analyse, sampled_loop, sampled_verdict, scenario, stable_windows
+from tfarm.arm import HubFeedback
+from tfarm.dsp import Chain, Simulator, analyse, sampled_loop, sampled_verdict, scenario, stable_windows
 from tfarm.dsp.chain import Sampling
 from tfarm.loop.stability import stability
 from tfarm.report.discrete_loci import loci, loci_table
@@ -22,7 +23,7 @@ from tfarm.report.strip_chart import draw_strip_chart, strip_chart
 from tfarm.report.time_responses import slews
 
 LAB, PAPER = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
-GAINS = Gains(K1=0.3, K2=0.3)
+GAINS = HubFeedback(K1=0.3, K2=0.3)
 PLANE = cache(lambda: overlay(LAB, GAINS, Chain()))
 
 
@@ -164,7 +165,7 @@ def test_the_slew_is_the_simulators_own(section):
     simulator = Simulator(LAB, Chain(), scenario("slew", LAB, Chain(), 3.0), count=14)
     drawn = values_of(blocks_of(section)["sampled-slew"].data)
     for key, K2 in (("without", 0.0), ("with", 0.3)):
-        expected = simulator.linear(Gains(K1=0.3, K2=K2))
+        expected = simulator.linear(HubFeedback(K1=0.3, K2=K2))
         for name, signal in (("torque", expected.torque), ("root_moment", expected.at_samples.root_moment)):
             assert abs(np.array(drawn[f"{name}_{key}_N_m"]) - signal).max() < 1e-12 * abs(signal).max()
 

@@ -4,7 +4,8 @@ import numpy as np
 
 import tfarm
 from tests.tuner.bounded import adversary, tally
-from tfarm.dsp import Gains, sampled_loop
+from tfarm.arm import HubFeedback
+from tfarm.dsp import sampled_loop
 from tfarm.tuner.sector import MovingGain
 
 
@@ -16,8 +17,8 @@ def test_guarded_runs_stay_bounded_and_in_the_guard():
 
 
 def test_the_adversary_has_teeth():
-    """Gains that are stable one by one: beyond a sector it drives the loop unstable, inside one it cannot."""
-    loop = MovingGain(sampled_loop(tfarm.load("sasaki2012-lab"), Gains(K1=0.3, K2=1.0), count=6))
+    """HubFeedback that are stable one by one: beyond a sector it drives the loop unstable, inside one it cannot."""
+    loop = MovingGain(sampled_loop(tfarm.load("sasaki2012-lab"), HubFeedback(K1=0.3, K2=1.0), count=6))
     grown = {ends: adversary(loop, *ends, np.random.default_rng(0), 1) for ends in ((0, 1.1), (0.1, 0.6), (0.31, 0.63))}
     assert grown[0, 1.1] > 50
     assert grown[0.1, 0.6] > 5

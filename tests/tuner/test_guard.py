@@ -9,7 +9,8 @@ from scipy.linalg import solve_discrete_lyapunov
 
 import tfarm
 from tests.dsp.roads import aliased_loop
-from tfarm.dsp import Chain, Gains, Sampling, sampled_loop
+from tfarm.arm import HubFeedback
+from tfarm.dsp import Chain, Sampling, sampled_loop
 from tfarm.errors import CertificationError, ParameterError
 from tfarm.tuner import find_guard, slew_trial
 from tfarm.tuner.lyapunov import is_positive_definite, whole
@@ -25,7 +26,7 @@ def lab():
 
 def moving(arm, count=6, delay=0.0):
     chain = Chain(sampling=Sampling(delay_samples=delay))
-    return MovingGain(sampled_loop(arm, Gains(K1=0.3, K2=1.0), chain, count=count))
+    return MovingGain(sampled_loop(arm, HubFeedback(K1=0.3, K2=1.0), chain, count=count))
 
 
 @pytest.fixture(scope="module")

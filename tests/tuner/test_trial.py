@@ -9,7 +9,8 @@ from scipy.linalg import toeplitz
 import tfarm
 from tests.tuner.plain import PlainTrial, plain_gain
 from tfarm import Hub
-from tfarm.dsp import Chain, Converters, Gains, Sampling, Simulator, pulse_transfer
+from tfarm.arm import HubFeedback
+from tfarm.dsp import Chain, Converters, Sampling, Simulator, pulse_transfer
 from tfarm.errors import ParameterError
 from tfarm.tuner import Cost, TunedGain, best_constant, initial_network, lq_bound, residual_rms, simulated, slew_trial
 
@@ -88,7 +89,7 @@ def test_the_best_constant_gain_is_global(lab):
     loop = Simulator(lab, trial.loop.chain, trial.task, count=6)
 
     def cost(K):
-        run = loop.linear(Gains(K1=0.3, K2=K))
+        run = loop.linear(HubFeedback(K1=0.3, K2=K))
         x = run.at_samples.root_moment - trial.task.rigid_moment
         return 0.01 * np.sum(3.0 * x**2 + 0.4 * (run.torque - trial.task.feedforward) ** 2) / 2
 

@@ -43,10 +43,10 @@ def sampled(
     """Is the loop u = -Kp theta - K1 theta_t - K2 M stable when it is sampled?  Verdict, intervals, modes, margins."""
     count = None if modes is None else whole("--modes", modes, 1, 400)
     subject, chain = load_arm(arm), chain_of(dsp or arm, period, delay_samples)
-    from tfarm.dsp.chain import Gains
+    from tfarm.arm import HubFeedback
     from tfarm.dsp.verdict import analyse, sampled_answer
 
-    answer = sampled_answer(analyse(subject, Gains(K1=K1, K2=K2, Kp=Kp), chain, count=count))
+    answer = sampled_answer(analyse(subject, HubFeedback(K1=K1, K2=K2, Kp=Kp), chain, count=count))
     if json:
         from tfarm.cli.answers import to_json
 
@@ -80,11 +80,11 @@ def simulate(
     """The sampled loop in time: hub angle, tip, root moment and torque, exact between the samples."""
     count, records = whole("--modes", modes or "20", 1, 400), whole("--between", between, 0, 1000)
     subject, chain = load_arm(arm), chain_of(dsp or arm, period, delay_samples)
-    from tfarm.dsp.chain import Gains
+    from tfarm.arm import HubFeedback
     from tfarm.dsp.results import simulated_answer
 
     if controller is None:
-        gains = Gains(K1=K1, K2=K2, Kp=Kp)
+        gains = HubFeedback(K1=K1, K2=K2, Kp=Kp)
         answer = simulated_answer(subject, gains, chain, scenario, duration, count=count, between=records)
     else:
         from tfarm.tuner.saving import load_tuner

@@ -1,6 +1,6 @@
 """The sampled loop of the exact arm: hold, delay, converters, verdicts and simulations at 10 ms or any other period."""
 
-from tfarm.dsp.chain import Actuator, Chain, Converters, Gains, Sampling, Slew
+from tfarm.dsp.chain import Actuator, Chain, Converters, Sampling, Slew
 from tfarm.dsp.loop import SampledLoop, closed_loop, sampled_loop
 from tfarm.dsp.margins import delay_margin, required_damping, stable_windows
 from tfarm.dsp.reading import load_chain
@@ -16,7 +16,6 @@ __all__ = [
     "Chain",
     "Converters",
     "GainMap",
-    "Gains",
     "Measurement",
     "PulseTransfer",
     "SampledLoop",

@@ -149,27 +149,6 @@ class Chain:
     slew: Slew = field(default_factory=Slew)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Gains:
-    """u = -Kp theta - K1 theta_t - K2 M + r: `K1` [N m s/rad], `K2` [-], `Kp` [N m/rad].
-
-    M is the root moment E I phi'(0) as a strain gauge reads it; a positive one accelerates the hub, and a rigid arm
-    under the torque u reads -(J - I_h)/J u.  With the opposite sign of the gauge K2 changes its sign.
-    """
-
-    K1: float
-    K2: float
-    Kp: float = 0.0
-
-    def __post_init__(self) -> None:
-        for name in ("K1", "K2", "Kp"):
-            meaning = "a gain is a finite number"
-            value = number(name, getattr(self, name), meaning)
-            if not abs(value) <= 1e12:
-                raise ParameterError(key=name, value=value, remedy=f"{meaning}, of at most 1e12")
-            object.__setattr__(self, name, value)
-
-
 def _above_zero(key: str, record: object, meaning: str) -> float:
     value = extended(key, getattr(record, key.split(".")[1]), meaning)
     if value == 0.0:

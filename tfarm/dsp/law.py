@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
+from tfarm.arm import HubFeedback
 from tfarm.dsp.boundary import GainName
-from tfarm.dsp.chain import Gains
 from tfarm.dsp.loop import SampledLoop
 from tfarm.spectrum import modes
 
@@ -53,7 +53,9 @@ class ModeTable:
         return self.by_rate + self.by_moment
 
 
-def first_order_law(w: Any, b: Any, hub_inertia: float, gains: Gains, period: float, delay: float) -> tuple[Any, Any]:
+def first_order_law(
+    w: Any, b: Any, hub_inertia: float, gains: HubFeedback, period: float, delay: float
+) -> tuple[Any, Any]:
     """The two terms of the formula, by K1 and by K2, for modes of frequency w [rad/s] and hub participation b."""
     q = w * period
     common = -(b**2) * np.sin(q / 2)
@@ -124,7 +126,7 @@ def growing_mode(loop: SampledLoop) -> int:
 
 def _scaled(loop: SampledLoop, scale: float) -> SampledLoop:
     gains = loop.gains
-    return replace(loop, gains=Gains(K1=scale * gains.K1, K2=scale * gains.K2, Kp=scale * gains.Kp))
+    return replace(loop, gains=HubFeedback(K1=scale * gains.K1, K2=scale * gains.K2, Kp=scale * gains.Kp))
 
 
 def _ahead(rows: list[Complex]) -> Complex:

@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm
-from tfarm.dsp.chain import Chain, Gains, Sampling
+from tfarm.arm import Arm, HubFeedback
+from tfarm.dsp.chain import Chain, Sampling
 from tfarm.dsp.plant import Plant, loop_plant
 from tfarm.dsp.sampling import PulseTransfer
 from tfarm.errors import ParameterError
@@ -62,7 +62,7 @@ class SampledLoop:
 
     plant: Plant
     chain: Chain
-    gains: Gains
+    gains: HubFeedback
 
     @cached_property
     def pulse(self) -> PulseTransfer:
@@ -71,7 +71,7 @@ class SampledLoop:
 
     def with_gains(self, K1: float, K2: float) -> SampledLoop:
         """The same loop with other gains."""
-        return replace(self, gains=Gains(K1=K1, K2=K2, Kp=self.gains.Kp))
+        return replace(self, gains=HubFeedback(K1=K1, K2=K2, Kp=self.gains.Kp))
 
     def with_delay(self, samples: float) -> SampledLoop:
         """The same loop with another computational delay."""
@@ -186,14 +186,14 @@ class SampledLoop:
         return np.where(abs(offset) <= UNMOVED, 0.0, offset)
 
 
-def sampled_loop(arm: Arm, gains: Gains, chain: Chain | None = None, *, count: int = 20) -> SampledLoop:
+def sampled_loop(arm: Arm, gains: HubFeedback, chain: Chain | None = None, *, count: int = 20) -> SampledLoop:
     """The loop with `count` flexible modes.  Raises ParameterError for a locked hub, and for I_h = 0 with K2 != 0."""
     chain = Chain() if chain is None else chain
     check_loop(arm, gains)
     return SampledLoop(loop_plant(arm, chain, count), chain, gains)
 
 
-def check_loop(arm: Arm, gains: Gains) -> None:
+def check_loop(arm: Arm, gains: HubFeedback) -> None:
     """Refuse the loop that does not exist: I_h = 0 and K2 != 0."""
     if arm.hub.inertia == 0.0 and gains.K2 != 0.0:
         remedy = (
@@ -208,4 +208,4 @@ def closed_loop(
 ) -> Real:
     """The discrete closed-loop matrix of u = -Kp theta - K1 theta_t - K2 M with the hub angle: `SampledLoop.matrix`."""
     chain = Chain(sampling=Sampling() if sampling is None else sampling)
-    return sampled_loop(arm, Gains(K1=K1, K2=K2, Kp=Kp), chain, count=count).matrix()
+    return sampled_loop(arm, HubFeedback(K1=K1, K2=K2, Kp=Kp), chain, count=count).matrix()

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from tfarm.arm import Arm
+from tfarm.arm import Arm, HubFeedback
 from tfarm.dsp.boundary import GainName, circle_grid, crossings
-from tfarm.dsp.chain import Chain, Gains
+from tfarm.dsp.chain import Chain
 from tfarm.dsp.loop import MOMENT, RATE, SampledLoop, sampled_loop
 from tfarm.dsp.sampling import FORGOTTEN, held
 from tfarm.errors import ConvergenceError
@@ -109,7 +109,7 @@ def _delay_step(loop: SampledLoop) -> float:
     return float(min(0.05, 2 * np.pi / fastest / 12))
 
 
-def required_damping(arm: Arm, gains: Gains, chain: Chain, *, count: int = 40) -> float:
+def required_damping(arm: Arm, gains: HubFeedback, chain: Chain, *, count: int = 40) -> float:
     """The smallest C [s] from which on these gains are stable on this arm (its own C is set aside).
 
     0 where they are stable without damping, inf where none up to 15 % of critical in the first mode helps.  Every
@@ -133,7 +133,7 @@ def required_damping(arm: Arm, gains: Gains, chain: Chain, *, count: int = 40) -
     return math.exp(high)
 
 
-def _with_damping(arm: Arm, gains: Gains, chain: Chain, C: float, count: int) -> float:
+def _with_damping(arm: Arm, gains: HubFeedback, chain: Chain, C: float, count: int) -> float:
     """The log spectral radius at C; where two damped modes are one there, at a C that differs by 1e-6.
 
     Modes that a strong C has settled before the next sample are left to the static remainder, but for a few.

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm
-from tfarm.dsp.chain import Chain, Gains
+from tfarm.arm import Arm, HubFeedback
+from tfarm.dsp.chain import Chain
 from tfarm.dsp.scenarios import scenario
 from tfarm.dsp.simulate import Simulation, Simulator, Trace
 
@@ -81,7 +81,9 @@ def _half_range(signal: Real) -> float:
     return float(np.ptp(signal)) / 2 if signal.size else 0.0
 
 
-def simulation_answer(arm_name: str, gains: Gains, simulation: Simulation, cycle: LimitCycle | None) -> dict[str, Any]:
+def simulation_answer(
+    arm_name: str, gains: HubFeedback, simulation: Simulation, cycle: LimitCycle | None
+) -> dict[str, Any]:
     """The simulation as a dictionary of plain numbers, texts and lists."""
     stopped, volts = simulation.stopped, simulation.volts
     answer: dict[str, Any] = {
@@ -140,7 +142,7 @@ def ideal_chain(chain: Chain) -> Chain:
 
 
 def simulated_answer(
-    arm: Arm, gains: Gains, chain: Chain, name: str, duration: float, *, count: int = 20, between: int = 0
+    arm: Arm, gains: HubFeedback, chain: Chain, name: str, duration: float, *, count: int = 20, between: int = 0
 ) -> dict[str, Any]:
     """Simulate a scenario by its name and say what came of it.
 

@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm
+from tfarm.arm import Arm, HubFeedback
 from tfarm.dsp import kernel
-from tfarm.dsp.chain import Chain, Gains
+from tfarm.dsp.chain import Chain
 from tfarm.dsp.converters import quantisers
 from tfarm.dsp.loop import check_loop
 from tfarm.dsp.plant import MEASURED, RECORDED, Plant, filtered, undelayed_plant
@@ -119,7 +119,7 @@ class Simulator:
         self._ideal = np.c_[scenario.feedforward, scenario.hub_angle, scenario.hub_rate, scenario.rigid_moment]
         self._bound = FOLDED_UP * arm.link.EI / arm.link.length
 
-    def linear(self, gains: Gains, K2: Real | None = None) -> Simulation:
+    def linear(self, gains: HubFeedback, K2: Real | None = None) -> Simulation:
         """The law u = r + Kp (theta_ref - theta) + K1 (theta_t_ref - theta_t) - K2 x, compiled; `K2` (n,) may vary.
 
         Raises ParameterError for I_h = 0 with moment feedback, and for gains that are not one finite number a sample.

@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from tfarm.arm import Arm
-from tfarm.dsp.chain import Chain, Gains
+from tfarm.arm import Arm, HubFeedback
+from tfarm.dsp.chain import Chain
 from tfarm.dsp.law import ModeTable, growing_mode, mode_table
 from tfarm.dsp.loop import SampledLoop, sampled_loop
 from tfarm.dsp.margins import DelayMargin, Window, alive, around, delay_margin, required_damping, stable_windows
@@ -69,7 +69,7 @@ def _change(log_radius: float) -> str:
     )
 
 
-def sampled_verdict(arm: Arm, gains: Gains, chain: Chain | None = None, *, count: int | None = None) -> Verdict:
+def sampled_verdict(arm: Arm, gains: HubFeedback, chain: Chain | None = None, *, count: int | None = None) -> Verdict:
     """The verdict, with `count` modes, or as many as it takes (C > 0), or the first 20 (C = 0).
 
     Raises ParameterError for a locked hub, for I_h = 0 with K2 != 0 (an algebraic loop), and a count outside 1..400.
@@ -91,7 +91,7 @@ def sampled_verdict(arm: Arm, gains: Gains, chain: Chain | None = None, *, count
     return Verdict(loop, False)
 
 
-def _larger(arm: Arm, gains: Gains, chain: Chain, before: int, count: int) -> SampledLoop:
+def _larger(arm: Arm, gains: HubFeedback, chain: Chain, before: int, count: int) -> SampledLoop:
     """The loop with `count` modes, or somewhat fewer (above `before`) where two damped modes cannot be told apart."""
     numbers = [number for number in (count, *(int(share * count) for share in FEWER)) if number > before]
     for number in numbers:
@@ -134,7 +134,7 @@ class Analysis:
         return int(grows[0]) if grows.size else None
 
 
-def analyse(arm: Arm, gains: Gains, chain: Chain | None = None, *, count: int | None = None) -> Analysis:
+def analyse(arm: Arm, gains: HubFeedback, chain: Chain | None = None, *, count: int | None = None) -> Analysis:
     """Verdict, stable intervals of both gains, modes one by one, delay margin, and the damping that makes it safe."""
     chain = Chain() if chain is None else chain
     verdict = sampled_verdict(arm, gains, chain, count=count)

@@ -18,7 +18,7 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback
-from tfarm.dsp import Gains, gain_map, sampled_verdict, stable_windows
+from tfarm.dsp import gain_map, sampled_verdict, stable_windows
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.loop import SampledLoop
 from tfarm.errors import ConvergenceError
@@ -63,14 +63,14 @@ class Overlay:
     """Both regions of one arm.  `sampled` has the arm's own C; at C = 0 also what a little damping would give."""
 
     arm: Arm
-    gains: Gains
+    gains: HubFeedback
     period: float
     K1_range: Window
     continuous: Layer
     sampled: tuple[Layer, ...]  # most damping first, so that each lies on the one before
 
 
-def overlay(arm: Arm, gains: Gains, chain: Chain) -> Overlay:
+def overlay(arm: Arm, gains: HubFeedback, chain: Chain) -> Overlay:
     """The regions around these gains.  Raises ParameterError where the arm has no loop."""
     dampings = (arm.link.damping,) if arm.link.damping else (*DAMPINGS, 0.0)
     loops = [sampled_verdict(with_damping(arm, C), gains, chain).loop for C in dampings]

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from tfarm.arm import Arm, HubFeedback
-from tfarm.dsp import Analysis, Gains, analyse, sampled_verdict, stable_windows
+from tfarm.dsp import Analysis, analyse, sampled_verdict, stable_windows
 from tfarm.dsp.chain import Chain, Sampling
 from tfarm.dsp.margins import around
 from tfarm.loop.stability import stability
@@ -15,7 +15,7 @@ from tfarm.report.digits import plain, scientific, significant
 from tfarm.report.overlay import Overlay, overlay
 from tfarm.report.sections import Fact
 
-GAINS = Gains(K1=0.3, K2=0.3)
+GAINS = HubFeedback(K1=0.3, K2=0.3)
 PERIODS = (0.001, 0.005, 0.01, 0.02, 0.05)  # s
 DEEPEST = -50.0  # K2: how far down the continuous window is looked for
 DAY = 86400.0  # s

@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm
-from tfarm.dsp import Converters, Gains, Measurement, Simulation, Simulator, scenario
+from tfarm.arm import Arm, HubFeedback
+from tfarm.dsp import Converters, Measurement, Simulation, Simulator, scenario
 from tfarm.dsp.chain import Actuator, Chain
 from tfarm.report.digits import plain, significant
 from tfarm.report.figures import BLUE, FAINT, GREEN, GREY, INK, ORANGE, blank, headline, style
@@ -38,7 +38,7 @@ class StripChart:
     """
 
     arm: Arm
-    gains: Gains
+    gains: HubFeedback
     simulation: Simulation
     read: Real
     asked: Real
@@ -62,7 +62,7 @@ class StripChart:
         return np.asarray(abs(self.asked) > self.limit)
 
 
-def strip_chart(arm: Arm, gains: Gains, ideal: Simulation, modes: int) -> StripChart:
+def strip_chart(arm: Arm, gains: HubFeedback, ideal: Simulation, modes: int) -> StripChart:
     """The same slew as that of an ideal chain, with a coarse ADC, a weak motor and one more sample of delay."""
     chain = coarse_chain(ideal)
     task = scenario("slew", arm, chain, DURATION)

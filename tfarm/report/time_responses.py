@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm
-from tfarm.dsp import Gains, Simulation, Simulator, scenario
+from tfarm.arm import Arm, HubFeedback
+from tfarm.dsp import Simulation, Simulator, scenario
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.results import residual_moment_rms, settling_time
 from tfarm.report.digits import plain, significant
@@ -30,7 +30,7 @@ class Slews:
     """One slew simulated twice: `without` (K2 = 0) and `with_moment` feedback, K1 the same."""
 
     arm: Arm
-    gains: Gains
+    gains: HubFeedback
     without: Simulation
     with_moment: Simulation
 
@@ -40,10 +40,10 @@ class Slews:
         return {"without moment feedback, K2 = 0": self.without, f"with, K2 = {plain(self.gains.K2)}": self.with_moment}
 
 
-def slews(arm: Arm, gains: Gains, chain: Chain, modes: int, duration: float = DURATION) -> Slews:
+def slews(arm: Arm, gains: HubFeedback, chain: Chain, modes: int, duration: float = DURATION) -> Slews:
     """The slew of the chain.  Raises ParameterError for an arm that cannot turn."""
     simulator = Simulator(arm, chain, scenario("slew", arm, chain, duration), count=modes, between=BETWEEN)
-    return Slews(arm, gains, simulator.linear(Gains(K1=gains.K1, K2=0.0)), simulator.linear(gains))
+    return Slews(arm, gains, simulator.linear(HubFeedback(K1=gains.K1, K2=0.0)), simulator.linear(gains))
 
 
 def draw_slews(data: Slews) -> Figure:

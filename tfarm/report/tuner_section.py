@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 
-from tfarm.arm import Arm
-from tfarm.dsp import Gains
+from tfarm.arm import Arm, HubFeedback
 from tfarm.errors import CertificationError
 from tfarm.report.digits import aligned, plain, significant
 from tfarm.report.figures import Picture
@@ -89,7 +88,7 @@ def why_not(arm: Arm) -> str:
 
 def _gain_picture(data: TunerStudy) -> Picture:
     tuning = data.tuning
-    plane = overlay(data.arm, Gains(K1=tuning.plan.K1, K2=tuning.best_constant.gain), tuning.trial.loop.chain)
+    plane = overlay(data.arm, HubFeedback(K1=tuning.plan.K1, K2=tuning.best_constant.gain), tuning.trial.loop.chain)
     guard, K = tuning.training.guard, tuning.training.result.K
     return Picture(
         stem="tune-gain",

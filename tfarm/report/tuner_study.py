@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm
-from tfarm.dsp import Chain, Gains, Simulation, Simulator
+from tfarm.arm import Arm, HubFeedback
+from tfarm.dsp import Chain, Simulation, Simulator
 from tfarm.report.time_responses import BETWEEN
 from tfarm.tuner import Learning, Plan, Tuning, compare, conditions, tune
 from tfarm.tuner.comparison import Row
@@ -119,7 +119,7 @@ def tuner_study(arm: Arm) -> TunerStudy:
         arm=arm,
         tuning=tuning,
         slews=_simulated(tuning, chain),
-        constant=_simulator(tuning, chain).linear(Gains(K1=tuning.plan.K1, K2=tuning.best_constant.gain)),
+        constant=_simulator(tuning, chain).linear(HubFeedback(K1=tuning.plan.K1, K2=tuning.best_constant.gain)),
         coarse=_simulated(tuning, next(each.chain for each in listed if each.name == COARSE)),
         curves=tuple(_curves(arm, *each) for each in LEARNT),
         cost_map=_cost_map(arm),
@@ -134,7 +134,7 @@ def _simulator(tuning: Tuning, chain: Chain) -> Simulator:
 
 def _simulated(tuning: Tuning, chain: Chain) -> dict[str, Simulation]:
     simulator, K1 = _simulator(tuning, chain), tuning.plan.K1
-    without, tuned = simulator.linear(Gains(K1=K1, K2=0.0)), simulator.gain_schedule(K1, tuning.gain())
+    without, tuned = simulator.linear(HubFeedback(K1=K1, K2=0.0)), simulator.gain_schedule(K1, tuning.gain())
     return {"without moment feedback, K2 = 0": without, "with the tuner": tuned}
 
 

@@ -11,8 +11,8 @@ import math
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from tfarm.arm import Arm
-from tfarm.dsp import Chain, Converters, Gains, Scenario, Simulator
+from tfarm.arm import Arm, HubFeedback
+from tfarm.dsp import Chain, Converters, Scenario, Simulator
 from tfarm.errors import ConvergenceError
 from tfarm.tuner.bound import lq_bound
 from tfarm.tuner.constants import best_constant
@@ -131,7 +131,7 @@ def _simulator(trial: Trial, task: Scenario) -> Simulator:
 
 
 def _constant(trial: Trial, task: Scenario, K: float) -> Outcome:
-    run = _simulator(trial, task).linear(Gains(K1=trial.loop.gains.K1, K2=K))
+    run = _simulator(trial, task).linear(HubFeedback(K1=trial.loop.gains.K1, K2=K))
     return _outcome(judged(run, trial.cost, trial.signals), task)
 
 

@@ -18,9 +18,9 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm
+from tfarm.arm import Arm, HubFeedback
 from tfarm.arm.checks import not_negative, number, positive
-from tfarm.dsp import Chain, Gains, SampledLoop, Scenario, sampled_loop, scenario
+from tfarm.dsp import Chain, SampledLoop, Scenario, sampled_loop, scenario
 from tfarm.errors import ParameterError, did_you_mean
 from tfarm.tuner import kernel
 from tfarm.tuner.network import Network
@@ -206,7 +206,7 @@ def slew_trial(
     if arm.hub.inertia == 0.0:
         remedy = "the root moment of a hub without inertia is the torque itself, and feeding it back an algebraic loop"
         raise ParameterError(key="hub.inertia", value=0.0, remedy=f"{remedy}; give the hub an inertia")
-    loop = sampled_loop(arm, Gains(K1=rate_gain, K2=1.0), chain, count=count)
+    loop = sampled_loop(arm, HubFeedback(K1=rate_gain, K2=1.0), chain, count=count)
     task = scenario("slew", arm if known is None else known, chain, length)
     return Trial(loop, task, Cost() if cost is None else cost, signals)
 

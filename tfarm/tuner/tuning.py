@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from tfarm.arm import Arm
-from tfarm.dsp import Chain, Gains, Simulator, scenario
+from tfarm.arm import Arm, HubFeedback
+from tfarm.dsp import Chain, Simulator, scenario
 from tfarm.dsp.results import simulation_answer
 from tfarm.errors import ParameterError
 from tfarm.tuner.bound import lq_bound
@@ -181,7 +181,7 @@ def controlled_answer(
     chain = with_signals(chain, saved.signals)
     task = scenario(name, arm, chain, duration)
     run = Simulator(arm, chain, task, count=count, between=between).gain_schedule(saved.K1, saved.gain())
-    answer = simulation_answer(arm.name, Gains(K1=saved.K1, K2=0.0), run, None)
+    answer = simulation_answer(arm.name, HubFeedback(K1=saved.K1, K2=0.0), run, None)
     return answer | {"K2": None, "controller": _described(saved)}
 
 
