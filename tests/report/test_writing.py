@@ -372,6 +372,6 @@ def test_an_arm_that_cannot_turn_nor_move_its_tip_is_reported_on_too(tmp_path):
 
 def test_the_pictures_of_the_readme(tmp_path):
     paths = readme_pictures(tmp_path)
-    assert [path.name for path in paths] == ["bode-root-moment.png", "mode-shapes.png"]
+    assert [path.name for path in paths] == ["bode-root-moment.png", "gains.png", "mode-shapes.png"]
     kept = Path(__file__).parents[2] / "reports" / "pictures"
     assert {path.name for path in kept.iterdir()} == {path.name for path in paths}

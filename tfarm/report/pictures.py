@@ -7,10 +7,13 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 import tfarm
+from tfarm.dsp.chain import Chain
 from tfarm.report.bode import draw_compared
 from tfarm.report.digits import plain
 from tfarm.report.figures import save
+from tfarm.report.loop_laws import DEFAULT
 from tfarm.report.mode_shapes import draw_shapes, shapes_of
+from tfarm.report.overlay import draw_overlay, overlay
 from tfarm.report.responses import band_of, bode
 
 DOTS_PER_INCH = 100
@@ -18,9 +21,9 @@ SHOWN = 4
 
 
 def readme_pictures(out: Path) -> tuple[Path, ...]:
-    """Write bode-root-moment.png and mode-shapes.png to the folder `out`; their paths."""
+    """Write bode-root-moment.png, gains.png and mode-shapes.png to the folder `out`; their paths."""
     out.mkdir(parents=True, exist_ok=True)
-    figures = {"bode-root-moment": _bode(), "mode-shapes": _shapes()}
+    figures = {"bode-root-moment": _bode(), "gains": _gains(), "mode-shapes": _shapes()}
     for stem, figure in figures.items():
         save(figure, out, stem, formats=("png",), dpi=DOTS_PER_INCH)
     return tuple(out / f"{stem}.png" for stem in figures)
@@ -33,6 +36,12 @@ def _bode() -> Figure:
     band = band_of(modes.natural_frequency[modes.index > 0])
     labels = "exact, no damping", f"exact, damping C = {plain(damped.link.damping)} s"
     return draw_compared(bode(undamped, "root_moment", band), bode(damped, "root_moment", band), labels)
+
+
+def _gains() -> Figure:
+    """The gains that keep the loop stable, continuous and sampled."""
+    arm = tfarm.load("sasaki2012-lab")
+    return draw_overlay(overlay(arm, DEFAULT, Chain()))
 
 
 def _shapes() -> Figure:
