@@ -13,7 +13,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from . import elements, loci, loops, memory, responses, spectra, tuning
+from . import elements, loci, loops, memory, responses, sampled, spectra, tuning
 from .rows import Row, keep, show
 
 
@@ -28,6 +28,7 @@ def measure() -> Iterator[Row]:
     yield spectra.cxroots_row()
     yield from loops.loop_rows()
     yield from loci.locus_rows()
+    yield from sampled.sampled_rows()
     yield from tuning.tuner_rows()
 
 

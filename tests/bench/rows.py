@@ -27,7 +27,7 @@ class Target:
     @property
     def met(self) -> bool:
         """Whether it was, this time."""
-        return self.measured <= self.limit
+        return bool(self.measured <= self.limit)
 
     def __str__(self) -> str:
         return f"{self.measured:.3g} of {self.limit:g} {self.unit}: {'met' if self.met else 'NOT MET'}"
