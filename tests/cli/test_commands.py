@@ -223,3 +223,27 @@ def test_without_arguments_there_is_help(capsys: pytest.CaptureFixture[str]) -> 
     code, out, err = run(capsys)
     assert (code, err) == (0, "")
     assert "modes" in out
+
+
+def test_damped_modes_stand_beside_the_undamped_ones(capsys: pytest.CaptureFixture[str]) -> None:
+    """Each eigenvalue near its own frequency, overdamped ones in pairs, and as many in the box as are said to be."""
+    result = answer(capsys, "modes", "sasaki2012-lab", "--count", "17", "--certify")
+    flexible = result["modes"][1:]
+    assert ["eigenvalue" in mode for mode in flexible] == [True] * 15 + [False] * 2
+    assert ["eigenvalues" in mode for mode in flexible] == [False] * 15 + [True] * 2
+    first = flexible[0]
+    assert abs(complex(*first["eigenvalue"])) == pytest.approx(first["natural_frequency_rad_s"], rel=1e-6)
+    assert float(first["discs"][0]["im"]) == pytest.approx(first["eigenvalue"][1], rel=1e-14)
+    listed = [mode["eigenvalue"] for mode in result["modes"] if "eigenvalue" in mode]
+    inside = sum(re > result["box"][0] and im < result["box"][3] for re, im in listed)
+    assert 2 * inside == result["eigenvalues_in_box"]
+
+
+def test_modes_that_cannot_be_followed_are_said_not_left_out(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tfarm.cli.answers.FOLLOWED", (4, 2))
+    result = answer(capsys, "modes", "sasaki2012-lab", "--count", "6")
+    assert [mode["index"] for mode in result["modes"] if "damping_ratio" in mode] == [0, 1, 2, 3, 4]
+    assert len(result["modes"]) == 7
+    assert "up to mode 4 only" in result["damped_note"]

@@ -53,10 +53,14 @@ def print_modes(answer: dict[str, Any]) -> None:
         print(f"{answer['eigenvalues_in_box']} eigenvalues with Re s from {left:.6g} to {right:.6g} 1/s and")
         print(f"Im s from {low:.6g} to {high:.6g} rad/s, all listed ({proven}). Beyond the box there are more:")
         print("shear is undamped, so lightly damped modes exist above any box; real ones accumulate at -1/C.")
+        if "damped_note" in answer:
+            print(answer["damped_note"])
     print(f"{answer['arm']}: the first {answer['count']} flexible modes, none missing ({answer['theory']} theory)")
 
 
 def _damping(mode: dict[str, Any]) -> tuple[str, str]:
+    if "damping_ratio" not in mode:
+        return "not followed", "-"
     if "eigenvalues" in mode:
         pair = " and ".join(f"{value:.8g}" for value in mode["eigenvalues"])
         return pair, f"{mode['damping_ratio']:.6g} (overdamped)"
