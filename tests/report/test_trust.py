@@ -202,3 +202,28 @@ def test_one_page_of_an_arm_does_not_wait_for_the_audit(tmp_path, monkeypatch, e
 def test_no_arm_may_be_called_trust(tmp_path):
     with pytest.raises(tfarm.ParameterError, match="another name"):
         write([replace(ARM, name="Trust")], tmp_path)
+
+
+def test_damped_modes_and_closed_loop_poles_are_counted_and_kept(tmp_path):
+    """Winding numbers in float64, by another code than the balls, count the same; and what was kept is read again."""
+    lab = tfarm.load("sasaki2012-lab")
+    proof = prove(lab)
+    damped, loop = proof.boxes
+    modes = tfarm.damped_modes(tfarm.modes(lab, 10))
+    assert (damped.count, damped.failure) == (modes.count, "")
+    eigenvalues = modes.eigenvalues.ravel().tolist()
+    assert sum(damped.box[0] < s.real and abs(s.imag) < damped.box[3] for s in eigenvalues) == damped.count
+    values = tfarm.closed_loop_poles(lab, tfarm.HubFeedback(K1=0.3, K2=0.3), 10).values
+    assert loop.count == sum(2 if s.imag > 0 else 1 for s in values)
+    (tmp_path / lab.name).mkdir()
+    save_proof(lab, tmp_path / lab.name)
+    assert written_proofs(tmp_path)[0].boxes == proof.boxes
+
+
+def test_a_box_that_cannot_be_proven_says_why(monkeypatch):
+    def fails(*_):
+        raise tfarm.CertificationError("a zero lies on the edge")
+
+    monkeypatch.setattr("tfarm.loop.poles.Poles.certify", fails)
+    (loop,) = prove(tfarm.load("sasaki2012")).boxes
+    assert (loop.count, loop.failure) == (0, "a zero lies on the edge")

@@ -55,6 +55,11 @@ class Poles:
         return int((right * np.where(self.values.imag > 0, 2, 1)).sum())
 
     @property
+    def count(self) -> int:
+        """How many poles the box holds, conjugates counted."""
+        return int(np.where(self.values.imag > 0, 2, 1).sum())
+
+    @property
     def moving(self) -> Complex:
         """The poles apart from those at 0, which the hub angle leaves there where Kp = 0."""
         return self.values[self.values != 0]
@@ -73,10 +78,9 @@ class Poles:
         discs = tuple(enclosed(k, complex(pole), digits, gains) for pole in self.moving)
         if not disjoint(discs):
             raise CertificationError("the discs of two poles touch: ask for more digits")
-        listed = int(np.where(self.moving.imag > 0, 2, 1).sum()) + zeros_at_origin(k, gains)
         proven = proven_count(k, self.box, gains)
-        if proven != listed:
-            raise CertificationError(f"{listed} poles in the box are listed, but {proven} are there")
+        if proven != self.count:
+            raise CertificationError(f"{self.count} poles in the box are listed, but {proven} are there")
         return discs
 
 

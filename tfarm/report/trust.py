@@ -13,6 +13,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 import tfarm
 from tfarm import audit
 from tfarm.arm import load, presets
@@ -20,9 +22,9 @@ from tfarm.audit import published
 from tfarm.report.digits import scientific, significant
 from tfarm.report.page import command_for_all, render
 from tfarm.report.sections import Fact, Section, save_section, save_table
-from tfarm.report.tables import Column, Table, text_column
+from tfarm.report.tables import Column, Table, number_column, text_column
 from tfarm.report.trust_audit import VERDICTS, audit_table, counts, shown
-from tfarm.report.trust_proofs import DIGITS, MODES, OUTPUTS, POINTS, Proof, digits_of, hash_of
+from tfarm.report.trust_proofs import BOX_DIGITS, DIGITS, MODES, OUTPUTS, POINTS, Proof, digits_of, hash_of
 
 FOLDER = "trust"
 PACKAGES = ("numpy", "scipy", "numba", "mpmath", "python-flint", "sympy", "control", "matplotlib", "latex2mathml")
@@ -41,6 +43,12 @@ DIGITS_CAPTION = (
 COUNTS_CAPTION = (
     "The count is made at one frequency between the last mode of the list and the next; with the rigid-body mode it is "
     "one more than the flexible modes enclosed. Each arm's folder has the enclosures as proof.json."
+)
+BOXES_CAPTION = (
+    "Eigenvalues off the axis, s in 1/s, conjugates and those at 0 counted. Each is enclosed in a disc of "
+    f"{BOX_DIGITS} digits that holds exactly one (Rouché's theorem), and the argument principle, evaluated in ball "
+    "arithmetic around the box, counts as many inside: none is missing there. With damping no box can hold all: "
+    "lightly damped shear modes exist far above any, and slow real eigenvalues accumulate at -1/C."
 )
 ACCURACY = (
     f"The plots are computed in double precision from a closed form without cancellation. At {POINTS} frequencies of "
@@ -95,7 +103,12 @@ def write_trust(evidence: Evidence, proofs: Sequence[Proof], folder: Path) -> No
 def _sections(evidence: Evidence, proofs: Sequence[Proof]) -> list[Section]:
     rows = evidence.published
     return [
-        Section(anchor="proofs", title="Proofs", words=(PROOFS,), blocks=(digits_table(proofs), counts_table(proofs))),
+        Section(
+            anchor="proofs",
+            title="Proofs",
+            words=(PROOFS,),
+            blocks=(digits_table(proofs), counts_table(proofs), *boxes_tables(proofs)),
+        ),
         Section(anchor="accuracy", title="Measured accuracy", words=(ACCURACY,), blocks=(accuracy_table(proofs),)),
         Section(
             anchor="published",
@@ -164,6 +177,33 @@ def counts_table(proofs: Sequence[Proof]) -> Table:
             text_column("verdict", "verdict", [_verdict(proof) for proof in proofs]),
         ),
     )
+
+
+def boxes_tables(proofs: Sequence[Proof]) -> tuple[Table, ...]:
+    """Damped modes and closed-loop poles, a row a box; no table where there is none."""
+    rows = [(proof.name, each) for proof in proofs for each in proof.boxes]
+    if not rows:
+        return ()
+    edges = ((0, "re_min", "Re s from"), (1, "re_max", "Re s to"), (3, "im_max", "|Im s| below"))
+    limits = [
+        number_column(key, title, "1/s", values, [significant(float(value), 4) for value in values])
+        for which, key, title in edges
+        for values in [np.array([each.box[which] for _, each in rows])]
+    ]
+    verdicts = [each.failure or "complete, proven" for _, each in rows]
+    table = Table(
+        stem="boxes",
+        title="Damped modes and closed-loop poles",
+        caption=BOXES_CAPTION,
+        columns=(
+            text_column("arm", "arm", [name for name, _ in rows]),
+            text_column("what", "of", [each.what for _, each in rows]),
+            _numbers("count", "counted", [each.count for _, each in rows]),
+            *limits,
+            text_column("verdict", "verdict", verdicts),
+        ),
+    )
+    return (table,)
 
 
 def _verdict(proof: Proof) -> str:

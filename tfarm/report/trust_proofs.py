@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from decimal import Decimal, localcontext
 from fractions import Fraction
@@ -19,9 +19,10 @@ import numpy as np
 import tfarm
 from tfarm.arm import Arm, to_toml
 from tfarm.errors import CertificationError, ConvergenceError
+from tfarm.report.loop_laws import DEFAULT, has_loop
 from tfarm.spectrum import Modes
 
-MODES, DIGITS = 10, 20
+MODES, DIGITS, BOX_DIGITS = 10, 20, 12
 OUTPUTS = ("root_moment", "tip_displacement")
 POINTS, POINT_DIGITS = 100, 30
 LARGEST = 1 << 20  # bytes of a proof.json worth reading
@@ -30,12 +31,26 @@ TWO_PI = Decimal("6.2831853071795864769252867665590057683943387987502")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Boxed:
+    """Eigenvalues proven complete in a box (re_min, re_max, im_min, im_max) [1/s]: each in a disc, `count` in all.
+
+    `failure` says what could not be proven.
+    """
+
+    what: str
+    count: int = 0
+    box: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    failure: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Proof:
     """Of one arm: brackets (lower, upper) [rad/s] of its first flexible frequencies, the count that completes them.
 
     `count` frequencies lie below `below` [rad/s], a rigid-body mode included if `has_rigid_mode`.  `errors` has
     (output, worst |G_64/G - 1| / (1 + |s G'/G|)) over `points` frequencies from `band`.  `failure` says what could
-    not be proven; then there are no brackets.  `sha256` is that of the arm's file.
+    not be proven; then there are no brackets.  `boxes` are damped modes and poles of the default loop.  `sha256` is
+    that of the arm's file.
     """
 
     name: str
@@ -49,6 +64,7 @@ class Proof:
     points: int = POINTS
     band: tuple[float, float]
     errors: tuple[tuple[str, float], ...]
+    boxes: tuple[Boxed, ...] = ()
 
 
 def prove(arm: Arm) -> Proof:
@@ -68,8 +84,34 @@ def prove(arm: Arm) -> Proof:
         has_rigid_mode=arm.has_rigid_mode,
         band=band,
         errors=tuple((output, worst) for output in OUTPUTS if (worst := measured(arm, output, band)) is not None),
+        boxes=tuple(boxed(arm, modes)),
         **found,
     )
+
+
+def boxed(arm: Arm, modes: Modes) -> Iterator[Boxed]:
+    """Damped modes and the default loop's poles, each enclosed and counted; what cannot be proven is said."""
+    if arm.link.damping:
+        what = f"damped modes, C = {arm.link.damping:g} s"
+        try:
+            damped = tfarm.damped_modes(modes)
+            damped.certify(BOX_DIGITS)
+            yield Boxed(what=what, count=damped.count, box=_four(damped.box))
+        except (CertificationError, ConvergenceError) as error:
+            yield Boxed(what=what, failure=str(error))
+    if has_loop(arm):
+        what = f"closed loop, K1 = {DEFAULT.K1:g}, K2 = {DEFAULT.K2:g}"
+        try:
+            poles = tfarm.closed_loop_poles(arm, DEFAULT, MODES)
+            poles.certify(BOX_DIGITS)
+            yield Boxed(what=what, count=poles.count, box=_four(poles.box))
+        except (CertificationError, ConvergenceError) as error:
+            yield Boxed(what=what, failure=str(error))
+
+
+def _four(box: Sequence[float]) -> tuple[float, float, float, float]:
+    left, right, low, high = (float(edge) for edge in box)
+    return left, right, low, high
 
 
 def hash_of(arm: Arm) -> str:
@@ -122,6 +164,7 @@ def _read(folder: Path) -> Proof | None:
         read["brackets"] = tuple((str(lower), str(upper)) for lower, upper in read["brackets"])
         read["band"] = float(read["band"][0]), float(read["band"][1])
         read["errors"] = tuple((str(output), float(error)) for output, error in read["errors"])
+        read["boxes"] = tuple(Boxed(**each | {"box": _four(each["box"])}) for each in read["boxes"])
         return Proof(**read)
     except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
         return None
