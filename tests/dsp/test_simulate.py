@@ -275,8 +275,10 @@ def test_what_cannot_be_simulated_is_refused(lab):
     from tfarm.arm import Payload
 
     pinned = replace(lab, payload=Payload(mass=np.inf))
-    with pytest.raises(ParameterError, match="no slew"):
+    with pytest.raises(ParameterError, match=r"payload\.mass = inf: .*no slew"):
         scenario("slew", pinned, Chain(), 1.0)
+    with pytest.raises(ParameterError, match=r"payload\.inertia = inf: .*no slew"):
+        scenario("slew", replace(lab, payload=Payload(inertia=np.inf)), Chain(), 1.0)
     with pytest.raises(ParameterError, match="cannot be released"):
         simulator(pinned, "decay", 1.0, count=3).linear(GAINS)
     with pytest.raises(ParameterError, match='did you mean "slew"'):

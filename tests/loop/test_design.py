@@ -1,5 +1,7 @@
 """Gains that serve best: never beaten by random ones, always stable, and what the slew leaves against a simulation."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.linalg import expm
@@ -117,3 +119,10 @@ def test_empty_bounds_are_refused(K1) -> None:
 def test_an_unknown_objective_is_refused() -> None:
     with pytest.raises(ParameterError, match="objective"):
         design(LAB, "beauty")
+
+
+@pytest.mark.parametrize("part", ["mass", "inertia"])
+def test_an_arm_that_cannot_turn_has_no_slew_to_leave_a_residual(part) -> None:
+    held = replace(LAB, payload=tfarm.Payload(**{part: float("inf")}))
+    with pytest.raises(ParameterError, match=rf"payload\.{part} = inf: .*no slew"):
+        design(held, "residual")

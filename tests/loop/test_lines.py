@@ -105,6 +105,12 @@ def test_without_other_gains_the_gauge_cancels_the_inertia_at_one_k2() -> None:
     assert poles_below(Loop(LAB, HubFeedback(K2=each.t * 0.99)), 20.0).values.real.max() < 1e-9
 
 
+def test_a_hub_that_rounds_the_arm_away_has_no_k2_that_cancels_it() -> None:
+    arm = replace(LAB, hub=Hub(inertia=1e20))
+    assert arm.total_inertia == arm.hub.inertia
+    assert crossing_at_zero(arm, along("K2", HubFeedback())) is None
+
+
 @pytest.mark.parametrize(("K2", "expected"), [(0.5, 1), (-0.5, -1), (0.0, -1)])
 def test_stiffness_without_k1_leaves_an_oscillation_that_k2_drives_or_damps(K2, expected) -> None:
     """From one real unstable pole to two or to none: with C > 0 the gauge lags by C behind the inertia it feels."""

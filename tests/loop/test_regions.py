@@ -50,6 +50,18 @@ def test_counts_of_a_held_arm_step_where_its_stiffness_vanishes(Kp) -> None:
     np.testing.assert_array_equal(found.unstable, model_counts(held(1e-3), K1, K2, Kp, 10))
 
 
+def test_a_column_without_rate_feedback_steps_where_the_effective_inertia_vanishes() -> None:
+    """At K1 = Kp = 0 a real pole passes the two at 0 where J = K2 (J - I_h): no crossing at w > 0 tells of it."""
+    J = LAB.total_inertia
+    limit = J / (J - LAB.hub.inertia)
+    K2 = np.array([-20.0, -2.0, 0.5, limit * (1 - 1e-6), limit * (1 + 1e-6), 40.0])
+    found = region(LAB, np.array([-0.5, 0.0, 0.5]), K2)
+    counted = [[stability(LAB, HubFeedback(K1=a, K2=float(b))).unstable_roots for a in (-0.5, 0.0, 0.5)] for b in K2]
+    assert found.unstable.tolist() == counted
+    assert found.unstable[4, 1] == found.unstable[3, 1] + 1
+    assert not found.stable[:, 1].any()
+
+
 def test_the_window_at_negative_k2_is_on_the_map() -> None:
     K2 = np.array([-13.0, -11.48, -11.46, -10.0, -8.49, -8.47, -5.0, 0.0, 1.0, 1.03])
     found = region(window_arm(), np.array([0.5, 1.0]), K2)

@@ -54,7 +54,12 @@ def slew(arm: Arm, chain: Chain, duration: float) -> Scenario:
     sample ("vibration"), or all of it ("total").  Raises ParameterError for an arm that cannot turn.
     """
     if not arm.has_rigid_mode:
-        key, value = ("hub.inertia", arm.hub.inertia) if arm.is_locked else ("payload.mass", arm.payload.mass)
+        parts = {
+            "hub.inertia": arm.hub.inertia,
+            "payload.mass": arm.payload.mass,
+            "payload.inertia": arm.payload.inertia,
+        }
+        key, value = max(parts.items(), key=lambda part: part[1])
         raise ParameterError(key=key, value=value, remedy="an arm that cannot turn has no slew; give finite inertias")
     T, manoeuvre = chain.sampling.period, chain.slew
     n = _samples(duration, T)

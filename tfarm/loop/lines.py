@@ -121,7 +121,10 @@ def _through_zero_free(arm: Arm, line: Line) -> Crossing | None:
     if base.K1 or not way.K2:
         return None
     J = arm.total_inertia
-    return Crossing((J / (J - arm.hub.inertia) - base.K2) / way.K2, 0.0, _sign(way.K2))
+    carried = J - arm.hub.inertia
+    if not carried:  # below the rounding of the hub's own: no gain a loop takes reaches so far
+        return None
+    return Crossing((J / carried - base.K2) / way.K2, 0.0, _sign(way.K2))
 
 
 def _change_with_stiffness(arm: Arm, law: HubFeedback) -> int:

@@ -137,12 +137,11 @@ def _crossings_along_K2(
     N = drive + (float(gains.Kp) + float(gains.K1) * 1j * at * K1[column]) * theta
     K2 = -(N * moment.conj()).real / abs(moment) ** 2
     change = np.where(start > 0, 2, -2)  # Im K2 = -h/|M|^2 grows where h falls
-    if not arm.has_rigid_mode:
-        static = [crossing_at_zero(arm, along("K2", HubFeedback(K1=float(each), Kp=Kp))) for each in K1]
-        there = np.array([n for n, each in enumerate(static) if each is not None], dtype=np.int64)
-        column = np.r_[column, there]
-        K2 = np.r_[K2, [each.t for each in static if each is not None]]
-        change = np.r_[change, [each.change for each in static if each is not None]]
+    static = [crossing_at_zero(arm, along("K2", HubFeedback(K1=float(each), Kp=Kp))) for each in K1]
+    there = [(n, each.t, each.change) for n, each in enumerate(static) if each is not None]
+    if there:
+        columns, gains_there, changes = zip(*there, strict=True)
+        column, K2, change = np.r_[column, columns], np.r_[K2, gains_there], np.r_[change, changes]
     return column, K2, change
 
 
