@@ -166,7 +166,7 @@ def test_those_two_points_are_what_they_are_said_to_be():
 
 @pytest.mark.parametrize("omega", [71.505682466890, 204.333139363807, 537.952620541657, 1046.821121534289])
 def test_the_published_roots_of_the_default_arm(omega):
-    """Published digits of the undamped frequencies: 13 right digits, and the determinant has one root there, none beside."""
+    """Frequencies known to 13 digits from three solutions: the determinant has one root there, and none beside."""
     arm = tfarm.load("sasaki2012-lab")
     assert appendix.roots_near(arm, omega, 13) == 1
     assert appendix.roots_near(arm, omega * (1 + 1e-11), 12) == 0
