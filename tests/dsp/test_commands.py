@@ -7,20 +7,7 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
-from tfarm.cli import main
-
-
-def run(capsys, *arguments):
-    with pytest.raises(SystemExit) as stop:
-        main(list(arguments))
-    out, err = capsys.readouterr()
-    return int(stop.value.code or 0), out, err
-
-
-def answer(capsys, *arguments):
-    code, out, err = run(capsys, *arguments, "--json")
-    assert (code, err) == (0, "")
-    return json.loads(out, parse_constant=lambda name: pytest.fail(f"{name} in JSON"))
+from tests.shell import answer, run
 
 
 def test_sampled_lab(capsys):

@@ -12,16 +12,6 @@ from tfarm.errors import ParameterError
 T = 0.01
 
 
-@pytest.fixture(scope="module")
-def lab():
-    return tfarm.load("sasaki2012-lab")
-
-
-@pytest.fixture(scope="module")
-def lossless():
-    return tfarm.load("sasaki2012")
-
-
 @pytest.mark.parametrize(("K2", "growth"), [(0.05, 6e-10), (0.3, 9e-9), (0.9, 3e-7)])
 def test_mode_13_grows_as_two_prototypes_found(lossless, K2, growth):
     poles = sampled_loop(lossless, HubFeedback(K1=0.3, K2=K2)).poles

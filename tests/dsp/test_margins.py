@@ -25,16 +25,6 @@ from tfarm.errors import ParameterError
 GAINS = HubFeedback(K1=0.3, K2=0.3)
 
 
-@pytest.fixture(scope="module")
-def lab():
-    return tfarm.load("sasaki2012-lab")
-
-
-@pytest.fixture(scope="module")
-def lossless():
-    return tfarm.load("sasaki2012")
-
-
 def growing(loop):
     return int((loop.poles.log_radius > 0).sum())
 

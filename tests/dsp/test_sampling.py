@@ -20,16 +20,6 @@ DELAYS = (0.0, 0.25, 0.5, 0.95, 1.0, 1.7, 2.0)
 CIRCLE = (np.exp(0.3j), np.exp(2.8j), 1.1 * np.exp(1j))
 
 
-@pytest.fixture(scope="module")
-def lab():
-    return tfarm.load("sasaki2012-lab")
-
-
-@pytest.fixture(scope="module")
-def lossless():
-    return tfarm.load("sasaki2012")
-
-
 @pytest.mark.parametrize("delay", DELAYS)
 def test_the_aliasing_sum_over_the_exact_arm(lab, delay):
     H = pulse_transfer(lab, BOTH, Sampling(delay_samples=delay), count=14)

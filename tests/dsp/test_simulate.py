@@ -29,16 +29,6 @@ T = 0.01
 GAINS = HubFeedback(K1=0.3, K2=0.3)
 
 
-@pytest.fixture(scope="module")
-def lab():
-    return tfarm.load("sasaki2012-lab")
-
-
-@pytest.fixture(scope="module")
-def lossless():
-    return tfarm.load("sasaki2012")
-
-
 def simulator(arm, name="slew", duration=3.0, chain=None, count=8, between=0):
     chain = Chain() if chain is None else chain
     return Simulator(arm, chain, scenario(name, arm, chain, duration), count=count, between=between)

@@ -7,22 +7,9 @@ import numpy as np
 import pytest
 
 import tfarm
-from tfarm.cli import main
+from tests.shell import answer, run
 from tfarm.tuner import Plan, compare, shaped_trial, slew_trial, tune
 from tfarm.tuner.comparison import conditions
-
-
-def run(capsys, *arguments):
-    with pytest.raises(SystemExit) as stop:
-        main(list(arguments))
-    out, err = capsys.readouterr()
-    return int(stop.value.code or 0), out, err
-
-
-def answer(capsys, *arguments):
-    code, out, err = run(capsys, *arguments, "--json")
-    assert (code, err) == (0, "")
-    return json.loads(out, parse_constant=lambda name: pytest.fail(f"{name} in JSON"))
 
 
 def test_tune_lab(capsys, tmp_path):

@@ -2,8 +2,8 @@
 
 from tfarm.arm.feedback import HubFeedback
 from tfarm.arm.reading import load, presets
-from tfarm.arm.records import Arm, Hub, Link, Payload
+from tfarm.arm.records import Arm, Hub, Link, Payload, must_turn
 from tfarm.arm.sections import Section
 from tfarm.arm.writing import to_toml
 
-__all__ = ["Arm", "Hub", "HubFeedback", "Link", "Payload", "Section", "load", "presets", "to_toml"]
+__all__ = ["Arm", "Hub", "HubFeedback", "Link", "Payload", "Section", "load", "must_turn", "presets", "to_toml"]

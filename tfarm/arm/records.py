@@ -179,6 +179,18 @@ class Arm:
         return math.sqrt(self.link.kGA / self.link.rhoI)
 
 
+def must_turn(arm: Arm) -> None:
+    """Raise ParameterError, naming the infinite part, for an arm that cannot slew: something holds it."""
+    parts = {
+        "hub.inertia": arm.hub.inertia,
+        "payload.mass": arm.payload.mass,
+        "payload.inertia": arm.payload.inertia,
+    }
+    key, value = max(parts.items(), key=lambda part: part[1])
+    if math.isinf(value):
+        raise ParameterError(key=key, value=value, remedy="an arm that cannot turn has no slew; give finite inertias")
+
+
 def _poissons_ratio(value: object) -> float:
     meaning = "Poisson's ratio lies above -1, up to 0.5 (incompressible); about 0.3 for metals"
     nu = number("link.poissons_ratio", value, meaning)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -92,6 +92,11 @@ def simulate(
 
         saved = load_tuner(controller)
         answer = controlled_answer(subject, saved, chain, scenario, duration, count=count, between=records)
+    _show(answer, csv, mat, json)
+
+
+def _show(answer: dict[str, Any], csv: Path | None, mat: Path | None, json: bool) -> None:
+    """The signals to the files asked for, and to standard output as JSON or, without files, as a summary."""
     from tfarm.cli import sampling_tables
 
     if csv is not None:

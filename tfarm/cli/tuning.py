@@ -65,6 +65,11 @@ def tune(
         answer["comparison"] = comparison_answer(rows)
     if save is not None:
         tuner.save(tuning.saved(), save)
+    _show(answer, json)
+
+
+def _show(answer: dict[str, Any], json: bool) -> None:
+    """The answer as JSON or as a summary; that a run has stopped is said either way."""
     from tfarm.cli import tuning_tables
 
     tuning_tables.warn_if_stopped(answer)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm
+from tfarm.arm import Arm, must_turn
 from tfarm.arm.checks import number, positive
 from tfarm.dsp.chain import Chain
 from tfarm.errors import ParameterError, did_you_mean
@@ -53,14 +53,7 @@ def slew(arm: Arm, chain: Chain, duration: float) -> Scenario:
     What the moment feedback sees is the moment less the rigid arm's -(J - I_h) theta_dd_ref of the interval before the
     sample ("vibration"), or all of it ("total").  Raises ParameterError for an arm that cannot turn.
     """
-    if not arm.has_rigid_mode:
-        parts = {
-            "hub.inertia": arm.hub.inertia,
-            "payload.mass": arm.payload.mass,
-            "payload.inertia": arm.payload.inertia,
-        }
-        key, value = max(parts.items(), key=lambda part: part[1])
-        raise ParameterError(key=key, value=value, remedy="an arm that cannot turn has no slew; give finite inertias")
+    must_turn(arm)
     T, manoeuvre = chain.sampling.period, chain.slew
     n = _samples(duration, T)
     peak = 4 * manoeuvre.travel / (arm.link.length * manoeuvre.rise_time**2)

@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm
-from tfarm.errors import ParameterError
+from tfarm.arm import Arm, must_turn
 from tfarm.exact.characteristic import Gains, loop_parts, quick_characteristics
 from tfarm.exact.coefficients import coefficients
 from tfarm.spectrum import modes
@@ -35,11 +34,7 @@ def residual_moment(arm: Arm, K1: Real, K2: Real, Kp: Real, number: int) -> Real
 
     Raises ParameterError for an arm that cannot turn.
     """
-    if not arm.has_rigid_mode:
-        key, value = max(
-            ("payload.mass", arm.payload.mass), ("payload.inertia", arm.payload.inertia), key=lambda part: part[1]
-        )
-        raise ParameterError(key=key, value=value, remedy="an arm that cannot turn has no slew; give finite inertias")
+    must_turn(arm)
     oscillating, real = band_poles(arm, K1, K2, Kp, number), real_poles(arm, K1, K2, Kp, number)
     period = 2 * np.pi / float(modes(arm, 1).natural_frequency[-1])
     t = period * np.arange(SAMPLES) / SAMPLES
