@@ -8,7 +8,20 @@ INSTALLED := .venv/.installed
 BENCH_INSTALLED := .venv/.bench
 PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check install -c requirements.lock
 
-.PHONY: help install reports modes bode margins locus sampled tune audit test lint bench clean
+# What `make survey` runs, one module of tests a line; each takes a size and a seed.
+SIZE ?= 100
+SEED ?= 1
+SURVEYS := \
+	exact.accuracy \
+	spectrum.proofs \
+	spectrum.damped \
+	loop.counts \
+	loop.agreement \
+	reduced.errors \
+	dsp.verdicts \
+	tuner.bounded
+
+.PHONY: help install reports modes bode margins locus sampled tune audit test survey lint bench clean
 
 help: ## list these verbs
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile | while IFS="$$(printf '\t')" read -r verb what; do \
@@ -42,6 +55,11 @@ audit: $(INSTALLED) ## check the paper equation by equation
 
 test: $(INSTALLED) ## run the tests
 	@$(BIN)/python -m pytest -n 2
+
+survey: $(INSTALLED) ## search random cases for a wrong answer (SIZE, SEED, SURVEYS=one or more)
+	@failed=; for each in $(SURVEYS); do echo "== $$each $(SIZE) $(SEED)"; \
+		$(BIN)/python -m tests.$$each $(SIZE) $(SEED) || failed="$$failed $$each"; done; \
+		test -z "$$failed" || { echo "failed:$$failed"; exit 1; }
 
 lint: $(INSTALLED) ## check style, types and which room imports which
 	@$(BIN)/ruff check .

@@ -54,7 +54,7 @@ def test_make_has_the_verbs_of_the_readme() -> None:
     done = subprocess.run(["make"], cwd=ROOT, capture_output=True, text=True, check=True)
     verbs = {line.split()[1] for line in done.stdout.splitlines()}
     assert {line.split()[1] for line in SHELL if line.startswith("make ")} <= verbs
-    assert {"install", "reports", "modes", "bode", "test", "lint", "bench", "clean"} <= verbs
+    assert {"install", "reports", "modes", "bode", "test", "survey", "lint", "bench", "clean"} <= verbs
 
 
 def test_the_example_of_an_arm_is_an_arm(tmp_path: Path) -> None:

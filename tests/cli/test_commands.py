@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import tfarm
+from tfarm.arm.reading import PRESETS
 from tfarm.cli import main
 
 Run = tuple[int, str, str]
@@ -247,3 +248,21 @@ def test_modes_that_cannot_be_followed_are_said_not_left_out(
     assert [mode["index"] for mode in result["modes"] if "damping_ratio" in mode] == [0, 1, 2, 3, 4]
     assert len(result["modes"]) == 7
     assert "up to mode 4 only" in result["damped_note"]
+
+
+def test_a_slip_of_units_is_a_warning_and_no_error(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """One line for all of them; the answer is that of the file as it stands."""
+    text = PRESETS.joinpath("stocky-steel.toml").read_text(encoding="utf-8")
+    slips = {"length = 0.5": "length = 500.0", "density = 7850.0": "density = 7.85"}
+    for right, slip in slips.items():
+        assert right in text
+        text = text.replace(right, slip)
+    file = tmp_path / "arm.toml"
+    file.write_text(text, encoding="utf-8")
+    code, out, err = run(capsys, "modes", str(file), "--count", "1", "--json")
+    assert code == 0
+    assert json.loads(out)["count"] == 1
+    assert err.startswith("tfarm: warning: stocky-steel: ")
+    assert err.count("\n") == 1
+    assert "link.length = 500.0" in err
+    assert "link.density = 7.85" in err

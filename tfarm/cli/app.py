@@ -28,10 +28,13 @@ Digits = Annotated[str | None, typer.Option("--digits", metavar="D", help="right
 
 
 def load_arm(name: str) -> Arm:
-    """The preset or file of that name."""
-    import tfarm
+    """The preset or file of that name; values that look like a slip of units are named on standard error."""
+    from tfarm.arm import implausible, load
 
-    return tfarm.load(name)
+    arm = load(name)
+    if texts := implausible(arm):
+        tell(f"warning: {arm.name}: {'; '.join(texts)}")
+    return arm
 
 
 def right_digits(text: str | None) -> int | None:
@@ -86,5 +89,10 @@ def _usage(error: Any) -> str:
 
 
 def _fail(message: str, code: int) -> int:
-    print(f"tfarm: {one_line(message, 1000)}", file=sys.stderr)
+    tell(message)
     return code
+
+
+def tell(message: str) -> None:
+    """One line to the person at the terminal, on standard error."""
+    print(f"tfarm: {one_line(message, 1000)}", file=sys.stderr)
