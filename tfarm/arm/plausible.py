@@ -1,7 +1,7 @@
 """Values that are legal and yet look like a slip of units: texts for a warning, never an error.
 
-Each bound lies outside what any material or mechanism has by a margin; a unit mistaken for another (GPa for Pa, mm for m,
-g/cm^3 for kg/m^3, a damping ratio for seconds) moves a value by a factor of 50 or more, well past it.
+Each bound lies outside what any material or mechanism has by a margin; a unit mistaken for another (GPa for Pa,
+mm for m, g/cm^3 for kg/m^3, a damping ratio for seconds) moves a value by a factor of 50 or more, well past it.
 """
 
 from __future__ import annotations
@@ -57,8 +57,8 @@ def _damping(link: Link) -> Iterator[str]:
     ratio = link.damping * w / 2
     if ratio > DAMPED:
         yield (
-            f"link.damping = {shown(link.damping)}: a damping ratio of {ratio:.2g} in the first mode of the clamped link; "
-            "it is taken in s (E (1 + C s)), it is no ratio"
+            f"link.damping = {shown(link.damping)}: a damping ratio of {ratio:.2g} in the first mode "
+            "of the clamped link; it is taken in s (E (1 + C s)), it is no ratio"
         )
 
 
