@@ -13,12 +13,12 @@ from tests.loop.arms import window_arm
 from tests.loop.ritz_loop import RitzLoop
 from tests.loop.test_lines import held
 from tests.strategies import some_arm
-from tfarm import Hub, HubFeedback, Payload
+from tfarm import Hub, HubFeedback, Payload, Section
 from tfarm.arm.feedback import MOST_GAIN
 from tfarm.loop.plant import Loop
 from tfarm.loop.poles import poles_below
 from tfarm.loop.stability import stability
-from tfarm.loop.windows import gain_windows
+from tfarm.loop.windows import gain_windows, looked_at
 
 LAB, BARE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))
 
@@ -156,3 +156,39 @@ def test_gains_near_the_largest_allowed_are_looked_at_too() -> None:
     assert found.looked_at == (-MOST_GAIN, MOST_GAIN)
     heavy = replace(LAB, hub=Hub(inertia=1e7), payload=Payload(mass=1e5))
     assert windows(heavy, HubFeedback(K1=0.3, K2=0.2), "Kp").around[0] == 0
+
+
+def test_an_end_of_the_search_is_no_edge() -> None:
+    """An edge has poles on the axis there, a search bound none as far as poles can be found, infinity is a theorem."""
+    found = windows(LAB, HubFeedback(K1=0.3, K2=0.3), "K2")
+    assert [found.end(value) for value in found.around] == ["search bound", "edge"]
+    for value in found.around:
+        poles = poles_below(Loop(LAB, HubFeedback(K1=0.3, K2=value)), 2e3).moving
+        assert (abs(poles.real / abs(poles)).min() < 1e-12) == (found.end(value) == "edge")
+    assert [windows(BARE, HubFeedback(K1=0.3), "K1").end(value) for value in (0.0, math.inf)] == ["edge", "no limit"]
+
+
+@pytest.mark.parametrize("C", [0.0, 1e-4])
+def test_of_a_heavy_hub_k2_is_looked_at_beyond_where_it_cancels_the_inertia(C) -> None:
+    """A hub of 100 times the beam: from K2 = J/(J - I_h) = 101 on K1 > 0 turns a negative inertia."""
+    carried = LAB.total_inertia - LAB.hub.inertia
+    arm = replace(LAB, hub=Hub(inertia=100 * carried), link=replace(LAB.link, damping=C))
+    found = windows(arm, HubFeedback(K1=1e-3, K2=0.3), "K2")
+    assert found.looked_at[1] > 101
+    assert found.end(found.around[1]) == "edge"
+    assert found.around[1] <= 101
+    assert stability(arm, HubFeedback(K1=1e-3, K2=101.5)).unstable_roots > 0
+
+
+def test_the_range_looked_at_of_a_pinned_tip_scales_with_the_arm() -> None:
+    """All lengths doubled: masses eightfold, inertias 32-fold, frequencies half, so gains on the rate 16-fold."""
+    small = held()
+    link = small.link
+    section = Section.general(
+        area=4 * link.section.area, second_moment=16 * link.section.second_moment,
+        shear_factor=link.section.shear_factor,
+    )  # fmt: skip
+    large = replace(small, link=replace(link, length=2 * link.length, section=section), hub=Hub(inertia=3.2))
+    for name, times in (("K1", 16.0), ("Kp", 8.0)):
+        of_small, of_large = (looked_at(Loop(arm, HubFeedback()), name)[1] for arm in (small, large))
+        assert of_large / of_small == pytest.approx(times, rel=1e-12)

@@ -32,16 +32,30 @@ def print_margins(answer: dict[str, Any]) -> None:
     print(f"unstable poles up to {answer['band_rad_s']:.6g} rad/s: {answer['unstable_roots']}{more}")
     print(answer["beyond_the_band"])
     print(f"Lyapunov: {answer['lyapunov']['reason']}")
-    rows = new_table(("gain", "value", "stable around it", "all stable windows", "looked at"))
-    for name in ("K1", "K2", "Kp"):
-        around = answer[f"{name}_interval"]
-        windows = " ".join(_pair(pair) for pair in answer[f"{name}_windows"]) or "none"
-        shown = "-" if around is None else _pair(around)
-        rows.add_row(name, f"{answer[name]:g}", shown, windows, _pair(answer[f"{name}_looked_at"]))
-    show(rows)
+    _print_windows(answer)
     if answer["in_band"] is not None:
         _print_loop_margins(answer)
     print(answer["sign_convention"])
+
+
+def _print_windows(answer: dict[str, Any]) -> None:
+    """A row a gain; a search bound is marked, as it is no edge."""
+    rows = new_table(("gain", "value", "stable around it", "all stable windows"))
+    for name in ("K1", "K2", "Kp"):
+        around, ends = answer[f"{name}_interval"], answer[f"{name}_interval_ends"]
+        pairs = zip(answer[f"{name}_windows"], answer[f"{name}_windows_ends"], strict=True)
+        windows = " ".join(_window(*pair) for pair in pairs) or "none"
+        rows.add_row(name, f"{answer[name]:g}", "-" if around is None else _window(around, ends), windows)
+    show(rows)
+    looked_at = ", ".join(f"{name} ({low:.6g}, {high:.6g})" for name in ("K1", "K2", "Kp")
+                          for low, high in [answer[f"{name}_looked_at"]])  # fmt: skip
+    print(f"looked at: {looked_at}; * no limit was found up to there, and beyond none was looked for")
+
+
+def _window(pair: list[float], ends: list[str]) -> str:
+    """An interval with a star at each end that only bounds the search."""
+    low, high = (f"{value:.8g}{'*' * (end == 'search bound')}" for value, end in zip(pair, ends, strict=True))
+    return f"({low}, {high})"
 
 
 def _print_loop_margins(answer: dict[str, Any]) -> None:

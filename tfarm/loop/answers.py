@@ -65,9 +65,12 @@ def margins_answer(found: Margins) -> dict[str, Any]:
 
 
 def _windows(name: str, windows: Windows) -> dict[str, Any]:
+    around = windows.around
     return {
-        f"{name}_interval": None if windows.around is None else list(windows.around),
+        f"{name}_interval": None if around is None else list(around),
+        f"{name}_interval_ends": None if around is None else [windows.end(value) for value in around],
         f"{name}_windows": [list(pair) for pair in windows.all],
+        f"{name}_windows_ends": [[windows.end(value) for value in pair] for pair in windows.all],
         f"{name}_looked_at": list(windows.looked_at),
     }
 

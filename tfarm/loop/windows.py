@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -17,15 +18,18 @@ from .plant import Loop
 from .stability import Stability, loop_band, stability
 
 Interval = tuple[float, float]
+End = Literal["edge", "search bound", "no limit"]
 
 REACH = {"K1": 20.0, "K2": 50.0, "Kp": 20.0}  # how far windows are looked for: times J w1, times 1, times J w1^2
+BEYOND_STATIC = 2.0  # times J/(J - I_h), where K2 cancels the inertia: windows are looked for at least so far
 
 
 @dataclass(frozen=True)
 class Windows:
     """Stable windows of one gain: that around the point (None if it is not stable) and all in `looked_at`.
 
-    An end of -inf or inf is a theorem; an end of `looked_at` only says that the search stopped there.
+    What an end of a window means says `end`: poles on the axis there ("edge"), an end of `looked_at`, up to which no
+    limit was found and beyond which none was looked for ("search bound"), or infinity, which is a theorem ("no limit").
     """
 
     name: str
@@ -33,6 +37,10 @@ class Windows:
     all: tuple[Interval, ...]
     looked_at: Interval
     crossings: tuple[Crossing, ...]
+
+    def end(self, value: float) -> End:
+        """What an end of one of the windows is."""
+        return "no limit" if math.isinf(value) else "search bound" if value in self.looked_at else "edge"
 
 
 def gain_windows(verdict: Stability, name: str) -> Windows:
@@ -43,7 +51,7 @@ def gain_windows(verdict: Stability, name: str) -> Windows:
         return Windows(name, None, (), (0.0, 0.0), ())  # an algebraic loop but for K2 = 0
     low, high = looked_at(loop, name)
     if loop.arm.link.damping == 0:
-        found = _undamped(loop, name)
+        found = tuple(each for each in _undamped(loop, name) if low < each.t < high)
     else:
         ends = (Loop(loop.arm, with_gain(law, name, end)) for end in (low, high))
         band = max(verdict.band, *(loop_band(end)[0] for end in ends))
@@ -60,11 +68,15 @@ def gain_windows(verdict: Stability, name: str) -> Windows:
 
 def looked_at(loop: Loop, name: str) -> Interval:
     """The range of a gain that is searched, symmetric and well beyond what matters to the first mode."""
-    first = float(modes(loop.arm, 1).natural_frequency[-1])
-    inertia = loop.arm.total_inertia if loop.arm.has_rigid_mode else loop.arm.hub.inertia + loop.arm.link.rhoA
+    arm, law = loop.arm, loop.law
+    first = float(modes(arm, 1).natural_frequency[-1])
+    inertia = arm.total_inertia if arm.has_rigid_mode else arm.hub.inertia + arm.link.rhoA * arm.link.length**3 / 3
     unit = {"K1": inertia * first, "K2": 1.0, "Kp": inertia * first**2}[name]
-    reach = min(MOST_GAIN, max(REACH[name] * unit, 10.0 * abs(getattr(loop.law, name))))
-    return -reach, reach
+    reach = max(REACH[name] * unit, 10.0 * abs(getattr(law, name)))
+    carried = arm.total_inertia - arm.hub.inertia
+    if name == "K2" and 0 < carried < math.inf:
+        reach = max(reach, BEYOND_STATIC * arm.total_inertia / carried)
+    return -min(MOST_GAIN, reach), min(MOST_GAIN, reach)
 
 
 def with_gain(law: HubFeedback, name: str, value: float) -> HubFeedback:
