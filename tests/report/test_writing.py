@@ -15,11 +15,13 @@ from urllib.parse import unquote
 import pytest
 
 import tfarm
+from tests.shell import run
 from tfarm.arm import to_toml
 from tfarm.report import readme_pictures, write, writing
 from tfarm.report.paper import is_from_paper, paper_section
 
 ATTACK = "<script>alert(1)</script> & <b>bold</b>, I_h in kg m^2"
+ANCHORS = {piece.anchor for piece in writing.PIECES}
 NAME = "Ärm & co's #1 $x$ 100%"
 ARM = replace(tfarm.load("stocky-steel"), name=NAME, assumptions=(ATTACK, "second assumption"))
 
@@ -293,6 +295,63 @@ def test_work_that_fails_leaves_an_earlier_report_as_it_was(pages, monkeypatch):
     with pytest.raises(tfarm.ConvergenceError):
         write([ARM], pages, only=("modes",))
     assert files_of(pages) == before
+
+
+class Unmakeable:
+    """A piece of the page that cannot be made: in a class, so that a process may be sent it."""
+
+    def __init__(self, error):
+        self.error = error
+
+    def __call__(self, arm):
+        raise self.error
+
+
+def without_a_section(monkeypatch, error):
+    """A report of two sections, the second of which meets that error."""
+    pieces = {piece.name: piece for piece in writing.PIECES}
+    broken = replace(pieces["root loci"], make=Unmakeable(error))
+    monkeypatch.setattr(writing, "PIECES", (pieces["the arm"], broken))
+    monkeypatch.setattr(writing, "save_proof", lambda arm, folder: None)
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        tfarm.ConvergenceError("stopped short of the pole", None, None),
+        tfarm.CertificationError("not proven: stopped short of the pole"),
+        tfarm.ParameterError(key="K2", value=2.0, remedy="stopped short of the pole"),
+    ],
+)
+def test_a_section_that_cannot_be_made_says_why_in_its_place(tmp_path, monkeypatch, error):
+    without_a_section(monkeypatch, error)
+    told = []
+    page = write([ARM], tmp_path, only=("locus",), notice=told.append).read_text(encoding="utf-8")
+    assert "stopped short of the pole" in page.partition('id="locus"')[2]
+    assert "Parameters" in page
+    assert len(told) == 1
+    assert "stopped short of the pole" in told[0]
+
+
+def test_a_section_left_out_is_one_line_on_standard_error(tmp_path, monkeypatch, capsys):
+    without_a_section(monkeypatch, tfarm.ConvergenceError("stopped\nshort", None, None))
+    code, out, err = run(capsys, "report", "stocky-steel", "--only", "locus", "--out", str(tmp_path))
+    assert (code, out.strip()) == (0, str(tmp_path / "stocky-steel" / "locus.html"))
+    assert err.startswith("tfarm: stocky-steel: ")
+    assert err.count("\n") == 1
+
+
+def test_a_bug_of_ours_stays_loud(tmp_path, monkeypatch):
+    without_a_section(monkeypatch, ValueError("cost matrix is infeasible"))
+    with pytest.raises(ValueError, match="infeasible"):
+        write([ARM], tmp_path / "out", only=("locus",))
+    assert not (tmp_path / "out").exists()
+
+
+def test_every_piece_knows_the_anchor_of_its_section(pages):
+    ids = Links(pages / NAME / "index.html").ids
+    assert [piece.anchor for piece in writing.PIECES if piece.suits(ARM)] == [i for i in ids if i in ANCHORS]
+    assert all(writing._answers(piece.anchor, page) for piece in writing.PIECES for page in piece.questions)
 
 
 @pytest.mark.parametrize(

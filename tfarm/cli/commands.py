@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from tfarm.cli.app import ArmName, Digits, Json, app, load_arm, right_digits, whole
-from tfarm.errors import ParameterError
+from tfarm.errors import ParameterError, one_line
 
 
 @app.command()
@@ -104,6 +105,9 @@ def report(
     from tfarm.cli.tables import progress
     from tfarm.report import write
 
+    left_out: list[str] = []
     with progress() as advance:
-        page = write(subjects, out, only=None if only is None else (only,), progress=advance)
+        page = write(subjects, out, only=None if only is None else (only,), progress=advance, notice=left_out.append)
+    for text in left_out:
+        print(f"tfarm: {one_line(text, 1000)}", file=sys.stderr)
     print(page)

@@ -22,7 +22,10 @@ class Fact:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Section:
-    """A part of a page.  `words` are paragraphs, `items` a list; `blocks` pictures and tables in their order."""
+    """A part of a page.  `words` are paragraphs, `items` a list; `blocks` pictures and tables in their order.
+
+    `failure` says why the section could not be made, where the words say so in its place; empty otherwise.
+    """
 
     anchor: str
     title: str
@@ -30,6 +33,7 @@ class Section:
     items: Sequence[str] = ()
     facts: Sequence[Fact] = ()
     blocks: Sequence[Picture | Table] = ()
+    failure: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,6 +66,7 @@ def save_section(section: Section, folder: Path) -> SavedSection:
         words=section.words,
         items=section.items,
         facts=section.facts,
+        failure=section.failure,
     )
     return SavedSection(section=words, blocks=blocks)
 

@@ -20,7 +20,7 @@ from multiprocessing import get_context
 from pathlib import Path
 
 from tfarm.arm import Arm, to_toml
-from tfarm.errors import ParameterError, did_you_mean
+from tfarm.errors import ParameterError, TfarmError, did_you_mean
 from tfarm.report.arm_section import arm_section
 from tfarm.report.assumptions_section import assumptions_section
 from tfarm.report.bode_section import bode_section
@@ -38,35 +38,40 @@ from tfarm.report.trust_proofs import save_proof, written_proofs
 from tfarm.report.tuner_section import tuner_section
 
 Progress = Callable[[int, int, str], object]
+Notice = Callable[[str], object]
 
 WORKERS = 2
+LOOP_PAGES = ("margins", "locus", "sampled", "tune")  # whose sections an arm without a loop has not
 OURS = ("index.html", "README.md", "pictures", "bench.json", "trust")  # names in `out` that no arm's folder may have
 
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """One section of one arm's page: a name for the progress bar, and how to make it."""
+    """One section of one arm's page: a name for the progress bar, the section's anchor, and how to make it."""
 
     name: str
+    anchor: str
     questions: tuple[str, ...]  # the --only pages that have it; the full page has all
     make: Callable[[Arm], Section]
     suits: Callable[[Arm], bool] = lambda arm: True
 
 
 PIECES = (
-    Piece("map of the gains", ("margins",), map_section, has_loop),
-    Piece("the arm", tuple(QUESTIONS), arm_section),
-    Piece("the paper's values", (), paper_section, is_from_paper),
-    Piece("root moment", ("bode",), partial(bode_section, output="root_moment")),
-    Piece("tip displacement", ("bode",), partial(bode_section, output="tip_displacement")),
-    Piece("modes", ("modes",), modes_section),
-    Piece("margins", ("margins",), margins_section, has_loop),
-    Piece("root loci", ("locus",), locus_section, has_loop),
-    Piece("Nyquist", ("margins",), nyquist_section, has_loop),
-    Piece("sampled loop", ("sampled",), sampled_section, has_loop),
-    Piece("gain tuner", ("tune",), tuner_section, has_loop),
-    Piece("no loop", ("margins", "locus", "sampled", "tune"), no_loop_section, lambda arm: not has_loop(arm)),
-    Piece("assumptions", ("assumptions",), assumptions_section),
+    Piece("map of the gains", "margins-map", ("margins",), map_section, has_loop),
+    Piece("the arm", "arm", tuple(QUESTIONS), arm_section),
+    Piece("the paper's values", "paper", (), paper_section, is_from_paper),
+    Piece("root moment", "bode-root-moment", ("bode",), partial(bode_section, output="root_moment")),
+    Piece("tip displacement", "bode-tip-displacement", ("bode",), partial(bode_section, output="tip_displacement")),
+    Piece("modes", "modes", ("modes",), modes_section),
+    Piece("margins", "margins", ("margins",), margins_section, has_loop),
+    Piece("root loci", "locus", ("locus",), locus_section, has_loop),
+    Piece("Nyquist", "margins-nyquist", ("margins",), nyquist_section, has_loop),
+    Piece("sampled loop", "sampled", ("sampled",), sampled_section, has_loop),
+    Piece("gain tuner", "tune", ("tune",), tuner_section, has_loop),
+    Piece(
+        "no loop", "no-loop", ("margins", "locus", "sampled", "tune"), no_loop_section, lambda arm: not has_loop(arm)
+    ),
+    Piece("assumptions", "assumptions", ("assumptions",), assumptions_section),
 )
 CARD = "card"
 EVIDENCE = (-1, "evidence")  # for the page on trust: of no arm
@@ -77,13 +82,19 @@ Result = SavedSection | Evidence | None
 
 
 def write(
-    arms: Sequence[Arm], out: Path, *, only: tuple[str, ...] | None = None, progress: Progress | None = None
+    arms: Sequence[Arm],
+    out: Path,
+    *,
+    only: tuple[str, ...] | None = None,
+    progress: Progress | None = None,
+    notice: Notice | None = None,
 ) -> Path:
     """Write the report of each arm to out/<name>/, out/trust/ and out/index.html; the page to open first.
 
     `only` ("bode", "modes", "margins", ...) writes those pages alone, out/<name>/bode.html and so on.  `progress` is
-    told (done, total, what) after each piece of work.  Raises ParameterError before any work if `out` cannot be
-    written, two arms share a name or there is none.  If the work itself fails, `out` is as it was.
+    told (done, total, what) after each piece of work.  A section that tfarm cannot make of an arm says why in its
+    place, and `notice` is told so in one line, once the pages are written.  Raises ParameterError before any work if
+    `out` cannot be written, two arms share a name or there is none.  If the work itself fails, `out` is as it was.
     """
     _check(arms, only)
     out = Path(out)
@@ -103,6 +114,9 @@ def write(
         index = index_page(written_cards(out), trust=trust)
         (beside / "index.html").write_text(index, encoding="utf-8", newline="")
         os.replace(beside / "index.html", out / "index.html")
+    for text in _failures(arms, sections):
+        if notice is not None:
+            notice(text)
     alone = len(arms) == 1 and only is not None and len(only) == 1
     return out / arms[0].name / f"{only[0]}.html" if alone and only else out / "index.html"
 
@@ -221,7 +235,25 @@ def _make(arm: Arm, piece: int | str, folder: Path) -> Result:
         save_card(arm, folder)
         save_proof(arm, folder)
         return None
-    return save_section(PIECES[piece].make(arm), folder)
+    return save_section(_section(PIECES[piece], arm), folder)
+
+
+def _section(piece: Piece, arm: Arm) -> Section:
+    """The section, or in its place why tfarm could not make it of this arm; a bug of ours stays loud."""
+    try:
+        return piece.make(arm)
+    except TfarmError as error:
+        title = f"{piece.name[0].upper()}{piece.name[1:]}"
+        words = (f"This section could not be made for this arm: {error}.",)
+        return Section(anchor=piece.anchor, title=title, words=words, failure=str(error))
+
+
+def _failures(arms: Sequence[Arm], sections: Sequence[Sequence[SavedSection]]) -> Iterator[str]:
+    """A line for each section that could not be made."""
+    for arm, parts in zip(arms, sections, strict=True):
+        for part in parts:
+            if part.section.failure:
+                yield f"{arm.name}: the page leaves out “{part.section.title}” and says why: {part.section.failure}"
 
 
 def _name_of(arms: Sequence[Arm], task: Task) -> str:
