@@ -20,7 +20,14 @@ from tfarm.dsp import (
     scenario,
 )
 from tfarm.dsp.law import growing_mode
-from tfarm.dsp.results import ideal_chain, limit_cycle, residual_moment_rms, settling_time, simulated_answer
+from tfarm.dsp.results import (
+    ideal_chain,
+    limit_cycle,
+    residual_moment_rms,
+    residual_raw_moment_rms,
+    settling_time,
+    simulated_answer,
+)
 from tfarm.dsp.scenarios import SCENARIOS
 from tfarm.errors import ParameterError
 from tfarm.reduced import modal_model
@@ -236,6 +243,33 @@ def test_quantisation_keeps_a_limit_cycle_up(lab):
     assert larger.root_moment > 2 * cycle.root_moment
 
 
+def test_an_unstable_loop_that_its_motor_limits_rings_for_ever(lab):
+    """Everything is linear but the limit: twice the limit and twice the impulse make a cycle twice as large."""
+    gains = HubFeedback(K1=0.3, K2=1.18)
+    assert not sampled_loop(lab, gains, count=8).poles.is_stable
+    cycles = []
+    for size in (1.0, 2.0):
+        chain = Chain(actuator=Actuator(torque_limit=3.0 * size))
+        task = replace(scenario("impulse", lab, chain, 20.0), impulse=0.01 * size)
+        run, ideal = (Simulator(lab, each, task, count=8).linear(gains) for each in (chain, ideal_chain(chain)))
+        cycles.append(limit_cycle(run, ideal))
+        assert run.saturated["torque"] > 100
+        assert limit_cycle(ideal, ideal) is None
+    one, two = cycles
+    assert (one.kept_up_by, one.torque) == ("saturation", 3.0)
+    assert two.root_moment == pytest.approx(2 * one.root_moment, rel=1e-6)  # what rounding makes of 20 s of ringing
+    assert two.frequency == one.frequency
+    answer = simulated_answer(lab, gains, chain, "impulse", 20.0, count=8)
+    assert answer["limit_cycle"]["kept_up_by"] == "saturation"
+
+
+def test_saturation_that_is_over_is_no_limit_cycle(lab):
+    chain = Chain(actuator=Actuator(torque_limit=3.0))
+    answer = simulated_answer(lab, GAINS, chain, "slew", 20.0, count=8)
+    assert answer["saturated_samples"]["torque"] > 10
+    assert answer["limit_cycle"] is None
+
+
 def test_running_away_is_said_with_its_time_and_mode(lab):
     run = simulator(lab, duration=5.0).linear(HubFeedback(K1=0.3, K2=1.5))
     assert run.stopped is not None
@@ -250,8 +284,9 @@ def test_running_away_is_said_with_its_time_and_mode(lab):
 
 def test_settling_and_residual_by_hand(lab):
     run = simulator(lab).linear(GAINS)
-    moment = abs(run.at_samples.root_moment)
-    assert residual_moment_rms(run) == pytest.approx(np.sqrt(np.mean(moment[100:] ** 2)), rel=1e-12)
+    moment, vibration = abs(run.at_samples.root_moment), run.at_samples.root_moment - run.scenario.rigid_moment
+    assert residual_moment_rms(run) == pytest.approx(np.sqrt(np.mean(vibration[100:] ** 2)), rel=1e-12)
+    assert residual_raw_moment_rms(run) == pytest.approx(np.sqrt(np.mean(moment[100:] ** 2)), rel=1e-12)
     k = round(settling_time(run) / T)
     assert moment[k:].max() <= 0.05 * moment.max() < moment[k - 1]
 

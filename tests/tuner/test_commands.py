@@ -31,6 +31,9 @@ def test_tune_lab(capsys, tmp_path):
     simulated = answer(capsys, "simulate", "sasaki2012-lab", "--controller", str(file), "--modes", "6")
     np.testing.assert_allclose(simulated["gain"], result["gain"]["K"], atol=1e-11)
     assert simulated["controller"]["trained_on"] == "sasaki2012-lab"
+    for key in ("residual_moment_rms", "residual_raw_moment_rms"):  # one name, one meaning
+        assert simulated[key] == pytest.approx(result[key], rel=1e-9)
+    assert result["residual_raw_moment_rms"] > 1.05 * result["residual_moment_rms"]
 
 
 def test_without_a_guard_the_upper_end_is_inf_and_a_divergence_is_told(capsys):

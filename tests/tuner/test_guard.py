@@ -189,6 +189,16 @@ def test_the_frozen_guard_is_stable_inside_and_not_beyond(lab):
     assert not loop.with_gains(0.3, guard.hi * 1.02).poles.is_stable
 
 
+def test_without_damping_a_proof_is_of_the_first_modes_and_no_proof_of_the_loop():
+    """Every finite model has one, but at C = 0 modes without end neither decay nor are looked at."""
+    chain = Chain(sampling=Sampling(period=0.005))
+    guard = find_guard(slew_trial(tfarm.load("sasaki2012"), chain).loop, "time-varying", 0.3)
+    assert all(proof.is_proven() for proof in guard.proofs)
+    assert not guard.is_settled
+    assert not guard.is_proven
+    assert "proven for the first 20 modes" in guard.sentence
+
+
 def test_no_guard(lab):
     guard = find_guard(slew_trial(lab).loop, "none", 0.3)
     assert not guard.is_proven

@@ -44,13 +44,14 @@ def print_sampled(answer: dict[str, Any]) -> None:
 def print_simulation(answer: dict[str, Any]) -> None:
     """What the simulation comes to."""
     print(f"{answer['arm']}, {answer['scenario']}: {len(answer['t'])} samples of {answer['period_s']:g} s")
-    print(f"residual root moment: {answer['residual_moment_rms']:.6g} N m rms")
+    print(f"residual root moment, less the rigid arm's: {answer['residual_moment_rms']:.6g} N m rms")
     print(f"settled (5 %) at: {answer['settling_time_s']:.4g} s")
     print(f"saturated samples: {', '.join(f'{k} {n}' for k, n in answer['saturated_samples'].items())}")
     if answer["limit_cycle"] is not None:
         cycle = answer["limit_cycle"]
         at = cycle["frequency_rad_s"]
-        print(f"limit cycle: root moment +-{cycle['root_moment_amplitude']:.4g} N m at {at:.4g} rad/s")
+        size = f"root moment +-{cycle['root_moment_amplitude']:.4g} N m at {at:.4g} rad/s"
+        print(f"limit cycle, kept up by {cycle['kept_up_by']}: {size}")
     print("--json, --csv or --mat give the signals")
 
 

@@ -94,6 +94,11 @@ class Converters:
         """Whether a signal is rounded to steps anywhere."""
         return any(n is not None for n in (self.encoder_counts, self.moment_bits, self.torque_bits))
 
+    @property
+    def has_ranges(self) -> bool:
+        """Whether a signal can be clipped."""
+        return self.moment_range is not None or self.torque_range is not None
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Actuator:
@@ -147,6 +152,12 @@ class Chain:
     converters: Converters = field(default_factory=Converters)
     actuator: Actuator = field(default_factory=Actuator)
     slew: Slew = field(default_factory=Slew)
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether nothing is rounded to steps and nothing can be clipped."""
+        c = self.converters
+        return not c.is_quantised and not c.has_ranges and math.isinf(self.actuator.torque_limit)
 
 
 def _above_zero(key: str, record: object, meaning: str) -> float:

@@ -69,15 +69,15 @@ def _angle(hub: Any, amplitude: Any, rigid: Any) -> float:
 
 @compiled
 def quantise(value: float, row: Any, saturated: Any, which: int) -> float:
-    """`value` on the steps of a converter, clipped to its range; counts what is clipped."""
+    """`value` on the steps of a converter, clipped to its range; says so in `saturated` (3,) where it is clipped."""
     step, low, high = row[0], row[1], row[2]
     if step > 0.0:
         value = np.rint(value / step) * step
     if value > high:
-        saturated[which] += 1
+        saturated[which] = True
         return high
     if value < low:
-        saturated[which] += 1
+        saturated[which] = True
         return low
     return value
 
@@ -119,8 +119,8 @@ def run(
     """The linear law over all samples; returns how many were made before the root moment passed `bound`.
 
     Outputs 0, 1, 2 are what is measured (hub angle, hub rate, root moment through their analog filters).  `held` is a
-    ring of the last delay + 2 torques.  `record` (n, outputs), `torque` (n,) and `fine` (n, records, outputs) are
-    filled.
+    ring of the last delay + 2 torques.  `record` (n, outputs), `torque` (n,), `fine` (n, records, outputs) and
+    `saturated` (n, 3) are filled.
     """
     weights, rates, static = tables[3], tables[4], tables[5]
     n, ring, memory = torque.size, held.size, np.zeros(3)
@@ -130,10 +130,11 @@ def run(
         read(weights, rates, static, amplitude, rigid, acting + extra, record[k])
         if not abs(record[k, 2]) <= bound:
             return k
-        angle = quantise(record[k, 0], rows[ANGLE], saturated, ANGLE)
-        moment = quantise(record[k, 2], rows[MOMENT], saturated, MOMENT)
+        clipped = saturated[k]
+        angle = quantise(record[k, 0], rows[ANGLE], clipped, ANGLE)
+        moment = quantise(record[k, 2], rows[MOMENT], clipped, MOMENT)
         rate = estimate(angle, record[k, 1], memory, filter_)
-        u = quantise(law(gains, K2[k], ideal[k], angle, rate, moment, single), rows[TORQUE], saturated, TORQUE)
+        u = quantise(law(gains, K2[k], ideal[k], angle, rate, moment, single), rows[TORQUE], clipped, TORQUE)
         held[k % ring] = torque[k] = u
         advance(tables, amplitude, rigid, acting, held[(k - delay) % ring], disturbance[k], fine[k], work)
     return n

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,28 +19,43 @@ Real = NDArray[np.float64]
 SETTLED = 0.05  # of the largest root moment
 LASTING = 0.7  # a limit cycle keeps at least this much of its amplitude over a quarter of the record
 BEYOND_IDEAL = 2.0  # and is this much larger than what an ideal chain leaves at that time
+FEWEST_TURNS = 1.0  # of the moment about its mean in a quarter of the record: fewer are a drift and no vibration
 FEWEST = 40  # samples without which a limit cycle cannot be told
 
 
 @dataclass(frozen=True)
 class LimitCycle:
-    """A vibration that quantisation keeps up: half peak to peak of root moment [N m], hub rate [rad/s] and torque [N
-    m].
+    """A vibration that does not end: half peak to peak of root moment [N m], hub rate [rad/s] and torque [N m].
 
-    `frequency` [rad/s] as the samples see it, from the zero crossings of the moment about its mean.
+    `frequency` [rad/s] as the samples see it, from the zero crossings of the moment about its mean.  `kept_up_by`:
+    "saturation" where a signal is still clipped (an unstable loop that its limits hold), else "quantisation".
     """
 
     root_moment: float
     hub_rate: float
     torque: float
     frequency: float
+    kept_up_by: Literal["quantisation", "saturation"]
 
 
 def residual_moment_rms(simulation: Simulation) -> float:
-    """Root mean square of the root moment [N m] from the end of the manoeuvre on (0 if it stopped before)."""
-    after = simulation.t >= simulation.scenario.busy_until * (1 - 1e-12)
-    moment = simulation.at_samples.root_moment[after]
-    return float(np.sqrt(np.mean(moment**2))) if moment.size else 0.0
+    """Root mean square of the vibration x, the root moment less the rigid arm's [N m], from the end of the slew on.
+
+    0 if it stopped before.  What is taken off is the scenario's `rigid_moment`: nothing under the reading "total".
+    """
+    rigid = simulation.scenario.rigid_moment[: simulation.t.size]
+    return rms_after(simulation.t, simulation.at_samples.root_moment - rigid, simulation.scenario.busy_until)
+
+
+def residual_raw_moment_rms(simulation: Simulation) -> float:
+    """The same of the root moment itself, to whose first sample the slew's last torque still belongs."""
+    return rms_after(simulation.t, simulation.at_samples.root_moment, simulation.scenario.busy_until)
+
+
+def rms_after(t: Real, signal: Real, start: float) -> float:
+    """Root mean square of the samples of a signal from `start` [s] on; 0 where there is none."""
+    after = signal[t >= start * (1 - 1e-12)]
+    return float(np.sqrt(np.mean(after**2))) if after.size else 0.0
 
 
 def settling_time(simulation: Simulation) -> float:
@@ -55,26 +70,41 @@ def settling_time(simulation: Simulation) -> float:
 def limit_cycle(simulation: Simulation, ideal: Simulation) -> LimitCycle | None:
     """The limit cycle in the last quarter of the record, if there is one.
 
-    It lasts (a quarter earlier it was not much larger), and the same loop with ideal converters (`ideal`) has died down
-    further.
+    It lasts: a quarter earlier it was not much larger, and, where signals are still clipped, not much smaller either.
+    The same loop with ideal converters (`ideal`) has died down further, or where they are clipped it runs away.
     """
     n = simulation.t.size
-    if simulation.stopped or not simulation.chain.converters.is_quantised or n < FEWEST:
+    if simulation.stopped or simulation.chain.is_linear or n < FEWEST:
         return None
     last, before = slice(n - n // 4, n), slice(n - n // 2, n - n // 4)
     moment = simulation.at_samples.root_moment
-    size = _half_range(moment[last])
-    linear = _half_range(ideal.at_samples.root_moment[last]) if not ideal.stopped else math.inf
-    if size == 0.0 or size < LASTING * _half_range(moment[before]) or size <= BEYOND_IDEAL * linear:
+    size, earlier = _half_range(moment[last]), _half_range(moment[before])
+    is_clipped = bool(simulation.saturated_at[last].any())
+    if size == 0.0 or size < LASTING * earlier or (is_clipped and earlier < LASTING * size):
+        return None
+    if not (is_clipped and _runs_away(ideal, last, before)) and size <= BEYOND_IDEAL * _left(ideal, last):
         return None
     about = moment[last] - moment[last].mean()
     turns = np.count_nonzero(np.diff(np.signbit(about))) / 2
+    if is_clipped and turns < FEWEST_TURNS:
+        return None
     return LimitCycle(
         root_moment=size,
         hub_rate=_half_range(simulation.at_samples.hub_rate[last]),
         torque=_half_range(simulation.torque[last]),
         frequency=float(2 * np.pi * turns / ((about.size - 1) * simulation.scenario.period)),
+        kept_up_by="saturation" if is_clipped else "quantisation",
     )
+
+
+def _left(ideal: Simulation, part: slice) -> float:
+    """What the ideal chain leaves of the moment there, as half of its range; inf where it ran away."""
+    return math.inf if ideal.stopped else _half_range(ideal.at_samples.root_moment[part])
+
+
+def _runs_away(ideal: Simulation, last: slice, before: slice) -> bool:
+    """Whether the ideal chain's moment has grown, or has run away altogether."""
+    return ideal.stopped is not None or _left(ideal, last) > _left(ideal, before)
 
 
 def _half_range(signal: Real) -> float:
@@ -99,6 +129,7 @@ def simulation_answer(
         "torque": simulation.torque.tolist(),
         "gain": [] if simulation.gain is None else simulation.gain.tolist(),
         "residual_moment_rms": residual_moment_rms(simulation),
+        "residual_raw_moment_rms": residual_raw_moment_rms(simulation),
         "settling_time_s": settling_time(simulation),
         "saturated_samples": simulation.saturated,
         "energy_error": simulation.energy_error,
@@ -113,12 +144,13 @@ def simulation_answer(
     return answer
 
 
-def _cycle(cycle: LimitCycle) -> dict[str, float]:
+def _cycle(cycle: LimitCycle) -> dict[str, float | str]:
     return {
         "root_moment_amplitude": cycle.root_moment,
         "hub_rate_amplitude": cycle.hub_rate,
         "torque_amplitude": cycle.torque,
         "frequency_rad_s": cycle.frequency,
+        "kept_up_by": cycle.kept_up_by,
     }
 
 
@@ -151,6 +183,6 @@ def simulated_answer(
     task = scenario(name, arm, chain, duration)
     simulation = Simulator(arm, chain, task, count=count, between=between).linear(gains)
     cycle = None
-    if chain.converters.is_quantised:
+    if not chain.is_linear:
         cycle = limit_cycle(simulation, Simulator(arm, ideal_chain(chain), task, count=count).linear(gains))
     return simulation_answer(arm.name, gains, simulation, cycle)

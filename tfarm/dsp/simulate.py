@@ -72,9 +72,9 @@ class Simulation:
     """A simulated loop: `at_samples` just before each update, `between` the records asked for between the samples.
 
     `torque` [N m] is what leaves the DAC at each sample, `gain` the K2 used there (None where a controller does not
-    say), `measured` (n, 3) what the analog filters pass of hub angle, hub rate and root moment.  `saturated` counts
-    samples at which the encoder, the strain amplifier and the torque were clipped.  `energy_error` is |energy gained -
-    work done| over the energy that went to and fro, for an arm without damping; None with damping.
+    say), `measured` (n, 3) what the analog filters pass of hub angle, hub rate and root moment.  `saturated_at` (n, 3)
+    says at which samples the encoder, the strain amplifier and the torque were clipped.  `energy_error` is |energy
+    gained - work done| over the energy that went to and fro, for an arm without damping; None with damping.
     """
 
     scenario: Scenario
@@ -84,7 +84,7 @@ class Simulation:
     measured: Real
     torque: Real
     gain: Real | None
-    saturated: dict[str, int]
+    saturated_at: NDArray[np.bool_]
     energy_error: float | None
     stopped: Stop | None
 
@@ -92,6 +92,12 @@ class Simulation:
     def t(self) -> Real:
         """The times of the samples [s]."""
         return self.at_samples.t
+
+    @property
+    def saturated(self) -> dict[str, int]:
+        """At how many samples encoder, strain amplifier and torque were clipped."""
+        counts = self.saturated_at.sum(axis=0)
+        return {name: int(n) for name, n in zip(("encoder", "moment", "torque"), counts, strict=True)}
 
     @property
     def volts(self) -> Real | None:
@@ -169,7 +175,7 @@ class Simulator:
             if not math.isfinite(u):
                 raise ParameterError(key="controller", value=u, remedy=f"its torque at sample {k} is not finite")
             u = float(np.float32(u)) if single else u
-            u = kernel.quantise(u, self._rows[kernel.TORQUE], state.saturated, kernel.TORQUE)
+            u = kernel.quantise(u, self._rows[kernel.TORQUE], state.saturated[k], kernel.TORQUE)
             state.held[k % ring] = state.torque[k] = u
             if gain is not None:
                 gain[k] = K
@@ -180,8 +186,8 @@ class Simulator:
         return self._result(state, state.torque.size, gain)
 
     def _measurement(self, k: int, state: _State, memory: Real, single: bool) -> Measurement:
-        angle = kernel.quantise(state.record[k, 0], self._rows[kernel.ANGLE], state.saturated, kernel.ANGLE)
-        moment = kernel.quantise(state.record[k, 2], self._rows[kernel.MOMENT], state.saturated, kernel.MOMENT)
+        angle = kernel.quantise(state.record[k, 0], self._rows[kernel.ANGLE], state.saturated[k], kernel.ANGLE)
+        moment = kernel.quantise(state.record[k, 2], self._rows[kernel.MOMENT], state.saturated[k], kernel.MOMENT)
         rate = kernel.estimate(angle, state.record[k, 1], memory, self._filter)
         forward, angle_wanted, rate_wanted, rigid = (float(value) for value in self._ideal[k])
         values = [angle, rate, moment, moment - rigid, forward, angle_wanted, rate_wanted, rigid]
@@ -207,7 +213,7 @@ class Simulator:
             record=np.zeros((n, outputs)),
             torque=np.zeros(n),
             fine=np.zeros((n, self.between, outputs)),
-            saturated=np.zeros(3, np.int64),
+            saturated=np.zeros((n, 3), np.bool_),
             work=np.zeros(2),
             energy=self._energy(amplitude, self.scenario.impulse),
         )
@@ -241,7 +247,7 @@ class Simulator:
             measured=state.record[:done, :3],
             torque=state.torque[:done],
             gain=None if gain is None else gain[:done],
-            saturated={name: int(n) for name, n in zip(("encoder", "moment", "torque"), state.saturated, strict=True)},
+            saturated_at=state.saturated[:done],
             energy_error=None if stopped else self._energy_error(state),
             stopped=stopped,
         )
@@ -262,7 +268,7 @@ class _State:
     record: Real
     torque: Real
     fine: Real
-    saturated: NDArray[np.int64]
+    saturated: NDArray[np.bool_]
     work: Real
     energy: float
 

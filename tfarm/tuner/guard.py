@@ -64,8 +64,8 @@ class Guard:
 
     @property
     def is_proven(self) -> bool:
-        """Whether the loop is proven stable for every K(t) in it."""
-        return bool(self.proofs)
+        """Whether the loop is proven stable for every K(t) in it, and not that of its first modes alone."""
+        return bool(self.proofs) and self.is_settled
 
     @property
     def array(self) -> Real:
@@ -84,7 +84,8 @@ class Guard:
                 f"[{self.lo:.4g}, {self.hi:.4g}]: stable for every constant K, not proven for one that moves ({modes})"
             )
         rate = max(proof.contraction for proof in self.proofs)
-        return f"[{self.lo:.4g}, {self.hi:.4g}]: proven for any K(t), shrinking by {1 - rate:.2g} a sample ({modes})"
+        what = "proven" if self.is_settled else f"proven for the first {self.modes_used} modes"
+        return f"[{self.lo:.4g}, {self.hi:.4g}]: {what} for any K(t), shrinking by {1 - rate:.2g} a sample ({modes})"
 
 
 def find_guard(loop: SampledLoop, kind: GuardKind, best_constant: float) -> Guard:

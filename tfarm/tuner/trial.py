@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from tfarm.arm import Arm, HubFeedback
 from tfarm.arm.checks import not_negative, number, positive
 from tfarm.dsp import Chain, SampledLoop, Scenario, sampled_loop, scenario
+from tfarm.dsp.results import rms_after
 from tfarm.errors import ParameterError, did_you_mean
 from tfarm.tuner import kernel
 from tfarm.tuner.network import Network
@@ -223,7 +224,4 @@ def no_guard() -> Real:
 
 def residual_rms(record: Record, busy_until: float) -> float:
     """Root mean square of x [N m] from the end of the slew on (0 if it ends with it); inf where the loop ran away."""
-    after: Any = record.x[record.t >= busy_until * (1 - 1e-12)]
-    if record.stopped is not None:
-        return float("inf")
-    return float(np.sqrt(np.mean(after**2))) if after.size else 0.0
+    return float("inf") if record.stopped is not None else rms_after(record.t, record.x, busy_until)

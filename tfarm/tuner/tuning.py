@@ -9,7 +9,7 @@ import numpy as np
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.dsp import Chain, Simulator, scenario
-from tfarm.dsp.results import simulation_answer
+from tfarm.dsp.results import rms_after, simulation_answer
 from tfarm.errors import ParameterError
 from tfarm.tuner.bound import lq_bound
 from tfarm.tuner.comparison import Row
@@ -135,6 +135,7 @@ def tune_answer(tuning: Tuning) -> dict[str, Any]:
         **_shaped(tuning),
         "gain": {"t": result.t.tolist(), "K": result.K.tolist()},
         "residual_moment_rms": residual_rms(result, busy),
+        "residual_raw_moment_rms": _raw_residual(tuning),
         "residual_without": residual_rms(tuning.without, busy),
         "guard": [guard.lo, guard.hi],
         "guard_kind": guard.kind,
@@ -146,6 +147,14 @@ def tune_answer(tuning: Tuning) -> dict[str, Any]:
         "stopped": None if stopped is None else str(stopped),
         "weights": weights_answer(training.network),
     }
+
+
+def _raw_residual(tuning: Tuning) -> float:
+    """Root mean square of the root moment itself after the slew [N m], as `tfarm simulate` has it under this key."""
+    result, task = tuning.training.result, tuning.trial.task
+    if result.stopped is not None:
+        return float("inf")
+    return rms_after(result.t, result.x + task.rigid_moment[: result.t.size], task.busy_until)
 
 
 def _shaped(tuning: Tuning) -> dict[str, Any]:
