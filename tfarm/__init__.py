@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from tfarm.reduced import reduce
     from tfarm.response import transfer
     from tfarm.spectrum import damped_modes, modes
+    from tfarm.spectrum.scales import default_gains
 
 __version__ = "0.1.0"
 
@@ -37,6 +38,7 @@ __all__ = [
     "Section",
     "closed_loop_poles",
     "damped_modes",
+    "default_gains",
     "load",
     "margins",
     "modes",
@@ -48,6 +50,7 @@ __all__ = [
 _ROOMS = {
     "closed_loop_poles": "loop.poles",
     "damped_modes": "spectrum",
+    "default_gains": "spectrum.scales",
     "margins": "loop.margins",
     "modes": "spectrum",
     "reduce": "reduced",

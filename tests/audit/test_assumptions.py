@@ -9,7 +9,6 @@ import pytest
 
 import tfarm
 from tfarm.audit.assumptions import (
-    GAINS,
     assumptions_answer,
     candidate_depths,
     candidate_inertias,
@@ -19,6 +18,7 @@ from tfarm.audit.assumptions import (
     own_depth,
     section_study,
 )
+from tfarm.spectrum.scales import PAPER_GAINS
 
 PAPER = tfarm.load("sasaki2012")
 STOCKY = tfarm.load("stocky-steel")
@@ -192,9 +192,9 @@ def test_verdicts_are_those_of_the_loop_itself():
     arm = tfarm.load("sasaki2012-lab")
     study = hub_study(arm, (0.05, 0.1, 0.5))
     verdicts = loop_verdicts(study)
-    assert verdicts[1].K2_below == pytest.approx(tfarm.margins(arm, GAINS).windows["K2"].around[1], rel=1e-12)
+    assert verdicts[1].K2_below == pytest.approx(tfarm.margins(arm, PAPER_GAINS).windows["K2"].around[1], rel=1e-12)
     for each, found in zip(study.arms, verdicts, strict=True):
-        below, above = (replace(GAINS, K2=found.K2_below * factor) for factor in (0.99, 1.01))
+        below, above = (replace(PAPER_GAINS, K2=found.K2_below * factor) for factor in (0.99, 1.01))
         assert found.verdict == "stable"
         assert tfarm.closed_loop_poles(each, below, 6).unstable == 0
         assert tfarm.closed_loop_poles(each, above, 6).unstable == 2

@@ -125,6 +125,6 @@ def test_hubs_without_a_loop(capsys, tmp_path, verb, inertia, message):
 
     file = tmp_path / "arm.toml"
     file.write_text(LAB.replace("inertia = 0.1", f"inertia = {inertia}"))
-    code, _, err = run(capsys, verb, str(file), *(["--scenario", "step"] if verb == "simulate" else []))
+    code, _, err = run(capsys, verb, str(file), "--K2", "0.3", *(["--scenario", "step"] if verb == "simulate" else []))
     assert code == 2
     assert message in err

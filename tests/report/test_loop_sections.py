@@ -16,8 +16,8 @@ from tfarm.loop.poles import closed_loop_poles
 from tfarm.loop.stability import stability
 from tfarm.report import loop_laws, loop_section, map
 from tfarm.report.loci import loci, zoomed
-from tfarm.report.locus_section import beyond_table, locus_law
-from tfarm.report.loop_laws import DEFAULT, NamedLaw, has_loop, margins_of
+from tfarm.report.locus_section import beyond_table
+from tfarm.report.loop_laws import NamedLaw, has_loop, margins_of
 from tfarm.report.loop_section import map_section, margins_section, nyquist_section
 from tfarm.report.map import Axis, gain_map, map_data, moment_axis, rate_axis, stable_edge
 from tfarm.report.map_picture import nice_levels
@@ -25,6 +25,7 @@ from tfarm.report.margins_table import NOTHING, margin_table
 from tfarm.report.nyquist import compressed, nyquist
 from tfarm.report.sections import save_section
 from tfarm.report.writing import write
+from tfarm.spectrum.scales import PAPER_GAINS, default_gains, rate_unit
 
 LAB, PURE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))
 EPS = np.finfo(float).eps
@@ -156,8 +157,8 @@ def test_the_verdict_comes_before_any_margin():
 def test_margins_are_those_of_the_loop_room():
     """Every number of the table, and 0 for the exact delay margin at C = 0."""
     for arm in (LAB, PURE):
-        found = margins_of(arm, DEFAULT)
-        table = margin_table([NamedLaw("default gains", "default", DEFAULT)], [found], arm is PURE)
+        found = margins_of(arm, default_gains(arm))
+        table = margin_table([NamedLaw("default gains", "default", default_gains(arm))], [found], arm is PURE)
         rows = dict(zip(table.columns[0].values, zip(*(c.values for c in table.columns[2:]), strict=True), strict=True))
         assert rows["delay margin"] == (found.exact_delay, found.in_band.delay, found.in_band.at["delay"])
         assert rows["phase margin"][1] == found.in_band.phase
@@ -171,9 +172,9 @@ def test_margins_are_those_of_the_loop_room():
 
 def test_the_loci_are_exact_and_the_gap_is_that_of_what_is_drawn():
     """At the gains marked each branch is a pole found in a box; the gap is the distance of the two curves drawn."""
-    data = loci(LAB, DEFAULT, "K2", -1.0, 1.6)
+    data = loci(LAB, PAPER_GAINS, "K2", -1.0, 1.6)
     for n in (0, 150, 299):
-        law = replace(DEFAULT, K2=float(data.exact.gain[n]))
+        law = replace(PAPER_GAINS, K2=float(data.exact.gain[n]))
         poles = closed_loop_poles(LAB, law, 5).values
         for branch in zoomed(data)[:2]:
             here = data.exact.branches[branch, n]
@@ -186,14 +187,9 @@ def test_the_loci_are_exact_and_the_gap_is_that_of_what_is_drawn():
     assert [round(each.gain, 4) for each in data.exact.crossings] == [1.0305]
 
 
-def test_the_law_of_the_loci_can_be_seen():
-    assert locus_law(LAB) == DEFAULT
-    assert locus_law(STOCKY).K1 > 100 * DEFAULT.K1
-
-
 def test_beyond_one_infinitely_many_poles_are_unstable_without_damping():
     """And at K2 = 1 exactly none is: the modes with the hub at rest stay on the axis."""
-    table = beyond_table(PURE, DEFAULT)
+    table = beyond_table(PURE, PAPER_GAINS)
     columns = {column.key: column.values for column in table.columns}
     assert columns["verdict"] == ["stable", "marginal", "unstable", "unstable", "unstable"]
     assert columns["unstable_poles"][2:] == ["infinitely many"] * 3
@@ -208,7 +204,7 @@ def test_beyond_one_infinitely_many_poles_are_unstable_without_damping():
 @pytest.mark.parametrize("K2", [-2.0, 0.3, 1.5])
 def test_turns_around_minus_one_are_unstable_poles(arm, K2):
     """Two counts that share nothing: the turns of 1 + L along a contour, and all poles found in a box."""
-    law = HubFeedback(K1=0.2 * loop_laws.rate_unit(arm), K2=K2)
+    law = HubFeedback(K1=0.2 * rate_unit(arm), K2=K2)
     plot = nyquist(NamedLaw("", "", law), stability(arm, law))
     assert plot.expected == plot.verdict.unstable_roots
     assert (plot.verdict.unstable_roots > 0) == (K2 > 1)
@@ -216,7 +212,7 @@ def test_turns_around_minus_one_are_unstable_poles(arm, K2):
 
 def test_every_pole_on_the_axis_is_passed_on_its_right():
     """At C = 0 half a circle a natural frequency, a quarter at 0; nothing infinite is evaluated."""
-    plot = nyquist(NamedLaw("", "", DEFAULT), stability(PURE, DEFAULT))
+    plot = nyquist(NamedLaw("", "", PAPER_GAINS), stability(PURE, PAPER_GAINS))
     omega = tfarm.modes(PURE, 12).natural_frequency
     assert plot.poles == pytest.approx(omega, rel=4 * EPS, abs=0)
     starts = np.flatnonzero(np.diff(np.r_[0, plot.is_arc.astype(int)]) == 1)

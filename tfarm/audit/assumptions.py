@@ -21,6 +21,7 @@ from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import gain_windows
 from tfarm.spectrum import modes
+from tfarm.spectrum.scales import default_gains
 
 Real = NDArray[np.float64]
 
@@ -28,7 +29,6 @@ COUNT = 4
 AREA = 6.0e-4  # m^2, the paper's
 DEPTHS = (0.002, 0.003, 0.004, 0.006, 0.008, 0.010, 0.015, 0.020, 0.030, 0.040, 0.060)  # m, for that area
 INERTIAS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # kg m^2
-GAINS = HubFeedback(K1=0.3, K2=0.3)  # the default loop, for which each candidate gets a verdict
 SAME = 1e-9  # relative: so near to the arm's own value a candidate is that value
 HELD_SECTION = "area, shear factor and all else held: I = A depth^2/12, so one per cent of depth counts twice"
 HELD_HUB = "all else held"
@@ -85,15 +85,19 @@ class LoopVerdict:
 
 
 def loop_verdicts(study: SectionStudy | HubStudy) -> tuple[LoopVerdict, ...] | None:
-    """The verdict on each candidate under `GAINS`; None where the hub is locked or a free pin: K2 has no loop there."""
+    """The verdict on each candidate under the default gains of the arm itself.
+
+    None where the hub is locked or a free pin: K2 has no loop there.
+    """
     if not all(has_hub_inertia(arm) for arm in study.arms):
         return None
-    return tuple(_loop_verdict(arm) for arm in study.arms)
+    law = default_gains(study.arm)
+    return tuple(_loop_verdict(arm, law) for arm in study.arms)
 
 
-def _loop_verdict(arm: Arm) -> LoopVerdict:
+def _loop_verdict(arm: Arm, law: HubFeedback) -> LoopVerdict:
     try:
-        found = stability(arm, GAINS)
+        found = stability(arm, law)
         window = gain_windows(found, "K2").around
     except ConvergenceError:
         return LoopVerdict("undecided", None)
@@ -196,7 +200,8 @@ def assumptions_answer(arm: Arm, count: int = COUNT) -> dict[str, Any]:
             for h, b, I, row in zip(study.depth, study.width, study.second_moment, _rows(study), strict=True)
         ],
     }
-    gains = {"K1": GAINS.K1, "K2": GAINS.K2}
+    law = default_gains(arm)
+    gains = {"K1": law.K1, "K2": law.K2}
     return {"arm": arm.name, "count": count, "gains": gains, "section": section, "hub": _hub_answer(arm, count)}
 
 

@@ -9,18 +9,15 @@ from typing import Annotated, Any
 import typer
 
 from tfarm.cli.app import ArmName, Json, app, load_arm, whole
+from tfarm.cli.inputs import K1, K2, Kp, gains_of, say_defaults
 from tfarm.errors import ParameterError
-
-K1 = Annotated[float, typer.Option("--K1", help="gain on the hub rate [N m s/rad]")]
-K2 = Annotated[float, typer.Option("--K2", help="gain on the root moment [-]; u = ... - K2 E I phi'(0)")]
-Kp = Annotated[float, typer.Option("--Kp", help="gain on the hub angle [N m/rad]")]
 
 
 @app.command()
 def poles(
     arm: ArmName,
-    k1: K1 = 0.3,
-    k2: K2 = 0.3,
+    k1: K1 = None,
+    k2: K2 = None,
     kp: Kp = 0.0,
     count: Annotated[str, typer.Option("--count", metavar="N", help="poles with Im s >= 0, 1 to 1000")] = "10",
     certify: Annotated[bool, typer.Option("--certify", help="prove each, and that none is missing")] = False,
@@ -28,23 +25,23 @@ def poles(
 ) -> None:
     """Closed-loop poles of the exact arm, complete in a printed box."""
     number, subject = whole("--count", count, 1, 1000), load_arm(arm)
-    from tfarm.arm import HubFeedback
+    law, said = gains_of(subject, k1, k2, kp)
     from tfarm.loop.answers import poles_answer
     from tfarm.loop.poles import closed_loop_poles
 
-    answer = poles_answer(closed_loop_poles(subject, HubFeedback(K1=k1, K2=k2, Kp=kp), number), certify)
-    _print(answer, json, "print_poles")
+    answer = poles_answer(closed_loop_poles(subject, law, number), certify)
+    _print(answer | said, json, "print_poles")
 
 
 @app.command()
-def margins(arm: ArmName, k1: K1 = 0.3, k2: K2 = 0.3, kp: Kp = 0.0, json: Json = False) -> None:
+def margins(arm: ArmName, k1: K1 = None, k2: K2 = None, kp: Kp = 0.0, json: Json = False) -> None:
     """The verdict on a loop, the windows of each gain, and the margins of the exact loop function."""
     subject = load_arm(arm)
-    from tfarm.arm import HubFeedback
+    law, said = gains_of(subject, k1, k2, kp)
     from tfarm.loop.answers import margins_answer
     from tfarm.loop.margins import margins as find_margins
 
-    _print(margins_answer(find_margins(subject, HubFeedback(K1=k1, K2=k2, Kp=kp))), json, "print_margins")
+    _print(margins_answer(find_margins(subject, law)) | said, json, "print_margins")
 
 
 @app.command("map")
@@ -113,3 +110,4 @@ def _print(answer: dict[str, Any], json: bool, printer: str) -> None:
         from tfarm.cli import control_tables
 
         getattr(control_tables, printer)(answer)
+        say_defaults(answer)

@@ -3,12 +3,26 @@
 from __future__ import annotations
 
 import math
-from typing import TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import numpy as np
+import typer
 from numpy.typing import NDArray
 
 from tfarm.errors import ParameterError
+
+if TYPE_CHECKING:
+    from tfarm.arm import Arm, HubFeedback
+
+K1 = Annotated[
+    float | None,
+    typer.Option("--K1", help="hub rate gain [N m s/rad]; by default 0.00642 J w1, the paper's 0.3 on its arm"),
+]
+K2 = Annotated[
+    float | None,
+    typer.Option("--K2", help="root moment gain, u = ... - K2 E I phi'(0); 0.3 by default, 0 on a hub without inertia"),
+]
+Kp = Annotated[float, typer.Option("--Kp", help="hub angle gain [N m/rad]")]
 
 MOST_POINTS = 1_000_000
 _Number = TypeVar("_Number", float, complex)
@@ -44,6 +58,32 @@ def grid(start: float, stop: float, points: str) -> NDArray[np.complex128]:
         raise ParameterError(key="--points", value=points, remedy=f"a whole number from 2 to {MOST_POINTS}")
     frequencies: NDArray[np.float64] = np.geomspace(start, stop, int(number))
     return s_on_axis(frequencies)
+
+
+def gains_of(
+    arm: Arm, K1: float | None, K2: float | None = None, Kp: float = 0.0
+) -> tuple[HubFeedback, dict[str, Any]]:
+    """The law of the command line, gains that were not given being the arm's default, and what its answer says of it.
+
+    `default_gains` names the gains that were not given, `default_gains_in_words` says what they are and why.
+    """
+    from dataclasses import replace
+
+    from tfarm.spectrum.scales import default_gains, default_words
+
+    given = {name: gain for name, gain in (("K1", K1), ("K2", K2)) if gain is not None}
+    missing = [name for name in ("K1", "K2") if name not in given]
+    words = default_words(arm, missing) if missing else None
+    return replace(default_gains(arm), Kp=Kp, **given), {
+        "default_gains": missing,
+        "default_gains_in_words": words,
+    }
+
+
+def say_defaults(answer: dict[str, Any]) -> None:
+    """One line about the gains that were not given, where there are any."""
+    if answer.get("default_gains"):
+        print(f"by default {answer['default_gains_in_words']}")
 
 
 def _number(key: str, text: str, kind: type[_Number], remedy: str) -> _Number:

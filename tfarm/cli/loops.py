@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from tfarm.cli.app import ArmName, Json, app, load_arm, whole
-from tfarm.cli.control import K1, K2, Kp
+from tfarm.cli.inputs import K1, K2, Kp, gains_of, say_defaults
 
 Vary = Annotated[
     str,
@@ -27,8 +27,8 @@ def locus(
     vary: Vary,
     start: Annotated[float, typer.Option("--from", help="value at which the locus begins")],
     stop: Annotated[float, typer.Option("--to", help="value at which it ends")],
-    k1: K1 = 0.3,
-    k2: K2 = 0.3,
+    k1: K1 = None,
+    k2: K2 = None,
     kp: Kp = 0.0,
     points: Annotated[str, typer.Option("--points", metavar="N", help="values, equally spaced")] = "500",
     branches: Annotated[str, typer.Option("--branches", metavar="N", help="branches, 1 to 200")] = "10",
@@ -38,13 +38,13 @@ def locus(
     """Root locus of the exact arm along a gain or a parameter; crossings of the imaginary axis are solved for."""
     number, count = whole("--points", points, 2, 100_000), whole("--branches", branches, 1, 200)
     subject = load_arm(arm)
-    from tfarm.arm import HubFeedback
+    law, said = gains_of(subject, k1, k2, kp)
     from tfarm.loop.locus import locus as find
     from tfarm.loop.locus_answer import locus_answer
     from tfarm.loop.reduced_locus import reduced_locus
 
-    exact = find(subject, HubFeedback(K1=k1, K2=k2, Kp=kp), vary, start, stop, number, count)
-    answer = locus_answer(exact, reduced_locus(exact))
+    exact = find(subject, law, vary, start, stop, number, count)
+    answer = locus_answer(exact, reduced_locus(exact)) | said
     if csv is not None:
         _write(answer, csv)
     if json:
@@ -53,6 +53,7 @@ def locus(
         print(to_json(answer))
     elif csv is None:
         _show(answer)
+        say_defaults(answer)
 
 
 def _write(answer: dict[str, Any], path: Path) -> None:

@@ -8,13 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tfarm.cli.app import ArmName, Json, app, load_arm, whole
+from tfarm.cli.inputs import K1, K2, Kp, gains_of, say_defaults
 
 if TYPE_CHECKING:
     from tfarm.dsp import Chain
 
-K1 = Annotated[float, typer.Option("--K1", help="hub rate gain [N m s/rad]")]
-K2 = Annotated[float, typer.Option("--K2", help="root moment gain; a positive moment accelerates the hub")]
-Kp = Annotated[float, typer.Option("--Kp", help="hub angle gain [N m/rad]")]
 Period = Annotated[
     float | None, typer.Option("--period", help="sample period [s]; 0.01 unless the file says otherwise")
 ]
@@ -31,8 +29,8 @@ Modes = Annotated[
 @app.command()
 def sampled(
     arm: ArmName,
-    K1: K1 = 0.3,
-    K2: K2 = 0.3,
+    K1: K1 = None,
+    K2: K2 = None,
     Kp: Kp = 0.0,
     period: Period = None,
     delay_samples: Delay = None,
@@ -43,10 +41,10 @@ def sampled(
     """Is the loop u = -Kp theta - K1 theta_t - K2 M stable when it is sampled?  Verdict, intervals, modes, margins."""
     count = None if modes is None else whole("--modes", modes, 1, 400)
     subject, chain = load_arm(arm), chain_of(dsp or arm, period, delay_samples)
-    from tfarm.arm import HubFeedback
+    gains, said = gains_of(subject, K1, K2, Kp)
     from tfarm.dsp.verdict import analyse, sampled_answer
 
-    answer = sampled_answer(analyse(subject, HubFeedback(K1=K1, K2=K2, Kp=Kp), chain, count=count))
+    answer = sampled_answer(analyse(subject, gains, chain, count=count)) | said
     if json:
         from tfarm.cli.answers import to_json
 
@@ -55,13 +53,14 @@ def sampled(
         from tfarm.cli.sampling_tables import print_sampled
 
         print_sampled(answer)
+        say_defaults(answer)
 
 
 @app.command()
 def simulate(
     arm: ArmName,
-    K1: K1 = 0.3,
-    K2: K2 = 0.3,
+    K1: K1 = None,
+    K2: K2 = None,
     Kp: Kp = 0.0,
     scenario: Annotated[str, typer.Option("--scenario", help="slew, step, decay or impulse")] = "slew",
     duration: Annotated[float, typer.Option("--duration", help="how long [s]")] = 3.0,
@@ -80,12 +79,11 @@ def simulate(
     """The sampled loop in time: hub angle, tip, root moment and torque, exact between the samples."""
     count, records = whole("--modes", modes or "20", 1, 400), whole("--between", between, 0, 1000)
     subject, chain = load_arm(arm), chain_of(dsp or arm, period, delay_samples)
-    from tfarm.arm import HubFeedback
     from tfarm.dsp.results import simulated_answer
 
     if controller is None:
-        gains = HubFeedback(K1=K1, K2=K2, Kp=Kp)
-        answer = simulated_answer(subject, gains, chain, scenario, duration, count=count, between=records)
+        gains, said = gains_of(subject, K1, K2, Kp)
+        answer = said | simulated_answer(subject, gains, chain, scenario, duration, count=count, between=records)
     else:
         from tfarm.tuner.saving import load_tuner
         from tfarm.tuner.tuning import controlled_answer
@@ -110,6 +108,7 @@ def _show(answer: dict[str, Any], csv: Path | None, mat: Path | None, json: bool
         print(to_json(answer))
     elif csv is None and mat is None:
         sampling_tables.print_simulation(answer)
+        say_defaults(answer)
 
 
 def chain_of(source: str, period: float | None, delay_samples: float | None) -> Chain:

@@ -25,11 +25,18 @@ def study(
     """Studies of the tuner on all cores: learning curves, the map of (alpha_c, eta_c), a and b, inputs, rules."""
     number, slews = whole("--seeds", seeds, 1, 10_000), whole("--trials", trials, 1, 1_000_000)
     subject = load_arm(arm)
+    from tfarm.spectrum.scales import default_gains
     from tfarm.tuner import Learning, Plan
     from tfarm.tuner.studies import plans_of, run_study, study_answer
 
     learning = Learning(rule=cast("Any", rule))
-    base = Plan(learning=learning, signals=cast("Any", signals), guard=cast("Any", guard), trials=slews)
+    base = Plan(
+        learning=learning,
+        signals=cast("Any", signals),
+        guard=cast("Any", guard),
+        trials=slews,
+        K1=default_gains(subject).K1,
+    )
     plans = plans_of(what, base, number)
     from tfarm.cli.tuning_tables import print_study, progress
 

@@ -8,6 +8,7 @@ from typing import Annotated, Any, cast
 import typer
 
 from tfarm.cli.app import ArmName, Json, app, load_arm, whole
+from tfarm.cli.inputs import K1, gains_of, say_defaults
 from tfarm.cli.sampling import Delay, DspFile, Period, chain_of
 
 
@@ -29,7 +30,7 @@ def tune(
     alpha: Annotated[float, typer.Option("--alpha", help="momentum, in [0, 1)")] = 0.6,
     a: Annotated[float, typer.Option("--a", help="weight of the root moment in the cost")] = 1.0,
     b: Annotated[float, typer.Option("--b", help="weight of the control signal in the cost")] = 2.6,
-    K1: Annotated[float, typer.Option("--K1", help="hub rate gain [N m s/rad]")] = 0.3,
+    K1: K1 = None,
     duration: Annotated[float, typer.Option("--duration", help="of a trial [s]")] = 3.0,
     enough: Annotated[float, typer.Option("--enough", help="stop once the rms of x is below this [N m]")] = 0.0,
     hidden: Annotated[str, typer.Option("--hidden", metavar="N", help="hidden neurons")] = "6",
@@ -46,6 +47,7 @@ def tune(
     numbers = whole("--trials", trials, 1, 1_000_000), whole("--seed", seed, 0, 2**53), whole("--modes", modes, 1, 48)
     neurons = whole("--hidden", hidden, 1, 1000)
     subject, chain = load_arm(arm), chain_of(dsp or arm, period, delay_samples)
+    law, said = gains_of(subject, K1, 0.0)
     from tfarm import tuner
     from tfarm.tuner.tuning import comparison_answer
 
@@ -55,11 +57,11 @@ def tune(
     )  # fmt: skip
     plan = tuner.Plan(
         cost=tuner.Cost(a=a, b=b), learning=learning, signals=cast("Any", signals), guard=cast("Any", guard),
-        trials=numbers[0], seed=numbers[1], count=numbers[2], K1=K1, duration=duration, hidden=neurons,
+        trials=numbers[0], seed=numbers[1], count=numbers[2], K1=law.K1, duration=duration, hidden=neurons,
         seventh_input=seventh_input,
     )  # fmt: skip
     tuning = tuner.tune(subject, plan, chain)
-    answer = tuner.tune_answer(tuning)
+    answer = tuner.tune_answer(tuning) | said
     if compare:
         rows = tuner.compare(tuning.trial, tuning.gain(), tuning.training.guard)
         answer["comparison"] = comparison_answer(rows)
@@ -79,3 +81,4 @@ def _show(answer: dict[str, Any], json: bool) -> None:
         print(to_json(answer))
     else:
         tuning_tables.print_tuning(answer)
+        say_defaults(answer)

@@ -11,7 +11,6 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from tfarm.arm import Arm
 from tfarm.audit.assumptions import (
-    GAINS,
     HubStudy,
     SectionStudy,
     has_hub_inertia,
@@ -24,6 +23,7 @@ from tfarm.report.figures import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, Picture
 from tfarm.report.paper import is_from_paper
 from tfarm.report.sections import Section
 from tfarm.report.tables import Column, Real, Table, data_column, number_column
+from tfarm.spectrum.scales import default_gains
 
 Study = SectionStudy | HubStudy
 
@@ -172,7 +172,8 @@ def _loop(study: Study) -> Iterator[Column]:
         return
     words = [each.verdict for each in verdicts]
     edges = ["-" if each.K2_below is None else significant(each.K2_below, 6) for each in verdicts]
-    group = f"loop at K1 = {GAINS.K1:g}, K2 = {GAINS.K2:g}"
+    law = default_gains(study.arm)
+    group = f"loop at K1 = {law.K1:g}, K2 = {law.K2:g}"
     yield Column(key="verdict", title="verdict", values=words, cells=words, group=group, tint=_tint(study))
     values = ["" if each.K2_below is None else each.K2_below for each in verdicts]
     yield Column(key="K2_below", title="stable below K2", values=values, cells=edges, group=group, tint=_tint(study))

@@ -12,9 +12,10 @@ from tfarm.loop.stability import Stability, stability
 from tfarm.report.digits import plain, scientific, significant
 from tfarm.report.figures import Picture
 from tfarm.report.loci import Loci, crossing_table, draw_loci, gap_table, loci, loci_data
-from tfarm.report.loop_laws import DEFAULT, SIGN, best, is_weak, rate_unit
+from tfarm.report.loop_laws import SIGN
 from tfarm.report.sections import Section
 from tfarm.report.tables import Column, Table, number_column, text_column
+from tfarm.spectrum.scales import default_gains, rate_unit
 
 BEYOND = (0.9, 1.0, 1.01, 1.1, 1.5)  # values of K2 whose exact poles are listed
 RANGE_OF_K2 = (-1.0, 1.6)
@@ -40,7 +41,7 @@ BACKWARDS = (
 
 def locus_section(arm: Arm) -> Section:
     """Where the poles go as each gain grows, and what K2 = 1 and beyond does."""
-    held = locus_law(arm)
+    held = default_gains(arm)
     words, blocks = [], list[Picture | Table]()
     ranges = {"K1": (0.0, 2.0 * rate_unit(arm)), "K2": RANGE_OF_K2}
     for name, (start, stop) in ranges.items():
@@ -55,14 +56,6 @@ def locus_section(arm: Arm) -> Section:
             blocks.append(crossing_table(data, f"locus-{name}-crossings"))
     blocks.append(beyond_table(arm, held))
     return Section(anchor="locus", title="Where do the poles go?", words=[*words, SIGN], blocks=blocks)
-
-
-def locus_law(arm: Arm) -> HubFeedback:
-    """The default gains, with a K1 that can be seen if the default one is next to nothing for this arm."""
-    if not is_weak(arm, DEFAULT):
-        return DEFAULT
-    found = best(arm)
-    return replace(DEFAULT, K1=found.law.K1 if found else 0.5 * rate_unit(arm))
 
 
 def _locus_words(data: Loci) -> str:

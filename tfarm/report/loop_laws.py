@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 
-import tfarm
 from tfarm.arm import Arm, HubFeedback
 from tfarm.errors import ConvergenceError
 from tfarm.loop.design import Design, design
 from tfarm.loop.margins import Margins, margins
 from tfarm.report.digits import plain
+from tfarm.spectrum.scales import default_gains
 
-DEFAULT = HubFeedback(K1=0.3, K2=0.3)
 MODES = 2  # flexible modes in the band of the damping that is drawn and designed for, as `tfarm design` has it
-WEAK = 1e-3  # a K1 below this share of J w1 hardly moves a pole
 SIGN = (
     "Law: u = −K1 dθ/dt − K2 E I φ′(0) + r. Sign of K2: the strain gauge reads E I φ′(0), positive where it "
     "accelerates the hub; a torque u at rest gives −(J − I_h)/J u. With the gauge reversed every K2 changes its sign."
@@ -22,7 +20,8 @@ SIGN = (
 
 
 TYPESET = {
-    "theta_t^2": "(dθ/dt)²", "theta_t": "dθ/dt", "phi_xt(0)": "∂φ′(0)/∂t", "L(iw)": "L(iω)", " = -": " = −",
+    "theta_t^2": "(dθ/dt)²", "theta_t": "dθ/dt", "phi_xt(0)": "∂φ′(0)/∂t", "L(iw)": "L(iω)",
+    "J w1": "J ω₁", " = -": " = −",
 }  # fmt: skip
 
 
@@ -62,13 +61,6 @@ def why_no_loop(arm: Arm) -> str:
     )
 
 
-def rate_unit(arm: Arm) -> float:
-    """J w1 [N m s/rad], in which a K1 is neither small nor large; the hub's and the link's inertia where J is held."""
-    first = float(tfarm.modes(arm, count=1).natural_frequency[-1])
-    link = arm.link.rhoA * arm.link.length**3 / 3
-    return first * (arm.total_inertia if arm.has_rigid_mode else arm.hub.inertia + link)
-
-
 @lru_cache(maxsize=16)
 def best(arm: Arm) -> Design | None:
     """What `tfarm design ARM` finds; None where no gains within its bounds are stable."""
@@ -87,10 +79,5 @@ def margins_of(arm: Arm, law: HubFeedback) -> Margins:
 def laws(arm: Arm) -> tuple[NamedLaw, ...]:
     """The default gains, and the best ones if there are any."""
     found = best(arm)
-    default = NamedLaw("default gains", "default", DEFAULT)
+    default = NamedLaw("default gains", "default", default_gains(arm))
     return (default,) if found is None else (default, NamedLaw("best damping", "best", found.law))
-
-
-def is_weak(arm: Arm, law: HubFeedback) -> bool:
-    """Whether K1 is too small for this arm to be seen in a picture."""
-    return bool(WEAK * rate_unit(arm) > law.K1)

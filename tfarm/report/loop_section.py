@@ -10,17 +10,14 @@ from tfarm.arm import Arm
 from tfarm.loop.stability import stability
 from tfarm.report.digits import plain, significant
 from tfarm.report.figures import Picture
-from tfarm.report.locus_section import locus_law
 from tfarm.report.loop_laws import (
-    DEFAULT,
     MODES,
     SIGN,
     NamedLaw,
     best,
-    is_weak,
     laws,
     margins_of,
-    rate_unit,
+    typeset,
     why_no_loop,
 )
 from tfarm.report.map import GainMap, gain_map, map_data
@@ -28,6 +25,7 @@ from tfarm.report.map_picture import draw_map
 from tfarm.report.margins_table import margin_table, verdict_facts, verdict_words, window_table
 from tfarm.report.nyquist import Nyquist, count_table, curve_data, draw_nyquist, nyquist
 from tfarm.report.sections import Section
+from tfarm.spectrum.scales import default_gains, default_words, rate_unit
 
 UNSTABLE_K2 = 1.5  # of the law whose encirclements are counted for comparison
 
@@ -90,9 +88,8 @@ def map_section(arm: Arm) -> Section:
 
 def _answer(arm: Arm) -> str:
     """The windows of K1 and K2 through the default gains, in words."""
-    found = margins_of(arm, DEFAULT)
-    gains = f"K1 = {plain(DEFAULT.K1)} N m s/rad and K2 = {plain(DEFAULT.K2)}"
-    start = f"With the default gains {gains} the loop is {found.stability.verdict}"
+    found = margins_of(arm, default_gains(arm))
+    start = f"With the default gains {typeset(default_words(arm))} the loop is {found.stability.verdict}"
     K1, K2 = (found.windows[name].around for name in ("K1", "K2"))
     if K1 is None or K2 is None:
         return f"{start}; the picture shows which gains are stable."
@@ -108,12 +105,11 @@ def _answer(arm: Arm) -> str:
     elif crossing is not None:
         where = ", where every flexible mode crosses at once"
     top = f"{plain(K2[1], 5)}{where}" if K2[1] < high else "without limit"
-    weak = f" For this arm such a K1 is next to nothing: {plain(DEFAULT.K1 / rate_unit(arm), 2)} of J ω₁."
     more = len(found.windows["K2"].all)
     again = f" K2 has {more} separate stable windows at that K1, listed below." if more > 1 else ""
     return (
         f"{start}: at that K1, K2 may go up to {top}, and {down}; at that K2, K1 may go {up}, and must stay above "
-        f"{plain(K1[0], 4)}.{again}{weak if is_weak(arm, DEFAULT) else ''}"
+        f"{plain(K1[0], 4)}.{again}"
     )
 
 
@@ -168,7 +164,7 @@ def nyquist_section(arm: Arm) -> Section:
     """The loop function on a contour that hides nothing."""
     named = laws(arm)
     plots = [nyquist(each, margins_of(arm, each.law).stability) for each in named]
-    wrong = NamedLaw("to compare", "unstable", replace(locus_law(arm), K2=UNSTABLE_K2))
+    wrong = NamedLaw("to compare", "unstable", replace(default_gains(arm), K2=UNSTABLE_K2))
     counted = [*plots, nyquist(wrong, stability(arm, wrong.law))]
     picture = Picture(
         stem="nyquist",

@@ -17,8 +17,9 @@ from tfarm.loop.damping import least_damping
 from tfarm.loop.design import Design
 from tfarm.loop.frequencies import band_of
 from tfarm.loop.regions import Region, between, boundary, region
-from tfarm.report.loop_laws import MODES, NamedLaw, best, laws, rate_unit
+from tfarm.report.loop_laws import MODES, NamedLaw, best, laws
 from tfarm.report.tables import Column, Table, Value, data_column
+from tfarm.spectrum.scales import default_gains, rate_unit
 
 Real = NDArray[np.float64]
 
@@ -117,8 +118,8 @@ def gain_map(arm: Arm) -> GainMap:
 def rate_axis(arm: Arm) -> Axis:
     """K1 from just below 0 to 10 J w1, logarithmic from well below the default gain on."""
     unit = rate_unit(arm)
-    linear = 10.0 ** math.floor(math.log10(min(0.3, 0.01 * unit)))
-    return Axis(-linear, max(10 * unit, 1.0), linear)
+    linear = 10.0 ** math.floor(math.log10(default_gains(arm).K1))
+    return Axis(-linear, 10 * unit, linear)
 
 
 def moment_axis(arm: Arm, x: Axis) -> Axis:

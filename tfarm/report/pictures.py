@@ -11,10 +11,10 @@ from tfarm.dsp.chain import Chain
 from tfarm.report.bode import draw_compared
 from tfarm.report.digits import plain
 from tfarm.report.figures import save
-from tfarm.report.loop_laws import DEFAULT
 from tfarm.report.mode_shapes import draw_shapes, shapes_of
 from tfarm.report.overlay import draw_overlay, overlay
 from tfarm.report.responses import band_of, bode
+from tfarm.spectrum.scales import default_gains
 
 DOTS_PER_INCH = 100
 SHOWN = 4
@@ -41,7 +41,7 @@ def _bode() -> Figure:
 def _gains() -> Figure:
     """The gains that keep the loop stable, continuous and sampled."""
     arm = tfarm.load("sasaki2012-lab")
-    return draw_overlay(overlay(arm, DEFAULT, Chain()))
+    return draw_overlay(overlay(arm, default_gains(arm), Chain()))
 
 
 def _shapes() -> Figure:

@@ -15,7 +15,6 @@ from tfarm.report.loop_laws import SIGN, has_loop, why_no_loop
 from tfarm.report.overlay import draw_overlay, overlay_table
 from tfarm.report.sampled_modes import draw_modes, mode_rows
 from tfarm.report.sampled_words import (
-    GAINS,
     SHORT_SIGN,
     Sampled,
     Window,
@@ -73,7 +72,7 @@ def _overlay_picture(data: Sampled) -> Picture:
             f"{SHORT_SIGN}"
         ),
         alt=(
-            f"Map of K1 and K2: at K1 = {plain(GAINS.K1)} the continuous loop is stable for K2 "
+            f"Map of K1 and K2: at K1 = {plain(data.gains.K1)} the continuous loop is stable for K2 "
             f"{interval(data.continuous_K2)}, the sampled one {interval(data.sampled_K2, cut=False)}."
         ),
         figure=draw_overlay(regions),
@@ -91,9 +90,9 @@ def _periods_table(data: Sampled) -> Table:
         stem="sampled-periods",
         title="Faster or slower sampling",
         caption=(
-            f"The same gains, K1 = {plain(GAINS.K1)} and K2 = {plain(GAINS.K2)}, at other sample periods; the verdicts "
-            f"hold for the modes given ({held}). Growth is that of the pole that decides, per second: negative is "
-            f"stable. {SHORT_SIGN}"
+            f"The same gains, K1 = {plain(data.gains.K1)} and K2 = {plain(data.gains.K2)}, at other sample periods; "
+            f"the verdicts hold for the modes given ({held}). Growth is that of the pole that decides, per second: "
+            f"negative is stable. {SHORT_SIGN}"
         ),
         columns=(
             number_column("period_ms", "period", "ms", ms, [plain(x) for x in ms]),
@@ -159,8 +158,8 @@ def _mode_blocks(data: Sampled) -> list[Picture | Table]:
 
 def _time_blocks(data: Sampled) -> list[Picture | Table]:
     loop = data.analysis.verdict.loop
-    moved = slews(data.arm, GAINS, loop.chain, loop.plant.count)
-    coarse = strip_chart(data.arm, GAINS, moved.with_moment, loop.plant.count)
+    moved = slews(data.arm, data.gains, loop.chain, loop.plant.count)
+    coarse = strip_chart(data.arm, data.gains, moved.with_moment, loop.plant.count)
     return [_slew_picture(moved), _strip_picture(coarse)]
 
 

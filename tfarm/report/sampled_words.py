@@ -14,8 +14,8 @@ from tfarm.loop.windows import gain_windows
 from tfarm.report.digits import plain, scientific, significant
 from tfarm.report.overlay import Overlay, overlay
 from tfarm.report.sections import Fact
+from tfarm.spectrum.scales import default_gains
 
-GAINS = HubFeedback(K1=0.3, K2=0.3)
 PERIODS = (0.001, 0.005, 0.01, 0.02, 0.05)  # s
 DEEPEST = -50.0  # K2: how far down the continuous window is looked for
 DAY = 86400.0  # s
@@ -39,9 +39,14 @@ class Sampled:
         return plain(1e3 * self.analysis.verdict.loop.chain.sampling.period)
 
     @property
+    def gains(self) -> HubFeedback:
+        """The gains that the section is about."""
+        return self.analysis.verdict.loop.gains
+
+    @property
     def sampled_K2(self) -> Window | None:
         """The stable interval of K2 around the gains."""
-        return around(self.analysis.K2_windows, GAINS.K2)
+        return around(self.analysis.K2_windows, self.gains.K2)
 
 
 @dataclass(frozen=True)
@@ -57,22 +62,22 @@ class Row:
 
 def study(arm: Arm) -> Sampled:
     """The numbers of the section.  Raises ParameterError for an arm without a loop."""
-    chain = Chain()
-    analysis = analyse(arm, GAINS, chain)
-    window = gain_windows(stability(arm, HubFeedback(K1=GAINS.K1, K2=GAINS.K2)), "K2").around
-    rows = tuple(_row(arm, period) for period in PERIODS)
-    return Sampled(arm, analysis, window, overlay(arm, GAINS, chain), rows)
+    chain, gains = Chain(), default_gains(arm)
+    analysis = analyse(arm, gains, chain)
+    window = gain_windows(stability(arm, gains), "K2").around
+    rows = tuple(_row(arm, gains, period) for period in PERIODS)
+    return Sampled(arm, analysis, window, overlay(arm, gains, chain), rows)
 
 
-def _row(arm: Arm, period: float) -> Row:
-    verdict = sampled_verdict(arm, GAINS, Chain(sampling=Sampling(period=period)))
+def _row(arm: Arm, gains: HubFeedback, period: float) -> Row:
+    verdict = sampled_verdict(arm, gains, Chain(sampling=Sampling(period=period)))
     windows = {name: stable_windows(verdict.loop, name) for name in ("K1", "K2")}
     return Row(
         period,
         verdict.modes_used,
         verdict.loop.poles.log_spectral_radius,
-        around(windows["K1"], GAINS.K1),
-        around(windows["K2"], GAINS.K2),
+        around(windows["K1"], gains.K1),
+        around(windows["K2"], gains.K2),
     )
 
 
@@ -83,7 +88,7 @@ def short_answer(data: Sampled) -> str:
     """Yes or no, for how many modes, and how fast."""
     verdict = data.analysis.verdict
     growth = verdict.loop.poles.log_spectral_radius
-    gains = f"K1 = {plain(GAINS.K1)} N m s/rad and K2 = {plain(GAINS.K2)}"
+    gains = f"K1 = {plain(data.gains.K1)} N m s/rad and K2 = {plain(data.gains.K2)}"
     modes = verdict.modes_used
     settled = f"with all modes that matter ({modes})" if verdict.is_settled else f"as far as its first {modes} modes go"
     if verdict.is_stable:
@@ -127,7 +132,7 @@ def compared(data: Sampled) -> str:
     sampled = interval(data.sampled_K2, cut=False)
     modes = "" if data.analysis.verdict.is_settled else f" (first {data.analysis.verdict.modes_used} modes)"
     both = f"the continuous loop is stable for K2 {continuous}; the sampled one {sampled}{modes}."
-    told = f"At K1 = {plain(GAINS.K1)} {both}"
+    told = f"At K1 = {plain(data.gains.K1)} {both}"
     if data.sampled_K2 is None:
         return f"{told} Sampling loses what the continuous proof promised."
     low, high = data.sampled_K2
@@ -181,14 +186,14 @@ def headline_facts(data: Sampled) -> tuple[Fact, ...]:
     T, growth = verdict.loop.chain.sampling.period, verdict.loop.poles.log_spectral_radius
     held = "all modes" if verdict.is_settled else f"first {verdict.modes_used} modes"
     answer, word = ("yes", "stable") if verdict.is_stable else ("not strictly", "unstable")
-    K1 = around(analysis.K1_windows, GAINS.K1)
+    K1, at = around(analysis.K1_windows, data.gains.K1), f"at K2 = {plain(data.gains.K2)}"
     delay = f"{'> ' if margin.is_bound else ''}{significant(1e3 * T * margin.samples, 3)}"
     samples = f"{significant(margin.samples, 3)} samples"
     return (
         Fact(label=f"does a {data.ms} ms loop hold?", value=answer, beside=f"{word}, {held}"),
         Fact(label="ln|z| a sample, largest", value=scientific(growth, 3), beside="below 0 is stable"),
         Fact(label="stable K2", value=span(data.sampled_K2), beside=f"continuous: {span(data.continuous_K2)}"),
-        Fact(label="stable K1", value=span(K1), unit="N m s/rad" if K1 else "", beside=f"at K2 = {plain(GAINS.K2)}"),
+        Fact(label="stable K1", value=span(K1), unit="N m s/rad" if K1 else "", beside=at),
         Fact(label="further delay it bears", value=delay, unit="ms", beside=samples),
         Fact(label="damping C that it needs", value=scientific(analysis.required_damping, 2), unit="s"),
     )

@@ -19,8 +19,9 @@ import numpy as np
 import tfarm
 from tfarm.arm import Arm, to_toml
 from tfarm.errors import CertificationError, ConvergenceError
-from tfarm.report.loop_laws import DEFAULT, has_loop
+from tfarm.report.loop_laws import has_loop
 from tfarm.spectrum import Modes
+from tfarm.spectrum.scales import default_gains
 
 MODES, DIGITS, BOX_DIGITS = 10, 20, 12
 OUTPUTS = ("root_moment", "tip_displacement")
@@ -100,9 +101,10 @@ def boxed(arm: Arm, modes: Modes) -> Iterator[Boxed]:
         except (CertificationError, ConvergenceError) as error:
             yield Boxed(what=what, failure=str(error))
     if has_loop(arm):
-        what = f"closed loop, K1 = {DEFAULT.K1:g}, K2 = {DEFAULT.K2:g}"
+        law = default_gains(arm)
+        what = f"closed loop, K1 = {law.K1:g}, K2 = {law.K2:g}"
         try:
-            poles = tfarm.closed_loop_poles(arm, DEFAULT, MODES)
+            poles = tfarm.closed_loop_poles(arm, law, MODES)
             poles.certify(BOX_DIGITS)
             yield Boxed(what=what, count=poles.count, box=_four(poles.box))
         except (CertificationError, ConvergenceError) as error:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tfarm.arm import Arm, HubFeedback
 from tfarm.dsp import Chain, Simulation, Simulator
 from tfarm.report.time_responses import BETWEEN
+from tfarm.spectrum.scales import default_gains
 from tfarm.tuner import Learning, Plan, Tuning, compare, conditions, tune
 from tfarm.tuner.comparison import Row
 from tfarm.tuner.guard import GuardKind
@@ -139,7 +140,7 @@ def _simulated(tuning: Tuning, chain: Chain) -> dict[str, Simulation]:
 
 
 def _curves(arm: Arm, key: str, title: str, rule: Rule, guard: GuardKind) -> Curves:
-    base = Plan(learning=Learning(rule=rule), guard=guard)
+    base = Plan(learning=Learning(rule=rule), guard=guard, K1=default_gains(arm).K1)
     plans = plans_of("curves", base, SEEDS)
     finished = run_study(arm, plans, workers=WORKERS)
     costs = np.full((SEEDS, base.trials), np.inf)
@@ -149,7 +150,8 @@ def _curves(arm: Arm, key: str, title: str, rule: Rule, guard: GuardKind) -> Cur
 
 
 def _cost_map(arm: Arm) -> CostMap:
-    finished = run_study(arm, plans_of("map", Plan(trials=MAP_TRIALS), MAP_SEEDS), workers=WORKERS)
+    base = Plan(trials=MAP_TRIALS, K1=default_gains(arm).K1)
+    finished = run_study(arm, plans_of("map", base, MAP_SEEDS), workers=WORKERS)
     groups = [finished[i : i + MAP_SEEDS] for i in range(0, len(finished), MAP_SEEDS)]
     medians = {
         (group[0].plan.learning.alpha, float(np.asarray(group[0].plan.learning.eta))): float(

@@ -23,6 +23,7 @@ from tfarm.arm.checks import not_negative, number, positive
 from tfarm.dsp import Chain, SampledLoop, Scenario, sampled_loop, scenario
 from tfarm.dsp.results import rms_after
 from tfarm.errors import ParameterError, did_you_mean
+from tfarm.spectrum.scales import default_gains
 from tfarm.tuner import kernel
 from tfarm.tuner.network import Network
 
@@ -185,19 +186,21 @@ def slew_trial(
     arm: Arm,
     chain: Chain | None = None,
     *,
-    K1: float = 0.3,
+    K1: float | None = None,
     cost: Cost | None = None,
     signals: Signals = "vibration",
     duration: float = DURATION,
     count: int = MODES,
     known: Arm | None = None,
 ) -> Trial:
-    """The slew of an arm with `count` flexible modes; `known` is the arm that the controller believes it moves.
+    """The slew of an arm with `count` flexible modes; `known` is the arm that the controller believes it moves,
+    `K1` by default that of `default_gains` for that arm.
 
     Raises ParameterError for an arm that cannot turn, a hub without inertia, and numbers out of range.
     """
     if signals not in ("vibration", "total"):
         raise ParameterError(key="signals", value=signals, remedy=did_you_mean(str(signals), ("vibration", "total")))
+    K1 = default_gains(known or arm).K1 if K1 is None else K1
     rate_gain = number("K1", K1, "the hub rate gain is a finite number of N m s/rad")
     length = positive("duration", duration, "a trial lasts a positive number of seconds")
     chain = with_signals(Chain() if chain is None else chain, signals)

@@ -11,6 +11,7 @@ from tfarm.arm import Arm, HubFeedback
 from tfarm.dsp import Chain, Simulator, scenario
 from tfarm.dsp.results import rms_after, simulation_answer
 from tfarm.errors import ParameterError
+from tfarm.spectrum.scales import default_gains
 from tfarm.tuner.bound import lq_bound
 from tfarm.tuner.comparison import Row
 from tfarm.tuner.constants import BestConstant, best_constant
@@ -91,7 +92,7 @@ def tune(arm: Arm, plan: Plan | None = None, chain: Chain | None = None) -> Tuni
 
     Raises ParameterError for what cannot be, and CertificationError where there is no guard.
     """
-    plan = Plan() if plan is None else plan
+    plan = Plan(K1=default_gains(arm).K1) if plan is None else plan
     network = initial_network(plan.seed, hidden=plan.hidden, scales=plan.scales)
     trial = slew_trial(
         arm, chain, K1=plan.K1, cost=plan.cost, signals=plan.signals, duration=plan.duration, count=plan.count

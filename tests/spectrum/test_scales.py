@@ -1,0 +1,102 @@
+"""The units of gains, by dimensional analysis: an arm of another size and material is the same arm in its own units."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+import tfarm
+from tests.shell import answer, run
+from tfarm import Hub, HubFeedback, Link, Payload, Section
+from tfarm.spectrum.scales import (
+    DIGITS,
+    OF_THE_PAPER,
+    PAPER_GAINS,
+    RATE_SHARE,
+    angle_unit,
+    default_gains,
+    rate_unit,
+    turning_inertia,
+)
+
+STOCKY, LAB = tfarm.load("stocky-steel"), tfarm.load("sasaki2012-lab")
+EPS = 2.0**-52
+
+
+def similar(arm, size, stiffness, density):
+    """The arm with its lengths, moduli and densities multiplied: times grow by size sqrt(density/stiffness)."""
+    link, section = arm.link, arm.link.section
+    section = Section.general(
+        area=section.area * size**2, second_moment=section.second_moment * size**4, shear_factor=link.shear_factor
+    )
+    time, inertia = size * math.sqrt(density / stiffness), density * size**5
+    link = Link(
+        length=link.length * size, density=link.density * density, youngs_modulus=link.youngs_modulus * stiffness,
+        shear_modulus=link.shear_modulus * stiffness, section=section, damping=link.damping * time,
+    )  # fmt: skip
+    payload = Payload(mass=arm.payload.mass * density * size**3, inertia=arm.payload.inertia * inertia)
+    return replace(arm, link=link, hub=Hub(inertia=arm.hub.inertia * inertia), payload=payload), time, inertia
+
+
+@pytest.mark.parametrize("arm", [STOCKY, LAB], ids=lambda arm: arm.name)
+@pytest.mark.parametrize("size", [0.01, 30.0])
+def test_similar_arms_have_the_same_loop(arm, size):
+    """J w1 grows as inertia/time, and the poles of the default loops are one spectrum, but for the rounding of K1."""
+    other, time, inertia = similar(arm, size, 0.3, 5.0)
+    assert rate_unit(other) == pytest.approx(rate_unit(arm) * inertia / time, rel=100 * EPS)
+    assert angle_unit(other) == pytest.approx(angle_unit(arm) * inertia / time**2, rel=100 * EPS)
+    rounding = 10.0 ** (1 - DIGITS)  # of both gains together
+    assert pytest.approx(default_gains(arm).K1 * inertia / time, rel=rounding) == default_gains(other).K1
+    here, there = (tfarm.closed_loop_poles(each, default_gains(each), 3).values for each in (arm, other))
+    assert there * time == pytest.approx(here, rel=rounding)  # none moves by more than its gain does
+
+
+def test_the_papers_arms_keep_the_papers_gains():
+    """The misprinted density too, though its J w1 is twice as large; any other arm has its own."""
+    assert {name for name in tfarm.presets() if name.startswith("sasaki")} == set(OF_THE_PAPER)
+    assert {default_gains(tfarm.load(name)) for name in OF_THE_PAPER} == {PAPER_GAINS}
+    assert float(f"{RATE_SHARE * rate_unit(LAB):.{DIGITS}g}") == PAPER_GAINS.K1  # by the rule for every arm as well
+    renamed = replace(LAB, name="mine", assumptions=())
+    assert default_gains(renamed) == PAPER_GAINS
+    assert default_gains(replace(LAB, hub=Hub(inertia=10.0))).K1 > 1.0
+
+
+def test_parts_that_do_not_turn_are_left_out():
+    """J of an arm whose tip is pinned is that of hub and link; a locked hub leaves the link."""
+    link = LAB.link
+    beam = link.rhoA * link.length**3 / 3 + link.rhoI * link.length
+    held = replace(LAB, payload=Payload(mass=math.inf))
+    assert turning_inertia(held) == pytest.approx(LAB.hub.inertia + beam, rel=8 * EPS)
+    assert turning_inertia(replace(LAB, hub=Hub(inertia=math.inf))) == pytest.approx(beam, rel=8 * EPS)
+    assert turning_inertia(STOCKY) == STOCKY.total_inertia
+
+
+def test_a_hub_without_inertia_has_no_moment_gain(capsys, tmp_path):
+    """A K2 would be an algebraic loop; so every verb answers for such an arm without being told K2 = 0."""
+    pin = replace(LAB, hub=Hub(inertia=0.0), name="pin")
+    assert default_gains(pin).K2 == 0.0
+    file = tmp_path / "pin.toml"
+    file.write_text(tfarm.arm.to_toml(pin), encoding="utf-8")
+    found = answer(capsys, "margins", str(file))
+    assert (found["K1"], found["K2"]) == (default_gains(pin).K1, 0.0)
+    assert tfarm.margins(pin, HubFeedback(K1=found["K1"])).stability.verdict == found["verdict"]
+
+
+VERBS = [
+    ["poles"], ["margins"], ["sampled"], ["simulate", "--duration", "0.05"],
+    ["locus", "--vary", "K1", "--from", "1", "--to", "2", "--points", "3", "--branches", "2"],
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("verb", VERBS, ids=lambda verb: verb[0])
+def test_gains_that_were_not_given_are_stated(capsys, verb):
+    gains = ["--K1", "80", "--K2", "0.2"]
+    _, out, _ = run(capsys, verb[0], "stocky-steel", *verb[1:], *gains[:2])
+    assert "by default K2 = 0.3\n" in out
+    _, out, _ = run(capsys, verb[0], "stocky-steel", *verb[1:], *gains)
+    assert "by default" not in out
+    _, out, _ = run(capsys, verb[0], "stocky-steel", *verb[1:])
+    assert "by default K1 = 77.7 N m s/rad (0.00642 J w1 of this arm) and K2 = 0.3\n" in out
+    found = answer(capsys, verb[0], "stocky-steel", *verb[1:])
+    assert found["default_gains"] == ["K1", "K2"]
+    assert default_gains(STOCKY).K1 == 77.7

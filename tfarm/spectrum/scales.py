@@ -1,0 +1,72 @@
+"""The units of an arm, in which its gains are neither small nor large, and the gains that it has where none are said.
+
+A rate gain K1 is measured in J w1 and an angle gain Kp in J w1^2: J the arm's inertia about the hub, w1 its first
+flexible frequency.  In these units a loop does not know whether the arm is a boom or a needle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+
+from tfarm.arm import Arm, HubFeedback, load
+
+from .table import modes
+
+PAPER_GAINS = HubFeedback(K1=0.3, K2=0.3)  # of the paper's arms
+RATE_SHARE = 6.42e-3  # of J w1: what K1 = 0.3 N m s/rad is on the preset sasaki2012
+DIGITS = 3  # of a default K1, so that it can be read and typed
+OF_THE_PAPER = ("sasaki2012", "sasaki2012-lab", "sasaki2012-as-printed")  # presets
+
+
+def turning_inertia(arm: Arm) -> float:
+    """J [kg m^2], the arm's inertia about the hub, without the parts that are infinite: these do not turn."""
+    finite = [each if np.isfinite(each) else 0.0 for each in (arm.hub.inertia, arm.payload.mass, arm.payload.inertia)]
+    hub, mass, inertia = finite
+    payload = replace(arm.payload, mass=mass, inertia=inertia)
+    return replace(arm, hub=replace(arm.hub, inertia=hub), payload=payload).total_inertia
+
+
+def rate_unit(arm: Arm) -> float:
+    """J w1 [N m s/rad], the unit of K1."""
+    return turning_inertia(arm) * _first(arm)
+
+
+def angle_unit(arm: Arm) -> float:
+    """J w1^2 [N m/rad], the unit of Kp."""
+    return turning_inertia(arm) * _first(arm) ** 2
+
+
+def default_gains(arm: Arm) -> HubFeedback:
+    """The law of an arm for which no gains are given: K1 = 0.00642 J w1 to three digits, K2 = 0.3.
+
+    On the paper's arm that is K1 = 0.3 N m s/rad, and all its presets have that.  A hub without inertia has K2 = 0:
+    more would be an algebraic loop.
+    """
+    if _is_of_the_paper(arm):
+        return PAPER_GAINS
+    K1 = float(f"{RATE_SHARE * rate_unit(arm):.{DIGITS}g}")
+    return HubFeedback(K1=K1, K2=PAPER_GAINS.K2 if arm.hub.inertia else 0.0)
+
+
+def default_words(arm: Arm, names: Iterable[str] = ("K1", "K2")) -> str:
+    """What `default_gains` gives to the gains of these names, and why, in one clause."""
+    law, is_paper = default_gains(arm), _is_of_the_paper(arm)
+    why = "as in the paper" if is_paper else f"{RATE_SHARE:g} J w1 of this arm"
+    words = {"K1": f"K1 = {law.K1:g} N m s/rad ({why})", "K2": f"K2 = {law.K2:g}"}
+    return " and ".join(words[name] for name in names)
+
+
+def _first(arm: Arm) -> float:
+    """w1 [rad/s], the lowest flexible frequency."""
+    return float(modes(arm, 1).natural_frequency[-1])
+
+
+@lru_cache(maxsize=64)
+def _is_of_the_paper(arm: Arm) -> bool:
+    """Whether link, hub and payload are those of one of the paper's presets."""
+    papers = (load(name) for name in OF_THE_PAPER)
+    return any((arm.link, arm.hub, arm.payload) == (each.link, each.hub, each.payload) for each in papers)
