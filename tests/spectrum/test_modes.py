@@ -251,3 +251,13 @@ def test_euler_bernoulli_has_no_shear_energy():
     for theory, without in (("euler-bernoulli", "shear_modulus"), ("rayleigh", "shear_modulus")):
         assert not tfarm.modes(arm, 5, theory=theory).sensitivity[without].any()
     assert coefficients(arm, "shear").a == 0
+
+
+def test_the_root_moment_of_a_light_hub_is_not_rounding():
+    """It tends to -I_h w^2 b of the free pin, in proportion to I_h; at the free pin it is 0."""
+    free = replace(tfarm.load("sasaki2012"), hub=Hub(inertia=0.0))
+    light = replace(free, hub=Hub(inertia=1e-12))
+    modes = tfarm.modes(free, COUNT)
+    assert not modes.modal_moment.any()
+    limit = -(modes.natural_frequency[1:] ** 2) * modes.hub_participation[1:]
+    np.testing.assert_allclose(tfarm.modes(light, COUNT).modal_moment[1:] / 1e-12, limit, rtol=1e-6)

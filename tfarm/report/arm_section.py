@@ -66,15 +66,26 @@ def _other_numbers(arm: Arm) -> Iterator[Fact]:
 
 
 def _picture(arm: Arm) -> Picture:
-    tip = "a payload" if arm.payload.mass or arm.payload.inertia else "nothing"
+    tip = "nothing"
+    if arm.payload.mass or arm.payload.inertia:
+        tip = "a pin" if math.isinf(arm.payload.mass) else "a payload"
     return Picture(
         stem="arm",
         title="The arm, its link to scale",
-        caption="The hub turns the link by the torque u (positive anticlockwise). Hub and payload are symbols; the "
-        "link's length and depth are to scale, which shows at a glance whether shear can matter.",
+        caption=f"{_drive(arm)} Hub and payload are symbols; the link's length and depth are to scale, which shows at "
+        "a glance whether shear can matter.",
         alt=f"Side view of the arm: hub at the left, a link {plain(arm.link.length, 6)} m long, {tip} at the tip.",
         figure=draw_arm(arm),
     )
+
+
+def _drive(arm: Arm) -> str:
+    """What moves the arm."""
+    if arm.is_locked:
+        return "The hub is locked: no torque turns it; it is led through the angle θ (positive anticlockwise)."
+    if arm.hub.inertia == 0:
+        return "The torque u (positive anticlockwise) acts on the root of the link itself: the pin has no inertia."
+    return "The hub turns the link by the torque u (positive anticlockwise)."
 
 
 def given_table(arm: Arm) -> Table:

@@ -39,17 +39,19 @@ def bode_section(arm: Arm, output: str) -> Section:
         figure=draw_bode(data),
         data=response_table(data, f"{anchor}-data"),
     )
+    if not data.poles.size and not data.zeros.size:
+        return Section(anchor=anchor, title=title, words=(f"{completeness(data)} There are none.",), blocks=(picture,))
     return Section(anchor=anchor, title=title, blocks=(picture, roots_table(data, f"{anchor}-roots")))
 
 
 def what_is_seen(data: Bode) -> str:
     """The picture in words."""
     low, high = (plain(w, 5) for w in data.band)
-    around = f"{_many(len(data.poles), 'pole')} and {_many(len(data.zeros), 'zero')}"
-    grid = (
-        f"The exact response at {data.omega.size} frequencies from {low} to {high} rad/s, spaced geometrically around "
-        f"its {around}, so that no peak and no dip falls between two of them."
-    )
+    grid = f"The exact response at {data.omega.size} frequencies from {low} to {high} rad/s"
+    if data.poles.size or data.zeros.size:
+        around = f"{_many(len(data.poles), 'pole')} and {_many(len(data.zeros), 'zero')}"
+        grid += f", spaced geometrically around its {around}, so that no peak and no dip falls between two of them"
+    grid += "."
     if data.infinite.size:
         edges = "the top edge" if not data.vanishing.size else "the top edge, or the bottom edge where it is truly zero"
         infinite = "Without damping every resonance is truly infinite: there the curve is broken and ends in an open "
@@ -64,6 +66,9 @@ def what_is_seen(data: Bode) -> str:
 
 def what_it_means(data: Bode) -> str:
     """One sentence on what the picture says about control."""
+    if not data.resonances.size and data.output == "root_moment" and data.arm.hub.inertia == 0:
+        gauge = "−u/(1 + C s)" if data.arm.link.damping else "−u"
+        return f"Nothing resonates here: a free pin passes the torque on to the link; the gauge there reads {gauge}."
     if not data.resonances.size:
         return "Nothing resonates here: no pole that oscillates shows at this output."
     turned = f"{np.ptp(data.phase):.0f} degrees over the band"
@@ -130,10 +135,17 @@ def roots_table(data: Bode, stem: str) -> Table:
 def completeness(data: Bode) -> str:
     """What the list of roots holds, and how far it goes."""
     height = f"0 ≤ Im s < {significant(data.band[1], 6)} rad/s"
-    left, right = data.width
-    width = "" if math.isinf(left) else f", {plain(left, 5)} < Re s < {plain(right, 5)} 1/s"
-    known = "counted" if math.isinf(left) else "confirmed by the winding number around the box"
-    return f"All poles and zeros that this output shows in {height}{width}, {known}; rigid-body poles at s = 0 apart."
+    widths = [_width(each) for each in (data.pole_width, data.zero_width)]
+    width = "" if not any(widths) else widths[0] if widths[0] == widths[1] else f"poles {widths[0]}, zeros {widths[1]}"
+    known = "confirmed by the winding number around the box" if any(widths) else "counted"
+    box = f"{height}, {width}, {known}" if width else f"{height}, {known}"
+    return f"All poles and zeros that this output shows in {box}; rigid-body poles at s = 0 apart."
+
+
+def _width(box: tuple[float, float]) -> str:
+    """The range of Re s in which roots are complete; empty where it has no end."""
+    left, right = box
+    return "" if math.isinf(left) else f"{plain(left, 5)} < Re s < {plain(right, 5)} 1/s"
 
 
 def _many(count: int, what: str) -> str:

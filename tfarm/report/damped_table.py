@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
-from tfarm.report.digits import aligned
-from tfarm.report.tables import Column, Table, number_column
+import numpy as np
+
+from tfarm.report.digits import aligned, plain, significant
+from tfarm.report.tables import Column, Table, number_column, text_column
 from tfarm.spectrum import DampedModes, Modes, damped_modes
 
 DAMPED = (
-    "Eigenvalues of the arm with its own damping, C = {C:g} s, each continued from the undamped mode of its number. "
-    "All {count} eigenvalues with {left} < Re s < {right} 1/s and |Im s| < {top} rad/s are listed (conjugates "
-    "counted{rigid}): each is enclosed in a disc of 12 digits that holds exactly one, and the argument principle in "
-    "ball arithmetic counts those in the box. Beyond any such box there are more: shear is undamped in this model, so "
-    "lightly damped modes exist at ever higher frequency, and the slow real eigenvalues of overdamped bending modes "
-    "accumulate at -1/C = {limit} 1/s."
+    "Eigenvalues of the arm with its own damping, C = {C} s, each continued from the undamped mode of its number. "
+    "Each is enclosed in a disc of 12 digits that holds exactly one. All {count} eigenvalues with {left} < Re s < "
+    "{right} 1/s and |Im s| < {top} rad/s are listed (conjugates counted{rigid}): the argument principle in ball "
+    "arithmetic counts those in this box. {outside}Beyond any such box there are more: shear is undamped in this "
+    "model, so lightly damped modes exist at ever higher frequency, and the slow real eigenvalues of overdamped "
+    "bending modes accumulate at −1/C = {limit} 1/s."
 )
+OUTSIDE = (
+    "Rows that are “outside” lie, with one eigenvalue or both, beyond the box: beside them others may exist that are "
+    "not listed. "
+)
+
+
+SMALL = 1e-3  # a damping ratio below this has less than three digits in five decimals
 
 
 def damped_table(modes: Modes) -> Table:
@@ -24,15 +33,20 @@ def damped_table(modes: Modes) -> Table:
     edges = {"left": box.re_min, "right": box.re_max, "top": box.im_max, "limit": -1 / C}
     rigid = ", with 0 twice" if modes.arm.has_rigid_mode else ""
     words = {name: _rounded(value) for name, value in edges.items()}
+    inside = np.all(box.holds(damped.eigenvalues), axis=1)
+    where = ["in the box" if each else "outside" for each in inside]
     return Table(
         stem="damped-modes",
         title="Damped modes",
-        caption=DAMPED.format(C=C, count=damped.count, rigid=rigid, **words),
+        caption=DAMPED.format(
+            C=plain(C), count=damped.count, rigid=rigid, outside="" if inside.all() else OUTSIDE, **words
+        ),
         columns=(
             Column(key="index", title="mode", values=damped.index.tolist(), cells=[str(i) for i in damped.index]),
             number_column("eigenvalue_re", "Re s", "1/s", one.real, aligned(one.real, 7, least=6)),
             _imaginary(damped),
             number_column("damping_ratio", "damping ratio", "-", damped.damping_ratio, _ratios(damped)),
+            text_column("complete", "list complete", where),
         ),
     )
 
@@ -40,17 +54,21 @@ def damped_table(modes: Modes) -> Table:
 def _imaginary(damped: DampedModes) -> Column:
     """Im s, or the second of two real eigenvalues."""
     one, two = damped.eigenvalues.T
-    plain = aligned(one.imag, 8, least=7)
+    rising = aligned(one.imag, 8, least=7)
     cells = [
-        f"overdamped, and {two[n].real:.7g}" if overdamped else plain[n]
+        f"overdamped, and {significant(float(two[n].real), 7)}" if overdamped else rising[n]
         for n, overdamped in enumerate(damped.is_overdamped)
     ]
     return Column(key="eigenvalue_im", title="Im s", unit="rad/s", values=one.imag.tolist(), cells=cells)
 
 
 def _ratios(damped: DampedModes) -> list[str]:
-    return [f"{ratio:.5f}" if index else "0" for ratio, index in zip(damped.damping_ratio, damped.index, strict=True)]
+    """Five decimals; a ratio that would lose its digits there has four digits of its own."""
+    return [
+        "0" if not index else f"{ratio:.5f}" if ratio >= SMALL else significant(float(ratio), 4)
+        for ratio, index in zip(damped.damping_ratio, damped.index, strict=True)
+    ]
 
 
 def _rounded(value: float) -> str:
-    return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
+    return plain(round(value)) if abs(value) >= 100 else plain(value, 3)

@@ -8,6 +8,8 @@ from collections.abc import Iterable
 
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 SMALLEST, LARGEST = 1e-3, 1e7  # outside, powers of ten read better
+SPARE = 2  # digits beyond its own that the largest number of a column may have for the sake of the smallest
+MOST_DECIMALS = 7
 
 
 def significant(x: float, digits: int) -> str:
@@ -32,7 +34,8 @@ def plain(x: float, digits: int = 10) -> str:
 def aligned(values: Iterable[float], digits: int, *, least: int = 6) -> tuple[str, ...]:
     """A column with one number of decimals: the largest has `digits` digits, the smallest at least `least`.
 
-    Where that would take more than twelve digits the column has powers of ten instead.
+    Where a small value asks for more decimals than the largest one has a use for, each has `digits` digits of its own,
+    as a power of ten if that reads better.
     """
     column = [float(x) for x in values]
     finite = [abs(x) for x in column if x != 0 and math.isfinite(x)]
@@ -40,8 +43,8 @@ def aligned(values: Iterable[float], digits: int, *, least: int = 6) -> tuple[st
         return tuple(_special(x) for x in column)
     top, bottom = _exponent(max(finite), digits), _exponent(min(finite), least)
     decimals = max(0, digits - 1 - top, least - 1 - bottom)
-    if top + 1 + decimals > 12 or decimals > 9 or top > 7:
-        return tuple(_special(x) if x == 0 or math.isinf(x) else scientific(x, digits) for x in column)
+    if top + 1 + decimals > digits + SPARE or decimals > MOST_DECIMALS or top > 7:
+        return tuple(significant(x, digits) for x in column)
     return tuple(_special(x) if x == 0 or math.isinf(x) else _signed(f"{x:.{decimals}f}") for x in column)
 
 

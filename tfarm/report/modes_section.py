@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 import tfarm
 from tfarm.arm import Arm
+from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.exact.coefficients import Theory
 from tfarm.report.damped_table import damped_table
 from tfarm.report.digits import aligned, fixed, significant
@@ -31,9 +33,12 @@ COMPLETE = (
 )
 MODAL_TABLE = (
     "Natural frequencies, hub participation b (hub angle of the mode), root moment of the mode and nodes. "
-    "{rigid}Modes have unit modal mass (1 kg m² of hub inertia counts as 1) and a positive tip displacement: "
-    "b² is how strongly a torque at the hub excites the mode and how well the hub angle sees it. {proof}"
+    "{rigid}Modes have unit modal mass and a positive {tip}: b² is how strongly a torque at the hub excites the mode "
+    "and how well the hub angle sees it{hub}. {proof}"
 )
+LOCKED = "; the locked hub takes part in none"
+FREE_PIN = "; a free pin bears no moment, so that at the root is 0"
+NO_DAMPED_TABLE = "The damped modes of this arm could not be listed with a proof, and are left out: {why}."
 MODE_SHAPES = (
     "Total displacement w(x), each mode scaled to a largest value of one; hub at the left (grey), nodes as "
     "open circles with their distance from the hub in m. A force or a displacement sensor at a node does not "
@@ -62,19 +67,30 @@ def modes_section(arm: Arm) -> Section:
     exact = _flexible(modes)
     theories: dict[str, Real] = {t: _flexible(tfarm.modes(arm, count=MODES, theory=t)) for t in SIMPLER}
     differences: dict[str, Real] = {theory: 100 * (simpler / exact - 1) for theory, simpler in theories.items()}
+    damped, missing = _damped(modes)
     return Section(
         anchor="modes",
         title="Modes",
-        words=(COMPLETE,),
+        words=(COMPLETE, *missing),
         blocks=(
             modal_table(modes),
-            *((damped_table(modes),) if arm.link.damping else ()),
+            *damped,
             _shapes(arm.name, shapes_of(modes, SHAPES)),
             theories_table(exact, theories, differences),
             _differences(arm.name, differences),
             sensitivity_table(modes),
         ),
     )
+
+
+def _damped(modes: Modes) -> tuple[tuple[Table, ...], tuple[str, ...]]:
+    """The table of the damped modes, none at C = 0; or in its place a sentence why there is none."""
+    if not modes.arm.link.damping:
+        return (), ()
+    try:
+        return (damped_table(modes),), ()
+    except (ConvergenceError, CertificationError) as error:
+        return (), (NO_DAMPED_TABLE.format(why=error),)
 
 
 def _flexible(modes: Modes) -> Real:
@@ -84,7 +100,7 @@ def _flexible(modes: Modes) -> Real:
 def modal_table(modes: Modes) -> Table:
     """Frequencies, hub participation, modal moment and nodes."""
     b, moment = modes.hub_participation, modes.modal_moment + 0.0
-    nodes = [", ".join(fixed(node, 4)) or "none" for node in modes.nodes]
+    nodes = [", ".join(places(node, modes.arm.link.length)) or "none" for node in modes.nodes]
     at = [tuple(node.tolist()) for node in modes.nodes]
     rigid = "Row 0 is the arm turning as a rigid body. " if modes.arm.has_rigid_mode else ""
     omega = _frequency("natural_frequency_rad_s", "natural frequency", "rad/s", modes.natural_frequency)
@@ -92,7 +108,12 @@ def modal_table(modes: Modes) -> Table:
     return Table(
         stem="modal-table",
         title="Modal table",
-        caption=MODAL_TABLE.format(rigid=rigid, proof=how_proven(modes, omega.cells, hertz.cells)),
+        caption=MODAL_TABLE.format(
+            rigid=rigid,
+            tip=_positive(modes.arm),
+            hub=LOCKED if modes.arm.is_locked else FREE_PIN if modes.arm.hub.inertia == 0 else "",
+            proof=how_proven(modes, omega.cells, hertz.cells),
+        ),
         columns=(
             _mode_numbers("index", modes.index.tolist()),
             omega,
@@ -102,6 +123,20 @@ def modal_table(modes: Modes) -> Table:
             Column(key="nodes_m", title="nodes", unit="m", values=at, cells=nodes),
         ),
     )
+
+
+def _positive(arm: Arm) -> str:
+    """What is positive in every mode: of the tip's motions the first that it can make."""
+    if math.isfinite(arm.payload.mass):
+        return "tip displacement"
+    return "tip rotation" if math.isfinite(arm.payload.inertia) else "hub angle"
+
+
+def places(nodes: Real, length: float) -> tuple[str, ...]:
+    """Points along the arm [m] to a ten-thousandth of its length; one nearer to the root has two digits of its own."""
+    decimals = max(0, 4 - math.floor(math.log10(length)))
+    near = 10.0 ** (1 - decimals)
+    return tuple(significant(float(x), 2) if x < near else fixed([float(x)], decimals)[0] for x in nodes)
 
 
 def _mode_numbers(key: str, numbers: Sequence[int]) -> Column:

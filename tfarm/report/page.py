@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import re
 import shlex
 from collections.abc import Sequence
@@ -110,6 +111,7 @@ def summary(arm: Arm) -> str:
     """The arm in one sentence."""
     hub = "a locked hub" if arm.is_locked else "a free pin" if arm.hub.inertia == 0 else "a hub"
     tip = "with a payload" if arm.payload.mass or arm.payload.inertia else "without payload"
+    tip = "its tip pinned" if math.isinf(arm.payload.mass) else tip
     damping = "damped" if arm.link.damping else "undamped"
     return f"A flexible link on {hub}, {tip}, {damping}; Timoshenko theory, exact."
 

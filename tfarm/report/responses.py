@@ -37,7 +37,8 @@ class Bode:
     """A frequency response with its poles and zeros.  omega in rad/s, `value` in SI units, `phase` in degrees.
 
     `poles` and `zeros` are those with Im s >= 0 that the output shows (every cancellation made), s = 0 apart, complete
-    up to `band`[1]; the grid holds none of those on the axis.  `rigid` is the response of the rigid arm.
+    up to `band`[1] in the ranges `pole_width` and `zero_width` of Re s [1/s]; the grid holds none of those on the axis.
+    `rigid` is the response of the rigid arm.
     """
 
     arm: Arm
@@ -50,7 +51,8 @@ class Bode:
     rigid: Complex
     peaks: Real  # |G| at the frequency of each pole; inf on the axis
     dips: Real  # and of each zero; 0 on the axis
-    width: tuple[float, float]  # the range of Re s [1/s] in which poles and zeros are complete
+    pole_width: tuple[float, float]
+    zero_width: tuple[float, float]
 
     @property
     def band(self) -> tuple[float, float]:
@@ -123,7 +125,8 @@ def bode(arm: Arm, output: str, band: tuple[float, float]) -> Bode:
         rigid=G.rigid_body / (1j * omega) ** 2 if G.rigid_body else np.full(omega.size, G.static + 0j),
         peaks=_magnitude_at(G, inside_poles, on_axis=math.inf),
         dips=_magnitude_at(G, inside_zeros, on_axis=0.0),
-        width=(max(all_poles.box[0], all_zeros.box[0]), min(all_poles.box[1], all_zeros.box[1])),
+        pole_width=(all_poles.box[0], all_poles.box[1]),
+        zero_width=(all_zeros.box[0], all_zeros.box[1]),
     )
 
 
@@ -134,10 +137,10 @@ def _upper(roots: Complex) -> Complex:
 
 def _no_motion(arm: Arm, output: str, band: tuple[float, float]) -> Bode:
     omega, none, real = np.array(band), np.empty(0, complex), np.empty(0)
-    zero = np.zeros(2, complex)
+    zero, everywhere = np.zeros(2, complex), (-math.inf, math.inf)
     return Bode(
         arm=arm, output=output, omega=omega, value=zero, phase=zero.real, poles=none, zeros=none, rigid=zero,
-        peaks=real, dips=real, width=(-math.inf, math.inf),
+        peaks=real, dips=real, pole_width=everywhere, zero_width=everywhere,
     )  # fmt: skip
 
 

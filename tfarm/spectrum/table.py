@@ -111,7 +111,13 @@ class Modes:
 
     @cached_property
     def modal_moment(self) -> Real:
-        """Root moment E I psi'(0) [N m] of each mode: -I_h w^2 b where the hub is free to turn."""
+        """Root moment E I psi'(0) [N m] of each mode: -I_h w^2 b where the hub is free to turn.
+
+        Of a hub lighter than the link it is taken from there, as the field at the root cancels: 0 for a free pin.
+        """
+        link, inertia = self.arm.link, self.arm.hub.inertia
+        if inertia < link.rhoA * link.length**3 / 3:
+            return -inertia * self.natural_frequency**2 * self.hub_participation + 0.0
         return self.moment(0.0)
 
     @cached_property
