@@ -1,28 +1,187 @@
-"""Writing files so that nobody ever sees half of one."""
+"""Reading and writing files so that nobody ever sees half of one, and nothing but a file is replaced.
+
+A file is written beside its place and renamed.  What a run that was killed left there is removed by the next one:
+each temporary file or folder is locked as long as its writer lives, so a lock that can be had says that nobody writes.
+"""
 
 from __future__ import annotations
 
+import errno
 import os
+import re
+import shutil
+import stat
+import sys
 import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from tfarm.errors import ParameterError
 
+if sys.platform != "win32":
+    import fcntl
+
+PART, FOLDER = ".part", ".writing-"  # how the names of temporary files end, and those of temporary folders begin
+SUFFIX = "[a-z0-9_]{8}"  # what Python's tempfile puts in their middle or at their end
+
+
+def read_file(path: str | os.PathLike[str], most: int, *, key: str, what: str) -> bytes:
+    """The bytes of a regular file of at most so many; a device, a pipe or a folder is refused unopened.
+
+    Raises ParameterError, naming `key`; `what` names the kind of file in the remedy ("a .toml file").
+    """
+    name = os.fspath(path)
+    try:
+        status = os.stat(path)
+        if not stat.S_ISREG(status.st_mode):
+            found = "a folder" if stat.S_ISDIR(status.st_mode) else "no regular file"
+            raise ParameterError(key=key, value=name, remedy=f"is {found}; give {what}")
+        with open(path, "rb") as file:
+            data = file.read(most + 1)
+    except (OSError, ValueError) as error:
+        if isinstance(error, ParameterError):
+            raise
+        remedy = f"cannot be read ({_reason(error)}); check the path and its permissions"
+        raise ParameterError(key=key, value=name, remedy=remedy) from None
+    if len(data) > most:
+        size = max(len(data), status.st_size)
+        raise ParameterError(key="size in bytes", value=size, remedy=f"{what} of at most {most} is read", file=path)
+    return data
+
 
 def write_file(path: Path, content: bytes, *, key: str) -> None:
-    """Write beside the path, then rename.  Raises ParameterError, naming `key`, where that cannot be done."""
-    temporary = ""
+    """Write beside the path, then rename; symbolic links are followed, and a file that is replaced keeps its mode.
+
+    What is no regular file (a device, a pipe, /dev/stdout) is written straight to.  Raises ParameterError, naming
+    `key`, where that cannot be done, and BrokenPipeError where the reader of a pipe has left.
+    """
     try:
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name[:40]}.")
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-        os.chmod(temporary, 0o666 & ~_umask())
-        os.replace(temporary, path)
+        number = _descriptor(path)
+        if number is not None:
+            _write_straight(os.dup(number), content)
+        elif path.exists() and not path.is_file():
+            _write_straight(_opened(path), content)
+        else:
+            _replace(Path(os.path.realpath(path)), content)
+    except BrokenPipeError:
+        raise
     except (OSError, ValueError) as error:
-        if temporary and os.path.exists(temporary):
-            os.unlink(temporary)
-        reason = getattr(error, "strerror", None) or str(error)
-        raise ParameterError(key=key, value=str(path), remedy=f"cannot be written ({reason}); choose another") from None
+        remedy = f"cannot be written ({_reason(error)}); choose another"
+        raise ParameterError(key=key, value=str(path), remedy=remedy) from None
+
+
+@contextmanager
+def temporary_folder(place: Path) -> Iterator[Path]:
+    """A new folder in `place`, gone afterwards with all that is in it; those that killed runs left there go first."""
+    _remove_leftovers(place, re.escape(FOLDER) + SUFFIX)
+    with _temporary(lambda: tempfile.mkdtemp(prefix=FOLDER, dir=place)) as folder:
+        yield folder
+
+
+def _descriptor(path: Path) -> int | None:
+    """The number of the open file that a path such as /dev/stdout or /dev/fd/3 stands for."""
+    name = os.path.abspath(path)
+    found = re.fullmatch(r"/dev/fd/(\d{1,9})|/proc/self/fd/(\d{1,9})", name)
+    if found:
+        return int(found[1] or found[2])
+    return {"/dev/stdout": 1, "/dev/stderr": 2}.get(name)
+
+
+def _opened(path: Path) -> int:
+    """A device or pipe opened for writing; a pipe without a reader, and a folder, raise OSError at once."""
+    handle = os.open(path, os.O_WRONLY | getattr(os, "O_NONBLOCK", 0))
+    os.set_blocking(handle, True)
+    return handle
+
+
+def _write_straight(handle: int, content: bytes) -> None:
+    with os.fdopen(handle, "wb") as file:
+        file.write(content)
+
+
+def _replace(path: Path, content: bytes) -> None:
+    """A regular file, new or in the place of another, whose mode and owner it keeps."""
+    if path.is_symlink():  # of a chain of links without an end
+        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP))
+    old = path.stat() if path.exists() else None
+    if old is not None and not os.access(path, os.W_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+    prefix = f".{path.name[:40]}."
+    _remove_leftovers(path.parent, re.escape(prefix) + SUFFIX + re.escape(PART))
+    with _temporary(lambda: _empty_file(path.parent, prefix)) as temporary:
+        temporary.write_bytes(content)
+        if old is not None and hasattr(os, "chown"):
+            with suppress(OSError):
+                os.chown(temporary, old.st_uid, old.st_gid)
+        temporary.chmod(0o666 & ~_umask() if old is None else stat.S_IMODE(old.st_mode))
+        os.replace(temporary, path)
+
+
+def _empty_file(folder: Path, prefix: str) -> str:
+    handle, name = tempfile.mkstemp(prefix=prefix, suffix=PART, dir=folder)
+    os.close(handle)
+    return name
+
+
+@contextmanager
+def _temporary(make: Callable[[], str]) -> Iterator[Path]:
+    """What `make` made, locked while it is in use, and gone afterwards; made again if another run tidied it away."""
+    while True:
+        path = Path(make())
+        handle = _locked(path, wait=True)
+        try:
+            if path.exists():
+                yield path
+                return
+        finally:
+            _remove(path)
+            if handle is not None:
+                os.close(handle)
+
+
+def _remove_leftovers(folder: Path, pattern: str) -> None:
+    """Remove what is named so and locked by nobody: its writer is gone."""
+    with suppress(PermissionError):  # of a folder that cannot be listed, and may yet be written to
+        for name in filter(re.compile(pattern).fullmatch, os.listdir(folder)):
+            with suppress(OSError):
+                handle = _locked(folder / name, wait=False)
+                _remove(folder / name)
+                if handle is not None:
+                    os.close(handle)
+
+
+def _locked(path: Path, *, wait: bool) -> int | None:
+    """An open file that holds the lock; None where there are no locks or the path is gone.
+
+    Raises BlockingIOError where another process has it and `wait` is false.
+    """
+    if sys.platform == "win32":  # no such locks, but what is open cannot be removed either
+        return None
+    try:
+        handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW)
+    except FileNotFoundError:
+        return None
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(handle)
+        if not wait:
+            raise
+        return None  # a file system without locks
+    return handle
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        with suppress(OSError):
+            path.unlink(missing_ok=True)
+
+
+def _reason(error: Exception) -> str:
+    return getattr(error, "strerror", None) or str(error)
 
 
 def _umask() -> int:

@@ -43,10 +43,10 @@ def refused(tmp_path):
     def refuse(content):
         path = tmp_path / "arm.toml"
         path.write_bytes(content if isinstance(content, bytes) else content.encode("utf-8"))
-        began = time.perf_counter()
+        began = time.process_time()
         with pytest.raises(ParameterError) as caught:
             load(path)
-        assert time.perf_counter() - began < 1.0
+        assert time.process_time() - began < 1.0
         text = str(caught.value)
         assert text.startswith(f"{path}: ")
         assert text.isprintable()
@@ -230,7 +230,7 @@ def test_a_tube_thinner_than_nothing(refused):
 
 CHOKING = {
     "nothing": (b"", "name is missing"),
-    "more than 64 KiB": (b"#" * (MOST_BYTES + 1), "size in bytes = 65537: an arm's file has at most 65536"),
+    "more than 64 KiB": (b"#" * (MOST_BYTES + 1), "size in bytes = 65537: a .toml file of at most 65536 is read"),
     "not UTF-8": (b'name = "\xff"', "byte 8 = b'\\xff': is not UTF-8; save the file as UTF-8"),
     "UTF-16": (EXAMPLE.encode("utf-16"), "is not UTF-8"),
     "zeros": (b"\0" * 1000, "is not TOML"),

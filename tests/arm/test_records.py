@@ -181,3 +181,15 @@ def test_assumptions_are_plain_texts(assumptions):
 
 def test_assumptions_become_a_tuple_of_single_lines():
     assert replace(ARM, assumptions=["two\n  lines", "one"]).assumptions == ("two lines", "one")
+
+
+@pytest.mark.parametrize("name", ["CON", "nul", "com1.old", "LPT9", "aux .x", "\U0001d538" * 80])
+def test_a_name_is_one_on_every_file_system(name):
+    """Windows' devices, and 80 letters of four bytes, longer than the 255 that Linux allows."""
+    with pytest.raises(ParameterError, match="name = "):
+        replace(ARM, name=name)
+
+
+@pytest.mark.parametrize("name", ["console", "null", "com", "lpt10", "é" * 80])
+def test_names_that_only_look_so(name):
+    assert replace(ARM, name=name).name == name

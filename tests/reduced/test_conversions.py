@@ -1,5 +1,6 @@
 """Each conversion is the same function of s (or z): checked by evaluating it."""
 
+import os
 import re
 
 import numpy as np
@@ -89,3 +90,22 @@ def _has_pymor():
     from importlib.util import find_spec
 
     return find_spec("pymor") is not None
+
+
+def test_a_script_that_is_another_files_is_left_alone(reduced, tmp_path):
+    """load_a_b.m is the script of a-b.mat and would be that of a_b.mat; one written by hand is nobody's."""
+    save_mat(reduced, tmp_path / "a-b.mat")
+    save_mat(reduced, tmp_path / "a-b.mat")
+    (tmp_path / "load_c.m").write_text("x = 1;\n")
+    before = {file: file.read_bytes() for file in tmp_path.iterdir()}
+    for name in ("a_b.mat", "c.mat"):
+        with pytest.raises(ParameterError, match="is not its script"):
+            save_mat(reduced, tmp_path / name)
+    assert {file: file.read_bytes() for file in tmp_path.iterdir()} == before
+
+
+def test_a_matlab_file_goes_to_no_pipe(reduced, tmp_path):
+    os.mkfifo(tmp_path / "pipe.mat")
+    with pytest.raises(ParameterError, match="no regular file"):
+        save_mat(reduced, tmp_path / "pipe.mat")
+    assert [file.name for file in tmp_path.iterdir()] == ["pipe.mat"]

@@ -1,6 +1,7 @@
 """A tuner's file: there and back to the last bit, and everything else refused in one line."""
 
 import json
+import os
 
 import numpy as np
 import pytest
@@ -78,6 +79,9 @@ def test_no_tuner_at_all(tmp_path, text):
 
 
 def test_no_file(tmp_path):
-    for path in (tmp_path / "nothing.json", tmp_path):
-        with pytest.raises(ParameterError, match="cannot be read"):
+    """Nothing, a folder, and a pipe that nobody writes to, which is not waited for."""
+    pipe = tmp_path / "pipe.json"
+    os.mkfifo(pipe)
+    for path, why in ((tmp_path / "nothing.json", "cannot be read"), (tmp_path, "a folder"), (pipe, "no regular file")):
+        with pytest.raises(ParameterError, match=why):
             load_tuner(path)

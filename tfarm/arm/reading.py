@@ -7,15 +7,14 @@ from __future__ import annotations
 
 import os
 import re
-import stat
 import tomllib
 from functools import cache
 from importlib.resources import files
-from pathlib import Path
 from typing import Any
 
 from tfarm.arm.records import Arm
 from tfarm.errors import ParameterError, did_you_mean
+from tfarm.files import read_file
 
 PRESETS = files("tfarm.arm") / "presets"
 MOST_BYTES = 64 * 1024
@@ -68,22 +67,7 @@ def _looks_like_a_path(name: str) -> bool:
 
 
 def _read(path: str) -> bytes:
-    """The bytes of a regular file of at most 64 KiB; a device, pipe or folder is refused unopened."""
-    try:
-        status = Path(path).stat()
-        if not stat.S_ISREG(status.st_mode):
-            what = "a folder" if stat.S_ISDIR(status.st_mode) else "no regular file"
-            raise ParameterError(key="arm", value=path, remedy=f"is {what}; give a .toml file")
-        with open(path, "rb") as file:
-            data = file.read(MOST_BYTES + 1)
-    except OSError as error:
-        remedy = f"cannot be read ({error.strerror or error}); check the path and its permissions"
-        raise ParameterError(key="arm", value=path, remedy=remedy) from None
-    if len(data) > MOST_BYTES:
-        size = max(len(data), status.st_size)
-        remedy = f"an arm's file has at most {MOST_BYTES}"
-        raise ParameterError(key="size in bytes", value=size, remedy=remedy, file=path)
-    return data
+    return read_file(path, MOST_BYTES, key="arm", what="a .toml file")
 
 
 def _arm_of(data: bytes, file: str) -> Arm:

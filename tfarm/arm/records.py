@@ -199,13 +199,21 @@ def _poissons_ratio(value: object) -> float:
     return nu
 
 
+MOST_BYTES = 200  # of a name in UTF-8: file systems stop at 255, and a temporary file's name is longer than its own
+DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in "0123456789¹²³")}
+
+
 def _name(name: object) -> str:
-    """The name, which is also the name of the arm's folder of reports."""
+    """The name, which is also the name of the arm's folder of reports, on every file system."""
     remedy = 'a name has 1 to 80 characters, begins with a letter or digit and has no / \\ : * ? " < > |'
     if not isinstance(name, str) or not 1 <= len(name) <= 80 or not name.isprintable():
         raise ParameterError(key="name", value=name, remedy=remedy)
     if not name[0].isalnum() or name[-1] in " ." or set(name) & set('/\\:*?"<>|'):
         raise ParameterError(key="name", value=name, remedy=remedy)
+    if len(name.encode()) > MOST_BYTES:
+        raise ParameterError(key="name", value=name, remedy=f"{len(name.encode())} bytes; at most {MOST_BYTES}")
+    if name.partition(".")[0].rstrip().casefold() in DEVICES:
+        raise ParameterError(key="name", value=name, remedy="is a device to Windows; give the arm another name")
     return name
 
 

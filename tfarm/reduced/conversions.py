@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 import math
+import os
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     import control
 
 MAT_HEADER = b"MATLAB 5.0 MAT-file, written by tfarm"  # SciPy's own has the date in it: same inputs, same bytes
+WRITTEN_BY = ": written by tfarm."  # ends the first line of every script
 POINTS = 1000
 
 
@@ -84,16 +86,39 @@ def save_mat(reduced: ReducedModel, path: Path, *, key: str = "path") -> tuple[P
     """Write a MATLAB file and, beside it, the script that makes of it `sys` (ss) and `exact` (frd).
 
     The file holds A, B, C, D, all names, the exact response over the band, and the worst error.  Returns both paths.
-    Raises ParameterError, naming `key`, where they cannot be written.
+    Raises ParameterError, naming `key`, where they cannot be written, or a script of that name is another file's.
     """
     path = Path(path)
+    if os.path.exists(path) and not os.path.isfile(path):
+        raise ParameterError(key=key, value=str(path), remedy="is no regular file, and a script stands beside it")
     path = path if path.suffix == ".mat" else path.with_name(path.name + ".mat")
     script = path.with_name(f"load_{re.sub(r'[^A-Za-z0-9_]', '_', path.stem)}.m")
+    _must_be_ours(script, path, key)
     content = io.BytesIO()
     scipy.io.savemat(content, _contents(reduced), oned_as="row")  # type: ignore[arg-type]
     write_file(script, _script(reduced, path).encode(), key=key)
     write_file(path, MAT_HEADER.ljust(116) + content.getvalue()[116:], key=key)
     return path, script
+
+
+def _must_be_ours(script: Path, path: Path, key: str) -> None:
+    """Refuse to replace a script that was not written here for the same MATLAB file."""
+    if not os.path.exists(script):
+        return
+    try:
+        text = script.read_text(encoding="utf-8") if os.path.isfile(script) else ""
+    except (OSError, UnicodeDecodeError):
+        text = ""
+    first, _, rest = text.partition("\n")
+    if not (first.endswith(WRITTEN_BY) and _loads(path) in rest):
+        remedy = f"{script.name} beside it is not its script and would be replaced; choose another name"
+        raise ParameterError(key=key, value=str(path), remedy=remedy)
+
+
+def _loads(path: Path) -> str:
+    """The line of the script that names its file."""
+    file = path.name.replace("'", "''")
+    return f"data = load(fullfile(here, '{file}'));"
 
 
 def _contents(reduced: ReducedModel) -> dict[str, Any]:
@@ -119,13 +144,13 @@ def _contents(reduced: ReducedModel) -> dict[str, Any]:
 
 
 def _script(reduced: ReducedModel, path: Path) -> str:
-    file, name = (text.replace("'", "''") for text in (path.name, reduced.name))
+    name = reduced.name.replace("'", "''")
     low, high = reduced.band
-    return f"""% {reduced.name}: written by tfarm.
+    return f"""% {reduced.name}{WRITTEN_BY}
 % sys:   the reduced model (ss), worst |dG| / (|G| + |w dG/dw|) {reduced.worst_error:.3g} over {low:g} to {high:g} rad/s
 % exact: the exact frequency response (frd) over that band
 here = fileparts(mfilename('fullpath'));
-data = load(fullfile(here, '{file}'));
+{_loads(path)}
 sys = ss(data.A, data.B, data.C, data.D, ...
     'InputName', data.input_name, 'OutputName', data.output_names, 'StateName', data.state_names);
 exact = frd(data.response, data.omega, ...

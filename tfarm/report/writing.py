@@ -8,9 +8,7 @@ from __future__ import annotations
 
 import errno
 import os
-import shutil
 import sys
-import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager, suppress
@@ -21,6 +19,7 @@ from pathlib import Path
 
 from tfarm.arm import Arm, to_toml
 from tfarm.errors import ParameterError, TfarmError, did_you_mean
+from tfarm.files import temporary_folder
 from tfarm.report.arm_section import arm_section
 from tfarm.report.assumptions_section import assumptions_section
 from tfarm.report.bode_section import bode_section
@@ -142,23 +141,18 @@ def _check(arms: Sequence[Arm], only: tuple[str, ...] | None) -> None:
 def _beside(out: Path, names: Sequence[str]) -> Iterator[Path]:
     """A temporary folder in `out`, gone afterwards; what was made for it goes too if the work fails."""
     made: list[Path] = []
+    why = "cannot be written ({}); give a folder that can"
     try:
         _make_folders(out, made)
-        beside = Path(tempfile.mkdtemp(prefix=".writing-", dir=out))
-        made.append(beside)
-        for name in names:
-            _make_folders(out / name, made)
+        with temporary_folder(out) as beside:
+            for name in names:
+                _make_folders(out / name, made)
+            why = "could not be written to ({}); free some space, or give another folder"
+            yield beside
     except OSError as error:
-        _remove(made)
-        remedy = f"cannot be written ({error.strerror or error}); give a folder that can"
-        raise ParameterError(key="out", value=str(out), remedy=remedy) from None
-    try:
-        yield beside
-    except OSError as error:
-        remedy = f"could not be written to ({error.strerror or error}); free some space, or give another folder"
+        remedy = why.format(error.strerror or error)
         raise ParameterError(key="out", value=str(out), remedy=remedy) from None
     finally:
-        shutil.rmtree(beside, ignore_errors=True)
         _remove(made)
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from tfarm.errors import MISSING, ParameterError, TfarmError
-from tfarm.files import write_file
+from tfarm.files import read_file, write_file
 from tfarm.tuner.controller import TunedGain
 from tfarm.tuner.guard import GuardKind
 from tfarm.tuner.network import MOST_HIDDEN, Network
@@ -111,16 +111,7 @@ def save(tuner: SavedTuner, path: Path) -> None:
 
 def load_tuner(path: str | os.PathLike[str]) -> SavedTuner:
     """The tuner of a file.  Raises ParameterError, in one line, for whatever is wrong with it."""
-    try:
-        with open(path, "rb") as file:
-            text = file.read(LARGEST + 1)
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise ParameterError(key="controller", value=os.fspath(path), remedy=f"cannot be read ({reason})") from None
-    if len(text) > LARGEST:
-        raise ParameterError(
-            key="controller", value=os.fspath(path), remedy=f"larger than {LARGEST} bytes: no tuner's file"
-        )
+    text = read_file(path, LARGEST, key="controller", what="a tuner's file")
     try:
         return TunerFile.model_validate_json(text).build()
     except ValidationError as error:

@@ -24,7 +24,7 @@ from tfarm.arm import Arm
 from tfarm.arm.writing import to_toml
 from tfarm.dsp import Chain
 from tfarm.errors import ParameterError
-from tfarm.files import write_file
+from tfarm.files import read_file, write_file
 from tfarm.tuner.constants import BestConstant, best_constant
 from tfarm.tuner.guard import Guard, find_guard
 from tfarm.tuner.network import initial_network
@@ -46,6 +46,7 @@ RULES = (
     ("plain", "online", "one-step"),
     ("clipped", "online", "whole"),
 )
+LARGEST = 1_000_000_000  # bytes of a file of results; a line has a few thousand
 BEGINNING = b'{"key": "'  # of every line that is kept
 
 
@@ -148,10 +149,7 @@ def _resumed(keep: Path | None) -> dict[str, Any]:
     """What an earlier run kept; a last line that was cut short is taken off the file."""
     if keep is None or not keep.exists():
         return {}
-    try:
-        content = keep.read_bytes()
-    except OSError as error:
-        raise ParameterError(key="--keep", value=str(keep), remedy=f"cannot be read ({error.strerror})") from None
+    content = read_file(keep, LARGEST, key="--keep", what="the file of a study")
     complete, _, cut = content.rpartition(b"\n")
     lines, known = complete.splitlines(), {}
     for i, line in enumerate([*lines, cut] if not BEGINNING.startswith(cut[: len(BEGINNING)]) else lines):
