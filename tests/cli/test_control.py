@@ -134,3 +134,11 @@ def test_numbers_are_finite(capsys) -> None:
     assert found["verdict"] == "stable"
     assert all(math.isfinite(x) for x in found.values() if isinstance(x, float))
     assert np.isfinite(found["spectral_abscissa"])
+
+
+def test_phases_are_printed_with_their_unit_and_a_lead_is_called_one(capsys) -> None:
+    _, out, _ = run(capsys, "margins", "sasaki2012-lab")
+    assert "phase margin [deg]" in out
+    assert "phase margin -7.90147 deg: lead; not an instability" in out
+    _, out, _ = run(capsys, "margins", "sasaki2012-lab", "--K2", "0")
+    assert "not an instability" not in out

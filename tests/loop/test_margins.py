@@ -15,7 +15,7 @@ from tests.loop.test_stability import exceptional
 from tfarm import Arm, Hub, HubFeedback
 from tfarm.loop.answers import margins_answer
 from tfarm.loop.frequencies import grid
-from tfarm.loop.margins import gain_margin, lowest, margins, unit_crossings
+from tfarm.loop.margins import gain_margin, lowest, margins, rigid_crossings, unit_crossings
 from tfarm.loop.plant import Loop
 from tfarm.loop.stability import stability
 from tfarm.reduced import relaxed_model
@@ -45,7 +45,9 @@ def test_margins_are_those_of_python_control_on_a_fine_grid(arm, law) -> None:
     found = margins(arm, law).in_band
     L = response(arm, law, found.band)
     gains, phases, _, _, at, _ = control.stability_margins(L, returnall=True)
-    assert found.phase == pytest.approx(min(abs(phases), default=math.inf), rel=2e-2)
+    assert found.phase == pytest.approx(control.margin(L)[1], rel=2e-2)
+    assert found.phase_lag == pytest.approx(min(phases[phases > 0], default=math.inf), rel=2e-2)
+    assert found.phase_lead == pytest.approx(min(-phases[phases < 0], default=math.inf), rel=2e-2)
     lag = np.mod(phases, 360) * math.pi / 180
     assert found.delay == pytest.approx(min(lag / at, default=math.inf), rel=2e-2)
     at_rest = -1 / L.frdata[0, 0, 0].real  # the lowest frequency of a held arm is as good as 0, where L is real
@@ -54,6 +56,45 @@ def test_margins_are_those_of_python_control_on_a_fine_grid(arm, law) -> None:
     peak = max(1.0, abs(1 / (1 + L.frdata[0, 0])).max())
     assert found.peak_sensitivity == pytest.approx(peak, rel=5e-2)
     assert found.peak_sensitivity >= peak * (1 - 1e-9)
+
+
+def test_the_lab_arm_bears_75_degrees_of_lag_and_8_of_lead() -> None:
+    """Four crossings of |L| = 1, their phases signed as in python-control of a model of 25 modes."""
+    answer = margins_answer(margins(LAB, LAW))
+    for level in (answer, answer["in_band"]):
+        assert level["phase_margin_deg"] == pytest.approx(-7.901, abs=6e-4)
+        assert level["phase_lag_deg"] == pytest.approx(75.280, abs=6e-4)
+        assert level["phase_lead_deg"] == -level["phase_margin_deg"]
+        places = [level["at_rad_s"][name] for name in ("phase", "phase_lag", "phase_lead")]
+        assert places == pytest.approx([63.2834, 0.47466, 63.2834], rel=1e-5)
+    places = np.array([0.47466, 63.2834, 200.58, 208.15])
+    omega = np.outer(places, 1 + np.linspace(-1e-3, 1e-3, 400)).ravel()
+    rate, moment = relaxed_model(LAB, ["hub_rate", "root_moment"], 25)(1j * omega)
+    L = control.frd(LAW.K1 * rate + LAW.K2 * moment, omega, smooth=False)
+    _, phases, _, _, at, _ = control.stability_margins(L, returnall=True)
+    near = abs(at - places[:, None]).argmin(axis=1)  # not what is interpolated between the four pieces
+    np.testing.assert_allclose(at[near], places, rtol=5e-5)
+    np.testing.assert_allclose(phases[near], [75.280, -7.901, -31.56, -155.10], atol=0.01)
+    assert phases[near][abs(phases[near]).argmin()] == pytest.approx(answer["phase_margin_deg"], rel=1e-4)
+
+
+@pytest.mark.parametrize("K1", [1e-9, 1e-60, 1e-300])
+def test_a_gain_far_too_small_for_the_flexible_arm_has_the_margins_of_the_rigid_one(K1) -> None:
+    """L = K1/(J s): |L| = 1 at K1/J, 90 degrees of lag there, and no lead."""
+    found = margins(LAB, HubFeedback(K1=K1)).in_band
+    assert (found.phase, found.phase_lag, found.phase_lead) == pytest.approx((90.0, 90.0, math.inf))
+    assert found.at["phase"] == pytest.approx(K1 / LAB.total_inertia, rel=1e-6, abs=0)
+    assert found.delay == pytest.approx(math.pi / 2 * LAB.total_inertia / K1, rel=1e-6)
+
+
+@pytest.mark.parametrize("law", [HubFeedback(K1=1e-12, Kp=1e-20, K2=0.4), HubFeedback(K1=1e-9, Kp=1e-8, K2=-2.0)])
+def test_rigid_crossings_are_where_the_rigid_loop_function_has_size_one(law) -> None:
+    J, carried = LAB.total_inertia, LAB.total_inertia - LAB.hub.inertia
+    omega = rigid_crossings(Loop(LAB, law))
+    assert omega.size > 0
+    L = -(law.Kp + 1j * omega * law.K1) / (J * omega**2) - law.K2 * carried / J
+    np.testing.assert_allclose(abs(L), 1.0, rtol=1e-12)
+    np.testing.assert_allclose(Loop(LAB, law).loop_function(1j * omega), L, rtol=1e-6)
 
 
 @pytest.mark.parametrize(("arm", "law"), LOOPS[:4])
@@ -132,8 +173,8 @@ def test_the_disk_margin_is_bounded_by_the_classical_ones(arm, law) -> None:
     """A disk of size alpha holds gains from (2 - alpha)/(2 + alpha) to its inverse and phases of 2 atan(alpha/2)."""
     found = margins(arm, law).in_band
     assert (2 + found.disk) / max(2 - found.disk, 1e-300) <= found.gain[1] * (1 + 1e-9)
-    assert 2 * math.degrees(math.atan(found.disk / 2)) <= found.phase * (1 + 1e-9)
-    assert 1 / found.peak_sensitivity <= 2 * math.sin(math.radians(found.phase) / 2) * (1 + 1e-9)
+    assert 2 * math.degrees(math.atan(found.disk / 2)) <= abs(found.phase) * (1 + 1e-9)
+    assert 1 / found.peak_sensitivity <= 2 * math.sin(math.radians(abs(found.phase)) / 2) * (1 + 1e-9)
     assert found.disk <= 2 / abs(1 - 1 / found.peak_sensitivity)
 
 

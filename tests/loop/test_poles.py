@@ -160,3 +160,26 @@ def test_a_list_that_cannot_be_so_long_is_refused() -> None:
     """Heavy damping: only poles right of -1/C can be listed."""
     with pytest.raises(ConvergenceError, match=r"right of -1/C were found, not 20"):
         closed_loop_poles(with_damping(ARM, 0.05), LAW, 20)
+
+
+@pytest.mark.parametrize("K2", [0.0, -3.0])
+@pytest.mark.parametrize("K1", [1e-7, -1e-12, 1e-60, 1e-300])
+def test_a_gain_far_too_small_for_the_flexible_arm_moves_the_pole_of_the_rigid_one(K1, K2) -> None:
+    """J s^2 + K1 s with J the effective inertia; the others are those at K1 = 0."""
+    J = LAB.hub.inertia + (1 - K2) * (LAB.total_inertia - LAB.hub.inertia)
+    zero, slow, *others = closed_loop_poles(LAB, HubFeedback(K1=K1, K2=K2), 5).values
+    assert zero == 0
+    assert slow == pytest.approx(-K1 / J, rel=1e-9, abs=0)
+    np.testing.assert_allclose(others, closed_loop_poles(LAB, HubFeedback(K2=K2), 5).values[2:], rtol=1e-7)
+
+
+def test_a_spring_far_too_weak_for_the_flexible_arm_swings_the_rigid_one() -> None:
+    J, K1, Kp = LAB.total_inertia, 1e-60, 1e-100
+    pair = np.roots([J, K1 * 1e50, Kp * 1e100]) / 1e50
+    poles = closed_loop_poles(LAB, HubFeedback(K1=K1, Kp=Kp), 4).values
+    assert poles[0] == pytest.approx(pair[pair.imag > 0][0], rel=1e-9, abs=0)
+
+
+def test_a_gain_without_all_its_digits_is_refused() -> None:
+    with pytest.raises(ParameterError, match="0, or at least"):
+        Loop(LAB, HubFeedback(K1=5e-324))

@@ -151,7 +151,7 @@ def test_the_verdict_comes_before_any_margin():
     wrong = NamedLaw("wrong", "wrong", HubFeedback(K1=0.3, K2=1.5))
     table = margin_table([wrong], [margins_of(PURE, wrong.law)], True)
     assert table.columns[2].values[0] == "unstable"
-    assert table.columns[2].values[3:] == [NOTHING] * 6
+    assert table.columns[2].values[3:] == [NOTHING] * 8
 
 
 def test_margins_are_those_of_the_loop_room():
@@ -162,6 +162,8 @@ def test_margins_are_those_of_the_loop_room():
         rows = dict(zip(table.columns[0].values, zip(*(c.values for c in table.columns[2:]), strict=True), strict=True))
         assert rows["delay margin"] == (found.exact_delay, found.in_band.delay, found.in_band.at["delay"])
         assert rows["phase margin"][1] == found.in_band.phase
+        assert rows["phase lag"][1:] == (found.in_band.phase_lag, found.in_band.at["phase_lag"])
+        assert ("is lead; not an instability" in table.caption) == (found.in_band.phase < 0)
         assert rows["gain margin, up"][0] == found.in_band.gain[1]
     assert rows["delay margin"][0] == 0
     assert rows["peak sensitivity"][0] == math.inf

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from pathlib import Path
 from typing import Any
+
+from rich.text import Text
 
 from tfarm.cli.tables import new_table, show
 from tfarm.files import write_file
@@ -58,15 +61,27 @@ def _window(pair: list[float], ends: list[str]) -> str:
     return f"({low}, {high})"
 
 
+LIMITS = {
+    "phase_margin_deg": "phase", "phase_lag_deg": "phase_lag", "phase_lead_deg": "phase_lead",
+    "delay_margin_s": "delay", "disk_margin": "disk", "peak_sensitivity": "peak_sensitivity",
+}  # fmt: skip
+UNITS = {"_deg": " [deg]", "_s": " [s]"}
+
+
 def _print_loop_margins(answer: dict[str, Any]) -> None:
     band = answer["in_band"]
     rows = new_table(("margin", "exact", f"up to {band['band_rad_s']:.6g} rad/s", "at [rad/s]"))
-    names = {"delay_margin_s": "delay", "disk_margin": "disk", "peak_sensitivity": "peak_sensitivity"}
     rows.add_row("gain (factors)", _pair(answer["gain_margin"]), "", "")
-    rows.add_row("phase [deg]", "", f"{band['phase_margin_deg']:.6g}", f"{band['at_rad_s']['phase']:.6g}")
-    for key, at in names.items():
-        rows.add_row(key.replace("_", " "), f"{answer[key]:.6g}", f"{band[key]:.6g}", f"{band['at_rad_s'][at]:.6g}")
+    for key, at in LIMITS.items():
+        unit = next((unit for unit in UNITS if key.endswith(unit)), "")
+        name = key.removesuffix(unit).replace("_", " ") + UNITS.get(unit, "")
+        exact = "" if at.startswith("phase") and answer["delay_margin_s"] == 0 else f"{answer[key]:.6g}"
+        where = "-" if math.isinf(band[key]) else f"{band['at_rad_s'][at]:.6g}"
+        rows.add_row(Text(name), exact, f"{band[key]:.6g}", where)
     show(rows)
+    phase = band["phase_margin_deg"]
+    if phase < 0:
+        print(f"phase margin {phase:.6g} deg: lead; not an instability")
 
 
 def _pair(pair: Any) -> str:

@@ -14,6 +14,7 @@ from .regions import INFINITE, Region
 from .windows import Windows
 
 SIGN = "u = -Kp theta - K1 theta_t - K2 E I phi'(0) + r; a static torque u gives the moment -(J - I_h)/J u"
+PHASES = ("phase", "phase_lag", "phase_lead")
 
 
 def law_answer(law: HubFeedback) -> dict[str, Any]:
@@ -56,10 +57,11 @@ def margins_answer(found: Margins) -> dict[str, Any]:
         "lyapunov": {"proven": proof.proven, "a1_over_a2": proof.a1_over_a2, "reason": proof.reason},
         **{key: value for name, windows in found.windows.items() for key, value in _windows(name, windows).items()},
         "gain_margin": None if limits is None else list(limits.gain),
-        "phase_margin_deg": None if limits is None else limits.phase,
+        **_phases(limits),
         "delay_margin_s": found.exact_delay,
         "disk_margin": found.exact_disk,
         "peak_sensitivity": found.exact_peak,
+        "at_rad_s": None if limits is None else {name: limits.at[name] for name in PHASES},
         "in_band": None if limits is None else _in_band(limits),
     }
 
@@ -78,11 +80,20 @@ def _windows(name: str, windows: Windows) -> dict[str, Any]:
 def _in_band(limits: LoopMargins) -> dict[str, Any]:
     return {
         "band_rad_s": limits.band,
-        "phase_margin_deg": limits.phase,
+        **_phases(limits),
         "delay_margin_s": limits.delay,
         "disk_margin": limits.disk,
         "peak_sensitivity": limits.peak_sensitivity,
         "at_rad_s": limits.at,
+    }
+
+
+def _phases(limits: LoopMargins | None) -> dict[str, float | None]:
+    """The phase margin, signed as python-control does, and the sizes of both sides: lag above 0, lead below."""
+    return {
+        "phase_margin_deg": None if limits is None else limits.phase,
+        "phase_lag_deg": None if limits is None else limits.phase_lag,
+        "phase_lead_deg": None if limits is None else limits.phase_lead,
     }
 
 

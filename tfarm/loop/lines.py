@@ -11,7 +11,7 @@ At C = 0 h vanishes identically along K2: there is no curve, only the line K2 = 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -29,6 +29,7 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
 
 BISECTIONS = 60
+NONE = HubFeedback()
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +53,11 @@ class Line:
         a, b = self.base, self.direction
         return HubFeedback(K1=a.K1 + t * b.K1, K2=a.K2 + t * b.K2, Kp=a.Kp + t * b.Kp)
 
+    @property
+    def length(self) -> float:
+        """The largest gain of the direction."""
+        return max(abs(self.direction.K1), abs(self.direction.K2), abs(self.direction.Kp))
+
 
 def along(name: str, law: HubFeedback) -> Line:
     """The line on which one gain takes every value, t being that value, and the others keep theirs."""
@@ -63,15 +69,19 @@ def crossings(arm: Arm, line: Line, band: float) -> tuple[Crossing, ...]:
     """All crossings of the imaginary axis at frequencies up to `band` [rad/s], ascending in t."""
     k = coefficients(arm)
     omega = np.asarray(grid(arm, band))
+    found, unit = [crossing_at_zero(arm, line)], line.length
+    if unit:
+        way = line.direction
+        line = replace(line, direction=HubFeedback(K1=way.K1 / unit, K2=way.K2 / unit, Kp=way.Kp / unit))
     h = _h(k, line, omega)
     (before,) = np.nonzero(np.sign(h[1:]) * np.sign(h[:-1]) < 0)
-    found = [crossing_at_zero(arm, line)]
     if before.size:
         at = _bisected(k, line, omega[before], omega[before + 1])
         N, P = _parts(k, line, 1j * at)
-        t = -(N * P.conj()).real / abs(P) ** 2
+        with np.errstate(over="ignore"):  # of a direction that is next to nothing: beyond any number
+            t = -(N * P.conj()).real / abs(P) ** 2 / unit
         change = np.where(h[before + 1] < 0, 2, -2)  # Im t = -h/|P|^2
-        found += [Crossing(float(a), float(b), int(c)) for a, b, c in zip(t, at, change, strict=True)]
+        found += [Crossing(float(a), float(b), int(c)) for a, b, c in zip(t, at, change, strict=True) if np.isfinite(a)]
     return tuple(sorted((each for each in found if each is not None), key=lambda each: each.t))
 
 

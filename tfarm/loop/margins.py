@@ -5,6 +5,9 @@ ever higher frequency, so that any delay, however short, destabilises some mode:
 K2 != 0 the disk margin is 0 too and the peak sensitivity infinite; with K2 = 0 the hub is passive, and they are not.
 What the loop has up to a band is given beside them, with the band.
 
+Phase margins bear the sign that python-control gives them: where |L| = 1 the angle from -1 to L, in (-180, 180] deg.
+One above 0 is lag that the loop bears, one below 0 lead; of a stable loop neither sign is an instability.
+
 Disk margin: the largest alpha for which the loop bears every factor (2 + alpha d)/(2 - alpha d), |d| < 1 (Seiler,
 Packard and Gahinet 2020, symmetric disks), which is 2 min |(1 + L)/(1 - L)|.
 """
@@ -14,6 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,13 +26,14 @@ from scipy.optimize import minimize_scalar
 from tfarm.arm import Arm, HubFeedback
 
 from .frequencies import grid
-from .lines import BISECTIONS, Line, crossing_at_zero, crossings
+from .lines import BISECTIONS, NONE, Line, crossing_at_zero, crossings
 from .plant import Loop
+from .poles import SMALLEST
 from .stability import Stability, stability
 from .windows import Windows, gain_windows
 
+Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
-NONE = HubFeedback()
 DIGITS, PLACE_DIGITS = 9, 7  # of a margin, and of the frequency of a dip, which its depth hardly feels
 LOWEST = 6  # local minima on the grid that are refined
 NEAR_POLES = np.geomspace(0.05, 20.0, 12)  # points about a pole, in its distances from the axis
@@ -38,13 +43,16 @@ NEAR_POLES = np.geomspace(0.05, 20.0, 12)  # points about a pole, in its distanc
 class LoopMargins:
     """Margins of L(i w) for 0 < w <= `band` [rad/s]; inf where nothing limits.
 
-    `gain` (lowest, highest factor), `phase` [deg], `delay` [s], `disk` [-], `peak_sensitivity` [-]; `at` are the
-    frequencies [rad/s] where phase, delay, disk margin and peak sensitivity occur.
+    `gain` (lowest, highest factor), `phase` [deg] of least size, above 0 for lag and below for lead, `phase_lag` and
+    `phase_lead` [deg] the sizes of the least of either, `delay` [s], `disk` [-], `peak_sensitivity` [-]; `at` are the
+    frequencies [rad/s] where these occur, 0 where there is none.
     """
 
     band: float
     gain: tuple[float, float]
     phase: float
+    phase_lag: float
+    phase_lead: float
     delay: float
     disk: float
     peak_sensitivity: float
@@ -84,21 +92,25 @@ def loop_margins(verdict: Stability) -> LoopMargins:
     loop, band = verdict.loop, verdict.band
     omega = dense(verdict)
     crossed = unit_crossings(loop, omega)
-    angle = np.angle(-loop.loop_function(1j * crossed))  # 0 where L = -1
-    lag = np.mod(angle, 2 * math.pi)
-    phase, at_phase = _least(np.asarray(abs(angle) * 180 / math.pi), crossed)
-    delay, at_delay = _least(lag / np.where(crossed == 0, 1, crossed), crossed)
+    angle = np.degrees(np.angle(minus_loop(loop, crossed)))  # 0 where L = -1
+    lag, lead = angle > 0, angle < 0
+    least = {
+        "phase": _least(angle, crossed),
+        "phase_lag": _least(angle[lag], crossed[lag]),
+        "phase_lead": _least(-angle[lead], crossed[lead]),
+        "delay": _least(np.radians(np.mod(angle, 360)) / np.where(crossed == 0, 1, crossed), crossed),
+    }
 
     def inverse_sensitivity(w: Real) -> Real:
         drive, fed_back = loop.parts(1j * w)
         return np.asarray(abs(drive + fed_back) / np.maximum(abs(drive), 1e-300))
 
-    disk, at_disk = lowest(lambda w: disk_at(loop, w), omega)
-    least, at_peak = lowest(inverse_sensitivity, omega)
-    at = {"phase": at_phase, "delay": at_delay, "disk": at_disk, "peak_sensitivity": at_peak}
-    places = {name: _held(where, PLACE_DIGITS) for name, where in at.items()}
-    phase, delay, disk, peak = (_held(value, DIGITS) for value in (phase, delay, disk, max(1.0, 1.0 / least)))
-    return LoopMargins(band, gain_margin(loop, band), phase, delay, disk, peak, places)
+    least["disk"] = lowest(lambda w: disk_at(loop, w), omega)
+    dip, at_peak = lowest(inverse_sensitivity, omega)
+    least["peak_sensitivity"] = max(1.0, 1.0 / dip), at_peak
+    values = {name: _held(value, DIGITS) for name, (value, _) in least.items()}
+    places = {name: _held(where, PLACE_DIGITS) for name, (_, where) in least.items()}
+    return LoopMargins(band=band, gain=gain_margin(loop, band), **values, at=places)
 
 
 def _held(value: float, digits: int) -> float:
@@ -121,7 +133,40 @@ def dense(verdict: Stability) -> Real:
     away = np.concatenate([-NEAR_POLES[::-1], [0.0], NEAR_POLES])
     close = (poles.imag[:, None] + abs(poles.real[:, None]) * away).ravel()
     omega = np.asarray(grid(verdict.loop.arm, verdict.band))
-    return np.unique(np.concatenate([omega, close[(close > omega[0]) & (close < omega[-1])]]))
+    slow = np.outer(rigid_crossings(verdict.loop), [0.5, 2.0]).ravel()
+    more = np.concatenate([close[close < omega[-1]], slow[slow < omega[0]]])
+    return np.unique(np.concatenate([omega, more[more > SMALLEST]]))
+
+
+def minus_loop(loop: Loop, omega: Real) -> Complex:
+    """-L(i w); below `SMALLEST` that of the rigid arm, from which the arm's own cannot be told there."""
+    rigid = omega <= SMALLEST
+    value = -loop.loop_function(1j * np.where(rigid, 1.0, omega))
+    if rigid.any():
+        a, b, k = _rigid(loop)
+        w = omega[rigid]
+        value[rigid] = k + b / w / w + 1j * (a / w)
+    return np.asarray(value)
+
+
+def rigid_crossings(loop: Loop) -> Real:
+    """Frequencies [rad/s] where the loop function of the rigid arm has size 1; none of an arm that cannot turn.
+
+    -L = k + b/w^2 + i a/w with a = K1/J, b = Kp/J, k = K2 (J - I_h)/J, so (1 - k^2) w^4 - (2 b k + a^2) w^2 - b^2 = 0.
+    """
+    if not loop.arm.has_rigid_mode or not (loop.law.K1 or loop.law.Kp):
+        return np.empty(0)
+    a, b, k = _rigid(loop)
+    unit = max(abs(a), math.sqrt(abs(b)))
+    a, b = a / unit, b / unit / unit
+    squares = np.roots([1 - k * k, -(2 * b * k + a * a), -b * b])
+    return np.asarray(unit * np.sqrt(squares.real[(squares.imag == 0) & (squares.real > 0)]))
+
+
+def _rigid(loop: Loop) -> tuple[float, float, float]:
+    """K1/J [1/s], Kp/J [1/s^2] and K2 (J - I_h)/J."""
+    J, law = loop.arm.total_inertia, loop.law
+    return law.K1 / J, law.Kp / J, law.K2 * (J - loop.arm.hub.inertia) / J
 
 
 def gain_margin(loop: Loop, band: float) -> tuple[float, float]:
@@ -143,16 +188,18 @@ def unit_crossings(loop: Loop, omega: Real) -> Real:
         return np.empty(0)
 
     def size(w: Real) -> Real:
-        return np.asarray(np.log(abs(loop.loop_function(1j * w))))
+        with np.errstate(divide="ignore"):  # where the hub stays at rest L is 0
+            return np.asarray(np.log(abs(loop.loop_function(1j * w))))
 
     sign = np.sign(size(omega))
     (before,) = np.nonzero(sign[1:] * sign[:-1] < 0)
     low, high, start = omega[before], omega[before + 1], sign[before]
+    slow = rigid_crossings(loop)
     for _ in range(BISECTIONS if before.size else 0):
         middle = (low + high) / 2
         left = np.sign(size(middle)) == start
         low, high = np.where(left, middle, low), np.where(left, high, middle)
-    return np.asarray((low + high) / 2)
+    return np.concatenate([slow[slow <= SMALLEST], (low + high) / 2])
 
 
 def lowest(f: Callable[[Real], Real], omega: Real) -> tuple[float, float]:
@@ -171,7 +218,8 @@ def lowest(f: Callable[[Real], Real], omega: Real) -> tuple[float, float]:
 
 
 def _least(values: Real, where: Real) -> tuple[float, float]:
+    """The value of least size and where; infinity and 0 where there is none."""
     if not values.size:
         return math.inf, 0.0
-    i = int(np.argmin(values))
+    i = int(np.argmin(abs(values)))
     return float(values[i]), float(where[i])

@@ -18,6 +18,7 @@ from tfarm.spectrum.damped import member
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
+SMALLEST_NORMAL = float(np.finfo(float).tiny)
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,7 @@ class Loop:
     """An arm under a law at its hub.
 
     Raises ParameterError where there is no loop: a locked hub cannot turn; a pin without inertia has M(0) = -u at every
-    instant, so that feeding the moment back is an algebraic loop.
+    instant, so that feeding the moment back is an algebraic loop; a gain may be 0, but no denormal number.
     """
 
     arm: Arm
@@ -38,6 +39,11 @@ class Loop:
         if self.arm.hub.inertia == 0 and self.law.K2:
             remedy = "with hub.inertia = 0 the root moment is -u at once: an algebraic loop; use K2 = 0 or some inertia"
             raise ParameterError(key="K2", value=self.law.K2, remedy=remedy)
+        least = SMALLEST_NORMAL * max(1.0, self.arm.total_inertia if self.arm.has_rigid_mode else 1.0)
+        for key in ("K1", "K2", "Kp"):
+            if 0 < abs(getattr(self.law, key)) < least:
+                remedy = f"0, or at least {least:.1e} in size: of less the double has not all its digits"
+                raise ParameterError(key=key, value=getattr(self.law, key), remedy=remedy)
 
     @cached_property
     def k(self) -> Coefficients:

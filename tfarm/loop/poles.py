@@ -6,6 +6,7 @@ function around the box says how many there are (`spectrum.box`); where it disag
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,13 +21,17 @@ from tfarm.spectrum.box import Box, zeros_in_box
 from tfarm.spectrum.damped import CLEAR
 from tfarm.spectrum.enclose import Disc, disjoint, enclosed, proven_count
 
-from .plant import Loop
+from .plant import Loop, effective_inertia
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
 
 ON_AXIS = 1e-12  # a pole whose real part is below this share of its size is on the imaginary axis to working precision
 MOST_POLES = 1000
+SLOW = 1e-6  # of a box's height: poles nearer to 0 are the rigid arm's, and known beforehand
+SLOW_STEPS = 4  # of Newton's method from there
+NEAR_RIGID = 0.01  # of its size: how far it may be from the rigid arm's
+SMALLEST = 1e-140  # 1/s: whose square is still a full double
 GROWTH = (1.0, 1.0041, 1.0093, 1.0171, 1.0311, 1.0573, 1.113)  # heights tried where a zero lies on the edge of a box
 
 
@@ -104,11 +109,11 @@ def closed_loop_poles(arm: Arm, law: HubFeedback, count: int) -> Poles:
 def poles_below(loop: Loop, height: float) -> Poles:
     """All closed-loop poles with |Im s| <= height, and more than about -1.5 heights or -0.8/C in Re s."""
     at_zero = zeros_at_origin(loop.k, loop.gains)
-    starts = starting_points(loop, 1.3 * height)
+    starts, known = starting_points(loop, 1.3 * height), slow_poles(loop, SLOW * height)
     for growth in GROWTH:
         box = box_of(loop, height * growth)
         try:
-            found = zeros_in_box(loop.member.function, box, starts)
+            found = zeros_in_box(loop.member.function, box, starts, known)
         except ConvergenceError:
             if growth == GROWTH[-1]:
                 raise
@@ -132,6 +137,27 @@ def box_of(loop: Loop, height: float) -> Box:
     return Box(-min(left, CLEAR / C) if C else -left, float(right), -height, height)
 
 
+def slow_poles(loop: Loop, below: float) -> Complex:
+    """Poles [1/s] but 0 of the turning arm under small gains, of size up to `below`: zeros of J s^2 + K1 s + Kp.
+
+    J is the effective inertia.  They are corrected on the characteristic function where their squares are full doubles;
+    smaller ones are right as they are, flexibility and damping adding terms of the order |s|/w1 and C |s|.
+    """
+    law = loop.law
+    if not loop.arm.has_rigid_mode or not (law.K1 or law.Kp):
+        return np.empty(0, complex)
+    J = effective_inertia(loop.arm, law.K2)
+    unit = max(abs(law.K1), math.sqrt(abs(law.Kp)) * math.sqrt(abs(J)), 1e-300)  # K1 and sqrt(Kp J) alike
+    with np.errstate(over="ignore"):
+        roots = unit * np.roots([J, law.K1 / unit, law.Kp / unit / unit]).astype(complex)
+    slow = roots[(roots != 0) & (abs(roots) <= below)]
+    exact = slow.copy()
+    for _ in range(SLOW_STEPS):
+        at = loop.member.function(np.where(abs(exact) > SMALLEST, exact, 1.0))
+        exact = exact - np.where(abs(exact) > SMALLEST, at.value / at.slope, 0.0)
+    return exact[abs(exact - slow) <= NEAR_RIGID * abs(slow)]
+
+
 def starting_points(loop: Loop, up_to: float) -> Complex:
     """Where Newton's method starts: the arm's own frequencies, those with the hub locked, and the rigid arm's poles."""
     arm, C = loop.arm, loop.arm.link.damping
@@ -141,7 +167,7 @@ def starting_points(loop: Loop, up_to: float) -> Complex:
     near = (-decay - shift * omega + 1j * omega * np.sqrt(np.maximum(1 - (C * omega / 2) ** 2, 0.0))).ravel()
     J = arm.total_inertia if arm.has_rigid_mode else arm.hub.inertia + 1e-12
     slow = np.roots([J, loop.law.K1, loop.law.Kp]).astype(complex)
-    slow = slow[slow != 0]  # zeros there are divided out
+    slow = slow[abs(slow) > SMALLEST]  # zeros at 0 are divided out
     real = -np.geomspace(up_to / 300, 1.4 * up_to, 25)
     return np.concatenate([near, near.conj(), slow, real, -real])
 

@@ -17,8 +17,10 @@ NOTHING = "none: not stable"
 UNITS = {"K1": "N m s/rad", "K2": "", "Kp": "N m/rad"}
 MARGINS = (
     "Exact: of the infinite-dimensional loop. In the band: as far as the poles were computed{undamped}. Gain margin: "
-    "factors on both gains at once between which the loop stays stable. Phase and delay: what may be lost at the worst "
-    "frequency. Disk margin: gain and phase may be off together by (2 + αδ)/(2 − αδ), |δ| < 1."
+    "factors on both gains at once between which the loop stays stable. Phase margin: where |L| = 1, the angle from −1 "
+    "to L of least size, above 0 for lag that the loop bears and below 0 for lead; lag and lead: the least of each. "
+    "Delay: what may be lost at the worst frequency. Disk margin: gain and phase may be off together by "
+    "(2 + αδ)/(2 − αδ), |δ| < 1."
 )
 UNDAMPED = (
     "; without damping (C = 0) any delay, however short, destabilises some mode far enough up, so the exact delay and "
@@ -28,6 +30,10 @@ WINDOWS = (
     "The others held, each gain may move within its window before the first pole reaches the axis. Ends ±∞ are proven; "
     "other ends that coincide with the range looked at only say where the search stopped. {sign}"
 )
+QUANTITIES = (
+    "gain margin, down", "gain margin, up", "phase margin", "phase lag", "phase lead", "delay margin", "disk margin α",
+    "peak sensitivity",
+)  # fmt: skip
 
 Row = tuple[str, str, float | str, float | str, float | str]  # quantity, unit, exact, in the band, at
 
@@ -77,9 +83,20 @@ def margin_table(laws: Sequence[NamedLaw], found: Sequence[Margins], is_undamped
     return Table(
         stem="margins",
         title="Verdict and margins",
-        caption=MARGINS.format(undamped=UNDAMPED if is_undamped else ""),
+        caption=MARGINS.format(undamped=UNDAMPED if is_undamped else "") + _leads(laws, found),
         columns=tuple(columns),
     )
+
+
+def _leads(laws: Sequence[NamedLaw], found: Sequence[Margins]) -> str:
+    """What a phase margin below 0 means, for each law that has one."""
+    bands = ((named, each.in_band) for named, each in zip(laws, found, strict=True))
+    texts = (
+        f" {named.name.capitalize()}: {significant(band.phase, 5)} deg at {significant(band.at['phase'], 5)} rad/s is "
+        "lead; not an instability."
+        for named, band in bands if band is not None and band.phase < 0
+    )  # fmt: skip
+    return "".join(texts)
 
 
 def _rows(found: Margins) -> Iterator[Row]:
@@ -90,13 +107,14 @@ def _rows(found: Margins) -> Iterator[Row]:
     yield "unstable poles", "", count, float(it.unstable_roots), ""
     yield "band", "rad/s", "", it.band, ""
     if band is None or found.exact_delay is None or found.exact_disk is None or found.exact_peak is None:
-        for name in ("gain margin, down", "gain margin, up", "phase margin", "delay margin", "disk margin α"):
+        for name in QUANTITIES:
             yield name, "", NOTHING, "", ""
-        yield "peak sensitivity", "", NOTHING, "", ""
         return
     yield "gain margin, down", "factor", band.gain[0], "", ""
     yield "gain margin, up", "factor", band.gain[1], "", ""
-    yield "phase margin", "deg", "" if found.exact_delay == 0 else band.phase, band.phase, band.at["phase"]
+    phases = {"phase margin": band.phase, "phase lag": band.phase_lag, "phase lead": band.phase_lead}
+    for name, at in zip(phases, ("phase", "phase_lag", "phase_lead"), strict=True):
+        yield name, "deg", "" if found.exact_delay == 0 else phases[name], phases[name], band.at[at]
     yield "delay margin", "s", found.exact_delay, band.delay, band.at["delay"]
     yield "disk margin α", "", found.exact_disk, band.disk, band.at["disk"]
     yield "peak sensitivity", "", found.exact_peak, band.peak_sensitivity, band.at["peak_sensitivity"]

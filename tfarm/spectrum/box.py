@@ -25,6 +25,8 @@ TURN = 0.6  # rad: a longer step of the phase along the contour is halved
 FORESEEN = 1.0  # so is one over which ln f, phase or size, would change by more at the rate of either end
 FINEST = 1e-13  # a contour cannot be resolved closer to a zero than this share of the box
 DEAD = 1e-8  # nearer to s = 0 than this share of a box Newton's method is not believed: a zero there forces cuts
+SAME = 0.1  # of its size: a zero found so near a known one is that one
+DEEPEST = 60  # cuts: then a box is a share of 2^-30 of the first, less than float64 can search
 SPLIT = 0.4871  # where a box is cut: off the axes, on which zeros like to lie
 
 
@@ -130,15 +132,19 @@ def distinct(points: Complex, apart: float = 1e-9) -> Complex:
     return np.array(kept, dtype=complex)
 
 
-def zeros_in_box(function: Function, box: Box, starts: Complex) -> Complex:
+NOTHING_KNOWN: Complex = np.empty(0, complex)
+
+
+def zeros_in_box(function: Function, box: Box, starts: Complex, known: Complex = NOTHING_KNOWN) -> Complex:
     """All zeros in the box, each as often as its order, as many as the winding number says.
 
+    `known` zeros are taken as they are: such as lie so near s = 0 that Newton's method is not believed there.
     Raises ConvergenceError if they cannot all be found, with those that were.
     """
-    return _search(function, box, starts, depth=0)
+    return _search(function, box, starts, known, depth=0)
 
 
-def _search(function: Function, box: Box, starts: Complex, depth: int) -> Complex:
+def _search(function: Function, box: Box, starts: Complex, known: Complex, depth: int) -> Complex:
     expected = winding_number(function, box)
     if not expected:
         return np.empty(0, complex)
@@ -148,11 +154,16 @@ def _search(function: Function, box: Box, starts: Complex, depth: int) -> Comple
     found = newton(function, np.concatenate([starts[box.holds(starts)], grid]))
     width = max(box.re_max - box.re_min, box.im_max - box.im_min)
     found = found[box.holds(found) & (abs(found) > DEAD * width)]  # deflated zeros at s = 0 leave noise around it
+    again = (abs(found[:, None] - known) < SAME * abs(known)).any(axis=1)
+    found = np.concatenate([known[box.holds(known)], found[~again]])
     if found.size == expected:
         return found
     if found.size == 1 and width < 1e-6 * abs(found[0]):
         return np.repeat(found, expected)
-    if depth > 60:
-        raise ConvergenceError(f"{expected} zeros in {box}, {found.size} found", found, expected)
-    parts = [_search(function, half, starts, depth + 1) for half in box.halves()]
+    if depth > DEEPEST:
+        where = f"{box.re_min:.3g} < Re s < {box.re_max:.3g}, {box.im_min:.3g} < Im s < {box.im_max:.3g}"
+        raise ConvergenceError(
+            f"of {expected} zeros with {where} only {found.size} could be told apart", found, expected
+        )
+    parts = [_search(function, half, starts, known, depth + 1) for half in box.halves()]
     return np.concatenate(parts)
