@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import tfarm
+from tests.shell import heard
 from tfarm.exact.outputs import OUTPUTS
 
 ROOT = Path(__file__).parent.parent
@@ -44,7 +45,7 @@ def test_shell_examples_run(line: str, tmp_path: Path) -> None:
     done = subprocess.run(
         ["bash", "-c", command], cwd=tmp_path, env=os.environ, capture_output=True, text=True, check=False
     )
-    assert (done.returncode, done.stderr) == (0, "")
+    assert (done.returncode, heard(done.stderr)) == (0, "")
     written = re.findall(r"--(?:csv|out) (\S+)", line)
     assert all((tmp_path / name).exists() for name in written)
     assert done.stdout or written

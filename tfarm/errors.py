@@ -62,10 +62,11 @@ class CertificationError(TfarmError):
 
 
 def did_you_mean(word: str, choices: Iterable[str]) -> str:
-    """The remedy for a misspelt word: the nearest choice, if one is near, and all of them."""
+    """The remedy for a misspelt word: the nearest choice, or those that begin with it, if any, and all of them."""
     known = list(choices)
-    near = difflib.get_close_matches(word[:80], known, n=1)
-    hint = f'did you mean "{near[0]}"? ' if near else ""
+    begun = [choice for choice in known if word and choice.startswith(word)][:3]
+    near = difflib.get_close_matches(word[:80], known, n=1) or begun
+    hint = "did you mean " + " or ".join(f'"{choice}"' for choice in near) + "? " if near else ""
     return f"{hint}known are: {', '.join(known)}"
 
 

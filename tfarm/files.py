@@ -71,6 +71,11 @@ def write_file(path: Path, content: bytes, *, key: str) -> None:
         raise ParameterError(key=key, value=str(path), remedy=remedy) from None
 
 
+def is_standard_output(path: Path) -> bool:
+    """Whether a path such as /dev/stdout stands for this process's own standard output."""
+    return _descriptor(path) == 1
+
+
 @contextmanager
 def temporary_folder(place: Path) -> Iterator[Path]:
     """A new folder in `place`, gone afterwards with all that is in it; those that killed runs left there go first."""

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from tests.shell import run
 from tfarm.audit import published
 from tfarm.audit.literature import SOURCES
 from tfarm.audit.published import agrees, validate, validate_answer
-from tfarm.cli import main
 from tfarm.errors import CertificationError
 
 
@@ -97,13 +97,6 @@ def test_the_answer_counts_its_rows() -> None:
     assert {row["source"] for row in answer["rows"]} == {source["key"] for source in answer["sources"]}
     keys = {"source", "case", "mode", "quantity", "printed", "ours", "difference", "agrees", "why"}
     assert all(set(row) == keys for row in answer["rows"])
-
-
-def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
-    with pytest.raises(SystemExit) as stop:
-        main(list(arguments))
-    out, err = capsys.readouterr()
-    return int(stop.value.code or 0), out, err
 
 
 def test_the_verb_prints_the_table_or_one_object(capsys: pytest.CaptureFixture[str]) -> None:

@@ -9,16 +9,14 @@ from dataclasses import replace
 import pytest
 
 import tfarm
+from tests.shell import heard
+from tests.shell import run as shell
 from tfarm.arm import to_toml
 from tfarm.audit.assumptions import assumptions_answer
-from tfarm.cli import main
 
 
 def run(capsys, *arguments):
-    with pytest.raises(SystemExit) as stop:
-        main(["assumptions", *arguments])
-    out, err = capsys.readouterr()
-    return int(stop.value.code or 0), out, err
+    return shell(capsys, "assumptions", *arguments)
 
 
 def test_json_is_the_room_s_answer(capsys):
@@ -54,7 +52,7 @@ def test_a_bad_count_is_refused_in_one_line(capsys, count):
 
 
 def test_it_loads_neither_matplotlib_nor_control():
-    code = "import sys; from tfarm.cli.app import _run; _run(['assumptions', 'sasaki2012', '--json']);"
+    code = "import sys; from tfarm.cli.running import run; run(['assumptions', 'sasaki2012', '--json']);"
     code += "sys.exit(bool({'matplotlib', 'control'} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (0, "")
+    assert (done.returncode, heard(done.stderr)) == (0, "")

@@ -58,7 +58,13 @@ def test_simulate_writes_what_it_prints(capsys, tmp_path, scenario):
     assert result["energy_error"] < 1e-13
     header, *rows = csv.reader(table.read_text().splitlines())
     assert header[:2] == ["t [s]", "hub_angle [rad]"]
-    assert [float(row[3]) for row in rows] == result["root_moment"]
+    torque = header.index("torque [N m]")
+    at_samples, between = ([row for row in rows if bool(row[torque]) is there] for there in (True, False))
+    assert [float(row[3]) for row in at_samples] == result["root_moment"]
+    assert [float(row[3]) for row in between] == result["between"]["root_moment"]
+    times = [float(row[0]) for row in rows]
+    assert times == sorted(result["t"] + result["between"]["t"])
+    assert len(set(times)) == 2 * n == len(rows)
     stored = loadmat(mat)
     np.testing.assert_array_equal(stored["torque"][:, 0], result["torque"])
     np.testing.assert_array_equal(stored["between"]["t"][0, 0][:, 0], result["between"]["t"])

@@ -1,15 +1,21 @@
 """The command line: arguments in, one call, output.  No arithmetic."""
 
-from tfarm.cli import (  # noqa: F401  each adds its verbs to the application
-    commands,
-    control,
-    loops,
-    reduction,
-    sampling,
-    studies,
-    trust,
-    tuning,
-)
-from tfarm.cli.app import app, main
+from __future__ import annotations
 
-__all__ = ["app", "main"]
+import sys
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run one command and exit: 0, 2 for bad input, 3 for what could not be solved or proven, 130 if interrupted.
+
+    Everything is imported inside, so that an interrupt is one line from the first moment on.
+    """
+    try:
+        from tfarm.cli.running import run
+
+        code = run(sys.argv[1:] if arguments is None else arguments)
+    except KeyboardInterrupt:
+        if sys.stderr is not None:
+            print("tfarm: stopped", file=sys.stderr)
+        code = 130
+    sys.exit(code)

@@ -19,8 +19,8 @@ from tfarm.spectrum import modes as find_modes
 
 
 def to_json(answer: dict[str, Any]) -> str:
-    """One JSON object, with infinities as strings; NaN raises ValueError."""
-    return json.dumps(_plain(answer), allow_nan=False, ensure_ascii=False)
+    """One JSON object in ASCII, which every pipe takes, with infinities as strings; NaN raises ValueError."""
+    return json.dumps(_plain(answer), allow_nan=False)
 
 
 def modes_answer(modes: Modes, digits: int | None, certify: bool = False) -> dict[str, Any]:

@@ -1,15 +1,16 @@
-"""The application, what its verbs share, and the one place where errors become exit codes."""
+"""The application and what its verbs share."""
 
 from __future__ import annotations
 
 import os
 import sys
-from typing import TYPE_CHECKING, Annotated, Any
+from contextlib import suppress
+from functools import cache
+from typing import IO, TYPE_CHECKING, Annotated
 
 import typer
-from typer.exceptions import TyperException
 
-from tfarm.errors import CertificationError, ConvergenceError, ParameterError, TfarmError, one_line
+from tfarm.errors import ParameterError, one_line
 
 if TYPE_CHECKING:
     from tfarm.arm import Arm
@@ -31,6 +32,7 @@ def load_arm(name: str) -> Arm:
     """The preset or file of that name; values that look like a slip of units are named on standard error."""
     from tfarm.arm import implausible, load
 
+    say_when_compiling()
     arm = load(name)
     if texts := implausible(arm):
         tell(f"warning: {arm.name}: {'; '.join(texts)}")
@@ -46,7 +48,7 @@ def whole(key: str, text: str, least: int, most: int) -> int:
     """A whole number in a range; it may be typed as 1e3."""
     remedy = f"a whole number from {least} to {most}"
     try:
-        number = float(text)
+        number = plain_number(text)
     except ValueError:
         raise ParameterError(key=key, value=text, remedy=remedy) from None
     if not (least <= number <= most and number == int(number)):
@@ -54,45 +56,46 @@ def whole(key: str, text: str, least: int, most: int) -> int:
     return int(number)
 
 
-def main(arguments: list[str] | None = None) -> None:
-    """Run one command and exit: 0, 2 for bad input, 3 for what could not be solved or proven."""
-    given = sys.argv[1:] if arguments is None else arguments
-    sys.exit(_run(given or ["--help"]))
-
-
-def _run(arguments: list[str]) -> int:
-    try:
-        result: Any = typer.main.get_command(app).main(arguments, prog_name="tfarm", standalone_mode=False)
-        sys.stdout.flush()
-    except typer.Exit as stop:
-        return stop.exit_code
-    except (ConvergenceError, CertificationError) as error:
-        return _fail(str(error), 3)
-    except TfarmError as error:
-        return _fail(str(error), 2)
-    except BrokenPipeError:  # the reader, head for instance, has left
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
-    except (KeyboardInterrupt, typer.Abort):
-        return _fail("stopped", 130)
-    except TyperException as error:
-        return _fail(_usage(error), 2)
-    return result if isinstance(result, int) else 0
-
-
-def _usage(error: Any) -> str:
-    """The parser's complaint, in the words of our own errors."""
-    near = getattr(error, "possibilities", None)
-    if near:
-        return f"{error.option_name}: no such option: did you mean {' or '.join(near)}?"
-    return str(error.format_message()) if hasattr(error, "format_message") else str(error)
-
-
-def _fail(message: str, code: int) -> int:
-    tell(message)
-    return code
+def plain_number(text: str) -> float:
+    """A number as people write it; ValueError for Python's own 5_0 and for digits that are not ASCII."""
+    if "_" in text or not text.isascii():
+        raise ValueError(text)
+    return float(text)
 
 
 def tell(message: str) -> None:
-    """One line to the person at the terminal, on standard error."""
-    print(f"tfarm: {one_line(message, 1000)}", file=sys.stderr)
+    """One line to the person at the terminal, on standard error; nothing where nobody can hear it."""
+    try:
+        print(f"tfarm: {one_line(message, 1000)}", file=sys.stderr)
+    except OSError:
+        discard(sys.stderr)
+
+
+def discard(stream: IO[str]) -> None:
+    """Send what the stream still holds nowhere: Python would complain about it on leaving."""
+    with suppress(OSError, ValueError, AttributeError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, stream.fileno())
+        os.close(nowhere)
+
+
+@cache
+def say_when_compiling() -> None:
+    """From now on the first compilation of a numerical kernel is announced, once, on standard error.
+
+    numba keeps what it has compiled, so this is the first use after an installation or an update.
+    """
+    from numba.core.event import Event, Listener, register
+
+    class Announcement(Listener):  # type: ignore[misc]  # numba comes without types
+        said = False
+
+        def on_start(self, event: Event) -> None:
+            if not self.said:
+                self.said = True
+                tell("compiling once: the first use after an installation takes some seconds longer")
+
+        def on_end(self, event: Event) -> None:
+            pass
+
+    register("numba:compile", Announcement())

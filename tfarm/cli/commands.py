@@ -79,7 +79,7 @@ def response(
 
     answer = response_answer(transfer(subject, output, x=x), at, right)
     if csv is not None:
-        from tfarm.cli.tables import write_csv
+        from tfarm.cli.tables import print_found, say_written, write_csv
 
         write_csv(answer, csv)
     if json:
@@ -88,6 +88,8 @@ def response(
         from tfarm.cli.tables import print_response
 
         print_response(answer)
+    elif say_written(csv):
+        print_found(answer)
 
 
 @app.command()

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from tfarm.cli.app import ArmName, Json, app, load_arm, whole
+from tfarm.cli.app import ArmName, Json, app, load_arm, plain_number, whole
 from tfarm.cli.inputs import K1, K2, Kp, gains_of, say_defaults
 from tfarm.errors import ParameterError
 
@@ -65,7 +65,9 @@ def gain_map(
         from tfarm.cli.control_tables import write_map
 
         write_map(map_answer(found), csv)
-    if json or csv is None:
+    from tfarm.cli.tables import say_written
+
+    if json or say_written(csv):
         _print(map_answer(found), json, "print_map")
 
 
@@ -93,7 +95,7 @@ def bounds(key: str, text: str) -> tuple[float, float]:
     """Two numbers separated by a comma, the lower first."""
     remedy = "two numbers, the lower first, such as -1,3"
     try:
-        low, high = (float(part) for part in text.split(","))
+        low, high = (plain_number(part) for part in text.split(","))
     except ValueError:
         raise ParameterError(key=key, value=text, remedy=remedy) from None
     if not -math.inf < low < high < math.inf:

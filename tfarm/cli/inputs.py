@@ -9,6 +9,7 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
+from tfarm.cli.app import whole
 from tfarm.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -53,10 +54,7 @@ def grid(start: float, stop: float, points: str) -> NDArray[np.complex128]:
         raise ParameterError(key="--from", value=start, remedy="a positive frequency in rad/s")
     if not start < stop < math.inf:
         raise ParameterError(key="--to", value=stop, remedy=f"a frequency above --from, {start:g} rad/s")
-    number = _number("--points", points, float, f"a whole number from 2 to {MOST_POINTS}")
-    if not (2 <= number <= MOST_POINTS and number == int(number)):
-        raise ParameterError(key="--points", value=points, remedy=f"a whole number from 2 to {MOST_POINTS}")
-    frequencies: NDArray[np.float64] = np.geomspace(start, stop, int(number))
+    frequencies: NDArray[np.float64] = np.geomspace(start, stop, whole("--points", points, 2, MOST_POINTS))
     return s_on_axis(frequencies)
 
 

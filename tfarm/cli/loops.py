@@ -47,11 +47,13 @@ def locus(
     answer = locus_answer(exact, reduced_locus(exact)) | said
     if csv is not None:
         _write(answer, csv)
+    from tfarm.cli.tables import say_written
+
     if json:
         from tfarm.cli.answers import to_json
 
         print(to_json(answer))
-    elif csv is None:
+    elif say_written(csv):
         _show(answer)
         say_defaults(answer)
 

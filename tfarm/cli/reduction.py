@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from tfarm.cli.app import ArmName, Json, app, load_arm, whole
+from tfarm.cli.app import ArmName, Json, app, load_arm, plain_number, whole
 from tfarm.errors import ParameterError
 
 
@@ -34,20 +34,22 @@ def reduce(
 
     names = [name.strip() for name in outputs.split(",")]
     reduced = find(subject, names, order=states, error=error, method=method, band=edges, x=x)  # type: ignore[arg-type]
-    if mat is not None:
-        save_mat(reduced, mat, key="--mat")
+    written = () if mat is None else save_mat(reduced, mat, key="--mat")
     answer = reduced_answer(reduced)
     if json:
         from tfarm.cli.answers import to_json
 
         print(to_json(answer))
     else:
+        from tfarm.cli.tables import say_written
+
+        say_written(*written)
         _show(answer)
 
 
 def _edges(text: str) -> tuple[float, float]:
     try:
-        low, high = (float(part) for part in text.split(","))
+        low, high = (plain_number(part) for part in text.split(","))
     except ValueError:
         remedy = "two frequencies in rad/s such as 0.1,1000"
         raise ParameterError(key="--band", value=text, remedy=remedy) from None

@@ -94,8 +94,9 @@ def simulate(
 
 
 def _show(answer: dict[str, Any], csv: Path | None, mat: Path | None, json: bool) -> None:
-    """The signals to the files asked for, and to standard output as JSON or, without files, as a summary."""
+    """The signals to the files asked for, and to standard output as JSON or as a summary."""
     from tfarm.cli import sampling_tables
+    from tfarm.cli.tables import say_written
 
     if csv is not None:
         sampling_tables.write_signals(answer, csv)
@@ -106,9 +107,11 @@ def _show(answer: dict[str, Any], csv: Path | None, mat: Path | None, json: bool
         from tfarm.cli.answers import to_json
 
         print(to_json(answer))
-    elif csv is None and mat is None:
+    elif say_written(csv, mat):
         sampling_tables.print_simulation(answer)
         say_defaults(answer)
+        if csv is None and mat is None:
+            print("--json, --csv or --mat give the signals")
 
 
 def chain_of(source: str, period: float | None, delay_samples: float | None) -> Chain:

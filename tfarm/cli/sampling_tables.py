@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import csv
 import io
-import sys
 from pathlib import Path
 from typing import Any
 
+from tfarm.cli.app import tell
 from tfarm.cli.tables import new_table, show
 from tfarm.files import write_file
 
@@ -52,23 +52,31 @@ def print_simulation(answer: dict[str, Any]) -> None:
         at = cycle["frequency_rad_s"]
         size = f"root moment +-{cycle['root_moment_amplitude']:.4g} N m at {at:.4g} rad/s"
         print(f"limit cycle, kept up by {cycle['kept_up_by']}: {size}")
-    print("--json, --csv or --mat give the signals")
 
 
 def warn_if_stopped(answer: dict[str, Any]) -> None:
     """A line on standard error where the loop ran away."""
     if answer["stopped_at_s"] is not None:
         what = f"mode {answer['growing_mode']}" if answer["growing_mode"] else "the hub"
-        print(f"tfarm: unstable: stopped at {answer['stopped_at_s']:.6g} s, {what} grows", file=sys.stderr)
+        tell(f"unstable: stopped at {answer['stopped_at_s']:.6g} s, {what} grows")
 
 
 def write_signals(answer: dict[str, Any], path: Path) -> None:
-    """The signals at the samples as a table, written beside and then renamed."""
+    """The signals as a table in the order of time, written beside and then renamed.
+
+    Rows between the samples leave empty what changes at the samples only: torque, gain and volts.
+    """
     names = _present(answer)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow([f"{name} [{SIGNALS[name]}]" for name in names])
-    writer.writerows(zip(*(answer[name] for name in names), strict=True))
+    rows = list(zip(*(answer[name] for name in names), strict=True))
+    if "between" in answer:
+        finer = answer["between"]
+        empty = [""] * len(finer["t"])
+        rows += zip(*(finer.get(name, empty) for name in names), strict=True)
+    rows.sort(key=lambda row: float(row[0]))
+    writer.writerows(rows)
     write_file(path, text.getvalue().encode(), key="--csv")
 
 

@@ -38,9 +38,11 @@ def study(
         K1=default_gains(subject).K1,
     )
     plans = plans_of(what, base, number)
-    from tfarm.cli.tuning_tables import print_study, progress
+    from tfarm.cli.tables import progress
+    from tfarm.cli.tuning_tables import print_study
 
-    with progress(len(plans)) as tell:
+    with progress() as advance:
+        tell = None if advance is None else lambda done, total: advance(done, total, "tuning")
         answer = study_answer(what, run_study(subject, plans, keep=keep, tell=tell), number)
     if json:
         from tfarm.cli.answers import to_json

@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
-from rich.text import Text
 
 from tfarm.arm import Arm
-from tfarm.files import write_file
+from tfarm.cli.layout import new_table as new_table
+from tfarm.cli.layout import show as show
+from tfarm.files import is_standard_output, write_file
 
 
 def print_presets(arms: list[Arm]) -> None:
@@ -31,17 +31,19 @@ def print_presets(arms: list[Arm]) -> None:
 def print_modes(answer: dict[str, Any]) -> None:
     """The modal table; with damping, each eigenvalue beside its undamped frequency."""
     is_damped = "box" in answer
-    last = ("eigenvalue [1/s]", "damping ratio") if is_damped else ("nodes [m]",)
-    table = new_table(("mode", "rad/s", "Hz", "hub participation b", "modal moment [N m]", *last))
+    damped = ("eigenvalue [1/s]", "damping ratio") if is_damped else ()
+    last = ("hub participation b", "modal moment [N m]", *(() if is_damped else ("nodes [m]",)))
+    table = new_table(("mode", "rad/s", "Hz", *damped, *last), fold=("nodes [m]",))
     for mode in answer["modes"]:
         frequency = mode["natural_frequency_rad_s"]
         table.add_row(
             str(mode["index"]),
             frequency if isinstance(frequency, str) else f"{frequency:.12g}",
             f"{mode['natural_frequency_hz']:.9g}",
+            *(_damping(mode) if is_damped else ()),
             f"{mode['hub_participation']:.6g}",
             f"{mode['modal_moment']:.6g}",
-            *(_damping(mode) if is_damped else (" ".join(f"{x:.4f}" for x in mode["nodes_m"]) or "-",)),
+            *(() if is_damped else (" ".join(f"{x:.4f}" for x in mode["nodes_m"]) or "-",)),
         )
     show(table)
     if "proof" in answer:
@@ -79,10 +81,10 @@ def print_response(answer: dict[str, Any]) -> None:
 def print_audit(answer: dict[str, Any]) -> None:
     """A row an equation: the verdict, and what it was and should be where the paper is corrected."""
     print(answer["paper"])
-    table = new_table(("equation", "verdict", "residual as printed", "as corrected"))
+    residuals = ("residual as printed", "as corrected")
+    table = new_table(("equation", "verdict", *residuals), fold=("equation", *residuals))
     for row in answer["rows"]:
-        residuals = (Text(str(row[name])[:60]) for name in ("residual_printed", "residual_corrected"))
-        table.add_row(Text(row["equation"]), row["verdict"], *residuals)
+        table.add_row(row["equation"], row["verdict"], row["residual_printed"], row["residual_corrected"])
     show(table)
 
 
@@ -132,11 +134,12 @@ def print_validation(answer: dict[str, Any]) -> None:
 
 def _print_printed_and_exact(rows: list[dict[str, Any]]) -> None:
     reasons = list(dict.fromkeys(row["why"] for row in rows if row["why"]))
-    table = new_table(("case", "quantity", "mode", "printed", "exact", "difference", ""))
+    titles = ("case", "quantity", "mode", "printed", "exact", "difference", "")
+    table = new_table(titles, fold=("case", "quantity"))
     for row in rows:
         mark = "" if row["agrees"] else f"[{reasons.index(row['why']) + 1}]"
-        cells = (row["case"], row["quantity"], str(row["mode"]), row["printed"], f"{row['ours']:.10g}")
-        table.add_row(*map(Text, cells), f"{row['difference']:+.1e}", Text(mark))
+        cells = (row["case"], row["quantity"], row["mode"], row["printed"], f"{row['ours']:.10g}")
+        table.add_row(*cells, f"{row['difference']:+.1e}", mark)
     show(table)
     for number, reason in enumerate(reasons, start=1):
         print(f"[{number}] {reason}")
@@ -151,6 +154,25 @@ def write_csv(answer: dict[str, Any], path: Path) -> None:
     for point, value in zip(answer["s"], answer["value"], strict=True):
         writer.writerow([*point, *value])
     write_file(path, text.getvalue().encode(), key="--csv")
+
+
+def print_found(answer: dict[str, Any]) -> None:
+    """How many points, and where the response is largest, for those who have the table in a file."""
+    sizes = [abs(complex(*map(float, value))) for value in answer["value"]]
+    largest = max(range(len(sizes)), key=sizes.__getitem__)
+    re, im = answer["s"][largest]
+    what = f"largest |{answer['output']} / {answer['input']}| {sizes[largest]:.6g} {_unit(answer)}"
+    print(f"{answer['arm']}: {len(sizes)} points, {what} at s = {re:.10g}{im:+.10g}i 1/s")
+
+
+def say_written(*paths: Path | None) -> bool:
+    """Say which files were written; False where one is standard output itself, which holds the table then."""
+    given = [path for path in paths if path is not None]
+    if any(map(is_standard_output, given)):
+        return False
+    for path in given:
+        print(f"written: {path}")
+    return True
 
 
 @contextmanager
@@ -172,15 +194,3 @@ def _unit(answer: dict[str, Any]) -> str:
 
 def _text(part: float | str) -> str:
     return part if isinstance(part, str) else f"{part:.12g}"
-
-
-def new_table(columns: tuple[str, ...]) -> Table:
-    table = Table(box=None, pad_edge=False)
-    for column in columns:
-        table.add_column(Text(column), justify="right", no_wrap=True)
-    return table
-
-
-def show(table: Table) -> None:
-    """Whole rows, whatever the width of the terminal."""
-    Console(width=None if sys.stdout.isatty() else 10_000, soft_wrap=True).print(table)

@@ -6,12 +6,13 @@ from typing import Annotated
 
 import typer
 
-from tfarm.cli.app import ArmName, Json, app, load_arm, whole
+from tfarm.cli.app import ArmName, Json, app, load_arm, say_when_compiling, whole
 
 
 @app.command()
 def audit(json: Json = False) -> None:
     """Every equation of the paper, as printed and as corrected, with the check that tells them apart."""
+    say_when_compiling()
     from tfarm.audit import audit_answer
 
     answer = audit_answer()
@@ -50,6 +51,7 @@ def assumptions(
 @app.command()
 def validate(json: Json = False) -> None:
     """Natural frequencies of published tables beside the exact ones, and why where they differ."""
+    say_when_compiling()
     from tfarm.audit.published import validate_answer
 
     answer = validate_answer()

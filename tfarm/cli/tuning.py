@@ -67,18 +67,19 @@ def tune(
         answer["comparison"] = comparison_answer(rows)
     if save is not None:
         tuner.save(tuning.saved(), save)
-    _show(answer, json)
+    _show(answer, save, json)
 
 
-def _show(answer: dict[str, Any], json: bool) -> None:
+def _show(answer: dict[str, Any], save: Path | None, json: bool) -> None:
     """The answer as JSON or as a summary; that a run has stopped is said either way."""
     from tfarm.cli import tuning_tables
+    from tfarm.cli.tables import say_written
 
     tuning_tables.warn_if_stopped(answer)
     if json:
         from tfarm.cli.answers import to_json
 
         print(to_json(answer))
-    else:
+    elif say_written(save):
         tuning_tables.print_tuning(answer)
         say_defaults(answer)

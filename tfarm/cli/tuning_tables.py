@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from typing import Any
 
-from rich.console import Console
-from rich.progress import Progress
-
+from tfarm.cli.app import tell
 from tfarm.cli.tables import new_table, show
 
 
@@ -37,7 +32,7 @@ def print_tuning(answer: dict[str, Any]) -> None:
 def warn_if_stopped(answer: dict[str, Any]) -> None:
     """A line on standard error where learning diverged."""
     if answer["stopped"] is not None:
-        print(f"tfarm: {answer['stopped']}; the tuner is that of the trial before", file=sys.stderr)
+        tell(f"{answer['stopped']}; the tuner is that of the trial before")
 
 
 def _print_comparison(rows: list[dict[str, Any]]) -> None:
@@ -48,14 +43,6 @@ def _print_comparison(rows: list[dict[str, Any]]) -> None:
         costs = (f"{row[name]['cost']:.4g}" for name in names)
         table.add_row(row["condition"], *costs, "yes" if row["proven"] else "no")
     show(table)
-
-
-@contextmanager
-def progress(total: int) -> Iterator[Callable[[int, int], None]]:
-    """A progress bar on standard error; yields what a study calls after each tuning."""
-    with Progress(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("tuning", total=total)
-        yield lambda done, _: bar.update(task, completed=done)
 
 
 def print_study(answer: dict[str, Any]) -> None:

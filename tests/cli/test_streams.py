@@ -1,0 +1,112 @@
+"""Standard output and error that are full, closed or cut off: one line and exit 2, or silence, never a traceback."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import tfarm
+from tests.shell import heard, run
+from tfarm.cli.app import say_when_compiling
+
+TFARM = f"{sys.executable} -m tfarm"
+
+
+def shell(command, **environment):
+    """Exit code, standard output and standard error of a line of bash; `tfarm` is the command."""
+    line = command.replace("tfarm", TFARM)
+    done = subprocess.run(["bash", "-c", line], capture_output=True, check=False, env={**os.environ, **environment})
+    return done.returncode, done.stdout, heard(done.stderr.decode())
+
+
+@pytest.mark.parametrize(
+    ("command", "code", "why"),
+    [
+        ("tfarm presets > /dev/full", 2, "No space left on device"),
+        ("tfarm presets >&-", 2, "Bad file descriptor"),
+        ("tfarm no-such-verb >&-", 2, "no-such-verb"),
+        ("tfarm modes sasaki2021 > /dev/full", 2, "sasaki2021"),
+    ],
+)
+def test_output_that_cannot_be_written_is_one_line(command, code, why):
+    got, out, err = shell(command)
+    assert (got, out) == (code, b"")
+    assert err.startswith("tfarm: ")
+    assert err.count("\n") == 1
+    assert why in err
+
+
+@pytest.mark.parametrize("command", ["tfarm modes sasaki2021 2>&-", "tfarm modes sasaki2021 2>/dev/full"])
+def test_a_message_that_nobody_hears_goes_nowhere_else(command):
+    assert shell(command) == (2, b"", "")
+
+
+def test_a_reader_that_leaves_is_silence():
+    code, _, err = shell("tfarm response sasaki2012 --output hub_rate --points 20000 | true; exit ${PIPESTATUS[0]}")
+    assert (code, err) == (0, "")
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
+def test_letters_that_a_terminal_does_not_have_are_escaped(encoding, tmp_path):
+    text = (Path(tfarm.__file__).parent / "arm" / "presets" / "stocky-steel.toml").read_text(encoding="utf-8")
+    name = "Ölarm-λ"
+    (tmp_path / "a.toml").write_text(text.replace('"stocky-steel"', f'"{name}"', 1), encoding="utf-8")
+    modes = f"tfarm modes {tmp_path / 'a.toml'} --count 1"
+    code, out, err = shell(modes, PYTHONIOENCODING=encoding)
+    assert (code, err) == (0, "")
+    assert name.encode(encoding, "backslashreplace") in out
+    code, out, err = shell(f"{modes} --json", PYTHONIOENCODING=encoding)
+    assert (code, err) == (0, "")
+    assert json.loads(out)["arm"] == name
+
+
+def test_an_interrupt_while_things_are_imported_is_one_line(tmp_path):
+    """A module of the name of the first that the commands need, interrupted as it is read."""
+    (tmp_path / "typer.py").write_text("raise KeyboardInterrupt\n")
+    path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
+    assert shell("tfarm presets", PYTHONPATH=path) == (130, b"", "tfarm: stopped\n")
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "line"),
+    [
+        (KeyboardInterrupt(), 130, "stopped"),
+        (OSError(28, "No space left on device", "/cache/kernel.nbc"), 2, "/cache/kernel.nbc: No space left on device"),
+        (MemoryError(), 3, "not enough memory"),
+    ],
+)
+def test_what_befalls_a_command_midway_is_one_line(error, code, line, capsys, monkeypatch):
+    def fail(*_):
+        raise error
+
+    monkeypatch.setattr("tfarm.spectrum.table.natural_frequencies", fail)
+    got, out, err = run(capsys, "modes", "sasaki2012")
+    assert (got, out) == (code, "")
+    assert err.startswith(f"tfarm: {line}")
+    assert err.count("\n") == 1
+
+
+def test_the_first_compilation_is_announced_once(capsys):
+    import numba
+
+    say_when_compiling.__wrapped__()  # whatever this process has said already
+    assert capsys.readouterr() == ("", "")
+    for function in (lambda x: x + 1, lambda x: x + 2):
+        assert numba.njit(function)(1) in (2, 3)
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith("tfarm: compiling once")
+    assert heard(err) == ""
+    assert err.count("\n") <= 2  # this announcement's, and perhaps that of an earlier command of this process
+
+
+@pytest.mark.parametrize("arguments", [["--version"]])
+def test_the_version(arguments, capsys):
+    assert run(capsys, *arguments) == (0, f"tfarm {tfarm.__version__}\n", "")
+
+
+def test_as_a_module():
+    assert shell("tfarm --version") == (0, f"tfarm {tfarm.__version__}\n".encode(), "")

@@ -1,0 +1,98 @@
+"""Tables for a terminal: no number is ever cut.
+
+In a pipe every row is one line.  On a terminal that is too narrow titles and long texts are folded; if that is not
+enough, the columns that do not fit follow in a block below, beside the first column again.  What answers comes first.
+"""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import textwrap
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import zip_longest
+
+from rich.cells import cell_len
+
+GAP = 2  # spaces between two columns
+LEAST = 20  # characters to which a text may be folded
+
+
+@dataclass
+class Rows:
+    """A table as it is filled: a title a column, then rows; columns named in `fold` hold texts that may be folded."""
+
+    titles: tuple[str, ...]
+    fold: tuple[str, ...] = ()
+    rows: list[tuple[str, ...]] = field(default_factory=list)
+
+    def add_row(self, *cells: object) -> None:
+        """One text a column."""
+        assert len(cells) == len(self.titles)
+        self.rows.append(tuple(map(str, cells)))
+
+    def lines(self, width: int) -> list[str]:
+        """The lines of the table, each in so many characters as far as its widest column allows."""
+        widths = self._widths(width)
+        printed: list[str] = []
+        for block in _blocks(widths, width):
+            printed += [""] * bool(printed)
+            for row in (self.titles, *self.rows):
+                printed += self._row(row, widths, block)
+        return printed
+
+    def _widths(self, width: int) -> list[int]:
+        """Of each column: as its cells want it, folded where that does not fit."""
+        columns = list(zip(*self.rows, strict=True)) or [() for _ in self.titles]
+        cells = [max(map(cell_len, column), default=0) for column in columns]
+        natural = [max(cell_len(title), cell) for title, cell in zip(self.titles, cells, strict=True)]
+        if _total(natural) <= width:
+            return natural
+        words = [max(map(len, title.split()), default=0) for title in self.titles]
+        widths = [max(pair) for pair in zip(words, cells, strict=True)]
+        folded = [i for i, title in enumerate(self.titles) if title in self.fold]
+        rest = width - _total([w for i, w in enumerate(widths) if i not in folded]) - GAP * len(folded)
+        for left, i in zip(range(len(folded), 0, -1), sorted(folded, key=lambda i: widths[i]), strict=True):
+            widths[i] = min(widths[i], max(rest // left, LEAST, words[i]))
+            rest -= widths[i]
+        return widths
+
+    def _row(self, row: Sequence[str], widths: Sequence[int], block: Sequence[int]) -> list[str]:
+        """A row's lines: numbers to the right, what is folded to the left."""
+        parts = [textwrap.wrap(row[i], widths[i]) if cell_len(row[i]) > widths[i] else [row[i]] for i in block]
+        to_left = [self.titles[i] in self.fold and len(part) > 1 for i, part in zip(block, parts, strict=True)]
+        lines = []
+        for texts in zip_longest(*parts, fillvalue=""):
+            cells = (
+                text + pad if left else pad + text
+                for i, text, left in zip(block, texts, to_left, strict=True)
+                for pad in [" " * (widths[i] - cell_len(text))]
+            )
+            lines.append((" " * GAP).join(cells).rstrip())
+        return lines
+
+
+def new_table(titles: tuple[str, ...], fold: tuple[str, ...] = ()) -> Rows:
+    """An empty table; what answers comes first."""
+    return Rows(titles, fold)
+
+
+def show(table: Rows) -> None:
+    """Print it, in the width of the terminal or, in a pipe, in as many characters as it takes."""
+    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else sys.maxsize
+    print("\n".join(table.lines(width)))
+
+
+def _blocks(widths: Sequence[int], width: int) -> list[list[int]]:
+    """The columns of each block, the first column in all of them."""
+    blocks = [[0]]
+    for i in range(1, len(widths)):
+        if len(blocks[-1]) > 1 and _total([widths[j] for j in (*blocks[-1], i)]) > width:
+            blocks.append([0])
+        blocks[-1].append(i)
+    return blocks
+
+
+def _total(widths: Sequence[int]) -> int:
+    return sum(widths) + GAP * (len(widths) - 1)
