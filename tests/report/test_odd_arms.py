@@ -1,17 +1,28 @@
 """What the pages say of eight legal arms unlike the paper's: each sentence against the numbers of its own page."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import tfarm
 from tests.odd_arms import odd_arms
+from tfarm import HubFeedback
+from tfarm.loop.locus import locus
+from tfarm.loop.plant import Loop
+from tfarm.loop.poles import poles_below
+from tfarm.report import loci as loci_room
+from tfarm.report import loop_laws, loop_section, writing
 from tfarm.report.arm_section import arm_section
 from tfarm.report.bode_section import bode_section
 from tfarm.report.damped_table import damped_table
+from tfarm.report.locus_section import beyond_table, locus_section
+from tfarm.report.loop_laws import has_loop
+from tfarm.report.loop_section import margins_section
 from tfarm.report.modes_section import modal_table, places
 from tfarm.spectrum import DampedModes
+from tfarm.spectrum.scales import default_gains
 
 ARMS = odd_arms()
 DAMPED = [name for name, arm in ARMS.items() if arm.link.damping]
@@ -82,3 +93,108 @@ def test_a_gauge_on_a_free_pin_reads_the_torque():
     G, C = tfarm.transfer(ARMS["free-pin"], "root_moment"), ARMS["free-pin"].link.damping
     s = np.array([3j, 200j, 5 + 900j])
     assert G(s) * (1 + C * s) == pytest.approx(np.full(3, -1.0), rel=1e-12)
+
+
+# ------------------------------------------------------------ the loop
+
+
+LOOPS = [name for name, arm in ARMS.items() if has_loop(arm)]
+
+
+def is_stable(arm, law, up_to):
+    """By finding every pole below a frequency: a road that knows no windows."""
+    return poles_below(Loop(arm, law), up_to).unstable == 0
+
+
+@pytest.mark.parametrize("name", LOOPS)
+def test_how_far_K2_may_go_is_what_the_poles_say(name):
+    """On either side of an edge; at the end of a search nothing happens, and no edge is claimed."""
+    arm, law = ARMS[name], default_gains(ARMS[name])
+    words = loop_section._answer(arm).partition("at that K1, ")[2].partition("; at that K2, ")[0]
+    assert "without limit" not in words
+    up = number(re.search(r"go up (?:at least )?to (\S+?),", words)[1])
+    band = 3 * tfarm.modes(arm, 3).natural_frequency[-1]
+    assert is_stable(arm, replace(law, K2=0.999 * up), band)
+    assert "go up at least" in words or not is_stable(arm, replace(law, K2=1.001 * up), band)
+    assert ("real pole passes through 0" in words) == (name == "pinned")
+    down = number(re.search(r"go down at least to (\S+?),", words)[1])
+    assert is_stable(arm, replace(law, K2=down), band)
+
+
+@pytest.mark.parametrize("name", LOOPS)
+def test_sentences_about_the_pole_at_0_and_J_are_for_arms_that_turn_freely(name, monkeypatch):
+    monkeypatch.setattr(loop_laws, "best", lambda arm: None)
+    section = margins_section(ARMS[name])
+    words = " ".join([*section.words, section.blocks[1].caption])
+    turns = ARMS[name].has_rigid_mode
+    assert ("the hub angle leaves apart" in words) == ("(J − I_h)/J" in words) == turns
+    assert not re.search(r"\de-\d", words)
+    pairs = zip(*(column(section.blocks[1], key).cells for key in ("stable_around_it", "looked_at")), strict=True)
+    for around, looked_at in pairs:
+        ends = [set(text.strip("()").split(", ")) for text in (around, looked_at)]
+        assert {end.rstrip("*") for end in ends[0] if "*" in end} == {end.rstrip("*") for end in ends[0]} & ends[1]
+
+
+@pytest.mark.parametrize("name", LOOPS)
+def test_what_K2_beyond_1_is_said_to_do_is_what_the_rows_show(name):
+    arm, law = ARMS[name], default_gains(ARMS[name])
+    table = beyond_table(arm, law)
+    verdicts, counts = (column(table, key).values for key in ("verdict", "unstable_poles"))
+    edge = number(re.search(r"stable up to K2 = (.+?)\.(?: |$)", table.caption)[1])
+    for K2, verdict, count in zip(column(table, "K2").values, verdicts, counts, strict=True):
+        assert edge == K2 or (verdict == "stable") == (edge > K2)
+        assert verdict != "unstable" or count > 0
+    assert "unstable" in verdicts
+    unstable = [count for count in counts if count in range(1, 100)]
+    assert ("more K2 drives more modes" in table.caption) == (len(set(unstable)) > 1)
+    assert "∞" not in column(table, "spectral_abscissa_1_s").cells
+
+
+def test_the_answer_of_a_static_crossing_is_in_the_locus():
+    """The pinned tip at K2 = 1 exactly: one pole at 0, by the static torque; the others as found in a box."""
+    arm = ARMS["pinned"]
+    law = HubFeedback(K1=0.3, K2=0.3)
+    found = locus(arm, law, "K2", -1.0, 1.6, 300, 4)
+    at = int(np.flatnonzero(found.gain == 1.0)[0])
+    assert np.isfinite(found.branches).all()
+    assert 0 in found.branches[:, at]
+    assert not (found.branches[:, at + 1] == 0).any()
+    poles = poles_below(Loop(arm, replace(law, K2=float(found.gain[at + 1]))), 500.0).values
+    for branch in found.branches[:3, at + 1]:
+        assert abs(poles - branch).min() < 1e-9 * abs(branch)
+
+
+def test_branches_that_cannot_be_followed_end_or_are_left_out_with_a_word(monkeypatch):
+    """Fewer branches or less of the range first; and never a text of the tracker."""
+    arm = ARMS["rubber"]
+    asked = []
+
+    def follow(arm, law, vary, start, stop, points, branches):
+        asked.append((vary, stop, branches))
+        if vary == "K1" or stop > 1:
+            raise tfarm.ConvergenceError("the damped mode 1 cannot be told from its neighbours", None, None)
+        return locus(arm, law, vary, start, stop, points, branches)
+
+    monkeypatch.setattr(loci_room, "locus", follow)
+    section = locus_section(arm)
+    words = " ".join(section.words)
+    assert "told from its neighbours" not in words
+    assert "Beyond K2 = 0.95 the branches" in words
+    assert "Along K1 the branches of this arm could not be followed" in words
+    assert [block.stem for block in section.blocks] == ["rates", "locus-K2", "locus-K2-gap", "beyond"]
+    rates = section.blocks[0]
+    for K1, count in zip(column(rates, "K1").values, column(rates, "unstable_poles").values, strict=True):
+        law = replace(default_gains(arm), K1=K1)
+        assert count == poles_below(Loop(arm, law), 300.0).unstable
+    assert len(asked) == 7
+
+
+def test_a_free_pin_has_its_rate_loop(monkeypatch):
+    """K1 at K2 = 0: verdict, windows and locus; no K2, and the gauge as it is."""
+    arm = ARMS["free-pin"]
+    assert "−u/(1 + C s)" in loop_laws.why_no_loop(arm)
+    assert "at every instant" in loop_laws.why_no_loop(replace(arm, link=replace(arm.link, damping=0.0)))
+    section = margins_section(arm)
+    assert section.facts[0].value == "STABLE"
+    assert set(column(section.blocks[1], "gain").values) == {"K1", "Kp"}
+    assert [piece.name for piece in writing.PIECES if piece.suits(arm)][4:7] == ["no loop", "margins", "root loci"]

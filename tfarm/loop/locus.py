@@ -19,6 +19,7 @@ from tfarm.spectrum.continuation import Member, corrected, follow
 
 from .branches import FREE, Segment, followed, ordered
 from .crossings import BranchCrossing, crossings
+from .lines import along, crossing_at_zero
 from .variation import Complex, Evaluator, Real, Variation, member_of
 
 MOST_POINTS = 100_000
@@ -26,6 +27,7 @@ MOST_BRANCHES = 200
 SHARE = 0.25  # how far a zero may be polished from its guess, in distances to the next branch
 SETTLED = 1e-10  # of its size: one step more is taken where Newton's method still moves a zero by this
 STEPS = 6
+SAME = 1e-12  # relative: a gain so near to that at which a pole passes through 0 has the pole there
 
 
 @dataclass(frozen=True)
@@ -108,8 +110,9 @@ def _listed(curves: Complex, variation: Variation, number: int) -> tuple[Complex
     mode = np.r_[np.zeros(idle, int), mode]
     real = (curves.imag == 0).any(axis=1)
     kept = np.nonzero(real | ~(curves.imag < 0).any(axis=1))[0][:number]
-    if np.isnan(curves[kept]).any() or kept.size < number:
-        lost = int(np.argmax(np.isnan(curves[kept]).any(axis=1)))
+    lives = np.isfinite(curves[kept]).all(axis=1)
+    if not lives.all() or kept.size < number:
+        lost = int(np.argmin(lives))
         text = f"branch {lost} meets a zero that continues from no mode: ask for fewer branches, or another range"
         raise ConvergenceError(text, lost, number)
     return np.where(curves[kept] == 0, 0.0, curves[kept]), mode[kept]
@@ -122,6 +125,7 @@ class _Polish:
         self.variation, self.evaluator, self.free = variation, evaluator, free
         self.gain = evaluator.values
         self.at_zero = variation.zeros_at_origin
+        self.static = _at_static_crossing(variation, self.gain)
 
     def curves(self, cut: list[Segment]) -> Complex:
         """The branches (slots, n); those which do not live all the way are left out."""
@@ -154,7 +158,7 @@ class _Polish:
 
     def _at_origin(self, guess: Complex, which: NDArray[np.int64], pinned: bool) -> NDArray[np.bool_]:
         """Which of the zeros followed are exactly 0: the smallest, as many as the law leaves there."""
-        left = self.variation.left_at_origin(self.gain[which]) * (self.at_zero < 2)
+        left = self.variation.left_at_origin(self.gain[which]) * (self.at_zero < 2) + self.static[which]
         if self.at_zero == 1 and not pinned:  # the zero at 0 has lost its partner, and is followed no more
             left = left - 1
         flat = abs(guess).reshape(len(guess), -1)
@@ -176,11 +180,11 @@ class _Polish:
                 move = value / slope
             move = np.where(s[still].imag == 0, move.real, move)
             s[still] -= move
-            still[still] = ~(abs(move) <= SETTLED * abs(s[still]))
+            still[still] = np.isfinite(s[still]) & ~(abs(move) <= SETTLED * abs(s[still]))
             if not still.any():
                 break
         found, settled = zeros.copy(), np.ones(zeros.shape, bool)
-        found[wanted], settled[wanted] = s, ~still
+        found[wanted], settled[wanted] = s, ~still & np.isfinite(s)
         found[..., 1] = np.where(mirrored, found[..., 0].conj(), found[..., 1])
         return found, settled
 
@@ -197,6 +201,16 @@ class _Polish:
 
     def _member(self, value: float) -> Member:
         return member_of(self.variation, value, self.at_zero, self.free)
+
+
+def _at_static_crossing(variation: Variation, gain: Real) -> NDArray[np.int64]:
+    """1 at each gain where a pole of an arm that is held at its tip passes through s = 0, and 0 elsewhere."""
+    if variation.arm.has_rigid_mode or variation.vary not in ("K1", "K2", "Kp"):
+        return np.zeros(gain.size, np.int64)
+    there = crossing_at_zero(variation.arm, along(variation.vary, variation.law))
+    if there is None or not math.isfinite(there.t):
+        return np.zeros(gain.size, np.int64)
+    return np.asarray(abs(gain - there.t) <= SAME * abs(there.t), np.int64)
 
 
 def _gaps(zeros: Complex) -> Real:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 import tfarm
 from tfarm.arm import Arm, HubFeedback
+from tfarm.errors import ConvergenceError
 from tfarm.loop.locus import Locus, locus
 from tfarm.loop.reduced_locus import ReducedLocus, reduced_locus
 from tfarm.report.digits import plain, scientific, significant
@@ -25,7 +26,8 @@ from tfarm.report.tables import Column, Table, data_column, number_column, text_
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
-POINTS, BRANCHES = 300, 7
+POINTS = 300
+TRIES = ((7, 1.0), (4, 1.0), (4, 0.75), (2, 0.5))  # branches, and the share of the range that they are followed over
 ZOOMED = 4  # modes drawn on their own
 COLORS = (INK, BLUE, GREEN, PURPLE, "#7a5a00", GREY)  # by mode
 UNITS = {"K1": "N m s/rad", "K2": ""}
@@ -35,11 +37,17 @@ MARKED = 5  # gains marked along each branch
 
 @dataclass(frozen=True)
 class Loci:
-    """The exact locus, the reduced one beside it, and the gains that are marked on both."""
+    """The exact locus, the reduced one beside it, the gains marked on both, and the gain that was to be reached."""
 
     exact: Locus
     reduced: ReducedLocus
     marked: Real
+    wanted: float
+
+    @property
+    def is_cut(self) -> bool:
+        """Whether the branches could not be followed to the end of the range."""
+        return float(self.exact.gain[-1]) != self.wanted
 
     @property
     def first(self) -> float:
@@ -58,9 +66,21 @@ class Loci:
 
 
 def loci(arm: Arm, law: HubFeedback, vary: str, start: float, stop: float) -> Loci:
-    """Both loci of one gain.  Raises what `locus` and `reduced_locus` raise."""
-    exact = locus(arm, law, vary, start, stop, POINTS, BRANCHES)
-    return Loci(exact, reduced_locus(exact), np.linspace(start, stop, MARKED))
+    """Both loci of one gain: fewer branches, or less of the range, where more cannot be followed.
+
+    Raises ConvergenceError where none can, and what `reduced_locus` raises.
+    """
+    lost: ConvergenceError | None = None
+    for branches, share in TRIES:
+        end = start + share * (stop - start)
+        try:
+            exact = locus(arm, law, vary, start, end, POINTS, branches)
+        except ConvergenceError as error:
+            lost = error
+            continue
+        return Loci(exact, reduced_locus(exact), np.linspace(start, end, MARKED), stop)
+    assert lost is not None
+    raise lost
 
 
 def zoomed(data: Loci) -> list[int]:

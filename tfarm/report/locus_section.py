@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.errors import ConvergenceError
-from tfarm.loop.stability import Stability, stability
+from tfarm.loop.stability import MARGIN_OF_ZERO, Stability, stability
 from tfarm.report.digits import plain, scientific, significant
 from tfarm.report.figures import Picture
 from tfarm.report.loci import Loci, crossing_table, draw_loci, gap_table, loci, loci_data
-from tfarm.report.loop_laws import SIGN
+from tfarm.report.loop_laws import edge_of_K2, has_loop, margins_of, sign_words
 from tfarm.report.sections import Section
-from tfarm.report.tables import Column, Table, number_column, text_column
+from tfarm.report.tables import Column, Real, Table, number_column, text_column
 from tfarm.spectrum.scales import default_gains, rate_unit
 
 BEYOND = (0.9, 1.0, 1.01, 1.1, 1.5)  # values of K2 whose exact poles are listed
+AROUND_EDGE = (0.9, 1.1)  # times the edge, if that lies above all of them
 RANGE_OF_K2 = (-1.0, 1.6)
 
 SEEN = (
@@ -27,16 +29,20 @@ SEEN = (
     "axis."
 )
 UNDAMPED = (
-    "Exact poles. At C = 0 and K2 = 1 the law cancels the root moment: the hub no longer feels the arm, and every mode "
-    "with the hub at rest stays undamped. Any K2 above 1 makes every flexible mode unstable."
+    "Exact poles, each list complete in its box. At C = 0 and K2 = 1 the law cancels the root moment: the hub no "
+    "longer feels the arm, and every mode with the hub at rest stays undamped. Any K2 above 1 makes every flexible "
+    "mode unstable."
 )
-DAMPED = (
-    "Exact poles. The material damps the modes, so the edge is not exactly at K2 = 1; from the first unstable row on, "
-    "more K2 drives more modes."
+DAMPED = "Exact poles, each list complete in its box. {edge}"
+MORE = " From the first unstable row on, more K2 drives more modes."
+BACKWARDS = " At K1 = 0 a real pole is unstable from K2 = J/(J − I_h) = {K2} on: torque then turns the arm backwards."
+NOT_FOLLOWED = (
+    "Along {name} the branches of this arm could not be followed: on the way poles come too near to each other, or to "
+    "−1/C, to be told apart. No line is drawn rather than one that may jump; where the poles are at a few gains, each "
+    "list complete, stands in the table."
 )
-BACKWARDS = (
-    " From K2 = J/(J − I_h) = {K2} on, a real pole is unstable even at K1 = 0: torque then turns the arm backwards."
-)
+CUT = " Beyond {name} = {end} the branches come too near to each other, or to −1/C, to be told apart: they end there."
+RATES = (0.0, 0.05, 0.2, 0.5, 1.0, 2.0)  # times J w1: values of K1 whose exact poles are listed where no locus is
 
 
 def locus_section(arm: Arm) -> Section:
@@ -44,24 +50,27 @@ def locus_section(arm: Arm) -> Section:
     held = default_gains(arm)
     words, blocks = [], list[Picture | Table]()
     ranges = {"K1": (0.0, 2.0 * rate_unit(arm)), "K2": RANGE_OF_K2}
-    for name, (start, stop) in ranges.items():
+    for name, (start, stop) in ranges.items() if has_loop(arm) else [("K1", ranges["K1"])]:
         try:
             data = loci(arm, held, name, start, stop)
-        except ConvergenceError as error:
-            words.append(f"The locus along {name} could not be computed and is left out: {error}.")
+        except ConvergenceError:
+            words.append(NOT_FOLLOWED.format(name=name))
+            blocks += [rates_table(arm, held)] * (name == "K1")
             continue
         words.append(_locus_words(data))
         blocks += [_locus_picture(data), gap_table(data, f"locus-{name}-gap")]
         if data.exact.crossings:
             blocks.append(crossing_table(data, f"locus-{name}-crossings"))
-    blocks.append(beyond_table(arm, held))
-    return Section(anchor="locus", title="Where do the poles go?", words=[*words, SIGN], blocks=blocks)
+    if has_loop(arm):
+        blocks.append(beyond_table(arm, held))
+    return Section(anchor="locus", title="Where do the poles go?", words=[*words, sign_words(arm)], blocks=blocks)
 
 
 def _locus_words(data: Loci) -> str:
     size = scientific(data.reduced.worst, 2)
     gap = f"python-control's locus of order {data.reduced.order} is within {size} of |s| of the exact one."
-    return f"{_more_K1(data) if data.name == 'K1' else _more_K2(data)}; {gap}"
+    cut = CUT.format(name=data.name, end=plain(float(data.exact.gain[-1]), 4)) if data.is_cut else ""
+    return f"{_more_K1(data) if data.name == 'K1' else _more_K2(data)}; {gap}{cut}"
 
 
 def _more_K1(data: Loci) -> str:
@@ -72,12 +81,12 @@ def _more_K1(data: Loci) -> str:
         return f"More K1, with K2 = {plain(exact.law.K2)} held"
     ratio = np.where(rows[0].imag > 0, -rows[0].real / np.maximum(abs(rows[0]), 1e-300), -np.inf)
     at = int(np.argmax(ratio))
-    then = ", and less from there on: the hub is then held too firmly to take energy out" if at < ratio.size - 1 else ""
     best_ratio, gain = significant(100 * float(ratio[at]), 3), significant(float(exact.gain[at]), 3)
-    return (
-        f"More K1 (K2 = {plain(exact.law.K2)} held) damps the first mode up to {best_ratio} % of critical at "
-        f"K1 = {gain} N m s/rad{then}"
-    )
+    start = f"More K1 (K2 = {plain(exact.law.K2)} held)"
+    if not (rows[0].imag[at:] > 0).all():
+        return f"{start} damps the first mode until it no longer swings, a little above K1 = {gain} N m s/rad"
+    then = ", and less from there on: the hub is then held too firmly to take energy out" if at < ratio.size - 1 else ""
+    return f"{start} damps the first mode up to {best_ratio} % of critical at K1 = {gain} N m s/rad{then}"
 
 
 def _more_K2(data: Loci) -> str:
@@ -88,10 +97,11 @@ def _more_K2(data: Loci) -> str:
     if not unstable:
         return f"{more} makes no branch that is drawn unstable in this range"
     first = min(each.gain for each in unstable)
-    many = [significant(each.omega, 4) for each in unstable if each.gain < first + 1e-6]
-    return (
-        f"{more} makes the loop unstable from K2 = {significant(first, 6)} on, where poles cross at {_list(many)} rad/s"
-    )
+    there = [each.omega for each in unstable if abs(each.gain - first) <= 1e-6 * abs(first)]
+    many = [significant(omega, 4) for omega in there if omega > 0]
+    how = f"poles cross at {_list(many)} rad/s" if many else "a real pole passes through 0"
+    on = "from" if not any(each.direction == "stable" and each.gain > first for each in exact.crossings) else "at"
+    return f"{more} makes the loop unstable {on} K2 = {significant(first, 6)}{' on' * (on == 'from')}, where {how}"
 
 
 def _list(texts: list[str]) -> str:
@@ -106,7 +116,7 @@ def _locus_picture(data: Loci) -> Picture:
         title=f"Closed-loop poles along {name}",
         caption=SEEN.format(name=name, order=data.reduced.order, worst=scientific(data.reduced.worst, 2)),
         alt=f"Root locus along {name}: {len(data.exact.branches)} branches, {many} crossing{'s' * (many != 1)} of the "
-        "imaginary axis; exact and reduced branches coincide.",
+        f"imaginary axis; the reduced branches are within {scientific(data.reduced.worst, 2)} of |s|.",
         figure=draw_loci(data),
         data=loci_data(data, f"locus-{name}-data"),
     )
@@ -114,24 +124,53 @@ def _locus_picture(data: Loci) -> Picture:
 
 def beyond_table(arm: Arm, held: HubFeedback) -> Table:
     """Verdict and poles of the exact loop for a few K2 around 1 and beyond."""
-    found = [_judged(arm, replace(held, K2=K2)) for K2 in BEYOND]
-    K2 = np.array(BEYOND)
-    growth = np.array([it.poles.spectral_abscissa if it else np.inf for it in found])
+    edge = edge_of_K2(arm, held) or 0.0
+    more = [float(f"{share * edge:.3g}") for share in AROUND_EDGE if edge > BEYOND[-1]]
+    gains = np.array([*BEYOND, *(K2 for K2 in more if BEYOND[-1] < K2)])
+    found = [_judged(arm, replace(held, K2=float(K2))) for K2 in gains]
+    title = "What K2 = 1 and beyond does, at K1 = " + plain(held.K1, 4)
+    return _poles_table("beyond", title, _beyond_caption(arm, held, found), "K2", "", gains, found)
+
+
+def rates_table(arm: Arm, held: HubFeedback) -> Table:
+    """Verdict and poles of the exact loop for a few K1."""
+    K1 = np.array([float(f"{share * rate_unit(arm):.3g}") for share in RATES])
+    found = [_judged(arm, replace(held, K1=float(gain))) for gain in K1]
+    title = "Poles at a few K1, at K2 = " + plain(held.K2, 4)
+    caption = "Exact poles, each list complete in its box."
+    return _poles_table("rates", title, caption, "K1", "N m s/rad", K1, found)
+
+
+def _poles_table(
+    stem: str, title: str, caption: str, name: str, unit: str, gains: Real, found: Sequence[Stability | None]
+) -> Table:
+    """A row a gain: verdict, unstable poles, the rightmost and the first pairs."""
     counts: list[int | str] = [_count(it) for it in found]
-    pairs = [_first_pairs(it) for it in found]
+    growth: list[float | str] = [it.poles.spectral_abscissa if it else "" for it in found]
     return Table(
-        stem="beyond",
-        title="What K2 = 1 and beyond does, at K1 = " + plain(held.K1, 4),
-        caption=_beyond_caption(arm),
+        stem=stem,
+        title=title,
+        caption=caption,
         columns=(
-            number_column("K2", "K2", "", K2, [plain(float(x)) for x in K2]),
+            number_column(name, name, unit, gains, [plain(float(x), 4) for x in gains]),
             text_column("verdict", "verdict", [it.verdict if it else "on the axis, not decided" for it in found]),
             Column(key="unstable_poles", title="unstable poles", values=counts, cells=[str(c) for c in counts]),
-            number_column("spectral_abscissa_1_s", "fastest growth", "1/s", growth,
-                          [significant(float(x), 4) for x in growth]),
-            text_column("first_pairs", "first pairs of poles, Re ± i Im [1/s]", pairs),
+            Column(
+                key="spectral_abscissa_1_s", title="fastest growth", unit="1/s", values=growth,
+                cells=[_growth(it) for it in found],
+            ),
+            text_column("first_pairs", "first pairs of poles, Re ± i Im [1/s]", [_first_pairs(it) for it in found]),
         ),
     )  # fmt: skip
+
+
+def _growth(it: Stability | None) -> str:
+    """The largest real part; 0 where rounding is all there is of it."""
+    if it is None:
+        return "-"
+    rightmost = it.poles.spectral_abscissa
+    size = abs(it.poles.moving[it.poles.moving.real == rightmost]).max(initial=0.0)
+    return "0" if abs(rightmost) <= MARGIN_OF_ZERO * size else significant(rightmost, 4)
 
 
 def _judged(arm: Arm, law: HubFeedback) -> Stability | None:
@@ -155,7 +194,21 @@ def _first_pairs(it: Stability | None) -> str:
     return ",  ".join(f"{plain(p.real, 4)} ± {significant(p.imag, 5)} i" for p in swinging)
 
 
-def _beyond_caption(arm: Arm) -> str:
+def _beyond_caption(arm: Arm, held: HubFeedback, found: Sequence[Stability | None]) -> str:
     J, hub = arm.total_inertia, arm.hub.inertia
     backwards = BACKWARDS.format(K2=significant(J / (J - hub), 5)) if arm.has_rigid_mode else ""
-    return (DAMPED if arm.link.damping else UNDAMPED) + backwards
+    if not arm.link.damping:
+        return UNDAMPED + backwards
+    counts = [it.unstable_roots for it in found if it is not None and it.unstable_roots]
+    more = MORE if len(counts) > 1 and counts[-1] > counts[0] and counts == sorted(counts) else ""
+    return DAMPED.format(edge=_edge_words(arm, held)) + more + backwards
+
+
+def _edge_words(arm: Arm, held: HubFeedback) -> str:
+    """Up to which K2 the loop stays stable, from the windows of the gains held."""
+    windows, edge = margins_of(arm, held).windows["K2"], edge_of_K2(arm, held)
+    if windows.around is None:
+        return ""
+    if edge is None:
+        return f"At this K1 no K2 up to {plain(windows.around[1], 6)} makes the loop unstable."
+    return f"At this K1 the loop is stable up to K2 = {plain(edge, 6)}."

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -15,9 +17,13 @@ from tfarm.spectrum.scales import default_gains
 MODES = 2  # flexible modes in the band of the damping that is drawn and designed for, as `tfarm design` has it
 SIGN = (
     "Law: u = −K1 dθ/dt − K2 E I φ′(0) + r. Sign of K2: the strain gauge reads E I φ′(0), positive where it "
-    "accelerates the hub; a torque u at rest gives −(J − I_h)/J u. With the gauge reversed every K2 changes its sign."
+    "accelerates the hub; {rest}. With the gauge reversed every K2 changes its sign."
 )
-
+AT_REST, HELD = "a torque u at rest gives −(J − I_h)/J u", "a torque u that lasts gives −u, as the tip holds the arm"
+NO_PLACE_FOR_K2 = (
+    "The hub of this arm has no inertia: {gauge}, so feeding it back by K2 would be an algebraic loop. There is no map "
+    "of K1 and K2; what K1 does at K2 = 0 is said below."
+)
 
 TYPESET = {
     "theta_t^2": "(dθ/dt)²", "theta_t": "dθ/dt", "phi_xt(0)": "∂φ′(0)/∂t", "L(iw)": "L(iω)",
@@ -29,7 +35,7 @@ def typeset(text: str) -> str:
     """A sentence of the loop room as a page shows it."""
     for plain_text, shown in TYPESET.items():
         text = text.replace(plain_text, shown)
-    return text
+    return re.sub(r"\d(?:\.\d+)?e[-+]\d+", lambda number: plain(float(number[0])), text)
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,19 +57,37 @@ def has_loop(arm: Arm) -> bool:
     return not arm.is_locked and arm.hub.inertia > 0
 
 
+def has_rate_loop(arm: Arm) -> bool:
+    """Whether K1 can be closed: the hub can turn."""
+    return not arm.is_locked
+
+
 def why_no_loop(arm: Arm) -> str:
-    """One sentence for an arm whose gains cannot be closed."""
+    """One sentence for an arm whose gains cannot both be closed."""
     if arm.is_locked:
         return "The hub of this arm is locked: it takes no torque, so there is no loop to close and no gain to choose."
-    return (
-        "The hub of this arm has no inertia: its root moment is −u at every instant, so feeding it back by K2 would "
-        "be an algebraic loop, and there is no map of K1 and K2."
-    )
+    whole = "its gauge reads −u at every instant"
+    damped = "its gauge reads −u/(1 + C s), the torque itself through a short lag"
+    return NO_PLACE_FOR_K2.format(gauge=damped if arm.link.damping else whole)
+
+
+def sign_words(arm: Arm) -> str:
+    """The law, and the sign of its K2."""
+    return SIGN.format(rest=AT_REST if arm.has_rigid_mode else HELD)
+
+
+def edge_of_K2(arm: Arm, law: HubFeedback) -> float | None:
+    """The K2 at which the loop loses its stability as K2 grows, the other gains held; None where none was found."""
+    windows = margins_of(arm, law).windows["K2"]
+    top = math.inf if windows.around is None else windows.around[1]
+    return top if windows.around is not None and windows.end(top) == "edge" else None
 
 
 @lru_cache(maxsize=16)
 def best(arm: Arm) -> Design | None:
-    """What `tfarm design ARM` finds; None where no gains within its bounds are stable."""
+    """What `tfarm design ARM` finds; None where no gains within its bounds are stable, or where K2 has no place."""
+    if not has_loop(arm):
+        return None
     try:
         return design(arm, modes=MODES)
     except ConvergenceError:

@@ -8,15 +8,17 @@ import numpy as np
 
 from tfarm.arm import Arm
 from tfarm.loop.stability import stability
+from tfarm.loop.windows import Windows
 from tfarm.report.digits import plain, significant
 from tfarm.report.figures import Picture
 from tfarm.report.loop_laws import (
     MODES,
-    SIGN,
     NamedLaw,
     best,
+    edge_of_K2,
     laws,
     margins_of,
+    sign_words,
     typeset,
     why_no_loop,
 )
@@ -27,13 +29,15 @@ from tfarm.report.nyquist import Nyquist, count_table, curve_data, draw_nyquist,
 from tfarm.report.sections import Section
 from tfarm.spectrum.scales import default_gains, default_words, rate_unit
 
-UNSTABLE_K2 = 1.5  # of the law whose encirclements are counted for comparison
+UNSTABLE_K2 = 1.5  # at least, of the law whose encirclements are counted for comparison
+BEYOND_EDGE = 1.2  # and at least so many times the K2 at which the loop loses its stability
 
 MAP_SEEN = (
-    "Green: every pole is in the left half-plane, that of the hub angle at 0 apart; orange: the number of unstable "
-    "poles. The black edge and the counts are exact, of the arm itself and no reduced model{reach}. Blue: damping "
-    "ratio of the least damped pole below {band} rad/s. {proof} K1 is scaled by J ω₁ = {unit} N m s/rad."
+    "Green: every pole is in the left half-plane{apart}; orange: the number of unstable poles. The black edge and the "
+    "counts are exact, of the arm itself and no reduced model{reach}. Blue: damping ratio of the least damped pole "
+    "below {band} rad/s. {proof} K1 is scaled by J ω₁ = {unit} N m s/rad{held}."
 )
+APART, HELD = ", that of the hub angle at 0 apart", ", with J the inertia of what turns: hub, link and finite payload"
 ALL_MODES, UP_TO = ", with all its infinitely many modes", ", with every crossing up to {band} rad/s"
 PROOF = "The purple frame is what the Lyapunov argument proves at C = 0: K1 > 0 and K2 < 1, all of the stable region."
 NO_PROOF = (
@@ -80,7 +84,7 @@ def map_section(arm: Arm) -> Section:
         figure=draw_map(data),
         data=map_data(data),
     )
-    words = (_answer(arm), _best_words(arm), SIGN)
+    words = (_answer(arm), _best_words(arm), sign_words(arm))
     return Section(
         anchor="margins-map", title="How high may the gains go?", words=[w for w in words if w], blocks=(picture,)
     )
@@ -90,27 +94,38 @@ def _answer(arm: Arm) -> str:
     """The windows of K1 and K2 through the default gains, in words."""
     found = margins_of(arm, default_gains(arm))
     start = f"With the default gains {typeset(default_words(arm))} the loop is {found.stability.verdict}"
-    K1, K2 = (found.windows[name].around for name in ("K1", "K2"))
-    if K1 is None or K2 is None:
+    K1, K2 = found.windows["K1"], found.windows["K2"]
+    if K1.around is None or K2.around is None:
         return f"{start}; the picture shows which gains are stable."
-    low, high = found.windows["K2"].looked_at
-    down = "as far down as one likes" if K2[0] == -np.inf else f"down to {plain(K2[0], 5)}"
-    down += " (the search ends there)" if K2[0] == low else ""
-    up = "without limit" if K1[1] == np.inf else f"up to {plain(K1[1], 5)} N m s/rad"
-    up += " (the search ends there)" if K1[1] == found.windows["K1"].looked_at[1] else ""
-    crossing = next((each for each in found.windows["K2"].crossings if each.t == K2[1]), None)
-    where = ""
-    if crossing is not None and np.isfinite(crossing.omega):
-        where = f", where poles cross at {significant(crossing.omega, 4)} rad/s"
-    elif crossing is not None:
-        where = ", where every flexible mode crosses at once"
-    top = f"{plain(K2[1], 5)}{where}" if K2[1] < high else "without limit"
-    more = len(found.windows["K2"].all)
-    again = f" K2 has {more} separate stable windows at that K1, listed below." if more > 1 else ""
-    return (
-        f"{start}: at that K1, K2 may go up to {top}, and {down}; at that K2, K1 may go {up}, and must stay above "
-        f"{plain(K1[0], 4)}.{again}"
-    )
+    again = f" K2 has {len(K2.all)} separate stable windows at that K1, listed below." if len(K2.all) > 1 else ""
+    return f"{start}: at that K1, K2 may {_room(K2, '')}; at that K2, K1 may {_room(K1, ' N m s/rad')}.{again}"
+
+
+def _room(windows: Windows, unit: str) -> str:
+    """How far a gain may go up and down: to an edge and what happens there, to where the search ends, or anywhere."""
+    assert windows.around is not None
+    ways = []
+    for value, way in zip(reversed(windows.around), ("up", "down"), strict=True):
+        place = f"{plain(value, 5)}{unit}"
+        if windows.end(value) == "no limit":
+            ways.append(f"go {way} without limit")
+        elif windows.end(value) == "search bound":
+            ways.append(f"go {way} at least to {place}, where the search ends")
+        else:
+            ways.append(f"go {way} to {place}{_crossing_there(windows, value)}")
+    return ", and may ".join(ways)
+
+
+def _crossing_there(windows: Windows, value: float) -> str:
+    """What reaches the axis at that edge."""
+    crossing = next((each for each in windows.crossings if each.t == value), None)
+    if crossing is None:
+        return ""
+    if crossing.omega == 0:
+        return ", where a real pole passes through 0"
+    if not np.isfinite(crossing.omega):
+        return ", where every flexible mode crosses at once"
+    return f", where poles cross at {significant(crossing.omega, 4)} rad/s"
 
 
 def _best_words(arm: Arm) -> str:
@@ -131,14 +146,16 @@ def _map_caption(data: GainMap) -> str:
     proof = PROOF if data.is_undamped else NO_PROOF
     unit = plain(rate_unit(data.arm), 4)
     reach = ALL_MODES if data.is_undamped else UP_TO.format(band=significant(data.region.band, 5))
-    return MAP_SEEN.format(band=significant(data.band, 5), proof=proof, unit=unit, reach=reach) + DEPTH * (
-        not data.is_undamped
+    free = data.arm.has_rigid_mode
+    seen = MAP_SEEN.format(
+        band=significant(data.band, 5), proof=proof, unit=unit, reach=reach, apart=APART * free, held=HELD * (not free)
     )
+    return seen + DEPTH * (not data.is_undamped)
 
 
 def _map_alt(data: GainMap) -> str:
     share = significant(100 * float(data.region.stable.mean()), 2)
-    return f"Map of K1 and K2: {share} % of the area shown is stable: right of K1 = 0 and below an edge near K2 = 1."
+    return f"Map of K1 and K2: {share} % of the area shown is stable; how far each gain may go is said above."
 
 
 # ------------------------------------------------------------ margins
@@ -153,7 +170,7 @@ def margins_section(arm: Arm) -> Section:
         title="Is the loop stable, and by how much?",
         facts=tuple(verdict_facts(named, found)),
         words=[verdict_words(*each) for each in zip(named, found, strict=True)],
-        blocks=(margin_table(named, found, arm.link.damping == 0), window_table(named, found, SIGN)),
+        blocks=(margin_table(named, found, arm.link.damping == 0), window_table(named, found, sign_words(arm))),
     )
 
 
@@ -164,7 +181,9 @@ def nyquist_section(arm: Arm) -> Section:
     """The loop function on a contour that hides nothing."""
     named = laws(arm)
     plots = [nyquist(each, margins_of(arm, each.law).stability) for each in named]
-    wrong = NamedLaw("to compare", "unstable", replace(default_gains(arm), K2=UNSTABLE_K2))
+    law = default_gains(arm)
+    beyond = float(f"{BEYOND_EDGE * (edge_of_K2(arm, law) or 1.0):.3g}")
+    wrong = NamedLaw("to compare", "unstable", replace(law, K2=max(UNSTABLE_K2, beyond)))
     counted = [*plots, nyquist(wrong, stability(arm, wrong.law))]
     picture = Picture(
         stem="nyquist",

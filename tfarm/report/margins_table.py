@@ -28,7 +28,7 @@ UNDAMPED = (
 )
 WINDOWS = (
     "The others held, each gain may move within its window before the first pole reaches the axis. Ends ±∞ are proven; "
-    "other ends that coincide with the range looked at only say where the search stopped. {sign}"
+    "an end with a star is no edge: up to there none was found, and beyond none was looked for. {sign}"
 )
 QUANTITIES = (
     "gain margin, down", "gain margin, up", "phase margin", "phase lag", "phase lead", "delay margin", "disk margin α",
@@ -51,9 +51,10 @@ def verdict_words(named: NamedLaw, found: Margins) -> str:
     it = found.stability
     proof = lyapunov(it.loop.arm, named.law)
     proven = "proven" if proof.proven else "no proof"
+    apart = ", the one at 0 that the hub angle leaves apart" if it.loop.arm.has_rigid_mode and not named.law.Kp else ""
     return (
         f"{named.name.capitalize()}, {named.gains}: {it.verdict.upper()}, with {_many(it.unstable_roots)} "
-        f"{_up_to(it.band)}, the one at 0 that the hub angle leaves apart; {typeset(it.tail)}. "
+        f"{_up_to(it.band)}{apart}; {typeset(it.tail)}. "
         f"Lyapunov: {proven}, {typeset(proof.reason)}."
     )
 
@@ -130,10 +131,15 @@ def _number(value: Value) -> str:
 
 
 def window_table(laws: Sequence[NamedLaw], found: Sequence[Margins], sign: str) -> Table:
-    """A row a law and gain."""
-    rows = [(law, name, each.windows[name], each) for law, each in zip(laws, found, strict=True) for name in UNITS]
+    """A row a law and gain; none for K2 on a free pin, where it has no loop."""
+    rows = [
+        (law, name, each.windows[name], each)
+        for law, each in zip(laws, found, strict=True)
+        for name in UNITS
+        if name != "K2" or each.stability.loop.arm.hub.inertia > 0
+    ]
     values = [getattr(law.law, name) for law, name, _, _ in rows]
-    around = [_pair(windows.around) if windows.around else NOTHING for _, _, windows, _ in rows]
+    around = [_window(windows, windows.around) if windows.around else NOTHING for _, _, windows, _ in rows]
     return Table(
         stem="windows",
         title="How far each gain may go alone",
@@ -166,7 +172,13 @@ def _joined(*pairs: tuple[float, float]) -> str:
 
 
 def _all(windows: Windows) -> str:
-    return ", ".join(_pair(pair) for pair in windows.all) or "none"
+    return ", ".join(_window(windows, pair) for pair in windows.all) or "none"
+
+
+def _window(windows: Windows, pair: tuple[float, float]) -> str:
+    """An interval with a star at each end that only bounds the search."""
+    low, high = (f"{plain(value, 5)}{'*' * (windows.end(value) == 'search bound')}" for value in pair)
+    return f"({low}, {high})"
 
 
 def _pair(pair: tuple[float, float]) -> str:

@@ -43,8 +43,9 @@ COUNTS = (
     "L has no pole right of the contour, so each clockwise turn around −1 (counted negative) is one unstable "
     "closed-loop pole. The count in a box was made without Nyquist, by finding every pole; poles whose real part is "
     "less than 10⁻¹² of their size are not told apart from the axis there (undecided), though their turns around −1 "
-    "are counted. The last law is there to show that the count is not always 0."
+    "are counted.{last}"
 )
+COUNTED = " The last law is there to show that the count is not always 0."
 
 
 @dataclass(frozen=True)
@@ -276,7 +277,7 @@ def count_table(plots: Sequence[Nyquist], names: Sequence[str]) -> Table:
     return Table(
         stem="nyquist-count",
         title="Encirclements beside unstable poles",
-        caption=COUNTS,
+        caption=COUNTS.format(last=COUNTED if plots[-1].verdict.unstable_roots else ""),
         columns=(
             text_column("law", "law", names),
             text_column("verdict", "verdict", words),

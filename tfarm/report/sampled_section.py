@@ -11,7 +11,7 @@ from tfarm.dsp import sampled_verdict
 from tfarm.report.digits import plain, scientific, significant
 from tfarm.report.discrete_loci import draw_loci, loci, loci_table
 from tfarm.report.figures import Picture
-from tfarm.report.loop_laws import SIGN, has_loop, why_no_loop
+from tfarm.report.loop_laws import has_loop, sign_words, why_no_loop
 from tfarm.report.overlay import draw_overlay, overlay_table
 from tfarm.report.sampled_modes import draw_modes, mode_rows
 from tfarm.report.sampled_words import (
@@ -44,7 +44,7 @@ def sampled_section(arm: Arm) -> Section:
         return Section(anchor="sampled", title=title, words=(why_no_loop(arm),))
     data = study(arm)
     blocks: list[Picture | Table] = [_overlay_picture(data), _periods_table(data), *_mode_blocks(data)]
-    words = [short_answer(data), compared(data), cure(data), SIGN]
+    words = [short_answer(data), compared(data), cure(data), sign_words(arm)]
     if arm.has_rigid_mode:
         blocks += _time_blocks(data)
     else:

@@ -10,7 +10,7 @@ from tfarm.arm import Arm, HubFeedback
 from tfarm.errors import CertificationError
 from tfarm.report.digits import aligned, plain, significant
 from tfarm.report.figures import Picture
-from tfarm.report.loop_laws import SIGN, has_loop, why_no_loop
+from tfarm.report.loop_laws import has_loop, sign_words, why_no_loop
 from tfarm.report.overlay import overlay
 from tfarm.report.sampled_words import SHORT_SIGN, typeset
 from tfarm.report.sections import Section
@@ -60,7 +60,7 @@ def section_of(data: TunerStudy) -> Section:
             shaping_words(data),
             bound_words(data),
             learning_words(data),
-            SIGN,
+            sign_words(data.arm),
         ),
         blocks=(
             _gain_picture(data),

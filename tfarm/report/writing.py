@@ -25,7 +25,7 @@ from tfarm.report.assumptions_section import assumptions_section
 from tfarm.report.bode_section import bode_section
 from tfarm.report.card import save_card, written_cards
 from tfarm.report.locus_section import locus_section
-from tfarm.report.loop_laws import has_loop
+from tfarm.report.loop_laws import has_loop, has_rate_loop
 from tfarm.report.loop_section import map_section, margins_section, no_loop_section, nyquist_section
 from tfarm.report.modes_section import modes_section
 from tfarm.report.page import QUESTIONS, arm_page, index_page
@@ -62,14 +62,14 @@ PIECES = (
     Piece("root moment", "bode-root-moment", ("bode",), partial(bode_section, output="root_moment")),
     Piece("tip displacement", "bode-tip-displacement", ("bode",), partial(bode_section, output="tip_displacement")),
     Piece("modes", "modes", ("modes",), modes_section),
-    Piece("margins", "margins", ("margins",), margins_section, has_loop),
-    Piece("root loci", "locus", ("locus",), locus_section, has_loop),
-    Piece("Nyquist", "margins-nyquist", ("margins",), nyquist_section, has_loop),
-    Piece("sampled loop", "sampled", ("sampled",), sampled_section, has_loop),
-    Piece("gain tuner", "tune", ("tune",), tuner_section, has_loop),
     Piece(
         "no loop", "no-loop", ("margins", "locus", "sampled", "tune"), no_loop_section, lambda arm: not has_loop(arm)
     ),
+    Piece("margins", "margins", ("margins",), margins_section, has_rate_loop),
+    Piece("root loci", "locus", ("locus",), locus_section, has_rate_loop),
+    Piece("Nyquist", "margins-nyquist", ("margins",), nyquist_section, has_loop),
+    Piece("sampled loop", "sampled", ("sampled",), sampled_section, has_loop),
+    Piece("gain tuner", "tune", ("tune",), tuner_section, has_loop),
     Piece("assumptions", "assumptions", ("assumptions",), assumptions_section),
 )
 CARD = "card"

@@ -175,8 +175,9 @@ def _exchange(family: Family, nodes: list[Node], stray: NDArray[np.bool_], at: f
         if near in (np.inf, zeros[i, 1 - j].real):
             continue
         both = np.array([zero, near])
-        move = -(there(both).value / here(both).slope * np.exp(there(both).scale - here(both).scale)).real
-        if (move[1] - move[0]) / (near - zero.real) > -CLOSING:
+        with np.errstate(divide="ignore", invalid="ignore"):  # a double zero has no slope: nothing is known of its way
+            move = -(there(both).value / here(both).slope * np.exp(there(both).scale - here(both).scale)).real
+        if not (move[1] - move[0]) / (near - zero.real) <= -CLOSING:
             continue
         m, n = np.unravel_index(abs(zeros - near).argmin(), zeros.shape)
         meeting = sorted(both, key=abs)
