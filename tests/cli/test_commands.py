@@ -116,7 +116,7 @@ def test_tables_for_people(capsys: pytest.CaptureFixture[str]) -> None:
 BAD = [
     (["modes", "sasaki2021"], 'did you mean "sasaki2012"'),
     (["modes", "sasaki2012", "--count", "0"], "--count = '0'"),
-    (["modes", "sasaki2012", "--count", "10001"], "1 to 10000"),
+    (["modes", "sasaki2012", "--count", "1001"], "1 to 1000"),
     (["modes", "sasaki2012", "--count", "nan"], "--count = 'nan'"),
     (["modes", "sasaki2012", "--count", "2.5"], "--count = '2.5'"),
     (["modes", "sasaki2012", "--count", "5_0"], "--count = '5_0'"),

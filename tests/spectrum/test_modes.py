@@ -1,6 +1,7 @@
 """Mode shapes, hub participation, energies, nodes and sensitivities, each by a road the code does not take."""
 
 import math
+import tracemalloc
 from dataclasses import replace
 from itertools import pairwise
 
@@ -143,7 +144,7 @@ def test_the_modal_moment_drives_the_hub(modes):
 
 def test_modal_sums_give_the_response():
     """theta/u = sum of b^2/(s^2 + w^2), in the limit: b^2 falls as w^-3 once the hub outweighs the arm in inertia."""
-    arm = tfarm.load("sasaki2012")
+    arm = tfarm.tfarm.load("sasaki2012")
     modes, s = tfarm.modes(arm, 60), 3.0 + 100.0j
     terms = modes.hub_participation**2 / (s**2 + modes.natural_frequency**2)
     exact = tfarm.transfer(arm, "hub_angle")(s)
@@ -237,13 +238,13 @@ def test_the_root_of_the_paper_s_determinant_is_the_frequency():
 
 
 def test_no_points_have_no_values():
-    assert tfarm.modes(tfarm.load("sasaki2012"), 3).shape(np.empty(0)).shape == (4, 0)
+    assert tfarm.modes(tfarm.tfarm.load("sasaki2012"), 3).shape(np.empty(0)).shape == (4, 0)
 
 
 @pytest.mark.parametrize("x", [-0.1, 1.1, math.nan])
 def test_a_point_outside_the_arm_has_no_shape(x):
     with pytest.raises(ParameterError, match="a point of the arm lies between 0 and"):
-        tfarm.modes(tfarm.load("sasaki2012"), 1).shape(x)
+        tfarm.modes(tfarm.tfarm.load("sasaki2012"), 1).shape(x)
 
 
 def test_euler_bernoulli_has_no_shear_energy():
@@ -255,9 +256,26 @@ def test_euler_bernoulli_has_no_shear_energy():
 
 def test_the_root_moment_of_a_light_hub_is_not_rounding():
     """It tends to -I_h w^2 b of the free pin, in proportion to I_h; at the free pin it is 0."""
-    free = replace(tfarm.load("sasaki2012"), hub=Hub(inertia=0.0))
+    free = replace(tfarm.tfarm.load("sasaki2012"), hub=Hub(inertia=0.0))
     light = replace(free, hub=Hub(inertia=1e-12))
     modes = tfarm.modes(free, COUNT)
     assert not modes.modal_moment.any()
     limit = -(modes.natural_frequency[1:] ** 2) * modes.hub_participation[1:]
     np.testing.assert_allclose(tfarm.modes(light, COUNT).modal_moment[1:] / 1e-12, limit, rtol=1e-6)
+
+
+def test_memory_does_not_grow_with_the_square_of_the_count(monkeypatch):
+    """Twice the modes have four times the points; what is evaluated at once stays the same, and so do the numbers."""
+    whole = tfarm.modes(tfarm.load("sasaki2012"), 40)
+    expected = whole.hub_participation, whole.sensitivity["length"]
+    monkeypatch.setattr("tfarm.spectrum.shapes.BLOCK", 2**10)
+    peaks = []
+    for count in (40, 80):
+        table = tfarm.modes(tfarm.load("sasaki2012"), count)
+        tracemalloc.start()
+        found = table.hub_participation, table.sensitivity["length"]
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+        for ours, theirs in zip(found, expected, strict=True):
+            np.testing.assert_allclose(ours[:41], theirs, rtol=1e-12)  # rounding of sums over 40 modes' points
+    assert peaks[1] < 2.5 * peaks[0]

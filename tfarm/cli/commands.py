@@ -11,6 +11,8 @@ import typer
 from tfarm.cli.app import ArmName, Digits, Json, app, load_arm, right_digits, whole
 from tfarm.errors import ParameterError, one_line
 
+MOST_LISTED = 1000  # modes with nodes and sensitivities: their work grows with the square, to some 20 s
+
 
 @app.command()
 def presets(json: Json = False) -> None:
@@ -31,14 +33,14 @@ def presets(json: Json = False) -> None:
 @app.command()
 def modes(
     arm: ArmName,
-    count: Annotated[str, typer.Option("--count", metavar="N", help="flexible modes, 1 to 10000")] = "10",
+    count: Annotated[str, typer.Option("--count", metavar="N", help="flexible modes, 1 to 1000")] = "10",
     theory: Annotated[str, typer.Option(help="timoshenko, shear, rayleigh or euler-bernoulli")] = "timoshenko",
     digits: Digits = None,
     certify: Annotated[bool, typer.Option("--certify", help="prove each bracket, and that no mode is missing")] = False,
     json: Json = False,
 ) -> None:
     """Natural frequencies and modes, complete by construction."""
-    wanted, right = whole("--count", count, 1, 10_000), right_digits(digits)
+    wanted, right = whole("--count", count, 1, MOST_LISTED), right_digits(digits)
     subject = load_arm(arm)
     from tfarm.cli.answers import modes_answer, to_json
     from tfarm.spectrum import modes as find_modes

@@ -8,6 +8,7 @@ A double frequency has two modes: its null space is taken whole and made orthogo
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from copy import copy
 from typing import Any
 
@@ -26,6 +27,7 @@ _even = plain(even_functions)
 GAUSS = 16  # points a panel; exact for the products of waves below once a panel holds a few radians
 DOUBLE = 4e-15  # relative gap under which two frequencies are one, with two modes
 CLOSE = 1e-5  # relative gap under which rounding would leave two modes not quite orthogonal
+BLOCK = 2**17  # modes times points that are evaluated at once, each of 256 bytes: memory, whatever the count
 
 
 class Shapes:
@@ -54,18 +56,26 @@ class Shapes:
             result[:, high] = np.einsum("sm,fsmx->fmx", self._weights, self._basis(x)).real
         return result
 
-    def only(self, mode: int) -> Shapes:
-        """The same with one of the modes, as it is normalised here."""
-        one = copy(self)
-        low = bool(self._low[mode])
-        among = int(self._low[:mode].sum()) if low else mode - int(self._low[:mode].sum())
-        keep, none = slice(among, among + 1), slice(0, 0)
-        here = slice(mode, mode + 1)
-        one.omega, one._S, one._gS, one._low = self.omega[here], self._S[here], self._gS[here], self._low[here]
-        one._one, one._two = (Wave._make(p[here] for p in wave) for wave in (self._one, self._two))
-        one._root = self._root[:, keep if low else none]
-        one._weights = self._weights[:, none if low else keep]
-        return one
+    def part(self, first: int, last: int) -> Shapes:
+        """The same with the modes first..last - 1 alone, as they are normalised here."""
+        part = copy(self)
+        here = slice(first, last)
+        lows = int(self._low[:first].sum()), int(self._low[:last].sum())
+        low, high = slice(*lows), slice(first - lows[0], last - lows[1])
+        part.omega, part._S, part._gS, part._low = self.omega[here], self._S[here], self._gS[here], self._low[here]
+        part._one, part._two = (Wave._make(p[here] for p in wave) for wave in (self._one, self._two))
+        part._root, part._weights = self._root[:, low], self._weights[:, high]
+        return part
+
+    def blocks(self) -> Iterator[slice]:
+        """Neighbouring modes, so few at a time that `quadrature` has `BLOCK` points for them in all."""
+        first = 0
+        while first < self.omega.size:
+            last = min(2 * first + 4, self.omega.size)
+            while last > first + 1 and (last - first) * GAUSS * self.part(first, last).panels > BLOCK:
+                last = (first + last) // 2
+            yield slice(first, last)
+            first = last
 
     def theta(self) -> Real:
         """Hub angle of each mode; from the hub's own balance where its inertia leads, so that no digit is lost."""
@@ -77,25 +87,38 @@ class Shapes:
         heavy = abs(inertia) > force
         return np.where(heavy, force * root[2] / np.where(heavy, inertia, 1.0), root[1])
 
-    def quadrature(self) -> tuple[Real, Real]:
-        """Gauss points and weights on 0..1, panels short against every wave of these modes."""
+    @property
+    def panels(self) -> int:
+        """Panels of 0..1 that are short against every wave of these modes."""
         fastest = max((abs(wave.t).max(initial=0.0) for wave in (self._one, self._two)), default=0.0)
-        panels = 4 + math.ceil(fastest / 4.0)
+        return 4 + math.ceil(fastest / 4.0)
+
+    def quadrature(self) -> tuple[Real, Real]:
+        """Gauss points and weights on 0..1 for products of these modes."""
+        panels = self.panels
         nodes, weights = np.polynomial.legendre.leggauss(GAUSS)
         start = np.arange(panels)[:, None]
         return ((start + (nodes + 1) / 2) / panels).ravel(), np.tile(weights / 2 / panels, panels)
 
     def mass_matrix(self) -> Real:
         """Modal masses (diagonal) and products of different modes, in EI/L: the identity, if all is well."""
+        W, Psi, weight, ends = self._moving()
+        mass = float(self.k.g) * (W * weight) @ W.T + float(self.k.a) * (Psi * weight) @ Psi.T
+        return mass + sum(inertia * np.outer(motion, motion) for inertia, motion in ends)
+
+    def masses(self) -> Real:
+        """The modal masses alone."""
+        W, Psi, weight, ends = self._moving()
+        mass = float(self.k.g) * W**2 @ weight + float(self.k.a) * Psi**2 @ weight
+        return mass + sum(inertia * motion**2 for inertia, motion in ends)
+
+    def _moving(self) -> tuple[Real, Real, Real, list[tuple[float, Real]]]:
+        """What moves: W and Psi at the points of `quadrature`, its weights; the ends' finite inertias and motions."""
         x, weight = self.quadrature()
         W, Psi, _, _ = self(x)
-        tip = self(np.ones(1))[..., 0]
-        k, theta = self.k, self.theta()
-        mass = float(k.g) * (W * weight) @ W.T + float(k.a) * (Psi * weight) @ Psi.T
-        for inertia, motion in ((k.tip_mass, tip[0]), (k.tip_inertia, tip[1]), (k.hub_inertia, theta)):
-            if math.isfinite(inertia):
-                mass = mass + float(inertia) * np.outer(motion, motion)
-        return mass
+        tip, k = self(np.ones(1))[..., 0], self.k
+        ends = ((k.tip_mass, tip[0]), (k.tip_inertia, tip[1]), (k.hub_inertia, self.theta()))
+        return W, Psi, weight, [(float(inertia), motion) for inertia, motion in ends if math.isfinite(inertia)]
 
     def _basis(self, x: Real) -> Complex:
         """The four waves of the modes above the low ones, at x: shape (4 waves, 4 fields, modes, x)."""
@@ -129,19 +152,26 @@ class Shapes:
 
     def _normalise(self) -> None:
         """Real phase, modes of a double frequency orthogonal, unit modal mass, tip (else its rotation) positive."""
-        x, _ = self.quadrature()
-        if self._weights.size:
-            fields = np.einsum("sm,fsmx->fmx", self._weights, self._basis(x))
-            W = fields[0] + fields[1] / max(1.0, abs(fields[1]).max())
-            peak = np.take_along_axis(W, abs(W).argmax(axis=1)[:, None], axis=1)[:, 0]
-            self._weights = self._weights * (abs(peak) / peak)
-        self._scale(1.0 / np.sqrt(np.diagonal(self.mass_matrix())))
+        parts = [self.part(block.start, block.stop) for block in self.blocks()]
+        turned = [part._weights * part._phase() for part in parts]
+        self._weights = np.concatenate([self._weights[:, :0], *turned], axis=1)
+        parts = [self.part(block.start, block.stop) for block in self.blocks()]
+        self._scale(1.0 / np.sqrt(np.concatenate([part.masses() for part in parts])))
         self._orthogonalise()
         tip, theta = self(np.ones(1))[..., 0], self.theta()
         motion = np.where(
             abs(tip[0]) > 1e-9 * abs(tip[1]), tip[0], np.where(abs(tip[1]) > 1e-9 * abs(theta), tip[1], theta)
         )
         self._scale(np.where(motion < 0, -1.0, 1.0))
+
+    def _phase(self) -> Complex:
+        """The factor of each mode of waves that makes it real."""
+        if not self._weights.size:
+            return np.empty(0, complex)
+        fields = np.einsum("sm,fsmx->fmx", self._weights, self._basis(self.quadrature()[0])[:2])
+        W = fields[0] + fields[1] / max(1.0, abs(fields[1]).max())
+        peak = np.take_along_axis(W, abs(W).argmax(axis=1)[:, None], axis=1)[:, 0]
+        return abs(peak) / peak
 
     def _scale(self, factor: Real) -> None:
         self._root = self._root * factor[self._low]
@@ -150,23 +180,36 @@ class Shapes:
     def _orthogonalise(self) -> None:
         """Gram-Schmidt in the modal mass within each pair of close or double frequencies."""
         (pairs,) = np.nonzero(np.diff(self.omega) < CLOSE * self.omega[1:])
-        for first in pairs:
-            overlap = self.mass_matrix()[first, first + 1]
+        for first in map(int, pairs):
+            overlap = self.part(first, first + 2).mass_matrix()[0, 1]
             above = first - int(self._low[: first + 1].sum())
             self._weights[:, above + 1] -= overlap * self._weights[:, above]
             factor = np.ones_like(self.omega)
-            factor[first + 1] = 1.0 / math.sqrt(self.mass_matrix()[first + 1, first + 1])
+            factor[first + 1] = 1.0 / math.sqrt(self.part(first + 1, first + 2).masses()[0])
             self._scale(factor)
 
 
 def _pair(wave: Wave, gS: Any, x: Real) -> tuple[Any, Any]:
     """Two independent solutions (W, Psi, M, Q) of one wave: from the root and from the tip, or even and odd in x."""
-    z, v, t = wave.z[:, None], wave.v[:, None], wave.t[:, None]
-    slow = abs(z) < 1.0
-    t = np.where(slow, 1.0, t)
-    from_start, from_end = np.exp(-t * x), np.exp(-t * (1 - x))
-    c, s = _even(np.where(slow, z, 0.0) * x**2)
+    slow = abs(wave.z) < 1.0
+    pair = np.empty((2, 4, slow.size, x.size), complex)
+    for rows, solutions in ((slow, _even_and_odd), (~slow, _from_the_ends)):
+        if rows.any():
+            pair[:, :, rows] = solutions(Wave._make(part[rows, None] for part in wave), gS[rows], x)
+    return pair[0], pair[1]
+
+
+def _even_and_odd(wave: Wave, gS: Any, x: Real) -> Any:
+    """For a wave that hardly turns along the arm."""
+    z, v = wave.z, wave.v
+    c, s = _even(z * x**2)
     s = x * s
-    one = np.where(slow, (c, v * s, v * c, gS * s), from_start * np.array((0 * v + 1, -v / t, v, -gS / t)))
-    two = np.where(slow, (z * s, v * c, v * z * s, gS * c), from_end * np.array((0 * v + 1, v / t, v, gS / t)))
-    return one, two
+    return (c, v * s, v * c, gS * s), (z * s, v * c, v * z * s, gS * c)
+
+
+def _from_the_ends(wave: Wave, gS: Any, x: Real) -> Any:
+    """e^(-t x) and e^(-t (1 - x)), neither of which grows."""
+    v, t = wave.v, wave.t
+    from_start, from_end = np.exp(-t * x), np.exp(-t * (1 - x))
+    one = (from_start, -v / t * from_start, v * from_start, -gS / t * from_start)
+    return one, (from_end, v / t * from_end, v * from_end, gS / t * from_end)

@@ -159,7 +159,12 @@ class Modes:
     @cached_property
     def _energies(self) -> tuple[Real, ...]:
         """Shares of each mode's energy: bending, shear, shear cross term; kinetic ones. Both kinds sum to 1."""
-        k, shapes = self._k, self._shapes
+        parts = (self._shapes.part(block.start, block.stop) for block in self._shapes.blocks())
+        energies = [self._energies_of(part) for part in parts]
+        return tuple(map(np.concatenate, zip(*energies, strict=True)))
+
+    def _energies_of(self, shapes: Shapes) -> tuple[Real, ...]:
+        k = self._k
         x, weight = shapes.quadrature()
         W, Psi, M, Q = shapes(x)
         tip, hub = shapes(np.ones(1))[..., 0], shapes.theta()
@@ -199,7 +204,7 @@ class Modes:
 
     def _nodes(self, mode: int) -> Real:
         """Interior zeros of W: bracketed on a grid finer than its waves, polished by Newton (W' = Psi + sigma Q)."""
-        shape = self._shapes.only(mode)
+        shape = self._shapes.part(mode, mode + 1)
         ends = np.geomspace(1e-9, 0.9 / (24 * (mode + 3)), 40)  # a heavy hub or payload draws a node close to it
         grid = np.r_[ends, np.linspace(0.0, 1.0, 24 * (mode + 3))[1:-1], 1.0 - ends[::-1]]
         W, Psi, *_ = shape(grid)[:, 0]
