@@ -10,7 +10,6 @@ import pytest
 
 import tfarm
 from tests.shell import heard
-from tfarm.exact.outputs import OUTPUTS
 
 ROOT = Path(__file__).parent.parent
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -24,13 +23,8 @@ def test_python_examples_run_one_after_the_other(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     names: dict[str, object] = {}
-    before = dict(OUTPUTS)
-    try:
-        for block in blocks("python"):
-            exec(compile(block, "README.md", "exec"), names)
-    finally:
-        OUTPUTS.clear()
-        OUTPUTS.update(before)
+    for block in blocks("python"):
+        exec(compile(block, "README.md", "exec"), names)
     out = capsys.readouterr().out
     assert "71.50568247" in out
     assert names["shapes"].shape == (11, 201)  # type: ignore[attr-defined]

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from tfarm.arm import Arm, Hub, HubFeedback, Link, Payload, Section, load, presets
     from tfarm.errors import CertificationError, ConvergenceError, ParameterError
+    from tfarm.exact.outputs import Output
     from tfarm.loop.margins import margins
     from tfarm.loop.poles import closed_loop_poles
     from tfarm.reduced import reduce
@@ -33,6 +34,7 @@ __all__ = [
     "Hub",
     "HubFeedback",
     "Link",
+    "Output",
     "ParameterError",
     "Payload",
     "Section",
@@ -53,6 +55,7 @@ _ROOMS = {
     "default_gains": "spectrum.scales",
     "margins": "loop.margins",
     "modes": "spectrum",
+    "Output": "exact.outputs",
     "reduce": "reduced",
     "transfer": "response",
 }

@@ -128,14 +128,14 @@ def determinant(arm: Arm, s: complex, digits: int) -> Number:
         raise ConvergenceError(f"Delta has no value at s = {s}, where a wave number is zero", None, None) from None
 
 
-def response(arm: Arm, output_name: str, s: complex, digits: int, x: float | None = None) -> Number:
+def response(arm: Arm, asked: str | Output, s: complex, digits: int, x: float | None = None) -> Number:
     """An output per unit torque (per unit hub angle where the hub is locked) at s [1/s], right to `digits`.
 
     Real and imaginary part have as many right digits each; x [m] is for the outputs along the arm.  Where two
     of the four waves coincide the appendix is 0/0: s is moved aside, by ever less as the precision grows.
     Raises ConvergenceError at a pole, ParameterError for an unknown output or an x outside the arm.
     """
-    wanted = output(output_name)
+    wanted = output(asked)
     place = {"root": 0.0, "tip": arm.link.length, "x": x}[wanted.place]
     if place is None or not 0.0 <= place <= arm.link.length:
         remedy = f"a point of the arm lies between 0 and {arm.link.length} m"
@@ -149,7 +149,7 @@ def response(arm: Arm, output_name: str, s: complex, digits: int, x: float | Non
         value = value if is_real else value * mpc(s) ** wanted.power
         return [value.real] if is_real else [value.real, value.imag]
 
-    found = _proven(parts, digits, f"{output_name} at s = {s}")
+    found = _proven(parts, digits, f"{wanted.name} at s = {s}")
     with mpmath.workdps(2 * digits + FEWEST_DIGITS):
         return found[0] * mpc(s) ** wanted.power if is_real else mpc(*found)
 

@@ -118,13 +118,20 @@ class State:
 
     def value(self, output: Output, x: float = 0.0) -> Ball:
         """The output for a unit input, in SI units; x is a share of the length."""
-        if output.place == "x":
-            quantity = self.field(output.quantity, x)
-        else:
-            quantity = {"theta": self.theta, "M": self.M0, "Q": self.Q0, "W": self.W1, "Y": self.Y1}[output.quantity]
-        ratio = quantity * self.s**output.power / self.input
+        constant = output.constant(self.k, x)
+        ratio = self.s**output.power * (self._ratio(output, x) if constant is None else constant)
         ratio = ratio / self.d if output.gauge else ratio
         return ratio * rational(unit_scale(output, self.k))
+
+    def _ratio(self, output: Output, x: float) -> Ball:
+        if output.is_at_end:
+            ends = {"theta": self.theta, "M": self.M0, "Q": self.Q0, "W": self.W1, "Y": self.Y1}
+            return ends[output.quantity] / self.input
+        return self.field(output.quantity, output.share(x)) / self.input
+
+    def determines(self, output: Output, x: float) -> bool:
+        """Whether the output has a value here: everywhere but where the input may be zero, at a pole."""
+        return output.constant(self.k, x) is not None or not self.input.contains(0)
 
 
 def enclose(k: Coefficients, wanted: Output, s: complex, *, bits: int, x: float = 0.0) -> Ball:
@@ -135,7 +142,7 @@ def enclose(k: Coefficients, wanted: Output, s: complex, *, bits: int, x: float 
     for working in _precisions(bits):
         with precision(working):
             state = State(k, point(s))
-            if not state.input.contains(0):
+            if state.determines(wanted, x):
                 value = state.value(wanted, x)
                 if value.rel_accuracy_bits() >= bits or value.is_zero():
                     return value
@@ -148,7 +155,7 @@ def slope(k: Coefficients, wanted: Output, s: complex, *, bits: int = 60, x: flo
     for working in _precisions(4 * bits):
         with precision(working):
             here, there = State(k, point(s)), State(k, point(s) * (1 + step))
-            if not (here.input.contains(0) or there.input.contains(0)):
+            if here.determines(wanted, x) and there.determines(wanted, x):
                 value = here.value(wanted, x)
                 difference = (there.value(wanted, x) - value) / (step * point(s))
                 if (difference + value / point(s)).rel_accuracy_bits() >= bits or value.is_zero():
@@ -164,7 +171,7 @@ def decimals(k: Coefficients, wanted: Output, s: complex, digits: int, x: float 
     for working in _precisions(4 * digits):
         with precision(working):
             state = State(k, point(s))
-            if state.input.contains(0):
+            if not state.determines(wanted, x):
                 continue
             value = state.value(wanted, x)
             known_zero = _vanishing_parts(k, wanted, s)

@@ -68,6 +68,33 @@ def from_waves(
     return theta, M0, Q0, W1
 
 
+def tip_from_waves(
+    c1: Number,
+    s1: Number,
+    z1: Number,
+    v1: Number,
+    e1: Number,
+    c2: Number,
+    s2: Number,
+    z2: Number,
+    v2: Number,
+    e2: Number,
+    gS: Number,
+    d: Number,
+    tip_mass: Number,
+    shear: Number,
+    tip_inertia: Number,
+    moment: Number,
+) -> tuple[Number, Number]:
+    """(lift, turn) of the free response's tip, up to the factor of `from_waves`: what its two conditions leave open.
+
+    W = shear lift, Q = -tip_mass lift, Psi = moment turn, M = -tip_inertia turn.
+    """
+    So1, So2 = tip_mass * z1 * s1 + shear * gS * c1, tip_mass * z2 * s2 + shear * gS * c2
+    r1, r2 = tip_inertia * c1 + moment * d * z1 * s1, tip_inertia * c2 + moment * d * z2 * s2
+    return gS * (z1 - z2) * (r1 * e2 - r2 * e1), d * (z1 - z2) * (v1 * So2 * e1 - v2 * So1 * e2)
+
+
 @inlined
 def from_transition(
     F0: Number,
@@ -108,6 +135,25 @@ def from_transition(
     rest = M0 * F1 * over_d + Q0 * lift
     W1 = shear * (moment * F2 + tip_inertia * over_d * F1)  # not theta F2 + rest: that cancels for a heavy payload
     return theta, M0, Q0, W1, theta * F2_less_1 + rest
+
+
+def tip_from_transition(
+    F0: Number,
+    F1: Number,
+    F2: Number,
+    F3: Number,
+    S: Number,
+    over_d: Number,
+    a: float,
+    sigma: float,
+    tip_mass: Number,
+    shear: Number,
+    tip_inertia: Number,
+    moment: Number,
+) -> tuple[Number, Number]:
+    """`tip_from_waves` up to the factor of `from_transition`, without wave numbers."""
+    turn = shear * (F3 - a * S * over_d * F1) + tip_mass * (sigma * F2 - (1 + sigma * a * S) * over_d * F0)
+    return moment * F2 + tip_inertia * over_d * F1, turn
 
 
 @inlined

@@ -6,9 +6,12 @@ arm.  Signs as in the paper: root moment E I phi'(0), shear force kappa G A (w' 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Literal
+from types import MappingProxyType
+from typing import Literal, get_args
 
 from tfarm.errors import ParameterError, did_you_mean
 
@@ -18,10 +21,25 @@ from .coefficients import Coefficients
 Quantity = Literal["theta", "M", "Q", "W", "Y", "Phi"]
 Place = Literal["root", "tip", "x"]
 
+MOST_POWER = 4  # of s: rate, acceleration, jerk and its rate
+PLACES: Mapping[str, tuple[Place, ...]] = MappingProxyType({
+    "theta": ("root",),
+    "M": ("root", "tip", "x"),
+    "Q": ("root", "tip", "x"),
+    "W": ("tip",),
+    "Y": ("tip", "x"),
+    "Phi": ("tip", "x"),
+})  # fmt: skip
+UNITS = MappingProxyType({"theta": "rad", "M": "N m", "Q": "N", "W": "m", "Y": "m", "Phi": "rad"})
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Output:
-    """`s`^power times a quantity at a place; `gauge` divides by 1 + C s (a strain gauge does not feel C)."""
+    """`s`^power times a quantity at a place; `gauge` divides by 1 + C s (a strain gauge does not feel C).
+
+    `unit` is the SI unit of what comes out, `label` what a person calls it, `name` what a program does (by default the
+    label's words joined by underscores).  Raises ParameterError for what is no output, naming the key and the remedy.
+    """
 
     quantity: Quantity
     place: Place
@@ -29,28 +47,107 @@ class Output:
     power: int = 0
     gauge: bool = False
     label: str
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.label, str) or not re.search(r"\w", self.label):
+            raise ParameterError(key="output.label", value=self.label, remedy="say in words what it is")
+        if not self.name:
+            object.__setattr__(self, "name", "_".join(re.findall(r"\w+", self.label)))
+        if not isinstance(self.name, str) or not re.fullmatch(r"\w+", self.name):
+            raise ParameterError(key="output.name", value=self.name, remedy="letters, digits and underscores")
+        if self.quantity not in get_args(Quantity):
+            remedy = did_you_mean(str(self.quantity), get_args(Quantity))
+            raise ParameterError(key="output.quantity", value=self.quantity, remedy=remedy)
+        if self.place not in PLACES[self.quantity]:
+            remedy = f"{self.quantity} is known at: {', '.join(PLACES[self.quantity])} ({self._elsewhere})"
+            raise ParameterError(key="output.place", value=self.place, remedy=remedy)
+        if isinstance(self.power, bool) or not isinstance(self.power, int) or not 0 <= self.power <= MOST_POWER:
+            remedy = f"a power of s: a whole number from 0 to {MOST_POWER}"
+            raise ParameterError(key="output.power", value=self.power, remedy=remedy)
+        if not isinstance(self.gauge, bool) or (self.gauge and self.quantity != "M"):
+            remedy = "true or false, and true for a moment only: a strain gauge reads E I phi' without its damping"
+            raise ParameterError(key="output.gauge", value=self.gauge, remedy=remedy)
+        if self.unit != _unit(self.quantity, self.power):
+            remedy = f'values are in SI units, here "{_unit(self.quantity, self.power)}"'
+            raise ParameterError(key="output.unit", value=self.unit, remedy=remedy)
+
+    @property
+    def _elsewhere(self) -> str:
+        if self.quantity == "theta":
+            return "the hub's angle is one number"
+        if self.place == "root":
+            return "it is 0 at the root"
+        return "along the arm ask for the deflection Y"
+
+    @property
+    def is_at_end(self) -> bool:
+        """Whether the closed form at hub and tip gives it; else the fields along the arm do."""
+        return self.place == "root" or (self.place == "tip" and self.quantity in ("W", "Y"))
+
+    @property
+    def base(self) -> Output:
+        """The same quantity without its power of s."""
+        return replace(self, power=0, unit=UNITS[self.quantity])
+
+    def share(self, x: float) -> float:
+        """Where it is, as a share of the length; x is that share for an output along the arm."""
+        return {"root": 0.0, "tip": 1.0, "x": x}[self.place]
+
+    def constant(self, k: Coefficients, x: float) -> int | None:
+        """What an end condition makes the quantity per unit of input, dimensionless and at any s: 0, 1 or -1, or None.
+
+        Held or free ends: W, Phi and Y are 0 at the root, and at the tip W where it is pinned, M and Q where nothing is
+        there to take them.  The hub angle is the input where the hub is locked, M(0) = -u where it has no inertia.
+        """
+        at, locked = self.share(x), k.is_locked
+        pinned, clamped = (not isinstance(end, Fraction) for end in (k.tip_mass, k.tip_inertia))
+        if at == 0:
+            root = {"theta": 1 if locked else None, "M": -1 if k.hub_inertia == 0 else None, "Q": None}
+            return root.get(self.quantity, 0)
+        if at != 1:
+            return None
+        tip = {
+            "M": 0 if k.tip_inertia == 0 else None,
+            "Q": 0 if k.tip_mass == 0 else None,
+            "W": 0 if pinned else None,
+            "Y": -1 if pinned and locked else None,
+            "Phi": -1 if clamped and locked else None,
+        }
+        return tip[self.quantity]
 
 
-OUTPUTS: dict[str, Output] = {
-    "hub_angle": Output(quantity="theta", place="root", unit="rad", label="hub angle"),
-    "hub_rate": Output(quantity="theta", place="root", unit="rad/s", power=1, label="hub rate"),
-    "tip_displacement": Output(quantity="W", place="tip", unit="m", label="tip displacement"),
-    "tip_deflection": Output(quantity="Y", place="tip", unit="m", label="tip deflection"),
-    "tip_acceleration": Output(quantity="W", place="tip", unit="m/s^2", power=2, label="tip acceleration"),
-    "root_moment": Output(quantity="M", place="root", unit="N m", gauge=True, label="root moment"),
-    "root_shear": Output(quantity="Q", place="root", unit="N", label="root shear force"),
-    "deflection": Output(quantity="Y", place="x", unit="m", label="deflection at x"),
-    "rotation": Output(quantity="Phi", place="x", unit="rad", label="rotation at x"),
-    "moment": Output(quantity="M", place="x", unit="N m", gauge=True, label="bending moment at x"),
-    "shear": Output(quantity="Q", place="x", unit="N", label="shear force at x"),
-}
+def _unit(quantity: Quantity, power: int) -> str:
+    """The SI unit of a quantity times s^power."""
+    return UNITS[quantity] + ("" if power == 0 else "/s" if power == 1 else f"/s^{power}")
 
 
-def output(name: str) -> Output:
-    """The output of that name.  Raises ParameterError, with the nearest name."""
-    if name not in OUTPUTS:
-        raise ParameterError(key="output", value=name, remedy=did_you_mean(name, OUTPUTS))
-    return OUTPUTS[name]
+OUTPUTS: Mapping[str, Output] = MappingProxyType({each.name: each for each in (
+    Output(name="hub_angle", quantity="theta", place="root", unit="rad", label="hub angle"),
+    Output(name="hub_rate", quantity="theta", place="root", unit="rad/s", power=1, label="hub rate"),
+    Output(name="tip_displacement", quantity="W", place="tip", unit="m", label="tip displacement"),
+    Output(name="tip_deflection", quantity="Y", place="tip", unit="m", label="tip deflection"),
+    Output(name="tip_acceleration", quantity="W", place="tip", unit="m/s^2", power=2, label="tip acceleration"),
+    Output(name="root_moment", quantity="M", place="root", unit="N m", gauge=True, label="root moment"),
+    Output(name="root_shear", quantity="Q", place="root", unit="N", label="root shear force"),
+    Output(name="deflection", quantity="Y", place="x", unit="m", label="deflection at x"),
+    Output(name="rotation", quantity="Phi", place="x", unit="rad", label="rotation at x"),
+    Output(name="moment", quantity="M", place="x", unit="N m", gauge=True, label="bending moment at x"),
+    Output(name="shear", quantity="Q", place="x", unit="N", label="shear force at x"),
+)})  # fmt: skip
+
+
+def output(wanted: str | Output) -> Output:
+    """The output of that name, or the one given.  Raises ParameterError, with the nearest name."""
+    if isinstance(wanted, Output):
+        if OUTPUTS.get(wanted.name, wanted) != wanted:
+            raise ParameterError(key="output.name", value=wanted.name, remedy="the name of another output; choose one")
+        return wanted
+    if not isinstance(wanted, str):
+        raise ParameterError(key="output", value=wanted, remedy="the name of an output, or an Output")
+    if wanted not in OUTPUTS:
+        raise ParameterError(key="output", value=wanted, remedy=did_you_mean(wanted, OUTPUTS))
+    return OUTPUTS[wanted]
 
 
 def unit_scale(wanted: Output, k: Coefficients) -> Fraction:

@@ -13,7 +13,7 @@ from tfarm.errors import ParameterError
 from . import balls
 from .coefficients import Coefficients
 from .fields import fields, from_root
-from .free import free_response, low_frequency
+from .free import free_response, low_frequency, low_frequency_tip
 from .jets import Jet
 from .outputs import Output, unit_scale
 from .waves import evaluate
@@ -43,8 +43,8 @@ def evaluate_outputs(
     with np.errstate(under="ignore"):
         evaluate(s, k.kernel, table, values, suspects)
         for row, each in enumerate(wanted):
-            if each.place == "x":
-                values[row] = _along(k, each, s, x)
+            if not each.is_at_end:
+                values[row] = _along(k, each, s, each.share(x))
     for i in np.flatnonzero(suspects):
         values[:, i] = [value_with_care(k, each, complex(s[i]), x) for each in wanted]
     return values
@@ -56,11 +56,11 @@ def differentiate_outputs(k: Coefficients, wanted: Sequence[Output], s: Complex,
     with np.errstate(under="ignore", invalid="ignore", divide="ignore"):
         free = free_response(k, s)
         for row, each in enumerate(wanted):
-            if each.place != "x":
+            if each.is_at_end:
                 values[row] = _ratio(k, each, Jet.variable(s, 1), free[_ENDS[each.quantity]], free.drive).c[1]
     suspects = free.parallel | (s == 0) | _at_pole(free.drive, s)
     for row, each in enumerate(wanted):
-        for i in np.nonzero(suspects | (each.place == "x"))[0]:
+        for i in np.nonzero(suspects | (not each.is_at_end))[0]:
             values[row, i] = _slope_with_care(k, each, complex(s[i]), x)
     return values
 
@@ -90,13 +90,21 @@ def expansions_at_zero(
     """The expansions at s = 0 of several outputs, from one free response."""
     s = Jet.variable(0.0, 7)
     *state, drive = low_frequency(k, s)
-    along = any(each.place == "x" for each in wanted)
-    fields = from_root(k, s * s, 1.0 + k.damping * s, tuple(state[:3]), x) if along else ()
     order = next(n for n, coefficient in enumerate(drive.c) if coefficient != 0)
 
+    def quantity(each: Output) -> Jet:
+        constant, at = each.constant(k, x), each.share(x)
+        if constant is not None:
+            return constant * drive
+        if each.is_at_end:
+            return state[_ENDS[each.quantity]]
+        if at < 1:
+            along: Jet = from_root(k, s * s, 1.0 + k.damping * s, tuple(state[:3]), at)[_FIELDS[each.quantity]]
+            return along
+        return state[_ENDS["Y"]] if each.quantity == "Y" else low_frequency_tip(k, s)[_FIELDS[each.quantity] - 1]
+
     def expand(each: Output) -> tuple[float, float, float, float]:
-        quantity = fields[_FIELDS[each.quantity]] if each.place == "x" else state[_ENDS[each.quantity]]
-        quotient = Jet((quantity * _power(s, each.power)).c[: 8 - order]) / drive.shifted(order)
+        quotient = Jet((quantity(each) * _power(s, each.power)).c[: 8 - order]) / drive.shifted(order)
         quotient = quotient / Jet((1.0 + k.damping * s).c[: 8 - order]) if each.gauge else quotient
         series = [0.0] * (2 - order) + [float(c) * float(unit_scale(each, k)) for c in quotient.c]
         return series[0], series[1], series[2], series[3]
@@ -114,7 +122,11 @@ def _along(k: Coefficients, wanted: Output, s: Complex, x: float) -> Complex:
 
 
 def _power(s: Any, power: int) -> Any:
-    return s * s if power == 2 else s if power == 1 else 1.0 + 0.0 * s
+    """s^power for any kind of number."""
+    product = s if power else 1.0 + 0.0 * s
+    for _ in range(power - 1):
+        product = product * s
+    return product
 
 
 def _ratio(k: Coefficients, wanted: Output, s: Jet, quantity: Jet, drive: Jet) -> Jet:
@@ -130,6 +142,8 @@ def _at_pole(drive: Jet, s: Complex) -> NDArray[np.bool_]:
 
 def _refuse_pole(k: Coefficients, wanted: Output, s: complex, x: float) -> None:
     """Raise ParameterError if s is a pole to the last digit that a float64 holds."""
+    if wanted.constant(k, x) is not None:
+        return
     if s == 0:
         if any(expansion_at_zero(k, wanted, x)[:2]):
             raise ParameterError(key="s", value=0, remedy="a pole: the arm turns as a rigid body there; choose s != 0")

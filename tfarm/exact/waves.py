@@ -90,6 +90,9 @@ def evaluate(s: Any, k: Any, outputs: Any, values: Any, suspects: Any) -> None:
                     value = value * (points[i] * points[i]) if power == 2 else value
                     value = value * reciprocal(1.0 + k[7] * points[i]) if gauge == 1 else value
                     values[o, chosen[i]] = factor * value
+                for _ in range(int(power) if power > 2 else 0):
+                    for i in range(n):
+                        values[o, chosen[i]] *= points[i]
             for i in range(n):
                 left = states[5 * BLOCK + i]
                 suspects[chosen[i]] = not left.real > POLE * left.imag or (not low and _parallel(numbers, i))

@@ -7,7 +7,6 @@ closed in on.  What is printed is the largest value found, and a little more (`M
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm
-from tfarm.response import TransferFunction, transfer
+from tfarm.response import TransferFunction, Wanted, transfer
 from tfarm.spectrum import modes, modes_below
 
 from .partial_fractions import PartialFractions
@@ -43,10 +42,8 @@ class Accuracy:
 class Ruler:
     """The exact outputs over a band [rad/s], sampled once, against which any number of models is held."""
 
-    def __init__(
-        self, arm: Arm, outputs: str | Sequence[str], band: tuple[float, float], x: float | None = None
-    ) -> None:
-        self.G = transfer(arm, outputs if not isinstance(outputs, str) else (outputs,), x=x)
+    def __init__(self, arm: Arm, outputs: Wanted, band: tuple[float, float], x: float | None = None) -> None:
+        self.G = transfer(arm, transfer(arm, outputs, x=x).rows, x=x)
         self.band = band
         self._poles = frequencies_around(arm, band[1])
         w = self._clear(_samples(*band, self._poles))
@@ -57,7 +54,7 @@ class Ruler:
     @classmethod
     def of(cls, model: PartialFractions, band: tuple[float, float]) -> Ruler:
         """The ruler of a model's arm and outputs."""
-        return cls(model.arm, model.outputs, band, model.x)
+        return cls(model.arm, model.rows, band, model.x)
 
     def norm(self, w: Real) -> Real:
         """|G| + |w dG/dw| (outputs, w) of the exact arm at w [rad/s], 1-D, off its natural frequencies."""
@@ -128,7 +125,7 @@ def norm(G: TransferFunction, w: Real, values: Complex, poles: Real) -> Real:
 
 def slope(G: TransferFunction, w: Real, poles: Real) -> Complex:
     """dG/ds (outputs, w) at i w; along the arm by differences across the axis, short against the nearest frequency."""
-    if G.x is None:
+    if all(each.is_at_end for each in G.rows):
         return np.atleast_2d(G.derivative(1j * w))
     step = 1e-3 * np.maximum(np.minimum(distance(w, poles), w), 1e-6 * w)
     return (G(1j * w + step) - G(1j * w - step)) / (2 * step)

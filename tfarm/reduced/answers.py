@@ -15,7 +15,7 @@ NORM = "|dG| / (|G| + |w dG/dw|)"
 def reduced_answer(reduced: ReducedModel) -> dict[str, Any]:
     """The model, its matrices and its error."""
     model = reduced.model
-    G = transfer(model.arm, model.outputs, x=model.x)
+    G = transfer(model.arm, model.rows, x=model.x)
     A, B, C, D = reduced.matrices()
     poles = [[float(p.real), float(p.imag)] for p in model.eigenvalues.ravel()]
     poles += [[-1 / model.arm.link.damping, 0.0]] if model.relaxation is not None else []

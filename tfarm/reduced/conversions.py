@@ -126,7 +126,7 @@ def _contents(reduced: ReducedModel) -> dict[str, Any]:
     model = reduced.model
     omega = np.geomspace(*reduced.band, POINTS)
     omega = omega[distance(omega, frequencies_around(model.arm, reduced.band[1])) > AT_A_POLE * omega]
-    response = transfer(model.arm, model.outputs, x=model.x)(1j * omega)
+    response = transfer(model.arm, model.rows, x=model.x)(1j * omega)
     return {
         "A": A,
         "B": B,

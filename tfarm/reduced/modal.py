@@ -8,7 +8,6 @@ At C > 0 the undamped modes do not diagonalise the damping, so the residues are 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -20,7 +19,7 @@ from tfarm.errors import ParameterError
 from tfarm.exact.coefficients import Coefficients, coefficients
 from tfarm.exact.outputs import OUTPUTS, Output
 from tfarm.exact.values import expansions_at_zero
-from tfarm.response import transfer
+from tfarm.response import Wanted, transfer
 from tfarm.spectrum import Modes, modes
 from tfarm.spectrum.damped import damped_modes
 
@@ -30,13 +29,14 @@ from .residues import contour_residues, end_residues, undamped_residues
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 MOST_MODES = 1000
+MOST_PROPER = 2  # power of s: a mode's share r s^2/(s^2 + w^2) is bounded, and one of s^3 is not
 
 
 class ModalModel(PartialFractions):
     """The first flexible modes of the arm with their exact eigenvalues and residues (see `PartialFractions`)."""
 
 
-def modal_model(arm: Arm, outputs: str | Sequence[str], count: int, x: float | None = None) -> ModalModel:
+def modal_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None) -> ModalModel:
     """The modal model of an arm with its first `count` flexible modes (0 to 1000), for one output or several.
 
     `x` [m] is the place of outputs along the arm.  Where the hub is locked, hub angle is the input and no rigid body is
@@ -46,8 +46,8 @@ def modal_model(arm: Arm, outputs: str | Sequence[str], count: int, x: float | N
     G = transfer(arm, outputs, x=x)
     if isinstance(count, bool) or not isinstance(count, int | np.integer) or not 0 <= count <= MOST_MODES:
         raise ParameterError(key="count", value=count, remedy=f"a whole number of flexible modes, 0 to {MOST_MODES}")
-    wanted = [proper(arm, name) for name in G.outputs]
     k, share = coefficients(arm), 0.0 if x is None else x / arm.link.length
+    wanted = [proper(k, each, share) for each in G.rows]
     table = modes(arm, max(1, int(count)))
     flexible = slice(int(arm.has_rigid_mode), int(arm.has_rigid_mode) + int(count))
     collocated = OUTPUTS["root_moment" if arm.is_locked else "hub_angle"]
@@ -56,7 +56,7 @@ def modal_model(arm: Arm, outputs: str | Sequence[str], count: int, x: float | N
     expansion = np.array(expansions_at_zero(k, wanted, share))
     return ModalModel(
         arm=arm,
-        outputs=G.outputs,
+        rows=G.rows,
         x=G.x,
         index=table.index[flexible],
         natural_frequency=table.natural_frequency[flexible],
@@ -68,7 +68,7 @@ def modal_model(arm: Arm, outputs: str | Sequence[str], count: int, x: float | N
     )
 
 
-def relaxed_model(arm: Arm, outputs: str | Sequence[str], count: int, x: float | None = None) -> ModalModel:
+def relaxed_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None) -> ModalModel:
     """The modal model of a damped arm with one state more, exact to first order at s -> 0.
 
     At C > 0 the bending modes left out are overdamped and follow as c b/w^2/(1 + C s), not at once as a static
@@ -79,17 +79,20 @@ def relaxed_model(arm: Arm, outputs: str | Sequence[str], count: int, x: float |
     if C == 0:
         raise ParameterError(key="link.damping", value=C, remedy="without damping nothing relaxes; take modal_model")
     share = 0.0 if x is None else x / arm.link.length
-    expansion = np.array(expansions_at_zero(coefficients(arm), [OUTPUTS[name] for name in model.outputs], share))
+    expansion = np.array(expansions_at_zero(coefficients(arm), model.rows, share))
     slope = expansion[:, 3] + (model.residues / model.eigenvalues**2).real.sum(axis=(1, 2))
     return replace(model, static=model.static + slope / C, relaxation=-slope / C)
 
 
-def proper(arm: Arm, name: str) -> Output:
-    """The output of that name, if a state space of finite order can have it.  Raises ParameterError if not."""
-    if arm.is_locked and name in ("hub_rate",):
-        remedy = "the rate of a prescribed hub angle is s itself, which no state space has; ask for another output"
-        raise ParameterError(key="outputs", value=name, remedy=remedy)
-    return OUTPUTS[name]
+def proper(k: Coefficients, wanted: Output, share: float) -> Output:
+    """The output, if a state space of finite order can have it.  Raises ParameterError if not."""
+    if wanted.power and wanted.constant(k, share):
+        remedy = "a power of s times the input itself, which no state space has; ask for another output"
+        raise ParameterError(key="outputs", value=wanted.name, remedy=remedy)
+    if wanted.power > MOST_PROPER:
+        remedy = f"s^{wanted.power} makes it grow with s, as no state space does; ask for a lower derivative"
+        raise ParameterError(key="outputs", value=wanted.name, remedy=remedy)
+    return wanted
 
 
 def _poles_and_residues(
@@ -102,7 +105,7 @@ def _poles_and_residues(
         upper = undamped_residues(table, wanted, k, share) * s**powers / (2 * s)
         return np.stack([s, s.conj()], axis=1), np.stack([upper, upper.conj()], axis=2)
     p = damped_modes(table).eigenvalues[table.index > 0]
-    along = any(each.place == "x" for each in wanted)
+    along = any(not each.is_at_end for each in wanted)
     residues, doubtful = end_residues(k, wanted, p.ravel())
     doubtful = doubtful | along
     if doubtful.any():

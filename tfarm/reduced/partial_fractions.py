@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tfarm.arm import Arm
 from tfarm.errors import ParameterError
+from tfarm.exact.outputs import Output
 
 if TYPE_CHECKING:
     import control
@@ -34,7 +35,7 @@ class PartialFractions:
     """
 
     arm: Arm
-    outputs: tuple[str, ...]
+    rows: tuple[Output, ...]
     x: float | None = None
     index: NDArray[np.int64]
     natural_frequency: Real
@@ -44,6 +45,11 @@ class PartialFractions:
     static: Real
     participation: Real
     relaxation: Real | None = None
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """The name of each output."""
+        return tuple(wanted.name for wanted in self.rows)
 
     @property
     def has_rigid_states(self) -> bool:

@@ -11,8 +11,8 @@ every pole is checked to be real and above the band, every residue of the hub an
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -22,9 +22,8 @@ from numpy.typing import NDArray
 from tfarm.arm import Arm
 from tfarm.errors import ParameterError
 from tfarm.exact.coefficients import coefficients
-from tfarm.exact.outputs import OUTPUTS
 from tfarm.exact.values import expansions_at_zero
-from tfarm.response import TransferFunction, transfer
+from tfarm.response import TransferFunction, Wanted, transfer
 from tfarm.spectrum import modes_below
 
 from .accuracy import distance, frequencies_around, norm
@@ -68,9 +67,7 @@ def modes_in(arm: Arm, high: float) -> int:
     return count
 
 
-def rational_model(
-    arm: Arm, outputs: str | Sequence[str], pairs: int, high: float, x: float | None = None
-) -> RationalModel:
+def rational_model(arm: Arm, outputs: Wanted, pairs: int, high: float, x: float | None = None) -> RationalModel:
     """The lossless model of so many pairs of poles: every mode below `high` [rad/s] exactly, the rest by AAA.
 
     Where more poles bring nothing but rounding, further modes are taken exactly instead; fewer pairs come out where too
@@ -83,13 +80,13 @@ def rational_model(
     if pairs <= exact:
         remedy = f"{exact} modes lie in the band: AAA wants more pairs of poles than that; take modal"
         raise ParameterError(key="pairs", value=pairs, remedy=remedy)
-    names = transfer(arm, outputs, x=x).outputs
+    rows = transfer(arm, outputs, x=x).rows
     hub = "root_moment" if arm.is_locked else "hub_rate"
-    G = transfer(arm, (hub, *names), x=x)
+    G = transfer(arm, (hub, *rows), x=x)
     frequencies = frequencies_around(arm, high)
     found: list[tuple[tuple[float, int], RationalModel]] = []
     for _ in range(4):  # first with all the poles asked for, then with those that helped
-        inside = modal_model(arm, G.outputs, exact, x)
+        inside = modal_model(arm, G.rows, exact, x)
         rest = _remainders(G, inside, high, frequencies)
         poles, shares, error = _best_poles(rest, pairs - exact)
         found.append(((max(error, ENOUGH), -exact - poles.size), _assembled(inside, rest, poles, shares)))
@@ -104,8 +101,8 @@ def _remainders(G: TransferFunction, inside: PartialFractions, high: float, freq
     k, share = coefficients(G.arm), 0.0 if G.x is None else G.x / G.arm.link.length
     w = high * np.sin(np.linspace(0.01, np.pi / 2, POINTS))
     w = w[distance(w, frequencies) > 1e-9 * w]
-    S, power = -(w**2), np.array([[OUTPUTS[name].power] for name in G.outputs])
-    bases = [replace(OUTPUTS[name], power=0) for name in G.outputs]
+    S, power = -(w**2), np.array([[each.power] for each in G.rows])
+    bases = [each.base for each in G.rows]
     at_zero = np.array(expansions_at_zero(k, bases, share))
     by_S = ((at_zero[:, 0] != 0) | (power[:, 0] > 0))[:, None]
     square = inside.natural_frequency**2
@@ -212,7 +209,7 @@ def _zeros_of_denominator(nodes: Real, weights: Real) -> NDArray[Any]:
 
 def _assembled(inside: PartialFractions, rest: _Remainders, poles: Real, shares: Real) -> RationalModel:
     """The exact modes and the poles above them as one model, without the hub's own output."""
-    power = np.array([[OUTPUTS[name].power] for name in inside.outputs])
+    power = np.array([[each.power] for each in inside.rows])
     s = 1j * poles
     in_S = np.where(rest.by_S[:, None], shares, -shares * poles**2)
     upper = in_S * s**power / (2 * s)
@@ -222,7 +219,7 @@ def _assembled(inside: PartialFractions, rest: _Remainders, poles: Real, shares:
     strict = rest.by_S & (power[:, 0] < 2)  # no static remainder: the poles above the band stand for it
     return RationalModel(
         arm=inside.arm,
-        outputs=inside.outputs[1:],
+        rows=inside.rows[1:],
         x=inside.x,
         index=np.r_[inside.index, np.zeros(poles.size, dtype=np.int64)],
         natural_frequency=np.r_[inside.natural_frequency, poles],

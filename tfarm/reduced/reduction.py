@@ -7,7 +7,7 @@ This is the one door out of exactness.  What comes through carries its band, its
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from tfarm.arm import Arm
 from tfarm.errors import MISSING, ConvergenceError, ParameterError
-from tfarm.response import transfer
+from tfarm.exact.outputs import Output
+from tfarm.response import Wanted, transfer
 from tfarm.spectrum import modes
 
 from .accuracy import Ruler
@@ -106,7 +107,7 @@ class ReducedModel:
 
 def reduce(
     arm: Arm,
-    outputs: str | Sequence[str],
+    outputs: Wanted,
     *,
     order: int | None = None,
     error: float | None = None,
@@ -121,7 +122,8 @@ def reduce(
     place of outputs along the arm.  Raises ParameterError for what no model can be, ConvergenceError where no model of
     up to 400 states is within the error.
     """
-    names = transfer(arm, outputs, x=x).outputs
+    rows = transfer(arm, outputs, x=x).rows
+    names = tuple(each.name for each in rows)
     low, high = _band(band)
     if len(set(names)) < len(names):
         raise ParameterError(key="outputs", value=names, remedy="name each output once")
@@ -132,7 +134,7 @@ def reduce(
     if (order is None) == (error is None):
         remedy = "give either an order (a number of states) or an error"
         raise ParameterError(key="order", value=MISSING if order is None else order, remedy=remedy)
-    bench = _Bench(arm, names, (low, high), x, method)
+    bench = _Bench(arm, rows, (low, high), x, method)
     return bench.of_order(order) if order is not None else bench.within(_error(error))
 
 
@@ -140,28 +142,28 @@ class _Bench:
     """Models of one arm over one band, tried and measured."""
 
     def __init__(
-        self, arm: Arm, names: tuple[str, ...], band: tuple[float, float], x: float | None, method: Method | None
+        self, arm: Arm, rows: tuple[Output, ...], band: tuple[float, float], x: float | None, method: Method | None
     ) -> None:
-        self.arm, self.names, self.band, self.x = arm, names, band, x
-        self.rigid = modal_model(arm, names, 0, x).has_rigid_states
+        self.arm, self.rows, self.band, self.x = arm, rows, band, x
+        self.rigid = modal_model(arm, rows, 0, x).has_rigid_states
         self.inside = modes_in(arm, band[1])
         self.by_modes = method != "aaa"
         self.by_aaa = method != "modal" and not arm.link.damping
-        self.ruler = Ruler(arm, names, band, x)
+        self.ruler = Ruler(arm, rows, band, x)
 
     def of_order(self, order: int) -> ReducedModel:
         """The better model of that many states."""
         pairs = self._pairs(order)
         if order % 2:
-            return self._measured(relaxed_model(self.arm, self.names, pairs, self.x), "modal", "")
+            return self._measured(relaxed_model(self.arm, self.rows, pairs, self.x), "modal", "")
         found: list[ReducedModel] = []
         if self.by_aaa and pairs > self.inside:
-            model = rational_model(self.arm, self.names, pairs, self.band[1], self.x)
+            model = rational_model(self.arm, self.rows, pairs, self.band[1], self.x)
             few = "" if model.order == order else f"order {order} asked: no more poles passed the checks of AAA"
             found.append(self._measured(model, "aaa", few))
         if self.by_modes or not found:
             note = "" if self.by_modes else f"modal taken: AAA wants more than the {self.inside} modes in the band"
-            found.append(self._measured(modal_model(self.arm, self.names, pairs, self.x), "modal", note))
+            found.append(self._measured(modal_model(self.arm, self.rows, pairs, self.x), "modal", note))
         return min(found, key=lambda each: each.worst_error)
 
     def within(self, error: float) -> ReducedModel:
@@ -187,7 +189,7 @@ class _Bench:
         if not self.by_aaa:
             return None
         for pairs in range(self.inside + 1, min(self.inside + MOST_TAILS, self._most()) + 1):
-            model = rational_model(self.arm, self.names, pairs, self.band[1], self.x)
+            model = rational_model(self.arm, self.rows, pairs, self.band[1], self.x)
             if self.ruler.rough(model) <= error:
                 measured = self._measured(model, "aaa", "")
                 if measured.worst_error <= error:
@@ -198,7 +200,7 @@ class _Bench:
         """The smallest model of up to so many modes, if one will do; its error falls with each, so by bisection."""
 
         def rough(count: int) -> float:
-            return self.ruler.rough(make(self.arm, self.names, count, self.x))
+            return self.ruler.rough(make(self.arm, self.rows, count, self.x))
 
         good, bad = 0, -1
         try:
@@ -212,7 +214,7 @@ class _Bench:
             middle = (good + bad) // 2
             good, bad = (middle, bad) if rough(middle) <= error else (good, middle)
         for count in range(good, min(good + 3, most + 1)):
-            measured = self._measured(make(self.arm, self.names, count, self.x), "modal", "")
+            measured = self._measured(make(self.arm, self.rows, count, self.x), "modal", "")
             if measured.worst_error <= error:
                 return measured
         return None

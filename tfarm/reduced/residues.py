@@ -38,7 +38,7 @@ def undamped_residues(table: Modes, wanted: Sequence[Output], k: Coefficients, x
     omega = table.natural_frequency[table.index > 0]
     close = np.r_[False, np.diff(omega) < CLOSE * omega[1:], False]
     by_shapes = close[:-1] | close[1:]
-    if any(each.place == "x" for each in wanted):
+    if any(not each.is_at_end for each in wanted):
         by_shapes[:] = True
     products = np.empty((len(wanted), omega.size))
     if not by_shapes.all():
@@ -111,7 +111,7 @@ def _from_shapes(table: Modes, wanted: Sequence[Output], k: Coefficients, x: flo
     theta = table.hub_participation
 
     def seen(each: Output) -> Real:
-        at = {"root": 0.0, "tip": length, "x": x * length}[each.place]
+        at = each.share(x) * length
         if each.quantity == "theta":
             return theta
         if each.quantity in ("W", "Y"):

@@ -13,7 +13,7 @@ from tfarm.arm import Arm, Hub
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import Analytic
 from tfarm.exact.coefficients import Coefficients, coefficients
-from tfarm.exact.free import free_response, low_frequency
+from tfarm.exact.free import free_response, low_frequency, low_frequency_tip, tip_response
 from tfarm.exact.jets import Jet
 from tfarm.exact.outputs import Output
 from tfarm.spectrum import modes, modes_below
@@ -45,17 +45,23 @@ def poles_of(arm: Arm, up_to: float) -> Roots:
 
 
 def zeros_of(arm: Arm, wanted: Output, up_to: float) -> Roots:
-    """The zeros of one output at the hub or the tip with |Im s| <= up_to."""
-    k = coefficients(arm)
-    if (arm.is_locked and wanted.quantity == "theta") or (math.isinf(arm.payload.mass) and wanted.quantity == "W"):
-        return Roots(np.empty(0, complex), (-math.inf, math.inf, -up_to, up_to), "constant")
-    at_zero = max(0, _order(k, wanted.quantity) + wanted.power - _order(k, "drive"))
-    neighbour = {"theta": math.inf, "M": 0.0}.get(wanted.quantity)
+    """The zeros of one output at the hub or the tip with |Im s| <= up_to.
+
+    One that its end condition holds constant has none but those of its power of s (at the tip: 0 throughout has none).
+    """
+    k, share = coefficients(arm), wanted.share(0.0)
+    constant = wanted.constant(k, share)
+    if constant is not None:
+        at_zero = wanted.power if constant else 0
+        return Roots(np.zeros(at_zero, complex), (-math.inf, math.inf, -up_to, up_to), "constant")
+    name = wanted.quantity if wanted.is_at_end else f"tip {wanted.quantity}"
+    at_zero = max(0, _order(k, name) + wanted.power - _order(k, "drive"))
+    neighbour = {"theta": math.inf, "M": 0.0}.get(name)
     other = arm if neighbour is None else replace(arm, hub=Hub(inertia=neighbour))
     if neighbour is not None and arm.link.damping == 0:
         return _on_axis(_frequencies(other, up_to), at_zero, up_to)
-    starts = _starts_by_sampling(k, wanted.quantity, up_to) if neighbour is None else _damped_starts(other, up_to)
-    return _in_box(k, wanted.quantity, at_zero, up_to, starts)
+    starts = _starts_by_sampling(k, name, up_to) if neighbour is None else _damped_starts(other, up_to)
+    return _in_box(k, name, at_zero, up_to, starts)
 
 
 def _frequencies(arm: Arm, up_to: float) -> NDArray[np.float64]:
@@ -96,8 +102,9 @@ def _starts_by_sampling(k: Coefficients, name: str, up_to: float) -> Complex:
 
 def _order(k: Coefficients, name: str) -> int:
     """How often the free response's quantity vanishes at s = 0."""
-    *state, drive = low_frequency(k, Jet.variable(0.0, 6))
-    jets = dict(zip(("theta", "M", "Q", "W", "Y", "drive"), (*state, drive), strict=True))
+    s = Jet.variable(0.0, 6)
+    jets = dict(zip(("theta", "M", "Q", "W", "Y", "drive"), low_frequency(k, s), strict=True))
+    jets |= zip(("tip Phi", "tip M", "tip Q"), low_frequency_tip(k, s), strict=True)
     return next(n for n, coefficient in enumerate(jets[name].c) if coefficient != 0)
 
 
@@ -106,8 +113,8 @@ def _function(k: Coefficients, name: str) -> Function:
     order = _order(k, name)
 
     def function(s: Complex) -> Analytic:
-        free = free_response(k, s)
-        value, slope = getattr(free, name).c
+        free = tip_response(k, s) if name.startswith("tip ") else free_response(k, s)
+        value, slope = getattr(free, name.removeprefix("tip ")).c
         s = np.where(s == 0, 1e-300, s)
         return Analytic(value / s**order, (slope - order * value / s) / s**order, free.scale)
 

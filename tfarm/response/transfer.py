@@ -31,11 +31,14 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 BLOCK = 1 << 16
 
 
-def transfer(arm: Arm, outputs: str | Sequence[str], *, x: float | None = None) -> TransferFunction:
+Wanted = str | Output | Sequence[str | Output]  # one output or several
+
+
+def transfer(arm: Arm, outputs: Wanted, *, x: float | None = None) -> TransferFunction:
     """The exact transfer function from hub torque (hub angle where the hub is locked) to one output or several.
 
-    `outputs` are names of `tfarm.exact.outputs.OUTPUTS`; `x` [m] is the place of deflection, rotation, moment and
-    shear.  Raises ParameterError for an unknown output, or for a place missing or outside the arm.
+    `outputs` are names of `tfarm.exact.outputs.OUTPUTS`, or an `Output` of your own; `x` [m] is the place of those
+    along the arm.  Raises ParameterError for an unknown output, or for a place missing or outside the arm.
     """
     return TransferFunction(arm, outputs, x=x)
 
@@ -47,21 +50,26 @@ class TransferFunction:
     axis.  At a pole it raises ParameterError naming the pole; everywhere else it has full float64 accuracy.
     """
 
-    def __init__(self, arm: Arm, outputs: str | Sequence[str], *, x: float | None = None) -> None:
+    def __init__(self, arm: Arm, outputs: Wanted, *, x: float | None = None) -> None:
         self.arm = arm
-        self.is_single = isinstance(outputs, str)
-        self.outputs: tuple[str, ...] = (outputs,) if isinstance(outputs, str) else tuple(outputs)
-        if not self.outputs:
+        self.is_single = isinstance(outputs, str | Output)
+        asked = (outputs,) if isinstance(outputs, str | Output) else tuple(outputs)
+        if not asked:
             raise ParameterError(key="outputs", value=outputs, remedy="name at least one output")
-        self._wanted: tuple[Output, ...] = tuple(output(name) for name in self.outputs)
+        self.rows: tuple[Output, ...] = tuple(output(each) for each in asked)
         self._k = coefficients(arm)
-        self._table = kernel_table(self._k, self._wanted)
+        self._table = kernel_table(self._k, self.rows)
         self.x = self._place(x)
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """The name of each output."""
+        return tuple(wanted.name for wanted in self.rows)
 
     @property
     def units(self) -> tuple[str, ...]:
         """The SI unit of each output."""
-        return tuple(wanted.unit for wanted in self._wanted)
+        return tuple(wanted.unit for wanted in self.rows)
 
     @property
     def input(self) -> str:
@@ -88,7 +96,7 @@ class TransferFunction:
     def derivative(self, s: ArrayLike) -> Any:
         """dG/ds at a complex scalar or array, by the same formulas carried as power series."""
         points = _finite(s)
-        flat = differentiate_outputs(self._k, self._wanted, points.ravel(), self._share)
+        flat = differentiate_outputs(self._k, self.rows, points.ravel(), self._share)
         return self._shaped(flat.reshape(len(self.outputs), *points.shape))
 
     def digits(self, s: complex, digits: int) -> Any:
@@ -99,7 +107,7 @@ class TransferFunction:
         if not isinstance(digits, int) or not 1 <= digits <= 1000:
             raise ParameterError(key="digits", value=digits, remedy="a whole number of digits from 1 to 1000")
         point = complex(_finite(s))
-        pairs = [digits_of(self._k, wanted, point, digits, self._share) for wanted in self._wanted]
+        pairs = [digits_of(self._k, wanted, point, digits, self._share) for wanted in self.rows]
         return pairs[0] if self.is_single else pairs
 
     def frequency_response(self, omega: ArrayLike) -> control.FrequencyResponseData:
@@ -117,11 +125,11 @@ class TransferFunction:
 
     def _values(self, s: Complex) -> Complex:
         if s.size <= BLOCK:
-            return evaluate_outputs(self._k, self._wanted, self._table, s, self._share)
+            return evaluate_outputs(self._k, self.rows, self._table, s, self._share)
         values = np.empty((len(self.outputs), s.size), complex)
         for start in range(0, s.size, BLOCK):
             part = slice(start, start + BLOCK)
-            values[:, part] = evaluate_outputs(self._k, self._wanted, self._table, s[part], self._share)
+            values[:, part] = evaluate_outputs(self._k, self.rows, self._table, s[part], self._share)
         return values
 
     def _shaped(self, values: Complex) -> Any:
@@ -132,7 +140,7 @@ class TransferFunction:
 
     @cached_property
     def _expansion(self) -> NDArray[np.float64]:
-        return np.array([expansion_at_zero(self._k, wanted, self._share) for wanted in self._wanted])
+        return np.array([expansion_at_zero(self._k, wanted, self._share) for wanted in self.rows])
 
     @property
     def rigid_body(self) -> Any:
@@ -162,9 +170,9 @@ class TransferFunction:
         """
         if not self.is_single:
             raise ParameterError(key="outputs", value=self.outputs, remedy="ask for the zeros of one output at a time")
-        if self._wanted[0].place == "x":
+        if self.rows[0].place == "x":
             raise ParameterError(key="output", value=self.outputs[0], remedy="zeros are found at the hub and the tip")
-        return zeros_of(self.arm, self._wanted[0], _positive("up_to", up_to))
+        return zeros_of(self.arm, self.rows[0], _positive("up_to", up_to))
 
     # ------------------------------------------------------------ inside
 
@@ -173,7 +181,7 @@ class TransferFunction:
         return 0.0 if self.x is None else self.x / self.arm.link.length
 
     def _place(self, x: float | None) -> float | None:
-        along = [name for name, wanted in zip(self.outputs, self._wanted, strict=True) if wanted.place == "x"]
+        along = [name for name, wanted in zip(self.outputs, self.rows, strict=True) if wanted.place == "x"]
         length = self.arm.link.length
         if not along:
             if x is not None:

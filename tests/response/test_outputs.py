@@ -1,0 +1,176 @@
+"""Outputs of one's own: right by every door, or refused; and those that an end condition holds constant."""
+
+import math
+from dataclasses import replace
+from types import MappingProxyType
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import tfarm
+from tests.shell import answer
+from tfarm import Hub, Output, ParameterError, Payload
+from tfarm.exact import appendix, outputs
+
+EPS = np.finfo(float).eps
+LAB, STOCKY = tfarm.load("sasaki2012-lab"), tfarm.load("stocky-steel")
+ARMS = {
+    "lab": LAB,
+    "stocky": STOCKY,
+    "pinned tip": replace(STOCKY, payload=Payload(mass=math.inf, inertia=0.0)),
+    "tip that cannot turn": replace(STOCKY, payload=Payload(mass=0.0, inertia=math.inf)),
+    "locked hub": replace(STOCKY, hub=Hub(inertia=math.inf)),
+    "free pin": replace(LAB, hub=Hub(inertia=0.0)),
+}
+POINTS = [0.3 + 57.1j, 2e-3j, -5.0 + 900.0j, 1.3e4j]
+TURN = Output(quantity="Phi", place="tip", unit="rad", label="tip rotation")
+MOMENT = Output(quantity="M", place="tip", unit="N m", label="tip moment")
+FORCE = Output(quantity="Q", place="tip", unit="N", label="tip shear force")
+JERK = Output(quantity="W", place="tip", unit="m/s^3", power=3, label="tip jerk")
+SNAP = Output(quantity="theta", place="root", unit="rad/s^4", power=4, label="hub snap")
+OWN = [TURN, MOMENT, FORCE, JERK, SNAP, replace(TURN, power=1, unit="rad/s", label="tip turning rate", name="")]
+
+
+@pytest.mark.parametrize("arm", ARMS.values(), ids=ARMS)
+@pytest.mark.parametrize("wanted", OWN, ids=lambda output: output.name)
+def test_call_digits_and_frequency_response_agree_with_the_paper(arm, wanted) -> None:
+    G = tfarm.transfer(arm, wanted)
+    for s in POINTS:
+        expected = complex(appendix.response(arm, wanted, s, 20))
+        slope = abs(s * G.derivative(s))
+        assert abs(G(s) - expected) <= 90 * EPS * (abs(expected) + slope)
+        assert abs(complex(*map(float, G.digits(s, 17))) - expected) <= 4 * EPS * abs(expected)
+    data = G.frequency_response([57.1, 900.0])
+    assert data.output_labels == [wanted.name]
+    assert (data.frdata[0, 0] == G([57.1j, 900j])).all()
+
+
+@pytest.mark.parametrize("arm", ARMS.values(), ids=ARMS)
+def test_derivatives_obey_the_product_rule_of_the_power(arm) -> None:
+    for wanted in (JERK, SNAP, OWN[-1]):
+        G, base, n = tfarm.transfer(arm, wanted), tfarm.transfer(arm, wanted.base), wanted.power
+        for s in POINTS:
+            terms = n * s ** (n - 1) * base(s), s**n * base.derivative(s)
+            assert abs(G.derivative(s) - sum(terms)) <= 64 * EPS * sum(map(abs, terms))
+
+
+def test_the_payload_is_driven_by_what_acts_on_the_tip() -> None:
+    """M(L) = -I_c s^2 psi(L), Q(L) = -m s^2 w(L): Newton and Euler for the payload; psi = phi + theta."""
+    moment, force, turn, theta, w = tfarm.transfer(STOCKY, [MOMENT, FORCE, TURN, "hub_angle", "tip_displacement"])(
+        1j * np.geomspace(1, 1e5, 50)
+    )
+    square = -(np.geomspace(1, 1e5, 50) ** 2)
+    scale = STOCKY.payload.inertia * abs(square) * (abs(turn) + abs(theta))
+    assert (abs(moment + STOCKY.payload.inertia * square * (turn + theta)) <= 300 * EPS * scale).all()
+    assert_allclose(force, -STOCKY.payload.mass * square * w, rtol=1e-12)
+
+
+@pytest.mark.parametrize("arm", ["lab", "stocky", "pinned tip", "tip that cannot turn", "locked hub"])
+@pytest.mark.parametrize("wanted", [TURN, MOMENT, FORCE], ids=lambda output: output.name)
+def test_zeros_at_the_tip_are_as_many_as_the_argument_turns(arm: str, wanted: Output) -> None:
+    G = tfarm.transfer(ARMS[arm], wanted)
+    radius = 21000.0 if arm != "lab" else 390.0
+    zeros, poles = G.zeros(up_to=1.2 * radius), G.poles(up_to=1.2 * radius)
+    payload = ARMS[arm].payload
+    if {MOMENT: payload.inertia, FORCE: payload.mass}.get(wanted) == 0:  # nothing at the tip takes it
+        assert (zeros.proof, zeros.values.size, G(57.1j)) == ("constant", 0, 0)
+        return
+    moving = zeros.values[zeros.values != 0]
+    assert all(abs(G(z * (1 + 1e-9))) <= 3e-9 * abs(z * G.derivative(z)) for z in moving)
+    circle = radius * np.exp(2j * np.pi * (np.arange(4000) + 0.5) / 4000)
+    values = G(circle)
+    turns = np.angle(np.roll(values, -1) / values).sum() / (2 * np.pi)
+    inside = [np.count_nonzero(abs(roots.values) < radius) for roots in (zeros, poles)]
+    at_zero = round(math.log(abs(G(2e-4)) / abs(G(1e-4)), 2))  # G ~ s^at_zero; poles and zeros at 0 may have cancelled
+    inside[0] += at_zero - (np.count_nonzero(zeros.values == 0) - np.count_nonzero(poles.values == 0))
+    assert round(turns) == inside[0] - inside[1]
+
+
+def test_reduced_models_take_them() -> None:
+    model, G = tfarm.reduce(STOCKY, [TURN, "hub_rate"], order=8, band=(100.0, 3000.0)), tfarm.transfer(STOCKY, TURN)
+    assert model.outputs == ("tip_rotation", "hub_rate")
+    w = np.linspace(100, 3000, 20)
+    size = abs(G(1j * w)) + abs(w * G.derivative(1j * w))
+    assert (abs(model(1j * w)[0] - G(1j * w)) <= model.worst_error * size).all()
+    assert model.worst_error < 1e-3
+    with pytest.raises(ParameterError, match="lower derivative"):
+        tfarm.reduce(STOCKY, JERK, order=10)
+
+
+def test_a_row_of_the_table_is_known_on_the_command_line(capsys, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(outputs, "OUTPUTS", MappingProxyType({**outputs.OUTPUTS, TURN.name: TURN}))
+    found = answer(capsys, "response", "sasaki2012-lab", "--output", "tip_rotation", "--s", "0.3+57.1j")
+    assert (found["output"], found["unit"].split("/")[0]) == ("tip_rotation", "rad")
+    (value,) = found["value"]
+    expected = complex(appendix.response(LAB, TURN, 0.3 + 57.1j, 20))
+    assert abs(complex(*value) - expected) <= 1e-13 * abs(expected)
+
+
+# ---------------------------------------------------------------- what an end condition holds
+
+HELD = [
+    ("lab", "rotation", 0.0, 0.0),
+    ("lab", "deflection", 0.0, 0.0),
+    ("lab", "moment", 1.0, 0.0),
+    ("lab", "shear", 1.0, 0.0),
+    ("lab", MOMENT, None, 0.0),
+    ("pinned tip", "tip_acceleration", None, 0.0),
+    ("locked hub", "hub_angle", None, 1.0),
+    ("free pin", replace(MOMENT, place="root", name="clamp_moment"), None, -1.0),
+]
+
+
+@pytest.mark.parametrize(("name", "wanted", "share", "value"), HELD, ids=str)
+def test_what_is_held_constant_has_its_value_at_a_resonance_too(name: str, wanted, share, value) -> None:
+    arm = replace(ARMS[name], link=replace(ARMS[name].link, damping=0.0))
+    G = tfarm.transfer(arm, wanted, x=None if share is None else share * arm.link.length)
+    s = 1j * float(tfarm.modes(arm, 2).natural_frequency[-1])
+    with pytest.raises(ParameterError, match="a natural frequency"):
+        tfarm.transfer(arm, "tip_deflection")(s)
+    assert (G(s), G.derivative(s), G(0)) == (value, 0.0, value)
+    assert [float(part) for part in G.digits(s, 30)] == [value, 0.0]
+
+
+# ---------------------------------------------------------------- refusals
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"quantity": "Psi"}, "quantity"),
+        ({"quantity": "Phi", "place": "root"}, "0 at the root"),
+        ({"quantity": "W", "place": "x"}, "deflection Y"),
+        ({"quantity": "theta"}, "one number"),
+        ({"place": "middle"}, "known at: tip"),
+        ({"power": 5}, "0 to 4"),
+        ({"power": -1}, "0 to 4"),
+        ({"power": True}, "0 to 4"),
+        ({"power": 1.0}, "0 to 4"),
+        ({"power": 1}, 'here "m/s"'),
+        ({"unit": "mm"}, 'here "m"'),
+        ({"gauge": True}, "moment only"),
+        ({"label": " "}, "in words"),
+        ({"name": "a.b"}, "underscores"),
+    ],
+    ids=str,
+)
+def test_what_is_no_output_is_refused(change, message: str) -> None:
+    right = {"quantity": "W", "place": "tip", "unit": "m", "label": "where the tip is"}
+    assert Output(**right).name == "where_the_tip_is"
+    with pytest.raises(ParameterError, match=message) as refused:
+        Output(**(right | change))
+    assert "\n" not in str(refused.value)
+
+
+def test_two_outputs_of_one_name_are_not_confused() -> None:
+    false = Output(quantity="Y", place="tip", unit="m", label="tip displacement")
+    with pytest.raises(ParameterError, match="the name of another output"):
+        tfarm.transfer(LAB, false)
+    with pytest.raises(ParameterError, match="the name of an output"):
+        tfarm.transfer(LAB, [3])  # type: ignore[list-item]
+
+
+def test_the_table_is_no_global_to_be_changed() -> None:
+    with pytest.raises(TypeError):
+        outputs.OUTPUTS["tip_velocity"] = TURN  # type: ignore[index]
