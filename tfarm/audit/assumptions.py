@@ -20,6 +20,7 @@ from tfarm.arm.checks import positive
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import gain_windows
+from tfarm.records import record
 from tfarm.spectrum import modes
 from tfarm.spectrum.scales import default_gains
 
@@ -35,6 +36,7 @@ HELD_HUB = "all else held"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+@record
 class SectionStudy:
     """Frequencies over rectangles of the arm's own area, a row a candidate.
 
@@ -55,6 +57,7 @@ class SectionStudy:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+@record
 class HubStudy:
     """Frequencies over hub inertias, a row a candidate.
 

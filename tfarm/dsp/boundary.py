@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.dsp.loop import ANGLE, SampledLoop
+from tfarm.records import record
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
@@ -31,6 +32,7 @@ NEAR_ONE = 1e-7  # where the values at z = 1 are read: they are even in q, so wr
 
 
 @dataclass(frozen=True)
+@record
 class Crossings:
     """At each `gain` (n,), ascending, `count` (n,) poles leave the unit circle (negative: enter it), at angle `q`."""
 
@@ -40,6 +42,7 @@ class Crossings:
 
 
 @dataclass(frozen=True)
+@record
 class CircleGrid:
     """Points z = e^{iq}, 0 < q < pi, each as a pole `base` and an angle `shift` from it, with what the loop's terms are
     there.

@@ -13,11 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.dsp.chain import Chain
+from tfarm.records import record
 
 ANGLE, MOMENT, TORQUE = 0, 1, 2  # rows of `Quantisers.rows`
 
 
 @dataclass(frozen=True)
+@record
 class Quantisers:
     """`rows` (3, 3): step, lowest and highest value of the angle, the moment and the torque; step 0 is ideal."""
 

@@ -20,6 +20,7 @@ from scipy.optimize import linear_sum_assignment
 from tfarm.arm import HubFeedback
 from tfarm.dsp.boundary import GainName
 from tfarm.dsp.loop import SampledLoop
+from tfarm.records import record
 from tfarm.spectrum import modes
 
 Real = NDArray[np.float64]
@@ -30,6 +31,7 @@ SETTLED = -20.0  # modes that lose more than this in ln|a| between two samples a
 
 
 @dataclass(frozen=True)
+@record
 class ModeTable:
     """A row a mode that outlives a sample.
 

@@ -23,6 +23,7 @@ from tfarm.dsp.chain import Chain, Sampling
 from tfarm.dsp.plant import Plant, loop_plant
 from tfarm.dsp.sampling import PulseTransfer
 from tfarm.errors import ParameterError
+from tfarm.records import record
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
@@ -35,6 +36,7 @@ FAINT = 0.2  # a pole nearer to z = 0 decides nothing and is not polished
 
 
 @dataclass(frozen=True)
+@record
 class Poles:
     """Closed-loop poles `z` and `log_radius` ln|z| of each, the z = 1 of a hub angle that nothing regulates left out.
 
@@ -57,6 +59,7 @@ class Poles:
 
 
 @dataclass(frozen=True)
+@record
 class SampledLoop:
     """The arm under the control law at the samples of a chain: `plant` from torque to what is measured, and `gains`."""
 

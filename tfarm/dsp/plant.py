@@ -22,6 +22,7 @@ from tfarm.arm import Arm
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.remainder import with_slow_remainder
 from tfarm.errors import ParameterError
+from tfarm.records import record
 from tfarm.reduced import ModalModel, modal_model
 from tfarm.response import transfer
 
@@ -33,6 +34,7 @@ RECORDED = ("hub_angle", "hub_rate", "root_moment", "tip_displacement")
 
 
 @dataclass(frozen=True)
+@record
 class Plant:
     """Poles (m,) [1/s] other than s = 0, conjugates listed too; residues (outputs, m), rigid (outputs, 2), static
     (outputs,).

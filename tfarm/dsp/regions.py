@@ -12,6 +12,7 @@ from tfarm.dsp.boundary import Crossings, circle_grid, crossings
 from tfarm.dsp.loop import SampledLoop
 from tfarm.dsp.margins import Window, joined
 from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.records import record
 
 Real = NDArray[np.float64]
 
@@ -19,6 +20,7 @@ MOST_GAINS = 4000
 
 
 @dataclass(frozen=True)
+@record
 class GainMap:
     """`unstable` (K1, K2): how many poles grow, apart from z = 1 of a free hub angle; stable where it is zero.
 

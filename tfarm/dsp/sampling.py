@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from tfarm.arm import Arm
 from tfarm.dsp.chain import Chain, Sampling
 from tfarm.dsp.plant import Plant, undelayed_plant
+from tfarm.records import record
 
 if TYPE_CHECKING:
     import control
@@ -34,6 +35,7 @@ FORGOTTEN = 40.0  # e^-40 = 4e-18: such a pole has settled before the next sampl
 
 
 @dataclass(frozen=True)
+@record
 class PulseTransfer:
     """H_o(z), the pulse transfer functions from the torque computed at a sample to what the next samples measure.
 

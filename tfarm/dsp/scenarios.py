@@ -14,6 +14,7 @@ from tfarm.arm import Arm, must_turn
 from tfarm.arm.checks import number, positive
 from tfarm.dsp.chain import Chain
 from tfarm.errors import ParameterError, did_you_mean
+from tfarm.records import record
 
 Real = NDArray[np.float64]
 
@@ -22,6 +23,7 @@ STEP_TORQUE, IMPULSE, TIP_OFFSET = 0.1, 0.01, 0.01  # N m, N m s, m: what the sc
 
 
 @dataclass(frozen=True)
+@record
 class Scenario:
     """A row a sample: `feedforward` r [N m], `hub_angle` and `hub_rate` references, `rigid_moment` [N m] that the
     moment feedback takes off, `disturbance` [N m] at the hub (held over the sample, not delayed).

@@ -19,6 +19,7 @@ from tfarm.dsp.plant import MEASURED, RECORDED, Plant, filtered, undelayed_plant
 from tfarm.dsp.sampling import held
 from tfarm.dsp.scenarios import Scenario
 from tfarm.errors import ParameterError
+from tfarm.records import record
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
@@ -49,6 +50,7 @@ Controller = Callable[[Measurement], float]
 
 
 @dataclass(frozen=True)
+@record
 class Trace:
     """Signals, not filtered, at `t` [s]: hub angle [rad], hub rate [rad/s], root moment [N m], tip displacement [m]."""
 
@@ -68,6 +70,7 @@ class Stop:
 
 
 @dataclass(frozen=True)
+@record
 class Simulation:
     """A simulated loop: `at_samples` just before each update, `between` the records asked for between the samples.
 

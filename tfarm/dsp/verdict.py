@@ -12,6 +12,7 @@ from tfarm.dsp.law import ModeTable, growing_mode, mode_table
 from tfarm.dsp.loop import SampledLoop, sampled_loop
 from tfarm.dsp.margins import DelayMargin, Window, alive, around, delay_margin, required_damping, stable_windows
 from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.records import record
 
 UNDAMPED_MODES = 20
 FEW, MOST = 4, 128
@@ -21,6 +22,7 @@ MOST_ASKED = 400
 
 
 @dataclass(frozen=True)
+@record
 class Verdict:
     """Whether a sampled loop is stable, apart from z = 1 of a hub angle that nothing regulates.
 
@@ -117,6 +119,7 @@ def _agree(before: SampledLoop, after: SampledLoop) -> bool:
 
 
 @dataclass(frozen=True)
+@record
 class Analysis:
     """Everything that is said of a sampled loop at its gains."""
 

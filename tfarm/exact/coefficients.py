@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import Arm
 from tfarm.errors import ParameterError
+from tfarm.records import record
 
 Theory = Literal["timoshenko", "shear", "rayleigh", "euler-bernoulli"]
 THEORIES: tuple[Theory, ...] = get_args(Theory)
@@ -45,6 +46,7 @@ class Condition:
 
 
 @dataclass(frozen=True, kw_only=True)
+@record
 class Coefficients:
     """Dimensionless coefficients of an arm, exact as fractions of its float64 parameters.
 

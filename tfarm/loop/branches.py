@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.errors import ConvergenceError
+from tfarm.records import record
 from tfarm.spectrum import modes
 from tfarm.spectrum.continuation import Node, corrected, follow, through
 from tfarm.spectrum.damped import COMPANY
@@ -39,6 +40,7 @@ class AtSingularError(ConvergenceError):
 
 
 @dataclass(frozen=True)
+@record
 class Segment:
     """Nodes between which the pairs stay what they are, and the number of the branch of each zero, (n, 2)."""
 
@@ -59,6 +61,7 @@ class Segment:
 
 
 @dataclass(frozen=True)
+@record
 class Stage:
     """One way of what varies from `start` to `stop`."""
 

@@ -16,6 +16,7 @@ from scipy.optimize import minimize
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.records import record
 
 from .damping import least_damping
 from .frequencies import band_of, grid
@@ -38,6 +39,7 @@ FLAT = 0.01  # gains whose value is worse by less than this share bound the flat
 
 
 @dataclass(frozen=True)
+@record
 class Design:
     """The best law, its value (damping ratio, disk margin, or residual moment [N m]), its verdict, and how flat it is.
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.records import record
 from tfarm.spectrum.continuation import Member, corrected, follow
 
 from .branches import FREE, Segment, followed, ordered
@@ -31,6 +32,7 @@ SAME = 1e-12  # relative: a gain so near to that at which a pole passes through 
 
 
 @dataclass(frozen=True)
+@record
 class Locus:
     """The closed-loop poles of an arm under a law, as one number varies.
 

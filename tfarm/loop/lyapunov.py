@@ -29,6 +29,7 @@ from scipy.linalg import expm
 from tfarm.arm import Arm, HubFeedback
 from tfarm.arm.checks import positive
 from tfarm.errors import ParameterError
+from tfarm.records import record
 from tfarm.reduced import modal_model
 from tfarm.response import transfer
 
@@ -42,6 +43,7 @@ SIGNALS = ("hub_angle", "hub_rate", "root_moment")
 
 
 @dataclass(frozen=True)
+@record
 class Lyapunov:
     """What V proves about an arm and a law with constant gains.
 
@@ -58,6 +60,7 @@ class Lyapunov:
 
 
 @dataclass(frozen=True)
+@record
 class EnergyBalance:
     """V along a free response of a modal model at C = 0, with a2 = 1 and a1 = 1 - K2.
 

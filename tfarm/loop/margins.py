@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from tfarm.arm import Arm, HubFeedback
+from tfarm.records import record
 
 from .frequencies import grid
 from .lines import BISECTIONS, NONE, Line, crossing_at_zero, crossings
@@ -40,6 +41,7 @@ NEAR_POLES = np.geomspace(0.05, 20.0, 12)  # points about a pole, in its distanc
 
 
 @dataclass(frozen=True)
+@record
 class LoopMargins:
     """Margins of L(i w) for 0 < w <= `band` [rad/s]; inf where nothing limits.
 
@@ -60,6 +62,7 @@ class LoopMargins:
 
 
 @dataclass(frozen=True)
+@record
 class Margins:
     """The verdict first.  `in_band` are the margins up to its band; `exact_delay`, `exact_disk` and `exact_peak` those
     of the whole infinite-dimensional loop.  All four are None unless the loop is stable.

@@ -13,6 +13,7 @@ from tfarm.arm import Arm, HubFeedback
 from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import Gains, loop_parts
 from tfarm.exact.coefficients import Coefficients, coefficients
+from tfarm.records import record
 from tfarm.spectrum.continuation import Member
 from tfarm.spectrum.damped import member
 
@@ -22,6 +23,7 @@ SMALLEST_NORMAL = float(np.finfo(float).tiny)
 
 
 @dataclass(frozen=True)
+@record
 class Loop:
     """An arm under a law at its hub.
 

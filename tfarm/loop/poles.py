@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from tfarm.arm import Arm, Hub, HubFeedback
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
 from tfarm.exact.characteristic import zeros_at_origin
+from tfarm.records import record
 from tfarm.spectrum import modes
 from tfarm.spectrum.box import Box, zeros_in_box
 from tfarm.spectrum.damped import CLEAR
@@ -36,6 +37,7 @@ GROWTH = (1.0, 1.0041, 1.0093, 1.0171, 1.0311, 1.0573, 1.113)  # heights tried w
 
 
 @dataclass(frozen=True)
+@record
 class Poles:
     """Closed-loop poles [1/s] with Im >= 0, ascending in Im, those at 0 as often as they are: all there are in `box`.
 

@@ -15,6 +15,7 @@ from scipy.optimize import linear_sum_assignment
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.errors import ParameterError
+from tfarm.records import record
 from tfarm.reduced import modal_model
 from tfarm.spectrum import modes
 
@@ -31,6 +32,7 @@ OUTPUTS = {"Kp": "hub_angle", "K1": "hub_rate", "K2": "root_moment"}
 
 
 @dataclass(frozen=True)
+@record
 class ReducedLocus:
     """Poles of a reduced closed loop of that `order`, next to the exact branches, at the values `gain` (m,).
 

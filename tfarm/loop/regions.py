@@ -22,6 +22,7 @@ from tfarm.arm import Arm, HubFeedback
 from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import Gains, loop_parts
 from tfarm.exact.coefficients import coefficients
+from tfarm.records import record
 
 from .frequencies import grid
 from .lines import BISECTIONS, along, crossing_at_zero, crossings
@@ -34,6 +35,7 @@ MOST = 2000  # grid points along one gain
 
 
 @dataclass(frozen=True)
+@record
 class Region:
     """Unstable poles over a grid: `unstable` (len(K2), len(K1)), -1 where they are infinitely many.
 

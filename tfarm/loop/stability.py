@@ -19,6 +19,7 @@ import numpy as np
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.errors import ConvergenceError
+from tfarm.records import record
 from tfarm.spectrum import modes, modes_below
 
 from .frequencies import MOST_MODES, band_of
@@ -32,6 +33,7 @@ UNFELT = 1e-9  # a hub participation below this share of an ordinary one is none
 
 
 @dataclass(frozen=True)
+@record
 class Stability:
     """`verdict` "stable", "marginal" or "unstable"; poles in the band; what is known beyond it, in words."""
 

@@ -14,6 +14,7 @@ from tfarm.arm import Arm, HubFeedback
 from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import Analytic, quick_characteristics
 from tfarm.exact.coefficients import Coefficients, coefficients
+from tfarm.records import record
 from tfarm.spectrum.continuation import Member
 
 from .plant import Loop
@@ -27,6 +28,7 @@ VARIED = GAINS | PARAMETERS  # what may be varied, and its unit
 
 
 @dataclass(frozen=True)
+@record
 class Variation:
     """The loops of an arm under a law, one of whose numbers varies: a gain, "all" (a scale on the law), or the arm's.
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from tfarm.arm import HubFeedback
 from tfarm.arm.feedback import MOST_GAIN
+from tfarm.records import record
 from tfarm.spectrum import modes
 
 from .lines import Crossing, along, crossing_at_zero, crossings
@@ -25,6 +26,7 @@ BEYOND_STATIC = 2.0  # times J/(J - I_h), where K2 cancels the inertia: windows 
 
 
 @dataclass(frozen=True)
+@record
 class Windows:
     """Stable windows of one gain: that around the point (None if it is not stable) and all in `looked_at`.
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm
+from tfarm.records import record
 from tfarm.response import TransferFunction, Wanted, transfer
 from tfarm.spectrum import modes, modes_below
 
@@ -32,6 +33,7 @@ MOST_PEAKS = 12
 
 
 @dataclass(frozen=True)
+@record
 class Accuracy:
     """`worst` (outputs,): an upper figure of the error over the band; `at` (outputs,) [rad/s]: where it is worst."""
 

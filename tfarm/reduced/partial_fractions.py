@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from tfarm.arm import Arm
 from tfarm.errors import ParameterError
 from tfarm.exact.outputs import Output
+from tfarm.records import record
 
 if TYPE_CHECKING:
     import control
@@ -23,6 +24,7 @@ BLOCK = 1 << 18  # entries of (poles, s) held at a time
 
 
 @dataclass(frozen=True, kw_only=True)
+@record
 class PartialFractions:
     """G_o(s) ~ rigid[o,0]/s^2 + rigid[o,1]/s + static[o] + sum of residues[o,k,i]/(s - eigenvalues[k,i]).
 

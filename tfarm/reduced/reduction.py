@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from tfarm.arm import Arm
 from tfarm.errors import MISSING, ConvergenceError, ParameterError
 from tfarm.exact.outputs import Output
+from tfarm.records import record
 from tfarm.response import Wanted, transfer
 from tfarm.spectrum import modes
 
@@ -38,6 +39,7 @@ SAME = 1e-6  # relative gap within which a pole of the model is a mode of the ar
 
 
 @dataclass(frozen=True)
+@record
 class ReducedModel:
     """A reduced model and how far to trust it.
 

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from tfarm.dsp.boundary import GainName
 from tfarm.dsp.law import origins, root_locus
 from tfarm.dsp.loop import SampledLoop
+from tfarm.records import record
 from tfarm.report.digits import plain
 from tfarm.report.figures import BLUE, GREY, INK, ORANGE, blank, headline, style
 from tfarm.report.tables import Column, Table, Value, data_column
@@ -38,6 +39,7 @@ RIM = 1.12  # radius up to which the z-plane is shown
 
 
 @dataclass(frozen=True)
+@record
 class Locus:
     """One gain's locus: `z` (values, branches), and the flexible mode of each branch (0: hub, filter or delay)."""
 
@@ -48,6 +50,7 @@ class Locus:
 
 
 @dataclass(frozen=True)
+@record
 class Loci:
     """Loci of K1 alone (K2 = 0), and of both gains through those of the loop; `poles` [1/s] are the arm's own,
     one a flexible mode, `mode` their numbers.

@@ -19,6 +19,7 @@ from tfarm.arm import Arm, HubFeedback
 from tfarm.errors import ConvergenceError
 from tfarm.loop.locus import Locus, locus
 from tfarm.loop.reduced_locus import ReducedLocus, reduced_locus
+from tfarm.records import record
 from tfarm.report.digits import plain, scientific, significant
 from tfarm.report.figures import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, blank, headline, style
 from tfarm.report.tables import Column, Table, data_column, number_column, text_column
@@ -36,6 +37,7 @@ MARKED = 5  # gains marked along each branch
 
 
 @dataclass(frozen=True)
+@record
 class Loci:
     """The exact locus, the reduced one beside it, the gains marked on both, and the gain that was to be reached."""
 

@@ -17,6 +17,7 @@ from tfarm.loop.damping import least_damping
 from tfarm.loop.design import Design
 from tfarm.loop.frequencies import band_of
 from tfarm.loop.regions import Region, between, boundary, region
+from tfarm.records import record
 from tfarm.report.loop_laws import MODES, NamedLaw, best, laws
 from tfarm.report.tables import Column, Table, Value, data_column
 from tfarm.spectrum.scales import default_gains, rate_unit
@@ -64,6 +65,7 @@ class Axis:
 
 
 @dataclass(frozen=True)
+@record
 class GainMap:
     """What the map shows.
 

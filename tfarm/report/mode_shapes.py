@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
+from tfarm.records import record
 from tfarm.report.digits import plain, significant
 from tfarm.report.figures import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, blank, headline, style
 from tfarm.report.responses import Real
@@ -22,6 +23,7 @@ HUB = 0.06  # width of the drawn hub, as a share of the length
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+@record
 class Shape:
     """One mode as drawn: w(x) over its largest value, x and nodes in m."""
 

@@ -23,6 +23,7 @@ from tfarm.loop.frequencies import band_of, grid, natural_frequencies
 from tfarm.loop.plant import Loop
 from tfarm.loop.poles import ON_AXIS
 from tfarm.loop.stability import Stability
+from tfarm.records import record
 from tfarm.report.digits import plain, significant
 from tfarm.report.figures import BLUE, FAINT, GREY, ORANGE, blank, headline, style
 from tfarm.report.loop_laws import NamedLaw
@@ -49,6 +50,7 @@ COUNTED = " The last law is there to show that the count is not always 0."
 
 
 @dataclass(frozen=True)
+@record
 class Nyquist:
     """L on the contour for Im s >= 0: `s` (n,), `L` (n,), `is_arc` where the contour passes a pole on the axis.
 

@@ -24,6 +24,7 @@ from tfarm.dsp.loop import SampledLoop
 from tfarm.errors import ConvergenceError
 from tfarm.loop.lines import along, crossings
 from tfarm.loop.regions import region
+from tfarm.records import record
 from tfarm.report.digits import plain, scientific
 from tfarm.report.figures import BLUE, GREY, INK, ORANGE, blank, headline, style
 from tfarm.report.region_pieces import pieces
@@ -46,6 +47,7 @@ BELOW = 15.0  # of the gain itself
 
 
 @dataclass(frozen=True)
+@record
 class Layer:
     """A stable region: at each K1 (n,) the open intervals of K2 in which nothing grows, cut to the picture.
 
@@ -59,6 +61,7 @@ class Layer:
 
 
 @dataclass(frozen=True)
+@record
 class Overlay:
     """Both regions of one arm.  `sampled` has the arm's own C; at C = 0 also what a little damping would give."""
 

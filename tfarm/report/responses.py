@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 import tfarm
 from tfarm.arm import Arm
 from tfarm.exact.outputs import OUTPUTS
+from tfarm.records import record
 
 Real = NDArray[np.floating[Any]]
 Complex = NDArray[np.complexfloating[Any, Any]]
@@ -33,6 +34,7 @@ COINCIDE = 1e-9  # relative distance below which a pole and a zero cancel
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+@record
 class Bode:
     """A frequency response with its poles and zeros.  omega in rad/s, `value` in SI units, `phase` in degrees.
 

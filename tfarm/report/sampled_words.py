@@ -11,6 +11,7 @@ from tfarm.dsp.chain import Chain, Sampling
 from tfarm.dsp.margins import around
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import gain_windows
+from tfarm.records import record
 from tfarm.report.digits import plain, scientific, significant
 from tfarm.report.overlay import Overlay, overlay
 from tfarm.report.sections import Fact
@@ -24,6 +25,7 @@ Window = tuple[float, float]
 
 
 @dataclass(frozen=True)
+@record
 class Sampled:
     """Everything that the section says and draws."""
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tfarm.arm import Arm, HubFeedback
 from tfarm.dsp import Converters, Measurement, Simulation, Simulator, scenario
 from tfarm.dsp.chain import Actuator, Chain
+from tfarm.records import record
 from tfarm.report.digits import plain, significant
 from tfarm.report.figures import BLUE, FAINT, GREEN, GREY, INK, ORANGE, blank, headline, style
 from tfarm.report.tables import Table, data_column
@@ -30,6 +31,7 @@ SATURATED = "#f6d9c2"
 
 
 @dataclass(frozen=True)
+@record
 class StripChart:
     """A slew through a coarse chain.
 

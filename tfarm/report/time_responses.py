@@ -15,6 +15,7 @@ from tfarm.arm import Arm, HubFeedback
 from tfarm.dsp import Simulation, Simulator, scenario
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.results import residual_moment_rms, settling_time
+from tfarm.records import record
 from tfarm.report.digits import plain, significant
 from tfarm.report.figures import BLUE, GREY, INK, ORANGE, blank, headline, style
 from tfarm.report.tables import Column, Table, data_column
@@ -26,6 +27,7 @@ DURATION = 3.0  # s
 
 
 @dataclass(frozen=True)
+@record
 class Slews:
     """One slew simulated twice: `without` (K2 = 0) and `with_moment` feedback, K1 the same."""
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.dsp import Chain, Simulation, Simulator
+from tfarm.records import record
 from tfarm.report.time_responses import BETWEEN
 from tfarm.spectrum.scales import default_gains
 from tfarm.tuner import Learning, Plan, Tuning, compare, conditions, tune
@@ -32,6 +33,7 @@ NOMINAL, COARSE = "as trained", "quantised, one sample of delay"  # rows of the 
 
 
 @dataclass(frozen=True)
+@record
 class Curves:
     """Learning curves of one rule over the seeds: `costs` (seeds, trials), inf from where a run diverged."""
 
@@ -61,6 +63,7 @@ class Curves:
 
 
 @dataclass(frozen=True)
+@record
 class CostMap:
     """`median` (alphas, etas) of the final cost over the seeds, and the study's verdict on the paper's pair."""
 
@@ -92,6 +95,7 @@ class CostMap:
 
 
 @dataclass(frozen=True)
+@record
 class TunerStudy:
     """All of it.  `slews` and `coarse` hold two simulations each, without and with the tuner; `constant` is the slew
     with the best constant gain.

@@ -16,6 +16,7 @@ from tfarm.exact.coefficients import Coefficients, coefficients
 from tfarm.exact.free import free_response, low_frequency, low_frequency_tip, tip_response
 from tfarm.exact.jets import Jet
 from tfarm.exact.outputs import Output
+from tfarm.records import record
 from tfarm.spectrum import modes, modes_below
 from tfarm.spectrum.box import Box, Function, zeros_in_box
 
@@ -25,6 +26,7 @@ CLEAR = 0.8  # how far towards the accumulation point -1/C a box may reach
 
 
 @dataclass(frozen=True, slots=True)
+@record
 class Roots:
     """Poles or zeros `values` [1/s], with multiplicity, ascending in |Im s|: all there are in `box`.
 

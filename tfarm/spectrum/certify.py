@@ -24,11 +24,13 @@ from numpy.typing import NDArray
 from tfarm.errors import CertificationError
 from tfarm.exact.balls import precision, rational
 from tfarm.exact.coefficients import Coefficients
+from tfarm.records import record
 
 from .ball_axis import Axis, precisions, secant
 
 
 @dataclass(frozen=True, slots=True)
+@record
 class Certificate:
     """Brackets (lower, upper) as decimal strings, and the count below a frequency that proves them complete."""
 

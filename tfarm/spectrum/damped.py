@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
 from tfarm.exact.characteristic import OPEN, Gains, quick_characteristic, zeros_at_origin
 from tfarm.exact.coefficients import Coefficients
+from tfarm.records import record
 
 from .box import Box, Complex, Function, winding_number
 from .complex_shapes import mode_field
@@ -33,6 +34,7 @@ FIRST = 0.01  # the first step in C, over 1/w of the highest mode
 
 
 @dataclass(frozen=True)
+@record
 class DampedModes:
     """The modes of an arm with its damping, in the order of the undamped modes they continue from.
 

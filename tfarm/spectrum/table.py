@@ -13,6 +13,7 @@ from tfarm.arm import Arm
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exact.appendix import roots_near
 from tfarm.exact.coefficients import THEORIES, Coefficients, Theory, coefficients
+from tfarm.records import record
 
 from .certify import Certificate, certify
 from .precise import refine
@@ -37,6 +38,7 @@ PARAMETERS = (
 
 
 @dataclass(frozen=True)
+@record
 class Modes:
     """The undamped modes of an arm, in ascending order, complete up to the last one.
 

@@ -31,6 +31,7 @@ from tfarm.dsp import SampledLoop, sampled_loop, stable_windows
 from tfarm.dsp.margins import around
 from tfarm.dsp.sampling import held
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError, did_you_mean
+from tfarm.records import record
 from tfarm.tuner.lyapunov import Lyapunov
 from tfarm.tuner.sector import SHARE, MovingGain
 
@@ -48,6 +49,7 @@ DAMPINGS = np.geomspace(1e-12, 1e-2, 11)  # s, tried for the remedy
 
 
 @dataclass(frozen=True)
+@record
 class Guard:
     """K stays in [lo, hi] (inf: no upper end).
 

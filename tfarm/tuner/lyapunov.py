@@ -17,6 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, solve_discrete_are, solve_triangular
 
+from tfarm.records import record
+
 Real = NDArray[np.float64]
 Whole = list[list[int]]
 
@@ -25,6 +27,7 @@ DIGITS = 60  # bits that P is rounded to before the proof
 
 
 @dataclass(frozen=True)
+@record
 class Lyapunov:
     """V = s^T P s falls with both matrices `low` and `high` (n, n), and with all between them.
 

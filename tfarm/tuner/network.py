@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.errors import ParameterError
+from tfarm.records import record
 from tfarm.tuner import kernel
 
 Real = NDArray[np.float64]
@@ -24,6 +25,7 @@ HALF_WIDTH = 0.5  # of the uniform distribution of the initial weights
 
 
 @dataclass(frozen=True)
+@record
 class Network:
     """Weights `W1` (hidden, inputs) and `w2` (hidden,); `scales` (inputs,) divide the inputs, in N m (K in 1).
 

@@ -15,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from tfarm.errors import MISSING, ParameterError, TfarmError
 from tfarm.files import read_file, write_file
+from tfarm.records import record
 from tfarm.tuner.controller import TunedGain
 from tfarm.tuner.guard import GuardKind
 from tfarm.tuner.network import MOST_HIDDEN, Network
@@ -26,6 +27,7 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
 @dataclass(frozen=True)
+@record
 class SavedTuner:
     """What a tuner needs to run: network, guard, K1 and the reading of the signals; and where it was trained."""
 

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.dsp import SampledLoop
+from tfarm.records import record
 from tfarm.tuner.lyapunov import Lyapunov, common_lyapunov
 
 Real = NDArray[np.float64]
@@ -29,6 +30,7 @@ AROUND = np.r_[-np.geomspace(100.0, 0.01, 30), 0.0, np.geomspace(0.01, 100.0, 30
 
 
 @dataclass(frozen=True)
+@record
 class MovingGain:
     """A sampled loop whose K2 moves: A(K) = open - K drive sense^T, apart from the free hub angle."""
 

@@ -25,6 +25,7 @@ from tfarm.arm.writing import to_toml
 from tfarm.dsp import Chain
 from tfarm.errors import ParameterError
 from tfarm.files import read_file, write_file
+from tfarm.records import record
 from tfarm.tuner.constants import BestConstant, best_constant
 from tfarm.tuner.guard import Guard, find_guard
 from tfarm.tuner.network import initial_network
@@ -51,6 +52,7 @@ BEGINNING = b'{"key": "'  # of every line that is kept
 
 
 @dataclass(frozen=True)
+@record
 class Finished:
     """One tuning of a study: `costs` of its trials, then a trial with what was learnt (inf where it ran away)."""
 

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm.checks import not_negative, positive
 from tfarm.errors import ParameterError, did_you_mean
+from tfarm.records import record
 from tfarm.tuner import kernel
 from tfarm.tuner.guard import Guard
 from tfarm.tuner.network import Network
@@ -37,6 +38,7 @@ MOST_TRIALS = 1_000_000
 
 
 @dataclass(frozen=True, kw_only=True)
+@record
 class Learning:
     """How to learn: `eta` (one number, or one a weight as `Network.weights` lists them), `alpha`, mode and rule.
 
@@ -97,6 +99,7 @@ class Stopped:
 
 
 @dataclass(frozen=True)
+@record
 class Training:
     """`costs` of the trials as they were run, the network that came out, and a trial with it as it is.
 

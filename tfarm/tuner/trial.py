@@ -23,6 +23,7 @@ from tfarm.arm.checks import not_negative, number, positive
 from tfarm.dsp import Chain, SampledLoop, Scenario, sampled_loop, scenario
 from tfarm.dsp.results import rms_after
 from tfarm.errors import ParameterError, did_you_mean
+from tfarm.records import record
 from tfarm.spectrum.scales import default_gains
 from tfarm.tuner import kernel
 from tfarm.tuner.network import Network
@@ -51,6 +52,7 @@ class Cost:
 
 
 @dataclass(frozen=True)
+@record
 class Record:
     """The signals of a trial at its samples: `x`, `u`, `e` [N m], gain `K`; `stopped`: the sample where it ran away."""
 
@@ -72,6 +74,7 @@ class Run(NamedTuple):
 
 
 @dataclass(frozen=True)
+@record
 class Trial:
     """An arm's loop with `K1`, a chain whose converters are taken as ideal, a slew `task` and a cost.
 

@@ -11,6 +11,7 @@ from tfarm.arm import Arm, HubFeedback
 from tfarm.dsp import Chain, Simulator, scenario
 from tfarm.dsp.results import rms_after, simulation_answer
 from tfarm.errors import ParameterError
+from tfarm.records import record
 from tfarm.spectrum.scales import default_gains
 from tfarm.tuner.bound import lq_bound
 from tfarm.tuner.comparison import Row
@@ -30,6 +31,7 @@ BOUND_NOTES = {
 
 
 @dataclass(frozen=True, kw_only=True)
+@record
 class Plan:
     """What to tune and how: the paper's figures where it gives them.
 
@@ -61,6 +63,7 @@ class Plan:
 
 
 @dataclass(frozen=True)
+@record
 class Tuning:
     """A tuner, trained, beside its yardsticks; all are of one trial.
 

@@ -1,0 +1,129 @@
+"""Records of the whole package: their arrays cannot be written, `==` answers, their repr is short."""
+
+import dataclasses
+import importlib
+import pkgutil
+import re
+from functools import cached_property
+
+import numpy as np
+import pytest
+
+import tfarm
+from tfarm import HubFeedback
+from tfarm.dsp import Chain
+from tfarm.dsp.regions import gain_map
+from tfarm.dsp.scenarios import slew
+from tfarm.dsp.simulate import Simulator
+from tfarm.dsp.verdict import analyse
+from tfarm.loop.locus import locus
+from tfarm.loop.regions import region
+from tfarm.records import LONGEST, record
+from tfarm.reduced import modal_model
+
+LAB = tfarm.load("sasaki2012-lab")
+LAW = HubFeedback(K1=0.3, K2=0.3)
+
+
+def sampled_map():
+    return gain_map(analyse(LAB, LAW, count=4).verdict.loop, np.array([0.1, 0.3]), np.array([0.0, 0.5]))
+
+
+MAKERS = {
+    "modes": lambda: tfarm.modes(LAB, 3),
+    "proof": lambda: tfarm.modes(LAB, 30).certify(20),
+    "damped modes": lambda: tfarm.damped_modes(tfarm.modes(LAB, 3)),
+    "zeros": lambda: tfarm.transfer(LAB, "tip_displacement").zeros(up_to=500.0),
+    "poles": lambda: tfarm.closed_loop_poles(LAB, LAW, 5),
+    "margins": lambda: tfarm.margins(LAB, LAW),
+    "locus": lambda: locus(LAB, LAW, "K2", 0.0, 1.0, 5, 4),
+    "region": lambda: region(LAB, np.linspace(0.1, 1, 3), np.linspace(0, 0.5, 3)),
+    "model": lambda: modal_model(LAB, ["root_moment"], 4),
+    "sampled": lambda: analyse(LAB, LAW, count=4),
+    "sampled map": sampled_map,
+    "slew": lambda: Simulator(LAB, Chain(), slew(LAB, Chain(), 0.5), count=3).linear(LAW),
+}
+
+
+def inside(value):
+    """Every record in a value, and every array, with those of cached properties."""
+    if isinstance(value, np.ndarray):
+        yield value
+    elif isinstance(value, dict):
+        yield from (found for entry in value.values() for found in inside(entry))
+    elif isinstance(value, tuple | list):
+        yield from (found for entry in value for found in inside(entry))
+    elif dataclasses.is_dataclass(value):
+        yield value
+        for name, attribute in vars(type(value)).items():
+            if isinstance(attribute, cached_property):
+                yield from inside(getattr(value, name))
+        yield from (found for each in dataclasses.fields(value) for found in inside(getattr(value, each.name)))
+
+
+@pytest.mark.parametrize("make", MAKERS.values(), ids=MAKERS)
+def test_what_the_package_answers_is_frozen_compared_and_short(make) -> None:
+    answer, again = make(), make()
+    found = list(inside(answer))
+    arrays = [each for each in found if isinstance(each, np.ndarray)]
+    assert not [each for each in arrays if each.flags.writeable]
+    assert answer == again
+    assert hash(answer) == hash(again)
+    assert answer != 3
+    for each in found:
+        if not isinstance(each, np.ndarray | tfarm.Arm | Chain):  # what a user types is shown as it is typed
+            assert len(repr(each)) <= LONGEST + 40
+            assert "\n" not in repr(each)
+
+
+def test_one_number_makes_a_difference() -> None:
+    table = tfarm.modes(LAB, 3)
+    moved = table.natural_frequency.copy()
+    moved[-1] = np.nextafter(moved[-1], np.inf)
+    assert table != dataclasses.replace(table, natural_frequency=moved)
+    assert table != tfarm.modes(LAB, 2)
+    with pytest.raises(ValueError, match="read-only"):
+        table.natural_frequency[0] = 1.0
+    with pytest.raises(ValueError, match="read-only"):
+        table.hub_participation[0] = 1.0
+
+
+def test_the_array_that_went_in_stays_its_owners() -> None:
+    values = np.array([1.0, np.nan])
+    one, other = Pair(values, {"a": [values]}), Pair(values.copy(), {"a": [values.copy()]})
+    values[0] = 1.0
+    assert one == other
+    assert one != Pair(values, {"a": [np.zeros(2)]})
+    assert one != Pair(values, {"b": [values]})
+    assert repr(one) == "Pair(here=[1, nan], there=<a>)"
+
+
+@dataclasses.dataclass(frozen=True)
+@record
+class Pair:
+    """Two entries."""
+
+    here: np.ndarray
+    there: dict
+
+
+def test_the_verdict_stands_first() -> None:
+    assert repr(tfarm.margins(LAB, LAW)).startswith("Margins(stability='stable', ")
+    assert repr(tfarm.margins(LAB, LAW).stability).startswith("Stability(verdict='stable', ")
+    assert repr(analyse(LAB, LAW, count=4)).startswith("Analysis(verdict='stable', ")
+    assert repr(tfarm.closed_loop_poles(LAB, LAW, 5)).startswith("Poles(unstable=0, ")
+
+
+def test_every_record_with_arrays_is_one() -> None:
+    """Whatever is frozen and holds an array, or a record that does, is decorated."""
+    classes = {}
+    for module in pkgutil.walk_packages(tfarm.__path__, "tfarm."):
+        if not module.name.endswith("__main__"):
+            for name, value in vars(importlib.import_module(module.name)).items():
+                if "__dataclass_params__" in getattr(value, "__dict__", {}) and value.__module__ == module.name:
+                    classes[module.name, name] = value
+    assert len(classes) > 60
+    for (module, name), value in classes.items():
+        types = " ".join(str(each.type) for each in dataclasses.fields(value))
+        if value.__dataclass_params__.frozen and re.search(r"\b(NDArray|Real|Complex|Whole)\b", types):
+            assert name.startswith("_") or value.__repr__.__module__ == "tfarm.records", (module, name)

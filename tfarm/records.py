@@ -1,0 +1,142 @@
+"""What a frozen record with arrays promises besides: arrays that cannot be written, an answer to `==`, a short repr."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
+from functools import cached_property
+from typing import Any, TypeVar
+
+import numpy as np
+
+_Class = TypeVar("_Class", bound=type[Any])
+
+FIRST = ("verdict", "word", "unstable", "worst_error")  # what was found stands before what it was found of
+LONGEST = 200  # characters of a repr: a line or two of a terminal
+FEW = 3  # numbers that are shown one by one
+
+
+def record(cls: _Class) -> _Class:
+    """Decorates a class inside `@dataclass(frozen=True)`.
+
+    Arrays in its fields (in tuples, lists and dictionaries too) and in its cached properties become read-only views;
+    two records of a class are equal where all their entries are, NaN to NaN; the repr is short, the verdict first.
+    """
+    after = cls.__dict__.get("__post_init__")
+
+    def after_init(self: Any) -> None:
+        if after is not None:
+            after(self)
+        for each in fields(self):
+            object.__setattr__(self, each.name, read_only(getattr(self, each.name)))
+
+    for value in vars(cls).values():
+        if isinstance(value, cached_property):
+            value.func = _read_only_result(value.func)
+    methods = {"__post_init__": after_init, "__eq__": _equal, "__hash__": _hash, "__repr__": _repr}
+    for name, method in methods.items():
+        setattr(cls, name, method)
+    return cls
+
+
+def read_only(value: Any) -> Any:
+    """The value with views that cannot be written in the place of its arrays; itself where it has none."""
+    if isinstance(value, np.ndarray):
+        if value.flags.writeable:
+            value = value.view()
+            value.flags.writeable = False
+        return value
+    if isinstance(value, dict):
+        held = {key: read_only(entry) for key, entry in value.items()}
+        return held if any(held[key] is not entry for key, entry in value.items()) else value
+    if isinstance(value, tuple | list):
+        entries = [read_only(entry) for entry in value]
+        if all(mine is theirs for mine, theirs in zip(entries, value, strict=True)):
+            return value
+        return type(value)(*entries) if hasattr(value, "_fields") else type(value)(entries)
+    return value
+
+
+def _read_only_result(function: Any) -> Any:
+    return lambda self: read_only(function(self))
+
+
+def _equal(self: Any, other: Any) -> Any:
+    if type(self) is not type(other):
+        return NotImplemented
+    return all(_same(getattr(self, each.name), getattr(other, each.name)) for each in fields(self) if each.compare)
+
+
+def _same(one: Any, other: Any) -> bool:
+    """Whether two entries are equal: arrays in shape and every number, containers entry by entry, NaN to NaN."""
+    if one is other:
+        return True
+    if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
+        one, other = np.asarray(one), np.asarray(other)
+        return np.array_equal(one, other, equal_nan=bool(one.dtype.kind in "fc" and other.dtype.kind in "fc"))
+    if isinstance(one, dict) and isinstance(other, dict):
+        return one.keys() == other.keys() and all(_same(one[key], other[key]) for key in one)
+    if isinstance(one, tuple | list) and isinstance(other, tuple | list):
+        pairs = zip(one, other, strict=False)
+        return type(one) is type(other) and len(one) == len(other) and all(_same(*pair) for pair in pairs)
+    both_nan = one != one and other != other
+    return bool(both_nan or one == other)
+
+
+def _hash(self: Any) -> int:
+    return hash((type(self), *(_key(getattr(self, each.name)) for each in fields(self) if each.compare)))
+
+
+def _key(value: Any) -> Any:
+    """Something with a hash that equal entries share."""
+    if isinstance(value, np.ndarray):
+        return value.shape
+    if isinstance(value, dict):
+        return frozenset(value)
+    if isinstance(value, tuple | list):
+        return tuple(map(_key, value))
+    return None if isinstance(value, float) and math.isnan(value) else value
+
+
+def _repr(self: Any) -> str:
+    text = ", ".join(f"{name}={_shown(value)}" for name, value in _entries(self))
+    text = text if len(text) <= LONGEST else f"{text[: LONGEST - 4]} ..."
+    return f"{type(self).__name__}({text})"
+
+
+def _entries(self: Any) -> Iterator[tuple[str, Any]]:
+    """What is shown: the finding, then the fields."""
+    found = _found(self)
+    for name in [*found, *(each.name for each in fields(self) if each.repr and each.name not in found)]:
+        yield name, getattr(self, name)
+
+
+def _found(self: Any) -> list[str]:
+    """Those of `FIRST` that a record has, as a field or a property."""
+    return [name for name in FIRST if hasattr(type(self), name) or name in self.__dataclass_fields__]
+
+
+def _shown(value: Any) -> str:
+    """An entry in a few characters: six digits of a number, a record's finding or name, an array's shape."""
+    if isinstance(value, np.ndarray):
+        small = value.ndim == 1 and value.size <= FEW
+        return f"[{', '.join(map(_shown, value.tolist()))}]" if small else f"<array {value.shape}>"
+    if isinstance(value, float | complex) and not isinstance(value, bool):
+        return f"{value:.6g}"
+    if isinstance(value, dict):
+        return f"<{', '.join(map(str, value))}>"
+    if isinstance(value, tuple | list):
+        shown = ", ".join(map(_shown, value)) if len(value) <= FEW else f"{len(value)} entries"
+        return f"({shown})"
+    if is_dataclass(value) and not isinstance(value, type):
+        return _named(value)
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:56]} ..."
+
+
+def _named(value: Any) -> str:
+    """A record inside another: its finding or its name, or all of it where that is short."""
+    known = _found(value) or [each.name for each in fields(value) if each.name == "name"]
+    text = _shown(getattr(value, known[0])) if known else repr(value)
+    return text if len(text) <= 80 else f"{type(value).__name__}(...)"
