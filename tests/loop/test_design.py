@@ -7,6 +7,7 @@ import pytest
 from scipy.linalg import expm
 
 import tfarm
+from tests.loop.designs import grids, least_on
 from tests.loop.ritz_loop import RitzLoop
 from tfarm import HubFeedback
 from tfarm.errors import ConvergenceError, ParameterError
@@ -89,6 +90,61 @@ def test_two_hundred_random_gains_leave_no_less(damping) -> None:
     K1, K2 = random_gains(LAB, 200)
     assert residual_moment(LAB, K1, K2, np.zeros(200), 2).min() >= found.value * (1 - 1e-9)
     assert found.value < residual_moment(LAB, np.array([damping.law.K1]), np.array([damping.law.K2]), np.zeros(1), 2)[0]
+
+
+@pytest.fixture(scope="module")
+def residual():
+    return design(LAB, "residual")
+
+
+def test_no_grid_leaves_less(residual) -> None:
+    """The small case of `python -m tests.loop.designs SIZE SEED`, and a part of the box where a grid once did."""
+    best = min(least_on(LAB, *grid) for grid in grids(np.random.default_rng(1), residual))
+    assert residual.value <= 1.01 * best
+    assert residual.value <= 1.01 * least_on(LAB, np.linspace(1e-3, 0.1, 60), np.linspace(-3, -1, 60))
+
+
+def test_without_damping_a_slew_ends_in_whole_periods() -> None:
+    """K1 -> 0 leaves a hub of I_h/(1 - K2); of its mode at w then sin^2(w T/4) is left: nothing at w T = 4 pi n."""
+    found = design(BARE, "residual", modes=1)
+    hub = tfarm.Hub(inertia=BARE.hub.inertia / (1 - found.law.K2))
+    periods = tfarm.modes(replace(BARE, hub=hub), 1).natural_frequency[-1] * RISE / (4 * np.pi)
+    assert periods == pytest.approx(round(periods), abs=1e-6)
+    plain = residual_moment(BARE, np.array([found.law.K1]), np.zeros(1), np.zeros(1), 1)[0]
+    assert found.value < 1e-6 * plain
+
+
+@pytest.mark.parametrize("name", ["damping", "residual"])
+def test_the_flat_part_is_that_of_the_valley(name, request) -> None:
+    """Within one per cent at its ends and in between; just beyond them, the other gain held, worse."""
+    found = request.getfixturevalue(name)
+    law, worse = found.law, found.value * (0.99 if name == "damping" else 1.01)
+
+    def value(K1, K2):
+        if name == "damping":
+            return least_damping(LAB, K1, K2, 0 * K1, 2) - worse
+        return worse - residual_moment(LAB, K1, K2, 0 * K1, 2)
+
+    for axis, (low, high) in enumerate((found.flat_K1, found.flat_K2)):
+        bounds = found.bounds[("K1", "K2")[axis]]
+        inside = np.linspace(low + 1e-6 * (high - low), high - 1e-6 * (high - low), 41)
+        gains = [np.full(inside.size, law.K1), np.full(inside.size, law.K2)]
+        gains[axis] = inside
+        assert (value(*gains) >= 0).all()
+        for end, bound in zip((low, high), bounds, strict=True):
+            beyond = [np.array([law.K1]), np.array([law.K2])]
+            beyond[axis] = np.array([end + (1e-3 if end == high else -1e-3) * (high - low)])
+            assert end == bound or value(*beyond)[0] < 0
+
+
+def test_where_the_bounds_cut_the_search_off_is_no_optimum(damping) -> None:
+    """More damping lies beyond the bounds named, and none beyond those that are not."""
+    assert damping.at_bound == ("K1", "K2")
+    found = design(LAB, "damping")
+    assert found.at_bound == ("K2",)
+    K1, K2 = found.law.K1 * np.array([0.99, 1.01, 1.0]), found.law.K2 + np.array([0.0, 0.0, -0.1])
+    below, above, beyond = least_damping(LAB, K1, K2, np.zeros(3), 2)
+    assert max(below, above) < found.value < beyond
 
 
 def test_random_gains_have_no_better_disk_margin() -> None:

@@ -3,11 +3,18 @@
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 import tfarm
 from tests.shell import answer, run
 from tfarm import Hub, HubFeedback, Link, Payload, Section
+from tfarm.dsp import Chain, stable_windows
+from tfarm.dsp.chain import Sampling
+from tfarm.dsp.loop import sampled_loop
+from tfarm.dsp.verdict import sampled_verdict
+from tfarm.errors import ParameterError
+from tfarm.loop.design import design
 from tfarm.spectrum.scales import (
     DIGITS,
     OF_THE_PAPER,
@@ -61,6 +68,34 @@ def test_the_papers_arms_keep_the_papers_gains():
     assert default_gains(replace(LAB, hub=Hub(inertia=10.0))).K1 > 1.0
 
 
+def test_a_gain_is_too_large_for_an_arm_and_not_by_itself():
+    """K1 = 2e9 N m s/rad is ordinary for an arm of J w1 = 5e9; LAB has a limit of its own, and is told it."""
+    large, time, _ = similar(LAB, 100.0, 1.0, 1.0)
+    assert rate_unit(large) > 1e9
+    law = HubFeedback(K1=0.5 * rate_unit(large), K2=0.3, Kp=0.1 * angle_unit(large))
+    small = HubFeedback(K1=0.5 * rate_unit(LAB), K2=0.3, Kp=0.1 * angle_unit(LAB))
+    here, there = (tfarm.closed_loop_poles(*each, 3).values for each in ((LAB, small), (large, law)))
+    assert there * time == pytest.approx(here, rel=1e-9)
+    for name, unit in (("K1", rate_unit(LAB)), ("Kp", angle_unit(LAB))):
+        with pytest.raises(ParameterError, match=rf"{name} = .*for this arm at most 1e\+09 times J w1"):
+            tfarm.margins(LAB, HubFeedback(**{name: 2e9 * unit}))
+        with pytest.raises(ParameterError, match="for this arm"):
+            sampled_verdict(LAB, HubFeedback(**{name: 2e9 * unit}))
+
+
+def test_windows_and_designs_of_a_large_arm_are_those_of_a_similar_small_one():
+    """Nothing on the way compares a gain with a number: K1 goes beyond 1e9 N m s/rad here, continuous and sampled."""
+    large, time, inertia = similar(LAB, 100.0, 1.0, 1.0)
+    slow = Chain(sampling=Sampling(period=0.01 * time))
+    chains, arms = (Chain(), slow), (LAB, large)
+    laws = [HubFeedback(K1=2 * rate_unit(arm), K2=0.3) for arm in arms]
+    ends = [stable_windows(sampled_loop(*each, count=4), "K1") for each in zip(arms, laws, chains, strict=True)]
+    assert np.ravel(ends[1]) * time / inertia == pytest.approx(np.ravel(ends[0]), rel=1e-6)
+    found = [design(arm, "damping") for arm in arms]
+    assert found[1].law.K1 * time / inertia == pytest.approx(found[0].law.K1, rel=1e-3)
+    assert found[1].value == pytest.approx(found[0].value, rel=1e-6)
+
+
 def test_parts_that_do_not_turn_are_left_out():
     """J of an arm whose tip is pinned is that of hub and link; a locked hub leaves the link."""
     link = LAB.link
@@ -83,20 +118,23 @@ def test_a_hub_without_inertia_has_no_moment_gain(capsys, tmp_path):
 
 
 VERBS = [
-    ["poles"], ["margins"], ["sampled"], ["simulate", "--duration", "0.05"],
+    ["poles"], ["margins"], ["sampled", "--modes", "2"], ["simulate", "--duration", "0.05"],
     ["locus", "--vary", "K1", "--from", "1", "--to", "2", "--points", "3", "--branches", "2"],
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize("verb", VERBS, ids=lambda verb: verb[0])
 def test_gains_that_were_not_given_are_stated(capsys, verb):
-    gains = ["--K1", "80", "--K2", "0.2"]
-    _, out, _ = run(capsys, verb[0], "stocky-steel", *verb[1:], *gains[:2])
-    assert "by default K2 = 0.3\n" in out
-    _, out, _ = run(capsys, verb[0], "stocky-steel", *verb[1:], *gains)
-    assert "by default" not in out
     _, out, _ = run(capsys, verb[0], "stocky-steel", *verb[1:])
     assert "by default K1 = 77.7 N m s/rad (0.00642 J w1 of this arm) and K2 = 0.3\n" in out
-    found = answer(capsys, verb[0], "stocky-steel", *verb[1:])
-    assert found["default_gains"] == ["K1", "K2"]
-    assert default_gains(STOCKY).K1 == 77.7
+    assert default_gains(STOCKY) == HubFeedback(K1=77.7, K2=0.3)
+
+
+def test_gains_that_were_given_are_not(capsys):
+    _, out, _ = run(capsys, "margins", "sasaki2012", "--K1", "1")
+    assert "by default K2 = 0.3\n" in out
+    _, out, _ = run(capsys, "margins", "sasaki2012", "--K1", "1", "--K2", "0")
+    assert "by default" not in out
+    found = answer(capsys, "margins", "sasaki2012", "--K2", "0")
+    assert found["default_gains"] == ["K1"]
+    assert found["default_gains_in_words"] == "K1 = 0.3 N m s/rad (as in the paper)"

@@ -10,10 +10,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 
-from tfarm.arm.checks import number
+from tfarm.arm.checks import LARGEST, number
 from tfarm.errors import ParameterError
-
-MOST_GAIN = 1e9  # N m s/rad, N m/rad or 1: beyond any machine
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,7 +19,8 @@ class HubFeedback:
     """Feedback at the hub: `K1` [N m s/rad] on the hub rate, `K2` [-] on the root moment, `Kp` [N m/rad] on the angle.
 
     Kp is an extension of the paper's law (19), which leaves the angle itself alone.  Raises ParameterError for what is
-    no finite number or absurdly large.
+    no finite number or would overflow; whether a gain is too large for an arm is judged in that arm's own units, where
+    the loop is closed.
     """
 
     K1: float = 0.0
@@ -30,8 +29,8 @@ class HubFeedback:
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            remedy = f"a gain is a finite number, at most {MOST_GAIN:g} in size"
+            remedy = f"a gain is a finite number, at most {LARGEST:g} in size"
             value = number(field.name, getattr(self, field.name), remedy)
-            if not abs(value) <= MOST_GAIN:
+            if not abs(value) <= LARGEST:
                 raise ParameterError(key=field.name, value=value, remedy=remedy)
             object.__setattr__(self, field.name, value)

@@ -106,7 +106,8 @@ def print_design(answer: dict[str, Any]) -> None:
     print(f"K1 = {answer['K1']:.6g} N m s/rad, K2 = {answer['K2']:.6g}, Kp = {answer['Kp']:.6g}: {answer['value']:.6g}")
     print(f"within one per cent of it: K1 {_pair(answer['flat_K1'])}, K2 {_pair(answer['flat_K2'])}")
     if answer["at_bound"]:
-        print(f"at the bound of {' and '.join(answer['at_bound'])}: wider bounds may give more")
+        ends = [f"{name} = {answer[name]:.6g} of {_pair(answer['bounds'][name])}" for name in answer["at_bound"]]
+        print(f"no optimum: {' and '.join(ends)} is where the search was cut off; it may get better beyond")
     print(answer["sign_convention"])
 
 

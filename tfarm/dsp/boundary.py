@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from tfarm.dsp.loop import ANGLE, SampledLoop
 from tfarm.records import record
+from tfarm.spectrum.scales import most_gain
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
@@ -27,7 +28,6 @@ GainName = Literal["K1", "K2"]
 A_DECADE = 48  # grid points a decade of the distance to a pole
 NARROWEST = 1e-17
 COARSEST = 2000  # points of the uniform grid over the half circle
-LARGEST = 1e9  # gains are looked at up to here
 NEAR_ONE = 1e-7  # where the values at z = 1 are read: they are even in q, so wrong by 1e-14
 
 
@@ -109,7 +109,10 @@ def _geometric(edge: float, width: float) -> Real:
 
 
 def crossings(grid: CircleGrid, gain: GainName, other: float) -> Crossings:
-    """Where poles cross the circle as one gain runs from -1e9 to 1e9, the `other` being held; exact to rounding."""
+    """Where poles cross the circle as one gain runs from minus to plus the largest that `most_gain` allows.
+
+    The `other` is held; exact to rounding.
+    """
     A, B = _split(grid.terms, gain, other)
     rises = (A * B.conj()).imag >= 0
     step = np.nonzero(rises[1:] != rises[:-1])[0]
@@ -120,7 +123,7 @@ def crossings(grid: CircleGrid, gain: GainName, other: float) -> Crossings:
     count = np.r_[count, [end[1] for end in ends]]
     q = np.r_[q, [end[2] for end in ends]]
     order = np.argsort(values, kind="stable")
-    kept = order[abs(values[order]) <= LARGEST]
+    kept = order[abs(values[order]) <= most_gain(grid.loop.plant.arm, gain)]
     return Crossings(values[kept], count[kept], q[kept])
 
 

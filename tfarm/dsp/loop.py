@@ -24,6 +24,7 @@ from tfarm.dsp.plant import Plant, loop_plant
 from tfarm.dsp.sampling import PulseTransfer
 from tfarm.errors import ParameterError
 from tfarm.records import record
+from tfarm.spectrum.scales import check_gains
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
@@ -197,13 +198,14 @@ def sampled_loop(arm: Arm, gains: HubFeedback, chain: Chain | None = None, *, co
 
 
 def check_loop(arm: Arm, gains: HubFeedback) -> None:
-    """Refuse the loop that does not exist: I_h = 0 and K2 != 0."""
+    """Refuse the loop that does not exist, I_h = 0 and K2 != 0, and a gain that is absurdly large for the arm."""
     if arm.hub.inertia == 0.0 and gains.K2 != 0.0:
         remedy = (
             "with hub.inertia = 0 the root moment is -u itself, so that moment feedback is an algebraic loop; "
             "give the hub an inertia, or set K2 = 0"
         )
         raise ParameterError(key="K2", value=gains.K2, remedy=remedy)
+    check_gains(arm, gains)
 
 
 def closed_loop(

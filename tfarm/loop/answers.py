@@ -121,10 +121,6 @@ def map_answer(found: Region) -> dict[str, Any]:
 def design_answer(found: Design) -> dict[str, Any]:
     """The gains, what they reach, the verdict, and how flat the optimum is."""
     law, bounds = found.law, found.bounds
-    at_bound = [
-        name for name, value in (("K1", law.K1), ("K2", law.K2))
-        if min(value - bounds[name][0], bounds[name][1] - value) < 1e-3 * (bounds[name][1] - bounds[name][0])
-    ]  # fmt: skip
     return {
         "arm": found.verdict.loop.arm.name,
         "objective": found.objective,
@@ -133,7 +129,7 @@ def design_answer(found: Design) -> dict[str, Any]:
         "verdict": found.verdict.verdict,
         "modes": found.modes,
         "bounds": {name: list(pair) for name, pair in bounds.items()},
-        "at_bound": at_bound,
+        "at_bound": list(found.at_bound),
         "flat_K1": list(found.flat_K1),
         "flat_K2": list(found.flat_K2),
     }

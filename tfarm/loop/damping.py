@@ -35,14 +35,14 @@ BLOCK = 4000  # gains at a time
 def band_poles(arm: Arm, K1: Real, K2: Real, Kp: Real, number: int) -> Complex:
     """The poles [1/s] with 0 < Im s below half-way to mode number + 1: (gains, slots), nan where there are fewer.
 
-    K1, K2 and Kp are arrays of one length.  Real poles are not among them (see `real_poles`).
+    K1, K2 and Kp are arrays of one length.  Real poles are not among them (see `band_and_real_poles`).
     """
     return _in_blocks(_oscillating, arm, K1, K2, Kp, number)
 
 
-def real_poles(arm: Arm, K1: Real, K2: Real, Kp: Real, number: int) -> Complex:
-    """The real poles [1/s] but 0, of size below half-way to mode number + 1: (gains, slots), padded with nan."""
-    return _in_blocks(_real, arm, K1, K2, Kp, number)
+def band_and_real_poles(arm: Arm, K1: Real, K2: Real, Kp: Real, number: int) -> Complex:
+    """Those of `band_poles`, and the real poles but 0 of size below the same frequency: (gains, slots), with nan."""
+    return _in_blocks(_either, arm, K1, K2, Kp, number)
 
 
 def _in_blocks(kind: Kind, arm: Arm, K1: Real, K2: Real, Kp: Real, number: int) -> Complex:
@@ -63,13 +63,22 @@ def least_damping(arm: Arm, K1: Real, K2: Real, Kp: Real, number: int) -> Real:
     return np.asarray(ratio.min(axis=1, initial=1.0))
 
 
+def is_oscillating(s: Complex) -> NDArray[np.bool_]:
+    """Whether poles lie above the real axis by more than rounding does it."""
+    return np.asarray(s.imag > 1e-9 * abs(s))
+
+
 def _oscillating(s: Complex, top: float) -> NDArray[np.bool_]:
-    return np.asarray((s.imag > 1e-9 * abs(s)) & (s.imag < top))
+    return is_oscillating(s) & (s.imag < top)
 
 
 def _real(s: Complex, top: float) -> NDArray[np.bool_]:
     """Real ones, apart from 0 and from what rounding makes of it."""
     return np.asarray((abs(s.imag) <= 1e-9 * abs(s)) & (abs(s) > 1e-9 * top) & (abs(s) < top))
+
+
+def _either(s: Complex, top: float) -> NDArray[np.bool_]:
+    return _oscillating(s, top) | _real(s, top)
 
 
 def _of_block(kind: Kind, arm: Arm, K1: Real, K2: Real, Kp: Real, number: int, top: float) -> Complex:

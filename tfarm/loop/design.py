@@ -1,41 +1,52 @@
 """Which gains?  The best K1, K2 (and Kp) within bounds, judged by the exact loop.
 
-A coarse grid first, because stable regions have several parts; then the downhill simplex of Nelder and Mead (1965)
-from the best points of the grid.  Gains that are not stable never win.  How flat the optimum is, is part of the answer.
+A grid over the bounds first, its minima refined together (`search`).  Gains that are not stable never win.  How flat
+the optimum is, and whether it is one or only where the bounds cut the search off, is part of the answer.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, Literal
+from dataclasses import dataclass, replace
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
 
-from tfarm.arm import Arm, HubFeedback
+from tfarm.arm import Arm, Hub, HubFeedback
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
+from tfarm.spectrum import modes as natural_modes
+from tfarm.spectrum.scales import rate_unit, turning_inertia
 
 from .damping import least_damping
 from .frequencies import band_of, grid
 from .margins import disk_at
 from .plant import Loop
 from .regions import region
-from .residual import residual_moment
+from .residual import RISE, residual_moment
+from .search import END, POLISHED, Axis, Bounds, Found, Score, minima, polished, rate_axis, refined
 from .stability import Stability, stability
 
 Real = NDArray[np.float64]
 Objective = Literal["damping", "margin", "residual"]
-Bounds = tuple[float, float]
 
 OBJECTIVES = ("damping", "margin", "residual")
-COARSE = 21  # grid points along each gain
-STARTS = 3  # best grid points from which the simplex starts
-BAD = 1e9  # the score of gains that are not stable
 TIE = 0.01  # weight of the damping ratio beside the disk margin: K2 = 0 has margin 2 at every K1
 FLAT = 0.01  # gains whose value is worse by less than this share bound the flat part
+AT_BOUND = 1e-3  # share of an axis: an optimum so near to its end is where the bound is
+BASIN = 6  # points of the grid in each basin of a residual
+SIMPLEX = 2.0**-8  # of a step of the grid: its first size
+HALVINGS = 40  # of an interval, for the ends of the flat part and the way back into the stable region
+
+
+class Effort(NamedTuple):
+    """Points of the grid along K1 and K2, and how many of its minima are refined."""
+
+    K1: int
+    K2: int
+    starts: int
 
 
 @dataclass(frozen=True)
@@ -44,6 +55,8 @@ class Design:
     """The best law, its value (damping ratio, disk margin, or residual moment [N m]), its verdict, and how flat it is.
 
     `flat_K1` and `flat_K2` are the gains between which, the other held, the value is within one per cent of the best.
+    `at_bound` names the gains that lie at an end of `bounds`: there the search was cut off, and the value is no
+    optimum.
     """
 
     objective: str
@@ -54,6 +67,7 @@ class Design:
     flat_K1: Bounds
     flat_K2: Bounds
     modes: int
+    at_bound: tuple[str, ...]
 
 
 def design(
@@ -70,32 +84,82 @@ def design(
     if objective not in OBJECTIVES:
         raise ParameterError(key="objective", value=objective, remedy=f"use one of {', '.join(OBJECTIVES)}")
     Loop(arm, HubFeedback(K1=1.0, K2=0.5 if arm.hub.inertia else 0.0, Kp=Kp))
-    inertia = arm.total_inertia if arm.has_rigid_mode else arm.hub.inertia
-    K1 = _checked("K1", K1 or (0.0, 2.0 * inertia * band_of(arm, 1)))
+    K1 = _checked("K1", K1 or (0.0, 2.0 * turning_inertia(arm) * band_of(arm, 1)))
     K2 = _checked("K2", K2 or (-3.0, 1.0))
+    axes = rate_axis(K1, rate_unit(arm)), Axis(*K2)
     score = _score(arm, objective, Kp, modes)
-    a, b = _inside(K1), _inside(K2)
-    stable = region(arm, a, b, Kp).stable
-    if not stable.any():
-        raise ConvergenceError(f"no gains with K1 in {K1} and K2 in {K2} are stable: widen the bounds", None, stable)
-    grid_K1, grid_K2 = np.meshgrid(a, b)
-    values = np.full(stable.size, np.inf)
-    values[stable.ravel()] = score(grid_K1[stable], grid_K2[stable])
-    starts = _starts(values, grid_K1, grid_K2)
-    for each in (score, _guarded(score, arm, Kp)):  # only where the simplex leaves what is stable each step is judged
-        best = min((_polished(each, x, K1, K2) for x in starts), key=lambda found: found[1])
-        law = HubFeedback(K1=float(best[0][0]), K2=float(best[0][1]), Kp=Kp)
-        if _holds(arm, law):
-            break
+    best = _best(arm, score, axes, Kp, _effort(arm, objective, K2, modes))
+    law = _law(axes, best.shares, Kp)
     verdict = stability(arm, law)
-    if not verdict.is_stable:
-        text = f"the best gains found, K1 = {law.K1:.6g} and K2 = {law.K2:.6g}, are not stable"
-        raise ConvergenceError(text, law, best)
-    value = best[1] if objective == "residual" else -best[1]
+    value = best.score if objective == "residual" else -best.score
     if objective == "margin":
         value = _disk(verdict.loop, np.asarray(grid(arm, band_of(arm, modes))))
-    flat = [_flat(score, best, axis, bounds) for axis, bounds in enumerate((K1, K2))]
-    return Design(objective, law, value, verdict, {"K1": K1, "K2": K2}, flat[0], flat[1], modes)
+    flat = [_flat(score, (law.K1, law.K2), best.score, axis, bounds) for axis, bounds in enumerate((K1, K2))]
+    ends = zip(("K1", "K2"), best.shares, strict=True)
+    at_bound = tuple(name for name, share in ends if min(share, 1 - share) < AT_BOUND)
+    return Design(objective, law, value, verdict, {"K1": K1, "K2": K2}, flat[0], flat[1], modes, at_bound)
+
+
+def _effort(arm: Arm, objective: str, K2: Bounds, number: int) -> Effort:
+    """A residual has as many basins along K2 as its modes' frequencies run through periods of the slew.
+
+    Feeding K2 back makes of the hub one of inertia I_h/(1 - K2); from K2 = 1 on it stands still.
+    """
+    if objective == "margin":  # the one that is dear
+        return Effort(24, 24, 4)
+    starts = max(6, 80 // number)
+    if objective == "damping":
+        return Effort(40, 60, starts)
+    hubs = (arm.hub.inertia / (1 - gain) if gain < 1 else math.inf for gain in K2)
+    ends = [natural_modes(replace(arm, hub=Hub(inertia=hub)), number).natural_frequency[-number:] for hub in hubs]
+    basins = float(abs(ends[0] - ends[1]).max()) * RISE / (4 * math.pi)
+    return Effort(36, int(min(max(60.0, BASIN * basins), max(60, 1600 // number))), starts)
+
+
+def _best(arm: Arm, score: Score, axes: tuple[Axis, Axis], Kp: float, effort: Effort) -> Found:
+    """The best stable gains, in shares of the axes.  Raises ConvergenceError where none are stable."""
+    shares = [axis.middles(number) for axis, number in zip(axes, effort[:2], strict=True)]
+    a, b = (axis.gain(share) for axis, share in zip(axes, shares, strict=True))
+    stable = region(arm, a, b, Kp).stable
+    if not stable.any():
+        text = "K1 in ({:g}, {:g}) and K2 in ({:g}, {:g})".format(*(x for each in axes for x in (each.low, each.high)))
+        raise ConvergenceError(f"no gains with {text} are stable: widen the bounds", None, stable)
+    grid_K1, grid_K2 = np.meshgrid(a, b)
+    values = np.full(stable.shape, np.inf)
+    values[stable] = score(grid_K1[stable], grid_K2[stable])
+    places = minima(values, effort.starts)[:, ::-1]
+    starts = np.stack([share[places[:, i]] for i, share in enumerate(shares)], axis=1)
+    steps = 1 / np.array(effort[:2])
+    inside = _inside(score, axes, stable)
+    found = sorted(refined(inside, axes, starts, steps), key=lambda each: each.score)
+    found = [polished(inside, axes, each, SIMPLEX * float(steps.min())) for each in found[:POLISHED]] + found[POLISHED:]
+    grid_best = [Found(start, float(values[row, column])) for start, (column, row) in zip(starts, places, strict=True)]
+    for each in sorted([*found, *grid_best], key=lambda each: each.score):
+        if _holds(arm, _law(axes, each.shares, Kp)):
+            return each
+    raise ConvergenceError("none of the best gains found is stable", None, found)
+
+
+def _inside(score: Score, axes: tuple[Axis, Axis], stable: NDArray[np.bool_]) -> Score:
+    """The score where the nearest point of the grid is stable, inf elsewhere."""
+
+    def inside(K1: Real, K2: Real) -> Real:
+        places = [
+            np.clip((axis.share(gain) * number).astype(int), 0, number - 1)
+            for axis, gain, number in zip(axes, (K1, K2), stable.shape[::-1], strict=True)
+        ]
+        good = stable[places[1], places[0]]
+        values = np.full(K1.size, np.inf)
+        if good.any():
+            values[good] = score(K1[good], K2[good])
+        return values
+
+    return inside
+
+
+def _law(axes: tuple[Axis, Axis], shares: Real, Kp: float) -> HubFeedback:
+    K1, K2 = (float(axis.gain(share)) for axis, share in zip(axes, shares, strict=True))
+    return HubFeedback(K1=K1, K2=K2, Kp=Kp)
 
 
 def _checked(name: str, bounds: Bounds) -> Bounds:
@@ -103,11 +167,6 @@ def _checked(name: str, bounds: Bounds) -> Bounds:
     if not (np.isfinite([low, high]).all() and low < high):
         raise ParameterError(key=name, value=bounds, remedy="bounds are two finite numbers, the lower first")
     return low, high
-
-
-def _inside(bounds: Bounds) -> Real:
-    """Points between the bounds, the ends left out: there verdicts are marginal."""
-    return np.asarray(np.linspace(*bounds, COARSE + 2)[1:-1])
 
 
 def _score(arm: Arm, objective: str, Kp: float, modes: int) -> Callable[[Real, Real], Real]:
@@ -127,16 +186,6 @@ def _score(arm: Arm, objective: str, Kp: float, modes: int) -> Callable[[Real, R
     return disk
 
 
-def _guarded(score: Callable[[Real, Real], Real], arm: Arm, Kp: float) -> Callable[[Real, Real], Real]:
-    """The score where the loop is stable, and `BAD` where it is not."""
-
-    def guarded(K1: Real, K2: Real) -> Real:
-        laws = [HubFeedback(K1=float(a), K2=float(b), Kp=Kp) for a, b in zip(K1, K2, strict=True)]
-        return np.where([_holds(arm, law) for law in laws], score(K1, K2), BAD)
-
-    return guarded
-
-
 def _holds(arm: Arm, law: HubFeedback) -> bool:
     try:
         return stability(arm, law).is_stable
@@ -148,35 +197,28 @@ def _disk(loop: Loop, omega: Real) -> float:
     return float(disk_at(loop, omega).min())
 
 
-def _starts(values: Real, K1: Real, K2: Real) -> list[Real]:
-    order = np.argsort(values)[:STARTS]
-    return [np.array([K1.ravel()[i], K2.ravel()[i]]) for i in order if np.isfinite(values[i])]
+def _flat(score: Score, gains: tuple[float, float], best: float, axis: int, bounds: Bounds) -> Bounds:
+    """Between which values of one gain the score stays within `FLAT` of the best, the other held.
 
+    Walked outwards in steps that grow by a tenth, and then halved: so narrow valleys are seen as well as wide ones.
+    """
+    limit, centre = best + FLAT * abs(best), gains[axis]
 
-def _polished(score: Callable[[Real, Real], Real], start: Real, K1: Bounds, K2: Bounds) -> tuple[Real, float]:
-    low, high = np.array([K1[0], K2[0]]), np.array([K1[1], K2[1]])
+    def good(values: Real) -> NDArray[np.bool_]:
+        held = [np.full(values.size, gain) for gain in gains]
+        held[axis] = values
+        return np.asarray(score(*held) <= limit)
 
-    def of_shares(x: Any) -> float:
-        gains = low + (high - low) * np.clip(x, 1e-9, 1 - 1e-9)
-        return float(score(gains[:1], gains[1:])[0]) + 10 * float(np.sum(np.maximum(0, abs(x - 0.5) - 0.5)))
-
-    first = (start - low) / (high - low)
-    simplex = first + 0.02 * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
-    options: Any = {"initial_simplex": simplex, "xatol": 1e-6, "fatol": 1e-9}
-    found = minimize(of_shares, first, method="Nelder-Mead", options=options)
-    return low + (high - low) * np.clip(found.x, 1e-9, 1 - 1e-9), float(found.fun)
-
-
-def _flat(score: Callable[[Real, Real], Real], best: tuple[Real, float], axis: int, bounds: Bounds) -> Bounds:
-    """Between which values of one gain the score stays within `FLAT` of the best, on a grid of a hundred."""
-    values = np.linspace(*bounds, 203)[1:-1]
-    gains = [np.full(values.size, best[0][0]), np.full(values.size, best[0][1])]
-    gains[axis] = values
-    good = score(*gains) <= best[1] + FLAT * abs(best[1])
-    centre = int(np.argmin(abs(values - best[0][axis])))
-    low = high = centre
-    while low > 0 and good[low - 1]:
-        low -= 1
-    while high < values.size - 1 and good[high + 1]:
-        high += 1
-    return min(float(values[low]), float(best[0][axis])), max(float(values[high]), float(best[0][axis]))
+    ends = []
+    for bound in bounds:
+        way = np.geomspace(1e-9, 1.0, 220) * (bound - centre)
+        (bad,) = np.nonzero(~good(centre + way * (1 - END)))
+        if not bad.size:
+            ends.append(bound)
+            continue
+        low, high = (way[bad[0] - 1] if bad[0] else 0.0), way[bad[0]]
+        for _ in range(HALVINGS):
+            middle = (low + high) / 2
+            low, high = (middle, high) if good(np.array([centre + middle]))[0] else (low, middle)
+        ends.append(centre + float(low))
+    return ends[0], ends[1]

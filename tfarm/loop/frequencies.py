@@ -60,6 +60,7 @@ def grid(arm: Arm, up_to: float) -> Any:
     return omega
 
 
+@lru_cache(maxsize=64)
 def band_of(arm: Arm, number: int) -> float:
     """A frequency [rad/s] half-way between two natural ones, with so many flexible modes below."""
     omega = modes(arm, number + 1).natural_frequency

@@ -16,6 +16,7 @@ from tfarm.exact.coefficients import Coefficients, coefficients
 from tfarm.records import record
 from tfarm.spectrum.continuation import Member
 from tfarm.spectrum.damped import member
+from tfarm.spectrum.scales import check_gains
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
@@ -28,7 +29,8 @@ class Loop:
     """An arm under a law at its hub.
 
     Raises ParameterError where there is no loop: a locked hub cannot turn; a pin without inertia has M(0) = -u at every
-    instant, so that feeding the moment back is an algebraic loop; a gain may be 0, but no denormal number.
+    instant, so that feeding the moment back is an algebraic loop; a gain may be 0, but neither a denormal number nor
+    absurdly large for the arm.
     """
 
     arm: Arm
@@ -46,6 +48,7 @@ class Loop:
             if 0 < abs(getattr(self.law, key)) < least:
                 remedy = f"0, or at least {least:.1e} in size: of less the double has not all its digits"
                 raise ParameterError(key=key, value=getattr(self.law, key), remedy=remedy)
+        check_gains(self.arm, self.law)
 
     @cached_property
     def k(self) -> Coefficients:

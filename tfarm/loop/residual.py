@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from tfarm.arm import Arm, must_turn
 from tfarm.exact.characteristic import Gains, loop_parts, quick_characteristics
 from tfarm.exact.coefficients import coefficients
-from tfarm.spectrum import modes
+from tfarm.spectrum.scales import first_frequency
 
-from .damping import band_poles, real_poles
+from .damping import band_and_real_poles, is_oscillating
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
@@ -35,19 +35,19 @@ def residual_moment(arm: Arm, K1: Real, K2: Real, Kp: Real, number: int) -> Real
     Raises ParameterError for an arm that cannot turn.
     """
     must_turn(arm)
-    oscillating, real = band_poles(arm, K1, K2, Kp, number), real_poles(arm, K1, K2, Kp, number)
-    period = 2 * np.pi / float(modes(arm, 1).natural_frequency[-1])
-    t = period * np.arange(SAMPLES) / SAMPLES
-    moment = 2 * _answers(arm, oscillating, K1, K2, Kp, t) + _answers(arm, real, K1, K2, Kp, t)
+    poles = band_and_real_poles(arm, K1, K2, Kp, number)
+    period = 2 * np.pi / first_frequency(arm)
+    moment = _answers(arm, poles, K1, K2, Kp, period * np.arange(SAMPLES) / SAMPLES)
     return np.asarray(np.sqrt((moment**2).mean(axis=1)))
 
 
 def _answers(arm: Arm, poles: Complex, K1: Real, K2: Real, Kp: Real, t: Real) -> Real:
-    """Real part of the sum over poles (gains, slots) at times t after the slew: (gains, times)."""
+    """Real part of the sum over poles (gains, slots) and their conjugates at times t after the slew: (gains, times)."""
     rows, columns = np.nonzero(~np.isnan(poles))
     s = poles[rows, columns]
     amplitude = np.zeros(poles.shape, complex)
     amplitude[rows, columns] = residues(arm, s, K1[rows], K2[rows], Kp[rows]) * command(arm, s, K1[rows], Kp[rows])
+    amplitude *= np.where(is_oscillating(poles), 2.0, 1.0)
     with np.errstate(under="ignore"):
         return np.asarray((amplitude[..., None] * _exp(np.nan_to_num(poles)[..., None] * t)).real.sum(axis=1))
 

@@ -10,9 +10,9 @@ from typing import Literal
 import numpy as np
 
 from tfarm.arm import HubFeedback
-from tfarm.arm.feedback import MOST_GAIN
 from tfarm.records import record
 from tfarm.spectrum import modes
+from tfarm.spectrum.scales import angle_unit, most_gain, rate_unit
 
 from .lines import Crossing, along, crossing_at_zero, crossings
 from .plant import Loop
@@ -71,14 +71,13 @@ def gain_windows(verdict: Stability, name: str) -> Windows:
 def looked_at(loop: Loop, name: str) -> Interval:
     """The range of a gain that is searched, symmetric and well beyond what matters to the first mode."""
     arm, law = loop.arm, loop.law
-    first = float(modes(arm, 1).natural_frequency[-1])
-    inertia = arm.total_inertia if arm.has_rigid_mode else arm.hub.inertia + arm.link.rhoA * arm.link.length**3 / 3
-    unit = {"K1": inertia * first, "K2": 1.0, "Kp": inertia * first**2}[name]
+    unit = {"K1": rate_unit(arm), "K2": 1.0, "Kp": angle_unit(arm)}[name]
     reach = max(REACH[name] * unit, 10.0 * abs(getattr(law, name)))
     carried = arm.total_inertia - arm.hub.inertia
     if name == "K2" and 0 < carried < math.inf:
         reach = max(reach, BEYOND_STATIC * arm.total_inertia / carried)
-    return -min(MOST_GAIN, reach), min(MOST_GAIN, reach)
+    most = min(most_gain(arm, name), reach)
+    return -most, most
 
 
 def with_gain(law: HubFeedback, name: str, value: float) -> HubFeedback:

@@ -132,13 +132,12 @@ def _best_words(arm: Arm) -> str:
     found = best(arm)
     if found is None:
         return ""
-    bounds = found.bounds["K2"]
-    at_edge = min(found.law.K2 - bounds[0], bounds[1] - found.law.K2) < 1e-3 * (bounds[1] - bounds[0])
-    edge = f" K2 is at the bound of the search ({plain(bounds[0])}): a wider one may give more." if at_edge else ""
+    cut = " and ".join(f"{name} = {plain(getattr(found.law, name), 4)}" for name in found.at_bound)
+    edge = f" That is no optimum: the dotted frame cuts the search off at {cut}, and there is more beyond." * bool(cut)
     return (
         f"The best damping of the first {MODES} modes within the dotted frame is {significant(100 * found.value, 3)} % "
         f"of critical, at K1 = {significant(found.law.K1, 4)} N m s/rad and K2 = {significant(found.law.K2, 4)} "
-        f"(tfarm design), a loop that is {found.verdict.verdict}.{edge}"
+        f"(tfarm design), a continuous loop that is {found.verdict.verdict}.{edge}"
     )
 
 

@@ -13,11 +13,13 @@ from functools import lru_cache
 import numpy as np
 
 from tfarm.arm import Arm, HubFeedback, load
+from tfarm.errors import ParameterError
 
 from .table import modes
 
 PAPER_GAINS = HubFeedback(K1=0.3, K2=0.3)  # of the paper's arms
 RATE_SHARE = 6.42e-3  # of J w1: what K1 = 0.3 N m s/rad is on the preset sasaki2012
+MOST_UNITS = 1e9  # of J w1, 1 and J w1^2: far beyond what a loop can tell from infinite, far from overflow
 DIGITS = 3  # of a default K1, so that it can be read and typed
 OF_THE_PAPER = ("sasaki2012", "sasaki2012-lab", "sasaki2012-as-printed")  # presets
 
@@ -32,12 +34,27 @@ def turning_inertia(arm: Arm) -> float:
 
 def rate_unit(arm: Arm) -> float:
     """J w1 [N m s/rad], the unit of K1."""
-    return turning_inertia(arm) * _first(arm)
+    return turning_inertia(arm) * first_frequency(arm)
 
 
 def angle_unit(arm: Arm) -> float:
     """J w1^2 [N m/rad], the unit of Kp."""
-    return turning_inertia(arm) * _first(arm) ** 2
+    return turning_inertia(arm) * first_frequency(arm) ** 2
+
+
+def most_gain(arm: Arm, name: str) -> float:
+    """The largest size that gain K1, K2 or Kp may have on this arm: beyond any machine."""
+    units = {"K1": rate_unit, "K2": lambda arm: 1.0, "Kp": angle_unit}
+    return MOST_UNITS * units[name](arm)
+
+
+def check_gains(arm: Arm, law: HubFeedback) -> None:
+    """Raise ParameterError for a gain that is too large for the arm, whatever it would be for another."""
+    for name, unit in (("K1", "J w1"), ("K2", "1"), ("Kp", "J w1^2")):
+        value, most = getattr(law, name), most_gain(arm, name)
+        if not abs(value) <= most:
+            remedy = f"for this arm at most {MOST_UNITS:g} times {unit} in size, {most:.3g}: beyond any machine"
+            raise ParameterError(key=name, value=value, remedy=remedy)
 
 
 def default_gains(arm: Arm) -> HubFeedback:
@@ -60,7 +77,8 @@ def default_words(arm: Arm, names: Iterable[str] = ("K1", "K2")) -> str:
     return " and ".join(words[name] for name in names)
 
 
-def _first(arm: Arm) -> float:
+@lru_cache(maxsize=64)
+def first_frequency(arm: Arm) -> float:
     """w1 [rad/s], the lowest flexible frequency."""
     return float(modes(arm, 1).natural_frequency[-1])
 

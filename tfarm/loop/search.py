@@ -1,0 +1,114 @@
+"""The search behind `design`: a grid that sees every basin, its minima refined all together, the best ones polished.
+
+K1 is searched on a scale that is logarithmic from a hundred-millionth of J w1 on: what a slew leaves behind is least
+where the loop hardly brakes, and there every decade of K1 counts.  Along K2 the scale is linear, and as fine as the
+basins are: a slew of time T leaves a mode of frequency w in proportion to sin^2(w T/4), so that each mode has a basin
+wherever w(K2) grows by 4 pi/T.  A minimum of the grid is then refined on ever smaller grids of 5 x 5 around it, all
+minima at once; the best are polished by the downhill simplex of Nelder and Mead (1965).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+Real = NDArray[np.float64]
+Bounds = tuple[float, float]
+Score = Callable[[Real, Real], Real]  # of arrays of K1 and K2; what is least is best
+
+LEAST = 1e-8  # of the unit of K1: below it K1 is linear, and nothing is found that is not found at it
+END = 1e-9  # share of an axis left out at either end: there verdicts are marginal
+ROUNDS, SHRINK = 10, 0.5  # of the small grids, and by how much they shrink where their centre is the best
+HALVED, FEWEST = (4, 7), 6  # rounds after which the better half of the minima goes on, and how many do at least
+OFFSETS = np.array([(i, j) for i in (-1.0, -0.5, 0.0, 0.5, 1.0) for j in (-1.0, -0.5, 0.0, 0.5, 1.0)])
+POLISHED = 3  # minima that the simplex starts from
+
+
+@dataclass(frozen=True)
+class Axis:
+    """The range of one gain on its scale, in shares from 0 to 1: g = least sinh(x), or linear where `least` is inf."""
+
+    low: float
+    high: float
+    least: float = np.inf
+
+    def gain(self, share: Real) -> Real:
+        """The gains at these shares of the axis, 0 to 1."""
+        if np.isinf(self.least):
+            return np.asarray(self.low + (self.high - self.low) * share)
+        ends = np.arcsinh(self.low / self.least), np.arcsinh(self.high / self.least)
+        return np.asarray(self.least * np.sinh(ends[0] + (ends[1] - ends[0]) * share))
+
+    def share(self, gain: Real) -> Real:
+        """Where gains are along the axis."""
+        if np.isinf(self.least):
+            return np.asarray((gain - self.low) / (self.high - self.low))
+        ends = np.arcsinh(self.low / self.least), np.arcsinh(self.high / self.least)
+        return np.asarray((np.arcsinh(gain / self.least) - ends[0]) / (ends[1] - ends[0]))
+
+    def middles(self, number: int) -> Real:
+        """The middles of so many equal parts."""
+        return (np.arange(number) + 0.5) / number
+
+
+def rate_axis(bounds: Bounds, unit: float) -> Axis:
+    """The axis of K1 for a unit J w1 [N m s/rad]; one that begins at 0 begins at the least K1 that is told from 0."""
+    low, high = bounds
+    least = LEAST * min(unit, max(abs(low), abs(high)))
+    return Axis(least if low == 0 else low, -least if high == 0 else high, least)
+
+
+@dataclass(frozen=True)
+class Found:
+    """A minimum: `shares` of both axes and the score there."""
+
+    shares: Real
+    score: float
+
+
+def minima(values: Real, most: int) -> NDArray[np.int64]:
+    """Rows and columns (n, 2) of the grid's local minima, the lowest `most`; inf where no value is."""
+    padded = np.pad(values, 1, constant_values=np.inf)
+    rows, columns = values.shape
+    around = [padded[1 + i : 1 + i + rows, 1 + j : 1 + j + columns] for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]
+    least = np.isfinite(values) & (values <= np.min(around, axis=0))
+    places = np.argwhere(least)
+    return np.asarray(places[np.argsort(values[least], kind="stable")[:most]])
+
+
+def refined(score: Score, axes: tuple[Axis, Axis], starts: Real, steps: Real) -> list[Found]:
+    """The lowest minima of the basins around the starts (n, 2), in shares; `steps` (2,) are those of the grid."""
+    at, size = starts.copy(), np.ones(len(starts))
+    best = np.full(len(starts), np.inf)
+    for number in range(ROUNDS):
+        if number in HALVED:
+            kept = np.argsort(best, kind="stable")[: max(FEWEST, len(best) // 2)]
+            at, size, best = at[kept], size[kept], best[kept]
+        points = np.clip(at[:, None] + size[:, None, None] * OFFSETS * steps, END, 1 - END)
+        gains = [axis.gain(points[..., i].ravel()) for i, axis in enumerate(axes)]
+        values = score(*gains).reshape(points.shape[:2])
+        least = values.argmin(axis=1)
+        rows = np.arange(len(at))
+        at, best = points[rows, least], values[rows, least]
+        size = np.where(abs(OFFSETS[least]).max(axis=1) < 1.0, size * SHRINK, size)
+    return [Found(*each) for each in zip(at, best.tolist(), strict=True)]
+
+
+def polished(score: Score, axes: tuple[Axis, Axis], found: Found, size: float) -> Found:
+    """The minimum by the downhill simplex, from a triangle of this size in shares."""
+
+    def of_shares(x: Any) -> float:
+        inside = np.clip(x, END, 1 - END)
+        gains = [axis.gain(inside[i : i + 1]) for i, axis in enumerate(axes)]
+        value = float(score(*gains)[0])
+        return value + abs(value) * float(abs(x - inside).sum())
+
+    simplex = found.shares + size * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    options: Any = {"initial_simplex": simplex, "xatol": 1e-3 * size, "fatol": 0.0, "maxfev": 120}
+    done = minimize(of_shares, found.shares, method="Nelder-Mead", options=options)
+    return min(found, Found(np.clip(done.x, END, 1 - END), float(done.fun)), key=lambda each: each.score)
