@@ -2,6 +2,7 @@
 
 import csv
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -143,3 +144,14 @@ def test_phases_are_printed_with_their_unit_and_a_lead_is_called_one(capsys) -> 
     assert "phase margin -7.90147 deg: lead; not an instability" in out
     _, out, _ = run(capsys, "margins", "sasaki2012-lab", "--K2", "0")
     assert "not an instability" not in out
+
+
+def test_a_list_of_poles_that_ends_at_the_shear_cut_off_says_so(capsys, tmp_path) -> None:
+    file = tmp_path / "arm.toml"
+    stocky = Path(tfarm.__file__).parent / "arm" / "presets" / "stocky-steel.toml"
+    file.write_text(stocky.read_text().replace("damping = 0.0 ", "damping = 1e-5 "))
+    found = answer(capsys, "poles", str(file), "--K1", "300")
+    assert found["ends_at_shear_cutoff"] is True
+    assert found["box"][3] <= found["shear_cutoff_rad_s"]
+    assert "shear cut-off" in run(capsys, "poles", str(file), "--K1", "300")[1]
+    assert answer(capsys, "poles", str(file), "--K1", "300", "--count", "10")["ends_at_shear_cutoff"] is False

@@ -9,9 +9,9 @@ import scipy.linalg
 
 import tfarm
 from tests.loop.arms import some_loop, window_arm, with_damping
-from tests.loop.counts import survey
+from tests.loop.counts import nyquist_count, survey
 from tests.spectrum.damped_roads import newton_step
-from tfarm import ConvergenceError, Hub, HubFeedback, ParameterError
+from tfarm import Hub, HubFeedback, ParameterError
 from tfarm.loop.plant import Loop
 from tfarm.loop.poles import closed_loop_poles, poles_below
 from tfarm.reduced import modal_model
@@ -156,10 +156,30 @@ def test_counts_that_are_refused(count) -> None:
     assert "\n" not in str(refused.value)
 
 
-def test_a_list_that_cannot_be_so_long_is_refused() -> None:
-    """Heavy damping: only poles right of -1/C can be listed."""
-    with pytest.raises(ConvergenceError, match=r"right of -1/C were found, not 20"):
-        closed_loop_poles(with_damping(ARM, 0.05), LAW, 20)
+@pytest.mark.parametrize("C", [1e-5, 1e-3])
+def test_a_list_without_a_count_ends_at_the_shear_cut_off_where_fewer_than_ten_lie_below(C) -> None:
+    """As many as turns of 1 + L around the box say; a count goes on above the same poles."""
+    arm, law = with_damping(STOCKY, C), HubFeedback(K1=300.0, K2=0.3)
+    few, ten = closed_loop_poles(arm, law), closed_loop_poles(arm, law, 10)
+    assert few.ends_at_shear_cutoff
+    assert not ten.ends_at_shear_cutoff
+    assert 0.9 * arm.shear_cutoff < few.box.im_max <= arm.shear_cutoff
+    assert few.values.size < 10 == ten.values.size
+    assert few.count == nyquist_count(few.loop, few.box)
+    assert ten.count == nyquist_count(ten.loop, ten.box)
+    same(few.moving, ten.moving[ten.moving.imag < few.box.im_max], 1e-12)
+    usual = closed_loop_poles(LAB, LAW)
+    assert (usual.values.size, usual.ends_at_shear_cutoff) == (10, False)
+
+
+def test_a_count_goes_on_into_shear_where_bending_is_overdamped() -> None:
+    """With psi' = 0 as good as held: shear waves in a free tip's arm, pi c/L apart, c^2 = kappa G/rho."""
+    arm = with_damping(ARM, 0.05)
+    poles = closed_loop_poles(arm, LAW, 12)
+    link = arm.link
+    apart = math.pi / link.length * math.sqrt(link.shear_factor * link.shear_modulus / link.density)
+    np.testing.assert_allclose(np.diff(poles.values.imag[-8:]), apart, rtol=1e-3)
+    assert poles.values.size == 12
 
 
 @pytest.mark.parametrize("K2", [0.0, -3.0])

@@ -12,6 +12,8 @@ from tfarm.cli.app import ArmName, Json, app, load_arm, plain_number, whole
 from tfarm.cli.inputs import K1, K2, Kp, gains_of, say_defaults
 from tfarm.errors import ParameterError
 
+POLES = "poles with Im s >= 0, 1 to 1000; if not given ten, or those below the shear cut-off where they are fewer"
+
 
 @app.command()
 def poles(
@@ -19,12 +21,12 @@ def poles(
     k1: K1 = None,
     k2: K2 = None,
     kp: Kp = 0.0,
-    count: Annotated[str, typer.Option("--count", metavar="N", help="poles with Im s >= 0, 1 to 1000")] = "10",
+    count: Annotated[str | None, typer.Option("--count", metavar="N", help=POLES)] = None,
     certify: Annotated[bool, typer.Option("--certify", help="prove each, and that none is missing")] = False,
     json: Json = False,
 ) -> None:
     """Closed-loop poles of the exact arm, complete in a printed box."""
-    number, subject = whole("--count", count, 1, 1000), load_arm(arm)
+    number, subject = None if count is None else whole("--count", count, 1, 1000), load_arm(arm)
     law, said = gains_of(subject, k1, k2, kp)
     from tfarm.loop.answers import poles_answer
     from tfarm.loop.poles import closed_loop_poles

@@ -31,6 +31,8 @@ def poles_answer(poles: Poles, certify: bool) -> dict[str, Any]:
         "unstable": poles.unstable,
         "complete": True,
         "box": list(poles.box),
+        "ends_at_shear_cutoff": poles.ends_at_shear_cutoff,
+        "shear_cutoff_rad_s": poles.loop.arm.shear_cutoff,
     }
     if certify:
         discs = poles.certify()

@@ -7,7 +7,7 @@ function around the box says how many there are (`spectrum.box`); where it disag
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -29,11 +29,14 @@ Real = NDArray[np.float64]
 
 ON_AXIS = 1e-12  # a pole whose real part is below this share of its size is on the imaginary axis to working precision
 MOST_POLES = 1000
+USUAL = 10  # poles listed where no count is asked for
+MOST_MODES = 4000  # of the undamped arm, below the highest box that is searched for as many poles as are asked for
 SLOW = 1e-6  # of a box's height: poles nearer to 0 are the rigid arm's, and known beforehand
 SLOW_STEPS = 4  # of Newton's method from there
 NEAR_RIGID = 0.01  # of its size: how far it may be from the rigid arm's
 SMALLEST = 1e-140  # 1/s: whose square is still a full double
 GROWTH = (1.0, 1.0041, 1.0093, 1.0171, 1.0311, 1.0573, 1.113)  # heights tried where a zero lies on the edge of a box
+SHRINK = tuple(1 / factor for factor in GROWTH)
 
 
 @dataclass(frozen=True)
@@ -41,12 +44,15 @@ GROWTH = (1.0, 1.0041, 1.0093, 1.0171, 1.0311, 1.0573, 1.113)  # heights tried w
 class Poles:
     """Closed-loop poles [1/s] with Im >= 0, ascending in Im, those at 0 as often as they are: all there are in `box`.
 
-    A real pole stands once for each time, an oscillating one for its conjugate too.
+    A real pole stands once for each time, an oscillating one for its conjugate too.  `ends_at_shear_cutoff` says that
+    the box ends at sqrt(kappa G A/(rho I)), since no more poles lie below it: those above are of shear, and undamped
+    but for the little that bending takes.
     """
 
     loop: Loop
     values: Complex
     box: Box
+    ends_at_shear_cutoff: bool = False
 
     @property
     def unstable(self) -> int:
@@ -91,33 +97,48 @@ class Poles:
         return discs
 
 
-def closed_loop_poles(arm: Arm, law: HubFeedback, count: int) -> Poles:
+def closed_loop_poles(arm: Arm, law: HubFeedback, count: int | None = None) -> Poles:
     """The first `count` closed-loop poles with Im >= 0, ascending in Im s, complete in the box of the record.
 
+    Without a count the first ten (more, where more are real), or as many as lie below the shear cut-off where these are
+    fewer: the box then ends there.  A count that is given goes on into shear.
     Raises ParameterError where there is no loop, ConvergenceError where the box cannot be completed.
     """
-    if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_POLES:
+    if count is not None and (isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_POLES):
         raise ParameterError(key="count", value=count, remedy=f"a whole number from 1 to {MOST_POLES}")
-    loop = Loop(arm, law)
-    number = count + 2
+    loop, cut_off = Loop(arm, law), arm.shear_cutoff
+    wanted, limit = (USUAL, cut_off) if count is None else (count, math.inf)
+    number = wanted + 2
     while True:
         height = _height_of(arm, number)
-        poles = poles_below(loop, height)
-        if poles.values.size >= count or number > 4 * count + 40:
-            return _first(poles, count)
-        number += max(2, count // 4)
+        if height >= limit:
+            poles = poles_below(loop, limit, SHRINK)
+            if poles.values.size <= wanted:
+                return replace(poles, ends_at_shear_cutoff=True)
+        else:
+            poles = poles_below(loop, height)
+        if poles.values.size >= wanted:
+            real = int((poles.values.imag == 0).sum())
+            return _first(poles, wanted if count is not None else max(wanted, real))
+        if number > MOST_MODES:
+            text = f"only {poles.values.size} poles right of -1/C lie below {height:.4g} rad/s, not {count}"
+            raise ConvergenceError(text, poles.values, count)
+        number *= 2
 
 
-def poles_below(loop: Loop, height: float) -> Poles:
-    """All closed-loop poles with |Im s| <= height, and more than about -1.5 heights or -0.8/C in Re s."""
+def poles_below(loop: Loop, height: float, factors: tuple[float, ...] = GROWTH) -> Poles:
+    """All closed-loop poles with |Im s| <= height, and more than about -1.5 heights or -0.8/C in Re s.
+
+    Where a zero lies on the edge of the box the next of the `factors` on the height is tried.
+    """
     at_zero = zeros_at_origin(loop.k, loop.gains)
     starts, known = starting_points(loop, 1.3 * height), slow_poles(loop, SLOW * height)
-    for growth in GROWTH:
-        box = box_of(loop, height * growth)
+    for factor in factors:
+        box = box_of(loop, height * factor)
         try:
             found = zeros_in_box(loop.member.function, box, starts, known)
         except ConvergenceError:
-            if growth == GROWTH[-1]:
+            if factor == factors[-1]:
                 raise
             continue
         found = np.where(abs(found.imag) < 1e-11 * abs(found), found.real, found)
@@ -175,8 +196,6 @@ def starting_points(loop: Loop, up_to: float) -> Complex:
 
 
 def _with_hub(arm: Arm, inertia: float) -> Arm:
-    from dataclasses import replace
-
     return replace(arm, hub=Hub(inertia=inertia))
 
 
@@ -198,8 +217,6 @@ def _height_of(arm: Arm, number: int) -> float:
 def _first(poles: Poles, count: int) -> Poles:
     """The first so many poles, and a lower box that holds just these."""
     values = poles.values
-    if values.size < count:
-        raise ConvergenceError(f"only {values.size} poles right of -1/C were found, not {count}", values, count)
     kept = values[:count]
     if count < values.size and values[count].imag == kept[-1].imag == 0:
         raise ParameterError(key="count", value=count, remedy=f"more: {int((values.imag == 0).sum())} poles are real")
