@@ -10,6 +10,7 @@ import typer
 
 from tfarm.cli.app import ArmName, Json, app, load_arm, plain_number, whole
 from tfarm.cli.inputs import K1, K2, Kp, gains_of, say_defaults
+from tfarm.cli.sampling import Delay, DspFile, Period, chain_of
 from tfarm.errors import ParameterError
 
 POLES = "poles with Im s >= 0, 1 to 1000; if not given ten, or those below the shear cut-off where they are fewer"
@@ -81,16 +82,22 @@ def design(
     k2: Annotated[str | None, typer.Option("--K2", metavar="LO,HI", help="bounds of K2")] = None,
     kp: Kp = 0.0,
     modes: Annotated[str, typer.Option("--modes", help="flexible modes in the band, 1 to 30")] = "2",
+    period: Period = None,
+    delay_samples: Delay = None,
+    dsp: DspFile = None,
     json: Json = False,
 ) -> None:
-    """The gains that serve an objective best, by the exact loop."""
+    """The gains that serve an objective best, by the exact loop; and whether they hold when it is sampled."""
     number, subject = whole("--modes", modes, 1, 30), load_arm(arm)
+    chain = chain_of(dsp or arm, period, delay_samples)
     limits = {name: None if text is None else bounds(f"--{name}", text) for name, text in (("K1", k1), ("K2", k2))}
+    from tfarm.dsp.brief import sampled_brief
     from tfarm.loop.answers import design_answer
     from tfarm.loop.design import design as find_gains
 
     found = find_gains(subject, objective, Kp=kp, modes=number, **limits)  # type: ignore[arg-type]
-    _print(design_answer(found), json, "print_design")
+    sampled = {"sampled": sampled_brief(subject, found.law, chain).answer}
+    _print(design_answer(found) | sampled, json, "print_design")
 
 
 def bounds(key: str, text: str) -> tuple[float, float]:

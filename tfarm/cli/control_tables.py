@@ -107,6 +107,9 @@ def print_design(answer: dict[str, Any]) -> None:
     """The gains and what they reach."""
     print(f"{answer['arm']}, objective {answer['objective']}, {answer['modes']} modes in the band: {answer['verdict']}")
     print(f"K1 = {answer['K1']:.6g} N m s/rad, K2 = {answer['K2']:.6g}, Kp = {answer['Kp']:.6g}: {answer['value']:.6g}")
+    sampled = answer["sampled"]
+    warning = "" if sampled["stable"] else "BUT "
+    print(f"{warning}{sampled['in_words']}")
     print(f"within one per cent of it: K1 {_pair(answer['flat_K1'])}, K2 {_pair(answer['flat_K2'])}")
     if answer["at_bound"]:
         ends = [f"{name} = {answer[name]:.6g} of {_pair(answer['bounds'][name])}" for name in answer["at_bound"]]
