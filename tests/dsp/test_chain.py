@@ -1,14 +1,17 @@
 """The records of the chain, and the TOML tables that fill them: defaults are ideal, bad input is named in one line."""
 
 import math
+import tomllib
 
 import pytest
 
 import tfarm
-from tfarm.arm import HubFeedback
+from tfarm.arm import HubFeedback, to_toml
+from tfarm.arm.schema import arm_of_table
 from tfarm.dsp import Actuator, Chain, Converters, Sampling, Slew, load_chain
 from tfarm.dsp.converters import MOMENT, TORQUE, quantisers
 from tfarm.dsp.reading import chain_of_tables
+from tfarm.dsp.writing import file_text
 from tfarm.errors import ParameterError
 
 LAB = """
@@ -54,7 +57,7 @@ def test_all_is_ideal_unless_it_is_said_otherwise():
     chain = load_chain("sasaki2012")
     assert chain == Chain()
     assert (chain.sampling.period, chain.sampling.delay_samples) == (0.01, 0.0)
-    assert (chain.slew.travel, chain.slew.rise_time, chain.slew.reading) == (1.15, 1.0, "vibration")
+    assert (chain.slew.travel_of(1.0), chain.slew.rise_time, chain.slew.reading) == (1.15, 1.0, "vibration")
     assert not chain.converters.is_quantised
     assert math.isinf(chain.actuator.torque_limit)
 
@@ -140,12 +143,21 @@ def test_steps_and_ranges():
     assert rows[TORQUE].tolist() == [1.0, -2.5, 2.5]
 
 
-def test_quantise_rounds_clips_and_counts():
+def test_quantise_rounds_clips_and_says_so():
     import numpy as np
 
     from tfarm.dsp.kernel import quantise
 
-    saturated, row = np.zeros(3, np.int64), np.array([0.5, -2.0, 1.5])
-    values = [quantise(x, row, saturated, 1) for x in (0.2, 0.3, -0.74, 1.6, 1.8, -2.3, 0.25)]
+    given, row = (0.2, 0.3, -0.74, 1.6, 1.8, -2.3, 0.25), np.array([0.5, -2.0, 1.5])
+    saturated = np.zeros((len(given), 3), np.bool_)
+    values = [quantise(x, row, flags, 1) for x, flags in zip(given, saturated, strict=True)]
     assert values == [0.0, 0.5, -0.5, 1.5, 1.5, -2.0, 0.0]
-    assert saturated.tolist() == [0, 2, 0]
+    assert np.argwhere(saturated).tolist() == [[4, 1], [5, 1]]
+
+
+def test_an_arm_and_its_chain_are_one_file_that_loads_to_both(tmp_path):
+    arm, chain = arm_of_table(tomllib.loads(LAB)), chain_of_tables(tomllib.loads(LOOP))
+    file = tmp_path / "arm.toml"
+    file.write_text(file_text(arm, chain), encoding="utf-8")
+    assert (tfarm.load(file), load_chain(file)) == (arm, chain)
+    assert file_text(arm, Chain()) == file_text(arm) == to_toml(arm)

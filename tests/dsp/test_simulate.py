@@ -270,6 +270,21 @@ def test_saturation_that_is_over_is_no_limit_cycle(lab):
     assert answer["limit_cycle"] is None
 
 
+def test_a_simulation_takes_the_modes_that_its_digits_need_or_says_what_it_is_off(lab):
+    """After a slew 20 modes do; after an impulse no 40 do, and what is said is not below what 80 show."""
+    slow = simulated_answer(lab, GAINS, Chain(), "slew", 1.5)
+    assert (slow["modes_used"], slow["modes_change"] < 1e-4) == (20, True)
+    fine = simulator(lab, "slew", 1.5, count=40).linear(GAINS).at_samples
+    assert abs(slow["root_moment"] - fine.root_moment).max() < slow["modes_change"] * abs(fine.root_moment).max()
+    sudden = simulated_answer(lab, GAINS, Chain(), "impulse", 0.5)
+    assert (sudden["modes_used"], sudden["modes_change"] > 1e-4) == (40, True)
+    more = simulator(lab, "impulse", 0.5, count=80).linear(GAINS).at_samples
+    off = abs(sudden["root_moment"] - more.root_moment).max() / abs(more.root_moment).max()
+    assert 0 < off < sudden["modes_change"]
+    asked = simulated_answer(lab, GAINS, Chain(), "slew", 0.1, count=3)
+    assert (asked["modes_used"], asked["modes_change"]) == (3, None)
+
+
 def test_running_away_is_said_with_its_time_and_mode(lab):
     run = simulator(lab, duration=5.0).linear(HubFeedback(K1=0.3, K2=1.5))
     assert run.stopped is not None

@@ -105,13 +105,18 @@ def report(
     """Write pages with pictures, tables and data: open index.html in a browser."""
     import tfarm
 
-    subjects = [load_arm(name) for name in arms or tfarm.presets()]
+    names = arms or tfarm.presets()
+    subjects = [load_arm(name) for name in names]
+    from tfarm.dsp.reading import load_chain
+
+    chains = [load_chain(name) for name in names]
     from tfarm.cli.tables import progress
     from tfarm.report import write
 
     left_out: list[str] = []
     with progress() as advance:
-        page = write(subjects, out, only=None if only is None else (only,), progress=advance, notice=left_out.append)
+        pages = None if only is None else (only,)
+        page = write(subjects, out, chains=chains, only=pages, progress=advance, notice=left_out.append)
     for text in left_out:
         print(f"tfarm: {one_line(text, 1000)}", file=sys.stderr)
     print(page)

@@ -77,7 +77,8 @@ def simulate(
     json: Json = False,
 ) -> None:
     """The sampled loop in time: hub angle, tip, root moment and torque, exact between the samples."""
-    count, records = whole("--modes", modes or "20", 1, 400), whole("--between", between, 0, 1000)
+    count = None if modes is None else whole("--modes", modes, 1, 400)
+    records = whole("--between", between, 0, 1000)
     subject, chain = load_arm(arm), chain_of(dsp or arm, period, delay_samples)
     from tfarm.dsp.results import simulated_answer
 

@@ -43,7 +43,8 @@ def print_sampled(answer: dict[str, Any]) -> None:
 
 def print_simulation(answer: dict[str, Any]) -> None:
     """What the simulation comes to."""
-    print(f"{answer['arm']}, {answer['scenario']}: {len(answer['t'])} samples of {answer['period_s']:g} s")
+    print(f"{answer['arm']}, {answer['scenario_in_words']}: {len(answer['t'])} samples of {answer['period_s']:g} s")
+    print(_modes_words(answer))
     print(f"residual root moment, less the rigid arm's: {answer['residual_moment_rms']:.6g} N m rms")
     print(f"settled (5 %) at: {answer['settling_time_s']:.4g} s")
     print(f"saturated samples: {', '.join(f'{k} {n}' for k, n in answer['saturated_samples'].items())}")
@@ -52,6 +53,14 @@ def print_simulation(answer: dict[str, Any]) -> None:
         at = cycle["frequency_rad_s"]
         size = f"root moment +-{cycle['root_moment_amplitude']:.4g} N m at {at:.4g} rad/s"
         print(f"limit cycle, kept up by {cycle['kept_up_by']}: {size}")
+
+
+def _modes_words(answer: dict[str, Any]) -> str:
+    """How many modes, and what is known of the rest."""
+    change, modes = answer["modes_change"], f"{answer['modes_used']} flexible modes"
+    if change is None:
+        return f"{modes}, as asked"
+    return f"{modes}: half of them change the signals by {change:.2g} of their largest"
 
 
 def warn_if_stopped(answer: dict[str, Any]) -> None:

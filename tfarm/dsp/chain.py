@@ -15,6 +15,7 @@ from tfarm.errors import ParameterError, did_you_mean
 Reading = Literal["vibration", "total"]
 LEAST_BITS, MOST_BITS = 2, 32
 MOST_DELAY = 100.0
+ANGLE = 1.15  # rad, as tip travel over length: the paper moves the tip of its 1 m by 1.15 m
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,21 +128,31 @@ class Actuator:
 class Slew:
     """A bang-bang acceleration: tip `travel` [m] within `rise_time` [s], +a for the first half and -a for the second.
 
+    Without a travel the tip goes 1.15 times the arm's length: the angle of the paper's slew, whatever the arm.
     `reading` says what the moment feedback sees: "vibration" (the moment less the rigid arm's) or "total" (all of it).
     """
 
-    travel: float = 1.15
+    travel: float | None = None
     rise_time: float = 1.0
     reading: Reading = "vibration"
 
     def __post_init__(self) -> None:
         meaning = "tip travel is a finite number of metres, other than zero"
-        travel = number("slew.travel", self.travel, meaning)
-        positive("slew.travel", abs(travel), meaning)
-        object.__setattr__(self, "travel", travel)
+        if self.travel is not None:
+            travel = number("slew.travel", self.travel, meaning)
+            positive("slew.travel", abs(travel), meaning)
+            object.__setattr__(self, "travel", travel)
         meaning = "a rise time is a positive, finite number of seconds"
         object.__setattr__(self, "rise_time", positive("slew.rise_time", self.rise_time, meaning))
         _choice("slew.reading", self.reading, ("vibration", "total"))
+
+    def travel_of(self, length: float) -> float:
+        """Tip travel [m] of an arm of that length [m]."""
+        return ANGLE * length if self.travel is None else self.travel
+
+    def acceleration(self, length: float) -> float:
+        """The hub's angular acceleration [rad/s^2] in the first half, 4 travel/(L rise^2)."""
+        return 4 * self.travel_of(length) / (length * self.rise_time**2)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

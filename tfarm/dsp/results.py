@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -11,7 +12,8 @@ from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.dsp.chain import Chain
-from tfarm.dsp.scenarios import scenario
+from tfarm.dsp.enough import Enough, enough_modes
+from tfarm.dsp.scenarios import described, scenario
 from tfarm.dsp.simulate import Simulation, Simulator, Trace
 
 Real = NDArray[np.float64]
@@ -112,9 +114,13 @@ def _half_range(signal: Real) -> float:
 
 
 def simulation_answer(
-    arm_name: str, gains: HubFeedback, simulation: Simulation, cycle: LimitCycle | None
+    arm_name: str, gains: HubFeedback, simulation: Simulation, cycle: LimitCycle | None, used: Enough
 ) -> dict[str, Any]:
-    """The simulation as a dictionary of plain numbers, texts and lists."""
+    """The simulation as a dictionary of plain numbers, texts and lists.
+
+    `modes_change`: by how much the signals changed when the modes were doubled to `modes_used`, relative to the
+    largest value of each; null where the number of modes was asked for.
+    """
     stopped, volts = simulation.stopped, simulation.volts
     answer: dict[str, Any] = {
         "arm": arm_name,
@@ -125,6 +131,8 @@ def simulation_answer(
         "K2": gains.K2,
         "Kp": gains.Kp,
         "period_s": simulation.scenario.period,
+        "modes_used": used.modes,
+        "modes_change": None if math.isnan(used.change) else used.change,
         **_columns(simulation.at_samples),
         "torque": simulation.torque.tolist(),
         "gain": [] if simulation.gain is None else simulation.gain.tolist(),
@@ -174,15 +182,30 @@ def ideal_chain(chain: Chain) -> Chain:
 
 
 def simulated_answer(
-    arm: Arm, gains: HubFeedback, chain: Chain, name: str, duration: float, *, count: int = 20, between: int = 0
+    arm: Arm,
+    gains: HubFeedback,
+    chain: Chain,
+    name: str,
+    duration: float,
+    *,
+    count: int | None = None,
+    between: int = 0,
 ) -> dict[str, Any]:
-    """Simulate a scenario by its name and say what came of it.
+    """Simulate a scenario by its name and say what came of it: with `count` modes, or as many as its digits take.
 
     Raises ParameterError for a locked hub, for I_h = 0 with K2 != 0, and for what `scenario` and `Simulator` refuse.
     """
-    task = scenario(name, arm, chain, duration)
-    simulation = Simulator(arm, chain, task, count=count, between=between).linear(gains)
+    task, ideal = scenario(name, arm, chain, duration), ideal_chain(chain)
+    used = modes_for(count, lambda n: Simulator(arm, ideal, task, count=n).linear(gains))
+    simulation = Simulator(arm, chain, task, count=used.modes, between=between).linear(gains)
     cycle = None
     if not chain.is_linear:
-        cycle = limit_cycle(simulation, Simulator(arm, ideal_chain(chain), task, count=count).linear(gains))
-    return simulation_answer(arm.name, gains, simulation, cycle)
+        cycle = limit_cycle(simulation, Simulator(arm, ideal, task, count=used.modes).linear(gains))
+    return simulation_answer(arm.name, gains, simulation, cycle, used) | {
+        "scenario_in_words": described(task, arm, chain)
+    }
+
+
+def modes_for(count: int | None, simulate: Callable[[int], Simulation]) -> Enough:
+    """The modes that were asked for, of which nothing more is known (NaN), or as many as it takes."""
+    return enough_modes(simulate) if count is None else Enough(count, math.nan)

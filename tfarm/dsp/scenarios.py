@@ -15,11 +15,13 @@ from tfarm.arm.checks import number, positive
 from tfarm.dsp.chain import Chain
 from tfarm.errors import ParameterError, did_you_mean
 from tfarm.records import record
+from tfarm.spectrum.scales import turning_inertia
 
 Real = NDArray[np.float64]
 
 MOST_SAMPLES = 4_000_000
-STEP_TORQUE, IMPULSE, TIP_OFFSET = 0.1, 0.01, 0.01  # N m, N m s, m: what the scenarios start with unless told
+STEP_TORQUE, IMPULSE, TIP_OFFSET = 0.1, 0.01, 0.01  # N m, N m s, m: what the scenarios of the paper's arm start with
+PAPER_TORQUE = 3.0  # N m, of the slew of 1.15 m in 1 s of the preset sasaki2012
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,7 @@ def slew(arm: Arm, chain: Chain, duration: float) -> Scenario:
     must_turn(arm)
     T, manoeuvre = chain.sampling.period, chain.slew
     n = _samples(duration, T)
-    peak = 4 * manoeuvre.travel / (arm.link.length * manoeuvre.rise_time**2)
+    peak = manoeuvre.acceleration(arm.link.length)
     t = T * np.arange(n + 1)
     rate = peak * np.clip(np.minimum(t, manoeuvre.rise_time - t), 0.0, None)
     acceleration = np.diff(rate) / T
@@ -77,21 +79,33 @@ def slew(arm: Arm, chain: Chain, duration: float) -> Scenario:
     )
 
 
-def step(arm: Arm, chain: Chain, duration: float, torque: float = STEP_TORQUE) -> Scenario:
-    """A step of the reference torque r [N m] at t = 0."""
+def torque_unit(arm: Arm, chain: Chain) -> float:
+    """What the slew's torque J theta_dd is in units of that of the paper's arm [N m], to one digit: 1 there.
+
+    An arm that makes no slew has the torque of its own inertia about the hub for one, what is held apart.
+    """
+    share = abs(turning_inertia(arm) * chain.slew.acceleration(arm.link.length)) / PAPER_TORQUE
+    return float(f"{share:.1g}")
+
+
+def step(arm: Arm, chain: Chain, duration: float, torque: float | None = None) -> Scenario:
+    """A step of the reference torque r [N m] at t = 0: 0.1 of the arm's unit of torque unless told."""
+    torque = STEP_TORQUE * torque_unit(arm, chain) if torque is None else torque
     resting = _rest("step", chain, duration)
     size = number("torque", torque, "a torque is a finite number of N m")
     return _with(resting, feedforward=np.full(resting.feedforward.size, size))
 
 
-def decay(arm: Arm, chain: Chain, duration: float, tip_offset: float = TIP_OFFSET) -> Scenario:
-    """Free decay: the first mode released from rest with the tip displaced by `tip_offset` [m]."""
+def decay(arm: Arm, chain: Chain, duration: float, tip_offset: float | None = None) -> Scenario:
+    """Free decay: the first mode released from rest with the tip displaced by `tip_offset` [m], 0.01 L unless told."""
+    tip_offset = TIP_OFFSET * arm.link.length if tip_offset is None else tip_offset
     size = number("tip_offset", tip_offset, "a tip offset is a finite number of metres")
     return _with(_rest("decay", chain, duration), tip_offset=size)
 
 
-def impulse(arm: Arm, chain: Chain, duration: float, impulse: float = IMPULSE) -> Scenario:
-    """A disturbance impulse [N m s] on the hub just before t = 0."""
+def impulse(arm: Arm, chain: Chain, duration: float, impulse: float | None = None) -> Scenario:
+    """A disturbance impulse [N m s] on the hub just before t = 0: 0.01 s of the arm's unit of torque unless told."""
+    impulse = IMPULSE * torque_unit(arm, chain) if impulse is None else impulse
     size = number("impulse", impulse, "an impulse is a finite number of N m s")
     return _with(_rest("impulse", chain, duration), impulse=size)
 
@@ -102,6 +116,17 @@ SCENARIOS: dict[str, Callable[[Arm, Chain, float], Scenario]] = {
     "decay": decay,
     "impulse": impulse,
 }
+
+
+def described(task: Scenario, arm: Arm, chain: Chain) -> str:
+    """What a scenario asks of the arm, with its size."""
+    if task.name == "slew":
+        return f"a slew: the tip moves {chain.slew.travel_of(arm.link.length):.4g} m in {chain.slew.rise_time:g} s"
+    if task.name == "step":
+        return f"a step of {task.feedforward[0]:.4g} N m"
+    if task.name == "decay":
+        return f"the first mode released with the tip at {task.tip_offset:.4g} m"
+    return f"an impulse of {task.impulse:.4g} N m s on the hub"
 
 
 def scenario(name: str, arm: Arm, chain: Chain, duration: float) -> Scenario:

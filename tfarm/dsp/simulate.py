@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -159,6 +160,21 @@ class Simulator:
             return m.feedforward + K1 * (m.rate_reference - m.hub_rate) - K * m.vibration, K
 
         return self._stepped(torque, np.zeros(self.scenario.feedforward.size))
+
+    def finer(self, between: int) -> Simulator:
+        """The same with so many records in each sample."""
+        other = copy(self)
+        other.between = between
+        other._tables = _tables(self.plant, self._kept, self.chain, between)
+        return other
+
+    def modal(self) -> tuple[Complex, Complex]:
+        """Poles (m,) [1/s] with Im p >= 0, and what each amplitude adds to hub angle, rate, moment and tip (4, m)."""
+        return self.plant.poles[self._kept], self._tables[3][3:7]
+
+    def first_amplitudes(self) -> Complex:
+        """The modal amplitudes (m,) that a simulation starts with."""
+        return self._start().amplitude
 
     # ------------------------------------------------------------ inside
 

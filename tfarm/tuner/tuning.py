@@ -9,7 +9,8 @@ import numpy as np
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.dsp import Chain, Simulator, scenario
-from tfarm.dsp.results import rms_after, simulation_answer
+from tfarm.dsp.results import ideal_chain, modes_for, rms_after, simulation_answer
+from tfarm.dsp.scenarios import described
 from tfarm.errors import ParameterError
 from tfarm.records import record
 from tfarm.spectrum.scales import default_gains
@@ -185,7 +186,14 @@ def _items(row: Row) -> list[tuple[str, Any]]:
 
 
 def controlled_answer(
-    arm: Arm, saved: SavedTuner, chain: Chain, name: str, duration: float, *, count: int = 20, between: int = 0
+    arm: Arm,
+    saved: SavedTuner,
+    chain: Chain,
+    name: str,
+    duration: float,
+    *,
+    count: int | None = None,
+    between: int = 0,
 ) -> dict[str, Any]:
     """A scenario simulated with a saved tuner as the gain, as `tfarm.dsp.results.simulated_answer` says it.
 
@@ -193,9 +201,12 @@ def controlled_answer(
     """
     chain = with_signals(chain, saved.signals)
     task = scenario(name, arm, chain, duration)
-    run = Simulator(arm, chain, task, count=count, between=between).gain_schedule(saved.K1, saved.gain())
-    answer = simulation_answer(arm.name, HubFeedback(K1=saved.K1, K2=0.0), run, None)
-    return answer | {"K2": None, "controller": _described(saved)}
+    ideal = ideal_chain(chain)
+    used = modes_for(count, lambda n: Simulator(arm, ideal, task, count=n).gain_schedule(saved.K1, saved.gain()))
+    run = Simulator(arm, chain, task, count=used.modes, between=between).gain_schedule(saved.K1, saved.gain())
+    answer = simulation_answer(arm.name, HubFeedback(K1=saved.K1, K2=0.0), run, None, used)
+    what = described(task, arm, chain)
+    return answer | {"K2": None, "controller": _described(saved), "scenario_in_words": what}
 
 
 def _described(saved: SavedTuner) -> dict[str, Any]:

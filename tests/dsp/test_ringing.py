@@ -1,0 +1,40 @@
+"""How far modes ring, and how many records a picture of it takes: against the simulation's own records."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tfarm
+from tfarm.arm import HubFeedback
+from tfarm.dsp import Chain, Sampling, Simulator, scenario
+from tfarm.dsp.ringing import POINTS, records_between, ringing
+
+STEEL = tfarm.load("stocky-steel")
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.3, 1.6])
+def test_what_is_played_again_is_the_simulation(delay):
+    """A step without feedback or damping: one mode rings as far as the moment does, however late the step."""
+    arm = replace(STEEL, link=replace(STEEL.link, damping=0.0))
+    chain = Chain(sampling=Sampling(delay_samples=delay))
+    simulator = Simulator(arm, chain, scenario("step", arm, chain, 0.3), count=1, between=400)
+    run = simulator.linear(HubFeedback(K1=0.0, K2=0.0))
+    moment = run.between.root_moment[run.between.t > (delay + 1) * chain.sampling.period]
+    found = ringing(simulator, run)
+    assert found.frequency == pytest.approx(tfarm.modes(arm, 1).natural_frequency[-1:])
+    assert found.size[2, 0] == pytest.approx(np.ptp(moment) / 2, rel=2e-3)  # 400 records a sample: 96 a period
+
+
+def test_the_slew_of_a_stiff_arm_gets_twenty_points_a_period():
+    """416 Hz, which 400 points a second cannot show."""
+    chain = Chain()
+    simulator = Simulator(STEEL, chain, scenario("slew", STEEL, chain, 3.0), count=8)
+    run = simulator.linear(HubFeedback(K1=1.0, K2=0.0))
+    first = tfarm.modes(STEEL, 1).natural_frequency[-1] / (2 * np.pi)
+    assert first == pytest.approx(416, abs=1)
+    records = records_between(simulator, run, {"root_moment": float(np.ptp(run.at_samples.root_moment))})
+    assert (records + 1) / chain.sampling.period >= POINTS * first
+    fine = simulator.finer(records).linear(HubFeedback(K1=1.0, K2=0.0))
+    np.testing.assert_allclose(fine.at_samples.root_moment, run.at_samples.root_moment, rtol=0, atol=1e-9)
+    assert fine.between.t.size == records * run.t.size
