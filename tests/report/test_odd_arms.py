@@ -1,6 +1,5 @@
 """What the pages say of eight legal arms unlike the paper's: each sentence against the numbers of its own page."""
 
-import math
 import re
 from dataclasses import replace
 
@@ -10,12 +9,11 @@ import pytest
 import tfarm
 from tests.odd_arms import odd_arms
 from tfarm import HubFeedback
-from tfarm.audit.assumptions import LoopVerdict, has_hub_inertia, hub_study, section_study
 from tfarm.loop.locus import locus
 from tfarm.loop.plant import Loop
 from tfarm.loop.poles import poles_below
-from tfarm.report import assumptions_pictures, assumptions_section, loop_laws, loop_section, writing
 from tfarm.report import loci as loci_room
+from tfarm.report import loop_laws, loop_section, writing
 from tfarm.report.arm_section import arm_section
 from tfarm.report.bode_section import bode_section
 from tfarm.report.damped_table import damped_table
@@ -200,38 +198,3 @@ def test_a_free_pin_has_its_rate_loop(monkeypatch):
     assert section.facts[0].value == "STABLE"
     assert set(column(section.blocks[1], "gain").values) == {"K1", "Kp"}
     assert [piece.name for piece in writing.PIECES if piece.suits(arm)][4:7] == ["no loop", "margins", "root loci"]
-
-
-# ------------------------------------------------------------ what the assumptions do
-
-
-@pytest.mark.parametrize("name", [name for name, arm in ARMS.items() if has_hub_inertia(arm)])
-def test_no_hub_takes_a_frequency_outside_what_is_said(name):
-    """Over the candidates, and hubs a million times lighter and heavier; each limit is approached."""
-    arm = ARMS[name]
-    study = hub_study(arm, [arm.hub.inertia * factor for factor in (1e-6, 1e-2, 1.0, 1e2, 1e6)])
-    assert (study.natural_frequency > study.locked).all()
-    assert (study.natural_frequency < study.pinned).all()
-    assert study.natural_frequency[-1] == pytest.approx(study.locked, rel=1e-3, abs=0.02 * study.locked[1])
-    assert (study.locked[0] == 0) == (name == "pinned")
-
-
-def test_a_K2_where_the_search_ended_has_a_star():
-    verdicts = (LoopVerdict("stable", 1.08, True), LoopVerdict("stable", 50.0, False), LoopVerdict("unstable", None))
-    study = hub_study(ARMS["heavy-hub"], [1.0, 22.5, 30.0], count=1)
-    (edges,) = (each for each in assumptions_section._loop(study, verdicts) if each.key == "K2_below")
-    assert list(edges.cells) == ["1.08000", "50*", "-"]
-    assert "*" in assumptions_section._searched(verdicts)
-    assert not assumptions_section._searched(verdicts[::2])
-
-
-def test_curves_that_fall_are_not_said_to_rise():
-    """The fourth mode of the stubby arm falls at last with more depth: shear has taken over."""
-    ways = [assumptions_pictures._way(section_study(ARMS["stubby"], depths)) for depths in ([0.01, 0.02], [0.12, 0.17])]
-    assert ways == ["all rising", "not all of them one way"]
-
-
-@pytest.mark.parametrize(("hub", "words"), [(math.inf, "a hub that is locked"), (0.1, "the two values assumed")])
-def test_what_the_paper_leaves_open_is_what_the_arm_has(hub, words):
-    arm = replace(tfarm.load("sasaki2012"), hub=tfarm.Hub(inertia=hub))
-    assert words in assumptions_section._opening(arm)

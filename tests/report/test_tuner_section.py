@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 import tfarm
+from tfarm.dsp import Chain
 from tfarm.report import tuner_study as study_module
+from tfarm.report.curves import away
 from tfarm.report.figures import save
-from tfarm.report.time_responses import away
 from tfarm.report.tuner_pictures import draw_cost_map, draw_curves
 from tfarm.report.tuner_section import section_of, tuner_section
 from tfarm.report.tuner_study import NOMINAL, CostMap, tuner_study
@@ -26,8 +27,8 @@ def small():
         patch.setattr(study_module, "SEEDS", SEEDS)
         patch.setattr(study_module, "MAP_SEEDS", 1)
         patch.setattr(study_module, "MAP_TRIALS", 3)
-        patch.setattr(study_module, "conditions", lambda arm, chain: conditions(arm, chain)[:4])
-        data = tuner_study(LAB)
+        patch.setattr(study_module, "conditions", lambda *each: conditions(*each)[:4])
+        data = tuner_study(LAB, Chain())
         yield data, section_of(data)
 
 

@@ -17,8 +17,10 @@ import pytest
 import tfarm
 from tests.shell import run
 from tfarm.arm import to_toml
+from tfarm.dsp import load_chain
 from tfarm.report import readme_pictures, write, writing
 from tfarm.report.paper import is_from_paper, paper_section
+from tfarm.report.sections import Section
 
 ATTACK = "<script>alert(1)</script> & <b>bold</b>, I_h in kg m^2"
 ANCHORS = {piece.anchor for piece in writing.PIECES}
@@ -307,12 +309,34 @@ class Unmakeable:
         raise self.error
 
 
+def test_a_page_is_about_the_arms_own_file(tmp_path, monkeypatch, capsys):
+    """Its sampling, converters and motor are those of the page, of the arm.toml beside it, and of the hash."""
+    seen = []
+
+    def section(arm, chain):
+        seen.append((arm.name, chain))
+        return Section(anchor="sampled", title="The sampled loop")
+
+    monkeypatch.setattr(writing, "PIECES", (writing.Piece("s", "sampled", ("sampled",), section, is_sampled=True),))
+    monkeypatch.setattr(writing, "save_proof", lambda *_: None)
+    file = tmp_path / "bench.toml"
+    tables = "[sampling]\nperiod = 0.004\n[converters]\nmoment_bits = 12\nmoment_range = 5.0\n[slew]\ntravel = 0.7\n"
+    file.write_text(to_toml(ARM) + tables, encoding="utf-8")
+    code, _, _ = run(capsys, "report", str(file), "--only", "sampled", "--out", str(tmp_path / "out"))
+    chain = load_chain(file)
+    assert (code, seen) == (0, [(ARM.name, chain)])
+    beside = tmp_path / "out" / ARM.name / "arm.toml"
+    assert (tfarm.load(beside), load_chain(beside)) == (ARM, chain)
+    page = (tmp_path / "out" / ARM.name / "sampled.html").read_text(encoding="utf-8")
+    assert hashlib.sha256(beside.read_bytes()).hexdigest() in page
+
+
 def without_a_section(monkeypatch, error):
     """A report of two sections, the second of which meets that error."""
     pieces = {piece.name: piece for piece in writing.PIECES}
     broken = replace(pieces["root loci"], make=Unmakeable(error))
     monkeypatch.setattr(writing, "PIECES", (pieces["the arm"], broken))
-    monkeypatch.setattr(writing, "save_proof", lambda arm, folder: None)
+    monkeypatch.setattr(writing, "save_proof", lambda *_: None)
 
 
 @pytest.mark.parametrize(

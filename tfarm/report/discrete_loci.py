@@ -75,8 +75,11 @@ class Loci:
 
 
 def loci(loop: SampledLoop, K1_top: float, K2_range: tuple[float, float]) -> Loci:
-    """The loci of K1 from nearly 0 to `K1_top` and of K2 over `K2_range`, the other gain as it is."""
-    K1 = np.geomspace(K1_top / 10**DECADES, K1_top, VALUES)
+    """The loci of K1 from nearly 0 to `K1_top` and of K2 over `K2_range`, the other gain as it is.
+
+    Both begin below the gains of the loop.
+    """
+    K1 = np.geomspace(min(K1_top / 10**DECADES, loop.gains.K1 / STRONGER), K1_top, VALUES)
     K2 = np.linspace(*K2_range, VALUES)
     upper = np.nonzero((loop.pulse.poles.imag > 0) & (loop.pulse.mode > 0))[0]
     upper = upper[np.argsort(loop.pulse.mode[upper])]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 import re
 import shlex
@@ -16,9 +15,11 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 import tfarm
-from tfarm.arm import Arm, load, presets, to_toml
+from tfarm.arm import Arm, load, presets
+from tfarm.dsp import Chain, load_chain
 from tfarm.report.digits import unit
 from tfarm.report.sections import Fact, SavedSection
+from tfarm.report.trust_proofs import hash_of
 
 TEMPLATES = Path(__file__).parent / "templates"
 QUESTIONS = {
@@ -57,7 +58,7 @@ def _templates() -> Environment:
     return environment
 
 
-def arm_page(arm: Arm, sections: Sequence[SavedSection], only: str | None, *, trust: str) -> str:
+def arm_page(arm: Arm, chain: Chain, sections: Sequence[SavedSection], only: str | None, *, trust: str) -> str:
     """The page of one arm, with every section or with those of one question.
 
     `trust` is the page that says why it can be trusted, as seen from the arm's folder; empty if there is none.
@@ -71,7 +72,7 @@ def arm_page(arm: Arm, sections: Sequence[SavedSection], only: str | None, *, tr
         only=only,
         trust=trust,
         summary=summary(arm),
-        foot=foot(arm, only),
+        foot=foot(arm, chain, only),
     )
 
 
@@ -80,15 +81,15 @@ def index_page(cards: Sequence[Card], *, trust: str) -> str:
     return render("index.html", title="tfarm reports", cards=cards, trust=trust)
 
 
-def foot(arm: Arm, only: str | None) -> dict[str, str]:
+def foot(arm: Arm, chain: Chain, only: str | None) -> dict[str, str]:
     """What a reader needs to make the page again: version, hash of the arm's file, command."""
-    return {"sha256": hashlib.sha256(to_toml(arm).encode()).hexdigest(), "command": command(arm, only)}
+    return {"sha256": hash_of(arm, chain), "command": command(arm, chain, only)}
 
 
-def command(arm: Arm, only: str | None) -> str:
+def command(arm: Arm, chain: Chain, only: str | None) -> str:
     """The command that writes this page; an arm that is no preset is named by its file."""
     choice = f" --only {only}" if only else ""
-    return f"tfarm report {_argument(arm.name, is_preset(arm))}{choice} --out reports"
+    return f"tfarm report {_argument(arm.name, is_preset(arm, chain))}{choice} --out reports"
 
 
 def command_for_all(arms: Sequence[tuple[str, bool]]) -> str:
@@ -98,9 +99,9 @@ def command_for_all(arms: Sequence[tuple[str, bool]]) -> str:
     return f"tfarm report {' '.join(_argument(name, preset) for name, preset in arms)} --out reports"
 
 
-def is_preset(arm: Arm) -> bool:
-    """Whether the arm comes with tfarm."""
-    return arm.name in presets() and load(arm.name) == arm
+def is_preset(arm: Arm, chain: Chain) -> bool:
+    """Whether the arm comes with tfarm, and its chain is the one that comes with it."""
+    return arm.name in presets() and (load(arm.name), load_chain(arm.name)) == (arm, chain)
 
 
 def _argument(name: str, preset: bool) -> str:

@@ -7,7 +7,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 import tfarm
-from tfarm.dsp.chain import Chain
+from tfarm.dsp import load_chain
 from tfarm.report.bode import draw_compared
 from tfarm.report.digits import plain
 from tfarm.report.figures import save
@@ -41,7 +41,7 @@ def _bode() -> Figure:
 def _gains() -> Figure:
     """The gains that keep the loop stable, continuous and sampled."""
     arm = tfarm.load("sasaki2012-lab")
-    return draw_overlay(overlay(arm, default_gains(arm), Chain()))
+    return draw_overlay(overlay(arm, default_gains(arm), load_chain(arm.name)))
 
 
 def _shapes() -> Figure:

@@ -1,4 +1,4 @@
-"""Does a 10 ms loop still hold?  Verdict, regions, loci, modes, the slew in time, and a coarse chain."""
+"""Does the loop still hold when it is sampled?  Verdict, regions, loci, modes, the slew in time, and a coarse chain."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from tfarm.arm import Arm
-from tfarm.dsp import sampled_verdict
+from tfarm.dsp import Chain, sampled_verdict
+from tfarm.dsp.margins import around
+from tfarm.report.curves import resolution_words
 from tfarm.report.digits import plain, scientific, significant
-from tfarm.report.discrete_loci import draw_loci, loci, loci_table
+from tfarm.report.discrete_loci import STRONGER, draw_loci, loci, loci_table
 from tfarm.report.figures import Picture
 from tfarm.report.loop_laws import has_loop, sign_words, why_no_loop
 from tfarm.report.overlay import draw_overlay, overlay_table
@@ -18,33 +20,36 @@ from tfarm.report.sampled_words import (
     SHORT_SIGN,
     Sampled,
     Window,
+    chain_words,
     compared,
     cure,
     headline_facts,
+    in_ms,
     interval,
     short_answer,
-    span,
+    spans,
     study,
     typeset,
 )
 from tfarm.report.sections import Section
-from tfarm.report.strip_chart import StripChart, draw_strip_chart, strip_chart, strip_table
+from tfarm.report.strip_chart import StripChart, draw_strip_chart, example_words, strip_chart, strip_table
 from tfarm.report.tables import Column, Table, number_column, text_column
-from tfarm.report.time_responses import Slews, draw_slews, slews, slews_table, what_slews_show
+from tfarm.report.time_responses import Slews, draw_slews, seen_words, slews, slews_table, what_slews_show
 
 PAST_HUB = 1.25  # times the K1 at which sampling the hub alone would break it: how far its locus goes
 
 LOCUS_K2 = (-0.5, 1.5)
 
 
-def sampled_section(arm: Arm) -> Section:
-    """The loop at 10 ms under the default gains; one sentence for an arm without a loop."""
-    title = "The sampled loop: does it still hold at 10 ms?"
+def sampled_section(arm: Arm, chain: Chain | None = None) -> Section:
+    """The loop through the arm's own chain, under the default gains; one sentence for an arm without a loop."""
+    chain = Chain() if chain is None else chain
+    title = f"The sampled loop: does it still hold at {in_ms(chain)} ms?"
     if not has_loop(arm):
         return Section(anchor="sampled", title=title, words=(why_no_loop(arm),))
-    data = study(arm)
+    data = study(arm, chain)
     blocks: list[Picture | Table] = [_overlay_picture(data), _periods_table(data), *_mode_blocks(data)]
-    words = [short_answer(data), compared(data), cure(data), sign_words(arm)]
+    words = [short_answer(data), chain_words(arm, chain), compared(data), cure(data), sign_words(arm)]
     if arm.has_rigid_mode:
         blocks += _time_blocks(data)
     else:
@@ -73,7 +78,8 @@ def _overlay_picture(data: Sampled) -> Picture:
         ),
         alt=(
             f"Map of K1 and K2: at K1 = {plain(data.gains.K1)} the continuous loop is stable for K2 "
-            f"{interval(data.continuous_K2)}, the sampled one {interval(data.sampled_K2, cut=False)}."
+            f"{interval(data.continuous.around, data.continuous.looked_at)}, the sampled one "
+            f"{interval(data.sampled_K2)}."
         ),
         figure=draw_overlay(regions),
         data=overlay_table(regions, "sampled-overlay-data"),
@@ -85,14 +91,16 @@ def _periods_table(data: Sampled) -> Table:
     growth = np.array([row.log_radius / row.period for row in rows])
     ms = np.array([1e3 * row.period for row in rows])
     half = 500.0 / ms
-    held = "all that matter" if data.arm.link.damping else "the first 20"
+    settled = [row.is_settled for row in rows]
+    held = "all that matter" if all(settled) else "the first so many" if not any(settled) else "where marked, the first"
     return Table(
         stem="sampled-periods",
         title="Faster or slower sampling",
         caption=(
             f"The same gains, K1 = {plain(data.gains.K1)} and K2 = {plain(data.gains.K2)}, at other sample periods; "
             f"the verdicts hold for the modes given ({held}). Growth is that of the pole that decides, per second: "
-            f"negative is stable. {SHORT_SIGN}"
+            "negative is stable. Where the gains are not stable, the intervals are those that would be. "
+            f"{SHORT_SIGN}"
         ),
         columns=(
             number_column("period_ms", "period", "ms", ms, [plain(x) for x in ms]),
@@ -103,23 +111,27 @@ def _periods_table(data: Sampled) -> Table:
                 key="modes",
                 title="modes",
                 values=[row.analysis_modes for row in rows],
-                cells=[str(row.analysis_modes) for row in rows],
+                cells=[f"{'' if row.is_settled or not any(settled) else 'first '}{row.analysis_modes}" for row in rows],
             ),
-            _window_column("stable_K1", "stable K1", "N m s/rad", [row.K1 for row in rows]),
-            _window_column("stable_K2", "stable K2", "", [row.K2 for row in rows]),
+            _window_column("stable_K1", "stable K1", "N m s/rad", [(row.K1, row.gains.K1) for row in rows]),
+            _window_column("stable_K2", "stable K2", "", [(row.K2, row.gains.K2) for row in rows]),
         ),
     )
 
 
-def _window_column(key: str, title: str, unit: str, windows: list[Window | None]) -> Column:
-    values = [window if window is not None else () for window in windows]
-    return Column(key=key, title=title, unit=unit, values=values, cells=[span(window) for window in windows])
+def _window_column(key: str, title: str, unit: str, rows: list[tuple[tuple[Window, ...], float]]) -> Column:
+    """The interval around the gain, or the ends of all that there are."""
+    here = [around(list(windows), gain) for windows, gain in rows]
+    every = [tuple(end for window in windows for end in window) for windows, _ in rows]
+    values = [window or others for window, others in zip(here, every, strict=True)]
+    return Column(key=key, title=title, unit=unit, values=values, cells=[spans(*row) for row in rows])
 
 
 def _mode_blocks(data: Sampled) -> list[Picture | Table]:
     loop, table = data.analysis.verdict.loop, data.analysis.modes
     T = loop.chain.sampling.period
-    found = loci(loop, PAST_HUB * 2 * data.arm.hub.inertia / T, LOCUS_K2)
+    top = max(PAST_HUB * 2 * data.arm.hub.inertia / T, STRONGER * data.gains.K1)
+    found = loci(loop, top, LOCUS_K2)
     aliased = [int(i) for i, band in zip(table.index, table.band, strict=True) if band > 0]
     first = f"From mode {aliased[0]} on all are aliased. " if aliased else "No mode here is aliased. "
     picture = Picture(
@@ -159,19 +171,25 @@ def _mode_blocks(data: Sampled) -> list[Picture | Table]:
 def _time_blocks(data: Sampled) -> list[Picture | Table]:
     loop = data.analysis.verdict.loop
     moved = slews(data.arm, data.gains, loop.chain, loop.plant.count)
+    if moved.with_moment.stopped is not None:
+        return [_slew_picture(moved)]
     coarse = strip_chart(data.arm, data.gains, moved.with_moment, loop.plant.count)
-    return [_slew_picture(moved), _strip_picture(coarse)]
+    return [_slew_picture(moved), _strip_picture(coarse, loop.chain)]
 
 
 def _slew_picture(moved: Slews) -> Picture:
+    volts = (
+        "The motor is in N m, as the file gives no motor constant: its volts are this curve divided by it. "
+        if moved.with_moment.volts is None
+        else ""
+    )
     return Picture(
         stem="sampled-slew",
         title="The slew, with and without moment feedback",
         caption=(
-            f"{what_slews_show(moved)} A bang-bang slew with rigid feedforward; the moment feedback sees the moment "
-            "less the rigid arm's (dashed). The dotted line is the end of the slew; the tip is shown against L times "
-            "the reference angle. The motor is in N m, as the paper gives no motor constant: its volts are this curve "
-            f"divided by it. {SHORT_SIGN}"
+            f"{what_slews_show(moved)} A bang-bang slew with rigid feedforward; the moment feedback sees "
+            f"{seen_words(moved)}. The dotted line is the end of the slew; the tip is shown against L times the "
+            f"reference angle.{resolution_words(moved.each)} {volts}{SHORT_SIGN}"
         ),
         alt=f"Root moment, tip and motor torque of a slew. {what_slews_show(moved)}",
         figure=draw_slews(moved),
@@ -179,22 +197,25 @@ def _slew_picture(moved: Slews) -> Picture:
     )
 
 
-def _strip_picture(coarse: StripChart) -> Picture:
-    chain = coarse.simulation.chain
+def _strip_picture(coarse: StripChart, own: Chain) -> Picture:
+    chain, delay = coarse.simulation.chain, coarse.simulation.chain.sampling.delay_samples
     verdict = sampled_verdict(coarse.arm, coarse.gains, chain)
-    clipped = int(coarse.saturated.sum())
+    clipped, read = int(coarse.saturated.sum()), coarse.simulation.saturated["moment"]
     what = (
         f"{clipped} of {coarse.asked.size} samples ask for more than the motor's {plain(coarse.limit, 3)} N m "
         f"(shaded); the moment is read in steps of {significant(coarse.step, 3)} N m (faint lines in the close-up)"
     )
+    beyond = f", and lies beyond the ADC's range at {read} samples" if read else ""
+    late = f"{plain(delay)} sample{'s' * (delay != 1)} of delay"
     return Picture(
         stem="sampled-strip",
         title="A coarse chain: ADC steps, delay, saturation",
         caption=(
-            f"An example, not the paper's hardware: {chain.converters.moment_bits} bits of ADC over "
-            f"±{plain(chain.converters.moment_range or 0.0, 3)} N m, one sample of delay, and a motor that gives 80 % "
-            f"of what the ideal slew takes. {what[0].upper()}{what[1:]}. Without its steps and limits the loop with "
-            f"this delay is {typeset(verdict.sentence.partition(' (')[0])}."
+            f"{example_words(own, chain)}: {chain.converters.moment_bits} bits of ADC over "
+            f"±{plain(chain.converters.moment_range or 0.0, 3)} N m, {late}, and a motor that gives at most "
+            f"{plain(coarse.limit, 3)} N m. {what[0].upper()}{what[1:]}{beyond}. Without its steps and limits the loop "
+            f"with this delay is {typeset(verdict.sentence.partition(' (')[0])}."
+            f"{resolution_words([coarse.simulation])}"
         ),
         alt=f"Strip chart of root moment and motor torque through a coarse chain; {what}.",
         figure=draw_strip_chart(coarse),

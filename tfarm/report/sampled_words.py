@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.dsp import Analysis, analyse, sampled_verdict, stable_windows
-from tfarm.dsp.chain import Chain, Sampling
+from tfarm.dsp.chain import Chain
 from tfarm.dsp.margins import around
 from tfarm.loop.stability import stability
-from tfarm.loop.windows import gain_windows
+from tfarm.loop.windows import Windows, gain_windows
 from tfarm.records import record
 from tfarm.report.digits import plain, scientific, significant
 from tfarm.report.overlay import Overlay, overlay
 from tfarm.report.sections import Fact
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.scales import default_gains, default_words
 
-PERIODS = (0.001, 0.005, 0.01, 0.02, 0.05)  # s
-DEEPEST = -50.0  # K2: how far down the continuous window is looked for
+SHARES = (0.1, 0.5, 1.0, 2.0, 5.0)  # of the chain's own period: the rows of the table
+EVERYWHERE = (-math.inf, math.inf)
+MOVED = 1e-4  # an end of a window that sampling moves by less is said to stay, in its own size
 DAY = 86400.0  # s
+SLOW = 60.0  # s: what takes longer to double is no growth that anyone would see
+ANYONE_HAS = 0.05  # % of critical damping: less than any real arm has
 SHORT_SIGN = "A positive root moment accelerates the hub; with the gauge reversed K2 changes its sign."
 Window = tuple[float, float]
 
@@ -27,18 +31,23 @@ Window = tuple[float, float]
 @dataclass(frozen=True)
 @record
 class Sampled:
-    """Everything that the section says and draws."""
+    """Everything that the section says and draws.  `continuous` are the windows of K2 of the continuous loop."""
 
     arm: Arm
     analysis: Analysis
-    continuous_K2: Window | None
+    continuous: Windows
     regions: Overlay
     periods: tuple[Row, ...]
 
     @property
+    def chain(self) -> Chain:
+        """The arm's own chain."""
+        return self.analysis.verdict.loop.chain
+
+    @property
     def ms(self) -> str:
         """The sample period in ms."""
-        return plain(1e3 * self.analysis.verdict.loop.chain.sampling.period)
+        return in_ms(self.chain)
 
     @property
     def gains(self) -> HubFeedback:
@@ -53,62 +62,99 @@ class Sampled:
 
 @dataclass(frozen=True)
 class Row:
-    """One sample period: its verdict, and the stable intervals around the gains."""
+    """One sample period: its verdict, and every stable interval of each gain through `gains`."""
 
     period: float
     analysis_modes: int
+    is_settled: bool
     log_radius: float
-    K1: Window | None
-    K2: Window | None
+    gains: HubFeedback
+    K1: tuple[Window, ...]
+    K2: tuple[Window, ...]
 
 
-def study(arm: Arm) -> Sampled:
+def in_ms(chain: Chain) -> str:
+    """The sample period in ms."""
+    return plain(1e3 * chain.sampling.period)
+
+
+def study(arm: Arm, chain: Chain) -> Sampled:
     """The numbers of the section.  Raises ParameterError for an arm without a loop."""
-    chain, gains = Chain(), default_gains(arm)
+    gains = default_gains(arm)
     analysis = analyse(arm, gains, chain)
-    window = gain_windows(stability(arm, gains), "K2").around
-    rows = tuple(_row(arm, gains, period) for period in PERIODS)
-    return Sampled(arm, analysis, window, overlay(arm, gains, chain), rows)
+    windows = gain_windows(stability(arm, gains), "K2")
+    rows = tuple(_row(arm, gains, chain, share) for share in SHARES)
+    return Sampled(arm, analysis, windows, overlay(arm, gains, chain), rows)
 
 
-def _row(arm: Arm, gains: HubFeedback, period: float) -> Row:
-    verdict = sampled_verdict(arm, gains, Chain(sampling=Sampling(period=period)))
-    windows = {name: stable_windows(verdict.loop, name) for name in ("K1", "K2")}
-    return Row(
-        period,
-        verdict.modes_used,
-        verdict.loop.poles.log_spectral_radius,
-        around(windows["K1"], gains.K1),
-        around(windows["K2"], gains.K2),
-    )
+def _row(arm: Arm, gains: HubFeedback, chain: Chain, share: float) -> Row:
+    period = float(f"{share * chain.sampling.period:.12g}")  # 1 ms, and no 1.0000000000000002 ms
+    verdict = sampled_verdict(arm, gains, replace(chain, sampling=replace(chain.sampling, period=period)))
+    K1, K2 = (tuple(stable_windows(verdict.loop, name)) for name in ("K1", "K2"))
+    growth = verdict.loop.poles.log_spectral_radius
+    return Row(period, verdict.modes_used, verdict.is_settled, growth, gains, K1, K2)
 
 
 # ------------------------------------------------------------ words
 
 
 def short_answer(data: Sampled) -> str:
-    """Yes or no, for how many modes, and how fast."""
+    """Yes or no, by how much, for how many modes, and how fast."""
     verdict = data.analysis.verdict
-    growth = verdict.loop.poles.log_spectral_radius
     gains = f"K1 = {plain(data.gains.K1)} N m s/rad and K2 = {plain(data.gains.K2)}"
     modes = verdict.modes_used
     settled = f"with all modes that matter ({modes})" if verdict.is_settled else f"as far as its first {modes} modes go"
+    is_stable = verdict.is_stable
+    margin = f" and bears {_delay(data)} more of delay" if is_stable else ""
+    word = "stable" if is_stable else "marginal" if verdict.word == "marginal" else "unstable"
+    lead = f"{_yes_or_no(data)}: sampled every {data.ms} ms with {gains}, the loop is {word}{margin}, {settled}."
+    return f"{lead} {_slowest(data)}"
+
+
+def _yes_or_no(data: Sampled) -> str:
+    """No strict yes where the growth is too slow for anyone to see."""
+    verdict = data.analysis.verdict
     if verdict.is_stable:
-        lead = f"Yes: sampled every {data.ms} ms with {gains}, the loop is stable, {settled}."
-    else:
-        lead = f"Not strictly: sampled every {data.ms} ms with {gains}, the loop is unstable, {settled}."
-    return f"{lead} {_slowest(data, growth)}"
+        return "Yes"
+    growth = verdict.loop.poles.log_spectral_radius
+    return "Not strictly" if growth * SLOW < data.chain.sampling.period * math.log(2) else "No"
 
 
-def _slowest(data: Sampled, growth: float) -> str:
+def _delay(data: Sampled) -> str:
+    """The further delay that the loop bears, in ms."""
+    margin = data.analysis.delay_margin
+    return f"{'over ' if margin.is_bound else ''}{significant(1e3 * data.chain.sampling.period * margin.samples, 3)} ms"
+
+
+def _slowest(data: Sampled) -> str:
     """The pole that decides, and in what time it changes by a factor of two."""
-    verdict, T = data.analysis.verdict, data.analysis.verdict.loop.chain.sampling.period
+    verdict, T = data.analysis.verdict, data.chain.sampling.period
+    growth = verdict.loop.poles.log_spectral_radius
     what = verdict.sentence.partition(": ")[2].partition(" (")[0]
     what = what[0].upper() + what[1:]
     if growth == 0:
         return f"{what}."
     verb = "doubles" if growth > 0 else "halves"
     return f"{typeset(what)}: it {verb} in {duration(T * math.log(2) / abs(growth))}."
+
+
+def chain_words(arm: Arm, chain: Chain) -> str:
+    """What the section is about: the arm's own chain, or what stands for it where its file says nothing."""
+    sampling = chain.sampling
+    told = [f"every {in_ms(chain)} ms"]
+    if sampling.delay_samples:
+        told.append(f"{plain(sampling.delay_samples)} samples of delay")
+    if not math.isinf(sampling.antialias_corner):
+        told.append(f"an anti-alias filter at {plain(sampling.antialias_corner)} rad/s")
+    if chain.converters.hub_rate == "difference":
+        told.append("the hub rate differenced from the encoder")
+    if chain.actuator.hub_damping:
+        told.append(f"hub damping of {plain(chain.actuator.hub_damping)} N m s/rad")
+    whose = "as the arm's file has it"
+    if chain == Chain():
+        whose = "which is the paper's: the arm's file has no [sampling], [converters] or [actuator] of its own"
+    gains = typeset(default_words(arm)).replace(" J w1", " J ω₁")
+    return f"Sampled {', '.join(told)}, {whose}. Gains, for which a file has no place: {gains}."
 
 
 def typeset(text: str) -> str:
@@ -129,31 +175,58 @@ def duration(seconds: float) -> str:
 
 
 def compared(data: Sampled) -> str:
-    """The continuous interval of K2 against the sampled one."""
-    continuous = interval(data.continuous_K2)
-    sampled = interval(data.sampled_K2, cut=False)
-    modes = "" if data.analysis.verdict.is_settled else f" (first {data.analysis.verdict.modes_used} modes)"
-    both = f"the continuous loop is stable for K2 {continuous}; the sampled one {sampled}{modes}."
-    told = f"At K1 = {plain(data.gains.K1)} {both}"
-    if data.sampled_K2 is None:
-        return f"{told} Sampling loses what the continuous proof promised."
-    low, high = data.sampled_K2
-    lost = "all negative K2" if low >= 0 else f"K2 below {significant(low, 3)}"
-    gained = f", and adds room up to {significant(high, 4)}" if high > 1 else ""
+    """The continuous interval of K2 against the sampled one, end by end."""
+    verdict, before, after = data.analysis.verdict, data.continuous.around, data.sampled_K2
+    modes = "" if verdict.is_settled else f" (first {verdict.modes_used} modes)"
+    both = (
+        f"the continuous loop is stable for K2 {interval(before, data.continuous.looked_at)}; the sampled one "
+        f"{interval(after)}{modes}"
+    )
+    told = f"At K1 = {plain(data.gains.K1)} {both}."
+    if after is None:
+        return told if before is None else f"{told} Sampling loses what holds without it."
+    if before is None:
+        return f"{told} Here it is the sampling that stabilises."
+    found = [*_lower_end(before, after, data.continuous.looked_at), *_upper_end(before, after)]
+    moved = " and ".join(found) if found else "moves neither end by a hundredth of a per cent"
     return (
-        f"{told} Sampling takes away {lost}{gained}: the energy argument holds for the continuous loop alone and says "
-        "nothing about this one."
+        f"{told} Sampling {moved}: the energy argument holds for the continuous loop alone and says nothing about this "
+        "one."
     )
 
 
-def interval(window: Window | None, cut: bool = True) -> str:
-    """An interval of K2 in words; `cut` where -50 is only the end of the search."""
+def _lower_end(before: Window, after: Window, looked_at: Window) -> list[str]:
+    """What sampling does to the lower end of K2."""
+    if abs(after[0] - before[0]) <= MOVED * abs(before[0]) or (before[0] == looked_at[0] and after[0] <= before[0]):
+        return []
+    if after[0] > before[0]:
+        return ["takes away all negative K2" if after[0] == 0 else f"takes away K2 below {significant(after[0], 3)}"]
+    return [f"adds room down to {significant(after[0], 3)}"]
+
+
+def _upper_end(before: Window, after: Window) -> list[str]:
+    """And to the upper one, beside the continuous edge."""
+    if abs(after[1] - before[1]) <= MOVED * abs(before[1]):
+        return []
+    verb = "adds room up to" if after[1] > before[1] else "takes away K2 above"
+    return [f"{verb} {significant(after[1], 4)}"]
+
+
+def interval(window: Window | None, looked_at: Window = EVERYWHERE) -> str:
+    """An interval of K2 in words; an end of what was looked at is no edge, and is said to be none."""
     if window is None:
         return "for no K2 around this one"
     low, high = window
-    if math.isinf(low) or (cut and low <= DEEPEST):
-        beyond = "" if math.isinf(low) else " (looked at down to −50)"
+    no_low, no_high = (math.isinf(end) or end == bound for end, bound in zip(window, looked_at, strict=True))
+    bounds = [f"down to {plain(low)}"] * (no_low and not math.isinf(low))
+    bounds += [f"up to {plain(high)}"] * (no_high and not math.isinf(high))
+    beyond = f" (looked at {' and '.join(bounds)})" if bounds else ""
+    if no_low and no_high:
+        return f"of any size{beyond}"
+    if no_low:
         return f"below {significant(high, 5)}{beyond}"
+    if no_high:
+        return f"above {significant(low, 5)}{beyond}"
     return f"from {significant(low, 4)} to {significant(high, 5)}"
 
 
@@ -169,44 +242,60 @@ def cure(data: Sampled) -> str:
             "about, so this is no proof for the arm with all of them; a little damping settles those."
         )
     if own:
+        enough = "and this arm has" if own >= needed else "but this arm has only"
         return (
-            f"Without damping the sampled loop would not hold. How little cures it: C = {scientific(needed, 2)} s is "
-            f"enough, and this arm has {scientific(own, 2)} s."
+            f"Without damping the sampled loop would not hold. What cures it: C = {scientific(needed, 2)} s is "
+            f"enough, {enough} {scientific(own, 2)} s."
         )
-    first = float(data.analysis.modes.natural_frequency[0])
+    percent = 50 * needed * float(data.analysis.modes.natural_frequency[0])
+    more = " Every real arm has more." if percent < ANYONE_HAS else ""
     return (
-        f"How little cures it: Kelvin-Voigt damping of C = {scientific(needed, 2)} s, "
-        f"{scientific(50 * needed * first, 2)} % of critical in the first mode, and these gains are stable. Every real "
-        "arm has more."
+        f"What cures it: Kelvin-Voigt damping of C = {scientific(needed, 2)} s, {scientific(percent, 2)} % of critical "
+        f"in the first mode, and these gains are stable.{more}"
     )
 
 
 def headline_facts(data: Sampled) -> tuple[Fact, ...]:
     """The headline numbers."""
-    analysis = data.analysis
+    analysis, gains = data.analysis, data.gains
     verdict, margin = analysis.verdict, analysis.delay_margin
-    T, growth = verdict.loop.chain.sampling.period, verdict.loop.poles.log_spectral_radius
+    growth = verdict.loop.poles.log_spectral_radius
     held = "all modes" if verdict.is_settled else f"first {verdict.modes_used} modes"
-    answer, word = ("yes", "stable") if verdict.is_stable else ("not strictly", "unstable")
-    K1, at = around(analysis.K1_windows, data.gains.K1), f"at K2 = {plain(data.gains.K2)}"
-    delay = f"{'> ' if margin.is_bound else ''}{significant(1e3 * T * margin.samples, 3)}"
-    samples = f"{significant(margin.samples, 3)} samples"
+    by = f"by {significant(margin.samples, 3)} samples of delay" if verdict.is_stable else verdict.word
+    K2 = span(data.continuous.around, data.continuous.looked_at)
+    K1 = spans(analysis.K1_windows, gains.K1)
     return (
-        Fact(label=f"does a {data.ms} ms loop hold?", value=answer, beside=f"{word}, {held}"),
+        Fact(label=f"does a {data.ms} ms loop hold?", value=_yes_or_no(data).lower(), beside=f"{by}, {held}"),
         Fact(label="ln|z| a sample, largest", value=scientific(growth, 3), beside="below 0 is stable"),
-        Fact(label="stable K2", value=span(data.sampled_K2), beside=f"continuous: {span(data.continuous_K2)}"),
-        Fact(label="stable K1", value=span(K1), unit="N m s/rad" if K1 else "", beside=at),
-        Fact(label="further delay it bears", value=delay, unit="ms", beside=samples),
+        Fact(label="stable K2", value=spans(analysis.K2_windows, gains.K2), beside=f"continuous: {K2}"),
+        Fact(
+            label="stable K1", value=K1, unit="N m s/rad" if K1 != "none" else "", beside=f"at K2 = {plain(gains.K2)}"
+        ),
+        Fact(label="further delay it bears", value=_delay(data).removesuffix(" ms"), unit="ms", beside=_samples(data)),
         Fact(label="damping C that it needs", value=scientific(analysis.required_damping, 2), unit="s"),
     )
 
 
-def span(window: Window | None) -> str:
-    """An interval of a gain in a few digits; one that was looked for down to -50 has no lower end."""
+def _samples(data: Sampled) -> str:
+    return f"{significant(data.analysis.delay_margin.samples, 3)} samples"
+
+
+def spans(windows: Sequence[Window], gain: float) -> str:
+    """The interval around a gain in a few digits, or the others where there is none around it."""
+    here = around(list(windows), gain)
+    if here is not None:
+        return span(here)
+    others = " or ".join(span(window) for window in windows)
+    return f"{others}, not {plain(gain, 3)}" if others else "none"
+
+
+def span(window: Window | None, looked_at: Window = EVERYWHERE) -> str:
+    """An interval of a gain in a few digits; an end of what was looked at is no end."""
     if window is None:
         return "none"
     low, high = window
-    if low <= DEEPEST:
-        return f"< {significant(high, 4)}"
+    no_low, no_high = low <= looked_at[0], high >= looked_at[1]
+    if no_low:
+        return "any" if no_high else f"< {significant(high, 4)}"
     lower = f"{low:.2g}".replace("-", "−") if 1e-4 < abs(low) < 1e-3 else significant(low, 3)
-    return f"{lower} … {significant(high, 4)}"
+    return f"> {lower}" if no_high else f"{lower} … {significant(high, 4)}"

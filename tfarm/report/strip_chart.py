@@ -11,13 +11,13 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback
-from tfarm.dsp import Converters, Measurement, Simulation, Simulator, scenario
-from tfarm.dsp.chain import Actuator, Chain
+from tfarm.dsp import Measurement, Simulation, Simulator, scenario
+from tfarm.dsp.chain import Chain
 from tfarm.records import record
+from tfarm.report.curves import Curve, continuous, held, resolved, root_moment
 from tfarm.report.digits import plain, significant
 from tfarm.report.figures import BLUE, FAINT, GREEN, GREY, INK, ORANGE, blank, headline, style
 from tfarm.report.tables import Table, data_column
-from tfarm.report.time_responses import continuous
 
 Real = NDArray[np.float64]
 
@@ -25,7 +25,7 @@ BITS = 6  # of the ADC: few, so that its steps are seen
 SHARE = 0.8  # of the torque that the ideal chain takes: what the motor gives at most
 ROOM = 1.2  # times the largest moment: the ADC's range
 DELAY = 1.0  # samples
-DURATION, BETWEEN = 2.0, 19
+LASTING = 2.0  # times the slew
 CLOSE = 14  # samples in the close-up
 SATURATED = "#f6d9c2"
 
@@ -67,8 +67,7 @@ class StripChart:
 def strip_chart(arm: Arm, gains: HubFeedback, ideal: Simulation, modes: int) -> StripChart:
     """The same slew as that of an ideal chain, with a coarse ADC, a weak motor and one more sample of delay."""
     chain = coarse_chain(ideal)
-    task = scenario("slew", arm, chain, DURATION)
-    simulator = Simulator(arm, chain, task, count=modes, between=BETWEEN)
+    task = scenario("slew", arm, chain, LASTING * chain.slew.rise_time)
     read, asked = np.zeros(task.t.size), np.zeros(task.t.size)
 
     def controller(m: Measurement) -> float:
@@ -76,22 +75,43 @@ def strip_chart(arm: Arm, gains: HubFeedback, ideal: Simulation, modes: int) -> 
         read[m.k], asked[m.k] = m.root_moment, u
         return u
 
-    done = simulator.controller(controller)
+    (done,) = resolved(Simulator(arm, chain, task, count=modes), arm, lambda each: each.controller(controller))
     n = done.torque.size
     return StripChart(arm, gains, done, read[:n], asked[:n])
 
 
 def coarse_chain(ideal: Simulation) -> Chain:
-    """A simulation's chain with 6 bits of ADC over a little more than its moment, 80 % of its torque, and delay."""
-    chain = ideal.chain
-    span = _nice(ROOM * float(abs(ideal.at_samples.root_moment).max()))
-    limit = SHARE * float(abs(ideal.torque).max())
+    """A simulation's chain; where that is ideal 6 bits of ADC over a little more than its moment, 80 % of its torque as
+    the motor's limit, and one sample of delay."""
+    chain, c = ideal.chain, ideal.chain.converters
+    if c.moment_bits is None:
+        span = c.moment_range or _nice(ROOM * float(abs(ideal.at_samples.root_moment).max()))
+        c = replace(c, moment_bits=BITS, moment_range=span)
+    limit = min(chain.actuator.torque_limit, c.torque_range or math.inf)
+    if math.isinf(limit):
+        limit = float(f"{SHARE * float(abs(ideal.torque).max()):.2g}")
     return replace(
         chain,
-        sampling=replace(chain.sampling, delay_samples=chain.sampling.delay_samples + DELAY),
-        converters=Converters(moment_bits=BITS, moment_range=span),
-        actuator=Actuator(torque_limit=float(f"{limit:.2g}")),
+        sampling=replace(chain.sampling, delay_samples=chain.sampling.delay_samples or DELAY),
+        converters=c,
+        actuator=replace(chain.actuator, torque_limit=limit),
     )
+
+
+def example_words(ideal: Chain, coarse: Chain) -> str:
+    """What of a coarse chain is an example, and what the arm's own file has."""
+    parts = (
+        ("ADC", ideal.converters.moment_bits is not None),
+        ("delay", ideal.sampling.delay_samples > 0),
+        ("motor limit", ideal.actuator.torque_limit == coarse.actuator.torque_limit),
+    )
+    own = [name for name, is_own in parts if is_own]
+    made_up = [name for name, is_own in parts if not is_own]
+    if not own:
+        return "An example, and nobody's hardware"
+    if not made_up:
+        return f"The arm's own {', '.join(own)}"
+    return f"The arm's own {' and '.join(own)}; {' and '.join(made_up)} an example"
 
 
 def _nice(x: float) -> float:
@@ -140,7 +160,8 @@ def moment(data: StripChart, is_close: bool, *, ax: Axes) -> None:
     """What the arm has, and what the ADC makes of it."""
     s, step = data.simulation, significant(data.step, 3)
     hidden = "" if is_close else "_"
-    ax.plot(*continuous(s, "root_moment"), color=BLUE, lw=1.3, label=hidden + "root moment of the arm")
+    drawn = root_moment(s) if not is_close else Curve(*_twice(*continuous(s, "root_moment")), False)
+    drawn.draw(ax, BLUE, hidden + "root moment of the arm")
     ax.step(
         s.t, data.read, where="post", color=ORANGE, lw=1.1,
         marker="o" if is_close else "", ms=4, label=f"{hidden}as the ADC reads it, steps of {step} N m",
@@ -163,8 +184,8 @@ def torque(data: StripChart, is_close: bool, *, ax: Axes) -> None:
     for sign in (-1, 1):
         label = hidden + "motor limit" if sign > 0 else None
         ax.axhline(sign * data.limit, color=INK, lw=0.9, ls=(0, (1, 2)), label=label)
-    if is_close and late:
-        k = int(np.searchsorted(s.t, close_up(data)[0])) + 8
+    k = int(np.searchsorted(s.t, close_up(data)[0])) + 8
+    if is_close and late and k < s.torque.size:
         ax.annotate(
             "", (s.t[k] + late, s.torque[k]), (s.t[k], s.torque[k]), zorder=6,
             arrowprops={"arrowstyle": "->", "color": INK, "lw": 1.2, "shrinkA": 0, "shrinkB": 0},
@@ -198,14 +219,18 @@ def _fit(ax: Axes, y: Real) -> None:
         ax.set_ylim(float(y.min()) - room, float(y.max()) + room)
 
 
+def _twice(t: Real, y: Real) -> tuple[Real, Real, Real]:
+    return t, y, y
+
+
 def strip_table(data: StripChart, stem: str) -> Table:
-    """The signals at the samples."""
-    s = data.simulation
+    """The curve of the moment as it is drawn, and what is held from sample to sample at its times."""
+    s, drawn = data.simulation, root_moment(data.simulation)
     columns = (
-        data_column("t_s", "time", "s", s.t),
-        data_column("root_moment_N_m", "root moment", "N m", s.at_samples.root_moment),
-        data_column("read_moment_N_m", "as the ADC reads it", "N m", data.read),
-        data_column("torque_asked_N_m", "torque asked", "N m", data.asked),
-        data_column("torque_given_N_m", "torque given, after the delay", "N m", s.torque),
+        data_column("t_s", "time", "s", drawn.t),
+        *drawn.columns("root_moment", "root moment", "N m"),
+        data_column("read_moment_N_m", "as the ADC reads it", "N m", held(s, data.read, drawn.t)),
+        data_column("torque_asked_N_m", "torque asked", "N m", held(s, data.asked, drawn.t)),
+        data_column("torque_given_N_m", "torque given, after the delay", "N m", held(s, s.torque, drawn.t)),
     )
     return Table(stem=stem, title="Strip chart", caption="", is_data=True, columns=columns)

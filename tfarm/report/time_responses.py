@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,14 +17,15 @@ from tfarm.dsp import Simulation, Simulator, scenario
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.results import residual_moment_rms, settling_time
 from tfarm.records import record
+from tfarm.report import curves
+from tfarm.report.curves import resolved
 from tfarm.report.digits import plain, significant
 from tfarm.report.figures import BLUE, GREY, INK, ORANGE, blank, headline, style
 from tfarm.report.tables import Column, Table, data_column
 
 Real = NDArray[np.float64]
 
-BETWEEN = 3  # records between two samples
-DURATION = 3.0  # s
+LASTING = 3.0  # times the slew: how long a record is
 
 
 @dataclass(frozen=True)
@@ -42,10 +44,16 @@ class Slews:
         return {"without moment feedback, K2 = 0": self.without, f"with, K2 = {plain(self.gains.K2)}": self.with_moment}
 
 
-def slews(arm: Arm, gains: HubFeedback, chain: Chain, modes: int, duration: float = DURATION) -> Slews:
-    """The slew of the chain.  Raises ParameterError for an arm that cannot turn."""
-    simulator = Simulator(arm, chain, scenario("slew", arm, chain, duration), count=modes, between=BETWEEN)
-    return Slews(arm, gains, simulator.linear(HubFeedback(K1=gains.K1, K2=0.0)), simulator.linear(gains))
+def slews(arm: Arm, gains: HubFeedback, chain: Chain, modes: int) -> Slews:
+    """The slew of the chain, for three times as long as it takes.
+
+    Raises ParameterError for an arm that cannot turn.
+    """
+    task = scenario("slew", arm, chain, LASTING * chain.slew.rise_time)
+    simulator = Simulator(arm, chain, task, count=modes)
+    without = HubFeedback(K1=gains.K1, K2=0.0)
+    both = resolved(simulator, arm, *(partial(Simulator.linear, gains=law) for law in (without, gains)))
+    return Slews(arm, gains, *both)
 
 
 def draw_slews(data: Slews) -> Figure:
@@ -58,8 +66,9 @@ def draw_slews(data: Slews) -> Figure:
         motor_torque(data.each, ax=torque)
         figure.legend(loc="outside lower left", ncols=3)
         torque.set_xlabel("time  [s]")
-        slew = data.with_moment.chain.slew
-        what = f"{plain(slew.travel, 3)} m of tip travel in {plain(slew.rise_time, 3)} s, K1 = {plain(data.gains.K1)}"
+        slew, K1 = data.with_moment.chain.slew, plain(data.gains.K1)
+        travel = plain(slew.travel_of(data.arm.link.length), 3)
+        what = f"{travel} m of tip travel in {plain(slew.rise_time, 3)} s, K1 = {K1}"
         headline(figure, f"{data.arm.name}: {what}")
     return figure
 
@@ -71,24 +80,18 @@ def root_moment(each: Mapping[str, Simulation], *, ax: Axes) -> None:
     T = first.scenario.period
     ax.step(t - T, first.scenario.rigid_moment, where="post", color=GREY, lw=1.0, ls=(0, (4, 3)), label="rigid arm")
     for (name, simulation), colour in zip(each.items(), (ORANGE, BLUE), strict=True):
-        ax.plot(*continuous(simulation, "root_moment"), color=colour, lw=1.3, label=name)
+        curves.root_moment(simulation).draw(ax, colour, name)
     _until(first, ax)
     ax.set_ylabel("root moment  [N m]")
 
 
 def tip_error(arm: Arm, each: Mapping[str, Simulation], *, ax: Axes) -> None:
-    """How far the tip is from where a rigid arm on its reference would have it, at the samples."""
+    """How far the tip is from where a rigid arm on its reference would have it, in mm."""
     for simulation, colour in zip(each.values(), (ORANGE, BLUE), strict=True):
-        ax.plot(simulation.t, 1e3 * away(arm, simulation), color=colour, lw=1.3)
+        found = curves.tip_deviation(arm, simulation)
+        replace(found, low=1e3 * found.low, high=1e3 * found.high).draw(ax, colour)
     _until(next(iter(each.values())), ax)
     ax.set_ylabel("tip − reference  [mm]")
-
-
-def away(arm: Arm, simulation: Simulation) -> Real:
-    """Tip displacement less L times the reference angle [m], at the samples."""
-    reference = arm.link.length * simulation.scenario.hub_angle[: simulation.t.size]
-    error: Real = simulation.at_samples.tip_displacement - reference
-    return error
 
 
 def motor_torque(each: Mapping[str, Simulation], *, ax: Axes) -> None:
@@ -97,7 +100,11 @@ def motor_torque(each: Mapping[str, Simulation], *, ax: Axes) -> None:
     in_volts = first.volts is not None
     for simulation, colour in zip(each.values(), (ORANGE, BLUE), strict=True):
         values = simulation.volts if simulation.volts is not None else simulation.torque
-        ax.step(simulation.t, values, where="post", color=colour, lw=1.3)
+        held = curves.curve(simulation.t, values)
+        if held.is_band:
+            held.draw(ax, colour)
+        else:
+            ax.step(simulation.t, values, where="post", color=colour, lw=1.3)
     _until(first, ax)
     ax.set_ylabel("motor  [V]" if in_volts else "motor torque  [N m]")
 
@@ -108,54 +115,75 @@ def _until(simulation: Simulation, ax: Axes) -> None:
     ax.set_xlim(0.0, float(simulation.scenario.t[-1]))
 
 
-def continuous(simulation: Simulation, signal: str) -> tuple[Real, Real]:
-    """A signal at the samples and between them, in order of time."""
-    at, between = simulation.at_samples, simulation.between
-    if between is None:
-        return at.t, getattr(at, signal)
-    t, y = np.r_[at.t, between.t], np.r_[getattr(at, signal), getattr(between, signal)]
-    order = np.argsort(t, kind="stable")
-    return t[order], y[order]
-
-
 def what_slews_show(data: Slews) -> str:
     """The picture in numbers: what moment feedback does to what is left after the slew."""
+    gone = [
+        f"{name} at {significant(run.stopped.time, 3)} s"
+        for name, run in (("without moment feedback", data.without), ("with it", data.with_moment))
+        if run.stopped is not None
+    ]
+    clipped = clipped_words(data.each)
+    if gone:
+        return f"The loop runs away until the arm is folded up: {' and '.join(gone)}.{clipped}"
     before, after = residual_moment_rms(data.without), residual_moment_rms(data.with_moment)
-    if data.without.stopped or data.with_moment.stopped:
-        stop = data.with_moment.stopped or data.without.stopped
-        assert stop is not None
-        return f"The loop runs away: the simulation stopped at {significant(stop.time, 3)} s."
     settled = [_settled(simulation) for simulation in (data.without, data.with_moment)]
     ratio = "" if before == 0 or after == 0 else f", {significant(before / after, 3)} times as much without as with it"
     return (
-        f"Root moment left after the slew: {significant(before, 3)} N m rms with K2 = 0, {significant(after, 3)} N m "
-        f"with K2 = {plain(data.gains.K2)}{ratio}. The moment stays within 5 % of its largest {settled[0]} without, "
-        f"{settled[1]} with moment feedback."
+        f"Root moment left after the slew, less the rigid arm's: {significant(before, 3)} N m rms with K2 = 0, "
+        f"{significant(after, 3)} N m with K2 = {plain(data.gains.K2)}{ratio}. Without moment feedback {settled[0]}, "
+        f"with it {settled[1]}.{clipped}"
     )
+
+
+def seen_words(data: Slews) -> str:
+    """What the moment feedback sees during the slew."""
+    if data.with_moment.chain.slew.reading == "total":
+        return "the whole moment"
+    return "the moment less the rigid arm's (dashed)"
 
 
 def _settled(simulation: Simulation) -> str:
     time = settling_time(simulation)
-    return "not within this record" if math.isinf(time) else f"from {significant(time, 3)} s on"
+    if math.isinf(time):
+        return "the moment does not settle within this record"
+    return f"the moment stays within 5 % of its largest from {significant(time, 3)} s on"
+
+
+def clipped_words(each: Mapping[str, Simulation]) -> str:
+    """A sentence for every signal that is clipped anywhere; empty where none is."""
+    names = {"encoder": "The encoder", "moment": "The strain amplifier", "torque": "The motor or its converter"}
+    told = [
+        f" {names[signal]} is clipped at {count} of {run.t.size} samples ({name})."
+        for name, run in each.items()
+        for signal, count in run.saturated.items()
+        if count
+    ]
+    return "".join(told)
 
 
 def slews_table(data: Slews, stem: str) -> Table:
-    """The signals at the samples."""
-    first = data.without
-    n = min(first.t.size, data.with_moment.t.size)
-    columns: list[Column] = [data_column("t_s", "time", "s", first.t[:n])]
-    columns.append(data_column("rigid_moment_N_m", "rigid arm", "N m", first.scenario.rigid_moment[:n]))
-    for key, simulation in (("without", first), ("with", data.with_moment)):
-        columns += signal_columns(key, simulation, n)
-        columns.append(data_column(f"tip_error_{key}_m", "tip less reference", "m", away(data.arm, simulation)[:n]))
-    return Table(stem=stem, title="The slew in time", caption="", is_data=True, columns=tuple(columns))
+    """The curves of the picture."""
+    return responses_table(stem, "The slew in time", data.arm, {"without": data.without, "with": data.with_moment})
 
 
-def signal_columns(key: str, simulation: Simulation, n: int) -> Sequence[Column]:
-    """Root moment, tip and torque of one simulation at its first n samples."""
-    at = simulation.at_samples
-    return (
-        data_column(f"root_moment_{key}_N_m", "root moment", "N m", at.root_moment[:n]),
-        data_column(f"tip_{key}_m", "tip", "m", at.tip_displacement[:n]),
-        data_column(f"torque_{key}_N_m", "torque", "N m", simulation.torque[:n]),
-    )
+def responses_table(stem: str, title: str, arm: Arm, each: Mapping[str, Simulation]) -> Table:
+    """The curves of some simulations of one scenario as they are drawn: a row a point, or a piece of the bands.
+
+    Torques and gains are those held at that time, the rigid arm's moment that of the sample after it.
+    """
+    found = [(key, curves.root_moment(run), curves.tip_deviation(arm, run), run) for key, run in each.items()]
+    t = min((moment.t for _, moment, _, _ in found), key=len)
+    task = found[0][3].scenario
+    rigid = curves.held(found[0][3], np.r_[task.rigid_moment[1:], task.rigid_moment[-1:]], t)
+    columns: list[Column] = [
+        data_column("t_s", "time", "s", t),
+        data_column("rigid_moment_N_m", "rigid arm", "N m", rigid),
+    ]
+    for key, moment, tip, run in found:
+        columns += moment.at(t).columns(f"root_moment_{key}", "root moment", "N m")
+        columns += curves.tip(run).at(t).columns(f"tip_{key}", "tip", "m")
+        columns += tip.at(t).columns(f"tip_error_{key}", "tip less reference", "m")
+        columns.append(data_column(f"torque_{key}_N_m", "torque", "N m", curves.held(run, run.torque, t)))
+        if run.gain is not None and np.ptp(run.gain):
+            columns.append(data_column(f"K_{key}", "gain", "", curves.held(run, run.gain, t)))
+    return Table(stem=stem, title=title, caption="", is_data=True, columns=tuple(columns))

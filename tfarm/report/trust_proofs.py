@@ -17,7 +17,9 @@ from typing import Any
 import numpy as np
 
 import tfarm
-from tfarm.arm import Arm, to_toml
+from tfarm.arm import Arm
+from tfarm.dsp import Chain
+from tfarm.dsp.writing import file_text
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.report.loop_laws import has_loop
 from tfarm.spectrum import Modes
@@ -68,7 +70,7 @@ class Proof:
     boxes: tuple[Boxed, ...] = ()
 
 
-def prove(arm: Arm) -> Proof:
+def prove(arm: Arm, chain: Chain | None = None) -> Proof:
     """Certify the first modes of the arm and measure its responses; what cannot be proven is said, not raised."""
     modes = tfarm.modes(arm, count=MODES)
     flexible = modes.natural_frequency[modes.index > 0]
@@ -81,7 +83,7 @@ def prove(arm: Arm) -> Proof:
         found = {"failure": str(error)}
     return Proof(
         name=arm.name,
-        sha256=hash_of(arm),
+        sha256=hash_of(arm, chain),
         has_rigid_mode=arm.has_rigid_mode,
         band=band,
         errors=tuple((output, worst) for output in OUTPUTS if (worst := measured(arm, output, band)) is not None),
@@ -116,9 +118,9 @@ def _four(box: Sequence[float]) -> tuple[float, float, float, float]:
     return left, right, low, high
 
 
-def hash_of(arm: Arm) -> str:
-    """SHA-256 of the arm's file."""
-    return hashlib.sha256(to_toml(arm).encode()).hexdigest()
+def hash_of(arm: Arm, chain: Chain | None = None) -> str:
+    """SHA-256 of the arm's file, its chain with it."""
+    return hashlib.sha256(file_text(arm, chain).encode()).hexdigest()
 
 
 def measured(arm: Arm, output: str, band: tuple[float, float]) -> float | None:
@@ -143,9 +145,9 @@ def measured(arm: Arm, output: str, band: tuple[float, float]) -> float | None:
     return float(max(errors)) if errors else None
 
 
-def save_proof(arm: Arm, folder: Path) -> None:
+def save_proof(arm: Arm, folder: Path, chain: Chain | None = None) -> None:
     """proof.json."""
-    text = json.dumps({"tfarm_proof": 1, **asdict(prove(arm))}, ensure_ascii=False, indent=1) + "\n"
+    text = json.dumps({"tfarm_proof": 1, **asdict(prove(arm, chain))}, ensure_ascii=False, indent=1) + "\n"
     (folder / "proof.json").write_text(text, encoding="utf-8", newline="")
 
 

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from tfarm.arm import Arm, HubFeedback
+from tfarm.dsp import Chain
 from tfarm.errors import CertificationError
 from tfarm.report.digits import aligned, plain, significant
 from tfarm.report.figures import Picture
@@ -15,7 +16,7 @@ from tfarm.report.overlay import overlay
 from tfarm.report.sampled_words import SHORT_SIGN, typeset
 from tfarm.report.sections import Section
 from tfarm.report.tables import Column, Table, data_column, number_column, text_column
-from tfarm.report.time_responses import signal_columns
+from tfarm.report.time_responses import responses_table
 from tfarm.report.tuner_pictures import draw_cost_map, draw_curves, draw_gain, draw_response
 from tfarm.report.tuner_study import COARSE, MAP_SEEDS, MAP_TRIALS, NOMINAL, SEEDS, TunerStudy, tuner_study
 from tfarm.report.tuner_words import (
@@ -29,19 +30,19 @@ from tfarm.report.tuner_words import (
 
 TITLE = "The gain tuner: does a self-tuning gain help?"
 UNDAMPED = (
-    "This arm has no damping. At 10 ms its high modes then neither decay by themselves nor are they all damped by the "
-    "loop, so no range of moving gains can be proven for all of them, and the tuner is not trained here. The page of "
-    "sasaki2012-lab, the same arm as the paper's with a little damping, has the answer."
+    "This arm has no damping. When it is sampled its high modes then neither decay by themselves nor are they all "
+    "damped by the loop, so no range of moving gains can be proven for all of them, and the tuner is not trained here. "
+    "The page of sasaki2012-lab, the same arm as the paper's with a little damping, has the answer."
 )
 
 
-def tuner_section(arm: Arm) -> Section:
-    """The tuner with the paper's figures on a damped arm; one sentence for any other."""
+def tuner_section(arm: Arm, chain: Chain | None = None) -> Section:
+    """The tuner with the paper's figures on a damped arm and its own chain; one sentence for any other."""
     reason = why_not(arm)
     if reason:
         return Section(anchor="tune", title=TITLE, words=(reason,))
     try:
-        data = tuner_study(arm)
+        data = tuner_study(arm, Chain() if chain is None else chain)
     except CertificationError as error:
         words = f"No tuner here: no range of gains is proven stable for a gain that moves ({error})."
         return Section(anchor="tune", title=TITLE, words=(words,))
@@ -157,15 +158,8 @@ def _residuals(data: TunerStudy, which: int) -> str:
 
 
 def _signals(data: TunerStudy, which: int, stem: str) -> Table:
-    each = (data.slews, data.coarse)[which]
-    without, tuned = each.values()
-    n = min(without.t.size, tuned.t.size)
-    columns: list[Column] = [data_column("t_s", "time", "s", without.t[:n])]
-    for key, simulation in (("without", without), ("tuner", tuned)):
-        columns += signal_columns(key, simulation, n)
-    assert tuned.gain is not None
-    columns.append(data_column("K", "gain", "", tuned.gain[:n]))
-    return Table(stem=stem, title="The slew", caption="", is_data=True, columns=tuple(columns))
+    without, tuned = (data.slews, data.coarse)[which].values()
+    return responses_table(stem, "The slew", data.arm, {"without": without, "tuner": tuned})
 
 
 def _curves_picture(data: TunerStudy) -> Picture:

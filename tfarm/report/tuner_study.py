@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.dsp import Chain, Simulation, Simulator
+from tfarm.dsp.results import ideal_chain
+from tfarm.dsp.scenarios import torque_unit
 from tfarm.records import record
-from tfarm.report.time_responses import BETWEEN
+from tfarm.report.curves import resolved
 from tfarm.spectrum.scales import default_gains
-from tfarm.tuner import Learning, Plan, Tuning, compare, conditions, tune
-from tfarm.tuner.comparison import Row
+from tfarm.tuner import Cost, Learning, Plan, Tuning, compare, conditions, tune
+from tfarm.tuner.comparison import Row, quantised_chain
 from tfarm.tuner.guard import GuardKind
 from tfarm.tuner.studies import PAPER, Finished, map_verdict, plans_of, run_study
 from tfarm.tuner.training import Rule
@@ -23,6 +25,7 @@ Real = NDArray[np.float64]
 
 SEEDS = 20  # of the learning curves
 MAP_SEEDS, MAP_TRIALS = 5, 60
+TRIAL = 3.0  # times the slew
 WORKERS = 2
 LEARNT: tuple[tuple[str, str, Rule, GuardKind], ...] = (
     ("default", "default, in the guard", "dynamic", "time-varying"),
@@ -111,51 +114,64 @@ class TunerStudy:
     rows: tuple[Row, ...]
 
 
-def tuner_study(arm: Arm) -> TunerStudy:
-    """Train with the paper's figures and measure.
+def tuner_study(arm: Arm, chain: Chain) -> TunerStudy:
+    """Train with the paper's figures, through the arm's own chain with its converters ideal, and measure.
 
     Raises ParameterError for an arm without a loop or a slew, CertificationError where no range of gains is proven.
     """
-    tuning = tune(arm)
-    chain = tuning.trial.loop.chain
-    listed = conditions(arm, chain)
+    plan = plan_of(arm, chain)
+    tuning = tune(arm, plan, ideal_chain(chain))
+    ideal = tuning.trial.loop.chain
+    listed = conditions(arm, ideal, quantised_chain(arm, chain))
     rows = compare(tuning.trial, tuning.gain(), tuning.training.guard, listed)
     return TunerStudy(
         arm=arm,
         tuning=tuning,
-        slews=_simulated(tuning, chain),
-        constant=_simulator(tuning, chain).linear(HubFeedback(K1=tuning.plan.K1, K2=tuning.best_constant.gain)),
+        slews=_simulated(tuning, ideal),
+        constant=_simulator(tuning, ideal).linear(HubFeedback(K1=tuning.plan.K1, K2=tuning.best_constant.gain)),
         coarse=_simulated(tuning, next(each.chain for each in listed if each.name == COARSE)),
-        curves=tuple(_curves(arm, *each) for each in LEARNT),
-        cost_map=_cost_map(arm),
+        curves=tuple(_curves(arm, ideal, plan, *each) for each in LEARNT),
+        cost_map=_cost_map(arm, ideal, plan),
         rows=tuple(rows),
     )
 
 
+def plan_of(arm: Arm, chain: Chain) -> Plan:
+    """The paper's figures at the arm's own gain and in its own unit of torque, for trials of three times the slew."""
+    unit = torque_unit(arm, chain)
+    cost = Cost(a=Cost().a / unit**2, b=Cost().b / unit**2)
+    return Plan(K1=default_gains(arm).K1, duration=TRIAL * chain.slew.rise_time, cost=cost, scale=unit)
+
+
 def _simulator(tuning: Tuning, chain: Chain) -> Simulator:
     trial = tuning.trial
-    return Simulator(trial.arm, chain, trial.task, count=trial.loop.plant.count, between=BETWEEN)
+    return Simulator(trial.arm, chain, trial.task, count=trial.loop.plant.count)
 
 
 def _simulated(tuning: Tuning, chain: Chain) -> dict[str, Simulation]:
     simulator, K1 = _simulator(tuning, chain), tuning.plan.K1
-    without, tuned = simulator.linear(HubFeedback(K1=K1, K2=0.0)), simulator.gain_schedule(K1, tuning.gain())
+    without, tuned = resolved(
+        simulator,
+        tuning.trial.arm,
+        lambda each: each.linear(HubFeedback(K1=K1, K2=0.0)),
+        lambda each: each.gain_schedule(K1, tuning.gain()),
+    )
     return {"without moment feedback, K2 = 0": without, "with the tuner": tuned}
 
 
-def _curves(arm: Arm, key: str, title: str, rule: Rule, guard: GuardKind) -> Curves:
-    base = Plan(learning=Learning(rule=rule), guard=guard, K1=default_gains(arm).K1)
+def _curves(arm: Arm, chain: Chain, plan: Plan, key: str, title: str, rule: Rule, guard: GuardKind) -> Curves:
+    base = replace(plan, learning=Learning(rule=rule), guard=guard)
     plans = plans_of("curves", base, SEEDS)
-    finished = run_study(arm, plans, workers=WORKERS)
+    finished = run_study(arm, plans, chain, workers=WORKERS)
     costs = np.full((SEEDS, base.trials), np.inf)
     for row, each in zip(costs, finished, strict=True):
         row[: len(each.costs)] = each.costs
     return Curves(key, title, costs, tuple(finished))
 
 
-def _cost_map(arm: Arm) -> CostMap:
-    base = Plan(trials=MAP_TRIALS, K1=default_gains(arm).K1)
-    finished = run_study(arm, plans_of("map", base, MAP_SEEDS), workers=WORKERS)
+def _cost_map(arm: Arm, chain: Chain, plan: Plan) -> CostMap:
+    base = replace(plan, trials=MAP_TRIALS)
+    finished = run_study(arm, plans_of("map", base, MAP_SEEDS), chain, workers=WORKERS)
     groups = [finished[i : i + MAP_SEEDS] for i in range(0, len(finished), MAP_SEEDS)]
     medians = {
         (group[0].plan.learning.alpha, float(np.asarray(group[0].plan.learning.eta))): float(

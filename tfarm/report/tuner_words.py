@@ -2,66 +2,106 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 
+from tfarm.report.curves import away
 from tfarm.report.digits import significant
 from tfarm.report.sampled_words import typeset
 from tfarm.report.sections import Fact
-from tfarm.report.time_responses import away
 from tfarm.report.tuner_study import Curves, TunerStudy
+
+MORE = 3.0  # times as far off its target is more, and no coincidence
+SAME = 1e-4  # relative difference of two costs below which they are called the same
 
 
 def short_answer(data: TunerStudy) -> str:
     """How much the tuner gains over the best constant gain."""
     tuning, final = data.tuning, data.curves[0].final
     best, without = tuning.best_constant.cost, tuning.without.cost
-    median = float(np.quantile(final, 0.5, method="nearest"))
-    free = float(np.quantile(data.curves[1].final, 0.5, method="nearest"))
+    median, free = (_median(curves) for curves in data.curves[:2])
     below = int((final < best).sum())
-    taken = 100 * (1 - best / without)
     gain = 100 * (1 - median / best)
-    lead = "A little" if 0 < gain < 15 else "Yes" if gain >= 15 else "No"
-    more = "lowers it by" if gain > 0 else "raises it by"
+    lead = "A little" if 100 * SAME < gain < 15 else "Yes" if gain >= 15 else "No"
+    again = "another " if best < (1 - SAME) * without else ""
+    verb = {"below": f"lowers it by {again}", "above": "raises it by "}.get(_side(median, best), "")
+    moves = f"{verb}{significant(abs(gain), 2)} %, to" if verb else "leaves it as it is, at"
     return (
-        f"{lead}. A constant K2 of {significant(tuning.best_constant.gain, 3)} already takes {significant(taken, 2)} % "
-        f"off the cost of a slew ({significant(without, 3)} without moment feedback, {significant(best, 3)} with it); "
-        f"a gain that tunes itself {more} another {significant(abs(gain), 2)} %, to {significant(median, 3)} in the "
-        f"median of {final.size} seeds. {below} of {final.size} seeds end below the best constant gain. Without the "
-        f"guard, and so without a proof, it would be {significant(100 * (1 - free / best), 2)} %."
+        f"{lead}. {_constant_words(tuning.best_constant.gain, best, without)} a gain that tunes itself {moves} "
+        f"{significant(median, 3)} in the median of {final.size} seeds. {below} of {final.size} seeds end below the "
+        f"best constant gain. Without the guard, and so without a proof, the median is {beside(free, best)}."
     )
+
+
+def _constant_words(gain: float, best: float, without: float) -> str:
+    """What the best constant gain does by itself."""
+    if best >= (1 - SAME) * without:
+        return f"No constant K2 takes anything off the cost of a slew ({significant(without, 3)} without it);"
+    return (
+        f"A constant K2 of {significant(gain, 3)} already takes {significant(100 * (1 - best / without), 2)} % off the "
+        f"cost of a slew ({significant(without, 3)} without moment feedback, {significant(best, 3)} with it);"
+    )
+
+
+def _median(curves: Curves) -> float:
+    return float(np.quantile(curves.final, 0.5, method="nearest"))
+
+
+def _side(cost: float, yardstick: float) -> str:
+    """Whether a cost is below or above another one, or the same."""
+    if abs(cost - yardstick) <= SAME * yardstick:
+        return "the same"
+    return "below" if cost < yardstick else "above"
+
+
+def beside(cost: float, yardstick: float) -> str:
+    """A cost beside that of the best constant gain, in words."""
+    if not np.isfinite(cost):
+        return "infinite: more than half of the seeds run away"
+    side, share = _side(cost, yardstick), 100 * abs(1 - cost / yardstick)
+    return "that of the best constant gain" if side == "the same" else f"{significant(share, 2)} % {side} that"
 
 
 def drift_words(data: TunerStudy) -> str:
     """What the cost does not see: the angle that a moving gain leaves, as nothing regulates it."""
-    tuned, constant = _off_target(data)
+    tuned, constant = off_target(data)
+    more = "a gain that moves leaves more of it than a constant one" if tuned > MORE * constant else ""
+    less = "here a gain that moves leaves no more of it than a constant one" if tuned <= constant else ""
+    what = more or less or "here a gain that moves leaves about as much of it as a constant one"
     return (
-        f"What the cost does not see: the arm ends off its target, the tip {tuned} mm with the tuner and {constant} mm "
-        "with the best constant gain. The law regulates the hub rate alone; the moment feedback's torque adds up to an "
-        "angle of its integral over K1, which for a constant gain is nearly nothing and for a moving one is not. A "
-        "tuner for use needs Kp."
+        f"What the cost does not see: the arm ends off its target, the tip {significant(1e3 * tuned, 2)} mm with the "
+        f"tuner and {significant(1e3 * constant, 2)} mm with the best constant gain. The law regulates the hub rate "
+        f"alone, and the moment feedback's torque adds up to an angle of its integral over K1: {what}. A tuner for use "
+        "needs Kp."
     )
 
 
-def _off_target(data: TunerStudy) -> tuple[str, str]:
-    """How far off the tip ends [mm], with the tuner and with the best constant gain."""
-    ends = (float(away(data.arm, each)[-1]) for each in (data.slews["with the tuner"], data.constant))
-    tuned, constant = (significant(1e3 * abs(x), 2) for x in ends)
-    return tuned, constant
+def off_target(data: TunerStudy) -> tuple[float, float]:
+    """How far off the tip ends [m], with the tuner and with the best constant gain."""
+    tuned, constant = (float(away(data.arm, each)[-1]) for each in (data.slews["with the tuner"], data.constant))
+    return abs(tuned), abs(constant)
 
 
 def shaping_words(data: TunerStudy) -> str:
     """What input shaping does instead."""
-    costs = {kind: record.cost for kind, (_, record) in data.tuning.shaped.items()}
-    late = {
-        kind: trial.task.busy_until - data.tuning.trial.task.busy_until
-        for kind, (trial, _) in data.tuning.shaped.items()
-    }
+    tuning, median = data.tuning, _median(data.curves[0])
+    costs = {kind: record.cost for kind, (_, record) in tuning.shaped.items()}
+    late = {kind: trial.task.busy_until - tuning.trial.task.busy_until for kind, (trial, _) in tuning.shaped.items()}
+    if not any(late.values()):
+        return (
+            "Input shaping, which one would try first, has nothing to do here: no mode of the loop lies below half the "
+            "sample rate, and a shaper would be shorter than a sample."
+        )
     told = " and ".join(
         f"{kind} has {significant(costs[kind], 2)}, arriving {significant(1e3 * late[kind], 3)} ms later"
         for kind in costs
     )
+    rival = min(median, tuning.best_constant.cost)
+    verdicts = {"below": "is cheaper", "above": "is dearer here", "the same": "costs the same"}
+    verdict = verdicts[_side(min(costs.values()), rival)]
     return (
-        f"What one would try first is cheaper: shaping the reference, with no moment feedback at all, {told} (each "
+        f"What one would try first {verdict}: shaping the reference, with no moment feedback at all, {told} (each "
         "judged by its own slew). Shaping cannot answer disturbances, which feedback can."
     )
 
@@ -86,10 +126,23 @@ def learning_words(data: TunerStudy) -> str:
     found = data.cost_map
     answer = "Yes" if found.is_papers_best else "No"
     return (
-        f"Seed by seed. {'. '.join(told)}. The guard costs part of the gain, "
-        "and buys the proof. Is (0.6, 0.8) the best pair of momentum and learning rate? "
-        f"{answer}: {found.verdict.partition(': ')[2]}."
+        f"Seed by seed. {'. '.join(told)}. {_price(data)}Is (0.6, 0.8) the best pair of momentum and learning rate? "
+        f"{answer}: {typeset_numbers(found.verdict.partition(': ')[2])}."
     )
+
+
+def _price(data: TunerStudy) -> str:
+    """What the guard costs and what it buys."""
+    guarded, free = (_median(curves) for curves in data.curves[:2])
+    costs = {"below": "The guard costs part of the gain", "above": "The guard costs nothing here"}
+    cost = costs.get(_side(free, guarded), "The guard changes nothing in the median")
+    guard = data.tuning.training.guard
+    return f"{cost}, and buys the proof. " if guard.is_proven else f"{cost}; its proof is of the first modes alone. "
+
+
+def typeset_numbers(text: str) -> str:
+    """Numbers such as 5.8e+04 within a sentence, with commas or brackets about them, as a person writes them."""
+    return re.sub(r"\d(?:\.\d+)?e[+-]\d+", lambda found: significant(float(found[0]), 4), text)
 
 
 def _ends(curves: Curves) -> str:
@@ -111,17 +164,23 @@ def headline_facts(data: TunerStudy) -> tuple[Fact, ...]:
     low, high = (float(np.quantile(final, q, method="nearest")) for q in (0.25, 0.75))
     gain = 100 * (1 - median / tuning.best_constant.cost)
     guard = tuning.training.guard
-    off, off_constant = _off_target(data)
-    helps = f"by {significant(gain, 2)} %" if gain > 0 else "no"
+    off, off_constant = (significant(1e3 * x, 2) for x in off_target(data))
+    helps = f"by {significant(gain, 2)} %" if gain > 100 * SAME else "no"
+    held = "proven stable" if guard.is_proven else f"proven for the first {guard.modes_used} modes"
+    half = f"half between {significant(low, 4)} and {significant(high, 4)}"
     K = significant(tuning.best_constant.gain, 3)
     shaped = min((record.cost, kind) for kind, (_, record) in tuning.shaped.items())
     return (
         Fact(label="does tuning beat a constant gain?", value=helps, beside=f"median of {final.size} seeds"),
         Fact(label="cost without moment feedback", value=significant(tuning.without.cost, 4)),
         Fact(label="best constant gain", value=significant(tuning.best_constant.cost, 4), beside=f"K2 = {K}"),
-        Fact(label="tuner", value=significant(median, 4), beside=f"half between {low:.3f} and {high:.3f}"),
+        Fact(
+            label="tuner",
+            value=significant(median, 4),
+            beside=half,
+        ),
         Fact(label="nothing is below", value=significant(tuning.bound.cost, 4), beside="linear-quadratic optimum"),
         Fact(label="input shaping instead", value=significant(shaped[0], 3), beside=f"{shaped[1]}, a later slew"),
         Fact(label="tip off its target at the end", value=off, unit="mm", beside=f"constant gain: {off_constant} mm"),
-        Fact(label="guard", value=f"{guard.lo:.3f} … {guard.hi:.3f}", beside="any K(t) in it: proven stable"),
+        Fact(label="guard", value=f"{guard.lo:.3f} … {guard.hi:.3f}", beside=f"any K(t) in it: {held}"),
     )

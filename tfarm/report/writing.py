@@ -17,7 +17,9 @@ from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 
-from tfarm.arm import Arm, to_toml
+from tfarm.arm import Arm
+from tfarm.dsp import Chain
+from tfarm.dsp.writing import file_text
 from tfarm.errors import ParameterError, TfarmError, did_you_mean
 from tfarm.files import temporary_folder
 from tfarm.report.arm_section import arm_section
@@ -46,13 +48,17 @@ OURS = ("index.html", "README.md", "pictures", "bench.json", "trust")  # names i
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """One section of one arm's page: a name for the progress bar, the section's anchor, and how to make it."""
+    """One section of one arm's page: a name for the progress bar, the section's anchor, and how to make it.
+
+    `make` takes the arm, and for a section that is about the sampled loop (`is_sampled`) its chain.
+    """
 
     name: str
     anchor: str
     questions: tuple[str, ...]  # the --only pages that have it; the full page has all
-    make: Callable[[Arm], Section]
+    make: Callable[..., Section]
     suits: Callable[[Arm], bool] = lambda arm: True
+    is_sampled: bool = False
 
 
 PIECES = (
@@ -68,14 +74,15 @@ PIECES = (
     Piece("margins", "margins", ("margins",), margins_section, has_rate_loop),
     Piece("root loci", "locus", ("locus",), locus_section, has_rate_loop),
     Piece("Nyquist", "margins-nyquist", ("margins",), nyquist_section, has_loop),
-    Piece("sampled loop", "sampled", ("sampled",), sampled_section, has_loop),
-    Piece("gain tuner", "tune", ("tune",), tuner_section, has_loop),
+    Piece("sampled loop", "sampled", ("sampled",), sampled_section, has_loop, is_sampled=True),
+    Piece("gain tuner", "tune", ("tune",), tuner_section, has_loop, is_sampled=True),
     Piece("assumptions", "assumptions", ("assumptions",), assumptions_section),
 )
 CARD = "card"
 EVIDENCE = (-1, "evidence")  # for the page on trust: of no arm
 TRUST = f"{FOLDER}/index.html"
 
+Subject = tuple[Arm, Chain]  # whose page it is
 Task = tuple[int, int | str]  # which arm, which piece (or its card and proof)
 Result = SavedSection | Evidence | None
 
@@ -84,27 +91,31 @@ def write(
     arms: Sequence[Arm],
     out: Path,
     *,
+    chains: Sequence[Chain] | None = None,
     only: tuple[str, ...] | None = None,
     progress: Progress | None = None,
     notice: Notice | None = None,
 ) -> Path:
     """Write the report of each arm to out/<name>/, out/trust/ and out/index.html; the page to open first.
 
+    `chains` are the arms' own sampling, converters, actuators and slews; ideal ones at 10 ms if not given.
     `only` ("bode", "modes", "margins", ...) writes those pages alone, out/<name>/bode.html and so on.  `progress` is
     told (done, total, what) after each piece of work.  A section that tfarm cannot make of an arm says why in its
     place, and `notice` is told so in one line, once the pages are written.  Raises ParameterError before any work if
     `out` cannot be written, two arms share a name or there is none.  If the work itself fails, `out` is as it was.
     """
     _check(arms, only)
+    chains = [Chain()] * len(arms) if chains is None else chains
+    subjects = list(zip(arms, chains, strict=True))
     out = Path(out)
     with _beside(out, [arm.name for arm in arms] + [FOLDER] * (not only)) as beside:
         folders = [beside / str(i) for i in range(len(arms))]
         for folder in folders:
             folder.mkdir()
-        sections, evidence = _make_all(arms, folders, only or (), progress)
+        sections, evidence = _make_all(subjects, folders, only or (), progress)
         trust = TRUST if evidence is not None or (out / TRUST).is_file() else ""
-        for arm, folder, parts in zip(arms, folders, sections, strict=True):
-            _write_pages(arm, folder, parts, only, trust)
+        for subject, folder, parts in zip(subjects, folders, sections, strict=True):
+            _write_pages(subject, folder, parts, only, trust)
         for arm, folder in zip(arms, folders, strict=True):
             _move_into(folder, out / arm.name)
         if evidence is not None:
@@ -176,37 +187,40 @@ def _remove(made: Sequence[Path]) -> None:
 
 
 def _make_all(
-    arms: Sequence[Arm], folders: Sequence[Path], only: tuple[str, ...], progress: Progress | None
+    subjects: Sequence[Subject], folders: Sequence[Path], only: tuple[str, ...], progress: Progress | None
 ) -> tuple[list[list[SavedSection]], Evidence | None]:
     """The sections of each arm's page, in the order of PIECES, and the evidence if whole reports are asked for."""
     tasks: list[Task] = [] if only else [EVIDENCE]  # first: it takes longest
     tasks += [
         (i, j)
-        for i, arm in enumerate(arms)
+        for i, (arm, _) in enumerate(subjects)
         for j, piece in enumerate(PIECES)
         if piece.suits(arm) and (not only or set(only) & set(piece.questions))
     ]
-    tasks += [(i, CARD) for i in range(len(arms))]
+    tasks += [(i, CARD) for i in range(len(subjects))]
     done: dict[Task, Result] = {}
     if progress is not None:
-        progress(0, len(tasks), arms[0].name)
-    for task, section in _results(arms, folders, tasks):
+        progress(0, len(tasks), subjects[0][0].name)
+    for task, section in _results(subjects, folders, tasks):
         done[task] = section
         if progress is not None:
-            progress(len(done), len(tasks), _name_of(arms, task))
-    sections = [[s for t in tasks if t[0] == i and isinstance(s := done[t], SavedSection)] for i in range(len(arms))]
+            progress(len(done), len(tasks), _name_of(subjects, task))
+    places = range(len(subjects))
+    sections = [[s for t in tasks if t[0] == i and isinstance(s := done[t], SavedSection)] for i in places]
     evidence = done.get(EVIDENCE)
     return sections, evidence if isinstance(evidence, Evidence) else None
 
 
-def _results(arms: Sequence[Arm], folders: Sequence[Path], tasks: Sequence[Task]) -> Iterator[tuple[Task, Result]]:
+def _results(
+    subjects: Sequence[Subject], folders: Sequence[Path], tasks: Sequence[Task]
+) -> Iterator[tuple[Task, Result]]:
     """Each task with its result as it comes: here, or by two processes where there is more than one arm."""
-    if len(arms) == 1 or not _may_start_processes():
+    if len(subjects) == 1 or not _may_start_processes():
         for task in tasks:
-            yield task, _make(arms[task[0]], task[1], folders[task[0]])
+            yield task, _make(subjects[task[0]], task[1], folders[task[0]])
         return
     with ProcessPoolExecutor(WORKERS, mp_context=get_context("spawn")) as pool:
-        futures = {pool.submit(_make, arms[i], piece, folders[i]): (i, piece) for i, piece in tasks}
+        futures = {pool.submit(_make, subjects[i], piece, folders[i]): (i, piece) for i, piece in tasks}
         try:
             for future in as_completed(futures):
                 yield futures[future], future.result()
@@ -222,20 +236,21 @@ def _may_start_processes() -> bool:
     return file is None or getattr(main, "__spec__", None) is not None or not str(file).endswith(".py")
 
 
-def _make(arm: Arm, piece: int | str, folder: Path) -> Result:
+def _make(subject: Subject, piece: int | str, folder: Path) -> Result:
     if piece == EVIDENCE[1]:
         return gather()
     if isinstance(piece, str):
+        arm, chain = subject
         save_card(arm, folder)
-        save_proof(arm, folder)
+        save_proof(arm, folder, chain)
         return None
-    return save_section(_section(PIECES[piece], arm), folder)
+    return save_section(_section(PIECES[piece], *subject), folder)
 
 
-def _section(piece: Piece, arm: Arm) -> Section:
+def _section(piece: Piece, arm: Arm, chain: Chain) -> Section:
     """The section, or in its place why tfarm could not make it of this arm; a bug of ours stays loud."""
     try:
-        return piece.make(arm)
+        return piece.make(arm, chain) if piece.is_sampled else piece.make(arm)
     except TfarmError as error:
         title = f"{piece.name[0].upper()}{piece.name[1:]}"
         words = (f"This section could not be made for this arm: {error}.",)
@@ -250,21 +265,21 @@ def _failures(arms: Sequence[Arm], sections: Sequence[Sequence[SavedSection]]) -
                 yield f"{arm.name}: the page leaves out “{part.section.title}” and says why: {part.section.failure}"
 
 
-def _name_of(arms: Sequence[Arm], task: Task) -> str:
+def _name_of(subjects: Sequence[Subject], task: Task) -> str:
     piece = task[1]
     if task == EVIDENCE:
         return "why trust this"
-    return f"{arms[task[0]].name}: {piece if isinstance(piece, str) else PIECES[piece].name}"
+    return f"{subjects[task[0]][0].name}: {piece if isinstance(piece, str) else PIECES[piece].name}"
 
 
 def _write_pages(
-    arm: Arm, folder: Path, sections: Sequence[SavedSection], only: tuple[str, ...] | None, trust: str
+    subject: Subject, folder: Path, sections: Sequence[SavedSection], only: tuple[str, ...] | None, trust: str
 ) -> None:
-    """The arm's file and its page, or the page of each question asked."""
-    (folder / "arm.toml").write_text(to_toml(arm), encoding="utf-8", newline="")
+    """The arm's file, with the chain that the page is about, and its page, or the page of each question asked."""
+    (folder / "arm.toml").write_text(file_text(*subject), encoding="utf-8", newline="")
     for question in only or (None,):
         wanted = [s for s in sections if question is None or _answers(s.section.anchor, question)]
-        page = arm_page(arm, wanted, question, trust=f"../{trust}" if trust else "")
+        page = arm_page(*subject, wanted, question, trust=f"../{trust}" if trust else "")
         (folder / f"{question or 'index'}.html").write_text(page, encoding="utf-8", newline="")
 
 

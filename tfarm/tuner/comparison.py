@@ -13,7 +13,9 @@ from typing import NamedTuple
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.dsp import Chain, Converters, Scenario, Simulator
+from tfarm.dsp.scenarios import torque_unit
 from tfarm.errors import ConvergenceError
+from tfarm.spectrum import modes
 from tfarm.tuner.bound import lq_bound
 from tfarm.tuner.constants import best_constant
 from tfarm.tuner.controller import TunedGain, judged, simulated
@@ -22,12 +24,13 @@ from tfarm.tuner.sector import MovingGain
 from tfarm.tuner.shaping import shaped, shaper
 from tfarm.tuner.trial import Record, Trial, residual_rms, slew_trial
 
-PAYLOADS = (0.1, 0.25, 0.5)  # kg
+ADDED = (0.06, 0.15, 0.3)  # of the arm's mass, for one without payload: 0.1, 0.25 and 0.5 kg on the paper's
+CARRIED = (0.5, 1.5, 2.0)  # of the payload, for one that has one
 HUBS = (0.8, 1.2)  # times the hub's inertia
-DAMPINGS = (0.0, 1e-5, 1e-3)  # s
-QUANTISED = Converters(
-    encoder_counts=8192, hub_rate="difference", moment_bits=12, moment_range=20.0, torque_bits=12, torque_range=10.0
-)  # N m
+DAMPINGS = (0.1, 10.0)  # times the arm's own C
+GIVEN = (3.575e-4, 3.575e-2)  # of critical in the first mode, for an arm without: C = 1e-5 and 1e-3 s on the paper's
+COUNTS, BITS = 8192, 12
+MOMENT_RANGE, TORQUE_RANGE = 20.0, 10.0  # N m, of the paper's arm: times the arm's unit of torque
 DELAY = 1.0  # samples
 
 
@@ -68,9 +71,24 @@ class Condition:
     chain: Chain
 
 
-def conditions(arm: Arm, chain: Chain) -> list[Condition]:
-    """The trained condition, converters and delay, then the arms that it was not trained on."""
-    quantised = replace(chain, converters=QUANTISED)
+def quantised_chain(arm: Arm, chain: Chain) -> Chain:
+    """The chain with its own converters, or where they are ideal with 12 bits over ranges that suit the arm's slew."""
+    if not chain.is_linear:
+        return chain
+    unit = torque_unit(arm, chain)
+    converters = Converters(
+        encoder_counts=COUNTS, hub_rate="difference", moment_bits=BITS, moment_range=MOMENT_RANGE * unit,
+        torque_bits=BITS, torque_range=TORQUE_RANGE * unit,
+    )  # fmt: skip
+    return replace(chain, converters=converters)
+
+
+def conditions(arm: Arm, chain: Chain, quantised: Chain | None = None) -> list[Condition]:
+    """The trained condition, converters and delay, then the arms that it was not trained on.
+
+    `quantised` is the chain with converters, that of `quantised_chain` if it is not given.
+    """
+    quantised = quantised_chain(arm, chain) if quantised is None else quantised
     sampling = replace(chain.sampling, delay_samples=chain.sampling.delay_samples + DELAY)
     listed = [
         Condition("as trained", arm, chain),
@@ -78,12 +96,26 @@ def conditions(arm: Arm, chain: Chain) -> list[Condition]:
         Condition("one sample of delay", arm, replace(chain, sampling=sampling)),
         Condition("quantised, one sample of delay", arm, replace(quantised, sampling=sampling)),
     ]
-    loads = {f"payload {mass:g} kg": replace(arm, payload=replace(arm.payload, mass=mass)) for mass in PAYLOADS}
+    loads = {f"payload {mass:g} kg": replace(arm, payload=replace(arm.payload, mass=mass)) for mass in _payloads(arm)}
     inertias = {f"hub {share - 1:+.0%}": share * arm.hub.inertia for share in HUBS}
     hubs = {name: replace(arm, hub=replace(arm.hub, inertia=inertia)) for name, inertia in inertias.items()}
-    others = [C for C in DAMPINGS if arm.link.damping != C]
-    dampings = {f"C = {C:g} s": replace(arm, link=replace(arm.link, damping=C)) for C in others}
+    dampings = {f"C = {C:g} s": replace(arm, link=replace(arm.link, damping=C)) for C in _dampings(arm)}
     return listed + [Condition(name, other, chain) for name, other in (loads | hubs | dampings).items()]
+
+
+def _payloads(arm: Arm) -> list[float]:
+    """Other masses at the tip [kg]: shares of the payload, or of the arm itself where it has none."""
+    mass, beam = arm.payload.mass, arm.link.rhoA * arm.link.length
+    return [float(f"{x:.2g}") for x in ([share * mass for share in CARRIED] if mass else [s * beam for s in ADDED])]
+
+
+def _dampings(arm: Arm) -> list[float]:
+    """Other dampings C [s], none among them where the arm has some."""
+    own = arm.link.damping
+    if own:
+        return [0.0, *(float(f"{share * own:.3g}") for share in DAMPINGS)]
+    first = float(modes(arm, 1).natural_frequency[-1])
+    return [float(f"{2 * zeta / first:.1g}") for zeta in GIVEN]
 
 
 def compare(trial: Trial, gain: TunedGain, guard: Guard, listed: list[Condition] | None = None) -> list[Row]:

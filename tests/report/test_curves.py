@@ -1,0 +1,58 @@
+"""Curves in time: a line that resolves what rings, or a band around it; the file has what is drawn."""
+
+import numpy as np
+import pytest
+
+import tfarm
+from tests.odd_arms import odd_arms
+from tfarm.dsp import Chain, Slew, scenario
+from tfarm.report.curves import BETWEEN, MOST_LINE, PERIODS, POINTS, curve, reference_angle, root_moment
+from tfarm.report.time_responses import slews, slews_table
+from tfarm.spectrum.scales import default_gains
+
+STEEL = tfarm.load("stocky-steel")
+
+
+def test_a_fast_ringing_is_drawn_as_a_band_that_holds_the_curve():
+    """The band of a known oscillation is its amplitude: no piece of it is shorter than a period."""
+    t = np.linspace(0.0, 3.0, 30_001)
+    f = 10_000 / POINTS  # Hz, twenty points a period
+    found = curve(t, 2.0 + np.cos(2 * np.pi * f * t))
+    assert found.is_band
+    assert found.low[:-1] == pytest.approx(1.0, abs=0.05)  # the cosine's lowest of twenty points, at most 9 degrees off
+    assert found.high[:-1] == pytest.approx(3.0, abs=0.05)
+    assert np.diff(found.t).min() * f >= PERIODS * (1 - 1e-9)
+    line = curve(t[:MOST_LINE], t[:MOST_LINE])
+    assert not line.is_band
+    assert np.array_equal(line.low, line.high)
+
+
+def test_the_slew_of_a_stiff_arm_is_not_aliased_and_its_file_has_the_curve():
+    data = slews(STEEL, default_gains(STEEL), Chain(), 8)
+    records = data.without.between.t.size / data.without.t.size
+    first = tfarm.modes(STEEL, 1).natural_frequency[-1] / (2 * np.pi)
+    assert (records + 1) * 100 >= POINTS * first > 400  # 400 a second is what three records gave
+    drawn, table = root_moment(data.without), slews_table(data, "t")
+    columns = {column.key: np.array(column.values) for column in table.columns}
+    assert drawn.is_band
+    assert columns["root_moment_without_N_m_low"].tolist() == drawn.low.tolist()
+    assert columns["root_moment_without_N_m_high"].tolist() == drawn.high.tolist()
+    assert (columns["root_moment_without_N_m_low"] <= columns["root_moment_without_N_m_high"]).all()
+
+
+def test_a_slow_arm_is_a_line_of_the_simulators_own_records():
+    lab = tfarm.load("sasaki2012-lab")
+    data = slews(lab, default_gains(lab), Chain(), 8)
+    drawn = root_moment(data.with_moment)
+    assert not drawn.is_band
+    assert drawn.t.size == data.with_moment.t.size + data.with_moment.between.t.size >= (BETWEEN + 1) * 301
+
+
+def test_the_reference_between_the_samples_is_that_of_the_slew():
+    """theta = a t^2/2 up to the middle of the slew, and its mirror image after it."""
+    arm = odd_arms()["boom"]
+    task = scenario("slew", arm, Chain(slew=Slew(rise_time=1.0)), 1.5)
+    t = np.linspace(0.0, 1.4, 777)
+    a = 4 * 1.15  # rad/s^2: 1.15 rad in 1 s
+    exact = np.where(t < 0.5, a * t**2 / 2, 1.15 - a * np.clip(1 - t, 0, None) ** 2 / 2)
+    assert reference_angle(task, t) == pytest.approx(exact, abs=1e-12)

@@ -1,0 +1,153 @@
+"""Curves in time as they are drawn: fine enough for the fastest mode that is seen, or a band that says so.
+
+A simulation is made twice: first at its samples, to see which modes ring visibly, then with at least 20 records in each
+period of the fastest of them.  Where that is more than a page can show as a line, the curve is drawn, and written to
+the file beside it, as the band between its smallest and largest value over at least two such periods.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from tfarm.arm import Arm
+from tfarm.dsp import Scenario, Simulation, Simulator
+from tfarm.dsp.ringing import POINTS, records_between
+from tfarm.records import record
+from tfarm.report.digits import significant
+from tfarm.report.tables import Column, data_column
+
+Real = NDArray[np.float64]
+
+BETWEEN = 3  # records between two samples at least
+MOST_LINE = 6000  # points of a line: at 20 a period still three pixels a period
+PERIODS = 2  # of the fastest mode that each piece of a band holds at least
+PIECES = 1500  # of a band at most
+MOST_RECORDS = 400_000  # of a simulation for a picture, some 30 MB
+
+
+@dataclass(frozen=True)
+@record
+class Curve:
+    """A signal over time: a line where `low` is `high`, else the band between them from each `t` [s] to the next."""
+
+    t: Real
+    low: Real
+    high: Real
+    is_band: bool
+
+    def draw(self, ax: Axes, colour: str, label: str | None = None) -> None:
+        """The line, or the band."""
+        if self.is_band:
+            ax.fill_between(self.t, self.low, self.high, color=colour, alpha=0.55, lw=0.8, label=label)
+        else:
+            ax.plot(self.t, self.low, color=colour, lw=1.3, label=label)
+
+    def at(self, t: Real) -> Curve:
+        """The same at other times, which its own begin with or hold, for a file with one column of time."""
+        if self.t.size == t.size:
+            return self
+        k = np.clip(np.searchsorted(self.t, t * (1 + 1e-12), side="right") - 1, 0, self.t.size - 1)
+        return Curve(t, self.low[k], self.high[k], self.is_band)
+
+    def columns(self, key: str, title: str, unit: str) -> Sequence[Column]:
+        """What is drawn, for the file: one column, or both edges of the band."""
+        name = f"{key}_{unit.replace(' ', '_')}"
+        if not self.is_band:
+            return (data_column(name, title, unit, self.low),)
+        return (
+            data_column(f"{name}_low", f"{title}, lowest", unit, self.low),
+            data_column(f"{name}_high", f"{title}, highest", unit, self.high),
+        )
+
+
+def resolved(simulator: Simulator, arm: Arm, *runs: Callable[[Simulator], Simulation]) -> list[Simulation]:
+    """The simulations of one picture, with as many records between their samples as its fastest visible mode takes."""
+    rough = [run(simulator) for run in runs]
+    needed = [records_between(simulator, each, _heights(arm, each)) for each in rough if each.t.size > 1]
+    most = max(BETWEEN, MOST_RECORDS // simulator.scenario.t.size)
+    finer = simulator.finer(min(max(BETWEEN, *needed), most) if needed else BETWEEN)
+    return [run(finer) for run in runs]
+
+
+def _heights(arm: Arm, run: Simulation) -> dict[str, float]:
+    """How high the curves are that are drawn, by the signal that they come from."""
+    return {"root_moment": float(np.ptp(run.at_samples.root_moment)), "tip_displacement": float(np.ptp(away(arm, run)))}
+
+
+def away(arm: Arm, simulation: Simulation) -> Real:
+    """Tip displacement less L times the reference angle [m], at the samples."""
+    reference = arm.link.length * simulation.scenario.hub_angle[: simulation.t.size]
+    error: Real = simulation.at_samples.tip_displacement - reference
+    return error
+
+
+def root_moment(simulation: Simulation) -> Curve:
+    """The root moment [N m]."""
+    return curve(*continuous(simulation, "root_moment"))
+
+
+def tip(simulation: Simulation) -> Curve:
+    """The tip displacement [m]."""
+    return curve(*continuous(simulation, "tip_displacement"))
+
+
+def tip_deviation(arm: Arm, simulation: Simulation) -> Curve:
+    """Tip displacement less L times the reference angle [m]."""
+    t, displacement = continuous(simulation, "tip_displacement")
+    return curve(t, displacement - arm.link.length * reference_angle(simulation.scenario, t))
+
+
+def reference_angle(task: Scenario, t: Real) -> Real:
+    """The reference angle [rad] between its samples, where its rate is linear in time."""
+    T, n = task.period, task.hub_angle.size
+    k = np.minimum(np.floor(t / T * (1 + 1e-12)).astype(np.int64), n - 1)
+    slope = np.diff(np.r_[task.hub_rate, task.hub_rate[-1:]]) / T
+    tau = t - k * T
+    angle: Real = task.hub_angle[k] + tau * (task.hub_rate[k] + slope[k] * tau / 2)
+    return angle
+
+
+def curve(t: Real, y: Real) -> Curve:
+    """A line where a page can show one, else a band."""
+    if t.size <= MOST_LINE:
+        return Curve(t, y, y, False)
+    step = max(PERIODS * POINTS, math.ceil(t.size / PIECES))
+    starts = np.arange(0, t.size, step)
+    return Curve(t[starts], np.minimum.reduceat(y, starts), np.maximum.reduceat(y, starts), True)
+
+
+def continuous(simulation: Simulation, signal: str) -> tuple[Real, Real]:
+    """A signal at the samples and between them, in order of time."""
+    at, between = simulation.at_samples, simulation.between
+    if between is None:
+        return at.t, getattr(at, signal)
+    t, y = np.r_[at.t, between.t], np.r_[getattr(at, signal), getattr(between, signal)]
+    order = np.argsort(t, kind="stable")
+    return t[order], y[order]
+
+
+def held(simulation: Simulation, values: Real, t: Real) -> Real:
+    """What is held from sample to sample, at the times t [s]."""
+    k = np.floor(t / simulation.scenario.period * (1 + 1e-12)).astype(np.int64)
+    return values[np.minimum(k, values.size - 1)]
+
+
+def resolution_words(each: Mapping[str, Simulation] | Sequence[Simulation]) -> str:
+    """A sentence where a curve is a band, and for how long each piece of it is; empty where all are lines."""
+    runs: Sequence[Any] = list(each.values()) if isinstance(each, Mapping) else each
+    drawn = [root_moment(run) for run in runs]
+    bands = [one for one in drawn if one.is_band]
+    if not bands:
+        return ""
+    ms = significant(1e3 * float(bands[0].t[1] - bands[0].t[0]), 2)
+    return (
+        f" The ringing is too fast to draw as a line: the bands lie between the smallest and the largest value in each "
+        f"{ms} ms."
+    )
