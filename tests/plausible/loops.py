@@ -1,0 +1,311 @@
+"""Judges of the verbs of the continuous loop: poles, margins, map, locus, design."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from tests.plausible.arms import Law, log
+from tests.plausible.judging import Judged
+from tests.plausible.spectra import SAFETY, pole_check
+
+BESIDE = 1e-5  # share of a printed edge on either side of which the loop is looked at
+CLEAR = 1e-9  # of |s|: a real part that is smaller tells the model nothing, unless its own error is smaller still
+HIGH = 0.6  # share of the model's modes that it counts poles up to
+
+
+def oscillating(model, law, top):
+    """The model's poles in |Im s| <= top but those at 0, polished: (n,), Im >= 0, and which polished well."""
+    starts = model.eigenvalues(law)
+    scale = model.modes[0][0]
+    starts = starts[(starts.imag >= -1e-9 * abs(starts)) & (abs(starts) > 1e-7 * scale) & (starts.imag <= 1.05 * top)]
+    return starts[np.argsort(abs(starts))]
+
+
+def trusted(models):
+    """The frequency [rad/s] up to which both models agree on the modes to a millionth."""
+    fine, rough = models.fine.modes[0], models.rough.modes[0]
+    off = abs(rough / fine[: rough.size] - 1) > 1e-6
+    return float(fine[max(0, int(np.argmax(off)) - 1)])
+
+
+def growing(models, law, top=None):
+    """Poles of the model right of the axis below `top` [rad/s], conjugates counted; None where it cannot tell.
+
+    Those near the axis are polished first: the linear form's rounding is larger than their damping.
+    """
+    top = trusted(models) if top is None else min(top, trusted(models))
+    starts = oscillating(models.rough, law, top)
+    near = (abs(starts.real) < 1e-3 * abs(starts)) & (starts.imag <= top)
+    right = starts[(starts.real > 0) & ~near & (starts.imag <= top)]
+    count = int(np.where(right.imag > 1e-7 * abs(right), 2, 1).sum())
+    for start in starts[near]:
+        fine, step = models.fine.polished(complex(start), law)
+        if abs(fine - start) > 0.02 * abs(start):
+            return None
+        other, _ = models.rough.polished(complex(start), law)
+        error = SAFETY * abs(fine.real - other.real) + step
+        if abs(fine.real) <= error + 1e-15 * abs(fine):
+            return None
+        count += 2 * int(fine.real > 0)
+    return count
+
+
+@dataclass(frozen=True)
+class Poles:
+    """`tfarm poles`: each printed pole is one of the model's, and none of the model's in the box is missing."""
+
+    oracle = "inverse iteration from each printed pole, and all eigenvalues of the model in the printed box"
+
+    def arguments(self, case):
+        return case.law.options
+
+    def judge(self, case, models, ran):
+        judged, answer, law = Judged(), ran.answer, case.law
+        printed = np.array([complex(*pole) for pole in answer["poles"]])
+        for pole in printed[printed != 0]:
+            pole_check(judged, "pole", complex(pole), models, law)
+        left, right, _, top = answer["box"]
+        moving, blind = printed[printed != 0], 0
+        for start in oscillating(models.rough, law, top):
+            if not (left < start.real < right and start.imag < top < trusted(models)):
+                continue
+            pole, step = models.fine.polished(complex(start), law)
+            off = abs(pole - models.rough.polished(complex(start), law)[0])
+            inside = left * (1 - 1e-6) < pole.real < right and -1e-9 * abs(pole) <= pole.imag < top * (1 - 1e-6)
+            if not inside or abs(pole) < 1e-7 * case.first:
+                continue
+            if off + step > 1e-6 * abs(pole):
+                blind += 1
+                continue
+            pole = complex(pole.real, abs(pole.imag))
+            judged.truth(f"{pole} of the model is missing", bool((abs(moving - pole) < 1e-4 * abs(pole)).any()))
+        judged.blind += blind
+        clear = abs(moving.real) > CLEAR * abs(moving)
+        if clear.all() and moving.size:
+            unstable = int(np.where(moving.imag > 0, 2, 1)[moving.real > 0].sum())
+            judged.truth(f"{answer['unstable']} unstable for {unstable}", answer["unstable"] == unstable)
+        return judged
+
+
+@dataclass(frozen=True)
+class Margins:
+    """`tfarm margins`: verdict, edges, gains inside and outside the windows, and each margin at its frequency."""
+
+    oracle = "poles of the model at the gains, beside each edge, at random gains; its L(i w) at and between the margins"
+
+    def arguments(self, case):
+        return case.law.options
+
+    def judge(self, case, models, ran):
+        judged, answer, law = Judged(), ran.answer, case.law
+        if answer["verdict"] != "marginal":
+            self._verdict(judged, models, law, answer["stable"], "the law")
+        for name in ("K1", "K2", "Kp"):
+            self._windows(judged, case, models, name, answer)
+        if answer["stable"]:
+            self._gain_margin(judged, case, models, answer)
+            self._margins(judged, case, models, answer["in_band"])
+        return judged
+
+    def _verdict(self, judged, models, law, stable, what):
+        count = growing(models, law)
+        if count is None:
+            judged.blind += 1
+            return
+        if count:
+            judged.truth(f"{what} is called stable, {count} poles grow ({law})", not stable)
+        elif stable:
+            judged.checks += 1
+        else:  # the model sees its own modes only: that it finds none proves nothing about the others
+            judged.blind += 1
+
+    def _windows(self, judged, case, models, name, answer):
+        low, high = answer[f"{name}_looked_at"]
+        windows = [tuple(map(float, pair)) for pair in answer[f"{name}_windows"]]
+        ends = [end for pair in windows for end in pair if low < end < high]
+        for end in ends[:4]:
+            self._edge(judged, models, case.law, name, end, windows)
+        for value in case.rng.uniform(low, high, 3):
+            inside = any(a < value < b for a, b in windows)
+            near = min((abs(value - end) for end in ends), default=np.inf) < 1e-3 * (high - low)
+            if not near and not (case.beam.link.damping == 0 and name == "K2" and abs(value - 1) < 1e-3):
+                self._verdict(judged, models, replace(case.law, **{name: float(value)}), inside, f"{name} = {value!r}")
+
+    def _edge(self, judged, models, law, name, end, windows):
+        """On one side of the edge the loop holds, on the other it does not."""
+        step = BESIDE * (abs(end) or 1e-3 * abs(getattr(law, name)))
+        for value in (end - step, end + step):
+            inside = any(a < value < b for a, b in windows)
+            self._verdict(judged, models, replace(law, **{name: value}), inside, f"{name} = {value!r}, by an edge")
+            if not inside and growing(models, replace(law, **{name: value})) == 0:
+                judged.blind += 1
+
+    def _gain_margin(self, judged, case, models, answer):
+        low, high = (float(end) for end in answer["gain_margin"])
+        for t in (low + BESIDE, 1.0, min(high, 3.0) * (1 - BESIDE)):
+            if low < t < high:
+                self._verdict(judged, models, scaled(case.law, t), True, f"the law times {t!r}")
+        for t in (low * (1 - BESIDE), high * (1 + BESIDE)):
+            if 0 < t < np.inf and growing(models, scaled(case.law, t)) == 0:
+                judged.blind += 1
+
+    def _margins(self, judged, case, models, band):
+        """At the frequency printed L has the margin printed; on a grid it has no smaller one."""
+        at, top = band["at_rad_s"], min(band["band_rad_s"], trusted(models))
+        if np.isfinite(float(band["phase_margin_deg"])):
+            self._phase(judged, models, case.law, at["phase"], abs(band["phase_margin_deg"]), band)
+        w = dense(models, case.law, top)
+        L = np.array([loop_function(models.rough, case.law, each) for each in w])
+        for key, f in (("disk_margin", disk), ("peak_sensitivity", peak)):
+            where, printed = at[{"disk_margin": "disk"}.get(key, key)], float(band[key])
+            if where <= top:
+                fine, rough = (extreme(f, m, case.law, where) for m in (models.fine, models.rough))
+                size = max(abs(fine), 1e-300)
+                judged.error(f"{key} at {where}", abs(printed - fine) / size, 1e-5 + SAFETY * abs(fine - rough) / size)
+            least = f(L).min() if key == "disk_margin" else 1 / f(L).max()
+            bound = printed if key == "disk_margin" else 1 / printed
+            judged.error(f"{key}: worse on a grid", max(0.0, bound / least - 1), 1e-4)
+
+    def _phase(self, judged, models, law, where, printed, band):
+        if where > trusted(models):
+            judged.blind += 1
+            return
+        fine, rough = (loop_function(m, law, where) for m in (models.fine, models.rough))
+        steep = abs(loop_function(models.fine, law, where * (1 + 1e-7)) - fine) / 1e-7 * 1e-6  # the place has 7 digits
+        slack = 1e-6 + steep + SAFETY * abs(fine - rough)
+        judged.error("|L| at the phase margin", abs(abs(fine) - 1), slack, 0.1)
+        judged.error("phase margin", abs(abs(np.angle(-fine)) * 180 / np.pi - printed), 60 * slack, 5.0)
+
+
+def scaled(law, t):
+    """All gains times t."""
+    return Law(law.K1 * t, law.K2 * t, law.Kp * t)
+
+
+def loop_function(model, law, w):
+    """L(i w) = -u_fed_back/u of the model."""
+    s = 1j * w
+    theta = model.coordinates(s)[0] @ model.b
+    moment = (model.hub * s * s * theta - 1) / (1 + model.C * s)
+    return (law.Kp + law.K1 * s) * theta + law.K2 * moment
+
+
+def disk(L):
+    """2 |(1 + L)/(1 - L)|."""
+    return 2 * abs((1 + L) / (1 - L))
+
+
+def peak(L):
+    """|1/(1 + L)|."""
+    return 1 / abs(1 + L)
+
+
+def extreme(f, model, law, where):
+    """The extreme of f(L) next to a frequency printed to seven digits: the least of `disk`, the largest of `peak`."""
+    sign = 1 if f is disk else -1
+    reach = where * 2e-6
+    found = minimize_scalar(
+        lambda w: sign * f(loop_function(model, law, w)),
+        bounds=(where - reach, where + reach), method="bounded", options={"xatol": 1e-4 * reach},
+    )  # fmt: skip
+    return sign * min(found.fun, sign * f(loop_function(model, law, where)))
+
+
+def dense(models, law, top):
+    """A grid up to `top` [rad/s], with points about each pole, closed or open loop, as near as it is to the axis."""
+    poles = np.r_[oscillating(models.rough, law, top), models.rough.modes[0]]
+    poles = poles[(poles.imag > 0) & (poles.imag < top)][:40]
+    near = (poles.imag[:, None] + abs(poles.real[:, None]) * np.array([-3.0, -1.0, -0.3, 0.0, 0.3, 1.0, 3.0])).ravel()
+    w = np.r_[near, np.geomspace(1e-3 * models.rough.modes[0][0], top, 120)]
+    return np.unique(w[(w > 0) & (w < top)])
+
+
+@dataclass(frozen=True)
+class Map:
+    """`tfarm map`: the counts at a dozen points of the grid, and boundary points that are poles on the axis."""
+
+    oracle = "poles of the model right of the axis at 12 grid points; inverse iteration from 5 boundary points"
+
+    def arguments(self, case):
+        unit = case.beam.total_inertia * case.first * log(case.rng, 0.05, 3.0)
+        return [f"--K1={-0.3 * unit!r},{unit!r}", "--K2=-2,2", f"--Kp={case.law.Kp!r}", "--points", "21"]
+
+    def judge(self, case, models, ran):
+        judged, answer, rng = Judged(), ran.answer, case.rng
+        for _ in range(12):
+            i, j = rng.integers(len(answer["K1"])), rng.integers(len(answer["K2"]))
+            law = Law(answer["K1"][i], answer["K2"][j], case.law.Kp)
+            printed, count = answer["unstable_roots"][j][i], growing(models, law)
+            if count is None or abs(law.K2 - 1) < 1e-9:
+                judged.blind += 1
+            elif printed == "inf":
+                judged.truth(f"infinitely many for {count} at {law}", count > 20)
+            elif answer["band_rad_s"] > trusted(models) and case.beam.link.damping:
+                judged.truth(f"{printed} for at least {count} unstable at {law}", printed >= count)
+            else:
+                judged.truth(f"{printed} for {count} unstable at {law}", printed == count)
+        points = [point for point in answer["boundary"] if point[2] < trusted(models)]
+        for at in rng.permutation(len(points))[:5]:
+            K1, K2, w = points[at]
+            pole_check(judged, "boundary", 1j * w, models, Law(K1, K2, case.law.Kp))
+        return judged
+
+
+@dataclass(frozen=True)
+class Locus:
+    """`tfarm locus` along K2: its last points are poles of the model."""
+
+    oracle = "inverse iteration from the last points of the branches"
+
+    def arguments(self, case):
+        vary = str(case.rng.choice(["K1", "K2"]))
+        stop = 2.0 if vary == "K2" else 2 * abs(case.law.K1)
+        return ["--vary", vary, "--from", "0", "--to", repr(stop), "--points", "60", *case.law.options]
+
+    def judge(self, case, models, ran):
+        judged, answer = Judged(), ran.answer
+        law = replace(case.law, **{answer["vary"]: answer["gain"][-1]})
+        for branch in answer["branches"]:
+            pole = complex(*branch[-1])
+            if abs(pole) > 1e-6 * case.first and abs(pole) < trusted(models):
+                pole_check(judged, "end of a branch", pole, models, law)
+        return judged
+
+
+@dataclass(frozen=True)
+class Design:
+    """`tfarm design`: the gains are stable, have the value printed; random ones within the bounds are no better."""
+
+    oracle = (
+        "least damping ratio of the model's poles in the band, at the gains and at 300 random ones within the bounds"
+    )
+
+    def arguments(self, case):
+        return ["--objective", "damping"]
+
+    def judge(self, case, models, ran):
+        judged, answer = Judged(), ran.answer
+        law = Law(answer["K1"], answer["K2"], answer["Kp"])
+        count = growing(models, law)
+        judged.truth(f"{count} poles grow at the gains recommended", not count)
+        omega = models.fine.modes[0]
+        band = (omega[answer["modes"] - 1] + omega[answer["modes"]]) / 2
+        own = ratio(models.rough, law, band)
+        judged.error("value", abs(own - answer["value"]), 1e-4 + 1e-3 * abs(own), 1.0)
+        bounds, rng = answer["bounds"], np.random.default_rng(1)
+        best, better = own, None
+        for _ in range(300):
+            K1 = bounds["K1"][1] * log(rng, 1e-4, 1) if rng.random() < 0.5 else rng.uniform(*bounds["K1"])
+            other = Law(float(K1), float(rng.uniform(*bounds["K2"])), law.Kp)
+            if ratio(models.coarse, other, band) > 1.02 * best + 1e-3 and growing(models, other) == 0:
+                best, better = ratio(models.rough, other, band), other
+        judged.truth(f"{better} has {best:.6g}, better than {own:.6g}", best <= 1.01 * own + 1e-3)
+        return judged
+
+
+def ratio(model, law, band):
+    """The least damping ratio of the model's oscillating poles below the band [rad/s]."""
+    s = oscillating(model, law, band)
+    s = s[(s.imag > 1e-9 * abs(s)) & (s.imag < band)]
+    return float((-s.real / abs(s)).min(initial=1.0))
