@@ -260,3 +260,12 @@ def test_a_passive_hub_keeps_its_disk_margin_without_damping():
         assert found.exact_delay == 0.0
     both = margins(arm, HubFeedback(K1=0.3, K2=0.1))
     assert (both.exact_delay, both.exact_disk, both.exact_peak) == (0.0, 0.0, np.inf)
+
+
+def test_a_dip_is_found_to_nine_digits_however_narrow_it_is_beside_its_frequency() -> None:
+    """|i w - p| of a pole is least at its imaginary part, where it is the real part: a millionth of a rad/s in 1e5."""
+    for real, imag in ((-1e-6, 12345.678), (-1e-3, 1.2e5), (-0.3, 2.0)):
+        omega = imag + abs(real) * np.array([-40.0, -2.1, -0.9, 0.37, 1.3, 50.0])
+        least, at = lowest(lambda w, p=complex(real, imag): abs(1j * w - p), omega)
+        assert least == pytest.approx(abs(real), rel=1e-9)
+        assert abs(at - imag) < 1e-4 * abs(real)

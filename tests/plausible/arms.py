@@ -108,7 +108,7 @@ def draw(number, seed):
     rng = np.random.default_rng([seed, number])
     material = str(rng.choice(list(MATERIALS)))
     length, slenderness = log(rng, 0.05, 10.0), log(rng, 5.0, 300.0)
-    shape, lines, area, second, factor = _section(rng, length / slenderness, material)
+    shape, lines, area, second, factor = _section(rng, length / slenderness, slenderness, material)
     density, E, nu = MATERIALS[material]
     G = CFRP_SHEAR if nu is None else E / (2 * (1 + nu))
     beam_mass = density * area * length
@@ -135,11 +135,11 @@ def draw(number, seed):
     return Case(number, int(rng.integers(2**62)), "\n".join(text) + "\n", beam, first, law, period, delay)
 
 
-def _section(rng, depth, material):
+def _section(rng, depth, slenderness, material):
     """Shape, lines of TOML, area [m^2], second moment [m^4] and shear factor; `depth` [m] in the plane of bending."""
     shape, nu = str(rng.choice(["rectangle", "round", "tube"])), MATERIALS[material][2]
     if shape == "rectangle":
-        width = depth * log(rng, 0.3, 30.0)
+        width = min(depth * log(rng, 0.3, 30.0), depth * slenderness / 3)
         lines, area, second = [f"width = {width!r}", f"depth = {depth!r}"], width * depth, width * depth**3 / 12
         cowper = None if nu is None else 10 * (1 + nu) / (12 + 11 * nu)
     elif shape == "round":

@@ -56,7 +56,13 @@ class Model:
 
     def coordinates(self, s, law=None):
         """q per torque at each s: (points, coordinates)."""
-        return np.array([np.linalg.solve(self.matrix(p, law), self.b.astype(complex)) for p in np.atleast_1d(s)])
+        return np.array([self._solved(complex(p), law) for p in np.atleast_1d(s)])
+
+    def _solved(self, s, law):
+        try:
+            return np.linalg.solve(self.matrix(s, law), self.b.astype(complex))
+        except np.linalg.LinAlgError:  # on a pole to the last bit
+            return np.linalg.solve(self.matrix(s * (1 + 4 * EPS), law), self.b.astype(complex))
 
     def response(self, name, s, x=None):
         """An output per torque at points s: (points,)."""
@@ -114,7 +120,10 @@ class Model:
 
     def polished(self, s, law=None):
         """The pole next to s [1/s] and the size of the last step."""
-        x, fixed = self.b.astype(complex), np.cos(np.arange(self.b.size))
+        if law is not None and self.C == 0 and law.K2 != 1:
+            return self._polished_undamped(s, law)
+        x, fixed = np.exp(1j * np.arange(self.b.size)), np.cos(np.arange(self.b.size))
+        x = np.linalg.solve(self.matrix(s * (1 + 1e-9), law), x)  # of the pole at s, not of its mirror image
         for _ in range(STEPS):
             slope = 2 * s * self.M + np.diag(self.C * self.B).astype(complex)
             A = self.matrix(s)
@@ -131,7 +140,23 @@ class Model:
                 break
         return s, abs(step)
 
+    def _polished_undamped(self, s, law):
+        """The same at C = 0, where the modes are uncoupled: zeros of (s^2 + w_k^2) (1 + g sum of b^2/(s^2 + w^2)).
 
-def agreed(beam, rough, fine):
-    """Two models of an arm."""
-    return Model(beam, rough), Model(beam, fine)
+        k is the mode next to s, so that a pole beside the arm's own one is a zero like any other.
+        """
+        omega, shapes = self._with_rigid
+        b2 = (self.b @ shapes) ** 2
+        k = int(np.argmin(abs(s * s + omega**2)))
+        others = np.arange(omega.size) != k
+        for _ in range(4 * STEPS):
+            g, dg = self._feedback(s, law)
+            below = s * s + omega[others] ** 2
+            H, dH = (b2[others] / below).sum(), -2 * s * (b2[others] / below**2).sum()
+            own = s * s + omega[k] ** 2
+            value = own * (1 + g * H) + g * b2[k]
+            step = value / (2 * s * (1 + g * H) + own * (dg * H + g * dH) + dg * b2[k])
+            s = s - step
+            if abs(step) <= 4 * EPS * abs(s):
+                break
+        return s, abs(step)

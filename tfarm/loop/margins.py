@@ -36,6 +36,7 @@ from .windows import Windows, gain_windows
 Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
 DIGITS, PLACE_DIGITS = 9, 7  # of a margin, and of the frequency of a dip, which its depth hardly feels
+BOTTOM = 1e-6  # of the gap between grid points: a dip's bottom is flat, so its depth is right to the square of that
 LOWEST = 6  # local minima on the grid that are refined
 NEAR_POLES = np.geomspace(0.05, 20.0, 12)  # points about a pole, in its distances from the axis
 
@@ -212,11 +213,14 @@ def lowest(f: Callable[[Real], Real], omega: Real) -> tuple[float, float]:
     best = int(np.argmin(values))
     least, at = float(values[best]), float(omega[best])
     for i in dips[np.argsort(values[dips])][:LOWEST]:
-        found = minimize_scalar(
-            lambda w: float(f(np.array([w]))[0]), bounds=(omega[i - 1], omega[i + 1]), method="bounded"
-        )
+        low, width = float(omega[i - 1]), float(omega[i + 1] - omega[i - 1])
+
+        def value(share: float, low: float = low, width: float = width) -> float:
+            return float(f(np.array([low + share * width]))[0])
+
+        found = minimize_scalar(value, bounds=(0.0, 1.0), method="bounded", options={"xatol": BOTTOM})
         if found.fun < least:
-            least, at = float(found.fun), float(found.x)
+            least, at = float(found.fun), low + float(found.x) * width
     return least, at
 
 
