@@ -4,7 +4,10 @@ import json
 
 import pytest
 
+import tfarm
 from tfarm.cli import main
+from tfarm.reduced import reduction
+from tfarm.reduced.modal import relaxed_model
 
 
 def run(capsys, *arguments):
@@ -66,6 +69,28 @@ def test_bad_input_is_one_line(capsys, arguments):
 
 
 def test_an_error_out_of_reach(capsys):
-    code, _, err = run(capsys, "sasaki2012", "--error", "1e-16")
+    code, _, err = run(capsys, "sasaki2012", "--error", "1.1e-14", "--method", "aaa", "--band", "1,100")
     assert code == 3
     assert err.count("\n") == 1
+
+
+def test_an_error_below_that_of_the_exact_values_is_refused_at_once(capsys):
+    code, out, err = run(capsys, "sasaki2012-lab", "--error", "1e-30")
+    assert (code, out) == (2, "")
+    assert err == (
+        "tfarm: error = 1e-30: the exact values it is measured against are float64 numbers; ask for 1e-14 or more\n"
+    )
+
+
+def test_the_search_ends_where_more_modes_no_longer_help(monkeypatch):
+    """The relaxed model's error has a floor, that of one state for all modes left out: no 199 damped modes for it."""
+    asked = []
+    lab = tfarm.load("sasaki2012-lab")
+
+    def model(arm, names, count, x):
+        asked.append(count)
+        return relaxed_model(arm, names, count, x)
+
+    bench = reduction._Bench(lab, ("root_moment",), (1.0, 30.0), None, None)
+    assert bench._few_modes(1.1e-14, model, 199) is None
+    assert max(asked) < 60

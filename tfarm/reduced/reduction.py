@@ -21,7 +21,7 @@ from tfarm.records import record
 from tfarm.response import Wanted, transfer
 from tfarm.spectrum import modes
 
-from .accuracy import Ruler
+from .accuracy import ROUNDING, Ruler
 from .modal import modal_model, relaxed_model
 from .partial_fractions import Complex, Matrices, PartialFractions
 from .rational import modes_in, rational_model
@@ -35,6 +35,7 @@ Method = Literal["modal", "aaa"]
 BAND = (0.1, 1000.0)
 MOST_ORDER = 400
 MOST_TAILS = 12  # pairs of poles above the band; more fit rounding
+FALLS = 0.5  # of the error, or more, goes with 2.25 times the modes, even where it falls as 1/n; less is its floor
 SAME = 1e-6  # relative gap within which a pole of the model is a mode of the arm
 
 
@@ -205,9 +206,11 @@ class _Bench:
             return self.ruler.rough(make(self.arm, self.rows, count, self.x))
 
         good, bad = 0, -1
+        sizes: list[float] = []  # of the errors with more and more modes, once all those of the band are there
         try:
-            while rough(good) > error:
-                if good == most:
+            while (size := rough(good)) > error:
+                sizes += [size] * (good > self.inside)
+                if good == most or (len(sizes) > 2 and sizes[-1] > FALLS * sizes[-3]):
                     return None
                 good, bad = min(good + max(good // 2, 2), most), good
         except ConvergenceError:  # at C > 0 no more damped modes can be told apart
@@ -265,4 +268,7 @@ def _band(band: Any) -> tuple[float, float]:
 def _error(error: Any) -> float:
     if isinstance(error, bool) or not isinstance(error, int | float) or not 0 < error < math.inf:
         raise ParameterError(key="error", value=error, remedy="a positive number, such as 1e-6")
+    if error < ROUNDING:
+        remedy = f"the exact values it is measured against are float64 numbers; ask for {ROUNDING:g} or more"
+        raise ParameterError(key="error", value=error, remedy=remedy)
     return float(error)
