@@ -19,7 +19,9 @@ SURVEYS := \
 	loop.agreement \
 	reduced.errors \
 	dsp.verdicts \
-	tuner.bounded
+	tuner.bounded \
+	cli.fuzz \
+	cli.kills
 
 .PHONY: help install reports modes bode margins locus sampled tune audit test survey lint bench clean
 

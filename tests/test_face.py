@@ -1,5 +1,6 @@
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -50,3 +51,18 @@ def test_no_name_of_the_face_is_a_room():
         "cli",
     }
     assert not rooms & set(tfarm.__all__)
+
+
+@pytest.mark.parametrize("arm", ["sasaki2012", Path("arm.toml"), None])
+def test_a_name_in_the_place_of_an_arm_is_refused_with_what_to_write(arm):
+    law = tfarm.HubFeedback(K1=0.3, K2=0.3)
+    calls = (
+        lambda: tfarm.modes(arm, count=3),
+        lambda: tfarm.transfer(arm, "root_moment"),
+        lambda: tfarm.closed_loop_poles(arm, law, 3),
+        lambda: tfarm.margins(arm, law),
+        lambda: tfarm.reduce(arm, ["root_moment"], order=4),
+    )
+    for call in calls:
+        with pytest.raises(tfarm.ParameterError, match=r"arm = .*: is no Arm; give tfarm.load\('[\w.]+'\)"):
+            call()

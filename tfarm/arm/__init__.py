@@ -3,7 +3,7 @@
 from tfarm.arm.feedback import HubFeedback
 from tfarm.arm.plausible import implausible
 from tfarm.arm.reading import load, presets
-from tfarm.arm.records import Arm, Hub, Link, Payload, must_turn
+from tfarm.arm.records import Arm, Hub, Link, Payload, must_be_arm, must_turn
 from tfarm.arm.sections import Section
 from tfarm.arm.writing import to_toml
 
@@ -16,6 +16,7 @@ __all__ = [
     "Section",
     "implausible",
     "load",
+    "must_be_arm",
     "must_turn",
     "presets",
     "to_toml",

@@ -6,11 +6,12 @@ Letters as in the paper: E, G, rho, A, I, kappa, C, I_h, m, I_c.
 from __future__ import annotations
 
 import math
+import os
 from dataclasses import dataclass, field
 
 from tfarm.arm.checks import extended, not_negative, number, positive
 from tfarm.arm.sections import Section
-from tfarm.errors import ParameterError
+from tfarm.errors import ParameterError, shown
 
 MEANINGS = {
     "length": "a length is a positive, finite number of metres",
@@ -177,6 +178,13 @@ class Arm:
     def shear_cutoff(self) -> float:
         """sqrt(kGA/rhoI) [rad/s], above which both pairs of waves travel."""
         return math.sqrt(self.link.kGA / self.link.rhoI)
+
+
+def must_be_arm(arm: object) -> None:
+    """Raise ParameterError where a name, a path or anything else stands in the place of an Arm."""
+    if not isinstance(arm, Arm):
+        name = str(arm) if isinstance(arm, str | os.PathLike) else "sasaki2012"
+        raise ParameterError(key="arm", value=arm, remedy=f"is no Arm; give tfarm.load({shown(name)})")
 
 
 def must_turn(arm: Arm) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, HubFeedback
+from tfarm.arm import Arm, HubFeedback, must_be_arm
 from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import Gains, loop_parts
 from tfarm.exact.coefficients import Coefficients, coefficients
@@ -37,6 +37,7 @@ class Loop:
     law: HubFeedback
 
     def __post_init__(self) -> None:
+        must_be_arm(self.arm)
         if self.arm.is_locked:
             remedy = "a locked hub (inertia = inf) takes no torque: there is no loop; give the hub a finite inertia"
             raise ParameterError(key="hub.inertia", value=self.arm.hub.inertia, remedy=remedy)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tfarm.arm import Arm
+from tfarm.arm import Arm, must_be_arm
 from tfarm.errors import MISSING, ParameterError
 from tfarm.exact.coefficients import coefficients
 from tfarm.exact.outputs import Output, output
@@ -51,6 +51,7 @@ class TransferFunction:
     """
 
     def __init__(self, arm: Arm, outputs: Wanted, *, x: float | None = None) -> None:
+        must_be_arm(arm)
         self.arm = arm
         self.is_single = isinstance(outputs, str | Output)
         asked = (outputs,) if isinstance(outputs, str | Output) else tuple(outputs)

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm
+from tfarm.arm import Arm, must_be_arm
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exact.appendix import roots_near
 from tfarm.exact.coefficients import THEORIES, Coefficients, Theory, coefficients
@@ -227,6 +227,7 @@ def modes(arm: Arm, count: int | None = None, *, up_to: float | None = None, the
     double frequencies listed twice.  `theory` is one of timoshenko, shear, rayleigh, euler-bernoulli.
     Raises ParameterError for a count outside 1..10000 or a frequency that is not positive.
     """
+    must_be_arm(arm)
     k = replace(coefficients(arm, theory), damping=0.0)
     rigid = arm.has_rigid_mode
     if (count is None) == (up_to is None):

@@ -1,0 +1,264 @@
+"""Arm files and options that nobody would write, through the command line:  python -m tests.cli.fuzz 5000 [seed]
+
+SIZE arm files (presets with lines changed, doubled, cut or filled with odd values, and files of noise), each through
+one verb with its defaults, and SIZE/17 sets of odd options on the presets.  Each command must exit 0, 2 or 3, say
+nothing on standard error but lines that begin with `tfarm:`, at most one of them an error and none a traceback, and
+take no more than 20 CPU seconds; with --json it prints one object or nothing.
+
+A worker process runs the commands; one that exceeds its CPU time ends its worker, and another takes over.
+"""
+
+import json
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+import tfarm
+
+CPU_SECONDS = 20
+STARTING = 5  # CPU seconds that imports and kernels from the cache may take the first command of a worker
+OPTIONS_PER_FILE = 17  # 5,000 files go with 300 sets of options
+PRESETS = Path(tfarm.__file__).parent / "arm" / "presets"
+VERBS = (
+    "modes", "response --output root_moment --points 20", "poles --count 4", "margins", "map --points 12",
+    "sampled", "simulate --duration 0.2", "assumptions --count 2", "reduce --order 6",
+    "locus --vary K2 --from 0 --to 0.5 --points 5 --branches 3", "design --modes 1",
+)  # fmt: skip
+NUMBERS = (
+    "0", "-0.0", "1", "-1", "1e-300", "1e300", "1e308", "1e-40", "1e40", "nan", "inf", "-inf", "true", '"1"', "[]",
+    "{}", "1_0", "0x10", "1e", "0.5", "1e-3", "1e3", "1e6", "12.0", "0.02", "2.1e11", "210.0", "1979-05-27", "9" * 400,
+)  # fmt: skip
+WORDS = (
+    "", "0", "1", "2", "-1", "3.5", "1e3", "1e308", "-1e308", "1e-308", "nan", "inf", "-inf", "5_0", "٣", "abc", "1,2",
+    "2,1", "0,0", "nan,inf", "1e-12,1e12", "1j", "1e300j", "0.3+57.1j,10j", "-", "--", "é", "\x00", "a" * 5000, "/",
+    "..", "0.01", "0.1", "10", "100",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Found:
+    """What came of a command."""
+
+    arguments: tuple[str, ...]
+    code: int | None  # None where it was ended for its CPU time
+    seconds: float
+    wrong: str
+
+
+# ---------------------------------------------------------------- drawing
+
+
+def odd_file(rng):
+    """The bytes of an arm's file with something odd in it."""
+    names = sorted(PRESETS.glob("*.toml"))
+    lines = names[rng.integers(len(names))].read_text(encoding="utf-8").splitlines()
+    for _ in range(int(rng.integers(1, 4))):
+        lines = _changed(rng, lines)
+    text = "\n".join(lines).encode()
+    if rng.random() < 0.1:  # a few bytes of noise
+        at = int(rng.integers(len(text) + 1))
+        text = text[:at] + rng.bytes(int(rng.integers(1, 9))) + text[at:]
+    if rng.random() < 0.05:
+        text = text[: int(rng.integers(len(text) + 1))]
+    return text
+
+
+def _changed(rng, lines):
+    """One line with another value, scaled by some powers of ten, twice, elsewhere or gone."""
+    settings = [i for i, line in enumerate(lines) if "=" in line]
+    i = int(rng.choice(settings)) if settings else 0
+    key, _, value = lines[i].partition("=")
+    draw = rng.random()
+    if draw < 0.15:
+        return [*lines[:i], f"{key}= {rng.choice(NUMBERS)}", *lines[i + 1 :]]
+    if draw < 0.8:
+        try:
+            number = float(value.partition("#")[0]) * 10.0 ** rng.uniform(-4, 4)
+        except ValueError:
+            return lines
+        return [*lines[:i], f"{key}= {number!r}", *lines[i + 1 :]]
+    if draw < 0.84:
+        return [*lines[:i], *lines[i + 1 :]]
+    if draw < 0.88:
+        return [*lines[: i + 1], *lines[i:]]
+    if draw < 0.94:
+        return [*lines[:i], lines[i].replace(key.strip(), key.strip()[:-1] + "x"), *lines[i + 1 :]]
+    tables = ("[sampling]", "period = 1e-9", "[converters]", "moment_bits = 99", "[slew]", "[[link]]", "[hub.x]")
+    return [*lines, str(rng.choice(tables))]
+
+
+def odd_options(rng, options):
+    """A verb of the command line with one to four of its options, each with an odd word."""
+    verb = str(rng.choice(sorted(options)))
+    arguments = [verb]
+    if verb not in ("presets", "audit", "validate"):
+        arguments += [str(rng.choice(tfarm.presets()))]
+    if verb == "study":
+        arguments += [str(rng.choice(["curves", "map", "nonsense"]))]
+    known = options[verb]
+    for _ in range(int(rng.integers(1, 5))):
+        name, is_flag = known[int(rng.integers(len(known)))]
+        arguments += [name] if is_flag else [name, str(rng.choice(WORDS))]
+    return tuple(arguments)
+
+
+def options_of_the_verbs():
+    """Of each verb but those that take minutes by their purpose: its options, and whether each is a flag."""
+    import typer
+
+    from tfarm.cli.running import app
+
+    verbs = typer.main.get_command(app).commands
+    return {
+        name: [
+            (param.opts[0], bool(getattr(param, "is_flag", False))) for param in verb.params if param.opts[0][:1] == "-"
+        ]
+        for name, verb in verbs.items()
+        if name not in ("report", "tune", "study")
+    }
+
+
+def cases(number, seed, folder):
+    """The commands: odd files in `folder`, then odd options."""
+    rng = np.random.default_rng(seed)
+    drawn = []
+    for i in range(number):
+        file = folder / f"arm{i}.toml"
+        file.write_bytes(odd_file(rng))
+        verb, *rest = str(rng.choice(VERBS)).split()
+        drawn.append((verb, str(file), *rest, *(["--json"] if rng.random() < 0.5 else [])))
+    options = options_of_the_verbs()
+    return drawn + [odd_options(rng, options) for _ in range(-(-number // OPTIONS_PER_FILE))]
+
+
+# ---------------------------------------------------------------- running
+
+
+def work():
+    """A worker: commands from standard input, a line of JSON each; exit code, output, seconds back the same way."""
+    import contextlib
+    import io
+
+    from tfarm.cli import main
+
+    limit = STARTING
+    for line in sys.stdin:
+        limit += CPU_SECONDS
+        spent = time.process_time()
+        resource.setrlimit(resource.RLIMIT_CPU, (int(spent) + limit, resource.RLIM_INFINITY))
+        limit = 1
+        out, err = io.StringIO(), io.StringIO()
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+            try:
+                main(json.loads(line))
+                code = 0
+            except SystemExit as stop:
+                code = int(stop.code or 0)
+            except BaseException as error:  # what would be a traceback
+                code = 1
+                print(f"{type(error).__name__}: {error}", file=sys.stderr)
+        answer = [code, out.getvalue(), err.getvalue(), time.process_time() - spent]
+        print(json.dumps(answer), flush=True)
+
+
+class Worker:
+    """A process that runs commands one after the other, started again after each that it does not survive."""
+
+    def __init__(self, folder):
+        self.folder, self.process = folder, None
+
+    def run(self, arguments):
+        """Exit code (None: ended), output, errors and CPU seconds of one command."""
+        if self.process is None or self.process.poll() is not None:
+            command = [sys.executable, "-m", "tests.cli.fuzz", "--work"]
+            path = os.pathsep.join([os.getcwd(), os.environ.get("PYTHONPATH", "")])
+            self.process = subprocess.Popen(
+                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=self.folder,
+                env={**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"},
+            )  # fmt: skip
+        self.process.stdin.write(json.dumps(arguments) + "\n")
+        self.process.stdin.flush()
+        line = self.process.stdout.readline()
+        if not line:
+            self.process.wait()
+            return None, "", "", float(CPU_SECONDS)
+        return tuple(json.loads(line))
+
+    def end(self):
+        """Let the process end."""
+        if self.process is not None:
+            self.process.stdin.close()
+            self.process.stdout.close()
+            self.process.wait()
+
+
+def judge(arguments, code, out, err, seconds):
+    """The case with what is wrong with it, or with an empty text."""
+    lines = [line for line in err.splitlines() if line]
+    errors = [line for line in lines if not line.startswith(("tfarm: warning:", "tfarm: compiling once"))]
+    wrong = ""
+    if code is None or seconds > CPU_SECONDS:
+        wrong = f"more than {CPU_SECONDS} CPU seconds"
+    elif code not in (0, 2, 3):
+        wrong = f"exit {code}: {err.strip()[-200:]}"
+    elif strangers := [line for line in lines if not line.startswith("tfarm: ")]:
+        wrong = f"says {strangers[0][:200]}"
+    elif len(errors) > 1:
+        wrong = f"{len(errors)} errors: {errors[1][:200]}"
+    elif code and not errors:
+        wrong = f"exit {code} without a word"
+    elif "--json" in arguments and code == 0:
+        try:
+            json.loads(out)
+        except ValueError as error:
+            wrong = f"no JSON: {error}"
+    return Found(tuple(arguments), code, seconds, wrong)
+
+
+def survey(number, seed):
+    """Every command with what came of it."""
+    found = []
+    with tempfile.TemporaryDirectory() as name:
+        worker = Worker(name)
+        try:
+            for arguments in cases(number, seed, Path(name)):
+                found.append(judge(arguments, *worker.run(arguments)))
+                if found[-1].wrong:
+                    tell(found[-1])
+        finally:
+            worker.end()
+    return found
+
+
+def tell(found):
+    """A command that did wrong, with its file."""
+    print(f"WRONG {found.wrong} | {' '.join(map(repr, found.arguments))[:300]}", flush=True)
+    for argument in found.arguments:
+        if argument.endswith(".toml") and os.path.exists(argument):
+            print("   ", Path(argument).read_bytes(), flush=True)
+
+
+def main(number, seed):
+    """A tally; whether nothing was wrong."""
+    found = survey(number, seed)
+    wrong = sum(bool(each.wrong) for each in found)
+    slowest = max(found, key=lambda each: each.seconds)
+    print(f"{len(found)} commands: {dict(Counter(str(each.code) for each in found))}, {wrong} wrong")
+    print(f"slowest: {slowest.seconds:.1f} CPU s, {' '.join(slowest.arguments)[:200]}")
+    return not wrong
+
+
+if __name__ == "__main__":
+    if sys.argv[1:] == ["--work"]:
+        work()
+    else:
+        given = [int(text) for text in sys.argv[1:]] or [300]
+        sys.exit(not main(given[0], given[1] if len(given) > 1 else 1))

@@ -1,0 +1,161 @@
+"""Commands that write files, killed at random moments:  python -m tests.cli.kills 200 [seed]
+
+Each command runs in a copy of a folder that holds its files as another arm left them.  After each of SIZE kills every
+file there is whole, the old one or the new, to the last byte, and no page names a file that is not there; after at most
+five kills the same command runs to its end, and then the folder holds the new files and nothing else.
+
+The runs are forks of this process, so that the kills fall on the work and not on imports; half of them fall into the
+time from the first temporary file on.
+"""
+
+import os
+import re
+import shutil
+import signal
+import sys
+import tempfile
+import time
+from collections import Counter
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+if __name__ == "__main__":
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # a fork has none of its parent's threads
+
+import numpy as np
+
+import tfarm
+from tfarm.arm import to_toml
+from tfarm.cli.running import run
+
+KILLS_A_RUN = 5
+COMMANDS = {
+    "csv": ("response", "arm.toml", "--output", "root_moment", "--points", "3000", "--csv", "table.csv"),
+    "mat": ("simulate", "arm.toml", "--duration", "0.5", "--csv", "run.csv", "--mat", "run.mat"),
+    "save": ("tune", "arm.toml", "--trials", "1", "--guard", "none", "--duration", "1", "--save", "tuner.json"),
+    "report": ("report", "arm.toml", "--only", "modes", "--out", "pages"),
+}
+
+
+@dataclass
+class Files:
+    """A folder's files: name to content."""
+
+    content: dict[str, bytes] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, folder):
+        """All below a folder but the arm itself."""
+        found = sorted(path for path in folder.rglob("*") if path.is_file() and path.name != "arm.toml.given")
+        return cls({str(path.relative_to(folder)): path.read_bytes() for path in found})
+
+
+def started(arguments, folder):
+    """The process id of a fork that runs the command in that folder, silently."""
+    child = os.fork()
+    if child:
+        return child
+    try:
+        os.chdir(folder)
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, 1)
+        os._exit(run(list(arguments)))
+    except BaseException as error:
+        print(f"{type(error).__name__}: {error}", file=sys.stderr)
+    finally:
+        os._exit(1)
+
+
+def completed(arguments, folder):
+    """Run it to its end; the seconds that it took and those until the first temporary file, or None where it failed."""
+    begun, child, first = time.perf_counter(), started(arguments, folder), None
+    while True:
+        done, status = os.waitpid(child, os.WNOHANG)
+        if first is None and _is_writing(folder):
+            first = time.perf_counter() - begun
+        if done:
+            spent = time.perf_counter() - begun
+            return (spent, spent if first is None else first) if status == 0 else None
+        time.sleep(1e-4)
+
+
+def _is_writing(folder):
+    return any(
+        name.startswith(".") for each in (folder, folder / "pages") if each.is_dir() for name in os.listdir(each)
+    )
+
+
+def killed(arguments, folder, after, from_writing):
+    """Kill a run so many seconds after its start or, with `from_writing`, after its first temporary file."""
+    child = started(arguments, folder)
+    while from_writing and not _is_writing(folder) and not os.waitpid(child, os.WNOHANG)[0]:
+        time.sleep(1e-4)
+    time.sleep(after)
+    try:
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+    except (ProcessLookupError, ChildProcessError):  # it had ended
+        pass
+
+
+def wrong_with(found, old, new):
+    """What is wrong with the files after a kill, or an empty text."""
+    for name, content in found.content.items():
+        if any(part.startswith(".") for part in Path(name).parts):
+            continue  # what the next run has to remove
+        if content not in (old.content.get(name), new.content.get(name)):
+            return f"{name} is neither the old file nor the new one"
+        if name.endswith(".html"):
+            for target in re.findall(rb'(?:src|href)="([^"#:?]+)"', content):
+                if str(Path(name).parent / target.decode()) not in found.content:
+                    return f"{name} names {target.decode()}, which is not there"
+    return ""
+
+
+def _given(folder, arm):
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "arm.toml").write_text(to_toml(arm), encoding="utf-8")
+
+
+def survey(number, seed, names=tuple(COMMANDS)):
+    """The outcome of each kill and of each run after some: "whole", "clean", or what is wrong."""
+    rng = np.random.default_rng(seed)
+    outcomes = []
+    lab = tfarm.load("sasaki2012-lab")
+    other = replace(lab, hub=tfarm.Hub(inertia=0.2))
+    with tempfile.TemporaryDirectory() as place:
+        for which, name in enumerate(names):
+            arguments, folder = COMMANDS[name], Path(place) / name
+            _given(folder / "old", other)
+            completed(arguments, folder / "old")
+            shutil.copytree(folder / "old", folder / "new")
+            _given(folder / "new", lab)
+            completed(arguments, folder / "new")  # with everything compiled, and in the memory of the disk
+            spent, first = completed(arguments, folder / "new")
+            old, new = Files.of(folder / "old"), Files.of(folder / "new")
+            share = number // len(names) + (which < number % len(names))
+            while share > 0:
+                shutil.rmtree(folder / "now", ignore_errors=True)
+                shutil.copytree(folder / "old", folder / "now")
+                _given(folder / "now", lab)
+                for _ in range(min(share, KILLS_A_RUN)):
+                    late = bool(rng.random() < 0.5)
+                    killed(arguments, folder / "now", rng.uniform(0, 1.1 * (spent - first if late else spent)), late)
+                    outcomes.append(wrong_with(Files.of(folder / "now"), old, new) or "whole")
+                share -= KILLS_A_RUN
+                ended = completed(arguments, folder / "now") is not None
+                is_new = Files.of(folder / "now").content == new.content
+                outcomes.append("clean" if ended and is_new else f"{name}: a run after kills leaves other files")
+    return outcomes
+
+
+def main(number, seed):
+    """A tally; whether nothing was wrong."""
+    outcomes = survey(number, seed)
+    print(dict(Counter(outcomes)))
+    return set(outcomes) == {"whole", "clean"}
+
+
+if __name__ == "__main__":
+    GIVEN = [int(text) for text in sys.argv[1:]] or [200]
+    sys.exit(not main(GIVEN[0], GIVEN[1] if len(GIVEN) > 1 else 1))
