@@ -13,7 +13,7 @@ from tfarm.arm import HubFeedback
 from tfarm.dsp import Chain, Sampling, sampled_loop
 from tfarm.errors import CertificationError, ParameterError
 from tfarm.tuner import find_guard, slew_trial
-from tfarm.tuner.lyapunov import is_positive_definite, whole
+from tfarm.tuner.lyapunov import common_lyapunov, is_positive_definite, whole
 from tfarm.tuner.sector import SHARE, MovingGain
 
 FINE = np.r_[np.geomspace(1e-6, 1e-2, 500), np.linspace(1e-2, np.pi, 100_001)]
@@ -155,6 +155,23 @@ def test_a_planted_unstable_end_is_not_proven(loop):
     alone = solve_discrete_lyapunov(loop.at(0.31).T, np.eye(loop.drive.size))
     assert replace(proof, high=loop.at(0.31), P=alone).is_proven()
     assert not replace(proof, high=loop.at(0.31), P=-alone).is_proven()
+
+
+def test_an_unstable_middle_has_no_lyapunov_function_and_says_so_quietly():
+    """No overflow on the way: warnings are errors here."""
+    A, b = np.diag([1.5, 0.3]), np.ones(2)
+    assert common_lyapunov(A, b, b, A, A) is None
+
+
+@pytest.mark.parametrize("unit", [2.0**-40, 1e-9, 1e9])
+def test_a_proof_does_not_depend_on_the_units_of_the_states(loop, unit):
+    """The same loop with lengths, rates and torques in other units, as a micro-arm or a boom has them: proven alike."""
+    proof = loop.proof(0.31, 0.63)
+    units = unit ** np.linspace(-1.0, 1.0, loop.drive.size)
+    low, high = (A * units / units[:, None] for A in (proof.low, proof.high))
+    other = replace(proof, low=low, high=high, P=proof.P * units * units[:, None])
+    assert other.is_proven()
+    assert not replace(other, high=loop.at(1.3) * units / units[:, None]).is_proven()
 
 
 # ---------------------------------------------------------------- the guard that is chosen

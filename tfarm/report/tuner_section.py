@@ -232,7 +232,8 @@ def comparison_table(data: TunerStudy) -> Table:
             f"all others. None: no moment feedback. Constant: the best constant gain as trained, {_gain(data)}; own "
             "constant: the best one for that row. Bound: the linear-quadratic optimum. ZV and EI: input shaping with "
             "no moment feedback, judged by their own, later slew, so that the bound is not theirs. Guard proven: "
-            f"whether the same range of gains is proven for that arm and chain too{away_from_it}. {SHORT_SIGN}"
+            f"whether the same range of gains is proven for that arm and chain too, with the trial's "
+            f"{data.tuning.trial.loop.plant.count} modes{away_from_it}.{_unit_words(data)} {SHORT_SIGN}"
         ),
         columns=(*_of_each(data, "cost", 4), text_column("guard_proven", "guard proven", proven)),
     )
@@ -257,6 +258,12 @@ def _of_each(data: TunerStudy, name: str, digits: int) -> tuple[Column, ...]:
         values = np.array([getattr(getattr(row, key), name) for row in data.rows])
         columns.append(number_column(f"{key}_{name}", title, "", values, aligned(values, digits, least=2)))
     return tuple(columns)
+
+
+def _unit_words(data: TunerStudy) -> str:
+    """In what the cost counts moments and torques, where that is not 1 N m."""
+    unit = data.tuning.plan.scale
+    return "" if unit == 1.0 else f" Costs count moments and torques in units of {plain(unit)} N m, as suits this arm."
 
 
 def _gain(data: TunerStudy) -> str:

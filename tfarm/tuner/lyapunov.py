@@ -45,16 +45,29 @@ class Lyapunov:
         return np.asarray(np.linalg.cholesky(self.P), dtype=float)
 
     def is_proven(self) -> bool:
-        """Whether P > 0 and both inequalities hold in exact arithmetic."""
-        P, _ = whole(np.round(np.ldexp(self.P / abs(self.P).max(), DIGITS)))
-        return is_positive_definite(P) and all(_falls(P, A) for A in (self.low, self.high))
+        """Whether P > 0 and both inequalities hold in exact arithmetic.
+
+        In the states 2^k s, k whole and such that P has diagonal entries near 1: units of length, torque and stiffness
+        then leave P all its digits, and nothing is rounded by the change of units, for powers of two are exact.
+        """
+        diagonal = np.diag(self.P)
+        if not (np.isfinite(self.P).all() and (diagonal > 0).all()):
+            return False
+        units = 2.0 ** np.round(-np.log2(diagonal) / 2)
+        scaled = self.P * units * units[:, None]
+        P, _ = whole(np.round(np.ldexp(scaled / abs(scaled).max(), DIGITS)))
+        ends = (A * units / units[:, None] for A in (self.low, self.high))
+        return is_positive_definite(P) and all(_falls(P, A) for A in ends)
 
 
 def common_lyapunov(middle: Real, drive: Real, sense: Real, low: Real, high: Real) -> Lyapunov | None:
     """The Lyapunov function of the segment from `low` to `high`, or None where none is found.
 
     `middle` lies between them, and drive sense^T is half of low - high.  Of several strictnesses the best is taken.
+    Where `middle` is not stable there is none.
     """
+    if not abs(np.linalg.eigvals(middle)).max() < 1.0:
+        return None
     scale = _sizes(middle, drive)
     A, b, c = middle * scale / scale[:, None], (drive / scale)[:, None], (sense * scale)[None]
     found: list[Lyapunov] = []
