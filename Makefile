@@ -23,7 +23,7 @@ SURVEYS := \
 	cli.fuzz \
 	cli.kills
 
-.PHONY: help install reports modes bode margins locus sampled tune audit test survey lint bench clean
+.PHONY: help install reports modes bode margins locus sampled tune audit test kernels survey lint bench clean
 
 help: ## list these verbs
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile | while IFS="$$(printf '\t')" read -r verb what; do \
@@ -57,6 +57,9 @@ audit: $(INSTALLED) ## check the paper equation by equation
 
 test: $(INSTALLED) ## run the tests
 	@$(BIN)/python -m pytest -n 2
+
+kernels: $(INSTALLED) ## run the numerical rooms under other kernels of BLAS and NumPy (ONLY=--marked: CI's minute)
+	@$(BIN)/python -m tests.kernels $(ONLY)
 
 survey: $(INSTALLED) ## search random cases for a wrong answer (SIZE, SEED, SURVEYS=one or more)
 	@failed=; for each in $(SURVEYS); do echo "== $$each $(SIZE) $(SEED)"; \

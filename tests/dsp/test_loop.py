@@ -9,6 +9,8 @@ from tfarm.dsp import Actuator, Chain, Converters, Sampling, closed_loop, sample
 from tfarm.dsp.law import first_order_law, mode_table, root_locus
 from tfarm.errors import ParameterError
 
+pytestmark = pytest.mark.kernels
+
 T = 0.01
 
 

@@ -52,6 +52,7 @@ def modal_poles(arm, feedback, count):
     return eigenvalues, np.finfo(float).eps * np.linalg.norm(closed) / abs((left.conj() * right).sum(axis=0))
 
 
+@pytest.mark.kernels
 def test_modal_models_converge_to_the_exact_poles() -> None:
     exact, misses = closed_loop_poles(ARM, LAW, 6).moving, []
     for count in (5, 10, 20, 60):
@@ -61,6 +62,7 @@ def test_modal_models_converge_to_the_exact_poles() -> None:
     assert misses[3] < 1e-12
 
 
+@pytest.mark.kernels
 @pytest.mark.parametrize("count", [10, 40])
 @pytest.mark.parametrize("arm", [ARM, LAB], ids=["paper", "lab"])
 def test_a_modal_model_misses_by_its_own_error(arm, count: int) -> None:

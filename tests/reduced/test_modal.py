@@ -15,6 +15,8 @@ from tests.strategies import BOUNDARY_CASES, some_arm
 from tfarm import Hub, ParameterError, Payload
 from tfarm.reduced import modal_model, relaxed_model
 
+pytestmark = pytest.mark.kernels
+
 ENDS = ("hub_angle", "hub_rate", "tip_displacement", "tip_deflection", "tip_acceleration", "root_moment", "root_shear")
 ALONG = ("deflection", "rotation", "moment", "shear")
 EPS = np.finfo(float).eps

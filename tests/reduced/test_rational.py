@@ -14,6 +14,8 @@ from tfarm import Hub, ParameterError, Payload
 from tfarm.reduced import modal_model, rational_model, reduce
 from tfarm.reduced.rational import aaa_poles
 
+pytestmark = pytest.mark.kernels
+
 HUB = ("root_moment", "hub_rate", "hub_angle")
 ALL = (*HUB, "tip_displacement", "tip_deflection", "tip_acceleration", "root_shear")
 

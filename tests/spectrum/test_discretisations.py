@@ -11,6 +11,8 @@ from tests import elements
 from tests.models import Ritz
 from tfarm import Arm, Hub, Link, Payload, Section
 
+pytestmark = pytest.mark.kernels
+
 EPS = np.finfo(float).eps
 COUNT = 4
 MESHES = {1: (48, 96), 2: (24, 48), 3: (12, 16)}

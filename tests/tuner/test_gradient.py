@@ -8,6 +8,8 @@ from tests.tuner.plain import PlainTrial, complex_step, plain_gain
 from tfarm.dsp import Chain, Converters, Sampling
 from tfarm.tuner import initial_network, kernel, slew_trial
 
+pytestmark = pytest.mark.kernels
+
 NONE, SECTOR = np.zeros(3), np.array([1.0, 0.3, 0.64])
 
 

@@ -1,0 +1,35 @@
+"""That `make kernels` runs what it says it runs."""
+
+from types import SimpleNamespace
+
+from tests import kernels
+
+
+def test_what_is_chosen_is_what_runs() -> None:
+    """Where NumPy and SciPy bring their OpenBLAS, the oldest kernels are never a CPU's own; NumPy's loops likewise."""
+    own, oldest = kernels.probed({}), kernels.probed({"OPENBLAS_CORETYPE": "Prescott"})
+    assert own.count(", ") == 2
+    if "no OpenBLAS" not in own:
+        assert oldest.split(", ")[:2] != own.split(", ")[:2]
+    assert oldest.split(", ")[2] == own.split(", ")[2]
+    plain = kernels.probed(kernels.variants(kernels.CORES)["NumPy without AVX512, AVX2 and FMA3"])
+    assert plain == ", ".join([*own.split(", ")[:2], "baseline"])
+
+
+def test_a_kernel_that_is_none_is_named_and_skipped(monkeypatch, capsys) -> None:
+    """SkylakeX dies of an unknown instruction, Zen is Haswell again, Nehalem has a failing test."""
+    what = {"Haswell": "h", "SkylakeX": "exit -4", "Zen": "h", "Nehalem": "n", "Prescott": "p"}
+    ran = []
+
+    def run(_, env, check):
+        ran.append(env.get("OPENBLAS_CORETYPE"))
+        return SimpleNamespace(returncode=int(ran[-1] == "Nehalem"))
+
+    monkeypatch.setattr(kernels, "probed", lambda chosen: what.get(chosen.get("OPENBLAS_CORETYPE"), str(chosen)))
+    monkeypatch.setattr(kernels.subprocess, "run", run)
+    assert kernels.main(["tests/exact"]) == 1
+    assert ran == ["Haswell", "Nehalem", "Prescott", None, None]
+    said = capsys.readouterr().out
+    assert "OpenBLAS SkylakeX: skipped, this CPU cannot run it (exit -4)" in said
+    assert "OpenBLAS Zen: skipped, it is h, as OpenBLAS Haswell" in said
+    assert "failures under OpenBLAS Nehalem" in said
