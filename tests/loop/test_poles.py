@@ -142,6 +142,22 @@ def test_a_strong_damper_locks_the_hub_as_one_over_K1() -> None:
     assert misses[0] > 9 * misses[1] > 81 * misses[2]
 
 
+@pytest.mark.parametrize(
+    "law", [HubFeedback(K2=0.3), HubFeedback(K2=-4.0, Kp=2.0), HubFeedback(K1=0.3, K2=1.0)], ids=str
+)
+@pytest.mark.parametrize("arm", [ARM, STOCKY], ids=["paper", "stocky"])
+def test_a_lossless_loop_neither_grows_nor_decays(arm, law) -> None:
+    """C = 0 and K1 = 0: even in s; K2 = 1: the locked hub's own frequencies.  Not a last bit off the axis."""
+    poles = closed_loop_poles(with_damping(arm, 0.0), law, 8)
+    ringing = poles.values[poles.values.imag > 0]
+    assert ringing.size > 5
+    assert (ringing.real == 0).all()
+    assert poles.unstable == 0
+    if law.K2 == 1:
+        held = tfarm.modes(replace(with_damping(arm, 0.0), hub=Hub(inertia=math.inf)), ringing.size).natural_frequency
+        np.testing.assert_allclose(ringing.imag, held, rtol=1e-13)
+
+
 # ------------------------------------------------------------ lists and refusals
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from rich.text import Text
 
-from tfarm.cli.tables import new_table, show
+from tfarm.cli.tables import HELD, held, new_table, show
 from tfarm.files import write_file
 
 
@@ -18,8 +18,8 @@ def print_poles(answer: dict[str, Any]) -> None:
     """A row a pole, then the box."""
     rows = new_table(("Re s [1/s]", "Im s [rad/s]", "damping ratio"))
     for re, im in answer["poles"]:
-        size = (re * re + im * im) ** 0.5
-        rows.add_row(f"{re:.12g}", f"{im:.12g}", f"{-re / size:.6g}" if im else "-")
+        size = math.hypot(re, im)
+        rows.add_row(held(re, HELD * size, 12), f"{im:.12g}", held(-re / size, HELD, 6) if im else "-")
     show(rows)
     left, right, _, top = answer["box"]
     proven = "proven" if "discs" in answer else "by winding number"

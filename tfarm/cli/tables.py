@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -67,7 +68,18 @@ def _damping(mode: dict[str, Any]) -> tuple[str, str]:
         pair = " and ".join(f"{value:.8g}" for value in mode["eigenvalues"])
         return pair, f"{mode['damping_ratio']:.6g} (overdamped)"
     re, im = mode["eigenvalue"]
-    return f"{re:.8g} + {im:.10g}i", f"{mode['damping_ratio']:.6g}"
+    return f"{held(re, HELD * math.hypot(re, im), 8)} + {im:.10g}i", held(mode["damping_ratio"], HELD, 6)
+
+
+HELD = 2e-14  # of an eigenvalue's size: what its float64 may be off (tests: 1e-14 to 50 digits, 64 eps in closed form)
+
+
+def held(value: float, error: float, most: int) -> str:
+    """A number in the digits that an absolute error leaves, at most so many; where it leaves none, 0 and the error."""
+    if value == 0:
+        return "0"
+    digits = math.floor(math.log10(abs(value) / error))
+    return f"{value:.{min(digits, most)}g}" if digits > 0 else f"0 (+-{error:.0e})"
 
 
 def print_response(answer: dict[str, Any]) -> None:

@@ -62,7 +62,8 @@ def first_order_law(
     q = w * period
     common = -(b**2) * np.sin(q / 2)
     by_rate = common * gains.K1 / w * np.cos((delay + 0.5) * q)
-    return by_rate, common * gains.K2 * hub_inertia * np.sin((delay + 0.5) * q)
+    by_moment = common * gains.K2 * hub_inertia * np.sin((delay + 0.5) * q)
+    return by_rate + 0.0, by_moment + 0.0  # -0.0 where a gain is 0
 
 
 def mode_table(loop: SampledLoop) -> ModeTable:

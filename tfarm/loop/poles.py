@@ -141,11 +141,22 @@ def poles_below(loop: Loop, height: float, factors: tuple[float, ...] = GROWTH) 
             if factor == factors[-1]:
                 raise
             continue
-        found = np.where(abs(found.imag) < 1e-11 * abs(found), found.real, found)
+        found = _on_its_axis(loop, np.where(abs(found.imag) < 1e-11 * abs(found), found.real, found))
         upper = found[found.imag >= 0]
         upper = upper[np.lexsort((upper.real, upper.imag))]
         return Poles(loop, np.r_[np.zeros(at_zero, complex), upper], box)
     raise AssertionError("unreachable")
+
+
+def _on_its_axis(loop: Loop, found: Complex) -> Complex:
+    """The poles, rounding taken off the real part of those that a lossless loop has on the imaginary axis.
+
+    At C = 0 the characteristic function is even in s where K1 = 0, so that a simple zero is its own mirror image;
+    K2 = 1 leaves the modes of the locked hub, which are undamped.
+    """
+    lossless = loop.arm.link.damping == 0 and (loop.law.K1 == 0 or loop.law.K2 == 1)
+    on_axis = lossless & (abs(found.real) <= ON_AXIS * abs(found))
+    return np.where(on_axis, 1j * found.imag, found)
 
 
 def box_of(loop: Loop, height: float) -> Box:
