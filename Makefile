@@ -21,7 +21,8 @@ SURVEYS := \
 	dsp.verdicts \
 	tuner.bounded \
 	cli.fuzz \
-	cli.kills
+	cli.kills \
+	report.plausible
 
 .PHONY: help install reports modes bode margins locus sampled tune audit test kernels survey lint bench clean
 

@@ -12,6 +12,7 @@ from tests.loop.arms import window_arm, with_damping
 from tfarm import Hub, HubFeedback, ParameterError, Payload
 from tfarm.cli import main
 from tfarm.errors import ConvergenceError
+from tfarm.loop import reduced_locus as reduced_locus_room
 from tfarm.loop.lines import along
 from tfarm.loop.lines import crossings as line_crossings
 from tfarm.loop.locus import locus
@@ -232,6 +233,19 @@ def test_reduced_poles_are_those_of_python_control():
     poles = np.linalg.eigvals(A - B @ row @ C / (1 + row @ D))
     mine = reduced_locus(found, 20).branches[:, -1]
     assert max(abs(poles - pole).min() for pole in mine) < 1e-7
+
+
+@pytest.mark.parametrize("law", [HubFeedback(K1=0.3, K2=0.3), HubFeedback(K1=30.0, K2=-1.0)])
+def test_reduced_poles_do_not_depend_on_the_eigenvalue_solver(law):
+    """Started where another processor's solver might end, 1e-12 of |s| away, they come to the same last digits."""
+    found = locus(LAB, law, "K2", -1.0, 1.6, points=20, branches=4)
+    rng = np.random.default_rng(3)
+    start = reduced_locus_room.root_locus(LAB, law, "K2", found.gain, 9)
+    noise = start * (1 + 1e-12 * (rng.standard_normal(start.shape) + 1j * rng.standard_normal(start.shape)))
+    one, two = (reduced_locus_room._polished(found.variation, found.gain, each, 9) for each in (start, noise))
+    assert (abs(one - start) <= 1e-9 * abs(start)).all()
+    moving = abs(one) > 1e-3 * tfarm.modes(LAB, 1).natural_frequency[-1]
+    assert (abs(one - two) <= 1e3 * EPS * abs(one))[moving].all()
 
 
 # ------------------------------------------------------------ refusals and the command

@@ -15,7 +15,7 @@ from tfarm.loop.plant import Loop
 from tfarm.loop.poles import closed_loop_poles
 from tfarm.loop.stability import stability
 from tfarm.report import loop_laws, loop_section, map
-from tfarm.report.loci import loci, zoomed
+from tfarm.report.loci import loci, shown, zoomed
 from tfarm.report.locus_section import beyond_table
 from tfarm.report.loop_laws import NamedLaw, has_loop, margins_of
 from tfarm.report.loop_section import map_section, margins_section, nyquist_section
@@ -187,6 +187,16 @@ def test_the_loci_are_exact_and_the_gap_is_that_of_what_is_drawn():
         apart <= data.reduced.gap * np.maximum(abs(data.exact.branches).max(axis=1), data.first) * (1 + 1e-12)
     ).all()
     assert [round(each.gain, 4) for each in data.exact.crossings] == [1.0305]
+
+
+def test_the_loci_are_drawn_and_written_to_digits_that_hold():
+    """Poles 1e-15 of |s| apart, as two processors have them, are the same in ten digits but for one in ten thousand."""
+    rng = np.random.default_rng(5)
+    branch = 10 ** rng.uniform(-3, 6, 20_000) * np.exp(1j * rng.uniform(0, np.pi, 20_000))
+    other = branch * (1 + 1e-15 * rng.standard_normal(branch.size))
+    assert (shown(branch) != shown(other)).mean() < 1e-4
+    assert (abs(shown(branch) - branch) <= 1e-9 * abs(branch)).all()
+    assert shown(np.array([0j, -1.0 + 0j, 123456.78901234j])).tolist() == [0j, -1.0, 123456.7890j]
 
 
 def test_beyond_one_infinitely_many_poles_are_unstable_without_damping():

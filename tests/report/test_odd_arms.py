@@ -1,5 +1,7 @@
 """What the pages say of eight legal arms unlike the paper's: each sentence against the numbers of its own page."""
 
+import json
+import math
 import re
 from dataclasses import replace
 
@@ -8,12 +10,15 @@ import pytest
 
 import tfarm
 from tests.odd_arms import odd_arms
+from tests.report import plausible
 from tfarm import HubFeedback
+from tfarm.arm import implausible
+from tfarm.audit.assumptions import LoopVerdict, has_hub_inertia, hub_study, section_study
 from tfarm.loop.locus import locus
 from tfarm.loop.plant import Loop
 from tfarm.loop.poles import poles_below
+from tfarm.report import assumptions_pictures, assumptions_section, loop_laws, loop_section, writing
 from tfarm.report import loci as loci_room
-from tfarm.report import loop_laws, loop_section, writing
 from tfarm.report.arm_section import arm_section
 from tfarm.report.bode_section import bode_section
 from tfarm.report.damped_table import damped_table
@@ -93,6 +98,27 @@ def test_a_gauge_on_a_free_pin_reads_the_torque():
     G, C = tfarm.transfer(ARMS["free-pin"], "root_moment"), ARMS["free-pin"].link.damping
     s = np.array([3j, 200j, 5 + 900j])
     assert G(s) * (1 + C * s) == pytest.approx(np.full(3, -1.0), rel=1e-12)
+
+
+def test_a_slip_of_units_is_named_on_the_page():
+    link = ARMS["boom"].link
+    slip = replace(ARMS["boom"], link=replace(link, density=1.6, length=800.0))
+    words = arm_section(slip).words
+    assert words[0].startswith("Check the units: ")
+    assert all(key in words[0] for key in ("link.density = 1.6", "link.length = 800.0"))
+    for arm in ARMS.values():
+        assert len(arm_section(arm).words) == (0 if arm.assumptions else 1) + bool(implausible(arm))
+
+
+def test_a_contradiction_on_a_page_is_found(tmp_path):
+    """The survey of plausible arms sees a count that differs from another, NaN, and a picture that is missing."""
+    (tmp_path / "index.html").write_text("<p>K2 up to nan, at 1e-05</p><img src='gone.svg'>")
+    rows = {"law": "x", "unstable_by_nyquist": 5, "unstable_in_box": 7, "on_axis_in_box": 0}
+    (tmp_path / "nyquist-count.json").write_text(json.dumps({"rows": [rows]}))
+    found = " ".join(plausible.contradictions(tmp_path))
+    assert all(word in found for word in ("gone.svg", "'nan'", "'1e-05'", "5 by Nyquist, 7 in a box"))
+    arms = [plausible.some_arm(np.random.default_rng([1, n]), "some") for n in range(3)]
+    assert all(0.05 <= arm.link.length <= 10 and not implausible(arm) for arm in arms)
 
 
 # ------------------------------------------------------------ the loop
@@ -198,3 +224,38 @@ def test_a_free_pin_has_its_rate_loop(monkeypatch):
     assert section.facts[0].value == "STABLE"
     assert set(column(section.blocks[1], "gain").values) == {"K1", "Kp"}
     assert [piece.name for piece in writing.PIECES if piece.suits(arm)][4:7] == ["no loop", "margins", "root loci"]
+
+
+# ------------------------------------------------------------ what the assumptions do
+
+
+@pytest.mark.parametrize("name", [name for name, arm in ARMS.items() if has_hub_inertia(arm)])
+def test_no_hub_takes_a_frequency_outside_what_is_said(name):
+    """Over the candidates, and hubs a million times lighter and heavier; each limit is approached."""
+    arm = ARMS[name]
+    study = hub_study(arm, [arm.hub.inertia * factor for factor in (1e-6, 1e-2, 1.0, 1e2, 1e6)])
+    assert (study.natural_frequency > study.locked).all()
+    assert (study.natural_frequency < study.pinned).all()
+    assert study.natural_frequency[-1] == pytest.approx(study.locked, rel=1e-3, abs=0.02 * study.locked[1])
+    assert (study.locked[0] == 0) == (name == "pinned")
+
+
+def test_a_K2_where_the_search_ended_has_a_star():
+    verdicts = (LoopVerdict("stable", 1.08, True), LoopVerdict("stable", 50.0, False), LoopVerdict("unstable", None))
+    study = hub_study(ARMS["heavy-hub"], [1.0, 22.5, 30.0], count=1)
+    (edges,) = (each for each in assumptions_section._loop(study, verdicts) if each.key == "K2_below")
+    assert list(edges.cells) == ["1.08000", "50*", "-"]
+    assert "*" in assumptions_section._searched(verdicts)
+    assert not assumptions_section._searched(verdicts[::2])
+
+
+def test_curves_that_fall_are_not_said_to_rise():
+    """The fourth mode of the stubby arm falls at last with more depth: shear has taken over."""
+    ways = [assumptions_pictures._way(section_study(ARMS["stubby"], depths)) for depths in ([0.01, 0.02], [0.12, 0.17])]
+    assert ways == ["all rising", "not all of them one way"]
+
+
+@pytest.mark.parametrize(("hub", "words"), [(math.inf, "a hub that is locked"), (0.1, "the two values assumed")])
+def test_what_the_paper_leaves_open_is_what_the_arm_has(hub, words):
+    arm = replace(tfarm.load("sasaki2012"), hub=tfarm.Hub(inertia=hub))
+    assert words in assumptions_section._opening(arm)

@@ -62,8 +62,8 @@ class HubStudy:
     """Frequencies over hub inertias, a row a candidate.
 
     `hub_inertia` I_h [kg m^2] has shape (n,); `natural_frequency` [rad/s] and `sensitivity`, d ln w/d ln I_h, are
-    (n, count).  `locked` [rad/s] holds the frequencies for I_h = inf, `pinned` those for I_h = 0: the limits of every
-    column.  `is_own` marks the arm's own inertia.
+    (n, count).  `locked` [rad/s] holds the limits of every column for I_h -> inf, `pinned` those for I_h = 0.  `is_own`
+    marks the arm's own inertia.
     """
 
     arm: Arm
@@ -80,11 +80,13 @@ class HubStudy:
 class LoopVerdict:
     """What becomes of the default loop: "stable", "marginal", "unstable" or "undecided", and the upper edge of K2.
 
-    `K2_below` is None where the loop is not stable.
+    `K2_below` is None where the loop is not stable.  `is_edge`: whether poles reach the axis there; the search for
+    such a K2 may have ended before.
     """
 
     verdict: str
     K2_below: float | None
+    is_edge: bool = False
 
 
 def loop_verdicts(study: SectionStudy | HubStudy) -> tuple[LoopVerdict, ...] | None:
@@ -101,10 +103,13 @@ def loop_verdicts(study: SectionStudy | HubStudy) -> tuple[LoopVerdict, ...] | N
 def _loop_verdict(arm: Arm, law: HubFeedback) -> LoopVerdict:
     try:
         found = stability(arm, law)
-        window = gain_windows(found, "K2").around
+        windows = gain_windows(found, "K2")
     except ConvergenceError:
         return LoopVerdict("undecided", None)
-    return LoopVerdict(found.verdict, None if window is None else window[1])
+    if windows.around is None:
+        return LoopVerdict(found.verdict, None)
+    top = windows.around[1]
+    return LoopVerdict(found.verdict, top, windows.end(top) == "edge")
 
 
 def own_depth(arm: Arm) -> float:
@@ -176,17 +181,26 @@ def hub_study(arm: Arm, inertias: Sequence[float] | None = None, *, count: int =
     values = [positive("inertias", inertia, meaning) for inertia in chosen]
     arms = [_with_hub(arm, inertia) for inertia in values]
     frequency, sensitivity = _frequencies(arms, count, "hub_inertia")
-    limits, _ = _frequencies([_with_hub(arm, math.inf), _with_hub(arm, 0.0)], count, "hub_inertia")
+    pinned, _ = _frequencies([_with_hub(arm, 0.0)], count, "hub_inertia")
     return HubStudy(
         arm=arm,
         arms=tuple(arms),
         hub_inertia=np.array(values),
         natural_frequency=frequency,
         sensitivity=sensitivity,
-        locked=limits[0],
-        pinned=limits[1],
+        locked=_locked(arm, count),
+        pinned=pinned[0],
         is_own=abs(np.array(values) - arm.hub.inertia) < SAME * np.array(values),
     )
+
+
+def _locked(arm: Arm, count: int) -> Real:
+    """The limits [rad/s] of the first `count` frequencies as the hub grows: those of the locked hub.
+
+    Where the tip holds the arm the first falls to 0, a heavy hub on the arm's own stiffness, and the others are next.
+    """
+    frequencies, _ = _frequencies([_with_hub(arm, math.inf)], count, "hub_inertia")
+    return frequencies[0] if _with_hub(arm, 1.0).has_rigid_mode else np.r_[0.0, frequencies[0, :-1]]
 
 
 def assumptions_answer(arm: Arm, count: int = COUNT) -> dict[str, Any]:
@@ -234,6 +248,7 @@ def _rows(study: SectionStudy | HubStudy) -> list[dict[str, Any]]:
             "sensitivity": sensitivity.tolist(),
             "verdict": loop.verdict,
             "K2_below": loop.K2_below,
+            "K2_below_is_edge": loop.is_edge,
         }
         for own, frequency, sensitivity, loop in columns
     ]

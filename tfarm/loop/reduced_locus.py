@@ -16,17 +16,19 @@ from scipy.optimize import linear_sum_assignment
 from tfarm.arm import Arm, HubFeedback
 from tfarm.errors import ParameterError
 from tfarm.records import record
-from tfarm.reduced import modal_model
+from tfarm.reduced import ModalModel, modal_model
 from tfarm.spectrum import modes
 
 from .locus import Locus
-from .variation import GAINS, Complex, Real
+from .variation import GAINS, Complex, Real, Variation
 
 if TYPE_CHECKING:
     import control
 
 LEAST_ORDER = 20
 BEYOND = 2  # modes of the reduced model above the last branch, if the order is not said
+POLISHING = 4  # steps of Newton's method: they start from a dozen right digits
+BELIEVED = 1e-6  # of its size: a pole that Newton's method would move further is none of its own
 FEW = 9  # values at which an arm is reduced anew, where a parameter of it varies
 OUTPUTS = {"Kp": "hub_angle", "K1": "hub_rate", "K2": "root_moment"}
 
@@ -66,7 +68,7 @@ def reduced_locus(exact: Locus, order: int | None = None) -> ReducedLocus:
     count = order // 2 - rigid
     if exact.vary in GAINS:
         which = np.arange(exact.gain.size)
-        poles = root_locus(arm, exact.law, exact.vary, exact.gain, count)
+        poles = _polished(exact.variation, exact.gain, root_locus(arm, exact.law, exact.vary, exact.gain, count), count)
     else:
         which = np.unique(np.linspace(0, exact.gain.size - 1, FEW).round().astype(int))
         loops = [exact.variation.at(float(value)) for value in exact.gain[which]]
@@ -82,6 +84,36 @@ def root_locus(arm: Arm, law: HubFeedback, vary: str, gain: Real, count: int) ->
     import control
 
     return np.asarray(control.root_locus_map(open_loop(arm, law, vary, count), gain).loci)
+
+
+def _polished(variation: Variation, gain: Real, poles: Complex, count: int) -> Complex:
+    """The same poles (gains, order) to the last digits that float64 has of them, by Newton's method.
+
+    What an eigenvalue solver gives depends on the processor in its last four digits.  Solved for is 1 + law . G(s) = 0
+    on the model's partial fractions; a pole where that has no slope, or that would move, stays as it is.
+    """
+    model = modal_model(variation.arm, list(OUTPUTS.values()), count)
+    laws = np.array([[getattr(variation.at(float(value)).law, name) for name in OUTPUTS] for value in gain])
+    found = poles.astype(complex)
+    for _ in range(POLISHING):
+        value, slope = _return_difference(model, laws, found)
+        with np.errstate(all="ignore"):
+            move = value / slope
+        near = abs(move) <= BELIEVED * abs(found)
+        found = np.where(near, found - np.where(found.imag == 0, move.real, move), found)
+    return found
+
+
+def _return_difference(model: ModalModel, laws: Real, s: Complex) -> tuple[Complex, Complex]:
+    """1 + law . G(s) and its derivative, at s (gains, order), each row under its own law (gains, 3)."""
+    pole, residues = model.eigenvalues.ravel(), laws @ model.residues.reshape(len(OUTPUTS), -1)
+    rigid, static = laws @ model.rigid, laws @ model.static
+    with np.errstate(all="ignore"):  # at a pole of the model: no number, and the pole is left alone
+        away = 1 / (s[..., None] - pole)
+        parts = residues[:, None, :] * away
+        value = 1 + static[:, None] + parts.sum(axis=2) + rigid[:, :1] / s**2 + rigid[:, 1:] / s
+        slope = -(parts * away).sum(axis=2) - 2 * rigid[:, :1] / s**3 - rigid[:, 1:] / s**2
+    return value, slope
 
 
 def open_loop(arm: Arm, law: HubFeedback, vary: str, count: int) -> control.StateSpace:

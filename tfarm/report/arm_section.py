@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 
 import tfarm
-from tfarm.arm import Arm
+from tfarm.arm import Arm, implausible
 from tfarm.report.digits import plain, significant, unit
 from tfarm.report.figures import Picture
 from tfarm.report.sections import Fact, Section
@@ -23,7 +23,7 @@ def arm_section(arm: Arm) -> Section:
         anchor="arm",
         title="The arm",
         facts=headline_numbers(arm),
-        words=() if arm.assumptions else ("This arm states no assumptions.",),
+        words=(*_warnings(arm), *(() if arm.assumptions else ("This arm states no assumptions.",))),
         items=arm.assumptions,
         blocks=(_picture(arm), given_table(arm), derived_table(arm)),
     )
@@ -63,6 +63,14 @@ def _other_numbers(arm: Arm) -> Iterator[Fact]:
     )
     yield Fact(label="mass of the link", value=significant(mass, 5), unit="kg")
     yield Fact(label="damping C", value=plain(C), unit="s", beside="" if C else "none: resonances are infinite")
+
+
+def _warnings(arm: Arm) -> tuple[str, ...]:
+    """A sentence on values that look like a slip of units, if there are any."""
+    texts = implausible(arm)
+    if not texts:
+        return ()
+    return (f"Check the units: every number on this page rests on {'; and on '.join(texts)}.",)
 
 
 def _picture(arm: Arm) -> Picture:

@@ -5,39 +5,34 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from tfarm.arm import Arm
 from tfarm.audit.assumptions import (
     HubStudy,
+    LoopVerdict,
     SectionStudy,
     has_hub_inertia,
     hub_study,
     loop_verdicts,
     section_study,
 )
+from tfarm.report.assumptions_pictures import Study, hub_picture, section_picture
 from tfarm.report.digits import fixed, plain, significant
-from tfarm.report.figures import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, Picture, blank, headline, style
+from tfarm.report.figures import Picture
 from tfarm.report.paper import is_from_paper
 from tfarm.report.sections import Section
-from tfarm.report.tables import Column, Real, Table, data_column, number_column
+from tfarm.report.tables import Column, Real, Table, number_column
 from tfarm.spectrum.scales import default_gains
 
-Study = SectionStudy | HubStudy
-
-POINTS = 49  # of each curve
-COLORS = (BLUE, ORANGE, GREEN, PURPLE)
+Verdicts = tuple[LoopVerdict, ...] | None
 OWN = "#eaf1f8"  # behind the row of the arm itself
 
 FROM_PAPER = (
     "The paper prints the area of the section, but neither its second moment I nor the hub inertia I_h. Every "
-    "frequency in rad/s on this page rests on the two values assumed for them: here is what other values would do."
+    "frequency in rad/s on this page rests on {assumed}: here is what other values would do."
 )
-NOT_FROM_PAPER = (
-    "What would another section of the same area do, and another hub? Everything else is as this arm has it."
-)
+TWO_ASSUMED, ONE_ASSUMED = "the two values assumed for them", "the one assumed for I, and on a hub that is {what}"
+NOT_FROM_PAPER = "What would another section of the same area do{hub}? Everything else is as this arm has it."
 SECTION_WORDS = (
     "Rectangles of {area} m² with a depth of {least} to {most} m in the plane of bending: the first natural frequency "
     "runs from {low} to {high} rad/s; here, at {own} m, it is {here} rad/s, and one per cent more depth changes it by "
@@ -49,42 +44,45 @@ HUB_WORDS = (
     "heavy, takes it outside {locked} to {pinned} rad/s."
 )
 NO_HUB = "The hub of this arm is {what}, so there is no inertia to choose."
-SECTION_PICTURE = (
-    "First natural frequencies over the depth of a rectangle of this area, exact (C = 0), both axes logarithmic. The "
-    "dashed line and the filled dots are this arm{equivalent}. As long as the arm is slender all curves rise in "
-    "proportion to the depth; they bend where shear and rotary inertia begin to tell."
-)
-EQUIVALENT = " (as the rectangle with its area and second moment; shear factor unchanged)"
-HUB_PICTURE = (
-    "First natural frequencies over the hub inertia, exact (C = 0), both axes logarithmic. The dashed line and the "
-    "filled dots are this arm. Bars at the edges are the limits of each mode: a free pin (left), a locked hub (right)."
-)
 SECTION_TABLE = (
     "The shaded row is this arm. Sensitivity: per cent of natural frequency for one per cent more of I, with the area, "
     "the shear factor and all else held, exact. As I = A depth²/12, one per cent of depth counts twice. A slender arm "
-    "has 0.5 throughout."
+    "has 0.5 throughout.{searched}"
 )
 HUB_TABLE = (
     "The shaded row is this arm. Sensitivity: per cent of natural frequency for one per cent more of I_h, all else "
-    "held, exact. The closer to zero, the less that frequency depends on the hub."
+    "held, exact. The closer to zero, the less that frequency depends on the hub.{searched}"
 )
+SEARCHED = " *: no limit was found up to there; the search ends."
 
 
 def assumptions_section(arm: Arm) -> Section:
     """Frequencies over depth and over hub inertia, with sensitivities, each as a picture and as a table."""
     section = section_study(arm)
-    words = [FROM_PAPER if is_from_paper(arm) else NOT_FROM_PAPER, _section_words(section)]
-    blocks: list[Picture | Table] = [_section_picture(section), section_table(section)]
+    words = [_opening(arm), _section_words(section)]
+    blocks: list[Picture | Table] = [section_picture(section), section_table(section)]
     if has_hub_inertia(arm):
         hub = hub_study(arm)
         words.append(_hub_words(hub))
-        blocks += [_hub_picture(hub), hub_table(hub)]
+        blocks += [hub_picture(hub), hub_table(hub)]
     else:
-        words.append(NO_HUB.format(what="locked" if arm.is_locked else "a free pin"))
+        words.append(NO_HUB.format(what=_held_hub(arm)))
     return Section(anchor="assumptions", title="What the assumptions do", words=words, blocks=blocks)
 
 
 # ------------------------------------------------------------ words
+
+
+def _opening(arm: Arm) -> str:
+    """What was assumed, or what is asked."""
+    if not is_from_paper(arm):
+        return NOT_FROM_PAPER.format(hub=", and another hub" * has_hub_inertia(arm))
+    one = ONE_ASSUMED.format(what=_held_hub(arm))
+    return FROM_PAPER.format(assumed=TWO_ASSUMED if has_hub_inertia(arm) else one)
+
+
+def _held_hub(arm: Arm) -> str:
+    return "locked" if arm.is_locked else "a free pin"
 
 
 def _section_words(study: SectionStudy) -> str:
@@ -115,6 +113,7 @@ def _ends(values: Real, study: Study) -> dict[str, str]:
 
 def section_table(study: SectionStudy) -> Table:
     """A row a candidate section."""
+    verdicts = loop_verdicts(study)
     size = (
         _value("depth_m", "depth", "m", study.depth, study),
         _value("width_m", "width", "m", study.width, study),
@@ -123,22 +122,23 @@ def section_table(study: SectionStudy) -> Table:
     return Table(
         stem="assumptions-section",
         title="Candidate sections: rectangles of this area",
-        caption=SECTION_TABLE,
-        columns=(_which(study), *size, *_modes(study), *_loop(study)),
+        caption=SECTION_TABLE.format(searched=_searched(verdicts)),
+        columns=(_which(study), *size, *_modes(study), *_loop(study, verdicts)),
     )
 
 
 def hub_table(study: HubStudy) -> Table:
     """A row a hub inertia."""
+    verdicts = loop_verdicts(study)
     return Table(
         stem="assumptions-hub",
         title="Candidate hub inertias",
-        caption=HUB_TABLE,
+        caption=HUB_TABLE.format(searched=_searched(verdicts)),
         columns=(
             _which(study),
             _value("hub_inertia_kg_m2", "I_h", "kg m²", study.hub_inertia, study),
             *_modes(study),
-            *_loop(study),
+            *_loop(study, verdicts),
         ),
     )
 
@@ -165,13 +165,12 @@ def _modes(study: Study) -> Iterator[Column]:
         )
 
 
-def _loop(study: Study) -> Iterator[Column]:
+def _loop(study: Study, verdicts: Verdicts) -> Iterator[Column]:
     """The verdict on the default loop, and up to which K2 it stays stable; nothing where there is no loop."""
-    verdicts = loop_verdicts(study)
     if verdicts is None:
         return
     words = [each.verdict for each in verdicts]
-    edges = ["-" if each.K2_below is None else significant(each.K2_below, 6) for each in verdicts]
+    edges = ["-" if each.K2_below is None else _edge(each.K2_below, each.is_edge) for each in verdicts]
     law = default_gains(study.arm)
     group = f"loop at K1 = {law.K1:g}, K2 = {law.K2:g}"
     yield Column(key="verdict", title="verdict", values=words, cells=words, group=group, tint=_tint(study))
@@ -179,119 +178,14 @@ def _loop(study: Study) -> Iterator[Column]:
     yield Column(key="K2_below", title="stable below K2", values=values, cells=edges, group=group, tint=_tint(study))
 
 
+def _searched(verdicts: Verdicts) -> str:
+    """What a star means, where there is one."""
+    return SEARCHED if any(each.K2_below is not None and not each.is_edge for each in verdicts or ()) else ""
+
+
+def _edge(K2: float, is_edge: bool) -> str:
+    return significant(K2, 6) if is_edge else f"{plain(K2, 6)}*"
+
+
 def _tint(study: Study) -> list[str]:
     return [OWN if own else "" for own in study.is_own]
-
-
-# ------------------------------------------------------------ pictures
-
-
-def _section_picture(study: SectionStudy) -> Picture:
-    arm = study.arm
-    curve = section_study(arm, _between(study.depth))
-    equivalent = "" if _is_rectangle(arm) else EQUIVALENT
-    return Picture(
-        stem="assumptions-depth",
-        title="Natural frequencies over the depth of the section",
-        caption=SECTION_PICTURE.format(equivalent=equivalent),
-        alt=f"Natural frequencies 1 to {len(COLORS)} over depth, all rising; {_ends_in_words(study, study.depth, 'm')}",
-        figure=draw_over(curve, curve.depth, study, study.depth, "depth of the rectangle, in the plane of bending [m]"),
-        data=_data("assumptions-depth-data", data_column("depth_m", "depth", "m", curve.depth), curve),
-    )
-
-
-def _hub_picture(study: HubStudy) -> Picture:
-    curve = hub_study(study.arm, _between(study.hub_inertia))
-    inertia = data_column("hub_inertia_kg_m2", "hub inertia", "kg m^2", curve.hub_inertia)
-    words = _ends_in_words(study, study.hub_inertia, "kg m²")
-    return Picture(
-        stem="assumptions-inertia",
-        title="Natural frequencies over the hub inertia",
-        caption=HUB_PICTURE,
-        alt=f"Natural frequencies 1 to {len(COLORS)} over hub inertia, all falling; {words}",
-        figure=draw_over(curve, curve.hub_inertia, study, study.hub_inertia, "hub inertia [kg m²]"),
-        data=_data("assumptions-inertia-data", inertia, curve),
-    )
-
-
-def _is_rectangle(arm: Arm) -> bool:
-    return arm.link.section.shape == "rectangle"
-
-
-def _between(values: Real) -> list[float]:
-    """The range of the candidates, evenly on a logarithmic axis."""
-    return [float(x) for x in np.geomspace(values.min(), values.max(), POINTS)]
-
-
-def _ends_in_words(study: Study, values: Real, of: str) -> str:
-    low, high = (significant(float(study.natural_frequency[i, 0]), 5) for i in (0, -1))
-    least, most = (plain(float(values[i]), 4) for i in (0, -1))
-    return f"the first goes from {low} rad/s at {least} {of} to {high} rad/s at {most} {of}."
-
-
-def _data(stem: str, values: Column, curve: Study) -> Table:
-    columns = [
-        data_column(f"mode_{i}_rad_s", f"mode {i}", "rad/s", omega)
-        for i, omega in enumerate(curve.natural_frequency.T, 1)
-    ]
-    return Table(stem=stem, title="Natural frequencies", caption="", is_data=True, columns=(values, *columns))
-
-
-def draw_over(curve: Study, x: Real, study: Study, candidates: Real, label: str) -> Figure:
-    """Frequencies over one assumed parameter: curves, the candidates of the table as rings, the arm itself filled."""
-    own = candidates[study.is_own][0]
-    with style():
-        figure = blank(9.0, 4.6)
-        ax = figure.subplots()
-        ax.set_xscale("log")
-        ax.set_yscale("log")
-        ax.axvline(own, color=INK, lw=1.0, ls=(0, (4, 3)), zorder=1.5)
-        for number, (color, omega) in enumerate(zip(COLORS, curve.natural_frequency.T, strict=True), 1):
-            ax.plot(x, omega, color=color)
-            _mark(number, color, candidates, study, ax)
-        if isinstance(study, HubStudy):
-            _mark_limits(study, ax)
-        _label_axes(label, ax)
-        _leave_room(x, ax)
-        headline(figure, f"{study.arm.name}: natural frequencies over the {_parameter(study)}")
-    return figure
-
-
-def _parameter(study: Study) -> str:
-    return "hub inertia" if isinstance(study, HubStudy) else "depth of the section, at this area"
-
-
-def _mark(number: int, color: str, candidates: Real, study: Study, ax: Axes) -> None:
-    omega = study.natural_frequency[:, number - 1]
-    own = study.is_own
-    ax.plot(candidates[~own], omega[~own], "o", ms=4.5, mfc="white", mec=color, mew=1.1)
-    ax.plot(candidates[own], omega[own], "o", ms=7.0, mfc=color, mec="white", mew=0.8, zorder=4)
-    end = (candidates[-1], omega[-1])
-    ax.annotate(
-        f"mode {number}", end, textcoords="offset points", xytext=(8, 0), va="center", color=color, fontsize=9.0
-    )
-
-
-def _mark_limits(study: HubStudy, ax: Axes) -> None:
-    """Short bars at the left edge for the free pin, at the right edge for the locked hub."""
-    for omegas, low, high in ((study.pinned, 0.0, 0.018), (study.locked, 0.982, 1.0)):
-        for color, omega in zip(COLORS, omegas, strict=True):
-            ax.axhline(omega, low, high, color=color, lw=2.4)
-    for place, text, side in ((0.0, "free pin", "left"), (1.0, "locked hub", "right")):
-        ax.text(place, 1.015, text, transform=ax.transAxes, ha=side, fontsize=9.0, color=GREY)
-
-
-def _label_axes(label: str, ax: Axes) -> None:
-    ax.set_xlabel(label)
-    ax.set_ylabel("natural frequency [rad/s]")
-    ax.margins(y=0.09)
-    for axis in (ax.xaxis, ax.yaxis):
-        axis.set_major_locator(LogLocator(10.0, subs=(1.0, 2.0, 5.0)))
-        axis.set_major_formatter(FuncFormatter(lambda value, _: plain(value, 3)))
-        axis.set_minor_formatter(NullFormatter())
-
-
-def _leave_room(x: Real, ax: Axes) -> None:
-    """At the left for the bars, at the right for these and the modes' names."""
-    span = float(x[-1] / x[0])
-    ax.set_xlim(x[0] / span**0.06, x[-1] * span**0.13)

@@ -34,6 +34,8 @@ COLORS = (INK, BLUE, GREEN, PURPLE, "#7a5a00", GREY)  # by mode
 UNITS = {"K1": "N m s/rad", "K2": ""}
 ROOM = 0.12  # around a branch, as a share of its extent
 MARKED = 5  # gains marked along each branch
+HELD = 10  # digits of |s| that are drawn and written: poles differ from processor to processor by 1e-14 at most
+GAPS_HELD = 5  # digits of a gap, 1e-5 of |s| or less between two such poles
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,13 @@ class Loci:
         return UNITS[self.exact.vary]
 
 
+def shown(branches: Complex) -> Complex:
+    """Branches to the digits that hold on every processor: as shares of |s|, so that a small Re s keeps its place."""
+    size = np.maximum(abs(branches), np.finfo(float).tiny)
+    unit = 10.0 ** (np.floor(np.log10(size)) + 1 - HELD)
+    return np.round(branches.real / unit) * unit + 1j * (np.round(branches.imag / unit) * unit)
+
+
 def loci(arm: Arm, law: HubFeedback, vary: str, start: float, stop: float) -> Loci:
     """Both loci of one gain: fewer branches, or less of the range, where more cannot be followed.
 
@@ -83,6 +92,11 @@ def loci(arm: Arm, law: HubFeedback, vary: str, start: float, stop: float) -> Lo
         return Loci(exact, reduced_locus(exact), np.linspace(start, end, MARKED), stop)
     assert lost is not None
     raise lost
+
+
+def _rounded(values: Real, digits: int = GAPS_HELD) -> Real:
+    """Each to that many digits."""
+    return np.array([float(f"{value:.{digits - 1}e}") for value in values])
 
 
 def zoomed(data: Loci) -> list[int]:
@@ -106,7 +120,7 @@ def draw_loci(data: Loci) -> Figure:
         whole = figure.add_subplot(grid[:, :2])
         numbers = range(len(exact.branches))
         _panel(data, numbers, whole, named=sorted(set(numbers) - set(zoomed(data))))
-        _frame(exact.branches, whole)
+        _frame(shown(exact.branches), whole)
         whole.set_title("all of them", fontsize=9.0)
         whole.set_xlabel("Re s [1/s]")
         whole.set_ylabel("Im s [rad/s]")
@@ -114,7 +128,8 @@ def draw_loci(data: Loci) -> Figure:
             ax = figure.add_subplot(grid[place // 2, 2 + place % 2])
             _panel(data, [n], ax, named=[n])
             ax.xaxis.set_major_locator(MaxNLocator(3))
-            upper = exact.branches[n][exact.branches[n].imag >= 0]
+            branch = shown(exact.branches[n])
+            upper = branch[branch.imag >= 0]
             _frame(upper, ax)
             ax.set_title(
                 f"mode {exact.mode[n]}" if exact.mode[n] else "rigid body", fontsize=9.0, color=color_of(data, n)
@@ -133,25 +148,26 @@ def _range(data: Loci) -> str:
 
 def _panel(data: Loci, numbers: Sequence[int], ax: Axes, named: Sequence[int]) -> None:
     """Some branches, exact and reduced, with their crossings; gain and frequency beside those of the named ones."""
-    exact, reduced = data.exact.branches, data.reduced.branches
+    exact, reduced = shown(data.exact.branches), shown(data.reduced.branches)
     ax.axvline(0, color=INK, lw=0.9, zorder=1)
     gain = data.exact.gain
     at = [int(np.argmin(abs(gain - value))) for value in data.marked]
     for n in numbers:
         color = color_of(data, n)
         ax.plot(exact[n].real, exact[n].imag, color=color, lw=2.6, alpha=0.4, zorder=2, solid_capstyle="round")
-        _band(reduced[n], data.reduced.gap[n] * np.maximum(abs(exact[n]), data.first), color, ax)
+        _band(reduced[n], _rounded(data.reduced.gap)[n] * np.maximum(abs(exact[n]), data.first), color, ax)
         ax.plot(reduced[n].real, reduced[n].imag, color=color, lw=0.9, ls=(0, (2, 1.5)), zorder=3)
         ax.plot(exact[n, 0].real, exact[n, 0].imag, "x", color=color, ms=6, mew=1.4, zorder=4)
         ax.plot(exact[n, at[1:]].real, exact[n, at[1:]].imag, "o", color=color, ms=3.2, zorder=4)
     for each in data.exact.crossings:
         if each.branch in numbers:
-            ax.plot([0], [each.omega], "D", ms=6, mfc=ORANGE, mec="white", mew=0.8, zorder=6)
+            omega = float(_rounded(np.array([each.omega]), HELD)[0])
+            ax.plot([0], [omega], "D", ms=6, mfc=ORANGE, mec="white", mew=0.8, zorder=6)
             if each.branch not in named:
                 continue
             text = f"{data.name} = {plain(each.gain, 5)}\n{significant(each.omega, 4)} rad/s"
             ax.annotate(
-                text, (0, each.omega), textcoords="offset points", xytext=(7, 0), fontsize=7.5, va="center", zorder=6,
+                text, (0, omega), textcoords="offset points", xytext=(7, 0), fontsize=7.5, va="center", zorder=6,
                 bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8, "alpha": 0.8},
             )  # fmt: skip
 
@@ -197,7 +213,7 @@ def _legend(data: Loci) -> tuple[list[Line2D], list[str]]:
 def crossing_table(data: Loci, stem: str) -> Table:
     """Where the branches cross the imaginary axis."""
     found = data.exact.crossings
-    gain, omega = (np.array([getattr(each, key) for each in found]) for key in ("gain", "omega"))
+    gain, omega = (_rounded(np.array([getattr(each, key) for each in found]), HELD) for key in ("gain", "omega"))
     hertz = omega / (2 * math.pi)
     modes = [int(data.exact.mode[each.branch]) for each in found]
     return Table(
@@ -216,14 +232,14 @@ def crossing_table(data: Loci, stem: str) -> Table:
 
 def gap_table(data: Loci, stem: str) -> Table:
     """How far each reduced branch is from the exact one."""
-    gap, mode = data.reduced.gap, data.exact.mode
+    gap, mode = _rounded(data.reduced.gap), data.exact.mode
     names = [f"mode {n}" if n else "rigid body" for n in mode]
     return Table(
         stem=stem,
         title=f"How far python-control's locus is from the exact one, along {data.name}",
         caption=f"Largest distance over the whole range, as a share of |s| (or of the first natural frequency, where "
         f"that is more). The reduced model has order {data.reduced.order}; its poles are those of "
-        "control.root_locus_map.",
+        "control.root_locus_map, taken to their last digits by Newton's method.",
         columns=(
             text_column("branch", "branch from", names),
             number_column("gap", "largest gap", "of |s|", gap, [scientific(float(x), 3) for x in gap]),
@@ -235,7 +251,7 @@ def loci_data(data: Loci, stem: str) -> Table:
     """The exact and the reduced branches."""
     columns = [data_column(data.name, data.name, data.unit, data.exact.gain)]
     for kind, branches in (("exact", data.exact.branches), ("reduced", data.reduced.branches)):
-        for n, row in enumerate(branches):
+        for n, row in enumerate(shown(branches)):
             columns.append(data_column(f"{kind}_{n}_re", f"{kind} branch {n}, Re s", "1/s", row.real))
             columns.append(data_column(f"{kind}_{n}_im", f"{kind} branch {n}, Im s", "rad/s", row.imag))
     return Table(stem=stem, title=f"Loci along {data.name}", caption="", is_data=True, columns=tuple(columns))
