@@ -12,6 +12,7 @@ PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check install -c requi
 SIZE ?= 100
 SEED ?= 1
 SURVEYS := \
+	plausible \
 	exact.accuracy \
 	spectrum.proofs \
 	spectrum.damped \

@@ -80,6 +80,14 @@ class Law:
 
 
 @dataclass(frozen=True)
+class Slew:
+    """A bang-bang slew: tip travel [m] and the time it takes [s]."""
+
+    travel: float
+    rise_time: float
+
+
+@dataclass(frozen=True)
 class Case:
     """One arm of the survey: its file, its model's numbers, a law, and a clock; `rng_seed` draws what a verb asks."""
 
@@ -91,6 +99,7 @@ class Case:
     law: Law
     period: float
     delay: float
+    slew: Slew
 
     @property
     def rng(self):
@@ -132,7 +141,10 @@ def draw(number, seed):
     period = log(rng, 1e-4, 0.1)
     delay = float(rng.choice([0.0, 0.5, 1.0, rng.uniform(0, 2)]))
     law = _law(rng, beam, first, period)
-    return Case(number, int(rng.integers(2**62)), "\n".join(text) + "\n", beam, first, law, period, delay)
+    rise = max(20 * period, 2 * math.pi / first * log(rng, 1, 10))
+    slew = Slew(travel=length * float(rng.uniform(0.05, 1.0)), rise_time=rise)
+    text += ["[slew]", f"travel = {slew.travel!r}", f"rise_time = {slew.rise_time!r}"]
+    return Case(number, int(rng.integers(2**62)), "\n".join(text) + "\n", beam, first, law, period, delay, slew)
 
 
 def _section(rng, depth, slenderness, material):

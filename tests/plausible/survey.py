@@ -46,10 +46,10 @@ class Row:
     blind: int
 
 
-def survey_one(number, seed, verbs):
-    """Every verb on the arm of that number."""
+def survey_one(number, seed, verbs, terms=(spectra.ROUGH, spectra.FINE)):
+    """Every verb on the arm of that number, judged by models of so many Legendre terms."""
     case = draw(number, seed)
-    models = spectra.Models(case.beam)
+    models = spectra.Models(case.beam, *terms)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "arm.toml"
         path.write_text(case.toml)
