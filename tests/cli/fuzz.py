@@ -243,7 +243,8 @@ def tell(found):
     print(f"WRONG {found.wrong} | {' '.join(map(repr, found.arguments))[:300]}", flush=True)
     for argument in found.arguments:
         if argument.endswith(".toml") and os.path.exists(argument):
-            print("   ", Path(argument).read_bytes(), flush=True)
+            lines = Path(argument).read_bytes().splitlines()
+            print("   ", [line for line in lines if line[:1] not in (b" ", b"#", b"")], flush=True)
 
 
 def main(number, seed):

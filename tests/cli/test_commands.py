@@ -147,6 +147,8 @@ BAD = [
     (["response", "sasaki2012", "--output", "root_moment", "--s", "nan"], "not finite"),
     (["response", "sasaki2012", "--output", "root_moment", "--s", "1j", "--omega", "1"], "not both"),
     (["response", "sasaki2012", "--output", "hub_angle", "--s", "0"], "rigid body"),
+    (["response", "sasaki2012", "--output", "hub_angle", "--s", "1e300j"], "at most 1e+20 1/s"),
+    (["response", "sasaki2012", "--output", "hub_angle", "--s", "-1e300", "--digits", "20"], "at most 1e+20 1/s"),
     (["response", "sasaki2012", "--output", "root_moment", "--s", "71.50568246689015j"], "a natural frequency"),
     (["response", "sasaki2012", "--output", "root_moment", "--csv", "/no/such/folder/a.csv"], "--csv"),
 ]

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 BLOCK = 1 << 16
+LARGEST = 1e20  # 1/s; far beyond any arm, and the powers of s that are taken do not overflow
 
 
 Wanted = str | Output | Sequence[str | Output]  # one output or several
@@ -200,6 +201,10 @@ def _finite(s: ArrayLike) -> Complex:
     if not np.isfinite(points.sum()) and not np.isfinite(points).all():  # the sum needs no array of its own
         bad = points[~np.isfinite(points)].ravel()[0]
         raise ParameterError(key="s", value=complex(bad), remedy="a transfer function wants finite s in 1/s")
+    parts = (points.real, points.imag) if points.size else ()
+    if any(part.max() > LARGEST or part.min() < -LARGEST for part in parts):
+        bad = points.ravel()[abs(points.ravel()).argmax()]
+        raise ParameterError(key="s", value=complex(bad), remedy=f"beyond any arm; at most {LARGEST:g} 1/s")
     return points
 
 
