@@ -11,6 +11,7 @@ import tfarm
 from tests.odd_arms import odd_arms
 from tfarm.dsp import Chain, Sampling, sampled_loop, stable_windows
 from tfarm.dsp.chain import Converters
+from tfarm.dsp.law import growing_mode, mode_table
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import gain_windows
 from tfarm.report.overlay import Overlay
@@ -99,6 +100,16 @@ def test_the_words_are_about_the_chain_of_the_file():
     assert "every 4 ms, 0.5 samples of delay" in words
     assert "differenced" in words
     assert "of this arm" in words  # its own default gain
+
+
+@pytest.mark.parametrize("name", ["micro", "rubber"])
+def test_the_table_of_modes_has_the_pole_that_the_verdict_names(name):
+    """On the micro-arm mode 1, aliased to the edge of the strip, becomes two real poles: the slower one decides."""
+    loop = data_of(name).analysis.verdict.loop
+    table, named = mode_table(loop), growing_mode(loop)
+    assert table.log_radius.max() <= loop.poles.log_spectral_radius
+    if named:
+        assert table.log_radius[table.index == named] == [loop.poles.log_spectral_radius]
 
 
 def test_rows_keep_every_interval():

@@ -35,9 +35,10 @@ SETTLED = -20.0  # modes that lose more than this in ln|a| between two samples a
 class ModeTable:
     """A row a mode that outlives a sample.
 
-    `log_radius`: ln|z| of the closed-loop pole that it becomes; `first_order` is the formula's change of it, the sum of
-    `by_rate` (K1) and `by_moment` (K2); `by_damping`: Re(p) T, from the arm's own C (and analog hub damping).
-    `band`: 0 from 0 to 1/(2T) [Hz], and so on; `aliased`: where the samples see the mode [rad/s].
+    `log_radius`: ln|z| of the closed-loop pole that it becomes, the larger where its pair has become two real poles;
+    `first_order` is the formula's change of it, the sum of `by_rate` (K1) and `by_moment` (K2); `by_damping`: Re(p) T,
+    from the arm's own C (and analog hub damping).  `band`: 0 from 0 to 1/(2T) [Hz], and so on; `aliased`: where the
+    samples see the mode [rad/s].
     """
 
     index: NDArray[np.int64]
@@ -87,8 +88,14 @@ def mode_table(loop: SampledLoop) -> ModeTable:
         by_rate=by_rate,
         by_moment=by_moment,
         by_damping=own[upper],
-        log_radius=loop.poles.log_radius[[int(np.nonzero(origin == i)[0][0]) for i in upper]],
+        log_radius=np.array([loop.poles.log_radius[_of_pair(loop, origin, int(i))].max() for i in upper]),
     )
+
+
+def _of_pair(loop: SampledLoop, origin: NDArray[np.int64], i: int) -> NDArray[np.bool_]:
+    """Which closed-loop poles come from open-loop pole `i` or its conjugate: two radii where both have become real."""
+    conjugate = int(abs(loop.pulse.poles - loop.pulse.poles[i].conjugate()).argmin())
+    return np.isin(origin, (i, conjugate))
 
 
 def root_locus(loop: SampledLoop, gain: GainName, values: Real) -> Complex:

@@ -218,8 +218,8 @@ def interval(window: Window | None, looked_at: Window = EVERYWHERE) -> str:
         return "for no K2 around this one"
     low, high = window
     no_low, no_high = (math.isinf(end) or end == bound for end, bound in zip(window, looked_at, strict=True))
-    bounds = [f"down to {plain(low)}"] * (no_low and not math.isinf(low))
-    bounds += [f"up to {plain(high)}"] * (no_high and not math.isinf(high))
+    bounds = [f"down to {plain(low, 4)}"] * (no_low and not math.isinf(low))
+    bounds += [f"up to {plain(high, 4)}"] * (no_high and not math.isinf(high))
     beyond = f" (looked at {' and '.join(bounds)})" if bounds else ""
     if no_low and no_high:
         return f"of any size{beyond}"
