@@ -10,17 +10,20 @@ import pytest
 import tfarm
 from tests.loop.arms import window_arm
 from tfarm.arm import Hub, HubFeedback
+from tfarm.dsp import Chain
+from tfarm.dsp.chain import Sampling
+from tfarm.dsp.loop import sampled_loop
 from tfarm.loop.damping import least_damping
 from tfarm.loop.plant import Loop
 from tfarm.loop.poles import closed_loop_poles
 from tfarm.loop.stability import stability
-from tfarm.report import loop_laws, loop_section, map
+from tfarm.report import loop_laws, map
 from tfarm.report.loci import loci, shown, zoomed
 from tfarm.report.locus_section import beyond_table
 from tfarm.report.loop_laws import NamedLaw, has_loop, margins_of
 from tfarm.report.loop_section import map_section, margins_section, nyquist_section
 from tfarm.report.map import Axis, gain_map, map_data, moment_axis, rate_axis, stable_edge
-from tfarm.report.map_picture import nice_levels
+from tfarm.report.map_picture import draw_map, nice_levels
 from tfarm.report.margins_table import NOTHING, margin_table
 from tfarm.report.nyquist import compressed, nyquist
 from tfarm.report.sections import save_section
@@ -40,7 +43,6 @@ def one_law(monkeypatch):
     """Without the search for the best gains, which takes longest and has its own tests."""
     monkeypatch.setattr(loop_laws, "best", lambda arm: None)
     monkeypatch.setattr(map, "best", lambda arm: None)
-    monkeypatch.setattr(loop_section, "best", lambda arm: None)
 
 
 # ------------------------------------------------------------ the map
@@ -281,3 +283,36 @@ def test_the_same_bytes_twice(tmp_path, monkeypatch):
     assert {"map.svg", "map.pdf", "map-data.csv", "nyquist.png", "nyquist-count.json"} <= set(files)
     for name in files:
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
+
+
+# ------------------------------------------------------------ the same gains, sampled
+
+
+def test_the_sampled_edge_on_the_map_is_where_a_pole_meets_the_circle(lab):
+    """Just inside every pole of the sampled loop decays, just outside one grows: by eigenvalues, at the edge's ends."""
+    assert lab.sampled is not None
+    loop = sampled_loop(LAB, lab.laws[0].law, Chain(), count=lab.sampled.modes)
+    columns = [i for i, column in enumerate(lab.sampled.intervals) if column][::20]
+    assert len(columns) >= 4
+    for i in columns:
+        K1, (low, high) = float(lab.sampled.K1[i]), lab.sampled.intervals[i][0]
+        step = 1e-4 * (high - low)
+        growth = [loop.with_gains(K1, K2).poles.log_spectral_radius for K2 in (low + step, high - step)]
+        assert max(growth) < 0
+        outside = [loop.with_gains(K1, K2).poles.log_spectral_radius for K2 in (low - step, high + step)]
+        assert min(outside) > 0
+
+
+def test_the_star_and_its_card_say_that_the_gains_do_not_hold_when_sampled(lab):
+    """Best damping without a clock is unstable at 10 ms and stable at 0.2 ms; the page says each at its own clock."""
+    assert [brief.is_stable for brief in lab.briefs] == [True, False]
+    labels = [text.get_text() for text in draw_map(lab).legends[0].get_texts()]
+    assert any(label.startswith("best damping") and "UNSTABLE when sampled every 10 ms" in label for label in labels)
+    assert any(label.startswith("stable when sampled every 10 ms") for label in labels)
+    section = map_section(LAB)
+    assert any("But sampled every 10 ms (tfarm's default period) these gains are UNSTABLE" in w for w in section.words)
+    facts = margins_section(LAB).facts
+    assert [fact.beside.endswith("UNSTABLE when sampled every 10 ms") for fact in facts] == [False, True]
+    quick = margins_section(LAB, Chain(sampling=Sampling(period=2e-4))).facts
+    assert all(fact.beside.endswith("; stable when sampled every 0.2 ms") for fact in quick)
+    assert set(map_data(lab).columns[0].values) == {"grid", "boundary", "sampled boundary"}

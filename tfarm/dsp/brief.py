@@ -34,6 +34,12 @@ class SampledBrief:
         return f"sampled every {1e3 * T:g} ms{late}{default}"
 
     @property
+    def short(self) -> str:
+        """The verdict in a few words, for a legend or a card."""
+        verdict = "undecided" if self.is_stable is None else "stable" if self.is_stable else "UNSTABLE"
+        return f"{verdict} when sampled every {1e3 * self.sampling.period:g} ms"
+
+    @property
     def words(self) -> str:
         """The clock and the verdict, loud where the gains do not hold."""
         verdict, _, rest = self.sentence.partition(":")

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from tfarm.arm import Arm, HubFeedback
+from tfarm.dsp import Chain
+from tfarm.dsp.brief import SampledBrief, sampled_brief
 from tfarm.errors import ConvergenceError
 from tfarm.loop.design import Design, design
 from tfarm.loop.margins import Margins, margins
@@ -92,6 +94,12 @@ def best(arm: Arm) -> Design | None:
         return design(arm, modes=MODES)
     except ConvergenceError:
         return None
+
+
+@lru_cache(maxsize=64)
+def brief_of(arm: Arm, law: HubFeedback, chain: Chain) -> SampledBrief:
+    """Whether gains hold when sampled, computed once for all sections."""
+    return sampled_brief(arm, law, chain)
 
 
 @lru_cache(maxsize=64)

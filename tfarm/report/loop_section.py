@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from tfarm.arm import Arm
+from tfarm.dsp import Chain
+from tfarm.dsp.brief import SampledBrief
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import Windows
 from tfarm.report.digits import plain, significant
@@ -14,7 +16,7 @@ from tfarm.report.figures import Picture
 from tfarm.report.loop_laws import (
     MODES,
     NamedLaw,
-    best,
+    brief_of,
     edge_of_K2,
     laws,
     margins_of,
@@ -44,6 +46,11 @@ NO_PROOF = (
     "The dashed frame is what the Lyapunov argument proves for an arm without damping; it is not a proof here, because "
     "the gauge does not feel C. At C > 0 it proves K2 = 0 alone (solid line). The true edge is the black line."
 )
+SAMPLED = (
+    " Hatched: what is stable when the loop is sampled every {clock}, its edge exact for the first {modes} modes; with "
+    "that clock no gains outside the hatching hold, whatever the continuous loop promises."
+)
+NOT_SAMPLED = " Where the loop is stable when it is sampled every {clock} could not be settled and is not drawn."
 DEPTH = " Unstable windows below K2 = −50 were not looked for."
 NYQUIST_WORDS = (
     "Every size of L(iω) from 0 to infinity is in the picture: a size r is drawn as r/(1 + r), so nothing is cut off, "
@@ -73,9 +80,9 @@ def no_loop_section(arm: Arm) -> Section:
 # ------------------------------------------------------------ the map
 
 
-def map_section(arm: Arm) -> Section:
-    """How high may the gains go?"""
-    data = gain_map(arm)
+def map_section(arm: Arm, chain: Chain | None = None) -> Section:
+    """How high may the gains go?  And how high when the loop is sampled by the chain's clock?"""
+    data = gain_map(arm, chain)
     picture = Picture(
         stem="map",
         title="The plane of both gains",
@@ -84,7 +91,7 @@ def map_section(arm: Arm) -> Section:
         figure=draw_map(data),
         data=map_data(data),
     )
-    words = (_answer(arm), _best_words(arm), sign_words(arm))
+    words = (_answer(arm), _best_words(data), sign_words(arm))
     return Section(
         anchor="margins-map", title="How high may the gains go?", words=[w for w in words if w], blocks=(picture,)
     )
@@ -128,8 +135,8 @@ def _crossing_there(windows: Windows, value: float) -> str:
     return f", where poles cross at {significant(crossing.omega, 4)} rad/s"
 
 
-def _best_words(arm: Arm) -> str:
-    found = best(arm)
+def _best_words(data: GainMap) -> str:
+    found = data.design
     if found is None:
         return ""
     cut = " and ".join(f"{name} = {plain(getattr(found.law, name), 4)}" for name in found.at_bound)
@@ -138,7 +145,14 @@ def _best_words(arm: Arm) -> str:
         f"The best damping of the first {MODES} modes within the dotted frame is {significant(100 * found.value, 3)} % "
         f"of critical, at K1 = {significant(found.law.K1, 4)} N m s/rad and K2 = {significant(found.law.K2, 4)} "
         f"(tfarm design), a continuous loop that is {found.verdict.verdict}.{edge}"
+        f" {_sampled_words(data.briefs[-1])}"
     )
+
+
+def _sampled_words(brief: SampledBrief) -> str:
+    """What sampling does to the best gains, as a sentence."""
+    words = typeset(brief.words)
+    return f"{'' if brief.is_stable else 'But '}{words if not brief.is_stable else words[0].upper() + words[1:]}."
 
 
 def _map_caption(data: GainMap) -> str:
@@ -149,7 +163,10 @@ def _map_caption(data: GainMap) -> str:
     seen = MAP_SEEN.format(
         band=significant(data.band, 5), proof=proof, unit=unit, reach=reach, apart=APART * free, held=HELD * (not free)
     )
-    return seen + DEPTH * (not data.is_undamped)
+    sampled = NOT_SAMPLED if data.sampled is None else SAMPLED
+    clock = f"{plain(1e3 * data.chain.sampling.period)} ms"
+    modes = 0 if data.sampled is None else data.sampled.modes
+    return seen + sampled.format(clock=clock, modes=modes) + DEPTH * (not data.is_undamped)
 
 
 def _map_alt(data: GainMap) -> str:
@@ -160,14 +177,15 @@ def _map_alt(data: GainMap) -> str:
 # ------------------------------------------------------------ margins
 
 
-def margins_section(arm: Arm) -> Section:
-    """The verdict on each law, then its margins."""
+def margins_section(arm: Arm, chain: Chain | None = None) -> Section:
+    """The verdict on each law, continuous and at the chain's clock, then its margins."""
+    chain = Chain() if chain is None else chain
     named = laws(arm)
     found = [margins_of(arm, each.law) for each in named]
     return Section(
         anchor="margins",
         title="Is the loop stable, and by how much?",
-        facts=tuple(verdict_facts(named, found)),
+        facts=tuple(verdict_facts(named, found, [brief_of(arm, each.law, chain) for each in named])),
         words=[verdict_words(*each) for each in zip(named, found, strict=True)],
         blocks=(margin_table(named, found, arm.link.damping == 0), window_table(named, found, sign_words(arm))),
     )

@@ -13,12 +13,16 @@ from numpy.typing import NDArray
 
 import tfarm
 from tfarm.arm import Arm, Hub
+from tfarm.dsp import Chain, sampled_verdict
+from tfarm.dsp.brief import SampledBrief
+from tfarm.errors import ConvergenceError
 from tfarm.loop.damping import least_damping
 from tfarm.loop.design import Design
 from tfarm.loop.frequencies import band_of
 from tfarm.loop.regions import Region, between, boundary, region
 from tfarm.records import record
-from tfarm.report.loop_laws import MODES, NamedLaw, best, laws
+from tfarm.report.loop_laws import MODES, NamedLaw, best, brief_of, laws
+from tfarm.report.overlay import Layer, ends_of_K1, sampled_layer
 from tfarm.report.tables import Column, Table, Value, data_column
 from tfarm.spectrum.scales import default_gains, rate_unit
 
@@ -29,6 +33,9 @@ SPARSE = 4  # every so many of them the damping is computed
 LOW, HIGH, DEEPEST = -4.0, 2.0, -50.0  # K2: the range shown, and how deep windows are looked for
 SHORT, LONG, ROUNDS = 0.008, 0.03, 30  # lengths of the boundary's segments, as shares of the picture
 SCAN = 32  # columns in which they are looked for
+SAMPLED_COLUMNS = 120  # values of K1 at which the sampled region is cut, besides its exact ends
+SIDE = 1e-9  # relative: so far to either side of an upright edge the region is cut too
+OUTSIDE = 0.1  # of K2, beyond the picture: an edge there is none of the region
 NEAR = 1.5  # beyond this many rows from the boundary the count must have changed
 
 
@@ -72,7 +79,8 @@ class GainMap:
     `region` is the exact count on the coloured grid, `edge` (n, 3) the exact boundary K1, K2, w within the picture
     with rows of nan where it leaves it; `damping` (rows, columns) the least damping ratio of the first `MODES` modes
     on every fourth point of the grid; `held` [rad/s] the first frequencies with the hub at rest; `design` the best
-    gains.
+    gains.  `sampled` is where the loop is stable at the clock of `chain` too, None where that could not be settled;
+    `briefs` are the sampled verdicts on the laws.
     """
 
     arm: Arm
@@ -86,6 +94,9 @@ class GainMap:
     laws: tuple[NamedLaw, ...]
     design: Design | None
     held: Real
+    chain: Chain
+    sampled: Layer | None
+    briefs: tuple[SampledBrief, ...]
 
     @property
     def is_undamped(self) -> bool:
@@ -104,8 +115,9 @@ class GainMap:
         return band_of(self.arm, MODES)
 
 
-def gain_map(arm: Arm) -> GainMap:
-    """The map of an arm, its ranges chosen by J w1 and by the windows that it has."""
+def gain_map(arm: Arm, chain: Chain | None = None) -> GainMap:
+    """The map of an arm, its ranges chosen by J w1 and by the windows that it has; without a chain at 10 ms."""
+    chain = Chain() if chain is None else chain
     x = rate_axis(arm)
     y = moment_axis(arm, x)
     found = region(arm, x.grid(COLUMNS), y.grid(ROWS))
@@ -114,7 +126,22 @@ def gain_map(arm: Arm) -> GainMap:
     a, b = (each.ravel() for each in np.meshgrid(K1, K2))
     damping = least_damping(arm, a, b, np.zeros(a.size), MODES).reshape(K2.size, K1.size)
     held = tfarm.modes(_held(arm), count=3).natural_frequency
-    return GainMap(arm, x, y, found, edge(found, x, y), K1, K2, damping, laws(arm), best(arm), held)
+    named = laws(arm)
+    briefs = tuple(brief_of(arm, each.law, chain) for each in named)
+    sampled = sampled_region(arm, x, y, chain)
+    return GainMap(arm, x, y, found, edge(found, x, y), K1, K2, damping, named, best(arm), held, chain, sampled, briefs)
+
+
+def sampled_region(arm: Arm, x: Axis, y: Axis, chain: Chain) -> Layer | None:
+    """Where in the picture the sampled loop is stable, with the modes of the verdict on the default gains."""
+    try:
+        loop = sampled_verdict(arm, default_gains(arm), chain).loop
+        ends = np.array(ends_of_K1(loop))
+        K1 = x.grid(SAMPLED_COLUMNS)
+        sides = np.concatenate([K1[K1 > 0], ends * (1 - SIDE), ends * (1 + SIDE)])
+        return sampled_layer(loop, np.unique(sides[sides < x.high]), (y.low - OUTSIDE, y.high + OUTSIDE))
+    except ConvergenceError:
+        return None
 
 
 def rate_axis(arm: Arm) -> Axis:
@@ -187,26 +214,38 @@ def stable_edge(data: GainMap) -> Real:
 
 
 def map_data(data: GainMap) -> Table:
-    """The grid with counts and damping, then the boundary with its frequencies, in one file."""
+    """The grid with counts and damping, the boundary with its frequencies, then the ends of the sampled intervals."""
     K1, K2 = (each.ravel() for each in np.meshgrid(data.K1, data.K2))
     edge = data.edge[~np.isnan(data.edge[:, 0])] if data.edge.size else data.edge
     counts: list[Value] = [math.inf if count < 0 else int(count) for count in data.counts.ravel()]
     none: list[Value] = [""]
+    sampled = _sampled_ends(data)
+    beyond = len(edge) + len(sampled)
+    what = ["grid"] * K1.size + ["boundary"] * len(edge) + ["sampled boundary"] * len(sampled)
     columns = (
-        Column(key="what", title="what", values=["grid"] * K1.size + ["boundary"] * len(edge), cells=()),
-        data_column("K1_N_m_s_rad", "K1", "N m s/rad", np.r_[K1, edge[:, 0]]),
-        data_column("K2", "K2", "", np.r_[K2, edge[:, 1]]),
-        Column(key="unstable_poles", title="unstable poles", values=counts + none * len(edge), cells=()),
+        Column(key="what", title="what", values=what, cells=()),
+        data_column("K1_N_m_s_rad", "K1", "N m s/rad", np.r_[K1, edge[:, 0], sampled[:, 0]]),
+        data_column("K2", "K2", "", np.r_[K2, edge[:, 1], sampled[:, 1]]),
+        Column(key="unstable_poles", title="unstable poles", values=counts + none * beyond, cells=()),
         Column(
             key="least_damping_ratio", title="least damping ratio", cells=(),
-            values=[*data.damping.ravel().tolist(), *none * len(edge)],
+            values=[*data.damping.ravel().tolist(), *none * beyond],
         ),
         Column(
             key="omega_rad_s", title="frequency", unit="rad/s", cells=(),
-            values=none * K1.size + edge[:, 2].tolist(),
+            values=none * K1.size + edge[:, 2].tolist() + none * len(sampled),
         ),
     )  # fmt: skip
     return Table(stem="map-data", title="The map of K1 and K2", caption="", is_data=True, columns=columns)
+
+
+def _sampled_ends(data: GainMap) -> Real:
+    """K1 and K2 (n, 2) of the ends of the sampled loop's stable intervals, those cut by the picture left out."""
+    if data.sampled is None:
+        return np.empty((0, 2))
+    columns = zip(data.sampled.K1, data.sampled.intervals, strict=True)
+    ends = [(float(K1), end) for K1, column in columns for window in column for end in window]
+    return np.array([each for each in ends if data.y.low <= each[1] <= data.y.high]).reshape(-1, 2)
 
 
 def _held(arm: Arm) -> Arm:

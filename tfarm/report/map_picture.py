@@ -16,6 +16,7 @@ from tfarm.loop.regions import INFINITE
 from tfarm.report.digits import SUPERSCRIPT, plain, significant
 from tfarm.report.figures import BLUE, GREY, INK, ORANGE, PURPLE, blank, headline, style
 from tfarm.report.map import GainMap, Real, stable_edge
+from tfarm.report.region_pieces import pieces
 
 STABLE, FEWEST, MOST, BOUNDLESS = "#dcefe6", "#fbeadd", "#eebd95", "#f3d9c6"
 STEPS, MOST_LEVELS = (1.0, 2.0, 5.0), 7  # of the contours
@@ -37,6 +38,7 @@ def draw_map(data: GainMap) -> Figure:
         )  # fmt: skip
         _contours(data, ax)
         _boundary(data, ax)
+        _sampled(data, ax)
         _lyapunov(data, ax)
         _count_labels(data, ax)
         _laws(data, ax)
@@ -122,6 +124,23 @@ def _boundary(data: GainMap, ax: Axes) -> None:
     ax.plot([], [], "o", ms=4.0, mfc="white", mec=INK, mew=1.0, label="with ω in rad/s")
 
 
+def _sampled(data: GainMap, ax: Axes) -> None:
+    """Where the sampled loop is stable: hatched, its edge exact."""
+    if data.sampled is None:
+        return
+    layer = data.sampled
+    label = f"stable when sampled every {plain(1e3 * data.chain.sampling.period)} ms (first {layer.modes} modes)"
+    for piece in pieces(layer.K1, layer.intervals):
+        x, low, high = np.array(piece.points).T
+        ax.fill_between(x, low, high, facecolor="none", edgecolor=ORANGE, alpha=0.45, hatch="////", lw=0, zorder=1)
+        for line in (low, high):
+            ax.plot(x, line, color=ORANGE, lw=1.2, zorder=4.5)
+        for end in np.nonzero([piece.begins and x[0] > layer.K1[0], piece.ends])[0]:
+            ax.plot([x[-end]] * 2, [low[-end], high[-end]], color=ORANGE, lw=1.2, zorder=4.5)
+    none = "" if any(layer.intervals) else ": nowhere in this picture"
+    ax.fill_between([], [], [], facecolor="none", edgecolor=ORANGE, hatch="////", lw=1.0, label=f"{label}{none}")
+
+
 def _chosen(points: Real, data: GainMap) -> Real:
     """A few points of the stable region's edge, far apart as seen."""
     if not points.size:
@@ -199,10 +218,10 @@ def _words(count: int) -> str:
 
 
 def _laws(data: GainMap, ax: Axes) -> None:
-    for law in data.laws:
+    for law, brief in zip(data.laws, data.briefs, strict=True):
         ax.plot(
             [law.law.K1], [law.law.K2], MARKERS[law.key], ms=8.0 if law.key == "default" else 13.0, mfc=ORANGE,
-            mec="white", mew=1.0, zorder=7, ls="none", label=f"{law.name}: {law.gains}",
+            mec="white", mew=1.0, zorder=7, ls="none", label=f"{law.name}: {law.gains};\n{brief.short}",
         )  # fmt: skip
     if data.design is not None:
         (a, b), (c, d) = data.design.bounds["K1"], data.design.bounds["K2"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
+from tfarm.dsp.brief import SampledBrief
 from tfarm.loop.lyapunov import lyapunov
 from tfarm.loop.margins import Margins
 from tfarm.loop.windows import Windows
@@ -38,12 +39,16 @@ QUANTITIES = (
 Row = tuple[str, str, float | str, float | str, float | str]  # quantity, unit, exact, in the band, at
 
 
-def verdict_facts(laws: Sequence[NamedLaw], found: Sequence[Margins]) -> Iterator[Fact]:
-    """The verdict of each law, large."""
-    for named, each in zip(laws, found, strict=True):
+def verdict_facts(laws: Sequence[NamedLaw], found: Sequence[Margins], briefs: Sequence[SampledBrief]) -> Iterator[Fact]:
+    """The verdict of each law on the continuous loop, large, and beside it what sampling makes of it."""
+    for named, each, brief in zip(laws, found, briefs, strict=True):
         it = each.stability
         count = "infinitely many unstable poles" if it.unstable_roots_infinite else _many(it.unstable_roots)
-        yield Fact(label=f"{named.name}: {named.gains}", value=it.verdict.upper(), beside=f"{count}, {_up_to(it.band)}")
+        yield Fact(
+            label=f"{named.name}: {named.gains}",
+            value=it.verdict.upper(),
+            beside=f"{count}, {_up_to(it.band)}; {brief.short}",
+        )
 
 
 def verdict_words(named: NamedLaw, found: Margins) -> str:

@@ -77,13 +77,13 @@ def overlay(arm: Arm, gains: HubFeedback, chain: Chain) -> Overlay:
     """The regions around these gains.  Raises ParameterError where the arm has no loop."""
     dampings = (arm.link.damping,) if arm.link.damping else (*DAMPINGS, 0.0)
     loops = [sampled_verdict(with_damping(arm, C), gains, chain).loop for C in dampings]
-    ends = np.array(sorted({end for loop in loops for end in _ends_of_K1(loop)}))
+    ends = np.array(sorted({end for loop in loops for end in ends_of_K1(loop)}))
     ends = ends[np.diff(ends, prepend=0.0) > SAME * ends]
     top = _round_up(BEYOND * max([gains.K1, *ends]))
     low = gains.K1 / BELOW
     sides = np.r_[ends * (1 - 1e-9), ends * (1 + 1e-9)]
     K1 = np.unique(np.r_[np.geomspace(low, top, COLUMNS), sides[(sides > low) & (sides < top)]])
-    layers = tuple(_sampled_layer(loop, K1) for loop in loops)
+    layers = tuple(sampled_layer(loop, K1, CUT) for loop in loops)
     span = (float(K1[0]), float(K1[-1]))
     return Overlay(arm, gains, chain.sampling.period, span, _continuous_layer(arm, K1), layers)
 
@@ -93,7 +93,7 @@ def with_damping(arm: Arm, C: float) -> Arm:
     return replace(arm, link=replace(arm.link, damping=C))
 
 
-def _ends_of_K1(loop: SampledLoop) -> list[float]:
+def ends_of_K1(loop: SampledLoop) -> list[float]:
     """Where stable intervals of K1 end, at a few K2: there the region has upright edges."""
     found = [window for K2 in ENDS_AT for window in stable_windows(loop.with_gains(loop.gains.K1, K2), "K1")]
     return [end for window in found for end in window if math.isfinite(end) and end > 0]
@@ -105,8 +105,9 @@ def _round_up(x: float) -> float:
     return next(step * power for step in (1.0, 2.0, 5.0, 10.0, 20.0) if step * power >= x)
 
 
-def _sampled_layer(loop: SampledLoop, K1: Real) -> Layer:
-    plane = gain_map(loop, K1, np.linspace(*CUT, 3))
+def sampled_layer(loop: SampledLoop, K1: Real, cut: Window) -> Layer:
+    """Where the sampled loop is stable: at each K1 (ascending) its intervals of K2, cut to a range."""
+    plane = gain_map(loop, K1, np.linspace(*cut, 3))
     return Layer(loop.plant.arm.link.damping, K1, plane.stable_intervals, plane.modes_used)
 
 

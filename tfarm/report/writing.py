@@ -50,7 +50,7 @@ OURS = ("index.html", "README.md", "pictures", "bench.json", "trust")  # names i
 class Piece:
     """One section of one arm's page: a name for the progress bar, the section's anchor, and how to make it.
 
-    `make` takes the arm, and for a section that is about the sampled loop (`is_sampled`) its chain.
+    `make` takes the arm, and for a section that says what the loop does when sampled (`is_sampled`) its chain.
     """
 
     name: str
@@ -62,7 +62,7 @@ class Piece:
 
 
 PIECES = (
-    Piece("map of the gains", "margins-map", ("margins",), map_section, has_loop),
+    Piece("map of the gains", "margins-map", ("margins",), map_section, has_loop, is_sampled=True),
     Piece("the arm", "arm", tuple(QUESTIONS), arm_section),
     Piece("the paper's values", "paper", (), paper_section, is_from_paper),
     Piece("root moment", "bode-root-moment", ("bode",), partial(bode_section, output="root_moment")),
@@ -71,7 +71,7 @@ PIECES = (
     Piece(
         "no loop", "no-loop", ("margins", "locus", "sampled", "tune"), no_loop_section, lambda arm: not has_loop(arm)
     ),
-    Piece("margins", "margins", ("margins",), margins_section, has_rate_loop),
+    Piece("margins", "margins", ("margins",), margins_section, has_rate_loop, is_sampled=True),
     Piece("root loci", "locus", ("locus",), locus_section, has_rate_loop),
     Piece("Nyquist", "margins-nyquist", ("margins",), nyquist_section, has_loop),
     Piece("sampled loop", "sampled", ("sampled",), sampled_section, has_loop, is_sampled=True),
