@@ -18,6 +18,7 @@ import tfarm
 from tests.shell import run
 from tfarm.arm import to_toml
 from tfarm.dsp import load_chain
+from tfarm.report import card as card_room
 from tfarm.report import readme_pictures, write, writing
 from tfarm.report.paper import is_from_paper, paper_section
 from tfarm.report.sections import Section
@@ -305,7 +306,7 @@ class Unmakeable:
     def __init__(self, error):
         self.error = error
 
-    def __call__(self, arm):
+    def __call__(self, *_):
         raise self.error
 
 
@@ -355,6 +356,15 @@ def test_a_section_that_cannot_be_made_says_why_in_its_place(tmp_path, monkeypat
     assert "Parameters" in page
     assert len(told) == 1
     assert "stopped short of the pole" in told[0]
+
+
+def test_an_index_without_the_picture_of_an_arm_names_it(tmp_path, monkeypatch):
+    without_a_section(monkeypatch, tfarm.ConvergenceError("no zeros found", None, None))
+    monkeypatch.setattr(card_room, "bode", Unmakeable(tfarm.ConvergenceError("no zeros found", None, None)))
+    write([ARM], tmp_path, only=("locus",))
+    targets = Links(tmp_path / "index.html").targets
+    assert not any(target.endswith(".svg") for target in targets)
+    assert any(unquote(target) == f"{NAME}/locus.html" for target in targets)
 
 
 def test_a_section_left_out_is_one_line_on_standard_error(tmp_path, monkeypatch, capsys):

@@ -12,6 +12,7 @@ from typing import Any
 
 import tfarm
 from tfarm.arm import Arm
+from tfarm.errors import TfarmError
 from tfarm.report.arm_section import headline_numbers
 from tfarm.report.bode import draw_card
 from tfarm.report.bode_section import RESONANCES
@@ -26,12 +27,17 @@ LARGEST = 1 << 16  # bytes of a card.json worth reading
 
 
 def save_card(arm: Arm, folder: Path) -> None:
-    """card.svg and card.json."""
+    """card.svg and card.json; a picture that cannot be made is left out, as its section on the page is."""
     modes = tfarm.modes(arm, count=RESONANCES + 1)
-    data = bode(arm, "root_moment", band_of(modes.natural_frequency[modes.index > 0]))
-    save(draw_card(data), folder, "card", formats=("svg",))
+    try:
+        data = bode(arm, "root_moment", band_of(modes.natural_frequency[modes.index > 0]))
+        save(draw_card(data), folder, "card", formats=("svg",))
+    except TfarmError:
+        picture = ""
+    else:
+        picture = "card.svg"
     facts = [[f.label, f.value, f.unit, f.beside] for f in headline_numbers(arm)[:FACTS]]
-    card = {"tfarm_card": 1, "name": arm.name, "summary": summary(arm), "facts": facts}
+    card = {"tfarm_card": 1, "name": arm.name, "summary": summary(arm), "facts": facts, "picture": picture}
     text = json.dumps(card, ensure_ascii=False, indent=1) + "\n"
     (folder / "card.json").write_text(text, encoding="utf-8", newline="")
 
@@ -57,4 +63,5 @@ def _card(read: Any, folder: str, pages: Sequence[tuple[str, str]]) -> Card | No
     if read["tfarm_card"] != 1 or read["name"] != folder:
         return None
     facts = [Fact(label=str(a), value=str(b), unit=str(c), beside=str(d)) for a, b, c, d in read["facts"]]
-    return Card(name=folder, summary=str(read["summary"]), facts=facts, pages=pages, picture="card.svg")
+    picture = "card.svg" if read.get("picture", "card.svg") else ""
+    return Card(name=folder, summary=str(read["summary"]), facts=facts, pages=pages, picture=picture)
