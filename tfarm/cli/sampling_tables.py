@@ -33,12 +33,14 @@ def print_sampled(answer: dict[str, Any]) -> None:
         table.add_row(str(mode["index"]), frequency, str(mode["band"]), *(f"{x:.3e}" for x in numbers))
     show(table)
     print(answer["law"])
-    print(f"stable at this K2 for K1 in {_texts(answer['K1_intervals'])}")
-    print(f"stable at this K1 for K2 in {_texts(answer['K2_intervals'])}")
+    shown, band = answer["shown"], answer["band_rad_s"]
+    print(f"stable at this K2 for K1 in {_texts(shown['K1_intervals'], band)}")
+    print(f"stable at this K1 for K2 in {_texts(shown['K2_intervals'], band)}")
+    delay, damping = shown["delay_margin_samples"], shown["required_damping_s"]
     more = " or more" if answer["delay_margin_is_lower_bound"] else ""
-    print(f"further delay it bears: {answer['delay_margin_samples']:.4g} samples{more}")
-    print(f"damping C from which these gains are safe: {answer['required_damping_s']:.4g} s")
-    print(f"{answer['arm']}: {answer['verdict']}; spectral radius {answer['spectral_radius']:.12g}")
+    print(f"further delay it bears: {delay['text']} samples{more}{_held([delay], band)}")
+    print(f"damping C from which these gains are safe: {damping['text']} s{_held([damping], band)}")
+    print(f"{answer['arm']}: {answer['verdict_in_words']}; spectral radius {answer['spectral_radius']:.12g}")
 
 
 def print_simulation(answer: dict[str, Any]) -> None:
@@ -108,5 +110,16 @@ def _present(answer: dict[str, Any]) -> list[str]:
     return [name for name in SIGNALS if answer.get(name)]
 
 
-def _texts(windows: list[list[float]]) -> str:
-    return " and ".join(f"({low:.6g}, {high:.6g})" for low, high in windows) or "no interval"
+def _texts(windows: list[list[dict[str, Any]]], band: float | None) -> str:
+    """Intervals in the digits that hold, and for which modes where that is not every one of the verdict's band."""
+    spans = " and ".join(f"({low['text']}, {high['text']})" for low, high in windows)
+    return f"{spans}{_held([edge for pair in windows for edge in pair], band)}" if windows else "no interval"
+
+
+def _held(figures: list[dict[str, Any]], band: float | None) -> str:
+    """For which modes the figures hold; nothing where that is the band of the verdict."""
+    modes = [figure["modes"] for figure in figures if not figure["settled"]]
+    if modes:
+        return f" (holds for the first {max(modes)} modes)"
+    narrowest = min(figure["band_rad_s"] for figure in figures)
+    return "" if band is not None and narrowest >= band else f" (proven below {narrowest:.3g} rad/s)"

@@ -22,6 +22,9 @@ Window = tuple[float, float]
 LONGEST_DELAY = 20.0  # samples: the delay margin is looked for up to here
 MOST_STEPS = 2000
 FEW = 2  # modes kept beyond the last one that outlives a sample
+BEYOND, MOST = 4, 128  # those of a whole loop, and the most that it has: half a second of work
+FEWER = (0.85, 0.72, 0.61, 0.54)
+OVERDAMPED = 2.5  # C w from which on a bending mode surely is: following it further costs a hundred times as much
 STRONGEST = 0.15  # of critical in the first mode: no stronger damping is looked at
 DECADES = 16  # down from there
 
@@ -117,9 +120,9 @@ def required_damping(arm: Arm, gains: HubFeedback, chain: Chain, *, count: int =
     """
 
     def log_radius(log_C: float) -> float:
-        return _with_damping(arm, gains, chain, math.exp(log_C), count)
+        return log_radius_with(arm, gains, chain, math.exp(log_C), count)
 
-    if sampled_loop(_damped(arm, 0.0), gains, chain, count=count).poles.is_stable:
+    if sampled_loop(damped(arm, 0.0), gains, chain, count=count).poles.is_stable:
         return 0.0
     first = float(modes(arm, 1).natural_frequency[-1])
     high = math.log(2 * STRONGEST / first)
@@ -133,15 +136,15 @@ def required_damping(arm: Arm, gains: HubFeedback, chain: Chain, *, count: int =
     return math.exp(high)
 
 
-def _with_damping(arm: Arm, gains: HubFeedback, chain: Chain, C: float, count: int) -> float:
+def log_radius_with(arm: Arm, gains: HubFeedback, chain: Chain, C: float, count: int) -> float:
     """The log spectral radius at C; where two damped modes are one there, at a C that differs by 1e-6.
 
-    Modes that a strong C has settled before the next sample are left to the static remainder, but for a few.
+    Modes that a strong C has settled before the next sample, or overdamped, are left to the remainder, but for a few.
     """
-    count = min(count, FEW + alive(_damped(arm, C), chain))
+    count = min(count, FEW + alive(damped(arm, C), chain), FEW + modes_below(arm, OVERDAMPED / C))
     for nudge in (0.0, 1e-6, -1e-6):
         try:
-            loop = sampled_loop(_damped(arm, C * (1 + nudge)), gains, chain, count=count)
+            loop = sampled_loop(damped(arm, C * (1 + nudge)), gains, chain, count=count)
         except ConvergenceError:
             if nudge < 0:
                 raise
@@ -156,5 +159,20 @@ def alive(arm: Arm, chain: Chain) -> int:
     return modes_below(arm, math.sqrt(2 * FORGOTTEN / (arm.link.damping * remaining)))
 
 
-def _damped(arm: Arm, C: float) -> Arm:
+def whole_loop(arm: Arm, gains: HubFeedback, chain: Chain) -> SampledLoop:
+    """The loop of a damped arm with every mode that outlives a sample and a few, or with the first 128.
+
+    With somewhat fewer where two damped modes cannot be told apart.
+    """
+    most = min(MOST, BEYOND + alive(arm, chain))
+    for number in (most, *(int(share * most) for share in FEWER)):
+        try:
+            return sampled_loop(arm, gains, chain, count=max(1, number))
+        except ConvergenceError as error:
+            lost = error
+    raise lost
+
+
+def damped(arm: Arm, C: float) -> Arm:
+    """The arm with another C [s]."""
     return replace(arm, link=replace(arm.link, damping=C))

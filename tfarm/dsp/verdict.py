@@ -1,23 +1,24 @@
-"""Is the sampled loop stable?  With as many modes as it takes for the answer not to change."""
+"""Is the sampled loop stable?  Proven for every mode of a band, or said of the first N modes alone."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 from tfarm.arm import Arm, HubFeedback
+from tfarm.dsp.band import Band, band_of
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.law import ModeTable, growing_mode, mode_table
-from tfarm.dsp.loop import SampledLoop, sampled_loop
-from tfarm.dsp.margins import DelayMargin, Window, alive, around, delay_margin, required_damping, stable_windows
-from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.dsp.loop import SampledLoop, check_loop, sampled_loop
+from tfarm.dsp.margins import DelayMargin, Window, around, whole_loop
+from tfarm.dsp.shown import Figure, ShownWindows, resized, shown_damping, shown_delay, shown_windows
+from tfarm.errors import ParameterError
 from tfarm.records import record
 
 UNDAMPED_MODES = 20
-FEW, MOST = 4, 128
 AGREE, NOISE = 1e-4, 1e-12
-FEWER = (0.85, 0.72, 0.61, 0.54)
 MOST_ASKED = 400
 
 
@@ -26,12 +27,22 @@ MOST_ASKED = 400
 class Verdict:
     """Whether a sampled loop is stable, apart from z = 1 of a hub angle that nothing regulates.
 
-    `loop` has the modes that the verdict holds for; `is_settled` says that more of them do not change it, which at C =
-    0 can never be said: there it holds for the first `modes_used` modes, and high ones may grow by 1e-9 a sample.
+    `band` is the part of the arm for which it is proven (`tfarm.dsp.band`); None where nothing is, as at C = 0: then
+    the verdict holds for the first `modes_used` modes, those of `loop`, and high ones may grow by 1e-9 a sample.
     """
 
     loop: SampledLoop
-    is_settled: bool
+    band: Band | None = None
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether no mode of the band, in the loop or not, and no slow real pole can change the verdict."""
+        return self.band is not None
+
+    @property
+    def band_rad_s(self) -> float | None:
+        """Up to where the verdict is proven [rad/s]; None where it is not."""
+        return None if self.band is None else self.band.top
 
     @property
     def modes_used(self) -> int:
@@ -54,12 +65,19 @@ class Verdict:
         poles = self.loop.poles
         growth, mode = poles.log_spectral_radius, growing_mode(self.loop)
         what = f"mode {mode}" if mode else "the hub"
-        held = "" if self.is_settled else f" (holds for the first {self.modes_used} modes)"
+        held = f" ({self.holds_for})"
         if growth > 0:
             return f"unstable: {what} grows by {_change(growth)} a sample{held}"
         if growth == 0:
             return f"marginal: {what} neither grows nor decays{held}"
         return f"stable: {what} decays most slowly, by {_change(growth)} a sample{held}"
+
+    @property
+    def holds_for(self) -> str:
+        """What the verdict holds for, in words."""
+        if self.band is None:
+            return f"holds for the first {self.modes_used} modes"
+        return f"proven for every mode below {self.band.top:.3g} rad/s, not known beyond"
 
 
 def _change(log_radius: float) -> str:
@@ -74,61 +92,77 @@ def _change(log_radius: float) -> str:
 def sampled_verdict(arm: Arm, gains: HubFeedback, chain: Chain | None = None, *, count: int | None = None) -> Verdict:
     """The verdict, with `count` modes, or as many as it takes (C > 0), or the first 20 (C = 0).
 
-    Raises ParameterError for a locked hub, for I_h = 0 with K2 != 0 (an algebraic loop), and a count outside 1..400.
+    As many as it takes: poles of the loop outside the circle are as many as are proven for its whole band, and the
+    largest radius has stopped to change.  Raises ParameterError for a locked hub, for I_h = 0 with K2 != 0 (an
+    algebraic loop), and a count outside 1..400.
     """
     chain = Chain() if chain is None else chain
     if count is not None:
         if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_ASKED:
             remedy = f"a whole number of flexible modes from 1 to {MOST_ASKED}"
             raise ParameterError(key="modes", value=count, remedy=remedy)
-        return Verdict(sampled_loop(arm, gains, chain, count=count), False)
+        return Verdict(sampled_loop(arm, gains, chain, count=count))
     if arm.link.damping == 0.0:
-        return Verdict(sampled_loop(arm, gains, chain, count=UNDAMPED_MODES), False)
-    fewest, *more = _counts(arm, chain)
-    loop = sampled_loop(arm, gains, chain, count=fewest)
-    for number in more:
-        before, loop = loop, _larger(arm, gains, chain, loop.plant.count, number)
-        if _agree(before, loop):
-            return Verdict(loop, True)
-    return Verdict(loop, False)
+        return Verdict(sampled_loop(arm, gains, chain, count=UNDAMPED_MODES))
+    check_loop(arm, gains)
+    largest = whole_loop(arm, gains, chain)
+    band = band_of(largest)
+    proven = None if band is None else band.circle().count(gains)
+    before: SampledLoop | None = None
+    for loop in _growing(largest, band.modes if band else largest.plant.count):
+        if before is not None and _agree(before, loop) and proven in (None, _outside(loop)):
+            break
+        before = loop
+    is_proven = proven is not None and (proven == 0) == (_outside(loop) == 0)
+    return Verdict(loop, band if is_proven else None)
 
 
-def _larger(arm: Arm, gains: HubFeedback, chain: Chain, before: int, count: int) -> SampledLoop:
-    """The loop with `count` modes, or somewhat fewer (above `before`) where two damped modes cannot be told apart."""
-    numbers = [number for number in (count, *(int(share * count) for share in FEWER)) if number > before]
-    for number in numbers:
-        try:
-            return sampled_loop(arm, gains, chain, count=number)
-        except ConvergenceError:
-            if number == numbers[-1]:
-                raise
-    raise AssertionError("unreachable")
+def _growing(largest: SampledLoop, most: int) -> Iterator[SampledLoop]:
+    """Loops of 8, 16, 32 ... modes, and one with the `most`."""
+    number = min(8, most // 2)
+    while 0 < number < most:
+        yield resized(largest, number)
+        number *= 2
+    yield largest if most == largest.plant.count else resized(largest, most)
 
 
-def _counts(arm: Arm, chain: Chain) -> list[int]:
-    """Numbers of modes to try: doubled up to those that outlive a sample and a few, for the others are static then."""
-    most = min(MOST, FEW + alive(arm, chain))
-    tried = [number for number in (8, 16, 32, 64) if number < most]
-    return [*(tried or [most // 2]), most]
+def _outside(loop: SampledLoop) -> int:
+    return int((loop.poles.log_radius > 0).sum())
 
 
 def _agree(before: SampledLoop, after: SampledLoop) -> bool:
     old, new = before.poles, after.poles
     close = abs(old.log_spectral_radius - new.log_spectral_radius) <= AGREE * abs(new.log_spectral_radius) + NOISE
-    return close and (old.log_radius > 0).sum() == (new.log_radius > 0).sum()
+    return close and _outside(before) == _outside(after)
 
 
 @dataclass(frozen=True)
 @record
 class Analysis:
-    """Everything that is said of a sampled loop at its gains."""
+    """Everything that is said of a sampled loop at its gains, with how far each edge is proven."""
 
     verdict: Verdict
-    K1_windows: list[Window]
-    K2_windows: list[Window]
+    K1: ShownWindows
+    K2: ShownWindows
     modes: ModeTable
     delay_margin: DelayMargin
-    required_damping: float
+    delay: Figure
+    damping: Figure
+
+    @property
+    def K1_windows(self) -> list[Window]:
+        """The stable intervals of K1."""
+        return self.K1.windows
+
+    @property
+    def K2_windows(self) -> list[Window]:
+        """The stable intervals of K2."""
+        return self.K2.windows
+
+    @property
+    def required_damping(self) -> float:
+        """The damping C [s] from which on the gains are stable."""
+        return self.damping.value
 
     @property
     def first_unstable_mode(self) -> int | None:
@@ -141,15 +175,15 @@ def analyse(arm: Arm, gains: HubFeedback, chain: Chain | None = None, *, count: 
     """Verdict, stable intervals of both gains, modes one by one, delay margin, and the damping that makes it safe."""
     chain = Chain() if chain is None else chain
     verdict = sampled_verdict(arm, gains, chain, count=count)
-    loop = verdict.loop
+    loop, band = verdict.loop, verdict.band
     has_moment = arm.hub.inertia > 0
     return Analysis(
         verdict,
-        stable_windows(loop, "K1"),
-        stable_windows(loop, "K2") if has_moment else [],
+        shown_windows(loop, band, "K1"),
+        shown_windows(loop, band, "K2") if has_moment else ShownWindows([], []),
         mode_table(loop),
-        delay_margin(loop),
-        required_damping(arm, gains, chain, count=count or max(verdict.modes_used, UNDAMPED_MODES)),
+        *shown_delay(loop, band),
+        shown_damping(arm, gains, chain, count=count or UNDAMPED_MODES),
     )
 
 
@@ -173,6 +207,7 @@ def sampled_answer(analysis: Analysis) -> dict[str, Any]:
         "unstable_poles": int((poles.log_radius > 0).sum()),
         "modes_used": verdict.modes_used,
         "settled": verdict.is_settled,
+        "band_rad_s": verdict.band_rad_s,
         "K1_interval": _listed(around(analysis.K1_windows, gains.K1)),
         "K2_interval": _listed(around(analysis.K2_windows, gains.K2)),
         "K1_intervals": [list(window) for window in analysis.K1_windows],
@@ -181,7 +216,24 @@ def sampled_answer(analysis: Analysis) -> dict[str, Any]:
         "delay_margin_samples": analysis.delay_margin.samples,
         "delay_margin_is_lower_bound": analysis.delay_margin.is_bound,
         "required_damping_s": analysis.required_damping,
+        "shown": {
+            "K1_intervals": [[_figure(edge) for edge in pair] for pair in analysis.K1.figures],
+            "K2_intervals": [[_figure(edge) for edge in pair] for pair in analysis.K2.figures],
+            "delay_margin_samples": _figure(analysis.delay),
+            "required_damping_s": _figure(analysis.damping),
+        },
         "modes": _rows(analysis.modes),
+    }
+
+
+def _figure(figure: Figure) -> dict[str, Any]:
+    """What is shown of a number: in how many digits, and for which modes these hold."""
+    return {
+        "text": figure.text,
+        "digits": figure.digits,
+        "settled": figure.is_settled,
+        "band_rad_s": figure.band,
+        "modes": figure.modes,
     }
 
 

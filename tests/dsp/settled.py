@@ -1,0 +1,91 @@
+"""Verdicts called settled on loops drawn to hurt, against a hold model; and how many ordinary loops are settled.
+
+    python -m tests.dsp.settled 2000 [SEED]
+
+To hurt: hubs of 1e-4 to 1e-1 of the beam's inertia or none, first modes with 1e-6 to 1e-3 of critical damping, periods
+that put one of the modes 10 to 60 where sampled rate feedback destabilises it, delays.  Two sizes of the hold model must
+agree on the loop, or one of 200 polynomials decides; where the growth is below 1e-7 a sample nobody can tell.
+"""
+
+import sys
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from tests.dsp.hold import HoldModel
+from tests.dsp.verdicts import Case, some_case
+from tests.strategies import arm_of
+from tfarm.arm import HubFeedback
+from tfarm.dsp import Chain, Sampling, sampled_verdict
+from tfarm.errors import ConvergenceError
+from tfarm.spectrum import modes
+
+FAINT = 1e-7
+
+
+def hurting_case(rng):
+    """A light hub, little damping, and a period short enough for the modes 10 to 60 to matter."""
+
+    def log(low, high):
+        return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+    draw = {
+        "length": log(0.3, 3.0),
+        "slenderness": log(20, 300),
+        "width": log(1, 20),
+        "density": log(1500, 8000),
+        "E": log(1e10, 2e11),
+        "nu": float(rng.uniform(0.1, 0.4)),
+        "mass": float(rng.choice([0.0, log(0.01, 1)])),
+        "inertia": 0.0,
+    }
+    beam = arm_of(**draw, damping=0.0, hub=1.0).total_inertia - 1.0
+    share = float(rng.choice([0.0, log(1e-4, 1e-1), log(1e-4, 1e-1), log(1e-4, 1e-1)]))
+    arm = arm_of(**draw, damping=0.0, hub=beam * share)
+    w = modes(arm, 60).natural_frequency
+    arm = replace(arm, link=replace(arm.link, damping=2 * log(1e-6, 1e-3) / float(w[1])))
+    period = float(rng.uniform(1.0, 2.0) * np.pi / w[rng.integers(10, 61)])
+    delay = float(rng.choice([0.0, 0.5, 1.0, rng.uniform(0, 2)]))
+    felt = float(rng.choice([arm.total_inertia, max(arm.hub.inertia, 1e-4 * beam)]))
+    gains = HubFeedback(K1=felt / period * log(1e-3, 1), K2=float(rng.uniform(-0.4, 1.4)) if share else 0.0)
+    return Case(arm, gains, Chain(sampling=Sampling(period=period, delay_samples=delay)))
+
+
+def oracle(case):
+    """Whether a loop is stable; None where it cannot be told."""
+    found = [HoldModel(case.arm, terms).log_radius(case.gains, case.chain) for terms in (60, 100)]
+    if min(found) <= 0 <= max(found):
+        found = [HoldModel(case.arm, 200).log_radius(case.gains, case.chain)]
+    return None if min(abs(np.array(found))) < FAINT else found[-1] < 0
+
+
+def survey(number, seed=1, draw=hurting_case):
+    """Counts of cases, stable, settled and falsely settled ones, refusals, and those that the oracle cannot tell."""
+    rng = np.random.default_rng(seed)
+    counts = {"cases": 0, "stable": 0, "settled": 0, "false": 0, "unclear": 0, "refused": 0}
+    for _ in range(number):
+        case = draw(rng)
+        counts["cases"] += 1
+        try:
+            verdict = sampled_verdict(case.arm, case.gains, case.chain)
+        except ConvergenceError as error:
+            counts["refused"] += 1
+            print("refused:", error, case, file=sys.stderr)
+            continue
+        stable = oracle(case)
+        counts["stable"] += verdict.is_stable
+        counts["settled"] += verdict.is_settled
+        counts["unclear"] += stable is None
+        if verdict.is_settled and stable not in (None, verdict.is_stable):
+            larger = HoldModel(case.arm, 200).log_radius(case.gains, case.chain)
+            counts["false"] += (larger < 0) != verdict.is_stable
+            print("doubtful:", verdict.sentence, larger, case, file=sys.stderr)
+    return counts
+
+
+if __name__ == "__main__":
+    number, seed = int(sys.argv[1]) if len(sys.argv) > 1 else 100, int(sys.argv[2]) if len(sys.argv) > 2 else 1
+    for draw in (hurting_case, some_case):
+        start = time.process_time()
+        print(draw.__name__, survey(number, seed, draw), f"{time.process_time() - start:.0f} s", flush=True)

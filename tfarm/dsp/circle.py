@@ -1,0 +1,193 @@
+"""How many poles of a sampled loop lie outside the unit circle, proven between the points of the circle too.
+
+With x = 1 - 1/z, a_j = e^{p_j (1-f) T}, b_j = e^{p_j T} and g0 the finite part of G at s = 0, the pulse transfer
+function of the plant is
+
+    H(z) = z^-d [ g0/z + x sum over poles of (r_j/p_j) a_j/(z - b_j) + the rigid body's terms in 1/x ]
+
+so a pole that has settled before the sample weighs nothing, and x^k F(z) = x^k (1 + Kp Theta + K1 R + K2 M), k the
+order of the pole at z = 1, is analytic on the circle and outside.  On an arc it stays in a disc about its value in the
+middle, for 1/(z - b) changes by h/(|z - b| (|z - b| - h)) at most over h.  Where no disc holds 0, the phase between
+neighbouring middles is known without doubt, and half the circle gives the count (the argument principle).  Arcs whose
+disc holds 0 are halved.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import HubFeedback
+from tfarm.dsp.loop import ANGLE, MOMENT, RATE, SampledLoop
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+EPS = float(np.finfo(float).eps)
+ARCS = 64  # of half the circle to begin with
+FINEST = 1e-13  # rad: no arc is halved further
+MOST_ARCS = 40_000
+BLOCK = 1 << 19  # terms 1/(z - b) at a time, lest they leave the cache
+
+
+@dataclass(frozen=True)
+class Discs:
+    """Discs in the complex plane, `middle` and `radius` arrays of one shape; what is computed with them holds for every
+    point."""
+
+    middle: Complex
+    radius: Real
+
+    def __add__(self, other: Discs) -> Discs:
+        return Discs(self.middle + other.middle, self.radius + other.radius)
+
+    def __mul__(self, other: Discs) -> Discs:
+        mine, theirs = abs(self.middle) + self.radius, abs(other.middle)
+        return Discs(self.middle * other.middle, mine * other.radius + theirs * self.radius)
+
+    def times(self, factor: complex) -> Discs:
+        """Every disc times a number."""
+        return Discs(self.middle * factor, self.radius * abs(factor))
+
+    def inverse(self) -> Discs:
+        """1/z for discs that do not hold 0; of infinite radius for those that do."""
+        size = abs(self.middle)
+        room = np.maximum(size - self.radius, 0.0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return Discs(1 / self.middle, np.where(room > 0, self.radius / (size * room), np.inf))
+
+
+@dataclass
+class Circle:
+    """The upper half of the unit circle in arcs, and on each the sums of a loop's plant; its gains do not matter.
+
+    `missing` (outputs,) bounds |x sum over poles left out|.  `low` and `high` [rad] are the ends of the arcs, `sums`
+    the discs (outputs, arcs) of the sum over poles; arcs are halved as counts need it.
+    """
+
+    loop: SampledLoop
+    kept: NDArray[np.bool_]
+    missing: Real
+    low: Real = field(init=False)
+    high: Real = field(init=False)
+    sums: Discs = field(init=False)
+
+    def __post_init__(self) -> None:
+        ends = np.linspace(0.0, np.pi, ARCS + 1)
+        self.low, self.high = ends[:-1], ends[1:]
+        self.sums = self._sums(self.low, self.high)
+
+    def count(self, gains: HubFeedback) -> int | None:
+        """Poles of the loop with these gains outside the circle, z = 1 of a free angle apart; None if not shown."""
+        while True:
+            F = self._characteristic(gains)
+            rough = ~(abs(F.middle) > F.radius)
+            if not rough.any():
+                steps = np.angle(F.middle[1:] / F.middle[:-1])
+                start, end = np.angle(F.middle[0]), np.angle(F.middle[-1])
+                return -round(float(steps.sum() + _to_the_axis(start) - _to_the_axis(end)) / np.pi)
+            width = self.high[rough] - self.low[rough]
+            if width.min() < FINEST or rough.sum() + rough.size > MOST_ARCS:
+                return None
+            self._halve(rough)
+
+    # ------------------------------------------------------------ the characteristic function
+
+    def _characteristic(self, gains: HubFeedback) -> Discs:
+        """x^k F on every arc, k the order of its pole at z = 1."""
+        terms = [(K, *part) for K, part in self._terms(gains) if K != 0.0]
+        k = max((order for _, order, _ in terms), default=0)
+        x = self._x
+        total = _power(x, k)
+        for K, order, values in terms:
+            total = total + (_power(x, k - order) * values).times(K)
+        return total
+
+    def _terms(self, gains: HubFeedback) -> list[tuple[float, tuple[int, Discs]]]:
+        """Each gain with what it multiplies in F: the order n of that at z = 1, and its values times x^n."""
+        order, angle = self._output(ANGLE)
+        rate = self._output(RATE)
+        if self.loop.differences:
+            a, T = self.loop.smoothing, self.loop.chain.sampling.period
+            lag = (self._turned(0).times(1.0) + self._turned(1).times(-a)).inverse()
+            values = angle * lag.times((1 - a) / T)
+            rate = (order - 1, values) if order else (0, values * self._x)
+        return [(gains.Kp, (order, angle)), (gains.K1, rate), (gains.K2, self._output(MOMENT))]
+
+    def _output(self, row: int) -> tuple[int, Discs]:
+        """The order n of an output's pole at z = 1, and x^n times its pulse transfer function."""
+        plant, pulse = self.loop.plant, self.loop.pulse
+        T, f = pulse.sampling.period, pulse.sampling.fraction
+        twice, once = plant.rigid[row]
+        order = 2 if twice else int(once != 0.0)
+        x, late = self._x, self._turned(1)
+        at_rest = float(plant.static[row] - (plant.residues[row] / plant.poles).real.sum())
+        sums = Discs(self.sums.middle[row], self.sums.radius[row]) * x
+        held = Discs(sums.middle, sums.radius + self.missing[row]) + late.times(at_rest)
+        total = _power(x, order) * held
+        push = self._turned(0).times((1 - f) * T) + late.times(f * T)
+        if once:
+            total = total + (_power(x, order - 1) * push * late).times(once)
+        if twice:
+            ramp = self._turned(0).times(pulse.ramps[0]) + late.times(pulse.ramps[1])
+            total = total + ((push * late).times(T) + x * ramp).times(twice) * late
+        return order, total * self._turned(pulse.sampling.whole_delay)
+
+    @property
+    def _x(self) -> Discs:
+        middle, half = (self.low + self.high) / 2, (self.high - self.low) / 2
+        return Discs(-np.expm1(-1j * middle), half + EPS)
+
+    def _turned(self, n: int) -> Discs:
+        """z^-n."""
+        middle, half = (self.low + self.high) / 2, (self.high - self.low) / 2
+        return Discs(np.exp(-1j * n * middle), n * (half + 4 * EPS))
+
+    # ------------------------------------------------------------ arcs
+
+    def _halve(self, rough: NDArray[np.bool_]) -> None:
+        """Halve some arcs."""
+        low, high = self.low[rough], self.high[rough]
+        middle = (low + high) / 2
+        new_low, new_high = np.r_[low, middle], np.r_[middle, high]
+        new = self._sums(new_low, new_high)
+        all_low = np.r_[self.low[~rough], new_low]
+        order = np.argsort(all_low)
+        self.low, self.high = all_low[order], np.r_[self.high[~rough], new_high][order]
+        old = self.sums
+        self.sums = Discs(
+            np.c_[old.middle[:, ~rough], new.middle][:, order], np.c_[old.radius[:, ~rough], new.radius][:, order]
+        )
+
+    def _sums(self, low: Real, high: Real) -> Discs:
+        """sum over poles of (r/p) a/(z - b) on arcs: discs (outputs, arcs)."""
+        plant, sampling = self.loop.plant, self.loop.chain.sampling
+        p, T = plant.poles[self.kept], sampling.period
+        b, room = np.exp(p * T), -np.expm1(p.real * T)
+        weights = plant.residues[:, self.kept] / p * np.exp(p * ((1 - sampling.fraction) * T))
+        blur = EPS * (4 + abs(p * T))
+        middles, radii = [], []
+        for some in np.array_split(np.arange(low.size), 1 + low.size * p.size // BLOCK):
+            q, h = (low[some] + high[some]) / 2, (high[some] - low[some])[:, None] / 2
+            away = np.exp(1j * q)[:, None] - b
+            near = 1 / abs(away)
+            least = 1 / np.maximum(1 / near - h, room)
+            change = np.minimum(h * near * least, near + least) + blur * near**2
+            middles.append(weights @ (1 / away).T)
+            radii.append(abs(weights) @ change.T)
+        return Discs(np.concatenate(middles, axis=1), np.concatenate(radii, axis=1))
+
+
+def _power(x: Discs, n: int) -> Discs:
+    """x^n."""
+    total = Discs(np.ones_like(x.middle), np.zeros_like(x.radius))
+    for _ in range(n):
+        total = total * x
+    return total
+
+
+def _to_the_axis(angle: float) -> float:
+    """The angle of a value from the real axis, on whichever side of 0 it lies."""
+    return angle - np.pi * round(angle / np.pi)

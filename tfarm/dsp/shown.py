@@ -1,0 +1,221 @@
+"""Edges of a sampled loop with the digits that are shown: on both ends of the interval that they stand for.
+
+A number printed with n digits stands for an interval.  It is settled where the loop is proven stable at the one end of
+it and unstable at the other, for every mode of the band.  Where that cannot be shown the number holds for the first N
+modes, and those digits are kept that a loop with twice as many (or half as many, of many) confirms in the same way.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache
+
+from tfarm.arm import Arm, HubFeedback
+from tfarm.dsp.band import Band, band_of
+from tfarm.dsp.boundary import GainName
+from tfarm.dsp.chain import Chain
+from tfarm.dsp.circle import Circle
+from tfarm.dsp.loop import SampledLoop, sampled_loop
+from tfarm.dsp.margins import (
+    DelayMargin,
+    Window,
+    damped,
+    delay_margin,
+    log_radius_with,
+    required_damping,
+    stable_windows,
+    whole_loop,
+)
+from tfarm.errors import ConvergenceError
+
+MANY = 64  # modes: edges are not looked for with more
+GAIN_DIGITS, OTHER_DIGITS = 6, 4  # that are printed where all are settled
+SMALL = 1e-6  # of a window's other edge: what an edge at 0 is told from
+
+Proof = tuple[
+    bool | None, float
+]  # whether a loop is stable (None: not shown), and the band [rad/s] that it is shown in
+Test = Callable[[float], Proof]
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A number with as many significant `digits` as hold: proven up to `band` [rad/s], or for the first `modes` modes.
+
+    One of `band` and `modes` is None.
+    """
+
+    value: float
+    digits: int
+    band: float | None
+    modes: int | None
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether it is proven in a band."""
+        return self.band is not None
+
+    @property
+    def text(self) -> str:
+        """The number in these digits; "?" where not one holds."""
+        if self.value == 0.0 or math.isinf(self.value):
+            return f"{self.value:g}"
+        return f"{self.value:.{self.digits}g}" if self.digits else "?"
+
+
+@dataclass(frozen=True)
+class ShownWindows:
+    """Stable intervals of a gain, and the two edges of each as `figures`."""
+
+    windows: list[Window]
+    figures: list[tuple[Figure, Figure]]
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether every edge is proven."""
+        return all(edge.is_settled for pair in self.figures for edge in pair)
+
+
+@dataclass(frozen=True)
+class Edge:
+    """A value at which stability turns: a loop is stable below it, or above.  `spare`: how far from 0 a 0 is tried."""
+
+    value: float
+    stable_below: bool
+    spare: float = 0.0
+
+    def figure(self, digits: int, modes: int, proven: Test | None, other: Test) -> Figure:
+        """With the most digits that are `proven` (two at least), or else that hold in the `other` loop too."""
+        for number in range(digits, 1, -1) if proven else ():
+            assert proven is not None
+            if band := self._turns(proven, number):
+                return Figure(self.value, number, band, None)
+        for number in range(digits, 0, -1):
+            if self._turns(other, number):
+                return Figure(self.value, number, None, modes)
+        return Figure(self.value, 0, None, modes)
+
+    def _turns(self, test: Test, digits: int) -> float:
+        """The band in which the loop is stable at one end of these digits' interval and not at the other; 0 for none."""
+        if math.isinf(self.value):
+            return 0.0
+        rounded = float(f"{self.value:.{digits}g}")
+        half = 0.5 * 10.0 ** (math.floor(math.log10(abs(rounded))) - digits + 1) if rounded else self.spare
+        low, high = rounded - half, rounded + half
+        inside, outside = (low, high) if self.stable_below else (high, low)
+        stable, band = test(inside)
+        if not stable:
+            return 0.0
+        still, narrower = test(outside)
+        return min(band, narrower) if still is False else 0.0
+
+
+def shown_windows(loop: SampledLoop, band: Band | None, gain: GainName) -> ShownWindows:
+    """The windows of one gain, with more modes than the loop's where edges can be proven only then."""
+    loop = loop if loop.plant.count <= MANY else resized(loop, MANY)
+    circle = None if band is None else band.circle()
+    found = _windows(loop, band, circle, gain)
+    while band is not None and not found.is_settled and 2 * loop.plant.count <= MANY:
+        loop = resized(loop, 2 * loop.plant.count)
+        found = _windows(loop, band, circle, gain)
+    return found
+
+
+def _windows(loop: SampledLoop, band: Band | None, circle: Circle | None, gain: GainName) -> ShownWindows:
+    """The windows of this very loop."""
+    other, modes = cache(lambda: resized(loop, another(loop.plant.count))), loop.plant.count
+
+    def at(value: float) -> HubFeedback:
+        gains = loop.gains
+        return replace(gains, K1=value) if gain == "K1" else replace(gains, K2=value)
+
+    def proof(value: float) -> Proof:
+        assert circle is not None
+        assert band is not None
+        count = circle.count(at(value))
+        return None if count is None else count == 0, band.top
+
+    def holds(value: float) -> Proof:
+        return replace(other(), gains=at(value)).poles.is_stable, math.inf
+
+    windows = stable_windows(loop, gain)
+    figures = []
+    for low, high in windows:
+        edges = Edge(low, False, _near_zero(high)), Edge(high, True, _near_zero(low))
+        first, second = (edge.figure(GAIN_DIGITS, modes, proof if circle else None, holds) for edge in edges)
+        figures.append((first, second))
+    return ShownWindows(windows, figures)
+
+
+def _near_zero(other: float) -> float:
+    return SMALL * (abs(other) if other and math.isfinite(other) else 1.0)
+
+
+def another(count: int) -> int:
+    """Another number of modes to compare with."""
+    return 2 * count if 2 * count <= MANY else count // 2
+
+
+def resized(loop: SampledLoop, count: int) -> SampledLoop:
+    """The loop with another number of flexible modes, or a few less or more where two damped modes are one there."""
+    for number in (count, count - 1, count + 1, count - 2, count + 2):
+        try:
+            return sampled_loop(loop.plant.arm, loop.gains, loop.chain, count=max(1, number))
+        except ConvergenceError as error:
+            lost = error
+    raise lost
+
+
+def proof_of(loop: SampledLoop) -> Proof:
+    """Whether a loop is stable with every mode of its band."""
+    band = band_of(loop)
+    if band is None:
+        return None, 0.0
+    count = band.circle().count(loop.gains)
+    return None if count is None else count == 0, band.top
+
+
+def shown_delay(loop: SampledLoop, band: Band | None) -> tuple[DelayMargin, Figure]:
+    """The delay margin, and its samples as a figure, with more modes where it can be proven only then."""
+    loop = loop if loop.plant.count <= MANY else resized(loop, MANY)
+    found = _delay(loop, band)
+    while band is not None and not (found[1].is_settled or found[0].is_bound) and 4 * loop.plant.count <= MANY:
+        loop = resized(loop, 2 * loop.plant.count)
+        found = _delay(loop, band)
+    return found
+
+
+def _delay(loop: SampledLoop, band: Band | None) -> tuple[DelayMargin, Figure]:
+    """The delay margin of this very loop; the 0 of one that is unstable is as settled as its verdict."""
+    margin, now, modes = delay_margin(loop), loop.chain.sampling.delay_samples, loop.plant.count
+    if margin.samples == 0.0:
+        return margin, Figure(0.0, OTHER_DIGITS, band.top if band else None, None if band else modes)
+    if margin.is_bound:
+        return margin, Figure(margin.samples, OTHER_DIGITS, None, modes)
+    other = cache(lambda: resized(loop, another(modes)))
+
+    def proof(more: float) -> Proof:
+        return (None, 0.0) if band is None or more < 0 else proof_of(band.loop.with_delay(now + more))
+
+    def holds(more: float) -> Proof:
+        return None if more < 0 else other().with_delay(now + more).poles.is_stable, math.inf
+
+    return margin, Edge(margin.samples, True).figure(OTHER_DIGITS, modes, proof, holds)
+
+
+def shown_damping(arm: Arm, gains: HubFeedback, chain: Chain, *, count: int) -> Figure:
+    """The damping from which on the gains are stable, as a figure [s]."""
+    count = min(count, MANY)
+    C = required_damping(arm, gains, chain, count=count)
+
+    def proof(value: float) -> Proof:
+        return proof_of(whole_loop(damped(arm, value), gains, chain))
+
+    def holds(value: float) -> Proof:
+        return log_radius_with(arm, gains, chain, value, another(count)) < 0, math.inf
+
+    if C == 0.0:
+        return Figure(C, OTHER_DIGITS, None, count)
+    return Edge(C, False).figure(OTHER_DIGITS, count, proof, holds)
