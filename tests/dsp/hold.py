@@ -1,4 +1,4 @@
-"""A sampled loop that shares no code with tfarm: the Ritz model of `tests.models`, a matrix exponential, eigenvalues."""
+"""A sampled loop that shares no code with tfarm: the Ritz model of `tests.models`, matrix exponential, eigenvalues."""
 
 import numpy as np
 from scipy.linalg import block_diag, expm
@@ -7,15 +7,17 @@ from tests.models import Ritz
 
 
 class HoldModel:
-    """A damped arm with the lower half of the modes that `terms` polynomials give (the upper ones are their own).
+    """A damped arm with the lowest quarter of the modes that `terms` polynomials for each strain give.
+
+    `terms`/2 modes, that is: those are right to 1e-13, the last of them to 1e-9; higher ones are the polynomials' own.
 
     States: w q and q_t of each mode, the angle and rate of the rigid arm, and the gauge's moment g, from the hub's
     balance  g + C g_t = I_h theta_tt - u,  which also has what the modes left out would bear at once.
     """
 
-    def __init__(self, arm, terms=60):
+    def __init__(self, arm, terms=80):
         ritz, C = Ritz(arm, terms), arm.link.damping
-        flexibility, shapes = (part[..., :terms] for part in ritz.flexibilities())
+        flexibility, shapes = (part[..., : terms // 2] for part in ritz.flexibilities())
         shapes = shapes / np.sqrt(flexibility)
         w, b = 1 / np.sqrt(flexibility), ritz.hub_psi @ shapes
         damping = C * (shapes.T * ritz.bending) @ shapes

@@ -3,8 +3,8 @@
     python -m tests.dsp.settled 2000 [SEED]
 
 To hurt: hubs of 1e-4 to 1e-1 of the beam's inertia or none, first modes with 1e-6 to 1e-3 of critical damping, periods
-that put one of the modes 10 to 60 where sampled rate feedback destabilises it, delays.  Two sizes of the hold model must
-agree on the loop, or one of 200 polynomials decides; where the growth is below 1e-7 a sample nobody can tell.
+that put one of the modes 10 to 60 where sampled rate feedback destabilises it, delays.  Two sizes of the hold model
+must agree, or one of 240 polynomials decides; where the growth is below 1e-7 a sample nobody can tell.
 """
 
 import sys
@@ -54,9 +54,9 @@ def hurting_case(rng):
 
 def oracle(case):
     """Whether a loop is stable; None where it cannot be told."""
-    found = [HoldModel(case.arm, terms).log_radius(case.gains, case.chain) for terms in (60, 100)]
+    found = [HoldModel(case.arm, terms).log_radius(case.gains, case.chain) for terms in (80, 140)]
     if min(found) <= 0 <= max(found):
-        found = [HoldModel(case.arm, 200).log_radius(case.gains, case.chain)]
+        found = [HoldModel(case.arm, 240).log_radius(case.gains, case.chain)]
     return None if min(abs(np.array(found))) < FAINT else found[-1] < 0
 
 
@@ -78,7 +78,7 @@ def survey(number, seed=1, draw=hurting_case):
         counts["settled"] += verdict.is_settled
         counts["unclear"] += stable is None
         if verdict.is_settled and stable not in (None, verdict.is_stable):
-            larger = HoldModel(case.arm, 200).log_radius(case.gains, case.chain)
+            larger = HoldModel(case.arm, 240).log_radius(case.gains, case.chain)
             counts["false"] += (larger < 0) != verdict.is_stable
             print("doubtful:", verdict.sentence, larger, case, file=sys.stderr)
     return counts

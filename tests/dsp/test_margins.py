@@ -144,6 +144,9 @@ def test_the_answer_is_plain_and_consistent(lab):
     low, high = answer["K2_interval"]
     assert low < 0.3 < high
     assert answer["K1_interval"][0] == 0.0
+    edges = answer["shown"]["K2_intervals"][0]
+    assert [float(edge["text"]) for edge in edges] == pytest.approx([low, high], rel=5e-6)
+    assert all(edge["settled"] and edge["band_rad_s"] == answer["band_rad_s"] > 1e5 for edge in edges)
     assert answer["first_unstable_mode"] is None
     assert [mode["index"] for mode in answer["modes"]] == list(range(1, len(answer["modes"]) + 1))
     unstable = sampled_answer(analyse(lab, HubFeedback(K1=0.3, K2=1.3)))

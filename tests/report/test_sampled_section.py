@@ -14,6 +14,7 @@ from tfarm.dsp import Chain, Simulator, analyse, sampled_loop, sampled_verdict, 
 from tfarm.dsp.chain import Sampling
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import gain_windows
+from tfarm.report.digits import scientific
 from tfarm.report.discrete_loci import loci, loci_table
 from tfarm.report.figures import save
 from tfarm.report.overlay import CUT, K2_RANGE, draw_overlay, overlay, overlay_table, with_damping
@@ -104,7 +105,9 @@ def test_a_region_is_cut_into_pieces_that_cover_it_exactly():
 def test_facts_words_and_tables_are_the_analysis(section):
     analysis = analyse(LAB, GAINS)
     facts = {fact.label: (fact.value, fact.beside) for fact in section.facts}
-    assert facts["does a 10 ms loop hold?"] == ("yes", "by 1.28 samples of delay, all modes")
+    band = scientific(analysis.verdict.band_rad_s, 2)
+    told = f"by 1.28 samples of delay, every mode below {band} rad/s (not known beyond)"
+    assert facts["does a 10 ms loop hold?"] == ("yes", told)
     assert facts["stable K2"][0] == "−0.153 … 1.164"
     assert facts["further delay it bears"] == ("12.8", "1.28 samples")
     table = values_of(blocks_of(section)["sampled-modes"])

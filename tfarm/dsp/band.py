@@ -23,6 +23,7 @@ from tfarm.dsp.circle import Circle
 from tfarm.dsp.loop import SampledLoop
 from tfarm.dsp.plant import MEASURED
 from tfarm.errors import ConvergenceError
+from tfarm.records import record
 from tfarm.response import transfer
 from tfarm.spectrum import modes
 from tfarm.spectrum.box import Box, winding_number
@@ -39,6 +40,7 @@ MOST_POINTS = 200_000
 
 
 @dataclass(frozen=True)
+@record
 class Band:
     """The poles of a loop's plant in a band up to `top` [rad/s], `kept` (poles,), and the bound `missing` (outputs,) on
     what the others of that band add to the pulse transfer functions, on the whole unit circle."""

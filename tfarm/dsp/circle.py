@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import HubFeedback
 from tfarm.dsp.loop import ANGLE, MOMENT, RATE, SampledLoop
+from tfarm.records import record
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -33,6 +34,7 @@ BLOCK = 1 << 19  # terms 1/(z - b) at a time, lest they leave the cache
 
 
 @dataclass(frozen=True)
+@record
 class Discs:
     """Discs in the complex plane, `middle` and `radius` arrays of one shape; what is computed with them holds for every
     point."""
@@ -82,7 +84,7 @@ class Circle:
     def count(self, gains: HubFeedback) -> int | None:
         """Poles of the loop with these gains outside the circle, z = 1 of a free angle apart; None if not shown."""
         while True:
-            F = self._characteristic(gains)
+            F = self.characteristic(gains)
             rough = ~(abs(F.middle) > F.radius)
             if not rough.any():
                 steps = np.angle(F.middle[1:] / F.middle[:-1])
@@ -95,7 +97,7 @@ class Circle:
 
     # ------------------------------------------------------------ the characteristic function
 
-    def _characteristic(self, gains: HubFeedback) -> Discs:
+    def characteristic(self, gains: HubFeedback) -> Discs:
         """x^k F on every arc, k the order of its pole at z = 1."""
         terms = [(K, *part) for K, part in self._terms(gains) if K != 0.0]
         k = max((order for _, order, _ in terms), default=0)

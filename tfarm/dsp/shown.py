@@ -98,7 +98,7 @@ class Edge:
         return Figure(self.value, 0, None, modes)
 
     def _turns(self, test: Test, digits: int) -> float:
-        """The band in which the loop is stable at one end of these digits' interval and not at the other; 0 for none."""
+        """The band in which the loop is stable at one end of these digits' interval, not at the other; 0: none."""
         if math.isinf(self.value):
             return 0.0
         rounded = float(f"{self.value:.{digits}g}")

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from tfarm.arm import Arm, HubFeedback
-from tfarm.dsp import Analysis, analyse, sampled_verdict, stable_windows
+from tfarm.dsp import Analysis, Verdict, analyse, sampled_verdict, stable_windows
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.margins import around
 from tfarm.loop.stability import stability
@@ -102,8 +102,7 @@ def short_answer(data: Sampled) -> str:
     """Yes or no, by how much, for how many modes, and how fast."""
     verdict = data.analysis.verdict
     gains = f"K1 = {plain(data.gains.K1)} N m s/rad and K2 = {plain(data.gains.K2)}"
-    modes = verdict.modes_used
-    settled = f"with all modes that matter ({modes})" if verdict.is_settled else f"as far as its first {modes} modes go"
+    settled = f"with {_modes(verdict)}" if verdict.is_settled else f"as far as its {_modes(verdict)} go"
     is_stable = verdict.is_stable
     margin = f" and bears {_delay(data)} more of delay" if is_stable else ""
     word = "stable" if is_stable else "marginal" if verdict.word == "marginal" else "unstable"
@@ -124,6 +123,13 @@ def _delay(data: Sampled) -> str:
     """The further delay that the loop bears, in ms."""
     margin = data.analysis.delay_margin
     return f"{'over ' if margin.is_bound else ''}{significant(1e3 * data.chain.sampling.period * margin.samples, 3)} ms"
+
+
+def _modes(verdict: Verdict) -> str:
+    """The modes that a verdict holds for."""
+    if verdict.band_rad_s is None:
+        return f"first {verdict.modes_used} modes"
+    return f"every mode below {scientific(verdict.band_rad_s, 2)} rad/s (not known beyond)"
 
 
 def _slowest(data: Sampled) -> str:
@@ -177,7 +183,7 @@ def duration(seconds: float) -> str:
 def compared(data: Sampled) -> str:
     """The continuous interval of K2 against the sampled one, end by end."""
     verdict, before, after = data.analysis.verdict, data.continuous.around, data.sampled_K2
-    modes = "" if verdict.is_settled else f" (first {verdict.modes_used} modes)"
+    modes = "" if data.analysis.K2.is_settled else f" (first {verdict.modes_used} modes)"
     both = (
         f"the continuous loop is stable for K2 {interval(before, data.continuous.looked_at)}; the sampled one "
         f"{interval(after)}{modes}"
@@ -236,7 +242,7 @@ def cure(data: Sampled) -> str:
     if math.isinf(needed):
         return "No Kelvin-Voigt damping up to 15 % of critical in the first mode makes these gains stable."
     if needed == 0:
-        modes = data.analysis.verdict.modes_used
+        modes = data.analysis.damping.modes
         return (
             f"No damping is needed for the first {modes} modes. Without damping there is always a higher mode to ask "
             "about, so this is no proof for the arm with all of them; a little damping settles those."
@@ -260,7 +266,7 @@ def headline_facts(data: Sampled) -> tuple[Fact, ...]:
     analysis, gains = data.analysis, data.gains
     verdict, margin = analysis.verdict, analysis.delay_margin
     growth = verdict.loop.poles.log_spectral_radius
-    held = "all modes" if verdict.is_settled else f"first {verdict.modes_used} modes"
+    held = _modes(verdict)
     by = f"by {significant(margin.samples, 3)} samples of delay" if verdict.is_stable else verdict.word
     K2 = span(data.continuous.around, data.continuous.looked_at)
     K1 = spans(analysis.K1_windows, gains.K1)
