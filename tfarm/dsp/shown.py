@@ -29,6 +29,7 @@ from tfarm.dsp.margins import (
     whole_loop,
 )
 from tfarm.errors import ConvergenceError
+from tfarm.records import record
 
 MANY = 64  # modes: edges are not looked for with more
 GAIN_DIGITS, OTHER_DIGITS = 6, 4  # that are printed where all are settled
@@ -66,6 +67,7 @@ class Figure:
 
 
 @dataclass(frozen=True)
+@record
 class ShownWindows:
     """Stable intervals of a gain, and the two edges of each as `figures`."""
 
