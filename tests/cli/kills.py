@@ -1,4 +1,4 @@
-"""Commands that write files, killed at random moments:  python -m tests.cli.kills 200 [seed]
+"""Commands that write files, killed at random moments:  python -m tests.cli.kills 200 [seed [command ...]]
 
 Each command runs in a copy of a folder that holds its files as another arm left them.  After each of SIZE kills every
 file there is whole, the old one or the new, to the last byte, and no page names a file that is not there; after at most
@@ -8,6 +8,8 @@ The runs are forks of this process, so that the kills fall on the work and not o
 time from the first temporary file on.
 """
 
+import contextlib
+import io
 import os
 import re
 import shutil
@@ -76,7 +78,7 @@ def completed(arguments, folder):
         if done:
             spent = time.perf_counter() - begun
             return (spent, spent if first is None else first) if status == 0 else None
-        time.sleep(1e-4)
+        time.sleep(1e-3)
 
 
 def _is_writing(folder):
@@ -89,7 +91,7 @@ def killed(arguments, folder, after, from_writing):
     """Kill a run so many seconds after its start or, with `from_writing`, after its first temporary file."""
     child = started(arguments, folder)
     while from_writing and not _is_writing(folder) and not os.waitpid(child, os.WNOHANG)[0]:
-        time.sleep(1e-4)
+        time.sleep(1e-3)
     time.sleep(after)
     try:
         os.kill(child, signal.SIGKILL)
@@ -107,7 +109,7 @@ def wrong_with(found, old, new):
             return f"{name} is neither the old file nor the new one"
         if name.endswith(".html"):
             for target in re.findall(rb'(?:src|href)="([^"#:?]+)"', content):
-                if str(Path(name).parent / target.decode()) not in found.content:
+                if os.path.normpath(Path(name).parent / target.decode()) not in found.content:
                     return f"{name} names {target.decode()}, which is not there"
     return ""
 
@@ -115,6 +117,14 @@ def wrong_with(found, old, new):
 def _given(folder, arm):
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "arm.toml").write_text(to_toml(arm), encoding="utf-8")
+
+
+def _here(arguments, folder, arm):
+    """The files of a run in this process, so that the forks have everything imported and compiled."""
+    _given(folder, arm)
+    with contextlib.chdir(folder), contextlib.redirect_stdout(io.StringIO()):
+        run(list(arguments))
+    return Files.of(folder)
 
 
 def survey(number, seed, names=tuple(COMMANDS)):
@@ -126,13 +136,10 @@ def survey(number, seed, names=tuple(COMMANDS)):
     with tempfile.TemporaryDirectory() as place:
         for which, name in enumerate(names):
             arguments, folder = COMMANDS[name], Path(place) / name
-            _given(folder / "old", other)
-            completed(arguments, folder / "old")
+            old = _here(arguments, folder / "old", other)
             shutil.copytree(folder / "old", folder / "new")
-            _given(folder / "new", lab)
-            completed(arguments, folder / "new")  # with everything compiled, and in the memory of the disk
+            new = _here(arguments, folder / "new", lab)
             spent, first = completed(arguments, folder / "new")
-            old, new = Files.of(folder / "old"), Files.of(folder / "new")
             share = number // len(names) + (which < number % len(names))
             while share > 0:
                 shutil.rmtree(folder / "now", ignore_errors=True)
@@ -149,13 +156,12 @@ def survey(number, seed, names=tuple(COMMANDS)):
     return outcomes
 
 
-def main(number, seed):
+def main(number, seed=1, *names):
     """A tally; whether nothing was wrong."""
-    outcomes = survey(number, seed)
+    outcomes = survey(int(number), int(seed), names or tuple(COMMANDS))
     print(dict(Counter(outcomes)))
     return set(outcomes) == {"whole", "clean"}
 
 
 if __name__ == "__main__":
-    GIVEN = [int(text) for text in sys.argv[1:]] or [200]
-    sys.exit(not main(GIVEN[0], GIVEN[1] if len(GIVEN) > 1 else 1))
+    sys.exit(not main(*(sys.argv[1:] or [200])))
