@@ -293,3 +293,13 @@ def test_shapes_are_conjugate_and_of_the_shape_of_x() -> None:
     np.testing.assert_allclose(w[:, 1], w[:, 0].conj(), rtol=1e-12)
     with pytest.raises(tfarm.ParameterError, match="between 0 and 1"):
         damped.shape(1.01)
+
+
+def test_modes_that_cannot_be_followed_are_counted_in_the_record(monkeypatch) -> None:
+    """As the command line answers: the first four of six, each as if four had been asked for, and proven."""
+    monkeypatch.setattr("tfarm.spectrum.damped.FEWER", (4, 2))
+    undamped = tfarm.modes(tfarm.load("sasaki2012-lab"), 6)
+    few, four = damped_modes(undamped), damped_modes(tfarm.modes(undamped.arm, 4))
+    assert (few.left_out, four.left_out) == (2, 0)
+    np.testing.assert_array_equal(few.eigenvalues, four.eigenvalues)
+    assert len(few.certify()) == 4

@@ -12,10 +12,8 @@ from typing import Any
 import numpy as np
 
 from tfarm.arm import Arm
-from tfarm.errors import ConvergenceError
 from tfarm.response import TransferFunction
-from tfarm.spectrum import DampedModes, Modes, compare_theories, damped_modes
-from tfarm.spectrum import modes as find_modes
+from tfarm.spectrum import Modes, compare_theories, damped_modes
 
 
 def to_json(answer: dict[str, Any]) -> str:
@@ -65,12 +63,9 @@ def modes_answer(modes: Modes, digits: int | None, certify: bool = False) -> dic
 IN_THE_BOX = "complete in the box; lightly damped shear modes exist above any box, real eigenvalues accumulate at -1/C"
 
 
-FOLLOWED = (300, 150, 60, 20, 5)  # damped modes that are tried where not all that are asked for can be followed
-
-
 def _damped(modes: Modes, rows: list[dict[str, Any]], digits: int | None, certify: bool) -> dict[str, Any]:
     """Eigenvalues beside each mode, and the box where they are all there are; with `certify` each in a proven disc."""
-    damped = damped_modes(modes) if certify else _as_many_as_can_be_followed(modes)
+    damped = damped_modes(modes)
     for row, pair, ratio in zip(rows, damped.eigenvalues, damped.damping_ratio, strict=False):
         if pair[0].imag or not row["index"]:
             row["eigenvalue"] = [float(pair[0].real), float(pair[0].imag)]
@@ -78,27 +73,14 @@ def _damped(modes: Modes, rows: list[dict[str, Any]], digits: int | None, certif
             row["eigenvalues"] = [float(zero.real) for zero in pair]
         row["damping_ratio"] = float(ratio)
     answer = {"box": list(damped.box), "eigenvalues_in_box": damped.count, "box_note": IN_THE_BOX}
-    if len(damped.index) < len(rows):
+    if damped.left_out:
         answer["damped_note"] = f"eigenvalues up to mode {damped.index[-1]} only: branches above cannot be told apart"
     if certify:
         discs = damped.certify(15 if digits is None else digits)
-        for row, of_mode in zip(rows[-len(discs) :], discs, strict=True):
+        for row, of_mode in zip((row for row in rows if row["index"]), discs, strict=False):
             row["discs"] = [{"re": disc.re, "im": disc.im, "radius": disc.radius} for disc in of_mode]
         answer["proven_complete_in_box"] = True
     return answer
-
-
-def _as_many_as_can_be_followed(modes: Modes) -> DampedModes:
-    """The damped modes of all that are listed, or of the first so many of them."""
-    asked = int(modes.index.max())
-    counts = [count for count in (asked, *FOLLOWED) if count <= min(asked, FOLLOWED[0])]
-    for count in counts:
-        try:
-            return damped_modes(modes if count == asked else find_modes(modes.arm, count, theory=modes.theory))
-        except ConvergenceError:
-            if count == counts[-1]:
-                raise
-    raise AssertionError("unreachable")
 
 
 def response_answer(G: TransferFunction, s: np.ndarray[Any, Any], digits: int | None) -> dict[str, Any]:

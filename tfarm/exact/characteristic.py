@@ -81,8 +81,9 @@ def quick_characteristics(k: Coefficients, s: Complex, law: Real, at_zero: int =
     values = drive + (law[0] + law[1] * at) * theta + law[2] * moment
     if at_zero:
         values = values / np.where(at == 0, 1e-100, at) ** at_zero
-    up, down = (values[row] * np.exp(scale[row] - scale[0]) for row in (1, 2))
-    return Analytic(values[0], (up - down) / (2 * h), scale[0])
+    with np.errstate(over="ignore", invalid="ignore"):  # next to -1/C at huge C: a slope that is no number says so
+        up, down = (values[row] * np.exp(scale[row] - scale[0]) for row in (1, 2))
+        return Analytic(values[0], (up - down) / (2 * h), scale[0])
 
 
 def loop_parts(k: Coefficients, s: NDArray[Any]) -> tuple[Complex, Complex, Complex, Complex]:

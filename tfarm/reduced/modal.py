@@ -21,7 +21,7 @@ from tfarm.exact.outputs import OUTPUTS, Output
 from tfarm.exact.values import expansions_at_zero
 from tfarm.response import Wanted, transfer
 from tfarm.spectrum import Modes, modes
-from tfarm.spectrum.damped import damped_modes
+from tfarm.spectrum.damped import all_damped_modes
 
 from .partial_fractions import PartialFractions
 from .residues import contour_residues, end_residues, undamped_residues
@@ -104,7 +104,7 @@ def _poles_and_residues(
         powers = np.array([[each.power] for each in wanted])
         upper = undamped_residues(table, wanted, k, share) * s**powers / (2 * s)
         return np.stack([s, s.conj()], axis=1), np.stack([upper, upper.conj()], axis=2)
-    p = damped_modes(table).eigenvalues[table.index > 0]
+    p = all_damped_modes(table).eigenvalues[table.index > 0]
     along = any(not each.is_at_end for each in wanted)
     residues, doubtful = end_residues(k, wanted, p.ravel())
     doubtful = doubtful | along

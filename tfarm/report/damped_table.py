@@ -16,6 +16,7 @@ DAMPED = (
     "model, so lightly damped modes exist at ever higher frequency, and the slow real eigenvalues of overdamped "
     "bending modes accumulate at −1/C = {limit} 1/s."
 )
+LEFT_OUT = "Modes above {last} are not listed: their branches cannot be told apart. "
 OUTSIDE = (
     "Rows that are “outside” lie, with one eigenvalue or both, beyond the box: beside them others may exist that are "
     "not listed. "
@@ -34,12 +35,13 @@ def damped_table(modes: Modes) -> Table:
     rigid = ", with 0 twice" if modes.arm.has_rigid_mode else ""
     words = {name: _rounded(value) for name, value in edges.items()}
     inside = np.all(box.holds(damped.eigenvalues), axis=1)
+    left_out = LEFT_OUT.format(last=damped.index[-1]) if damped.left_out else ""
     where = ["in the box" if each else "outside" for each in inside]
     return Table(
         stem="damped-modes",
         title="Damped modes",
         caption=DAMPED.format(
-            C=plain(C), count=damped.count, rigid=rigid, outside="" if inside.all() else OUTSIDE, **words
+            C=plain(C), count=damped.count, rigid=rigid, outside=("" if inside.all() else OUTSIDE) + left_out, **words
         ),
         columns=(
             Column(key="index", title="mode", values=damped.index.tolist(), cells=[str(i) for i in damped.index]),

@@ -82,7 +82,7 @@ def winding_number(function: Function, box: Box, points: int = 40) -> int:
         length = np.diff(path)
         step = np.angle(np.exp(1j * np.diff(phase)))
         foreseen = np.maximum(abs(rate[:-1] * length), abs(rate[1:] * length))
-        (rough,) = np.nonzero((abs(step) > TURN) | (foreseen > FORESEEN))
+        (rough,) = np.nonzero(~((abs(step) <= TURN) & (foreseen <= FORESEEN)))  # so is what is no number
         if not rough.size:
             return round(float(step.sum()) / (2 * math.pi))
         if path.size > 200_000 or abs(length[rough]).min() < smallest:

@@ -51,7 +51,7 @@ SETTLED = 1e-6  # a correction smaller than this share of that distance ends a s
 CLOSING = 0.2  # two real zeros whose distance would shrink by more than this share in a step refused are a pair
 FINEST = 1e-10  # no step is smaller beside the way from the start
 STUCK = 1e-4  # a step this small beside the way so far ends a mode
-MOST_REFUSALS = 2_000
+MOST_REFUSALS = 300  # steps; lists that arrive take up to 120 (tuned: survey tests.spectrum.damped)
 
 
 class Node(NamedTuple):

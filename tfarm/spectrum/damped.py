@@ -28,6 +28,8 @@ from .table import Modes, modes
 Real = NDArray[np.float64]
 
 COMPANY = (6, 11, 17, 29)  # modes followed beyond those wanted, lest the last be led astray: the next if that fails
+FEWER = (300, 150, 60, 20, 5, 1)  # modes that are tried where more are asked for, or not all can be followed
+MANY = 30  # modes: of more one number in company is tried, as each step takes long
 BESIDE = 1e-12  # how far a listed eigenvalue may be from its disc, of its size (more beside its own partner)
 CLEAR = 0.8  # how far towards -1/C a box may reach
 FIRST = 0.01  # the first step in C, over 1/w of the highest mode
@@ -41,13 +43,15 @@ class DampedModes:
     `eigenvalues` (n, 2) [1/s] are both zeros of each mode: a conjugate pair with Im > 0 first, or two real ones, the
     slower first (overdamped); 0 and 0 for the rigid body.  (An overdamped mode whose fast zero has met the third one of
     its wave rings again, in shear: that pair is listed, not its slow zero near -1/C.)  `box` [1/s] holds `count`
-    eigenvalues, all of them listed.
+    eigenvalues, all of them listed.  `left_out` modes that were asked for are not in the record: from the next one on
+    branches could not be told apart.
     """
 
     undamped: Modes
     eigenvalues: Complex
     box: Box
     count: int
+    left_out: int = 0
 
     @property
     def index(self) -> NDArray[np.int64]:
@@ -129,23 +133,44 @@ def _compared(zero: complex, disc: Disc, apart: float) -> None:
 
 
 def damped_modes(undamped: Modes) -> DampedModes:
-    """The modes of the arm with its own C, continued from the undamped ones.
+    """The modes of the arm with its own C, continued from the undamped ones: all, or the first that can be followed.
+
+    Where branches cannot be told apart the record holds fewer modes than are asked for, and `left_out` says how many
+    are missing.  Raises ConvergenceError where not even the first can be followed.
+    """
+    asked, lost = int(undamped.index.max()), None
+    for count in sorted({asked, *FEWER}, reverse=True):
+        if count > asked or (count > FEWER[0] and undamped.arm.link.damping):
+            continue
+        some = undamped if count == asked else modes(undamped.arm, count, theory=undamped.theory)
+        try:
+            found = all_damped_modes(some, COMPANY if count == asked <= MANY else COMPANY[:1])
+        except ConvergenceError as error:
+            lost = error
+            continue
+        return replace(found, left_out=asked - count)
+    assert lost is not None
+    raise lost
+
+
+def all_damped_modes(undamped: Modes, companies: tuple[int, ...] = COMPANY) -> DampedModes:
+    """All of the modes with the arm's own C, followed with so many more beside them: the next number if one fails.
 
     Raises ConvergenceError if a branch is lost, or two arrive at one eigenvalue.
     """
     k, C = undamped.coefficients, undamped.arm.link.damping
     flexible = int((undamped.index > 0).sum())
-    zeros = _followed(undamped, k, C, flexible)
+    zeros = _followed(undamped, k, C, flexible, companies)
     listed, company = zeros[:flexible], zeros[flexible:]
     box, count = complete_box(member(k).function, listed, company, C)
     rigid = np.zeros((undamped.index.size - flexible, 2), complex)
     return DampedModes(undamped, np.concatenate([rigid, listed]), box, count + zeros_at_origin(k))
 
 
-def _followed(undamped: Modes, k: Coefficients, C: float, wanted: int) -> Complex:
+def _followed(undamped: Modes, k: Coefficients, C: float, wanted: int, companies: tuple[int, ...]) -> Complex:
     """The zeros that the first modes, and those in their company, arrive at."""
     lost: ConvergenceError | None = None
-    for company in COMPANY:
+    for company in companies:
         more = modes(undamped.arm, wanted + company, theory=undamped.theory)
         omega = more.natural_frequency[more.index > 0]
         start = Node(0.0, np.stack([1j * omega, -1j * omega], 1))
