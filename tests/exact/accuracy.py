@@ -113,6 +113,16 @@ def run(count, seed=0):
     return [point for _ in range(count) for point in measure(some_arm(rng), some_s(rng), some_share(rng))]
 
 
+def run_near_singularity(count, seed=0):
+    """The Points of so many damped arms at real s next to -1/C, at 1e-4 of it to nearly all the way to 0."""
+    rng, points = np.random.default_rng([seed, 1]), []
+    for _ in range(count):
+        arm = some_arm(rng, damping=10 ** rng.uniform(-4.5, -2))
+        away = rng.choice([-1, 1]) * 10 ** rng.uniform(-4, -0.05)
+        points += measure(arm, complex(-(1 + away) / arm.link.damping), some_share(rng))
+    return points
+
+
 def main():
     count, seed = int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 0
     start = time.perf_counter()
@@ -122,6 +132,8 @@ def main():
     print(f"{count} random (arm, s, x) in {time.perf_counter() - start:.0f} s: {len(points)} representable values,")
     print(f"{len(points) - len(fair)} of them flagged (the kernel asks for balls there)")
     print(f"worst error {max(p.error for p in fair):.3g}; {len(above)} above {BOUND:g}")
+    near = [point.error for point in run_near_singularity(count // 4, seed) if not point.flagged]
+    print(f"next to -1/C, at real s: worst error {max(near):.3g} over {len(near)} values")
     for name in OUTPUTS:
         print(f"  {name:18s}{max(p.error for p in fair if p.name == name):.3g}")
     for point in above[:20]:
