@@ -45,6 +45,15 @@ def test_what_does_not_fit_stands_below_beside_the_first_column():
     assert [line.split()[0] for line in lines[-2:]] == ["1", "2"]
 
 
+def test_a_row_is_known_by_as_many_columns_as_it_takes():
+    rows = Rows(("", "depth", "first frequency", "second frequency"), keys=2)
+    rows.add_row("*", "0.006", "71.505682466890", "204.33313936381")
+    assert [line.split() for line in rows.lines(30) if "*" in line] == [
+        ["*", "0.006", "71.505682466890"],
+        ["*", "0.006", "204.33313936381"],
+    ]
+
+
 def test_a_table_without_rows_has_its_titles():
     assert Rows(("a", "b")).lines(80) == ["a  b"]
 

@@ -21,10 +21,14 @@ LEAST = 20  # characters to which a text may be folded
 
 @dataclass
 class Rows:
-    """A table as it is filled: a title a column, then rows; columns named in `fold` hold texts that may be folded."""
+    """A table as it is filled: a title a column, then rows; columns named in `fold` hold texts that may be folded.
+
+    The first `keys` columns say which row it is, and stand in every block.
+    """
 
     titles: tuple[str, ...]
     fold: tuple[str, ...] = ()
+    keys: int = 1
     rows: list[tuple[str, ...]] = field(default_factory=list)
 
     def add_row(self, *cells: object) -> None:
@@ -36,7 +40,7 @@ class Rows:
         """The lines of the table, each in so many characters as far as its widest column allows."""
         widths = self._widths(width)
         printed: list[str] = []
-        for block in _blocks(widths, width):
+        for block in _blocks(widths, width, self.keys):
             printed += [""] * bool(printed)
             for row in (self.titles, *self.rows):
                 printed += self._row(row, widths, block)
@@ -73,9 +77,9 @@ class Rows:
         return lines
 
 
-def new_table(titles: tuple[str, ...], fold: tuple[str, ...] = ()) -> Rows:
+def new_table(titles: tuple[str, ...], fold: tuple[str, ...] = (), keys: int = 1) -> Rows:
     """An empty table; what answers comes first."""
-    return Rows(titles, fold)
+    return Rows(titles, fold, keys)
 
 
 def show(table: Rows) -> None:
@@ -84,12 +88,12 @@ def show(table: Rows) -> None:
     print("\n".join(table.lines(width)))
 
 
-def _blocks(widths: Sequence[int], width: int) -> list[list[int]]:
-    """The columns of each block, the first column in all of them."""
-    blocks = [[0]]
-    for i in range(1, len(widths)):
-        if len(blocks[-1]) > 1 and _total([widths[j] for j in (*blocks[-1], i)]) > width:
-            blocks.append([0])
+def _blocks(widths: Sequence[int], width: int, keys: int) -> list[list[int]]:
+    """The columns of each block, the first so many in all of them."""
+    blocks = [list(range(min(keys, len(widths))))]
+    for i in range(keys, len(widths)):
+        if len(blocks[-1]) > keys and _total([widths[j] for j in (*blocks[-1], i)]) > width:
+            blocks.append(list(range(keys)))
         blocks[-1].append(i)
     return blocks
 

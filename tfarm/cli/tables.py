@@ -124,7 +124,7 @@ def print_assumptions(answer: dict[str, Any]) -> None:
 def _print_candidates(study: dict[str, Any], keys: tuple[str, ...], titles: tuple[str, ...], parameter: str) -> None:
     count = len(study["candidates"][0]["sensitivity"])
     modes = (title for i in range(1, count + 1) for title in (f"w{i} [rad/s]", f"%/% {parameter}"))
-    table = new_table(("", *titles, *modes, "loop", "K2 below"))
+    table = new_table(("", *titles, *modes, "loop", "K2 below"), keys=2)
     for row in study["candidates"]:
         pairs = zip(row["natural_frequency_rad_s"], row["sensitivity"], strict=True)
         numbers = (text for w, slope in pairs for text in (f"{w:.8g}", f"{slope:.4f}"))
