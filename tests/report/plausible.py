@@ -127,14 +127,18 @@ def _rows(folder: Path, stem: str) -> list[dict[str, float | str]]:
 
 
 def report_on(arm: Arm, folder: Path) -> tuple[float, list[str], list[str]]:
-    """CPU-bound seconds, what is wrong, and the sections left out, of the pages of one arm."""
+    """Seconds, what is wrong, and the sections left out, of the pages of one arm."""
     file = folder / "arm.toml"
     file.write_text(to_toml(arm), encoding="utf-8")
     start = time.perf_counter()
-    done = subprocess.run(
-        [sys.executable, "-c", WRITE, str(file), str(folder / "out")],
-        capture_output=True, text=True, timeout=LONGEST, check=False, env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
-    )  # fmt: skip
+    command = [sys.executable, "-c", WRITE, str(file), str(folder / "out")]
+    try:
+        done = subprocess.run(
+            command, capture_output=True, text=True, timeout=LONGEST, check=False,
+            env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
+        return LONGEST, [f"not done after {LONGEST:g} s"], []
     wrong = [f"exit {done.returncode}"] * (done.returncode != 0)
     wrong += [line for line in done.stderr.splitlines()[-3:] if line]
     if not wrong:
