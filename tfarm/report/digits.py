@@ -53,6 +53,11 @@ def fixed(values: Iterable[float], decimals: int) -> tuple[str, ...]:
     return tuple(_signed(f"{x:.{decimals}f}") for x in values)
 
 
+def held(values: Iterable[float], digits: int) -> list[float]:
+    """Numbers as a file has them whose last digits depend on the processor: rounded to so many significant digits."""
+    return [float(f"{value:.{digits - 1}e}") for value in values]
+
+
 def scientific(x: float, digits: int) -> str:
     """`x` as a power of ten, e.g. 5.7456 × 10⁶."""
     return _special(x) if x == 0 or math.isinf(x) else _power_of_ten(f"{x:.{digits - 1}e}")

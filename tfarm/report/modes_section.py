@@ -12,7 +12,7 @@ from tfarm.arm import Arm
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.exact.coefficients import Theory
 from tfarm.report.damped_table import damped_table
-from tfarm.report.digits import aligned, fixed, significant
+from tfarm.report.digits import aligned, fixed, held, significant
 from tfarm.report.figures import Picture
 from tfarm.report.mode_shapes import Shape, draw_differences, draw_shapes, shapes_of, theory_name
 from tfarm.report.responses import Real
@@ -22,6 +22,7 @@ from tfarm.report.trust_proofs import how_proven
 from tfarm.spectrum import Modes
 
 MODES, SHAPES = 10, 6
+HELD = 10  # digits in files of what shapes are needed for: these differ from processor to processor by 1e-14
 SIMPLER: tuple[Theory, ...] = ("shear", "rayleigh", "euler-bernoulli")
 PARAMETER_NAMES = {"youngs_modulus": "Young's modulus"}
 NEGLECTED = 5e-7  # a sensitivity that never exceeds this reads as zero
@@ -99,9 +100,9 @@ def _flexible(modes: Modes) -> Real:
 
 def modal_table(modes: Modes) -> Table:
     """Frequencies, hub participation, modal moment and nodes."""
-    b, moment = modes.hub_participation, modes.modal_moment + 0.0
+    b, moment = (np.array(held(each, HELD)) for each in (modes.hub_participation, modes.modal_moment + 0.0))
     nodes = [", ".join(places(node, modes.arm.link.length)) or "none" for node in modes.nodes]
-    at = [tuple(node.tolist()) for node in modes.nodes]
+    at = [tuple(held(node, HELD)) for node in modes.nodes]
     rigid = "Row 0 is the arm turning as a rigid body. " if modes.arm.has_rigid_mode else ""
     omega = _frequency("natural_frequency_rad_s", "natural frequency", "rad/s", modes.natural_frequency)
     hertz = _frequency("natural_frequency_hz", "", "Hz", modes.natural_frequency_hz)
@@ -150,7 +151,7 @@ def _frequency(key: str, title: str, of: str, values: Real, group: str = "") -> 
 def _shapes(name: str, shapes: tuple[Shape, ...]) -> Picture:
     counts = ", ".join(str(len(shape.nodes)) for shape in shapes)
     columns = [data_column("x_m", "x", "m", shapes[0].x)]
-    columns += [data_column(f"mode_{shape.number}", f"mode {shape.number}", "", shape.w) for shape in shapes]
+    columns += [data_column(f"mode_{s.number}", f"mode {s.number}", "", np.round(s.w, HELD - 1) + 0.0) for s in shapes]
     return Picture(
         stem="mode-shapes",
         title=f"Shapes of the first {len(shapes)} flexible modes",
@@ -205,7 +206,7 @@ def sensitivity_table(modes: Modes) -> Table:
     """Per cent of frequency per per cent of each parameter: a row a parameter, a column a mode."""
     flexible = modes.index > 0
     rows = {
-        PARAMETER_NAMES.get(name, name.replace("_", " ")): values[flexible] + 0.0
+        PARAMETER_NAMES.get(name, name.replace("_", " ")): np.round(values[flexible], HELD - 1) + 0.0
         for name, values in modes.sensitivity.items()
     }
     shown = {name: values for name, values in rows.items() if abs(values).max() > NEGLECTED}
