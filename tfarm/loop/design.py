@@ -107,9 +107,9 @@ def _effort(arm: Arm, objective: str, K2: Bounds, number: int) -> Effort:
     """
     if objective == "margin":  # the one that is dear
         return Effort(24, 24, 4)
+    if objective == "damping":  # which has few basins
+        return Effort(32, 36, 12)
     starts = max(6, 80 // number)
-    if objective == "damping":
-        return Effort(40, 60, starts)
     hubs = (arm.hub.inertia / (1 - gain) if gain < 1 else math.inf for gain in K2)
     ends = [natural_modes(replace(arm, hub=Hub(inertia=hub)), number).natural_frequency[-number:] for hub in hubs]
     basins = float(abs(ends[0] - ends[1]).max()) * RISE / (4 * math.pi)
@@ -200,7 +200,7 @@ def _disk(loop: Loop, omega: Real) -> float:
 def _flat(score: Score, gains: tuple[float, float], best: float, axis: int, bounds: Bounds) -> Bounds:
     """Between which values of one gain the score stays within `FLAT` of the best, the other held.
 
-    Walked outwards in steps that grow by a tenth, and then halved: so narrow valleys are seen as well as wide ones.
+    Walked outwards in steps that grow by three tenths, then halved: narrow valleys are seen as well as wide ones.
     """
     limit, centre = best + FLAT * abs(best), gains[axis]
 
@@ -211,7 +211,7 @@ def _flat(score: Score, gains: tuple[float, float], best: float, axis: int, boun
 
     ends = []
     for bound in bounds:
-        way = np.geomspace(1e-9, 1.0, 220) * (bound - centre)
+        way = np.geomspace(1e-9, 1.0, 80) * (bound - centre)
         (bad,) = np.nonzero(~good(centre + way * (1 - END)))
         if not bad.size:
             ends.append(bound)
