@@ -9,10 +9,12 @@ import pytest
 
 import tfarm
 from tests.loop.arms import window_arm
+from tests.report.nyquist_counts import survey
 from tfarm.arm import Hub, HubFeedback
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import Sampling
 from tfarm.dsp.loop import sampled_loop
+from tfarm.errors import ConvergenceError
 from tfarm.loop.damping import least_damping
 from tfarm.loop.plant import Loop
 from tfarm.loop.poles import closed_loop_poles
@@ -316,3 +318,29 @@ def test_the_star_and_its_card_say_that_the_gains_do_not_hold_when_sampled(lab):
     quick = margins_section(LAB, Chain(sampling=Sampling(period=2e-4))).facts
     assert all(fact.beside.endswith("; stable when sampled every 0.2 ms") for fact in quick)
     assert set(map_data(lab).columns[0].values) == {"grid", "boundary", "sampled boundary"}
+
+
+@pytest.mark.parametrize("arm", [PURE, LAB], ids=lambda arm: arm.name)
+@pytest.mark.parametrize("Kp", [-1e-3, -1e-8, -1e-14])
+def test_a_small_unstable_pole_is_not_indented_away(arm, Kp):
+    """Kp < 0 leaves one real unstable pole near -Kp/K1, however near to the double pole of L at 0."""
+    law = HubFeedback(K1=0.3, K2=0.3, Kp=Kp)
+    plot = nyquist(NamedLaw("", "", law), stability(arm, law))
+    assert (plot.expected, plot.verdict.unstable_roots) == (1, 1)
+    radius = abs(plot.s[plot.is_arc][plot.s[plot.is_arc].imag < 1e-2]).min()
+    assert radius < plot.verdict.poles.values.real.max() == pytest.approx(-Kp / 0.3, rel=1e-2)
+
+
+def test_both_counts_of_a_nyquist_plot_are_compared():
+    """With a verdict that has lost its unstable poles there is no plot."""
+    law = HubFeedback(K1=0.3, K2=1.5)
+    verdict = replace(stability(LAB, law), unstable_roots=0)
+    with pytest.raises(ConvergenceError, match="by the turns around -1, 0 by finding all"):
+        nyquist(NamedLaw("", "", law), verdict)
+
+
+def test_random_loops_have_as_many_turns_as_unstable_poles():
+    """`python -m tests.report.nyquist_counts 500` for more; refused are poles as good as on the axis."""
+    outcomes = survey(12, 1)
+    assert sum(each == "agree" for each in outcomes) >= 9
+    assert not any("by finding" in each for each in outcomes)

@@ -1,7 +1,7 @@
 """Nyquist plots of the exact loop function that hide nothing: infinity is drawn on the rim, poles on the axis by arcs.
 
-The contour runs up the imaginary axis, passes each pole of L on it by a small semicircle on the right, and closes by a
-half circle in the right half-plane at the edge of the band.  L is evaluated on all of it, so the encirclements of -1
+The contour runs up the imaginary axis, passes each pole of L on it by a small semicircle on the right, and closes along
+the edges of the box in which the verdict's poles were counted.  L is evaluated on all of it, so the encirclements of -1
 are counted, not read off: clockwise ones are closed-loop poles inside the contour, as no pole of L is in there.
 """
 
@@ -33,6 +33,9 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 INDENT = 0.05  # radius of a semicircle around a pole of L, in units of its residue: |L| is about 20 on it
+NEARER = 0.1  # of the way to the nearest closed-loop pole: no step past a pole of L leaves an unstable one out
+SLOW = 200  # points between that and the arm's own grid
+EDGE = 750  # points along an edge of the box, to begin with
 ARC = np.linspace(-math.pi / 2, math.pi / 2, 41)
 FAST = 0.7  # radians: where the argument of 1 + L turns by more between neighbours of the contour it is halved
 FINE = 0.02  # of the rim's radius: the longest straight piece of a drawn curve
@@ -82,15 +85,22 @@ class Nyquist:
 def nyquist(named: NamedLaw, verdict: Stability) -> Nyquist:
     """The plot of one law, its encirclements counted up to the verdict's band.
 
-    Raises ConvergenceError where a curve passes -1 so close that they cannot be counted.
+    The contour goes around the right part of the verdict's box, so both counts are of one region.  Raises
+    ConvergenceError where a curve passes -1 so close that its turns cannot be counted, or the two counts differ.
     """
     loop, band = verdict.loop, verdict.band
     poles = poles_on_axis(loop, band)
-    s, is_arc = smooth(loop, *upper_contour(loop, poles, band))
-    closing = band * np.exp(1j * np.linspace(math.pi / 2, 0.0, 1500))
-    path = np.r_[s, closing[1:]]
-    turned = turning(loop, path)
-    return Nyquist(named, s, loop.loop_function(s), is_arc, poles, round(turned / math.pi), verdict)
+    s, is_arc = smooth(loop, *upper_contour(loop, poles, band, verdict.poles.moving))
+    corner = complex(verdict.poles.box.re_max, band)
+    across, down = np.linspace(1j * band, corner, EDGE), np.linspace(corner, corner.real, EDGE)
+    turned = turning(loop, np.r_[s, across[1:], down[1:]])
+    plot = Nyquist(named, s, loop.loop_function(s), is_arc, poles, round(turned / math.pi), verdict)
+    if not verdict.unstable_roots <= plot.expected <= verdict.unstable_roots + plot.on_axis:
+        text = (
+            f"{plot.expected} unstable poles by the turns around -1, {verdict.unstable_roots} by finding all in a box"
+        )
+        raise ConvergenceError(text, plot, plot.expected - verdict.unstable_roots)
+    return plot
 
 
 def poles_on_axis(loop: Loop, band: float) -> Real:
@@ -100,12 +110,20 @@ def poles_on_axis(loop: Loop, band: float) -> Real:
     return np.r_[zero, natural_frequencies(arm, band)] if arm.link.damping == 0 else np.array(zero)
 
 
-def upper_contour(loop: Loop, poles: Real, band: float) -> tuple[Complex, NDArray[np.bool_]]:
-    """From s = 0 (or right of it, where a pole is) up the axis to the band, past each pole on its right."""
+def upper_contour(loop: Loop, poles: Real, band: float, closed: Complex) -> tuple[Complex, NDArray[np.bool_]]:
+    """From s = 0 (or right of it, where a pole is) up the axis to the band, past each pole on its right.
+
+    `closed` are the closed loop's poles: each step past a pole of L goes nearer to it than the nearest of them.
+    """
     omega = np.asarray(grid(loop.arm, band))
     s, is_arc = 1j * omega, np.zeros(omega.size, bool)
     for pole in poles:
         radius = indentation(loop, float(pole))
+        away = abs(closed - 1j * pole)
+        radius = min(radius, NEARER * float(away[away > ON_AXIS * pole].min(initial=math.inf)))
+        if pole == 0:
+            slow = 1j * np.geomspace(radius, omega[0], SLOW)[1:-1]
+            s, is_arc = np.r_[s, slow], np.r_[is_arc, np.zeros(slow.size, bool)]
         clear = abs(s - 1j * pole) > radius
         arc = 1j * pole + radius * np.exp(1j * (ARC[ARC >= 0] if pole == 0 else ARC))
         approach = 1j * (pole + np.outer([-1.0, 1.0], radius * np.geomspace(1.05, 1e3, 40)).ravel())
