@@ -7,6 +7,7 @@ import math
 import os
 import subprocess
 import sys
+import time
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
@@ -470,3 +471,36 @@ def test_the_pictures_of_the_readme(tmp_path):
     assert [path.name for path in paths] == ["bode-root-moment.png", "gains.png", "mode-shapes.png"]
     kept = Path(__file__).parents[2] / "reports" / "pictures"
     assert {path.name for path in kept.iterdir()} == {path.name for path in paths}
+
+
+POOL = """
+import os, time
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from tfarm.report.writing import _leave_with_parent
+if __name__ == "__main__":
+    pool = ProcessPoolExecutor(1, get_context("spawn"), _leave_with_parent)
+    print(pool.submit(os.getpid).result(), flush=True)
+    time.sleep(60)
+"""
+
+
+def test_the_workers_of_a_run_that_is_killed_leave_with_it(tmp_path):
+    script = tmp_path / "pool.py"
+    script.write_text(POOL)
+    with subprocess.Popen([sys.executable, script], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
+        worker = int(process.stdout.readline())
+        assert is_alive(worker)
+        process.kill()
+    deadline = time.monotonic() + 30
+    while is_alive(worker):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+def is_alive(process):
+    """Whether it runs, and is not just waiting for its exit code to be read."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False

@@ -14,8 +14,9 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from pathlib import Path
+from threading import Thread
 
 from tfarm.arm import Arm
 from tfarm.dsp import Chain
@@ -219,7 +220,7 @@ def _results(
         for task in tasks:
             yield task, _make(subjects[task[0]], task[1], folders[task[0]])
         return
-    with ProcessPoolExecutor(WORKERS, mp_context=get_context("spawn")) as pool:
+    with ProcessPoolExecutor(WORKERS, get_context("spawn"), _leave_with_parent) as pool:
         futures = {pool.submit(_make, subjects[i], piece, folders[i]): (i, piece) for i, piece in tasks}
         try:
             for future in as_completed(futures):
@@ -227,6 +228,18 @@ def _results(
         except BaseException:
             pool.shutdown(wait=True, cancel_futures=True)
             raise
+
+
+def _leave_with_parent() -> None:
+    """In a worker: end when the process that started it is gone; a pool's workers would wait for work for ever."""
+    parent = parent_process()
+
+    def leave() -> None:
+        if parent is not None:
+            parent.join()
+            os._exit(1)
+
+    Thread(target=leave, daemon=True).start()
 
 
 def _may_start_processes() -> bool:
