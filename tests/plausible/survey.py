@@ -1,7 +1,9 @@
 """One arm after another through every verb, and what is printed of it."""
 
+import math
 import multiprocessing
 import tempfile
+import time
 import traceback
 from dataclasses import dataclass
 from functools import partial
@@ -108,23 +110,25 @@ def listing(rows, seed):
     return "\n".join(lines)
 
 
-def survey(size, seed, verbs, processes=1, tell=None, first=0):
-    """The rows of so many arms."""
+def survey(size, seed, verbs, processes=1, tell=None, seconds=math.inf):
+    """The rows of so many arms, or of as many as were done when so many seconds were over."""
     work, rows = partial(survey_one, seed=seed, verbs=verbs), []
-    numbers = range(first, first + size)
+    numbers, end = range(size), time.perf_counter() + seconds
     if processes == 1:
         found = map(work, numbers)
-        rows = _gathered(found, size, tell)
+        rows = _gathered(found, size, tell, end)
     else:
         with multiprocessing.get_context("spawn").Pool(processes) as pool:
-            rows = _gathered(pool.imap_unordered(work, numbers), size, tell)
+            rows = _gathered(pool.imap_unordered(work, numbers), size, tell, end)
     return sorted(rows, key=lambda row: (verbs.index(row.verb), row.number))
 
 
-def _gathered(found, size, tell):
+def _gathered(found, size, tell, end):
     rows = []
     for done, new in enumerate(found, start=1):
         rows += new
         if tell:
             tell(done, size, new)
+        if time.perf_counter() > end:
+            break
     return rows
