@@ -65,6 +65,17 @@ def test_between_crossings_the_counts_are_those_of_the_eigenvalues(name, delay):
         np.testing.assert_array_equal(np.diff(counts), found.count)
 
 
+def test_a_long_delay_hides_no_crossing_between_two_points_of_the_grid(lab):
+    """Sixty samples turn the loop's phase sixty times round the circle; a grid ten times coarser loses a pair."""
+    loop = sampled_loop(lab, GAINS, Chain(sampling=Sampling(delay_samples=60.0)), count=6)
+    found = crossings(circle_grid(loop), "K1", 0.3)
+    gaps = np.nonzero(np.diff(found.gain) > 1e-6)[0]
+    middles = np.r_[found.gain[0] - 1, (found.gain[gaps + 1] + found.gain[gaps]) / 2, found.gain[-1] + 1]
+    passed = np.r_[0, np.cumsum(found.count)][np.searchsorted(found.gain, middles)]
+    counts = [growing(loop.with_gains(middle, 0.3)) for middle in middles]
+    np.testing.assert_array_equal(counts - passed, counts[0])
+
+
 @pytest.mark.parametrize("hub_rate", ["ideal", "difference"])
 @pytest.mark.parametrize("name", ["sasaki2012", "sasaki2012-lab"])
 def test_the_map_counts_as_the_eigenvalues_do(name, hub_rate):

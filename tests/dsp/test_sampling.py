@@ -10,8 +10,9 @@ from tests.dsp.roads import aliased, aliased_loop, durbin
 from tests.strategies import arm_of
 from tfarm.arm import HubFeedback
 from tfarm.dsp import Chain, Sampling, pulse_transfer, sampled_loop
-from tfarm.dsp.plant import loop_plant
+from tfarm.dsp.plant import loop_plant, undelayed_plant, with_filter
 from tfarm.dsp.sampling import PulseTransfer
+from tfarm.errors import ParameterError
 from tfarm.reduced import modal_model
 
 T = 0.01
@@ -182,13 +183,13 @@ def test_a_rigid_inertia_is_stable_up_to_its_known_gain(delay):
         assert loop.poles.is_stable is stable
 
 
-def test_a_filter_after_an_angle_that_drifts(lab):
-    """1/s^2 wc/(s + wc) = 1/s^2 - 1/(wc s) + ...: the rigid body lags by 1/wc."""
-    from tfarm.dsp.plant import undelayed_plant, with_filter
-
-    plain = undelayed_plant(lab, Chain(), ("hub_angle", "root_moment"), 8)
+def test_a_filter_is_for_what_does_not_drift(lab):
+    """The rigid body's rate 1/(J s) is lagged, an angle's 1/(J s^2) refused: encoders have no analog filter."""
+    plain = undelayed_plant(lab, Chain(), ("hub_rate", "root_moment", "hub_angle"), 8)
     lagged = with_filter(plain, [0], 90.0)
     for s in (3.0 + 1j, 200j, -20.0 + 400j):
-        angle, moment = lagged(s)
-        assert angle == pytest.approx(plain(s)[0] * 90 / (s + 90), rel=1e-11)
+        rate, moment, _ = lagged(s)
+        assert rate == pytest.approx(plain(s)[0] * 90 / (s + 90), rel=1e-11)
         assert moment == plain(s)[1]
+    with pytest.raises(ParameterError, match="filtered output = 'hub_angle'"):
+        with_filter(plain, [2], 90.0)

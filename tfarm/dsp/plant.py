@@ -109,20 +109,26 @@ def filtered(plant: Plant, chain: Chain) -> Plant:
 
 
 def with_filter(plant: Plant, rows: Sequence[int], corner: float) -> Plant:
-    """wc/(s + wc) after some outputs: a pole at -wc, with the residue wc G(-wc)."""
+    """wc/(s + wc) after some outputs: a pole at -wc, with the residue wc G(-wc).
+
+    Raises ParameterError for an output with the double integral of the torque, an angle or a displacement: encoders
+    are digital and have no analog filter.
+    """
+    for row in rows:
+        if plant.rigid[row, 0] != 0.0:
+            remedy = "it follows the turning hub without bound; an analog filter is for the gauge and the tachometer"
+            raise ParameterError(key="filtered output", value=plant.outputs[row], remedy=remedy)
     residues = np.c_[plant.residues, np.zeros(len(plant.outputs), complex)]
-    rigid, static = plant.rigid.copy(), plant.static.copy()
+    static = plant.static.copy()
     at_corner = plant(-corner)
     for row in rows:
         residues[row, :-1] *= corner / (plant.poles + corner)
         residues[row, -1] = corner * at_corner[row].real
-        rigid[row, 1] -= rigid[row, 0] / corner
         static[row] = 0.0
     return replace(
         plant,
         poles=np.r_[plant.poles, -corner],
         residues=residues,
-        rigid=rigid,
         static=static,
         mode=np.r_[plant.mode, 0],
     )
