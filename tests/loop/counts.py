@@ -136,3 +136,4 @@ if __name__ == "__main__":
     for CASE, VERDICT in SURVEY:
         if VERDICT.outcome != "right":
             print(VERDICT.outcome, VERDICT.reason, *CASE)
+    sys.exit(any(case[-1].outcome == "wrong" for case in SURVEY))

@@ -120,3 +120,4 @@ if __name__ == "__main__":
     for ARM, COUNT, VERDICT in SURVEY:
         if VERDICT.outcome != "right":
             print(VERDICT.outcome, VERDICT.reason, COUNT, ARM)
+    sys.exit(any(case[-1].outcome == "wrong" for case in SURVEY))

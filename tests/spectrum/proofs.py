@@ -105,3 +105,4 @@ if __name__ == "__main__":
     for ARM, VERDICT in SURVEY:
         if VERDICT.outcome != "proven":
             print(VERDICT.outcome, VERDICT.reason, ARM)
+    sys.exit(any(verdict.outcome == "wrong" for _, verdict in SURVEY))
