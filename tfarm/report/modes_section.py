@@ -102,7 +102,8 @@ def modal_table(modes: Modes) -> Table:
     """Frequencies, hub participation, modal moment and nodes."""
     b, moment = (np.array(held(each, HELD)) for each in (modes.hub_participation, modes.modal_moment + 0.0))
     nodes = [", ".join(places(node, modes.arm.link.length)) or "none" for node in modes.nodes]
-    at = [tuple(held(node, HELD)) for node in modes.nodes]
+    decimals = HELD - 1 - math.floor(math.log10(modes.arm.link.length))  # a node is known as a share of the length
+    at = [tuple(np.round(node, decimals).tolist()) for node in modes.nodes]
     rigid = "Row 0 is the arm turning as a rigid body. " if modes.arm.has_rigid_mode else ""
     omega = _frequency("natural_frequency_rad_s", "natural frequency", "rad/s", modes.natural_frequency)
     hertz = _frequency("natural_frequency_hz", "", "Hz", modes.natural_frequency_hz)
