@@ -203,7 +203,7 @@ def _strip_picture(coarse: StripChart, own: Chain) -> Picture:
     clipped, read = int(coarse.saturated.sum()), coarse.simulation.saturated["moment"]
     what = (
         f"{clipped} of {coarse.asked.size} samples ask for more than the motor's {plain(coarse.limit, 3)} N m "
-        f"(shaded); the moment is read in steps of {significant(coarse.step, 3)} N m (faint lines in the close-up)"
+        f"(shaded); the moment is read in steps of {significant(coarse.step, 3)} N m"
     )
     beyond = f", and lies beyond the ADC's range at {read} samples" if read else ""
     late = f"{plain(delay)} sample{'s' * (delay != 1)} of delay"

@@ -27,6 +27,7 @@ ROOM = 1.2  # times the largest moment: the ADC's range
 DELAY = 1.0  # samples
 LASTING = 2.0  # times the slew
 CLOSE = 14  # samples in the close-up
+MOST_LEVELS = 60  # of the ADC that are drawn: more would be a grey wall
 SATURATED = "#f6d9c2"
 
 
@@ -206,7 +207,7 @@ def _limits(data: StripChart, window: tuple[float, float], upper: Axes, lower: A
     seen = y[(t >= window[0]) & (t <= window[1])]
     _fit(upper, seen)
     low, high = (math.floor(y / data.step) for y in upper.get_ylim())
-    for level in range(low + 1, high + 1):
+    for level in range(low + 1, high + 1) if high - low <= MOST_LEVELS else ():
         upper.axhline(level * data.step, color=FAINT, lw=0.7, zorder=0.8)
     upper.grid(False)
     at = (s.t >= window[0] - 2 * s.scenario.period) & (s.t <= window[1])

@@ -9,6 +9,7 @@ import numpy as np
 from tfarm.arm import Arm, HubFeedback
 from tfarm.dsp import Chain
 from tfarm.errors import CertificationError
+from tfarm.report.curves import resolution_words
 from tfarm.report.digits import aligned, plain, significant
 from tfarm.report.figures import Picture
 from tfarm.report.loop_laws import has_loop, sign_words, why_no_loop
@@ -16,7 +17,7 @@ from tfarm.report.overlay import overlay
 from tfarm.report.sampled_words import SHORT_SIGN, typeset
 from tfarm.report.sections import Section
 from tfarm.report.tables import Column, Table, data_column, number_column, text_column
-from tfarm.report.time_responses import responses_table
+from tfarm.report.time_responses import clipped_words, responses_table
 from tfarm.report.tuner_pictures import draw_cost_map, draw_curves, draw_gain, draw_response
 from tfarm.report.tuner_study import COARSE, MAP_SEEDS, MAP_TRIALS, NOMINAL, SEEDS, TunerStudy, tuner_study
 from tfarm.report.tuner_words import (
@@ -123,7 +124,7 @@ def _slew_picture(data: TunerStudy) -> Picture:
         title="The slew without and with the tuner",
         caption=(
             f"Root moment, tip and motor over an ideal chain (the paper's Figures 4 and 6). {_residuals(data, 0)} The "
-            f"dotted line is the end of the slew; dashed, the rigid arm. {SHORT_SIGN}"
+            f"dotted line is the end of the slew; dashed, the rigid arm.{resolution_words(data.slews)} {SHORT_SIGN}"
         ),
         alt=f"Root moment, tip and motor torque of the slew. {_residuals(data, 0)}",
         figure=draw_response(data.arm.name, data.arm, data.slews, "the slew, ideal chain"),
@@ -136,15 +137,29 @@ def _coarse_picture(data: TunerStudy) -> Picture:
         stem="tune-dsp",
         title="The same with the DSP's effects on",
         caption=(
-            "With 12-bit ADC and DAC, a hub rate differenced from an encoder of 8192 counts, and one sample of delay "
-            f"(the paper's Figures 8 and 9). {_residuals(data, 1)} Nothing regulates the hub angle (no Kp), so what it "
-            "loses to delay and steps it keeps. The motor is in N m: the paper gives no motor constant to turn it "
-            f"into volts. {SHORT_SIGN}"
+            f"{_converter_words(data)} (the paper's Figures 8 and 9). {_residuals(data, 1)} Nothing regulates the hub "
+            "angle (no Kp), so what it loses to delay and steps it keeps."
+            f"{clipped_words(data.coarse)}{resolution_words(data.coarse)} {SHORT_SIGN}"
         ),
         alt=f"The slew with converters and delay. {_residuals(data, 1)}",
         figure=draw_response(data.arm.name, data.arm, data.coarse, "the slew, converters and one sample of delay"),
         data=_signals(data, 1, "tune-dsp-data"),
     )
+
+
+def _converter_words(data: TunerStudy) -> str:
+    """What stands between the controller and the arm in the second picture."""
+    chain = next(iter(data.coarse.values())).chain
+    c, delay = chain.converters, chain.sampling.delay_samples
+    late = f"{plain(delay)} sample{'s' * (delay != 1)} of delay"
+    ranges = [
+        f"{bits}-bit {name} over ±{plain(span, 3)} N m"
+        for name, bits, span in (("ADC", c.moment_bits, c.moment_range), ("DAC", c.torque_bits, c.torque_range))
+        if bits is not None and span is not None
+    ]
+    if c.hub_rate == "difference":
+        ranges.append(f"a hub rate differenced from an encoder of {c.encoder_counts} counts")
+    return f"With {', '.join([*ranges, late])}"
 
 
 def _residuals(data: TunerStudy, which: int) -> str:

@@ -168,8 +168,10 @@ def headline_facts(data: TunerStudy) -> tuple[Fact, ...]:
     helps = f"by {significant(gain, 2)} %" if gain > 100 * SAME else "no"
     held = "proven stable" if guard.is_proven else f"proven for the first {guard.modes_used} modes"
     half = f"half between {significant(low, 4)} and {significant(high, 4)}"
-    K = significant(tuning.best_constant.gain, 3)
     shaped = min((record.cost, kind) for kind, (_, record) in tuning.shaped.items())
+    later = any(trial.task.busy_until > tuning.trial.task.busy_until for trial, _ in tuning.shaped.values())
+    how = f"{shaped[1]}, a later slew" if later else "no mode slow enough to shape"
+    K = significant(tuning.best_constant.gain, 3)
     return (
         Fact(label="does tuning beat a constant gain?", value=helps, beside=f"median of {final.size} seeds"),
         Fact(label="cost without moment feedback", value=significant(tuning.without.cost, 4)),
@@ -180,7 +182,7 @@ def headline_facts(data: TunerStudy) -> tuple[Fact, ...]:
             beside=half,
         ),
         Fact(label="nothing is below", value=significant(tuning.bound.cost, 4), beside="linear-quadratic optimum"),
-        Fact(label="input shaping instead", value=significant(shaped[0], 3), beside=f"{shaped[1]}, a later slew"),
+        Fact(label="input shaping instead", value=significant(shaped[0], 3), beside=how),
         Fact(label="tip off its target at the end", value=off, unit="mm", beside=f"constant gain: {off_constant} mm"),
         Fact(label="guard", value=f"{guard.lo:.3f} … {guard.hi:.3f}", beside=f"any K(t) in it: {held}"),
     )
