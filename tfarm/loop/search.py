@@ -17,6 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from tfarm.records import record
+
 Real = NDArray[np.float64]
 Bounds = tuple[float, float]
 Score = Callable[[Real, Real], Real]  # of arrays of K1 and K2; what is least is best
@@ -64,6 +66,7 @@ def rate_axis(bounds: Bounds, unit: float) -> Axis:
 
 
 @dataclass(frozen=True)
+@record
 class Found:
     """A minimum: `shares` of both axes and the score there."""
 
