@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import tfarm
+from tests.odd_arms import odd_arms
 from tfarm.arm import HubFeedback
 from tfarm.dsp import (
     Chain,
@@ -18,7 +19,7 @@ from tfarm.dsp import (
     sampled_loop,
 )
 from tfarm.dsp.boundary import circle_grid, crossings
-from tfarm.dsp.margins import stable_windows
+from tfarm.dsp.margins import around, stable_windows
 from tfarm.dsp.verdict import sampled_answer, sampled_verdict
 from tfarm.errors import ParameterError
 
@@ -35,6 +36,17 @@ def test_the_edges_that_two_prototypes_found(lab):
     assert (low, high) == (pytest.approx(-0.1526, abs=5e-5), pytest.approx(1.1639, abs=5e-5))
     ((low, high),) = stable_windows(loop, "K1")
     assert low == 0.0
+
+
+@pytest.mark.parametrize("period", [0.005, 0.05])
+def test_a_static_crossing_torn_by_rounding_hides_no_window(period):
+    """A pinned tip, where a pole meets z = 1 at K2 = 1: the window below it is there, by the poles on its two sides."""
+    arm = odd_arms()["pinned"]
+    loop = sampled_loop(arm, HubFeedback(K1=0.0374, K2=0.3), Chain(sampling=Sampling(period=period)), count=8)
+    low, high = around(stable_windows(loop, "K2"), 0.3)
+    assert high == pytest.approx(1.0, rel=1e-9)
+    for K2, is_stable in ((low - 1e-6, False), (low + 1e-6, True), (0.999, True), (1.001, False)):
+        assert loop.with_gains(0.0374, K2).poles.is_stable == is_stable
 
 
 @pytest.mark.parametrize("gain", ["K1", "K2"])

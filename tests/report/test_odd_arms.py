@@ -24,7 +24,8 @@ from tfarm.report.bode_section import bode_section
 from tfarm.report.damped_table import damped_table
 from tfarm.report.locus_section import beyond_table, locus_section
 from tfarm.report.loop_laws import has_loop
-from tfarm.report.loop_section import margins_section
+from tfarm.report.loop_section import margins_section, nyquist_section
+from tfarm.report.margins_table import margin_table
 from tfarm.report.modes_section import modal_table, places
 from tfarm.spectrum import DampedModes
 from tfarm.spectrum.scales import default_gains
@@ -95,6 +96,7 @@ def test_a_gauge_on_a_free_pin_reads_the_torque():
     assert "−u/(1 + C s)" in section.blocks[0].caption
     assert "0 poles" not in section.blocks[0].caption
     assert section.words[0].endswith("There are none.")
+    assert "zeros ," not in section.words[0]
     G, C = tfarm.transfer(ARMS["free-pin"], "root_moment"), ARMS["free-pin"].link.damping
     s = np.array([3j, 200j, 5 + 900j])
     assert G(s) * (1 + C * s) == pytest.approx(np.full(3, -1.0), rel=1e-12)
@@ -223,7 +225,33 @@ def test_a_free_pin_has_its_rate_loop(monkeypatch):
     section = margins_section(arm)
     assert section.facts[0].value == "STABLE"
     assert set(column(section.blocks[1], "gain").values) == {"K1", "Kp"}
-    assert [piece.name for piece in writing.PIECES if piece.suits(arm)][4:7] == ["no loop", "margins", "root loci"]
+    pieces = [piece.name for piece in writing.PIECES if piece.suits(arm)]
+    assert pieces[4:8] == ["no loop", "margins", "root loci", "Nyquist"]
+
+
+def test_a_free_pin_has_its_nyquist_plot():
+    """The default K1, and a negative one to compare: as many turns as poles in a box."""
+    section = nyquist_section(ARMS["free-pin"])
+    table = section.blocks[1]
+    turns, by_nyquist, in_box = (
+        list(column(table, key).values) for key in ("encirclements", "unstable_by_nyquist", "unstable_in_box")
+    )
+    assert by_nyquist == in_box == [-turn for turn in turns]
+    assert by_nyquist[0] == 0 < by_nyquist[1]
+    assert all("K2 = 0" in law for law in column(table, "law").values)
+    assert "the last law" in table.caption.lower()
+
+
+def test_a_margin_without_end_has_no_frequency(monkeypatch):
+    monkeypatch.setattr(loop_laws, "best", lambda arm: None)
+    named = loop_laws.NamedLaw("default gains", "default", HubFeedback(K1=5.0338, K2=-3.0))
+    found = loop_laws.margins_of(ARMS["pinned"], named.law)
+    table = margin_table([named], [found], False)
+    rows = dict(
+        zip(column(table, "quantity").values, zip(*(c.values for c in table.columns[3:5]), strict=True), strict=True)
+    )
+    assert rows["phase lead"] == (math.inf, "")
+    assert rows["phase lag"][1] == pytest.approx(488.89, rel=1e-4)
 
 
 # ------------------------------------------------------------ what the assumptions do

@@ -27,6 +27,7 @@ FEWER = (0.85, 0.72, 0.61, 0.54)
 OVERDAMPED = 2.5  # C w from which on a bending mode surely is: following it further costs a hundred times as much
 STRONGEST = 0.15  # of critical in the first mode: no stronger damping is looked at
 DECADES = 16  # down from there
+SAME = 1e-9  # relative: next to z = 1 one static crossing is read several times, each with an error near 1e-12
 
 
 @dataclass(frozen=True)
@@ -41,14 +42,16 @@ def stable_windows(loop: SampledLoop, gain: GainName) -> list[Window]:
     """Every open interval of one gain in which the loop is stable, the other gains as they are.
 
     Between two crossings of the unit circle the count of unstable poles is constant: it follows from the count at one
-    gain, and where it is zero the poles themselves confirm it.
+    gain, and where it is zero the poles themselves confirm it.  A gap that rounding tears between crossings of one
+    gain has no count of its own.
     """
     other = loop.gains.K2 if gain == "K1" else loop.gains.K1
     found = crossings(circle_grid(loop), gain, other)
     edges = np.r_[-math.inf, found.gain, math.inf]
     middles = _middles(found.gain)
     totals = np.r_[0, np.cumsum(found.count)]
-    lowest = totals == totals.min()  # the count is the same up to a constant: only its minima can be zero
+    is_gap = np.r_[True, np.diff(found.gain) > SAME * abs(found.gain[1:]), True][: totals.size]
+    lowest = is_gap & (totals == totals[is_gap].min())  # the same up to a constant: only its minima can be zero
     windows: list[Window] = []
     for i in np.nonzero(lowest)[0]:
         K1, K2 = (middles[i], other) if gain == "K1" else (other, middles[i])

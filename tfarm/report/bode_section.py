@@ -136,10 +136,12 @@ def completeness(data: Bode) -> str:
     """What the list of roots holds, and how far it goes."""
     height = f"0 ≤ Im s < {significant(data.band[1], 6)} rad/s"
     widths = [_width(each) for each in (data.pole_width, data.zero_width)]
-    width = "" if not any(widths) else widths[0] if widths[0] == widths[1] else f"poles {widths[0]}, zeros {widths[1]}"
+    named = [f"{what} {each}" for what, each in zip(("poles", "zeros"), widths, strict=True) if each]
+    width = widths[0] if widths[0] == widths[1] else ", ".join(named)
     known = "confirmed by the winding number around the box" if any(widths) else "counted"
     box = f"{height}, {width}, {known}" if width else f"{height}, {known}"
-    return f"All poles and zeros that this output shows in {box}; rigid-body poles at s = 0 apart."
+    rigid = "; rigid-body poles at s = 0 apart" * data.arm.has_rigid_mode
+    return f"All poles and zeros that this output shows in {box}{rigid}."
 
 
 def _width(box: tuple[float, float]) -> str:

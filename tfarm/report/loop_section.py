@@ -9,6 +9,7 @@ import numpy as np
 from tfarm.arm import Arm
 from tfarm.dsp import Chain
 from tfarm.dsp.brief import SampledBrief
+from tfarm.errors import ConvergenceError
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import Windows
 from tfarm.report.digits import plain, significant
@@ -18,6 +19,7 @@ from tfarm.report.loop_laws import (
     NamedLaw,
     brief_of,
     edge_of_K2,
+    has_loop,
     laws,
     margins_of,
     sign_words,
@@ -27,7 +29,7 @@ from tfarm.report.loop_laws import (
 from tfarm.report.map import GainMap, gain_map, map_data
 from tfarm.report.map_picture import draw_map
 from tfarm.report.margins_table import margin_table, verdict_facts, verdict_words, window_table
-from tfarm.report.nyquist import Nyquist, count_table, curve_data, draw_nyquist, nyquist
+from tfarm.report.nyquist import COMPARED, Nyquist, count_table, curve_data, draw_nyquist, nyquist
 from tfarm.report.sections import Section
 from tfarm.spectrum.scales import default_gains, default_words, rate_unit
 
@@ -198,10 +200,7 @@ def nyquist_section(arm: Arm) -> Section:
     """The loop function on a contour that hides nothing."""
     named = laws(arm)
     plots = [nyquist(each, margins_of(arm, each.law).stability) for each in named]
-    law = default_gains(arm)
-    beyond = float(f"{BEYOND_EDGE * (edge_of_K2(arm, law) or 1.0):.3g}")
-    wrong = NamedLaw("to compare", "unstable", replace(law, K2=max(UNSTABLE_K2, beyond)))
-    counted = [*plots, nyquist(wrong, stability(arm, wrong.law))]
+    counted = [*plots, *_to_compare(arm)]
     picture = Picture(
         stem="nyquist",
         title="Nyquist plots of the exact loop function",
@@ -216,6 +215,22 @@ def nyquist_section(arm: Arm) -> Section:
     words = (_nyquist_answer(plots), NYQUIST_WORDS.format(poles=_poles_words(plots[0])))
     title = "Nyquist: does the loop function turn around −1?"
     return Section(anchor="margins-nyquist", title=title, words=words, blocks=(picture, count_table(counted, names)))
+
+
+def _to_compare(arm: Arm) -> list[Nyquist]:
+    """An unstable law whose turns are counted too: K2 beyond its edge, on a free pin K1 < 0; none where neither counts.
+
+    K1 is small there: without inertia at the hub a large K1 < 0 drives poles unstable at any frequency.
+    """
+    law = default_gains(arm)
+    beyond = float(f"{BEYOND_EDGE * (edge_of_K2(arm, law) or 1.0):.3g}")
+    drives = (
+        replace(law, K2=max(UNSTABLE_K2, beyond)) if has_loop(arm) else replace(law, K1=float(f"{-law.K1 / 10:.3g}"))
+    )
+    try:
+        return [nyquist(NamedLaw(COMPARED, "unstable", drives), stability(arm, drives))]
+    except ConvergenceError:
+        return []
 
 
 def _nyquist_answer(plots: list[Nyquist]) -> str:

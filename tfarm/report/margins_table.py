@@ -120,8 +120,10 @@ def _rows(found: Margins) -> Iterator[Row]:
     yield "gain margin, up", "factor", band.gain[1], "", ""
     phases = {"phase margin": band.phase, "phase lag": band.phase_lag, "phase lead": band.phase_lead}
     for name, at in zip(phases, ("phase", "phase_lag", "phase_lead"), strict=True):
-        yield name, "deg", "" if found.exact_delay == 0 else phases[name], phases[name], band.at[at]
-    yield "delay margin", "s", found.exact_delay, band.delay, band.at["delay"]
+        where = "" if math.isinf(phases[name]) else band.at[at]
+        yield name, "deg", "" if found.exact_delay == 0 else phases[name], phases[name], where
+    where = "" if math.isinf(band.delay) else band.at["delay"]
+    yield "delay margin", "s", found.exact_delay, band.delay, where
     yield "disk margin α", "", found.exact_disk, band.disk, band.at["disk"]
     yield "peak sensitivity", "", found.exact_peak, band.peak_sensitivity, band.at["peak_sensitivity"]
 

@@ -49,6 +49,7 @@ COUNTS = (
     "less than 10⁻¹² of their size are not told apart from the axis there (undecided), though their turns around −1 "
     "are counted.{last}"
 )
+COMPARED = "to compare"
 COUNTED = " The last law is there to show that the count is not always 0."
 
 
@@ -297,7 +298,7 @@ def count_table(plots: Sequence[Nyquist], names: Sequence[str]) -> Table:
     return Table(
         stem="nyquist-count",
         title="Encirclements beside unstable poles",
-        caption=COUNTS.format(last=COUNTED if plots[-1].verdict.unstable_roots else ""),
+        caption=COUNTS.format(last=COUNTED if plots[-1].named.name == COMPARED and plots[-1].expected else ""),
         columns=(
             text_column("law", "law", names),
             text_column("verdict", "verdict", words),

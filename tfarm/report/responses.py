@@ -113,6 +113,8 @@ def bode(arm: Arm, output: str, band: tuple[float, float]) -> Bode:
     beyond = 1.3 * band[1]  # roots just above the band shape its edge
     all_poles, all_zeros = G.poles(up_to=beyond), G.zeros(up_to=beyond)
     poles, zeros = without_cancelled(_upper(all_poles.values), _upper(all_zeros.values))
+    if all_zeros.proof == "constant":  # held by its end condition: it shows no pole of the arm
+        poles = poles[:0]
     omega = refined_grid(band, np.r_[poles, zeros])
     value = G(1j * omega)
     inside_poles, inside_zeros = poles[poles.imag < band[1]], zeros[zeros.imag < band[1]]

@@ -30,7 +30,8 @@ CLEAR = 0.8  # how far towards the accumulation point -1/C a box may reach
 class Roots:
     """Poles or zeros `values` [1/s], with multiplicity, ascending in |Im s|: all there are in `box`.
 
-    `box` is (re_min, re_max, im_min, im_max); `proof` says how completeness is known: "count" or "winding number".
+    `box` is (re_min, re_max, im_min, im_max); `proof` says how completeness is known: "count", "winding number" or
+    "constant" (an end condition holds the output: none but at 0).
     """
 
     values: Complex
