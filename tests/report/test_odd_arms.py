@@ -19,7 +19,7 @@ from tfarm.loop.plant import Loop
 from tfarm.loop.poles import poles_below
 from tfarm.report import assumptions_pictures, assumptions_section, loop_laws, loop_section, writing
 from tfarm.report import loci as loci_room
-from tfarm.report.arm_section import arm_section
+from tfarm.report.arm_section import arm_section, derived_table
 from tfarm.report.bode_section import bode_section
 from tfarm.report.damped_table import damped_table
 from tfarm.report.locus_section import beyond_table, locus_section
@@ -100,6 +100,12 @@ def test_a_gauge_on_a_free_pin_reads_the_torque():
     G, C = tfarm.transfer(ARMS["free-pin"], "root_moment"), ARMS["free-pin"].link.damping
     s = np.array([3j, 200j, 5 + 900j])
     assert G(s) * (1 + C * s) == pytest.approx(np.full(3, -1.0), rel=1e-12)
+
+
+def test_a_ratio_that_no_isotropic_material_has_is_not_called_poissons():
+    """The boom's E/2G - 1 is 11: of a laminate."""
+    named = {name: "E/2G − 1" in column(derived_table(arm), "symbol").values for name, arm in ARMS.items()}
+    assert named == {name: name != "boom" for name in ARMS}
 
 
 def test_a_slip_of_units_is_named_on_the_page():
@@ -252,6 +258,9 @@ def test_a_margin_without_end_has_no_frequency(monkeypatch):
     )
     assert rows["phase lead"] == (math.inf, "")
     assert rows["phase lag"][1] == pytest.approx(488.89, rel=1e-4)
+    passive = loop_laws.margins_of(ARMS["free-pin"], HubFeedback(K1=0.283))
+    table = margin_table([named], [passive], False)
+    assert dict(zip(column(table, "quantity").values, table.columns[4].values, strict=True))["disk margin α"] == ""
 
 
 # ------------------------------------------------------------ what the assumptions do
@@ -273,6 +282,8 @@ def test_a_K2_where_the_search_ended_has_a_star():
     study = hub_study(ARMS["heavy-hub"], [1.0, 22.5, 30.0], count=1)
     (edges,) = (each for each in assumptions_section._loop(study, verdicts) if each.key == "K2_below")
     assert list(edges.cells) == ["1.08000", "50*", "-"]
+    small = hub_study(ARMS["micro"], [1e-7, 2e-7, 5e-7], count=1)
+    assert "K1 = 1.66 × 10⁻⁵, K2 = 0.3" in next(iter(assumptions_section._loop(small, verdicts))).group
     assert "*" in assumptions_section._searched(verdicts)
     assert not assumptions_section._searched(verdicts[::2])
 

@@ -89,6 +89,9 @@ def test_the_angle_that_is_left_is_said_as_it_is():
     assert "leaves more of it" in drift_words(study(ends=(0.5, 0.01)))
     assert "leaves no more of it" in drift_words(study(ends=(0.01, 0.5)))
     assert "about as much" in drift_words(study(ends=(0.2, 0.1)))
+    there = study(ends=(0.5, 1e-15))
+    there.constant.scenario.hub_angle[0] = 0.1
+    assert "and 0 mm with the best constant gain" in drift_words(there)
     assert away(ARMS["boom"], study().constant)[-1] == 0.1
 
 

@@ -14,6 +14,7 @@ from tfarm.report.sketch import draw_arm
 from tfarm.report.tables import Column, Table, text_column
 
 FIRST = 3  # natural frequencies among the headline numbers
+MOST_POISSON = 0.5  # of an isotropic material; a larger E/2G - 1 is none's ratio
 Row = tuple[str, str, float, str]  # quantity, symbol, value, unit
 
 
@@ -126,11 +127,13 @@ def given_table(arm: Arm) -> Table:
 def derived_table(arm: Arm) -> Table:
     """What follows from the parameters alone."""
     link, J = arm.link, arm.total_inertia
+    ratio = ("Poisson's ratio of an isotropic material", "E/2G − 1", link.poissons_ratio, "")
+    isotropic = [ratio] if -1 < link.poissons_ratio <= MOST_POISSON else []
     rows: list[Row] = [
         ("mass of the link", "ρAL", link.rhoA * link.length, "kg"),
         ("bending stiffness", "EI", link.EI, "N m^2"),
         ("shear stiffness", "κGA", link.kGA, "N"),
-        ("Poisson's ratio of an isotropic material", "E/2G − 1", link.poissons_ratio, ""),
+        *isotropic,
         ("radius of gyration", "√(I/A)", link.section.radius_of_gyration, "m"),
         ("slenderness", "L/√(I/A)", link.slenderness, ""),
         ("total inertia about the hub", "J", J, "kg m^2"),

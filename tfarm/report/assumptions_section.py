@@ -172,7 +172,7 @@ def _loop(study: Study, verdicts: Verdicts) -> Iterator[Column]:
     words = [each.verdict for each in verdicts]
     edges = ["-" if each.K2_below is None else _edge(each.K2_below, each.is_edge) for each in verdicts]
     law = default_gains(study.arm)
-    group = f"loop at K1 = {law.K1:g}, K2 = {law.K2:g}"
+    group = f"loop at K1 = {plain(law.K1, 4)}, K2 = {plain(law.K2, 4)}"
     yield Column(key="verdict", title="verdict", values=words, cells=words, group=group, tint=_tint(study))
     values = ["" if each.K2_below is None else each.K2_below for each in verdicts]
     yield Column(key="K2_below", title="stable below K2", values=values, cells=edges, group=group, tint=_tint(study))

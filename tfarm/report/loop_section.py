@@ -53,7 +53,7 @@ SAMPLED = (
     "that clock no gains outside the hatching hold, whatever the continuous loop promises."
 )
 NOT_SAMPLED = " Where the loop is stable when it is sampled every {clock} could not be settled and is not drawn."
-DEPTH = " Unstable windows below K2 = −50 were not looked for."
+DEPTH = " For this map unstable windows below K2 = −50 were not looked for."
 NYQUIST_WORDS = (
     "Every size of L(iω) from 0 to infinity is in the picture: a size r is drawn as r/(1 + r), so nothing is cut off, "
     "and infinity is the outer rim. The loop is stable when the curve does not turn around −1. {poles}"

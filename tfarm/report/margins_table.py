@@ -15,6 +15,7 @@ from tfarm.report.sections import Fact
 from tfarm.report.tables import Column, Table, Value, text_column
 
 NOTHING = "none: not stable"
+LARGEST_DISK = 2.0  # of a passive loop, at no frequency of its own: as the least peak sensitivity, 1
 UNITS = {"K1": "N m s/rad", "K2": "", "Kp": "N m/rad"}
 MARGINS = (
     "Exact: of the infinite-dimensional loop. In the band: as far as the poles were computed{undamped}. Gain margin: "
@@ -124,8 +125,10 @@ def _rows(found: Margins) -> Iterator[Row]:
         yield name, "deg", "" if found.exact_delay == 0 else phases[name], phases[name], where
     where = "" if math.isinf(band.delay) else band.at["delay"]
     yield "delay margin", "s", found.exact_delay, band.delay, where
-    yield "disk margin α", "", found.exact_disk, band.disk, band.at["disk"]
-    yield "peak sensitivity", "", found.exact_peak, band.peak_sensitivity, band.at["peak_sensitivity"]
+    where = "" if band.disk == LARGEST_DISK else band.at["disk"]
+    yield "disk margin α", "", found.exact_disk, band.disk, where
+    where = "" if band.peak_sensitivity == 1 else band.at["peak_sensitivity"]
+    yield "peak sensitivity", "", found.exact_peak, band.peak_sensitivity, where
 
 
 def _cells(values: Sequence[Value]) -> list[str]:

@@ -127,11 +127,13 @@ def what_slews_show(data: Slews) -> str:
         return f"The loop runs away until the arm is folded up: {' and '.join(gone)}.{clipped}"
     before, after = residual_moment_rms(data.without), residual_moment_rms(data.with_moment)
     settled = [_settled(simulation) for simulation in (data.without, data.with_moment)]
+    each = f"Without moment feedback {settled[0]}, with it {settled[1]}"
+    both = f"With moment feedback or without it {settled[0]}" if settled[0] == settled[1] else each
     ratio = "" if before == 0 or after == 0 else f", {significant(before / after, 3)} times as much without as with it"
     return (
         f"Root moment left after the slew, less the rigid arm's: {significant(before, 3)} N m rms with K2 = 0, "
-        f"{significant(after, 3)} N m with K2 = {plain(data.gains.K2)}{ratio}. Without moment feedback {settled[0]}, "
-        f"with it {settled[1]}.{clipped}"
+        f"{significant(after, 3)} N m with K2 = {plain(data.gains.K2)}{ratio}. "
+        f"{both}.{clipped}"
     )
 
 

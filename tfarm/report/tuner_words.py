@@ -12,6 +12,7 @@ from tfarm.report.sampled_words import typeset
 from tfarm.report.sections import Fact
 from tfarm.report.tuner_study import Curves, TunerStudy
 
+ROUNDED = 1e-10  # of the tip's travel: no slew ends nearer its target than rounding tells
 MORE = 3.0  # times as far off its target is more, and no coincidence
 SAME = 1e-4  # relative difference of two costs below which they are called the same
 
@@ -79,8 +80,10 @@ def drift_words(data: TunerStudy) -> str:
 
 def off_target(data: TunerStudy) -> tuple[float, float]:
     """How far off the tip ends [m], with the tuner and with the best constant gain."""
-    tuned, constant = (float(away(data.arm, each)[-1]) for each in (data.slews["with the tuner"], data.constant))
-    return abs(tuned), abs(constant)
+    runs = data.slews["with the tuner"], data.constant
+    travel = data.arm.link.length * float(abs(data.constant.scenario.hub_angle).max())
+    tuned, constant = (abs(float(away(data.arm, each)[-1])) for each in runs)
+    return tuned * (tuned > ROUNDED * travel), constant * (constant > ROUNDED * travel)
 
 
 def shaping_words(data: TunerStudy) -> str:
