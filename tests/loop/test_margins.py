@@ -12,6 +12,7 @@ import tfarm
 from tests.loop.arms import window_arm
 from tests.loop.test_lines import held
 from tests.loop.test_stability import exceptional
+from tests.odd_arms import odd_arms
 from tfarm import Arm, Hub, HubFeedback
 from tfarm.loop.answers import margins_answer
 from tfarm.loop.frequencies import grid
@@ -139,6 +140,24 @@ def test_the_loop_bears_just_less_than_the_delay_margin(arm, law) -> None:
     assert turns(arm, law, 0.0, band) == 0
     assert turns(arm, law, found.exact_delay * (1 - 1e-5), band) == 0
     assert turns(arm, law, found.exact_delay * (1 + 1e-5), band) == 2
+
+
+def test_what_nothing_bounds_beyond_the_band_is_not_called_exact() -> None:
+    """A pin without inertia: beyond its band |L| is above 1 still, and where it falls through 1 bears less delay.
+
+    There the beam is a damped shaft in rotation, theta/M = 1/(s I sqrt(rho E (1 + C s))): |L| = 1 at about
+    (K1/I)^2/(rho E C), with an angle of 135 degrees from -1.
+    """
+    arm, law = odd_arms()["free-pin"], HubFeedback(K1=0.283)
+    found = margins(arm, law)
+    link = arm.link
+    omega = (law.K1 / link.section.second_moment) ** 2 / (link.density * link.youngs_modulus * link.damping)
+    assert omega > found.in_band.band
+    L = Loop(arm, law).loop_function(1j * omega * np.array([0.5, 2.0]))
+    assert abs(L[0]) > 1 > abs(L[1])
+    assert np.mod(np.angle(-L), 2 * np.pi) == pytest.approx([0.75 * np.pi] * 2, abs=0.2)
+    assert 0.75 * np.pi / (0.5 * omega) < 0.5 * found.in_band.delay
+    assert (found.exact_delay, found.exact_disk, found.exact_peak) == (None, 2.0, 1.0)
 
 
 def test_the_delay_margin_of_the_lab_arm_is_about_17_ms() -> None:

@@ -78,7 +78,8 @@ def _print_loop_margins(answer: dict[str, Any]) -> None:
     for key, at in LIMITS.items():
         unit = next((unit for unit in UNITS if key.endswith(unit)), "")
         name = key.removesuffix(unit).replace("_", " ") + UNITS.get(unit, "")
-        exact = "" if at.startswith("phase") and answer["delay_margin_s"] == 0 else f"{answer[key]:.6g}"
+        value = "not known" if answer[key] is None else f"{answer[key]:.6g}"
+        exact = "" if at.startswith("phase") and not answer["delay_margin_s"] else value
         where = "-" if math.isinf(band[key]) else f"{band['at_rad_s'][at]:.6g}"
         rows.add_row(Text(name), exact, f"{band[key]:.6g}", where)
     show(rows)

@@ -30,7 +30,7 @@ from .frequencies import grid
 from .lines import BISECTIONS, NONE, Line, crossing_at_zero, crossings
 from .plant import Loop
 from .poles import SMALLEST
-from .stability import Stability, stability
+from .stability import Stability, is_quiet, stability
 from .windows import Windows, gain_windows
 
 Complex = NDArray[np.complexfloating[Any, Any]]
@@ -66,7 +66,8 @@ class LoopMargins:
 @record
 class Margins:
     """The verdict first.  `in_band` are the margins up to its band; `exact_delay`, `exact_disk` and `exact_peak` those
-    of the whole infinite-dimensional loop.  All four are None unless the loop is stable.
+    of the whole infinite-dimensional loop.  All four are None unless the loop is stable, and each exact one where at
+    C > 0 nothing bounds |L| beyond the band (the hub's inertia does, where it has some): not known then.
     """
 
     stability: Stability
@@ -88,7 +89,11 @@ def margins(arm: Arm, law: HubFeedback, band: float | None = None) -> Margins:
         return Margins(verdict, windows, found, 0.0, 0.0, math.inf)
     if arm.link.damping == 0 and law.K1:  # 1 + L = 1 + (Kp + i K1 w) theta, theta real: no dip deepens with w
         return Margins(verdict, windows, found, 0.0, found.disk, found.peak_sensitivity)
-    return Margins(verdict, windows, found, found.delay, found.disk, found.peak_sensitivity)
+    if arm.link.damping == 0 or is_quiet(verdict.loop, verdict.band):
+        return Margins(verdict, windows, found, found.delay, found.disk, found.peak_sensitivity)
+    if law.K2 == 0 and law.Kp == 0:  # rate feedback of a passive arm: L in the right half-plane at every frequency
+        return Margins(verdict, windows, found, None, found.disk, found.peak_sensitivity)
+    return Margins(verdict, windows, found, None, None, None)
 
 
 def loop_margins(verdict: Stability) -> LoopMargins:

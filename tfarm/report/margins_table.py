@@ -15,10 +15,12 @@ from tfarm.report.sections import Fact
 from tfarm.report.tables import Column, Table, Value, text_column
 
 NOTHING = "none: not stable"
+UNKNOWN = "not known"  # an exact margin, where nothing bounds L beyond the band
 LARGEST_DISK = 2.0  # of a passive loop, at no frequency of its own: as the least peak sensitivity, 1
 UNITS = {"K1": "N m s/rad", "K2": "", "Kp": "N m/rad"}
 MARGINS = (
-    "Exact: of the infinite-dimensional loop. In the band: as far as the poles were computed{undamped}. Gain margin: "
+    "Exact: of the infinite-dimensional loop; not known where nothing bounds L beyond the band. "
+    "In the band: as far as the poles were computed{undamped}. Gain margin: "
     "factors on both gains at once between which the loop stays stable. Phase margin: where |L| = 1, the angle from −1 "
     "to L of least size, above 0 for lag that the loop bears and below 0 for lead; lag and lead: the least of each. "
     "Delay: what may be lost at the worst frequency. Disk margin: gain and phase may be off together by "
@@ -113,22 +115,27 @@ def _rows(found: Margins) -> Iterator[Row]:
     yield "verdict", "", it.verdict, "", ""
     yield "unstable poles", "", count, float(it.unstable_roots), ""
     yield "band", "rad/s", "", it.band, ""
-    if band is None or found.exact_delay is None or found.exact_disk is None or found.exact_peak is None:
+    if band is None:
         for name in QUANTITIES:
             yield name, "", NOTHING, "", ""
         return
     yield "gain margin, down", "factor", band.gain[0], "", ""
     yield "gain margin, up", "factor", band.gain[1], "", ""
     phases = {"phase margin": band.phase, "phase lag": band.phase_lag, "phase lead": band.phase_lead}
+    hidden = found.exact_delay == 0 or found.exact_delay is None
     for name, at in zip(phases, ("phase", "phase_lag", "phase_lead"), strict=True):
         where = "" if math.isinf(phases[name]) else band.at[at]
-        yield name, "deg", "" if found.exact_delay == 0 else phases[name], phases[name], where
+        yield name, "deg", "" if hidden else phases[name], phases[name], where
     where = "" if math.isinf(band.delay) else band.at["delay"]
-    yield "delay margin", "s", found.exact_delay, band.delay, where
+    yield "delay margin", "s", _known(found.exact_delay), band.delay, where
     where = "" if band.disk == LARGEST_DISK else band.at["disk"]
-    yield "disk margin α", "", found.exact_disk, band.disk, where
+    yield "disk margin α", "", _known(found.exact_disk), band.disk, where
     where = "" if band.peak_sensitivity == 1 else band.at["peak_sensitivity"]
-    yield "peak sensitivity", "", found.exact_peak, band.peak_sensitivity, where
+    yield "peak sensitivity", "", _known(found.exact_peak), band.peak_sensitivity, where
+
+
+def _known(exact: float | None) -> float | str:
+    return UNKNOWN if exact is None else exact
 
 
 def _cells(values: Sequence[Value]) -> list[str]:
