@@ -31,11 +31,12 @@ def data_of(name, period=0.01):
     loop = sampled_loop(arm, gains, chain, count=MODES)
     growth = loop.poles.log_spectral_radius
     verdict = SimpleNamespace(
-        loop=loop, is_settled=False, modes_used=MODES, is_stable=loop.poles.is_stable,
+        loop=loop, is_settled=False, band_rad_s=None, modes_used=MODES, is_stable=loop.poles.is_stable,
         word="stable" if growth < 0 else "unstable", sentence="stable: the hub decays most slowly, by 0.1 a sample",
     )  # fmt: skip
     analysis = SimpleNamespace(
         verdict=verdict, K1_windows=stable_windows(loop, "K1"), K2_windows=stable_windows(loop, "K2"),
+        K2=SimpleNamespace(is_settled=False),
         delay_margin=SimpleNamespace(samples=1.25, is_bound=False), required_damping=0.0,
         modes=SimpleNamespace(natural_frequency=tfarm.modes(arm, 1).natural_frequency[-1:]),
     )  # fmt: skip
