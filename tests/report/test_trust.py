@@ -17,6 +17,7 @@ from tfarm.report import trust_proofs, write, writing
 from tfarm.report.modes_section import modal_table
 from tfarm.report.trust import Evidence, write_trust
 from tfarm.report.trust_proofs import digits_of, how_proven, measured, prove, rounds_to, save_proof, written_proofs
+from tfarm.report.trust_tables import boxes_tables
 
 ARM = tfarm.load("stocky-steel")
 BRACKET = ("71.50568246689014371", "71.505682466890143711")
@@ -218,6 +219,10 @@ def test_damped_modes_and_closed_loop_poles_are_counted_and_kept(tmp_path):
     (tmp_path / lab.name).mkdir()
     save_proof(lab, tmp_path / lab.name)
     assert written_proofs(tmp_path)[0].boxes == proof.boxes
+    (table,) = boxes_tables([proof])
+    assert table.columns[1].values[0] == "damped modes, C = 0.0001 s"
+    (small,) = boxes_tables([replace(proof, boxes=(replace(loop, what="closed loop, K1 = 1.66e-05, K2 = 0.3"),))])
+    assert small.columns[1].cells[0] == "closed loop, K1 = 1.66 × 10⁻⁵, K2 = 0.3"
 
 
 def test_a_box_that_cannot_be_proven_says_why(monkeypatch):

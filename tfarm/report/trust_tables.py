@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tfarm.report.digits import scientific, significant
+from tfarm.report.loop_laws import typeset
 from tfarm.report.tables import Column, Table, number_column, text_column
 from tfarm.report.trust_proofs import BOX_DIGITS, DIGITS, MODES, OUTPUTS, Proof, digits_of
 
@@ -16,8 +17,8 @@ DIGITS_CAPTION = (
     "stand for those that follow (digits are cut off, not rounded)."
 )
 COUNTS_CAPTION = (
-    "The count is made at one frequency between the last mode of the list and the next; with the rigid-body mode it is "
-    "one more than the flexible modes enclosed. Each arm's folder has the enclosures as proof.json."
+    "The count is made at one frequency between the last mode of the list and the next: as many as the flexible modes "
+    "enclosed, and one more where the arm turns as a rigid body. Each arm's folder has the enclosures as proof.json."
 )
 BOXES_CAPTION = (
     "Eigenvalues off the axis, s in 1/s, conjugates and those at 0 counted. Each is enclosed in a disc of "
@@ -75,13 +76,14 @@ def boxes_tables(proofs: Sequence[Proof]) -> tuple[Table, ...]:
         for values in [np.array([each.box[which] for _, each in rows])]
     ]
     verdicts = [each.failure or "complete, proven" for _, each in rows]
+    named = [each.what for _, each in rows]
     table = Table(
         stem="boxes",
         title="Damped modes and closed-loop poles",
         caption=BOXES_CAPTION,
         columns=(
             text_column("arm", "arm", [name for name, _ in rows]),
-            text_column("what", "of", [each.what for _, each in rows]),
+            Column(key="what", title="of", values=named, cells=[typeset(each) for each in named]),
             numbers("count", "counted", [each.count for _, each in rows]),
             *limits,
             text_column("verdict", "verdict", verdicts),
