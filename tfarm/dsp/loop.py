@@ -20,10 +20,11 @@ from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.dsp.chain import Chain, Sampling
-from tfarm.dsp.plant import Plant, loop_plant
+from tfarm.dsp.plant import Branching, Plant, loop_plant, shorter_plant
 from tfarm.dsp.sampling import PulseTransfer
 from tfarm.errors import ParameterError
 from tfarm.records import record
+from tfarm.spectrum.damped import all_damped_modes
 from tfarm.spectrum.scales import check_gains
 
 Real = NDArray[np.float64]
@@ -80,6 +81,12 @@ class SampledLoop:
     def with_delay(self, samples: float) -> SampledLoop:
         """The same loop with another computational delay."""
         return replace(self, chain=replace(self.chain, sampling=replace(self.chain.sampling, delay_samples=samples)))
+
+    def with_modes(self, count: int) -> SampledLoop:
+        """The same loop with another number of flexible modes; no work where the plant's model has as many."""
+        if count <= self.plant.model.index.size:
+            return replace(self, plant=shorter_plant(self.plant, self.chain, count))
+        return replace(self, plant=loop_plant(self.plant.arm, self.chain, count))
 
     @property
     def differences(self) -> bool:
@@ -190,11 +197,21 @@ class SampledLoop:
         return np.where(abs(offset) <= UNMOVED, 0.0, offset)
 
 
-def sampled_loop(arm: Arm, gains: HubFeedback, chain: Chain | None = None, *, count: int = 20) -> SampledLoop:
-    """The loop with `count` flexible modes.  Raises ParameterError for a locked hub, and for I_h = 0 with K2 != 0."""
+def sampled_loop(
+    arm: Arm,
+    gains: HubFeedback,
+    chain: Chain | None = None,
+    *,
+    count: int = 20,
+    branches: Branching = all_damped_modes,
+) -> SampledLoop:
+    """The loop with `count` flexible modes.  Raises ParameterError for a locked hub, and for I_h = 0 with K2 != 0.
+
+    For one arm with many C: `branches` of its damped modes, that remember where they were.
+    """
     chain = Chain() if chain is None else chain
     check_loop(arm, gains)
-    return SampledLoop(loop_plant(arm, chain, count), chain, gains)
+    return SampledLoop(loop_plant(arm, chain, count, branches), chain, gains)
 
 
 def check_loop(arm: Arm, gains: HubFeedback) -> None:

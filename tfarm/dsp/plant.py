@@ -10,7 +10,7 @@ poles.  Both stay in this form, and the discretisation knows nothing of them.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -25,9 +25,13 @@ from tfarm.errors import ParameterError
 from tfarm.records import record
 from tfarm.reduced import ModalModel, modal_model
 from tfarm.response import transfer
+from tfarm.spectrum import DampedModes, Modes
+from tfarm.spectrum.damped import all_damped_modes
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
+
+Branching = Callable[[Modes], DampedModes]
 
 MEASURED = ("hub_angle", "hub_rate", "root_moment")
 RECORDED = ("hub_angle", "hub_rate", "root_moment", "tip_displacement")
@@ -39,7 +43,8 @@ class Plant:
     """Poles (m,) [1/s] other than s = 0, conjugates listed too; residues (outputs, m), rigid (outputs, 2), static
     (outputs,).
 
-    `mode` (m,) is the flexible mode that a pole belongs to; 0 for those of a filter or the damped hub.
+    `mode` (m,) is the flexible mode that a pole belongs to; 0 for those of a filter or the damped hub.  `model` is what
+    it was made from; it may have more modes.
     """
 
     arm: Arm
@@ -49,6 +54,7 @@ class Plant:
     rigid: Real
     static: Real
     mode: NDArray[np.int64]
+    model: ModalModel
 
     def __call__(self, s: complex) -> Complex:
         """G_o(s) of every output at one s."""
@@ -68,15 +74,22 @@ class Plant:
         return int(self.mode.max(initial=0))
 
 
-def loop_plant(arm: Arm, chain: Chain, count: int) -> Plant:
+def loop_plant(arm: Arm, chain: Chain, count: int, branches: Branching = all_damped_modes) -> Plant:
     """What the controller of a chain measures: hub angle, hub rate and root moment through their analog filters.
 
     Raises ParameterError for a locked hub, which no torque turns.
     """
-    return filtered(undelayed_plant(arm, chain, MEASURED, count), chain)
+    return filtered(undelayed_plant(arm, chain, MEASURED, count, branches), chain)
 
 
-def undelayed_plant(arm: Arm, chain: Chain, outputs: Sequence[str], count: int) -> Plant:
+def shorter_plant(plant: Plant, chain: Chain, count: int) -> Plant:
+    """A plant of `loop_plant` with the first `count` modes of its model."""
+    return filtered(_with_modes(plant.model, chain, MEASURED, count), chain)
+
+
+def undelayed_plant(
+    arm: Arm, chain: Chain, outputs: Sequence[str], count: int, branches: Branching = all_damped_modes
+) -> Plant:
     """The arm with `count` flexible modes and the actuator's analog hub damping, its outputs not filtered."""
     if arm.is_locked:
         remedy = "a locked hub has no loop: no torque turns it; give a finite inertia"
@@ -87,16 +100,24 @@ def undelayed_plant(arm: Arm, chain: Chain, outputs: Sequence[str], count: int) 
             "a hub without inertia has no model of finite order under hub damping; give hub.inertia, or leave it out"
         )
         raise ParameterError(key="actuator.hub_damping", value=damping, remedy=remedy)
-    model = modal_model(arm, list(outputs), count)
-    plant = _with_hub_damping(arm, outputs, count, damping) if damping > 0 else _of_model(model)
-    exact = transfer(arm, [*outputs, "hub_rate"])
+    names = [*outputs, "hub_rate"] if damping > 0 else list(outputs)
+    return _with_modes(modal_model(arm, names, count, branches=branches), chain, outputs, count)
+
+
+def _with_modes(model: ModalModel, chain: Chain, outputs: Sequence[str], count: int) -> Plant:
+    """The plant with the first `count` modes of a model, whose last output is the hub's rate where this is damped."""
+    damping = chain.actuator.hub_damping
+    some = model if count == model.index.size else model.first(count)
+    plant = _with_hub_damping(some, outputs, damping) if damping > 0 else _of_model(some)
+    exact = transfer(model.arm, [*outputs, "hub_rate"])
 
     def values(s: Complex) -> Complex:
         G = exact(s)
         damped: Complex = G[:-1] / (1 + damping * G[-1])
         return damped
 
-    return with_slow_remainder(plant, values, float(model.natural_frequency.max(initial=0.0)))
+    highest = float(some.natural_frequency.max(initial=0.0))
+    return replace(with_slow_remainder(plant, values, highest), model=model)
 
 
 def filtered(plant: Plant, chain: Chain) -> Plant:
@@ -138,20 +159,18 @@ def _of_model(model: ModalModel) -> Plant:
     poles = model.eigenvalues.ravel()
     residues = model.residues.reshape(len(model.outputs), poles.size)
     mode = np.repeat(model.index, 2)
-    return Plant(model.arm, model.outputs, poles, residues, model.rigid, model.static, mode)
+    return Plant(model.arm, model.outputs, poles, residues, model.rigid, model.static, mode, model)
 
 
-def _with_hub_damping(arm: Arm, outputs: Sequence[str], count: int, damping: float) -> Plant:
-    """The poles and residues of the modal model under the torque -damping theta_t, by its eigenvectors."""
-    names = [*outputs, "hub_rate"]
-    model = modal_model(arm, names, count)
+def _with_hub_damping(model: ModalModel, outputs: Sequence[str], damping: float) -> Plant:
+    """The poles and residues under the torque -damping theta_t of a model with the hub's rate last, by eigenvectors."""
     A, B, C, D = model.matrices()
     share = 1 / (1 + damping * D[-1, 0])
     A, C, D, B = A - damping * share * B @ C[-1:], C - damping * share * D @ C[-1:], D * share, B * share
     poles, right = np.linalg.eig(A)
     drive = np.linalg.solve(right, B.astype(complex))[:, 0]
     residues = (C @ right) * drive
-    rigid = np.zeros((len(names), 2))
+    rigid = np.zeros((len(model.outputs), 2))
     if model.has_rigid_states:  # turning the whole arm by an angle costs nothing: that pole is exactly zero
         zero = int(np.argmin(abs(poles)))
         rigid[:, 1] = np.where(model.rigid[:, 0] != 0, residues[:, zero].real, 0.0)
@@ -160,5 +179,5 @@ def _with_hub_damping(arm: Arm, outputs: Sequence[str], count: int, damping: flo
     mode = np.zeros(poles.size, np.int64)
     new, old = linear_sum_assignment(abs(poles[:, None] - own))
     mode[new] = np.repeat(model.index, 2)[old]
-    damped = Plant(arm, tuple(names), poles, residues, rigid, D[:, 0], mode)
+    damped = Plant(model.arm, model.outputs, poles, residues, rigid, D[:, 0], mode, model)
     return damped.rows(outputs)

@@ -17,7 +17,7 @@ from tfarm.dsp.band import Band, band_of
 from tfarm.dsp.boundary import GainName
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.circle import Circle
-from tfarm.dsp.loop import SampledLoop, sampled_loop
+from tfarm.dsp.loop import SampledLoop
 from tfarm.dsp.margins import (
     DelayMargin,
     Window,
@@ -164,7 +164,7 @@ def resized(loop: SampledLoop, count: int) -> SampledLoop:
     """The loop with another number of flexible modes, or a few less or more where two damped modes are one there."""
     for number in (count, count - 1, count + 1, count - 2, count + 2):
         try:
-            return sampled_loop(loop.plant.arm, loop.gains, loop.chain, count=max(1, number))
+            return loop.with_modes(max(1, number))
         except ConvergenceError as error:
             lost = error
     raise lost

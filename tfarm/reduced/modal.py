@@ -8,6 +8,7 @@ At C > 0 the undamped modes do not diagonalise the damping, so the residues are 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -21,7 +22,7 @@ from tfarm.exact.outputs import OUTPUTS, Output
 from tfarm.exact.values import expansions_at_zero
 from tfarm.response import Wanted, transfer
 from tfarm.spectrum import Modes, modes
-from tfarm.spectrum.damped import all_damped_modes
+from tfarm.spectrum.damped import DampedModes, all_damped_modes
 
 from .partial_fractions import PartialFractions
 from .residues import contour_residues, end_residues, undamped_residues
@@ -35,12 +36,33 @@ MOST_PROPER = 2  # power of s: a mode's share r s^2/(s^2 + w^2) is bounded, and 
 class ModalModel(PartialFractions):
     """The first flexible modes of the arm with their exact eigenvalues and residues (see `PartialFractions`)."""
 
+    def first(self, count: int) -> ModalModel:
+        """The model with the first `count` of these modes: those left out leave their static share."""
+        gone = (self.residues[:, count:] / self.eigenvalues[count:]).real.sum(axis=(1, 2))
+        return replace(
+            self,
+            index=self.index[:count],
+            natural_frequency=self.natural_frequency[:count],
+            eigenvalues=self.eigenvalues[:count],
+            residues=self.residues[:, :count],
+            static=self.static - gone,
+            participation=self.participation[:count],
+        )
 
-def modal_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None) -> ModalModel:
+
+def modal_model(
+    arm: Arm,
+    outputs: Wanted,
+    count: int,
+    x: float | None = None,
+    *,
+    branches: Callable[[Modes], DampedModes] = all_damped_modes,
+) -> ModalModel:
     """The modal model of an arm with its first `count` flexible modes (0 to 1000), for one output or several.
 
     `x` [m] is the place of outputs along the arm.  Where the hub is locked, hub angle is the input and no rigid body is
     left.  At C > 0 the eigenvalues and residues are those of the damped arm, overdamped modes by their two real poles.
+    For one arm with many C: `branches`, that remembers where they were.
     Raises ParameterError for an unknown output, a count out of range, and an output that grows with s without bound.
     """
     G = transfer(arm, outputs, x=x)
@@ -51,7 +73,7 @@ def modal_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None) -
     table = modes(arm, max(1, int(count)))
     flexible = slice(int(arm.has_rigid_mode), int(arm.has_rigid_mode) + int(count))
     collocated = OUTPUTS["root_moment" if arm.is_locked else "hub_angle"]
-    p, r = _poles_and_residues(arm, table, k, [*wanted, collocated], share)
+    p, r = _poles_and_residues(arm, table, k, [*wanted, collocated], share, branches)
     p, r = p[:count], r[:, :count]
     expansion = np.array(expansions_at_zero(k, wanted, share))
     return ModalModel(
@@ -96,7 +118,12 @@ def proper(k: Coefficients, wanted: Output, share: float) -> Output:
 
 
 def _poles_and_residues(
-    arm: Arm, table: Modes, k: Coefficients, wanted: list[Output], share: float
+    arm: Arm,
+    table: Modes,
+    k: Coefficients,
+    wanted: list[Output],
+    share: float,
+    branches: Callable[[Modes], DampedModes],
 ) -> tuple[Complex, Complex]:
     """Eigenvalues (n, 2) and residues (outputs, n, 2) at them."""
     if arm.link.damping == 0:
@@ -104,7 +131,7 @@ def _poles_and_residues(
         powers = np.array([[each.power] for each in wanted])
         upper = undamped_residues(table, wanted, k, share) * s**powers / (2 * s)
         return np.stack([s, s.conj()], axis=1), np.stack([upper, upper.conj()], axis=2)
-    p = all_damped_modes(table).eigenvalues[table.index > 0]
+    p = branches(table).eigenvalues[table.index > 0]
     along = any(not each.is_at_end for each in wanted)
     residues, doubtful = end_residues(k, wanted, p.ravel())
     doubtful = doubtful | along

@@ -143,9 +143,9 @@ def _pairs(mean: Real, square: Real) -> Complex:
 
 def corrected(member: Member, guess: Complex) -> tuple[Complex, NDArray[np.bool_]]:
     """The pairs of zeros next to the guess, and which of them did not settle there."""
-    zeros = guess
+    zeros, which = guess, nearest(guess)
     for _ in range(12):
-        zeros, moved = improved(member, zeros)
+        zeros, moved = improved(member, zeros, which)
         if not np.isfinite(zeros).all():
             break
         if (moved < SETTLED).all():
@@ -154,10 +154,10 @@ def corrected(member: Member, guess: Complex) -> tuple[Complex, NDArray[np.bool_
 
 
 def _strayed(guess: Complex, found: Complex, member: Member) -> NDArray[np.bool_]:
-    gap, _ = _neighbours(found, member)
+    gap, _ = _neighbours(found, member, nearest(found))
     met = (guess[:, 0].imag > 0) != (found[:, 0].imag > 0)  # around a meeting on the axis only the mean is compared
     moved = np.where(met[:, None], abs((guess - found).mean(1))[:, None], abs(guess - found))
-    strayed: NDArray[np.bool_] = np.any(~(moved <= BELIEVED * gap), axis=1)
+    strayed: NDArray[np.bool_] = np.any(~(moved < BELIEVED * gap), axis=1)
     return strayed
 
 
@@ -221,25 +221,34 @@ def _next_zero(function: Function, zero: float) -> float:
     return min(found, key=lambda s: abs(s - zero), default=np.inf)
 
 
-def _neighbours(zeros: Complex, member: Member) -> tuple[Real, Complex]:
-    """Of each zero its distance to the nearest zero of another pair or to the singular point, and its nearest zeros."""
+def nearest(zeros: Complex) -> NDArray[np.int64]:
+    """The numbers (2 n, m) of the m zeros next to each of the pairs' zeros (n, 2), itself among them."""
     flat = zeros.ravel()
-    plane = np.c_[flat.real, flat.imag]
-    number = min(NEIGHBOURS, flat.size)
-    distance, which = (np.reshape(part, (flat.size, number)) for part in cKDTree(plane).query(plane, k=number))
+    plane, number = np.c_[flat.real, flat.imag], min(NEIGHBOURS, flat.size)
+    found: NDArray[np.int64] = np.reshape(cKDTree(plane).query(plane, k=number)[1], (flat.size, number))
+    return found
+
+
+def _neighbours(zeros: Complex, member: Member, which: NDArray[np.int64]) -> tuple[Real, Complex]:
+    """Of each zero its distance to the nearest zero of another pair or to the singular point, and its `nearest`."""
+    flat = zeros.ravel()
     itself = np.arange(flat.size)[:, None]
-    gap = np.where(which // 2 == itself // 2, np.inf, distance).min(1)
-    others = np.where(which == itself, np.nan, flat[which])
+    near = flat[which]
+    gap = np.where(which // 2 == itself // 2, np.inf, abs(near - flat[:, None])).min(1)
+    others = np.where(which == itself, np.nan, near)
     from_origin = np.maximum(2 * abs(flat), member.free + 1e-300)
     gap = np.minimum(gap, np.minimum(from_origin, abs(flat - member.singular)))
     return gap.reshape(zeros.shape), others
 
 
-def improved(member: Member, zeros: Complex) -> tuple[Complex, Real]:
-    """One correction of every pair, and how far each moved, as a share of its distance to the next zero."""
-    gap, others = _neighbours(zeros, member)
+def improved(member: Member, zeros: Complex, which: NDArray[np.int64] | None = None) -> tuple[Complex, Real]:
+    """One correction of every pair, and how far each moved, as a share of its distance to the next zero.
+
+    `which` are the `nearest` zeros, where they are known from before the first of a few corrections.
+    """
+    gap, others = _neighbours(zeros, member, nearest(zeros) if which is None else which)
     is_real = zeros.imag[:, 0] == 0
-    value, slope, scale = (part.reshape(zeros.shape) for part in member.function(zeros.ravel()))
+    value, slope, scale = _of_pairs(member.function, zeros, is_real)
     with np.errstate(all="ignore"):
         step = value / slope
         repulsion = np.nansum(1 / (zeros.ravel()[:, None] - others), axis=1).reshape(zeros.shape)
@@ -252,8 +261,21 @@ def improved(member: Member, zeros: Complex) -> tuple[Complex, Real]:
         twist = np.exp(scale[i, 1] - scale[i, 0])  # both values on the scale of the first
         new[i] = _together(zeros[i], value[i] * [1, twist], slope[i] * [1, twist])
     floor = 4 * np.finfo(float).eps * abs(zeros)  # nearer no zero is known
-    moved = np.where(abs(new - zeros) <= floor, 0.0, abs(new - zeros) / gap).max(1)
+    with np.errstate(divide="ignore", invalid="ignore"):  # no gap is left between two that have become one
+        moved = np.where(abs(new - zeros) <= floor, 0.0, abs(new - zeros) / gap).max(1)
     return new, moved
+
+
+def _of_pairs(function: Function, zeros: Complex, is_real: NDArray[np.bool_]) -> list[Complex]:
+    """Value, slope and scale at pairs (n, 2); of a conjugate pair the function is asked at the upper zero alone."""
+    asked = np.stack([np.ones_like(is_real), is_real], axis=1)
+    found = []
+    for part in function(zeros[asked]):
+        both = np.empty(zeros.shape, complex)
+        both[asked] = part
+        both[~is_real, 1] = both[~is_real, 0].conj()
+        found.append(both)
+    return found
 
 
 def _together(zeros: Complex, value: Complex, slope: Complex) -> Complex:

@@ -158,32 +158,58 @@ def all_damped_modes(undamped: Modes, companies: tuple[int, ...] = COMPANY) -> D
 
     Raises ConvergenceError if a branch is lost, or two arrive at one eigenvalue.
     """
-    k, C = undamped.coefficients, undamped.arm.link.damping
-    flexible = int((undamped.index > 0).sum())
-    zeros = _followed(undamped, k, C, flexible, companies)
-    listed, company = zeros[:flexible], zeros[flexible:]
-    box, count = complete_box(member(k).function, listed, company, C)
-    rigid = np.zeros((undamped.index.size - flexible, 2), complex)
-    return DampedModes(undamped, np.concatenate([rigid, listed]), box, count + zeros_at_origin(k))
+    return Branches()(undamped, companies)
 
 
-def _followed(undamped: Modes, k: Coefficients, C: float, wanted: int, companies: tuple[int, ...]) -> Complex:
-    """The zeros that the first modes, and those in their company, arrive at."""
-    lost: ConvergenceError | None = None
-    for company in companies:
-        more = modes(undamped.arm, wanted + company, theory=undamped.theory)
-        omega = more.natural_frequency[more.index > 0]
-        start = Node(0.0, np.stack([1j * omega, -1j * omega], 1))
-        if C == 0:
-            return start.zeros
-        try:
-            nodes = follow(lambda C: member(replace(k, damping=C)), start, C, min(C, FIRST / omega[-1]), wanted)
-        except ConvergenceError as error:
-            lost = error
-            continue
-        return polished(member(k), nodes[-1].zeros)
-    assert lost is not None
-    raise lost
+class Branches:
+    """`all_damped_modes` of one arm with this C and that: each is followed on from the nearest smaller C that was met.
+
+    A branch that was lost at one C is not sought again beyond it.
+    """
+
+    def __init__(self) -> None:
+        self._met: dict[tuple[int, int], list[Node]] = {}
+        self._lost: dict[tuple[int, int], tuple[float, ConvergenceError]] = {}
+
+    def __call__(self, undamped: Modes, companies: tuple[int, ...] = COMPANY) -> DampedModes:
+        """The modes with the C of this table's arm.  Raises ConvergenceError as `all_damped_modes` does."""
+        k, C = undamped.coefficients, undamped.arm.link.damping
+        flexible = int((undamped.index > 0).sum())
+        zeros = self._followed(undamped, flexible, companies)
+        listed, company = zeros[:flexible], zeros[flexible:]
+        box, count = complete_box(member(k).function, listed, company, C)
+        rigid = np.zeros((undamped.index.size - flexible, 2), complex)
+        return DampedModes(undamped, np.concatenate([rigid, listed]), box, count + zeros_at_origin(k))
+
+    def _followed(self, undamped: Modes, wanted: int, companies: tuple[int, ...]) -> Complex:
+        """The zeros that the first modes, and those in their company, arrive at."""
+        k, C = undamped.coefficients, undamped.arm.link.damping
+        lost: ConvergenceError | None = None
+        for company in companies:
+            key = wanted, company
+            if key in self._lost and self._lost[key][0] <= C:
+                lost = self._lost[key][1]
+                continue
+            met = self._met.get(key) or [_undamped_node(undamped, wanted + company)]
+            start = sorted((node for node in met if node.at <= C), key=lambda node: node.at)[-1]
+            first = C - start.at if start.at else min(C, FIRST / abs(start.zeros[-1, 0]))
+            try:
+                nodes = follow(lambda C: member(replace(k, damping=C)), start, C, first, wanted)
+            except ConvergenceError as error:
+                lost = error
+                self._lost[key] = C, error
+                continue
+            self._met[key] = [*met, *nodes[1:]]
+            return nodes[-1].zeros if C == 0 else polished(member(k), nodes[-1].zeros)
+        assert lost is not None
+        raise lost
+
+
+def _undamped_node(undamped: Modes, count: int) -> Node:
+    """The first `count` modes of the table's arm at C = 0."""
+    more = modes(undamped.arm, count, theory=undamped.theory)
+    omega = more.natural_frequency[more.index > 0]
+    return Node(0.0, np.stack([1j * omega, -1j * omega], 1))
 
 
 def member(k: Coefficients, gains: Gains = OPEN) -> Member:

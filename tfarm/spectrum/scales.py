@@ -77,10 +77,14 @@ def default_words(arm: Arm, names: Iterable[str] = ("K1", "K2")) -> str:
     return " and ".join(words[name] for name in names)
 
 
-@lru_cache(maxsize=64)
 def first_frequency(arm: Arm) -> float:
-    """w1 [rad/s], the lowest flexible frequency."""
-    return float(modes(arm, 1).natural_frequency[-1])
+    """w1 [rad/s], the lowest flexible frequency of the undamped arm."""
+    return _first_frequency(replace(arm, link=replace(arm.link, damping=0.0)))
+
+
+@lru_cache(maxsize=64)
+def _first_frequency(undamped: Arm) -> float:
+    return float(modes(undamped, 1).natural_frequency[-1])
 
 
 @lru_cache(maxsize=64)
