@@ -13,9 +13,11 @@ from tfarm.arm import Arm, HubFeedback
 from tfarm.dsp.boundary import GainName, circle_grid, crossings
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.loop import MOMENT, RATE, SampledLoop, sampled_loop
+from tfarm.dsp.plant import Branching
 from tfarm.dsp.sampling import FORGOTTEN, held
 from tfarm.errors import ConvergenceError
 from tfarm.spectrum import modes, modes_below
+from tfarm.spectrum.damped import LITTLE, Branches, all_damped_modes
 
 Window = tuple[float, float]
 
@@ -115,15 +117,18 @@ def _delay_step(loop: SampledLoop) -> float:
     return float(min(0.05, 2 * np.pi / fastest / 12))
 
 
-def required_damping(arm: Arm, gains: HubFeedback, chain: Chain, *, count: int = 40) -> float:
+def required_damping(
+    arm: Arm, gains: HubFeedback, chain: Chain, *, count: int = 40, branches: Branching | None = None
+) -> float:
     """The smallest C [s] from which on these gains are stable on this arm (its own C is set aside).
 
     0 where they are stable without damping, inf where none up to 15 % of critical in the first mode helps.  Every
     decade is looked at from there down, so that larger ones on that grid are stable too; the edge is found to 1e-6.
     """
+    branches = Branches(LITTLE) if branches is None else branches
 
     def log_radius(log_C: float) -> float:
-        return log_radius_with(arm, gains, chain, math.exp(log_C), count)
+        return log_radius_with(arm, gains, chain, math.exp(log_C), count, branches)
 
     if sampled_loop(damped(arm, 0.0), gains, chain, count=count).poles.is_stable:
         return 0.0
@@ -139,7 +144,9 @@ def required_damping(arm: Arm, gains: HubFeedback, chain: Chain, *, count: int =
     return math.exp(high)
 
 
-def log_radius_with(arm: Arm, gains: HubFeedback, chain: Chain, C: float, count: int) -> float:
+def log_radius_with(
+    arm: Arm, gains: HubFeedback, chain: Chain, C: float, count: int, branches: Branching = all_damped_modes
+) -> float:
     """The log spectral radius at C; where two damped modes are one there, at a C that differs by 1e-6.
 
     Modes that a strong C has settled before the next sample, or overdamped, are left to the remainder, but for a few.
@@ -147,7 +154,7 @@ def log_radius_with(arm: Arm, gains: HubFeedback, chain: Chain, C: float, count:
     count = min(count, FEW + alive(damped(arm, C), chain), FEW + modes_below(arm, OVERDAMPED / C))
     for nudge in (0.0, 1e-6, -1e-6):
         try:
-            loop = sampled_loop(damped(arm, C * (1 + nudge)), gains, chain, count=count)
+            loop = sampled_loop(damped(arm, C * (1 + nudge)), gains, chain, count=count, branches=branches)
         except ConvergenceError:
             if nudge < 0:
                 raise
@@ -162,7 +169,9 @@ def alive(arm: Arm, chain: Chain) -> int:
     return modes_below(arm, math.sqrt(2 * FORGOTTEN / (arm.link.damping * remaining)))
 
 
-def whole_loop(arm: Arm, gains: HubFeedback, chain: Chain) -> SampledLoop:
+def whole_loop(
+    arm: Arm, gains: HubFeedback, chain: Chain, branches: Branching = all_damped_modes
+) -> SampledLoop:
     """The loop of a damped arm with every mode that outlives a sample and a few, or with the first 128.
 
     With somewhat fewer where two damped modes cannot be told apart.
@@ -170,7 +179,7 @@ def whole_loop(arm: Arm, gains: HubFeedback, chain: Chain) -> SampledLoop:
     most = min(MOST, BEYOND + alive(arm, chain))
     for number in (most, *(int(share * most) for share in FEWER)):
         try:
-            return sampled_loop(arm, gains, chain, count=max(1, number))
+            return sampled_loop(arm, gains, chain, count=max(1, number), branches=branches)
         except ConvergenceError as error:
             lost = error
     raise lost

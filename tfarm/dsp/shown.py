@@ -30,6 +30,7 @@ from tfarm.dsp.margins import (
 )
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
+from tfarm.spectrum.damped import LITTLE, Branches
 
 MANY = 64  # modes: edges are not looked for with more
 GAIN_DIGITS, OTHER_DIGITS = 6, 4  # that are printed where all are settled
@@ -90,14 +91,24 @@ class Edge:
 
     def figure(self, digits: int, modes: int, proven: Test | None, other: Test) -> Figure:
         """With the most digits that are `proven` (two at least), or else that hold in the `other` loop too."""
-        for number in range(digits, 1, -1) if proven else ():
-            assert proven is not None
-            if band := self._turns(proven, number):
-                return Figure(self.value, number, band, None)
-        for number in range(digits, 0, -1):
-            if self._turns(other, number):
-                return Figure(self.value, number, None, modes)
-        return Figure(self.value, 0, None, modes)
+        number, band = self._most(proven, digits, 2) if proven else (0, 0.0)
+        if number:
+            return Figure(self.value, number, band, None)
+        return Figure(self.value, self._most(other, digits, 1)[0], None, modes)
+
+    def _most(self, test: Test, digits: int, least: int) -> tuple[int, float]:
+        """So many digits that hold where one more (or `digits`) does not, and their band; 0 where not the `least` do.
+
+        By bisection: an interval of fewer digits holds that of more, but for its rounding.
+        """
+        if band := self._turns(test, digits):
+            return digits, band
+        low, found, high = least - 1, 0.0, digits
+        while high - low > 1:
+            middle = (low + high + 1) // 2
+            band = self._turns(test, middle)
+            low, found, high = (middle, band, high) if band else (low, found, middle)
+        return (low, found) if found else (0, 0.0)
 
     def _turns(self, test: Test, digits: int) -> float:
         """The band in which the loop is stable at one end of these digits' interval, not at the other; 0: none."""
@@ -209,14 +220,14 @@ def _delay(loop: SampledLoop, band: Band | None) -> tuple[DelayMargin, Figure]:
 
 def shown_damping(arm: Arm, gains: HubFeedback, chain: Chain, *, count: int) -> Figure:
     """The damping from which on the gains are stable, as a figure [s]."""
-    count = min(count, MANY)
-    C = required_damping(arm, gains, chain, count=count)
+    count, branches = min(count, MANY), Branches(LITTLE)
+    C = required_damping(arm, gains, chain, count=count, branches=branches)
 
     def proof(value: float) -> Proof:
-        return proof_of(whole_loop(damped(arm, value), gains, chain))
+        return proof_of(whole_loop(damped(arm, value), gains, chain, branches))
 
     def holds(value: float) -> Proof:
-        return log_radius_with(arm, gains, chain, value, another(count)) < 0, math.inf
+        return log_radius_with(arm, gains, chain, value, another(count), branches) < 0, math.inf
 
     if C == 0.0:
         return Figure(C, OTHER_DIGITS, None, count)

@@ -29,6 +29,7 @@ Real = NDArray[np.float64]
 
 COMPANY = (6, 11, 17, 29)  # modes followed beyond those wanted, lest the last be led astray: the next if that fails
 FEWER = (300, 150, 60, 20, 5, 1)  # modes that are tried where more are asked for, or not all can be followed
+LITTLE = (2, *COMPANY)  # where many C are met and more modes than matter are followed anyway
 MANY = 30  # modes: of more one number in company is tried, as each step takes long
 BESIDE = 1e-12  # how far a listed eigenvalue may be from its disc, of its size (more beside its own partner)
 CLEAR = 0.8  # how far towards -1/C a box may reach
@@ -158,34 +159,36 @@ def all_damped_modes(undamped: Modes, companies: tuple[int, ...] = COMPANY) -> D
 
     Raises ConvergenceError if a branch is lost, or two arrive at one eigenvalue.
     """
-    return Branches()(undamped, companies)
+    return Branches(companies)(undamped)
 
 
 class Branches:
     """`all_damped_modes` of one arm with this C and that: each is followed on from the nearest smaller C that was met.
 
-    A branch that was lost at one C is not sought again beyond it.
+    A branch that was lost at one C is not sought again beyond it.  `companies`: how many modes are followed beside
+    those wanted, the next number where one fails.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, companies: tuple[int, ...] = COMPANY) -> None:
+        self.companies = companies
         self._met: dict[tuple[int, int], list[Node]] = {}
         self._lost: dict[tuple[int, int], tuple[float, ConvergenceError]] = {}
 
-    def __call__(self, undamped: Modes, companies: tuple[int, ...] = COMPANY) -> DampedModes:
+    def __call__(self, undamped: Modes) -> DampedModes:
         """The modes with the C of this table's arm.  Raises ConvergenceError as `all_damped_modes` does."""
         k, C = undamped.coefficients, undamped.arm.link.damping
         flexible = int((undamped.index > 0).sum())
-        zeros = self._followed(undamped, flexible, companies)
+        zeros = self._followed(undamped, flexible)
         listed, company = zeros[:flexible], zeros[flexible:]
         box, count = complete_box(member(k).function, listed, company, C)
         rigid = np.zeros((undamped.index.size - flexible, 2), complex)
         return DampedModes(undamped, np.concatenate([rigid, listed]), box, count + zeros_at_origin(k))
 
-    def _followed(self, undamped: Modes, wanted: int, companies: tuple[int, ...]) -> Complex:
+    def _followed(self, undamped: Modes, wanted: int) -> Complex:
         """The zeros that the first modes, and those in their company, arrive at."""
         k, C = undamped.coefficients, undamped.arm.link.damping
         lost: ConvergenceError | None = None
-        for company in companies:
+        for company in self.companies:
             key = wanted, company
             if key in self._lost and self._lost[key][0] <= C:
                 lost = self._lost[key][1]
