@@ -29,7 +29,9 @@ def record(cls: _Class) -> _Class:
         if after is not None:
             after(self)
         for each in fields(self):
-            object.__setattr__(self, each.name, read_only(getattr(self, each.name)))
+            held = read_only(value := getattr(self, each.name))
+            if held is not value:
+                object.__setattr__(self, each.name, held)
 
     for value in vars(cls).values():
         if isinstance(value, cached_property):

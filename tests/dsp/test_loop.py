@@ -6,6 +6,7 @@ import pytest
 import tfarm
 from tfarm.arm import Hub, HubFeedback
 from tfarm.dsp import Actuator, Chain, Converters, Sampling, closed_loop, sampled_loop
+from tfarm.dsp import plant
 from tfarm.dsp.law import first_order_law, mode_table, root_locus
 from tfarm.errors import ParameterError
 
@@ -147,3 +148,25 @@ def test_a_locked_hub_has_no_loop_and_a_free_pin_none_by_moment(lab):
     with pytest.raises(ParameterError, match="algebraic loop"):
         sampled_loop(pin, HubFeedback(K1=0.3, K2=0.3))
     assert sampled_loop(pin, HubFeedback(K1=0.1, K2=0.0), count=6).poles.z.size > 10
+
+
+@pytest.mark.parametrize("hub_damping", [0.0, 0.4])
+def test_a_loop_with_fewer_modes_is_cut_from_the_same_model(lab, hub_damping, monkeypatch):
+    """As made anew, poles and static remainder and all; a model is made again only where more modes are asked for."""
+    chain = Chain(
+        sampling=Sampling(delay_samples=0.4, antialias_corner=900.0), actuator=Actuator(hub_damping=hub_damping)
+    )
+    gains = HubFeedback(K1=0.3, K2=0.3)
+    large, small, larger = (sampled_loop(lab, gains, chain, count=count) for count in (20, 7, 24))
+    made = []
+    model = plant.modal_model
+    monkeypatch.setattr(plant, "modal_model", lambda *args, **named: made.append(args[2]) or model(*args, **named))
+    cut = large.with_modes(7)
+    assert cut.plant.count == small.plant.count == 7
+    z = np.exp(1j * np.linspace(0.01, 3.1, 50))
+    np.testing.assert_allclose(cut(z), small(z), rtol=1e-9)
+    assert cut.poles.log_spectral_radius == pytest.approx(small.poles.log_spectral_radius, rel=1e-9)
+    np.testing.assert_array_equal(cut.with_modes(20)(z), large(z))
+    assert made == []
+    np.testing.assert_allclose(cut.with_modes(24)(z), larger(z), rtol=1e-9)
+    assert made == [24]

@@ -8,11 +8,21 @@ import pytest
 from tests.dsp.hold import HoldModel
 from tests.dsp.settled import survey
 from tfarm.arm import Arm, Hub, HubFeedback, Link, Section
-from tfarm.dsp import Chain, Sampling, sampled_loop, sampled_verdict, stable_windows
+from tfarm.dsp import (
+    Chain,
+    Converters,
+    Sampling,
+    analyse,
+    plant,
+    sampled_loop,
+    sampled_verdict,
+    stable_windows,
+)
 from tfarm.dsp.band import band_of
+from tfarm.dsp.circle import Circle
 from tfarm.dsp.margins import whole_loop
-from tfarm.dsp.shown import shown_windows
-from tfarm.spectrum import modes
+from tfarm.dsp.shown import Edge, shown_windows
+from tfarm.spectrum import continuation, modes
 from tfarm.spectrum.damped import damped_modes
 
 
@@ -105,6 +115,55 @@ def test_the_count_does_not_depend_on_the_arcs_to_begin_with(lab, coarser, monke
     for K2 in (0.3, -0.05, 1.3):
         other = loop.with_gains(0.3, K2)
         assert circle.count(other.gains) == (other.poles.log_radius > 0).sum()
+
+
+@pytest.mark.parametrize("Kp", [0.0, 0.5])
+@pytest.mark.parametrize("hub_rate", ["ideal", "difference"])
+def test_discs_hold_the_characteristic_function(lab, Kp, hub_rate):
+    """At the middle of each arc and at its ends, before and after arcs were cut for other gains."""
+    chain = Chain(sampling=Sampling(delay_samples=1.3), converters=Converters(hub_rate=hub_rate, rate_filter=200.0))
+    loop = sampled_loop(lab, HubFeedback(K1=0.3, K2=0.3, Kp=Kp), chain, count=14)
+    circle = Circle(loop, np.ones(loop.plant.poles.size, bool), np.zeros(3))
+    order = 2 if Kp else 1
+    for cut in (False, True):
+        if cut:
+            arcs = circle.low.size
+            assert circle.count(HubFeedback(K1=0.3, K2=1.1)) is not None
+            assert circle.low.size > arcs
+        F = circle.characteristic(loop.gains)
+        for share, most in ((0.5, 1e-9), (0.01, 1.0), (0.99, 1.0)):
+            z = np.exp(1j * (circle.low + share * (circle.high - circle.low)))
+            away = abs((1 - 1 / z) ** order * loop(z) - F.middle)
+            assert (away <= most * F.radius + 1e-9 * abs(F.middle)).all()
+
+
+def test_an_analysis_makes_each_model_once(lab, monkeypatch):
+    """One plant serves every number of modes up to its own; with the damping that is sought modes are followed on.
+
+    Counted in steps of the continuation: 372 where each damping was followed from none, 27 models made anew.
+    """
+    steps, models, corrected, model = [], [], continuation.corrected, plant.modal_model
+    monkeypatch.setattr(continuation, "corrected", lambda *args: steps.append(1) or corrected(*args))
+    monkeypatch.setattr(plant, "modal_model", lambda *args, **named: models.append(1) or model(*args, **named))
+    analyse(lab, HubFeedback(K1=0.3, K2=0.3))
+    assert len(steps) < 250
+    assert len(models) < 24
+
+
+def test_digits_are_found_by_bisection():
+    """As many as a look at each number finds, in at most three looks, each at both ends."""
+    for held in range(7):
+        asked = []
+
+        def below(value, asked=asked, held=held):
+            asked.append(value)
+            return (value < np.pi if abs(value - np.pi) > 0.4 * 10.0**-held else None), 1.0
+
+        figure = Edge(np.pi, True).figure(6, 8, below, lambda value: (None, 1.0))
+        assert len(asked) <= 8
+        ends = {n: (float(f"{np.pi:.{n}g}"), 0.5 * 10.0 ** (1 - n)) for n in range(2, 7)}
+        hold = [n for n, (at, half) in ends.items() if (below(at - half)[0], below(at + half)[0]) == (True, False)]
+        assert figure.digits == max(hold, default=0)
 
 
 def test_without_damping_nothing_is_settled(lossless):

@@ -153,6 +153,15 @@ def test_correction_keeps_conjugates_and_real_zeros_apart() -> None:
     assert not zeros[1].imag.any()
 
 
+def test_a_conjugate_pair_is_asked_for_once() -> None:
+    """The function is real on the real axis: its value at the lower zero of a pair is known."""
+    truth, asked = np.array([[-1 + 2j, -1 - 2j], [-5.0, -9.0], [-3 + 7j, -3 - 7j]]), []
+    function = with_zeros(truth)
+    whole, _ = improved(Member(lambda s: asked.append(s.size) or function(s)), truth * 1.01)
+    assert asked == [4]
+    assert abs(whole - truth).max() < 0.01 * abs(truth * 0.01).max()
+
+
 def test_a_nearly_double_zero_is_corrected_as_a_pair() -> None:
     """Closer to each other than Newton's method would bear."""
     for apart in (1e-3, 1e-5, 1e-6j):

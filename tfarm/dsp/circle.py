@@ -9,7 +9,7 @@ so a pole that has settled before the sample weighs nothing, and x^k F(z) = x^k 
 order of the pole at z = 1, is analytic on the circle and outside.  On an arc it stays in a disc about its value in the
 middle, for 1/(z - b) changes by h/(|z - b| (|z - b| - h)) at most over h.  Where no disc holds 0, the phase between
 neighbouring middles is known without doubt, and half the circle gives the count (the argument principle).  Arcs whose
-disc holds 0 are halved.
+disc holds 0 are cut.
 """
 
 from __future__ import annotations
@@ -28,8 +28,9 @@ Complex = NDArray[np.complex128]
 
 EPS = float(np.finfo(float).eps)
 ARCS = 64  # of half the circle to begin with
-FINEST = 1e-13  # rad: no arc is halved further
-MOST_ARCS = 40_000
+FINEST = 1e-13  # rad: no arc is cut further
+PIECES = 4  # into which one is cut that is too long
+MOST_ARCS = 60_000
 BLOCK = 1 << 19  # terms 1/(z - b) at a time, lest they leave the cache
 
 
@@ -53,6 +54,10 @@ class Discs:
         """Every disc times a number."""
         return Discs(self.middle * factor, self.radius * abs(factor))
 
+    def __getitem__(self, row: int) -> Discs:
+        """The discs of one row."""
+        return Discs(self.middle[row], self.radius[row])
+
     def inverse(self) -> Discs:
         """1/z for discs that do not hold 0; of infinite radius for those that do."""
         size = abs(self.middle)
@@ -61,12 +66,32 @@ class Discs:
             return Discs(1 / self.middle, np.where(room > 0, self.radius / (size * room), np.inf))
 
 
+@dataclass(frozen=True)
+class _Arcs:
+    """Arcs of the circle between the angles `low` and `high` [rad]."""
+
+    low: Real
+    high: Real
+
+    @property
+    def x(self) -> Discs:
+        """1 - 1/z."""
+        middle, half = (self.low + self.high) / 2, (self.high - self.low) / 2
+        return Discs(-np.expm1(-1j * middle), half + EPS)
+
+    def turned(self, n: int) -> Discs:
+        """z^-n."""
+        middle, half = (self.low + self.high) / 2, (self.high - self.low) / 2
+        return Discs(np.exp(-1j * n * middle), n * (half + 4 * EPS))
+
+
 @dataclass
 class Circle:
-    """The upper half of the unit circle in arcs, and on each the sums of a loop's plant; its gains do not matter.
+    """The upper half of the unit circle in arcs, and on each what a loop's plant is there; its gains do not matter.
 
-    `missing` (outputs,) bounds |x sum over poles left out|.  `low` and `high` [rad] are the ends of the arcs, `sums`
-    the discs (outputs, arcs) of the sum over poles; arcs are halved as counts need it.
+    `missing` (outputs,) bounds |x sum over poles left out|.  `low` and `high` [rad] are the ends of the arcs, `parts`
+    the discs (1 + gains, arcs) of x and of what Kp, K1 and K2 multiply in F times x^n, n = `orders` (gains,) at z = 1;
+    arcs are cut as counts need it.
     """
 
     loop: SampledLoop
@@ -74,12 +99,12 @@ class Circle:
     missing: Real
     low: Real = field(init=False)
     high: Real = field(init=False)
-    sums: Discs = field(init=False)
+    parts: Discs = field(init=False)
 
     def __post_init__(self) -> None:
         ends = np.linspace(0.0, np.pi, ARCS + 1)
         self.low, self.high = ends[:-1], ends[1:]
-        self.sums = self._sums(self.low, self.high)
+        self.parts = self._parts(self.low, self.high)
 
     def count(self, gains: HubFeedback) -> int | None:
         """Poles of the loop with these gains outside the circle, z = 1 of a free angle apart; None if not shown."""
@@ -91,75 +116,72 @@ class Circle:
                 start, end = np.angle(F.middle[0]), np.angle(F.middle[-1])
                 return -round(float(steps.sum() + _to_the_axis(start) - _to_the_axis(end)) / np.pi)
             width = self.high[rough] - self.low[rough]
-            if width.min() < FINEST or rough.sum() + rough.size > MOST_ARCS:
+            if width.min() < FINEST or (PIECES - 1) * rough.sum() + rough.size > MOST_ARCS:
                 return None
-            self._halve(rough)
+            self._cut(rough)
 
     # ------------------------------------------------------------ the characteristic function
 
     def characteristic(self, gains: HubFeedback) -> Discs:
         """x^k F on every arc, k the order of its pole at z = 1."""
-        terms = [(K, *part) for K, part in self._terms(gains) if K != 0.0]
-        k = max((order for _, order, _ in terms), default=0)
-        x = self._x
+        used = [(K, order, row) for row, (K, order) in enumerate(zip(_three(gains), self.orders, strict=True)) if K]
+        k = max((order for _, order, _ in used), default=0)
+        x = self.parts[0]
         total = _power(x, k)
-        for K, order, values in terms:
-            total = total + (_power(x, k - order) * values).times(K)
+        for K, order, row in used:
+            part = self.parts[1 + row]
+            total = total + (part if order == k else _power(x, k - order) * part).times(K)
         return total
 
-    def _terms(self, gains: HubFeedback) -> list[tuple[float, tuple[int, Discs]]]:
-        """Each gain with what it multiplies in F: the order n of that at z = 1, and its values times x^n."""
-        order, angle = self._output(ANGLE)
-        rate = self._output(RATE)
+    @property
+    def orders(self) -> tuple[int, int, int]:
+        """The order at z = 1 of what each of Kp, K1 and K2 multiplies."""
+        angle, rate, moment = (2 if twice else int(once != 0.0) for twice, once in self.loop.plant.rigid)
+        return angle, max(0, angle - 1) if self.loop.differences else rate, moment
+
+    def _parts(self, low: Real, high: Real) -> Discs:
+        """x, and what each of Kp, K1 and K2 multiplies in F times x^n, on arcs: discs (1 + gains, arcs)."""
+        arcs = _Arcs(low, high)
+        sums = self._sums(low, high)
+        angle, rate, moment = (self._output(row, arcs, sums[row]) for row in (ANGLE, RATE, MOMENT))
         if self.loop.differences:
             a, T = self.loop.smoothing, self.loop.chain.sampling.period
-            lag = (self._turned(0).times(1.0) + self._turned(1).times(-a)).inverse()
-            values = angle * lag.times((1 - a) / T)
-            rate = (order - 1, values) if order else (0, values * self._x)
-        return [(gains.Kp, (order, angle)), (gains.K1, rate), (gains.K2, self._output(MOMENT))]
+            rate = angle * (arcs.turned(0) + arcs.turned(1).times(-a)).inverse().times((1 - a) / T)
+            rate = rate if self.orders[0] else rate * arcs.x
+        found = (arcs.x, angle, rate, moment)
+        return Discs(np.array([each.middle for each in found]), np.array([each.radius for each in found]))
 
-    def _output(self, row: int) -> tuple[int, Discs]:
-        """The order n of an output's pole at z = 1, and x^n times its pulse transfer function."""
+    def _output(self, row: int, arcs: _Arcs, poles: Discs) -> Discs:
+        """x^n times an output's pulse transfer function, n its order at z = 1; `poles`: the sum over its poles."""
         plant, pulse = self.loop.plant, self.loop.pulse
         T, f = pulse.sampling.period, pulse.sampling.fraction
         twice, once = plant.rigid[row]
         order = 2 if twice else int(once != 0.0)
-        x, late = self._x, self._turned(1)
+        x, late = arcs.x, arcs.turned(1)
         at_rest = float(plant.static[row] - (plant.residues[row] / plant.poles).real.sum())
-        sums = Discs(self.sums.middle[row], self.sums.radius[row]) * x
+        sums = poles * x
         held = Discs(sums.middle, sums.radius + self.missing[row]) + late.times(at_rest)
         total = _power(x, order) * held
-        push = self._turned(0).times((1 - f) * T) + late.times(f * T)
+        push = arcs.turned(0).times((1 - f) * T) + late.times(f * T)
         if once:
             total = total + (_power(x, order - 1) * push * late).times(once)
         if twice:
-            ramp = self._turned(0).times(pulse.ramps[0]) + late.times(pulse.ramps[1])
+            ramp = arcs.turned(0).times(pulse.ramps[0]) + late.times(pulse.ramps[1])
             total = total + ((push * late).times(T) + x * ramp).times(twice) * late
-        return order, total * self._turned(pulse.sampling.whole_delay)
-
-    @property
-    def _x(self) -> Discs:
-        middle, half = (self.low + self.high) / 2, (self.high - self.low) / 2
-        return Discs(-np.expm1(-1j * middle), half + EPS)
-
-    def _turned(self, n: int) -> Discs:
-        """z^-n."""
-        middle, half = (self.low + self.high) / 2, (self.high - self.low) / 2
-        return Discs(np.exp(-1j * n * middle), n * (half + 4 * EPS))
+        return total * arcs.turned(pulse.sampling.whole_delay)
 
     # ------------------------------------------------------------ arcs
 
-    def _halve(self, rough: NDArray[np.bool_]) -> None:
-        """Halve some arcs."""
-        low, high = self.low[rough], self.high[rough]
-        middle = (low + high) / 2
-        new_low, new_high = np.r_[low, middle], np.r_[middle, high]
-        new = self._sums(new_low, new_high)
+    def _cut(self, rough: NDArray[np.bool_]) -> None:
+        """Cut some arcs into shorter ones."""
+        ends = np.linspace(self.low[rough], self.high[rough], PIECES + 1)
+        new_low, new_high = ends[:-1].ravel(), ends[1:].ravel()
+        new = self._parts(new_low, new_high)
         all_low = np.r_[self.low[~rough], new_low]
         order = np.argsort(all_low)
         self.low, self.high = all_low[order], np.r_[self.high[~rough], new_high][order]
-        old = self.sums
-        self.sums = Discs(
+        old = self.parts
+        self.parts = Discs(
             np.c_[old.middle[:, ~rough], new.middle][:, order], np.c_[old.radius[:, ~rough], new.radius][:, order]
         )
 
@@ -180,6 +202,10 @@ class Circle:
             middles.append(weights @ (1 / away).T)
             radii.append(abs(weights) @ change.T)
         return Discs(np.concatenate(middles, axis=1), np.concatenate(radii, axis=1))
+
+
+def _three(gains: HubFeedback) -> tuple[float, float, float]:
+    return gains.Kp, gains.K1, gains.K2
 
 
 def _power(x: Discs, n: int) -> Discs:

@@ -11,6 +11,7 @@ destabilises.  At finite gains the closed-loop pole itself says it: it is follow
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -111,6 +112,7 @@ def root_locus(loop: SampledLoop, gain: GainName, values: Real) -> Complex:
     return np.array(rows)
 
 
+@lru_cache(maxsize=4)
 def origins(loop: SampledLoop) -> NDArray[np.int64]:
     """For each closed-loop pole the open-loop pole (its number in `PulseTransfer.poles`) that it comes from, or -1.
 
@@ -119,12 +121,13 @@ def origins(loop: SampledLoop) -> NDArray[np.int64]:
     labels = np.nonzero(loop.pulse.poles != 0)[0]
     ahead, rows = loop.pulse.multipliers[labels], []
     for scale in np.r_[1e-6, np.arange(1, STEPS + 1) / STEPS]:
-        poles = _scaled(loop, float(scale)).poles
-        order = _matched(ahead, poles.z)
-        rows.append(poles.z[order])
+        z = _scaled(loop, float(scale)).eigenvalues
+        order = _matched(ahead, z)
+        rows.append(z[order])
         ahead = _ahead(rows)
-    origin = np.full(poles.z.size, -1)
+    origin = np.full(z.size, -1)
     origin[order] = labels
+    origin.flags.writeable = False
     return origin
 
 

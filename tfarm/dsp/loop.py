@@ -164,9 +164,14 @@ class SampledLoop:
         return quotient
 
     @cached_property
+    def eigenvalues(self) -> Complex:
+        """The closed-loop poles, not polished, in the order of `poles`."""
+        return np.linalg.eigvals(self.reduced_matrix()).astype(complex)
+
+    @cached_property
     def poles(self) -> Poles:
         """The closed-loop poles, polished."""
-        z = np.linalg.eigvals(self.reduced_matrix()).astype(complex)
+        z = self.eigenvalues.copy()
         open_loop = self.pulse.multipliers
         base = abs(z[:, None] - open_loop).argmin(axis=1)
         with np.errstate(divide="ignore"):

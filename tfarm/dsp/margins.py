@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,7 @@ Window = tuple[float, float]
 
 LONGEST_DELAY = 20.0  # samples: the delay margin is looked for up to here
 MOST_STEPS = 2000
+CLEARLY = 1e-6  # within the circle: an eigenvalue there is not polished, as even a double one is right to 1e-7
 FEW = 2  # modes kept beyond the last one that outlives a sample
 BEYOND, MOST = 4, 128  # those of a whole loop, and the most that it has: half a second of work
 FEWER = (0.85, 0.72, 0.61, 0.54)
@@ -96,13 +98,17 @@ def delay_margin(loop: SampledLoop) -> DelayMargin:
     def log_radius(more: float) -> float:
         return loop.with_delay(now + more).poles.log_spectral_radius
 
+    def grows(more: float) -> bool:
+        later = loop.with_delay(now + more)
+        return bool(abs(later.eigenvalues).max() > 1 - CLEARLY) and later.poles.log_spectral_radius >= 0
+
     if log_radius(0.0) >= 0:
         return DelayMargin(0.0, False)
     step = _delay_step(loop)
     for i in range(1, MOST_STEPS + 1):
         if i * step > LONGEST_DELAY:
             break
-        if log_radius(i * step) >= 0:
+        if grows(i * step):
             return DelayMargin(float(brentq(log_radius, (i - 1) * step, i * step, xtol=1e-10)), False)
     return DelayMargin(min(MOST_STEPS * step, LONGEST_DELAY), True)
 
@@ -127,21 +133,22 @@ def required_damping(
     """
     branches = Branches(LITTLE) if branches is None else branches
 
-    def log_radius(log_C: float) -> float:
-        return log_radius_with(arm, gains, chain, math.exp(log_C), count, branches)
+    @cache
+    def log_radius(C: float) -> float:
+        return log_radius_with(arm, gains, chain, C, count, branches)
 
     if sampled_loop(damped(arm, 0.0), gains, chain, count=count).poles.is_stable:
         return 0.0
     first = float(modes(arm, 1).natural_frequency[-1])
-    high = math.log(2 * STRONGEST / first)
+    high = 2 * STRONGEST / first
     if log_radius(high) >= 0:
         return math.inf
     for _ in range(DECADES):
-        low = high - math.log(10)
-        if log_radius(low) >= 0:
-            return math.exp(brentq(log_radius, low, high, xtol=5e-7)) * (1 + 1e-6)
+        low = high / 10
+        if log_radius(low) >= 0:  # a radius is nearly linear in C where C is small
+            return float(brentq(log_radius, low, high, xtol=1e-7 * low, rtol=4e-7)) * (1 + 1e-6)
         high = low
-    return math.exp(high)
+    return high
 
 
 def log_radius_with(

@@ -7,6 +7,7 @@ with a relative gap of 1e-9 right to 1e-11 only.  Such pairs are bisected again 
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,7 @@ REACH = 4e-6  # relative width in which float64 surely has each of a close pair
 PAIR_BITS = 256  # of working precision, for a double frequency to its last float64 digit
 
 
+@lru_cache(maxsize=32)  # a table of sampled verdicts asks for the same undamped arm some twenty times
 def natural_frequencies(k: Coefficients, first: int, last: int) -> NDArray[np.float64]:
     """The natural frequencies [rad/s] number first..last of the undamped arm, counted from 1, double ones twice.
 
@@ -36,7 +38,9 @@ def natural_frequencies(k: Coefficients, first: int, last: int) -> NDArray[np.fl
     close = np.diff(omega) * number[1:] < CLOSE * omega[1:]
     for i in np.nonzero(np.r_[close, False] | np.r_[False, close])[0]:
         omega[i] = _settle(k, int(number[i]), float(omega[i]))
-    return omega[(first <= number) & (number <= last)]
+    found = omega[(first <= number) & (number <= last)]
+    found.flags.writeable = False
+    return found
 
 
 def _bisect(k: Coefficients, number: NDArray[np.int64]) -> NDArray[np.float64]:
