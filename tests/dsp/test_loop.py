@@ -5,8 +5,7 @@ import pytest
 
 import tfarm
 from tfarm.arm import Hub, HubFeedback
-from tfarm.dsp import Actuator, Chain, Converters, Sampling, closed_loop, sampled_loop
-from tfarm.dsp import plant
+from tfarm.dsp import Actuator, Chain, Converters, Sampling, closed_loop, plant, sampled_loop
 from tfarm.dsp.law import first_order_law, mode_table, root_locus
 from tfarm.errors import ParameterError
 

@@ -176,9 +176,7 @@ def alive(arm: Arm, chain: Chain) -> int:
     return modes_below(arm, math.sqrt(2 * FORGOTTEN / (arm.link.damping * remaining)))
 
 
-def whole_loop(
-    arm: Arm, gains: HubFeedback, chain: Chain, branches: Branching = all_damped_modes
-) -> SampledLoop:
+def whole_loop(arm: Arm, gains: HubFeedback, chain: Chain, branches: Branching = all_damped_modes) -> SampledLoop:
     """The loop of a damped arm with every mode that outlives a sample and a few, or with the first 128.
 
     With somewhat fewer where two damped modes cannot be told apart.
