@@ -17,8 +17,9 @@ from tfarm.dsp.loop import MOMENT, RATE, SampledLoop, sampled_loop
 from tfarm.dsp.plant import Branching
 from tfarm.dsp.sampling import FORGOTTEN, held
 from tfarm.errors import ConvergenceError
-from tfarm.spectrum import modes, modes_below
-from tfarm.spectrum.damped import LITTLE, Branches, all_damped_modes
+from tfarm.spectrum import modes_below
+from tfarm.spectrum.damped import COMPANY, LITTLE, Branches, all_damped_modes
+from tfarm.spectrum.scales import first_frequency
 
 Window = tuple[float, float]
 
@@ -29,6 +30,7 @@ FEW = 2  # modes kept beyond the last one that outlives a sample
 BEYOND, MOST = 4, 128  # those of a whole loop, and the most that it has: half a second of work
 FEWER = (0.85, 0.72, 0.61, 0.54)
 OVERDAMPED = 2.5  # C w from which on a bending mode surely is: following it further costs a hundred times as much
+FAR_BEYOND = 5.0  # of critical in the first mode: all poles of bending lie left of any line, one mode shows it as well
 STRONGEST = 0.15  # of critical in the first mode: no stronger damping is looked at
 DECADES = 16  # down from there
 SAME = 1e-9  # relative: next to z = 1 one static crossing is read several times, each with an error near 1e-12
@@ -139,8 +141,7 @@ def required_damping(
 
     if sampled_loop(damped(arm, 0.0), gains, chain, count=count).poles.is_stable:
         return 0.0
-    first = float(modes(arm, 1).natural_frequency[-1])
-    high = 2 * STRONGEST / first
+    high = 2 * STRONGEST / first_frequency(arm)
     if log_radius(high) >= 0:
         return math.inf
     for _ in range(DECADES):
@@ -179,15 +180,21 @@ def alive(arm: Arm, chain: Chain) -> int:
 def whole_loop(arm: Arm, gains: HubFeedback, chain: Chain, branches: Branching = all_damped_modes) -> SampledLoop:
     """The loop of a damped arm with every mode that outlives a sample and a few, or with the first 128.
 
-    With somewhat fewer where two damped modes cannot be told apart.
+    With somewhat fewer where two damped modes cannot be told apart; with one where the first is far overdamped.
+    Raises ConvergenceError where not even that one can be followed.
     """
+    criticals = arm.link.damping * first_frequency(arm) / 2
     most = min(MOST, BEYOND + alive(arm, chain))
-    for number in (most, *(int(share * most) for share in FEWER)):
+    numbers = [most, *(int(share * most) for share in FEWER)]
+    if criticals > FAR_BEYOND:
+        numbers, branches = [1], Branches(COMPANY[:1])
+    for number in numbers:
         try:
             return sampled_loop(arm, gains, chain, count=max(1, number), branches=branches)
         except ConvergenceError as error:
             lost = error
-    raise lost
+    text = f"modes cannot be followed to C = {arm.link.damping:g} s, {criticals:.3g} times critical in the first: {lost}"
+    raise ConvergenceError(text, lost.best, lost.residual)
 
 
 def damped(arm: Arm, C: float) -> Arm:
