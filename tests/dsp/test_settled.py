@@ -22,7 +22,8 @@ from tfarm.dsp.band import band_of
 from tfarm.dsp.circle import Circle
 from tfarm.dsp.margins import whole_loop
 from tfarm.dsp.shown import Edge, shown_windows
-from tfarm.spectrum import continuation, modes
+from tfarm.errors import ConvergenceError
+from tfarm.spectrum import continuation, damped, modes
 from tfarm.spectrum.damped import damped_modes
 
 
@@ -135,6 +136,25 @@ def test_discs_hold_the_characteristic_function(lab, Kp, hub_rate):
             z = np.exp(1j * (circle.low + share * (circle.high - circle.low)))
             away = abs((1 - 1 / z) ** order * loop(z) - F.middle)
             assert (away <= most * F.radius + 1e-9 * abs(F.middle)).all()
+
+
+@pytest.mark.parametrize("K2", [0.3, 1.5])
+def test_far_beyond_critical_one_mode_shows_what_a_hold_model_does(lab, K2):
+    """Eleven times critical in the first mode: its slow pole, and those left out near -1/C."""
+    arm, gains = replace(lab, link=replace(lab.link, damping=0.3)), HubFeedback(K1=0.3, K2=K2)
+    verdict = sampled_verdict(arm, gains)
+    assert verdict.modes_used == 1
+    assert verdict.is_stable == (K2 < 1)
+    assert verdict.loop.poles.log_spectral_radius == pytest.approx(HoldModel(arm, 30).log_radius(gains, Chain()), 1e-5)
+
+
+def test_a_damping_that_no_mode_can_be_followed_to_is_said_at_once(lab):
+    arm, begun, follow = replace(lab, link=replace(lab.link, damping=12.0)), [], damped.follow
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(damped, "follow", lambda *args: begun.append(1) or follow(*args))
+        with pytest.raises(ConvergenceError, match="C = 12 s, 429 times critical in the first mode: branches cannot"):
+            analyse(arm, HubFeedback(K1=0.3, K2=0.3))
+    assert len(begun) == 1
 
 
 def test_an_analysis_makes_each_model_once(lab, monkeypatch):

@@ -193,8 +193,8 @@ def whole_loop(arm: Arm, gains: HubFeedback, chain: Chain, branches: Branching =
             return sampled_loop(arm, gains, chain, count=max(1, number), branches=branches)
         except ConvergenceError as error:
             lost = error
-    text = f"modes cannot be followed to C = {arm.link.damping:g} s, {criticals:.3g} times critical in the first: {lost}"
-    raise ConvergenceError(text, lost.best, lost.residual)
+    where = f"C = {arm.link.damping:g} s, {criticals:.3g} times critical in the first mode"
+    raise ConvergenceError(f"modes cannot be followed to {where}: {lost}", lost.best, lost.residual)
 
 
 def damped(arm: Arm, C: float) -> Arm:
