@@ -15,6 +15,7 @@ from tfarm.dsp.law import growing_mode, mode_table
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import gain_windows
 from tfarm.report.overlay import Overlay
+from tfarm.report.sampled_section import grown_words
 from tfarm.report.sampled_words import Row, Sampled, chain_words, compared, cure, short_answer, spans
 from tfarm.spectrum.scales import default_gains
 
@@ -38,6 +39,7 @@ def data_of(name, period=0.01):
         verdict=verdict, K1_windows=stable_windows(loop, "K1"), K2_windows=stable_windows(loop, "K2"),
         K2=SimpleNamespace(is_settled=False),
         delay_margin=SimpleNamespace(samples=1.25, is_bound=False), required_damping=0.0,
+        damping=SimpleNamespace(is_settled=False, modes=MODES),
         modes=SimpleNamespace(natural_frequency=tfarm.modes(arm, 1).natural_frequency[-1:]),
     )  # fmt: skip
     windows = gain_windows(stability(arm, gains), "K2")
@@ -87,10 +89,21 @@ def test_damping_that_is_not_enough_is_not_said_to_be():
     for needed, said in ((own / 2, "and this arm has"), (2 * own, "but this arm has only")):
         analysis = SimpleNamespace(**{**vars(data.analysis), "required_damping": needed})
         assert said in cure(replace(data, analysis=analysis))
+        assert "is enough for the first 4 modes, " in cure(replace(data, analysis=analysis))
+        analysis.damping = SimpleNamespace(is_settled=True, modes=None)
+        assert "is enough, " in cure(replace(data, analysis=analysis))
     bare = replace(data.arm, link=replace(data.arm.link, damping=0.0))
     for needed, is_little in ((1e-9, True), (1e-3, False)):
         analysis = SimpleNamespace(**{**vars(data.analysis), "required_damping": needed})
         assert ("Every real arm has more" in cure(replace(data, arm=bare, analysis=analysis))) == is_little
+
+
+def test_how_many_modes_grow_is_not_taken_for_which():
+    assert [grown_words(each) for each in ([], [20], [3, 20])] == [
+        "none grows",
+        "one grows: mode 20",
+        "2 grow: modes 3, 20",
+    ]
 
 
 def test_the_words_are_about_the_chain_of_the_file():

@@ -150,7 +150,7 @@ def _mode_blocks(data: Sampled) -> list[Picture | Table]:
     )
     grown = table.index[table.log_radius > 0]
     rows = mode_rows(loop, table, "sampled-modes", SHORT_SIGN)
-    said = f"growing: {', '.join(map(str, grown))}" if grown.size else "none grows"
+    said = grown_words(grown.tolist())
     chart = Picture(
         stem="sampled-growth",
         title="What each mode gains or loses a sample",
@@ -166,6 +166,14 @@ def _mode_blocks(data: Sampled) -> list[Picture | Table]:
         data=replace(rows, stem="sampled-growth-data", is_data=True),
     )
     return [picture, chart, rows]
+
+
+def grown_words(grown: list[int]) -> str:
+    """Which modes grow, as the end of "Of 20 modes ..."."""
+    if not grown:
+        return "none grows"
+    number, named = ("one grows", "mode") if len(grown) == 1 else (f"{len(grown)} grow", "modes")
+    return f"{number}: {named} {', '.join(map(str, grown))}"
 
 
 def _time_blocks(data: Sampled) -> list[Picture | Table]:

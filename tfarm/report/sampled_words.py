@@ -251,14 +251,20 @@ def cure(data: Sampled) -> str:
         enough = "and this arm has" if own >= needed else "but this arm has only"
         return (
             f"Without damping the sampled loop would not hold. What cures it: C = {scientific(needed, 2)} s is "
-            f"enough, {enough} {scientific(own, 2)} s."
+            f"enough{_for_modes(data)}, {enough} {scientific(own, 2)} s."
         )
     percent = 50 * needed * float(data.analysis.modes.natural_frequency[0])
     more = " Every real arm has more." if percent < ANYONE_HAS else ""
     return (
         f"What cures it: Kelvin-Voigt damping of C = {scientific(needed, 2)} s, {scientific(percent, 2)} % of critical "
-        f"in the first mode, and these gains are stable.{more}"
+        f"in the first mode, and these gains are stable{_for_modes(data)}.{more}"
     )
+
+
+def _for_modes(data: Sampled) -> str:
+    """For which modes a damping is enough, where more was not proven."""
+    found = data.analysis.damping
+    return "" if found.is_settled else f" for the first {found.modes} modes"
 
 
 def headline_facts(data: Sampled) -> tuple[Fact, ...]:
@@ -278,7 +284,12 @@ def headline_facts(data: Sampled) -> tuple[Fact, ...]:
             label="stable K1", value=K1, unit="N m s/rad" if K1 != "none" else "", beside=f"at K2 = {plain(gains.K2)}"
         ),
         Fact(label="further delay it bears", value=_delay(data).removesuffix(" ms"), unit="ms", beside=_samples(data)),
-        Fact(label="damping C that it needs", value=scientific(analysis.required_damping, 2), unit="s"),
+        Fact(
+            label="damping C that it needs",
+            value=scientific(analysis.required_damping, 2),
+            unit="s",
+            beside=_for_modes(data).strip(),
+        ),
     )
 
 
