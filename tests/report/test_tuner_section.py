@@ -79,6 +79,7 @@ def test_the_table_of_comparison_is_the_rows(small):
     shown = values_of(blocks_of(section)["tune-comparison"]) | values_of(blocks_of(section)["tune-residual"])
     assert shown["condition"] == [row.condition for row in data.rows]
     assert shown["condition"][0] == NOMINAL
+    assert f"seed {data.tuning.plan.seed}." in blocks_of(section)["tune-comparison"].caption
     for key in ("without", "best_constant", "own_constant", "tuner", "bound", "ZV", "EI"):
         assert shown[f"{key}_cost"] == [getattr(row, key).cost for row in data.rows]
         assert shown[f"{key}_residual"] == [getattr(row, key).residual for row in data.rows]

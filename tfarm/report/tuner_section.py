@@ -246,8 +246,9 @@ def comparison_table(data: TunerStudy) -> Table:
             "Every controller knows the arm by its name plate only: what was trained or chosen as trained is used on "
             f"all others. None: no moment feedback. Constant: the best constant gain as trained, {_gain(data)}; own "
             "constant: the best one for that row, of those that leave its loop stable, steps apart. "
-            "Bound: the linear-quadratic optimum. ZV and EI: input shaping with "
-            "no moment feedback, judged by their own, later slew, so that the bound is not theirs. Guard proven: "
+            f"Tuner: that of seed {data.tuning.plan.seed}. Bound: the linear-quadratic optimum. ZV and EI: "
+            "input shaping with no moment feedback, judged by their own, later slew, so that the bound is not theirs. "
+            "Guard proven: "
             f"whether the same range of gains is proven for that arm and chain too, with the trial's "
             f"{data.tuning.trial.loop.plant.count} modes{away_from_it}.{_unit_words(data)} {SHORT_SIGN}"
         ),
