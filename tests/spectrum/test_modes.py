@@ -144,7 +144,7 @@ def test_the_modal_moment_drives_the_hub(modes):
 
 def test_modal_sums_give_the_response():
     """theta/u = sum of b^2/(s^2 + w^2), in the limit: b^2 falls as w^-3 once the hub outweighs the arm in inertia."""
-    arm = tfarm.tfarm.load("sasaki2012")
+    arm = tfarm.load("sasaki2012")
     modes, s = tfarm.modes(arm, 60), 3.0 + 100.0j
     terms = modes.hub_participation**2 / (s**2 + modes.natural_frequency**2)
     exact = tfarm.transfer(arm, "hub_angle")(s)
@@ -238,13 +238,13 @@ def test_the_root_of_the_paper_s_determinant_is_the_frequency():
 
 
 def test_no_points_have_no_values():
-    assert tfarm.modes(tfarm.tfarm.load("sasaki2012"), 3).shape(np.empty(0)).shape == (4, 0)
+    assert tfarm.modes(tfarm.load("sasaki2012"), 3).shape(np.empty(0)).shape == (4, 0)
 
 
 @pytest.mark.parametrize("x", [-0.1, 1.1, math.nan])
 def test_a_point_outside_the_arm_has_no_shape(x):
     with pytest.raises(ParameterError, match="a point of the arm lies between 0 and"):
-        tfarm.modes(tfarm.tfarm.load("sasaki2012"), 1).shape(x)
+        tfarm.modes(tfarm.load("sasaki2012"), 1).shape(x)
 
 
 def test_euler_bernoulli_has_no_shear_energy():
@@ -256,7 +256,7 @@ def test_euler_bernoulli_has_no_shear_energy():
 
 def test_the_root_moment_of_a_light_hub_is_not_rounding():
     """It tends to -I_h w^2 b of the free pin, in proportion to I_h; at the free pin it is 0."""
-    free = replace(tfarm.tfarm.load("sasaki2012"), hub=Hub(inertia=0.0))
+    free = replace(tfarm.load("sasaki2012"), hub=Hub(inertia=0.0))
     light = replace(free, hub=Hub(inertia=1e-12))
     modes = tfarm.modes(free, COUNT)
     assert not modes.modal_moment.any()
