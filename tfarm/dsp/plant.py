@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -101,16 +100,8 @@ def undelayed_plant(
             "a hub without inertia has no model of finite order under hub damping; give hub.inertia, or leave it out"
         )
         raise ParameterError(key="actuator.hub_damping", value=damping, remedy=remedy)
-    names = (*outputs, "hub_rate") if damping > 0 else tuple(outputs)
-    is_plain = branches is all_damped_modes
-    model = _model(arm, names, count) if is_plain else modal_model(arm, names, count, branches=branches)
-    return _with_modes(model, chain, outputs, count)
-
-
-@lru_cache(maxsize=64)
-def _model(arm: Arm, names: tuple[str, ...], count: int) -> ModalModel:
-    """The modal model of an arm, made once: it serves every gain, delay, period and simulation of that arm."""
-    return modal_model(arm, names, count)
+    names = [*outputs, "hub_rate"] if damping > 0 else list(outputs)
+    return _with_modes(modal_model(arm, names, count, branches=branches), chain, outputs, count)
 
 
 def _with_modes(model: ModalModel, chain: Chain, outputs: Sequence[str], count: int) -> Plant:
