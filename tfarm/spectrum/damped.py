@@ -9,14 +9,15 @@ can be complete but in a box, and no box can hold -1/C.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tfarm.arm import Arm
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
 from tfarm.exact.characteristic import OPEN, Gains, quick_characteristic, zeros_at_origin
-from tfarm.exact.coefficients import Coefficients
+from tfarm.exact.coefficients import Coefficients, Theory
 from tfarm.records import record
 
 from .box import Box, Complex, Function, winding_number
@@ -159,7 +160,15 @@ def all_damped_modes(undamped: Modes, companies: tuple[int, ...] = COMPANY) -> D
 
     Raises ConvergenceError if a branch is lost, or two arrive at one eigenvalue.
     """
-    return Branches(companies)(undamped)
+    count = int(undamped.index.max(initial=0))
+    found = _followed_once(undamped.arm, undamped.theory, count, companies) if count else None
+    return found if found is not None and found.undamped == undamped else Branches(companies)(undamped)
+
+
+@lru_cache(maxsize=32)  # loops, plants and simulations of one page ask for the same modes some ninety times
+def _followed_once(arm: Arm, theory: Theory, count: int, companies: tuple[int, ...]) -> DampedModes:
+    """All damped modes of an arm's own table of `count`."""
+    return Branches(companies)(modes(arm, count, theory=theory))
 
 
 class Branches:
