@@ -1,5 +1,10 @@
 """What holds for every test."""
 
+import os
+
+# One thread of BLAS for each worker, set before NumPy is loaded: on matrices of a hundred rows a second one only spins.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 from collections.abc import Iterator
 
 import flint

@@ -5,6 +5,7 @@ left of |G_64/G - 1| after division by 1 + |s dG/ds / G|, along the arm by 1 + |
 it comes from two ball evaluations, at (s, x) and next to it.
 """
 
+import math
 import sys
 import time
 from dataclasses import dataclass, replace
@@ -41,12 +42,12 @@ def some_share(rng):
     return float(rng.choice([rng.uniform(), 10 ** rng.uniform(-4, 0), 1 - 10 ** rng.uniform(-4, 0), 0.0, 1.0]))
 
 
-def measure(arm, s, x):
-    """All outputs of one arm at one s (and share x of the length): the representable ones as Points."""
+def measure(arm, s, x, outputs=OUTPUTS):
+    """Those outputs of one arm at one s (and share x of the length): the representable ones as Points."""
     k, L = coefficients(arm), arm.link.length
     values, flagged = float_values(k, s, x)
     points = []
-    for name, (value, condition) in exact_values(k, s, x).items():
+    for name, (value, condition) in exact_values(k, s, x, outputs).items():
         error = abs(balls.point(complex(values[name])) / value - 1)
         error = float(error.mid()) if np.isfinite(values[name]) else np.inf
         points.append(Point(name, error / (1 + condition), flagged, (arm, s, x * L)))
@@ -68,15 +69,26 @@ def float_values(k, s, x):
     return found, bool(flagged[0])
 
 
-def exact_values(k, s, x, bits=320):
-    """Every output that is not zero and fits into a float, as a ball, with its |s G'/G|."""
+def exact_values(k, s, x, outputs=OUTPUTS):
+    """Each of those outputs that is not zero and fits into a float, as a ball, with its |s G'/G|."""
+    bits = 320 + lost_bits(k, s)
     while True:
         with balls.precision(bits):
             here, there = (balls.State(k, balls.point(s) * (1 + balls.rational(step))) for step in (0.0, STEP))
-            found = {name: _value(here, there, each, x) for name, each in OUTPUTS.items()}
+            found = {name: _value(here, there, each, x) for name, each in outputs.items()}
             if None not in found.values():
                 return {name: pair for name, pair in found.items() if pair[1] is not None}
         bits *= 2
+
+
+def lost_bits(k, s):
+    """About so many bits cancel at s: the square of the faster wave's growth along the arm, e^(2 |Re t|)."""
+    with balls.precision(128):
+        state = balls.State(k, balls.point(s))
+        half = state.z_sum / 2
+        spread = balls.root(half * half - state.z_product)
+        rates = (abs(balls.root(z).real.mid()) for z in (half + spread, half - spread))
+        return int(2 * float(max(rates)) / math.log(2))
 
 
 def _value(here, there, output, x):

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from fractions import Fraction
+from functools import cached_property
 from typing import Any
 
 import flint
@@ -37,8 +38,7 @@ def precision(bits: int) -> Iterator[None]:
 
 def rational(value: Fraction | float) -> Ball:
     """The ball of a fraction or float, at the working precision."""
-    exact = Fraction(value)
-    return flint.arb(flint.fmpq(exact.numerator, exact.denominator))
+    return flint.arb(flint.fmpq(*value.as_integer_ratio()))
 
 
 def point(s: complex) -> Ball:
@@ -83,6 +83,7 @@ class State:
 
     def __init__(self, k: Coefficients, s: Ball) -> None:
         self.k, self.s = k, s
+        self._fields: dict[float, tuple[Ball, ...]] = {}  # by x: four quantities share the transition
         self.S, self.d = s * s, 1 + rational(k.damping) * s
         self.a, self.b, self.g, self.sigma = (rational(value) for value in (k.a, k.b, k.g, k.sigma))
         S, over_d = self.S, 1 / self.d
@@ -99,7 +100,7 @@ class State:
         """rest + inertia s^2 of an end condition."""
         return rational(condition.rest) + rational(condition.inertia) * self.S
 
-    @property
+    @cached_property
     def input(self) -> Ball:
         """The torque behind this response, or the hub angle where the hub is locked: zero at a pole."""
         hub = Condition.of(self.k.hub_inertia)
@@ -108,13 +109,14 @@ class State:
 
     def field(self, quantity: Quantity, x: float) -> Ball:
         """The quantity at x (a share of the length, 0..1), from the root by the state-transition matrix."""
-        at = rational(x)
-        F0, F1, F2, F3 = transition(self.z_sum, self.z_product, at)
-        fields = _fields(
-            at, F0, F1, F2, F3, F2 - at, F3 - 1, self.S, 1 / self.d, self.a, self.b, self.g, self.sigma,
-            self.theta, self.M0, self.Q0,
-        )  # fmt: skip
-        return fields[("Y", "Phi", "M", "Q").index(quantity)]
+        if x not in self._fields:
+            at = rational(x)
+            F0, F1, F2, F3 = transition(self.z_sum, self.z_product, at)
+            self._fields[x] = _fields(
+                at, F0, F1, F2, F3, F2 - at, F3 - 1, self.S, 1 / self.d, self.a, self.b, self.g, self.sigma,
+                self.theta, self.M0, self.Q0,
+            )  # fmt: skip
+        return self._fields[x][("Y", "Phi", "M", "Q").index(quantity)]
 
     def value(self, output: Output, x: float = 0.0) -> Ball:
         """The output for a unit input, in SI units; x is a share of the length."""
