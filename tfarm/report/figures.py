@@ -110,7 +110,7 @@ def save(figure: Figure, folder: Path, stem: str, formats: tuple[str, ...] = FOR
     with style(), warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph .* missing")  # an arm's name may hold any letter
         figure.draw_without_rendering()  # lays it out; once is enough for all formats
-        figure.set_layout_engine("none")
+        figure.set_layout_engine(None)
         _settle(figure)
         for kind in formats:
             figure.savefig(folder / f"{stem}.{kind}", format=kind, dpi=dpi, metadata=METADATA[kind])
