@@ -23,7 +23,8 @@ SURVEYS := \
 	tuner.bounded \
 	cli.fuzz \
 	cli.kills \
-	report.plausible
+	report.plausible \
+	report.twice
 
 .PHONY: help install reports modes bode margins locus sampled tune audit test kernels survey lint bench clean
 

@@ -2,6 +2,7 @@
 
 import os
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -9,7 +10,8 @@ from pathlib import Path
 import pytest
 
 import tfarm
-from tests.shell import heard
+from tests.shell import heard, run
+from tfarm.report import writing
 
 ROOT = Path(__file__).parent.parent
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -33,16 +35,49 @@ def test_python_examples_run_one_after_the_other(
 SHELL = [line.split("#")[0].strip() for block in blocks("sh") for line in block.splitlines() if line.strip()]
 
 
-@pytest.mark.parametrize("line", [line for line in SHELL if line.startswith("tfarm ")])
-def test_shell_examples_run(line: str, tmp_path: Path) -> None:
+COMMANDS = [line for line in SHELL if line.startswith("tfarm ")]
+
+
+def by_a_shell(line: str, folder: Path) -> tuple[int, str, str]:
     command = line.replace("tfarm", f"{sys.executable} -c 'from tfarm.cli import main; main()'", 1)
     done = subprocess.run(
-        ["bash", "-c", command], cwd=tmp_path, env=os.environ, capture_output=True, text=True, check=False
+        ["bash", "-c", command], cwd=folder, env=os.environ, capture_output=True, text=True, check=False
     )
-    assert (done.returncode, heard(done.stderr)) == (0, "")
-    written = re.findall(r"--(?:csv|out) (\S+)", line)
+    return done.returncode, done.stdout, heard(done.stderr)
+
+
+@pytest.mark.parametrize("line", [line for line in COMMANDS if not line.startswith("tfarm report ")])
+def test_shell_examples_run(
+    line: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    request: pytest.FixtureRequest,
+) -> None:
+    """Without a process each, which are a second or two of imports, but for the first."""
+    monkeypatch.chdir(tmp_path)
+    if line == "tfarm audit":
+        request.getfixturevalue("audited")
+    words = shlex.split(line)[1:]
+    code, out, err = by_a_shell(line, tmp_path) if line == COMMANDS[0] else run(capsys, *words)
+    assert (code, err) == (0, "")
+    written = re.findall(r"--(?:csv|out|save) (\S+)", line)
     assert all((tmp_path / name).exists() for name in written)
-    assert done.stdout or written
+    assert out or written
+
+
+@pytest.mark.usefixtures("audited")
+def test_the_example_of_a_report_runs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With two of its sections; a report with all of them is that of tests/report."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(writing, "PIECES", [each for each in writing.PIECES if each.name in ("the arm", "margins")])
+    (line,) = (line for line in COMMANDS if line.startswith("tfarm report "))
+    code, out, err = run(capsys, *shlex.split(line)[1:])
+    assert (code, out.strip(), err) == (0, "pages/index.html", "")
+    assert {path.name for path in (tmp_path / "pages").iterdir()} == {"index.html", "sasaki2012-lab", "trust"}
+    assert (tmp_path / "pages" / "sasaki2012-lab" / "index.html").exists()
 
 
 def test_make_has_the_verbs_of_the_readme() -> None:

@@ -212,6 +212,7 @@ def test_a_reader_that_leaves_early_is_no_error() -> None:
     assert heard(done.stderr) == ""
 
 
+@pytest.mark.usefixtures("audited")
 def test_the_audit_has_a_row_an_equation(capsys: pytest.CaptureFixture[str]) -> None:
     rows = answer(capsys, "audit")["rows"]
     verdicts = {row["equation"]: row["verdict"] for row in rows}

@@ -58,12 +58,23 @@ def test_a_table_without_rows_has_its_titles():
     assert Rows(("a", "b")).lines(80) == ["a  b"]
 
 
+WITH_ROWS = """
+import pickle, sys
+from tfarm.audit import paper
+with open(sys.argv.pop(), "rb") as file:
+    rows = pickle.load(file)
+paper.audit = lambda: rows
+from tfarm.cli import main
+main()
+"""
+
+
 def in_a_terminal(*arguments):
-    """What a command prints in a terminal of 80 columns."""
+    """What Python prints, run with these arguments, in a terminal of 80 columns."""
     pid, handle = pty.fork()
     if pid == 0:
         os.environ.update(COLUMNS="80", TERM="xterm")
-        os.execv(sys.executable, [sys.executable, "-m", "tfarm", *arguments])
+        os.execv(sys.executable, [sys.executable, *arguments])
     text = b""
     try:
         while part := os.read(handle, 65536):
@@ -75,12 +86,12 @@ def in_a_terminal(*arguments):
     return text.decode().replace("\r\n", "\n")
 
 
-def test_modes_and_audit_answer_within_80_columns():
+def test_modes_and_audit_answer_within_80_columns(audit_file):
     """All digits of all frequencies, in rad/s and Hz, and all verdicts; the same as in a pipe."""
-    text = in_a_terminal("modes", "sasaki2012-lab", "--count", "3")
+    text = in_a_terminal("-m", "tfarm", "modes", "sasaki2012-lab", "--count", "3")
     assert max(map(len, re.findall(r"^ .*$", text, flags=re.MULTILINE))) <= 80
     for number in ("71.5056824669", "11.3804828", "-0.25564562 + 71.50522553i", "0.00357518", "1332.3"):
         assert number in text
-    text = in_a_terminal("audit")
+    text = in_a_terminal("-c", WITH_ROWS, "audit", str(audit_file))
     assert "…" not in text
     assert len(re.findall(r"^ *\S.*  (confirmed|corrected|contradictory|\w+)", text, flags=re.MULTILINE)) >= 23

@@ -5,6 +5,7 @@ import hashlib
 import json
 import math
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -16,13 +17,19 @@ from urllib.parse import unquote
 import pytest
 
 import tfarm
+from tests.shared import once
 from tests.shell import run
 from tfarm.arm import to_toml
-from tfarm.dsp import load_chain
+from tfarm.audit.published import validate
+from tfarm.dsp import Chain, load_chain
 from tfarm.report import card as card_room
 from tfarm.report import readme_pictures, write, writing
+from tfarm.report.card import written_cards
+from tfarm.report.page import index_page
 from tfarm.report.paper import is_from_paper, paper_section
 from tfarm.report.sections import Section
+from tfarm.report.trust import Evidence, write_trust
+from tfarm.report.trust_proofs import written_proofs
 
 ATTACK = "<script>alert(1)</script> & <b>bold</b>, I_h in kg m^2"
 ANCHORS = {piece.anchor for piece in writing.PIECES}
@@ -30,12 +37,32 @@ NAME = "Ärm & co's #1 $x$ 100%"
 ARM = replace(tfarm.load("stocky-steel"), name=NAME, assumptions=(ATTACK, "second assumption"))
 
 
+HELD = replace(ARM, hub=tfarm.Hub(inertia=math.inf))  # no loop: its proofs are quick
+REPORT = (
+    "import sys, tfarm; from pathlib import Path; from tfarm.report import write;"
+    "print(write([tfarm.load(sys.argv[1])], Path(sys.argv[2])));"
+    "pyplot = sys.modules.get('matplotlib.pyplot');"  # python-control imports it; no figure may be its own
+    "print(bool(pyplot and pyplot.get_fignums()))"
+)
+
+
 @pytest.fixture(scope="module")
 def pages(tmp_path_factory):
-    """A full report on one arm."""
-    out = tmp_path_factory.mktemp("reports")
-    assert write([ARM], out) == out / "index.html"
-    return out
+    """A full report on one arm, one a session, by a process with other hashes and in another time zone."""
+    return once(tmp_path_factory, "pages", report_elsewhere)
+
+
+def report_elsewhere(out):
+    file = out.with_suffix(".toml")
+    file.write_text(to_toml(ARM), encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-c", REPORT, str(file), str(out)],
+        env={**os.environ, "PYTHONHASHSEED": "12345", "TZ": "Asia/Tokyo"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert (done.stdout.splitlines(), done.stderr) == ([str(out / "index.html"), "False"], "")
 
 
 def files_of(folder):
@@ -64,28 +91,26 @@ class Links(HTMLParser):
 # ------------------------------------------------------------ the same bytes
 
 
-def test_another_process_with_other_hashes_writes_the_same_bytes(pages, tmp_path):
-    (tmp_path / "arm.toml").write_text(to_toml(ARM), encoding="utf-8")
-    code = (
-        "import sys, tfarm; from pathlib import Path; from tfarm.report import write;"
-        "write([tfarm.load(sys.argv[1])], Path(sys.argv[2]));"
-        "pyplot = sys.modules.get('matplotlib.pyplot');"  # python-control imports it; no figure may be its own
-        "print(bool(pyplot and pyplot.get_fignums()))"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code, str(tmp_path / "arm.toml"), str(tmp_path / "out")],
-        env={**os.environ, "PYTHONHASHSEED": "12345", "TZ": "Asia/Tokyo"},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert (done.stdout.strip(), done.stderr) == ("False", "")
-    assert files_of(tmp_path / "out") == files_of(pages)
+def test_another_process_with_other_hashes_writes_the_same_bytes(pages, audit_rows, tmp_path):
+    """What is quickly made, and the page on trust; of all sections: `python -m tests.report.twice`."""
+    made = tmp_path / "made"
+    made.mkdir()
+    for i, piece in enumerate(writing.PIECES):
+        if piece.anchor in ("bode-root-moment", "margins", "margins-nyquist"):
+            writing._make((ARM, Chain()), i, made)
+    there = files_of(pages / NAME)
+    assert {"bode-root-moment.pdf", "nyquist.svg", "nyquist.png", "nyquist-count.csv"} <= set(files_of(made))
+    assert {name: there[name] == content for name, content in files_of(made).items() if there[name] != content} == {}
+    write_trust(Evidence(audit=audit_rows, published=validate()), written_proofs(pages), tmp_path / "trust")
+    assert files_of(tmp_path / "trust") == files_of(pages / "trust")
+    index = index_page(written_cards(pages), trust="trust/index.html")
+    assert (pages / "index.html").read_text(encoding="utf-8") == index
 
 
 def test_two_processes_write_what_one_does(pages, tmp_path):
+    """The modes, the card and the proof: by two processes, each with hashes of its own, and by the one of `pages`."""
     told = []
-    other = replace(ARM, name="other")
+    other = replace(HELD, name="other")
     page = write([ARM, other], tmp_path, only=("modes",), progress=lambda *what: told.append(what))
     assert page == tmp_path / "index.html"
     alone = files_of(pages / NAME)
@@ -292,15 +317,16 @@ def test_work_that_fails_leaves_nothing(tmp_path, monkeypatch):
     assert not (tmp_path / "new").exists()
 
 
-def test_work_that_fails_leaves_an_earlier_report_as_it_was(pages, monkeypatch):
+def test_work_that_fails_leaves_an_earlier_report_as_it_was(pages, tmp_path, monkeypatch):
     def fail(arm, folder):
         raise tfarm.ConvergenceError("stopped short", None, None)
 
-    before = files_of(pages)
+    before, out = files_of(pages), tmp_path / "out"
+    shutil.copytree(pages, out)
     monkeypatch.setattr(writing, "save_card", fail)
     with pytest.raises(tfarm.ConvergenceError):
-        write([ARM], pages, only=("modes",))
-    assert files_of(pages) == before
+        write([ARM], out, only=("modes",))
+    assert files_of(out) == before
 
 
 class Unmakeable:
@@ -418,6 +444,7 @@ STRANGE_CARDS = (
 )
 
 
+@pytest.mark.usefixtures("audited")
 def test_other_files_in_the_folder_are_kept_and_strange_cards_passed_over(tmp_path, monkeypatch):
     monkeypatch.setattr(writing, "PIECES", ())
     (tmp_path / NAME).mkdir()
@@ -426,7 +453,7 @@ def test_other_files_in_the_folder_are_kept_and_strange_cards_passed_over(tmp_pa
         (tmp_path / f"x{i}").mkdir()
         (tmp_path / f"x{i}" / "card.json").write_text(card)
         (tmp_path / f"x{i}" / "index.html").write_text("mine")
-    write([ARM], tmp_path)
+    write([HELD], tmp_path)
     assert (tmp_path / NAME / "mine.txt").read_text() == "mine"
     links = Links(tmp_path / "index.html").targets
     assert not any(target.startswith("x") for target in links)

@@ -1,0 +1,20 @@
+"""What is dear and the same for every test: made once a session, by the first of its processes to want it."""
+
+import fcntl
+import os
+
+
+def once(factory, name, make):
+    """The file `name`, which make(file) wrote in this process or in another; those that come meanwhile wait for it.
+
+    `factory` is pytest's tmp_path_factory, whose folders lie in one of the session where xdist shares the work.
+    """
+    base = factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "shared"
+    folder.mkdir(exist_ok=True)
+    with open(folder / f"{name}.lock", "w", encoding="utf-8") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not (folder / name).exists():
+            make(folder / f"{name}.part")
+            (folder / f"{name}.part").rename(folder / name)
+    return folder / name
