@@ -145,11 +145,11 @@ def lumped(poles, rows, hold):
     return np.array(kept), np.array(columns).T, static
 
 
-def simulated(sampled, model_rows, law, references, n, start):
+def simulated(sampled, model_rows, law, references, n, start, struck):
     """Records (n, outputs) of the loop at the samples, and its torques (n,).
 
     `references` are feedforward, angle, rate and rigid moment; `model_rows` (outputs, states) are read beside; `start`
-    is the state at t = 0.
+    is the state at t = 0, `struck` what an impulse just after that sample adds to it.
     """
     A, B, C = sampled.matrices
     x, records, torques = start.astype(complex), [], np.zeros(n)
@@ -160,5 +160,5 @@ def simulated(sampled, model_rows, law, references, n, start):
             forward + law.Kp * (angle_wanted - angle) + law.K1 * (rate_wanted - rate) - law.K2 * (moment - rigid)
         )
         records.append((model_rows @ x).real)
-        x = A @ x + B * torques[k]
+        x = A @ (x + struck if k == 0 else x) + B * torques[k]
     return np.array(records), torques

@@ -144,7 +144,7 @@ def tame(case):
     )
 
 
-LEFT = 5  # times the change that is printed, which is no bound: where the series converges slowly more is left
+LEFT = 3  # times the change that is printed, which is no bound: without damping up to twice of it was left
 ROUNDED = 1e-3  # of the largest value: what a simulation may leave without saying so
 OFFSET = 0.01  # of the length, at the tip of an arm that is released
 
@@ -162,9 +162,9 @@ def step_through(case, model, count, n, scenario, size):
     poles = sampled.poles
     tip = np.zeros(len(A), complex)
     tip[: poles.size], tip[poles.size + 1] = sampled.tip, case.beam.link.length / sampled.inertia
-    start = np.zeros(len(A), complex)
+    start, struck = np.zeros((2, len(A)), complex)
     if scenario == "impulse":
-        start[: poles.size + 1] = size
+        struck[: poles.size + 1] = size
     if scenario == "decay":
         own = np.nonzero(poles.imag > 0)[0]
         i = own[np.argmin(abs(poles[own]))]
@@ -173,7 +173,7 @@ def step_through(case, model, count, n, scenario, size):
         start[i] = 1j * OFFSET * case.beam.link.length * abs(p) ** 2 / (2 * p.imag) / (p * r)
         start[j] = start[i].conj()
     records, torques = simulated(
-        sampled, np.vstack([C, tip]), tame(case), references(case, n, scenario, size), n, start
+        sampled, np.vstack([C, tip]), tame(case), references(case, n, scenario, size), n, start, struck
     )
     return np.column_stack([records, torques])
 

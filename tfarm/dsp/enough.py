@@ -1,9 +1,9 @@
 """How many flexible modes a simulation takes for the digits that are asked for, or what it is off by.
 
 The signals with twice the modes tell: their largest change, relative to the largest value of each signal, is what half
-the modes were off by, and mostly more than what is left.  It is no bound: after an impulse the series converges slowly
-(four times the change was left on one overdamped arm), and without damping hardly at all; a loop whose high modes grow
-is for `dsp.verdict` to find.
+the modes were off by, and mostly more than what is left.  It is no bound: without damping the moment after an impulse
+converges slowly (of 70 random arms one had nearly twice the change left); a loop whose high modes grow is for
+`dsp.verdict` to find.
 """
 
 from __future__ import annotations

@@ -31,6 +31,14 @@ def read(weights: Any, rates: Any, static: Any, amplitude: Any, rigid: Any, torq
 
 
 @compiled
+def strike(amplitude: Any, rigid: Any, impulse: float) -> None:
+    """An impulse of torque [N m s] on the hub: every amplitude jumps by it."""
+    for i in range(amplitude.size):
+        amplitude[i] += impulse
+    rigid[1] += impulse
+
+
+@compiled
 def advance(
     tables: Any, amplitude: Any, rigid: Any, old: float, new: float, push_on: float, fine: Any, work: Any
 ) -> None:
@@ -114,12 +122,12 @@ def law(gains: Any, K2: float, ideal: Any, angle: float, rate: float, moment: fl
 @compiled
 def run(
     tables: Any, amplitude: Any, rigid: Any, held: Any, delay: int, gains: Any, K2: Any, ideal: Any, disturbance: Any,
-    rows: Any, filter_: Any, single: bool, bound: float, record: Any, torque: Any, fine: Any, saturated: Any, work: Any,
+    impulse: float, rows: Any, filter_: Any, single: bool, bound: float, record: Any, torque: Any, fine: Any, saturated: Any, work: Any,
 ) -> int:  # fmt: skip
     """The linear law over all samples; returns how many were made before the root moment passed `bound`.
 
-    Outputs 0, 1, 2 are what is measured (hub angle, hub rate, root moment through their analog filters).  `held` is a
-    ring of the last delay + 2 torques.  `record` (n, outputs), `torque` (n,), `fine` (n, records, outputs) and
+    Outputs 0, 1, 2 are what is measured (hub angle, hub rate, root moment through their analog filters).  The hub is
+    struck by `impulse` [N m s] after the first sample.  `held` is a ring of the last delay + 2 torques.  `record` (n, outputs), `torque` (n,), `fine` (n, records, outputs) and
     `saturated` (n, 3) are filled.
     """
     weights, rates, static = tables[3], tables[4], tables[5]
@@ -136,5 +144,7 @@ def run(
         rate = estimate(angle, record[k, 1], memory, filter_)
         u = quantise(law(gains, K2[k], ideal[k], angle, rate, moment, single), rows[TORQUE], clipped, TORQUE)
         held[k % ring] = torque[k] = u
+        if k == 0:
+            strike(amplitude, rigid, impulse)
         advance(tables, amplitude, rigid, acting, held[(k - delay) % ring], disturbance[k], fine[k], work)
     return n

@@ -30,8 +30,8 @@ class Scenario:
     """A row a sample: `feedforward` r [N m], `hub_angle` and `hub_rate` references, `rigid_moment` [N m] that the
     moment feedback takes off, `disturbance` [N m] at the hub (held over the sample, not delayed).
 
-    It starts at rest, but for `impulse` [N m s] at the hub and the first mode released with `tip_offset` [m] at the
-    tip. `busy_until` [s]: the residual vibration is measured from there on.
+    It starts at rest, but for the first mode released with `tip_offset` [m] at the tip; `impulse` [N m s] strikes the
+    hub just after the sample at t = 0. `busy_until` [s]: the residual vibration is measured from there on.
     """
 
     name: str
@@ -104,7 +104,11 @@ def decay(arm: Arm, chain: Chain, duration: float, tip_offset: float | None = No
 
 
 def impulse(arm: Arm, chain: Chain, duration: float, impulse: float | None = None) -> Scenario:
-    """A disturbance impulse [N m s] on the hub just before t = 0: 0.01 s of the arm's unit of torque unless told."""
+    """A disturbance impulse [N m s] on the hub just after the sample at t = 0: 0.01 s of the arm's unit of torque.
+
+    So it is first seen a sample later.  (Just before, the moment of a damped arm would be measured where it grows as
+    t^-1/2, without bound, and no number of modes has that.)
+    """
     impulse = IMPULSE * torque_unit(arm, chain) if impulse is None else impulse
     size = number("impulse", impulse, "an impulse is a finite number of N m s")
     return _with(_rest("impulse", chain, duration), impulse=size)

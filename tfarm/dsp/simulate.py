@@ -143,8 +143,8 @@ class Simulator:
         c = self.chain.converters
         done = kernel.run(
             self._tables, state.amplitude, state.rigid, state.held, self.chain.sampling.whole_delay,
-            np.array([gains.Kp, gains.K1]), gain, self._ideal, self.scenario.disturbance, self._rows, self._filter,
-            c.arithmetic == "float32", self._bound, state.record, state.torque, state.fine, state.saturated, state.work,
+            np.array([gains.Kp, gains.K1]), gain, self._ideal, self.scenario.disturbance, self.scenario.impulse, self._rows,
+            self._filter, c.arithmetic == "float32", self._bound, state.record, state.torque, state.fine, state.saturated, state.work,
         )  # fmt: skip
         return self._result(state, int(done), gain)
 
@@ -173,8 +173,8 @@ class Simulator:
         return self.plant.poles[self._kept], self._tables[3][3:7]
 
     def first_amplitudes(self) -> Complex:
-        """The modal amplitudes (m,) that a simulation starts with."""
-        return self._start().amplitude
+        """The modal amplitudes (m,) after the sample at t = 0, once the hub was struck."""
+        return self._start().amplitude + self.scenario.impulse
 
     # ------------------------------------------------------------ inside
 
@@ -199,6 +199,8 @@ class Simulator:
             if gain is not None:
                 gain[k] = K
             now = state.held[(k - d) % ring]
+            if k == 0:
+                kernel.strike(state.amplitude, state.rigid, self.scenario.impulse)
             kernel.advance(
                 self._tables, state.amplitude, state.rigid, acting, now, disturbance[k], state.fine[k], state.work
             )
@@ -221,20 +223,20 @@ class Simulator:
 
     def _start(self) -> _State:
         n, outputs = self.scenario.feedforward.size, len(self.plant.outputs)
-        amplitude = np.full(self._kept.size, self.scenario.impulse, complex)
+        amplitude = np.zeros(self._kept.size, complex)
         if self.scenario.tip_offset:
             i, value = _released(self.plant, self._kept, self.scenario.tip_offset)
             amplitude[i] += value
         return _State(
             amplitude=amplitude,
-            rigid=np.array([0.0, self.scenario.impulse]),
+            rigid=np.zeros(2),
             held=np.zeros(self.chain.sampling.whole_delay + 2),
             record=np.zeros((n, outputs)),
             torque=np.zeros(n),
             fine=np.zeros((n, self.between, outputs)),
             saturated=np.zeros((n, 3), np.bool_),
             work=np.zeros(2),
-            energy=self._energy(amplitude, self.scenario.impulse),
+            energy=self._energy(amplitude + self.scenario.impulse, self.scenario.impulse),
         )
 
     def _energy(self, amplitude: Complex, rate: float) -> float:
