@@ -289,7 +289,7 @@ def test_a_simulation_takes_the_modes_that_its_digits_need_or_says_what_it_is_of
 
 
 def time_function(G, t, terms=400):
-    """The inverse Laplace transform of G at t > 0: the Fourier series of Abate and Whitt (1995) with Euler summation."""
+    """The inverse Laplace transform of G at t > 0: Fourier series with Euler summation (Abate and Whitt, 1995)."""
     A, m = 25.0, 12  # errors of e^-A, and of the last terms' 12th differences
     values = G((A + 2j * np.pi * np.arange(terms + m + 1)) / (2 * t)).real * (-1.0) ** np.arange(terms + m + 1)
     values[..., 0] /= 2

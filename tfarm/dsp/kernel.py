@@ -122,13 +122,14 @@ def law(gains: Any, K2: float, ideal: Any, angle: float, rate: float, moment: fl
 @compiled
 def run(
     tables: Any, amplitude: Any, rigid: Any, held: Any, delay: int, gains: Any, K2: Any, ideal: Any, disturbance: Any,
-    impulse: float, rows: Any, filter_: Any, single: bool, bound: float, record: Any, torque: Any, fine: Any, saturated: Any, work: Any,
+    impulse: float, rows: Any, filter_: Any, single: bool, bound: float, record: Any, torque: Any, fine: Any,
+    saturated: Any, work: Any,
 ) -> int:  # fmt: skip
     """The linear law over all samples; returns how many were made before the root moment passed `bound`.
 
     Outputs 0, 1, 2 are what is measured (hub angle, hub rate, root moment through their analog filters).  The hub is
-    struck by `impulse` [N m s] after the first sample.  `held` is a ring of the last delay + 2 torques.  `record` (n, outputs), `torque` (n,), `fine` (n, records, outputs) and
-    `saturated` (n, 3) are filled.
+    struck by `impulse` [N m s] after the first sample.  `held` is a ring of the last delay + 2 torques.  `record`
+    (n, outputs), `torque` (n,), `fine` (n, records, outputs) and `saturated` (n, 3) are filled.
     """
     weights, rates, static = tables[3], tables[4], tables[5]
     n, ring, memory = torque.size, held.size, np.zeros(3)

@@ -143,8 +143,9 @@ class Simulator:
         c = self.chain.converters
         done = kernel.run(
             self._tables, state.amplitude, state.rigid, state.held, self.chain.sampling.whole_delay,
-            np.array([gains.Kp, gains.K1]), gain, self._ideal, self.scenario.disturbance, self.scenario.impulse, self._rows,
-            self._filter, c.arithmetic == "float32", self._bound, state.record, state.torque, state.fine, state.saturated, state.work,
+            np.array([gains.Kp, gains.K1]), gain, self._ideal, self.scenario.disturbance, self.scenario.impulse,
+            self._rows, self._filter, c.arithmetic == "float32", self._bound, state.record, state.torque, state.fine,
+            state.saturated, state.work,
         )  # fmt: skip
         return self._result(state, int(done), gain)
 
