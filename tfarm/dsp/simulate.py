@@ -224,7 +224,7 @@ class Simulator:
 
     def _start(self) -> _State:
         n, outputs = self.scenario.feedforward.size, len(self.plant.outputs)
-        amplitude = np.zeros(self._kept.size, complex)
+        amplitude: Complex = np.zeros(self._kept.size, complex)
         if self.scenario.tip_offset:
             i, value = _released(self.plant, self._kept, self.scenario.tip_offset)
             amplitude[i] += value
@@ -237,7 +237,7 @@ class Simulator:
             fine=np.zeros((n, self.between, outputs)),
             saturated=np.zeros((n, 3), np.bool_),
             work=np.zeros(2),
-            energy=self._energy(amplitude + self.scenario.impulse, self.scenario.impulse),
+            energy=self._energy(amplitude + complex(self.scenario.impulse), self.scenario.impulse),
         )
 
     def _energy(self, amplitude: Complex, rate: float) -> float:
