@@ -56,9 +56,9 @@ def upper(zeros):
 @pytest.mark.parametrize(("arm", "law", "vary", "start", "stop"), RANGES, ids=NAMES)
 def test_branches_are_all_poles_of_the_box_and_the_same_backwards(arm, law, vary, start, stop):
     """Road: winding numbers, which know of no continuation; then the same way back, from other modes and gains."""
-    found = locus(arm, law, vary, start, stop, points=21, branches=8)
-    assert found.branches.shape == (8, 21)
-    for n in (0, 9, 20):
+    found = locus(arm, law, vary, start, stop, points=11, branches=8)
+    assert found.branches.shape == (8, 11)
+    for n in (0, 4, 10):
         zeros = found.branches[:, n]
         poles = poles_below(found.variation.at(found.gain[n]), zeros.imag.max() * (1 + 1e-6))
         for zero in zeros[poles.box.holds(zeros)]:
@@ -67,7 +67,7 @@ def test_branches_are_all_poles_of_the_box_and_the_same_backwards(arm, law, vary
             )
         for pole in poles.values:
             assert abs(upper(zeros) - pole).min() <= 50 * EPS * abs(pole)
-    back = locus(arm, law, vary, stop, start, points=21, branches=8)
+    back = locus(arm, law, vary, stop, start, points=11, branches=8)
     assert np.all(abs(found.branches - back.branches[:, ::-1]) <= 50 * EPS * abs(found.branches))
 
 

@@ -34,9 +34,9 @@ LOOPS = [
 
 
 def response(arm, law, up_to):
-    """The loop function from the arm's public transfer functions, on a grid six times as dense as the margins'."""
+    """The loop function from the arm's public transfer functions, on a grid three times as dense as the margins'."""
     rough = np.asarray(grid(arm, up_to))
-    omega = np.unique((rough[:-1, None] + np.diff(rough)[:, None] * np.arange(6) / 6).ravel())
+    omega = np.unique((rough[:-1, None] + np.diff(rough)[:, None] * np.arange(3) / 3).ravel())
     theta, moment = tfarm.transfer(arm, ["hub_angle", "root_moment"])(1j * omega)
     return control.frd((law.Kp + law.K1 * 1j * omega) * theta + law.K2 * moment, omega, smooth=False)
 
@@ -46,7 +46,7 @@ def test_margins_are_those_of_python_control_on_a_fine_grid(arm, law) -> None:
     found = margins(arm, law).in_band
     L = response(arm, law, found.band)
     gains, phases, _, _, at, _ = control.stability_margins(L, returnall=True)
-    assert found.phase == pytest.approx(control.margin(L)[1], rel=2e-2)
+    assert found.phase == pytest.approx(min(phases, key=abs, default=math.inf), rel=2e-2)
     assert found.phase_lag == pytest.approx(min(phases[phases > 0], default=math.inf), rel=2e-2)
     assert found.phase_lead == pytest.approx(min(-phases[phases < 0], default=math.inf), rel=2e-2)
     lag = np.mod(phases, 360) * math.pi / 180

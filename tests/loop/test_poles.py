@@ -81,10 +81,10 @@ def test_a_modal_model_misses_by_its_own_error(arm, count: int) -> None:
 
 def test_random_loops_counted_again() -> None:
     """`python -m tests.loop.counts 500` for more."""
-    verdicts = [verdict for _, verdict in survey(25, 3)]
+    verdicts = [verdict for _, verdict in survey(8, 3)]
     assert [v.reason for v in verdicts if v.outcome == "wrong"] == []
-    assert sum(v.outcome == "right" for v in verdicts) >= 24
-    assert sum(v.unstable for v in verdicts) > 10
+    assert sum(v.outcome == "right" for v in verdicts) >= 7
+    assert sum(v.unstable for v in verdicts) > 3
 
 
 def test_poles_are_proven_in_balls() -> None:

@@ -31,7 +31,7 @@ def model_counts(arm, K1, K2, Kp, terms):
 
 @pytest.mark.parametrize("Kp", [0.0, 3.0, -0.5])
 def test_counts_of_the_lab_arm_are_those_of_an_independent_model(Kp) -> None:
-    K1, K2 = between(-1, 3, 7), between(-2, 2.5, 8)
+    K1, K2 = between(-1, 3, 5), between(-2, 2.5, 6)
     found = region(LAB, K1, K2, Kp)
     there = model_counts(LAB, K1, K2, Kp, 10)
     low = np.array([

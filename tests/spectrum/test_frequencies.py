@@ -17,7 +17,7 @@ from tfarm.spectrum.counting import Counter
 from tfarm.spectrum.search import count_below, natural_frequencies
 
 EPS = np.finfo(float).eps
-BATCHES = 10
+BATCHES = 5
 
 
 def random_arms(batch, count):
@@ -27,13 +27,13 @@ def random_arms(batch, count):
 
 
 @pytest.mark.parametrize("batch", range(BATCHES))
-def test_a_thousand_random_arms_have_the_frequencies_of_a_ritz_model(batch):
+def test_random_arms_have_the_frequencies_of_a_ritz_model(batch):
     """The first twelve flexible ones: so none is missing and none is made up, whatever the ends.
 
     Eigenvalues 1/w^2 of the Ritz model are right to some eps of the largest; its own frequencies, converged with 40
-    polynomials, come from no count and no search.
+    polynomials, come from no count and no search.  `python -m tests.spectrum.proofs 1000` for more.
     """
-    for arm in random_arms(batch, 1000 // BATCHES):
+    for arm in random_arms(batch, 270 // BATCHES):
         k, rigid = coefficients(arm), arm.has_rigid_mode
         omega = natural_frequencies(k, rigid + 1, rigid + 13)
         flexibility = Ritz(arm).flexibilities()[0][:13]
@@ -92,7 +92,7 @@ def brackets(k, omega, units):
 def test_frequencies_are_right_to_the_last_digits(slenderness):
     """Eight units in the last place at most, and one for nearly all; (1, 10) is mostly above the cut-off."""
     rng, within = np.random.default_rng(5), []
-    for i in range(270):
+    for i in range(81):
         arm = some_arm(rng, BOUNDARY_CASES[i % 27], damping=0.0, slenderness=slenderness)
         k, rigid = coefficients(arm), arm.has_rigid_mode
         omega = natural_frequencies(k, rigid + 1, rigid + 12)

@@ -1,4 +1,4 @@
-"""Lists against counts on a thousand random arms, every boundary condition among them."""
+"""Lists against counts on random arms, every boundary condition among them."""
 
 import math
 from itertools import product
@@ -12,15 +12,15 @@ from tfarm.exact.coefficients import coefficients
 from tfarm.spectrum import modes_below
 from tfarm.spectrum.counting import Counter
 
-ARMS = 1000
+ARMS = 270
 
 
 def arms() -> list[Arm]:
-    """Random ones, and each combination of zero, finite and infinite inertias on some of them."""
+    """Random ones, and each combination of zero, finite and infinite inertias on ten of them."""
     generator = np.random.default_rng(2)
     bases = [random_arm(generator) for _ in range(ARMS)]
     kinds = list(product((0.0, 1.0, math.inf), repeat=3))
-    for i, base in enumerate(bases[: 10 * len(kinds)]):
+    for i, base in enumerate(bases):
         hub, mass, inertia = kinds[i % len(kinds)]
         beam = base.link.rhoA * base.link.length
         unit = beam * base.link.length**2
@@ -30,7 +30,8 @@ def arms() -> list[Arm]:
     return bases
 
 
-def test_the_list_is_the_count_on_a_thousand_arms() -> None:
+def test_the_list_is_the_count_on_random_arms() -> None:
+    """`python -m tests.spectrum.proofs 1000` for more, in balls and against a Ritz model."""
     for arm in arms():
         modes = tfarm.modes(arm, 12)
         omega = modes.natural_frequency[-12:]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Literal, get_args
 
 import numpy as np
@@ -38,6 +38,7 @@ class Condition:
     force: Fraction
 
     @classmethod
+    @lru_cache(maxsize=64)  # a proof asks for the same three at every step of its contour
     def of(cls, inertia: Inertia) -> Condition:
         """The condition of a body of that dimensionless inertia (0..inf)."""
         if not isinstance(inertia, Fraction):
