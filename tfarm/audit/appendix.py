@@ -115,8 +115,8 @@ def solves(text: str, stiffness: str = STIFFNESS) -> str:
         left.append(residual.subs(dict.fromkeys(ks, 0)))
         for j, k in enumerate(ks):
             l = symbols("lambda_1 lambda_2")[j % 2]
-            coefficient = sp.together(residual.coeff(k) * sp.exp((1 if j > 1 else -1) * l * symbol("x")))
-            top = sp.expand(sp.simplify(coefficient) * l)
+            coefficient = sp.expand(residual.coeff(k) * sp.exp((1 if j > 1 else -1) * l * symbol("x")))
+            top = sp.expand(coefficient * l)
             on_waves = relation().subs(symbol("lambda_"), l)
             rest = sp.rem(sp.numer(sp.together(top)), on_waves, l)
             left.append(rest * k)
