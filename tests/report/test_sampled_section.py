@@ -198,9 +198,9 @@ def test_the_strip_chart_has_steps_delay_and_saturation():
 
 def test_the_same_bytes_twice(tmp_path):
     loop = sampled_verdict(LAB, GAINS).loop
-    for name in ("a", "b"):
+    for name, data in (("a", PLANE()), ("b", overlay(LAB, GAINS, Chain()))):
         (tmp_path / name).mkdir()
-        data, found = overlay(LAB, GAINS, Chain()), loci(loop, 20.0, (-0.5, 1.5))
+        found = loci(loop, 20.0, (-0.5, 1.5))
         ideal = slews(LAB, GAINS, Chain(), 14)
         figures = (draw_overlay(data), draw_strip_chart(strip_chart(LAB, GAINS, ideal.without, 14)))
         for i, figure in enumerate(figures):
