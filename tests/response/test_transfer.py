@@ -100,6 +100,19 @@ def test_digits_agree_with_the_paper_to_forty(preset: str) -> None:
 # ---------------------------------------------------------------- poles, zeros, special points
 
 
+@pytest.mark.parametrize("s", [1e-80j, 1e-120 + 0j, 1e-200j, 1e-300j])
+def test_next_to_zero_the_expansion_there_is_the_answer_or_one_line(arm, s) -> None:
+    """s^2 leaves the range of float64 long before s does: no NaN, and no natural frequency there."""
+    G = tfarm.transfer(arm, ("root_moment", "tip_deflection"))
+    assert G(s) == pytest.approx(G.static, rel=1e-14)
+    angle = tfarm.transfer(arm, "hub_angle")
+    if abs(s) < 1e-150:
+        with pytest.raises(ParameterError, match="hub_angle is larger than any float64 there"):
+            angle(s)
+    else:
+        assert angle(s) == pytest.approx(1 / arm.total_inertia / abs(s) ** 2 * (1 if s.real else -1), rel=1e-14)
+
+
 def test_a_pole_is_named() -> None:
     arm = tfarm.load("sasaki2012")
     omega = tfarm.modes(arm, 1).natural_frequency[1]

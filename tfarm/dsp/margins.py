@@ -70,7 +70,7 @@ def _middles(gain: NDArray[np.float64]) -> NDArray[np.float64]:
     """A gain inside each gap."""
     if not gain.size:
         return np.zeros(1)
-    beyond = max(1.0, abs(gain).max())
+    beyond = abs(gain).max() or 1.0  # no crossing lies beyond: any distance would do
     return np.r_[gain[0] - beyond, (gain[1:] + gain[:-1]) / 2, gain[-1] + beyond]
 
 

@@ -40,12 +40,12 @@ def evaluate_outputs(
     """
     s = np.ascontiguousarray(s)
     values, suspects = np.empty((len(wanted), s.size), complex), np.empty(s.size, bool)
-    with np.errstate(under="ignore"):
+    with np.errstate(under="ignore", over="ignore", invalid="ignore"):
         evaluate(s, k.kernel, table, values, suspects)
         for row, each in enumerate(wanted):
             if not each.is_at_end:
                 values[row] = _along(k, each, s, each.share(x))
-    for i in np.flatnonzero(suspects):
+    for i in np.flatnonzero(suspects | ~np.isfinite(values).all(axis=0)):
         values[:, i] = [value_with_care(k, each, complex(s[i]), x) for each in wanted]
     return values
 
@@ -66,11 +66,19 @@ def differentiate_outputs(k: Coefficients, wanted: Sequence[Output], s: Complex,
 
 
 def value_with_care(k: Coefficients, wanted: Output, s: complex, x: float = 0.0) -> complex:
-    """One output at one s from a proven enclosure, or from the expansion at s = 0; ParameterError at a pole."""
+    """One output at one s from a proven enclosure, or from the expansion at s = 0.
+
+    Raises ParameterError at a pole, and where the value is larger than any float64.
+    """
     _refuse_pole(k, wanted, s, x)
     if s == 0:
         return complex(expansion_at_zero(k, wanted, x)[2])
-    return balls.nearest(balls.enclose(k, wanted, s, bits=PROVEN_BITS, x=x))
+    value = balls.nearest(balls.enclose(k, wanted, s, bits=PROVEN_BITS, x=x))
+    if not np.isfinite(value):
+        raise ParameterError(
+            key="s", value=s, remedy=f"{wanted.name} is larger than any float64 there; choose another s"
+        )
+    return value
 
 
 def digits_of(k: Coefficients, wanted: Output, s: complex, digits: int, x: float = 0.0) -> tuple[str, str]:
@@ -136,7 +144,7 @@ def _ratio(k: Coefficients, wanted: Output, s: Jet, quantity: Jet, drive: Jet) -
 
 def _at_pole(drive: Jet, s: Complex) -> NDArray[np.bool_]:
     value, slope = drive.c
-    near: NDArray[np.bool_] = abs(value) <= AT_A_POLE * abs(s) * abs(slope)
+    near: NDArray[np.bool_] = abs(value) < AT_A_POLE * abs(s) * abs(slope)  # both 0 where s^2 underflows: no pole there
     return near
 
 
