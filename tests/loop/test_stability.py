@@ -1,9 +1,6 @@
 """Verdicts, against a Legendre-Ritz model, hub equivalence, Lyapunov's theorem, and what is beyond the band."""
 
 import math
-import os
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +8,7 @@ import pytest
 from scipy.optimize import brentq
 
 import tfarm
-from tests.loop.agreement import some_free_arm
+from tests.loop.agreement import some_free_arm, survey
 from tests.loop.arms import hub_units, window_arm
 from tests.loop.ritz_loop import RitzLoop
 from tests.loop.test_lines import held
@@ -25,16 +22,11 @@ LAB, BARE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012
 
 
 def test_map_count_and_simulation_agree_on_random_loops() -> None:
-    """In a process of its own: matrices of 49 rows, for which threads cost more than they bring."""
-    alone = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
-    command = [sys.executable, "-W", "error", "-m", "tests.loop.agreement", "60", "3"]
-    done = subprocess.run(command, capture_output=True, text=True, env=alone, check=False)
-    assert (done.returncode, done.stderr) == (0, "")
-    first, tally = done.stdout.splitlines()
-    number = int(first.split()[0])
-    assert number > 40
-    assert f"{{'agree': {number}}}" in first
-    assert all(f"'{count} unstable'" in tally for count in (-1, 0, 1))
+    """`python -m tests.loop.agreement 2000` for more, of three times as many arms."""
+    cases = survey(24, 4, arms=4)
+    assert [case for case in cases if case.outcome != "agree"] == []
+    assert len(cases) > 24
+    assert {-1, 0, 1} <= {case.of_map for case in cases}
 
 
 @pytest.mark.parametrize(
