@@ -74,9 +74,16 @@ def gain_gradient(weights: Any, inputs: Any, hidden: Any, by_sum: float, out: An
 
 
 @compiled
+def _copy(source: Any, target: Any) -> None:
+    """target = source, element by element: an assignment of arrays takes numba seconds to compile, and a loop none."""
+    for i in range(target.size):
+        target[i] = source[i]
+
+
+@compiled
 def _turn(rows: Any, vector: Any, out: Any) -> None:
     """out = rows^T vector, in the order of memory."""
-    out[:] = 0.0
+    out.fill(0.0)
     for j in range(vector.size):
         v = vector[j]
         if v != 0.0:
@@ -101,7 +108,7 @@ def _sense(k: int, model: Any, reference: Any, numbers: Any, scales: Any, state:
         return False
     signals[k, X] = moment - reference[k, 3]
     signals[k, U] = reference[k, 1] + numbers[0] * (reference[k, 0] - _dot(model[3], state))
-    inputs[k, :] = 0.0
+    inputs[k].fill(0.0)
     inputs[k, 0], inputs[k, 4] = signals[k, U], signals[k, X]
     if k >= 1:
         inputs[k, 1], inputs[k, 2], inputs[k, 5] = signals[k - 1, U], signals[k - 1, E], signals[k - 1, X]
@@ -142,7 +149,7 @@ def forward(
 ) -> int:
     """One trial with fixed weights; fills `run`, returns how many samples were made before the bound was passed."""
     state, spare = work[0], work[1]
-    state[:] = 0.0
+    state.fill(0.0)
     n = reference.shape[0]
     for k in range(n):
         if not _sense(k, model, reference, numbers, scales, state, run):
@@ -162,12 +169,14 @@ def backward(model: Any, numbers: Any, scales: Any, weights: Any, run: Any, work
     n, m, h = inputs.shape[0], inputs.shape[1], hidden.shape[1]
     back, spare, by_input, late = work[0], work[1], work[2], work[3]
     K1, a, b, T = numbers[0], numbers[1], numbers[2], numbers[3]
-    gradient[:], back[:], late[:] = 0.0, 0.0, 0.0
+    gradient.fill(0.0)
+    back.fill(0.0)
+    late.fill(0.0)
     for k in range(n - 1, -1, -1):
         by_e = T * b * signals[k, E] + _dot(model[2], back) + late[0]
         by_sum = (late[4] - signals[k, X] * by_e) * signals[k, SLOPE]
         gain_gradient(weights, inputs[k], hidden[k], by_sum, gradient)
-        by_input[:] = 0.0
+        by_input.fill(0.0)
         for j in range(h):
             by_net = by_sum * weights[h * m + j] * hidden[k, j] * (1.0 - hidden[k, j])
             for i in range(m):
@@ -224,23 +233,24 @@ def learn_by_trials(
         costs[trial] = cost
         if rule == BACKTRACKING and not cost <= best and best < np.inf:
             share *= 0.5
-            weights[:], change[:] = kept, 0.0
+            _copy(kept, weights)
+            change.fill(0.0)
             _step(weights, change, slope, rates, momentum, share, longest)
             continue
         if done < n or not isfinite(cost):
-            weights[:] = kept
+            _copy(kept, weights)
             return trial + 1, done
         if _rms(done, run[2]) < enough:
             return trial + 1, -1
         backward(model, numbers, scales, weights, run, work, gradient)
-        kept[:] = weights
+        _copy(weights, kept)
         if rule == BACKTRACKING:
-            slope[:] = gradient
+            _copy(gradient, slope)
             share = min(1.0, 1.2 * share) if best < np.inf else 1.0
             best = cost
         _step(weights, change, gradient, rates, momentum, share, longest)
     if rule == BACKTRACKING:
-        weights[:] = kept
+        _copy(kept, weights)
     return costs.size, -1
 
 
@@ -250,7 +260,7 @@ def sample_gradient(k: int, numbers: Any, reply: float, x_next: float, run: Any,
     `reply`."""
     inputs, hidden, signals = run
     by_gain = -signals[k, X] * (numbers[1] * x_next * reply + numbers[2] * signals[k, E])
-    out[:] = 0.0
+    out.fill(0.0)
     gain_gradient(weights, inputs[k], hidden[k], by_gain * signals[k, SLOPE], out)
 
 
@@ -268,15 +278,17 @@ def learn_by_samples(
     state, spare = work[0], work[1]
     kept = weights.copy()
     for trial in range(costs.size):
-        state[:], kept[:] = 0.0, weights
+        state.fill(0.0)
+        _copy(weights, kept)
         for k in range(n):
             if not _sense(k, model, reference, numbers, scales, state, run):
-                costs[trial], weights[:] = np.inf, kept
+                costs[trial] = np.inf
+                _copy(kept, weights)
                 return trial + 1, k
             if k >= lag:
                 sample_gradient(k - lag, numbers, reply, run[2][k, X], run, past[k % lag], gradient)
                 _step(weights, change, gradient, rates, momentum, 1.0, longest)
-            past[k % lag] = weights
+            _copy(weights, past[k % lag])
             _act(k, model, reference, weights, guard, state, spare, run)
         costs[trial] = trial_cost(n, numbers, run[2])
         if _rms(n, run[2]) < enough:
@@ -293,8 +305,9 @@ def _derive(k: int, model: Any, numbers: Any, scales: Any, weights: Any, run: An
     inputs, hidden, signals = run
     m, h = inputs.shape[1], hidden.shape[1]
     for row in range(11, 3, -1):
-        D[row] = D[row - 4]
-    D[:4] = 0.0
+        _copy(D[row - 4], D[row])
+    for row in range(4):
+        D[row].fill(0.0)
     for i in range(S.shape[0]):
         for p in range(S.shape[1]):
             D[X, p] += model[4][i] * S[i, p]
@@ -304,15 +317,21 @@ def _derive(k: int, model: Any, numbers: Any, scales: Any, weights: Any, run: An
         by_input = 0.0
         for j in range(h):
             by_input += weights[h * m + j] * hidden[k, j] * (1.0 - hidden[k, j]) * weights[j * m + i]
-        D[GAIN] += signals[k, SLOPE] * by_input / scales[i] * D[SOURCE[i]]
-    D[E] = D[U] - signals[k, GAIN] * D[X] - signals[k, X] * D[GAIN]
-    spare[:] = 0.0
+        share = signals[k, SLOPE] * by_input / scales[i]
+        for p in range(S.shape[1]):
+            D[GAIN, p] += share * D[SOURCE[i], p]
+    for p in range(S.shape[1]):
+        D[E, p] = D[U, p] - signals[k, GAIN] * D[X, p] - signals[k, X] * D[GAIN, p]
+    spare.fill(0.0)
     for i in range(S.shape[0]):
         for j in range(S.shape[0]):
             if model[1][i, j] != 0.0:
-                spare[i] += model[1][i, j] * S[j]
-        spare[i] += model[2][i] * D[E]
-    S[:] = spare
+                for p in range(S.shape[1]):
+                    spare[i, p] += model[1][i, j] * S[j, p]
+        for p in range(S.shape[1]):
+            spare[i, p] += model[2][i] * D[E, p]
+    for i in range(S.shape[0]):
+        _copy(spare[i], S[i])
 
 
 @compiled
@@ -330,15 +349,21 @@ def learn_by_sensitivities(
     S, room, D = np.zeros((states, size)), np.zeros((states, size)), np.zeros((12, size))
     state, spare = work[0], work[1]
     for trial in range(costs.size):
-        state[:], kept[:], S[:], D[:], total[:] = 0.0, weights, 0.0, 0.0, 0.0
+        _copy(weights, kept)
+        for each in (state, total):
+            each.fill(0.0)
+        for each in (S, D):
+            each.fill(0.0)
         for k in range(n):
             if not _sense(k, model, reference, numbers, scales, state, run):
-                costs[trial], weights[:] = np.inf, kept
+                costs[trial] = np.inf
+                _copy(kept, weights)
                 return trial + 1, k
             _act(k, model, reference, weights, guard, state, spare, run)
             _derive(k, model, numbers, scales, weights, run, S, room, D)
-            gradient[:] = numbers[1] * run[2][k, X] * D[X] + numbers[2] * run[2][k, E] * D[E]
-            total += numbers[3] * gradient
+            for p in range(size):
+                gradient[p] = numbers[1] * run[2][k, X] * D[X, p] + numbers[2] * run[2][k, E] * D[E, p]
+                total[p] += numbers[3] * gradient[p]
             _step(weights, change, gradient, rates, momentum, 1.0, longest)
         costs[trial] = trial_cost(n, numbers, run[2])
         if _rms(n, run[2]) < enough:
