@@ -63,6 +63,29 @@ def _drives(omega: Any, k: Any, ends: Any, values: Any, pinned: Any) -> None:
                 values[row, i] = ((e[6] + e[7] * S) * theta - e[8] * M0) / (gS.real * (z1 - z2) ** 2)
 
 
+@compiled
+def bisect(number: Any, k: Any, ends: Any, steps: Any, low: Any, high: Any) -> None:
+    """Move low[i] and high[i] to the neighbouring floats between which the count reaches number[i]; k is undamped.
+
+    `ends` and `steps` are the arms that the count climbs by (`tfarm.spectrum.counting`).
+    """
+    omega, values, pinned = np.empty(1), np.empty((len(ends), 1)), np.empty(1, np.int64)
+    for i in range(number.size):
+        while True:
+            omega[0] = 0.5 * (low[i] + high[i])
+            if not (low[i] < omega[0] and omega[0] < high[i]):
+                break
+            _drives(omega, k, ends, values, pinned)
+            count = pinned[0]
+            for row in range(len(ends)):
+                if (count % 2 == 1) != (values[row, 0] < 0.0):
+                    count += steps[row]
+            if count >= number[i]:
+                high[i] = omega[0]
+            else:
+                low[i] = omega[0]
+
+
 @inlined
 def _half_waves(z: complex, t: complex, dt: complex) -> int:
     """How many whole half waves fit strictly inside the length: n pi < k, for a travelling wave e^{i k x}."""

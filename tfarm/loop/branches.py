@@ -158,14 +158,10 @@ def followed(variation: Variation, start: float, stop: float, wanted: int) -> tu
 def _stay_on_their_side(variation: Variation, segment: Segment) -> None:
     """Raise ConvergenceError where a real zero has stepped over -1/C, and so over infinitely many others."""
     for before, after in pairwise(segment.nodes):
-        sides = [ordered(node.zeros, segment.pinned).real > _singular(variation, node.at) for node in (before, after)]
+        sides = [ordered(node.zeros, segment.pinned).real > variation.singular(node.at) for node in (before, after)]
         real = (before.zeros.imag == 0) & (after.zeros.imag == 0)
         if (real & (sides[0] != sides[1])).any():
             raise _ends_at_singular(variation, before)
-
-
-def _singular(variation: Variation, value: float) -> float:
-    return member_of(variation, value, 0, 0.0).singular
 
 
 def _explained(error: ConvergenceError, variation: Variation) -> ConvergenceError:
@@ -173,7 +169,7 @@ def _explained(error: ConvergenceError, variation: Variation) -> ConvergenceErro
     last = error.best
     if not isinstance(last, Node):
         return error
-    singular = _singular(variation, last.at)
+    singular = variation.singular(last.at)
     if abs(last.zeros - singular).min() <= NEAR_SINGULAR * abs(singular):
         return _ends_at_singular(variation, last)
     text = f"branches cannot be told apart beyond {variation.vary} = {last.at:.10g}: ask for fewer, or another range"

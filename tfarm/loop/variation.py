@@ -66,6 +66,11 @@ class Variation:
         unit = float(k.length / k.EI)
         return k, np.array([[unit * self.law.Kp], [unit * self.law.K1], [self.law.K2]])
 
+    def singular(self, value: float) -> float:
+        """-1/C where the varied number has that value, -inf at C = 0."""
+        C = value if self.vary == "damping" else self.arm.link.damping
+        return -1.0 / C if C else -math.inf
+
     def laws(self, values: Real) -> Real:
         """The dimensionless gains (3, n) at n values of a gain: linear in it."""
         law = self.law
@@ -124,7 +129,6 @@ class Evaluator:
 def member_of(variation: Variation, value: float, at_zero: int, free: float) -> Member:
     """The characteristic function D/s^at_zero of one loop, to be followed; exact zeros at s = 0 may be asked for."""
     k, law = variation.system(value)
-    singular = -1.0 / k.damping if k.damping else -math.inf
 
     def function(s: Complex) -> Analytic:
         value, slope, scale = quick_characteristics(k, s, law, at_zero)
@@ -132,4 +136,4 @@ def member_of(variation: Variation, value: float, at_zero: int, free: float) -> 
             value, slope = np.where(s == 0, 0.0, value), np.where(s == 0, 1.0, slope)
         return Analytic(value, slope, scale)
 
-    return Member(function, singular, free)
+    return Member(function, variation.singular(value), free)

@@ -21,7 +21,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.exact.axis import drives
+from tfarm.exact.axis import bisect, drives
 from tfarm.exact.coefficients import Coefficients, Condition
 
 
@@ -39,6 +39,14 @@ class Counter:
         for value, step in zip(values, self._steps, strict=True):
             count = count + step * ((count % 2 == 1) != (value < 0))
         return count
+
+    def first_reaching(self, number: NDArray[np.int64], below: float) -> NDArray[np.float64]:
+        """The smallest floats [rad/s] with a count of `number` at least, by bisection of 0..below."""
+        kernel = self._kernel.copy()
+        kernel[7] = 0.0
+        low, high = np.zeros(number.size), np.full(number.size, below)
+        bisect(number, kernel, self._ends, np.array(self._steps, np.int64), low, high)
+        return high
 
 
 def steps_of(k: Coefficients) -> tuple[list[list[Fraction]], list[int]]:

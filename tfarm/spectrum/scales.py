@@ -51,8 +51,8 @@ def most_gain(arm: Arm, name: str) -> float:
 def check_gains(arm: Arm, law: HubFeedback) -> None:
     """Raise ParameterError for a gain that is too large for the arm, whatever it would be for another."""
     for name, unit in (("K1", "J w1"), ("K2", "1"), ("Kp", "J w1^2")):
-        value, most = getattr(law, name), most_gain(arm, name)
-        if not abs(value) <= most:
+        value = getattr(law, name)
+        if value and not abs(value) <= (most := most_gain(arm, name)):
             remedy = f"for this arm at most {MOST_UNITS:g} times {unit} in size, {most:.3g}: beyond any machine"
             raise ParameterError(key=name, value=value, remedy=remedy)
 

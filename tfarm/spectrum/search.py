@@ -34,25 +34,14 @@ def natural_frequencies(k: Coefficients, first: int, last: int) -> NDArray[np.fl
     """
     lowest = min(first, 1 + k.has_rigid_mode)  # not the rigid body at zero: bisection would run down all exponents
     number = np.arange(max(first - 1, lowest), last + 2)  # with both neighbours: one of them may be close
-    omega = _bisect(k, number)
+    count = Counter(k)
+    omega = count.first_reaching(number, _upper_bound(count, k, int(number[-1])))
     close = np.diff(omega) * number[1:] < CLOSE * omega[1:]
     for i in np.nonzero(np.r_[close, False] | np.r_[False, close])[0]:
         omega[i] = _settle(k, int(number[i]), float(omega[i]))
     found = omega[(first <= number) & (number <= last)]
     found.flags.writeable = False
     return found
-
-
-def _bisect(k: Coefficients, number: NDArray[np.int64]) -> NDArray[np.float64]:
-    count, last = Counter(k), int(number[-1])
-    low, high = np.zeros(number.size), np.full(number.size, _upper_bound(count, k, last))
-    while True:
-        middle = 0.5 * (low + high)
-        open_ = (low < middle) & (middle < high)
-        if not open_.any():
-            return high
-        above = count(middle) >= number
-        high, low = np.where(open_ & above, middle, high), np.where(open_ & ~above, middle, low)
 
 
 def _settle(k: Coefficients, number: int, omega: float) -> float:
