@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from tfarm.arm import Arm
+from tfarm.exact.methods import Method
 from tfarm.response import TransferFunction
 from tfarm.spectrum import Modes, compare_theories, damped_modes
 
@@ -21,21 +22,24 @@ def to_json(answer: dict[str, Any]) -> str:
     return json.dumps(_plain(answer), allow_nan=False)
 
 
-def modes_answer(modes: Modes, digits: int | None, certify: bool = False) -> dict[str, Any]:
+def modes_answer(
+    modes: Modes, digits: int | None, certify: bool = False, method: Method = "closed-form"
+) -> dict[str, Any]:
     """The modal table, frequencies as strings of so many digits where more than 15 are asked for.
 
-    With `certify` each flexible mode gets its proven bracket, and the whole the count that proves it complete.
+    With `certify` each flexible mode gets its proven bracket, and the whole the count that proves it complete; `method`
+    is the road to the frequencies.
     """
     exact = modes.digits(digits) if digits is not None else []
     strings = exact if digits is not None and digits > 15 else None
-    by_theory = compare_theories(modes)
+    by_theory, found = compare_theories(modes), modes.frequencies(method)
     rows = []
     for row, index in enumerate(modes.index):
-        frequency: Any = float(modes.natural_frequency[row]) if strings is None else strings[row]
+        frequency: Any = float(found[row]) if strings is None else strings[row]
         rows.append({
             "index": int(index),
             "natural_frequency_rad_s": frequency,
-            "natural_frequency_hz": float(modes.natural_frequency_hz[row]),
+            "natural_frequency_hz": float(found[row]) / (2 * math.pi),
             "hub_participation": float(modes.hub_participation[row]),
             "modal_moment": float(modes.modal_moment[row]),
             "nodes_m": [float(x) for x in modes.nodes[row]],
@@ -47,6 +51,7 @@ def modes_answer(modes: Modes, digits: int | None, certify: bool = False) -> dic
         "count": int(modes.index.max()),
         "complete": True,
         "theory": modes.theory,
+        "method": method,
     }
     if digits is not None:
         answer["digits"] = digits
@@ -95,6 +100,7 @@ def response_answer(G: TransferFunction, s: np.ndarray[Any, Any], digits: int | 
         "input_unit": G.input_unit,
         "output": G.outputs[0],
         "unit": G.units[0],
+        "method": G.method,
     }
     if G.x is not None:
         answer["x"] = G.x

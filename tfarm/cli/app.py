@@ -25,6 +25,8 @@ app = typer.Typer(
 
 ArmName = Annotated[str, typer.Argument(metavar="ARM", help="a preset's name or a TOML file", show_default=False)]
 Json = Annotated[bool, typer.Option("--json", help="one JSON object on standard output")]
+MethodName = Annotated[str, typer.Option("--method", help="closed-form, balls, or appendix: the paper's determinant")]
+Compare = Annotated[bool, typer.Option("--compare", help="all three methods beside each other, and where they part")]
 Digits = Annotated[str | None, typer.Option("--digits", metavar="D", help="right digits, proven; strings above 15")]
 
 

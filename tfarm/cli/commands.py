@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from tfarm.cli.app import ArmName, Digits, Json, app, load_arm, right_digits, whole
+from tfarm.cli.app import ArmName, Compare, Digits, Json, MethodName, app, load_arm, right_digits, whole
 from tfarm.errors import ParameterError, one_line
 
 MOST_LISTED = 1000  # modes with nodes and sensitivities: their work grows with the square, to some 20 s
@@ -37,20 +37,27 @@ def modes(
     theory: Annotated[str, typer.Option(help="timoshenko, shear, rayleigh or euler-bernoulli")] = "timoshenko",
     digits: Digits = None,
     certify: Annotated[bool, typer.Option("--certify", help="prove each bracket, and that no mode is missing")] = False,
+    method: MethodName = "closed-form",
+    compare: Compare = False,
     json: Json = False,
 ) -> None:
     """Natural frequencies and modes, complete by construction."""
     wanted, right = whole("--count", count, 1, MOST_LISTED), right_digits(digits)
     subject = load_arm(arm)
     from tfarm.cli.answers import modes_answer, to_json
+    from tfarm.cli.methods import compared_modes, print_compared, slow_method
+    from tfarm.cli.tables import print_modes
     from tfarm.spectrum import modes as find_modes
 
-    answer = modes_answer(find_modes(subject, wanted, theory=theory), right, certify)  # type: ignore[arg-type]
+    table = find_modes(subject, wanted, theory=theory)  # type: ignore[arg-type]
+    road = slow_method(method, table.index, right)
+    if compare:
+        print_compared(compared_modes(table), json)
+        return
+    answer = modes_answer(table, right, certify, road)
     if json:
         print(to_json(answer))
     else:
-        from tfarm.cli.tables import print_modes
-
         print_modes(answer)
 
 
@@ -65,6 +72,8 @@ def response(
     points: Annotated[str, typer.Option("--points", help="how many, logarithmically spaced")] = "500",
     x: Annotated[float | None, typer.Option("--x", help="place on the arm [m], for outputs along it")] = None,
     digits: Digits = None,
+    method: MethodName = "closed-form",
+    compare: Compare = False,
     csv: Annotated[Path | None, typer.Option("--csv", help="write a table to this file")] = None,
     json: Json = False,
 ) -> None:
@@ -77,9 +86,14 @@ def response(
     at = s_values(s) if s is not None else omega_values(omega) if omega is not None else grid(start, stop, points)
     subject = load_arm(arm)
     from tfarm.cli.answers import response_answer, to_json
+    from tfarm.cli.methods import compared_responses, print_compared, slow_method
     from tfarm.response import transfer
 
-    answer = response_answer(transfer(subject, output, x=x), at, right)
+    road = slow_method("balls" if compare else method, at, right)
+    if compare:
+        print_compared(compared_responses(subject, output, x, at), json)
+        return
+    answer = response_answer(transfer(subject, output, x=x, method=road), at, right)
     if csv is not None:
         from tfarm.cli.tables import print_found, say_written, write_csv
 

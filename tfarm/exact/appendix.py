@@ -173,6 +173,28 @@ def roots_near(arm: Arm, omega: float | str | Number, digits: int) -> int:
     return round(sum(turns) / math.pi)
 
 
+def natural_frequency(arm: Arm, near: float, digits: int) -> Number:
+    """The root w [rad/s] of Delta(i w), undamped, next to `near`, right to `digits`.
+
+    By the secant method on Delta lambda_1 lambda_2, which is real for real w and has no branch.  Raises
+    ConvergenceError where two precisions do not agree: at a double frequency.
+    """
+    undamped = replace(arm, link=replace(arm.link, damping=0.0))
+
+    def smooth(w: Number) -> Number:
+        at = Appendix(undamped, mpc(0, 1) * w)
+        return (at.Delta * at.lambdas[0] * at.lambdas[1]).real
+
+    def root() -> list[Number]:
+        start = mpf(near)
+        try:
+            return [mpmath.findroot(smooth, (start, start * (1 + mpf(10) ** -8)), solver="secant", tol=0, verify=False)]
+        except ZeroDivisionError:  # both ends are the root, to the last digit
+            return [start]
+
+    return _proven(root, digits, f"the root of Delta near {near} rad/s")[0]
+
+
 def _proven(evaluate: Callable[[], list[Number]], digits: int, what: str) -> list[Number]:
     """What evaluate() gives at a working precision doubled until two results agree, each number in its digits."""
     digits = max(digits, FEWEST_DIGITS)

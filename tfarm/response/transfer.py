@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from tfarm.arm import Arm, must_be_arm
 from tfarm.errors import MISSING, ParameterError
 from tfarm.exact.coefficients import coefficients
+from tfarm.exact.methods import Method, known_method, slow_values
 from tfarm.exact.outputs import Output, output
 from tfarm.exact.values import (
     differentiate_outputs,
@@ -35,13 +36,15 @@ LARGEST = 1e20  # 1/s; far beyond any arm, and the powers of s that are taken do
 Wanted = str | Output | Sequence[str | Output]  # one output or several
 
 
-def transfer(arm: Arm, outputs: Wanted, *, x: float | None = None) -> TransferFunction:
+def transfer(arm: Arm, outputs: Wanted, *, x: float | None = None, method: Method = "closed-form") -> TransferFunction:
     """The exact transfer function from hub torque (hub angle where the hub is locked) to one output or several.
 
     `outputs` are names of `tfarm.exact.outputs.OUTPUTS`, or an `Output` of your own; `x` [m] is the place of those
-    along the arm.  Raises ParameterError for an unknown output, or for a place missing or outside the arm.
+    along the arm.  `method` is the road to its values: the closed form in float64, "balls" for ball arithmetic alone,
+    or "appendix" for the paper's own determinant with mpmath, some milliseconds a point (`tfarm.exact.methods`).
+    Raises ParameterError for an unknown output or method, or for a place missing or outside the arm.
     """
-    return TransferFunction(arm, outputs, x=x)
+    return TransferFunction(arm, outputs, x=x, method=method)
 
 
 class TransferFunction:
@@ -51,8 +54,9 @@ class TransferFunction:
     axis.  At a pole it raises ParameterError naming the pole; everywhere else it has full float64 accuracy.
     """
 
-    def __init__(self, arm: Arm, outputs: Wanted, *, x: float | None = None) -> None:
+    def __init__(self, arm: Arm, outputs: Wanted, *, x: float | None = None, method: Method = "closed-form") -> None:
         must_be_arm(arm)
+        self.method = known_method(method)
         self.arm = arm
         self.is_single = isinstance(outputs, str | Output)
         asked = (outputs,) if isinstance(outputs, str | Output) else tuple(outputs)
@@ -126,6 +130,8 @@ class TransferFunction:
         )
 
     def _values(self, s: Complex) -> Complex:
+        if self.method != "closed-form":
+            return slow_values(self.method, self.arm, self._k, self.rows, s, self._share)
         if s.size <= BLOCK:
             return evaluate_outputs(self._k, self.rows, self._table, s, self._share)
         values = np.empty((len(self.outputs), s.size), complex)

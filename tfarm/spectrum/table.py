@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from tfarm.arm import Arm, must_be_arm
 from tfarm.errors import ConvergenceError, ParameterError
-from tfarm.exact.appendix import roots_near
+from tfarm.exact.appendix import natural_frequency, roots_near
 from tfarm.exact.coefficients import THEORIES, Coefficients, Theory, coefficients
+from tfarm.exact.methods import DIGITS, Method, known_method
 from tfarm.records import record
 
 from .certify import Certificate, certify
@@ -75,6 +76,26 @@ class Modes:
             if not roots_near(self.arm, text, digits - 1):
                 raise ConvergenceError(f"Delta(s) of the appendix has no root at {text}i rad/s", text, digits)
         return ["0.0"] * self._rigid + flexible
+
+    def frequencies(self, method: Method = "closed-form") -> Real:
+        """The frequencies [rad/s] by another road (`tfarm.exact.methods`), float64, one a mode.
+
+        "balls": the middle of each proven bracket, 15 digits; "appendix": the roots of the paper's Delta next to them.
+        Raises ParameterError for the appendix of another theory, CertificationError where a bracket is not proven and
+        ConvergenceError where Delta's root has no digits: both at a double frequency.
+        """
+        if known_method(method) == "closed-form":
+            return self.natural_frequency
+        if method == "balls":
+            flexible = [(float(lower) + float(upper)) / 2 for lower, upper in self.certify().brackets]
+        elif self.theory == "timoshenko":
+            flexible = [
+                float(natural_frequency(self.arm, float(omega), DIGITS))
+                for omega in self.natural_frequency[self._rigid :]
+            ]
+        else:
+            raise ParameterError(key="method", value=method, remedy="the paper's appendix is of a Timoshenko beam")
+        return np.r_[[0.0] * self._rigid, flexible]
 
     def certify(self, digits: int = 15) -> Certificate:
         """Proven brackets of the flexible frequencies to so many digits, and the proof that none is missing.

@@ -1,0 +1,86 @@
+"""The closed form, balls and the paper's appendix beside each other, as a reader can take them."""
+
+import json
+
+import numpy as np
+import pytest
+
+import tfarm
+from tests.shell import run
+from tests.strategies import some_arm
+from tfarm.cli.methods import ALIKE
+from tfarm.errors import ParameterError
+from tfarm.exact.methods import METHODS
+
+S = np.array([0.3 + 57.1j, 57.1j, -3.0 + 400.0j, 2.0 + 0j])
+BRACKETS = 1e-14  # the middle of two neighbouring decimals of 15 digits
+
+
+@pytest.mark.parametrize("preset", ["sasaki2012", "sasaki2012-lab", "stocky-steel"])
+def test_three_methods_give_one_number(preset):
+    arm = tfarm.load(preset)
+    for output, x in (("root_moment", None), ("tip_displacement", None), ("moment", 0.3 * arm.link.length)):
+        fast, *slow = (tfarm.transfer(arm, output, x=x, method=method)(S) for method in METHODS)
+        for each in slow:
+            assert each == pytest.approx(fast, rel=ALIKE, abs=0)
+    table = tfarm.modes(arm, 5)
+    for method in METHODS[1:]:
+        assert table.frequencies(method) == pytest.approx(table.natural_frequency, rel=BRACKETS, abs=0)
+
+
+def test_random_arms_too():
+    rng = np.random.default_rng(12)
+    for _ in range(5):
+        arm = some_arm(rng)
+        w = tfarm.modes(arm, 2).natural_frequency[-1]
+        fast, *slow = (tfarm.transfer(arm, "tip_displacement", method=each)([0.3j * w, 0.1 * w]) for each in METHODS)
+        for each in slow:
+            assert each == pytest.approx(fast, rel=1e-13, abs=0)  # fast: 6e-14 at worst (tests.exact.accuracy)
+
+
+def test_a_road_that_is_broken_shows(monkeypatch, capsys):
+    """The appendix shares no formula with the closed form: with another wave number in (A.2) it parts, and says so."""
+    from tfarm.exact.appendix import Appendix
+
+    right = Appendix.wave_numbers
+
+    def wrong(self, Ed):
+        one, two = right(self, Ed)
+        return one, two * (1 + 1e-9)
+
+    monkeypatch.setattr(Appendix, "wave_numbers", wrong)
+    code, out, _ = run(capsys, "response", "sasaki2012", "--output", "root_moment", "--s", "0.3+57.1j", "--compare")
+    assert code == 0
+    assert "They part by up to" in out
+
+
+def test_commands_compare_and_take_a_method(capsys):
+    code, out, _ = run(capsys, "modes", "sasaki2012", "--count", "3", "--compare", "--json")
+    answer = json.loads(out)
+    assert (code, list(answer["methods"])) == (0, list(METHODS))
+    assert answer["largest_difference"] < BRACKETS
+    _, out, _ = run(capsys, "modes", "sasaki2012", "--count", "3", "--method", "appendix", "--json")
+    assert json.loads(out)["method"] == "appendix"
+    _, out, _ = run(capsys, "response", "sasaki2012", "--output", "shear", "--x", "0.3", "--omega", "1000", "--compare")
+    assert "agree to" in out
+    assert "+0j" in out.splitlines()[1]  # at C = 0 no rounding is printed as an imaginary part
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("modes", "sasaki2012", "--method", "fem"), "known are: closed-form, balls, appendix"),
+        (("modes", "sasaki2012", "--theory", "shear", "--method", "appendix"), "Timoshenko beam"),
+        (("modes", "sasaki2012", "--method", "balls", "--digits", "20"), "leave --method out"),
+        (("response", "sasaki2012", "--output", "hub_rate", "--points", "3000", "--compare"), "at most 2000 points"),
+    ],
+)
+def test_what_cannot_be_asked_for_is_one_line(capsys, arguments, words):
+    code, out, err = run(capsys, *arguments)
+    assert (code, out) == (2, "")
+    assert words in err
+
+
+def test_python_says_so_too():
+    with pytest.raises(ParameterError, match="closed-form, balls, appendix"):
+        tfarm.transfer(tfarm.load("sasaki2012"), "hub_rate", method="fem")

@@ -1,0 +1,89 @@
+"""The same number by three roads, beside each other: what `--compare` prints."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.cli.answers import to_json
+from tfarm.cli.layout import new_table, show
+from tfarm.errors import ParameterError
+from tfarm.exact.methods import METHODS, Method, known_method
+from tfarm.response import transfer
+
+if TYPE_CHECKING:
+    from tfarm.arm import Arm
+    from tfarm.spectrum import Modes
+
+MOST_SLOW = 2000  # points by balls or by the appendix, at some milliseconds each
+ALIKE = 1e-14  # relative: two roads differ in the last bits of their float64 numbers, as each is rounded
+
+
+def slow_method(method: str, points: NDArray[Any], digits: int | None) -> Method:
+    """The method asked for.  Raises ParameterError for an unknown one, too many points, and digits beside it."""
+    chosen = known_method(method)
+    if chosen != "closed-form" and digits is not None:
+        raise ParameterError(key="--digits", value=digits, remedy="they are proven by balls: leave --method out")
+    if chosen != "closed-form" and points.size > MOST_SLOW:
+        remedy = f"at most {MOST_SLOW} points by {chosen}, which takes milliseconds for each"
+        raise ParameterError(key="--points", value=points.size, remedy=remedy)
+    return chosen
+
+
+def compared_responses(arm: Arm, output: str, x: float | None, s: NDArray[Any]) -> dict[str, Any]:
+    """One output at s by each method, and by what share of its size each differs from the closed form."""
+    found = {method: np.asarray(transfer(arm, output, x=x, method=method)(s)) for method in METHODS}
+    G = transfer(arm, output, x=x)
+    answer = {"arm": arm.name, "output": G.outputs[0], "unit": G.units[0]}
+    values = {method: [[float(v.real), float(v.imag)] for v in each] for method, each in found.items()}
+    return answer | {"s": [[float(p.real), float(p.imag)] for p in s], "methods": values, **_differences(found)}
+
+
+def compared_modes(table: Modes) -> dict[str, Any]:
+    """The frequencies by each method, and by what share each differs from the closed form."""
+    found = {method: table.frequencies(method) for method in METHODS}
+    answer = {"arm": table.arm.name, "theory": table.theory, "index": [int(index) for index in table.index]}
+    return answer | {"methods": {name: each.tolist() for name, each in found.items()}, **_differences(found)}
+
+
+def _differences(found: dict[Method, NDArray[Any]]) -> dict[str, Any]:
+    fast = found["closed-form"]
+    size = np.where(fast == 0, 1.0, abs(fast))
+    apart = {name: abs(each - fast) / size for name, each in found.items() if name != "closed-form"}
+    return {
+        "differences": {name: each.tolist() for name, each in apart.items()},
+        "largest_difference": max(float(each.max(initial=0.0)) for each in apart.values()),
+    }
+
+
+def print_compared(answer: dict[str, Any], json: bool) -> None:
+    """A row a point or a mode: the closed form's number, and how far the other two are from it, relatively."""
+    if json:
+        print(to_json(answer))
+        return
+    if "index" in answer:
+        titles = ("mode", "rad/s")
+        rows = [(str(i), f"{w:.15g}") for i, w in zip(answer["index"], answer["methods"]["closed-form"], strict=True)]
+    else:
+        titles = ("s [1/s]", f"{answer['output']} [{answer['unit']}]")
+        values = zip(answer["s"], answer["methods"]["closed-form"], strict=True)
+        rows = [(f"{complex(*at):.10g}", _shown(complex(*value))) for at, value in values]
+    table = new_table((*titles, "balls differ by", "appendix differs by"))
+    for row, *apart in zip(rows, *(answer["differences"][name] for name in ("balls", "appendix")), strict=True):
+        table.add_row(*row, *(f"{each:.1e}" for each in apart))
+    show(table)
+    print(_verdict(answer["largest_difference"]))
+
+
+def _shown(value: complex) -> str:
+    """A value in 15 digits; without a part that is less than the rounding of the other."""
+    parts = [part if abs(part) > ALIKE * abs(value) else 0.0 for part in (value.real, value.imag)]
+    return f"{complex(*parts):.15g}"
+
+
+def _verdict(largest: float) -> str:
+    if largest <= ALIKE:
+        return f"Float64, proven balls and the paper's own determinant agree to {largest:.1e}, their rounding."
+    return f"They part by up to {largest:.1e}: more than rounding ({ALIKE:.0e}); the balls are proven."

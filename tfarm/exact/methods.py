@@ -1,0 +1,50 @@
+"""Three roads to one number, to be taken beside each other: by hand what the tests do everywhere.
+
+closed-form   the fused formulas in float64, with ball arithmetic where they lose digits: what tfarm takes
+balls         ball arithmetic alone (python-flint): a proven enclosure, and the float64 nearest to it
+appendix      the paper's own 4x4 determinant and Cramer's rule with mpmath, at a precision that is doubled until
+              two results agree; it shares no formula with the other two
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import Arm
+from tfarm.errors import ParameterError, did_you_mean
+
+from . import appendix
+from .coefficients import Coefficients
+from .outputs import Output
+from .values import value_with_care
+
+Complex = NDArray[np.complexfloating[Any, Any]]
+Method = Literal["closed-form", "balls", "appendix"]
+METHODS: tuple[Method, ...] = ("closed-form", "balls", "appendix")
+
+DIGITS = 17  # of the appendix: more than a float64 holds
+
+
+def known_method(method: str) -> Method:
+    """The method of that name.  Raises ParameterError for any other."""
+    if method not in METHODS:
+        raise ParameterError(key="method", value=method, remedy=did_you_mean(method, METHODS))
+    return method
+
+
+def slow_values(method: Method, arm: Arm, k: Coefficients, wanted: Sequence[Output], s: Complex, x: float) -> Complex:
+    """Outputs (rows) at s (1-D) one by one, by the balls or by the appendix; x is a share of the length.
+
+    Raises ParameterError at a pole that float64 cannot tell s from, ConvergenceError where the appendix has no limit.
+    """
+    if method == "balls":
+        return np.array([[value_with_care(k, each, complex(at), each.share(x)) for at in s] for each in wanted])
+
+    def by_cramer(each: Output, at: complex) -> complex:
+        return complex(appendix.response(arm, each, at, DIGITS, x * arm.link.length))
+
+    return np.array([[by_cramer(each, complex(at)) for at in s] for each in wanted])
