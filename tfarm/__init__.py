@@ -18,10 +18,13 @@ if TYPE_CHECKING:
     from tfarm.arm import Arm, Hub, HubFeedback, Link, Payload, Section, load, presets
     from tfarm.errors import CertificationError, ConvergenceError, ParameterError
     from tfarm.exact.outputs import Output
+    from tfarm.loop.design import design
+    from tfarm.loop.locus import locus
     from tfarm.loop.margins import margins
+    from tfarm.loop.nyquist import nyquist
     from tfarm.loop.poles import closed_loop_poles
     from tfarm.reduced import reduce
-    from tfarm.response import transfer
+    from tfarm.response import bode, transfer
     from tfarm.spectrum import damped_modes, modes
     from tfarm.spectrum.scales import default_gains
 
@@ -38,18 +41,26 @@ __all__ = [
     "ParameterError",
     "Payload",
     "Section",
+    "bode",
     "closed_loop_poles",
     "damped_modes",
     "default_gains",
+    "design",
     "load",
+    "locus",
     "margins",
     "modes",
+    "nyquist",
     "presets",
     "reduce",
     "transfer",
 ]
 
 _ROOMS = {
+    "bode": "response",
+    "design": "loop.design",
+    "locus": "loop.locus",
+    "nyquist": "loop.nyquist",
     "closed_loop_poles": "loop.poles",
     "damped_modes": "spectrum",
     "default_gains": "spectrum.scales",

@@ -9,13 +9,14 @@ import pytest
 
 import tfarm
 from tests.loop.arms import window_arm
-from tests.report.nyquist_counts import survey
+from tests.loop.nyquist_counts import survey
 from tfarm.arm import Hub, HubFeedback
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import Sampling
 from tfarm.dsp.loop import sampled_loop
 from tfarm.errors import ConvergenceError
 from tfarm.loop.damping import least_damping
+from tfarm.loop.nyquist import compressed, nyquist, nyquist_of
 from tfarm.loop.plant import Loop
 from tfarm.loop.poles import closed_loop_poles
 from tfarm.loop.stability import stability
@@ -27,7 +28,6 @@ from tfarm.report.loop_section import map_section, margins_section, nyquist_sect
 from tfarm.report.map import Axis, gain_map, map_data, moment_axis, rate_axis, stable_edge
 from tfarm.report.map_picture import draw_map, nice_levels
 from tfarm.report.margins_table import NOTHING, margin_table
-from tfarm.report.nyquist import compressed, nyquist
 from tfarm.report.sections import save_section
 from tfarm.spectrum.scales import PAPER_GAINS, default_gains, rate_unit
 
@@ -226,14 +226,14 @@ def test_beyond_one_infinitely_many_poles_are_unstable_without_damping():
 def test_turns_around_minus_one_are_unstable_poles(arm, K2):
     """Two counts that share nothing: the turns of 1 + L along a contour, and all poles found in a box."""
     law = HubFeedback(K1=0.2 * rate_unit(arm), K2=K2)
-    plot = nyquist(NamedLaw("", "", law), stability(arm, law))
+    plot = nyquist(arm, law)
     assert plot.expected == plot.verdict.unstable_roots
     assert (plot.verdict.unstable_roots > 0) == (K2 > 1)
 
 
 def test_every_pole_on_the_axis_is_passed_on_its_right():
     """At C = 0 half a circle a natural frequency, a quarter at 0; nothing infinite is evaluated."""
-    plot = nyquist(NamedLaw("", "", PAPER_GAINS), stability(PURE, PAPER_GAINS))
+    plot = nyquist(PURE, PAPER_GAINS)
     omega = tfarm.modes(PURE, 12).natural_frequency
     assert plot.poles == pytest.approx(omega, rel=4 * EPS, abs=0)
     starts = np.flatnonzero(np.diff(np.r_[0, plot.is_arc.astype(int)]) == 1)
@@ -329,7 +329,7 @@ def test_the_star_and_its_card_say_that_the_gains_do_not_hold_when_sampled(lab, 
 def test_a_small_unstable_pole_is_not_indented_away(arm, Kp):
     """Kp < 0 leaves one real unstable pole near -Kp/K1, however near to the double pole of L at 0."""
     law = HubFeedback(K1=0.3, K2=0.3, Kp=Kp)
-    plot = nyquist(NamedLaw("", "", law), stability(arm, law))
+    plot = nyquist(arm, law)
     assert (plot.expected, plot.verdict.unstable_roots) == (1, 1)
     radius = abs(plot.s[plot.is_arc][plot.s[plot.is_arc].imag < 1e-2]).min()
     assert radius < plot.verdict.poles.values.real.max() == pytest.approx(-Kp / 0.3, rel=1e-2)
@@ -340,11 +340,11 @@ def test_both_counts_of_a_nyquist_plot_are_compared():
     law = HubFeedback(K1=0.3, K2=1.5)
     verdict = replace(stability(LAB, law), unstable_roots=0)
     with pytest.raises(ConvergenceError, match="by the turns around -1, 0 by finding all"):
-        nyquist(NamedLaw("", "", law), verdict)
+        nyquist_of(verdict)
 
 
 def test_random_loops_have_as_many_turns_as_unstable_poles():
-    """`python -m tests.report.nyquist_counts 500` for more; refused are poles as good as on the axis."""
+    """`python -m tests.loop.nyquist_counts 500` for more; refused are poles as good as on the axis."""
     outcomes = survey(12, 1)
     assert sum(each == "agree" for each in outcomes) >= 9
     assert not any("by finding" in each for each in outcomes)

@@ -13,7 +13,7 @@ from matplotlib.ticker import FuncFormatter, MultipleLocator, NullFormatter
 
 from tfarm.report.digits import plain
 from tfarm.report.figures import BLUE, FAINT, GREY, INK, ORANGE, blank, headline, style
-from tfarm.report.responses import Bode, Real
+from tfarm.response.frequency import Bode, Real
 
 HERTZ = 2 * math.pi
 STRIP = 0.085  # height of the strip of mode numbers above the magnitude, as a share of its axes

@@ -6,16 +6,13 @@ import math
 
 import numpy as np
 
-import tfarm
 from tfarm.arm import Arm
 from tfarm.report.bode import draw_bode
 from tfarm.report.digits import aligned, plain, scientific, significant, unit
 from tfarm.report.figures import Picture
-from tfarm.report.responses import ON_AXIS, Bode, band_of, bode
 from tfarm.report.sections import Section
 from tfarm.report.tables import Table, data_column, number_column, text_column
-
-RESONANCES = 10  # flexible modes in the band
+from tfarm.response.frequency import ON_AXIS, Bode, bode
 
 ROOTS = (
     "Those below the real axis are their mirror images. A damping ratio of 100 % is a real root in the left "
@@ -25,8 +22,7 @@ ROOTS = (
 
 def bode_section(arm: Arm, output: str) -> Section:
     """One output: picture, what it means, poles and zeros."""
-    modes = tfarm.modes(arm, count=RESONANCES + 1)
-    data = bode(arm, output, band_of(modes.natural_frequency[modes.index > 0]))
+    data = bode(arm, output)
     anchor, title = f"bode-{output.replace('_', '-')}", f"From {data.input_label} to {data.label}"
     if data.is_zero:
         words = (f"The {data.label} is zero at every frequency: this arm's tip is pinned.",)

@@ -10,16 +10,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import tfarm
 from tfarm.arm import Arm
 from tfarm.errors import TfarmError
 from tfarm.report.arm_section import headline_numbers
 from tfarm.report.bode import draw_card
-from tfarm.report.bode_section import RESONANCES
 from tfarm.report.figures import save
 from tfarm.report.page import QUESTIONS, Card, summary
-from tfarm.report.responses import band_of, bode
 from tfarm.report.sections import Fact
+from tfarm.response.frequency import bode
 
 FACTS = 4  # of the headline numbers
 PAGES = {"index": "full report", **QUESTIONS}
@@ -28,10 +26,8 @@ LARGEST = 1 << 16  # bytes of a card.json worth reading
 
 def save_card(arm: Arm, folder: Path) -> None:
     """card.svg and card.json; a picture that cannot be made is left out, as its section on the page is."""
-    modes = tfarm.modes(arm, count=RESONANCES + 1)
     try:
-        data = bode(arm, "root_moment", band_of(modes.natural_frequency[modes.index > 0]))
-        save(draw_card(data), folder, "card", formats=("svg",))
+        save(draw_card(bode(arm, "root_moment")), folder, "card", formats=("svg",))
     except TfarmError:
         picture = ""
     else:

@@ -10,7 +10,7 @@ from tfarm.arm import Arm
 from tfarm.dsp import Chain
 from tfarm.dsp.brief import SampledBrief
 from tfarm.errors import ConvergenceError
-from tfarm.loop.stability import stability
+from tfarm.loop.nyquist import Nyquist, nyquist, nyquist_of
 from tfarm.loop.windows import Windows
 from tfarm.report.digits import plain, significant
 from tfarm.report.figures import Picture
@@ -29,7 +29,7 @@ from tfarm.report.loop_laws import (
 from tfarm.report.map import GainMap, gain_map, map_data
 from tfarm.report.map_picture import draw_map
 from tfarm.report.margins_table import margin_table, verdict_facts, verdict_words, window_table
-from tfarm.report.nyquist import COMPARED, Nyquist, count_table, curve_data, draw_nyquist, nyquist
+from tfarm.report.nyquist import COMPARED, Curve, count_table, curve_data, draw_nyquist
 from tfarm.report.sections import Section
 from tfarm.spectrum.scales import default_gains, default_words, rate_unit
 
@@ -199,25 +199,25 @@ def margins_section(arm: Arm, chain: Chain | None = None) -> Section:
 def nyquist_section(arm: Arm) -> Section:
     """The loop function on a contour that hides nothing."""
     named = laws(arm)
-    plots = [nyquist(each, margins_of(arm, each.law).stability) for each in named]
+    plots = [Curve(each, nyquist_of(margins_of(arm, each.law).stability)) for each in named]
     counted = [*plots, *_to_compare(arm)]
     picture = Picture(
         stem="nyquist",
         title="Nyquist plots of the exact loop function",
         caption="Rings: sizes of L; −1 lies on the ring 1. Broad: ω > 0, arrows as ω rises; thin: its mirror image.",
         alt="; ".join(
-            f"{p.named.name}: {p.verdict.verdict}, {p.encirclements} encirclements of −1" for p in plots
+            f"{p.named.name}: {p.data.verdict.verdict}, {p.data.encirclements} encirclements of −1" for p in plots
         ),
         figure=draw_nyquist(arm.name, plots),
         data=curve_data(plots),
     )  # fmt: skip
     names = [f"{plot.named.name}: {plot.named.gains}" for plot in counted]
-    words = (_nyquist_answer(plots), NYQUIST_WORDS.format(poles=_poles_words(plots[0])))
+    words = (_nyquist_answer(plots), NYQUIST_WORDS.format(poles=_poles_words(plots[0].data)))
     title = "Nyquist: does the loop function turn around −1?"
     return Section(anchor="margins-nyquist", title=title, words=words, blocks=(picture, count_table(counted, names)))
 
 
-def _to_compare(arm: Arm) -> list[Nyquist]:
+def _to_compare(arm: Arm) -> list[Curve]:
     """An unstable law whose turns are counted too: K2 beyond its edge, on a free pin K1 < 0; none where neither counts.
 
     K1 is small there: without inertia at the hub a large K1 < 0 drives poles unstable at any frequency.
@@ -228,16 +228,16 @@ def _to_compare(arm: Arm) -> list[Nyquist]:
         replace(law, K2=max(UNSTABLE_K2, beyond)) if has_loop(arm) else replace(law, K1=float(f"{-law.K1 / 10:.3g}"))
     )
     try:
-        return [nyquist(NamedLaw(COMPARED, "unstable", drives), stability(arm, drives))]
+        return [Curve(NamedLaw(COMPARED, "unstable", drives), nyquist(arm, drives))]
     except ConvergenceError:
         return []
 
 
-def _nyquist_answer(plots: list[Nyquist]) -> str:
+def _nyquist_answer(plots: list[Curve]) -> str:
     parts = [
-        f"{p.named.name}: {p.verdict.verdict}, {abs(p.encirclements) or 'no'} turn{'s' * (abs(p.encirclements) != 1)} "
+        f"{named.name}: {p.verdict.verdict}, {abs(p.encirclements) or 'no'} turn{'s' * (abs(p.encirclements) != 1)} "
         f"around −1 and {p.verdict.unstable_roots or 'no'} unstable pole{'s' * (p.verdict.unstable_roots != 1)}"
-        for p in plots
+        for named, p in plots
     ]
     return f"{'; '.join(parts).capitalize()}."
 

@@ -15,7 +15,7 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator
 from tfarm.records import record
 from tfarm.report.digits import plain, significant
 from tfarm.report.figures import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, blank, headline, style
-from tfarm.report.responses import Real
+from tfarm.response.frequency import Real
 from tfarm.spectrum import Modes
 
 POINTS = 401

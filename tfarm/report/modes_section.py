@@ -15,10 +15,10 @@ from tfarm.report.damped_table import damped_table
 from tfarm.report.digits import aligned, fixed, held, significant
 from tfarm.report.figures import Picture
 from tfarm.report.mode_shapes import Shape, draw_differences, draw_shapes, shapes_of, theory_name
-from tfarm.report.responses import Real
 from tfarm.report.sections import Section
 from tfarm.report.tables import Column, Table, data_column, number_column, text_column
 from tfarm.report.trust_proofs import how_proven
+from tfarm.response.frequency import Real
 from tfarm.spectrum import Modes
 
 MODES, SHAPES = 10, 6

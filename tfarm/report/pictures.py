@@ -13,7 +13,7 @@ from tfarm.report.digits import plain
 from tfarm.report.figures import save
 from tfarm.report.mode_shapes import draw_shapes, shapes_of
 from tfarm.report.overlay import draw_overlay, overlay
-from tfarm.report.responses import band_of, bode
+from tfarm.response.frequency import band_of, bode
 from tfarm.spectrum.scales import default_gains
 
 DOTS_PER_INCH = 100
@@ -32,8 +32,7 @@ def readme_pictures(out: Path) -> tuple[Path, ...]:
 def _bode() -> Figure:
     """Torque to root moment, with and without damping."""
     damped, undamped = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
-    modes = tfarm.modes(damped, count=7)
-    band = band_of(modes.natural_frequency[modes.index > 0])
+    band = band_of(damped, 6)
     labels = "exact, no damping", f"exact, damping C = {plain(damped.link.damping)} s"
     return draw_compared(bode(undamped, "root_moment", band), bode(damped, "root_moment", band), labels)
 

@@ -1,6 +1,6 @@
-"""Turns around -1 beside poles in a box, of random loops:  python -m tests.report.nyquist_counts 500 [seed]
+"""Turns around -1 beside poles in a box, of random loops:  python -m tests.loop.nyquist_counts 500 [seed]
 
-Arms and gains of `tests.loop.arms.some_loop`, Kp of either sign; `nyquist` compares its two counts and refuses where
+Arms and gains of `tests.loop.arms.some_loop`, Kp of either sign; `nyquist_of` compares its two counts and refuses where
 they differ, so what is counted here are refusals, by reason.  A small negative Kp leaves one real unstable pole near 0.
 """
 
@@ -11,9 +11,8 @@ import numpy as np
 
 from tests.loop.arms import some_loop
 from tfarm.errors import ConvergenceError
+from tfarm.loop.nyquist import nyquist_of
 from tfarm.loop.stability import stability
-from tfarm.report.loop_laws import NamedLaw
-from tfarm.report.nyquist import nyquist
 
 
 def survey(number, seed):
@@ -27,7 +26,7 @@ def survey(number, seed):
             outcomes.append("no verdict")
             continue
         try:
-            nyquist(NamedLaw("", "", law), verdict)
+            nyquist_of(verdict)
             outcomes.append("agree")
         except ConvergenceError as error:
             outcomes.append(f"{verdict.verdict} loop refused: {error}")

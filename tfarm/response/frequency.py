@@ -18,14 +18,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import tfarm
 from tfarm.arm import Arm
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.records import record
+from tfarm.spectrum import modes
+
+from .transfer import TransferFunction, transfer
 
 Real = NDArray[np.floating[Any]]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
+RESONANCES = 10  # flexible modes in a band, unless told
 PER_DECADE = 120  # points of the even grid
 PER_ROOT_DECADE = 12  # points a decade of distance, on each side of a pole or zero
 NEAREST = 1e-6  # relative distance of the nearest point to a root on the axis
@@ -97,17 +100,23 @@ class Bode:
         return "hub angle" if self.arm.is_locked else "torque"
 
 
-def band_of(natural_frequency: Real) -> tuple[float, float]:
-    """From far below the first flexible mode to midway (geometrically) between the last two [rad/s]."""
+def band_of(arm: Arm, resonances: int = RESONANCES) -> tuple[float, float]:
+    """From far below the first flexible mode to midway (geometrically) between the last shown and the next [rad/s]."""
+    table = modes(arm, resonances + 1)
+    natural_frequency = table.natural_frequency[table.index > 0]
     low = natural_frequency[0] / 20
     decade = 10.0 ** math.floor(math.log10(low))
     start = max(step for step in (decade, 2 * decade, 5 * decade) if step <= low * (1 + 1e-12))
     return float(start), float(math.sqrt(natural_frequency[-2] * natural_frequency[-1]))
 
 
-def bode(arm: Arm, output: str, band: tuple[float, float]) -> Bode:
-    """The exact frequency response of one output over a band [rad/s], refined at every pole and zero."""
-    G = tfarm.transfer(arm, output)
+def bode(arm: Arm, output: str, band: tuple[float, float] | None = None) -> Bode:
+    """The exact frequency response of one output over a band [rad/s], refined at every pole and zero.
+
+    Without a band it holds the first ten flexible modes (`band_of`).  Raises ParameterError for an unknown output.
+    """
+    band = band_of(arm) if band is None else band
+    G = transfer(arm, output)
     if not np.any(G(1j * np.geomspace(*band, 3))):
         return _no_motion(arm, output, band)
     beyond = 1.3 * band[1]  # roots just above the band shape its edge
@@ -201,7 +210,7 @@ def _on_axis(roots: Complex) -> NDArray[np.bool_]:
     return (abs(roots.real) <= ON_AXIS * abs(roots)) & (roots.imag > 0)
 
 
-def _magnitude_at(G: tfarm.response.TransferFunction, roots: Complex, *, on_axis: float) -> Real:
+def _magnitude_at(G: TransferFunction, roots: Complex, *, on_axis: float) -> Real:
     """|G(i Im s)| at each root; the given value at those on the axis."""
     result = np.full(roots.size, on_axis)
     off = ~_on_axis(roots)

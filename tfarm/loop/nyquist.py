@@ -1,0 +1,160 @@
+"""Nyquist's criterion on the exact loop function, the turns around -1 counted and compared with the poles found.
+
+The contour runs up the imaginary axis, passes each pole of L on it by a small semicircle on the right, and closes along
+the edges of the box in which the verdict's poles were counted.  L is evaluated on all of it, so the encirclements of -1
+are counted, not read off: clockwise ones are closed-loop poles inside the contour, as no pole of L is in there.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import Arm, HubFeedback
+from tfarm.errors import ConvergenceError
+from tfarm.records import record
+
+from .frequencies import band_of, grid, natural_frequencies
+from .plant import Loop
+from .poles import ON_AXIS
+from .stability import Stability, stability
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complexfloating[Any, Any]]
+
+INDENT = 0.05  # radius of a semicircle around a pole of L, in units of its residue: |L| is about 20 on it
+NEARER = 0.1  # of the way to the nearest closed-loop pole: no step past a pole of L leaves an unstable one out
+SLOW = 200  # points between that and the arm's own grid
+EDGE = 750  # points along an edge of the box, to begin with
+ARC = np.linspace(-math.pi / 2, math.pi / 2, 41)
+FAST = 0.7  # radians: where the argument of 1 + L turns by more between neighbours of the contour it is halved
+FINE = 0.02  # of the rim's radius: the longest straight piece of a drawn curve
+ROUNDS = 24  # of halving where it turns more
+
+
+@dataclass(frozen=True)
+@record
+class Nyquist:
+    """L on the contour for Im s >= 0: `s` (n,), `L` (n,), `is_arc` where the contour passes a pole on the axis.
+
+    `poles` [rad/s] are those of L on the axis, `encirclements` of -1 by the whole contour, counter-clockwise positive,
+    `verdict` what the poles say, counted in a box without this contour.
+    """
+
+    s: Complex
+    L: Complex
+    is_arc: NDArray[np.bool_]
+    poles: Real
+    encirclements: int
+    verdict: Stability
+
+    @property
+    def on_axis(self) -> int:
+        """Poles of the box that lie on the axis to working precision, apart from that at 0."""
+        moving = self.verdict.poles.moving
+        near = abs(moving.real) <= ON_AXIS * abs(moving)
+        return int((near * np.where(moving.imag > 0, 2, 1)).sum())
+
+    @property
+    def expected(self) -> int:
+        """Unstable closed-loop poles by Nyquist's criterion."""
+        return -self.encirclements
+
+
+def nyquist(arm: Arm, law: HubFeedback) -> Nyquist:
+    """The loop function of a law on Nyquist's contour, its turns around -1 counted (see `nyquist_of`)."""
+    return nyquist_of(stability(arm, law))
+
+
+def nyquist_of(verdict: Stability) -> Nyquist:
+    """The same for a verdict, its encirclements counted up to the verdict's band.
+
+    The contour goes around the right part of the verdict's box, so both counts are of one region.  Raises
+    ConvergenceError where a curve passes -1 so close that its turns cannot be counted, or the two counts differ.
+    """
+    loop, band = verdict.loop, verdict.band
+    poles = poles_on_axis(loop, band)
+    s, is_arc = smooth(loop, *upper_contour(loop, poles, band, verdict.poles.moving))
+    corner = complex(verdict.poles.box.re_max, band)
+    across, down = np.linspace(1j * band, corner, EDGE), np.linspace(corner, corner.real, EDGE)
+    turned = turning(loop, np.r_[s, across[1:], down[1:]])
+    plot = Nyquist(s, loop.loop_function(s), is_arc, poles, round(turned / math.pi), verdict)
+    if not verdict.unstable_roots <= plot.expected <= verdict.unstable_roots + plot.on_axis:
+        text = (
+            f"{plot.expected} unstable poles by the turns around -1, {verdict.unstable_roots} by finding all in a box"
+        )
+        raise ConvergenceError(text, plot, plot.expected - verdict.unstable_roots)
+    return plot
+
+
+def poles_on_axis(loop: Loop, band: float) -> Real:
+    """Poles of L on the imaginary axis [rad/s], from 0 up: the rigid body's, and at C = 0 every natural frequency."""
+    arm, law = loop.arm, loop.law
+    zero = [0.0] if arm.has_rigid_mode and (law.K1 or law.Kp) else []
+    return np.r_[zero, natural_frequencies(arm, band)] if arm.link.damping == 0 else np.array(zero)
+
+
+def upper_contour(loop: Loop, poles: Real, band: float, closed: Complex) -> tuple[Complex, NDArray[np.bool_]]:
+    """From s = 0 (or right of it, where a pole is) up the axis to the band, past each pole on its right.
+
+    `closed` are the closed loop's poles: each step past a pole of L goes nearer to it than the nearest of them.
+    """
+    omega = np.asarray(grid(loop.arm, band))
+    s, is_arc = 1j * omega, np.zeros(omega.size, bool)
+    for pole in poles:
+        radius = indentation(loop, float(pole))
+        away = abs(closed - 1j * pole)
+        radius = min(radius, NEARER * float(away[away > ON_AXIS * pole].min(initial=math.inf)))
+        if pole == 0:
+            slow = 1j * np.geomspace(radius, omega[0], SLOW)[1:-1]
+            s, is_arc = np.r_[s, slow], np.r_[is_arc, np.zeros(slow.size, bool)]
+        clear = abs(s - 1j * pole) > radius
+        arc = 1j * pole + radius * np.exp(1j * (ARC[ARC >= 0] if pole == 0 else ARC))
+        approach = 1j * (pole + np.outer([-1.0, 1.0], radius * np.geomspace(1.05, 1e3, 40)).ravel())
+        approach = approach[(approach.imag > 0) & (approach.imag < band)]
+        s = np.r_[s[clear], arc, approach]
+        is_arc = np.r_[is_arc[clear], np.ones(arc.size, bool), np.zeros(approach.size, bool)]
+    order = np.argsort(s.imag, kind="stable")
+    return s[order], is_arc[order]
+
+
+def smooth(loop: Loop, s: Complex, is_arc: NDArray[np.bool_]) -> tuple[Complex, NDArray[np.bool_]]:
+    """More points on the axis wherever the drawn curve would have corners."""
+    for _ in range(ROUNDS):
+        length = abs(np.diff(compressed(loop.loop_function(s))))
+        (coarse,) = np.nonzero((length > FINE) & ~is_arc[1:] & ~is_arc[:-1])
+        if not coarse.size:
+            break
+        s = np.insert(s, coarse + 1, (s[coarse] + s[coarse + 1]) / 2)
+        is_arc = np.insert(is_arc, coarse + 1, False)
+    return s, is_arc
+
+
+def indentation(loop: Loop, pole: float) -> float:
+    """The radius at which |L| is about 20, and at most a thousandth of the pole's frequency (at 0: of the first)."""
+    scale = pole or band_of(loop.arm, 1)
+    step = 1e-6 * scale
+    near = np.array([step + 0j if pole == 0 else 1j * (pole + step)])
+    return min(INDENT * float(abs(loop.loop_function(near)[0])) * step, 1e-3 * scale)
+
+
+def turning(loop: Loop, path: Complex) -> float:
+    """By how much [rad] the argument of 1 + L grows along a path, halved where it turns fast."""
+    value = 1 + loop.loop_function(path)
+    for _ in range(ROUNDS):
+        step = np.angle(value[1:] / value[:-1])
+        (fast,) = np.nonzero(abs(step) > FAST)
+        if not fast.size:
+            return float(step.sum())
+        middle = (path[fast] + path[fast + 1]) / 2
+        path, value = np.insert(path, fast + 1, middle), np.insert(value, fast + 1, 1 + loop.loop_function(middle))
+    raise ConvergenceError("the curve passes -1 too close for its encirclements to be counted", path[fast], step[fast])
+
+
+def compressed(L: Complex) -> Complex:
+    """L with its size r drawn as r/(1 + r): 0 stays, 1 is half-way, infinity is the rim."""
+    return np.asarray(L / (1 + abs(L)))
