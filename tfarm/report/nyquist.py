@@ -1,4 +1,4 @@
-"""Nyquist plots of the exact loop function that hide nothing: infinity is drawn on the rim, poles on the axis by arcs."""
+"""Nyquist plots of the exact loop function that hide nothing: infinity is on the rim, poles on the axis are arcs."""
 
 from __future__ import annotations
 
@@ -157,9 +157,7 @@ def _legend() -> tuple[list[Line2D], list[str]]:
 def count_table(plots: Sequence[Curve], names: Sequence[str]) -> Table:
     """Verdict, encirclements and unstable poles of each law."""
     verdicts = [plot.data.verdict for plot in plots]
-    counts = np.array(
-        [[p.data.encirclements, p.data.expected, p.data.verdict.unstable_roots, p.data.on_axis] for p in plots]
-    )
+    counts = np.array([[p.encirclements, p.expected, p.verdict.unstable_roots, p.on_axis] for _, p in plots])
     bands = np.array([verdict.band for verdict in verdicts])
     words = [f"{it.verdict}{', infinitely many in all' * it.unstable_roots_infinite}" for it in verdicts]
     titles = ("turns around −1", "by Nyquist", "in a box", "undecided")
