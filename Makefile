@@ -13,6 +13,7 @@ SIZE ?= 100
 SEED ?= 1
 SURVEYS := \
 	plausible \
+	audit.slips \
 	exact.accuracy \
 	spectrum.proofs \
 	spectrum.damped \

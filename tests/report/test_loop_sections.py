@@ -253,7 +253,7 @@ def test_nothing_is_cut_off_by_the_compression():
 @pytest.mark.parametrize(("inertia", "reason"), [(math.inf, "locked"), (0.0, "no inertia")])
 def test_an_arm_without_a_loop_gets_a_sentence(tmp_path, monkeypatch, inertia, reason):
     monkeypatch.setattr(writing, "save_proof", lambda *_: None)
-    arm = replace(LAB, name="held", hub=Hub(inertia=inertia))
+    arm = replace(PURE, name="held", hub=Hub(inertia=inertia))
     assert not has_loop(arm)
     page = write([arm], tmp_path, only=("margins",)).read_text()
     assert reason in page
@@ -281,10 +281,14 @@ def test_the_sign_convention_stands_wherever_K2_does(monkeypatch):
         assert any("Sign of K2" in text for text in texts)
 
 
-def test_the_same_bytes_twice(section, tmp_path):
-    for folder, drawn in (("a", section), ("b", map_section(LAB))):
+def test_the_same_bytes_twice(tmp_path, monkeypatch):
+    """On a coarse grid, under the default gains."""
+    one_law(monkeypatch)
+    for name, number in {"COLUMNS": 48, "ROWS": 40, "SAMPLED_COLUMNS": 24}.items():
+        monkeypatch.setattr(map, name, number)
+    for folder in ("a", "b"):
         (tmp_path / folder).mkdir()
-        for each in (drawn, nyquist_section(LAB)):
+        for each in (map_section(LAB), nyquist_section(LAB)):
             save_section(each, tmp_path / folder)
     files = sorted(file.name for file in (tmp_path / "a").iterdir())
     assert {"map.svg", "map.pdf", "map-data.csv", "nyquist.png", "nyquist-count.json"} <= set(files)

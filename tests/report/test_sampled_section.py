@@ -31,7 +31,10 @@ PLANE = cache(lambda: overlay(LAB, GAINS, Chain()))
 
 @pytest.fixture(scope="module")
 def section():
-    return sampled_section(LAB)
+    """With the map of both regions that the tests of it have."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("tfarm.report.sampled_words.overlay", lambda *what: {(LAB, GAINS, Chain()): PLANE()}[what])
+        return sampled_section(LAB)
 
 
 def windows(arm, gains=GAINS):
@@ -196,10 +199,12 @@ def test_the_strip_chart_has_steps_delay_and_saturation():
 # ------------------------------------------------------------ bytes and odd arms
 
 
-def test_the_same_bytes_twice(tmp_path):
+def test_the_same_bytes_twice(tmp_path, monkeypatch):
+    monkeypatch.setattr("tfarm.report.overlay.COLUMNS", 16)
     loop = sampled_verdict(LAB, GAINS).loop
-    for name, data in (("a", PLANE()), ("b", overlay(LAB, GAINS, Chain()))):
+    for name in ("a", "b"):
         (tmp_path / name).mkdir()
+        data = overlay(LAB, GAINS, Chain())
         found = loci(loop, 20.0, (-0.5, 1.5))
         ideal = slews(LAB, GAINS, Chain(), 14)
         figures = (draw_overlay(data), draw_strip_chart(strip_chart(LAB, GAINS, ideal.without, 14)))

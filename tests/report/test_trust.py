@@ -1,6 +1,7 @@
 """Why trust this: the proofs kept for each arm, the digits shown, and the page made of them."""
 
 import json
+import pickle
 import re
 from dataclasses import replace
 from fractions import Fraction
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 import tfarm
+from tests.shared import once
 from tfarm.arm import to_toml
 from tfarm.audit.published import Row as PublishedRow
 from tfarm.report import trust_proofs, write, writing
@@ -25,8 +27,12 @@ CHEAP = ("(8)", "Table 1 (rho)", "Table 1 (I_h)", "section 5: inputs", "(22)", "
 
 
 @pytest.fixture(scope="module")
-def proof():
-    return prove(ARM)
+def proof(tmp_path_factory):
+    return pickle.loads(once(tmp_path_factory, "proof", save_pickled).read_bytes())
+
+
+def save_pickled(file):
+    file.write_bytes(pickle.dumps(prove(ARM)))
 
 
 @pytest.fixture(scope="module")
@@ -194,17 +200,20 @@ def test_versions_hashes_and_the_command_are_there(page, proof, tmp_path):
 
 
 def test_one_page_of_an_arm_does_not_wait_for_the_audit(tmp_path, monkeypatch, evidence):
-    """--only has no page on trust, nor a link to it, unless a whole report made it before."""
+    """--only has no page on trust, nor a link to it, unless a whole report made it before.
+
+    The page of loci, which for an arm without a loop is made at once.
+    """
     monkeypatch.setattr(writing, "gather", lambda: pytest.fail("the audit ran"))
     arm = replace(ARM, name="mine", hub=tfarm.Hub(inertia=np.inf))
-    page = write([arm], tmp_path, only=("assumptions",))
+    page = write([arm], tmp_path, only=("locus",))
     text = page.read_text(encoding="utf-8")
     assert "why trust this" not in text
     assert 'href="proof.json"' in text
     assert (tmp_path / "mine" / "arm.toml").read_text(encoding="utf-8") == to_toml(arm)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["index.html", "mine"]
     write_trust(evidence, written_proofs(tmp_path), tmp_path / "trust")
-    write([arm], tmp_path, only=("assumptions",))
+    write([arm], tmp_path, only=("locus",))
     assert "../trust/index.html" in page.read_text(encoding="utf-8")
     assert "trust/index.html" in (tmp_path / "index.html").read_text(encoding="utf-8")
 
