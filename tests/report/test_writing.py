@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from functools import cache, partial
 from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote
@@ -39,7 +40,10 @@ ARM = replace(tfarm.load("stocky-steel"), name=NAME, assumptions=(ATTACK, "secon
 
 HELD = replace(ARM, hub=tfarm.Hub(inertia=math.inf))  # no loop: its proofs are quick
 REPORT = (
-    "import sys, tfarm; from pathlib import Path; from tfarm.report import write;"
+    "import pickle, sys, tfarm; from pathlib import Path; from tfarm import audit; from tfarm.report import write;"
+    "from tfarm.report import overlay, sampled_words;"
+    "rows = pickle.loads(Path(sys.argv[3]).read_bytes()); audit.audit = lambda: rows;"
+    "overlay.COLUMNS, sampled_words.SHARES = 16, (1.0, 5.0);"  # the sampled section has tests of its own
     "print(write([tfarm.load(sys.argv[1])], Path(sys.argv[2])));"
     "pyplot = sys.modules.get('matplotlib.pyplot');"  # python-control imports it; no figure may be its own
     "print(bool(pyplot and pyplot.get_fignums()))"
@@ -47,16 +51,19 @@ REPORT = (
 
 
 @pytest.fixture(scope="module")
-def pages(tmp_path_factory):
-    """A full report on one arm, one a session, by a process with other hashes and in another time zone."""
-    return once(tmp_path_factory, "pages", report_elsewhere)
+def pages(tmp_path_factory, audit_file):
+    """A full report on one arm, one a session, by a process with other hashes and in another time zone.
+
+    Its audit is the one that the command of this session has made.
+    """
+    return once(tmp_path_factory, "pages", partial(report_elsewhere, audit_file))
 
 
-def report_elsewhere(out):
+def report_elsewhere(audit_file, out):
     file = out.with_suffix(".toml")
     file.write_text(to_toml(ARM), encoding="utf-8")
     done = subprocess.run(
-        [sys.executable, "-c", REPORT, str(file), str(out)],
+        [sys.executable, "-c", REPORT, str(file), str(out), str(audit_file)],
         env={**os.environ, "PYTHONHASHSEED": "12345", "TZ": "Asia/Tokyo"},
         capture_output=True,
         text=True,
@@ -67,6 +74,11 @@ def report_elsewhere(out):
 
 def files_of(folder):
     return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+@cache
+def ids_of(page):
+    return set(Links(page).ids)
 
 
 class Links(HTMLParser):
@@ -137,7 +149,7 @@ def test_every_link_leads_somewhere_and_none_leaves_the_disk(pages):
             path, _, anchor = target.partition("#")
             file = page.parent / unquote(path) if path else page
             assert file.resolve().is_file(), target
-            assert not anchor or anchor in Links(file).ids
+            assert not anchor or anchor in ids_of(file)
         assert len(set(links.ids)) == len(links.ids)
         assert not links.tags & {"script", "link", "iframe", "object", "b"}
         text = page.read_text(encoding="utf-8")
@@ -305,6 +317,7 @@ def test_a_name_too_long_for_a_folder_is_refused_too(tmp_path):
     assert not (tmp_path / "new").exists()
 
 
+@pytest.mark.usefixtures("audited")
 def test_work_that_fails_leaves_nothing(tmp_path, monkeypatch):
     def fail(arm, folder):
         (folder / "half.svg").write_text("half")
