@@ -1,12 +1,14 @@
 """The tuner on the page: costs are those of the tuner's room, the guard is on the map, other arms get one sentence."""
 
 import math
+import pickle
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import tfarm
+from tests.shared import once
 from tfarm.dsp import Chain
 from tfarm.report import tuner_study as study_module
 from tfarm.report.curves import away
@@ -21,15 +23,19 @@ SEEDS = 3
 
 
 @pytest.fixture(scope="module")
-def small():
+def small(tmp_path_factory):
     """The section and its numbers with few seeds, few trials and the first four conditions."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(study_module, "SEEDS", SEEDS)
         patch.setattr(study_module, "MAP_SEEDS", 1)
         patch.setattr(study_module, "MAP_TRIALS", 3)
         patch.setattr(study_module, "conditions", lambda *each: conditions(*each)[:4])
-        data = tuner_study(LAB, Chain())
+        data = pickle.loads(once(tmp_path_factory, "tuner", save_study).read_bytes())
         yield data, section_of(data)
+
+
+def save_study(file):
+    file.write_bytes(pickle.dumps(tuner_study(LAB, Chain())))
 
 
 def blocks_of(section):
