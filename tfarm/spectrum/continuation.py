@@ -46,6 +46,7 @@ class Member(NamedTuple):
 Family = Callable[[float], Member]
 
 NEIGHBOURS = 8  # zeros that repel each other: those further away move too little to matter
+FEW = 64  # zeros: of so many all distances are found sooner than a tree is built
 BELIEVED = 0.2  # how far a zero may land from its prediction, in distances to the next one
 SETTLED = 1e-6  # a correction smaller than this share of that distance ends a step
 CLOSING = 0.2  # two real zeros whose distance would shrink by more than this share in a step refused are a pair
@@ -143,9 +144,9 @@ def _pairs(mean: Real, square: Real) -> Complex:
 
 def corrected(member: Member, guess: Complex) -> tuple[Complex, NDArray[np.bool_]]:
     """The pairs of zeros next to the guess, and which of them did not settle there."""
-    zeros, which = guess, nearest(guess)
+    zeros, beside = guess, nearest(guess)
     for _ in range(12):
-        zeros, moved = improved(member, zeros, which)
+        zeros, moved = improved(member, zeros, beside)
         if not np.isfinite(zeros).all():
             break
         if (moved < SETTLED).all():
@@ -154,7 +155,7 @@ def corrected(member: Member, guess: Complex) -> tuple[Complex, NDArray[np.bool_
 
 
 def _strayed(guess: Complex, found: Complex, member: Member) -> NDArray[np.bool_]:
-    gap, _ = _neighbours(found, member, nearest(found))
+    gap, _ = _gaps(found, member, nearest(found))
     met = (guess[:, 0].imag > 0) != (found[:, 0].imag > 0)  # around a meeting on the axis only the mean is compared
     moved = np.where(met[:, None], abs((guess - found).mean(1))[:, None], abs(guess - found))
     strayed: NDArray[np.bool_] = np.any(~(moved < BELIEVED * gap), axis=1)
@@ -221,59 +222,73 @@ def _next_zero(function: Function, zero: float) -> float:
     return min(found, key=lambda s: abs(s - zero), default=np.inf)
 
 
-def nearest(zeros: Complex) -> NDArray[np.int64]:
-    """The numbers (2 n, m) of the m zeros next to each of the pairs' zeros (n, 2), itself among them."""
-    flat = zeros.ravel()
-    plane, number = np.c_[flat.real, flat.imag], min(NEIGHBOURS, flat.size)
-    found: NDArray[np.int64] = np.reshape(cKDTree(plane).query(plane, k=number)[1], (flat.size, number))
-    return found
+class Neighbours(NamedTuple):
+    """The numbers (2 n, m) of the m zeros next to each of the pairs' zeros, and which of them are others."""
+
+    which: NDArray[np.int64]
+    itself: NDArray[np.bool_]
+    own_pair: NDArray[np.bool_]
 
 
-def _neighbours(zeros: Complex, member: Member, which: NDArray[np.int64]) -> tuple[Real, Complex]:
-    """Of each zero its distance to the nearest zero of another pair or to the singular point, and its `nearest`."""
+def nearest(zeros: Complex) -> Neighbours:
+    """The zeros next to each of the pairs' zeros (n, 2), itself among them."""
     flat = zeros.ravel()
-    itself = np.arange(flat.size)[:, None]
-    near = flat[which]
-    gap = np.where(which // 2 == itself // 2, np.inf, abs(near - flat[:, None])).min(1)
-    others = np.where(which == itself, np.nan, near)
+    number, each = min(NEIGHBOURS, flat.size), np.arange(flat.size)[:, None]
+    if flat.size <= FEW:
+        away = abs(flat[:, None] - flat)
+        which = np.argpartition(away, number - 1, axis=1)[:, :number]
+    else:
+        plane = np.column_stack([flat.real, flat.imag])
+        which = np.reshape(cKDTree(plane).query(plane, k=number)[1], (flat.size, number))
+    return Neighbours(which, which == each, which // 2 == each // 2)
+
+
+def _gaps(zeros: Complex, member: Member, beside: Neighbours) -> tuple[Real, Complex]:
+    """Of each zero its distance to the nearest zero of another pair or to the singular point, and the way to each."""
+    flat = zeros.ravel()
+    way = flat[:, None] - flat[beside.which]
+    gap = np.where(beside.own_pair, np.inf, abs(way)).min(1)
     from_origin = np.maximum(2 * abs(flat), member.free + 1e-300)
     gap = np.minimum(gap, np.minimum(from_origin, abs(flat - member.singular)))
-    return gap.reshape(zeros.shape), others
+    return gap.reshape(zeros.shape), way
 
 
-def improved(member: Member, zeros: Complex, which: NDArray[np.int64] | None = None) -> tuple[Complex, Real]:
+def improved(member: Member, zeros: Complex, beside: Neighbours | None = None) -> tuple[Complex, Real]:
     """One correction of every pair, and how far each moved, as a share of its distance to the next zero.
 
-    `which` are the `nearest` zeros, where they are known from before the first of a few corrections.
+    `beside` are the `nearest` zeros, where they are known from before the first of a few corrections.
     """
-    gap, others = _neighbours(zeros, member, nearest(zeros) if which is None else which)
+    beside = beside or nearest(zeros)
+    gap, way = _gaps(zeros, member, beside)
     is_real = zeros.imag[:, 0] == 0
     value, slope, scale = _of_pairs(member.function, zeros, is_real)
+    way[beside.itself | (way == 0)] = np.inf  # two that have become one do not part by repulsion
     with np.errstate(all="ignore"):
         step = value / slope
-        repulsion = np.nansum(1 / (zeros.ravel()[:, None] - others), axis=1).reshape(zeros.shape)
+        repulsion = (1 / way).sum(1).reshape(zeros.shape)
         new = zeros - step / (1 - step * repulsion)
-    new[~is_real, 1] = new[~is_real, 0].conj()
-    new[is_real] = new[is_real].real
-    apart = abs(zeros[:, 0] - zeros[:, 1])
-    close = (apart < gap.min(1)) & (zeros[:, 0] != 0)
-    for i in np.nonzero(close & ~(abs(new - zeros).max(1) < 0.1 * apart))[0]:
-        twist = np.exp(scale[i, 1] - scale[i, 0])  # both values on the scale of the first
-        new[i] = _together(zeros[i], value[i] * [1, twist], slope[i] * [1, twist])
-    floor = 4 * np.finfo(float).eps * abs(zeros)  # nearer no zero is known
-    with np.errstate(divide="ignore", invalid="ignore"):  # no gap is left between two that have become one
-        moved = np.where(abs(new - zeros) <= floor, 0.0, abs(new - zeros) / gap).max(1)
+        new[:, 1] = np.where(is_real, new[:, 1].real, new[:, 0].conj())
+        new[:, 0] = np.where(is_real, new[:, 0].real, new[:, 0])
+        apart = abs(zeros[:, 0] - zeros[:, 1])
+        close = (apart < gap.min(1)) & (zeros[:, 0] != 0)
+        for i in np.nonzero(close & ~(abs(new - zeros).max(1) < 0.1 * apart))[0]:
+            twist = np.exp(scale[i, 1] - scale[i, 0])  # both values on the scale of the first
+            new[i] = _together(zeros[i], value[i] * [1, twist], slope[i] * [1, twist])
+        away = abs(new - zeros)
+        floor = 4 * np.finfo(float).eps * abs(zeros)  # nearer no zero is known
+        moved = np.where(away <= floor, 0.0, away / gap).max(1)  # no gap is left between two that have become one
     return new, moved
 
 
 def _of_pairs(function: Function, zeros: Complex, is_real: NDArray[np.bool_]) -> list[Complex]:
     """Value, slope and scale at pairs (n, 2); of a conjugate pair the function is asked at the upper zero alone."""
-    asked = np.stack([np.ones_like(is_real), is_real], axis=1)
+    count = len(zeros)
     found = []
-    for part in function(zeros[asked]):
+    for part in function(np.concatenate([zeros[:, 0], zeros[is_real, 1]])):
         both = np.empty(zeros.shape, complex)
-        both[asked] = part
-        both[~is_real, 1] = both[~is_real, 0].conj()
+        both[:, 0] = part[:count]
+        both[:, 1] = both[:, 0].conj()
+        both[is_real, 1] = part[count:]
         found.append(both)
     return found
 
