@@ -16,6 +16,7 @@ SURVEYS := \
 	audit.slips \
 	exact.accuracy \
 	spectrum.proofs \
+	spectrum.ritz \
 	spectrum.damped \
 	loop.counts \
 	loop.agreement \

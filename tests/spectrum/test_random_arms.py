@@ -31,7 +31,7 @@ def arms() -> list[Arm]:
 
 
 def test_the_list_is_the_count_on_random_arms() -> None:
-    """`python -m tests.spectrum.proofs 1000` for more, in balls and against a Ritz model."""
+    """`python -m tests.spectrum.ritz 1000` for more, against a Ritz model and in balls too."""
     for arm in arms():
         modes = tfarm.modes(arm, 12)
         omega = modes.natural_frequency[-12:]
