@@ -1,5 +1,7 @@
 """Poles and damping of many laws at once, against the complete lists of `poles_below` and a Legendre-Ritz model."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ import tfarm
 from tests.loop.agreement import some_free_arm, some_gains
 from tests.loop.ritz_loop import RitzLoop
 from tfarm import HubFeedback
+from tfarm.loop import damping
 from tfarm.loop.damping import band_and_real_poles, band_poles, is_oscillating, least_damping
 from tfarm.loop.frequencies import band_of
 from tfarm.loop.plant import Loop
@@ -48,3 +51,17 @@ def test_the_least_damping_is_that_of_an_independent_model() -> None:
         s = s[(s.imag > 0) & (s.imag < top)]
         assert found[n] == pytest.approx((-s.real / abs(s)).min(), rel=1e-5)
     assert found[3] < 0
+
+
+def test_next_to_the_clamped_hub_a_larger_model_is_asked_before_a_box(monkeypatch):
+    """K2 = 0.9978 nearly cancels the hub's inertia: a model's first modes are a third off, and a design asks often."""
+    arm = tfarm.load("sasaki2012")
+    arm = replace(arm, link=replace(arm.link, length=16.0))
+    K1, K2, none = np.array([0.3, 0.1, 1.0]), np.full(3, 0.9978), np.zeros(3)
+    top = band_of(arm, 1)
+    boxed = [poles_below(Loop(arm, HubFeedback(K1=float(k), K2=0.9978)), top).values for k in K1]
+    monkeypatch.setattr(damping, "poles_below", None)
+    found = band_poles(arm, K1, K2, none, 1)
+    for own, box in zip(found, boxed, strict=True):
+        box = box[is_oscillating(box) & (box.imag < top)]
+        np.testing.assert_allclose(np.sort_complex(own[~np.isnan(own)]), np.sort_complex(box), rtol=1e-9)

@@ -17,7 +17,7 @@ from tfarm import CertificationError
 from tfarm.exact.balls import point, precision
 from tfarm.exact.characteristic import OPEN, Gains, characteristic, zeros_at_origin
 from tfarm.exact.coefficients import coefficients
-from tfarm.spectrum import ball_axis
+from tfarm.spectrum import ball_axis, enclose
 from tfarm.spectrum.box import Box
 from tfarm.spectrum.enclose import Disc, _holds_one, disjoint, enclosed, proven_count
 
@@ -290,3 +290,13 @@ def test_certified_discs_hold_the_listed_eigenvalues() -> None:
                 middle = complex(float(disc.re), float(disc.im))
                 assert abs(zero - middle) <= 2 * float(disc.radius)
                 assert disc.is_real == (zero.imag == 0)
+
+
+def test_a_contour_that_takes_too_many_pieces_is_given_up(monkeypatch):
+    """One arm's proof took 27,000 evaluations for a third of one side; a proof ends, or says that it does not."""
+    k = coefficients(tfarm.load("sasaki2012-lab"))
+    box = Box(-300.0, 100.0, -400.0, 400.0)
+    assert proven_count(k, box) > 0
+    monkeypatch.setattr(enclose, "MOST_PIECES", 20)
+    with pytest.raises(CertificationError, match="takes more than 20 pieces: prove a shorter list"):
+        proven_count(k, box)

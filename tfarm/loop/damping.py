@@ -1,7 +1,8 @@
 """The damping of a band's modes for many gains at once: eigenvalues of a modal model, made exact by Newton's method.
 
 The modal model only says where to start: each closed-loop eigenvalue is corrected on the transcendental characteristic
-function, all gains and modes together; where one did not settle near its start, all are found again in a box.
+function, all gains and modes together.  Where one did not settle near its start (next to K2 = 1 a model needs many
+modes) a larger model is asked, and at last all are found again in a box.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
 Kind = Callable[[Complex, float], NDArray[np.bool_]]  # which poles below a top frequency are meant
 
-BEYOND = 5  # modes of the model above those of the band
+BEYOND = (5, 30)  # modes of the model above those of the band, and where those do not do
 STEPS = 6  # of Newton's method: the start is right to a few digits, so the last ones change nothing
 SETTLED, NEAR = 1e-9, 0.05  # shares of |s|: of the last correction, and of the whole way from the start
 BLOCK = 4000  # gains at a time
@@ -82,26 +83,44 @@ def _either(s: Complex, top: float) -> NDArray[np.bool_]:
 
 
 def _of_block(kind: Kind, arm: Arm, K1: Real, K2: Real, Kp: Real, number: int, top: float) -> Complex:
-    starts = _eigenvalues(arm, K1, K2, Kp, number)
-    wanted = kind(starts, 1.2 * top)
-    order = np.argsort(~wanted, axis=1, kind="stable")[:, : max(1, int(wanted.sum(1).max()))]
-    s = np.where(np.take_along_axis(wanted, order, 1), np.take_along_axis(starts, order, 1), np.nan)
-    polished, settled = _newton(arm, s, K1, K2, Kp)
-    poles = np.where(kind(polished, top), polished, np.nan)
-    distinct = _are_distinct(poles)
-    for n in np.nonzero(~(settled.all(1) & distinct))[0]:
+    """The poles (gains, slots) of one block."""
+    poles, left = np.empty((K1.size, 0), complex), np.arange(K1.size)
+    for beyond in BEYOND:
+        found, is_done = _corrected(kind, arm, (K1[left], K2[left], Kp[left]), number + beyond, top)
+        poles, left = _filled(poles, left[is_done], found[is_done]), left[~is_done]
+        if not left.size:
+            return poles
+    for n in left:
         exact = poles_below(Loop(arm, HubFeedback(K1=float(K1[n]), K2=float(K2[n]), Kp=float(Kp[n]))), top).values
-        exact = exact[kind(exact, top)]
-        if exact.size > poles.shape[1]:
-            poles = np.pad(poles, ((0, 0), (0, exact.size - poles.shape[1])), constant_values=np.nan)
-        poles[n] = np.nan
-        poles[n, : exact.size] = exact
+        poles = _filled(poles, np.array([n]), exact[kind(exact, top)][None])
     return poles
 
 
-def _eigenvalues(arm: Arm, K1: Real, K2: Real, Kp: Real, number: int) -> Complex:
-    """Eigenvalues of the modal model under each law: (gains, states)."""
-    A, B, C, D = _model(arm, number + BEYOND)
+def _filled(poles: Complex, rows: NDArray[np.int64], found: Complex) -> Complex:
+    """`poles` with those rows filled in, padded with nan to the wider of the two."""
+    wider = max(0, found.shape[1] - poles.shape[1])
+    poles = np.pad(poles, ((0, 0), (0, wider)), constant_values=np.nan)
+    poles[rows] = np.nan
+    poles[rows, : found.shape[1]] = found
+    return poles
+
+
+def _corrected(
+    kind: Kind, arm: Arm, law: tuple[Real, Real, Real], modes: int, top: float
+) -> tuple[Complex, NDArray[np.bool_]]:
+    """The exact poles next to those of a model with so many modes, and for which laws all settled apart."""
+    starts = _eigenvalues(arm, *law, modes)
+    wanted = kind(starts, 1.2 * top)
+    order = np.argsort(~wanted, axis=1, kind="stable")[:, : max(1, int(wanted.sum(1).max()))]
+    s = np.where(np.take_along_axis(wanted, order, 1), np.take_along_axis(starts, order, 1), np.nan)
+    polished, settled = _newton(arm, s, *law)
+    poles = np.where(kind(polished, top), polished, np.nan)
+    return poles, settled.all(1) & _are_distinct(poles)
+
+
+def _eigenvalues(arm: Arm, K1: Real, K2: Real, Kp: Real, modes: int) -> Complex:
+    """Eigenvalues of the modal model with so many modes under each law: (gains, states)."""
+    A, B, C, D = _model(arm, modes)
     rows = Kp[:, None] * C[0] + K1[:, None] * C[1] + K2[:, None] * C[2]
     through = Kp * D[0, 0] + K1 * D[1, 0] + K2 * D[2, 0]
     gain = rows / (1.0 + through)[:, None]

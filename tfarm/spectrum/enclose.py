@@ -29,6 +29,7 @@ from .ball_axis import precisions
 from .box import Box
 
 FINEST = 2.0**-26  # a piece of contour shorter than this share of it means a zero on it
+MOST_PIECES = 6000  # of one side of a contour, some 10 s of CPU time; the longest of the presets' lists take 2,000
 CONTOUR_BITS = 96
 GROWTH = 1.125  # of a step that went well; tuned: with 2 every second step went too far, and was half of the work
 
@@ -50,7 +51,8 @@ class Disc:
 def proven_count(k: Coefficients, box: Box, gains: Gains = OPEN) -> int:
     """How many zeros of D lie in a box symmetric about the real axis, with multiplicity, those at s = 0 included.
 
-    Raises CertificationError where a zero is too near the contour, or -1/C inside.
+    Raises CertificationError where a zero is too near the contour, where it would take too many pieces, or -1/C is
+    inside.
     """
     if k.damping and box.re_min <= -1.0 / k.damping:
         raise CertificationError(f"a box from {box.re_min:g} 1/s on holds or touches the accumulation point -1/C")
@@ -68,12 +70,15 @@ def proven_count(k: Coefficients, box: Box, gains: Gains = OPEN) -> int:
 
 def _turning(k: Coefficients, gains: Gains, a: Ball, b: Ball) -> Ball:
     """The change of arg D along the piece from a to b."""
-    total, start, step = flint.arb(0), 0.0, 1 / 32
+    total, start, step, pieces = flint.arb(0), 0.0, 1 / 32, 0
     here, value = a, characteristic_over(k, a, gains)
     while start < 1:
         end = min(start + step, 1.0)
         there = (a + (b - a) * end).mid()
         over = characteristic_over(k, here.union(there), gains)
+        pieces += 1
+        if pieces > MOST_PIECES:
+            raise CertificationError(f"the edge of the box takes more than {MOST_PIECES} pieces: prove a shorter list")
         if not over.is_finite() or over.contains(0):
             step /= 2
             if step < FINEST:
