@@ -27,7 +27,7 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
 Kind = Callable[[Complex, float], NDArray[np.bool_]]  # which poles below a top frequency are meant
 
-BEYOND = (5, 30)  # modes of the model above those of the band, and where those do not do
+BEYOND = (5, 30, 100)  # modes of the model above those of the band; the next where those do not do
 STEPS = 6  # of Newton's method: the start is right to a few digits, so the last ones change nothing
 SETTLED, NEAR = 1e-9, 0.05  # shares of |s|: of the last correction, and of the whole way from the start
 BLOCK = 4000  # gains at a time
