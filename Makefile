@@ -20,8 +20,11 @@ SURVEYS := \
 	spectrum.damped \
 	loop.counts \
 	loop.agreement \
+	loop.designs \
+	loop.nyquist_counts \
 	reduced.errors \
 	dsp.verdicts \
+	dsp.settled \
 	tuner.bounded \
 	cli.fuzz \
 	cli.kills \

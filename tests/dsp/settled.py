@@ -92,6 +92,10 @@ def survey(number, seed=1, draw=hurting_case):
 
 if __name__ == "__main__":
     number, seed = int(sys.argv[1]) if len(sys.argv) > 1 else 100, int(sys.argv[2]) if len(sys.argv) > 2 else 1
+    wrong = 0
     for draw in (hurting_case, some_case):
         start = time.process_time()
-        print(draw.__name__, survey(number, seed, draw), f"{time.process_time() - start:.0f} s", flush=True)
+        found = survey(number, seed, draw)
+        wrong += found["false"]
+        print(draw.__name__, found, f"{time.process_time() - start:.0f} s", flush=True)
+    sys.exit(wrong > 0)
