@@ -147,7 +147,7 @@ def turning(loop: Loop, path: Complex) -> float:
     value = 1 + loop.loop_function(path)
     for _ in range(ROUNDS):
         step = np.angle(value[1:] / value[:-1])
-        (fast,) = np.nonzero(abs(step) > FAST)
+        (fast,) = np.nonzero(~(abs(step) <= FAST))  # so is what is no number
         if not fast.size:
             return float(step.sum())
         middle = (path[fast] + path[fast + 1]) / 2
