@@ -71,8 +71,11 @@ def test_commands_compare_and_take_a_method(capsys):
     [
         (("modes", "sasaki2012", "--method", "fem"), "known are: closed-form, balls, appendix"),
         (("modes", "sasaki2012", "--theory", "shear", "--method", "appendix"), "Timoshenko beam"),
-        (("modes", "sasaki2012", "--method", "balls", "--digits", "20"), "leave --method out"),
-        (("response", "sasaki2012", "--output", "hub_rate", "--points", "3000", "--compare"), "at most 2000 points"),
+        (("modes", "sasaki2012", "--method", "balls", "--digits", "20"), "leave --method and --compare out"),
+        (("modes", "sasaki2012", "--compare", "--digits", "20"), "leave --method and --compare out"),
+        (("modes", "sasaki2012", "--compare", "--certify"), "ask for one"),
+        (("response", "sasaki2012", "--output", "hub_rate", "--points", "9", "--compare", "--csv", "x.csv"), "--csv"),
+        (("response", "sasaki2012", "--output", "hub_rate", "--points", "3000", "--compare"), "at most 2000 by balls"),
     ],
 )
 def test_what_cannot_be_asked_for_is_one_line(capsys, arguments, words):

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from tfarm.cli.app import ArmName, Compare, Digits, Json, MethodName, app, load_arm, right_digits, whole
-from tfarm.errors import ParameterError, one_line
+from tfarm.errors import one_line
 
 MOST_LISTED = 1000  # modes with nodes and sensitivities: their work grows with the square, to some 20 s
 
@@ -45,13 +45,14 @@ def modes(
     wanted, right = whole("--count", count, 1, MOST_LISTED), right_digits(digits)
     subject = load_arm(arm)
     from tfarm.cli.answers import modes_answer, to_json
-    from tfarm.cli.methods import compared_modes, print_compared, slow_method
+    from tfarm.cli.methods import alone, compared_modes, print_compared, slow_method
     from tfarm.cli.tables import print_modes
     from tfarm.spectrum import modes as find_modes
 
     table = find_modes(subject, wanted, theory=theory)  # type: ignore[arg-type]
-    road = slow_method(method, table.index, right)
+    road = slow_method(method, len(table), right, compare)
     if compare:
+        alone({"--certify": certify or None})
         print_compared(compared_modes(table), json)
         return
     answer = modes_answer(table, right, certify, road)
@@ -78,19 +79,16 @@ def response(
     json: Json = False,
 ) -> None:
     """The exact response to hub torque (to hub angle where the hub is locked)."""
-    from tfarm.cli.inputs import grid, omega_values, s_values
+    from tfarm.cli.inputs import points_on
 
-    if s is not None and omega is not None:
-        raise ParameterError(key="--omega", value=omega, remedy="give --s or --omega, not both")
-    right = right_digits(digits)
-    at = s_values(s) if s is not None else omega_values(omega) if omega is not None else grid(start, stop, points)
-    subject = load_arm(arm)
+    right, at, subject = right_digits(digits), points_on(s, omega, start, stop, points), load_arm(arm)
     from tfarm.cli.answers import response_answer, to_json
-    from tfarm.cli.methods import compared_responses, print_compared, slow_method
+    from tfarm.cli.methods import alone, compared_responses, print_compared, slow_method
     from tfarm.response import transfer
 
-    road = slow_method("balls" if compare else method, at, right)
+    road = slow_method(method, at.size, right, compare)
     if compare:
+        alone({"--csv": csv})
         print_compared(compared_responses(subject, output, x, at), json)
         return
     answer = response_answer(transfer(subject, output, x=x, method=road), at, right)

@@ -48,6 +48,15 @@ def s_on_axis(omega: NDArray[np.float64]) -> NDArray[np.complex128]:
     return np.asarray(1j * omega, dtype=np.complex128)
 
 
+def points_on(s: str | None, omega: str | None, start: float, stop: float, points: str) -> NDArray[np.complex128]:
+    """The points s [1/s] of a response: those typed, s = i omega for frequencies typed, or a grid of them."""
+    if s is not None and omega is not None:
+        raise ParameterError(key="--omega", value=omega, remedy="give --s or --omega, not both")
+    if s is not None:
+        return s_values(s)
+    return grid(start, stop, points) if omega is None else omega_values(omega)
+
+
 def grid(start: float, stop: float, points: str) -> NDArray[np.complex128]:
     """s = i omega for logarithmically spaced frequencies from start to stop [rad/s]."""
     if not 0 < start < math.inf:

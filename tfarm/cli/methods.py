@@ -21,21 +21,33 @@ MOST_SLOW = 2000  # points by balls or by the appendix, at some milliseconds eac
 ALIKE = 1e-14  # relative: two roads differ in the last bits of their float64 numbers, as each is rounded
 
 
-def slow_method(method: str, points: NDArray[Any], digits: int | None) -> Method:
-    """The method asked for.  Raises ParameterError for an unknown one, too many points, and digits beside it."""
+def slow_method(method: str, number: int, digits: int | None, compare: bool) -> Method:
+    """The method asked for.  Raises ParameterError for an unknown one, too many points, digits beside a slow one."""
     chosen = known_method(method)
-    if chosen != "closed-form" and digits is not None:
-        raise ParameterError(key="--digits", value=digits, remedy="they are proven by balls: leave --method out")
-    if chosen != "closed-form" and points.size > MOST_SLOW:
-        remedy = f"at most {MOST_SLOW} points by {chosen}, which takes milliseconds for each"
-        raise ParameterError(key="--points", value=points.size, remedy=remedy)
+    if chosen == "closed-form" and not compare:
+        return chosen
+    if digits is not None:
+        remedy = "they are proven by balls in any case: leave --method and --compare out"
+        raise ParameterError(key="--digits", value=digits, remedy=remedy)
+    if number > MOST_SLOW:
+        remedy = f"at most {MOST_SLOW} by balls or the appendix, which take milliseconds for each"
+        raise ParameterError(key="points", value=number, remedy=remedy)
     return chosen
+
+
+def alone(others: dict[str, Any]) -> None:
+    """Raise ParameterError for an option beside --compare that it would leave unheard."""
+    for key, value in others.items():
+        if value is not None:
+            raise ParameterError(
+                key=key, value=value, remedy="--compare prints a table of its own: ask for one of them"
+            )
 
 
 def compared_responses(arm: Arm, output: str, x: float | None, s: NDArray[Any]) -> dict[str, Any]:
     """One output at s by each method, and by what share of its size each differs from the closed form."""
-    found = {method: np.asarray(transfer(arm, output, x=x, method=method)(s)) for method in METHODS}
-    G = transfer(arm, output, x=x)
+    roads = {method: transfer(arm, output, x=x, method=method) for method in METHODS}
+    found, G = {method: np.asarray(road(s)) for method, road in roads.items()}, roads["closed-form"]
     answer = {"arm": arm.name, "output": G.outputs[0], "unit": G.units[0]}
     values = {method: [[float(v.real), float(v.imag)] for v in each] for method, each in found.items()}
     return answer | {"s": [[float(p.real), float(p.imag)] for p in s], "methods": values, **_differences(found)}

@@ -350,10 +350,10 @@ def learn_by_sensitivities(
     state, spare = work[0], work[1]
     for trial in range(costs.size):
         _copy(weights, kept)
-        for each in (state, total):
-            each.fill(0.0)
-        for each in (S, D):
-            each.fill(0.0)
+        state.fill(0.0)
+        total.fill(0.0)
+        S.fill(0.0)
+        D.fill(0.0)
         for k in range(n):
             if not _sense(k, model, reference, numbers, scales, state, run):
                 costs[trial] = np.inf
