@@ -14,6 +14,7 @@ from tests.loop.ritz_loop import RitzLoop
 from tests.loop.test_lines import held
 from tfarm import Arm, Hub, HubFeedback, Link, Payload, Section
 from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.loop.nyquist import turning
 from tfarm.loop.plant import Loop
 from tfarm.loop.poles import poles_below
 from tfarm.loop.stability import is_felt, is_quiet, loop_band, stability
@@ -199,3 +200,16 @@ def test_where_there_is_no_loop_one_line_says_why() -> None:
         stability(locked, HubFeedback(K1=0.3))
     with pytest.raises(ParameterError, match="algebraic loop"):
         stability(replace(LAB, hub=Hub(inertia=0.0)), HubFeedback(K1=0.3, K2=0.3))
+
+
+def test_a_turn_that_is_no_number_is_refused() -> None:
+    """Where 1 + L cannot be evaluated nothing is counted: a NaN is not a slow turn."""
+
+    class Unknown:
+        def loop_function(self, s):
+            return np.where(abs(s - 2j) < 0.5, np.nan, 1.0 / (s + 1.0))
+
+    path = 1j * np.linspace(0.0, 4.0, 50)
+    with pytest.raises(ConvergenceError, match="its encirclements"):
+        turning(Unknown(), path)
+    assert abs(turning(Unknown(), path[path.imag < 1.4])) < 1.0

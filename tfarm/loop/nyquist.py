@@ -146,8 +146,9 @@ def turning(loop: Loop, path: Complex) -> float:
     """By how much [rad] the argument of 1 + L grows along a path, halved where it turns fast."""
     value = 1 + loop.loop_function(path)
     for _ in range(ROUNDS):
-        step = np.angle(value[1:] / value[:-1])
-        (fast,) = np.nonzero(~(abs(step) <= FAST))  # so is what is no number
+        with np.errstate(invalid="ignore"):  # what is no number is refused below
+            step = np.angle(value[1:] / value[:-1])
+        (fast,) = np.nonzero(~(abs(step) <= FAST))
         if not fast.size:
             return float(step.sum())
         middle = (path[fast] + path[fast + 1]) / 2
