@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import Analytic
-from tfarm.spectrum.box import Box, newton, zeros_in_box
+from tfarm.spectrum import box as room
+from tfarm.spectrum.box import Box, newton, winding_number, zeros_in_box
 
 
 def polynomial(*zeros, flat=0.0):
@@ -27,3 +29,19 @@ def test_flat_starts_do_not_stand_in_for_zeros_not_yet_found():
     zeros = np.array([2.0 + 3.0j, 2.0 - 3.0j, -1.0, -40.0])
     found = zeros_in_box(polynomial(*zeros, flat=0.5), Box(-50.0, 10.0, -10.0, 10.0), np.array([0.1, -0.2, 0.3 + 0j]))
     assert np.sort_complex(found) == pytest.approx(np.sort_complex(zeros), rel=1e-12)
+
+
+def test_the_turns_around_a_box_are_the_zeros_in_it_however_near_the_edge():
+    zeros = np.array([2.0 + 3.0j, 2.0 - 3.0j, -1.0, -40.0, 9.999, 9.99999, 10.001])
+    box = Box(-50.0, 10.0, -10.0, 10.0)
+    assert winding_number(polynomial(*zeros), box) == box.holds(zeros.astype(complex)).sum() == 6
+    with pytest.raises(ConvergenceError, match="lies on the contour near 10"):
+        winding_number(polynomial(*zeros, 10.0), box)
+
+
+def test_a_search_ends(monkeypatch):
+    """Where cut follows cut the search is given up, not run for minutes."""
+    zeros = np.array([2.0 + 3.0j, 2.0 - 3.0j, -1.0, -40.0])
+    monkeypatch.setattr(room, "MOST_CALLS", 3)
+    with pytest.raises(ConvergenceError, match="no end of cuts"):
+        zeros_in_box(polynomial(*zeros), Box(-50.0, 10.0, -10.0, 10.0), np.array([0.1 + 0j]))
