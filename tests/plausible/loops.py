@@ -52,7 +52,7 @@ def growing(models, law, top=None):
         sign = side(models, complex(start), law)
         if sign is None:
             return None
-        count += 2 * int(sign > 0)
+        count += int(np.where(start.imag > 1e-7 * abs(start), 2, 1)) * int(sign > 0)
     return count
 
 
