@@ -46,7 +46,7 @@ def test_a_static_crossing_torn_by_rounding_hides_no_window(period):
     low, high = around(stable_windows(loop, "K2"), 0.3)
     assert high == pytest.approx(1.0, rel=1e-9)
     for K2, is_stable in ((low - 1e-6, False), (low + 1e-6, True), (0.999, True), (1.001, False)):
-        assert loop.with_gains(0.0374, K2).poles.is_stable == is_stable
+        assert loop.having(K1=0.0374, K2=K2).poles.is_stable == is_stable
 
 
 @pytest.mark.parametrize("gain", ["K1", "K2"])
@@ -57,7 +57,7 @@ def test_an_edge_has_a_pole_on_the_circle_and_the_verdict_turns_there(name, gain
         for edge, inward in zip(window, (1, -1), strict=True):
 
             def at(value):
-                return loop.with_gains(value, 0.3) if gain == "K1" else loop.with_gains(0.3, value)
+                return loop.having(**{gain: value})
 
             step = 1e-9 * max(1e-3, abs(edge))
             assert at(edge + inward * step).poles.is_stable
@@ -71,20 +71,21 @@ def test_between_crossings_the_counts_are_those_of_the_eigenvalues(name, delay):
     loop = sampled_loop(tfarm.load(name), GAINS, chain, count=10)
     grid = circle_grid(loop)
     for gain, other in (("K2", 0.3), ("K2", 7.0), ("K1", 0.3), ("K1", -0.1)):
-        found = crossings(grid, gain, other)
+        law = HubFeedback(K1=other, K2=other)
+        found = crossings(grid, gain, law)
         middles = np.r_[found.gain[0] - 1, (found.gain[1:] + found.gain[:-1]) / 2, found.gain[-1] + 1]
-        counts = [growing(loop.with_gains(*((m, other) if gain == "K1" else (other, m)))) for m in middles]
-        np.testing.assert_array_equal(np.diff(counts), found.count)
+        counts = [growing(replace(loop, gains=law.having(gain, m))) for m in middles]
+        np.testing.assert_array_equal(np.diff(counts), found.change)
 
 
 def test_a_long_delay_hides_no_crossing_between_two_points_of_the_grid(lab):
     """Sixty samples turn the loop's phase sixty times round the circle; a grid ten times coarser loses a pair."""
     loop = sampled_loop(lab, GAINS, Chain(sampling=Sampling(delay_samples=60.0)), count=6)
-    found = crossings(circle_grid(loop), "K1", 0.3)
+    found = crossings(circle_grid(loop), "K1", HubFeedback(K2=0.3))
     gaps = np.nonzero(np.diff(found.gain) > 1e-6)[0]
     middles = np.r_[found.gain[0] - 1, (found.gain[gaps + 1] + found.gain[gaps]) / 2, found.gain[-1] + 1]
-    passed = np.r_[0, np.cumsum(found.count)][np.searchsorted(found.gain, middles)]
-    counts = [growing(loop.with_gains(middle, 0.3)) for middle in middles]
+    passed = np.r_[0, np.cumsum(found.change)][np.searchsorted(found.gain, middles)]
+    counts = [growing(loop.having(K1=middle, K2=0.3)) for middle in middles]
     np.testing.assert_array_equal(counts - passed, counts[0])
 
 
@@ -96,7 +97,7 @@ def test_the_map_counts_as_the_eigenvalues_do(name, hub_rate):
     plane = gain_map(loop, np.linspace(-2, 25, 28), np.linspace(-0.7, 2.1, 31))
     rng = np.random.default_rng(5)
     for i, j in zip(rng.integers(28, size=60), rng.integers(31, size=60), strict=True):
-        assert growing(loop.with_gains(float(plane.K1[i]), float(plane.K2[j]))) == plane.unstable[i, j]
+        assert growing(loop.having(K1=float(plane.K1[i]), K2=float(plane.K2[j]))) == plane.unstable[i, j]
 
 
 def test_the_map_has_exact_edges(lab):

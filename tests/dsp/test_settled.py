@@ -114,7 +114,7 @@ def test_the_count_does_not_depend_on_the_arcs_to_begin_with(lab, coarser, monke
     loop = sampled_loop(slightly, HubFeedback(K1=0.3, K2=0.3), count=14)
     circle = band_of(loop).circle()
     for K2 in (0.3, -0.05, 1.3):
-        other = loop.with_gains(0.3, K2)
+        other = loop.having(K1=0.3, K2=K2)
         assert circle.count(other.gains) == (other.poles.log_radius > 0).sum()
 
 

@@ -61,8 +61,8 @@ def is_clear(verdict):
     if abs(loop.poles.log_spectral_radius) < SLOW:
         return False
     grid = circle_grid(loop)
-    near_K1 = abs(crossings(grid, "K1", gains.K2).gain - gains.K1) < CLOSE * max(1, abs(gains.K1))
-    near_K2 = abs(crossings(grid, "K2", gains.K1).gain - gains.K2) < CLOSE
+    near_K1 = abs(crossings(grid, "K1", gains).gain - gains.K1) < CLOSE * max(1, abs(gains.K1))
+    near_K2 = abs(crossings(grid, "K2", gains).gain - gains.K2) < CLOSE
     return not (near_K1.any() or near_K2.any())
 
 

@@ -11,8 +11,9 @@ import pytest
 import tfarm
 from tests.spectrum.damped_roads import delta, newton_step, shot
 from tests.strategies import ENDS, some_arm, some_s
+from tfarm import HubFeedback
 from tfarm.exact.balls import point, precision
-from tfarm.exact.characteristic import OPEN, Gains, characteristic, quick_characteristic, zeros_at_origin
+from tfarm.exact.characteristic import OPEN, characteristic, gains_of, quick_characteristic, zeros_at_origin
 from tfarm.exact.coefficients import coefficients
 from tfarm.exact.wide_balls import characteristic_ball, characteristic_over, tangent
 
@@ -45,8 +46,8 @@ def laws(case):
     return ({}, LAW) if case[0] != "infinite" else ({},)
 
 
-def gains_of(k, law):
-    return Gains.of(k, law["K1"], law["K2"], law["Kp"]) if law else OPEN
+def gains_under(k, law):
+    return gains_of(k, HubFeedback(**law)) if law else OPEN
 
 
 @pytest.mark.parametrize("case", list(product(ENDS, repeat=3))[::6])
@@ -54,7 +55,7 @@ def test_D_is_the_determinant_of_the_shot_arm_but_for_a_constant(case) -> None:
     arm = arm_at(case)
     k = coefficients(arm)
     for law in laws(case):
-        ours = balls(k, S, gains_of(k, law))
+        ours = balls(k, S, gains_under(k, law))
         with mpmath.workdps(40):
             ratio = [shot(arm, s, **law) / value for s, value in zip(S, ours, strict=True)]
             assert max(abs(r / ratio[0] - 1) for r in ratio) < 1e-30
@@ -70,7 +71,7 @@ def test_float64_agrees_with_balls_at_random_s(case) -> None:
         [complex(rng.uniform(-0.5, 0.5), rng.uniform(-1, 1)) * size * 10 ** rng.uniform(-3, 0) for _ in range(40)]
     )
     for law in laws(case):
-        gains = gains_of(k, law)
+        gains = gains_under(k, law)
         ours = characteristic(k, s, gains)
         quick = quick_characteristic(k, s, gains)
         theirs = balls(k, s, gains)
@@ -85,7 +86,7 @@ def test_slopes_are_derivatives_of_the_values() -> None:
     arm = arm_at(("some", "some", "some"))
     k = coefficients(arm)
     for law in ({}, LAW):
-        gains = gains_of(k, law)
+        gains = gains_under(k, law)
         ours, quick = characteristic(k, S, gains), quick_characteristic(k, S, gains)
         with precision(400), mpmath.workdps(60):
             for n, s in enumerate(S):
@@ -109,7 +110,7 @@ def test_feedback_changes_the_hub_row_of_the_papers_matrix(law) -> None:
     ):
         arm = arm_at(case, seed=8)
         k = coefficients(arm)
-        gains = Gains.of(k, law.get("K1", 0.0), law.get("K2", 0.0), law.get("Kp", 0.0))
+        gains = gains_of(k, HubFeedback(**law))
         s = S[:5]
         fed, free = balls(k, s, gains), balls(k, s)
         with mpmath.workdps(80):
@@ -120,7 +121,7 @@ def test_feedback_changes_the_hub_row_of_the_papers_matrix(law) -> None:
 def test_a_closed_loop_pole_in_float64_is_one_of_the_papers_matrix() -> None:
     arm = tfarm.load("sasaki2012-lab")
     k = coefficients(arm)
-    gains = Gains.of(k, 0.3, 0.3, 0.5)
+    gains = gains_of(k, HubFeedback(K1=0.3, K2=0.3, Kp=0.5))
     s = np.array([-3 + 70j, -3 + 200j, -20 + 530j])
     for _ in range(60):
         at = characteristic(k, s, gains)
@@ -134,7 +135,7 @@ def test_D_is_linear_in_the_gains_and_the_gauge_does_not_read_the_damping() -> N
     k = coefficients(arm)
     s = S[:5]
     none, by_angle, by_gauge = (
-        np.array([complex(v) for v in true_value(characteristic(k, s, Gains.of(k, 0.0, K2, Kp)))])
+        np.array([complex(v) for v in true_value(characteristic(k, s, gains_of(k, HubFeedback(K2=K2, Kp=Kp))))])
         for Kp, K2 in ((0.0, 0.0), (1e3, 0.0), (0.0, 1e3))
     )
     gauge = tfarm.transfer(arm, "root_moment")(s) / tfarm.transfer(arm, "hub_angle")(s)
@@ -149,13 +150,10 @@ def test_zeros_at_the_origin_are_as_many_as_the_order_of_D_there(case) -> None:
     arm = arm_at(case)
     k = coefficients(arm)
     small = np.array([1e-3, 1e-4]) * tfarm.modes(arm, 1).natural_frequency[-1]
-    laws = (
-        [OPEN]
-        if case[0] == "infinite"
-        else [OPEN, Gains.of(k, 1.0, 0.2, 0.0), Gains.of(k, 0.0, 0.2, 0.0), Gains.of(k, 1.0, 0.2, 3.0)]
-    )
-    for gains in laws:
-        at = small * (1e-9 if gains.K1 else 1.0)  # where K1 s outweighs the inertia
+    laws = [(0, 0, 0)] if case[0] == "infinite" else [(0, 0, 0), (1, 0.2, 0), (0, 0.2, 0), (1, 0.2, 3)]
+    for K1, K2, Kp in laws:
+        gains = gains_of(k, HubFeedback(K1=K1, K2=K2, Kp=Kp)) if any((K1, K2, Kp)) else OPEN
+        at = small * (1e-9 if K1 else 1.0)  # where K1 s outweighs the inertia
         value = characteristic(k, at.astype(complex), gains).value.real
         order = np.log10(value[0] / value[1])
         assert order == pytest.approx(zeros_at_origin(k, gains), abs=1e-2)

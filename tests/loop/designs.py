@@ -13,7 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 import tfarm
-from tfarm import Arm, Hub, Link, Payload, Section
+from tfarm import Arm, Hub, HubFeedback, Link, Payload, Section
+from tfarm.arm import many_laws
 from tfarm.loop.design import design
 from tfarm.loop.regions import region
 from tfarm.loop.residual import residual_moment
@@ -69,7 +70,7 @@ def least_on(arm, K1, K2):
     """The least residual [N m] of the stable points of a grid; inf where none is."""
     stable = region(arm, K1, K2).stable
     a, b = np.meshgrid(K1, K2)
-    return float(residual_moment(arm, a[stable], b[stable], np.zeros(int(stable.sum())), 2).min(initial=np.inf))
+    return float(residual_moment(arm, many_laws(HubFeedback(), K1=a[stable], K2=b[stable]), 2).min(initial=np.inf))
 
 
 def compared(arm, rng):

@@ -9,6 +9,7 @@ import tfarm
 from tests.loop.agreement import some_free_arm, some_gains
 from tests.loop.ritz_loop import RitzLoop
 from tfarm import HubFeedback
+from tfarm.arm import law_of, many_laws
 from tfarm.loop import damping
 from tfarm.loop.damping import band_and_real_poles, band_poles, is_oscillating, least_damping
 from tfarm.loop.frequencies import band_of
@@ -20,7 +21,7 @@ LAB = tfarm.load("sasaki2012-lab")
 
 def some_laws(rng, arm, number):
     K1, K2, Kp = some_gains(rng, arm, number)
-    return K1, rng.permutation(K2), np.full(number, Kp)
+    return many_laws(HubFeedback(Kp=Kp), K1=K1, K2=rng.permutation(K2))
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -29,10 +30,10 @@ def test_they_are_the_poles_of_the_complete_list(seed, number) -> None:
     rng = np.random.default_rng(30 + seed)
     arm = some_free_arm(rng, damped=bool(seed % 2))
     laws, top = some_laws(rng, arm, 6), band_of(arm, number)
-    oscillating, either = band_poles(arm, *laws, number), band_and_real_poles(arm, *laws, number)
+    oscillating, either = band_poles(arm, laws, number), band_and_real_poles(arm, laws, number)
     real = np.where(is_oscillating(either), np.nan, either)
-    for n, (K1, K2, Kp) in enumerate(zip(*laws, strict=True)):
-        complete = poles_below(Loop(arm, HubFeedback(K1=float(K1), K2=float(K2), Kp=float(Kp))), 3 * top)
+    for n, law in enumerate(laws.T):
+        complete = poles_below(Loop(arm, law_of(law)), 3 * top)
         exact, left = complete.moving, complete.box.re_min
         for found, there in (
             (oscillating[n], exact[(exact.imag > 0) & (exact.imag < top)]),
@@ -44,7 +45,7 @@ def test_they_are_the_poles_of_the_complete_list(seed, number) -> None:
 
 def test_the_least_damping_is_that_of_an_independent_model() -> None:
     K1, K2 = np.array([0.3, 0.3, 5.0, 0.3]), np.array([0.3, -1.0, 0.5, 1.2])
-    found = least_damping(LAB, K1, K2, np.zeros(4), 2)
+    found = least_damping(LAB, many_laws(HubFeedback(), K1=K1, K2=K2), 2)
     model, top = RitzLoop(LAB, 12), band_of(LAB, 2)
     for n in range(4):
         s = model.eigenvalues(HubFeedback(K1=float(K1[n]), K2=float(K2[n])))
@@ -57,11 +58,11 @@ def test_next_to_the_clamped_hub_a_larger_model_is_asked_before_a_box(monkeypatc
     """K2 = 0.9978 nearly cancels the hub's inertia: a model's first modes are a third off, and a design asks often."""
     arm = tfarm.load("sasaki2012")
     arm = replace(arm, link=replace(arm.link, length=16.0))
-    K1, K2, none = np.array([0.3, 0.1, 1.0]), np.full(3, 0.9978), np.zeros(3)
+    K1 = np.array([0.3, 0.1, 1.0])
     top = band_of(arm, 1)
     boxed = [poles_below(Loop(arm, HubFeedback(K1=float(k), K2=0.9978)), top).values for k in K1]
     monkeypatch.setattr(damping, "poles_below", None)
-    found = band_poles(arm, K1, K2, none, 1)
+    found = band_poles(arm, many_laws(HubFeedback(K2=0.9978), K1=K1), 1)
     for own, box in zip(found, boxed, strict=True):
         box = box[is_oscillating(box) & (box.imag < top)]
         np.testing.assert_allclose(np.sort_complex(own[~np.isnan(own)]), np.sort_complex(box), rtol=1e-9)

@@ -10,10 +10,12 @@ import tfarm
 from tests.loop.designs import grids, least_on
 from tests.loop.ritz_loop import RitzLoop
 from tfarm import HubFeedback
+from tfarm.arm import many_laws
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop.damping import least_damping
 from tfarm.loop.design import design
 from tfarm.loop.frequencies import band_of
+from tfarm.loop.lines import NONE
 from tfarm.loop.margins import loop_margins
 from tfarm.loop.regions import region
 from tfarm.loop.residual import RISE, SAMPLES, TRAVEL, residual_moment
@@ -54,12 +56,12 @@ def slew(model, law):
 def test_the_residual_moment_is_that_of_a_simulated_slew(K1, K2, Kp) -> None:
     """Real poles count: at K1 = 26 and K2 = -3 they are nine tenths of what is left."""
     moment = slew(RitzLoop(LAB, 10), HubFeedback(K1=K1, K2=K2, Kp=Kp))
-    ours = residual_moment(LAB, *(np.array([gain]) for gain in (K1, K2, Kp)), 6)[0]
+    ours = residual_moment(LAB, many_laws(HubFeedback(K1=K1, K2=K2, Kp=Kp)), 6)[0]
     assert ours == pytest.approx(np.sqrt((moment**2).mean()), rel=1e-3)
 
 
 def test_what_an_unstable_loop_leaves_is_huge_but_finite() -> None:
-    left = residual_moment(BARE, np.array([0.3, 0.3, -1e4]), np.array([0.3, 6.0, 0.3]), np.zeros(3), 2)
+    left = residual_moment(BARE, many_laws(NONE, K1=[0.3, 0.3, -1e4], K2=[0.3, 6.0, 0.3]), 2)
     assert np.isfinite(left).all()
     assert (left[1:] > left[0]).all()
 
@@ -80,16 +82,16 @@ def random_gains(arm, number):
 
 def test_two_hundred_random_gains_damp_no_better(damping) -> None:
     K1, K2 = random_gains(LAB, 200)
-    assert least_damping(LAB, K1, K2, np.zeros(200), 2).max() <= damping.value * (1 + 1e-9)
+    assert least_damping(LAB, many_laws(NONE, K1=K1, K2=K2), 2).max() <= damping.value * (1 + 1e-9)
     assert damping.verdict.is_stable
-    assert least_damping(LAB, *(np.array([x]) for x in (damping.law.K1, damping.law.K2, 0.0)), 2)[0] == damping.value
+    assert least_damping(LAB, many_laws(damping.law), 2)[0] == damping.value
 
 
 def test_two_hundred_random_gains_leave_no_less(damping) -> None:
     found = design(LAB, "residual", **BOUNDS)
     K1, K2 = random_gains(LAB, 200)
-    assert residual_moment(LAB, K1, K2, np.zeros(200), 2).min() >= found.value * (1 - 1e-9)
-    assert found.value < residual_moment(LAB, np.array([damping.law.K1]), np.array([damping.law.K2]), np.zeros(1), 2)[0]
+    assert residual_moment(LAB, many_laws(NONE, K1=K1, K2=K2), 2).min() >= found.value * (1 - 1e-9)
+    assert found.value < residual_moment(LAB, many_laws(damping.law), 2)[0]
 
 
 @pytest.fixture(scope="module")
@@ -110,7 +112,7 @@ def test_without_damping_a_slew_ends_in_whole_periods() -> None:
     hub = tfarm.Hub(inertia=BARE.hub.inertia / (1 - found.law.K2))
     periods = tfarm.modes(replace(BARE, hub=hub), 1).natural_frequency[-1] * RISE / (4 * np.pi)
     assert periods == pytest.approx(round(periods), abs=1e-6)
-    plain = residual_moment(BARE, np.array([found.law.K1]), np.zeros(1), np.zeros(1), 1)[0]
+    plain = residual_moment(BARE, many_laws(HubFeedback(K1=found.law.K1)), 1)[0]
     assert found.value < 1e-6 * plain
 
 
@@ -122,8 +124,8 @@ def test_the_flat_part_is_that_of_the_valley(name, request) -> None:
 
     def value(K1, K2):
         if name == "damping":
-            return least_damping(LAB, K1, K2, 0 * K1, 2) - worse
-        return worse - residual_moment(LAB, K1, K2, 0 * K1, 2)
+            return least_damping(LAB, many_laws(NONE, K1=K1, K2=K2), 2) - worse
+        return worse - residual_moment(LAB, many_laws(NONE, K1=K1, K2=K2), 2)
 
     for axis, (low, high) in enumerate((found.flat_K1, found.flat_K2)):
         bounds = found.bounds[("K1", "K2")[axis]]
@@ -143,7 +145,7 @@ def test_where_the_bounds_cut_the_search_off_is_no_optimum(damping) -> None:
     found = design(LAB, "damping")
     assert found.at_bound == ("K2",)
     K1, K2 = found.law.K1 * np.array([0.99, 1.01, 1.0]), found.law.K2 + np.array([0.0, 0.0, -0.1])
-    below, above, beyond = least_damping(LAB, K1, K2, np.zeros(3), 2)
+    below, above, beyond = least_damping(LAB, many_laws(NONE, K1=K1, K2=K2), 2)
     assert max(below, above) < found.value < beyond
 
 

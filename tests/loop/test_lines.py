@@ -41,11 +41,11 @@ def test_at_each_crossing_a_pole_of_that_frequency_is_on_the_axis_and_goes_the_w
     law = HubFeedback(K1=0.3 if arm is not window_arm() else 1.0, K2=-9.0)
     line = along(name, law)
     band = loop_band(Loop(arm, law))[0]
-    found = [each for each in crossings(arm, line, band) if each.omega and abs(each.t) < 1e9][:6]
+    found = [each for each in crossings(arm, line, band) if each.at and abs(each.t) < 1e9][:6]
     assert bool(found) != ((arm, name) in EMPTY)
     for each in found:
         step = 1e-6 * max(abs(each.t), 1e-3)
-        real = [_next_to(arm, line.at(each.t + way * step), each.omega) for way in (-1, 1)]
+        real = [_next_to(arm, line.at(each.t + way * step), each.at) for way in (-1, 1)]
         assert real[0] * each.change < 0 < real[1] * each.change
 
 
@@ -84,7 +84,7 @@ def test_no_crossing_is_missed_the_count_steps_as_they_say() -> None:
 @pytest.mark.parametrize("K1", [0.3, 1e-6, 1e3, -2.0])
 def test_the_real_pole_of_a_free_arm_passes_zero_at_kp_zero_exactly(K1) -> None:
     each = crossing_at_zero(LAB, along("Kp", HubFeedback(K1=K1, K2=-10.0)))
-    assert (each.t, each.omega, each.change) == (0.0, 0.0, -1 if K1 > 0 else 1)
+    assert (each.t, each.at, each.change) == (0.0, 0.0, -1 if K1 > 0 else 1)
     assert crossing_at_zero(window_arm(), along("Kp", HubFeedback(K1=1.0, K2=-10.0))).t == 0
 
 

@@ -175,7 +175,7 @@ def test_crossings_are_those_of_the_line_of_gains(arm, law, vary, start, stop):
     top = found.branches.imag.max()
     other = [each for each in line_crossings(arm, along(vary, law), top) if start < each.t < stop]
     ours = sorted((each.gain, each.omega, each.direction == "unstable") for each in found.crossings)
-    theirs = sorted((each.t, each.omega, each.change > 0) for each in other)
+    theirs = sorted((each.t, each.at, each.change > 0) for each in other)
     assert len(ours) == len(theirs) > 0
     for (g, w, right), (t, omega, more) in zip(ours, theirs, strict=True):
         assert right == more

@@ -62,7 +62,7 @@ def test_the_lab_arm_reaches_a_little_above_one() -> None:
     found = windows(LAB, HubFeedback(K1=0.3, K2=0.3), "K2")
     assert found.around[1] == pytest.approx(1.0305, abs=5e-5)
     (at,) = [each for each in found.crossings if each.t == found.around[1]]
-    assert at.omega == pytest.approx(27.8, abs=0.05)
+    assert at.at == pytest.approx(27.8, abs=0.05)
     assert at.change == 2
     ritz = edge_by_bisection(RitzLoop(LAB, 12), HubFeedback(K1=0.3), "K2", 0.9, 1.2)
     assert found.around[1] == pytest.approx(ritz, rel=1e-5)

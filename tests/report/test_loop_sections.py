@@ -10,7 +10,7 @@ import pytest
 import tfarm
 from tests.loop.arms import window_arm
 from tests.loop.nyquist_counts import survey
-from tfarm.arm import Hub, HubFeedback
+from tfarm.arm import Hub, HubFeedback, many_laws
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import Sampling
 from tfarm.dsp.loop import sampled_loop
@@ -119,7 +119,7 @@ def test_the_data_behind_the_map_is_what_is_drawn(lab):
     at = grid[7 * lab.K1.size + 31]
     assert (at["K1_N_m_s_rad"], at["K2"]) == (lab.K1[31], lab.K2[7])
     assert at["unstable_poles"] == lab.counts[7, 31]
-    fresh = least_damping(LAB, lab.K1[31:32], lab.K2[7:8], np.zeros(1), loop_laws.MODES)
+    fresh = least_damping(LAB, many_laws(HubFeedback(), K1=lab.K1[31:32], K2=lab.K2[7:8]), loop_laws.MODES)
     assert at["least_damping_ratio"] == pytest.approx(fresh[0], rel=1e-12, abs=0)
 
 
@@ -308,9 +308,9 @@ def test_the_sampled_edge_on_the_map_is_where_a_pole_meets_the_circle(lab):
     for i in columns:
         K1, (low, high) = float(lab.sampled.K1[i]), lab.sampled.intervals[i][0]
         step = 1e-4 * (high - low)
-        growth = [loop.with_gains(K1, K2).poles.log_spectral_radius for K2 in (low + step, high - step)]
+        growth = [loop.having(K1=K1, K2=K2).poles.log_spectral_radius for K2 in (low + step, high - step)]
         assert max(growth) < 0
-        outside = [loop.with_gains(K1, K2).poles.log_spectral_radius for K2 in (low - step, high + step)]
+        outside = [loop.having(K1=K1, K2=K2).poles.log_spectral_radius for K2 in (low - step, high + step)]
         assert min(outside) > 0
 
 

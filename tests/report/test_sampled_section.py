@@ -61,7 +61,7 @@ def test_the_map_of_both_regions_is_what_poles_say():
         for K2 in random.uniform(*K2_RANGE, 2):
             inside = [any(a < K2 < b for a, b in layer.intervals[i]) for layer in (data.continuous, *data.sampled)]
             law = tfarm.HubFeedback(K1=K1, K2=float(K2))
-            assert inside == [stability(LAB, law).is_stable, loop.with_gains(K1, float(K2)).poles.is_stable]
+            assert inside == [stability(LAB, law).is_stable, loop.having(K1=K1, K2=float(K2)).poles.is_stable]
 
 
 def test_the_edges_at_the_default_gains_are_published_ones(section):
@@ -170,8 +170,8 @@ def test_loci_are_the_poles_at_their_gains_and_aliased_modes_are_told_apart():
     data = loci(loop, 20.0, (-0.5, 1.5))
     for locus, i in itertools.product((data.by_K1, data.by_K2), (0, 45, 90)):
         value = float(locus.values[i])
-        gains = (value, 0.3) if locus.gain == "K1" else (0.3, value)
-        assert np.sort_complex(locus.z[i]) == pytest.approx(np.sort_complex(loop.with_gains(*gains).poles.z), abs=1e-12)
+        z = loop.having(**{locus.gain: value}).poles.z
+        assert np.sort_complex(locus.z[i]) == pytest.approx(np.sort_complex(z), abs=1e-12)
     assert [data.is_aliased(mode) for mode in (1, 2, 3, 4)] == [False, False, True, True]
 
 

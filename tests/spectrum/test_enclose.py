@@ -13,9 +13,9 @@ import tfarm
 from tests.spectrum.damped import pairs
 from tests.spectrum.damped_roads import delta, newton_root, newton_step, pinned, ritz_eigenvalues, sine_waves
 from tests.spectrum.test_damped import damped_arm, listed
-from tfarm import CertificationError
+from tfarm import CertificationError, HubFeedback
 from tfarm.exact.balls import point, precision
-from tfarm.exact.characteristic import OPEN, Gains, characteristic, zeros_at_origin
+from tfarm.exact.characteristic import OPEN, characteristic, gains_of, zeros_at_origin
 from tfarm.exact.coefficients import coefficients
 from tfarm.spectrum import ball_axis, enclose
 from tfarm.spectrum.box import Box
@@ -92,7 +92,7 @@ def test_a_double_eigenvalue_has_no_disc(monkeypatch: pytest.MonkeyPatch) -> Non
 
 def test_a_closed_loop_pole_is_enclosed() -> None:
     k = coefficients(LAB)
-    gains = Gains.of(k, 0.3, 0.3, 0.0)
+    gains = gains_of(k, HubFeedback(K1=0.3, K2=0.3))
     s = np.array([-3 + 70j])
     for _ in range(60):
         at = characteristic(k, s, gains)
@@ -203,7 +203,7 @@ def test_a_loop_has_as_many_unstable_poles_as_the_papers_matrix(K1: float, K2: f
     k = coefficients(arm)
     box = Box(0.5, 100.0, -700.0, 700.0)
     assert turns_of_ratio(arm, box, K1=K1, K2=K2) == unstable
-    assert proven_count(k, box, Gains.of(k, K1, K2, 0.0)) == unstable
+    assert proven_count(k, box, gains_of(k, HubFeedback(K1=K1, K2=K2))) == unstable
 
 
 # ------------------------------------------------------------ refusals

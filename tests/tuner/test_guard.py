@@ -202,8 +202,8 @@ def test_the_frozen_guard_is_stable_inside_and_not_beyond(lab):
     assert not guard.is_proven
     assert "not proven for one that moves" in guard.sentence
     for K in np.linspace(guard.lo, guard.hi, 25):
-        assert loop.with_gains(0.3, float(K)).poles.is_stable
-    assert not loop.with_gains(0.3, guard.hi * 1.02).poles.is_stable
+        assert loop.having(K1=0.3, K2=float(K)).poles.is_stable
+    assert not loop.having(K1=0.3, K2=guard.hi * 1.02).poles.is_stable
 
 
 def test_without_damping_a_proof_is_of_the_first_modes_and_no_proof_of_the_loop():

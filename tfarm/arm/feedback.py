@@ -1,4 +1,4 @@
-"""The control law, as a record.
+"""The control law, as a record: one gain an output, and the table of what each of them multiplies.
 
     u = -Kp theta - K1 theta_t - K2 E I phi'(0) + r                                                            (19)
 
@@ -8,10 +8,31 @@ where it accelerates the hub; a static torque u gives it the value -(J - I_h)/J 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from tfarm.arm.checks import LARGEST, number
 from tfarm.errors import ParameterError
+
+
+@dataclass(frozen=True, slots=True)
+class Gain:
+    """One entry of the law: its `name`, the `output` that it multiplies and its SI `unit`."""
+
+    name: str
+    output: str
+    unit: str
+
+
+GAINS = (
+    Gain("Kp", "hub_angle", "N m/rad"),
+    Gain("K1", "hub_rate", "N m s/rad"),
+    Gain("K2", "root_moment", "1"),
+)  # in the order in which the outputs are fed back, everywhere
+FED_BACK = tuple(gain.output for gain in GAINS)
+NAMES = tuple(sorted(gain.name for gain in GAINS))  # in the order in which a person lists them
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,3 +55,36 @@ class HubFeedback:
             if not abs(value) <= LARGEST:
                 raise ParameterError(key=field.name, value=value, remedy=remedy)
             object.__setattr__(self, field.name, value)
+
+    @property
+    def row(self) -> tuple[float, ...]:
+        """The gains in the order of `GAINS`: what the outputs in `FED_BACK` are multiplied by."""
+        return tuple(self[gain.name] for gain in GAINS)
+
+    def __getitem__(self, name: str) -> float:
+        """The gain of that name."""
+        value: float = getattr(self, name)
+        return value
+
+    def having(self, name: str, value: float) -> HubFeedback:
+        """The law with another value of one gain."""
+        return replace(self, **{name: value})
+
+    def times(self, factor: float) -> HubFeedback:
+        """Every gain times a number."""
+        return HubFeedback(**{gain.name: factor * self[gain.name] for gain in GAINS})
+
+    def plus(self, other: HubFeedback, factor: float = 1.0) -> HubFeedback:
+        """This law and so many times another one at once: their torques add."""
+        return HubFeedback(**{gain.name: self[gain.name] + factor * other[gain.name] for gain in GAINS})
+
+
+def many_laws(law: HubFeedback, **varied: ArrayLike) -> NDArray[np.float64]:
+    """Rows (gains, n) in the order of `GAINS`: the law's gains, but for those named, which take n values together."""
+    columns = [np.asarray(varied.get(gain.name, law[gain.name]), dtype=float) for gain in GAINS]
+    return np.array(np.broadcast_arrays(*(np.atleast_1d(column) for column in columns)))
+
+
+def law_of(row: ArrayLike) -> HubFeedback:
+    """The law with these gains, in the order of `GAINS`."""
+    return HubFeedback(**{gain.name: float(value) for gain, value in zip(GAINS, np.asarray(row), strict=True)})

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import HubFeedback
-from tfarm.dsp.loop import ANGLE, MOMENT, RATE, SampledLoop
+from tfarm.dsp.loop import ANGLE, RATE, SampledLoop
 from tfarm.records import record
 
 Real = NDArray[np.float64]
@@ -90,7 +90,7 @@ class Circle:
     """The upper half of the unit circle in arcs, and on each what a loop's plant is there; its gains do not matter.
 
     `missing` (outputs,) bounds |x sum over poles left out|.  `low` and `high` [rad] are the ends of the arcs, `parts`
-    the discs (1 + gains, arcs) of x and of what Kp, K1 and K2 multiply in F times x^n, n = `orders` (gains,) at z = 1;
+    the discs (1 + gains, arcs) of x and of what the gains multiply in F times x^n, n = `orders` (gains,) at z = 1;
     arcs are cut as counts need it.
     """
 
@@ -124,7 +124,7 @@ class Circle:
 
     def characteristic(self, gains: HubFeedback) -> Discs:
         """x^k F on every arc, k the order of its pole at z = 1."""
-        used = [(K, order, row) for row, (K, order) in enumerate(zip(_three(gains), self.orders, strict=True)) if K]
+        used = [(K, order, row) for row, (K, order) in enumerate(zip(gains.row, self.orders, strict=True)) if K]
         k = max((order for _, order, _ in used), default=0)
         x = self.parts[0]
         total = _power(x, k)
@@ -134,21 +134,22 @@ class Circle:
         return total
 
     @property
-    def orders(self) -> tuple[int, int, int]:
-        """The order at z = 1 of what each of Kp, K1 and K2 multiplies."""
-        angle, rate, moment = (2 if twice else int(once != 0.0) for twice, once in self.loop.plant.rigid)
-        return angle, max(0, angle - 1) if self.loop.differences else rate, moment
+    def orders(self) -> list[int]:
+        """The order at z = 1 of what each gain multiplies."""
+        orders = [2 if twice else int(once != 0.0) for twice, once in self.loop.plant.rigid]
+        if self.loop.differences:
+            orders[RATE] = max(0, orders[ANGLE] - 1)
+        return orders
 
     def _parts(self, low: Real, high: Real) -> Discs:
-        """x, and what each of Kp, K1 and K2 multiplies in F times x^n, on arcs: discs (1 + gains, arcs)."""
+        """x, and what each gain multiplies in F times x^n, on arcs: discs (1 + gains, arcs)."""
         arcs = _Arcs(low, high)
         sums = self._sums(low, high)
-        angle, rate, moment = (self._output(row, arcs, sums[row]) for row in (ANGLE, RATE, MOMENT))
+        found = [arcs.x, *(self._output(row, arcs, sums[row]) for row in range(len(self.orders)))]
         if self.loop.differences:
             a, T = self.loop.smoothing, self.loop.chain.sampling.period
-            rate = angle * (arcs.turned(0) + arcs.turned(1).times(-a)).inverse().times((1 - a) / T)
-            rate = rate if self.orders[0] else rate * arcs.x
-        found = (arcs.x, angle, rate, moment)
+            rate = found[1 + ANGLE] * (arcs.turned(0) + arcs.turned(1).times(-a)).inverse().times((1 - a) / T)
+            found[1 + RATE] = rate if self.orders[ANGLE] else rate * arcs.x
         return Discs(np.array([each.middle for each in found]), np.array([each.radius for each in found]))
 
     def _output(self, row: int, arcs: _Arcs, poles: Discs) -> Discs:
@@ -202,10 +203,6 @@ class Circle:
             middles.append(weights @ (1 / away).T)
             radii.append(abs(weights) @ change.T)
         return Discs(np.concatenate(middles, axis=1), np.concatenate(radii, axis=1))
-
-
-def _three(gains: HubFeedback) -> tuple[float, float, float]:
-    return gains.Kp, gains.K1, gains.K2
 
 
 def _power(x: Discs, n: int) -> Discs:

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from tfarm.arm import HubFeedback
-from tfarm.dsp.boundary import GainName
 from tfarm.dsp.loop import SampledLoop
 from tfarm.records import record
 from tfarm.spectrum import modes
@@ -99,15 +98,14 @@ def _of_pair(loop: SampledLoop, origin: NDArray[np.int64], i: int) -> NDArray[np
     return np.isin(origin, (i, conjugate))
 
 
-def root_locus(loop: SampledLoop, gain: GainName, values: Real) -> Complex:
+def root_locus(loop: SampledLoop, name: str, values: Real) -> Complex:
     """Closed-loop poles (values, poles) as one gain takes these values, each column one continuous branch.
 
     The other gains are those of the loop.  Values are taken as they are: give them close enough to tell branches apart.
     """
     rows: list[Complex] = []
     for value in values:
-        K1, K2 = (value, loop.gains.K2) if gain == "K1" else (loop.gains.K1, value)
-        z = loop.with_gains(float(K1), float(K2)).poles.z
+        z = loop.having(**{name: float(value)}).poles.z
         rows.append(z if not rows else z[_matched(_ahead(rows), z)])
     return np.array(rows)
 
@@ -138,8 +136,7 @@ def growing_mode(loop: SampledLoop) -> int:
 
 
 def _scaled(loop: SampledLoop, scale: float) -> SampledLoop:
-    gains = loop.gains
-    return replace(loop, gains=HubFeedback(K1=scale * gains.K1, K2=scale * gains.K2, Kp=scale * gains.Kp))
+    return replace(loop, gains=loop.gains.times(scale))
 
 
 def _ahead(rows: list[Complex]) -> Complex:

@@ -2,7 +2,7 @@
 
     u_k = -Kp theta_k - K1 theta_t,k - K2 M_k + r_k,   M the root moment E I phi'(0) as a strain gauge reads it
 
-    F(z) = 1 + Kp Theta(z) + K1 R(z) + K2 M(z) = 0
+    F(z) = 1 + gains . H(z) = 1 + Kp Theta(z) + K1 R(z) + K2 M(z) = 0
 
 Matrix eigenvalues are right to about 1e-14, and a mode may grow by 1e-10 a sample.  So each is polished as an offset
 delta from the nearest open-loop pole e^{pT}, by the secant method on delta F(e^{pT} + delta), which is computed without
@@ -18,11 +18,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, HubFeedback
+from tfarm.arm import FED_BACK, Arm, HubFeedback
 from tfarm.dsp.chain import Chain, Sampling
 from tfarm.dsp.plant import Branching, Plant, loop_plant, shorter_plant
 from tfarm.dsp.sampling import PulseTransfer
 from tfarm.errors import ParameterError
+from tfarm.exact.characteristic import torque
 from tfarm.records import record
 from tfarm.spectrum.damped import all_damped_modes
 from tfarm.spectrum.scales import check_gains
@@ -31,7 +32,7 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 Whole = NDArray[np.int64]
 
-ANGLE, RATE, MOMENT = 0, 1, 2
+ANGLE, RATE = (FED_BACK.index(name) for name in ("hub_angle", "hub_rate"))  # rows of what is measured
 TINY = 1e-30  # stands for zero where a root sits on the filter's own pole, which it does where nothing is fed back
 UNMOVED = 1e-50  # an offset this small is a pole that the loop does not move
 FAINT = 0.2  # a pole nearer to z = 0 decides nothing and is not polished
@@ -74,9 +75,9 @@ class SampledLoop:
         """The pulse transfer functions to hub angle, hub rate and root moment."""
         return PulseTransfer(self.plant, self.chain.sampling).folded()
 
-    def with_gains(self, K1: float, K2: float) -> SampledLoop:
-        """The same loop with other gains."""
-        return replace(self, gains=HubFeedback(K1=K1, K2=K2, Kp=self.gains.Kp))
+    def having(self, **gains: float) -> SampledLoop:
+        """The same loop with other values of the gains that are named."""
+        return replace(self, gains=replace(self.gains, **gains))
 
     def with_delay(self, samples: float) -> SampledLoop:
         """The same loop with another computational delay."""
@@ -105,22 +106,21 @@ class SampledLoop:
 
     # ------------------------------------------------------------ characteristic function
 
-    def signals(self, z: Complex, base: Whole | None, offset: Any) -> tuple[Complex, Complex, Complex]:
-        """offset (1 + Kp Theta), offset R and offset M at z = e^{pT} + offset, p the pole number `base`."""
-        angle, rate, moment = self.pulse.scaled(z, base, offset)
+    def signals(self, z: Complex, base: Whole | None, offset: Any) -> Complex:
+        """offset H (gains, n) of all that is fed back, at z = e^{pT} + offset (n,), p the pole number `base`."""
+        measured = self.pulse.scaled(z, base, offset)
         if self.differences:
             a, T = self.smoothing, self.chain.sampling.period
             step = z - 1.0
             if base is not None:
                 step = np.where(base == self.pulse.poles.size - 1, offset, step)
             lag = np.where(z == a, TINY, z - a)
-            rate = angle * step * ((1 - a) / T) / lag
-        return offset + self.gains.Kp * angle, rate, moment
+            measured[RATE] = measured[ANGLE] * step * ((1 - a) / T) / lag
+        return measured
 
     def characteristic(self, z: Complex, base: Whole | None, offset: Any) -> Complex:
         """offset F(z)."""
-        rest, rate, moment = self.signals(z, base, offset)
-        return rest + self.gains.K1 * rate + self.gains.K2 * moment
+        return np.asarray(offset + torque(self.gains.row, self.signals(z, base, offset)))
 
     def __call__(self, z: Complex) -> Complex:
         """F(z) at an array of z."""
@@ -132,18 +132,13 @@ class SampledLoop:
     def matrix(self) -> Real:
         """The closed-loop matrix with the hub angle: states of `PulseTransfer.matrices`, then of the rate filter."""
         A, B, C = self.pulse.matrices()
-        K1, K2, Kp = self.gains.K1, self.gains.K2, self.gains.Kp
-        n, feedback = len(A), Kp * C[ANGLE] + K2 * C[MOMENT]
-        if not self.differences:
-            closed: Real = A - np.outer(B, feedback + K1 * C[RATE])
-            return closed
-        a, T = self.smoothing, self.chain.sampling.period
-        whole, drive = np.zeros((n + 2, n + 2)), np.r_[B, 0.0, 0.0]
-        whole[:n, :n] = A
-        rate = np.r_[(1 - a) / T * C[ANGLE], -(1 - a) / T, a]  # states: the angle and the rate of the sample before
-        whole[n, :n] = C[ANGLE]
-        whole[n + 1] = rate
-        return whole - np.outer(drive, np.r_[feedback, 0.0, 0.0] + K1 * rate)
+        if self.differences:
+            n, a, T = len(A), self.smoothing, self.chain.sampling.period
+            A, B, C = np.pad(A, (0, 2)), np.pad(B, (0, 2)), np.pad(C, ((0, 0), (0, 2)))
+            A[n] = C[ANGLE]  # two states more: the angle and the rate of the sample before
+            A[n + 1] = C[RATE] = (1 - a) / T * (C[ANGLE] - np.eye(n + 2)[n]) + a * np.eye(n + 2)[n + 1]
+        closed: Real = A - np.outer(B, np.array(self.gains.row) @ C)
+        return closed
 
     def reduced_matrix(self) -> Real:
         """The closed-loop matrix without the pole z = 1 of a free hub angle, or of a hub that cannot drift."""
@@ -192,11 +187,12 @@ class SampledLoop:
         start = np.where(start == 0, 1e-17, start)
         old = start * (1 + 1e-4) + 1e-18
         new, f_old = start, self.characteristic(open_loop + old, base, old)
-        for _ in range(8):
-            f_new = self.characteristic(open_loop + new, base, new)
-            slope = f_new - f_old
-            step = np.where(slope == 0, 0.0, f_new * (new - old) / np.where(slope == 0, 1.0, slope))
-            old, f_old, new = new, f_new, np.where(abs(new - step) < UNMOVED, UNMOVED, new - step)
+        with np.errstate(all="ignore"):  # a root that strays beyond any number is put back to its start below
+            for _ in range(8):
+                f_new = self.characteristic(open_loop + new, base, new)
+                slope = f_new - f_old
+                step = np.where(slope == 0, 0.0, f_new * (new - old) / np.where(slope == 0, 1.0, slope))
+                old, f_old, new = new, f_new, np.where(abs(new - step) < UNMOVED, UNMOVED, new - step)
         near = abs(new - start) <= 1e-9 + 1e-3 * abs(start)
         offset = np.where(near, new, start)
         return np.where(abs(offset) <= UNMOVED, 0.0, offset)

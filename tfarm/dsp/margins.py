@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from tfarm.arm import Arm, HubFeedback
-from tfarm.dsp.boundary import GainName, circle_grid, crossings
+from tfarm.crossing import joined
+from tfarm.dsp.boundary import circle_grid, crossings
 from tfarm.dsp.chain import Chain
-from tfarm.dsp.loop import MOMENT, RATE, SampledLoop, sampled_loop
+from tfarm.dsp.loop import SampledLoop, sampled_loop
 from tfarm.dsp.plant import Branching
 from tfarm.dsp.sampling import FORGOTTEN, held
 from tfarm.errors import ConvergenceError
@@ -44,26 +45,22 @@ class DelayMargin:
     is_bound: bool
 
 
-def stable_windows(loop: SampledLoop, gain: GainName) -> list[Window]:
+def stable_windows(loop: SampledLoop, name: str) -> list[Window]:
     """Every open interval of one gain in which the loop is stable, the other gains as they are.
 
     Between two crossings of the unit circle the count of unstable poles is constant: it follows from the count at one
     gain, and where it is zero the poles themselves confirm it.  A gap that rounding tears between crossings of one
     gain has no count of its own.
     """
-    other = loop.gains.K2 if gain == "K1" else loop.gains.K1
-    found = crossings(circle_grid(loop), gain, other)
+    found = crossings(circle_grid(loop), name, loop.gains)
     edges = np.r_[-math.inf, found.gain, math.inf]
     middles = _middles(found.gain)
-    totals = np.r_[0, np.cumsum(found.count)]
+    totals = found.passed(middles)
     is_gap = np.r_[True, np.diff(found.gain) > SAME * abs(found.gain[1:]), True][: totals.size]
     lowest = is_gap & (totals == totals[is_gap].min())  # the same up to a constant: only its minima can be zero
-    windows: list[Window] = []
-    for i in np.nonzero(lowest)[0]:
-        K1, K2 = (middles[i], other) if gain == "K1" else (other, middles[i])
-        if edges[i] < edges[i + 1] and loop.with_gains(K1, K2).poles.is_stable:
-            windows.append((float(edges[i]), float(edges[i + 1])))
-    return joined(windows)
+    gaps = [int(i) for i in np.nonzero(lowest)[0] if edges[i] < edges[i + 1]]
+    stable = [i for i in gaps if loop.having(**{name: float(middles[i])}).poles.is_stable]
+    return joined([(float(edges[i]), float(edges[i + 1])) for i in stable])
 
 
 def _middles(gain: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -72,17 +69,6 @@ def _middles(gain: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.zeros(1)
     beyond = abs(gain).max() or 1.0  # no crossing lies beyond: any distance would do
     return np.r_[gain[0] - beyond, (gain[1:] + gain[:-1]) / 2, gain[-1] + beyond]
-
-
-def joined(windows: list[Window]) -> list[Window]:
-    """Neighbours with a common edge are one (two crossings that cancel)."""
-    merged: list[Window] = []
-    for low, high in windows:
-        if merged and merged[-1][1] == low:
-            merged[-1] = (merged[-1][0], high)
-        else:
-            merged.append((low, high))
-    return merged
 
 
 def around(windows: list[Window], gain: float) -> Window | None:
@@ -118,7 +104,7 @@ def delay_margin(loop: SampledLoop) -> DelayMargin:
 def _delay_step(loop: SampledLoop) -> float:
     """A twelfth of the turn, in samples, of the fastest mode whose own damping the feedback could outweigh."""
     plant, T = loop.plant, loop.chain.sampling.period
-    push = abs(loop.gains.K1 * plant.residues[RATE]) + abs(loop.gains.K2 * plant.residues[MOMENT])
+    push = abs(np.array(loop.gains.row)[:, None] * plant.residues).sum(axis=0)
     reach = 4 * push * abs(held(plant.poles, T))
     risky = (reach > -plant.poles.real * T) & (plant.poles.imag > 0)
     fastest = (plant.poles.imag[risky] * T).max(initial=np.pi / 4)

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from tfarm.arm import Arm
+from tfarm.arm import FED_BACK, Arm
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.remainder import with_slow_remainder
 from tfarm.errors import ParameterError
@@ -33,7 +33,7 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 
 Branching = Callable[[Modes], DampedModes]
 
-MEASURED = ("hub_angle", "hub_rate", "root_moment")
+MEASURED = FED_BACK
 RECORDED = ("hub_angle", "hub_rate", "root_moment", "tip_displacement")
 
 
@@ -164,9 +164,7 @@ def _of_model(model: ModalModel) -> Plant:
 
 def _with_hub_damping(model: ModalModel, outputs: Sequence[str], damping: float) -> Plant:
     """The poles and residues under the torque -damping theta_t of a model with the hub's rate last, by eigenvectors."""
-    A, B, C, D = model.matrices()
-    share = 1 / (1 + damping * D[-1, 0])
-    A, C, D, B = A - damping * share * B @ C[-1:], C - damping * share * D @ C[-1:], D * share, B * share
+    A, B, C, D = model.closed([0.0] * (len(model.outputs) - 1) + [damping])
     poles, right = np.linalg.eig(A)
     drive = np.linalg.solve(right, B.astype(complex))[:, 0]
     residues = (C @ right) * drive

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.dsp.boundary import Crossings, circle_grid, crossings
+from tfarm.crossing import Crossings, counts_over, intervals
+from tfarm.dsp.boundary import circle_grid, crossings
 from tfarm.dsp.loop import SampledLoop
-from tfarm.dsp.margins import Window, joined
+from tfarm.dsp.margins import Window
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 
@@ -42,16 +43,10 @@ class GainMap:
     def stable_intervals(self) -> list[list[Window]]:
         """For each K1 the intervals of K2, cut to the map, in which nothing grows: the region with exact edges."""
         low, high = float(self.K2[0]), float(self.K2[-1])
-        return [self._intervals(i, low, high) for i in range(self.K1.size)]
-
-    def _intervals(self, i: int, low: float, high: float) -> list[Window]:
-        jumps = self.crossings[i]
-        inside = jumps.gain[(jumps.gain > low) & (jumps.gain < high)]
-        ends = np.r_[low, inside, high]
-        middles = (ends[1:] + ends[:-1]) / 2
-        counts = self.unstable[i, 0] + _passed(jumps, middles) - _passed(jumps, self.K2[:1])
-        pairs = zip(ends[:-1], ends[1:], counts, strict=True)
-        return joined([(float(a), float(b)) for a, b, n in pairs if n == 0 and b > a])
+        return [
+            intervals(found, low, high, low, int(unstable))
+            for found, unstable in zip(self.crossings, self.unstable[:, 0], strict=True)
+        ]
 
 
 def gain_map(loop: SampledLoop, K1: Sequence[float] | Real, K2: Sequence[float] | Real) -> GainMap:
@@ -61,33 +56,20 @@ def gain_map(loop: SampledLoop, K1: Sequence[float] | Real, K2: Sequence[float] 
     corner, must agree with what the crossings say, or a ConvergenceError is raised.
     """
     rows, columns = _ascending("K1", K1), _ascending("K2", K2)
-    grid = circle_grid(loop)
-    first, start = _off_the_edge(rows), _off_the_edge(columns)
-    along = crossings(grid, "K1", start)
-    reference = _count(loop, first, start) - _passed(along, np.array([first]))
-    at_start = reference + _passed(along, rows)
-    found = [crossings(grid, "K2", float(gain)) for gain in rows]
-    passed = np.array([_passed(jumps, np.r_[columns, start]) for jumps in found])
-    plane = GainMap(loop, rows, columns, at_start[:, None] + passed[:, :-1] - passed[:, -1:], found)
+    grid, start = circle_grid(loop), loop.having(K1=_off_the_edge(rows), K2=_off_the_edge(columns))
+    first, there = start.gains, np.array([(start.poles.log_radius > 0).sum()])
+    (at_start,) = counts_over(rows, [crossings(grid, "K1", first)], first.K1, there)
+    found = [crossings(grid, "K2", first.having("K1", float(gain))) for gain in rows]
+    plane = GainMap(loop, rows, columns, counts_over(columns, found, first.K2, at_start), found)
     _check(plane)
     return plane
-
-
-def _count(loop: SampledLoop, K1: float, K2: float) -> int:
-    return int((loop.with_gains(K1, K2).poles.log_radius > 0).sum())
-
-
-def _passed(jumps: Crossings, at: Real) -> NDArray[np.int64]:
-    """How many poles have left the circle between -infinity and each gain."""
-    total: NDArray[np.int64] = np.r_[0, np.cumsum(jumps.count)][np.searchsorted(jumps.gain, at)]
-    return total
 
 
 def _check(plane: GainMap) -> None:
     """Counts by eigenvalues at three corners against those of the map."""
     for i, j in ((0, 0), (-1, 0), (-1, -1)):
         K1, K2 = float(plane.K1[i]), float(plane.K2[j])
-        poles = plane.loop.with_gains(K1, K2).poles
+        poles = plane.loop.having(K1=K1, K2=K2).poles
         if abs(poles.log_radius).min() < 1e-9:  # on an edge, or too close to tell
             continue
         if (count := int((poles.log_radius > 0).sum())) != plane.unstable[i, j]:

@@ -14,7 +14,6 @@ from functools import cache
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.dsp.band import Band, band_of
-from tfarm.dsp.boundary import GainName
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.circle import Circle
 from tfarm.dsp.loop import SampledLoop
@@ -125,7 +124,7 @@ class Edge:
         return min(band, narrower) if still is False else 0.0
 
 
-def shown_windows(loop: SampledLoop, band: Band | None, gain: GainName) -> ShownWindows:
+def shown_windows(loop: SampledLoop, band: Band | None, gain: str) -> ShownWindows:
     """The windows of one gain, with more modes than the loop's where edges can be proven only then."""
     loop = loop if loop.plant.count <= MANY else resized(loop, MANY)
     circle = None if band is None else band.circle()
@@ -136,13 +135,12 @@ def shown_windows(loop: SampledLoop, band: Band | None, gain: GainName) -> Shown
     return found
 
 
-def _windows(loop: SampledLoop, band: Band | None, circle: Circle | None, gain: GainName) -> ShownWindows:
+def _windows(loop: SampledLoop, band: Band | None, circle: Circle | None, gain: str) -> ShownWindows:
     """The windows of this very loop."""
     other, modes = cache(lambda: resized(loop, another(loop.plant.count))), loop.plant.count
 
     def at(value: float) -> HubFeedback:
-        gains = loop.gains
-        return replace(gains, K1=value) if gain == "K1" else replace(gains, K2=value)
+        return loop.gains.having(gain, value)
 
     def proof(value: float) -> Proof:
         assert circle is not None

@@ -17,7 +17,7 @@ from typing import Any
 import flint
 
 from .balls import Ball, State, point, rational
-from .characteristic import OPEN, Gains
+from .characteristic import NUMERATORS, OPEN, Gains
 from .closed_form import from_waves
 from .coefficients import Coefficients, Condition
 from .compiled import plain
@@ -33,7 +33,7 @@ TERMS = 4  # of the Taylor series
 def characteristic_ball(k: Coefficients, s: Ball, gains: Gains = OPEN) -> Ball:
     """D(s) enclosed, at the working precision: for points, at any s."""
     state = State(k, s)
-    return _fed_back(k, s, state.theta, state.M0, gains)
+    return _closed(k, s, state.theta, state.M0, gains)
 
 
 def characteristic_over(k: Coefficients, s: Ball, gains: Gains = OPEN) -> Ball:
@@ -59,14 +59,14 @@ def tangent(k: Coefficients, m: Ball, r: Ball, gains: Gains = OPEN) -> tuple[Bal
     return None if here is None or there is None else (here[0][0], here[0][1], there[0][2])
 
 
-def _fed_back(k: Coefficients, s: Any, theta: Any, M0: Any, gains: Gains) -> Any:
-    """The drive and the feedback's torque (see `characteristic`), for balls and for series."""
+def _closed(k: Coefficients, s: Any, theta: Any, M0: Any, gains: Gains) -> Any:
+    """D (see `characteristic`) of a response with that hub angle and root moment, for balls and for series."""
     hub = Condition.of(k.hub_inertia)
     drive = theta * (s * s * rational(hub.inertia) + rational(hub.rest)) - M0 * rational(hub.force)
     drive = drive if hub.rest else drive / rational(hub.force)
-    if gains.Kp or gains.K1:
-        drive = drive + theta * (s * rational(gains.K1) + rational(gains.Kp))
-    return drive + M0 * rational(gains.K2) / (s * rational(k.damping) + 1) if gains.K2 else drive
+    for gain, part in zip(gains, NUMERATORS(s, 1 / (s * rational(k.damping) + 1), theta, M0), strict=True):
+        drive = drive + part * rational(gain) if gain else drive
+    return drive
 
 
 def _by_waves(
@@ -95,7 +95,7 @@ def _by_waves(
     unit = S * d * spread * spread * (4 * g)
     if unit[0].contains(0):
         return None
-    return _fed_back(k, s, theta, M0, gains) * (t - scale).exp() / unit, scale
+    return _closed(k, s, theta, M0, gains) * (t - scale).exp() / unit, scale
 
 
 def _root(z: Series) -> Series | None:

@@ -9,8 +9,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from tfarm.arm import GAINS
 from tfarm.errors import ConvergenceError
-from tfarm.exact.characteristic import loop_parts, quick_characteristics
+from tfarm.exact.characteristic import loop_parts, quick_characteristics, torque
+from tfarm.exact.outputs import OUTPUTS
 
 from .variation import Complex, Evaluator, Real, Variation
 
@@ -19,6 +21,7 @@ NEAR_ZERO = 1e-50  # of the lowest frequency: where D is taken for its value at 
 SETTLED = 1e-6  # of the distance of two points: a crossing must be known so well at least
 STEP = 1e-5  # of a frequency, or of the distance of two gains, for differences
 STEPS = 30
+ODD = np.array([OUTPUTS[gain.output].power % 2 == 1 for gain in GAINS])  # powers of s: imaginary on the axis
 HALVINGS = (0, 4, 12)  # of the distance of two points, before Newton's method is tried
 
 
@@ -129,19 +132,19 @@ def _newton_step(variation: Variation, g: float, w: float, low: float, high: flo
 def _on_axis(variation: Variation, gains: Real, omega: Real) -> Complex:
     """D(i w; g) for each gain and frequency, all on the scale of the first.
 
-    At C = 0 drive, theta and M(0) are real there, and what rounding adds to them is taken off: then Im D is that of the
-    rate gain alone, and the crossings at K1 = 0 and K2 = 1 come out to the last digit.
+    At C = 0 drive and numerators are real there, or imaginary with an odd power of s, and what rounding adds is taken
+    off: then Im D is that of the rate gain alone, and the crossings at K1 = 0 and K2 = 1 come out to the last digit.
     """
     values, base = np.empty(omega.size, complex), 0.0
     for n, (gain, w) in enumerate(zip(gains, omega, strict=True)):
         k, law = variation.system(float(gain))
-        drive, theta, moment, scale = (part[0] for part in loop_parts(k, np.array([1j * w])))
+        drive, numerators, scale = (part[..., 0] for part in loop_parts(k, np.array([1j * w])))
         turn = np.exp(1j * scale.imag)
+        drive, numerators = drive * turn, numerators * turn
         if k.damping == 0:
-            drive, theta, moment, turn = (drive * turn).real, (theta * turn).real, (moment * turn).real, 1.0
-        Kp, K1, K2 = law[:, 0]
+            drive, numerators = drive.real, np.where(ODD, 1j * numerators.imag, numerators.real)
         base = base if n else float(scale.real)
-        values[n] = (drive + (Kp + 1j * w * K1) * theta + K2 * moment) * turn * np.exp(scale.real - base)
+        values[n] = (drive + torque(law[:, 0], numerators)) * np.exp(scale.real - base)
     return values
 
 

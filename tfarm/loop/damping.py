@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, HubFeedback
-from tfarm.exact.characteristic import Gains, quick_characteristics
+from tfarm.arm import FED_BACK, Arm, law_of
+from tfarm.exact.characteristic import quick_characteristics, unit_gains
 from tfarm.exact.coefficients import coefficients
-from tfarm.reduced import modal_model
+from tfarm.reduced import ModalModel, modal_model
 
 from .frequencies import band_of
 from .plant import Loop
@@ -33,32 +33,32 @@ SETTLED, NEAR = 1e-9, 0.05  # shares of |s|: of the last correction, and of the 
 BLOCK = 4000  # gains at a time
 
 
-def band_poles(arm: Arm, K1: Real, K2: Real, Kp: Real, number: int) -> Complex:
-    """The poles [1/s] with 0 < Im s below half-way to mode number + 1: (gains, slots), nan where there are fewer.
+def band_poles(arm: Arm, laws: Real, number: int) -> Complex:
+    """The poles [1/s] with 0 < Im s below half-way to mode number + 1: (n, slots), nan where there are fewer.
 
-    K1, K2 and Kp are arrays of one length.  Real poles are not among them (see `band_and_real_poles`).
+    `laws` (gains, n) are those of `many_laws`.  Real poles are not among them (see `band_and_real_poles`).
     """
-    return _in_blocks(_oscillating, arm, K1, K2, Kp, number)
+    return _in_blocks(_oscillating, arm, laws, number)
 
 
-def band_and_real_poles(arm: Arm, K1: Real, K2: Real, Kp: Real, number: int) -> Complex:
-    """Those of `band_poles`, and the real poles but 0 of size below the same frequency: (gains, slots), with nan."""
-    return _in_blocks(_either, arm, K1, K2, Kp, number)
+def band_and_real_poles(arm: Arm, laws: Real, number: int) -> Complex:
+    """Those of `band_poles`, and the real poles but 0 of size below the same frequency: (n, slots), with nan."""
+    return _in_blocks(_either, arm, laws, number)
 
 
-def _in_blocks(kind: Kind, arm: Arm, K1: Real, K2: Real, Kp: Real, number: int) -> Complex:
-    Loop(arm, HubFeedback(K1=float(K1[0]), K2=float(np.max(abs(K2))), Kp=float(Kp[0])))
+def _in_blocks(kind: Kind, arm: Arm, laws: Real, number: int) -> Complex:
+    Loop(arm, law_of(abs(laws).max(axis=1)))
     top = band_of(arm, number)
-    parts = [slice(i, i + BLOCK) for i in range(0, K1.size, BLOCK)]
-    found = [_of_block(kind, arm, K1[part], K2[part], Kp[part], number, top) for part in parts]
+    parts = [slice(i, i + BLOCK) for i in range(0, laws.shape[1], BLOCK)]
+    found = [_of_block(kind, arm, laws[:, part], number, top) for part in parts]
     slots = max(part.shape[1] for part in found)
     padded = [np.pad(part, ((0, 0), (0, slots - part.shape[1])), constant_values=np.nan) for part in found]
     return np.concatenate(padded)
 
 
-def least_damping(arm: Arm, K1: Real, K2: Real, Kp: Real, number: int) -> Real:
+def least_damping(arm: Arm, laws: Real, number: int) -> Real:
     """The damping ratio of the least damped oscillating pole of the band, for each law; negative if one is unstable."""
-    poles = band_poles(arm, K1, K2, Kp, number)
+    poles = band_poles(arm, laws, number)
     ratio = -poles.real / abs(poles)
     ratio = np.where(np.isnan(ratio), 1.0, ratio)
     return np.asarray(ratio.min(axis=1, initial=1.0))
@@ -82,16 +82,16 @@ def _either(s: Complex, top: float) -> NDArray[np.bool_]:
     return _oscillating(s, top) | _real(s, top)
 
 
-def _of_block(kind: Kind, arm: Arm, K1: Real, K2: Real, Kp: Real, number: int, top: float) -> Complex:
-    """The poles (gains, slots) of one block."""
-    poles, left = np.empty((K1.size, 0), complex), np.arange(K1.size)
+def _of_block(kind: Kind, arm: Arm, laws: Real, number: int, top: float) -> Complex:
+    """The poles (n, slots) of one block."""
+    poles, left = np.empty((laws.shape[1], 0), complex), np.arange(laws.shape[1])
     for beyond in BEYOND:
-        found, is_done = _corrected(kind, arm, (K1[left], K2[left], Kp[left]), number + beyond, top)
+        found, is_done = _corrected(kind, arm, laws[:, left], number + beyond, top)
         poles, left = _filled(poles, left[is_done], found[is_done]), left[~is_done]
         if not left.size:
             return poles
     for n in left:
-        exact = poles_below(Loop(arm, HubFeedback(K1=float(K1[n]), K2=float(K2[n]), Kp=float(Kp[n]))), top).values
+        exact = poles_below(Loop(arm, law_of(laws[:, n])), top).values
         poles = _filled(poles, np.array([n]), exact[kind(exact, top)][None])
     return poles
 
@@ -105,43 +105,36 @@ def _filled(poles: Complex, rows: NDArray[np.int64], found: Complex) -> Complex:
     return poles
 
 
-def _corrected(
-    kind: Kind, arm: Arm, law: tuple[Real, Real, Real], modes: int, top: float
-) -> tuple[Complex, NDArray[np.bool_]]:
+def _corrected(kind: Kind, arm: Arm, laws: Real, modes: int, top: float) -> tuple[Complex, NDArray[np.bool_]]:
     """The exact poles next to those of a model with so many modes, and for which laws all settled apart."""
-    starts = _eigenvalues(arm, *law, modes)
+    starts = _eigenvalues(arm, laws, modes)
     wanted = kind(starts, 1.2 * top)
     order = np.argsort(~wanted, axis=1, kind="stable")[:, : max(1, int(wanted.sum(1).max()))]
     s = np.where(np.take_along_axis(wanted, order, 1), np.take_along_axis(starts, order, 1), np.nan)
-    polished, settled = _newton(arm, s, *law)
+    polished, settled = _newton(arm, s, laws)
     poles = np.where(kind(polished, top), polished, np.nan)
     return poles, settled.all(1) & _are_distinct(poles)
 
 
-def _eigenvalues(arm: Arm, K1: Real, K2: Real, Kp: Real, modes: int) -> Complex:
+def _eigenvalues(arm: Arm, laws: Real, modes: int) -> Complex:
     """Eigenvalues of the modal model with so many modes under each law: (gains, states)."""
-    A, B, C, D = _model(arm, modes)
-    rows = Kp[:, None] * C[0] + K1[:, None] * C[1] + K2[:, None] * C[2]
-    through = Kp * D[0, 0] + K1 * D[1, 0] + K2 * D[2, 0]
-    gain = rows / (1.0 + through)[:, None]
-    return np.linalg.eigvals(A[None] - B[None] * gain[:, None, :])
+    return np.linalg.eigvals(_model(arm, modes).closed(laws.T)[0]).astype(complex)
 
 
 @lru_cache(maxsize=16)
-def _model(arm: Arm, count: int) -> Any:
-    return modal_model(arm, ["hub_angle", "hub_rate", "root_moment"], count).matrices()
+def _model(arm: Arm, count: int) -> ModalModel:
+    return modal_model(arm, FED_BACK, count)
 
 
-def _newton(arm: Arm, starts: Complex, K1: Real, K2: Real, Kp: Real) -> tuple[Complex, NDArray[np.bool_]]:
+def _newton(arm: Arm, starts: Complex, laws: Real) -> tuple[Complex, NDArray[np.bool_]]:
     """The exact poles next to the starts, and which settled there (nan where there is no start)."""
     k = coefficients(arm)
-    unit = Gains.of(k, 1.0, 1.0, 1.0)
-    law = np.stack([float(unit.Kp) * Kp, float(unit.K1) * K1, K2])
+    laws = laws * np.array([[float(unit)] for unit in unit_gains(k)])
     rows, columns = np.nonzero(~np.isnan(starts))
     s = starts[rows, columns]
     begin, move = s.copy(), np.zeros_like(s)
     for _ in range(STEPS):
-        at = quick_characteristics(k, s, law[:, rows])
+        at = quick_characteristics(k, s, laws[:, rows])
         with np.errstate(all="ignore"):  # a start that runs away has not settled
             move = at.value / at.slope
         move = np.where(np.isfinite(move), move, 0.1 * s)

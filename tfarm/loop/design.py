@@ -14,7 +14,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, Hub, HubFeedback
+from tfarm.arm import Arm, Hub, HubFeedback, law_of, many_laws
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 from tfarm.spectrum import modes as natural_modes
@@ -171,17 +171,18 @@ def _checked(name: str, bounds: Bounds) -> Bounds:
 
 def _score(arm: Arm, objective: str, Kp: float, modes: int) -> Callable[[Real, Real], Real]:
     """What is minimised, for arrays of K1 and K2."""
+    rest = HubFeedback(Kp=Kp)
     if objective == "damping":
-        return lambda K1, K2: -least_damping(arm, K1, K2, np.full(K1.size, Kp), modes)
+        return lambda K1, K2: -least_damping(arm, many_laws(rest, K1=K1, K2=K2), modes)
     if objective == "residual":
-        return lambda K1, K2: residual_moment(arm, K1, K2, np.full(K1.size, Kp), modes)
+        return lambda K1, K2: residual_moment(arm, many_laws(rest, K1=K1, K2=K2), modes)
     band = band_of(arm, modes)
     omega = np.asarray(grid(arm, band))
 
     def disk(K1: Real, K2: Real) -> Real:
-        loops = (Loop(arm, HubFeedback(K1=float(a), K2=float(b), Kp=Kp)) for a, b in zip(K1, K2, strict=True))
-        size = np.array([_disk(loop, omega) for loop in loops])
-        return -size - TIE * least_damping(arm, K1, K2, np.full(K1.size, Kp), modes)
+        laws = many_laws(rest, K1=K1, K2=K2)
+        size = np.array([_disk(Loop(arm, law_of(law)), omega) for law in laws.T])
+        return -size - TIE * least_damping(arm, laws, modes)
 
     return disk
 

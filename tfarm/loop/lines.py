@@ -1,24 +1,22 @@
-"""Where poles cross the imaginary axis along a line of gains: solved, for all windows at once (D-decomposition).
+"""Where poles cross the imaginary axis along a line of laws, for all windows at once (`tfarm.crossing` on s = i w).
 
-Along gains g0 + t g1 the characteristic function is N(s) + t P(s), linear in t.  A pole lies at i w where t(w) = -N/P
-is real, that is at the zeros of h(w) = Im(N P*), a real function of one variable.  As t grows, the pair of poles there
-goes right if Im t(w) grows with w, and left if it falls (differentiate N + t P = 0).  A real pole crosses at s = 0,
-where t(s) for real s has a finite limit, and goes right if t(s) grows with s.  (Neimark 1948; Gryazina, Polyak and
-Tremba 2008.)
+Along laws g0 + t g1 the characteristic function is N(s) + t P(s), linear in t.  A real pole crosses at s = 0, where
+t(s) = -N/P for real s has a finite limit, and goes right if t(s) grows with s.
 
 At C = 0 h vanishes identically along K2: there is no curve, only the line K2 = 1; `margins` knows that case.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback
-from tfarm.exact.characteristic import Gains, loop_parts
+from tfarm.crossing import Crossing, Crossings, brackets, solved
+from tfarm.exact.characteristic import gains_of, loop_parts, torque
 from tfarm.exact.coefficients import Coefficients, coefficients
 from tfarm.spectrum import modes
 
@@ -26,87 +24,52 @@ from .frequencies import grid
 from .plant import effective_inertia
 
 Complex = NDArray[np.complexfloating[Any, Any]]
-Real = NDArray[np.float64]
 
-BISECTIONS = 60
 NONE = HubFeedback()
 
 
 @dataclass(frozen=True, slots=True)
-class Crossing:
-    """Poles on the axis at t along the line: +-i omega (one at 0), `change` more of them unstable for greater t."""
-
-    t: float
-    omega: float
-    change: int
-
-
-@dataclass(frozen=True, slots=True)
 class Line:
-    """Gains base + t direction, t real."""
+    """Laws base + t direction, t real."""
 
     base: HubFeedback
     direction: HubFeedback
 
     def at(self, t: float) -> HubFeedback:
         """The law at t."""
-        a, b = self.base, self.direction
-        return HubFeedback(K1=a.K1 + t * b.K1, K2=a.K2 + t * b.K2, Kp=a.Kp + t * b.Kp)
+        return self.base.plus(self.direction, t)
 
     @property
     def length(self) -> float:
         """The largest gain of the direction."""
-        return max(abs(self.direction.K1), abs(self.direction.K2), abs(self.direction.Kp))
+        return max(map(abs, self.direction.row))
 
 
 def along(name: str, law: HubFeedback) -> Line:
     """The line on which one gain takes every value, t being that value, and the others keep theirs."""
-    others = {key: getattr(law, key) for key in ("K1", "K2", "Kp") if key != name}
-    return Line(HubFeedback(**others), HubFeedback(**{name: 1.0}))
+    return Line(law.having(name, 0.0), NONE.having(name, 1.0))
 
 
-def crossings(arm: Arm, line: Line, band: float) -> tuple[Crossing, ...]:
-    """All crossings of the imaginary axis at frequencies up to `band` [rad/s], ascending in t."""
-    k = coefficients(arm)
-    omega = np.asarray(grid(arm, band))
-    found, unit = [crossing_at_zero(arm, line)], line.length
+def crossings(arm: Arm, line: Line, band: float) -> Crossings:
+    """All crossings of the imaginary axis at frequencies `at` up to `band` [rad/s], ascending in t."""
+    k, unit = coefficients(arm), line.length
+    static = crossing_at_zero(arm, line)
+    found = [] if static is None else [static]
     if unit:
-        way = line.direction
-        line = replace(line, direction=HubFeedback(K1=way.K1 / unit, K2=way.K2 / unit, Kp=way.Kp / unit))
-    h = _h(k, line, omega)
-    (before,) = np.nonzero(np.sign(h[1:]) * np.sign(h[:-1]) < 0)
-    if before.size:
-        at = _bisected(k, line, omega[before], omega[before + 1])
-        N, P = _parts(k, line, 1j * at)
-        with np.errstate(over="ignore"):  # of a direction that is next to nothing: beyond any number
-            t = -(N * P.conj()).real / abs(P) ** 2 / unit
-        change = np.where(h[before + 1] < 0, 2, -2)  # Im t = -h/|P|^2
-        found += [Crossing(float(a), float(b), int(c)) for a, b, c in zip(t, at, change, strict=True) if np.isfinite(a)]
-    return tuple(sorted((each for each in found if each is not None), key=lambda each: each.t))
-
-
-def _h(k: Coefficients, line: Line, omega: Real) -> Real:
-    N, P = _parts(k, line, 1j * omega)
-    return np.asarray((N * P.conj()).imag)
+        unified = Line(line.base, NONE.plus(line.direction, 1 / unit))
+        omega = np.asarray(grid(arm, band))
+        N, P = _parts(k, unified, 1j * omega)
+        (before,), change = brackets((N * P.conj()).imag)
+        at, t = solved(lambda w: _parts(k, unified, 1j * w), omega[before], omega[before + 1])
+        found += [Crossing(*each) for each in zip(t / unit, at, change, strict=True)]
+    return Crossings.of(found)
 
 
 def _parts(k: Coefficients, line: Line, s: NDArray[Any]) -> tuple[Complex, Complex]:
     """N and P at s, up to one common positive factor."""
-    drive, theta, moment, _ = loop_parts(k, s)
-    base, way = (Gains.of(k, law.K1, law.K2, law.Kp) for law in (line.base, line.direction))
-    N = drive + (float(base.Kp) + float(base.K1) * s) * theta + float(base.K2) * moment
-    P = (float(way.Kp) + float(way.K1) * s) * theta + float(way.K2) * moment
-    return N, P
-
-
-def _bisected(k: Coefficients, line: Line, low: Real, high: Real) -> Real:
-    """The zero of h in each bracket."""
-    low, high, start = low.copy(), high.copy(), np.sign(_h(k, line, low))
-    for _ in range(BISECTIONS):
-        middle = (low + high) / 2
-        left = np.sign(_h(k, line, middle)) == start
-        low, high = np.where(left, middle, low), np.where(left, high, middle)
-    return (low + high) / 2
+    drive, numerators, _ = loop_parts(k, s)
+    base, way = (torque(map(float, gains_of(k, law)), numerators) for law in (line.base, line.direction))
+    return drive + base, way
 
 
 def crossing_at_zero(arm: Arm, line: Line) -> Crossing | None:

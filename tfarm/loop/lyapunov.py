@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from tfarm.arm import Arm, HubFeedback
+from tfarm.arm import FED_BACK, Arm, HubFeedback
 from tfarm.arm.checks import positive
 from tfarm.errors import ParameterError
 from tfarm.records import record
@@ -39,7 +39,6 @@ Real = NDArray[np.float64]
 Kind = Literal["dissipated", "conserved", "unproven"]
 
 MOST_POINTS = 100_000
-SIGNALS = ("hub_angle", "hub_rate", "root_moment")
 
 
 @dataclass(frozen=True)
@@ -189,19 +188,17 @@ def _closed_modal_model(loop: Loop, modes: int) -> tuple[Real, Real, Real, Real,
     theta is the sum of the modes kept, without a static remainder, so that theta_t is its rate.
     """
     arm, law = loop.arm, loop.law
-    model = modal_model(arm, SIGNALS, modes)
-    A, B, C, D = model.matrices()
-    angle, rate, moment = C
-    passes = 1.0 + law.K2 * float(D[2, 0])
-    if passes <= 0:
+    model = modal_model(arm, FED_BACK, modes)
+    model = replace(model, static=np.where(np.array(FED_BACK) == "root_moment", model.static, 0.0))
+    _, B, (angle, rate, _), _ = model.matrices()
+    if 1.0 + np.array(law.row) @ model.static <= 0:
         raise ParameterError(
             key="modes", value=modes, remedy=f"more modes: too few have no solution at K2 = {law.K2:g}"
         )
-    weights = np.ones(A.shape[0])
+    weights = np.ones(model.order)
     if model.has_rigid_states:
         weights[:2] = 0.0, arm.total_inertia
-    feedback = (law.Kp * angle + law.K1 * rate + law.K2 * moment) / passes
-    return A - B * feedback, B[:, 0], angle, rate, weights
+    return model.closed(law.row)[0], B[:, 0], angle, rate, weights
 
 
 def _step(A: Real, Q: Real, step: float) -> tuple[Real, Real]:

@@ -23,11 +23,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from tfarm.arm import Arm, HubFeedback
+from tfarm.arm import NAMES, Arm, HubFeedback
+from tfarm.crossing import bisected, brackets
 from tfarm.records import record
 
 from .frequencies import grid
-from .lines import BISECTIONS, NONE, Line, crossing_at_zero, crossings
+from .lines import NONE, Line, crossing_at_zero, crossings
 from .plant import Loop
 from .poles import SMALLEST
 from .stability import Stability, is_quiet, stability
@@ -81,7 +82,7 @@ class Margins:
 def margins(arm: Arm, law: HubFeedback, band: float | None = None) -> Margins:
     """Verdict, windows of each gain, and margins of the loop.  Raises what `stability` raises."""
     verdict = stability(arm, law, band)
-    windows = {name: gain_windows(verdict, name) for name in ("K1", "K2", "Kp")}
+    windows = {name: gain_windows(verdict, name) for name in NAMES}
     if not verdict.is_stable:
         return Margins(verdict, windows, None, None, None, None)
     found = loop_margins(verdict)
@@ -186,7 +187,7 @@ def gain_margin(loop: Loop, band: float) -> tuple[float, float]:
         factors = [1.0 / law.K2] if law.K2 > 0 else []
         factors += [] if static is None else [static.t]
     else:
-        factors = [each.t for each in crossings(arm, line, band)]
+        factors = crossings(arm, line, band).gain.tolist()
     below = max((t for t in factors if 0 <= t < 1), default=0.0)
     return below, min((t for t in factors if t > 1), default=math.inf)
 
@@ -200,15 +201,9 @@ def unit_crossings(loop: Loop, omega: Real) -> Real:
         with np.errstate(divide="ignore"):  # where the hub stays at rest L is 0
             return np.asarray(np.log(abs(loop.loop_function(1j * w))))
 
-    sign = np.sign(size(omega))
-    (before,) = np.nonzero(sign[1:] * sign[:-1] < 0)
-    low, high, start = omega[before], omega[before + 1], sign[before]
+    (before,), _ = brackets(size(omega))
     slow = rigid_crossings(loop)
-    for _ in range(BISECTIONS if before.size else 0):
-        middle = (low + high) / 2
-        left = np.sign(size(middle)) == start
-        low, high = np.where(left, middle, low), np.where(left, high, middle)
-    return np.concatenate([slow[slow <= SMALLEST], (low + high) / 2])
+    return np.concatenate([slow[slow <= SMALLEST], bisected(size, omega[before], omega[before + 1])])
 
 
 def lowest(f: Callable[[Real], Real], omega: Real) -> tuple[float, float]:

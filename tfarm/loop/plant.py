@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, HubFeedback, must_be_arm
+from tfarm.arm import GAINS, Arm, HubFeedback, must_be_arm
 from tfarm.errors import ParameterError
-from tfarm.exact.characteristic import Gains, loop_parts
+from tfarm.exact.characteristic import Gains, gains_of, loop_parts, torque
 from tfarm.exact.coefficients import Coefficients, coefficients
 from tfarm.records import record
 from tfarm.spectrum.continuation import Member
@@ -45,10 +45,10 @@ class Loop:
             remedy = "with hub.inertia = 0 the root moment is -u at once: an algebraic loop; use K2 = 0 or some inertia"
             raise ParameterError(key="K2", value=self.law.K2, remedy=remedy)
         least = SMALLEST_NORMAL * max(1.0, self.arm.total_inertia if self.arm.has_rigid_mode else 1.0)
-        for key in ("K1", "K2", "Kp"):
-            if 0 < abs(getattr(self.law, key)) < least:
+        for gain in GAINS:
+            if 0 < abs(self.law[gain.name]) < least:
                 remedy = f"0, or at least {least:.1e} in size: of less the double has not all its digits"
-                raise ParameterError(key=key, value=getattr(self.law, key), remedy=remedy)
+                raise ParameterError(key=gain.name, value=self.law[gain.name], remedy=remedy)
         check_gains(self.arm, self.law)
 
     @cached_property
@@ -59,7 +59,7 @@ class Loop:
     @cached_property
     def gains(self) -> Gains:
         """The law's dimensionless gains."""
-        return Gains.of(self.k, self.law.K1, self.law.K2, self.law.Kp)
+        return gains_of(self.k, self.law)
 
     @property
     def member(self) -> Member:
@@ -67,7 +67,7 @@ class Loop:
         return member(self.k, self.gains)
 
     def loop_function(self, s: NDArray[Any]) -> Complex:
-        """L(s) = Kp G_theta + K1 s G_theta + K2 G_moment, so that closed-loop poles are the zeros of 1 + L.
+        """L(s), the law's gains times the transfer functions to what they multiply: closed-loop poles are at L = -1.
 
         Infinite at the arm's own poles.
         """
@@ -76,9 +76,8 @@ class Loop:
 
     def parts(self, s: NDArray[Any]) -> tuple[Complex, Complex]:
         """Denominator and numerator of L at s, up to one factor: finite at poles too."""
-        drive, theta, moment, _ = loop_parts(self.k, np.asarray(s, dtype=complex))
-        Kp, K1, K2 = float(self.gains.Kp), float(self.gains.K1), float(self.gains.K2)
-        return drive, np.asarray((Kp + K1 * s) * theta + K2 * moment)
+        drive, numerators, _ = loop_parts(self.k, np.asarray(s, dtype=complex))
+        return drive, np.asarray(torque(map(float, self.gains), numerators))
 
 
 def effective_inertia(arm: Arm, K2: float) -> float:

@@ -7,20 +7,20 @@ parameter of the arm, which python-control cannot vary, the poles of a reduced c
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from tfarm.arm import Arm, HubFeedback
+from tfarm.arm import FED_BACK, Arm, HubFeedback
 from tfarm.errors import ParameterError
 from tfarm.records import record
 from tfarm.reduced import ModalModel, modal_model
+from tfarm.reduced.partial_fractions import Matrices
 from tfarm.spectrum import modes
 
 from .locus import Locus
-from .variation import GAINS, Complex, Real, Variation
+from .variation import OF_THE_LAW, Complex, Real, Variation
 
 if TYPE_CHECKING:
     import control
@@ -30,7 +30,6 @@ BEYOND = 2  # modes of the reduced model above the last branch, if the order is 
 POLISHING = 4  # steps of Newton's method: they start from a dozen right digits
 BELIEVED = 1e-6  # of its size: a pole that Newton's method would move further is none of its own
 FEW = 9  # values at which an arm is reduced anew, where a parameter of it varies
-OUTPUTS = {"Kp": "hub_angle", "K1": "hub_rate", "K2": "root_moment"}
 
 
 @dataclass(frozen=True)
@@ -66,13 +65,15 @@ def reduced_locus(exact: Locus, order: int | None = None) -> ReducedLocus:
     if isinstance(order, bool) or not isinstance(order, int) or order % 2 or order < 2 * least:
         raise ParameterError(key="order", value=order, remedy=f"an even number from {2 * least}: two a mode")
     count = order // 2 - rigid
-    if exact.vary in GAINS:
+    if exact.vary in OF_THE_LAW:
         which = np.arange(exact.gain.size)
         poles = _polished(exact.variation, exact.gain, root_locus(arm, exact.law, exact.vary, exact.gain, count), count)
     else:
         which = np.unique(np.linspace(0, exact.gain.size - 1, FEW).round().astype(int))
         loops = [exact.variation.at(float(value)) for value in exact.gain[which]]
-        poles = np.array([_closed(each.arm, each.law, "", count)[0].poles() for each in loops])
+        none = np.zeros(len(FED_BACK))
+        closed = [_closed(each.arm, np.array(each.law.row), count, none)[0][0] for each in loops]
+        poles = np.array([np.linalg.eigvals(A) for A in closed])
     branches = exact.branches[:, which]
     paired = np.array([_paired(*each) for each in zip(branches.T, poles, strict=True)]).T
     size = np.maximum(abs(branches), modes(arm, 1).natural_frequency[-1])
@@ -92,8 +93,8 @@ def _polished(variation: Variation, gain: Real, poles: Complex, count: int) -> C
     What an eigenvalue solver gives depends on the processor in its last four digits.  Solved for is 1 + law . G(s) = 0
     on the model's partial fractions; a pole where that has no slope, or that would move, stays as it is.
     """
-    model = modal_model(variation.arm, list(OUTPUTS.values()), count)
-    laws = np.array([[getattr(variation.at(float(value)).law, name) for name in OUTPUTS] for value in gain])
+    model = modal_model(variation.arm, FED_BACK, count)
+    laws = np.array([variation.at(float(value)).law.row for value in gain])
     found = poles.astype(complex)
     for _ in range(POLISHING):
         value, slope = _return_difference(model, laws, found)
@@ -106,7 +107,7 @@ def _polished(variation: Variation, gain: Real, poles: Complex, count: int) -> C
 
 def _return_difference(model: ModalModel, laws: Real, s: Complex) -> tuple[Complex, Complex]:
     """1 + law . G(s) and its derivative, at s (gains, order), each row under its own law (gains, 3)."""
-    pole, residues = model.eigenvalues.ravel(), laws @ model.residues.reshape(len(OUTPUTS), -1)
+    pole, residues = model.eigenvalues.ravel(), laws @ model.residues.reshape(len(FED_BACK), -1)
     rigid, static = laws @ model.rigid, laws @ model.static
     with np.errstate(all="ignore"):  # at a pole of the model: no number, and the pole is left alone
         away = 1 / (s[..., None] - pole)
@@ -118,26 +119,20 @@ def _return_difference(model: ModalModel, laws: Real, s: Complex) -> tuple[Compl
 
 def open_loop(arm: Arm, law: HubFeedback, vary: str, count: int) -> control.StateSpace:
     """The loop function to be multiplied by the varied gain, all other gains closed; state space of a modal model."""
-    system, row = _closed(arm, law, vary, count)
-    return _static(row) * system
-
-
-def _closed(arm: Arm, law: HubFeedback, vary: str, count: int) -> tuple[control.StateSpace, Real]:
-    """The model with all gains closed that do not vary, and the row that the varied one makes of its outputs."""
     import control
 
-    fixed = {name: 0.0 if vary in (name, "all") else float(getattr(law, name)) for name in OUTPUTS}
-    moving = {name: float(getattr(law, name)) if vary == "all" else float(name == vary) for name in OUTPUTS}
-    used = [name for name in OUTPUTS if fixed[name] or moving[name]] or ["K1"]
-    plant = modal_model(arm, [OUTPUTS[name] for name in used], count).state_space()
-    closed = control.feedback(plant, _static(np.array([[fixed[name] for name in used]])))
-    return closed, np.array([[moving[name] for name in used]])
+    moving = np.array(law.row) if vary == "all" else np.array(HubFeedback().having(vary, 1.0).row)
+    fixed = np.zeros(moving.size) if vary == "all" else np.array(law.having(vary, 0.0).row)
+    (A, B, C, D), row = _closed(arm, fixed, count, moving)
+    return control.StateSpace(A, B, row @ C, row @ D)
 
 
-def _static(row: NDArray[Any]) -> control.StateSpace:
-    import control
-
-    return control.StateSpace([], [], [], row)
+def _closed(arm: Arm, fixed: Real, count: int, moving: Real) -> tuple[Matrices, Real]:
+    """The model of the outputs that either row of gains uses, closed by the fixed one, and the other on its outputs."""
+    used = (fixed != 0) | (moving != 0)
+    used[FED_BACK.index("hub_rate")] |= not used.any()
+    model = modal_model(arm, [name for name, is_used in zip(FED_BACK, used, strict=True) if is_used], count)
+    return model.closed(fixed[used]), moving[None, used]
 
 
 def _paired(exact: Complex, poles: Complex) -> Complex:

@@ -19,13 +19,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback
+from tfarm.crossing import Crossings, brackets, counts_over, solved
 from tfarm.errors import ParameterError
-from tfarm.exact.characteristic import Gains, loop_parts
-from tfarm.exact.coefficients import coefficients
+from tfarm.exact.characteristic import gains_of, loop_parts, torque
+from tfarm.exact.coefficients import Coefficients, coefficients
 from tfarm.records import record
 
 from .frequencies import grid
-from .lines import BISECTIONS, along, crossing_at_zero, crossings
+from .lines import Complex, along, crossing_at_zero, crossings
 from .plant import Loop
 from .stability import loop_band, stability
 
@@ -71,14 +72,10 @@ def region(arm: Arm, K1: Real, K2: Real, Kp: float = 0.0) -> Region:
     corners = [HubFeedback(K1=float(a), K2=float(b), Kp=Kp) for a in (K1[0], K1[-1]) for b in (K2[0], K2[-1])]
     band = max(loop_band(Loop(arm, law))[0] for law in corners)
     omega = np.asarray(grid(arm, band))
-    base = _counts_without_K2(arm, K1, Kp, band)
-    column, at, change = _crossings_along_K2(arm, K1, Kp, omega)
-    unstable = np.repeat(base[None, :], K2.size, axis=0)
-    for n, t, step in zip(column, at, change, strict=True):
-        if t > 0:
-            unstable[t < K2, n] += step
-        else:
-            unstable[t > K2, n] -= step
+    without = HubFeedback(K1=float(K1[-1]), Kp=Kp)
+    last = np.array([stability(arm, without).unstable_roots])
+    (without_K2,) = counts_over(K1, [crossings(arm, along("K1", without), band)], float(K1[-1]), last)
+    unstable = counts_over(K2, _crossings_along_K2(arm, K1, Kp, omega), 0.0, without_K2).T
     return Region(arm, Kp, K1, K2, unstable, boundary(arm, omega, Kp), band)
 
 
@@ -110,58 +107,43 @@ def _undamped_counts(arm: Arm, K1: Real, K2: Real, Kp: float) -> NDArray[np.int6
     return unstable
 
 
-def _counts_without_K2(arm: Arm, K1: Real, Kp: float, band: float) -> NDArray[np.int64]:
-    """Unstable poles at K2 = 0 for each K1: a count at the largest, and the crossings on the way down."""
-    law = HubFeedback(K1=float(K1[-1]), Kp=Kp)
-    counts = np.full(K1.size, stability(arm, law).unstable_roots)
-    for each in crossings(arm, along("K1", law), band):
-        if each.t <= K1[-1]:
-            counts[each.t > K1] -= each.change
-    return counts
+def _crossings_along_K2(arm: Arm, K1: Real, Kp: float, omega: Real) -> list[Crossings]:
+    """The crossings along K2 for each K1, all columns solved at once."""
+    k = coefficients(arm)
+    laws = [HubFeedback(K1=float(each), Kp=Kp) for each in K1]
+    rows = np.array([[float(gain) for gain in gains_of(k, law)] for law in laws]).T
+    along_K2 = [float(gain) for gain in gains_of(k, HubFeedback(K2=1.0))]
+    fixed, by_K1 = _h(k, omega, HubFeedback(Kp=Kp)), _h(k, omega, HubFeedback(Kp=Kp, K1=1.0))
+    (column, before), change = brackets(fixed + K1[:, None] * (by_K1 - fixed))
+
+    def parts(w: Real) -> tuple[Complex, Complex]:
+        drive, numerators, _ = loop_parts(k, 1j * w)
+        return drive + torque(rows[:, column], numerators), torque(along_K2, numerators)
+
+    at, t = solved(parts, omega[before], omega[before + 1])
+    found = []
+    for n, law in enumerate(laws):
+        static, here = crossing_at_zero(arm, along("K2", law)), column == n
+        solved_here = zip(t[here], at[here], change[here], strict=True)
+        found.append(Crossings.of([*solved_here, *([] if static is None else [static])]))
+    return found
 
 
-def _crossings_along_K2(
-    arm: Arm, K1: Real, Kp: float, omega: Real
-) -> tuple[NDArray[np.int64], Real, NDArray[np.int64]]:
-    """Of every crossing: its column, its K2, and how many more poles are unstable above it."""
-    gains = Gains.of(coefficients(arm), 1.0, 0.0, Kp)
-    A, B = _h(arm, omega, gains)
-    sign = np.sign(A + K1[:, None] * B)
-    column, before = np.nonzero(sign[:, 1:] * sign[:, :-1] < 0)
-    low, high, start = omega[before], omega[before + 1], sign[column, before]
-    for _ in range(BISECTIONS if column.size else 0):
-        middle = (low + high) / 2
-        a, b = _h(arm, middle, gains)
-        left = np.sign(a + K1[column] * b) == start
-        low, high = np.where(left, middle, low), np.where(left, high, middle)
-    at = (low + high) / 2
-    drive, theta, moment, _ = loop_parts(coefficients(arm), 1j * at)
-    N = drive + (float(gains.Kp) + float(gains.K1) * 1j * at * K1[column]) * theta
-    K2 = -(N * moment.conj()).real / abs(moment) ** 2
-    change = np.where(start > 0, 2, -2)  # Im K2 = -h/|M|^2 grows where h falls
-    static = [crossing_at_zero(arm, along("K2", HubFeedback(K1=float(each), Kp=Kp))) for each in K1]
-    there = [(n, each.t, each.change) for n, each in enumerate(static) if each is not None]
-    if there:
-        columns, gains_there, changes = zip(*there, strict=True)
-        column, K2, change = np.r_[column, columns], np.r_[K2, gains_there], np.r_[change, changes]
-    return column, K2, change
-
-
-def _h(arm: Arm, omega: Real, gains: Gains) -> tuple[Real, Real]:
-    """h(w) = Im(N P*) of `lines` along K2, split: what does not depend on K1, and what K1 multiplies."""
-    drive, theta, moment, _ = loop_parts(coefficients(arm), 1j * omega)
-    size = abs(moment) * (abs(drive) + abs(theta)) + 1e-300
-    fixed = ((drive + float(gains.Kp) * theta) * moment.conj()).imag / size
-    return np.asarray(fixed), np.asarray((float(gains.K1) * 1j * omega * theta * moment.conj()).imag / size)
+def _h(k: Coefficients, omega: Real, law: HubFeedback) -> Real:
+    """Im(N P*) along K2 from a law on (see `lines`), in units of the sizes of its parts."""
+    drive, numerators, _ = loop_parts(k, 1j * omega)
+    along_K2 = torque(map(float, gains_of(k, HubFeedback(K2=1.0))), numerators)
+    N = drive + torque(map(float, gains_of(k, law)), numerators)
+    return np.asarray((N * along_K2.conj()).imag / (abs(along_K2) * (abs(drive) + abs(numerators[0])) + 1e-300))
 
 
 def boundary(arm: Arm, omega: Real, Kp: float = 0.0) -> Real:
     """K1 and K2 with poles at +-i w, and w: (n, 3), in the order of omega."""
     k = coefficients(arm)
-    gains = Gains.of(k, 1.0, 0.0, Kp)
-    drive, theta, moment, _ = loop_parts(k, 1j * omega)
-    N, a, b = drive + float(gains.Kp) * theta, float(gains.K1) * 1j * omega * theta, moment
-    determinant = (a * b.conj()).imag
+    drive, numerators, _ = loop_parts(k, 1j * omega)
+    laws = (HubFeedback(Kp=Kp), HubFeedback(K1=1.0), HubFeedback(K2=1.0))
+    N, a, b = (torque(map(float, gains_of(k, law)), numerators) for law in laws)
+    N, determinant = drive + N, (a * b.conj()).imag
     with np.errstate(all="ignore"):  # where both equations are one, the point is far away
         K1 = -(N * b.conj()).imag / determinant
         K2 = (N * a.conj()).imag / determinant

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, must_turn
-from tfarm.exact.characteristic import Gains, loop_parts, quick_characteristics
+from tfarm.arm import FED_BACK, Arm, must_turn
+from tfarm.exact.characteristic import loop_parts, quick_characteristics, unit_gains
 from tfarm.exact.coefficients import coefficients
 from tfarm.spectrum.scales import first_frequency
 
@@ -29,24 +29,24 @@ MOST_EXPONENT = 100.0
 SAMPLES = 64  # of the period after the slew
 
 
-def residual_moment(arm: Arm, K1: Real, K2: Real, Kp: Real, number: int) -> Real:
-    """Root-mean-square of the root moment [N m] over the first mode's period after the slew, for each law.
+def residual_moment(arm: Arm, laws: Real, number: int) -> Real:
+    """Root-mean-square of the root moment [N m] over the first mode's period after the slew, for `laws` (gains, n).
 
     Raises ParameterError for an arm that cannot turn.
     """
     must_turn(arm)
-    poles = band_and_real_poles(arm, K1, K2, Kp, number)
+    poles = band_and_real_poles(arm, laws, number)
     period = 2 * np.pi / first_frequency(arm)
-    moment = _answers(arm, poles, K1, K2, Kp, period * np.arange(SAMPLES) / SAMPLES)
+    moment = _answers(arm, poles, laws, period * np.arange(SAMPLES) / SAMPLES)
     return np.asarray(np.sqrt((moment**2).mean(axis=1)))
 
 
-def _answers(arm: Arm, poles: Complex, K1: Real, K2: Real, Kp: Real, t: Real) -> Real:
+def _answers(arm: Arm, poles: Complex, laws: Real, t: Real) -> Real:
     """Real part of the sum over poles (gains, slots) and their conjugates at times t after the slew: (gains, times)."""
     rows, columns = np.nonzero(~np.isnan(poles))
     s = poles[rows, columns]
     amplitude = np.zeros(poles.shape, complex)
-    amplitude[rows, columns] = residues(arm, s, K1[rows], K2[rows], Kp[rows]) * command(arm, s, K1[rows], Kp[rows])
+    amplitude[rows, columns] = residues(arm, s, laws[:, rows]) * command(arm, s, laws[:, rows])
     amplitude *= np.where(is_oscillating(poles), 2.0, 1.0)
     with np.errstate(under="ignore"):
         return np.asarray((amplitude[..., None] * _exp(np.nan_to_num(poles)[..., None] * t)).real.sum(axis=1))
@@ -57,18 +57,19 @@ def _exp(z: Complex) -> Complex:
     return np.asarray(np.exp(np.minimum(z.real, MOST_EXPONENT) + 1j * z.imag))
 
 
-def residues(arm: Arm, s: Complex, K1: Real, K2: Real, Kp: Real) -> Complex:
+def residues(arm: Arm, s: Complex, laws: Real) -> Complex:
     """Residues of root moment over r [N m s^-1 per N m] at closed-loop poles s, each of its own law (1-D)."""
     k = coefficients(arm)
-    unit = Gains.of(k, 1.0, 1.0, 1.0)
-    law = np.stack([float(unit.Kp) * Kp, float(unit.K1) * K1, K2])
-    return np.asarray(loop_parts(k, s)[2] / quick_characteristics(k, s, law).slope)
+    rows = laws * np.array([[float(unit)] for unit in unit_gains(k)])
+    moment = loop_parts(k, s).numerators[FED_BACK.index("root_moment")]
+    return np.asarray(moment / quick_characteristics(k, s, rows).slope)
 
 
-def command(arm: Arm, s: Complex, K1: Real, Kp: Real) -> Complex:
-    """R(s) e^{s RISE}: R the Laplace transform of r until `RISE` and, the angle held by Kp, after it."""
+def command(arm: Arm, s: Complex, laws: Real) -> Complex:
+    """R(s) e^{s RISE}: R the Laplace transform of r until `RISE` and, the angle held by its gain, after it."""
     acceleration = 4 * TRAVEL / (arm.link.length * RISE**2)
     with np.errstate(under="ignore"):
         bang = acceleration * (_exp(s * RISE / 2) - 1) ** 2 / s
     rate = bang / s
-    return np.asarray(arm.total_inertia * bang + K1 * rate + Kp * rate / s)
+    by_angle, by_rate = (laws[FED_BACK.index(name)] for name in ("hub_angle", "hub_rate"))
+    return np.asarray(arm.total_inertia * bang + by_rate * rate + by_angle * rate / s)

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, HubFeedback
+from tfarm.arm import GAINS, NAMES, Arm, HubFeedback
 from tfarm.errors import ParameterError
-from tfarm.exact.characteristic import Analytic, quick_characteristics
+from tfarm.exact.characteristic import Analytic, gains_of, quick_characteristics, unit_gains, zeros_at_origin
 from tfarm.exact.coefficients import Coefficients, coefficients
 from tfarm.records import record
 from tfarm.spectrum.continuation import Member
@@ -22,9 +22,9 @@ from .plant import Loop
 Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
 
-GAINS = {"K1": "N m s/rad", "K2": "1", "Kp": "N m/rad", "all": "1"}
+OF_THE_LAW = {gain.name: gain.unit for gain in sorted(GAINS, key=lambda each: each.name)} | {"all": "1"}
 PARAMETERS = {"payload_mass": "kg", "payload_inertia": "kg m^2", "hub_inertia": "kg m^2", "length": "m", "damping": "s"}
-VARIED = GAINS | PARAMETERS  # what may be varied, and its unit
+VARIED = OF_THE_LAW | PARAMETERS  # what may be varied, and its unit
 
 
 @dataclass(frozen=True)
@@ -46,25 +46,24 @@ class Variation:
     @property
     def is_of_gains(self) -> bool:
         """Whether the arm stays as it is."""
-        return self.vary in GAINS
+        return self.vary in OF_THE_LAW
 
     def at(self, value: float) -> Loop:
         """The loop where the varied number has that value.  Raises ParameterError where there is none."""
         arm, law = self.arm, self.law
         if self.vary == "all":
-            return Loop(arm, HubFeedback(K1=value * law.K1, K2=value * law.K2, Kp=value * law.Kp))
+            return Loop(arm, law.times(value))
         if self.is_of_gains:
-            return Loop(arm, replace(law, **{self.vary: value}))
+            return Loop(arm, law.having(self.vary, value))
         room, name = ("link", self.vary) if self.vary in ("length", "damping") else self.vary.split("_")
         return Loop(replace(arm, **{room: replace(getattr(arm, room), **{name: value})}), law)
 
     def system(self, value: float) -> tuple[Coefficients, Real]:
-        """Coefficients of the arm, and Kp, K1, K2 without dimensions (3, 1), where the varied number has that value."""
+        """Coefficients of the arm, and gains without dimensions (gains, 1), where the varied number has that value."""
         if self.is_of_gains:
             return self._k, self.laws(np.array([value]))
         k = coefficients(self.at(value).arm)
-        unit = float(k.length / k.EI)
-        return k, np.array([[unit * self.law.Kp], [unit * self.law.K1], [self.law.K2]])
+        return k, np.array([[float(gain)] for gain in gains_of(k, self.law)])
 
     def singular(self, value: float) -> float:
         """-1/C where the varied number has that value, -inf at C = 0."""
@@ -72,37 +71,28 @@ class Variation:
         return -1.0 / C if C else -math.inf
 
     def laws(self, values: Real) -> Real:
-        """The dimensionless gains (3, n) at n values of a gain: linear in it."""
-        law = self.law
-        rows = {"Kp": self._unit * law.Kp, "K1": self._unit * law.K1, "K2": law.K2}
+        """The dimensionless gains (gains, n) at n values of a gain: linear in it."""
+        rows = np.array([[float(gain)] for gain in gains_of(self._k, self.law)])
         if self.vary == "all":
-            return np.array([[gain] for gain in rows.values()]) * values
-        unit = 1.0 if self.vary == "K2" else self._unit
-        return np.array([unit * values if name == self.vary else np.full(values.size, rows[name]) for name in rows])
+            return np.asarray(rows * values)
+        units = [float(unit) for unit in unit_gains(self._k)]
+        varied = np.array([[gain.name == self.vary] for gain in GAINS])
+        return np.where(varied, np.outer(units, values), rows)
 
     @cached_property
     def _k(self) -> Coefficients:
         return coefficients(self.arm)
 
     @cached_property
-    def _unit(self) -> float:
-        return float(self._k.length / self._k.EI)
-
-    @cached_property
     def zeros_at_origin(self) -> int:
         """How many zeros stay at s = 0 all the way: 2, 1 under a rate gain alone, 0 where the hub angle is held."""
-        law, varied = self.law, self.vary
-        if not self.arm.has_rigid_mode or law.Kp or varied == "Kp":
-            return 0
-        return 1 if law.K1 or varied == "K1" else 2
+        law = self.law.having(self.vary, 1.0) if self.vary in NAMES else self.law
+        return zeros_at_origin(self._k, law.row)
 
     def left_at_origin(self, values: Real) -> NDArray[np.int64]:
         """How many zeros are at s = 0 at each of the values."""
-        if not self.arm.has_rigid_mode:
-            return np.zeros(values.size, np.int64)
-        law, scale = self.law, values if self.vary == "all" else np.ones(values.size)
-        K1, Kp = (values if self.vary == name else scale * getattr(law, name) for name in ("K1", "Kp"))
-        return np.where(Kp != 0, 0, np.where(K1 != 0, 1, 2))
+        rows = self.laws(values).T.tolist() if self.is_of_gains else [self.law.row] * values.size
+        return np.array([zeros_at_origin(self._k, row) for row in rows], dtype=np.int64)
 
 
 class Evaluator:

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from tfarm.arm import HubFeedback
+from tfarm.crossing import Crossing, Crossings, counts_over
 from tfarm.records import record
 from tfarm.spectrum import modes
-from tfarm.spectrum.scales import angle_unit, most_gain, rate_unit
+from tfarm.spectrum.scales import gain_unit, most_gain
 
-from .lines import Crossing, along, crossing_at_zero, crossings
+from .lines import along, crossing_at_zero, crossings
 from .plant import Loop
 from .stability import Stability, loop_band, stability
 
@@ -38,7 +39,7 @@ class Windows:
     around: Interval | None
     all: tuple[Interval, ...]
     looked_at: Interval
-    crossings: tuple[Crossing, ...]
+    crossings: Crossings
 
     def end(self, value: float) -> End:
         """What an end of one of the windows is."""
@@ -48,17 +49,17 @@ class Windows:
 def gain_windows(verdict: Stability, name: str) -> Windows:
     """The windows of "K1", "K2" or "Kp" through the loop whose verdict is given."""
     loop, law = verdict.loop, verdict.loop.law
-    value: float = getattr(law, name)
+    value = law[name]
     if name == "K2" and loop.arm.hub.inertia == 0:
-        return Windows(name, None, (), (0.0, 0.0), ())  # an algebraic loop but for K2 = 0
+        return Windows(name, None, (), (0.0, 0.0), Crossings.of([]))  # an algebraic loop but for K2 = 0
     low, high = looked_at(loop, name)
     if loop.arm.link.damping == 0:
-        found = tuple(each for each in _undamped(loop, name) if low < each.t < high)
+        found = _undamped(loop, name).within(low, high)
     else:
-        ends = (Loop(loop.arm, with_gain(law, name, end)) for end in (low, high))
+        ends = (Loop(loop.arm, law.having(name, end)) for end in (low, high))
         band = max(verdict.band, *(loop_band(end)[0] for end in ends))
-        found = tuple(each for each in crossings(loop.arm, along(name, law), band) if low < each.t < high)
-    edges = [low, *sorted({each.t for each in found}), high]
+        found = crossings(loop.arm, along(name, law), band).within(low, high)
+    edges = [low, *np.unique(found.gain).tolist(), high]
     pairs = list(itertools.pairwise(edges))
     stable = [pair for pair, count in zip(pairs, _counts(verdict, name, pairs, found), strict=True) if count == 0]
     stable = [_with_proven_ends(loop, name, pair, (low, high)) for pair in stable]
@@ -71,8 +72,7 @@ def gain_windows(verdict: Stability, name: str) -> Windows:
 def looked_at(loop: Loop, name: str) -> Interval:
     """The range of a gain that is searched, symmetric and well beyond what matters to the first mode."""
     arm, law = loop.arm, loop.law
-    unit = {"K1": rate_unit(arm), "K2": 1.0, "Kp": angle_unit(arm)}[name]
-    reach = max(REACH[name] * unit, 10.0 * abs(getattr(law, name)))
+    reach = max(REACH[name] * gain_unit(arm, name), 10.0 * abs(law[name]))
     carried = arm.total_inertia - arm.hub.inertia
     if name == "K2" and 0 < carried < math.inf:
         reach = max(reach, BEYOND_STATIC * arm.total_inertia / carried)
@@ -80,12 +80,7 @@ def looked_at(loop: Loop, name: str) -> Interval:
     return -most, most
 
 
-def with_gain(law: HubFeedback, name: str, value: float) -> HubFeedback:
-    """The law with another value of one gain."""
-    return replace(law, **{name: value})
-
-
-def _undamped(loop: Loop, name: str) -> tuple[Crossing, ...]:
+def _undamped(loop: Loop, name: str) -> Crossings:
     """At C = 0: every mode at once at K2 = 1 and K1 = 0; a real pole at 0 where stiffness or inertia vanishes."""
     static = crossing_at_zero(loop.arm, along(name, loop.law))
     found = [] if static is None else [static]
@@ -93,25 +88,23 @@ def _undamped(loop: Loop, name: str) -> tuple[Crossing, ...]:
         found.append(Crossing(1.0, math.inf, 1 if loop.law.K1 > 0 else -1))
     if name == "K1" and (static is None or static.t != 0):
         found.append(Crossing(0.0, math.inf, -1 if loop.law.K2 < 1 else 1))
-    return tuple(found)
+    return Crossings.of(found)
 
 
-def _counts(verdict: Stability, name: str, pairs: list[Interval], found: tuple[Crossing, ...]) -> list[int]:
+def _counts(verdict: Stability, name: str, pairs: list[Interval], found: Crossings) -> list[int]:
     """Unstable poles in each window: counted in one, by the crossings in the others; at C = 0 whether there are any."""
-    loop, value = verdict.loop, getattr(verdict.loop.law, name)
+    loop, value = verdict.loop, verdict.loop.law[name]
     if loop.arm.link.damping == 0:
-        return [0 if holds_undamped(loop, with_gain(loop.law, name, (low + high) / 2)) else 1 for low, high in pairs]
-    home = next((n for n, (low, high) in enumerate(pairs) if low < value < high), None)
-    known = verdict.unstable_roots if home is not None and verdict.verdict != "marginal" else None
-    if home is None or known is None:
-        home = len(pairs) // 2
-        known = _count_at(loop, name, (pairs[home][0] + pairs[home][1]) / 2)
-    counts = [known] * len(pairs)
-    for n in range(home + 1, len(pairs)):
-        counts[n] = counts[n - 1] + sum(each.change for each in found if each.t == pairs[n][0])
-    for n in range(home - 1, -1, -1):
-        counts[n] = counts[n + 1] - sum(each.change for each in found if each.t == pairs[n][1])
-    return counts
+        return [0 if holds_undamped(loop, loop.law.having(name, (low + high) / 2)) else 1 for low, high in pairs]
+    middles = np.array([(low + high) / 2 for low, high in pairs])
+    if verdict.verdict != "marginal" and any(low < value < high for low, high in pairs):
+        known = verdict.unstable_roots
+    else:
+        value = float(middles[middles.size // 2])
+        there = stability(loop.arm, loop.law.having(name, value))
+        known = 0 if there.is_stable else max(1, there.unstable_roots)
+    (counts,) = counts_over(middles, [found], value, np.array([known]))
+    return [int(count) for count in counts]
 
 
 def holds_undamped(loop: Loop, law: HubFeedback) -> bool:
@@ -120,11 +113,6 @@ def holds_undamped(loop: Loop, law: HubFeedback) -> bool:
         return False
     small = np.array([1e-9 * float(modes(loop.arm, 1).natural_frequency[-1])], dtype=complex)
     return bool(law.Kp >= 0 or (1 + Loop(loop.arm, law).loop_function(small)[0]).real > 0)
-
-
-def _count_at(loop: Loop, name: str, value: float) -> int:
-    there = stability(loop.arm, with_gain(loop.law, name, value))
-    return 0 if there.is_stable else max(1, there.unstable_roots)
 
 
 def _with_proven_ends(loop: Loop, name: str, pair: Interval, limits: Interval) -> Interval:

@@ -148,6 +148,17 @@ class PartialFractions:
             A[-1, -1], B[-1, 0], C[:, -1] = -1 / self.arm.link.damping, 1 / self.arm.link.damping, self.relaxation
         return A, B, C, self.static[:, None].copy()
 
+    def closed(self, gains: ArrayLike) -> Matrices:
+        """A, B, C, D under the law  u = r - gains . y, r the new input: gains (outputs,), or (n, outputs) of n laws.
+
+        Of n laws every matrix has a leading axis.  What D feeds straight back is solved for.
+        """
+        A, B, C, D = self.matrices()
+        law = np.asarray(gains, dtype=float)
+        share = (1.0 / (1.0 + law @ D[:, 0]))[..., None, None]
+        row = share * (law @ C)[..., None, :]
+        return A - B * row, B * share, C - D * row, D * share
+
     def state_space(self, name: str | None = None) -> control.StateSpace:
         """The model as a `control.StateSpace` with named inputs, outputs and states."""
         import control

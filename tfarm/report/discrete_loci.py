@@ -17,7 +17,6 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullLocator
 from numpy.typing import NDArray
 
-from tfarm.dsp.boundary import GainName
 from tfarm.dsp.law import origins, root_locus
 from tfarm.dsp.loop import SampledLoop
 from tfarm.records import record
@@ -43,7 +42,7 @@ RIM = 1.12  # radius up to which the z-plane is shown
 class Locus:
     """One gain's locus: `z` (values, branches), and the flexible mode of each branch (0: hub, filter or delay)."""
 
-    gain: GainName
+    gain: str
     values: Real
     z: Complex
     mode: NDArray[np.int64]
@@ -84,14 +83,14 @@ def loci(loop: SampledLoop, K1_top: float, K2_range: tuple[float, float]) -> Loc
     upper = np.nonzero((loop.pulse.poles.imag > 0) & (loop.pulse.mode > 0))[0]
     upper = upper[np.argsort(loop.pulse.mode[upper])]
     small = np.geomspace(1e-3, STRONGER, VALUES) * loop.gains.K1
-    alone = _locus(loop.with_gains(loop.gains.K1, 0.0), "K1", small)
+    alone = _locus(loop.having(K2=0.0), "K1", small)
     by_K1, by_K2 = _locus(loop, "K1", K1), _locus(loop, "K2", K2)
     return Loci(loop, alone, by_K1, by_K2, loop.pulse.poles[upper], loop.pulse.mode[upper])
 
 
-def _locus(loop: SampledLoop, gain: GainName, values: Real) -> Locus:
+def _locus(loop: SampledLoop, gain: str, values: Real) -> Locus:
     z = root_locus(loop, gain, values)
-    first = loop.with_gains(values[0], loop.gains.K2) if gain == "K1" else loop.with_gains(loop.gains.K1, values[0])
+    first = loop.having(**{gain: float(values[0])})
     origin = origins(first)
     mode = np.where(origin < 0, 0, loop.pulse.mode[origin])
     return Locus(gain, values, z, mode[[abs(first.poles.z - start).argmin() for start in z[0]]])

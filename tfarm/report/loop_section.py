@@ -130,11 +130,11 @@ def _crossing_there(windows: Windows, value: float) -> str:
     crossing = next((each for each in windows.crossings if each.t == value), None)
     if crossing is None:
         return ""
-    if crossing.omega == 0:
+    if crossing.at == 0:
         return ", where a real pole passes through 0"
-    if not np.isfinite(crossing.omega):
+    if not np.isfinite(crossing.at):
         return ", where every flexible mode crosses at once"
-    return f", where poles cross at {significant(crossing.omega, 4)} rad/s"
+    return f", where poles cross at {significant(crossing.at, 4)} rad/s"
 
 
 def _best_words(data: GainMap) -> str:

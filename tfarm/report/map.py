@@ -12,7 +12,7 @@ from matplotlib.scale import SymmetricalLogTransform
 from numpy.typing import NDArray
 
 import tfarm
-from tfarm.arm import Arm, Hub
+from tfarm.arm import Arm, Hub, HubFeedback, many_laws
 from tfarm.dsp import Chain, sampled_verdict
 from tfarm.dsp.brief import SampledBrief
 from tfarm.errors import ConvergenceError
@@ -124,7 +124,7 @@ def gain_map(arm: Arm, chain: Chain | None = None) -> GainMap:
     half = SPARSE // 2
     K1, K2 = found.K1[half::SPARSE], found.K2[half::SPARSE]
     a, b = (each.ravel() for each in np.meshgrid(K1, K2))
-    damping = least_damping(arm, a, b, np.zeros(a.size), MODES).reshape(K2.size, K1.size)
+    damping = least_damping(arm, many_laws(HubFeedback(), K1=a, K2=b), MODES).reshape(K2.size, K1.size)
     held = tfarm.modes(_held(arm), count=3).natural_frequency
     named = laws(arm)
     briefs = tuple(brief_of(arm, each.law, chain) for each in named)

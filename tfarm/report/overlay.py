@@ -95,7 +95,7 @@ def with_damping(arm: Arm, C: float) -> Arm:
 
 def ends_of_K1(loop: SampledLoop) -> list[float]:
     """Where stable intervals of K1 end, at a few K2: there the region has upright edges."""
-    found = [window for K2 in ENDS_AT for window in stable_windows(loop.with_gains(loop.gains.K1, K2), "K1")]
+    found = [window for K2 in ENDS_AT for window in stable_windows(loop.having(K2=K2), "K1")]
     return [end for window in found for end in window if math.isfinite(end) and end > 0]
 
 

@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from tfarm.arm import Arm, HubFeedback, load
+from tfarm.arm import GAINS, Arm, HubFeedback, load
 from tfarm.errors import ParameterError
 
 from .table import modes
@@ -42,19 +42,28 @@ def angle_unit(arm: Arm) -> float:
     return turning_inertia(arm) * first_frequency(arm) ** 2
 
 
+UNITS = {"hub_angle": ("J w1^2", angle_unit), "hub_rate": ("J w1", rate_unit)}  # of a gain on that output, else 1
+
+
+def gain_unit(arm: Arm, name: str) -> float:
+    """The unit of the gain of that name on this arm, in that gain's SI unit."""
+    (output,) = (gain.output for gain in GAINS if gain.name == name)
+    return UNITS[output][1](arm) if output in UNITS else 1.0
+
+
 def most_gain(arm: Arm, name: str) -> float:
-    """The largest size that gain K1, K2 or Kp may have on this arm: beyond any machine."""
-    units = {"K1": rate_unit, "K2": lambda arm: 1.0, "Kp": angle_unit}
-    return MOST_UNITS * units[name](arm)
+    """The largest size that the gain of that name may have on this arm: beyond any machine."""
+    return MOST_UNITS * gain_unit(arm, name)
 
 
 def check_gains(arm: Arm, law: HubFeedback) -> None:
     """Raise ParameterError for a gain that is too large for the arm, whatever it would be for another."""
-    for name, unit in (("K1", "J w1"), ("K2", "1"), ("Kp", "J w1^2")):
-        value = getattr(law, name)
-        if value and not abs(value) <= (most := most_gain(arm, name)):
+    for gain in GAINS:
+        value = law[gain.name]
+        if value and not abs(value) <= (most := most_gain(arm, gain.name)):
+            unit = UNITS[gain.output][0] if gain.output in UNITS else "1"
             remedy = f"for this arm at most {MOST_UNITS:g} times {unit} in size, {most:.3g}: beyond any machine"
-            raise ParameterError(key=name, value=value, remedy=remedy)
+            raise ParameterError(key=gain.name, value=value, remedy=remedy)
 
 
 def default_gains(arm: Arm) -> HubFeedback:

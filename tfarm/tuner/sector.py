@@ -19,6 +19,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from tfarm.arm import FED_BACK
 from tfarm.dsp import SampledLoop
 from tfarm.records import record
 from tfarm.tuner.lyapunov import Lyapunov, common_lyapunov
@@ -62,7 +63,7 @@ class MovingGain:
 
     def at(self, K: float) -> Real:
         """The closed-loop matrix at a gain."""
-        return self.loop.with_gains(self.loop.gains.K1, K).reduced_matrix()
+        return self.loop.having(K2=K).reduced_matrix()
 
     def radius(self, m: float) -> float:
         """Half the width of the widest sector around m; 0 where m itself is unstable."""
@@ -83,8 +84,8 @@ class MovingGain:
     def criterion(self, lo: float, hi: float, theta: Real) -> Real:
         """1 + (lo + hi) Re H + lo hi |H|^2 at z = e^{i theta}, by transfer functions."""
         z = np.exp(1j * theta)
-        rest, rate, moment = self.loop.signals(z, None, np.ones(theta.size))
-        H = moment / (rest + self.loop.gains.K1 * rate)
+        moment = self.loop.signals(z, None, np.ones(theta.size))[FED_BACK.index("root_moment")]
+        H = moment / self.loop.having(K2=0.0)(z)
         return np.asarray(1 + (lo + hi) * H.real + lo * hi * abs(H) ** 2)
 
 

@@ -83,7 +83,7 @@ def shaped_trial(trial: Trial, kind: Shaper) -> Trial:
 
 
 def _poles(loop: SampledLoop, modes: int) -> list[complex]:
-    poles: Any = loop.with_gains(loop.gains.K1, 0.0).poles
+    poles: Any = loop.having(K2=0.0).poles
     found = []
     for mode in range(1, modes + 1):
         own = loop.plant.poles[(loop.plant.mode == mode) & (loop.plant.poles.imag > 0)]

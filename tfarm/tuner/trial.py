@@ -99,10 +99,10 @@ class Trial:
     @cached_property
     def model(self) -> tuple[Real, ...]:
         """A^T, A, B and the rows that read rate and moment: s' = A s + B torque (see `kernel`)."""
-        A = self.loop.with_gains(0.0, 0.0).matrix()
+        A = self.loop.having(K1=0.0, K2=0.0).matrix()
         upper, real = self.loop.pulse.kept()
         last = 2 * upper.size + real.size + 2  # where the torque of the sample before is kept: B is 1 there
-        rate, moment = (-self.loop.with_gains(*gains).matrix()[last] for gains in ((1.0, 0.0), (0.0, 1.0)))
+        rate, moment = (-self.loop.having(K1=K1, K2=1 - K1).matrix()[last] for K1 in (1.0, 0.0))
         B = self.loop.pulse.matrices()[1]
         drive = np.r_[B, np.zeros(len(A) - len(B))]
         return tuple(np.ascontiguousarray(each) for each in (A.T, A, drive, rate, moment))

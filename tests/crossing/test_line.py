@@ -1,0 +1,76 @@
+"""D-decomposition on either curve, against the roots of polynomials: the room knows nothing else of A and B either."""
+
+import numpy as np
+import pytest
+
+from tfarm.crossing import Crossings, bisected, brackets, counts_over, intervals, joined, solved
+
+CURVES = {
+    "axis": (lambda x: 1j * x, np.linspace(1e-3, 40.0, 4001), lambda s: s.real > 0),
+    "circle": (lambda x: np.exp(1j * x), np.linspace(1e-3, np.pi - 1e-3, 4001), lambda z: abs(z) > 1),
+}
+
+
+def drawn(rng, curve):
+    """A (degree 5) and B (degree 4) with real coefficients, roots on both sides of the curve."""
+    pairs = rng.uniform(0.3, 1.6, 2) * np.exp(1j * rng.uniform(0.3, 2.8, 2))
+    roots = np.r_[pairs, pairs.conj(), rng.uniform(-1.5, 1.5)]
+    A = np.poly(roots * (8 if curve == "axis" else 1)).real
+    return np.poly1d(A), np.poly1d(rng.standard_normal(5)) * (4.0 if curve == "axis" else 1.0)
+
+
+def crossings_of(curve, A, B):
+    """Those of pairs between the ends of the grid, and those of single roots at the real points of the curve."""
+    at, grid, _ = CURVES[curve]
+    values = A(at(grid)), B(at(grid))
+    (before,), change = brackets((values[0] * values[1].conj()).imag)
+    place, gain = solved(lambda x: (A(at(x)), B(at(x))), grid[before], grid[before + 1])
+    single = [0.0] if curve == "axis" else [1.0, -1.0]
+    return place, Crossings.of(zip(gain, place, change, strict=True)), [-A(point) / B(point) for point in single]
+
+
+@pytest.mark.parametrize("curve", CURVES)
+@pytest.mark.parametrize("seed", range(12))
+def test_between_crossings_the_roots_beyond_the_curve_are_as_many_as_counted(curve, seed):
+    A, B = drawn(np.random.default_rng(seed), curve)
+    at, _, is_beyond = CURVES[curve]
+    place, found, single = crossings_of(curve, A, B)
+    np.testing.assert_allclose(
+        A(at(found.at)) + found.gain * B(at(found.at)), 0, atol=1e-10 * abs(A(at(place))).max(initial=0.0)
+    )
+
+    def count(gain):
+        return int(is_beyond((A + gain * B).roots).sum())
+
+    for each in found:
+        step = 1e-5 * max(abs(each.t), 1e-3)
+        if min(abs(each.t - other) for other in [*single, *(o.t for o in found if o != each), np.inf]) > 3 * step:
+            assert count(each.t + step) - count(each.t - step) == each.change
+
+
+def test_counts_over_a_plane_are_those_of_every_column():
+    rng = np.random.default_rng(4)
+    gains = np.linspace(-3.0, 3.0, 41)
+    rows = [sorted(rng.uniform(-4, 4, 7)) for _ in range(5)]
+    columns = [Crossings.of((t, 1.0, int(rng.choice([-2, 2]))) for t in row) for row in rows]
+    counts = counts_over(gains, columns, 0.3, np.array([0, 1, 2, 3, 4]))
+    for n, column in enumerate(columns):
+        for gain, found in zip(gains, counts[n], strict=True):
+            passed = sum(each.change for each in column if 0.3 < each.t <= gain)
+            assert found == n + passed - sum(each.change for each in column if gain < each.t <= 0.3)
+
+
+def test_intervals_are_where_nothing_is_beyond():
+    found = Crossings.of([(1.0, 5.0, 2), (2.0, 6.0, -2), (-1.0, 7.0, -2), (2.0, 0.0, 1), (2.0, 0.1, -1), (9.0, 1.0, 2)])
+    assert len(found) == 6
+    assert [each.t for each in found.within(0.0, 3.0)] == [1.0, 2.0, 2.0, 2.0]
+    assert intervals(found, -3.0, 5.0, 0.0, 0) == [(-1.0, 1.0), (2.0, 5.0)]
+    assert intervals(found, -3.0, 5.0, -2.0, 1) == []
+    assert intervals(Crossings.of([(np.inf, 1.0, 2)]), -1.0, 1.0, 0.0, 0) == [(-1.0, 1.0)]
+    assert joined([(0.0, 1.0), (1.0, 2.0), (3.0, 4.0)]) == [(0.0, 2.0), (3.0, 4.0)]
+
+
+def test_a_bisected_zero_is_the_closed_one():
+    zeros = np.array([0.3, 2.0, 1e-9])
+    assert bisected(lambda x: x - zeros, np.zeros(3), np.full(3, 3.0)) == pytest.approx(zeros, rel=1e-15)
+    assert bisected(lambda x: x, np.empty(0), np.empty(0)).size == 0

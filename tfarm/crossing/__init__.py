@@ -1,0 +1,9 @@
+"""Where zeros of A + g B cross a curve as a real gain g runs, and how many lie beyond it (D-decomposition).
+
+The curve may be the imaginary axis or the unit circle; nothing here knows what A and B are.
+"""
+
+from tfarm.crossing.line import Crossing, Crossings, bisected, brackets, solved
+from tfarm.crossing.plane import counts_over, intervals, joined
+
+__all__ = ["Crossing", "Crossings", "bisected", "brackets", "counts_over", "intervals", "joined", "solved"]

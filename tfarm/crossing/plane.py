@@ -1,0 +1,42 @@
+"""Over a plane of two gains: the count of zeros beyond the curve, column by column, from crossings and one count."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .line import Crossings
+
+Real = NDArray[np.float64]
+Whole = NDArray[np.int64]
+Window = tuple[float, float]
+
+
+def counts_over(gains: Real, columns: Sequence[Crossings], reference: float, there: NDArray[Any]) -> Whole:
+    """Zeros beyond the curve at each of the gains (n,) in each column: (columns, n).
+
+    `columns` holds the crossings of each along the gain, `there` (columns,) the count at the gain `reference`.
+    """
+    passed = np.array([each.passed(np.r_[gains, reference]) for each in columns]).reshape(len(columns), gains.size + 1)
+    return np.asarray(np.asarray(there)[:, None] + passed[:, :-1] - passed[:, -1:], dtype=np.int64)
+
+
+def intervals(found: Crossings, low: float, high: float, reference: float, there: int) -> list[Window]:
+    """The intervals between `low` and `high` in which nothing is beyond the curve, `there` the count at `reference`."""
+    ends = np.r_[low, np.unique(found.within(low, high).gain), high]
+    (counts,) = counts_over((ends[1:] + ends[:-1]) / 2, [found], reference, np.array([there]))
+    return joined([(float(a), float(b)) for a, b, n in zip(ends[:-1], ends[1:], counts, strict=True) if n == 0 < b - a])
+
+
+def joined(windows: list[Window]) -> list[Window]:
+    """Neighbours with a common edge are one (two crossings that cancel)."""
+    merged: list[Window] = []
+    for low, high in windows:
+        if merged and merged[-1][1] == low:
+            merged[-1] = (merged[-1][0], high)
+        else:
+            merged.append((low, high))
+    return merged
