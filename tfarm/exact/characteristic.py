@@ -24,7 +24,7 @@ from tfarm.arm import GAINS, HubFeedback
 
 from .coefficients import Coefficients
 from .compiled import compiled, inlined, plain
-from .dispersion import reciprocal
+from .dispersion import quotient, reciprocal
 from .free import free_response
 from .jets import Jet
 from .outputs import OUTPUTS, unit_scale
@@ -100,15 +100,29 @@ def quick_characteristic(k: Coefficients, s: Complex, gains: Gains = OPEN, at_ze
 
 def quick_characteristics(k: Coefficients, s: Complex, rows: Real, at_zero: int = 0) -> Analytic:
     """`quick_characteristic` with gains of their own at each point: rows (gains, n) or (gains, 1), dimensionless."""
-    h = STEP * np.maximum(abs(s) * np.minimum(1.0, abs(1.0 + k.damping * s)), 1e-300)
-    at = np.stack([s, s + h, s - h])
-    drive, fed_back, scale = loop_parts(k, at)
-    values = drive + torque(rows, fed_back)
-    if at_zero:
-        values = values / np.where(at == 0, 1e-100, at) ** at_zero
-    with np.errstate(over="ignore", invalid="ignore"):  # next to -1/C at huge C: a slope that is no number says so
-        up, down = (values[row] * np.exp(scale[row] - scale[0]) for row in (1, 2))
-        return Analytic(values[0], (up - down) / (2 * h), scale[0])
+    found = np.empty((3, s.size), complex)
+    s, rows = np.ascontiguousarray(s, dtype=complex), np.ascontiguousarray(rows, dtype=float)
+    fill_characteristics(s, k.kernel, rows, at_zero, found)
+    return Analytic(found[0], found[1], found[2])
+
+
+@compiled
+def fill_characteristics(s: Any, k: Any, rows: Any, at_zero: int, found: Any) -> None:
+    """Value, slope and scale of D/s^at_zero at s (1-D), a row each; the slope from values at s +- h."""
+    values, scales = np.empty(3, np.complex128), np.empty(3, np.complex128)
+    for i in range(s.size):
+        law = i if rows.shape[1] > 1 else 0
+        h = STEP * max(abs(s[i]) * min(1.0, abs(1.0 + k[7] * s[i])), 1e-300)
+        for j in range(3):
+            at = s[i] + h * (j - 3 * (j // 2))
+            value, scales[j], fed_back = parts_at(at, k)
+            for row, part in enumerate(fed_back):
+                value += rows[row, law] * part
+            for _ in range(at_zero):
+                value = quotient(value, at if at != 0.0 else complex(1e-100, 0.0))
+            values[j] = value
+        up, down = values[1] * np.exp(scales[1] - scales[0]), values[2] * np.exp(scales[2] - scales[0])
+        found[0, i], found[1, i], found[2, i] = values[0], (up - down) / (2.0 * h), scales[0]
 
 
 def loop_parts(k: Coefficients, s: NDArray[Any]) -> LoopParts:
@@ -123,13 +137,17 @@ def loop_parts(k: Coefficients, s: NDArray[Any]) -> LoopParts:
 def fill_loop_parts(s: Any, k: Any, parts: Any) -> None:
     """Drive, scale and the numerators at s (1-D), a row each."""
     for i in range(s.size):
-        theta, M0, scale = free_ends(s[i], k)
-        parts[0, i] = ((k[14] + k[15] * s[i] * s[i]) * theta - k[16] * M0) / k[17]
-        parts[1, i] = scale
-        row = 2
-        for part in numerators(s[i], reciprocal(1.0 + k[7] * s[i]), theta, M0):
-            parts[row, i] = part
-            row += 1
+        parts[0, i], parts[1, i], fed_back = parts_at(s[i], k)
+        for row, part in enumerate(fed_back):
+            parts[2 + row, i] = part
+
+
+@compiled
+def parts_at(s: complex, k: Any) -> Any:
+    """Drive, scale and the numerators at one s."""
+    theta, M0, scale = free_ends(s, k)
+    drive = ((k[14] + k[15] * s * s) * theta - k[16] * M0) / k[17]
+    return drive, scale, numerators(s, reciprocal(1.0 + k[7] * s), theta, M0)
 
 
 def zeros_at_origin(k: Coefficients, gains: Sequence[Fraction | float] = OPEN) -> int:
