@@ -187,7 +187,7 @@ def test_files_get_the_usual_permissions(capsys: pytest.CaptureFixture[str], tmp
     assert stat.S_IMODE(file.stat().st_mode) == stat.S_IMODE(other.stat().st_mode)
 
 
-HEAVY = ("control", "matplotlib", "sympy", "scipy.signal")
+HEAVY = ("control", "matplotlib", "sympy", "scipy.signal", "scipy.optimize")
 
 
 @pytest.mark.parametrize(

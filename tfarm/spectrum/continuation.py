@@ -22,8 +22,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
-from scipy.spatial import cKDTree
 
 from tfarm.errors import ConvergenceError
 
@@ -207,6 +205,7 @@ def _shortened(node: Node, stray: NDArray[np.bool_], wanted: int) -> Node:
 
 def _next_zero(function: Function, zero: float) -> float:
     """The real zero nearest to a given one, within 0.3 of its size; inf if there is none."""
+    from scipy.optimize import brentq  # takes half a second to load, and few arms come here
 
     def deflated(s: Real) -> Real:
         value, _, scale = function(s.astype(complex))
@@ -238,6 +237,8 @@ def nearest(zeros: Complex) -> Neighbours:
         away = abs(flat[:, None] - flat)
         which = np.argpartition(away, number - 1, axis=1)[:, :number]
     else:
+        from scipy.spatial import cKDTree  # takes a third of a second to load, and most tables are short
+
         plane = np.column_stack([flat.real, flat.imag])
         which = np.reshape(cKDTree(plane).query(plane, k=number)[1], (flat.size, number))
     return Neighbours(which, which == each, which // 2 == each // 2)
