@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from tfarm.cli.app import ArmName, Json, app, load_arm, plain_number, whole
-from tfarm.cli.inputs import K1, K2, Kp, gains_of, say_defaults
+from tfarm.cli.inputs import Given, Kp, gains_of, say_defaults, under_a_law
 from tfarm.cli.sampling import Delay, DspFile, Period, chain_of
 from tfarm.errors import ParameterError
 
@@ -17,18 +17,18 @@ POLES = "poles with Im s >= 0, 1 to 1000; if not given ten, or those below the s
 
 
 @app.command()
+@under_a_law
 def poles(
     arm: ArmName,
-    k1: K1 = None,
-    k2: K2 = None,
-    kp: Kp = 0.0,
     count: Annotated[str | None, typer.Option("--count", metavar="N", help=POLES)] = None,
     certify: Annotated[bool, typer.Option("--certify", help="prove each, and that none is missing")] = False,
     json: Json = False,
+    *,
+    given: Given,
 ) -> None:
     """Closed-loop poles of the exact arm, complete in a printed box."""
     number, subject = None if count is None else whole("--count", count, 1, 1000), load_arm(arm)
-    law, said = gains_of(subject, k1, k2, kp)
+    law, said = gains_of(subject, given)
     from tfarm.loop.answers import poles_answer
     from tfarm.loop.poles import closed_loop_poles
 
@@ -37,10 +37,11 @@ def poles(
 
 
 @app.command()
-def margins(arm: ArmName, k1: K1 = None, k2: K2 = None, kp: Kp = 0.0, json: Json = False) -> None:
+@under_a_law
+def margins(arm: ArmName, json: Json = False, *, given: Given) -> None:
     """The verdict on a loop, the windows of each gain, and the margins of the exact loop function."""
     subject = load_arm(arm)
-    law, said = gains_of(subject, k1, k2, kp)
+    law, said = gains_of(subject, given)
     from tfarm.loop.answers import margins_answer
     from tfarm.loop.margins import margins as find_margins
 

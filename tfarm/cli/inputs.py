@@ -3,27 +3,55 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import wraps
+from inspect import Parameter, signature
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import numpy as np
 import typer
 from numpy.typing import NDArray
 
+from tfarm.arm import GAINS, Gain
 from tfarm.cli.app import whole
 from tfarm.errors import ParameterError
 
 if TYPE_CHECKING:
     from tfarm.arm import Arm, HubFeedback
 
-K1 = Annotated[
-    float | None,
-    typer.Option("--K1", help="hub rate gain [N m s/rad]; by default 0.00642 J w1, the paper's 0.3 on its arm"),
-]
-K2 = Annotated[
-    float | None,
-    typer.Option("--K2", help="root moment gain, u = ... - K2 E I phi'(0); 0.3 by default, 0 on a hub without inertia"),
-]
+Given = dict[str, float | None]  # gains by name, as typed
+HELP = {  # of the gains that have a default of their own
+    "K1": "hub rate gain [N m s/rad]; by default 0.00642 J w1, the paper's 0.3 on its arm",
+    "K2": "root moment gain, u = ... - K2 E I phi'(0); 0.3 by default, 0 on a hub without inertia",
+}
+K1 = Annotated[float | None, typer.Option("--K1", help=HELP["K1"])]
 Kp = Annotated[float, typer.Option("--Kp", help="hub angle gain [N m/rad]")]
+
+
+def option_of(gain: Gain) -> Any:
+    """The type of the option of a gain: a number, or None where it is not given."""
+    words = HELP.get(gain.name, f"{gain.output.replace('_', ' ')} gain [{gain.unit}]")
+    return Annotated[float | None, typer.Option(f"--{gain.name}", help=words)]
+
+
+def under_a_law(command: Callable[..., None]) -> Callable[..., None]:
+    """The command with an option for each gain after its arm, instead of its last argument, `given`: those by name."""
+    whole_signature = signature(command, eval_str=True)
+    first, *rest, given = whole_signature.parameters.values()
+    gains = [
+        Parameter(gain.name, Parameter.KEYWORD_ONLY, default=None, annotation=option_of(gain))
+        for gain in sorted(GAINS, key=lambda each: each.name)
+    ]
+
+    @wraps(command)
+    def with_options(**arguments: Any) -> None:
+        command(**{given.name: {gain.name: arguments.pop(gain.name) for gain in GAINS}, **arguments})
+
+    keywords = [each.replace(kind=Parameter.KEYWORD_ONLY) for each in (first, *rest)]
+    shown = [keywords[0], *gains, *keywords[1:]]
+    with_options.__signature__ = whole_signature.replace(parameters=shown)  # type: ignore[attr-defined]
+    return with_options
+
 
 MOST_POINTS = 1_000_000
 _Number = TypeVar("_Number", float, complex)
@@ -67,24 +95,19 @@ def grid(start: float, stop: float, points: str) -> NDArray[np.complex128]:
     return s_on_axis(frequencies)
 
 
-def gains_of(
-    arm: Arm, K1: float | None, K2: float | None = None, Kp: float = 0.0
-) -> tuple[HubFeedback, dict[str, Any]]:
+def gains_of(arm: Arm, given: Given) -> tuple[HubFeedback, dict[str, Any]]:
     """The law of the command line, gains that were not given being the arm's default, and what its answer says of it.
 
-    `default_gains` names the gains that were not given, `default_gains_in_words` says what they are and why.
+    `default_gains` names those that were not given and have one, `default_gains_in_words` says what they are and why.
     """
     from dataclasses import replace
 
     from tfarm.spectrum.scales import default_gains, default_words
 
-    given = {name: gain for name, gain in (("K1", K1), ("K2", K2)) if gain is not None}
-    missing = [name for name in ("K1", "K2") if name not in given]
+    missing = [name for name in HELP if given.get(name) is None]
+    law = replace(default_gains(arm), **{name: value for name, value in given.items() if value is not None})
     words = default_words(arm, missing) if missing else None
-    return replace(default_gains(arm), Kp=Kp, **given), {
-        "default_gains": missing,
-        "default_gains_in_words": words,
-    }
+    return law, {"default_gains": missing, "default_gains_in_words": words}
 
 
 def say_defaults(answer: dict[str, Any]) -> None:

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from tfarm.cli.app import ArmName, Json, app, load_arm, whole
-from tfarm.cli.inputs import K1, K2, Kp, gains_of, say_defaults
+from tfarm.cli.inputs import Given, gains_of, say_defaults, under_a_law
 
 Vary = Annotated[
     str,
@@ -22,23 +22,23 @@ Vary = Annotated[
 
 
 @app.command()
+@under_a_law
 def locus(
     arm: ArmName,
     vary: Vary,
     start: Annotated[float, typer.Option("--from", help="value at which the locus begins")],
     stop: Annotated[float, typer.Option("--to", help="value at which it ends")],
-    k1: K1 = None,
-    k2: K2 = None,
-    kp: Kp = 0.0,
     points: Annotated[str, typer.Option("--points", metavar="N", help="values, equally spaced")] = "500",
     branches: Annotated[str, typer.Option("--branches", metavar="N", help="branches, 1 to 200")] = "10",
     csv: Annotated[Path | None, typer.Option("--csv", help="write the branches to this file")] = None,
     json: Json = False,
+    *,
+    given: Given,
 ) -> None:
     """Root locus of the exact arm along a gain or a parameter; crossings of the imaginary axis are solved for."""
     number, count = whole("--points", points, 2, 100_000), whole("--branches", branches, 1, 200)
     subject = load_arm(arm)
-    law, said = gains_of(subject, k1, k2, kp)
+    law, said = gains_of(subject, given)
     from tfarm.loop.locus import locus as find
     from tfarm.loop.locus_answer import locus_answer
     from tfarm.loop.reduced_locus import reduced_locus

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tfarm.cli.app import ArmName, Json, app, load_arm, whole
-from tfarm.cli.inputs import K1, K2, Kp, gains_of, say_defaults
+from tfarm.cli.inputs import Given, gains_of, say_defaults, under_a_law
 
 if TYPE_CHECKING:
     from tfarm.dsp import Chain
@@ -27,21 +27,21 @@ Modes = Annotated[
 
 
 @app.command()
+@under_a_law
 def sampled(
     arm: ArmName,
-    K1: K1 = None,
-    K2: K2 = None,
-    Kp: Kp = 0.0,
     period: Period = None,
     delay_samples: Delay = None,
     dsp: DspFile = None,
     modes: Modes = None,
     json: Json = False,
+    *,
+    given: Given,
 ) -> None:
     """Is the loop u = -Kp theta - K1 theta_t - K2 M stable when it is sampled?  Verdict, intervals, modes, margins."""
     count = None if modes is None else whole("--modes", modes, 1, 400)
     subject, chain = load_arm(arm), chain_of(dsp or arm, period, delay_samples)
-    gains, said = gains_of(subject, K1, K2, Kp)
+    gains, said = gains_of(subject, given)
     from tfarm.dsp.verdict import analyse, sampled_answer
 
     answer = sampled_answer(analyse(subject, gains, chain, count=count)) | said
@@ -57,11 +57,9 @@ def sampled(
 
 
 @app.command()
+@under_a_law
 def simulate(
     arm: ArmName,
-    K1: K1 = None,
-    K2: K2 = None,
-    Kp: Kp = 0.0,
     scenario: Annotated[str, typer.Option("--scenario", help="slew, step, decay or impulse")] = "slew",
     duration: Annotated[float, typer.Option("--duration", help="how long [s]")] = 3.0,
     period: Period = None,
@@ -75,6 +73,8 @@ def simulate(
         Path | None, typer.Option("--controller", help="a tuner from `tfarm tune --save`: it sets K2, with its own K1")
     ] = None,
     json: Json = False,
+    *,
+    given: Given,
 ) -> None:
     """The sampled loop in time: hub angle, tip, root moment and torque, exact between the samples."""
     count = None if modes is None else whole("--modes", modes, 1, 400)
@@ -83,7 +83,7 @@ def simulate(
     from tfarm.dsp.results import simulated_answer
 
     if controller is None:
-        gains, said = gains_of(subject, K1, K2, Kp)
+        gains, said = gains_of(subject, given)
         answer = said | simulated_answer(subject, gains, chain, scenario, duration, count=count, between=records)
     else:
         from tfarm.tuner.saving import load_tuner
