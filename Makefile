@@ -64,7 +64,7 @@ audit: $(INSTALLED) ## check the paper equation by equation
 	@$(BIN)/tfarm audit
 
 test: $(INSTALLED) ## run the tests
-	@$(BIN)/python -m pytest -n 2
+	@$(BIN)/python -m pytest -n 2 --dist worksteal
 
 kernels: $(INSTALLED) ## run the numerical rooms under other kernels of BLAS and NumPy (ONLY=--marked: CI's minute)
 	@$(BIN)/python -m tests.kernels $(ONLY)
@@ -88,15 +88,20 @@ clean: ## remove everything that was generated
 	@find reports -mindepth 1 -maxdepth 1 ! -name README.md ! -name pictures -exec rm -rf {} +
 	@find tfarm tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
-# The last step compiles the numerical kernels, which numba then keeps on disk.
+# pip alone would byte-compile on one core, and every package's own tests too.  The last steps compile the numerical
+# kernels, which numba then keeps on disk: two commands at a time that need different ones.
 $(INSTALLED): pyproject.toml requirements.lock
 	$(if $(shell $(PYTHON) -c 'import sys; print("yes" * (sys.version_info >= (3, 11)))' 2>/dev/null),,$(error \
 		tfarm needs Python 3.11 or newer; name one, e.g. make PYTHON=python3.12))
 	@echo "setting up .venv (once; a minute or two)"
 	@$(PYTHON) -m venv .venv
-	@$(PIP) -e '.[dev]'
+	@$(PIP) --no-compile -e '.[dev]'
+	@$(BIN)/python -m compileall -q -j 2 -x '/tests?/' .venv/lib || true # as pip: one that does not compile is its own affair
 	@touch $@
-	@$(BIN)/tfarm modes sasaki2012 --count 1 --json > /dev/null
+	@$(BIN)/tfarm response sasaki2012 --output root_moment --s 1j > /dev/null & \
+		$(BIN)/tfarm modes sasaki2012 --count 1 > /dev/null && wait $$!
+	@$(BIN)/tfarm tune sasaki2012-lab --trials 1 > /dev/null & \
+		$(BIN)/tfarm poles sasaki2012-lab > /dev/null && $(BIN)/tfarm simulate sasaki2012-lab > /dev/null && wait $$!
 
 $(BENCH_INSTALLED): $(INSTALLED)
 	@$(PIP) -e '.[bench]'

@@ -76,7 +76,8 @@ def main(arguments: list[str]) -> int:
     """The number of kernels under which a test failed."""
     marked, failed, seen = "--marked" in arguments, [], {}
     paths = [argument for argument in arguments if argument != "--marked"] or ROOMS
-    pytest = [sys.executable, "-m", "pytest", "-q", "-n", "2", *(("-m", "kernels") if marked else ()), *paths]
+    shared = ("-n", "2", "--dist", "worksteal")  # each worker goes on where it is, and makes what a file shares once
+    pytest = [sys.executable, "-m", "pytest", "-q", *shared, *(("-m", "kernels") if marked else ()), *paths]
     print(f"own: {probed({})}", flush=True)
     for title, environment in variants(FEW if marked else CORES).items():
         what = probed(environment)
