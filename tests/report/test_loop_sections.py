@@ -30,6 +30,7 @@ from tfarm.report.map_picture import draw_map, nice_levels
 from tfarm.report.margins_table import NOTHING, margin_table
 from tfarm.report.sections import save_section
 from tfarm.spectrum.scales import PAPER_GAINS, default_gains, rate_unit
+from tfarm.tables.files import as_json
 
 LAB, PURE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))
 EPS = np.finfo(float).eps
@@ -111,7 +112,7 @@ def test_the_contours_are_the_damping_of_the_poles(lab):
 
 def test_the_data_behind_the_map_is_what_is_drawn(lab):
     """The files hold the grid, its counts and damping, then the edge with its frequencies."""
-    rows = json.loads(map_data(lab).as_json())["rows"]
+    rows = json.loads(as_json(map_data(lab)))["rows"]
     grid = [row for row in rows if row["what"] == "grid"]
     edge = [row for row in rows if row["what"] == "boundary"]
     assert len(grid) == lab.damping.size

@@ -10,11 +10,11 @@ import pytest
 
 import tfarm
 from tfarm.arm import HubFeedback
+from tfarm.digits import scientific
 from tfarm.dsp import Chain, Simulator, analyse, sampled_loop, sampled_verdict, scenario, stable_windows
 from tfarm.dsp.chain import Sampling
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import gain_windows
-from tfarm.report.digits import scientific
 from tfarm.report.discrete_loci import loci, loci_table
 from tfarm.report.figures import save
 from tfarm.report.overlay import CUT, K2_RANGE, draw_overlay, overlay, overlay_table, with_damping
@@ -23,6 +23,7 @@ from tfarm.report.sampled_section import sampled_section
 from tfarm.report.sampled_words import Sampled, compared, cure, duration, interval, short_answer
 from tfarm.report.strip_chart import draw_strip_chart, strip_chart
 from tfarm.report.time_responses import slews
+from tfarm.tables.files import as_csv, as_json
 
 LAB, PAPER = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 GAINS = HubFeedback(K1=0.3, K2=0.3)
@@ -210,7 +211,7 @@ def test_the_same_bytes_twice(tmp_path, monkeypatch):
         figures = (draw_overlay(data), draw_strip_chart(strip_chart(LAB, GAINS, ideal.without, 14)))
         for i, figure in enumerate(figures):
             save(figure, tmp_path / name, str(i), formats=("svg",))
-        table = overlay_table(data, "t").as_csv() + loci_table(found, "t").as_json()
+        table = as_csv(overlay_table(data, "t")) + as_json(loci_table(found, "t"))
         (tmp_path / name / "t").write_text(table, encoding="utf-8")
     files = sorted(path.name for path in (tmp_path / "a").iterdir())
     assert files == ["0.svg", "1.svg", "t"]

@@ -7,11 +7,11 @@ from collections.abc import Iterator
 
 import tfarm
 from tfarm.arm import Arm, implausible
-from tfarm.report.digits import plain, significant, unit
+from tfarm.columns import Column, Table
+from tfarm.digits import plain, significant, singly, unit
 from tfarm.report.figures import Picture
 from tfarm.report.sections import Fact, Section
 from tfarm.report.sketch import draw_arm
-from tfarm.report.tables import Column, Table, text_column
 
 FIRST = 3  # natural frequencies among the headline numbers
 MOST_POISSON = 0.5  # of an isotropic material; a larger E/2G - 1 is none's ratio
@@ -158,9 +158,9 @@ def _table(stem: str, title: str, caption: str, rows: list[Row], digits: int = 1
         title=title,
         caption=caption,
         columns=(
-            text_column("quantity", "quantity", quantity),
-            text_column("symbol", "symbol", symbol),
-            Column(key="value", title="value", values=value, cells=[plain(x, digits) for x in value]),
-            text_column("unit", "unit", [unit(u) for u in units]),
+            Column("quantity", "quantity", of=quantity),
+            Column("symbol", "symbol", of=symbol),
+            Column("value", "value", of=value, digits=singly(plain, digits)),
+            Column("unit", "unit", of=[unit(u) for u in units]),
         ),
     )

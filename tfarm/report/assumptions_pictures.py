@@ -9,9 +9,10 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from tfarm.arm import Arm
 from tfarm.audit.assumptions import HubStudy, SectionStudy, hub_study, section_study
-from tfarm.report.digits import plain, significant
+from tfarm.columns import Column, Table
+from tfarm.digits import plain, significant
 from tfarm.report.figures import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, Picture, blank, headline, style
-from tfarm.report.tables import Column, Real, Table, data_column
+from tfarm.response.frequency import Real
 
 Study = SectionStudy | HubStudy
 
@@ -42,13 +43,13 @@ def section_picture(study: SectionStudy) -> Picture:
         caption=SECTION_PICTURE.format(equivalent=equivalent),
         alt=f"Natural frequencies 1 to {len(COLORS)} over depth, {_way(curve)}; {words}",
         figure=draw_over(curve, curve.depth, study, study.depth, "depth of the rectangle, in the plane of bending [m]"),
-        data=_data("assumptions-depth-data", data_column("depth_m", "depth", "m", curve.depth), curve),
+        data=_data("assumptions-depth-data", Column("depth_m", "depth", "m", of=curve.depth), curve),
     )
 
 
 def hub_picture(study: HubStudy) -> Picture:
     curve = hub_study(study.arm, _between(study.hub_inertia))
-    inertia = data_column("hub_inertia_kg_m2", "hub inertia", "kg m^2", curve.hub_inertia)
+    inertia = Column("hub_inertia_kg_m2", "hub inertia", "kg m^2", of=curve.hub_inertia)
     words = _ends_in_words(study, study.hub_inertia, "kg m²")
     return Picture(
         stem="assumptions-inertia",
@@ -83,7 +84,7 @@ def _ends_in_words(study: Study, values: Real, of: str) -> str:
 
 def _data(stem: str, values: Column, curve: Study) -> Table:
     columns = [
-        data_column(f"mode_{i}_rad_s", f"mode {i}", "rad/s", omega)
+        Column(f"mode_{i}_rad_s", f"mode {i}", "rad/s", of=omega)
         for i, omega in enumerate(curve.natural_frequency.T, 1)
     ]
     return Table(stem=stem, title="Natural frequencies", caption="", is_data=True, columns=(values, *columns))

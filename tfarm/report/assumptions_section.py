@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
@@ -16,12 +17,13 @@ from tfarm.audit.assumptions import (
     loop_verdicts,
     section_study,
 )
+from tfarm.columns import Column, Table
+from tfarm.digits import fixed, plain, significant, singly
 from tfarm.report.assumptions_pictures import Study, hub_picture, section_picture
-from tfarm.report.digits import fixed, plain, significant
 from tfarm.report.figures import Picture
 from tfarm.report.paper import is_from_paper
 from tfarm.report.sections import Section
-from tfarm.report.tables import Column, Real, Table, number_column
+from tfarm.response.frequency import Real
 from tfarm.spectrum.scales import default_gains
 
 Verdicts = tuple[LoopVerdict, ...] | None
@@ -146,22 +148,28 @@ def hub_table(study: HubStudy) -> Table:
 def _which(study: Study) -> Column:
     """Says in words what the shade says."""
     texts = ["this arm" if own else "" for own in study.is_own]
-    return Column(key="is", title="", values=texts, cells=texts, tint=_tint(study))
+    return Column("is", "", of=texts, tint=_tint(study))
 
 
 def _value(key: str, title: str, of: str, values: Real, study: Study) -> Column:
-    return number_column(key, title, of, values, [plain(float(x), 4) for x in values], tint=_tint(study))
+    return Column(key, title, of, of=values, digits=singly(plain, 4), tint=_tint(study))
 
 
 def _modes(study: Study) -> Iterator[Column]:
     for i, omega in enumerate(study.natural_frequency.T, 1):
-        cells = [significant(float(w), 6) for w in omega]
-        yield number_column(
-            f"mode_{i}_rad_s", f"mode {i}", "rad/s", omega, cells, group="natural frequency", tint=_tint(study)
-        )
+        yield Column(
+            f"mode_{i}_rad_s", f"mode {i}", "rad/s", of=omega, digits=singly(significant, 6),
+            group="natural frequency", tint=_tint(study),
+        )  # fmt: skip
     for i, slope in enumerate(study.sensitivity.T, 1):
-        yield number_column(
-            f"mode_{i}_sensitivity", f"mode {i}", "%/%", slope, fixed(slope, 4), group="sensitivity", tint=_tint(study)
+        yield Column(
+            f"mode_{i}_sensitivity",
+            f"mode {i}",
+            "%/%",
+            of=slope,
+            digits=partial(fixed, decimals=4),
+            group="sensitivity",
+            tint=_tint(study),
         )
 
 
@@ -173,9 +181,9 @@ def _loop(study: Study, verdicts: Verdicts) -> Iterator[Column]:
     edges = ["-" if each.K2_below is None else _edge(each.K2_below, each.is_edge) for each in verdicts]
     law = default_gains(study.arm)
     group = f"loop at K1 = {plain(law.K1, 4)}, K2 = {plain(law.K2, 4)}"
-    yield Column(key="verdict", title="verdict", values=words, cells=words, group=group, tint=_tint(study))
+    yield Column("verdict", "verdict", of=words, group=group, tint=_tint(study))
     values = ["" if each.K2_below is None else each.K2_below for each in verdicts]
-    yield Column(key="K2_below", title="stable below K2", values=values, cells=edges, group=group, tint=_tint(study))
+    yield Column("K2_below", "stable below K2", of=values, digits=edges, group=group, tint=_tint(study))
 
 
 def _searched(verdicts: Verdicts) -> str:

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MultipleLocator, NullFormatter
 
-from tfarm.report.digits import plain
+from tfarm.digits import plain
 from tfarm.report.figures import BLUE, FAINT, GREY, INK, ORANGE, blank, headline, style
 from tfarm.response.frequency import Bode, Real
 

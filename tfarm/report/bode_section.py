@@ -7,11 +7,11 @@ import math
 import numpy as np
 
 from tfarm.arm import Arm
+from tfarm.columns import Column, Table
+from tfarm.digits import lined, plain, scientific, significant, singly, unit
 from tfarm.report.bode import draw_bode
-from tfarm.report.digits import aligned, plain, scientific, significant, unit
 from tfarm.report.figures import Picture
 from tfarm.report.sections import Section
-from tfarm.report.tables import Table, data_column, number_column, text_column
 from tfarm.response.frequency import ON_AXIS, Bode, bode
 
 ROOTS = (
@@ -95,12 +95,12 @@ def response_table(data: Bode, stem: str) -> Table:
     """The numbers of the picture."""
     of = data.gain_unit
     columns = (
-        data_column("omega_rad_s", "angular frequency", "rad/s", data.omega),
-        data_column("frequency_hz", "frequency", "Hz", data.omega / (2 * math.pi)),
-        data_column("real", "real part", of, data.value.real),
-        data_column("imaginary", "imaginary part", of, data.value.imag),
-        data_column("magnitude", "magnitude", of, abs(data.value)),
-        data_column("phase_deg", "phase", "deg", data.phase),
+        Column("omega_rad_s", "angular frequency", "rad/s", of=data.omega),
+        Column("frequency_hz", "frequency", "Hz", of=data.omega / (2 * math.pi)),
+        Column("real", "real part", of, of=data.value.real),
+        Column("imaginary", "imaginary part", of, of=data.value.imag),
+        Column("magnitude", "magnitude", of, of=abs(data.value)),
+        Column("phase_deg", "phase", "deg", of=data.phase),
     )
     return Table(stem=stem, title=f"{data.input_label} to {data.label}", caption="", is_data=True, columns=columns)
 
@@ -112,18 +112,17 @@ def roots_table(data: Bode, stem: str) -> Table:
     gains = np.r_[data.peaks, data.dips]
     real, hertz = roots.real + 0.0, roots.imag / (2 * math.pi)
     ratio = -100 * real / abs(roots) + 0.0
-    magnitudes = [scientific(x, 4) for x in gains]
     return Table(
         stem=stem,
         title=f"Poles and zeros, {data.input_label} to {data.label}",
         caption=f"{completeness(data)} {ROOTS}",
         columns=(
-            text_column("kind", "kind", kinds),
-            number_column("real_1_s", "Re s", "1/s", real, aligned(real, 8, least=4)),
-            number_column("imaginary_rad_s", "Im s", "rad/s", roots.imag, aligned(roots.imag, 8, least=7)),
-            number_column("frequency_hz", "Im s/2π", "Hz", hertz, aligned(hertz, 8, least=7)),
-            number_column("damping_percent", "damping ratio", "%", ratio, aligned(ratio, 5, least=3)),
-            number_column("magnitude", "magnitude there", unit(data.gain_unit), gains, magnitudes),
+            Column("kind", "kind", of=kinds),
+            Column("real_1_s", "Re s", "1/s", of=real, digits=lined(8, 4)),
+            Column("imaginary_rad_s", "Im s", "rad/s", of=roots.imag, digits=lined(8, 7)),
+            Column("frequency_hz", "Im s/2π", "Hz", of=hertz, digits=lined(8, 7)),
+            Column("damping_percent", "damping ratio", "%", of=ratio, digits=lined(5, 3)),
+            Column("magnitude", "magnitude there", unit(data.gain_unit), of=gains, digits=singly(scientific, 4)),
         ),
     )
 

@@ -17,11 +17,11 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm
+from tfarm.columns import Column
+from tfarm.digits import significant
 from tfarm.dsp import Scenario, Simulation, Simulator
 from tfarm.dsp.ringing import POINTS, records_between
 from tfarm.records import record
-from tfarm.report.digits import significant
-from tfarm.report.tables import Column, data_column
 
 Real = NDArray[np.float64]
 
@@ -60,10 +60,10 @@ class Curve:
         """What is drawn, for the file: one column, or both edges of the band."""
         name = f"{key}_{unit.replace(' ', '_')}"
         if not self.is_band:
-            return (data_column(name, title, unit, self.low),)
+            return (Column(name, title, unit, of=self.low),)
         return (
-            data_column(f"{name}_low", f"{title}, lowest", unit, self.low),
-            data_column(f"{name}_high", f"{title}, highest", unit, self.high),
+            Column(f"{name}_low", f"{title}, lowest", unit, of=self.low),
+            Column(f"{name}_high", f"{title}, highest", unit, of=self.high),
         )
 
 

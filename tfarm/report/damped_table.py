@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tfarm.report.digits import aligned, plain, significant
-from tfarm.report.tables import Column, Table, number_column, text_column
+from tfarm.columns import Column, Table
+from tfarm.digits import aligned, lined, plain, significant
 from tfarm.spectrum import DampedModes, Modes, damped_modes
 
 DAMPED = (
@@ -44,11 +44,11 @@ def damped_table(modes: Modes) -> Table:
             C=plain(C), count=damped.count, rigid=rigid, outside=("" if inside.all() else OUTSIDE) + left_out, **words
         ),
         columns=(
-            Column(key="index", title="mode", values=damped.index.tolist(), cells=[str(i) for i in damped.index]),
-            number_column("eigenvalue_re", "Re s", "1/s", one.real, aligned(one.real, 7, least=6)),
+            Column("index", "mode", of=damped.index),
+            Column("eigenvalue_re", "Re s", "1/s", of=one.real, digits=lined(7, 6)),
             _imaginary(damped),
-            number_column("damping_ratio", "damping ratio", "-", damped.damping_ratio, _ratios(damped)),
-            text_column("complete", "list complete", where),
+            Column("damping_ratio", "damping ratio", "-", of=damped.damping_ratio, digits=_ratios(damped)),
+            Column("complete", "list complete", of=where),
         ),
     )
 
@@ -61,7 +61,7 @@ def _imaginary(damped: DampedModes) -> Column:
         f"overdamped, and {significant(float(two[n].real), 7)}" if overdamped else rising[n]
         for n, overdamped in enumerate(damped.is_overdamped)
     ]
-    return Column(key="eigenvalue_im", title="Im s", unit="rad/s", values=one.imag.tolist(), cells=cells)
+    return Column("eigenvalue_im", "Im s", "rad/s", of=one.imag, digits=cells)
 
 
 def _ratios(damped: DampedModes) -> list[str]:

@@ -17,12 +17,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullLocator
 from numpy.typing import NDArray
 
+from tfarm.columns import Column, Table
+from tfarm.digits import plain
 from tfarm.dsp.law import origins, root_locus
 from tfarm.dsp.loop import SampledLoop
 from tfarm.records import record
-from tfarm.report.digits import plain
 from tfarm.report.figures import BLUE, GREY, INK, ORANGE, blank, headline, style
-from tfarm.report.tables import Column, Table, Value, data_column
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
@@ -202,7 +202,7 @@ def _colour(data: Loci, mode: int) -> str:
 
 def loci_table(data: Loci, stem: str) -> Table:
     """Every pole of the three loci with Im z >= 0: a row a gain and a branch."""
-    keys: dict[str, list[Value]] = {"locus": [], "K1": [], "K2": [], "mode": []}
+    keys: dict[str, list[float | int | str]] = {"locus": [], "K1": [], "K2": [], "mode": []}
     points = []
     for name, locus, held in (
         ("K1 alone", data.alone, 0.0),
@@ -218,6 +218,6 @@ def loci_table(data: Loci, stem: str) -> Table:
                     keys[key].append(cell)
                 points.append(z)
     z_all = np.array(points)
-    columns = [Column(key=key, title=key, values=cells, cells=()) for key, cells in keys.items()]
-    columns += [data_column("real", "Re z", "", z_all.real), data_column("imaginary", "Im z", "", z_all.imag)]
+    columns = [Column(key, key, of=cells) for key, cells in keys.items()]
+    columns += [Column("real", "Re z", of=z_all.real), Column("imaginary", "Im z", of=z_all.imag)]
     return Table(stem=stem, title="Poles of the sampled loop", caption="", is_data=True, columns=tuple(columns))

@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 
 import tfarm
 from tfarm.arm import Arm, HubFeedback
+from tfarm.columns import Column, Table
+from tfarm.digits import plain, scientific, significant, singly
 from tfarm.errors import ConvergenceError
 from tfarm.loop.locus import Locus, locus
 from tfarm.loop.reduced_locus import ReducedLocus, reduced_locus
 from tfarm.records import record
-from tfarm.report.digits import plain, scientific, significant
 from tfarm.report.figures import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, blank, headline, style
-from tfarm.report.tables import Column, Table, data_column, number_column, text_column
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
@@ -221,11 +221,11 @@ def crossing_table(data: Loci, stem: str) -> Table:
         title=f"Crossings of the imaginary axis along {data.name}",
         caption="Solved for gain and frequency together on the exact characteristic function, to the digits shown.",
         columns=(
-            number_column(data.name, data.name, data.unit, gain, [significant(float(x), 8) for x in gain]),
-            number_column("omega_rad_s", "frequency", "rad/s", omega, [significant(float(x), 7) for x in omega]),
-            number_column("frequency_hz", "", "Hz", hertz, [significant(float(x), 7) for x in hertz]),
-            Column(key="mode", title="mode", values=modes, cells=[str(n) for n in modes]),
-            text_column("becomes", "becomes", [each.direction for each in found]),
+            Column(data.name, data.name, data.unit, of=gain, digits=singly(significant, 8)),
+            Column("omega_rad_s", "frequency", "rad/s", of=omega, digits=singly(significant, 7)),
+            Column("frequency_hz", "", "Hz", of=hertz, digits=singly(significant, 7)),
+            Column("mode", "mode", of=modes),
+            Column("becomes", "becomes", of=[each.direction for each in found]),
         ),
     )
 
@@ -241,17 +241,17 @@ def gap_table(data: Loci, stem: str) -> Table:
         f"that is more). The reduced model has order {data.reduced.order}; its poles are those of "
         "control.root_locus_map, taken to their last digits by Newton's method.",
         columns=(
-            text_column("branch", "branch from", names),
-            number_column("gap", "largest gap", "of |s|", gap, [scientific(float(x), 3) for x in gap]),
+            Column("branch", "branch from", of=names),
+            Column("gap", "largest gap", "of |s|", of=gap, digits=singly(scientific, 3)),
         ),
     )
 
 
 def loci_data(data: Loci, stem: str) -> Table:
     """The exact and the reduced branches."""
-    columns = [data_column(data.name, data.name, data.unit, data.exact.gain)]
+    columns = [Column(data.name, data.name, data.unit, of=data.exact.gain)]
     for kind, branches in (("exact", data.exact.branches), ("reduced", data.reduced.branches)):
         for n, row in enumerate(shown(branches)):
-            columns.append(data_column(f"{kind}_{n}_re", f"{kind} branch {n}, Re s", "1/s", row.real))
-            columns.append(data_column(f"{kind}_{n}_im", f"{kind} branch {n}, Im s", "rad/s", row.imag))
+            columns.append(Column(f"{kind}_{n}_re", f"{kind} branch {n}, Re s", "1/s", of=row.real))
+            columns.append(Column(f"{kind}_{n}_im", f"{kind} branch {n}, Im s", "rad/s", of=row.imag))
     return Table(stem=stem, title=f"Loci along {data.name}", caption="", is_data=True, columns=tuple(columns))

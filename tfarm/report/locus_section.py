@@ -8,14 +8,15 @@ from dataclasses import replace
 import numpy as np
 
 from tfarm.arm import Arm, HubFeedback
+from tfarm.columns import Column, Table
+from tfarm.digits import plain, scientific, significant, singly
 from tfarm.errors import ConvergenceError
 from tfarm.loop.stability import MARGIN_OF_ZERO, Stability, stability
-from tfarm.report.digits import plain, scientific, significant
 from tfarm.report.figures import Picture
 from tfarm.report.loci import Loci, crossing_table, draw_loci, gap_table, loci, loci_data
 from tfarm.report.loop_laws import edge_of_K2, has_loop, margins_of, sign_words
 from tfarm.report.sections import Section
-from tfarm.report.tables import Column, Real, Table, number_column, text_column
+from tfarm.response.frequency import Real
 from tfarm.spectrum.scales import default_gains, rate_unit
 
 BEYOND = (0.9, 1.0, 1.01, 1.1, 1.5)  # values of K2 whose exact poles are listed
@@ -153,16 +154,13 @@ def _poles_table(
         title=title,
         caption=caption,
         columns=(
-            number_column(name, name, unit, gains, [plain(float(x), 4) for x in gains]),
-            text_column("verdict", "verdict", [it.verdict if it else "on the axis, not decided" for it in found]),
-            Column(key="unstable_poles", title="unstable poles", values=counts, cells=[str(c) for c in counts]),
-            Column(
-                key="spectral_abscissa_1_s", title="fastest growth", unit="1/s", values=growth,
-                cells=[_growth(it) for it in found],
-            ),
-            text_column("first_pairs", "first pairs of poles, Re ± i Im [1/s]", [_first_pairs(it) for it in found]),
+            Column(name, name, unit, of=gains, digits=singly(plain, 4)),
+            Column("verdict", "verdict", of=[it.verdict if it else "on the axis, not decided" for it in found]),
+            Column("unstable_poles", "unstable poles", of=counts),
+            Column("spectral_abscissa_1_s", "fastest growth", "1/s", of=growth, digits=[_growth(it) for it in found]),
+            Column("first_pairs", "first pairs of poles, Re ± i Im [1/s]", of=[_first_pairs(it) for it in found]),
         ),
-    )  # fmt: skip
+    )
 
 
 def _growth(it: Stability | None) -> str:

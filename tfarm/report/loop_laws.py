@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from tfarm.arm import Arm, HubFeedback
+from tfarm.digits import plain
 from tfarm.dsp import Chain
 from tfarm.dsp.brief import SampledBrief, sampled_brief
 from tfarm.errors import ConvergenceError
 from tfarm.loop.design import Design, design
 from tfarm.loop.margins import Margins, margins
-from tfarm.report.digits import plain
 from tfarm.spectrum.scales import default_gains
 
 MODES = 2  # flexible modes in the band of the damping that is drawn and designed for, as `tfarm design` has it

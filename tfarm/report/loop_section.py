@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 
 from tfarm.arm import Arm
+from tfarm.digits import plain, significant
 from tfarm.dsp import Chain
 from tfarm.dsp.brief import SampledBrief
 from tfarm.errors import ConvergenceError
 from tfarm.loop.nyquist import Nyquist, nyquist, nyquist_of
 from tfarm.loop.windows import Windows
-from tfarm.report.digits import plain, significant
 from tfarm.report.figures import Picture
 from tfarm.report.loop_laws import (
     MODES,

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 import tfarm
 from tfarm.arm import Arm, Hub, HubFeedback, many_laws
+from tfarm.columns import Column, Table
 from tfarm.dsp import Chain, sampled_verdict
 from tfarm.dsp.brief import SampledBrief
 from tfarm.errors import ConvergenceError
@@ -23,7 +24,6 @@ from tfarm.loop.regions import Region, between, boundary, region
 from tfarm.records import record
 from tfarm.report.loop_laws import MODES, NamedLaw, best, brief_of, laws
 from tfarm.report.overlay import Layer, ends_of_K1, sampled_layer
-from tfarm.report.tables import Column, Table, Value, data_column
 from tfarm.spectrum.scales import default_gains, rate_unit
 
 Real = NDArray[np.float64]
@@ -217,24 +217,18 @@ def map_data(data: GainMap) -> Table:
     """The grid with counts and damping, the boundary with its frequencies, then the ends of the sampled intervals."""
     K1, K2 = (each.ravel() for each in np.meshgrid(data.K1, data.K2))
     edge = data.edge[~np.isnan(data.edge[:, 0])] if data.edge.size else data.edge
-    counts: list[Value] = [math.inf if count < 0 else int(count) for count in data.counts.ravel()]
-    none: list[Value] = [""]
+    counts: list[float | int | str] = [math.inf if count < 0 else int(count) for count in data.counts.ravel()]
+    none: list[float | int | str] = [""]
     sampled = _sampled_ends(data)
     beyond = len(edge) + len(sampled)
     what = ["grid"] * K1.size + ["boundary"] * len(edge) + ["sampled boundary"] * len(sampled)
     columns = (
-        Column(key="what", title="what", values=what, cells=()),
-        data_column("K1_N_m_s_rad", "K1", "N m s/rad", np.r_[K1, edge[:, 0], sampled[:, 0]]),
-        data_column("K2", "K2", "", np.r_[K2, edge[:, 1], sampled[:, 1]]),
-        Column(key="unstable_poles", title="unstable poles", values=counts + none * beyond, cells=()),
-        Column(
-            key="least_damping_ratio", title="least damping ratio", cells=(),
-            values=[*data.damping.ravel().tolist(), *none * beyond],
-        ),
-        Column(
-            key="omega_rad_s", title="frequency", unit="rad/s", cells=(),
-            values=none * K1.size + edge[:, 2].tolist() + none * len(sampled),
-        ),
+        Column("what", "what", of=what),
+        Column("K1_N_m_s_rad", "K1", "N m s/rad", of=np.r_[K1, edge[:, 0], sampled[:, 0]]),
+        Column("K2", "K2", of=np.r_[K2, edge[:, 1], sampled[:, 1]]),
+        Column("unstable_poles", "unstable poles", of=counts + none * beyond),
+        Column("least_damping_ratio", "least damping ratio", of=[*data.damping.ravel().tolist(), *none * beyond]),
+        Column("omega_rad_s", "frequency", "rad/s", of=none * K1.size + edge[:, 2].tolist() + none * len(sampled)),
     )  # fmt: skip
     return Table(stem="map-data", title="The map of K1 and K2", caption="", is_data=True, columns=columns)
 

@@ -12,8 +12,8 @@ from matplotlib.ticker import FuncFormatter, NullFormatter, SymmetricalLogLocato
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from tfarm.digits import SUPERSCRIPT, plain, significant
 from tfarm.loop.regions import INFINITE
-from tfarm.report.digits import SUPERSCRIPT, plain, significant
 from tfarm.report.figures import BLUE, GREY, INK, ORANGE, PURPLE, blank, headline, style
 from tfarm.report.map import GainMap, Real, stable_edge
 from tfarm.report.region_pieces import pieces

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
+from tfarm.columns import Column, Table
+from tfarm.digits import plain, significant, singly
 from tfarm.dsp.brief import SampledBrief
 from tfarm.loop.lyapunov import lyapunov
 from tfarm.loop.margins import Margins
 from tfarm.loop.windows import Windows
-from tfarm.report.digits import plain, significant
 from tfarm.report.loop_laws import NamedLaw, typeset
 from tfarm.report.sections import Fact
-from tfarm.report.tables import Column, Table, Value, text_column
 
 NOTHING = "none: not stable"
 UNKNOWN = "not known"  # an exact margin, where nothing bounds L beyond the band
@@ -79,16 +79,14 @@ def margin_table(laws: Sequence[NamedLaw], found: Sequence[Margins], is_undamped
     """A row a quantity, the verdict first; for each law the exact value, that in the band, and where."""
     rows = [list(_rows(each)) for each in found]
     columns = [
-        text_column("quantity", "", [row[0] for row in rows[0]]),
-        text_column("unit", "unit", [row[1] for row in rows[0]]),
+        Column("quantity", "", of=[row[0] for row in rows[0]]),
+        Column("unit", "unit", of=[row[1] for row in rows[0]]),
     ]
     for named, part in zip(laws, rows, strict=True):
         group = f"{named.name}: {named.gains}"
         for i, (key, title) in enumerate((("exact", "exact"), ("band", "in the band"), ("at_rad_s", "at rad/s")), 2):
-            values: list[Value] = [row[i] for row in part]
-            columns.append(
-                Column(key=f"{named.key}_{key}", title=title, values=values, cells=_cells(values), group=group)
-            )
+            values = [row[i] for row in part]
+            columns.append(Column(f"{named.key}_{key}", title, of=values, digits=singly(_number), group=group))
     return Table(
         stem="margins",
         title="Verdict and margins",
@@ -138,13 +136,8 @@ def _known(exact: float | None) -> float | str:
     return UNKNOWN if exact is None else exact
 
 
-def _cells(values: Sequence[Value]) -> list[str]:
-    return [value if isinstance(value, str) else _number(value) for value in values]
-
-
-def _number(value: Value) -> str:
-    assert isinstance(value, float | int)
-    return plain(float(value), 6) if float(value).is_integer() else significant(float(value), 5)
+def _number(value: float) -> str:
+    return plain(value, 6) if value.is_integer() else significant(value, 5)
 
 
 def window_table(laws: Sequence[NamedLaw], found: Sequence[Margins], sign: str) -> Table:
@@ -162,22 +155,22 @@ def window_table(laws: Sequence[NamedLaw], found: Sequence[Margins], sign: str) 
         title="How far each gain may go alone",
         caption=WINDOWS.format(sign=sign),
         columns=(
-            text_column("law", "law", [law.name for law, *_ in rows]),
-            text_column("verdict", "verdict", [each.stability.verdict for *_, each in rows]),
-            text_column("gain", "gain", [name for _, name, _, _ in rows]),
-            text_column("unit", "unit", [UNITS[name] for _, name, _, _ in rows]),
-            Column(key="value", title="value", values=values, cells=[plain(value, 5) for value in values]),
+            Column("law", "law", of=[law.name for law, *_ in rows]),
+            Column("verdict", "verdict", of=[each.stability.verdict for *_, each in rows]),
+            Column("gain", "gain", of=[name for _, name, _, _ in rows]),
+            Column("unit", "unit", of=[UNITS[name] for _, name, _, _ in rows]),
+            Column("value", "value", of=values, digits=singly(plain, 5)),
             Column(
-                key="stable_around_it", title="stable around it", cells=around,
-                values=[_joined(windows.around) if windows.around else NOTHING for _, _, windows, _ in rows],
+                "stable_around_it", "stable around it", digits=around,
+                of=[_joined(windows.around) if windows.around else NOTHING for _, _, windows, _ in rows],
             ),
             Column(
-                key="stable_windows", title="all stable windows", cells=[_all(windows) for _, _, windows, _ in rows],
-                values=[_joined(*windows.all) or "none" for _, _, windows, _ in rows],
+                "stable_windows", "all stable windows", digits=[_all(windows) for _, _, windows, _ in rows],
+                of=[_joined(*windows.all) or "none" for _, _, windows, _ in rows],
             ),
             Column(
-                key="looked_at", title="looked at", values=[_joined(windows.looked_at) for _, _, windows, _ in rows],
-                cells=[_pair(windows.looked_at) for _, _, windows, _ in rows],
+                "looked_at", "looked at", digits=[_pair(windows.looked_at) for _, _, windows, _ in rows],
+                of=[_joined(windows.looked_at) for _, _, windows, _ in rows],
             ),
         ),
     )  # fmt: skip

@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
+from tfarm.digits import plain, significant
 from tfarm.records import record
-from tfarm.report.digits import plain, significant
 from tfarm.report.figures import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, blank, headline, style
 from tfarm.response.frequency import Real
 from tfarm.spectrum import Modes

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
 import tfarm
 from tfarm.arm import Arm
+from tfarm.columns import Column, Table
+from tfarm.digits import fixed, held, lined, significant
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.exact.coefficients import Theory
 from tfarm.report.damped_table import damped_table
-from tfarm.report.digits import aligned, fixed, held, significant
 from tfarm.report.figures import Picture
 from tfarm.report.mode_shapes import Shape, draw_differences, draw_shapes, shapes_of, theory_name
 from tfarm.report.sections import Section
-from tfarm.report.tables import Column, Table, data_column, number_column, text_column
 from tfarm.report.trust_proofs import how_proven
 from tfarm.response.frequency import Real
 from tfarm.spectrum import Modes
@@ -120,9 +121,15 @@ def modal_table(modes: Modes) -> Table:
             _mode_numbers("index", modes.index.tolist()),
             omega,
             hertz,
-            number_column("hub_participation", "hub participation b", "1/√(kg m²)", b, aligned(b, 7, least=4)),
-            number_column("modal_moment", "modal moment", "N m/√(kg m²)", moment, aligned(moment, 7, least=4)),
-            Column(key="nodes_m", title="nodes", unit="m", values=at, cells=nodes),
+            Column(
+                "hub_participation",
+                "hub participation b",
+                "1/√(kg m²)",
+                of=b,
+                digits=lined(7, 4),
+            ),
+            Column("modal_moment", "modal moment", "N m/√(kg m²)", of=moment, digits=lined(7, 4)),
+            Column("nodes_m", "nodes", "m", of=at, digits=nodes),
         ),
     )
 
@@ -142,17 +149,17 @@ def places(nodes: Real, length: float) -> tuple[str, ...]:
 
 
 def _mode_numbers(key: str, numbers: Sequence[int]) -> Column:
-    return Column(key=key, title="mode", values=numbers, cells=[str(number) for number in numbers])
+    return Column(key, "mode", of=numbers)
 
 
 def _frequency(key: str, title: str, of: str, values: Real, group: str = "") -> Column:
-    return number_column(key, title, of, values, aligned(values, 8, least=7), group=group)
+    return Column(key, title, of, of=values, digits=lined(8, 7), group=group)
 
 
 def _shapes(name: str, shapes: tuple[Shape, ...]) -> Picture:
     counts = ", ".join(str(len(shape.nodes)) for shape in shapes)
-    columns = [data_column("x_m", "x", "m", shapes[0].x)]
-    columns += [data_column(f"mode_{s.number}", f"mode {s.number}", "", np.round(s.w, HELD - 1) + 0.0) for s in shapes]
+    columns = [Column("x_m", "x", "m", of=shapes[0].x)]
+    columns += [Column(f"mode_{s.number}", f"mode {s.number}", of=np.round(s.w, HELD - 1) + 0.0) for s in shapes]
     return Picture(
         stem="mode-shapes",
         title=f"Shapes of the first {len(shapes)} flexible modes",
@@ -170,8 +177,8 @@ def theories_table(exact: Real, theories: Mapping[str, Real], differences: Mappi
     for theory, omega in {"timoshenko": exact, **theories}.items():
         columns.append(_frequency(f"{_key(theory)}_rad_s", theory_name(theory), "rad/s", omega, both[0]))
     for theory, percent in differences.items():
-        key, cells = f"{_key(theory)}_difference_percent", aligned(percent, 5, least=3)
-        columns.append(number_column(key, theory_name(theory), "%", percent, cells, group=both[1]))
+        key, digits = f"{_key(theory)}_difference_percent", lined(5, 3)
+        columns.append(Column(key, theory_name(theory), "%", of=percent, digits=digits, group=both[1]))
     worst = differences["euler-bernoulli"]
     least, most = significant(float(worst.min()), 2), significant(float(worst.max()), 2)
     return Table(
@@ -190,7 +197,7 @@ def _differences(name: str, differences: Mapping[str, Real]) -> Picture:
     shown = dict(reversed(list(differences.items())))
     words = ", ".join(f"{theory_name(theory)} {significant(float(v[-1]), 3)} %" for theory, v in shown.items())
     columns = [_mode_numbers("mode", range(1, MODES + 1))]
-    columns += [data_column(f"{_key(t)}_difference_percent", theory_name(t), "%", v) for t, v in shown.items()]
+    columns += [Column(f"{_key(t)}_difference_percent", theory_name(t), "%", of=v) for t, v in shown.items()]
     return Picture(
         stem="theory-differences",
         title="How far the simpler theories are off",
@@ -212,10 +219,12 @@ def sensitivity_table(modes: Modes) -> Table:
     }
     shown = {name: values for name, values in rows.items() if abs(values).max() > NEGLECTED}
     dropped = [name for name in rows if name not in shown]
-    columns = [text_column("parameter", "parameter", list(shown))]
+    columns = [Column("parameter", "parameter", of=list(shown))]
     for number, column in zip(modes.index[flexible], np.array(list(shown.values())).T, strict=True):
         tints = [tint(x) for x in column]
-        columns.append(number_column(f"mode_{number}", f"mode {number}", "%/%", column, fixed(column, 3), tint=tints))
+        columns.append(
+            Column(f"mode_{number}", f"mode {number}", "%/%", of=column, digits=partial(fixed, decimals=3), tint=tints)
+        )
     left_out = f" Left out, as one per cent more of it changes no frequency here: {_list(dropped)}." if dropped else ""
     return Table(
         stem="sensitivities",

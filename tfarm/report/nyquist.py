@@ -12,11 +12,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from tfarm.columns import Column, Table
+from tfarm.digits import plain, significant, singly
 from tfarm.loop.nyquist import Nyquist, compressed
-from tfarm.report.digits import plain, significant
 from tfarm.report.figures import BLUE, FAINT, GREY, ORANGE, blank, headline, style
 from tfarm.report.loop_laws import NamedLaw
-from tfarm.report.tables import Column, Table, data_column, number_column, text_column
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 
@@ -167,19 +167,19 @@ def count_table(plots: Sequence[Curve], names: Sequence[str]) -> Table:
         title="Encirclements beside unstable poles",
         caption=COUNTS.format(last=COUNTED if plots[-1].named.name == COMPARED and plots[-1].data.expected else ""),
         columns=(
-            text_column("law", "law", names),
-            text_column("verdict", "verdict", words),
+            Column("law", "law", of=names),
+            Column("verdict", "verdict", of=words),
             *(
                 Column(
-                    key=key,
-                    title=title,
-                    values=column.tolist(),
-                    cells=[str(n).replace("-", "−") for n in column],
+                    key,
+                    title,
+                    of=column,
+                    digits=singly(lambda n: str(n).replace("-", "−")),
                     group="" if key == "encirclements" else "unstable poles",
                 )
                 for key, title, column in zip(keys, titles, counts.T, strict=True)
             ),
-            number_column("band_rad_s", "up to", "rad/s", bands, [significant(float(band), 6) for band in bands]),
+            Column("band_rad_s", "up to", "rad/s", of=bands, digits=singly(significant, 6)),
         ),
     )
 
@@ -194,10 +194,10 @@ def curve_data(plots: Sequence[Curve]) -> Table:
         caption="",
         is_data=True,
         columns=(
-            Column(key="law", title="law", values=law, cells=()),
-            data_column("re_s", "Re s", "1/s", s.real),
-            data_column("im_s", "Im s", "rad/s", s.imag),
-            data_column("re_L", "Re L", "", L.real),
-            data_column("im_L", "Im L", "", L.imag),
+            Column("law", "law", of=law),
+            Column("re_s", "Re s", "1/s", of=s.real),
+            Column("im_s", "Im s", "rad/s", of=s.imag),
+            Column("re_L", "Re L", of=L.real),
+            Column("im_L", "Im L", of=L.imag),
         ),
     )

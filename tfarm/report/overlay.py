@@ -18,6 +18,8 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback
+from tfarm.columns import Column, Table
+from tfarm.digits import plain, scientific
 from tfarm.dsp import gain_map, sampled_verdict, stable_windows
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.loop import SampledLoop
@@ -25,10 +27,8 @@ from tfarm.errors import ConvergenceError
 from tfarm.loop.lines import along, crossings
 from tfarm.loop.regions import region
 from tfarm.records import record
-from tfarm.report.digits import plain, scientific
 from tfarm.report.figures import BLUE, GREY, INK, ORANGE, blank, headline, style
 from tfarm.report.region_pieces import pieces
-from tfarm.report.tables import Column, Table, data_column
 
 Real = NDArray[np.float64]
 Window = tuple[float, float]
@@ -186,7 +186,7 @@ def _fill(ax: Axes, layer: Layer, colour: str, edge: str, label: str) -> Patch:
 
 def overlay_table(data: Overlay, stem: str) -> Table:
     """The numbers of the picture: at each K1 the ends of the stable intervals of K2."""
-    columns = [data_column("K1", "K1", "N m s/rad", data.continuous.K1)]
+    columns = [Column("K1", "K1", "N m s/rad", of=data.continuous.K1)]
     columns.append(_ends("continuous_K2_intervals", data.continuous))
     for layer in data.sampled:
         own = layer.damping == data.arm.link.damping
@@ -197,4 +197,4 @@ def overlay_table(data: Overlay, stem: str) -> Table:
 
 def _ends(key: str, layer: Layer) -> Column:
     ends = [tuple(float(end) for window in column for end in window) for column in layer.intervals]
-    return Column(key=key, title=key, values=ends, cells=())
+    return Column(key, key, of=ends)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,14 +11,13 @@ from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from markupsafe import Markup, escape
 
 import tfarm
 from tfarm.arm import Arm, load, presets
 from tfarm.dsp import Chain, load_chain
-from tfarm.report.digits import unit
 from tfarm.report.sections import Fact, SavedSection
 from tfarm.report.trust_proofs import hash_of
+from tfarm.tables.html import symbol
 
 TEMPLATES = Path(__file__).parent / "templates"
 QUESTIONS = {
@@ -115,12 +113,6 @@ def summary(arm: Arm) -> str:
     tip = "its tip pinned" if math.isinf(arm.payload.mass) else tip
     damping = "damped" if arm.link.damping else "undamped"
     return f"A flexible link on {hub}, {tip}, {damping}; Timoshenko theory, exact."
-
-
-def symbol(text: str) -> Markup:
-    """A text with true subscripts and exponents: I_h becomes I<sub>h</sub>, m^2 becomes m²."""
-    plain = unit(str(escape(text)))
-    return Markup(re.sub(r"\b([A-Za-zθ])_([a-z0-9])\b", r"\1<sub>\2</sub>", plain))
 
 
 def render(template: str, **values: Any) -> str:

@@ -10,9 +10,9 @@ import math
 from dataclasses import dataclass
 
 from tfarm.arm import Arm
-from tfarm.report.digits import plain, unit
+from tfarm.columns import Column, Table
+from tfarm.digits import plain, unit
 from tfarm.report.sections import Section
-from tfarm.report.tables import Column, Table, text_column
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,8 +77,8 @@ def paper_section(arm: Arm) -> Section:
         caption="Rows in colour differ from the paper in value or unit, or are missing there: every number on this "
         "page rests on them.",
         columns=(
-            text_column("quantity", "quantity", [row.quantity for row in TABLE_1.values()]),
-            text_column("symbol", "symbol", [row.symbol for row in TABLE_1.values()]),
+            Column("quantity", "quantity", of=[row.quantity for row in TABLE_1.values()]),
+            Column("symbol", "symbol", of=[row.symbol for row in TABLE_1.values()]),
             _tinted("printed", "printed in Table 1", printed, arm),
             _tinted("used_here", "used here", [_with_unit(used[k], row.unit_here) for k, row in TABLE_1.items()], arm),
             _tinted("remark", "why", [remark(key, used[key]) for key in TABLE_1], arm),
@@ -115,4 +115,4 @@ def _with_unit(value: float, of: str) -> str:
 def _tinted(key: str, title: str, texts: list[str], arm: Arm) -> Column:
     used = values_of(arm)
     tint = ["#fff1de" if remark(name, used[name]) else "" for name in TABLE_1]
-    return Column(key=key, title=title, values=texts, cells=texts, tint=tint)
+    return Column(key, title, of=texts, tint=tint)

@@ -7,9 +7,9 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 import tfarm
+from tfarm.digits import plain
 from tfarm.dsp import load_chain
 from tfarm.report.bode import draw_compared
-from tfarm.report.digits import plain
 from tfarm.report.figures import save
 from tfarm.report.mode_shapes import draw_shapes, shapes_of
 from tfarm.report.overlay import draw_overlay, overlay

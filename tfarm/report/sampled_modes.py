@@ -10,12 +10,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 from numpy.typing import NDArray
 
+from tfarm.columns import Column, Table
+from tfarm.digits import SUPERSCRIPT, lined, plain, scientific, singly
 from tfarm.dsp.law import ModeTable
 from tfarm.dsp.loop import SampledLoop
 from tfarm.report.bode import hertz_axis
-from tfarm.report.digits import SUPERSCRIPT, aligned, plain, scientific
 from tfarm.report.figures import BLUE, GREY, INK, ORANGE, blank, headline, style
-from tfarm.report.tables import Column, Table, number_column, text_column
 
 Real = NDArray[np.float64]
 
@@ -106,22 +106,22 @@ def mode_rows(loop: SampledLoop, table: ModeTable, stem: str, sign: str) -> Tabl
         caption=MODE_TABLE.format(ms=plain(1e3 * T), half=plain(0.5 / T), sign=sign),
         columns=(
             _whole("mode", "mode", table.index),
-            number_column("natural_frequency_hz", "natural frequency", "Hz", hertz, aligned(hertz, 7, least=5)),
+            Column("natural_frequency_hz", "natural frequency", "Hz", of=hertz, digits=lined(7, 5)),
             _whole("band", "band", table.band),
-            number_column("seen_at_hz", "seen at", "Hz", seen, aligned(seen, 5, least=3)),
+            Column("seen_at_hz", "seen at", "Hz", of=seen, digits=lined(5, 3)),
             _small("by_damping", "own damping", table.by_damping, "ln|z| per sample"),
             _small("by_K1", "K1, first order", table.by_rate, "ln|z| per sample"),
             _small("by_K2", "K2, first order", table.by_moment, "ln|z| per sample"),
             _small("log_radius", "closed loop, exact", table.log_radius, "ln|z| per sample", tints),
-            text_column("verdict", "closed loop", grows),
+            Column("verdict", "closed loop", of=grows),
         ),
     )
 
 
 def _whole(key: str, title: str, values: NDArray[np.int64]) -> Column:
-    return Column(key=key, title=title, values=values.tolist(), cells=[str(value) for value in values.tolist()])
+    return Column(key, title, of=values)
 
 
 def _small(key: str, title: str, values: Real, group: str, tint: list[str] | None = None) -> Column:
     shown = values + 0.0
-    return number_column(key, title, "", shown, [scientific(x, 3) for x in shown], group=group, tint=tint or ())
+    return Column(key, title, of=shown, digits=singly(scientific, 3), group=group, tint=tint or ())

@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from tfarm.arm import Arm
+from tfarm.columns import Column, Table
+from tfarm.digits import plain, scientific, significant, singly
 from tfarm.dsp import Chain, sampled_verdict
 from tfarm.dsp.margins import around
 from tfarm.report.curves import resolution_words
-from tfarm.report.digits import plain, scientific, significant
 from tfarm.report.discrete_loci import STRONGER, draw_loci, loci, loci_table
 from tfarm.report.figures import Picture
 from tfarm.report.loop_laws import has_loop, sign_words, why_no_loop
@@ -33,7 +34,6 @@ from tfarm.report.sampled_words import (
 )
 from tfarm.report.sections import Section
 from tfarm.report.strip_chart import StripChart, draw_strip_chart, example_words, strip_chart, strip_table
-from tfarm.report.tables import Column, Table, number_column, text_column
 from tfarm.report.time_responses import Slews, draw_slews, seen_words, slews, slews_table, what_slews_show
 
 PAST_HUB = 1.25  # times the K1 at which sampling the hub alone would break it: how far its locus goes
@@ -92,6 +92,7 @@ def _periods_table(data: Sampled) -> Table:
     ms = np.array([1e3 * row.period for row in rows])
     half = 500.0 / ms
     settled = [row.is_settled for row in rows]
+    first = [f"{'' if row.is_settled or not any(settled) else 'first '}{row.analysis_modes}" for row in rows]
     held = "all that matter" if all(settled) else "the first so many" if not any(settled) else "where marked, the first"
     return Table(
         stem="sampled-periods",
@@ -102,17 +103,13 @@ def _periods_table(data: Sampled) -> Table:
             "negative is stable. Where the gains are not stable, the intervals are those that would be. "
             f"{SHORT_SIGN}"
         ),
+        record=rows,
         columns=(
-            number_column("period_ms", "period", "ms", ms, [plain(x) for x in ms]),
-            number_column("half_rate_hz", "aliased above", "Hz", half, [plain(x) for x in half]),
-            text_column("verdict", "verdict", ["stable" if row.log_radius < 0 else "unstable" for row in rows]),
-            number_column("growth_1_s", "growth", "1/s", growth, [scientific(x, 3) for x in growth]),
-            Column(
-                key="modes",
-                title="modes",
-                values=[row.analysis_modes for row in rows],
-                cells=[f"{'' if row.is_settled or not any(settled) else 'first '}{row.analysis_modes}" for row in rows],
-            ),
+            Column("period_ms", "period", "ms", of=ms, digits=singly(plain)),
+            Column("half_rate_hz", "aliased above", "Hz", of=half, digits=singly(plain)),
+            Column("verdict", "verdict", of=lambda row: "stable" if row.log_radius < 0 else "unstable"),
+            Column("growth_1_s", "growth", "1/s", of=growth, digits=singly(scientific, 3)),
+            Column("modes", "modes", of="analysis_modes", digits=first),
             _window_column("stable_K1", "stable K1", "N m s/rad", [(row.K1, row.gains.K1) for row in rows]),
             _window_column("stable_K2", "stable K2", "", [(row.K2, row.gains.K2) for row in rows]),
         ),
@@ -124,7 +121,7 @@ def _window_column(key: str, title: str, unit: str, rows: list[tuple[tuple[Windo
     here = [around(list(windows), gain) for windows, gain in rows]
     every = [tuple(end for window in windows for end in window) for windows, _ in rows]
     values = [window or others for window, others in zip(here, every, strict=True)]
-    return Column(key=key, title=title, unit=unit, values=values, cells=[spans(*row) for row in rows])
+    return Column(key, title, unit, of=values, digits=[spans(*row) for row in rows])
 
 
 def _mode_blocks(data: Sampled) -> list[Picture | Table]:

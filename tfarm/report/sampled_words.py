@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from tfarm.arm import Arm, HubFeedback
+from tfarm.digits import plain, scientific, significant
 from tfarm.dsp import Analysis, Verdict, analyse, sampled_verdict, stable_windows
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.margins import around
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import Windows, gain_windows
 from tfarm.records import record
-from tfarm.report.digits import plain, scientific, significant
 from tfarm.report.overlay import Overlay, overlay
 from tfarm.report.sections import Fact
 from tfarm.spectrum.scales import default_gains, default_words

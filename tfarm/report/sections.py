@@ -6,8 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from markupsafe import Markup
+
+from tfarm.columns import Table
 from tfarm.report.figures import FORMATS, Picture, save
-from tfarm.report.tables import Table
+from tfarm.tables.files import save as save_table
+from tfarm.tables.html import as_html
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,7 +47,7 @@ class Block:
     stem: str
     title: str
     caption: str
-    table: Table | None = None
+    table: Markup | None = None
     alt: str = ""
     size: tuple[int, int] = (0, 0)
     files: tuple[str, ...] = ()
@@ -73,17 +77,10 @@ def save_section(section: Section, folder: Path) -> SavedSection:
 
 def _save(block: Picture | Table, folder: Path) -> Block:
     if isinstance(block, Table):
-        files = save_table(block, folder)
-        return Block(stem=block.stem, title=block.title, caption=block.caption, table=block, files=files)
+        table, files = as_html(block), save_table(block, folder)
+        return Block(stem=block.stem, title=block.title, caption=block.caption, table=table, files=files)
     save(block.figure, folder, block.stem)
     files = tuple(f"{block.stem}.{kind}" for kind in FORMATS)
     if block.data is not None:
         files += save_table(block.data, folder)
     return Block(stem=block.stem, title=block.title, caption=block.caption, alt=block.alt, size=block.size, files=files)
-
-
-def save_table(table: Table, folder: Path) -> tuple[str, ...]:
-    """The table's two files."""
-    (folder / f"{table.stem}.csv").write_text(table.as_csv(), encoding="utf-8", newline="")
-    (folder / f"{table.stem}.json").write_text(table.as_json(), encoding="utf-8", newline="")
-    return f"{table.stem}.csv", f"{table.stem}.json"

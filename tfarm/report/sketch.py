@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyArrowPatch, Polygon, Rectangle
 
 from tfarm.arm import Arm
-from tfarm.report.digits import plain, unit
+from tfarm.digits import plain, unit
 from tfarm.report.figures import BLUE, FAINT, GREY, INK, ORANGE, blank, style
 
 HUB = 0.055  # radius of the drawn hub, and half the payload's side, as shares of the length

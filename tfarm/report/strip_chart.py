@@ -11,13 +11,13 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback
+from tfarm.columns import Column, Table
+from tfarm.digits import plain, significant
 from tfarm.dsp import Measurement, Simulation, Simulator, scenario
 from tfarm.dsp.chain import Chain
 from tfarm.records import record
 from tfarm.report.curves import Curve, continuous, held, resolved, root_moment
-from tfarm.report.digits import plain, significant
 from tfarm.report.figures import BLUE, FAINT, GREEN, GREY, INK, ORANGE, blank, headline, style
-from tfarm.report.tables import Table, data_column
 
 Real = NDArray[np.float64]
 
@@ -228,10 +228,10 @@ def strip_table(data: StripChart, stem: str) -> Table:
     """The curve of the moment as it is drawn, and what is held from sample to sample at its times."""
     s, drawn = data.simulation, root_moment(data.simulation)
     columns = (
-        data_column("t_s", "time", "s", drawn.t),
+        Column("t_s", "time", "s", of=drawn.t),
         *drawn.columns("root_moment", "root moment", "N m"),
-        data_column("read_moment_N_m", "as the ADC reads it", "N m", held(s, data.read, drawn.t)),
-        data_column("torque_asked_N_m", "torque asked", "N m", held(s, data.asked, drawn.t)),
-        data_column("torque_given_N_m", "torque given, after the delay", "N m", held(s, s.torque, drawn.t)),
+        Column("read_moment_N_m", "as the ADC reads it", "N m", of=held(s, data.read, drawn.t)),
+        Column("torque_asked_N_m", "torque asked", "N m", of=held(s, data.asked, drawn.t)),
+        Column("torque_given_N_m", "torque given, after the delay", "N m", of=held(s, s.torque, drawn.t)),
     )
     return Table(stem=stem, title="Strip chart", caption="", is_data=True, columns=columns)

@@ -12,15 +12,15 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback
+from tfarm.columns import Column, Table
+from tfarm.digits import plain, significant
 from tfarm.dsp import Simulation, Simulator, scenario
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.results import residual_moment_rms, settling_time
 from tfarm.records import record
 from tfarm.report import curves
 from tfarm.report.curves import resolved
-from tfarm.report.digits import plain, significant
 from tfarm.report.figures import BLUE, GREY, INK, ORANGE, blank, headline, style
-from tfarm.report.tables import Column, Table, data_column
 
 Real = NDArray[np.float64]
 
@@ -178,14 +178,14 @@ def responses_table(stem: str, title: str, arm: Arm, each: Mapping[str, Simulati
     task = found[0][3].scenario
     rigid = curves.held(found[0][3], np.r_[task.rigid_moment[1:], task.rigid_moment[-1:]], t)
     columns: list[Column] = [
-        data_column("t_s", "time", "s", t),
-        data_column("rigid_moment_N_m", "rigid arm", "N m", rigid),
+        Column("t_s", "time", "s", of=t),
+        Column("rigid_moment_N_m", "rigid arm", "N m", of=rigid),
     ]
     for key, moment, tip, run in found:
         columns += moment.at(t).columns(f"root_moment_{key}", "root moment", "N m")
         columns += curves.tip(run).at(t).columns(f"tip_{key}", "tip", "m")
         columns += tip.at(t).columns(f"tip_error_{key}", "tip less reference", "m")
-        columns.append(data_column(f"torque_{key}_N_m", "torque", "N m", curves.held(run, run.torque, t)))
+        columns.append(Column(f"torque_{key}_N_m", "torque", "N m", of=curves.held(run, run.torque, t)))
         if run.gain is not None and np.ptp(run.gain):
-            columns.append(data_column(f"K_{key}", "gain", "", curves.held(run, run.gain, t)))
+            columns.append(Column(f"K_{key}", "gain", of=curves.held(run, run.gain, t)))
     return Table(stem=stem, title=title, caption="", is_data=True, columns=tuple(columns))

@@ -17,13 +17,14 @@ import tfarm
 from tfarm import audit
 from tfarm.arm import load, presets
 from tfarm.audit import published
-from tfarm.report.digits import scientific, significant
+from tfarm.columns import Column, Table
+from tfarm.digits import scientific, significant, singly, worded
 from tfarm.report.page import command_for_all, render
-from tfarm.report.sections import Fact, Section, save_section, save_table
-from tfarm.report.tables import Column, Table, text_column
+from tfarm.report.sections import Fact, Section, save_section
 from tfarm.report.trust_audit import VERDICTS, audit_table, counts, shown
 from tfarm.report.trust_proofs import DIGITS, POINTS, Proof, hash_of
-from tfarm.report.trust_tables import accuracy_table, boxes_tables, counts_table, digits_table, numbers
+from tfarm.report.trust_tables import accuracy_table, boxes_tables, counts_table, digits_table
+from tfarm.tables.files import save as save_table
 
 FOLDER = "trust"
 PACKAGES = ("numpy", "scipy", "numba", "mpmath", "python-flint", "sympy", "control", "matplotlib", "latex2mathml")
@@ -135,12 +136,13 @@ def sources_table(rows: Sequence[published.Row]) -> Table:
         stem="sources",
         title="Sources",
         caption="Few of the originals lay open on the desk; the last column says how each table was read.",
+        record=sources,
         columns=(
-            text_column("source", "source", [source.key for source in sources]),
-            numbers("numbers", "numbers", [len(each) for each in of]),
-            numbers("agree", "agree", [sum(row.agrees for row in each) for each in of]),
-            text_column("citation", "where it was printed", [source.citation for source in sources]),
-            text_column("reached", "how it was read", [source.reached for source in sources]),
+            Column("source", "source", of="key"),
+            Column("numbers", "numbers", of=[len(each) for each in of]),
+            Column("agree", "agree", of=[sum(row.agrees for row in each) for each in of]),
+            Column("citation", "where it was printed"),
+            Column("reached", "how it was read"),
         ),
     )
 
@@ -157,49 +159,43 @@ def differences_table(rows: Sequence[published.Row]) -> Table:
         title="Where ours differs, and why",
         caption="Largest difference: ours over printed, less one, of the modes named. All other numbers agree.",
         columns=(
-            text_column("source", "source", [source for source, _, _ in groups]),
-            _lettered("case", "case", [case for _, case, _ in groups]),
-            text_column("modes", "modes", [", ".join(str(row.mode) for row in each) for each in groups.values()]),
-            Column(
-                key="largest_difference",
-                title="largest difference",
-                values=worst,
-                cells=[significant(difference, 2) for difference in worst],
-            ),
-            text_column("why", "why", [why for _, _, why in groups]),
+            Column("source", "source", of=[source for source, _, _ in groups]),
+            Column("case", "case", of=[case for _, case, _ in groups], digits=worded(_lettered)),
+            Column("modes", "modes", of=[", ".join(str(row.mode) for row in each) for each in groups.values()]),
+            Column("largest_difference", "largest difference", of=worst, digits=singly(significant, 2)),
+            Column("why", "why", of=[why for _, _, why in groups]),
         ),
     )
 
 
 def published_table(rows: Sequence[published.Row]) -> Table:
     """Every printed number beside ours."""
-    printed, agrees = [row.printed for row in rows], ["yes" if row.agrees else "no" for row in rows]
     return Table(
         stem="published",
         title="All printed numbers, and ours",
         caption="✓ agrees to the last printed digit, ≠ differs, for the reason given above. Difference: ours over "
         "printed, less one.",
+        record=list(rows),
         columns=(
-            text_column("source", "source", [row.source for row in rows]),
-            _lettered("case", "case", [row.case for row in rows]),
-            _lettered("quantity", "quantity", [row.quantity for row in rows]),
-            numbers("mode", "mode", [row.mode for row in rows]),
-            Column(key="agrees", title="", values=agrees, cells=["✓" if row.agrees else "≠" for row in rows]),
-            Column(key="printed", title="printed", values=printed, cells=printed),
-            _measured("ours", "ours", [row.ours for row in rows], 11),
-            _measured("difference", "difference", [row.difference for row in rows], 2),
+            Column("source", "source"),
+            Column("case", "case", digits=worded(_lettered)),
+            Column("quantity", "quantity", digits=worded(_lettered)),
+            Column("mode", "mode"),
+            Column(
+                "agrees",
+                of=lambda row: "yes" if row.agrees else "no",
+                digits=worded({"yes": "✓", "no": "≠"}.__getitem__),
+            ),
+            Column("printed", "printed"),
+            Column("ours", "ours", digits=singly(significant, 11)),
+            Column("difference", "difference", digits=singly(significant, 2)),
         ),
     )
 
 
-def _lettered(key: str, title: str, texts: Sequence[str]) -> Column:
-    """Words with formulas in plain letters, on the page with Greek ones."""
-    cells = [text.replace("rhoA", "ρA").replace("w^2", "ω^2").replace("w L", "ω L") for text in texts]
-    return Column(key=key, title=title, values=texts, cells=cells)
-
-
-def _measured(key: str, title: str, values: Sequence[float], digits: int) -> Column:
-    return Column(key=key, title=title, values=values, cells=[significant(value, digits) for value in values])
+def _lettered(text: str) -> str:
+    """Words with formulas in plain letters, with Greek ones."""
+    return text.replace("rhoA", "ρA").replace("w^2", "ω^2").replace("w L", "ω L")
 
 
 def _published_facts(rows: Sequence[published.Row]) -> tuple[Fact, ...]:
@@ -224,9 +220,9 @@ def inputs_table(proofs: Sequence[Proof]) -> Table:
         title="Inputs",
         caption="SHA-256 of each arm's file, arm.toml in its folder: all that its page depends on.",
         columns=(
-            text_column("arm", "arm", names),
-            text_column("is", "where from", ["comes with tfarm" if _is_preset(p) else "a file" for p in proofs]),
-            text_column("sha256", "SHA-256 of arm.toml", hashes),
+            Column("arm", "arm", of=names),
+            Column("is", "where from", of=["comes with tfarm" if _is_preset(p) else "a file" for p in proofs]),
+            Column("sha256", "SHA-256 of arm.toml", of=hashes),
         ),
     )
 
@@ -240,8 +236,8 @@ def versions_table() -> Table:
         title="Versions",
         caption="With these versions, on one machine, two runs give the same bytes: no dates, no timings, fixed seeds.",
         columns=(
-            text_column("package", "package", list(found)),
-            text_column("version", "version", list(found.values())),
+            Column("package", "package", of=list(found)),
+            Column("version", "version", of=list(found.values())),
         ),
     )
 

@@ -11,8 +11,8 @@ from markupsafe import Markup, escape
 
 from tfarm.audit import Row
 from tfarm.audit.rows import is_zero
-from tfarm.report.digits import unit
-from tfarm.report.tables import Table, text_column
+from tfarm.columns import Column, Table
+from tfarm.digits import unit
 from tfarm.report.trust_math import compared, formulas, lines, width
 
 VERDICTS = {"ok": ("✓", "right as printed"), "corrected": ("≠", "corrected"), "undecided": ("?", "undecided")}
@@ -88,7 +88,7 @@ def counts(rows: Sequence[Row]) -> dict[str, int]:
 def audit_table(rows: Sequence[Row]) -> Table:
     """Every row in plain text, for the files."""
     names = ("equation", "verdict", "printed", "corrected", "residual_printed", "residual_corrected", "evidence")
-    columns = tuple(text_column(name, name, [getattr(row, name) for row in rows]) for name in names)
+    columns = tuple(Column(name, name, of=[getattr(row, name) for row in rows]) for name in names)
     return Table(stem="audit", title="The paper, equation by equation", caption="", is_data=True, columns=columns)
 
 

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
-from tfarm.report.digits import scientific, significant
+from tfarm.columns import Column, Table
+from tfarm.digits import scientific, significant, singly, worded
 from tfarm.report.loop_laws import typeset
-from tfarm.report.tables import Column, Table, number_column, text_column
 from tfarm.report.trust_proofs import BOX_DIGITS, DIGITS, MODES, OUTPUTS, Proof, digits_of
 
 UNPROVEN = "not proven"
@@ -30,12 +28,11 @@ BOXES_CAPTION = (
 
 def digits_table(proofs: Sequence[Proof]) -> Table:
     """A row a mode, a column an arm: every digit that is proven."""
-    numbers = list(range(1, MODES + 1))
-    columns = [Column(key="mode", title="mode", values=numbers, cells=[str(number) for number in numbers])]
+    dotted = worded(lambda text: f"{text}…" if text else UNPROVEN)
+    columns = [Column("mode", "mode", of=range(1, MODES + 1))]
     for proof in proofs:
         digits = [digits_of(bracket, proof.digits) for bracket in proof.brackets] or [""] * MODES
-        cells = [f"{text}…" if text else UNPROVEN for text in digits]
-        columns.append(Column(key=f"{proof.name}_rad_s", title=proof.name, unit="rad/s", values=digits, cells=cells))
+        columns.append(Column(f"{proof.name}_rad_s", proof.name, "rad/s", of=digits, digits=dotted))
     return Table(
         stem="digits", title=f"Natural frequencies, {DIGITS} digits", caption=DIGITS_CAPTION, columns=tuple(columns)
     )
@@ -47,19 +44,14 @@ def counts_table(proofs: Sequence[Proof]) -> Table:
         stem="counts",
         title="None missing",
         caption=COUNTS_CAPTION,
+        record=list(proofs),
         columns=(
-            text_column("arm", "arm", [proof.name for proof in proofs]),
-            numbers("rigid_body", "rigid body", [int(proof.has_rigid_mode) for proof in proofs]),
-            numbers("enclosed", "flexible modes enclosed", [len(proof.brackets) for proof in proofs]),
-            numbers("count", "counted", [proof.count for proof in proofs]),
-            Column(
-                key="below_rad_s",
-                title="below",
-                unit="rad/s",
-                values=[proof.below for proof in proofs],
-                cells=[significant(float(proof.below), 9) if proof.below else "" for proof in proofs],
-            ),
-            text_column("verdict", "verdict", [_verdict(proof) for proof in proofs]),
+            Column("arm", "arm", of="name"),
+            Column("rigid_body", "rigid body", of=lambda proof: int(proof.has_rigid_mode)),
+            Column("enclosed", "flexible modes enclosed", of=lambda proof: len(proof.brackets)),
+            Column("count", "counted"),
+            Column("below_rad_s", "below", "rad/s", of="below", digits=worded(_nine_digits)),
+            Column("verdict", "verdict", of=_verdict),
         ),
     )
 
@@ -69,24 +61,19 @@ def boxes_tables(proofs: Sequence[Proof]) -> tuple[Table, ...]:
     rows = [(proof.name, each) for proof in proofs for each in proof.boxes]
     if not rows:
         return ()
+    four = singly(significant, 4)
     edges = ((0, "re_min", "Re s from"), (1, "re_max", "Re s to"), (3, "im_max", "|Im s| below"))
-    limits = [
-        number_column(key, title, "1/s", values, [significant(float(value), 4) for value in values])
-        for which, key, title in edges
-        for values in [np.array([each.box[which] for _, each in rows])]
-    ]
-    verdicts = [each.failure or "complete, proven" for _, each in rows]
-    named = [each.what for _, each in rows]
     table = Table(
         stem="boxes",
         title="Damped modes and closed-loop poles",
         caption=BOXES_CAPTION,
+        record=[each for _, each in rows],
         columns=(
-            text_column("arm", "arm", [name for name, _ in rows]),
-            Column(key="what", title="of", values=named, cells=[typeset(each) for each in named]),
-            numbers("count", "counted", [each.count for _, each in rows]),
-            *limits,
-            text_column("verdict", "verdict", verdicts),
+            Column("arm", "arm", of=[name for name, _ in rows]),
+            Column("what", "of", digits=worded(typeset)),
+            Column("count", "counted"),
+            *(Column(key, title, "1/s", of=[each.box[i] for _, each in rows], digits=four) for i, key, title in edges),
+            Column("verdict", "verdict", of=lambda each: each.failure or "complete, proven"),
         ),
     )
     return (table,)
@@ -96,24 +83,21 @@ def _verdict(proof: Proof) -> str:
     return f"{UNPROVEN}: {proof.failure}" if proof.failure else "complete, proven"
 
 
-def numbers(key: str, title: str, values: Sequence[int]) -> Column:
-    """A column of whole numbers."""
-    return Column(key=key, title=title, values=values, cells=[str(value) for value in values])
+def _nine_digits(below: str) -> str:
+    return significant(float(below), 9) if below else ""
 
 
 def accuracy_table(proofs: Sequence[Proof]) -> Table:
     """The worst error of each arm's two responses."""
     columns = [
-        text_column("arm", "arm", [proof.name for proof in proofs]),
-        text_column(
-            "band_rad_s", "from … to, rad/s", [" … ".join(significant(x, 4) for x in proof.band) for proof in proofs]
-        ),
+        Column("arm", "arm", of=[proof.name for proof in proofs]),
+        Column("band_rad_s", "from … to, rad/s", of=[" … ".join(significant(x, 4) for x in p.band) for p in proofs]),
     ]
     for output in OUTPUTS:
         errors = [dict(proof.errors).get(output) for proof in proofs]
         cells = ["zero throughout" if error is None else scientific(error, 2) for error in errors]
         values = ["" if error is None else error for error in errors]
-        columns.append(Column(key=output, title=output.replace("_", " "), values=values, cells=cells))
+        columns.append(Column(output, output.replace("_", " "), of=values, digits=cells))
     caption = "Worst error of double precision over those frequencies, counted as said above."
     return Table(
         stem="accuracy", title="Double precision against proven digits", caption=caption, columns=tuple(columns)

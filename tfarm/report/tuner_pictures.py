@@ -11,8 +11,8 @@ from matplotlib.ticker import NullLocator
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm
+from tfarm.digits import plain, significant
 from tfarm.dsp import Simulation
-from tfarm.report.digits import plain, significant
 from tfarm.report.figures import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, blank, headline, style
 from tfarm.report.overlay import Overlay, regions
 from tfarm.report.time_responses import motor_torque, root_moment, tip_error

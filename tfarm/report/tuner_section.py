@@ -7,16 +7,16 @@ import math
 import numpy as np
 
 from tfarm.arm import Arm, HubFeedback
+from tfarm.columns import Column, Table
+from tfarm.digits import lined, plain, significant, worded
 from tfarm.dsp import Chain
 from tfarm.errors import CertificationError
 from tfarm.report.curves import resolution_words
-from tfarm.report.digits import aligned, plain, significant
 from tfarm.report.figures import Picture
 from tfarm.report.loop_laws import has_loop, sign_words, why_no_loop
 from tfarm.report.overlay import overlay
 from tfarm.report.sampled_words import SHORT_SIGN, typeset
 from tfarm.report.sections import Section
-from tfarm.report.tables import Column, Table, data_column, number_column, text_column
 from tfarm.report.time_responses import clipped_words, responses_table
 from tfarm.report.tuner_pictures import draw_cost_map, draw_curves, draw_gain, draw_response
 from tfarm.report.tuner_study import COARSE, MAP_SEEDS, MAP_TRIALS, NOMINAL, SEEDS, TunerStudy, tuner_study
@@ -110,9 +110,9 @@ def _gain_picture(data: TunerStudy) -> Picture:
             caption="",
             is_data=True,
             columns=(
-                data_column("t_s", "time", "s", tuning.training.result.t),
-                data_column("K", "gain", "", K),
-                data_column("x_N_m", "root moment less the rigid arm's", "N m", tuning.training.result.x),
+                Column("t_s", "time", "s", of=tuning.training.result.t),
+                Column("K", "gain", of=K),
+                Column("x_N_m", "root moment less the rigid arm's", "N m", of=tuning.training.result.x),
             ),
         ),
     )
@@ -181,11 +181,11 @@ def _curves_picture(data: TunerStudy) -> Picture:
     columns: list[Column] = []
     for curves in data.curves:
         for name, share in (("lower_quartile", 0.25), ("median", 0.5), ("upper_quartile", 0.75)):
-            columns.append(data_column(f"{curves.key}_{name}", name, "", curves.quantile(share)))
+            columns.append(Column(f"{curves.key}_{name}", name, of=curves.quantile(share)))
         for seed, costs in enumerate(curves.costs):
-            columns.append(data_column(f"{curves.key}_seed_{seed}", f"seed {seed}", "", costs))
+            columns.append(Column(f"{curves.key}_seed_{seed}", f"seed {seed}", of=costs))
     trials = np.arange(1, data.curves[0].costs.shape[1] + 1)
-    first = Column(key="trial", title="trial", values=trials.tolist(), cells=())
+    first = Column("trial", "trial", of=trials)
     return Picture(
         stem="tune-curves",
         title="Learning",
@@ -207,9 +207,9 @@ def _map_picture(data: TunerStudy) -> Picture:
     alpha, eta = (each.ravel() for each in np.meshgrid(found.alphas, found.etas, indexing="ij"))
     edge = "The lowest is at the edge of this map: larger steps may go lower still." if found.best_at_edge else ""
     columns = (
-        data_column("alpha_c", "momentum", "", alpha),
-        data_column("eta_c", "learning rate", "", eta),
-        data_column("median_cost", "median final cost", "", found.median.ravel()),
+        Column("alpha_c", "momentum", of=alpha),
+        Column("eta_c", "learning rate", of=eta),
+        Column("median_cost", "median final cost", of=found.median.ravel()),
     )
     return Picture(
         stem="tune-map",
@@ -237,7 +237,6 @@ CONTROLLERS = {
 
 def comparison_table(data: TunerStudy) -> Table:
     """Cost of a slew, a row a condition, a column a controller, and whether the guard is proven there too."""
-    proven = ["yes" if row.proven else "no" for row in data.rows]
     away_from_it = "; ∞ where the loop ran away" if any(math.isinf(row.tuner.cost) for row in data.rows) else ""
     return Table(
         stem="tune-comparison",
@@ -252,7 +251,11 @@ def comparison_table(data: TunerStudy) -> Table:
             f"whether the same range of gains is proven for that arm and chain too, with the trial's "
             f"{data.tuning.trial.loop.plant.count} modes{away_from_it}.{_unit_words(data)} {SHORT_SIGN}"
         ),
-        columns=(*_of_each(data, "cost", 4), text_column("guard_proven", "guard proven", proven)),
+        record=data.rows,
+        columns=(
+            *_of_each("cost", 4),
+            Column("guard_proven", "guard proven", of=lambda row: "yes" if row.proven else "no"),
+        ),
     )
 
 
@@ -262,19 +265,18 @@ def residual_table(data: TunerStudy) -> Table:
         stem="tune-residual",
         title="Root moment left after the slew",
         caption="Root mean square of the root moment less the rigid arm's, from the end of the slew on, in N m.",
-        columns=_of_each(data, "residual", 3),
+        record=data.rows,
+        columns=_of_each("residual", 3),
     )
 
 
-def _of_each(data: TunerStudy, name: str, digits: int) -> tuple[Column, ...]:
+def _of_each(name: str, digits: int) -> tuple[Column, ...]:
     """The condition, then one number of every controller."""
-    names = [row.condition for row in data.rows]
-    cells = [typeset(name).replace(" -", " −") for name in names]
-    columns = [Column(key="condition", title="condition", values=names, cells=cells)]
-    for key, title in CONTROLLERS.items():
-        values = np.array([getattr(getattr(row, key), name) for row in data.rows])
-        columns.append(number_column(f"{key}_{name}", title, "", values, aligned(values, digits, least=2)))
-    return tuple(columns)
+    cells = lined(digits, 2)
+    return (
+        Column("condition", "condition", digits=worded(lambda text: typeset(text).replace(" -", " −"))),
+        *(Column(f"{key}_{name}", title, of=f"{key}.{name}", digits=cells) for key, title in CONTROLLERS.items()),
+    )
 
 
 def _unit_words(data: TunerStudy) -> str:

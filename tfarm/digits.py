@@ -4,12 +4,38 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from typing import Any
 
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 SMALLEST, LARGEST = 1e-3, 1e7  # outside, powers of ten read better
 SPARE = 2  # digits beyond its own that the largest number of a column may have for the sake of the smallest
 MOST_DECIMALS = 7
+Digits = Callable[[Sequence[Any]], Sequence[str]]  # the values of a column to its cells
+
+
+def singly(how: Callable[..., str], *digits: int) -> Digits:
+    """Cells one by one: `how(value, *digits)` of each number; words stay as they are."""
+    return lambda values: [value if isinstance(value, str) else how(value, *digits) for value in values]
+
+
+def lined(digits: int, least: int) -> Digits:
+    """Cells with one number of decimals, as `aligned` has them."""
+    return partial(aligned, digits=digits, least=least)
+
+
+def worded(how: Callable[[str], str]) -> Digits:
+    """Cells of texts, such as formulas in plain letters that a page sets in Greek ones."""
+    return lambda values: [how(value) for value in values]
+
+
+TEXTS = singly(str)  # words and whole numbers as they are
+
+
+def general(x: float, digits: int) -> str:
+    """`x` as a terminal shows it, in at most so many significant digits: 71.5057, 1.8e-09, inf."""
+    return f"{x:.{digits}g}"
 
 
 def significant(x: float, digits: int) -> str:
@@ -56,6 +82,14 @@ def fixed(values: Iterable[float], decimals: int) -> tuple[str, ...]:
 def held(values: Iterable[float], digits: int) -> list[float]:
     """Numbers as a file has them whose last digits depend on the processor: rounded to so many significant digits."""
     return [float(f"{value:.{digits - 1}e}") for value in values]
+
+
+def within(value: float, error: float, most: int) -> str:
+    """A number in the digits that an absolute error leaves, at most so many; where it leaves none, 0 and the error."""
+    if value == 0:
+        return "0"
+    digits = math.floor(math.log10(abs(value) / error))
+    return general(value, min(digits, most)) if digits > 0 else f"0 (+-{error:.0e})"
 
 
 def scientific(x: float, digits: int) -> str:

@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from tfarm.report.digits import aligned, fixed, plain, scientific, significant, unit
+from tfarm.digits import aligned, fixed, plain, scientific, significant, unit
 
 
 @pytest.mark.parametrize(

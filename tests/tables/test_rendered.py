@@ -1,0 +1,147 @@
+"""Tables read back by the standard library's own readers: csv, json, html.parser."""
+
+import csv
+import io
+import json
+import math
+from dataclasses import dataclass, field
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from tfarm.columns import ANSWER, FILES, PAGE, REPORT, Column, Table
+from tfarm.digits import lined, significant, singly, worded
+from tfarm.errors import MISSING
+from tfarm.tables.files import as_csv, as_json, save, to_json
+from tfarm.tables.html import as_html
+
+
+@dataclass
+class Found:
+    """A record of arrays, as a spectrum is."""
+
+    omega: np.ndarray = field(default_factory=lambda: np.array([71.50568246689, 1e-9, math.inf]))
+    index: np.ndarray = field(default_factory=lambda: np.array([1, 2, 3]))
+    words: tuple = ("<b> & 'c'", 'a, "quoted" line\nand another', "I_h in m^2")
+
+
+COLUMNS = (
+    Column("index", "mode"),
+    Column("omega_rad_s", "frequency", "rad/s", of="omega", digits=singly(significant, 5), group="both"),
+    Column("frequency_hz", "", "Hz", of=lambda found: found.omega / (2 * math.pi), digits=lined(5, 3), group="both"),
+    Column("words", "what & why", tint=("", "#fff", "")),
+    Column("nodes_m", "nodes", "m", of=[(0.1, 0.25), (), (1e-300,)], digits=["0.1, 0.25", "none", "1e-300"]),
+)
+
+
+@pytest.fixture
+def table():
+    return Table(columns=COLUMNS, record=Found(), stem="found", title="What is <found>")
+
+
+class Parsed(HTMLParser):
+    """The cells of a page's table, row by row, with the attributes of each."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.rows, self.attributes, self.inside = [], [], False
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag, attributes):
+        if tag == "tr":
+            self.rows.append([])
+            self.attributes.append([])
+        if tag in ("th", "td"):
+            self.rows[-1].append("")
+            self.attributes[-1].append(dict(attributes))
+            self.inside = True
+
+    def handle_endtag(self, tag):
+        self.inside = self.inside and tag not in ("th", "td")
+
+    def handle_data(self, data):
+        if self.inside:
+            self.rows[-1][-1] += data
+
+
+def test_csv_has_every_digit(table):
+    head, *rows = csv.reader(io.StringIO(as_csv(table)))
+    assert head == [column.key for column in COLUMNS]
+    record = Found()
+    assert [float(row[1]) for row in rows] == record.omega.tolist()
+    assert [float(row[2]) for row in rows] == (record.omega / (2 * math.pi)).tolist()
+    assert [row[3] for row in rows] == list(record.words)
+    assert [tuple(map(float, row[4].split())) for row in rows] == [(0.1, 0.25), (), (1e-300,)]
+
+
+def test_units_stand_behind_the_keys_of_a_command_s_file(table):
+    assert next(csv.reader(io.StringIO(as_csv(table, units=True))))[:2] == ["index", "omega_rad_s [rad/s]"]
+
+
+def test_json_has_the_numbers_and_their_units(table):
+    found = json.loads(as_json(table))
+    assert found["table"] == "What is <found>"
+    assert found["units"] == {column.key: column.unit for column in COLUMNS if column.unit}
+    omega = Found().omega.tolist()
+    assert [row["omega_rad_s"] for row in found["rows"]] == [*omega[:2], "inf"]
+    assert [row["nodes_m"] for row in found["rows"]] == [[0.1, 0.25], [], [1e-300]]
+    assert found["rows"] == json.loads(to_json({"rows": table}))["rows"]
+
+
+def test_the_page_has_the_cells_of_the_files_rounded(table):
+    page = Parsed(as_html(table))
+    groups, heads, *rows = page.rows
+    assert groups == ["", "both", ""]
+    assert [int(group["colspan"]) for group in page.attributes[0]] == [1, 2, 2]
+    assert heads == ["mode", "frequencyrad/s", "Hz", "what & why", "nodesm"]
+    assert [row[1] for row in rows] == ["71.506", "1.0000 × 10⁻⁹", "∞"]
+    assert [row[3] for row in rows] == [*Found().words[:2], "Ih in m²"]
+    assert [cell[3].get("style") for cell in page.attributes[2:]] == [None, "background:#fff", None]
+    assert "text" in page.attributes[2][3]["class"]
+    assert "text" not in page.attributes[2][1]["class"]
+
+
+def test_one_line_more_is_a_column_more_everywhere():
+    double = Column("double_rad_s", "twice", "rad/s", of=lambda found: 2 * found.omega, digits=singly(significant, 3))
+    more = Table(columns=(*COLUMNS, double), record=Found())
+    assert next(csv.reader(io.StringIO(as_csv(more))))[-1] == "double_rad_s"
+    assert json.loads(as_json(more))["rows"][0]["double_rad_s"] == 2 * Found().omega[0]
+    assert json.loads(to_json({"found": more}))["found"][0]["double_rad_s"] == 2 * Found().omega[0]
+    assert [row[-1] for row in Parsed(as_html(more)).rows] == ["", "twicerad/s", "143", "2.00 × 10⁻⁹", "∞"]
+
+
+def test_a_column_may_be_for_some_outputs_only():
+    columns = (Column("a", of=[1]), Column("b", of=[2], on=ANSWER), Column("c", of=[3], on=REPORT))
+    table = Table(columns=columns)
+    assert list(table) == [{"a": 1, "b": 2}]
+    assert json.loads(as_json(table))["rows"] == [{"a": 1, "c": 3}]
+    assert [column.key for column in table.on(FILES)] == [column.key for column in table.on(PAGE)] == ["a", "c"]
+
+
+def test_a_list_of_records_is_asked_one_by_one():
+    rows = [{"x": 1.5, "y": "a"}, {"x": 2.5, "y": "b"}]
+    columns = (Column("x", of=lambda row: row["x"]), Column("y", of=lambda row: row["y"], digits=worded(str.upper)))
+    table = Table(columns=columns, record=rows)
+    assert list(table) == rows
+    assert list(table.columns[1].cells) == ["A", "B"]
+
+
+def test_what_a_row_has_no_value_for_is_left_out_of_it():
+    table = Table(columns=(Column("a", of=[1, 2]), Column("b", of=[MISSING, None])))
+    assert list(table) == [{"a": 1}, {"a": 2, "b": None}]
+
+
+def test_no_nan_is_written(table):
+    columns = (Column("x", of=np.array([math.nan])),)
+    with pytest.raises(ValueError, match="Out of range"):
+        as_json(Table(columns=columns))
+    with pytest.raises(ValueError, match="Out of range"):
+        to_json(Table(columns=columns))
+
+
+def test_a_report_s_table_has_two_files(table, tmp_path):
+    assert save(table, tmp_path) == ("found.csv", "found.json")
+    assert (tmp_path / "found.csv").read_text(encoding="utf-8") == as_csv(table)
+    assert (tmp_path / "found.json").read_bytes().decode() == as_json(table)

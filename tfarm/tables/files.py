@@ -1,0 +1,73 @@
+"""JSON and CSV: every digit of a double, infinities as "inf" and "-inf"; NaN does not occur."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+from tfarm.columns import FILES, Table
+from tfarm.files import write_file
+
+
+def to_json(answer: Any) -> str:
+    """One JSON object in ASCII, which every pipe takes; a table in it is a list of its rows.  NaN raises ValueError."""
+    return json.dumps(plain(answer), allow_nan=False)
+
+
+def plain(value: Any) -> Any:
+    """A value as JSON has it: a table as its rows, a tuple as a list, an infinity as a text."""
+    if isinstance(value, float):
+        return float(value) if not math.isinf(value) else "inf" if value > 0 else "-inf"
+    if isinstance(value, dict):
+        return {key: plain(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple | Table):
+        return [plain(entry) for entry in value]
+    return value
+
+
+def as_json(table: Table) -> str:
+    """{"table", "units", "rows": [{key: value}, ...]}, a line a row."""
+    columns = table.on(FILES)
+    rows = zip(*(plain(column.values) for column in columns), strict=True)
+    texts = (_dumped({column.key: value for column, value in zip(columns, row, strict=True)}) for row in rows)
+    lines = ",\n  ".join(texts)
+    head = _dumped({"table": table.title, "units": {column.key: column.unit for column in columns if column.unit}})
+    return f'{head[:-1]}, "rows": [\n  {lines}\n]}}\n'
+
+
+def _dumped(entries: dict[str, Any]) -> str:
+    return json.dumps(entries, ensure_ascii=False, allow_nan=False)
+
+
+def as_csv(table: Table, *, units: bool = False) -> str:
+    """Comma-separated values, shortest exact digits; several values in a cell are separated by a space.
+
+    With `units` these stand in brackets behind the keys.
+    """
+    stream, columns = io.StringIO(), table.on(FILES)
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow([f"{column.key} [{column.unit}]" if units and column.unit else column.key for column in columns])
+    writer.writerows(zip(*(map(_csv_cell, column.values) for column in columns), strict=True))
+    return stream.getvalue()
+
+
+def _csv_cell(value: Any) -> str:
+    found = plain(value)
+    return " ".join(map(str, found)) if isinstance(found, list) else str(found)
+
+
+def write_csv(table: Table, path: Path) -> None:
+    """A command's table to the file asked for, written beside and then renamed."""
+    write_file(path, as_csv(table, units=True).encode(), key="--csv")
+
+
+def save(table: Table, folder: Path) -> tuple[str, ...]:
+    """A report's table as CSV and JSON: the names of the two files."""
+    names = f"{table.stem}.csv", f"{table.stem}.json"
+    for name, text in zip(names, (as_csv(table), as_json(table)), strict=True):
+        (folder / name).write_text(text, encoding="utf-8", newline="")
+    return names
