@@ -89,6 +89,11 @@ class Table:
         """The columns that an output has."""
         return [column for column in self.columns if output in column.on]
 
+    def rows(self, places: Sequence[int]) -> Table:
+        """The same columns with some of the rows only."""
+        found = (replace(column, of=[column.values[i] for i in places]) for column in self.columns)
+        return Table(columns=tuple(found), keys=self.keys)
+
     def __len__(self) -> int:
         return len(self.columns[0].values)
 

@@ -9,7 +9,6 @@ import pytest
 
 import tfarm
 from tfarm.audit.assumptions import (
-    assumptions_answer,
     candidate_depths,
     candidate_inertias,
     has_hub_inertia,
@@ -18,7 +17,9 @@ from tfarm.audit.assumptions import (
     own_depth,
     section_study,
 )
+from tfarm.audit.candidates import assumptions_answer
 from tfarm.spectrum.scales import PAPER_GAINS
+from tfarm.tables.files import to_json
 
 PAPER = tfarm.load("sasaki2012")
 STOCKY = tfarm.load("stocky-steel")
@@ -175,7 +176,7 @@ def test_hub_frequencies_fall_and_interlace_with_those_of_pin_and_lock(arm):
 
 
 def test_the_answer_is_plain_json_with_the_numbers_of_the_studies():
-    answer = json.loads(json.dumps(assumptions_answer(PAPER, 2)))
+    answer = json.loads(to_json(assumptions_answer(PAPER, 2)))
     assert (answer["arm"], answer["count"]) == ("sasaki2012", 2)
     study, rows = section_study(PAPER, count=2), answer["section"]["candidates"]
     assert [row["natural_frequency_rad_s"] for row in rows] == study.natural_frequency.tolist()

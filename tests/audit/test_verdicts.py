@@ -6,6 +6,7 @@ import pytest
 from matplotlib.mathtext import MathTextParser
 
 from tfarm import audit
+from tfarm.tables.files import to_json
 
 VERDICTS = {
     **dict.fromkeys([f"({n})" for n in (*range(1, 8), 9, 10, 12, 13, 16, 21)], "ok"),
@@ -92,7 +93,7 @@ def test_typesetting_of_values(rows, name, formula):
 
 def test_json_has_the_keys_of_the_issue(audited, audit_file):
     """The answer is what the command has printed, in a process of its own."""
-    answer = json.loads(json.dumps(audit.audit_answer()))
+    answer = json.loads(to_json(audit.audit_answer()))
     assert json.loads(audit_file.with_suffix(".json").read_text(encoding="utf-8")) == answer
     assert "852780" in answer["paper"]
     keys = ["equation", "verdict", "printed", "corrected", "evidence", "residual_printed", "residual_corrected"]

@@ -90,7 +90,7 @@ def test_csv_is_the_same_table(capsys: pytest.CaptureFixture[str], tmp_path: Pat
 
 
 def test_infinities_are_strings(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    from tfarm.cli.answers import to_json
+    from tfarm.tables.files import to_json
 
     assert to_json({"a": [float("inf"), {"b": -float("inf")}]}) == '{"a": ["inf", {"b": "-inf"}]}'
     with pytest.raises(ValueError, match="JSON"):

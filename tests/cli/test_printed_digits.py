@@ -9,7 +9,8 @@ import pytest
 import tfarm
 from tests.shell import run
 from tfarm.arm.writing import to_toml
-from tfarm.cli.tables import HELD, held
+from tfarm.digits import within
+from tfarm.loop.answers import HELD
 from tfarm.loop.poles import closed_loop_poles
 
 
@@ -23,7 +24,7 @@ from tfarm.loop.poles import closed_loop_poles
     ],
 )
 def test_a_number_has_the_digits_that_its_error_leaves(value: float, error: float, text: str) -> None:
-    assert held(value, error, 6 if error < 1e-15 else 12) == text
+    assert within(value, error, 6 if error < 1e-15 else 12) == text
 
 
 def test_poles_of_a_hardly_damped_arm_are_printed_as_far_as_they_are_proven(capsys, tmp_path) -> None:

@@ -13,7 +13,9 @@ from tests.odd_arms import odd_arms
 from tests.report import plausible
 from tfarm import HubFeedback
 from tfarm.arm import implausible
+from tfarm.audit import candidates
 from tfarm.audit.assumptions import LoopVerdict, has_hub_inertia, hub_study, section_study
+from tfarm.columns import PAGE
 from tfarm.loop.locus import locus
 from tfarm.loop.plant import Loop
 from tfarm.loop.poles import poles_below
@@ -61,10 +63,10 @@ def test_cells_of_the_modal_table_are_its_numbers_with_a_few_digits(name):
     """None rounded away, none with more decimals than it has a use for; nodes lie within the arm, and not at 0."""
     modes = tfarm.modes(ARMS[name], count=6)
     table = modal_table(modes)
-    for each in table.columns[1:5]:
+    for each in table.on(PAGE)[1:5]:
         assert [number(cell) for cell in each.cells] == pytest.approx(list(each.values), rel=5e-4, abs=0)
         assert max(len(cell) for cell in each.cells) <= 17
-    for cell, nodes in zip(column(table, "nodes_m").cells, modes.nodes, strict=True):
+    for cell, nodes in zip(table.on(PAGE)[5].cells, modes.nodes, strict=True):
         shown = [] if cell == "none" else [number(part) for part in cell.split(", ")]
         assert shown == pytest.approx(list(nodes), rel=0.05, abs=0)
     assert not np.any(modes.modal_moment) or name != "free-pin"
@@ -280,12 +282,13 @@ def test_no_hub_takes_a_frequency_outside_what_is_said(name):
 def test_a_K2_where_the_search_ended_has_a_star():
     verdicts = (LoopVerdict("stable", 1.08, True), LoopVerdict("stable", 50.0, False), LoopVerdict("unstable", None))
     study = hub_study(ARMS["heavy-hub"], [1.0, 22.5, 30.0], count=1)
-    (edges,) = (each for each in assumptions_section._loop(study, verdicts) if each.key == "K2_below")
+    *_, edges = candidates.loop_columns(study, verdicts)
     assert list(edges.cells) == ["1.08000", "50*", "-"]
     small = hub_study(ARMS["micro"], [1e-7, 2e-7, 5e-7], count=1)
-    assert "K1 = 1.66 × 10⁻⁵, K2 = 0.3" in next(iter(assumptions_section._loop(small, verdicts))).group
-    assert "*" in assumptions_section._searched(verdicts)
-    assert not assumptions_section._searched(verdicts[::2])
+    assert "K1 = 1.66 × 10⁻⁵, K2 = 0.3" in next(candidates.loop_columns(small, verdicts)).group
+    assert "*" in assumptions_section.searched_words(edges)
+    certain = replace(edges, of=edges.of[::2], digits=edges.digits[::2])
+    assert not assumptions_section.searched_words(certain)
 
 
 def test_curves_that_fall_are_not_said_to_rise():

@@ -31,8 +31,6 @@ AREA = 6.0e-4  # m^2, the paper's
 DEPTHS = (0.002, 0.003, 0.004, 0.006, 0.008, 0.010, 0.015, 0.020, 0.030, 0.040, 0.060)  # m, for that area
 INERTIAS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # kg m^2
 SAME = 1e-9  # relative: so near to the arm's own value a candidate is that value
-HELD_SECTION = "area, shear factor and all else held: I = A depth^2/12, so one per cent of depth counts twice"
-HELD_HUB = "all else held"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -201,57 +199,6 @@ def _locked(arm: Arm, count: int) -> Real:
     """
     frequencies, _ = _frequencies([_with_hub(arm, math.inf)], count, "hub_inertia")
     return frequencies[0] if _with_hub(arm, 1.0).has_rigid_mode else np.r_[0.0, frequencies[0, :-1]]
-
-
-def assumptions_answer(arm: Arm, count: int = COUNT) -> dict[str, Any]:
-    """The answer of `tfarm assumptions --json`; "hub" is null where the hub has no inertia to choose."""
-    study = section_study(arm, count=count)
-    section = {
-        "shape": "rectangle",
-        "area_m2": arm.link.section.area,
-        "shear_factor": arm.link.shear_factor,
-        "sensitivity_to": "second_moment",
-        "held": HELD_SECTION,
-        "candidates": [
-            {"depth_m": float(h), "width_m": float(b), "second_moment_m4": float(I), **row}
-            for h, b, I, row in zip(study.depth, study.width, study.second_moment, _rows(study), strict=True)
-        ],
-    }
-    law = default_gains(arm)
-    gains = {"K1": law.K1, "K2": law.K2}
-    return {"arm": arm.name, "count": count, "gains": gains, "section": section, "hub": _hub_answer(arm, count)}
-
-
-def _hub_answer(arm: Arm, count: int) -> dict[str, Any] | None:
-    if not has_hub_inertia(arm):
-        return None
-    study = hub_study(arm, count=count)
-    return {
-        "sensitivity_to": "hub_inertia",
-        "held": HELD_HUB,
-        "candidates": [
-            {"hub_inertia_kg_m2": float(inertia), **row}
-            for inertia, row in zip(study.hub_inertia, _rows(study), strict=True)
-        ],
-        "locked_rad_s": study.locked.tolist(),
-        "pinned_rad_s": study.pinned.tolist(),
-    }
-
-
-def _rows(study: SectionStudy | HubStudy) -> list[dict[str, Any]]:
-    verdicts = loop_verdicts(study) or (LoopVerdict("no loop", None),) * len(study.arms)
-    columns = zip(study.is_own, study.natural_frequency, study.sensitivity, verdicts, strict=True)
-    return [
-        {
-            "is_own": bool(own),
-            "natural_frequency_rad_s": frequency.tolist(),
-            "sensitivity": sensitivity.tolist(),
-            "verdict": loop.verdict,
-            "K2_below": loop.K2_below,
-            "K2_below_is_edge": loop.is_edge,
-        }
-        for own, frequency, sensitivity, loop in columns
-    ]
 
 
 def _frequencies(arms: Sequence[Arm], count: int, parameter: str) -> tuple[Real, Real]:

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
-from dataclasses import asdict
 from functools import cache
 from typing import Any
 
+from tfarm.columns import Table
+
 from . import appendix_rows, energy_rows, motion, table, tuner
-from .rows import Claim, Row
+from .rows import ROWS, Claim, Row
 
 PAPER = (
     "Self-Tuning Vibration Control of a Rotational Flexible Timoshenko Arm Using Neural Networks, "
     "Advances in Acoustics and Vibration, 2012, article 852780"
 )
-ANSWER = ("equation", "verdict", "printed", "corrected", "evidence", "residual_printed", "residual_corrected")
 
 
 def claims() -> tuple[Claim, ...]:
@@ -41,7 +41,7 @@ def audit() -> tuple[Row, ...]:
 
 def records(rows: Iterable[Row]) -> list[dict[str, str]]:
     """Rows as plain dictionaries, without the typeset formulas."""
-    return [{key: asdict(row)[key] for key in ANSWER} for row in rows]
+    return list(Table(columns=ROWS, record=list(rows)))
 
 
 def to_json(rows: Iterable[Row]) -> str:
@@ -51,4 +51,4 @@ def to_json(rows: Iterable[Row]) -> str:
 
 def audit_answer() -> dict[str, Any]:
     """The answer of `tfarm audit --json`."""
-    return {"paper": PAPER, "rows": records(audit())}
+    return {"paper": PAPER, "rows": Table(columns=ROWS, record=audit())}

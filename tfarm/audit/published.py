@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tfarm.columns import JSON, REPORT, Column, Table
+from tfarm.digits import TEXTS, general, significant, singly, worded
 from tfarm.errors import CertificationError
 from tfarm.spectrum import modes
 
@@ -34,6 +36,26 @@ class Row:
     difference: float
     agrees: bool
     why: str
+
+
+def lettered(text: str) -> str:
+    """Words with formulas in plain letters, with Greek ones."""
+    return text.replace("rhoA", "ρA").replace("w^2", "ω^2").replace("w L", "ω L")
+
+
+ROWS = (
+    Column("source", "source", on=(JSON, *REPORT)),
+    Column("case", "case", digits=worded(lettered), printed=TEXTS, folds=True),
+    Column("quantity", "quantity", digits=worded(lettered), printed=TEXTS, folds=True),
+    Column("mode", "mode"),
+    Column("agrees", on=(JSON,)),
+    Column("agrees", of=lambda row: "yes" if row.agrees else "no", digits=worded({"yes": "✓", "no": "≠"}.__getitem__),
+           on=REPORT),
+    Column("printed", "printed"),
+    Column("ours", "ours", digits=singly(significant, 11), head="exact", printed=singly(general, 10)),
+    Column("difference", "difference", digits=singly(significant, 2), printed=singly(lambda x: f"{x:+.1e}")),
+    Column("why", on=(JSON,)),
+)  # fmt: skip
 
 
 def validate(sources: tuple[Source, ...] = SOURCES) -> tuple[Row, ...]:
@@ -89,27 +111,14 @@ def agrees(ours: float, printed: str) -> bool:
 
 
 def validate_answer() -> dict[str, Any]:
-    """The sources and rows as plain dictionaries, with how many agree and how many are explained.
+    """The sources and the table of rows, with how many agree and how many are explained.
 
     Raises CertificationError as `validate` does.
     """
     found = validate()
     return {
         "sources": [{"key": s.key, "citation": s.citation, "reached": s.reached} for s in SOURCES],
-        "rows": [
-            {
-                "source": row.source,
-                "case": row.case,
-                "mode": row.mode,
-                "quantity": row.quantity,
-                "printed": row.printed,
-                "ours": row.ours,
-                "difference": row.difference,
-                "agrees": row.agrees,
-                "why": row.why,
-            }
-            for row in found
-        ],
+        "rows": Table(columns=ROWS, record=found),
         "agree": sum(row.agrees for row in found),
         "explained": sum(bool(row.why) for row in found),
     }

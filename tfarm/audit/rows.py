@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from tfarm.columns import FILES, JSON, Column
 from tfarm.errors import CertificationError
 
 from .typesetting import tex
@@ -34,6 +35,18 @@ class Row:
     residual_corrected: str
     printed_tex: str
     corrected_tex: str
+
+
+ROWS = (
+    Column("equation", "equation", folds=True),
+    Column("verdict", "verdict"),
+    Column("printed", on=(JSON, FILES)),
+    Column("corrected", on=(JSON, FILES)),
+    Column("evidence", on=(JSON,)),
+    Column("residual_printed", "residual as printed", folds=True),
+    Column("residual_corrected", "as corrected", folds=True),
+    Column("evidence", on=(FILES,)),  # the last of a line
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
-from typing import IO, TYPE_CHECKING, Annotated
+from typing import IO, TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -39,6 +40,18 @@ def load_arm(name: str) -> Arm:
     if texts := implausible(arm):
         tell(f"warning: {arm.name}: {'; '.join(texts)}")
     return arm
+
+
+def give(answer: dict[str, Any], json: bool, show: Callable[[dict[str, Any]], None]) -> None:
+    """The answer as one JSON object, or as `show` prints it, with a line about the gains that were not given."""
+    if json:
+        from tfarm.tables.files import to_json
+
+        print(to_json(answer))
+        return
+    show(answer)
+    if answer.get("default_gains"):
+        print(f"by default {answer['default_gains_in_words']}")
 
 
 def right_digits(text: str | None) -> int | None:

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from tfarm.cli.app import ArmName, Compare, Digits, Json, MethodName, app, load_arm, right_digits, whole
+from tfarm.cli.app import ArmName, Compare, Digits, Json, MethodName, app, give, load_arm, right_digits, whole
 from tfarm.errors import one_line
 
 MOST_LISTED = 1000  # modes with nodes and sensitivities: their work grows with the square, to some 20 s
@@ -20,14 +20,9 @@ def presets(json: Json = False) -> None:
     import tfarm
 
     arms = [tfarm.load(name) for name in tfarm.presets()]
-    if json:
-        from tfarm.cli.answers import presets_answer, to_json
+    from tfarm.cli.tables import presets_table, print_presets
 
-        print(to_json(presets_answer(arms)))
-    else:
-        from tfarm.cli.tables import print_presets
-
-        print_presets(arms)
+    give({"presets": presets_table(arms)}, json, print_presets)
 
 
 @app.command()
@@ -44,22 +39,18 @@ def modes(
     """Natural frequencies and modes, complete by construction."""
     wanted, right = whole("--count", count, 1, MOST_LISTED), right_digits(digits)
     subject = load_arm(arm)
-    from tfarm.cli.answers import modes_answer, to_json
     from tfarm.cli.methods import alone, compared_modes, print_compared, slow_method
     from tfarm.cli.tables import print_modes
     from tfarm.spectrum import modes as find_modes
+    from tfarm.spectrum.answers import modes_answer
 
     table = find_modes(subject, wanted, theory=theory)  # type: ignore[arg-type]
     road = slow_method(method, len(table), right, compare)
     if compare:
         alone({"--certify": certify or None})
-        print_compared(compared_modes(table), json)
+        give(compared_modes(table), json, print_compared)
         return
-    answer = modes_answer(table, right, certify, road)
-    if json:
-        print(to_json(answer))
-    else:
-        print_modes(answer)
+    give(modes_answer(table, right, certify, road), json, print_modes)
 
 
 @app.command()
@@ -82,28 +73,23 @@ def response(
     from tfarm.cli.inputs import points_on
 
     right, at, subject = right_digits(digits), points_on(s, omega, start, stop, points), load_arm(arm)
-    from tfarm.cli.answers import response_answer, to_json
     from tfarm.cli.methods import alone, compared_responses, print_compared, slow_method
+    from tfarm.cli.tables import print_found, say_written
     from tfarm.response import transfer
+    from tfarm.response.answers import response_answer, response_table
+    from tfarm.tables.files import write_csv
+    from tfarm.tables.terminal import show
 
     road = slow_method(method, at.size, right, compare)
     if compare:
         alone({"--csv": csv})
-        print_compared(compared_responses(subject, output, x, at), json)
+        give(compared_responses(subject, output, x, at), json, print_compared)
         return
     answer = response_answer(transfer(subject, output, x=x, method=road), at, right)
     if csv is not None:
-        from tfarm.cli.tables import print_found, say_written, write_csv
-
-        write_csv(answer, csv)
-    if json:
-        print(to_json(answer))
-    elif csv is None:
-        from tfarm.cli.tables import print_response
-
-        print_response(answer)
-    elif say_written(csv):
-        print_found(answer)
+        write_csv(response_table(answer), csv)
+    if json or csv is None or say_written(csv):
+        give(answer, json, (lambda found: show(response_table(found))) if csv is None else print_found)
 
 
 @app.command()

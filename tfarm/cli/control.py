@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from tfarm.cli.app import ArmName, Json, app, load_arm, plain_number, whole
-from tfarm.cli.inputs import Given, Kp, gains_of, say_defaults, under_a_law
+from tfarm.cli.app import ArmName, Json, app, give, load_arm, plain_number, whole
+from tfarm.cli.inputs import Given, Kp, gains_of, under_a_law
 from tfarm.cli.sampling import Delay, DspFile, Period, chain_of
 from tfarm.errors import ParameterError
 
@@ -29,11 +29,12 @@ def poles(
     """Closed-loop poles of the exact arm, complete in a printed box."""
     number, subject = None if count is None else whole("--count", count, 1, 1000), load_arm(arm)
     law, said = gains_of(subject, given)
+    from tfarm.cli.control_tables import print_poles
     from tfarm.loop.answers import poles_answer
     from tfarm.loop.poles import closed_loop_poles
 
     answer = poles_answer(closed_loop_poles(subject, law, number), certify)
-    _print(answer | said, json, "print_poles")
+    give(answer | said, json, print_poles)
 
 
 @app.command()
@@ -42,10 +43,11 @@ def margins(arm: ArmName, json: Json = False, *, given: Given) -> None:
     """The verdict on a loop, the windows of each gain, and the margins of the exact loop function."""
     subject = load_arm(arm)
     law, said = gains_of(subject, given)
+    from tfarm.cli.control_tables import print_margins
     from tfarm.loop.answers import margins_answer
     from tfarm.loop.margins import margins as find_margins
 
-    _print(margins_answer(find_margins(subject, law)) | said, json, "print_margins")
+    give(margins_answer(find_margins(subject, law)) | said, json, print_margins)
 
 
 @app.command("map")
@@ -61,18 +63,17 @@ def gain_map(
     """How many poles are unstable over the plane of K1 and K2, and the exact boundary."""
     number, subject = whole("--points", points, 2, 2000), load_arm(arm)
     ranges = [bounds(key, text) for key, text in (("--K1", k1), ("--K2", k2))]
+    from tfarm.cli.control_tables import print_map, write_map
     from tfarm.loop.answers import map_answer
     from tfarm.loop.regions import between, region
 
     found = region(subject, between(*ranges[0], number), between(*ranges[1], number), kp)
     if csv is not None:
-        from tfarm.cli.control_tables import write_map
-
         write_map(map_answer(found), csv)
     from tfarm.cli.tables import say_written
 
     if json or say_written(csv):
-        _print(map_answer(found), json, "print_map")
+        give(map_answer(found), json, print_map)
 
 
 @app.command()
@@ -93,12 +94,13 @@ def design(
     chain = chain_of(dsp or arm, period, delay_samples)
     limits = {name: None if text is None else bounds(f"--{name}", text) for name, text in (("K1", k1), ("K2", k2))}
     from tfarm.dsp.brief import sampled_brief
+    from tfarm.cli.control_tables import print_design
     from tfarm.loop.answers import design_answer
     from tfarm.loop.design import design as find_gains
 
     found = find_gains(subject, objective, Kp=kp, modes=number, **limits)  # type: ignore[arg-type]
     sampled = {"sampled": sampled_brief(subject, found.law, chain).answer}
-    _print(design_answer(found) | sampled, json, "print_design")
+    give(design_answer(found) | sampled, json, print_design)
 
 
 def bounds(key: str, text: str) -> tuple[float, float]:
@@ -111,15 +113,3 @@ def bounds(key: str, text: str) -> tuple[float, float]:
     if not -math.inf < low < high < math.inf:
         raise ParameterError(key=key, value=text, remedy=remedy)
     return low, high
-
-
-def _print(answer: dict[str, Any], json: bool, printer: str) -> None:
-    if json:
-        from tfarm.cli.answers import to_json
-
-        print(to_json(answer))
-    else:
-        from tfarm.cli import control_tables
-
-        getattr(control_tables, printer)(answer)
-        say_defaults(answer)

@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from pathlib import Path
 from typing import Any
 
-from rich.text import Text
-
-from tfarm.cli.tables import HELD, held, new_table, show
-from tfarm.files import write_file
+from tfarm.columns import Column, Table
+from tfarm.loop.answers import POLES
+from tfarm.tables.files import write_csv
+from tfarm.tables.terminal import show
 
 
 def print_poles(answer: dict[str, Any]) -> None:
     """A row a pole, then the box."""
-    rows = new_table(("Re s [1/s]", "Im s [rad/s]", "damping ratio"))
-    for re, im in answer["poles"]:
-        size = math.hypot(re, im)
-        rows.add_row(held(re, HELD * size, 12), f"{im:.12g}", held(-re / size, HELD, 6) if im else "-")
-    show(rows)
+    show(Table(columns=POLES, record=answer["poles"]))
     left, right, _, top = answer["box"]
     proven = "proven" if "discs" in answer else "by winding number"
     print(f"all poles with {left:.6g} < Re s < {right:.6g} and |Im s| < {top:.6g} ({proven}),")
@@ -46,13 +40,16 @@ def print_margins(answer: dict[str, Any]) -> None:
 
 def _print_windows(answer: dict[str, Any]) -> None:
     """A row a gain; a search bound is marked, as it is no edge."""
-    rows = new_table(("gain", "value", "stable around it", "all stable windows"))
-    for name in ("K1", "K2", "Kp"):
-        around, ends = answer[f"{name}_interval"], answer[f"{name}_interval_ends"]
-        pairs = zip(answer[f"{name}_windows"], answer[f"{name}_windows_ends"], strict=True)
-        windows = " ".join(_window(*pair) for pair in pairs) or "none"
-        rows.add_row(name, f"{answer[name]:g}", "-" if around is None else _window(around, ends), windows)
-    show(rows)
+    gains = ("K1", "K2", "Kp")
+    around = [(answer[f"{name}_interval"], answer[f"{name}_interval_ends"]) for name in gains]
+    every = [zip(answer[f"{name}_windows"], answer[f"{name}_windows_ends"], strict=True) for name in gains]
+    columns = (
+        Column("gain", "gain", of=gains),
+        Column("value", "value", of=[f"{answer[name]:g}" for name in gains]),
+        Column("around", "stable around it", of=["-" if pair[0] is None else _window(*pair) for pair in around]),
+        Column("all", "all stable windows", of=[" ".join(_window(*pair) for pair in p) or "none" for p in every]),
+    )
+    show(Table(columns=columns))
     looked_at = ", ".join(f"{name} ({low:.6g}, {high:.6g})" for name in ("K1", "K2", "Kp")
                           for low, high in [answer[f"{name}_looked_at"]])  # fmt: skip
     print(f"looked at: {looked_at}; * no limit was found up to there, and beyond none was looked for")
@@ -64,25 +61,29 @@ def _window(pair: list[float], ends: list[str]) -> str:
     return f"({low}, {high})"
 
 
-LIMITS = {
-    "phase_margin_deg": "phase", "phase_lag_deg": "phase_lag", "phase_lead_deg": "phase_lead",
-    "delay_margin_s": "delay", "disk_margin": "disk", "peak_sensitivity": "peak_sensitivity",
-}  # fmt: skip
-UNITS = {"_deg": " [deg]", "_s": " [s]"}
+LIMITS = {  # of an answer's margins: the name, and that of where it is taken
+    "phase_margin_deg": ("phase margin [deg]", "phase"),
+    "phase_lag_deg": ("phase lag [deg]", "phase_lag"),
+    "phase_lead_deg": ("phase lead [deg]", "phase_lead"),
+    "delay_margin_s": ("delay margin [s]", "delay"),
+    "disk_margin": ("disk margin", "disk"),
+    "peak_sensitivity": ("peak sensitivity", "peak_sensitivity"),
+}
 
 
 def _print_loop_margins(answer: dict[str, Any]) -> None:
     band = answer["in_band"]
-    rows = new_table(("margin", "exact", f"up to {band['band_rad_s']:.6g} rad/s", "at [rad/s]"))
-    rows.add_row("gain (factors)", _pair(answer["gain_margin"]), "", "")
-    for key, at in LIMITS.items():
-        unit = next((unit for unit in UNITS if key.endswith(unit)), "")
-        name = key.removesuffix(unit).replace("_", " ") + UNITS.get(unit, "")
-        value = "not known" if answer[key] is None else f"{answer[key]:.6g}"
-        exact = "" if at.startswith("phase") and not answer["delay_margin_s"] else value
-        where = "-" if math.isinf(band[key]) else f"{band['at_rad_s'][at]:.6g}"
-        rows.add_row(Text(name), exact, f"{band[key]:.6g}", where)
-    show(rows)
+    phases = range(1, 4)  # exact ones are shown where a delay does not take them away
+    sizes = ["not known" if answer[key] is None else f"{answer[key]:.6g}" for key in LIMITS]
+    exact = ["" if i in phases and not answer["delay_margin_s"] else size for i, size in enumerate(sizes, 1)]
+    at = ["-" if math.isinf(band[key]) else f"{band['at_rad_s'][name]:.6g}" for key, (_, name) in LIMITS.items()]
+    columns = (
+        Column("margin", "margin", of=["gain (factors)", *(title for title, _ in LIMITS.values())]),
+        Column("exact", "exact", of=[_pair(answer["gain_margin"]), *exact]),
+        Column("band", f"up to {band['band_rad_s']:.6g} rad/s", of=["", *(f"{band[key]:.6g}" for key in LIMITS)]),
+        Column("at", "at", "rad/s", of=["", *at]),
+    )
+    show(Table(columns=columns))
     phase = band["phase_margin_deg"]
     if phase < 0:
         print(f"phase margin {phase:.6g} deg: lead; not an instability")
@@ -120,9 +121,7 @@ def print_design(answer: dict[str, Any]) -> None:
 
 def write_map(answer: dict[str, Any], path: Path) -> None:
     """K1, K2 and the number of unstable poles, one row a point."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(("K1", "K2", "unstable_roots"))
-    for K2, row in zip(answer["K2"], answer["unstable_roots"], strict=True):
-        writer.writerows((repr(K1), repr(K2), count) for K1, count in zip(answer["K1"], row, strict=True))
-    write_file(path, text.getvalue().encode(), key="--csv")
+    counts = [count for row in answer["unstable_roots"] for count in row]
+    K1, K2 = answer["K1"] * len(answer["K2"]), [K2 for K2 in answer["K2"] for _ in answer["K1"]]
+    columns = (Column("K1", of=K1), Column("K2", of=K2), Column("unstable_roots", of=counts))
+    write_csv(Table(columns=columns), path)

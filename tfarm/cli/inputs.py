@@ -110,12 +110,6 @@ def gains_of(arm: Arm, given: Given) -> tuple[HubFeedback, dict[str, Any]]:
     return law, {"default_gains": missing, "default_gains_in_words": words}
 
 
-def say_defaults(answer: dict[str, Any]) -> None:
-    """One line about the gains that were not given, where there are any."""
-    if answer.get("default_gains"):
-        print(f"by default {answer['default_gains_in_words']}")
-
-
 def _number(key: str, text: str, kind: type[_Number], remedy: str) -> _Number:
     try:
         value = kind(text.strip().replace("i", "j") if kind is complex else text)

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import csv as tables
-import io
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from tfarm.cli.app import ArmName, Json, app, load_arm, whole
-from tfarm.cli.inputs import Given, gains_of, say_defaults, under_a_law
+from tfarm.cli.app import ArmName, Json, app, give, load_arm, whole
+from tfarm.cli.inputs import Given, gains_of, under_a_law
+from tfarm.columns import Column, Table
+from tfarm.digits import singly
 
 Vary = Annotated[
     str,
@@ -46,41 +46,37 @@ def locus(
     exact = find(subject, law, vary, start, stop, number, count)
     answer = locus_answer(exact, reduced_locus(exact)) | said
     if csv is not None:
-        _write(answer, csv)
+        from tfarm.tables.files import write_csv
+
+        write_csv(branches_table(answer), csv)
     from tfarm.cli.tables import say_written
 
-    if json:
-        from tfarm.cli.answers import to_json
-
-        print(to_json(answer))
-    elif say_written(csv):
-        _show(answer)
-        say_defaults(answer)
+    if json or say_written(csv):
+        give(answer, json, print_locus)
 
 
-def _write(answer: dict[str, Any], path: Path) -> None:
-    """A row a gain, two columns a branch; written beside and then renamed."""
-    from tfarm.files import write_file
-
-    text = io.StringIO()
-    writer = tables.writer(text, lineterminator="\n")
-    heads = [f"{part}_{n} [1/s]" for n in range(len(answer["branches"])) for part in ("re", "im")]
-    writer.writerow([f"{answer['vary']} [{answer['unit']}]", *heads])
-    for gain, points in zip(answer["gain"], zip(*answer["branches"], strict=True), strict=True):
-        writer.writerow([gain, *(part for point in points for part in point)])
-    write_file(path, text.getvalue().encode(), key="--csv")
+def branches_table(answer: dict[str, Any]) -> Table:
+    """A row a gain, two columns a branch."""
+    columns = [Column(answer["vary"], unit=answer["unit"], of=answer["gain"])]
+    for n, branch in enumerate(answer["branches"]):
+        re, im = zip(*branch, strict=True)
+        columns += [Column(f"re_{n}", unit="1/s", of=re), Column(f"im_{n}", unit="1/s", of=im)]
+    return Table(columns=tuple(columns))
 
 
-def _show(answer: dict[str, Any]) -> None:
-    from tfarm.cli.tables import new_table, show
+def print_locus(answer: dict[str, Any]) -> None:
+    """A row a branch, then the crossings."""
+    from tfarm.tables.terminal import show
 
-    first, last, name = answer["gain"][0], answer["gain"][-1], answer["vary"]
-    rows = new_table(("branch", "mode", f"s [1/s] at {name} = {first:g}", f"at {name} = {last:g}", "gap to reduced"))
-    for n, (mode, branch) in enumerate(zip(answer["mode"], answer["branches"], strict=True)):
-        rows.add_row(
-            str(n), str(mode), *(_complex(branch[end]) for end in (0, -1)), f"{answer['gap_by_branch'][n]:.1e}"
-        )
-    show(rows)
+    first, last, name, branches = answer["gain"][0], answer["gain"][-1], answer["vary"], answer["branches"]
+    columns = (
+        Column("branch", "branch", of=range(len(branches))),
+        Column("mode", "mode", of=answer["mode"]),
+        Column("first", f"s [1/s] at {name} = {first:g}", of=[_complex(branch[0]) for branch in branches]),
+        Column("last", f"at {name} = {last:g}", of=[_complex(branch[-1]) for branch in branches]),
+        Column("gap", "gap to reduced", of=answer["gap_by_branch"], digits=singly("{:.1e}".format)),
+    )
+    show(Table(columns=columns))
     for each in answer["crossings"]:
         where = f"{name} = {each['gain']:.10g}, {each['omega_rad_s']:.10g} rad/s ({each['frequency_hz']:.6g} Hz)"
         print(f"branch {each['branch']} becomes {each['direction']} at {where}")

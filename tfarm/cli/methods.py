@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.cli.answers import to_json
-from tfarm.cli.layout import new_table, show
+from tfarm.columns import Column, Table
+from tfarm.digits import general, singly
 from tfarm.errors import ParameterError
 from tfarm.exact.methods import METHODS, Method, known_method
 from tfarm.response import transfer
+from tfarm.tables.terminal import show
 
 if TYPE_CHECKING:
     from tfarm.arm import Arm
@@ -70,22 +71,20 @@ def _differences(found: dict[Method, NDArray[Any]]) -> dict[str, Any]:
     }
 
 
-def print_compared(answer: dict[str, Any], json: bool) -> None:
+def print_compared(answer: dict[str, Any]) -> None:
     """A row a point or a mode: the closed form's number, and how far the other two are from it, relatively."""
-    if json:
-        print(to_json(answer))
-        return
+    numbers = answer["methods"]["closed-form"]
     if "index" in answer:
-        titles = ("mode", "rad/s")
-        rows = [(str(i), f"{w:.15g}") for i, w in zip(answer["index"], answer["methods"]["closed-form"], strict=True)]
+        first = Column("index", "mode", of=answer["index"]), Column("", "rad/s", of=numbers, digits=singly(general, 15))
     else:
-        titles = ("s [1/s]", f"{answer['output']} [{answer['unit']}]")
-        values = zip(answer["s"], answer["methods"]["closed-form"], strict=True)
-        rows = [(f"{complex(*at):.10g}", _shown(complex(*value))) for at, value in values]
-    table = new_table((*titles, "balls differ by", "appendix differs by"))
-    for row, *apart in zip(rows, *(answer["differences"][name] for name in ("balls", "appendix")), strict=True):
-        table.add_row(*row, *(f"{each:.1e}" for each in apart))
-    show(table)
+        points = [f"{complex(*at):.10g}" for at in answer["s"]]
+        values = [_shown(complex(*value)) for value in numbers]
+        first = Column("s", "s", "1/s", of=points), Column("", answer["output"], answer["unit"], of=values)
+    apart = [
+        Column(name, f"{name} differ{end} by", of=answer["differences"][name], digits=singly("{:.1e}".format))
+        for name, end in (("balls", ""), ("appendix", "s"))
+    ]
+    show(Table(columns=(*first, *apart)))
     print(_verdict(answer["largest_difference"]))
 
 

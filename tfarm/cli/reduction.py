@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from tfarm.cli.app import ArmName, Json, app, load_arm, plain_number, whole
+from tfarm.cli.app import ArmName, Json, app, give, load_arm, plain_number, whole
 from tfarm.errors import ParameterError
 
 
@@ -35,16 +35,11 @@ def reduce(
     names = [name.strip() for name in outputs.split(",")]
     reduced = find(subject, names, order=states, error=error, method=method, band=edges, x=x)  # type: ignore[arg-type]
     written = () if mat is None else save_mat(reduced, mat, key="--mat")
-    answer = reduced_answer(reduced)
-    if json:
-        from tfarm.cli.answers import to_json
+    from tfarm.cli.tables import say_written
 
-        print(to_json(answer))
-    else:
-        from tfarm.cli.tables import say_written
-
+    if not json:
         say_written(*written)
-        _show(answer)
+    give(reduced_answer(reduced), json, _show)
 
 
 def _edges(text: str) -> tuple[float, float]:

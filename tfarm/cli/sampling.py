@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tfarm.cli.app import ArmName, Json, app, load_arm, whole
-from tfarm.cli.inputs import Given, gains_of, say_defaults, under_a_law
+from tfarm.cli.app import ArmName, Json, app, give, load_arm, whole
+from tfarm.cli.inputs import Given, gains_of, under_a_law
 
 if TYPE_CHECKING:
     from tfarm.dsp import Chain
@@ -42,18 +42,11 @@ def sampled(
     count = None if modes is None else whole("--modes", modes, 1, 400)
     subject, chain = load_arm(arm), chain_of(dsp or arm, period, delay_samples)
     gains, said = gains_of(subject, given)
+    from tfarm.cli.sampling_tables import print_sampled
     from tfarm.dsp.verdict import analyse, sampled_answer
 
     answer = sampled_answer(analyse(subject, gains, chain, count=count)) | said
-    if json:
-        from tfarm.cli.answers import to_json
-
-        print(to_json(answer))
-    else:
-        from tfarm.cli.sampling_tables import print_sampled
-
-        print_sampled(answer)
-        say_defaults(answer)
+    give(answer, json, print_sampled)
 
 
 @app.command()
@@ -104,14 +97,9 @@ def _show(answer: dict[str, Any], csv: Path | None, mat: Path | None, json: bool
     if mat is not None:
         sampling_tables.write_mat(answer, mat)
     sampling_tables.warn_if_stopped(answer)
-    if json:
-        from tfarm.cli.answers import to_json
-
-        print(to_json(answer))
-    elif say_written(csv, mat):
-        sampling_tables.print_simulation(answer)
-        say_defaults(answer)
-        if csv is None and mat is None:
+    if json or say_written(csv, mat):
+        give(answer, json, sampling_tables.print_simulation)
+        if not json and csv is None and mat is None:
             print("--json, --csv or --mat give the signals")
 
 

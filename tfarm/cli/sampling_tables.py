@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-import csv
 import io
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from tfarm.cli.app import tell
-from tfarm.cli.tables import new_table, show
+from tfarm.columns import Column, Table
 from tfarm.files import write_file
+from tfarm.tables.files import write_csv
+from tfarm.tables.terminal import show
 
 SIGNALS = {
     "t": "s",
@@ -25,13 +28,7 @@ SIGNALS = {
 
 def print_sampled(answer: dict[str, Any]) -> None:
     """A row a mode, then the verdict."""
-    table = new_table(("mode", "rad/s", "band", "ln|z| closed loop", "open loop", "first order", "by K1", "by K2"))
-    for mode in answer["modes"]:
-        names = ("log_radius_per_sample", "open_loop_log_radius", "first_order_log_radius")
-        numbers = [mode[name] for name in (*names, "first_order_by_K1", "first_order_by_K2")]
-        frequency = f"{mode['natural_frequency_rad_s']:.6g}"
-        table.add_row(str(mode["index"]), frequency, str(mode["band"]), *(f"{x:.3e}" for x in numbers))
-    show(table)
+    show(answer["modes"])
     print(answer["law"])
     shown, band = answer["shown"], answer["band_rad_s"]
     print(f"stable at this K2 for K1 in {_texts(shown['K1_intervals'], band)}")
@@ -77,23 +74,18 @@ def write_signals(answer: dict[str, Any], path: Path) -> None:
 
     Rows between the samples leave empty what changes at the samples only: torque, gain and volts.
     """
-    names = _present(answer)
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([f"{name} [{SIGNALS[name]}]" for name in names])
-    rows = list(zip(*(answer[name] for name in names), strict=True))
-    if "between" in answer:
-        finer = answer["between"]
-        empty = [""] * len(finer["t"])
-        rows += zip(*(finer.get(name, empty) for name in names), strict=True)
-    rows.sort(key=lambda row: float(row[0]))
-    writer.writerows(rows)
-    write_file(path, text.getvalue().encode(), key="--csv")
+    names, finer = _present(answer), answer.get("between", {"t": []})
+    empty = [""] * len(finer["t"])
+    order = np.argsort([*answer["t"], *finer["t"]], kind="stable")
+    values = ([*answer[name], *finer.get(name, empty)] for name in names)
+    columns = (
+        Column(name, unit=SIGNALS[name], of=[of[i] for i in order]) for name, of in zip(names, values, strict=True)
+    )
+    write_csv(Table(columns=tuple(columns)), path)
 
 
 def write_mat(answer: dict[str, Any], path: Path) -> None:
     """The signals at the samples, and those between them, as a MATLAB file (level 5)."""
-    import numpy as np
     from scipy.io import savemat
 
     signals: dict[str, Any] = {name: np.array(answer[name]) for name in _present(answer)}

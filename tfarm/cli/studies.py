@@ -7,7 +7,7 @@ from typing import Annotated, Any, cast
 
 import typer
 
-from tfarm.cli.app import ArmName, Json, app, load_arm, whole
+from tfarm.cli.app import ArmName, Json, app, give, load_arm, whole
 
 
 @app.command()
@@ -44,9 +44,4 @@ def study(
     with progress() as advance:
         tell = None if advance is None else lambda done, total: advance(done, total, "tuning")
         answer = study_answer(what, run_study(subject, plans, keep=keep, tell=tell), number)
-    if json:
-        from tfarm.cli.answers import to_json
-
-        print(to_json(answer))
-    else:
-        print_study(answer)
+    give(answer, json, print_study)

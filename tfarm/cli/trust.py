@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from tfarm.cli.app import ArmName, Json, app, load_arm, say_when_compiling, whole
+from tfarm.cli.app import ArmName, Json, app, give, load_arm, say_when_compiling, whole
 
 
 @app.command()
@@ -14,16 +14,9 @@ def audit(json: Json = False) -> None:
     """Every equation of the paper, as printed and as corrected, with the check that tells them apart."""
     say_when_compiling()
     from tfarm.audit import audit_answer
+    from tfarm.cli.tables import print_audit
 
-    answer = audit_answer()
-    if json:
-        from tfarm.cli.answers import to_json
-
-        print(to_json(answer))
-    else:
-        from tfarm.cli.tables import print_audit
-
-        print_audit(answer)
+    give(audit_answer(), json, print_audit)
 
 
 @app.command()
@@ -35,17 +28,10 @@ def assumptions(
     """What the assumed section and hub do: frequencies over the candidates, with exact sensitivities."""
     wanted = whole("--count", count, 1, 100)
     subject = load_arm(arm)
-    from tfarm.audit.assumptions import assumptions_answer
+    from tfarm.audit.candidates import assumptions_answer
+    from tfarm.cli.tables import print_assumptions
 
-    answer = assumptions_answer(subject, wanted)
-    if json:
-        from tfarm.cli.answers import to_json
-
-        print(to_json(answer))
-    else:
-        from tfarm.cli.tables import print_assumptions
-
-        print_assumptions(answer)
+    give(assumptions_answer(subject, wanted), json, print_assumptions)
 
 
 @app.command()
@@ -53,13 +39,6 @@ def validate(json: Json = False) -> None:
     """Natural frequencies of published tables beside the exact ones, and why where they differ."""
     say_when_compiling()
     from tfarm.audit.published import validate_answer
+    from tfarm.cli.tables import print_validation
 
-    answer = validate_answer()
-    if json:
-        from tfarm.cli.answers import to_json
-
-        print(to_json(answer))
-    else:
-        from tfarm.cli.tables import print_validation
-
-        print_validation(answer)
+    give(validate_answer(), json, print_validation)

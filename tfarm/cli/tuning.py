@@ -7,8 +7,8 @@ from typing import Annotated, Any, cast
 
 import typer
 
-from tfarm.cli.app import ArmName, Json, app, load_arm, whole
-from tfarm.cli.inputs import K1, gains_of, say_defaults
+from tfarm.cli.app import ArmName, Json, app, give, load_arm, whole
+from tfarm.cli.inputs import K1, gains_of
 from tfarm.cli.sampling import Delay, DspFile, Period, chain_of
 
 
@@ -76,10 +76,5 @@ def _show(answer: dict[str, Any], save: Path | None, json: bool) -> None:
     from tfarm.cli.tables import say_written
 
     tuning_tables.warn_if_stopped(answer)
-    if json:
-        from tfarm.cli.answers import to_json
-
-        print(to_json(answer))
-    elif say_written(save):
-        tuning_tables.print_tuning(answer)
-        say_defaults(answer)
+    if json or say_written(save):
+        give(answer, json, tuning_tables.print_tuning)

@@ -5,21 +5,25 @@ from __future__ import annotations
 from typing import Any
 
 from tfarm.cli.app import tell
-from tfarm.cli.tables import new_table, show
+from tfarm.columns import Column, Table
+from tfarm.digits import general, singly
+from tfarm.tables.terminal import show
+
+FOUR = singly(general, 4)
 
 
 def print_tuning(answer: dict[str, Any]) -> None:
     """The tuner beside its yardsticks."""
-    table = new_table(("", "cost of a slew"))
-    table.add_row("no moment feedback", f"{answer['cost_without']:.4g}")
-    constant = f"best constant gain, K = {answer['best_constant_gain']:.4g}"
-    table.add_row(constant, f"{answer['cost_best_constant']:.4g}")
-    table.add_row(f"tuner, after {answer['trials']} trials", f"{answer['cost_tuned']:.4g}")
+    costs = {
+        "no moment feedback": answer["cost_without"],
+        f"best constant gain, K = {answer['best_constant_gain']:.4g}": answer["cost_best_constant"],
+        f"tuner, after {answer['trials']} trials": answer["cost_tuned"],
+    }
     for kind, values in answer["shaped"].items():
-        late = f"{1e3 * values['arrives_later_by_s']:.0f} ms later"
-        table.add_row(f"input shaping, {kind}, {late}", f"{values['cost']:.4g}")
-    table.add_row("linear-quadratic bound of the unshaped slew", f"{answer['cost_lq_bound']:.4g}")
-    show(table)
+        costs[f"input shaping, {kind}, {1e3 * values['arrives_later_by_s']:.0f} ms later"] = values["cost"]
+    costs["linear-quadratic bound of the unshaped slew"] = answer["cost_lq_bound"]
+    columns = Column("", of=list(costs)), Column("cost", "cost of a slew", of=list(costs.values()), digits=FOUR)
+    show(Table(columns=columns))
     print(f"guard {answer['guard_says']}")
     K = answer["gain"]["K"]
     print(f"gain: K from {min(K):.4g} to {max(K):.4g}")
@@ -38,25 +42,42 @@ def warn_if_stopped(answer: dict[str, Any]) -> None:
 def _print_comparison(rows: list[dict[str, Any]]) -> None:
     names = ("without", "best_constant", "own_constant", "ZV", "EI", "tuner", "bound")
     heads = ("no moment feedback", "constant", "own constant", "ZV", "EI", "tuner", "LQ bound")
-    table = new_table(("condition", *heads, "guard proven"))
-    for row in rows:
-        costs = (f"{row[name]['cost']:.4g}" for name in names)
-        table.add_row(row["condition"], *costs, "yes" if row["proven"] else "no")
-    show(table)
+    columns = (
+        Column("condition", "condition", of=[row["condition"] for row in rows]),
+        *(
+            Column(name, head, of=[row[name]["cost"] for row in rows], digits=FOUR)
+            for name, head in zip(names, heads, strict=True)
+        ),
+        Column("proven", "guard proven", of=["yes" if row["proven"] else "no" for row in rows]),
+    )
+    show(Table(columns=columns))
 
 
 def print_study(answer: dict[str, Any]) -> None:
     """A row a group of seeds, and the verdict of the map."""
     names = ("alpha", "eta", "a", "b", "inputs", "rule", "mode", "sensitivity")
-    shown = [name for name in names if len({str(group[name]) for group in answer["groups"]}) > 1]
-    costs = ("median", "lower quartile", "upper quartile", "best", "worst")
-    table = new_table((*shown, *costs, "below best constant", "residual [N m]", "diverged", "died"))
-    for group in answer["groups"]:
-        low, high = group["cost_quartiles"]
-        numbers = (group["cost_median"], low, high, group["cost_best"], group["cost_worst"])
-        below = f"{group['below_best_constant']} of {answer['seeds']}"
-        ends = (below, f"{group['residual_median']:.4g}", str(group["diverged"]), str(group["died"]))
-        table.add_row(*(str(group[name]) for name in shown), *(f"{x:.4g}" for x in numbers), *ends)
-    show(table)
+    groups = answer["groups"]
+    shown = [name for name in names if len({str(group[name]) for group in groups}) > 1]
+    low, high = zip(*(group["cost_quartiles"] for group in groups), strict=True)
+    costs = {
+        "median": [group["cost_median"] for group in groups],
+        "lower quartile": low,
+        "upper quartile": high,
+        "best": [group["cost_best"] for group in groups],
+        "worst": [group["cost_worst"] for group in groups],
+    }
+    columns = (
+        *(Column(name, name, of=[group[name] for group in groups]) for name in shown),
+        *(Column(name, name, of=values, digits=FOUR) for name, values in costs.items()),
+        Column(
+            "below",
+            "below best constant",
+            of=[f"{group['below_best_constant']} of {answer['seeds']}" for group in groups],
+        ),
+        Column("residual", "residual", "N m", of=[group["residual_median"] for group in groups], digits=FOUR),
+        Column("diverged", "diverged", of=[group["diverged"] for group in groups]),
+        Column("died", "died", of=[group["died"] for group in groups]),
+    )
+    show(Table(columns=columns))
     if "verdict" in answer:
         print(answer["verdict"])

@@ -11,7 +11,7 @@ destabilises.  At finite gains the closed-loop pole itself says it: it is follow
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from tfarm.arm import HubFeedback
+from tfarm.columns import ANSWER, JSON, REPORT, Column
+from tfarm.digits import general, lined, scientific, singly
 from tfarm.dsp.loop import SampledLoop
 from tfarm.records import record
 from tfarm.spectrum import modes
@@ -28,6 +30,33 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 
 STEPS = 24  # of the continuation from zero gain
 SETTLED = -20.0  # modes that lose more than this in ln|a| between two samples are not listed
+
+
+_LOG = "ln|z| per sample"
+_log = partial(Column, printed=singly("{:.3e}".format), on=ANSWER)
+_page_log = partial(Column, digits=singly(scientific, 3), group=_LOG, on=REPORT)
+MODES = (  # of a `ModeTable`; what of it is small is the change of ln|z| per sample
+    Column("index", "mode", on=ANSWER),
+    Column("mode", "mode", of="index", on=REPORT),
+    Column("natural_frequency_rad_s", of="natural_frequency", head="rad/s", printed=singly(general, 6), on=ANSWER),
+    Column("natural_frequency_hz", "natural frequency", "Hz", of=lambda table: table.natural_frequency / (2 * np.pi),
+           digits=lined(7, 5), on=REPORT),
+    Column("band", "band"),
+    Column("aliased_rad_s", of="aliased", on=(JSON,)),
+    Column("seen_at_hz", "seen at", "Hz", of=lambda table: table.aliased / (2 * np.pi), digits=lined(5, 3), on=REPORT),
+    _log("log_radius_per_sample", "ln|z| closed loop", of="log_radius"),
+    _log("open_loop_log_radius", "open loop", of="by_damping"),
+    _log("first_order_log_radius", "first order", of="first_order"),
+    _log("first_order_by_K1", "by K1", of="by_rate"),
+    _log("first_order_by_K2", "by K2", of="by_moment"),
+    _page_log("by_damping", "own damping", of=lambda table: table.by_damping + 0.0),  # 0.0 where it is -0.0
+    _page_log("by_K1", "K1, first order", of=lambda table: table.by_rate + 0.0),
+    _page_log("by_K2", "K2, first order", of=lambda table: table.by_moment + 0.0),
+    _page_log("log_radius", "closed loop, exact", of=lambda table: table.log_radius + 0.0,
+              tint=lambda table: ["#f9e1d0" if x > 0 else "" for x in table.log_radius]),
+    Column("verdict", "closed loop", on=REPORT,
+           of=lambda table: ["grows" if x > 0 else "decays" if x < 0 else "neither" for x in table.log_radius]),
+)  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from tfarm.arm import Arm, HubFeedback
+from tfarm.columns import Table
 from tfarm.dsp.band import Band, band_of
 from tfarm.dsp.chain import Chain
-from tfarm.dsp.law import ModeTable, growing_mode, mode_table
+from tfarm.dsp.law import MODES, ModeTable, growing_mode, mode_table
 from tfarm.dsp.loop import SampledLoop, check_loop, sampled_loop
 from tfarm.dsp.margins import DelayMargin, Window, around, whole_loop
 from tfarm.dsp.shown import Figure, ShownWindows, resized, shown_damping, shown_delay, shown_windows
@@ -188,7 +189,7 @@ def analyse(arm: Arm, gains: HubFeedback, chain: Chain | None = None, *, count: 
 
 
 def sampled_answer(analysis: Analysis) -> dict[str, Any]:
-    """The analysis as a dictionary of plain numbers, texts and lists."""
+    """The analysis as a dictionary of plain numbers, texts, lists and the table of its modes."""
     verdict, gains = analysis.verdict, analysis.verdict.loop.gains
     poles, sampling = verdict.loop.poles, verdict.loop.chain.sampling
     return {
@@ -222,7 +223,7 @@ def sampled_answer(analysis: Analysis) -> dict[str, Any]:
             "delay_margin_samples": _figure(analysis.delay),
             "required_damping_s": _figure(analysis.damping),
         },
-        "modes": _rows(analysis.modes),
+        "modes": Table(columns=MODES, record=analysis.modes),
     }
 
 
@@ -239,20 +240,3 @@ def _figure(figure: Figure) -> dict[str, Any]:
 
 def _listed(window: Window | None) -> list[float] | None:
     return None if window is None else list(window)
-
-
-def _rows(table: ModeTable) -> list[dict[str, Any]]:
-    return [
-        {
-            "index": int(table.index[i]),
-            "natural_frequency_rad_s": float(table.natural_frequency[i]),
-            "band": int(table.band[i]),
-            "aliased_rad_s": float(table.aliased[i]),
-            "log_radius_per_sample": float(table.log_radius[i]),
-            "first_order_log_radius": float(table.first_order[i]),
-            "first_order_by_K1": float(table.by_rate[i]),
-            "first_order_by_K2": float(table.by_moment[i]),
-            "open_loop_log_radius": float(table.by_damping[i]),
-        }
-        for i in range(table.index.size)
-    ]

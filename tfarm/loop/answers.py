@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from tfarm.arm import HubFeedback
+from tfarm.columns import Column
+from tfarm.digits import general, singly, within
 
 from .design import Design
 from .lyapunov import lyapunov
@@ -15,6 +18,14 @@ from .windows import Windows
 
 SIGN = "u = -Kp theta - K1 theta_t - K2 E I phi'(0) + r; a static torque u gives the moment -(J - I_h)/J u"
 PHASES = ("phase", "phase_lag", "phase_lead")
+
+
+HELD = 2e-14  # of a pole's size: what its float64 may be off (tests: 1e-14 to 50 digits)
+POLES = (  # of pairs Re s, Im s
+    Column("re", "Re s", "1/s", of=lambda pole: within(pole[0], HELD * math.hypot(*pole), 12)),
+    Column("im", "Im s", "rad/s", of=lambda pole: pole[1], digits=singly(general, 12)),
+    Column("ratio", "damping ratio", of=lambda pole: within(-pole[0] / math.hypot(*pole), HELD, 6) if pole[1] else "-"),
+)
 
 
 def law_answer(law: HubFeedback) -> dict[str, Any]:

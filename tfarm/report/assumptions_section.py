@@ -2,32 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from functools import partial
-
 import numpy as np
 
 from tfarm.arm import Arm
 from tfarm.audit.assumptions import (
     HubStudy,
-    LoopVerdict,
     SectionStudy,
     has_hub_inertia,
     hub_study,
-    loop_verdicts,
     section_study,
 )
+from tfarm.audit.candidates import candidates
 from tfarm.columns import Column, Table
-from tfarm.digits import fixed, plain, significant, singly
+from tfarm.digits import fixed, plain, significant
 from tfarm.report.assumptions_pictures import Study, hub_picture, section_picture
 from tfarm.report.figures import Picture
 from tfarm.report.paper import is_from_paper
 from tfarm.report.sections import Section
 from tfarm.response.frequency import Real
-from tfarm.spectrum.scales import default_gains
-
-Verdicts = tuple[LoopVerdict, ...] | None
-OWN = "#eaf1f8"  # behind the row of the arm itself
 
 FROM_PAPER = (
     "The paper prints the area of the section, but neither its second moment I nor the hub inertia I_h. Every "
@@ -115,85 +107,20 @@ def _ends(values: Real, study: Study) -> dict[str, str]:
 
 def section_table(study: SectionStudy) -> Table:
     """A row a candidate section."""
-    verdicts = loop_verdicts(study)
-    size = (
-        _value("depth_m", "depth", "m", study.depth, study),
-        _value("width_m", "width", "m", study.width, study),
-        _value("second_moment_m4", "I", "m⁴", study.second_moment, study),
-    )
-    return Table(
-        stem="assumptions-section",
-        title="Candidate sections: rectangles of this area",
-        caption=SECTION_TABLE.format(searched=_searched(verdicts)),
-        columns=(_which(study), *size, *_modes(study), *_loop(study, verdicts)),
-    )
+    return _table("assumptions-section", "Candidate sections: rectangles of this area", SECTION_TABLE, study)
 
 
 def hub_table(study: HubStudy) -> Table:
     """A row a hub inertia."""
-    verdicts = loop_verdicts(study)
-    return Table(
-        stem="assumptions-hub",
-        title="Candidate hub inertias",
-        caption=HUB_TABLE.format(searched=_searched(verdicts)),
-        columns=(
-            _which(study),
-            _value("hub_inertia_kg_m2", "I_h", "kg m²", study.hub_inertia, study),
-            *_modes(study),
-            *_loop(study, verdicts),
-        ),
-    )
+    return _table("assumptions-hub", "Candidate hub inertias", HUB_TABLE, study)
 
 
-def _which(study: Study) -> Column:
-    """Says in words what the shade says."""
-    texts = ["this arm" if own else "" for own in study.is_own]
-    return Column("is", "", of=texts, tint=_tint(study))
+def _table(stem: str, title: str, caption: str, study: Study) -> Table:
+    """The candidates on a page."""
+    columns = candidates(study).columns
+    return Table(stem=stem, title=title, caption=caption.format(searched=searched_words(columns[-1])), columns=columns)
 
 
-def _value(key: str, title: str, of: str, values: Real, study: Study) -> Column:
-    return Column(key, title, of, of=values, digits=singly(plain, 4), tint=_tint(study))
-
-
-def _modes(study: Study) -> Iterator[Column]:
-    for i, omega in enumerate(study.natural_frequency.T, 1):
-        yield Column(
-            f"mode_{i}_rad_s", f"mode {i}", "rad/s", of=omega, digits=singly(significant, 6),
-            group="natural frequency", tint=_tint(study),
-        )  # fmt: skip
-    for i, slope in enumerate(study.sensitivity.T, 1):
-        yield Column(
-            f"mode_{i}_sensitivity",
-            f"mode {i}",
-            "%/%",
-            of=slope,
-            digits=partial(fixed, decimals=4),
-            group="sensitivity",
-            tint=_tint(study),
-        )
-
-
-def _loop(study: Study, verdicts: Verdicts) -> Iterator[Column]:
-    """The verdict on the default loop, and up to which K2 it stays stable; nothing where there is no loop."""
-    if verdicts is None:
-        return
-    words = [each.verdict for each in verdicts]
-    edges = ["-" if each.K2_below is None else _edge(each.K2_below, each.is_edge) for each in verdicts]
-    law = default_gains(study.arm)
-    group = f"loop at K1 = {plain(law.K1, 4)}, K2 = {plain(law.K2, 4)}"
-    yield Column("verdict", "verdict", of=words, group=group, tint=_tint(study))
-    values = ["" if each.K2_below is None else each.K2_below for each in verdicts]
-    yield Column("K2_below", "stable below K2", of=values, digits=edges, group=group, tint=_tint(study))
-
-
-def _searched(verdicts: Verdicts) -> str:
+def searched_words(edges: Column) -> str:
     """What a star means, where there is one."""
-    return SEARCHED if any(each.K2_below is not None and not each.is_edge for each in verdicts or ()) else ""
-
-
-def _edge(K2: float, is_edge: bool) -> str:
-    return significant(K2, 6) if is_edge else f"{plain(K2, 6)}*"
-
-
-def _tint(study: Study) -> list[str]:
-    return [OWN if own else "" for own in study.is_own]
+    return SEARCHED if any("*" in cell for cell in edges.cells) else ""

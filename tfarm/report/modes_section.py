@@ -10,8 +10,8 @@ import numpy as np
 
 import tfarm
 from tfarm.arm import Arm
-from tfarm.columns import Column, Table
-from tfarm.digits import fixed, held, lined, significant
+from tfarm.columns import REPORT, Column, Table
+from tfarm.digits import fixed, lined, significant
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.exact.coefficients import Theory
 from tfarm.report.damped_table import damped_table
@@ -21,9 +21,10 @@ from tfarm.report.sections import Section
 from tfarm.report.trust_proofs import how_proven
 from tfarm.response.frequency import Real
 from tfarm.spectrum import Modes
+from tfarm.spectrum.answers import KEPT
+from tfarm.spectrum.answers import MODES as MODAL
 
 MODES, SHAPES = 10, 6
-HELD = 10  # digits in files of what shapes are needed for: these differ from processor to processor by 1e-14
 SIMPLER: tuple[Theory, ...] = ("shear", "rayleigh", "euler-bernoulli")
 PARAMETER_NAMES = {"youngs_modulus": "Young's modulus"}
 NEGLECTED = 5e-7  # a sensitivity that never exceeds this reads as zero
@@ -101,13 +102,11 @@ def _flexible(modes: Modes) -> Real:
 
 def modal_table(modes: Modes) -> Table:
     """Frequencies, hub participation, modal moment and nodes."""
-    b, moment = (np.array(held(each, HELD)) for each in (modes.hub_participation, modes.modal_moment + 0.0))
     nodes = [", ".join(places(node, modes.arm.link.length)) or "none" for node in modes.nodes]
-    decimals = HELD - 1 - math.floor(math.log10(modes.arm.link.length))  # a node is known as a share of the length
+    decimals = KEPT - 1 - math.floor(math.log10(modes.arm.link.length))  # a node is known as a share of the length
     at = [tuple(np.round(node, decimals).tolist()) for node in modes.nodes]
     rigid = "Row 0 is the arm turning as a rigid body. " if modes.arm.has_rigid_mode else ""
-    omega = _frequency("natural_frequency_rad_s", "natural frequency", "rad/s", modes.natural_frequency)
-    hertz = _frequency("natural_frequency_hz", "", "Hz", modes.natural_frequency_hz)
+    omega, hertz = (column.read(modes).cells for column in MODAL[1:3])
     return Table(
         stem="modal-table",
         title="Modal table",
@@ -115,22 +114,10 @@ def modal_table(modes: Modes) -> Table:
             rigid=rigid,
             tip=_positive(modes.arm),
             hub=LOCKED if modes.arm.is_locked else FREE_PIN if modes.arm.hub.inertia == 0 else "",
-            proof=how_proven(modes, omega.cells, hertz.cells),
+            proof=how_proven(modes, omega, hertz),
         ),
-        columns=(
-            _mode_numbers("index", modes.index.tolist()),
-            omega,
-            hertz,
-            Column(
-                "hub_participation",
-                "hub participation b",
-                "1/√(kg m²)",
-                of=b,
-                digits=lined(7, 4),
-            ),
-            Column("modal_moment", "modal moment", "N m/√(kg m²)", of=moment, digits=lined(7, 4)),
-            Column("nodes_m", "nodes", "m", of=at, digits=nodes),
-        ),
+        columns=(*MODAL, Column("nodes_m", "nodes", "m", of=at, digits=nodes, on=REPORT)),
+        record=modes,
     )
 
 
@@ -148,18 +135,10 @@ def places(nodes: Real, length: float) -> tuple[str, ...]:
     return tuple(significant(float(x), 2) if x < near else fixed([float(x)], decimals)[0] for x in nodes)
 
 
-def _mode_numbers(key: str, numbers: Sequence[int]) -> Column:
-    return Column(key, "mode", of=numbers)
-
-
-def _frequency(key: str, title: str, of: str, values: Real, group: str = "") -> Column:
-    return Column(key, title, of, of=values, digits=lined(8, 7), group=group)
-
-
 def _shapes(name: str, shapes: tuple[Shape, ...]) -> Picture:
     counts = ", ".join(str(len(shape.nodes)) for shape in shapes)
     columns = [Column("x_m", "x", "m", of=shapes[0].x)]
-    columns += [Column(f"mode_{s.number}", f"mode {s.number}", of=np.round(s.w, HELD - 1) + 0.0) for s in shapes]
+    columns += [Column(f"mode_{s.number}", f"mode {s.number}", of=np.round(s.w, KEPT - 1) + 0.0) for s in shapes]
     return Picture(
         stem="mode-shapes",
         title=f"Shapes of the first {len(shapes)} flexible modes",
@@ -173,9 +152,10 @@ def _shapes(name: str, shapes: tuple[Shape, ...]) -> Picture:
 def theories_table(exact: Real, theories: Mapping[str, Real], differences: Mapping[str, Real]) -> Table:
     """Natural frequencies by the four beam theories, and differences from the first in per cent."""
     both = "natural frequency", "difference from Timoshenko"
-    columns = [_mode_numbers("mode", range(1, exact.size + 1))]
+    columns = [Column("mode", "mode", of=range(1, exact.size + 1))]
     for theory, omega in {"timoshenko": exact, **theories}.items():
-        columns.append(_frequency(f"{_key(theory)}_rad_s", theory_name(theory), "rad/s", omega, both[0]))
+        key = f"{_key(theory)}_rad_s"
+        columns.append(Column(key, theory_name(theory), "rad/s", of=omega, digits=lined(8, 7), group=both[0]))
     for theory, percent in differences.items():
         key, digits = f"{_key(theory)}_difference_percent", lined(5, 3)
         columns.append(Column(key, theory_name(theory), "%", of=percent, digits=digits, group=both[1]))
@@ -196,7 +176,7 @@ def _key(theory: str) -> str:
 def _differences(name: str, differences: Mapping[str, Real]) -> Picture:
     shown = dict(reversed(list(differences.items())))
     words = ", ".join(f"{theory_name(theory)} {significant(float(v[-1]), 3)} %" for theory, v in shown.items())
-    columns = [_mode_numbers("mode", range(1, MODES + 1))]
+    columns = [Column("mode", "mode", of=range(1, MODES + 1))]
     columns += [Column(f"{_key(t)}_difference_percent", theory_name(t), "%", of=v) for t, v in shown.items()]
     return Picture(
         stem="theory-differences",
@@ -214,7 +194,7 @@ def sensitivity_table(modes: Modes) -> Table:
     """Per cent of frequency per per cent of each parameter: a row a parameter, a column a mode."""
     flexible = modes.index > 0
     rows = {
-        PARAMETER_NAMES.get(name, name.replace("_", " ")): np.round(values[flexible], HELD - 1) + 0.0
+        PARAMETER_NAMES.get(name, name.replace("_", " ")): np.round(values[flexible], KEPT - 1) + 0.0
         for name, values in modes.sensitivity.items()
     }
     shown = {name: values for name, values in rows.items() if abs(values).max() > NEGLECTED}

@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 from numpy.typing import NDArray
 
-from tfarm.columns import Column, Table
-from tfarm.digits import SUPERSCRIPT, lined, plain, scientific, singly
-from tfarm.dsp.law import ModeTable
+from tfarm.columns import Table
+from tfarm.digits import SUPERSCRIPT, plain
+from tfarm.dsp.law import MODES, ModeTable
 from tfarm.dsp.loop import SampledLoop
 from tfarm.report.bode import hertz_axis
 from tfarm.report.figures import BLUE, GREY, INK, ORANGE, blank, headline, style
@@ -96,32 +96,11 @@ def _power(y: float, _: object = None) -> str:
 
 def mode_rows(loop: SampledLoop, table: ModeTable, stem: str, sign: str) -> Table:
     """A row a mode that outlives a sample."""
-    hertz, seen = table.natural_frequency / (2 * math.pi), table.aliased / (2 * math.pi)
     T = loop.chain.sampling.period
-    grows = ["grows" if x > 0 else "decays" if x < 0 else "neither" for x in table.log_radius]
-    tints = ["#f9e1d0" if x > 0 else "" for x in table.log_radius]
     return Table(
         stem=stem,
         title="The sampled loop, mode by mode",
         caption=MODE_TABLE.format(ms=plain(1e3 * T), half=plain(0.5 / T), sign=sign),
-        columns=(
-            _whole("mode", "mode", table.index),
-            Column("natural_frequency_hz", "natural frequency", "Hz", of=hertz, digits=lined(7, 5)),
-            _whole("band", "band", table.band),
-            Column("seen_at_hz", "seen at", "Hz", of=seen, digits=lined(5, 3)),
-            _small("by_damping", "own damping", table.by_damping, "ln|z| per sample"),
-            _small("by_K1", "K1, first order", table.by_rate, "ln|z| per sample"),
-            _small("by_K2", "K2, first order", table.by_moment, "ln|z| per sample"),
-            _small("log_radius", "closed loop, exact", table.log_radius, "ln|z| per sample", tints),
-            Column("verdict", "closed loop", of=grows),
-        ),
+        columns=MODES,
+        record=table,
     )
-
-
-def _whole(key: str, title: str, values: NDArray[np.int64]) -> Column:
-    return Column(key, title, of=values)
-
-
-def _small(key: str, title: str, values: Real, group: str, tint: list[str] | None = None) -> Column:
-    shown = values + 0.0
-    return Column(key, title, of=shown, digits=singly(scientific, 3), group=group, tint=tint or ())

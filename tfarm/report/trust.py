@@ -160,7 +160,7 @@ def differences_table(rows: Sequence[published.Row]) -> Table:
         caption="Largest difference: ours over printed, less one, of the modes named. All other numbers agree.",
         columns=(
             Column("source", "source", of=[source for source, _, _ in groups]),
-            Column("case", "case", of=[case for _, case, _ in groups], digits=worded(_lettered)),
+            Column("case", "case", of=[case for _, case, _ in groups], digits=worded(published.lettered)),
             Column("modes", "modes", of=[", ".join(str(row.mode) for row in each) for each in groups.values()]),
             Column("largest_difference", "largest difference", of=worst, digits=singly(significant, 2)),
             Column("why", "why", of=[why for _, _, why in groups]),
@@ -176,26 +176,8 @@ def published_table(rows: Sequence[published.Row]) -> Table:
         caption="✓ agrees to the last printed digit, ≠ differs, for the reason given above. Difference: ours over "
         "printed, less one.",
         record=list(rows),
-        columns=(
-            Column("source", "source"),
-            Column("case", "case", digits=worded(_lettered)),
-            Column("quantity", "quantity", digits=worded(_lettered)),
-            Column("mode", "mode"),
-            Column(
-                "agrees",
-                of=lambda row: "yes" if row.agrees else "no",
-                digits=worded({"yes": "✓", "no": "≠"}.__getitem__),
-            ),
-            Column("printed", "printed"),
-            Column("ours", "ours", digits=singly(significant, 11)),
-            Column("difference", "difference", digits=singly(significant, 2)),
-        ),
+        columns=published.ROWS,
     )
-
-
-def _lettered(text: str) -> str:
-    """Words with formulas in plain letters, with Greek ones."""
-    return text.replace("rhoA", "ρA").replace("w^2", "ω^2").replace("w L", "ω L")
 
 
 def _published_facts(rows: Sequence[published.Row]) -> tuple[Fact, ...]:

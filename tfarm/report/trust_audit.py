@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from markupsafe import Markup, escape
 
 from tfarm.audit import Row
-from tfarm.audit.rows import is_zero
-from tfarm.columns import Column, Table
+from tfarm.audit.rows import ROWS, is_zero
+from tfarm.columns import Table
 from tfarm.digits import unit
 from tfarm.report.trust_math import compared, formulas, lines, width
 
@@ -87,9 +87,7 @@ def counts(rows: Sequence[Row]) -> dict[str, int]:
 
 def audit_table(rows: Sequence[Row]) -> Table:
     """Every row in plain text, for the files."""
-    names = ("equation", "verdict", "printed", "corrected", "residual_printed", "residual_corrected", "evidence")
-    columns = tuple(Column(name, name, of=[getattr(row, name) for row in rows]) for name in names)
-    return Table(stem="audit", title="The paper, equation by equation", caption="", is_data=True, columns=columns)
+    return Table(stem="audit", title="The paper, equation by equation", is_data=True, columns=ROWS, record=list(rows))
 
 
 def _left(residual: str) -> str:

@@ -10,31 +10,28 @@ import shutil
 import sys
 import textwrap
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import zip_longest
 
 from rich.cells import cell_len
+
+from tfarm.columns import TERMINAL, Column, Table
 
 GAP = 2  # spaces between two columns
 LEAST = 20  # characters to which a text may be folded
 
 
-@dataclass
+@dataclass(frozen=True)
 class Rows:
-    """A table as it is filled: a title a column, then rows; columns named in `fold` hold texts that may be folded.
+    """A table as texts: a title a column, then rows; the columns numbered in `fold` hold texts that may be folded.
 
     The first `keys` columns say which row it is, and stand in every block.
     """
 
     titles: tuple[str, ...]
-    fold: tuple[str, ...] = ()
+    rows: Sequence[tuple[str, ...]]
+    fold: tuple[int, ...] = ()
     keys: int = 1
-    rows: list[tuple[str, ...]] = field(default_factory=list)
-
-    def add_row(self, *cells: object) -> None:
-        """One text a column."""
-        assert len(cells) == len(self.titles)
-        self.rows.append(tuple(map(str, cells)))
 
     def lines(self, width: int) -> list[str]:
         """The lines of the table, each in so many characters as far as its widest column allows."""
@@ -55,9 +52,8 @@ class Rows:
             return natural
         words = [max(map(len, title.split()), default=0) for title in self.titles]
         widths = [max(pair) for pair in zip(words, cells, strict=True)]
-        folded = [i for i, title in enumerate(self.titles) if title in self.fold]
-        rest = width - _total([w for i, w in enumerate(widths) if i not in folded]) - GAP * len(folded)
-        for left, i in zip(range(len(folded), 0, -1), sorted(folded, key=lambda i: widths[i]), strict=True):
+        rest = width - _total([w for i, w in enumerate(widths) if i not in self.fold]) - GAP * len(self.fold)
+        for left, i in zip(range(len(self.fold), 0, -1), sorted(self.fold, key=lambda i: widths[i]), strict=True):
             widths[i] = min(widths[i], max(rest // left, LEAST, words[i]))
             rest -= widths[i]
         return widths
@@ -65,7 +61,7 @@ class Rows:
     def _row(self, row: Sequence[str], widths: Sequence[int], block: Sequence[int]) -> list[str]:
         """A row's lines: numbers to the right, what is folded to the left."""
         parts = [textwrap.wrap(row[i], widths[i]) if cell_len(row[i]) > widths[i] else [row[i]] for i in block]
-        to_left = [self.titles[i] in self.fold and len(part) > 1 for i, part in zip(block, parts, strict=True)]
+        to_left = [i in self.fold and len(part) > 1 for i, part in zip(block, parts, strict=True)]
         lines = []
         for texts in zip_longest(*parts, fillvalue=""):
             cells = (
@@ -77,15 +73,30 @@ class Rows:
         return lines
 
 
-def new_table(titles: tuple[str, ...], fold: tuple[str, ...] = (), keys: int = 1) -> Rows:
-    """An empty table; what answers comes first."""
-    return Rows(titles, fold, keys)
-
-
-def show(table: Rows) -> None:
+def show(table: Table) -> None:
     """Print it, in the width of the terminal or, in a pipe, in as many characters as it takes."""
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else sys.maxsize
-    print("\n".join(table.lines(width)))
+    print("\n".join(lines(table, width)))
+
+
+def lines(table: Table, width: int) -> list[str]:
+    """The lines of the table, each in so many characters as far as its widest column allows."""
+    columns = table.on(TERMINAL)
+    cells = [column.printed(column.values) if column.printed else column.cells for column in columns]
+    rows = Rows(
+        titles=tuple(_heading(column) for column in columns),
+        rows=list(zip(*cells, strict=True)),
+        fold=tuple(i for i, column in enumerate(columns) if column.folds),
+        keys=table.keys,
+    )
+    return rows.lines(width)
+
+
+def _heading(column: Column) -> str:
+    """The title with its unit, or what is said on terminals in their place."""
+    if column.head is not None:
+        return column.head
+    return f"{column.title} [{column.unit}]" if column.unit else column.title
 
 
 def _blocks(widths: Sequence[int], width: int, keys: int) -> list[list[int]]:

@@ -4,19 +4,24 @@ import os
 import pty
 import re
 import sys
+from dataclasses import replace
 
 import pytest
 
-from tfarm.cli.layout import Rows
+from tfarm.columns import REPORT, Column, Table
+from tfarm.digits import general, singly
+from tfarm.tables.terminal import lines
 
-COLUMNS = ("mode", "natural frequency rad/s", "eigenvalue", "what is said of it")
+COLUMNS = (
+    Column("mode", "mode", of=["1", "2"]),
+    Column("omega", "natural frequency rad/s", of=["71.505682466890", "204.33313936381"]),
+    Column("eigenvalue", "eigenvalue", of=["-0.2556+71.505i", "-2.0869+204.32i"]),
+    Column("said", "what is said of it", of=["lightly damped, and the first of all there are", "-"], folds=True),
+)
 
 
-def table(fold=("what is said of it",)):
-    rows = Rows(COLUMNS, fold)
-    rows.add_row(1, "71.505682466890", "-0.2556+71.505i", "lightly damped, and the first of all there are")
-    rows.add_row(2, "204.33313936381", "-2.0869+204.32i", "-")
-    return rows
+def printed(width, columns=COLUMNS, keys=1):
+    return lines(Table(columns=columns, keys=keys), width)
 
 
 def words(lines):
@@ -24,38 +29,46 @@ def words(lines):
 
 
 def test_in_a_pipe_a_row_is_a_line():
-    lines = table().lines(sys.maxsize)
+    lines = printed(sys.maxsize)
     assert len(lines) == 3
     assert len({len(line) for line in lines}) == 1
 
 
 @pytest.mark.parametrize("width", [100, 80, 60, 50, 40])
 def test_no_word_is_cut_and_no_line_is_too_long(width):
-    lines = table().lines(width)
+    lines = printed(width)
     assert max(map(len, lines)) <= width
-    whole = words(table().lines(sys.maxsize))
+    whole = words(printed(sys.maxsize))
     repeated = [word for word in words(lines) if word not in ("mode", "1", "2")]
     assert repeated == [word for word in whole if word not in ("mode", "1", "2")]
 
 
 def test_what_does_not_fit_stands_below_beside_the_first_column():
-    lines = table(fold=()).lines(50)
+    lines = printed(50, (*COLUMNS[:3], replace(COLUMNS[3], folds=False)))
     blank = lines.index("")
     assert [line.split()[0] for line in lines[blank - 2 : blank]] == ["1", "2"]
     assert [line.split()[0] for line in lines[-2:]] == ["1", "2"]
 
 
 def test_a_row_is_known_by_as_many_columns_as_it_takes():
-    rows = Rows(("", "depth", "first frequency", "second frequency"), keys=2)
-    rows.add_row("*", "0.006", "71.505682466890", "204.33313936381")
-    assert [line.split() for line in rows.lines(30) if "*" in line] == [
+    texts = {"": "*", "depth": "0.006", "first frequency": "71.505682466890", "second frequency": "204.33313936381"}
+    columns = tuple(Column(title, title, of=[text]) for title, text in texts.items())
+    assert [line.split() for line in printed(30, columns, keys=2) if "*" in line] == [
         ["*", "0.006", "71.505682466890"],
         ["*", "0.006", "204.33313936381"],
     ]
 
 
 def test_a_table_without_rows_has_its_titles():
-    assert Rows(("a", "b")).lines(80) == ["a  b"]
+    assert printed(80, (Column("a", "a", of=[]), Column("b", "b", of=[]))) == ["a  b"]
+
+
+def test_a_heading_has_the_unit_and_cells_the_digits_of_a_terminal():
+    one = Column("omega_rad_s", "frequency", "rad/s", of=[71.50568246689], printed=singly(general, 5))
+    assert printed(80, (one, replace(one, head="w"), replace(one, on=REPORT))) == [
+        "frequency [rad/s]       w",
+        "           71.506  71.506",
+    ]
 
 
 WITH_ROWS = """

@@ -1,0 +1,126 @@
+"""The modal table as commands and pages have it: its columns, and the answer of `tfarm modes`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from tfarm.columns import ANSWER, JSON, REPORT, TERMINAL, Column, Table
+from tfarm.digits import general, held, lined, singly, within
+from tfarm.errors import MISSING
+from tfarm.exact.methods import Method
+
+from .damped import DampedModes, damped_modes
+from .table import Modes, Real, compare_theories
+
+KEPT = 10  # digits in a report's files of what shapes are needed for: these differ by 1e-14 from processor to processor
+HELD = 2e-14  # of an eigenvalue's size: what its float64 may be off (tests: 1e-14 to 50 digits, 64 eps in closed form)
+IN_THE_BOX = "complete in the box; lightly damped shear modes exist above any box, real eigenvalues accumulate at -1/C"
+
+
+def _by_row(columns: Mapping[Any, Real]) -> list[dict[str, float]]:
+    """A dictionary a mode of a dictionary of columns."""
+    rows = zip(*(values.tolist() for values in columns.values()), strict=True)
+    return [dict(zip(columns, row, strict=True)) for row in rows]
+
+
+def _places(nodes: Sequence[Real]) -> list[str]:
+    return [" ".join(f"{x:.4f}" for x in each) or "-" for each in nodes]
+
+
+MODES = (  # of `Modes`; a page adds the nodes, which it rounds to a share of the length
+    Column("index", "mode"),
+    Column(
+        "natural_frequency_rad_s", "natural frequency", "rad/s", of="natural_frequency", digits=lined(8, 7),
+        head="rad/s", printed=singly(general, 12),
+    ),
+    Column("natural_frequency_hz", "", "Hz", digits=lined(8, 7), head="Hz", printed=singly(general, 9)),
+    Column("hub_participation", "hub participation b", printed=singly(general, 6), on=ANSWER),
+    Column("modal_moment", "modal moment", "N m", printed=singly(general, 6), on=ANSWER),
+    Column("nodes_m", "nodes", "m", of=lambda modes: [x.tolist() for x in modes.nodes], printed=_places, folds=True,
+           on=ANSWER),
+    Column("theories_rad_s", of=lambda modes: _by_row(compare_theories(modes)), on=(JSON,)),
+    Column("sensitivity", of=lambda modes: _by_row(modes.sensitivity), on=(JSON,)),
+    Column("hub_participation", "hub participation b", "1/√(kg m²)",
+           of=lambda modes: held(modes.hub_participation, KEPT), digits=lined(7, 4), on=REPORT),
+    Column("modal_moment", "modal moment", "N m/√(kg m²)", of=lambda modes: held(modes.modal_moment + 0.0, KEPT),
+           digits=lined(7, 4), on=REPORT),
+)  # fmt: skip
+
+
+def modes_answer(
+    modes: Modes, digits: int | None, certify: bool = False, method: Method = "closed-form"
+) -> dict[str, Any]:
+    """The modal table, frequencies as strings of so many digits where more than 15 are asked for.
+
+    With `certify` each flexible mode gets its proven bracket, and the whole the count that proves it complete; `method`
+    is the road to the frequencies.
+    """
+    exact = modes.digits(digits) if digits is not None else []
+    found = modes.frequencies(method)
+    given = {
+        "natural_frequency_rad_s": exact if digits is not None and digits > 15 else found,
+        "natural_frequency_hz": found / (2 * math.pi),
+    }
+    columns = [replace(column, of=given.get(column.key, column.of)) for column in MODES]
+    answer: dict[str, Any] = {
+        "arm": modes.arm.name,
+        "count": int(modes.index.max()),
+        "complete": True,
+        "theory": modes.theory,
+        "method": method,
+    }
+    if digits is not None:
+        answer["digits"] = digits
+    if certify:
+        proof = modes.certify(15 if digits is None else digits)
+        rigid = [MISSING] * (len(modes) - len(proof.brackets))
+        for key, ends in zip(("lower_rad_s", "upper_rad_s"), zip(*proof.brackets, strict=True), strict=True):
+            columns.append(Column(key, of=[*rigid, *ends], on=(JSON,)))
+        answer |= {"proven_complete": True, "proof": {"count": proof.count, "below_rad_s": proof.below}}
+    if modes.arm.link.damping:
+        damped = damped_modes(modes)
+        answer |= {"box": list(damped.box), "eigenvalues_in_box": damped.count, "box_note": IN_THE_BOX}
+        if damped.left_out:
+            last = damped.index[-1]
+            answer["damped_note"] = f"eigenvalues up to mode {last} only: branches above cannot be told apart"
+        columns = [replace(column, on=(JSON,)) if column.key == "nodes_m" else column for column in columns]
+        columns[3:3] = _damped(damped, len(modes))
+        if certify:
+            columns.append(_discs(damped, len(modes), 15 if digits is None else digits))
+            answer["proven_complete_in_box"] = True
+    return answer | {"modes": Table(columns=tuple(columns), record=modes)}
+
+
+def _damped(damped: DampedModes, rows: int) -> list[Column]:
+    """Eigenvalue, or two real ones, and damping ratio of each mode that was followed, in as many rows as there are."""
+    over, ratios = damped.is_overdamped.tolist(), damped.damping_ratio.tolist()
+    pairs = list(zip(damped.eigenvalues.tolist(), over, strict=True))
+    texts = [
+        f"{p.real:.8g} and {q.real:.8g}" if both else f"{within(p.real, HELD * abs(p), 8)} + {p.imag:.10g}i"
+        for (p, q), both in pairs
+    ]
+    words = [
+        f"{ratio:.6g} (overdamped)" if both else within(ratio, HELD, 6)
+        for ratio, both in zip(ratios, over, strict=True)
+    ]
+    rest = [MISSING] * (rows - len(pairs))
+    return [
+        Column("eigenvalue", of=[MISSING if both else [p.real, p.imag] for (p, _), both in pairs] + rest, on=(JSON,)),
+        Column("eigenvalues", of=[[p.real, q.real] if both else MISSING for (p, q), both in pairs] + rest, on=(JSON,)),
+        Column("eigenvalue", "eigenvalue", "1/s", of=texts + ["not followed"] * len(rest), on=(TERMINAL,)),
+        Column("damping_ratio", "damping ratio", of=ratios + rest, digits=words + ["-"] * len(rest)),
+    ]
+
+
+def _discs(damped: DampedModes, rows: int, digits: int) -> Column:
+    """The proven discs of each flexible mode that was followed."""
+    found = [
+        [{"re": disc.re, "im": disc.im, "radius": disc.radius} for disc in discs] for discs in damped.certify(digits)
+    ]
+    rigid = [MISSING] * int(np.sum(damped.index == 0))
+    return Column("discs", of=[*rigid, *found, *[MISSING] * (rows - len(rigid) - len(found))], on=(JSON,))
