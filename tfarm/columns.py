@@ -27,17 +27,18 @@ class Column:
     """One quantity: `key` in JSON and files (with the unit, as omega_rad_s), `title` and `unit` where a person reads.
 
     `of` says where its values are: the name of an attribute (that of the key if left out), a function of the record,
-    or the values themselves.  Of a list of records it is asked one by one.  `digits` makes cells of values, or is the
-    cells; on a terminal `printed` does, under `head`, where these are given.  `on`: the outputs that have it.
-    Neighbours of one `group` share a heading on a page; `tint` is, like `of`, a background colour a cell; on a narrow
-    terminal texts of a column with `folds` are folded.
+    or the values themselves.  Of a list of records it is asked one by one.  `digits` makes cells of values; where
+    these do not say it all, `shown` is, like `of`, the cells.  On a terminal `printed` makes them, under `head`, where
+    these are given.  `on`: the outputs that have it.  Neighbours of one `group` share a heading on a page; `tint` is,
+    like `of`, a background colour a cell; on a narrow terminal texts of a column with `folds` are folded.
     """
 
     key: str
     title: str = ""
     unit: str = ""
     of: Any = None
-    digits: Digits | Sequence[str] = TEXTS
+    digits: Digits = TEXTS
+    shown: Any = None
     head: str | None = None
     printed: Digits | None = None
     on: tuple[str, ...] = (*ANSWER, *REPORT)
@@ -46,8 +47,10 @@ class Column:
     folds: bool = False
 
     def read(self, record: Any) -> Column:
-        """The column with its values and tints in the place of where they are."""
-        return replace(self, of=_read(self.key if self.of is None else self.of, record), tint=_read(self.tint, record))
+        """The column with its values, cells and tints in the place of where they are."""
+        values = _read(self.key if self.of is None else self.of, record)
+        shown = None if self.shown is None else _read(self.shown, record)
+        return replace(self, of=values, shown=shown, tint=_read(self.tint, record))
 
     @property
     def values(self) -> Sequence[Any]:
@@ -57,7 +60,7 @@ class Column:
     @property
     def cells(self) -> Sequence[str]:
         """The same as a page shows them."""
-        return self.digits(self.values) if callable(self.digits) else self.digits
+        return self.digits(self.values) if self.shown is None else self.shown
 
     @property
     def is_text(self) -> bool:

@@ -287,7 +287,7 @@ def test_a_K2_where_the_search_ended_has_a_star():
     small = hub_study(ARMS["micro"], [1e-7, 2e-7, 5e-7], count=1)
     assert "K1 = 1.66 × 10⁻⁵, K2 = 0.3" in next(candidates.loop_columns(small, verdicts)).group
     assert "*" in assumptions_section.searched_words(edges)
-    certain = replace(edges, of=edges.of[::2], digits=edges.digits[::2])
+    certain = replace(edges, of=edges.of[::2], shown=edges.shown[::2])
     assert not assumptions_section.searched_words(certain)
 
 

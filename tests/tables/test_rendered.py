@@ -31,7 +31,7 @@ COLUMNS = (
     Column("omega_rad_s", "frequency", "rad/s", of="omega", digits=singly(significant, 5), group="both"),
     Column("frequency_hz", "", "Hz", of=lambda found: found.omega / (2 * math.pi), digits=lined(5, 3), group="both"),
     Column("words", "what & why", tint=("", "#fff", "")),
-    Column("nodes_m", "nodes", "m", of=[(0.1, 0.25), (), (1e-300,)], digits=["0.1, 0.25", "none", "1e-300"]),
+    Column("nodes_m", "nodes", "m", of=[(0.1, 0.25), (), (1e-300,)], shown=["0.1, 0.25", "none", "1e-300"]),
 )
 
 

@@ -81,12 +81,12 @@ def loop_columns(study: Study, found: tuple[LoopVerdict, ...] | None) -> Iterato
     words = [each.verdict for each in verdicts]
     yield Column("verdict", "verdict", of=words, head="loop", group=group, tint=_tints, on=everywhere)
     shown = [EDGE if K2 is None else general(K2, 6) for K2 in edges]
-    yield Column("K2_below", of=edges, head="K2 below", digits=shown, on=ANSWER)
+    yield Column("K2_below", of=edges, head="K2 below", shown=shown, on=ANSWER)
     yield Column("K2_below_is_edge", of=[each.is_edge for each in verdicts], on=(JSON,))
     if found:
         texts = [EDGE if each.K2_below is None else _edge(each.K2_below, each.is_edge) for each in found]
         values = ["" if K2 is None else K2 for K2 in edges]
-        yield Column("K2_below", "stable below K2", of=values, digits=texts, group=group, tint=_tints, on=REPORT)
+        yield Column("K2_below", "stable below K2", of=values, shown=texts, group=group, tint=_tints, on=REPORT)
 
 
 def _edge(K2: float, is_edge: bool) -> str:

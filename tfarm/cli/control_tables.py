@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from tfarm.columns import Column, Table
-from tfarm.loop.answers import POLES
+from tfarm.loop.answers import MARGINS, POLES
 from tfarm.tables.files import write_csv
-from tfarm.tables.terminal import show
+from tfarm.tables.terminal import heading, show
 
 
 def print_poles(answer: dict[str, Any]) -> None:
@@ -61,26 +61,18 @@ def _window(pair: list[float], ends: list[str]) -> str:
     return f"({low}, {high})"
 
 
-LIMITS = {  # of an answer's margins: the name, and that of where it is taken
-    "phase_margin_deg": ("phase margin [deg]", "phase"),
-    "phase_lag_deg": ("phase lag [deg]", "phase_lag"),
-    "phase_lead_deg": ("phase lead [deg]", "phase_lead"),
-    "delay_margin_s": ("delay margin [s]", "delay"),
-    "disk_margin": ("disk margin", "disk"),
-    "peak_sensitivity": ("peak sensitivity", "peak_sensitivity"),
-}
-
-
 def _print_loop_margins(answer: dict[str, Any]) -> None:
     band = answer["in_band"]
-    phases = range(1, 4)  # exact ones are shown where a delay does not take them away
-    sizes = ["not known" if answer[key] is None else f"{answer[key]:.6g}" for key in LIMITS]
-    exact = ["" if i in phases and not answer["delay_margin_s"] else size for i, size in enumerate(sizes, 1)]
-    at = ["-" if math.isinf(band[key]) else f"{band['at_rad_s'][name]:.6g}" for key, (_, name) in LIMITS.items()]
+    hidden = not answer["delay_margin_s"]  # what a delay takes away has no exact phase
+    sizes = ["not known" if (size := answer[each.key]) is None else f"{size:.6g}" for each in MARGINS]
+    exact = ["" if hidden and each.unit == "deg" else size for each, size in zip(MARGINS, sizes, strict=True)]
+    at = ["-" if math.isinf(band[each.key]) else f"{band['at_rad_s'][each.of]:.6g}" for each in MARGINS]
     columns = (
-        Column("margin", "margin", of=["gain (factors)", *(title for title, _ in LIMITS.values())]),
+        Column("margin", "margin", of=["gain (factors)", *map(heading, MARGINS)]),
         Column("exact", "exact", of=[_pair(answer["gain_margin"]), *exact]),
-        Column("band", f"up to {band['band_rad_s']:.6g} rad/s", of=["", *(f"{band[key]:.6g}" for key in LIMITS)]),
+        Column(
+            "band", f"up to {band['band_rad_s']:.6g} rad/s", of=["", *(f"{band[each.key]:.6g}" for each in MARGINS)]
+        ),
         Column("at", "at", "rad/s", of=["", *at]),
     )
     show(Table(columns=columns))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -78,23 +79,16 @@ def print_compared(answer: dict[str, Any]) -> None:
         first = Column("index", "mode", of=answer["index"]), Column("", "rad/s", of=numbers, digits=singly(general, 15))
     else:
         points = [f"{complex(*at):.10g}" for at in answer["s"]]
-        values = [_shown(complex(*value)) for value in numbers]
+        pairs = ([part if abs(part) > ALIKE * math.hypot(*pair) else 0.0 for part in pair] for pair in numbers)
+        values = [f"{complex(*pair):.15g}" for pair in pairs]  # no part that is less than the rounding of the other
         first = Column("s", "s", "1/s", of=points), Column("", answer["output"], answer["unit"], of=values)
     apart = [
         Column(name, f"{name} differ{end} by", of=answer["differences"][name], digits=singly("{:.1e}".format))
         for name, end in (("balls", ""), ("appendix", "s"))
     ]
     show(Table(columns=(*first, *apart)))
-    print(_verdict(answer["largest_difference"]))
-
-
-def _shown(value: complex) -> str:
-    """A value in 15 digits; without a part that is less than the rounding of the other."""
-    parts = [part if abs(part) > ALIKE * abs(value) else 0.0 for part in (value.real, value.imag)]
-    return f"{complex(*parts):.15g}"
-
-
-def _verdict(largest: float) -> str:
+    largest = answer["largest_difference"]
     if largest <= ALIKE:
-        return f"Float64, proven balls and the paper's own determinant agree to {largest:.1e}, their rounding."
-    return f"They part by up to {largest:.1e}: more than rounding ({ALIKE:.0e}); the balls are proven."
+        print(f"Float64, proven balls and the paper's own determinant agree to {largest:.1e}, their rounding.")
+    else:
+        print(f"They part by up to {largest:.1e}: more than rounding ({ALIKE:.0e}); the balls are proven.")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,20 +11,10 @@ import numpy as np
 
 from tfarm.cli.app import tell
 from tfarm.columns import Column, Table
+from tfarm.dsp.results import SIGNALS
 from tfarm.files import write_file
 from tfarm.tables.files import write_csv
 from tfarm.tables.terminal import show
-
-SIGNALS = {
-    "t": "s",
-    "hub_angle": "rad",
-    "hub_rate": "rad/s",
-    "root_moment": "N m",
-    "tip_displacement": "m",
-    "torque": "N m",
-    "gain": "-",
-    "volts": "V",
-}
 
 
 def print_sampled(answer: dict[str, Any]) -> None:
@@ -43,7 +34,10 @@ def print_sampled(answer: dict[str, Any]) -> None:
 def print_simulation(answer: dict[str, Any]) -> None:
     """What the simulation comes to."""
     print(f"{answer['arm']}, {answer['scenario_in_words']}: {len(answer['t'])} samples of {answer['period_s']:g} s")
-    print(_modes_words(answer))
+    change, known = answer["modes_change"], "as asked"
+    if change is not None:
+        known = f"half of them change the signals by {change:.2g} of their largest"
+    print(f"{answer['modes_used']} flexible modes{', ' if change is None else ': '}{known}")
     print(f"residual root moment, less the rigid arm's: {answer['residual_moment_rms']:.6g} N m rms")
     print(f"settled (5 %) at: {answer['settling_time_s']:.4g} s")
     print(f"saturated samples: {', '.join(f'{k} {n}' for k, n in answer['saturated_samples'].items())}")
@@ -52,14 +46,6 @@ def print_simulation(answer: dict[str, Any]) -> None:
         at = cycle["frequency_rad_s"]
         size = f"root moment +-{cycle['root_moment_amplitude']:.4g} N m at {at:.4g} rad/s"
         print(f"limit cycle, kept up by {cycle['kept_up_by']}: {size}")
-
-
-def _modes_words(answer: dict[str, Any]) -> str:
-    """How many modes, and what is known of the rest."""
-    change, modes = answer["modes_change"], f"{answer['modes_used']} flexible modes"
-    if change is None:
-        return f"{modes}, as asked"
-    return f"{modes}: half of them change the signals by {change:.2g} of their largest"
 
 
 def warn_if_stopped(answer: dict[str, Any]) -> None:
@@ -74,13 +60,12 @@ def write_signals(answer: dict[str, Any], path: Path) -> None:
 
     Rows between the samples leave empty what changes at the samples only: torque, gain and volts.
     """
-    names, finer = _present(answer), answer.get("between", {"t": []})
-    empty = [""] * len(finer["t"])
-    order = np.argsort([*answer["t"], *finer["t"]], kind="stable")
-    values = ([*answer[name], *finer.get(name, empty)] for name in names)
-    columns = (
-        Column(name, unit=SIGNALS[name], of=[of[i] for i in order]) for name, of in zip(names, values, strict=True)
-    )
+    finer = answer.get("between", {"t": []})
+    empty, order = [""] * len(finer["t"]), np.argsort([*answer["t"], *finer["t"]], kind="stable")
+    columns = []
+    for column in _present(answer):
+        values = [*answer[column.key], *finer.get(column.key, empty)]
+        columns.append(replace(column, of=[values[i] for i in order]))
     write_csv(Table(columns=tuple(columns)), path)
 
 
@@ -88,7 +73,7 @@ def write_mat(answer: dict[str, Any], path: Path) -> None:
     """The signals at the samples, and those between them, as a MATLAB file (level 5)."""
     from scipy.io import savemat
 
-    signals: dict[str, Any] = {name: np.array(answer[name]) for name in _present(answer)}
+    signals: dict[str, Any] = {column.key: np.array(answer[column.key]) for column in _present(answer)}
     if "between" in answer:
         signals["between"] = {name: np.array(values) for name, values in answer["between"].items()}
     data = io.BytesIO()
@@ -98,8 +83,8 @@ def write_mat(answer: dict[str, Any], path: Path) -> None:
     write_file(path, header + content[116:], key="--mat")
 
 
-def _present(answer: dict[str, Any]) -> list[str]:
-    return [name for name in SIGNALS if answer.get(name)]
+def _present(answer: dict[str, Any]) -> list[Column]:
+    return [column for column in SIGNALS if answer.get(column.key)]
 
 
 def _texts(windows: list[list[dict[str, Any]]], band: float | None) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback
+from tfarm.columns import Column
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.enough import Enough, enough_modes
 from tfarm.dsp.scenarios import described, scenario
@@ -23,6 +24,18 @@ LASTING = 0.7  # a limit cycle keeps at least this much of its amplitude over a 
 BEYOND_IDEAL = 2.0  # and is this much larger than what an ideal chain leaves at that time
 FEWEST_TURNS = 1.0  # of the moment about its mean in a quarter of the record: fewer are a drift and no vibration
 FEWEST = 40  # samples without which a limit cycle cannot be told
+
+
+SIGNALS = (  # of a simulation's answer: the first are those of a `Trace`, the others stand at the samples only
+    Column("t", "time", "s"),
+    Column("hub_angle", "hub angle", "rad"),
+    Column("hub_rate", "hub rate", "rad/s"),
+    Column("root_moment", "root moment", "N m"),
+    Column("tip_displacement", "tip displacement", "m"),
+    Column("torque", "torque", "N m"),
+    Column("gain", "gain", "-"),
+    Column("volts", "volts", "V"),
+)
 
 
 @dataclass(frozen=True)
@@ -141,10 +154,18 @@ def simulation_answer(
         "settling_time_s": settling_time(simulation),
         "saturated_samples": simulation.saturated,
         "energy_error": simulation.energy_error,
-        "limit_cycle": None if cycle is None else _cycle(cycle),
+        "limit_cycle": None,
         "stopped_at_s": None if stopped is None else stopped.time,
         "growing_mode": None if stopped is None else stopped.mode,
     }
+    if cycle is not None:
+        answer["limit_cycle"] = {
+            "root_moment_amplitude": cycle.root_moment,
+            "hub_rate_amplitude": cycle.hub_rate,
+            "torque_amplitude": cycle.torque,
+            "frequency_rad_s": cycle.frequency,
+            "kept_up_by": cycle.kept_up_by,
+        }
     if volts is not None:
         answer["volts"] = volts.tolist()
     if simulation.between is not None:
@@ -152,19 +173,8 @@ def simulation_answer(
     return answer
 
 
-def _cycle(cycle: LimitCycle) -> dict[str, float | str]:
-    return {
-        "root_moment_amplitude": cycle.root_moment,
-        "hub_rate_amplitude": cycle.hub_rate,
-        "torque_amplitude": cycle.torque,
-        "frequency_rad_s": cycle.frequency,
-        "kept_up_by": cycle.kept_up_by,
-    }
-
-
-def _columns(trace: Trace) -> dict[str, list[float]]:
-    names = ("t", "hub_angle", "hub_rate", "root_moment", "tip_displacement")
-    return {name: getattr(trace, name).tolist() for name in names}
+def _columns(trace: Trace) -> dict[str, Sequence[float]]:
+    return {column.key: column.read(trace).values for column in SIGNALS if hasattr(trace, column.key)}
 
 
 def ideal_chain(chain: Chain) -> Chain:

@@ -11,13 +11,12 @@ from tfarm.digits import general, singly, within
 
 from .design import Design
 from .lyapunov import lyapunov
-from .margins import LoopMargins, Margins
+from .margins import Margins
 from .poles import Poles
 from .regions import INFINITE, Region
 from .windows import Windows
 
 SIGN = "u = -Kp theta - K1 theta_t - K2 E I phi'(0) + r; a static torque u gives the moment -(J - I_h)/J u"
-PHASES = ("phase", "phase_lag", "phase_lead")
 
 
 HELD = 2e-14  # of a pole's size: what its float64 may be off (tests: 1e-14 to 50 digits)
@@ -25,6 +24,14 @@ POLES = (  # of pairs Re s, Im s
     Column("re", "Re s", "1/s", of=lambda pole: within(pole[0], HELD * math.hypot(*pole), 12)),
     Column("im", "Im s", "rad/s", of=lambda pole: pole[1], digits=singly(general, 12)),
     Column("ratio", "damping ratio", of=lambda pole: within(-pole[0] / math.hypot(*pole), HELD, 6) if pole[1] else "-"),
+)
+MARGINS = (  # of `LoopMargins`, beside the factors of the gain
+    Column("phase_margin_deg", "phase margin", "deg", of="phase"),
+    Column("phase_lag_deg", "phase lag", "deg", of="phase_lag"),
+    Column("phase_lead_deg", "phase lead", "deg", of="phase_lead"),
+    Column("delay_margin_s", "delay margin", "s", of="delay"),
+    Column("disk_margin", "disk margin", of="disk"),
+    Column("peak_sensitivity", "peak sensitivity", of="peak_sensitivity"),
 )
 
 
@@ -56,7 +63,10 @@ def margins_answer(found: Margins) -> dict[str, Any]:
     """The verdict first; margins are null unless the loop is stable."""
     verdict = found.stability
     proof = lyapunov(verdict.loop.arm, verdict.loop.law)
-    limits = found.in_band
+    limits, sizes = found.in_band, sizes_of(found)
+    in_band = None
+    if limits is not None:
+        in_band = {"band_rad_s": limits.band, **{key: size for key, (_, size) in sizes.items()}, "at_rad_s": limits.at}
     return {
         "arm": verdict.loop.arm.name,
         **law_answer(verdict.loop.law),
@@ -70,13 +80,20 @@ def margins_answer(found: Margins) -> dict[str, Any]:
         "lyapunov": {"proven": proof.proven, "a1_over_a2": proof.a1_over_a2, "reason": proof.reason},
         **{key: value for name, windows in found.windows.items() for key, value in _windows(name, windows).items()},
         "gain_margin": None if limits is None else list(limits.gain),
-        **_phases(limits),
-        "delay_margin_s": found.exact_delay,
-        "disk_margin": found.exact_disk,
-        "peak_sensitivity": found.exact_peak,
-        "at_rad_s": None if limits is None else {name: limits.at[name] for name in PHASES},
-        "in_band": None if limits is None else _in_band(limits),
+        **{key: exact for key, (exact, _) in sizes.items()},
+        "at_rad_s": None
+        if limits is None
+        else {name: limits.at[name] for name in ("phase", "phase_lag", "phase_lead")},
+        "in_band": in_band,
     }
+
+
+def sizes_of(found: Margins) -> dict[str, tuple[float | None, float | None]]:
+    """Of each of MARGINS what is exact and what holds in the band; None where not known, or where there is none."""
+    limits: Any = found.in_band
+    exact = {"delay": found.exact_delay, "disk": found.exact_disk, "peak_sensitivity": found.exact_peak}
+    sizes = {column.of: None if limits is None else getattr(limits, column.of) for column in MARGINS}
+    return {column.key: (exact.get(column.of, sizes[column.of]), sizes[column.of]) for column in MARGINS}
 
 
 def _windows(name: str, windows: Windows) -> dict[str, Any]:
@@ -87,26 +104,6 @@ def _windows(name: str, windows: Windows) -> dict[str, Any]:
         f"{name}_windows": [list(pair) for pair in windows.all],
         f"{name}_windows_ends": [[windows.end(value) for value in pair] for pair in windows.all],
         f"{name}_looked_at": list(windows.looked_at),
-    }
-
-
-def _in_band(limits: LoopMargins) -> dict[str, Any]:
-    return {
-        "band_rad_s": limits.band,
-        **_phases(limits),
-        "delay_margin_s": limits.delay,
-        "disk_margin": limits.disk,
-        "peak_sensitivity": limits.peak_sensitivity,
-        "at_rad_s": limits.at,
-    }
-
-
-def _phases(limits: LoopMargins | None) -> dict[str, float | None]:
-    """The phase margin, signed as python-control does, and the sizes of both sides: lag above 0, lead below."""
-    return {
-        "phase_margin_deg": None if limits is None else limits.phase,
-        "phase_lag_deg": None if limits is None else limits.phase_lag,
-        "phase_lead_deg": None if limits is None else limits.phase_lead,
     }
 
 

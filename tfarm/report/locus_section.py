@@ -157,7 +157,7 @@ def _poles_table(
             Column(name, name, unit, of=gains, digits=singly(plain, 4)),
             Column("verdict", "verdict", of=[it.verdict if it else "on the axis, not decided" for it in found]),
             Column("unstable_poles", "unstable poles", of=counts),
-            Column("spectral_abscissa_1_s", "fastest growth", "1/s", of=growth, digits=[_growth(it) for it in found]),
+            Column("spectral_abscissa_1_s", "fastest growth", "1/s", of=growth, shown=[_growth(it) for it in found]),
             Column("first_pairs", "first pairs of poles, Re ± i Im [1/s]", of=[_first_pairs(it) for it in found]),
         ),
     )

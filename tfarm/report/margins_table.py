@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 from tfarm.columns import Column, Table
 from tfarm.digits import plain, significant, singly
 from tfarm.dsp.brief import SampledBrief
+from tfarm.loop.answers import MARGINS, sizes_of
 from tfarm.loop.lyapunov import lyapunov
 from tfarm.loop.margins import Margins
 from tfarm.loop.windows import Windows
@@ -16,9 +18,9 @@ from tfarm.report.sections import Fact
 
 NOTHING = "none: not stable"
 UNKNOWN = "not known"  # an exact margin, where nothing bounds L beyond the band
-LARGEST_DISK = 2.0  # of a passive loop, at no frequency of its own: as the least peak sensitivity, 1
+UNLIMITED = {"disk": 2.0, "peak_sensitivity": 1.0}  # sizes of a passive loop, at no frequency of its own; else inf
 UNITS = {"K1": "N m s/rad", "K2": "", "Kp": "N m/rad"}
-MARGINS = (
+CAPTION = (
     "Exact: of the infinite-dimensional loop; not known where nothing bounds L beyond the band. "
     "In the band: as far as the poles were computed{undamped}. Gain margin: "
     "factors on both gains at once between which the loop stays stable. Phase margin: where |L| = 1, the angle from −1 "
@@ -34,10 +36,8 @@ WINDOWS = (
     "The others held, each gain may move within its window before the first pole reaches the axis. Ends ±∞ are proven; "
     "an end with a star is no edge: up to there none was found, and beyond none was looked for. {sign}"
 )
-QUANTITIES = (
-    "gain margin, down", "gain margin, up", "phase margin", "phase lag", "phase lead", "delay margin", "disk margin α",
-    "peak sensitivity",
-)  # fmt: skip
+TITLES = {"disk": "disk margin α"}
+QUANTITIES = ("gain margin, down", "gain margin, up", *(TITLES.get(each.of, each.title) for each in MARGINS))
 
 Row = tuple[str, str, float | str, float | str, float | str]  # quantity, unit, exact, in the band, at
 
@@ -90,7 +90,7 @@ def margin_table(laws: Sequence[NamedLaw], found: Sequence[Margins], is_undamped
     return Table(
         stem="margins",
         title="Verdict and margins",
-        caption=MARGINS.format(undamped=UNDAMPED if is_undamped else "") + _leads(laws, found),
+        caption=CAPTION.format(undamped=UNDAMPED if is_undamped else "") + _leads(laws, found),
         columns=tuple(columns),
     )
 
@@ -119,61 +119,24 @@ def _rows(found: Margins) -> Iterator[Row]:
         return
     yield "gain margin, down", "factor", band.gain[0], "", ""
     yield "gain margin, up", "factor", band.gain[1], "", ""
-    phases = {"phase margin": band.phase, "phase lag": band.phase_lag, "phase lead": band.phase_lead}
-    hidden = found.exact_delay == 0 or found.exact_delay is None
-    for name, at in zip(phases, ("phase", "phase_lag", "phase_lead"), strict=True):
-        where = "" if math.isinf(phases[name]) else band.at[at]
-        yield name, "deg", "" if hidden else phases[name], phases[name], where
-    where = "" if math.isinf(band.delay) else band.at["delay"]
-    yield "delay margin", "s", _known(found.exact_delay), band.delay, where
-    where = "" if band.disk == LARGEST_DISK else band.at["disk"]
-    yield "disk margin α", "", _known(found.exact_disk), band.disk, where
-    where = "" if band.peak_sensitivity == 1 else band.at["peak_sensitivity"]
-    yield "peak sensitivity", "", _known(found.exact_peak), band.peak_sensitivity, where
-
-
-def _known(exact: float | None) -> float | str:
-    return UNKNOWN if exact is None else exact
+    for column, (exact, size) in zip(MARGINS, sizes_of(found).values(), strict=True):
+        assert size is not None
+        known = "" if column.unit == "deg" and not found.exact_delay else UNKNOWN if exact is None else exact
+        where = "" if abs(size) == UNLIMITED.get(column.of, math.inf) else band.at[column.of]
+        yield TITLES.get(column.of, column.title), column.unit, known, size, where
 
 
 def _number(value: float) -> str:
     return plain(value, 6) if value.is_integer() else significant(value, 5)
 
 
-def window_table(laws: Sequence[NamedLaw], found: Sequence[Margins], sign: str) -> Table:
-    """A row a law and gain; none for K2 on a free pin, where it has no loop."""
-    rows = [
-        (law, name, each.windows[name], each)
-        for law, each in zip(laws, found, strict=True)
-        for name in UNITS
-        if name != "K2" or each.stability.loop.arm.hub.inertia > 0
-    ]
-    values = [getattr(law.law, name) for law, name, _, _ in rows]
-    around = [_window(windows, windows.around) if windows.around else NOTHING for _, _, windows, _ in rows]
-    return Table(
-        stem="windows",
-        title="How far each gain may go alone",
-        caption=WINDOWS.format(sign=sign),
-        columns=(
-            Column("law", "law", of=[law.name for law, *_ in rows]),
-            Column("verdict", "verdict", of=[each.stability.verdict for *_, each in rows]),
-            Column("gain", "gain", of=[name for _, name, _, _ in rows]),
-            Column("unit", "unit", of=[UNITS[name] for _, name, _, _ in rows]),
-            Column("value", "value", of=values, digits=singly(plain, 5)),
-            Column(
-                "stable_around_it", "stable around it", digits=around,
-                of=[_joined(windows.around) if windows.around else NOTHING for _, _, windows, _ in rows],
-            ),
-            Column(
-                "stable_windows", "all stable windows", digits=[_all(windows) for _, _, windows, _ in rows],
-                of=[_joined(*windows.all) or "none" for _, _, windows, _ in rows],
-            ),
-            Column(
-                "looked_at", "looked at", digits=[_pair(windows.looked_at) for _, _, windows, _ in rows],
-                of=[_joined(windows.looked_at) for _, _, windows, _ in rows],
-            ),
-        ),
-    )  # fmt: skip
+class GainRow(NamedTuple):
+    """One gain of one law, and its windows."""
+
+    law: NamedLaw
+    gain: str
+    windows: Windows
+    verdict: str
 
 
 def _joined(*pairs: tuple[float, float]) -> str:
@@ -181,15 +144,45 @@ def _joined(*pairs: tuple[float, float]) -> str:
     return " ".join(repr(float(end)) for pair in pairs for end in pair)
 
 
-def _all(windows: Windows) -> str:
-    return ", ".join(_window(windows, pair) for pair in windows.all) or "none"
+def _spans(windows: Windows, *pairs: tuple[float, float]) -> str:
+    """Intervals with a star at each end that only bounds the search."""
+    ends = ([f"{plain(x, 5)}{'*' * (windows.end(x) == 'search bound')}" for x in pair] for pair in pairs)
+    return ", ".join(f"({low}, {high})" for low, high in ends)
 
 
-def _window(windows: Windows, pair: tuple[float, float]) -> str:
-    """An interval with a star at each end that only bounds the search."""
-    low, high = (f"{plain(value, 5)}{'*' * (windows.end(value) == 'search bound')}" for value in pair)
-    return f"({low}, {high})"
+GAIN_ROWS = (
+    Column("law", "law", of="law.name"),
+    Column("verdict", "verdict"),
+    Column("gain", "gain"),
+    Column("unit", "unit", of=lambda row: UNITS[row.gain]),
+    Column("value", "value", of=lambda row: getattr(row.law.law, row.gain), digits=singly(plain, 5)),
+    Column(
+        "stable_around_it", "stable around it",
+        of=lambda row: _joined(row.windows.around) if row.windows.around else NOTHING,
+        shown=lambda row: _spans(row.windows, row.windows.around) if row.windows.around else NOTHING,
+    ),
+    Column(
+        "stable_windows", "all stable windows",
+        of=lambda row: _joined(*row.windows.all) or "none",
+        shown=lambda row: _spans(row.windows, *row.windows.all) or "none",
+    ),
+    Column(
+        "looked_at", "looked at",
+        of=lambda row: _joined(row.windows.looked_at),
+        shown=lambda row: "({}, {})".format(*(plain(end, 5) for end in row.windows.looked_at)),
+    ),
+)  # fmt: skip
 
 
-def _pair(pair: tuple[float, float]) -> str:
-    return f"({plain(pair[0], 5)}, {plain(pair[1], 5)})"
+def window_table(laws: Sequence[NamedLaw], found: Sequence[Margins], sign: str) -> Table:
+    """A row a law and gain; none for K2 on a free pin, where it has no loop."""
+    rows = [
+        GainRow(law, name, each.windows[name], each.stability.verdict)
+        for law, each in zip(laws, found, strict=True)
+        for name in UNITS
+        if name != "K2" or each.stability.loop.arm.hub.inertia > 0
+    ]
+    caption = WINDOWS.format(sign=sign)
+    return Table(
+        stem="windows", title="How far each gain may go alone", caption=caption, columns=GAIN_ROWS, record=rows
+    )

@@ -20,9 +20,7 @@ from tfarm.report.mode_shapes import Shape, draw_differences, draw_shapes, shape
 from tfarm.report.sections import Section
 from tfarm.report.trust_proofs import how_proven
 from tfarm.response.frequency import Real
-from tfarm.spectrum import Modes
-from tfarm.spectrum.answers import KEPT
-from tfarm.spectrum.answers import MODES as MODAL
+from tfarm.spectrum import Modes, answers
 
 MODES, SHAPES = 10, 6
 SIMPLER: tuple[Theory, ...] = ("shear", "rayleigh", "euler-bernoulli")
@@ -103,10 +101,12 @@ def _flexible(modes: Modes) -> Real:
 def modal_table(modes: Modes) -> Table:
     """Frequencies, hub participation, modal moment and nodes."""
     nodes = [", ".join(places(node, modes.arm.link.length)) or "none" for node in modes.nodes]
-    decimals = KEPT - 1 - math.floor(math.log10(modes.arm.link.length))  # a node is known as a share of the length
+    decimals = (
+        answers.KEPT - 1 - math.floor(math.log10(modes.arm.link.length))
+    )  # a node is known as a share of the length
     at = [tuple(np.round(node, decimals).tolist()) for node in modes.nodes]
     rigid = "Row 0 is the arm turning as a rigid body. " if modes.arm.has_rigid_mode else ""
-    omega, hertz = (column.read(modes).cells for column in MODAL[1:3])
+    omega, hertz = (column.read(modes).cells for column in answers.MODES[1:3])
     return Table(
         stem="modal-table",
         title="Modal table",
@@ -116,7 +116,7 @@ def modal_table(modes: Modes) -> Table:
             hub=LOCKED if modes.arm.is_locked else FREE_PIN if modes.arm.hub.inertia == 0 else "",
             proof=how_proven(modes, omega, hertz),
         ),
-        columns=(*MODAL, Column("nodes_m", "nodes", "m", of=at, digits=nodes, on=REPORT)),
+        columns=(*answers.MODES, Column("nodes_m", "nodes", "m", of=at, shown=nodes, on=REPORT)),
         record=modes,
     )
 
@@ -138,7 +138,9 @@ def places(nodes: Real, length: float) -> tuple[str, ...]:
 def _shapes(name: str, shapes: tuple[Shape, ...]) -> Picture:
     counts = ", ".join(str(len(shape.nodes)) for shape in shapes)
     columns = [Column("x_m", "x", "m", of=shapes[0].x)]
-    columns += [Column(f"mode_{s.number}", f"mode {s.number}", of=np.round(s.w, KEPT - 1) + 0.0) for s in shapes]
+    columns += [
+        Column(f"mode_{s.number}", f"mode {s.number}", of=np.round(s.w, answers.KEPT - 1) + 0.0) for s in shapes
+    ]
     return Picture(
         stem="mode-shapes",
         title=f"Shapes of the first {len(shapes)} flexible modes",
@@ -194,7 +196,7 @@ def sensitivity_table(modes: Modes) -> Table:
     """Per cent of frequency per per cent of each parameter: a row a parameter, a column a mode."""
     flexible = modes.index > 0
     rows = {
-        PARAMETER_NAMES.get(name, name.replace("_", " ")): np.round(values[flexible], KEPT - 1) + 0.0
+        PARAMETER_NAMES.get(name, name.replace("_", " ")): np.round(values[flexible], answers.KEPT - 1) + 0.0
         for name, values in modes.sensitivity.items()
     }
     shown = {name: values for name, values in rows.items() if abs(values).max() > NEGLECTED}

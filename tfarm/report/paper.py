@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 from tfarm.arm import Arm
 from tfarm.columns import Column, Table
@@ -70,18 +71,20 @@ def is_from_paper(arm: Arm) -> bool:
 def paper_section(arm: Arm) -> Section:
     """Table 1 and its corrections."""
     used = values_of(arm)
+    marked = partial(Column, tint=["#fff1de" if remark(key, used[key]) else "" for key in TABLE_1])
     printed = [_with_unit(row.value, row.unit) if row.value is not None else "not given" for row in TABLE_1.values()]
     table = Table(
         stem="paper-values",
         title="Table 1 of the paper, and what is used here",
         caption="Rows in colour differ from the paper in value or unit, or are missing there: every number on this "
         "page rests on them.",
+        record=list(TABLE_1.values()),
         columns=(
-            Column("quantity", "quantity", of=[row.quantity for row in TABLE_1.values()]),
-            Column("symbol", "symbol", of=[row.symbol for row in TABLE_1.values()]),
-            _tinted("printed", "printed in Table 1", printed, arm),
-            _tinted("used_here", "used here", [_with_unit(used[k], row.unit_here) for k, row in TABLE_1.items()], arm),
-            _tinted("remark", "why", [remark(key, used[key]) for key in TABLE_1], arm),
+            Column("quantity", "quantity"),
+            Column("symbol", "symbol"),
+            marked("printed", "printed in Table 1", of=printed),
+            marked("used_here", "used here", of=[_with_unit(used[k], row.unit_here) for k, row in TABLE_1.items()]),
+            marked("remark", "why", of=[remark(key, used[key]) for key in TABLE_1]),
         ),
     )
     words = (
@@ -110,9 +113,3 @@ def remark(key: str, used: float) -> str:
 
 def _with_unit(value: float, of: str) -> str:
     return f"{plain(value, 6)} {unit(of)}".strip()
-
-
-def _tinted(key: str, title: str, texts: list[str], arm: Arm) -> Column:
-    used = values_of(arm)
-    tint = ["#fff1de" if remark(name, used[name]) else "" for name in TABLE_1]
-    return Column(key, title, of=texts, tint=tint)

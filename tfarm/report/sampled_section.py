@@ -109,7 +109,7 @@ def _periods_table(data: Sampled) -> Table:
             Column("half_rate_hz", "aliased above", "Hz", of=half, digits=singly(plain)),
             Column("verdict", "verdict", of=lambda row: "stable" if row.log_radius < 0 else "unstable"),
             Column("growth_1_s", "growth", "1/s", of=growth, digits=singly(scientific, 3)),
-            Column("modes", "modes", of="analysis_modes", digits=first),
+            Column("modes", "modes", of="analysis_modes", shown=first),
             _window_column("stable_K1", "stable K1", "N m s/rad", [(row.K1, row.gains.K1) for row in rows]),
             _window_column("stable_K2", "stable K2", "", [(row.K2, row.gains.K2) for row in rows]),
         ),
@@ -121,7 +121,7 @@ def _window_column(key: str, title: str, unit: str, rows: list[tuple[tuple[Windo
     here = [around(list(windows), gain) for windows, gain in rows]
     every = [tuple(end for window in windows for end in window) for windows, _ in rows]
     values = [window or others for window, others in zip(here, every, strict=True)]
-    return Column(key, title, unit, of=values, digits=[spans(*row) for row in rows])
+    return Column(key, title, unit, of=values, shown=[spans(*row) for row in rows])
 
 
 def _mode_blocks(data: Sampled) -> list[Picture | Table]:

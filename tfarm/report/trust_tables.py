@@ -97,7 +97,7 @@ def accuracy_table(proofs: Sequence[Proof]) -> Table:
         errors = [dict(proof.errors).get(output) for proof in proofs]
         cells = ["zero throughout" if error is None else scientific(error, 2) for error in errors]
         values = ["" if error is None else error for error in errors]
-        columns.append(Column(output, output.replace("_", " "), of=values, digits=cells))
+        columns.append(Column(output, output.replace("_", " "), of=values, shown=cells))
     caption = "Worst error of double precision over those frequencies, counted as said above."
     return Table(
         stem="accuracy", title="Double precision against proven digits", caption=caption, columns=tuple(columns)

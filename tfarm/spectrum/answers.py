@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tfarm.columns import ANSWER, JSON, REPORT, TERMINAL, Column, Table
-from tfarm.digits import general, held, lined, singly, within
+from tfarm.digits import aligned, general, held, lined, significant, singly, within
 from tfarm.errors import MISSING
 from tfarm.exact.methods import Method
 
@@ -19,6 +19,7 @@ from .table import Modes, Real, compare_theories
 
 KEPT = 10  # digits in a report's files of what shapes are needed for: these differ by 1e-14 from processor to processor
 HELD = 2e-14  # of an eigenvalue's size: what its float64 may be off (tests: 1e-14 to 50 digits, 64 eps in closed form)
+SMALL = 1e-3  # a damping ratio below this has less than three digits in five decimals
 IN_THE_BOX = "complete in the box; lightly damped shear modes exist above any box, real eigenvalues accumulate at -1/C"
 
 
@@ -50,6 +51,26 @@ MODES = (  # of `Modes`; a page adds the nodes, which it rounds to a share of th
     Column("modal_moment", "modal moment", "N m/√(kg m²)", of=lambda modes: held(modes.modal_moment + 0.0, KEPT),
            digits=lined(7, 4), on=REPORT),
 )  # fmt: skip
+
+
+def _imaginary(damped: DampedModes) -> list[str]:
+    """Im s, or of an overdamped mode the second of its real eigenvalues."""
+    rising = aligned(damped.eigenvalues[:, 0].imag, 8, least=7)
+    pairs = zip(damped.eigenvalues[:, 1].real.tolist(), damped.is_overdamped, rising, strict=True)
+    return [f"overdamped, and {significant(second, 7)}" if over else text for second, over, text in pairs]
+
+
+def _ratio(ratio: float) -> str:
+    """Five decimals; a ratio that would lose its digits there has four of its own; 0 of a rigid body."""
+    return "0" if ratio == 0 else f"{ratio:.5f}" if ratio >= SMALL else significant(ratio, 4)
+
+
+DAMPED_MODES = (  # of `DampedModes`, on a page; a command has them beside the undamped ones
+    Column("index", "mode"),
+    Column("eigenvalue_re", "Re s", "1/s", of=lambda damped: damped.eigenvalues[:, 0].real, digits=lined(7, 6)),
+    Column("eigenvalue_im", "Im s", "rad/s", of=lambda damped: damped.eigenvalues[:, 0].imag, shown=_imaginary),
+    Column("damping_ratio", "damping ratio", "-", digits=singly(_ratio)),
+)
 
 
 def modes_answer(
@@ -113,7 +134,7 @@ def _damped(damped: DampedModes, rows: int) -> list[Column]:
         Column("eigenvalue", of=[MISSING if both else [p.real, p.imag] for (p, _), both in pairs] + rest, on=(JSON,)),
         Column("eigenvalues", of=[[p.real, q.real] if both else MISSING for (p, q), both in pairs] + rest, on=(JSON,)),
         Column("eigenvalue", "eigenvalue", "1/s", of=texts + ["not followed"] * len(rest), on=(TERMINAL,)),
-        Column("damping_ratio", "damping ratio", of=ratios + rest, digits=words + ["-"] * len(rest)),
+        Column("damping_ratio", "damping ratio", of=ratios + rest, shown=words + ["-"] * len(rest)),
     ]
 
 

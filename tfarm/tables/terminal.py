@@ -84,7 +84,7 @@ def lines(table: Table, width: int) -> list[str]:
     columns = table.on(TERMINAL)
     cells = [column.printed(column.values) if column.printed else column.cells for column in columns]
     rows = Rows(
-        titles=tuple(_heading(column) for column in columns),
+        titles=tuple(heading(column) for column in columns),
         rows=list(zip(*cells, strict=True)),
         fold=tuple(i for i, column in enumerate(columns) if column.folds),
         keys=table.keys,
@@ -92,7 +92,7 @@ def lines(table: Table, width: int) -> list[str]:
     return rows.lines(width)
 
 
-def _heading(column: Column) -> str:
+def heading(column: Column) -> str:
     """The title with its unit, or what is said on terminals in their place."""
     if column.head is not None:
         return column.head

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -176,13 +176,8 @@ def _shaped(tuning: Tuning) -> dict[str, Any]:
 
 def comparison_answer(rows: list[Row]) -> list[dict[str, Any]]:
     """The rows of a comparison as dictionaries."""
-    return [
-        {key: value._asdict() if hasattr(value, "_asdict") else value for key, value in _items(row)} for row in rows
-    ]
-
-
-def _items(row: Row) -> list[tuple[str, Any]]:
-    return [(name, getattr(row, name)) for name in row.__dataclass_fields__]
+    items = ([(each.name, getattr(row, each.name)) for each in fields(row)] for row in rows)
+    return [{key: value._asdict() if hasattr(value, "_asdict") else value for key, value in row} for row in items]
 
 
 def controlled_answer(
