@@ -93,8 +93,8 @@ def design(
     number, subject = whole("--modes", modes, 1, 30), load_arm(arm)
     chain = chain_of(dsp or arm, period, delay_samples)
     limits = {name: None if text is None else bounds(f"--{name}", text) for name, text in (("K1", k1), ("K2", k2))}
-    from tfarm.dsp.brief import sampled_brief
     from tfarm.cli.control_tables import print_design
+    from tfarm.dsp.brief import sampled_brief
     from tfarm.loop.answers import design_answer
     from tfarm.loop.design import design as find_gains
 

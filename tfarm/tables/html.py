@@ -16,12 +16,12 @@ WIDE = 44  # characters of a text from which its cell is a wide one
 def as_html(table: Table) -> Markup:
     """The table element, named by the table's title."""
     columns = table.on(PAGE)
-    heads = Markup("").join(_head(column) for column in columns)
-    cells = ([_cell(column, *pair) for pair in _tinted(column)] for column in columns)
-    rows = Markup("").join(Markup("\n<tr>{}</tr>").format(Markup("").join(row)) for row in zip(*cells, strict=True))
-    return Markup('<table aria-label="{}">\n<thead>\n{}<tr>{}</tr>\n</thead>\n<tbody>{}\n</tbody>\n</table>').format(
-        table.title, _groups(columns), heads, rows
+    heads, *rows = (
+        Markup("<tr>{}</tr>").format(Markup("").join(row)) for row in zip(*map(_column, columns), strict=True)
     )
+    body = Markup("\n").join([Markup("<tbody>"), *rows, Markup("</tbody>")])
+    shape = Markup('<table aria-label="{}">\n<thead>\n{}{}\n</thead>\n{}\n</table>')
+    return shape.format(table.title, _groups(columns), heads, body)
 
 
 def _groups(columns: list[Column]) -> Markup:
@@ -34,22 +34,22 @@ def _groups(columns: list[Column]) -> Markup:
     return Markup('<tr class="group">{}</tr>\n').format(Markup("").join(cells))
 
 
-def _head(column: Column) -> Markup:
+def _column(column: Column) -> list[Markup]:
+    """The heading, then the cells: words to the left, long ones wide, some with a background."""
+    text, tinted, cells = "text" * column.is_text, " tinted" * bool(column.tint), column.cells
     of = Markup('<span class="unit">{}</span>').format(column.unit) if column.unit else ""
-    return Markup('<th scope="col" class="{}">{}{}</th>').format(_class(column, ""), symbol(column.title), of)
-
-
-def _tinted(column: Column) -> list[tuple[str, str]]:
-    return list(zip(column.cells, column.tint or itertools.repeat(""), strict=False))
-
-
-def _cell(column: Column, text: str, tint: str) -> Markup:
-    style = Markup(' style="background:{}"').format(tint) if tint else ""
-    return Markup('<td class="{}"{}>{}</td>').format(_class(column, text), style, symbol(text))
-
-
-def _class(column: Column, text: str) -> str:
-    return "text" * column.is_text + " wide" * (len(text) > WIDE) + " tinted" * bool(column.tint)
+    head = Markup('<th scope="col" class="{}{}">{}{}</th>').format(text, tinted, symbol(column.title), of)
+    styles = (
+        Markup(' style="background:{}"').format(tint) if tint else "" for tint in column.tint or [""] * len(cells)
+    )
+    cell = Markup('<td class="{}{}{}"{}>{}</td>')
+    return [
+        head,
+        *(
+            cell.format(text, " wide" * (len(words) > WIDE), tinted, style, symbol(words))
+            for words, style in zip(cells, styles, strict=True)
+        ),
+    ]
 
 
 def symbol(text: str) -> Markup:
