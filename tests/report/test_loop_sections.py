@@ -10,6 +10,7 @@ import pytest
 import tfarm
 from tests.loop.arms import window_arm
 from tests.loop.nyquist_counts import survey
+from tests.report.coarse import coarsen
 from tfarm.arm import Hub, HubFeedback, many_laws
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import Sampling
@@ -20,15 +21,14 @@ from tfarm.loop.nyquist import compressed, nyquist, nyquist_of
 from tfarm.loop.plant import Loop
 from tfarm.loop.poles import closed_loop_poles
 from tfarm.loop.stability import stability
-from tfarm.report import loop_laws, map, write, writing
+from tfarm.report import loop_laws, loop_section, map, write, writing
 from tfarm.report.loci import loci, shown, zoomed
 from tfarm.report.locus_section import beyond_table
 from tfarm.report.loop_laws import NamedLaw, has_loop, margins_of
-from tfarm.report.loop_section import map_section, margins_section, nyquist_section
+from tfarm.report.loop_section import map_section, margins_section
 from tfarm.report.map import Axis, gain_map, map_data, moment_axis, rate_axis, stable_edge
 from tfarm.report.map_picture import draw_map, nice_levels
 from tfarm.report.margins_table import NOTHING, margin_table
-from tfarm.report.sections import save_section
 from tfarm.spectrum.scales import PAPER_GAINS, default_gains, rate_unit
 from tfarm.tables.files import as_json
 
@@ -42,15 +42,23 @@ def lab():
 
 
 @pytest.fixture(scope="module")
-def section():
+def section(lab):
     """The map of the lab's gains on its page."""
-    return map_section(LAB)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(loop_section, "gain_map", lambda arm, chain: {(LAB, None): lab}[arm, chain])
+        return map_section(LAB)
 
 
-def one_law(monkeypatch):
-    """Without the search for the best gains, which takes longest and has its own tests."""
-    monkeypatch.setattr(loop_laws, "best", lambda arm: None)
-    monkeypatch.setattr(map, "best", lambda arm: None)
+@pytest.fixture(scope="module")
+def coarse():
+    """The map of the paper's arm on its page: a coarse one, and without the search for the best gains.
+
+    That takes longest and has its own tests.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(map, "best", lambda arm: None)
+        coarsen(patch.setattr)
+        return map_section(PURE)
 
 
 # ------------------------------------------------------------ the map
@@ -253,7 +261,8 @@ def test_nothing_is_cut_off_by_the_compression():
 
 @pytest.mark.parametrize(("inertia", "reason"), [(math.inf, "locked"), (0.0, "no inertia")])
 def test_an_arm_without_a_loop_gets_a_sentence(tmp_path, monkeypatch, inertia, reason):
-    monkeypatch.setattr(writing, "save_proof", lambda *_: None)
+    for kept in ("save_proof", "save_card"):  # which have their own tests
+        monkeypatch.setattr(writing, kept, lambda *_: None)
     arm = replace(PURE, name="held", hub=Hub(inertia=inertia))
     assert not has_loop(arm)
     page = write([arm], tmp_path, only=("margins",)).read_text()
@@ -261,40 +270,24 @@ def test_an_arm_without_a_loop_gets_a_sentence(tmp_path, monkeypatch, inertia, r
     assert "map.svg" not in page
 
 
-def test_the_map_says_what_is_proven(monkeypatch):
+def test_the_map_says_what_is_proven(coarse, section):
     """The whole frame at C = 0; at C > 0 it is drawn dashed and called no proof, in the picture and below it."""
-    one_law(monkeypatch)
-    for arm, words, style in ((PURE, "proven", "-"), (LAB, "not a proof here", "--")):
-        picture = map_section(arm).blocks[0]
+    for page, words, style in ((coarse, "proven", "-"), (section, "not a proof here", "--")):
+        picture = page.blocks[0]
         (frame,) = [
             line
             for line in picture.figure.axes[0].lines
             if words in str(line.get_label()) and "K2 < 1" in str(line.get_label())
         ]
         assert frame.get_linestyle() == style
-        assert ("not a proof here" in picture.caption) == (arm is LAB)
+        assert ("not a proof here" in picture.caption) == (page is section)
 
 
-def test_the_sign_convention_stands_wherever_K2_does(monkeypatch):
-    one_law(monkeypatch)
-    for section in (map_section(PURE), margins_section(PURE)):
+def test_the_sign_convention_stands_wherever_K2_does(coarse, monkeypatch):
+    monkeypatch.setattr(loop_laws, "best", lambda arm: None)
+    for section in (coarse, margins_section(PURE)):
         texts = [*section.words, *(block.caption for block in section.blocks)]
         assert any("Sign of K2" in text for text in texts)
-
-
-def test_the_same_bytes_twice(tmp_path, monkeypatch):
-    """On a coarse grid, under the default gains."""
-    one_law(monkeypatch)
-    for name, number in {"COLUMNS": 48, "ROWS": 40, "SAMPLED_COLUMNS": 24}.items():
-        monkeypatch.setattr(map, name, number)
-    for folder in ("a", "b"):
-        (tmp_path / folder).mkdir()
-        for each in (map_section(LAB), nyquist_section(LAB)):
-            save_section(each, tmp_path / folder)
-    files = sorted(file.name for file in (tmp_path / "a").iterdir())
-    assert {"map.svg", "map.pdf", "map-data.csv", "nyquist.png", "nyquist-count.json"} <= set(files)
-    for name in files:
-        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
 
 
 # ------------------------------------------------------------ the same gains, sampled
@@ -350,6 +343,6 @@ def test_both_counts_of_a_nyquist_plot_are_compared():
 
 def test_random_loops_have_as_many_turns_as_unstable_poles():
     """`python -m tests.loop.nyquist_counts 500` for more; refused are poles as good as on the axis."""
-    outcomes = survey(12, 1)
-    assert sum(each == "agree" for each in outcomes) >= 9
+    outcomes = survey(3, 1)
+    assert sum(each == "agree" for each in outcomes) >= 2
     assert not any("by finding" in each for each in outcomes)

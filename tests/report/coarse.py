@@ -1,0 +1,17 @@
+"""Pages on coarse grids, for tests of words, links and bytes: where a boundary lies has tests of its own."""
+
+from tfarm.report import map, overlay, sampled_words
+
+COARSE = (
+    (map, "COLUMNS", 48),
+    (map, "ROWS", 40),
+    (map, "SAMPLED_COLUMNS", 24),
+    (overlay, "COLUMNS", 16),
+    (sampled_words, "SHARES", (1.0, 5.0)),
+)
+
+
+def coarsen(put=setattr):
+    """Put the coarse grids in place, for good or, with a MonkeyPatch's setattr, until it is undone."""
+    for room, name, value in COARSE:
+        put(room, name, value)
