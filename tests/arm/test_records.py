@@ -6,6 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+import tfarm
 from tfarm.arm import Arm, Hub, Link, Payload, Section
 from tfarm.errors import ParameterError
 
@@ -193,3 +194,25 @@ def test_a_name_is_one_on_every_file_system(name):
 @pytest.mark.parametrize("name", ["console", "null", "com", "lpt10", "é" * 80])
 def test_names_that_only_look_so(name):
     assert replace(ARM, name=name).name == name
+
+
+@pytest.mark.parametrize(("name", "value"), [("damping", 1e-4), ("length", 2.0), ("hub_inertia", 0.3)])
+def test_an_arm_with_another_number_is_the_same_but_for_it(name: str, value: float) -> None:
+    arm = tfarm.load("sasaki2012-lab")
+    other = arm.having(**{name: value})
+    assert getattr(other, name) == value
+    assert other.having(**{name: getattr(arm, name)}) == arm
+    assert arm.having(payload_mass=1.0, payload_inertia=0.2).payload == tfarm.Payload(mass=1.0, inertia=0.2)
+    with pytest.raises(tfarm.ParameterError, match="length"):
+        arm.having(length=-1.0)
+
+
+def test_what_the_hub_carries_and_what_bends_the_arm() -> None:
+    arm = tfarm.load("stocky-steel")
+    link, payload = arm.link, arm.payload
+    carried = arm.having(hub_inertia=0.0).total_inertia
+    assert arm.carried_inertia == pytest.approx(carried, rel=1e-15)
+    assert payload.mass * arm.length**2 + payload.inertia < carried
+    assert arm.bending_scale * arm.length == link.EI
+    assert arm.is_undamped == (arm.damping == 0)
+    assert not arm.has_massless_hub

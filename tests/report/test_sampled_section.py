@@ -17,7 +17,7 @@ from tfarm.loop.stability import stability
 from tfarm.loop.windows import gain_windows
 from tfarm.report.discrete_loci import loci, loci_table
 from tfarm.report.figures import save
-from tfarm.report.overlay import CUT, K2_RANGE, draw_overlay, overlay, overlay_table, with_damping
+from tfarm.report.overlay import CUT, K2_RANGE, draw_overlay, overlay, overlay_table
 from tfarm.report.region_pieces import pieces
 from tfarm.report.sampled_section import sampled_section
 from tfarm.report.sampled_words import Sampled, compared, cure, duration, interval, short_answer
@@ -233,7 +233,3 @@ def test_a_held_tip_has_a_map_but_no_slew(monkeypatch):
     assert "no slew" in section.words[-1]
     assert "sampled-overlay" in blocks_of(section)
     assert "sampled-slew" not in blocks_of(section)
-
-
-def test_with_damping_changes_nothing_else():
-    assert with_damping(PAPER, 1e-4).link == LAB.link

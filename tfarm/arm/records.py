@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from tfarm.arm.checks import extended, not_negative, number, positive
 from tfarm.arm.sections import Section
@@ -165,6 +165,49 @@ class Arm:
         return self.hub.inertia + beam + payload.mass * link.length**2 + payload.inertia
 
     @property
+    def hub_inertia(self) -> float:
+        """I_h [kg m^2]."""
+        return self.hub.inertia
+
+    @property
+    def carried_inertia(self) -> float:
+        """J - I_h [kg m^2], of what the hub carries."""
+        return self.total_inertia - self.hub.inertia
+
+    @property
+    def length(self) -> float:
+        """L [m], from the hub's axis to the tip."""
+        return self.link.length
+
+    @property
+    def damping(self) -> float:
+        """C [s] of the bending moment E I (1 + C s)."""
+        return self.link.damping
+
+    @property
+    def is_undamped(self) -> bool:
+        """Whether C = 0: then every frequency is real, and theorems hold that do not at C > 0."""
+        return self.link.damping == 0
+
+    @property
+    def has_massless_hub(self) -> bool:
+        """Whether I_h = 0: then the root moment is -u at every instant."""
+        return self.hub.inertia == 0
+
+    @property
+    def bending_scale(self) -> float:
+        """E I/L [N m], the moment that bends the whole arm by an angle of 1."""
+        return self.link.EI / self.link.length
+
+    def having(self, **numbers: float) -> Arm:
+        """The arm with other numbers: of `ADJUSTABLE`, by name, in SI units.  Raises ParameterError as its parts do."""
+        parts = {room: getattr(self, room) for room in ("link", "hub", "payload")}
+        for name, value in numbers.items():
+            room, field = ADJUSTABLE[name]
+            parts[room] = replace(parts[room], **{field: value})
+        return replace(self, **parts)
+
+    @property
     def is_locked(self) -> bool:
         """Whether the hub cannot turn (I_h = inf): then the hub angle drives, not the torque."""
         return math.isinf(self.hub.inertia)
@@ -178,6 +221,15 @@ class Arm:
     def shear_cutoff(self) -> float:
         """sqrt(kGA/rhoI) [rad/s], above which both pairs of waves travel."""
         return math.sqrt(self.link.kGA / self.link.rhoI)
+
+
+ADJUSTABLE = {  # numbers of an arm by name: the part and the field that hold them
+    "payload_mass": ("payload", "mass"),
+    "payload_inertia": ("payload", "inertia"),
+    "hub_inertia": ("hub", "inertia"),
+    "length": ("link", "length"),
+    "damping": ("link", "damping"),
+}
 
 
 def must_be_arm(arm: object) -> None:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, Hub, HubFeedback, Section
+from tfarm.arm import Arm, HubFeedback, Section
 from tfarm.arm.checks import positive
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop.stability import stability
@@ -177,9 +177,9 @@ def hub_study(arm: Arm, inertias: Sequence[float] | None = None, *, count: int =
     meaning = "the hub inertia of a candidate is a positive, finite number of kg m^2"
     chosen = candidate_inertias(arm) if inertias is None else inertias
     values = [positive("inertias", inertia, meaning) for inertia in chosen]
-    arms = [_with_hub(arm, inertia) for inertia in values]
+    arms = [arm.having(hub_inertia=inertia) for inertia in values]
     frequency, sensitivity = _frequencies(arms, count, "hub_inertia")
-    pinned, _ = _frequencies([_with_hub(arm, 0.0)], count, "hub_inertia")
+    pinned, _ = _frequencies([arm.having(hub_inertia=0.0)], count, "hub_inertia")
     return HubStudy(
         arm=arm,
         arms=tuple(arms),
@@ -197,8 +197,8 @@ def _locked(arm: Arm, count: int) -> Real:
 
     Where the tip holds the arm the first falls to 0, a heavy hub on the arm's own stiffness, and the others are next.
     """
-    frequencies, _ = _frequencies([_with_hub(arm, math.inf)], count, "hub_inertia")
-    return frequencies[0] if _with_hub(arm, 1.0).has_rigid_mode else np.r_[0.0, frequencies[0, :-1]]
+    frequencies, _ = _frequencies([arm.having(hub_inertia=math.inf)], count, "hub_inertia")
+    return frequencies[0] if arm.having(hub_inertia=1.0).has_rigid_mode else np.r_[0.0, frequencies[0, :-1]]
 
 
 def _frequencies(arms: Sequence[Arm], count: int, parameter: str) -> tuple[Real, Real]:
@@ -206,10 +206,6 @@ def _frequencies(arms: Sequence[Arm], count: int, parameter: str) -> tuple[Real,
     tables = [modes(arm, count) for arm in arms]
     frequency = np.array([table.natural_frequency[-count:] for table in tables])
     return frequency, np.array([table.sensitivity[parameter][-count:] + 0.0 for table in tables])
-
-
-def _with_hub(arm: Arm, inertia: float) -> Arm:
-    return replace(arm, hub=Hub(inertia=inertia))
 
 
 def _with_own(candidates: Any, own: float) -> tuple[float, ...]:

@@ -67,7 +67,7 @@ def band_of(loop: SampledLoop) -> Band | None:
     Not without damping, nor with analog hub damping, whose poles the model has to its own accuracy alone.
     """
     plant, sampling = loop.plant, loop.chain.sampling
-    C, remaining = plant.arm.link.damping, sampling.period * (1 - sampling.fraction)
+    C, remaining = plant.arm.damping, sampling.period * (1 - sampling.fraction)
     if C == 0.0 or loop.chain.actuator.hub_damping > 0.0:
         return None
     line = min(CLEAR / C, SETTLED / remaining)

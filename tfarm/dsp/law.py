@@ -107,7 +107,7 @@ def mode_table(loop: SampledLoop) -> ModeTable:
     flexible = np.searchsorted(table.index, index)
     w, b = table.natural_frequency[flexible], table.hub_participation[flexible]
     T, arm = pulse.sampling.period, pulse.plant.arm
-    by_rate, by_moment = first_order_law(w, b, arm.hub.inertia, loop.gains, T, pulse.sampling.delay_samples)
+    by_rate, by_moment = first_order_law(w, b, arm.hub_inertia, loop.gains, T, pulse.sampling.delay_samples)
     turns, origin = np.round(w * T / (2 * np.pi)), origins(loop)
     return ModeTable(
         index=index,

@@ -217,7 +217,7 @@ def sampled_loop(
 
 def check_loop(arm: Arm, gains: HubFeedback) -> None:
     """Refuse the loop that does not exist, I_h = 0 and K2 != 0, and a gain that is absurdly large for the arm."""
-    if arm.hub.inertia == 0.0 and gains.K2 != 0.0:
+    if arm.has_massless_hub and gains.K2 != 0.0:
         remedy = (
             "with hub.inertia = 0 the root moment is -u itself, so that moment feedback is an algebraic loop; "
             "give the hub an inertia, or set K2 = 0"

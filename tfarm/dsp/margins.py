@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -125,7 +125,7 @@ def required_damping(
     def log_radius(C: float) -> float:
         return log_radius_with(arm, gains, chain, C, count, branches)
 
-    if sampled_loop(damped(arm, 0.0), gains, chain, count=count).poles.is_stable:
+    if sampled_loop(arm.having(damping=0.0), gains, chain, count=count).poles.is_stable:
         return 0.0
     high = 2 * STRONGEST / first_frequency(arm)
     if log_radius(high) >= 0:
@@ -145,10 +145,10 @@ def log_radius_with(
 
     Modes that a strong C has settled before the next sample, or overdamped, are left to the remainder, but for a few.
     """
-    count = min(count, FEW + alive(damped(arm, C), chain), FEW + modes_below(arm, OVERDAMPED / C))
+    count = min(count, FEW + alive(arm.having(damping=C), chain), FEW + modes_below(arm, OVERDAMPED / C))
     for nudge in (0.0, 1e-6, -1e-6):
         try:
-            loop = sampled_loop(damped(arm, C * (1 + nudge)), gains, chain, count=count, branches=branches)
+            loop = sampled_loop(arm.having(damping=C * (1 + nudge)), gains, chain, count=count, branches=branches)
         except ConvergenceError:
             if nudge < 0:
                 raise
@@ -160,7 +160,7 @@ def log_radius_with(
 def alive(arm: Arm, chain: Chain) -> int:
     """How many bending modes of a damped arm outlive the rest of a sample: C w^2 T (1 - f)/2 below 40."""
     remaining = chain.sampling.period * (1 - chain.sampling.fraction)
-    return modes_below(arm, math.sqrt(2 * FORGOTTEN / (arm.link.damping * remaining)))
+    return modes_below(arm, math.sqrt(2 * FORGOTTEN / (arm.damping * remaining)))
 
 
 def whole_loop(arm: Arm, gains: HubFeedback, chain: Chain, branches: Branching = all_damped_modes) -> SampledLoop:
@@ -169,7 +169,7 @@ def whole_loop(arm: Arm, gains: HubFeedback, chain: Chain, branches: Branching =
     With somewhat fewer where two damped modes cannot be told apart; with one where the first is far overdamped.
     Raises ConvergenceError where not even that one can be followed.
     """
-    criticals = arm.link.damping * first_frequency(arm) / 2
+    criticals = arm.damping * first_frequency(arm) / 2
     most = min(MOST, BEYOND + alive(arm, chain))
     numbers = [most, *(int(share * most) for share in FEWER)]
     if criticals > FAR_BEYOND:
@@ -179,10 +179,5 @@ def whole_loop(arm: Arm, gains: HubFeedback, chain: Chain, branches: Branching =
             return sampled_loop(arm, gains, chain, count=max(1, number), branches=branches)
         except ConvergenceError as error:
             lost = error
-    where = f"C = {arm.link.damping:g} s, {criticals:.3g} times critical in the first mode"
+    where = f"C = {arm.damping:g} s, {criticals:.3g} times critical in the first mode"
     raise ConvergenceError(f"modes cannot be followed to {where}: {lost}", lost.best, lost.residual)
-
-
-def damped(arm: Arm, C: float) -> Arm:
-    """The arm with another C [s]."""
-    return replace(arm, link=replace(arm.link, damping=C))

@@ -95,7 +95,7 @@ def undelayed_plant(
         remedy = "a locked hub has no loop: no torque turns it; give a finite inertia"
         raise ParameterError(key="hub.inertia", value=math.inf, remedy=remedy)
     damping = chain.actuator.hub_damping
-    if damping > 0 and arm.hub.inertia == 0.0:
+    if damping > 0 and arm.has_massless_hub:
         remedy = (
             "a hub without inertia has no model of finite order under hub damping; give hub.inertia, or leave it out"
         )

@@ -31,7 +31,7 @@ def with_slow_remainder(plant: Plant, exact: Callable[[Complex], Complex], highe
     Unchanged where its last mode, of natural frequency `highest` [rad/s], still rings.  `exact` gives the plant's
     outputs (outputs, n) at s (n,).
     """
-    C = plant.arm.link.damping
+    C = plant.arm.damping
     if C * highest < OVERDAMPED:
         return plant
     s, corners = (AT / C).astype(complex), RATIOS / C

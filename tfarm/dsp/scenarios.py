@@ -60,13 +60,13 @@ def slew(arm: Arm, chain: Chain, duration: float) -> Scenario:
     must_turn(arm)
     T, manoeuvre = chain.sampling.period, chain.slew
     n = _samples(duration, T)
-    peak = manoeuvre.acceleration(arm.link.length)
+    peak = manoeuvre.acceleration(arm.length)
     t = T * np.arange(n + 1)
     rate = peak * np.clip(np.minimum(t, manoeuvre.rise_time - t), 0.0, None)
     acceleration = np.diff(rate) / T
     angle = np.r_[0.0, np.cumsum((rate[1:] + rate[:-1]) / 2 * T)][:-1]
     before = np.r_[0.0, acceleration[:-1]]
-    rigid = -(arm.total_inertia - arm.hub.inertia) * before * (manoeuvre.reading == "vibration")
+    rigid = -(arm.carried_inertia) * before * (manoeuvre.reading == "vibration")
     return Scenario(
         name="slew",
         period=T,
@@ -84,7 +84,7 @@ def torque_unit(arm: Arm, chain: Chain) -> float:
 
     An arm that makes no slew has the torque of its own inertia about the hub for one, what is held apart.
     """
-    share = abs(turning_inertia(arm) * chain.slew.acceleration(arm.link.length)) / PAPER_TORQUE
+    share = abs(turning_inertia(arm) * chain.slew.acceleration(arm.length)) / PAPER_TORQUE
     return float(f"{share:.1g}")
 
 
@@ -98,7 +98,7 @@ def step(arm: Arm, chain: Chain, duration: float, torque: float | None = None) -
 
 def decay(arm: Arm, chain: Chain, duration: float, tip_offset: float | None = None) -> Scenario:
     """Free decay: the first mode released from rest with the tip displaced by `tip_offset` [m], 0.01 L unless told."""
-    tip_offset = TIP_OFFSET * arm.link.length if tip_offset is None else tip_offset
+    tip_offset = TIP_OFFSET * arm.length if tip_offset is None else tip_offset
     size = number("tip_offset", tip_offset, "a tip offset is a finite number of metres")
     return _with(_rest("decay", chain, duration), tip_offset=size)
 
@@ -125,7 +125,7 @@ SCENARIOS: dict[str, Callable[[Arm, Chain, float], Scenario]] = {
 def described(task: Scenario, arm: Arm, chain: Chain) -> str:
     """What a scenario asks of the arm, with its size."""
     if task.name == "slew":
-        return f"a slew: the tip moves {chain.slew.travel_of(arm.link.length):.4g} m in {chain.slew.rise_time:g} s"
+        return f"a slew: the tip moves {chain.slew.travel_of(arm.length):.4g} m in {chain.slew.rise_time:g} s"
     if task.name == "step":
         return f"a step of {task.feedforward[0]:.4g} N m"
     if task.name == "decay":

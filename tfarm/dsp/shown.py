@@ -20,7 +20,6 @@ from tfarm.dsp.loop import SampledLoop
 from tfarm.dsp.margins import (
     DelayMargin,
     Window,
-    damped,
     delay_margin,
     log_radius_with,
     required_damping,
@@ -222,7 +221,7 @@ def shown_damping(arm: Arm, gains: HubFeedback, chain: Chain, *, count: int) -> 
     C = required_damping(arm, gains, chain, count=count, branches=branches)
 
     def proof(value: float) -> Proof:
-        return proof_of(whole_loop(damped(arm, value), gains, chain, branches))
+        return proof_of(whole_loop(arm.having(damping=value), gains, chain, branches))
 
     def holds(value: float) -> Proof:
         return log_radius_with(arm, gains, chain, value, another(count), branches) < 0, math.inf

@@ -127,7 +127,7 @@ class Simulator:
         self._tables = _tables(self.plant, self._kept, chain, between)
         self._rows = quantisers(chain).rows
         self._ideal = np.c_[scenario.feedforward, scenario.hub_angle, scenario.hub_rate, scenario.rigid_moment]
-        self._bound = FOLDED_UP * arm.link.EI / arm.link.length
+        self._bound = FOLDED_UP * arm.bending_scale
 
     def linear(self, gains: HubFeedback, K2: Real | None = None) -> Simulation:
         """The law u = r + Kp (theta_ref - theta) + K1 (theta_t_ref - theta_t) - K2 x, compiled; `K2` (n,) may vary.
@@ -247,7 +247,7 @@ class Simulator:
         return float(self.plant.residues[row, self._kept].real @ abs(amplitude) ** 2 + rigid)
 
     def _energy_error(self, state: _State) -> float | None:
-        if self.plant.arm.link.damping > 0 or self.chain.actuator.hub_damping > 0:
+        if not self.plant.arm.is_undamped or self.chain.actuator.hub_damping > 0:
             return None
         after, (work, moved) = self._energy(state.amplitude, state.rigid[1]), state.work
         return float(abs(after - state.energy - work) / max(state.energy + moved, 1e-300))

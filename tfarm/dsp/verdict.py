@@ -103,7 +103,7 @@ def sampled_verdict(arm: Arm, gains: HubFeedback, chain: Chain | None = None, *,
             remedy = f"a whole number of flexible modes from 1 to {MOST_ASKED}"
             raise ParameterError(key="modes", value=count, remedy=remedy)
         return Verdict(sampled_loop(arm, gains, chain, count=count))
-    if arm.link.damping == 0.0:
+    if arm.is_undamped:
         return Verdict(sampled_loop(arm, gains, chain, count=UNDAMPED_MODES))
     check_loop(arm, gains)
     largest = whole_loop(arm, gains, chain)
@@ -177,7 +177,7 @@ def analyse(arm: Arm, gains: HubFeedback, chain: Chain | None = None, *, count: 
     chain = Chain() if chain is None else chain
     verdict = sampled_verdict(arm, gains, chain, count=count)
     loop, band = verdict.loop, verdict.band
-    has_moment = arm.hub.inertia > 0
+    has_moment = arm.hub_inertia > 0
     return Analysis(
         verdict,
         shown_windows(loop, band, "K1"),

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cached_property
 from itertools import combinations, pairwise
 from typing import Any
@@ -160,7 +159,7 @@ def roots_near(arm: Arm, omega: float | str | Number, digits: int) -> int:
     Delta lambda_1 lambda_2 is real for real w and has no branch; the turns of its phase along a half circle
     about omega count its roots inside.  omega may be a text or an mpmath number of any number of digits.
     """
-    undamped = replace(arm, link=replace(arm.link, damping=0.0))
+    undamped = arm.having(damping=0.0)
     with mpmath.workdps(2 * digits + FEWEST_DIGITS):
         half_circle = [mpf(omega) * (1 + mpmath.expjpi(mpf(n) / 8) / mpf(10) ** digits) for n in range(9)]
 
@@ -179,7 +178,7 @@ def natural_frequency(arm: Arm, near: float, digits: int) -> Number:
     By the secant method on Delta lambda_1 lambda_2, which is real for real w and has no branch.  Raises
     ConvergenceError where two precisions do not agree: at a double frequency.
     """
-    undamped = replace(arm, link=replace(arm.link, damping=0.0))
+    undamped = arm.having(damping=0.0)
 
     def smooth(w: Number) -> Number:
         at = Appendix(undamped, mpc(0, 1) * w)

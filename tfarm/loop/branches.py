@@ -7,7 +7,7 @@ stay with the zeros: a branch is a zero followed, not a pair.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -200,7 +200,7 @@ def open_pairs(arm: Arm, number: int, wanted: int) -> tuple[Complex, float]:
 
     Of the `number` of modes followed from C = 0 to the arm's own C the first `wanted` are sure to arrive.
     """
-    undamped, C = replace(arm, link=replace(arm.link, damping=0.0)), arm.link.damping
+    undamped, C = arm.having(damping=0.0), arm.damping
     table = modes(undamped, number)
     omega = table.natural_frequency[table.index > 0]
     zeros, lowest = np.stack([1j * omega, -1j * omega], axis=1), float(omega[0])

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, Hub, HubFeedback, law_of, many_laws
+from tfarm.arm import Arm, HubFeedback, law_of, many_laws
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 from tfarm.spectrum import modes as natural_modes
@@ -83,7 +83,7 @@ def design(
     """
     if objective not in OBJECTIVES:
         raise ParameterError(key="objective", value=objective, remedy=f"use one of {', '.join(OBJECTIVES)}")
-    Loop(arm, HubFeedback(K1=1.0, K2=0.5 if arm.hub.inertia else 0.0, Kp=Kp))
+    Loop(arm, HubFeedback(K1=1.0, K2=0.5 if arm.hub_inertia else 0.0, Kp=Kp))
     K1 = _checked("K1", K1 or (0.0, 2.0 * turning_inertia(arm) * band_of(arm, 1)))
     K2 = _checked("K2", K2 or (-3.0, 1.0))
     axes = rate_axis(K1, rate_unit(arm)), Axis(*K2)
@@ -110,8 +110,8 @@ def _effort(arm: Arm, objective: str, K2: Bounds, number: int) -> Effort:
     if objective == "damping":  # which has few basins
         return Effort(32, 36, 12)
     starts = max(6, 80 // number)
-    hubs = (arm.hub.inertia / (1 - gain) if gain < 1 else math.inf for gain in K2)
-    ends = [natural_modes(replace(arm, hub=Hub(inertia=hub)), number).natural_frequency[-number:] for hub in hubs]
+    hubs = (arm.hub_inertia / (1 - gain) if gain < 1 else math.inf for gain in K2)
+    ends = [natural_modes(arm.having(hub_inertia=hub), number).natural_frequency[-number:] for hub in hubs]
     basins = float(abs(ends[0] - ends[1]).max()) * RISE / (4 * math.pi)
     return Effort(36, int(min(max(60.0, BASIN * basins), max(60, 1600 // number))), starts)
 

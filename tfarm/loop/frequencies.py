@@ -9,14 +9,13 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, Hub
+from tfarm.arm import Arm
 from tfarm.spectrum import modes, modes_below
 
 Real = NDArray[np.float64]
@@ -38,7 +37,7 @@ def natural_frequencies(arm: Arm, up_to: float) -> Real:
 @lru_cache(maxsize=64)
 def steep_places(arm: Arm, up_to: float) -> Any:
     """Natural frequencies [rad/s] with the arm's own hub, with a locked one and with none, ascending; read-only."""
-    others = (arm, replace(arm, hub=Hub(inertia=math.inf)), replace(arm, hub=Hub(inertia=0.0)))
+    others = (arm, arm.having(hub_inertia=math.inf), arm.having(hub_inertia=0.0))
     places = np.unique(np.concatenate([natural_frequencies(each, up_to) for each in others]))
     places.flags.writeable = False
     return places

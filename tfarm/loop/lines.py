@@ -93,8 +93,7 @@ def _through_zero_free(arm: Arm, line: Line) -> Crossing | None:
         return Crossing(t, 0.0, -_sign(way.K1 * effective_inertia(arm, line.at(t).K2)))
     if base.K1 or not way.K2:
         return None
-    J = arm.total_inertia
-    carried = J - arm.hub.inertia
+    J, carried = arm.total_inertia, arm.carried_inertia
     if not carried:  # below the rounding of the hub's own: no gain a loop takes reaches so far
         return None
     return Crossing((J / carried - base.K2) / way.K2, 0.0, _sign(way.K2))
@@ -105,7 +104,7 @@ def _change_with_stiffness(arm: Arm, law: HubFeedback) -> int:
     if law.K1:
         return -_sign(law.K1)
     J = effective_inertia(arm, law.K2)
-    oscillating = 2 if law.K2 * arm.link.damping * J > 0 else 0  # against one real pole on the other side
+    oscillating = 2 if law.K2 * arm.damping * J > 0 else 0  # against one real pole on the other side
     return _sign(J) * (oscillating - 1)
 
 

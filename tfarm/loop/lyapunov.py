@@ -79,7 +79,7 @@ class EnergyBalance:
 
 def lyapunov(arm: Arm, law: HubFeedback) -> Lyapunov:
     """What V proves of the law with a strain gauge as it is.  Raises ParameterError where there is no loop."""
-    loop, C = Loop(arm, law), arm.link.damping
+    loop, C = Loop(arm, law), arm.damping
     if C and law.K2:
         reason = (
             f"the gauge does not feel the damping C = {C:g} s, so V_t keeps a term in phi_xt(0) theta_t of no sign, "
@@ -109,13 +109,12 @@ def damped_gauge_equivalent(arm: Arm, law: HubFeedback) -> tuple[Arm, HubFeedbac
         )
     Loop(arm, law)
     share = 1.0 - law.K2
-    hub = replace(arm.hub, inertia=arm.hub.inertia / share)
-    return replace(arm, hub=hub), HubFeedback(K1=law.K1 / share, Kp=law.Kp / share)
+    return arm.having(hub_inertia=arm.hub_inertia / share), HubFeedback(K1=law.K1 / share, Kp=law.Kp / share)
 
 
 def _with_whole_moment(loop: Loop) -> Lyapunov:
     """V_t = -a2 K1 theta_t^2 - a1 C integral(E I phi_xt^2) with a1/a2 = 1 - K2."""
-    law, C = loop.law, loop.arm.link.damping
+    law, C = loop.law, loop.arm.damping
     weight = 1.0 - law.K2
     if law.K2 == 1:
         return _unproven(loop, "K2 = 1 leaves a1 = 0: V sees the hub alone, and the arm moves as on a held hub")
@@ -157,14 +156,14 @@ def energy_along(arm: Arm, law: HubFeedback, duration: float, points: int = 501,
     where so few modes have no solution under K2 > 1.
     """
     loop, duration = Loop(arm, law), positive("duration", duration, "seconds to follow")
-    if arm.link.damping:
+    if not arm.is_undamped:
         remedy = "0: modes of a damped arm do not share out its energy, and V_t has no such formula"
-        raise ParameterError(key="link.damping", value=arm.link.damping, remedy=remedy)
+        raise ParameterError(key="link.damping", value=arm.damping, remedy=remedy)
     if isinstance(points, bool) or not isinstance(points, int) or not 2 <= points <= MOST_POINTS:
         raise ParameterError(key="points", value=points, remedy=f"a whole number from 2 to {MOST_POINTS}")
     A, struck, angle, rate, weights = _closed_modal_model(loop, modes)
     hub = np.outer(rate, rate)
-    P = (1.0 - law.K2) * (np.diag(weights) - arm.hub.inertia * hub) + arm.hub.inertia * hub
+    P = (1.0 - law.K2) * (np.diag(weights) - arm.hub_inertia * hub) + arm.hub_inertia * hub
     P = P + law.Kp * np.outer(angle, angle)
     sizes = np.diag(weights) + abs(law.Kp) * np.outer(angle, angle)
     step = duration / (points - 1)

@@ -86,11 +86,11 @@ def margins(arm: Arm, law: HubFeedback, band: float | None = None) -> Margins:
     if not verdict.is_stable:
         return Margins(verdict, windows, None, None, None, None)
     found = loop_margins(verdict)
-    if arm.link.damping == 0 and law.K2:
+    if arm.is_undamped and law.K2:
         return Margins(verdict, windows, found, 0.0, 0.0, math.inf)
-    if arm.link.damping == 0 and law.K1:  # 1 + L = 1 + (Kp + i K1 w) theta, theta real: no dip deepens with w
+    if arm.is_undamped and law.K1:  # 1 + L = 1 + (Kp + i K1 w) theta, theta real: no dip deepens with w
         return Margins(verdict, windows, found, 0.0, found.disk, found.peak_sensitivity)
-    if arm.link.damping == 0 or is_quiet(verdict.loop, verdict.band):
+    if arm.is_undamped or is_quiet(verdict.loop, verdict.band):
         return Margins(verdict, windows, found, found.delay, found.disk, found.peak_sensitivity)
     if law.K2 == 0 and law.Kp == 0:  # rate feedback of a passive arm: L in the right half-plane at every frequency
         return Margins(verdict, windows, found, None, found.disk, found.peak_sensitivity)
@@ -176,13 +176,13 @@ def rigid_crossings(loop: Loop) -> Real:
 def _rigid(loop: Loop) -> tuple[float, float, float]:
     """K1/J [1/s], Kp/J [1/s^2] and K2 (J - I_h)/J."""
     J, law = loop.arm.total_inertia, loop.law
-    return law.K1 / J, law.Kp / J, law.K2 * (J - loop.arm.hub.inertia) / J
+    return law.K1 / J, law.Kp / J, law.K2 * loop.arm.carried_inertia / J
 
 
 def gain_margin(loop: Loop, band: float) -> tuple[float, float]:
     """The factors on all gains at once, below and above 1, at which a pole first reaches the axis."""
     law, arm, line = loop.law, loop.arm, Line(NONE, loop.law)
-    if arm.link.damping == 0:
+    if arm.is_undamped:
         static = crossing_at_zero(arm, line)
         factors = [1.0 / law.K2] if law.K2 > 0 else []
         factors += [] if static is None else [static.t]

@@ -40,8 +40,8 @@ class Loop:
         must_be_arm(self.arm)
         if self.arm.is_locked:
             remedy = "a locked hub (inertia = inf) takes no torque: there is no loop; give the hub a finite inertia"
-            raise ParameterError(key="hub.inertia", value=self.arm.hub.inertia, remedy=remedy)
-        if self.arm.hub.inertia == 0 and self.law.K2:
+            raise ParameterError(key="hub.inertia", value=self.arm.hub_inertia, remedy=remedy)
+        if self.arm.has_massless_hub and self.law.K2:
             remedy = "with hub.inertia = 0 the root moment is -u at once: an algebraic loop; use K2 = 0 or some inertia"
             raise ParameterError(key="K2", value=self.law.K2, remedy=remedy)
         least = SMALLEST_NORMAL * max(1.0, self.arm.total_inertia if self.arm.has_rigid_mode else 1.0)
@@ -82,5 +82,4 @@ class Loop:
 
 def effective_inertia(arm: Arm, K2: float) -> float:
     """I_h + (1 - K2)(J - I_h) [kg m^2]: what slow torque turns once the moment is fed back."""
-    hub = arm.hub.inertia
-    return hub + (1.0 - K2) * (arm.total_inertia - hub)
+    return arm.hub_inertia + (1.0 - K2) * arm.carried_inertia

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, Hub, HubFeedback
+from tfarm.arm import Arm, HubFeedback
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
 from tfarm.exact.characteristic import zeros_at_origin
 from tfarm.records import record
@@ -63,7 +63,7 @@ class Poles:
         """
         right = self.values.real > ON_AXIS * abs(self.values)
         law = self.loop.law
-        if self.loop.arm.link.damping == 0 and law.K1 * (law.K2 - 1) > 0:
+        if self.loop.arm.is_undamped and law.K1 * (law.K2 - 1) > 0:
             right |= (self.values.imag > 0) & (abs(self.values.real) <= ON_AXIS * abs(self.values))
         return int((right * np.where(self.values.imag > 0, 2, 1)).sum())
 
@@ -154,7 +154,7 @@ def _on_its_axis(loop: Loop, found: Complex) -> Complex:
     At C = 0 the characteristic function is even in s where K1 = 0, so that a simple zero is its own mirror image;
     K2 = 1 leaves the modes of the locked hub, which are undamped.
     """
-    lossless = loop.arm.link.damping == 0 and (loop.law.K1 == 0 or loop.law.K2 == 1)
+    lossless = loop.arm.is_undamped and (loop.law.K1 == 0 or loop.law.K2 == 1)
     on_axis = lossless & (abs(found.real) <= ON_AXIS * abs(found))
     return np.where(on_axis, 1j * found.imag, found)
 
@@ -167,7 +167,7 @@ def box_of(loop: Loop, height: float) -> Box:
         if L.real.min() > -0.5:  # then 1 + L has no zero there; L > 0 may be large, as K1's on a hub without inertia
             break
         right *= 1.7
-    left, C = 1.5 * height, loop.arm.link.damping
+    left, C = 1.5 * height, loop.arm.damping
     return Box(-min(left, CLEAR / C) if C else -left, float(right), -height, height)
 
 
@@ -194,20 +194,18 @@ def slow_poles(loop: Loop, below: float) -> Complex:
 
 def starting_points(loop: Loop, up_to: float) -> Complex:
     """Where Newton's method starts: the arm's own frequencies, those with the hub locked, and the rigid arm's poles."""
-    arm, C = loop.arm, loop.arm.link.damping
-    omega = np.concatenate([_frequencies(each, up_to) for each in (arm, _with_hub(arm, np.inf), _with_hub(arm, 0.0))])
+    arm, C = loop.arm, loop.arm.damping
+    omega = np.concatenate(
+        [_frequencies(each, up_to) for each in (arm, arm.having(hub_inertia=np.inf), arm.having(hub_inertia=0.0))]
+    )
     shift = np.array([0.0, 0.02, 0.3])[:, None]
     decay = C * omega**2 / 2
     near = (-decay - shift * omega + 1j * omega * np.sqrt(np.maximum(1 - (C * omega / 2) ** 2, 0.0))).ravel()
-    J = arm.total_inertia if arm.has_rigid_mode else arm.hub.inertia + 1e-12
+    J = arm.total_inertia if arm.has_rigid_mode else arm.hub_inertia + 1e-12
     slow = np.roots([J, loop.law.K1, loop.law.Kp]).astype(complex)
     slow = slow[abs(slow) > SMALLEST]  # zeros at 0 are divided out
     real = -np.geomspace(up_to / 300, 1.4 * up_to, 25)
     return np.concatenate([near, near.conj(), slow, real, -real])
-
-
-def _with_hub(arm: Arm, inertia: float) -> Arm:
-    return replace(arm, hub=Hub(inertia=inertia))
 
 
 def _frequencies(arm: Arm, up_to: float) -> Real:

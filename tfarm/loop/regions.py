@@ -67,7 +67,7 @@ def region(arm: Arm, K1: Real, K2: Real, Kp: float = 0.0) -> Region:
     """
     K1, K2 = _axis("K1", K1), _axis("K2", K2)
     Loop(arm, HubFeedback(K1=float(K1[-1]), K2=float(K2[-1]), Kp=Kp))
-    if arm.link.damping == 0:
+    if arm.is_undamped:
         return Region(arm, Kp, K1, K2, _undamped_counts(arm, K1, K2, Kp), np.empty((0, 3)), 0.0)
     corners = [HubFeedback(K1=float(a), K2=float(b), Kp=Kp) for a in (K1[0], K1[-1]) for b in (K2[0], K2[-1])]
     band = max(loop_band(Loop(arm, law))[0] for law in corners)

@@ -67,7 +67,7 @@ def residues(arm: Arm, s: Complex, laws: Real) -> Complex:
 
 def command(arm: Arm, s: Complex, laws: Real) -> Complex:
     """R(s) e^{s RISE}: R the Laplace transform of r until `RISE` and, the angle held by its gain, after it."""
-    acceleration = 4 * TRAVEL / (arm.link.length * RISE**2)
+    acceleration = 4 * TRAVEL / (arm.length * RISE**2)
     with np.errstate(under="ignore"):
         bang = acceleration * (_exp(s * RISE / 2) - 1) ** 2 / s
     rate = bang / s

@@ -72,7 +72,7 @@ def _verdict(poles: Poles, infinite: bool, loop: Loop) -> str:
     at_zero = poles.values.size - moving.size
     if at_zero > 1 or (at_zero == 1 and law.K1 == 0):
         return "marginal"
-    if loop.arm.link.damping == 0:
+    if loop.arm.is_undamped:
         lossless = law.K1 == 0 or law.K2 == 1
         return "marginal" if lossless or not is_felt(loop.arm, poles.box.im_max) else "stable"
     on_axis = moving[moving.real > -MARGIN_OF_ZERO * abs(moving)]
@@ -94,14 +94,14 @@ def is_felt(arm: Arm, up_to: float) -> bool:
     flexible = table.index > 0
     omega, b = table.natural_frequency[flexible], abs(table.hub_participation[flexible])
     rotation = b * np.sqrt(link.rhoA * link.length) * np.sqrt(np.sqrt(link.EI / link.rhoA) / omega)
-    moment = b * arm.hub.inertia * omega * np.sqrt(link.length / link.EI)
+    moment = b * arm.hub_inertia * omega * np.sqrt(link.length / link.EI)
     return bool((np.maximum(rotation, moment) > UNFELT).all())
 
 
 def _beyond(loop: Loop, quiet: bool) -> tuple[bool, str]:
     """Whether infinitely many poles are unstable, and what is known beyond the band."""
     law = loop.law
-    if loop.arm.link.damping > 0:
+    if not loop.arm.is_undamped:
         if quiet:
             return False, f"beyond the band |L(iw)| < {QUIET:g} and falling: no unstable pole there (small gain)"
         return False, "beyond the band not bounded: the small-gain condition would need more modes than are looked at"
@@ -117,7 +117,7 @@ def _beyond(loop: Loop, quiet: bool) -> tuple[bool, str]:
 def loop_band(loop: Loop) -> tuple[float, bool]:
     """The band [rad/s] in which poles are computed, and whether the loop is quiet beyond it (always False at C = 0)."""
     few = band_of(loop.arm, FEW)
-    if loop.arm.link.damping == 0:
+    if loop.arm.is_undamped:
         return few, False
     band = few
     while modes_below(loop.arm, band) <= MOST_MODES:

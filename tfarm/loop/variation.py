@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -55,8 +55,7 @@ class Variation:
             return Loop(arm, law.times(value))
         if self.is_of_gains:
             return Loop(arm, law.having(self.vary, value))
-        room, name = ("link", self.vary) if self.vary in ("length", "damping") else self.vary.split("_")
-        return Loop(replace(arm, **{room: replace(getattr(arm, room), **{name: value})}), law)
+        return Loop(arm.having(**{self.vary: value}), law)
 
     def system(self, value: float) -> tuple[Coefficients, Real]:
         """Coefficients of the arm, and gains without dimensions (gains, 1), where the varied number has that value."""
@@ -67,7 +66,7 @@ class Variation:
 
     def singular(self, value: float) -> float:
         """-1/C where the varied number has that value, -inf at C = 0."""
-        C = value if self.vary == "damping" else self.arm.link.damping
+        C = value if self.vary == "damping" else self.arm.damping
         return -1.0 / C if C else -math.inf
 
     def laws(self, values: Real) -> Real:

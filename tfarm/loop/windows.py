@@ -50,10 +50,10 @@ def gain_windows(verdict: Stability, name: str) -> Windows:
     """The windows of "K1", "K2" or "Kp" through the loop whose verdict is given."""
     loop, law = verdict.loop, verdict.loop.law
     value = law[name]
-    if name == "K2" and loop.arm.hub.inertia == 0:
+    if name == "K2" and loop.arm.has_massless_hub:
         return Windows(name, None, (), (0.0, 0.0), Crossings.of([]))  # an algebraic loop but for K2 = 0
     low, high = looked_at(loop, name)
-    if loop.arm.link.damping == 0:
+    if loop.arm.is_undamped:
         found = _undamped(loop, name).within(low, high)
     else:
         ends = (Loop(loop.arm, law.having(name, end)) for end in (low, high))
@@ -73,7 +73,7 @@ def looked_at(loop: Loop, name: str) -> Interval:
     """The range of a gain that is searched, symmetric and well beyond what matters to the first mode."""
     arm, law = loop.arm, loop.law
     reach = max(REACH[name] * gain_unit(arm, name), 10.0 * abs(law[name]))
-    carried = arm.total_inertia - arm.hub.inertia
+    carried = arm.carried_inertia
     if name == "K2" and 0 < carried < math.inf:
         reach = max(reach, BEYOND_STATIC * arm.total_inertia / carried)
     most = min(most_gain(arm, name), reach)
@@ -94,7 +94,7 @@ def _undamped(loop: Loop, name: str) -> Crossings:
 def _counts(verdict: Stability, name: str, pairs: list[Interval], found: Crossings) -> list[int]:
     """Unstable poles in each window: counted in one, by the crossings in the others; at C = 0 whether there are any."""
     loop, value = verdict.loop, verdict.loop.law[name]
-    if loop.arm.link.damping == 0:
+    if loop.arm.is_undamped:
         return [0 if holds_undamped(loop, loop.law.having(name, (low + high) / 2)) else 1 for low, high in pairs]
     middles = np.array([(low + high) / 2 for low, high in pairs])
     if verdict.verdict != "marginal" and any(low < value < high for low, high in pairs):
@@ -121,9 +121,9 @@ def _with_proven_ends(loop: Loop, name: str, pair: Interval, limits: Interval) -
     At C = 0 the Lyapunov argument holds for every K1 > 0, Kp >= 0, K2 < 1; at C > 0 for K2 = 0 (a passive hub).
     """
     low, high = pair
-    law, passive = loop.law, loop.arm.link.damping == 0 or loop.law.K2 == 0
+    law, passive = loop.law, loop.arm.is_undamped or loop.law.K2 == 0
     if name == "K2":
-        is_proven = loop.arm.link.damping == 0 and law.K1 > 0 and law.Kp >= 0
+        is_proven = loop.arm.is_undamped and law.K1 > 0 and law.Kp >= 0
         return (-math.inf if is_proven and low == limits[0] else low), high
     is_proven = passive and law.K2 < 1 and (name == "K1" or law.K1 > 0) and (name == "Kp" or law.Kp >= 0)
     return low, (math.inf if is_proven and high == limits[1] else high)

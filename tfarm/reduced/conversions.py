@@ -41,7 +41,7 @@ def transfer_function(reduced: ReducedModel) -> control.TransferFunction:
     model = reduced.model
     pairs = [np.poly(pair).real for pair in model.eigenvalues]
     rigid = [np.array([1.0, 0.0, 0.0])] if model.has_rigid_states else []
-    delay = [np.array([model.arm.link.damping, 1.0])] if model.relaxation is not None else []
+    delay = [np.array([model.arm.damping, 1.0])] if model.relaxation is not None else []
     denominators = [*rigid, *pairs, *delay]
     whole = _product(denominators)
     n1, n0 = model.numerators

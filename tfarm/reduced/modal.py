@@ -68,7 +68,7 @@ def modal_model(
     G = transfer(arm, outputs, x=x)
     if isinstance(count, bool) or not isinstance(count, int | np.integer) or not 0 <= count <= MOST_MODES:
         raise ParameterError(key="count", value=count, remedy=f"a whole number of flexible modes, 0 to {MOST_MODES}")
-    k, share = coefficients(arm), 0.0 if x is None else x / arm.link.length
+    k, share = coefficients(arm), 0.0 if x is None else x / arm.length
     wanted = [proper(k, each, share) for each in G.rows]
     table = modes(arm, max(1, int(count)))
     flexible = slice(int(arm.has_rigid_mode), int(arm.has_rigid_mode) + int(count))
@@ -97,10 +97,10 @@ def relaxed_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None)
     remainder does: their slow poles gather at -1/C.  So the remainder is D + E/(1 + C s), from G and G' at 0.
     Raises ParameterError at C = 0.
     """
-    model, C = modal_model(arm, outputs, count, x), arm.link.damping
+    model, C = modal_model(arm, outputs, count, x), arm.damping
     if C == 0:
         raise ParameterError(key="link.damping", value=C, remedy="without damping nothing relaxes; take modal_model")
-    share = 0.0 if x is None else x / arm.link.length
+    share = 0.0 if x is None else x / arm.length
     expansion = np.array(expansions_at_zero(coefficients(arm), model.rows, share))
     slope = expansion[:, 3] + (model.residues / model.eigenvalues**2).real.sum(axis=(1, 2))
     return replace(model, static=model.static + slope / C, relaxation=-slope / C)
@@ -126,7 +126,7 @@ def _poles_and_residues(
     branches: Callable[[Modes], DampedModes],
 ) -> tuple[Complex, Complex]:
     """Eigenvalues (n, 2) and residues (outputs, n, 2) at them."""
-    if arm.link.damping == 0:
+    if arm.is_undamped:
         s = 1j * table.natural_frequency[table.index > 0]
         powers = np.array([[each.power] for each in wanted])
         upper = undamped_residues(table, wanted, k, share) * s**powers / (2 * s)

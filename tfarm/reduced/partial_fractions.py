@@ -109,7 +109,7 @@ class PartialFractions:
         if self.has_rigid_states:
             values = values + self.rigid[:, :1] / (s * s) + self.rigid[:, 1:] / s
         if self.relaxation is not None:
-            values = values + self.relaxation[:, None] / (1 + self.arm.link.damping * s)
+            values = values + self.relaxation[:, None] / (1 + self.arm.damping * s)
         return values
 
     def magnitude(self, s: Complex) -> Real:
@@ -121,7 +121,7 @@ class PartialFractions:
         if self.has_rigid_states:
             size = size + abs(self.rigid[:, :1]) / abs(s) ** 2 + abs(self.rigid[:, 1:]) / abs(s)
         if self.relaxation is not None:
-            size = size + abs(self.relaxation[:, None] / (1 + self.arm.link.damping * s))
+            size = size + abs(self.relaxation[:, None] / (1 + self.arm.damping * s))
         return size
 
     def matrices(self) -> Matrices:
@@ -145,7 +145,7 @@ class PartialFractions:
         B[position + 1, 0] = b
         C[:, position], C[:, position + 1] = n0 / (w * b), n1 / b
         if self.relaxation is not None:
-            A[-1, -1], B[-1, 0], C[:, -1] = -1 / self.arm.link.damping, 1 / self.arm.link.damping, self.relaxation
+            A[-1, -1], B[-1, 0], C[:, -1] = -1 / self.arm.damping, 1 / self.arm.damping, self.relaxation
         return A, B, C, self.static[:, None].copy()
 
     def closed(self, gains: ArrayLike) -> Matrices:

@@ -74,7 +74,7 @@ def rational_model(arm: Arm, outputs: Wanted, pairs: int, high: float, x: float 
     few poles pass the checks.  Raises ParameterError at C > 0, where poles do not lie on one line in s^2, and where
     `pairs` does not exceed the modes below `high`.
     """
-    if arm.link.damping:
+    if not arm.is_undamped:
         raise ParameterError(key="method", value="aaa", remedy="AAA in s^2 is for C = 0; take modal, which has C")
     exact = modes_in(arm, high)
     if pairs <= exact:
@@ -98,7 +98,7 @@ def rational_model(arm: Arm, outputs: Wanted, pairs: int, high: float, x: float 
 
 def _remainders(G: TransferFunction, inside: PartialFractions, high: float, frequencies: Real) -> _Remainders:
     """Samples over the band.  Below high/100 the point S = 0 says all there is to say."""
-    k, share = coefficients(G.arm), 0.0 if G.x is None else G.x / G.arm.link.length
+    k, share = coefficients(G.arm), 0.0 if G.x is None else G.x / G.arm.length
     w = high * np.sin(np.linspace(0.01, np.pi / 2, POINTS))
     w = w[distance(w, frequencies) > 1e-9 * w]
     S, power = -(w**2), np.array([[each.power] for each in G.rows])

@@ -132,7 +132,7 @@ def reduce(
         raise ParameterError(key="outputs", value=names, remedy="name each output once")
     if method is not None and method not in get_args(Method):
         raise ParameterError(key="method", value=method, remedy="modal or aaa, or leave it out for the better one")
-    if method == "aaa" and arm.link.damping:
+    if method == "aaa" and arm.damping:
         raise ParameterError(key="method", value="aaa", remedy="AAA in s^2 is for C = 0; take modal, which has C")
     if (order is None) == (error is None):
         remedy = "give either an order (a number of states) or an error"
@@ -151,7 +151,7 @@ class _Bench:
         self.rigid = modal_model(arm, rows, 0, x).has_rigid_states
         self.inside = modes_in(arm, band[1])
         self.by_modes = method != "aaa"
-        self.by_aaa = method != "modal" and not arm.link.damping
+        self.by_aaa = method != "modal" and not arm.damping
         self.ruler = Ruler(arm, rows, band, x)
 
     def of_order(self, order: int) -> ReducedModel:
@@ -172,7 +172,7 @@ class _Bench:
     def within(self, error: float) -> ReducedModel:
         """The smallest model whose measured error is within that one."""
         tried, most = [self._few_poles(error)], self._most()
-        if self.arm.link.damping:
+        if not self.arm.is_undamped:
             tried.append(self._few_modes(error, relaxed_model, most))
             most = most if tried[-1] is None else tried[-1].model.index.size
         if self.by_modes:
@@ -236,11 +236,11 @@ class _Bench:
         """Flexible pairs of poles in a model of so many states."""
         rigid = "two for the rigid body, " if self.rigid else ""
         remedy = f"states come in pairs, {rigid}two a mode: an even number from 2 to {MOST_ORDER}"
-        if self.arm.link.damping:
+        if not self.arm.is_undamped:
             remedy = f"two states a mode, {rigid}and one for relaxation where it is odd: from 2 to {MOST_ORDER}"
         if isinstance(order, bool) or not isinstance(order, int | np.integer) or not 2 <= order <= MOST_ORDER:
             raise ParameterError(key="order", value=order, remedy=remedy)
-        if order % 2 and not self.arm.link.damping:
+        if order % 2 and not self.arm.damping:
             raise ParameterError(key="order", value=order, remedy=remedy)
         return int(order) // 2 - self.rigid
 

@@ -47,9 +47,9 @@ def headline_numbers(arm: Arm) -> tuple[Fact, ...]:
 
 
 def _other_numbers(arm: Arm) -> Iterator[Fact]:
-    cutoff, C = arm.shear_cutoff, arm.link.damping
+    cutoff, C = arm.shear_cutoff, arm.damping
     how = "" if arm.has_rigid_mode else "the arm cannot turn as a rigid body"
-    mass = arm.link.rhoA * arm.link.length
+    mass = arm.link.rhoA * arm.length
     yield Fact(label="total inertia J about the hub", value=significant(arm.total_inertia, 8), unit="kg m²", beside=how)
     yield Fact(
         label="slenderness L/√(I/A)",
@@ -83,7 +83,7 @@ def _picture(arm: Arm) -> Picture:
         title="The arm, its link to scale",
         caption=f"{_drive(arm)} Hub and payload are symbols; the link's length and depth are to scale, which shows at "
         "a glance whether shear can matter.",
-        alt=f"Side view of the arm: hub at the left, a link {plain(arm.link.length, 6)} m long, {tip} at the tip.",
+        alt=f"Side view of the arm: hub at the left, a link {plain(arm.length, 6)} m long, {tip} at the tip.",
         figure=draw_arm(arm),
     )
 
@@ -92,7 +92,7 @@ def _drive(arm: Arm) -> str:
     """What moves the arm."""
     if arm.is_locked:
         return "The hub is locked: no torque turns it; it is led through the angle θ (positive anticlockwise)."
-    if arm.hub.inertia == 0:
+    if arm.has_massless_hub:
         return "The torque u (positive anticlockwise) acts on the root of the link itself: the pin has no inertia."
     return "The hub turns the link by the torque u (positive anticlockwise)."
 

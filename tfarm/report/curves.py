@@ -83,7 +83,7 @@ def _heights(arm: Arm, run: Simulation) -> dict[str, float]:
 
 def away(arm: Arm, simulation: Simulation) -> Real:
     """Tip displacement less L times the reference angle [m], at the samples."""
-    reference = arm.link.length * simulation.scenario.hub_angle[: simulation.t.size]
+    reference = arm.length * simulation.scenario.hub_angle[: simulation.t.size]
     error: Real = simulation.at_samples.tip_displacement - reference
     return error
 
@@ -101,7 +101,7 @@ def tip(simulation: Simulation) -> Curve:
 def tip_deviation(arm: Arm, simulation: Simulation) -> Curve:
     """Tip displacement less L times the reference angle [m]."""
     t, displacement = continuous(simulation, "tip_displacement")
-    return curve(t, displacement - arm.link.length * reference_angle(simulation.scenario, t))
+    return curve(t, displacement - arm.length * reference_angle(simulation.scenario, t))
 
 
 def reference_angle(task: Scenario, t: Real) -> Real:

@@ -31,7 +31,7 @@ def damped_table(modes: Modes) -> Table:
     """The table of the arm's damped modes, each number proven to 12 digits and printed to fewer."""
     damped = damped_modes(modes)
     damped.certify(12)
-    C, box = modes.arm.link.damping, damped.box
+    C, box = modes.arm.damping, damped.box
     edges = {"left": box.re_min, "right": box.re_max, "top": box.im_max, "limit": -1 / C}
     rigid = ", with 0 twice" if modes.arm.has_rigid_mode else ""
     words = {name: plain(round(x)) if abs(x) >= 100 else plain(x, 3) for name, x in edges.items()}

@@ -128,7 +128,7 @@ def beyond_table(arm: Arm, held: HubFeedback) -> Table:
     edge = edge_of_K2(arm, held) or 0.0
     more = [float(f"{share * edge:.3g}") for share in AROUND_EDGE if edge > BEYOND[-1]]
     gains = np.array([*BEYOND, *(K2 for K2 in more if BEYOND[-1] < K2)])
-    on_edge = np.isclose(gains, edge, rtol=1e-9, atol=0.0) & (arm.link.damping > 0)  # no list of poles ends there
+    on_edge = np.isclose(gains, edge, rtol=1e-9, atol=0.0) & (not arm.is_undamped)  # no list of poles ends there
     found = [None if on else _judged(arm, replace(held, K2=float(K2))) for K2, on in zip(gains, on_edge, strict=True)]
     title = "What K2 = 1 and beyond does, at K1 = " + plain(held.K1, 4)
     return _poles_table("beyond", title, _beyond_caption(arm, held, found), "K2", "", gains, found)
@@ -196,7 +196,7 @@ def _first_pairs(it: Stability | None) -> str:
 def _beyond_caption(arm: Arm, held: HubFeedback, found: Sequence[Stability | None]) -> str:
     J, hub = arm.total_inertia, arm.hub.inertia
     backwards = BACKWARDS.format(K2=significant(J / (J - hub), 5)) if arm.has_rigid_mode else ""
-    if not arm.link.damping:
+    if not arm.damping:
         return UNDAMPED + backwards
     counts = [it.unstable_roots for it in found if it is not None and it.unstable_roots]
     more = MORE if len(counts) > 1 and counts[-1] > counts[0] and counts == sorted(counts) else ""

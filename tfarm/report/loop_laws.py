@@ -70,7 +70,7 @@ def why_no_loop(arm: Arm) -> str:
         return "The hub of this arm is locked: it takes no torque, so there is no loop to close and no gain to choose."
     whole = "its gauge reads −u at every instant"
     damped = "its gauge reads −u/(1 + C s), the torque itself through a short lag"
-    return NO_PLACE_FOR_K2.format(gauge=damped if arm.link.damping else whole)
+    return NO_PLACE_FOR_K2.format(gauge=damped if arm.damping else whole)
 
 
 def sign_words(arm: Arm) -> str:

@@ -189,7 +189,7 @@ def margins_section(arm: Arm, chain: Chain | None = None) -> Section:
         title="Is the loop stable, and by how much?",
         facts=tuple(verdict_facts(named, found, [brief_of(arm, each.law, chain) for each in named])),
         words=[verdict_words(*each) for each in zip(named, found, strict=True)],
-        blocks=(margin_table(named, found, arm.link.damping == 0), window_table(named, found, sign_words(arm))),
+        blocks=(margin_table(named, found, arm.is_undamped), window_table(named, found, sign_words(arm))),
     )
 
 
@@ -244,7 +244,7 @@ def _nyquist_answer(plots: list[Curve]) -> str:
 
 def _poles_words(plot: Nyquist) -> str:
     arm, count = plot.verdict.loop.arm, plot.poles.size
-    if arm.link.damping > 0:
+    if not arm.is_undamped:
         return ONE_POLE if count else NO_POLE
     if not arm.has_rigid_mode:
         return HELD_POLES

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -12,7 +12,7 @@ from matplotlib.scale import SymmetricalLogTransform
 from numpy.typing import NDArray
 
 import tfarm
-from tfarm.arm import Arm, Hub, HubFeedback, many_laws
+from tfarm.arm import Arm, HubFeedback, many_laws
 from tfarm.columns import Column, Table
 from tfarm.dsp import Chain, sampled_verdict
 from tfarm.dsp.brief import SampledBrief
@@ -101,7 +101,7 @@ class GainMap:
     @property
     def is_undamped(self) -> bool:
         """Whether C = 0."""
-        return self.arm.link.damping == 0
+        return self.arm.is_undamped
 
     @property
     def counts(self) -> NDArray[np.int64]:
@@ -125,7 +125,7 @@ def gain_map(arm: Arm, chain: Chain | None = None) -> GainMap:
     K1, K2 = found.K1[half::SPARSE], found.K2[half::SPARSE]
     a, b = (each.ravel() for each in np.meshgrid(K1, K2))
     damping = least_damping(arm, many_laws(HubFeedback(), K1=a, K2=b), MODES).reshape(K2.size, K1.size)
-    held = tfarm.modes(_held(arm), count=3).natural_frequency
+    held = tfarm.modes(arm.having(hub_inertia=math.inf), count=3).natural_frequency
     named = laws(arm)
     briefs = tuple(brief_of(arm, each.law, chain) for each in named)
     sampled = sampled_region(arm, x, y, chain)
@@ -153,7 +153,7 @@ def rate_axis(arm: Arm) -> Axis:
 
 def moment_axis(arm: Arm, x: Axis) -> Axis:
     """K2 from -4 to 2, or as deep as unstable windows go."""
-    if arm.link.damping == 0:
+    if arm.is_undamped:
         return Axis(LOW, HIGH)
     K1 = x.grid(SCAN)
     deep = region(arm, K1[K1 > 0], between(DEEPEST, LOW, 400))
@@ -240,7 +240,3 @@ def _sampled_ends(data: GainMap) -> Real:
     columns = zip(data.sampled.K1, data.sampled.intervals, strict=True)
     ends = [(float(K1), end) for K1, column in columns for window in column for end in window]
     return np.array([each for each in ends if data.y.low <= each[1] <= data.y.high]).reshape(-1, 2)
-
-
-def _held(arm: Arm) -> Arm:
-    return replace(arm, hub=Hub(inertia=math.inf))

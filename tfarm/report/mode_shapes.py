@@ -37,7 +37,7 @@ class Shape:
 
 def shapes_of(modes: Modes, count: int) -> tuple[Shape, ...]:
     """The first flexible modes, each scaled to a largest displacement of one, the tip's side positive."""
-    x = np.linspace(0.0, modes.arm.link.length, POINTS)
+    x = np.linspace(0.0, modes.arm.length, POINTS)
     payload = modes.arm.payload
     shapes = []
     for i, w in enumerate(modes.shape(x)):

@@ -86,7 +86,7 @@ def modes_section(arm: Arm) -> Section:
 
 def _damped(modes: Modes) -> tuple[tuple[Table, ...], tuple[str, ...]]:
     """The table of the damped modes, none at C = 0; or in its place a sentence why there is none."""
-    if not modes.arm.link.damping:
+    if not modes.arm.damping:
         return (), ()
     try:
         return (damped_table(modes),), ()
@@ -100,10 +100,8 @@ def _flexible(modes: Modes) -> Real:
 
 def modal_table(modes: Modes) -> Table:
     """Frequencies, hub participation, modal moment and nodes."""
-    nodes = [", ".join(places(node, modes.arm.link.length)) or "none" for node in modes.nodes]
-    decimals = (
-        answers.KEPT - 1 - math.floor(math.log10(modes.arm.link.length))
-    )  # a node is known as a share of the length
+    nodes = [", ".join(places(node, modes.arm.length)) or "none" for node in modes.nodes]
+    decimals = answers.KEPT - 1 - math.floor(math.log10(modes.arm.length))  # a node is known as a share of the length
     at = [tuple(np.round(node, decimals).tolist()) for node in modes.nodes]
     rigid = "Row 0 is the arm turning as a rigid body. " if modes.arm.has_rigid_mode else ""
     omega, hertz = (column.read(modes).cells for column in answers.MODES[1:3])
@@ -113,7 +111,7 @@ def modal_table(modes: Modes) -> Table:
         caption=MODAL_TABLE.format(
             rigid=rigid,
             tip=_positive(modes.arm),
-            hub=LOCKED if modes.arm.is_locked else FREE_PIN if modes.arm.hub.inertia == 0 else "",
+            hub=LOCKED if modes.arm.is_locked else FREE_PIN if modes.arm.has_massless_hub else "",
             proof=how_proven(modes, omega, hertz),
         ),
         columns=(*answers.MODES, Column("nodes_m", "nodes", "m", of=at, shown=nodes, on=REPORT)),

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -75,8 +75,8 @@ class Overlay:
 
 def overlay(arm: Arm, gains: HubFeedback, chain: Chain) -> Overlay:
     """The regions around these gains.  Raises ParameterError where the arm has no loop."""
-    dampings = (arm.link.damping,) if arm.link.damping else (*DAMPINGS, 0.0)
-    loops = [sampled_verdict(with_damping(arm, C), gains, chain).loop for C in dampings]
+    dampings = (arm.damping,) if arm.damping else (*DAMPINGS, 0.0)
+    loops = [sampled_verdict(arm.having(damping=C), gains, chain).loop for C in dampings]
     ends = np.array(sorted({end for loop in loops for end in ends_of_K1(loop)}))
     ends = ends[np.diff(ends, prepend=0.0) > SAME * ends]
     top = _round_up(BEYOND * max([gains.K1, *ends]))
@@ -86,11 +86,6 @@ def overlay(arm: Arm, gains: HubFeedback, chain: Chain) -> Overlay:
     layers = tuple(sampled_layer(loop, K1, CUT) for loop in loops)
     span = (float(K1[0]), float(K1[-1]))
     return Overlay(arm, gains, chain.sampling.period, span, _continuous_layer(arm, K1), layers)
-
-
-def with_damping(arm: Arm, C: float) -> Arm:
-    """The arm with another damping C [s]."""
-    return replace(arm, link=replace(arm.link, damping=C))
 
 
 def ends_of_K1(loop: SampledLoop) -> list[float]:
@@ -108,13 +103,13 @@ def _round_up(x: float) -> float:
 def sampled_layer(loop: SampledLoop, K1: Real, cut: Window) -> Layer:
     """Where the sampled loop is stable: at each K1 (ascending) its intervals of K2, cut to a range."""
     plane = gain_map(loop, K1, np.linspace(*cut, 3))
-    return Layer(loop.plant.arm.link.damping, K1, plane.stable_intervals, plane.modes_used)
+    return Layer(loop.plant.arm.damping, K1, plane.stable_intervals, plane.modes_used)
 
 
 def _continuous_layer(arm: Arm, K1: Real) -> Layer:
     """From the count on the lowest K2 and every crossing above it; the count on the highest one must agree."""
     plane = region(arm, K1, np.array(CUT))
-    if arm.link.damping == 0:
+    if arm.is_undamped:
         return Layer(0.0, K1, [[(CUT[0], 1.0)] for _ in K1], None)
     found: list[list[Window]] = []
     for i, gain in enumerate(K1):
@@ -126,7 +121,7 @@ def _continuous_layer(arm: Arm, K1: Real) -> Layer:
             raise ConvergenceError(f"the crossings along K2 at K1 = {gain:g} do not add up", ends, float(counts[-1]))
         pairs = zip(itertools.pairwise(ends), counts, strict=True)
         found.append([pair for pair, count in pairs if count == 0 and pair[1] > pair[0]])
-    return Layer(arm.link.damping, K1, found, None)
+    return Layer(arm.damping, K1, found, None)
 
 
 # ------------------------------------------------------------ the picture
@@ -170,7 +165,7 @@ def sampled_label(arm: Arm, layer: Layer) -> str:
     """What a sampled layer holds for: the modes at C = 0, the damping where it is not the arm's own."""
     if layer.damping == 0.0:
         return f", C = 0: the first {layer.modes} modes"
-    return "" if layer.damping == arm.link.damping else f", if C were {scientific(layer.damping, 1)} s"
+    return "" if layer.damping == arm.damping else f", if C were {scientific(layer.damping, 1)} s"
 
 
 def _fill(ax: Axes, layer: Layer, colour: str, edge: str, label: str) -> Patch:
@@ -189,7 +184,7 @@ def overlay_table(data: Overlay, stem: str) -> Table:
     columns = [Column("K1", "K1", "N m s/rad", of=data.continuous.K1)]
     columns.append(_ends("continuous_K2_intervals", data.continuous))
     for layer in data.sampled:
-        own = layer.damping == data.arm.link.damping
+        own = layer.damping == data.arm.damping
         columns.append(_ends("sampled_K2_intervals" if own else f"sampled_at_C_{layer.damping:g}_s", layer))
     title = "Stable intervals of K2, continuous and sampled"
     return Table(stem=stem, title=title, caption="", is_data=True, columns=tuple(columns))

@@ -108,10 +108,10 @@ def _argument(name: str, preset: bool) -> str:
 
 def summary(arm: Arm) -> str:
     """The arm in one sentence."""
-    hub = "a locked hub" if arm.is_locked else "a free pin" if arm.hub.inertia == 0 else "a hub"
+    hub = "a locked hub" if arm.is_locked else "a free pin" if arm.has_massless_hub else "a hub"
     tip = "with a payload" if arm.payload.mass or arm.payload.inertia else "without payload"
     tip = "its tip pinned" if math.isinf(arm.payload.mass) else tip
-    damping = "damped" if arm.link.damping else "undamped"
+    damping = "damped" if arm.damping else "undamped"
     return f"A flexible link on {hub}, {tip}, {damping}; Timoshenko theory, exact."
 
 

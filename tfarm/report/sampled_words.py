@@ -238,7 +238,7 @@ def interval(window: Window | None, looked_at: Window = EVERYWHERE) -> str:
 
 def cure(data: Sampled) -> str:
     """How much damping makes these gains safe, and how far the arm is from it."""
-    needed, own = data.analysis.required_damping, data.arm.link.damping
+    needed, own = data.analysis.required_damping, data.arm.damping
     if math.isinf(needed):
         return "No Kelvin-Voigt damping up to 15 % of critical in the first mode makes these gains stable."
     if needed == 0:

@@ -38,7 +38,7 @@ def depth_of(arm: Arm) -> float:
     """Depth over length of a rectangle of the link's radius of gyration, sqrt(12) r/L; a named shape's own."""
     given = dict(arm.link.section.dimensions)
     own = given.get("depth") or given.get("diameter") or given.get("outer_diameter")
-    return own / arm.link.length if own else math.sqrt(12) / arm.link.slenderness
+    return own / arm.length if own else math.sqrt(12) / arm.link.slenderness
 
 
 def _link(arm: Arm, ax: Axes) -> None:
@@ -47,7 +47,7 @@ def _link(arm: Arm, ax: Axes) -> None:
     ax.add_patch(Rectangle((0, -depth / 2), 1.0, depth, fc="#cfe0ee", ec=BLUE, lw=1.0, zorder=2))
     below = -max(depth / 2, HUB) - 0.035
     ax.annotate("", (0, below), (1, below), arrowprops={"arrowstyle": "<->", "color": GREY, "lw": 0.8})
-    text = f"L = {plain(arm.link.length, 6)} m,  depth {plain(depth * arm.link.length, 4)} m (to scale)"
+    text = f"L = {plain(arm.length, 6)} m,  depth {plain(depth * arm.length, 4)} m (to scale)"
     ax.text(0.5, below - 0.012, text, ha="center", va="top", fontsize=9.0, color=INK)
 
 

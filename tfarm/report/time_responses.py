@@ -67,7 +67,7 @@ def draw_slews(data: Slews) -> Figure:
         figure.legend(loc="outside lower left", ncols=3)
         torque.set_xlabel("time  [s]")
         slew, K1 = data.with_moment.chain.slew, plain(data.gains.K1)
-        travel = plain(slew.travel_of(data.arm.link.length), 3)
+        travel = plain(slew.travel_of(data.arm.length), 3)
         what = f"{travel} m of tip travel in {plain(slew.rise_time, 3)} s, K1 = {K1}"
         headline(figure, f"{data.arm.name}: {what}")
     return figure

@@ -94,8 +94,8 @@ def prove(arm: Arm, chain: Chain | None = None) -> Proof:
 
 def boxed(arm: Arm, modes: Modes) -> Iterator[Boxed]:
     """Damped modes and the default loop's poles, each enclosed and counted; what cannot be proven is said."""
-    if arm.link.damping:
-        what = f"damped modes, C = {arm.link.damping:g} s"
+    if not arm.is_undamped:
+        what = f"damped modes, C = {arm.damping:g} s"
         try:
             damped = tfarm.damped_modes(modes)
             damped.certify(BOX_DIGITS)

@@ -82,7 +82,7 @@ def why_not(arm: Arm) -> str:
         return why_no_loop(arm)
     if not arm.has_rigid_mode:
         return "The tip of this arm is held: it makes no slew, and there is nothing for the tuner to learn from."
-    return UNDAMPED if arm.link.damping == 0 else ""
+    return UNDAMPED if arm.is_undamped else ""
 
 
 # ------------------------------------------------------------ pictures

@@ -81,7 +81,7 @@ def drift_words(data: TunerStudy) -> str:
 def off_target(data: TunerStudy) -> tuple[float, float]:
     """How far off the tip ends [m], with the tuner and with the best constant gain."""
     runs = data.slews["with the tuner"], data.constant
-    travel = data.arm.link.length * float(abs(data.constant.scenario.hub_angle).max())
+    travel = data.arm.length * float(abs(data.constant.scenario.hub_angle).max())
     tuned, constant = (abs(float(away(data.arm, each)[-1])) for each in runs)
     return tuned * (tuned > ROUNDED * travel), constant * (constant > ROUNDED * travel)
 

@@ -132,7 +132,7 @@ def bode(arm: Arm, output: str, band: tuple[float, float] | None = None) -> Bode
         output=output,
         omega=omega,
         value=value,
-        phase=phase_of(omega, value, inside_poles, inside_zeros, is_real=arm.link.damping == 0),
+        phase=phase_of(omega, value, inside_poles, inside_zeros, is_real=arm.is_undamped),
         poles=inside_poles,
         zeros=inside_zeros,
         rigid=G.rigid_body / (1j * omega) ** 2 if G.rigid_body else np.full(omega.size, G.static + 0j),

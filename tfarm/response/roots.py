@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, Hub
+from tfarm.arm import Arm
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import Analytic
 from tfarm.exact.coefficients import Coefficients, coefficients
@@ -42,7 +42,7 @@ class Roots:
 def poles_of(arm: Arm, up_to: float) -> Roots:
     """The poles of every transfer function of the arm with |Im s| <= up_to."""
     at_zero = 2 * arm.has_rigid_mode
-    if arm.link.damping == 0:
+    if arm.is_undamped:
         return _on_axis(_frequencies(arm, up_to), at_zero, up_to)
     return _in_box(coefficients(arm), "drive", at_zero, up_to, _damped_starts(arm, up_to))
 
@@ -60,8 +60,8 @@ def zeros_of(arm: Arm, wanted: Output, up_to: float) -> Roots:
     name = wanted.quantity if wanted.is_at_end else f"tip {wanted.quantity}"
     at_zero = max(0, _order(k, name) + wanted.power - _order(k, "drive"))
     neighbour = {"theta": math.inf, "M": 0.0}.get(name)
-    other = arm if neighbour is None else replace(arm, hub=Hub(inertia=neighbour))
-    if neighbour is not None and arm.link.damping == 0:
+    other = arm if neighbour is None else arm.having(hub_inertia=neighbour)
+    if neighbour is not None and arm.is_undamped:
         return _on_axis(_frequencies(other, up_to), at_zero, up_to)
     starts = _starts_by_sampling(k, name, up_to) if neighbour is None else _damped_starts(other, up_to)
     return _in_box(k, name, at_zero, up_to, starts)
@@ -83,7 +83,7 @@ def _on_axis(frequencies: NDArray[np.float64], at_zero: int, up_to: float) -> Ro
 
 def _damped_starts(arm: Arm, up_to: float) -> Complex:
     """First-order estimates s = -C w^2/2 +- i w sqrt(1 - (C w/2)^2) from the undamped frequencies."""
-    omega, C = _frequencies(arm, 1.5 * up_to), arm.link.damping
+    omega, C = _frequencies(arm, 1.5 * up_to), arm.damping
     root = np.sqrt((1 - (C * omega / 2) ** 2).astype(complex))
     starts = np.r_[omega * (-C * omega / 2 + 1j * root), omega * (-C * omega / 2 - 1j * root)]
     return np.r_[starts, np.linspace(-up_to, -up_to / 50, 40)]

@@ -186,11 +186,11 @@ class TransferFunction:
 
     @property
     def _share(self) -> float:
-        return 0.0 if self.x is None else self.x / self.arm.link.length
+        return 0.0 if self.x is None else self.x / self.arm.length
 
     def _place(self, x: float | None) -> float | None:
         along = [name for name, wanted in zip(self.outputs, self.rows, strict=True) if wanted.place == "x"]
-        length = self.arm.link.length
+        length = self.arm.length
         if not along:
             if x is not None:
                 raise ParameterError(key="x", value=x, remedy=f"{self.outputs[0]} has its own place; leave x out")

@@ -88,7 +88,7 @@ def default_words(arm: Arm, names: Iterable[str] = ("K1", "K2")) -> str:
 
 def first_frequency(arm: Arm) -> float:
     """w1 [rad/s], the lowest flexible frequency of the undamped arm."""
-    return _first_frequency(replace(arm, link=replace(arm.link, damping=0.0)))
+    return _first_frequency(arm.having(damping=0.0))
 
 
 @lru_cache(maxsize=64)

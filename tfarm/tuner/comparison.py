@@ -96,22 +96,22 @@ def conditions(arm: Arm, chain: Chain, quantised: Chain | None = None) -> list[C
         Condition("one sample of delay", arm, replace(chain, sampling=sampling)),
         Condition("quantised, one sample of delay", arm, replace(quantised, sampling=sampling)),
     ]
-    loads = {f"payload {mass:g} kg": replace(arm, payload=replace(arm.payload, mass=mass)) for mass in _payloads(arm)}
-    inertias = {f"hub {share - 1:+.0%}": share * arm.hub.inertia for share in HUBS}
-    hubs = {name: replace(arm, hub=replace(arm.hub, inertia=inertia)) for name, inertia in inertias.items()}
-    dampings = {f"C = {C:g} s": replace(arm, link=replace(arm.link, damping=C)) for C in _dampings(arm)}
+    loads = {f"payload {mass:g} kg": arm.having(payload_mass=mass) for mass in _payloads(arm)}
+    inertias = {f"hub {share - 1:+.0%}": share * arm.hub_inertia for share in HUBS}
+    hubs = {name: arm.having(hub_inertia=inertia) for name, inertia in inertias.items()}
+    dampings = {f"C = {C:g} s": arm.having(damping=C) for C in _dampings(arm)}
     return listed + [Condition(name, other, chain) for name, other in (loads | hubs | dampings).items()]
 
 
 def _payloads(arm: Arm) -> list[float]:
     """Other masses at the tip [kg]: shares of the payload, or of the arm itself where it has none."""
-    mass, beam = arm.payload.mass, arm.link.rhoA * arm.link.length
+    mass, beam = arm.payload.mass, arm.link.rhoA * arm.length
     return [float(f"{x:.2g}") for x in ([share * mass for share in CARRIED] if mass else [s * beam for s in ADDED])]
 
 
 def _dampings(arm: Arm) -> list[float]:
     """Other dampings C [s], none among them where the arm has some."""
-    own = arm.link.damping
+    own = arm.damping
     if own:
         return [0.0, *(float(f"{share * own:.3g}") for share in DAMPINGS)]
     first = float(modes(arm, 1).natural_frequency[-1])
@@ -150,7 +150,7 @@ def _row(trial: Trial, gain: TunedGain, guard: Guard, nominal: float, condition:
 
 def _proven(here: Trial, guard: Guard) -> bool:
     """Whether the sector is proven for this loop, with the trial's modes."""
-    if here.arm.link.damping == 0.0:
+    if here.arm.is_undamped:
         return False
     try:
         return MovingGain(here.loop).proof(guard.lo, guard.hi) is not None

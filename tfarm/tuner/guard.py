@@ -176,7 +176,7 @@ def _settled(loops: list[SampledLoop], found: list[tuple[float, float]]) -> bool
 
     At C = 0 that can never be said.
     """
-    if loops[0].plant.arm.link.damping == 0.0 or len(found) < 2:
+    if loops[0].plant.arm.is_undamped or len(found) < 2:
         return False
     (low, high), (before_low, before_high) = found[-1], found[-2]
     agree = max(abs(low - before_low), abs(high - before_high)) <= AGREE * (high - low)
@@ -199,7 +199,7 @@ def _larger(loop: SampledLoop) -> Iterator[SampledLoop]:
     """
     yield loop
     arm, count = loop.plant.arm, loop.plant.count
-    wanted = (4 * count, 3 * count, 2 * count) if arm.link.damping else (UNDAMPED_MODES,)
+    wanted = (4 * count, 3 * count, 2 * count) if arm.damping else (UNDAMPED_MODES,)
     for number in (min(number, MOST_MODES) for number in wanted):
         if number <= count:
             return
@@ -215,9 +215,9 @@ def _remedy(loop: SampledLoop, kind: str) -> str:
     """Why there is no guard, and the smallest damping tried that has one."""
     arm = loop.plant.arm
     what = "no sector of moving gains" if kind == "time-varying" else "no constant gain"
-    start = f"{arm.name}: {what} is proven stable at K1 = {loop.gains.K1:g}, C = {arm.link.damping:g} s"
-    for C in DAMPINGS[arm.link.damping < DAMPINGS]:
-        if _has_guard(replace(arm, link=replace(arm.link, damping=float(C))), loop, kind):
+    start = f"{arm.name}: {what} is proven stable at K1 = {loop.gains.K1:g}, C = {arm.damping:g} s"
+    for C in DAMPINGS[arm.damping < DAMPINGS]:
+        if _has_guard(arm.having(damping=float(C)), loop, kind):
             return f"{start}; with a damping of C = {C:.1e} s there is one"
     return f"{start}, nor with any damping up to {DAMPINGS[-1]:g} s; take another K1, or a shorter period or delay"
 

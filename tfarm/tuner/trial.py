@@ -117,8 +117,8 @@ class Trial:
     @cached_property
     def numbers(self) -> Real:
         """K1, a, b, T, the largest moment, and after how many samples x answers a torque."""
-        link, sampling = self.arm.link, self.loop.chain.sampling
-        bound, lag = FOLDED_UP * link.EI / link.length, 1 + sampling.whole_delay
+        sampling = self.loop.chain.sampling
+        bound, lag = FOLDED_UP * self.arm.bending_scale, 1 + sampling.whole_delay
         return np.array([self.loop.gains.K1, self.cost.a, self.cost.b, sampling.period, bound, float(lag)])
 
     @cached_property
@@ -210,7 +210,7 @@ def slew_trial(
     if length < chain.slew.rise_time:
         remedy = f"a trial lasts at least as long as its slew, {chain.slew.rise_time:g} s"
         raise ParameterError(key="duration", value=length, remedy=remedy)
-    if arm.hub.inertia == 0.0:
+    if arm.has_massless_hub:
         remedy = "the root moment of a hub without inertia is the torque itself, and feeding it back an algebraic loop"
         raise ParameterError(key="hub.inertia", value=0.0, remedy=f"{remedy}; give the hub an inertia")
     loop = sampled_loop(arm, HubFeedback(K1=rate_gain, K2=1.0), chain, count=count)
