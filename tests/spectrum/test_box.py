@@ -6,7 +6,7 @@ import pytest
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import Analytic
 from tfarm.spectrum import box as room
-from tfarm.spectrum.box import Box, newton, winding_number, zeros_in_box
+from tfarm.spectrum.box import Box, complete, newton, winding_number, zeros_in_box
 
 
 def polynomial(*zeros, flat=0.0):
@@ -45,3 +45,15 @@ def test_a_search_ends(monkeypatch):
     monkeypatch.setattr(room, "MOST_CALLS", 3)
     with pytest.raises(ConvergenceError, match="no end of cuts"):
         zeros_in_box(polynomial(*zeros), Box(-50.0, 10.0, -10.0, 10.0), np.array([0.1 + 0j]))
+
+
+def test_a_box_grows_where_a_zero_lies_on_its_edge():
+    zeros = np.array([2.0 + 10.0j, 2.0 - 10.0j, -1.0, -40.0])
+    found, box = complete(
+        polynomial(*zeros), lambda height: Box(-50.0, 10.0, -height, height), 10.0, np.array([0.1 + 0j])
+    )
+    assert 10.0 < box.im_max < 10.1
+    assert np.sort_complex(found) == pytest.approx(np.sort_complex(zeros), rel=1e-12)
+    assert (found.imag == 0).sum() == 2
+    with pytest.raises(ConvergenceError, match="lies on the contour"):
+        complete(polynomial(*zeros), lambda height: Box(-50.0, 10.0, -height, height), 10.0, zeros, factors=(1.0,))

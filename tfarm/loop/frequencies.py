@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm
-from tfarm.spectrum import modes, modes_below
+from tfarm.spectrum import flexible_frequencies, modes
 
 Real = NDArray[np.float64]
 
@@ -26,19 +26,11 @@ BETWEEN = 24  # and between two of them
 MOST_MODES = 150  # flexible modes that a band holds at most
 
 
-def natural_frequencies(arm: Arm, up_to: float) -> Real:
-    """Flexible natural frequencies [rad/s] below `up_to`."""
-    if modes_below(arm, up_to) == 0:
-        return np.empty(0)
-    table = modes(arm, up_to=up_to)
-    return table.natural_frequency[table.index > 0]
-
-
 @lru_cache(maxsize=64)
 def steep_places(arm: Arm, up_to: float) -> Any:
     """Natural frequencies [rad/s] with the arm's own hub, with a locked one and with none, ascending; read-only."""
     others = (arm, arm.having(hub_inertia=math.inf), arm.having(hub_inertia=0.0))
-    places = np.unique(np.concatenate([natural_frequencies(each, up_to) for each in others]))
+    places = np.unique(np.concatenate([flexible_frequencies(each, up_to) for each in others]))
     places.flags.writeable = False
     return places
 

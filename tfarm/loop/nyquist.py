@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from tfarm.arm import Arm, HubFeedback
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
+from tfarm.spectrum import flexible_frequencies
 
-from .frequencies import band_of, grid, natural_frequencies
+from .frequencies import band_of, grid
 from .plant import Loop
 from .poles import ON_AXIS
 from .stability import Stability, stability
@@ -95,7 +96,7 @@ def poles_on_axis(loop: Loop, band: float) -> Real:
     """Poles of L on the imaginary axis [rad/s], from 0 up: the rigid body's, and at C = 0 every natural frequency."""
     arm, law = loop.arm, loop.law
     zero = [0.0] if arm.has_rigid_mode and (law.K1 or law.Kp) else []
-    return np.r_[zero, natural_frequencies(arm, band)] if arm.is_undamped else np.array(zero)
+    return np.r_[zero, flexible_frequencies(arm, band)] if arm.is_undamped else np.array(zero)
 
 
 def upper_contour(loop: Loop, poles: Real, band: float, closed: Complex) -> tuple[Complex, NDArray[np.bool_]]:

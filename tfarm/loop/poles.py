@@ -17,11 +17,11 @@ from tfarm.arm import Arm, HubFeedback
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
 from tfarm.exact.characteristic import zeros_at_origin
 from tfarm.records import record
-from tfarm.spectrum import modes
-from tfarm.spectrum.box import Box, zeros_in_box
+from tfarm.spectrum.box import GROWTH, Box, complete
 from tfarm.spectrum.damped import CLEAR
 from tfarm.spectrum.enclose import Disc, disjoint, enclosed, proven_count
 
+from .frequencies import band_of, steep_places
 from .plant import Loop, effective_inertia
 
 Complex = NDArray[np.complexfloating[Any, Any]]
@@ -35,7 +35,6 @@ SLOW = 1e-6  # of a box's height: poles nearer to 0 are the rigid arm's, and kno
 SLOW_STEPS = 4  # of Newton's method from there
 NEAR_RIGID = 0.01  # of its size: how far it may be from the rigid arm's
 SMALLEST = 1e-140  # 1/s: whose square is still a full double
-GROWTH = (1.0, 1.0041, 1.0093, 1.0171, 1.0311, 1.0573, 1.113)  # heights tried where a zero lies on the edge of a box
 SHRINK = tuple(1 / factor for factor in GROWTH)
 
 
@@ -110,7 +109,7 @@ def closed_loop_poles(arm: Arm, law: HubFeedback, count: int | None = None) -> P
     wanted, limit = (USUAL, cut_off) if count is None else (count, math.inf)
     number = wanted + 2
     while True:
-        height = _height_of(arm, number)
+        height = band_of(arm, number)
         if height >= limit:
             poles = poles_below(loop, limit, SHRINK)
             if poles.values.size <= wanted:
@@ -133,19 +132,12 @@ def poles_below(loop: Loop, height: float, factors: tuple[float, ...] = GROWTH) 
     """
     at_zero = zeros_at_origin(loop.k, loop.gains)
     starts, known = starting_points(loop, 1.3 * height), slow_poles(loop, SLOW * height)
-    for factor in factors:
-        box = box_of(loop, height * factor)
-        try:
-            found = zeros_in_box(loop.member.function, box, starts, known)
-        except ConvergenceError:
-            if factor == factors[-1]:
-                raise
-            continue
-        found = _on_its_axis(loop, np.where(abs(found.imag) < 1e-11 * abs(found), found.real, found))
-        upper = found[found.imag >= 0]
-        upper = upper[np.lexsort((upper.real, upper.imag))]
-        return Poles(loop, np.r_[np.zeros(at_zero, complex), upper], box)
-    raise AssertionError("unreachable")
+    function = loop.member.function
+    found, box = complete(function, lambda height: box_of(loop, height), height, starts, known, factors)
+    found = _on_its_axis(loop, found)
+    upper = found[found.imag >= 0]
+    upper = upper[np.lexsort((upper.real, upper.imag))]
+    return Poles(loop, np.r_[np.zeros(at_zero, complex), upper], box)
 
 
 def _on_its_axis(loop: Loop, found: Complex) -> Complex:
@@ -195,9 +187,7 @@ def slow_poles(loop: Loop, below: float) -> Complex:
 def starting_points(loop: Loop, up_to: float) -> Complex:
     """Where Newton's method starts: the arm's own frequencies, those with the hub locked, and the rigid arm's poles."""
     arm, C = loop.arm, loop.arm.damping
-    omega = np.concatenate(
-        [_frequencies(each, up_to) for each in (arm, arm.having(hub_inertia=np.inf), arm.having(hub_inertia=0.0))]
-    )
+    omega = np.asarray(steep_places(arm, up_to))
     shift = np.array([0.0, 0.02, 0.3])[:, None]
     decay = C * omega**2 / 2
     near = (-decay - shift * omega + 1j * omega * np.sqrt(np.maximum(1 - (C * omega / 2) ** 2, 0.0))).ravel()
@@ -206,21 +196,6 @@ def starting_points(loop: Loop, up_to: float) -> Complex:
     slow = slow[abs(slow) > SMALLEST]  # zeros at 0 are divided out
     real = -np.geomspace(up_to / 300, 1.4 * up_to, 25)
     return np.concatenate([near, near.conj(), slow, real, -real])
-
-
-def _frequencies(arm: Arm, up_to: float) -> Real:
-    from tfarm.spectrum import modes_below
-
-    if modes_below(arm, up_to) == 0:
-        return np.empty(0)
-    table = modes(arm, up_to=up_to)
-    return table.natural_frequency[table.index > 0]
-
-
-def _height_of(arm: Arm, number: int) -> float:
-    """Half-way between two natural frequencies, so many flexible modes up."""
-    omega = modes(arm, number + 1).natural_frequency
-    return float((omega[-1] + omega[-2]) / 2)
 
 
 def _first(poles: Poles, count: int) -> Poles:

@@ -10,15 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm
-from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import Analytic
 from tfarm.exact.coefficients import Coefficients, coefficients
 from tfarm.exact.free import free_response, low_frequency, low_frequency_tip, tip_response
 from tfarm.exact.jets import Jet
 from tfarm.exact.outputs import Output
 from tfarm.records import record
-from tfarm.spectrum import modes, modes_below
-from tfarm.spectrum.box import Box, Function, zeros_in_box
+from tfarm.spectrum import flexible_frequencies
+from tfarm.spectrum.box import REAL, Box, Function, complete
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 
@@ -43,7 +42,7 @@ def poles_of(arm: Arm, up_to: float) -> Roots:
     """The poles of every transfer function of the arm with |Im s| <= up_to."""
     at_zero = 2 * arm.has_rigid_mode
     if arm.is_undamped:
-        return _on_axis(_frequencies(arm, up_to), at_zero, up_to)
+        return _on_axis(flexible_frequencies(arm, up_to), at_zero, up_to)
     return _in_box(coefficients(arm), "drive", at_zero, up_to, _damped_starts(arm, up_to))
 
 
@@ -62,17 +61,9 @@ def zeros_of(arm: Arm, wanted: Output, up_to: float) -> Roots:
     neighbour = {"theta": math.inf, "M": 0.0}.get(name)
     other = arm if neighbour is None else arm.having(hub_inertia=neighbour)
     if neighbour is not None and arm.is_undamped:
-        return _on_axis(_frequencies(other, up_to), at_zero, up_to)
+        return _on_axis(flexible_frequencies(other, up_to), at_zero, up_to)
     starts = _starts_by_sampling(k, name, up_to) if neighbour is None else _damped_starts(other, up_to)
     return _in_box(k, name, at_zero, up_to, starts)
-
-
-def _frequencies(arm: Arm, up_to: float) -> NDArray[np.float64]:
-    """Flexible natural frequencies below up_to."""
-    if modes_below(arm, up_to) == 0:
-        return np.empty(0)
-    table = modes(arm, up_to=up_to)
-    return table.natural_frequency[table.index > 0]
 
 
 def _on_axis(frequencies: NDArray[np.float64], at_zero: int, up_to: float) -> Roots:
@@ -83,7 +74,7 @@ def _on_axis(frequencies: NDArray[np.float64], at_zero: int, up_to: float) -> Ro
 
 def _damped_starts(arm: Arm, up_to: float) -> Complex:
     """First-order estimates s = -C w^2/2 +- i w sqrt(1 - (C w/2)^2) from the undamped frequencies."""
-    omega, C = _frequencies(arm, 1.5 * up_to), arm.damping
+    omega, C = flexible_frequencies(arm, 1.5 * up_to), arm.damping
     root = np.sqrt((1 - (C * omega / 2) ** 2).astype(complex))
     starts = np.r_[omega * (-C * omega / 2 + 1j * root), omega * (-C * omega / 2 - 1j * root)]
     return np.r_[starts, np.linspace(-up_to, -up_to / 50, 40)]
@@ -124,29 +115,15 @@ def _function(k: Coefficients, name: str) -> Function:
     return function
 
 
-def _on_their_axes(found: Complex, damping: float) -> Complex:
-    """Zeros come in conjugate pairs (at C = 0 in +- pairs too), so one that is real up to rounding is real."""
-    tiny = 1e-11 * abs(found)
-    real = np.where((abs(found.real) < tiny) & (damping == 0), 0.0, found.real)
-    imag = np.where(abs(found.imag) < tiny, 0.0, found.imag)
-    on_axes: Complex = real + 1j * imag
-    return on_axes
-
-
 def _in_box(k: Coefficients, name: str, at_zero: int, up_to: float, starts: Complex) -> Roots:
     """Zeros of the quantity in a box of that height; the box grows a little where a zero lies on its edge."""
     function = _function(k, name)
-    for growth in (1.0, 1.0037, 1.0091, 1.0173):
-        height = up_to * growth
-        left = -min(CLEAR / k.damping, height) if k.damping else -height
-        box = Box(left, height, -height, height)
-        try:
-            found = zeros_in_box(function, box, starts)
-        except ConvergenceError:
-            if growth > 1.01:
-                raise
-            continue
-        found = _on_their_axes(found, k.damping)
-        found = found[np.lexsort((-found.imag, found.real, abs(found.imag).round(9)))]
-        return Roots(np.r_[np.zeros(at_zero, complex), found], (*box,), "winding number")
-    raise AssertionError("unreachable")
+
+    def box_of(height: float) -> Box:
+        return Box(-min(CLEAR / k.damping, height) if k.damping else -height, height, -height, height)
+
+    found, box = complete(function, box_of, up_to, starts)
+    if k.damping == 0:  # zeros come in +- pairs too
+        found = np.where(abs(found.real) < REAL * abs(found), 1j * found.imag, found)
+    found = found[np.lexsort((-found.imag, found.real, abs(found.imag).round(9)))]
+    return Roots(np.r_[np.zeros(at_zero, complex), found], (*box,), "winding number")

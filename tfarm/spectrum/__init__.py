@@ -1,6 +1,15 @@
 """Natural frequencies and mode shapes: counted, so that none is missing, then found to the last digit."""
 
 from tfarm.spectrum.damped import DampedModes, damped_modes
-from tfarm.spectrum.table import PARAMETERS, Modes, compare_theories, modes, modes_below
+from tfarm.spectrum.table import PARAMETERS, Modes, compare_theories, flexible_frequencies, modes, modes_below
 
-__all__ = ["PARAMETERS", "DampedModes", "Modes", "compare_theories", "damped_modes", "modes", "modes_below"]
+__all__ = [
+    "PARAMETERS",
+    "DampedModes",
+    "Modes",
+    "compare_theories",
+    "damped_modes",
+    "flexible_frequencies",
+    "modes",
+    "modes_below",
+]

@@ -9,7 +9,8 @@ of any size.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from itertools import count, pairwise
 from typing import Any, NamedTuple
 
@@ -29,6 +30,8 @@ MOST_CALLS = 30_000  # of the function in one search; the most that 300 random l
 DEAD = 1e-8  # nearer to s = 0 than this share of a box Newton's method is not believed: a zero there forces cuts
 SAME = 0.1  # of its size: a zero found so near a known one is that one
 DEEPEST = 60  # cuts: then a box is a share of 2^-30 of the first, less than float64 can search
+REAL = 1e-11  # of its size: a smaller imaginary part is rounding
+GROWTH = (1.0, 1.0041, 1.0093, 1.0171, 1.0311, 1.0573, 1.113)  # heights tried where a zero lies on the edge of a box
 SPLIT = 0.4871  # where a box is cut: off the axes, on which zeros like to lie
 
 
@@ -152,6 +155,27 @@ def zeros_in_box(function: Function, box: Box, starts: Complex, known: Complex =
         return function(s)
 
     return _search(counted, box, starts, known, depth=0)
+
+
+def complete(
+    function: Function,
+    box_of: Callable[[float], Box],
+    height: float,
+    starts: Complex,
+    known: Complex = NOTHING_KNOWN,
+    factors: Sequence[float] = GROWTH,
+) -> tuple[Complex, Box]:
+    """All zeros of a function that is real on the real axis in the box of a height, and that box.
+
+    Zeros that are real but for rounding are real.  Where a zero lies on the edge of the box the next of the `factors`
+    on the height is tried; raises ConvergenceError where none does.
+    """
+    for factor in factors[:-1]:
+        with suppress(ConvergenceError):
+            return complete(function, box_of, factor * height, starts, known, (1.0,))
+    box = box_of(factors[-1] * height)
+    found = zeros_in_box(function, box, starts, known)
+    return np.where(abs(found.imag) < REAL * abs(found), found.real, found), box
 
 
 def _search(function: Function, box: Box, starts: Complex, known: Complex, depth: int) -> Complex:

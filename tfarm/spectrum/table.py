@@ -283,3 +283,11 @@ def compare_theories(table: Modes) -> dict[Theory, Real]:
 def modes_below(arm: Arm, up_to: float, *, theory: Theory = "timoshenko") -> int:
     """How many flexible modes the undamped arm has below up_to [rad/s], by the count alone."""
     return count_below(replace(coefficients(arm, theory), damping=0.0), up_to) - arm.has_rigid_mode
+
+
+def flexible_frequencies(arm: Arm, up_to: float) -> Real:
+    """The flexible natural frequencies [rad/s] of the undamped arm below `up_to`, which may have none."""
+    if modes_below(arm, up_to) == 0:
+        return np.empty(0)
+    table = modes(arm, up_to=up_to)
+    return table.natural_frequency[table.index > 0]
