@@ -196,6 +196,6 @@ def test_without_damping_nothing_is_settled(lossless):
 
 def test_a_small_survey():
     """Of `python -m tests.dsp.settled 2000`."""
-    counts = survey(3, seed=3)
+    counts = survey(1, seed=3)
     assert counts["false"] == 0
-    assert counts["settled"] >= 2
+    assert counts["settled"] == 1

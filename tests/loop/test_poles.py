@@ -81,10 +81,10 @@ def test_a_modal_model_misses_by_its_own_error(arm, count: int) -> None:
 
 def test_random_loops_counted_again() -> None:
     """`python -m tests.loop.counts 500` for more."""
-    verdicts = [verdict for _, verdict in survey(8, 1)]
+    verdicts = [verdict for _, verdict in survey(2, 1)]
     assert [v.reason for v in verdicts if v.outcome == "wrong"] == []
-    assert sum(v.outcome == "right" for v in verdicts) == 8
-    assert sum(v.unstable for v in verdicts) > 3
+    assert sum(v.outcome == "right" for v in verdicts) == 2
+    assert sum(v.unstable for v in verdicts) > 0
 
 
 def test_poles_are_proven_in_balls() -> None:

@@ -17,12 +17,13 @@ from tfarm.spectrum.certify import Certificate
 ROOT = Path(__file__).parent.parent.parent
 
 
-def test_sixty_random_arms_are_proven_and_none_wrongly() -> None:
-    command = [sys.executable, "-m", "tests.spectrum.proofs", "60", "77"]
+def test_random_arms_are_proven_and_none_wrongly() -> None:
+    """`python -m tests.spectrum.proofs 60` for more."""
+    command = [sys.executable, "-m", "tests.spectrum.proofs", "15", "77"]
     alone = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
     done = subprocess.run(command, cwd=ROOT, env=alone, capture_output=True, text=True, check=True)
-    assert done.stdout.startswith("60 arms, 20 flexible modes: 60 proven, 0 refused, 0 wrong\n")
-    assert "1140 of 1140 gaps counted" in done.stdout
+    assert done.stdout.startswith("15 arms, 20 flexible modes: 15 proven, 0 refused, 0 wrong\n")
+    assert "285 of 285 gaps counted" in done.stdout
 
 
 def forged(monkeypatch: pytest.MonkeyPatch, change) -> None:

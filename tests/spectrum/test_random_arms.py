@@ -12,11 +12,11 @@ from tfarm.exact.coefficients import coefficients
 from tfarm.spectrum import modes_below
 from tfarm.spectrum.counting import Counter
 
-ARMS = 270
+ARMS = 81
 
 
 def arms() -> list[Arm]:
-    """Random ones, and each combination of zero, finite and infinite inertias on ten of them."""
+    """Random ones, and each combination of zero, finite and infinite inertias on three of them."""
     generator = np.random.default_rng(2)
     bases = [random_arm(generator) for _ in range(ARMS)]
     kinds = list(product((0.0, 1.0, math.inf), repeat=3))

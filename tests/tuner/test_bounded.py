@@ -10,8 +10,8 @@ from tfarm.tuner.sector import MovingGain
 
 
 def test_guarded_runs_stay_bounded_and_in_the_guard():
-    counts = tally(5)
-    assert counts["runs"] == 5
+    counts = tally(2)
+    assert counts["runs"] == 2
     assert counts["wrong"] == 0
     assert counts["growing"] == 0
 
