@@ -152,6 +152,8 @@ def turning(loop: Loop, path: Complex) -> float:
         (fast,) = np.nonzero(~(abs(step) <= FAST))
         if not fast.size:
             return float(step.sum())
+        if not (np.isfinite(value) & (value != 0)).all():
+            break  # a point without an argument is there after any halving, and each doubles the points around it
         middle = (path[fast] + path[fast + 1]) / 2
         path, value = np.insert(path, fast + 1, middle), np.insert(value, fast + 1, 1 + loop.loop_function(middle))
     raise ConvergenceError("the curve passes -1 too close for its encirclements to be counted", path[fast], step[fast])
