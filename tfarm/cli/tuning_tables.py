@@ -55,29 +55,6 @@ def _print_comparison(rows: list[dict[str, Any]]) -> None:
 
 def print_study(answer: dict[str, Any]) -> None:
     """A row a group of seeds, and the verdict of the map."""
-    names = ("alpha", "eta", "a", "b", "inputs", "rule", "mode", "sensitivity")
-    groups = answer["groups"]
-    shown = [name for name in names if len({str(group[name]) for group in groups}) > 1]
-    low, high = zip(*(group["cost_quartiles"] for group in groups), strict=True)
-    costs = {
-        "median": [group["cost_median"] for group in groups],
-        "lower quartile": low,
-        "upper quartile": high,
-        "best": [group["cost_best"] for group in groups],
-        "worst": [group["cost_worst"] for group in groups],
-    }
-    columns = (
-        *(Column(name, name, of=[group[name] for group in groups]) for name in shown),
-        *(Column(name, name, of=values, digits=FOUR) for name, values in costs.items()),
-        Column(
-            "below",
-            "below best constant",
-            of=[f"{group['below_best_constant']} of {answer['seeds']}" for group in groups],
-        ),
-        Column("residual", "residual", "N m", of=[group["residual_median"] for group in groups], digits=FOUR),
-        Column("diverged", "diverged", of=[group["diverged"] for group in groups]),
-        Column("died", "died", of=[group["died"] for group in groups]),
-    )
-    show(Table(columns=columns))
+    show(answer["groups"])
     if "verdict" in answer:
         print(answer["verdict"])

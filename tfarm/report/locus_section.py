@@ -147,20 +147,20 @@ def _poles_table(
     stem: str, title: str, caption: str, name: str, unit: str, gains: Real, found: Sequence[Stability | None]
 ) -> Table:
     """A row a gain: verdict, unstable poles, the rightmost and the first pairs."""
-    counts: list[int | str] = [_count(it) for it in found]
-    growth: list[float | str] = [it.poles.spectral_abscissa if it else "" for it in found]
     return Table(
         stem=stem,
         title=title,
         caption=caption,
+        record=list(found),
         columns=(
             Column(name, name, unit, of=gains, digits=singly(plain, 4)),
-            Column("verdict", "verdict", of=[it.verdict if it else "on the axis, not decided" for it in found]),
-            Column("unstable_poles", "unstable poles", of=counts),
-            Column("spectral_abscissa_1_s", "fastest growth", "1/s", of=growth, shown=[_growth(it) for it in found]),
-            Column("first_pairs", "first pairs of poles, Re ± i Im [1/s]", of=[_first_pairs(it) for it in found]),
+            Column("verdict", "verdict", of=lambda it: it.verdict if it else "on the axis, not decided"),
+            Column("unstable_poles", "unstable poles", of=_count),
+            Column("spectral_abscissa_1_s", "fastest growth", "1/s",
+                   of=lambda it: it.poles.spectral_abscissa if it else "", shown=_growth),
+            Column("first_pairs", "first pairs of poles, Re ± i Im [1/s]", of=_first_pairs),
         ),
-    )
+    )  # fmt: skip
 
 
 def _growth(it: Stability | None) -> str:

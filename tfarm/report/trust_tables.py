@@ -50,10 +50,16 @@ def counts_table(proofs: Sequence[Proof]) -> Table:
             Column("rigid_body", "rigid body", of=lambda proof: int(proof.has_rigid_mode)),
             Column("enclosed", "flexible modes enclosed", of=lambda proof: len(proof.brackets)),
             Column("count", "counted"),
-            Column("below_rad_s", "below", "rad/s", of="below", digits=worded(_nine_digits)),
-            Column("verdict", "verdict", of=_verdict),
+            Column(
+                "below_rad_s", "below", "rad/s", of="below",
+                shown=lambda proof: significant(float(proof.below), 9) if proof.below else "",
+            ),
+            Column(
+                "verdict", "verdict",
+                of=lambda proof: f"{UNPROVEN}: {proof.failure}" if proof.failure else "complete, proven",
+            ),
         ),
-    )
+    )  # fmt: skip
 
 
 def boxes_tables(proofs: Sequence[Proof]) -> tuple[Table, ...]:
@@ -77,14 +83,6 @@ def boxes_tables(proofs: Sequence[Proof]) -> tuple[Table, ...]:
         ),
     )
     return (table,)
-
-
-def _verdict(proof: Proof) -> str:
-    return f"{UNPROVEN}: {proof.failure}" if proof.failure else "complete, proven"
-
-
-def _nine_digits(below: str) -> str:
-    return significant(float(below), 9) if below else ""
 
 
 def accuracy_table(proofs: Sequence[Proof]) -> Table:

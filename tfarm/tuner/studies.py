@@ -15,6 +15,7 @@ import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,8 @@ import numpy as np
 
 from tfarm.arm import Arm
 from tfarm.arm.writing import to_toml
+from tfarm.columns import JSON, TERMINAL, Column, Table
+from tfarm.digits import general, singly
 from tfarm.dsp import Chain
 from tfarm.errors import ParameterError
 from tfarm.files import read_file, write_file
@@ -213,41 +216,61 @@ def _rules(base: Plan) -> list[Plan]:
 # ---------------------------------------------------------------- what came of them
 
 
+def _cost(group: list[Finished], share: float) -> float:
+    """A quantile of the final costs over the seeds."""
+    return float(np.quantile([each.cost for each in group], share, method="nearest"))
+
+
+_four = partial(Column, digits=singly(general, 4))
+PLANS = (  # what the seeds of a group have in common
+    Column("alpha", "alpha", of=lambda group: group[0].plan.learning.alpha),
+    Column("eta", "eta", of=lambda group: np.asarray(group[0].plan.learning.eta).tolist()),
+    Column("a", "a", of=lambda group: group[0].plan.cost.a),
+    Column("b", "b", of=lambda group: group[0].plan.cost.b),
+    Column("inputs", "inputs", of=lambda group: group[0].plan.scales.size),
+    Column("rule", "rule", of=lambda group: group[0].plan.learning.rule),
+    Column("mode", "mode", of=lambda group: group[0].plan.learning.mode),
+    Column("sensitivity", "sensitivity", of=lambda group: group[0].plan.learning.sensitivity),
+)
+GROUPS = (  # of the runs of one plan, a run a seed
+    _four("cost_median", "median", of=lambda group: _cost(group, 0.5)),
+    Column("cost_quartiles", of=lambda group: [_cost(group, 0.25), _cost(group, 0.75)], on=(JSON,)),
+    _four("", "lower quartile", of=lambda group: _cost(group, 0.25), on=(TERMINAL,)),
+    _four("", "upper quartile", of=lambda group: _cost(group, 0.75), on=(TERMINAL,)),
+    _four("cost_best", "best", of=lambda group: min(each.cost for each in group)),
+    _four("cost_worst", "worst", of=lambda group: max(each.cost for each in group)),
+    Column("below_best_constant", "below best constant", of=lambda group: _below(group),
+           shown=lambda group: f"{_below(group)} of {len(group)}"),
+    Column("best_constant_gain", of=lambda group: group[0].best_constant_gain, on=(JSON,)),
+    Column("best_constant_cost", of=lambda group: group[0].best_constant_cost, on=(JSON,)),
+    Column("mean_gain_median", of=lambda group: float(np.median([each.mean_gain for each in group])), on=(JSON,)),
+    _four("residual_median", "residual", "N m",
+          of=lambda group: float(np.quantile([each.residual for each in group], 0.5, method="nearest"))),
+    Column("diverged", "diverged", of=lambda group: sum(each.stopped for each in group)),
+    Column("died", "died", of=lambda group: sum(each.died for each in group)),
+)  # fmt: skip
+
+
+def _below(group: list[Finished]) -> int:
+    return sum(each.cost < each.best_constant_cost for each in group)
+
+
 def study_answer(study: str, results: list[Finished], seeds: int) -> dict[str, Any]:
-    """A study's result as a dictionary: a group a plan, its seeds summed up by median and quartiles."""
+    """A study's result: a group a plan, its seeds summed up by median and quartiles.
+
+    On a terminal what all plans have in common is left out.
+    """
     groups = [results[i : i + seeds] for i in range(0, len(results), seeds)]
-    answer: dict[str, Any] = {"study": study, "seeds": seeds, "groups": [_group(group) for group in groups]}
+    varied = (
+        replace(column, on=(JSON, TERMINAL) if len(set(column.read(groups).cells)) > 1 else (JSON,)) for column in PLANS
+    )
+    table = Table(columns=(*varied, *GROUPS), record=groups)
+    answer: dict[str, Any] = {"study": study, "seeds": seeds, "groups": table}
     if study == "curves":
         answer |= _learning_curve(results)
     if study == "map":
         answer["verdict"] = map_verdict(groups)
     return answer
-
-
-def _group(group: list[Finished]) -> dict[str, Any]:
-    plan, costs = group[0].plan, np.array([each.cost for each in group])
-    low, middle, high = (float(np.quantile(costs, q, method="nearest")) for q in (0.25, 0.5, 0.75))
-    return {
-        "alpha": plan.learning.alpha,
-        "eta": plan.learning.eta if isinstance(plan.learning.eta, float) else plan.learning.eta.tolist(),
-        "rule": plan.learning.rule,
-        "mode": plan.learning.mode,
-        "sensitivity": plan.learning.sensitivity,
-        "a": plan.cost.a,
-        "b": plan.cost.b,
-        "inputs": plan.scales.size,
-        "cost_median": middle,
-        "cost_quartiles": [low, high],
-        "cost_best": float(costs.min()),
-        "cost_worst": float(costs.max()),
-        "below_best_constant": int((costs < group[0].best_constant_cost).sum()),
-        "best_constant_gain": group[0].best_constant_gain,
-        "best_constant_cost": group[0].best_constant_cost,
-        "mean_gain_median": float(np.median([each.mean_gain for each in group])),
-        "residual_median": float(np.quantile([each.residual for each in group], 0.5, method="nearest")),
-        "diverged": sum(each.stopped for each in group),
-        "died": sum(each.died for each in group),
-    }
 
 
 def _learning_curve(results: list[Finished]) -> dict[str, Any]:
