@@ -52,6 +52,11 @@ class Column:
         shown = None if self.shown is None else _read(self.shown, record)
         return replace(self, of=values, shown=shown, tint=_read(self.tint, record))
 
+    def at(self, places: Sequence[int]) -> Column:
+        """Some rows of a column that was read."""
+        of, shown, tint = ([part[i] for i in places] if part else part for part in (self.of, self.shown, self.tint))
+        return replace(self, of=of, shown=shown, tint=tint)
+
     @property
     def values(self) -> Sequence[Any]:
         """The values of a column that was read."""
@@ -86,6 +91,9 @@ class Table:
 
     def __post_init__(self, record: Any) -> None:
         object.__setattr__(self, "columns", tuple(column.read(record) for column in self.columns))
+        for output in (JSON, FILES):
+            keys = [column.key for column in self.on(output)]
+            assert len(set(keys)) == len(keys), f"{self.stem}: two columns of one key in {keys}"
         assert len({len(column.values) for column in self.columns}) <= 1, f"{self.stem}: columns of different lengths"
 
     def on(self, output: str) -> list[Column]:
@@ -94,8 +102,7 @@ class Table:
 
     def rows(self, places: Sequence[int]) -> Table:
         """The same columns with some of the rows only."""
-        found = (replace(column, of=[column.values[i] for i in places]) for column in self.columns)
-        return Table(columns=tuple(found), keys=self.keys)
+        return replace(self, columns=tuple(column.at(places) for column in self.columns), record=None)
 
     def __len__(self) -> int:
         return len(self.columns[0].values)

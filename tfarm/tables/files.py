@@ -21,6 +21,8 @@ def to_json(answer: Any) -> str:
 def plain(value: Any) -> Any:
     """A value as JSON has it: a table as its rows, a tuple as a list, an infinity as a text."""
     if isinstance(value, float):
+        if math.isnan(value):
+            raise ValueError("an answer or a table holds a NaN")
         return float(value) if not math.isinf(value) else "inf" if value > 0 else "-inf"
     if isinstance(value, dict):
         return {key: plain(entry) for key, entry in value.items()}
