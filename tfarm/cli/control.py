@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -47,7 +48,8 @@ def margins(arm: ArmName, json: Json = False, *, given: Given) -> None:
     from tfarm.loop.answers import margins_answer
     from tfarm.loop.margins import margins as find_margins
 
-    give(margins_answer(find_margins(subject, law)) | said, json, print_margins)
+    found = find_margins(subject, law)
+    give(margins_answer(found) | said, json, partial(print_margins, found))
 
 
 @app.command("map")

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from tfarm.columns import Column, Table
-from tfarm.loop.answers import MARGINS, POLES
+from tfarm.loop.answers import MARGINS, POLES, WINDOWS, gain_rows
+from tfarm.loop.margins import Margins
 from tfarm.tables.files import write_csv
 from tfarm.tables.terminal import heading, show
 
@@ -25,40 +26,21 @@ def print_poles(answer: dict[str, Any]) -> None:
     print(answer["sign_convention"])
 
 
-def print_margins(answer: dict[str, Any]) -> None:
+def print_margins(found: Margins, answer: dict[str, Any]) -> None:
     """The verdict, then everything else."""
     print(f"{answer['arm']}: {answer['verdict'].upper()} (apart from the pole at 0 that Kp = 0 leaves)")
     more = " (infinitely many in all)" if answer["unstable_roots_infinite"] else ""
     print(f"unstable poles up to {answer['band_rad_s']:.6g} rad/s: {answer['unstable_roots']}{more}")
     print(answer["beyond_the_band"])
     print(f"Lyapunov: {answer['lyapunov']['reason']}")
-    _print_windows(answer)
+    show(Table(columns=WINDOWS, record=gain_rows(found)))
+    spans = ", ".join(
+        f"{name} ({each.looked_at[0]:.6g}, {each.looked_at[1]:.6g})" for name, each in found.windows.items()
+    )
+    print(f"looked at: {spans}; * no limit was found up to there, and beyond none was looked for")
     if answer["in_band"] is not None:
         _print_loop_margins(answer)
     print(answer["sign_convention"])
-
-
-def _print_windows(answer: dict[str, Any]) -> None:
-    """A row a gain; a search bound is marked, as it is no edge."""
-    gains = ("K1", "K2", "Kp")
-    around = [(answer[f"{name}_interval"], answer[f"{name}_interval_ends"]) for name in gains]
-    every = [zip(answer[f"{name}_windows"], answer[f"{name}_windows_ends"], strict=True) for name in gains]
-    columns = (
-        Column("gain", "gain", of=gains),
-        Column("value", "value", of=[f"{answer[name]:g}" for name in gains]),
-        Column("around", "stable around it", of=["-" if pair[0] is None else _window(*pair) for pair in around]),
-        Column("all", "all stable windows", of=[" ".join(_window(*pair) for pair in p) or "none" for p in every]),
-    )
-    show(Table(columns=columns))
-    looked_at = ", ".join(f"{name} ({low:.6g}, {high:.6g})" for name in ("K1", "K2", "Kp")
-                          for low, high in [answer[f"{name}_looked_at"]])  # fmt: skip
-    print(f"looked at: {looked_at}; * no limit was found up to there, and beyond none was looked for")
-
-
-def _window(pair: list[float], ends: list[str]) -> str:
-    """An interval with a star at each end that only bounds the search."""
-    low, high = (f"{value:.8g}{'*' * (end == 'search bound')}" for value, end in zip(pair, ends, strict=True))
-    return f"({low}, {high})"
 
 
 def _print_loop_margins(answer: dict[str, Any]) -> None:

@@ -3,28 +3,82 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
-from tfarm.arm import HubFeedback
-from tfarm.columns import Column
-from tfarm.digits import general, singly, within
+from tfarm.arm import GAINS, HubFeedback
+from tfarm.columns import JSON, REPORT, TERMINAL, Column, Table
+from tfarm.digits import general, plain, singly, within
 
 from .design import Design
 from .lyapunov import lyapunov
 from .margins import Margins
 from .poles import Poles
 from .regions import INFINITE, Region
-from .windows import Windows
+from .windows import Interval, Windows
 
 SIGN = "u = -Kp theta - K1 theta_t - K2 E I phi'(0) + r; a static torque u gives the moment -(J - I_h)/J u"
-
-
+UNITS = {gain.name: gain.unit.removesuffix("1") for gain in GAINS}
 HELD = 2e-14  # of a pole's size: what its float64 may be off (tests: 1e-14 to 50 digits)
 POLES = (  # of pairs Re s, Im s
     Column("re", "Re s", "1/s", of=lambda pole: within(pole[0], HELD * math.hypot(*pole), 12)),
     Column("im", "Im s", "rad/s", of=lambda pole: pole[1], digits=singly(general, 12)),
     Column("ratio", "damping ratio", of=lambda pole: within(-pole[0] / math.hypot(*pole), HELD, 6) if pole[1] else "-"),
 )
+
+
+class GainRow(NamedTuple):
+    """One gain of a loop, and how far it may go alone."""
+
+    gain: str
+    value: float
+    windows: Windows
+
+    def spans(self, how: Callable[[float, int], str], digits: int, *pairs: Interval | None) -> list[str]:
+        """Intervals, with a star at each end that only bounds the search; those that there are."""
+        ends = (
+            [f"{how(end, digits)}{'*' * (self.windows.end(end) == 'search bound')}" for end in pair]
+            for pair in pairs
+            if pair is not None
+        )
+        return [f"({low}, {high})" for low, high in ends]
+
+
+def gain_rows(found: Margins) -> list[GainRow]:
+    """The gains of a loop."""
+    law = found.stability.loop.law
+    return [GainRow(name, getattr(law, name), windows) for name, windows in found.windows.items()]
+
+
+def _joined(*pairs: Interval) -> str:
+    """The ends with every digit, for files."""
+    return " ".join(repr(float(end)) for pair in pairs for end in pair)
+
+
+NOTHING = "none: not stable"
+WINDOWS = (  # of `GainRow`; JSON has the gain's name before each key
+    Column("gain", "gain", on=(TERMINAL, *REPORT)),
+    Column("unit", "unit", of=lambda row: UNITS[row.gain], on=REPORT),
+    Column("value", "value", digits=singly(plain, 5), printed=singly(general, 6), on=(TERMINAL, *REPORT)),
+    Column("interval", of=lambda row: row.windows.around and list(row.windows.around), on=(JSON,)),
+    Column("interval_ends", of=lambda row: row.windows.around and list(map(row.windows.end, row.windows.around)),
+           on=(JSON,)),
+    Column("windows", of=lambda row: list(row.windows.all), on=(JSON,)),
+    Column("windows_ends", of=lambda row: [list(map(row.windows.end, pair)) for pair in row.windows.all], on=(JSON,)),
+    Column("looked_at", of=lambda row: list(row.windows.looked_at), on=(JSON,)),
+    Column("", "stable around it", on=(TERMINAL,),
+           of=lambda row: " ".join(row.spans(general, 8, row.windows.around)) or "-"),
+    Column("", "all stable windows", on=(TERMINAL,),
+           of=lambda row: " ".join(row.spans(general, 8, *row.windows.all)) or "none"),
+    Column("stable_around_it", "stable around it", on=REPORT,
+           of=lambda row: _joined(row.windows.around) if row.windows.around else NOTHING,
+           shown=lambda row: " ".join(row.spans(plain, 5, row.windows.around)) or NOTHING),
+    Column("stable_windows", "all stable windows", on=REPORT,
+           of=lambda row: _joined(*row.windows.all) or "none",
+           shown=lambda row: ", ".join(row.spans(plain, 5, *row.windows.all)) or "none"),
+    Column("looked_at", "looked at", on=REPORT, of=lambda row: _joined(row.windows.looked_at),
+           shown=lambda row: "({}, {})".format(*(plain(end, 5) for end in row.windows.looked_at))),
+)  # fmt: skip
 MARGINS = (  # of `LoopMargins`, beside the factors of the gain
     Column("phase_margin_deg", "phase margin", "deg", of="phase"),
     Column("phase_lag_deg", "phase lag", "deg", of="phase_lag"),
@@ -63,7 +117,8 @@ def margins_answer(found: Margins) -> dict[str, Any]:
     """The verdict first; margins are null unless the loop is stable."""
     verdict = found.stability
     proof = lyapunov(verdict.loop.arm, verdict.loop.law)
-    limits, sizes = found.in_band, sizes_of(found)
+    limits, sizes, rows = found.in_band, sizes_of(found), gain_rows(found)
+    windows = Table(columns=WINDOWS, record=rows)
     in_band = None
     if limits is not None:
         in_band = {"band_rad_s": limits.band, **{key: size for key, (_, size) in sizes.items()}, "at_rad_s": limits.at}
@@ -78,7 +133,7 @@ def margins_answer(found: Margins) -> dict[str, Any]:
         "beyond_the_band": verdict.tail,
         "spectral_abscissa": verdict.poles.spectral_abscissa,
         "lyapunov": {"proven": proof.proven, "a1_over_a2": proof.a1_over_a2, "reason": proof.reason},
-        **{key: value for name, windows in found.windows.items() for key, value in _windows(name, windows).items()},
+        **{f"{row.gain}_{key}": value for row, part in zip(rows, windows, strict=True) for key, value in part.items()},
         "gain_margin": None if limits is None else list(limits.gain),
         **{key: exact for key, (exact, _) in sizes.items()},
         "at_rad_s": None
@@ -94,17 +149,6 @@ def sizes_of(found: Margins) -> dict[str, tuple[float | None, float | None]]:
     exact = {"delay": found.exact_delay, "disk": found.exact_disk, "peak_sensitivity": found.exact_peak}
     sizes = {column.of: None if limits is None else getattr(limits, column.of) for column in MARGINS}
     return {column.key: (exact.get(column.of, sizes[column.of]), sizes[column.of]) for column in MARGINS}
-
-
-def _windows(name: str, windows: Windows) -> dict[str, Any]:
-    around = windows.around
-    return {
-        f"{name}_interval": None if around is None else list(around),
-        f"{name}_interval_ends": None if around is None else [windows.end(value) for value in around],
-        f"{name}_windows": [list(pair) for pair in windows.all],
-        f"{name}_windows_ends": [[windows.end(value) for value in pair] for pair in windows.all],
-        f"{name}_looked_at": list(windows.looked_at),
-    }
 
 
 def map_answer(found: Region) -> dict[str, Any]:

@@ -19,6 +19,7 @@ from tfarm.arm import Arm, HubFeedback
 from tfarm.columns import Column, Table
 from tfarm.digits import plain, scientific, significant, singly
 from tfarm.errors import ConvergenceError
+from tfarm.loop.answers import UNITS
 from tfarm.loop.locus import Locus, locus
 from tfarm.loop.reduced_locus import ReducedLocus, reduced_locus
 from tfarm.records import record
@@ -31,7 +32,6 @@ POINTS = 300
 TRIES = ((7, 1.0), (4, 1.0), (4, 0.75), (2, 0.5))  # branches, and the share of the range that they are followed over
 ZOOMED = 4  # modes drawn on their own
 COLORS = (INK, BLUE, GREEN, PURPLE, "#7a5a00", GREY)  # by mode
-UNITS = {"K1": "N m s/rad", "K2": ""}
 ROOM = 0.12  # around a branch, as a share of its extent
 MARKED = 5  # gains marked along each branch
 HELD = 10  # digits of |s| that are drawn and written: poles differ from processor to processor by 1e-14 at most

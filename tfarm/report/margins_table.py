@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
 
 from tfarm.columns import Column, Table
 from tfarm.digits import plain, significant, singly
 from tfarm.dsp.brief import SampledBrief
-from tfarm.loop.answers import MARGINS, sizes_of
+from tfarm.loop.answers import MARGINS, NOTHING, WINDOWS, gain_rows, sizes_of
 from tfarm.loop.lyapunov import lyapunov
 from tfarm.loop.margins import Margins
-from tfarm.loop.windows import Windows
 from tfarm.report.loop_laws import NamedLaw, typeset
 from tfarm.report.sections import Fact
 
-NOTHING = "none: not stable"
 UNKNOWN = "not known"  # an exact margin, where nothing bounds L beyond the band
 UNLIMITED = {"disk": 2.0, "peak_sensitivity": 1.0}  # sizes of a passive loop, at no frequency of its own; else inf
-UNITS = {"K1": "N m s/rad", "K2": "", "Kp": "N m/rad"}
 CAPTION = (
     "Exact: of the infinite-dimensional loop; not known where nothing bounds L beyond the band. "
     "In the band: as far as the poles were computed{undamped}. Gain margin: "
@@ -32,7 +28,7 @@ UNDAMPED = (
     "; without damping (C = 0) any delay, however short, destabilises some mode far enough up, so the exact delay and "
     "disk margins are 0, and only a band gives them a size"
 )
-WINDOWS = (
+CAPTION_OF_WINDOWS = (
     "The others held, each gain may move within its window before the first pole reaches the axis. Ends ±∞ are proven; "
     "an end with a star is no edge: up to there none was found, and beyond none was looked for. {sign}"
 )
@@ -130,59 +126,19 @@ def _number(value: float) -> str:
     return plain(value, 6) if value.is_integer() else significant(value, 5)
 
 
-class GainRow(NamedTuple):
-    """One gain of one law, and its windows."""
-
-    law: NamedLaw
-    gain: str
-    windows: Windows
-    verdict: str
-
-
-def _joined(*pairs: tuple[float, float]) -> str:
-    """The ends with every digit, for files."""
-    return " ".join(repr(float(end)) for pair in pairs for end in pair)
-
-
-def _spans(windows: Windows, *pairs: tuple[float, float]) -> str:
-    """Intervals with a star at each end that only bounds the search."""
-    ends = ([f"{plain(x, 5)}{'*' * (windows.end(x) == 'search bound')}" for x in pair] for pair in pairs)
-    return ", ".join(f"({low}, {high})" for low, high in ends)
-
-
-GAIN_ROWS = (
-    Column("law", "law", of="law.name"),
-    Column("verdict", "verdict"),
-    Column("gain", "gain"),
-    Column("unit", "unit", of=lambda row: UNITS[row.gain]),
-    Column("value", "value", of=lambda row: getattr(row.law.law, row.gain), digits=singly(plain, 5)),
-    Column(
-        "stable_around_it", "stable around it",
-        of=lambda row: _joined(row.windows.around) if row.windows.around else NOTHING,
-        shown=lambda row: _spans(row.windows, row.windows.around) if row.windows.around else NOTHING,
-    ),
-    Column(
-        "stable_windows", "all stable windows",
-        of=lambda row: _joined(*row.windows.all) or "none",
-        shown=lambda row: _spans(row.windows, *row.windows.all) or "none",
-    ),
-    Column(
-        "looked_at", "looked at",
-        of=lambda row: _joined(row.windows.looked_at),
-        shown=lambda row: "({}, {})".format(*(plain(end, 5) for end in row.windows.looked_at)),
-    ),
-)  # fmt: skip
-
-
 def window_table(laws: Sequence[NamedLaw], found: Sequence[Margins], sign: str) -> Table:
     """A row a law and gain; none for K2 on a free pin, where it has no loop."""
     rows = [
-        GainRow(law, name, each.windows[name], each.stability.verdict)
+        (law.name, each.stability.verdict, row)
         for law, each in zip(laws, found, strict=True)
-        for name in UNITS
-        if name != "K2" or each.stability.loop.arm.hub.inertia > 0
+        for row in gain_rows(each)
+        if row.gain != "K2" or each.stability.loop.arm.hub.inertia > 0
     ]
-    caption = WINDOWS.format(sign=sign)
+    names, verdicts, gains = zip(*rows, strict=True)
     return Table(
-        stem="windows", title="How far each gain may go alone", caption=caption, columns=GAIN_ROWS, record=rows
+        stem="windows",
+        title="How far each gain may go alone",
+        caption=CAPTION_OF_WINDOWS.format(sign=sign),
+        columns=(Column("law", "law", of=names), Column("verdict", "verdict", of=verdicts), *WINDOWS),
+        record=gains,
     )
