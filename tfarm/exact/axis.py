@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from .closed_form import SERIES_RADIUS, even_functions, from_transition, from_waves, transition_series
 from .compiled import compiled, inlined
 from .dispersion import dispersion
+from .vector import SIGMA, A, B, G
 
 
 def drives(
@@ -47,7 +48,7 @@ def _drives(omega: Any, k: Any, ends: Any, values: Any, pinned: Any) -> None:
             for row in range(len(ends)):
                 e = ends[row]
                 theta, M0, _, _, _ = from_transition(
-                    F0, F1, F2, F3, F2_less_1, S, 1.0, k[0], k[2], k[4], k[6],
+                    F0, F1, F2, F3, F2_less_1, S, 1.0, k[A], k[B], k[G], k[SIGMA],
                     e[0] + e[1] * S, e[2], e[3] + e[4] * S, e[5],
                 )  # fmt: skip
                 values[row, i] = (e[6] + e[7] * S) * theta - e[8] * M0

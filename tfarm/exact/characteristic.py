@@ -28,6 +28,7 @@ from .dispersion import quotient, reciprocal
 from .free import free_response
 from .jets import Jet
 from .outputs import OUTPUTS, unit_scale
+from .vector import DAMPING, GAIN, HUB, HUB_FORCE, HUB_INERTIA
 from .waves import free_ends
 
 Complex = NDArray[np.complexfloating[Any, Any]]
@@ -112,7 +113,7 @@ def fill_characteristics(s: Any, k: Any, rows: Any, at_zero: int, found: Any) ->
     values, scales = np.empty(3, np.complex128), np.empty(3, np.complex128)
     for i in range(s.size):
         law = i if rows.shape[1] > 1 else 0
-        h = STEP * max(abs(s[i]) * min(1.0, abs(1.0 + k[7] * s[i])), 1e-300)
+        h = STEP * max(abs(s[i]) * min(1.0, abs(1.0 + k[DAMPING] * s[i])), 1e-300)
         for j in range(3):
             at = s[i] + h * (j - 3 * (j // 2))
             value, scales[j], fed_back = parts_at(at, k)
@@ -146,8 +147,8 @@ def fill_loop_parts(s: Any, k: Any, parts: Any) -> None:
 def parts_at(s: complex, k: Any) -> Any:
     """Drive, scale and the numerators at one s."""
     theta, M0, scale = free_ends(s, k)
-    drive = ((k[14] + k[15] * s * s) * theta - k[16] * M0) / k[17]
-    return drive, scale, numerators(s, reciprocal(1.0 + k[7] * s), theta, M0)
+    drive = ((k[HUB] + k[HUB_INERTIA] * s * s) * theta - k[HUB_FORCE] * M0) / k[GAIN]
+    return drive, scale, numerators(s, reciprocal(1.0 + k[DAMPING] * s), theta, M0)
 
 
 def zeros_at_origin(k: Coefficients, gains: Sequence[Fraction | float] = OPEN) -> int:

@@ -78,7 +78,7 @@ class Coefficients:
 
     @cached_property
     def kernel(self) -> NDArray[np.float64]:
-        """The vector that the compiled functions of `waves` read (see the indices there)."""
+        """The vector that the compiled functions of `waves` read (see `vector`)."""
         split = [part for value in (self.a, self.b, self.g) for part in double_double(value)]
         ends = [Condition.of(inertia) for inertia in (self.tip_mass, self.tip_inertia, self.hub_inertia)]
         numbers = [float(number) for end in ends for number in (end.rest, end.inertia, end.force)]

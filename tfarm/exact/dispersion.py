@@ -12,6 +12,7 @@ import math
 from typing import Any
 
 from .compiled import fma, inlined
+from .vector import A_LOW, B_LOW, DAMPING, G_LOW, A, B, G
 
 
 @inlined
@@ -78,11 +79,12 @@ def dispersion(s: complex, k: Any) -> tuple[complex, ...]:
     `k` is the vector of `Coefficients.kernel`: a, b, g as double-doubles, then sigma and C.
     """
     S, S_low = _two_product(s, s)
-    d, d_low = _two_sum(complex(1.0, 0.0), k[7] * s)
-    d_low = d_low + complex(fma(k[7], s.real, -(k[7] * s.real)), fma(k[7], s.imag, -(k[7] * s.imag)))
-    aS, aS_low = _scaled(k[0], k[1], S, S_low)
-    bS, bS_low = _scaled(k[2], k[3], S, S_low)
-    gS, gS_low = _scaled(k[4], k[5], S, S_low)
+    C = k[DAMPING]
+    d, d_low = _two_sum(complex(1.0, 0.0), C * s)
+    d_low = d_low + complex(fma(C, s.real, -(C * s.real)), fma(C, s.imag, -(C * s.imag)))
+    aS, aS_low = _scaled(k[A], k[A_LOW], S, S_low)
+    bS, bS_low = _scaled(k[B], k[B_LOW], S, S_low)
+    gS, gS_low = _scaled(k[G], k[G_LOW], S, S_low)
 
     over_d = reciprocal(d)
     bend, couple = aS * over_d, gS * over_d

@@ -27,6 +27,7 @@ from .coefficients import Coefficients
 from .compiled import plain
 from .fields import Wave, tip_condition, waves
 from .jets import Jet
+from .vector import HUB
 from .waves import PARALLEL
 
 Complex = NDArray[np.complexfloating[Any, Any]]
@@ -121,7 +122,7 @@ def _series(k: Coefficients, s: Jet) -> tuple[Jet, Jet, tuple[Jet, ...]]:
 
 def drive(k: Coefficients, S: Any, theta: Any, M0: Any) -> Any:
     """Torque of the free response (its hub angle where the hub is locked): the characteristic function."""
-    rest, inertia, force, gain = k.kernel[14:18]
+    rest, inertia, force, gain = k.kernel[HUB:]
     return ((rest + inertia * S) * theta - force * M0) / gain
 
 

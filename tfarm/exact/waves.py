@@ -24,6 +24,7 @@ import numpy as np
 from .closed_form import SERIES_RADIUS, Number, even_functions, from_transition, from_waves, transition_series
 from .compiled import compiled, inlined
 from .dispersion import dispersion, reciprocal
+from .vector import DAMPING, GAIN, HUB, HUB_FORCE, MASS_FORCE, SIGMA, TIP_INERTIA, TIP_MASS, TURN_FORCE, A, B, G
 
 BLOCK = 128  # points a block: its twenty work arrays stay in the first- and second-level cache
 PARALLEL = 0.15  # |z_1 - z_2| below this share of |z_1| + |z_2|: flagged
@@ -88,7 +89,7 @@ def evaluate(s: Any, k: Any, outputs: Any, values: Any, suspects: Any) -> None:
                     value = states[start + i]
                     value = value * points[i] if power == 1 else value
                     value = value * (points[i] * points[i]) if power == 2 else value
-                    value = value * reciprocal(1.0 + k[7] * points[i]) if gauge == 1 else value
+                    value = value * reciprocal(1.0 + k[DAMPING] * points[i]) if gauge == 1 else value
                     values[o, chosen[i]] = factor * value
                 for _ in range(int(power) if power > 2 else 0):
                     for i in range(n):
@@ -101,9 +102,9 @@ def evaluate(s: Any, k: Any, outputs: Any, values: Any, suspects: Any) -> None:
 @inlined
 def _is_low(s: complex, k: Any) -> bool:
     """Whether both |z| are surely below SERIES_RADIUS."""
-    S, over_d = s * s, reciprocal(1.0 + k[7] * s)
-    half_sum = 0.5 * _size(S * (k[2] + k[0] * over_d))
-    product = _size(S * (k[0] * k[2] * S + k[4]) * over_d)
+    S, over_d = s * s, reciprocal(1.0 + k[DAMPING] * s)
+    half_sum = 0.5 * _size(S * (k[B] + k[A] * over_d))
+    product = _size(S * (k[A] * k[B] * S + k[G]) * over_d)
     return 1.4 * (half_sum + math.sqrt(half_sum * half_sum + 2.0 * product)) < SERIES_RADIUS
 
 
@@ -146,7 +147,8 @@ def _wave_states(numbers: Any, functions: Any, k: Any, states: Any) -> None:
         theta, M0, Q0, W1 = from_waves(
             functions[_C1 + i], functions[_S1 + i], numbers[_Z1 + i], numbers[_V1 + i], functions[_E1 + i],
             functions[_C2 + i], functions[_S2 + i], numbers[_Z2 + i], numbers[_V2 + i], functions[_E2 + i],
-            numbers[_GS + i], numbers[_D + i], _end(k, 8, S), k[10], _end(k, 11, S), k[13],
+            numbers[_GS + i], numbers[_D + i],
+            _end(k, TIP_MASS, S), k[MASS_FORCE], _end(k, TIP_INERTIA, S), k[TURN_FORCE],
         )  # fmt: skip
         _store(i, states, k, S, theta, M0, Q0, W1, W1 - theta)
 
@@ -156,14 +158,14 @@ def _series_states(points: Any, k: Any, states: Any) -> None:
     """The same by the series of the transition functions, at low frequency."""
     for i in range(BLOCK):
         s = points[i]
-        S, d = s * s, 1.0 + k[7] * s
+        S, d = s * s, 1.0 + k[DAMPING] * s
         over_d = reciprocal(d)
-        z_sum = S * (k[2] + k[0] * over_d)
-        z_product = S * (k[0] * k[2] * S + k[4]) * over_d
+        z_sum = S * (k[B] + k[A] * over_d)
+        z_product = S * (k[A] * k[B] * S + k[G]) * over_d
         F0, F1, F2, F3, F2_less_1, _ = transition_series(z_sum, z_product)
         theta, M0, Q0, W1, Y1 = from_transition(
-            F0, F1, F2, F3, F2_less_1, S, over_d, k[0], k[2], k[4], k[6],
-            _end(k, 8, S), k[10], _end(k, 11, S), k[13],
+            F0, F1, F2, F3, F2_less_1, S, over_d, k[A], k[B], k[G], k[SIGMA],
+            _end(k, TIP_MASS, S), k[MASS_FORCE], _end(k, TIP_INERTIA, S), k[TURN_FORCE],
         )  # fmt: skip
         _store(i, states, k, S, theta, M0, Q0, W1, Y1)
 
@@ -173,21 +175,21 @@ def _store(
     i: int, states: Any, k: Any, S: complex, theta: complex, M0: complex, Q0: complex, W1: complex, Y1: complex
 ) -> None:
     """Divide the free response by its torque (hub angle where the hub is locked), and say what is left of that."""
-    turned, held = _end(k, 14, S) * theta, k[16] * M0
+    turned, held = _end(k, HUB, S) * theta, k[HUB_FORCE] * M0
     u = turned - held
-    scale = k[17] * reciprocal(u)
+    scale = k[GAIN] * reciprocal(u)
     states[i], states[BLOCK + i], states[2 * BLOCK + i] = scale * theta, scale * M0, scale * Q0
     states[3 * BLOCK + i], states[4 * BLOCK + i] = (LIFT * scale) * W1, scale * Y1
     impedance = _impedance(_size(S), k)  # with it, what u would be away from a pole
-    crossed = k[14] * _size(M0) / max(impedance, 1.0) + k[16] * _size(theta) * impedance
+    crossed = k[HUB] * _size(M0) / max(impedance, 1.0) + k[HUB_FORCE] * _size(theta) * impedance
     states[5 * BLOCK + i] = complex(_size(u), _size(turned) + _size(held) + crossed)
 
 
 @inlined
 def _impedance(S: float, k: Any) -> float:
     """Size of M0/theta for a free tip, dimensionless: of its inertia when slow, of one wave number when fast."""
-    inertia = k[4] * S
-    return min(inertia, math.sqrt(math.sqrt(inertia)) + math.sqrt(S * (k[0] + k[2])))
+    inertia = k[G] * S
+    return min(inertia, math.sqrt(math.sqrt(inertia)) + math.sqrt(S * (k[A] + k[B])))
 
 
 @compiled
@@ -207,19 +209,34 @@ def free_ends(s: complex, k: Any) -> tuple[complex, complex, complex]:
     """theta and M0 of the free response at one s, times e^{-scale}, and scale: entire in s^2 at C = 0 (see `free`)."""
     S = s * s
     if _is_low(s, k):
-        over_d = reciprocal(1.0 + k[7] * s)
-        z_sum, z_product = S * (k[2] + k[0] * over_d), S * (k[0] * k[2] * S + k[4]) * over_d
+        over_d = reciprocal(1.0 + k[DAMPING] * s)
+        z_sum, z_product = S * (k[B] + k[A] * over_d), S * (k[A] * k[B] * S + k[G]) * over_d
         F0, F1, F2, F3, F2_less_1, _ = transition_series(z_sum, z_product)
         theta, M0, _, _, _ = from_transition(
-            F0, F1, F2, F3, F2_less_1, S, over_d, k[0], k[2], k[4], k[6],
-            _end(k, 8, S), k[10], _end(k, 11, S), k[13],
+            F0, F1, F2, F3, F2_less_1, S, over_d, k[A], k[B], k[G], k[SIGMA],
+            _end(k, TIP_MASS, S), k[MASS_FORCE], _end(k, TIP_INERTIA, S), k[TURN_FORCE],
         )  # fmt: skip
         return theta, M0, complex(0.0, 0.0)
     S, d, _, gS, z1, v1, t1, dt1, z2, v2, t2, dt2 = dispersion(s, k)
     c1, s1, e1 = _wave_functions(z1, t1, dt1)
     c2, s2, e2 = _wave_functions(z2, t2, dt2)
     theta, M0, _, _ = from_waves(
-        c1, s1, z1, v1, e1, c2, s2, z2, v2, e2, gS, d, _end(k, 8, S), k[10], _end(k, 11, S), k[13]
+        c1,
+        s1,
+        z1,
+        v1,
+        e1,
+        c2,
+        s2,
+        z2,
+        v2,
+        e2,
+        gS,
+        d,
+        _end(k, TIP_MASS, S),
+        k[MASS_FORCE],
+        _end(k, TIP_INERTIA, S),
+        k[TURN_FORCE],
     )
     gap = z1 - z2
     unit = reciprocal(gS * d * gap * gap)

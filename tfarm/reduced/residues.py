@@ -19,6 +19,7 @@ from tfarm.exact.coefficients import Coefficients
 from tfarm.exact.free import free_response
 from tfarm.exact.outputs import Output, unit_scale
 from tfarm.exact.values import evaluate_outputs, kernel_table
+from tfarm.exact.vector import GAIN, HUB
 from tfarm.spectrum import Modes
 
 Real = NDArray[np.float64]
@@ -55,7 +56,7 @@ def end_residues(k: Coefficients, wanted: Sequence[Output], p: Complex) -> tuple
     """Residues (outputs, p) of outputs at hub and tip at eigenvalues p, and where they are in doubt."""
     with np.errstate(all="ignore"):
         free = free_response(k, p)
-        rest, inertia, force = k.kernel[14:17]
+        rest, inertia, force = k.kernel[HUB:GAIN]
         balance = rest + inertia * p * p  # balance theta = force M, and the larger side has lost digits
         heavy = abs(balance) > force
         theta = np.where(heavy, force * free.M.c[0] / np.where(heavy, balance, 1.0), free.theta.c[0])

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from tfarm.exact.axis import bisect, drives
 from tfarm.exact.coefficients import Coefficients, Condition
+from tfarm.exact.vector import DAMPING
 
 
 class Counter:
@@ -43,7 +44,7 @@ class Counter:
     def first_reaching(self, number: NDArray[np.int64], below: float) -> NDArray[np.float64]:
         """The smallest floats [rad/s] with a count of `number` at least, by bisection of 0..below."""
         kernel = self._kernel.copy()
-        kernel[7] = 0.0
+        kernel[DAMPING] = 0.0
         low, high = np.zeros(number.size), np.full(number.size, below)
         bisect(number, kernel, self._ends, np.array(self._steps, np.int64), low, high)
         return high

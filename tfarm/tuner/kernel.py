@@ -21,7 +21,9 @@ import numpy as np
 
 from tfarm.exact.compiled import compiled
 
-X, U, E, GAIN, SLOPE = 0, 1, 2, 3, 4
+X, U, E, GAIN, SLOPE = range(5)  # columns of the signals
+TURNED, ADVANCE, DRIVE, RATE, MOMENT = range(5)  # A^T, A, B and the rows of the model
+RATE_GAIN, MOMENT_WEIGHT, TORQUE_WEIGHT, PERIOD, BOUND, LAG = range(6)  # of the numbers
 PLAIN, CLIPPED, BACKTRACKING = 0, 1, 2
 SOURCE = (1, 5, 6, 10, 0, 4, 7)  # of each input in the rows of `_derive`: x, u, e, K now, before, and before that
 
@@ -103,11 +105,11 @@ def _dot(a: Any, b: Any) -> float:
 def _sense(k: int, model: Any, reference: Any, numbers: Any, scales: Any, state: Any, run: Any) -> bool:
     """Reads x and u at sample k and fills the network's inputs there; False where the moment passes the bound."""
     inputs, _, signals = run
-    moment = _dot(model[4], state)
-    if not abs(moment) <= numbers[4]:
+    moment = _dot(model[MOMENT], state)
+    if not abs(moment) <= numbers[BOUND]:
         return False
     signals[k, X] = moment - reference[k, 3]
-    signals[k, U] = reference[k, 1] + numbers[0] * (reference[k, 0] - _dot(model[3], state))
+    signals[k, U] = reference[k, 1] + numbers[RATE_GAIN] * (reference[k, 0] - _dot(model[RATE], state))
     inputs[k].fill(0.0)
     inputs[k, 0], inputs[k, 4] = signals[k, U], signals[k, X]
     if k >= 1:
@@ -129,9 +131,9 @@ def _act(k: int, model: Any, reference: Any, weights: Any, guard: Any, state: An
     signals[k, GAIN], signals[k, SLOPE] = K, slope
     signals[k, E] = signals[k, U] - K * signals[k, X]
     torque = signals[k, E] + reference[k, 2]
-    _turn(model[0], state, spare)
+    _turn(model[TURNED], state, spare)
     for i in range(state.size):
-        state[i] = spare[i] + model[2][i] * torque
+        state[i] = spare[i] + model[DRIVE][i] * torque
 
 
 @compiled
@@ -139,8 +141,8 @@ def trial_cost(done: int, numbers: Any, signals: Any) -> float:
     """T times the sum of a x^2/2 + b e^2/2 over the first `done` samples."""
     total = 0.0
     for k in range(done):
-        total += 0.5 * numbers[1] * signals[k, X] ** 2 + 0.5 * numbers[2] * signals[k, E] ** 2
-    return total * numbers[3]
+        total += 0.5 * numbers[MOMENT_WEIGHT] * signals[k, X] ** 2 + 0.5 * numbers[TORQUE_WEIGHT] * signals[k, E] ** 2
+    return total * numbers[PERIOD]
 
 
 @compiled
@@ -168,12 +170,12 @@ def backward(model: Any, numbers: Any, scales: Any, weights: Any, run: Any, work
     inputs, hidden, signals = run
     n, m, h = inputs.shape[0], inputs.shape[1], hidden.shape[1]
     back, spare, by_input, late = work[0], work[1], work[2], work[3]
-    K1, a, b, T = numbers[0], numbers[1], numbers[2], numbers[3]
+    K1, a, b, T = numbers[RATE_GAIN], numbers[MOMENT_WEIGHT], numbers[TORQUE_WEIGHT], numbers[PERIOD]
     gradient.fill(0.0)
     back.fill(0.0)
     late.fill(0.0)
     for k in range(n - 1, -1, -1):
-        by_e = T * b * signals[k, E] + _dot(model[2], back) + late[0]
+        by_e = T * b * signals[k, E] + _dot(model[DRIVE], back) + late[0]
         by_sum = (late[4] - signals[k, X] * by_e) * signals[k, SLOPE]
         gain_gradient(weights, inputs[k], hidden[k], by_sum, gradient)
         by_input.fill(0.0)
@@ -183,9 +185,9 @@ def backward(model: Any, numbers: Any, scales: Any, weights: Any, run: Any, work
                 by_input[i] += by_net * weights[j * m + i] / scales[i]
         by_u = by_e + by_input[0] + late[2]
         by_x = T * a * signals[k, X] - signals[k, GAIN] * by_e + by_input[4] + late[3]
-        _turn(model[1], back, spare)
+        _turn(model[ADVANCE], back, spare)
         for i in range(back.size):
-            back[i] = spare[i] + model[4][i] * by_x - K1 * model[3][i] * by_u
+            back[i] = spare[i] + model[MOMENT][i] * by_x - K1 * model[RATE][i] * by_u
         late[0], late[1] = late[1] + by_input[2], by_input[3]
         late[2], late[3] = by_input[1], by_input[5]
         late[4] = by_input[6] if m > 6 else 0.0
@@ -259,7 +261,7 @@ def sample_gradient(k: int, numbers: Any, reply: float, x_next: float, run: Any,
     """Gradient of a x_next^2/2 + b e^2/2 by the weights that made K at sample k; x_next answers to the torque by
     `reply`."""
     inputs, hidden, signals = run
-    by_gain = -signals[k, X] * (numbers[1] * x_next * reply + numbers[2] * signals[k, E])
+    by_gain = -signals[k, X] * (numbers[MOMENT_WEIGHT] * x_next * reply + numbers[TORQUE_WEIGHT] * signals[k, E])
     out.fill(0.0)
     gain_gradient(weights, inputs[k], hidden[k], by_gain * signals[k, SLOPE], out)
 
@@ -271,9 +273,9 @@ def learn_by_samples(
 ) -> tuple[int, int]:  # fmt: skip
     """Learning at every sample (the paper's delta rule): as x arrives, the weights that it answers to are corrected.
 
-    A torque is answered `numbers[5]` samples later.  `reply` is the derivative of that x by the torque.
+    A torque is answered `numbers[LAG]` samples later.  `reply` is the derivative of that x by the torque.
     """
-    n, size, lag = reference.shape[0], weights.size, int(numbers[5])
+    n, size, lag = reference.shape[0], weights.size, int(numbers[LAG])
     gradient, change, past = np.zeros(size), np.zeros(size), np.zeros((lag, size))
     state, spare = work[0], work[1]
     kept = weights.copy()
@@ -310,8 +312,8 @@ def _derive(k: int, model: Any, numbers: Any, scales: Any, weights: Any, run: An
         D[row].fill(0.0)
     for i in range(S.shape[0]):
         for p in range(S.shape[1]):
-            D[X, p] += model[4][i] * S[i, p]
-            D[U, p] -= numbers[0] * model[3][i] * S[i, p]
+            D[X, p] += model[MOMENT][i] * S[i, p]
+            D[U, p] -= numbers[RATE_GAIN] * model[RATE][i] * S[i, p]
     gain_gradient(weights, inputs[k], hidden[k], signals[k, SLOPE], D[GAIN])
     for i in range(m):
         by_input = 0.0
@@ -325,11 +327,11 @@ def _derive(k: int, model: Any, numbers: Any, scales: Any, weights: Any, run: An
     spare.fill(0.0)
     for i in range(S.shape[0]):
         for j in range(S.shape[0]):
-            if model[1][i, j] != 0.0:
+            if model[ADVANCE][i, j] != 0.0:
                 for p in range(S.shape[1]):
-                    spare[i, p] += model[1][i, j] * S[j, p]
+                    spare[i, p] += model[ADVANCE][i, j] * S[j, p]
         for p in range(S.shape[1]):
-            spare[i, p] += model[2][i] * D[E, p]
+            spare[i, p] += model[DRIVE][i] * D[E, p]
     for i in range(S.shape[0]):
         _copy(spare[i], S[i])
 
@@ -344,7 +346,7 @@ def learn_by_sensitivities(
     The gradient of a x^2/2 + b e^2/2 now, by weights taken for constant all the trial (Williams and Zipser, 1989).
     `total` collects T times the gradients of a trial: with rates of zero that is the gradient of its cost.
     """
-    n, size, states = reference.shape[0], weights.size, model[2].size
+    n, size, states = reference.shape[0], weights.size, model[DRIVE].size
     gradient, change, kept = np.zeros(size), np.zeros(size), weights.copy()
     S, room, D = np.zeros((states, size)), np.zeros((states, size)), np.zeros((12, size))
     state, spare = work[0], work[1]
@@ -362,8 +364,10 @@ def learn_by_sensitivities(
             _act(k, model, reference, weights, guard, state, spare, run)
             _derive(k, model, numbers, scales, weights, run, S, room, D)
             for p in range(size):
-                gradient[p] = numbers[1] * run[2][k, X] * D[X, p] + numbers[2] * run[2][k, E] * D[E, p]
-                total[p] += numbers[3] * gradient[p]
+                gradient[p] = (
+                    numbers[MOMENT_WEIGHT] * run[2][k, X] * D[X, p] + numbers[TORQUE_WEIGHT] * run[2][k, E] * D[E, p]
+                )
+                total[p] += numbers[PERIOD] * gradient[p]
             _step(weights, change, gradient, rates, momentum, 1.0, longest)
         costs[trial] = trial_cost(n, numbers, run[2])
         if _rms(n, run[2]) < enough:
