@@ -10,8 +10,8 @@ import tfarm
 from tests.shell import run
 from tfarm.arm.writing import to_toml
 from tfarm.digits import within
-from tfarm.loop.answers import HELD
 from tfarm.loop.poles import closed_loop_poles
+from tfarm.spectrum.answers import HELD
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from tfarm.arm import GAINS, HubFeedback
 from tfarm.columns import JSON, REPORT, TERMINAL, Column, Table
 from tfarm.digits import general, plain, singly, within
+from tfarm.spectrum.answers import HELD
 
 from .design import Design
 from .lyapunov import lyapunov
@@ -19,7 +20,6 @@ from .windows import Interval, Windows
 
 SIGN = "u = -Kp theta - K1 theta_t - K2 E I phi'(0) + r; a static torque u gives the moment -(J - I_h)/J u"
 UNITS = {gain.name: gain.unit.removesuffix("1") for gain in GAINS}
-HELD = 2e-14  # of a pole's size: what its float64 may be off (tests: 1e-14 to 50 digits)
 POLES = (  # of pairs Re s, Im s
     Column("re", "Re s", "1/s", of=lambda pole: within(pole[0], HELD * math.hypot(*pole), 12)),
     Column("im", "Im s", "rad/s", of=lambda pole: pole[1], digits=singly(general, 12)),
