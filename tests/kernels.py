@@ -72,10 +72,17 @@ def probed(environment: dict[str, str]) -> str:
     return done.stdout.strip() if done.returncode == 0 else f"exit {done.returncode}"
 
 
+def with_the_mark(paths: list[str]) -> list[str]:
+    """The files of tests in those folders with one marked `kernels`: the others would only take time to load."""
+    files = [file for path in paths for file in sorted(Path(path).rglob("test_*.py"))]
+    return [str(file) for file in files if "pytest.mark.kernels" in file.read_text(encoding="utf-8")]
+
+
 def main(arguments: list[str]) -> int:
     """The number of kernels under which a test failed."""
     marked, failed, seen = "--marked" in arguments, [], {}
     paths = [argument for argument in arguments if argument != "--marked"] or ROOMS
+    paths = with_the_mark(paths) if marked else paths
     shared = ("-n", "2", "--dist", "worksteal")  # each worker goes on where it is, and makes what a file shares once
     pytest = [sys.executable, "-m", "pytest", "-q", *shared, *(("-m", "kernels") if marked else ()), *paths]
     print(f"own: {probed({})}", flush=True)

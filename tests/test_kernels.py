@@ -1,8 +1,13 @@
 """That `make kernels` runs what it says it runs."""
 
+import subprocess
+import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 from tests import kernels
+
+ROOT = Path(__file__).parent.parent
 
 
 def test_what_is_chosen_is_what_runs() -> None:
@@ -33,3 +38,12 @@ def test_a_kernel_that_is_none_is_named_and_skipped(monkeypatch, capsys) -> None
     assert "OpenBLAS SkylakeX: skipped, this CPU cannot run it (exit -4)" in said
     assert "OpenBLAS Zen: skipped, it is h, as OpenBLAS Haswell" in said
     assert "failures under OpenBLAS Nehalem" in said
+
+
+def test_only_files_with_a_marked_test_are_loaded() -> None:
+    """Those that pytest itself chooses by the mark."""
+    command = [sys.executable, "-m", "pytest", "-q", "-n", "0", "--collect-only", "-m", "kernels", "tests/reduced"]
+    listed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.splitlines()
+    files = {str(Path(file).relative_to(ROOT)) for file in kernels.with_the_mark([str(ROOT / "tests" / "reduced")])}
+    assert {line.partition("::")[0] for line in listed if "::" in line} == files
+    assert 0 < len(files) < 5
