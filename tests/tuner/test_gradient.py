@@ -6,7 +6,7 @@ import pytest
 import tfarm
 from tests.tuner.plain import PlainTrial, complex_step, plain_gain
 from tfarm.dsp import Chain, Converters, Sampling
-from tfarm.tuner import initial_network, kernel, slew_trial
+from tfarm.tuner import initial_network, rules, slew_trial
 
 pytestmark = pytest.mark.kernels
 
@@ -48,7 +48,7 @@ def test_reverse_and_forward_accumulation_agree(lab, chain, inputs, hidden):
     trial, network = slew_trial(lab, chain), some_network(1, inputs, hidden)
     cost, gradient = trial.gradient(network, SECTOR)
     total, costs = np.zeros(gradient.size), np.zeros(1)
-    kernel.learn_by_sensitivities(
+    rules.learn_by_sensitivities(
         trial.model, trial.reference, trial.numbers, network.scales, SECTOR, network.weights, np.zeros(gradient.size),
         0.0, np.inf, 0.0, costs, trial.run(inputs, hidden), trial.work(inputs), total,
     )  # fmt: skip

@@ -2,7 +2,7 @@
 
 numba keys a cached function by its own file only: an edited callee in another file would go unnoticed
 (measured with numba 0.68).  So the cache of this package lies in a folder named by a hash of all the sources
-that compiled code can come from.
+that compiled code can come from: those of this room, and those that ask it to compile.
 """
 
 from __future__ import annotations
@@ -48,8 +48,10 @@ def plain(function: Callable[..., Any]) -> Callable[..., Any]:
 
 def _source_hash() -> str:
     digest = hashlib.sha256()
-    for source in sorted(_HERE.glob("*.py")):
-        digest.update(source.read_bytes())
+    for source in sorted(_HERE.parent.rglob("*.py")):
+        text = source.read_bytes()
+        if source.parent == _HERE or b"exact.compiled import" in text:
+            digest.update(text)
     return digest.hexdigest()[:16]
 
 

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from tfarm.arm.checks import not_negative, positive
 from tfarm.errors import ParameterError, did_you_mean
 from tfarm.records import record
-from tfarm.tuner import kernel
+from tfarm.tuner import rules
 from tfarm.tuner.guard import Guard
 from tfarm.tuner.network import Network
 from tfarm.tuner.trial import Record, Trial
@@ -33,7 +33,7 @@ Mode = Literal["trial", "online"]
 Rule = Literal["dynamic", "clipped", "plain"]
 Sensitivity = Literal["one-step", "whole"]
 
-RULES: dict[str, int] = {"dynamic": kernel.BACKTRACKING, "clipped": kernel.CLIPPED, "plain": kernel.PLAIN}
+RULES: dict[str, int] = {"dynamic": rules.BACKTRACKING, "clipped": rules.CLIPPED, "plain": rules.PLAIN}
 MOST_TRIALS = 1_000_000
 
 
@@ -144,14 +144,14 @@ def _learn(
     common = (trial.model, trial.reference, trial.numbers, network.scales, guard.array, weights, rates)
     if learning.mode == "online" and learning.sensitivity == "whole":
         total = np.zeros(weights.size)
-        return kernel.learn_by_sensitivities(
+        return rules.learn_by_sensitivities(
             *common, float(learning.alpha), longest, float(learning.enough), costs, run, work, total
         )
     if learning.mode == "online":
-        return kernel.learn_by_samples(
+        return rules.learn_by_samples(
             *common, float(learning.alpha), trial.reply, longest, float(learning.enough), costs, run, work
         )
     rule = RULES[learning.rule]
-    return kernel.learn_by_trials(
+    return rules.learn_by_trials(
         *common, float(learning.alpha), rule, longest, float(learning.enough), costs, run, work
     )
