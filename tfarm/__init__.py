@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from tfarm.arm import Arm, Hub, HubFeedback, Link, Payload, Section, load, presets
+    from tfarm.dsp.results import simulate
+    from tfarm.dsp.verdict import analyse as sampled
     from tfarm.errors import CertificationError, ConvergenceError, ParameterError
     from tfarm.exact.outputs import Output
     from tfarm.loop.design import design
@@ -23,10 +25,12 @@ if TYPE_CHECKING:
     from tfarm.loop.margins import margins
     from tfarm.loop.nyquist import nyquist
     from tfarm.loop.poles import closed_loop_poles
+    from tfarm.loop.regions import region as map
     from tfarm.reduced import reduce
     from tfarm.response import bode, transfer
     from tfarm.spectrum import damped_modes, modes
     from tfarm.spectrum.scales import default_gains
+    from tfarm.tuner import tune
 
 __version__ = "0.1.0"
 
@@ -48,15 +52,19 @@ __all__ = [
     "design",
     "load",
     "locus",
+    "map",
     "margins",
     "modes",
     "nyquist",
     "presets",
     "reduce",
+    "sampled",
+    "simulate",
     "transfer",
+    "tune",
 ]
 
-_ROOMS = {
+_ROOMS = {  # where a name stands; what it is called there after a colon, if not the same
     "bode": "response",
     "design": "loop.design",
     "locus": "loop.locus",
@@ -64,19 +72,23 @@ _ROOMS = {
     "closed_loop_poles": "loop.poles",
     "damped_modes": "spectrum",
     "default_gains": "spectrum.scales",
+    "map": "loop.regions:region",
     "margins": "loop.margins",
     "modes": "spectrum",
     "Output": "exact.outputs",
     "reduce": "reduced",
+    "sampled": "dsp.verdict:analyse",
+    "simulate": "dsp.results",
     "transfer": "response",
+    "tune": "tuner",
 }
 
 
 def __getattr__(name: str) -> object:
     if name not in __all__:
         raise AttributeError(f"module 'tfarm' has no attribute {name!r}")
-    room = _ROOMS.get(name, "errors" if name.endswith("Error") else "arm")
-    value = getattr(import_module(f"tfarm.{room}"), name)
+    room, _, called = _ROOMS.get(name, "errors" if name.endswith("Error") else "arm").partition(":")
+    value = getattr(import_module(f"tfarm.{room}"), called or name)
     globals()[name] = value
     return value
 

@@ -14,7 +14,7 @@ from tfarm.arm import Arm, HubFeedback
 from tfarm.columns import Column
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.enough import Enough, enough_modes
-from tfarm.dsp.scenarios import described, scenario
+from tfarm.dsp.scenarios import Scenario, described, scenario
 from tfarm.dsp.simulate import Simulation, Simulator, Trace
 
 Real = NDArray[np.float64]
@@ -191,6 +191,33 @@ def ideal_chain(chain: Chain) -> Chain:
     return replace(chain, converters=converters, actuator=replace(chain.actuator, torque_limit=math.inf))
 
 
+def simulate(
+    arm: Arm,
+    law: HubFeedback,
+    chain: Chain | None = None,
+    scenario_name: str = "slew",
+    duration: float = 3.0,
+    *,
+    count: int | None = None,
+    between: int = 0,
+) -> Simulation:
+    """The sampled loop in time, exact between the samples: a "slew", "step", "decay" or "impulse" of `duration` [s].
+
+    With `count` flexible modes, or as many as the digits of the signals take, and `between` records between two
+    samples.  Raises ParameterError for a locked hub, for I_h = 0 with K2 != 0, and for what `scenario` refuses.
+    """
+    chain = Chain() if chain is None else chain
+    return _simulated(arm, law, chain, scenario(scenario_name, arm, chain, duration), count, between)[0]
+
+
+def _simulated(
+    arm: Arm, law: HubFeedback, chain: Chain, task: Scenario, count: int | None, between: int
+) -> tuple[Simulation, Enough]:
+    """The simulation, and how many modes it took."""
+    used = modes_for(count, lambda n: Simulator(arm, ideal_chain(chain), task, count=n).linear(law))
+    return Simulator(arm, chain, task, count=used.modes, between=between).linear(law), used
+
+
 def simulated_answer(
     arm: Arm,
     gains: HubFeedback,
@@ -205,12 +232,10 @@ def simulated_answer(
 
     Raises ParameterError for a locked hub, for I_h = 0 with K2 != 0, and for what `scenario` and `Simulator` refuse.
     """
-    task, ideal = scenario(name, arm, chain, duration), ideal_chain(chain)
-    used = modes_for(count, lambda n: Simulator(arm, ideal, task, count=n).linear(gains))
-    simulation = Simulator(arm, chain, task, count=used.modes, between=between).linear(gains)
-    cycle = None
+    task, cycle = scenario(name, arm, chain, duration), None
+    simulation, used = _simulated(arm, gains, chain, task, count, between)
     if not chain.is_linear:
-        cycle = limit_cycle(simulation, Simulator(arm, ideal, task, count=used.modes).linear(gains))
+        cycle = limit_cycle(simulation, Simulator(arm, ideal_chain(chain), task, count=used.modes).linear(gains))
     return simulation_answer(arm.name, gains, simulation, cycle, used) | {
         "scenario_in_words": described(task, arm, chain)
     }
