@@ -102,7 +102,7 @@ def response_table(data: Bode, stem: str) -> Table:
         Column("magnitude", "magnitude", of, of=abs(data.value)),
         Column("phase_deg", "phase", "deg", of=data.phase),
     )
-    return Table(stem=stem, title=f"{data.input_label} to {data.label}", caption="", is_data=True, columns=columns)
+    return Table(stem=stem, title=f"{data.input_label} to {data.label}", is_data=True, columns=columns)
 
 
 def roots_table(data: Bode, stem: str) -> Table:

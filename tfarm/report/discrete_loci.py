@@ -220,4 +220,4 @@ def loci_table(data: Loci, stem: str) -> Table:
     z_all = np.array(points)
     columns = [Column(key, key, of=cells) for key, cells in keys.items()]
     columns += [Column("real", "Re z", of=z_all.real), Column("imaginary", "Im z", of=z_all.imag)]
-    return Table(stem=stem, title="Poles of the sampled loop", caption="", is_data=True, columns=tuple(columns))
+    return Table(stem=stem, title="Poles of the sampled loop", is_data=True, columns=tuple(columns))

@@ -254,4 +254,4 @@ def loci_data(data: Loci, stem: str) -> Table:
         for n, row in enumerate(shown(branches)):
             columns.append(Column(f"{kind}_{n}_re", f"{kind} branch {n}, Re s", "1/s", of=row.real))
             columns.append(Column(f"{kind}_{n}_im", f"{kind} branch {n}, Im s", "rad/s", of=row.imag))
-    return Table(stem=stem, title=f"Loci along {data.name}", caption="", is_data=True, columns=tuple(columns))
+    return Table(stem=stem, title=f"Loci along {data.name}", is_data=True, columns=tuple(columns))

@@ -230,7 +230,7 @@ def map_data(data: GainMap) -> Table:
         Column("least_damping_ratio", "least damping ratio", of=[*data.damping.ravel().tolist(), *none * beyond]),
         Column("omega_rad_s", "frequency", "rad/s", of=none * K1.size + edge[:, 2].tolist() + none * len(sampled)),
     )  # fmt: skip
-    return Table(stem="map-data", title="The map of K1 and K2", caption="", is_data=True, columns=columns)
+    return Table(stem="map-data", title="The map of K1 and K2", is_data=True, columns=columns)
 
 
 def _sampled_ends(data: GainMap) -> Real:

@@ -145,7 +145,7 @@ def _shapes(name: str, shapes: tuple[Shape, ...]) -> Picture:
         caption=MODE_SHAPES,
         alt=f"Mode shapes of the arm, modes 1 to {len(shapes)}; they have {counts} nodes between hub and tip.",
         figure=draw_shapes(name, shapes),
-        data=Table(stem="mode-shapes-data", title="Mode shapes", caption="", is_data=True, columns=tuple(columns)),
+        data=Table(stem="mode-shapes-data", title="Mode shapes", is_data=True, columns=tuple(columns)),
     )
 
 
@@ -184,9 +184,7 @@ def _differences(name: str, differences: Mapping[str, Real]) -> Picture:
         caption=DIFFERENCES,
         alt=f"Differences from the Timoshenko theory by mode; at mode {MODES}: {words}.",
         figure=draw_differences(name, shown),
-        data=Table(
-            stem="theory-differences-data", title="Differences", caption="", is_data=True, columns=tuple(columns)
-        ),
+        data=Table(stem="theory-differences-data", title="Differences", is_data=True, columns=tuple(columns)),
     )
 
 

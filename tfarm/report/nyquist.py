@@ -191,7 +191,6 @@ def curve_data(plots: Sequence[Curve]) -> Table:
     return Table(
         stem="nyquist-data",
         title="The loop function on the contour",
-        caption="",
         is_data=True,
         columns=(
             Column("law", "law", of=law),

@@ -187,7 +187,7 @@ def overlay_table(data: Overlay, stem: str) -> Table:
         own = layer.damping == data.arm.damping
         columns.append(_ends("sampled_K2_intervals" if own else f"sampled_at_C_{layer.damping:g}_s", layer))
     title = "Stable intervals of K2, continuous and sampled"
-    return Table(stem=stem, title=title, caption="", is_data=True, columns=tuple(columns))
+    return Table(stem=stem, title=title, is_data=True, columns=tuple(columns))
 
 
 def _ends(key: str, layer: Layer) -> Column:

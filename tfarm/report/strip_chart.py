@@ -234,4 +234,4 @@ def strip_table(data: StripChart, stem: str) -> Table:
         Column("torque_asked_N_m", "torque asked", "N m", of=held(s, data.asked, drawn.t)),
         Column("torque_given_N_m", "torque given, after the delay", "N m", of=held(s, s.torque, drawn.t)),
     )
-    return Table(stem=stem, title="Strip chart", caption="", is_data=True, columns=columns)
+    return Table(stem=stem, title="Strip chart", is_data=True, columns=columns)

@@ -188,4 +188,4 @@ def responses_table(stem: str, title: str, arm: Arm, each: Mapping[str, Simulati
         columns.append(Column(f"torque_{key}_N_m", "torque", "N m", of=curves.held(run, run.torque, t)))
         if run.gain is not None and np.ptp(run.gain):
             columns.append(Column(f"K_{key}", "gain", of=curves.held(run, run.gain, t)))
-    return Table(stem=stem, title=title, caption="", is_data=True, columns=tuple(columns))
+    return Table(stem=stem, title=title, is_data=True, columns=tuple(columns))
