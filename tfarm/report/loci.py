@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 import tfarm
 from tfarm.arm import Arm, HubFeedback
 from tfarm.columns import Column, Table
-from tfarm.digits import plain, scientific, significant, singly
+from tfarm.digits import held, plain, scientific, significant, singly
 from tfarm.errors import ConvergenceError
 from tfarm.loop.answers import UNITS
 from tfarm.loop.locus import Locus, locus
@@ -94,11 +94,6 @@ def loci(arm: Arm, law: HubFeedback, vary: str, start: float, stop: float) -> Lo
     raise lost
 
 
-def _rounded(values: Real, digits: int = GAPS_HELD) -> Real:
-    """Each to that many digits."""
-    return np.array([float(f"{value:.{digits - 1}e}") for value in values])
-
-
 def zoomed(data: Loci) -> list[int]:
     """The branches drawn on their own: the first that swings of each mode."""
     imag, mode = data.exact.branches.imag, data.exact.mode
@@ -155,13 +150,13 @@ def _panel(data: Loci, numbers: Sequence[int], ax: Axes, named: Sequence[int]) -
     for n in numbers:
         color = color_of(data, n)
         ax.plot(exact[n].real, exact[n].imag, color=color, lw=2.6, alpha=0.4, zorder=2, solid_capstyle="round")
-        _band(reduced[n], _rounded(data.reduced.gap)[n] * np.maximum(abs(exact[n]), data.first), color, ax)
+        _band(reduced[n], held(data.reduced.gap, GAPS_HELD)[n] * np.maximum(abs(exact[n]), data.first), color, ax)
         ax.plot(reduced[n].real, reduced[n].imag, color=color, lw=0.9, ls=(0, (2, 1.5)), zorder=3)
         ax.plot(exact[n, 0].real, exact[n, 0].imag, "x", color=color, ms=6, mew=1.4, zorder=4)
         ax.plot(exact[n, at[1:]].real, exact[n, at[1:]].imag, "o", color=color, ms=3.2, zorder=4)
     for each in data.exact.crossings:
         if each.branch in numbers:
-            omega = float(_rounded(np.array([each.omega]), HELD)[0])
+            omega = held([each.omega], HELD)[0]
             ax.plot([0], [omega], "D", ms=6, mfc=ORANGE, mec="white", mew=0.8, zorder=6)
             if each.branch not in named:
                 continue
@@ -212,28 +207,26 @@ def _legend(data: Loci) -> tuple[list[Line2D], list[str]]:
 
 def crossing_table(data: Loci, stem: str) -> Table:
     """Where the branches cross the imaginary axis."""
-    found = data.exact.crossings
-    gain, omega = (_rounded(np.array([getattr(each, key) for each in found]), HELD) for key in ("gain", "omega"))
-    hertz = omega / (2 * math.pi)
-    modes = [int(data.exact.mode[each.branch]) for each in found]
+    found = list(data.exact.crossings)
+    gain, omega = (held([getattr(each, key) for each in found], HELD) for key in ("gain", "omega"))
     return Table(
         stem=stem,
         title=f"Crossings of the imaginary axis along {data.name}",
         caption="Solved for gain and frequency together on the exact characteristic function, to the digits shown.",
+        record=found,
         columns=(
             Column(data.name, data.name, data.unit, of=gain, digits=singly(significant, 8)),
             Column("omega_rad_s", "frequency", "rad/s", of=omega, digits=singly(significant, 7)),
-            Column("frequency_hz", "", "Hz", of=hertz, digits=singly(significant, 7)),
-            Column("mode", "mode", of=modes),
-            Column("becomes", "becomes", of=[each.direction for each in found]),
+            Column("frequency_hz", "", "Hz", of=[w / (2 * math.pi) for w in omega], digits=singly(significant, 7)),
+            Column("mode", "mode", of=lambda each: int(data.exact.mode[each.branch])),
+            Column("becomes", "becomes", of="direction"),
         ),
     )
 
 
 def gap_table(data: Loci, stem: str) -> Table:
     """How far each reduced branch is from the exact one."""
-    gap, mode = _rounded(data.reduced.gap), data.exact.mode
-    names = [f"mode {n}" if n else "rigid body" for n in mode]
+    gap, names = held(data.reduced.gap, GAPS_HELD), [f"mode {n}" if n else "rigid body" for n in data.exact.mode]
     return Table(
         stem=stem,
         title=f"How far python-control's locus is from the exact one, along {data.name}",
