@@ -8,6 +8,7 @@ import pytest
 
 import tfarm
 from tfarm.arm import Arm, Hub, Link, Payload, Section
+from tfarm.arm.checks import whole
 from tfarm.errors import ParameterError
 
 LINK = Link(
@@ -216,3 +217,14 @@ def test_what_the_hub_carries_and_what_bends_the_arm() -> None:
     assert arm.bending_scale * arm.length == link.EI
     assert arm.is_undamped == (arm.damping == 0)
     assert not arm.has_massless_hub
+
+
+@pytest.mark.parametrize("value", [True, 1.0, "2", None, 0, 8])
+def test_a_number_that_is_not_whole_or_out_of_range_is_refused(value: object) -> None:
+    with pytest.raises(ParameterError, match="n = .*from 1 to 7"):
+        whole("n", value, 1, 7, "a whole number from 1 to 7")
+
+
+def test_numpys_whole_numbers_are_pythons() -> None:
+    assert [whole("n", value, 1, math.inf, "") for value in (1, np.int64(7), np.uint8(3))] == [1, 7, 3]
+    assert type(whole("n", np.int64(7), 1, 7, "")) is int

@@ -7,7 +7,7 @@ would be right.
 from __future__ import annotations
 
 import math
-from numbers import Real
+from numbers import Integral, Real
 
 from tfarm.errors import ParameterError
 
@@ -25,6 +25,16 @@ def number(key: str, value: object, meaning: str) -> float:
     if math.isnan(x):
         raise ParameterError(key=key, value=value, remedy=f"{meaning}; nan is none")
     return x
+
+
+def whole(key: str, value: object, least: int, most: float, remedy: str) -> int:
+    """A whole number from `least` to `most`; NumPy's are welcome, a bool or a text is none.
+
+    `remedy` says all of what would be right.
+    """
+    if isinstance(value, bool) or not isinstance(value, Integral) or not least <= int(value) <= most:
+        raise ParameterError(key=key, value=value, remedy=remedy)
+    return int(value)
 
 
 def positive(key: str, value: object, meaning: str) -> float:

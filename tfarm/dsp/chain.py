@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal
 
-from tfarm.arm.checks import extended, not_negative, number, positive
+from tfarm.arm.checks import extended, not_negative, number, positive, whole
 from tfarm.errors import ParameterError, did_you_mean
 
 Reading = Literal["vibration", "total"]
@@ -181,9 +181,8 @@ def _above_zero(key: str, record: object, meaning: str) -> float:
 def _whole(key: str, value: object, least: int, most: int, what: str) -> None:
     if value is None:
         return
-    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
-        remedy = f"a whole number of {what} from {least} to {most}; leave it out for an ideal converter"
-        raise ParameterError(key=key, value=value, remedy=remedy)
+    remedy = f"a whole number of {what} from {least} to {most}; leave it out for an ideal converter"
+    whole(key, value, least, most, remedy)
 
 
 def _choice(key: str, value: object, choices: tuple[str, ...]) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback
+from tfarm.arm.checks import whole
 from tfarm.dsp import kernel
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.converters import quantisers
@@ -117,9 +118,8 @@ class Simulator:
     """
 
     def __init__(self, arm: Arm, chain: Chain, scenario: Scenario, *, count: int = 20, between: int = 0) -> None:
-        if isinstance(between, bool) or not isinstance(between, int) or not 0 <= between <= MOST_BETWEEN:
-            remedy = f"a whole number of records between two samples, 0 to {MOST_BETWEEN}"
-            raise ParameterError(key="between", value=between, remedy=remedy)
+        remedy = f"a whole number of records between two samples, 0 to {MOST_BETWEEN}"
+        between = whole("between", between, 0, MOST_BETWEEN, remedy)
         self.chain, self.scenario, self.between = chain, scenario, between
         plant = undelayed_plant(arm, chain, (*MEASURED, *RECORDED), count)
         self.plant = filtered(plant, chain)  # the first of each name: those that are recorded come later

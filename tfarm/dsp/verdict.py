@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tfarm.arm import Arm, HubFeedback
+from tfarm.arm.checks import whole
 from tfarm.columns import Table
 from tfarm.dsp.band import Band, band_of
 from tfarm.dsp.chain import Chain
@@ -15,7 +16,6 @@ from tfarm.dsp.law import MODES, ModeTable, growing_mode, mode_table
 from tfarm.dsp.loop import SampledLoop, check_loop, sampled_loop
 from tfarm.dsp.margins import DelayMargin, Window, around, whole_loop
 from tfarm.dsp.shown import Figure, ShownWindows, resized, shown_damping, shown_delay, shown_windows
-from tfarm.errors import ParameterError
 from tfarm.records import record
 
 UNDAMPED_MODES = 20
@@ -99,9 +99,7 @@ def sampled_verdict(arm: Arm, gains: HubFeedback, chain: Chain | None = None, *,
     """
     chain = Chain() if chain is None else chain
     if count is not None:
-        if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_ASKED:
-            remedy = f"a whole number of flexible modes from 1 to {MOST_ASKED}"
-            raise ParameterError(key="modes", value=count, remedy=remedy)
+        count = whole("modes", count, 1, MOST_ASKED, f"a whole number of flexible modes from 1 to {MOST_ASKED}")
         return Verdict(sampled_loop(arm, gains, chain, count=count))
     if arm.is_undamped:
         return Verdict(sampled_loop(arm, gains, chain, count=UNDAMPED_MODES))

@@ -13,6 +13,7 @@ from fractions import Fraction
 from types import MappingProxyType
 from typing import Literal, get_args
 
+from tfarm.arm.checks import whole
 from tfarm.errors import ParameterError, did_you_mean
 
 from .coefficients import Coefficients
@@ -62,9 +63,7 @@ class Output:
         if self.place not in PLACES[self.quantity]:
             remedy = f"{self.quantity} is known at: {', '.join(PLACES[self.quantity])} ({self._elsewhere})"
             raise ParameterError(key="output.place", value=self.place, remedy=remedy)
-        if isinstance(self.power, bool) or not isinstance(self.power, int) or not 0 <= self.power <= MOST_POWER:
-            remedy = f"a power of s: a whole number from 0 to {MOST_POWER}"
-            raise ParameterError(key="output.power", value=self.power, remedy=remedy)
+        whole("output.power", self.power, 0, MOST_POWER, f"a power of s: a whole number from 0 to {MOST_POWER}")
         if not isinstance(self.gauge, bool) or (self.gauge and self.quantity != "M"):
             remedy = "true or false, and true for a moment only: a strain gauge reads E I phi' without its damping"
             raise ParameterError(key="output.gauge", value=self.gauge, remedy=remedy)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback
+from tfarm.arm.checks import whole
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 from tfarm.spectrum.continuation import Member, corrected, follow
@@ -71,7 +72,8 @@ def locus(
     hub_inertia, length, damping; what it names in `arm` or `law` is replaced.  Raises ParameterError for what is no
     loop or no range, ConvergenceError where a branch cannot be told from another.
     """
-    points, branches = _whole("points", points, 2, MOST_POINTS), _whole("branches", branches, 1, MOST_BRANCHES)
+    points = whole("points", points, 2, MOST_POINTS, f"a whole number from 2 to {MOST_POINTS}")
+    branches = whole("branches", branches, 1, MOST_BRANCHES, f"a whole number from 1 to {MOST_BRANCHES}")
     variation = Variation(arm, law, vary)
     gain = _range(variation, start, stop, points)
     cut, lowest = followed(variation, start, stop, branches + 1)
@@ -92,12 +94,6 @@ def _range(variation: Variation, start: float, stop: float, points: int) -> Real
     if variation.vary == "all" and variation.law == HubFeedback():
         raise ParameterError(key="vary", value="all", remedy="every gain is 0: give K1, K2 or Kp to be scaled")
     return np.linspace(start, stop, points)
-
-
-def _whole(key: str, value: int, least: int, most: int) -> int:
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not least <= value <= most:
-        raise ParameterError(key=key, value=value, remedy=f"a whole number from {least} to {most}")
-    return int(value)
 
 
 def _listed(curves: Complex, variation: Variation, number: int) -> tuple[Complex, NDArray[np.int64]]:

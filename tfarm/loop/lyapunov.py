@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from tfarm.arm import FED_BACK, Arm, HubFeedback
-from tfarm.arm.checks import positive
+from tfarm.arm.checks import positive, whole
 from tfarm.errors import ParameterError
 from tfarm.records import record
 from tfarm.reduced import modal_model
@@ -159,8 +159,7 @@ def energy_along(arm: Arm, law: HubFeedback, duration: float, points: int = 501,
     if not arm.is_undamped:
         remedy = "0: modes of a damped arm do not share out its energy, and V_t has no such formula"
         raise ParameterError(key="link.damping", value=arm.damping, remedy=remedy)
-    if isinstance(points, bool) or not isinstance(points, int) or not 2 <= points <= MOST_POINTS:
-        raise ParameterError(key="points", value=points, remedy=f"a whole number from 2 to {MOST_POINTS}")
+    points = whole("points", points, 2, MOST_POINTS, f"a whole number from 2 to {MOST_POINTS}")
     A, struck, angle, rate, weights = _closed_modal_model(loop, modes)
     hub = np.outer(rate, rate)
     P = (1.0 - law.K2) * (np.diag(weights) - arm.hub_inertia * hub) + arm.hub_inertia * hub

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback
+from tfarm.arm.checks import whole
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
 from tfarm.exact.characteristic import zeros_at_origin
 from tfarm.records import record
@@ -103,8 +104,8 @@ def closed_loop_poles(arm: Arm, law: HubFeedback, count: int | None = None) -> P
     fewer: the box then ends there.  A count that is given goes on into shear.
     Raises ParameterError where there is no loop, ConvergenceError where the box cannot be completed.
     """
-    if count is not None and (isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_POLES):
-        raise ParameterError(key="count", value=count, remedy=f"a whole number from 1 to {MOST_POLES}")
+    if count is not None:
+        count = whole("count", count, 1, MOST_POLES, f"a whole number from 1 to {MOST_POLES}")
     loop, cut_off = Loop(arm, law), arm.shear_cutoff
     wanted, limit = (USUAL, cut_off) if count is None else (count, math.inf)
     number = wanted + 2

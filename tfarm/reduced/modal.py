@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm
+from tfarm.arm.checks import whole
 from tfarm.errors import ParameterError
 from tfarm.exact.coefficients import Coefficients, coefficients
 from tfarm.exact.outputs import OUTPUTS, Output
@@ -66,8 +67,7 @@ def modal_model(
     Raises ParameterError for an unknown output, a count out of range, and an output that grows with s without bound.
     """
     G = transfer(arm, outputs, x=x)
-    if isinstance(count, bool) or not isinstance(count, int | np.integer) or not 0 <= count <= MOST_MODES:
-        raise ParameterError(key="count", value=count, remedy=f"a whole number of flexible modes, 0 to {MOST_MODES}")
+    count = whole("count", count, 0, MOST_MODES, f"a whole number of flexible modes, 0 to {MOST_MODES}")
     k, share = coefficients(arm), 0.0 if x is None else x / arm.length
     wanted = [proper(k, each, share) for each in G.rows]
     table = modes(arm, max(1, int(count)))

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tfarm.arm import Arm
+from tfarm.arm.checks import whole
 from tfarm.errors import MISSING, ConvergenceError, ParameterError
 from tfarm.exact.outputs import Output
 from tfarm.records import record
@@ -238,11 +239,10 @@ class _Bench:
         remedy = f"states come in pairs, {rigid}two a mode: an even number from 2 to {MOST_ORDER}"
         if not self.arm.is_undamped:
             remedy = f"two states a mode, {rigid}and one for relaxation where it is odd: from 2 to {MOST_ORDER}"
-        if isinstance(order, bool) or not isinstance(order, int | np.integer) or not 2 <= order <= MOST_ORDER:
-            raise ParameterError(key="order", value=order, remedy=remedy)
+        order = whole("order", order, 2, MOST_ORDER, remedy)
         if order % 2 and not self.arm.damping:
             raise ParameterError(key="order", value=order, remedy=remedy)
-        return int(order) // 2 - self.rigid
+        return order // 2 - self.rigid
 
 
 def first_mode_lacking(model: PartialFractions) -> tuple[int, float]:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm, must_be_arm
+from tfarm.arm.checks import whole
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exact.appendix import natural_frequency, roots_near
 from tfarm.exact.coefficients import THEORIES, Coefficients, Theory, coefficients
@@ -257,9 +258,8 @@ def modes(arm: Arm, count: int | None = None, *, up_to: float | None = None, the
         if not 0 < up_to < math.inf:
             raise ParameterError(key="up_to", value=up_to, remedy="a positive, finite frequency in rad/s")
         count = modes_below(arm, up_to, theory=theory)
-    elif isinstance(count, bool) or not isinstance(count, int) or count < 1:
-        raise ParameterError(key="count", value=count, remedy=f"a whole number of modes from 1 to {MOST_MODES}")
-    assert count is not None
+    else:
+        count = whole("count", count, 1, math.inf, f"a whole number of modes from 1 to {MOST_MODES}")
     if count == 0:
         raise ParameterError(key="up_to", value=up_to, remedy="no flexible mode lies below it; choose a higher one")
     if count > MOST_MODES:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tfarm.arm.checks import whole
 from tfarm.errors import ParameterError
 from tfarm.records import record
 from tfarm.tuner import kernel
@@ -80,10 +81,8 @@ class Network:
 
 def initial_network(seed: int, *, hidden: int = 6, scales: Real | None = None) -> Network:
     """Weights uniform in (-0.5, 0.5), by NumPy's PCG64 of that seed; `scales` (6 or 7) are 1 N m unless given."""
-    if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < 2**63:
-        raise ParameterError(key="seed", value=seed, remedy="a seed is a whole number from 0 to 2^63 - 1")
-    if isinstance(hidden, bool) or not isinstance(hidden, int) or not 1 <= hidden <= MOST_HIDDEN:
-        raise ParameterError(key="hidden", value=hidden, remedy=f"a whole number of neurons from 1 to {MOST_HIDDEN}")
+    seed = whole("seed", seed, 0, 2**63 - 1, "a seed is a whole number from 0 to 2^63 - 1")
+    hidden = whole("hidden", hidden, 1, MOST_HIDDEN, f"a whole number of neurons from 1 to {MOST_HIDDEN}")
     widths = np.ones(6) if scales is None else np.asarray(scales, dtype=float)
     draw = np.random.default_rng(seed).uniform(-HALF_WIDTH, HALF_WIDTH, hidden * (widths.size + 1))
     return Network(draw[:-hidden].reshape(hidden, widths.size), draw[-hidden:], widths)

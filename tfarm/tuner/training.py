@@ -20,7 +20,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm.checks import not_negative, positive
+from tfarm.arm.checks import not_negative, positive, whole
 from tfarm.errors import ParameterError, did_you_mean
 from tfarm.records import record
 from tfarm.tuner import rules
@@ -124,8 +124,7 @@ def train(trial: Trial, network: Network, guard: Guard, learning: Learning, tria
 
     The same inputs give the same bits.  Raises ParameterError for a number of trials or rates that do not fit.
     """
-    if isinstance(trials, bool) or not isinstance(trials, int) or not 1 <= trials <= MOST_TRIALS:
-        raise ParameterError(key="trials", value=trials, remedy=f"a whole number of trials from 1 to {MOST_TRIALS}")
+    trials = whole("trials", trials, 1, MOST_TRIALS, f"a whole number of trials from 1 to {MOST_TRIALS}")
     weights, costs = network.weights, np.zeros(trials)
     made, sample = _learn(trial, network, guard, learning, weights, costs)
     learnt = network.with_weights(weights)
