@@ -221,7 +221,7 @@ def test_what_the_hub_carries_and_what_bends_the_arm() -> None:
 
 @pytest.mark.parametrize("value", [True, 1.0, "2", None, 0, 8])
 def test_a_number_that_is_not_whole_or_out_of_range_is_refused(value: object) -> None:
-    with pytest.raises(ParameterError, match="n = .*from 1 to 7"):
+    with pytest.raises(ParameterError, match="from 1 to 7"):
         whole("n", value, 1, 7, "a whole number from 1 to 7")
 
 
