@@ -13,6 +13,7 @@ SIZE ?= 100
 SEED ?= 1
 SURVEYS := \
 	plausible \
+	properties \
 	audit.slips \
 	exact.accuracy \
 	spectrum.proofs \
@@ -96,7 +97,7 @@ $(INSTALLED): pyproject.toml requirements.lock
 	@echo "setting up .venv (once; a minute or two)"
 	@$(PYTHON) -m venv .venv
 	@$(PIP) --no-compile -e '.[dev]'
-	@$(BIN)/python -m compileall -q -j 2 -x '/tests?/' .venv/lib || true # as pip: one that does not compile is its own affair
+	@$(BIN)/python -m compileall -q -j 2 -x '/tests?/' .venv/lib tfarm tests || true # as pip: one that does not compile is its own affair
 	@touch $@
 	@$(BIN)/tfarm response sasaki2012 --output root_moment --s 1j > /dev/null & \
 		$(BIN)/tfarm modes sasaki2012 --count 1 > /dev/null && wait $$!

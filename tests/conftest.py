@@ -17,8 +17,10 @@ from hypothesis import settings
 
 from tests.shared import once
 
-settings.register_profile("reproducible", deadline=None, derandomize=True, database=None)
-settings.register_profile("search", deadline=None, max_examples=1000)
+# Few examples, the same ones each time; `python -m tests.properties SIZE SEED` has others.
+settings.register_profile("reproducible", deadline=None, derandomize=True, database=None, max_examples=25)
+EXAMPLES = int(os.environ.get("EXAMPLES", "1000"))
+settings.register_profile("search", deadline=None, database=None, max_examples=EXAMPLES)
 settings.load_profile("reproducible")
 
 
