@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import re
 import stat
 import subprocess
 import sys
@@ -268,3 +269,33 @@ def test_a_slip_of_units_is_a_warning_and_no_error(capsys: pytest.CaptureFixture
     assert err.count("\n") == 1
     assert "link.length = 500.0" in err
     assert "link.density = 7.85" in err
+
+
+@pytest.mark.parametrize(
+    ("preset", "lines", "command", "expected"),
+    [
+        (
+            "stocky-steel",
+            {"youngs_modulus": "1e40"},
+            "locus --vary K2 --from 0 --to 0.5 --points 5 --branches 3",
+            (3, "python-control cannot follow a model of this arm"),
+        ),
+        ("sasaki2012-lab", {"damping": "1e-40"}, "sampled --K1 0.3 --K2 0.3", (0, "")),
+        (
+            "sasaki2012-as-printed",
+            {"youngs_modulus": "16.0", "shear_modulus": "1e-40"},
+            "reduce --outputs root_moment --order 6",
+            (2, "a pole: a natural frequency"),
+        ),
+    ],
+)
+def test_numbers_that_no_arm_has_end_in_one_line(tmp_path, capsys, preset, lines, command, expected) -> None:
+    text = (PRESETS / f"{preset}.toml").read_text()
+    for key, value in lines.items():
+        text = re.sub(rf"(?m)^{key} = .*$", f"{key} = {value}", text)
+    (tmp_path / "odd.toml").write_text(text)
+    verb, *options = command.split()
+    code, _, err = run(capsys, verb, str(tmp_path / "odd.toml"), *options)
+    told = [line for line in err.splitlines() if line and "warning" not in line and "compiling" not in line]
+    assert code == expected[0]
+    assert [expected[1] in line for line in told] == [True] * (expected[0] != 0)

@@ -31,6 +31,7 @@ ARCS = 64  # of half the circle to begin with
 FINEST = 1e-13  # rad: no arc is cut further
 PIECES = 4  # into which one is cut that is too long
 MOST_ARCS = 60_000
+ON_IT = 1e-100  # stands for the distance from the circle of a pole on it: its disc is wide, and holds 0
 BLOCK = 1 << 19  # terms 1/(z - b) at a time, lest they leave the cache
 
 
@@ -190,13 +191,14 @@ class Circle:
         """sum over poles of (r/p) a/(z - b) on arcs: discs (outputs, arcs)."""
         plant, sampling = self.loop.plant, self.loop.chain.sampling
         p, T = plant.poles[self.kept], sampling.period
-        b, room = np.exp(p * T), -np.expm1(p.real * T)
+        b, room = np.exp(p * T), np.maximum(-np.expm1(p.real * T), ON_IT)
         weights = plant.residues[:, self.kept] / p * np.exp(p * ((1 - sampling.fraction) * T))
         blur = EPS * (4 + abs(p * T))
         middles, radii = [], []
         for some in np.array_split(np.arange(low.size), 1 + low.size * p.size // BLOCK):
             q, h = (low[some] + high[some]) / 2, (high[some] - low[some])[:, None] / 2
             away = np.exp(1j * q)[:, None] - b
+            away = np.where(away == 0, ON_IT, away)
             near = 1 / abs(away)
             least = 1 / np.maximum(1 / near - h, room)
             change = np.minimum(h * near * least, near + least) + blur * near**2

@@ -152,8 +152,9 @@ def _jets(k: Coefficients, S: Jet, d: Complex, one: Wave, two: Wave) -> tuple[li
         by_s = k.damping * wave.z * wave.v - S.c[1] * (a * wave.v + b * u - g)
         slope = -by_s / (d * wave.v + u)  # dz/ds from the dispersion relation
         z = Jet([wave.z, slope])
-        far = np.where(abs(wave.z) > 1.0, wave.z, 1.0)
-        by_z = np.where(far == wave.z, (wave.c - wave.s) / (2 * far), wave.e * _slope_of_sinhc(wave.z))
+        is_far = abs(wave.z) > 1.0
+        far, near = np.where(is_far, wave.z, 1.0), np.where(is_far, 0.0, wave.z)
+        by_z = np.where(is_far, (wave.c - wave.s) / (2 * far), wave.e * _slope_of_sinhc(near))
         c, sinhc = Jet([wave.c, wave.s / 2 * slope]), Jet([wave.s, by_z * slope])
         arguments += [c, sinhc, z, Jet([wave.v, slope - b * S.c[1]]), wave.e]
     gap = arguments[2] - arguments[7]

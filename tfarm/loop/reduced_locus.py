@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from tfarm.arm import FED_BACK, Arm, HubFeedback
-from tfarm.errors import ParameterError
+from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 from tfarm.reduced import ModalModel, modal_model
 from tfarm.reduced.partial_fractions import Matrices
@@ -84,7 +84,10 @@ def root_locus(arm: Arm, law: HubFeedback, vary: str, gain: Real, count: int) ->
     """`control.root_locus_map` of the loop opened at what varies, a modal model of `count` modes: (gains, order)."""
     import control
 
-    return np.asarray(control.root_locus_map(open_loop(arm, law, vary, count), gain).loci)
+    try:
+        return np.asarray(control.root_locus_map(open_loop(arm, law, vary, count), gain).loci)
+    except np.linalg.LinAlgError as error:  # it works with coefficients of s^n, which overflow at high frequencies
+        raise ConvergenceError(f"python-control cannot follow a model of this arm: {error}", arm.name, count) from None
 
 
 def _polished(variation: Variation, gain: Real, poles: Complex, count: int) -> Complex:
