@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import cache
 from itertools import pairwise
 
 import control
@@ -16,10 +17,12 @@ from tests.odd_arms import odd_arms
 from tfarm import Arm, Hub, HubFeedback
 from tfarm.loop.answers import margins_answer
 from tfarm.loop.frequencies import grid
-from tfarm.loop.margins import gain_margin, lowest, margins, rigid_crossings, unit_crossings
+from tfarm.loop.margins import gain_margin, lowest, rigid_crossings, unit_crossings
 from tfarm.loop.plant import Loop
 from tfarm.loop.stability import stability
 from tfarm.reduced import relaxed_model
+
+margins = cache(tfarm.margins)  # several tests ask for those of the same loops
 
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 LAW = HubFeedback(K1=0.3, K2=0.3)

@@ -28,7 +28,7 @@ def arm_for(case):
     return some_arm(np.random.default_rng(400 + BOUNDARY_CASES.index(case)), case, damping=0.0)
 
 
-@pytest.fixture(params=BOUNDARY_CASES, ids="-".join)
+@pytest.fixture(params=BOUNDARY_CASES, ids="-".join, scope="module")
 def modes(request):
     return tfarm.modes(arm_for(request.param), COUNT)
 
