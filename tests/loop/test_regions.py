@@ -139,3 +139,16 @@ def test_where_there_is_no_loop_there_is_no_map() -> None:
     for inertia in (0.0, math.inf):
         with pytest.raises(ParameterError):
             region(replace(LAB, hub=Hub(inertia=inertia)), gains, gains)
+
+
+def test_the_intervals_of_a_column_are_the_windows_along_it() -> None:
+    """Road: `gain_windows`, from a verdict of its own; between the edges the map's own counts."""
+    plane = region(LAB, np.array([0.05, 0.3, 2.0]), np.linspace(-2.0, 1.5, 29))
+    for n, (K1, column) in enumerate(zip(plane.K1, plane.stable_intervals, strict=True)):
+        windows = gain_windows(stability(LAB, HubFeedback(K1=float(K1), K2=0.1)), "K2").all
+        cut = [(max(low, -2.0), min(high, 1.5)) for low, high in windows if low < 1.5 and high > -2.0]
+        np.testing.assert_allclose(column, cut, rtol=1e-9)
+        inside = [any(low < K2 < high for low, high in column) for K2 in plane.K2[1:-1]]
+        np.testing.assert_array_equal(inside, plane.unstable[1:-1, n] == 0)
+    (right,) = region(LAB.having(damping=0.0), np.array([0.1, 0.3]), np.linspace(-1.0, 2.0, 5)).stable_intervals[1]
+    assert right == (-1.0, 1.0)

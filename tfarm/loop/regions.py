@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback
-from tfarm.crossing import Crossings, brackets, counts_over, solved
+from tfarm.crossing import Crossings, brackets, counts_over, intervals, solved
 from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import gains_of, loop_parts, torque
 from tfarm.exact.coefficients import Coefficients, coefficients
@@ -31,6 +31,7 @@ from .plant import Loop
 from .stability import loop_band, stability
 
 Real = NDArray[np.float64]
+Window = tuple[float, float]
 INFINITE = -1  # stands for infinitely many unstable poles
 MOST = 2000  # grid points along one gain
 
@@ -41,7 +42,7 @@ class Region:
     """Unstable poles over a grid: `unstable` (len(K2), len(K1)), -1 where they are infinitely many.
 
     `boundary` (n, 3) holds K1, K2 and w [rad/s] of the D-decomposition curve; empty at C = 0.  `band` [rad/s] is how
-    far up crossings were looked for.
+    far up crossings were looked for; `crossings` those along K2 for each K1, none at C = 0.
     """
 
     arm: Arm
@@ -51,6 +52,19 @@ class Region:
     unstable: NDArray[np.int64]
     boundary: Real
     band: float
+    crossings: list[Crossings]
+
+    @property
+    def stable_intervals(self) -> list[list[Window]]:
+        """For each K1 the intervals of K2, cut to the map, in which nothing grows: the region with exact edges.
+
+        At C = 0 those are K2 < 1 for K1 > 0, a theorem where the hub's angle is not pushed (Kp >= 0).
+        """
+        low, high = float(self.K2[0]), float(self.K2[-1])
+        if self.arm.is_undamped:
+            return [[(low, min(1.0, high))] if K1 > 0 and low < 1 and self.Kp >= 0 else [] for K1 in self.K1]
+        first = self.unstable[0].tolist()
+        return [intervals(found, low, high, low, count) for found, count in zip(self.crossings, first, strict=True)]
 
     @property
     def stable(self) -> NDArray[np.bool_]:
@@ -68,15 +82,16 @@ def region(arm: Arm, K1: Real, K2: Real, Kp: float = 0.0) -> Region:
     K1, K2 = _axis("K1", K1), _axis("K2", K2)
     Loop(arm, HubFeedback(K1=float(K1[-1]), K2=float(K2[-1]), Kp=Kp))
     if arm.is_undamped:
-        return Region(arm, Kp, K1, K2, _undamped_counts(arm, K1, K2, Kp), np.empty((0, 3)), 0.0)
+        return Region(arm, Kp, K1, K2, _undamped_counts(arm, K1, K2, Kp), np.empty((0, 3)), 0.0, [])
     corners = [HubFeedback(K1=float(a), K2=float(b), Kp=Kp) for a in (K1[0], K1[-1]) for b in (K2[0], K2[-1])]
     band = max(loop_band(Loop(arm, law))[0] for law in corners)
     omega = np.asarray(grid(arm, band))
     without = HubFeedback(K1=float(K1[-1]), Kp=Kp)
     last = np.array([stability(arm, without).unstable_roots])
     (without_K2,) = counts_over(K1, [crossings(arm, along("K1", without), band)], float(K1[-1]), last)
-    unstable = counts_over(K2, _crossings_along_K2(arm, K1, Kp, omega), 0.0, without_K2).T
-    return Region(arm, Kp, K1, K2, unstable, boundary(arm, omega, Kp), band)
+    found = _crossings_along_K2(arm, K1, Kp, omega)
+    unstable = counts_over(K2, found, 0.0, without_K2).T
+    return Region(arm, Kp, K1, K2, unstable, boundary(arm, omega, Kp), band, found)
 
 
 def between(low: float, high: float, number: int) -> Real:

@@ -6,7 +6,6 @@ is read off a raster.
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import dataclass
 
@@ -23,8 +22,6 @@ from tfarm.digits import plain, scientific
 from tfarm.dsp import gain_map, sampled_verdict, stable_windows
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.loop import SampledLoop
-from tfarm.errors import ConvergenceError
-from tfarm.loop.lines import along, crossings
 from tfarm.loop.regions import region
 from tfarm.records import record
 from tfarm.report.figures import BLUE, GREY, INK, ORANGE, blank, headline, style
@@ -85,7 +82,8 @@ def overlay(arm: Arm, gains: HubFeedback, chain: Chain) -> Overlay:
     K1 = np.unique(np.r_[np.geomspace(low, top, COLUMNS), sides[(sides > low) & (sides < top)]])
     layers = tuple(sampled_layer(loop, K1, CUT) for loop in loops)
     span = (float(K1[0]), float(K1[-1]))
-    return Overlay(arm, gains, chain.sampling.period, span, _continuous_layer(arm, K1), layers)
+    continuous = Layer(arm.damping, K1, region(arm, K1, np.array(CUT)).stable_intervals, None)
+    return Overlay(arm, gains, chain.sampling.period, span, continuous, layers)
 
 
 def ends_of_K1(loop: SampledLoop) -> list[float]:
@@ -104,24 +102,6 @@ def sampled_layer(loop: SampledLoop, K1: Real, cut: Window) -> Layer:
     """Where the sampled loop is stable: at each K1 (ascending) its intervals of K2, cut to a range."""
     plane = gain_map(loop, K1, np.linspace(*cut, 3))
     return Layer(loop.plant.arm.damping, K1, plane.stable_intervals, plane.modes_used)
-
-
-def _continuous_layer(arm: Arm, K1: Real) -> Layer:
-    """From the count on the lowest K2 and every crossing above it; the count on the highest one must agree."""
-    plane = region(arm, K1, np.array(CUT))
-    if arm.is_undamped:
-        return Layer(0.0, K1, [[(CUT[0], 1.0)] for _ in K1], None)
-    found: list[list[Window]] = []
-    for i, gain in enumerate(K1):
-        jumps = crossings(arm, along("K2", HubFeedback(K1=float(gain))), plane.band)
-        inside = [(each.t, each.change) for each in jumps if CUT[0] < each.t < CUT[1]]
-        ends = [CUT[0], *(t for t, _ in inside), CUT[1]]
-        counts = int(plane.unstable[0, i]) + np.cumsum([0, *(change for _, change in inside)])
-        if counts[-1] != plane.unstable[-1, i]:
-            raise ConvergenceError(f"the crossings along K2 at K1 = {gain:g} do not add up", ends, float(counts[-1]))
-        pairs = zip(itertools.pairwise(ends), counts, strict=True)
-        found.append([pair for pair, count in pairs if count == 0 and pair[1] > pair[0]])
-    return Layer(arm.damping, K1, found, None)
 
 
 # ------------------------------------------------------------ the picture
