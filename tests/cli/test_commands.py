@@ -94,7 +94,7 @@ def test_infinities_are_strings(capsys: pytest.CaptureFixture[str], tmp_path: Pa
     from tfarm.tables.files import to_json
 
     assert to_json({"a": [float("inf"), {"b": -float("inf")}]}) == '{"a": ["inf", {"b": "-inf"}]}'
-    with pytest.raises(ValueError, match="JSON"):
+    with pytest.raises(ValueError, match="NaN"):
         to_json({"a": float("nan")})
 
 

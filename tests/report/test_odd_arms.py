@@ -37,7 +37,7 @@ DAMPED = [name for name, arm in ARMS.items() if arm.link.damping]
 
 
 def column(table, key):
-    return next(each for each in table.columns if each.key == key)
+    return next(each for each in table.on(PAGE) if each.key == key)
 
 
 def number(text):

@@ -65,7 +65,7 @@ def test_a_table_without_rows_has_its_titles():
 
 def test_a_heading_has_the_unit_and_cells_the_digits_of_a_terminal():
     one = Column("omega_rad_s", "frequency", "rad/s", of=[71.50568246689], printed=singly(general, 5))
-    assert printed(80, (one, replace(one, head="w"), replace(one, on=REPORT))) == [
+    assert printed(80, (one, replace(one, key="w", head="w"), replace(one, key="page", on=REPORT))) == [
         "frequency [rad/s]       w",
         "           71.506  71.506",
     ]
