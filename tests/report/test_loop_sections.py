@@ -346,3 +346,20 @@ def test_random_loops_have_as_many_turns_as_unstable_poles():
     outcomes = survey(3, 1)
     assert sum(each == "agree" for each in outcomes) >= 2
     assert not any("by finding" in each for each in outcomes)
+
+
+def test_a_drawn_curve_keeps_directions_and_ends_on_the_rim():
+    L = np.array([0.0, 1.0, -3.0j, 2.0 + 2.0j, np.inf + 0.0j])
+    drawn = compressed(L)
+    assert abs(drawn) == pytest.approx([0.0, 0.5, 0.75, math.sqrt(8) / (1 + math.sqrt(8)), 1.0], rel=1e-15)
+    assert np.angle(drawn[1:4]) == pytest.approx(np.angle(L[1:4]), rel=1e-15)
+
+
+def test_poles_that_only_a_theorem_tells_from_the_axis_may_be_on_either_side_of_the_curve():
+    """On a hub of 10,000 beams modes grow by 1e-9 of a rad/s at 1e5: the verdict knows, the turns may not."""
+    arm = PURE.having(hub_inertia=1e4 * PURE.carried_inertia)
+    plot = nyquist(arm, HubFeedback(K1=-0.05 * arm.total_inertia))
+    assert plot.verdict.unstable_roots_infinite
+    assert plot.on_axis > 0
+    assert plot.clear + plot.on_axis == plot.verdict.unstable_roots
+    assert plot.clear <= plot.expected <= plot.verdict.unstable_roots

@@ -61,6 +61,12 @@ class Nyquist:
         return int((near * np.where(moving.imag > 0, 2, 1)).sum())
 
     @property
+    def clear(self) -> int:
+        """Poles of the box that lie right of the axis by more than working precision: at C = 0 a theorem knows more."""
+        moving = self.verdict.poles.moving
+        return int(((moving.real > ON_AXIS * abs(moving)) * np.where(moving.imag > 0, 2, 1)).sum())
+
+    @property
     def expected(self) -> int:
         """Unstable closed-loop poles by Nyquist's criterion."""
         return -self.encirclements
@@ -84,7 +90,8 @@ def nyquist_of(verdict: Stability) -> Nyquist:
     across, down = np.linspace(1j * band, corner, EDGE), np.linspace(corner, corner.real, EDGE)
     turned = turning(loop, np.r_[s, across[1:], down[1:]])
     plot = Nyquist(s, loop.loop_function(s), is_arc, poles, round(turned / math.pi), verdict)
-    if not verdict.unstable_roots <= plot.expected <= verdict.unstable_roots + plot.on_axis:
+    found = min(plot.clear, verdict.unstable_roots)
+    if not found <= plot.expected <= found + plot.on_axis:
         text = (
             f"{plot.expected} unstable poles by the turns around -1, {verdict.unstable_roots} by finding all in a box"
         )
@@ -160,5 +167,7 @@ def turning(loop: Loop, path: Complex) -> float:
 
 
 def compressed(L: Complex) -> Complex:
-    """L with its size r drawn as r/(1 + r): 0 stays, 1 is half-way, infinity is the rim."""
-    return np.asarray(L / (1 + abs(L)))
+    """L with its size r drawn as r/(1 + r): 0 stays, 1 is half-way, infinity is the rim, at a pole its point 1."""
+    size = abs(L)
+    inside = np.where(np.isinf(size), 1.0, L)
+    return np.asarray(np.where(np.isinf(size), 1.0, inside / (1 + abs(inside))))
