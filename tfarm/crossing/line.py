@@ -24,7 +24,7 @@ Real = NDArray[np.float64]
 Whole = NDArray[np.int64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
-BISECTIONS = 60  # of a bracket: to its last bit
+BISECTIONS = 53  # of a bracket, which is narrower than its place: to the last bit
 
 
 class Crossing(NamedTuple):

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,49 +101,54 @@ def crossings(grid: CircleGrid, name: str, law: HubFeedback) -> Crossings:
 
     The others are those of the law; exact to rounding.
     """
-    A, B = _split(grid.terms, name, law)
+    line = _Line([gain.name for gain in GAINS].index(name), law.having(name, 0.0).row)
+    A, B = line.split(grid.terms)
     rises = (A * B.conj()).imag >= 0
     step = np.nonzero(rises[1:] != rises[:-1])[0]
-    q, gain = _solved(grid, name, law, step)
-    ends = [_at_minus_one(grid, name, law, bool(rises[-1])), *_at_one(grid, name, law, bool(rises[0]))]
+    q, gain = _solved(grid, line, step)
+    ends = [_at_minus_one(grid, line, bool(rises[-1])), *_at_one(grid, line, bool(rises[0]))]
     most = most_gain(grid.loop.plant.arm, name)
     found = [*zip(gain, q, np.where(rises[step], 2, -2), strict=True), *ends]
     return Crossings.of(each for each in found if abs(each[0]) <= most)
 
 
-def _split(terms: tuple[Any, Complex], name: str, law: HubFeedback) -> tuple[Complex, Complex]:
-    """A and B of A + K B, K the gain of that name."""
-    offset, signals = terms
-    row = next(i for i, gain in enumerate(GAINS) if gain.name == name)
-    return offset + torque(law.having(name, 0.0).row, signals), signals[row]
+class _Line(NamedTuple):
+    """A gain by its place in the law, the loop's gains with 0 in that place."""
+
+    place: int
+    others: tuple[float, ...]
+
+    def split(self, terms: tuple[Any, Complex]) -> tuple[Complex, Complex]:
+        """A and B of A + K B, K that gain."""
+        offset, signals = terms
+        return offset + torque(self.others, signals), signals[self.place]
 
 
-def _solved(grid: CircleGrid, name: str, law: HubFeedback, step: Whole) -> tuple[Real, Real]:
+def _solved(grid: CircleGrid, line: _Line, step: Whole) -> tuple[Real, Real]:
     """Angle and gain of the crossing in each step, by the angle from the nearer pole, down to its last bit."""
     base = np.where(abs(grid.shift[step]) < abs(grid.shift[step + 1]), grid.base[step], grid.base[step + 1])
     low = np.where(base == grid.base[step], grid.shift[step], grid.q[step] - grid.angles[base])
     high = np.where(base == grid.base[step + 1], grid.shift[step + 1], grid.q[step + 1] - grid.angles[base])
-    shift, gain = solved(lambda place: _split(grid.at(base, place), name, law), low, high)
+    shift, gain = solved(lambda shift: line.split(grid.at(base, shift)), low, high)
     return grid.angles[base] + shift, gain
 
 
-def _at_minus_one(grid: CircleGrid, name: str, law: HubFeedback, is_above: bool) -> tuple[float, float, int]:
+def _at_minus_one(grid: CircleGrid, line: _Line, is_above: bool) -> tuple[float, float, int]:
     """The crossing at z = -1; f vanishes there, so it falls where it is positive just before."""
     one = np.ones(1)
-    A, B = _split((one, grid.loop.signals(np.array([-1.0 + 0j]), None, one)), name, law)
+    A, B = line.split((one, grid.loop.signals(np.array([-1.0 + 0j]), None, one)))
     return _real_gain(A[0], B[0]), float(np.pi), 1 if is_above else -1
 
 
-def _at_one(grid: CircleGrid, name: str, law: HubFeedback, is_above: bool) -> list[tuple[float, float, int]]:
+def _at_one(grid: CircleGrid, line: _Line, is_above: bool) -> list[tuple[float, float, int]]:
     """The crossing at z = 1: at no gain on the rate where the arm can drift, else by a static balance."""
     loop, one = grid.loop, np.ones(1)
     rigid, change = loop.plant.rigid[ANGLE], -1 if is_above else 1
-    if law.having(name, 0.0).row[ANGLE] != 0.0 and rigid.any():
+    if line.others[ANGLE] != 0.0 and rigid.any():
         return []
-    output = next(OUTPUTS[gain.output] for gain in GAINS if gain.name == name)
     if rigid[0] != 0.0:
-        return [(0.0, 0.0, change)] if output.quantity == "theta" else []
-    A, B = _split((one, loop.signals(np.exp(np.array([1j * NEAR_ONE])), None, one)), name, law)
+        return [(0.0, 0.0, change)] if OUTPUTS[GAINS[line.place].output].quantity == "theta" else []
+    A, B = line.split((one, loop.signals(np.exp(np.array([1j * NEAR_ONE])), None, one)))
     return [(_real_gain(A[0], B[0]), 0.0, change)]
 
 

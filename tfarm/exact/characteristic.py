@@ -62,8 +62,13 @@ NUMERATORS = plain(numerators)
 
 
 def torque(gains: Iterable[Any], fed_back: Iterable[Any]) -> Any:
-    """gains . numerators, for any kind of number; a gain may be an array of one value a point."""
-    return reduce(add, (part * gain for gain, part in zip(gains, fed_back, strict=True)))
+    """gains . numerators, for any kind of number; a gain may be an array of one value a point.
+
+    Plain gains of 0 are left out, but for the last: half of most laws.
+    """
+    *terms, last = zip(gains, fed_back, strict=True)
+    used = [each for each in terms if not (isinstance(each[0], float) and each[0] == 0)]
+    return reduce(add, (part * gain for gain, part in [*used, last]))
 
 
 class Analytic(NamedTuple):
