@@ -152,3 +152,15 @@ def test_the_intervals_of_a_column_are_the_windows_along_it() -> None:
         np.testing.assert_array_equal(inside, plane.unstable[1:-1, n] == 0)
     (right,) = region(LAB.having(damping=0.0), np.array([0.1, 0.3]), np.linspace(-1.0, 2.0, 5)).stable_intervals[1]
     assert right == (-1.0, 1.0)
+
+
+def test_without_damping_the_intervals_of_a_held_arm_end_where_it_falls_statically() -> None:
+    """An angle pushed away by less than the arm's own stiffness: the map's counts tell the same, point by point."""
+    held = BARE.having(payload_mass=math.inf)
+    assert held.is_undamped
+    plane = region(held, np.array([-0.3, 0.3]), np.linspace(-2.5, 1.9, 41), -150.0)
+    for n, column in enumerate(plane.stable_intervals):
+        inside = [any(low < K2 < high for low, high in column) for K2 in plane.K2[1:-1]]
+        np.testing.assert_array_equal(inside, plane.unstable[1:-1, n] == 0)
+    assert plane.stable_intervals[0] == []
+    assert 0 < (plane.unstable[:, 1] == 0).sum() < 41

@@ -32,7 +32,8 @@ GAINS = (
     Gain("K2", "root_moment", "1"),
 )  # in the order in which the outputs are fed back, everywhere
 FED_BACK = tuple(gain.output for gain in GAINS)
-NAMES = tuple(sorted(gain.name for gain in GAINS))  # in the order in which a person lists them
+LISTED = tuple(sorted(GAINS, key=lambda gain: gain.name))  # in the order in which a person lists them
+NAMES = tuple(gain.name for gain in LISTED)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

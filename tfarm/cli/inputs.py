@@ -12,7 +12,7 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
-from tfarm.arm import GAINS, Gain
+from tfarm.arm import GAINS, LISTED, Gain
 from tfarm.cli.app import whole
 from tfarm.errors import ParameterError
 
@@ -38,10 +38,7 @@ def under_a_law(command: Callable[..., None]) -> Callable[..., None]:
     """The command with an option for each gain after its arm, instead of its last argument, `given`: those by name."""
     whole_signature = signature(command, eval_str=True)
     first, *rest, given = whole_signature.parameters.values()
-    gains = [
-        Parameter(gain.name, Parameter.KEYWORD_ONLY, default=None, annotation=option_of(gain))
-        for gain in sorted(GAINS, key=lambda each: each.name)
-    ]
+    gains = [Parameter(gain.name, Parameter.KEYWORD_ONLY, default=None, annotation=option_of(gain)) for gain in LISTED]
 
     @wraps(command)
     def with_options(**arguments: Any) -> None:

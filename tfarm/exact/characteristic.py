@@ -49,6 +49,12 @@ def gains_of(k: Coefficients, law: HubFeedback) -> Gains:
     return tuple(Fraction(gain) * unit for gain, unit in zip(law.row, unit_gains(k), strict=True))
 
 
+def dimensionless(k: Coefficients, laws: Real) -> Real:
+    """Rows (gains, ...) of gains in SI units, in the order of `GAINS`, without dimensions, as doubles."""
+    units = np.array([float(unit) for unit in unit_gains(k)])
+    return np.asarray(units.reshape(-1, *[1] * (laws.ndim - 1)) * laws)
+
+
 @inlined
 def numerators(s: Any, over_d: Any, theta: Any, M0: Any) -> Any:
     """What the gains multiply, in the order of `GAINS`, of a response with that hub angle and root moment.

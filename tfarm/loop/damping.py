@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import FED_BACK, Arm, law_of
-from tfarm.exact.characteristic import quick_characteristics, unit_gains
+from tfarm.exact.characteristic import dimensionless, quick_characteristics
 from tfarm.exact.coefficients import coefficients
 from tfarm.reduced import ModalModel, modal_model
 
@@ -129,7 +129,7 @@ def _model(arm: Arm, count: int) -> ModalModel:
 def _newton(arm: Arm, starts: Complex, laws: Real) -> tuple[Complex, NDArray[np.bool_]]:
     """The exact poles next to the starts, and which settled there (nan where there is no start)."""
     k = coefficients(arm)
-    laws = laws * np.array([[float(unit)] for unit in unit_gains(k)])
+    laws = dimensionless(k, laws)
     rows, columns = np.nonzero(~np.isnan(starts))
     s = starts[rows, columns]
     begin, move = s.copy(), np.zeros_like(s)

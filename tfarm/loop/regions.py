@@ -29,6 +29,7 @@ from .frequencies import grid
 from .lines import Complex, along, crossing_at_zero, crossings
 from .plant import Loop
 from .stability import loop_band, stability
+from .windows import holds_undamped
 
 Real = NDArray[np.float64]
 Window = tuple[float, float]
@@ -58,11 +59,17 @@ class Region:
     def stable_intervals(self) -> list[list[Window]]:
         """For each K1 the intervals of K2, cut to the map, in which nothing grows: the region with exact edges.
 
-        At C = 0 those are K2 < 1 for K1 > 0, a theorem where the hub's angle is not pushed (Kp >= 0).
+        At C = 0 the same for every K1 > 0, by Lyapunov's theorem and the static balance, and none for others.
         """
         low, high = float(self.K2[0]), float(self.K2[-1])
         if self.arm.is_undamped:
-            return [[(low, min(1.0, high))] if K1 > 0 and low < 1 and self.Kp >= 0 else [] for K1 in self.K1]
+            law = HubFeedback(K1=1.0, Kp=self.Kp)
+            static = crossing_at_zero(self.arm, along("K2", law))
+            ends = {low, high, 1.0, *([] if static is None else [static.t])}
+            pairs = itertools.pairwise(sorted(end for end in ends if low <= end <= high))
+            loop = Loop(self.arm, law)
+            held = [pair for pair in pairs if holds_undamped(loop, law.having("K2", sum(pair) / 2))]
+            return [held if K1 > 0 else [] for K1 in self.K1]
         first = self.unstable[0].tolist()
         return [intervals(found, low, high, low, count) for found, count in zip(self.crossings, first, strict=True)]
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import FED_BACK, Arm, must_turn
-from tfarm.exact.characteristic import loop_parts, quick_characteristics, unit_gains
+from tfarm.exact.characteristic import dimensionless, loop_parts, quick_characteristics
 from tfarm.exact.coefficients import coefficients
 from tfarm.spectrum.scales import first_frequency
 
@@ -60,7 +60,7 @@ def _exp(z: Complex) -> Complex:
 def residues(arm: Arm, s: Complex, laws: Real) -> Complex:
     """Residues of root moment over r [N m s^-1 per N m] at closed-loop poles s, each of its own law (1-D)."""
     k = coefficients(arm)
-    rows = laws * np.array([[float(unit)] for unit in unit_gains(k)])
+    rows = dimensionless(k, laws)
     moment = loop_parts(k, s).numerators[FED_BACK.index("root_moment")]
     return np.asarray(moment / quick_characteristics(k, s, rows).slope)
 

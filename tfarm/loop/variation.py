@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import GAINS, NAMES, Arm, HubFeedback
+from tfarm.arm import GAINS, LISTED, NAMES, Arm, HubFeedback
 from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import Analytic, gains_of, quick_characteristics, unit_gains, zeros_at_origin
 from tfarm.exact.coefficients import Coefficients, coefficients
@@ -22,7 +22,7 @@ from .plant import Loop
 Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
 
-OF_THE_LAW = {gain.name: gain.unit for gain in sorted(GAINS, key=lambda each: each.name)} | {"all": "1"}
+OF_THE_LAW = {gain.name: gain.unit for gain in LISTED} | {"all": "1"}
 PARAMETERS = {"payload_mass": "kg", "payload_inertia": "kg m^2", "hub_inertia": "kg m^2", "length": "m", "damping": "s"}
 VARIED = OF_THE_LAW | PARAMETERS  # what may be varied, and its unit
 
