@@ -7,7 +7,7 @@ import pytest
 
 from tests.dsp.hold import HoldModel
 from tests.dsp.settled import survey
-from tfarm.arm import Arm, Hub, HubFeedback, Link, Section
+from tfarm.arm import Arm, Hub, HubFeedback, Link, Payload, Section
 from tfarm.dsp import (
     Chain,
     Converters,
@@ -16,11 +16,13 @@ from tfarm.dsp import (
     plant,
     sampled_loop,
     sampled_verdict,
+    shown,
     stable_windows,
 )
 from tfarm.dsp.band import band_of
+from tfarm.dsp import loop as loop_module
 from tfarm.dsp.circle import Circle
-from tfarm.dsp.margins import whole_loop
+from tfarm.dsp.margins import most_modes, whole_loop
 from tfarm.dsp.shown import Edge, shown_windows
 from tfarm.errors import ConvergenceError
 from tfarm.spectrum import continuation, damped, modes
@@ -59,6 +61,37 @@ def test_modes_beyond_the_sixteenth_can_be_the_unstable_ones(name):
     coarse, fine = (HoldModel(arm, terms).log_radius(gains, chain) for terms in (80, 140))
     assert min(coarse, fine) > 1e-3
     assert verdict.loop.poles.log_spectral_radius == pytest.approx(fine, abs=4 * abs(fine - coarse))
+
+
+# Like arms 60 and 20 of seed 4100 of the plausible survey: a rubber strip, and a steel wire with a heavy tip.
+STRIP = Arm(
+    link=Link(length=0.058, density=1100, youngs_modulus=5e6, shear_modulus=1.68e6, damping=1.5e-6,
+              section=Section.rectangle(width=0.016, depth=0.0074)),
+    hub=Hub(inertia=1.66e-4), payload=Payload(mass=1.8e-4, inertia=1.4e-8),
+)  # fmt: skip
+WIRE = Arm(
+    link=Link(length=0.4176565774396141, density=7850, youngs_modulus=2.1e11, shear_modulus=2.1e11 / 2.6,
+              damping=4.0273122299462785e-05, section=Section.round(diameter=0.0015086127571420388)),
+    hub=Hub(inertia=3.4174268e-4), payload=Payload(mass=2.6415111e-3),
+)  # fmt: skip
+
+
+def test_the_radius_is_that_of_every_mode_of_the_band():
+    """The verdict stops at sixteen modes, where the radius still has four digits: the hold model knows more."""
+    gains, chain = HubFeedback(K1=0.0033, K2=0.855), Chain(sampling=Sampling(period=2.6e-3))
+    verdict = sampled_verdict(STRIP, gains, chain)
+    coarse, fine = (HoldModel(STRIP, terms).log_radius(gains, chain) for terms in (60, 80))
+    assert verdict.log_radius == pytest.approx(fine, abs=4 * abs(fine - coarse) + 1e-13)
+
+
+def test_no_edge_asks_for_modes_that_a_sample_leaves_nothing_of(monkeypatch):
+    """Each takes seconds to follow: this wire once took 40 s for the digits of its delay margin."""
+    gains = HubFeedback(K1=0.015303840530141454, K2=-1.3140758590396808, Kp=0.0029035773498561667)
+    chain = Chain(sampling=Sampling(period=1.7464985e-3, delay_samples=0.5))
+    asked = []
+    monkeypatch.setattr(shown, "resized", lambda loop, count: asked.append(count) or loop_module.resized(loop, count))
+    assert analyse(WIRE, gains, chain).delay.digits
+    assert 0 < max(asked) <= most_modes(WIRE, chain)
 
 
 def test_an_edge_has_the_digits_that_more_modes_leave():

@@ -88,16 +88,18 @@ def phi(p, t):
         return np.where(abs(x) < 1e-5, t * (1 + x / 2 + x * x / 6), (np.exp(x) - 1) / p)
 
 
-def held(model, count, period, delay, C=None):
-    """The sampled model of an arm, of its own damping or another: at C = 0 of its first `count` modes, else of all."""
+def held(model, count, period, delay, C=None, top=np.inf):
+    """The sampled model of an arm, of its own damping or another: at C = 0 of its first `count` modes, else of all, or
+    of those below `top` [rad/s].
+    """
     C = model.C if C is None else C
     J, static = model.beam.total_inertia, np.zeros(3)
     poles, rows = spectrum(model, count, C)
     static[2] = -(J - model.hub) / J + (rows[2] / poles).sum().real
     if C:
         poles, rows = np.r_[poles, -1 / C], np.column_stack([rows, [0, 0, static[2] / C, 0]])
-        poles, rows, gone = lumped(poles, rows, period * (1 - delay % 1))
-        static = np.array([gone[0], 0.0, gone[2]])
+        poles, rows, gone = lumped(poles, rows, period * (1 - delay % 1), top)
+        static = gone[:3]
     return Held(poles, rows[:3], static, J, period, delay, rows[3])
 
 
@@ -127,11 +129,11 @@ def sharper(model, p, C):
     return complex(s.real, np.copysign(s.imag, p.imag)) if abs(s - p.real - 1j * abs(p.imag)) < 1e-3 * abs(p) else p
 
 
-def lumped(poles, rows, hold):
-    """Fewer poles: those that a sample leaves nothing of are static, the third that is returned; slow real ones near
-    -1/C that are within ALIKE of each other are one.
+def lumped(poles, rows, hold, top):
+    """Fewer poles: those that a sample leaves nothing of, or above `top`, are static, the third that is returned; slow
+    real ones near -1/C that are within ALIKE of each other are one.
     """
-    gone = poles.real * hold < -FADED
+    gone = (poles.real * hold < -FADED) | (abs(poles.imag) > top)
     static = -(rows[:, gone] / poles[gone]).real.sum(axis=1)
     poles, rows = poles[~gone], rows[:, ~gone]
     real = poles.imag == 0

@@ -21,8 +21,8 @@ def modes_of(case, models, answer):
 class Clock:
     """The sampled models of a case, and what they make of gains."""
 
-    def __init__(self, case, models, count):
-        self.rough, self.fine = (held(m, count, case.period, case.delay) for m in (models.rough, models.fine))
+    def __init__(self, case, models, count, top=np.inf):
+        self.rough, self.fine = (held(m, count, case.period, case.delay, top=top) for m in (models.rough, models.fine))
 
     def log_radius(self, law):
         """ln of the spectral radius, and its tolerance."""
@@ -54,7 +54,8 @@ class Sampled:
             judged.blind += 1
             return judged
         clock = Clock(case, models, count)
-        radius, slack = clock.log_radius(case.law)
+        band = Clock(case, models, count, answer["band_rad_s"] or np.inf)  # which is what the radius is said of
+        radius, slack = band.log_radius(case.law)
         size = max(1.0, abs(radius))
         printed = answer["log_spectral_radius"]
         if case.beam.link.damping and not answer["settled"] and abs(radius - printed) > slack:  # for some modes only

@@ -14,13 +14,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.dsp.circle import Circle
-from tfarm.dsp.loop import SampledLoop
+from tfarm.dsp.loop import SampledLoop, resized
 from tfarm.dsp.plant import MEASURED
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
@@ -55,6 +56,11 @@ class Band:
         """How many flexible modes lie in it, the first ones."""
         outside = self.loop.plant.mode[~self.kept & (abs(self.loop.plant.poles.imag) >= self.top)]
         return int(outside.min(initial=self.loop.plant.count + 1)) - 1
+
+    @cached_property
+    def full(self) -> SampledLoop:
+        """The loop with all of them, or with one where there is none."""
+        return resized(self.loop, max(1, self.modes))
 
     def circle(self) -> Circle:
         """The unit circle, on which poles outside are counted."""

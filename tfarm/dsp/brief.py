@@ -68,6 +68,6 @@ def sampled_brief(arm: Arm, law: HubFeedback, chain: Chain) -> SampledBrief:
     return SampledBrief(
         sampling=chain.sampling,
         is_stable=verdict.is_stable,
-        log_radius=float(verdict.loop.poles.log_spectral_radius),
+        log_radius=float(verdict.log_radius),
         sentence=verdict.sentence,
     )

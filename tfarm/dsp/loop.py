@@ -22,7 +22,7 @@ from tfarm.arm import FED_BACK, Arm, HubFeedback
 from tfarm.dsp.chain import Chain, Sampling
 from tfarm.dsp.plant import Branching, Plant, loop_plant, shorter_plant
 from tfarm.dsp.sampling import PulseTransfer
-from tfarm.errors import ParameterError
+from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exact.characteristic import torque
 from tfarm.records import record
 from tfarm.spectrum.damped import all_damped_modes
@@ -213,6 +213,16 @@ def sampled_loop(
     chain = Chain() if chain is None else chain
     check_loop(arm, gains)
     return SampledLoop(loop_plant(arm, chain, count, branches), chain, gains)
+
+
+def resized(loop: SampledLoop, count: int) -> SampledLoop:
+    """The loop with another number of flexible modes, or a few less or more where two damped modes are one there."""
+    for number in (count, count - 1, count + 1, count - 2, count + 2):
+        try:
+            return loop.with_modes(max(1, number))
+        except ConvergenceError as error:
+            lost = error
+    raise lost
 
 
 def check_loop(arm: Arm, gains: HubFeedback) -> None:

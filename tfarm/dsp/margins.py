@@ -163,6 +163,11 @@ def alive(arm: Arm, chain: Chain) -> int:
     return modes_below(arm, math.sqrt(2 * FORGOTTEN / (arm.damping * remaining)))
 
 
+def most_modes(arm: Arm, chain: Chain) -> int:
+    """The most that a loop has: of a damped arm those that outlive a sample and a few, never more than 128."""
+    return MOST if arm.is_undamped else min(MOST, BEYOND + alive(arm, chain))
+
+
 def whole_loop(arm: Arm, gains: HubFeedback, chain: Chain, branches: Branching = all_damped_modes) -> SampledLoop:
     """The loop of a damped arm with every mode that outlives a sample and a few, or with the first 128.
 
@@ -170,7 +175,7 @@ def whole_loop(arm: Arm, gains: HubFeedback, chain: Chain, branches: Branching =
     Raises ConvergenceError where not even that one can be followed.
     """
     criticals = arm.damping * first_frequency(arm) / 2
-    most = min(MOST, BEYOND + alive(arm, chain))
+    most = most_modes(arm, chain)
     numbers = [most, *(int(share * most) for share in FEWER)]
     if criticals > FAR_BEYOND:
         numbers, branches = [1], Branches(COMPANY[:1])

@@ -16,17 +16,17 @@ from tfarm.arm import Arm, HubFeedback
 from tfarm.dsp.band import Band, band_of
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.circle import Circle
-from tfarm.dsp.loop import SampledLoop
+from tfarm.dsp.loop import SampledLoop, resized
 from tfarm.dsp.margins import (
     DelayMargin,
     Window,
     delay_margin,
     log_radius_with,
+    most_modes,
     required_damping,
     stable_windows,
     whole_loop,
 )
-from tfarm.errors import ConvergenceError
 from tfarm.records import record
 from tfarm.spectrum.damped import LITTLE, Branches
 
@@ -128,7 +128,7 @@ def shown_windows(loop: SampledLoop, band: Band | None, gain: str) -> ShownWindo
     loop = loop if loop.plant.count <= MANY else resized(loop, MANY)
     circle = None if band is None else band.circle()
     found = _windows(loop, band, circle, gain)
-    while band is not None and not found.is_settled and 2 * loop.plant.count <= MANY:
+    while band is not None and not found.is_settled and 2 * loop.plant.count <= _most(loop):
         loop = resized(loop, 2 * loop.plant.count)
         found = _windows(loop, band, circle, gain)
     return found
@@ -136,7 +136,7 @@ def shown_windows(loop: SampledLoop, band: Band | None, gain: str) -> ShownWindo
 
 def _windows(loop: SampledLoop, band: Band | None, circle: Circle | None, gain: str) -> ShownWindows:
     """The windows of this very loop."""
-    other, modes = cache(lambda: resized(loop, another(loop.plant.count))), loop.plant.count
+    other, modes = cache(lambda: resized(loop, another(loop.plant.count, _most(loop)))), loop.plant.count
 
     def at(value: float) -> HubFeedback:
         return loop.gains.having(gain, value)
@@ -163,19 +163,14 @@ def _near_zero(other: float) -> float:
     return SMALL * (abs(other) if other and math.isfinite(other) else 1.0)
 
 
-def another(count: int) -> int:
-    """Another number of modes to compare with."""
-    return 2 * count if 2 * count <= MANY else count // 2
+def another(count: int, most: int) -> int:
+    """Another number of modes to compare with: twice as many, or half as many where these are too many."""
+    return 2 * count if 2 * count <= most else max(1, count // 2)
 
 
-def resized(loop: SampledLoop, count: int) -> SampledLoop:
-    """The loop with another number of flexible modes, or a few less or more where two damped modes are one there."""
-    for number in (count, count - 1, count + 1, count - 2, count + 2):
-        try:
-            return loop.with_modes(max(1, number))
-        except ConvergenceError as error:
-            lost = error
-    raise lost
+def _most(loop: SampledLoop) -> int:
+    """The most that edges are looked for with: what a sample leaves nothing of is hard to follow and adds nothing."""
+    return min(MANY, most_modes(loop.plant.arm, loop.chain))
 
 
 def proof_of(loop: SampledLoop) -> Proof:
@@ -191,7 +186,7 @@ def shown_delay(loop: SampledLoop, band: Band | None) -> tuple[DelayMargin, Figu
     """The delay margin, and its samples as a figure, with more modes where it can be proven only then."""
     loop = loop if loop.plant.count <= MANY else resized(loop, MANY)
     found = _delay(loop, band)
-    while band is not None and not (found[1].is_settled or found[0].is_bound) and 4 * loop.plant.count <= MANY:
+    while band is not None and not (found[1].is_settled or found[0].is_bound) and 4 * loop.plant.count <= _most(loop):
         loop = resized(loop, 2 * loop.plant.count)
         found = _delay(loop, band)
     return found
@@ -204,7 +199,7 @@ def _delay(loop: SampledLoop, band: Band | None) -> tuple[DelayMargin, Figure]:
         return margin, Figure(0.0, OTHER_DIGITS, band.top if band else None, None if band else modes)
     if margin.is_bound:
         return margin, Figure(margin.samples, OTHER_DIGITS, None, modes)
-    other = cache(lambda: resized(loop, another(modes)))
+    other = cache(lambda: resized(loop, another(modes, _most(loop))))
 
     def proof(more: float) -> Proof:
         return (None, 0.0) if band is None or more < 0 else proof_of(band.loop.with_delay(now + more))
@@ -224,7 +219,7 @@ def shown_damping(arm: Arm, gains: HubFeedback, chain: Chain, *, count: int) -> 
         return proof_of(whole_loop(arm.having(damping=value), gains, chain, branches))
 
     def holds(value: float) -> Proof:
-        return log_radius_with(arm, gains, chain, value, another(count), branches) < 0, math.inf
+        return log_radius_with(arm, gains, chain, value, another(count, MANY), branches) < 0, math.inf
 
     if C == 0.0:
         return Figure(C, OTHER_DIGITS, None, count)

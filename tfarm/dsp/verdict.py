@@ -13,9 +13,9 @@ from tfarm.columns import Table
 from tfarm.dsp.band import Band, band_of
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.law import MODES, ModeTable, growing_mode, mode_table
-from tfarm.dsp.loop import SampledLoop, check_loop, sampled_loop
+from tfarm.dsp.loop import SampledLoop, check_loop, resized, sampled_loop
 from tfarm.dsp.margins import DelayMargin, Window, around, whole_loop
-from tfarm.dsp.shown import Figure, ShownWindows, resized, shown_damping, shown_delay, shown_windows
+from tfarm.dsp.shown import Figure, ShownWindows, shown_damping, shown_delay, shown_windows
 from tfarm.records import record
 
 UNDAMPED_MODES = 20
@@ -56,6 +56,15 @@ class Verdict:
         return self.loop.poles.is_stable
 
     @property
+    def log_radius(self) -> float:
+        """ln of the spectral radius, of every mode of the band, or of the first `modes_used` where nothing is proven.
+
+        Few modes settle a verdict, but not the later digits of this number.
+        """
+        loop = self.loop if self.band is None else self.band.full
+        return loop.poles.log_spectral_radius
+
+    @property
     def word(self) -> str:
         """stable, marginal or unstable."""
         return self.sentence.split(":")[0]
@@ -63,8 +72,7 @@ class Verdict:
     @property
     def sentence(self) -> str:
         """The verdict in words, beginning with stable, unstable or marginal."""
-        poles = self.loop.poles
-        growth, mode = poles.log_spectral_radius, growing_mode(self.loop)
+        growth, mode = self.log_radius, growing_mode(self.loop)
         what = f"mode {mode}" if mode else "the hub"
         held = f" ({self.holds_for})"
         if growth > 0:
@@ -94,7 +102,7 @@ def sampled_verdict(arm: Arm, gains: HubFeedback, chain: Chain | None = None, *,
     """The verdict, with `count` modes, or as many as it takes (C > 0), or the first 20 (C = 0).
 
     As many as it takes: poles of the loop outside the circle are as many as are proven for its whole band, and the
-    largest radius has stopped to change.  Raises ParameterError for a locked hub, for I_h = 0 with K2 != 0 (an
+    largest radius is that of the loop with every mode of the band.  Raises ParameterError for a locked hub, for I_h = 0 with K2 != 0 (an
     algebraic loop), and a count outside 1..400.
     """
     chain = Chain() if chain is None else chain
@@ -106,33 +114,32 @@ def sampled_verdict(arm: Arm, gains: HubFeedback, chain: Chain | None = None, *,
     check_loop(arm, gains)
     largest = whole_loop(arm, gains, chain)
     band = band_of(largest)
+    full = largest if band is None else band.full
     proven = None if band is None else band.circle().count(gains)
-    before: SampledLoop | None = None
-    for loop in _growing(largest, band.modes if band else largest.plant.count):
-        if before is not None and _agree(before, loop) and proven in (None, _outside(loop)):
+    for loop in _growing(full):
+        if _agree(loop, full) and proven in (None, _outside(loop)):
             break
-        before = loop
     is_proven = proven is not None and (proven == 0) == (_outside(loop) == 0)
     return Verdict(loop, band if is_proven else None)
 
 
-def _growing(largest: SampledLoop, most: int) -> Iterator[SampledLoop]:
-    """Loops of 8, 16, 32 ... modes, and one with the `most`."""
+def _growing(full: SampledLoop) -> Iterator[SampledLoop]:
+    """Loops of 8, 16, 32 ... modes, and the full one."""
+    most = full.plant.count
     number = min(8, most // 2)
     while 0 < number < most:
-        yield resized(largest, number)
+        yield resized(full, number)
         number *= 2
-    yield largest if most == largest.plant.count else resized(largest, most)
+    yield full
 
 
 def _outside(loop: SampledLoop) -> int:
     return int((loop.poles.log_radius > 0).sum())
 
 
-def _agree(before: SampledLoop, after: SampledLoop) -> bool:
-    old, new = before.poles, after.poles
-    close = abs(old.log_spectral_radius - new.log_spectral_radius) <= AGREE * abs(new.log_spectral_radius) + NOISE
-    return close and _outside(before) == _outside(after)
+def _agree(loop: SampledLoop, full: SampledLoop) -> bool:
+    radius, true = loop.poles.log_spectral_radius, full.poles.log_spectral_radius
+    return abs(radius - true) <= AGREE * abs(true) + NOISE and _outside(loop) == _outside(full)
 
 
 @dataclass(frozen=True)
@@ -201,8 +208,8 @@ def sampled_answer(analysis: Analysis) -> dict[str, Any]:
         "verdict": verdict.word,
         "verdict_in_words": verdict.sentence,
         "stable": verdict.is_stable,
-        "spectral_radius": math.exp(poles.log_spectral_radius),
-        "log_spectral_radius": poles.log_spectral_radius,
+        "spectral_radius": math.exp(verdict.log_radius),
+        "log_spectral_radius": verdict.log_radius,
         "unstable_poles": int((poles.log_radius > 0).sum()),
         "modes_used": verdict.modes_used,
         "settled": verdict.is_settled,

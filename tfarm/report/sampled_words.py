@@ -91,7 +91,7 @@ def _row(arm: Arm, gains: HubFeedback, chain: Chain, share: float) -> Row:
     period = float(f"{share * chain.sampling.period:.12g}")  # 1 ms, and no 1.0000000000000002 ms
     verdict = sampled_verdict(arm, gains, replace(chain, sampling=replace(chain.sampling, period=period)))
     K1, K2 = (tuple(stable_windows(verdict.loop, name)) for name in ("K1", "K2"))
-    growth = verdict.loop.poles.log_spectral_radius
+    growth = verdict.log_radius
     return Row(period, verdict.modes_used, verdict.is_settled, growth, gains, K1, K2)
 
 
@@ -115,7 +115,7 @@ def _yes_or_no(data: Sampled) -> str:
     verdict = data.analysis.verdict
     if verdict.is_stable:
         return "Yes"
-    growth = verdict.loop.poles.log_spectral_radius
+    growth = verdict.log_radius
     return "Not strictly" if growth * SLOW < data.chain.sampling.period * math.log(2) else "No"
 
 
@@ -135,7 +135,7 @@ def _modes(verdict: Verdict) -> str:
 def _slowest(data: Sampled) -> str:
     """The pole that decides, and in what time it changes by a factor of two."""
     verdict, T = data.analysis.verdict, data.chain.sampling.period
-    growth = verdict.loop.poles.log_spectral_radius
+    growth = verdict.log_radius
     what = verdict.sentence.partition(": ")[2].partition(" (")[0]
     what = what[0].upper() + what[1:]
     if growth == 0:
@@ -271,7 +271,7 @@ def headline_facts(data: Sampled) -> tuple[Fact, ...]:
     """The headline numbers."""
     analysis, gains = data.analysis, data.gains
     verdict, margin = analysis.verdict, analysis.delay_margin
-    growth = verdict.loop.poles.log_spectral_radius
+    growth = verdict.log_radius
     held = _modes(verdict)
     by = f"by {significant(margin.samples, 3)} samples of delay" if verdict.is_stable else verdict.word
     K2 = span(data.continuous.around, data.continuous.looked_at)
