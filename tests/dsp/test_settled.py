@@ -19,8 +19,8 @@ from tfarm.dsp import (
     shown,
     stable_windows,
 )
-from tfarm.dsp.band import band_of
 from tfarm.dsp import loop as loop_module
+from tfarm.dsp.band import band_of
 from tfarm.dsp.circle import Circle
 from tfarm.dsp.margins import most_modes, whole_loop
 from tfarm.dsp.shown import Edge, shown_windows

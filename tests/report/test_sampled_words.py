@@ -33,7 +33,8 @@ def data_of(name, period=0.01):
     growth = loop.poles.log_spectral_radius
     verdict = SimpleNamespace(
         loop=loop, is_settled=False, band_rad_s=None, modes_used=MODES, is_stable=loop.poles.is_stable,
-        log_radius=growth, word="stable" if growth < 0 else "unstable", sentence="stable: the hub decays most slowly, by 0.1 a sample",
+        log_radius=growth, word="stable" if growth < 0 else "unstable",
+        sentence="stable: the hub decays most slowly, by 0.1 a sample",
     )  # fmt: skip
     analysis = SimpleNamespace(
         verdict=verdict, K1_windows=stable_windows(loop, "K1"), K2_windows=stable_windows(loop, "K2"),

@@ -102,8 +102,8 @@ def sampled_verdict(arm: Arm, gains: HubFeedback, chain: Chain | None = None, *,
     """The verdict, with `count` modes, or as many as it takes (C > 0), or the first 20 (C = 0).
 
     As many as it takes: poles of the loop outside the circle are as many as are proven for its whole band, and the
-    largest radius is that of the loop with every mode of the band.  Raises ParameterError for a locked hub, for I_h = 0 with K2 != 0 (an
-    algebraic loop), and a count outside 1..400.
+    largest radius is that of the loop with every mode of the band.  Raises ParameterError for a locked hub, for I_h = 0
+    with K2 != 0 (an algebraic loop), and a count outside 1..400.
     """
     chain = Chain() if chain is None else chain
     if count is not None:
