@@ -8,7 +8,7 @@ modes, and those digits are kept that a loop with twice as many (or half as many
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -56,6 +56,10 @@ class Figure:
     def is_settled(self) -> bool:
         """Whether it is proven in a band."""
         return self.band is not None
+
+    def is_sharp(self, digits: int) -> bool:
+        """Whether it is proven in that many."""
+        return self.is_settled and (self.digits >= digits or self.value == 0.0)
 
     @property
     def text(self) -> str:
@@ -124,14 +128,26 @@ class Edge:
 
 
 def shown_windows(loop: SampledLoop, band: Band | None, gain: str) -> ShownWindows:
-    """The windows of one gain, with more modes than the loop's where edges can be proven only then."""
-    loop = loop if loop.plant.count <= MANY else resized(loop, MANY)
+    """The windows of one gain, with more modes than the loop's until their edges are proven to the last digit."""
     circle = None if band is None else band.circle()
-    found = _windows(loop, band, circle, gain)
-    while band is not None and not found.is_settled and 2 * loop.plant.count <= _most(loop):
-        loop = resized(loop, 2 * loop.plant.count)
-        found = _windows(loop, band, circle, gain)
+    found = ShownWindows([], [])
+    for each in _sizes(loop, band, MANY):
+        found = _windows(each, band, circle, gain)
+        if all(edge.is_sharp(GAIN_DIGITS) for pair in found.figures for edge in pair):
+            break
     return found
+
+
+def _sizes(loop: SampledLoop, band: Band | None, most: int) -> Iterator[SampledLoop]:
+    """The loop, at most MANY modes of it, and where anything can be proven the same with 2, 4 ... times as many."""
+    loop = loop if loop.plant.count <= MANY else resized(loop, MANY)
+    yield loop
+    most = min(most, _most(loop)) if band is not None else 0
+    while loop.plant.count < most:
+        before, loop = loop.plant.count, resized(loop, min(2 * loop.plant.count, most))
+        if loop.plant.count <= before:  # two damped modes are one here
+            return
+        yield loop
 
 
 def _windows(loop: SampledLoop, band: Band | None, circle: Circle | None, gain: str) -> ShownWindows:
@@ -183,12 +199,12 @@ def proof_of(loop: SampledLoop) -> Proof:
 
 
 def shown_delay(loop: SampledLoop, band: Band | None) -> tuple[DelayMargin, Figure]:
-    """The delay margin, and its samples as a figure, with more modes where it can be proven only then."""
-    loop = loop if loop.plant.count <= MANY else resized(loop, MANY)
-    found = _delay(loop, band)
-    while band is not None and not (found[1].is_settled or found[0].is_bound) and 4 * loop.plant.count <= _most(loop):
-        loop = resized(loop, 2 * loop.plant.count)
-        found = _delay(loop, band)
+    """The delay margin, and its samples as a figure, with more modes until it is proven to the last digit."""
+    found = DelayMargin(0.0, False), Figure(0.0, 0, None, 0)
+    for each in _sizes(loop, band, MANY // 2):
+        found = _delay(each, band)
+        if found[0].is_bound or found[1].is_sharp(OTHER_DIGITS):
+            break
     return found
 
 
