@@ -21,6 +21,10 @@ def test_importing_tfarm_and_reading_an_arm_load_nothing_heavy(code):
     assert loaded_after(code) == []
 
 
+def test_pictures_load_matplotlib_where_they_are_asked_for():
+    assert "matplotlib" in loaded_after("import tfarm; tfarm.plots")
+
+
 def test_the_probe_would_notice():
     assert "sympy" in loaded_after("import sympy")
 

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from matplotlib import pyplot
 
 import tfarm
 from tests.shell import heard, run
@@ -22,11 +23,14 @@ def blocks(language: str) -> list[str]:
 
 
 def test_python_examples_run_one_after_the_other(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     names: dict[str, object] = {}
+    monkeypatch.chdir(tmp_path)
     for block in blocks("python"):
         exec(compile(block, "README.md", "exec"), names)
+    pyplot.close("all")
+    assert (tmp_path / "bode.png").stat().st_size > 10_000
     out = capsys.readouterr().out
     assert "71.50568247" in out
     assert names["shapes"].shape == (11, 201)  # type: ignore[attr-defined]

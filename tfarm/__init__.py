@@ -5,6 +5,7 @@
     modes = tfarm.modes(arm, count=10)        # complete by construction
     law = tfarm.HubFeedback(K1=0.3, K2=0.3)   # u = -K1 theta_t - K2 E I phi'(0)
     found = tfarm.margins(arm, law)           # the verdict first
+    tfarm.plots.modes(modes)                  # a picture; so are bode, nyquist, ... of what these return
 
 What is not needed is not imported: each name below is fetched at its first use.
 """
@@ -15,6 +16,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from tfarm import plots
     from tfarm.arm import Arm, Hub, HubFeedback, Link, Payload, Section, load, presets
     from tfarm.dsp.results import simulate
     from tfarm.dsp.verdict import analyse as sampled
@@ -56,6 +58,7 @@ __all__ = [
     "margins",
     "modes",
     "nyquist",
+    "plots",
     "presets",
     "reduce",
     "sampled",
@@ -76,6 +79,7 @@ _ROOMS = {  # where a name stands; what it is called there after a colon, if not
     "margins": "loop.margins",
     "modes": "spectrum",
     "Output": "exact.outputs",
+    "plots": "plots",
     "reduce": "reduced",
     "sampled": "dsp.verdict:analyse",
     "simulate": "dsp.results",
@@ -88,7 +92,8 @@ def __getattr__(name: str) -> object:
     if name not in __all__:
         raise AttributeError(f"module 'tfarm' has no attribute {name!r}")
     room, _, called = _ROOMS.get(name, "errors" if name.endswith("Error") else "arm").partition(":")
-    value = getattr(import_module(f"tfarm.{room}"), called or name)
+    module = import_module(f"tfarm.{room}")
+    value = module if room == name else getattr(module, called or name)
     globals()[name] = value
     return value
 

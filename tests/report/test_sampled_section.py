@@ -15,8 +15,8 @@ from tfarm.dsp import Chain, Simulator, analyse, sampled_loop, sampled_verdict, 
 from tfarm.dsp.chain import Sampling
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import gain_windows
+from tfarm.plots.files import save
 from tfarm.report.discrete_loci import loci, loci_table
-from tfarm.report.figures import save
 from tfarm.report.overlay import CUT, K2_RANGE, draw_overlay, overlay, overlay_table
 from tfarm.report.region_pieces import pieces
 from tfarm.report.sampled_section import sampled_section

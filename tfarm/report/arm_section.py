@@ -9,9 +9,8 @@ import tfarm
 from tfarm.arm import Arm, implausible
 from tfarm.columns import Column, Table
 from tfarm.digits import plain, significant, singly, unit
-from tfarm.report.figures import Picture
-from tfarm.report.sections import Fact, Section
-from tfarm.report.sketch import draw_arm
+from tfarm.plots.sketch import draw_arm
+from tfarm.report.sections import Fact, Picture, Section
 
 FIRST = 3  # natural frequencies among the headline numbers
 MOST_POISSON = 0.5  # of an isotropic material; a larger E/2G - 1 is none's ratio

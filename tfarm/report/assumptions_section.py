@@ -15,10 +15,10 @@ from tfarm.audit.assumptions import (
 from tfarm.audit.candidates import candidates
 from tfarm.columns import Column, Table
 from tfarm.digits import fixed, plain, significant
-from tfarm.report.assumptions_pictures import Study, hub_picture, section_picture
-from tfarm.report.figures import Picture
+from tfarm.plots.assumptions import Study
+from tfarm.report.assumptions_pictures import hub_picture, section_picture
 from tfarm.report.paper import is_from_paper
-from tfarm.report.sections import Section
+from tfarm.report.sections import Picture, Section
 from tfarm.response.frequency import Real
 
 FROM_PAPER = (

@@ -9,9 +9,8 @@ import numpy as np
 from tfarm.arm import Arm
 from tfarm.columns import Column, Table
 from tfarm.digits import lined, plain, scientific, significant, singly, unit
-from tfarm.report.bode import draw_bode
-from tfarm.report.figures import Picture
-from tfarm.report.sections import Section
+from tfarm.plots.frequency import draw_bode
+from tfarm.report.sections import Picture, Section
 from tfarm.response.frequency import ON_AXIS, Bode, bode
 
 ROOTS = (

@@ -12,9 +12,9 @@ from typing import Any
 
 from tfarm.arm import Arm
 from tfarm.errors import TfarmError
+from tfarm.plots.files import save
+from tfarm.plots.frequency import draw_card
 from tfarm.report.arm_section import headline_numbers
-from tfarm.report.bode import draw_card
-from tfarm.report.figures import save
 from tfarm.report.page import QUESTIONS, Card, summary
 from tfarm.report.sections import Fact
 from tfarm.response.frequency import bode

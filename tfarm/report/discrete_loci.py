@@ -21,8 +21,8 @@ from tfarm.columns import Column, Table
 from tfarm.digits import plain
 from tfarm.dsp.law import origins, root_locus
 from tfarm.dsp.loop import SampledLoop
+from tfarm.plots.style import BLUE, GREY, INK, ORANGE, blank, headline, style
 from tfarm.records import record
-from tfarm.report.figures import BLUE, GREY, INK, ORANGE, blank, headline, style
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]

@@ -22,8 +22,8 @@ from tfarm.errors import ConvergenceError
 from tfarm.loop.answers import UNITS
 from tfarm.loop.locus import Locus, locus
 from tfarm.loop.reduced_locus import ReducedLocus, reduced_locus
+from tfarm.plots.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, blank, headline, style
 from tfarm.records import record
-from tfarm.report.figures import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, blank, headline, style
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]

@@ -12,10 +12,9 @@ from tfarm.columns import Column, Table
 from tfarm.digits import plain, scientific, significant, singly
 from tfarm.errors import ConvergenceError
 from tfarm.loop.stability import MARGIN_OF_ZERO, Stability, stability
-from tfarm.report.figures import Picture
 from tfarm.report.loci import Loci, crossing_table, draw_loci, gap_table, loci, loci_data
 from tfarm.report.loop_laws import edge_of_K2, has_loop, margins_of, sign_words
-from tfarm.report.sections import Section
+from tfarm.report.sections import Picture, Section
 from tfarm.response.frequency import Real
 from tfarm.spectrum.scales import default_gains, rate_unit
 

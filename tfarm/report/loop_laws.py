@@ -14,6 +14,7 @@ from tfarm.dsp.brief import SampledBrief, sampled_brief
 from tfarm.errors import ConvergenceError
 from tfarm.loop.design import Design, design
 from tfarm.loop.margins import Margins, margins
+from tfarm.plots.words import gains_words
 from tfarm.spectrum.scales import default_gains
 
 MODES = 2  # flexible modes in the band of the damping that is drawn and designed for, as `tfarm design` has it
@@ -51,7 +52,7 @@ class NamedLaw:
     @property
     def gains(self) -> str:
         """K1 = ..., K2 = ..., for reading."""
-        return f"K1 = {plain(self.law.K1, 4)}, K2 = {plain(self.law.K2, 4)}"
+        return gains_words(self.law)
 
 
 def has_loop(arm: Arm) -> bool:

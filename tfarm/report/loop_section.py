@@ -13,7 +13,7 @@ from tfarm.dsp.brief import SampledBrief
 from tfarm.errors import ConvergenceError
 from tfarm.loop.nyquist import Nyquist, nyquist, nyquist_of
 from tfarm.loop.windows import Windows
-from tfarm.report.figures import Picture
+from tfarm.plots.disc import draw_nyquist
 from tfarm.report.loop_laws import (
     MODES,
     NamedLaw,
@@ -29,8 +29,8 @@ from tfarm.report.loop_laws import (
 from tfarm.report.map import GainMap, gain_map, map_data
 from tfarm.report.map_picture import draw_map
 from tfarm.report.margins_table import margin_table, verdict_facts, verdict_words, window_table
-from tfarm.report.nyquist import COMPARED, Curve, count_table, curve_data, draw_nyquist
-from tfarm.report.sections import Section
+from tfarm.report.nyquist import COMPARED, Curve, count_table, curve_data
+from tfarm.report.sections import Picture, Section
 from tfarm.spectrum.scales import default_gains, default_words, rate_unit
 
 UNSTABLE_K2 = 1.5  # at least, of the law whose encirclements are counted for comparison
@@ -208,7 +208,7 @@ def nyquist_section(arm: Arm) -> Section:
         alt="; ".join(
             f"{p.named.name}: {p.data.verdict.verdict}, {p.data.encirclements} encirclements of −1" for p in plots
         ),
-        figure=draw_nyquist(arm.name, plots),
+        figure=draw_nyquist(arm.name, {plot.named.name: plot.data for plot in plots}),
         data=curve_data(plots),
     )  # fmt: skip
     names = [f"{plot.named.name}: {plot.named.gains}" for plot in counted]

@@ -14,7 +14,7 @@ from scipy import ndimage
 
 from tfarm.digits import SUPERSCRIPT, plain, significant
 from tfarm.loop.regions import INFINITE
-from tfarm.report.figures import BLUE, GREY, INK, ORANGE, PURPLE, blank, headline, style
+from tfarm.plots.style import BLUE, GREY, INK, ORANGE, PURPLE, blank, headline, style
 from tfarm.report.map import GainMap, Real, stable_edge
 from tfarm.report.region_pieces import pieces
 

@@ -14,10 +14,9 @@ from tfarm.columns import REPORT, Column, Table
 from tfarm.digits import fixed, lined, significant
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.exact.coefficients import Theory
+from tfarm.plots.shapes import Shape, draw_differences, draw_shapes, shapes_of, theory_name
 from tfarm.report.damped_table import damped_table
-from tfarm.report.figures import Picture
-from tfarm.report.mode_shapes import Shape, draw_differences, draw_shapes, shapes_of, theory_name
-from tfarm.report.sections import Section
+from tfarm.report.sections import Picture, Section
 from tfarm.report.trust_proofs import how_proven
 from tfarm.response.frequency import Real
 from tfarm.spectrum import Modes, answers

@@ -23,8 +23,8 @@ from tfarm.dsp import gain_map, sampled_verdict, stable_windows
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.loop import SampledLoop
 from tfarm.loop.regions import region
+from tfarm.plots.style import BLUE, GREY, INK, ORANGE, blank, headline, style
 from tfarm.records import record
-from tfarm.report.figures import BLUE, GREY, INK, ORANGE, blank, headline, style
 from tfarm.report.region_pieces import pieces
 
 Real = NDArray[np.float64]

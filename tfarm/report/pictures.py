@@ -9,9 +9,9 @@ from matplotlib.figure import Figure
 import tfarm
 from tfarm.digits import plain
 from tfarm.dsp import load_chain
-from tfarm.report.bode import draw_compared
-from tfarm.report.figures import save
-from tfarm.report.mode_shapes import draw_shapes, shapes_of
+from tfarm.plots.files import save
+from tfarm.plots.frequency import draw_compared
+from tfarm.plots.shapes import draw_shapes, shapes_of
 from tfarm.report.overlay import draw_overlay, overlay
 from tfarm.response.frequency import band_of, bode
 from tfarm.spectrum.scales import default_gains

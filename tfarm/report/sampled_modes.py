@@ -14,8 +14,8 @@ from tfarm.columns import Table
 from tfarm.digits import SUPERSCRIPT, plain
 from tfarm.dsp.law import MODES, ModeTable
 from tfarm.dsp.loop import SampledLoop
-from tfarm.report.bode import hertz_axis
-from tfarm.report.figures import BLUE, GREY, INK, ORANGE, blank, headline, style
+from tfarm.plots.frequency import hertz_axis
+from tfarm.plots.style import BLUE, GREY, INK, ORANGE, blank, headline, style
 
 Real = NDArray[np.float64]
 

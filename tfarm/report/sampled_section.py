@@ -13,7 +13,6 @@ from tfarm.dsp import Chain, sampled_verdict
 from tfarm.dsp.margins import around
 from tfarm.report.curves import resolution_words
 from tfarm.report.discrete_loci import STRONGER, draw_loci, loci, loci_table
-from tfarm.report.figures import Picture
 from tfarm.report.loop_laws import has_loop, sign_words, why_no_loop
 from tfarm.report.overlay import draw_overlay, overlay_table
 from tfarm.report.sampled_modes import draw_modes, mode_rows
@@ -32,7 +31,7 @@ from tfarm.report.sampled_words import (
     study,
     typeset,
 )
-from tfarm.report.sections import Section
+from tfarm.report.sections import Picture, Section
 from tfarm.report.strip_chart import StripChart, draw_strip_chart, example_words, strip_chart, strip_table
 from tfarm.report.time_responses import Slews, draw_slews, seen_words, slews, slews_table, what_slews_show
 

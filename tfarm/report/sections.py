@@ -5,13 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
 from tfarm.columns import Table
-from tfarm.report.figures import FORMATS, Picture, save
+from tfarm.plots.files import FORMATS, save
 from tfarm.tables.files import save as save_table
 from tfarm.tables.html import as_html
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,6 +26,24 @@ class Fact:
     value: str
     unit: str = ""
     beside: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Picture:
+    """A finished figure with its words.  `stem` names its files; `data` are the numbers that it draws."""
+
+    stem: str
+    title: str
+    caption: str
+    alt: str
+    figure: Figure
+    data: Table | None = None
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height on the page [CSS pixels], at 96 an inch."""
+        width, height = self.figure.get_size_inches() * 96
+        return round(width), round(height)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

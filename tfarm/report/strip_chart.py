@@ -15,9 +15,9 @@ from tfarm.columns import Column, Table
 from tfarm.digits import plain, significant
 from tfarm.dsp import Measurement, Simulation, Simulator, scenario
 from tfarm.dsp.chain import Chain
+from tfarm.plots.style import BLUE, FAINT, GREEN, GREY, INK, ORANGE, blank, headline, style
 from tfarm.records import record
 from tfarm.report.curves import Curve, continuous, held, resolved, root_moment
-from tfarm.report.figures import BLUE, FAINT, GREEN, GREY, INK, ORANGE, blank, headline, style
 
 Real = NDArray[np.float64]
 

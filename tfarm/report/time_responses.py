@@ -17,10 +17,10 @@ from tfarm.digits import plain, significant
 from tfarm.dsp import Simulation, Simulator, scenario
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.results import residual_moment_rms, settling_time
+from tfarm.plots.style import BLUE, GREY, INK, ORANGE, blank, headline, style
 from tfarm.records import record
 from tfarm.report import curves
 from tfarm.report.curves import resolved
-from tfarm.report.figures import BLUE, GREY, INK, ORANGE, blank, headline, style
 
 Real = NDArray[np.float64]
 

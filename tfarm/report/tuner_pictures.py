@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tfarm.arm import Arm
 from tfarm.digits import plain, significant
 from tfarm.dsp import Simulation
-from tfarm.report.figures import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, blank, headline, style
+from tfarm.plots.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, blank, headline, style
 from tfarm.report.overlay import Overlay, regions
 from tfarm.report.time_responses import motor_torque, root_moment, tip_error
 from tfarm.report.tuner_study import CostMap, Curves, TunerStudy

@@ -12,11 +12,10 @@ from tfarm.digits import lined, plain, significant, worded
 from tfarm.dsp import Chain
 from tfarm.errors import CertificationError
 from tfarm.report.curves import resolution_words
-from tfarm.report.figures import Picture
 from tfarm.report.loop_laws import has_loop, sign_words, why_no_loop
 from tfarm.report.overlay import overlay
 from tfarm.report.sampled_words import SHORT_SIGN, typeset
-from tfarm.report.sections import Section
+from tfarm.report.sections import Picture, Section
 from tfarm.report.time_responses import clipped_words, responses_table
 from tfarm.report.tuner_pictures import draw_cost_map, draw_curves, draw_gain, draw_response
 from tfarm.report.tuner_study import COARSE, MAP_SEEDS, MAP_TRIALS, NOMINAL, SEEDS, TunerStudy, tuner_study

@@ -1,22 +1,18 @@
-"""What all pictures share: one style, one way to save.  No pyplot: nothing global, nothing on a screen.
+"""What all pictures share: one style, whatever the user's own matplotlib settings are, and figures to draw on.
 
-The same figure gives the same bytes on every run: fixed fonts, a fixed salt for SVG's ids and no dates.
+A page's figure (`blank`) knows nothing of pyplot: nothing global, nothing on a screen.  One that is asked for without
+`ax` (`window`) is pyplot's, so that a notebook shows it.
 """
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
-from pathlib import Path
 
 import matplotlib.style
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-
-from tfarm.columns import Table
 
 INK, GREY, FAINT = "#1a1a1a", "#6b6b6b", "#d4d4d4"
 BLUE, ORANGE, GREEN, PURPLE = "#0060a8", "#c4500a", "#00795a", "#8a3b8f"  # told apart by the colour-blind too
@@ -51,31 +47,8 @@ STYLE = {
     "pdf.fonttype": 42,
     "path.simplify": False,
 }
-FORMATS = ("svg", "png", "pdf")
-METADATA: dict[str, dict[str, str | None]] = {
-    "svg": {"Date": None, "Creator": "tfarm"},
-    "png": {"Software": "tfarm"},
-    "pdf": {"CreationDate": None, "Creator": "tfarm", "Producer": None},
-}
-DOTS_PER_INCH = 160
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Picture:
-    """A finished figure with its words.  `stem` names its files; `data` are the numbers that it draws."""
-
-    stem: str
-    title: str
-    caption: str
-    alt: str
-    figure: Figure
-    data: Table | None = None
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """Width and height on the page [CSS pixels], at 96 an inch."""
-        width, height = self.figure.get_size_inches() * 96
-        return round(width), round(height)
+New = Callable[[float, float], Figure]  # how a figure of that width and height [inches] is made
 
 
 @contextmanager
@@ -93,6 +66,22 @@ def blank(width: float, height: float) -> Figure:
     return figure
 
 
+def window(width: float, height: float) -> Figure:
+    """The same as a figure of pyplot's, which a notebook or `pyplot.show` shows."""
+    from matplotlib import pyplot  # not needed, and not loaded, for a page
+
+    return pyplot.figure(figsize=(width, height), layout="constrained")
+
+
+def settled(figure: Figure) -> list[Axes]:
+    """The axes of a figure, their ticks as they are styled now: matplotlib makes them later, by the user's settings."""
+    for ax in figure.axes:
+        for axis in (ax.xaxis, ax.yaxis):
+            axis.get_major_ticks(1)
+            axis.get_minor_ticks(1)
+    return figure.axes
+
+
 def headline(figure: Figure, text: str) -> None:
     """One line above everything, at the left."""
     figure.suptitle(text.replace("$", r"\$"), x=0.012, ha="left", fontsize=10.5, color=INK)
@@ -103,21 +92,3 @@ def figure_of(ax: Axes) -> Figure:
     figure = ax.get_figure()
     assert isinstance(figure, Figure)
     return figure
-
-
-def save(figure: Figure, folder: Path, stem: str, formats: tuple[str, ...] = FORMATS, dpi: int = DOTS_PER_INCH) -> None:
-    """The figure as folder/stem.svg, .png and .pdf."""
-    with style(), warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Glyph .* missing")  # an arm's name may hold any letter
-        figure.draw_without_rendering()  # lays it out; once is enough for all formats
-        figure.set_layout_engine(None)
-        _settle(figure)
-        for kind in formats:
-            figure.savefig(folder / f"{stem}.{kind}", format=kind, dpi=dpi, metadata=METADATA[kind])
-
-
-def _settle(figure: Figure) -> None:
-    """Axes at ten digits: the layout's solver orders by address, so its last bit differs from run to run."""
-    for ax in figure.axes:
-        left, bottom, width, height = (round(float(x), 10) for x in ax.get_position(original=True).bounds)
-        ax.set_position((left, bottom, width, height))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,11 +14,13 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from tfarm.digits import plain, significant
 from tfarm.records import record
-from tfarm.report.figures import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, blank, headline, style
 from tfarm.response.frequency import Real
 from tfarm.spectrum import Modes
 
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, New, blank, headline, settled, style, window
+
 POINTS = 401
+ALONG, DISPLACEMENT = "distance from the hub, x [m]", "displacement w(x), largest = 1 [-]"
 HUB = 0.06  # width of the drawn hub, as a share of the length
 
 
@@ -35,41 +37,59 @@ class Shape:
     has_payload: bool
 
 
-def shapes_of(modes: Modes, count: int) -> tuple[Shape, ...]:
+def shapes_of(found: Modes, count: int) -> tuple[Shape, ...]:
     """The first flexible modes, each scaled to a largest displacement of one, the tip's side positive."""
-    x = np.linspace(0.0, modes.arm.length, POINTS)
-    payload = modes.arm.payload
+    x = np.linspace(0.0, found.arm.length, POINTS)
+    payload = found.arm.payload
     shapes = []
-    for i, w in enumerate(modes.shape(x)):
-        if modes.index[i] == 0 or modes.index[i] > count:
+    for i, w in enumerate(found.shape(x)):
+        if found.index[i] == 0 or found.index[i] > count:
             continue
         largest = float(abs(w).max())
         shape = Shape(
-            number=int(modes.index[i]),
-            natural_frequency=float(modes.natural_frequency[i]),
+            number=int(found.index[i]),
+            natural_frequency=float(found.natural_frequency[i]),
             x=x,
             w=w / largest if largest > 0 else w,
-            nodes=modes.nodes[i],
+            nodes=found.nodes[i],
             has_payload=payload.mass > 0 or payload.inertia > 0,
         )
         shapes.append(shape)
     return tuple(shapes)
 
 
-def draw_shapes(name: str, shapes: tuple[Shape, ...]) -> Figure:
+def modes(found: Modes, *, ax: Sequence[Axes] | None = None) -> tuple[Axes, ...]:
+    """The shapes of flexible modes (what `tfarm.modes` returns), an axes each, in those given or in new ones; these.
+
+    Displacement along the arm [m], largest 1, with the places of the nodes [m].  Of more modes than axes the first are
+    drawn.
+    """
+    shapes = shapes_of(found, int(found.index[-1]))
+    with style():
+        if ax is None:
+            return tuple(settled(draw_shapes(found.arm.name, shapes, window)))
+        each = tuple(np.ravel(np.asarray(ax, dtype=object)))[: len(shapes)]
+        for one, shape in zip(each, shapes, strict=False):
+            draw_shape(shape, ax=one)
+            one.set_xlabel(ALONG)
+            one.set_ylabel(DISPLACEMENT)
+    return each
+
+
+def draw_shapes(name: str, shapes: tuple[Shape, ...], new: New = blank) -> Figure:
     """Small pictures, two in a row, one a mode."""
     with style():
         rows = math.ceil(len(shapes) / 2)
-        figure = blank(9.0, 0.7 + 1.75 * rows)
+        figure = new(9.0, 0.7 + 1.75 * rows)
         axes = np.atleast_1d(figure.subplots(rows, 2, sharex=True, sharey=True)).ravel()
         for ax, shape in zip(axes, shapes, strict=False):
             draw_shape(shape, ax=ax)
         for ax in axes[len(shapes) :]:
             ax.remove()
         for ax in axes[max(0, len(shapes) - 2) : len(shapes)]:
-            ax.set_xlabel("distance from the hub, x [m]")
+            ax.set_xlabel(ALONG)
             ax.tick_params(labelbottom=True)
-        figure.supylabel("displacement w(x), largest = 1 [-]", fontsize=10.0, color=INK)
+        figure.supylabel(DISPLACEMENT, fontsize=10.0, color=INK)
         headline(figure, f"{name}: mode shapes")
     return figure
 

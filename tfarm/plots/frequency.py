@@ -12,21 +12,35 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MultipleLocator, NullFormatter
 
 from tfarm.digits import plain
-from tfarm.report.figures import BLUE, FAINT, GREY, INK, ORANGE, blank, headline, style
 from tfarm.response.frequency import Bode, Real
+
+from .style import BLUE, FAINT, GREY, INK, ORANGE, New, blank, headline, settled, style, window
 
 HERTZ = 2 * math.pi
 STRIP = 0.085  # height of the strip of mode numbers above the magnitude, as a share of its axes
 NARROWEST = 0.019  # share of the width below which two mode numbers would touch
 
 
-def draw_bode(data: Bode) -> Figure:
-    """Magnitude over phase of one response."""
+def bode(data: Bode, *, ax: Sequence[Axes] | None = None) -> tuple[Axes, Axes]:
+    """Magnitude over phase of a response (what `tfarm.bode` returns), in two axes, those given or new ones: these axes.
+
+    Magnitudes in the response's SI units, phases in degrees; an infinite resonance is broken, a triangle at its place.
+    """
     with style():
-        figure = blank(9.0, 6.2)
-        upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[1.75, 1.0])
-        magnitude(data, ax=upper)
-        phase(data, ax=lower)
+        if ax is None:
+            upper, lower = settled(draw_bode(data, window))
+        else:
+            upper, lower = ax
+            magnitude(data, ax=upper)
+            phase(data, ax=lower)
+    return upper, lower
+
+
+def draw_bode(data: Bode, new: New = blank) -> Figure:
+    """Magnitude over phase of one response, on a figure of its own."""
+    with style():
+        figure = new(9.0, 6.2)
+        upper, _ = bode(data, ax=figure.subplots(2, 1, sharex=True, height_ratios=[1.75, 1.0]))
         upper.set_xlabel("")
         upper.tick_params(labelbottom=False)
         headline(figure, f"{data.arm.name}: {data.input_label} to {data.label}")

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import tfarm
-from tfarm.report.bode import broken, draw_bode, magnitude, magnitude_limits, phase
-from tfarm.report.figures import blank, style
+from tfarm.plots.frequency import broken, draw_bode, magnitude, magnitude_limits, phase
+from tfarm.plots.style import blank, style
 from tfarm.response.frequency import band_of, bode
 
 

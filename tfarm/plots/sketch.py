@@ -10,28 +10,42 @@ from matplotlib.patches import Circle, FancyArrowPatch, Polygon, Rectangle
 
 from tfarm.arm import Arm
 from tfarm.digits import plain, unit
-from tfarm.report.figures import BLUE, FAINT, GREY, INK, ORANGE, blank, style
+
+from .style import BLUE, FAINT, GREY, INK, ORANGE, New, blank, settled, style, window
 
 HUB = 0.055  # radius of the drawn hub, and half the payload's side, as shares of the length
 LOW, HIGH = -0.15, 0.16  # what is shown below and above the arm at least, as shares of its length
 LEFT, RIGHT = -0.2, 1.2
 
 
-def draw_arm(arm: Arm) -> Figure:
-    """Hub, link and payload from the side; lengths in shares of the link's."""
+def sketch(arm: Arm, *, ax: Axes | None = None) -> Axes:
+    """Hub, link and payload from the side, lengths in shares of the link's, in the axes given or new ones; the axes."""
     with style():
-        half = depth_of(arm) / 2
-        low, high = min(LOW, -half - 0.09), max(HIGH, half + 0.09)
-        figure = blank(9.0, 0.2 + 9.0 * (high - low) / (RIGHT - LEFT))
-        ax = figure.subplots()
+        if ax is None:
+            return settled(draw_arm(arm, window))[0]
         ax.set_aspect("equal")
         ax.set_axis_off()
         ax.set_xlim(LEFT, RIGHT)
-        ax.set_ylim(low, high)
+        ax.set_ylim(*heights(arm))
         _link(arm, ax)
         _hub(arm, ax)
         _payload(arm, ax)
+    return ax
+
+
+def draw_arm(arm: Arm, new: New = blank) -> Figure:
+    """The arm on a figure of its own, as high as it takes."""
+    low, high = heights(arm)
+    with style():
+        figure = new(9.0, 0.2 + 9.0 * (high - low) / (RIGHT - LEFT))
+        sketch(arm, ax=figure.subplots())
     return figure
+
+
+def heights(arm: Arm) -> tuple[float, float]:
+    """What is shown below and above the arm, as shares of its length."""
+    half = depth_of(arm) / 2
+    return min(LOW, -half - 0.09), max(HIGH, half + 0.09)
 
 
 def depth_of(arm: Arm) -> float:

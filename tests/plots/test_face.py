@@ -1,0 +1,128 @@
+"""Pictures from Python: what is drawn are the record's own numbers, in the axes that are given and in no other."""
+
+import subprocess
+import sys
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib import pyplot
+from matplotlib.figure import Figure
+
+import tfarm
+from tfarm.loop.nyquist import compressed
+
+mpl.use("Agg")
+
+LAB = tfarm.load("sasaki2012-lab")
+LAW = tfarm.HubFeedback(K1=0.3, K2=0.3)
+
+
+@pytest.fixture(autouse=True)
+def no_figure_left_open():
+    """What a test asks pyplot for it closes again."""
+    yield
+    left = pyplot.get_fignums()
+    pyplot.close("all")
+    assert left == []
+
+
+@pytest.fixture(scope="module")
+def records():
+    """By the name of the plot: what it takes, and how many axes it draws in (0: one that is no sequence)."""
+    return {
+        "bode": (tfarm.bode(LAB, "root_moment", (1.0, 300.0)), 2),
+        "modes": (tfarm.modes(LAB, count=3), 3),
+        "nyquist": (tfarm.nyquist(LAB, LAW), 0),
+        "sketch": (LAB, 0),
+    }
+
+
+def axes_for(count):
+    axes = Figure().subplots(max(1, count), 1)
+    return axes if count else axes.item() if isinstance(axes, np.ndarray) else axes
+
+
+def as_tuple(axes):
+    return tuple(np.ravel(np.asarray(axes, dtype=object)))
+
+
+@pytest.mark.parametrize("name", tfarm.plots.__all__)
+def test_axes_given_are_the_axes_returned_and_nothing_else_is_opened(name, records):
+    record, count = records[name]
+    given = axes_for(count)
+    returned = getattr(tfarm.plots, name)(record, ax=given)
+    assert as_tuple(returned) == as_tuple(given)
+    assert all(ax.lines or ax.images or ax.collections for ax in as_tuple(returned))
+    assert pyplot.get_fignums() == []
+
+
+@pytest.mark.parametrize("name", tfarm.plots.__all__)
+def test_without_axes_a_figure_is_made_in_the_look_of_the_pages(name, records):
+    """Whatever the user's settings are, and though matplotlib makes ticks only when it draws."""
+    record, count = records[name]
+    with mpl.rc_context({"xtick.labelsize": 31.0, "axes.labelsize": 31.0, "font.size": 31.0}):
+        axes = as_tuple(getattr(tfarm.plots, name)(record))
+        (number,) = pyplot.get_fignums()
+        figure = pyplot.figure(number)
+        assert {ax.get_figure() for ax in axes} == {figure}
+        assert len(axes) == max(1, count)
+        figure.draw_without_rendering()
+        sizes = {tick.label1.get_fontsize() for ax in axes for tick in ax.xaxis.get_major_ticks()}
+        sizes |= {ax.xaxis.label.get_fontsize() for ax in axes}
+    assert max(sizes) < 12
+    pyplot.close(figure)
+
+
+def test_bode_draws_the_response(records):
+    data, _ = records["bode"]
+    upper, lower = tfarm.plots.bode(data, ax=axes_for(2))
+    (curve,) = (line for line in upper.lines if line.get_label() == "flexible arm, exact")
+    assert curve.get_xdata().tolist() == data.omega.tolist()
+    assert curve.get_ydata().tolist() == abs(data.value).tolist()
+    assert lower.lines[-1].get_ydata().tolist() == data.phase.tolist()
+    assert "[N m/(N m)]" in upper.get_ylabel()
+    assert ("[rad/s]" in lower.get_xlabel(), lower.get_ylabel()) == (True, "phase [deg]")
+
+
+def test_nyquist_draws_the_loop_function_with_its_verdict(records):
+    """Off the arcs past poles every point of the contour is on a line, at r/(1 + r) for its size r."""
+    data, _ = records["nyquist"]
+    ax = tfarm.plots.nyquist(data, ax=axes_for(0), name="mine")
+    drawn = {complex(x, y) for line in ax.lines for x, y in zip(*line.get_data(), strict=True)}
+    assert set(compressed(data.L)[~data.is_arc].tolist()) <= drawn
+    assert ax.get_title().split("\n") == [
+        f"mine: {data.verdict.verdict.upper()}",
+        "K1 = 0.3, K2 = 0.3",
+        f"encirclements of −1: {data.encirclements};  unstable poles: {data.verdict.unstable_roots}",
+    ]
+
+
+def test_modes_draws_the_shapes_with_their_nodes(records):
+    found, _ = records["modes"]
+    axes = tfarm.plots.modes(found, ax=axes_for(3))
+    shapes = found.shape(axes[0].lines[1].get_xdata())
+    for ax, index in zip(axes, (1, 2, 3), strict=True):
+        (at,) = np.nonzero(found.index == index)[0]
+        w = shapes[at]
+        assert ax.lines[1].get_ydata().tolist() == (w / abs(w).max()).tolist()
+        (nodes,) = (line.get_xdata() for line in ax.lines if line.get_marker() == "o")
+        assert nodes.tolist() == found.nodes[at].tolist()
+        assert f"{found.natural_frequency[at]:.7g} rad/s" in ax.get_title("left")
+        assert ("[m]" in ax.get_xlabel(), ax.get_ylabel()[-3:]) == (True, "[-]")
+
+
+def test_of_more_modes_than_axes_the_first_are_drawn():
+    axes = axes_for(2)
+    assert tfarm.plots.modes(tfarm.modes(LAB, count=5), ax=axes) == tuple(axes)
+
+
+def test_a_page_needs_no_pyplot():
+    """Only figures that nobody gave axes for are pyplot's."""
+    code = (
+        "import sys, tfarm; from matplotlib.figure import Figure;"
+        "tfarm.plots.sketch(tfarm.load('sasaki2012'), ax=Figure().subplots());"
+        "print('matplotlib.pyplot' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"

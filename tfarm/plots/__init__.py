@@ -1,0 +1,14 @@
+"""Pictures of what tfarm computes: a record in, matplotlib axes in and out.
+
+    tfarm.plots.bode(tfarm.bode(arm, "root_moment"))              # a figure of its own; the axes are returned
+    tfarm.plots.nyquist(tfarm.nyquist(arm, law), ax=axes)         # or in axes that are there
+
+In the look of the report's pages, whose pictures these are.  This is the only room with matplotlib.
+"""
+
+from tfarm.plots.disc import nyquist
+from tfarm.plots.frequency import bode
+from tfarm.plots.shapes import modes
+from tfarm.plots.sketch import sketch
+
+__all__ = ["bode", "modes", "nyquist", "sketch"]

@@ -1,0 +1,148 @@
+"""Nyquist plots of the exact loop function that hide nothing: infinity is on the rim, poles on the axis are arcs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from tfarm.digits import plain, significant
+from tfarm.loop.nyquist import Nyquist, compressed
+
+from .style import BLUE, FAINT, GREY, ORANGE, blank, headline, settled, style, window
+from .words import gains_words
+
+Complex = NDArray[np.complexfloating[Any, Any]]
+
+RINGS = (0.1, 0.3, 1.0, 3.0, 10.0)  # |L| of the rings
+RING, LAST, STEP = 1.04, 1.2, 0.03  # radius of the first arc at infinity, of the last at most, from one to the next
+
+
+def nyquist(data: Nyquist, *, ax: Axes | None = None, name: str = "") -> Axes:
+    """L on Nyquist's contour (what `tfarm.nyquist` returns), verdict and encirclements above it; the axes.
+
+    A size r of L is drawn as r/(1 + r): the rim is infinity, -1 lies half way.  `name`: what the law is called.
+    """
+    with style():
+        if ax is None:
+            figure = window(5.0, 5.8)
+            ax = nyquist(data, ax=figure.subplots(), name=name)
+            figure.legend(*_legend(), loc="outside lower left", ncols=2, fontsize=8.5)
+            settled(figure)
+            return ax
+        _disc(ax)
+        _curve(data, ax)
+        _headings(name, data, ax)
+    return ax
+
+
+def draw_nyquist(title: str, plots: Mapping[str, Nyquist]) -> Figure:
+    """One disc a law, of at most two, by the laws' names."""
+    with style():
+        figure = blank(9.0, 5.3)
+        axes = figure.subplots(1, 2)
+        for ax in axes[len(plots) :]:
+            ax.set_visible(False)
+        for ax, (name, data) in zip(axes, plots.items(), strict=False):
+            nyquist(data, ax=ax, name=name)
+        figure.legend(*_legend(), loc="outside lower left", ncols=4, fontsize=8.5)
+        band = significant(max(data.verdict.band for data in plots.values()), 5)
+        headline(figure, f"{title}: the loop function L(iω) up to {band} rad/s")
+    return figure
+
+
+def _disc(ax: Axes) -> None:
+    """Rings of equal |L|, the axes, the rim at infinity, and -1."""
+    turn = np.exp(1j * np.linspace(0, 2 * math.pi, 361))
+    for size in (*RINGS, math.inf):
+        ring = turn * (1.0 if math.isinf(size) else size / (1 + size))
+        ax.plot(ring.real, ring.imag, color=GREY if size in (1.0, math.inf) else FAINT, lw=0.7, zorder=0.6)
+        at = ring[56 if math.isfinite(size) else 124]
+        text = "|L| = ∞" if math.isinf(size) else plain(size)
+        ax.text(at.real, at.imag, text, fontsize=7.5, color=GREY, ha="center", va="center", zorder=0.7,
+                bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6})  # fmt: skip
+    ax.plot([-1, 1], [0, 0], color=FAINT, lw=0.7, zorder=0.5)
+    ax.plot([0, 0], [-1, 1], color=FAINT, lw=0.7, zorder=0.5)
+    ax.plot([-0.5], [0], "+", color=ORANGE, ms=11, mew=2.2, zorder=6)
+    ax.annotate("−1", (-0.5, 0), textcoords="offset points", xytext=(-4, 6), ha="right", color=ORANGE, weight="bold",
+                bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.4}, zorder=5)  # fmt: skip
+    ax.set_aspect("equal")
+    ax.set_xticks([])
+    ax.set_yticks([])
+    ax.spines[:].set_visible(False)
+
+
+def _curve(data: Nyquist, ax: Axes) -> None:
+    """Along the axis as a line, past each pole as an arc beyond the rim, arrows with rising frequency."""
+    z = compressed(data.L)
+    turn = np.flatnonzero(np.diff(data.is_arc.astype(int))) + 1
+    step = min(STEP, (LAST - RING) / max(1, data.poles.size - 1))
+    number = 0
+    for piece in np.split(np.arange(z.size), turn):
+        if not data.is_arc[piece[0]]:
+            ax.plot(z[piece].real, z[piece].imag, color=BLUE, lw=1.3, zorder=3)
+            ax.plot(z[piece].real, -z[piece].imag, color=BLUE, lw=0.6, alpha=0.55, zorder=2)
+            continue
+        ring = arc_on_ring(data.L[piece], RING + step * number)
+        ends = np.r_[z[max(0, piece[0] - 1)], ring, z[min(z.size - 1, piece[-1] + 1)]]
+        ends = ends[1:] if piece[0] == 0 else ends
+        ax.plot(ends.real, ends.imag, color=BLUE, lw=0.8, ls=(0, (3, 1.5)), zorder=3)
+        _arrow(ring, ax)
+        number += 1
+    for at in _arrows(data, z):
+        _arrow(z[at], ax)
+    ax.set_xlim(-LAST - STEP, LAST + STEP)
+    ax.set_ylim(-LAST - STEP, LAST + STEP)
+
+
+def arc_on_ring(L: Complex, radius: float) -> Complex:
+    """The directions of L on an arc around a pole, drawn at one radius beyond the rim."""
+    angle = np.unwrap(np.angle(L))
+    fine = np.interp(np.linspace(0, 1, 61), np.linspace(0, 1, angle.size), angle)
+    return np.asarray(radius * np.exp(1j * fine))
+
+
+def _arrows(data: Nyquist, z: Complex) -> list[NDArray[np.int64]]:
+    """Short pieces of the curve to bear arrows: an eighth, two fifths and three quarters of its drawn length on."""
+    (along,) = np.nonzero(~data.is_arc)
+    length = np.r_[0.0, np.cumsum(abs(np.diff(z[along])))]
+    places = np.searchsorted(length, length[-1] * np.array([0.12, 0.4, 0.75]))
+    return [along[max(0, n - 1) : n + 1] for n in places]
+
+
+def _arrow(piece: Complex, ax: Axes) -> None:
+    half = piece.size // 2 if piece.size > 2 else 1
+    start, stop = piece[half - 1], piece[half]
+    if start == stop:
+        return
+    way = (stop - start) / abs(stop - start)
+    ax.annotate(
+        "", (stop.real + 0.012 * way.real, stop.imag + 0.012 * way.imag), (stop.real, stop.imag), zorder=4,
+        arrowprops={"arrowstyle": "-|>", "color": BLUE, "lw": 0.8, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 9},
+    )  # fmt: skip
+
+
+def _headings(name: str, data: Nyquist, ax: Axes) -> None:
+    """The verdict and the count above each disc."""
+    verdict = data.verdict
+    ax.set_title(
+        f"{name}{': ' * bool(name)}{verdict.verdict.upper()}\n{gains_words(verdict.loop.law)}\n"
+        f"encirclements of −1: {data.encirclements:d};  unstable poles: {verdict.unstable_roots}",
+        fontsize=9.0, loc="center",
+    )  # fmt: skip
+
+
+def _legend() -> tuple[list[Line2D], list[str]]:
+    handles = [
+        Line2D([], [], color=BLUE, lw=1.3),
+        Line2D([], [], color=BLUE, lw=0.6, alpha=0.55),
+        Line2D([], [], color=BLUE, lw=0.8, ls=(0, (3, 1.5))),
+        Line2D([], [], color=ORANGE, ls="none", marker="+", ms=9, mew=2.0),
+    ]
+    return handles, ["ω > 0, arrows as it rises", "ω < 0", "past a pole on the axis", "the point −1"]
