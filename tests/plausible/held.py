@@ -96,6 +96,9 @@ def held(model, count, period, delay, C=None, top=np.inf):
     J, static = model.beam.total_inertia, np.zeros(3)
     poles, rows = spectrum(model, count, C)
     static[2] = -(J - model.hub) / J + (rows[2] / poles).sum().real
+    if C == 0:  # the angle of the modes left out
+        omega, shapes = model.modes
+        static[0] = (((model.b @ shapes) / omega)[count:] ** 2).sum()
     if C:
         poles, rows = np.r_[poles, -1 / C], np.column_stack([rows, [0, 0, static[2] / C, 0]])
         poles, rows, gone = lumped(poles, rows, period * (1 - delay % 1), top)
