@@ -10,11 +10,13 @@ from tests.loop.agreement import some_free_arm, some_gains
 from tests.loop.ritz_loop import RitzLoop
 from tfarm import HubFeedback
 from tfarm.arm import law_of, many_laws
+from tfarm.errors import ConvergenceError
 from tfarm.loop import damping
 from tfarm.loop.damping import band_and_real_poles, band_poles, is_oscillating, least_damping
 from tfarm.loop.frequencies import band_of
 from tfarm.loop.plant import Loop
 from tfarm.loop.poles import poles_below
+from tfarm.reduced import tailed_model
 
 LAB = tfarm.load("sasaki2012-lab")
 
@@ -66,3 +68,41 @@ def test_next_to_the_clamped_hub_a_larger_model_is_asked_before_a_box(monkeypatc
     for own, box in zip(found, boxed, strict=True):
         box = box[is_oscillating(box) & (box.imag < top)]
         np.testing.assert_allclose(np.sort_complex(own[~np.isnan(own)]), np.sort_complex(box), rtol=1e-9)
+
+
+def test_a_hub_as_good_as_clamped_needs_no_larger_model(monkeypatch):
+    """A light hub that K2 nearly clamps: designs took 20 s and more, in models of 31 and 101 modes and in boxes."""
+    arm = tfarm.load("stocky-steel")
+    arm = replace(arm, link=replace(arm.link, density=58453563.61002201))
+    K1, K2, top = np.geomspace(1.0, 1e4, 5).repeat(4), np.tile([-2, 0.5, 0.95, 0.9972], 5), band_of(arm, 1)
+    model = RitzLoop(arm, 12)
+    monkeypatch.setattr(damping, "BEYOND", damping.BEYOND[:1])
+    monkeypatch.setattr(damping, "poles_below", None)
+    for own, a, b in zip(band_poles(arm, many_laws(HubFeedback(), K1=K1, K2=K2), 1), K1, K2, strict=True):
+        s = model.eigenvalues(HubFeedback(K1=float(a), K2=float(b)))
+        s = s[is_oscillating(s) & (s.imag < top)]
+        np.testing.assert_allclose(np.sort_complex(own[~np.isnan(own)]), np.sort_complex(s), rtol=1e-6)
+
+
+def test_modes_that_cannot_be_followed_are_sought_once_and_left_to_a_box(monkeypatch):
+    """A heavy arm of much damping, and a law that makes two poles one: 20 s went into 101 modes, then nothing came."""
+    arm = tfarm.load("sasaki2012-as-printed")
+    section = replace(arm.link.section, area=0.5471584437514746)
+    arm = replace(arm, link=replace(arm.link, damping=0.02, section=section))
+    sought, laws = [], many_laws(HubFeedback(K2=-1.29253472), K1=np.array([10.9546321, 10.9546322]))
+
+    def lost(arm, count):
+        sought.append(count)
+        if count > 6:
+            raise ConvergenceError("lost", None, None)
+        return tailed_model(arm, count)
+
+    monkeypatch.setattr(damping, "tailed_model", lost)
+    damping._model.cache_clear()
+    found = [band_and_real_poles(arm, laws, 1) for _ in range(2)]
+    damping._model.cache_clear()
+    assert sought == [6, 31]
+    np.testing.assert_array_equal(*found)
+    boxed = poles_below(Loop(arm, law_of(laws[:, 0])), band_of(arm, 1)).moving
+    own = found[0][0]
+    np.testing.assert_allclose(np.sort_complex(own[~np.isnan(own)]), np.sort_complex(boxed), rtol=1e-8)

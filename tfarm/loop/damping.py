@@ -1,8 +1,8 @@
 """The damping of a band's modes for many gains at once: eigenvalues of a modal model, made exact by Newton's method.
 
 The modal model only says where to start: each closed-loop eigenvalue is corrected on the transcendental characteristic
-function, all gains and modes together.  Where one did not settle near its start (next to K2 = 1 a model needs many
-modes) a larger model is asked, and at last all are found again in a box.
+function, all gains and modes together.  Where one did not settle near its start a larger model is asked, and at last
+all are found again in a box.
 """
 
 from __future__ import annotations
@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import FED_BACK, Arm, law_of
+from tfarm.arm import Arm, law_of
+from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import dimensionless, quick_characteristics
 from tfarm.exact.coefficients import coefficients
-from tfarm.reduced import ModalModel, modal_model
+from tfarm.reduced import ModalModel, tailed_model
 
 from .frequencies import band_of
 from .plant import Loop
@@ -27,7 +28,7 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
 Kind = Callable[[Complex, float], NDArray[np.bool_]]  # which poles below a top frequency are meant
 
-BEYOND = (5, 30, 100)  # modes of the model above those of the band; the next where those do not do
+BEYOND = (5, 30)  # modes of the model above those of the band; more where those do not do, a box where these do not
 STEPS = 6  # of Newton's method: the start is right to a few digits, so the last ones change nothing
 SETTLED, NEAR = 1e-9, 0.05  # shares of |s|: of the last correction, and of the whole way from the start
 BLOCK = 4000  # gains at a time
@@ -86,7 +87,12 @@ def _of_block(kind: Kind, arm: Arm, laws: Real, number: int, top: float) -> Comp
     """The poles (n, slots) of one block."""
     poles, left = np.empty((laws.shape[1], 0), complex), np.arange(laws.shape[1])
     for beyond in BEYOND:
-        found, is_done = _corrected(kind, arm, laws[:, left], number + beyond, top)
+        model = _model(arm, number + beyond)
+        if isinstance(model, ConvergenceError):
+            if beyond == BEYOND[0]:  # boxes for all of them would take minutes
+                raise model
+            break
+        found, is_done = _corrected(kind, model, laws[:, left], top)
         poles, left = _filled(poles, left[is_done], found[is_done]), left[~is_done]
         if not left.size:
             return poles
@@ -105,25 +111,24 @@ def _filled(poles: Complex, rows: NDArray[np.int64], found: Complex) -> Complex:
     return poles
 
 
-def _corrected(kind: Kind, arm: Arm, laws: Real, modes: int, top: float) -> tuple[Complex, NDArray[np.bool_]]:
-    """The exact poles next to those of a model with so many modes, and for which laws all settled apart."""
-    starts = _eigenvalues(arm, laws, modes)
+def _corrected(kind: Kind, model: ModalModel, laws: Real, top: float) -> tuple[Complex, NDArray[np.bool_]]:
+    """The exact poles next to those of a model, and for which laws all settled apart."""
+    starts = np.linalg.eigvals(model.closed(laws.T)[0]).astype(complex)
     wanted = kind(starts, 1.2 * top)
     order = np.argsort(~wanted, axis=1, kind="stable")[:, : max(1, int(wanted.sum(1).max()))]
     s = np.where(np.take_along_axis(wanted, order, 1), np.take_along_axis(starts, order, 1), np.nan)
-    polished, settled = _newton(arm, s, laws)
+    polished, settled = _newton(model.arm, s, laws)
     poles = np.where(kind(polished, top), polished, np.nan)
     return poles, settled.all(1) & _are_distinct(poles)
 
 
-def _eigenvalues(arm: Arm, laws: Real, modes: int) -> Complex:
-    """Eigenvalues of the modal model with so many modes under each law: (gains, states)."""
-    return np.linalg.eigvals(_model(arm, modes).closed(laws.T)[0]).astype(complex)
-
-
 @lru_cache(maxsize=16)
-def _model(arm: Arm, count: int) -> ModalModel:
-    return modal_model(arm, FED_BACK, count)
+def _model(arm: Arm, count: int) -> ModalModel | ConvergenceError:
+    """The model with so many modes, or why they cannot be followed to the arm's damping: asked for again and again."""
+    try:
+        return tailed_model(arm, count)
+    except ConvergenceError as error:
+        return error
 
 
 def _newton(arm: Arm, starts: Complex, laws: Real) -> tuple[Complex, NDArray[np.bool_]]:

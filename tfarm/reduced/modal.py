@@ -8,6 +8,7 @@ At C > 0 the undamped modes do not diagonalise the damping, so the residues are 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -15,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm
+from tfarm.arm import FED_BACK, Arm
 from tfarm.arm.checks import whole
 from tfarm.errors import ParameterError
 from tfarm.exact.coefficients import Coefficients, coefficients
@@ -104,6 +105,36 @@ def relaxed_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None)
     expansion = np.array(expansions_at_zero(coefficients(arm), model.rows, share))
     slope = expansion[:, 3] + (model.residues / model.eigenvalues**2).real.sum(axis=(1, 2))
     return replace(model, static=model.static + slope / C, relaxation=-slope / C)
+
+
+def tailed_model(arm: Arm, count: int) -> ModalModel:
+    """The modal model of what a law feeds back, with one pair of poles more in the place of all modes left out.
+
+    To the hub angle these add  sum of b^2/(s^2 + w^2 (1 + C s)) ~ rho/(s^2 + W^2 (1 + C s)),  and to the root moment
+    -I_h w^2 times as much; rho and W such that without damping both sides agree at s = 0 and s = w of the last mode.
+    Where a law changes what the hub weighs few modes do then: those of a free hub make up a clamped one but slowly.
+    """
+    model = modal_model(arm, FED_BACK, count)
+    undamped = modal_model(arm.having(damping=0.0), "hub_angle", count)
+    s, whole = float(undamped.natural_frequency[-1]), float(undamped.static[0])
+    fallen = float((undamped(s) - transfer(undamped.arm, "hub_angle")(s))[0].real)
+    if not 0 < fallen < whole:  # what is left out drowns in rounding
+        return model
+    W2 = s**2 * (whole - fallen) / fallen
+    rho, half = whole * W2, arm.damping * W2 / 2
+    root = complex(np.emath.sqrt(half**2 - W2)) or 1e-6 * half  # a double pole has no residues
+    p = -half + root * np.array([1.0, -1.0])
+    numerators = {"hub_angle": rho + 0 * p, "hub_rate": rho * p, "root_moment": -arm.hub_inertia * W2 * rho + 0 * p}
+    tail = np.array([numerators[each.name] for each in model.rows]) / (2 * root) * np.array([1.0, -1.0])
+    return replace(
+        model,
+        index=np.r_[model.index, 0],
+        natural_frequency=np.r_[model.natural_frequency, math.sqrt(W2)],
+        eigenvalues=np.r_[model.eigenvalues, p[None]],
+        residues=np.concatenate([model.residues, tail[:, None]], axis=1),
+        static=model.static + (tail / p).real.sum(axis=1),
+        participation=np.r_[model.participation, math.sqrt(rho)],
+    )
 
 
 def proper(k: Coefficients, wanted: Output, share: float) -> Output:
