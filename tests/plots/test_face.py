@@ -10,7 +10,9 @@ from matplotlib import pyplot
 from matplotlib.figure import Figure
 
 import tfarm
+from tfarm.dsp import gain_map
 from tfarm.loop.nyquist import compressed
+from tfarm.plots.plane import colours
 
 mpl.use("Agg")
 
@@ -30,11 +32,15 @@ def no_figure_left_open():
 @pytest.fixture(scope="module")
 def records():
     """By the name of the plot: what it takes, and how many axes it draws in (0: one that is no sequence)."""
+    K1, K2 = np.linspace(0.05, 2.0, 40), np.linspace(-1.0, 1.5, 41)
+    plane, loop = tfarm.map(LAB, K1, K2), tfarm.sampled(LAB, LAW).verdict.loop
     return {
-        "bode": (tfarm.bode(LAB, "root_moment", (1.0, 300.0)), 2),
-        "modes": (tfarm.modes(LAB, count=3), 3),
-        "nyquist": (tfarm.nyquist(LAB, LAW), 0),
-        "sketch": (LAB, 0),
+        "bode": ([tfarm.bode(LAB, "root_moment", (1.0, 300.0))], 2),
+        "gain_map": ([plane], 0),
+        "modes": ([tfarm.modes(LAB, count=3)], 3),
+        "nyquist": ([tfarm.nyquist(LAB, LAW)], 0),
+        "overlay": ([plane, gain_map(loop, K1, K2)], 0),
+        "sketch": ([LAB], 0),
     }
 
 
@@ -51,7 +57,7 @@ def as_tuple(axes):
 def test_axes_given_are_the_axes_returned_and_nothing_else_is_opened(name, records):
     record, count = records[name]
     given = axes_for(count)
-    returned = getattr(tfarm.plots, name)(record, ax=given)
+    returned = getattr(tfarm.plots, name)(*record, ax=given)
     assert as_tuple(returned) == as_tuple(given)
     assert all(ax.lines or ax.images or ax.collections for ax in as_tuple(returned))
     assert pyplot.get_fignums() == []
@@ -62,7 +68,7 @@ def test_without_axes_a_figure_is_made_in_the_look_of_the_pages(name, records):
     """Whatever the user's settings are, and though matplotlib makes ticks only when it draws."""
     record, count = records[name]
     with mpl.rc_context({"xtick.labelsize": 31.0, "axes.labelsize": 31.0, "font.size": 31.0}):
-        axes = as_tuple(getattr(tfarm.plots, name)(record))
+        axes = as_tuple(getattr(tfarm.plots, name)(*record))
         (number,) = pyplot.get_fignums()
         figure = pyplot.figure(number)
         assert {ax.get_figure() for ax in axes} == {figure}
@@ -75,7 +81,7 @@ def test_without_axes_a_figure_is_made_in_the_look_of_the_pages(name, records):
 
 
 def test_bode_draws_the_response(records):
-    data, _ = records["bode"]
+    (data,), _ = records["bode"]
     upper, lower = tfarm.plots.bode(data, ax=axes_for(2))
     (curve,) = (line for line in upper.lines if line.get_label() == "flexible arm, exact")
     assert curve.get_xdata().tolist() == data.omega.tolist()
@@ -87,7 +93,7 @@ def test_bode_draws_the_response(records):
 
 def test_nyquist_draws_the_loop_function_with_its_verdict(records):
     """Off the arcs past poles every point of the contour is on a line, at r/(1 + r) for its size r."""
-    data, _ = records["nyquist"]
+    (data,), _ = records["nyquist"]
     ax = tfarm.plots.nyquist(data, ax=axes_for(0), name="mine")
     drawn = {complex(x, y) for line in ax.lines for x, y in zip(*line.get_data(), strict=True)}
     assert set(compressed(data.L)[~data.is_arc].tolist()) <= drawn
@@ -99,7 +105,7 @@ def test_nyquist_draws_the_loop_function_with_its_verdict(records):
 
 
 def test_modes_draws_the_shapes_with_their_nodes(records):
-    found, _ = records["modes"]
+    (found,), _ = records["modes"]
     axes = tfarm.plots.modes(found, ax=axes_for(3))
     shapes = found.shape(axes[0].lines[1].get_xdata())
     for ax, index in zip(axes, (1, 2, 3), strict=True):
@@ -110,6 +116,37 @@ def test_modes_draws_the_shapes_with_their_nodes(records):
         assert nodes.tolist() == found.nodes[at].tolist()
         assert f"{found.natural_frequency[at]:.7g} rad/s" in ax.get_title("left")
         assert ("[m]" in ax.get_xlabel(), ax.get_ylabel()[-3:]) == (True, "[-]")
+
+
+def test_gain_map_draws_the_boundary_and_the_counts(records):
+    """Every point of the record's boundary that is in the picture is on the line, and each pixel is a count."""
+    (found,), _ = records["gain_map"]
+    ax = tfarm.plots.gain_map(found, ax=axes_for(0))
+    (line,) = (line for line in ax.lines if "exact" in str(line.get_label()))
+    K1, K2, _ = found.boundary.T
+    inside = (K1 > 0.05) & (K1 < 2.0) & (K2 > -1.0) & (K2 < 1.5)
+    drawn = set(zip(*(x.tolist() for x in line.get_data()), strict=True))
+    assert inside.any()
+    assert set(zip(K1[inside].tolist(), K2[inside].tolist(), strict=True)) <= drawn
+    (image,) = ax.images
+    assert np.array_equal(image.get_array(), colours(found.unstable))
+    assert ("[N m s/rad]" in ax.get_xlabel(), ax.get_ylabel()[-3:]) == (True, "[−]")
+    texts = {text.get_text() for text in ax.texts}
+    assert {"stable", "2 unstable poles"} <= texts
+
+
+def test_overlay_draws_both_regions_edges(records):
+    (plane, sampled), _ = records["overlay"]
+    ax = tfarm.plots.overlay(plane, sampled, ax=axes_for(0))
+    drawn = {(float(x), float(y)) for line in ax.lines for x, y in zip(*line.get_data(), strict=True)}
+    for region in (plane, sampled):
+        columns = zip(region.K1.tolist(), region.stable_intervals, strict=True)
+        ends = {(K1, end) for K1, column in columns for window in column for end in window}
+        assert len(ends) > 40
+        assert ends <= drawn
+    assert (LAW.K1, LAW.K2) in drawn
+    legend = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert "K1 = 0.3, K2 = 0.3" in legend
 
 
 def test_of_more_modes_than_axes_the_first_are_drawn():

@@ -16,18 +16,20 @@ from tfarm.dsp import Chain
 from tfarm.dsp.chain import Sampling
 from tfarm.dsp.loop import sampled_loop
 from tfarm.errors import ConvergenceError
+from tfarm.loop import edges
 from tfarm.loop.damping import least_damping
+from tfarm.loop.edges import Axis, moment_axis, rate_axis, stable_edge
 from tfarm.loop.nyquist import compressed, nyquist, nyquist_of
 from tfarm.loop.plant import Loop
 from tfarm.loop.poles import closed_loop_poles
 from tfarm.loop.stability import stability
+from tfarm.plots.plane import nice_levels
 from tfarm.report import loop_laws, loop_section, map, write, writing
 from tfarm.report.loci import loci, shown, zoomed
 from tfarm.report.locus_section import beyond_table
 from tfarm.report.loop_laws import NamedLaw, has_loop, margins_of
 from tfarm.report.loop_section import map_section, margins_section
-from tfarm.report.map import Axis, gain_map, map_data, moment_axis, rate_axis, stable_edge
-from tfarm.report.map_picture import draw_map, nice_levels
+from tfarm.report.map import draw_map, gain_map, map_data
 from tfarm.report.margins_table import NOTHING, margin_table
 from tfarm.spectrum.scales import PAPER_GAINS, default_gains, rate_unit
 from tfarm.tables.files import as_json
@@ -66,7 +68,9 @@ def coarse():
 
 def test_the_edge_drawn_has_poles_on_the_axis(lab):
     """1 + L(i w) = 0 at each point of the edge, L by the loop function, which the edge was not made with."""
-    points = stable_edge(lab)[:: max(1, len(stable_edge(lab)) // 25)]
+    points = stable_edge(lab.region, lab.edge, lab.x, lab.y)[
+        :: max(1, len(stable_edge(lab.region, lab.edge, lab.x, lab.y)) // 25)
+    ]
     assert len(points) > 10
     for K1, K2, omega in points:
         loop = Loop(LAB, HubFeedback(K1=K1, K2=K2))
@@ -81,7 +85,7 @@ def _single(K1, K2):
 def test_the_edge_is_smooth_and_inside_the_picture(lab):
     """Neighbours lie close as seen, so that what is drawn between them is the curve itself."""
     places = np.stack([lab.x.place(lab.edge[:, 0]), lab.y.place(lab.edge[:, 1])])
-    assert np.nanmax(np.hypot(*np.diff(places))) < map.LONG
+    assert np.nanmax(np.hypot(*np.diff(places))) < edges.LONG
     assert np.isnan(lab.edge[-1]).all()
 
 
@@ -95,7 +99,7 @@ def test_no_part_of_the_edge_is_missing(lab):
             if axis == 1 and lab.region.K1[column] < 0 < lab.region.K1[column + 1]:
                 continue  # the line K1 = 0 is drawn on its own
             beside = across[column] + (0.5 / map.COLUMNS) * axis, up[row] + (0.5 / map.ROWS) * (1 - axis)
-            assert np.hypot(*(edge - beside).T).min() < map.SHORT
+            assert np.hypot(*(edge - beside).T).min() < edges.SHORT
 
 
 @pytest.mark.parametrize("column", [20, 120, 200])
@@ -137,7 +141,7 @@ def test_the_ranges_show_what_there_is():
     for arm in (LAB, STOCKY):
         omega = tfarm.modes(arm, 1).natural_frequency[-1]
         assert rate_axis(arm).high == pytest.approx(10 * arm.total_inertia * omega, rel=1e-14, abs=0)
-    assert moment_axis(LAB, rate_axis(LAB)).low == map.LOW
+    assert moment_axis(LAB, rate_axis(LAB)).low == edges.LOW
     deep = moment_axis(window_arm(), rate_axis(window_arm()))
     assert deep.low < -11.47
     assert not deep.is_linear
@@ -296,11 +300,11 @@ def test_the_sign_convention_stands_wherever_K2_does(coarse, monkeypatch):
 def test_the_sampled_edge_on_the_map_is_where_a_pole_meets_the_circle(lab):
     """Just inside every pole of the sampled loop decays, just outside one grows: by eigenvalues, at the edge's ends."""
     assert lab.sampled is not None
-    loop = sampled_loop(LAB, lab.laws[0].law, Chain(), count=lab.sampled.modes)
-    columns = [i for i, column in enumerate(lab.sampled.intervals) if column][::20]
+    loop = sampled_loop(LAB, lab.laws[0].law, Chain(), count=lab.sampled.modes_used)
+    columns = [i for i, column in enumerate(lab.sampled.stable_intervals) if column][::20]
     assert len(columns) >= 4
     for i in columns:
-        K1, (low, high) = float(lab.sampled.K1[i]), lab.sampled.intervals[i][0]
+        K1, (low, high) = float(lab.sampled.K1[i]), lab.sampled.stable_intervals[i][0]
         step = 1e-4 * (high - low)
         growth = [loop.having(K1=K1, K2=K2).poles.log_spectral_radius for K2 in (low + step, high - step)]
         assert max(growth) < 0

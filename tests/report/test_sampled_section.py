@@ -10,6 +10,7 @@ import pytest
 
 import tfarm
 from tfarm.arm import HubFeedback
+from tfarm.crossing import pieces
 from tfarm.digits import scientific
 from tfarm.dsp import Chain, Simulator, analyse, sampled_loop, sampled_verdict, scenario, stable_windows
 from tfarm.dsp.chain import Sampling
@@ -18,7 +19,6 @@ from tfarm.loop.windows import gain_windows
 from tfarm.plots.files import save
 from tfarm.report.discrete_loci import loci, loci_table
 from tfarm.report.overlay import CUT, K2_RANGE, draw_overlay, overlay, overlay_table
-from tfarm.report.region_pieces import pieces
 from tfarm.report.sampled_section import sampled_section
 from tfarm.report.sampled_words import Sampled, compared, cure, duration, interval, short_answer
 from tfarm.report.strip_chart import draw_strip_chart, strip_chart
@@ -60,18 +60,19 @@ def test_the_map_of_both_regions_is_what_poles_say():
     for i in random.integers(0, data.continuous.K1.size, 6):
         K1 = float(data.continuous.K1[i])
         for K2 in random.uniform(*K2_RANGE, 2):
-            inside = [any(a < K2 < b for a, b in layer.intervals[i]) for layer in (data.continuous, *data.sampled)]
+            regions = (data.continuous, *data.sampled)
+            inside = [any(a < K2 < b for a, b in each.stable_intervals[i]) for each in regions]
             law = tfarm.HubFeedback(K1=K1, K2=float(K2))
             assert inside == [stability(LAB, law).is_stable, loop.having(K1=K1, K2=float(K2)).poles.is_stable]
 
 
 def test_the_edges_at_the_default_gains_are_published_ones(section):
     data = PLANE()
-    edges = [np.interp(math.log(0.3), np.log(data.continuous.K1), [c[0][1] for c in data.continuous.intervals])]
+    edges = [np.interp(math.log(0.3), np.log(data.continuous.K1), [c[0][1] for c in data.continuous.stable_intervals])]
     sampled = data.sampled[0]
     stable = slice(0, int(np.searchsorted(sampled.K1, 5.0)))
     for side in (0, 1):
-        ends = [column[0][side] for column in sampled.intervals[stable]]
+        ends = [column[0][side] for column in sampled.stable_intervals[stable]]
         edges.append(np.interp(0.3, sampled.K1[stable], ends))
     assert edges == pytest.approx([1.0305, -0.1526, 1.1639], abs=2e-3)  # linear between columns 12 % apart
     assert "below 1.0305" in " ".join(section.words)
@@ -81,11 +82,11 @@ def test_the_edges_at_the_default_gains_are_published_ones(section):
 def test_without_damping_the_layers_are_nested_at_the_gains_and_say_for_how_many_modes(monkeypatch):
     monkeypatch.setattr("tfarm.report.overlay.COLUMNS", 16)
     data = overlay(PAPER, GAINS, Chain())
-    assert [layer.damping for layer in data.sampled] == [1e-4, 1e-6, 0.0]
-    assert data.sampled[-1].modes == 20
-    assert all(column == [(CUT[0], 1.0)] for column in data.continuous.intervals)
+    assert [layer.loop.plant.arm.damping for layer in data.sampled] == [1e-4, 1e-6, 0.0]
+    assert data.sampled[-1].modes_used == 20
+    assert all(column == [(CUT[0], 1.0)] for column in data.continuous.stable_intervals)
     i = int(np.searchsorted(data.continuous.K1, 0.3))
-    widths = [sum(b - a for a, b in layer.intervals[i]) for layer in data.sampled]
+    widths = [sum(b - a for a, b in layer.stable_intervals[i]) for layer in data.sampled]
     assert widths[0] > widths[1] > 1.1
     assert widths[2] < 0.05  # C = 0: a sliver
 

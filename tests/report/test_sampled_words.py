@@ -44,7 +44,7 @@ def data_of(name, period=0.01):
         modes=SimpleNamespace(natural_frequency=tfarm.modes(arm, 1).natural_frequency[-1:]),
     )  # fmt: skip
     windows = gain_windows(stability(arm, gains), "K2")
-    return Sampled(arm, analysis, windows, Overlay(arm, gains, period, (1, 2), None, ()), ())
+    return Sampled(arm, analysis, windows, Overlay(None, ()), ())
 
 
 def number(text):

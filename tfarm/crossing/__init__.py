@@ -4,6 +4,18 @@ The curve may be the imaginary axis or the unit circle; nothing here knows what 
 """
 
 from tfarm.crossing.line import Crossing, Crossings, bisected, brackets, solved
+from tfarm.crossing.pieces import RegionPiece, pieces
 from tfarm.crossing.plane import counts_over, intervals, joined
 
-__all__ = ["Crossing", "Crossings", "bisected", "brackets", "counts_over", "intervals", "joined", "solved"]
+__all__ = [
+    "Crossing",
+    "Crossings",
+    "RegionPiece",
+    "bisected",
+    "brackets",
+    "counts_over",
+    "intervals",
+    "joined",
+    "pieces",
+    "solved",
+]

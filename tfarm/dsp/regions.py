@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -11,13 +12,15 @@ from numpy.typing import NDArray
 from tfarm.crossing import Crossings, counts_over, intervals
 from tfarm.dsp.boundary import circle_grid, crossings
 from tfarm.dsp.loop import SampledLoop
-from tfarm.dsp.margins import Window
+from tfarm.dsp.margins import Window, stable_windows
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 
 Real = NDArray[np.float64]
 
 MOST_GAINS = 4000
+ENDS_AT = (-0.9, 0.3, 0.9)  # K2 at which upright edges are looked for
+SIDE = 1e-9  # relative: so far to either side of such an edge a region is cut
 
 
 @dataclass(frozen=True)
@@ -63,6 +66,17 @@ def gain_map(loop: SampledLoop, K1: Sequence[float] | Real, K2: Sequence[float] 
     plane = GainMap(loop, rows, columns, counts_over(columns, found, first.K2, at_start), found)
     _check(plane)
     return plane
+
+
+def ends_of_K1(loop: SampledLoop) -> Real:
+    """Where stable intervals of K1 > 0 end, at a few K2: there the region has upright edges."""
+    found = [window for K2 in ENDS_AT for window in stable_windows(loop.having(K2=K2), "K1")]
+    return np.array(sorted({end for window in found for end in window if math.isfinite(end) and end > 0}))
+
+
+def with_both_sides(K1: Real, ends: Real) -> Real:
+    """Values of K1 ascending, and among them either side of each upright edge."""
+    return np.unique(np.concatenate([K1, ends * (1 - SIDE), ends * (1 + SIDE)]))
 
 
 def _check(plane: GainMap) -> None:

@@ -8,7 +8,9 @@ In the look of the report's pages, whose pictures these are.  This is the only r
 
 from tfarm.plots.disc import nyquist
 from tfarm.plots.frequency import bode
+from tfarm.plots.plane import gain_map
+from tfarm.plots.regions import overlay
 from tfarm.plots.shapes import modes
 from tfarm.plots.sketch import sketch
 
-__all__ = ["bode", "modes", "nyquist", "sketch"]
+__all__ = ["bode", "gain_map", "modes", "nyquist", "overlay", "sketch"]

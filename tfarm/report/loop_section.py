@@ -26,8 +26,7 @@ from tfarm.report.loop_laws import (
     typeset,
     why_no_loop,
 )
-from tfarm.report.map import GainMap, gain_map, map_data
-from tfarm.report.map_picture import draw_map
+from tfarm.report.map import GainMap, draw_map, gain_map, map_data
 from tfarm.report.margins_table import margin_table, verdict_facts, verdict_words, window_table
 from tfarm.report.nyquist import COMPARED, Curve, count_table, curve_data
 from tfarm.report.sections import Picture, Section
@@ -167,7 +166,7 @@ def _map_caption(data: GainMap) -> str:
     )
     sampled = NOT_SAMPLED if data.sampled is None else SAMPLED
     clock = f"{plain(1e3 * data.chain.sampling.period)} ms"
-    modes = 0 if data.sampled is None else data.sampled.modes
+    modes = 0 if data.sampled is None else data.sampled.modes_used
     return seen + sampled.format(clock=clock, modes=modes) + DEPTH * (not data.is_undamped)
 
 

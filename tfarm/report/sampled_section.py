@@ -59,7 +59,7 @@ def sampled_section(arm: Arm, chain: Chain | None = None) -> Section:
 def _overlay_picture(data: Sampled) -> Picture:
     regions = data.regions
     below = ", and nothing is stable at K1 < 0" if data.arm.has_rigid_mode else ""
-    low = plain(regions.K1_range[0], 2)
+    low = plain(float(regions.continuous.K1[0]), 2)
     layers = (
         "Nested blues: C = 0 (for the first modes only), and what the same arm would do with a little damping. "
         if len(regions.sampled) > 1

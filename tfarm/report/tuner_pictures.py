@@ -14,7 +14,7 @@ from tfarm.arm import Arm
 from tfarm.digits import plain, significant
 from tfarm.dsp import Simulation
 from tfarm.plots.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, blank, headline, style
-from tfarm.report.overlay import Overlay, regions
+from tfarm.report.overlay import Overlay, in_picture
 from tfarm.report.time_responses import motor_torque, root_moment, tip_error
 from tfarm.report.tuner_study import CostMap, Curves, TunerStudy
 from tfarm.tuner import Tuning
@@ -31,7 +31,7 @@ def draw_gain(data: TunerStudy, plane: Overlay) -> Figure:
     with style():
         figure = blank(9.0, 4.9)
         left, right = figure.subplots(1, 2, sharey=True, width_ratios=[1.0, 1.35])
-        regions(plane, ax=left)
+        in_picture(plane, ax=left)
         left.get_legend().remove()
         left.set_title("", loc="right")
         path(data.tuning, ax=left)

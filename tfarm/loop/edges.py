@@ -1,0 +1,160 @@
+"""The plane of both gains as it is drawn: axes, and the exact stability boundary fine enough for a picture.
+
+The boundary of a `Region` is known at the frequencies of the arm's grid.  Where a segment of it would be seen as one,
+the D-decomposition is evaluated between; where the curve leaves the picture, or runs through infinity, it is cut.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import Arm, HubFeedback
+from tfarm.spectrum.scales import default_gains, rate_unit
+
+from .lines import along, crossing_at_zero
+from .regions import Region, between, boundary, region
+
+Real = NDArray[np.float64]
+
+LOG_BASE = math.log(10.0)
+LINEAR_SCALE = 0.5  # decades that the linear part of an axis takes on each side of 0, as matplotlib's `linscale` has it
+LINEAR_SHARE = LINEAR_SCALE / (1 - 1 / 10)  # what these are multiplied by there
+EVEN = 1e-9  # of its range: by less may the steps of an even grid differ
+LOW, HIGH, DEEPEST = -4.0, 2.0, -50.0  # K2: the range shown, and how deep windows are looked for
+SHORT, LONG, ROUNDS = 0.008, 0.03, 30  # lengths of the boundary's segments, as shares of the picture
+SCAN = 32  # columns in which they are looked for
+NEAR = 1.5  # beyond this many rows from the boundary the count must have changed
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One axis of the map: linear within +-`linear`, logarithmic beyond (all linear where `linear` is infinite)."""
+
+    low: float
+    high: float
+    linear: float = math.inf
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether it is linear throughout."""
+        return math.isinf(self.linear)
+
+    def place(self, x: Real) -> Real:
+        """Where values are along the axis, 0 to 1."""
+        low, high = self._stretched(np.array([self.low, self.high]))
+        return np.asarray((self._stretched(np.asarray(x, float)) - low) / (high - low))
+
+    def grid(self, number: int) -> Real:
+        """So many values, evenly spaced as seen."""
+        low, high = self._stretched(np.array([self.low, self.high]))
+        y = between(low, high, number)
+        if self.is_linear:
+            return y
+        beyond = self.linear * np.exp((abs(y) / self.linear - LINEAR_SHARE) * LOG_BASE)
+        return np.asarray(np.where(abs(y) <= self.linear * LINEAR_SHARE, y / LINEAR_SHARE, np.sign(y) * beyond))
+
+    def _stretched(self, x: Real) -> Real:
+        """Proportional to x up to `linear`, then a decade as long as `linear`: matplotlib's "symlog"."""
+        if self.is_linear:
+            return x
+        decades = np.log(np.maximum(abs(x), self.linear)) / LOG_BASE
+        beyond = self.linear * (LINEAR_SHARE - math.log(self.linear) / LOG_BASE + decades)
+        return np.asarray(np.where(abs(x) <= self.linear, x * LINEAR_SHARE, np.sign(x) * beyond))
+
+    @classmethod
+    def of(cls, values: Real) -> Axis:
+        """That on which a grid (n,), ascending, is nearly even: linear, or logarithmic beyond its smallest size."""
+        low, high = float(values[0]), float(values[-1])
+        if np.ptp(np.diff(values)) <= EVEN * (high - low):
+            return cls(low, high)
+        return cls(low, high, float(abs(values[values != 0]).min()))
+
+
+def rate_axis(arm: Arm) -> Axis:
+    """K1 from just below 0 to 10 J w1, logarithmic from well below the default gain on."""
+    unit = rate_unit(arm)
+    linear = 10.0 ** math.floor(math.log10(default_gains(arm).K1))
+    return Axis(-linear, 10 * unit, linear)
+
+
+def moment_axis(arm: Arm, x: Axis) -> Axis:
+    """K2 from -4 to 2, or as deep as unstable windows go."""
+    if arm.is_undamped:
+        return Axis(LOW, HIGH)
+    K1 = x.grid(SCAN)
+    deep = region(arm, K1[K1 > 0], between(DEEPEST, LOW, 400))
+    rows = np.nonzero(~deep.stable.all(axis=1))[0]
+    if not rows.size:
+        return Axis(LOW, HIGH)
+    return Axis(max(DEEPEST, 1.4 * float(deep.K2[rows[0]])), HIGH, 2.0)
+
+
+def edge(found: Region, x: Axis, y: Axis) -> Real:
+    """The boundary in the picture, finer where it is coarse, with rows of nan between its parts."""
+    points = found.boundary
+    if not points.size:
+        return points
+    for _ in range(ROUNDS):
+        length, is_seen = _segments(points, x, y)
+        (coarse,) = np.nonzero((length > SHORT) & is_seen)
+        if not coarse.size:
+            break
+        middle = np.sqrt(points[coarse, 2] * points[coarse + 1, 2])
+        middle = middle[(middle > points[coarse, 2]) & (middle < points[coarse + 1, 2])]
+        points = np.concatenate([points, boundary(found.arm, middle, found.Kp)])
+        points = points[np.unique(points[:, 2], return_index=True)[1]]
+    length, is_seen = _segments(points, x, y)
+    return _cut(points, is_seen & (length < LONG))
+
+
+def _segments(points: Real, x: Axis, y: Axis) -> tuple[Real, NDArray[np.bool_]]:
+    """How long each segment looks, and whether it may pass through the picture."""
+    places = np.stack([axis.place(points[:, i]) for i, axis in enumerate((x, y))])
+    low, high = np.minimum(places[:, 1:], places[:, :-1]), np.maximum(places[:, 1:], places[:, :-1])
+    return np.hypot(*np.diff(places)), np.asarray(((high >= 0) & (low <= 1)).all(axis=0))
+
+
+def _cut(points: Real, kept: NDArray[np.bool_]) -> Real:
+    """The points that belong to kept segments, a row of nan after each run."""
+    belongs = np.r_[kept, False] | np.r_[False, kept]
+    rows: list[Real] = []
+    for i in np.nonzero(belongs)[0]:
+        rows.append(points[i])
+        if i == len(points) - 1 or not kept[i]:
+            rows.append(np.full(3, np.nan))
+    return np.array(rows).reshape(-1, 3)
+
+
+def stable_edge(found: Region, points: Real, x: Axis, y: Axis) -> Real:
+    """Of points (n, 3) of the boundary those in the picture with the stable region on one side, above or below."""
+    points = points[~np.isnan(points[:, 0])]
+    if not points.size:
+        return points
+    across, up = x.place(points[:, 0]), y.place(points[:, 1])
+    column = np.searchsorted(_middles(x.place(found.K1)), across)
+    row = np.interp(up, y.place(found.K2), np.arange(found.K2.size))
+    below, above = (np.clip(np.round(row + way).astype(int), 0, found.K2.size - 1) for way in (-NEAR, NEAR))
+    differ = (found.unstable[below, column] == 0) != (found.unstable[above, column] == 0)
+    return np.asarray(points[differ & (up >= 0) & (up <= 1) & (across <= 1) & (points[:, 0] > 0)])
+
+
+def _middles(values: Real) -> Real:
+    return np.asarray((values[1:] + values[:-1]) / 2)
+
+
+def seen(found: Region, x: Axis, y: Axis) -> Region:
+    """The counts of a map on a grid that is even as seen: at each of its points those of the nearest one computed."""
+    K1, K2 = x.grid(found.K1.size), y.grid(found.K2.size)
+    rows, columns = np.searchsorted(_middles(found.K2), K2), np.searchsorted(_middles(found.K1), K1)
+    return replace(found, K1=K1, K2=K2, unstable=found.unstable[np.ix_(rows, columns)])
+
+
+def static_edges(found: Region) -> tuple[float | None, float | None]:
+    """Where a real pole passes through 0: the K1 of an upright line of the boundary, and the K2 of a level one."""
+    upright = crossing_at_zero(found.arm, along("K1", HubFeedback(Kp=found.Kp)))
+    level = crossing_at_zero(found.arm, along("K2", HubFeedback(K1=1.0, Kp=found.Kp)))
+    return None if upright is None else upright.t, None if level is None else level.t

@@ -1,0 +1,273 @@
+"""The plane of both gains: colours for the exact count, lines for the exact boundary, contours of the least damping."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+from matplotlib.ticker import FuncFormatter, NullFormatter, SymmetricalLogLocator
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from tfarm.arm import Arm, HubFeedback
+from tfarm.crossing import RegionPiece, pieces
+from tfarm.digits import SUPERSCRIPT, plain, significant
+from tfarm.dsp import GainMap
+from tfarm.loop.edges import LINEAR_SCALE, Axis, edge, seen, stable_edge, static_edges
+from tfarm.loop.regions import INFINITE, Region
+from tfarm.spectrum import modes
+
+from .style import BLUE, GREY, INK, ORANGE, PURPLE, headline, settled, style, window
+
+Real = NDArray[np.float64]
+
+STABLE, FEWEST, MOST, BOUNDLESS = "#dcefe6", "#fbeadd", "#eebd95", "#f3d9c6"
+STEPS, MOST_LEVELS = (1.0, 2.0, 5.0), 7  # of the contours
+LEAST_AREA = 0.004  # of the picture: smaller regions are not labelled
+LETTER = (0.01, 0.018)  # of the picture's width and height: what a letter takes, across and upright
+MARKS = 7  # frequencies written along the boundary
+DIAMOND, STAR = "D", "*"  # of laws
+K2_TICKS = (-50, -20, -10, -5, -2, -1, 0, 1, 2)
+
+
+def gain_map(found: Region, *, ax: Axes | None = None) -> Axes:
+    """The plane of K1 and K2 (what `tfarm.map` returns), in the axes given or in new ones; the axes.
+
+    Colours for the number of unstable poles, a black line for the exact boundary with frequencies [rad/s] along it.
+    """
+    x, y = Axis.of(found.K1), Axis.of(found.K2)
+    with style():
+        if ax is None:
+            figure = window(7.0, 5.4)
+            ax = gain_map(found, ax=figure.subplots())
+            figure.legend(loc="outside lower left", ncols=2)
+            headline(figure, f"{found.arm.name}: unstable poles over the plane of both gains")
+            settled(figure)
+            return ax
+        ground(found, x, y, ax)
+        boundary(found, edge(found, x, y), x, y, ax)
+        count_labels(found, x, y, ax)
+    return ax
+
+
+def ground(found: Region, x: Axis, y: Axis, ax: Axes) -> None:
+    """Both axes, and the colours of the count."""
+    _scale(x, y, ax)
+    ax.imshow(
+        colours(seen(found, x, y).unstable), extent=(0, 1, 0, 1), transform=ax.transAxes, origin="lower", aspect="auto",
+        interpolation="nearest", zorder=0.1,
+    )  # fmt: skip
+
+
+def colours(unstable: NDArray[np.int64]) -> Real:
+    """Green where stable, orange the stronger the more poles are unstable."""
+    share = np.clip((unstable - 1) / max(1, unstable.max() - 1), 0, 1)[..., None]
+    low, high = np.array(to_rgb(FEWEST)), np.array(to_rgb(MOST))
+    image = low + share * (high - low)
+    image[unstable == INFINITE] = to_rgb(BOUNDLESS)
+    image[unstable == 0] = to_rgb(STABLE)
+    return np.asarray(image)
+
+
+def _scale(x: Axis, y: Axis, ax: Axes) -> None:
+    for axis, setter, limits, name in (
+        (x, ax.set_xscale, ax.set_xlim, ax.xaxis),
+        (y, ax.set_yscale, ax.set_ylim, ax.yaxis),
+    ):
+        if not axis.is_linear:
+            setter("symlog", linthresh=axis.linear, linscale=LINEAR_SCALE)
+            name.set_major_locator(SymmetricalLogLocator(base=10, linthresh=axis.linear))
+            name.set_major_formatter(FuncFormatter(_tick))
+            name.set_minor_formatter(NullFormatter())
+        limits(axis.low, axis.high)
+    if not y.is_linear:
+        ax.set_yticks([tick for tick in K2_TICKS if y.low <= tick <= y.high])
+    ax.grid(False)
+    stretched = "" if x.is_linear else f"; linear up to {plain(x.linear)}, logarithmic beyond"
+    ax.set_xlabel(f"K1, gain on the hub rate [N m s/rad]{stretched}")
+    ax.set_ylabel("K2, gain on the root moment [−]")
+
+
+def _tick(x: float, _: object = None) -> str:
+    return plain(x, 3) if abs(x) < 1e4 else f"10{str(round(math.log10(x))).translate(SUPERSCRIPT)}"
+
+
+def contours(K1: Real, K2: Real, damping: Real, ax: Axes) -> None:
+    """Of the least damping ratio (K2, K1), where it is a number: inside the stable region."""
+    if np.isnan(damping).all():
+        return
+    levels = nice_levels(float(np.nanmin(damping)), float(np.nanmax(damping)))
+    if not levels:
+        return
+    lines = ax.contour(K1, K2, np.ma.masked_invalid(damping), levels=levels, colors=BLUE, linewidths=0.9)
+    ax.clabel(lines, fmt=lambda level: f"{plain(100 * level, 3)} %", fontsize=8.0, inline_spacing=3)
+    ax.plot([], [], color=BLUE, lw=0.9, label="least damping ratio of the first two modes")
+
+
+def nice_levels(low: float, high: float) -> list[float]:
+    """1, 2 and 5 times powers of ten between two values, the highest few, and one more below the top."""
+    if high <= 0:
+        return []
+    top = math.floor(math.log10(high))
+    steps = sorted(step * 10.0**power for power in range(top - 4, top + 1) for step in STEPS)
+    levels = [level for level in steps if max(low, 0.0) < level < high][-MOST_LEVELS:]
+    more = [1.5 * levels[-1]] if levels and 1.5 * levels[-1] < high else []
+    return levels + more
+
+
+def boundary(found: Region, points: Real, x: Axis, y: Axis, ax: Axes) -> None:
+    """The exact edge (n, 3) with its frequencies; without damping the lines K1 = 0 and K2 = 1."""
+    if found.arm.is_undamped:
+        _undamped_boundary(found, x, y, ax)
+        return
+    ax.plot(points[:, 0], points[:, 1], color=INK, lw=1.6, label="poles on the axis at iω, exact")
+    upright, level = static_edges(found)
+    if upright is not None and x.low <= upright <= x.high:
+        ax.plot([upright, upright], [y.low, y.high], color=INK, lw=1.6)
+    if level is not None and y.low <= level <= y.high:
+        ax.plot([x.low, x.high], [level, level], color=INK, lw=1.6)
+    for K1, K2, omega in _chosen(stable_edge(found, points, x, y), x, y):
+        ax.plot([K1], [K2], "o", ms=4.0, mfc="white", mec=INK, mew=1.0, zorder=5)
+        ax.annotate(
+            f"{significant(omega, 3)}", (K1, K2), textcoords="offset points", xytext=(0, 5), ha="center",
+            fontsize=8.0, zorder=6,
+        )  # fmt: skip
+    ax.plot([], [], "o", ms=4.0, mfc="white", mec=INK, mew=1.0, label="with ω in rad/s")
+
+
+def _undamped_boundary(found: Region, x: Axis, y: Axis, ax: Axes) -> None:
+    """Strong around what is stable, thin where only the number of unstable poles changes."""
+    label: str | None = "stability boundary, exact"
+    cut = {float(found.K2[0]): y.low, float(found.K2[-1]): y.high}  # an end there is the map's and not the region's
+    for low, high in found.stable_intervals[-1]:
+        side = [(0.0, cut.get(end, end)) for end in (low, high)]
+        corners = [(x.high, low)] * (low not in cut) + side + [(x.high, high)] * (high not in cut)
+        ax.plot(*zip(*corners, strict=True), color=INK, lw=1.8, label=label)
+        label = None
+    if not y.low < 1 < y.high:
+        return
+    ax.plot([0, 0], [1, y.high], color=INK, lw=0.8)
+    ax.plot([x.low, 0], [1, 1], color=INK, lw=0.8)
+    omega = modes(found.arm.having(hub_inertia=math.inf), 3).natural_frequency
+    text = f"on this line every mode with the hub at rest: {', '.join(significant(float(w), 4) for w in omega)} … rad/s"
+    ax.annotate(text, (x.high, 1.0), textcoords="offset points", xytext=(-6, 5), ha="right", fontsize=8.5)
+
+
+def sampled_region(plane: GainMap | None, ax: Axes) -> None:
+    """Where the sampled loop is stable: hatched, its edge exact.  Nothing where it could not be settled."""
+    if plane is None:
+        return
+    ms = plain(1e3 * plane.loop.chain.sampling.period)
+    parts = pieces(plane.K1, plane.stable_intervals)
+    for piece in parts:
+        x, low, high = np.array(piece.points).T
+        ax.fill_between(x, low, high, facecolor="none", edgecolor=ORANGE, alpha=0.45, hatch="////", lw=0, zorder=1)
+        outline(replace(piece, begins=piece.begins and x[0] > plane.K1[0]), ORANGE, 1.2, 4.5, ax)
+    none = "" if parts else ": nowhere in this picture"
+    label = f"stable when sampled every {ms} ms (first {plane.modes_used} modes){none}"
+    ax.fill_between([], [], [], facecolor="none", edgecolor=ORANGE, hatch="////", lw=1.0, label=label)
+
+
+def outline(piece: RegionPiece, colour: str, width: float, zorder: float, ax: Axes) -> None:
+    """The edges of a part of a region, upright ones where the region itself begins or ends."""
+    x, low, high = np.array(piece.points).T
+    for line in (low, high):
+        ax.plot(x, line, color=colour, lw=width, zorder=zorder)
+    for end in np.nonzero([piece.begins, piece.ends])[0]:
+        ax.plot([x[-end]] * 2, [low[-end], high[-end]], color=colour, lw=width, zorder=zorder)
+
+
+def _chosen(points: Real, x: Axis, y: Axis) -> Real:
+    """A few points of the stable region's edge, far apart as seen."""
+    if not points.size:
+        return points
+    places = np.stack([x.place(points[:, 0]), y.place(points[:, 1])], axis=1)
+    (inside,) = np.nonzero((places > 0.02).all(axis=1) & (places < 0.97).all(axis=1))
+    if not inside.size:
+        return points[:0]
+    chosen = [int(inside[0])]
+    while len(chosen) < MARKS:
+        apart = np.hypot(*np.moveaxis(places[inside][:, None] - places[chosen], -1, 0)).min(axis=1)
+        if apart.max() < 0.07:
+            break
+        chosen.append(int(inside[np.argmax(apart)]))
+    return np.asarray(points[chosen])
+
+
+def lyapunov(arm: Arm, x: Axis, y: Axis, ax: Axes) -> None:
+    """K1 > 0, K2 < 1: proven at C = 0; at C > 0 only its line K2 = 0 is."""
+    inset = 1.0 if not arm.is_undamped else 1.0 - 0.008 * (y.high - y.low)
+    corner = 0.0 if not arm.is_undamped else 0.04 * x.linear
+    dashes, label = (
+        ("-", "Lyapunov (K1 > 0, K2 < 1): proven")
+        if arm.is_undamped
+        else ((0, (5, 3)), "Lyapunov (K1 > 0, K2 < 1): not a proof here")
+    )
+    ax.plot([corner, corner, x.high], [y.low, inset, inset], color=PURPLE, lw=1.6, ls=dashes, label=label)
+    if not arm.is_undamped:
+        ax.plot([0, x.high], [0, 0], color=PURPLE, lw=1.6, label="Lyapunov at C > 0: K2 = 0 proven")
+
+
+def count_labels(found: Region, x: Axis, y: Axis, ax: Axes) -> None:
+    """In every region that is large enough, how many poles are unstable there."""
+    grid = seen(found, x, y)
+    image = colours(grid.unstable)
+    for count in np.unique(grid.unstable):
+        parts, number = ndimage.label(grid.unstable == count)
+        for part in range(1, number + 1):
+            inside = np.asarray(parts == part)
+            if inside.mean() < LEAST_AREA:
+                continue
+            row, column, words, turn = _placed(inside, _words(int(count)), str(count).replace("-1", "∞"))
+            ax.annotate(
+                words, (grid.K1[column], grid.K2[row]), ha="center", va="center", rotation=turn, zorder=4,
+                fontsize=9.0, color=INK if count else "#00543f",
+                bbox={"facecolor": image[row, column], "edgecolor": "none", "pad": 1.5},
+            )  # fmt: skip
+
+
+def _placed(inside: NDArray[np.bool_], words: str, short: str) -> tuple[int, int, str, int]:
+    """Row, column, words and rotation: across if that fits, else upright, else the bare number."""
+    depth = ndimage.distance_transform_edt(np.pad(inside, 1))[1:-1, 1:-1]
+    deep = np.argwhere(depth > 0.8 * depth.max())
+    centre = np.argwhere(inside).mean(axis=0)
+    row, column = (int(i) for i in deep[np.argmin(((deep - centre) ** 2).sum(axis=1))])
+    left, right = _run(inside[row], column)
+    low, high = _run(inside[:, column], row)
+    across, up = LETTER[0] * inside.shape[1], LETTER[1] * inside.shape[0]
+    if right - left > across * len(words):
+        return row, (left + right) // 2, words, 0
+    if high - low > up * len(words):
+        return (low + high) // 2, column, words, 90
+    return row, column, short, 0
+
+
+def _run(inside: NDArray[np.bool_], at: int) -> tuple[int, int]:
+    """First and last place of the run of trues around one of them."""
+    outside = np.r_[-1, np.nonzero(~inside)[0], inside.size]
+    n = int(np.searchsorted(outside, at))
+    return int(outside[n - 1]) + 1, int(outside[n]) - 1
+
+
+def _words(count: int) -> str:
+    if count == 0:
+        return "stable"
+    return "every flexible mode unstable" if count == INFINITE else f"{count} unstable pole{'s' * (count > 1)}"
+
+
+def law_mark(law: HubFeedback, marker: str, label: str, ax: Axes) -> None:
+    """One law, as a point."""
+    ax.plot(
+        [law.K1], [law.K2], marker, ms=13.0 if marker == STAR else 8.0, mfc=ORANGE, mec="white", mew=1.0, zorder=7,
+        ls="none", label=label,
+    )  # fmt: skip
+
+
+def search_frame(bounds: Mapping[str, tuple[float, float]], ax: Axes) -> None:
+    """Where a design looked for the best gains."""
+    (a, b), (c, d) = bounds["K1"], bounds["K2"]
+    ax.plot([a, b, b, a, a], [c, c, d, d, c], color=GREY, lw=0.8, ls=(0, (1, 2)), label="bounds of its search")

@@ -1,0 +1,84 @@
+"""Where the continuous loop is stable, and where the sampled one is, on the same axes: exact edges, no raster."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Patch
+from matplotlib.ticker import FuncFormatter, NullFormatter
+
+from tfarm.crossing import pieces
+from tfarm.digits import plain, scientific
+from tfarm.dsp import GainMap
+from tfarm.loop.regions import Region
+
+from .plane import outline
+from .style import BLUE, GREY, INK, ORANGE, headline, settled, style, window
+from .words import gains_words
+
+SAND = "#f6dfcb"
+BLUES = ("#c9dcef", "#7fb0da", "#2f7cbc")  # lightest: most damping
+CONVENTION = "u = −K1 dθ/dt − K2 M;  a positive root moment M accelerates the hub"
+
+
+def overlay(continuous: Region, sampled: GainMap | Sequence[GainMap], *, ax: Axes | None = None) -> Axes:
+    """Both regions of K1 and K2, in the axes given or in new ones; the axes.
+
+    `continuous` is what `tfarm.map` returns, `sampled` what `tfarm.dsp.gain_map` does: several, for arms with less and
+    less damping, lie on each other.  The point is the law of the sampled loop.
+    """
+    planes = [sampled] if isinstance(sampled, GainMap) else list(sampled)
+    with style():
+        if ax is None:
+            figure = window(9.0, 5.4)
+            ax = overlay(continuous, planes, ax=figure.subplots())
+            headline(figure, f"{continuous.arm.name}: gains that keep the loop stable, continuous and sampled")
+            settled(figure)
+            return ax
+        _scale(continuous, ax)
+        keys = [_fill(ax, continuous, SAND, ORANGE, "stable, continuous: every mode")]
+        colours = BLUES[1:2] if len(planes) == 1 else BLUES
+        for plane, colour in zip(planes, colours, strict=True):
+            keys.append(_fill(ax, plane, colour, BLUE, f"stable, sampled{sampled_label(continuous, plane)}"))
+        (line,) = ax.plot(ax.get_xlim(), (1.0, 1.0), color=INK, lw=1.1, ls=(0, (5, 3)), zorder=4)
+        line.set_label("below it: proven by energy at C = 0 (K1 > 0, K2 < 1)")
+        law = planes[0].loop.gains
+        (point,) = ax.plot(law.K1, law.K2, "o", color="white", mec=INK, mew=1.4, ms=7, zorder=6, ls="none")
+        point.set_label(gains_words(law))
+        handles = [*keys, line, point]
+        ax.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.0, -0.13), ncols=2, borderaxespad=0.0)
+    return ax
+
+
+def _scale(continuous: Region, ax: Axes) -> None:
+    """Logarithmic in K1 where that is positive."""
+    K1, K2 = continuous.K1, continuous.K2
+    if K1[0] > 0:
+        ax.set_xscale("log")
+        ax.xaxis.set_minor_formatter(NullFormatter())
+    ax.xaxis.set_major_formatter(FuncFormatter(lambda x, _: plain(x, 3)))
+    ax.set_xlim(float(K1[0]), float(K1[-1]))
+    ax.set_ylim(float(K2[0]), float(K2[-1]))
+    ax.grid(False)
+    ax.axhline(0.0, color=GREY, lw=0.7, zorder=3.5)
+    ax.set_xlabel("K1, on the hub rate  [N m s/rad]")
+    ax.set_ylabel("K2, on the root moment  [-]")
+    ax.set_title(CONVENTION, loc="right", fontsize=8.5, color=GREY)
+
+
+def sampled_label(continuous: Region, plane: GainMap) -> str:
+    """What a sampled region holds for: the modes at C = 0, the damping where it is not the arm's own."""
+    C = plane.loop.plant.arm.damping
+    if C == 0.0:
+        return f", C = 0: the first {plane.modes_used} modes"
+    return "" if continuous.arm.damping == C else f", if C were {scientific(C, 1)} s"
+
+
+def _fill(ax: Axes, region: Region | GainMap, colour: str, edge: str, label: str) -> Patch:
+    for piece in pieces(region.K1, region.stable_intervals):
+        x, low, high = np.array(piece.points).T
+        ax.fill_between(x, low, high, facecolor=colour, edgecolor="none", zorder=2)
+        outline(piece, edge, 0.9, 2.5, ax)
+    return Patch(facecolor=colour, edgecolor=edge, linewidth=0.9, label=label)
