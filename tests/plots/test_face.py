@@ -33,14 +33,16 @@ def no_figure_left_open():
 def records():
     """By the name of the plot: what it takes, and how many axes it draws in (0: one that is no sequence)."""
     K1, K2 = np.linspace(0.05, 2.0, 40), np.linspace(-1.0, 1.5, 41)
-    plane, loop = tfarm.map(LAB, K1, K2), tfarm.sampled(LAB, LAW).verdict.loop
+    plane, analysis = tfarm.map(LAB, K1, K2), tfarm.sampled(LAB, LAW)
     return {
         "bode": ([tfarm.bode(LAB, "root_moment", (1.0, 300.0))], 2),
         "gain_map": ([plane], 0),
         "modes": ([tfarm.modes(LAB, count=3)], 3),
         "nyquist": ([tfarm.nyquist(LAB, LAW)], 0),
-        "overlay": ([plane, gain_map(loop, K1, K2)], 0),
+        "overlay": ([plane, gain_map(analysis.verdict.loop, K1, K2)], 0),
+        "sampled_modes": ([analysis], 0),
         "sketch": ([LAB], 0),
+        "slew": ([LAB, tfarm.simulate(LAB, LAW, duration=2.0, count=8, between=4)], 3),
     }
 
 
@@ -147,6 +149,46 @@ def test_overlay_draws_both_regions_edges(records):
     assert (LAW.K1, LAW.K2) in drawn
     legend = [text.get_text() for text in ax.get_legend().get_texts()]
     assert "K1 = 0.3, K2 = 0.3" in legend
+
+
+def test_sampled_modes_draws_the_growth_of_each(records):
+    (found,), _ = records["sampled_modes"]
+    ax = tfarm.plots.sampled_modes(found, ax=axes_for(0))
+    drawn = {line.get_label(): line.get_ydata() for line in ax.lines}
+    table = found.modes
+    assert ax.lines[1].get_xdata().tolist() == table.natural_frequency.tolist()
+    assert drawn["closed loop, exact"].tolist() == table.log_radius.tolist()
+    assert drawn["by K1, first order"].tolist() == table.by_rate.tolist()
+    assert drawn["by K2, first order"].tolist() == table.by_moment.tolist()
+    assert drawn["own damping"].tolist() == table.by_damping.tolist()
+    assert "[rad/s]" in ax.get_xlabel()
+
+
+def test_slew_draws_the_records_at_the_samples_and_between(records):
+    (arm, run), _ = records["slew"]
+    moment, tip, torque = tfarm.plots.slew(arm, run, ax=axes_for(3))
+    (drawn,) = (line for line in moment.lines if line.get_linewidth() == 1.3)
+    t, y = (x.tolist() for x in drawn.get_data())
+    both = {*zip(run.t.tolist(), run.at_samples.root_moment.tolist(), strict=True)}
+    both |= {*zip(run.between.t.tolist(), run.between.root_moment.tolist(), strict=True)}
+    assert len(t) == len(both)
+    assert set(zip(t, y, strict=True)) == both
+    assert t == sorted(t)
+    at_samples = dict(zip(*(x.tolist() for x in tip.lines[0].get_data()), strict=True))
+    reference = run.at_samples.tip_displacement - arm.length * run.scenario.hub_angle
+    assert [at_samples[t] for t in run.t.tolist()] == pytest.approx(1e3 * reference, abs=1e-9)
+    assert torque.lines[0].get_ydata().tolist() == run.torque.tolist()
+    assert [ax.get_ylabel().split("[")[1] for ax in (moment, tip, torque)] == ["N m]", "mm]", "N m]"]
+
+
+def test_several_slews_are_told_apart_by_their_names():
+    runs = {str(K2): tfarm.simulate(LAB, LAW.having("K2", K2), duration=1.5, count=6) for K2 in (0.0, 0.3, 0.6)}
+    moment, *_ = tfarm.plots.slew(LAB, runs, ax=axes_for(3))
+    lines = {line.get_label(): line for line in moment.lines if line.get_label() in runs}
+    assert lines.keys() == runs.keys()
+    assert len({line.get_color() for line in lines.values()}) == 3
+    for name, run in runs.items():
+        assert lines[name].get_ydata().tolist() == run.at_samples.root_moment.tolist()
 
 
 def test_of_more_modes_than_axes_the_first_are_drawn():

@@ -14,15 +14,17 @@ from tfarm.crossing import pieces
 from tfarm.digits import scientific
 from tfarm.dsp import Chain, Simulator, analyse, sampled_loop, sampled_verdict, scenario, stable_windows
 from tfarm.dsp.chain import Sampling
+from tfarm.dsp.loci import loci
+from tfarm.dsp.slews import slews
+from tfarm.dsp.strip_chart import strip_chart
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import gain_windows
 from tfarm.plots.files import save
-from tfarm.report.discrete_loci import loci, loci_table
+from tfarm.plots.strip import draw_strip_chart
 from tfarm.report.overlay import CUT, K2_RANGE, draw_overlay, overlay, overlay_table
+from tfarm.report.sampled_modes import loci_table
 from tfarm.report.sampled_section import sampled_section
 from tfarm.report.sampled_words import Sampled, compared, cure, duration, interval, short_answer
-from tfarm.report.strip_chart import draw_strip_chart, strip_chart
-from tfarm.report.time_responses import slews
 from tfarm.tables.files import as_csv, as_json
 
 LAB, PAPER = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")

@@ -10,9 +10,9 @@ import pytest
 import tfarm
 from tests.shared import once
 from tfarm.dsp import Chain
+from tfarm.dsp.curves import away
 from tfarm.plots.files import save
 from tfarm.report import tuner_study as study_module
-from tfarm.report.curves import away
 from tfarm.report.tuner_pictures import draw_cost_map, draw_curves
 from tfarm.report.tuner_section import section_of, tuner_section
 from tfarm.report.tuner_study import NOMINAL, CostMap, tuner_study

@@ -9,7 +9,7 @@ import pytest
 import tfarm
 from tests.odd_arms import odd_arms
 from tfarm.dsp import Chain, sampled_loop
-from tfarm.report.curves import away
+from tfarm.dsp.curves import away
 from tfarm.report.tuner_study import plan_of
 from tfarm.report.tuner_words import beside, drift_words, learning_words, shaping_words, short_answer, typeset_numbers
 from tfarm.spectrum.scales import default_gains

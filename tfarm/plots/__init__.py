@@ -8,9 +8,11 @@ In the look of the report's pages, whose pictures these are.  This is the only r
 
 from tfarm.plots.disc import nyquist
 from tfarm.plots.frequency import bode
+from tfarm.plots.growth import sampled_modes
+from tfarm.plots.motion import slew
 from tfarm.plots.plane import gain_map
 from tfarm.plots.regions import overlay
 from tfarm.plots.shapes import modes
 from tfarm.plots.sketch import sketch
 
-__all__ = ["bode", "gain_map", "modes", "nyquist", "overlay", "sketch"]
+__all__ = ["bode", "gain_map", "modes", "nyquist", "overlay", "sampled_modes", "sketch", "slew"]

@@ -9,7 +9,7 @@ from tfarm.digits import plain
 NOT_THE_PAPERS = ("hub_angle",)  # outputs whose gain is an extension of the paper's law: named where it is used
 
 
-def gains_words(law: HubFeedback, digits: int = 4) -> str:
-    """K1 = ..., K2 = ..., for reading."""
+def gains_words(law: HubFeedback, digits: int = 4, but: str = "") -> str:
+    """K1 = ..., K2 = ..., for reading; `but` names one that varies and is left out."""
     named = [gain.name for gain in LISTED if law[gain.name] or gain.output not in NOT_THE_PAPERS]
-    return ", ".join(f"{name} = {plain(law[name], digits)}" for name in named)
+    return ", ".join(f"{name} = {plain(law[name], digits)}" for name in named if name != but)

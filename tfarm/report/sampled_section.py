@@ -10,12 +10,16 @@ from tfarm.arm import Arm
 from tfarm.columns import Column, Table
 from tfarm.digits import plain, scientific, significant, singly
 from tfarm.dsp import Chain, sampled_verdict
+from tfarm.dsp.loci import STRONGER, loci
 from tfarm.dsp.margins import around
-from tfarm.report.curves import resolution_words
-from tfarm.report.discrete_loci import STRONGER, draw_loci, loci, loci_table
+from tfarm.dsp.slews import Slews, slews
+from tfarm.dsp.strip_chart import StripChart, strip_chart
+from tfarm.plots.folded import draw_loci
+from tfarm.plots.growth import draw_modes
+from tfarm.plots.strip import draw_strip_chart
 from tfarm.report.loop_laws import has_loop, sign_words, why_no_loop
 from tfarm.report.overlay import draw_overlay, overlay_table
-from tfarm.report.sampled_modes import draw_modes, mode_rows
+from tfarm.report.sampled_modes import loci_table, mode_rows
 from tfarm.report.sampled_words import (
     SHORT_SIGN,
     Sampled,
@@ -32,8 +36,14 @@ from tfarm.report.sampled_words import (
     typeset,
 )
 from tfarm.report.sections import Picture, Section
-from tfarm.report.strip_chart import StripChart, draw_strip_chart, example_words, strip_chart, strip_table
-from tfarm.report.time_responses import Slews, draw_slews, seen_words, slews, slews_table, what_slews_show
+from tfarm.report.strip_words import example_words, strip_table
+from tfarm.report.time_responses import (
+    draw_slews,
+    resolution_words,
+    seen_words,
+    slews_table,
+    what_slews_show,
+)
 
 PAST_HUB = 1.25  # times the K1 at which sampling the hub alone would break it: how far its locus goes
 
@@ -193,7 +203,7 @@ def _slew_picture(moved: Slews) -> Picture:
         caption=(
             f"{what_slews_show(moved)} A bang-bang slew with rigid feedforward; the moment feedback sees "
             f"{seen_words(moved)}. The dotted line is the end of the slew; the tip is shown against L times the "
-            f"reference angle.{resolution_words(moved.each)} {volts}{SHORT_SIGN}"
+            f"reference angle.{resolution_words(moved.each.values())} {volts}{SHORT_SIGN}"
         ),
         alt=f"Root moment, tip and motor torque of a slew. {what_slews_show(moved)}",
         figure=draw_slews(moved),

@@ -2,117 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from functools import partial
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
-from tfarm.arm import Arm, HubFeedback
+from tfarm.arm import Arm
 from tfarm.columns import Column, Table
 from tfarm.digits import plain, significant
-from tfarm.dsp import Simulation, Simulator, scenario
-from tfarm.dsp.chain import Chain
+from tfarm.dsp import Simulation, curves
 from tfarm.dsp.results import residual_moment_rms, settling_time
-from tfarm.plots.style import BLUE, GREY, INK, ORANGE, blank, headline, style
-from tfarm.records import record
-from tfarm.report import curves
-from tfarm.report.curves import resolved
+from tfarm.dsp.slews import Slews
+from tfarm.plots.motion import draw_responses
 
-Real = NDArray[np.float64]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
-LASTING = 3.0  # times the slew: how long a record is
 UNTIL = 0.9  # of a record: what has settled after that may ring on
-
-
-@dataclass(frozen=True)
-@record
-class Slews:
-    """One slew simulated twice: `without` (K2 = 0) and `with_moment` feedback, K1 the same."""
-
-    arm: Arm
-    gains: HubFeedback
-    without: Simulation
-    with_moment: Simulation
-
-    @property
-    def each(self) -> Mapping[str, Simulation]:
-        """Both, by what they are called; the one without comes first."""
-        return {"without moment feedback, K2 = 0": self.without, f"with, K2 = {plain(self.gains.K2)}": self.with_moment}
-
-
-def slews(arm: Arm, gains: HubFeedback, chain: Chain, modes: int) -> Slews:
-    """The slew of the chain, for three times as long as it takes.
-
-    Raises ParameterError for an arm that cannot turn.
-    """
-    task = scenario("slew", arm, chain, LASTING * chain.slew.rise_time)
-    simulator = Simulator(arm, chain, task, count=modes)
-    without = HubFeedback(K1=gains.K1, K2=0.0)
-    both = resolved(simulator, arm, *(partial(Simulator.linear, gains=law) for law in (without, gains)))
-    return Slews(arm, gains, *both)
 
 
 def draw_slews(data: Slews) -> Figure:
     """Root moment, tip and motor torque over time."""
-    with style():
-        figure = blank(9.0, 7.0)
-        moment, tip, torque = figure.subplots(3, 1, sharex=True, height_ratios=[1.35, 1.0, 1.0])
-        root_moment(data.each, ax=moment)
-        tip_error(data.arm, data.each, ax=tip)
-        motor_torque(data.each, ax=torque)
-        figure.legend(loc="outside lower left", ncols=3)
-        torque.set_xlabel("time  [s]")
-        slew, K1 = data.with_moment.chain.slew, plain(data.gains.K1)
-        travel = plain(slew.travel_of(data.arm.length), 3)
-        what = f"{travel} m of tip travel in {plain(slew.rise_time, 3)} s, K1 = {K1}"
-        headline(figure, f"{data.arm.name}: {what}")
-    return figure
-
-
-def root_moment(each: Mapping[str, Simulation], *, ax: Axes) -> None:
-    """The moment at the root between and at the samples, and the rigid arm's."""
-    first = next(iter(each.values()))
-    t = first.scenario.t
-    T = first.scenario.period
-    ax.step(t - T, first.scenario.rigid_moment, where="post", color=GREY, lw=1.0, ls=(0, (4, 3)), label="rigid arm")
-    for (name, simulation), colour in zip(each.items(), (ORANGE, BLUE), strict=True):
-        curves.root_moment(simulation).draw(ax, colour, name)
-    _until(first, ax)
-    ax.set_ylabel("root moment  [N m]")
-
-
-def tip_error(arm: Arm, each: Mapping[str, Simulation], *, ax: Axes) -> None:
-    """How far the tip is from where a rigid arm on its reference would have it, in mm."""
-    for simulation, colour in zip(each.values(), (ORANGE, BLUE), strict=True):
-        found = curves.tip_deviation(arm, simulation)
-        replace(found, low=1e3 * found.low, high=1e3 * found.high).draw(ax, colour)
-    _until(next(iter(each.values())), ax)
-    ax.set_ylabel("tip − reference  [mm]")
-
-
-def motor_torque(each: Mapping[str, Simulation], *, ax: Axes) -> None:
-    """The torque that the motor holds from sample to sample; in volts where the chain has a motor constant."""
-    first = next(iter(each.values()))
-    in_volts = first.volts is not None
-    for simulation, colour in zip(each.values(), (ORANGE, BLUE), strict=True):
-        values = simulation.volts if simulation.volts is not None else simulation.torque
-        held = curves.curve(simulation.t, values)
-        if held.is_band:
-            held.draw(ax, colour)
-        else:
-            ax.step(simulation.t, values, where="post", color=colour, lw=1.3)
-    _until(first, ax)
-    ax.set_ylabel("motor  [V]" if in_volts else "motor torque  [N m]")
-
-
-def _until(simulation: Simulation, ax: Axes) -> None:
-    ax.axvline(simulation.scenario.busy_until, color=INK, lw=0.8, ls=(0, (1, 2)))
-    ax.axhline(0.0, color=GREY, lw=0.6)
-    ax.set_xlim(0.0, float(simulation.scenario.t[-1]))
+    slew = data.with_moment.chain.slew
+    travel = plain(slew.travel_of(data.arm.length), 3)
+    what = f"{travel} m of tip travel in {plain(slew.rise_time, 3)} s, K1 = {plain(data.gains.K1)}"
+    return draw_responses(data.arm, data.each, what)
 
 
 def what_slews_show(data: Slews) -> str:
@@ -161,6 +75,18 @@ def clipped_words(each: Mapping[str, Simulation]) -> str:
         if count
     ]
     return "".join(told)
+
+
+def resolution_words(runs: Iterable[Simulation]) -> str:
+    """A sentence where a curve is a band, and for how long each piece of it is; empty where all are lines."""
+    bands = [one for one in map(curves.root_moment, runs) if one.is_band]
+    if not bands:
+        return ""
+    ms = significant(1e3 * float(bands[0].t[1] - bands[0].t[0]), 2)
+    return (
+        f" The ringing is too fast to draw as a line: the bands lie between the smallest and the largest value in each "
+        f"{ms} ms."
+    )
 
 
 def slews_table(data: Slews, stem: str) -> Table:

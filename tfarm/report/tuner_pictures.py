@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm
 from tfarm.digits import plain, significant
-from tfarm.dsp import Simulation
 from tfarm.plots.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, blank, headline, style
 from tfarm.report.overlay import Overlay, in_picture
-from tfarm.report.time_responses import motor_torque, root_moment, tip_error
 from tfarm.report.tuner_study import CostMap, Curves, TunerStudy
 from tfarm.tuner import Tuning
 
@@ -64,20 +59,6 @@ def gain(tuning: Tuning, *, ax: Axes) -> None:
     ax.axhline(0.0, color=GREY, lw=0.7)
     ax.set_xlim(0.0, float(result.t[-1]))
     ax.set_xlabel("time  [s]")
-
-
-def draw_response(name: str, arm: Arm, each: Mapping[str, Simulation], what: str) -> Figure:
-    """Tip, root moment and motor torque of the slew, without and with the tuner."""
-    with style():
-        figure = blank(9.0, 6.8)
-        moment, tip, torque = figure.subplots(3, 1, sharex=True, height_ratios=[1.3, 1.0, 1.0])
-        root_moment(each, ax=moment)
-        tip_error(arm, each, ax=tip)
-        motor_torque(each, ax=torque)
-        torque.set_xlabel("time  [s]")
-        figure.legend(loc="outside lower left", ncols=3)
-        headline(figure, f"{name}: {what}")
-    return figure
 
 
 def draw_curves(data: TunerStudy) -> Figure:

@@ -11,13 +11,13 @@ from tfarm.columns import Column, Table
 from tfarm.digits import lined, plain, significant, worded
 from tfarm.dsp import Chain
 from tfarm.errors import CertificationError
-from tfarm.report.curves import resolution_words
+from tfarm.plots.motion import draw_responses
 from tfarm.report.loop_laws import has_loop, sign_words, why_no_loop
 from tfarm.report.overlay import overlay
 from tfarm.report.sampled_words import SHORT_SIGN, typeset
 from tfarm.report.sections import Picture, Section
-from tfarm.report.time_responses import clipped_words, responses_table
-from tfarm.report.tuner_pictures import draw_cost_map, draw_curves, draw_gain, draw_response
+from tfarm.report.time_responses import clipped_words, resolution_words, responses_table
+from tfarm.report.tuner_pictures import draw_cost_map, draw_curves, draw_gain
 from tfarm.report.tuner_study import COARSE, MAP_SEEDS, MAP_TRIALS, NOMINAL, SEEDS, TunerStudy, tuner_study
 from tfarm.report.tuner_words import (
     bound_words,
@@ -122,10 +122,11 @@ def _slew_picture(data: TunerStudy) -> Picture:
         title="The slew without and with the tuner",
         caption=(
             f"Root moment, tip and motor over an ideal chain (the paper's Figures 4 and 6). {_residuals(data, 0)} The "
-            f"dotted line is the end of the slew; dashed, the rigid arm.{resolution_words(data.slews)} {SHORT_SIGN}"
+            "dotted line is the end of the slew; dashed, the rigid arm."
+            f"{resolution_words(data.slews.values())} {SHORT_SIGN}"
         ),
         alt=f"Root moment, tip and motor torque of the slew. {_residuals(data, 0)}",
-        figure=draw_response(data.arm.name, data.arm, data.slews, "the slew, ideal chain"),
+        figure=draw_responses(data.arm, data.slews, "the slew, ideal chain"),
         data=_signals(data, 0, "tune-slew-data"),
     )
 
@@ -137,10 +138,10 @@ def _coarse_picture(data: TunerStudy) -> Picture:
         caption=(
             f"{_converter_words(data)} (the paper's Figures 8 and 9). {_residuals(data, 1)} Nothing regulates the hub "
             "angle (no Kp), so what it loses to delay and steps it keeps."
-            f"{clipped_words(data.coarse)}{resolution_words(data.coarse)} {SHORT_SIGN}"
+            f"{clipped_words(data.coarse)}{resolution_words(data.coarse.values())} {SHORT_SIGN}"
         ),
         alt=f"The slew with converters and delay. {_residuals(data, 1)}",
-        figure=draw_response(data.arm.name, data.arm, data.coarse, "the slew, converters and one sample of delay"),
+        figure=draw_responses(data.arm, data.coarse, "the slew, converters and one sample of delay"),
         data=_signals(data, 1, "tune-dsp-data"),
     )
 

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.dsp import Chain, Simulation, Simulator
+from tfarm.dsp.curves import resolved
 from tfarm.dsp.results import ideal_chain
 from tfarm.dsp.scenarios import torque_unit
 from tfarm.records import record
-from tfarm.report.curves import resolved
 from tfarm.spectrum.scales import default_gains
 from tfarm.tuner import Cost, Learning, Plan, Tuning, compare, conditions, tune
 from tfarm.tuner.comparison import Row, quantised_chain

@@ -7,7 +7,7 @@ import re
 import numpy as np
 
 from tfarm.digits import significant
-from tfarm.report.curves import away
+from tfarm.dsp.curves import away
 from tfarm.report.sampled_words import typeset
 from tfarm.report.sections import Fact
 from tfarm.report.tuner_study import Curves, TunerStudy

@@ -1,15 +1,12 @@
-"""Where the poles of the sampled loop go as a gain grows, and the strips of the s-plane that the samples fold on one.
+"""Poles of the sampled loop along its gains, in the strips of the s-plane that the samples fold on one, and in z.
 
 Left the s-plane: a mode above half the sample rate (in a shaded strip) is seen, and moved, at its mirror image in the
-lowest strip, s = ln(z)/T; the locus is that of K1 alone.  Right the z-plane.  Branches are followed by
-`dsp.law.root_locus`; each is named after the mode that it comes from at zero gain.
+lowest strip, s = ln(z)/T; the locus is that of K1 alone.  Right the z-plane.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -17,86 +14,17 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullLocator
 from numpy.typing import NDArray
 
-from tfarm.columns import Column, Table
 from tfarm.digits import plain
-from tfarm.dsp.law import origins, root_locus
-from tfarm.dsp.loop import SampledLoop
-from tfarm.plots.style import BLUE, GREY, INK, ORANGE, blank, headline, style
-from tfarm.records import record
+from tfarm.dsp.loci import Loci, Locus
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
+from .style import BLUE, GREY, INK, ORANGE, blank, headline, style
+from .words import gains_words
 
-VALUES = 91  # of a gain along its locus
-DECADES = 3  # of K1
 STRIPS = 2.0  # how many strips are shown at least
 ALIASED = "#eef0f3"
 NEAR_AXIS = 0.01  # 1/s: the real axis is linear up to here, logarithmic beyond
 TICKS = (-100.0, -10.0, -1.0, -0.1, 0.0, 0.1, 1.0)
-STRONGER = 10.0  # how many times its own K1 the locus of K1 alone goes
 RIM = 1.12  # radius up to which the z-plane is shown
-
-
-@dataclass(frozen=True)
-@record
-class Locus:
-    """One gain's locus: `z` (values, branches), and the flexible mode of each branch (0: hub, filter or delay)."""
-
-    gain: str
-    values: Real
-    z: Complex
-    mode: NDArray[np.int64]
-
-
-@dataclass(frozen=True)
-@record
-class Loci:
-    """Loci of K1 alone (K2 = 0), and of both gains through those of the loop; `poles` [1/s] are the arm's own,
-    one a flexible mode, `mode` their numbers.
-    """
-
-    loop: SampledLoop
-    alone: Locus
-    by_K1: Locus
-    by_K2: Locus
-    poles: Complex
-    mode: NDArray[np.int64]
-
-    @property
-    def half_rate(self) -> float:
-        """1/(2T) [Hz]: what lies above is aliased."""
-        return 0.5 / self.loop.chain.sampling.period
-
-    def is_aliased(self, mode: int) -> bool:
-        """Whether a flexible mode lies above half the sample rate."""
-        at = np.nonzero(self.mode == mode)[0]
-        return bool(at.size and self.poles[at[0]].imag > 2 * math.pi * self.half_rate)
-
-
-def loci(loop: SampledLoop, K1_top: float, K2_range: tuple[float, float]) -> Loci:
-    """The loci of K1 from nearly 0 to `K1_top` and of K2 over `K2_range`, the other gain as it is.
-
-    Both begin below the gains of the loop.
-    """
-    K1 = np.geomspace(min(K1_top / 10**DECADES, loop.gains.K1 / STRONGER), K1_top, VALUES)
-    K2 = np.linspace(*K2_range, VALUES)
-    upper = np.nonzero((loop.pulse.poles.imag > 0) & (loop.pulse.mode > 0))[0]
-    upper = upper[np.argsort(loop.pulse.mode[upper])]
-    small = np.geomspace(1e-3, STRONGER, VALUES) * loop.gains.K1
-    alone = _locus(loop.having(K2=0.0), "K1", small)
-    by_K1, by_K2 = _locus(loop, "K1", K1), _locus(loop, "K2", K2)
-    return Loci(loop, alone, by_K1, by_K2, loop.pulse.poles[upper], loop.pulse.mode[upper])
-
-
-def _locus(loop: SampledLoop, gain: str, values: Real) -> Locus:
-    z = root_locus(loop, gain, values)
-    first = loop.having(**{gain: float(values[0])})
-    origin = origins(first)
-    mode = np.where(origin < 0, 0, loop.pulse.mode[origin])
-    return Locus(gain, values, z, mode[[abs(first.poles.z - start).argmin() for start in z[0]]])
-
-
-# ------------------------------------------------------------ the picture
 
 
 def draw_loci(data: Loci) -> Figure:
@@ -172,8 +100,7 @@ def z_plane(data: Loci, locus: Locus, *, ax: Axes) -> None:
     ax.fill_between(RIM * 1.2 * np.cos(angle), 0, RIM * 1.2 * np.sin(angle), color="#f7e9de", zorder=0)
     ax.fill_between(np.cos(angle), 0, np.sin(angle), color="white", zorder=0.2)
     ax.plot(np.cos(angle), np.sin(angle), color=INK, lw=0.9, zorder=1)
-    own = data.loop.gains.K1 if locus.gain == "K1" else data.loop.gains.K2
-    here = int(abs(locus.values - own).argmin())
+    here = int(abs(locus.values - data.loop.gains[locus.gain]).argmin())
     for branch in np.argsort(locus.mode):
         z, mode = locus.z[:, branch], int(locus.mode[branch])
         visible = np.where((z.imag >= -1e-12) & (abs(z) < RIM * 1.2), z, np.nan)
@@ -190,34 +117,11 @@ def z_plane(data: Loci, locus: Locus, *, ax: Axes) -> None:
     ax.set_aspect("equal")
     ax.grid(False)
     span = f"{plain(locus.values[0], 2)} to {plain(locus.values[-1], 3)}"
-    other = f"K2 = {plain(data.loop.gains.K2)}" if locus.gain == "K1" else f"K1 = {plain(data.loop.gains.K1)}"
-    ax.set_title(f"z-plane, {locus.gain} from {span} ({other})", fontsize=9.5)
+    held = gains_words(data.loop.gains, 10, but=locus.gain)
+    ax.set_title(f"z-plane, {locus.gain} from {span} ({held})", fontsize=9.5)
     ax.set_xlabel("Re z")
     ax.set_ylabel("Im z")
 
 
 def _colour(data: Loci, mode: int) -> str:
     return ORANGE if data.is_aliased(mode) else BLUE
-
-
-def loci_table(data: Loci, stem: str) -> Table:
-    """Every pole of the three loci with Im z >= 0: a row a gain and a branch."""
-    keys: dict[str, list[float | int | str]] = {"locus": [], "K1": [], "K2": [], "mode": []}
-    points = []
-    for name, locus, held in (
-        ("K1 alone", data.alone, 0.0),
-        ("K1", data.by_K1, data.loop.gains.K2),
-        ("K2", data.by_K2, data.loop.gains.K1),
-    ):
-        for value, row in zip(locus.values.tolist(), locus.z, strict=True):
-            K1, K2 = (value, held) if locus.gain == "K1" else (held, value)
-            for mode, z in zip(locus.mode.tolist(), row, strict=True):
-                if z.imag < 0:
-                    continue
-                for key, cell in zip(keys, (name, K1, K2, mode), strict=True):
-                    keys[key].append(cell)
-                points.append(z)
-    z_all = np.array(points)
-    columns = [Column(key, key, of=cells) for key, cells in keys.items()]
-    columns += [Column("real", "Re z", of=z_all.real), Column("imaginary", "Im z", of=z_all.imag)]
-    return Table(stem=stem, title="Poles of the sampled loop", is_data=True, columns=tuple(columns))

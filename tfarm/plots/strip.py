@@ -3,122 +3,24 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, HubFeedback
-from tfarm.columns import Column, Table
 from tfarm.digits import plain, significant
-from tfarm.dsp import Measurement, Simulation, Simulator, scenario
-from tfarm.dsp.chain import Chain
-from tfarm.plots.style import BLUE, FAINT, GREEN, GREY, INK, ORANGE, blank, headline, style
-from tfarm.records import record
-from tfarm.report.curves import Curve, continuous, held, resolved, root_moment
+from tfarm.dsp.curves import Curve, continuous, root_moment
+from tfarm.dsp.strip_chart import StripChart
+
+from .motion import draw_curve
+from .style import BLUE, FAINT, GREEN, GREY, INK, ORANGE, blank, headline, style
 
 Real = NDArray[np.float64]
 
-BITS = 6  # of the ADC: few, so that its steps are seen
-SHARE = 0.8  # of the torque that the ideal chain takes: what the motor gives at most
-ROOM = 1.2  # times the largest moment: the ADC's range
-DELAY = 1.0  # samples
-LASTING = 2.0  # times the slew
 CLOSE = 14  # samples in the close-up
 MOST_LEVELS = 60  # of the ADC that are drawn: more would be a grey wall
 SATURATED = "#f6d9c2"
-
-
-@dataclass(frozen=True)
-@record
-class StripChart:
-    """A slew through a coarse chain.
-
-    `read` [N m] is what the ADC hands over at each sample, `asked` [N m] the torque that the controller then wants;
-    `simulation.torque` is what the motor gives, `delay_samples` later.
-    """
-
-    arm: Arm
-    gains: HubFeedback
-    simulation: Simulation
-    read: Real
-    asked: Real
-
-    @property
-    def step(self) -> float:
-        """One step of the ADC [N m]."""
-        c = self.simulation.chain.converters
-        assert c.moment_range is not None
-        assert c.moment_bits is not None
-        return 2 * c.moment_range / 2**c.moment_bits
-
-    @property
-    def limit(self) -> float:
-        """The most the motor gives [N m]."""
-        return self.simulation.chain.actuator.torque_limit
-
-    @property
-    def saturated(self) -> NDArray[np.bool_]:
-        """At which samples more was asked than the motor gives."""
-        return np.asarray(abs(self.asked) > self.limit)
-
-
-def strip_chart(arm: Arm, gains: HubFeedback, ideal: Simulation, modes: int) -> StripChart:
-    """The same slew as that of an ideal chain, with a coarse ADC, a weak motor and one more sample of delay."""
-    chain = coarse_chain(ideal)
-    task = scenario("slew", arm, chain, LASTING * chain.slew.rise_time)
-    read, asked = np.zeros(task.t.size), np.zeros(task.t.size)
-
-    def controller(m: Measurement) -> float:
-        u = m.feedforward + gains.K1 * (m.rate_reference - m.hub_rate) - gains.K2 * m.vibration
-        read[m.k], asked[m.k] = m.root_moment, u
-        return u
-
-    (done,) = resolved(Simulator(arm, chain, task, count=modes), arm, lambda each: each.controller(controller))
-    n = done.torque.size
-    return StripChart(arm, gains, done, read[:n], asked[:n])
-
-
-def coarse_chain(ideal: Simulation) -> Chain:
-    """A simulation's chain; where that is ideal 6 bits of ADC over a little more than its moment, 80 % of its torque as
-    the motor's limit, and one sample of delay."""
-    chain, c = ideal.chain, ideal.chain.converters
-    if c.moment_bits is None:
-        span = c.moment_range or _nice(ROOM * float(abs(ideal.at_samples.root_moment).max()))
-        c = replace(c, moment_bits=BITS, moment_range=span)
-    limit = min(chain.actuator.torque_limit, c.torque_range or math.inf)
-    if math.isinf(limit):
-        limit = float(f"{SHARE * float(abs(ideal.torque).max()):.2g}")
-    return replace(
-        chain,
-        sampling=replace(chain.sampling, delay_samples=chain.sampling.delay_samples or DELAY),
-        converters=c,
-        actuator=replace(chain.actuator, torque_limit=limit),
-    )
-
-
-def example_words(ideal: Chain, coarse: Chain) -> str:
-    """What of a coarse chain is an example, and what the arm's own file has."""
-    parts = (
-        ("ADC", ideal.converters.moment_bits is not None),
-        ("delay", ideal.sampling.delay_samples > 0),
-        ("motor limit", ideal.actuator.torque_limit == coarse.actuator.torque_limit),
-    )
-    own = [name for name, is_own in parts if is_own]
-    made_up = [name for name, is_own in parts if not is_own]
-    if not own:
-        return "An example, and nobody's hardware"
-    if not made_up:
-        return f"The arm's own {', '.join(own)}"
-    return f"The arm's own {' and '.join(own)}; {' and '.join(made_up)} an example"
-
-
-def _nice(x: float) -> float:
-    """Rounded up to two digits."""
-    power = 10.0 ** (math.floor(math.log10(x)) - 1)
-    return float(f"{math.ceil(x / power) * power:.2g}")
 
 
 def draw_strip_chart(data: StripChart) -> Figure:
@@ -162,7 +64,7 @@ def moment(data: StripChart, is_close: bool, *, ax: Axes) -> None:
     s, step = data.simulation, significant(data.step, 3)
     hidden = "" if is_close else "_"
     drawn = root_moment(s) if not is_close else Curve(*_twice(*continuous(s, "root_moment")), False)
-    drawn.draw(ax, BLUE, hidden + "root moment of the arm")
+    draw_curve(drawn, ax, BLUE, hidden + "root moment of the arm")
     ax.step(
         s.t, data.read, where="post", color=ORANGE, lw=1.1,
         marker="o" if is_close else "", ms=4, label=f"{hidden}as the ADC reads it, steps of {step} N m",
@@ -222,16 +124,3 @@ def _fit(ax: Axes, y: Real) -> None:
 
 def _twice(t: Real, y: Real) -> tuple[Real, Real, Real]:
     return t, y, y
-
-
-def strip_table(data: StripChart, stem: str) -> Table:
-    """The curve of the moment as it is drawn, and what is held from sample to sample at its times."""
-    s, drawn = data.simulation, root_moment(data.simulation)
-    columns = (
-        Column("t_s", "time", "s", of=drawn.t),
-        *drawn.columns("root_moment", "root moment", "N m"),
-        Column("read_moment_N_m", "as the ADC reads it", "N m", of=held(s, data.read, drawn.t)),
-        Column("torque_asked_N_m", "torque asked", "N m", of=held(s, data.asked, drawn.t)),
-        Column("torque_given_N_m", "torque given, after the delay", "N m", of=held(s, s.torque, drawn.t)),
-    )
-    return Table(stem=stem, title="Strip chart", is_data=True, columns=columns)

@@ -8,19 +8,17 @@ the file beside it, as the band between its smallest and largest value over at l
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm
 from tfarm.columns import Column
-from tfarm.digits import significant
-from tfarm.dsp import Scenario, Simulation, Simulator
 from tfarm.dsp.ringing import POINTS, records_between
+from tfarm.dsp.scenarios import Scenario
+from tfarm.dsp.simulate import Simulation, Simulator
 from tfarm.records import record
 
 Real = NDArray[np.float64]
@@ -41,13 +39,6 @@ class Curve:
     low: Real
     high: Real
     is_band: bool
-
-    def draw(self, ax: Axes, colour: str, label: str | None = None) -> None:
-        """The line, or the band."""
-        if self.is_band:
-            ax.fill_between(self.t, self.low, self.high, color=colour, alpha=0.55, lw=0.8, label=label)
-        else:
-            ax.plot(self.t, self.low, color=colour, lw=1.3, label=label)
 
     def at(self, t: Real) -> Curve:
         """The same at other times, which its own begin with or hold, for a file with one column of time."""
@@ -137,17 +128,3 @@ def held(simulation: Simulation, values: Real, t: Real) -> Real:
     """What is held from sample to sample, at the times t [s]."""
     k = np.floor(t / simulation.scenario.period * (1 + 1e-12)).astype(np.int64)
     return values[np.minimum(k, values.size - 1)]
-
-
-def resolution_words(each: Mapping[str, Simulation] | Sequence[Simulation]) -> str:
-    """A sentence where a curve is a band, and for how long each piece of it is; empty where all are lines."""
-    runs: Sequence[Any] = list(each.values()) if isinstance(each, Mapping) else each
-    drawn = [root_moment(run) for run in runs]
-    bands = [one for one in drawn if one.is_band]
-    if not bands:
-        return ""
-    ms = significant(1e3 * float(bands[0].t[1] - bands[0].t[0]), 2)
-    return (
-        f" The ringing is too fast to draw as a line: the bands lie between the smallest and the largest value in each "
-        f"{ms} ms."
-    )

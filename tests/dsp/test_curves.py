@@ -6,8 +6,9 @@ import pytest
 import tfarm
 from tests.odd_arms import odd_arms
 from tfarm.dsp import Chain, Slew, scenario
-from tfarm.report.curves import BETWEEN, MOST_LINE, PERIODS, POINTS, curve, reference_angle, root_moment
-from tfarm.report.time_responses import slews, slews_table
+from tfarm.dsp.curves import BETWEEN, MOST_LINE, PERIODS, POINTS, curve, reference_angle, root_moment
+from tfarm.dsp.slews import slews
+from tfarm.report.time_responses import slews_table
 from tfarm.spectrum.scales import default_gains
 
 STEEL = tfarm.load("stocky-steel")

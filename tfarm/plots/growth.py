@@ -1,0 +1,99 @@
+"""What sampling does to each mode: growth per sample over frequency, by what it comes from."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullFormatter
+
+from tfarm.digits import SUPERSCRIPT, plain
+from tfarm.dsp import Analysis
+from tfarm.dsp.law import ModeTable
+from tfarm.dsp.loop import SampledLoop
+
+from .frequency import hertz_axis
+from .style import BLUE, GREY, INK, ORANGE, New, blank, headline, settled, style, window
+from .words import gains_words
+
+BANDS = 12  # strips that are shaded one by one; above they are too narrow to tell
+SHADE = "#f3e6dc"
+
+
+def sampled_modes(found: Analysis, *, ax: Axes | None = None) -> Axes:
+    """ln|z| per sample of every mode of a sampled loop (what `tfarm.sampled` returns), in the axes given or new; these.
+
+    The closed loop, and to first order what its gains and its own damping add; below 0 a mode decays.
+    """
+    with style():
+        if ax is None:
+            return settled(draw_modes(found.verdict.loop, found.modes, window))[0]
+        growths(found.verdict.loop, found.modes, ax=ax)
+    return ax
+
+
+def draw_modes(loop: SampledLoop, table: ModeTable, new: New = blank) -> Figure:
+    """ln|z| per sample of every mode: own damping, both gains to first order, and the closed loop."""
+    with style():
+        figure = new(9.0, 4.6)
+        growths(loop, table, ax=figure.subplots())
+        ms = plain(1e3 * loop.chain.sampling.period)
+        gains = gains_words(loop.gains, 10)
+        headline(figure, f"{loop.plant.arm.name}: what each mode gains or loses a sample ({ms} ms, {gains})")
+    return figure
+
+
+def growths(loop: SampledLoop, table: ModeTable, *, ax: Axes) -> None:
+    """The chart; shaded where K1 destabilises to first order."""
+    w, T = table.natural_frequency, loop.chain.sampling.period
+    low, high = 0.7 * float(w[0]), 1.25 * float(w[-1])
+    ax.set_xscale("log")
+    ax.set_xlim(low, high)
+    smallest, down, up = _sizes(table)
+    ax.set_yscale("symlog", linthresh=smallest, linscale=0.4)
+    ax.set_ylim(-8 * down, 8 * up)
+    ax.set_yticks(_ticks(smallest, down, up))
+    if loop.chain.sampling.delay_samples == 0:
+        for band in range(1, BANDS, 2):
+            ax.axvspan(band * math.pi / T, (band + 1) * math.pi / T, color=SHADE, lw=0, zorder=0.1)
+        if BANDS * math.pi / T < high:
+            ax.axvspan(BANDS * math.pi / T, high, facecolor=SHADE, alpha=0.5, lw=0, zorder=0.1)
+    ax.axhline(0.0, color=INK, lw=0.9)
+    ax.vlines(w, 0, table.log_radius, color=BLUE, lw=1.2, zorder=2)
+    ax.plot(w, table.log_radius, "o", color=BLUE, ms=6, label="closed loop, exact", zorder=4)
+    ax.plot(w, table.by_rate, "^", mfc="none", mec=ORANGE, mew=1.3, ms=7, label="by K1, first order", zorder=5)
+    ax.plot(w, table.by_moment, "s", mfc="none", mec=INK, mew=1.1, ms=6, label="by K2, first order", zorder=5)
+    if table.by_damping.any():
+        ax.plot(w, table.by_damping, "_", color=GREY, mew=1.6, ms=13, label="own damping", zorder=3)
+    ax.yaxis.set_major_formatter(FuncFormatter(_power))
+    ax.yaxis.set_minor_formatter(NullFormatter())
+    ax.set_ylabel("ln|z| per sample:  decays | grows")
+    ax.set_xlabel("natural frequency  [rad/s]")
+    hertz_axis(ax, 1.0)
+    ax.legend(loc="upper left", bbox_to_anchor=(0.0, -0.17), ncols=4, borderaxespad=0.0)
+
+
+def _sizes(table: ModeTable) -> tuple[float, float, float]:
+    """The smallest power of ten worth showing, and the largest loss and gain."""
+    every = np.r_[table.log_radius, table.by_rate, table.by_moment, table.by_damping]
+    sizes = abs(every[every != 0])
+    if not sizes.size:
+        return 1e-12, 1e-11, 1e-11
+    smallest = max(10.0 ** math.floor(math.log10(sizes.min())), 1e-13)
+    return smallest, max(-float(every.min()), 10 * smallest), max(float(every.max()), 10 * smallest)
+
+
+def _ticks(smallest: float, down: float, up: float) -> list[float]:
+    """0 and powers of ten to either side, every so many decades."""
+    first = round(math.log10(smallest))
+    step = max(2, math.ceil((math.log10(max(down, up)) - first) / 5))
+    below, above = (range(first + step, math.floor(math.log10(8 * end)) + 1, step) for end in (down, up))
+    return sorted([*(-(10.0**n) for n in below), 0.0, *(10.0**n for n in above)])
+
+
+def _power(y: float, _: object = None) -> str:
+    if y == 0:
+        return "0"
+    return f"{'−' if y < 0 else '+'}10{str(round(math.log10(abs(y)))).translate(SUPERSCRIPT)}"

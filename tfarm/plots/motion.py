@@ -1,0 +1,101 @@
+"""The arm over time: root moment, tip and motor, as lines or, where these ring too fast for a page, as bands."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from tfarm.arm import Arm
+from tfarm.dsp import Simulation, curves
+from tfarm.dsp.curves import Curve
+
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, New, blank, headline, settled, style, window
+
+COLOURS = (ORANGE, BLUE, GREEN, PURPLE)  # of several simulations; one alone is blue
+
+Runs = Mapping[str, Simulation]
+
+
+def slew(arm: Arm, runs: Simulation | Runs, *, ax: Sequence[Axes] | None = None) -> tuple[Axes, Axes, Axes]:
+    """Simulations of one scenario (what `tfarm.simulate` returns; several by name) in three axes, given or new; these.
+
+    Root moment [N m], tip less L times the reference angle [mm], and the torque of the motor [N m], or its volts.
+    """
+    each = {"": runs} if isinstance(runs, Simulation) else runs
+    with style():
+        if ax is None:
+            moment, tip, torque = settled(draw_responses(arm, each, next(iter(each.values())).scenario.name, window))
+        else:
+            moment, tip, torque = ax
+            root_moment(each, ax=moment)
+            tip_error(arm, each, ax=tip)
+            motor_torque(each, ax=torque)
+            torque.set_xlabel("time  [s]")
+    return moment, tip, torque
+
+
+def draw_responses(arm: Arm, each: Runs, what: str, new: New = blank) -> Figure:
+    """Root moment, tip and motor above each other, on a figure of its own."""
+    with style():
+        figure = new(9.0, 7.0)
+        slew(arm, each, ax=figure.subplots(3, 1, sharex=True, height_ratios=[1.35, 1.0, 1.0]))
+        figure.legend(loc="outside lower left", ncols=3)
+        headline(figure, f"{arm.name}: {what}")
+    return figure
+
+
+def draw_curve(curve: Curve, ax: Axes, colour: str, label: str | None = None) -> None:
+    """The line, or the band."""
+    if curve.is_band:
+        ax.fill_between(curve.t, curve.low, curve.high, color=colour, alpha=0.55, lw=0.8, label=label)
+    else:
+        ax.plot(curve.t, curve.low, color=colour, lw=1.3, label=label)
+
+
+def root_moment(each: Runs, *, ax: Axes) -> None:
+    """The moment at the root between and at the samples, and the rigid arm's."""
+    first = next(iter(each.values()))
+    t = first.scenario.t
+    T = first.scenario.period
+    ax.step(t - T, first.scenario.rigid_moment, where="post", color=GREY, lw=1.0, ls=(0, (4, 3)), label="rigid arm")
+    for (name, simulation), colour in zip(each.items(), _colours(each), strict=True):
+        draw_curve(curves.root_moment(simulation), ax, colour, name or None)
+    _until(first, ax)
+    ax.set_ylabel("root moment  [N m]")
+
+
+def tip_error(arm: Arm, each: Runs, *, ax: Axes) -> None:
+    """How far the tip is from where a rigid arm on its reference would have it, in mm."""
+    for simulation, colour in zip(each.values(), _colours(each), strict=True):
+        found = curves.tip_deviation(arm, simulation)
+        draw_curve(replace(found, low=1e3 * found.low, high=1e3 * found.high), ax, colour)
+    _until(next(iter(each.values())), ax)
+    ax.set_ylabel("tip − reference  [mm]")
+
+
+def motor_torque(each: Runs, *, ax: Axes) -> None:
+    """The torque that the motor holds from sample to sample; in volts where the chain has a motor constant."""
+    first = next(iter(each.values()))
+    in_volts = first.volts is not None
+    for simulation, colour in zip(each.values(), _colours(each), strict=True):
+        values = simulation.volts if simulation.volts is not None else simulation.torque
+        held = curves.curve(simulation.t, values)
+        if held.is_band:
+            draw_curve(held, ax, colour)
+        else:
+            ax.step(simulation.t, values, where="post", color=colour, lw=1.3)
+    _until(first, ax)
+    ax.set_ylabel("motor  [V]" if in_volts else "motor torque  [N m]")
+
+
+def _until(simulation: Simulation, ax: Axes) -> None:
+    ax.axvline(simulation.scenario.busy_until, color=INK, lw=0.8, ls=(0, (1, 2)))
+    ax.axhline(0.0, color=GREY, lw=0.6)
+    ax.set_xlim(0.0, float(simulation.scenario.t[-1]))
+
+
+def _colours(each: Runs) -> list[str]:
+    return [BLUE] if len(each) == 1 else [COLOURS[i % len(COLOURS)] for i in range(len(each))]
