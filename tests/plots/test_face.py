@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 import tfarm
 from tfarm.dsp import gain_map
 from tfarm.loop.nyquist import compressed
+from tfarm.loop.reduced_locus import reduced_locus
 from tfarm.plots.plane import colours
 
 mpl.use("Agg")
@@ -37,6 +38,7 @@ def records():
     return {
         "bode": ([tfarm.bode(LAB, "root_moment", (1.0, 300.0))], 2),
         "gain_map": ([plane], 0),
+        "locus": ([tfarm.locus(LAB, LAW, "K2", -1.0, 1.6, points=60, branches=3)], 0),
         "modes": ([tfarm.modes(LAB, count=3)], 3),
         "nyquist": ([tfarm.nyquist(LAB, LAW)], 0),
         "overlay": ([plane, gain_map(analysis.verdict.loop, K1, K2)], 0),
@@ -135,6 +137,30 @@ def test_gain_map_draws_the_boundary_and_the_counts(records):
     assert ("[N m s/rad]" in ax.get_xlabel(), ax.get_ylabel()[-3:]) == (True, "[−]")
     texts = {text.get_text() for text in ax.texts}
     assert {"stable", "2 unstable poles"} <= texts
+
+
+def test_locus_draws_the_branches_and_their_crossings(records):
+    """To the ten digits of |s| that hold on every processor."""
+    (found,), _ = records["locus"]
+    ax = tfarm.plots.locus(found, ax=axes_for(0))
+    drawn = [line.get_xdata() + 1j * line.get_ydata() for line in ax.lines if line.get_linewidth() == 2.6]
+    assert np.array(drawn) == pytest.approx(found.branches, rel=1e-9, abs=0)
+    (crossing,) = found.crossings
+    (diamond,) = (line.get_data() for line in ax.lines if line.get_marker() == "D")
+    assert diamond == ([0], [pytest.approx(crossing.omega, rel=1e-9)])
+    assert [text.get_text() for text in ax.texts] == [f"K2 = {crossing.gain:.4f}\n{crossing.omega:.2f} rad/s"]
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("Re s [1/s]", "Im s [rad/s]")
+
+
+@pytest.mark.parametrize(("vary", "stop"), [("K1", 0.6), ("payload_mass", 0.1)])
+def test_a_reduced_locus_lies_beside_the_exact_one(vary, stop):
+    """Dashed, at its own values: fewer where a parameter of the arm varies."""
+    found = tfarm.locus(LAB, LAW, vary, 0.01, stop, points=30, branches=3)
+    reduced = reduced_locus(found)
+    ax = tfarm.plots.locus(found, reduced=reduced, ax=axes_for(0))
+    drawn = [line.get_xdata() + 1j * line.get_ydata() for line in ax.lines if line.get_linestyle() == "--"]
+    assert np.array(drawn) == pytest.approx(reduced.branches, rel=1e-9, abs=0)
+    assert reduced.gain.size == 30 if vary == "K1" else reduced.gain.size < 30
 
 
 def test_overlay_draws_both_regions_edges(records):

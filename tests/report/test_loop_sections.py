@@ -19,13 +19,14 @@ from tfarm.errors import ConvergenceError
 from tfarm.loop import edges
 from tfarm.loop.damping import least_damping
 from tfarm.loop.edges import Axis, moment_axis, rate_axis, stable_edge
+from tfarm.loop.loci import loci, shown
 from tfarm.loop.nyquist import compressed, nyquist, nyquist_of
 from tfarm.loop.plant import Loop
 from tfarm.loop.poles import closed_loop_poles
 from tfarm.loop.stability import stability
 from tfarm.plots.plane import nice_levels
+from tfarm.plots.roots import zoomed
 from tfarm.report import loop_laws, loop_section, map, write, writing
-from tfarm.report.loci import loci, shown, zoomed
 from tfarm.report.locus_section import beyond_table
 from tfarm.report.loop_laws import NamedLaw, has_loop, margins_of
 from tfarm.report.loop_section import map_section, margins_section
@@ -200,7 +201,7 @@ def test_the_loci_are_exact_and_the_gap_is_that_of_what_is_drawn():
     for n in (0, 150, 299):
         law = replace(PAPER_GAINS, K2=float(data.exact.gain[n]))
         poles = closed_loop_poles(LAB, law, 5).values
-        for branch in zoomed(data)[:2]:
+        for branch in zoomed(data.exact)[:2]:
             here = data.exact.branches[branch, n]
             assert abs(poles - here).min() < 1e-9 * abs(here)
     apart = abs(data.reduced.branches - data.exact.branches).max(axis=1)

@@ -16,11 +16,11 @@ from tfarm.arm import implausible
 from tfarm.audit import candidates
 from tfarm.audit.assumptions import LoopVerdict, has_hub_inertia, hub_study, section_study
 from tfarm.columns import PAGE
+from tfarm.loop import loci as loci_room
 from tfarm.loop.locus import locus
 from tfarm.loop.plant import Loop
 from tfarm.loop.poles import poles_below
 from tfarm.report import assumptions_pictures, assumptions_section, loop_laws, loop_section, writing
-from tfarm.report import loci as loci_room
 from tfarm.report.arm_section import arm_section, derived_table
 from tfarm.report.bode_section import bode_section
 from tfarm.report.damped_table import damped_table

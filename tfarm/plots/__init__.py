@@ -12,7 +12,8 @@ from tfarm.plots.growth import sampled_modes
 from tfarm.plots.motion import slew
 from tfarm.plots.plane import gain_map
 from tfarm.plots.regions import overlay
+from tfarm.plots.roots import locus
 from tfarm.plots.shapes import modes
 from tfarm.plots.sketch import sketch
 
-__all__ = ["bode", "gain_map", "modes", "nyquist", "overlay", "sampled_modes", "sketch", "slew"]
+__all__ = ["bode", "gain_map", "locus", "modes", "nyquist", "overlay", "sampled_modes", "sketch", "slew"]

@@ -11,8 +11,10 @@ from tfarm.arm import Arm, HubFeedback
 from tfarm.columns import Column, Table
 from tfarm.digits import plain, scientific, significant, singly
 from tfarm.errors import ConvergenceError
+from tfarm.loop.loci import Loci, loci
 from tfarm.loop.stability import MARGIN_OF_ZERO, Stability, stability
-from tfarm.report.loci import Loci, crossing_table, draw_loci, gap_table, loci, loci_data
+from tfarm.plots.roots import draw_loci
+from tfarm.report.locus_tables import crossing_table, gap_table, loci_data
 from tfarm.report.loop_laws import edge_of_K2, has_loop, margins_of, sign_words
 from tfarm.report.sections import Picture, Section
 from tfarm.response.frequency import Real

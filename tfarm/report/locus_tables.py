@@ -1,0 +1,54 @@
+"""The numbers of a root locus: crossings of the axis, the gap to the reduced model, the branches."""
+
+from __future__ import annotations
+
+import math
+
+from tfarm.columns import Column, Table
+from tfarm.digits import held, scientific, significant, singly
+from tfarm.loop.loci import GAPS_HELD, HELD, Loci, shown
+
+
+def crossing_table(data: Loci, stem: str) -> Table:
+    """Where the branches cross the imaginary axis."""
+    found = list(data.exact.crossings)
+    gain, omega = (held([getattr(each, key) for each in found], HELD) for key in ("gain", "omega"))
+    return Table(
+        stem=stem,
+        title=f"Crossings of the imaginary axis along {data.name}",
+        caption="Solved for gain and frequency together on the exact characteristic function, to the digits shown.",
+        record=found,
+        columns=(
+            Column(data.name, data.name, data.unit, of=gain, digits=singly(significant, 8)),
+            Column("omega_rad_s", "frequency", "rad/s", of=omega, digits=singly(significant, 7)),
+            Column("frequency_hz", "", "Hz", of=[w / (2 * math.pi) for w in omega], digits=singly(significant, 7)),
+            Column("mode", "mode", of=lambda each: int(data.exact.mode[each.branch])),
+            Column("becomes", "becomes", of="direction"),
+        ),
+    )
+
+
+def gap_table(data: Loci, stem: str) -> Table:
+    """How far each reduced branch is from the exact one."""
+    gap, names = held(data.reduced.gap, GAPS_HELD), [f"mode {n}" if n else "rigid body" for n in data.exact.mode]
+    return Table(
+        stem=stem,
+        title=f"How far python-control's locus is from the exact one, along {data.name}",
+        caption=f"Largest distance over the whole range, as a share of |s| (or of the first natural frequency, where "
+        f"that is more). The reduced model has order {data.reduced.order}; its poles are those of "
+        "control.root_locus_map, taken to their last digits by Newton's method.",
+        columns=(
+            Column("branch", "branch from", of=names),
+            Column("gap", "largest gap", "of |s|", of=gap, digits=singly(scientific, 3)),
+        ),
+    )
+
+
+def loci_data(data: Loci, stem: str) -> Table:
+    """The exact and the reduced branches."""
+    columns = [Column(data.name, data.name, data.unit, of=data.exact.gain)]
+    for kind, branches in (("exact", data.exact.branches), ("reduced", data.reduced.branches)):
+        for n, row in enumerate(shown(branches)):
+            columns.append(Column(f"{kind}_{n}_re", f"{kind} branch {n}, Re s", "1/s", of=row.real))
+            columns.append(Column(f"{kind}_{n}_im", f"{kind} branch {n}, Im s", "rad/s", of=row.imag))
+    return Table(stem=stem, title=f"Loci along {data.name}", is_data=True, columns=tuple(columns))
