@@ -14,6 +14,7 @@ from tfarm.dsp import gain_map
 from tfarm.loop.nyquist import compressed
 from tfarm.loop.reduced_locus import reduced_locus
 from tfarm.plots.plane import colours
+from tfarm.tuner import Plan
 
 mpl.use("Agg")
 
@@ -44,6 +45,7 @@ def records():
         "overlay": ([plane, gain_map(analysis.verdict.loop, K1, K2)], 0),
         "sampled_modes": ([analysis], 0),
         "sketch": ([LAB], 0),
+        "tuned_gain": ([tfarm.tune(LAB, Plan(trials=1))], 0),
         "slew": ([LAB, tfarm.simulate(LAB, LAW, duration=2.0, count=8, between=4)], 3),
     }
 
@@ -205,6 +207,17 @@ def test_slew_draws_the_records_at_the_samples_and_between(records):
     assert [at_samples[t] for t in run.t.tolist()] == pytest.approx(1e3 * reference, abs=1e-9)
     assert torque.lines[0].get_ydata().tolist() == run.torque.tolist()
     assert [ax.get_ylabel().split("[")[1] for ax in (moment, tip, torque)] == ["N m]", "mm]", "N m]"]
+
+
+def test_tuned_gain_draws_the_gain_in_its_guard(records):
+    (found,), _ = records["tuned_gain"]
+    ax = tfarm.plots.tuned_gain(found, ax=axes_for(0))
+    (line,) = (line for line in ax.lines if "K(t)" in str(line.get_label()))
+    assert line.get_xdata().tolist() == found.training.result.t.tolist()
+    assert line.get_ydata().tolist() == found.training.result.K.tolist()
+    (guard,) = ax.patches
+    assert (guard.get_y(), guard.get_y() + guard.get_height()) == (found.training.guard.lo, found.training.guard.hi)
+    assert ("[s]" in ax.get_xlabel(), ax.get_ylabel()[-3:]) == (True, "[-]")
 
 
 def test_several_slews_are_told_apart_by_their_names():

@@ -12,11 +12,11 @@ from tests.shared import once
 from tfarm.dsp import Chain
 from tfarm.dsp.curves import away
 from tfarm.plots.files import save
-from tfarm.report import tuner_study as study_module
-from tfarm.report.tuner_pictures import draw_cost_map, draw_curves
+from tfarm.plots.learning import draw_cost_map, draw_curves
 from tfarm.report.tuner_section import section_of, tuner_section
-from tfarm.report.tuner_study import NOMINAL, CostMap, tuner_study
 from tfarm.tuner import Learning, Plan, conditions, initial_network, train, tune
+from tfarm.tuner import overview as study_module
+from tfarm.tuner.overview import NOMINAL, CostMap, tuner_study
 
 LAB = tfarm.load("sasaki2012-lab")
 SEEDS = 3

@@ -10,10 +10,10 @@ import tfarm
 from tests.odd_arms import odd_arms
 from tfarm.dsp import Chain, sampled_loop
 from tfarm.dsp.curves import away
-from tfarm.report.tuner_study import plan_of
 from tfarm.report.tuner_words import beside, drift_words, learning_words, shaping_words, short_answer, typeset_numbers
 from tfarm.spectrum.scales import default_gains
 from tfarm.tuner.comparison import conditions, quantised_chain
+from tfarm.tuner.overview import plan_of
 from tfarm.tuner.shaping import shaper
 
 ARMS = odd_arms()

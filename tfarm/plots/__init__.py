@@ -9,6 +9,7 @@ In the look of the report's pages, whose pictures these are.  This is the only r
 from tfarm.plots.disc import nyquist
 from tfarm.plots.frequency import bode
 from tfarm.plots.growth import sampled_modes
+from tfarm.plots.learning import tuned_gain
 from tfarm.plots.motion import slew
 from tfarm.plots.plane import gain_map
 from tfarm.plots.regions import overlay
@@ -16,4 +17,4 @@ from tfarm.plots.roots import locus
 from tfarm.plots.shapes import modes
 from tfarm.plots.sketch import sketch
 
-__all__ = ["bode", "gain_map", "locus", "modes", "nyquist", "overlay", "sampled_modes", "sketch", "slew"]
+__all__ = ["bode", "gain_map", "locus", "modes", "nyquist", "overlay", "sampled_modes", "sketch", "slew", "tuned_gain"]

@@ -22,11 +22,10 @@ from tfarm.plots import regions
 from tfarm.plots.style import blank, headline, style
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 K2_RANGE = (-1.0, 1.5)
-CUT = (-1.02, 1.52)  # where intervals are cut, just outside the picture
+CUT = (-1.02, 1.52)  # where intervals are cut, just outside the picture: no cut is seen as an edge
 COLUMNS = 72  # values of K1, and either side of upright edges
 DAMPINGS = (1e-4, 1e-6)  # s: what is drawn beside C = 0
 BEYOND = 1.7  # of the largest stable K1: how far the picture goes
@@ -63,17 +62,11 @@ def draw_overlay(data: Overlay) -> Figure:
     """The picture of this tool: a continuous region and a sampled one on the same axes."""
     with style():
         figure = blank(9.0, 5.4)
-        in_picture(data, ax=figure.subplots())
+        regions.overlay(*data, ax=figure.subplots()).set_ylim(*K2_RANGE)
         ms = plain(1e3 * data.sampled[0].loop.chain.sampling.period)
         name = data.continuous.arm.name
         headline(figure, f"{name}: gains that keep the loop stable, continuous and sampled every {ms} ms")
     return figure
-
-
-def in_picture(data: Overlay, *, ax: Axes) -> None:
-    """Both regions in the range of K2 that is shown, just inside that in which they were cut."""
-    regions.overlay(*data, ax=ax)
-    ax.set_ylim(*K2_RANGE)
 
 
 def overlay_table(data: Overlay, stem: str) -> Table:

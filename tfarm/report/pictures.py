@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-
-from matplotlib.figure import Figure
+from typing import TYPE_CHECKING
 
 import tfarm
 from tfarm.digits import plain
@@ -15,6 +14,9 @@ from tfarm.plots.shapes import draw_shapes, shapes_of
 from tfarm.report.overlay import draw_overlay, overlay
 from tfarm.response.frequency import band_of, bode
 from tfarm.spectrum.scales import default_gains
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 DOTS_PER_INCH = 100
 SHOWN = 4

@@ -11,14 +11,13 @@ from tfarm.columns import Column, Table
 from tfarm.digits import lined, plain, significant, worded
 from tfarm.dsp import Chain
 from tfarm.errors import CertificationError
+from tfarm.plots.learning import draw_cost_map, draw_curves, draw_gain
 from tfarm.plots.motion import draw_responses
 from tfarm.report.loop_laws import has_loop, sign_words, why_no_loop
 from tfarm.report.overlay import overlay
 from tfarm.report.sampled_words import SHORT_SIGN, typeset
 from tfarm.report.sections import Picture, Section
 from tfarm.report.time_responses import clipped_words, resolution_words, responses_table
-from tfarm.report.tuner_pictures import draw_cost_map, draw_curves, draw_gain
-from tfarm.report.tuner_study import COARSE, MAP_SEEDS, MAP_TRIALS, NOMINAL, SEEDS, TunerStudy, tuner_study
 from tfarm.report.tuner_words import (
     bound_words,
     drift_words,
@@ -27,6 +26,7 @@ from tfarm.report.tuner_words import (
     shaping_words,
     short_answer,
 )
+from tfarm.tuner.overview import COARSE, MAP_SEEDS, MAP_TRIALS, NOMINAL, SEEDS, TunerStudy, tuner_study
 
 TITLE = "The gain tuner: does a self-tuning gain help?"
 UNDAMPED = (
@@ -102,7 +102,7 @@ def _gain_picture(data: TunerStudy) -> Picture:
             f"paper's Figure 3), seed {tuning.plan.seed}; without the tuner K2 = 0. {SHORT_SIGN}"
         ),
         alt=f"Map of K1 and K2 with the tuner's guard from {guard.lo:.3f} to {guard.hi:.3f}, and its gain over time.",
-        figure=draw_gain(data, plane),
+        figure=draw_gain(data, *plane),
         data=Table(
             stem="tune-gain-data",
             title="The tuner's gain",

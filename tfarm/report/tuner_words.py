@@ -10,7 +10,7 @@ from tfarm.digits import significant
 from tfarm.dsp.curves import away
 from tfarm.report.sampled_words import typeset
 from tfarm.report.sections import Fact
-from tfarm.report.tuner_study import Curves, TunerStudy
+from tfarm.tuner.overview import Curves, TunerStudy
 
 ROUNDED = 1e-10  # of the tip's travel: no slew ends nearer its target than rounding tells
 MORE = 3.0  # times as far off its target is more, and no coincidence

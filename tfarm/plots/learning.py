@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -9,10 +11,13 @@ from matplotlib.ticker import NullLocator
 from numpy.typing import NDArray
 
 from tfarm.digits import plain, significant
-from tfarm.plots.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, blank, headline, style
-from tfarm.report.overlay import Overlay, in_picture
-from tfarm.report.tuner_study import CostMap, Curves, TunerStudy
+from tfarm.dsp import GainMap
+from tfarm.loop.regions import Region
 from tfarm.tuner import Tuning
+from tfarm.tuner.overview import CostMap, Curves, TunerStudy
+
+from .regions import overlay
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, blank, headline, settled, style, window
 
 Real = NDArray[np.float64]
 
@@ -21,12 +26,27 @@ GUARD = "#bfe3d6"
 TOP = 1.25  # of the cost without feedback: higher ones are drawn at the top edge
 
 
-def draw_gain(data: TunerStudy, plane: Overlay) -> Figure:
+def tuned_gain(found: Tuning, *, ax: Axes | None = None) -> Axes:
+    """A tuned gain over time (what `tfarm.tune` returns) in its guard, in the axes given or new ones; the axes."""
+    with style():
+        if ax is None:
+            figure = window(7.0, 4.4)
+            ax = tuned_gain(found, ax=figure.subplots())
+            figure.legend(loc="outside lower left", ncols=2)
+            headline(figure, f"{found.trial.arm.name}: the tuner's gain, and where it is proven stable")
+            settled(figure)
+            return ax
+        gain(found, ax=ax)
+        ax.set_ylabel("gain on the root moment, K2  [-]")
+    return ax
+
+
+def draw_gain(data: TunerStudy, continuous: Region, sampled: Sequence[GainMap]) -> Figure:
     """Left the map with the tuner's path and guard, right the gain over time, on the same axis of K2."""
     with style():
         figure = blank(9.0, 4.9)
         left, right = figure.subplots(1, 2, sharey=True, width_ratios=[1.0, 1.35])
-        in_picture(plane, ax=left)
+        overlay(continuous, sampled, ax=left)
         left.get_legend().remove()
         left.set_title("", loc="right")
         path(data.tuning, ax=left)
