@@ -34,6 +34,7 @@ def nyquist(data: Nyquist, *, ax: Axes | None = None, name: str = "") -> Axes:
             figure = window(5.0, 5.8)
             ax = nyquist(data, ax=figure.subplots(), name=name)
             figure.legend(*_legend(), loc="outside lower left", ncols=2, fontsize=8.5)
+            headline(figure, f"{data.verdict.loop.arm.name}: the loop function L(iω)")
             settled(figure)
             return ax
         _disc(ax)

@@ -87,7 +87,7 @@ def _scale(x: Axis, y: Axis, ax: Axes) -> None:
     if not y.is_linear:
         ax.set_yticks([tick for tick in K2_TICKS if y.low <= tick <= y.high])
     ax.grid(False)
-    stretched = "" if x.is_linear else f"; linear up to {plain(x.linear)}, logarithmic beyond"
+    stretched = "" if x.is_linear or x.low >= x.linear else f"; linear up to {plain(x.linear)}, logarithmic beyond"
     ax.set_xlabel(f"K1, gain on the hub rate [N m s/rad]{stretched}")
     ax.set_ylabel("K2, gain on the root moment [−]")
 
