@@ -21,6 +21,7 @@ SURVEYS := \
 	spectrum.damped \
 	loop.counts \
 	loop.agreement \
+	loop.loci \
 	loop.designs \
 	loop.nyquist_counts \
 	reduced.errors \

@@ -11,7 +11,6 @@ import tfarm
 from tests.loop.arms import window_arm, with_damping
 from tfarm import Hub, HubFeedback, ParameterError, Payload
 from tfarm.cli import main
-from tfarm.errors import ConvergenceError
 from tfarm.loop import reduced_locus as reduced_locus_room
 from tfarm.loop.lines import along
 from tfarm.loop.lines import crossings as line_crossings
@@ -271,10 +270,45 @@ def test_bad_input_is_refused_in_one_line(change, told):
     assert "\n" not in str(error.value)
 
 
-def test_a_branch_that_runs_into_the_accumulation_point_is_an_error():
-    """A real pole near -K1/I_h reaches -1/C at K1 = I_h/C, where real zeros accumulate."""
-    with pytest.raises(ConvergenceError, match="-1/C"):
-        locus(LAB, HubFeedback(), "K1", 0.0, 2000.0, 20, 5)
+def test_a_branch_that_comes_to_the_accumulation_point_ends_there_and_the_others_go_on(capsys):
+    """A real pole near -K1/I_h reaches -1/C at K1 = I_h/C, where real zeros accumulate; a box has all the others."""
+    found, C = locus(LAB, HubFeedback(), "K1", 0.0, 2000.0, 201, 5), LAB.link.damping
+    ((branch, last),) = found.ends
+    ended = found.branches[branch][~np.isnan(found.branches[branch])][-1]
+    assert 0.9 * LAB.hub.inertia / C < last < LAB.hub.inertia / C
+    assert (ended.imag, -1 / C < ended.real < -0.95 / C) == (0.0, True)
+    assert np.isnan(found.branches).sum() == np.isnan(found.branches[branch]).sum() == (found.gain > last).sum()
+    others = np.delete(found.branches, branch, axis=0)[:, -1]
+    poles = poles_below(Loop(LAB, HubFeedback(K1=2000.0)), 0.9 * others.imag.max())
+    assert upper(others[others.imag < 0.8 * others.imag.max()]) == pytest.approx(
+        upper(poles.values[poles.values.imag < 0.8 * others.imag.max()]), rel=1e-9
+    )
+    assert found.spectral_abscissa[-1] == others[others != 0].real.max()
+    given = "locus sasaki2012-lab --K2 0 --vary K1 --from 0 --to 2000 --points 41 --branches 5 --json"
+    with pytest.raises(SystemExit):
+        main(given.split())
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["branches"][branch][-1] is None
+    assert [each["branch"] for each in answer["ends"]] == [branch]
+    assert answer["gap_to_reduced"] < 1e-3
+
+
+def test_a_pole_that_is_on_no_branch_crosses_the_axis_all_the_same():
+    """On the way back nobody knows the pole that comes out of -1/C; the crossing engine does, and says where."""
+    found = locus(LAB, HubFeedback(), "K1", 2000.0, -3.0, 60, 5)
+    nobodys = [each for each in found.crossings if each.branch is None]
+    assert [(each.gain, each.omega, each.direction) for each in nobodys] == [(0.0, 0.0, "unstable")]
+
+
+def test_modes_that_meet_on_the_axis_and_leave_it_as_a_quadruple_are_followed_around_that():
+    """Without losses, K2 > 1 and Kp let the hub's mode meet the first one; the winding number has four poles off it."""
+    arm, law = replace(LAB, link=replace(LAB.link, damping=0.0)), HubFeedback(K2=1.3, Kp=334.0593798812562)
+    found = locus(arm, law, "K1", 0.0, 1e-6, 3, 4)
+    poles = poles_below(Loop(arm, law), 1.1 * found.branches[:, 0].imag.max())
+    assert np.sort_complex(found.branches[:, 0].round(6)) == pytest.approx(
+        np.sort_complex(poles.values.round(6)), rel=1e-9, abs=2e-6
+    )
+    assert (abs(found.branches[:, 0].real) > 13).sum() == 2
 
 
 def test_the_command_prints_one_json_object(capsys, tmp_path):

@@ -105,6 +105,25 @@ def test_a_real_zero_that_nobody_follows_takes_over_the_pair() -> None:
     np.testing.assert_allclose(nodes[-1].zeros[1], others, rtol=1e-5)
 
 
+def test_a_real_zero_ends_where_it_comes_to_the_singular_point_and_its_partner_goes_on() -> None:
+    """One of two real zeros runs to -2, where nothing can be followed; the other crosses 0 without it."""
+
+    def exact(C):
+        return np.array([0.3 * C - 0.2, -1 - C, -0.1 + 9j, -0.1 - 9j])
+
+    def family(C):
+        return Member(with_zeros(exact(C)), -2.0, 1e-3, 0.05)
+
+    start = Node(0.0, exact(0.0).reshape(2, 2))
+    nodes = follow(family, start, 3.0, 0.05, 2)
+    ended = next(node for node in nodes if np.isnan(node.zeros).any())
+    assert 0.9 <= ended.at < 1.0
+    assert [node.at for node in nodes].count(ended.at) == 2
+    assert np.isnan(nodes[-1].zeros[0, 1])
+    np.testing.assert_allclose(nodes[-1].zeros[0, 0], 0.7, rtol=1e-6)
+    np.testing.assert_allclose(nodes[-1].zeros[1], exact(3.0)[2:], rtol=1e-6)
+
+
 def test_a_wanted_pair_that_ends_is_an_error_and_not_a_shorter_list() -> None:
     """A zero that jumps cannot be followed; what is behind it only keeps company."""
 

@@ -21,6 +21,7 @@ from tfarm.records import record
 from tfarm.spectrum import modes
 from tfarm.spectrum.continuation import Node, corrected, follow, through
 from tfarm.spectrum.damped import COMPANY
+from tfarm.spectrum.scales import rate_unit
 
 from .plant import Loop, effective_inertia
 from .variation import Complex, Real, Variation, member_of
@@ -29,14 +30,11 @@ FREE = 1e-6  # of the lowest flexible frequency: zeros closer to the origin may 
 FIRST = 0.01  # the first step along a parameter, as a share of the way
 SOFT = 1e-6  # where the rigid body's zeros meet at s = 0, this share of the way is left out
 SMALLEST = 1e-15  # share of the way at which they are no longer looked for on the other side
-NEAR_SINGULAR = 0.01  # of 1/C: where a branch lost is said to have run into -1/C
 SAME = 1e-9  # of its size: a zero paired anew is known again so closely
+NOBODY = -1  # the number of the branch of a zero that has ended
+ASIDE = 1e-3  # of J w1: a rate gain that keeps modes from meeting on the axis
 AROUND = 4  # nodes through which a guess between two of them goes
 APART = 0.02  # of the lowest flexible frequency: how far the rigid body's zeros may be there
-
-
-class AtSingularError(ConvergenceError):
-    """A branch has come to -1/C: no other company helps it across."""
 
 
 @dataclass(frozen=True)
@@ -139,60 +137,44 @@ class Stage:
 def followed(variation: Variation, start: float, stop: float, wanted: int) -> tuple[list[Segment], float]:
     """The segments of the locus from `start` to `stop` with its first `wanted` pairs, and the lowest frequency [rad/s].
 
-    Raises ConvergenceError if a branch is lost.
+    Raises ConvergenceError where branches cannot be told apart.
     """
     lost: ConvergenceError | None = None
     for company in COMPANY:
         try:
             return _followed(variation, start, stop, wanted, wanted + company)
-        except AtSingularError:
-            raise
         except ConvergenceError as error:
-            lost = lost or _explained(error, variation)
-            if isinstance(lost, AtSingularError):
-                break
+            lost = lost or error
     assert lost is not None
-    raise lost
-
-
-def _stay_on_their_side(variation: Variation, segment: Segment) -> None:
-    """Raise ConvergenceError where a real zero has stepped over -1/C, and so over infinitely many others."""
-    for before, after in pairwise(segment.nodes):
-        sides = [ordered(node.zeros, segment.pinned).real > variation.singular(node.at) for node in (before, after)]
-        real = (before.zeros.imag == 0) & (after.zeros.imag == 0)
-        if (real & (sides[0] != sides[1])).any():
-            raise _ends_at_singular(variation, before)
-
-
-def _explained(error: ConvergenceError, variation: Variation) -> ConvergenceError:
-    """The same error, in better words where a branch has come to -1/C."""
-    last = error.best
-    if not isinstance(last, Node):
-        return error
-    singular = variation.singular(last.at)
-    if abs(last.zeros - singular).min() <= NEAR_SINGULAR * abs(singular):
-        return _ends_at_singular(variation, last)
-    text = f"branches cannot be told apart beyond {variation.vary} = {last.at:.10g}: ask for fewer, or another range"
-    return ConvergenceError(text, last, error.residual)
-
-
-def _ends_at_singular(variation: Variation, last: Node) -> AtSingularError:
-    where = f"beyond {variation.vary} = {last.at:.6g} a branch comes to -1/C, where real zeros accumulate"
-    return AtSingularError(f"{where}: ask for fewer branches, or end the range there", last, NEAR_SINGULAR)
+    text = "branches cannot be told apart: ask for fewer, or another range"
+    if isinstance(lost.best, Node) and min(start, stop) <= lost.best.at <= max(start, stop):
+        text = text.replace("apart", f"apart beyond {variation.vary} = {lost.best.at:.10g}")
+    raise ConvergenceError(text, lost.best, lost.residual)
 
 
 def _followed(variation: Variation, start: float, stop: float, wanted: int, number: int) -> tuple[list[Segment], float]:
     first = variation.at(start)
     zeros, lowest = open_pairs(first.arm, number, wanted)
-    law = first.law
-    if law.K1 or law.K2 or law.Kp:
-        scaled = Stage(Variation(first.arm, law, "all"), 0.0, 1.0, lowest)
-        zeros = scaled.follow(zeros, wanted)[-1].zeros
+    if any(first.law.row):
+        zeros = _closed(first, zeros, wanted, lowest)
     stage = Stage(variation, start, stop, lowest)
-    cut = segments(stage.follow(zeros, wanted), stage.at_zero == 1)
-    for segment in cut:
-        _stay_on_their_side(variation, segment)
-    return cut, lowest
+    return segments(stage.follow(zeros, wanted), stage.at_zero == 1), lowest
+
+
+def _closed(loop: Loop, zeros: Complex, wanted: int, lowest: float) -> Complex:
+    """The pairs under the loop's law: of the open arm, all gains growing together.
+
+    Without losses two modes may meet on the imaginary axis and leave it as a quadruple: then around that, with a little
+    feedback of the hub's rate that is taken back at the end.
+    """
+    arm, law = loop.arm, loop.law
+    try:
+        return Stage(Variation(arm, law, "all"), 0.0, 1.0, lowest).follow(zeros, wanted)[-1].zeros
+    except ConvergenceError:
+        aside = law.K1 + ASIDE * rate_unit(arm)
+        around = law.having("K1", aside)
+        there = Stage(Variation(arm, around, "all"), 0.0, 1.0, lowest).follow(zeros, wanted)[-1].zeros
+        return Stage(Variation(arm, law, "K1"), aside, law.K1, lowest).follow(there, wanted)[-1].zeros
 
 
 def open_pairs(arm: Arm, number: int, wanted: int) -> tuple[Complex, float]:
@@ -228,28 +210,27 @@ def _slow_zero(loop: Loop, pair: Complex) -> Complex:
 def segments(nodes: list[Node], pinned: bool = False) -> list[Segment]:
     """The nodes cut where zeros were paired anew, with the branches handed on from zero to zero."""
     slots = np.arange(nodes[0].zeros.size).reshape(-1, 2)
+    fresh = slots.size
     cut: list[Segment] = []
     kept, pinned = [nodes[0]], pinned and nodes[0].zeros[0, 0] == 0
     for before, after in pairwise(nodes):
         if after.at == before.at:
             cut.append(Segment(kept, slots, pinned))
             still = pinned and after.zeros[0, 0] == 0
-            slots, kept = _handed_on(ordered(before.zeros, pinned), ordered(after.zeros, still), slots), []
-            pinned = still
+            slots = _handed_on(ordered(before.zeros, pinned), ordered(after.zeros, still), slots, fresh)
+            fresh, kept, pinned = max(fresh, int(slots.max()) + 1), [], still
         kept.append(after)
     return [*cut, Segment(kept, slots, pinned)]
 
 
-def _handed_on(old: Complex, new: Complex, slots: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The branch of each zero after a new pairing: that of the same zero before it, or a new number."""
-    handed = slots[: len(new)].copy()
-    fresh = int(slots.max()) + 1
-    for i in np.nonzero((old[: len(new)] != new).any(axis=1))[0]:
-        for j in (0, 1):
-            apart = abs(old - new[i, j])
-            same = apart.min() <= SAME * abs(new[i, j])
-            handed[i, j] = slots.ravel()[int(apart.argmin())] if same else fresh
-            fresh += not same
+def _handed_on(old: Complex, new: Complex, slots: NDArray[np.int64], fresh: int) -> NDArray[np.int64]:
+    """The branch of each zero after a new pairing: that of the same zero before it, a new number, or NOBODY's."""
+    handed = np.full(new.shape, NOBODY)
+    for i, j in zip(*np.nonzero(~np.isnan(new)), strict=True):
+        apart = abs(old - new[i, j])
+        same = np.nanmin(apart) <= SAME * abs(new[i, j])
+        handed[i, j] = slots.ravel()[int(np.nanargmin(apart))] if same else fresh
+        fresh += not same
     return handed
 
 

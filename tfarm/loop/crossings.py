@@ -29,13 +29,13 @@ HALVINGS = (0, 4, 12)  # of the distance of two points, before Newton's method i
 class BranchCrossing:
     """One branch of a locus crosses the imaginary axis at s = i `omega` [rad/s], where what varies is `gain`.
 
-    `branch` is its number in the locus; `direction` is "unstable" where the real part becomes positive as the locus
-    runs, and "stable" where it becomes negative.
+    `branch` is its number in the locus, None for a pole on none of them, or between two points; `direction` is
+    "unstable" where the real part becomes positive as the locus runs, and "stable" where it becomes negative.
     """
 
     gain: float
     omega: float
-    branch: int
+    branch: int | None
     direction: str
 
     @property
@@ -49,7 +49,8 @@ def crossings(variation: Variation, gain: Real, branches: Complex, lowest: float
 
     Raises ConvergenceError where one cannot be solved for.
     """
-    side = np.where(abs(branches.real) <= ON_AXIS * abs(branches), 0, np.sign(branches.real)).astype(int)
+    on_axis = abs(branches.real) <= ON_AXIS * abs(branches)
+    side = np.where(on_axis | np.isnan(branches), 0, np.sign(branches.real)).astype(int)
     found = []
     for number, (sides, zeros) in enumerate(zip(side, branches, strict=True)):
         for low, high in _changes(sides, zeros):

@@ -19,8 +19,9 @@ from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 from tfarm.spectrum.continuation import Member, corrected, follow
 
-from .branches import FREE, Segment, followed, ordered
+from .branches import FREE, NOBODY, Segment, followed, ordered
 from .crossings import BranchCrossing, crossings
+from .ended import with_others
 from .lines import along, crossing_at_zero
 from .variation import Complex, Evaluator, Real, Variation, member_of
 
@@ -40,7 +41,9 @@ class Locus:
     `gain` (n,) are the values of what `vary` names; `branches` (b, n) [1/s] are zeros followed: those at s = 0, then
     one a mode with Im s > 0, in the order of the modes they continue from (`mode` (b,), 0 for the rigid body).  The
     mirror image of a branch is left out, unless the two meet on the real axis and part there: then it is a branch of
-    its own, with Im s < 0 where they are a pair.  `crossings` are those of the imaginary axis, ascending along the way.
+    its own, with Im s < 0 where they are a pair.  A branch that comes to -1/C, or meets a zero that nobody follows,
+    ends there (`ends`), and is NaN beyond.  `crossings` are those of the imaginary axis, ascending along the way; where
+    a branch has ended, those of poles on no branch too.
     """
 
     arm: Arm
@@ -60,7 +63,14 @@ class Locus:
     def spectral_abscissa(self) -> Real:
         """The largest real part [1/s] of these branches at each gain, apart from zeros at s = 0."""
         moving = np.where(self.branches == 0, -math.inf, self.branches.real)
-        return np.asarray(moving.max(axis=0))
+        return np.asarray(np.fmax.reduce(moving, axis=0))
+
+    @property
+    def ends(self) -> tuple[tuple[int, float], ...]:
+        """The number of each branch that ends on the way, and the last of the values at which it lives."""
+        lives = ~np.isnan(self.branches)
+        rows = np.nonzero(~lives[:, -1])[0]
+        return tuple((int(row), float(self.gain[np.nonzero(lives[row])[0][-1]])) for row in rows if lives[row].any())
 
 
 def locus(
@@ -70,7 +80,8 @@ def locus(
 
     `vary` is K1, K2, Kp, "all" (a scale on the law) or a parameter of the arm: payload_mass, payload_inertia,
     hub_inertia, length, damping; what it names in `arm` or `law` is replaced.  Raises ParameterError for what is no
-    loop or no range, ConvergenceError where a branch cannot be told from another.
+    loop or no range, ConvergenceError where branches cannot be told apart, and where one has ended and an unstable pole
+    is on none (along a gain that is no error: its crossing is listed).
     """
     points = whole("points", points, 2, MOST_POINTS, f"a whole number from 2 to {MOST_POINTS}")
     branches = whole("branches", branches, 1, MOST_BRANCHES, f"a whole number from 1 to {MOST_BRANCHES}")
@@ -81,6 +92,8 @@ def locus(
     curves = _Polish(variation, evaluator, FREE * lowest).curves(cut)
     rows, mode = _listed(curves, variation, branches)
     found = crossings(variation, gain, rows, lowest)
+    if np.isnan(curves[: 2 * branches]).any():
+        found = with_others(variation, gain, rows, found)
     return Locus(arm, law, vary, gain, rows, mode, found)
 
 
@@ -99,20 +112,18 @@ def _range(variation: Variation, start: float, stop: float, points: int) -> Real
 def _listed(curves: Complex, variation: Variation, number: int) -> tuple[Complex, NDArray[np.int64]]:
     """The first branches that are no mirror images, and the modes they continue from; zeros nobody follows at 0 first.
 
-    Raises ConvergenceError where one of them was not followed to the end.
+    NaN beyond the end of one that was not followed all the way.
     """
     at_zero = variation.zeros_at_origin
     mode = np.arange(len(curves)) // 2 + (at_zero == 2 or not variation.arm.has_rigid_mode)
     idle = at_zero - (at_zero == 1 and not curves[0].any())
     curves = np.concatenate([np.zeros((idle, curves.shape[1]), complex), curves])
     mode = np.r_[np.zeros(idle, int), mode]
-    real = (curves.imag == 0).any(axis=1)
-    kept = np.nonzero(real | ~(curves.imag < 0).any(axis=1))[0][:number]
-    lives = np.isfinite(curves[kept]).all(axis=1)
-    if not lives.all() or kept.size < number:
-        lost = int(np.argmin(lives))
-        text = f"branch {lost} meets a zero that continues from no mode: ask for fewer branches, or another range"
-        raise ConvergenceError(text, lost, number)
+    lives = ~np.isnan(curves)
+    real = (lives & (curves.imag == 0)).any(axis=1)
+    kept = np.nonzero(lives.any(axis=1) & (real | ~(curves.imag < 0).any(axis=1)))[0][:number]
+    if kept.size < number:
+        raise ConvergenceError(f"only {kept.size} branches could be followed: ask for fewer", kept.size, number)
     return np.where(curves[kept] == 0, 0.0, curves[kept]), mode[kept]
 
 
@@ -135,8 +146,9 @@ class _Polish:
         for n, segment in enumerate(cut):
             (which,) = np.nonzero(owner == n)
             if which.size:
-                pairs = self.pairs(segment, which)
-                curves[segment.slots.ravel()[:, None], which] = pairs.reshape(which.size, -1).T
+                pairs, slots = self.pairs(segment, which).reshape(which.size, -1), segment.slots.ravel()
+                lives = slots != NOBODY
+                curves[slots[lives, None], which] = pairs[:, lives].T
         if self.at_zero == 1 and cut[0].pinned:
             curves[0] = 0.0
         return curves
@@ -168,7 +180,7 @@ class _Polish:
     ) -> tuple[Complex, NDArray[np.bool_]]:
         """Newton's method for every zero that is not known and no mirror image, and which of them have settled."""
         mirrored = zeros[..., 0].imag > 0
-        wanted = ~known
+        wanted = ~known & ~np.isnan(zeros)
         wanted[..., 1] &= ~mirrored
         owner = np.broadcast_to(which[:, None, None], zeros.shape)[wanted]
         s, still = zeros[wanted], np.ones(int(wanted.sum()), bool)
@@ -194,7 +206,7 @@ class _Polish:
         if stray.any():
             nodes = [node for node in segment.nodes if (value - node.at) * (self.gain[-1] - self.gain[0]) >= 0]
             last = nodes[-1] if nodes else segment.nodes[0]
-            found = follow(self._member, last, value, (value - last.at) / 8, len(last.zeros))[-1].zeros
+            found = follow(self._member, last, value, (value - last.at) / 8, len(last.zeros))[-1].zeros[: len(guess)]
         return ordered(found, segment.pinned)
 
     def _member(self, value: float) -> Member:

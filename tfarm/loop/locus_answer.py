@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from .answers import law_answer
 from .locus import Locus
 from .reduced_locus import ReducedLocus
@@ -12,7 +14,9 @@ from .variation import VARIED
 GAP = "largest distance of a branch from the reduced one, over |s| or the arm's first flexible frequency, the larger"
 BRANCHES = (
     "zeros followed: those at s = 0, then one a mode with Im s > 0; its mirror image only where the two part on the "
-    "real axis. A crossing of a branch with omega > 0 is one of its mirror image too."
+    "real axis. A crossing of a branch with omega > 0 is one of its mirror image too. A branch that comes to -1/C, "
+    "where real poles accumulate, ends there and is null beyond; then crossings of poles on no branch are listed too "
+    "(branch null)."
 )
 
 
@@ -25,7 +29,7 @@ def locus_answer(exact: Locus, reduced: ReducedLocus) -> dict[str, Any]:
         "unit": VARIED[exact.vary],
         "gain": exact.gain.tolist(),
         "mode": exact.mode.tolist(),
-        "branches": [[[float(s.real), float(s.imag)] for s in branch] for branch in exact.branches],
+        "branches": [[None if np.isnan(s) else [s.real, s.imag] for s in row] for row in exact.branches.tolist()],
         "branches_note": BRANCHES,
         "crossings": [
             {
@@ -37,6 +41,7 @@ def locus_answer(exact: Locus, reduced: ReducedLocus) -> dict[str, Any]:
             }
             for each in exact.crossings
         ],
+        "ends": [{"branch": branch, "gain": gain} for branch, gain in exact.ends],
         "gap_to_reduced": reduced.worst,
         "gap_by_branch": reduced.gap.tolist(),
         "gap_note": GAP,

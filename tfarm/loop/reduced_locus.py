@@ -77,7 +77,7 @@ def reduced_locus(exact: Locus, order: int | None = None) -> ReducedLocus:
     branches = exact.branches[:, which]
     paired = np.array([_paired(*each) for each in zip(branches.T, poles, strict=True)]).T
     size = np.maximum(abs(branches), modes(arm, 1).natural_frequency[-1])
-    return ReducedLocus(order, exact.gain[which], paired, (abs(paired - branches) / size).max(axis=1))
+    return ReducedLocus(order, exact.gain[which], paired, np.fmax.reduce(abs(paired - branches) / size, axis=1))
 
 
 def root_locus(arm: Arm, law: HubFeedback, vary: str, gain: Real, count: int) -> Complex:
@@ -139,6 +139,6 @@ def _closed(arm: Arm, fixed: Real, count: int, moving: Real) -> tuple[Matrices, 
 
 
 def _paired(exact: Complex, poles: Complex) -> Complex:
-    """Of the poles the one that belongs to each exact zero."""
-    _, chosen = linear_sum_assignment(abs(exact[:, None] - poles[None, :]))
-    return np.asarray(poles[chosen])
+    """Of the poles the one that belongs to each exact zero; NaN where that has ended."""
+    _, chosen = linear_sum_assignment(np.nan_to_num(abs(exact[:, None] - poles[None, :])))
+    return np.where(np.isnan(exact), np.nan, poles[chosen])

@@ -24,6 +24,7 @@ Real = NDArray[np.float64]
 
 OF_THE_LAW = {gain.name: gain.unit for gain in LISTED} | {"all": "1"}
 PARAMETERS = {"payload_mass": "kg", "payload_inertia": "kg m^2", "hub_inertia": "kg m^2", "length": "m", "damping": "s"}
+ENDS = 0.05  # of 1/C: nearer to -1/C, where real zeros accumulate, no zero is followed from the right
 VARIED = OF_THE_LAW | PARAMETERS  # what may be varied, and its unit
 
 
@@ -125,4 +126,4 @@ def member_of(variation: Variation, value: float, at_zero: int, free: float) -> 
             value, slope = np.where(s == 0, 0.0, value), np.where(s == 0, 1.0, slope)
         return Analytic(value, slope, scale)
 
-    return Member(function, variation.singular(value), free)
+    return Member(function, variation.singular(value), free, ENDS)

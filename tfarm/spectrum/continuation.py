@@ -11,6 +11,9 @@ shortened otherwise.  Where a real zero runs into one of another pair, or into o
 enough: then the two become one pair.  (A damped Timoshenko beam has a third, real zero for each bending wave, coming
 from s = -inf as C grows from 0.  It meets the fast zero of the overdamped mode; together they ring again, in shear.)
 
+Where real zeros accumulate, at -1/C, a real zero that comes to that point from the right can be followed no further:
+its place in the pair is then NaN, and the other zero of the pair goes on alone.
+
 None of this is a proof: a winding number is, and `damped` asks for it.
 """
 
@@ -33,17 +36,20 @@ Real = NDArray[np.float64]
 class Member(NamedTuple):
     """One function of a family, and the real point where it is singular (-1/C; -inf if it is entire).
 
-    Zeros nearer to the origin than `free` may pass it; others may not come near it in one step.
+    Zeros nearer to the origin than `free` may pass it; others may not come near it in one step.  A real zero that comes
+    from the right to within the share `ends` of the singular point ends there.
     """
 
     function: Function
     singular: float = -np.inf
     free: float = 0.0
+    ends: float = 0.0
 
 
 Family = Callable[[float], Member]
 
 NEIGHBOURS = 8  # zeros that repel each other: those further away move too little to matter
+FARTHEST = 1e150  # where the tree has what has ended
 FEW = 64  # zeros: of so many all distances are found sooner than a tree is built
 BELIEVED = 0.2  # how far a zero may land from its prediction, in distances to the next one
 SETTLED = 1e-6  # a correction smaller than this share of that distance ends a step
@@ -54,7 +60,10 @@ MOST_REFUSALS = 300  # steps; lists that arrive take up to 120 (tuned: survey te
 
 
 class Node(NamedTuple):
-    """The pairs at one value of the parameter: zeros (n, 2), with Im > 0 first, or the slower of two real ones."""
+    """The pairs at one value of the parameter: zeros (n, 2), with Im > 0 first, or the slower of two real ones.
+
+    NaN stands second, or twice, for what has ended.
+    """
 
     at: float
     zeros: Complex
@@ -65,21 +74,27 @@ def follow(
 ) -> list[Node]:
     """The nodes passed from `start` to the parameter `stop`, with steps chosen on the way, the first being `first`.
 
-    `before` are earlier nodes, if there are any, to predict with.  Where zeros were paired anew two nodes follow each
-    other at one value, before and after it.  Of the pairs only the first `wanted` are sure to arrive; the others keep
-    them company, and are dropped where they meet a zero that nobody follows.  Raises ConvergenceError, with the last
-    node, where branches cannot be told apart.
+    `before` are earlier nodes, if there are any, to predict with.  Where zeros were paired anew, or one ended, two
+    nodes follow each other at one value, before and after it.  Of the pairs only the first `wanted` are sure to arrive;
+    the others keep them company, and are dropped where they meet a zero that nobody follows.  Raises ConvergenceError,
+    with the last node, where branches cannot be told apart.
     """
     nodes, recent, step, refusals, anchor = [start], [*before, start][-3:], first, 0, start.at
+    here = family(start.at)
     while nodes[-1].at != stop:
         at = nodes[-1].at + step
         if (stop - at) * np.sign(stop - start.at) <= 1e-9 * abs(stop - nodes[-1].at):
             at = stop
-        zeros, stray = corrected(family(at), predicted(recent, at))
+        there = family(at)
+        zeros, stray = corrected(there, predicted(recent, at))
+        stray |= _jumped(here, there, nodes[-1].zeros, zeros)
         if not stray.any():
-            step = 1.6 * (at - nodes[-1].at)
+            step, here = 1.6 * (at - nodes[-1].at), there
             nodes.append(Node(at, zeros))
             recent = [*recent[-2:], nodes[-1]]
+            if (left := _left(there, zeros)) is not None:
+                recent = [Node(node.at, left(node.zeros)) for node in recent]
+                nodes.append(recent[-1])
             continue
         refusals += 1
         if refusals > MOST_REFUSALS:
@@ -94,6 +109,31 @@ def follow(
             recent = [_shortened(nodes[-1], stray, wanted)]
             nodes.append(recent[-1])
     return nodes
+
+
+def _jumped(here: Member, there: Member, before: Complex, after: Complex) -> NDArray[np.bool_]:
+    """Which pairs of real zeros have stepped over the singular point, and so over infinitely many others."""
+    real = (before.imag == 0).all(1) & (after.imag == 0).all(1) & (there.ends > 0)
+    jumped: NDArray[np.bool_] = real & ((before.real > here.singular).sum(1) != (after.real > there.singular).sum(1))
+    return jumped
+
+
+def _left(member: Member, zeros: Complex) -> Callable[[Complex], Complex] | None:
+    """What takes the real zeros that have come to the singular point out of any node; None where there are none."""
+    if not member.ends:
+        return None
+    beyond = zeros.real - member.singular
+    ended = (zeros.imag == 0) & (beyond > 0) & (beyond < member.ends * abs(member.singular))
+    if not ended.any():
+        return None
+    swapped = ended[:, :1] & ~ended[:, 1:]  # the one that stays stands first
+
+    def without(pairs: Complex) -> Complex:
+        real = np.where(ended.any(1, keepdims=True) & (pairs.imag != 0), np.nan, pairs)
+        kept = np.where(ended, np.nan, real)
+        return np.where(swapped, kept[:, ::-1], kept)
+
+    return without
 
 
 def predicted(nodes: list[Node], at: float) -> Complex:
@@ -123,9 +163,12 @@ def through(nodes: list[Node], at: float | Real) -> Complex:
     inverse = weights @ np.where(far, 1 / np.where(far, slow, 1), 1)
     apart = np.stack([1 / np.where(inverse == 0, 1, inverse), weights @ zeros[..., 1].real], -1)
     found = np.where(far[:, None], apart, pairs)
-    pinned = (zeros[..., 0] == 0).all(0)
+    pinned: NDArray[np.bool_] = np.all(zeros[..., 0] == 0, axis=0)
     beside = 2 * (weights @ mean)
-    return np.where(pinned[:, None], np.stack([0 * beside, beside], -1), found)
+    found = np.where(pinned[:, None], np.stack([0 * beside, beside], -1), found)
+    alone: NDArray[np.bool_] = np.all(np.isnan(zeros[..., 1]), axis=0)
+    nothing = np.full_like(beside, np.nan)
+    return np.where(alone[:, None], np.stack([weights @ zeros[..., 0].real, nothing], -1), found)
 
 
 def _product(factors: list[Real]) -> Real:
@@ -145,7 +188,7 @@ def corrected(member: Member, guess: Complex) -> tuple[Complex, NDArray[np.bool_
     zeros, beside = guess, nearest(guess)
     for _ in range(12):
         zeros, moved = improved(member, zeros, beside)
-        if not np.isfinite(zeros).all():
+        if not (np.isfinite(zeros) | np.isnan(guess)).all():
             break
         if (moved < SETTLED).all():
             return zeros, _strayed(guess, zeros, member)
@@ -156,7 +199,7 @@ def _strayed(guess: Complex, found: Complex, member: Member) -> NDArray[np.bool_
     gap, _ = _gaps(found, member, nearest(found))
     met = (guess[:, 0].imag > 0) != (found[:, 0].imag > 0)  # around a meeting on the axis only the mean is compared
     moved = np.where(met[:, None], abs((guess - found).mean(1))[:, None], abs(guess - found))
-    strayed: NDArray[np.bool_] = np.any(~(moved < BELIEVED * gap), axis=1)
+    strayed: NDArray[np.bool_] = np.any(~(moved < BELIEVED * gap) & ~np.isnan(guess), axis=1)
     return strayed
 
 
@@ -168,7 +211,7 @@ def _exchange(family: Family, nodes: list[Node], stray: NDArray[np.bool_], at: f
     here, there, zeros = family(nodes[-1].at).function, family(at).function, nodes[-1].zeros.copy()
     for i, j in product(np.nonzero(stray & (zeros[:, 0].imag == 0))[0], (0, 1)):
         zero = zeros[i, j]
-        if zero == 0:
+        if zero == 0 or np.isnan(zero):
             continue
         near = _next_zero(here, zero.real)
         if near in (np.inf, zeros[i, 1 - j].real):
@@ -178,12 +221,15 @@ def _exchange(family: Family, nodes: list[Node], stray: NDArray[np.bool_], at: f
             move = -(there(both).value / here(both).slope * np.exp(there(both).scale - here(both).scale)).real
         if not (move[1] - move[0]) / (near - zero.real) <= -CLOSING:
             continue
-        m, n = np.unravel_index(abs(zeros - near).argmin(), zeros.shape)
+        m, n = np.unravel_index(np.nanargmin(abs(zeros - near)), zeros.shape)
         meeting = sorted(both, key=abs)
         if m == i or abs(zeros[m, n] - near) > 1e-6 * abs(near - zero):
-            zeros[i], changed = meeting, [i]
+            lone, zeros[i], changed = zeros[i, 1 - j], meeting, [i]
+            if family(at).ends and lone != 0 and not np.isnan(lone):  # the one that is left goes on alone
+                zeros = np.concatenate([zeros, [[lone, np.nan]]])
+                nodes[:-1] = [Node(node.at, _longer(node.zeros)) for node in nodes[:-1]]
         else:
-            left = sorted([zeros[i, 1 - j], zeros[m, 1 - n]], key=abs)
+            left = sorted([zeros[i, 1 - j], zeros[m, 1 - n]], key=lambda zero: (np.isnan(zero), abs(zero)))
             zeros[min(i, m)], zeros[max(i, m)], changed = left, meeting, [i, m]
         for back in range(2, min(3, len(nodes)) + 1):
             past = nodes[-back].zeros.copy()
@@ -192,6 +238,11 @@ def _exchange(family: Family, nodes: list[Node], stray: NDArray[np.bool_], at: f
         nodes[-1] = Node(nodes[-1].at, zeros)
         return True
     return False
+
+
+def _longer(zeros: Complex) -> Complex:
+    """The pairs and one more of which nothing is known."""
+    return np.concatenate([zeros, np.full((1, 2), np.nan + 0j)])
 
 
 def _shortened(node: Node, stray: NDArray[np.bool_], wanted: int) -> Node:
@@ -239,7 +290,7 @@ def nearest(zeros: Complex) -> Neighbours:
     else:
         from scipy.spatial import cKDTree  # takes a third of a second to load, and most tables are short
 
-        plane = np.column_stack([flat.real, flat.imag])
+        plane = np.nan_to_num(np.column_stack([flat.real, flat.imag]), nan=FARTHEST)
         which = np.reshape(cKDTree(plane).query(plane, k=number)[1], (flat.size, number))
     return Neighbours(which, which == each, which // 2 == each // 2)
 
@@ -248,9 +299,10 @@ def _gaps(zeros: Complex, member: Member, beside: Neighbours) -> tuple[Real, Com
     """Of each zero its distance to the nearest zero of another pair or to the singular point, and the way to each."""
     flat = zeros.ravel()
     way = flat[:, None] - flat[beside.which]
-    gap = np.where(beside.own_pair, np.inf, abs(way)).min(1)
+    gap = np.fmin.reduce(np.where(beside.own_pair, np.inf, abs(way)), axis=1)
     from_origin = np.maximum(2 * abs(flat), member.free + 1e-300)
-    gap = np.minimum(gap, np.minimum(from_origin, abs(flat - member.singular)))
+    gap = np.fmin(gap, np.fmin(from_origin, abs(flat - member.singular)))
+    gap[np.isnan(flat)] = np.inf
     return gap.reshape(zeros.shape), way
 
 
@@ -263,7 +315,7 @@ def improved(member: Member, zeros: Complex, beside: Neighbours | None = None) -
     gap, way = _gaps(zeros, member, beside)
     is_real = zeros.imag[:, 0] == 0
     value, slope, scale = _of_pairs(member.function, zeros, is_real)
-    way[beside.itself | (way == 0)] = np.inf  # two that have become one do not part by repulsion
+    way[beside.itself | (way == 0) | np.isnan(way)] = np.inf  # two that have become one do not part by repulsion
     with np.errstate(all="ignore"):
         step = value / slope
         repulsion = (1 / way).sum(1).reshape(zeros.shape)
@@ -275,7 +327,7 @@ def improved(member: Member, zeros: Complex, beside: Neighbours | None = None) -
         for i in np.nonzero(close & ~(abs(new - zeros).max(1) < 0.1 * apart))[0]:
             twist = np.exp(scale[i, 1] - scale[i, 0])  # both values on the scale of the first
             new[i] = _together(zeros[i], value[i] * [1, twist], slope[i] * [1, twist])
-        away = abs(new - zeros)
+        away = np.where(np.isnan(zeros), 0.0, abs(new - zeros))
         floor = 4 * np.finfo(float).eps * abs(zeros)  # nearer no zero is known
         moved = np.where(away <= floor, 0.0, away / gap).max(1)  # no gap is left between two that have become one
     return new, moved
@@ -284,8 +336,10 @@ def improved(member: Member, zeros: Complex, beside: Neighbours | None = None) -
 def _of_pairs(function: Function, zeros: Complex, is_real: NDArray[np.bool_]) -> list[Complex]:
     """Value, slope and scale at pairs (n, 2); of a conjugate pair the function is asked at the upper zero alone."""
     count = len(zeros)
+    asked = np.concatenate([zeros[:, 0], zeros[is_real, 1]])
+    parts, ended = function(np.where(np.isnan(asked), 1.0, asked)), np.isnan(asked)
     found = []
-    for part in function(np.concatenate([zeros[:, 0], zeros[is_real, 1]])):
+    for part in (np.where(ended, 0.0, parts[0]), np.where(ended, 1.0, parts[1]), parts[2]):
         both = np.empty(zeros.shape, complex)
         both[:, 0] = part[:count]
         both[:, 1] = both[:, 0].conj()

@@ -1,0 +1,57 @@
+"""What a locus whose branches end may not hide: unstable poles that are on none of them.
+
+Along a gain the crossing engine knows every crossing of the imaginary axis, whoever crosses it (`lines`).  Along a
+parameter of the arm the poles of a few loops are counted in a box.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tfarm.arm import HubFeedback
+from tfarm.errors import ConvergenceError
+
+from .crossings import BranchCrossing
+from .lines import Line, along
+from .lines import crossings as line_crossings
+from .poles import ON_AXIS, poles_below
+from .variation import Complex, Real, Variation
+
+ALIKE = 1e-6  # of gain and frequency: two roads to one crossing
+LOOPS = 12  # that are counted along a parameter of the arm
+BELOW = (0.97, 0.95, 0.93, 0.9)  # shares of that frequency: heights of the box that are tried
+
+
+def with_others(
+    variation: Variation, gain: Real, branches: Complex, found: tuple[BranchCrossing, ...]
+) -> tuple[BranchCrossing, ...]:
+    """The crossings found on the branches, and those of poles on none, up to the frequency of the highest branch.
+
+    Raises ConvergenceError where a parameter of the arm varies and at one of a few values more poles are unstable than
+    branches are.
+    """
+    top = float(np.fmax.reduce(branches.imag, axis=0).min())
+    if not variation.is_of_gains:
+        _refuse_hidden(variation, gain, branches, top)
+        return found
+    law, way, width = variation.law, np.sign(gain[-1] - gain[0]), abs(gain[-1] - gain[0])
+    line = Line(HubFeedback(), law) if variation.vary == "all" else along(variation.vary, law)
+    inside = line_crossings(variation.arm, line, top).within(gain.min() + ALIKE * width, gain.max() - ALIKE * width)
+    more = [
+        BranchCrossing(gain=t, omega=w, branch=None, direction="unstable" if change * way > 0 else "stable")
+        for t, w, change in inside
+        if not any(abs(t - it.gain) <= ALIKE * width and abs(w - it.omega) <= ALIKE * top for it in found)
+    ]
+    return tuple(sorted([*found, *more], key=lambda each: (way * each.gain, each.omega)))
+
+
+def _refuse_hidden(variation: Variation, gain: Real, branches: Complex, top: float) -> None:
+    """Raise ConvergenceError where at one of a few values more poles below `top` are unstable than branches are."""
+    for n in np.unique(np.linspace(0, gain.size - 1, LOOPS).round().astype(int)):
+        here = branches[:, n]
+        right = (here.real > ON_AXIS * abs(here)) & (abs(here.imag) < top)
+        poles = poles_below(variation.at(float(gain[n])), top, BELOW)
+        if poles.unstable > int((right * np.where(here.imag > 0, 2, 1)).sum()):
+            where = f"{variation.vary} = {gain[n]:.6g}"
+            text = f"at {where} an unstable pole is on none of the branches that could be followed: use another range"
+            raise ConvergenceError(text, poles.values, n)
