@@ -59,7 +59,7 @@ def branches_table(answer: dict[str, Any]) -> Table:
     """A row a gain, two columns a branch."""
     columns = [Column(answer["vary"], unit=answer["unit"], of=answer["gain"])]
     for n, branch in enumerate(answer["branches"]):
-        re, im = zip(*branch, strict=True)
+        re, im = zip(*(point or ("", "") for point in branch), strict=True)
         columns += [Column(f"re_{n}", unit="1/s", of=re), Column(f"im_{n}", unit="1/s", of=im)]
     return Table(columns=tuple(columns))
 
@@ -79,7 +79,10 @@ def print_locus(answer: dict[str, Any]) -> None:
     show(Table(columns=columns))
     for each in answer["crossings"]:
         where = f"{name} = {each['gain']:.10g}, {each['omega_rad_s']:.10g} rad/s ({each['frequency_hz']:.6g} Hz)"
-        print(f"branch {each['branch']} becomes {each['direction']} at {where}")
+        which = "a pole that is on no branch" if each["branch"] is None else f"branch {each['branch']}"
+        print(f"{which} becomes {each['direction']} at {where}")
+    for each in answer["ends"]:
+        print(f"branch {each['branch']} is followed to {name} = {each['gain']:.10g}: then it comes to -1/C, or is lost")
     if not answer["crossings"]:
         print("no branch crosses the imaginary axis")
     print(
@@ -88,6 +91,8 @@ def print_locus(answer: dict[str, Any]) -> None:
     print(answer["sign_convention"])
 
 
-def _complex(point: list[float]) -> str:
+def _complex(point: list[float] | None) -> str:
+    if point is None:
+        return "ended"
     re, im = point
     return f"{re:.10g}{im:+.10g}i" if im else f"{re:.10g}"

@@ -55,7 +55,7 @@ def locus(exact: Locus, *, reduced: ReducedLocus | None = None, ax: Axes | None 
 def zoomed(exact: Locus) -> list[int]:
     """The branches drawn on their own: the first that swings of each mode."""
     imag, mode = exact.branches.imag, exact.mode
-    first = {int(mode[n]): n for n in reversed(range(mode.size)) if imag[n].max() > 0}
+    first = {int(mode[n]): n for n in reversed(range(mode.size)) if (imag[n] > 0).any()}
     return [first[number] for number in sorted(first)][:ZOOMED]
 
 
@@ -113,8 +113,9 @@ def _panel(exact: Locus, reduced: ReducedLocus | None, numbers: Sequence[int], a
             _reduced_branch(exact, reduced, n, color, ax)
         ax.plot(s[0].real, s[0].imag, "x", color=color, ms=6, mew=1.4, zorder=4)
         ax.plot(s[at[1:]].real, s[at[1:]].imag, "o", color=color, ms=3.2, zorder=4)
+    everything = len(numbers) == len(branches)
     for each in exact.crossings:
-        if each.branch in numbers:
+        if each.branch in numbers or (each.branch is None and everything):
             omega = held([each.omega], HELD)[0]
             ax.plot([0], [omega], "D", ms=6, mfc=ORANGE, mec="white", mew=0.8, zorder=6)
             if each.branch not in named:
@@ -128,8 +129,11 @@ def _panel(exact: Locus, reduced: ReducedLocus | None, numbers: Sequence[int], a
 
 def _reduced_branch(exact: Locus, reduced: ReducedLocus, n: int, color: str, ax: Axes) -> None:
     """A branch of the reduced model, and the strip around it that its printed gap allows."""
-    curve, first = shown(reduced.branches[n]), float(modes(exact.arm, 1).natural_frequency[-1])
-    there = abs(exact.gain - reduced.gain[:, None]).argmin(axis=1)  # the reduced one may have fewer values
+    lives = ~np.isnan(reduced.branches[n])
+    if lives.sum() < 2:
+        return
+    curve, first = shown(reduced.branches[n][lives]), float(modes(exact.arm, 1).natural_frequency[-1])
+    there = abs(exact.gain - reduced.gain[lives, None]).argmin(axis=1)  # the reduced one may have fewer values
     size = abs(shown(exact.branches[n, there]))
     width = held(reduced.gap, GAPS_HELD)[n] * np.maximum(size, first)
     along = np.gradient(curve)
@@ -141,6 +145,7 @@ def _reduced_branch(exact: Locus, reduced: ReducedLocus, n: int, color: str, ax:
 
 def _frame(points: Complex, ax: Axes) -> None:
     """Limits with all of the branch, the axis and some room: nothing is cut off."""
+    points = points[~np.isnan(points)]
     real, imag = points.real, points.imag
     left, right = min(float(real.min()), 0.0), max(float(real.max()), 0.0)
     low, high = float(imag.min()), float(imag.max())

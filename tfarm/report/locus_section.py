@@ -44,6 +44,9 @@ NOT_FOLLOWED = (
     "list complete, stands in the table."
 )
 CUT = " Beyond {name} = {end} the branches come too near to each other, or to −1/C, to be told apart: they end there."
+ENDED = (
+    " A branch ends at {name} = {gain}: there its pole comes to −1/C, where real poles accumulate, or cannot be told."
+)
 RATES = (0.0, 0.05, 0.2, 0.5, 1.0, 2.0)  # times J w1: values of K1 whose exact poles are listed where no locus is
 
 
@@ -72,13 +75,15 @@ def _locus_words(data: Loci) -> str:
     size = scientific(data.reduced.worst, 2)
     gap = f"python-control's locus of order {data.reduced.order} is within {size} of |s| of the exact one."
     cut = CUT.format(name=data.name, end=plain(float(data.exact.gain[-1]), 4)) if data.is_cut else ""
-    return f"{_more_K1(data) if data.name == 'K1' else _more_K2(data)}; {gap}{cut}"
+    ended = "".join(ENDED.format(name=data.name, gain=significant(gain, 3)) for _, gain in data.exact.ends)
+    return f"{_more_K1(data) if data.name == 'K1' else _more_K2(data)}; {gap}{cut}{ended}"
 
 
 def _more_K1(data: Loci) -> str:
     """How the damping of the first mode rises, and whether it falls again."""
     exact = data.exact
     rows = exact.branches[(exact.mode == 1) & (exact.branches.imag > 0).any(axis=1)]
+    rows = rows[~np.isnan(rows).any(axis=1)]
     if not rows.size:
         return f"More K1, with K2 = {plain(exact.law.K2)} held"
     ratio = np.where(rows[0].imag > 0, -rows[0].real / np.maximum(abs(rows[0]), 1e-300), -np.inf)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from tfarm.columns import Column, Table
 from tfarm.digits import held, scientific, significant, singly
 from tfarm.loop.loci import GAPS_HELD, HELD, Loci, shown
@@ -22,7 +24,11 @@ def crossing_table(data: Loci, stem: str) -> Table:
             Column(data.name, data.name, data.unit, of=gain, digits=singly(significant, 8)),
             Column("omega_rad_s", "frequency", "rad/s", of=omega, digits=singly(significant, 7)),
             Column("frequency_hz", "", "Hz", of=[w / (2 * math.pi) for w in omega], digits=singly(significant, 7)),
-            Column("mode", "mode", of=lambda each: int(data.exact.mode[each.branch])),
+            Column(
+                "mode",
+                "mode",
+                of=lambda each: "of no branch" if each.branch is None else int(data.exact.mode[each.branch]),
+            ),
             Column("becomes", "becomes", of="direction"),
         ),
     )
@@ -49,6 +55,7 @@ def loci_data(data: Loci, stem: str) -> Table:
     columns = [Column(data.name, data.name, data.unit, of=data.exact.gain)]
     for kind, branches in (("exact", data.exact.branches), ("reduced", data.reduced.branches)):
         for n, row in enumerate(shown(branches)):
-            columns.append(Column(f"{kind}_{n}_re", f"{kind} branch {n}, Re s", "1/s", of=row.real))
-            columns.append(Column(f"{kind}_{n}_im", f"{kind} branch {n}, Im s", "rad/s", of=row.imag))
+            re, im = (["" if np.isnan(x) else x for x in part.tolist()] for part in (row.real, row.imag))
+            columns.append(Column(f"{kind}_{n}_re", f"{kind} branch {n}, Re s", "1/s", of=re))
+            columns.append(Column(f"{kind}_{n}_im", f"{kind} branch {n}, Im s", "rad/s", of=im))
     return Table(stem=stem, title=f"Loci along {data.name}", is_data=True, columns=tuple(columns))
