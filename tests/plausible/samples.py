@@ -58,7 +58,7 @@ class Sampled:
         radius, slack = band.log_radius(case.law)
         size = max(1.0, abs(radius))
         printed = answer["log_spectral_radius"]
-        if case.beam.link.damping and not answer["settled"] and abs(radius - printed) > slack:  # for some modes only
+        if case.beam.link.damping and not answer["settled"]:  # all is said of some modes only
             judged.blind += 1
             return judged
         if slack < 0.1 * size:
@@ -66,18 +66,27 @@ class Sampled:
         if abs(radius) > slack:
             judged.truth(f"{answer['verdict']} at ln radius {radius:.3g}", answer["stable"] == (radius < 0))
         for name in ("K1", "K2"):
-            self._windows(judged, case, clock, name, answer[f"{name}_intervals"])
+            self._windows(judged, case, clock, name, answer[f"{name}_intervals"], answer["shown"][f"{name}_intervals"])
         if answer["stable"]:
             self._delay(judged, case, models, count, answer)
         self._damping(judged, case, models, answer["required_damping_s"])
         return judged
 
-    def _windows(self, judged, case, clock, name, windows):
+    def _windows(self, judged, case, clock, name, windows, shown):
         windows = [tuple(float(end) for end in pair) for pair in windows]
-        ends = [end for pair in windows for end in pair if np.isfinite(end)]
+        figures = [
+            (float(end), of)
+            for pair, both in zip(windows, shown, strict=True)
+            for end, of in zip(pair, both, strict=True)
+        ]
+        ends = [end for end, _ in figures if np.isfinite(end)]
         unit = max([abs(end) for end in ends] + [abs(getattr(case.law, name)), 1e-6])
-        for end in ends[:3]:
-            for value in (end - BESIDE * abs(end), end + BESIDE * abs(end)):
+        for end, figure in [each for each in figures if np.isfinite(each[0])][:3]:
+            if case.beam.link.damping and not figure["settled"]:  # it is said to hold for some modes only
+                judged.blind += 1
+                continue
+            beside = max(BESIDE, 10.0 ** (1 - figure["digits"])) * abs(end)
+            for value in (end - beside, end + beside):
                 self._at(judged, case, clock, name, value, windows)
         for value in case.rng.uniform(-2, 2, 2) * unit:
             if min((abs(value - end) for end in ends), default=np.inf) > 1e-3 * unit:
