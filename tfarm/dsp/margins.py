@@ -164,8 +164,13 @@ def alive(arm: Arm, chain: Chain) -> int:
 
 
 def most_modes(arm: Arm, chain: Chain) -> int:
-    """The most that a loop has: of a damped arm those that outlive a sample and a few, never more than 128."""
-    return MOST if arm.is_undamped else min(MOST, BEYOND + alive(arm, chain))
+    """The most that a loop has: of a damped arm those that outlive a sample and ring, and a few; never more than 128.
+
+    What is overdamped has its slow poles beside -1/C, where the remainder has them too.
+    """
+    if arm.is_undamped:
+        return MOST
+    return min(MOST, BEYOND + min(alive(arm, chain), modes_below(arm, OVERDAMPED / arm.damping)))
 
 
 def whole_loop(arm: Arm, gains: HubFeedback, chain: Chain, branches: Branching = all_damped_modes) -> SampledLoop:
