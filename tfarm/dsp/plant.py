@@ -20,7 +20,7 @@ from scipy.optimize import linear_sum_assignment
 
 from tfarm.arm import FED_BACK, Arm
 from tfarm.dsp.chain import Chain
-from tfarm.dsp.remainder import with_slow_remainder
+from tfarm.dsp.remainder import OVERDAMPED, slow_remainder
 from tfarm.errors import ParameterError
 from tfarm.records import record
 from tfarm.reduced import ModalModel, modal_model
@@ -116,8 +116,17 @@ def _with_modes(model: ModalModel, chain: Chain, outputs: Sequence[str], count: 
         damped: Complex = G[:-1] / (1 + damping * G[-1])
         return damped
 
-    highest = float(some.natural_frequency.max(initial=0.0))
-    return replace(with_slow_remainder(plant, values, highest), model=model)
+    plant, C = replace(plant, model=model), model.arm.damping
+    if C * some.natural_frequency.max(initial=0.0) < OVERDAMPED:
+        return plant
+    corners, shares = slow_remainder(C, lambda s: values(s) - np.array([plant(each) for each in s]).T)
+    return replace(
+        plant,
+        poles=np.r_[plant.poles, -corners],
+        residues=np.c_[plant.residues, shares * corners],
+        static=plant.static - shares.sum(axis=1),
+        mode=np.r_[plant.mode, np.zeros(corners.size, np.int64)],
+    )
 
 
 def filtered(plant: Plant, chain: Chain) -> Plant:

@@ -9,39 +9,25 @@ s > 0; at s = 0 nothing changes.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from tfarm.dsp.plant import Plant
-
 Complex = NDArray[np.complexfloating[Any, Any]]
+Real = NDArray[np.float64]
 
 RATIOS = 1 + np.geomspace(0.02, 30.0, 14)  # c_j C, and below s C of the fit: tuned by hand on the lab arm
 AT = np.geomspace(0.02, 5.0, 60)
 OVERDAMPED = 1.2  # C w of the last mode from which on it is fitted; below, the modes left out still ring
 
 
-def with_slow_remainder(plant: Plant, exact: Callable[[Complex], Complex], highest: float) -> Plant:
-    """The plant with its static remainder spread over slow poles.
+def slow_remainder(C: float, missing: Callable[[Complex], Complex]) -> tuple[Real, Real]:
+    """The corners c_j (m,) [1/s] and the shares D_j (outputs, m), C being the damping [s].
 
-    Unchanged where its last mode, of natural frequency `highest` [rad/s], still rings.  `exact` gives the plant's
-    outputs (outputs, n) at s (n,).
+    `missing` gives what the modes leave out of each output (outputs, n) at s (n,).
     """
-    C = plant.arm.damping
-    if C * highest < OVERDAMPED:
-        return plant
-    s, corners = (AT / C).astype(complex), RATIOS / C
-    missing = (exact(s) - np.array([plant(each) for each in s]).T).real
     basis = 1 / (1 + AT[:, None] / RATIOS) - 1
-    shares = np.linalg.lstsq(basis, missing.T, rcond=1e-12)[0].T
-    return replace(
-        plant,
-        poles=np.r_[plant.poles, -corners],
-        residues=np.c_[plant.residues, shares * corners],
-        static=plant.static - shares.sum(axis=1),
-        mode=np.r_[plant.mode, np.zeros(corners.size, np.int64)],
-    )
+    left = missing((AT / C).astype(complex)).real
+    shares: Real = np.linalg.lstsq(basis, left.T, rcond=1e-12)[0].T.astype(float)
+    return RATIOS / C, shares

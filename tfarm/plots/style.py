@@ -12,7 +12,7 @@ from contextlib import contextmanager
 import matplotlib.style
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure as Figure  # which pages name too
 
 INK, GREY, FAINT = "#1a1a1a", "#6b6b6b", "#d4d4d4"
 BLUE, ORANGE, GREEN, PURPLE = "#0060a8", "#c4500a", "#00795a", "#8a3b8f"  # told apart by the colour-blind too

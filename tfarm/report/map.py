@@ -29,7 +29,7 @@ from tfarm.report.loop_laws import MODES, NamedLaw, best, brief_of, laws
 from tfarm.spectrum.scales import default_gains
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from tfarm.plots.style import Figure
 
 Real = NDArray[np.float64]
 

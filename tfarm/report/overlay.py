@@ -22,7 +22,7 @@ from tfarm.plots import regions
 from tfarm.plots.style import blank, headline, style
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from tfarm.plots.style import Figure
 
 K2_RANGE = (-1.0, 1.5)
 CUT = (-1.02, 1.52)  # where intervals are cut, just outside the picture: no cut is seen as an edge

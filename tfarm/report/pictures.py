@@ -16,7 +16,7 @@ from tfarm.response.frequency import band_of, bode
 from tfarm.spectrum.scales import default_gains
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from tfarm.plots.style import Figure
 
 DOTS_PER_INCH = 100
 SHOWN = 4

@@ -15,7 +15,7 @@ from tfarm.tables.files import save as save_table
 from tfarm.tables.html import as_html
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from tfarm.plots.style import Figure
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

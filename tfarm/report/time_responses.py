@@ -16,7 +16,7 @@ from tfarm.dsp.slews import Slews
 from tfarm.plots.motion import draw_responses
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from tfarm.plots.style import Figure
 
 UNTIL = 0.9  # of a record: what has settled after that may ring on
 
