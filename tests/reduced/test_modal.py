@@ -13,8 +13,9 @@ import tfarm
 from tests.spectrum.test_double import pinned_pinned, steel
 from tests.strategies import BOUNDARY_CASES, some_arm
 from tfarm import Hub, ParameterError, Payload
-from tfarm.arm import FED_BACK
-from tfarm.reduced import modal_model, relaxed_model, tailed_model
+from tfarm.arm import FED_BACK, Arm, Link, Section
+from tfarm.reduced import modal_model, reduce, relaxed_model, slow_model, tailed_model
+from tfarm.response import transfer
 
 pytestmark = pytest.mark.kernels
 
@@ -233,3 +234,24 @@ def test_relaxation_goes_where_the_static_remainder_cannot(lab):
 def test_nothing_relaxes_without_damping(arm):
     with pytest.raises(ParameterError, match="damping"):
         relaxed_model(arm, "root_moment", 3)
+
+
+def test_slow_poles_stand_for_the_overdamped_modes_that_are_left_out():
+    """A strongly damped rod: modes alone, and one relaxing state, are off by 1e-3; slow poles have seven digits."""
+    rod = Section.round(diameter=0.004)
+    link = Link(length=0.4, density=1100.0, youngs_modulus=5e6, shear_modulus=1.7e6, damping=2e-3, section=rod)
+    arm, names, omega = Arm(link=link, hub=Hub(inertia=1e-4)), ["root_moment", "hub_rate"], np.geomspace(0.5, 300, 160)
+    exact = transfer(arm, names)(1j * omega)
+    size = abs(exact) + abs(np.gradient(exact, np.log(omega), axis=1))
+
+    def error(model):
+        return (abs(model(1j * omega) - exact) / size).max()
+
+    few, slow = modal_model(arm, names, 14), slow_model(arm, names, 14)
+    assert min(error(few), error(relaxed_model(arm, names, 14))) > 1e-3
+    assert error(slow) < 1e-7
+    assert slow.order == few.order + 14
+    assert slow(1e-3j)[0] == pytest.approx(transfer(arm, "root_moment")(1e-3j), rel=1e-9)
+    assert reduce(arm, names, error=1e-6, band=(0.5, 300.0)).worst_error <= 1e-6
+    with pytest.raises(ParameterError, match="nothing is slow"):
+        slow_model(arm.having(damping=0.0), names, 8)

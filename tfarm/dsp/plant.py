@@ -20,10 +20,10 @@ from scipy.optimize import linear_sum_assignment
 
 from tfarm.arm import FED_BACK, Arm
 from tfarm.dsp.chain import Chain
-from tfarm.dsp.remainder import OVERDAMPED, slow_remainder
 from tfarm.errors import ParameterError
 from tfarm.records import record
 from tfarm.reduced import ModalModel, modal_model
+from tfarm.reduced.remainder import OVERDAMPED, slow_remainder
 from tfarm.response import transfer
 from tfarm.spectrum import DampedModes, Modes
 from tfarm.spectrum.damped import all_damped_modes

@@ -27,6 +27,7 @@ from tfarm.spectrum import Modes, modes
 from tfarm.spectrum.damped import DampedModes, all_damped_modes
 
 from .partial_fractions import PartialFractions
+from .remainder import slow_remainder
 from .residues import contour_residues, end_residues, undamped_residues
 
 Complex = NDArray[np.complexfloating[Any, Any]]
@@ -105,6 +106,29 @@ def relaxed_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None)
     expansion = np.array(expansions_at_zero(coefficients(arm), model.rows, share))
     slope = expansion[:, 3] + (model.residues / model.eigenvalues**2).real.sum(axis=(1, 2))
     return replace(model, static=model.static + slope / C, relaxation=-slope / C)
+
+
+def slow_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None) -> ModalModel:
+    """The modal model of a damped arm with slow real poles in the place of all modes left out (`remainder`).
+
+    They go in pairs, with the index 0.  Raises ParameterError at C = 0.
+    """
+    model, C = modal_model(arm, outputs, count, x), arm.damping
+    if C == 0:
+        raise ParameterError(key="link.damping", value=C, remedy="without damping nothing is slow; take modal_model")
+    exact = transfer(arm, outputs, x=x)
+    corners, shares = slow_remainder(C, lambda s: exact(s).reshape(-1, s.size) - model(s))
+    p, none = -corners.reshape(-1, 2), np.zeros(corners.size // 2, np.int64)
+    residues = (shares * corners).reshape(len(shares), -1, 2)
+    return replace(
+        model,
+        index=np.r_[model.index, none],
+        natural_frequency=np.r_[model.natural_frequency, np.sqrt(p.prod(axis=1))],
+        eigenvalues=np.r_[model.eigenvalues, p],
+        residues=np.concatenate([model.residues, residues], axis=1),
+        static=model.static - shares.sum(axis=1),
+        participation=np.r_[model.participation, 0.0 * none],
+    )
 
 
 def tailed_model(arm: Arm, count: int) -> ModalModel:

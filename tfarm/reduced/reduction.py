@@ -23,9 +23,10 @@ from tfarm.response import Wanted, transfer
 from tfarm.spectrum import modes
 
 from .accuracy import ROUNDING, Ruler
-from .modal import modal_model, relaxed_model
+from .modal import modal_model, relaxed_model, slow_model
 from .partial_fractions import Complex, Matrices, PartialFractions
 from .rational import modes_in, rational_model
+from .remainder import OVERDAMPED, SLOW_PAIRS
 
 if TYPE_CHECKING:
     import control
@@ -121,7 +122,8 @@ def reduce(
 ) -> ReducedModel:
     """The reduced model of so many states, or the smallest one whose worst error over the band is within `error`.
 
-    Orders are even; at C > 0 an odd one has the relaxation of the modes left out as a state (see `relaxed_model`).
+    Orders are even; at C > 0 an odd one has the relaxation of the modes left out as a state (see `relaxed_model`), and
+    where these are overdamped 14 of an even one may be slow poles beside -1/C in their place (`slow_model`).
     `band` in rad/s; `method` "modal" or "aaa" (C = 0 only), by default whichever has the smaller error; `x` [m] is the
     place of outputs along the arm.  Raises ParameterError for what no model can be, ConvergenceError where no model of
     up to 400 states is within the error.
@@ -168,7 +170,14 @@ class _Bench:
         if self.by_modes or not found:
             note = "" if self.by_modes else f"modal taken: AAA wants more than the {self.inside} modes in the band"
             found.append(self._measured(modal_model(self.arm, self.rows, pairs, self.x), "modal", note))
+            found += self._with_slow_poles(pairs - SLOW_PAIRS)
         return min(found, key=lambda each: each.worst_error)
+
+    def _with_slow_poles(self, count: int) -> list[ReducedModel]:
+        """The model of so many modes and slow poles, where those that it leaves out are overdamped."""
+        if count < 1 or self.arm.damping * modes(self.arm, count).natural_frequency[-1] < OVERDAMPED:
+            return []
+        return [self._measured(slow_model(self.arm, self.rows, count, self.x), "modal", "")]
 
     def within(self, error: float) -> ReducedModel:
         """The smallest model whose measured error is within that one."""
@@ -179,6 +188,8 @@ class _Bench:
         if self.by_modes:
             tried.append(self._few_modes(error, modal_model, most))
         found = [each for each in tried if each is not None]
+        if not found and not self.arm.is_undamped:
+            found = [each for each in [self._few_modes(error, slow_model, self._most() - SLOW_PAIRS)] if each]
         if not found:
             best = self.of_order(2 * (min(self.inside + MOST_TAILS, self._most()) + self.rigid))
             message = (

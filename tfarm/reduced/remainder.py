@@ -18,8 +18,9 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
 
 RATIOS = 1 + np.geomspace(0.02, 30.0, 14)  # c_j C, and below s C of the fit: tuned by hand on the lab arm
+SLOW_PAIRS = RATIOS.size // 2
 AT = np.geomspace(0.02, 5.0, 60)
-OVERDAMPED = 1.2  # C w of the last mode from which on it is fitted; below, the modes left out still ring
+OVERDAMPED = 1.2  # C w of the last mode from which on it serves; below, the modes left out still ring
 
 
 def slow_remainder(C: float, missing: Callable[[Complex], Complex]) -> tuple[Real, Real]:
