@@ -47,3 +47,8 @@ def test_powers_of_ten_and_units():
     assert scientific(94.96, 4) == "9.496 × 10¹"
     assert unit("kg m^2") == "kg m²"
     assert unit("m^-3") == "m⁻³"
+
+
+def test_counts_and_lists_read_as_a_person_writes_them():
+    assert [counted(n, "pole") for n in (0, 1, 2, 0.5)] == ["no poles", "1 pole", "2 poles", "0.5 poles"]
+    assert [listed(words) for words in (["a"], ["a", "b"], ["a", "b", "c"])] == ["a", "a and b", "a, b and c"]

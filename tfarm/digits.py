@@ -97,6 +97,16 @@ def scientific(x: float, digits: int) -> str:
     return _special(x) if x == 0 or math.isinf(x) else _power_of_ten(f"{x:.{digits - 1}e}")
 
 
+def counted(count: float, what: str) -> str:
+    """How many of something: no poles, 1 pole, 2 poles."""
+    return f"{plain(count) if count else 'no'} {what}{'s' * (count != 1)}"
+
+
+def listed(words: Sequence[str]) -> str:
+    """One, or several with commas and an "and" before the last."""
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+
+
 def unit(text: str) -> str:
     """A unit with true exponents: m^2 becomes m²."""
     return re.sub(r"\^(-?\d)", lambda power: power[1].translate(SUPERSCRIPT), text)

@@ -10,7 +10,8 @@ import tfarm
 from tests.odd_arms import odd_arms
 from tfarm.dsp import Chain, sampled_loop
 from tfarm.dsp.curves import away
-from tfarm.report.tuner_words import beside, drift_words, learning_words, shaping_words, short_answer, typeset_numbers
+from tfarm.report.tuner_words import beside, drift_words, learning_words, shaping_words, short_answer
+from tfarm.report.words import typeset
 from tfarm.spectrum.scales import default_gains
 from tfarm.tuner.comparison import conditions, quantised_chain
 from tfarm.tuner.overview import plan_of
@@ -99,7 +100,8 @@ def test_the_guard_is_not_sold_as_more_than_it_is():
     assert "costs part of the gain, and buys the proof" in learning_words(study(tuner=0.9, free=0.8))
     assert "costs nothing here, and buys the proof" in learning_words(study(tuner=0.9, free=1.2))
     assert "of the first modes alone" in learning_words(study(is_proven=False))
-    assert typeset_numbers("cost 5.852e+04, (0.9, 0.1)") == "cost 58520, (0.9, 0.1)"
+    assert typeset("cost 5.852e+04, (0.9, 0.1)") == "cost 58520, (0.9, 0.1)"
+    assert typeset("V_t = -a2 K1 theta_t^2, -2.5e-09 of J w1") == "V_t = −a2 K1 (dθ/dt)², −2.5 × 10⁻⁹ of J ω₁"
 
 
 @pytest.mark.parametrize("name", TURNING)

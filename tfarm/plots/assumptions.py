@@ -31,13 +31,11 @@ def draw_over(curve: Study, x: Real, study: Study, candidates: Real, label: str)
         if isinstance(study, HubStudy):
             _mark_limits(study, ax)
         _label_axes(label, ax)
-        _leave_room(x, ax)
-        headline(figure, f"{study.arm.name}: natural frequencies over the {_parameter(study)}")
+        span = float(x[-1] / x[0])
+        ax.set_xlim(x[0] / span**0.06, x[-1] * span**0.13)  # room for the bars, and for these and the modes' names
+        parameter = "hub inertia" if isinstance(study, HubStudy) else "depth of the section, at this area"
+        headline(figure, f"{study.arm.name}: natural frequencies over the {parameter}")
     return figure
-
-
-def _parameter(study: Study) -> str:
-    return "hub inertia" if isinstance(study, HubStudy) else "depth of the section, at this area"
 
 
 def _mark(number: int, color: str, candidates: Real, study: Study, ax: Axes) -> None:
@@ -69,9 +67,3 @@ def _label_axes(label: str, ax: Axes) -> None:
         axis.set_major_locator(LogLocator(10.0, subs=(1.0, 2.0, 5.0)))
         axis.set_major_formatter(FuncFormatter(lambda value, _: plain(value, 3)))
         axis.set_minor_formatter(NullFormatter())
-
-
-def _leave_room(x: Real, ax: Axes) -> None:
-    """At the left for the bars, at the right for these and the modes' names."""
-    span = float(x[-1] / x[0])
-    ax.set_xlim(x[0] / span**0.06, x[-1] * span**0.13)

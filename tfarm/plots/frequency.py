@@ -69,7 +69,8 @@ def magnitude(data: Bode, *, ax: Axes, is_small: bool = False, label: str = "fle
     if np.any(data.rigid):
         ax.plot(data.omega, abs(data.rigid), color=GREY, lw=1.0, ls=(0, (4, 3)), zorder=1.5, label="rigid arm")
     _mark_roots(data, ax)
-    _mark_cutoff(data, ax)
+    if data.band[0] < data.arm.shear_cutoff < data.band[1]:  # where the second pair of waves begins to travel
+        ax.axvline(data.arm.shear_cutoff, color=ORANGE, lw=1.0, ls="-.", label="shear cut-off")
     ax.set_xlabel("angular frequency [rad/s]")
     ax.yaxis.set_minor_formatter(NullFormatter())
     if is_small:
@@ -148,12 +149,6 @@ def _mark_roots(data: Bode, ax: Axes) -> None:
                 roots, np.full(roots.size, height), marker, transform=ax.get_xaxis_transform(), clip_on=False,
                 mfc="white", mec=INK, ms=6.0, mew=1.0, zorder=5, label=label,
             )  # fmt: skip
-
-
-def _mark_cutoff(data: Bode, ax: Axes) -> None:
-    """Where the second pair of waves begins to travel, if that is in the band."""
-    if data.band[0] < data.arm.shear_cutoff < data.band[1]:
-        ax.axvline(data.arm.shear_cutoff, color=ORANGE, lw=1.0, ls="-.", label="shear cut-off")
 
 
 def _number_modes(data: Bode, ax: Axes) -> None:

@@ -15,7 +15,7 @@ from scipy import ndimage
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.crossing import RegionPiece, pieces
-from tfarm.digits import SUPERSCRIPT, plain, significant
+from tfarm.digits import SUPERSCRIPT, counted, plain, significant
 from tfarm.dsp import GainMap
 from tfarm.loop.edges import LINEAR_SCALE, Axis, edge, seen, stable_edge, static_edges
 from tfarm.loop.regions import INFINITE, Region
@@ -256,7 +256,7 @@ def _run(inside: NDArray[np.bool_], at: int) -> tuple[int, int]:
 def _words(count: int) -> str:
     if count == 0:
         return "stable"
-    return "every flexible mode unstable" if count == INFINITE else f"{count} unstable pole{'s' * (count > 1)}"
+    return "every flexible mode unstable" if count == INFINITE else counted(count, "unstable pole")
 
 
 def law_mark(law: HubFeedback, marker: str, label: str, ax: Axes) -> None:

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from tfarm.digits import plain, significant
+from tfarm.digits import counted, plain, significant
 from tfarm.dsp.curves import Curve, continuous, root_moment
 from tfarm.dsp.strip_chart import StripChart
 
@@ -48,8 +48,7 @@ def draw_strip_chart(data: StripChart) -> Figure:
 
 def _chain_words(data: StripChart) -> str:
     c, delay = data.simulation.chain.converters, data.simulation.chain.sampling.delay_samples
-    late = f"{plain(delay)} sample{'s' * (delay != 1)} late"
-    return f"{c.moment_bits} bits of ADC, {late}, at most {plain(data.limit, 3)} N m"
+    return f"{c.moment_bits} bits of ADC, {counted(delay, 'sample')} late, at most {plain(data.limit, 3)} N m"
 
 
 def close_up(data: StripChart) -> tuple[float, float]:
@@ -63,7 +62,8 @@ def moment(data: StripChart, is_close: bool, *, ax: Axes) -> None:
     """What the arm has, and what the ADC makes of it."""
     s, step = data.simulation, significant(data.step, 3)
     hidden = "" if is_close else "_"
-    drawn = root_moment(s) if not is_close else Curve(*_twice(*continuous(s, "root_moment")), False)
+    t, y = continuous(s, "root_moment")
+    drawn = Curve(t, y, y, False) if is_close else root_moment(s)
     draw_curve(drawn, ax, BLUE, hidden + "root moment of the arm")
     ax.step(
         s.t, data.read, where="post", color=ORANGE, lw=1.1,
@@ -120,7 +120,3 @@ def _fit(ax: Axes, y: Real) -> None:
     if y.size:
         room = 0.12 * max(float(np.ptp(y)), 1e-12)
         ax.set_ylim(float(y.min()) - room, float(y.max()) + room)
-
-
-def _twice(t: Real, y: Real) -> tuple[Real, Real, Real]:
-    return t, y, y

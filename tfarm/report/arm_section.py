@@ -18,12 +18,14 @@ Row = tuple[str, str, float, str]  # quantity, symbol, value, unit
 
 
 def arm_section(arm: Arm) -> Section:
-    """The first part of every page."""
+    """The first part of every page, with a sentence on values that look like a slip of units."""
+    odd = "; and on ".join(implausible(arm))
+    words = [f"Check the units: every number on this page rests on {odd}."] * bool(odd)
     return Section(
         anchor="arm",
         title="The arm",
         facts=headline_numbers(arm),
-        words=(*_warnings(arm), *(() if arm.assumptions else ("This arm states no assumptions.",))),
+        words=words + ["This arm states no assumptions."] * (not arm.assumptions),
         items=arm.assumptions,
         blocks=(_picture(arm), given_table(arm), derived_table(arm)),
     )
@@ -63,14 +65,6 @@ def _other_numbers(arm: Arm) -> Iterator[Fact]:
     )
     yield Fact(label="mass of the link", value=significant(mass, 5), unit="kg")
     yield Fact(label="damping C", value=plain(C), unit="s", beside="" if C else "none: resonances are infinite")
-
-
-def _warnings(arm: Arm) -> tuple[str, ...]:
-    """A sentence on values that look like a slip of units, if there are any."""
-    texts = implausible(arm)
-    if not texts:
-        return ()
-    return (f"Check the units: every number on this page rests on {'; and on '.join(texts)}.",)
 
 
 def _picture(arm: Arm) -> Picture:

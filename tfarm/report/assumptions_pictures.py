@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from tfarm.arm import Arm
 from tfarm.audit.assumptions import HubStudy, SectionStudy, hub_study, section_study
 from tfarm.columns import Column, Table
 from tfarm.digits import plain, significant
@@ -30,7 +29,7 @@ RISING, FALLING = "all rising", "all falling"
 def section_picture(study: SectionStudy) -> Picture:
     arm = study.arm
     curve = section_study(arm, _between(study.depth))
-    equivalent = "" if _is_rectangle(arm) else EQUIVALENT
+    equivalent = "" if arm.link.section.shape == "rectangle" else EQUIVALENT
     words = _ends_in_words(study, study.depth, "m")
     return Picture(
         stem="assumptions-depth",
@@ -60,10 +59,6 @@ def _way(curve: Study) -> str:
     """Whether all curves rise, all fall, or neither."""
     steps = np.diff(curve.natural_frequency, axis=0)
     return RISING if (steps > 0).all() else FALLING if (steps < 0).all() else "not all of them one way"
-
-
-def _is_rectangle(arm: Arm) -> bool:
-    return arm.link.section.shape == "rectangle"
 
 
 def _between(values: Real) -> list[float]:

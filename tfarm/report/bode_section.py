@@ -8,7 +8,7 @@ import numpy as np
 
 from tfarm.arm import Arm
 from tfarm.columns import Column, Table
-from tfarm.digits import lined, plain, scientific, significant, singly, unit
+from tfarm.digits import counted, lined, plain, scientific, significant, singly, unit
 from tfarm.plots.frequency import draw_bode
 from tfarm.report.sections import Picture, Section
 from tfarm.response.frequency import ON_AXIS, Bode, bode
@@ -44,7 +44,7 @@ def what_is_seen(data: Bode) -> str:
     low, high = (plain(w, 5) for w in data.band)
     grid = f"The exact response at {data.omega.size} frequencies from {low} to {high} rad/s"
     if data.poles.size or data.zeros.size:
-        around = f"{_many(len(data.poles), 'pole')} and {_many(len(data.zeros), 'zero')}"
+        around = f"{counted(len(data.poles), 'pole')} and {counted(len(data.zeros), 'zero')}"
         grid += f", spaced geometrically around its {around}, so that no peak and no dip falls between two of them"
     grid += "."
     if data.infinite.size:
@@ -72,7 +72,7 @@ def what_it_means(data: Bode) -> str:
         count = int(np.sum(right.imag == 0) + 2 * np.sum(right.imag > 0))
         slowest = significant(float(abs(right).min()), 4)
         return (
-            f"{_many(count, 'zero')} in the right half-plane, the slowest at {slowest} rad/s: the phase turns by "
+            f"{counted(count, 'zero')} in the right half-plane, the slowest at {slowest} rad/s: the phase turns by "
             f"{turned}, and a loop closed here cannot be much faster than the slowest of them."
         )
     if np.ptp(data.phase) < 181:
@@ -142,7 +142,3 @@ def _width(box: tuple[float, float]) -> str:
     """The range of Re s in which roots are complete; empty where it has no end."""
     left, right = box
     return "" if math.isinf(left) else f"{plain(left, 5)} < Re s < {plain(right, 5)} 1/s"
-
-
-def _many(count: int, what: str) -> str:
-    return f"{count} {what}{'s' * (count != 1)}"

@@ -9,7 +9,7 @@ import numpy as np
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.columns import Column, Table
-from tfarm.digits import plain, scientific, significant, singly
+from tfarm.digits import counted, listed, plain, scientific, significant, singly
 from tfarm.errors import ConvergenceError
 from tfarm.loop.loci import Loci, loci
 from tfarm.loop.stability import MARGIN_OF_ZERO, Stability, stability
@@ -106,13 +106,9 @@ def _more_K2(data: Loci) -> str:
     first = min(each.gain for each in unstable)
     there = [each.omega for each in unstable if abs(each.gain - first) <= 1e-6 * abs(first)]
     many = [significant(omega, 4) for omega in there if omega > 0]
-    how = f"poles cross at {_list(many)} rad/s" if many else "a real pole passes through 0"
+    how = f"poles cross at {listed(many)} rad/s" if many else "a real pole passes through 0"
     on = "from" if not any(each.direction == "stable" and each.gain > first for each in exact.crossings) else "at"
     return f"{more} makes the loop unstable {on} K2 = {significant(first, 6)}{' on' * (on == 'from')}, where {how}"
-
-
-def _list(texts: list[str]) -> str:
-    return texts[0] if len(texts) == 1 else f"{', '.join(texts[:-1])} and {texts[-1]}"
 
 
 def _locus_picture(data: Loci) -> Picture:
@@ -122,7 +118,7 @@ def _locus_picture(data: Loci) -> Picture:
         stem=f"locus-{name}",
         title=f"Closed-loop poles along {name}",
         caption=SEEN.format(name=name, order=data.reduced.order, worst=scientific(data.reduced.worst, 2)),
-        alt=f"Root locus along {name}: {len(data.exact.branches)} branches, {many} crossing{'s' * (many != 1)} of the "
+        alt=f"Root locus along {name}: {len(data.exact.branches)} branches, {counted(many, 'crossing')} of the "
         f"imaginary axis; the reduced branches are within {scientific(data.reduced.worst, 2)} of |s|.",
         figure=draw_loci(data),
         data=loci_data(data, f"locus-{name}-data"),

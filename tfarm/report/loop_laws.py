@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import dataclass
 from functools import lru_cache
 
 from tfarm.arm import Arm, HubFeedback
-from tfarm.digits import plain
 from tfarm.dsp import Chain
 from tfarm.dsp.brief import SampledBrief, sampled_brief
 from tfarm.errors import ConvergenceError
@@ -27,18 +25,6 @@ NO_PLACE_FOR_K2 = (
     "The hub of this arm has no inertia: {gauge}, so feeding it back by K2 would be an algebraic loop. There is no map "
     "of K1 and K2; what K1 does at K2 = 0 is said below."
 )
-
-TYPESET = {
-    "theta_t^2": "(dθ/dt)²", "theta_t": "dθ/dt", "phi_xt(0)": "∂φ′(0)/∂t", "L(iw)": "L(iω)",
-    "J w1": "J ω₁", " = -": " = −",
-}  # fmt: skip
-
-
-def typeset(text: str) -> str:
-    """A sentence of the loop room as a page shows it."""
-    for plain_text, shown in TYPESET.items():
-        text = text.replace(plain_text, shown)
-    return re.sub(r"\d(?:\.\d+)?e[-+]\d+", lambda number: plain(float(number[0])), text)
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from tfarm.arm import Arm
-from tfarm.digits import plain, significant
+from tfarm.digits import counted, plain, significant
 from tfarm.dsp import Chain
-from tfarm.dsp.brief import SampledBrief
 from tfarm.errors import ConvergenceError
 from tfarm.loop.nyquist import Nyquist, nyquist, nyquist_of
 from tfarm.loop.windows import Windows
@@ -23,13 +22,13 @@ from tfarm.report.loop_laws import (
     laws,
     margins_of,
     sign_words,
-    typeset,
     why_no_loop,
 )
 from tfarm.report.map import GainMap, draw_map, gain_map, map_data
 from tfarm.report.margins_table import margin_table, verdict_facts, verdict_words, window_table
 from tfarm.report.nyquist import COMPARED, Curve, count_table, curve_data
 from tfarm.report.sections import Picture, Section
+from tfarm.report.words import typeset
 from tfarm.spectrum.scales import default_gains, default_words, rate_unit
 
 UNSTABLE_K2 = 1.5  # at least, of the law whose encirclements are counted for comparison
@@ -84,11 +83,12 @@ def no_loop_section(arm: Arm) -> Section:
 def map_section(arm: Arm, chain: Chain | None = None) -> Section:
     """How high may the gains go?  And how high when the loop is sampled by the chain's clock?"""
     data = gain_map(arm, chain)
+    share = significant(100 * float(data.region.stable.mean()), 2)
     picture = Picture(
         stem="map",
         title="The plane of both gains",
         caption=_map_caption(data),
-        alt=_map_alt(data),
+        alt=f"Map of K1 and K2: {share} % of the area shown is stable; how far each gain may go is said above.",
         figure=draw_map(data),
         data=map_data(data),
     )
@@ -141,19 +141,16 @@ def _best_words(data: GainMap) -> str:
     if found is None:
         return ""
     cut = " and ".join(f"{name} = {plain(getattr(found.law, name), 4)}" for name in found.at_bound)
+    brief = data.briefs[-1]
+    words = typeset(brief.words)
+    sampled = f"{words[0].upper()}{words[1:]}" if brief.is_stable else f"But {words}"
     edge = f" That is no optimum: the dotted frame cuts the search off at {cut}, and there is more beyond." * bool(cut)
     return (
         f"The best damping of the first {MODES} modes within the dotted frame is {significant(100 * found.value, 3)} % "
         f"of critical, at K1 = {significant(found.law.K1, 4)} N m s/rad and K2 = {significant(found.law.K2, 4)} "
         f"(tfarm design), a continuous loop that is {found.verdict.verdict}.{edge}"
-        f" {_sampled_words(data.briefs[-1])}"
+        f" {sampled}."
     )
-
-
-def _sampled_words(brief: SampledBrief) -> str:
-    """What sampling does to the best gains, as a sentence."""
-    words = typeset(brief.words)
-    return f"{'' if brief.is_stable else 'But '}{words if not brief.is_stable else words[0].upper() + words[1:]}."
 
 
 def _map_caption(data: GainMap) -> str:
@@ -168,11 +165,6 @@ def _map_caption(data: GainMap) -> str:
     clock = f"{plain(1e3 * data.chain.sampling.period)} ms"
     modes = 0 if data.sampled is None else data.sampled.modes_used
     return seen + sampled.format(clock=clock, modes=modes) + DEPTH * (not data.is_undamped)
-
-
-def _map_alt(data: GainMap) -> str:
-    share = significant(100 * float(data.region.stable.mean()), 2)
-    return f"Map of K1 and K2: {share} % of the area shown is stable; how far each gain may go is said above."
 
 
 # ------------------------------------------------------------ margins
@@ -234,8 +226,8 @@ def _to_compare(arm: Arm) -> list[Curve]:
 
 def _nyquist_answer(plots: list[Curve]) -> str:
     parts = [
-        f"{named.name}: {p.verdict.verdict}, {abs(p.encirclements) or 'no'} turn{'s' * (abs(p.encirclements) != 1)} "
-        f"around −1 and {p.verdict.unstable_roots or 'no'} unstable pole{'s' * (p.verdict.unstable_roots != 1)}"
+        f"{named.name}: {p.verdict.verdict}, {counted(abs(p.encirclements), 'turn')} around −1 and "
+        f"{counted(p.verdict.unstable_roots, 'unstable pole')}"
         for named, p in plots
     ]
     return f"{'; '.join(parts).capitalize()}."

@@ -6,13 +6,14 @@ import math
 from collections.abc import Iterator, Sequence
 
 from tfarm.columns import Column, Table
-from tfarm.digits import plain, significant, singly
+from tfarm.digits import counted, plain, significant, singly
 from tfarm.dsp.brief import SampledBrief
 from tfarm.loop.answers import MARGINS, NOTHING, WINDOWS, gain_rows, sizes_of
 from tfarm.loop.lyapunov import lyapunov
 from tfarm.loop.margins import Margins
-from tfarm.report.loop_laws import NamedLaw, typeset
+from tfarm.report.loop_laws import NamedLaw
 from tfarm.report.sections import Fact
+from tfarm.report.words import typeset
 
 UNKNOWN = "not known"  # an exact margin, where nothing bounds L beyond the band
 UNLIMITED = {"disk": 2.0, "peak_sensitivity": 1.0}  # sizes of a passive loop, at no frequency of its own; else inf
@@ -42,7 +43,8 @@ def verdict_facts(laws: Sequence[NamedLaw], found: Sequence[Margins], briefs: Se
     """The verdict of each law on the continuous loop, large, and beside it what sampling makes of it."""
     for named, each, brief in zip(laws, found, briefs, strict=True):
         it = each.stability
-        count = "infinitely many unstable poles" if it.unstable_roots_infinite else _many(it.unstable_roots)
+        number = counted(it.unstable_roots, "unstable pole")
+        count = "infinitely many unstable poles" if it.unstable_roots_infinite else number
         yield Fact(
             label=f"{named.name}: {named.gains}",
             value=it.verdict.upper(),
@@ -57,7 +59,8 @@ def verdict_words(named: NamedLaw, found: Margins) -> str:
     proven = "proven" if proof.proven else "no proof"
     apart = ", the one at 0 that the hub angle leaves apart" if it.loop.arm.has_rigid_mode and not named.law.Kp else ""
     return (
-        f"{named.name.capitalize()}, {named.gains}: {it.verdict.upper()}, with {_many(it.unstable_roots)} "
+        f"{named.name.capitalize()}, {named.gains}: {it.verdict.upper()}, with "
+        f"{counted(it.unstable_roots, 'unstable pole')} "
         f"{_up_to(it.band)}{apart}; {typeset(it.tail)}. "
         f"Lyapunov: {proven}, {typeset(proof.reason)}."
     )
@@ -65,10 +68,6 @@ def verdict_words(named: NamedLaw, found: Margins) -> str:
 
 def _up_to(band: float) -> str:
     return f"up to {significant(band, 5)} rad/s"
-
-
-def _many(count: int) -> str:
-    return f"{count or 'no'} unstable pole{'s' * (count != 1)}"
 
 
 def margin_table(laws: Sequence[NamedLaw], found: Sequence[Margins], is_undamped: bool) -> Table:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import partial
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 import tfarm
 from tfarm.arm import Arm
 from tfarm.columns import REPORT, Column, Table
-from tfarm.digits import fixed, lined, significant
+from tfarm.digits import fixed, lined, listed, significant
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.exact.coefficients import Theory
 from tfarm.plots.shapes import Shape, draw_differences, draw_shapes, shapes_of, theory_name
@@ -202,7 +202,7 @@ def sensitivity_table(modes: Modes) -> Table:
         columns.append(
             Column(f"mode_{number}", f"mode {number}", "%/%", of=column, digits=partial(fixed, decimals=3), tint=tints)
         )
-    left_out = f" Left out, as one per cent more of it changes no frequency here: {_list(dropped)}." if dropped else ""
+    left_out = f" Left out, as one per cent more of it changes no frequency here: {listed(dropped)}." if dropped else ""
     return Table(
         stem="sensitivities",
         title="Sensitivity of each natural frequency",
@@ -216,7 +216,3 @@ def tint(x: float) -> str:
     strength = 0.45 * min(1.0, abs(x) / 2.0) ** 0.6
     parts = (round(255 - strength * (255 - part)) for part in (WARM if x > 0 else COOL))
     return "#" + "".join(f"{part:02x}" for part in parts)
-
-
-def _list(words: Sequence[str]) -> str:
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

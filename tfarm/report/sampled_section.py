@@ -8,7 +8,7 @@ import numpy as np
 
 from tfarm.arm import Arm
 from tfarm.columns import Column, Table
-from tfarm.digits import plain, scientific, significant, singly
+from tfarm.digits import counted, plain, scientific, significant, singly
 from tfarm.dsp import Chain, sampled_verdict
 from tfarm.dsp.loci import STRONGER, loci
 from tfarm.dsp.margins import around
@@ -33,7 +33,6 @@ from tfarm.report.sampled_words import (
     short_answer,
     spans,
     study,
-    typeset,
 )
 from tfarm.report.sections import Picture, Section
 from tfarm.report.strip_words import example_words, strip_table
@@ -44,6 +43,7 @@ from tfarm.report.time_responses import (
     slews_table,
     what_slews_show,
 )
+from tfarm.report.words import typeset
 
 PAST_HUB = 1.25  # times the K1 at which sampling the hub alone would break it: how far its locus goes
 
@@ -220,7 +220,7 @@ def _strip_picture(coarse: StripChart, own: Chain) -> Picture:
         f"(shaded); the moment is read in steps of {significant(coarse.step, 3)} N m"
     )
     beyond = f", and lies beyond the ADC's range at {read} samples" if read else ""
-    late = f"{plain(delay)} sample{'s' * (delay != 1)} of delay"
+    late = f"{counted(delay, 'sample')} of delay"
     return Picture(
         stem="sampled-strip",
         title="A coarse chain: ADC steps, delay, saturation",

@@ -16,6 +16,7 @@ from tfarm.loop.windows import Windows, gain_windows
 from tfarm.records import record
 from tfarm.report.overlay import Overlay, overlay
 from tfarm.report.sections import Fact
+from tfarm.report.words import typeset
 from tfarm.spectrum.scales import default_gains, default_words
 
 SHARES = (0.1, 0.5, 1.0, 2.0, 5.0)  # of the chain's own period: the rows of the table
@@ -159,17 +160,8 @@ def chain_words(arm: Arm, chain: Chain) -> str:
     whose = "as the arm's file has it"
     if chain == Chain():
         whose = "which is the paper's: the arm's file has no [sampling], [converters] or [actuator] of its own"
-    gains = typeset(default_words(arm)).replace(" J w1", " J ω₁")
+    gains = typeset(default_words(arm))
     return f"Sampled {', '.join(told)}, {whose}. Gains, for which a file has no place: {gains}."
-
-
-def typeset(text: str) -> str:
-    """Powers of ten as a person writes them."""
-    words = []
-    for word in text.split(" "):
-        is_power = "e-" in word or "e+" in word
-        words.append(scientific(float(word), 3) if is_power else word)
-    return " ".join(words)
 
 
 def duration(seconds: float) -> str:
@@ -273,7 +265,8 @@ def headline_facts(data: Sampled) -> tuple[Fact, ...]:
     verdict, margin = analysis.verdict, analysis.delay_margin
     growth = verdict.log_radius
     held = _modes(verdict)
-    by = f"by {significant(margin.samples, 3)} samples of delay" if verdict.is_stable else verdict.word
+    late = f"{significant(margin.samples, 3)} samples"
+    by = f"by {late} of delay" if verdict.is_stable else verdict.word
     K2 = span(data.continuous.around, data.continuous.looked_at)
     K1 = spans(analysis.K1_windows, gains.K1)
     return (
@@ -283,7 +276,12 @@ def headline_facts(data: Sampled) -> tuple[Fact, ...]:
         Fact(
             label="stable K1", value=K1, unit="N m s/rad" if K1 != "none" else "", beside=f"at K2 = {plain(gains.K2)}"
         ),
-        Fact(label="further delay it bears", value=_delay(data).removesuffix(" ms"), unit="ms", beside=_samples(data)),
+        Fact(
+            label="further delay it bears",
+            value=_delay(data).removesuffix(" ms"),
+            unit="ms",
+            beside=f"{significant(margin.samples, 3)} samples",
+        ),
         Fact(
             label="damping C that it needs",
             value=scientific(analysis.required_damping, 2),
@@ -291,10 +289,6 @@ def headline_facts(data: Sampled) -> tuple[Fact, ...]:
             beside=_for_modes(data).strip(),
         ),
     )
-
-
-def _samples(data: Sampled) -> str:
-    return f"{significant(data.analysis.delay_margin.samples, 3)} samples"
 
 
 def spans(windows: Sequence[Window], gain: float) -> str:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from decimal import Decimal, localcontext
 from fractions import Fraction
@@ -21,8 +21,10 @@ from tfarm.arm import Arm
 from tfarm.dsp import Chain
 from tfarm.dsp.writing import file_text
 from tfarm.errors import CertificationError, ConvergenceError
+from tfarm.loop.poles import Poles
+from tfarm.plots.words import gains_words
 from tfarm.report.loop_laws import has_loop
-from tfarm.spectrum import Modes
+from tfarm.spectrum import DampedModes, Modes
 from tfarm.spectrum.scales import default_gains
 
 MODES, DIGITS, BOX_DIGITS = 10, 20, 12
@@ -94,21 +96,17 @@ def prove(arm: Arm, chain: Chain | None = None) -> Proof:
 
 def boxed(arm: Arm, modes: Modes) -> Iterator[Boxed]:
     """Damped modes and the default loop's poles, each enclosed and counted; what cannot be proven is said."""
+    boxes: list[tuple[str, Callable[[], DampedModes | Poles]]] = []
     if not arm.is_undamped:
-        what = f"damped modes, C = {arm.damping:g} s"
-        try:
-            damped = tfarm.damped_modes(modes)
-            damped.certify(BOX_DIGITS)
-            yield Boxed(what=what, count=damped.count, box=_four(damped.box))
-        except (CertificationError, ConvergenceError) as error:
-            yield Boxed(what=what, failure=str(error))
+        boxes.append((f"damped modes, C = {arm.damping:g} s", lambda: tfarm.damped_modes(modes)))
     if has_loop(arm):
         law = default_gains(arm)
-        what = f"closed loop, K1 = {law.K1:g}, K2 = {law.K2:g}"
+        boxes.append((f"closed loop, {gains_words(law, 6)}", lambda: tfarm.closed_loop_poles(arm, law, MODES)))
+    for what, enclosed in boxes:
         try:
-            poles = tfarm.closed_loop_poles(arm, law, MODES)
-            poles.certify(BOX_DIGITS)
-            yield Boxed(what=what, count=poles.count, box=_four(poles.box))
+            found = enclosed()
+            found.certify(BOX_DIGITS)
+            yield Boxed(what=what, count=found.count, box=_four(found.box))
         except (CertificationError, ConvergenceError) as error:
             yield Boxed(what=what, failure=str(error))
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from tfarm.columns import Column, Table
 from tfarm.digits import scientific, significant, singly, worded
-from tfarm.report.loop_laws import typeset
 from tfarm.report.trust_proofs import BOX_DIGITS, DIGITS, MODES, OUTPUTS, Proof, digits_of
+from tfarm.report.words import typeset
 
 UNPROVEN = "not proven"
 DIGITS_CAPTION = (

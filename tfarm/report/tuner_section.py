@@ -8,14 +8,14 @@ import numpy as np
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.columns import Column, Table
-from tfarm.digits import lined, plain, significant, worded
+from tfarm.digits import counted, lined, plain, significant, worded
 from tfarm.dsp import Chain
 from tfarm.errors import CertificationError
 from tfarm.plots.learning import draw_cost_map, draw_curves, draw_gain
 from tfarm.plots.motion import draw_responses
 from tfarm.report.loop_laws import has_loop, sign_words, why_no_loop
 from tfarm.report.overlay import overlay
-from tfarm.report.sampled_words import SHORT_SIGN, typeset
+from tfarm.report.sampled_words import SHORT_SIGN
 from tfarm.report.sections import Picture, Section
 from tfarm.report.time_responses import clipped_words, resolution_words, responses_table
 from tfarm.report.tuner_words import (
@@ -26,6 +26,7 @@ from tfarm.report.tuner_words import (
     shaping_words,
     short_answer,
 )
+from tfarm.report.words import typeset
 from tfarm.tuner.overview import COARSE, MAP_SEEDS, MAP_TRIALS, NOMINAL, SEEDS, TunerStudy, tuner_study
 
 TITLE = "The gain tuner: does a self-tuning gain help?"
@@ -150,7 +151,7 @@ def _converter_words(data: TunerStudy) -> str:
     """What stands between the controller and the arm in the second picture."""
     chain = next(iter(data.coarse.values())).chain
     c, delay = chain.converters, chain.sampling.delay_samples
-    late = f"{plain(delay)} sample{'s' * (delay != 1)} of delay"
+    late = f"{counted(delay, 'sample')} of delay"
     ranges = [
         f"{bits}-bit {name} over ±{plain(span, 3)} N m"
         for name, bits, span in (("ADC", c.moment_bits, c.moment_range), ("DAC", c.torque_bits, c.torque_range))
@@ -234,19 +235,21 @@ CONTROLLERS = {
 
 def comparison_table(data: TunerStudy) -> Table:
     """Cost of a slew, a row a condition, a column a controller, and whether the guard is proven there too."""
+    unit, K2 = data.tuning.plan.scale, significant(data.tuning.best_constant.gain, 3)
+    units = f" Costs count moments and torques in units of {plain(unit)} N m, as suits this arm." * (unit != 1.0)
     away_from_it = "; ∞ where the loop ran away" if any(math.isinf(row.tuner.cost) for row in data.rows) else ""
     return Table(
         stem="tune-comparison",
         title="Cost of the slew, beside what it has to beat",
         caption=(
             "Every controller knows the arm by its name plate only: what was trained or chosen as trained is used on "
-            f"all others. None: no moment feedback. Constant: the best constant gain as trained, {_gain(data)}; own "
+            f"all others. None: no moment feedback. Constant: the best constant gain as trained, K2 = {K2}; own "
             "constant: the best one for that row, of those that leave its loop stable, steps apart. "
             f"Tuner: that of seed {data.tuning.plan.seed}. Bound: the linear-quadratic optimum. ZV and EI: "
             "input shaping with no moment feedback, judged by their own, later slew, so that the bound is not theirs. "
             "Guard proven: "
             f"whether the same range of gains is proven for that arm and chain too, with the trial's "
-            f"{data.tuning.trial.loop.plant.count} modes{away_from_it}.{_unit_words(data)} {SHORT_SIGN}"
+            f"{data.tuning.trial.loop.plant.count} modes{away_from_it}.{units} {SHORT_SIGN}"
         ),
         record=data.rows,
         columns=(
@@ -271,16 +274,6 @@ def _of_each(name: str, digits: int) -> tuple[Column, ...]:
     """The condition, then one number of every controller."""
     cells = lined(digits, 2)
     return (
-        Column("condition", "condition", digits=worded(lambda text: typeset(text).replace(" -", " −"))),
+        Column("condition", "condition", digits=worded(typeset)),
         *(Column(f"{key}_{name}", title, of=f"{key}.{name}", digits=cells) for key, title in CONTROLLERS.items()),
     )
-
-
-def _unit_words(data: TunerStudy) -> str:
-    """In what the cost counts moments and torques, where that is not 1 N m."""
-    unit = data.tuning.plan.scale
-    return "" if unit == 1.0 else f" Costs count moments and torques in units of {plain(unit)} N m, as suits this arm."
-
-
-def _gain(data: TunerStudy) -> str:
-    return f"K2 = {significant(data.tuning.best_constant.gain, 3)}"

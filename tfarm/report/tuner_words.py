@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import re
-
 import numpy as np
 
 from tfarm.digits import significant
 from tfarm.dsp.curves import away
-from tfarm.report.sampled_words import typeset
 from tfarm.report.sections import Fact
+from tfarm.report.words import typeset
 from tfarm.tuner.overview import Curves, TunerStudy
 
 ROUNDED = 1e-10  # of the tip's travel: no slew ends nearer its target than rounding tells
@@ -130,7 +128,7 @@ def learning_words(data: TunerStudy) -> str:
     answer = "Yes" if found.is_papers_best else "No"
     return (
         f"Seed by seed. {'. '.join(told)}. {_price(data)}Is (0.6, 0.8) the best pair of momentum and learning rate? "
-        f"{answer}: {typeset_numbers(found.verdict.partition(': ')[2])}."
+        f"{answer}: {typeset(found.verdict.partition(': ')[2])}."
     )
 
 
@@ -141,11 +139,6 @@ def _price(data: TunerStudy) -> str:
     cost = costs.get(_side(free, guarded), "The guard changes nothing in the median")
     guard = data.tuning.training.guard
     return f"{cost}, and buys the proof. " if guard.is_proven else f"{cost}; its proof is of the first modes alone. "
-
-
-def typeset_numbers(text: str) -> str:
-    """Numbers such as 5.8e+04 within a sentence, with commas or brackets about them, as a person writes them."""
-    return re.sub(r"\d(?:\.\d+)?e[+-]\d+", lambda found: significant(float(found[0]), 4), text)
 
 
 def _ends(curves: Curves) -> str:

@@ -1,0 +1,19 @@
+"""What several sections say the same way."""
+
+from __future__ import annotations
+
+import re
+
+from tfarm.digits import plain
+
+TYPESET = {
+    "theta_t^2": "(dθ/dt)²", "theta_t": "dθ/dt", "phi_xt(0)": "∂φ′(0)/∂t", "L(iw)": "L(iω)", "J w1": "J ω₁",
+}  # fmt: skip
+POWER, MINUS = re.compile(r"\d(?:\.\d+)?e[-+]\d+"), re.compile(r"(?<= )-(?=\w)")
+
+
+def typeset(text: str) -> str:
+    """A sentence of the rooms below as a page shows it: Greek letters, powers of ten, and minus signs."""
+    for plain_text, shown in TYPESET.items():
+        text = text.replace(plain_text, shown)
+    return MINUS.sub("−", POWER.sub(lambda number: plain(float(number[0])), text))
