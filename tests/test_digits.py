@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from tfarm.digits import aligned, fixed, plain, scientific, significant, unit
+from tfarm.digits import aligned, counted, fixed, listed, plain, scientific, significant, unit
 
 
 @pytest.mark.parametrize(

@@ -40,7 +40,7 @@ def test_an_unknown_name_is_an_attribute_error():
         _ = tfarm.mode
 
 
-def test_no_name_of_the_face_is_a_room():
+def test_no_name_of_the_face_is_a_room_but_plots():
     rooms = {
         "arm",
         "exact",

@@ -235,6 +235,12 @@ def test_of_more_modes_than_axes_the_first_are_drawn():
     assert tfarm.plots.modes(tfarm.modes(LAB, count=5), ax=axes) == tuple(axes)
 
 
+@pytest.mark.parametrize(("name", "number"), [("bode", 2), ("slew", 3)])
+def test_too_few_axes_are_refused_with_how_many_it_takes(name, number, records):
+    with pytest.raises(tfarm.ParameterError, match=rf"ax = 1: {number} axes, as figure.subplots\({number}\)"):
+        getattr(tfarm.plots, name)(*records[name][0], ax=axes_for(0))
+
+
 def test_a_page_needs_no_pyplot():
     """Only figures that nobody gave axes for are pyplot's."""
     code = (

@@ -1,13 +1,14 @@
 """Pages on coarse grids, for tests of words, links and bytes: where a boundary lies has tests of its own."""
 
-from tfarm.report import map, overlay, sampled_words
+from tfarm.dsp import periods
+from tfarm.report import map, overlay
 
 COARSE = (
     (map, "COLUMNS", 48),
     (map, "ROWS", 40),
     (map, "SAMPLED_COLUMNS", 24),
     (overlay, "COLUMNS", 16),
-    (sampled_words, "SHARES", (1.0, 5.0)),
+    (periods, "SHARES", (1.0, 5.0)),
 )
 
 

@@ -12,11 +12,12 @@ from tests.odd_arms import odd_arms
 from tfarm.dsp import Chain, Sampling, sampled_loop, stable_windows
 from tfarm.dsp.chain import Converters
 from tfarm.dsp.law import growing_mode, mode_table
+from tfarm.dsp.periods import AtPeriod
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import gain_windows
 from tfarm.report.overlay import Overlay
 from tfarm.report.sampled_section import grown_words
-from tfarm.report.sampled_words import Row, Sampled, chain_words, compared, cure, short_answer, spans
+from tfarm.report.sampled_words import Sampled, chain_words, compared, cure, short_answer, spans
 from tfarm.spectrum.scales import default_gains
 
 ARMS = odd_arms()
@@ -128,4 +129,4 @@ def test_the_table_of_modes_has_the_pole_that_the_verdict_names(name):
 
 
 def test_rows_keep_every_interval():
-    assert Row(0.01, 4, True, -0.1, default_gains(ARMS["boom"]), ((0.0, 1.0),), ()).K1 == ((0.0, 1.0),)
+    assert AtPeriod(0.01, 4, True, -0.1, default_gains(ARMS["boom"]), ((0.0, 1.0),), ()).K1 == ((0.0, 1.0),)

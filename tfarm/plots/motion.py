@@ -12,7 +12,7 @@ from tfarm.arm import Arm
 from tfarm.dsp import Simulation, curves
 from tfarm.dsp.curves import Curve
 
-from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, New, blank, headline, settled, style, window
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, New, blank, headline, settled, style, taken, window
 
 COLOURS = (ORANGE, BLUE, GREEN, PURPLE)  # of several simulations; one alone is blue
 
@@ -29,7 +29,7 @@ def slew(arm: Arm, runs: Simulation | Runs, *, ax: Sequence[Axes] | None = None)
         if ax is None:
             moment, tip, torque = settled(draw_responses(arm, each, next(iter(each.values())).scenario.name, window))
         else:
-            moment, tip, torque = ax
+            moment, tip, torque = taken(ax, 3)
             root_moment(each, ax=moment)
             tip_error(arm, each, ax=tip)
             motor_torque(each, ax=torque)

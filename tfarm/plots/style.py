@@ -6,13 +6,16 @@ A page's figure (`blank`) knows nothing of pyplot: nothing global, nothing on a 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 import matplotlib.style
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as Figure  # which pages name too
+
+from tfarm.errors import ParameterError
 
 INK, GREY, FAINT = "#1a1a1a", "#6b6b6b", "#d4d4d4"
 BLUE, ORANGE, GREEN, PURPLE = "#0060a8", "#c4500a", "#00795a", "#8a3b8f"  # told apart by the colour-blind too
@@ -80,6 +83,16 @@ def settled(figure: Figure) -> list[Axes]:
             axis.get_major_ticks(1)
             axis.get_minor_ticks(1)
     return figure.axes
+
+
+def taken(ax: Sequence[Axes], number: int) -> list[Axes]:
+    """The axes given, in any shape that `subplots` returns.  Raises ParameterError where they are not so many."""
+    axes = list(np.ravel(np.asarray(ax, dtype=object)))
+    if len(axes) != number:
+        raise ParameterError(
+            key="ax", value=len(axes), remedy=f"{number} axes, as figure.subplots({number}) makes them"
+        )
+    return axes
 
 
 def headline(figure: Figure, text: str) -> None:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.digits import plain, scientific, significant
-from tfarm.dsp import Analysis, Verdict, analyse, sampled_verdict, stable_windows
+from tfarm.dsp import Analysis, Verdict, analyse
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.margins import around
+from tfarm.dsp.periods import AtPeriod, at_periods
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import Windows, gain_windows
 from tfarm.records import record
@@ -19,7 +20,6 @@ from tfarm.report.sections import Fact
 from tfarm.report.words import typeset
 from tfarm.spectrum.scales import default_gains, default_words
 
-SHARES = (0.1, 0.5, 1.0, 2.0, 5.0)  # of the chain's own period: the rows of the table
 EVERYWHERE = (-math.inf, math.inf)
 MOVED = 1e-4  # an end of a window that sampling moves by less is said to stay, in its own size
 DAY = 86400.0  # s
@@ -38,7 +38,7 @@ class Sampled:
     analysis: Analysis
     continuous: Windows
     regions: Overlay
-    periods: tuple[Row, ...]
+    periods: tuple[AtPeriod, ...]
 
     @property
     def chain(self) -> Chain:
@@ -61,19 +61,6 @@ class Sampled:
         return around(self.analysis.K2_windows, self.gains.K2)
 
 
-@dataclass(frozen=True)
-class Row:
-    """One sample period: its verdict, and every stable interval of each gain through `gains`."""
-
-    period: float
-    analysis_modes: int
-    is_settled: bool
-    log_radius: float
-    gains: HubFeedback
-    K1: tuple[Window, ...]
-    K2: tuple[Window, ...]
-
-
 def in_ms(chain: Chain) -> str:
     """The sample period in ms."""
     return plain(1e3 * chain.sampling.period)
@@ -84,16 +71,7 @@ def study(arm: Arm, chain: Chain) -> Sampled:
     gains = default_gains(arm)
     analysis = analyse(arm, gains, chain)
     windows = gain_windows(stability(arm, gains), "K2")
-    rows = tuple(_row(arm, gains, chain, share) for share in SHARES)
-    return Sampled(arm, analysis, windows, overlay(arm, gains, chain), rows)
-
-
-def _row(arm: Arm, gains: HubFeedback, chain: Chain, share: float) -> Row:
-    period = float(f"{share * chain.sampling.period:.12g}")  # 1 ms, and no 1.0000000000000002 ms
-    verdict = sampled_verdict(arm, gains, replace(chain, sampling=replace(chain.sampling, period=period)))
-    K1, K2 = (tuple(stable_windows(verdict.loop, name)) for name in ("K1", "K2"))
-    growth = verdict.log_radius
-    return Row(period, verdict.modes_used, verdict.is_settled, growth, gains, K1, K2)
+    return Sampled(arm, analysis, windows, overlay(arm, gains, chain), at_periods(arm, gains, chain))
 
 
 # ------------------------------------------------------------ words

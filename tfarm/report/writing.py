@@ -291,9 +291,13 @@ def _write_pages(
     """The arm's file, with the chain that the page is about, and its page, or the page of each question asked."""
     (folder / "arm.toml").write_text(file_text(*subject), encoding="utf-8", newline="")
     for question in only or (None,):
-        wanted = [s for s in sections if s.section.anchor.startswith((question or "", "arm", "no-loop"))]
+        wanted = [s for s in sections if question is None or _answers(s.section.anchor, question)]
         page = arm_page(*subject, wanted, question, trust=f"../{trust}" if trust else "")
         (folder / f"{question or 'index'}.html").write_text(page, encoding="utf-8", newline="")
+
+
+def _answers(anchor: str, question: str) -> bool:
+    return anchor in ("arm", "no-loop") or anchor.startswith(question)
 
 
 def _move_into(made: Path, folder: Path) -> None:
