@@ -1,7 +1,7 @@
 """Poles of the sampled loop along its gains, in the strips of the s-plane that the samples fold on one, and in z.
 
 Left the s-plane: a mode above half the sample rate (in a shaded strip) is seen, and moved, at its mirror image in the
-lowest strip, s = ln(z)/T; the locus is that of K1 alone.  Right the z-plane.
+lowest strip, s = ln(z)/T; the locus is that of one gain alone.  Right the z-plane.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def draw_loci(data: Loci) -> Figure:
 
 
 def folded(data: Loci, *, ax: Axes) -> None:
-    """The s-plane up to the first aliased mode: strips, the arm's poles, their images, and the locus of K1 alone."""
+    """The s-plane up to the first aliased mode: strips, the arm's poles, their images, and the locus of one gain."""
     half = data.half_rate
     hertz = data.poles.imag / (2 * math.pi)
     above = hertz[hertz > half]
@@ -75,11 +75,11 @@ def folded(data: Loci, *, ax: Axes) -> None:
     ax.set_xlabel("real part  [1/s]: decays | grows")
     ax.set_ylabel("frequency  [Hz]")
     ax.grid(False)
-    ax.set_title(f"s = ln(z)/T, K1 alone, up to {plain(data.alone.values[-1], 3)}", fontsize=9.5)
+    ax.set_title(f"s = ln(z)/T, {data.alone.gain} alone, up to {plain(data.alone.values[-1], 3)}", fontsize=9.5)
 
 
 def _branches(data: Loci, modes: NDArray[np.int64], ax: Axes) -> list[float]:
-    """The locus of K1 alone of these modes in the lowest strip; real parts of what was drawn."""
+    """The locus of the gain that is alone, of these modes, in the lowest strip; real parts of what was drawn."""
     ends: list[float] = []
     for branch in np.nonzero(np.isin(data.alone.mode, modes))[0]:
         z = data.alone.z[:, branch]

@@ -10,6 +10,6 @@ NOT_THE_PAPERS = ("hub_angle",)  # outputs whose gain is an extension of the pap
 
 
 def gains_words(law: HubFeedback, digits: int = 4, but: str = "") -> str:
-    """K1 = ..., K2 = ..., for reading; `but` names one that varies and is left out."""
+    """Each gain with its value, for reading; `but` names one that varies and is left out."""
     named = [gain.name for gain in LISTED if law[gain.name] or gain.output not in NOT_THE_PAPERS]
     return ", ".join(f"{name} = {plain(law[name], digits)}" for name in named if name != but)
