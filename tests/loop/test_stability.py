@@ -17,7 +17,7 @@ from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop.nyquist import turning
 from tfarm.loop.plant import Loop
 from tfarm.loop.poles import poles_below
-from tfarm.loop.stability import is_felt, is_quiet, loop_band, stability
+from tfarm.loop.stability import felt, is_felt, is_quiet, loop_band, stability
 
 LAB, BARE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))
 
@@ -153,6 +153,16 @@ def test_a_mode_that_the_hub_does_not_feel_stays_undamped_under_any_law() -> Non
     heavy, light = (replace(BARE, hub=Hub(inertia=inertia)) for inertia in (1e6, 1e-6))
     assert is_felt(heavy, 1e4)
     assert is_felt(light, 1e4)
+
+
+def test_a_light_hub_feels_rotation_and_a_heavy_one_the_moment_as_a_slender_beam_has_them() -> None:
+    """Pinned-free and clamped-free Euler-Bernoulli modes: slope sqrt(2/m) k and curvature 2 k^2/sqrt m at the root."""
+    section = Section.rectangle(width=0.02, depth=0.001)
+    slender = replace(BARE, link=replace(BARE.link, section=section))
+    top = float(tfarm.modes(slender, 9).natural_frequency[-1])
+    for inertia, expected in ((1e-9, [2**0.5, 0.0]), (1e3, [0.0, 2.0])):
+        shares = felt(replace(slender, hub=Hub(inertia=inertia)), top)
+        assert shares[:, 3:] == pytest.approx(np.tile(expected, (shares.shape[1] - 3, 1)).T, abs=0.01)
 
 
 def test_a_pole_on_the_axis_to_working_precision_is_refused_with_its_reason() -> None:

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from itertools import product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from tfarm.arm import HubFeedback
 from tfarm.dsp import Chain, Sampling, sampled_loop
 from tfarm.errors import CertificationError, ParameterError
 from tfarm.tuner import find_guard, slew_trial
+from tfarm.tuner.guard import is_quiet
 from tfarm.tuner.lyapunov import common_lyapunov, is_positive_definite, whole
 from tfarm.tuner.sector import SHARE, MovingGain
 
@@ -194,6 +196,21 @@ def test_a_best_gain_of_nothing_gets_a_sector_from_zero(lab):
     guard = find_guard(slew_trial(lab).loop, "time-varying", 0.0)
     assert guard.lo == 0.0
     assert 0.05 < guard.hi < 0.2
+
+
+def test_modes_are_quiet_where_they_lose_more_than_the_feedback_could_give():
+    """Two modes by hand, T = 1: the push is 2 (|K1| 0.01 + K 0.02) on a mode that loses 0.05 a sample."""
+    plant = SimpleNamespace(
+        residues=np.array([[0.0, 0.0], [9.0, 0.01], [9.0, 0.02]], complex),
+        poles=np.array([-1e-3 + 1e-6j, -0.05 + 1e-6j]), mode=np.array([1, 2]), count=2,
+    )  # fmt: skip
+    loop = SimpleNamespace(
+        plant=plant, chain=SimpleNamespace(sampling=SimpleNamespace(period=1.0)), gains=HubFeedback(K1=-0.5)
+    )
+    hold = (1 - np.exp(-0.05)) / 0.05
+    edge = (0.05 / hold / 2 - 0.5 * 0.01) / 0.02
+    assert is_quiet(loop, 0.999 * edge)
+    assert not is_quiet(loop, 1.001 * edge)
 
 
 def test_the_frozen_guard_is_stable_inside_and_not_beyond(lab):

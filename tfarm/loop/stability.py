@@ -16,6 +16,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.errors import ConvergenceError
@@ -25,6 +26,8 @@ from tfarm.spectrum import modes, modes_below
 from .frequencies import MOST_MODES, band_of
 from .plant import Loop
 from .poles import Poles, poles_below
+
+Real = NDArray[np.float64]
 
 FEW = 12  # flexible modes in the band at C = 0, and at least
 QUIET = 0.5  # |L| beyond the band, at C > 0
@@ -85,17 +88,23 @@ def _verdict(poles: Poles, infinite: bool, loop: Loop) -> str:
 def is_felt(arm: Arm, up_to: float) -> bool:
     """Whether the hub takes part in every flexible mode below `up_to` [rad/s], by rotation or by root moment.
 
-    At C = 0 a mode that it does not feel stays undamped under any law: so it is for exceptional arms only.  Both are
-    measured in those of a slender beam of the same frequency.
+    At C = 0 a mode that it does not feel stays undamped under any law: so it is for exceptional arms only.
     """
-    if modes_below(arm, up_to) == 0:
-        return True
+    return modes_below(arm, up_to) == 0 or bool((felt(arm, up_to).max(axis=0) > UNFELT).all())
+
+
+def felt(arm: Arm, up_to: float) -> Real:
+    """Rotation and root moment at the hub (2, modes) of the flexible modes below `up_to` [rad/s], as shares.
+
+    Of sqrt(1/m) k and sqrt(1/m) E I k^2, those of a slender beam of mass m with waves of the same frequency: high modes
+    tend to sqrt 2 and 0 on a free pin, to 0 and 2 where the hub is heavy.
+    """
     table, link = modes(arm, up_to=up_to), arm.link
     flexible = table.index > 0
     omega, b = table.natural_frequency[flexible], abs(table.hub_participation[flexible])
-    rotation = b * np.sqrt(link.rhoA * link.length) * np.sqrt(np.sqrt(link.EI / link.rhoA) / omega)
-    moment = b * arm.hub_inertia * omega * np.sqrt(link.length / link.EI)
-    return bool((np.maximum(rotation, moment) > UNFELT).all())
+    k = np.sqrt(omega) * (link.rhoA / link.EI) ** 0.25
+    scale = np.sqrt(link.rhoA * link.length)
+    return np.array([b * scale / k, b * arm.hub_inertia * omega**2 * scale / (link.EI * k**2)])
 
 
 def _beyond(loop: Loop, quiet: bool) -> tuple[bool, str]:

@@ -180,10 +180,10 @@ def _settled(loops: list[SampledLoop], found: list[tuple[float, float]]) -> bool
         return False
     (low, high), (before_low, before_high) = found[-1], found[-2]
     agree = max(abs(low - before_low), abs(high - before_high)) <= AGREE * (high - low)
-    return agree and _is_quiet(loops[-1], high)
+    return agree and is_quiet(loops[-1], high)
 
 
-def _is_quiet(loop: SampledLoop, highest: float) -> bool:
+def is_quiet(loop: SampledLoop, highest: float) -> bool:
     """Whether the upper half of the modes lose more in a sample by themselves than the feedback could give them."""
     plant, T = loop.plant, loop.chain.sampling.period
     _, rate, moment = abs(plant.residues)
