@@ -303,7 +303,7 @@ class Locus:
     def judge(self, case, models, ran):
         judged, answer = Judged(), ran.answer
         law = replace(case.law, **{answer["vary"]: answer["gain"][-1]})
-        for branch in answer["branches"]:
+        for branch in (each for each in answer["branches"] if each[-1] is not None):  # of those that have not ended
             pole = complex(*branch[-1])
             if abs(pole) > 1e-6 * case.first and abs(pole) < trusted(models):
                 pole_check(judged, "end of a branch", pole, models, law)
