@@ -17,8 +17,10 @@ from tfarm.audit.published import Row as PublishedRow
 from tfarm.report import trust_proofs, write, writing
 from tfarm.report.modes_section import modal_table
 from tfarm.report.trust import Evidence, write_trust
-from tfarm.report.trust_proofs import digits_of, how_proven, measured, prove, rounds_to, save_proof, written_proofs
+from tfarm.report.trust_proofs import digits_of, how_proven, prove, rounds_to, save_proof, written_proofs
 from tfarm.report.trust_tables import boxes_tables
+from tfarm.response import accuracy
+from tfarm.response.accuracy import worst_error
 
 ARM = tfarm.load("stocky-steel")
 BRACKET = ("71.50568246689014371", "71.505682466890143711")
@@ -138,13 +140,13 @@ def test_the_accuracy_is_measured_and_a_wrong_digit_would_show(proof, monkeypatc
             return self.G(s) * (1 + 1e-9)
 
     exact = tfarm.transfer
-    monkeypatch.setattr(trust_proofs.tfarm, "transfer", Off)
-    assert 1e-10 < measured(ARM, "root_moment", proof.band) <= 1e-9
+    monkeypatch.setattr(accuracy, "transfer", Off)
+    assert 1e-10 < worst_error(ARM, "root_moment", proof.band) <= 1e-9
 
 
 def test_a_response_that_is_zero_throughout_has_no_error():
     locked = replace(HELD, hub=tfarm.Hub(inertia=np.inf))  # no loop: its proofs are quick
-    assert measured(HELD, "tip_displacement", (1.0, 10.0)) is None
+    assert worst_error(HELD, "tip_displacement", (1.0, 10.0)) is None
     assert [output for output, _ in prove(locked).errors] == ["root_moment"]
 
 

@@ -45,7 +45,7 @@ def locus(exact: Locus, *, reduced: ReducedLocus | None = None, ax: Axes | None 
             settled(figure)
             return ax
         every = range(len(exact.branches))
-        _panel(exact, reduced, every, ax, named=every)
+        _panel(exact, reduced, every, ax, named=[*every, None])
         _frame(shown(exact.branches), ax)
         ax.set_xlabel("Re s [1/s]")
         ax.set_ylabel("Im s [rad/s]")
@@ -101,8 +101,13 @@ def _marked(exact: Locus) -> Real:
     return np.linspace(exact.gain[0], exact.gain[-1], MARKED)
 
 
-def _panel(exact: Locus, reduced: ReducedLocus | None, numbers: Sequence[int], ax: Axes, named: Sequence[int]) -> None:
-    """Some branches, exact and reduced, with their crossings; gain and frequency beside those of the named ones."""
+def _panel(
+    exact: Locus, reduced: ReducedLocus | None, numbers: Sequence[int], ax: Axes, named: Sequence[int | None]
+) -> None:
+    """Some branches, exact and reduced, with their crossings; gain and frequency beside those of the named ones.
+
+    None names crossings that lie on no branch that is drawn.
+    """
     branches = shown(exact.branches)
     ax.axvline(0, color=INK, lw=0.9, zorder=1)
     at = [int(np.argmin(abs(exact.gain - value))) for value in _marked(exact)]

@@ -22,8 +22,9 @@ from tfarm.digits import scientific, significant, singly, worded
 from tfarm.report.page import command_for_all, render
 from tfarm.report.sections import Fact, Section, save_section
 from tfarm.report.trust_audit import VERDICTS, audit_table, counts, shown
-from tfarm.report.trust_proofs import DIGITS, POINTS, Proof, hash_of
+from tfarm.report.trust_proofs import DIGITS, Proof, hash_of
 from tfarm.report.trust_tables import accuracy_table, boxes_tables, counts_table, digits_table
+from tfarm.response.accuracy import POINTS
 from tfarm.tables.files import save as save_table
 
 FOLDER = "trust"

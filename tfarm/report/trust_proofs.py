@@ -6,11 +6,9 @@ The natural frequencies are enclosed and counted in ball arithmetic; the float64
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from decimal import Decimal, localcontext
-from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -23,14 +21,14 @@ from tfarm.dsp.writing import file_text
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.loop.poles import Poles
 from tfarm.plots.words import gains_words
+from tfarm.report.kept import keep, kept
 from tfarm.report.loop_laws import has_loop
+from tfarm.response.accuracy import POINTS, worst_error
 from tfarm.spectrum import DampedModes, Modes
 from tfarm.spectrum.scales import default_gains
 
 MODES, DIGITS, BOX_DIGITS = 10, 20, 12
 OUTPUTS = ("root_moment", "tip_displacement")
-POINTS, POINT_DIGITS = 100, 30
-LARGEST = 1 << 20  # bytes of a proof.json worth reading
 PLAIN = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹−", "-0123456789-")
 TWO_PI = Decimal("6.2831853071795864769252867665590057683943387987502")
 
@@ -88,7 +86,7 @@ def prove(arm: Arm, chain: Chain | None = None) -> Proof:
         sha256=hash_of(arm, chain),
         has_rigid_mode=arm.has_rigid_mode,
         band=band,
-        errors=tuple((output, worst) for output in OUTPUTS if (worst := measured(arm, output, band)) is not None),
+        errors=tuple((output, worst) for output in OUTPUTS if (worst := worst_error(arm, output, band)) is not None),
         boxes=tuple(boxed(arm, modes)),
         **found,
     )
@@ -121,55 +119,22 @@ def hash_of(arm: Arm, chain: Chain | None = None) -> str:
     return hashlib.sha256(file_text(arm, chain).encode()).hexdigest()
 
 
-def measured(arm: Arm, output: str, band: tuple[float, float]) -> float | None:
-    """The worst error of the float64 response along the imaginary axis; None where the response is zero throughout.
-
-    Counted in the change of G that a relative change of its argument brings about: |G_64/G - 1| / (1 + |s G'/G|).
-    """
-    G = tfarm.transfer(arm, output)
-    s = 1j * np.geomspace(*band, POINTS)
-    values, slopes = G(s), G.derivative(s)
-    if not np.any(values):
-        return None
-    errors = []
-    for point, value, slope in zip(s, values, slopes, strict=True):
-        try:
-            pair = G.digits(complex(point), POINT_DIGITS)
-        except (CertificationError, ConvergenceError):  # a zero of G, where a relative error means nothing
-            continue
-        parts = zip(pair, (value.real, value.imag), strict=True)
-        off = complex(*(float(Fraction(exact) - Fraction(float(part))) for exact, part in parts))
-        errors.append(abs(off) / (abs(value) + abs(point * slope)))
-    return float(max(errors)) if errors else None
-
-
 def save_proof(arm: Arm, folder: Path, chain: Chain | None = None) -> None:
     """proof.json."""
-    text = json.dumps({"tfarm_proof": 1, **asdict(prove(arm, chain))}, ensure_ascii=False, indent=1) + "\n"
-    (folder / "proof.json").write_text(text, encoding="utf-8", newline="")
+    keep(folder, "proof", asdict(prove(arm, chain)))
 
 
 def written_proofs(out: Path) -> Sequence[Proof]:
     """The proofs of all arms in the folder of reports, by name; what is none of ours is passed over."""
-    folders = sorted((f for f in out.iterdir() if f.is_dir() and not f.name.startswith(".")), key=lambda f: f.name)
-    return [proof for folder in folders if (proof := _read(folder)) is not None]
+    return kept(out, "proof", _proof)
 
 
-def _read(folder: Path) -> Proof | None:
-    file = folder / "proof.json"
-    try:
-        if file.stat().st_size > LARGEST:
-            return None
-        read = json.loads(file.read_text(encoding="utf-8"))
-        if read.pop("tfarm_proof") != 1 or read["name"] != folder.name:
-            return None
-        read["brackets"] = tuple((str(lower), str(upper)) for lower, upper in read["brackets"])
-        read["band"] = float(read["band"][0]), float(read["band"][1])
-        read["errors"] = tuple((str(output), float(error)) for output, error in read["errors"])
-        read["boxes"] = tuple(Boxed(**each | {"box": _four(each["box"])}) for each in read["boxes"])
-        return Proof(**read)
-    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
-        return None
+def _proof(read: dict[str, Any], _: Path) -> Proof:
+    read["brackets"] = tuple((str(lower), str(upper)) for lower, upper in read["brackets"])
+    read["band"] = float(read["band"][0]), float(read["band"][1])
+    read["errors"] = tuple((str(output), float(error)) for output, error in read["errors"])
+    read["boxes"] = tuple(Boxed(**each | {"box": _four(each["box"])}) for each in read["boxes"])
+    return Proof(**read)
 
 
 # ------------------------------------------------------------ digits

@@ -1,0 +1,34 @@
+"""What a report keeps of each arm in its folder as JSON, and reads again for the pages that are about all arms."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+LARGEST = 1 << 20  # bytes of a file worth reading
+
+T = TypeVar("T")
+
+
+def keep(folder: Path, kind: str, content: Mapping[str, Any]) -> None:
+    """kind.json, with a mark of what it is."""
+    text = json.dumps({f"tfarm_{kind}": 1, **content}, ensure_ascii=False, indent=1) + "\n"
+    (folder / f"{kind}.json").write_text(text, encoding="utf-8", newline="")
+
+
+def kept(out: Path, kind: str, made_of: Callable[[dict[str, Any], Path], T | None]) -> list[T]:
+    """What `made_of` makes of each folder's kind.json, by name; what is none of ours is passed over."""
+    found = []
+    for folder in sorted((f for f in out.iterdir() if f.is_dir() and not f.name.startswith(".")), key=lambda f: f.name):
+        file = folder / f"{kind}.json"
+        try:
+            if file.stat().st_size > LARGEST:
+                continue
+            read = json.loads(file.read_text(encoding="utf-8"))
+            if read.pop(f"tfarm_{kind}") == 1 and read["name"] == folder.name:
+                found.append(made_of(read, folder))
+        except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
+            continue
+    return [each for each in found if each is not None]
