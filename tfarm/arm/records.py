@@ -175,6 +175,16 @@ class Arm:
         return self.total_inertia - self.hub.inertia
 
     @property
+    def own_mass(self) -> float:
+        """rho A L [kg], of the arm itself."""
+        return self.link.rhoA * self.link.length
+
+    @property
+    def payload_mass(self) -> float:
+        """m [kg], at the tip; inf where that is pinned."""
+        return self.payload.mass
+
+    @property
     def length(self) -> float:
         """L [m], from the hub's axis to the tip."""
         return self.link.length

@@ -99,12 +99,11 @@ def felt(arm: Arm, up_to: float) -> Real:
     Of sqrt(1/m) k and sqrt(1/m) E I k^2, those of a slender beam of mass m with waves of the same frequency: high modes
     tend to sqrt 2 and 0 on a free pin, to 0 and 2 where the hub is heavy.
     """
-    table, link = modes(arm, up_to=up_to), arm.link
+    table, EI = modes(arm, up_to=up_to), arm.bending_scale * arm.length
     flexible = table.index > 0
     omega, b = table.natural_frequency[flexible], abs(table.hub_participation[flexible])
-    k = np.sqrt(omega) * (link.rhoA / link.EI) ** 0.25
-    scale = np.sqrt(link.rhoA * link.length)
-    return np.array([b * scale / k, b * arm.hub_inertia * omega**2 * scale / (link.EI * k**2)])
+    k, scale = np.sqrt(omega) * (arm.own_mass / arm.length / EI) ** 0.25, np.sqrt(arm.own_mass)
+    return np.array([b * scale / k, b * arm.hub_inertia * omega**2 * scale / (EI * k**2)])
 
 
 def _beyond(loop: Loop, quiet: bool) -> tuple[bool, str]:

@@ -105,7 +105,7 @@ def conditions(arm: Arm, chain: Chain, quantised: Chain | None = None) -> list[C
 
 def _payloads(arm: Arm) -> list[float]:
     """Other masses at the tip [kg]: shares of the payload, or of the arm itself where it has none."""
-    mass, beam = arm.payload.mass, arm.link.rhoA * arm.length
+    mass, beam = arm.payload_mass, arm.own_mass
     return [float(f"{x:.2g}") for x in ([share * mass for share in CARRIED] if mass else [s * beam for s in ADDED])]
 
 
