@@ -90,20 +90,22 @@ clean: ## remove everything that was generated
 	@find reports -mindepth 1 -maxdepth 1 ! -name README.md ! -name pictures -exec rm -rf {} +
 	@find tfarm tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
-# pip alone would byte-compile on one core, and every package's own tests too.  The last steps compile the numerical
-# kernels, which numba then keeps on disk: two commands at a time that need different ones.
+# pip alone would byte-compile on one core, with every package's own tests and with what is never imported again: itself
+# and what mypy has as machine code.  Meanwhile four commands compile the numerical kernels, which numba then keeps on
+# disk: two at a time that need different ones.
+NOT_COMPILED := /tests?/|/(pip|setuptools|pkg_resources|mypy|mypyc)/|/pygments/(lexers|styles)/
 $(INSTALLED): pyproject.toml requirements.lock
 	$(if $(shell $(PYTHON) -c 'import sys; print("yes" * (sys.version_info >= (3, 11)))' 2>/dev/null),,$(error \
 		tfarm needs Python 3.11 or newer; name one, e.g. make PYTHON=python3.12))
 	@echo "setting up .venv (once; a minute or two)"
 	@$(PYTHON) -m venv .venv
 	@$(PIP) --no-compile -e '.[dev]'
-	@$(BIN)/python -m compileall -q -j 2 -x '/tests?/' .venv/lib tfarm tests || true # as pip: one that does not compile is its own affair
 	@touch $@
-	@$(BIN)/tfarm response sasaki2012 --output root_moment --s 1j > /dev/null & \
-		$(BIN)/tfarm modes sasaki2012 --count 1 > /dev/null && wait $$!
-	@$(BIN)/tfarm tune sasaki2012-lab --trials 1 > /dev/null & \
-		$(BIN)/tfarm poles sasaki2012-lab > /dev/null && $(BIN)/tfarm simulate sasaki2012-lab > /dev/null && wait $$!
+	@{ $(BIN)/tfarm modes sasaki2012 --count 1 > /dev/null && { \
+		$(BIN)/python -m compileall -q -x '$(NOT_COMPILED)' .venv/lib tfarm tests || true; } && \
+		$(BIN)/tfarm poles sasaki2012-lab > /dev/null && $(BIN)/tfarm simulate sasaki2012-lab > /dev/null; } & \
+		$(BIN)/tfarm response sasaki2012 --output root_moment --s 1j > /dev/null && \
+		$(BIN)/tfarm tune sasaki2012-lab --trials 1 > /dev/null && wait $$!
 
 $(BENCH_INSTALLED): $(INSTALLED)
 	@$(PIP) -e '.[bench]'

@@ -13,6 +13,7 @@ import ctypes
 import os
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 ROOMS = [f"tests/{room}" for room in ("exact", "spectrum", "response", "reduced", "loop", "dsp", "tuner")]
@@ -79,23 +80,30 @@ def with_the_mark(paths: list[str]) -> list[str]:
 
 
 def main(arguments: list[str]) -> int:
-    """The number of kernels under which a test failed."""
-    marked, failed, seen = "--marked" in arguments, [], {}
+    """The number of kernels under which a test failed.  Two are run at a time, each by one process."""
+    marked, seen = "--marked" in arguments, {}
     paths = [argument for argument in arguments if argument != "--marked"] or ROOMS
     paths = with_the_mark(paths) if marked else paths
-    shared = ("-n", "2", "--dist", "worksteal")  # each worker goes on where it is, and makes what a file shares once
-    pytest = [sys.executable, "-m", "pytest", "-q", *shared, *(("-m", "kernels") if marked else ()), *paths]
+    pytest = [sys.executable, "-m", "pytest", "-q", "-n", "0", *(("-m", "kernels") if marked else ()), *paths]
     print(f"own: {probed({})}", flush=True)
     for title, environment in variants(FEW if marked else CORES).items():
         what = probed(environment)
         if what.startswith("exit") or what in seen:
-            why = f"it is {what}, as {seen[what]}" if what in seen else f"this CPU cannot run it ({what})"
+            why = f"it is {what}, as {seen[what][0]}" if what in seen else f"this CPU cannot run it ({what})"
             print(f"{title}: skipped, {why}", flush=True)
             continue
-        seen[what] = title
-        print(f"{title}: {what}", flush=True)
-        if subprocess.run(pytest, env=os.environ | environment, check=False).returncode:
-            failed.append(title)
+        seen[what] = title, environment
+
+    def passes(environment: dict[str, str]) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(pytest, env=os.environ | environment, capture_output=True, text=True, check=False)
+
+    failed = []
+    with ThreadPoolExecutor(2) as pool:
+        environments = [environment for _, environment in seen.values()]
+        for (what, (title, _)), done in zip(seen.items(), pool.map(passes, environments), strict=True):
+            print(f"{title}: {what}\n{done.stdout}{done.stderr}", flush=True)
+            if done.returncode:
+                failed.append(title)
     print(f"{len(seen)} kernels, " + (f"failures under {', '.join(failed)}" if failed else "none with a failure"))
     return len(failed)
 
