@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tfarm.crossing import Crossings, bisected, brackets, counts_over, intervals, joined, solved
+from tfarm.crossing import Crossings, brackets, counts_over, intervals, joined, solved, zeros_between
 
 CURVES = {
     "axis": (lambda x: 1j * x, np.linspace(1e-3, 40.0, 4001), lambda s: s.real > 0),
@@ -70,7 +70,32 @@ def test_intervals_are_where_nothing_is_beyond():
     assert joined([(0.0, 1.0), (1.0, 2.0), (3.0, 4.0)]) == [(0.0, 2.0), (3.0, 4.0)]
 
 
-def test_a_bisected_zero_is_the_closed_one():
-    zeros = np.array([0.3, 2.0, 1e-9])
-    assert bisected(lambda x: x - zeros, np.zeros(3), np.full(3, 3.0)) == pytest.approx(zeros, rel=1e-15)
-    assert bisected(lambda x: x, np.empty(0), np.empty(0)).size == 0
+HARD = (  # functions of x, each with one change of sign in (0, 3)
+    lambda x: x - 2.0,
+    lambda x: 1e-300 * (x * x - 2.0),
+    lambda x: (x - 1.2) ** 3,
+    lambda x: np.tanh(1e6 * (x - 0.7)),
+    lambda x: np.sign(x - 1.7),
+    lambda x: np.exp(30 * (x - 0.1)) - 1.0,
+    lambda x: 1 / (x - 0.9),
+    lambda x: x - 1e-9,
+)
+ZEROS = np.array([2.0, 2.0**0.5, 1.2, 0.7, 1.7, 0.1, 0.9, 1e-9])
+
+
+@pytest.mark.parametrize(("number", "most"), [(2, 12), (len(HARD), 160)])
+def test_zeros_are_the_closed_ones_to_the_last_bit_and_soon(number, most):
+    """The first two are smooth: halving took 54 evaluations of them.  The others are like no parabola."""
+    asked = []
+
+    def f(x):
+        asked.append(x)
+        return np.array([each(place) for each, place in zip(HARD, x, strict=False)])
+
+    found = zeros_between(f, np.zeros(number), np.full(number, 3.0))
+    np.testing.assert_allclose(found, ZEROS[:number], rtol=0, atol=4 * np.finfo(float).eps)
+    assert len(asked) <= most
+
+
+def test_no_bracket_has_no_zero():
+    assert zeros_between(lambda x: x, np.empty(0), np.empty(0)).size == 0

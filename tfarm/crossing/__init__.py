@@ -3,7 +3,7 @@
 The curve may be the imaginary axis or the unit circle; nothing here knows what A and B are.
 """
 
-from tfarm.crossing.line import Crossing, Crossings, bisected, brackets, solved
+from tfarm.crossing.line import Crossing, Crossings, brackets, solved, zeros_between
 from tfarm.crossing.pieces import RegionPiece, pieces
 from tfarm.crossing.plane import counts_over, intervals, joined
 
@@ -11,11 +11,11 @@ __all__ = [
     "Crossing",
     "Crossings",
     "RegionPiece",
-    "bisected",
     "brackets",
     "counts_over",
     "intervals",
     "joined",
     "pieces",
     "solved",
+    "zeros_between",
 ]

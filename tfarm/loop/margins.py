@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from tfarm.arm import NAMES, Arm, HubFeedback
-from tfarm.crossing import bisected, brackets
+from tfarm.crossing import brackets, zeros_between
 from tfarm.records import record
 
 from .frequencies import grid
@@ -203,7 +203,7 @@ def unit_crossings(loop: Loop, omega: Real) -> Real:
 
     (before,), _ = brackets(size(omega))
     slow = rigid_crossings(loop)
-    return np.concatenate([slow[slow <= SMALLEST], bisected(size, omega[before], omega[before + 1])])
+    return np.concatenate([slow[slow <= SMALLEST], zeros_between(size, omega[before], omega[before + 1])])
 
 
 def lowest(f: Callable[[Real], Real], omega: Real) -> tuple[float, float]:
