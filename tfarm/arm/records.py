@@ -151,7 +151,7 @@ class Arm:
     hub: Hub
     payload: Payload = field(default_factory=Payload)
     name: str = "arm"
-    assumptions: tuple[str, ...] = ()
+    assumptions: tuple[str, ...] = field(default=(), repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", _name(self.name))

@@ -1,0 +1,98 @@
+"""Do the tests of a room see a mistake?  python -m tests.mutants SIZE [SEED] [room ...]
+
+In each room SIZE places are drawn where an operator, a comparison or a number stands; one after the other is changed, in
+a copy of the project, and the room's own tests are run until one fails.  Survivors are printed, to be read: some change
+nothing that matters (a number of steps, a tolerance with room), the others want a test.  A change in `exact` costs the
+compilation of its kernels.
+"""
+
+import ast
+import os
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+ROOMS = ("spectrum", "crossing", "loop", "dsp", "tuner", "exact")
+SWAPS = {
+    ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.Lt: ast.GtE, ast.LtE: ast.Gt,
+    ast.Gt: ast.LtE, ast.GtE: ast.Lt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq, ast.And: ast.Or, ast.Or: ast.And,
+}  # fmt: skip
+PATIENCE = 900  # seconds for a room's tests
+
+
+def places(tree):
+    """Every node that can be changed, inside functions."""
+    bodies = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+    found = []
+    for node in {id(each): each for body in bodies for line in body.body for each in ast.walk(line)}.values():
+        operator = getattr(node, "op", None) or (getattr(node, "ops", None) or [None])[0]
+        is_number = isinstance(node, ast.Constant) and type(node.value) in (int, float)
+        if type(operator) in SWAPS or is_number:
+            found.append(node)
+    return sorted(found, key=lambda node: (node.lineno, node.col_offset, type(node).__name__))
+
+
+def change(node):
+    """Change a node in place; the line that it stands on."""
+    if isinstance(node, ast.Constant):
+        node.value = node.value + 1 if isinstance(node.value, int) else node.value * 1.5 + (node.value == 0)
+    elif hasattr(node, "ops"):
+        node.ops[0] = SWAPS[type(node.ops[0])]()
+    else:
+        node.op = SWAPS[type(node.op)]()
+    return node.lineno
+
+
+def mutant(path, number):
+    """The text of a file with its place of that number changed, and the line."""
+    tree = ast.parse(path.read_text())
+    line = change(places(tree)[number])
+    return ast.unparse(tree), line
+
+
+def survives(copy, room):
+    """Whether the room's tests in the copy all pass."""
+    command = [sys.executable, "-m", "pytest", "-q", "-x", "-n", "0", "-p", "no:cacheprovider", f"tests/{room}"]
+    environment = os.environ | {"PYTHONPATH": str(copy), "OPENBLAS_NUM_THREADS": "1"}
+    try:
+        done = subprocess.run(command, cwd=copy, env=environment, capture_output=True, timeout=PATIENCE)
+    except subprocess.TimeoutExpired:
+        return False
+    return done.returncode == 0
+
+
+def survey(size, seed, rooms):
+    """How many were killed in each room, and how many there were."""
+    rng, tally = random.Random(seed), {}
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder) / "copy"
+        shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(".git", ".venv", "reports", ".mypy_cache"))
+        for room in rooms:
+            files = [path for path in sorted((ROOT / "tfarm" / room).glob("*.py"))]
+            drawn = [(path, n) for path in files for n in range(len(places(ast.parse(path.read_text()))))]
+            killed = 0
+            chosen = rng.sample(drawn, min(size, len(drawn)))
+            for path, number in chosen:
+                text, line = mutant(path, number)
+                target = copy / path.relative_to(ROOT)
+                kept = target.read_text()
+                target.write_text(text)
+                alive = survives(copy, room)
+                target.write_text(kept)
+                killed += not alive
+                if alive:
+                    print(f"survives: {path.relative_to(ROOT)}:{line} {path.read_text().splitlines()[line - 1].strip()}",
+                          flush=True)  # fmt: skip
+            tally[room] = killed, len(chosen)
+            print(f"{room}: {killed} of {len(chosen)} killed", flush=True)
+    return tally
+
+
+if __name__ == "__main__":
+    numbers = [int(each) for each in sys.argv[1:] if each.isdigit()]
+    named = [each for each in sys.argv[1:] if not each.isdigit()]
+    survey(*(numbers + [40, 2026][len(numbers) :]), named or ROOMS)
