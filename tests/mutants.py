@@ -1,9 +1,9 @@
 """Do the tests of a room see a mistake?  python -m tests.mutants SIZE [SEED] [room ...]
 
-In each room SIZE places are drawn where an operator, a comparison or a number stands; one after the other is changed, in
-a copy of the project, and the room's own tests are run until one fails.  Survivors are printed, to be read: some change
-nothing that matters (a number of steps, a tolerance with room), the others want a test.  A change in `exact` costs the
-compilation of its kernels.
+In each room SIZE places are drawn where an operator, a comparison or a number stands; one after the other is changed,
+in a copy of the project, and the room's own tests are run until one fails.  Survivors are printed, to be read: some
+change nothing that matters (a number of steps, a tolerance with room), the others want a test.  A change in `exact`
+costs the compilation of its kernels.
 """
 
 import ast
@@ -72,21 +72,18 @@ def survey(size, seed, rooms):
         copy = Path(folder) / "copy"
         shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(".git", ".venv", "reports", ".mypy_cache"))
         for room in rooms:
-            files = [path for path in sorted((ROOT / "tfarm" / room).glob("*.py"))]
+            files = sorted((ROOT / "tfarm" / room).glob("*.py"))
             drawn = [(path, n) for path in files for n in range(len(places(ast.parse(path.read_text()))))]
-            killed = 0
-            chosen = rng.sample(drawn, min(size, len(drawn)))
+            chosen, killed = rng.sample(drawn, min(size, len(drawn))), 0
             for path, number in chosen:
                 text, line = mutant(path, number)
-                target = copy / path.relative_to(ROOT)
-                kept = target.read_text()
+                target, name = copy / path.relative_to(ROOT), f"{path.relative_to(ROOT)}:{line}"
                 target.write_text(text)
                 alive = survives(copy, room)
-                target.write_text(kept)
+                target.write_text(path.read_text())
                 killed += not alive
                 if alive:
-                    print(f"survives: {path.relative_to(ROOT)}:{line} {path.read_text().splitlines()[line - 1].strip()}",
-                          flush=True)  # fmt: skip
+                    print(f"survives: {name} {path.read_text().splitlines()[line - 1].strip()}", flush=True)
             tally[room] = killed, len(chosen)
             print(f"{room}: {killed} of {len(chosen)} killed", flush=True)
     return tally
