@@ -6,7 +6,7 @@ import pytest
 
 import tfarm
 
-HEAVY = ("control", "matplotlib", "sympy", "scipy.signal")
+HEAVY = ("control", "matplotlib", "matplotlib.pyplot", "sympy", "scipy.signal")
 
 
 def loaded_after(code):
@@ -21,8 +21,11 @@ def test_importing_tfarm_and_reading_an_arm_load_nothing_heavy(code):
     assert loaded_after(code) == []
 
 
-def test_pictures_load_matplotlib_where_they_are_asked_for():
-    assert "matplotlib" in loaded_after("import tfarm; tfarm.plots")
+def test_pictures_load_matplotlib_where_they_are_asked_for_and_pyplot_for_figures_of_their_own_only():
+    code = "import tfarm; from matplotlib.figure import Figure as F; arm = tfarm.load('sasaki2012');"
+    found = loaded_after(f"{code} tfarm.plots.sketch(arm, ax=F().subplots())")
+    assert "matplotlib" in found
+    assert not {"matplotlib.pyplot", "control", "sympy"} & set(found)
 
 
 def test_the_probe_would_notice():
