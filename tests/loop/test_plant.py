@@ -52,6 +52,6 @@ def test_slow_torque_turns_the_effective_inertia(K2: float) -> None:
     for K1 in (1e-2, 1e-3):
         slow = closed_loop_poles(ARM, HubFeedback(K1=K1, K2=K2), 6).moving
         slow = slow[abs(slow).argmin()].real
-        misses.append(abs(slow * effective_inertia(ARM, K2) / -K1 - 1))
+        misses.append(abs(slow * effective_inertia(ARM, HubFeedback(K2=K2)) / -K1 - 1))
     assert misses[1] < 1e-3
     assert misses[1] < misses[0] / 30 or misses[1] < 1e-12

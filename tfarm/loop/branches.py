@@ -194,7 +194,7 @@ def open_pairs(arm: Arm, number: int, wanted: int) -> tuple[Complex, float]:
 
 def rigid_pair(loop: Loop, _: Complex) -> Complex:
     """The zeros of J_eff s^2 + K1 s + Kp: what the rigid body's become under small gains."""
-    J = effective_inertia(loop.arm, loop.law.K2) or 1e-9 * loop.arm.total_inertia
+    J = effective_inertia(loop.arm, loop.law) or 1e-9 * loop.arm.total_inertia
     b, c = loop.law.K1 / J, loop.law.Kp / J
     root = np.sqrt(complex(b * b / 4 - c))
     far = -b / 2 - np.copysign(root.real, b) if root.real else -b / 2 + 1j * root.imag

@@ -90,7 +90,7 @@ def _through_zero_free(arm: Arm, line: Line) -> Crossing | None:
         return None
     if way.K1:
         t = -base.K1 / way.K1 + 0.0
-        return Crossing(t, 0.0, -_sign(way.K1 * effective_inertia(arm, line.at(t).K2)))
+        return Crossing(t, 0.0, -_sign(way.K1 * effective_inertia(arm, line.at(t))))
     if base.K1 or not way.K2:
         return None
     J, carried = arm.total_inertia, arm.carried_inertia
@@ -103,7 +103,7 @@ def _change_with_stiffness(arm: Arm, law: HubFeedback) -> int:
     """How many more poles are unstable above Kp = 0 than below: by K1 if not 0, else by J s^2 + c s^3, c ~ K2 C."""
     if law.K1:
         return -_sign(law.K1)
-    J = effective_inertia(arm, law.K2)
+    J = effective_inertia(arm, law)
     oscillating = 2 if law.K2 * arm.damping * J > 0 else 0  # against one real pole on the other side
     return _sign(J) * (oscillating - 1)
 

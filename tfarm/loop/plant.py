@@ -62,6 +62,15 @@ class Loop:
         return gains_of(self.k, self.law)
 
     @property
+    def takes_energy(self) -> int:
+        """At C = 0: 1 where the law damps every oscillating mode that the hub feels, -1 where it drives them all.
+
+        0 where it does neither: K1 = 0 leaves no loss, K2 = 1 leaves the modes of the locked hub.  By Lyapunov's
+        argument it is the sign of K1 (1 - K2), whatever Kp.
+        """
+        return int(np.sign(self.law.K1)) * int(np.sign(1.0 - self.law.K2))
+
+    @property
     def member(self) -> Member:
         """The closed loop's characteristic function, its zeros at the origin divided out."""
         return member(self.k, self.gains)
@@ -80,6 +89,6 @@ class Loop:
         return drive, np.asarray(torque(map(float, self.gains), numerators))
 
 
-def effective_inertia(arm: Arm, K2: float) -> float:
+def effective_inertia(arm: Arm, law: HubFeedback) -> float:
     """I_h + (1 - K2)(J - I_h) [kg m^2]: what slow torque turns once the moment is fed back."""
-    return arm.hub_inertia + (1.0 - K2) * arm.carried_inertia
+    return arm.hub_inertia + (1.0 - law.K2) * arm.carried_inertia

@@ -58,12 +58,10 @@ class Poles:
     def unstable(self) -> int:
         """How many poles of the box, conjugates counted, lie to the right of the axis.
 
-        A real part below working precision decides nothing, but at C = 0 a theorem does: with K1 > 0 every oscillating
-        mode that the hub feels is damped if K2 < 1 and driven if K2 > 1, with K1 < 0 the other way round.
+        A real part below working precision decides nothing, but at C = 0 a theorem does (`Loop.takes_energy`).
         """
         right = self.values.real > ON_AXIS * abs(self.values)
-        law = self.loop.law
-        if self.loop.arm.is_undamped and law.K1 * (law.K2 - 1) > 0:
+        if self.loop.arm.is_undamped and self.loop.takes_energy < 0:
             right |= (self.values.imag > 0) & (abs(self.values.real) <= ON_AXIS * abs(self.values))
         return int((right * np.where(self.values.imag > 0, 2, 1)).sum())
 
@@ -144,10 +142,9 @@ def poles_below(loop: Loop, height: float, factors: tuple[float, ...] = GROWTH) 
 def _on_its_axis(loop: Loop, found: Complex) -> Complex:
     """The poles, rounding taken off the real part of those that a lossless loop has on the imaginary axis.
 
-    At C = 0 the characteristic function is even in s where K1 = 0, so that a simple zero is its own mirror image;
-    K2 = 1 leaves the modes of the locked hub, which are undamped.
+    At C = 0 the characteristic function is even in s where K1 = 0, so that a simple zero is its own mirror image.
     """
-    lossless = loop.arm.is_undamped and (loop.law.K1 == 0 or loop.law.K2 == 1)
+    lossless = loop.arm.is_undamped and not loop.takes_energy
     on_axis = lossless & (abs(found.real) <= ON_AXIS * abs(found))
     return np.where(on_axis, 1j * found.imag, found)
 
@@ -173,7 +170,7 @@ def slow_poles(loop: Loop, below: float) -> Complex:
     law = loop.law
     if not loop.arm.has_rigid_mode or not (law.K1 or law.Kp):
         return np.empty(0, complex)
-    J = effective_inertia(loop.arm, law.K2)
+    J = effective_inertia(loop.arm, law)
     unit = max(abs(law.K1), math.sqrt(abs(law.Kp)) * math.sqrt(abs(J)), 1e-300)  # K1 and sqrt(Kp J) alike
     with np.errstate(over="ignore"):
         roots = unit * np.roots([J, law.K1 / unit, law.Kp / unit / unit]).astype(complex)

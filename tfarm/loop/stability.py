@@ -76,8 +76,7 @@ def _verdict(poles: Poles, infinite: bool, loop: Loop) -> str:
     if at_zero > 1 or (at_zero == 1 and law.K1 == 0):
         return "marginal"
     if loop.arm.is_undamped:
-        lossless = law.K1 == 0 or law.K2 == 1
-        return "marginal" if lossless or not is_felt(loop.arm, poles.box.im_max) else "stable"
+        return "marginal" if not loop.takes_energy or not is_felt(loop.arm, poles.box.im_max) else "stable"
     on_axis = moving[moving.real > -MARGIN_OF_ZERO * abs(moving)]
     if on_axis.size:
         text = f"the pole at {on_axis[0]:.6g} 1/s is on the imaginary axis to working precision: neither stable nor not"
@@ -117,7 +116,7 @@ def _beyond(loop: Loop, quiet: bool) -> tuple[bool, str]:
         return False, "C = 0 and K1 = 0: nothing takes or gives energy, modes beyond the band lie on the axis"
     if law.K2 == 1:
         return False, "C = 0 and K2 = 1: modes with the hub at rest stay undamped, in every band"
-    if (law.K1 > 0) == (law.K2 < 1):
+    if loop.takes_energy > 0:
         return False, "C = 0: every mode beyond the band is damped (Lyapunov), with a decay rate that tends to 0"
     return True, "C = 0: every flexible mode beyond the band is unstable too, with a growth rate that tends to 0"
 
