@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from tfarm.digits import plain, significant
 from tfarm.loop.nyquist import Nyquist, compressed
 
-from .style import BLUE, FAINT, GREY, ORANGE, blank, headline, settled, style, window
+from .style import BLUE, FAINT, GREY, ORANGE, Keys, alone, blank, headline, style
 from .words import gains_words
 
 Complex = NDArray[np.complexfloating[Any, Any]]
@@ -29,14 +29,10 @@ def nyquist(data: Nyquist, *, ax: Axes | None = None, name: str = "") -> Axes:
 
     A size r of L is drawn as r/(1 + r): the rim is infinity, -1 lies half way.  `name`: what the law is called.
     """
+    if ax is None:
+        title = f"{data.verdict.loop.arm.name}: the loop function L(iω)"
+        return alone(lambda own: nyquist(data, ax=own, name=name), (5.0, 5.8), title, _legend())
     with style():
-        if ax is None:
-            figure = window(5.0, 5.8)
-            ax = nyquist(data, ax=figure.subplots(), name=name)
-            figure.legend(*_legend(), loc="outside lower left", ncols=2, fontsize=8.5)
-            headline(figure, f"{data.verdict.loop.arm.name}: the loop function L(iω)")
-            settled(figure)
-            return ax
         _disc(ax)
         _curve(data, ax)
         _headings(name, data, ax)
@@ -139,7 +135,7 @@ def _headings(name: str, data: Nyquist, ax: Axes) -> None:
     )  # fmt: skip
 
 
-def _legend() -> tuple[list[Line2D], list[str]]:
+def _legend() -> Keys:
     handles = [
         Line2D([], [], color=BLUE, lw=1.3),
         Line2D([], [], color=BLUE, lw=0.6, alpha=0.55),

@@ -17,7 +17,7 @@ from tfarm.tuner import Tuning
 from tfarm.tuner.overview import CostMap, Curves, TunerStudy
 
 from .regions import overlay
-from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, blank, headline, settled, style, window
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, alone, blank, headline, style
 
 Real = NDArray[np.float64]
 
@@ -28,14 +28,10 @@ TOP = 1.25  # of the cost without feedback: higher ones are drawn at the top edg
 
 def tuned_gain(found: Tuning, *, ax: Axes | None = None) -> Axes:
     """A tuned gain over time (what `tfarm.tune` returns) in its guard, in the axes given or new ones; the axes."""
+    if ax is None:
+        title = f"{found.trial.arm.name}: the tuner's gain, and where it is proven stable"
+        return alone(lambda own: tuned_gain(found, ax=own), (7.0, 4.4), title)
     with style():
-        if ax is None:
-            figure = window(7.0, 4.4)
-            ax = tuned_gain(found, ax=figure.subplots())
-            figure.legend(loc="outside lower left", ncols=2)
-            headline(figure, f"{found.trial.arm.name}: the tuner's gain, and where it is proven stable")
-            settled(figure)
-            return ax
         gain(found, ax=ax)
         ax.set_ylabel("gain on the root moment, K2  [-]")
     return ax

@@ -21,7 +21,7 @@ from tfarm.loop.edges import LINEAR_SCALE, Axis, edge, seen, stable_edge, static
 from tfarm.loop.regions import INFINITE, Region
 from tfarm.spectrum import modes
 
-from .style import BLUE, GREY, INK, ORANGE, PURPLE, headline, settled, style, window
+from .style import BLUE, GREY, INK, ORANGE, PURPLE, alone, style
 
 Real = NDArray[np.float64]
 
@@ -40,14 +40,10 @@ def gain_map(found: Region, *, ax: Axes | None = None) -> Axes:
     Colours for the number of unstable poles, a black line for the exact boundary with frequencies [rad/s] along it.
     """
     x, y = Axis.of(found.K1), Axis.of(found.K2)
+    if ax is None:
+        title = f"{found.arm.name}: unstable poles over the plane of both gains"
+        return alone(lambda own: gain_map(found, ax=own), (7.0, 5.4), title)
     with style():
-        if ax is None:
-            figure = window(7.0, 5.4)
-            ax = gain_map(found, ax=figure.subplots())
-            figure.legend(loc="outside lower left", ncols=2)
-            headline(figure, f"{found.arm.name}: unstable poles over the plane of both gains")
-            settled(figure)
-            return ax
         ground(found, x, y, ax)
         boundary(found, edge(found, x, y), x, y, ax)
         count_labels(found, x, y, ax)

@@ -18,7 +18,7 @@ from tfarm.loop.locus import Locus
 from tfarm.loop.reduced_locus import ReducedLocus
 from tfarm.spectrum import modes
 
-from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, blank, headline, settled, style, window
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, Keys, alone, blank, headline, style
 from .words import gains_words
 
 Real = NDArray[np.float64]
@@ -36,14 +36,10 @@ def locus(exact: Locus, *, reduced: ReducedLocus | None = None, ax: Axes | None 
     Broad lines: the branches [1/s], a colour a mode, a cross at their beginning, dots at every fourth of the range,
     and a diamond where one crosses the axis.  Thin: those of `reduced` (`tfarm.loop.reduced_locus`), if given.
     """
+    if ax is None:
+        title = f"{exact.arm.name}: closed-loop poles as {_range(exact)}"
+        return alone(lambda own: locus(exact, reduced=reduced, ax=own), (7.0, 5.6), title, _legend(exact, reduced))
     with style():
-        if ax is None:
-            figure = window(7.0, 5.6)
-            ax = locus(exact, reduced=reduced, ax=figure.subplots())
-            figure.legend(*_legend(exact, reduced), loc="outside lower left", ncols=3)
-            headline(figure, f"{exact.arm.name}: closed-loop poles as {_range(exact)}")
-            settled(figure)
-            return ax
         every = range(len(exact.branches))
         _panel(exact, reduced, every, ax, named=[*every, None])
         _frame(shown(exact.branches), ax)
@@ -160,7 +156,7 @@ def _frame(points: Complex, ax: Axes) -> None:
     ax.set_ylim(low - ROOM * tall, high + ROOM * tall)
 
 
-def _legend(exact: Locus, reduced: ReducedLocus | None) -> tuple[list[Line2D], list[str]]:
+def _legend(exact: Locus, reduced: ReducedLocus | None) -> Keys:
     start, *others = (plain(float(value), 3) for value in _marked(exact))
     keys = {"exact": Line2D([], [], color=GREY, lw=2.6, alpha=0.4)}
     if reduced is not None:

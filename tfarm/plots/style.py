@@ -14,6 +14,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as Figure  # which pages name too
+from matplotlib.lines import Line2D
 
 from tfarm.errors import ParameterError
 
@@ -51,6 +52,7 @@ STYLE = {
     "path.simplify": False,
 }
 
+Keys = tuple[list[Line2D], list[str]]  # of a legend
 New = Callable[[float, float], Figure]  # how a figure of that width and height [inches] is made
 
 
@@ -83,6 +85,18 @@ def settled(figure: Figure) -> list[Axes]:
             axis.get_major_ticks(1)
             axis.get_minor_ticks(1)
     return figure.axes
+
+
+def alone(draw: Callable[[Axes], object], size: tuple[float, float], title: str, keys: Keys | None = None) -> Axes:
+    """The axes of a picture in a figure of its own, of that size [inches]; below a legend, of `keys` or labels."""
+    with style():
+        figure = window(*size)
+        ax = figure.subplots()
+        draw(ax)
+        figure.legend(*(keys or ()), loc="outside lower left", ncols=2, fontsize=8.5)
+        headline(figure, title)
+        settled(figure)
+    return ax
 
 
 def taken(ax: Sequence[Axes], number: int) -> list[Axes]:
