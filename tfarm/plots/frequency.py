@@ -14,7 +14,7 @@ from matplotlib.ticker import FuncFormatter, MultipleLocator, NullFormatter
 from tfarm.digits import plain
 from tfarm.response.frequency import Bode, Real
 
-from .style import BLUE, FAINT, GREY, INK, ORANGE, New, blank, headline, settled, style, taken, window
+from .style import BLUE, FAINT, GREY, INK, ORANGE, New, blank, headline, style, taken, window
 
 HERTZ = 2 * math.pi
 STRIP = 0.085  # height of the strip of mode numbers above the magnitude, as a share of its axes
@@ -28,7 +28,7 @@ def bode(data: Bode, *, ax: Sequence[Axes] | None = None) -> tuple[Axes, Axes]:
     """
     with style():
         if ax is None:
-            upper, lower = settled(draw_bode(data, window))
+            upper, lower = draw_bode(data, window).axes
         else:
             upper, lower = taken(ax, 2)
             magnitude(data, ax=upper)

@@ -15,7 +15,7 @@ from tfarm.dsp.law import ModeTable
 from tfarm.dsp.loop import SampledLoop
 
 from .frequency import hertz_axis
-from .style import BLUE, GREY, INK, ORANGE, New, blank, headline, settled, style, window
+from .style import BLUE, GREY, INK, ORANGE, New, blank, headline, style, window
 from .words import gains_words
 
 BANDS = 12  # strips that are shaded one by one; above they are too narrow to tell
@@ -29,7 +29,7 @@ def sampled_modes(found: Analysis, *, ax: Axes | None = None) -> Axes:
     """
     with style():
         if ax is None:
-            return settled(draw_modes(found.verdict.loop, found.modes, window))[0]
+            return draw_modes(found.verdict.loop, found.modes, window).axes[0]
         growths(found.verdict.loop, found.modes, ax=ax)
     return ax
 

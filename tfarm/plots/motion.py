@@ -12,7 +12,7 @@ from tfarm.arm import Arm
 from tfarm.dsp import Simulation, curves
 from tfarm.dsp.curves import Curve
 
-from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, New, blank, headline, settled, style, taken, window
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, New, blank, headline, style, taken, window
 
 COLOURS = (ORANGE, BLUE, GREEN, PURPLE)  # of several simulations; one alone is blue
 
@@ -27,7 +27,7 @@ def slew(arm: Arm, runs: Simulation | Runs, *, ax: Sequence[Axes] | None = None)
     each = {"": runs} if isinstance(runs, Simulation) else runs
     with style():
         if ax is None:
-            moment, tip, torque = settled(draw_responses(arm, each, next(iter(each.values())).scenario.name, window))
+            moment, tip, torque = draw_responses(arm, each, next(iter(each.values())).scenario.name, window).axes
         else:
             moment, tip, torque = taken(ax, 3)
             root_moment(each, ax=moment)

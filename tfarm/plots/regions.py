@@ -15,7 +15,7 @@ from tfarm.dsp import GainMap
 from tfarm.loop.regions import Region
 
 from .plane import outline
-from .style import BLUE, GREY, INK, ORANGE, headline, settled, style, window
+from .style import BLUE, GREY, INK, ORANGE, headline, style, window
 from .words import gains_words
 
 SAND = "#f6dfcb"
@@ -35,7 +35,6 @@ def overlay(continuous: Region, sampled: GainMap | Sequence[GainMap], *, ax: Axe
             figure = window(9.0, 5.4)
             ax = overlay(continuous, planes, ax=figure.subplots())
             headline(figure, f"{continuous.arm.name}: gains that keep the loop stable, continuous and sampled")
-            settled(figure)
             return ax
         _scale(continuous, ax)
         keys = [_fill(ax, continuous, SAND, ORANGE, "stable, continuous: every mode")]

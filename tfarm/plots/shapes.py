@@ -17,7 +17,7 @@ from tfarm.records import record
 from tfarm.response.frequency import Real
 from tfarm.spectrum import Modes
 
-from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, New, blank, headline, settled, style, window
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, New, blank, headline, style, window
 
 POINTS = 401
 ALONG, DISPLACEMENT = "distance from the hub, x [m]", "displacement w(x), largest = 1 [-]"
@@ -67,7 +67,7 @@ def modes(found: Modes, *, ax: Sequence[Axes] | None = None) -> tuple[Axes, ...]
     shapes = shapes_of(found, int(found.index[-1]))
     with style():
         if ax is None:
-            return tuple(settled(draw_shapes(found.arm.name, shapes, window)))
+            return tuple(draw_shapes(found.arm.name, shapes, window).axes)
         each = tuple(np.ravel(np.asarray(ax, dtype=object)))[: len(shapes)]
         for one, shape in zip(each, shapes, strict=False):
             draw_shape(shape, ax=one)

@@ -11,7 +11,7 @@ from matplotlib.patches import Circle, FancyArrowPatch, Polygon, Rectangle
 from tfarm.arm import Arm
 from tfarm.digits import plain, unit
 
-from .style import BLUE, FAINT, GREY, INK, ORANGE, New, blank, settled, style, window
+from .style import BLUE, FAINT, GREY, INK, ORANGE, New, blank, style, window
 
 HUB = 0.055  # radius of the drawn hub, and half the payload's side, as shares of the length
 LOW, HIGH = -0.15, 0.16  # what is shown below and above the arm at least, as shares of its length
@@ -22,7 +22,7 @@ def sketch(arm: Arm, *, ax: Axes | None = None) -> Axes:
     """Hub, link and payload from the side, lengths in shares of the link's, in the axes given or new ones; the axes."""
     with style():
         if ax is None:
-            return settled(draw_arm(arm, window))[0]
+            return draw_arm(arm, window).axes[0]
         ax.set_aspect("equal")
         ax.set_axis_off()
         ax.set_xlim(LEFT, RIGHT)

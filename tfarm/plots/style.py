@@ -78,15 +78,6 @@ def window(width: float, height: float) -> Figure:
     return pyplot.figure(figsize=(width, height), layout="constrained")
 
 
-def settled(figure: Figure) -> list[Axes]:
-    """The axes of a figure, their ticks as they are styled now: matplotlib makes them later, by the user's settings."""
-    for ax in figure.axes:
-        for axis in (ax.xaxis, ax.yaxis):
-            axis.get_major_ticks(1)
-            axis.get_minor_ticks(1)
-    return figure.axes
-
-
 def alone(draw: Callable[[Axes], object], size: tuple[float, float], title: str, keys: Keys | None = None) -> Axes:
     """The axes of a picture in a figure of its own, of that size [inches]; below a legend, of `keys` or labels."""
     with style():
@@ -95,7 +86,6 @@ def alone(draw: Callable[[Axes], object], size: tuple[float, float], title: str,
         draw(ax)
         figure.legend(*(keys or ()), loc="outside lower left", ncols=2, fontsize=8.5)
         headline(figure, title)
-        settled(figure)
     return ax
 
 
