@@ -78,8 +78,9 @@ def design(
 
     "damping" maximises the least damping ratio of the oscillating poles below mode `modes` + 1; "margin" the disk
     margin up to there (of nearly equal ones that with more damping); "residual" minimises the root moment left after
-    the slew of `residual`.  Raises ParameterError for a bad objective or bounds, ConvergenceError if no gains within
-    the bounds are stable.
+    the slew of `residual`.  The verdict is that of the continuous loop: gains that are best there need not hold when
+    sampled, `tfarm.sampled(arm, found.law)` says whether they do.  Raises ParameterError for a bad objective or bounds,
+    ConvergenceError if no gains within the bounds are stable.
     """
     if objective not in OBJECTIVES:
         raise ParameterError(key="objective", value=objective, remedy=f"use one of {', '.join(OBJECTIVES)}")
