@@ -1,13 +1,17 @@
 """Pages on coarse grids, for tests of words, links and bytes: where a boundary lies has tests of its own."""
 
+from tfarm.dsp import loci as sampled_loci
 from tfarm.dsp import periods
+from tfarm.loop import loci
 from tfarm.report import map, overlay
 
 COARSE = (
     (map, "COLUMNS", 48),
     (map, "ROWS", 40),
     (map, "SAMPLED_COLUMNS", 24),
-    (overlay, "COLUMNS", 16),
+    (overlay, "COLUMNS", 8),
+    (loci, "POINTS", 60),
+    (sampled_loci, "VALUES", 31),
     (periods, "SHARES", (1.0, 5.0)),
 )
 

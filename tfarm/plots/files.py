@@ -22,8 +22,9 @@ def save(figure: Figure, folder: Path, stem: str, formats: tuple[str, ...] = FOR
     """The figure as folder/stem.svg, .png and .pdf."""
     with style(), warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph .* missing")  # an arm's name may hold any letter
-        figure.draw_without_rendering()  # lays it out; once is enough for all formats
-        figure.set_layout_engine(None)
+        if (layout := figure.get_layout_engine()) is not None:
+            layout.execute(figure)  # once is enough for all formats
+            figure.set_layout_engine(None)
         _settle(figure)
         for kind in formats:
             figure.savefig(folder / f"{stem}.{kind}", format=kind, dpi=dpi, metadata=METADATA[kind])
