@@ -131,7 +131,7 @@ def test_the_table_of_periods_is_each_period_by_itself(section):
     assert table["period_ms"] == [1.0, 5.0, 10.0, 20.0, 50.0]
     verdict = sampled_verdict(LAB, GAINS, Chain(sampling=Sampling(period=0.05)))
     assert table["growth_1_s"][-1] == verdict.log_radius / 0.05
-    assert table["stable_K2"][-1] in stable_windows(verdict.loop, "K2")
+    assert table["stable_K2"][-1] in stable_windows(verdict.full, "K2")
 
 
 def test_at_zero_damping_the_verdict_names_its_modes_its_growth_and_the_cure():

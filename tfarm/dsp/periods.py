@@ -31,7 +31,7 @@ def at_periods(arm: Arm, gains: HubFeedback, chain: Chain) -> tuple[AtPeriod, ..
     for share in SHARES:
         period = float(f"{share * chain.sampling.period:.12g}")  # 1 ms, and no 1.0000000000000002 ms
         verdict = sampled_verdict(arm, gains, replace(chain, sampling=replace(chain.sampling, period=period)))
-        K1, K2 = (tuple(stable_windows(verdict.loop, name)) for name in ("K1", "K2"))
+        K1, K2 = (tuple(stable_windows(verdict.full, name)) for name in ("K1", "K2"))
         growth = verdict.log_radius
         rows.append(AtPeriod(period, verdict.modes_used, verdict.is_settled, growth, gains, K1, K2))
     return tuple(rows)

@@ -61,8 +61,12 @@ class Verdict:
 
         Few modes settle a verdict, but not the later digits of this number.
         """
-        loop = self.loop if self.band is None else self.band.full
-        return loop.poles.log_spectral_radius
+        return self.full.poles.log_spectral_radius
+
+    @property
+    def full(self) -> SampledLoop:
+        """The loop with every mode of the band, for other gains than these; that of the verdict where there is none."""
+        return self.loop if self.band is None else self.band.full
 
     @property
     def word(self) -> str:

@@ -101,7 +101,7 @@ def gain_map(arm: Arm, chain: Chain | None = None) -> GainMap:
 def sampled_region(arm: Arm, x: Axis, y: Axis, chain: Chain) -> SampledMap | None:
     """Where in the picture the sampled loop is stable, with the modes of the verdict on the default gains."""
     try:
-        loop = sampled_verdict(arm, default_gains(arm), chain).loop
+        loop = sampled_verdict(arm, default_gains(arm), chain).full
         K1 = x.grid(SAMPLED_COLUMNS)
         K1 = with_both_sides(K1[K1 > 0], ends_of_K1(loop))
         return sampled_map(loop, K1[x.high > K1], [y.low - OUTSIDE, y.high + OUTSIDE])

@@ -43,7 +43,7 @@ class Overlay(NamedTuple):
 def overlay(arm: Arm, gains: HubFeedback, chain: Chain) -> Overlay:
     """The regions around these gains.  Raises ParameterError where the arm has no loop."""
     dampings = (arm.damping,) if arm.damping else (*DAMPINGS, 0.0)
-    loops = [sampled_verdict(arm.having(damping=C), gains, chain).loop for C in dampings]
+    loops = [sampled_verdict(arm.having(damping=C), gains, chain).full for C in dampings]
     ends = np.unique(np.concatenate([ends_of_K1(loop) for loop in loops]))
     ends = ends[np.diff(ends, prepend=0.0) > SAME * ends]
     low, top = gains.K1 / BELOW, _round_up(BEYOND * max([gains.K1, *ends]))
