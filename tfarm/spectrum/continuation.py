@@ -299,10 +299,10 @@ def _gaps(zeros: Complex, member: Member, beside: Neighbours) -> tuple[Real, Com
     """Of each zero its distance to the nearest zero of another pair or to the singular point, and the way to each."""
     flat = zeros.ravel()
     way = flat[:, None] - flat[beside.which]
-    gap = np.fmin.reduce(np.where(beside.own_pair, np.inf, abs(way)), axis=1)
-    from_origin = np.maximum(2 * abs(flat), member.free + 1e-300)
-    gap = np.fmin(gap, np.fmin(from_origin, abs(flat - member.singular)))
-    gap[np.isnan(flat)] = np.inf
+    apart, from_origin = abs(way), np.maximum(2 * abs(flat), member.free + 1e-300)
+    apart[beside.own_pair | np.isnan(apart)] = np.inf
+    gap = np.minimum(apart.min(1), np.minimum(from_origin, abs(flat - member.singular)))
+    gap[np.isnan(gap)] = np.inf
     return gap.reshape(zeros.shape), way
 
 
@@ -315,7 +315,10 @@ def improved(member: Member, zeros: Complex, beside: Neighbours | None = None) -
     gap, way = _gaps(zeros, member, beside)
     is_real = zeros.imag[:, 0] == 0
     value, slope, scale = _of_pairs(member.function, zeros, is_real)
-    way[beside.itself | (way == 0) | np.isnan(way)] = np.inf  # two that have become one do not part by repulsion
+    ended = np.isnan(zeros)
+    way[beside.itself | (way == 0)] = np.inf  # two that have become one do not part by repulsion
+    if ended.any():
+        way[np.isnan(way)] = np.inf
     with np.errstate(all="ignore"):
         step = value / slope
         repulsion = (1 / way).sum(1).reshape(zeros.shape)
@@ -327,7 +330,8 @@ def improved(member: Member, zeros: Complex, beside: Neighbours | None = None) -
         for i in np.nonzero(close & ~(abs(new - zeros).max(1) < 0.1 * apart))[0]:
             twist = np.exp(scale[i, 1] - scale[i, 0])  # both values on the scale of the first
             new[i] = _together(zeros[i], value[i] * [1, twist], slope[i] * [1, twist])
-        away = np.where(np.isnan(zeros), 0.0, abs(new - zeros))
+        away = abs(new - zeros)
+        away[ended] = 0.0
         floor = 4 * np.finfo(float).eps * abs(zeros)  # nearer no zero is known
         moved = np.where(away <= floor, 0.0, away / gap).max(1)  # no gap is left between two that have become one
     return new, moved
@@ -337,9 +341,11 @@ def _of_pairs(function: Function, zeros: Complex, is_real: NDArray[np.bool_]) ->
     """Value, slope and scale at pairs (n, 2); of a conjugate pair the function is asked at the upper zero alone."""
     count = len(zeros)
     asked = np.concatenate([zeros[:, 0], zeros[is_real, 1]])
-    parts, ended = function(np.where(np.isnan(asked), 1.0, asked)), np.isnan(asked)
-    found = []
-    for part in (np.where(ended, 0.0, parts[0]), np.where(ended, 1.0, parts[1]), parts[2]):
+    ended, found = np.isnan(asked), []
+    value, slope, scale = function(np.where(ended, 1.0, asked) if ended.any() else asked)
+    if ended.any():
+        value, slope = np.where(ended, 0.0, value), np.where(ended, 1.0, slope)
+    for part in (value, slope, scale):
         both = np.empty(zeros.shape, complex)
         both[:, 0] = part[:count]
         both[:, 1] = both[:, 0].conj()
