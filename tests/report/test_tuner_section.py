@@ -3,6 +3,7 @@
 import math
 import pickle
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,8 +12,10 @@ import tfarm
 from tests.shared import once
 from tfarm.dsp import Chain
 from tfarm.dsp.curves import away
+from tfarm.errors import CertificationError
 from tfarm.plots.files import save
 from tfarm.plots.learning import draw_cost_map, draw_curves
+from tfarm.report import tuner_section as tuner_section_room
 from tfarm.report.tuner_section import section_of, tuner_section
 from tfarm.tuner import Learning, Plan, conditions, initial_network, train, tune
 from tfarm.tuner import overview as study_module
@@ -157,3 +160,17 @@ def test_other_arms_are_told_why_there_is_no_tuner(arm, word):
     assert len(section.words) == 1
     assert word in section.words[0]
     assert not section.blocks
+
+
+def test_a_slew_that_runs_away_and_a_guard_that_fails_are_a_sentence(monkeypatch):
+    """Random arms met both: a traceback out of matplotlib, and 3.21e+06 in the middle of a sentence."""
+    runs_away = SimpleNamespace(tuning=SimpleNamespace(without=SimpleNamespace(cost=math.inf)))
+    monkeypatch.setattr(tuner_section_room, "tuner_study", lambda *_: runs_away)
+    assert "runs away" in tuner_section_room.tuner_section(LAB).words[0]
+
+    def unproven(*_):
+        raise CertificationError("no sector at K1 = 3.21e+06, C = 6.94e-05 s")
+
+    monkeypatch.setattr(tuner_section_room, "tuner_study", unproven)
+    (words,) = tuner_section_room.tuner_section(LAB).words
+    assert "K1 = 3210000, C = 6.94 × 10⁻⁵ s" in words

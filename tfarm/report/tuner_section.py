@@ -37,6 +37,12 @@ UNDAMPED = (
 )
 
 
+RUNS_AWAY = (
+    "No tuner here: at the default K1 and this period the slew without moment feedback runs away, so that there is no "
+    "cost to compare with. The sampled loop above says which K1 holds."
+)
+
+
 def tuner_section(arm: Arm, chain: Chain | None = None) -> Section:
     """The tuner with the paper's figures on a damped arm and its own chain; one sentence for any other."""
     reason = why_not(arm)
@@ -45,8 +51,10 @@ def tuner_section(arm: Arm, chain: Chain | None = None) -> Section:
     try:
         data = tuner_study(arm, Chain() if chain is None else chain)
     except CertificationError as error:
-        words = f"No tuner here: no range of gains is proven stable for a gain that moves ({error})."
+        words = f"No tuner here: no range of gains is proven stable for a gain that moves ({typeset(str(error))})."
         return Section(anchor="tune", title=TITLE, words=(words,))
+    if not math.isfinite(data.tuning.without.cost):
+        return Section(anchor="tune", title=TITLE, words=(RUNS_AWAY,))
     return section_of(data)
 
 

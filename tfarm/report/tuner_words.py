@@ -143,14 +143,14 @@ def _price(data: TunerStudy) -> str:
 
 def _ends(curves: Curves) -> str:
     finite = curves.final[np.isfinite(curves.final)]
-    low, middle, high = (
-        significant(float(x), 3) for x in (finite.min(), np.quantile(curves.final, 0.5, method="nearest"), finite.max())
-    )
     gone = [
         f"{count} {what}" for count, what in ((curves.diverged, "diverged"), (curves.died, "died at K = 0")) if count
     ]
-    spread = f"median {middle}, from {low} to {high}"
-    return ", ".join([*gone, spread])
+    if not finite.size:
+        return ", ".join(gone) or "none of a finite cost"
+    half = np.quantile(curves.final, 0.5, method="nearest")
+    low, middle, high = (significant(float(x), 3) for x in (finite.min(), half, finite.max()))
+    return ", ".join([*gone, f"median {middle}, from {low} to {high}"])
 
 
 def headline_facts(data: TunerStudy) -> tuple[Fact, ...]:

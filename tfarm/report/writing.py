@@ -38,6 +38,7 @@ from tfarm.report.sections import SavedSection, Section, save_section
 from tfarm.report.trust import FOLDER, Evidence, gather, write_trust
 from tfarm.report.trust_proofs import save_proof, written_proofs
 from tfarm.report.tuner_section import tuner_section
+from tfarm.report.words import typeset
 
 Progress = Callable[[int, int, str], object]
 Notice = Callable[[str], object]
@@ -266,7 +267,7 @@ def _section(piece: Piece, arm: Arm, chain: Chain) -> Section:
         return piece.make(arm, chain) if piece.is_sampled else piece.make(arm)
     except TfarmError as error:
         title = f"{piece.name[0].upper()}{piece.name[1:]}"
-        words = (f"This section could not be made for this arm: {error}.",)
+        words = (f"This section could not be made for this arm: {typeset(str(error))}.",)
         return Section(anchor=piece.anchor, title=title, words=words, failure=str(error))
 
 
