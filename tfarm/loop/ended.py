@@ -14,7 +14,7 @@ from tfarm.errors import ConvergenceError
 from .crossings import BranchCrossing
 from .lines import Line, along
 from .lines import crossings as line_crossings
-from .poles import ON_AXIS, poles_below
+from .poles import ON_AXIS, counted, poles_below
 from .variation import Complex, Real, Variation
 
 ALIKE = 1e-6  # of gain and frequency: two roads to one crossing
@@ -51,7 +51,7 @@ def _refuse_hidden(variation: Variation, gain: Real, branches: Complex, top: flo
         here = branches[:, n]
         right = (here.real > ON_AXIS * abs(here)) & (abs(here.imag) < top)
         poles = poles_below(variation.at(float(gain[n])), top, BELOW)
-        if poles.unstable > int((right * np.where(here.imag > 0, 2, 1)).sum()):
+        if poles.unstable > counted(here[right]):
             where = f"{variation.vary} = {gain[n]:.6g}"
             text = f"at {where} an unstable pole is on none of the branches that could be followed: use another range"
             raise ConvergenceError(text, poles.values, n)

@@ -21,7 +21,7 @@ from tfarm.spectrum import flexible_frequencies
 
 from .frequencies import band_of, grid
 from .plant import Loop
-from .poles import ON_AXIS
+from .poles import ON_AXIS, counted
 from .stability import Stability, stability
 
 Real = NDArray[np.float64]
@@ -58,13 +58,13 @@ class Nyquist:
         """Poles of the box that lie on the axis to working precision, apart from that at 0."""
         moving = self.verdict.poles.moving
         near = abs(moving.real) <= ON_AXIS * abs(moving)
-        return int((near * np.where(moving.imag > 0, 2, 1)).sum())
+        return counted(moving[near])
 
     @property
     def clear(self) -> int:
         """Poles of the box that lie right of the axis by more than working precision: at C = 0 a theorem knows more."""
         moving = self.verdict.poles.moving
-        return int(((moving.real > ON_AXIS * abs(moving)) * np.where(moving.imag > 0, 2, 1)).sum())
+        return counted(moving[moving.real > ON_AXIS * abs(moving)])
 
     @property
     def expected(self) -> int:

@@ -39,6 +39,11 @@ SMALLEST = 1e-140  # 1/s: whose square is still a full double
 SHRINK = tuple(1 / factor for factor in GROWTH)
 
 
+def counted(zeros: Complex) -> int:
+    """How many zeros these with Im s >= 0 stand for, conjugates counted."""
+    return int(np.where(zeros.imag > 0, 2, 1).sum())
+
+
 @dataclass(frozen=True)
 @record
 class Poles:
@@ -63,12 +68,12 @@ class Poles:
         right = self.values.real > ON_AXIS * abs(self.values)
         if self.loop.arm.is_undamped and self.loop.takes_energy < 0:
             right |= (self.values.imag > 0) & (abs(self.values.real) <= ON_AXIS * abs(self.values))
-        return int((right * np.where(self.values.imag > 0, 2, 1)).sum())
+        return counted(self.values[right])
 
     @property
     def count(self) -> int:
         """How many poles the box holds, conjugates counted."""
-        return int(np.where(self.values.imag > 0, 2, 1).sum())
+        return counted(self.values)
 
     @property
     def moving(self) -> Complex:
