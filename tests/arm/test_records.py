@@ -163,7 +163,7 @@ def test_nothing_that_is_accepted_overflows():
 @pytest.mark.parametrize("length", [1e-9, 1e20])
 def test_a_plate_or_an_endless_thread_is_no_beam(length):
     with pytest.raises(ParameterError, match=r"^link\.length = .*radius of gyration is no beam"):
-        replace(LINK, length=length)
+        replace(ARM, link=replace(LINK, length=length))
 
 
 @pytest.mark.parametrize(

@@ -18,8 +18,9 @@ import numpy as np
 
 from tests.models import Ritz
 from tests.strategies import BOUNDARY_CASES, some_arm
+from tfarm.arm import THEORIES
 from tfarm.exact import balls
-from tfarm.exact.coefficients import THEORIES, coefficients
+from tfarm.exact.coefficients import coefficients
 from tfarm.spectrum.counting import Counter
 from tfarm.spectrum.search import count_below, natural_frequencies
 

@@ -18,7 +18,8 @@ from tests.spectrum.ritz import (
 )
 from tests.strategies import some_arm
 from tfarm import Hub
-from tfarm.exact.coefficients import THEORIES, coefficients
+from tfarm.arm import THEORIES
+from tfarm.exact.coefficients import coefficients
 from tfarm.spectrum.counting import Counter
 from tfarm.spectrum.search import natural_frequencies
 

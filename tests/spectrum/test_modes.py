@@ -15,8 +15,9 @@ import tfarm
 from tests.models import Ritz
 from tests.strategies import BOUNDARY_CASES, some_arm
 from tfarm import Hub, Link, ParameterError, Payload, Section
+from tfarm.arm import THEORIES
 from tfarm.exact import balls
-from tfarm.exact.coefficients import THEORIES, coefficients
+from tfarm.exact.coefficients import coefficients
 from tfarm.spectrum import PARAMETERS
 from tfarm.spectrum.precise import refine
 

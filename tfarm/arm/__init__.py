@@ -1,24 +1,36 @@
 """What is analysed: the arm as frozen records, its TOML file and the presets."""
 
 from tfarm.arm.feedback import FED_BACK, GAINS, LISTED, NAMES, Gain, HubFeedback, law_of, many_laws
+from tfarm.arm.link import Link
 from tfarm.arm.plausible import implausible
 from tfarm.arm.reading import load, presets
-from tfarm.arm.records import Arm, Hub, Link, Payload, must_be_arm, must_turn
+from tfarm.arm.records import INPUTS, Arm, Input, must_be_arm, must_turn
+from tfarm.arm.rig import Attachment, Hub, Motor, Payload, RotarySpring
 from tfarm.arm.sections import Section
+from tfarm.arm.theories import THEORIES, WITH_ROTARY_INERTIA, WITH_SHEAR, Theory
 from tfarm.arm.writing import to_toml
 
 __all__ = [
     "FED_BACK",
     "GAINS",
+    "INPUTS",
     "LISTED",
     "NAMES",
+    "THEORIES",
+    "WITH_ROTARY_INERTIA",
+    "WITH_SHEAR",
     "Arm",
+    "Attachment",
     "Gain",
     "Hub",
     "HubFeedback",
+    "Input",
     "Link",
+    "Motor",
     "Payload",
+    "RotarySpring",
     "Section",
+    "Theory",
     "implausible",
     "law_of",
     "load",

@@ -51,6 +51,16 @@ def not_negative(key: str, value: object, meaning: str) -> float:
     return 0.0 if x == 0.0 else positive(key, x, meaning)
 
 
+def signed(key: str, value: object, meaning: str) -> float:
+    """Zero, or a finite number of either sign."""
+    x = number(key, value, meaning)
+    if math.isinf(x):
+        raise ParameterError(key=key, value=x, remedy=meaning)
+    if x != 0.0 and not SMALLEST <= abs(x) <= LARGEST:
+        raise _too_far(key, x)
+    return x + 0.0  # -0.0 becomes 0.0
+
+
 def extended(key: str, value: object, meaning: str) -> float:
     """Zero, a positive number, or inf."""
     x = number(key, value, meaning)

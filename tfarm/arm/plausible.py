@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from tfarm.arm.records import Arm, Link
+from tfarm.arm.link import Link
+from tfarm.arm.records import Arm
 from tfarm.errors import shown
 
 SOFTEST, STIFFEST = 1e5, 2e12  # Pa; soft silicone has 3e5, diamond 1.2e12

@@ -1,168 +1,125 @@
-"""What is analysed: a hub, a uniform Timoshenko link and a payload.  Frozen, checked once, SI units.
+"""What is analysed: a hub, a flexible link of one or more segments and a payload, with whatever else a rig has.
 
-Letters as in the paper: E, G, rho, A, I, kappa, C, I_h, m, I_c.
+Frozen, checked once, SI units.
 """
 
 from __future__ import annotations
 
 import math
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from typing import Literal, TypeVar, get_args
 
-from tfarm.arm.checks import extended, not_negative, number, positive
-from tfarm.arm.sections import Section
-from tfarm.errors import ParameterError, shown
+from tfarm.arm.link import Link
+from tfarm.arm.rig import Attachment, Hub, Motor, Payload, RotarySpring, brief_repr
+from tfarm.arm.texts import plain_name, plain_texts
+from tfarm.arm.theories import THEORIES, WITH_ROTARY_INERTIA, Theory
+from tfarm.errors import ParameterError, did_you_mean, shown
 
-MEANINGS = {
-    "length": "a length is a positive, finite number of metres",
-    "density": "a density is a positive, finite number in kg/m^3",
-    "youngs_modulus": "Young's modulus is a positive, finite number in Pa",
-    "shear_modulus": "a shear modulus is a positive, finite number in Pa",
-    "damping": "damping C is zero or a positive time in seconds, as in E (1 + C s)",
-}
+Input = Literal["hub_torque", "motor_voltage", "motor_current", "hub_angle"]
+INPUTS: tuple[Input, ...] = get_args(Input)
+MOST = 64  # segments, and attachments: more than any rig has, and 64 equal pieces are a check of the chain
+FLATTEST = 1e-3  # arm's length over a segment's radius of gyration: below it the units are mixed up
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Link:
-    """The flexible link: `length` [m], `density` [kg/m^3], `youngs_modulus`, `shear_modulus` [Pa], `section`.
-
-    `damping` is Kelvin-Voigt damping C [s], on bending only: E -> E (1 + C s).
-    """
-
-    length: float
-    density: float
-    youngs_modulus: float
-    shear_modulus: float
-    section: Section
-    damping: float = 0.0
-
-    def __post_init__(self) -> None:
-        for name, meaning in MEANINGS.items():
-            check = not_negative if name == "damping" else positive
-            object.__setattr__(self, name, check(f"link.{name}", getattr(self, name), meaning))
-        self._check_slenderness()
-        self._check_cowper()
-
-    @classmethod
-    def isotropic(
-        cls,
-        *,
-        length: float,
-        density: float,
-        youngs_modulus: float,
-        poissons_ratio: float,
-        section: Section,
-        damping: float = 0.0,
-    ) -> Link:
-        """The link of an isotropic material: G = E / (2 (1 + nu)) from Poisson's ratio nu."""
-        E = positive("link.youngs_modulus", youngs_modulus, MEANINGS["youngs_modulus"])
-        nu = _poissons_ratio(poissons_ratio)
-        return cls(
-            length=length,
-            density=density,
-            youngs_modulus=E,
-            shear_modulus=E / (2 * (1 + nu)),
-            section=section,
-            damping=damping,
-        )
-
-    def _check_slenderness(self) -> None:
-        if not 1e-3 <= self.slenderness <= 1e9:
-            remedy = f"{self.slenderness:.3g} times the section's radius of gyration is no beam; check the units"
-            raise ParameterError(key="link.length", value=self.length, remedy=remedy)
-
-    def _check_cowper(self) -> None:
-        """Cowper's factor holds for isotropic materials; the margins allow for a rounded G."""
-        nu = self.poissons_ratio
-        if self.section.shear_factor is None and not -1 + 1e-9 <= nu <= 0.5 + 1e-12:
-            remedy = (
-                f"with this Young's modulus it means a Poisson's ratio of {nu:.4g}, outside (-1, 0.5]; "
-                "mend it, or give link.section.shear_factor for a material that is not isotropic"
-            )
-            raise ParameterError(key="link.shear_modulus", value=self.shear_modulus, remedy=remedy)
-
-    @property
-    def poissons_ratio(self) -> float:
-        """nu = E / (2 G) - 1 [-], of an isotropic material."""
-        return self.youngs_modulus / (2 * self.shear_modulus) - 1
-
-    @property
-    def shear_factor(self) -> float:
-        """kappa [-]: the section's own, or else Cowper's (1966) from Poisson's ratio."""
-        given = self.section.shear_factor
-        return self.section.cowper_factor(self.poissons_ratio) if given is None else given
-
-    @property
-    def EI(self) -> float:
-        """Bending stiffness E I [N m^2], undamped."""
-        return self.youngs_modulus * self.section.second_moment
-
-    @property
-    def kGA(self) -> float:
-        """Shear stiffness kappa G A [N]."""
-        return self.shear_factor * self.shear_modulus * self.section.area
-
-    @property
-    def rhoA(self) -> float:
-        """Mass per length rho A [kg/m]."""
-        return self.density * self.section.area
-
-    @property
-    def rhoI(self) -> float:
-        """Rotary inertia per length rho I [kg m]."""
-        return self.density * self.section.second_moment
-
-    @property
-    def slenderness(self) -> float:
-        """L / sqrt(I/A) [-]; for a rectangle sqrt(12) times length over depth."""
-        return self.length / self.section.radius_of_gyration
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Hub:
-    """The hub: `inertia` I_h [kg m^2]; inf locks it, 0 leaves a free pin."""
-
-    inertia: float
-
-    def __post_init__(self) -> None:
-        meaning = "a hub inertia is zero (free pin), positive in kg m^2, or inf (locked)"
-        object.__setattr__(self, "inertia", extended("hub.inertia", self.inertia, meaning))
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Payload:
-    """The payload: `mass` m [kg] (inf pins the tip), `inertia` I_c [kg m^2] (inf forbids tip rotation)."""
-
-    mass: float = 0.0
-    inertia: float = 0.0
-
-    def __post_init__(self) -> None:
-        meaning = "a payload mass is zero, positive in kg, or inf (tip pinned)"
-        object.__setattr__(self, "mass", extended("payload.mass", self.mass, meaning))
-        meaning = "a payload inertia is zero, positive in kg m^2, or inf (tip cannot rotate)"
-        object.__setattr__(self, "inertia", extended("payload.inertia", self.inertia, meaning))
+_Part = TypeVar("_Part")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Arm:
-    """A hub, a flexible link and a payload, with the assumptions that every report repeats."""
+    """A hub, a flexible link and a payload, with the assumptions that every report repeats.
+
+    `link` is the segment at the hub, the only one of the paper's arm, and `outer` are those that follow it outwards.
+    The `clamp` yields between hub and link, `hub.radius` from the axis, the `joint` (gear, shaft) at the axis.
+    `theory` is one of `THEORIES`; `input` one of `INPUTS`, what drives the hub.
+    """
 
     link: Link
     hub: Hub
     payload: Payload = field(default_factory=Payload)
     name: str = "arm"
     assumptions: tuple[str, ...] = field(default=(), repr=False)
+    outer: tuple[Link, ...] = ()
+    clamp: RotarySpring = field(default_factory=RotarySpring)
+    joint: RotarySpring = field(default_factory=RotarySpring)
+    motor: Motor | None = None
+    attachments: tuple[Attachment, ...] = ()
+    theory: Theory = "timoshenko"
+    input: Input = "hub_torque"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "name", _name(self.name))
-        object.__setattr__(self, "assumptions", _texts(self.assumptions))
+        object.__setattr__(self, "name", plain_name(self.name))
+        object.__setattr__(self, "assumptions", plain_texts(self.assumptions))
+        object.__setattr__(self, "outer", _parts("outer", self.outer, Link, MOST - 1))
+        object.__setattr__(self, "attachments", _parts("attachments", self.attachments, Attachment, MOST))
+        _one_of("theory", self.theory, THEORIES)
+        _one_of("input", self.input, INPUTS)
+        self._check_slenderness()
+        self._check_places()
+        self._check_motor()
+
+    def __repr__(self) -> str:
+        return brief_repr(self, always=4)
+
+    def _check_slenderness(self) -> None:
+        """A segment may be as short as one likes, the whole arm may not."""
+        slenderness = min(self.length / link.section.radius_of_gyration for link in self.links)
+        if slenderness < FLATTEST:
+            remedy = f"{slenderness:.3g} times the section's radius of gyration is no beam; check the units"
+            raise ParameterError(key="length" if self.outer else "link.length", value=self.length, remedy=remedy)
+
+    def _check_places(self) -> None:
+        """Attachments on the link, and no pin on the axis, which stands anyway."""
+        for i, attachment in enumerate(self.attachments, 1):
+            if attachment.x > self.length:
+                remedy = f"is beyond the tip; x counts from the clamp, up to the link's length of {self.length!r} m"
+                raise ParameterError(key=f"attachment.{i}.x", value=attachment.x, remedy=remedy)
+        if math.isinf(self.payload.mass) and abs(self.centre_distance) < 1e-9 * (self.hub.radius + self.length):
+            remedy = "puts the pinned centre of mass on the axis, which stands anyway; give a finite payload.mass"
+            raise ParameterError(key="payload.offset", value=self.payload.offset, remedy=remedy)
+
+    def _check_motor(self) -> None:
+        if self.motor is None and self.input in ("motor_voltage", "motor_current"):
+            remedy = "there is no motor; describe it under [motor], or take hub_torque or hub_angle"
+            raise ParameterError(key="input", value=self.input, remedy=remedy)
+        if self.motor is not None and math.isinf(self.hub.inertia):
+            remedy = "cannot turn, so the motor does nothing; leave out the motor, or give the hub's own inertia"
+            raise ParameterError(key="hub.inertia", value=self.hub.inertia, remedy=remedy)
+
+    @property
+    def links(self) -> tuple[Link, ...]:
+        """The segments, from the hub outwards."""
+        return (self.link, *self.outer)
+
+    @property
+    def length(self) -> float:
+        """L [m], from the clamp to the tip."""
+        return math.fsum(link.length for link in self.links)
+
+    @property
+    def centre_distance(self) -> float:
+        """r + L + e [m], from the axis to the payload's centre of mass."""
+        return self.hub.radius + self.length + self.payload.offset
 
     @property
     def total_inertia(self) -> float:
-        """J = I_h + rhoA L^3/3 + rhoI L + m L^2 + I_c [kg m^2], of the rigid arm about the hub."""
-        link, payload = self.link, self.payload
-        beam = link.rhoA * link.length**3 / 3 + link.rhoI * link.length
-        return self.hub.inertia + beam + payload.mass * link.length**2 + payload.inertia
+        """J = I_h + N^2 J_m + sum of the segments and attachments + m (r + L + e)^2 + I_c [kg m^2], about the axis.
+
+        A segment from a to a + L has rhoA (L^3/3 + a L (a + L)) + rhoI L, without rhoI where the theory has no rotary
+        inertia.  inf where the hub or the payload says so.
+        """
+        beam = math.fsum(self._segment_inertias())
+        payload = self.payload.mass * self.centre_distance**2
+        attached = math.fsum(each.mass * (self.hub.radius + each.x) ** 2 + each.inertia for each in self.attachments)
+        return self.hub_side_inertia + beam + payload + self.payload.inertia + attached
+
+    def _segment_inertias(self) -> Iterator[float]:
+        a = self.hub.radius
+        for link in self.links:
+            L = link.length
+            rotary = link.rhoI * L if self.theory in WITH_ROTARY_INERTIA else 0.0
+            yield link.rhoA * L**3 / 3 + rotary + link.rhoA * L * a * (a + L)
+            a += L
 
     @property
     def hub_inertia(self) -> float:
@@ -170,14 +127,19 @@ class Arm:
         return self.hub.inertia
 
     @property
+    def hub_side_inertia(self) -> float:
+        """I_h + N^2 J_m [kg m^2], of hub and rotor."""
+        return self.hub.inertia + (self.motor.reflected_inertia if self.motor else 0.0)
+
+    @property
     def carried_inertia(self) -> float:
-        """J - I_h [kg m^2], of what the hub carries."""
-        return self.total_inertia - self.hub.inertia
+        """J - I_h - N^2 J_m [kg m^2], of what the hub carries."""
+        return self.total_inertia - self.hub_side_inertia
 
     @property
     def own_mass(self) -> float:
-        """rho A L [kg], of the arm itself."""
-        return self.link.rhoA * self.link.length
+        """rho A L [kg], of the link itself, all segments."""
+        return math.fsum(link.rhoA * link.length for link in self.links)
 
     @property
     def payload_mass(self) -> float:
@@ -185,52 +147,89 @@ class Arm:
         return self.payload.mass
 
     @property
-    def length(self) -> float:
-        """L [m], from the hub's axis to the tip."""
-        return self.link.length
+    def payload_inertia(self) -> float:
+        """I_c [kg m^2], about the payload's own centre of mass."""
+        return self.payload.inertia
 
     @property
     def damping(self) -> float:
-        """C [s] of the bending moment E I (1 + C s)."""
-        return self.link.damping
+        """C [s] of the bending moment E I (1 + C s); of several segments the largest."""
+        return max(link.damping for link in self.links)
+
+    @property
+    def singular_points(self) -> tuple[float, ...]:
+        """-1/C [1/s] of each damped segment, ascending, each once: there its bending stiffness vanishes."""
+        return tuple(sorted({-1.0 / link.damping for link in self.links if link.damping > 0.0}))
 
     @property
     def is_undamped(self) -> bool:
-        """Whether C = 0: then every frequency is real, and theorems hold that do not at C > 0."""
-        return self.link.damping == 0
+        """Whether nothing dissipates: then every frequency is real, and theorems hold that do not otherwise."""
+        springs, motor = (self.clamp.damping, self.joint.damping), self.motor
+        losses = [self.damping, *springs, self.hub.friction]
+        if motor is not None:
+            losses += [motor.rotor_friction, motor.back_emf_constant * (self.input == "motor_voltage")]
+        return not any(losses)
+
+    @property
+    def is_uniform(self) -> bool:
+        """Whether it is an arm as the paper has it: one segment on a hub, a payload centred on the tip, no more."""
+        hub, spare = self.hub, (self.outer, self.motor, self.attachments, self.payload.offset)
+        plain = not any((hub.friction, hub.radius, hub.stiffness, *spare))
+        return plain and self.clamp.is_rigid and self.joint.is_rigid
 
     @property
     def has_massless_hub(self) -> bool:
-        """Whether I_h = 0: then the root moment is -u at every instant."""
-        return self.hub.inertia == 0
+        """Whether nothing at the hub resists its turning and r = 0: then the root moment is -u at every instant."""
+        friction = self.hub.friction + (self.motor.rotor_friction if self.motor else 0.0)
+        back_emf = self.motor is not None and self.input == "motor_voltage" and self.motor.back_emf_constant > 0.0
+        return not (self.hub_side_inertia or friction or self.hub.stiffness or self.hub.radius or back_emf)
 
     @property
     def bending_scale(self) -> float:
-        """E I/L [N m], the moment that bends the whole arm by an angle of 1."""
-        return self.link.EI / self.link.length
-
-    def having(self, **numbers: float) -> Arm:
-        """The arm with other numbers: of `ADJUSTABLE`, by name, in SI units.  Raises ParameterError as its parts do."""
-        parts = {room: getattr(self, room) for room in ("link", "hub", "payload")}
-        for name, value in numbers.items():
-            room, field = ADJUSTABLE[name]
-            parts[room] = replace(parts[room], **{field: value})
-        return replace(self, **parts)
+        """E I/L [N m] of the hub's segment and the whole length: the moment that bends the arm by an angle of 1."""
+        return self.link.EI / self.length
 
     @property
     def is_locked(self) -> bool:
-        """Whether the hub cannot turn (I_h = inf): then the hub angle drives, not the torque."""
-        return math.isinf(self.hub.inertia)
+        """Whether the hub's angle drives, not a torque: I_h = inf, or the angle is the input."""
+        return math.isinf(self.hub.inertia) or self.input == "hub_angle"
 
     @property
     def has_rigid_mode(self) -> bool:
-        """Whether the whole arm can turn as a rigid body: no inertia is infinite."""
-        return math.isfinite(self.total_inertia)
+        """Whether the whole rig can turn as a rigid body: no inertia is infinite, no spring ties it to the ground."""
+        return math.isfinite(self.total_inertia) and not any(value for _, value in self._springs_to_ground())
+
+    def _springs_to_ground(self) -> Iterator[tuple[str, float]]:
+        """The key and the stiffness of each spring that could hold the rig."""
+        yield "hub.stiffness", self.hub.stiffness
+        for i, each in enumerate(self.attachments, 1):
+            yield f"attachment.{i}.stiffness", each.stiffness
+            yield f"attachment.{i}.rotational_stiffness", each.rotational_stiffness
 
     @property
     def shear_cutoff(self) -> float:
-        """sqrt(kGA/rhoI) [rad/s], above which both pairs of waves travel."""
-        return math.sqrt(self.link.kGA / self.link.rhoI)
+        """sqrt(kGA/rhoI) [rad/s], above which both pairs of waves travel; of several segments the lowest."""
+        return min(math.sqrt(link.kGA / link.rhoI) for link in self.links)
+
+    def having(self, **numbers: float) -> Arm:
+        """The arm with other numbers: of `ADJUSTABLE`, by name, in SI units.  Raises ParameterError as its parts do.
+
+        A hub that an infinite inertia locks is left without its friction, spring and motor, which then do nothing.
+        """
+        arm = self
+        for name, value in numbers.items():
+            room, number = ADJUSTABLE[name]
+            if room == "link" and arm.outer:
+                remedy = f"which of the {len(arm.links)} segments is meant? write their [[link]] tables anew"
+                raise ParameterError(key=name, value=value, remedy=remedy)
+            if name == "hub_inertia" and value == math.inf:
+                arm = arm._with_an_idle_hub()
+            arm = replace(arm, **{room: replace(getattr(arm, room), **{number: value})})
+        return arm
+
+    def _with_an_idle_hub(self) -> Arm:
+        hub = replace(self.hub, friction=0.0, stiffness=0.0)
+        return replace(self, hub=hub, motor=None, input="hub_angle" if self.input == "hub_angle" else "hub_torque")
 
 
 ADJUSTABLE = {  # numbers of an arm by name: the part and the field that hold them
@@ -250,7 +249,7 @@ def must_be_arm(arm: object) -> None:
 
 
 def must_turn(arm: Arm) -> None:
-    """Raise ParameterError, naming the infinite part, for an arm that cannot slew: something holds it."""
+    """Raise ParameterError, naming the infinite part or the spring, for an arm that cannot slew: something holds it."""
     parts = {
         "hub.inertia": arm.hub.inertia,
         "payload.mass": arm.payload.mass,
@@ -259,41 +258,21 @@ def must_turn(arm: Arm) -> None:
     key, value = max(parts.items(), key=lambda part: part[1])
     if math.isinf(value):
         raise ParameterError(key=key, value=value, remedy="an arm that cannot turn has no slew; give finite inertias")
+    for key, value in arm._springs_to_ground():
+        if value > 0.0:
+            remedy = "an arm that a spring ties to the ground has no slew; leave the spring out"
+            raise ParameterError(key=key, value=value, remedy=remedy)
 
 
-def _poissons_ratio(value: object) -> float:
-    meaning = "Poisson's ratio lies above -1, up to 0.5 (incompressible); about 0.3 for metals"
-    nu = number("link.poissons_ratio", value, meaning)
-    if not -1.0 < nu <= 0.5:
-        raise ParameterError(key="link.poissons_ratio", value=nu, remedy=meaning)
-    return nu
+def _parts(key: str, parts: object, kind: type[_Part], most: int) -> tuple[_Part, ...]:
+    """A tuple of at most so many records of one kind."""
+    if not isinstance(parts, list | tuple) or not all(isinstance(part, kind) for part in parts):
+        raise ParameterError(key=key, value=parts, remedy=f"give a tuple of {kind.__name__} records")
+    if len(parts) > most:
+        raise ParameterError(key=key, value=len(parts), remedy=f"so many are no rig; at most {MOST} are read")
+    return tuple(parts)
 
 
-MOST_BYTES = 200  # of a name in UTF-8: file systems stop at 255, and a temporary file's name is longer than its own
-DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in "0123456789¹²³")}
-
-
-def _name(name: object) -> str:
-    """The name, which is also the name of the arm's folder of reports, on every file system."""
-    remedy = 'a name has 1 to 80 characters, begins with a letter or digit and has no / \\ : * ? " < > |'
-    if not isinstance(name, str) or not 1 <= len(name) <= 80 or not name.isprintable():
-        raise ParameterError(key="name", value=name, remedy=remedy)
-    if not name[0].isalnum() or name[-1] in " ." or set(name) & set('/\\:*?"<>|'):
-        raise ParameterError(key="name", value=name, remedy=remedy)
-    if len(name.encode()) > MOST_BYTES:
-        raise ParameterError(key="name", value=name, remedy=f"{len(name.encode())} bytes; at most {MOST_BYTES}")
-    if name.partition(".")[0].rstrip().casefold() in DEVICES:
-        raise ParameterError(key="name", value=name, remedy="is a device to Windows; give the arm another name")
-    return name
-
-
-def _texts(assumptions: object) -> tuple[str, ...]:
-    """The assumptions, each with its white space made plain."""
-    remedy = "assumptions are a list of plain texts"
-    if not isinstance(assumptions, list | tuple):
-        raise ParameterError(key="assumptions", value=assumptions, remedy=remedy)
-    texts = tuple(" ".join(text.split()) if isinstance(text, str) else text for text in assumptions)
-    for text in texts:
-        if not isinstance(text, str) or not text.isprintable():
-            raise ParameterError(key="assumptions", value=text, remedy=remedy)
-    return texts
+def _one_of(key: str, value: object, known: tuple[str, ...]) -> None:
+    if value not in known:
+        raise ParameterError(key=key, value=value, remedy=f"unknown; {did_you_mean(str(value), known)}")

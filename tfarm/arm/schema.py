@@ -12,7 +12,9 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic_core import ErrorDetails
 
-from tfarm.arm.records import Arm, Hub, Link, Payload
+from tfarm.arm.link import Link
+from tfarm.arm.records import Arm
+from tfarm.arm.rig import Hub, Payload
 from tfarm.arm.sections import Section
 from tfarm.errors import MISSING, ParameterError, did_you_mean
 

@@ -11,8 +11,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from tfarm.arm import Arm, Hub, Link, Payload, Section
-from tfarm.exact.coefficients import Theory
+from tfarm.arm import Arm, Hub, Link, Payload, Section, Theory
 
 inf = math.inf
 FREQUENCY = "frequency [Hz]"

@@ -10,18 +10,13 @@ import math
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property, lru_cache
-from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm
+from tfarm.arm import THEORIES, WITH_ROTARY_INERTIA, WITH_SHEAR, Arm, Theory
 from tfarm.errors import ParameterError
 from tfarm.records import record
-
-Theory = Literal["timoshenko", "shear", "rayleigh", "euler-bernoulli"]
-THEORIES: tuple[Theory, ...] = get_args(Theory)
-
 
 Inertia = Fraction | float  # a fraction, or math.inf
 
@@ -104,8 +99,8 @@ def coefficients(arm: Arm, theory: Theory = "timoshenko") -> Coefficients:
     length, density, E = Fraction(link.length), Fraction(link.density), Fraction(link.youngs_modulus)
     kG = Fraction(link.shear_factor) * Fraction(link.shear_modulus)
     area, second_moment = Fraction(link.section.area), Fraction(link.section.second_moment)
-    rotary = theory in ("timoshenko", "rayleigh")
-    flexible = theory in ("timoshenko", "shear")
+    rotary = theory in WITH_ROTARY_INERTIA
+    flexible = theory in WITH_SHEAR
     EI = E * second_moment
     return Coefficients(
         a=density * length**2 / E * rotary,

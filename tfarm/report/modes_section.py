@@ -9,11 +9,10 @@ from functools import partial
 import numpy as np
 
 import tfarm
-from tfarm.arm import Arm
+from tfarm.arm import Arm, Theory
 from tfarm.columns import REPORT, Column, Table
 from tfarm.digits import fixed, lined, listed, significant
 from tfarm.errors import CertificationError, ConvergenceError
-from tfarm.exact.coefficients import Theory
 from tfarm.plots.shapes import Shape, draw_differences, draw_shapes, shapes_of, theory_name
 from tfarm.report.damped_table import damped_table
 from tfarm.report.sections import Picture, Section

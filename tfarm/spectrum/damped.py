@@ -14,10 +14,10 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm
+from tfarm.arm import Arm, Theory
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
 from tfarm.exact.characteristic import OPEN, Gains, quick_characteristic, zeros_at_origin
-from tfarm.exact.coefficients import Coefficients, Theory
+from tfarm.exact.coefficients import Coefficients
 from tfarm.records import record
 
 from .box import Box, Complex, Function, winding_number

@@ -9,11 +9,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, must_be_arm
+from tfarm.arm import THEORIES, Arm, Theory, must_be_arm
 from tfarm.arm.checks import whole
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exact.appendix import natural_frequency, roots_near
-from tfarm.exact.coefficients import THEORIES, Coefficients, Theory, coefficients
+from tfarm.exact.coefficients import Coefficients, coefficients
 from tfarm.exact.methods import DIGITS, Method, known_method
 from tfarm.records import record
 

@@ -1,0 +1,187 @@
+"""The parts of a rig besides its link: hub, springs, motor, attachments, payload.  Frozen, checked once, SI units.
+
+Letters: I_h, b, r of the hub; k, c of a rotary spring; R, L_a, Kt, Ke, N, J_m, b_m, eta of the motor; m, I_c, e of the
+payload.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import MISSING, dataclass, fields
+from typing import Any, cast
+
+from tfarm.arm.checks import extended, not_negative, positive, signed
+from tfarm.errors import ParameterError
+
+
+def brief_repr(record: Any, always: int) -> str:
+    """The repr of a record: the first `always` fields, and of the others those that differ from their defaults."""
+    known = [each for each in fields(record) if each.repr]
+    shown = [each for i, each in enumerate(known) if i < always or getattr(record, each.name) != _default(each)]
+    return f"{type(record).__name__}({', '.join(f'{each.name}={getattr(record, each.name)!r}' for each in shown)})"
+
+
+def _default(field: Any) -> Any:
+    return field.default if field.default_factory is MISSING else field.default_factory()
+
+
+def _finite(record: Any, kind: str, meanings: dict[str, str]) -> None:
+    """Zero or a positive, finite number in each of these fields; raises ParameterError under `kind.field`."""
+    for name, meaning in meanings.items():
+        object.__setattr__(record, name, not_negative(f"{kind}.{name}", getattr(record, name), meaning))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Hub:
+    """The hub: `inertia` I_h [kg m^2] (inf locks it, 0 leaves a free pin), viscous `friction` b [N m s/rad].
+
+    `radius` r [m] lies between the axis and the clamp; `stiffness` [N m/rad] is a spring to ground.
+    """
+
+    inertia: float
+    friction: float = 0.0
+    radius: float = 0.0
+    stiffness: float = 0.0
+
+    def __post_init__(self) -> None:
+        meaning = "a hub inertia is zero (free pin), positive in kg m^2, or inf (locked)"
+        object.__setattr__(self, "inertia", extended("hub.inertia", self.inertia, meaning))
+        meanings = {
+            "friction": "a hub friction is zero or a positive, finite number in N m s/rad",
+            "radius": "a hub radius, from the axis to the clamp, is zero or a positive, finite number of metres",
+            "stiffness": "a spring from hub to ground is zero or positive, finite, in N m/rad (inertia = inf locks)",
+        }
+        _finite(self, "hub", meanings)
+        for name in ("friction", "stiffness"):
+            if math.isinf(self.inertia) and getattr(self, name) > 0.0:
+                remedy = f"does nothing: with inertia = inf the hub cannot turn; leave out the {name}, or the inf"
+                raise ParameterError(key=f"hub.{name}", value=getattr(self, name), remedy=remedy)
+
+    def __repr__(self) -> str:
+        return brief_repr(self, always=1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RotarySpring:
+    """A rotary spring with a dashpot beside it: `stiffness` k [N m/rad] (inf: rigid), `damping` c [s], k (1 + c s)."""
+
+    stiffness: float = math.inf
+    damping: float = 0.0
+
+    def __post_init__(self) -> None:
+        meaning = "the stiffness of a clamp or joint is positive in N m/rad, or inf (rigid)"
+        stiffness = extended("spring.stiffness", self.stiffness, meaning)
+        if stiffness == 0.0:
+            raise ParameterError(key="spring.stiffness", value=stiffness, remedy=meaning)
+        object.__setattr__(self, "stiffness", stiffness)
+        _finite(self, "spring", {"damping": "damping c is zero or a positive time in seconds, as in k (1 + c s)"})
+        if self.damping > 0.0 and self.is_rigid:
+            remedy = "nothing yields that could be damped: give a finite stiffness in N m/rad, or leave the damping out"
+            raise ParameterError(key="spring.damping", value=self.damping, remedy=remedy)
+
+    @property
+    def is_rigid(self) -> bool:
+        """Whether it does not yield at all: k = inf."""
+        return math.isinf(self.stiffness)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Motor:
+    """A geared DC motor: `resistance` R [ohm], `inductance` L_a [H], `torque_constant` Kt [N m/A].
+
+    `back_emf_constant` Ke [V s/rad] is Kt unless given; `gear_ratio` N is motor turns per hub turn.  On the motor's
+    side of the gear: `rotor_inertia` J_m [kg m^2] and `rotor_friction` b_m [N m s/rad].  `gear_efficiency` eta [-]
+    holds in the direction from motor to hub: u = eta N Kt i.
+    """
+
+    resistance: float
+    torque_constant: float
+    back_emf_constant: float = cast("float", None)  # Kt then
+    inductance: float = 0.0
+    gear_ratio: float = 1.0
+    rotor_inertia: float = 0.0
+    rotor_friction: float = 0.0
+    gear_efficiency: float = 1.0
+
+    def __post_init__(self) -> None:
+        meanings = {
+            "resistance": "a motor's resistance is a positive, finite number of ohms",
+            "torque_constant": "a torque constant is a positive, finite number in N m/A",
+            "gear_ratio": "a gear ratio, motor turns per hub turn, is a positive, finite number",
+            "gear_efficiency": "an efficiency is above 0, up to 1 (75 % is entered as 0.75)",
+        }
+        for name, meaning in meanings.items():
+            object.__setattr__(self, name, positive(f"motor.{name}", getattr(self, name), meaning))
+        if self.gear_efficiency > 1.0:
+            remedy = meanings["gear_efficiency"]
+            raise ParameterError(key="motor.gear_efficiency", value=self.gear_efficiency, remedy=remedy)
+        given: object = self.back_emf_constant
+        if given is None:
+            object.__setattr__(self, "back_emf_constant", self.torque_constant)
+        others = {
+            "back_emf_constant": "a back-EMF constant is zero or a positive, finite number in V s/rad",
+            "inductance": "an inductance is zero or a positive, finite number of henries",
+            "rotor_inertia": "a rotor inertia is zero or a positive, finite number in kg m^2, before the gear",
+            "rotor_friction": "a rotor friction is zero or a positive, finite number in N m s/rad, before the gear",
+        }
+        _finite(self, "motor", others)
+
+    @property
+    def reflected_inertia(self) -> float:
+        """N^2 J_m [kg m^2], the rotor's inertia as the hub feels it."""
+        return self.gear_ratio**2 * self.rotor_inertia
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Attachment:
+    """What sits on the link at `x` [m] from the clamp: a `mass` [kg], an `inertia` [kg m^2], springs to ground.
+
+    `stiffness` [N/m] resists the displacement there, `rotational_stiffness` [N m/rad] the rotation.
+    """
+
+    x: float
+    mass: float = 0.0
+    inertia: float = 0.0
+    stiffness: float = 0.0
+    rotational_stiffness: float = 0.0
+
+    def __post_init__(self) -> None:
+        meanings = {
+            "x": "an attachment's place is zero or a positive number of metres from the clamp, up to the tip",
+            "mass": "an attached mass is zero or a positive, finite number in kg",
+            "inertia": "an attached inertia is zero or a positive, finite number in kg m^2",
+            "stiffness": "an attached spring to ground is zero or positive, finite, in N/m",
+            "rotational_stiffness": "an attached rotary spring to ground is zero or positive, finite, in N m/rad",
+        }
+        _finite(self, "attachment", meanings)
+        if not (self.mass or self.inertia or self.is_held):
+            remedy = "there is nothing in it: give a mass, an inertia, a stiffness or a rotational_stiffness"
+            raise ParameterError(key="attachment.x", value=self.x, remedy=remedy)
+
+    @property
+    def is_held(self) -> bool:
+        """Whether a spring ties it to the ground."""
+        return self.stiffness > 0.0 or self.rotational_stiffness > 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Payload:
+    """The payload: `mass` m [kg] (inf pins its centre), `inertia` I_c [kg m^2] about its own centre of mass.
+
+    An infinite inertia forbids tip rotation; `offset` e [m] is how far the centre lies beyond the tip, of any sign.
+    """
+
+    mass: float = 0.0
+    inertia: float = 0.0
+    offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        meaning = "a payload mass is zero, positive in kg, or inf (tip pinned)"
+        object.__setattr__(self, "mass", extended("payload.mass", self.mass, meaning))
+        meaning = "a payload inertia is zero, positive in kg m^2, or inf (tip cannot rotate)"
+        object.__setattr__(self, "inertia", extended("payload.inertia", self.inertia, meaning))
+        meaning = "a payload's offset is a finite number of metres beyond the tip, negative before it"
+        object.__setattr__(self, "offset", signed("payload.offset", self.offset, meaning))
+
+    def __repr__(self) -> str:
+        return brief_repr(self, always=2)
