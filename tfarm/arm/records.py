@@ -21,6 +21,7 @@ Input = Literal["hub_torque", "motor_voltage", "motor_current", "hub_angle"]
 INPUTS: tuple[Input, ...] = get_args(Input)
 MOST = 64  # segments, and attachments: more than any rig has, and 64 equal pieces are a check of the chain
 FLATTEST = 1e-3  # arm's length over a segment's radius of gyration: below it the units are mixed up
+ROUNDED = 1e-12  # of the length: what a person's sum of up to 64 decimal lengths may differ from ours
 
 _Part = TypeVar("_Part")
 
@@ -69,11 +70,13 @@ class Arm:
             raise ParameterError(key="length" if self.outer else "link.length", value=self.length, remedy=remedy)
 
     def _check_places(self) -> None:
-        """Attachments on the link, and no pin on the axis, which stands anyway."""
+        """Attachments on the link, those at the tip exactly there; no pin on the axis, which stands anyway."""
         for i, attachment in enumerate(self.attachments, 1):
-            if attachment.x > self.length:
+            if attachment.x > self.length * (1 + ROUNDED):
                 remedy = f"is beyond the tip; x counts from the clamp, up to the link's length of {self.length!r} m"
                 raise ParameterError(key=f"attachment.{i}.x", value=attachment.x, remedy=remedy)
+        on_it = tuple(each if each.x <= self.length else replace(each, x=self.length) for each in self.attachments)
+        object.__setattr__(self, "attachments", on_it)
         if math.isinf(self.payload.mass) and abs(self.centre_distance) < 1e-9 * (self.hub.radius + self.length):
             remedy = "puts the pinned centre of mass on the axis, which stands anyway; give a finite payload.mass"
             raise ParameterError(key="payload.offset", value=self.payload.offset, remedy=remedy)
@@ -269,7 +272,7 @@ def _parts(key: str, parts: object, kind: type[_Part], most: int) -> tuple[_Part
     if not isinstance(parts, list | tuple) or not all(isinstance(part, kind) for part in parts):
         raise ParameterError(key=key, value=parts, remedy=f"give a tuple of {kind.__name__} records")
     if len(parts) > most:
-        raise ParameterError(key=key, value=len(parts), remedy=f"so many are no rig; at most {MOST} are read")
+        raise ParameterError(key=key, value=len(parts), remedy=f"at most {most} are taken")
     return tuple(parts)
 
 

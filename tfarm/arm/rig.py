@@ -14,15 +14,21 @@ from tfarm.arm.checks import extended, not_negative, positive, signed
 from tfarm.errors import ParameterError
 
 
-def brief_repr(record: Any, always: int) -> str:
-    """The repr of a record: the first `always` fields, and of the others those that differ from their defaults."""
+def differing(record: Any, always: int) -> dict[str, Any]:
+    """The first `always` fields of a record's repr, and of the others those that differ from their defaults."""
     known = [each for each in fields(record) if each.repr]
-    shown = [each for i, each in enumerate(known) if i < always or getattr(record, each.name) != _default(each)]
-    return f"{type(record).__name__}({', '.join(f'{each.name}={getattr(record, each.name)!r}' for each in shown)})"
+    held = [(each.name, getattr(record, each.name), _default(each)) for each in known]
+    return {name: value for i, (name, value, default) in enumerate(held) if i < always or value != default}
 
 
 def _default(field: Any) -> Any:
     return field.default if field.default_factory is MISSING else field.default_factory()
+
+
+def brief_repr(record: Any, always: int) -> str:
+    """The repr of a record with no more in it than `differing` has."""
+    shown = ", ".join(f"{name}={value!r}" for name, value in differing(record, always).items())
+    return f"{type(record).__name__}({shown})"
 
 
 def _finite(record: Any, kind: str, meanings: dict[str, str]) -> None:

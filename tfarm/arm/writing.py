@@ -3,41 +3,60 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
+from tfarm.arm.link import Link
 from tfarm.arm.records import Arm
+from tfarm.arm.rig import Motor, differing
 from tfarm.arm.sections import Section
 
 
 def to_toml(arm: Arm) -> str:
-    """The arm as a TOML file; equal arms give equal text, so its hash names the inputs."""
-    link = arm.link
-    lines = [
-        f"name = {_text(arm.name)}",
-        "assumptions = [",
-        *(f"    {_text(assumption)}," for assumption in arm.assumptions),
-        "]",
-        "",
-        "[link]",
-        *_numbers(link, "length", "density", "youngs_modulus", "shear_modulus", "damping"),
-        "",
-        "[link.section]",
-        f"shape = {_text(link.section.shape)}",
-        *_section(link.section),
-        "",
-        "[hub]",
-        *_numbers(arm.hub, "inertia"),
-        "",
-        "[payload]",
-        *_numbers(arm.payload, "mass", "inertia"),
-        "",
+    """The arm as a TOML file; equal arms give equal text, so its hash names the inputs.
+
+    The numbers of the paper's arm are always there, all else only where it differs from its default.
+    """
+    named = {"theory": arm.theory, "input": arm.input}
+    defaults = {"theory": "timoshenko", "input": "hub_torque"}
+    springs = {"clamp": arm.clamp, "joint": arm.joint}
+    tables = [
+        [
+            f"name = {_text(arm.name)}",
+            "assumptions = [",
+            *(f"    {_text(assumption)}," for assumption in arm.assumptions),
+            "]",
+            *(f"{key} = {_text(value)}" for key, value in named.items() if value != defaults[key]),
+        ],
+        *(table for link in arm.links for table in _link(link, "[[link]]" if arm.outer else "[link]")),
+        ["[hub]", *_lines(differing(arm.hub, always=1))],
+        *([f"[{key}]", *_lines(differing(spring, always=0))] for key, spring in springs.items() if not spring.is_rigid),
+        *([] if arm.motor is None else [["[motor]", *_motor(arm.motor)]]),
+        *(["[[attachment]]", *_lines(differing(each, always=1))] for each in arm.attachments),
+        ["[payload]", *_lines(differing(arm.payload, always=2))],
     ]
-    return "\n".join(lines)
+    return "\n\n".join("\n".join(table) for table in tables) + "\n"
+
+
+def _lines(numbers: Mapping[str, float]) -> Iterable[str]:
+    """Python's shortest exact digits are TOML's too, and so is inf."""
+    return (f"{name} = {value!r}" for name, value in numbers.items())
 
 
 def _numbers(record: object, *names: str) -> Iterable[str]:
-    """Python's shortest exact digits are TOML's too, and so is inf."""
-    return (f"{name} = {getattr(record, name)!r}" for name in names)
+    return _lines({name: getattr(record, name) for name in names})
+
+
+def _link(link: Link, heading: str) -> Iterable[list[str]]:
+    yield [heading, *_numbers(link, "length", "density", "youngs_modulus", "shear_modulus", "damping")]
+    yield ["[link.section]", f"shape = {_text(link.section.shape)}", *_section(link.section)]
+
+
+def _motor(motor: Motor) -> Iterable[str]:
+    """The back-EMF constant stands there only where it is not the torque constant."""
+    numbers = differing(motor, always=2)
+    if motor.back_emf_constant == motor.torque_constant:
+        del numbers["back_emf_constant"]
+    return _lines(numbers)
 
 
 def _section(section: Section) -> Iterable[str]:

@@ -10,11 +10,12 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from tfarm.arm.reading import load_tables
+from tfarm.arm.tables import ArmTable
 from tfarm.dsp.chain import Actuator, Chain, Converters, Sampling, Slew
 from tfarm.errors import ParameterError, did_you_mean
 
 RECORDS = {"sampling": Sampling, "converters": Converters, "actuator": Actuator, "slew": Slew}
-OF_AN_ARM = ("name", "assumptions", "link", "hub", "payload")
+OF_AN_ARM = tuple(ArmTable.model_fields)
 
 
 class _Table(BaseModel):

@@ -1,0 +1,235 @@
+"""A rig's TOML file: what it may hold, what is refused, and that it says the same after a round trip."""
+
+import math
+import tomllib
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tests.arm.test_reading import arms, inertias, positive
+from tfarm.arm import INPUTS, THEORIES, Arm, Attachment, Hub, Motor, Payload, RotarySpring, Section, load, to_toml
+from tfarm.arm.schema import arm_of_table
+from tfarm.dsp.reading import chain_of_tables
+from tfarm.errors import ParameterError
+
+RIG = """\
+name = "bench"
+theory = "rayleigh"
+input = "motor_voltage"
+[[link]]
+length = 0.05
+density = 7850.0
+youngs_modulus = 2.1e11
+poissons_ratio = 0.3
+[link.section]
+shape = "rectangle"
+width = 0.04
+depth = 0.004
+[[link]]
+length = 0.35
+density = 2700
+youngs_modulus = 7.0e10
+poissons_ratio = 0.33
+damping = 1e-4
+[link.section]
+shape = "round"
+diameter = 0.006
+[hub]
+inertia = 0.002
+friction = 0.015
+radius = 0.03
+stiffness = 0.1
+[clamp]
+stiffness = 900
+damping = 1e-4
+[joint]
+stiffness = inf
+[motor]
+resistance = 2.6
+torque_constant = 0.00768
+gear_ratio = 70
+rotor_inertia = 3.9e-7
+gear_efficiency = 0.9
+[[attachment]]
+x = 0.02
+mass = 0.005
+[[attachment]]
+x = 0.4
+stiffness = 12.0
+[payload]
+mass = 0.1
+inertia = 3e-5
+offset = -0.01
+"""
+
+
+def rig(old="", new=""):
+    """The arm of the file above, with one of its texts replaced."""
+    assert old in RIG
+    return arm_of_table(tomllib.loads(RIG.replace(old, new, 1)))
+
+
+def test_a_file_holds_all_that_a_rig_has():
+    arm = rig()
+    assert (arm.theory, arm.input) == ("rayleigh", "motor_voltage")
+    assert [link.length for link in arm.links] == [0.05, 0.35]
+    assert arm.outer[0].section == Section.round(diameter=0.006)
+    assert arm.hub == Hub(inertia=0.002, friction=0.015, radius=0.03, stiffness=0.1)
+    assert (arm.clamp, arm.joint) == (RotarySpring(stiffness=900.0, damping=1e-4), RotarySpring())
+    motor = Motor(resistance=2.6, torque_constant=0.00768, gear_ratio=70, rotor_inertia=3.9e-7, gear_efficiency=0.9)
+    assert arm.motor == motor
+    assert arm.attachments == (Attachment(x=0.02, mass=0.005), Attachment(x=arm.length, stiffness=12.0))
+    assert arm.length < 0.4  # 0.05 + 0.35 in binary; what a person puts at the tip is at the tip
+    assert arm.payload == Payload(mass=0.1, inertia=3e-5, offset=-0.01)
+
+
+def test_the_loop_s_tables_stand_beside_the_rig_s():
+    assert chain_of_tables(tomllib.loads(RIG + "[sampling]\nperiod = 0.002\n")).sampling.period == 0.002
+
+
+REFUSED = {
+    "link.2.length = -0.35: a length is": ("length = 0.35", "length = -0.35"),
+    "link.1.shear_modulus is missing: give it in Pa": ("poissons_ratio = 0.3\n", ""),
+    "link.2.poissons_ratio = 0.7: ": ("poissons_ratio = 0.33", "poissons_ratio = 0.7"),
+    'link.2.dampin = 0.0001: unknown key; did you mean "damping"': ("damping = 1e-4", "dampin = 1e-4"),
+    "link.2.density is missing: give a number": ("density = 2700\n", ""),
+    "link.1.density = '7850': wrong type; give a number": ("density = 7850.0", 'density = "7850"'),
+    "link.2.section.diameter = 0.0: the diameter": ("diameter = 0.006", "diameter = 0"),
+    'link.2.section.diamter = 0.006: unknown key; did you mean "diameter"': ("diameter", "diamter"),
+    "link.1.section.shape = 'rect': unknown shape; did you mean \"rectangle\"": ('"rectangle"', '"rect"'),
+    "link.2.section.shape is missing: give one of rectangle": ('shape = "round"\n', ""),
+    "hub.friction = -0.015: a hub friction": ("friction = 0.015", "friction = -0.015"),
+    'hub.raduis = 0.03: unknown key; did you mean "radius"': ("radius", "raduis"),
+    "hub.stiffness = inf: a spring from hub to ground": ("stiffness = 0.1", "stiffness = inf"),
+    "clamp.damping = 0.0001: nothing yields": ("stiffness = 900", "stiffness = inf"),
+    "clamp.stiffness = 0.0: the stiffness of a clamp or joint": ("stiffness = 900", "stiffness = 0"),
+    "clamp.stiffness = 'stiff': wrong type; give a number": ("stiffness = 900", 'stiffness = "stiff"'),
+    "joint.stiffness = -1.0: the stiffness": ("stiffness = inf", "stiffness = -1"),
+    "motor.gear_efficiency = 90.0: an efficiency is above 0, up to 1": ("= 0.9\n", "= 90\n"),
+    "motor.resistance is missing: give a number": ("resistance = 2.6\n", ""),
+    "attachment.2.x = 0.41: is beyond the tip": ("x = 0.4\n", "x = 0.41\n"),
+    "attachment.1.x = -0.02: an attachment's place": ("x = 0.02", "x = -0.02"),
+    "attachment.1.x is missing: give a number": ("x = 0.02\n", ""),
+    "attachment.2.x = 0.4: there is nothing in it": ("stiffness = 12.0\n", ""),
+    'attachment.1.mas = 0.005: unknown key; did you mean "mass"': ("mass = 0.005", "mas = 0.005"),
+    "payload.offset = inf: a payload's offset": ("offset = -0.01", "offset = inf"),
+    "payload.input = 'hub_angle': unknown key; input belongs at the top": (
+        "offset = -0.01",
+        'input = "hub_angle"',
+    ),
+    "theory = 'bernoulli': unknown; ": ('"rayleigh"', '"bernoulli"'),
+    "theory = 3: wrong type; give one of timoshenko, shear": ('"rayleigh"', "3"),
+    "input = 'motor_volt': unknown; did you mean \"motor_voltage\"": ('"motor_voltage"', '"motor_volt"'),
+    "input = ['hub_torque', 'motor_voltage']: wrong type; give one of": (
+        '"motor_voltage"',
+        '["hub_torque", "motor_voltage"]',
+    ),
+    "motr = {": ("[motor]", "[motr]"),
+}
+
+
+@pytest.mark.parametrize("message", REFUSED)
+def test_what_a_rig_s_file_may_not_say_is_refused_with_its_place(message):
+    with pytest.raises(ParameterError) as caught:
+        rig(*REFUSED[message])
+    assert str(caught.value).startswith(message)
+    assert str(caught.value).isprintable()
+
+
+SHAPED = {
+    "a table for the list": (
+        "attachment = {'x': 0.4",
+        {"attachment": {"x": 0.4, "mass": 1.0}},
+        "headed [[attachment]]",
+    ),
+    "no segments": ("link is missing", {"link": []}, "headed [link], or [[link]] for each"),
+    "a number for the link": ("link = 3", {"link": 3}, "headed [link], or [[link]] for each"),
+    "a number among the segments": ("link.2 = 3", {"link": [{}, 3]}, "headed [link], or [[link]] for each"),
+    "65 attachments": ("attachment = 65", {"attachment": [{"x": 0.0, "mass": 1.0}] * 65}, "at most 64 are read"),
+    "65 segments": ("link = 65", {"link": tomllib.loads(RIG)["link"][:1] * 65}, "at most 64 are read"),
+}
+
+
+@pytest.mark.parametrize("what", SHAPED)
+def test_lists_that_are_none_or_too_long(what):
+    key, change, remedy = SHAPED[what]
+    table = tomllib.loads(RIG) | change
+    if what.endswith("among the segments"):
+        table["link"][0] = tomllib.loads(RIG)["link"][0]
+    with pytest.raises(ParameterError) as caught:
+        arm_of_table(table)
+    assert str(caught.value).startswith(key)
+    assert remedy in str(caught.value)
+
+
+def test_a_single_link_has_no_number_in_either_spelling(tmp_path):
+    table = tomllib.loads(RIG)
+    (first, _), table["attachment"] = table["link"], []
+    assert arm_of_table(table | {"link": first}) == arm_of_table(table | {"link": [first]})
+    for link in (first | {"length": -1.0}, [first | {"length": -1.0}]):
+        with pytest.raises(ParameterError, match=r"^link\.length = -1\.0"):
+            arm_of_table(table | {"link": link})
+    path = tmp_path / "rig.toml"
+    path.write_text(RIG.replace("length = 0.35", "length = nan"))
+    with pytest.raises(ParameterError) as caught:
+        load(path)
+    assert str(caught.value).startswith(f"{path}: link.2.length = nan: a length is a positive, finite number of metres")
+
+
+def test_an_arm_of_the_paper_s_kind_is_written_as_it_ever_was():
+    """A study is found by the hash of this text, so it must not grow a key."""
+    plain = tomllib.loads(to_toml(load("sasaki2012-lab")))
+    assert list(plain) == ["name", "assumptions", "link", "hub", "payload"]
+    assert (list(plain["hub"]), list(plain["payload"])) == (["inertia"], ["mass", "inertia"])
+    written = tomllib.loads(to_toml(rig()))
+    parts = ["name", "assumptions", "theory", "input", "link", "hub", "clamp", "motor", "attachment", "payload"]
+    assert list(written) == parts  # no joint: it is rigid
+    assert "back_emf_constant" not in written["motor"]
+    assert written["attachment"] == [{"x": 0.02, "mass": 0.005}, {"x": rig().length, "stiffness": 12.0}]
+
+
+loss = st.one_of(st.just(0.0), st.floats(1e-6, 1e3))
+springs = st.one_of(st.just(RotarySpring()), st.builds(RotarySpring, stiffness=st.floats(1e-3, 1e6), damping=loss))
+motors = st.builds(
+    Motor,
+    resistance=positive,
+    torque_constant=positive,
+    back_emf_constant=st.one_of(st.none(), loss),
+    inductance=loss,
+    gear_ratio=positive,
+    rotor_inertia=loss,
+    rotor_friction=loss,
+    gear_efficiency=st.floats(0.1, 1.0),
+)
+attachments = st.builds(
+    Attachment, x=st.floats(0.0, 0.1), mass=positive, inertia=loss, stiffness=loss, rotational_stiffness=loss
+)
+offsets = st.floats(-0.5, 0.5).map(lambda x: round(x, 9))
+
+
+@st.composite
+def rigs(draw) -> Arm:
+    """Any legal rig: the arm of the paper's kind with a few of the other parts."""
+    arm = draw(arms)
+    motor = draw(st.one_of(st.none(), motors))
+    hub = Hub(inertia=draw(loss), friction=draw(loss), radius=draw(loss))
+    locked = draw(st.booleans()) and motor is None
+    return replace(
+        arm,
+        outer=tuple(draw(st.lists(arms.map(lambda each: each.link), max_size=2))),
+        hub=Hub(inertia=math.inf, radius=draw(loss)) if locked else replace(hub, stiffness=draw(loss)),
+        clamp=draw(springs),
+        joint=draw(springs),
+        motor=motor,
+        attachments=tuple(draw(st.lists(attachments, max_size=2))),
+        payload=Payload(mass=draw(loss), inertia=draw(inertias), offset=draw(offsets)),
+        theory=draw(st.sampled_from(THEORIES)),
+        input=draw(st.sampled_from(INPUTS if motor else ("hub_torque", "hub_angle"))),
+    )
+
+
+@given(arm=rigs())
+def test_a_rig_written_and_read_is_the_same_to_the_last_bit(arm):
+    assert arm_of_table(tomllib.loads(to_toml(arm))) == arm
