@@ -1,0 +1,205 @@
+"""The plain product of transition matrices against closed forms, the paper's arm, and what nature guarantees."""
+
+import math
+from dataclasses import replace
+
+import mpmath
+import numpy as np
+import pytest
+
+import tfarm
+from tests.strategies import some_arm
+from tests.transition import ALIASES, determinant, response
+from tfarm import Section
+from tfarm.arm import Attachment, Link, Motor, RotarySpring
+
+NAMES = ("hub_angle", "hub_rate", "root_moment", "root_shear", "tip_displacement", "tip_deflection", "tip_acceleration")
+EPS = np.finfo(float).eps
+
+
+def link(length, depth, damping=0.0, E=7e10):
+    section = Section.rectangle(width=0.04, depth=depth)
+    return Link.isotropic(
+        length=length, density=2700.0, youngs_modulus=E, poissons_ratio=0.33, section=section, damping=damping
+    )
+
+
+def rig(**changes):
+    """Three segments with everything that a rig can have, lengths and places of few bits."""
+    arm = tfarm.load("sasaki2012")
+    rig = replace(
+        arm,
+        link=link(0.25, 0.005, 1e-4),
+        outer=(link(0.5, 0.003, 2e-4), link(0.25, 0.02)),
+        hub=replace(arm.hub, radius=0.0625, friction=0.1, stiffness=0.5),
+        payload=replace(arm.payload, mass=0.2, inertia=1e-3, offset=0.03125),
+        clamp=RotarySpring(stiffness=300.0, damping=1e-3),
+        joint=RotarySpring(stiffness=200.0, damping=2e-3),
+        motor=Motor(
+            resistance=2.0,
+            torque_constant=0.05,
+            back_emf_constant=0.06,
+            inductance=0.01,
+            gear_ratio=14.0,
+            rotor_inertia=1e-5,
+            rotor_friction=1e-6,
+            gear_efficiency=0.9,
+        ),
+        attachments=(
+            Attachment(x=0.125, mass=0.03, inertia=1e-5),
+            Attachment(x=0.25, mass=0.1, inertia=1e-4, stiffness=100.0, rotational_stiffness=2.0),
+        ),
+    )
+    return replace(rig, **changes)
+
+
+def alike(one, other, digits):
+    """Whether two dicts of mpc agree to so many digits of each."""
+    return all(abs(one[key] - other[key]) <= mpmath.mpf(10) ** -digits * abs(one[key]) for key in one)
+
+
+def test_the_papers_arm():
+    """One link and nothing else: the same as the closed form in balls, to the last bit but one."""
+    rng = np.random.default_rng(11)
+    for _ in range(12):
+        arm = some_arm(rng)
+        s = 10 ** rng.uniform(-3, 4) * np.exp(1j * rng.uniform(0, math.pi / 2))
+        exact = tfarm.transfer(arm, NAMES, method="balls")(s)
+        found = response(arm, s, NAMES)
+        for value, name in zip(exact, NAMES, strict=True):
+            assert abs(complex(found[name]) - value) <= 2 * EPS * abs(value) + 1e-60
+
+
+@pytest.mark.parametrize("theory", ["timoshenko", "shear", "rayleigh", "euler-bernoulli"])
+def test_the_determinant_changes_sign_at_the_frequencies_of_every_theory(theory):
+    arm = replace(tfarm.load("stocky-steel"), theory=theory)
+    for omega in tfarm.modes(arm, 6, theory=theory).natural_frequency[1:]:
+        low, high = (determinant(arm, 1j * omega * (1 + shift)) for shift in (-4 * EPS, 4 * EPS))
+        assert low.imag == high.imag == 0
+        assert low.real * high.real < 0
+
+
+def test_twice_the_digits_give_the_same():
+    wanted = [*ALIASES, "hub_angle", "link_angle", "hub_torque", "motor_current", "payload_displacement"]
+    wanted += [(name, 0.6) for name in ("gauge", "moment", "shear", "rotation", "twist", "curvature", "velocity")]
+    for kind in (
+        "hub_torque",
+        "motor_current",
+        "motor_voltage",
+        "hub_angle",
+        ("force", 0.4),
+        ("moment_pair", 0.1, 0.7),
+    ):
+        for s in (300j, -5 + 4000j):
+            short, long = (response(rig(), s, wanted, digits, input=kind) for digits in (60, 120))
+            assert alike(short, long, 60)
+
+
+def test_cutting_a_segment_changes_nothing():
+    whole = rig()
+    _, second, third = whole.links
+    halves = replace(whole, outer=(*[replace(second, length=0.125)] * 4, third))
+    wanted = [*NAMES, ("gauge", 0.375), ("deflection", 0.9), ("shear", 0.375, "inner")]
+    assert alike(response(whole, 1 + 500j, wanted), response(halves, 1 + 500j, wanted), 55)
+
+
+def test_static_force_on_the_tip():
+    """W(L) of a unit force: beam in bending and shear, clamp, and hub spring and joint with the arm's whole lever."""
+    arm = rig(outer=(), attachments=(), theory="timoshenko")
+    beam, hub = arm.link, arm.hub
+    lever = arm.length + hub.radius
+    wanted = (
+        arm.length**3 / (3 * beam.EI)
+        + arm.length / beam.kGA
+        + arm.length**2 / arm.clamp.stiffness
+        + lever**2 * (1 / arm.joint.stiffness + 1 / hub.stiffness)
+    )
+    found = response(arm, 0, ["tip_displacement", "root_moment", "root_shear"], input=("force", arm.length))
+    assert complex(found["tip_displacement"]) == pytest.approx(wanted, rel=8 * EPS)
+    assert complex(found["root_moment"]) == pytest.approx(arm.length, rel=8 * EPS)
+    assert complex(found["root_shear"]) == pytest.approx(1.0, rel=8 * EPS)
+
+
+def test_static_pair_of_moments_bends_what_lies_between():
+    arm = rig(attachments=())
+    found = response(arm, 0, [("moment", 0.1), ("moment", 0.4), ("moment", 0.6)], input=("moment_pair", 0.2, 0.5))
+    assert [complex(value) for value in found.values()] == pytest.approx([0, 1, 0], abs=1e-50)
+
+
+def test_a_rigid_body_at_low_frequency():
+    """s^2 theta -> 1/J, and the clamp carries -(J - I_h)/J of the torque as M(0) + r Q(0)."""
+    arm = rig(hub=replace(rig().hub, friction=0.0, stiffness=0.0), clamp=RotarySpring(), joint=RotarySpring())
+    masses = tuple(replace(each, stiffness=0.0, rotational_stiffness=0.0) for each in arm.attachments)
+    arm, r, s = replace(arm, attachments=masses, motor=None), 0.0625, mpmath.mpf("1e-12")
+    left = np.array([0.0, 0.25, 0.75, 1.0]) + r
+    J = arm.hub.inertia + sum(each.mass * (r + each.x) ** 2 + each.inertia for each in masses)
+    for segment, a, b in zip(arm.links, left, left[1:], strict=False):
+        J += segment.rhoA * (b**3 - a**3) / 3 + segment.rhoI * segment.length
+    J += arm.payload.mass * (left[-1] + arm.payload.offset) ** 2 + arm.payload.inertia
+    found = response(arm, s, ["hub_angle", "root_moment", "root_shear"])
+    carried = found["root_moment"] + r * found["root_shear"]
+    assert complex(s**2 * found["hub_angle"]) == pytest.approx(1 / J, rel=32 * EPS)
+    assert complex(carried) == pytest.approx(-(J - arm.hub.inertia) / J, rel=32 * EPS)
+
+
+def test_the_motor_is_a_filter_and_a_damper_around_the_torque():
+    """theta/v = g G/(R + L_a s + g N Ke s G) of theta/u = G and g = eta N Kt, and i = u/g."""
+    s, arm = -3 + 200j, rig()
+    motor, G = arm.motor, response(arm, s, ["hub_angle"])["hub_angle"]
+    g, N = motor.gear_efficiency * motor.gear_ratio * motor.torque_constant, motor.gear_ratio
+    coil = motor.resistance + motor.inductance * s
+    voltage = response(arm, s, ["hub_angle", "motor_current"], input="motor_voltage")
+    current = response(arm, s, ["hub_angle"], input="motor_current")["hub_angle"]
+    wanted = g * G / (coil + g * N * motor.back_emf_constant * s * G)
+    assert complex(voltage["hub_angle"]) == pytest.approx(complex(wanted), rel=8 * EPS)
+    assert complex(voltage["motor_current"]) == pytest.approx(complex(wanted / G / g), rel=8 * EPS)
+    assert complex(current) == pytest.approx(complex(g * G), rel=8 * EPS)
+
+
+@pytest.mark.parametrize("drive", ["hub_torque", "motor_voltage", "hub_angle"])
+def test_reciprocity_off_the_axis(drive):
+    """What a force at a does to w at b, a force at b does to w at a; so with the pair, the turn and the torque."""
+    arm, s = rig(input=drive), -4 + 321j
+    a, b, pair = ("displacement", 0.2), ("displacement", 0.9), (("rotation", 0.3), ("rotation", 0.6))
+    of_a, of_b = (response(arm, s, [a, b, *pair, "hub_angle"], input=("force", each[1])) for each in (a, b))
+    of_pair = response(arm, s, [a, b], input=("moment_pair", pair[0][1], pair[1][1]))
+    with mpmath.workdps(60):
+        roads = [(of_a[b], of_b[a]), (of_pair[a], of_a[pair[1]] - of_a[pair[0]])]
+        if drive == "hub_torque":
+            roads.append((response(arm, s, [a])[a], of_a["hub_angle"]))
+        if drive == "hub_angle":
+            held = response(arm, s, ["hub_torque"], input=("force", a[1]))["hub_torque"]
+            roads.append((response(arm, s, [a])[a], -held))
+        for one, other in roads:
+            assert abs(one - other) <= mpmath.mpf("1e-55") * abs(one)
+
+
+def test_a_mass_at_the_tip_is_the_payload_and_an_infinite_one_its_limit():
+    arm, s = rig(), 2 + 700j
+    body = arm.payload
+    hung = replace(
+        arm,
+        payload=replace(body, mass=0.0, inertia=0.0),
+        attachments=(*arm.attachments, Attachment(x=arm.length, mass=body.mass, inertia=body.inertia)),
+    )
+    held = replace(arm, payload=replace(body, offset=0.0))
+    assert alike(response(held, s, NAMES), response(hung, s, NAMES), 55)
+    huge, pinned = (replace(arm, payload=replace(body, mass=mass)) for mass in (1e35, math.inf))
+    assert alike(response(huge, s, NAMES[:6]), response(pinned, s, NAMES[:6]), 25)
+    assert abs(response(pinned, s, ["payload_displacement"])["payload_displacement"]) < mpmath.mpf("1e-60")
+
+
+def test_sides_of_a_joint_and_of_a_mass():
+    """At x = 0.25 a stiffer segment ends and a mass sits: M and Q jump by inertia and mass, the gauge also by C."""
+    arm, s, at = rig(), 3 + 400j, 0.25
+    each = arm.attachments[1]
+    quantities = ("moment", "shear", "gauge", "displacement", "rotation")
+    found = response(arm, s, [(name, at, side) for name in quantities for side in ("inner", "outer")])
+    jump = {name: complex(found[name, at, "outer"] - found[name, at, "inner"]) for name in quantities}
+    W, Psi = complex(found["displacement", at, "outer"]), complex(found["rotation", at, "outer"])
+    assert jump["displacement"] == jump["rotation"] == 0
+    assert jump["shear"] == pytest.approx((each.mass * s**2 + each.stiffness) * W, rel=64 * EPS)
+    assert jump["moment"] == pytest.approx((each.inertia * s**2 + each.rotational_stiffness) * Psi, rel=64 * EPS)
+    for side, segment in zip(("inner", "outer"), arm.links, strict=False):
+        felt = complex(found["moment", at, side]) / (1 + segment.damping * s)
+        assert complex(found["gauge", at, side]) == pytest.approx(felt, rel=8 * EPS)
