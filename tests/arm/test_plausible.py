@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 import tfarm
-from tfarm.arm import Hub, Payload, Section, implausible, load, presets
+from tfarm.arm import Attachment, Hub, Motor, Payload, RotarySpring, Section, implausible, load, presets
 
 MATERIALS = {  # E [Pa], density [kg/m^3], Poisson's ratio: handbook values
     "steel": (2.1e11, 7850, 0.3),
@@ -95,3 +95,31 @@ def test_of_the_presets_only_the_misprint_is_named():
     found = {name: implausible(load(name)) for name in presets()}
     assert {name for name, texts in found.items() if texts} == {"sasaki2012-as-printed"}
     assert "density = 2.7667" in found["sasaki2012-as-printed"][0]
+
+
+SLIPS = {  # of a rig that is plausible without them: a unit mistaken for another
+    "hub.radius = 30.0": {"hub": Hub(inertia=0.1, radius=30.0)},
+    "payload.offset = 20.0": {"payload": Payload(mass=0.1, offset=20.0)},
+    "clamp.stiffness = 2.0": {"clamp": RotarySpring(stiffness=2.0)},
+    "hub.friction = 40000.0": {"hub": Hub(inertia=0.1, friction=4e4)},
+    "motor.rotor_inertia = 120.0": {
+        "motor": Motor(resistance=1.0, torque_constant=0.1, gear_ratio=100.0, rotor_inertia=120.0)
+    },
+    "attachment.2.mass = 5000000.0": {"attachments": (Attachment(x=0.1, mass=0.005), Attachment(x=0.2, mass=5e6))},
+    "link.2.density = 2.7": {"outer": (replace(beam("aluminium"), density=2.7),)},
+}
+
+
+@pytest.mark.parametrize("key", SLIPS)
+def test_a_slip_of_units_in_a_rig_is_named(key):
+    change = SLIPS[key]
+    plain = tfarm.Arm(link=beam("steel"), hub=Hub(inertia=0.1))
+    text = next(text for text in implausible(replace(plain, **change)) if text.startswith(key))
+    assert text.isprintable()
+    assert implausible(plain) == ()
+
+
+def test_a_short_segment_is_a_patch_and_no_slip():
+    """It is the whole arm that is to be longer than deep, and that swings."""
+    patch = replace(beam("steel"), length=0.005)
+    assert implausible(tfarm.Arm(link=patch, outer=(beam("steel"),), hub=Hub(inertia=0.1))) == ()

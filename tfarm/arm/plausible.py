@@ -18,6 +18,9 @@ LIGHTEST, DENSEST = 25.0, 25_000.0  # kg/m^3; light foam has 30, osmium 22,600: 
 LONGEST = 100.0  # m; the arm of the space station has 17
 DAMPED = 0.1  # damping ratio of the clamped link; rubber has about 0.05
 HEAVIEST = 1e5  # times the link's own mass or inertia
+FARTHEST = 10.0  # times the link's length; a hub's radius and a payload's offset are a fraction of it
+YIELDING = 10.0  # times the link's own flexibility L/(3 EI); a clamp that is meant to hold has a tenth of it
+RUBBING = 50.0  # times 2 sqrt(3 EI/L J), beyond which the link cannot turn the hub; a harmonic drive reaches 1
 FIRST_CLAMPED = 1.8751040687119611  # first root of 1 + cos(b) cosh(b) = 0, for the clamped Euler-Bernoulli beam
 
 
@@ -26,53 +29,95 @@ def implausible(arm: Arm) -> tuple[str, ...]:
 
     Empty for a plausible arm.
     """
-    return tuple(_material(arm.link)) + tuple(_size(arm.link)) + tuple(_damping(arm.link)) + tuple(_inertias(arm))
+    keys = [f"link.{i}" for i in range(1, len(arm.links) + 1)] if arm.outer else ["link"]
+    segments = [text for key, link in zip(keys, arm.links, strict=True) for text in _segment(key, link, arm.length)]
+    return (*segments, *_inertias(arm), *_rig(arm))
 
 
-def _material(link: Link) -> Iterator[str]:
+def _segment(key: str, link: Link, length: float) -> Iterator[str]:
+    """What looks odd in a segment of an arm of that length [m]; its texts begin with its key in the file."""
+    yield from _material(key, link)
+    yield from _size(key, link, length)
+    yield from _damping(key, link, length)
+
+
+def _material(key: str, link: Link) -> Iterator[str]:
     for name in ("youngs_modulus", "shear_modulus"):
         value = getattr(link, name)
         if value < SOFTEST:
-            yield f"link.{name} = {shown(value)}: softer than any rubber; it is taken in Pa, not in GPa"
+            yield f"{key}.{name} = {shown(value)}: softer than any rubber; it is taken in Pa, not in GPa"
         elif value > STIFFEST:
-            yield f"link.{name} = {shown(value)}: stiffer than diamond; it is taken in Pa"
+            yield f"{key}.{name} = {shown(value)}: stiffer than diamond; it is taken in Pa"
     if link.density < LIGHTEST:
-        yield f"link.density = {shown(link.density)}: lighter than foam; it is taken in kg/m^3, not in g/cm^3"
+        yield f"{key}.density = {shown(link.density)}: lighter than foam; it is taken in kg/m^3, not in g/cm^3"
     elif link.density > DENSEST:
-        yield f"link.density = {shown(link.density)}: denser than osmium; it is taken in kg/m^3"
+        yield f"{key}.density = {shown(link.density)}: denser than osmium; it is taken in kg/m^3"
 
 
-def _size(link: Link) -> Iterator[str]:
+def _size(key: str, link: Link, length: float) -> Iterator[str]:
     if link.length > LONGEST:
-        yield f"link.length = {shown(link.length)}: longer than any arm; it is taken in m, not in mm"
+        yield f"{key}.length = {shown(link.length)}: longer than any arm; it is taken in m, not in mm"
     sides = link.section.dimensions or (("second_moment", math.sqrt(12) * link.section.radius_of_gyration),)
     for name, side in sides:
-        if name != "inner_diameter" and side > link.length:
+        if name != "inner_diameter" and side > length:
             what = "means a depth of" if name == "second_moment" else "is"
-            yield f"link.section.{name} {what} {side:.4g} m, above the length of {link.length:.4g} m: no slender link"
+            yield f"{key}.section.{name} {what} {side:.4g} m, above the length of {length:.4g} m: no slender link"
 
 
-def _damping(link: Link) -> Iterator[str]:
-    """The damping ratio C w/2 of the clamped link in its first mode, w = (b/L)^2 sqrt(EI / rhoA)."""
-    w = (FIRST_CLAMPED / link.length) ** 2 * math.sqrt(link.EI / link.rhoA)
+def _damping(key: str, link: Link, length: float) -> Iterator[str]:
+    """The damping ratio C w/2 of the clamped arm in its first mode, w = (b/L)^2 sqrt(EI / rhoA) of this segment."""
+    w = (FIRST_CLAMPED / length) ** 2 * math.sqrt(link.EI / link.rhoA)
     ratio = link.damping * w / 2
     if ratio > DAMPED:
         yield (
-            f"link.damping = {shown(link.damping)}: a damping ratio of {ratio:.2g} in the first mode "
+            f"{key}.damping = {shown(link.damping)}: a damping ratio of {ratio:.2g} in the first mode "
             "of the clamped link; it is taken in s (E (1 + C s)), it is no ratio"
         )
 
 
 def _inertias(arm: Arm) -> Iterator[str]:
-    link, payload = arm.link, arm.payload
-    mass, inertia = link.rhoA * link.length, link.rhoA * link.length**3 / 3
+    payload, mass, inertia = arm.payload, arm.own_mass, _beam_inertia(arm)
     if HEAVIEST * inertia < arm.hub.inertia < math.inf:
         yield f"hub.inertia = {shown(arm.hub.inertia)}: {arm.hub.inertia / inertia:.1g} times the link's; in kg m^2?"
     if HEAVIEST * mass < payload.mass < math.inf:
         yield f"payload.mass = {shown(payload.mass)}: {payload.mass / mass:.1g} times the link's; in kg?"
-    if 0.0 < payload.mass < math.inf and payload.mass * link.length**2 < payload.inertia < math.inf:
+    if 0.0 < payload.mass < math.inf and payload.mass * arm.length**2 < payload.inertia < math.inf:
         radius = math.sqrt(payload.inertia / payload.mass)
         yield (
             f"payload.inertia = {shown(payload.inertia)}: a radius of gyration of {radius:.3g} m, "
             "above the link's length; in kg m^2?"
         )
+
+
+def _beam_inertia(arm: Arm) -> float:
+    """Inertia [kg m^2] of the arm's own mass, taken as spread evenly from the axis."""
+    return arm.own_mass * arm.length**2 / 3
+
+
+def _rig(arm: Arm) -> Iterator[str]:
+    """The parts that the paper's arm has not: bounds on what a slip of units by 50 or more does to them."""
+    hub, bending = arm.hub, 3 * arm.bending_scale
+    for key, value in (("hub.radius", hub.radius), ("payload.offset", abs(arm.payload.offset))):
+        if value > FARTHEST * arm.length:
+            times = value / arm.length
+            yield f"{key} = {shown(value)}: {times:.3g} times the link's length; it is taken in m, not in mm"
+    if arm.clamp.stiffness < bending / YIELDING:
+        yield (
+            f"clamp.stiffness = {shown(arm.clamp.stiffness)}: a clamp that yields {bending / arm.clamp.stiffness:.2g} "
+            "times as much as its link bends; it is taken in N m/rad"
+        )
+    critical = 2 * math.sqrt(bending * arm.total_inertia)
+    if hub.friction > RUBBING * critical:
+        yield (
+            f"hub.friction = {shown(hub.friction)}: {hub.friction / critical:.2g} times what keeps the link's first "
+            "swing from ringing; it is taken in N m s/rad, at the hub's side of a gear"
+        )
+    if arm.motor and arm.motor.reflected_inertia > HEAVIEST * _beam_inertia(arm):
+        times = arm.motor.reflected_inertia / _beam_inertia(arm)
+        yield (
+            f"motor.rotor_inertia = {shown(arm.motor.rotor_inertia)}: through the gear {times:.1g} times the link's; "
+            "it is taken in kg m^2, before the gear"
+        )
+    for i, each in enumerate(arm.attachments, 1):
+        if each.mass > HEAVIEST * arm.own_mass:
+            yield f"attachment.{i}.mass = {shown(each.mass)}: {each.mass / arm.own_mass:.1g} times the link's; in kg?"
