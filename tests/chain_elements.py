@@ -27,7 +27,7 @@ def natural_frequencies(arm, count, *, locked=False):
     """The first flexible frequencies [rad/s] of the rig without its damping, its hub as the arm leaves it or locked."""
     held = locked or _is_held(arm)
     rigid = arm.has_rigid_mode and not held
-    shift, up_to, found = _slowest(arm), _reached(arm, count + len(arm.links) + len(arm.attachments)), np.empty(0)
+    shift, up_to, found = _slowest(arm), reached(arm, count + len(arm.links) + len(arm.attachments)), np.empty(0)
     for _ in range(8):
         model = assemble(arm, up_to, held=held)
         basis = _basis(model.stiffness, shift * model.mass)
@@ -123,14 +123,16 @@ class System:
         self.full = _over(model.full, self.basis)
 
     def with_current(self):
-        """K, D, M, bordered by the current where the voltage is the input and the motor has an inductance."""
-        motor, hub = self.arm.motor, self.full[HUB]
-        n = len(self.K)
-        if not (self.arm.input == "motor_voltage" and motor.inductance > 0 and not _is_held(self.arm)):
+        """K, D, M with the back-EMF where the voltage is the input: bordered by the current if there is inductance."""
+        motor, hub, n = self.arm.motor, self.full[HUB], len(self.K)
+        if self.arm.input != "motor_voltage" or _is_held(self.arm):
             return self.K, self.D, self.M
+        emf = motor.gear_ratio * motor.back_emf_constant
+        if motor.inductance == 0:
+            return self.K, self.D + _gain(motor) * emf / motor.resistance * np.outer(hub, hub), self.M
         K, D, M = (np.pad(each, (0, 1)) for each in (self.K, self.D, self.M))
         K[:n, n], K[n, n] = -_gain(motor) * hub, motor.resistance
-        D[n, :n], D[n, n] = motor.gear_ratio * motor.back_emf_constant * hub, motor.inductance
+        D[n, :n], D[n, n] = emf * hub, motor.inductance
         return K, D, M
 
     def response(self, s, outputs, input):
@@ -270,7 +272,7 @@ def _lumped(arm, model):
 
 
 def _hub(arm):
-    """Inertia and viscous friction that the hub's angle feels, but for back-EMF through an inductance."""
+    """Inertia and viscous friction that the hub's angle feels, but for back-EMF."""
     inertia = arm.hub.inertia if math.isfinite(arm.hub.inertia) else 0.0
     friction, motor = arm.hub.friction, arm.motor
     if motor is not None:
@@ -297,7 +299,7 @@ def _slowest(arm):
     return math.sqrt(min(link.EI for link in arm.links) / (mass * length**3))
 
 
-def _reached(arm, count):
+def reached(arm, count):
     """The frequency [rad/s] below which there are about so many: the waves turn by pi times that on their way."""
 
     def turns(omega):

@@ -1,0 +1,89 @@
+"""Random rigs are legal, various, and as wide as they say; the two oracles agree on them."""
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import mpmath
+import numpy as np
+import pytest
+
+from tests.chain_elements import eigenvalues, frequency_response, natural_frequencies, reached
+from tests.rigs import CONTRAST, MOST_SEGMENTS, SLENDERNESS, some_point, some_rig
+from tests.transition import determinant, response
+
+FEATURES = {
+    "radius": lambda arm: arm.hub.radius > 0,
+    "hub friction": lambda arm: arm.hub.friction > 0,
+    "hub spring": lambda arm: arm.hub.stiffness > 0,
+    "massless hub": lambda arm: arm.hub.inertia == 0,
+    "locked hub": lambda arm: math.isinf(arm.hub.inertia),
+    "clamp": lambda arm: not arm.clamp.is_rigid,
+    "joint dashpot": lambda arm: arm.joint.damping > 0,
+    "voltage": lambda arm: arm.input == "motor_voltage",
+    "current": lambda arm: arm.input == "motor_current",
+    "angle": lambda arm: arm.input == "hub_angle",
+    "inductance": lambda arm: arm.motor is not None and arm.motor.inductance > 0,
+    "attachments": lambda arm: len(arm.attachments) > 1,
+    "ground": lambda arm: any(each.is_held for each in arm.attachments),
+    "at a joint": lambda arm: {each.x for each in arm.attachments} & {link.length for link in arm.links[:-1]},
+    "offset": lambda arm: arm.payload.offset > 0,
+    "offset inwards": lambda arm: arm.payload.offset < 0,
+    "pinned": lambda arm: math.isinf(arm.payload.mass) and arm.payload.offset != 0,
+    "one segment": lambda arm: not arm.outer,
+    "six segments": lambda arm: len(arm.links) == MOST_SEGMENTS,
+    "undamped": lambda arm: arm.is_undamped,
+    "damped": lambda arm: arm.damping > 0,
+    "rigid mode": lambda arm: arm.has_rigid_mode,
+    "plain": lambda arm: arm.is_locked and not arm.attachments,
+}
+
+
+def test_every_feature_comes_in_many_rigs():
+    rigs = [some_rig(np.random.default_rng(seed)) for seed in range(400)]
+    for name, has in FEATURES.items():
+        assert 4 <= sum(map(bool, map(has, rigs))) <= 396, name
+
+
+def test_slenderness_and_contrasts_reach_their_ends_and_not_beyond():
+    rigs = [some_rig(np.random.default_rng(seed)) for seed in range(400)]
+    slender = [link.slenderness / math.sqrt(12) for arm in rigs for link in arm.links]
+    low, high = SLENDERNESS
+    assert low * (1 - 1e-9) <= min(slender) <= 1.05 * low
+    assert 0.95 * high <= max(slender) <= high * (1 + 1e-9)
+    for name in ("EI", "rhoA"):
+        ratios = [abs(math.log10(getattr(a, name) / getattr(b, name))) for arm in rigs for a, b in pairwise(arm.links)]
+        assert 0.9 * math.log10(CONTRAST) <= max(ratios) <= math.log10(CONTRAST) * (1 + 1e-9)
+
+
+def test_a_seed_gives_one_rig_and_an_undamped_one_dissipates_nothing():
+    for seed in range(20):
+        assert some_rig(np.random.default_rng(seed)) == some_rig(np.random.default_rng(seed))
+        assert some_rig(np.random.default_rng(seed), damped=False).is_undamped
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_two_oracles_agree(seed):
+    """Frequencies without damping, and what the hub and the root do with it at a random s."""
+    rng = np.random.default_rng([5, seed])
+    arm = some_rig(rng, damped=False)
+    for omega in natural_frequencies(arm, 12)[[0, 3, 11]]:
+        low, high = (determinant(arm, 1j * omega * (1 + shift), 20).real for shift in (-1e-9, 1e-9))
+        assert low * high < 0
+    arm = some_rig(rng)
+    s, wanted = some_point(rng, arm), ["hub_angle", "link_angle", "root_moment"]
+    exact = np.array([complex(value) for value in response(arm, s, wanted, 30).values()])
+    assert frequency_response(arm, s, wanted) == pytest.approx(exact, rel=1e-6, abs=1e-20)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_damped_eigenvalues_are_zeros_of_the_determinant(seed):
+    arm = some_rig(np.random.default_rng([6, seed]), damped=True)
+    arm = replace(arm, hub=replace(arm.hub, inertia=1.0) if math.isinf(arm.hub.inertia) else arm.hub)
+    for s in eigenvalues(arm, reached(arm, 4)):
+        if abs(s) < 1e-6 * reached(arm, 1) or any(abs(s - at) < 0.5 * abs(at) for at in arm.singular_points):
+            continue  # the rigid body's zero, and the crowd of poles at -1/C
+        with mpmath.workdps(60):
+            h = mpmath.mpf("1e-20") * abs(s)
+            at, beside = determinant(arm, s), determinant(arm, s + h)
+            assert abs(at * h / (beside - at)) < 1e-7 * abs(s)
