@@ -14,7 +14,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import THEORIES, WITH_ROTARY_INERTIA, WITH_SHEAR, Arm, Theory
+from tfarm.arm import THEORIES, WITH_ROTARY_INERTIA, WITH_SHEAR, Arm, Link, Theory
 from tfarm.errors import ParameterError
 from tfarm.records import record
 
@@ -93,28 +93,41 @@ def coefficients(arm: Arm, theory: Theory = "timoshenko") -> Coefficients:
     "shear" leaves out rotary inertia, "rayleigh" shear flexibility, "euler-bernoulli" both (Han, Benaroya
     and Wei 1999).  Raises ParameterError for another name.
     """
-    if theory not in THEORIES:
-        raise ParameterError(key="theory", value=theory, remedy=f"use one of {', '.join(THEORIES)}")
     link = arm.link
-    length, density, E = Fraction(link.length), Fraction(link.density), Fraction(link.youngs_modulus)
-    kG = Fraction(link.shear_factor) * Fraction(link.shear_modulus)
-    area, second_moment = Fraction(link.section.area), Fraction(link.section.second_moment)
-    rotary = theory in WITH_ROTARY_INERTIA
-    flexible = theory in WITH_SHEAR
-    EI = E * second_moment
+    length, EI = Fraction(link.length), stiffness_of(link)
+    a, b, g, sigma = uniform(link, theory)
     return Coefficients(
-        a=density * length**2 / E * rotary,
-        b=density * length**2 / kG * flexible,
-        g=density * area * length**4 / EI,
-        sigma=EI / (kG * area * length**2) * flexible,
+        a=a,
+        b=b,
+        g=g,
+        sigma=sigma,
         damping=link.damping,
-        tip_mass=_inertia(arm.payload.mass, length**3 / EI),
-        tip_inertia=_inertia(arm.payload.inertia, length / EI),
-        hub_inertia=_inertia(arm.hub.inertia, length / EI),
+        tip_mass=scaled_inertia(arm.payload.mass, length**3 / EI),
+        tip_inertia=scaled_inertia(arm.payload.inertia, length / EI),
+        hub_inertia=scaled_inertia(arm.hub.inertia, length / EI),
         length=length,
         EI=EI,
     )
 
 
-def _inertia(value: float, unit: Fraction) -> Inertia:
+def uniform(link: Link, theory: Theory) -> tuple[Fraction, Fraction, Fraction, Fraction]:
+    """a, b, g [s^2] and sigma of a link under one of `THEORIES`.  Raises ParameterError for another name."""
+    if theory not in THEORIES:
+        raise ParameterError(key="theory", value=theory, remedy=f"use one of {', '.join(THEORIES)}")
+    length, density, E = Fraction(link.length), Fraction(link.density), Fraction(link.youngs_modulus)
+    kG = Fraction(link.shear_factor) * Fraction(link.shear_modulus)
+    area, EI = Fraction(link.section.area), stiffness_of(link)
+    rotary = theory in WITH_ROTARY_INERTIA
+    flexible = theory in WITH_SHEAR
+    a, b = density * length**2 / E * rotary, density * length**2 / kG * flexible
+    return a, b, density * area * length**4 / EI, EI / (kG * area * length**2) * flexible
+
+
+def stiffness_of(link: Link) -> Fraction:
+    """E I [N m^2] of a link, exact."""
+    return Fraction(link.youngs_modulus) * Fraction(link.section.second_moment)
+
+
+def scaled_inertia(value: float, unit: Fraction) -> Inertia:
+    """A mass or inertia in that unit; inf stays."""
     return math.inf if math.isinf(value) else Fraction(value) * unit

@@ -33,7 +33,7 @@ POLE = 1e-11  # torque below this share of its own terms: flagged, it may be a p
 
 
 @inlined
-def _wave_functions(z: complex, t: complex, dt: complex) -> tuple[complex, complex, complex]:
+def wave_functions(z: complex, t: complex, dt: complex) -> tuple[complex, complex, complex]:
     """c = cosh t e^{-t}, S = sinh t / t e^{-t} and e = e^{-t}, with t + dt for t."""
     decay = math.exp(-t.real)
     e = decay * complex(math.cos(t.imag), -math.sin(t.imag))
@@ -70,7 +70,7 @@ def evaluate(s: Any, k: Any, outputs: Any, values: Any, suspects: Any) -> None:
         for low in (True, False):
             n = 0
             for i in range(first, min(first + BLOCK, s.size)):
-                if _is_low(s[i], k) == low:
+                if is_low(s[i], k) == low:
                     chosen[n], points[n] = i, s[i]
                     n += 1
             if n == 0:
@@ -100,22 +100,22 @@ def evaluate(s: Any, k: Any, outputs: Any, values: Any, suspects: Any) -> None:
 
 
 @inlined
-def _is_low(s: complex, k: Any) -> bool:
+def is_low(s: complex, k: Any) -> bool:
     """Whether both |z| are surely below SERIES_RADIUS."""
     S, over_d = s * s, reciprocal(1.0 + k[DAMPING] * s)
-    half_sum = 0.5 * _size(S * (k[B] + k[A] * over_d))
-    product = _size(S * (k[A] * k[B] * S + k[G]) * over_d)
+    half_sum = 0.5 * magnitude(S * (k[B] + k[A] * over_d))
+    product = magnitude(S * (k[A] * k[B] * S + k[G]) * over_d)
     return 1.4 * (half_sum + math.sqrt(half_sum * half_sum + 2.0 * product)) < SERIES_RADIUS
 
 
 @inlined
 def _parallel(numbers: Any, i: int) -> bool:
-    size = _size(numbers[_Z1 + i]) + _size(numbers[_Z2 + i])
-    return _size(numbers[_Z1 + i] - numbers[_Z2 + i]) < PARALLEL * size
+    size = magnitude(numbers[_Z1 + i]) + magnitude(numbers[_Z2 + i])
+    return magnitude(numbers[_Z1 + i] - numbers[_Z2 + i]) < PARALLEL * size
 
 
 @inlined
-def _size(z: complex) -> float:
+def magnitude(z: complex) -> float:
     return max(abs(z.real), abs(z.imag))
 
 
@@ -133,8 +133,8 @@ def _wave_numbers(points: Any, k: Any, numbers: Any) -> None:
 def _all_wave_functions(numbers: Any, functions: Any) -> None:
     """The two complex exponentials a point: the only loop that calls a library."""
     for i in range(BLOCK):
-        c1, s1, e1 = _wave_functions(numbers[_Z1 + i], numbers[_T1 + i], numbers[_DT1 + i])
-        c2, s2, e2 = _wave_functions(numbers[_Z2 + i], numbers[_T2 + i], numbers[_DT2 + i])
+        c1, s1, e1 = wave_functions(numbers[_Z1 + i], numbers[_T1 + i], numbers[_DT1 + i])
+        c2, s2, e2 = wave_functions(numbers[_Z2 + i], numbers[_T2 + i], numbers[_DT2 + i])
         functions[_C1 + i], functions[_S1 + i], functions[_E1 + i] = c1, s1, e1
         functions[_C2 + i], functions[_S2 + i], functions[_E2 + i] = c2, s2, e2
 
@@ -180,9 +180,9 @@ def _store(
     scale = k[GAIN] * reciprocal(u)
     states[i], states[BLOCK + i], states[2 * BLOCK + i] = scale * theta, scale * M0, scale * Q0
     states[3 * BLOCK + i], states[4 * BLOCK + i] = (LIFT * scale) * W1, scale * Y1
-    impedance = _impedance(_size(S), k)  # with it, what u would be away from a pole
-    crossed = k[HUB] * _size(M0) / max(impedance, 1.0) + k[HUB_FORCE] * _size(theta) * impedance
-    states[5 * BLOCK + i] = complex(_size(u), _size(turned) + _size(held) + crossed)
+    impedance = _impedance(magnitude(S), k)  # with it, what u would be away from a pole
+    crossed = k[HUB] * magnitude(M0) / max(impedance, 1.0) + k[HUB_FORCE] * magnitude(theta) * impedance
+    states[5 * BLOCK + i] = complex(magnitude(u), magnitude(turned) + magnitude(held) + crossed)
 
 
 @inlined
@@ -200,15 +200,15 @@ def separated(s: Any, k: Any, numbers: Any, functions: Any) -> None:
         numbers[0, i], numbers[1, i], numbers[2, i] = S, d, gS
         numbers[3, i], numbers[4, i], numbers[5, i], numbers[6, i] = z1, v1, t1, dt1
         numbers[7, i], numbers[8, i], numbers[9, i], numbers[10, i] = z2, v2, t2, dt2
-        functions[0, i], functions[1, i], functions[2, i] = _wave_functions(z1, t1, dt1)
-        functions[3, i], functions[4, i], functions[5, i] = _wave_functions(z2, t2, dt2)
+        functions[0, i], functions[1, i], functions[2, i] = wave_functions(z1, t1, dt1)
+        functions[3, i], functions[4, i], functions[5, i] = wave_functions(z2, t2, dt2)
 
 
 @inlined
 def free_ends(s: complex, k: Any) -> tuple[complex, complex, complex]:
     """theta and M0 of the free response at one s, times e^{-scale}, and scale: entire in s^2 at C = 0 (see `free`)."""
     S = s * s
-    if _is_low(s, k):
+    if is_low(s, k):
         over_d = reciprocal(1.0 + k[DAMPING] * s)
         z_sum, z_product = S * (k[B] + k[A] * over_d), S * (k[A] * k[B] * S + k[G]) * over_d
         F0, F1, F2, F3, F2_less_1, _ = transition_series(z_sum, z_product)
@@ -218,8 +218,8 @@ def free_ends(s: complex, k: Any) -> tuple[complex, complex, complex]:
         )  # fmt: skip
         return theta, M0, complex(0.0, 0.0)
     S, d, _, gS, z1, v1, t1, dt1, z2, v2, t2, dt2 = dispersion(s, k)
-    c1, s1, e1 = _wave_functions(z1, t1, dt1)
-    c2, s2, e2 = _wave_functions(z2, t2, dt2)
+    c1, s1, e1 = wave_functions(z1, t1, dt1)
+    c2, s2, e2 = wave_functions(z2, t2, dt2)
     theta, M0, _, _ = from_waves(
         c1,
         s1,

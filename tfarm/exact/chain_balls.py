@@ -1,0 +1,135 @@
+"""The free response of a chain in ball arithmetic: the sweeps of `sweep`, with the error of every number enclosed.
+
+Segments are crossed by their transition functions, entire in s^2/(1 + C s): no wave is separated (see `balls`).
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import flint
+
+from .balls import Ball, rational, transition
+from .chain import Body, Chain, Drive, Element, Layout, Mark, Offset, Segment, Spring
+from .coefficients import Condition, Inertia
+from .compiled import plain
+from .compound import (
+    Plane,
+    Row,
+    across_rows,
+    beyond_body,
+    beyond_offset,
+    beyond_spring,
+    end_plane,
+    inside_body,
+    inside_offset,
+    inside_spring,
+    met,
+    row_across,
+    transition_rows,
+)
+
+_end_plane, _inside_offset, _inside_spring = plain(end_plane), plain(inside_offset), plain(inside_spring)
+_inside_body, _across_rows, _transition_rows = plain(inside_body), plain(across_rows), plain(transition_rows)
+_beyond_offset, _beyond_spring, _beyond_body = plain(beyond_offset), plain(beyond_spring), plain(beyond_body)
+_row_across, _met = plain(row_across), plain(met)
+
+
+class Sweep:
+    """The plane of a layout's chain at the axis and at its marks, at one s (a ball or a series of balls)."""
+
+    def __init__(self, layout: Layout, s: Any) -> None:
+        self.layout, self.s, self.S = layout, s, s * s
+        self._rows: dict[Segment, tuple[Row, ...]] = {}
+        self.planes: dict[int, Plane] = {}
+        p = _end_plane(*self._end(layout.chain.tip_mass), *self._end(layout.chain.tip_inertia))
+        for each in layout.elements:
+            if isinstance(each, Mark):
+                self.planes[each.number] = p
+            else:
+                p = self._inside(each, p)
+        self.theta, self.M = p[0], p[1]
+
+    @cached_property
+    def input(self) -> Any:
+        """What the input must be for this response: zero at a pole."""
+        return drive_of(self.layout.chain.drive, self.s, self.theta, self.M)
+
+    @cached_property
+    def states(self) -> dict[int, Row]:
+        """W, Psi, M and Q at each mark."""
+        one, none = rational(1) + 0 * self.s, 0 * self.s
+        f: Row = (one, none, none, none)
+        found: dict[int, Row] = {}
+        for each in reversed(self.layout.elements):
+            if isinstance(each, Mark):
+                found[each.number] = _met(f, self.planes[each.number])
+            else:
+                f = self._beyond(each, f)
+        return found
+
+    def _end(self, inertia: Inertia) -> tuple[Any, Any]:
+        condition = Condition.of(inertia)
+        return self.S * rational(condition.inertia) + rational(condition.rest), rational(condition.force)
+
+    def _inside(self, element: Element, p: Plane) -> Plane:
+        match element:
+            case Segment():
+                w, m, q = (rational(unit) for unit in element.units)
+                own = p[0] * w, p[1] * (w * m), p[2] * m, p[3] * q, p[4] * (m * q)
+                own = _across_rows(*self._transition(element), own)
+                return own[0] / w, own[1] / (w * m), own[2] / m, own[3] / q, own[4] / (m * q)
+            case Offset():
+                return _inside_offset(rational(element.length), p)
+            case Spring():
+                return _inside_spring(*self._spring(element), p)
+        return _inside_body(*self._body(element), p)
+
+    def _beyond(self, element: Element, f: Row) -> Row:
+        match element:
+            case Segment():
+                w, m, q = (rational(unit) for unit in element.units)
+                own = _row_across(*self._transition(element), (f[0] / w, f[1], f[2] / m, f[3] / q))
+                return own[0] * w, own[1], own[2] * m, own[3] * q
+            case Offset():
+                return _beyond_offset(rational(element.length), f)
+            case Spring():
+                return _beyond_spring(*self._spring(element), f)
+        return _beyond_body(*self._body(element), f)
+
+    def _transition(self, segment: Segment) -> tuple[Row, ...]:
+        if segment not in self._rows:
+            a, b, g, sigma = (rational(number) for number in segment[:4])
+            S, over_d = self.S, 1 / (self.s * rational(segment.damping) + 1)
+            z_sum, z_product = S * (over_d * a + b), S * (S * (a * b) + g) * over_d
+            functions = self._functions(z_sum, z_product)
+            self._rows[segment] = _transition_rows(*functions, S, over_d, a, b, g, sigma)
+        return self._rows[segment]
+
+    def _functions(self, z_sum: Any, z_product: Any) -> tuple[Any, ...]:
+        """F0..F3 at the segment's end."""
+        return transition(z_sum, z_product, flint.arb(1))
+
+    def _spring(self, spring: Spring) -> tuple[Any, Any]:
+        k = rational(spring.stiffness)
+        return self.s * (k * rational(spring.damping)) + k, rational(spring.compliance)
+
+    def _body(self, body: Any) -> tuple[Any, Any]:
+        assert isinstance(body, Body)
+        return (
+            self.S * rational(body.mass) + rational(body.stiffness),
+            self.S * rational(body.inertia) + rational(body.rotational_stiffness),
+        )
+
+
+def drive_of(drive: Drive, s: Any, theta: Any, M: Any) -> Any:
+    """The input behind a response with that hub angle and moment on the hub."""
+    A, B = (drive.of_angle, drive.of_moment)
+    of_angle = ((s * rational(A[3]) + rational(A[2])) * s + rational(A[1])) * s + rational(A[0])
+    return of_angle * theta - (s * rational(B[1]) + rational(B[0])) * M
+
+
+def determinant(chain: Chain, s: Ball) -> Ball:
+    """The input of the free response at s: zero at the eigenvalues."""
+    return Sweep(chain.at(), s).input
