@@ -39,7 +39,7 @@ def drives(
 def _drives(omega: Any, k: Any, ends: Any, values: Any, pinned: Any) -> None:
     for i in range(omega.size):
         S, _, _, gS, z1, v1, t1, dt1, z2, v2, t2, dt2 = dispersion(complex(0.0, omega[i]), k)
-        pinned[i] = _half_waves(z1, t1, dt1) + _half_waves(z2, t2, dt2)
+        pinned[i] = half_waves(z1, t1, dt1) + half_waves(z2, t2, dt2)
         if z1.real < 0.0 and z2.real < 0.0:
             pinned[i] += 1  # above the cut-off: W = 0, Psi constant
         S, z1, z2 = S.real, z1.real, z2.real
@@ -53,8 +53,8 @@ def _drives(omega: Any, k: Any, ends: Any, values: Any, pinned: Any) -> None:
                 )  # fmt: skip
                 values[row, i] = (e[6] + e[7] * S) * theta - e[8] * M0
         else:
-            c1, s1, e1 = _real_functions(z1, t1, dt1)
-            c2, s2, e2 = _real_functions(z2, t2, dt2)
+            c1, s1, e1 = real_functions(z1, t1, dt1)
+            c2, s2, e2 = real_functions(z2, t2, dt2)
             for row in range(len(ends)):
                 e = ends[row]
                 theta, M0, _, _ = from_waves(
@@ -88,13 +88,13 @@ def bisect(number: Any, k: Any, ends: Any, steps: Any, low: Any, high: Any) -> N
 
 
 @inlined
-def _half_waves(z: complex, t: complex, dt: complex) -> int:
+def half_waves(z: complex, t: complex, dt: complex) -> int:
     """How many whole half waves fit strictly inside the length: n pi < k, for a travelling wave e^{i k x}."""
     return max(0, math.ceil((abs(t.imag) + math.copysign(1.0, t.imag) * dt.imag) / math.pi) - 1) if z.real < 0.0 else 0
 
 
 @inlined
-def _real_functions(z: float, t: complex, dt: complex) -> tuple[float, float, float]:
+def real_functions(z: float, t: complex, dt: complex) -> tuple[float, float, float]:
     """c, S, e of `closed_form.from_waves` for real z: scaled where it decays, plain where it travels."""
     if abs(z) < 1.0:
         c, s = even_functions(z)

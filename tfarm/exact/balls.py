@@ -16,8 +16,6 @@ from typing import Any
 
 import flint
 
-from tfarm.errors import CertificationError
-
 from .closed_form import fields_from_root, from_transition
 from .coefficients import Coefficients, Condition
 from .compiled import plain
@@ -25,8 +23,6 @@ from .outputs import Output, Quantity, unit_scale
 
 _algebra, _fields = plain(from_transition), plain(fields_from_root)
 Ball = Any  # flint.acb or flint.arb, which come without types
-
-MOST_BITS = 1 << 18
 
 
 @contextmanager
@@ -134,82 +130,6 @@ class State:
     def determines(self, output: Output, x: float) -> bool:
         """Whether the output has a value here: everywhere but where the input may be zero, at a pole."""
         return output.constant(self.k, x) is not None or not self.input.contains(0)
-
-
-def enclose(k: Coefficients, wanted: Output, s: complex, *, bits: int, x: float = 0.0) -> Ball:
-    """A ball around the output at s whose relative radius is below 2^-bits.
-
-    Raises CertificationError where no precision up to `MOST_BITS` gives one: at a pole, or at an exact zero.
-    """
-    for working in _precisions(bits):
-        with precision(working):
-            state = State(k, point(s))
-            if state.determines(wanted, x):
-                value = state.value(wanted, x)
-                if value.rel_accuracy_bits() >= bits or value.is_zero():
-                    return value
-    raise CertificationError(f"no {bits} bits at s = {s:g} 1/s: it is a pole or a zero, or too close to one")
-
-
-def slope(k: Coefficients, wanted: Output, s: complex, *, bits: int = 60, x: float = 0.0) -> Ball:
-    """dG/ds at s, by a difference so short that its error is below 2^-bits of the larger of G/s and dG/ds."""
-    step = rational(Fraction(1, 1 << (2 * bits)))
-    for working in _precisions(4 * bits):
-        with precision(working):
-            here, there = State(k, point(s)), State(k, point(s) * (1 + step))
-            if here.determines(wanted, x) and there.determines(wanted, x):
-                value = here.value(wanted, x)
-                difference = (there.value(wanted, x) - value) / (step * point(s))
-                if (difference + value / point(s)).rel_accuracy_bits() >= bits or value.is_zero():
-                    return difference
-    raise CertificationError(f"no derivative at s = {s:g} 1/s: it is a pole, or too close to one")
-
-
-def decimals(k: Coefficients, wanted: Output, s: complex, digits: int, x: float = 0.0) -> tuple[str, str]:
-    """Real and imaginary part to `digits` significant right digits each ("0" where it vanishes identically).
-
-    On the imaginary axis at C = 0, and for real s, one of the two parts is exactly zero.
-    """
-    for working in _precisions(4 * digits):
-        with precision(working):
-            state = State(k, point(s))
-            if not state.determines(wanted, x):
-                continue
-            value = state.value(wanted, x)
-            known_zero = _vanishing_parts(k, wanted, s)
-            texts = [
-                "0.0" if zero else _decimal(part, digits)
-                for zero, part in zip(known_zero, (value.real, value.imag), strict=True)
-            ]
-            if None not in texts:
-                return str(texts[0]), str(texts[1])
-    raise CertificationError(f"no {digits} digits at s = {s:g} 1/s: it is a pole or a zero, or too close to one")
-
-
-def _vanishing_parts(k: Coefficients, wanted: Output, s: complex) -> tuple[bool, bool]:
-    """Whether the real and the imaginary part vanish by symmetry: G is real for real s, and in s^2 at C = 0."""
-    if s.imag == 0:
-        return False, True
-    if s.real == 0 and k.damping == 0:
-        return wanted.power % 2 == 1, wanted.power % 2 == 0
-    return False, False
-
-
-def _decimal(part: Ball, digits: int) -> str | None:
-    """A ball rounded to so many digits, None if it does not determine them."""
-    if part.is_zero():
-        return "0.0"
-    if part.rel_accuracy_bits() < 3.33 * digits + 8:
-        return None
-    return str(part.mid().str(digits, radius=False))
-
-
-def _precisions(bits: int) -> Iterator[int]:
-    """Working precisions worth trying for so many right bits, each twice the one before."""
-    working = 2 * bits + 64
-    while working < MOST_BITS:
-        yield working
-        working *= 2
 
 
 def nearest(ball: Ball) -> complex:

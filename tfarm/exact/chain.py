@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,14 +26,12 @@ from tfarm.arm import Arm, Attachment, Link, RotarySpring, Theory
 from tfarm.records import record
 
 from .coefficients import Condition, Inertia, double_double, scaled_inertia, stiffness_of, uniform
+from .outputs import Side
 
 SEGMENT, OFFSET, SPRING, BODY, MARK = range(5)
 KIND, WIDTH = 8, 12  # where a row of the kernel says what it is, after the eight numbers of a segment (`vector`)
 TO_W, TO_M, TO_Q = 9, 10, 11  # from the chain's units to the segment's own
 TIP, OF_ANGLE, OF_MOMENT = 0, 6, 10  # of the vector of ends: six numbers of the payload, A_0..A_3, B_0 and B_1
-
-Side = Literal["outer", "inner"]
-
 
 class Segment(NamedTuple):
     """A uniform piece: a, b, g [s^2], sigma and C [s] as in `Coefficients`, length/L and EI/EI of the first."""
@@ -169,6 +167,29 @@ class Chain:
         free = all(isinstance(end, Fraction) for end in (self.tip_mass, self.tip_inertia)) and not self.is_locked
         bodies = [each for each in self.elements if isinstance(each, Body)]
         return free and not self.drive.stiffness and not any(each.stiffness or each.rotational_stiffness for each in bodies)
+
+    @property
+    def at_rest(self) -> int:
+        """How often the drive vanishes at s = 0: twice where the rig turns freely, once where friction resists it."""
+        if not self.has_rigid_mode:
+            return 0
+        return 1 if self.drive.friction or self.drive.back_emf else 2
+
+    @property
+    def singular(self) -> tuple[float, ...]:
+        """-1/C [1/s] of each damped segment, ascending: there eigenvalues accumulate."""
+        return tuple(sorted({-1.0 / each.damping for each in self.segments if each.damping}))
+
+    @property
+    def is_undamped(self) -> bool:
+        """Whether nothing dissipates."""
+        dashpots = any(each.damping for each in self.elements if isinstance(each, Segment | Spring))
+        return not (dashpots or self.drive.friction or self.drive.back_emf)
+
+    @property
+    def input_unit(self) -> Fraction:
+        """The SI value of one unit of the input."""
+        return self.drive.unit
 
     def with_damping(self, share: float) -> Chain:
         """The chain with so much of every damper: of C, of the dashpots, and of what the drive has in odd powers."""

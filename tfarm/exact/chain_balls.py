@@ -63,6 +63,8 @@ class Sweep:
         f: Row = (one, none, none, none)
         found: dict[int, Row] = {}
         for each in reversed(self.layout.elements):
+            if len(found) == len(self.planes):
+                break
             if isinstance(each, Mark):
                 found[each.number] = _met(f, self.planes[each.number])
             else:

@@ -22,12 +22,15 @@ from numpy.typing import NDArray
 
 from tfarm.arm import GAINS, HubFeedback
 
+from .chain import Chain
+from .chain_values import free_outputs, free_slopes
 from .coefficients import Coefficients
 from .compiled import compiled, inlined, plain
 from .dispersion import quotient, reciprocal
 from .free import free_response
 from .jets import Jet
-from .outputs import OUTPUTS, unit_scale
+from .outputs import OUTPUTS, Output, unit_scale
+from .system import System
 from .vector import DAMPING, GAIN, HUB, HUB_FORCE, HUB_INERTIA
 from .waves import free_ends
 
@@ -36,20 +39,21 @@ Real = NDArray[np.float64]
 
 Gains = tuple[Fraction, ...]  # of a law without dimensions, in the order of `GAINS`, exact
 OPEN: Gains = (Fraction(0),) * len(GAINS)
+FED = tuple(OUTPUTS[gain.output] for gain in GAINS)
 STEP = 1e-6  # of |s|, or of the way to -1/C, for differences
 
 
-def unit_gains(k: Coefficients) -> Gains:
+def unit_gains(k: System) -> Gains:
     """What a gain of one SI unit is without dimensions."""
     return tuple(unit_scale(OUTPUTS[gain.output], k) for gain in GAINS)
 
 
-def gains_of(k: Coefficients, law: HubFeedback) -> Gains:
+def gains_of(k: System, law: HubFeedback) -> Gains:
     """The gains of a law without dimensions."""
     return tuple(Fraction(gain) * unit for gain, unit in zip(law.row, unit_gains(k), strict=True))
 
 
-def dimensionless(k: Coefficients, laws: Real) -> Real:
+def dimensionless(k: System, laws: Real) -> Real:
     """Rows (gains, ...) of gains in SI units, in the order of `GAINS`, without dimensions, as doubles."""
     units = np.array([float(unit) for unit in unit_gains(k)])
     return np.asarray(units.reshape(-1, *[1] * (laws.ndim - 1)) * laws)
@@ -93,29 +97,68 @@ class LoopParts(NamedTuple):
     scale: Complex
 
 
-def characteristic(k: Coefficients, s: Complex, gains: Gains = OPEN, at_zero: int = 0) -> Analytic:
+def characteristic(k: System, s: Complex, gains: Gains = OPEN, at_zero: int = 0) -> Analytic:
     """D(s)/s^at_zero and its derivative at s (1-D, complex), in float64."""
+    if isinstance(k, Chain):
+        here, slopes = free_slopes(k, _fed_back(gains), s, 0.0)
+        value, slope = (part.drive + _weighted(k, gains, part.outputs) for part in (here, slopes))
+        return _deflated(value, slope, here.scale, s, at_zero)
     free, at = free_response(k, s), Jet.variable(s, 1)
     fed_back = NUMERATORS(at, 1.0 / (1.0 + k.damping * at), free.theta, free.M)
     value, slope = (free.drive + torque([float(gain) for gain in gains], fed_back)).c
+    return _deflated(value, slope, free.scale, s, at_zero)
+
+
+def _deflated(value: Complex, slope: Complex, scale: Complex, s: Complex, at_zero: int) -> Analytic:
+    """D/s^at_zero from D and its slope."""
     if at_zero:
         s = np.where(s == 0, 1e-100, s)
         value = value / s**at_zero
         slope = slope / s**at_zero - at_zero * value / s
-    return Analytic(value, slope, free.scale)
+    return Analytic(value, slope, scale)
 
 
-def quick_characteristic(k: Coefficients, s: Complex, gains: Gains = OPEN, at_zero: int = 0) -> Analytic:
+def quick_characteristic(k: System, s: Complex, gains: Gains = OPEN, at_zero: int = 0) -> Analytic:
     """The same with slopes from differences, right to about 1e-8: thirty times as fast for a hundred points."""
     return quick_characteristics(k, s, np.array([[float(gain)] for gain in gains]), at_zero)
 
 
-def quick_characteristics(k: Coefficients, s: Complex, rows: Real, at_zero: int = 0) -> Analytic:
+def quick_characteristics(k: System, s: Complex, rows: Real, at_zero: int = 0) -> Analytic:
     """`quick_characteristic` with gains of their own at each point: rows (gains, n) or (gains, 1), dimensionless."""
+    if isinstance(k, Chain):
+        return _quick(k, s, rows, at_zero)
     found = np.empty((3, s.size), complex)
     s, rows = np.ascontiguousarray(s, dtype=complex), np.ascontiguousarray(rows, dtype=float)
     fill_characteristics(s, k.kernel, rows, at_zero, found)
     return Analytic(found[0], found[1], found[2])
+
+
+def float_units(k: System) -> Real:
+    """`unit_gains` as a column of doubles: SI outputs per numerator without dimensions."""
+    return np.array([[float(unit)] for unit in unit_gains(k)])
+
+
+def _fed_back(gains: Gains) -> tuple[Output, ...]:
+    """What gains other than 0 multiply."""
+    return tuple(each for each, gain in zip(FED, gains, strict=True) if gain)
+
+
+def _weighted(k: Chain, gains: Gains, outputs: Complex) -> Complex:
+    """gains . numerators of the outputs of `_fed_back`, which come in SI."""
+    units = [float(gain / unit) for gain, unit in zip(gains, unit_gains(k), strict=True) if gain]
+    return np.asarray(np.tensordot(units, outputs, 1)) if units else np.zeros(outputs.shape[1:], complex)
+
+
+def _quick(k: Chain, s: Complex, rows: Real, at_zero: int) -> Analytic:
+    """`quick_characteristics` of a chain: the slope from values at s +- h."""
+    s = np.asarray(s, dtype=complex)
+    near = np.min([np.ones(s.size), *(abs(1.0 - s / each) for each in k.singular)], axis=0)
+    h = STEP * np.maximum(abs(s) * near, 1e-300)
+    parts = loop_parts(k, np.array([s, s + h, s - h]))
+    values = parts.drive + (rows[:, None, :] * parts.numerators).sum(axis=0)
+    values = values / np.where((at := np.array([s, s + h, s - h])) == 0, 1e-100, at) ** at_zero
+    up, down = values[1:] * np.exp(parts.scale[1:] - parts.scale[0])
+    return Analytic(values[0], (up - down) / (2.0 * h), parts.scale[0])
 
 
 @compiled
@@ -137,8 +180,12 @@ def fill_characteristics(s: Any, k: Any, rows: Any, at_zero: int, found: Any) ->
         found[0, i], found[1, i], found[2, i] = values[0], (up - down) / (2.0 * h), scales[0]
 
 
-def loop_parts(k: Coefficients, s: NDArray[Any]) -> LoopParts:
+def loop_parts(k: System, s: NDArray[Any]) -> LoopParts:
     """Drive, numerators and scale at s: what a law makes of them is linear, D = drive + torque(gains, numerators)."""
+    if isinstance(k, Chain):
+        free = free_outputs(k, FED, np.asarray(s, dtype=complex).ravel(), 0.0)
+        numerators = free.outputs / float_units(k)
+        return LoopParts(*(part.reshape(*part.shape[:-1], *s.shape) for part in (free.drive, numerators, free.scale)))
     parts = np.empty((2 + len(GAINS), s.size), complex)
     fill_loop_parts(np.ascontiguousarray(s, dtype=complex).ravel(), k.kernel, parts)
     parts = parts.reshape(len(parts), *s.shape)
@@ -162,13 +209,11 @@ def parts_at(s: complex, k: Any) -> Any:
     return drive, scale, numerators(s, reciprocal(1.0 + k[DAMPING] * s), theta, M0)
 
 
-def zeros_at_origin(k: Coefficients, gains: Sequence[Fraction | float] = OPEN) -> int:
+def zeros_at_origin(k: System, gains: Sequence[Fraction | float] = OPEN) -> int:
     """How often D vanishes at s = 0: twice where the whole arm turns freely, once where the hub's rate is fed back.
 
     Not where its angle is.  (A third time at K1 = Kp = 0 and K2 = J/(J - I_h), where gauge and inertia cancel: that
     zero is left in D.)
     """
-    if not k.has_rigid_mode:
-        return 0
     used = [OUTPUTS[gain.output] for gain, value in zip(GAINS, gains, strict=True) if value]
-    return min((each.power for each in used if each.quantity == "theta"), default=2)
+    return min(k.at_rest, *(each.power for each in used if each.quantity == "theta"), 2)

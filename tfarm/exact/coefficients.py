@@ -7,7 +7,7 @@ two numbers: rotary inertia a (0 without it) and shear flexibility b, sigma (0 w
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property, lru_cache
 
@@ -71,6 +71,30 @@ class Coefficients:
         """Whether the arm can turn as a rigid body: every inertia is finite."""
         return all(isinstance(end, Fraction) for end in (self.tip_mass, self.tip_inertia, self.hub_inertia))
 
+    @property
+    def at_rest(self) -> int:
+        """How often the drive vanishes at s = 0: twice where the arm turns freely."""
+        return 2 * self.has_rigid_mode
+
+    @property
+    def singular(self) -> tuple[float, ...]:
+        """-1/C [1/s], where eigenvalues accumulate; empty without damping."""
+        return (-1.0 / self.damping,) if self.damping else ()
+
+    @property
+    def is_undamped(self) -> bool:
+        """Whether nothing dissipates."""
+        return self.damping == 0
+
+    @property
+    def input_unit(self) -> Fraction:
+        """The SI value of one unit of the input: E I/L of torque, 1 rad of the angle of a locked hub."""
+        return Fraction(1) if self.is_locked else self.EI / self.length
+
+    def with_damping(self, share: float) -> Coefficients:
+        """The same with so much of its C."""
+        return replace(self, damping=self.damping * share)
+
     @cached_property
     def kernel(self) -> NDArray[np.float64]:
         """The vector that the compiled functions of `waves` read (see `vector`)."""
@@ -104,7 +128,7 @@ def coefficients(arm: Arm, theory: Theory = "timoshenko") -> Coefficients:
         damping=link.damping,
         tip_mass=scaled_inertia(arm.payload.mass, length**3 / EI),
         tip_inertia=scaled_inertia(arm.payload.inertia, length / EI),
-        hub_inertia=scaled_inertia(arm.hub.inertia, length / EI),
+        hub_inertia=scaled_inertia(math.inf if arm.is_locked else arm.hub.inertia, length / EI),
         length=length,
         EI=EI,
     )

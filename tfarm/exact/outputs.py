@@ -21,6 +21,7 @@ from .coefficients import Coefficients
 # theta, M, Q, W - x theta, W and Psi - theta: hub angle, moment, shear force, deflection and rotation
 Quantity = Literal["theta", "M", "Q", "W", "Y", "Phi"]
 Place = Literal["root", "tip", "x"]
+Side = Literal["outer", "inner"]  # of a joint of two segments, or of what is attached there
 
 MOST_POWER = 4  # of s: rate, acceleration, jerk and its rate
 PLACES: Mapping[str, tuple[Place, ...]] = MappingProxyType({
@@ -47,6 +48,7 @@ class Output:
     unit: str
     power: int = 0
     gauge: bool = False
+    side: Side = "outer"
     label: str
     name: str = ""
 
@@ -152,5 +154,4 @@ def output(wanted: str | Output) -> Output:
 def unit_scale(wanted: Output, k: Coefficients) -> Fraction:
     """SI value of the output per N m of torque (per radian where the hub is locked), for one dimensionless unit."""
     units = {"W": k.length, "Y": k.length, "M": k.EI / k.length, "Q": k.EI / k.length**2}
-    scale = units.get(wanted.quantity, Fraction(1))
-    return scale if k.is_locked else scale * k.length / k.EI
+    return units.get(wanted.quantity, Fraction(1)) / k.input_unit

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from .chain import BODY, KIND, MARK, OF_ANGLE, OF_MOMENT, OFFSET, SEGMENT, SPRING, TO_M, TO_Q, TO_W
+from .chain import KIND, MARK, OF_ANGLE, OF_MOMENT, OFFSET, SEGMENT, SPRING, TO_M, TO_Q, TO_W
 from .closed_form import SERIES_RADIUS, transition_series
 from .compiled import compiled, inlined
 from .compound import (
@@ -32,11 +32,11 @@ from .compound import (
 )
 from .dispersion import dispersion, reciprocal
 from .vector import DAMPING, SIGMA, A, B, G
-from .waves import PARALLEL, is_low, magnitude, wave_functions
+from .waves import PARALLEL, POLE, impedance, is_low, magnitude, wave_functions
 
 HELD = 14  # complex numbers of a segment that the way back takes up again
 OVERFLOW, UNDERFLOW = 1e80, 1e-80  # a plane beyond is brought back to 1, the factor into its scale
-READ = 6  # where a row of the table begins to be of the input: W, Psi, M, Q, theta, and the rest
+SMALL = 0.02  # an output below this share of its own terms has lost two digits: flagged
 
 
 @inlined
@@ -181,12 +181,28 @@ def drive_of(s: complex, ends: Any, theta: complex, M: complex) -> complex:
     return of_angle * theta - (ends[B0] + s * ends[B0 + 1]) * M
 
 
+@inlined
+def _drive_terms(s: complex, rows: Any, ends: Any, theta: complex, M: complex) -> float:
+    """What the drive would be away from a pole: its two terms, and each with the other's size of motion."""
+    A0, B0, last = OF_ANGLE, OF_MOMENT, rows[0]
+    for row in rows:
+        if row[KIND] == SEGMENT:
+            last = row
+    S = magnitude(s * s)
+    of_angle = magnitude(ends[A0] + s * (ends[A0 + 1] + s * (ends[A0 + 2] + s * ends[A0 + 3])))
+    of_moment = magnitude(ends[B0] + s * ends[B0 + 1])
+    waves = impedance(S, last) / last[TO_M]
+    crossed = of_angle * magnitude(M) / max(waves, 1.0) + of_moment * magnitude(theta) * waves
+    return of_angle * magnitude(theta) + of_moment * magnitude(M) + crossed
+
+
 @compiled
 def fill_free(s: Any, rows: Any, ends: Any, table: Any, found: Any, lost: Any) -> None:
     """Drive, scale and each output of the free response at s (1-D), a row each; whether digits are lost.
 
     A row of `table` is an output: its place (or -1), weights of W, Psi, M, Q there and of theta, power of s, C of the
-    gauge, factor.
+    gauge, factor.  Digits are lost where two waves of a segment are nearly one, where an output is a small difference
+    (a deflection at low frequency), and where the drive is: there it may be a pole.
     """
     marks = 0
     for i in range(len(rows)):
@@ -199,6 +215,7 @@ def fill_free(s: Any, rows: Any, ends: Any, table: Any, found: Any, lost: Any) -
         if marks:
             go_back(s[i], rows, f, planes, scales, held, states)
         found[0, i], found[1, i] = drive_of(s[i], ends, plane[0], plane[1]), scale
+        lost[i] = lost[i] or magnitude(found[0, i]) < POLE * _drive_terms(s[i], rows, ends, plane[0], plane[1])
         for o in range(len(table)):
             want = table[o]
             value = want[5] * plane[0]
@@ -207,7 +224,9 @@ def fill_free(s: Any, rows: Any, ends: Any, table: Any, found: Any, lost: Any) -
                 at = want[1] * states[n, 0] + want[2] * states[n, 1] + want[3] * states[n, 2] + want[4] * states[n, 3]
                 more = scales[n] - scale
                 decay = math.exp(more.real)
-                value += at * complex(decay * math.cos(more.imag), decay * math.sin(more.imag))
+                at *= complex(decay * math.cos(more.imag), decay * math.sin(more.imag))
+                lost[i] = lost[i] or (want[5] != 0.0 and magnitude(value + at) < SMALL * magnitude(value))
+                value += at
             for _ in range(int(want[6])):
                 value *= s[i]
             found[2 + o, i] = want[8] * value * (reciprocal(1.0 + want[7] * s[i]) if want[7] else 1.0)

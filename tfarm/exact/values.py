@@ -10,12 +10,16 @@ from numpy.typing import NDArray
 
 from tfarm.errors import ParameterError
 
-from . import balls
+from .balls import nearest
+from .chain import Chain
+from .chain_values import expansions, free_outputs, free_slopes
 from .coefficients import Coefficients
+from .enclosures import decimals, enclose, slope
 from .fields import fields, from_root
 from .free import free_response, low_frequency, low_frequency_tip
 from .jets import Jet
 from .outputs import Output, unit_scale
+from .system import System
 from .waves import evaluate
 
 Complex = NDArray[np.complexfloating[Any, Any]]
@@ -26,13 +30,13 @@ _ENDS = {"theta": 0, "M": 1, "Q": 2, "W": 3, "Y": 4}
 _FIELDS = {"Y": 0, "Phi": 1, "M": 2, "Q": 3}
 
 
-def kernel_table(k: Coefficients, wanted: Sequence[Output]) -> NDArray[np.float64]:
+def kernel_table(k: System, wanted: Sequence[Output]) -> NDArray[np.float64]:
     """The outputs as `waves.evaluate` reads them: worth keeping between calls."""
-    return np.array([_row(k, each) for each in wanted])
+    return np.empty((0, 4)) if isinstance(k, Chain) else np.array([_row(k, each) for each in wanted])
 
 
 def evaluate_outputs(
-    k: Coefficients, wanted: Sequence[Output], table: NDArray[np.float64], s: Complex, x: float = 0.0
+    k: System, wanted: Sequence[Output], table: NDArray[np.float64], s: Complex, x: float = 0.0
 ) -> Complex:
     """Outputs (rows) for a unit input at s (1-D), SI; x is a share of the length, for outputs along the arm.
 
@@ -40,19 +44,25 @@ def evaluate_outputs(
     """
     s = np.ascontiguousarray(s)
     values, suspects = np.empty((len(wanted), s.size), complex), np.empty(s.size, bool)
-    with np.errstate(under="ignore", over="ignore", invalid="ignore"):
-        evaluate(s, k.kernel, table, values, suspects)
+    with np.errstate(under="ignore", over="ignore", invalid="ignore", divide="ignore"):
+        if isinstance(k, Chain):
+            free = free_outputs(k, wanted, s, x)
+            values, suspects = free.outputs / free.drive, free.lost
+        else:
+            evaluate(s, k.kernel, table, values, suspects)
         for row, each in enumerate(wanted):
-            if not each.is_at_end:
+            if not (isinstance(k, Chain) or each.is_at_end):
                 values[row] = _along(k, each, s, each.share(x))
     for i in np.flatnonzero(suspects | ~np.isfinite(values).all(axis=0)):
         values[:, i] = [value_with_care(k, each, complex(s[i]), x) for each in wanted]
     return values
 
 
-def differentiate_outputs(k: Coefficients, wanted: Sequence[Output], s: Complex, x: float = 0.0) -> Complex:
+def differentiate_outputs(k: System, wanted: Sequence[Output], s: Complex, x: float = 0.0) -> Complex:
     """The derivatives of the outputs (rows) with respect to s, by power series at the ends and by balls along x."""
     values = np.empty((len(wanted), s.size), complex)
+    if isinstance(k, Chain):
+        return _of_chain(k, wanted, s, x)
     with np.errstate(under="ignore", invalid="ignore", divide="ignore"):
         free = free_response(k, s)
         for row, each in enumerate(wanted):
@@ -65,7 +75,7 @@ def differentiate_outputs(k: Coefficients, wanted: Sequence[Output], s: Complex,
     return values
 
 
-def value_with_care(k: Coefficients, wanted: Output, s: complex, x: float = 0.0) -> complex:
+def value_with_care(k: System, wanted: Output, s: complex, x: float = 0.0) -> complex:
     """One output at one s from a proven enclosure, or from the expansion at s = 0.
 
     Raises ParameterError at a pole, and where the value is larger than any float64.
@@ -73,7 +83,7 @@ def value_with_care(k: Coefficients, wanted: Output, s: complex, x: float = 0.0)
     _refuse_pole(k, wanted, s, x)
     if s == 0:
         return complex(expansion_at_zero(k, wanted, x)[2])
-    value = balls.nearest(balls.enclose(k, wanted, s, bits=PROVEN_BITS, x=x))
+    value = nearest(enclose(k, wanted, s, bits=PROVEN_BITS, x=x))
     if not np.isfinite(value):
         raise ParameterError(
             key="s", value=s, remedy=f"{wanted.name} is larger than any float64 there; choose another s"
@@ -81,21 +91,23 @@ def value_with_care(k: Coefficients, wanted: Output, s: complex, x: float = 0.0)
     return value
 
 
-def digits_of(k: Coefficients, wanted: Output, s: complex, digits: int, x: float = 0.0) -> tuple[str, str]:
+def digits_of(k: System, wanted: Output, s: complex, digits: int, x: float = 0.0) -> tuple[str, str]:
     """Real and imaginary part as decimal strings, each with that many right digits."""
     _refuse_pole(k, wanted, s, x)
-    return balls.decimals(k, wanted, s, digits, x)
+    return decimals(k, wanted, s, digits, x)
 
 
-def expansion_at_zero(k: Coefficients, wanted: Output, x: float = 0.0) -> tuple[float, float, float, float]:
+def expansion_at_zero(k: System, wanted: Output, x: float = 0.0) -> tuple[float, float, float, float]:
     """Coefficients of s^-2, s^-1, 1 and s in the output's expansion at s = 0."""
     return expansions_at_zero(k, [wanted], x)[0]
 
 
 def expansions_at_zero(
-    k: Coefficients, wanted: Sequence[Output], x: float = 0.0
+    k: System, wanted: Sequence[Output], x: float = 0.0
 ) -> list[tuple[float, float, float, float]]:
     """The expansions at s = 0 of several outputs, from one free response."""
+    if isinstance(k, Chain):
+        return expansions(k, wanted, x)
     s = Jet.variable(0.0, 7)
     *state, drive = low_frequency(k, s)
     order = next(n for n, coefficient in enumerate(drive.c) if coefficient != 0)
@@ -118,6 +130,16 @@ def expansions_at_zero(
         return series[0], series[1], series[2], series[3]
 
     return [expand(each) for each in wanted]
+
+
+def _of_chain(k: Chain, wanted: Sequence[Output], s: Complex, x: float) -> Complex:
+    """The derivatives of a chain's outputs: N'/D - N D'/D^2, by balls where digits are lost."""
+    with np.errstate(all="ignore"):
+        free, slopes = free_slopes(k, wanted, s, x)
+        values: Complex = (slopes.outputs - free.outputs * slopes.drive / free.drive) / free.drive
+    for i in np.flatnonzero(free.lost | (s == 0) | ~np.isfinite(values).all(axis=0)):
+        values[:, i] = [_slope_with_care(k, each, complex(s[i]), x) for each in wanted]
+    return values
 
 
 def _row(k: Coefficients, wanted: Output) -> tuple[float, ...]:
@@ -148,20 +170,25 @@ def _at_pole(drive: Jet, s: Complex) -> NDArray[np.bool_]:
     return near
 
 
-def _refuse_pole(k: Coefficients, wanted: Output, s: complex, x: float) -> None:
+def _refuse_pole(k: System, wanted: Output, s: complex, x: float) -> None:
     """Raise ParameterError if s is a pole to the last digit that a float64 holds."""
-    if wanted.constant(k, x) is not None:
+    if isinstance(k, Coefficients) and wanted.constant(k, x) is not None:
         return
     if s == 0:
         if any(expansion_at_zero(k, wanted, x)[:2]):
             raise ParameterError(key="s", value=0, remedy="a pole: the arm turns as a rigid body there; choose s != 0")
-    elif _at_pole(free_response(k, np.array([s])).drive, np.array([s]))[0]:
+    elif _at_pole(_drive(k, np.array([s])), np.array([s]))[0]:
         name = f"a natural frequency, {abs(s):.10g} rad/s" if s.real == 0 else f"an eigenvalue, {s:.10g} 1/s"
         raise ParameterError(key="s", value=s, remedy=f"a pole: {name}; the response is infinite there, move s")
 
 
-def _slope_with_care(k: Coefficients, wanted: Output, s: complex, x: float) -> complex:
+def _drive(k: System, s: Complex) -> Jet:
+    """The drive at s, and its slope."""
+    return Jet([part.drive for part in free_slopes(k, (), s, 0.0)]) if isinstance(k, Chain) else free_response(k, s).drive
+
+
+def _slope_with_care(k: System, wanted: Output, s: complex, x: float) -> complex:
     _refuse_pole(k, wanted, s, x)
     if s == 0:
         return complex(expansion_at_zero(k, wanted, x)[3])
-    return balls.nearest(balls.slope(k, wanted, s, x=x))
+    return nearest(slope(k, wanted, s, x=x))

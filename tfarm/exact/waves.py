@@ -180,13 +180,13 @@ def _store(
     scale = k[GAIN] * reciprocal(u)
     states[i], states[BLOCK + i], states[2 * BLOCK + i] = scale * theta, scale * M0, scale * Q0
     states[3 * BLOCK + i], states[4 * BLOCK + i] = (LIFT * scale) * W1, scale * Y1
-    impedance = _impedance(magnitude(S), k)  # with it, what u would be away from a pole
-    crossed = k[HUB] * magnitude(M0) / max(impedance, 1.0) + k[HUB_FORCE] * magnitude(theta) * impedance
+    waves = impedance(magnitude(S), k)  # with it, what u would be away from a pole
+    crossed = k[HUB] * magnitude(M0) / max(waves, 1.0) + k[HUB_FORCE] * magnitude(theta) * waves
     states[5 * BLOCK + i] = complex(magnitude(u), magnitude(turned) + magnitude(held) + crossed)
 
 
 @inlined
-def _impedance(S: float, k: Any) -> float:
+def impedance(S: float, k: Any) -> float:
     """Size of M0/theta for a free tip, dimensionless: of its inertia when slow, of one wave number when fast."""
     inertia = k[G] * S
     return min(inertia, math.sqrt(math.sqrt(inertia)) + math.sqrt(S * (k[A] + k[B])))

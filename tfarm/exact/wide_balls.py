@@ -12,15 +12,20 @@ wave with itself lose by cancelling, at any precision.  Where a wave is long or 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import flint
 
 from .balls import Ball, State, point, rational
-from .characteristic import NUMERATORS, OPEN, Gains
+from .chain import Chain, Segment
+from .chain_values import ChainState
+from .chain_wide import swept
+from .characteristic import FED, NUMERATORS, OPEN, Gains, unit_gains
 from .closed_form import from_waves
 from .coefficients import Coefficients, Condition
 from .compiled import plain
+from .system import System
 
 Series = Any  # flint.acb_series, which comes without types
 
@@ -30,13 +35,16 @@ LONG = 0.3  # |z| below which a wave is not separated from the others
 TERMS = 4  # of the Taylor series
 
 
-def characteristic_ball(k: Coefficients, s: Ball, gains: Gains = OPEN) -> Ball:
+def characteristic_ball(k: System, s: Ball, gains: Gains = OPEN) -> Ball:
     """D(s) enclosed, at the working precision: for points, at any s."""
+    if isinstance(k, Chain):
+        chain = ChainState(k, s)
+        return _law(k, gains, chain.input, [chain.numerator(each) for each in FED])
     state = State(k, s)
     return _closed(k, s, state.theta, state.M0, gains)
 
 
-def characteristic_over(k: Coefficients, s: Ball, gains: Gains = OPEN) -> Ball:
+def characteristic_over(k: System, s: Ball, gains: Gains = OPEN) -> Ball:
     """D enclosed over the wide ball s, but for a factor that depends on its middle alone and is positive."""
     middle = s.mid()
     here = _by_waves(k, middle, gains, None, LONG)
@@ -51,7 +59,7 @@ def characteristic_over(k: Coefficients, s: Ball, gains: Gains = OPEN) -> Ball:
     return value * flint.acb(0, here[1].imag).exp()
 
 
-def tangent(k: Coefficients, m: Ball, r: Ball, gains: Gains = OPEN) -> tuple[Ball, Ball, Ball] | None:
+def tangent(k: System, m: Ball, r: Ball, gains: Gains = OPEN) -> tuple[Ball, Ball, Ball] | None:
     """D(m), D'(m) and D''/2 over the disc of radius r around m, apart from one factor; None where waves may be one."""
     here = _by_waves(k, m, gains, None, 0.0)
     disc = flint.acb(flint.arb(m.real.mid(), r), flint.arb(m.imag.mid(), r))
@@ -59,7 +67,7 @@ def tangent(k: Coefficients, m: Ball, r: Ball, gains: Gains = OPEN) -> tuple[Bal
     return None if here is None or there is None else (here[0][0], here[0][1], there[0][2])
 
 
-def _closed(k: Coefficients, s: Any, theta: Any, M0: Any, gains: Gains) -> Any:
+def _closed(k: System, s: Any, theta: Any, M0: Any, gains: Gains) -> Any:
     """D (see `characteristic`) of a response with that hub angle and root moment, for balls and for series."""
     hub = Condition.of(k.hub_inertia)
     drive = theta * (s * s * rational(hub.inertia) + rational(hub.rest)) - M0 * rational(hub.force)
@@ -70,21 +78,18 @@ def _closed(k: Coefficients, s: Any, theta: Any, M0: Any, gains: Gains) -> Any:
 
 
 def _by_waves(
-    k: Coefficients, at: Ball, gains: Gains, scale: Ball | None, shortest: float
+    k: System, at: Ball, gains: Gains, scale: Ball | None, shortest: float
 ) -> tuple[Series, Ball] | None:
     """D e^{-scale} as a series around `at`, and scale (t1 + t2 there if none is given); None where waves may be one."""
     s = flint.acb_series([at, 1], prec=TERMS)
+    if isinstance(k, Chain):
+        return _by_segments(k, s, gains, scale, shortest)
     a, b, g, C = (rational(value) for value in (k.a, k.b, k.g, k.damping))
     S, d = s * s, s * C + 1
-    if S[0].contains(0) or d[0].contains(0):
+    pair = _waves(a, b, g, S, d, shortest)
+    if pair is None:
         return None
-    half = (S * b + S * a / d) / 2
-    spread = _root(half * half - S * (S * (a * b) + g) / d)
-    if spread is None:
-        return None
-    one, two = (_wave(half + sign * spread, S, d, a, b, g, shortest) for sign in (1, -1))
-    if one is None or two is None:
-        return None
+    one, two = pair
     mass, inertia = Condition.of(k.tip_mass), Condition.of(k.tip_inertia)
     ends = [S * rational(end.inertia) + rational(end.rest) for end in (mass, inertia)]
     theta, M0, _, _ = _separated(
@@ -92,10 +97,52 @@ def _by_waves(
     )
     t = one[5] + two[5]
     scale = t[0] if scale is None else scale
-    unit = S * d * spread * spread * (4 * g)
+    gap = one[2] - two[2]
+    unit = S * d * gap * gap * g
     if unit[0].contains(0):
         return None
     return _closed(k, s, theta, M0, gains) * (t - scale).exp() / unit, scale
+
+
+def _by_segments(
+    k: Chain, s: Series, gains: Gains, scale: Ball | None, shortest: float
+) -> tuple[Series, Ball] | None:
+    """`_by_waves` of a chain."""
+
+    def waves(each: Segment, S: Series, d: Series) -> tuple[tuple[Series, ...], tuple[Series, ...]] | None:
+        a, b, g = (rational(value) for value in each[:3])
+        return _waves(a, b, g, S, d, shortest)
+
+    used = [each for each, gain in zip(FED, gains, strict=True) if gain]
+    found = swept(k, s, used, waves)
+    if found is None:
+        return None
+    drive, outputs, t = found
+    every = iter(outputs)
+    value = _law(k, gains, drive, [next(every) if gain else 0 * s for gain in gains])
+    scale = t[0] if scale is None else scale
+    return value * (t - scale).exp(), scale
+
+
+def _law(k: Chain, gains: Gains, drive: Any, outputs: Sequence[Any]) -> Any:
+    """drive + gains . numerators, from outputs in SI."""
+    for gain, unit, part in zip(gains, unit_gains(k), outputs, strict=True):
+        drive = drive + part * rational(gain / unit) if gain else drive
+    return drive
+
+
+def _waves(
+    a: Ball, b: Ball, g: Ball, S: Series, d: Series, shortest: float
+) -> tuple[tuple[Series, ...], tuple[Series, ...]] | None:
+    """Both waves of a uniform piece (see `_wave`); None where they may be one, or one is too long."""
+    if S[0].contains(0) or d[0].contains(0):
+        return None
+    half = (S * b + S * a / d) / 2
+    spread = _root(half * half - S * (S * (a * b) + g) / d)
+    if spread is None:
+        return None
+    one, two = (_wave(half + sign * spread, S, d, a, b, g, shortest) for sign in (1, -1))
+    return None if one is None or two is None else (one, two)
 
 
 def _root(z: Series) -> Series | None:

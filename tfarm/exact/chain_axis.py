@@ -1,0 +1,119 @@
+"""A chain without damping on the imaginary axis: the signs that its natural frequencies are counted by.
+
+Everything is real there.  The count climbs from the payload to the hub.  A segment clamped at both ends has the count
+of the pinned one, in closed form, less 0 or 1 for each rotation that is held.  Then at each joint, between a segment
+clamped at its inner end and all that lies outside of the joint, which was clamped there, first the displacement is let
+go and then the rotation; at last the clamp's spring, the joint and the hub.  Each step raises the count by 0 or 1
+(Rayleigh's theorem on one constraint), and the parity of the count is the sign of the determinant of that system,
+positive at rest.  Of the outer part these are p_WPsi where it is clamped, and with the numbers r of the states that a
+clamped inner end allows at the joint, r_PsiQ p_WPsi - r_WPsi p_PsiQ where W is free and Psi held.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .axis import half_waves, real_functions
+from .chain import BODY, Chain, KIND, Layout, OF_ANGLE, OF_MOMENT, OFFSET, SEGMENT, SPRING, TO_M, TO_Q, TO_W
+from .closed_form import SERIES_RADIUS, transition_series
+from .compiled import compiled, inlined
+from .compound import across_rows, across_waves, end_plane, inside_body, inside_offset, inside_spring, transition_rows
+from .dispersion import dispersion
+from .vector import SIGMA, A, B, G
+
+FREE = 12  # where the vector of ends says how many motions the payload leaves the tip
+
+
+def counted(layout: Layout) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Rows and ends of a layout without damping, for `count_below` and `bisect`."""
+    chain = layout.chain
+    free = sum(not isinstance(end, float) for end in (chain.tip_mass, chain.tip_inertia))
+    return layout.rows, np.r_[layout.ends, float(free)]
+
+
+@inlined
+def _clamped(number: int, value: float, step: int) -> int:
+    """The count one step on: `step` is +1 or -1 where its parity must change to fit the sign of the determinant."""
+    return number + step * ((number % 2 == 1) != (value < 0.0))
+
+
+@compiled
+def count_below(omega: float, rows: Any, ends: Any, plane: Any) -> int:
+    """How many natural frequencies lie below omega [rad/s], the rigid-body mode included; `plane` (5,) is worked in."""
+    S = -omega * omega
+    p = end_plane(ends[0] + ends[1] * S, ends[2], ends[3] + ends[4] * S, ends[5])
+    plane[0], plane[1], plane[2], plane[3], plane[4] = p
+    number, free, spring = 0, int(ends[FREE]), 0
+    for i in range(len(rows)):
+        row = rows[i]
+        if row[KIND] == SEGMENT:
+            number = _joined(number, omega, row, plane, free)
+            free = 2
+        elif row[KIND] == OFFSET:
+            p = inside_offset(row[0], (plane[0], plane[1], plane[2], plane[3], plane[4]))
+            plane[0], plane[1], plane[2], plane[3], plane[4] = p
+        elif row[KIND] == BODY:
+            p = plane[0], plane[1], plane[2], plane[3], plane[4]
+            p = inside_body(row[0] * S + row[2], row[1] * S + row[3], p)
+            plane[0], plane[1], plane[2], plane[3], plane[4] = p
+        elif row[KIND] == SPRING:
+            p = inside_spring(row[0], row[1], (plane[0], plane[1], plane[2], plane[3], plane[4]))
+            plane[0], plane[1], plane[2], plane[3], plane[4] = p
+            number = _clamped(number, plane[0], 1)
+    if ends[OF_MOMENT] == 0.0:
+        return number
+    drive = (ends[OF_ANGLE] + S * ends[OF_ANGLE + 2]) * plane[0] - ends[OF_MOMENT] * plane[1]
+    return _clamped(number, drive, 1)
+
+
+@compiled
+def _joined(outside: int, omega: float, row: Any, plane: Any, free: int) -> int:
+    """The count with a segment more, clamped at its inner end; `plane` is carried across it.
+
+    `outside` is the count of what lies beyond, clamped at the joint, which leaves so many motions `free` there.
+    """
+    to_w, to_m, to_q = row[TO_W], row[TO_M], row[TO_Q]
+    p = plane[0] * to_w, plane[1] * (to_w * to_m), plane[2] * to_m, plane[3] * to_q, plane[4] * (to_m * to_q)
+    held = (0.0, 0.0, 0.0, 0.0, 1.0)  # W = Psi = 0
+    s, _, _, gS, z1, v1, t1, dt1, z2, v2, t2, dt2 = dispersion(complex(0.0, omega), row)
+    number = half_waves(z1, t1, dt1) + half_waves(z2, t2, dt2) + (z1.real < 0.0 and z2.real < 0.0)
+    S, z1, z2 = s.real, z1.real, z2.real
+    if max(abs(z1), abs(z2)) < SERIES_RADIUS:
+        F0, F1, F2, F3, _, _ = transition_series(z1 + z2, z1 * z2)
+        W, Psi, M, Q = transition_rows(F0, F1, F2, F3, S, 1.0, row[A], row[B], row[G], row[SIGMA])
+        q, r = across_rows(W, Psi, M, Q, p), across_rows(W, Psi, M, Q, held)
+    else:
+        c1, s1, e1 = real_functions(z1, t1, dt1)
+        c2, s2, e2 = real_functions(z2, t2, dt2)
+        gS, v_sum = gS.real, S * (row[A] - row[B])
+        q = across_waves(c1, s1, z1, v1.real, e1, c2, s2, z2, v2.real, e2, gS, 1.0, v_sum, p)
+        r = across_waves(c1, s1, z1, v1.real, e1, c2, s2, z2, v2.real, e2, gS, 1.0, v_sum, held)
+        unit = 1.0 / (gS * (z1 - z2) * (z1 - z2))
+        q = q[0] * unit, q[1] * unit, q[2] * unit, q[3] * unit, q[4] * unit
+        r = r[0] * unit, r[1] * unit, r[2] * unit, r[3] * unit, r[4] * unit
+    plane[0], plane[1], plane[2] = q[0] / to_w, q[1] / (to_w * to_m), q[2] / to_m
+    plane[3], plane[4] = q[3] / to_q, q[4] / (to_m * to_q)
+    number = _clamped(number, r[1], -1)  # r at the outer end is, but for signs, the plane carried inwards (symmetry)
+    number = _clamped(number, -r[0], -1) + outside
+    if free == 2:
+        number = _clamped(number, -r[0] * p[3] - r[3] * p[0], 1)
+    return _clamped(number, q[0], 1) if free else number
+
+
+@compiled
+def bisect_chain(number: Any, rows: Any, ends: Any, low: Any, high: Any) -> None:
+    """Move low[i] and high[i] [rad/s] to the neighbouring floats between which the count reaches number[i]."""
+    plane = np.empty(5)
+    for i in range(number.size):
+        while True:
+            middle = 0.5 * (low[i] + high[i])
+            if not (low[i] < middle and middle < high[i]):
+                break
+            if count_below(middle, rows, ends, plane) >= number[i]:
+                high[i] = middle
+            else:
+                low[i] = middle

@@ -1,0 +1,188 @@
+"""What can be read of a chain: outputs of its free response in float64, with slopes, at s = 0, and in balls."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .balls import Ball, precision, rational
+from .chain import Chain, Layout, Place
+from .chain_balls import Sweep
+from .jets import Jet
+from .outputs import Output, unit_scale
+from .sweep import fill_free
+
+Complex = NDArray[np.complexfloating[Any, Any]]
+
+CIRCLE = np.exp(2j * np.pi * np.arange(16) / 16)
+NEAR = 0.3  # radius of a circle for a slope, of |s| over the phase of all waves: the 16th Taylor term is below 1e-17
+CLEAR = 0.1  # of the way to a -1/C
+SERIES_BITS = 512  # of the power series at s = 0, whose coefficients are sums of small differences
+NOTHING = 1e-80  # a coefficient below this share of the first is a zero that balls cannot know
+ORDER = 8  # of the power series: the drive begins at s^2 at most
+
+
+class Reading(NamedTuple):
+    """What an output weighs: W, Psi, M and Q at a place, theta; its power of s, its gauge's C [s], its SI unit."""
+
+    place: Place | None
+    state: tuple[int, int, int, int]
+    theta: Fraction
+    power: int
+    gauge: bool
+    unit: Fraction
+
+
+@dataclass(frozen=True)
+class Readings:
+    """Several outputs of one chain: where and what, and the table that the compiled sweep takes."""
+
+    layout: Layout
+    each: tuple[Reading, ...]
+
+    @property
+    def gauges(self) -> list[float]:
+        """C [s] of each output's gauge, 0 for what is none."""
+        places = self.layout.places
+        return [
+            self.layout.read[places.index(one.place)].damping if one.gauge and one.place is not None else 0.0
+            for one in self.each
+        ]
+
+    @property
+    def table(self) -> NDArray[np.float64]:
+        """Rows for `sweep.fill_free`."""
+        places = self.layout.places
+        return np.array([
+            [-1 if one.place is None else places.index(one.place), *one.state, one.theta, one.power, C, one.unit]
+            for one, C in zip(self.each, self.gauges, strict=True)
+        ], dtype=float).reshape(-1, 9)  # fmt: skip
+
+
+class Free(NamedTuple):
+    """Drive (n,) and outputs (rows, n) of the free response times e^{-scale}, and where digits are lost."""
+
+    drive: Complex
+    outputs: Complex
+    scale: Complex
+    lost: NDArray[np.bool_]
+
+
+def reading_of(chain: Chain, wanted: Output, x: float) -> Reading:
+    """An output as weights; x is the share of the length for one along the link."""
+    share = Fraction(wanted.share(x))
+    weights = {"W": (1, 0, 0, 0), "Y": (1, 0, 0, 0), "Psi": (0, 1, 0, 0), "Phi": (0, 1, 0, 0), "M": (0, 0, 1, 0)}
+    theta = {"Y": -(chain.radius + share), "Phi": Fraction(-1), "theta": Fraction(1)}
+    place = None if wanted.quantity == "theta" else Place(share, wanted.side)
+    state = weights.get(wanted.quantity, (0, 0, 0, 1)) if place else (0, 0, 0, 0)
+    unit = unit_scale(wanted, chain)
+    return Reading(place, state, theta.get(wanted.quantity, Fraction(0)), wanted.power, wanted.gauge, unit)
+
+
+@lru_cache(maxsize=256)
+def readings(chain: Chain, wanted: tuple[Output, ...], x: float) -> Readings:
+    """The outputs of a chain, laid out."""
+    each = tuple(reading_of(chain, one, x) for one in wanted)
+    places = tuple(dict.fromkeys(one.place for one in each if one.place is not None))
+    return Readings(chain.at(places), each)
+
+
+def free_outputs(chain: Chain, wanted: Sequence[Output], s: Complex, x: float) -> Free:
+    """The free response at s (1-D): outputs in SI per unit of the input that the drive is."""
+    return _free(readings(chain, tuple(wanted), x), s)
+
+
+def _free(those: Readings, s: Complex) -> Free:
+    found, lost = np.empty((2 + len(those.each), s.size), complex), np.empty(s.size, bool)
+    fill_free(np.ascontiguousarray(s, dtype=complex), those.layout.rows, those.layout.ends, those.table, found, lost)
+    return Free(found[0], found[2:], found[1], lost)
+
+
+def free_slopes(chain: Chain, wanted: Sequence[Output], s: Complex, x: float) -> tuple[Free, Free]:
+    """The free response and its derivative at s (1-D), by Cauchy's integral on a circle that is right to rounding."""
+    those = readings(chain, tuple(wanted), x)
+    here = _free(those, s)
+    radius = NEAR * np.maximum(abs(s), 1e-150) / np.maximum(1.0, abs(here.scale))
+    for C in {each.damping for each in chain.segments if each.damping}:
+        radius = np.minimum(radius, CLEAR * abs(s + 1.0 / C))
+    around = _free(those, (s[:, None] + radius[:, None] * CIRCLE).ravel())
+    factor = np.exp(around.scale.reshape(-1, CIRCLE.size) - here.scale[:, None]) / CIRCLE / radius[:, None]
+    drive = (around.drive.reshape(factor.shape) * factor).mean(axis=1)
+    outputs = (around.outputs.reshape(-1, *factor.shape) * factor).mean(axis=2)
+    return here, Free(drive, outputs, here.scale, here.lost)
+
+
+class ChainState:
+    """The free response of a chain at one s in balls, as `balls.State` is of an arm."""
+
+    def __init__(self, chain: Chain, s: Any, *, slow: bool = False) -> None:
+        self.chain, self.s, self._sweep = chain, s, SlowSweep if slow else Sweep
+        self.input = self._sweep(chain.at(), s).input
+        self._sweeps: dict[tuple[Output, float], Sweep] = {}
+
+    def numerator(self, output: Output, x: float = 0.0) -> Any:
+        """The output of the free response, in SI units."""
+        those = readings(self.chain, (output,), x)
+        one, sweep = those.each[0], self._sweep(those.layout, self.s)
+        value = sweep.theta * rational(one.theta)
+        if one.place is not None:
+            for weight, part in zip(one.state, sweep.states[0], strict=True):
+                value = value + part if weight else value
+        for _ in range(one.power):
+            value = value * self.s
+        if one.gauge:
+            value = value / (self.s * rational(those.gauges[0]) + 1)
+        return value * rational(one.unit)
+
+    def value(self, output: Output, x: float = 0.0) -> Ball:
+        """The output for a unit input, in SI units; x is a share of the length."""
+        return self.numerator(output, x) / self.input
+
+    def determines(self, output: Output, x: float) -> bool:
+        """Whether the output has a value here: everywhere but where the input may be zero, at a pole."""
+        return not self.input.contains(0)
+
+
+class SlowSweep(Sweep):
+    """The sweep with power series (`Jet`) in s at 0, whose coefficients are balls."""
+
+    def _functions(self, z_sum: Any, z_product: Any) -> tuple[Any, ...]:
+        """F0..F3 by their series in z1 + z2 and z1 z2, which begin with s^2 both."""
+        h, before, sums = Jet([rational(1), *[rational(0)] * (len(self.s.c) - 1)]), None, [0 * z_sum] * 4
+        factorial = Fraction(1)
+        for n in range(2 * len(self.s.c)):
+            factorial = factorial / max(1, (2 * n) * (2 * n - 1))  # 1/(2 n)!
+            terms = [factorial, *[Fraction(0)] * 3]
+            for shift in (1, 2, 3):
+                terms[shift] = terms[shift - 1] / (2 * n + shift)
+            sums = [total + h * rational(term) for total, term in zip(sums, reversed(terms), strict=True)]
+            h, before = z_sum * h - (z_product * before if before is not None else 0 * h), h
+        return tuple(sums)
+
+
+def expansions(chain: Chain, wanted: Sequence[Output], x: float) -> list[tuple[float, float, float, float]]:
+    """Coefficients of s^-2, s^-1, 1 and s in each output's expansion at s = 0."""
+    with precision(SERIES_BITS):
+        s = Jet([rational(0), rational(1), *[rational(0)] * (ORDER - 2)])
+        state = ChainState(chain, s, slow=True)
+        drive = _cleared(state.input)
+        order = next(n for n, coefficient in enumerate(drive.c) if coefficient != 0)
+        found = []
+        for each in wanted:
+            quotient = Jet(_cleared(state.numerator(each, x)).c[: ORDER - order]) / drive.shifted(order)
+            series = [0.0] * (2 - order) + [float(c.mid()) if hasattr(c, "mid") else float(c) for c in quotient.c]
+            found.append((series[0], series[1], series[2], series[3]))
+    return found
+
+
+def _cleared(jet: Jet) -> Jet:
+    """The jet with exact zeros where only rounding is left."""
+    sizes = [abs(rational(0) + c) for c in jet.c]
+    largest = max(float(size.mid()) for size in sizes)
+    return Jet([rational(0) if float(size.mid()) < NOTHING * largest else c for size, c in zip(sizes, jet.c, strict=True)])
