@@ -61,7 +61,7 @@ def judge(arm, count, *, certify=True, model=True):
     flexible = damped.eigenvalues[damped.index > 0].ravel()
     inside = flexible[damped.box.holds(flexible)]
     wrong = []
-    if inside.size + zeros_at_origin(damped.undamped.coefficients) != damped.count:
+    if inside.size + zeros_at_origin(damped.undamped.system) != damped.count:
         wrong.append(f"{inside.size} flexible eigenvalues listed in the box of {damped.count}")
     if model:
         wrong += compared(arm, damped, inside)

@@ -215,7 +215,7 @@ def test_the_arm_that_was_miscounted(monkeypatch: pytest.MonkeyPatch) -> None:
     for _ in range(70):
         arm, count = some_damped_arm(rng)
     damped = damped_modes(tfarm.modes(arm, count))
-    function = member(damped.undamped.coefficients).function
+    function = member(damped.undamped.system).function
     inside = damped.box.holds(damped.eigenvalues[damped.index > 0]).sum()
     points = (5, 10, 20, 25, 40, 83)
     assert [winding_number(function, damped.box, number) for number in points] == [inside] * len(points)

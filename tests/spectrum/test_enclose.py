@@ -51,7 +51,7 @@ def test_discs_of_real_zeros_are_real() -> None:
     damped = listed(arm, 6)
     for pair in damped.eigenvalues[damped.is_overdamped]:
         for zero in pair:
-            disc = enclosed(damped.undamped.coefficients, complex(zero), 30)
+            disc = enclosed(damped.undamped.system, complex(zero), 30)
             assert disc.is_real
             root = newton_root(arm, zero, 30)
             with mpmath.workdps(60):
@@ -252,7 +252,7 @@ def test_a_forged_list_is_refused(name: str) -> None:
     zeros = np.concatenate([damped.eigenvalues[:1], FORGERIES[name](damped.eigenvalues[1:])])
     undamped = replace(damped.undamped, index=np.arange(len(zeros)))
     forged = replace(damped, undamped=undamped, eigenvalues=zeros)
-    consistent = int(forged.box.holds(zeros).sum()) + zeros_at_origin(damped.undamped.coefficients) - 2
+    consistent = int(forged.box.holds(zeros).sum()) + zeros_at_origin(damped.undamped.system) - 2
     for count in {damped.count, consistent}:
         with pytest.raises(CertificationError) as refused:
             replace(forged, count=count).certify()

@@ -87,7 +87,7 @@ def band_of(loop: SampledLoop) -> Band | None:
 
 def _highest(loop: SampledLoop, line: float) -> float | None:
     """The top of the highest box right of the line in which the exact arm has the plant's poles and no other."""
-    plant, function = loop.plant, member(modes(loop.plant.arm, 1).coefficients).function
+    plant, function = loop.plant, member(modes(loop.plant.arm, 1).system).function
     poles = plant.poles[(plant.mode > 0) & (plant.poles.real > -line)]
 
     def is_complete(top: float) -> bool:

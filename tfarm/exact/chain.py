@@ -169,6 +169,11 @@ class Chain:
         return free and not self.drive.stiffness and not any(each.stiffness or each.rotational_stiffness for each in bodies)
 
     @property
+    def transit(self) -> float:
+        """The sum over the segments of (rho A l^4/(E I))^(1/4) [s^(1/2)]."""
+        return math.fsum(float(each.g) ** 0.25 for each in self.segments)
+
+    @property
     def at_rest(self) -> int:
         """How often the drive vanishes at s = 0: twice where the rig turns freely, once where friction resists it."""
         if not self.has_rigid_mode:
@@ -260,7 +265,7 @@ def drive_of(arm: Arm, rotation: Fraction) -> Drive:
         back_emf = per_ampere * N * Fraction(motor.back_emf_constant) / Fraction(motor.resistance) * rotation
         lag = Fraction(motor.inductance) / Fraction(motor.resistance)
     per_torque = {"motor_current": 1 / per_ampere}.get(arm.input, Fraction(1))
-    if arm.input == "motor_voltage":
+    if motor is not None and arm.input == "motor_voltage":
         per_torque = Fraction(motor.resistance) / per_ampere
     else:
         lag = back_emf = none
@@ -316,7 +321,8 @@ class Layout:
 def _marked(elements: Sequence[Element], places: tuple[Place, ...]) -> tuple[Element, ...]:
     """The elements with a mark for each place; segments are cut where a place lies inside."""
     order = sorted(range(len(places)), key=lambda n: (-places[n].share, places[n].side != "outer"))
-    marks, position, result = list(order), Fraction(1), []
+    marks, position = list(order), Fraction(1)
+    result: list[Element] = []
     is_beyond = True  # still outside the link: the payload's offset
     for each in elements:
         if is_beyond and isinstance(each, Offset):
@@ -328,12 +334,12 @@ def _marked(elements: Sequence[Element], places: tuple[Place, ...]) -> tuple[Ele
             places[marks[0]].side == "outer" or not isinstance(each, Body)
         ):
             result.append(Mark(marks.pop(0)))
-        rest, whole = each, position - inner_end
-        while marks and isinstance(rest, Segment) and places[marks[0]].share > inner_end:
+        rest = each
+        while marks and isinstance(each, Segment) and places[marks[0]].share > inner_end:
             here = places[marks[0]].share
             if here < position:
-                result.append(each.piece((position - here) / whole))
-                rest, position = each.piece((here - inner_end) / whole), here
+                result.append(each.piece((position - here) / each.length))
+                rest, position = each.piece((here - inner_end) / each.length), here
             result.append(Mark(marks.pop(0)))
         result.append(rest)
         position = inner_end

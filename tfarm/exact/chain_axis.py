@@ -105,6 +105,15 @@ def _joined(outside: int, omega: float, row: Any, plane: Any, free: int) -> int:
 
 
 @compiled
+def counts(omega: Any, rows: Any, ends: Any) -> Any:
+    """`count_below` at every omega (1-D)."""
+    found, plane = np.empty(omega.size, np.int64), np.empty(5)
+    for i in range(omega.size):
+        found[i] = count_below(omega[i], rows, ends, plane)
+    return found
+
+
+@compiled
 def bisect_chain(number: Any, rows: Any, ends: Any, low: Any, high: Any) -> None:
     """Move low[i] and high[i] [rad/s] to the neighbouring floats between which the count reaches number[i]."""
     plane = np.empty(5)

@@ -39,8 +39,8 @@ _row_across, _met = plain(row_across), plain(met)
 class Sweep:
     """The plane of a layout's chain at the axis and at its marks, at one s (a ball or a series of balls)."""
 
-    def __init__(self, layout: Layout, s: Any) -> None:
-        self.layout, self.s, self.S = layout, s, s * s
+    def __init__(self, layout: Layout, s: Any, S: Any = None) -> None:
+        self.layout, self.s, self.S = layout, s, s * s if S is None else S
         self._rows: dict[Segment, tuple[Row, ...]] = {}
         self.planes: dict[int, Plane] = {}
         p = _end_plane(*self._end(layout.chain.tip_mass), *self._end(layout.chain.tip_inertia))

@@ -118,6 +118,27 @@ def free_slopes(chain: Chain, wanted: Sequence[Output], s: Complex, x: float) ->
     return here, Free(drive, outputs, here.scale, here.lost)
 
 
+def free_fields(
+    chain: Chain, s: Complex, places: Sequence[Place]
+) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], Complex]:
+    """W, Psi, M, Q (4, s, places), hub angle and moment on the hub (s,), times e^{-scale}, and scale: dimensionless."""
+    layout = chain.at(tuple(dict.fromkeys(places)))
+    order = [layout.places.index(place) for place in places]
+    table = np.zeros((4 * len(layout.places) + 1, 9))
+    table[:, 8], table[-1, 0], table[-1, 5] = 1.0, -1.0, 1.0
+    for number in range(len(layout.places)):
+        rows = slice(4 * number, 4 * (number + 1))
+        table[rows, 0], table[rows, 1:5] = number, np.eye(4)
+    found, lost = np.empty((2 + len(table), s.size), complex), np.empty(s.size, bool)
+    fill_free(np.ascontiguousarray(s, dtype=complex), layout.rows, layout.ends, table, found, lost)
+    fields = found[2:-1].reshape(len(layout.places), 4, s.size).transpose(1, 2, 0)[:, :, order]
+    A, B = (np.array([float(number) for number in part]) for part in (chain.drive.of_angle, chain.drive.of_moment))
+    of_moment = np.polyval(B[::-1], s)
+    with np.errstate(all="ignore"):
+        M = (np.polyval(A[::-1], s) * found[-1] - found[0]) / of_moment
+    return fields, found[-1], M, found[1]
+
+
 class ChainState:
     """The free response of a chain at one s in balls, as `balls.State` is of an arm."""
 
@@ -179,6 +200,15 @@ def expansions(chain: Chain, wanted: Sequence[Output], x: float) -> list[tuple[f
             series = [0.0] * (2 - order) + [float(c.mid()) if hasattr(c, "mid") else float(c) for c in quotient.c]
             found.append((series[0], series[1], series[2], series[3]))
     return found
+
+
+def order_at_zero(chain: Chain, wanted: Output | None) -> int:
+    """How often an output of the free response vanishes at s = 0; the drive itself for None."""
+    with precision(SERIES_BITS):
+        s = Jet([rational(0), rational(1), *[rational(0)] * (ORDER - 2)])
+        state = ChainState(chain, s, slow=True)
+        series = _cleared(state.input if wanted is None else state.numerator(wanted))
+    return next(n for n, coefficient in enumerate(series.c) if coefficient != 0)
 
 
 def _cleared(jet: Jet) -> Jet:

@@ -102,14 +102,14 @@ def characteristic(k: System, s: Complex, gains: Gains = OPEN, at_zero: int = 0)
     if isinstance(k, Chain):
         here, slopes = free_slopes(k, _fed_back(gains), s, 0.0)
         value, slope = (part.drive + _weighted(k, gains, part.outputs) for part in (here, slopes))
-        return _deflated(value, slope, here.scale, s, at_zero)
+        return deflated(value, slope, here.scale, s, at_zero)
     free, at = free_response(k, s), Jet.variable(s, 1)
     fed_back = NUMERATORS(at, 1.0 / (1.0 + k.damping * at), free.theta, free.M)
     value, slope = (free.drive + torque([float(gain) for gain in gains], fed_back)).c
-    return _deflated(value, slope, free.scale, s, at_zero)
+    return deflated(value, slope, free.scale, s, at_zero)
 
 
-def _deflated(value: Complex, slope: Complex, scale: Complex, s: Complex, at_zero: int) -> Analytic:
+def deflated(value: Complex, slope: Complex, scale: Complex, s: Complex, at_zero: int) -> Analytic:
     """D/s^at_zero from D and its slope."""
     if at_zero:
         s = np.where(s == 0, 1e-100, s)

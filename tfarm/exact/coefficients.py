@@ -72,6 +72,11 @@ class Coefficients:
         return all(isinstance(end, Fraction) for end in (self.tip_mass, self.tip_inertia, self.hub_inertia))
 
     @property
+    def transit(self) -> float:
+        """(rho A L^4/(E I))^(1/4) [s^(1/2)]: times the root of w, the phase of a slow bending wave along the arm."""
+        return float(self.g) ** 0.25
+
+    @property
     def at_rest(self) -> int:
         """How often the drive vanishes at s = 0: twice where the arm turns freely."""
         return 2 * self.has_rigid_mode

@@ -18,8 +18,8 @@ from tfarm.arm import Arm
 from tfarm.errors import ParameterError, did_you_mean
 
 from . import appendix
-from .coefficients import Coefficients
 from .outputs import Output
+from .system import System
 from .values import value_with_care
 
 Complex = NDArray[np.complexfloating[Any, Any]]
@@ -36,7 +36,7 @@ def known_method(method: str) -> Method:
     return method
 
 
-def slow_values(method: Method, arm: Arm, k: Coefficients, wanted: Sequence[Output], s: Complex, x: float) -> Complex:
+def slow_values(method: Method, arm: Arm, k: System, wanted: Sequence[Output], s: Complex, x: float) -> Complex:
     """Outputs (rows) at s (1-D) one by one, by the balls or by the appendix; x is a share of the length.
 
     Raises ParameterError at a pole that float64 cannot tell s from, ConvergenceError where the appendix has no limit.

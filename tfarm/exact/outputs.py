@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from types import MappingProxyType
-from typing import Literal, get_args
+from typing import Literal, Protocol, get_args
 
 from tfarm.arm.checks import whole
 from tfarm.errors import ParameterError, did_you_mean
@@ -33,6 +33,19 @@ PLACES: Mapping[str, tuple[Place, ...]] = MappingProxyType({
     "Phi": ("tip", "x"),
 })  # fmt: skip
 UNITS = MappingProxyType({"theta": "rad", "M": "N m", "Q": "N", "W": "m", "Y": "m", "Phi": "rad"})
+
+
+class Units(Protocol):
+    """What an output needs of a system: the units of its numbers without dimensions, and whether the hub is held."""
+
+    @property
+    def length(self) -> Fraction: ...
+    @property
+    def EI(self) -> Fraction: ...
+    @property
+    def input_unit(self) -> Fraction: ...
+    @property
+    def is_locked(self) -> bool: ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,13 +108,15 @@ class Output:
         """Where it is, as a share of the length; x is that share for an output along the arm."""
         return {"root": 0.0, "tip": 1.0, "x": x}[self.place]
 
-    def constant(self, k: Coefficients, x: float) -> int | None:
+    def constant(self, k: Units, x: float) -> int | None:
         """What an end condition makes the quantity per unit of input, dimensionless and at any s: 0, 1 or -1, or None.
 
         Held or free ends: W, Phi and Y are 0 at the root, and at the tip W where it is pinned, M and Q where nothing is
         there to take them.  The hub angle is the input where the hub is locked, M(0) = -u where it has no inertia.
         """
         at, locked = self.share(x), k.is_locked
+        if not isinstance(k, Coefficients):
+            return 1 if self.quantity == "theta" and locked else None
         pinned, clamped = (not isinstance(end, Fraction) for end in (k.tip_mass, k.tip_inertia))
         if at == 0:
             root = {"theta": 1 if locked else None, "M": -1 if k.hub_inertia == 0 else None, "Q": None}
@@ -151,7 +166,7 @@ def output(wanted: str | Output) -> Output:
     return OUTPUTS[wanted]
 
 
-def unit_scale(wanted: Output, k: Coefficients) -> Fraction:
+def unit_scale(wanted: Output, k: Units) -> Fraction:
     """SI value of the output per N m of torque (per radian where the hub is locked), for one dimensionless unit."""
     units = {"W": k.length, "Y": k.length, "M": k.EI / k.length, "Q": k.EI / k.length**2}
     return units.get(wanted.quantity, Fraction(1)) / k.input_unit

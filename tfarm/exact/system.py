@@ -6,6 +6,9 @@ functions of this room take either.
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 from tfarm.arm import Arm, Theory
 
 from .chain import Chain, chain_of
@@ -18,3 +21,13 @@ def system_of(arm: Arm, theory: Theory | None = None) -> System:
     """The system of an arm under its own theory, or another.  Raises ParameterError for an unknown theory."""
     theory = theory or arm.theory
     return coefficients(arm, theory) if arm.is_uniform else chain_of(arm, theory)
+
+
+def shear_flexibility(k: System, x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """E I/(kappa G A L^2) at the shares x (1-D) of the length, with E I and L of the whole: W' = Psi + that Q."""
+    if isinstance(k, Coefficients):
+        return np.full(x.shape, float(k.sigma))
+    inner = list(reversed(k.segments))
+    edges = np.cumsum([float(each.length) for each in inner])[:-1]
+    own = np.array([float(each.sigma * each.length**2 / each.stiffness) for each in inner])
+    return np.asarray(own[np.searchsorted(edges, x, side="right")])

@@ -67,7 +67,7 @@ def tangent(k: System, m: Ball, r: Ball, gains: Gains = OPEN) -> tuple[Ball, Bal
     return None if here is None or there is None else (here[0][0], here[0][1], there[0][2])
 
 
-def _closed(k: System, s: Any, theta: Any, M0: Any, gains: Gains) -> Any:
+def _closed(k: Coefficients, s: Any, theta: Any, M0: Any, gains: Gains) -> Any:
     """D (see `characteristic`) of a response with that hub angle and root moment, for balls and for series."""
     hub = Condition.of(k.hub_inertia)
     drive = theta * (s * s * rational(hub.inertia) + rational(hub.rest)) - M0 * rational(hub.force)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from tfarm.arm import Arm, law_of
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import dimensionless, quick_characteristics
-from tfarm.exact.coefficients import coefficients
+from tfarm.exact.system import system_of
 from tfarm.reduced import ModalModel, tailed_model
 
 from .frequencies import band_of
@@ -133,7 +133,7 @@ def _model(arm: Arm, count: int) -> ModalModel | ConvergenceError:
 
 def _newton(arm: Arm, starts: Complex, laws: Real) -> tuple[Complex, NDArray[np.bool_]]:
     """The exact poles next to the starts, and which settled there (nan where there is no start)."""
-    k = coefficients(arm)
+    k = system_of(arm)
     laws = dimensionless(k, laws)
     rows, columns = np.nonzero(~np.isnan(starts))
     s = starts[rows, columns]

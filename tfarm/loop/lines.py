@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from tfarm.arm import Arm, HubFeedback
 from tfarm.crossing import Crossing, Crossings, brackets, solved
 from tfarm.exact.characteristic import gains_of, loop_parts, torque
-from tfarm.exact.coefficients import Coefficients, coefficients
+from tfarm.exact.system import System, system_of
 from tfarm.spectrum import modes
 
 from .frequencies import grid
@@ -52,7 +52,7 @@ def along(name: str, law: HubFeedback) -> Line:
 
 def crossings(arm: Arm, line: Line, band: float) -> Crossings:
     """All crossings of the imaginary axis at frequencies `at` up to `band` [rad/s], ascending in t."""
-    k, unit = coefficients(arm), line.length
+    k, unit = system_of(arm), line.length
     static = crossing_at_zero(arm, line)
     found = [] if static is None else [static]
     if unit:
@@ -65,7 +65,7 @@ def crossings(arm: Arm, line: Line, band: float) -> Crossings:
     return Crossings.of(found)
 
 
-def _parts(k: Coefficients, line: Line, s: NDArray[Any]) -> tuple[Complex, Complex]:
+def _parts(k: System, line: Line, s: NDArray[Any]) -> tuple[Complex, Complex]:
     """N and P at s, up to one common positive factor."""
     drive, numerators, _ = loop_parts(k, s)
     base, way = (torque(map(float, gains_of(k, law)), numerators) for law in (line.base, line.direction))
@@ -111,7 +111,7 @@ def _change_with_stiffness(arm: Arm, law: HubFeedback) -> int:
 def _through_zero_held(arm: Arm, line: Line) -> Crossing | None:
     """Of an arm whose tip is held: where the static stiffness vanishes, from t(s) at two small s."""
     small = 1e-7 * float(modes(arm, 1).natural_frequency[-1])
-    N, P = _parts(coefficients(arm), line, small * np.array([1 + 0j, 0.5]))
+    N, P = _parts(system_of(arm), line, small * np.array([1 + 0j, 0.5]))
     if not P.all():
         return None
     far, near = -(N / P).real

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tfarm.arm import GAINS, Arm, HubFeedback, must_be_arm
 from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import Gains, gains_of, loop_parts, torque
-from tfarm.exact.coefficients import Coefficients, coefficients
+from tfarm.exact.system import System, system_of
 from tfarm.records import record
 from tfarm.spectrum.continuation import Member
 from tfarm.spectrum.damped import member
@@ -52,9 +52,9 @@ class Loop:
         check_gains(self.arm, self.law)
 
     @cached_property
-    def k(self) -> Coefficients:
+    def k(self) -> System:
         """The arm's dimensionless coefficients."""
-        return coefficients(self.arm)
+        return system_of(self.arm)
 
     @cached_property
     def gains(self) -> Gains:

@@ -22,7 +22,7 @@ from tfarm.arm import Arm, HubFeedback
 from tfarm.crossing import Crossings, brackets, counts_over, intervals, solved
 from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import gains_of, loop_parts, torque
-from tfarm.exact.coefficients import Coefficients, coefficients
+from tfarm.exact.system import System, system_of
 from tfarm.records import record
 
 from .frequencies import grid
@@ -131,7 +131,7 @@ def _undamped_counts(arm: Arm, K1: Real, K2: Real, Kp: float) -> NDArray[np.int6
 
 def _crossings_along_K2(arm: Arm, K1: Real, Kp: float, omega: Real) -> list[Crossings]:
     """The crossings along K2 for each K1, all columns solved at once."""
-    k = coefficients(arm)
+    k = system_of(arm)
     laws = [HubFeedback(K1=float(each), Kp=Kp) for each in K1]
     rows = np.array([[float(gain) for gain in gains_of(k, law)] for law in laws]).T
     along_K2 = [float(gain) for gain in gains_of(k, HubFeedback(K2=1.0))]
@@ -151,7 +151,7 @@ def _crossings_along_K2(arm: Arm, K1: Real, Kp: float, omega: Real) -> list[Cros
     return found
 
 
-def _h(k: Coefficients, omega: Real, law: HubFeedback) -> Real:
+def _h(k: System, omega: Real, law: HubFeedback) -> Real:
     """Im(N P*) along K2 from a law on (see `lines`), in units of the sizes of its parts."""
     drive, numerators, _ = loop_parts(k, 1j * omega)
     along_K2 = torque(map(float, gains_of(k, HubFeedback(K2=1.0))), numerators)
@@ -161,7 +161,7 @@ def _h(k: Coefficients, omega: Real, law: HubFeedback) -> Real:
 
 def boundary(arm: Arm, omega: Real, Kp: float = 0.0) -> Real:
     """K1 and K2 with poles at +-i w, and w: (n, 3), in the order of omega."""
-    k = coefficients(arm)
+    k = system_of(arm)
     drive, numerators, _ = loop_parts(k, 1j * omega)
     laws = (HubFeedback(Kp=Kp), HubFeedback(K1=1.0), HubFeedback(K2=1.0))
     N, a, b = (torque(map(float, gains_of(k, law)), numerators) for law in laws)

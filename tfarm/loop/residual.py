@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import FED_BACK, Arm, must_turn
 from tfarm.exact.characteristic import dimensionless, loop_parts, quick_characteristics
-from tfarm.exact.coefficients import coefficients
+from tfarm.exact.system import system_of
 from tfarm.spectrum.scales import first_frequency
 
 from .damping import band_and_real_poles, is_oscillating
@@ -59,7 +59,7 @@ def _exp(z: Complex) -> Complex:
 
 def residues(arm: Arm, s: Complex, laws: Real) -> Complex:
     """Residues of root moment over r [N m s^-1 per N m] at closed-loop poles s, each of its own law (1-D)."""
-    k = coefficients(arm)
+    k = system_of(arm)
     rows = dimensionless(k, laws)
     moment = loop_parts(k, s).numerators[FED_BACK.index("root_moment")]
     return np.asarray(moment / quick_characteristics(k, s, rows).slope)

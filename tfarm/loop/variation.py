@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tfarm.arm import GAINS, LISTED, NAMES, Arm, HubFeedback
 from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import Analytic, gains_of, quick_characteristics, unit_gains, zeros_at_origin
-from tfarm.exact.coefficients import Coefficients, coefficients
+from tfarm.exact.system import System, system_of
 from tfarm.records import record
 from tfarm.spectrum.continuation import Member
 
@@ -58,11 +58,11 @@ class Variation:
             return Loop(arm, law.having(self.vary, value))
         return Loop(arm.having(**{self.vary: value}), law)
 
-    def system(self, value: float) -> tuple[Coefficients, Real]:
-        """Coefficients of the arm, and gains without dimensions (gains, 1), where the varied number has that value."""
+    def system(self, value: float) -> tuple[System, Real]:
+        """The arm's system, and gains without dimensions (gains, 1), where the varied number has that value."""
         if self.is_of_gains:
             return self._k, self.laws(np.array([value]))
-        k = coefficients(self.at(value).arm)
+        k = system_of(self.at(value).arm)
         return k, np.array([[float(gain)] for gain in gains_of(k, self.law)])
 
     def singular(self, value: float) -> float:
@@ -80,8 +80,8 @@ class Variation:
         return np.where(varied, np.outer(units, values), rows)
 
     @cached_property
-    def _k(self) -> Coefficients:
-        return coefficients(self.arm)
+    def _k(self) -> System:
+        return system_of(self.arm)
 
     @cached_property
     def zeros_at_origin(self) -> int:

@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from tfarm.arm import FED_BACK, Arm
 from tfarm.arm.checks import whole
 from tfarm.errors import ParameterError
-from tfarm.exact.coefficients import Coefficients, coefficients
+from tfarm.exact.system import System, system_of
+from tfarm.exact.coefficients import Coefficients
 from tfarm.exact.outputs import OUTPUTS, Output
 from tfarm.exact.values import expansions_at_zero
 from tfarm.response import Wanted, transfer
@@ -70,7 +71,7 @@ def modal_model(
     """
     G = transfer(arm, outputs, x=x)
     count = whole("count", count, 0, MOST_MODES, f"a whole number of flexible modes, 0 to {MOST_MODES}")
-    k, share = coefficients(arm), 0.0 if x is None else x / arm.length
+    k, share = system_of(arm), 0.0 if x is None else x / arm.length
     wanted = [proper(k, each, share) for each in G.rows]
     table = modes(arm, max(1, int(count)))
     flexible = slice(int(arm.has_rigid_mode), int(arm.has_rigid_mode) + int(count))
@@ -103,7 +104,7 @@ def relaxed_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None)
     if C == 0:
         raise ParameterError(key="link.damping", value=C, remedy="without damping nothing relaxes; take modal_model")
     share = 0.0 if x is None else x / arm.length
-    expansion = np.array(expansions_at_zero(coefficients(arm), model.rows, share))
+    expansion = np.array(expansions_at_zero(system_of(arm), model.rows, share))
     slope = expansion[:, 3] + (model.residues / model.eigenvalues**2).real.sum(axis=(1, 2))
     return replace(model, static=model.static + slope / C, relaxation=-slope / C)
 
@@ -161,7 +162,7 @@ def tailed_model(arm: Arm, count: int) -> ModalModel:
     )
 
 
-def proper(k: Coefficients, wanted: Output, share: float) -> Output:
+def proper(k: System, wanted: Output, share: float) -> Output:
     """The output, if a state space of finite order can have it.  Raises ParameterError if not."""
     if wanted.power and wanted.constant(k, share):
         remedy = "a power of s times the input itself, which no state space has; ask for another output"
@@ -175,7 +176,7 @@ def proper(k: Coefficients, wanted: Output, share: float) -> Output:
 def _poles_and_residues(
     arm: Arm,
     table: Modes,
-    k: Coefficients,
+    k: System,
     wanted: list[Output],
     share: float,
     branches: Callable[[Modes], DampedModes],
@@ -187,8 +188,8 @@ def _poles_and_residues(
         upper = undamped_residues(table, wanted, k, share) * s**powers / (2 * s)
         return np.stack([s, s.conj()], axis=1), np.stack([upper, upper.conj()], axis=2)
     p = branches(table).eigenvalues[table.index > 0]
-    along = any(not each.is_at_end for each in wanted)
-    residues, doubtful = end_residues(k, wanted, p.ravel())
+    along = isinstance(k, Coefficients) and any(not each.is_at_end for each in wanted)
+    residues, doubtful = end_residues(k, wanted, p.ravel(), share)
     doubtful = doubtful | along
     if doubtful.any():
         residues[:, doubtful] = contour_residues(k, wanted, p.ravel()[doubtful], share)

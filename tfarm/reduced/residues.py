@@ -15,7 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.errors import ConvergenceError
-from tfarm.exact.coefficients import Coefficients
+from tfarm.exact.system import System
+from tfarm.exact.chain import Chain
+from tfarm.exact.chain_values import free_slopes
 from tfarm.exact.free import free_response
 from tfarm.exact.outputs import Output, unit_scale
 from tfarm.exact.values import evaluate_outputs, kernel_table
@@ -30,13 +32,16 @@ CIRCLE = np.exp(2j * np.pi * np.arange(32) / 32)
 AGREE = 1e-11  # of the largest value on the circle: what two radii may differ by
 
 
-def undamped_residues(table: Modes, wanted: Sequence[Output], k: Coefficients, x: float) -> Real:
+def undamped_residues(table: Modes, wanted: Sequence[Output], k: System, x: float) -> Real:
     """Residues in the variable s^2 of each output over s^power at the flexible modes (C = 0): (outputs, modes).
 
     c b, with c the output of the mode and b its hub participation (its root moment where the hub is locked).
     `x` is a share of the length.
     """
     omega = table.natural_frequency[table.index > 0]
+    if isinstance(k, Chain):
+        powers = np.array([[each.power] for each in wanted])
+        return np.asarray((_of_chain(k, wanted, 1j * omega, x)[0] * 2j * omega / (1j * omega) ** powers).real)
     close = np.r_[False, np.diff(omega) < CLOSE * omega[1:], False]
     by_shapes = close[:-1] | close[1:]
     if any(not each.is_at_end for each in wanted):
@@ -52,8 +57,10 @@ def undamped_residues(table: Modes, wanted: Sequence[Output], k: Coefficients, x
     return products
 
 
-def end_residues(k: Coefficients, wanted: Sequence[Output], p: Complex) -> tuple[Complex, NDArray[np.bool_]]:
+def end_residues(k: System, wanted: Sequence[Output], p: Complex, x: float = 0.0) -> tuple[Complex, NDArray[np.bool_]]:
     """Residues (outputs, p) of outputs at hub and tip at eigenvalues p, and where they are in doubt."""
+    if isinstance(k, Chain):
+        return _of_chain(k, wanted, p, x)
     with np.errstate(all="ignore"):
         free = free_response(k, p)
         rest, inertia, force = k.kernel[HUB:GAIN]
@@ -71,7 +78,15 @@ def end_residues(k: Coefficients, wanted: Sequence[Output], p: Complex) -> tuple
     return residues, free.parallel | ~np.isfinite(residues).all(axis=0)
 
 
-def contour_residues(k: Coefficients, wanted: Sequence[Output], p: Complex, x: float) -> Complex:
+def _of_chain(k: Chain, wanted: Sequence[Output], p: Complex, x: float) -> tuple[Complex, NDArray[np.bool_]]:
+    """Residues of a chain's outputs anywhere on it, and where they are in doubt."""
+    with np.errstate(all="ignore"):
+        here, slopes = free_slopes(k, wanted, p, x)
+        residues: Complex = here.outputs / slopes.drive
+    return residues, np.asarray(~np.isfinite(residues).all(axis=0))
+
+
+def contour_residues(k: System, wanted: Sequence[Output], p: Complex, x: float) -> Complex:
     """Residues (outputs, p) by the trapezoid rule on circles around p, which converges geometrically.
 
     A circle is right where one of a third of its radius agrees with it; until then it shrinks.
@@ -79,8 +94,8 @@ def contour_residues(k: Coefficients, wanted: Sequence[Output], p: Complex, x: f
     """
     apart = abs(p[:, None] - p) + np.where(np.eye(p.size, dtype=bool), np.inf, 0.0)
     radius = np.minimum(apart.min(axis=1, initial=np.inf), abs(p)) / 4
-    if k.damping:
-        radius = np.minimum(radius, abs(p + 1 / k.damping) / 4)
+    for point in k.singular:
+        radius = np.minimum(radius, abs(p - point) / 4)
     residues, size = _around(k, wanted, p, radius, x)
     todo = np.arange(p.size)
     for _ in range(9):
@@ -96,7 +111,7 @@ def contour_residues(k: Coefficients, wanted: Sequence[Output], p: Complex, x: f
 
 
 def _around(
-    k: Coefficients, wanted: Sequence[Output], p: Complex, radius: Real, x: float
+    k: System, wanted: Sequence[Output], p: Complex, radius: Real, x: float
 ) -> tuple[Complex, NDArray[np.float64]]:
     """Cauchy's integral on the circles, and the largest |G| radius on each."""
     arrow = radius[:, None] * CIRCLE
@@ -105,7 +120,7 @@ def _around(
     return values.mean(axis=2), abs(values).max(axis=2)
 
 
-def _from_shapes(table: Modes, wanted: Sequence[Output], k: Coefficients, x: float) -> Real:
+def _from_shapes(table: Modes, wanted: Sequence[Output], k: System, x: float) -> Real:
     """c b of every flexible mode by the mode shapes."""
     length = float(k.length)
     drive = table.modal_moment if k.is_locked else table.hub_participation

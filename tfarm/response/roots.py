@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm
-from tfarm.exact.characteristic import Analytic
-from tfarm.exact.coefficients import Coefficients, coefficients
+from tfarm.exact.chain import Chain
+from tfarm.exact.chain_values import free_slopes, order_at_zero
+from tfarm.exact.characteristic import Analytic, characteristic, deflated
+from tfarm.exact.coefficients import Coefficients
+from tfarm.exact.system import System, system_of
 from tfarm.exact.free import free_response, low_frequency, low_frequency_tip, tip_response
 from tfarm.exact.jets import Jet
 from tfarm.exact.outputs import Output
@@ -40,10 +43,10 @@ class Roots:
 
 def poles_of(arm: Arm, up_to: float) -> Roots:
     """The poles of every transfer function of the arm with |Im s| <= up_to."""
-    at_zero = 2 * arm.has_rigid_mode
+    k = system_of(arm)
     if arm.is_undamped:
-        return _on_axis(flexible_frequencies(arm, up_to), at_zero, up_to)
-    return _in_box(coefficients(arm), "drive", at_zero, up_to, _damped_starts(arm, up_to))
+        return _on_axis(flexible_frequencies(arm, up_to), k.at_rest, up_to)
+    return _in_box(k, _drive(k), k.at_rest, up_to, _damped_starts(arm, up_to))
 
 
 def zeros_of(arm: Arm, wanted: Output, up_to: float) -> Roots:
@@ -51,19 +54,20 @@ def zeros_of(arm: Arm, wanted: Output, up_to: float) -> Roots:
 
     One that its end condition holds constant has none but those of its power of s (at the tip: 0 throughout has none).
     """
-    k, share = coefficients(arm), wanted.share(0.0)
+    k, share = system_of(arm), wanted.share(0.0)
     constant = wanted.constant(k, share)
     if constant is not None:
         at_zero = wanted.power if constant else 0
         return Roots(np.zeros(at_zero, complex), (-math.inf, math.inf, -up_to, up_to), "constant")
-    name = wanted.quantity if wanted.is_at_end else f"tip {wanted.quantity}"
-    at_zero = max(0, _order(k, name) + wanted.power - _order(k, "drive"))
-    neighbour = {"theta": math.inf, "M": 0.0}.get(name)
+    order, numerator = _numerator(k, wanted)
+    at_zero = max(0, order + wanted.power - k.at_rest)
+    neighbour = {("theta", "root"): math.inf, ("M", "root"): 0.0}.get((wanted.quantity, wanted.place))
+    neighbour = None if isinstance(k, Chain) and neighbour == 0.0 else neighbour
     other = arm if neighbour is None else arm.having(hub_inertia=neighbour)
     if neighbour is not None and arm.is_undamped:
         return _on_axis(flexible_frequencies(other, up_to), at_zero, up_to)
-    starts = _starts_by_sampling(k, name, up_to) if neighbour is None else _damped_starts(other, up_to)
-    return _in_box(k, name, at_zero, up_to, starts)
+    starts = _starts_by_sampling(numerator, up_to) if neighbour is None else _damped_starts(other, up_to)
+    return _in_box(k, numerator, at_zero, up_to, starts)
 
 
 def _on_axis(frequencies: NDArray[np.float64], at_zero: int, up_to: float) -> Roots:
@@ -80,18 +84,38 @@ def _damped_starts(arm: Arm, up_to: float) -> Complex:
     return np.r_[starts, np.linspace(-up_to, -up_to / 50, 40)]
 
 
-def _starts_by_sampling(k: Coefficients, name: str, up_to: float) -> Complex:
+def _starts_by_sampling(numerator: Function, up_to: float) -> Complex:
     """Dips of the numerator along the imaginary and the real axis."""
     line = np.r_[np.geomspace(1e-4 * up_to, up_to, 400), np.linspace(0.01 * up_to, up_to, 1600)]
     line.sort()
     starts = []
     for direction in (1j, 1.0, -1.0):
-        at = _function(k, name)(direction * line)
+        at = numerator(direction * line)
         size = abs(at.value)
         dips = np.nonzero((size[1:-1] < size[:-2]) & (size[1:-1] < size[2:]))[0] + 1
         starts.append(direction * line[dips])
     found = np.concatenate(starts)
     return np.r_[found, found.conj(), -found, -found.conj()]
+
+
+def _drive(k: System) -> Function:
+    """The characteristic function with its zeros at s = 0 divided out."""
+    return lambda s: characteristic(k, s, at_zero=k.at_rest)
+
+
+def _numerator(k: System, wanted: Output) -> tuple[int, Function]:
+    """How often an output over its power of s vanishes at s = 0, and the function without these zeros."""
+    base = replace(wanted.base, gauge=False)
+    if isinstance(k, Coefficients):
+        name = wanted.quantity if wanted.is_at_end else f"tip {wanted.quantity}"
+        return _order(k, name), _function(k, name)
+    order = order_at_zero(k, base)
+
+    def function(s: Complex) -> Analytic:
+        here, slopes = free_slopes(k, [base], s, 0.0)
+        return deflated(here.outputs[0], slopes.outputs[0], here.scale, s, order)
+
+    return order, function
 
 
 def _order(k: Coefficients, name: str) -> int:
@@ -115,15 +139,14 @@ def _function(k: Coefficients, name: str) -> Function:
     return function
 
 
-def _in_box(k: Coefficients, name: str, at_zero: int, up_to: float, starts: Complex) -> Roots:
+def _in_box(k: System, function: Function, at_zero: int, up_to: float, starts: Complex) -> Roots:
     """Zeros of the quantity in a box of that height; the box grows a little where a zero lies on its edge."""
-    function = _function(k, name)
 
     def box_of(height: float) -> Box:
         return Box(-min(CLEAR / k.damping, height) if k.damping else -height, height, -height, height)
 
     found, box = complete(function, box_of, up_to, starts)
-    if k.damping == 0:  # zeros come in +- pairs too
+    if k.is_undamped:  # zeros come in +- pairs too
         found = np.where(abs(found.real) < REAL * abs(found), 1j * found.imag, found)
     found = found[np.lexsort((-found.imag, found.real, abs(found.imag).round(9)))]
     return Roots(np.r_[np.zeros(at_zero, complex), found], (*box,), "winding number")

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tfarm.arm import Arm, must_be_arm
 from tfarm.errors import MISSING, ParameterError
-from tfarm.exact.coefficients import coefficients
+from tfarm.exact.system import system_of
 from tfarm.exact.methods import Method, known_method, slow_values
 from tfarm.exact.outputs import Output, output
 from tfarm.exact.values import (
@@ -63,7 +63,7 @@ class TransferFunction:
         if not asked:
             raise ParameterError(key="outputs", value=outputs, remedy="name at least one output")
         self.rows: tuple[Output, ...] = tuple(output(each) for each in asked)
-        self._k = coefficients(arm)
+        self._k = system_of(arm)
         self._table = kernel_table(self._k, self.rows)
         self.x = self._place(x)
 

@@ -9,9 +9,12 @@ import flint
 
 from tfarm.exact.balls import rational
 from tfarm.exact.closed_form import from_waves
+from tfarm.exact.chain import Chain
 from tfarm.exact.coefficients import Coefficients
+from tfarm.exact.system import System
 from tfarm.exact.compiled import plain
 
+from .chain_axis import ChainAxis
 from .counting import row_of, steps_of
 
 Ball = Any
@@ -81,7 +84,12 @@ class Axis:
         return number + (travelling == 2)
 
 
-def secant(axis: Axis, omega: float, digits: int) -> Ball | None:
+def axis_of(k: System) -> Axis | ChainAxis:
+    """The system on the imaginary axis, at the working precision."""
+    return ChainAxis(k) if isinstance(k, Chain) else Axis(k)
+
+
+def secant(axis: Axis | ChainAxis, omega: float, digits: int) -> Ball | None:
     """The root next to omega by the secant method on midpoints; None if it does not settle close by."""
     before, now = flint.arb(omega), flint.arb(omega) * (1 + flint.arb(2) ** -50)
     value_before = axis.drive(before).mid()

@@ -15,7 +15,7 @@ is no silent downgrade.  Exactly double frequencies change no sign and cannot be
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
@@ -23,10 +23,10 @@ from numpy.typing import NDArray
 
 from tfarm.errors import CertificationError
 from tfarm.exact.balls import precision, rational
-from tfarm.exact.coefficients import Coefficients
+from tfarm.exact.system import System
 from tfarm.records import record
 
-from .ball_axis import Axis, precisions, secant
+from .ball_axis import axis_of, precisions, secant
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,12 +39,12 @@ class Certificate:
     below: str
 
 
-def certify(k: Coefficients, omega: NDArray[np.float64], above: float, digits: int, rigid: int) -> Certificate:
+def certify(k: System, omega: NDArray[np.float64], above: float, digits: int, rigid: int) -> Certificate:
     """Prove that the frequencies omega (ascending) are all there are below a point before `above`, the next one.
 
     Raises CertificationError saying what could not be proven.
     """
-    k = replace(k, damping=0.0)
+    k = k.with_damping(0.0)
     brackets = [_bracket(k, float(each), digits) for each in omega]
     for (_, upper), (lower, _), each in zip(brackets, brackets[1:], omega, strict=False):
         if upper > lower:
@@ -60,13 +60,13 @@ def certify(k: Coefficients, omega: NDArray[np.float64], above: float, digits: i
     return Certificate(texts, count, below)
 
 
-def _bracket(k: Coefficients, omega: float, digits: int) -> tuple[Fraction, Fraction]:
+def _bracket(k: System, omega: float, digits: int) -> tuple[Fraction, Fraction]:
     """Neighbouring decimals of so many digits with a proven sign change of D between them."""
     exponent = math.floor(math.log10(omega)) - digits + 1
     unit = Fraction(10) ** exponent
     for bits in precisions(digits):
         with precision(bits):
-            axis = Axis(k)
+            axis = axis_of(k)
             root = secant(axis, omega, digits)
             if root is None:
                 continue
@@ -81,14 +81,14 @@ def _bracket(k: Coefficients, omega: float, digits: int) -> tuple[Fraction, Frac
     )
 
 
-def _count_above(k: Coefficients, last: Fraction, above: float) -> tuple[int, str]:
+def _count_above(k: System, last: Fraction, above: float) -> tuple[int, str]:
     """A proven count somewhere between the last bracket and the next frequency, and where."""
     gap = Fraction(above) - last
     for share in (Fraction(1, 2), Fraction(2, 5), Fraction(3, 5), Fraction(1, 7), Fraction(6, 7)):
         point = Fraction(float(last + gap * share))
         for bits in (128, 512, 4096):
             with precision(bits):
-                count = Axis(k).count(rational(point)) if point > last else None
+                count = axis_of(k).count(rational(point)) if point > last else None
                 if count is not None:
                     return count, repr(float(point))
     raise CertificationError(f"no proven count between {float(last):.10g} and {above:.10g} rad/s")

@@ -11,19 +11,24 @@ from numpy.typing import NDArray
 
 from tfarm.errors import ConvergenceError
 from tfarm.exact.balls import State, nearest, point, precision
+from tfarm.exact.chain import Chain, Place
+from tfarm.exact.chain_values import free_fields
 from tfarm.exact.characteristic import characteristic
 from tfarm.exact.coefficients import Coefficients, Condition
 from tfarm.exact.free import free_response
+from tfarm.exact.system import System
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 
-def mode_field(k: Coefficients, s: complex, quantity: str, x: NDArray[np.float64]) -> Complex:
+def mode_field(k: System, s: complex, quantity: str, x: NDArray[np.float64]) -> Complex:
     """ "W", "Psi" or "M" (dimensionless lengths and moments) at the shares x, of unit modal mass in SI units.
 
     At an eigenvalue  D'(s) theta = a  (locked hub: D'(s) M0 = a),  a the mode's  2 s (mass) + (damping)  in the shape's
     own scale (reciprocity, differentiated); the shape is scaled to  a = 2 s, its tip moving up (turning, if pinned).
     """
+    if isinstance(k, Chain):
+        return _of_chain(k, s, quantity, x)
     at = np.array([s])
     free = free_response(k, at)
     theta, M0, slope = (complex(part) for part in (free.theta.c[0][0], free.M.c[0][0], characteristic(k, at).slope[0]))
@@ -43,6 +48,24 @@ def mode_field(k: Coefficients, s: complex, quantity: str, x: NDArray[np.float64
     unit = -unit if (unit * tip).real < 0 else unit
     shape: Complex = unit * np.array(values, dtype=complex)
     return shape
+
+
+def _of_chain(k: Chain, s: complex, quantity: str, x: NDArray[np.float64]) -> Complex:
+    """`mode_field` of a chain: the reciprocity is that of torque and hub angle, or of hub angle and moment if held."""
+    at, places = np.array([s]), [Place(Fraction(float(share))) for share in (*x, 1.0)]
+    fields, theta, M, _ = free_fields(k, at, places)
+    slope = characteristic(k, at).slope[0]
+    lag = 1.0 + float(k.drive.lag) * s
+    product = complex(slope * (theta[0] / lag if k.drive.turns else -M[0]))
+    if product == 0 or not np.isfinite(product):
+        raise ConvergenceError(f"the hub does not feel the mode at {s:.6g} 1/s, or it is double", s, slope)
+    values = fields[("W", "Psi", "M").index(quantity), 0]
+    if quantity == "M":
+        damping = [segment.damping for segment in k.at(tuple(dict.fromkeys(places))).read]
+        values = values / (1.0 + s * np.array([damping[list(dict.fromkeys(places)).index(each)] for each in places]))
+    unit = np.sqrt(2 * s / product * float(k.length / k.EI))
+    tip = fields[0 if isinstance(k.tip_mass, Fraction) else 1, 0, -1]
+    return np.asarray((-unit if (unit * tip).real < 0 else unit) * values[:-1], dtype=complex)
 
 
 def _at(state: State, quantity: str, x: float) -> Any:

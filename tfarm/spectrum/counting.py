@@ -22,8 +22,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.exact.axis import bisect, drives
+from tfarm.exact.chain import Chain
+from tfarm.exact.chain_axis import bisect_chain, counted, counts
 from tfarm.exact.coefficients import Coefficients, Condition
+from tfarm.exact.system import System
 from tfarm.exact.vector import DAMPING
+
+
+class ChainCounter:
+    """N(omega) of a chain, as `Counter` is of an arm (see `tfarm.exact.chain_axis`)."""
+
+    def __init__(self, chain: Chain) -> None:
+        self._rows, self._ends = counted(chain.with_damping(0.0).at())
+
+    def __call__(self, omega: NDArray[np.float64]) -> NDArray[np.int64]:
+        """The counts, in the shape of omega (1-D, rad/s, positive)."""
+        return counts(np.ascontiguousarray(omega, dtype=float), self._rows, self._ends)
+
+    def first_reaching(self, number: NDArray[np.int64], below: float) -> NDArray[np.float64]:
+        """The smallest floats [rad/s] with a count of `number` at least, by bisection of 0..below."""
+        low, high = np.zeros(number.size), np.full(number.size, below)
+        bisect_chain(number, self._rows, self._ends, low, high)
+        return high
+
+
+def counter_of(k: System) -> Counter | ChainCounter:
+    """The count of a system."""
+    return ChainCounter(k) if isinstance(k, Chain) else Counter(k)
 
 
 class Counter:

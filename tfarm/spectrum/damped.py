@@ -18,6 +18,7 @@ from tfarm.arm import Arm, Theory
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
 from tfarm.exact.characteristic import OPEN, Gains, quick_characteristic, zeros_at_origin
 from tfarm.exact.coefficients import Coefficients
+from tfarm.exact.system import System
 from tfarm.records import record
 
 from .box import Box, Complex, Function, winding_number
@@ -46,7 +47,8 @@ class DampedModes:
     slower first (overdamped); 0 and 0 for the rigid body.  (An overdamped mode whose fast zero has met the third one of
     its wave rings again, in shear: that pair is listed, not its slow zero near -1/C.)  `box` [1/s] holds `count`
     eigenvalues, all of them listed.  `left_out` modes that were asked for are not in the record: from the next one on
-    branches could not be told apart.
+    branches could not be told apart.  `others` are real eigenvalues of the motor's circuit, which belong to no mode.
+    Where friction at the hub resists the turning rig, the second eigenvalue of mode 0 is not 0 but about -b/J.
     """
 
     undamped: Modes
@@ -54,6 +56,7 @@ class DampedModes:
     box: Box
     count: int
     left_out: int = 0
+    others: tuple[float, ...] = ()
 
     @property
     def index(self) -> NDArray[np.int64]:
@@ -84,20 +87,27 @@ class DampedModes:
 
         Raises CertificationError where something cannot be proven.
         """
-        k, discs = self.undamped.coefficients, []
-        for pair in self.eigenvalues[self.index > 0]:
-            wanted = pair[:1] if pair[0].imag > 0 else pair
+        k, discs = self.undamped.system, []
+        for pair in self._listed:
+            wanted = pair[:1] if pair[0].imag > 0 else pair[np.isfinite(pair)]
             discs.append(tuple(enclosed(k, complex(zero), digits) for zero in wanted))
             for zero, disc in zip(wanted, discs[-1], strict=True):
-                _compared(complex(zero), disc, abs(pair[0] - pair[1]))
+                _compared(complex(zero), disc, abs(pair[0] - pair[-1]) if np.isfinite(pair[-1]) else abs(zero))
         if not disjoint([disc for pair in discs for disc in pair]):
             raise CertificationError("the discs of two eigenvalues touch: ask for more digits")
         proven = proven_count(k, self.box)
-        listed = int(self.box.holds(self.eigenvalues[self.index > 0].ravel()).sum()) + zeros_at_origin(k)
+        listed = int(self.box.holds(self._listed.ravel()).sum()) + zeros_at_origin(k)
         if not listed == self.count == proven:
             text = f"{listed} eigenvalues in the box are listed and {self.count} claimed, but {proven} are there"
             raise CertificationError(text)
         return tuple(discs)
+
+    @property
+    def _listed(self) -> Complex:
+        """Every eigenvalue of the record but those at 0, (n, 2): the flexible modes', then single ones beside NaN."""
+        turning = self.eigenvalues[(self.index == 0)][:, 1]
+        alone = [*turning[turning != 0], *self.others]
+        return np.concatenate([self.eigenvalues[self.index > 0], [[each, np.nan] for each in alone]] if alone else [self.eigenvalues[self.index > 0]])
 
     # ------------------------------------------------------------ shapes
 
@@ -106,7 +116,7 @@ class DampedModes:
 
         Scaled so that the residue of w(x) over torque is w(x) psi(0)/(2 s), as for undamped modes of unit modal mass.
         """
-        return self._field("W", x) * float(self.undamped.coefficients.length)
+        return self._field("W", x) * float(self.undamped.system.length)
 
     def rotation(self, x: NDArray[np.float64] | float) -> Complex:
         """Total rotation psi(x) [rad], as `shape`."""
@@ -114,11 +124,11 @@ class DampedModes:
 
     def moment(self, x: NDArray[np.float64] | float) -> Complex:
         """Elastic bending moment E I psi'(x) [N m], without its damping part, as `shape`."""
-        k = self.undamped.coefficients
+        k = self.undamped.system
         return self._field("M", x) * float(k.EI / k.length)
 
     def _field(self, quantity: str, x: NDArray[np.float64] | float) -> Complex:
-        k = self.undamped.coefficients
+        k = self.undamped.system
         share = np.asarray(x, dtype=float) / float(k.length)
         if not np.all((share >= 0) & (share <= 1)):
             raise ParameterError(key="x", value=x, remedy=f"a point of the arm lies between 0 and {float(k.length)} m")
@@ -142,7 +152,7 @@ def damped_modes(undamped: Modes) -> DampedModes:
     """
     asked, lost = int(undamped.index.max()), None
     for count in sorted({asked, *FEWER}, reverse=True):
-        if count > asked or (count > FEWER[0] and undamped.arm.link.damping):
+        if count > asked or (count > FEWER[0] and not undamped.arm.is_undamped):
             continue
         some = undamped if count == asked else modes(undamped.arm, count, theory=undamped.theory)
         try:
@@ -185,36 +195,71 @@ class Branches:
 
     def __call__(self, undamped: Modes) -> DampedModes:
         """The modes with the C of this table's arm.  Raises ConvergenceError as `all_damped_modes` does."""
-        k, C = undamped.coefficients, undamped.arm.link.damping
-        flexible = int((undamped.index > 0).sum())
-        zeros = self._followed(undamped, flexible)
-        listed, company = zeros[:flexible], zeros[flexible:]
-        box, count = complete_box(member(k).function, listed, company, C)
+        k = undamped.system
+        flexible, alone = int((undamped.index > 0).sum()), len(single_zeros(undamped, 1.0))
+        zeros = self._followed(undamped, flexible + alone)
+        listed, company = zeros[: flexible + alone], zeros[flexible + alone :]
+        box, count = complete_box(member(k).function, listed, company, k.damping)
+        single = listed[:alone]
+        if single.size and (np.isfinite(single[:, 1]).any() or single[:, 0].imag.any()):
+            raise ConvergenceError("friction at the hub or the motor's circuit rings with a flexible mode", single, 0)
+        resisted = int(bool(alone) and k.at_rest == 1)
         rigid = np.zeros((undamped.index.size - flexible, 2), complex)
-        return DampedModes(undamped, np.concatenate([rigid, listed]), box, count + zeros_at_origin(k))
+        rigid[:, 1] = single[:resisted, 0] if resisted else 0.0
+        others = tuple(float(each) for each in single[resisted:, 0].real)
+        eigenvalues = np.concatenate([rigid, listed[alone:]])
+        return DampedModes(undamped, eigenvalues, box, count + zeros_at_origin(k), others=others)
 
     def _followed(self, undamped: Modes, wanted: int) -> Complex:
         """The zeros that the first modes, and those in their company, arrive at."""
-        k, C = undamped.coefficients, undamped.arm.link.damping
+        k = undamped.system
+        C = level_of(k)
         lost: ConvergenceError | None = None
         for company in self.companies:
             key = wanted, company
             if key in self._lost and self._lost[key][0] <= C:
                 lost = self._lost[key][1]
                 continue
-            met = self._met.get(key) or [_undamped_node(undamped, wanted + company)]
+            met = self._met.get(key) or [_first_node(undamped, wanted + company, C)]
             start = sorted((node for node in met if node.at <= C), key=lambda node: node.at)[-1]
-            first = C - start.at if start.at else min(C, FIRST / abs(start.zeros[-1, 0]))
+            first = C - start.at if len(met) > 1 else min(C, FIRST / abs(start.zeros[-1, 0]))
             try:
-                nodes = follow(lambda C: member(replace(k, damping=C)), start, C, first, wanted)
+                nodes = follow(lambda level: member(k.with_damping(level / C if C else 0.0)), start, C, first, wanted)
             except ConvergenceError as error:
                 lost = error
                 self._lost[key] = C, error
                 continue
-            self._met[key] = [*met, *nodes[1:]]
+            self._met[key] = [*met, *nodes[1:]] if isinstance(k, Coefficients) else []  # one C is not all there is
             return nodes[-1].zeros if C == 0 else polished(member(k), nodes[-1].zeros)
         assert lost is not None
         raise lost
+
+
+def level_of(k: System) -> float:
+    """How far a system's damping is from none: its C [s], 1 s where it is damped otherwise, 0 where it is not."""
+    return 0.0 if k.is_undamped else k.damping or 1.0
+
+
+def single_zeros(undamped: Modes, share: float) -> list[float]:
+    """Real eigenvalues [1/s] that no flexible mode goes over into, under little of the damping: -b/J, and -R/L_a."""
+    k = undamped.system
+    if isinstance(k, Coefficients):
+        return []
+    friction = float((k.drive.friction + k.drive.back_emf) * k.EI / k.length)
+    turning = [-share * friction / undamped.arm.total_inertia] if k.at_rest == 1 else []
+    return turning + ([-1.0 / float(k.drive.lag)] if k.drive.lag else [])
+
+
+def _first_node(undamped: Modes, count: int, level: float) -> Node:
+    """Where the way begins: at no damping, or at so little that what friction makes of the double zero at 0 is apart."""
+    alone = single_zeros(undamped, 1.0)
+    node = _undamped_node(undamped, count - len(alone))
+    if not alone:
+        return node
+    share = min(1e-3, 1e-3 * abs(node.zeros[0, 0] / alone[0]))
+    single = np.array([[zero, np.nan] for zero in single_zeros(undamped, share)], dtype=complex)
+    start = member(undamped.system.with_damping(share))
+    return Node(share * level, polished(start, np.concatenate([single, node.zeros])))
 
 
 def _undamped_node(undamped: Modes, count: int) -> Node:
@@ -224,7 +269,7 @@ def _undamped_node(undamped: Modes, count: int) -> Node:
     return Node(0.0, np.stack([1j * omega, -1j * omega], 1))
 
 
-def member(k: Coefficients, gains: Gains = OPEN) -> Member:
+def member(k: System, gains: Gains = OPEN) -> Member:
     """The characteristic function without its zeros at the origin, to be followed."""
     at_zero = zeros_at_origin(k, gains)
     singular = -1.0 / k.damping if k.damping else -np.inf

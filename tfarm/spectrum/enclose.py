@@ -22,7 +22,7 @@ import numpy as np
 from tfarm.errors import CertificationError
 from tfarm.exact.balls import Ball, point, precision, rational
 from tfarm.exact.characteristic import OPEN, Gains
-from tfarm.exact.coefficients import Coefficients
+from tfarm.exact.system import System
 from tfarm.exact.wide_balls import characteristic_over, tangent
 
 from .ball_axis import precisions
@@ -48,7 +48,7 @@ class Disc:
         return float(self.im) == 0
 
 
-def proven_count(k: Coefficients, box: Box, gains: Gains = OPEN) -> int:
+def proven_count(k: System, box: Box, gains: Gains = OPEN) -> int:
     """How many zeros of D lie in a box symmetric about the real axis, with multiplicity, those at s = 0 included.
 
     Raises CertificationError where a zero is too near the contour, where it would take too many pieces, or -1/C is
@@ -68,7 +68,7 @@ def proven_count(k: Coefficients, box: Box, gains: Gains = OPEN) -> int:
     return int(number)
 
 
-def _turning(k: Coefficients, gains: Gains, a: Ball, b: Ball) -> Ball:
+def _turning(k: System, gains: Gains, a: Ball, b: Ball) -> Ball:
     """The change of arg D along the piece from a to b."""
     total, start, step, pieces = flint.arb(0), 0.0, 1 / 32, 0
     here, value = a, characteristic_over(k, a, gains)
@@ -90,7 +90,7 @@ def _turning(k: Coefficients, gains: Gains, a: Ball, b: Ball) -> Ball:
     return total
 
 
-def enclosed(k: Coefficients, near: complex, digits: int, gains: Gains = OPEN) -> Disc:
+def enclosed(k: System, near: complex, digits: int, gains: Gains = OPEN) -> Disc:
     """A disc with one zero, its radius one unit in the last of `digits` significant digits of |s| or less.
 
     Raises CertificationError where no disc can be proven, around a double zero for instance.
@@ -109,7 +109,7 @@ def enclosed(k: Coefficients, near: complex, digits: int, gains: Gains = OPEN) -
     )
 
 
-def _newton(k: Coefficients, gains: Gains, near: complex, digits: int) -> Ball | None:
+def _newton(k: System, gains: Gains, near: complex, digits: int) -> Ball | None:
     """Newton's method on the middles of balls; real starts stay real."""
     s = point(near)
     for _ in range(40):
@@ -124,7 +124,7 @@ def _newton(k: Coefficients, gains: Gains, near: complex, digits: int) -> Ball |
     return None
 
 
-def _holds_one(k: Coefficients, gains: Gains, m: Ball, r: Ball) -> bool:
+def _holds_one(k: System, gains: Gains, m: Ball, r: Ball) -> bool:
     """Rouche's theorem with the tangent at m, on the disc of radius r."""
     parts = tangent(k, m, r, gains)
     if parts is None:

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import flint
 
 from tfarm.errors import ConvergenceError
 from tfarm.exact.balls import precision
-from tfarm.exact.coefficients import Coefficients
+from tfarm.exact.system import System
 
-from .ball_axis import Axis, precisions, secant
+from .ball_axis import axis_of, precisions, secant
 
 
-def refine(k: Coefficients, omega: float, digits: int) -> str:
+def refine(k: System, omega: float, digits: int) -> str:
     """The natural frequency next to omega [rad/s], with that many right digits, as a decimal string.
 
     The sign of D(i w) is proven to change within a tenth of the last digit of the root that is printed.
@@ -21,7 +19,7 @@ def refine(k: Coefficients, omega: float, digits: int) -> str:
     """
     for bits in precisions(digits):
         with precision(bits):
-            axis = Axis(replace(k, damping=0.0))
+            axis = axis_of(k.with_damping(0.0))
             root = secant(axis, omega, digits)
             if root is None:
                 continue

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from tfarm.errors import ConvergenceError
 from tfarm.exact.balls import precision, rational
-from tfarm.exact.coefficients import Coefficients
+from tfarm.exact.system import System
 
-from .ball_axis import Axis
-from .counting import Counter
+from .ball_axis import axis_of
+from .counting import ChainCounter, Counter, counter_of
 
 CLOSE = 1e-3  # share of the mean spacing; further apart, rounding moves neither by more than a few last units
 REACH = 4e-6  # relative width in which float64 surely has each of a close pair
@@ -25,7 +25,7 @@ PAIR_BITS = 256  # of working precision, for a double frequency to its last floa
 
 
 @lru_cache(maxsize=32)  # a table of sampled verdicts asks for the same undamped arm some twenty times
-def natural_frequencies(k: Coefficients, first: int, last: int) -> NDArray[np.float64]:
+def natural_frequencies(k: System, first: int, last: int) -> NDArray[np.float64]:
     """The natural frequencies [rad/s] number first..last of the undamped arm, counted from 1, double ones twice.
 
     Each is the point where the count steps from below its number to it, bisected to neighbouring floats: no
@@ -34,7 +34,7 @@ def natural_frequencies(k: Coefficients, first: int, last: int) -> NDArray[np.fl
     """
     lowest = min(first, 1 + k.has_rigid_mode)  # not the rigid body at zero: bisection would run down all exponents
     number = np.arange(max(first - 1, lowest), last + 2)  # with both neighbours: one of them may be close
-    count = Counter(k)
+    count = counter_of(k)
     omega = count.first_reaching(number, _upper_bound(count, k, int(number[-1])))
     close = np.diff(omega) * number[1:] < CLOSE * omega[1:]
     for i in np.nonzero(np.r_[close, False] | np.r_[False, close])[0]:
@@ -44,12 +44,12 @@ def natural_frequencies(k: Coefficients, first: int, last: int) -> NDArray[np.fl
     return found
 
 
-def _settle(k: Coefficients, number: int, omega: float) -> float:
+def _settle(k: System, number: int, omega: float) -> float:
     """The frequency of that number, close to omega, by the count in balls (in float64 where a ball cannot tell)."""
-    count = Counter(k)
+    count = counter_of(k)
     low, high = omega * (1 - REACH), omega * (1 + REACH)
     with precision(PAIR_BITS):
-        axis = Axis(k)
+        axis = axis_of(k)
         while low < (middle := 0.5 * (low + high)) < high:
             below = axis.count(rational(middle))
             below = int(count(np.array([middle]))[0]) if below is None else below
@@ -57,14 +57,14 @@ def _settle(k: Coefficients, number: int, omega: float) -> float:
     return high
 
 
-def count_below(k: Coefficients, omega: float) -> int:
+def count_below(k: System, omega: float) -> int:
     """How many natural frequencies lie below omega [rad/s]."""
-    return int(Counter(k)(np.array([omega]))[0])
+    return int(counter_of(k)(np.array([omega]))[0])
 
 
-def _upper_bound(count: Counter, k: Coefficients, last: int) -> float:
+def _upper_bound(count: Counter | ChainCounter, k: System, last: int) -> float:
     """A frequency above the last one wanted: the Euler-Bernoulli estimate, doubled until the count says so."""
-    omega = unit = ((last + 1) * math.pi) ** 2 / math.sqrt(k.g)
+    omega = unit = ((last + 1) * math.pi) ** 2 / k.transit**2
     while omega < 1e12 * unit:
         if count(np.array([omega]))[0] >= last:
             return omega

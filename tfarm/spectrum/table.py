@@ -13,10 +13,13 @@ from tfarm.arm import THEORIES, Arm, Theory, must_be_arm
 from tfarm.arm.checks import whole
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exact.appendix import natural_frequency, roots_near
-from tfarm.exact.coefficients import Coefficients, coefficients
+from tfarm.exact.chain import Chain
+from tfarm.exact.coefficients import Coefficients
+from tfarm.exact.system import System, shear_flexibility, system_of
 from tfarm.exact.methods import DIGITS, Method, known_method
 from tfarm.records import record
 
+from .chain_shapes import ChainShapes
 from .certify import Certificate, certify
 from .precise import refine
 from .search import count_below, natural_frequencies
@@ -53,12 +56,12 @@ class Modes:
     theory: Theory
     index: NDArray[np.int64]
     natural_frequency: Real
-    _k: Coefficients = field(repr=False)
+    _k: System = field(repr=False)
 
     @property
-    def coefficients(self) -> Coefficients:
-        """The arm's dimensionless coefficients under this theory, with its damping."""
-        return replace(self._k, damping=self.arm.link.damping)
+    def system(self) -> System:
+        """The arm's system under this theory, with its damping."""
+        return system_of(self.arm, self.theory)
 
     @property
     def natural_frequency_hz(self) -> Real:
@@ -161,9 +164,12 @@ class Modes:
     def sensitivity(self) -> dict[str, Real]:
         """d ln w / d ln p, per cent per per cent, of each frequency by each of `PARAMETERS` (zero for a rigid mode).
 
-        Exact, from the energies of the mode (Rayleigh's quotient is stationary).  Each parameter varies alone:
+        Exact, from the energies of the mode (Rayleigh's quotient is stationary).  Each parameter varies alone (a chain, of whose
+        segments each has its own, has no entry here):
         Young's modulus with G held, the area with I held.  An infinite or zero inertia counts as zero.
         """
+        if isinstance(self._k, Chain):
+            return {}
         bend, shear, slide, move, turn, mass, inertia, hub = self._energies
         by_length = -bend + shear - 2 * slide - move - turn
         halves = {
@@ -183,12 +189,14 @@ class Modes:
     @cached_property
     def _energies(self) -> tuple[Real, ...]:
         """Shares of each mode's energy: bending, shear, shear cross term; kinetic ones. Both kinds sum to 1."""
+        assert isinstance(self._shapes, Shapes)
         parts = (self._shapes.part(block.start, block.stop) for block in self._shapes.blocks())
         energies = [self._energies_of(part) for part in parts]
         return tuple(map(np.concatenate, zip(*energies, strict=True)))
 
     def _energies_of(self, shapes: Shapes) -> tuple[Real, ...]:
         k = self._k
+        assert isinstance(k, Coefficients)
         x, weight = shapes.quadrature()
         W, Psi, M, Q = shapes(x)
         tip, hub = shapes(np.ones(1))[..., 0], shapes.theta()
@@ -212,8 +220,9 @@ class Modes:
         return math.sqrt(float(self._k.length / self._k.EI))
 
     @cached_property
-    def _shapes(self) -> Shapes:
-        return Shapes(self._k, self.natural_frequency[self._rigid :])
+    def _shapes(self) -> Shapes | ChainShapes:
+        k, flexible = self._k, self.natural_frequency[self._rigid :]
+        return ChainShapes(k, flexible) if isinstance(k, Chain) else Shapes(k, flexible)
 
     def _field(self, which: int, x: NDArray[np.float64] | float) -> Real:
         share = np.asarray(x, dtype=float) / float(self._k.length)
@@ -238,11 +247,11 @@ class Modes:
         x = low + (high - low) * W[start] / (W[start] - W[start + 1])
         for _ in range(6 if x.size else 0):
             W, Psi, _, Q = shape(x)[:, 0]
-            x = np.clip(x - W / (Psi + float(self._k.sigma) * Q), low, high)
+            x = np.clip(x - W / (Psi + shear_flexibility(self._k, x) * Q), low, high)
         return x
 
 
-def modes(arm: Arm, count: int | None = None, *, up_to: float | None = None, theory: Theory = "timoshenko") -> Modes:
+def modes(arm: Arm, count: int | None = None, *, up_to: float | None = None, theory: Theory | None = None) -> Modes:
     """All undamped modes of the arm: the first `count` flexible ones, or all with a frequency below `up_to` [rad/s].
 
     Complete by construction (Wittrick and Williams 1971), for any hub and payload, above the shear cut-off, and with
@@ -250,7 +259,8 @@ def modes(arm: Arm, count: int | None = None, *, up_to: float | None = None, the
     Raises ParameterError for a count outside 1..10000 or a frequency that is not positive.
     """
     must_be_arm(arm)
-    k = replace(coefficients(arm, theory), damping=0.0)
+    theory = arm.theory if theory is None else theory
+    k = system_of(arm, theory).with_damping(0.0)
     rigid = arm.has_rigid_mode
     if (count is None) == (up_to is None):
         raise ParameterError(key="count", value=count, remedy="give either a count of modes or a frequency up_to")
@@ -280,9 +290,9 @@ def compare_theories(table: Modes) -> dict[Theory, Real]:
     return {theory: by_theory.get(theory, table).natural_frequency for theory in THEORIES}
 
 
-def modes_below(arm: Arm, up_to: float, *, theory: Theory = "timoshenko") -> int:
+def modes_below(arm: Arm, up_to: float, *, theory: Theory | None = None) -> int:
     """How many flexible modes the undamped arm has below up_to [rad/s], by the count alone."""
-    return count_below(replace(coefficients(arm, theory), damping=0.0), up_to) - arm.has_rigid_mode
+    return count_below(system_of(arm, theory).with_damping(0.0), up_to) - arm.has_rigid_mode
 
 
 def flexible_frequencies(arm: Arm, up_to: float) -> Real:

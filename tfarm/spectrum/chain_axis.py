@@ -1,0 +1,137 @@
+"""A chain without damping on the imaginary axis in real balls: its determinant and its count, each sign certain or not.
+
+The steps of the count are those of `tfarm.exact.chain_axis`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import flint
+
+from tfarm.exact.balls import rational
+from tfarm.exact.chain import Chain, Element, Segment, Spring
+from tfarm.exact.chain_balls import Sweep, drive_of
+from tfarm.exact.compiled import plain
+from tfarm.exact.compound import Plane, across_waves
+
+Ball = Any
+_across_waves = plain(across_waves)
+
+
+class Uncertain(Exception):
+    """A sign, or a number of half waves, that these balls do not determine."""
+
+
+class AxisSweep(Sweep):
+    """The sweep at s = i omega, in real balls: `s` stands for 0, `S` for -omega^2.  It counts on its way."""
+
+    def __init__(self, chain: Chain, omega: Ball, counting: bool) -> None:
+        self._omega, self._counting = omega, counting
+        self.number = 0
+        self._free = sum(not isinstance(end, float) for end in (chain.tip_mass, chain.tip_inertia))
+        super().__init__(chain.at(), flint.arb(0), -omega * omega)
+
+    @property
+    def drive(self) -> Ball:
+        """D(i omega)."""
+        drive = self.layout.chain.drive
+        return drive_of(drive, flint.arb(0), self.theta, self.M) + self.S * rational(drive.of_angle[2]) * self.theta
+
+    def _inside(self, element: Element, p: Plane) -> Plane:
+        if isinstance(element, Segment):
+            return self._joined(element, p)
+        p = super()._inside(element, p)
+        if isinstance(element, Spring):
+            self._step(p[0], 1)
+        return p
+
+    def _joined(self, element: Segment, p: Plane) -> Plane:
+        w, m, q = (rational(unit) for unit in element.units)
+        own = p[0] * w, p[1] * (w * m), p[2] * m, p[3] * q, p[4] * (m * q)
+        a, b, g = (rational(number) for number in element[:3])
+        waves, gS = self._waves(a, b, g), self.S * g
+        one, two = waves
+        gap = one[2] - two[2]
+        unit = 1 / (gS * gap * gap)
+        inside = tuple(part * unit for part in _across_waves(*one, *two, gS, flint.arb(1), self.S * (a - b), own))
+        if self._counting:
+            zero = flint.arb(0)
+            held = (zero, zero, zero, zero, flint.arb(1))
+            r = [part * unit for part in _across_waves(*one, *two, gS, flint.arb(1), self.S * (a - b), held)]
+            self._count_segment([one[2], two[2]], own, inside, r)
+        self._free = 2
+        return inside[0] / w, inside[1] / (w * m), inside[2] / m, inside[3] / q, inside[4] / (m * q)
+
+    def _count_segment(self, z: Sequence[Ball], p: Plane, q: Plane, r: Sequence[Ball]) -> None:
+        outside, self.number = self.number, _pinned(z)
+        self._step(r[1], -1)
+        self._step(-r[0], -1)
+        self.number += outside
+        if self._free == 2:
+            self._step(-r[0] * p[3] - r[3] * p[0], 1)
+        if self._free:
+            self._step(q[0], 1)
+
+    def _step(self, value: Ball, step: int) -> None:
+        """The count one step on, where the sign of the determinant asks for it."""
+        if not self._counting:
+            return
+        if not (value > 0 or value < 0):
+            raise Uncertain
+        self.number += step * ((self.number % 2 == 1) != bool(value < 0))
+
+    def released(self) -> int:
+        """The count with the hub let go, where it is not held."""
+        if self.layout.chain.drive.turns:
+            self._step(self.drive, 1)
+        return self.number
+
+    def _waves(self, a: Ball, b: Ball, g: Ball) -> tuple[tuple[Ball, ...], tuple[Ball, ...]]:
+        """c, sinh t / t, z, v and the scale of both waves; real, whether they decay or travel."""
+        half, product = self.S * (a + b) / 2, self.S * (a * b * self.S + g)
+        spread = (half * half - product).sqrt()
+
+        def functions(z: Ball) -> tuple[Ball, ...]:
+            if z < 0:
+                k = (-z).sqrt()
+                sine, cosine = k.sin_cos()
+                return cosine, sine / k, z, z - self.S * b, flint.arb(1)
+            t = z.sqrt()
+            e = (-t).exp()
+            return (1 + e * e) / 2, (1 - e * e) / (2 * t), z, z - self.S * b, e
+
+        return functions(half + spread), functions(half - spread)
+
+
+class ChainAxis:
+    """A chain on the imaginary axis in real balls, at the working precision, as `ball_axis.Axis` is of an arm."""
+
+    def __init__(self, chain: Chain) -> None:
+        self._chain = chain.with_damping(0.0)
+
+    def drive(self, omega: Ball) -> Ball:
+        """D(i omega) times a positive factor."""
+        return AxisSweep(self._chain, omega, counting=False).drive
+
+    def count(self, omega: Ball) -> int | None:
+        """N(omega), the rigid-body mode included; None if a sign or a half wave is not certain."""
+        try:
+            return AxisSweep(self._chain, omega, counting=True).released()
+        except Uncertain:
+            return None
+
+
+def _pinned(z: Sequence[Ball]) -> int:
+    """The count of a segment pinned at both ends: half waves inside it, and one above the cut-off."""
+    number, travelling = 0, 0
+    for each in z:
+        if each < 0:
+            whole = ((-each).sqrt() / flint.arb.pi()).floor().unique_fmpz()
+            if whole is None:
+                raise Uncertain
+            number, travelling = number + int(whole), travelling + 1
+        elif not each > 0:
+            raise Uncertain
+    return number + (travelling == 2)

@@ -1,0 +1,121 @@
+"""Mode shapes of a chain: the free response at its natural frequencies, in float64, of unit modal mass.
+
+At an eigenvalue the state that the axis allows (W = 0) meets the plane of the payload's states everywhere along the
+link, so the sweeps of the response give the shape at any number of places at once.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from copy import copy
+from fractions import Fraction
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.errors import ConvergenceError
+from tfarm.exact.chain import Body, Chain, Place, Segment
+from tfarm.exact.chain_values import free_fields
+
+Real = NDArray[np.float64]
+
+GAUSS = 16  # points a panel; exact for the products of waves below once a panel holds a few radians
+
+
+class ChainShapes:
+    """The modes of an undamped chain at its natural frequencies, dimensionless, of unit modal mass times EI/L.
+
+    Call it with x (shares of the length, 1-D) for W, Psi, M, Q, each of shape (modes, x); at a joint or a body they are
+    those of its outer side.  Raises ConvergenceError for a mode that the hub's axis cannot tell from another one.
+    """
+
+    def __init__(self, chain: Chain, omega: Real) -> None:
+        self.chain, self.omega = chain, omega
+        self._factor = np.ones(omega.size)
+        with np.errstate(all="ignore"):
+            self._factor = 1.0 / np.sqrt(self.masses())
+        self._forget()
+        if not np.isfinite(self._factor).all():
+            worst = float(omega[~np.isfinite(self._factor)][0])
+            raise ConvergenceError(f"the mode at {worst:.10g} rad/s has no shape of its own: a double one", worst, 0.0)
+        tip, theta = self(np.ones(1))[..., 0], self.theta()
+        motion = np.where(abs(tip[0]) > 1e-9 * abs(tip[1]), tip[0], np.where(tip[1] != 0, tip[1], theta))
+        self._factor = self._factor * np.where(motion < 0, -1.0, 1.0)
+        self._forget()
+
+    def __call__(self, x: Real) -> Real:
+        places = tuple(Place(Fraction(float(share))) for share in x)
+        return self._states(places)[0]
+
+    def part(self, first: int, last: int) -> ChainShapes:
+        """The same with the modes first..last - 1 alone."""
+        part = copy(self)
+        part.omega, part._factor = self.omega[first:last], self._factor[first:last]
+        part._forget()
+        return part
+
+    def _forget(self) -> None:
+        """Let go of motions that were found in another scale, or of other modes."""
+        self.__dict__.pop("_moving", None)
+
+    def theta(self) -> Real:
+        """Hub angle of each mode."""
+        return self._states(())[1]
+
+    def masses(self) -> Real:
+        """The modal masses."""
+        total = np.zeros(self.omega.size)
+        for weight, motion in self._moving:
+            total = total + weight @ motion**2
+        return total
+
+    def mass_matrix(self) -> Real:
+        """Modal masses (diagonal) and products of different modes, in EI/L: the identity, if all is well."""
+        return np.asarray(sum((motion.T * weight) @ motion for weight, motion in self._moving))
+
+    def _states(self, places: tuple[Place, ...]) -> tuple[Real, Real]:
+        """W, Psi, M, Q (fields, modes, places) and the hub angle (modes,)."""
+        fields, theta, _, scale = free_fields(self.chain, 1j * self.omega, places)
+        turned = np.exp(1j * scale.imag) * self._factor  # real, as everything is on the axis without damping
+        return (fields * turned[:, None]).real, (theta * turned).real
+
+    @cached_property
+    def _moving(self) -> list[tuple[Real, Real]]:
+        """Inertias (n,) and the motions (n, modes) that they have: along the segments, of bodies, payload and hub."""
+        chain, parts = self.chain, []
+        for piece, weights, at in self._panels():
+            W, Psi = self._states(at)[0][:2]
+            parts.append((float(piece.g * piece.stiffness / piece.length**4) * weights, W.T))
+            parts.append((float(piece.a * piece.stiffness / piece.length**2) * weights, Psi.T))
+        bodies = list(self._bodies())
+        for share, body in bodies:
+            W, Psi = self._states((Place(share, "inner"),))[0][:2, :, 0]
+            parts += [(np.array([float(body.mass)]), W[None]), (np.array([float(body.inertia)]), Psi[None])]
+        W, Psi = self._states((Place(Fraction(1)),))[0][:2, :, 0]
+        ends = (chain.tip_mass, W + float(chain.offset) * Psi), (chain.tip_inertia, Psi), (chain.drive.inertia, self.theta())
+        return parts + [(np.array([float(size)]), motion[None]) for size, motion in ends if math.isfinite(size)]
+
+    def _panels(self) -> Iterator[tuple[Segment, Real, tuple[Place, ...]]]:
+        """Each segment with Gauss points along it and their weights as shares of the whole length."""
+        nodes, weights = np.polynomial.legendre.leggauss(GAUSS)
+        position = Fraction(1)
+        for each in self.chain.segments:
+            S = self.omega.max(initial=0.0) ** 2
+            waves = (float(each.g) * S) ** 0.25 + math.sqrt(S * float(each.a + each.b))
+            panels = 2 + math.ceil(waves / 4.0)
+            start = position - each.length
+            shares = ((np.arange(panels)[:, None] + (nodes + 1) / 2) / panels).ravel()
+            at = tuple(Place(start + each.length * Fraction(float(share))) for share in shares)
+            yield each, np.tile(weights / 2 / panels, panels) * float(each.length), at
+            position = start
+
+    def _bodies(self) -> Iterator[tuple[Fraction, Body]]:
+        """Each body with its place."""
+        position = Fraction(1)
+        for each in self.chain.elements:
+            if isinstance(each, Segment):
+                position -= each.length
+            elif isinstance(each, Body):
+                yield position, each
