@@ -12,7 +12,8 @@ import tfarm
 from tests.models import Ritz, shooting
 from tests.strategies import BOUNDARY_CASES, arm_of, some_arm, some_s
 from tfarm import Arm, ConvergenceError, Hub, Link, ParameterError, Payload, Section
-from tfarm.exact import appendix, balls
+from tfarm.exact import appendix
+from tfarm.exact.enclosures import enclose
 from tfarm.exact.coefficients import coefficients
 from tfarm.exact.outputs import OUTPUTS
 
@@ -36,7 +37,7 @@ def test_forty_digits_are_those_of_the_balls(case):
         if value == 0:
             assert output.place == "tip"
             continue
-        exact = balls.enclose(k, output, s, bits=170, x=Fraction(x) / k.length)
+        exact = enclose(k, output, s, bits=170, x=Fraction(x) / k.length)
         with mpmath.workdps(50):
             assert abs(value / middle(exact, 50) - 1) < mpmath.mpf(10) ** -39
         compared += 1

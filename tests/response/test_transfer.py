@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 import tfarm
 from tfarm import Arm, Hub, ParameterError, Payload
-from tfarm.exact import appendix, balls
+from tfarm.exact import appendix, balls, enclosures
 from tfarm.exact.coefficients import coefficients
 from tfarm.exact.outputs import OUTPUTS
 
@@ -47,7 +47,7 @@ def test_values_along_the_arm_agree_with_the_paper(arm: Arm, name: str) -> None:
 def test_derivative_is_the_limit_of_differences_with_many_digits(arm: Arm, name: str) -> None:
     G = tfarm.transfer(arm, name)
     for s in (0.3 + 57.1j, 10 + 700j, 3e-3 + 1e-3j, 2e4j):
-        expected = balls.nearest(balls.slope(coefficients(arm), OUTPUTS[name], s))
+        expected = balls.nearest(enclosures.slope(coefficients(arm), OUTPUTS[name], s))
         scale = abs(G(s) / s) + abs(expected)
         assert abs(G.derivative(s) - expected) <= 4000 * EPS * scale
 

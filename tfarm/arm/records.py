@@ -181,6 +181,59 @@ class Arm:
         return plain and self.clamp.is_rigid and self.joint.is_rigid
 
     @property
+    def has_elastic_link(self) -> bool:
+        """Whether no segment is damped: C = 0 throughout, whatever hub, clamp and joint lose."""
+        return self.damping == 0.0
+
+    @property
+    def reads_hub_moment(self) -> bool:
+        """Whether a gauge at the root reads the moment that turns the hub: r = 0, and no inertia sits at the clamp."""
+        at_clamp = any(each.x == 0 and (each.inertia or each.rotational_stiffness) for each in self.attachments)
+        return self.hub.radius == 0 and not at_clamp
+
+    @property
+    def input_per_torque(self) -> float:
+        """What one N m of torque at the hub takes of the input: 1, or of a motor's current [A] or voltage [V]."""
+        if self.motor is None or self.input not in ("motor_current", "motor_voltage"):
+            return 1.0
+        per_ampere = self.motor.gear_efficiency * self.motor.gear_ratio * self.motor.torque_constant
+        return (self.motor.resistance if self.input == "motor_voltage" else 1.0) / per_ampere
+
+    @property
+    def rate_loss(self) -> float:
+        """What the input must give for 1 rad/s: of N m for b + N^2 b_m, and of a voltage N Ke for the back-EMF too."""
+        if self.motor is None:
+            return self.hub.friction
+        N, loss = self.motor.gear_ratio, self.hub.friction + self.motor.gear_ratio**2 * self.motor.rotor_friction
+        back_emf = N * self.motor.back_emf_constant if self.input == "motor_voltage" else 0.0
+        return self.input_per_torque * loss + back_emf
+
+    @property
+    def turned_inertia(self) -> float:
+        """J in units of the input [N m s^2, A s^2 or V s^2]; with an inductance what friction adds to it through L_a/R."""
+        lag = 0.0
+        if self.motor is not None and self.input == "motor_voltage":
+            loss = self.hub.friction + self.motor.gear_ratio**2 * self.motor.rotor_friction
+            lag = self.motor.inductance / self.motor.resistance * loss
+        return self.input_per_torque * (self.total_inertia + lag)
+
+    @property
+    def gauged_inertia(self) -> float:
+        """-M(0)/theta_tt [kg m^2] of the slowly turning rig: J without hub and rotor where the clamp is on the axis."""
+        if self.reads_hub_moment:
+            return self.carried_inertia
+        r, total = self.hub.radius, self.payload.inertia
+        total += self.payload.mass * self.centre_distance * (self.centre_distance - r)
+        total += math.fsum(each.mass * (r + each.x) * each.x + each.inertia for each in self.attachments if each.x)
+        a = 0.0
+        for link in self.links:
+            L, rotary = link.length, link.rhoI * link.length if self.theory in WITH_ROTARY_INERTIA else 0.0
+            b = a + L
+            total += link.rhoA * ((b**3 - a**3) / 3 + r * (b**2 - a**2) / 2) + rotary
+            a = b
+        return total
+
+    @property
     def has_massless_hub(self) -> bool:
         """Whether nothing at the hub resists its turning and r = 0: then the root moment is -u at every instant."""
         friction = self.hub.friction + (self.motor.rotor_friction if self.motor else 0.0)

@@ -17,10 +17,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import Arm, Attachment, Link, RotarySpring, Theory
 from tfarm.records import record
@@ -32,6 +31,7 @@ SEGMENT, OFFSET, SPRING, BODY, MARK = range(5)
 KIND, WIDTH = 8, 12  # where a row of the kernel says what it is, after the eight numbers of a segment (`vector`)
 TO_W, TO_M, TO_Q = 9, 10, 11  # from the chain's units to the segment's own
 TIP, OF_ANGLE, OF_MOMENT = 0, 6, 10  # of the vector of ends: six numbers of the payload, A_0..A_3, B_0 and B_1
+
 
 class Segment(NamedTuple):
     """A uniform piece: a, b, g [s^2], sigma and C [s] as in `Coefficients`, length/L and EI/EI of the first."""
@@ -166,7 +166,11 @@ class Chain:
         """Whether it can turn as a rigid body: nothing is infinite and no spring holds it."""
         free = all(isinstance(end, Fraction) for end in (self.tip_mass, self.tip_inertia)) and not self.is_locked
         bodies = [each for each in self.elements if isinstance(each, Body)]
-        return free and not self.drive.stiffness and not any(each.stiffness or each.rotational_stiffness for each in bodies)
+        return (
+            free
+            and not self.drive.stiffness
+            and not any(each.stiffness or each.rotational_stiffness for each in bodies)
+        )
 
     @property
     def transit(self) -> float:
@@ -215,7 +219,7 @@ class Chain:
 def chain_of(arm: Arm, theory: Theory | None = None) -> Chain:
     """The chain of an arm under its own theory, or another."""
     theory = theory or arm.theory
-    unit_length, EI = Fraction(arm.length), stiffness_of(arm.link)
+    unit_length, EI = sum((Fraction(link.length) for link in arm.links), Fraction(0)), stiffness_of(arm.link)
     translation, rotation = unit_length**3 / EI, unit_length / EI
 
     def segment(link: Link) -> Segment:
@@ -224,7 +228,7 @@ def chain_of(arm: Arm, theory: Theory | None = None) -> Chain:
 
     pieces: list[Element] = [Offset(Fraction(arm.payload.offset) / unit_length)] if arm.payload.offset else []
     waiting = sorted(arm.attachments, key=lambda each: each.x)
-    position = sum((Fraction(link.length) for link in arm.links), Fraction(0))
+    position = unit_length
     for link in reversed(arm.links):
         start, own = position - Fraction(link.length), segment(link)
         while waiting and Fraction(waiting[-1].x) > start:
@@ -256,7 +260,13 @@ def drive_of(arm: Arm, rotation: Fraction) -> Drive:
     hub, motor, none = arm.hub, arm.motor, Fraction(0)
     if arm.is_locked:
         return Drive(False, none, none, none, none, none, Fraction(1))
-    inertia, friction, per_ampere, lag, back_emf = Fraction(hub.inertia), Fraction(hub.friction), Fraction(1), none, none
+    inertia, friction, per_ampere, lag, back_emf = (
+        Fraction(hub.inertia),
+        Fraction(hub.friction),
+        Fraction(1),
+        none,
+        none,
+    )
     if motor is not None:
         N = Fraction(motor.gear_ratio)
         inertia += N**2 * Fraction(motor.rotor_inertia)
@@ -330,8 +340,10 @@ def _marked(elements: Sequence[Element], places: tuple[Place, ...]) -> tuple[Ele
             continue
         is_beyond = False
         inner_end = position - each.length if isinstance(each, Segment) else position
-        while marks and places[marks[0]].share >= position and (
-            places[marks[0]].side == "outer" or not isinstance(each, Body)
+        while (
+            marks
+            and places[marks[0]].share >= position
+            and (places[marks[0]].side == "outer" or not isinstance(each, Body))
         ):
             result.append(Mark(marks.pop(0)))
         rest = each

@@ -11,14 +11,13 @@ clamped inner end allows at the joint, r_PsiQ p_WPsi - r_WPsi p_PsiQ where W is 
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .axis import half_waves, real_functions
-from .chain import BODY, Chain, KIND, Layout, OF_ANGLE, OF_MOMENT, OFFSET, SEGMENT, SPRING, TO_M, TO_Q, TO_W
+from .chain import BODY, KIND, OF_ANGLE, OF_MOMENT, OFFSET, SEGMENT, SPRING, TO_M, TO_Q, TO_W, Layout
 from .closed_form import SERIES_RADIUS, transition_series
 from .compiled import compiled, inlined
 from .compound import across_rows, across_waves, end_plane, inside_body, inside_offset, inside_spring, transition_rows
@@ -47,7 +46,7 @@ def count_below(omega: float, rows: Any, ends: Any, plane: Any) -> int:
     S = -omega * omega
     p = end_plane(ends[0] + ends[1] * S, ends[2], ends[3] + ends[4] * S, ends[5])
     plane[0], plane[1], plane[2], plane[3], plane[4] = p
-    number, free, spring = 0, int(ends[FREE]), 0
+    number, free = 0, int(ends[FREE])
     for i in range(len(rows)):
         row = rows[i]
         if row[KIND] == SEGMENT:

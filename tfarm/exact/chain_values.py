@@ -215,4 +215,6 @@ def _cleared(jet: Jet) -> Jet:
     """The jet with exact zeros where only rounding is left."""
     sizes = [abs(rational(0) + c) for c in jet.c]
     largest = max(float(size.mid()) for size in sizes)
-    return Jet([rational(0) if float(size.mid()) < NOTHING * largest else c for size, c in zip(sizes, jet.c, strict=True)])
+    return Jet(
+        [rational(0) if float(size.mid()) < NOTHING * largest else c for size, c in zip(sizes, jet.c, strict=True)]
+    )

@@ -30,7 +30,7 @@ SLOW = 6.0  # |z1| + |z2| below which a segment is crossed by power series
 SERIES_TERMS = 40  # of them: of arguments up to twice that the tail is below 1e-60
 
 
-class Inseparable(Exception):
+class InseparableError(Exception):
     """Two waves of a segment may be one over this ball, or a wave has no definite square root there."""
 
 
@@ -50,12 +50,12 @@ class WideSweep(Sweep):
         S, d = self.S, self.s * rational(element.damping) + 1
         pair = self._waves(element, S, d)
         if pair is None:
-            raise Inseparable
+            raise InseparableError
         one, two = pair
         gap = one[2] - two[2]
         unit = gap * gap * d * S * g
         if unit[0].contains(0):
-            raise Inseparable
+            raise InseparableError
         own = _across_waves(*one[:5], *two[:5], S * g, d, S * (a / d - b), own)
         self.phase = self.phase + one[5] + two[5]
         own = tuple(part / unit for part in own)
@@ -72,7 +72,7 @@ class WideSweep(Sweep):
 
     def _transition(self, segment: Segment) -> tuple[Row, ...]:
         if not self._is_slow(segment):
-            raise Inseparable
+            raise InseparableError
         return super()._transition(segment)
 
     def _functions(self, z_sum: Series, z_product: Series) -> tuple[Series, ...]:
@@ -93,7 +93,7 @@ class WideSweep(Sweep):
             h, before = z_sum * h - z_product * before, h
         tail = (SERIES_TERMS + 1) * q**SERIES_TERMS * rational(Fraction(2, math.factorial(2 * SERIES_TERMS)))
         if not q < SERIES_TERMS**2:  # then each term is less than half of the one before
-            raise Inseparable
+            raise InseparableError
         ball = flint.acb(flint.arb(0, tail.upper()), flint.arb(0, tail.upper()))
         terms_kept = z_sum.prec
         rest = flint.acb_series([ball] * terms_kept, prec=terms_kept)
@@ -117,7 +117,7 @@ def swept(
         sweep = WideSweep(those.layout, s, waves)
         places = those.layout.places
         states = sweep.states if places else {}
-    except Inseparable:
+    except InseparableError:
         return None
     outputs = []
     for one, C in zip(those.each, those.gauges, strict=True):

@@ -24,7 +24,6 @@ from tfarm.arm import GAINS, HubFeedback
 
 from .chain import Chain
 from .chain_values import free_outputs, free_slopes
-from .coefficients import Coefficients
 from .compiled import compiled, inlined, plain
 from .dispersion import quotient, reciprocal
 from .free import free_response

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from .chain import KIND, MARK, OF_ANGLE, OF_MOMENT, OFFSET, SEGMENT, SPRING, TO_M, TO_Q, TO_W
-from .closed_form import SERIES_RADIUS, transition_series
+from .closed_form import transition_series
 from .compiled import compiled, inlined
 from .compound import (
     across_rows,
@@ -49,7 +49,7 @@ def _functions(row: Any, s: complex, S: complex, over_d: complex) -> Any:
 
 @compiled
 def _cross_segment(s: complex, row: Any, plane: Any, held: Any) -> tuple[complex, bool]:
-    """Carry the plane (5,) across a segment, in place; keep its waves in `held`.  Scale, and whether digits are lost."""
+    """Carry the plane (5,) across a segment, in place; keep its waves in `held`.  Scale, and if digits are lost."""
     to_w, to_m, to_q = row[TO_W], row[TO_M], row[TO_Q]
     p = plane[0] * to_w, plane[1] * (to_w * to_m), plane[2] * to_m, plane[3] * to_q, plane[4] * (to_m * to_q)
     S, d = s * s, 1.0 + row[DAMPING] * s
@@ -132,7 +132,9 @@ def sweep(s: complex, rows: Any, ends: Any, plane: Any, planes: Any, scales: Any
         else:
             p = plane[0], plane[1], plane[2], plane[3], plane[4]
             plane[0], plane[1], plane[2], plane[3], plane[4] = _small(row, s, S, p)
-        largest = max(magnitude(plane[0]), magnitude(plane[1]), magnitude(plane[2]), magnitude(plane[3]), magnitude(plane[4]))
+        largest = max(
+            magnitude(plane[0]), magnitude(plane[1]), magnitude(plane[2]), magnitude(plane[3]), magnitude(plane[4])
+        )
         if (largest > OVERFLOW or largest < UNDERFLOW) and largest > 0.0 and largest < np.inf:
             plane /= largest
             scale += math.log(largest)

@@ -102,9 +102,7 @@ def expansion_at_zero(k: System, wanted: Output, x: float = 0.0) -> tuple[float,
     return expansions_at_zero(k, [wanted], x)[0]
 
 
-def expansions_at_zero(
-    k: System, wanted: Sequence[Output], x: float = 0.0
-) -> list[tuple[float, float, float, float]]:
+def expansions_at_zero(k: System, wanted: Sequence[Output], x: float = 0.0) -> list[tuple[float, float, float, float]]:
     """The expansions at s = 0 of several outputs, from one free response."""
     if isinstance(k, Chain):
         return expansions(k, wanted, x)
@@ -184,7 +182,9 @@ def _refuse_pole(k: System, wanted: Output, s: complex, x: float) -> None:
 
 def _drive(k: System, s: Complex) -> Jet:
     """The drive at s, and its slope."""
-    return Jet([part.drive for part in free_slopes(k, (), s, 0.0)]) if isinstance(k, Chain) else free_response(k, s).drive
+    return (
+        Jet([part.drive for part in free_slopes(k, (), s, 0.0)]) if isinstance(k, Chain) else free_response(k, s).drive
+    )
 
 
 def _slope_with_care(k: System, wanted: Output, s: complex, x: float) -> complex:

@@ -77,9 +77,7 @@ def _closed(k: Coefficients, s: Any, theta: Any, M0: Any, gains: Gains) -> Any:
     return drive
 
 
-def _by_waves(
-    k: System, at: Ball, gains: Gains, scale: Ball | None, shortest: float
-) -> tuple[Series, Ball] | None:
+def _by_waves(k: System, at: Ball, gains: Gains, scale: Ball | None, shortest: float) -> tuple[Series, Ball] | None:
     """D e^{-scale} as a series around `at`, and scale (t1 + t2 there if none is given); None where waves may be one."""
     s = flint.acb_series([at, 1], prec=TERMS)
     if isinstance(k, Chain):
@@ -104,9 +102,7 @@ def _by_waves(
     return _closed(k, s, theta, M0, gains) * (t - scale).exp() / unit, scale
 
 
-def _by_segments(
-    k: Chain, s: Series, gains: Gains, scale: Ball | None, shortest: float
-) -> tuple[Series, Ball] | None:
+def _by_segments(k: Chain, s: Series, gains: Gains, scale: Ball | None, shortest: float) -> tuple[Series, Ball] | None:
     """`_by_waves` of a chain."""
 
     def waves(each: Segment, S: Series, d: Series) -> tuple[tuple[Series, ...], tuple[Series, ...]] | None:

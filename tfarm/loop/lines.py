@@ -78,7 +78,8 @@ def crossing_at_zero(arm: Arm, line: Line) -> Crossing | None:
 
 
 def _through_zero_free(arm: Arm, line: Line) -> Crossing | None:
-    """Of an arm that turns freely:  D/theta = Kp + K1 s + J s^2 + c s^3 + ...,  with J the effective inertia.
+    """Of an arm that turns freely:  D/theta = Kp + K1 s + J s^2 + c s^3 + ...,  with J the effective inertia
+    and the hub's friction in K1.
 
     The lowest coefficient that does not vanish all along the line decides: the pole passes where it is 0.
     """
@@ -89,11 +90,11 @@ def _through_zero_free(arm: Arm, line: Line) -> Crossing | None:
     if base.Kp:
         return None
     if way.K1:
-        t = -base.K1 / way.K1 + 0.0
+        t = -(base.K1 + arm.rate_loss) / way.K1 + 0.0
         return Crossing(t, 0.0, -_sign(way.K1 * effective_inertia(arm, line.at(t))))
-    if base.K1 or not way.K2:
+    if base.K1 + arm.rate_loss or not way.K2:
         return None
-    J, carried = arm.total_inertia, arm.carried_inertia
+    J, carried = arm.turned_inertia, arm.gauged_inertia
     if not carried:  # below the rounding of the hub's own: no gain a loop takes reaches so far
         return None
     return Crossing((J / carried - base.K2) / way.K2, 0.0, _sign(way.K2))
@@ -101,8 +102,8 @@ def _through_zero_free(arm: Arm, line: Line) -> Crossing | None:
 
 def _change_with_stiffness(arm: Arm, law: HubFeedback) -> int:
     """How many more poles are unstable above Kp = 0 than below: by K1 if not 0, else by J s^2 + c s^3, c ~ K2 C."""
-    if law.K1:
-        return -_sign(law.K1)
+    if law.K1 + arm.rate_loss:
+        return -_sign(law.K1 + arm.rate_loss)
     J = effective_inertia(arm, law)
     oscillating = 2 if law.K2 * arm.damping * J > 0 else 0  # against one real pole on the other side
     return _sign(J) * (oscillating - 1)

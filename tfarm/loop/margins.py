@@ -163,8 +163,9 @@ def rigid_crossings(loop: Loop) -> Real:
     """Frequencies [rad/s] where the loop function of the rigid arm has size 1; none of an arm that cannot turn.
 
     -L = k + b/w^2 + i a/w with a = K1/J, b = Kp/J, k = K2 (J - I_h)/J, so (1 - k^2) w^4 - (2 b k + a^2) w^2 - b^2 = 0.
+    Of a hub with friction the drive is not J s^2, and these are none of its own.
     """
-    if not loop.arm.has_rigid_mode or not (loop.law.K1 or loop.law.Kp):
+    if loop.arm.rate_loss or not loop.arm.has_rigid_mode or not (loop.law.K1 or loop.law.Kp):
         return np.empty(0)
     a, b, k = _rigid(loop)
     unit = max(abs(a), math.sqrt(abs(b)))
@@ -175,8 +176,8 @@ def rigid_crossings(loop: Loop) -> Real:
 
 def _rigid(loop: Loop) -> tuple[float, float, float]:
     """K1/J [1/s], Kp/J [1/s^2] and K2 (J - I_h)/J."""
-    J, law = loop.arm.total_inertia, loop.law
-    return law.K1 / J, law.Kp / J, law.K2 * loop.arm.carried_inertia / J
+    J, law = loop.arm.turned_inertia, loop.law
+    return law.K1 / J, law.Kp / J, law.K2 * loop.arm.gauged_inertia / J
 
 
 def gain_margin(loop: Loop, band: float) -> tuple[float, float]:

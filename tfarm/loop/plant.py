@@ -44,6 +44,12 @@ class Loop:
         if self.arm.has_massless_hub and self.law.K2:
             remedy = "with hub.inertia = 0 the root moment is -u at once: an algebraic loop; use K2 = 0 or some inertia"
             raise ParameterError(key="K2", value=self.law.K2, remedy=remedy)
+        if self.arm.is_undamped and not (self.arm.reads_hub_moment and self.arm.input_per_torque == 1.0):
+            remedy = (
+                "without any damping, and with a gauge that does not read the torque's own moment, no theorem tells "
+                "the modes beyond a band; give link.damping, hub.friction or another loss, as every rig has one"
+            )
+            raise ParameterError(key="link.damping", value=0.0, remedy=remedy)
         least = SMALLEST_NORMAL * max(1.0, self.arm.total_inertia if self.arm.has_rigid_mode else 1.0)
         for gain in GAINS:
             if 0 < abs(self.law[gain.name]) < least:
@@ -66,9 +72,18 @@ class Loop:
         """At C = 0: 1 where the law damps every oscillating mode that the hub feels, -1 where it drives them all.
 
         0 where it does neither: K1 = 0 leaves no loss, K2 = 1 leaves the modes of the locked hub.  By Lyapunov's
-        argument it is the sign of K1 (1 - K2), whatever Kp.
+        argument it is the sign of K1 (1 - K2), whatever Kp, with K1 plus the hub's friction for K1 of a rig.
         """
-        return int(np.sign(self.law.K1)) * int(np.sign(1.0 - self.law.K2))
+        K2 = self.law.K2 / self.arm.input_per_torque
+        return int(np.sign(self.law.K1 + self.arm.rate_loss)) * int(np.sign(1.0 - K2))
+
+    @property
+    def is_told_by_theorem(self) -> bool:
+        """Whether `takes_energy` tells every mode: the links are elastic, and the gauge reads the hub's moment, if used.
+
+        What hub, clamp and joint lose only adds to K1 > 0.
+        """
+        return self.arm.has_elastic_link and (self.arm.reads_hub_moment or not self.law.K2)
 
     @property
     def member(self) -> Member:
@@ -90,5 +105,10 @@ class Loop:
 
 
 def effective_inertia(arm: Arm, law: HubFeedback) -> float:
-    """I_h + (1 - K2)(J - I_h) [kg m^2]: what slow torque turns once the moment is fed back."""
-    return arm.hub_inertia + (1.0 - law.K2) * arm.carried_inertia
+    """I_h + (1 - K2)(J - I_h) [kg m^2]: what slow torque turns once the moment is fed back.
+
+    In units of the input, and with what the root's gauge reads of the turning rig in the place of J - I_h.
+    """
+    if arm.is_uniform:
+        return arm.hub_inertia + (1.0 - law.K2) * arm.carried_inertia
+    return arm.turned_inertia - law.K2 * arm.gauged_inertia

@@ -173,12 +173,12 @@ def slow_poles(loop: Loop, below: float) -> Complex:
     smaller ones are right as they are, flexibility and damping adding terms of the order |s|/w1 and C |s|.
     """
     law = loop.law
-    if not loop.arm.has_rigid_mode or not (law.K1 or law.Kp):
+    if not loop.arm.has_rigid_mode or not (law.K1 or law.Kp or loop.arm.rate_loss):
         return np.empty(0, complex)
-    J = effective_inertia(loop.arm, law)
-    unit = max(abs(law.K1), math.sqrt(abs(law.Kp)) * math.sqrt(abs(J)), 1e-300)  # K1 and sqrt(Kp J) alike
+    J, K1 = effective_inertia(loop.arm, law), law.K1 + loop.arm.rate_loss
+    unit = max(abs(K1), math.sqrt(abs(law.Kp)) * math.sqrt(abs(J)), 1e-300)  # K1 and sqrt(Kp J) alike
     with np.errstate(over="ignore"):
-        roots = unit * np.roots([J, law.K1 / unit, law.Kp / unit / unit]).astype(complex)
+        roots = unit * np.roots([J, K1 / unit, law.Kp / unit / unit]).astype(complex)
     slow = roots[(roots != 0) & (abs(roots) <= below)]
     exact = slow.copy()
     for _ in range(SLOW_STEPS):
@@ -194,8 +194,8 @@ def starting_points(loop: Loop, up_to: float) -> Complex:
     shift = np.array([0.0, 0.02, 0.3])[:, None]
     decay = C * omega**2 / 2
     near = (-decay - shift * omega + 1j * omega * np.sqrt(np.maximum(1 - (C * omega / 2) ** 2, 0.0))).ravel()
-    J = arm.total_inertia if arm.has_rigid_mode else arm.hub_inertia + 1e-12
-    slow = np.roots([J, loop.law.K1, loop.law.Kp]).astype(complex)
+    J = arm.turned_inertia if arm.has_rigid_mode else arm.hub_side_inertia + 1e-12
+    slow = np.roots([J, loop.law.K1 + arm.rate_loss, loop.law.Kp]).astype(complex)
     slow = slow[abs(slow) > SMALLEST]  # zeros at 0 are divided out
     real = -np.geomspace(up_to / 300, 1.4 * up_to, 25)
     return np.concatenate([near, near.conj(), slow, real, -real])

@@ -102,12 +102,14 @@ def felt(arm: Arm, up_to: float) -> Real:
     flexible = table.index > 0
     omega, b = table.natural_frequency[flexible], abs(table.hub_participation[flexible])
     k, scale = np.sqrt(omega) * (arm.own_mass / arm.length / EI) ** 0.25, np.sqrt(arm.own_mass)
-    return np.array([b * scale / k, b * arm.hub_inertia * omega**2 * scale / (EI * k**2)])
+    return np.array([b * scale / k, b * arm.hub_side_inertia * omega**2 * scale / (EI * k**2)])
 
 
 def _beyond(loop: Loop, quiet: bool) -> tuple[bool, str]:
     """Whether infinitely many poles are unstable, and what is known beyond the band."""
     law = loop.law
+    if not loop.arm.is_undamped and loop.is_told_by_theorem and loop.takes_energy > 0:
+        return False, "C = 0: every mode beyond the band is damped (Lyapunov), with a decay rate that tends to 0"
     if not loop.arm.is_undamped:
         if quiet:
             return False, f"beyond the band |L(iw)| < {QUIET:g} and falling: no unstable pole there (small gain)"
@@ -124,7 +126,7 @@ def _beyond(loop: Loop, quiet: bool) -> tuple[bool, str]:
 def loop_band(loop: Loop) -> tuple[float, bool]:
     """The band [rad/s] in which poles are computed, and whether the loop is quiet beyond it (always False at C = 0)."""
     few = band_of(loop.arm, FEW)
-    if loop.arm.is_undamped:
+    if loop.arm.is_undamped or (loop.is_told_by_theorem and loop.takes_energy > 0):
         return few, False
     band = few
     while modes_below(loop.arm, band) <= MOST_MODES:

@@ -73,9 +73,9 @@ def looked_at(loop: Loop, name: str) -> Interval:
     """The range of a gain that is searched, symmetric and well beyond what matters to the first mode."""
     arm, law = loop.arm, loop.law
     reach = max(REACH[name] * gain_unit(arm, name), 10.0 * abs(law[name]))
-    carried = arm.carried_inertia
+    carried = arm.gauged_inertia
     if name == "K2" and 0 < carried < math.inf:
-        reach = max(reach, BEYOND_STATIC * arm.total_inertia / carried)
+        reach = max(reach, BEYOND_STATIC * arm.turned_inertia / carried)
     most = min(most_gain(arm, name), reach)
     return -most, most
 
@@ -122,6 +122,8 @@ def _with_proven_ends(loop: Loop, name: str, pair: Interval, limits: Interval) -
     """
     low, high = pair
     law, passive = loop.law, loop.arm.is_undamped or loop.law.K2 == 0
+    if loop.arm.input == "motor_voltage" and loop.arm.motor is not None and loop.arm.motor.inductance:
+        return low, high  # a voltage reaches the hub late: it is not passive
     if name == "K2":
         is_proven = loop.arm.is_undamped and law.K1 > 0 and law.Kp >= 0
         return (-math.inf if is_proven and low == limits[0] else low), high

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from tfarm.arm import FED_BACK, Arm
 from tfarm.arm.checks import whole
 from tfarm.errors import ParameterError
-from tfarm.exact.system import System, system_of
 from tfarm.exact.coefficients import Coefficients
 from tfarm.exact.outputs import OUTPUTS, Output
+from tfarm.exact.system import System, system_of
 from tfarm.exact.values import expansions_at_zero
 from tfarm.response import Wanted, transfer
 from tfarm.spectrum import Modes, modes

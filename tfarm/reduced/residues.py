@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.errors import ConvergenceError
-from tfarm.exact.system import System
 from tfarm.exact.chain import Chain
 from tfarm.exact.chain_values import free_slopes
 from tfarm.exact.free import free_response
 from tfarm.exact.outputs import Output, unit_scale
+from tfarm.exact.system import System
 from tfarm.exact.values import evaluate_outputs, kernel_table
 from tfarm.exact.vector import GAIN, HUB
 from tfarm.spectrum import Modes

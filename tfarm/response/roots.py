@@ -14,10 +14,10 @@ from tfarm.exact.chain import Chain
 from tfarm.exact.chain_values import free_slopes, order_at_zero
 from tfarm.exact.characteristic import Analytic, characteristic, deflated
 from tfarm.exact.coefficients import Coefficients
-from tfarm.exact.system import System, system_of
 from tfarm.exact.free import free_response, low_frequency, low_frequency_tip, tip_response
 from tfarm.exact.jets import Jet
 from tfarm.exact.outputs import Output
+from tfarm.exact.system import System, system_of
 from tfarm.records import record
 from tfarm.spectrum import flexible_frequencies
 from tfarm.spectrum.box import REAL, Box, Function, complete
@@ -148,5 +148,5 @@ def _in_box(k: System, function: Function, at_zero: int, up_to: float, starts: C
     found, box = complete(function, box_of, up_to, starts)
     if k.is_undamped:  # zeros come in +- pairs too
         found = np.where(abs(found.real) < REAL * abs(found), 1j * found.imag, found)
-    found = found[np.lexsort((-found.imag, found.real, abs(found.imag).round(9)))]
+    found = found[np.lexsort((-found.imag, found.real.round(9), abs(found.imag).round(9)))]
     return Roots(np.r_[np.zeros(at_zero, complex), found], (*box,), "winding number")

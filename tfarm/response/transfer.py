@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from tfarm.arm import Arm, must_be_arm
 from tfarm.errors import MISSING, ParameterError
-from tfarm.exact.system import system_of
 from tfarm.exact.methods import Method, known_method, slow_values
 from tfarm.exact.outputs import Output, output
+from tfarm.exact.system import system_of
 from tfarm.exact.values import (
     differentiate_outputs,
     digits_of,

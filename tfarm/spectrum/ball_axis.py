@@ -8,11 +8,11 @@ from typing import Any
 import flint
 
 from tfarm.exact.balls import rational
-from tfarm.exact.closed_form import from_waves
 from tfarm.exact.chain import Chain
+from tfarm.exact.closed_form import from_waves
 from tfarm.exact.coefficients import Coefficients
-from tfarm.exact.system import System
 from tfarm.exact.compiled import plain
+from tfarm.exact.system import System
 
 from .chain_axis import ChainAxis
 from .counting import row_of, steps_of

@@ -20,7 +20,7 @@ Ball = Any
 _across_waves = plain(across_waves)
 
 
-class Uncertain(Exception):
+class UncertainError(Exception):
     """A sign, or a number of half waves, that these balls do not determine."""
 
 
@@ -79,7 +79,7 @@ class AxisSweep(Sweep):
         if not self._counting:
             return
         if not (value > 0 or value < 0):
-            raise Uncertain
+            raise UncertainError
         self.number += step * ((self.number % 2 == 1) != bool(value < 0))
 
     def released(self) -> int:
@@ -119,7 +119,7 @@ class ChainAxis:
         """N(omega), the rigid-body mode included; None if a sign or a half wave is not certain."""
         try:
             return AxisSweep(self._chain, omega, counting=True).released()
-        except Uncertain:
+        except UncertainError:
             return None
 
 
@@ -130,8 +130,8 @@ def _pinned(z: Sequence[Ball]) -> int:
         if each < 0:
             whole = ((-each).sqrt() / flint.arb.pi()).floor().unique_fmpz()
             if whole is None:
-                raise Uncertain
+                raise UncertainError
             number, travelling = number + int(whole), travelling + 1
         elif not each > 0:
-            raise Uncertain
+            raise UncertainError
     return number + (travelling == 2)

@@ -33,9 +33,10 @@ class ChainShapes:
 
     def __init__(self, chain: Chain, omega: Real) -> None:
         self.chain, self.omega = chain, omega
-        self._factor = np.ones(omega.size)
+        self._factor: Real = np.ones(omega.size)
+        self._size = free_fields(chain, 1j * omega, ())[3].real  # a chain that is cut has other scales
         with np.errstate(all="ignore"):
-            self._factor = 1.0 / np.sqrt(self.masses())
+            self._factor = np.asarray(1.0 / np.sqrt(self.masses()))
         self._forget()
         if not np.isfinite(self._factor).all():
             worst = float(omega[~np.isfinite(self._factor)][0])
@@ -52,7 +53,8 @@ class ChainShapes:
     def part(self, first: int, last: int) -> ChainShapes:
         """The same with the modes first..last - 1 alone."""
         part = copy(self)
-        part.omega, part._factor = self.omega[first:last], self._factor[first:last]
+        here = slice(first, last)
+        part.omega, part._factor, part._size = self.omega[here], self._factor[here], self._size[here]
         part._forget()
         return part
 
@@ -78,7 +80,7 @@ class ChainShapes:
     def _states(self, places: tuple[Place, ...]) -> tuple[Real, Real]:
         """W, Psi, M, Q (fields, modes, places) and the hub angle (modes,)."""
         fields, theta, _, scale = free_fields(self.chain, 1j * self.omega, places)
-        turned = np.exp(1j * scale.imag) * self._factor  # real, as everything is on the axis without damping
+        turned = np.exp(scale - self._size) * self._factor  # real, as everything is on the axis without damping
         return (fields * turned[:, None]).real, (theta * turned).real
 
     @cached_property
@@ -94,7 +96,11 @@ class ChainShapes:
             W, Psi = self._states((Place(share, "inner"),))[0][:2, :, 0]
             parts += [(np.array([float(body.mass)]), W[None]), (np.array([float(body.inertia)]), Psi[None])]
         W, Psi = self._states((Place(Fraction(1)),))[0][:2, :, 0]
-        ends = (chain.tip_mass, W + float(chain.offset) * Psi), (chain.tip_inertia, Psi), (chain.drive.inertia, self.theta())
+        ends = (
+            (chain.tip_mass, W + float(chain.offset) * Psi),
+            (chain.tip_inertia, Psi),
+            (chain.drive.inertia, self.theta()),
+        )
         return parts + [(np.array([float(size)]), motion[None]) for size, motion in ends if math.isfinite(size)]
 
     def _panels(self) -> Iterator[tuple[Segment, Real, tuple[Place, ...]]]:

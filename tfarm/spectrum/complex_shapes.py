@@ -14,7 +14,7 @@ from tfarm.exact.balls import State, nearest, point, precision
 from tfarm.exact.chain import Chain, Place
 from tfarm.exact.chain_values import free_fields
 from tfarm.exact.characteristic import characteristic
-from tfarm.exact.coefficients import Coefficients, Condition
+from tfarm.exact.coefficients import Condition
 from tfarm.exact.free import free_response
 from tfarm.exact.system import System
 
@@ -53,8 +53,10 @@ def mode_field(k: System, s: complex, quantity: str, x: NDArray[np.float64]) -> 
 def _of_chain(k: Chain, s: complex, quantity: str, x: NDArray[np.float64]) -> Complex:
     """`mode_field` of a chain: the reciprocity is that of torque and hub angle, or of hub angle and moment if held."""
     at, places = np.array([s]), [Place(Fraction(float(share))) for share in (*x, 1.0)]
-    fields, theta, M, _ = free_fields(k, at, places)
-    slope = characteristic(k, at).slope[0]
+    fields, theta, M, scale = free_fields(k, at, places)
+    drive = characteristic(k, at)
+    slope, back = drive.slope[0], np.exp(scale - drive.scale)  # a chain that is cut has another scale
+    fields, theta, M = fields * back, theta * back, M * back
     lag = 1.0 + float(k.drive.lag) * s
     product = complex(slope * (theta[0] / lag if k.drive.turns else -M[0]))
     if product == 0 or not np.isfinite(product):

@@ -107,7 +107,11 @@ class DampedModes:
         """Every eigenvalue of the record but those at 0, (n, 2): the flexible modes', then single ones beside NaN."""
         turning = self.eigenvalues[(self.index == 0)][:, 1]
         alone = [*turning[turning != 0], *self.others]
-        return np.concatenate([self.eigenvalues[self.index > 0], [[each, np.nan] for each in alone]] if alone else [self.eigenvalues[self.index > 0]])
+        return np.concatenate(
+            [self.eigenvalues[self.index > 0], [[each, np.nan] for each in alone]]
+            if alone
+            else [self.eigenvalues[self.index > 0]]
+        )
 
     # ------------------------------------------------------------ shapes
 
@@ -251,7 +255,7 @@ def single_zeros(undamped: Modes, share: float) -> list[float]:
 
 
 def _first_node(undamped: Modes, count: int, level: float) -> Node:
-    """Where the way begins: at no damping, or at so little that what friction makes of the double zero at 0 is apart."""
+    """Where the way begins: at no damping, or at so little that what friction makes of the zeros at 0 is apart."""
     alone = single_zeros(undamped, 1.0)
     node = _undamped_node(undamped, count - len(alone))
     if not alone:

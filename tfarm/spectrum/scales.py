@@ -25,11 +25,14 @@ OF_THE_PAPER = ("sasaki2012", "sasaki2012-lab", "sasaki2012-as-printed")  # pres
 
 
 def turning_inertia(arm: Arm) -> float:
-    """J [kg m^2], the arm's inertia about the hub, without the parts that are infinite: these do not turn."""
+    """J, the arm's inertia about the hub, without the parts that are infinite: these do not turn.
+
+    In kg m^2 where torque is the input, else in the input's own unit times s^2.
+    """
     finite = [each if np.isfinite(each) else 0.0 for each in (arm.hub.inertia, arm.payload.mass, arm.payload.inertia)]
     hub, mass, inertia = finite
     payload = replace(arm.payload, mass=mass, inertia=inertia)
-    return replace(arm, hub=replace(arm.hub, inertia=hub), payload=payload).total_inertia
+    return replace(arm, hub=replace(arm.hub, inertia=hub), payload=payload).turned_inertia
 
 
 def rate_unit(arm: Arm) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -15,12 +15,12 @@ from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exact.appendix import natural_frequency, roots_near
 from tfarm.exact.chain import Chain
 from tfarm.exact.coefficients import Coefficients
-from tfarm.exact.system import System, shear_flexibility, system_of
 from tfarm.exact.methods import DIGITS, Method, known_method
+from tfarm.exact.system import System, shear_flexibility, system_of
 from tfarm.records import record
 
-from .chain_shapes import ChainShapes
 from .certify import Certificate, certify
+from .chain_shapes import ChainShapes
 from .precise import refine
 from .search import count_below, natural_frequencies
 from .shapes import Shapes
@@ -164,9 +164,9 @@ class Modes:
     def sensitivity(self) -> dict[str, Real]:
         """d ln w / d ln p, per cent per per cent, of each frequency by each of `PARAMETERS` (zero for a rigid mode).
 
-        Exact, from the energies of the mode (Rayleigh's quotient is stationary).  Each parameter varies alone (a chain, of whose
-        segments each has its own, has no entry here):
+        Exact, from the energies of the mode (Rayleigh's quotient is stationary).  Each parameter varies alone:
         Young's modulus with G held, the area with I held.  An infinite or zero inertia counts as zero.
+        A chain, whose segments each have their own, has no entry here.
         """
         if isinstance(self._k, Chain):
             return {}
