@@ -13,8 +13,8 @@ from tests.models import Ritz, shooting
 from tests.strategies import BOUNDARY_CASES, arm_of, some_arm, some_s
 from tfarm import Arm, ConvergenceError, Hub, Link, ParameterError, Payload, Section
 from tfarm.exact import appendix
-from tfarm.exact.enclosures import enclose
 from tfarm.exact.coefficients import coefficients
+from tfarm.exact.enclosures import enclose
 from tfarm.exact.outputs import OUTPUTS
 
 EPS = np.finfo(float).eps

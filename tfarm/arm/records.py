@@ -283,6 +283,23 @@ class Arm:
             arm = replace(arm, **{room: replace(getattr(arm, room), **{number: value})})
         return arm
 
+    @property
+    def elastic(self) -> Arm:
+        """The same with C = 0 in every segment."""
+        if self.has_elastic_link:
+            return self
+        return replace(
+            self,
+            link=replace(self.link, damping=0.0),
+            outer=tuple(replace(link, damping=0.0) for link in self.outer),
+        )
+
+    @property
+    def lossless_hub(self) -> Arm:
+        """The same without what `rate_loss` counts: friction of hub and rotor, and back-EMF."""
+        motor = self.motor and replace(self.motor, rotor_friction=0.0, back_emf_constant=0.0)
+        return replace(self, hub=replace(self.hub, friction=0.0), motor=motor)
+
     def _with_an_idle_hub(self) -> Arm:
         hub = replace(self.hub, friction=0.0, stiffness=0.0)
         return replace(self, hub=hub, motor=None, input="hub_angle" if self.input == "hub_angle" else "hub_torque")

@@ -125,7 +125,7 @@ def required_damping(
     def log_radius(C: float) -> float:
         return log_radius_with(arm, gains, chain, C, count, branches)
 
-    if sampled_loop(arm.having(damping=0.0), gains, chain, count=count).poles.is_stable:
+    if sampled_loop(arm.elastic, gains, chain, count=count).poles.is_stable:
         return 0.0
     high = 2 * STRONGEST / first_frequency(arm)
     if log_radius(high) >= 0:

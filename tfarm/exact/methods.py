@@ -44,6 +44,9 @@ def slow_values(method: Method, arm: Arm, k: System, wanted: Sequence[Output], s
     if method == "balls":
         return np.array([[value_with_care(k, each, complex(at), each.share(x)) for at in s] for each in wanted])
 
+    if not arm.is_uniform:
+        raise ParameterError(key="method", value=method, remedy="the paper's appendix is of one uniform link on a hub")
+
     def by_cramer(each: Output, at: complex) -> complex:
         return complex(appendix.response(arm, each, at, DIGITS, x * arm.link.length))
 

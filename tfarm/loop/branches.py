@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from tfarm.arm import Arm, HubFeedback
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
-from tfarm.spectrum import modes
+from tfarm.spectrum import damped_modes, modes
 from tfarm.spectrum.continuation import Node, corrected, follow, through
 from tfarm.spectrum.damped import COMPANY
 from tfarm.spectrum.scales import rate_unit
@@ -182,12 +182,15 @@ def open_pairs(arm: Arm, number: int, wanted: int) -> tuple[Complex, float]:
 
     Of the `number` of modes followed from C = 0 to the arm's own C the first `wanted` are sure to arrive.
     """
-    undamped, C = arm.having(damping=0.0), arm.damping
+    undamped, C = arm.elastic, arm.damping
     table = modes(undamped, number)
     omega = table.natural_frequency[table.index > 0]
     zeros, lowest = np.stack([1j * omega, -1j * omega], axis=1), float(omega[0])
-    if C == 0:
+    if arm.is_undamped:
         return zeros, lowest
+    if not arm.is_uniform:
+        found = damped_modes(table)
+        return found.eigenvalues[found.index > 0], lowest
     stage = Stage(Variation(arm, HubFeedback(), "damping"), 0.0, C, lowest)
     return stage.follow(zeros, wanted, min(1.0, FIRST / (omega[-1] * C)))[-1].zeros, lowest
 

@@ -84,9 +84,10 @@ def design(
     """
     if objective not in OBJECTIVES:
         raise ParameterError(key="objective", value=objective, remedy=f"use one of {', '.join(OBJECTIVES)}")
-    Loop(arm, HubFeedback(K1=1.0, K2=0.5 if arm.hub_inertia else 0.0, Kp=Kp))
+    Loop(arm, HubFeedback(K1=1.0, K2=0.0 if arm.has_massless_hub else 0.5 * arm.input_per_torque, Kp=Kp))
     K1 = _checked("K1", K1 or (0.0, 2.0 * turning_inertia(arm) * band_of(arm, 1)))
-    K2 = _checked("K2", K2 or (-3.0, 1.0))
+    unit = arm.input_per_torque
+    K2 = _checked("K2", K2 or (-3.0 * unit, 1.0 * unit))
     axes = rate_axis(K1, rate_unit(arm)), Axis(*K2)
     score = _score(arm, objective, Kp, modes)
     best = _best(arm, score, axes, Kp, _effort(arm, objective, K2, modes))
@@ -111,7 +112,8 @@ def _effort(arm: Arm, objective: str, K2: Bounds, number: int) -> Effort:
     if objective == "damping":  # which has few basins
         return Effort(32, 36, 12)
     starts = max(6, 80 // number)
-    hubs = (arm.hub_inertia / (1 - gain) if gain < 1 else math.inf for gain in K2)
+    shares = (1 - gain / arm.input_per_torque for gain in K2)
+    hubs = (arm.hub_inertia / share if share > 0 else math.inf for share in shares)
     ends = [natural_modes(arm.having(hub_inertia=hub), number).natural_frequency[-number:] for hub in hubs]
     basins = float(abs(ends[0] - ends[1]).max()) * RISE / (4 * math.pi)
     return Effort(36, int(min(max(60.0, BASIN * basins), max(60, 1600 // number))), starts)

@@ -8,7 +8,7 @@ characteristic function.  A guess that moves too far, or lands on a neighbour, i
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,6 +85,8 @@ def locus(
     """
     points = whole("points", points, 2, MOST_POINTS, f"a whole number from 2 to {MOST_POINTS}")
     branches = whole("branches", branches, 1, MOST_BRANCHES, f"a whole number from 1 to {MOST_BRANCHES}")
+    if arm.rate_loss:
+        return _of_rig_with_friction(arm, law, vary, (start, stop), points, branches)
     variation = Variation(arm, law, vary)
     gain = _range(variation, start, stop, points)
     cut, lowest = followed(variation, start, stop, branches + 1)
@@ -95,6 +97,29 @@ def locus(
     if np.isnan(curves[: 2 * branches]).any():
         found = with_others(variation, gain, rows, found)
     return Locus(arm, law, vary, gain, rows, mode, found)
+
+
+def _of_rig_with_friction(
+    arm: Arm, law: HubFeedback, vary: str, ends: tuple[float, float], points: int, branches: int
+) -> Locus:
+    """The locus of a rig whose hub loses b theta_t: that of the rig without the loss, whose K1 is as much larger.
+
+    Raises ParameterError where the loss is no gain of the law: behind an inductance, and under a scale on the law.
+    """
+    if vary == "all":
+        remedy = "a scale on the law does not scale the hub's friction: vary K1, K2 or Kp"
+        raise ParameterError(key="vary", value=vary, remedy=remedy)
+    if arm.motor is not None and arm.input == "motor_voltage" and arm.motor.inductance:
+        remedy = "a locus wants a circuit without lag: leave it out, as L_a/R is mostly far beyond the arm's modes"
+        raise ParameterError(key="motor.inductance", value=arm.motor.inductance, remedy=remedy)
+    loss = arm.rate_loss
+    shift = loss if vary == "K1" else 0.0
+    _range(Variation(arm, law, vary), *ends, points)
+    found = locus(
+        arm.lossless_hub, law.having("K1", law.K1 + loss), vary, ends[0] + shift, ends[1] + shift, points, branches
+    )
+    crossings = tuple(replace(each, gain=each.gain - shift) for each in found.crossings)
+    return replace(found, arm=arm, law=law, gain=np.linspace(*ends, points), crossings=crossings)
 
 
 def _range(variation: Variation, start: float, stop: float, points: int) -> Real:

@@ -80,6 +80,8 @@ class EnergyBalance:
 def lyapunov(arm: Arm, law: HubFeedback) -> Lyapunov:
     """What V proves of the law with a strain gauge as it is.  Raises ParameterError where there is no loop."""
     loop, C = Loop(arm, law), arm.damping
+    if law.K2 and not arm.reads_hub_moment:
+        return _unproven(loop, "the gauge does not read the moment on the hub (r > 0, or inertia at the clamp)")
     if C and law.K2:
         reason = (
             f"the gauge does not feel the damping C = {C:g} s, so V_t keeps a term in phi_xt(0) theta_t of no sign, "
@@ -114,19 +116,21 @@ def damped_gauge_equivalent(arm: Arm, law: HubFeedback) -> tuple[Arm, HubFeedbac
 
 def _with_whole_moment(loop: Loop) -> Lyapunov:
     """V_t = -a2 K1 theta_t^2 - a1 C integral(E I phi_xt^2) with a1/a2 = 1 - K2."""
-    law, C = loop.law, loop.arm.damping
-    weight = 1.0 - law.K2
-    if law.K2 == 1:
+    law, C = loop.law, 0.0 if loop.arm.is_undamped else 1.0
+    weight, K1 = 1.0 - law.K2 / loop.arm.input_per_torque, law.K1 + loop.arm.rate_loss
+    if loop.arm.motor is not None and loop.arm.input == "motor_voltage" and loop.arm.motor.inductance:
+        return _unproven(loop, "the voltage reaches the hub through an inductance, late: V_t has a term of no sign")
+    if weight == 0:
         return _unproven(loop, "K2 = 1 leaves a1 = 0: V sees the hub alone, and the arm moves as on a held hub")
-    if law.K2 > 1:
+    if weight < 0:
         return _unproven(loop, f"a1/a2 = 1 - K2 = {weight:g} is negative, so V has no sign")
-    if law.K1 < 0:
+    if K1 < 0:
         return _unproven(loop, f"K1 = {law.K1:g} feeds energy in: V_t = -a2 K1 theta_t^2 has the wrong sign")
     if law.Kp < 0 and law.Kp < (least := -weight * _static_stiffness(loop.arm)):
         return _unproven(
             loop, f"Kp = {law.Kp:g} is below {least:g} N m/rad, where the spring at the hub makes V negative"
         )
-    kind: Kind = "dissipated" if law.K1 or C else "conserved"
+    kind: Kind = "dissipated" if K1 or C else "conserved"
     loss = "V_t = -a2 K1 theta_t^2" + (" less what the material dissipates" if C else "")
     what = f"never grows ({loss})" if kind == "dissipated" else "is constant (K1 = 0), and no motion dies out"
     return Lyapunov(loop, True, weight, kind, f"V with a1/a2 = {weight:g} {what}: no pole lies in the right half-plane")

@@ -79,7 +79,7 @@ class Loop:
 
     @property
     def is_told_by_theorem(self) -> bool:
-        """Whether `takes_energy` tells every mode: the links are elastic, and the gauge reads the hub's moment, if used.
+        """Whether `takes_energy` tells every mode: elastic links, and a gauge that reads the hub's moment, if used.
 
         What hub, clamp and joint lose only adds to K1 > 0.
         """

@@ -140,7 +140,9 @@ def tailed_model(arm: Arm, count: int) -> ModalModel:
     Where a law changes what the hub weighs few modes do then: those of a free hub make up a clamped one but slowly.
     """
     model = modal_model(arm, FED_BACK, count)
-    undamped = modal_model(arm.having(damping=0.0), "hub_angle", count)
+    if not arm.is_uniform:
+        return model
+    undamped = modal_model(arm.elastic, "hub_angle", count)
     s, whole = float(undamped.natural_frequency[-1]), float(undamped.static[0])
     fallen = float((undamped(s) - transfer(undamped.arm, "hub_angle")(s))[0].real)
     if not 0 < fallen < whole:  # what is left out drowns in rounding

@@ -51,7 +51,7 @@ UNITS = {"hub_angle": ("J w1^2", angle_unit), "hub_rate": ("J w1", rate_unit)}  
 def gain_unit(arm: Arm, name: str) -> float:
     """The unit of the gain of that name on this arm, in that gain's SI unit."""
     (output,) = (gain.output for gain in GAINS if gain.name == name)
-    return UNITS[output][1](arm) if output in UNITS else 1.0
+    return UNITS[output][1](arm) if output in UNITS else arm.input_per_torque
 
 
 def most_gain(arm: Arm, name: str) -> float:
@@ -78,7 +78,8 @@ def default_gains(arm: Arm) -> HubFeedback:
     if _is_of_the_paper(arm):
         return PAPER_GAINS
     K1 = float(f"{RATE_SHARE * rate_unit(arm):.{DIGITS}g}")
-    return HubFeedback(K1=K1, K2=PAPER_GAINS.K2 if arm.hub.inertia else 0.0)
+    K2 = float(f"{PAPER_GAINS.K2 * arm.input_per_torque:.{DIGITS}g}")
+    return HubFeedback(K1=K1, K2=0.0 if arm.has_massless_hub else K2)
 
 
 def default_words(arm: Arm, names: Iterable[str] = ("K1", "K2")) -> str:
@@ -91,7 +92,7 @@ def default_words(arm: Arm, names: Iterable[str] = ("K1", "K2")) -> str:
 
 def first_frequency(arm: Arm) -> float:
     """w1 [rad/s], the lowest flexible frequency of the undamped arm."""
-    return _first_frequency(arm.having(damping=0.0))
+    return _first_frequency(arm.elastic)
 
 
 @lru_cache(maxsize=64)

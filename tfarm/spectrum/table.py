@@ -76,7 +76,7 @@ class Modes:
         """
         digits = max(digits, 12)
         flexible = [refine(self._k, float(omega), digits) for omega in self.natural_frequency[self._rigid :]]
-        for text in flexible if self.theory == "timoshenko" else ():
+        for text in flexible if self.theory == "timoshenko" and self.arm.is_uniform else ():
             if not roots_near(self.arm, text, digits - 1):
                 raise ConvergenceError(f"Delta(s) of the appendix has no root at {text}i rad/s", text, digits)
         return ["0.0"] * self._rigid + flexible
@@ -92,13 +92,15 @@ class Modes:
             return self.natural_frequency
         if method == "balls":
             flexible = [(float(lower) + float(upper)) / 2 for lower, upper in self.certify().brackets]
-        elif self.theory == "timoshenko":
+        elif self.theory == "timoshenko" and self.arm.is_uniform:
             flexible = [
                 float(natural_frequency(self.arm, float(omega), DIGITS))
                 for omega in self.natural_frequency[self._rigid :]
             ]
         else:
-            raise ParameterError(key="method", value=method, remedy="the paper's appendix is of a Timoshenko beam")
+            raise ParameterError(
+                key="method", value=method, remedy="the paper's appendix is of one Timoshenko beam on a hub"
+            )
         return np.r_[[0.0] * self._rigid, flexible]
 
     def certify(self, digits: int = 15) -> Certificate:
