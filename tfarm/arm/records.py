@@ -181,6 +181,11 @@ class Arm:
         return plain and self.clamp.is_rigid and self.joint.is_rigid
 
     @property
+    def least_damping(self) -> float:
+        """The smallest C [s] of the segments."""
+        return min(link.damping for link in self.links)
+
+    @property
     def has_elastic_link(self) -> bool:
         """Whether no segment is damped: C = 0 throughout, whatever hub, clamp and joint lose."""
         return self.damping == 0.0
@@ -200,6 +205,11 @@ class Arm:
         return (self.motor.resistance if self.input == "motor_voltage" else 1.0) / per_ampere
 
     @property
+    def input_lags(self) -> bool:
+        """Whether the input is a voltage behind an inductance, whose torque comes late."""
+        return self.input == "motor_voltage" and self.motor is not None and self.motor.inductance > 0
+
+    @property
     def rate_loss(self) -> float:
         """What the input must give for 1 rad/s: of N m for b + N^2 b_m, and of a voltage N Ke for the back-EMF too."""
         if self.motor is None:
@@ -210,7 +220,7 @@ class Arm:
 
     @property
     def turned_inertia(self) -> float:
-        """J in units of the input [N m s^2, A s^2 or V s^2]; with an inductance what friction adds to it through L_a/R."""
+        """J in units of the input [N m s^2, A s^2 or V s^2]; with an inductance what friction adds through L_a/R."""
         lag = 0.0
         if self.motor is not None and self.input == "motor_voltage":
             loss = self.hub.friction + self.motor.gear_ratio**2 * self.motor.rotor_friction
@@ -270,11 +280,15 @@ class Arm:
     def having(self, **numbers: float) -> Arm:
         """The arm with other numbers: of `ADJUSTABLE`, by name, in SI units.  Raises ParameterError as its parts do.
 
-        A hub that an infinite inertia locks is left without its friction, spring and motor, which then do nothing.
+        The damping is that of every segment.  A hub that an infinite inertia locks is left without its friction, spring and motor, which then do nothing.
         """
         arm = self
         for name, value in numbers.items():
             room, number = ADJUSTABLE[name]
+            if name == "damping" and arm.outer:
+                others = tuple(replace(link, damping=value) for link in arm.outer)
+                arm = replace(arm, link=replace(arm.link, damping=value), outer=others)
+                continue
             if room == "link" and arm.outer:
                 remedy = f"which of the {len(arm.links)} segments is meant? write their [[link]] tables anew"
                 raise ParameterError(key=name, value=value, remedy=remedy)

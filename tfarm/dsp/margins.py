@@ -160,7 +160,7 @@ def log_radius_with(
 def alive(arm: Arm, chain: Chain) -> int:
     """How many bending modes of a damped arm outlive the rest of a sample: C w^2 T (1 - f)/2 below 40."""
     remaining = chain.sampling.period * (1 - chain.sampling.fraction)
-    return modes_below(arm, math.sqrt(2 * FORGOTTEN / (arm.damping * remaining)))
+    return modes_below(arm, math.sqrt(2 * FORGOTTEN / (arm.least_damping * remaining)))
 
 
 def most_modes(arm: Arm, chain: Chain) -> int:
@@ -168,9 +168,9 @@ def most_modes(arm: Arm, chain: Chain) -> int:
 
     What is overdamped has its slow poles beside -1/C, where the remainder has them too.
     """
-    if arm.is_undamped:
+    if not arm.least_damping:
         return MOST
-    return min(MOST, BEYOND + min(alive(arm, chain), modes_below(arm, OVERDAMPED / arm.damping)))
+    return min(MOST, BEYOND + min(alive(arm, chain), modes_below(arm, OVERDAMPED / arm.least_damping)))
 
 
 def whole_loop(arm: Arm, gains: HubFeedback, chain: Chain, branches: Branching = all_damped_modes) -> SampledLoop:

@@ -113,7 +113,7 @@ def sampled_verdict(arm: Arm, gains: HubFeedback, chain: Chain | None = None, *,
     if count is not None:
         count = whole("modes", count, 1, MOST_ASKED, f"a whole number of flexible modes from 1 to {MOST_ASKED}")
         return Verdict(sampled_loop(arm, gains, chain, count=count))
-    if arm.is_undamped:
+    if arm.has_elastic_link:
         return Verdict(sampled_loop(arm, gains, chain, count=UNDAMPED_MODES))
     check_loop(arm, gains)
     largest = whole_loop(arm, gains, chain)
@@ -186,7 +186,7 @@ def analyse(arm: Arm, gains: HubFeedback, chain: Chain | None = None, *, count: 
     chain = Chain() if chain is None else chain
     verdict = sampled_verdict(arm, gains, chain, count=count)
     loop, band = verdict.loop, verdict.band
-    has_moment = arm.hub_inertia > 0
+    has_moment = not arm.has_massless_hub
     return Analysis(
         verdict,
         shown_windows(loop, band, "K1"),

@@ -13,8 +13,8 @@ M(0) = p_WM and Q(0) = p_WQ, the functions of `closed_form`.
 
 A uniform segment has two pairs of waves, W = cosh(t_j x) and sinh(t_j x)/t_j with z_j = t_j^2, whose weights
 (alpha_j, beta_j) turn into (c alpha - z s beta, c beta - s alpha) where the origin is moved inwards by the length.
-This has the determinant 1, so alpha_1 beta_1 and alpha_2 beta_2 stay as they are, and what is left of p is a 2x2 matrix that
-the first wave turns from the left and the second from the right: no product of a wave with itself appears.
+This has the determinant 1, so alpha_1 beta_1 and alpha_2 beta_2 stay as they are, and what is left of p is a 2x2
+matrix that the first wave turns from the left and the second from the right: no product of a wave with itself appears.
 
 In these formulas lengths are in the segment's own length, moments in EI/l, forces in EI/l^2 (`closed_form`); numbers
 are floats, arrays, balls or series alike.

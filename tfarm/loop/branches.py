@@ -189,7 +189,7 @@ def open_pairs(arm: Arm, number: int, wanted: int) -> tuple[Complex, float]:
     if arm.is_undamped:
         return zeros, lowest
     if not arm.is_uniform:
-        found = damped_modes(table)
+        found = damped_modes(modes(arm, number))
         return found.eigenvalues[found.index > 0], lowest
     stage = Stage(Variation(arm, HubFeedback(), "damping"), 0.0, C, lowest)
     return stage.follow(zeros, wanted, min(1.0, FIRST / (omega[-1] * C)))[-1].zeros, lowest

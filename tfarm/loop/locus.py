@@ -109,7 +109,7 @@ def _of_rig_with_friction(
     if vary == "all":
         remedy = "a scale on the law does not scale the hub's friction: vary K1, K2 or Kp"
         raise ParameterError(key="vary", value=vary, remedy=remedy)
-    if arm.motor is not None and arm.input == "motor_voltage" and arm.motor.inductance:
+    if arm.motor is not None and arm.input_lags:
         remedy = "a locus wants a circuit without lag: leave it out, as L_a/R is mostly far beyond the arm's modes"
         raise ParameterError(key="motor.inductance", value=arm.motor.inductance, remedy=remedy)
     loss = arm.rate_loss

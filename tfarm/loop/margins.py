@@ -185,7 +185,7 @@ def gain_margin(loop: Loop, band: float) -> tuple[float, float]:
     law, arm, line = loop.law, loop.arm, Line(NONE, loop.law)
     if arm.is_undamped:
         static = crossing_at_zero(arm, line)
-        factors = [1.0 / law.K2] if law.K2 > 0 else []
+        factors = [1.0 / loop.moment_share] if law.K2 > 0 else []
         factors += [] if static is None else [static.t]
     else:
         factors = crossings(arm, line, band).gain.tolist()

@@ -44,7 +44,7 @@ class Loop:
         if self.arm.has_massless_hub and self.law.K2:
             remedy = "with hub.inertia = 0 the root moment is -u at once: an algebraic loop; use K2 = 0 or some inertia"
             raise ParameterError(key="K2", value=self.law.K2, remedy=remedy)
-        if self.arm.is_undamped and not (self.arm.reads_hub_moment and self.arm.input_per_torque == 1.0):
+        if self.arm.is_undamped and not self.arm.reads_hub_moment:
             remedy = (
                 "without any damping, and with a gauge that does not read the torque's own moment, no theorem tells "
                 "the modes beyond a band; give link.damping, hub.friction or another loss, as every rig has one"
@@ -74,8 +74,12 @@ class Loop:
         0 where it does neither: K1 = 0 leaves no loss, K2 = 1 leaves the modes of the locked hub.  By Lyapunov's
         argument it is the sign of K1 (1 - K2), whatever Kp, with K1 plus the hub's friction for K1 of a rig.
         """
-        K2 = self.law.K2 / self.arm.input_per_torque
-        return int(np.sign(self.law.K1 + self.arm.rate_loss)) * int(np.sign(1.0 - K2))
+        return int(np.sign(self.law.K1 + self.arm.rate_loss)) * int(np.sign(1.0 - self.moment_share))
+
+    @property
+    def moment_share(self) -> float:
+        """How much of the moment on the hub the law takes off it: K2, over the input that a torque of 1 N m takes."""
+        return self.law.K2 / self.arm.input_per_torque
 
     @property
     def is_told_by_theorem(self) -> bool:
@@ -83,7 +87,7 @@ class Loop:
 
         What hub, clamp and joint lose only adds to K1 > 0.
         """
-        return self.arm.has_elastic_link and (self.arm.reads_hub_moment or not self.law.K2)
+        return self.arm.has_elastic_link and not self.arm.input_lags and (self.arm.reads_hub_moment or not self.law.K2)
 
     @property
     def member(self) -> Member:

@@ -65,7 +65,7 @@ class Region:
         if self.arm.is_undamped:
             law = HubFeedback(K1=1.0, Kp=self.Kp)
             static = crossing_at_zero(self.arm, along("K2", law))
-            ends = {low, high, 1.0, *([] if static is None else [static.t])}
+            ends = {low, high, self.arm.input_per_torque, *([] if static is None else [static.t])}
             pairs = itertools.pairwise(sorted(end for end in ends if low <= end <= high))
             loop = Loop(self.arm, law)
             held = [pair for pair in pairs if holds_undamped(loop, law.having("K2", sum(pair) / 2))]
@@ -120,7 +120,8 @@ def _undamped_counts(arm: Arm, K1: Real, K2: Real, Kp: float) -> NDArray[np.int6
     static = crossing_at_zero(arm, along("K2", HubFeedback(K1=1.0, Kp=Kp)))
     side = np.zeros(K2.size, bool) if static is None else static.t < K2
     unstable = np.full((K2.size, K1.size), INFINITE, dtype=np.int64)
-    quadrants = ((np.nonzero(K1 > 0)[0], K2 < 1), (np.nonzero(K1 < 0)[0], K2 > 1))
+    whole = arm.input_per_torque  # the K2 that takes the whole moment off the hub: 1 where the input is torque
+    quadrants = ((np.nonzero(K1 > 0)[0], K2 < whole), (np.nonzero(K1 < 0)[0], K2 > whole))
     for (columns, band), each in itertools.product(quadrants, (True, False)):
         (rows,) = np.nonzero(band & (side == each))
         if rows.size and columns.size:

@@ -116,7 +116,7 @@ def _beyond(loop: Loop, quiet: bool) -> tuple[bool, str]:
         return False, "beyond the band not bounded: the small-gain condition would need more modes than are looked at"
     if law.K1 == 0:
         return False, "C = 0 and K1 = 0: nothing takes or gives energy, modes beyond the band lie on the axis"
-    if law.K2 == 1:
+    if loop.moment_share == 1:
         return False, "C = 0 and K2 = 1: modes with the hub at rest stay undamped, in every band"
     if loop.takes_energy > 0:
         return False, "C = 0: every mode beyond the band is damped (Lyapunov), with a decay rate that tends to 0"

@@ -85,9 +85,9 @@ def _undamped(loop: Loop, name: str) -> Crossings:
     static = crossing_at_zero(loop.arm, along(name, loop.law))
     found = [] if static is None else [static]
     if name == "K2":
-        found.append(Crossing(1.0, math.inf, 1 if loop.law.K1 > 0 else -1))
+        found.append(Crossing(loop.arm.input_per_torque, math.inf, 1 if loop.law.K1 > 0 else -1))
     if name == "K1" and (static is None or static.t != 0):
-        found.append(Crossing(0.0, math.inf, -1 if loop.law.K2 < 1 else 1))
+        found.append(Crossing(0.0, math.inf, -1 if loop.moment_share < 1 else 1))
     return Crossings.of(found)
 
 
@@ -109,7 +109,7 @@ def _counts(verdict: Stability, name: str, pairs: list[Interval], found: Crossin
 
 def holds_undamped(loop: Loop, law: HubFeedback) -> bool:
     """Whether no pole is right of the axis at C = 0: K1 > 0, K2 < 1 (Lyapunov), and nothing falls statically."""
-    if not (law.K1 > 0 and law.K2 < 1):
+    if not (law.K1 > 0 and law.K2 < loop.arm.input_per_torque):
         return False
     small = np.array([1e-9 * float(modes(loop.arm, 1).natural_frequency[-1])], dtype=complex)
     return bool(law.Kp >= 0 or (1 + Loop(loop.arm, law).loop_function(small)[0]).real > 0)
@@ -122,10 +122,10 @@ def _with_proven_ends(loop: Loop, name: str, pair: Interval, limits: Interval) -
     """
     low, high = pair
     law, passive = loop.law, loop.arm.is_undamped or loop.law.K2 == 0
-    if loop.arm.input == "motor_voltage" and loop.arm.motor is not None and loop.arm.motor.inductance:
+    if loop.arm.input_lags:
         return low, high  # a voltage reaches the hub late: it is not passive
     if name == "K2":
         is_proven = loop.arm.is_undamped and law.K1 > 0 and law.Kp >= 0
         return (-math.inf if is_proven and low == limits[0] else low), high
-    is_proven = passive and law.K2 < 1 and (name == "K1" or law.K1 > 0) and (name == "Kp" or law.Kp >= 0)
+    is_proven = passive and loop.moment_share < 1 and (name == "K1" or law.K1 > 0) and (name == "Kp" or law.Kp >= 0)
     return low, (math.inf if is_proven and high == limits[1] else high)

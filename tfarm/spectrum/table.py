@@ -98,9 +98,8 @@ class Modes:
                 for omega in self.natural_frequency[self._rigid :]
             ]
         else:
-            raise ParameterError(
-                key="method", value=method, remedy="the paper's appendix is of one Timoshenko beam on a hub"
-            )
+            remedy = "the paper's appendix is of one Timoshenko beam on a hub"
+            raise ParameterError(key="method", value=method, remedy=remedy)
         return np.r_[[0.0] * self._rigid, flexible]
 
     def certify(self, digits: int = 15) -> Certificate:
