@@ -280,7 +280,8 @@ class Arm:
     def having(self, **numbers: float) -> Arm:
         """The arm with other numbers: of `ADJUSTABLE`, by name, in SI units.  Raises ParameterError as its parts do.
 
-        The damping is that of every segment.  A hub that an infinite inertia locks is left without its friction, spring and motor, which then do nothing.
+        The damping is that of every segment.  A hub that an infinite inertia locks is left without its friction, spring
+        and motor, which then do nothing.
         """
         arm = self
         for name, value in numbers.items():

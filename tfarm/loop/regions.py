@@ -121,7 +121,7 @@ def _undamped_counts(arm: Arm, K1: Real, K2: Real, Kp: float) -> NDArray[np.int6
     side = np.zeros(K2.size, bool) if static is None else static.t < K2
     unstable = np.full((K2.size, K1.size), INFINITE, dtype=np.int64)
     whole = arm.input_per_torque  # the K2 that takes the whole moment off the hub: 1 where the input is torque
-    quadrants = ((np.nonzero(K1 > 0)[0], K2 < whole), (np.nonzero(K1 < 0)[0], K2 > whole))
+    quadrants = ((np.nonzero(K1 > 0)[0], whole > K2), (np.nonzero(K1 < 0)[0], whole < K2))
     for (columns, band), each in itertools.product(quadrants, (True, False)):
         (rows,) = np.nonzero(band & (side == each))
         if rows.size and columns.size:

@@ -109,7 +109,7 @@ def _counts(verdict: Stability, name: str, pairs: list[Interval], found: Crossin
 
 def holds_undamped(loop: Loop, law: HubFeedback) -> bool:
     """Whether no pole is right of the axis at C = 0: K1 > 0, K2 < 1 (Lyapunov), and nothing falls statically."""
-    if not (law.K1 > 0 and law.K2 < loop.arm.input_per_torque):
+    if not (law.K1 > 0 and loop.arm.input_per_torque > law.K2):
         return False
     small = np.array([1e-9 * float(modes(loop.arm, 1).natural_frequency[-1])], dtype=complex)
     return bool(law.Kp >= 0 or (1 + Loop(loop.arm, law).loop_function(small)[0]).real > 0)
