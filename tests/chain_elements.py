@@ -27,7 +27,7 @@ def natural_frequencies(arm, count, *, locked=False):
     """The first flexible frequencies [rad/s] of the rig without its damping, its hub as the arm leaves it or locked."""
     held = locked or _is_held(arm)
     rigid = arm.has_rigid_mode and not held
-    shift, up_to, found = _slowest(arm), reached(arm, count + len(arm.links) + len(arm.attachments)), np.empty(0)
+    shift, up_to, found = _slowest(arm), reached(arm, count + 2), np.empty(0)
     for _ in range(8):
         model = assemble(arm, up_to, held=held)
         basis = _basis(model.stiffness, shift * model.mass)

@@ -90,9 +90,8 @@ def test_twice_the_digits_give_the_same():
         ("force", 0.4),
         ("moment_pair", 0.1, 0.7),
     ):
-        for s in (300j, -5 + 4000j):
-            short, long = (response(rig(), s, wanted, digits, input=kind) for digits in (60, 120))
-            assert alike(short, long, 60)
+        short, long = (response(rig(), -5 + 4000j, wanted, digits, input=kind) for digits in (60, 120))
+        assert alike(short, long, 60)
 
 
 def test_cutting_a_segment_changes_nothing():

@@ -119,7 +119,7 @@ class _Chain:
     def _jumped(self, rows, x):
         """Past what is attached at x, and past the loads there."""
         W, Psi, moment, shear = ([*row] for row in rows)
-        s2 = self.s**2
+        s2 = _squared(self.s)
         for each in self.arm.attachments:
             if self._place(each.x) == x:
                 k, kr = each.stiffness + each.mass * s2, each.rotational_stiffness + each.inertia * s2
@@ -182,7 +182,7 @@ class _Chain:
 
     def _tip(self):
         """Q = -m s^2 (W + e Psi) and M = e Q - I_c s^2 Psi; an infinite m or I_c holds W + e Psi or Psi."""
-        payload, s2 = self.arm.payload, self.s**2
+        payload, s2 = self.arm.payload, _squared(self.s)
         W, Psi, moment, shear = self.states[self.joints[-1], "outer"][0]
         e = mpf(payload.offset)
         centre = [a + e * b for a, b in zip(W, Psi, strict=True)]
@@ -247,7 +247,15 @@ def _compliances(link, s, theory):
     kGA = mpf(link.shear_factor) * link.shear_modulus * section.area
     shear = mpf(0) if theory in ("rayleigh", "euler-bernoulli") else 1 / kGA
     rotary = mpf(0) if theory in ("shear", "euler-bernoulli") else rho * section.second_moment
-    return shear, 1 / (_EI(link) * (1 + link.damping * s)), rotary * s**2, rho * section.area * s**2
+    bending = 1 / (_EI(link) * (1 + link.damping * s if link.damping else 1))
+    s2 = _squared(s)
+    return shear, bending, rotary * s2, rho * section.area * s2
+
+
+def _squared(s):
+    """s^2, as a real number where it is one: real numbers are three times as fast."""
+    s2 = s * s
+    return s2.real if s2.imag == 0 else s2
 
 
 def _generator(link, s, theory):
@@ -264,7 +272,7 @@ def _biquadratic(link, s, theory):
 
 def _series(p, q, x):
     """c_0..c_3 of exp(A x) = c_0 + c_1 A + c_2 A^2 + c_3 A^3: A^n = a_n + b_n A^2, times A^(0 or 1)."""
-    c = [mpmath.mpc(0)] * 4
+    c = [mpf(0)] * 4
     a, b, even, odd, n = mpf(1), mpf(0), mpf(1), x, 0
     size = mpf(1)
     while size > mpmath.eps**2:
