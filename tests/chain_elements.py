@@ -32,6 +32,7 @@ def natural_frequencies(arm, count, *, locked=False):
         model = assemble(arm, up_to, held=held)
         basis = _basis(model.stiffness, shift * model.mass)
         share = svdvals(_over(shift * model.mass, basis))[rigid:]  # shift/sqrt(w^2 + shift^2)
+        share = share[share > 0]  # a hub without inertia behind a joint moves at no finite frequency
         found = shift * np.sqrt((1 - share) * (1 + share)) / share
         if found[count - 1] <= up_to:
             break

@@ -11,6 +11,8 @@ import pytest
 from tests.chain_elements import eigenvalues, frequency_response, natural_frequencies, reached
 from tests.rigs import CONTRAST, MOST_SEGMENTS, SLENDERNESS, some_point, some_rig
 from tests.transition import determinant, response
+from tfarm import Hub
+from tfarm.arm import RotarySpring
 
 FEATURES = {
     "radius": lambda arm: arm.hub.radius > 0,
@@ -60,6 +62,15 @@ def test_a_seed_gives_one_rig_and_an_undamped_one_dissipates_nothing():
     for seed in range(20):
         assert some_rig(np.random.default_rng(seed)) == some_rig(np.random.default_rng(seed))
         assert some_rig(np.random.default_rng(seed), damped=False).is_undamped
+
+
+def test_a_massless_hub_behind_a_joint_only_follows():
+    """Between two springs it has no inertia to tell them apart: they act in series."""
+    arm = some_rig(np.random.default_rng(0), damped=False, segments=2, drive="hub_torque")
+    spring = arm.link.EI / arm.link.length
+    arm = replace(arm, motor=None, joint=RotarySpring(stiffness=spring), hub=Hub(inertia=0.0, stiffness=spring))
+    both = replace(arm, joint=RotarySpring(stiffness=spring / 2), hub=Hub(inertia=math.inf))
+    assert natural_frequencies(arm, 6) == pytest.approx(natural_frequencies(both, 6), rel=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(8))
