@@ -196,6 +196,11 @@ class Chain:
         return not (dashpots or self.drive.friction or self.drive.back_emf)
 
     @property
+    def is_real_on_axis(self) -> bool:
+        """Whether drive and outputs are real at s = i w, but for odd powers of s: no loss, and no inductance's lag."""
+        return self.is_undamped and not self.drive.lag
+
+    @property
     def input_unit(self) -> Fraction:
         """The SI value of one unit of the input."""
         return self.drive.unit

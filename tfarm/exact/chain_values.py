@@ -163,11 +163,14 @@ class ChainState:
 
     def value(self, output: Output, x: float = 0.0) -> Ball:
         """The output for a unit input, in SI units; x is a share of the length."""
-        return self.numerator(output, x) / self.input
+        constant = output.constant(self.chain, x)
+        if constant is None:
+            return self.numerator(output, x) / self.input
+        return self.s**output.power * constant * rational(unit_scale(output, self.chain))
 
     def determines(self, output: Output, x: float) -> bool:
         """Whether the output has a value here: everywhere but where the input may be zero, at a pole."""
-        return not self.input.contains(0)
+        return output.constant(self.chain, x) is not None or not self.input.contains(0)
 
 
 class SlowSweep(Sweep):

@@ -92,6 +92,11 @@ class Coefficients:
         return self.damping == 0
 
     @property
+    def is_real_on_axis(self) -> bool:
+        """Whether drive and outputs are real at s = i w, but for odd powers of s."""
+        return self.is_undamped
+
+    @property
     def input_unit(self) -> Fraction:
         """The SI value of one unit of the input: E I/L of torque, 1 rad of the angle of a locked hub."""
         return Fraction(1) if self.is_locked else self.EI / self.length

@@ -72,10 +72,10 @@ def decimals(k: System, wanted: Output, s: complex, digits: int, x: float = 0.0)
 
 
 def _vanishing_parts(k: System, wanted: Output, s: complex) -> tuple[bool, bool]:
-    """Whether the real and the imaginary part vanish by symmetry: G is real for real s, and in s^2 at C = 0."""
+    """Whether the real and the imaginary part vanish by symmetry: G is real for real s, and without losses in s^2."""
     if s.imag == 0:
         return False, True
-    if s.real == 0 and k.damping == 0:
+    if s.real == 0 and k.is_real_on_axis:
         return wanted.power % 2 == 1, wanted.power % 2 == 0
     return False, False
 

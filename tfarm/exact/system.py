@@ -1,7 +1,7 @@
 """The exact system that an arm is: one uniform link in closed form, or a chain of elements.  Above, no more is known.
 
-Both have `damping`, `is_undamped`, `is_locked`, `at_rest`, `singular`, `transit`, `length`, `EI`, `input_unit` and
-`with_damping`, and the functions of this room take either.
+Both have `damping`, `is_undamped`, `is_real_on_axis`, `is_locked`, `at_rest`, `singular`, `transit`, `length`, `EI`,
+`input_unit` and `with_damping`, and the functions of this room take either.
 """
 
 from __future__ import annotations

@@ -133,8 +133,9 @@ def _newton_step(variation: Variation, g: float, w: float, low: float, high: flo
 def _on_axis(variation: Variation, gains: Real, omega: Real) -> Complex:
     """D(i w; g) for each gain and frequency, all on the scale of the first.
 
-    At C = 0 drive and numerators are real there, or imaginary with an odd power of s, and what rounding adds is taken
-    off: then Im D is that of the rate gain alone, and the crossings at K1 = 0 and K2 = 1 come out to the last digit.
+    Without losses drive and numerators are real there, or imaginary with an odd power of s, and what rounding adds is
+    taken off: then Im D is that of the rate gain alone, and the crossings at K1 = 0 and K2 = 1 come out to the last
+    digit.
     """
     values, base = np.empty(omega.size, complex), 0.0
     for n, (gain, w) in enumerate(zip(gains, omega, strict=True)):
@@ -142,7 +143,7 @@ def _on_axis(variation: Variation, gains: Real, omega: Real) -> Complex:
         drive, numerators, scale = (part[..., 0] for part in loop_parts(k, np.array([1j * w])))
         turn = np.exp(1j * scale.imag)
         drive, numerators = drive * turn, numerators * turn
-        if k.damping == 0:
+        if k.is_real_on_axis:
             drive, numerators = drive.real, np.where(ODD, 1j * numerators.imag, numerators.real)
         base = base if n else float(scale.real)
         values[n] = (drive + torque(law[:, 0], numerators)) * np.exp(scale.real - base)

@@ -1,0 +1,272 @@
+"""The chain against the plain product of transition matrices, against itself cut up, and against the paper's arm."""
+
+import math
+from dataclasses import replace
+from fractions import Fraction
+
+import mpmath
+import numpy as np
+import pytest
+
+import tfarm
+from tests.rigs import some_point, some_rig
+from tests.strategies import some_arm
+from tests.test_chain_elements import lossless
+from tests.test_transition import rig
+from tests.transition import determinant, response
+from tfarm import Hub
+from tfarm.arm import THEORIES, Attachment, Motor, RotarySpring
+from tfarm.exact.chain import Chain, chain_of
+from tfarm.exact.coefficients import Coefficients
+from tfarm.exact.outputs import OUTPUTS, Output
+from tfarm.exact.system import system_of
+from tfarm.exact.values import evaluate_outputs, expansions_at_zero, kernel_table
+from tfarm.spectrum.search import natural_frequencies
+
+EPS = np.finfo(float).eps
+LOST = 1e-13  # error over 1 + condition: 20 times what 5,000 rigs of `chain_accuracy` have at most
+EXACT = mpmath.mpf("1e-29")  # of 30 digits, rounded
+INPUTS = ("hub_torque", "motor_voltage", "motor_current", "hub_angle")
+ENDS = [name for name, each in OUTPUTS.items() if each.place != "x"]
+ALONG = {"deflection": "deflection", "rotation": "twist", "moment": "gauge", "shear": "shear"}  # as the oracle says
+
+
+def point_of(arm, share):
+    """That share of the exact sum of the lengths [m], as tfarm takes it, to 60 digits."""
+    x = Fraction(share) * sum(Fraction(link.length) for link in arm.links)
+    with mpmath.workdps(60):
+        return mpmath.mpf(x.numerator) / x.denominator
+
+
+def oracle(arm, s, x, digits=40):
+    """Every output in the order of `transfer_of`, by transition matrices."""
+    wanted = [*ENDS, *((name, point_of(arm, x / arm.length)) for name in ALONG.values())]
+    found = response(arm, s, wanted, digits)
+    return [found[each] for each in wanted]
+
+
+def transfer_of(arm, x, method="closed-form"):
+    return tfarm.transfer(arm, [*ENDS, *ALONG], x=x, method=method)
+
+
+def error(G, s, exact):
+    """The largest |G/exact - 1| over 1 + |s G'/G|, of outputs that are not zero; those are zero."""
+    exact = np.array([complex(value) for value in exact])
+    values, slopes = G(s), G.derivative(s)
+    there = abs(exact) > 1e-30 * abs(exact).max()
+    assert (abs(values[~there]) < 1e-30 * abs(exact).max()).all()
+    condition = abs(s * slopes[there] / exact[there])
+    return (abs(values[there] / exact[there] - 1) / (1 + condition)).max()
+
+
+@pytest.mark.parametrize("drive", INPUTS)
+@pytest.mark.parametrize("s", [130j, -4 + 900j, -60 + 0j, 1e-3j])
+def test_every_output_of_a_rig_with_everything(drive, s):
+    arm = rig(input=drive)
+    assert error(transfer_of(arm, 0.625), s, oracle(arm, s, 0.625)) < LOST
+
+
+@pytest.mark.parametrize("seed", range(16))
+def test_every_output_of_random_rigs(seed):
+    rng = np.random.default_rng([1, seed])
+    arm = some_rig(rng)
+    s, x = some_point(rng, arm), float(rng.uniform(0, arm.length))
+    assert error(transfer_of(arm, x), s, oracle(arm, s, x)) < LOST
+
+
+@pytest.mark.parametrize("theory", THEORIES)
+def test_every_output_under_every_theory(theory):
+    for s in (300j, -30 + 4000j):
+        arm = rig(theory=theory)
+        assert error(transfer_of(arm, 0.375), s, oracle(arm, s, 0.375)) < LOST
+
+
+@pytest.mark.parametrize("side", ["inner", "outer"])
+def test_both_sides_of_a_joint_with_a_mass_on_it(side):
+    """At 0.25 of the rig M, Q, C and so the gauge jump."""
+    arm, s = rig(), -3 + 400j
+    units, quantities = {"M": "N m", "Q": "N"}, {"M": "gauge", "Q": "shear"}
+    wanted = [
+        Output(quantity=name, place="x", unit=units[name], gauge=name == "M", side=side, label=f"{name} {side}")
+        for name in units
+    ]
+    exact = response(arm, s, [(name, 0.25, side) for name in quantities.values()])
+    assert error(tfarm.transfer(arm, wanted, x=0.25), s, exact.values()) < LOST
+
+
+@pytest.mark.parametrize("drive", INPUTS)
+@pytest.mark.parametrize("s", [250j, -4 + 900j])
+def test_thirty_digits_by_balls(drive, s):
+    arm = rig(input=drive)
+    exact = oracle(arm, s, 0.625, 60)
+    for (re, im), value in zip(transfer_of(arm, 0.625).digits(s, 30), exact, strict=True):
+        for text, part in ((re, value.real), (im, value.imag)):
+            with mpmath.workdps(60):
+                assert abs(mpmath.mpf(text) - part) <= EXACT * abs(part) + mpmath.mpf("1e-55") * abs(value)
+    balls = transfer_of(arm, 0.625, "balls")(s)
+    assert abs(balls - [complex(value) for value in exact]).max() <= 2 * EPS * abs(balls).max()
+
+
+LOSSES = {
+    "friction": {"hub": Hub(inertia=0.1, friction=0.1)},
+    "dashpot": {"clamp": RotarySpring(stiffness=300.0, damping=1e-3)},
+    "inductance alone": {
+        "motor": Motor(resistance=2.0, torque_constant=0.05, back_emf_constant=0.0, inductance=0.01),
+        "input": "motor_voltage",
+    },
+    "none": {},
+}
+
+
+@pytest.mark.parametrize("loss", LOSSES)
+def test_digits_of_elastic_links_with_another_loss(loss):
+    """No part vanishes on the axis but where nothing dissipates or lags: C = 0 alone does not say so."""
+    arm = replace(lossless(rig()), **LOSSES[loss])
+    for name, (re, im) in zip(
+        ("hub_angle", "hub_rate"), tfarm.transfer(arm, ["hub_angle", "hub_rate"]).digits(99j, 30), strict=True
+    ):
+        exact = response(arm, 99j, [name])[name]
+        with mpmath.workdps(60):
+            assert abs(mpmath.mpc(re, im) - exact) <= EXACT * abs(exact)
+        assert (mpmath.mpf(re) != 0) == (exact.real != 0)
+        assert (mpmath.mpf(im) != 0) == (exact.imag != 0)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_derivatives_are_differences_of_the_oracle(seed):
+    """Cauchy's integral has the error of a value over the circle's radius, |s| over the phase of all waves."""
+    rng = np.random.default_rng([2, seed])
+    arm = some_rig(rng)
+    s, x = some_point(rng, arm), float(rng.uniform(0, arm.length))
+    h = 2.0**-60 * abs(s)  # the square of 2^-60 is far below what is asked
+    with mpmath.workdps(60):
+        right, left = (oracle(arm, mpmath.mpc(s) + sign * h, x, 60) for sign in (1, -1))
+        exact = np.array([complex((a - b) / (2 * h)) for a, b in zip(right, left, strict=True)])
+        sizes = abs(exact) + abs(np.array([complex(value) for value in right])) / abs(s)
+    found = transfer_of(arm, x).derivative(s)
+    assert (abs(found - exact) <= 1e-12 * sizes + 1e-40).all()
+
+
+def free_rig(**changes):
+    """The rig without its springs to ground."""
+    arm = rig(hub=replace(rig().hub, stiffness=0.0, friction=0.0), motor=None)
+    masses = tuple(replace(each, stiffness=0.0, rotational_stiffness=0.0) for each in arm.attachments)
+    return replace(arm, attachments=masses, **changes)
+
+
+AT_REST = {
+    "free": free_rig(),
+    "friction": free_rig(hub=replace(rig().hub, stiffness=0.0, friction=0.3)),
+    "held": rig(),
+    "voltage": free_rig(motor=rig().motor, input="motor_voltage"),
+    "angle": rig(input="hub_angle"),
+}
+
+
+@pytest.mark.parametrize("name", AT_REST)
+def test_the_expansion_at_rest(name):
+    """From values at +-h and +-ih: powers s^-2 and s^0 stay in the mean of a pair, s^-1 and s in its difference."""
+    arm = AT_REST[name]
+    with mpmath.workdps(75):
+        h = mpmath.mpf("1e-14")
+        right, left, up = (oracle(arm, h * turn, 0.625, 75) for turn in (1, -1, 1j))
+        down = [mpmath.conj(value) for value in up]
+        even, odd = ([(a + sign * b) / 2 for a, b in zip(right, left, strict=True)] for sign in (1, -1))
+        even_i, odd_i = ([(a + sign * b) / 2 for a, b in zip(up, down, strict=True)] for sign in (1, -1))
+        wanted = [
+            (
+                h**2 * (a - b) / 2,
+                h * (c + 1j * d) / 2,
+                (a + b) / 2,
+                (c - 1j * d) / (2 * h),
+            )
+            for a, b, c, d in zip(even, even_i, odd, odd_i, strict=True)
+        ]
+        exact = np.array([[complex(value) for value in row] for row in wanted])
+    G = transfer_of(arm, 0.625)
+    found = np.array(expansions_at_zero(system_of(arm), G.rows, 0.625 / arm.length))
+    assert np.array_equal(G.rigid_body, found[:, 0])
+    assert np.array_equal(G.static, found[:, 2])
+    sizes = np.maximum(abs(exact).max(axis=1)[:, None], 1e-20)
+    assert (abs(found - exact) <= 1e-13 * abs(exact) + 1e-17 * sizes).all()
+
+
+@pytest.mark.parametrize("pieces", [2, 3, 7, 64])
+@pytest.mark.parametrize("name", ["sasaki2012", "stocky-steel"])
+def test_an_arm_cut_into_equal_pieces(name, pieces):
+    """Frequencies as of the uncut one, which is not solved as a chain; responses with its damping too."""
+    arm = tfarm.load(name)
+    part = replace(arm.link, length=arm.link.length / pieces, damping=1e-5)
+    whole = replace(arm, link=replace(arm.link, damping=1e-5))
+    cut = replace(whole, link=part, outer=(part,) * (pieces - 1))
+    assert not cut.is_uniform
+    assert whole.is_uniform
+    assert tfarm.modes(cut, 12).natural_frequency == pytest.approx(
+        tfarm.modes(whole, 12).natural_frequency, rel=1e-13, abs=0
+    )
+    s = np.array([0.3, 0.6j, 2.3j, 5j, -0.02 + 9j]) * tfarm.modes(whole, 1).natural_frequency[-1]
+    ours, theirs = (tfarm.transfer(each, ENDS) for each in (cut, whole))
+    condition = abs(s * theirs.derivative(s) / theirs(s))
+    assert (abs(ours(s) / theirs(s) - 1) / (1 + condition)).max() < LOST
+
+
+@pytest.mark.parametrize("pieces", [2, 3, 7, 62])
+def test_a_rig_whose_middle_segment_is_cut(pieces):
+    whole = lossless(rig())
+    _, middle, outer = whole.links
+    cut = replace(whole, outer=(*[replace(middle, length=middle.length / pieces)] * pieces, outer))
+    assert tfarm.modes(cut, 12).natural_frequency == pytest.approx(
+        tfarm.modes(whole, 12).natural_frequency, rel=1e-13, abs=0
+    )
+
+
+@pytest.mark.parametrize("place", [0, 1, 2])
+def test_a_segment_of_next_to_no_length(place):
+    """1e-14 L of a hundredfold stiffness, at the clamp, between two segments and at the tip."""
+    whole = lossless(rig())
+    sliver = replace(whole.link, length=1e-14 * whole.length, youngs_modulus=7e12, shear_modulus=3e12)
+    links = list(whole.links)
+    links.insert(place if place < 2 else len(links), sliver)
+    cut = replace(whole, link=links[0], outer=tuple(links[1:]))
+    found, wanted = (tfarm.modes(arm, 12).natural_frequency for arm in (cut, whole))
+    assert found == pytest.approx(wanted, rel=1e-12, abs=0)
+
+
+def test_what_is_zero_or_rigid_leaves_the_papers_arm():
+    arm = tfarm.load("sasaki2012-lab")
+    hub = Hub(inertia=arm.hub.inertia, radius=0.0, friction=0.0, stiffness=0.0)
+    same = replace(arm, hub=hub, clamp=RotarySpring(stiffness=math.inf), joint=RotarySpring(stiffness=math.inf))
+    assert isinstance(system_of(same), Coefficients)
+    assert system_of(same) == system_of(arm)
+    more = {"motor": Motor(resistance=1.0, torque_constant=1.0), "attachments": (Attachment(x=0.1, mass=1.0),)}
+    assert all(isinstance(system_of(replace(arm, **{name: part})), Chain) for name, part in more.items())
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_the_papers_arm_as_a_chain(seed):
+    """One segment, solved as chains are: the closed form's frequencies, responses and expansions at rest."""
+    rng = np.random.default_rng([3, seed])
+    arm = some_arm(rng)
+    k, chain = system_of(arm), chain_of(arm)
+    assert natural_frequencies(chain.with_damping(0.0), 1, 12)[arm.has_rigid_mode :] == pytest.approx(
+        natural_frequencies(k.with_damping(0.0), 1, 12)[arm.has_rigid_mode :], rel=1e-14, abs=0
+    )
+    wanted, x = [OUTPUTS[name] for name in [*ENDS, *ALONG]], 0.4
+    s = np.array([some_point(rng, arm) for _ in range(8)])
+    G = tfarm.transfer(arm, [*ENDS, *ALONG], x=x * arm.length)
+    ours, theirs = (evaluate_outputs(each, wanted, kernel_table(each, wanted), s, x) for each in (chain, k))
+    there = theirs != 0
+    condition = abs(s * G.derivative(s))[there] / abs(theirs[there])
+    assert (abs(ours[there] / theirs[there] - 1) / (1 + condition)).max() < 1e-14
+    assert (abs(ours[~there]) <= 1e-16 * abs(ours).max()).all()
+    ours, theirs = (np.array(expansions_at_zero(each, wanted, x)) for each in (chain, k))
+    assert (abs(ours - theirs) <= 1e-14 * abs(theirs) + 1e-15 * abs(theirs).max(axis=1)[:, None]).all()
+
+
+@pytest.mark.parametrize("theory", THEORIES)
+def test_the_frequencies_of_every_theory_are_sign_changes_of_the_determinant(theory):
+    arm = replace(lossless(rig()), theory=theory)
+    for omega in tfarm.modes(arm, 8).natural_frequency:
+        low, high = (determinant(arm, 1j * omega * (1 + shift)) for shift in (-1e-14, 1e-14))
+        assert low.imag == high.imag == 0
+        assert low.real * high.real < 0
