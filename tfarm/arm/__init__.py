@@ -1,10 +1,10 @@
 """What is analysed: the arm as frozen records, its TOML file and the presets."""
 
-from tfarm.arm.feedback import FED_BACK, GAINS, LISTED, NAMES, Gain, HubFeedback, law_of, many_laws
+from tfarm.arm.feedback import FED_BACK, GAINS, LISTED, NAMES, Gain, HubFeedback, law_of, many_laws, through, unit_of
 from tfarm.arm.link import Link
 from tfarm.arm.plausible import implausible
 from tfarm.arm.reading import load, presets
-from tfarm.arm.records import INPUTS, Arm, Input, must_be_arm, must_turn
+from tfarm.arm.records import INPUT_UNITS, INPUTS, Arm, Input, must_be_arm, must_turn
 from tfarm.arm.rig import Attachment, Hub, Motor, Payload, RotarySpring
 from tfarm.arm.sections import Section
 from tfarm.arm.theories import THEORIES, WITH_ROTARY_INERTIA, WITH_SHEAR, Theory
@@ -14,6 +14,7 @@ __all__ = [
     "FED_BACK",
     "GAINS",
     "INPUTS",
+    "INPUT_UNITS",
     "LISTED",
     "NAMES",
     "THEORIES",
@@ -38,5 +39,7 @@ __all__ = [
     "must_be_arm",
     "must_turn",
     "presets",
+    "through",
     "to_toml",
+    "unit_of",
 ]

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tfarm.arm.checks import LARGEST, number
+from tfarm.arm.records import INPUT_UNITS, Arm
 from tfarm.errors import ParameterError
 
 
@@ -78,6 +79,24 @@ class HubFeedback:
     def plus(self, other: HubFeedback, factor: float = 1.0) -> HubFeedback:
         """This law and so many times another one at once: their torques add."""
         return HubFeedback(**{gain.name: self[gain.name] + factor * other[gain.name] for gain in GAINS})
+
+
+def unit_of(name: str, arm: Arm) -> str:
+    """The SI unit of the gain of that name on an arm whose loop closes through its own input: N m, A or V.
+
+    K2, a pure number where a torque answers the moment, is A/(N m) or V/(N m) through a motor.
+    """
+    (unit,) = (gain.unit for gain in GAINS if gain.name == name)
+    given = INPUT_UNITS["hub_torque" if arm.is_locked else arm.input]
+    if unit == "1":
+        return "1" if given == "N m" else f"{given}/(N m)"
+    return unit.replace("N m", given)
+
+
+def through(arm: Arm) -> str:
+    """What the loop of an arm closes through, in words."""
+    words = {"motor_voltage": "the motor's voltage [V]", "motor_current": "the motor's current [A]"}
+    return words.get(arm.input, "the torque at the hub [N m]")
 
 
 def many_laws(law: HubFeedback, **varied: ArrayLike) -> NDArray[np.float64]:

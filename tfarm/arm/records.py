@@ -19,6 +19,7 @@ from tfarm.errors import ParameterError, did_you_mean, shown
 
 Input = Literal["hub_torque", "motor_voltage", "motor_current", "hub_angle"]
 INPUTS: tuple[Input, ...] = get_args(Input)
+INPUT_UNITS = {"hub_torque": "N m", "motor_voltage": "V", "motor_current": "A", "hub_angle": "rad"}
 MOST = 64  # segments, and attachments: more than any rig has, and 64 equal pieces are a check of the chain
 FLATTEST = 1e-3  # arm's length over a segment's radius of gyration: below it the units are mixed up
 ROUNDED = 1e-12  # of the length: what a person's sum of up to 64 decimal lengths may differ from ours

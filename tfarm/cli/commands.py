@@ -29,7 +29,9 @@ def presets(json: Json = False) -> None:
 def modes(
     arm: ArmName,
     count: Annotated[str, typer.Option("--count", metavar="N", help="flexible modes, 1 to 1000")] = "10",
-    theory: Annotated[str, typer.Option(help="timoshenko, shear, rayleigh or euler-bernoulli")] = "timoshenko",
+    theory: Annotated[
+        str | None, typer.Option(help="timoshenko, shear, rayleigh or euler-bernoulli; the arm's own if not said")
+    ] = None,
     digits: Digits = None,
     certify: Annotated[bool, typer.Option("--certify", help="prove each bracket, and that no mode is missing")] = False,
     method: MethodName = "closed-form",

@@ -74,8 +74,8 @@ class PartialFractions:
 
     @property
     def input(self) -> str:
-        """The input: "hub_torque" [N m], or "hub_angle" [rad] where the hub is locked."""
-        return "hub_angle" if self.arm.is_locked else "hub_torque"
+        """The input: the arm's own, "hub_torque" [N m] of the paper's; "hub_angle" [rad] where the hub is locked."""
+        return "hub_angle" if self.arm.is_locked else self.arm.input
 
     @property
     def stiffness(self) -> Real:

@@ -135,8 +135,9 @@ def reduce(
         raise ParameterError(key="outputs", value=names, remedy="name each output once")
     if method is not None and method not in get_args(Method):
         raise ParameterError(key="method", value=method, remedy="modal or aaa, or leave it out for the better one")
-    if method == "aaa" and arm.damping:
-        raise ParameterError(key="method", value="aaa", remedy="AAA in s^2 is for C = 0; take modal, which has C")
+    if method == "aaa" and not arm.is_undamped:
+        remedy = "AAA in s^2 is for an arm without damping; take modal, which has it"
+        raise ParameterError(key="method", value="aaa", remedy=remedy)
     if (order is None) == (error is None):
         remedy = "give either an order (a number of states) or an error"
         raise ParameterError(key="order", value=MISSING if order is None else order, remedy=remedy)
@@ -154,7 +155,7 @@ class _Bench:
         self.rigid = modal_model(arm, rows, 0, x).has_rigid_states
         self.inside = modes_in(arm, band[1])
         self.by_modes = method != "aaa"
-        self.by_aaa = method != "modal" and not arm.damping
+        self.by_aaa = method != "modal" and arm.is_undamped
         self.ruler = Ruler(arm, rows, band, x)
 
     def of_order(self, order: int) -> ReducedModel:

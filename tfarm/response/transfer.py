@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tfarm.arm import Arm, must_be_arm
+from tfarm.arm import INPUT_UNITS, Arm, must_be_arm
 from tfarm.errors import MISSING, ParameterError
 from tfarm.exact.methods import Method, known_method, slow_values
 from tfarm.exact.outputs import Output, output
@@ -79,13 +79,13 @@ class TransferFunction:
 
     @property
     def input(self) -> str:
-        """The input: "hub_torque" [N m], or "hub_angle" [rad] where the hub is locked."""
-        return "hub_angle" if self.arm.is_locked else "hub_torque"
+        """The input: the arm's own, "hub_torque" [N m] of the paper's; "hub_angle" [rad] where the hub is locked."""
+        return "hub_angle" if self.arm.is_locked else self.arm.input
 
     @property
     def input_unit(self) -> str:
         """The SI unit of the input."""
-        return "rad" if self.arm.is_locked else "N m"
+        return INPUT_UNITS[self.input]
 
     def __repr__(self) -> str:
         place = "" if self.x is None else f" at x = {self.x:g} m"

@@ -15,18 +15,28 @@ from tfarm.errors import MISSING
 from tfarm.exact.methods import Method
 
 from .damped import DampedModes, damped_modes
-from .table import Modes, Real, compare_theories
+from .table import Modes, Real, compare_theories, hub_locked
 
 KEPT = 10  # digits in a report's files of what shapes are needed for: these differ by 1e-14 from processor to processor
 HELD = 2e-14  # of an eigenvalue's size: what its float64 may be off (tests: 1e-14 to 50 digits, 64 eps in closed form)
 SMALL = 1e-3  # a damping ratio below this has less than three digits in five decimals
 IN_THE_BOX = "complete in the box; lightly damped shear modes exist above any box, real eigenvalues accumulate at -1/C"
+NO_C = "complete in the box; above it there are more, ever less damped, as no segment is (C = 0)"
+LOCKED = (
+    "hub locked: the frequencies with the hub held still. A hub that dry friction holds, as it mostly does once a slew "
+    "is over, rings there and not at the free ones: a measured number near this column says that the hub stood still."
+)
 
 
 def _by_row(columns: Mapping[Any, Real]) -> list[dict[str, float]]:
     """A dictionary a mode of a dictionary of columns."""
     rows = zip(*(values.tolist() for values in columns.values()), strict=True)
     return [dict(zip(columns, row, strict=True)) for row in rows]
+
+
+def _sensitivities(modes: Modes) -> list[Any]:
+    """A dictionary a mode; none of a chain, which has no such table."""
+    return [*_by_row(modes.sensitivity)] or [MISSING] * len(modes)
 
 
 def _places(nodes: Sequence[Real]) -> list[str]:
@@ -45,7 +55,7 @@ MODES = (  # of `Modes`; a page adds the nodes, which it rounds to a share of th
     Column("nodes_m", "nodes", "m", of=lambda modes: [x.tolist() for x in modes.nodes], printed=_places, folds=True,
            on=ANSWER),
     Column("theories_rad_s", of=lambda modes: _by_row(compare_theories(modes)), on=(JSON,)),
-    Column("sensitivity", of=lambda modes: _by_row(modes.sensitivity), on=(JSON,)),
+    Column("sensitivity", of=lambda modes: _sensitivities(modes), on=(JSON,)),
     Column("hub_participation", "hub participation b", "1/√(kg m²)",
            of=lambda modes: held(modes.hub_participation, KEPT), digits=lined(7, 4), on=REPORT),
     Column("modal_moment", "modal moment", "N m/√(kg m²)", of=lambda modes: held(modes.modal_moment + 0.0, KEPT),
@@ -79,7 +89,7 @@ def modes_answer(
     """The modal table, frequencies as strings of so many digits where more than 15 are asked for.
 
     With `certify` each flexible mode gets its proven bracket, and the whole the count that proves it complete; `method`
-    is the road to the frequencies.
+    is the road to the frequencies.  Beside each stands that of the same number with the hub locked.
     """
     exact = modes.digits(digits) if digits is not None else []
     found = modes.frequencies(method)
@@ -88,12 +98,15 @@ def modes_answer(
         "natural_frequency_hz": found / (2 * math.pi),
     }
     columns = [replace(column, of=given.get(column.key, column.of)) for column in MODES]
+    columns.insert(3, _locked(modes, digits))
     answer: dict[str, Any] = {
         "arm": modes.arm.name,
         "count": int(modes.index.max()),
         "complete": True,
         "theory": modes.theory,
         "method": method,
+        "input": modes.arm.input,
+        "hub_locked_note": None if modes.arm.is_locked else LOCKED,
     }
     if digits is not None:
         answer["digits"] = digits
@@ -103,9 +116,12 @@ def modes_answer(
         for key, ends in zip(("lower_rad_s", "upper_rad_s"), zip(*proof.brackets, strict=True), strict=True):
             columns.append(Column(key, of=[*rigid, *ends], on=(JSON,)))
         answer |= {"proven_complete": True, "proof": {"count": proof.count, "below_rad_s": proof.below}}
-    if modes.arm.link.damping:
+    if not modes.arm.is_undamped:
         damped = damped_modes(modes)
-        answer |= {"box": list(damped.box), "eigenvalues_in_box": damped.count, "box_note": IN_THE_BOX}
+        note = IN_THE_BOX if modes.arm.damping else NO_C
+        answer |= {"box": list(damped.box), "eigenvalues_in_box": damped.count, "box_note": note}
+        if damped.others:
+            answer["circuit_eigenvalues"] = list(damped.others)
         if damped.left_out:
             last = damped.index[-1]
             answer["damped_note"] = f"eigenvalues up to mode {last} only: branches above cannot be told apart"
@@ -117,16 +133,30 @@ def modes_answer(
     return answer | {"modes": Table(columns=tuple(columns), record=modes)}
 
 
+def _locked(modes: Modes, digits: int | None) -> Column:
+    """The frequency of each number with the hub locked; none beside a rigid body.  On a terminal if the hub turns."""
+    held_still, rigid = hub_locked(modes), [MISSING] * int(np.sum(modes.index == 0))
+    flexible = held_still.index > 0
+    if digits is not None and digits > 15:
+        found: list[Any] = held_still.digits(digits)[-int(flexible.sum()) :]
+    else:
+        found = held_still.natural_frequency[flexible].tolist()
+    texts = ["-"] * len(rigid) + [each if isinstance(each, str) else general(each, 12) for each in found]
+    on = (JSON,) if modes.arm.is_locked else ANSWER
+    return Column("hub_locked_rad_s", "hub locked", "rad/s", of=[*rigid, *found], shown=texts, on=on)
+
+
 def _damped(damped: DampedModes, rows: int) -> list[Column]:
     """Eigenvalue, or two real ones, and damping ratio of each mode that was followed, in as many rows as there are."""
-    over, ratios = damped.is_overdamped.tolist(), damped.damping_ratio.tolist()
+    turning = (damped.index == 0) & (damped.eigenvalues[:, 1] != 0)  # friction resists the rigid body
+    over, ratios = (damped.is_overdamped | turning).tolist(), damped.damping_ratio.tolist()
     pairs = list(zip(damped.eigenvalues.tolist(), over, strict=True))
     texts = [
         f"{p.real:.8g} and {q.real:.8g}" if both else f"{within(p.real, HELD * abs(p), 8)} + {p.imag:.10g}i"
         for (p, q), both in pairs
     ]
     words = [
-        f"{ratio:.6g} (overdamped)" if both else within(ratio, HELD, 6)
+        f"{ratio:.6g} (overdamped)" if ratio and both else within(ratio, HELD, 6)
         for ratio, both in zip(ratios, over, strict=True)
     ]
     rest = [MISSING] * (rows - len(pairs))
@@ -143,5 +173,7 @@ def _discs(damped: DampedModes, rows: int, digits: int) -> Column:
     found = [
         [{"re": disc.re, "im": disc.im, "radius": disc.radius} for disc in discs] for discs in damped.certify(digits)
     ]
-    rigid = [MISSING] * int(np.sum(damped.index == 0))
+    flexible = int(np.sum(damped.index > 0))
+    found, alone = found[:flexible], found[flexible : len(found) - len(damped.others)]
+    rigid: list[Any] = [*alone] or [MISSING] * int(np.sum(damped.index == 0))
     return Column("discs", of=[*rigid, *found, *[MISSING] * (rows - len(rigid) - len(found))], on=(JSON,))

@@ -139,13 +139,13 @@ class Modes:
 
     @cached_property
     def modal_moment(self) -> Real:
-        """Root moment E I psi'(0) [N m] of each mode: -I_h w^2 b where the hub is free to turn.
+        """Root moment E I psi'(0) [N m] of each mode: (k - I_h w^2) b where the clamp lies on the axis of a free hub.
 
         Of a hub lighter than the link it is taken from there, as the field at the root cancels: 0 for a free pin.
         """
-        link, inertia = self.arm.link, self.arm.hub.inertia
-        if inertia < link.rhoA * link.length**3 / 3:
-            return -inertia * self.natural_frequency**2 * self.hub_participation + 0.0
+        link, inertia = self.arm.link, self.arm.hub_side_inertia
+        if self.arm.reads_hub_moment and not self.arm.is_locked and inertia < link.rhoA * link.length**3 / 3:
+            return (self.arm.hub.stiffness - inertia * self.natural_frequency**2) * self.hub_participation + 0.0
         return self.moment(0.0)
 
     @cached_property
@@ -232,7 +232,8 @@ class Modes:
         values = self._shapes(share.ravel())[which] * self._unit
         if self._rigid:
             turn = 1.0 / math.sqrt(self.arm.total_inertia)
-            rigid = (turn * share.ravel(), np.full(share.size, turn), *np.zeros((2, share.size)))[which]
+            reach = share.ravel() + self.arm.hub.radius / float(self._k.length)
+            rigid = (turn * reach, np.full(share.size, turn), *np.zeros((2, share.size)))[which]
             values = np.vstack([rigid, values])
         return values.reshape(len(values), *share.shape)
 
@@ -289,6 +290,16 @@ def compare_theories(table: Modes) -> dict[Theory, Real]:
     count = int(table.index.max())
     by_theory = {theory: modes(table.arm, count, theory=theory) for theory in THEORIES if theory != table.theory}
     return {theory: by_theory.get(theory, table).natural_frequency for theory in THEORIES}
+
+
+def hub_locked(table: Modes) -> Modes:
+    """As many modes of the same arm with its hub held still; the table itself where it is held anyway.
+
+    The joint, which lies behind the hub, goes on yielding.
+    """
+    if table.arm.is_locked:
+        return table
+    return modes(table.arm.having(hub_inertia=math.inf), int(table.index.max()), theory=table.theory)
 
 
 def modes_below(arm: Arm, up_to: float, *, theory: Theory | None = None) -> int:
