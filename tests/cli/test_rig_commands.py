@@ -59,3 +59,60 @@ def test_theory_is_the_files_own_unless_another_is_asked_for(capsys, tmp_path):
     )
     assert answer(capsys, "modes", str(file), "--count", "1")["theory"] == "euler-bernoulli"
     assert answer(capsys, "modes", str(file), "--count", "1", "--theory", "shear")["theory"] == "shear"
+
+
+QUICK = {  # each verb, as short as it goes
+    "poles": ["--count", "2"],
+    "margins": [],
+    "map": ["--points", "5"],
+    "locus": ["--vary", "K2", "--from", "0", "--to", "0.001", "--points", "3", "--branches", "2"],
+    "sampled": ["--modes", "4"],
+    "simulate": ["--duration", "0.05", "--modes", "2", "--scenario", "step"],
+    "reduce": ["--outputs", "hub_rate", "--order", "8"],
+}
+
+
+@pytest.mark.parametrize("verb", QUICK)
+def test_every_verb_says_through_what_the_loop_closes_and_each_gains_unit(capsys, verb):
+    found = answer(capsys, verb, RIGS["quanser-2dsfl"], *QUICK[verb])
+    assert found["input"] == "motor_current"
+    if verb != "reduce":
+        assert found["gain_units"] == {"K1": "A s/rad", "K2": "A/(N m)", "Kp": "A/rad"}
+        assert "the motor's current [A]" in found.get("sign_convention", found.get("law"))
+
+
+def test_a_voltage_has_its_units_wherever_gains_stand(capsys):
+    _, out, _ = run(capsys, "margins", RIGS["quanser-flexlink"])
+    assert "V s/rad" in out
+    assert "V/(N m)" in out
+    assert "u is the motor's voltage [V]" in out
+    assert "N m s/rad" not in out
+    found = answer(capsys, "map", RIGS["quanser-flexlink"], "--points", "3")
+    arm = tfarm.load(RIGS["quanser-flexlink"])
+    assert found["K2"][-1] == pytest.approx(2 * arm.input_per_torque * 2 / 3)
+
+
+def test_a_response_is_of_the_input_that_is_asked_for(capsys):
+    """A response to the angle is that to the torque over the angle's own; a current is a torque through the gear."""
+    file, values, units = RIGS["quanser-flexlink"], {}, {}
+    for name in ("hub_torque", "motor_current", "motor_voltage", "hub_angle"):
+        found = answer(capsys, "response", file, "--output", "root_moment", "--input", name, "--s", "2+30j")
+        assert found["input"] == name
+        values[name], units[name] = complex(*found["value"][0]), found["input_unit"]
+    assert list(units.values()) == ["N m", "A", "V", "rad"]
+    motor = tfarm.load(file).motor
+    gain = motor.gear_efficiency * motor.gear_ratio * motor.torque_constant
+    assert values["motor_current"] == pytest.approx(gain * values["hub_torque"], rel=1e-12)
+    angle = answer(capsys, "response", file, "--output", "hub_angle", "--input", "hub_torque", "--s", "2+30j")["value"]
+    assert values["hub_angle"] * complex(*angle[0]) == pytest.approx(values["hub_torque"], rel=1e-12)
+    code, _, err = run(capsys, "response", "sasaki2012", "--output", "hub_rate", "--input", "motor_voltage", "--s", "1")
+    assert code == 2
+    assert "there is no motor" in err
+
+
+@pytest.mark.parametrize("arguments", [["modes", "--method", "appendix"], ["assumptions"]])
+def test_what_is_of_the_papers_arm_says_so_in_one_line(capsys, arguments):
+    verb, *rest = arguments
+    code, _, err = run(capsys, verb, RIGS["bench-rig"], *rest)
+    assert (code, err.count("\n")) == (2, 1)
+    assert "one Timoshenko beam on a hub" in err

@@ -1,6 +1,19 @@
 """What is analysed: the arm as frozen records, its TOML file and the presets."""
 
-from tfarm.arm.feedback import FED_BACK, GAINS, LISTED, NAMES, Gain, HubFeedback, law_of, many_laws, through, unit_of
+from tfarm.arm.feedback import (
+    FED_BACK,
+    GAINS,
+    LISTED,
+    NAMES,
+    Gain,
+    HubFeedback,
+    driven,
+    law_of,
+    many_laws,
+    through,
+    unit_of,
+    written_unit,
+)
 from tfarm.arm.link import Link
 from tfarm.arm.plausible import implausible
 from tfarm.arm.reading import load, presets
@@ -32,6 +45,7 @@ __all__ = [
     "RotarySpring",
     "Section",
     "Theory",
+    "driven",
     "implausible",
     "law_of",
     "load",
@@ -42,4 +56,5 @@ __all__ = [
     "through",
     "to_toml",
     "unit_of",
+    "written_unit",
 ]

@@ -93,10 +93,21 @@ def unit_of(name: str, arm: Arm) -> str:
     return unit.replace("N m", given)
 
 
+def written_unit(name: str, arm: Arm) -> str:
+    """What follows a value of that gain in a sentence: a space and its unit, nothing of a pure number."""
+    unit = unit_of(name, arm)
+    return "" if unit == "1" else f" {unit}"
+
+
 def through(arm: Arm) -> str:
     """What the loop of an arm closes through, in words."""
     words = {"motor_voltage": "the motor's voltage [V]", "motor_current": "the motor's current [A]"}
     return words.get(arm.input, "the torque at the hub [N m]")
+
+
+def driven(arm: Arm) -> str:
+    """A clause that says what u is, where it is no torque."""
+    return "" if unit_of("K2", arm) == "1" else f"; u is {through(arm)}"
 
 
 def many_laws(law: HubFeedback, **varied: ArrayLike) -> NDArray[np.float64]:

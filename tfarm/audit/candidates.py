@@ -9,6 +9,7 @@ from typing import Any
 from tfarm.arm import Arm
 from tfarm.columns import ANSWER, JSON, REPORT, TERMINAL, Column, Table
 from tfarm.digits import fixed, general, plain, significant, singly
+from tfarm.errors import ParameterError
 from tfarm.spectrum.scales import default_gains
 
 from .assumptions import (
@@ -95,7 +96,13 @@ def _edge(K2: float, is_edge: bool) -> str:
 
 
 def assumptions_answer(arm: Arm, count: int = COUNT) -> dict[str, Any]:
-    """The answer of `tfarm assumptions --json`; "hub" is null where the hub has no inertia to choose."""
+    """The answer of `tfarm assumptions --json`; "hub" is null where the hub has no inertia to choose.
+
+    Raises ParameterError for a rig: what the paper leaves open are section and hub of one beam.
+    """
+    if not arm.is_uniform:
+        remedy = "the assumptions looked at are the paper's, of one Timoshenko beam on a hub; this is a rig"
+        raise ParameterError(key="arm", value=arm.name, remedy=remedy)
     section = {
         "shape": "rectangle",
         "area_m2": arm.link.section.area,

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
 from tfarm.cli.app import ArmName, Compare, Digits, Json, MethodName, app, give, load_arm, right_digits, whole
 from tfarm.errors import one_line
+
+if TYPE_CHECKING:
+    from tfarm.arm import Input
 
 MOST_LISTED = 1000  # modes with nodes and sensitivities: their work grows with the square, to some 20 s
 
@@ -65,16 +68,24 @@ def response(
     stop: Annotated[float, typer.Option("--to", help="highest frequency [rad/s]")] = 1000.0,
     points: Annotated[str, typer.Option("--points", help="how many, logarithmically spaced")] = "500",
     x: Annotated[float | None, typer.Option("--x", help="place on the arm [m], for outputs along it")] = None,
+    driven: Annotated[
+        str | None,
+        typer.Option("--input", help="hub_torque, motor_voltage, motor_current or hub_angle; the file's if not said"),
+    ] = None,
     digits: Digits = None,
     method: MethodName = "closed-form",
     compare: Compare = False,
     csv: Annotated[Path | None, typer.Option("--csv", help="write a table to this file")] = None,
     json: Json = False,
 ) -> None:
-    """The exact response to hub torque (to hub angle where the hub is locked)."""
+    """The exact response to the arm's input: hub torque unless its file says otherwise, hub angle of a locked hub."""
     from tfarm.cli.inputs import points_on
 
     right, at, subject = right_digits(digits), points_on(s, omega, start, stop, points), load_arm(arm)
+    if driven is not None:
+        from dataclasses import replace
+
+        subject = replace(subject, input=cast("Input", driven))
     from tfarm.cli.methods import alone, compared_responses, print_compared, slow_method
     from tfarm.cli.tables import print_found, say_written
     from tfarm.response import transfer

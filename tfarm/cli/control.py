@@ -16,6 +16,11 @@ from tfarm.errors import ParameterError
 
 POLES = "poles with Im s >= 0, 1 to 1000; if not given ten, or those below the shear cut-off where they are fewer"
 
+RANGES = {  # of a map
+    "K1": "range of K1; by default -1,3 on the paper's arm, -3.33 to 10 times the default K1 on a rig",
+    "K2": "range of K2; by default -2,2, times what one N m takes of the input of a rig",
+}
+
 
 @app.command()
 @under_a_law
@@ -55,8 +60,8 @@ def margins(arm: ArmName, json: Json = False, *, given: Given) -> None:
 @app.command("map")
 def gain_map(
     arm: ArmName,
-    k1: Annotated[str, typer.Option("--K1", metavar="LO,HI", help="range of K1")] = "-1,3",
-    k2: Annotated[str, typer.Option("--K2", metavar="LO,HI", help="range of K2")] = "-2,2",
+    k1: Annotated[str | None, typer.Option("--K1", metavar="LO,HI", help=RANGES["K1"])] = None,
+    k2: Annotated[str | None, typer.Option("--K2", metavar="LO,HI", help=RANGES["K2"])] = None,
     kp: Kp = 0.0,
     points: Annotated[str, typer.Option("--points", help="grid points along each gain")] = "101",
     csv: Annotated[Path | None, typer.Option("--csv", help="write K1, K2 and the count to this file")] = None,
@@ -64,7 +69,11 @@ def gain_map(
 ) -> None:
     """How many poles are unstable over the plane of K1 and K2, and the exact boundary."""
     number, subject = whole("--points", points, 2, 2000), load_arm(arm)
-    ranges = [bounds(key, text) for key, text in (("--K1", k1), ("--K2", k2))]
+    from tfarm.loop.regions import ranges_of
+
+    usual = ranges_of(subject)
+    given = zip(("--K1", "--K2"), (k1, k2), usual, strict=True)
+    ranges = [known if text is None else bounds(key, text) for key, text, known in given]
     from tfarm.cli.control_tables import print_map, write_map
     from tfarm.loop.answers import map_answer
     from tfarm.loop.regions import between, region

@@ -82,7 +82,9 @@ def print_map(answer: dict[str, Any]) -> None:
 def print_design(answer: dict[str, Any]) -> None:
     """The gains and what they reach."""
     print(f"{answer['arm']}, objective {answer['objective']}, {answer['modes']} modes in the band: {answer['verdict']}")
-    print(f"K1 = {answer['K1']:.6g} N m s/rad, K2 = {answer['K2']:.6g}, Kp = {answer['Kp']:.6g}: {answer['value']:.6g}")
+    units = {name: "" if unit == "1" else f" {unit}" for name, unit in answer["gain_units"].items()}
+    law = f"K1 = {answer['K1']:.6g}{units['K1']}, K2 = {answer['K2']:.6g}{units['K2']}, Kp = {answer['Kp']:.6g}"
+    print(f"{law}: {answer['value']:.6g}")
     sampled = answer["sampled"]
     warning = "" if sampled["stable"] else "BUT "
     print(f"{warning}{sampled['in_words']}")

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 Given = dict[str, float | None]  # gains by name, as typed
 HELP = {  # of the gains that have a default of their own
-    "K1": "hub rate gain [N m s/rad]; by default 0.00642 J w1, the paper's 0.3 on its arm",
+    "K1": "hub rate gain [N m s/rad, V s/rad or A s/rad]; by default 0.00642 J w1, the paper's 0.3 on its arm",
     "K2": "root moment gain, u = ... - K2 E I phi'(0); 0.3 by default, 0 on a hub without inertia",
 }
 K1 = Annotated[float | None, typer.Option("--K1", help=HELP["K1"])]

@@ -86,7 +86,7 @@ class ModeTable:
 
 
 def first_order_law(
-    w: Any, b: Any, hub_inertia: float, gains: HubFeedback, period: float, delay: float
+    w: Any, b: Any, hub_inertia: Any, gains: HubFeedback, period: float, delay: float
 ) -> tuple[Any, Any]:
     """The two terms of the formula, by K1 and by K2, for modes of frequency w [rad/s] and hub participation b."""
     q = w * period
@@ -107,7 +107,11 @@ def mode_table(loop: SampledLoop) -> ModeTable:
     flexible = np.searchsorted(table.index, index)
     w, b = table.natural_frequency[flexible], table.hub_participation[flexible]
     T, arm = pulse.sampling.period, pulse.plant.arm
-    by_rate, by_moment = first_order_law(w, b, arm.hub_inertia, loop.gains, T, pulse.sampling.delay_samples)
+    gains, inertia = loop.gains, np.asarray(arm.hub_inertia)
+    if not arm.is_uniform:  # of each mode what its gauge moment stands for
+        gains = gains.times(1.0 / arm.input_per_torque)
+        inertia = np.divide(-table.modal_moment[flexible], w**2 * b, out=np.zeros_like(b), where=b != 0)
+    by_rate, by_moment = first_order_law(w, b, inertia, gains, T, pulse.sampling.delay_samples)
     turns, origin = np.round(w * T / (2 * np.pi)), origins(loop)
     return ModeTable(
         index=index,

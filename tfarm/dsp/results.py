@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, HubFeedback
+from tfarm.arm import LISTED, Arm, HubFeedback, driven, unit_of
 from tfarm.columns import Column
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.enough import Enough, enough_modes
@@ -127,7 +127,7 @@ def _half_range(signal: Real) -> float:
 
 
 def simulation_answer(
-    arm_name: str, gains: HubFeedback, simulation: Simulation, cycle: LimitCycle | None, used: Enough
+    arm: Arm, gains: HubFeedback, simulation: Simulation, cycle: LimitCycle | None, used: Enough
 ) -> dict[str, Any]:
     """The simulation as a dictionary of plain numbers, texts and lists.
 
@@ -136,8 +136,11 @@ def simulation_answer(
     """
     stopped, volts = simulation.stopped, simulation.volts
     answer: dict[str, Any] = {
-        "arm": arm_name,
-        "law": "u = r - Kp theta - K1 theta_t - K2 M, with references; a positive root moment M accelerates the hub",
+        "arm": arm.name,
+        "law": "u = r - Kp theta - K1 theta_t - K2 M, with references; a positive root moment M accelerates the hub"
+        + driven(arm),
+        "input": arm.input,
+        "gain_units": {gain.name: unit_of(gain.name, arm) for gain in LISTED},
         "scenario": simulation.scenario.name,
         "reading": simulation.chain.slew.reading,
         "K1": gains.K1,
@@ -236,9 +239,7 @@ def simulated_answer(
     simulation, used = _simulated(arm, gains, chain, task, count, between)
     if not chain.is_linear:
         cycle = limit_cycle(simulation, Simulator(arm, ideal_chain(chain), task, count=used.modes).linear(gains))
-    return simulation_answer(arm.name, gains, simulation, cycle, used) | {
-        "scenario_in_words": described(task, arm, chain)
-    }
+    return simulation_answer(arm, gains, simulation, cycle, used) | {"scenario_in_words": described(task, arm, chain)}
 
 
 def modes_for(count: int | None, simulate: Callable[[int], Simulation]) -> Enough:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from tfarm.arm import Arm, HubFeedback
+from tfarm.arm import LISTED, Arm, HubFeedback, driven, unit_of
 from tfarm.arm.checks import whole
 from tfarm.columns import Table
 from tfarm.dsp.band import Band, band_of
@@ -200,10 +200,12 @@ def analyse(arm: Arm, gains: HubFeedback, chain: Chain | None = None, *, count: 
 def sampled_answer(analysis: Analysis) -> dict[str, Any]:
     """The analysis as a dictionary of plain numbers, texts, lists and the table of its modes."""
     verdict, gains = analysis.verdict, analysis.verdict.loop.gains
-    poles, sampling = verdict.loop.poles, verdict.loop.chain.sampling
+    arm, poles, sampling = verdict.loop.plant.arm, verdict.loop.poles, verdict.loop.chain.sampling
     return {
-        "arm": verdict.loop.plant.arm.name,
-        "law": "u = -Kp theta - K1 theta_t - K2 M; a positive root moment M accelerates the hub",
+        "arm": arm.name,
+        "law": f"u = -Kp theta - K1 theta_t - K2 M; a positive root moment M accelerates the hub{driven(arm)}",
+        "input": arm.input,
+        "gain_units": {gain.name: unit_of(gain.name, arm) for gain in LISTED},
         "K1": gains.K1,
         "K2": gains.K2,
         "Kp": gains.Kp,

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from tfarm.arm import GAINS, HubFeedback
+from tfarm.arm import LISTED, Arm, HubFeedback, through, unit_of, written_unit
 from tfarm.columns import JSON, REPORT, TERMINAL, Column, Table
 from tfarm.digits import general, plain, singly, within
 from tfarm.spectrum.answers import HELD
@@ -18,8 +18,7 @@ from .poles import Poles
 from .regions import INFINITE, Region
 from .windows import Interval, Windows
 
-SIGN = "u = -Kp theta - K1 theta_t - K2 E I phi'(0) + r; a static torque u gives the moment -(J - I_h)/J u"
-UNITS = {gain.name: gain.unit.removesuffix("1") for gain in GAINS}
+LAW = "u = -Kp theta - K1 theta_t - K2 E I phi'(0) + r"
 POLES = (  # of pairs Re s, Im s
     Column("re", "Re s", "1/s", of=lambda pole: within(pole[0], HELD * math.hypot(*pole), 12)),
     Column("im", "Im s", "rad/s", of=lambda pole: pole[1], digits=singly(general, 12)),
@@ -33,6 +32,7 @@ class GainRow(NamedTuple):
     gain: str
     value: float
     windows: Windows
+    unit: str
 
     def spans(self, how: Callable[[float, int], str], digits: int, *pairs: Interval | None) -> list[str]:
         """Intervals, with a star at each end that only bounds the search; those that there are."""
@@ -46,8 +46,8 @@ class GainRow(NamedTuple):
 
 def gain_rows(found: Margins) -> list[GainRow]:
     """The gains of a loop."""
-    law = found.stability.loop.law
-    return [GainRow(name, getattr(law, name), windows) for name, windows in found.windows.items()]
+    loop, rows = found.stability.loop, found.windows.items()
+    return [GainRow(name, loop.law[name], windows, written_unit(name, loop.arm).strip()) for name, windows in rows]
 
 
 def _joined(*pairs: Interval) -> str:
@@ -58,7 +58,7 @@ def _joined(*pairs: Interval) -> str:
 NOTHING = "none: not stable"
 WINDOWS = (  # of `GainRow`; JSON has the gain's name before each key
     Column("gain", "gain", on=(TERMINAL, *REPORT)),
-    Column("unit", "unit", of=lambda row: UNITS[row.gain], on=REPORT),
+    Column("unit", "unit", on=REPORT),
     Column("value", "value", digits=singly(plain, 5), printed=singly(general, 6), on=(TERMINAL, *REPORT)),
     Column("interval", of=lambda row: row.windows.around and list(row.windows.around), on=(JSON,)),
     Column("interval_ends", of=lambda row: row.windows.around and list(map(row.windows.end, row.windows.around)),
@@ -89,16 +89,32 @@ MARGINS = (  # of `LoopMargins`, beside the factors of the gain
 )
 
 
-def law_answer(law: HubFeedback) -> dict[str, Any]:
-    """The gains, with the sign convention that K2 needs."""
-    return {"K1": law.K1, "K2": law.K2, "Kp": law.Kp, "sign_convention": SIGN}
+def sign_of(arm: Arm) -> str:
+    """The law, and what a gauge reads of a static torque: with it the sign of K2; of a rig what u is."""
+    if arm.is_uniform:
+        return f"{LAW}; a static torque u gives the moment -(J - I_h)/J u"
+    if not arm.has_rigid_mode:
+        return f"{LAW}; u is {through(arm)}"
+    share = arm.gauged_inertia / arm.total_inertia
+    return f"{LAW}; u is {through(arm)}, and a static torque at the hub gives the moment {-share:.6g} times as much"
+
+
+def law_answer(law: HubFeedback, arm: Arm) -> dict[str, Any]:
+    """The gains, with the sign convention that K2 needs, and what the loop closes through."""
+    return {"K1": law.K1, "K2": law.K2, "Kp": law.Kp} | convention(arm)
+
+
+def convention(arm: Arm) -> dict[str, Any]:
+    """Of the answers of every loop: the sign of K2, the input, and each gain's unit."""
+    units = {gain.name: unit_of(gain.name, arm) for gain in LISTED}
+    return {"sign_convention": sign_of(arm), "input": arm.input, "gain_units": units}
 
 
 def poles_answer(poles: Poles, certify: bool) -> dict[str, Any]:
     """Poles with Im >= 0, how many are unstable, and the box in which they are complete; proven discs if asked."""
     answer = {
         "arm": poles.loop.arm.name,
-        **law_answer(poles.loop.law),
+        **law_answer(poles.loop.law, poles.loop.arm),
         "poles": [[float(pole.real), float(pole.imag)] for pole in poles.values],
         "unstable": poles.unstable,
         "complete": True,
@@ -124,7 +140,7 @@ def margins_answer(found: Margins) -> dict[str, Any]:
         in_band = {"band_rad_s": limits.band, **{key: size for key, (_, size) in sizes.items()}, "at_rad_s": limits.at}
     return {
         "arm": verdict.loop.arm.name,
-        **law_answer(verdict.loop.law),
+        **law_answer(verdict.loop.law, verdict.loop.arm),
         "verdict": verdict.verdict,
         "stable": verdict.is_stable,
         "unstable_roots": verdict.unstable_roots,
@@ -163,7 +179,7 @@ def map_answer(found: Region) -> dict[str, Any]:
     return {
         "arm": found.arm.name,
         "Kp": found.Kp,
-        "sign_convention": SIGN,
+        **convention(found.arm),
         "K1": found.K1.tolist(),
         "K2": found.K2.tolist(),
         "unstable_roots": rows,
@@ -178,7 +194,7 @@ def design_answer(found: Design) -> dict[str, Any]:
     return {
         "arm": found.verdict.loop.arm.name,
         "objective": found.objective,
-        **law_answer(law),
+        **law_answer(law, found.verdict.loop.arm),
         "value": found.value,
         "verdict": found.verdict.verdict,
         "modes": found.modes,

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -29,7 +30,8 @@ MOST_MODES = 150  # flexible modes that a band holds at most
 @lru_cache(maxsize=64)
 def steep_places(arm: Arm, up_to: float) -> Any:
     """Natural frequencies [rad/s] with the arm's own hub, with a locked one and with none, ascending; read-only."""
-    others = (arm, arm.having(hub_inertia=math.inf), arm.having(hub_inertia=0.0))
+    pin = replace(arm, hub=replace(arm.hub, inertia=0.0, friction=0.0, stiffness=0.0), motor=None, input="hub_torque")
+    others = (arm, arm.having(hub_inertia=math.inf), pin)
     places = np.unique(np.concatenate([flexible_frequencies(each, up_to) for each in others]))
     places.flags.writeable = False
     return places

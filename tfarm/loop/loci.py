@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, HubFeedback
+from tfarm.arm import Arm, HubFeedback, written_unit
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
 from tfarm.spectrum import modes
 
-from .answers import UNITS
 from .locus import Locus, locus
 from .reduced_locus import ReducedLocus, reduced_locus
 
@@ -52,7 +51,7 @@ class Loci:
     @property
     def unit(self) -> str:
         """Of what varies."""
-        return UNITS[self.exact.vary]
+        return written_unit(self.exact.vary, self.exact.arm).strip()
 
 
 def shown(branches: Complex) -> Complex:

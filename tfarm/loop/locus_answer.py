@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from tfarm.arm import NAMES, unit_of
+
 from .answers import law_answer
 from .locus import Locus
 from .reduced_locus import ReducedLocus
@@ -24,9 +26,9 @@ def locus_answer(exact: Locus, reduced: ReducedLocus) -> dict[str, Any]:
     """The branches at each gain, where they cross the imaginary axis, and the gap to the reduced model's locus."""
     return {
         "arm": exact.arm.name,
-        **law_answer(exact.law),
+        **law_answer(exact.law, exact.arm),
         "vary": exact.vary,
-        "unit": VARIED[exact.vary],
+        "unit": unit_of(exact.vary, exact.arm) if exact.vary in NAMES else VARIED[exact.vary],
         "gain": exact.gain.tolist(),
         "mode": exact.mode.tolist(),
         "branches": [[None if np.isnan(s) else [s.real, s.imag] for s in row] for row in exact.branches.tolist()],

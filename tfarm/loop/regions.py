@@ -24,6 +24,7 @@ from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import gains_of, loop_parts, torque
 from tfarm.exact.system import System, system_of
 from tfarm.records import record
+from tfarm.spectrum.scales import PAPER_GAINS, default_gains
 
 from .frequencies import grid
 from .lines import Complex, along, crossing_at_zero, crossings
@@ -99,6 +100,13 @@ def region(arm: Arm, K1: Real, K2: Real, Kp: float = 0.0) -> Region:
     found = _crossings_along_K2(arm, K1, Kp, omega)
     unstable = counts_over(K2, found, 0.0, without_K2).T
     return Region(arm, Kp, K1, K2, unstable, boundary(arm, omega, Kp), band, found)
+
+
+def ranges_of(arm: Arm) -> tuple[tuple[float, float], tuple[float, float]]:
+    """The ranges of K1 and K2 that a map has unless others are asked for: of a rig, in its own units."""
+    K1 = 1.0 if arm.is_uniform else default_gains(arm).K1 / PAPER_GAINS.K1
+    K2 = arm.input_per_torque
+    return (-1.0 * K1, 3.0 * K1), (-2.0 * K2, 2.0 * K2)
 
 
 def between(low: float, high: float, number: int) -> Real:

@@ -136,7 +136,7 @@ def reduce(
     if method is not None and method not in get_args(Method):
         raise ParameterError(key="method", value=method, remedy="modal or aaa, or leave it out for the better one")
     if method == "aaa" and not arm.is_undamped:
-        remedy = "AAA in s^2 is for an arm without damping; take modal, which has it"
+        remedy = "AAA in s^2 is for C = 0 and no friction; take modal, which has both"
         raise ParameterError(key="method", value="aaa", remedy=remedy)
     if (order is None) == (error is None):
         remedy = "give either an order (a number of states) or an error"

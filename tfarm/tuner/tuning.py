@@ -199,7 +199,7 @@ def controlled_answer(
     ideal = ideal_chain(chain)
     used = modes_for(count, lambda n: Simulator(arm, ideal, task, count=n).gain_schedule(saved.K1, saved.gain()))
     run = Simulator(arm, chain, task, count=used.modes, between=between).gain_schedule(saved.K1, saved.gain())
-    answer = simulation_answer(arm.name, HubFeedback(K1=saved.K1, K2=0.0), run, None, used)
+    answer = simulation_answer(arm, HubFeedback(K1=saved.K1, K2=0.0), run, None, used)
     what = described(task, arm, chain)
     return answer | {"K2": None, "controller": _described(saved), "scenario_in_words": what}
 
