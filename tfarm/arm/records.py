@@ -12,9 +12,10 @@ from dataclasses import dataclass, field, replace
 from typing import Literal, TypeVar, get_args
 
 from tfarm.arm.link import Link
-from tfarm.arm.rig import Attachment, Hub, Motor, Payload, RotarySpring, brief_repr
+from tfarm.arm.rig import Attachment, Gauge, Hub, Motor, Payload, RotarySpring, brief_repr
 from tfarm.arm.texts import plain_name, plain_texts
-from tfarm.arm.theories import THEORIES, WITH_ROTARY_INERTIA, Theory
+from tfarm.arm.theories import THEORIES, Theory
+from tfarm.arm.turning import Turning
 from tfarm.errors import ParameterError, did_you_mean, shown
 
 Input = Literal["hub_torque", "motor_voltage", "motor_current", "hub_angle"]
@@ -28,12 +29,13 @@ _Part = TypeVar("_Part")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Arm:
+class Arm(Turning):
     """A hub, a flexible link and a payload, with the assumptions that every report repeats.
 
     `link` is the segment at the hub, the only one of the paper's arm, and `outer` are those that follow it outwards.
     The `clamp` yields between hub and link, `hub.radius` from the axis, the `joint` (gear, shaft) at the axis.
-    `theory` is one of `THEORIES`; `input` one of `INPUTS`, what drives the hub.
+    The `gauge` reads
+    what the law feeds back as the root moment.  `theory` is one of `THEORIES`; `input` one of `INPUTS`, what drives the hub.
     """
 
     link: Link
@@ -46,6 +48,7 @@ class Arm:
     joint: RotarySpring = field(default_factory=RotarySpring)
     motor: Motor | None = None
     attachments: tuple[Attachment, ...] = ()
+    gauge: Gauge = field(default_factory=Gauge)
     theory: Theory = "timoshenko"
     input: Input = "hub_torque"
 
@@ -78,6 +81,9 @@ class Arm:
                 raise ParameterError(key=f"attachment.{i}.x", value=attachment.x, remedy=remedy)
         on_it = tuple(each if each.x <= self.length else replace(each, x=self.length) for each in self.attachments)
         object.__setattr__(self, "attachments", on_it)
+        if self.gauge.x > self.length:
+            remedy = f"is beyond the tip; x counts from the clamp, up to the link's length of {self.length!r} m"
+            raise ParameterError(key="gauge.x", value=self.gauge.x, remedy=remedy)
         if math.isinf(self.payload.mass) and abs(self.centre_distance) < 1e-9 * (self.hub.radius + self.length):
             remedy = "puts the pinned centre of mass on the axis, which stands anyway; give a finite payload.mass"
             raise ParameterError(key="payload.offset", value=self.payload.offset, remedy=remedy)
@@ -104,41 +110,6 @@ class Arm:
     def centre_distance(self) -> float:
         """r + L + e [m], from the axis to the payload's centre of mass."""
         return self.hub.radius + self.length + self.payload.offset
-
-    @property
-    def total_inertia(self) -> float:
-        """J = I_h + N^2 J_m + sum of the segments and attachments + m (r + L + e)^2 + I_c [kg m^2], about the axis.
-
-        A segment from a to a + L has rhoA (L^3/3 + a L (a + L)) + rhoI L, without rhoI where the theory has no rotary
-        inertia.  inf where the hub or the payload says so.
-        """
-        beam = math.fsum(self._segment_inertias())
-        payload = self.payload.mass * self.centre_distance**2
-        attached = math.fsum(each.mass * (self.hub.radius + each.x) ** 2 + each.inertia for each in self.attachments)
-        return self.hub_side_inertia + beam + payload + self.payload.inertia + attached
-
-    def _segment_inertias(self) -> Iterator[float]:
-        a = self.hub.radius
-        for link in self.links:
-            L = link.length
-            rotary = link.rhoI * L if self.theory in WITH_ROTARY_INERTIA else 0.0
-            yield link.rhoA * L**3 / 3 + rotary + link.rhoA * L * a * (a + L)
-            a += L
-
-    @property
-    def hub_inertia(self) -> float:
-        """I_h [kg m^2]."""
-        return self.hub.inertia
-
-    @property
-    def hub_side_inertia(self) -> float:
-        """I_h + N^2 J_m [kg m^2], of hub and rotor."""
-        return self.hub.inertia + (self.motor.reflected_inertia if self.motor else 0.0)
-
-    @property
-    def carried_inertia(self) -> float:
-        """J - I_h - N^2 J_m [kg m^2], of what the hub carries."""
-        return self.total_inertia - self.hub_side_inertia
 
     @property
     def own_mass(self) -> float:
@@ -177,7 +148,7 @@ class Arm:
     @property
     def is_uniform(self) -> bool:
         """Whether it is an arm as the paper has it: one segment on a hub, a payload centred on the tip, no more."""
-        hub, spare = self.hub, (self.outer, self.motor, self.attachments, self.payload.offset)
+        hub, spare = self.hub, (self.outer, self.motor, self.attachments, self.payload.offset, self.gauge.x)
         plain = not any((hub.friction, hub.radius, hub.stiffness, *spare))
         return plain and self.clamp.is_rigid and self.joint.is_rigid
 
@@ -192,64 +163,12 @@ class Arm:
         return self.damping == 0.0
 
     @property
-    def reads_hub_moment(self) -> bool:
-        """Whether a gauge at the root reads the moment that turns the hub: r = 0, and no inertia sits at the clamp."""
-        at_clamp = any(each.x == 0 and (each.inertia or each.rotational_stiffness) for each in self.attachments)
-        return self.hub.radius == 0 and not at_clamp
-
-    @property
-    def input_per_torque(self) -> float:
-        """What one N m of torque at the hub takes of the input: 1, or of a motor's current [A] or voltage [V]."""
-        if self.motor is None or self.input not in ("motor_current", "motor_voltage"):
-            return 1.0
-        per_ampere = self.motor.gear_efficiency * self.motor.gear_ratio * self.motor.torque_constant
-        return (self.motor.resistance if self.input == "motor_voltage" else 1.0) / per_ampere
-
-    @property
-    def input_lags(self) -> bool:
-        """Whether the input is a voltage behind an inductance, whose torque comes late."""
-        return self.input == "motor_voltage" and self.motor is not None and self.motor.inductance > 0
-
-    @property
-    def rate_loss(self) -> float:
-        """What the input must give for 1 rad/s: of N m for b + N^2 b_m, and of a voltage N Ke for the back-EMF too."""
-        if self.motor is None:
-            return self.hub.friction
-        N, loss = self.motor.gear_ratio, self.hub.friction + self.motor.gear_ratio**2 * self.motor.rotor_friction
-        back_emf = N * self.motor.back_emf_constant if self.input == "motor_voltage" else 0.0
-        return self.input_per_torque * loss + back_emf
-
-    @property
-    def turned_inertia(self) -> float:
-        """J in units of the input [N m s^2, A s^2 or V s^2]; with an inductance what friction adds through L_a/R."""
-        lag = 0.0
-        if self.motor is not None and self.input == "motor_voltage":
-            loss = self.hub.friction + self.motor.gear_ratio**2 * self.motor.rotor_friction
-            lag = self.motor.inductance / self.motor.resistance * loss
-        return self.input_per_torque * (self.total_inertia + lag)
-
-    @property
-    def gauged_inertia(self) -> float:
-        """-M(0)/theta_tt [kg m^2] of the slowly turning rig: J without hub and rotor where the clamp is on the axis."""
-        if self.reads_hub_moment:
-            return self.carried_inertia
-        r, total = self.hub.radius, self.payload.inertia
-        total += self.payload.mass * self.centre_distance * (self.centre_distance - r)
-        total += math.fsum(each.mass * (r + each.x) * each.x + each.inertia for each in self.attachments if each.x)
-        a = 0.0
-        for link in self.links:
-            L, rotary = link.length, link.rhoI * link.length if self.theory in WITH_ROTARY_INERTIA else 0.0
-            b = a + L
-            total += link.rhoA * ((b**3 - a**3) / 3 + r * (b**2 - a**2) / 2) + rotary
-            a = b
-        return total
-
-    @property
     def has_massless_hub(self) -> bool:
         """Whether nothing at the hub resists its turning and r = 0: then the root moment is -u at every instant."""
         friction = self.hub.friction + (self.motor.rotor_friction if self.motor else 0.0)
         back_emf = self.motor is not None and self.input == "motor_voltage" and self.motor.back_emf_constant > 0.0
-        return not (self.hub_side_inertia or friction or self.hub.stiffness or self.hub.radius or back_emf)
+        elsewhere = self.hub.radius or self.gauge.x  # the gauge reads another moment
+        return not (self.hub_side_inertia or friction or self.hub.stiffness or elsewhere or back_emf)
 
     @property
     def bending_scale(self) -> float:

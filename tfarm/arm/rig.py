@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import MISSING, dataclass, fields
-from typing import Any, cast
+from typing import Any, Literal, cast
 
 from tfarm.arm.checks import extended, not_negative, positive, signed
 from tfarm.errors import ParameterError
@@ -168,6 +168,22 @@ class Attachment:
     def is_held(self) -> bool:
         """Whether a spring ties it to the ground."""
         return self.stiffness > 0.0 or self.rotational_stiffness > 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Gauge:
+    """The strain gauge whose moment is fed back, at `x` [m] from the clamp: 0 at the root, as the paper has it.
+
+    At a joint of two segments, or where something is attached, it sits on the outer side unless `side` is "inner".
+    """
+
+    x: float = 0.0
+    side: Literal["outer", "inner"] = "outer"
+
+    def __post_init__(self) -> None:
+        _finite(self, "gauge", {"x": "a gauge's place is zero or a positive number of metres from the clamp"})
+        if self.side not in ("outer", "inner"):
+            raise ParameterError(key="gauge.side", value=self.side, remedy='"outer" or "inner"')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -139,6 +139,13 @@ class Section:
         """sqrt(I/A) [m]."""
         return math.sqrt(self.second_moment / self.area)
 
+    @property
+    def half_depth(self) -> float | None:
+        """From the middle to the surface in the plane of bending [m]; None for a general section."""
+        sizes = dict(self.dimensions)
+        depth = sizes.get("depth", sizes.get("diameter", sizes.get("outer_diameter")))
+        return None if depth is None else depth / 2
+
     def cowper_factor(self, poissons_ratio: float) -> float:
         """Cowper's shear factor of a named shape, for a Poisson's ratio in (-1, 0.5]."""
         return SHAPES[self.shape].cowper(poissons_ratio, **dict(self.dimensions))

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from tfarm.arm.link import Link
 from tfarm.arm.records import MOST, Arm
-from tfarm.arm.rig import Attachment, Hub, Motor, Payload, RotarySpring
+from tfarm.arm.rig import Attachment, Gauge, Hub, Motor, Payload, RotarySpring
 from tfarm.arm.sections import Section
 from tfarm.errors import MISSING, ParameterError
 
@@ -148,6 +148,13 @@ class AttachmentTable(Table):
         return Attachment(**self.given())
 
 
+class GaugeTable(Table):
+    """[gauge], optional."""
+
+    x: float = 0.0
+    side: str = "outer"
+
+
 class PayloadTable(Table):
     """[payload], optional."""
 
@@ -169,6 +176,7 @@ class ArmTable(Table):
     joint: SpringTable = SpringTable()
     motor: MotorTable | None = None
     attachment: Annotated[list[AttachmentTable], Field(max_length=MOST)] = []
+    gauge: GaugeTable = GaugeTable()
     payload: PayloadTable = PayloadTable()
 
     def build(self) -> Arm:
@@ -188,6 +196,7 @@ class ArmTable(Table):
             joint=_within("joint", self.joint.build),
             motor=None if self.motor is None else Motor(**self.motor.given()),
             attachments=tuple(attachments),
+            gauge=Gauge(**self.gauge.given()),
             payload=Payload(**self.payload.given()),
         )
 
@@ -210,5 +219,6 @@ TABLES: dict[str, type[Table]] = {
     "joint": SpringTable,
     "motor": MotorTable,
     "attachment": AttachmentTable,
+    "gauge": GaugeTable,
     "payload": PayloadTable,
 }

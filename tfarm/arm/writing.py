@@ -32,6 +32,7 @@ def to_toml(arm: Arm) -> str:
         *([f"[{key}]", *_lines(differing(spring, always=0))] for key, spring in springs.items() if not spring.is_rigid),
         *([] if arm.motor is None else [["[motor]", *_motor(arm.motor)]]),
         *(["[[attachment]]", *_lines(differing(each, always=1))] for each in arm.attachments),
+        *([["[gauge]", f"x = {arm.gauge.x!r}", f"side = {_text(arm.gauge.side)}"]] if arm.gauge.x else []),
         ["[payload]", *_lines(differing(arm.payload, always=2))],
     ]
     return "\n\n".join("\n".join(table) for table in tables) + "\n"

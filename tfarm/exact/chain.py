@@ -34,7 +34,7 @@ TIP, OF_ANGLE, OF_MOMENT = 0, 6, 10  # of the vector of ends: six numbers of the
 
 
 class Segment(NamedTuple):
-    """A uniform piece: a, b, g [s^2], sigma and C [s] as in `Coefficients`, length/L and EI/EI of the first."""
+    """A uniform piece: a, b, g [s^2], sigma, C [s] as in `Coefficients`, length/L, EI/EI of the first, depth/2 [m]."""
 
     a: Fraction
     b: Fraction
@@ -43,6 +43,7 @@ class Segment(NamedTuple):
     damping: float
     length: Fraction
     stiffness: Fraction
+    half_depth: float | None = None
 
     def piece(self, share: Fraction) -> Segment:
         """That share of it."""
@@ -134,7 +135,8 @@ class Drive(NamedTuple):
 class Chain:
     """A rig: its elements from the payload inwards, the conditions of both ends, and the units.
 
-    `radius` and `offset` of hub and payload are shares of the link's `length` [m]; `EI` [N m^2] is that at the hub.
+    `gauge` is where the moment that a law feeds back is read; `radius` and `offset` of hub and payload are shares of
+    the link's `length` [m]; `EI` [N m^2] is that at the hub.
     """
 
     elements: tuple[Element, ...]
@@ -143,6 +145,7 @@ class Chain:
     drive: Drive
     radius: Fraction
     offset: Fraction
+    gauge: Place
     length: Fraction
     EI: Fraction
 
@@ -229,7 +232,8 @@ def chain_of(arm: Arm, theory: Theory | None = None) -> Chain:
 
     def segment(link: Link) -> Segment:
         numbers = uniform(link, theory)
-        return Segment(*numbers, link.damping, Fraction(link.length) / unit_length, stiffness_of(link) / EI)
+        length, stiffness = Fraction(link.length) / unit_length, stiffness_of(link) / EI
+        return Segment(*numbers, link.damping, length, stiffness, link.section.half_depth)
 
     pieces: list[Element] = [Offset(Fraction(arm.payload.offset) / unit_length)] if arm.payload.offset else []
     waiting = sorted(arm.attachments, key=lambda each: each.x)
@@ -255,6 +259,7 @@ def chain_of(arm: Arm, theory: Theory | None = None) -> Chain:
         drive=drive_of(arm, rotation),
         radius=Fraction(arm.hub.radius) / unit_length,
         offset=Fraction(arm.payload.offset) / unit_length,
+        gauge=Place(min(Fraction(arm.gauge.x) / unit_length, Fraction(1)), arm.gauge.side),
         length=unit_length,
         EI=EI,
     )

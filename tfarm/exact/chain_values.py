@@ -11,6 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tfarm.errors import ParameterError
+
 from .balls import Ball, precision, rational
 from .chain import Chain, Layout, Place
 from .chain_balls import Sweep
@@ -32,7 +34,7 @@ class Reading(NamedTuple):
     """What an output weighs: W, Psi, M and Q at a place, theta; its power of s, its gauge's C [s], its SI unit."""
 
     place: Place | None
-    state: tuple[int, int, int, int]
+    state: tuple[Fraction | int, ...]
     theta: Fraction
     power: int
     gauge: bool
@@ -77,12 +79,28 @@ class Free(NamedTuple):
 def reading_of(chain: Chain, wanted: Output, x: float) -> Reading:
     """An output as weights; x is the share of the length for one along the link."""
     share = Fraction(wanted.share(x))
-    weights = {"W": (1, 0, 0, 0), "Y": (1, 0, 0, 0), "Psi": (0, 1, 0, 0), "Phi": (0, 1, 0, 0), "M": (0, 0, 1, 0)}
+    weights: dict[str, tuple[Fraction | int, ...]] = {
+        **dict.fromkeys(("W", "Y"), (1, 0, 0, 0)),
+        "centre": (1, chain.offset, 0, 0),
+        **dict.fromkeys(("Psi", "Phi"), (0, 1, 0, 0)),
+        **dict.fromkeys(("M", "strain"), (0, 0, 1, 0)),
+    }
     theta = {"Y": -(chain.radius + share), "Phi": Fraction(-1), "theta": Fraction(1)}
     place = None if wanted.quantity == "theta" else Place(share, wanted.side)
+    if wanted.place == "root" and wanted.gauge:
+        place = chain.gauge
     state = weights.get(wanted.quantity, (0, 0, 0, 1)) if place else (0, 0, 0, 0)
-    unit = unit_scale(wanted, chain)
+    unit = _strain_unit(chain, place) if wanted.quantity == "strain" and place else unit_scale(wanted, chain)
     return Reading(place, state, theta.get(wanted.quantity, Fraction(0)), wanted.power, wanted.gauge, unit)
+
+
+def _strain_unit(chain: Chain, place: Place) -> Fraction:
+    """Strain at the surface per moment without dimensions and unit of the input: half the depth over E I/L."""
+    (segment,) = chain.at((place,)).read
+    if segment.half_depth is None:
+        remedy = 'a "general" section does not say how deep it is: give rectangle, round or tube'
+        raise ParameterError(key="link.section.shape", value="general", remedy=remedy)
+    return Fraction(segment.half_depth) / chain.length / segment.stiffness / chain.input_unit
 
 
 @lru_cache(maxsize=256)
@@ -154,7 +172,7 @@ class ChainState:
         value = sweep.theta * rational(one.theta)
         if one.place is not None:
             for weight, part in zip(one.state, sweep.states[0], strict=True):
-                value = value + part if weight else value
+                value = value + part * rational(weight) if weight else value
         for _ in range(one.power):
             value = value * self.s
         if one.gauge:
@@ -205,12 +223,12 @@ def expansions(chain: Chain, wanted: Sequence[Output], x: float) -> list[tuple[f
     return found
 
 
-def order_at_zero(chain: Chain, wanted: Output | None) -> int:
+def order_at_zero(chain: Chain, wanted: Output | None, x: float = 0.0) -> int:
     """How often an output of the free response vanishes at s = 0; the drive itself for None."""
     with precision(SERIES_BITS):
         s = Jet([rational(0), rational(1), *[rational(0)] * (ORDER - 2)])
         state = ChainState(chain, s, slow=True)
-        series = _cleared(state.input if wanted is None else state.numerator(wanted))
+        series = _cleared(state.input if wanted is None else state.numerator(wanted, x))
     return next(n for n, coefficient in enumerate(series.c) if coefficient != 0)
 
 

@@ -124,7 +124,8 @@ def swept(
         value = sweep.theta * rational(one.theta)
         if one.place is not None:
             state = states[places.index(one.place)]
-            value = sum((part for weight, part in zip(one.state, state, strict=True) if weight), value)
+            for weight, part in zip(one.state, state, strict=True):
+                value = value + part * rational(weight) if weight else value
         for _ in range(one.power):
             value = value * s
         outputs.append(value / (s * rational(C) + 1) * rational(one.unit))

@@ -18,8 +18,10 @@ from tfarm.errors import ParameterError, did_you_mean
 
 from .coefficients import Coefficients
 
-# theta, M, Q, W - x theta, W and Psi - theta: hub angle, moment, shear force, deflection and rotation
-Quantity = Literal["theta", "M", "Q", "W", "Y", "Phi"]
+# theta, M, Q, W, W - (r + x) theta, Psi - theta: hub angle, moment, shear force, displacement, deflection, rotation;
+# Psi: rotation in space;
+# bending strain at the surface, displacement of the payload's centre of mass
+Quantity = Literal["theta", "M", "Q", "W", "Y", "Phi", "Psi", "strain", "centre"]
 Place = Literal["root", "tip", "x"]
 Side = Literal["outer", "inner"]  # of a joint of two segments, or of what is attached there
 
@@ -28,11 +30,15 @@ PLACES: Mapping[str, tuple[Place, ...]] = MappingProxyType({
     "theta": ("root",),
     "M": ("root", "tip", "x"),
     "Q": ("root", "tip", "x"),
-    "W": ("tip",),
+    "W": ("tip", "x"),
     "Y": ("tip", "x"),
     "Phi": ("tip", "x"),
+    "Psi": ("tip", "x"),
+    "strain": ("x",),
+    "centre": ("tip",),
 })  # fmt: skip
-UNITS = MappingProxyType({"theta": "rad", "M": "N m", "Q": "N", "W": "m", "Y": "m", "Phi": "rad"})
+_METRES, _RADIANS = dict.fromkeys(("W", "Y", "centre"), "m"), dict.fromkeys(("theta", "Phi", "Psi"), "rad")
+UNITS = MappingProxyType({**_METRES, **_RADIANS, "M": "N m", "Q": "N", "strain": "1"})
 
 
 class Units(Protocol):
@@ -79,7 +85,7 @@ class Output:
             remedy = f"{self.quantity} is known at: {', '.join(PLACES[self.quantity])} ({self._elsewhere})"
             raise ParameterError(key="output.place", value=self.place, remedy=remedy)
         whole("output.power", self.power, 0, MOST_POWER, f"a power of s: a whole number from 0 to {MOST_POWER}")
-        if not isinstance(self.gauge, bool) or (self.gauge and self.quantity != "M"):
+        if not isinstance(self.gauge, bool) or (self.gauge and self.quantity not in ("M", "strain")):
             remedy = "true or false, and true for a moment only: a strain gauge reads E I phi' without its damping"
             raise ParameterError(key="output.gauge", value=self.gauge, remedy=remedy)
         if self.unit != _unit(self.quantity, self.power):
@@ -92,12 +98,18 @@ class Output:
             return "the hub's angle is one number"
         if self.place == "root":
             return "it is 0 at the root"
-        return "along the arm ask for the deflection Y"
+        return "it is read elsewhere"
 
     @property
     def is_at_end(self) -> bool:
         """Whether the closed form at hub and tip gives it; else the fields along the arm do."""
         return self.place == "root" or (self.place == "tip" and self.quantity in ("W", "Y"))
+
+    @property
+    def is_of_a_chain(self) -> bool:
+        """Whether the closed form of one link leaves it out: then that link is taken as a chain of one segment."""
+        along = self.quantity == "W" and self.place == "x"
+        return along or self.quantity in ("Psi", "strain", "centre") or self.side == "inner"
 
     @property
     def base(self) -> Output:
@@ -135,6 +147,8 @@ class Output:
 
 def _unit(quantity: Quantity, power: int) -> str:
     """The SI unit of a quantity times s^power."""
+    if power and UNITS[quantity] == "1":
+        return "1/s" if power == 1 else f"1/s^{power}"
     return UNITS[quantity] + ("" if power == 0 else "/s" if power == 1 else f"/s^{power}")
 
 
@@ -146,9 +160,16 @@ OUTPUTS: Mapping[str, Output] = MappingProxyType({each.name: each for each in (
     Output(name="tip_acceleration", quantity="W", place="tip", unit="m/s^2", power=2, label="tip acceleration"),
     Output(name="root_moment", quantity="M", place="root", unit="N m", gauge=True, label="root moment"),
     Output(name="root_shear", quantity="Q", place="root", unit="N", label="root shear force"),
+    Output(name="tip_rotation", quantity="Psi", place="tip", unit="rad", label="tip rotation"),
+    Output(name="payload_displacement", quantity="centre", place="tip", unit="m", label="payload displacement"),
+    Output(name="displacement", quantity="W", place="x", unit="m", label="displacement at x"),
+    Output(name="velocity", quantity="W", place="x", unit="m/s", power=1, label="velocity at x"),
+    Output(name="acceleration", quantity="W", place="x", unit="m/s^2", power=2, label="acceleration at x"),
     Output(name="deflection", quantity="Y", place="x", unit="m", label="deflection at x"),
     Output(name="rotation", quantity="Phi", place="x", unit="rad", label="rotation at x"),
     Output(name="moment", quantity="M", place="x", unit="N m", gauge=True, label="bending moment at x"),
+    Output(name="full_moment", quantity="M", place="x", unit="N m", label="bending moment with damping at x"),
+    Output(name="strain", quantity="strain", place="x", unit="1", gauge=True, label="bending strain at x"),
     Output(name="shear", quantity="Q", place="x", unit="N", label="shear force at x"),
 )})  # fmt: skip
 
@@ -168,5 +189,5 @@ def output(wanted: str | Output) -> Output:
 
 def unit_scale(wanted: Output, k: Units) -> Fraction:
     """SI value of the output per N m of torque (per radian where the hub is locked), for one dimensionless unit."""
-    units = {"W": k.length, "Y": k.length, "M": k.EI / k.length, "Q": k.EI / k.length**2}
+    units = {"W": k.length, "Y": k.length, "centre": k.length, "M": k.EI / k.length, "Q": k.EI / k.length**2}
     return units.get(wanted.quantity, Fraction(1)) / k.input_unit

@@ -6,6 +6,8 @@ Both have `damping`, `is_undamped`, `is_real_on_axis`, `is_locked`, `at_rest`, `
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,14 +15,19 @@ from tfarm.arm import Arm, Theory
 
 from .chain import Chain, chain_of
 from .coefficients import Coefficients, coefficients
+from .outputs import Output
 
 System = Coefficients | Chain
 
 
-def system_of(arm: Arm, theory: Theory | None = None) -> System:
-    """The system of an arm under its own theory, or another.  Raises ParameterError for an unknown theory."""
+def system_of(arm: Arm, theory: Theory | None = None, wanted: Sequence[Output] = ()) -> System:
+    """The system of an arm under its own theory, or another, for certain outputs.
+
+    Raises ParameterError for an unknown theory.
+    """
     theory = theory or arm.theory
-    return coefficients(arm, theory) if arm.is_uniform else chain_of(arm, theory)
+    is_simple = arm.is_uniform and not any(each.is_of_a_chain for each in wanted)
+    return coefficients(arm, theory) if is_simple else chain_of(arm, theory)
 
 
 def shear_flexibility(k: System, x: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -71,7 +71,7 @@ def modal_model(
     """
     G = transfer(arm, outputs, x=x)
     count = whole("count", count, 0, MOST_MODES, f"a whole number of flexible modes, 0 to {MOST_MODES}")
-    k, share = system_of(arm), 0.0 if x is None else x / arm.length
+    k, share = G.system, 0.0 if x is None else x / arm.length
     wanted = [proper(k, each, share) for each in G.rows]
     table = modes(arm, max(1, int(count)))
     flexible = slice(int(arm.has_rigid_mode), int(arm.has_rigid_mode) + int(count))
@@ -104,7 +104,7 @@ def relaxed_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None)
     if C == 0:
         raise ParameterError(key="link.damping", value=C, remedy="without damping nothing relaxes; take modal_model")
     share = 0.0 if x is None else x / arm.length
-    expansion = np.array(expansions_at_zero(system_of(arm), model.rows, share))
+    expansion = np.array(expansions_at_zero(system_of(arm, wanted=model.rows), model.rows, share))
     slope = expansion[:, 3] + (model.residues / model.eigenvalues**2).real.sum(axis=(1, 2))
     return replace(model, static=model.static + slope / C, relaxation=-slope / C)
 

@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 
 from tfarm.arm import Arm
 from tfarm.errors import ParameterError
-from tfarm.exact.system import system_of
 from tfarm.exact.values import expansions_at_zero
 from tfarm.response import TransferFunction, Wanted, transfer
 from tfarm.spectrum import modes_below
@@ -98,7 +97,7 @@ def rational_model(arm: Arm, outputs: Wanted, pairs: int, high: float, x: float 
 
 def _remainders(G: TransferFunction, inside: PartialFractions, high: float, frequencies: Real) -> _Remainders:
     """Samples over the band.  Below high/100 the point S = 0 says all there is to say."""
-    k, share = system_of(G.arm), 0.0 if G.x is None else G.x / G.arm.length
+    k, share = G.system, 0.0 if G.x is None else G.x / G.arm.length
     w = high * np.sin(np.linspace(0.01, np.pi / 2, POINTS))
     w = w[distance(w, frequencies) > 1e-9 * w]
     S, power = -(w**2), np.array([[each.power] for each in G.rows])

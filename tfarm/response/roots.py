@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm
-from tfarm.exact.chain import Chain
+from tfarm.exact.chain import Chain, chain_of
 from tfarm.exact.chain_values import free_slopes, order_at_zero
 from tfarm.exact.characteristic import Analytic, characteristic, deflated
 from tfarm.exact.coefficients import Coefficients
@@ -49,17 +49,18 @@ def poles_of(arm: Arm, up_to: float) -> Roots:
     return _in_box(k, _drive(k), k.at_rest, up_to, _damped_starts(arm, up_to))
 
 
-def zeros_of(arm: Arm, wanted: Output, up_to: float) -> Roots:
-    """The zeros of one output at the hub or the tip with |Im s| <= up_to.
+def zeros_of(arm: Arm, wanted: Output, up_to: float, x: float = 0.0) -> Roots:
+    """The zeros of one output with |Im s| <= up_to; x is a share of the length, for outputs along the arm.
 
     One that its end condition holds constant has none but those of its power of s (at the tip: 0 throughout has none).
     """
-    k, share = system_of(arm), wanted.share(0.0)
+    share = wanted.share(x)
+    k = chain_of(arm) if wanted.place == "x" else system_of(arm, wanted=[wanted])
     constant = wanted.constant(k, share)
     if constant is not None:
         at_zero = wanted.power if constant else 0
         return Roots(np.zeros(at_zero, complex), (-math.inf, math.inf, -up_to, up_to), "constant")
-    order, numerator = _numerator(k, wanted)
+    order, numerator = _numerator(k, wanted, x)
     at_zero = max(0, order + wanted.power - k.at_rest)
     neighbour = {("theta", "root"): math.inf, ("M", "root"): 0.0}.get((wanted.quantity, wanted.place))
     neighbour = None if isinstance(k, Chain) and neighbour == 0.0 else neighbour
@@ -103,16 +104,16 @@ def _drive(k: System) -> Function:
     return lambda s: characteristic(k, s, at_zero=k.at_rest)
 
 
-def _numerator(k: System, wanted: Output) -> tuple[int, Function]:
+def _numerator(k: System, wanted: Output, x: float) -> tuple[int, Function]:
     """How often an output over its power of s vanishes at s = 0, and the function without these zeros."""
     base = replace(wanted.base, gauge=False)
     if isinstance(k, Coefficients):
         name = wanted.quantity if wanted.is_at_end else f"tip {wanted.quantity}"
         return _order(k, name), _function(k, name)
-    order = order_at_zero(k, base)
+    order = order_at_zero(k, base, x)
 
     def function(s: Complex) -> Analytic:
-        here, slopes = free_slopes(k, [base], s, 0.0)
+        here, slopes = free_slopes(k, [base], s, x)
         return deflated(here.outputs[0], slopes.outputs[0], here.scale, s, order)
 
     return order, function

@@ -14,7 +14,7 @@ from tfarm.arm import INPUT_UNITS, Arm, must_be_arm
 from tfarm.errors import MISSING, ParameterError
 from tfarm.exact.methods import Method, known_method, slow_values
 from tfarm.exact.outputs import Output, output
-from tfarm.exact.system import system_of
+from tfarm.exact.system import System, system_of
 from tfarm.exact.values import (
     differentiate_outputs,
     digits_of,
@@ -63,9 +63,14 @@ class TransferFunction:
         if not asked:
             raise ParameterError(key="outputs", value=outputs, remedy="name at least one output")
         self.rows: tuple[Output, ...] = tuple(output(each) for each in asked)
-        self._k = system_of(arm)
+        self._k = system_of(arm, wanted=self.rows)
         self._table = kernel_table(self._k, self.rows)
         self.x = self._place(x)
+
+    @property
+    def system(self) -> System:
+        """The exact system that it is read from."""
+        return self._k
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -178,9 +183,7 @@ class TransferFunction:
         """
         if not self.is_single:
             raise ParameterError(key="outputs", value=self.outputs, remedy="ask for the zeros of one output at a time")
-        if self.rows[0].place == "x":
-            raise ParameterError(key="output", value=self.outputs[0], remedy="zeros are found at the hub and the tip")
-        return zeros_of(self.arm, self.rows[0], _positive("up_to", up_to))
+        return zeros_of(self.arm, self.rows[0], _positive("up_to", up_to), self._share)
 
     # ------------------------------------------------------------ inside
 
