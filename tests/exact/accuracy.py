@@ -18,7 +18,7 @@ from tests.strategies import some_arm, some_s
 from tfarm.exact import balls
 from tfarm.exact.coefficients import coefficients
 from tfarm.exact.fields import fields
-from tfarm.exact.outputs import OUTPUTS, unit_scale
+from tfarm.exact.outputs import OF_ONE_LINK, unit_scale
 from tfarm.exact.waves import evaluate
 from tfarm.spectrum.search import natural_frequencies
 
@@ -44,7 +44,7 @@ def some_share(rng):
     return float(rng.choice([rng.uniform(), 10 ** rng.uniform(-4, 0), 1 - 10 ** rng.uniform(-4, 0), 0.0, 1.0]))
 
 
-def measure(arm, s, x, outputs=OUTPUTS):
+def measure(arm, s, x, outputs=OF_ONE_LINK):
     """Those outputs of one arm at one s (and share x of the length): the representable ones as Points."""
     k, L = coefficients(arm), arm.link.length
     values, flagged = float_values(k, s, x)
@@ -58,20 +58,20 @@ def measure(arm, s, x, outputs=OUTPUTS):
 
 def float_values(k, s, x):
     """Every output in float64, SI, and whether the kernel flags s."""
-    at_ends = {name: each for name, each in OUTPUTS.items() if each.place != "x"}
+    at_ends = {name: each for name, each in OF_ONE_LINK.items() if each.place != "x"}
     table = [[ENDS[o.quantity], o.power, o.gauge, float(unit_scale(o, k))] for o in at_ends.values()]
     values, flagged = np.empty((len(table), 1), complex), np.empty(1, bool)
     with np.errstate(all="raise", under="ignore"):
         evaluate(np.array([s]), k.kernel, np.array(table), values, flagged)
         along = fields(k, np.array([s]), x)[0][:, 0]
     found = dict(zip(at_ends, values[:, 0], strict=True))
-    for name, each in OUTPUTS.items():
+    for name, each in OF_ONE_LINK.items():
         if each.place == "x":
             found[name] = along[FIELDS[each.quantity]] * float(unit_scale(each, k)) / (1 + k.damping * s * each.gauge)
     return found, bool(flagged[0])
 
 
-def exact_values(k, s, x, outputs=OUTPUTS):
+def exact_values(k, s, x, outputs=OF_ONE_LINK):
     """Each of those outputs that is not zero and fits into a float, as a ball, with its |s G'/G|."""
     bits = 320 + lost_bits(k, s)
     while True:
@@ -202,7 +202,7 @@ def main():
         errors = [point.error for point in run_at(place, count // 4, seed) if not point.flagged]
         print(f"{name}: worst error {max(errors):.3g} over {len(errors)} values")
         special += errors
-    for name in OUTPUTS:
+    for name in OF_ONE_LINK:
         print(f"  {name:18s}{max(p.error for p in fair if p.name == name):.3g}")
     for point in above[:20]:
         arm, s, x = point.where

@@ -11,10 +11,10 @@ from tests.exact.accuracy import BOUND, PLACES, by_a_frequency, exact_values, fl
 from tests.strategies import some_arm
 from tfarm.exact import balls
 from tfarm.exact.coefficients import coefficients
-from tfarm.exact.outputs import OUTPUTS
+from tfarm.exact.outputs import OF_ONE_LINK
 from tfarm.spectrum.search import count_below, natural_frequencies
 
-AT_ENDS = {name: output for name, output in OUTPUTS.items() if output.place != "x"}
+AT_ENDS = {name: output for name, output in OF_ONE_LINK.items() if output.place != "x"}
 
 
 def assert_accurate(points):
@@ -91,5 +91,5 @@ def test_where_the_tip_hardly_moves_any_more():
         arm = some_arm(rng, ("some", "some", "some"), damping=0.0)
         k = coefficients(arm)
         s = rng.uniform(690, 760) / math.sqrt(min(k.a, k.b)) + 0j
-        points += measure(arm, s, 0.5, {"tip_acceleration": OUTPUTS["tip_acceleration"]})
+        points += measure(arm, s, 0.5, {"tip_acceleration": OF_ONE_LINK["tip_acceleration"]})
     assert_accurate(points)

@@ -15,7 +15,7 @@ from tfarm import Arm, ConvergenceError, Hub, Link, ParameterError, Payload, Sec
 from tfarm.exact import appendix
 from tfarm.exact.coefficients import coefficients
 from tfarm.exact.enclosures import enclose
-from tfarm.exact.outputs import OUTPUTS
+from tfarm.exact.outputs import OF_ONE_LINK
 
 EPS = np.finfo(float).eps
 
@@ -32,7 +32,7 @@ def test_forty_digits_are_those_of_the_balls(case):
     arm, s = some_arm(rng, case), some_s(rng)
     x = float(rng.uniform(0.05, 0.95)) * arm.link.length
     k, compared = coefficients(arm), 0
-    for name, output in OUTPUTS.items():
+    for name, output in OF_ONE_LINK.items():
         value = appendix.response(arm, name, s, 40, x=x)
         if value == 0:
             assert output.place == "tip"
@@ -66,7 +66,7 @@ def test_thirty_digits_are_those_of_the_state_transition_matrix(preset, s):
             "moment": inside[2] / damper,
             "shear": inside[3],
         }
-        for name in OUTPUTS:
+        for name in OF_ONE_LINK:
             value = appendix.response(arm, name, s, 30, x=x * L)
             assert abs(value / expected[name] - 1) < mpmath.mpf(10) ** -30
 
@@ -141,10 +141,10 @@ def powers_of_two(*, damping=0.0, hub=0.25, mass=0.5, inertia=0.125):
 
 
 @pytest.mark.parametrize("s", [3 * 2.0**16 * 1j, 2.0**18 + 0j, -(2.0**18) + 0j])
-@pytest.mark.parametrize("name", OUTPUTS)
+@pytest.mark.parametrize("name", OF_ONE_LINK)
 def test_where_two_waves_coincide_to_the_last_bit(name, s):
     """The cut-off, and the real s of equal waves: the appendix is 0/0, float64 flags it, and all give the value."""
-    arm, output, x = powers_of_two(), OUTPUTS[name], 0.4
+    arm, output, x = powers_of_two(), OF_ONE_LINK[name], 0.4
     root, inside, tip = shooting(arm, s, x=[x], digits=30)
     place, state = {"root": (0.0, root), "tip": (1.0, tip), "x": (mpmath.mpf(x), inside)}[output.place]
     with mpmath.workdps(30):

@@ -11,10 +11,10 @@ from numpy.polynomial import Polynomial
 import tfarm
 from tests.strategies import BOUNDARY_CASES, some_arm
 from tfarm import Hub, Payload
-from tfarm.exact.outputs import OUTPUTS
+from tfarm.exact.outputs import OF_ONE_LINK
 
 EPS = np.finfo(float).eps
-ENDS = [name for name, output in OUTPUTS.items() if output.place != "x"]
+ENDS = [name for name, output in OF_ONE_LINK.items() if output.place != "x"]
 FINITE = [case for case in BOUNDARY_CASES if "infinite" not in case]
 LOCKED = [case for case in BOUNDARY_CASES if case[0] == "infinite" and "infinite" not in case[1:]]
 

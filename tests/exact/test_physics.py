@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 import tfarm
 from tests.models import shooting
 from tests.strategies import arms, dampings, finite, frequencies, undamped
-from tfarm.exact.outputs import OUTPUTS
+from tfarm.exact.outputs import OF_ONE_LINK
 
 EPS = np.finfo(float).eps
-ENDS = [name for name, output in OUTPUTS.items() if output.place != "x"]
+ENDS = [name for name, output in OF_ONE_LINK.items() if output.place != "x"]
 free_hubs = st.one_of(st.just(0.0), finite)
 angles = st.floats(-1.5, 1.5)
 dear = settings(max_examples=max(1, settings.default.max_examples * 2 // 5))  # solved in mpmath too
@@ -47,7 +47,7 @@ def test_on_the_imaginary_axis_an_undamped_arm_does_no_work(arm, omega):
     """At C = 0 an output over s^power is real there, but for the rounding of a travelling wave."""
     G = tfarm.transfer(arm, ENDS)
     for name, value, slope in zip(ENDS, values(arm, ENDS, 1j * omega), G.derivative(1j * omega), strict=True):
-        across = value.real if OUTPUTS[name].power == 1 else value.imag
+        across = value.real if OF_ONE_LINK[name].power == 1 else value.imag
         assert abs(across) <= 90 * EPS * (abs(value) + abs(omega * slope))
 
 

@@ -13,11 +13,11 @@ import numpy as np
 
 import tfarm
 from tests.strategies import some_arm
-from tfarm.exact.outputs import OUTPUTS
+from tfarm.exact.outputs import OF_ONE_LINK
 from tfarm.reduced import reduce
 
-ALONG = [name for name, each in OUTPUTS.items() if each.place == "x"]
-AT_ENDS = [name for name, each in OUTPUTS.items() if each.place != "x"]
+ALONG = [name for name, each in OF_ONE_LINK.items() if each.place == "x"]
+AT_ENDS = [name for name, each in OF_ONE_LINK.items() if each.place != "x"]
 
 
 @dataclass(frozen=True)

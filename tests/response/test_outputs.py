@@ -138,9 +138,9 @@ def test_what_is_held_constant_has_its_value_at_a_resonance_too(name: str, wante
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"quantity": "Psi"}, "quantity"),
+        ({"quantity": "Chi"}, "quantity"),
         ({"quantity": "Phi", "place": "root"}, "0 at the root"),
-        ({"quantity": "W", "place": "x"}, "deflection Y"),
+        ({"quantity": "strain", "place": "tip"}, "known at: x"),
         ({"quantity": "theta"}, "one number"),
         ({"place": "middle"}, "known at: tip"),
         ({"power": 5}, "0 to 4"),

@@ -11,11 +11,11 @@ import tfarm
 from tfarm import Arm, Hub, ParameterError, Payload
 from tfarm.exact import appendix, balls, enclosures
 from tfarm.exact.coefficients import coefficients
-from tfarm.exact.outputs import OUTPUTS
+from tfarm.exact.outputs import OF_ONE_LINK
 
 EPS = np.finfo(float).eps
-AT_ENDS = [name for name, output in OUTPUTS.items() if output.place != "x"]
-ALONG = [name for name, output in OUTPUTS.items() if output.place == "x"]
+AT_ENDS = [name for name, output in OF_ONE_LINK.items() if output.place != "x"]
+ALONG = [name for name, output in OF_ONE_LINK.items() if output.place == "x"]
 POINTS = [0.3 + 57.1j, 2e-3j, 40.0 + 0.0j, -5.0 + 900.0j, 1.3e4j]
 
 
@@ -47,7 +47,7 @@ def test_values_along_the_arm_agree_with_the_paper(arm: Arm, name: str) -> None:
 def test_derivative_is_the_limit_of_differences_with_many_digits(arm: Arm, name: str) -> None:
     G = tfarm.transfer(arm, name)
     for s in (0.3 + 57.1j, 10 + 700j, 3e-3 + 1e-3j, 2e4j):
-        expected = balls.nearest(enclosures.slope(coefficients(arm), OUTPUTS[name], s))
+        expected = balls.nearest(enclosures.slope(coefficients(arm), OF_ONE_LINK[name], s))
         scale = abs(G(s) / s) + abs(expected)
         assert abs(G.derivative(s) - expected) <= 4000 * EPS * scale
 

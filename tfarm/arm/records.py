@@ -34,8 +34,8 @@ class Arm(Turning):
 
     `link` is the segment at the hub, the only one of the paper's arm, and `outer` are those that follow it outwards.
     The `clamp` yields between hub and link, `hub.radius` from the axis, the `joint` (gear, shaft) at the axis.
-    The `gauge` reads
-    what the law feeds back as the root moment.  `theory` is one of `THEORIES`; `input` one of `INPUTS`, what drives the hub.
+    The `gauge` reads what the law feeds back as the root moment.  `theory` is one of `THEORIES`; `input` one of
+    `INPUTS`, what drives the hub.
     """
 
     link: Link

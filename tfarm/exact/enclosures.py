@@ -26,7 +26,7 @@ def enclose(k: System, wanted: Output, s: complex, *, bits: int, x: float = 0.0)
 
     Raises CertificationError where no precision up to `MOST_BITS` gives one: at a pole, or at an exact zero.
     """
-    for working in _precisions(bits):
+    for working in precisions(bits):
         with precision(working):
             state = state_of(k, point(s))
             if state.determines(wanted, x):
@@ -39,7 +39,7 @@ def enclose(k: System, wanted: Output, s: complex, *, bits: int, x: float = 0.0)
 def slope(k: System, wanted: Output, s: complex, *, bits: int = 60, x: float = 0.0) -> Ball:
     """dG/ds at s, by a difference so short that its error is below 2^-bits of the larger of G/s and dG/ds."""
     step = rational(Fraction(1, 1 << (2 * bits)))
-    for working in _precisions(4 * bits):
+    for working in precisions(4 * bits):
         with precision(working):
             here, there = state_of(k, point(s)), state_of(k, point(s) * (1 + step))
             if here.determines(wanted, x) and there.determines(wanted, x):
@@ -55,7 +55,7 @@ def decimals(k: System, wanted: Output, s: complex, digits: int, x: float = 0.0)
 
     On the imaginary axis at C = 0, and for real s, one of the two parts is exactly zero.
     """
-    for working in _precisions(4 * digits):
+    for working in precisions(4 * digits):
         with precision(working):
             state = state_of(k, point(s))
             if not state.determines(wanted, x):
@@ -89,7 +89,7 @@ def _decimal(part: Ball, digits: int) -> str | None:
     return str(part.mid().str(digits, radius=False))
 
 
-def _precisions(bits: int) -> Iterator[int]:
+def precisions(bits: int) -> Iterator[int]:
     """Working precisions worth trying for so many right bits, each twice the one before."""
     working = 2 * bits + 64
     while working < MOST_BITS:

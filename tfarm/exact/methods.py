@@ -47,6 +47,10 @@ def slow_values(method: Method, arm: Arm, k: System, wanted: Sequence[Output], s
     if not arm.is_uniform:
         raise ParameterError(key="method", value=method, remedy="the paper's appendix is of one uniform link on a hub")
 
+    for each in wanted:
+        if each.is_of_a_chain:
+            raise ParameterError(key="output", value=each.name, remedy="the paper's appendix is not asked for it")
+
     def by_cramer(each: Output, at: complex) -> complex:
         return complex(appendix.response(arm, each, at, DIGITS, x * arm.link.length))
 

@@ -160,7 +160,8 @@ OUTPUTS: Mapping[str, Output] = MappingProxyType({each.name: each for each in (
     Output(name="tip_acceleration", quantity="W", place="tip", unit="m/s^2", power=2, label="tip acceleration"),
     Output(name="root_moment", quantity="M", place="root", unit="N m", gauge=True, label="root moment"),
     Output(name="root_shear", quantity="Q", place="root", unit="N", label="root shear force"),
-    Output(name="tip_rotation", quantity="Psi", place="tip", unit="rad", label="tip rotation"),
+    Output(name="tip_rotation", quantity="Phi", place="tip", unit="rad", label="tip rotation"),
+    Output(name="tip_angle", quantity="Psi", place="tip", unit="rad", label="tip angle in space"),
     Output(name="payload_displacement", quantity="centre", place="tip", unit="m", label="payload displacement"),
     Output(name="displacement", quantity="W", place="x", unit="m", label="displacement at x"),
     Output(name="velocity", quantity="W", place="x", unit="m/s", power=1, label="velocity at x"),
@@ -172,6 +173,8 @@ OUTPUTS: Mapping[str, Output] = MappingProxyType({each.name: each for each in (
     Output(name="strain", quantity="strain", place="x", unit="1", gauge=True, label="bending strain at x"),
     Output(name="shear", quantity="Q", place="x", unit="N", label="shear force at x"),
 )})  # fmt: skip
+
+OF_ONE_LINK = MappingProxyType({name: each for name, each in OUTPUTS.items() if not each.is_of_a_chain})
 
 
 def output(wanted: str | Output) -> Output:

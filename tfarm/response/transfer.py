@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tfarm.arm import INPUT_UNITS, Arm, must_be_arm
+from tfarm.arm import INPUT_UNITS, Arm, Input, must_be_arm
 from tfarm.errors import MISSING, ParameterError
+from tfarm.exact.balls import nearest
+from tfarm.exact.chain import Chain, chain_of
+from tfarm.exact.loads import is_load, load_of, loaded_value
 from tfarm.exact.methods import Method, known_method, slow_values
 from tfarm.exact.outputs import Output, output
 from tfarm.exact.system import System, system_of
@@ -36,15 +40,21 @@ LARGEST = 1e20  # 1/s; far beyond any arm, and the powers of s that are taken do
 Wanted = str | Output | Sequence[str | Output]  # one output or several
 
 
-def transfer(arm: Arm, outputs: Wanted, *, x: float | None = None, method: Method = "closed-form") -> TransferFunction:
-    """The exact transfer function from hub torque (hub angle where the hub is locked) to one output or several.
+def transfer(
+    arm: Arm, outputs: Wanted, *, x: float | None = None, method: Method = "closed-form", input: str | None = None
+) -> TransferFunction:
+    """The exact transfer function from the arm's input (hub torque, unless it has another) to one output or several.
+
+    `input` takes the place of the arm's own: one of `tfarm.arm.INPUTS`, or a load on the link while the hub's input is
+    held at zero, force@X [N] (positive with the displacement) or moment_pair@X1,X2 [N m] (as a piezo patch between them
+    gives), with X in m from the clamp; then every value is an enclosure in balls, about a millisecond each.
 
     `outputs` are names of `tfarm.exact.outputs.OUTPUTS`, or an `Output` of your own; `x` [m] is the place of those
     along the arm.  `method` is the road to its values: the closed form in float64, "balls" for ball arithmetic alone,
     or "appendix" for the paper's own determinant with mpmath, some milliseconds a point (`tfarm.exact.methods`).
     Raises ParameterError for an unknown output or method, or for a place missing or outside the arm.
     """
-    return TransferFunction(arm, outputs, x=x, method=method)
+    return TransferFunction(arm, outputs, x=x, method=method, input=input)
 
 
 class TransferFunction:
@@ -54,8 +64,20 @@ class TransferFunction:
     axis.  At a pole it raises ParameterError naming the pole; everywhere else it has full float64 accuracy.
     """
 
-    def __init__(self, arm: Arm, outputs: Wanted, *, x: float | None = None, method: Method = "closed-form") -> None:
+    def __init__(
+        self,
+        arm: Arm,
+        outputs: Wanted,
+        *,
+        x: float | None = None,
+        method: Method = "closed-form",
+        input: str | None = None,
+    ) -> None:
         must_be_arm(arm)
+        self.load = load_of(input, arm.length) if input is not None and is_load(input) else None
+        self._input = input
+        if input is not None and self.load is None:
+            arm = replace(arm, input=cast("Input", input))  # the record refuses what is none
         self.method = known_method(method)
         self.arm = arm
         self.is_single = isinstance(outputs, str | Output)
@@ -63,7 +85,7 @@ class TransferFunction:
         if not asked:
             raise ParameterError(key="outputs", value=outputs, remedy="name at least one output")
         self.rows: tuple[Output, ...] = tuple(output(each) for each in asked)
-        self._k = system_of(arm, wanted=self.rows)
+        self._k = system_of(arm, wanted=self.rows) if self.load is None else chain_of(arm)
         self._table = kernel_table(self._k, self.rows)
         self.x = self._place(x)
 
@@ -85,12 +107,14 @@ class TransferFunction:
     @property
     def input(self) -> str:
         """The input: the arm's own, "hub_torque" [N m] of the paper's; "hub_angle" [rad] where the hub is locked."""
+        if self.load is not None:
+            return str(self._input)
         return "hub_angle" if self.arm.is_locked else self.arm.input
 
     @property
     def input_unit(self) -> str:
         """The SI unit of the input."""
-        return INPUT_UNITS[self.input]
+        return INPUT_UNITS[self.input] if self.load is None else self.load.unit
 
     def __repr__(self) -> str:
         place = "" if self.x is None else f" at x = {self.x:g} m"
@@ -106,6 +130,7 @@ class TransferFunction:
 
     def derivative(self, s: ArrayLike) -> Any:
         """dG/ds at a complex scalar or array, by the same formulas carried as power series."""
+        self._must_be_of_the_hub("a derivative")
         points = _finite(s)
         flat = differentiate_outputs(self._k, self.rows, points.ravel(), self._share)
         return self._shaped(flat.reshape(len(self.outputs), *points.shape))
@@ -117,6 +142,7 @@ class TransferFunction:
         """
         if not isinstance(digits, int) or not 1 <= digits <= 1000:
             raise ParameterError(key="digits", value=digits, remedy="a whole number of digits from 1 to 1000")
+        self._must_be_of_the_hub("digits")
         point = complex(_finite(s))
         pairs = [digits_of(self._k, wanted, point, digits, self._share) for wanted in self.rows]
         return pairs[0] if self.is_single else pairs
@@ -135,6 +161,12 @@ class TransferFunction:
         )
 
     def _values(self, s: Complex) -> Complex:
+        if self.load is not None and isinstance(self._k, Chain):
+            of_load = np.empty((len(self.rows), s.size), complex)
+            for row, each in enumerate(self.rows):
+                balls = (loaded_value(self._k, self.load, each, complex(at), self._share) for at in s)
+                of_load[row] = [nearest(ball) for ball in balls]
+            return of_load
         if self.method != "closed-form":
             return slow_values(self.method, self.arm, self._k, self.rows, s, self._share)
         if s.size <= BLOCK:
@@ -153,6 +185,7 @@ class TransferFunction:
 
     @cached_property
     def _expansion(self) -> NDArray[np.float64]:
+        self._must_be_of_the_hub("an expansion at s = 0")
         return np.array([expansion_at_zero(self._k, wanted, self._share) for wanted in self.rows])
 
     @property
@@ -181,11 +214,17 @@ class TransferFunction:
 
         By a count for hub angle, hub rate and root moment at C = 0, else by the winding number around the box.
         """
+        self._must_be_of_the_hub("zeros")
         if not self.is_single:
             raise ParameterError(key="outputs", value=self.outputs, remedy="ask for the zeros of one output at a time")
         return zeros_of(self.arm, self.rows[0], _positive("up_to", up_to), self._share)
 
     # ------------------------------------------------------------ inside
+
+    def _must_be_of_the_hub(self, what: str) -> None:
+        if self.load is not None:
+            remedy = f"{what} is known for an input at the hub; ask for values G(s)"
+            raise ParameterError(key="input", value=self._input, remedy=remedy)
 
     @property
     def _share(self) -> float:

@@ -1,0 +1,172 @@
+"""Forces and couples on the link: what a disturbance, or a pair of moments of a piezo patch, moves.
+
+The input of the hub is held at zero.  A load e (1 in Q or in M) makes z- = z+ + e of the states on both sides of it.
+With f z = 0 and g z = 0 for W = 0 at the axis and for the hub's balance, both carried out to the load, and with the
+plane of the payload's states there (`compound`), the state beyond it is
+
+    z+ = -((g e) F - (f e) G)/(g F),     F = met(f), G = met(g),
+
+which is met(h) for the condition h = (g e) f - (f e) g that goes on outwards.  Balls throughout: f and g become
+parallel far out, and only digits part them.
+"""
+
+from __future__ import annotations
+
+import re
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+from tfarm.errors import CertificationError, ParameterError
+
+from .balls import Ball, point, precision, rational
+from .chain import Body, Chain, Element, Mark, Offset, Place, Segment, Spring
+from .chain_balls import Sweep
+from .chain_values import Reading, reading_of
+from .compiled import plain
+from .compound import Plane, Row, met
+from .enclosures import precisions
+from .outputs import Output
+
+_met = plain(met)
+KINDS = {"force": ("N", 3), "moment_pair": ("N m", 2)}  # unit, and which entry of (W, Psi, M, Q) jumps
+PATTERN = re.compile(r"(force|moment_pair)@([^,]+)(?:,([^,]+))?")
+
+
+class Load(NamedTuple):
+    """A unit load: `kind` "force" [N], positive with W, or "moment_pair" [N m], with Psi at the second of its places.
+
+    `shares` are its places as shares of the link's length.
+    """
+
+    kind: str
+    shares: tuple[float, ...]
+
+    @property
+    def unit(self) -> str:
+        """N or N m."""
+        return KINDS[self.kind][0]
+
+
+def is_load(text: str) -> bool:
+    """Whether an input is named as a load is."""
+    return "@" in text
+
+
+def load_of(text: str, length: float) -> Load:
+    """force@X or moment_pair@X1,X2, with X [m] from the clamp.  Raises ParameterError for anything else."""
+    found = PATTERN.fullmatch(text.replace(" ", ""))
+    remedy = "force@X or moment_pair@X1,X2, with X in m from the clamp, such as force@0.3"
+    if not found or (found[1] == "force") == bool(found[3]):
+        raise ParameterError(key="input", value=text, remedy=remedy)
+    try:
+        places = [float(each) for each in found.groups()[1:] if each]
+    except ValueError:
+        raise ParameterError(key="input", value=text, remedy=remedy) from None
+    if not all(0 <= x <= length for x in places):
+        raise ParameterError(key="input", value=text, remedy=f"a place on the link lies between 0 and {length:g} m")
+    if len(set(places)) < len(places):
+        raise ParameterError(key="input", value=text, remedy="two moments at one place cancel; give two places")
+    return Load(found[1], tuple(x / length for x in places))
+
+
+def loaded_value(chain: Chain, load: Load, wanted: Output, s: complex, x: float, bits: int = 60) -> Ball:
+    """The output per unit load at s, SI, to so many bits.  Raises CertificationError at a pole or an exact zero."""
+    for working in precisions(bits):
+        with precision(working):
+            value = _value(chain, load, wanted, point(s), x)
+            if value is not None and (value.rel_accuracy_bits() >= bits or value.is_zero()):
+                return value
+    raise CertificationError(f"no {bits} bits at s = {s:g} 1/s: it is a pole or a zero, or too close to one")
+
+
+def _value(chain: Chain, load: Load, wanted: Output, s: Ball, x: float) -> Ball | None:
+    one = reading_of(chain, wanted, x)
+    signs = (1,) if load.kind == "force" else (-1, 1)
+    total = rational(0) * s
+    for share, sign in zip(load.shares, signs, strict=True):
+        state = _Loaded(chain, s, Place(Fraction(share)), one.place)
+        if state.balance.contains(0):
+            return None
+        total += sign * state.read(one, KINDS[load.kind][1])
+    unit = (chain.length / chain.EI) * (chain.length if load.kind == "force" else 1)  # of the load, without dimensions
+    return total * rational(one.unit * chain.input_unit * unit)
+
+
+class _Loaded(Sweep):
+    """The sweep with a mark at the load, and one at the place that is read, if it is on the link."""
+
+    def __init__(self, chain: Chain, s: Ball, at: Place, read: Place | None) -> None:
+        self.places = (at,) if read is None or read == at else (at, read)
+        super().__init__(chain.at(self.places), s)
+        A, B = chain.drive.of_angle, chain.drive.of_moment
+        of_angle = ((s * rational(A[3]) + rational(A[2])) * s + rational(A[1])) * s + rational(A[0])
+        zero, one = 0 * s, 1 + 0 * s
+        self.f: Row = (one, zero, zero, zero)
+        self.g: Row = (zero, of_angle, -(s * rational(B[1]) + rational(B[0])), zero)
+        for each in reversed(self.layout.elements):
+            if each == Mark(0):
+                break
+            if not isinstance(each, Mark):
+                self.f, self.g = self._beyond(each, self.f), self._beyond(each, self.g)
+
+    @property
+    def plane(self) -> Plane:
+        """That of the payload's states at the load."""
+        return self.planes[0]
+
+    @property
+    def balance(self) -> Ball:
+        """g F: zero at an eigenvalue."""
+        return sum(a * b for a, b in zip(self.g, _met(self.f, self.plane), strict=True))
+
+    def read(self, one: Reading, jumps: int) -> Ball:
+        """The reading, without its unit, for a unit jump of that entry of the state."""
+        h = tuple(self.g[jumps] * a - self.f[jumps] * b for a, b in zip(self.f, self.g, strict=True))
+        outer = tuple(-part / self.balance for part in _met(h, self.plane))
+        inner = [part + (1 if n == jumps else 0) for n, part in enumerate(outer)]
+        theta, at_place = self._inwards(inner)
+        state = at_place or (self._outwards(h) if one.place is not None and len(self.places) > 1 else outer)
+        value = theta * rational(one.theta)
+        if one.place is not None:
+            value = sum((part * rational(weight) for weight, part in zip(one.state, state, strict=True)), value)
+        C = 0.0 if not one.gauge or one.place is None else self.layout.read[self.places.index(one.place)].damping
+        return value * self.s**one.power / (1 + rational(C) * self.s)
+
+    def _inwards(self, state: Any) -> tuple[Ball, Any]:
+        """The hub angle, and the state at the place that is read where that lies on this side of the load."""
+        found, elements = None, self.layout.elements
+        for each in elements[elements.index(Mark(0)) + 1 :]:
+            if isinstance(each, Mark):
+                found = state
+            else:
+                state = self._state_inside(each, state)
+        return state[1], found
+
+    def _outwards(self, h: Any) -> Any:
+        """The state at a place beyond the load."""
+        elements = self.layout.elements
+        for each in reversed(elements[: elements.index(Mark(0))]):
+            if isinstance(each, Mark):
+                return tuple(-part / self.balance for part in _met(h, self.planes[each.number]))
+            h = self._beyond(each, h)
+        raise AssertionError("the place is on neither side of the load")
+
+    def _state_inside(self, element: Element, z: Any) -> Any:
+        """A state at the inner end of an element from that at its outer one."""
+        W, Psi, M, Q = z
+        match element:
+            case Segment():
+                w, m, q = (rational(unit) for unit in element.units)
+                own = W * w, Psi, M * m, Q * q
+                rows = self._transition(element)
+                W, Psi, M, Q = (sum(a * b for a, b in zip(row, own, strict=True)) for row in rows)
+                return W / w, Psi, M / m, Q / q
+            case Offset():
+                a = rational(element.length)
+                return W - a * Psi, Psi, M + a * Q, Q
+            case Spring():
+                stiffness, compliance = self._spring(element)
+                return W, Psi - compliance / stiffness * M, M, Q
+        assert isinstance(element, Body)
+        translation, rotation = self._body(element)
+        return W, Psi, M - rotation * Psi, Q - translation * W
