@@ -24,7 +24,8 @@ ALIASES = {
     "tip_displacement": ("displacement", math.inf),
     "tip_acceleration": ("acceleration", math.inf),
     "tip_deflection": ("deflection", math.inf),
-    "tip_rotation": ("rotation", math.inf),
+    "tip_rotation": ("twist", math.inf),
+    "tip_angle": ("rotation", math.inf),
 }
 
 

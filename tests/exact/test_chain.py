@@ -18,7 +18,7 @@ from tfarm import Hub
 from tfarm.arm import THEORIES, Attachment, Motor, RotarySpring
 from tfarm.exact.chain import Chain, chain_of
 from tfarm.exact.coefficients import Coefficients
-from tfarm.exact.outputs import OUTPUTS, Output
+from tfarm.exact.outputs import OF_ONE_LINK, OUTPUTS, Output
 from tfarm.exact.system import system_of
 from tfarm.exact.values import evaluate_outputs, expansions_at_zero, kernel_table
 from tfarm.spectrum.search import natural_frequencies
@@ -28,7 +28,10 @@ LOST = 1e-13  # error over 1 + condition: 20 times what 5,000 rigs of `chain_acc
 EXACT = mpmath.mpf("1e-29")  # of 30 digits, rounded
 INPUTS = ("hub_torque", "motor_voltage", "motor_current", "hub_angle")
 ENDS = [name for name, each in OUTPUTS.items() if each.place != "x"]
-ALONG = {"deflection": "deflection", "rotation": "twist", "moment": "gauge", "shear": "shear"}  # as the oracle says
+ALONG = {  # as the oracle says
+    **{name: name for name in ("displacement", "velocity", "acceleration", "deflection", "shear")},
+    **{"rotation": "twist", "moment": "gauge", "full_moment": "moment"},
+}
 
 
 def point_of(arm, share):
@@ -251,9 +254,9 @@ def test_the_papers_arm_as_a_chain(seed):
     assert natural_frequencies(chain.with_damping(0.0), 1, 12)[arm.has_rigid_mode :] == pytest.approx(
         natural_frequencies(k.with_damping(0.0), 1, 12)[arm.has_rigid_mode :], rel=1e-14, abs=0
     )
-    wanted, x = [OUTPUTS[name] for name in [*ENDS, *ALONG]], 0.4
+    wanted, x = list(OF_ONE_LINK.values()), 0.4
     s = np.array([some_point(rng, arm) for _ in range(8)])
-    G = tfarm.transfer(arm, [*ENDS, *ALONG], x=x * arm.length)
+    G = tfarm.transfer(arm, wanted, x=x * arm.length)
     ours, theirs = (evaluate_outputs(each, wanted, kernel_table(each, wanted), s, x) for each in (chain, k))
     there = theirs != 0
     condition = abs(s * G.derivative(s))[there] / abs(theirs[there])
