@@ -30,7 +30,9 @@ INPUTS = ("hub_torque", "motor_voltage", "motor_current", "hub_angle")
 ENDS = [name for name, each in OUTPUTS.items() if each.place != "x"]
 ALONG = {  # as the oracle says
     **{name: name for name in ("displacement", "velocity", "acceleration", "deflection", "shear")},
-    **{"rotation": "twist", "moment": "gauge", "full_moment": "moment"},
+    "rotation": "twist",
+    "moment": "gauge",
+    "full_moment": "moment",
 }
 
 

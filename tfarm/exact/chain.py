@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -91,10 +91,13 @@ class Mark(NamedTuple):
 
 
 class Place(NamedTuple):
-    """A point of the link, as a share of its length (0..1), and a side where a body or a joint is at it."""
+    """A point of the link, as a share of its length (0..1), and a side where a body or a joint is at it.
+
+    "payload" is the payload's centre of mass, beyond the tip.
+    """
 
     share: Fraction
-    side: Side = "outer"
+    side: Side | Literal["payload"] = "outer"
 
 
 Element = Segment | Offset | Spring | Body | Mark
@@ -334,15 +337,15 @@ class Layout:
         at = self.elements.index(Mark(number))
         outer = [each for each in self.elements[:at] if isinstance(each, Segment)]
         inner = [each for each in self.elements[at:] if isinstance(each, Segment)]
-        is_outer = self.places[number].side == "outer"
+        is_outer = self.places[number].side != "inner"
         return (outer[-1] if outer else inner[0]) if is_outer else (inner[0] if inner else outer[-1])
 
 
 def _marked(elements: Sequence[Element], places: tuple[Place, ...]) -> tuple[Element, ...]:
     """The elements with a mark for each place; segments are cut where a place lies inside."""
     order = sorted(range(len(places)), key=lambda n: (-places[n].share, places[n].side != "outer"))
-    marks, position = list(order), Fraction(1)
-    result: list[Element] = []
+    marks, position = [n for n in order if places[n].side != "payload"], Fraction(1)
+    result: list[Element] = [Mark(n) for n in order if places[n].side == "payload"]
     is_beyond = True  # still outside the link: the payload's offset
     for each in elements:
         if is_beyond and isinstance(each, Offset):

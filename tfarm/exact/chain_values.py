@@ -80,8 +80,7 @@ def reading_of(chain: Chain, wanted: Output, x: float) -> Reading:
     """An output as weights; x is the share of the length for one along the link."""
     share = Fraction(wanted.share(x))
     weights: dict[str, tuple[Fraction | int, ...]] = {
-        **dict.fromkeys(("W", "Y"), (1, 0, 0, 0)),
-        "centre": (1, chain.offset, 0, 0),
+        **dict.fromkeys(("W", "Y", "centre"), (1, 0, 0, 0)),
         **dict.fromkeys(("Psi", "Phi"), (0, 1, 0, 0)),
         **dict.fromkeys(("M", "strain"), (0, 0, 1, 0)),
     }
@@ -89,6 +88,8 @@ def reading_of(chain: Chain, wanted: Output, x: float) -> Reading:
     place = None if wanted.quantity == "theta" else Place(share, wanted.side)
     if wanted.place == "root" and wanted.gauge:
         place = chain.gauge
+    if wanted.quantity == "centre":
+        place = Place(Fraction(1), "payload")
     state = weights.get(wanted.quantity, (0, 0, 0, 1)) if place else (0, 0, 0, 0)
     unit = _strain_unit(chain, place) if wanted.quantity == "strain" and place else unit_scale(wanted, chain)
     return Reading(place, state, theta.get(wanted.quantity, Fraction(0)), wanted.power, wanted.gauge, unit)
