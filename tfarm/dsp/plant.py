@@ -168,6 +168,9 @@ def _of_model(model: ModalModel) -> Plant:
     poles = model.eigenvalues.ravel()
     residues = model.residues.reshape(len(model.outputs), poles.size)
     mode = np.repeat(model.index, 2)
+    if model.single_residues is not None:
+        poles, residues = np.r_[poles, model.single], np.c_[residues, model.single_residues]
+        mode = np.r_[mode, np.zeros(model.single.size, np.int64)]
     return Plant(model.arm, model.outputs, poles, residues, model.rigid, model.static, mode, model)
 
 
@@ -180,7 +183,8 @@ def _with_hub_damping(model: ModalModel, outputs: Sequence[str], damping: float)
     rigid = np.zeros((len(model.outputs), 2))
     if model.has_rigid_states:  # turning the whole arm by an angle costs nothing: that pole is exactly zero
         zero = int(np.argmin(abs(poles)))
-        rigid[:, 1] = np.where(model.rigid[:, 0] != 0, residues[:, zero].real, 0.0)
+        feels = model.rigid[:, 2 - model.rigid_states] != 0
+        rigid[:, 1] = np.where(feels, residues[:, zero].real, 0.0)
         poles, residues = np.delete(poles, zero), np.delete(residues, zero, axis=1)
     own = model.eigenvalues.ravel()
     mode = np.zeros(poles.size, np.int64)

@@ -18,6 +18,7 @@ def reduced_answer(reduced: ReducedModel) -> dict[str, Any]:
     G = transfer(model.arm, model.rows, x=model.x)
     A, B, C, D = reduced.matrices()
     poles = [[float(p.real), float(p.imag)] for p in model.eigenvalues.ravel()]
+    poles += [[float(pole), 0.0] for pole in model.single]
     poles += [[-1 / model.arm.damping, 0.0]] if model.relaxation is not None else []
     answer: dict[str, Any] = {
         "arm": model.arm.name,

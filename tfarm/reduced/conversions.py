@@ -40,15 +40,17 @@ def transfer_function(reduced: ReducedModel) -> control.TransferFunction:
 
     model = reduced.model
     pairs = [np.poly(pair).real for pair in model.eigenvalues]
-    rigid = [np.array([1.0, 0.0, 0.0])] if model.has_rigid_states else []
+    rigid = [np.eye(3)[0, : model.rigid_states + 1]] if model.has_rigid_states else []
+    single = [np.array([1.0, -pole]) for pole in model.single]
     delay = [np.array([model.arm.damping, 1.0])] if model.relaxation is not None else []
-    denominators = [*rigid, *pairs, *delay]
+    denominators = [*rigid, *pairs, *single, *delay]
     whole = _product(denominators)
     n1, n0 = model.numerators
     numerators = []
     for row in range(len(model.outputs)):
-        parts = [model.rigid[row, ::-1]] if rigid else []
+        parts = [model.rigid[row, ::-1][: model.rigid_states]] if rigid else []
         parts += [np.array(pair) for pair in zip(n1[row], n0[row], strict=True)]
+        parts += [] if model.single_residues is None else [np.array([each]) for each in model.single_residues[row]]
         parts += [model.relaxation[row : row + 1]] if model.relaxation is not None else []
         total = model.static[row] * whole
         for place, part in enumerate(parts):

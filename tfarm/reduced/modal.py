@@ -33,6 +33,7 @@ from .residues import contour_residues, end_residues, undamped_residues
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 
+Real = NDArray[np.float64]
 MOST_MODES = 1000
 MOST_PROPER = 2  # power of s: a mode's share r s^2/(s^2 + w^2) is bounded, and one of s^3 is not
 
@@ -76,7 +77,7 @@ def modal_model(
     table = modes(arm, max(1, int(count)))
     flexible = slice(int(arm.has_rigid_mode), int(arm.has_rigid_mode) + int(count))
     collocated = OUTPUTS["root_moment" if arm.is_locked else "hub_angle"]
-    p, r = _poles_and_residues(arm, table, k, [*wanted, collocated], share, branches)
+    p, r, single, alone = _poles_and_residues(arm, table, k, [*wanted, collocated], share, branches)
     p, r = p[:count], r[:, :count]
     expansion = np.array(expansions_at_zero(k, wanted, share))
     return ModalModel(
@@ -88,7 +89,9 @@ def modal_model(
         eigenvalues=p,
         residues=r[:-1],
         rigid=expansion[:, :2],
-        static=expansion[:, 2] + (r[:-1] / p).real.sum(axis=(1, 2)),
+        static=expansion[:, 2] + (r[:-1] / p).real.sum(axis=(1, 2)) + (alone / single).sum(axis=1)[:-1],
+        single=single,
+        single_residues=alone[:-1] if single.size else None,
         participation=np.sqrt(abs((r[-1] * p[:, ::-1]).real.sum(axis=-1))),
     )
 
@@ -106,6 +109,8 @@ def relaxed_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None)
     share = 0.0 if x is None else x / arm.length
     expansion = np.array(expansions_at_zero(system_of(arm, wanted=model.rows), model.rows, share))
     slope = expansion[:, 3] + (model.residues / model.eigenvalues**2).real.sum(axis=(1, 2))
+    if model.single_residues is not None:
+        slope = slope + (model.single_residues / model.single**2).sum(axis=1)
     return replace(model, static=model.static + slope / C, relaxation=-slope / C)
 
 
@@ -132,26 +137,34 @@ def slow_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None) ->
     )
 
 
+def _of_torque(arm: Arm) -> Arm:
+    """The rig without anything that dissipates, driven by a torque."""
+    clamp, joint = replace(arm.clamp, damping=0.0), replace(arm.joint, damping=0.0)
+    return replace(arm.elastic.lossless_hub, clamp=clamp, joint=joint, input="hub_torque")
+
+
 def tailed_model(arm: Arm, count: int) -> ModalModel:
     """The modal model of what a law feeds back, with one pair of poles more in the place of all modes left out.
 
     To the hub angle these add  sum of b^2/(s^2 + w^2 (1 + C s)) ~ rho/(s^2 + W^2 (1 + C s)),  and to the root moment
     -I_h w^2 times as much; rho and W such that without damping both sides agree at s = 0 and s = w of the last mode.
     Where a law changes what the hub weighs few modes do then: those of a free hub make up a clamped one but slowly.
+    The root moment of a rig agrees at s = w, too, its hub inertia being no longer all that stands before the gauge.
     """
-    model = modal_model(arm, FED_BACK, count)
-    if not arm.is_uniform:
-        return model
-    undamped = modal_model(arm.elastic, "hub_angle", count)
+    model, whole_rig = modal_model(arm, FED_BACK, count), () if arm.is_uniform else ("root_moment",)
+    undamped = modal_model(arm.elastic if arm.is_uniform else _of_torque(arm), ("hub_angle", *whole_rig), count)
     s, whole = float(undamped.natural_frequency[-1]), float(undamped.static[0])
-    fallen = float((undamped(s) - transfer(undamped.arm, "hub_angle")(s))[0].real)
+    fallen, *others = (undamped(s) - transfer(undamped.arm, undamped.outputs)(s)).real.tolist()
     if not 0 < fallen < whole:  # what is left out drowns in rounding
         return model
     W2 = s**2 * (whole - fallen) / fallen
     rho, half = whole * W2, arm.damping * W2 / 2
     root = complex(np.emath.sqrt(half**2 - W2)) or 1e-6 * half  # a double pole has no residues
     p = -half + root * np.array([1.0, -1.0])
-    numerators = {"hub_angle": rho + 0 * p, "hub_rate": rho * p, "root_moment": -arm.hub_inertia * W2 * rho + 0 * p}
+    moment = others[0] * W2 * (s**2 + W2) / s**2 if others else -arm.hub_inertia * W2 * rho
+    if others:
+        rho, moment = rho / arm.input_per_torque, moment / arm.input_per_torque
+    numerators = {"hub_angle": rho + 0 * p, "hub_rate": rho * p, "root_moment": moment + 0 * p}
     tail = np.array([numerators[each.name] for each in model.rows]) / (2 * root) * np.array([1.0, -1.0])
     return replace(
         model,
@@ -182,14 +195,16 @@ def _poles_and_residues(
     wanted: list[Output],
     share: float,
     branches: Callable[[Modes], DampedModes],
-) -> tuple[Complex, Complex]:
-    """Eigenvalues (n, 2) and residues (outputs, n, 2) at them."""
+) -> tuple[Complex, Complex, Real, Real]:
+    """Eigenvalues (n, 2) and residues (outputs, n, 2) at them; single real ones (m,) and theirs (outputs, m)."""
+    none = np.empty(0), np.empty((len(wanted), 0))
     if arm.is_undamped:
         s = 1j * table.natural_frequency[table.index > 0]
         powers = np.array([[each.power] for each in wanted])
         upper = undamped_residues(table, wanted, k, share) * s**powers / (2 * s)
-        return np.stack([s, s.conj()], axis=1), np.stack([upper, upper.conj()], axis=2)
-    p = branches(table).eigenvalues[table.index > 0]
+        return np.stack([s, s.conj()], axis=1), np.stack([upper, upper.conj()], axis=2), *none
+    damped = branches(table)
+    p = damped.eigenvalues[table.index > 0]
     along = isinstance(k, Coefficients) and any(not each.is_at_end for each in wanted)
     residues, doubtful = end_residues(k, wanted, p.ravel(), share)
     doubtful = doubtful | along
@@ -199,4 +214,8 @@ def _poles_and_residues(
     pair = p[:, 0].imag > 0
     residues[:, pair, 1] = residues[:, pair, 0].conj()
     residues[:, ~pair] = residues[:, ~pair].real
-    return p, residues
+    single = damped.single
+    if not single.size:
+        return p, residues, *none
+    alone: Real = end_residues(k, wanted, single.astype(complex), share)[0].real.astype(float)
+    return p, residues, single, alone

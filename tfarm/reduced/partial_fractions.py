@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,6 +34,8 @@ class PartialFractions:
     (outputs,) make the model exact at s -> 0.  `participation` (n,) is how strongly the input drives each pair:
     |b| at C = 0, the root moment of the mode where the hub is locked.  `relaxation` (outputs,), where there is one, is
     the share E of E/(1 + C s), which stands for what the bending modes left out do at C > 0 (see `relaxed_model`).
+    `single` (m,) [1/s] are real poles of a rig that belong to no flexible mode, about -b/J where friction resists the
+    turning hub (then rigid[:,0] is 0) and -R/L_a of a motor's circuit, with `single_residues` (outputs, m).
     """
 
     arm: Arm
@@ -47,6 +49,8 @@ class PartialFractions:
     static: Real
     participation: Real
     relaxation: Real | None = None
+    single: Real = field(default_factory=lambda: np.empty(0))
+    single_residues: Real | None = None
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -59,18 +63,24 @@ class PartialFractions:
         return bool(self.rigid.any())
 
     @property
+    def rigid_states(self) -> int:
+        """Two where an output feels the angle of the rigid body, one where friction leaves it a single integral."""
+        return self.has_rigid_states * (1 if self.arm.rate_loss else 2)
+
+    @property
     def order(self) -> int:
-        """The number of states: two a mode, two for the rigid body where an output feels it, one for a relaxation."""
-        return 2 * (self.index.size + self.has_rigid_states) + (self.relaxation is not None)
+        """The number of states: two a mode, those of the rigid body, one a single pole, one for a relaxation."""
+        return 2 * self.index.size + self.rigid_states + self.single.size + (self.relaxation is not None)
 
     @property
     def states(self) -> tuple[str, ...]:
         """Names of the states, in the order of `matrices`."""
-        rigid = ("rigid_angle", "rigid_rate") if self.has_rigid_states else ()
+        rigid = ("rigid_angle", "rigid_rate")[2 - self.rigid_states :]
         tails = iter(range(1, self.index.size + 1))
         names = [f"mode{k}" if k else f"tail{next(tails)}" for k in self.index]
         pairs = tuple(f"{name}_{part}" for name in names for part in ("position", "rate"))
-        return rigid + pairs + (("relaxation",) if self.relaxation is not None else ())
+        alone = tuple(f"single{i}" for i in range(1, self.single.size + 1))
+        return rigid + pairs + alone + (("relaxation",) if self.relaxation is not None else ())
 
     @property
     def input(self) -> str:
@@ -108,6 +118,8 @@ class PartialFractions:
         values = s * (n1 @ (1 / product)) + n0 @ (1 / product) + self.static[:, None]
         if self.has_rigid_states:
             values = values + self.rigid[:, :1] / (s * s) + self.rigid[:, 1:] / s
+        if self.single_residues is not None:
+            values = values + self.single_residues @ (1 / (s - self.single[:, None]))
         if self.relaxation is not None:
             values = values + self.relaxation[:, None] / (1 + self.arm.damping * s)
         return values
@@ -120,6 +132,8 @@ class PartialFractions:
         size = abs(n1) @ (abs(s) * share) + abs(n0) @ share + abs(self.static)[:, None]
         if self.has_rigid_states:
             size = size + abs(self.rigid[:, :1]) / abs(s) ** 2 + abs(self.rigid[:, 1:]) / abs(s)
+        if self.single_residues is not None:
+            size = size + abs(self.single_residues) @ (1 / abs(s - self.single[:, None]))
         if self.relaxation is not None:
             size = size + abs(self.relaxation[:, None] / (1 + self.arm.damping * s))
         return size
@@ -130,12 +144,14 @@ class PartialFractions:
         Rigid body: angle and rate of an inertia J.  Each mode: (w q, q') with q'' + a q' + w^2 q = b u, that is the
         block [[0, w], [-w, -a]]; at C = 0 half the sum of their squares is the mode's energy [J].
         """
-        first, n = 2 * self.has_rigid_states, self.index.size
+        first, n = self.rigid_states, self.index.size
         A, B = np.zeros((self.order, self.order)), np.zeros((self.order, 1))
         C = np.zeros((len(self.outputs), self.order))
+        J = self.arm.total_inertia
         if first:
-            A[0, 1], B[1, 0] = 1.0, 1.0 / self.arm.total_inertia
-            C[:, :2] = self.rigid * self.arm.total_inertia
+            B[first - 1, 0] = 1.0 / J
+            A[0, first - 1] += first - 1.0
+            C[:, :first] = self.rigid[:, 2 - first :] * J
         position = first + 2 * np.arange(n)
         w = np.sqrt(self.stiffness)
         A[position, position + 1], A[position + 1, position] = w, -w
@@ -144,6 +160,9 @@ class PartialFractions:
         n1, n0 = self.numerators
         B[position + 1, 0] = b
         C[:, position], C[:, position + 1] = n0 / (w * b), n1 / b
+        if self.single_residues is not None:
+            alone = first + 2 * n + np.arange(self.single.size)
+            A[alone, alone], B[alone, 0], C[:, alone] = self.single, 1.0, self.single_residues
         if self.relaxation is not None:
             A[-1, -1], B[-1, 0], C[:, -1] = -1 / self.arm.damping, 1 / self.arm.damping, self.relaxation
         return A, B, C, self.static[:, None].copy()

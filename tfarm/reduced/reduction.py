@@ -152,7 +152,7 @@ class _Bench:
         self, arm: Arm, rows: tuple[Output, ...], band: tuple[float, float], x: float | None, method: Method | None
     ) -> None:
         self.arm, self.rows, self.band, self.x = arm, rows, band, x
-        self.rigid = modal_model(arm, rows, 0, x).has_rigid_states
+        self.fixed = modal_model(arm, rows, 0, x).order
         self.inside = modes_in(arm, band[1])
         self.by_modes = method != "aaa"
         self.by_aaa = method != "modal" and arm.is_undamped
@@ -161,7 +161,7 @@ class _Bench:
     def of_order(self, order: int) -> ReducedModel:
         """The better model of that many states."""
         pairs = self._pairs(order)
-        if order % 2:
+        if (order - self.fixed) % 2 and self.arm.damping:
             return self._measured(relaxed_model(self.arm, self.rows, pairs, self.x), "modal", "")
         found: list[ReducedModel] = []
         if self.by_aaa and pairs > self.inside:
@@ -183,16 +183,16 @@ class _Bench:
     def within(self, error: float) -> ReducedModel:
         """The smallest model whose measured error is within that one."""
         tried, most = [self._few_poles(error)], self._most()
-        if not self.arm.is_undamped:
+        if self.arm.damping:
             tried.append(self._few_modes(error, relaxed_model, most))
             most = most if tried[-1] is None else tried[-1].model.index.size
         if self.by_modes:
             tried.append(self._few_modes(error, modal_model, most))
         found = [each for each in tried if each is not None]
-        if not found and not self.arm.is_undamped:
+        if not found and self.arm.damping:
             found = [each for each in [self._few_modes(error, slow_model, self._most() - SLOW_PAIRS)] if each]
         if not found:
-            best = self.of_order(2 * (min(self.inside + MOST_TAILS, self._most()) + self.rigid))
+            best = self.of_order(2 * min(self.inside + MOST_TAILS, self._most()) + self.fixed)
             message = (
                 f"found no model of up to {MOST_ORDER} states within {error:g} from {self.band[0]:g} to "
                 f"{self.band[1]:g} rad/s; order {best.order} has {best.worst_error:.2g}: allow more, or narrow the band"
@@ -243,18 +243,18 @@ class _Bench:
         return ReducedModel(model, method, self.band, accuracy.worst, accuracy.at, number, frequency, note)
 
     def _most(self) -> int:
-        return MOST_ORDER // 2 - self.rigid
+        return (MOST_ORDER - self.fixed) // 2
 
     def _pairs(self, order: object) -> int:
         """Flexible pairs of poles in a model of so many states."""
-        rigid = "two for the rigid body, " if self.rigid else ""
+        rigid = {0: "", 2: "two for the rigid body, "}.get(self.fixed, f"{self.fixed} besides the modes, ")
         remedy = f"states come in pairs, {rigid}two a mode: an even number from 2 to {MOST_ORDER}"
         if not self.arm.is_undamped:
             remedy = f"two states a mode, {rigid}and one for relaxation where it is odd: from 2 to {MOST_ORDER}"
         order = whole("order", order, 2, MOST_ORDER, remedy)
-        if order % 2 and not self.arm.damping:
+        if order % 2 and not self.arm.damping and self.arm.is_uniform:
             raise ParameterError(key="order", value=order, remedy=remedy)
-        return order // 2 - self.rigid
+        return (order - self.fixed) // 2
 
 
 def first_mode_lacking(model: PartialFractions) -> tuple[int, float]:

@@ -103,6 +103,12 @@ class DampedModes:
         return tuple(discs)
 
     @property
+    def single(self) -> Real:
+        """Real eigenvalues [1/s] of no flexible mode: what friction makes of the second 0 at rest, then `others`."""
+        turning = self.eigenvalues[self.index == 0][:, 1].real
+        return np.r_[turning[turning != 0], np.array(self.others)]
+
+    @property
     def _listed(self) -> Complex:
         """Every eigenvalue of the record but those at 0, (n, 2): the flexible modes', then single ones beside NaN."""
         turning = self.eigenvalues[(self.index == 0)][:, 1]

@@ -1,0 +1,53 @@
+"""Modal models of rigs: friction leaves one integral and a real pole, a motor's circuit another one."""
+
+import numpy as np
+import pytest
+
+import tfarm
+from tfarm.dsp import pulse_transfer
+from tfarm.reduced.modal import modal_model, tailed_model
+
+MEASURED = ("hub_angle", "hub_rate", "root_moment")
+S = np.array([0.01 + 0.02j, 5 + 40j, 3 - 20j])
+
+
+@pytest.fixture(params=["bench-rig", "quanser-2dsfl", "quanser-flexlink"])
+def arm(request):
+    return tfarm.load(f"tests/rigs/{request.param}.toml")
+
+
+def test_a_model_with_friction_is_the_exact_rig_at_low_frequency(arm):
+    """Static remainders are off by (s/w)^2 of the first mode left out: 1e-4 at |s| of 50 1/s, far less at the hub."""
+    exact = tfarm.transfer(arm, MEASURED)(S)
+    model = modal_model(arm, MEASURED, 7)
+    np.testing.assert_allclose(model(S), exact, rtol=1e-4)
+    np.testing.assert_allclose(tailed_model(arm, 7)(S), exact, rtol=1e-5)
+    assert model.order == 14 + 1 + model.single.size == len(model.states)
+    A, B, C, D = model.matrices()
+    for s, values in zip(S, model(S).T, strict=True):
+        again = (C @ np.linalg.solve(s * np.eye(len(A)) - A, B) + D)[:, 0]
+        np.testing.assert_allclose(again, values, rtol=1e-9)
+
+
+def test_the_single_poles_are_eigenvalues_of_the_rig(arm):
+    found = tfarm.damped_modes(tfarm.modes(arm, 2))
+    np.testing.assert_array_equal(modal_model(arm, "hub_rate", 2).single, found.single)
+    assert found.single.size == (2 if arm.motor and arm.motor.inductance else 1)
+    G = tfarm.transfer(arm, "hub_rate")
+    near, far = (abs(G(found.single * (1 + share))) for share in (1e-6, 1e-3))
+    assert (near > 100 * far).all()
+
+
+def test_a_sampled_rig_turns_at_rest_as_its_friction_lets_it(arm):
+    """At z = 1 the pulse transfer of the hub rate is that of the rig at s = 0: one over all friction at the hub."""
+    H = pulse_transfer(arm, ("hub_rate",), count=4)
+    assert H(1.0 + 1e-9)[0].real == pytest.approx(1.0 / arm.rate_loss, rel=1e-4)
+
+
+def test_reduced_models_of_rigs_keep_their_word(arm):
+    reduced = tfarm.reduce(arm, ["hub_angle", "root_moment"], order=10, band=(0.1, 50.0))
+    assert reduced.order == 10 - (10 - 1 - reduced.model.single.size) % 2 * (arm.damping == 0)
+    assert reduced.worst_error < 1e-3
+    space = reduced.state_space()
+    values = space(5j)[:, 0]
+    np.testing.assert_allclose(values, tfarm.transfer(arm, ["hub_angle", "root_moment"])(5j), rtol=1e-2)
