@@ -16,9 +16,11 @@ SURVEYS := \
 	properties \
 	audit.slips \
 	exact.accuracy \
+	exact.chain_accuracy \
 	spectrum.proofs \
 	spectrum.ritz \
 	spectrum.damped \
+	spectrum.chains \
 	loop.counts \
 	loop.agreement \
 	loop.loci \

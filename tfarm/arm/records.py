@@ -182,8 +182,12 @@ class Arm(Turning):
 
     @property
     def has_rigid_mode(self) -> bool:
-        """Whether the whole rig can turn as a rigid body: no inertia is infinite, no spring ties it to the ground."""
-        return math.isfinite(self.total_inertia) and not any(value for _, value in self._springs_to_ground())
+        """Whether the whole rig can turn as a rigid body.
+
+        No inertia is infinite, no spring ties it to the ground, and the hub's angle is not prescribed.
+        """
+        is_held = self.is_locked or any(value for _, value in self._springs_to_ground())
+        return math.isfinite(self.total_inertia) and not is_held
 
     def _springs_to_ground(self) -> Iterator[tuple[str, float]]:
         """The key and the stiffness of each spring that could hold the rig."""

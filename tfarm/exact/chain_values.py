@@ -137,10 +137,8 @@ def free_slopes(chain: Chain, wanted: Sequence[Output], s: Complex, x: float) ->
     return here, Free(drive, outputs, here.scale, here.lost)
 
 
-def free_fields(
-    chain: Chain, s: Complex, places: Sequence[Place]
-) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], Complex]:
-    """W, Psi, M, Q (4, s, places), hub angle and moment on the hub (s,), times e^{-scale}, and scale: dimensionless."""
+def free_fields(chain: Chain, s: Complex, places: Sequence[Place]) -> tuple[NDArray[Any], NDArray[Any], Complex]:
+    """W, Psi, M, Q (4, s, places) and hub angle (s,) times e^{-scale}, and scale: dimensionless."""
     layout = chain.at(tuple(dict.fromkeys(places)))
     order = [layout.places.index(place) for place in places]
     table = np.zeros((4 * len(layout.places) + 1, 9))
@@ -151,11 +149,7 @@ def free_fields(
     found, lost = np.empty((2 + len(table), s.size), complex), np.empty(s.size, bool)
     fill_free(np.ascontiguousarray(s, dtype=complex), layout.rows, layout.ends, table, found, lost)
     fields = found[2:-1].reshape(len(layout.places), 4, s.size).transpose(1, 2, 0)[:, :, order]
-    A, B = (np.array([float(number) for number in part]) for part in (chain.drive.of_angle, chain.drive.of_moment))
-    of_moment = np.polyval(B[::-1], s)
-    with np.errstate(all="ignore"):
-        M = (np.polyval(A[::-1], s) * found[-1] - found[0]) / of_moment
-    return fields, found[-1], M, found[1]
+    return fields, found[-1], found[1]
 
 
 class ChainState:

@@ -2,7 +2,8 @@
 
 At each s the plane of states (`compound`) is carried from the payload to the axis, where W = 0 leaves theta and the
 moment on the hub; the condition W = 0 is carried back to the places that something is read at.  Every segment takes its
-waves where one is fast and its transition functions where both are slow; each scale e^{t} is taken out and kept.
+waves where one is fast and its transition functions where both are slow; each scale e^{t} is taken out and kept.  What
+is read has the scales of the segments inside of it alone: the difference of two sums over all would cost their digits.
 """
 
 from __future__ import annotations
@@ -35,8 +36,9 @@ from .vector import DAMPING, SIGMA, A, B, G
 from .waves import PARALLEL, POLE, impedance, is_low, magnitude, wave_functions
 
 HELD = 14  # complex numbers of a segment that the way back takes up again
-OVERFLOW, UNDERFLOW = 1e80, 1e-80  # a plane beyond is brought back to 1, the factor into its scale
-SMALL = 0.02  # an output below this share of its own terms has lost two digits: flagged
+OVERFLOW, UNDERFLOW = 1e80, 1e-80  # a plane beyond is brought back to 1, by a power of two
+LN_2 = math.log(2.0)
+SMALL = 0.05  # an output below this share of its own terms has lost four bits: flagged
 
 
 @inlined
@@ -80,7 +82,7 @@ def _cross_segment(s: complex, row: Any, plane: Any, held: Any) -> tuple[complex
 
 @compiled
 def _return_across(s: complex, row: Any, held: Any, f: Any) -> complex:
-    """Carry the condition (4,) outwards across a segment, in place; its scale."""
+    """Carry the condition (4,) outwards across a segment, in place; its scale less that of the plane."""
     to_w, to_m, to_q = row[TO_W], row[TO_M], row[TO_Q]
     own = f[0] / to_w, f[1] + 0.0, f[2] / to_m, f[3] / to_q
     d = 1.0 + row[DAMPING] * s
@@ -93,10 +95,10 @@ def _return_across(s: complex, row: Any, held: Any, f: Any) -> complex:
         c2, s2, z2, v2, e2, t2 = held[7], held[8], held[9], held[10], held[11], held[12]
         gS = held[13]
         if t1.real >= t2.real:
-            ratio, scale = e1 * reciprocal(e2) if magnitude(e2) > 1e-140 else complex(0.0, 0.0), t1
+            ratio, scale = e1 * reciprocal(e2) if magnitude(e2) > 1e-140 else complex(0.0, 0.0), -t2
             c2, s2 = c2 * ratio, s2 * ratio
         else:
-            ratio, scale = e2 * reciprocal(e1) if magnitude(e1) > 1e-140 else complex(0.0, 0.0), t2
+            ratio, scale = e2 * reciprocal(e1) if magnitude(e1) > 1e-140 else complex(0.0, 0.0), -t1
             c1, s1 = c1 * ratio, s1 * ratio
         own = row_across_waves(c1, s1, z1, v1, c2, s2, z2, v2, gS, d, own)
         unit = reciprocal(gS * d * (z1 - z2))
@@ -116,8 +118,11 @@ def _small(row: Any, s: complex, S: complex, p: Any) -> Any:
 
 
 @compiled
-def sweep(s: complex, rows: Any, ends: Any, plane: Any, planes: Any, scales: Any, held: Any) -> tuple[complex, bool]:
-    """The plane (5,) at the axis and at each mark, with the scales at the marks.  Its scale, and if digits are lost."""
+def sweep(s: complex, rows: Any, ends: Any, plane: Any, planes: Any, powers: Any, held: Any) -> tuple[complex, bool]:
+    """The plane (5,) at the axis and at each mark.  Its scale, and if digits are lost.
+
+    `powers` (elements,): those of two that the plane was divided by after each.
+    """
     S = s * s
     p = end_plane(ends[0] + ends[1] * S, ends[2] + 0.0 * S, ends[3] + ends[4] * S, ends[5] + 0.0 * S)
     plane[0], plane[1], plane[2], plane[3], plane[4] = p
@@ -128,29 +133,37 @@ def sweep(s: complex, rows: Any, ends: Any, plane: Any, planes: Any, scales: Any
             more, here = _cross_segment(s, row, plane, held[i])
             scale, lost = scale + more, lost or here
         elif row[KIND] == MARK:
-            planes[int(row[0])], scales[int(row[0])] = plane, scale
+            planes[int(row[0])] = plane
         else:
             p = plane[0], plane[1], plane[2], plane[3], plane[4]
             plane[0], plane[1], plane[2], plane[3], plane[4] = _small(row, s, S, p)
         largest = max(
             magnitude(plane[0]), magnitude(plane[1]), magnitude(plane[2]), magnitude(plane[3]), magnitude(plane[4])
         )
+        powers[i] = 0
         if (largest > OVERFLOW or largest < UNDERFLOW) and largest > 0.0 and largest < np.inf:
-            plane /= largest
-            scale += math.log(largest)
+            powers[i] = math.frexp(largest)[1]
+            plane *= math.ldexp(1.0, -powers[i])
+            scale += powers[i] * LN_2
     return scale, lost
 
 
 @compiled
-def go_back(s: complex, rows: Any, f: Any, planes: Any, scales: Any, held: Any, states: Any) -> None:
-    """The state (4,) at each mark: the condition W = 0 of the axis carried outwards meets the planes; scales too."""
+def go_back(
+    s: complex, rows: Any, f: Any, planes: Any, scales: Any, shifts: Any, powers: Any, held: Any, states: Any
+) -> None:
+    """The state (4,) at each mark: the condition W = 0 of the axis carried outwards meets the planes.
+
+    It is the state that goes with the plane at the axis divided by e^scale 2^shift (marks,).
+    """
     S = s * s
     f[0], f[1], f[2], f[3] = 1.0, 0.0, 0.0, 0.0
-    scale, left = complex(0.0, 0.0), len(scales)
+    scale, shift, left = complex(0.0, 0.0), 0, len(scales)
     for i in range(len(rows) - 1, -1, -1):
         if left == 0:
             break
         row = rows[i]
+        shift -= powers[i]
         if row[KIND] == SEGMENT:
             scale += _return_across(s, row, held[i], f)
             continue
@@ -159,7 +172,7 @@ def go_back(s: complex, rows: Any, f: Any, planes: Any, scales: Any, held: Any, 
             n = int(row[0])
             p = planes[n, 0], planes[n, 1], planes[n, 2], planes[n, 3], planes[n, 4]
             states[n, 0], states[n, 1], states[n, 2], states[n, 3] = met(own, p)
-            scales[n] += scale
+            scales[n], shifts[n] = scale, shift
             left -= 1
         elif row[KIND] == OFFSET:
             own = beyond_offset(row[0], own)
@@ -170,8 +183,9 @@ def go_back(s: complex, rows: Any, f: Any, planes: Any, scales: Any, held: Any, 
         f[0], f[1], f[2], f[3] = own
         largest = max(magnitude(f[0]), magnitude(f[1]), magnitude(f[2]), magnitude(f[3]))
         if largest > OVERFLOW or (largest < UNDERFLOW and largest > 0.0):
-            f /= largest
-            scale += math.log(largest)
+            power = math.frexp(largest)[1]
+            f *= math.ldexp(1.0, -power)
+            shift += power
     return
 
 
@@ -212,10 +226,11 @@ def fill_free(s: Any, rows: Any, ends: Any, table: Any, found: Any, lost: Any) -
     plane, f = np.empty(5, np.complex128), np.empty(4, np.complex128)
     planes, states = np.empty((marks, 5), np.complex128), np.empty((marks, 4), np.complex128)
     scales, held = np.empty(marks, np.complex128), np.empty((len(rows), HELD), np.complex128)
+    shifts, powers = np.empty(marks, np.int64), np.empty(len(rows), np.int64)
     for i in range(s.size):
-        scale, lost[i] = sweep(s[i], rows, ends, plane, planes, scales, held)
+        scale, lost[i] = sweep(s[i], rows, ends, plane, planes, powers, held)
         if marks:
-            go_back(s[i], rows, f, planes, scales, held, states)
+            go_back(s[i], rows, f, planes, scales, shifts, powers, held, states)
         found[0, i], found[1, i] = drive_of(s[i], ends, plane[0], plane[1]), scale
         lost[i] = lost[i] or magnitude(found[0, i]) < POLE * _drive_terms(s[i], rows, ends, plane[0], plane[1])
         for o in range(len(table)):
@@ -224,9 +239,8 @@ def fill_free(s: Any, rows: Any, ends: Any, table: Any, found: Any, lost: Any) -
             if want[0] >= 0.0:
                 n = int(want[0])
                 at = want[1] * states[n, 0] + want[2] * states[n, 1] + want[3] * states[n, 2] + want[4] * states[n, 3]
-                more = scales[n] - scale
-                decay = math.exp(more.real)
-                at *= complex(decay * math.cos(more.imag), decay * math.sin(more.imag))
+                decay, turn = math.ldexp(math.exp(scales[n].real), shifts[n]), scales[n].imag
+                at *= complex(decay * math.cos(turn), decay * math.sin(turn))
                 lost[i] = lost[i] or (want[5] != 0.0 and magnitude(value + at) < SMALL * magnitude(value))
                 value += at
             for _ in range(int(want[6])):

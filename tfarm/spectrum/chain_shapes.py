@@ -34,7 +34,7 @@ class ChainShapes:
     def __init__(self, chain: Chain, omega: Real) -> None:
         self.chain, self.omega = chain, omega
         self._factor: Real = np.ones(omega.size)
-        self._size = free_fields(chain, 1j * omega, ())[3].real  # a chain that is cut has other scales
+        self._size = free_fields(chain, 1j * omega, ())[2].real  # a chain that is cut has other scales
         with np.errstate(all="ignore"):
             self._factor = np.asarray(1.0 / np.sqrt(self.masses()))
         self._forget()
@@ -79,7 +79,7 @@ class ChainShapes:
 
     def _states(self, places: tuple[Place, ...]) -> tuple[Real, Real]:
         """W, Psi, M, Q (fields, modes, places) and the hub angle (modes,)."""
-        fields, theta, _, scale = free_fields(self.chain, 1j * self.omega, places)
+        fields, theta, scale = free_fields(self.chain, 1j * self.omega, places)
         turned = np.exp(scale - self._size) * self._factor  # real, as everything is on the axis without damping
         return (fields * turned[:, None]).real, (theta * turned).real
 

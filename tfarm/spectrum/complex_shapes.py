@@ -53,20 +53,21 @@ def mode_field(k: System, s: complex, quantity: str, x: NDArray[np.float64]) -> 
 def _of_chain(k: Chain, s: complex, quantity: str, x: NDArray[np.float64]) -> Complex:
     """`mode_field` of a chain: the reciprocity is that of torque and hub angle, or of hub angle and moment if held."""
     at, places = np.array([s]), [Place(Fraction(float(share))) for share in (*x, 1.0)]
-    fields, theta, M, scale = free_fields(k, at, places)
+    fields, theta, scale = free_fields(k, at, [*places, Place(Fraction(0), "inner")])
     drive = characteristic(k, at)
     slope, back = drive.slope[0], np.exp(scale - drive.scale)  # a chain that is cut has another scale
-    fields, theta, M = fields * back, theta * back, M * back
+    fields, theta = fields * back, theta * back
+    _, _, M, Q = fields[:, 0, -1]
     lag = 1.0 + float(k.drive.lag) * s
-    product = complex(slope * (theta[0] / lag if k.drive.turns else -M[0]))
+    product = complex(slope * (theta[0] / lag if k.drive.turns else M + float(k.radius) * Q))
     if product == 0 or not np.isfinite(product):
         raise ConvergenceError(f"the hub does not feel the mode at {s:.6g} 1/s, or it is double", s, slope)
-    values = fields[("W", "Psi", "M").index(quantity), 0]
+    values = fields[("W", "Psi", "M").index(quantity), 0, :-1]
     if quantity == "M":
         damping = [segment.damping for segment in k.at(tuple(dict.fromkeys(places))).read]
         values = values / (1.0 + s * np.array([damping[list(dict.fromkeys(places)).index(each)] for each in places]))
     unit = np.sqrt(2 * s / product * float(k.length / k.EI))
-    tip = fields[0 if isinstance(k.tip_mass, Fraction) else 1, 0, -1]
+    tip = fields[0 if isinstance(k.tip_mass, Fraction) else 1, 0, -2]
     return np.asarray((-unit if (unit * tip).real < 0 else unit) * values[:-1], dtype=complex)
 
 

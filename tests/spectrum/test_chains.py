@@ -1,0 +1,112 @@
+"""Modes of random rigs against finite elements and transition matrices (see `chains`), and what modes guarantee."""
+
+from dataclasses import replace
+
+import mpmath
+import numpy as np
+import pytest
+
+import tfarm
+from tests.rigs import some_rig
+from tests.spectrum.chains import judge, judge_damped
+from tests.test_chain_elements import lossless
+from tests.test_transition import rig
+from tests.transition import response
+from tfarm.exact.outputs import OUTPUTS
+from tfarm.exact.system import system_of
+from tfarm.reduced.residues import end_residues, undamped_residues
+
+NAMES = ("hub_angle", "root_moment", "root_shear", "tip_displacement", "tip_deflection")
+
+
+def rigs(seed, count, **kind):
+    return [some_rig(np.random.default_rng([seed, n]), **kind) for n in range(count)]
+
+
+def test_twenty_frequencies_of_random_rigs():
+    """`python -m tests.spectrum.chains 1000` for more, here and below."""
+    verdicts = [judge(arm, certify=n == 0) for n, arm in enumerate(rigs(11, 8, damped=False))]
+    assert [each.reason for each in verdicts if each.outcome != "right"] == []
+    assert max(each.distance for each in verdicts) < 1e-8
+
+
+def test_damped_modes_of_random_rigs():
+    verdicts = [judge_damped(arm, 3, certify=n == 0) for n, arm in enumerate(rigs(12, 3, damped=True, segments=2))]
+    assert [each.reason for each in verdicts if each.outcome != "right"] == []
+    assert sum(each.inside for each in verdicts) >= 6
+
+
+def test_a_prescribed_angle_has_the_modes_of_a_locked_hub():
+    """However heavy the hub that is turned: no rigid body, and none of its frequencies left out."""
+    arm = lossless(rig())
+    arm = replace(arm, motor=None, hub=replace(arm.hub, stiffness=0.0))
+    turned, locked = replace(arm, input="hub_angle"), arm.having(hub_inertia=np.inf)
+    assert tfarm.modes(turned, 6).index[0] == 1
+    assert np.array_equal(tfarm.modes(turned, 6).natural_frequency, tfarm.modes(locked, 6).natural_frequency)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_shapes_are_orthogonal_and_of_unit_mass(seed):
+    """The mass matrix is the identity, and behind a rigid clamp the root moves with the radius."""
+    arm = some_rig(np.random.default_rng([13, seed]), damped=False)
+    table = tfarm.modes(arm, 8)
+    assert table.orthogonality() < 1e-9
+    flexible = table.index > 0
+    W, Psi = table.shape(0.0)[flexible], table.rotation(0.0)[flexible]
+    if arm.clamp.is_rigid:
+        assert pytest.approx(arm.hub.radius * Psi, rel=1e-9, abs=1e-9 * abs(Psi).max()) == W
+
+
+def residue_of(arm, p, names):
+    """Residues at a simple pole next to p, from values of the oracle on both sides of it."""
+    with mpmath.workdps(40):
+        h = mpmath.mpf("1e-9") * abs(p)
+        right, left = (response(arm, mpmath.mpc(p) + sign * h, names, 40) for sign in (1, -1))
+        return np.array([complex(2 * h / (1 / right[each] - 1 / left[each])) for each in names])
+
+
+@pytest.mark.parametrize("drive", ["hub_torque", "motor_current", "hub_angle"])
+def test_residues_of_an_undamped_rig(drive):
+    arm = replace(lossless(rig()), input=drive)
+    table, wanted = tfarm.modes(arm, 5), [OUTPUTS[name] for name in NAMES]
+    found = undamped_residues(table, wanted, table.system, 0.0)
+    for n, omega in enumerate(table.natural_frequency[table.index > 0]):
+        exact = 2j * omega * residue_of(arm, 1j * omega, NAMES[drive == "hub_angle" :])
+        assert found[drive == "hub_angle" :, n] == pytest.approx(exact.real, rel=1e-9, abs=1e-12 * abs(exact).max())
+
+
+def test_shapes_are_the_residues_along_the_link():
+    """w(x) b in s^2, with b the hub's part in the mode."""
+    arm, x = lossless(rig()), 0.375
+    table = tfarm.modes(arm, 5)
+    for n in np.flatnonzero(table.index > 0):
+        p = 1j * table.natural_frequency[n]
+        W, Psi = 2 * p * residue_of(arm, p, [("displacement", x), ("rotation", x)])
+        b = table.hub_participation[n]
+        assert table.shape(x)[n] * b == pytest.approx(W.real, rel=1e-9)
+        assert table.rotation(x)[n] * b == pytest.approx(Psi.real, rel=1e-9)
+
+
+@pytest.mark.parametrize("drive", ["hub_torque", "motor_voltage", "hub_angle"])
+def test_residues_and_shapes_of_a_damped_rig(drive):
+    """Residues are c b/(2 s): w(x) b over the input, b^2 of what the input works on.
+
+    That is the hub angle, behind the motor's (R + L_a s)/(eta N Kt), and of a prescribed angle the torque, with a minus
+    sign, as W/theta = -u/F.
+    """
+    arm, x = rig(input=drive), 0.375
+    held, motor = drive == "hub_angle", arm.motor
+    damped = tfarm.damped_modes(tfarm.modes(arm, 4))
+    p = damped.eigenvalues[damped.index > 0][:, 0]
+    found, _ = end_residues(system_of(arm), [OUTPUTS[name] for name in NAMES], p)
+    shapes, turns, moments = (part(x)[:, 0] for part in (damped.shape, damped.rotation, damped.moment))
+    along = [("displacement", x), ("rotation", x), ("gauge", x), "hub_torque" if held else "hub_angle"]
+    for n, s in enumerate(p):
+        exact = residue_of(arm, s, NAMES[held:])
+        assert found[held:, n] == pytest.approx(exact, rel=1e-8, abs=1e-12 * abs(exact).max())
+        W, Psi, M, worked = residue_of(arm, s, along)
+        volts = (1 + motor.inductance / motor.resistance * s) if drive == "motor_voltage" else 1.0
+        square = 2 * s * W**2 / (-worked if held else worked) * volts * arm.input_per_torque
+        assert shapes[n] ** 2 == pytest.approx(square, rel=1e-8)
+        assert turns[n] / shapes[n] == pytest.approx(Psi / W, rel=1e-8)
+        assert moments[n] / shapes[n] == pytest.approx(M / W, rel=1e-8)
