@@ -82,15 +82,16 @@ def rate_axis(arm: Arm) -> Axis:
 
 
 def moment_axis(arm: Arm, x: Axis) -> Axis:
-    """K2 from -4 to 2, or as deep as unstable windows go."""
+    """K2 from -4 to 2, or as deep as unstable windows go, times what one N m takes of a rig's input."""
+    low, high, deepest = (each * arm.input_per_torque for each in (LOW, HIGH, DEEPEST))
     if arm.is_undamped:
-        return Axis(LOW, HIGH)
+        return Axis(low, high)
     K1 = x.grid(SCAN)
-    deep = region(arm, K1[K1 > 0], between(DEEPEST, LOW, 400))
+    deep = region(arm, K1[K1 > 0], between(deepest, low, 400))
     rows = np.nonzero(~deep.stable.all(axis=1))[0]
     if not rows.size:
-        return Axis(LOW, HIGH)
-    return Axis(max(DEEPEST, 1.4 * float(deep.K2[rows[0]])), HIGH, 2.0)
+        return Axis(low, high)
+    return Axis(max(deepest, 1.4 * float(deep.K2[rows[0]])), high, high)
 
 
 def edge(found: Region, x: Axis, y: Axis) -> Real:

@@ -13,7 +13,7 @@ from matplotlib.ticker import FuncFormatter, NullFormatter, SymmetricalLogLocato
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from tfarm.arm import Arm, HubFeedback
+from tfarm.arm import Arm, HubFeedback, unit_of, written_unit
 from tfarm.crossing import RegionPiece, pieces
 from tfarm.digits import SUPERSCRIPT, counted, plain, significant
 from tfarm.dsp import GainMap
@@ -52,7 +52,7 @@ def gain_map(found: Region, *, ax: Axes | None = None) -> Axes:
 
 def ground(found: Region, x: Axis, y: Axis, ax: Axes) -> None:
     """Both axes, and the colours of the count."""
-    _scale(x, y, ax)
+    _scale(found.arm, x, y, ax)
     ax.imshow(
         colours(seen(found, x, y).unstable), extent=(0, 1, 0, 1), transform=ax.transAxes, origin="lower", aspect="auto",
         interpolation="nearest", zorder=0.1,
@@ -69,7 +69,7 @@ def colours(unstable: NDArray[np.int64]) -> Real:
     return np.asarray(image)
 
 
-def _scale(x: Axis, y: Axis, ax: Axes) -> None:
+def _scale(arm: Arm, x: Axis, y: Axis, ax: Axes) -> None:
     for axis, setter, limits, name in (
         (x, ax.set_xscale, ax.set_xlim, ax.xaxis),
         (y, ax.set_yscale, ax.set_ylim, ax.yaxis),
@@ -81,11 +81,13 @@ def _scale(x: Axis, y: Axis, ax: Axes) -> None:
             name.set_minor_formatter(NullFormatter())
         limits(axis.low, axis.high)
     if not y.is_linear:
-        ax.set_yticks([tick for tick in K2_TICKS if y.low <= tick <= y.high])
+        unit = arm.input_per_torque
+        if unit == 1.0:
+            ax.set_yticks([tick for tick in K2_TICKS if y.low <= tick <= y.high])
     ax.grid(False)
     stretched = "" if x.is_linear or x.low >= x.linear else f"; linear up to {plain(x.linear)}, logarithmic beyond"
-    ax.set_xlabel(f"K1, gain on the hub rate [N m s/rad]{stretched}")
-    ax.set_ylabel("K2, gain on the root moment [−]")
+    ax.set_xlabel(f"K1, gain on the hub rate [{unit_of('K1', arm)}]{stretched}")
+    ax.set_ylabel(f"K2, gain on the root moment [{written_unit('K2', arm).strip() or '−'}]")
 
 
 def _tick(x: float, _: object = None) -> str:

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
+from tfarm.arm import unit_of, written_unit
 from tfarm.crossing import pieces
 from tfarm.digits import plain, scientific
 from tfarm.dsp import GainMap
@@ -62,8 +63,8 @@ def _scale(continuous: Region, ax: Axes) -> None:
     ax.set_ylim(float(K2[0]), float(K2[-1]))
     ax.grid(False)
     ax.axhline(0.0, color=GREY, lw=0.7, zorder=3.5)
-    ax.set_xlabel("K1, on the hub rate  [N m s/rad]")
-    ax.set_ylabel("K2, on the root moment  [-]")
+    ax.set_xlabel(f"K1, on the hub rate  [{unit_of('K1', continuous.arm)}]")
+    ax.set_ylabel(f"K2, on the root moment  [{written_unit('K2', continuous.arm).strip() or '-'}]")
     ax.set_title(CONVENTION, loc="right", fontsize=8.5, color=GREY)
 
 

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
+from itertools import cycle
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyArrowPatch, Polygon, Rectangle
 
-from tfarm.arm import Arm
+from tfarm.arm import Arm, Link
 from tfarm.digits import plain, unit
 
 from .style import BLUE, FAINT, GREY, INK, ORANGE, New, blank, style, window
 
 HUB = 0.055  # radius of the drawn hub, and half the payload's side, as shares of the length
+SEGMENTS = ("#cfe0ee", "#e3ecd5")  # colours of neighbours
 LOW, HIGH = -0.15, 0.16  # what is shown below and above the arm at least, as shares of its length
 LEFT, RIGHT = -0.2, 1.2
 
@@ -25,7 +27,7 @@ def sketch(arm: Arm, *, ax: Axes | None = None) -> Axes:
             return draw_arm(arm, window).axes[0]
         ax.set_aspect("equal")
         ax.set_axis_off()
-        ax.set_xlim(LEFT, RIGHT)
+        ax.set_xlim(LEFT, right_of(arm))
         ax.set_ylim(*heights(arm))
         _link(arm, ax)
         _hub(arm, ax)
@@ -37,9 +39,14 @@ def draw_arm(arm: Arm, new: New = blank) -> Figure:
     """The arm on a figure of its own, as high as it takes."""
     low, high = heights(arm)
     with style():
-        figure = new(9.0, 0.2 + 9.0 * (high - low) / (RIGHT - LEFT))
+        figure = new(9.0, 0.2 + 9.0 * (high - low) / (right_of(arm) - LEFT))
         sketch(arm, ax=figure.subplots())
     return figure
+
+
+def right_of(arm: Arm) -> float:
+    """Where the picture ends, in lengths of the link: so far beyond the tip, or beyond a payload's centre."""
+    return RIGHT + arm.hub.radius / arm.length + max(0.0, arm.payload.offset) / arm.length
 
 
 def heights(arm: Arm) -> tuple[float, float]:
@@ -49,20 +56,44 @@ def heights(arm: Arm) -> tuple[float, float]:
 
 
 def depth_of(arm: Arm) -> float:
-    """Depth over length of a rectangle of the link's radius of gyration, sqrt(12) r/L; a named shape's own."""
-    given = dict(arm.link.section.dimensions)
+    """Depth over length of a rectangle of the radius of gyration, sqrt(12) r/L; a named shape's own: the deepest."""
+    return max(_depth(link) for link in arm.links) / arm.length
+
+
+def _depth(link: Link) -> float:
+    """The depth [m] of one segment."""
+    given = dict(link.section.dimensions)
     own = given.get("depth") or given.get("diameter") or given.get("outer_diameter")
-    return own / arm.length if own else math.sqrt(12) / arm.link.slenderness
+    return own if own else math.sqrt(12) / link.slenderness * link.length
 
 
 def _link(arm: Arm, ax: Axes) -> None:
     depth = depth_of(arm)
-    ax.plot([-0.2, 1.2], [0, 0], color=FAINT, lw=0.8, ls=(0, (6, 3, 1, 3)), zorder=0)
-    ax.add_patch(Rectangle((0, -depth / 2), 1.0, depth, fc="#cfe0ee", ec=BLUE, lw=1.0, zorder=2))
+    ax.plot([-0.2, right_of(arm)], [0, 0], color=FAINT, lw=0.8, ls=(0, (6, 3, 1, 3)), zorder=0)
+    root = start = arm.hub.radius / arm.length
+    for link, colour in zip(arm.links, cycle(SEGMENTS), strict=False):
+        share, high = (link.length / arm.length if arm.outer else 1.0), _depth(link) / arm.length
+        ax.add_patch(Rectangle((start, -high / 2), share, high, fc=colour, ec=BLUE, lw=1.0, zorder=2))
+        start += share
+    if root:
+        ax.plot([0, root], [0, 0], color=INK, lw=4.0, solid_capstyle="butt", zorder=1.5)
+    if not arm.clamp.is_rigid:
+        ax.plot([root], [0], "o", ms=7.0, mfc="white", mec=ORANGE, mew=1.4, zorder=5)
+    for each in arm.attachments:
+        ax.plot([root + each.x / arm.length], [0], "o", ms=5.0, color=INK, zorder=5)
     below = -max(depth / 2, HUB) - 0.035
-    ax.annotate("", (0, below), (1, below), arrowprops={"arrowstyle": "<->", "color": GREY, "lw": 0.8})
-    text = f"L = {plain(arm.length, 6)} m,  depth {plain(depth * arm.length, 4)} m (to scale)"
-    ax.text(0.5, below - 0.012, text, ha="center", va="top", fontsize=9.0, color=INK)
+    ax.annotate("", (root, below), (root + 1, below), arrowprops={"arrowstyle": "<->", "color": GREY, "lw": 0.8})
+    text = f"L = {plain(arm.length, 6)} m,  {_depths(arm)} (to scale)"
+    if root:
+        text += f",  r = {plain(arm.hub.radius, 6)} m"
+    ax.text(root + 0.5, below - 0.012, text, ha="center", va="top", fontsize=9.0, color=INK)
+
+
+def _depths(arm: Arm) -> str:
+    """The depth of the link, or how many segments it has."""
+    if not arm.outer:
+        return f"depth {plain(depth_of(arm) * arm.length, 4)} m"
+    return f"{len(arm.links)} segments, at most {plain(depth_of(arm) * arm.length, 4)} m deep"
 
 
 def _hub(arm: Arm, ax: Axes) -> None:
@@ -94,9 +125,15 @@ def _payload(arm: Arm, ax: Axes) -> None:
         )
         text = "payload  " + ",  ".join(words)
         side = max(0.03, min(HUB, depth_of(arm) * 0.75))
-        ax.add_patch(Rectangle((1 - side, -side), 2 * side, 2 * side, fc="#8c8c8c", ec=INK, lw=1.0, zorder=3))
+        tip = 1 + arm.hub.radius / arm.length
+        at = tip + arm.payload.offset / arm.length
+        if at != tip:
+            text += f",  e = {plain(arm.payload.offset, 6)} m"
+            ax.plot([tip, at], [0, 0], color=INK, lw=2.0, zorder=2.5)
+        ax.add_patch(Rectangle((at - side, -side), 2 * side, 2 * side, fc="#8c8c8c", ec=INK, lw=1.0, zorder=3))
     if math.isinf(mass):
-        foot = ((1, 0), (0.97, -0.07), (1.03, -0.07))
+        at = 1 + (arm.hub.radius + arm.payload.offset) / arm.length
+        foot = ((at, 0), (at - 0.03, -0.07), (at + 0.03, -0.07))
         ax.add_patch(Polygon(foot, closed=True, fc="white", ec=INK, lw=1.0, zorder=4))
     top = max(0.12, depth_of(arm) / 2 + 0.03)
-    ax.text(1.05, top, text, ha="right", va="bottom", fontsize=9.0, color=INK)
+    ax.text(right_of(arm) - 0.15, top, text, ha="right", va="bottom", fontsize=9.0, color=INK)

@@ -6,15 +6,30 @@ import math
 from collections.abc import Iterator
 
 import tfarm
-from tfarm.arm import Arm, implausible
+from tfarm.arm import Arm, implausible, through
 from tfarm.columns import Column, Table
 from tfarm.digits import plain, significant, singly, unit
 from tfarm.plots.sketch import draw_arm
+from tfarm.report.rig_tables import Row, derived_rows, given_rows
 from tfarm.report.sections import Fact, Picture, Section
 
 FIRST = 3  # natural frequencies among the headline numbers
 MOST_POISSON = 0.5  # of an isotropic material; a larger E/2G - 1 is none's ratio
-Row = tuple[str, str, float, str]  # quantity, symbol, value, unit
+BELOW_CUTOFF = "Below the shear cut-off one pair of the beam's waves decays along it, above it both pairs travel."
+RIG_GIVEN = (
+    "What the rig's file says, in SI units, from the hub outwards; parts that are not listed are not there: a clamp or "
+    "joint is rigid then, the radius 0, the payload's centre at the tip."
+)
+PARTS = (
+    " So are the radius from the axis to the clamp and the payload's centre beyond the tip; dots are attachments, a "
+    "ring is a clamp that yields."
+)
+THEORIES = {
+    "timoshenko": "Timoshenko's, with shear and rotary inertia",
+    "shear": "the shear theory, without rotary inertia",
+    "rayleigh": "Rayleigh's, without shear",
+    "euler-bernoulli": "Euler and Bernoulli's, without shear and rotary inertia",
+}
 
 
 def arm_section(arm: Arm) -> Section:
@@ -25,10 +40,18 @@ def arm_section(arm: Arm) -> Section:
         anchor="arm",
         title="The arm",
         facts=headline_numbers(arm),
-        words=words + ["This arm states no assumptions."] * (not arm.assumptions),
+        words=words + _rig_words(arm) + ["This arm states no assumptions."] * (not arm.assumptions),
         items=arm.assumptions,
         blocks=(_picture(arm), given_table(arm), derived_table(arm)),
     )
+
+
+def _rig_words(arm: Arm) -> list[str]:
+    """Of a rig: by which theory, and through what its loops close."""
+    if arm.is_uniform:
+        return []
+    driven = "It is led through the hub's angle" if arm.is_locked else f"Its input is {through(arm)}"
+    return [f"The theory of its link is {THEORIES[arm.theory]}. {driven}; all loops on this page close through that."]
 
 
 def headline_numbers(arm: Arm) -> tuple[Fact, ...]:
@@ -50,12 +73,13 @@ def headline_numbers(arm: Arm) -> tuple[Fact, ...]:
 def _other_numbers(arm: Arm) -> Iterator[Fact]:
     cutoff, C = arm.shear_cutoff, arm.damping
     how = "" if arm.has_rigid_mode else "the arm cannot turn as a rigid body"
-    mass = arm.link.rhoA * arm.length
+    mass, link = arm.own_mass, arm.link
+    slenderness = link.slenderness if arm.is_uniform else arm.length / link.section.radius_of_gyration
     yield Fact(label="total inertia J about the hub", value=significant(arm.total_inertia, 8), unit="kg m²", beside=how)
     yield Fact(
         label="slenderness L/√(I/A)",
-        value=significant(arm.link.slenderness, 5),
-        beside=f"depth/length {significant(math.sqrt(12) / arm.link.slenderness, 3)} as a rectangle",
+        value=significant(slenderness, 5),
+        beside=f"depth/length {significant(math.sqrt(12) / slenderness, 3)} as a rectangle",
     )
     yield Fact(
         label="shear cut-off √(κGA/ρI)",
@@ -64,7 +88,8 @@ def _other_numbers(arm: Arm) -> Iterator[Fact]:
         beside=f"{significant(cutoff / (2 * math.pi), 6)} Hz",
     )
     yield Fact(label="mass of the link", value=significant(mass, 5), unit="kg")
-    yield Fact(label="damping C", value=plain(C), unit="s", beside="" if C else "none: resonances are infinite")
+    lossless = "none: resonances are infinite" if arm.is_undamped else "none in the link: hub, clamp or joint lose"
+    yield Fact(label="damping C", value=plain(C), unit="s", beside="" if C else lossless)
 
 
 def _picture(arm: Arm) -> Picture:
@@ -75,7 +100,7 @@ def _picture(arm: Arm) -> Picture:
         stem="arm",
         title="The arm, its link to scale",
         caption=f"{_drive(arm)} Hub and payload are symbols; the link's length and depth are to scale, which shows at "
-        "a glance whether shear can matter.",
+        f"a glance whether shear can matter.{PARTS * (not arm.is_uniform)}",
         alt=f"Side view of the arm: hub at the left, a link {plain(arm.length, 6)} m long, {tip} at the tip.",
         figure=draw_arm(arm),
     )
@@ -85,6 +110,8 @@ def _drive(arm: Arm) -> str:
     """What moves the arm."""
     if arm.is_locked:
         return "The hub is locked: no torque turns it; it is led through the angle θ (positive anticlockwise)."
+    if arm.input_per_torque != 1.0:
+        return f"The hub turns the link through its motor; the input u is {through(arm)}."
     if arm.has_massless_hub:
         return "The torque u (positive anticlockwise) acts on the root of the link itself: the pin has no inertia."
     return "The hub turns the link by the torque u (positive anticlockwise)."
@@ -92,6 +119,8 @@ def _drive(arm: Arm) -> str:
 
 def given_table(arm: Arm) -> Table:
     """The arm's file as a table."""
+    if not arm.is_uniform:
+        return _table("parameters", "Parameters", RIG_GIVEN, given_rows(arm))
     link, section = arm.link, arm.link.section
     kappa = "shear factor, given" if section.shear_factor is not None else "shear factor, Cowper (1966)"
     rows: list[Row] = [
@@ -119,6 +148,8 @@ def given_table(arm: Arm) -> Table:
 
 def derived_table(arm: Arm) -> Table:
     """What follows from the parameters alone."""
+    if not arm.is_uniform:
+        return _table("derived", "What follows from them", BELOW_CUTOFF, derived_rows(arm), digits=8)
     link, J = arm.link, arm.total_inertia
     ratio = ("Poisson's ratio of an isotropic material", "E/2G − 1", link.poissons_ratio, "")
     isotropic = [ratio] if -1 < link.poissons_ratio <= MOST_POISSON else []
@@ -138,7 +169,7 @@ def derived_table(arm: Arm) -> Table:
     return _table(
         "derived",
         "What follows from them",
-        "Below the shear cut-off one pair of the beam's waves decays along it, above it both pairs travel.",
+        BELOW_CUTOFF,
         rows,
         digits=8,
     )

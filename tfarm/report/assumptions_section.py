@@ -37,6 +37,10 @@ HUB_WORDS = (
     "{own} kg m^2, it is {here} rad/s, and one per cent more inertia changes it by {slope} %. No hub, however light or "
     "heavy, takes it outside {locked} to {pinned} rad/s."
 )
+OF_ONE_BEAM = (
+    "What another section or another hub inertia would do is studied for an arm of one segment on a hub and no more; "
+    "this is a rig, each of whose parts has assumptions of its own. To see what one does, change it in the file."
+)
 NO_HUB = "The hub of this arm is {what}, so there is no inertia to choose."
 SECTION_TABLE = (
     "The shaded row is this arm. Sensitivity: per cent of natural frequency for one per cent more of I, with the area, "
@@ -52,6 +56,8 @@ SEARCHED = " *: no limit was found up to there; the search ends."
 
 def assumptions_section(arm: Arm) -> Section:
     """Frequencies over depth and over hub inertia, with sensitivities, each as a picture and as a table."""
+    if not arm.is_uniform:
+        return Section(anchor="assumptions", title="What the assumptions do", words=(OF_ONE_BEAM,))
     section = section_study(arm)
     words = [_opening(arm), _section_words(section)]
     blocks: list[Picture | Table] = [section_picture(section), section_table(section)]

@@ -39,6 +39,9 @@ def bode_section(arm: Arm, output: str) -> Section:
     return Section(anchor=anchor, title=title, blocks=(picture, roots_table(data, f"{anchor}-roots")))
 
 
+ROUNDED = 1e-13  # of |s|: what rounding leaves of Re s where a zero of an elastic link lies on the axis
+
+
 def what_is_seen(data: Bode) -> str:
     """The picture in words."""
     low, high = (plain(w, 5) for w in data.band)
@@ -109,7 +112,8 @@ def roots_table(data: Bode, stem: str) -> Table:
     roots = np.r_[data.poles, data.zeros]
     kinds = ["pole"] * data.poles.size + ["zero"] * data.zeros.size
     gains = np.r_[data.peaks, data.dips]
-    real, hertz = roots.real + 0.0, roots.imag / (2 * math.pi)
+    exact = data.arm.has_elastic_link & (abs(roots.real) < ROUNDED * abs(roots)) & (np.array(kinds) == "zero")
+    real, hertz = np.where(exact, 0.0, roots.real + 0.0), roots.imag / (2 * math.pi)
     ratio = -100 * real / abs(roots) + 0.0
     return Table(
         stem=stem,

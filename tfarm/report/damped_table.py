@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tfarm.columns import Column, Table
-from tfarm.digits import plain
+from tfarm.digits import plain, significant
 from tfarm.spectrum import Modes, damped_modes
 from tfarm.spectrum.answers import DAMPED_MODES
 
@@ -16,6 +16,13 @@ DAMPED = (
     "arithmetic counts those in this box. {outside}Beyond any such box there are more: shear is undamped in this "
     "model, so lightly damped modes exist at ever higher frequency, and the slow real eigenvalues of overdamped "
     "bending modes accumulate at −1/C = {limit} 1/s."
+)
+NO_C = (
+    "Eigenvalues of the rig with what its hub, clamp and joint lose (C = {C} in the link), each continued from the "
+    "undamped mode of its number. Each is enclosed in a disc of 12 digits that holds exactly one. All {count} "
+    "eigenvalues with {left} < Re s < {right} 1/s and |Im s| < {top} rad/s are listed (conjugates counted{rigid}): the "
+    "argument principle in ball arithmetic counts those in this box. {outside}Beyond any such box there are more, at "
+    "ever higher frequency."
 )
 LEFT_OUT = "Modes above {last} are not listed: their branches cannot be told apart. "
 OUTSIDE = (
@@ -32,15 +39,20 @@ def damped_table(modes: Modes) -> Table:
     damped = damped_modes(modes)
     damped.certify(12)
     C, box = modes.arm.damping, damped.box
-    edges = {"left": box.re_min, "right": box.re_max, "top": box.im_max, "limit": -1 / C}
+    edges = {"left": box.re_min, "right": box.re_max, "top": box.im_max, "limit": -1 / C if C else 0.0}
+    resisted = damped.single.size - len(damped.others)
     rigid = ", with 0 twice" if modes.arm.has_rigid_mode else ""
+    if modes.arm.has_rigid_mode and resisted:
+        rigid = f", with 0 and the {significant(damped.single[0], 6)} 1/s to which friction resists the turning rig"
+    for each in damped.others:
+        rigid += f"; {significant(each, 6)} 1/s, of the motor's circuit, is one of no mode"
     words = {name: plain(round(x)) if abs(x) >= 100 else plain(x, 3) for name, x in edges.items()}
     inside = np.all(box.holds(damped.eigenvalues), axis=1)
     left_out = LEFT_OUT.format(last=damped.index[-1]) if damped.left_out else ""
     return Table(
         stem="damped-modes",
         title="Damped modes",
-        caption=DAMPED.format(
+        caption=(DAMPED if C else NO_C).format(
             C=plain(C), count=damped.count, rigid=rigid, outside=("" if inside.all() else OUTSIDE) + left_out, **words
         ),
         columns=(*DAMPED_MODES, Column("complete", "list complete", of=[PLACES[bool(each)] for each in inside])),

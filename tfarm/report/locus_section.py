@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tfarm.arm import Arm, HubFeedback
+from tfarm.arm import Arm, HubFeedback, unit_of, written_unit
 from tfarm.columns import Column, Table
 from tfarm.digits import counted, listed, plain, scientific, significant, singly
 from tfarm.errors import ConvergenceError
@@ -47,14 +47,23 @@ CUT = " Beyond {name} = {end} the branches come too near to each other, or to �
 ENDED = (
     " A branch ends at {name} = {gain}: there its pole comes to −1/C, where real poles accumulate, or cannot be told."
 )
+NO_LAG = (
+    "The loci on this page leave out the inductance of the motor, whose pole near −R/L_a = −{corner} 1/s lies on no "
+    "branch of the arm; every other section has it."
+)
 RATES = (0.0, 0.05, 0.2, 0.5, 1.0, 2.0)  # times J w1: values of K1 whose exact poles are listed where no locus is
 
 
 def locus_section(arm: Arm) -> Section:
     """Where the poles go as each gain grows, and what K2 = 1 and beyond does."""
-    held = default_gains(arm)
     words, blocks = [], list[Picture | Table]()
-    ranges = {"K1": (0.0, 2.0 * rate_unit(arm)), "K2": RANGE_OF_K2}
+    if arm.motor is not None and arm.input_lags:
+        corner = significant(arm.motor.resistance / arm.motor.inductance, 4)
+        arm = replace(arm, motor=replace(arm.motor, inductance=0.0))
+        words.append(NO_LAG.format(corner=corner))
+    held = default_gains(arm)
+    low, high = (share * arm.input_per_torque for share in RANGE_OF_K2)
+    ranges = {"K1": (0.0, 2.0 * rate_unit(arm)), "K2": (low, high)}
     for name, (start, stop) in ranges.items() if has_loop(arm) else [("K1", ranges["K1"])]:
         try:
             data = loci(arm, held, name, start, stop)
@@ -86,14 +95,15 @@ def _more_K1(data: Loci) -> str:
     rows = rows[~np.isnan(rows).any(axis=1)]
     if not rows.size:
         return f"More K1, with K2 = {plain(exact.law.K2)} held"
+    unit = written_unit("K1", exact.arm)
     ratio = np.where(rows[0].imag > 0, -rows[0].real / np.maximum(abs(rows[0]), 1e-300), -np.inf)
     at = int(np.argmax(ratio))
     best_ratio, gain = significant(100 * float(ratio[at]), 3), significant(float(exact.gain[at]), 3)
     start = f"More K1 (K2 = {plain(exact.law.K2)} held)"
     if not (rows[0].imag[at:] > 0).all():
-        return f"{start} damps the first mode until it no longer swings, a little above K1 = {gain} N m s/rad"
+        return f"{start} damps the first mode until it no longer swings, a little above K1 = {gain}{unit}"
     then = ", and less from there on: the hub is then held too firmly to take energy out" if at < ratio.size - 1 else ""
-    return f"{start} damps the first mode up to {best_ratio} % of critical at K1 = {gain} N m s/rad{then}"
+    return f"{start} damps the first mode up to {best_ratio} % of critical at K1 = {gain}{unit}{then}"
 
 
 def _more_K2(data: Loci) -> str:
@@ -127,13 +137,16 @@ def _locus_picture(data: Loci) -> Picture:
 
 def beyond_table(arm: Arm, held: HubFeedback) -> Table:
     """Verdict and poles of the exact loop for a few K2 around 1 and beyond."""
-    edge = edge_of_K2(arm, held) or 0.0
-    more = [float(f"{share * edge:.3g}") for share in AROUND_EDGE if edge > BEYOND[-1]]
-    gains = np.array([*BEYOND, *(K2 for K2 in more if BEYOND[-1] < K2)])
+    edge, unit = edge_of_K2(arm, held) or 0.0, arm.input_per_torque
+    more = [float(f"{share * edge:.3g}") for share in AROUND_EDGE if edge > BEYOND[-1] * unit]
+    gains = np.array([*(K2 * unit for K2 in BEYOND), *(K2 for K2 in more if BEYOND[-1] * unit < K2)])
     on_edge = np.isclose(gains, edge, rtol=1e-9, atol=0.0) & (not arm.is_undamped)  # no list of poles ends there
     found = [None if on else _judged(arm, replace(held, K2=float(K2))) for K2, on in zip(gains, on_edge, strict=True)]
-    title = "What K2 = 1 and beyond does, at K1 = " + plain(held.K1, 4)
-    return _poles_table("beyond", title, _beyond_caption(arm, held, found), "K2", "", gains, found)
+    one = f"K2 = {plain(unit, 4)}{written_unit('K2', arm)}"
+    title = f"What {one} and beyond does, at K1 = " + plain(held.K1, 4)
+    return _poles_table(
+        "beyond", title, _beyond_caption(arm, held, found), "K2", written_unit("K2", arm).strip(), gains, found
+    )
 
 
 def rates_table(arm: Arm, held: HubFeedback) -> Table:
@@ -142,7 +155,7 @@ def rates_table(arm: Arm, held: HubFeedback) -> Table:
     found = [_judged(arm, replace(held, K1=float(gain))) for gain in K1]
     title = "Poles at a few K1, at K2 = " + plain(held.K2, 4)
     caption = "Exact poles, each list complete in its box."
-    return _poles_table("rates", title, caption, "K1", "N m s/rad", K1, found)
+    return _poles_table("rates", title, caption, "K1", unit_of("K1", arm), K1, found)
 
 
 def _poles_table(
@@ -197,8 +210,8 @@ def _first_pairs(it: Stability | None) -> str:
 
 def _beyond_caption(arm: Arm, held: HubFeedback, found: Sequence[Stability | None]) -> str:
     J, hub = arm.total_inertia, arm.hub.inertia
-    backwards = BACKWARDS.format(K2=significant(J / (J - hub), 5)) if arm.has_rigid_mode else ""
-    if not arm.damping:
+    backwards = BACKWARDS.format(K2=significant(J / (J - hub), 5)) if arm.has_rigid_mode and arm.is_uniform else ""
+    if arm.is_uniform and not arm.damping:
         return UNDAMPED + backwards
     counts = [it.unstable_roots for it in found if it is not None and it.unstable_roots]
     more = MORE if len(counts) > 1 and counts[-1] > counts[0] and counts == sorted(counts) else ""

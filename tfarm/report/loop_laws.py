@@ -6,7 +6,8 @@ import math
 from dataclasses import dataclass
 from functools import lru_cache
 
-from tfarm.arm import Arm, HubFeedback
+from tfarm.arm import Arm, HubFeedback, through
+from tfarm.digits import significant
 from tfarm.dsp import Chain
 from tfarm.dsp.brief import SampledBrief, sampled_brief
 from tfarm.errors import ConvergenceError
@@ -43,7 +44,7 @@ class NamedLaw:
 
 def has_loop(arm: Arm) -> bool:
     """Whether both gains can be closed: the hub can turn, and has inertia."""
-    return not arm.is_locked and arm.hub.inertia > 0
+    return not (arm.is_locked or arm.has_massless_hub)
 
 
 def has_rate_loop(arm: Arm) -> bool:
@@ -62,7 +63,11 @@ def why_no_loop(arm: Arm) -> str:
 
 def sign_words(arm: Arm) -> str:
     """The law, and the sign of its K2."""
-    return SIGN.format(rest=AT_REST if arm.has_rigid_mode else HELD)
+    if arm.is_uniform:
+        return SIGN.format(rest=AT_REST if arm.has_rigid_mode else HELD)
+    share = significant(arm.gauged_inertia / arm.total_inertia, 5) if arm.has_rigid_mode else ""
+    rest = f"a static torque at the hub gives −{share} times as much" if share else HELD
+    return f"Here u is {through(arm)}. {SIGN.format(rest=rest)}"
 
 
 def edge_of_K2(arm: Arm, law: HubFeedback) -> float | None:

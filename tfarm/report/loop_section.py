@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from tfarm.arm import Arm
+from tfarm.arm import Arm, unit_of, written_unit
 from tfarm.digits import counted, plain, significant
 from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError
+from tfarm.loop.edges import DEEPEST
 from tfarm.loop.nyquist import Nyquist, nyquist, nyquist_of
 from tfarm.loop.windows import Windows
 from tfarm.plots.disc import draw_nyquist
@@ -37,7 +38,7 @@ BEYOND_EDGE = 1.2  # and at least so many times the K2 at which the loop loses i
 MAP_SEEN = (
     "Green: every pole is in the left half-plane{apart}; orange: the number of unstable poles. The black edge and the "
     "counts are exact, of the arm itself and no reduced model{reach}. Blue: damping ratio of the least damped pole "
-    "below {band} rad/s. {proof} K1 is scaled by J ω₁ = {unit} N m s/rad{held}."
+    "below {band} rad/s. {proof} K1 is scaled by J ω₁ = {unit}{held}."
 )
 APART, HELD = ", that of the hub angle at 0 apart", ", with J the inertia of what turns: hub, link and finite payload"
 ALL_MODES, UP_TO = ", with all its infinitely many modes", ", with every crossing up to {band} rad/s"
@@ -46,12 +47,13 @@ NO_PROOF = (
     "The dashed frame is what the Lyapunov argument proves for an arm without damping; it is not a proof here, because "
     "the gauge does not feel C. At C > 0 it proves K2 = 0 alone (solid line). The true edge is the black line."
 )
+OF_NO_RIG = "No Lyapunov proof is claimed of a rig with losses; the edge is computed."
 SAMPLED = (
     " Hatched: what is stable when the loop is sampled every {clock}, its edge exact for the first {modes} modes; with "
     "that clock no gains outside the hatching hold, whatever the continuous loop promises."
 )
 NOT_SAMPLED = " Where the loop is stable when it is sampled every {clock} could not be settled and is not drawn."
-DEPTH = " For this map unstable windows below K2 = −50 were not looked for."
+DEPTH = " For this map unstable windows below K2 = {deepest} were not looked for."
 NYQUIST_WORDS = (
     "Every size of L(iω) from 0 to infinity is in the picture: a size r is drawn as r/(1 + r), so nothing is cut off, "
     "and infinity is the outer rim. The loop is stable when the curve does not turn around −1. {poles}"
@@ -106,7 +108,8 @@ def _answer(arm: Arm) -> str:
     if K1.around is None or K2.around is None:
         return f"{start}; the picture shows which gains are stable."
     again = f" K2 has {len(K2.all)} separate stable windows at that K1, listed below." if len(K2.all) > 1 else ""
-    return f"{start}: at that K1, K2 may {_room(K2, '')}; at that K2, K1 may {_room(K1, ' N m s/rad')}.{again}"
+    more_K2, more_K1 = (_room(windows, written_unit(name, arm)) for name, windows in (("K2", K2), ("K1", K1)))
+    return f"{start}: at that K1, K2 may {more_K2}; at that K2, K1 may {more_K1}.{again}"
 
 
 def _room(windows: Windows, unit: str) -> str:
@@ -147,15 +150,16 @@ def _best_words(data: GainMap) -> str:
     edge = f" That is no optimum: the dotted frame cuts the search off at {cut}, and there is more beyond." * bool(cut)
     return (
         f"The best damping of the first {MODES} modes within the dotted frame is {significant(100 * found.value, 3)} % "
-        f"of critical, at K1 = {significant(found.law.K1, 4)} N m s/rad and K2 = {significant(found.law.K2, 4)} "
+        f"of critical, at K1 = {significant(found.law.K1, 4)}{written_unit('K1', data.arm)} and "
+        f"K2 = {significant(found.law.K2, 4)}{written_unit('K2', data.arm)} "
         f"(tfarm design), a continuous loop that is {found.verdict.verdict}.{edge}"
         f" {sampled}."
     )
 
 
 def _map_caption(data: GainMap) -> str:
-    proof = PROOF if data.is_undamped else NO_PROOF
-    unit = plain(rate_unit(data.arm), 4)
+    proof = PROOF if data.is_undamped else NO_PROOF if data.arm.is_uniform else OF_NO_RIG
+    unit = f"{plain(rate_unit(data.arm), 4)} {unit_of('K1', data.arm)}"
     reach = ALL_MODES if data.is_undamped else UP_TO.format(band=significant(data.region.band, 5))
     free = data.arm.has_rigid_mode
     seen = MAP_SEEN.format(
@@ -164,7 +168,11 @@ def _map_caption(data: GainMap) -> str:
     sampled = NOT_SAMPLED if data.sampled is None else SAMPLED
     clock = f"{plain(1e3 * data.chain.sampling.period)} ms"
     modes = 0 if data.sampled is None else data.sampled.modes_used
-    return seen + sampled.format(clock=clock, modes=modes) + DEPTH * (not data.is_undamped)
+    return (
+        seen
+        + sampled.format(clock=clock, modes=modes)
+        + DEPTH.format(deepest=plain(DEEPEST * data.arm.input_per_torque, 4)) * (not data.is_undamped)
+    )
 
 
 # ------------------------------------------------------------ margins
@@ -214,9 +222,11 @@ def _to_compare(arm: Arm) -> list[Curve]:
     K1 is small there: without inertia at the hub a large K1 < 0 drives poles unstable at any frequency.
     """
     law = default_gains(arm)
-    beyond = float(f"{BEYOND_EDGE * (edge_of_K2(arm, law) or 1.0):.3g}")
+    beyond = float(f"{BEYOND_EDGE * (edge_of_K2(arm, law) or arm.input_per_torque):.3g}")
     drives = (
-        replace(law, K2=max(UNSTABLE_K2, beyond)) if has_loop(arm) else replace(law, K1=float(f"{-law.K1 / 10:.3g}"))
+        replace(law, K2=max(UNSTABLE_K2 * arm.input_per_torque, beyond))
+        if has_loop(arm)
+        else replace(law, K1=float(f"{-law.K1 / 10:.3g}"))
     )
     try:
         return [Curve(NamedLaw(COMPARED, "unstable", drives), nyquist(arm, drives))]

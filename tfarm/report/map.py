@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, HubFeedback, many_laws
+from tfarm.arm import Arm, HubFeedback, many_laws, unit_of, written_unit
 from tfarm.columns import Column, Table
 from tfarm.dsp import Chain, sampled_verdict
 from tfarm.dsp import GainMap as SampledMap
@@ -119,7 +119,8 @@ def draw_map(data: GainMap) -> Figure:
         plane.contours(data.K1, data.K2, np.where(data.counts == 0, data.damping, np.nan), ax)
         plane.boundary(found, data.edge, x, y, ax)
         plane.sampled_region(data.sampled, ax)
-        plane.lyapunov(data.arm, x, y, ax)
+        if data.arm.is_uniform:
+            plane.lyapunov(data.arm, x, y, ax)
         plane.count_labels(found, x, y, ax)
         for law, brief in zip(data.laws, data.briefs, strict=True):
             plane.law_mark(law.law, MARKERS[law.key], f"{law.name}: {law.gains};\n{brief.short}", ax)
@@ -141,13 +142,18 @@ def map_data(data: GainMap) -> Table:
     what = ["grid"] * K1.size + ["boundary"] * len(edge) + ["sampled boundary"] * len(sampled)
     columns = (
         Column("what", "what", of=what),
-        Column("K1_N_m_s_rad", "K1", "N m s/rad", of=np.r_[K1, edge[:, 0], sampled[:, 0]]),
-        Column("K2", "K2", of=np.r_[K2, edge[:, 1], sampled[:, 1]]),
+        Column(_key_of_K1(data.arm), "K1", unit_of("K1", data.arm), of=np.r_[K1, edge[:, 0], sampled[:, 0]]),
+        Column("K2", "K2", written_unit("K2", data.arm).strip(), of=np.r_[K2, edge[:, 1], sampled[:, 1]]),
         Column("unstable_poles", "unstable poles", of=counts + none * beyond),
         Column("least_damping_ratio", "least damping ratio", of=[*data.damping.ravel().tolist(), *none * beyond]),
         Column("omega_rad_s", "frequency", "rad/s", of=none * K1.size + edge[:, 2].tolist() + none * len(sampled)),
     )  # fmt: skip
     return Table(stem="map-data", title="The map of K1 and K2", is_data=True, columns=columns)
+
+
+def _key_of_K1(arm: Arm) -> str:
+    """K1 with its unit, as a key."""
+    return "K1_" + unit_of("K1", arm).replace(" ", "_").replace("/", "_")
 
 
 def _sampled_ends(data: GainMap) -> Real:

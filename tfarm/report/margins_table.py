@@ -131,7 +131,7 @@ def window_table(laws: Sequence[NamedLaw], found: Sequence[Margins], sign: str) 
         (law.name, each.stability.verdict, row)
         for law, each in zip(laws, found, strict=True)
         for row in gain_rows(each)
-        if row.gain != "K2" or each.stability.loop.arm.hub.inertia > 0
+        if row.gain != "K2" or not each.stability.loop.arm.has_massless_hub
     ]
     names, verdicts, gains = zip(*rows, strict=True)
     return Table(

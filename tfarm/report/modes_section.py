@@ -15,6 +15,7 @@ from tfarm.digits import fixed, lined, listed, significant
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.plots.shapes import Shape, draw_differences, draw_shapes, shapes_of, theory_name
 from tfarm.report.damped_table import damped_table
+from tfarm.report.locked_table import locked_table, locked_words
 from tfarm.report.sections import Picture, Section
 from tfarm.report.trust_proofs import how_proven
 from tfarm.response.frequency import Real
@@ -60,31 +61,38 @@ SENSITIVITIES = (
 )
 
 
+NO_SENSITIVITIES = (
+    "The table of sensitivities is left out: it varies one segment's material and section, and a rig has a number of "
+    "its own for every part. Change the part in the file and run tfarm modes again."
+)
+
+
 def modes_section(arm: Arm) -> Section:
     """Everything about free vibration: at C = 0, and the eigenvalues at the arm's own C."""
     modes = tfarm.modes(arm, count=MODES)
-    exact = _flexible(modes)
+    exact = _flexible(modes if modes.theory == "timoshenko" else tfarm.modes(arm, count=MODES, theory="timoshenko"))
     theories: dict[str, Real] = {t: _flexible(tfarm.modes(arm, count=MODES, theory=t)) for t in SIMPLER}
     differences: dict[str, Real] = {theory: 100 * (simpler / exact - 1) for theory, simpler in theories.items()}
     damped, missing = _damped(modes)
     return Section(
         anchor="modes",
         title="Modes",
-        words=(COMPLETE, *missing),
+        words=(COMPLETE, *missing, *([] if arm.is_uniform else [*locked_words(arm), NO_SENSITIVITIES])),
         blocks=(
             modal_table(modes),
+            *([] if arm.is_uniform else [locked_table(modes)]),
             *damped,
             _shapes(arm.name, shapes_of(modes, SHAPES)),
             theories_table(exact, theories, differences),
             _differences(arm.name, differences),
-            sensitivity_table(modes),
+            *([sensitivity_table(modes)] if arm.is_uniform else []),
         ),
     )
 
 
 def _damped(modes: Modes) -> tuple[tuple[Table, ...], tuple[str, ...]]:
     """The table of the damped modes, none at C = 0; or in its place a sentence why there is none."""
-    if not modes.arm.damping:
+    if modes.arm.is_undamped:
         return (), ()
     try:
         return (damped_table(modes),), ()

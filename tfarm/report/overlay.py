@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import Arm, HubFeedback
+from tfarm.arm import Arm, HubFeedback, unit_of
 from tfarm.columns import Column, Table
 from tfarm.digits import plain
 from tfarm.dsp import GainMap, gain_map, sampled_verdict
@@ -80,6 +80,6 @@ def overlay_table(data: Overlay, stem: str) -> Table:
         Column(key, key, of=[tuple(float(end) for window in column for end in window) for column in intervals])
         for key, intervals in each.items()
     ]
-    K1 = Column("K1", "K1", "N m s/rad", of=data.continuous.K1)
+    K1 = Column("K1", "K1", unit_of("K1", data.continuous.arm), of=data.continuous.K1)
     title = "Stable intervals of K2, continuous and sampled"
     return Table(stem=stem, title=title, is_data=True, columns=(K1, *columns))

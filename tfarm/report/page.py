@@ -111,8 +111,11 @@ def summary(arm: Arm) -> str:
     hub = "a locked hub" if arm.is_locked else "a free pin" if arm.has_massless_hub else "a hub"
     tip = "with a payload" if arm.payload.mass or arm.payload.inertia else "without payload"
     tip = "its tip pinned" if math.isinf(arm.payload.mass) else tip
-    damping = "damped" if arm.damping else "undamped"
-    return f"A flexible link on {hub}, {tip}, {damping}; Timoshenko theory, exact."
+    damping = "undamped" if arm.is_undamped else "damped"
+    link = f"A flexible link of {len(arm.links)} segments" if arm.outer else "A flexible link"
+    hub = hub if arm.motor is None else f"{hub} with a motor"
+    theory = "-".join(part.capitalize() for part in arm.theory.split("-"))
+    return f"{link} on {hub}, {tip}, {damping}; {theory} theory, exact."
 
 
 def render(template: str, **values: Any) -> str:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tfarm.arm import Arm
+from tfarm.arm import Arm, unit_of, written_unit
 from tfarm.columns import Column, Table
 from tfarm.digits import counted, plain, scientific, significant, singly
 from tfarm.dsp import Chain, sampled_verdict
@@ -119,10 +119,17 @@ def _periods_table(data: Sampled) -> Table:
             Column("verdict", "verdict", of=lambda row: "stable" if row.log_radius < 0 else "unstable"),
             Column("growth_1_s", "growth", "1/s", of=growth, digits=singly(scientific, 3)),
             Column("modes", "modes", of="analysis_modes", shown=first),
-            _window_column("stable_K1", "stable K1", "N m s/rad", [(row.K1, row.gains.K1) for row in rows]),
-            _window_column("stable_K2", "stable K2", "", [(row.K2, row.gains.K2) for row in rows]),
+            _window_column("stable_K1", "stable K1", unit_of("K1", data.arm), [(row.K1, row.gains.K1) for row in rows]),
+            _window_column(
+                "stable_K2", "stable K2", written_unit("K2", data.arm).strip(), [(row.K2, row.gains.K2) for row in rows]
+            ),
         ),
     )
+
+
+def _hub_in_input(arm: Arm) -> float:
+    """What turns at the hub, in the unit of the input times s^2."""
+    return arm.hub_side_inertia * arm.input_per_torque
 
 
 def _window_column(key: str, title: str, unit: str, rows: list[tuple[tuple[Window, ...], float]]) -> Column:
@@ -136,7 +143,7 @@ def _window_column(key: str, title: str, unit: str, rows: list[tuple[tuple[Windo
 def _mode_blocks(data: Sampled) -> list[Picture | Table]:
     loop, table = data.analysis.verdict.loop, data.analysis.modes
     T = loop.chain.sampling.period
-    top = max(PAST_HUB * 2 * data.arm.hub.inertia / T, STRONGER * data.gains.K1)
+    top = max(PAST_HUB * 2 * _hub_in_input(data.arm) / T, STRONGER * data.gains.K1)
     found = loci(loop, top, LOCUS_K2)
     aliased = [int(i) for i, band in zip(table.index, table.band, strict=True) if band > 0]
     first = f"From mode {aliased[0]} on all are aliased. " if aliased else "No mode here is aliased. "

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tfarm.arm import Arm, HubFeedback
+from tfarm.arm import Arm, HubFeedback, unit_of, written_unit
 from tfarm.digits import plain, scientific, significant
 from tfarm.dsp import Analysis, Verdict, analyse
 from tfarm.dsp.chain import Chain
@@ -80,7 +80,8 @@ def study(arm: Arm, chain: Chain) -> Sampled:
 def short_answer(data: Sampled) -> str:
     """Yes or no, by how much, for how many modes, and how fast."""
     verdict = data.analysis.verdict
-    gains = f"K1 = {plain(data.gains.K1)} N m s/rad and K2 = {plain(data.gains.K2)}"
+    units = [written_unit(name, data.arm) for name in ("K1", "K2")]
+    gains = f"K1 = {plain(data.gains.K1)}{units[0]} and K2 = {plain(data.gains.K2)}{units[1]}"
     settled = f"with {_modes(verdict)}" if verdict.is_settled else f"as far as its {_modes(verdict)} go"
     is_stable = verdict.is_stable
     margin = f" and bears {_delay(data)} more of delay" if is_stable else ""
@@ -252,7 +253,10 @@ def headline_facts(data: Sampled) -> tuple[Fact, ...]:
         Fact(label="ln|z| a sample, largest", value=scientific(growth, 3), beside="below 0 is stable"),
         Fact(label="stable K2", value=spans(analysis.K2_windows, gains.K2), beside=f"continuous: {K2}"),
         Fact(
-            label="stable K1", value=K1, unit="N m s/rad" if K1 != "none" else "", beside=f"at K2 = {plain(gains.K2)}"
+            label="stable K1",
+            value=K1,
+            unit=unit_of("K1", data.arm) if K1 != "none" else "",
+            beside=f"at K2 = {plain(gains.K2)}",
         ),
         Fact(
             label="further delay it bears",

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm
+from tfarm.arm import INPUT_UNITS, Arm
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.records import record
 from tfarm.spectrum import modes
@@ -92,12 +92,14 @@ class Bode:
     @property
     def gain_unit(self) -> str:
         """SI unit of the response, e.g. N m/(N m)."""
-        return f"{OUTPUTS[self.output].unit}/{'rad' if self.arm.is_locked else '(N m)'}"
+        given = "rad" if self.arm.is_locked else INPUT_UNITS[self.arm.input]
+        return f"{OUTPUTS[self.output].unit}/{f'({given})' if ' ' in given else given}"
 
     @property
     def input_label(self) -> str:
         """The input in words."""
-        return "hub angle" if self.arm.is_locked else "torque"
+        named = {"motor_voltage": "motor voltage", "motor_current": "motor current"}
+        return "hub angle" if self.arm.is_locked else named.get(self.arm.input, "torque")
 
 
 def band_of(arm: Arm, resonances: int = RESONANCES) -> tuple[float, float]:

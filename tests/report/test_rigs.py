@@ -1,0 +1,74 @@
+"""Pages of rigs: every part is in a table and in the sketch, hub-locked frequencies stand beside the free ones."""
+
+import math
+
+import numpy as np
+import pytest
+from matplotlib.patches import Rectangle
+
+import tfarm
+from tfarm.arm import written_unit
+from tfarm.plots.sketch import sketch
+from tfarm.report.arm_section import arm_section
+from tfarm.report.assumptions_section import assumptions_section
+from tfarm.report.locked_table import locked_table, locked_words
+from tfarm.report.loop_laws import has_loop, sign_words
+from tfarm.report.page import summary
+
+RIGS = {name: tfarm.load(f"tests/rigs/{name}.toml") for name in ("bench-rig", "quanser-2dsfl", "quanser-flexlink")}
+
+
+def values_of(table):
+    columns = {column.key: column.values for column in table.columns}
+    return dict(zip(columns["quantity"], columns["value"], strict=True))
+
+
+@pytest.mark.parametrize("name", RIGS)
+def test_every_number_of_the_file_stands_in_the_table_of_parameters(name):
+    arm = RIGS[name]
+    _, given, derived = arm_section(arm).blocks
+    shown = values_of(given)
+    numbers = [getattr(link, key) for link in arm.links for key in ("length", "density", "youngs_modulus", "damping")]
+    numbers += [arm.hub.inertia, arm.hub.friction, arm.payload.mass, arm.payload.inertia]
+    numbers += [each.mass for each in arm.attachments] + [arm.payload.offset or 0.0, arm.hub.radius or 0.0]
+    if arm.motor is not None:
+        numbers += [arm.motor.resistance, arm.motor.torque_constant, arm.motor.gear_ratio, arm.motor.rotor_inertia]
+    assert set(numbers) - {0.0} <= set(shown.values())
+    assert values_of(derived)["total inertia about the axis"] == arm.total_inertia
+
+
+def test_the_sketch_has_each_segment_where_it_is_and_the_payload_at_its_centre():
+    arm = RIGS["bench-rig"]
+    ax = sketch(arm)
+    boxes = [each for each in ax.patches if isinstance(each, Rectangle)]
+    starts = [each.get_x() * arm.length for each in boxes[:2]]
+    np.testing.assert_allclose(starts, [arm.hub.radius, arm.hub.radius + arm.link.length])
+    centre = (boxes[2].get_x() + boxes[2].get_width() / 2) * arm.length
+    assert centre == pytest.approx(arm.centre_distance)
+    assert ax.get_xlim()[1] * arm.length > arm.centre_distance
+
+
+def test_free_lossy_and_locked_frequencies_are_those_of_the_commands():
+    arm = RIGS["quanser-2dsfl"]
+    columns = {each.key: np.array(each.values) for each in locked_table(tfarm.modes(arm, 2)).columns}
+    np.testing.assert_array_equal(columns["hub_free_rad_s"][:2], tfarm.modes(arm, 2).natural_frequency[1:])
+    held = tfarm.modes(arm.having(hub_inertia=math.inf), 6)
+    np.testing.assert_array_equal(columns["hub_locked_rad_s"], held.natural_frequency)
+    found = tfarm.damped_modes(tfarm.modes(arm, 6))  # whose only loss is at its hub
+    np.testing.assert_allclose(columns["with_losses_rad_s"], found.eigenvalues[1:, 0].imag, rtol=1e-9)
+    (words,) = locked_words(arm)
+    assert "11.526 rad/s" in words
+    assert "dry friction" in words
+
+
+def test_words_of_a_rig_are_true_of_it():
+    voltage, bench = RIGS["quanser-flexlink"], RIGS["bench-rig"]
+    assert "the motor's voltage [V]" in sign_words(voltage)
+    assert "(J − I_h)/J" not in sign_words(voltage) + sign_words(bench)
+    assert [written_unit(gain, voltage) for gain in ("K1", "K2")] == [" V s/rad", " V/(N m)"]
+    assert "2 segments" in summary(bench)
+    assert "damped" in summary(voltage)
+    assert "undamped" not in summary(voltage)
+    assert has_loop(voltage)
+    (section,) = assumptions_section(bench).words
+    assert "this is a rig" in section

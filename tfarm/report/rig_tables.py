@@ -1,0 +1,109 @@
+"""What is given of a rig, part by part, and what follows from it: rows of quantity, symbol, value, unit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from tfarm.arm import Arm, Link, RotarySpring, unit_of
+
+Row = tuple[str, str, float, str]
+
+
+def given_rows(arm: Arm) -> list[Row]:
+    """Every part that the rig has."""
+    alone = not arm.outer
+    rows = [row for i, link in enumerate(arm.links, 1) for row in _segment(link, "" if alone else f"segment {i}: ")]
+    rows += _hub(arm)
+    rows += [*_spring(arm.clamp, "clamp"), *_spring(arm.joint, "joint at the axis"), *_motor(arm)]
+    for i, each in enumerate(arm.attachments, 1):
+        parts: list[Row] = [
+            ("place from the clamp", "x", each.x, "m"),
+            ("mass", "", each.mass, "kg"),
+            ("inertia", "", each.inertia, "kg m^2"),
+            ("spring to ground", "", each.stiffness, "N/m"),
+            ("rotary spring to ground", "", each.rotational_stiffness, "N m/rad"),
+        ]
+        rows += [
+            (f"attachment {i}: {name}", symbol, value, unit)
+            for place, (name, symbol, value, unit) in enumerate(parts)
+            if value or not place
+        ]
+    payload = arm.payload
+    rows += [("payload mass", "m", payload.mass, "kg"), ("payload inertia", "I_c", payload.inertia, "kg m^2")]
+    return rows + [("payload's centre beyond the tip", "e", payload.offset, "m")] * bool(payload.offset)
+
+
+def _segment(link: Link, prefix: str) -> Iterator[Row]:
+    """The numbers of one segment."""
+    section = link.section
+    kappa = "shear factor, given" if section.shear_factor is not None else "shear factor, Cowper (1966)"
+    rows: list[Row] = [
+        ("length", "L", link.length, "m"),
+        ("density", "ρ", link.density, "kg/m^3"),
+        ("Young's modulus", "E", link.youngs_modulus, "Pa"),
+        ("shear modulus", "G", link.shear_modulus, "Pa"),
+        ("Kelvin-Voigt damping, on bending", "C", link.damping, "s"),
+        *((f"section ({section.shape}): {n.replace('_', ' ')}", "", value, "m") for n, value in section.dimensions),
+        ("area of the section", "A", section.area, "m^2"),
+        ("second moment of area", "I", section.second_moment, "m^4"),
+        (kappa, "κ", link.shear_factor, ""),
+    ]
+    for name, symbol, value, unit in rows:
+        yield f"{prefix}{name}", symbol, value, unit
+
+
+def _hub(arm: Arm) -> Iterator[Row]:
+    hub = arm.hub
+    yield "hub inertia", "I_h", hub.inertia, "kg m^2"
+    others: list[Row] = [
+        ("hub friction", "b", hub.friction, "N m s/rad"),
+        ("hub radius, from the axis to the clamp", "r", hub.radius, "m"),
+        ("spring from hub to ground", "", hub.stiffness, "N m/rad"),
+    ]
+    yield from (row for row in others if row[2])
+
+
+def _spring(spring: RotarySpring, name: str) -> Iterator[Row]:
+    if not spring.is_rigid:
+        yield f"{name}: stiffness", "k", spring.stiffness, "N m/rad"
+        yield f"{name}: damping, k (1 + c s)", "c", spring.damping, "s"
+
+
+def _motor(arm: Arm) -> Iterator[Row]:
+    motor = arm.motor
+    if motor is None:
+        return
+    yield "motor: resistance", "R", motor.resistance, "ohm"
+    yield "motor: inductance", "L_a", motor.inductance, "H"
+    yield "motor: torque constant", "Kt", motor.torque_constant, "N m/A"
+    yield "motor: back-EMF constant", "Ke", motor.back_emf_constant, "V s/rad"
+    yield "motor: gear ratio", "N", motor.gear_ratio, ""
+    yield "motor: gear efficiency, motor to hub", "η", motor.gear_efficiency, ""
+    yield "motor: rotor inertia, before the gear", "J_m", motor.rotor_inertia, "kg m^2"
+    yield "motor: rotor friction, before the gear", "b_m", motor.rotor_friction, "N m s/rad"
+
+
+def derived_rows(arm: Arm) -> list[Row]:
+    """What follows from the parts."""
+    alone = not arm.outer
+    rows: list[Row] = []
+    for i, link in enumerate(arm.links, 1):
+        prefix = "" if alone else f"segment {i}: "
+        rows += [
+            (f"{prefix}mass", "ρAL", link.rhoA * link.length, "kg"),
+            (f"{prefix}bending stiffness", "EI", link.EI, "N m^2"),
+            (f"{prefix}shear stiffness", "κGA", link.kGA, "N"),
+            (f"{prefix}slenderness", "L/√(I/A)", link.slenderness, ""),
+        ]
+    rows.append(("total inertia about the axis", "J", arm.total_inertia, "kg m^2"))
+    if arm.motor is not None:
+        rows.append(("rotor as the hub feels it", "N² J_m", arm.motor.reflected_inertia, "kg m^2"))
+    if arm.has_rigid_mode and not arm.is_locked:
+        rows.append(("root moment per torque at rest", "", -arm.gauged_inertia / arm.total_inertia, "N m/(N m)"))
+    if arm.input_per_torque != 1.0:
+        rows.append(("input for a torque of 1 N m", "", arm.input_per_torque, unit_of("K2", arm)))
+    if arm.rate_loss:
+        rows.append(("what the losses at the hub add to K1", "", arm.rate_loss, unit_of("K1", arm)))
+    rows.append(("shear cut-off, of several segments the lowest", "√(κGA/ρI)", arm.shear_cutoff, "rad/s"))
+    return [*rows, ("shear cut-off", "", arm.shear_cutoff / (2 * math.pi), "Hz")]
