@@ -6,7 +6,7 @@ Poles are computed, completely, up to a band; what lies beyond is
   modes of the locked hub alone (`lyapunov`), so a few modes tell the rest;
 * at C > 0 bounded: from the band on |L(i w)| stays below one half, and falls (the hub's inertia against ever more
   heavily damped bending), so that 1 + L has no zero there, nor further right.  Where the band of that would hold more
-  modes than `MOST_MODES` it is cut, and the verdict says so.
+  modes than `MOST_MODES` it is cut, and where a segment of a lossy rig has C = 0 there is none; the verdict says so.
 
 A pole at 0 remains where Kp = 0, whatever K1 and K2: verdicts are apart from it.
 """
@@ -113,6 +113,11 @@ def _beyond(loop: Loop, quiet: bool) -> tuple[bool, str]:
     if not loop.arm.is_undamped:
         if quiet:
             return False, f"beyond the band |L(iw)| < {QUIET:g} and falling: no unstable pole there (small gain)"
+        if not loop.arm.least_damping:
+            return (
+                False,
+                "beyond the band not bounded: with C = 0 in the link resonances are too narrow to be looked at",
+            )
         return False, "beyond the band not bounded: the small-gain condition would need more modes than are looked at"
     if law.K1 == 0:
         return False, "C = 0 and K1 = 0: nothing takes or gives energy, modes beyond the band lie on the axis"
@@ -130,14 +135,23 @@ def loop_band(loop: Loop) -> tuple[float, bool]:
         return few, False
     band = few
     while modes_below(loop.arm, band) <= MOST_MODES:
-        if is_quiet(loop, band):
-            return band, True
+        if _has_fallen(loop, band):
+            return band, is_quiet(loop, band)
         band *= 1.6
     return max(few, band / 1.6), False
 
 
 def is_quiet(loop: Loop, band: float) -> bool:
-    """Whether |L(i w)| stays below `QUIET` over two decades from the band on, and falls there."""
+    """Whether |L(i w)| stays below `QUIET` over two decades from the band on, and falls there.
+
+    Of a rig with an elastic segment it is not known: with what the hub or another segment loses, the resonances of that
+    one become ever narrower, and pass between any points that are looked at.
+    """
+    return loop.arm.least_damping > 0 and _has_fallen(loop, band)
+
+
+def _has_fallen(loop: Loop, band: float) -> bool:
+    """Whether |L| is so at 1200 points of these two decades."""
     omega = band * np.geomspace(1.0, 100.0, 1200)
     size = abs(loop.loop_function(1j * omega))
     return bool(size.max() < QUIET and size[600:].max() <= size[:600].max())

@@ -1,0 +1,55 @@
+"""The closed loop of a rig made of finite elements (`tests.chain_elements`), for the tests only.
+
+    s^2 M y + s D y + K y = b i,    (L_a s + R) i + N Ke s theta = v,    input = -(Kp theta + K1 s theta + K2 m)
+
+with i the current where a voltage drives (without inductance it is left out), else the input itself; m = E I psi'(0) on
+the outer side of the clamp, read from the elements.
+"""
+
+import numpy as np
+from scipy.linalg import eigvals
+
+from tests.chain_elements import HUB, System, _gain, _slowest, assemble
+
+
+class RigLoop:
+    """K, D, M of a damped rig on elements good for |s| < up_to, and of its loop under any law."""
+
+    def __init__(self, arm, up_to):
+        self.arm, self.up_to, self.a = arm, up_to, _slowest(arm)
+        self.system = System(assemble(arm, up_to, held=False), self.a)
+        self.K, self.D, self.M = self.system.with_current()
+        free = self.system.K.shape[0]
+        self.hub, self.gauge, self.works = (np.zeros(len(self.K)) for _ in range(3))
+        self.hub[:free] = self.system.full[HUB]
+        self.gauge[:free] = self.system.model.output("root_moment", 0.0) @ self.system.full
+        if free < len(self.K):
+            self.works[-1] = 1.0  # the voltage's own equation
+        else:
+            self.works[:free] = self.system.full[HUB] * self._per_input()
+
+    def _per_input(self):
+        """Torque per unit of the input, of one that acts at once."""
+        motor = self.arm.motor
+        if self.arm.input == "hub_torque":
+            return 1.0
+        return _gain(motor) / (motor.resistance if self.arm.input == "motor_voltage" else 1.0)
+
+    def closed(self, law):
+        """K, D, M of the loop."""
+        K = self.K + np.outer(self.works, law.Kp * self.hub + law.K2 * self.gauge)
+        return K, self.D + law.K1 * np.outer(self.works, self.hub), self.M
+
+    def eigenvalues(self, law):
+        """The loop's eigenvalues [1/s] with |s| < up_to; by z = 1/(s - a), of which those are the large ones."""
+        K, D, M = self.closed(law)
+        a, n = self.a, len(K)
+        upper = -np.linalg.solve(a * a * M + a * D + K, np.hstack([2 * a * M + D, M]))
+        z = eigvals(np.vstack([upper, np.eye(n, 2 * n)]))
+        s = a + 1 / z[abs(z) > 0.5 / (self.up_to + a)]
+        return s[abs(s) < self.up_to]
+
+    def unstable(self, law):
+        """How many of these lie to the right of the axis, but for rounding of the turning rig's 0."""
+        s = self.eigenvalues(law)
+        return int((s.real > 1e-9 * abs(s) + 1e-7 * self.a).sum())

@@ -1,0 +1,93 @@
+"""Loops of rigs against a state-space model of finite elements (`rig_loops`): poles, counts, edges, samples."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tfarm
+from tests.chain_elements import reached
+from tests.loop.rig_loops import RigLoop
+from tests.rigs import some_rig
+from tfarm import HubFeedback
+from tfarm.loop.plant import Loop
+from tfarm.loop.poles import closed_loop_poles, poles_below
+from tfarm.loop.stability import stability
+from tfarm.loop.windows import gain_windows
+from tfarm.spectrum.scales import default_gains, gain_unit
+
+REAL = {path.stem: tfarm.load(str(path)) for path in sorted((Path(__file__).parents[1] / "rigs").glob("*.toml"))}
+SEEDS = (0, 2, 3)
+LAWS = ((0.5, 0.8, 0.0), (0.05, 1.5, 0.1), (0.05, -2.0, 0.1), (-0.05, 0.0, 0.0))  # K1, K2, Kp in the arm's units
+
+
+def damped_rig(seed):
+    """A rig that turns by a torque or through its motor."""
+    rng = np.random.default_rng([21, seed])
+    arm = some_rig(rng, damped=True, segments=int(rng.integers(1, 4)))
+    return replace(arm, input="hub_torque") if arm.input == "hub_angle" else arm
+
+
+RIGS = REAL | {f"seed {seed}": damped_rig(seed) for seed in SEEDS}
+
+
+def laws(arm):
+    """The default law, and some that are not: strong, with too much moment, with too little, driving."""
+    yield default_gains(arm)
+    units = [gain_unit(arm, name) for name in ("K1", "K2", "Kp")]
+    for shares in LAWS:
+        K1, K2, Kp = (share * unit for share, unit in zip(shares, units, strict=True))
+        yield HubFeedback(K1=K1, K2=0.0 if arm.has_massless_hub else K2, Kp=Kp)
+
+
+@pytest.mark.parametrize("name", RIGS)
+def test_poles_are_those_of_the_elements_and_no_others(name):
+    """Six poles of each loop: as many of the elements in the box, each where it is listed, and as many unstable."""
+    arm = RIGS[name]
+    found = [closed_loop_poles(arm, law, 6) for law in laws(arm)]
+    corner = max(abs(complex(max(-poles.box.re_min, poles.box.re_max), poles.box.im_max)) for poles in found)
+    model = RigLoop(arm, 1.05 * corner)
+    for poles in found:
+        theirs = model.eigenvalues(poles.loop.law)
+        theirs = theirs[poles.box.holds(theirs) & (abs(theirs) > 1e-6 * model.a)]
+        upper = theirs[theirs.imag > -1e-9 * model.a]
+        assert upper.size == poles.moving.size
+        assert all(abs(upper - pole).min() < 1e-8 * abs(pole) for pole in poles.moving)
+        assert int((theirs.real > 1e-9 * abs(theirs)).sum()) == poles.unstable
+
+
+def test_no_bound_is_claimed_where_elastic_links_ring_beyond_the_band():
+    """A voltage behind an inductance, C = 0: with K2 < 0 modes far above the band are driven, each by very little."""
+    arm = REAL["quanser-flexlink"]
+    law = default_gains(arm).having("K2", -0.015)
+    verdict = stability(arm, law)
+    assert "not bounded" in verdict.tail
+    beyond = poles_below(Loop(arm, law), 3e4)
+    driven = beyond.moving[beyond.moving.real > 1e-12 * abs(beyond.moving)]
+    assert driven.size
+    assert driven.imag.min() > verdict.band
+    theirs = RigLoop(arm, 2.5e4).eigenvalues(law)
+    first = driven[driven.imag.argmin()]
+    assert abs(theirs - first).min() < 1e-9 * abs(first)
+
+
+@pytest.mark.parametrize("gain", ["K1", "K2"])
+@pytest.mark.parametrize("name", RIGS)
+def test_at_an_edge_of_a_window_poles_of_the_elements_cross(name, gain):
+    """Just inside none is unstable, just outside one or two are, at the crossing's frequency."""
+    arm = RIGS[name]
+    law = default_gains(arm)
+    window = gain_windows(stability(arm, law), gain)
+    assert window.around is not None
+    for edge in window.around:
+        at = window.crossings.at[abs(window.crossings.gain - edge) <= 1e-6 * abs(edge)]  # of elastic links all at once
+        if window.end(edge) != "edge" or at.min() > reached(arm, 30):
+            continue  # no pole crosses there, or beyond what the elements have
+        model, outwards = RigLoop(arm, max(reached(arm, 10), 1.5 * at.min())), np.sign(edge - law[gain])
+        inside, outside = (law.having(gain, edge + sign * outwards * 1e-3 * abs(edge)) for sign in (-1, 1))
+        assert model.unstable(inside) == 0
+        moved = model.eigenvalues(outside)
+        moved = moved[moved.real > 1e-12 * abs(moved)]
+        assert moved.size
+        assert (abs(abs(moved)[:, None] - at) < 1e-2 * (at + model.a)).any()
