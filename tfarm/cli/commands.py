@@ -70,7 +70,9 @@ def response(
     x: Annotated[float | None, typer.Option("--x", help="place on the arm [m], for outputs along it")] = None,
     driven: Annotated[
         str | None,
-        typer.Option("--input", help="hub_torque, motor_voltage, motor_current or hub_angle; the file's if not said"),
+        typer.Option(
+            "--input", help="hub_torque, motor_voltage, motor_current, hub_angle, force@X or moment_pair@X1,X2"
+        ),
     ] = None,
     digits: Digits = None,
     method: MethodName = "closed-form",
@@ -82,10 +84,10 @@ def response(
     from tfarm.cli.inputs import points_on
 
     right, at, subject = right_digits(digits), points_on(s, omega, start, stop, points), load_arm(arm)
-    if driven is not None:
+    if driven is not None and "@" not in driven:
         from dataclasses import replace
 
-        subject = replace(subject, input=cast("Input", driven))
+        subject, driven = replace(subject, input=cast("Input", driven)), None
     from tfarm.cli.methods import alone, compared_responses, print_compared, slow_method
     from tfarm.cli.tables import print_found, say_written
     from tfarm.response import transfer
@@ -95,10 +97,10 @@ def response(
 
     road = slow_method(method, at.size, right, compare)
     if compare:
-        alone({"--csv": csv})
+        alone({"--csv": csv, "--input": driven})
         give(compared_responses(subject, output, x, at), json, print_compared)
         return
-    answer = response_answer(transfer(subject, output, x=x, method=road), at, right)
+    answer = response_answer(transfer(subject, output, x=x, method=road, input=driven), at, right)
     if csv is not None:
         write_csv(response_table(answer), csv)
     if json or csv is None or say_written(csv):

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -151,6 +151,11 @@ class Chain:
     gauge: Place
     length: Fraction
     EI: Fraction
+
+    @cached_property
+    def kept(self) -> dict[Any, Any]:
+        """What is laid out of it once (`chain_values.readings`), with the chain and gone with it."""
+        return {}
 
     @property
     def segments(self) -> tuple[Segment, ...]:

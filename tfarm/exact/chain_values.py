@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import lru_cache
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -57,7 +57,7 @@ class Readings:
             for one in self.each
         ]
 
-    @property
+    @cached_property
     def table(self) -> NDArray[np.float64]:
         """Rows for `sweep.fill_free`."""
         places = self.layout.places
@@ -104,9 +104,16 @@ def _strain_unit(chain: Chain, place: Place) -> Fraction:
     return Fraction(segment.half_depth) / chain.length / segment.stiffness / chain.input_unit
 
 
-@lru_cache(maxsize=256)
 def readings(chain: Chain, wanted: tuple[Output, ...], x: float) -> Readings:
-    """The outputs of a chain, laid out."""
+    """The outputs of a chain, laid out: once for each chain."""
+    key = wanted, x
+    if key not in chain.kept:
+        chain.kept[key] = _laid_out(chain, wanted, x)
+    found: Readings = chain.kept[key]
+    return found
+
+
+def _laid_out(chain: Chain, wanted: tuple[Output, ...], x: float) -> Readings:
     each = tuple(reading_of(chain, one, x) for one in wanted)
     places = tuple(dict.fromkeys(one.place for one in each if one.place is not None))
     return Readings(chain.at(places), each)

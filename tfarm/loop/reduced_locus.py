@@ -110,7 +110,10 @@ def _polished(variation: Variation, gain: Real, poles: Complex, count: int) -> C
 
 def _return_difference(model: ModalModel, laws: Real, s: Complex) -> tuple[Complex, Complex]:
     """1 + law . G(s) and its derivative, at s (gains, order), each row under its own law (gains, 3)."""
-    pole, residues = model.eigenvalues.ravel(), laws @ model.residues.reshape(len(FED_BACK), -1)
+    pole, parts = model.eigenvalues.ravel(), model.residues.reshape(len(FED_BACK), -1)
+    if model.single_residues is not None:
+        pole, parts = np.r_[pole, model.single], np.c_[parts, model.single_residues]
+    residues = laws @ parts
     rigid, static = laws @ model.rigid, laws @ model.static
     with np.errstate(all="ignore"):  # at a pole of the model: no number, and the pole is left alone
         away = 1 / (s[..., None] - pole)
