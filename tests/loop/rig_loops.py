@@ -7,9 +7,11 @@ the outer side of the clamp, read from the elements.
 """
 
 import numpy as np
-from scipy.linalg import eigvals
+from scipy.linalg import cholesky, eigh, eigvals, expm, solve_triangular
 
 from tests.chain_elements import HUB, System, _gain, _slowest, assemble
+
+LEAST = 1e-13  # 1/(w^2 + a^2) of the highest modes that are kept, of the largest: of these rounding leaves digits
 
 
 class RigLoop:
@@ -53,3 +55,25 @@ class RigLoop:
         """How many of these lie to the right of the axis, but for rounding of the turning rig's 0."""
         s = self.eigenvalues(law)
         return int((s.real > 1e-9 * abs(s) + 1e-7 * self.a).sum())
+
+    def sampled(self, law, period):
+        """Eigenvalues z of the loop sampled every period [s], its input held in between, of one that acts at once.
+
+        Modes of K + a^2 M and M, of which 1/(w^2 + a^2) has the digits; states sqrt(w^2 + a^2) q and q_t of each.
+        """
+        root = cholesky(self.K + self.a**2 * self.M)
+        over = solve_triangular(root, self.M, trans=1)
+        size, shapes = eigh(solve_triangular(root, over.T, trans=1))
+        kept = size > LEAST * size.max()
+        unit = np.sqrt(size[kept])
+        shapes = solve_triangular(root, shapes[:, kept]) / unit
+        n = unit.size
+        A = np.zeros((2 * n + 1, 2 * n + 1))
+        A[:n, n : 2 * n] = np.diag(1 / unit)
+        A[n : 2 * n, :n] = np.diag(self.a**2 * unit - 1 / unit)
+        A[n : 2 * n, n : 2 * n] = -shapes.T @ self.D @ shapes
+        A[n : 2 * n, -1] = shapes.T @ self.works
+        held = expm(A * period)[: 2 * n]
+        angle, gauge = shapes.T @ self.hub, shapes.T @ self.gauge
+        fed_back = np.r_[(law.Kp * angle + law.K2 * gauge) * unit, law.K1 * angle]
+        return eigvals(held[:, :-1] - np.outer(held[:, -1], fed_back))

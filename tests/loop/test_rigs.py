@@ -11,6 +11,7 @@ from tests.chain_elements import reached
 from tests.loop.rig_loops import RigLoop
 from tests.rigs import some_rig
 from tfarm import HubFeedback
+from tfarm.dsp import Chain, Sampling, sampled_verdict
 from tfarm.loop.plant import Loop
 from tfarm.loop.poles import closed_loop_poles, poles_below
 from tfarm.loop.stability import stability
@@ -29,6 +30,7 @@ def damped_rig(seed):
     return replace(arm, input="hub_torque") if arm.input == "hub_angle" else arm
 
 
+SAMPLED = ((0.001, 0.3, True), (0.001, 1.3, False), (0.008, -0.6, False), (0.008, 1.05, True))  # s, K2
 RIGS = REAL | {f"seed {seed}": damped_rig(seed) for seed in SEEDS}
 
 
@@ -91,3 +93,16 @@ def test_at_an_edge_of_a_window_poles_of_the_elements_cross(name, gain):
         moved = moved[moved.real > 1e-12 * abs(moved)]
         assert moved.size
         assert (abs(abs(moved)[:, None] - at) < 1e-2 * (at + model.a)).any()
+
+
+@pytest.mark.parametrize(("period", "K2", "stable"), SAMPLED)
+def test_the_sampled_loop_is_that_of_the_elements_under_a_hold(period, K2, stable):
+    """The largest |z|, of the loop stable and not, the free angle's z = 1 apart."""
+    arm = REAL["bench-rig"]
+    law = default_gains(arm).having("K2", K2)
+    verdict = sampled_verdict(arm, law, Chain(sampling=Sampling(period=period)))
+    z = RigLoop(arm, reached(arm, 8)).sampled(law, period)
+    radius = np.log(abs(np.delete(z, abs(z - 1).argmin())).max())
+    assert verdict.log_radius == pytest.approx(radius, rel=1e-5)
+    assert verdict.is_stable is stable
+    assert bool(radius < 0) is stable

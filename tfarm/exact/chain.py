@@ -20,6 +20,7 @@ from functools import cached_property
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tfarm.arm import Arm, Attachment, Link, RotarySpring, Theory
 from tfarm.records import record
@@ -321,17 +322,25 @@ def _springs(spring: RotarySpring, rotation: Fraction) -> list[Element]:
 class Layout:
     """A chain cut and marked at places, as the compiled sweeps read it (`sweep`), and as elements for balls.
 
-    `rows` (elements, `WIDTH`) from the payload inwards and `ends` (12,), float64; `damping` [s] and `stiffness` (of
-    that of the first link) of the segment on whose side each place is, `piece` its number among the segments.
+    `elements` run from the payload inwards.
     """
 
     def __init__(self, chain: Chain, places: tuple[Place, ...]) -> None:
         self.chain, self.places = chain, places
         self.elements = _marked(chain.elements, places)
-        self.rows = np.array([row_of(each) for each in self.elements]).reshape(-1, WIDTH)
+
+    @cached_property
+    def rows(self) -> NDArray[np.float64]:
+        """The elements, which balls have no use for (elements, `WIDTH`)."""
+        return np.array([row_of(each) for each in self.elements]).reshape(-1, WIDTH)
+
+    @cached_property
+    def ends(self) -> NDArray[np.float64]:
+        """Payload and drive (12,)."""
+        chain = self.chain
         tip = [Condition.of(inertia) for inertia in (chain.tip_mass, chain.tip_inertia)]
         numbers = [number for end in tip for number in (end.rest, end.inertia, end.force)]
-        self.ends = np.array([*map(float, (*numbers, *chain.drive.of_angle, *chain.drive.of_moment))])
+        return np.array([*map(float, (*numbers, *chain.drive.of_angle, *chain.drive.of_moment))])
 
     @cached_property
     def read(self) -> tuple[Segment, ...]:
