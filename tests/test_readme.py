@@ -92,13 +92,14 @@ def test_make_has_the_verbs_of_the_readme() -> None:
     assert {"install", "reports", "modes", "bode", "test", "survey", "lint", "bench", "clean"} <= verbs
 
 
-def test_the_example_of_an_arm_is_an_arm(tmp_path: Path) -> None:
-    (toml,) = blocks("toml")
-    file = tmp_path / "my-arm.toml"
-    file.write_text(toml, encoding="utf-8")
-    arm = tfarm.load(str(file))
-    assert arm.name == "my-arm"
-    assert tfarm.modes(arm, 1).natural_frequency[1] > 0
+def test_the_examples_of_an_arm_and_of_a_rig_are_arms(tmp_path: Path) -> None:
+    for name, toml in zip(("my-arm", "bench"), blocks("toml"), strict=True):
+        file = tmp_path / f"{name}.toml"
+        file.write_text(toml, encoding="utf-8")
+        arm = tfarm.load(str(file))
+        assert arm.name == name
+        assert arm.is_uniform == (name == "my-arm")
+        assert tfarm.modes(arm, 1).natural_frequency[1] > 0
 
 
 def test_every_dependency_has_its_line() -> None:
