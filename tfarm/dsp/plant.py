@@ -100,13 +100,16 @@ def undelayed_plant(
             "a hub without inertia has no model of finite order under hub damping; give hub.inertia, or leave it out"
         )
         raise ParameterError(key="actuator.hub_damping", value=damping, remedy=remedy)
+    if damping > 0 and arm.input_lags:
+        remedy = "acts on the hub at once, and the input behind an inductance late: give it as hub.friction of the rig"
+        raise ParameterError(key="actuator.hub_damping", value=damping, remedy=remedy)
     names = [*outputs, "hub_rate"] if damping > 0 else list(outputs)
     return _with_modes(modal_model(arm, names, count, branches=branches), chain, outputs, count)
 
 
 def _with_modes(model: ModalModel, chain: Chain, outputs: Sequence[str], count: int) -> Plant:
     """The plant with the first `count` modes of a model, whose last output is the hub's rate where this is damped."""
-    damping = chain.actuator.hub_damping
+    damping = chain.actuator.hub_damping * model.arm.input_per_torque
     some = model if count == model.index.size else model.first(count)
     plant = _with_hub_damping(some, outputs, damping) if damping > 0 else _of_model(some)
     exact = transfer(model.arm, [*outputs, "hub_rate"])

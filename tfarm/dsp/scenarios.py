@@ -54,6 +54,7 @@ class Scenario:
 def slew(arm: Arm, chain: Chain, duration: float) -> Scenario:
     """The bang-bang slew: hub acceleration +-4 travel/(L rise^2), as its mean over each sample, J of it as feedforward.
 
+    On a rig also what friction and back-EMF take at the mean rate, all in the unit of its input.
     What the moment feedback sees is the moment less the rigid arm's -(J - I_h) theta_dd_ref of the interval before the
     sample ("vibration"), or all of it ("total").  Raises ParameterError for an arm that cannot turn.
     """
@@ -64,13 +65,14 @@ def slew(arm: Arm, chain: Chain, duration: float) -> Scenario:
     t = T * np.arange(n + 1)
     rate = peak * np.clip(np.minimum(t, manoeuvre.rise_time - t), 0.0, None)
     acceleration = np.diff(rate) / T
-    angle = np.r_[0.0, np.cumsum((rate[1:] + rate[:-1]) / 2 * T)][:-1]
+    mean = (rate[1:] + rate[:-1]) / 2
+    angle = np.r_[0.0, np.cumsum(mean * T)][:-1]
     before = np.r_[0.0, acceleration[:-1]]
-    rigid = -(arm.carried_inertia) * before * (manoeuvre.reading == "vibration")
+    rigid = -(arm.gauged_inertia) * before * (manoeuvre.reading == "vibration")
     return Scenario(
         name="slew",
         period=T,
-        feedforward=arm.total_inertia * acceleration,
+        feedforward=arm.turned_inertia * acceleration + arm.rate_loss * mean,
         hub_angle=angle,
         hub_rate=rate[:-1],
         rigid_moment=rigid,

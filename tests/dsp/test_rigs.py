@@ -1,0 +1,46 @@
+"""The sampled loop on rigs: what a slew asks of the input, and analog damping where the input is no torque."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tfarm
+from tfarm.dsp import Chain
+from tfarm.dsp.chain import Actuator
+from tfarm.dsp.plant import undelayed_plant
+from tfarm.dsp.scenarios import slew
+from tfarm.errors import ParameterError
+
+SLOW = 1e-3  # 1/s: the rig turns as one piece, and s^2 of its next term is beyond the digits compared
+
+
+@pytest.mark.parametrize("name", ["bench-rig", "quanser-2dsfl", "quanser-flexlink"])
+def test_the_feedforward_of_a_slew_turns_the_rig_against_its_friction(name):
+    """Input over angle of the slowly turning exact rig is loss s + J s^2 + ..., and its gauge reads -J_g s^2."""
+    arm = tfarm.load(f"tests/rigs/{name}.toml")
+    task = slew(arm, Chain(), 1.5)
+    forth, back = (1 / tfarm.transfer(arm, "hub_angle")(s) for s in (SLOW, -SLOW))
+    loss, inertia = (forth - back) / (2 * SLOW), (forth + back) / (2 * SLOW**2)
+    mean = np.r_[np.diff(task.hub_angle), 0.0] / task.period
+    acceleration = np.r_[np.diff(task.hub_rate), 0.0] / task.period
+    wanted = (loss * mean + inertia * acceleration).real[:-1]
+    np.testing.assert_allclose(task.feedforward[:-1], wanted, rtol=1e-3, atol=1e-6 * abs(wanted).max())
+    gauge = (tfarm.transfer(arm, "root_moment")(1j * SLOW) / tfarm.transfer(arm, "hub_angle")(1j * SLOW)).real
+    np.testing.assert_allclose(task.rigid_moment[1:], gauge / -(SLOW**2) * np.diff(task.hub_rate) / task.period,
+                               rtol=1e-4, atol=1e-9)  # fmt: skip
+
+
+def test_analog_damping_is_friction_whatever_the_input():
+    """A torque -d theta_t on the hub of a rig driven by current is the same rig with so much more friction."""
+    arm, d = tfarm.load("tests/rigs/quanser-2dsfl.toml"), 0.7
+    plant = undelayed_plant(arm, Chain(actuator=Actuator(hub_damping=d)), ("hub_rate", "root_moment"), 8)
+    stiffer = replace(arm, hub=replace(arm.hub, friction=arm.hub.friction + d))
+    s = 4 + 9j
+    np.testing.assert_allclose(plant(s), tfarm.transfer(stiffer, ["hub_rate", "root_moment"])(s), rtol=1e-4)
+
+
+def test_analog_damping_behind_an_inductance_is_refused_with_a_remedy():
+    arm = tfarm.load("tests/rigs/quanser-flexlink.toml")
+    with pytest.raises(ParameterError, match=r"hub\.friction"):
+        undelayed_plant(arm, Chain(actuator=Actuator(hub_damping=0.1)), ("hub_rate",), 4)
