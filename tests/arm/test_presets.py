@@ -6,7 +6,8 @@ from tfarm.arm import load, presets
 
 
 def test_the_presets_are_those_of_the_documentation():
-    assert presets() == ("sasaki2012", "sasaki2012-as-printed", "sasaki2012-lab", "stocky-steel")
+    rigs, papers = ("quanser-2dsfl", "quanser-flexlink"), ("sasaki2012", "sasaki2012-as-printed", "sasaki2012-lab")
+    assert presets() == (*rigs, *papers, "stocky-steel")
     assert [load(name).name for name in presets()] == list(presets())
 
 

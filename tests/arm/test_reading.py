@@ -272,7 +272,7 @@ def test_a_misspelt_preset():
 
 @pytest.mark.parametrize("name", ["", "  ", "a\0b.toml", None, 3])
 def test_what_can_be_no_name(name):
-    assert "give a preset (sasaki2012, " in refusal(name)
+    assert "give a preset (quanser-2dsfl, " in refusal(name)
 
 
 def test_what_is_no_regular_file(tmp_path):

@@ -1,4 +1,4 @@
-"""The rigs in tests/rigs: what their makers and users state of them, by formulas that are not ours."""
+"""The preset rigs and the example in tests/rigs: what makers and users state of them, by formulas not ours."""
 
 import math
 import tomllib
@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tfarm.arm import implausible, load, to_toml
+from tfarm.arm import implausible, load, presets, to_toml
 from tfarm.arm.schema import arm_of_table
 
-RIGS = {path.stem: path for path in sorted((Path(__file__).parents[1] / "rigs").glob("*.toml"))}
+RIGS: dict[str, str | Path] = {path.stem: path for path in sorted((Path(__file__).parents[1] / "rigs").glob("*.toml"))}
+RIGS |= {name: name for name in presets() if not load(name).is_uniform}
 
 
 @pytest.mark.parametrize("name", RIGS)

@@ -10,7 +10,7 @@ import tfarm
 from tests import chain_elements
 from tests.shell import answer, run
 
-RIGS = {name: f"tests/rigs/{name}.toml" for name in ("bench-rig", "quanser-2dsfl", "quanser-flexlink")}
+RIGS = {"bench-rig": "tests/rigs/bench-rig.toml"} | {name: name for name in ("quanser-2dsfl", "quanser-flexlink")}
 
 
 @pytest.fixture(params=RIGS)

@@ -15,10 +15,10 @@ from tfarm.errors import ParameterError
 SLOW = 1e-3  # 1/s: the rig turns as one piece, and s^2 of its next term is beyond the digits compared
 
 
-@pytest.mark.parametrize("name", ["bench-rig", "quanser-2dsfl", "quanser-flexlink"])
+@pytest.mark.parametrize("name", ["tests/rigs/bench-rig.toml", "quanser-2dsfl", "quanser-flexlink"])
 def test_the_feedforward_of_a_slew_turns_the_rig_against_its_friction(name):
     """Input over angle of the slowly turning exact rig is loss s + J s^2 + ..., and its gauge reads -J_g s^2."""
-    arm = tfarm.load(f"tests/rigs/{name}.toml")
+    arm = tfarm.load(name)
     task = slew(arm, Chain(), 1.5)
     forth, back = (1 / tfarm.transfer(arm, "hub_angle")(s) for s in (SLOW, -SLOW))
     loss, inertia = (forth - back) / (2 * SLOW), (forth + back) / (2 * SLOW**2)
@@ -33,7 +33,7 @@ def test_the_feedforward_of_a_slew_turns_the_rig_against_its_friction(name):
 
 def test_analog_damping_is_friction_whatever_the_input():
     """A torque -d theta_t on the hub of a rig driven by current is the same rig with so much more friction."""
-    arm, d = tfarm.load("tests/rigs/quanser-2dsfl.toml"), 0.7
+    arm, d = tfarm.load("quanser-2dsfl"), 0.7
     plant = undelayed_plant(arm, Chain(actuator=Actuator(hub_damping=d)), ("hub_rate", "root_moment"), 8)
     stiffer = replace(arm, hub=replace(arm.hub, friction=arm.hub.friction + d))
     s = 4 + 9j
@@ -41,6 +41,6 @@ def test_analog_damping_is_friction_whatever_the_input():
 
 
 def test_analog_damping_behind_an_inductance_is_refused_with_a_remedy():
-    arm = tfarm.load("tests/rigs/quanser-flexlink.toml")
+    arm = tfarm.load("quanser-flexlink")
     with pytest.raises(ParameterError, match=r"hub\.friction"):
         undelayed_plant(arm, Chain(actuator=Actuator(hub_damping=0.1)), ("hub_rate",), 4)

@@ -11,9 +11,9 @@ MEASURED = ("hub_angle", "hub_rate", "root_moment")
 S = np.array([0.01 + 0.02j, 5 + 40j, 3 - 20j])
 
 
-@pytest.fixture(params=["bench-rig", "quanser-2dsfl", "quanser-flexlink"])
+@pytest.fixture(params=["tests/rigs/bench-rig.toml", "quanser-2dsfl", "quanser-flexlink"])
 def arm(request):
-    return tfarm.load(f"tests/rigs/{request.param}.toml")
+    return tfarm.load(request.param)
 
 
 def test_a_model_with_friction_is_the_exact_rig_at_low_frequency(arm):

@@ -15,7 +15,7 @@ from tfarm.report.locked_table import locked_table, locked_words
 from tfarm.report.loop_laws import has_loop, sign_words
 from tfarm.report.page import summary
 
-RIGS = {name: tfarm.load(f"tests/rigs/{name}.toml") for name in ("bench-rig", "quanser-2dsfl", "quanser-flexlink")}
+RIGS = {arm.name: arm for arm in map(tfarm.load, ("tests/rigs/bench-rig.toml", "quanser-2dsfl", "quanser-flexlink"))}
 
 
 def values_of(table):

@@ -8,10 +8,10 @@ import pytest
 import tfarm
 
 
-@pytest.mark.parametrize("name", ["bench-rig", "quanser-flexlink"])
+@pytest.mark.parametrize("name", ["tests/rigs/bench-rig.toml", "quanser-flexlink"])
 def test_a_rigid_body_turns_about_the_axis_and_the_root_moment_is_that_of_the_field(name):
     """The turning rig moves its tip by (r + L + ...): the residue at 0 of tip over torque, without friction."""
-    arm = tfarm.load(f"tests/rigs/{name}.toml").elastic.lossless_hub
+    arm = tfarm.load(name).elastic.lossless_hub
     arm = replace(arm, clamp=replace(arm.clamp, damping=0.0), input="hub_torque")
     table = tfarm.modes(arm, 3)
     s = 1e-3j

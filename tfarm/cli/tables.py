@@ -21,8 +21,8 @@ def presets_table(arms: list[Arm]) -> Table:
     """Name, size and assumptions of each preset."""
     names = {
         "name": "name",
-        "length": "link.length",
-        "damping": "link.damping",
+        "length": "length",
+        "damping": "damping",
         "hub_inertia": "hub.inertia",
         "payload_mass": "payload.mass",
         "payload_inertia": "payload.inertia",
