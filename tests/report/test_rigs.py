@@ -14,6 +14,7 @@ from tfarm.report.assumptions_section import assumptions_section
 from tfarm.report.locked_table import locked_table, locked_words
 from tfarm.report.loop_laws import has_loop, sign_words
 from tfarm.report.page import summary
+from tfarm.report.tuner_section import why_not
 
 RIGS = {arm.name: arm for arm in map(tfarm.load, ("tests/rigs/bench-rig.toml", "quanser-2dsfl", "quanser-flexlink"))}
 
@@ -70,5 +71,7 @@ def test_words_of_a_rig_are_true_of_it():
     assert "damped" in summary(voltage)
     assert "undamped" not in summary(voltage)
     assert has_loop(voltage)
+    assert "C = 0" in why_not(voltage)
+    assert not why_not(bench)
     (section,) = assumptions_section(bench).words
     assert "this is a rig" in section

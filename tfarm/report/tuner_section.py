@@ -36,7 +36,11 @@ UNDAMPED = (
     "The page of sasaki2012-lab, the same arm as the paper's with a little damping, has the answer."
 )
 
-
+ELASTIC = (
+    "The link of this rig has no damping (C = 0), and what its hub, clamp or joint lose reaches high modes ever less. "
+    "When it is sampled no range of moving gains can be proven for all of them, and the tuner is not trained here: "
+    "give the link a measured damping, or see what tfarm tune makes of the first modes."
+)
 RUNS_AWAY = (
     "No tuner here: at the default K1 and this period the slew without moment feedback runs away, so that there is no "
     "cost to compare with. The sampled loop above says which K1 holds."
@@ -90,7 +94,9 @@ def why_not(arm: Arm) -> str:
         return why_no_loop(arm)
     if not arm.has_rigid_mode:
         return "The tip of this arm is held: it makes no slew, and there is nothing for the tuner to learn from."
-    return UNDAMPED if arm.is_undamped else ""
+    if not arm.has_elastic_link:
+        return ""
+    return UNDAMPED if arm.is_undamped else ELASTIC
 
 
 # ------------------------------------------------------------ pictures
