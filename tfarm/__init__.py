@@ -17,7 +17,20 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from tfarm import plots
-    from tfarm.arm import Arm, Hub, HubFeedback, Link, Payload, Section, load, presets
+    from tfarm.arm import (
+        Arm,
+        Attachment,
+        Gauge,
+        Hub,
+        HubFeedback,
+        Link,
+        Motor,
+        Payload,
+        RotarySpring,
+        Section,
+        load,
+        presets,
+    )
     from tfarm.dsp.results import simulate
     from tfarm.dsp.verdict import analyse as sampled
     from tfarm.errors import CertificationError, ConvergenceError, ParameterError
@@ -38,14 +51,18 @@ __version__ = "0.1.0"
 
 __all__ = [
     "Arm",
+    "Attachment",
     "CertificationError",
     "ConvergenceError",
+    "Gauge",
     "Hub",
     "HubFeedback",
     "Link",
+    "Motor",
     "Output",
     "ParameterError",
     "Payload",
+    "RotarySpring",
     "Section",
     "bode",
     "closed_loop_poles",
