@@ -1,42 +1,23 @@
 """Frequencies of a rig for the published tables: one function, so that every table asks the same solution.
 
-They are found by the finite elements and then confirmed, and made exact, as roots of the determinant of the transition
-matrices, in the rig's own theory.
+They are tfarm's own, in the rig's own theory; the transition matrices and elements of the tests were compared with the
+same tables.
 """
 
 import math
 from itertools import pairwise
 
 import numpy as np
-from scipy.optimize import brentq
 
-from tests import chain_elements
-from tests.transition import determinant
+import tfarm
 from tfarm import Arm, Hub, Link, Section
 
 SLENDER = 1e4  # L/r of a unit beam: shear and rotary inertia move its first frequencies by some 1e-6 or less
-NEAR = (1e-5, 1e-3, 0.05)  # of a frequency: how far from the elements' the theory's own may lie
 
 
 def natural_frequencies(arm, count):
-    """The first flexible frequencies [rad/s] of an undamped rig in its own theory, to 1e-9."""
-
-    def value(omega):
-        return determinant(arm, 1j * omega, 15).real
-
-    return np.array([_root(value, guess) for guess in chain_elements.natural_frequencies(arm, count).tolist()])
-
-
-def _root(value, guess):
-    """The root near a guess, between two signs: by the chord where they are near, which leaves some NEAR[0]^2."""
-    for distance in NEAR:
-        low, high = guess * (1 - distance), guess * (1 + distance)
-        below, above = value(low), value(high)
-        if below * above < 0:
-            if distance == NEAR[0]:
-                return low + (high - low) * float(below / (below - above))
-            return brentq(lambda omega, unit=above: float(value(omega) / unit), low, high, rtol=1e-12)
-    raise AssertionError(f"the elements' {guess} rad/s is no frequency of the transition matrices")
+    """The first flexible frequencies [rad/s] of an undamped rig in its own theory."""
+    return tfarm.modes(arm, count).natural_frequency[arm.has_rigid_mode :]
 
 
 def unit_link(length=1.0, EI=1.0, rhoA=1.0):
