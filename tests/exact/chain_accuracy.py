@@ -17,9 +17,9 @@ from tests.exact.accuracy import HUGE, STEP, TINY, some_share
 from tests.rigs import some_point, some_rig
 from tfarm.exact import balls
 from tfarm.exact.balls import rational
-from tfarm.exact.chain import chain_of
 from tfarm.exact.chain_balls import Sweep
 from tfarm.exact.chain_values import free_outputs, readings
+from tfarm.exact.chaining import chain_of
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.spectrum.search import natural_frequencies
 

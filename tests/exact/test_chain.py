@@ -16,7 +16,8 @@ from tests.test_transition import rig
 from tests.transition import determinant, response
 from tfarm import Hub
 from tfarm.arm import THEORIES, Attachment, Motor, RotarySpring
-from tfarm.exact.chain import Chain, chain_of
+from tfarm.exact.chain import Chain
+from tfarm.exact.chaining import chain_of
 from tfarm.exact.coefficients import Coefficients
 from tfarm.exact.outputs import OF_ONE_LINK, OUTPUTS, Output
 from tfarm.exact.system import system_of

@@ -11,7 +11,7 @@ from tests.exact.chain_accuracy import BOUND, PLACES, WANTED, anywhere, exact_va
 from tests.test_transition import rig
 from tests.transition import response
 from tfarm.exact import balls
-from tfarm.exact.chain import chain_of
+from tfarm.exact.chaining import chain_of
 
 
 @pytest.mark.parametrize("place", [anywhere, *PLACES.values()], ids=["anywhere", *PLACES])

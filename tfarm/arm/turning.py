@@ -10,7 +10,7 @@ from tfarm.arm.theories import WITH_ROTARY_INERTIA
 
 if TYPE_CHECKING:
     from tfarm.arm.link import Link
-    from tfarm.arm.rig import Attachment, Gauge, Hub, Motor, Payload
+    from tfarm.arm.rig import Attachment, Gauge, Hub, Motor, Payload, RotarySpring
     from tfarm.arm.theories import Theory
 
 
@@ -25,6 +25,8 @@ class Turning:
         payload: Payload
         gauge: Gauge
         attachments: tuple[Attachment, ...]
+        clamp: RotarySpring
+        joint: RotarySpring
         theory: Theory
         input: str
 
@@ -86,6 +88,11 @@ class Turning:
     def input_lags(self) -> bool:
         """Whether the input is a voltage behind an inductance, whose torque comes late."""
         return self.input == "motor_voltage" and self.motor is not None and self.motor.inductance > 0
+
+    @property
+    def loses_at_hub_alone(self) -> bool:
+        """Whether nothing but the hub's own friction, the rotor's and back-EMF dissipates."""
+        return not any((*(link.damping for link in self.links), self.clamp.damping, self.joint.damping))
 
     @property
     def rate_loss(self) -> float:

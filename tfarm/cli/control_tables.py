@@ -28,7 +28,9 @@ def print_poles(answer: dict[str, Any]) -> None:
 
 def print_margins(found: Margins, answer: dict[str, Any]) -> None:
     """The verdict, then everything else."""
-    print(f"{answer['arm']}: {answer['verdict'].upper()} (apart from the pole at 0 that Kp = 0 leaves)")
+    far = answer["verdict"] == "unstable" or answer["known_beyond_the_band"]
+    reach = "" if far else f" up to {answer['band_rad_s']:.4g} rad/s, not known beyond"
+    print(f"{answer['arm']}: {answer['verdict'].upper()}{reach} (apart from the pole at 0 that Kp = 0 leaves)")
     more = " (infinitely many in all)" if answer["unstable_roots_infinite"] else ""
     print(f"unstable poles up to {answer['band_rad_s']:.6g} rad/s: {answer['unstable_roots']}{more}")
     print(answer["beyond_the_band"])

@@ -11,7 +11,7 @@ from typing import Any
 import flint
 
 from .balls import Ball, rational, transition
-from .chain import Body, Chain, Drive, Element, Layout, Mark, Offset, Segment, Spring
+from .chain import Chain, Layout
 from .coefficients import Condition, Inertia
 from .compiled import plain
 from .compound import (
@@ -29,6 +29,7 @@ from .compound import (
     row_across,
     transition_rows,
 )
+from .elements import Body, Drive, Element, Mark, Offset, Segment, Spring
 
 _end_plane, _inside_offset, _inside_spring = plain(end_plane), plain(inside_offset), plain(inside_spring)
 _inside_body, _across_rows, _transition_rows = plain(inside_body), plain(across_rows), plain(transition_rows)

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from tfarm.errors import ParameterError
 
 from .balls import Ball, precision, rational
-from .chain import Chain, Layout, Place
+from .chain import Chain, Layout
 from .chain_balls import Sweep
+from .elements import Place
 from .jets import Jet
 from .outputs import Output, unit_scale
 from .sweep import fill_free

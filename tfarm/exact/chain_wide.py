@@ -14,11 +14,12 @@ from typing import Any
 import flint
 
 from .balls import Ball, rational
-from .chain import Chain, Element, Segment
+from .chain import Chain
 from .chain_balls import Sweep, drive_of
 from .chain_values import readings
 from .compiled import plain
 from .compound import Plane, Row, across_waves, transition_rows
+from .elements import Element, Segment
 from .outputs import Output
 
 Series = Any  # flint.acb_series, which comes without types

@@ -19,11 +19,12 @@ from typing import Any, NamedTuple
 from tfarm.errors import CertificationError, ParameterError
 
 from .balls import Ball, point, precision, rational
-from .chain import Body, Chain, Element, Mark, Offset, Place, Segment, Spring
+from .chain import Chain
 from .chain_balls import Sweep
 from .chain_values import Reading, reading_of
 from .compiled import plain
 from .compound import Plane, Row, met
+from .elements import Body, Element, Mark, Offset, Place, Segment, Spring
 from .enclosures import precisions
 from .outputs import Output
 

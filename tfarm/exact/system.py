@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from tfarm.arm import Arm, Theory
 
-from .chain import Chain, chain_of
+from .chain import Chain
+from .chaining import chain_of
 from .coefficients import Coefficients, coefficients
 from .outputs import Output
 

@@ -18,13 +18,14 @@ from typing import Any
 import flint
 
 from .balls import Ball, State, point, rational
-from .chain import Chain, Segment
+from .chain import Chain
 from .chain_values import ChainState
 from .chain_wide import swept
 from .characteristic import FED, NUMERATORS, OPEN, Gains, unit_gains
 from .closed_form import from_waves
 from .coefficients import Coefficients, Condition
 from .compiled import plain
+from .elements import Segment
 from .system import System
 
 Series = Any  # flint.acb_series, which comes without types

@@ -147,6 +147,7 @@ def margins_answer(found: Margins) -> dict[str, Any]:
         "unstable_roots_infinite": verdict.unstable_roots_infinite,
         "band_rad_s": verdict.band,
         "beyond_the_band": verdict.tail,
+        "known_beyond_the_band": verdict.is_known_beyond,
         "spectral_abscissa": verdict.poles.spectral_abscissa,
         "lyapunov": {"proven": proof.proven, "a1_over_a2": proof.a1_over_a2, "reason": proof.reason},
         **{f"{row.gain}_{key}": value for row, part in zip(rows, windows, strict=True) for key, value in part.items()},

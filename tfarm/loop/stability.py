@@ -32,13 +32,21 @@ Real = NDArray[np.float64]
 FEW = 12  # flexible modes in the band at C = 0, and at least
 QUIET = 0.5  # |L| beyond the band, at C > 0
 MARGIN_OF_ZERO = 1e-11  # a real part below this share of |s| is none: the poles are right to a few eps
+UNKNOWN = (  # beyond the band: of a rig with a segment without damping, and of others
+    "beyond the band not bounded: with C = 0 in the link resonances are too narrow to be looked at",
+    "beyond the band not bounded: the small-gain condition would need more modes than are looked at",
+)
+DRIVEN = "C = 0: every flexible mode beyond the band is unstable too, with a growth rate that tends to 0"
 UNFELT = 1e-9  # a hub participation below this share of an ordinary one is none
 
 
 @dataclass(frozen=True)
 @record
 class Stability:
-    """`verdict` "stable", "marginal" or "unstable"; poles in the band; what is known beyond it, in words."""
+    """`verdict` "stable", "marginal" or "unstable"; poles in the band; what is known beyond it, in words.
+
+    Where `is_known_beyond` is false the verdict is that of the band alone.
+    """
 
     loop: Loop
     verdict: str
@@ -47,6 +55,7 @@ class Stability:
     band: float
     tail: str
     poles: Poles
+    is_known_beyond: bool = True
 
     @property
     def is_stable(self) -> bool:
@@ -65,7 +74,7 @@ def stability(arm: Arm, law: HubFeedback, band: float | None = None) -> Stabilit
     poles = poles_below(loop, height)
     infinite, tail = _beyond(loop, quiet)
     verdict = _verdict(poles, infinite, loop)
-    return Stability(loop, verdict, poles.unstable, infinite, poles.box.im_max, tail, poles)
+    return Stability(loop, verdict, poles.unstable, infinite, poles.box.im_max, tail, poles, tail not in UNKNOWN)
 
 
 def _verdict(poles: Poles, infinite: bool, loop: Loop) -> str:
@@ -110,22 +119,19 @@ def _beyond(loop: Loop, quiet: bool) -> tuple[bool, str]:
     law = loop.law
     if not loop.arm.is_undamped and loop.is_told_by_theorem and loop.takes_energy > 0:
         return False, "C = 0: every mode beyond the band is damped (Lyapunov), with a decay rate that tends to 0"
+    if not loop.arm.is_undamped and loop.is_told_by_theorem and loop.takes_energy < 0 and loop.arm.loses_at_hub_alone:
+        return True, DRIVEN
     if not loop.arm.is_undamped:
         if quiet:
             return False, f"beyond the band |L(iw)| < {QUIET:g} and falling: no unstable pole there (small gain)"
-        if not loop.arm.least_damping:
-            return (
-                False,
-                "beyond the band not bounded: with C = 0 in the link resonances are too narrow to be looked at",
-            )
-        return False, "beyond the band not bounded: the small-gain condition would need more modes than are looked at"
+        return False, UNKNOWN[bool(loop.arm.least_damping)]
     if law.K1 == 0:
         return False, "C = 0 and K1 = 0: nothing takes or gives energy, modes beyond the band lie on the axis"
     if loop.moment_share == 1:
         return False, "C = 0 and K2 = 1: modes with the hub at rest stay undamped, in every band"
     if loop.takes_energy > 0:
         return False, "C = 0: every mode beyond the band is damped (Lyapunov), with a decay rate that tends to 0"
-    return True, "C = 0: every flexible mode beyond the band is unstable too, with a growth rate that tends to 0"
+    return True, DRIVEN
 
 
 def loop_band(loop: Loop) -> tuple[float, bool]:

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm
-from tfarm.exact.chain import Chain, chain_of
+from tfarm.exact.chain import Chain
 from tfarm.exact.chain_values import free_slopes, order_at_zero
+from tfarm.exact.chaining import chain_of
 from tfarm.exact.characteristic import Analytic, characteristic, deflated
 from tfarm.exact.coefficients import Coefficients
 from tfarm.exact.free import free_response, low_frequency, low_frequency_tip, tip_response

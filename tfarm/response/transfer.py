@@ -14,7 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from tfarm.arm import INPUT_UNITS, Arm, Input, must_be_arm
 from tfarm.errors import MISSING, ParameterError
 from tfarm.exact.balls import nearest
-from tfarm.exact.chain import Chain, chain_of
+from tfarm.exact.chain import Chain
+from tfarm.exact.chaining import chain_of
 from tfarm.exact.loads import is_load, load_of, loaded_value
 from tfarm.exact.methods import Method, known_method, slow_values
 from tfarm.exact.outputs import Output, output

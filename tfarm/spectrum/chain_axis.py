@@ -11,10 +11,11 @@ from typing import Any
 import flint
 
 from tfarm.exact.balls import rational
-from tfarm.exact.chain import Chain, Element, Segment, Spring
+from tfarm.exact.chain import Chain
 from tfarm.exact.chain_balls import Sweep, drive_of
 from tfarm.exact.compiled import plain
 from tfarm.exact.compound import Plane, across_waves
+from tfarm.exact.elements import Element, Segment, Spring
 
 Ball = Any
 _across_waves = plain(across_waves)

@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.errors import ConvergenceError
-from tfarm.exact.chain import Body, Chain, Place, Segment
+from tfarm.exact.chain import Chain
 from tfarm.exact.chain_values import free_fields
+from tfarm.exact.elements import Body, Place, Segment
 
 Real = NDArray[np.float64]
 

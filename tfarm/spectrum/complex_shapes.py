@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from tfarm.errors import ConvergenceError
 from tfarm.exact.balls import State, nearest, point, precision
-from tfarm.exact.chain import Chain, Place
+from tfarm.exact.chain import Chain
 from tfarm.exact.chain_values import free_fields
 from tfarm.exact.characteristic import characteristic
 from tfarm.exact.coefficients import Condition
+from tfarm.exact.elements import Place
 from tfarm.exact.free import free_response
 from tfarm.exact.system import System
 
