@@ -36,6 +36,8 @@ from tfarm.reduced import modal_model
 T = 0.01
 GAINS = HubFeedback(K1=0.3, K2=0.3)
 
+ROUNDED = 16 * np.finfo(float).eps  # of the largest moment: 20 modes and 40 are one there, but for sums
+
 
 def simulator(arm, name="slew", duration=3.0, chain=None, count=8, between=0):
     chain = Chain() if chain is None else chain
@@ -278,7 +280,7 @@ def test_a_simulation_takes_the_modes_that_its_digits_need_or_says_what_it_is_of
         assert (enough["modes_used"], enough["modes_change"] < 1e-4) == (20, True)
         fine = simulator(lab, task, duration, count=40).linear(GAINS).at_samples
         off = abs(enough["root_moment"] - fine.root_moment).max() / abs(fine.root_moment).max()
-        assert 0 < off < enough["modes_change"]
+        assert 0 < off < max(enough["modes_change"], ROUNDED)
     sudden = simulated_answer(lossless, GAINS, Chain(), "impulse", 0.5)
     assert (sudden["modes_used"], sudden["modes_change"] > 1e-4) == (40, True)
     more = simulator(lossless, "impulse", 0.5, count=160).linear(GAINS).at_samples

@@ -14,11 +14,12 @@ from fractions import Fraction
 
 import numpy as np
 
+from tests.outputs import OF_ONE_LINK
 from tests.strategies import some_arm, some_s
 from tfarm.exact import balls
 from tfarm.exact.coefficients import coefficients
 from tfarm.exact.fields import fields
-from tfarm.exact.outputs import OF_ONE_LINK, unit_scale
+from tfarm.exact.outputs import unit_scale
 from tfarm.exact.waves import evaluate
 from tfarm.spectrum.search import natural_frequencies
 

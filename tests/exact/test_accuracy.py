@@ -8,10 +8,10 @@ import pytest
 
 import tfarm
 from tests.exact.accuracy import BOUND, PLACES, by_a_frequency, exact_values, float_values, measure, near, run, run_at
+from tests.outputs import OF_ONE_LINK
 from tests.strategies import some_arm
 from tfarm.exact import balls
 from tfarm.exact.coefficients import coefficients
-from tfarm.exact.outputs import OF_ONE_LINK
 from tfarm.spectrum.search import count_below, natural_frequencies
 
 AT_ENDS = {name: output for name, output in OF_ONE_LINK.items() if output.place != "x"}

@@ -10,12 +10,12 @@ import pytest
 
 import tfarm
 from tests.models import Ritz, shooting
+from tests.outputs import OF_ONE_LINK
 from tests.strategies import BOUNDARY_CASES, arm_of, some_arm, some_s
 from tfarm import Arm, ConvergenceError, Hub, Link, ParameterError, Payload, Section
 from tfarm.exact import appendix
 from tfarm.exact.coefficients import coefficients
 from tfarm.exact.enclosures import enclose
-from tfarm.exact.outputs import OF_ONE_LINK
 
 EPS = np.finfo(float).eps
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import tfarm
+from tests.outputs import OF_ONE_LINK
 from tests.rigs import some_point, some_rig
 from tests.strategies import some_arm
 from tests.test_chain_elements import lossless
@@ -16,10 +17,11 @@ from tests.test_transition import rig
 from tests.transition import determinant, response
 from tfarm import Hub
 from tfarm.arm import THEORIES, Attachment, Motor, RotarySpring
+from tfarm.errors import ParameterError
 from tfarm.exact.chain import Chain
 from tfarm.exact.chaining import chain_of
 from tfarm.exact.coefficients import Coefficients
-from tfarm.exact.outputs import OF_ONE_LINK, OUTPUTS, Output
+from tfarm.exact.outputs import OUTPUTS, Output
 from tfarm.exact.system import system_of
 from tfarm.exact.values import evaluate_outputs, expansions_at_zero, kernel_table
 from tfarm.spectrum.search import natural_frequencies
@@ -28,7 +30,7 @@ EPS = np.finfo(float).eps
 LOST = 1e-13  # error over 1 + condition: 20 times what 5,000 rigs of `chain_accuracy` have at most
 EXACT = mpmath.mpf("1e-29")  # of 30 digits, rounded
 INPUTS = ("hub_torque", "motor_voltage", "motor_current", "hub_angle")
-ENDS = [name for name, each in OUTPUTS.items() if each.place != "x"]
+ENDS = [name for name, each in OUTPUTS.items() if each.place != "x" and name != "motor_current"]
 ALONG = {  # as the oracle says
     **{name: name for name in ("displacement", "velocity", "acceleration", "deflection", "shear")},
     "rotation": "twist",
@@ -70,6 +72,22 @@ def error(G, s, exact):
 def test_every_output_of_a_rig_with_everything(drive, s):
     arm = rig(input=drive)
     assert error(transfer_of(arm, 0.625), s, oracle(arm, s, 0.625)) < LOST
+
+
+@pytest.mark.parametrize("drive", ["hub_torque", "motor_voltage", "motor_current"])
+def test_the_current_of_the_motor(drive):
+    arm, s = rig(input=drive), -4 + 900j
+    exact = response(arm, s, ["motor_current"], 40)
+    G = tfarm.transfer(arm, "motor_current")
+    assert error(tfarm.transfer(arm, ["motor_current"]), s, list(exact.values())) < LOST
+    (re, im), value = G.digits(s, 20), complex(exact["motor_current"])
+    assert abs(complex(float(re), float(im)) - value) <= 2 * EPS * abs(value)
+
+
+@pytest.mark.parametrize("arm", [rig(motor=None), rig(input="hub_angle")], ids=["no motor", "angle"])
+def test_no_current_is_known_without_a_motor_that_drives(arm):
+    with pytest.raises(ParameterError, match="motor_current"):
+        tfarm.transfer(arm, "motor_current")(1j)
 
 
 @pytest.mark.parametrize("seed", range(16))

@@ -9,9 +9,9 @@ import pytest
 from numpy.polynomial import Polynomial
 
 import tfarm
+from tests.outputs import OF_ONE_LINK
 from tests.strategies import BOUNDARY_CASES, some_arm
 from tfarm import Hub, Payload
-from tfarm.exact.outputs import OF_ONE_LINK
 
 EPS = np.finfo(float).eps
 ENDS = [name for name, output in OF_ONE_LINK.items() if output.place != "x"]

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 import tfarm
 from tests.models import shooting
+from tests.outputs import OF_ONE_LINK
 from tests.strategies import arms, dampings, finite, frequencies, undamped
-from tfarm.exact.outputs import OF_ONE_LINK
 
 EPS = np.finfo(float).eps
 ENDS = [name for name, output in OF_ONE_LINK.items() if output.place != "x"]

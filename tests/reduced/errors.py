@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 import tfarm
+from tests.outputs import OF_ONE_LINK
 from tests.strategies import some_arm
-from tfarm.exact.outputs import OF_ONE_LINK
 from tfarm.reduced import reduce
 
 ALONG = [name for name, each in OF_ONE_LINK.items() if each.place == "x"]

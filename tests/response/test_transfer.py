@@ -8,10 +8,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 import tfarm
+from tests.outputs import OF_ONE_LINK
 from tfarm import Arm, Hub, ParameterError, Payload
 from tfarm.exact import appendix, balls, enclosures
 from tfarm.exact.coefficients import coefficients
-from tfarm.exact.outputs import OF_ONE_LINK
 
 EPS = np.finfo(float).eps
 AT_ENDS = [name for name, output in OF_ONE_LINK.items() if output.place != "x"]

@@ -40,6 +40,7 @@ class Reading(NamedTuple):
     power: int
     gauge: bool
     unit: Fraction
+    is_current: bool = False
 
 
 @dataclass(frozen=True)
@@ -86,6 +87,8 @@ def reading_of(chain: Chain, wanted: Output, x: float) -> Reading:
         **dict.fromkeys(("M", "strain"), (0, 0, 1, 0)),
     }
     theta = {"Y": -(chain.radius + share), "Phi": Fraction(-1), "theta": Fraction(1)}
+    if wanted.quantity == "current":
+        return Reading(None, (0, 0, 0, 0), Fraction(1), wanted.power, False, _current_unit(chain), True)
     place = None if wanted.quantity == "theta" else Place(share, wanted.side)
     if wanted.place == "root" and wanted.gauge:
         place = chain.gauge
@@ -94,6 +97,14 @@ def reading_of(chain: Chain, wanted: Output, x: float) -> Reading:
     state = weights.get(wanted.quantity, (0, 0, 0, 1)) if place else (0, 0, 0, 0)
     unit = _strain_unit(chain, place) if wanted.quantity == "strain" and place else unit_scale(wanted, chain)
     return Reading(place, state, theta.get(wanted.quantity, Fraction(0)), wanted.power, wanted.gauge, unit)
+
+
+def _current_unit(chain: Chain) -> Fraction:
+    """Current [A] per torque without dimensions and unit of the input."""
+    if not chain.drive.per_ampere or not chain.drive.turns:
+        remedy = "needs a [motor] and another input than hub_angle, which says nothing of the current"
+        raise ParameterError(key="output", value="motor_current", remedy=remedy)
+    return chain.EI / chain.length / chain.drive.per_ampere / chain.input_unit
 
 
 def _strain_unit(chain: Chain, place: Place) -> Fraction:
@@ -128,6 +139,11 @@ def free_outputs(chain: Chain, wanted: Sequence[Output], s: Complex, x: float) -
 def _free(those: Readings, s: Complex) -> Free:
     found, lost = np.empty((2 + len(those.each), s.size), complex), np.empty(s.size, bool)
     fill_free(np.ascontiguousarray(s, dtype=complex), those.layout.rows, those.layout.ends, those.table, found, lost)
+    drive = those.layout.chain.drive
+    for row, one in enumerate(those.each):
+        if one.is_current:  # the row holds theta: what is left of the input after back-EMF turns the hub
+            unit, back = float(one.unit) * s**one.power, float(drive.back_emf) * s
+            found[2 + row] = (unit * found[0] - back * found[2 + row]) / (1.0 + float(drive.lag) * s)
     return Free(found[0], found[2:], found[1], lost)
 
 
@@ -173,6 +189,9 @@ class ChainState:
         those = readings(self.chain, (output,), x)
         one, sweep = those.each[0], self._sweep(those.layout, self.s)
         value = sweep.theta * rational(one.theta)
+        if one.is_current:
+            drive = self.chain.drive
+            value = (sweep.input - self.s * rational(drive.back_emf) * value) / (self.s * rational(drive.lag) + 1)
         if one.place is not None:
             for weight, part in zip(one.state, sweep.states[0], strict=True):
                 value = value + part * rational(weight) if weight else value
@@ -184,7 +203,9 @@ class ChainState:
 
     def value(self, output: Output, x: float = 0.0) -> Ball:
         """The output for a unit input, in SI units; x is a share of the length."""
-        constant = output.constant(self.chain, x)
+        constant, drive = output.constant(self.chain, x), self.chain.drive
+        if output.quantity == "current" and not (drive.back_emf or drive.lag):  # the input itself, but for its unit
+            return self.s**output.power * rational(readings(self.chain, (output,), x).each[0].unit)
         if constant is None:
             return self.numerator(output, x) / self.input
         return self.s**output.power * constant * rational(unit_scale(output, self.chain))

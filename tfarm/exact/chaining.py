@@ -78,7 +78,7 @@ def drive_of(arm: Arm, rotation: Fraction) -> Drive:
     else:
         lag = back_emf = none
     own = inertia * rotation, friction * rotation, Fraction(hub.stiffness) * rotation
-    return Drive(True, *own, back_emf, lag, per_torque / rotation)
+    return Drive(True, *own, back_emf, lag, per_torque / rotation, per_ampere if motor is not None else none)
 
 
 def _body(each: Attachment, translation: Fraction, rotation: Fraction) -> Body:

@@ -86,7 +86,7 @@ class Drive(NamedTuple):
 
     The input turns the hub against  Z_h = inertia s^2 + friction s + stiffness,  or is its angle (`turns` false).  A
     voltage has back-EMF and lag too:  (1 + lag s)(Z_h theta - M_axis) + back_emf s theta.  `unit` is the SI value of
-    one unit of the input.
+    one unit of the input, `per_ampere` the torque at the hub of 1 A [N m/A], 0 without a motor.
     """
 
     turns: bool
@@ -96,6 +96,7 @@ class Drive(NamedTuple):
     back_emf: Fraction
     lag: Fraction
     unit: Fraction
+    per_ampere: Fraction = Fraction(0)
 
     @property
     def of_angle(self) -> tuple[Fraction, ...]:

@@ -82,6 +82,8 @@ def loaded_value(chain: Chain, load: Load, wanted: Output, s: complex, x: float,
 
 def _value(chain: Chain, load: Load, wanted: Output, s: Ball, x: float) -> Ball | None:
     one = reading_of(chain, wanted, x)
+    if one.is_current:
+        raise ParameterError(key="output", value=wanted.name, remedy="is known for an input at the hub, not for a load")
     signs = (1,) if load.kind == "force" else (-1, 1)
     total = rational(0) * s
     for share, sign in zip(load.shares, signs, strict=True):

@@ -20,8 +20,8 @@ from .coefficients import Coefficients
 
 # theta, M, Q, W, W - (r + x) theta, Psi - theta: hub angle, moment, shear force, displacement, deflection, rotation;
 # Psi: rotation in space;
-# bending strain at the surface, displacement of the payload's centre of mass
-Quantity = Literal["theta", "M", "Q", "W", "Y", "Phi", "Psi", "strain", "centre"]
+# bending strain at the surface, displacement of the payload's centre of mass, current of the motor
+Quantity = Literal["theta", "M", "Q", "W", "Y", "Phi", "Psi", "strain", "centre", "current"]
 Place = Literal["root", "tip", "x"]
 Side = Literal["outer", "inner"]  # of a joint of two segments, or of what is attached there
 
@@ -36,9 +36,10 @@ PLACES: Mapping[str, tuple[Place, ...]] = MappingProxyType({
     "Psi": ("tip", "x"),
     "strain": ("x",),
     "centre": ("tip",),
+    "current": ("root",),
 })  # fmt: skip
 _METRES, _RADIANS = dict.fromkeys(("W", "Y", "centre"), "m"), dict.fromkeys(("theta", "Phi", "Psi"), "rad")
-UNITS = MappingProxyType({**_METRES, **_RADIANS, "M": "N m", "Q": "N", "strain": "1"})
+UNITS = MappingProxyType({**_METRES, **_RADIANS, "M": "N m", "Q": "N", "strain": "1", "current": "A"})
 
 
 class Units(Protocol):
@@ -109,7 +110,7 @@ class Output:
     def is_of_a_chain(self) -> bool:
         """Whether the closed form of one link leaves it out: then that link is taken as a chain of one segment."""
         along = self.quantity == "W" and self.place == "x"
-        return along or self.quantity in ("Psi", "strain", "centre") or self.side == "inner"
+        return along or self.quantity in ("Psi", "strain", "centre", "current") or self.side == "inner"
 
     @property
     def base(self) -> Output:
@@ -160,6 +161,7 @@ OUTPUTS: Mapping[str, Output] = MappingProxyType({each.name: each for each in (
     Output(name="tip_acceleration", quantity="W", place="tip", unit="m/s^2", power=2, label="tip acceleration"),
     Output(name="root_moment", quantity="M", place="root", unit="N m", gauge=True, label="root moment"),
     Output(name="root_shear", quantity="Q", place="root", unit="N", label="root shear force"),
+    Output(name="motor_current", quantity="current", place="root", unit="A", label="motor current"),
     Output(name="tip_rotation", quantity="Phi", place="tip", unit="rad", label="tip rotation"),
     Output(name="tip_angle", quantity="Psi", place="tip", unit="rad", label="tip angle in space"),
     Output(name="payload_displacement", quantity="centre", place="tip", unit="m", label="payload displacement"),
@@ -173,8 +175,6 @@ OUTPUTS: Mapping[str, Output] = MappingProxyType({each.name: each for each in (
     Output(name="strain", quantity="strain", place="x", unit="1", gauge=True, label="bending strain at x"),
     Output(name="shear", quantity="Q", place="x", unit="N", label="shear force at x"),
 )})  # fmt: skip
-
-OF_ONE_LINK = MappingProxyType({name: each for name, each in OUTPUTS.items() if not each.is_of_a_chain})
 
 
 def output(wanted: str | Output) -> Output:

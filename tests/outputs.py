@@ -1,0 +1,7 @@
+"""The outputs that the oracles of the single arm know: those of the closed form that had a name before rigs."""
+
+from tfarm.exact.outputs import OUTPUTS
+
+OF_ONE_LINK = {  # the rotation of the tip has tests of its own (tests/response/test_outputs.py)
+    name: each for name, each in OUTPUTS.items() if not each.is_of_a_chain and name != "tip_rotation"
+}
