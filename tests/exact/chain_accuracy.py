@@ -24,7 +24,8 @@ from tfarm.exact.outputs import OUTPUTS
 from tfarm.spectrum.search import natural_frequencies
 
 BOUND = 1e-14
-WANTED = tuple(each for each in OUTPUTS.values() if each.quantity != "strain")  # which a random section does not have
+UNKNOWN = ("strain", "current")  # a random section has no depth, a random rig no motor
+WANTED = tuple(each for each in OUTPUTS.values() if each.quantity not in UNKNOWN)
 RIGHT = 120  # bits of a value that its slopes, over `STEP`, leave some sixty of
 MOST_BITS = 1 << 14  # an output that has no digit by then is zero
 

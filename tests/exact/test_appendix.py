@@ -64,6 +64,7 @@ def test_thirty_digits_are_those_of_the_state_transition_matrix(preset, s):
             "deflection": inside[0] - mpmath.mpf(x * L) * theta,
             "rotation": inside[1] - theta,
             "moment": inside[2] / damper,
+            "full_moment": inside[2],
             "shear": inside[3],
         }
         for name in OF_ONE_LINK:
