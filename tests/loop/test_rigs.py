@@ -12,8 +12,10 @@ from tests.loop.rig_loops import RigLoop
 from tests.rigs import some_rig
 from tfarm import HubFeedback
 from tfarm.dsp import Chain, Sampling, sampled_verdict
+from tfarm.loop.frequencies import band_of
 from tfarm.loop.plant import Loop
 from tfarm.loop.poles import closed_loop_poles, poles_below
+from tfarm.loop.regions import INFINITE, region
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import gain_windows
 from tfarm.spectrum.scales import default_gains, gain_unit
@@ -107,3 +109,21 @@ def test_the_sampled_loop_is_that_of_the_elements_under_a_hold(period, K2, stabl
     assert verdict.log_radius == pytest.approx(radius, rel=1e-5)
     assert verdict.is_stable is stable
     assert bool(radius < 0) is stable
+
+
+@pytest.mark.parametrize("K2", [1.2, -0.5])
+def test_more_than_the_whole_moment_drives_every_mode_behind_friction(K2):
+    """Each higher band has as many more unstable poles as it has modes, two each; below the whole moment none."""
+    arm = REAL["quanser-2dsfl"]
+    law = default_gains(arm).having("K2", K2 * arm.input_per_torque)
+    verdict = stability(arm, law)
+    driven = K2 > 1
+    assert verdict.unstable_roots_infinite == driven
+    assert verdict.is_known_beyond
+    heights = [band_of(arm, number) for number in (4, 8)]
+    low, high = (poles_below(Loop(arm, law), height).unstable for height in heights)
+    assert high - low == 8 * driven
+    plane = region(
+        arm, np.array([0.5, 1.0]) * law.K1, np.array([1.0, 1.01]) * law.K2 if driven else np.array([1.0, 0.9]) * law.K2
+    )
+    assert (plane.unstable == (INFINITE if driven else 0)).all()
