@@ -13,7 +13,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from . import elements, loci, loops, memory, responses, sampled, spectra, tuning
+from . import elements, loci, loops, memory, responses, rigs, sampled, spectra, tuning
 from .rows import Row, keep, show
 
 
@@ -23,6 +23,7 @@ def measure() -> Iterator[Row]:
     yield from responses.response_rows()
     yield from responses.mpmath_rows()
     yield from elements.response_rows()
+    yield from rigs.rig_rows()
     yield from spectra.modes_rows()
     yield from elements.modes_rows()
     yield spectra.cxroots_row()
