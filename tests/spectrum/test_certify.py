@@ -90,8 +90,8 @@ def test_the_cut_off_mode_is_certified() -> None:
 
 
 def test_a_wrong_half_wave_count_would_be_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    honest = room.Axis._pinned
-    monkeypatch.setattr(room.Axis, "_pinned", lambda self, waves: honest(self, waves) + 2)
+    honest = room.pinned_count
+    monkeypatch.setattr(room, "pinned_count", lambda squares: honest(squares) + 2)
     with pytest.raises(CertificationError, match="lie below"):
         tfarm.modes(tfarm.load("sasaki2012"), 3).certify(15)
 

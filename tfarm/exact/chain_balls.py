@@ -10,8 +10,8 @@ from typing import Any
 
 import flint
 
-from .balls import Ball, rational, transition
-from .chain import Chain, Layout
+from .balls import rational, transition
+from .chain import Layout
 from .coefficients import Condition, Inertia
 from .compiled import plain
 from .compound import (
@@ -131,8 +131,3 @@ def drive_of(drive: Drive, s: Any, theta: Any, M: Any) -> Any:
     A, B = (drive.of_angle, drive.of_moment)
     of_angle = ((s * rational(A[3]) + rational(A[2])) * s + rational(A[1])) * s + rational(A[0])
     return of_angle * theta - (s * rational(B[1]) + rational(B[0])) * M
-
-
-def determinant(chain: Chain, s: Ball) -> Ball:
-    """The input of the free response at s: zero at the eigenvalues."""
-    return Sweep(chain.at(), s).input

@@ -182,7 +182,6 @@ class ChainState:
     def __init__(self, chain: Chain, s: Any, *, slow: bool = False) -> None:
         self.chain, self.s, self._sweep = chain, s, SlowSweep if slow else Sweep
         self.input = self._sweep(chain.at(), s).input
-        self._sweeps: dict[tuple[Output, float], Sweep] = {}
 
     def numerator(self, output: Output, x: float = 0.0) -> Any:
         """The output of the free response, in SI units."""

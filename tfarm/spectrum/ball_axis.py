@@ -16,6 +16,7 @@ from tfarm.exact.system import System
 
 from .chain_axis import ChainAxis
 from .counting import row_of, steps_of
+from .half_waves import pinned_count, real_waves
 
 Ball = Any
 _minors = plain(from_waves)
@@ -39,7 +40,7 @@ class Axis:
     def count(self, omega: Ball) -> int | None:
         """N(omega), the rigid-body mode included; None if a sign or a half wave is not certain."""
         waves = self._waves(omega)
-        number = self._pinned(waves)
+        number = pinned_count(wave[2] for wave in waves[1])
         for row, step in zip(self._rows, self._steps, strict=True):
             value = self._drive(waves, row)
             if number is None or not (value > 0 or value < 0):
@@ -47,41 +48,15 @@ class Axis:
             number += step * ((number % 2 == 1) != bool(value < 0))
         return number
 
-    def _waves(self, omega: Ball) -> tuple[Ball, list[tuple[Ball, ...]]]:
+    def _waves(self, omega: Ball) -> tuple[Ball, tuple[tuple[Ball, ...], ...]]:
         S = -omega * omega
-        half, product = S * (self._a + self._b) / 2, S * (self._a * self._b * S + self._g)
-        spread = (half * half - product).sqrt()
-        return S, [self._functions(z, S) for z in (half + spread, half - spread)]
+        return S, real_waves(self._a, self._b, self._g, S)
 
-    def _functions(self, z: Ball, S: Ball) -> tuple[Ball, ...]:
-        """c, sinh t / t, z, v and the scale of one wave; real, whether it decays or travels."""
-        if z < 0:
-            k = (-z).sqrt()
-            sine, cosine = k.sin_cos()
-            return cosine, sine / k, z, z - self._b * S, flint.arb(1)
-        t = z.sqrt()
-        e = (-t).exp()
-        square = e * e
-        return (1 + square) / 2, (1 - square) / (2 * t), z, z - self._b * S, e
-
-    def _drive(self, waves: tuple[Ball, list[tuple[Ball, ...]]], row: list[Ball]) -> Ball:
+    def _drive(self, waves: tuple[Ball, tuple[tuple[Ball, ...], ...]], row: list[Ball]) -> Ball:
         S, (one, two) = waves
         tip = row[0] + row[1] * S, row[2], row[3] + row[4] * S, row[5]
         theta, M0, _, _ = _minors(*one, *two, self._g * S, flint.arb(1), *tip)
         return row[8] * M0 - (row[6] + row[7] * S) * theta  # the sign of g S is minus
-
-    def _pinned(self, waves: tuple[Ball, list[tuple[Ball, ...]]]) -> int | None:
-        """The count for both ends pinned: half waves inside the length, and one above the cut-off."""
-        number, travelling = 0, 0
-        for _, _, z, _, _ in waves[1]:
-            if z < 0:
-                whole = ((-z).sqrt() / flint.arb.pi()).floor().unique_fmpz()
-                if whole is None:
-                    return None
-                number, travelling = number + int(whole), travelling + 1
-            elif not z > 0:
-                return None
-        return number + (travelling == 2)
 
 
 def axis_of(k: System) -> Axis | ChainAxis:

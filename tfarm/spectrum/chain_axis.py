@@ -17,6 +17,8 @@ from tfarm.exact.compiled import plain
 from tfarm.exact.compound import Plane, across_waves
 from tfarm.exact.elements import Element, Segment, Spring
 
+from .half_waves import pinned_count, real_waves
+
 Ball = Any
 _across_waves = plain(across_waves)
 
@@ -52,8 +54,7 @@ class AxisSweep(Sweep):
         w, m, q = (rational(unit) for unit in element.units)
         own = p[0] * w, p[1] * (w * m), p[2] * m, p[3] * q, p[4] * (m * q)
         a, b, g = (rational(number) for number in element[:3])
-        waves, gS = self._waves(a, b, g), self.S * g
-        one, two = waves
+        (one, two), gS = real_waves(a, b, g, self.S), self.S * g
         gap = one[2] - two[2]
         unit = 1 / (gS * gap * gap)
         inside = tuple(part * unit for part in _across_waves(*one, *two, gS, flint.arb(1), self.S * (a - b), own))
@@ -66,7 +67,10 @@ class AxisSweep(Sweep):
         return inside[0] / w, inside[1] / (w * m), inside[2] / m, inside[3] / q, inside[4] / (m * q)
 
     def _count_segment(self, z: Sequence[Ball], p: Plane, q: Plane, r: Sequence[Ball]) -> None:
-        outside, self.number = self.number, _pinned(z)
+        outside, pinned = self.number, pinned_count(z)
+        if pinned is None:
+            raise UncertainError
+        self.number = pinned
         self._step(r[1], -1)
         self._step(-r[0], -1)
         self.number += outside
@@ -89,22 +93,6 @@ class AxisSweep(Sweep):
             self._step(self.drive, 1)
         return self.number
 
-    def _waves(self, a: Ball, b: Ball, g: Ball) -> tuple[tuple[Ball, ...], tuple[Ball, ...]]:
-        """c, sinh t / t, z, v and the scale of both waves; real, whether they decay or travel."""
-        half, product = self.S * (a + b) / 2, self.S * (a * b * self.S + g)
-        spread = (half * half - product).sqrt()
-
-        def functions(z: Ball) -> tuple[Ball, ...]:
-            if z < 0:
-                k = (-z).sqrt()
-                sine, cosine = k.sin_cos()
-                return cosine, sine / k, z, z - self.S * b, flint.arb(1)
-            t = z.sqrt()
-            e = (-t).exp()
-            return (1 + e * e) / 2, (1 - e * e) / (2 * t), z, z - self.S * b, e
-
-        return functions(half + spread), functions(half - spread)
-
 
 class ChainAxis:
     """A chain on the imaginary axis in real balls, at the working precision, as `ball_axis.Axis` is of an arm."""
@@ -122,17 +110,3 @@ class ChainAxis:
             return AxisSweep(self._chain, omega, counting=True).released()
         except UncertainError:
             return None
-
-
-def _pinned(z: Sequence[Ball]) -> int:
-    """The count of a segment pinned at both ends: half waves inside it, and one above the cut-off."""
-    number, travelling = 0, 0
-    for each in z:
-        if each < 0:
-            whole = ((-each).sqrt() / flint.arb.pi()).floor().unique_fmpz()
-            if whole is None:
-                raise UncertainError
-            number, travelling = number + int(whole), travelling + 1
-        elif not each > 0:
-            raise UncertainError
-    return number + (travelling == 2)
