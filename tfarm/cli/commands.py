@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, cast
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,7 +12,7 @@ from tfarm.cli.app import ArmName, Compare, Digits, Json, MethodName, app, give,
 from tfarm.errors import one_line
 
 if TYPE_CHECKING:
-    from tfarm.arm import Input
+    pass
 
 MOST_LISTED = 1000  # modes with nodes and sensitivities: their work grows with the square, to some 20 s
 
@@ -81,13 +81,10 @@ def response(
     json: Json = False,
 ) -> None:
     """The exact response to the arm's input: hub torque unless its file says otherwise, hub angle of a locked hub."""
-    from tfarm.cli.inputs import points_on
+    from tfarm.cli.inputs import driven_by, points_on
 
-    right, at, subject = right_digits(digits), points_on(s, omega, start, stop, points), load_arm(arm)
-    if driven is not None and "@" not in driven:
-        from dataclasses import replace
-
-        subject, driven = replace(subject, input=cast("Input", driven)), None
+    right, at = right_digits(digits), points_on(s, omega, start, stop, points)
+    subject, driven = driven_by(load_arm(arm), driven)
     from tfarm.cli.methods import alone, compared_responses, print_compared, slow_method
     from tfarm.cli.tables import print_found, say_written
     from tfarm.response import transfer

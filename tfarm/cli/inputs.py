@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from functools import wraps
 from inspect import Parameter, signature
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar, cast
 
 import numpy as np
 import typer
@@ -17,7 +18,7 @@ from tfarm.cli.app import whole
 from tfarm.errors import ParameterError
 
 if TYPE_CHECKING:
-    from tfarm.arm import Arm, HubFeedback
+    from tfarm.arm import Arm, HubFeedback, Input
 
 Given = dict[str, float | None]  # gains by name, as typed
 HELP = {  # of the gains that have a default of their own
@@ -115,3 +116,10 @@ def _number(key: str, text: str, kind: type[_Number], remedy: str) -> _Number:
     if not np.isfinite(value):
         raise ParameterError(key=key, value=text, remedy=f"not finite; {remedy}")
     return value
+
+
+def driven_by(arm: Arm, name: str | None) -> tuple[Arm, str | None]:
+    """The arm with another input at its hub, or with its own and the load on its link that is named."""
+    if name is None or "@" in name:
+        return arm, name
+    return replace(arm, input=cast("Input", name)), None  # the record refuses what is none
