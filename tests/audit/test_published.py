@@ -102,7 +102,7 @@ def test_the_answer_counts_its_rows() -> None:
 def test_the_verb_prints_the_table_or_one_object(capsys: pytest.CaptureFixture[str]) -> None:
     code, out, err = run(capsys, "validate")
     assert (code, err) == (0, "")
-    assert "94 agree to the last printed digit, 21 differ for the reason given" in out
+    assert "136 agree to the last printed digit, 21 differ for the reason given" in out
     assert "[1] printed with the sign of the tip inertia reversed" in out
     assert all(source.citation in out for source in SOURCES)
     code, out, err = run(capsys, "validate", "--json")

@@ -13,10 +13,11 @@ import pytest
 import tfarm
 from tests.shared import once
 from tfarm.arm import to_toml
+from tfarm.audit import published
 from tfarm.audit.published import Row as PublishedRow
 from tfarm.report import trust_proofs, write, writing
 from tfarm.report.modes_section import modal_table
-from tfarm.report.trust import Evidence, write_trust
+from tfarm.report.trust import Evidence, sources_table, write_trust
 from tfarm.report.trust_proofs import digits_of, how_proven, prove, rounds_to, save_proof, written_proofs
 from tfarm.report.trust_tables import boxes_tables
 from tfarm.response import accuracy
@@ -48,14 +49,14 @@ def proven_modes():
 def evidence(audit_rows):
     """Some rows of the audit, and two published numbers, one of them explained."""
     rows = tuple(row for row in audit_rows if row.equation in CHEAP)
-    published = [
+    printed = [
         PublishedRow(
             source="nafems-fv5", case="pinned <b>", quantity="frequency [Hz]", mode=mode, printed="42.650",
             ours=42.6449, difference=-1.2e-4, agrees=not why, why=why,
         )
         for mode, why in ((1, ""), (2, "a misprint"))
     ]  # fmt: skip
-    return Evidence(audit=rows, published=tuple(published))
+    return Evidence(audit=rows, published=tuple(printed))
 
 
 @pytest.fixture
@@ -190,6 +191,15 @@ def test_published_numbers_stand_with_their_reasons_and_are_text(page):
     assert "a misprint" in page
     assert "pinned &lt;b&gt;" in page
     assert "<b>" not in page
+
+
+def test_every_source_of_a_number_is_named():
+    """Tables of arms and of rigs: the numbers of the sources are all numbers that are compared."""
+    rows = [row for source in published.ALL for case in source.cases[:1] for row in published.rows(source.key, case)]
+    table = sources_table(rows)
+    columns = {column.key: column for column in table.columns}
+    assert len(columns["numbers"].of) == len(published.ALL)
+    assert sum(columns["numbers"].of) == len(rows)
 
 
 def test_versions_hashes_and_the_command_are_there(page, proof, tmp_path):

@@ -1,4 +1,8 @@
-"""Published natural frequencies of rigs: yielding roots and masses on the way (see `literature`)."""
+"""Published natural frequencies of rigs: yielding roots, masses on the way, a hub's radius, payloads beyond the tip.
+
+Two sources are frequency equations instead of tables: what stands here as printed are their roots, each digit of which
+the test of the source computes (see `literature`).
+"""
 
 from __future__ import annotations
 
@@ -9,6 +13,7 @@ from tfarm.arm import Attachment, Hub, Payload, RotarySpring
 from .literature import ANGULAR, SLENDER, WAVE_NUMBER, Case, Source, beam, inf
 
 LIGHT = 1e-9  # mass of a beam that has none, beside masses of 1
+FAR = 1e10  # lengths to a point about which an end turns that only slides: what is left of the turn goes with 1/FAR
 
 
 def _chun() -> Source:
@@ -57,4 +62,77 @@ def _ghali_neville() -> Source:
     )
 
 
-RIG_SOURCES: tuple[Source, ...] = (_chun(), _ghali_neville())
+def _blevins_sliding() -> Source:
+    """An end that slides but does not turn is one that turns about a point far away."""
+    printed = ("2.36502037", "5.49780392", "8.63937983", "11.78097245", "14.92256510")
+    arms = {
+        "sliding-free, the clamp 1e10 L off the axis": replace(beam(), hub=Hub(inertia=0.0, radius=FAR)),
+        "clamped-sliding, the tip held 1e10 L beyond": replace(beam(), payload=Payload(mass=inf, offset=FAR)),
+    }
+    return Source(
+        key="blevins-1979-sliding",
+        citation="R. D. Blevins, Formulas for Natural Frequency and Mode Shape (1979), table 8-1: roots of the "
+        "Euler-Bernoulli beam with an end that slides",
+        reached="set down without a copy at hand; each digit confirmed by tan z + tanh z = 0",
+        cases=tuple(
+            Case(name=name, arm=arm, theory="euler-bernoulli", quantity=WAVE_NUMBER, printed=printed)
+            for name, arm in arms.items()
+        ),
+    )
+
+
+def _bhat_wagner() -> Source:
+    """Mass m/(rhoA L) and half length e/L of each slender tip body, whose inertia is m e^2/3."""
+    roots = {
+        (0.5, 0.1): ("1.35056773", "3.71122911", "6.40009656", "9.13709646"),
+        (1.0, 0.25): ("1.07901581", "3.08984286", "5.61317347", "8.42638262"),
+        (2.0, 0.5): ("0.804292662", "2.50918084", "5.17431289", "8.12837869"),
+    }
+    return Source(
+        key="bhat-wagner-1976",
+        citation="B. R. Bhat and H. Wagner, Natural frequencies of a uniform cantilever with a tip mass slender in the "
+        "axial direction, Journal of Sound and Vibration 45 (1976) 304-307: a clamped Euler-Bernoulli beam that a "
+        "rigid rod of length 2 e lengthens; roots of the frequency equation, not numbers of the paper",
+        reached="no copy at hand: the equation is derived anew in the test, which computes each digit",
+        cases=tuple(
+            Case(
+                name=f"tip body m/(rhoA L) = {mass:g}, e/L = {offset:g}",
+                arm=replace(beam(), payload=Payload(mass=mass, inertia=mass * offset**2 / 3, offset=offset)),
+                theory="euler-bernoulli",
+                quantity=WAVE_NUMBER,
+                printed=printed,
+            )
+            for (mass, offset), printed in roots.items()
+        ),
+    )
+
+
+def _bellezza() -> Source:
+    """Inertia I_h/(rhoA L^3) and radius r/L of each hub."""
+    roots = {
+        (0.1, 0.0): ("2.63892470", "4.79377085", "7.87565294", "11.0031042"),
+        (0.0, 0.1): ("3.58261032", "6.49271973", "9.45289515", "12.4573801"),
+        (0.1, 0.1): ("2.70046686", "4.89616695", "7.91975359", "11.0284434"),
+        (1.0, 0.25): ("2.09220976", "4.73962320", "7.87268691", "11.0060456"),
+        (0.05, 0.5): ("2.81592598", "5.46951048", "8.38394298", "11.3976967"),
+    }
+    return Source(
+        key="bellezza-lanari-ulivi-1990",
+        citation="F. Bellezza, L. Lanari and G. Ulivi, Exact modeling of the flexible slewing link, IEEE International "
+        "Conference on Robotics and Automation (1990) 734-739: an Euler-Bernoulli link on a turning hub; roots of "
+        "the frequency equation, to which the terms in the hub's radius are added, not numbers of the paper",
+        reached="no copy at hand: the equation is derived anew in the test, which computes each digit",
+        cases=tuple(
+            Case(
+                name=f"free hub I_h/(rhoA L^3) = {inertia:g}, r/L = {radius:g}",
+                arm=replace(beam(), hub=Hub(inertia=inertia, radius=radius)),
+                theory="euler-bernoulli",
+                quantity=WAVE_NUMBER,
+                printed=printed,
+            )
+            for (inertia, radius), printed in roots.items()
+        ),
+    )
+
+
+RIG_SOURCES: tuple[Source, ...] = (_chun(), _ghali_neville(), _blevins_sliding(), _bhat_wagner(), _bellezza())

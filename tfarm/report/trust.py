@@ -131,12 +131,13 @@ def _short(evidence: Evidence, proofs: Sequence[Proof]) -> dict[str, Any]:
 
 def sources_table(rows: Sequence[published.Row]) -> Table:
     """Where the numbers were printed, how they came here, and how many agree."""
-    sources = [s for s in published.SOURCES if any(row.source == s.key for row in rows)]
+    sources = [s for s in published.ALL if any(row.source == s.key for row in rows)]
     of = [[row for row in rows if row.source == source.key] for source in sources]
     return Table(
         stem="sources",
         title="Sources",
-        caption="Few of the originals lay open on the desk; the last column says how each table was read.",
+        caption="Few of the originals lay open on the desk; the last column says how each table was read. Where "
+        "no table but a frequency equation was published, the equation's roots stand for printed numbers.",
         record=sources,
         columns=(
             Column("source", "source", of="key"),
