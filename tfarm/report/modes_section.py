@@ -23,7 +23,6 @@ from tfarm.spectrum import Modes, answers
 
 MODES, SHAPES = 10, 6
 SIMPLER: tuple[Theory, ...] = ("shear", "rayleigh", "euler-bernoulli")
-PARAMETER_NAMES = {"youngs_modulus": "Young's modulus"}
 NEGLECTED = 5e-7  # a sensitivity that never exceeds this reads as zero
 WARM, COOL = (196, 80, 10), (0, 96, 168)
 
@@ -61,9 +60,9 @@ SENSITIVITIES = (
 )
 
 
-NO_SENSITIVITIES = (
-    "The table of sensitivities is left out: it varies one segment's material and section, and a rig has a number of "
-    "its own for every part. Change the part in the file and run tfarm modes again."
+OF_RIGS = (
+    " Without a segment's number a parameter is that of all segments at once; a length takes along what is attached to "
+    "it, and x is the place of an attachment alone."
 )
 
 
@@ -77,7 +76,7 @@ def modes_section(arm: Arm) -> Section:
     return Section(
         anchor="modes",
         title="Modes",
-        words=(COMPLETE, *missing, *([] if arm.is_uniform else [*locked_words(arm), NO_SENSITIVITIES])),
+        words=(COMPLETE, *missing, *([] if arm.is_uniform else locked_words(arm))),
         blocks=(
             modal_table(modes),
             *([] if arm.is_uniform else [locked_table(modes)]),
@@ -85,7 +84,7 @@ def modes_section(arm: Arm) -> Section:
             _shapes(arm.name, shapes_of(modes, SHAPES)),
             theories_table(exact, theories, differences),
             _differences(arm.name, differences),
-            *([sensitivity_table(modes)] if arm.is_uniform else []),
+            sensitivity_table(modes),
         ),
     )
 
@@ -198,7 +197,7 @@ def sensitivity_table(modes: Modes) -> Table:
     """Per cent of frequency per per cent of each parameter: a row a parameter, a column a mode."""
     flexible = modes.index > 0
     rows = {
-        PARAMETER_NAMES.get(name, name.replace("_", " ")): np.round(values[flexible], answers.KEPT - 1) + 0.0
+        name.replace("youngs", "Young's").replace("_", " "): np.round(values[flexible], answers.KEPT - 1) + 0.0
         for name, values in modes.sensitivity.items()
     }
     shown = {name: values for name, values in rows.items() if abs(values).max() > NEGLECTED}
@@ -213,7 +212,7 @@ def sensitivity_table(modes: Modes) -> Table:
     return Table(
         stem="sensitivities",
         title="Sensitivity of each natural frequency",
-        caption=SENSITIVITIES + left_out,
+        caption=SENSITIVITIES + OF_RIGS * (not modes.arm.is_uniform) + left_out,
         columns=tuple(columns),
     )
 

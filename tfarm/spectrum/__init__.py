@@ -1,7 +1,8 @@
 """Natural frequencies and mode shapes: counted, so that none is missing, then found to the last digit."""
 
 from tfarm.spectrum.damped import DampedModes, damped_modes
-from tfarm.spectrum.table import PARAMETERS, Modes, compare_theories, flexible_frequencies, modes, modes_below
+from tfarm.spectrum.sensitivities import PARAMETERS
+from tfarm.spectrum.table import Modes, compare_theories, flexible_frequencies, modes, modes_below
 
 __all__ = [
     "PARAMETERS",

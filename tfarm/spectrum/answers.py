@@ -34,11 +34,6 @@ def _by_row(columns: Mapping[Any, Real]) -> list[dict[str, float]]:
     return [dict(zip(columns, row, strict=True)) for row in rows]
 
 
-def _sensitivities(modes: Modes) -> list[Any]:
-    """A dictionary a mode; none of a chain, which has no such table."""
-    return [*_by_row(modes.sensitivity)] or [MISSING] * len(modes)
-
-
 def _places(nodes: Sequence[Real]) -> list[str]:
     return [" ".join(f"{x:.4f}" for x in each) or "-" for each in nodes]
 
@@ -55,7 +50,7 @@ MODES = (  # of `Modes`; a page adds the nodes, which it rounds to a share of th
     Column("nodes_m", "nodes", "m", of=lambda modes: [x.tolist() for x in modes.nodes], printed=_places, folds=True,
            on=ANSWER),
     Column("theories_rad_s", of=lambda modes: _by_row(compare_theories(modes)), on=(JSON,)),
-    Column("sensitivity", of=lambda modes: _sensitivities(modes), on=(JSON,)),
+    Column("sensitivity", of=lambda modes: _by_row(modes.sensitivity), on=(JSON,)),
     Column("hub_participation", "hub participation b", "1/√(kg m²)",
            of=lambda modes: held(modes.hub_participation, KEPT), digits=lined(7, 4), on=REPORT),
     Column("modal_moment", "modal moment", "N m/√(kg m²)", of=lambda modes: held(modes.modal_moment + 0.0, KEPT),

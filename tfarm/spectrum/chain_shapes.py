@@ -49,7 +49,7 @@ class ChainShapes:
 
     def __call__(self, x: Real) -> Real:
         places = tuple(Place(Fraction(float(share))) for share in x)
-        return self._states(places)[0]
+        return self.states(places)[0]
 
     def part(self, first: int, last: int) -> ChainShapes:
         """The same with the modes first..last - 1 alone."""
@@ -65,7 +65,7 @@ class ChainShapes:
 
     def theta(self) -> Real:
         """Hub angle of each mode."""
-        return self._states(())[1]
+        return self.states(())[1]
 
     def masses(self) -> Real:
         """The modal masses."""
@@ -78,7 +78,7 @@ class ChainShapes:
         """Modal masses (diagonal) and products of different modes, in EI/L: the identity, if all is well."""
         return np.asarray(sum((motion.T * weight) @ motion for weight, motion in self._moving))
 
-    def _states(self, places: tuple[Place, ...]) -> tuple[Real, Real]:
+    def states(self, places: tuple[Place, ...]) -> tuple[Real, Real]:
         """W, Psi, M, Q (fields, modes, places) and the hub angle (modes,)."""
         fields, theta, scale = free_fields(self.chain, 1j * self.omega, places)
         turned = np.exp(scale - self._size) * self._factor  # real, as everything is on the axis without damping
@@ -88,15 +88,15 @@ class ChainShapes:
     def _moving(self) -> list[tuple[Real, Real]]:
         """Inertias (n,) and the motions (n, modes) that they have: along the segments, of bodies, payload and hub."""
         chain, parts = self.chain, []
-        for piece, weights, at in self._panels():
-            W, Psi = self._states(at)[0][:2]
+        for piece, weights, at in self.panels():
+            W, Psi = self.states(at)[0][:2]
             parts.append((float(piece.g * piece.stiffness / piece.length**4) * weights, W.T))
             parts.append((float(piece.a * piece.stiffness / piece.length**2) * weights, Psi.T))
         bodies = list(self._bodies())
         for share, body in bodies:
-            W, Psi = self._states((Place(share, "inner"),))[0][:2, :, 0]
+            W, Psi = self.states((Place(share, "inner"),))[0][:2, :, 0]
             parts += [(np.array([float(body.mass)]), W[None]), (np.array([float(body.inertia)]), Psi[None])]
-        W, Psi = self._states((Place(Fraction(1)),))[0][:2, :, 0]
+        W, Psi = self.states((Place(Fraction(1)),))[0][:2, :, 0]
         ends = (
             (chain.tip_mass, W + float(chain.offset) * Psi),
             (chain.tip_inertia, Psi),
@@ -104,7 +104,7 @@ class ChainShapes:
         )
         return parts + [(np.array([float(size)]), motion[None]) for size, motion in ends if math.isfinite(size)]
 
-    def _panels(self) -> Iterator[tuple[Segment, Real, tuple[Place, ...]]]:
+    def panels(self) -> Iterator[tuple[Segment, Real, tuple[Place, ...]]]:
         """Each segment with Gauss points along it and their weights as shares of the whole length."""
         nodes, weights = np.polynomial.legendre.leggauss(GAUSS)
         position = Fraction(1)

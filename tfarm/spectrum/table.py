@@ -23,23 +23,12 @@ from .certify import Certificate, certify
 from .chain_shapes import ChainShapes
 from .precise import refine
 from .search import count_below, natural_frequencies
+from .sensitivities import arm_sensitivities, chain_sensitivities
 from .shapes import Shapes
 
 Real = NDArray[np.float64]
 
 MOST_MODES = 10_000
-PARAMETERS = (
-    "length",
-    "density",
-    "youngs_modulus",
-    "shear_modulus",
-    "shear_factor",
-    "area",
-    "second_moment",
-    "hub_inertia",
-    "payload_mass",
-    "payload_inertia",
-)
 
 
 @dataclass(frozen=True)
@@ -163,51 +152,18 @@ class Modes:
 
     @cached_property
     def sensitivity(self) -> dict[str, Real]:
-        """d ln w / d ln p, per cent per per cent, of each frequency by each of `PARAMETERS` (zero for a rigid mode).
+        """d ln w / d ln p, per cent per per cent, of each frequency by each parameter p (zero for a rigid mode).
 
-        Exact, from the energies of the mode (Rayleigh's quotient is stationary).  Each parameter varies alone:
-        Young's modulus with G held, the area with I held.  An infinite or zero inertia counts as zero.
-        A chain, whose segments each have their own, has no entry here.
+        Exact (`sensitivities`).  Each parameter varies alone: Young's modulus with G held, the area with I held.  An
+        infinite or zero inertia counts as zero.  A rig has entries for its own parts, and for each of its segments.
         """
-        if isinstance(self._k, Chain):
-            return {}
-        bend, shear, slide, move, turn, mass, inertia, hub = self._energies
-        by_length = -bend + shear - 2 * slide - move - turn
-        halves = {
-            "length": by_length,
-            "density": -move - turn,
-            "youngs_modulus": bend,
-            "shear_modulus": shear,
-            "shear_factor": shear,
-            "area": shear - move,
-            "second_moment": bend - turn,
-            "hub_inertia": -hub,
-            "payload_mass": -mass,
-            "payload_inertia": -inertia,
-        }
-        return {name: np.r_[[0.0] * self._rigid, halves[name] / 2] for name in PARAMETERS}
-
-    @cached_property
-    def _energies(self) -> tuple[Real, ...]:
-        """Shares of each mode's energy: bending, shear, shear cross term; kinetic ones. Both kinds sum to 1."""
-        assert isinstance(self._shapes, Shapes)
-        parts = (self._shapes.part(block.start, block.stop) for block in self._shapes.blocks())
-        energies = [self._energies_of(part) for part in parts]
-        return tuple(map(np.concatenate, zip(*energies, strict=True)))
-
-    def _energies_of(self, shapes: Shapes) -> tuple[Real, ...]:
-        k = self._k
-        assert isinstance(k, Coefficients)
-        x, weight = shapes.quadrature()
-        W, Psi, M, Q = shapes(x)
-        tip, hub = shapes(np.ones(1))[..., 0], shapes.theta()
-        square = shapes.omega**2
-        sigma = float(k.sigma)
-        potential = (M**2 @ weight, sigma * Q**2 @ weight, (Q * (Psi + sigma * Q)) @ weight)
-        kinetic = [float(k.g) * W**2 @ weight, float(k.a) * Psi**2 @ weight]
-        for held, motion in ((k.tip_mass, tip[0]), (k.tip_inertia, tip[1]), (k.hub_inertia, hub)):
-            kinetic.append(float(held) * motion**2 if math.isfinite(held) else np.zeros_like(hub))
-        return *(energy / square for energy in potential), *kinetic
+        shapes = self._shapes
+        if isinstance(shapes, ChainShapes):
+            found = chain_sensitivities(self.arm, shapes)
+        else:
+            assert isinstance(self._k, Coefficients)
+            found = arm_sensitivities(self._k, shapes)
+        return {name: np.r_[[0.0] * self._rigid, values] for name, values in found.items()}
 
     # ------------------------------------------------------------ inside
 
