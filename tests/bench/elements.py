@@ -1,12 +1,13 @@
-"""The same arm by finite elements (scikit-fem).
+"""The same arm by finite elements (scikit-fem), its link of one segment or several.
 
 Deflection of degree p, rotation of degree p - 1: w' - psi does not lock.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -40,15 +41,14 @@ class Elements:
 
 
 def assemble(arm: Arm, elements: int, degree: int) -> Elements:
-    """The arm on equal elements: link by scikit-fem's forms, hub and payload as lumped inertias."""
-    link = arm.link
-    mesh = skfem.MeshLine(np.linspace(0.0, link.length, elements + 1))
-    pair = _pair(degree)
+    """The arm on so many elements, equal in each segment: by scikit-fem's forms, hub and payload as lumped inertias."""
+    mesh, pair = skfem.MeshLine(_nodes(arm, elements)), _pair(degree)
     basis = skfem.Basis(mesh, pair[0] * pair[1], intorder=2 * degree)
-    bending = skfem.BilinearForm(lambda w, psi, v, phi, _: link.EI * psi.grad[0] * phi.grad[0])
-    shear = skfem.BilinearForm(lambda w, psi, v, phi, _: link.kGA * (w.grad[0] - psi) * (v.grad[0] - phi))
-    inertia = skfem.BilinearForm(lambda w, psi, v, phi, _: link.rhoA * w * v + link.rhoI * psi * phi)
-    root, tip = (basis.get_dofs(lambda x, at=at: x[0] == at).nodal for at in (0.0, link.length))
+    EI, kGA, rhoA, rhoI = (_along(arm, name) for name in ("EI", "kGA", "rhoA", "rhoI"))
+    bending = skfem.BilinearForm(lambda w, psi, v, phi, at: EI(at.x[0]) * psi.grad[0] * phi.grad[0])
+    shear = skfem.BilinearForm(lambda w, psi, v, phi, at: kGA(at.x[0]) * (w.grad[0] - psi) * (v.grad[0] - phi))
+    inertia = skfem.BilinearForm(lambda w, psi, v, phi, at: rhoA(at.x[0]) * w * v + rhoI(at.x[0]) * psi * phi)
+    root, tip = (basis.get_dofs(lambda x, at=at: x[0] == at).nodal for at in (0.0, mesh.p.max()))
     mass = inertia.assemble(basis).tolil()
     for entry, body in (
         (root["u^2"], arm.hub.inertia),
@@ -59,6 +59,20 @@ def assemble(arm: Arm, elements: int, degree: int) -> Elements:
     free = np.delete(np.arange(basis.N), root["u^1"])
     parts = (part.tocsc()[free][:, free] for part in (bending.assemble(basis), shear.assemble(basis), mass))
     return Elements(*parts, *(int(np.searchsorted(free, entry[0])) for entry in (root["u^2"], tip["u^1"])))
+
+
+def _nodes(arm: Arm, elements: int) -> NDArray[np.float64]:
+    """The ends of the elements [m], joints of segments among them."""
+    joints = np.cumsum([0.0, *(link.length for link in arm.links)])
+    each = [np.linspace(a, b, max(1, round(elements * (b - a) / joints[-1])) + 1) for a, b in pairwise(joints)]
+    return np.concatenate([[0.0], *(inner[1:] for inner in each)])
+
+
+def _along(arm: Arm, name: str) -> Callable[[Any], Any]:
+    """A property of the links as a function of x [m]."""
+    ends = np.cumsum([link.length for link in arm.links])[:-1]
+    values = np.array([getattr(link, name) for link in arm.links])
+    return lambda x: values[np.searchsorted(ends, x)]
 
 
 def _pair(degree: int) -> tuple[skfem.Element, skfem.Element]:

@@ -1,15 +1,17 @@
-"""A link of three segments: against the single link, and against a product of sixty transfer matrices in NumPy."""
+"""A link of three segments: against the single link, a product of transfer matrices in NumPy, and finite elements."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 import tfarm
 from tfarm import Arm
 
+from .elements import modal_sum
 from .reference import OUTPUTS, Complex
 from .rows import Row, Target
 from .timing import interleaved
@@ -17,30 +19,46 @@ from .timing import interleaved
 GROUP = "A link of three segments: hub angle, root moment and tip displacement in one pass, 0.1 to 1e4 rad/s"
 POINTS, ROUNDS, ELEMENTS = 2_000, 25, 60
 LIMIT = 5.0  # times the single link
-NOTE = "elements: lumped masses and massless Timoshenko fields, 4x4 complex products, all frequencies at once."
+MESH = (60, 8)  # elements and their degree, the best of `elements.MESHES`
+CHAIN = "three equal pieces of the single link, which are a chain to it."
+LUMPED = "lumped masses and massless Timoshenko fields, 4x4 complex products, all frequencies at once."
+MODAL = "a hundred modes and the rigid body; the time includes assembly and eigenvalues."
 
 
 def rig_rows() -> Iterator[Row]:
-    """Both, with the error of each beside the same link undivided."""
-    single = tfarm.load("sasaki2012-lab")
-    third = replace(single.link, length=single.length / 3)
-    three, s = replace(single, link=third, outer=(third, third)), 1j * np.geomspace(0.1, 1e4, POINTS)
-    names = list(OUTPUTS)
-    one, chain = tfarm.transfer(single, names), tfarm.transfer(three, names)
-    times = interleaved(
-        {"one": lambda: one(s), "three": lambda: chain(s), "product": lambda: product(single, s)}, ROUNDS
-    )
+    """All three, with the error of each beside the same link undivided."""
+    lab, s = tfarm.load("sasaki2012-lab"), 1j * np.geomspace(0.1, 1e4, POINTS)
+    yield from _rows(lab, s, {
+        "tfarm: three segments": (tfarm.transfer(in_three(lab), list(OUTPUTS)), LIMIT, CHAIN),
+        f"{ELEMENTS} transfer matrices in NumPy": (partial(product, lab), None, LUMPED),
+    })  # fmt: skip
+    lossless = lab.having(damping=0.0)
+    solve = partial(modal_sum, in_three(lossless), elements=MESH[0], degree=MESH[1])
+    what = f"scikit-fem, {MESH[0]} elements of degree {MESH[1]}/{MESH[1] - 1}, modal sum: C = 0"
+    yield from _rows(lossless, s, {what: (solve, None, MODAL)})
+
+
+def in_three(arm: Arm) -> Arm:
+    """The arm with its link in three equal segments."""
+    third = replace(arm.link, length=arm.length / 3)
+    return replace(arm, link=third, outer=(third, third))
+
+
+def _rows(
+    single: Arm, s: Complex, candidates: dict[str, tuple[Callable[[Complex], Complex], float | None, str]]
+) -> Iterator[Row]:
+    """A row a candidate, (what it calls, the ratio asked for, a note), beside the single link."""
+    one = tfarm.transfer(single, list(OUTPUTS))
+    calls = {what: partial(call, s) for what, (call, _, _) in candidates.items()}
+    times = interleaved({"one": lambda: one(s), **calls}, ROUNDS)
     exact = one(s)
     size = abs(exact) + abs(s * one.derivative(s))
-    for key, what, values, target in (
-        ("three", "tfarm: three segments", chain(s), LIMIT),
-        ("product", f"{ELEMENTS} transfer matrices in NumPy", product(single, s), None),
-    ):
-        ratio = times.ratio(key, "one")
+    for what, (call, limit, note) in candidates.items():
+        ratio = times.ratio(what, "one")
         yield Row(
-            group=GROUP, what=what, n=POINTS, each="point", seconds=times.median(key) / POINTS, ratio=ratio,
-            to="one link", to_seconds=times.median("one") / POINTS, error=float((abs(values - exact) / size).max()),
-            note=NOTE, target=None if target is None else Target(measured=ratio, limit=target, unit="single links"),
+            group=GROUP, what=what, n=POINTS, each="point", seconds=times.median(what) / POINTS, ratio=ratio,
+            to="one link", to_seconds=times.median("one") / POINTS, error=float((abs(call(s) - exact) / size).max()),
+            note=note, target=None if limit is None else Target(measured=ratio, limit=limit, unit="single links"),
         )  # fmt: skip
 
 
