@@ -1,9 +1,12 @@
 """Modal models of rigs: friction leaves one integral and a real pole, a motor's circuit another one."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import tfarm
+from tfarm.arm import Motor
 from tfarm.dsp import pulse_transfer
 from tfarm.reduced.modal import modal_model, tailed_model
 
@@ -51,3 +54,26 @@ def test_reduced_models_of_rigs_keep_their_word(arm):
     space = reduced.state_space()
     values = space(5j)[:, 0]
     np.testing.assert_allclose(values, tfarm.transfer(arm, ["hub_angle", "root_moment"])(5j), rtol=1e-2)
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.05])
+def test_a_lossless_rig_behind_an_inductance_has_its_circuits_pole(radius):
+    """Without back-EMF the circuit is the factor 1/(L_a s + R) of every response: of the current all there is."""
+    plain = tfarm.load("sasaki2012")
+    motor = Motor(resistance=2.6, torque_constant=0.0077, back_emf_constant=0.0, inductance=0.02, gear_ratio=70)
+    plain = replace(plain, hub=replace(plain.hub, radius=radius))
+    arm = replace(plain, motor=motor, input="motor_voltage")
+    outputs = ("hub_angle", "root_moment", "motor_current")
+    model = modal_model(arm, outputs, 12)
+    np.testing.assert_allclose(model.single, [-motor.resistance / motor.inductance], rtol=1e-14)
+    exact = tfarm.transfer(arm, outputs)(S)
+    np.testing.assert_allclose(model(S), exact, rtol=1e-6)
+    circuit = 1 / (motor.resistance + motor.inductance * S)
+    np.testing.assert_allclose(model(S)[2], circuit, rtol=1e-12)
+    by_torque = modal_model(plain, outputs[:2], 40)(S) * circuit * motor.gear_ratio * motor.torque_constant
+    np.testing.assert_allclose(model(S)[:2], by_torque, rtol=1e-5)
+    A, B, C, D = model.matrices()
+    again = [(C @ np.linalg.solve(s * np.eye(len(A)) - A, B) + D)[:, 0] for s in S]
+    np.testing.assert_allclose(np.array(again).T, exact, rtol=1e-6)
+    with pytest.raises(tfarm.ParameterError, match="no inductance"):
+        tfarm.reduce(arm, "hub_angle", order=8, method="aaa")

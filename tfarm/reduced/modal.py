@@ -25,7 +25,7 @@ from tfarm.exact.system import System, system_of
 from tfarm.exact.values import expansions_at_zero
 from tfarm.response import Wanted, transfer
 from tfarm.spectrum import Modes, modes
-from tfarm.spectrum.damped import DampedModes, all_damped_modes
+from tfarm.spectrum.damped import DampedModes, all_damped_modes, single_zeros
 
 from .partial_fractions import PartialFractions
 from .remainder import slow_remainder
@@ -198,13 +198,12 @@ def _poles_and_residues(
 ) -> tuple[Complex, Complex, Real, Real]:
     """Eigenvalues (n, 2) and residues (outputs, n, 2) at them; single real ones (m,) and theirs (outputs, m)."""
     none = np.empty(0), np.empty((len(wanted), 0))
-    if arm.is_undamped:
+    if arm.is_undamped and not arm.input_lags:
         s = 1j * table.natural_frequency[table.index > 0]
         powers = np.array([[each.power] for each in wanted])
         upper = undamped_residues(table, wanted, k, share) * s**powers / (2 * s)
         return np.stack([s, s.conj()], axis=1), np.stack([upper, upper.conj()], axis=2), *none
-    damped = branches(table)
-    p = damped.eigenvalues[table.index > 0]
+    p, single = _eigenvalues(arm, table, branches)
     along = isinstance(k, Coefficients) and any(not each.is_at_end for each in wanted)
     residues, doubtful = end_residues(k, wanted, p.ravel(), share)
     doubtful = doubtful | along
@@ -214,8 +213,18 @@ def _poles_and_residues(
     pair = p[:, 0].imag > 0
     residues[:, pair, 1] = residues[:, pair, 0].conj()
     residues[:, ~pair] = residues[:, ~pair].real
-    single = damped.single
     if not single.size:
         return p, residues, *none
-    alone: Real = end_residues(k, wanted, single.astype(complex), share)[0].real.astype(float)
-    return p, residues, single, alone
+    apart = arm.is_undamped  # the circuit's pole alone, where the current is 0 over 0
+    at = single.astype(complex)
+    alone = contour_residues(k, wanted, at, share) if apart else end_residues(k, wanted, at, share)[0]
+    return p, residues, single, alone.real.astype(float)
+
+
+def _eigenvalues(arm: Arm, table: Modes, branches: Callable[[Modes], DampedModes]) -> tuple[Complex, Real]:
+    """Those of the flexible modes (n, 2), and single real ones (m,): of an undamped rig its circuit's alone."""
+    if arm.is_undamped:
+        s = 1j * table.natural_frequency[table.index > 0]
+        return np.stack([s, s.conj()], axis=1), np.array(single_zeros(table, 1.0))
+    damped = branches(table)
+    return damped.eigenvalues[table.index > 0], damped.single

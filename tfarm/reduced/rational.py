@@ -73,7 +73,7 @@ def rational_model(arm: Arm, outputs: Wanted, pairs: int, high: float, x: float 
     few poles pass the checks.  Raises ParameterError at C > 0, where poles do not lie on one line in s^2, and where
     `pairs` does not exceed the modes below `high`.
     """
-    if not arm.is_undamped:
+    if not arm.is_undamped or arm.input_lags:
         raise ParameterError(key="method", value="aaa", remedy="AAA in s^2 is for C = 0; take modal, which has C")
     exact = modes_in(arm, high)
     if pairs <= exact:

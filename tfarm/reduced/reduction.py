@@ -135,8 +135,8 @@ def reduce(
         raise ParameterError(key="outputs", value=names, remedy="name each output once")
     if method is not None and method not in get_args(Method):
         raise ParameterError(key="method", value=method, remedy="modal or aaa, or leave it out for the better one")
-    if method == "aaa" and not arm.is_undamped:
-        remedy = "AAA in s^2 is for C = 0 and no friction; take modal, which has both"
+    if method == "aaa" and (not arm.is_undamped or arm.input_lags):
+        remedy = "AAA in s^2 is for C = 0, no friction and no inductance; take modal, which has them"
         raise ParameterError(key="method", value="aaa", remedy=remedy)
     if (order is None) == (error is None):
         remedy = "give either an order (a number of states) or an error"
@@ -155,7 +155,7 @@ class _Bench:
         self.fixed = modal_model(arm, rows, 0, x).order
         self.inside = modes_in(arm, band[1])
         self.by_modes = method != "aaa"
-        self.by_aaa = method != "modal" and arm.is_undamped
+        self.by_aaa = method != "modal" and arm.is_undamped and not arm.input_lags
         self.ruler = Ruler(arm, rows, band, x)
 
     def of_order(self, order: int) -> ReducedModel:
