@@ -256,6 +256,20 @@ def test_a_segment_of_next_to_no_length(place):
     assert found == pytest.approx(wanted, rel=1e-12, abs=0)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_value_does_not_depend_on_the_points_beside_it(seed):
+    """Points go through in blocks, each segment by waves or by series: 77 in any order are those one at a time.
+
+    The lowest are slow in every segment, the highest in none, and between them some segments are and others not.
+    """
+    rng = np.random.default_rng(seed)
+    arm = some_rig(rng, segments=4)
+    first = natural_frequencies(chain_of(lossless(arm)), 2, 2)[0]
+    s = rng.permutation(first * np.geomspace(1e-2, 1e2, 77)) * np.exp(1j * rng.uniform(0.3, 1.5))
+    G = tfarm.transfer(arm, ["hub_angle", "root_moment", "tip_displacement"])
+    np.testing.assert_array_equal(G(s), np.array([G(each) for each in s]).T)
+
+
 def test_what_is_zero_or_rigid_leaves_the_papers_arm():
     arm = tfarm.load("sasaki2012-lab")
     hub = Hub(inertia=arm.hub.inertia, radius=0.0, friction=0.0, stiffness=0.0)

@@ -4,21 +4,21 @@ At each s the plane of states (`compound`) is carried from the payload to the ax
 moment on the hub; the condition W = 0 is carried back to the places that something is read at.  Every segment takes its
 waves where one is fast and its transition functions where both are slow; each scale e^{t} is taken out and kept.  What
 is read has the scales of the segments inside of it alone: the difference of two sums over all would cost their digits.
+
+Points are worked through in blocks, component by component (`pieces`).
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from .chain import KIND, MARK, OF_ANGLE, OF_MOMENT, OFFSET, SEGMENT, SPRING, TO_M, TO_Q, TO_W
-from .closed_form import transition_series
+from .chain import KIND, MARK, OF_ANGLE, OF_MOMENT, OFFSET, SEGMENT, SPRING, TO_M
 from .compiled import compiled, inlined
 from .compound import (
-    across_rows,
-    across_waves,
     beyond_body,
     beyond_offset,
     beyond_spring,
@@ -27,166 +27,176 @@ from .compound import (
     inside_offset,
     inside_spring,
     met,
-    row_across,
-    row_across_waves,
-    transition_rows,
 )
-from .dispersion import dispersion, reciprocal
-from .vector import DAMPING, SIGMA, A, B, G
-from .waves import PARALLEL, POLE, impedance, is_low, magnitude, wave_functions
+from .dispersion import reciprocal
+from .pieces import BLOCK, FUNCTIONS, NUMBERS, PLANE, ROW, Kept, cross, cross_back, times
+from .waves import POLE, impedance, magnitude
 
-HELD = 14  # complex numbers of a segment that the way back takes up again
 OVERFLOW, UNDERFLOW = 1e80, 1e-80  # a plane beyond is brought back to 1, by a power of two
 LN_2 = math.log(2.0)
 SMALL = 0.05  # an output below this share of its own terms has lost four bits: flagged
 
 
-@inlined
-def _functions(row: Any, s: complex, S: complex, over_d: complex) -> Any:
-    """The transition matrix of a slow segment."""
-    z_sum, z_product = S * (row[B] + row[A] * over_d), S * (row[A] * row[B] * S + row[G]) * over_d
-    F0, F1, F2, F3, _, _ = transition_series(z_sum, z_product)
-    return transition_rows(F0, F1, F2, F3, S, over_d, row[A], row[B], row[G], row[SIGMA])
+class Work(NamedTuple):
+    """What a block is worked in: planes (2) here and beyond, and at marks; conditions (2); the scales of all.
 
-
-@compiled
-def _cross_segment(s: complex, row: Any, plane: Any, held: Any) -> tuple[complex, bool]:
-    """Carry the plane (5,) across a segment, in place; keep its waves in `held`.  Scale, and if digits are lost."""
-    to_w, to_m, to_q = row[TO_W], row[TO_M], row[TO_Q]
-    p = plane[0] * to_w, plane[1] * (to_w * to_m), plane[2] * to_m, plane[3] * to_q, plane[4] * (to_m * to_q)
-    S, d = s * s, 1.0 + row[DAMPING] * s
-    over_d = reciprocal(d)
-    lost, scale = False, complex(0.0, 0.0)
-    if is_low(s, row):
-        W, Psi, M, Q = _functions(row, s, S, over_d)
-        p = across_rows(W, Psi, M, Q, p)
-        held[0] = 0.0
-    else:
-        S, d, _, gS, z1, v1, t1, dt1, z2, v2, t2, dt2 = dispersion(s, row)
-        c1, s1, e1 = wave_functions(z1, t1, dt1)
-        c2, s2, e2 = wave_functions(z2, t2, dt2)
-        gap = z1 - z2
-        p = across_waves(c1, s1, z1, v1, e1, c2, s2, z2, v2, e2, gS, d, S * (row[A] * over_d - row[B]), p)
-        unit = reciprocal(gS * d * gap * gap)
-        p = p[0] * unit, p[1] * unit, p[2] * unit, p[3] * unit, p[4] * unit
-        scale = t1 + dt1 + t2 + dt2
-        lost = magnitude(gap) < PARALLEL * (magnitude(z1) + magnitude(z2))
-        held[0] = 1.0
-        held[1], held[2], held[3], held[4], held[5], held[6] = c1, s1, z1, v1, e1, t1 + dt1
-        held[7], held[8], held[9], held[10], held[11], held[12] = c2, s2, z2, v2, e2, t2 + dt2
-        held[13] = gS
-    plane[0], plane[1], plane[2] = p[0] / to_w, p[1] / (to_w * to_m), p[2] / to_m
-    plane[3], plane[4] = p[3] / to_q, p[4] / (to_m * to_q)
-    return scale, lost
-
-
-@compiled
-def _return_across(s: complex, row: Any, held: Any, f: Any) -> complex:
-    """Carry the condition (4,) outwards across a segment, in place; its scale less that of the plane."""
-    to_w, to_m, to_q = row[TO_W], row[TO_M], row[TO_Q]
-    own = f[0] / to_w, f[1] + 0.0, f[2] / to_m, f[3] / to_q
-    d = 1.0 + row[DAMPING] * s
-    scale = complex(0.0, 0.0)
-    if held[0] == 0.0:
-        W, Psi, M, Q = _functions(row, s, s * s, reciprocal(d))
-        own = row_across(W, Psi, M, Q, own)
-    else:
-        c1, s1, z1, v1, e1, t1 = held[1], held[2], held[3], held[4], held[5], held[6]
-        c2, s2, z2, v2, e2, t2 = held[7], held[8], held[9], held[10], held[11], held[12]
-        gS = held[13]
-        if t1.real >= t2.real:
-            ratio, scale = e1 * reciprocal(e2) if magnitude(e2) > 1e-140 else complex(0.0, 0.0), -t2
-            c2, s2 = c2 * ratio, s2 * ratio
-        else:
-            ratio, scale = e2 * reciprocal(e1) if magnitude(e1) > 1e-140 else complex(0.0, 0.0), -t1
-            c1, s1 = c1 * ratio, s1 * ratio
-        own = row_across_waves(c1, s1, z1, v1, c2, s2, z2, v2, gS, d, own)
-        unit = reciprocal(gS * d * (z1 - z2))
-        own = own[0] * unit, own[1] * unit, own[2] * unit, own[3] * unit
-    f[0], f[1], f[2], f[3] = own[0] * to_w, own[1], own[2] * to_m, own[3] * to_q
-    return scale
-
-
-@inlined
-def _small(row: Any, s: complex, S: complex, p: Any) -> Any:
-    """The plane inside an offset, a spring or a body."""
-    if row[KIND] == OFFSET:
-        return inside_offset(row[0], p)
-    if row[KIND] == SPRING:
-        return inside_spring(row[0] + row[2] * s, row[1] + 0.0 * s, p)
-    return inside_body(row[0] * S + row[2], row[1] * S + row[3], p)
-
-
-@compiled
-def sweep(s: complex, rows: Any, ends: Any, plane: Any, planes: Any, powers: Any, held: Any) -> tuple[complex, bool]:
-    """The plane (5,) at the axis and at each mark.  Its scale, and if digits are lost.
-
-    `powers` (elements,): those of two that the plane was divided by after each.
+    `powers` (elements, points) are those of two that the plane was divided by after each; a mark's state times e^scale
+    2^shift goes with the plane at the axis.
     """
-    S = s * s
-    p = end_plane(ends[0] + ends[1] * S, ends[2] + 0.0 * S, ends[3] + ends[4] * S, ends[5] + 0.0 * S)
-    plane[0], plane[1], plane[2], plane[3], plane[4] = p
-    scale, lost = complex(0.0, 0.0), False
-    for i in range(len(rows)):
-        row = rows[i]
+
+    planes: NDArray[np.complex128]
+    scale: NDArray[np.complex128]
+    powers: NDArray[np.int64]
+    marked: NDArray[np.complex128]
+    conditions: NDArray[np.complex128]
+    faded: NDArray[np.complex128]
+    scales: NDArray[np.complex128]
+    shifts: NDArray[np.int64]
+    kept: Kept
+
+
+@compiled
+def _work(rows: Any) -> Work:
+    """Room for a chain."""
+    marks = segments = 0
+    for j in range(len(rows)):
+        marks += rows[j, KIND] == MARK
+        segments += rows[j, KIND] == SEGMENT
+    number = np.complex128
+    kept = Kept(
+        np.empty((segments, BLOCK), np.bool_),
+        np.empty((segments, NUMBERS), number),
+        np.empty((segments, FUNCTIONS), number),
+        np.empty((segments, ROW), number),
+    )
+    return Work(
+        np.empty((2, PLANE), number),
+        np.empty(BLOCK, number),
+        np.empty((len(rows), BLOCK), np.int64),
+        np.empty((marks, PLANE), number),
+        np.empty((2, ROW), number),
+        np.empty(ROW, number),
+        np.empty((marks, BLOCK), number),
+        np.empty((marks, BLOCK), np.int64),
+        kept,
+    )
+
+
+@compiled
+def _sweep(points: Any, rows: Any, ends: Any, work: Work, lost: Any) -> None:
+    """The plane at the axis, into work.planes[0], and at each mark, with its scale; whether digits are lost."""
+    plane, beyond, scale, number = work.planes[0], work.planes[1], work.scale, 0
+    _begin(points, ends, plane)
+    scale[:], lost[:] = 0.0, False
+    for j in range(len(rows)):
+        row = rows[j]
         if row[KIND] == SEGMENT:
-            more, here = _cross_segment(s, row, plane, held[i])
-            scale, lost = scale + more, lost or here
+            cross(points, row, plane, beyond, scale, lost, work.kept, number)
+            plane[:] = beyond
+            number += 1
         elif row[KIND] == MARK:
-            planes[int(row[0])] = plane
+            work.marked[int(row[0])] = plane
         else:
-            p = plane[0], plane[1], plane[2], plane[3], plane[4]
-            plane[0], plane[1], plane[2], plane[3], plane[4] = _small(row, s, S, p)
-        largest = max(
-            magnitude(plane[0]), magnitude(plane[1]), magnitude(plane[2]), magnitude(plane[3]), magnitude(plane[4])
-        )
-        powers[i] = 0
-        if (largest > OVERFLOW or largest < UNDERFLOW) and largest > 0.0 and largest < np.inf:
-            powers[i] = math.frexp(largest)[1]
-            plane *= math.ldexp(1.0, -powers[i])
-            scale += powers[i] * LN_2
-    return scale, lost
+            _small(points, row, plane)
+        _brought_back(plane, 5, work.powers[j])
+        for i in range(BLOCK):
+            scale[i] += work.powers[j, i] * LN_2
 
 
 @compiled
-def go_back(
-    s: complex, rows: Any, f: Any, planes: Any, scales: Any, shifts: Any, powers: Any, held: Any, states: Any
-) -> None:
-    """The state (4,) at each mark: the condition W = 0 of the axis carried outwards meets the planes.
+def _begin(points: Any, ends: Any, plane: Any) -> None:
+    """The plane at the payload."""
+    for i in range(BLOCK):
+        S = points[i] * points[i]
+        p = end_plane(ends[0] + ends[1] * S, ends[2] + 0.0 * S, ends[3] + ends[4] * S, ends[5] + 0.0 * S)
+        plane[i], plane[BLOCK + i], plane[2 * BLOCK + i], plane[3 * BLOCK + i], plane[4 * BLOCK + i] = p
 
-    It is the state that goes with the plane at the axis divided by e^scale 2^shift (marks,).
-    """
-    S = s * s
-    f[0], f[1], f[2], f[3] = 1.0, 0.0, 0.0, 0.0
-    scale, shift, left = complex(0.0, 0.0), 0, len(scales)
-    for i in range(len(rows) - 1, -1, -1):
+
+@compiled
+def _small(points: Any, row: Any, plane: Any) -> None:
+    """The plane inside an offset, a spring or a body, in place."""
+    for i in range(BLOCK):
+        s, S = points[i], points[i] * points[i]
+        p = plane[i], plane[BLOCK + i], plane[2 * BLOCK + i], plane[3 * BLOCK + i], plane[4 * BLOCK + i]
+        if row[KIND] == OFFSET:
+            p = inside_offset(row[0], p)
+        elif row[KIND] == SPRING:
+            p = inside_spring(row[0] + row[2] * s, row[1] + 0.0 * s, p)
+        else:
+            p = inside_body(row[0] * S + row[2], row[1] * S + row[3], p)
+        plane[i], plane[BLOCK + i], plane[2 * BLOCK + i], plane[3 * BLOCK + i], plane[4 * BLOCK + i] = p
+
+
+@compiled
+def _brought_back(buffer: Any, parts: int, powers: Any) -> None:
+    """Divide each point's numbers by a power of two, in place, where they come near to over- or underflow."""
+    is_extreme = False
+    for i in range(BLOCK):
+        largest = 0.0
+        for j in range(parts):
+            largest = max(largest, magnitude(buffer[BLOCK * j + i]))
+        is_extreme = is_extreme or not UNDERFLOW <= largest <= OVERFLOW
+    powers[:] = 0
+    if not is_extreme:
+        return
+    for i in range(BLOCK):
+        largest = 0.0
+        for j in range(parts):
+            largest = max(largest, magnitude(buffer[BLOCK * j + i]))
+        if 0.0 < largest < np.inf and not UNDERFLOW <= largest <= OVERFLOW:
+            powers[i] = math.frexp(largest)[1]
+            for j in range(parts):
+                buffer[BLOCK * j + i] *= math.ldexp(1.0, -powers[i])
+
+
+@compiled
+def _go_back(points: Any, rows: Any, work: Work) -> None:
+    """The state at each mark, in place of its plane: the condition W = 0 of the axis, carried outwards, meets it."""
+    f, beyond = work.conditions[0], work.conditions[1]
+    left, number = len(work.marked), len(work.kept.low)
+    scale, shift, raised = np.zeros(BLOCK, np.complex128), np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64)
+    f[:BLOCK], f[BLOCK:] = 1.0, 0.0
+    for j in range(len(rows) - 1, -1, -1):
         if left == 0:
-            break
-        row = rows[i]
-        shift -= powers[i]
+            return
+        row = rows[j]
+        shift -= work.powers[j]
         if row[KIND] == SEGMENT:
-            scale += _return_across(s, row, held[i], f)
-            continue
-        own = f[0], f[1], f[2], f[3]
-        if row[KIND] == MARK:
-            n = int(row[0])
-            p = planes[n, 0], planes[n, 1], planes[n, 2], planes[n, 3], planes[n, 4]
-            states[n, 0], states[n, 1], states[n, 2], states[n, 3] = met(own, p)
-            scales[n], shifts[n] = scale, shift
-            left -= 1
-        elif row[KIND] == OFFSET:
+            number -= 1
+            cross_back(points, row, f, beyond, scale, work.faded, work.kept, number)
+            f[:] = beyond
+        elif row[KIND] == MARK:
+            left, mark = left - 1, int(row[0])
+            work.scales[mark], work.shifts[mark] = scale, shift
+            _meet(f, work.marked[mark])
+        else:
+            _small_back(points, row, f)
+        _brought_back(f, 4, raised)
+        shift += raised
+
+
+@compiled
+def _small_back(points: Any, row: Any, f: Any) -> None:
+    """The condition beyond an offset, a spring or a body, in place."""
+    for i in range(BLOCK):
+        s, S = points[i], points[i] * points[i]
+        own = f[i], f[BLOCK + i], f[2 * BLOCK + i], f[3 * BLOCK + i]
+        if row[KIND] == OFFSET:
             own = beyond_offset(row[0], own)
         elif row[KIND] == SPRING:
             own = beyond_spring(row[0] + row[2] * s, row[1] + 0.0 * s, own)
         else:
             own = beyond_body(row[0] * S + row[2], row[1] * S + row[3], own)
-        f[0], f[1], f[2], f[3] = own
-        largest = max(magnitude(f[0]), magnitude(f[1]), magnitude(f[2]), magnitude(f[3]))
-        if largest > OVERFLOW or (largest < UNDERFLOW and largest > 0.0):
-            power = math.frexp(largest)[1]
-            f *= math.ldexp(1.0, -power)
-            shift += power
-    return
+        f[i], f[BLOCK + i], f[2 * BLOCK + i], f[3 * BLOCK + i] = own
+
+
+@compiled
+def _meet(f: Any, plane: Any) -> None:
+    """The state that a condition leaves of a plane, in the place of the plane's first four numbers."""
+    for i in range(BLOCK):
+        own = f[i], f[BLOCK + i], f[2 * BLOCK + i], f[3 * BLOCK + i]
+        p = plane[i], plane[BLOCK + i], plane[2 * BLOCK + i], plane[3 * BLOCK + i], plane[4 * BLOCK + i]
+        plane[i], plane[BLOCK + i], plane[2 * BLOCK + i], plane[3 * BLOCK + i] = met(own, p)
 
 
 @inlined
@@ -198,16 +208,13 @@ def drive_of(s: complex, ends: Any, theta: complex, M: complex) -> complex:
 
 
 @inlined
-def _drive_terms(s: complex, rows: Any, ends: Any, theta: complex, M: complex) -> float:
+def _drive_terms(s: complex, segment: Any, ends: Any, theta: complex, M: complex) -> float:
     """What the drive would be away from a pole: its two terms, and each with the other's size of motion."""
-    A0, B0, last = OF_ANGLE, OF_MOMENT, rows[0]
-    for row in rows:
-        if row[KIND] == SEGMENT:
-            last = row
+    A0, B0 = OF_ANGLE, OF_MOMENT
     S = magnitude(s * s)
     of_angle = magnitude(ends[A0] + s * (ends[A0 + 1] + s * (ends[A0 + 2] + s * ends[A0 + 3])))
     of_moment = magnitude(ends[B0] + s * ends[B0 + 1])
-    waves = impedance(S, last) / last[TO_M]
+    waves = impedance(S, segment) / segment[TO_M]
     crossed = of_angle * magnitude(M) / max(waves, 1.0) + of_moment * magnitude(theta) * waves
     return of_angle * magnitude(theta) + of_moment * magnitude(M) + crossed
 
@@ -220,29 +227,61 @@ def fill_free(s: Any, rows: Any, ends: Any, table: Any, found: Any, lost: Any) -
     gauge, factor.  Digits are lost where two waves of a segment are nearly one, where an output is a small difference
     (a deflection at low frequency), and where the drive is: there it may be a pole.
     """
-    marks = 0
-    for i in range(len(rows)):
-        marks += rows[i, KIND] == MARK
-    plane, f = np.empty(5, np.complex128), np.empty(4, np.complex128)
-    planes, states = np.empty((marks, 5), np.complex128), np.empty((marks, 4), np.complex128)
-    scales, held = np.empty(marks, np.complex128), np.empty((len(rows), HELD), np.complex128)
-    shifts, powers = np.empty(marks, np.int64), np.empty(len(rows), np.int64)
-    for i in range(s.size):
-        scale, lost[i] = sweep(s[i], rows, ends, plane, planes, powers, held)
-        if marks:
-            go_back(s[i], rows, f, planes, scales, shifts, powers, held, states)
-        found[0, i], found[1, i] = drive_of(s[i], ends, plane[0], plane[1]), scale
-        lost[i] = lost[i] or magnitude(found[0, i]) < POLE * _drive_terms(s[i], rows, ends, plane[0], plane[1])
+    work, values = _work(rows), np.empty((1 + len(table), BLOCK), np.complex128)
+    points, lost_here = np.empty(BLOCK, np.complex128), np.empty(BLOCK, np.bool_)
+    for first in range(0, s.size, BLOCK):
+        n = min(BLOCK, s.size - first)
+        points[:n] = s[first : first + n]
+        points[n:] = points[0]
+        _sweep(points, rows, ends, work, lost_here)
+        _go_back(points, rows, work)
+        _drive(points, _innermost(rows), ends, work.planes[0], values[0], lost_here)
         for o in range(len(table)):
-            want = table[o]
-            value = want[5] * plane[0]
-            if want[0] >= 0.0:
-                n = int(want[0])
-                at = want[1] * states[n, 0] + want[2] * states[n, 1] + want[3] * states[n, 2] + want[4] * states[n, 3]
-                decay, turn = math.ldexp(math.exp(scales[n].real), shifts[n]), scales[n].imag
+            _output(points, table[o], work, values[1 + o], lost_here)
+        found[0, first : first + n], found[1, first : first + n] = values[0, :n], work.scale[:n]
+        found[2:, first : first + n] = values[1:, :n]
+        lost[first : first + n] = lost_here[:n]
+
+
+@inlined
+def _innermost(rows: Any) -> Any:
+    """The row of the segment at the hub."""
+    last = rows[0]
+    for j in range(len(rows)):
+        if rows[j, KIND] == SEGMENT:
+            last = rows[j]
+    return last
+
+
+@compiled
+def _drive(points: Any, segment: Any, ends: Any, plane: Any, drive: Any, lost: Any) -> None:
+    """The drive at every point of a block; digits are lost where it is small."""
+    for i in range(BLOCK):
+        drive[i] = drive_of(points[i], ends, plane[i], plane[BLOCK + i])
+    for i in range(BLOCK):
+        terms = _drive_terms(points[i], segment, ends, plane[i], plane[BLOCK + i])
+        lost[i] = lost[i] or magnitude(drive[i]) < POLE * terms
+
+
+@compiled
+def _output(points: Any, want: Any, work: Work, value: Any, lost: Any) -> None:
+    """An output of a row of the table, at every point of a block; digits are lost where it is a small difference."""
+    of_theta, power, C, unit = want[5], int(want[6]), want[7], want[8]
+    for i in range(BLOCK):
+        value[i] = times(work.planes[0, i], of_theta)
+    if want[0] >= 0.0:
+        mark = int(want[0])
+        states, scale, shift = work.marked[mark], work.scales[mark], work.shifts[mark]
+        for i in range(BLOCK):
+            at = times(states[i], want[1]) + times(states[BLOCK + i], want[2])
+            at += times(states[2 * BLOCK + i], want[3]) + times(states[3 * BLOCK + i], want[4])
+            if scale[i] != 0.0 or shift[i]:
+                decay, turn = math.ldexp(math.exp(scale[i].real), shift[i]), scale[i].imag
                 at *= complex(decay * math.cos(turn), decay * math.sin(turn))
-                lost[i] = lost[i] or (want[5] != 0.0 and magnitude(value + at) < SMALL * magnitude(value))
-                value += at
-            for _ in range(int(want[6])):
-                value *= s[i]
-            found[2 + o, i] = want[8] * value * (reciprocal(1.0 + want[7] * s[i]) if want[7] else 1.0)
+            lost[i] = lost[i] or (of_theta != 0.0 and magnitude(value[i] + at) < SMALL * magnitude(value[i]))
+            value[i] += at
+    for _ in range(power):
+        for i in range(BLOCK):
+            value[i] *= points[i]
+    for i in range(BLOCK):
+        value[i] = times(value[i] * reciprocal(1.0 + C * points[i]), unit) if C else times(value[i], unit)

@@ -1,0 +1,229 @@
+"""Segments of a chain in float64, many s at a time: the plane carried inwards across one, the condition back outwards.
+
+The steps of a block of points are loops that hold nothing but arithmetic, so that they vectorise, and one that calls
+the exponentials (as in `waves`).  Of each segment its waves, or its transition functions where both waves are slow at
+that s, are kept for the way back.
+
+Arrays of a block lie one behind the other in flat buffers: component j of point i at `BLOCK` j + i.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .chain import TO_M, TO_Q, TO_W
+from .closed_form import transition_series
+from .compiled import compiled, inlined
+from .compound import across_rows, across_waves, row_across, row_across_waves, transition_rows
+from .dispersion import dispersion, reciprocal
+from .vector import DAMPING, SIGMA, A, B, G
+from .waves import PARALLEL, is_low, magnitude, wave_functions
+
+BLOCK = 32  # points a block: few, as single points fill one too; many, as each loop has its own beginning and end
+SQUARE, D, GS, Z1, V1, T1, DT1, Z2, V2, T2, DT2 = (BLOCK * j for j in range(11))
+C1, S1, E1, C2, S2, E2 = (BLOCK * j for j in range(6))
+
+PLANE, ROW, NUMBERS, FUNCTIONS = (BLOCK * parts for parts in (5, 4, 11, 6))  # sizes of the flat buffers
+TINY = 1e-140  # |e^{-t}| below which a wave has no part in the other's
+
+
+class Kept(NamedTuple):
+    """Of each segment (rows) and point what the way in leaves for the way back: waves, or functions where `low`."""
+
+    low: NDArray[np.bool_]
+    numbers: NDArray[np.complex128]
+    functions: NDArray[np.complex128]
+    series: NDArray[np.complex128]
+
+
+@inlined
+def times(z: complex, factor: float) -> complex:
+    """z times a real number: numba's own would multiply complex ones."""
+    return complex(z.real * factor, z.imag * factor)
+
+
+@compiled
+def cross(points: Any, row: Any, plane: Any, inner: Any, scale: Any, lost: Any, kept: Any, number: int) -> None:
+    """The plane at the inner end of a segment (into `inner`) from that at its outer one, at the points of a block.
+
+    Scales are added to `scale`, lost digits marked.  What the way back needs is `kept` (`Kept`) under its number.
+    """
+    low, numbers, series, slow = kept.low[number], kept.numbers[number], kept.series[number], 0
+    for i in range(BLOCK):
+        low[i] = is_low(points[i], row)
+        slow += low[i]
+    if slow < BLOCK:
+        _wave_numbers(points, row, numbers)
+        _wave_functions(numbers, kept.functions[number])
+        _by_waves(row, numbers, kept.functions[number], plane, inner)
+        for i in range(BLOCK):
+            if not low[i]:
+                z1, z2 = numbers[Z1 + i], numbers[Z2 + i]
+                scale[i] += numbers[T1 + i] + numbers[DT1 + i] + numbers[T2 + i] + numbers[DT2 + i]
+                lost[i] = lost[i] or magnitude(z1 - z2) < PARALLEL * (magnitude(z1) + magnitude(z2))
+    if slow:
+        _transition(points, row, series)
+        other = inner.copy() if slow < BLOCK else inner
+        _by_series(points, row, series, plane, other)
+        if slow < BLOCK:
+            _where(low, other, inner)
+
+
+@compiled
+def _wave_numbers(points: Any, row: Any, numbers: Any) -> None:
+    """`dispersion` at every point of a block."""
+    for i in range(BLOCK):
+        S, d, _, gS, z1, v1, t1, dt1, z2, v2, t2, dt2 = dispersion(points[i], row)
+        numbers[SQUARE + i], numbers[D + i], numbers[GS + i] = S, d, gS
+        numbers[Z1 + i], numbers[V1 + i], numbers[T1 + i], numbers[DT1 + i] = z1, v1, t1, dt1
+        numbers[Z2 + i], numbers[V2 + i], numbers[T2 + i], numbers[DT2 + i] = z2, v2, t2, dt2
+
+
+@compiled
+def _wave_functions(numbers: Any, functions: Any) -> None:
+    """The two complex exponentials a point: the only loop that calls a library."""
+    for i in range(BLOCK):
+        c1, s1, e1 = wave_functions(numbers[Z1 + i], numbers[T1 + i], numbers[DT1 + i])
+        c2, s2, e2 = wave_functions(numbers[Z2 + i], numbers[T2 + i], numbers[DT2 + i])
+        functions[C1 + i], functions[S1 + i], functions[E1 + i] = c1, s1, e1
+        functions[C2 + i], functions[S2 + i], functions[E2 + i] = c2, s2, e2
+
+
+@compiled
+def _where(low: Any, source: Any, target: Any) -> None:
+    """Take the slow points of another buffer."""
+    for j in range(len(target) // BLOCK):
+        for i in range(BLOCK):
+            if low[i]:
+                target[BLOCK * j + i] = source[BLOCK * j + i]
+
+
+@compiled
+def _by_waves(row: Any, numbers: Any, functions: Any, plane: Any, inner: Any) -> None:
+    """`across_waves` in the segment's own units, at every point of a block."""
+    w, wm, m, q, mq = row[TO_W], row[TO_W] * row[TO_M], row[TO_M], row[TO_Q], row[TO_M] * row[TO_Q]
+    over_w, over_wm, over_m, over_q, over_mq = 1.0 / w, 1.0 / wm, 1.0 / m, 1.0 / q, 1.0 / mq
+    for i in range(BLOCK):
+        p = (
+            times(plane[i], w), times(plane[BLOCK + i], wm), times(plane[2 * BLOCK + i], m),
+            times(plane[3 * BLOCK + i], q), times(plane[4 * BLOCK + i], mq),
+        )  # fmt: skip
+        S, d, gS = numbers[SQUARE + i], numbers[D + i], numbers[GS + i]
+        z1, z2 = numbers[Z1 + i], numbers[Z2 + i]
+        v_sum = S * (times(reciprocal(d), row[A]) - row[B])
+        p = across_waves(
+            functions[C1 + i], functions[S1 + i], z1, numbers[V1 + i], functions[E1 + i],
+            functions[C2 + i], functions[S2 + i], z2, numbers[V2 + i], functions[E2 + i], gS, d, v_sum, p,
+        )  # fmt: skip
+        unit = reciprocal(gS * d * (z1 - z2) * (z1 - z2))
+        inner[i], inner[BLOCK + i] = times(p[0] * unit, over_w), times(p[1] * unit, over_wm)
+        inner[2 * BLOCK + i], inner[3 * BLOCK + i] = times(p[2] * unit, over_m), times(p[3] * unit, over_q)
+        inner[4 * BLOCK + i] = times(p[4] * unit, over_mq)
+
+
+@compiled
+def _transition(points: Any, row: Any, series: Any) -> None:
+    """F0..F3 of a slow segment, at every point of a block."""
+    for i in range(BLOCK):
+        S = points[i] * points[i]
+        over_d = reciprocal(1.0 + row[DAMPING] * points[i])
+        z_sum, z_product = S * (row[B] + row[A] * over_d), S * (row[A] * row[B] * S + row[G]) * over_d
+        F0, F1, F2, F3, _, _ = transition_series(z_sum, z_product)
+        series[i], series[BLOCK + i], series[2 * BLOCK + i], series[3 * BLOCK + i] = F0, F1, F2, F3
+
+
+@inlined
+def _rows(i: int, points: Any, row: Any, series: Any) -> Any:
+    """The transition matrix of a slow segment at a point."""
+    S, over_d = points[i] * points[i], reciprocal(1.0 + row[DAMPING] * points[i])
+    F0, F1, F2, F3 = series[i], series[BLOCK + i], series[2 * BLOCK + i], series[3 * BLOCK + i]
+    return transition_rows(F0, F1, F2, F3, S, over_d, row[A], row[B], row[G], row[SIGMA])
+
+
+@compiled
+def _by_series(points: Any, row: Any, series: Any, plane: Any, inner: Any) -> None:
+    """`across_rows` in the segment's own units, at every point of a block."""
+    w, wm, m, q, mq = row[TO_W], row[TO_W] * row[TO_M], row[TO_M], row[TO_Q], row[TO_M] * row[TO_Q]
+    over_w, over_wm, over_m, over_q, over_mq = 1.0 / w, 1.0 / wm, 1.0 / m, 1.0 / q, 1.0 / mq
+    for i in range(BLOCK):
+        p = (
+            times(plane[i], w), times(plane[BLOCK + i], wm), times(plane[2 * BLOCK + i], m),
+            times(plane[3 * BLOCK + i], q), times(plane[4 * BLOCK + i], mq),
+        )  # fmt: skip
+        W, Psi, M, Q = _rows(i, points, row, series)
+        p = across_rows(W, Psi, M, Q, p)
+        inner[i], inner[BLOCK + i], inner[2 * BLOCK + i] = (
+            times(p[0], over_w),
+            times(p[1], over_wm),
+            times(p[2], over_m),
+        )
+        inner[3 * BLOCK + i], inner[4 * BLOCK + i] = times(p[3], over_q), times(p[4], over_mq)
+
+
+@compiled
+def cross_back(points: Any, row: Any, f: Any, outer: Any, scale: Any, faded: Any, kept: Any, number: int) -> None:
+    """The condition at the outer end of a segment (into `outer`) from that at its inner one; see `cross`.
+
+    The scales less those of the plane are added to `scale`; `faded` (4 blocks) is worked in.
+    """
+    low, slow = kept.low[number], 0
+    for i in range(BLOCK):
+        slow += low[i]
+    if slow < BLOCK:
+        _fade(kept.numbers[number], kept.functions[number], faded, scale, low)
+        _row_by_waves(row, kept.numbers[number], faded, f, outer)
+    if slow:
+        other = outer.copy() if slow < BLOCK else outer
+        _row_by_series(points, row, kept.series[number], f, other)
+        if slow < BLOCK:
+            _where(low, other, outer)
+
+
+@compiled
+def _fade(numbers: Any, functions: Any, faded: Any, scale: Any, low: Any) -> None:
+    """c and s of both waves by the scale of the faster one; the other's is taken out."""
+    for i in range(BLOCK):
+        c1, s1, c2, s2 = functions[C1 + i], functions[S1 + i], functions[C2 + i], functions[S2 + i]
+        e1, e2, t1, t2 = functions[E1 + i], functions[E2 + i], numbers[T1 + i], numbers[T2 + i]
+        if t1.real >= t2.real:
+            ratio, left = e1 * reciprocal(e2) if magnitude(e2) > TINY else complex(0.0, 0.0), t2 + numbers[DT2 + i]
+            c2, s2 = c2 * ratio, s2 * ratio
+        else:
+            ratio, left = e2 * reciprocal(e1) if magnitude(e1) > TINY else complex(0.0, 0.0), t1 + numbers[DT1 + i]
+            c1, s1 = c1 * ratio, s1 * ratio
+        faded[i], faded[BLOCK + i], faded[2 * BLOCK + i], faded[3 * BLOCK + i] = c1, s1, c2, s2
+        if not low[i]:
+            scale[i] -= left
+
+
+@compiled
+def _row_by_waves(row: Any, numbers: Any, faded: Any, f: Any, outer: Any) -> None:
+    """`row_across_waves` in the segment's own units, at every point of a block."""
+    w, m, q = row[TO_W], row[TO_M], row[TO_Q]
+    over_w, over_m, over_q = 1.0 / w, 1.0 / m, 1.0 / q
+    for i in range(BLOCK):
+        own = times(f[i], over_w), f[BLOCK + i], times(f[2 * BLOCK + i], over_m), times(f[3 * BLOCK + i], over_q)
+        d, gS, z1, z2 = numbers[D + i], numbers[GS + i], numbers[Z1 + i], numbers[Z2 + i]
+        own = row_across_waves(
+            faded[i], faded[BLOCK + i], z1, numbers[V1 + i],
+            faded[2 * BLOCK + i], faded[3 * BLOCK + i], z2, numbers[V2 + i], gS, d, own,
+        )  # fmt: skip
+        unit = reciprocal(gS * d * (z1 - z2))
+        outer[i], outer[BLOCK + i] = times(own[0] * unit, w), own[1] * unit
+        outer[2 * BLOCK + i], outer[3 * BLOCK + i] = times(own[2] * unit, m), times(own[3] * unit, q)
+
+
+@compiled
+def _row_by_series(points: Any, row: Any, series: Any, f: Any, outer: Any) -> None:
+    """`row_across` in the segment's own units, at every point of a block."""
+    w, m, q = row[TO_W], row[TO_M], row[TO_Q]
+    over_w, over_m, over_q = 1.0 / w, 1.0 / m, 1.0 / q
+    for i in range(BLOCK):
+        own = times(f[i], over_w), f[BLOCK + i], times(f[2 * BLOCK + i], over_m), times(f[3 * BLOCK + i], over_q)
+        W, Psi, M, Q = _rows(i, points, row, series)
+        own = row_across(W, Psi, M, Q, own)
+        outer[i], outer[BLOCK + i] = times(own[0], w), own[1]
+        outer[2 * BLOCK + i], outer[3 * BLOCK + i] = times(own[2], m), times(own[3], q)
