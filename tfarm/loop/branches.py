@@ -6,7 +6,7 @@ stay with the zeros: a branch is a zero followed, not a pair.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -20,7 +20,7 @@ from tfarm.errors import ConvergenceError
 from tfarm.records import record
 from tfarm.spectrum import damped_modes, modes
 from tfarm.spectrum.continuation import Node, corrected, follow, through
-from tfarm.spectrum.damped import COMPANY
+from tfarm.spectrum.damped import COMPANY, single_zeros
 from tfarm.spectrum.scales import rate_unit
 
 from .plant import Loop, effective_inertia
@@ -155,6 +155,7 @@ def followed(variation: Variation, start: float, stop: float, wanted: int) -> tu
 def _followed(variation: Variation, start: float, stop: float, wanted: int, number: int) -> tuple[list[Segment], float]:
     first = variation.at(start)
     zeros, lowest = open_pairs(first.arm, number, wanted)
+    wanted += len(single_zeros(modes(first.arm, 1), 1.0))  # which stand before the flexible modes
     if any(first.law.row):
         zeros = _closed(first, zeros, wanted, lowest)
     stage = Stage(variation, start, stop, lowest)
@@ -180,6 +181,7 @@ def _closed(loop: Loop, zeros: Complex, wanted: int, lowest: float) -> Complex:
 def open_pairs(arm: Arm, number: int, wanted: int) -> tuple[Complex, float]:
     """Pairs of the first flexible modes of the arm without feedback, (n, 2), and the lowest frequency [rad/s].
 
+    Before them 0 and about -b/J of a hub with friction, and the real pole of a motor's circuit beside NaN.
     Of the `number` of modes followed from C = 0 to the arm's own C the first `wanted` are sure to arrive.
     """
     undamped, C = arm.elastic, arm.damping
@@ -187,18 +189,24 @@ def open_pairs(arm: Arm, number: int, wanted: int) -> tuple[Complex, float]:
     omega = table.natural_frequency[table.index > 0]
     zeros, lowest = np.stack([1j * omega, -1j * omega], axis=1), float(omega[0])
     if arm.is_undamped:
-        return zeros, lowest
+        return np.concatenate([_alone(single_zeros(table, 1.0)), zeros]), lowest
     if not arm.is_uniform:
         found = damped_modes(modes(arm, number))
-        return found.eigenvalues[found.index > 0], lowest
+        turning = found.eigenvalues[(found.index == 0) & (found.eigenvalues[:, 1] != 0)]
+        return np.concatenate([turning, _alone(found.others), found.eigenvalues[found.index > 0]]), lowest
     stage = Stage(Variation(arm, HubFeedback(), "damping"), 0.0, C, lowest)
     return stage.follow(zeros, wanted, min(1.0, FIRST / (omega[-1] * C)))[-1].zeros, lowest
+
+
+def _alone(zeros: Sequence[float]) -> Complex:
+    """Real zeros that are no pair, each beside NaN."""
+    return np.array([[zero, np.nan] for zero in zeros], complex).reshape(-1, 2)
 
 
 def rigid_pair(loop: Loop, _: Complex) -> Complex:
     """The zeros of J_eff s^2 + K1 s + Kp: what the rigid body's become under small gains."""
     J = effective_inertia(loop.arm, loop.law) or 1e-9 * loop.arm.total_inertia
-    b, c = loop.law.K1 / J, loop.law.Kp / J
+    b, c = (loop.law.K1 + loop.arm.rate_loss) / J, loop.law.Kp / J
     root = np.sqrt(complex(b * b / 4 - c))
     far = -b / 2 - np.copysign(root.real, b) if root.real else -b / 2 + 1j * root.imag
     near = c / far if root.real else np.conj(far)
@@ -207,7 +215,7 @@ def rigid_pair(loop: Loop, _: Complex) -> Complex:
 
 def _slow_zero(loop: Loop, pair: Complex) -> Complex:
     """The pair with its zero at 0 moved to -Kp/K1: where it goes at small Kp."""
-    return np.array([-loop.law.Kp / loop.law.K1, pair[1]], complex)
+    return np.array([-loop.law.Kp / (loop.law.K1 + loop.arm.rate_loss), pair[1]], complex)
 
 
 def segments(nodes: list[Node], pinned: bool = False) -> list[Segment]:

@@ -17,6 +17,7 @@ from tfarm.exact.outputs import OUTPUTS
 from .variation import Complex, Evaluator, Real, Variation
 
 ON_AXIS = 1e-12  # a real part below this share of a zero's size is none, to working precision
+AT_REST = 1e-9  # of the largest of its branch: a pole so near to 0 is there but for the last step of its correction
 NEAR_ZERO = 1e-50  # of the lowest frequency: where D is taken for its value at s = 0
 SETTLED = 1e-6  # of the distance of two points: a crossing must be known so well at least
 STEP = 1e-5  # of a frequency, or of the distance of two gains, for differences
@@ -49,7 +50,8 @@ def crossings(variation: Variation, gain: Real, branches: Complex, lowest: float
 
     Raises ConvergenceError where one cannot be solved for.
     """
-    on_axis = abs(branches.real) <= ON_AXIS * abs(branches)
+    size = abs(branches)
+    on_axis = (abs(branches.real) <= ON_AXIS * size) | (size <= AT_REST * np.fmax.reduce(size, axis=1)[:, None])
     side = np.where(on_axis | np.isnan(branches), 0, np.sign(branches.real)).astype(int)
     found = []
     for number, (sides, zeros) in enumerate(zip(side, branches, strict=True)):
@@ -83,7 +85,10 @@ def _solved(variation: Variation, gains: Real, zeros: Complex, lowest: float) ->
         ends, points = _halved(variation, gains, zeros, halvings)
         share = points.real[0] / (points.real[0] - points.real[1])
         g, w = float(ends[0] + share * (ends[1] - ends[0])), float((points[0] + share * (points[1] - points[0])).imag)
-        g, w, step = _newton(variation, g, w, gains)
+        try:
+            g, w, step = _newton(variation, g, w, gains)
+        except np.linalg.LinAlgError:
+            continue
         if step < SETTLED and w > 0:
             return g, w
     raise ConvergenceError(f"a crossing of the imaginary axis near {gains.mean():.6g} could not be solved", g, w)
@@ -117,16 +122,13 @@ def _halved(variation: Variation, gains: Real, zeros: Complex, times: int) -> tu
 
 
 def _newton_step(variation: Variation, g: float, w: float, low: float, high: float) -> tuple[float, float]:
-    """Newton's step for D(i w; g) = 0, a complex equation in two real unknowns."""
+    """Newton's step for D(i w; g) = 0, one complex equation in two real unknowns; LinAlgError if it has none."""
     dg, dw = STEP * (high - low), STEP * w
     up, down = min(g + dg, high), max(g - dg, low)
     values = _on_axis(variation, np.array([g, g, g, up, down]), np.array([w, w + dw, w - dw, w, w]))
     by_omega, by_gain = (values[1] - values[2]) / (2 * dw), (values[3] - values[4]) / (up - down)
     matrix = np.array([[by_gain.real, by_omega.real], [by_gain.imag, by_omega.imag]])
-    try:
-        step = np.linalg.solve(matrix, [values[0].real, values[0].imag])
-    except np.linalg.LinAlgError:
-        raise ConvergenceError(f"a branch touches the imaginary axis near {g:.6g}, {w:.6g} rad/s", g, w) from None
+    step = np.linalg.solve(matrix, [values[0].real, values[0].imag])
     return float(step[0]), float(step[1])
 
 

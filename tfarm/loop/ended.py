@@ -8,11 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from tfarm.arm import HubFeedback
 from tfarm.errors import ConvergenceError
 
 from .crossings import BranchCrossing
-from .lines import Line, along
 from .lines import crossings as line_crossings
 from .poles import ON_AXIS, counted, poles_below
 from .variation import Complex, Real, Variation
@@ -34,9 +32,9 @@ def with_others(
     if not variation.is_of_gains:
         _refuse_hidden(variation, gain, branches, top)
         return found
-    law, way, width = variation.law, np.sign(gain[-1] - gain[0]), abs(gain[-1] - gain[0])
-    line = Line(HubFeedback(), law) if variation.vary == "all" else along(variation.vary, law)
-    inside = line_crossings(variation.arm, line, top).within(gain.min() + ALIKE * width, gain.max() - ALIKE * width)
+    way, width = np.sign(gain[-1] - gain[0]), abs(gain[-1] - gain[0])
+    ends = gain.min() + ALIKE * width, gain.max() - ALIKE * width
+    inside = line_crossings(variation.arm, variation.line, top).within(*ends)
     more = [
         BranchCrossing(gain=t, omega=w, branch=None, direction="unstable" if change * way > 0 else "stable")
         for t, w, change in inside

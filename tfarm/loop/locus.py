@@ -8,7 +8,7 @@ characteristic function.  A guess that moves too far, or lands on a neighbour, i
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +22,8 @@ from tfarm.spectrum.continuation import Member, corrected, follow
 from .branches import FREE, NOBODY, Segment, followed, ordered
 from .crossings import BranchCrossing, crossings
 from .ended import with_others
-from .lines import along, crossing_at_zero
-from .variation import Complex, Evaluator, Real, Variation, member_of
+from .lines import crossing_at_zero
+from .variation import Complex, Evaluator, Real, Variation, free_of_loss, member_of
 
 MOST_POINTS = 100_000
 MOST_BRANCHES = 200
@@ -39,11 +39,11 @@ class Locus:
     """The closed-loop poles of an arm under a law, as one number varies.
 
     `gain` (n,) are the values of what `vary` names; `branches` (b, n) [1/s] are zeros followed: those at s = 0, then
-    one a mode with Im s > 0, in the order of the modes they continue from (`mode` (b,), 0 for the rigid body).  The
-    mirror image of a branch is left out, unless the two meet on the real axis and part there: then it is a branch of
-    its own, with Im s < 0 where they are a pair.  A branch that comes to -1/C, or meets a zero that nobody follows,
-    ends there (`ends`), and is NaN beyond.  `crossings` are those of the imaginary axis, ascending along the way; where
-    a branch has ended, those of poles on no branch too.
+    one a mode with Im s > 0, in the order of the modes they continue from (`mode` (b,), 0 for the rigid body and for a
+    motor's circuit).  The mirror image of a branch is left out, unless the two meet on the real axis and part there:
+    then it is a branch of its own, with Im s < 0 where they are a pair.  A branch that comes to -1/C, or meets a zero
+    that nobody follows, ends there (`ends`), and is NaN beyond.  `crossings` are those of the imaginary axis, ascending
+    along the way; where a branch has ended, those of poles on no branch too.
     """
 
     arm: Arm
@@ -85,10 +85,10 @@ def locus(
     """
     points = whole("points", points, 2, MOST_POINTS, f"a whole number from 2 to {MOST_POINTS}")
     branches = whole("branches", branches, 1, MOST_BRANCHES, f"a whole number from 1 to {MOST_BRANCHES}")
-    if arm.rate_loss:
-        return _of_rig_with_friction(arm, law, vary, (start, stop), points, branches)
-    variation = Variation(arm, law, vary)
-    gain = _range(variation, start, stop, points)
+    _range(Variation(arm, law, vary), start, stop)
+    freed, loss = free_of_loss(arm)
+    variation = Variation(freed, law, vary, loss)
+    gain = np.linspace(start, stop, points)
     cut, lowest = followed(variation, start, stop, branches + 1)
     evaluator = Evaluator(variation, gain)
     curves = _Polish(variation, evaluator, FREE * lowest).curves(cut)
@@ -99,30 +99,8 @@ def locus(
     return Locus(arm, law, vary, gain, rows, mode, found)
 
 
-def _of_rig_with_friction(
-    arm: Arm, law: HubFeedback, vary: str, ends: tuple[float, float], points: int, branches: int
-) -> Locus:
-    """The locus of a rig whose hub loses b theta_t: that of the rig without the loss, whose K1 is as much larger.
-
-    Raises ParameterError where the loss is no gain of the law: behind an inductance, and under a scale on the law.
-    """
-    if vary == "all":
-        remedy = "a scale on the law does not scale the hub's friction: vary K1, K2 or Kp"
-        raise ParameterError(key="vary", value=vary, remedy=remedy)
-    if arm.motor is not None and arm.input_lags:
-        remedy = "a locus wants a circuit without lag: leave it out, as L_a/R is mostly far beyond the arm's modes"
-        raise ParameterError(key="motor.inductance", value=arm.motor.inductance, remedy=remedy)
-    loss = arm.rate_loss
-    shift = loss if vary == "K1" else 0.0
-    _range(Variation(arm, law, vary), *ends, points)
-    found = locus(
-        arm.lossless_hub, law.having("K1", law.K1 + loss), vary, ends[0] + shift, ends[1] + shift, points, branches
-    )
-    crossings = tuple(replace(each, gain=each.gain - shift) for each in found.crossings)
-    return replace(found, arm=arm, law=law, gain=np.linspace(*ends, points), crossings=crossings)
-
-
-def _range(variation: Variation, start: float, stop: float, points: int) -> Real:
+def _range(variation: Variation, start: float, stop: float) -> None:
+    """Raise ParameterError for what is no range, or no loop at its ends."""
     for key, value in (("from", start), ("to", stop)):
         if not math.isfinite(value):
             raise ParameterError(key=key, value=value, remedy="a finite number")
@@ -131,7 +109,6 @@ def _range(variation: Variation, start: float, stop: float, points: int) -> Real
         raise ParameterError(key="to", value=stop, remedy="the range is empty: a locus runs to another value")
     if variation.vary == "all" and variation.law == HubFeedback():
         raise ParameterError(key="vary", value="all", remedy="every gain is 0: give K1, K2 or Kp to be scaled")
-    return np.linspace(start, stop, points)
 
 
 def _listed(curves: Complex, variation: Variation, number: int) -> tuple[Complex, NDArray[np.int64]]:
@@ -140,7 +117,9 @@ def _listed(curves: Complex, variation: Variation, number: int) -> tuple[Complex
     NaN beyond the end of one that was not followed all the way.
     """
     at_zero = variation.zeros_at_origin
-    mode = np.arange(len(curves)) // 2 + (at_zero == 2 or not variation.arm.has_rigid_mode)
+    follows_rigid = at_zero < 2 and variation.arm.has_rigid_mode
+    mode = np.arange(len(curves)) // 2
+    mode = np.where(mode < follows_rigid, 0, np.maximum(0, mode + (not follows_rigid) - variation.arm.input_lags))
     idle = at_zero - (at_zero == 1 and not curves[0].any())
     curves = np.concatenate([np.zeros((idle, curves.shape[1]), complex), curves])
     mode = np.r_[np.zeros(idle, int), mode]
@@ -242,7 +221,7 @@ def _at_static_crossing(variation: Variation, gain: Real) -> NDArray[np.int64]:
     """1 at each gain where a pole of an arm that is held at its tip passes through s = 0, and 0 elsewhere."""
     if variation.arm.has_rigid_mode or variation.vary not in ("K1", "K2", "Kp"):
         return np.zeros(gain.size, np.int64)
-    there = crossing_at_zero(variation.arm, along(variation.vary, variation.law))
+    there = crossing_at_zero(variation.arm, variation.line)
     if there is None or not math.isfinite(there.t):
         return np.zeros(gain.size, np.int64)
     return np.asarray(abs(gain - there.t) <= SAME * abs(there.t), np.int64)

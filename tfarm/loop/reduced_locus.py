@@ -137,6 +137,7 @@ def _closed(arm: Arm, fixed: Real, count: int, moving: Real) -> tuple[Matrices, 
     """The model of the outputs that either row of gains uses, closed by the fixed one, and the other on its outputs."""
     used = (fixed != 0) | (moving != 0)
     used[FED_BACK.index("hub_rate")] |= not used.any()
+    used[FED_BACK.index("hub_angle")] |= bool(arm.rate_loss) and arm.has_rigid_mode  # or its pole at 0 is not a state
     model = modal_model(arm, [name for name, is_used in zip(FED_BACK, used, strict=True) if is_used], count)
     return model.closed(fixed[used]), moving[None, used]
 

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import GAINS, LISTED, NAMES, Arm, HubFeedback
+from tfarm.arm import LISTED, NAMES, Arm, HubFeedback
 from tfarm.errors import ParameterError
-from tfarm.exact.characteristic import Analytic, gains_of, quick_characteristics, unit_gains, zeros_at_origin
+from tfarm.exact.characteristic import Analytic, gains_of, quick_characteristics, zeros_at_origin
 from tfarm.exact.system import System, system_of
 from tfarm.records import record
 from tfarm.spectrum.continuation import Member
 
+from .lines import NONE, Line
 from .plant import Loop
 
 Complex = NDArray[np.complexfloating[Any, Any]]
@@ -33,12 +34,14 @@ VARIED = OF_THE_LAW | PARAMETERS  # what may be varied, and its unit
 class Variation:
     """The loops of an arm under a law, one of whose numbers varies: a gain, "all" (a scale on the law), or the arm's.
 
-    Raises ParameterError for a name that is not in `VARIED`.
+    `beside` is another law, which acts too and does not vary.  Raises ParameterError for a name that is not in
+    `VARIED`.
     """
 
     arm: Arm
     law: HubFeedback
     vary: str
+    beside: HubFeedback = NONE
 
     def __post_init__(self) -> None:
         if self.vary not in VARIED:
@@ -51,19 +54,23 @@ class Variation:
 
     def at(self, value: float) -> Loop:
         """The loop where the varied number has that value.  Raises ParameterError where there is none."""
-        arm, law = self.arm, self.law
-        if self.vary == "all":
-            return Loop(arm, law.times(value))
         if self.is_of_gains:
-            return Loop(arm, law.having(self.vary, value))
-        return Loop(arm.having(**{self.vary: value}), law)
+            return Loop(self.arm, self.line.at(value))
+        return Loop(self.arm.having(**{self.vary: value}), self.beside.plus(self.law))
+
+    @property
+    def line(self) -> Line:
+        """The laws, where a gain or their scale varies."""
+        if self.vary == "all":
+            return Line(self.beside, self.law)
+        return Line(self.beside.plus(self.law.having(self.vary, 0.0)), NONE.having(self.vary, 1.0))
 
     def system(self, value: float) -> tuple[System, Real]:
         """The arm's system, and gains without dimensions (gains, 1), where the varied number has that value."""
         if self.is_of_gains:
             return self._k, self.laws(np.array([value]))
         k = system_of(self.at(value).arm)
-        return k, np.array([[float(gain)] for gain in gains_of(k, self.law)])
+        return k, np.array([[float(gain)] for gain in gains_of(k, self.beside.plus(self.law))])
 
     def singular(self, value: float) -> float:
         """-1/C where the varied number has that value, -inf at C = 0."""
@@ -72,12 +79,9 @@ class Variation:
 
     def laws(self, values: Real) -> Real:
         """The dimensionless gains (gains, n) at n values of a gain: linear in it."""
-        rows = np.array([[float(gain)] for gain in gains_of(self._k, self.law)])
-        if self.vary == "all":
-            return np.asarray(rows * values)
-        units = [float(unit) for unit in unit_gains(self._k)]
-        varied = np.array([[gain.name == self.vary] for gain in GAINS])
-        return np.where(varied, np.outer(units, values), rows)
+        rows = (gains_of(self._k, law) for law in (self.line.base, self.line.direction))
+        base, way = (np.array([[float(gain)] for gain in row]) for row in rows)
+        return np.asarray(base + way * values)
 
     @cached_property
     def _k(self) -> System:
@@ -87,12 +91,24 @@ class Variation:
     def zeros_at_origin(self) -> int:
         """How many zeros stay at s = 0 all the way: 2, 1 under a rate gain alone, 0 where the hub angle is held."""
         law = self.law.having(self.vary, 1.0) if self.vary in NAMES else self.law
-        return zeros_at_origin(self._k, law.row)
+        return zeros_at_origin(self._k, [max(map(abs, pair)) for pair in zip(law.row, self.beside.row, strict=True)])
 
     def left_at_origin(self, values: Real) -> NDArray[np.int64]:
         """How many zeros are at s = 0 at each of the values."""
-        rows = self.laws(values).T.tolist() if self.is_of_gains else [self.law.row] * values.size
+        one = self.beside.plus(self.law).row
+        rows = self.laws(values).T.tolist() if self.is_of_gains else [one] * values.size
         return np.array([zeros_at_origin(self._k, row) for row in rows], dtype=np.int64)
+
+
+def free_of_loss(arm: Arm) -> tuple[Arm, HubFeedback]:
+    """An arm whose hub loses less, and the law that takes as much beside any other: a K1.
+
+    That is b + N^2 b_m and the back-EMF.  Behind an inductance it is the back-EMF alone: friction acts at once.
+    """
+    if arm.motor is None or not arm.input_lags:
+        return arm.lossless_hub, HubFeedback(K1=arm.rate_loss)
+    motor = replace(arm.motor, back_emf_constant=0.0)
+    return replace(arm, motor=motor), HubFeedback(K1=arm.motor.gear_ratio * arm.motor.back_emf_constant)
 
 
 class Evaluator:

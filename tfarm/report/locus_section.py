@@ -47,20 +47,12 @@ CUT = " Beyond {name} = {end} the branches come too near to each other, or to �
 ENDED = (
     " A branch ends at {name} = {gain}: there its pole comes to −1/C, where real poles accumulate, or cannot be told."
 )
-NO_LAG = (
-    "The loci on this page leave out the inductance of the motor, whose pole near −R/L_a = −{corner} 1/s lies on no "
-    "branch of the arm; every other section has it."
-)
 RATES = (0.0, 0.05, 0.2, 0.5, 1.0, 2.0)  # times J w1: values of K1 whose exact poles are listed where no locus is
 
 
 def locus_section(arm: Arm) -> Section:
     """Where the poles go as each gain grows, and what K2 = 1 and beyond does."""
     words, blocks = [], list[Picture | Table]()
-    if arm.motor is not None and arm.input_lags:
-        corner = significant(arm.motor.resistance / arm.motor.inductance, 4)
-        arm = replace(arm, motor=replace(arm.motor, inductance=0.0))
-        words.append(NO_LAG.format(corner=corner))
     held = default_gains(arm)
     low, high = (share * arm.input_per_torque for share in RANGE_OF_K2)
     ranges = {"K1": (0.0, 2.0 * rate_unit(arm)), "K2": (low, high)}
