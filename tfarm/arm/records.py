@@ -181,6 +181,11 @@ class Arm(Turning):
         return math.isinf(self.hub.inertia) or self.input == "hub_angle"
 
     @property
+    def input_unit(self) -> str:
+        """The SI unit of the input, "rad" where the hub is locked: N m, V or A of one that turns."""
+        return INPUT_UNITS["hub_angle" if self.is_locked else self.input]
+
+    @property
     def has_rigid_mode(self) -> bool:
         """Whether the whole rig can turn as a rigid body.
 

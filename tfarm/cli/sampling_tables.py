@@ -84,7 +84,8 @@ def write_mat(answer: dict[str, Any], path: Path) -> None:
 
 
 def _present(answer: dict[str, Any]) -> list[Column]:
-    return [column for column in SIGNALS if answer.get(column.key)]
+    units = {"torque": answer["torque_unit"]}
+    return [replace(column, unit=units.get(column.key, column.unit)) for column in SIGNALS if answer.get(column.key)]
 
 
 def _texts(windows: list[list[dict[str, Any]]], band: float | None) -> str:

@@ -52,14 +52,18 @@ class Sampling:
         return self.delay_samples - self.whole_delay
 
 
+UNITS = {"moment": " of N m", "torque": " of N m (of V or A where that is the arm's input)"}  # of ranges
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Converters:
     """The sensors and the DAC; what is left out (None) is ideal.
 
     `encoder_counts` a revolution of the hub; `hub_rate` "ideal" or "difference" (of the encoder, through a first-order
     filter of corner `rate_filter` [rad/s], inf for none); `moment_bits` over +-`moment_range` [N m] of the strain
-    amplifier; `torque_bits` over +-`torque_range` [N m] of the DAC; `arithmetic` of the controller, "float64" or
-    "float32" (as on a TMS320C31).  A signal beyond a range saturates, and the simulation says how often.
+    amplifier; `torque_bits` over +-`torque_range` of the DAC, in the unit of the arm's input (N m, V or A);
+    `arithmetic` of the controller, "float64" or "float32" (as on a TMS320C31).  A signal beyond a range saturates, and
+    the simulation says how often.
     """
 
     encoder_counts: int | None = None
@@ -84,10 +88,12 @@ class Converters:
         bits, span = getattr(self, f"{signal}_bits"), getattr(self, f"{signal}_range")
         _whole(f"converters.{signal}_bits", bits, LEAST_BITS, MOST_BITS, "bits")
         if span is not None:
-            meaning = "the range +-R of a converter is a positive, finite number of N m"
+            meaning = f"the range +-R of a converter is a positive, finite number{UNITS[signal]}"
             object.__setattr__(self, f"{signal}_range", positive(f"converters.{signal}_range", span, meaning))
         elif bits is not None:
-            remedy = f"{bits} bits of what? give the range +-R in N m too, or leave converters.{signal}_bits out"
+            remedy = (
+                f"{bits} bits of what? give the range +-R{UNITS[signal]} too, or leave converters.{signal}_bits out"
+            )
             raise ParameterError(key=f"converters.{signal}_range", value=span, remedy=remedy)
 
     @property
@@ -103,7 +109,8 @@ class Converters:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Actuator:
-    """The motor: `torque_limit` [N m] (inf: none), `motor_constant` [N m/V], so that volts = torque / constant.
+    """The motor: `torque_limit` (inf: none) in the unit of the arm's input, N m, V or A, and `motor_constant` [N m/V],
+    so that volts = torque / constant where the input is a torque.
 
     `hub_damping` [N m s/rad] is analog: a back-EMF torque -hub_damping theta_t that acts between the samples too.
     """
@@ -113,7 +120,7 @@ class Actuator:
     hub_damping: float = 0.0
 
     def __post_init__(self) -> None:
-        meaning = "a torque limit is positive in N m, or inf for none"
+        meaning = "a torque limit is positive (in N m; in V or A where that is the arm's input), or inf for none"
         object.__setattr__(self, "torque_limit", _above_zero("actuator.torque_limit", self, meaning))
         meaning = "hub damping is zero or positive, in N m s/rad"
         damping = not_negative("actuator.hub_damping", self.hub_damping, meaning)

@@ -32,7 +32,7 @@ SIGNALS = (  # of a simulation's answer: the first are those of a `Trace`, the o
     Column("hub_rate", "hub rate", "rad/s"),
     Column("root_moment", "root moment", "N m"),
     Column("tip_displacement", "tip displacement", "m"),
-    Column("torque", "torque", "N m"),
+    Column("torque", "torque", "N m"),  # or in the unit of another input, `torque_unit` of the answer
     Column("gain", "gain", "-"),
     Column("volts", "volts", "V"),
 )
@@ -134,7 +134,6 @@ def simulation_answer(
     `modes_change`: by how much the signals changed when the modes were doubled to `modes_used`, relative to the
     largest value of each; null where the number of modes was asked for.
     """
-    stopped, volts = simulation.stopped, simulation.volts
     answer: dict[str, Any] = {
         "arm": arm.name,
         "law": "u = r - Kp theta - K1 theta_t - K2 M, with references; a positive root moment M accelerates the hub"
@@ -151,29 +150,40 @@ def simulation_answer(
         "modes_change": None if math.isnan(used.change) else used.change,
         **_columns(simulation.at_samples),
         "torque": simulation.torque.tolist(),
+        "torque_unit": arm.input_unit,
         "gain": [] if simulation.gain is None else simulation.gain.tolist(),
+        **_figures(simulation),
+        "limit_cycle": None if cycle is None else _cycle_answer(cycle),
+    }
+    if simulation.volts is not None:
+        answer["volts"] = simulation.volts.tolist()
+    if simulation.between is not None:
+        answer["between"] = _columns(simulation.between)
+    return answer
+
+
+def _figures(simulation: Simulation) -> dict[str, Any]:
+    """What a simulation comes to, in single numbers."""
+    stopped = simulation.stopped
+    return {
         "residual_moment_rms": residual_moment_rms(simulation),
         "residual_raw_moment_rms": residual_raw_moment_rms(simulation),
         "settling_time_s": settling_time(simulation),
         "saturated_samples": simulation.saturated,
         "energy_error": simulation.energy_error,
-        "limit_cycle": None,
         "stopped_at_s": None if stopped is None else stopped.time,
         "growing_mode": None if stopped is None else stopped.mode,
     }
-    if cycle is not None:
-        answer["limit_cycle"] = {
-            "root_moment_amplitude": cycle.root_moment,
-            "hub_rate_amplitude": cycle.hub_rate,
-            "torque_amplitude": cycle.torque,
-            "frequency_rad_s": cycle.frequency,
-            "kept_up_by": cycle.kept_up_by,
-        }
-    if volts is not None:
-        answer["volts"] = volts.tolist()
-    if simulation.between is not None:
-        answer["between"] = _columns(simulation.between)
-    return answer
+
+
+def _cycle_answer(cycle: LimitCycle) -> dict[str, Any]:
+    return {
+        "root_moment_amplitude": cycle.root_moment,
+        "hub_rate_amplitude": cycle.hub_rate,
+        "torque_amplitude": cycle.torque,
+        "frequency_rad_s": cycle.frequency,
+        "kept_up_by": cycle.kept_up_by,
+    }
 
 
 def _columns(trace: Trace) -> dict[str, Sequence[float]]:

@@ -129,10 +129,10 @@ def described(task: Scenario, arm: Arm, chain: Chain) -> str:
     if task.name == "slew":
         return f"a slew: the tip moves {chain.slew.travel_of(arm.length):.4g} m in {chain.slew.rise_time:g} s"
     if task.name == "step":
-        return f"a step of {task.feedforward[0]:.4g} N m"
+        return f"a step of {task.feedforward[0]:.4g} {arm.input_unit}"
     if task.name == "decay":
         return f"the first mode released with the tip at {task.tip_offset:.4g} m"
-    return f"an impulse of {task.impulse:.4g} N m s on the hub"
+    return f"an impulse of {task.impulse:.4g} {arm.input_unit} s on the hub"
 
 
 def scenario(name: str, arm: Arm, chain: Chain, duration: float) -> Scenario:

@@ -29,7 +29,7 @@ LASTING = 2.0  # times the slew
 class StripChart:
     """A slew through a coarse chain.
 
-    `read` [N m] is what the ADC hands over at each sample, `asked` [N m] the torque that the controller then wants;
+    `read` [N m] is what the ADC hands over at each sample, `asked` [N m, V or A] what the controller then wants;
     `simulation.torque` is what the motor gives, `delay_samples` later.
     """
 
@@ -49,7 +49,7 @@ class StripChart:
 
     @property
     def limit(self) -> float:
-        """The most the motor gives [N m]."""
+        """The most the motor gives [N m, V or A]."""
         return self.simulation.chain.actuator.torque_limit
 
     @property

@@ -22,7 +22,7 @@ Runs = Mapping[str, Simulation]
 def slew(arm: Arm, runs: Simulation | Runs, *, ax: Sequence[Axes] | None = None) -> tuple[Axes, Axes, Axes]:
     """Simulations of one scenario (what `tfarm.simulate` returns; several by name) in three axes, given or new; these.
 
-    Root moment [N m], tip less L times the reference angle [mm], and the torque of the motor [N m], or its volts.
+    Root moment [N m], tip less L times the reference angle [mm], and the torque of the motor [N m], or its input.
     """
     each = {"": runs} if isinstance(runs, Simulation) else runs
     with style():
@@ -32,7 +32,7 @@ def slew(arm: Arm, runs: Simulation | Runs, *, ax: Sequence[Axes] | None = None)
             moment, tip, torque = taken(ax, 3)
             root_moment(each, ax=moment)
             tip_error(arm, each, ax=tip)
-            motor_torque(each, ax=torque)
+            motor_torque(each, arm.input_unit, ax=torque)
             torque.set_xlabel("time  [s]")
     return moment, tip, torque
 
@@ -76,8 +76,8 @@ def tip_error(arm: Arm, each: Runs, *, ax: Axes) -> None:
     ax.set_ylabel("tip − reference  [mm]")
 
 
-def motor_torque(each: Runs, *, ax: Axes) -> None:
-    """The torque that the motor holds from sample to sample; in volts where the chain has a motor constant."""
+def motor_torque(each: Runs, unit: str = "N m", *, ax: Axes) -> None:
+    """What the motor holds from sample to sample, in the arm's unit; in volts where the chain has a motor constant."""
     first = next(iter(each.values()))
     in_volts = first.volts is not None
     for simulation, colour in zip(each.values(), _colours(each), strict=True):
@@ -88,7 +88,12 @@ def motor_torque(each: Runs, *, ax: Axes) -> None:
         else:
             ax.step(simulation.t, values, where="post", color=colour, lw=1.3)
     _until(first, ax)
-    ax.set_ylabel("motor  [V]" if in_volts else "motor torque  [N m]")
+    ax.set_ylabel("motor  [V]" if in_volts else motor_words(unit))
+
+
+def motor_words(unit: str) -> str:
+    """What stands at the axis of what the motor gives."""
+    return "motor torque  [N m]" if unit == "N m" else f"motor  [{unit}]"
 
 
 def _until(simulation: Simulation, ax: Axes) -> None:

@@ -13,7 +13,7 @@ from tfarm.digits import counted, plain, significant
 from tfarm.dsp.curves import Curve, continuous, root_moment
 from tfarm.dsp.strip_chart import StripChart
 
-from .motion import draw_curve
+from .motion import draw_curve, motor_words
 from .style import BLUE, FAINT, GREEN, GREY, INK, ORANGE, blank, headline, style
 
 Real = NDArray[np.float64]
@@ -39,7 +39,7 @@ def draw_strip_chart(data: StripChart) -> Figure:
         for ax in axes[:, 0]:
             ax.axvspan(*window, color=GREY, alpha=0.16, lw=0)
         axes[0, 0].set_ylabel("root moment  [N m]")
-        axes[1, 0].set_ylabel("motor torque  [N m]")
+        axes[1, 0].set_ylabel(motor_words(data.arm.input_unit))
         axes[0, 1].set_title("close-up of the grey strip", fontsize=9.5)
         figure.legend(loc="outside lower left", ncols=3)
         headline(figure, f"{data.arm.name}: the slew through {_chain_words(data)}")
@@ -48,7 +48,8 @@ def draw_strip_chart(data: StripChart) -> Figure:
 
 def _chain_words(data: StripChart) -> str:
     c, delay = data.simulation.chain.converters, data.simulation.chain.sampling.delay_samples
-    return f"{c.moment_bits} bits of ADC, {counted(delay, 'sample')} late, at most {plain(data.limit, 3)} N m"
+    most = f"{plain(data.limit, 3)} {data.arm.input_unit}"
+    return f"{c.moment_bits} bits of ADC, {counted(delay, 'sample')} late, at most {most}"
 
 
 def close_up(data: StripChart) -> tuple[float, float]:

@@ -201,7 +201,7 @@ def _time_blocks(data: Sampled) -> list[Picture | Table]:
 def _slew_picture(moved: Slews) -> Picture:
     volts = (
         "The motor is in N m, as the file gives no motor constant: its volts are this curve divided by it. "
-        if moved.with_moment.volts is None
+        if moved.with_moment.volts is None and moved.arm.input_unit == "N m"
         else ""
     )
     return Picture(
@@ -222,8 +222,9 @@ def _strip_picture(coarse: StripChart, own: Chain) -> Picture:
     chain, delay = coarse.simulation.chain, coarse.simulation.chain.sampling.delay_samples
     verdict = sampled_verdict(coarse.arm, coarse.gains, chain)
     clipped, read = int(coarse.saturated.sum()), coarse.simulation.saturated["moment"]
+    unit = coarse.arm.input_unit
     what = (
-        f"{clipped} of {coarse.asked.size} samples ask for more than the motor's {plain(coarse.limit, 3)} N m "
+        f"{clipped} of {coarse.asked.size} samples ask for more than the motor's {plain(coarse.limit, 3)} {unit} "
         f"(shaded); the moment is read in steps of {significant(coarse.step, 3)} N m"
     )
     beyond = f", and lies beyond the ADC's range at {read} samples" if read else ""
@@ -234,8 +235,8 @@ def _strip_picture(coarse: StripChart, own: Chain) -> Picture:
         caption=(
             f"{example_words(own, chain)}: {chain.converters.moment_bits} bits of ADC over "
             f"±{plain(chain.converters.moment_range or 0.0, 3)} N m, {late}, and a motor that gives at most "
-            f"{plain(coarse.limit, 3)} N m. {what[0].upper()}{what[1:]}{beyond}. Without its steps and limits the loop "
-            f"with this delay is {typeset(verdict.sentence.partition(' (')[0])}."
+            f"{plain(coarse.limit, 3)} {unit}. {what[0].upper()}{what[1:]}{beyond}. Without its steps and limits "
+            f"the loop with this delay is {typeset(verdict.sentence.partition(' (')[0])}."
             f"{resolution_words([coarse.simulation])}"
         ),
         alt=f"Strip chart of root moment and motor torque through a coarse chain; {what}.",

@@ -111,7 +111,9 @@ def responses_table(stem: str, title: str, arm: Arm, each: Mapping[str, Simulati
         columns += moment.at(t).columns(f"root_moment_{key}", "root moment", "N m")
         columns += curves.tip(run).at(t).columns(f"tip_{key}", "tip", "m")
         columns += tip.at(t).columns(f"tip_error_{key}", "tip less reference", "m")
-        columns.append(Column(f"torque_{key}_N_m", "torque", "N m", of=curves.held(run, run.torque, t)))
+        given = "torque" if arm.input_unit == "N m" else "input"
+        name = f"{given}_{key}_{arm.input_unit.replace(' ', '_')}"
+        columns.append(Column(name, given, arm.input_unit, of=curves.held(run, run.torque, t)))
         if run.gain is not None and np.ptp(run.gain):
             columns.append(Column(f"K_{key}", "gain", of=curves.held(run, run.gain, t)))
     return Table(stem=stem, title=title, is_data=True, columns=tuple(columns))

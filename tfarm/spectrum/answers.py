@@ -86,14 +86,7 @@ def modes_answer(
     With `certify` each flexible mode gets its proven bracket, and the whole the count that proves it complete; `method`
     is the road to the frequencies.  Beside each stands that of the same number with the hub locked.
     """
-    exact = modes.digits(digits) if digits is not None else []
-    found = modes.frequencies(method)
-    given = {
-        "natural_frequency_rad_s": exact if digits is not None and digits > 15 else found,
-        "natural_frequency_hz": found / (2 * math.pi),
-    }
-    columns = [replace(column, of=given.get(column.key, column.of)) for column in MODES]
-    columns.insert(3, _locked(modes, digits))
+    columns = _undamped(modes, digits, method)
     answer: dict[str, Any] = {
         "arm": modes.arm.name,
         "count": int(modes.index.max()),
@@ -105,27 +98,49 @@ def modes_answer(
     }
     if digits is not None:
         answer["digits"] = digits
-    if certify:
-        proof = modes.certify(15 if digits is None else digits)
+    wanted = None if not certify else 15 if digits is None else digits
+    if wanted is not None:
+        proof = modes.certify(wanted)
         rigid = [MISSING] * (len(modes) - len(proof.brackets))
         for key, ends in zip(("lower_rad_s", "upper_rad_s"), zip(*proof.brackets, strict=True), strict=True):
             columns.append(Column(key, of=[*rigid, *ends], on=(JSON,)))
         answer |= {"proven_complete": True, "proof": {"count": proof.count, "below_rad_s": proof.below}}
     if not modes.arm.is_undamped:
         damped = damped_modes(modes)
-        note = IN_THE_BOX if modes.arm.damping else NO_C
-        answer |= {"box": list(damped.box), "eigenvalues_in_box": damped.count, "box_note": note}
-        if damped.others:
-            answer["circuit_eigenvalues"] = list(damped.others)
-        if damped.left_out:
-            last = damped.index[-1]
-            answer["damped_note"] = f"eigenvalues up to mode {last} only: branches above cannot be told apart"
-        columns = [replace(column, on=(JSON,)) if column.key == "nodes_m" else column for column in columns]
-        columns[3:3] = _damped(damped, len(modes))
-        if certify:
-            columns.append(_discs(damped, len(modes), 15 if digits is None else digits))
-            answer["proven_complete_in_box"] = True
+        columns = _with_damping(columns, damped, len(modes), wanted)
+        answer |= _damped_answer(damped) | ({} if wanted is None else {"proven_complete_in_box": True})
     return answer | {"modes": Table(columns=tuple(columns), record=modes)}
+
+
+def _undamped(modes: Modes, digits: int | None, method: Method) -> list[Column]:
+    """The columns of `MODES`, frequencies in the digits asked for, and those with the hub locked beside them."""
+    exact = modes.digits(digits) if digits is not None else []
+    found = modes.frequencies(method)
+    given = {
+        "natural_frequency_rad_s": exact if digits is not None and digits > 15 else found,
+        "natural_frequency_hz": found / (2 * math.pi),
+    }
+    columns = [replace(column, of=given.get(column.key, column.of)) for column in MODES]
+    return [*columns[:3], _locked(modes, digits), *columns[3:]]
+
+
+def _with_damping(columns: list[Column], damped: DampedModes, rows: int, wanted: int | None) -> list[Column]:
+    """The columns with those of the eigenvalues, and of their discs in so many digits; the nodes go to files."""
+    shown = [replace(column, on=(JSON,)) if column.key == "nodes_m" else column for column in columns]
+    discs = [] if wanted is None else [_discs(damped, rows, wanted)]
+    return [*shown[:3], *_damped(damped, rows), *shown[3:], *discs]
+
+
+def _damped_answer(damped: DampedModes) -> dict[str, Any]:
+    """The box of the eigenvalues, and what of them is in no row."""
+    note = IN_THE_BOX if damped.undamped.arm.damping else NO_C
+    answer: dict[str, Any] = {"box": list(damped.box), "eigenvalues_in_box": damped.count, "box_note": note}
+    if damped.others:
+        answer["circuit_eigenvalues"] = list(damped.others)
+    if damped.left_out:
+        last = damped.index[-1]
+        answer["damped_note"] = f"eigenvalues up to mode {last} only: branches above cannot be told apart"
+    return answer
 
 
 def _locked(modes: Modes, digits: int | None) -> Column:
