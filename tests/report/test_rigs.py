@@ -7,8 +7,11 @@ import pytest
 from matplotlib.patches import Rectangle
 
 import tfarm
+from tfarm import plots
 from tfarm.arm import written_unit
+from tfarm.dsp.regions import gain_map
 from tfarm.plots.sketch import sketch
+from tfarm.plots.style import blank
 from tfarm.report.arm_section import arm_section
 from tfarm.report.assumptions_section import assumptions_section
 from tfarm.report.locked_table import locked_table, locked_words
@@ -75,3 +78,16 @@ def test_words_of_a_rig_are_true_of_it():
     assert not why_not(bench)
     (section,) = assumptions_section(bench).words
     assert "this is a rig" in section
+
+
+@pytest.mark.parametrize("name", ["bench-rig", "sasaki2012-lab"])
+def test_no_line_of_energy_where_it_is_no_argument(name):
+    """The sampled map of a rig has none of the arm's line K2 = 1, below which C = 0 would be proven."""
+    arm = RIGS.get(name) or tfarm.load(name)
+    law = tfarm.default_gains(arm)
+    K1, K2 = law.K1 * np.geomspace(0.5, 2.0, 3), np.linspace(-1.0, 2.0, 4)
+    sampled = gain_map(tfarm.sampled(arm, law).verdict.loop, K1, K2)
+    (ax,) = blank(6, 4).subplots(1, 1, squeeze=False).ravel()
+    plots.overlay(tfarm.map(arm, K1, K2), sampled, ax=ax)
+    words = " ".join(text.get_text() for text in ax.get_legend().get_texts())
+    assert ("proven by energy" in words) == arm.is_uniform

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, NullFormatter
@@ -38,16 +39,18 @@ def overlay(continuous: Region, sampled: GainMap | Sequence[GainMap], *, ax: Axe
             headline(figure, f"{continuous.arm.name}: gains that keep the loop stable, continuous and sampled")
             return ax
         _scale(continuous, ax)
-        keys = [_fill(ax, continuous, SAND, ORANGE, "stable, continuous: every mode")]
+        keys: list[Artist] = [_fill(ax, continuous, SAND, ORANGE, "stable, continuous: every mode")]
         colours = BLUES[1:2] if len(planes) == 1 else BLUES
         for plane, colour in zip(planes, colours, strict=True):
             keys.append(_fill(ax, plane, colour, BLUE, f"stable, sampled{sampled_label(continuous, plane)}"))
-        (line,) = ax.plot(ax.get_xlim(), (1.0, 1.0), color=INK, lw=1.1, ls=(0, (5, 3)), zorder=4)
-        line.set_label("below it: proven by energy at C = 0 (K1 > 0, K2 < 1)")
+        if continuous.arm.is_uniform:  # of a rig the argument needs more: see `tfarm.loop.lyapunov`
+            (line,) = ax.plot(ax.get_xlim(), (1.0, 1.0), color=INK, lw=1.1, ls=(0, (5, 3)), zorder=4)
+            line.set_label("below it: proven by energy at C = 0 (K1 > 0, K2 < 1)")
+            keys.append(line)
         law = planes[0].loop.gains
         (point,) = ax.plot(law.K1, law.K2, "o", color="white", mec=INK, mew=1.4, ms=7, zorder=6, ls="none")
         point.set_label(gains_words(law))
-        handles = [*keys, line, point]
+        handles = [*keys, point]
         ax.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.0, -0.13), ncols=2, borderaxespad=0.0)
     return ax
 

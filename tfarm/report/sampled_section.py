@@ -75,13 +75,14 @@ def _overlay_picture(data: Sampled) -> Picture:
         if len(regions.sampled) > 1
         else ""
     )
+    proven = "Below the dashed line lies what the energy argument proves at C = 0. " if data.arm.is_uniform else ""
     return Picture(
         stem="sampled-overlay",
         title="The same gains, continuous and sampled",
         caption=(
             "Sand: where the continuous loop is stable, with every mode. Blue: where the sampled one is. Sand without "
-            f"blue is what a controller that ignores its clock would wrongly trust. {layers}Below the dashed line lies "
-            "what the energy argument proves at C = 0. All edges are exact crossings of the axis or the unit circle. "
+            f"blue is what a controller that ignores its clock would wrongly trust. {layers}{proven}"
+            "All edges are exact crossings of the axis or the unit circle. "
             f"The axis is logarithmic: K1 = 0 lies beyond its left end at {low}{below}. "
             f"{SHORT_SIGN}"
         ),
@@ -204,6 +205,8 @@ def _slew_picture(moved: Slews) -> Picture:
         if moved.with_moment.volts is None and moved.arm.input_unit == "N m"
         else ""
     )
+    if moved.arm.motor is not None:
+        volts = "The motor's torque is that at the hub, behind the gear. "
     return Picture(
         stem="sampled-slew",
         title="The slew, with and without moment feedback",

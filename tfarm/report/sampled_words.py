@@ -166,6 +166,8 @@ def compared(data: Sampled) -> str:
         return f"{told} Here it is the sampling that stabilises."
     found = [*_lower_end(before, after, data.continuous.looked_at), *_upper_end(before, after)]
     moved = " and ".join(found) if found else "moves neither end by a hundredth of a per cent"
+    if not data.arm.is_uniform:
+        return f"{told} Sampling {moved}."
     return (
         f"{told} Sampling {moved}: the energy argument holds for the continuous loop alone and says nothing about this "
         "one."
