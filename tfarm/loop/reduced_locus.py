@@ -74,10 +74,6 @@ def reduced_locus(exact: Locus, order: int | None = None) -> ReducedLocus:
         none = np.zeros(len(FED_BACK))
         closed = [_closed(each.arm, np.array(each.law.row), count, none)[0][0] for each in loops]
         poles = np.array([np.linalg.eigvals(A) for A in closed])
-    unseen = max(
-        0, order - poles.shape[1]
-    )  # the hub angle's pole at 0, where friction resists and no gain sees the angle
-    poles = np.concatenate([poles, np.zeros((len(poles), unseen))], axis=1)
     branches = exact.branches[:, which]
     paired = np.array([_paired(*each) for each in zip(branches.T, poles, strict=True)]).T
     size = np.maximum(abs(branches), modes(arm, 1).natural_frequency[-1])

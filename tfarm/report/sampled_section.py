@@ -205,7 +205,7 @@ def _slew_picture(moved: Slews) -> Picture:
         if moved.with_moment.volts is None and moved.arm.input_unit == "N m"
         else ""
     )
-    if moved.arm.motor is not None:
+    if moved.arm.motor is not None and moved.arm.input_unit == "N m":
         volts = "The motor's torque is that at the hub, behind the gear. "
     return Picture(
         stem="sampled-slew",
