@@ -31,15 +31,15 @@ if TYPE_CHECKING:
         load,
         presets,
     )
+    from tfarm.arm.law import Law
     from tfarm.dsp.results import simulate
     from tfarm.dsp.verdict import analyse as sampled
     from tfarm.errors import CertificationError, ConvergenceError, ParameterError
     from tfarm.exact.outputs import Output
+    from tfarm.loop.closed import closed_loop_poles, margins
     from tfarm.loop.design import design
     from tfarm.loop.locus import locus
-    from tfarm.loop.margins import margins
     from tfarm.loop.nyquist import nyquist
-    from tfarm.loop.poles import closed_loop_poles
     from tfarm.loop.regions import region as map
     from tfarm.reduced import reduce
     from tfarm.response import bode, transfer
@@ -57,6 +57,7 @@ __all__ = [
     "Gauge",
     "Hub",
     "HubFeedback",
+    "Law",
     "Link",
     "Motor",
     "Output",
@@ -89,11 +90,12 @@ _ROOMS = {  # where a name stands; what it is called there after a colon, if not
     "design": "loop.design",
     "locus": "loop.locus",
     "nyquist": "loop.nyquist",
-    "closed_loop_poles": "loop.poles",
+    "closed_loop_poles": "loop.closed",
     "damped_modes": "spectrum",
     "default_gains": "spectrum.scales",
     "map": "loop.regions:region",
-    "margins": "loop.margins",
+    "margins": "loop.closed",
+    "Law": "arm.law",
     "modes": "spectrum",
     "Output": "exact.outputs",
     "plots": "plots",

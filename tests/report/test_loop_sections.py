@@ -174,7 +174,7 @@ def test_the_verdict_comes_before_any_margin():
     wrong = NamedLaw("wrong", "wrong", HubFeedback(K1=0.3, K2=1.5))
     table = margin_table([wrong], [margins_of(PURE, wrong.law)], True)
     assert table.columns[2].values[0] == "unstable"
-    assert table.columns[2].values[3:] == [NOTHING] * 8
+    assert table.columns[2].values[3:] == [NOTHING] * 9
 
 
 def test_margins_are_those_of_the_loop_room():

@@ -13,7 +13,7 @@ from tfarm.arm.tables import SHAPES, TABLES, ArmTable
 from tfarm.arm.theories import THEORIES
 from tfarm.errors import MISSING, ParameterError, did_you_mean
 
-LOOP_TABLES = ("sampling", "converters", "actuator", "slew")  # of the sampled loop; tfarm.dsp reads them
+LOOP_TABLES = ("sampling", "converters", "actuator", "slew", "law")  # of the loop: others read them
 AT_THE_TOP = ("name", "assumptions", "theory", "input")  # no tables: they stand before the first
 
 

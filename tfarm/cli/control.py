@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from tfarm.cli.app import ArmName, Json, app, give, load_arm, plain_number, whole
-from tfarm.cli.inputs import Given, Kp, gains_of, under_a_law
+from tfarm.cli.inputs import Given, Kp, law_of, under_a_law
 from tfarm.cli.sampling import Delay, DspFile, Period, chain_of
 from tfarm.errors import ParameterError
 
@@ -34,10 +34,10 @@ def poles(
 ) -> None:
     """Closed-loop poles of the exact arm, complete in a printed box."""
     number, subject = None if count is None else whole("--count", count, 1, 1000), load_arm(arm)
-    law, said = gains_of(subject, given)
+    law, said = law_of(subject, given)
     from tfarm.cli.control_tables import print_poles
     from tfarm.loop.answers import poles_answer
-    from tfarm.loop.poles import closed_loop_poles
+    from tfarm.loop.closed import closed_loop_poles
 
     answer = poles_answer(closed_loop_poles(subject, law, number), certify)
     give(answer | said, json, print_poles)
@@ -48,10 +48,10 @@ def poles(
 def margins(arm: ArmName, json: Json = False, *, given: Given) -> None:
     """The verdict on a loop, the windows of each gain, and the margins of the exact loop function."""
     subject = load_arm(arm)
-    law, said = gains_of(subject, given)
+    law, said = law_of(subject, given)
     from tfarm.cli.control_tables import print_margins
     from tfarm.loop.answers import margins_answer
-    from tfarm.loop.margins import margins as find_margins
+    from tfarm.loop.closed import margins as find_margins
 
     found = find_margins(subject, law)
     give(margins_answer(found) | said, json, partial(print_margins, found))

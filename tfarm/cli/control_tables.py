@@ -26,23 +26,36 @@ def print_poles(answer: dict[str, Any]) -> None:
     print(answer["sign_convention"])
 
 
-def print_margins(found: Margins, answer: dict[str, Any]) -> None:
+def print_margins(found: Margins[Any], answer: dict[str, Any]) -> None:
     """The verdict, then everything else."""
     far = answer["verdict"] == "unstable" or answer["known_beyond_the_band"]
     reach = "" if far else f" up to {answer['band_rad_s']:.4g} rad/s, not known beyond"
-    print(f"{answer['arm']}: {answer['verdict'].upper()}{reach} (apart from the pole at 0 that Kp = 0 leaves)")
+    apart = " (apart from the pole at 0 that Kp = 0 leaves)" if found.windows else ""
+    if not found.windows and found.stability.poles.moving.size < found.stability.poles.values.size:
+        apart = " (apart from the pole at 0 of a hub whose angle is not held)"
+    print(f"{answer['arm']}: {answer['verdict'].upper()}{reach}{apart}")
     more = " (infinitely many in all)" if answer["unstable_roots_infinite"] else ""
     print(f"unstable poles up to {answer['band_rad_s']:.6g} rad/s: {answer['unstable_roots']}{more}")
     print(answer["beyond_the_band"])
+    for warning in answer.get("warnings", ()):
+        print(f"warning: {warning}")
+    if found.windows:
+        _print_windows(found, answer)
+    elif answer["passivity"]["kind"]:
+        print(answer["passivity"]["reason"])
+    if answer["in_band"] is not None:
+        _print_loop_margins(answer)
+    print(answer["sign_convention"])
+
+
+def _print_windows(found: Margins[Any], answer: dict[str, Any]) -> None:
+    """What Lyapunov's argument says of gains at the hub, and how far each may go alone."""
     print(f"Lyapunov: {answer['lyapunov']['reason']}")
     show(Table(columns=WINDOWS, record=gain_rows(found)))
     spans = ", ".join(
         f"{name} ({each.looked_at[0]:.6g}, {each.looked_at[1]:.6g})" for name, each in found.windows.items()
     )
     print(f"looked at: {spans}; * no limit was found up to there, and beyond none was looked for")
-    if answer["in_band"] is not None:
-        _print_loop_margins(answer)
-    print(answer["sign_convention"])
 
 
 def _print_loop_margins(answer: dict[str, Any]) -> None:
@@ -60,6 +73,11 @@ def _print_loop_margins(answer: dict[str, Any]) -> None:
         Column("at", "at", "rad/s", of=["", *at]),
     )
     show(Table(columns=columns))
+    for key, empty in (("gain_crossovers", "|L| = 1"), ("phase_crossovers", "L < 0")):
+        if answer[key]:
+            show(answer[key])
+        else:
+            print(f"nowhere in the band {empty}")
     phase = band["phase_margin_deg"]
     if phase < 0:
         print(f"phase margin {phase:.6g} deg: lead; not an instability")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import wraps
 from inspect import Parameter, signature
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar, cast
@@ -19,13 +19,24 @@ from tfarm.errors import ParameterError
 
 if TYPE_CHECKING:
     from tfarm.arm import Arm, HubFeedback, Input
+    from tfarm.arm.law import Law
 
-Given = dict[str, float | None]  # gains by name, as typed
+
+@dataclass(frozen=True)
+class Given:
+    """What is typed of a law: `gains` by name, None where not given; the `law` of a file; and the `arm`'s own name."""
+
+    gains: dict[str, float | None]
+    law: str | None = None
+    arm: str = ""
+
+
 HELP = {  # of the gains that have a default of their own
     "K1": "hub rate gain [N m s/rad, V s/rad or A s/rad]; by default 0.00642 J w1, the paper's 0.3 on its arm",
     "K2": "root moment gain, u = ... - K2 E I phi'(0); 0.3 by default, 0 on a hub without inertia",
 }
 K1 = Annotated[float | None, typer.Option("--K1", help=HELP["K1"])]
+LawFile = Annotated[str | None, typer.Option("--law", metavar="FILE", help="TOML file with a [law]; else the arm's")]
 Kp = Annotated[float, typer.Option("--Kp", help="hub angle gain [N m/rad]")]
 
 
@@ -36,17 +47,20 @@ def option_of(gain: Gain) -> Any:
 
 
 def under_a_law(command: Callable[..., None]) -> Callable[..., None]:
-    """The command with an option for each gain after its arm, instead of its last argument, `given`: those by name."""
+    """The command with options for each gain and for a law's file after its arm, instead of its last argument."""
     whole_signature = signature(command, eval_str=True)
     first, *rest, given = whole_signature.parameters.values()
-    gains = [Parameter(gain.name, Parameter.KEYWORD_ONLY, default=None, annotation=option_of(gain)) for gain in LISTED]
+    options = {**{gain.name: option_of(gain) for gain in LISTED}, "law": LawFile}
+    added = [Parameter(name, Parameter.KEYWORD_ONLY, default=None, annotation=kind) for name, kind in options.items()]
 
     @wraps(command)
     def with_options(**arguments: Any) -> None:
-        command(**{given.name: {gain.name: arguments.pop(gain.name) for gain in GAINS}, **arguments})
+        gains = {gain.name: arguments.pop(gain.name) for gain in GAINS}
+        typed = Given(gains, arguments.pop("law"), arguments[first.name])
+        command(**{given.name: typed, **arguments})
 
     keywords = [each.replace(kind=Parameter.KEYWORD_ONLY) for each in (first, *rest)]
-    shown = [keywords[0], *gains, *keywords[1:]]
+    shown = [keywords[0], *added, *keywords[1:]]
     with_options.__signature__ = whole_signature.replace(parameters=shown)  # type: ignore[attr-defined]
     return with_options
 
@@ -93,8 +107,28 @@ def grid(start: float, stop: float, points: str) -> NDArray[np.complex128]:
     return s_on_axis(frequencies)
 
 
+def law_of(arm: Arm, given: Given) -> tuple[HubFeedback | Law, dict[str, Any]]:
+    """The law of the command line: that of a file, of the arm's own [law] where no gain is typed, or gains at the hub.
+
+    With it what the answer says of gains that were not given.
+    """
+    from tfarm.arm.law_tables import load_law
+
+    typed = [name for name, value in given.gains.items() if value is not None]
+    if given.law is not None:
+        if typed:
+            remedy = f"the law is that of {given.law}; leave out --{typed[0]}, or --law"
+            raise ParameterError(key=f"--{typed[0]}", value=given.gains[typed[0]], remedy=remedy)
+        law = load_law(given.law)
+        if law is None:
+            raise ParameterError(key="--law", value=given.law, remedy="has no table [law]", file=None)
+        return law, {}
+    own = None if typed or not given.arm else load_law(given.arm)
+    return gains_of(arm, given) if own is None else (own, {})
+
+
 def gains_of(arm: Arm, given: Given) -> tuple[HubFeedback, dict[str, Any]]:
-    """The law of the command line, gains that were not given being the arm's default, and what its answer says of it.
+    """The gains at the hub of the command line, those not given being the arm's default, and what its answer says.
 
     `default_gains` names those that were not given and have one, `default_gains_in_words` says what they are and why.
     """
@@ -102,8 +136,11 @@ def gains_of(arm: Arm, given: Given) -> tuple[HubFeedback, dict[str, Any]]:
 
     from tfarm.spectrum.scales import default_gains, default_words
 
-    missing = [name for name in HELP if given.get(name) is None]
-    law = replace(default_gains(arm), **{name: value for name, value in given.items() if value is not None})
+    if given.law is not None:
+        remedy = "this command knows gains at the hub; poles, margins, locus and sampled take any law"
+        raise ParameterError(key="--law", value=given.law, remedy=remedy)
+    missing = [name for name in HELP if given.gains.get(name) is None]
+    law = replace(default_gains(arm), **{name: value for name, value in given.gains.items() if value is not None})
     words = default_words(arm, missing) if missing else None
     return law, {"default_gains": missing, "default_gains_in_words": words}
 

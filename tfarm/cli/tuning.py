@@ -8,7 +8,7 @@ from typing import Annotated, Any, cast
 import typer
 
 from tfarm.cli.app import ArmName, Json, app, give, load_arm, whole
-from tfarm.cli.inputs import K1, gains_of
+from tfarm.cli.inputs import K1, Given, gains_of
 from tfarm.cli.sampling import Delay, DspFile, Period, chain_of
 
 
@@ -47,7 +47,7 @@ def tune(
     numbers = whole("--trials", trials, 1, 1_000_000), whole("--seed", seed, 0, 2**53), whole("--modes", modes, 1, 48)
     neurons = whole("--hidden", hidden, 1, 1000)
     subject, chain = load_arm(arm), chain_of(dsp or arm, period, delay_samples)
-    law, said = gains_of(subject, {"K1": K1, "K2": 0.0})
+    law, said = gains_of(subject, Given({"K1": K1, "K2": 0.0}))
     from tfarm import tuner
     from tfarm.tuner.tuning import comparison_answer
 

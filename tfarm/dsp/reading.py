@@ -15,7 +15,7 @@ from tfarm.dsp.chain import Actuator, Chain, Converters, Sampling, Slew
 from tfarm.errors import ParameterError, did_you_mean
 
 RECORDS = {"sampling": Sampling, "converters": Converters, "actuator": Actuator, "slew": Slew}
-OF_AN_ARM = tuple(ArmTable.model_fields)
+OF_AN_ARM = (*ArmTable.model_fields, "law")
 
 
 class _Table(BaseModel):

@@ -233,16 +233,20 @@ class SlowSweep(Sweep):
 
 def expansions(chain: Chain, wanted: Sequence[Output], x: float) -> list[tuple[float, float, float, float]]:
     """Coefficients of s^-2, s^-1, 1 and s in each output's expansion at s = 0."""
+    return [(each[0], each[1], each[2], each[3]) for each in series_at_zero(chain, wanted, x)]
+
+
+def series_at_zero(chain: Chain, wanted: Sequence[Output], x: float, terms: int = ORDER) -> list[list[float]]:
+    """Coefficients from s^-2 on in each output's expansion at s = 0, `terms` less two of them at least."""
     with precision(SERIES_BITS):
-        s = Jet([rational(0), rational(1), *[rational(0)] * (ORDER - 2)])
+        s = Jet([rational(0), rational(1), *[rational(0)] * (terms - 2)])
         state = ChainState(chain, s, slow=True)
         drive = _cleared(state.input)
         order = next(n for n, coefficient in enumerate(drive.c) if coefficient != 0)
         found = []
         for each in wanted:
-            quotient = Jet(_cleared(state.numerator(each, x)).c[: ORDER - order]) / drive.shifted(order)
-            series = [0.0] * (2 - order) + [float(c.mid()) if hasattr(c, "mid") else float(c) for c in quotient.c]
-            found.append((series[0], series[1], series[2], series[3]))
+            quotient = Jet(_cleared(state.numerator(each, x)).c[: terms - order]) / drive.shifted(order)
+            found.append([0.0] * (2 - order) + [float(c.mid()) if hasattr(c, "mid") else float(c) for c in quotient.c])
     return found
 
 

@@ -7,11 +7,15 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from tfarm.arm import LISTED, Arm, HubFeedback, through, unit_of, written_unit
+from tfarm.arm.law import Law
 from tfarm.columns import JSON, REPORT, TERMINAL, Column, Table
 from tfarm.digits import general, plain, singly, within
+from tfarm.response.signals import Signals
 from tfarm.spectrum.answers import HELD
 
 from .design import Design
+from .law_loop import LawLoop
+from .law_stability import signs_of_loop
 from .lyapunov import lyapunov
 from .margins import Margins
 from .poles import Poles
@@ -44,7 +48,7 @@ class GainRow(NamedTuple):
         return [f"({low}, {high})" for low, high in ends]
 
 
-def gain_rows(found: Margins) -> list[GainRow]:
+def gain_rows(found: Margins[Any]) -> list[GainRow]:
     """The gains of a loop."""
     loop, rows = found.stability.loop, found.windows.items()
     return [GainRow(name, loop.law[name], windows, written_unit(name, loop.arm).strip()) for name, windows in rows]
@@ -86,6 +90,16 @@ MARGINS = (  # of `LoopMargins`, beside the factors of the gain
     Column("delay_margin_s", "delay margin", "s", of="delay"),
     Column("disk_margin", "disk margin", of="disk"),
     Column("peak_sensitivity", "peak sensitivity", of="peak_sensitivity"),
+    Column("peak_complementary_sensitivity", "peak complementary sensitivity", of="peak_complementary"),
+)
+_AT = Column("omega_rad_s", "frequency", "rad/s", of=lambda row: row[0], digits=singly(general, 7))
+GAIN_CROSSOVERS = (  # of pairs: where |L| = 1, and the phase margin there
+    _AT,
+    Column("phase_margin_deg", "phase margin", "deg", of=lambda row: row[1], digits=singly(general, 6)),
+)
+PHASE_CROSSOVERS = (  # of pairs: where L < 0, and the factor that puts a pole there
+    _AT,
+    Column("factor", "factor on L", of=lambda row: row[1], digits=singly(general, 6)),
 )
 
 
@@ -99,9 +113,21 @@ def sign_of(arm: Arm) -> str:
     return f"{LAW}; u is {through(arm)}, and a static torque at the hub gives the moment {-share:.6g} times as much"
 
 
-def law_answer(law: HubFeedback, arm: Arm) -> dict[str, Any]:
-    """The gains, with the sign convention that K2 needs, and what the loop closes through."""
-    return {"K1": law.K1, "K2": law.K2, "Kp": law.Kp} | convention(arm)
+def law_answer(law: HubFeedback | Law, arm: Arm) -> dict[str, Any]:
+    """The gains, with the sign convention that K2 needs, and what the loop closes through; or what a law reads."""
+    if isinstance(law, HubFeedback):
+        return {"K1": law.K1, "K2": law.K2, "Kp": law.Kp} | convention(arm)
+    sign = "-" if law.sign < 0 else "+"
+    late = f", {law.delay:g} s late" if law.delay else ""
+    words = f"v = {sign}sum of C_i(s) y_i{late}; v is {through(arm)}, y = ({', '.join(law.signals)})"
+    return {
+        "law": law.name,
+        "signals": dict(zip(law.signals, Signals(arm, law.signals).units, strict=True)),
+        "law_order": law.order,
+        "delay_s": law.delay,
+        "sign_convention": words,
+        "input": arm.input,
+    }
 
 
 def convention(arm: Arm) -> dict[str, Any]:
@@ -110,7 +136,7 @@ def convention(arm: Arm) -> dict[str, Any]:
     return {"sign_convention": sign_of(arm), "input": arm.input, "gain_units": units}
 
 
-def poles_answer(poles: Poles, certify: bool) -> dict[str, Any]:
+def poles_answer(poles: Poles | Poles[LawLoop], certify: bool) -> dict[str, Any]:
     """Poles with Im >= 0, how many are unstable, and the box in which they are complete; proven discs if asked."""
     answer = {
         "arm": poles.loop.arm.name,
@@ -129,12 +155,10 @@ def poles_answer(poles: Poles, certify: bool) -> dict[str, Any]:
     return answer
 
 
-def margins_answer(found: Margins) -> dict[str, Any]:
+def margins_answer(found: Margins | Margins[LawLoop]) -> dict[str, Any]:
     """The verdict first; margins are null unless the loop is stable."""
     verdict = found.stability
-    proof = lyapunov(verdict.loop.arm, verdict.loop.law)
-    limits, sizes, rows = found.in_band, sizes_of(found), gain_rows(found)
-    windows = Table(columns=WINDOWS, record=rows)
+    limits, sizes = found.in_band, sizes_of(found)
     in_band = None
     if limits is not None:
         in_band = {"band_rad_s": limits.band, **{key: size for key, (_, size) in sizes.items()}, "at_rad_s": limits.at}
@@ -149,21 +173,39 @@ def margins_answer(found: Margins) -> dict[str, Any]:
         "beyond_the_band": verdict.tail,
         "known_beyond_the_band": verdict.is_known_beyond,
         "spectral_abscissa": verdict.poles.spectral_abscissa,
-        "lyapunov": {"proven": proof.proven, "a1_over_a2": proof.a1_over_a2, "reason": proof.reason},
-        **{f"{row.gain}_{key}": value for row, part in zip(rows, windows, strict=True) for key, value in part.items()},
+        **_known_of(found),
         "gain_margin": None if limits is None else list(limits.gain),
         **{key: exact for key, (exact, _) in sizes.items()},
         "at_rad_s": None
         if limits is None
         else {name: limits.at[name] for name in ("phase", "phase_lag", "phase_lead")},
         "in_band": in_band,
+        "gain_crossovers": None if limits is None else Table(columns=GAIN_CROSSOVERS, record=limits.gain_crossovers),
+        "phase_crossovers": None if limits is None else Table(columns=PHASE_CROSSOVERS, record=limits.phase_crossovers),
     }
 
 
-def sizes_of(found: Margins) -> dict[str, tuple[float | None, float | None]]:
+def _known_of(found: Margins | Margins[LawLoop]) -> dict[str, Any]:
+    """What a theorem says of the law: Lyapunov's argument and the windows of gains at the hub, or the law's sign."""
+    if isinstance(found.stability.loop, LawLoop):
+        loop = found.stability.loop
+        signs = signs_of_loop(loop)
+        return {"passivity": {"kind": signs.kind, "reason": signs.reason}, "warnings": list(loop.warnings)}
+    proof = lyapunov(found.stability.loop.arm, found.stability.loop.law)
+    rows = gain_rows(found)
+    windows = Table(columns=WINDOWS, record=rows)
+    return {
+        "lyapunov": {"proven": proof.proven, "a1_over_a2": proof.a1_over_a2, "reason": proof.reason},
+        **{f"{row.gain}_{key}": value for row, part in zip(rows, windows, strict=True) for key, value in part.items()},
+    }
+
+
+def sizes_of(found: Margins[Any]) -> dict[str, tuple[float | None, float | None]]:
     """Of each of MARGINS what is exact and what holds in the band; None where not known, or where there is none."""
     limits: Any = found.in_band
     exact = {"delay": found.exact_delay, "disk": found.exact_disk, "peak_sensitivity": found.exact_peak}
+    if found.exact_peak is None or math.isinf(found.exact_peak):  # T = 1 - S: as little known, or as large
+        exact["peak_complementary"] = found.exact_peak
     sizes = {column.of: None if limits is None else getattr(limits, column.of) for column in MARGINS}
     return {column.key: (exact.get(column.of, sizes[column.of]), sizes[column.of]) for column in MARGINS}
 

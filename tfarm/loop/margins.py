@@ -17,20 +17,21 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Generic
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from tfarm.arm import NAMES, Arm, HubFeedback
-from tfarm.crossing import brackets, zeros_between
+from tfarm.crossing import brackets, solved, zeros_between
 from tfarm.records import record
 
 from .frequencies import grid
+from .law_loop import LawLoop
 from .lines import NONE, Line, crossing_at_zero, crossings
 from .plant import Loop
-from .poles import SMALLEST
+from .poles import SMALLEST, AnyLoop
 from .stability import Stability, is_quiet, stability
 from .windows import Windows, gain_windows
 
@@ -39,6 +40,8 @@ Real = NDArray[np.float64]
 DIGITS, PLACE_DIGITS = 9, 7  # of a margin, and of the frequency of a dip, which its depth hardly feels
 BOTTOM = 1e-6  # of the gap between grid points: a dip's bottom is flat, so its depth is right to the square of that
 LOWEST = 6  # local minima on the grid that are refined
+AT_POLE = 1e-9  # a factor on L so small belongs to a pole of L on the axis, where L changes its sign through infinity
+REST = 1e-3  # of its size: what Im L may be at the lowest frequency for L to have settled there
 NEAR_POLES = np.geomspace(0.05, 20.0, 12)  # points about a pole, in its distances from the axis
 
 
@@ -48,8 +51,10 @@ class LoopMargins:
     """Margins of L(i w) for 0 < w <= `band` [rad/s]; inf where nothing limits.
 
     `gain` (lowest, highest factor), `phase` [deg] of least size, above 0 for lag and below for lead, `phase_lag` and
-    `phase_lead` [deg] the sizes of the least of either, `delay` [s], `disk` [-], `peak_sensitivity` [-]; `at` are the
-    frequencies [rad/s] where these occur, 0 where there is none.
+    `phase_lead` [deg] the sizes of the least of either, `delay` [s], `disk` [-], `peak_sensitivity` and
+    `peak_complementary` [-], of 1/(1 + L) and L/(1 + L); `at` are the frequencies [rad/s] where these occur, 0 where
+    there is none.  `gain_crossovers` are all frequencies with |L| = 1 and the phase margin [deg] at each,
+    `phase_crossovers` all with L < 0 and the factor -1/L on it that puts a pole there, both ascending.
     """
 
     band: float
@@ -61,17 +66,20 @@ class LoopMargins:
     disk: float
     peak_sensitivity: float
     at: dict[str, float]
+    peak_complementary: float
+    gain_crossovers: tuple[tuple[float, float], ...]
+    phase_crossovers: tuple[tuple[float, float], ...]
 
 
 @dataclass(frozen=True)
 @record
-class Margins:
+class Margins(Generic[AnyLoop]):
     """The verdict first.  `in_band` are the margins up to its band; `exact_delay`, `exact_disk` and `exact_peak` those
     of the whole infinite-dimensional loop.  All four are None unless the loop is stable, and each exact one where at
     C > 0 nothing bounds |L| beyond the band (the hub's inertia does, where it has some): not known then.
     """
 
-    stability: Stability
+    stability: Stability[AnyLoop]
     windows: dict[str, Windows]
     in_band: LoopMargins | None
     exact_delay: float | None
@@ -97,7 +105,7 @@ def margins(arm: Arm, law: HubFeedback, band: float | None = None) -> Margins:
     return Margins(verdict, windows, found, None, None, None)
 
 
-def loop_margins(verdict: Stability) -> LoopMargins:
+def loop_margins(verdict: Stability[Any]) -> LoopMargins:
     """The margins of a stable loop up to the verdict's band."""
     loop, band = verdict.loop, verdict.band
     omega = dense(verdict)
@@ -111,16 +119,17 @@ def loop_margins(verdict: Stability) -> LoopMargins:
         "delay": _least(np.radians(np.mod(angle, 360)) / np.where(crossed == 0, 1, crossed), crossed),
     }
 
-    def inverse_sensitivity(w: Real) -> Real:
-        drive, fed_back = loop.parts(1j * w)
-        return np.asarray(abs(drive + fed_back) / np.maximum(abs(drive), 1e-300))
-
     least["disk"] = lowest(lambda w: disk_at(loop, w), omega)
-    dip, at_peak = lowest(inverse_sensitivity, omega)
+    dip, at_peak = lowest(lambda w: inverse_peak(loop, w, of=0), omega)
     least["peak_sensitivity"] = max(1.0, 1.0 / dip), at_peak
+    dip, at_peak = lowest(lambda w: inverse_peak(loop, w, of=1), omega)
+    least["peak_complementary"] = 1.0 / dip if dip else math.inf, at_peak
     values = {name: _held(value, DIGITS) for name, (value, _) in least.items()}
     places = {name: _held(where, PLACE_DIGITS) for name, (_, where) in least.items()}
-    return LoopMargins(band=band, gain=gain_margin(loop, band), **values, at=places)
+    by_phase = phase_crossovers(loop, omega)
+    gain = gain_margin(loop, band) if isinstance(loop, Loop) else _nearest_to_one([t for _, t in by_phase])
+    by_gain = tuple(sorted(zip(crossed.tolist(), angle.tolist(), strict=True)))
+    return LoopMargins(band=band, gain=gain, **values, at=places, gain_crossovers=by_gain, phase_crossovers=by_phase)
 
 
 def _held(value: float, digits: int) -> float:
@@ -128,19 +137,45 @@ def _held(value: float, digits: int) -> float:
     return float(f"{value:.{digits}g}")
 
 
-def disk_at(loop: Loop, omega: Real) -> Real:
+def inverse_peak(loop: Loop | LawLoop, omega: Real, of: int) -> Real:
+    """|1 + L| at i omega, or |1 + 1/L| for `of` 1: the inverse of what S = 1/(1 + L) and T = L/(1 + L) peak at."""
+    parts = loop.parts(1j * omega)
+    return np.asarray(abs(parts[0] + parts[1]) / np.maximum(abs(parts[of]), 1e-300))
+
+
+def phase_crossovers(loop: Loop | LawLoop, omega: Real) -> tuple[tuple[float, float], ...]:
+    """Frequencies [rad/s] with L real and below 0, and the factor -1/L; at rest too where L is finite there."""
+    drive, fed_back = loop.parts(1j * omega)
+    (before,), _ = brackets((drive * fed_back.conj()).imag)
+    place, factor = solved(lambda w: loop.parts(1j * w), omega[before], omega[before + 1])
+    found = [(float(w), float(t)) for w, t in zip(place, factor, strict=True) if AT_POLE < t < 1 / AT_POLE]
+    low = -(drive[0] / fed_back[0]) if fed_back[0] else 0j
+    if low.real > AT_POLE and abs(low.imag) < REST * low.real:
+        found.append((0.0, float(low.real)))
+    return tuple(sorted(found))
+
+
+def _nearest_to_one(factors: list[float]) -> tuple[float, float]:
+    """The largest factor below 1, or 0, and the least above it, or infinity."""
+    return max((t for t in factors if t < 1), default=0.0), min((t for t in factors if t > 1), default=math.inf)
+
+
+def disk_at(loop: Loop | LawLoop, omega: Real) -> Real:
     """2 |(1 + L)/(1 - L)| at i omega."""
     drive, fed_back = loop.parts(1j * omega)
     return np.asarray(2 * abs(drive + fed_back) / np.maximum(abs(drive - fed_back), 1e-300))
 
 
-def dense(verdict: Stability) -> Real:
+def dense(verdict: Stability[Any]) -> Real:
     """The grid of the arm and points about every oscillating pole of the loop, as close as it is to the axis.
 
     There |1 + L| dips, by as little damping as narrowly, and not where the arm's own functions are steep.
     """
     poles = verdict.poles.values[verdict.poles.values.imag > 0]
     away = np.concatenate([-NEAR_POLES[::-1], [0.0], NEAR_POLES])
+    if isinstance(verdict.loop, LawLoop):  # its own poles and zeros of |L| may be as narrow
+        own = verdict.loop.law.poles
+        poles = np.r_[poles, own[own.imag > 0]]
     close = (poles.imag[:, None] + abs(poles.real[:, None]) * away).ravel()
     omega = np.asarray(grid(verdict.loop.arm, verdict.band))
     slow = np.outer(rigid_crossings(verdict.loop), [0.5, 2.0]).ravel()
@@ -148,24 +183,26 @@ def dense(verdict: Stability) -> Real:
     return np.unique(np.concatenate([omega, more[more > SMALLEST]]))
 
 
-def minus_loop(loop: Loop, omega: Real) -> Complex:
+def minus_loop(loop: Loop | LawLoop, omega: Real) -> Complex:
     """-L(i w); below `SMALLEST` that of the rigid arm, from which the arm's own cannot be told there."""
     rigid = omega <= SMALLEST
     value = -loop.loop_function(1j * np.where(rigid, 1.0, omega))
-    if rigid.any():
+    if isinstance(loop, Loop) and rigid.any():
         a, b, k = _rigid(loop)
         w = omega[rigid]
         value[rigid] = k + b / w / w + 1j * (a / w)
     return np.asarray(value)
 
 
-def rigid_crossings(loop: Loop) -> Real:
+def rigid_crossings(loop: Loop | LawLoop) -> Real:
     """Frequencies [rad/s] where the loop function of the rigid arm has size 1; none of an arm that cannot turn.
 
     -L = k + b/w^2 + i a/w with a = K1/J, b = Kp/J, k = K2 (J - I_h)/J, so (1 - k^2) w^4 - (2 b k + a^2) w^2 - b^2 = 0.
     Of a hub with friction the drive is not J s^2, and these are none of its own.
     """
-    if loop.arm.rate_loss or not loop.arm.has_rigid_mode or not (loop.law.K1 or loop.law.Kp):
+    if not isinstance(loop, Loop) or loop.arm.rate_loss or not loop.arm.has_rigid_mode:
+        return np.empty(0)
+    if not (loop.law.K1 or loop.law.Kp):
         return np.empty(0)
     a, b, k = _rigid(loop)
     unit = max(abs(a), math.sqrt(abs(b)))
@@ -193,7 +230,7 @@ def gain_margin(loop: Loop, band: float) -> tuple[float, float]:
     return below, min((t for t in factors if t > 1), default=math.inf)
 
 
-def unit_crossings(loop: Loop, omega: Real) -> Real:
+def unit_crossings(loop: Loop | LawLoop, omega: Real) -> Real:
     """Frequencies [rad/s] where |L(i w)| = 1."""
     if loop.law == NONE:
         return np.empty(0)

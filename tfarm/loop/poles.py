@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Generic
 
 import numpy as np
 from numpy.typing import NDArray
+from typing_extensions import TypeVar
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.arm.checks import whole
@@ -23,6 +24,7 @@ from tfarm.spectrum.damped import CLEAR
 from tfarm.spectrum.enclose import Disc, disjoint, enclosed, proven_count
 
 from .frequencies import band_of, steep_places
+from .law_loop import LawLoop
 from .plant import Loop, effective_inertia
 
 Complex = NDArray[np.complexfloating[Any, Any]]
@@ -36,6 +38,7 @@ SLOW = 1e-6  # of a box's height: poles nearer to 0 are the rigid arm's, and kno
 SLOW_STEPS = 4  # of Newton's method from there
 NEAR_RIGID = 0.01  # of its size: how far it may be from the rigid arm's
 SMALLEST = 1e-140  # 1/s: whose square is still a full double
+AnyLoop = TypeVar("AnyLoop", bound=Loop | LawLoop, default=Loop)  # hub gains, unless another law is said
 SHRINK = tuple(1 / factor for factor in GROWTH)
 
 
@@ -46,7 +49,7 @@ def counted(zeros: Complex) -> int:
 
 @dataclass(frozen=True)
 @record
-class Poles:
+class Poles(Generic[AnyLoop]):
     """Closed-loop poles [1/s] with Im >= 0, ascending in Im, those at 0 as often as they are: all there are in `box`.
 
     A real pole stands once for each time, an oscillating one for its conjugate too.  `ends_at_shear_cutoff` says that
@@ -54,7 +57,7 @@ class Poles:
     but for the little that bending takes.
     """
 
-    loop: Loop
+    loop: AnyLoop
     values: Complex
     box: Box
     ends_at_shear_cutoff: bool = False
@@ -90,6 +93,8 @@ class Poles:
 
         Raises CertificationError where something cannot be proven.
         """
+        if isinstance(self.loop, LawLoop):
+            raise CertificationError("discs are proven for gains at the hub; of a law the poles are counted in the box")
         k, gains = self.loop.k, self.loop.gains
         discs = tuple(enclosed(k, complex(pole), digits, gains) for pole in self.moving)
         if not disjoint(discs):
@@ -122,7 +127,7 @@ def closed_loop_poles(arm: Arm, law: HubFeedback, count: int | None = None) -> P
             poles = poles_below(loop, height)
         if poles.values.size >= wanted:
             real = int((poles.values.imag == 0).sum())
-            return _first(poles, wanted if count is not None else max(wanted, real))
+            return first_poles(poles, wanted if count is not None else max(wanted, real))
         if number > MOST_MODES:
             text = f"only {poles.values.size} poles right of -1/C lie below {height:.4g} rad/s, not {count}"
             raise ConvergenceError(text, poles.values, count)
@@ -201,7 +206,7 @@ def starting_points(loop: Loop, up_to: float) -> Complex:
     return np.concatenate([near, near.conj(), slow, real, -real])
 
 
-def _first(poles: Poles, count: int) -> Poles:
+def first_poles(poles: Poles[AnyLoop], count: int) -> Poles[AnyLoop]:
     """The first so many poles, and a lower box that holds just these."""
     values = poles.values
     kept = values[:count]

@@ -14,6 +14,7 @@ A pole at 0 remains where Kp = 0, whatever K1 and K2: verdicts are apart from it
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Generic
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,7 @@ from tfarm.spectrum import modes, modes_below
 
 from .frequencies import MOST_MODES, band_of
 from .plant import Loop
-from .poles import Poles, poles_below
+from .poles import AnyLoop, Poles, poles_below
 
 Real = NDArray[np.float64]
 
@@ -42,19 +43,19 @@ UNFELT = 1e-9  # a hub participation below this share of an ordinary one is none
 
 @dataclass(frozen=True)
 @record
-class Stability:
+class Stability(Generic[AnyLoop]):
     """`verdict` "stable", "marginal" or "unstable"; poles in the band; what is known beyond it, in words.
 
     Where `is_known_beyond` is false the verdict is that of the band alone.
     """
 
-    loop: Loop
+    loop: AnyLoop
     verdict: str
     unstable_roots: int
     unstable_roots_infinite: bool
     band: float
     tail: str
-    poles: Poles
+    poles: Poles[AnyLoop]
     is_known_beyond: bool = True
 
     @property

@@ -19,7 +19,7 @@ from tfarm.arm import Arm
 from tfarm.dsp import Chain
 from tfarm.dsp.writing import file_text
 from tfarm.errors import CertificationError, ConvergenceError
-from tfarm.loop.poles import Poles
+from tfarm.loop.poles import Poles, closed_loop_poles
 from tfarm.plots.words import gains_words
 from tfarm.report.kept import keep, kept
 from tfarm.report.loop_laws import has_loop
@@ -99,7 +99,7 @@ def boxed(arm: Arm, modes: Modes) -> Iterator[Boxed]:
         boxes.append((f"damped modes, C = {arm.damping:g} s", lambda: tfarm.damped_modes(modes)))
     if has_loop(arm):
         law = default_gains(arm)
-        boxes.append((f"closed loop, {gains_words(law, 6)}", lambda: tfarm.closed_loop_poles(arm, law, MODES)))
+        boxes.append((f"closed loop, {gains_words(law, 6)}", lambda: closed_loop_poles(arm, law, MODES)))
     for what, enclosed in boxes:
         try:
             found = enclosed()

@@ -24,7 +24,8 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 
 TURN = 0.6  # rad: a longer step of the phase along the contour is halved
 FORESEEN = 1.0  # so is one over which ln f, phase or size, would change by more at the rate of either end
-FINEST = 1e-13  # a contour cannot be resolved closer to a zero than this share of the box
+FINEST = 1e-13  # a contour cannot be resolved closer to a zero than this share of |s|
+NARROW = 1e-8  # of a box: in a wide one the part near s = 0 is resolved as finely as in one of this size
 MOST_POINTS = 200_000  # of a contour
 MOST_CALLS = 30_000  # of the function in one search; the most that 300 random loops took is 4,100
 DEAD = 1e-8  # nearer to s = 0 than this share of a box Newton's method is not believed: a zero there forces cuts
@@ -83,7 +84,7 @@ def winding_number(function: Function, box: Box, points: int = 40) -> int:
     path = np.append(path, corners[-1])
     phase, rate = _phase(function, path)
     start, end = np.array([path[:-1], phase[:-1], rate[:-1]]), np.array([path[1:], phase[1:], rate[1:]])
-    smallest, turned, seen = FINEST * abs(corners[2] - corners[0]), 0.0, path.size
+    across, turned, seen = abs(corners[2] - corners[0]), 0.0, path.size
     while True:
         length, step = end[0] - start[0], np.angle(np.exp(1j * (end[1] - start[1]).real))
         foreseen = abs(length) * np.maximum(abs(start[2]), abs(end[2]))
@@ -92,7 +93,8 @@ def winding_number(function: Function, box: Box, points: int = 40) -> int:
         start, end, length, step = start[:, ~smooth], end[:, ~smooth], length[~smooth], step[~smooth]
         if not length.size:
             break
-        if seen > MOST_POINTS or abs(length).min() < smallest:
+        smallest = FINEST * np.clip(abs(start[0]), NARROW * across, across)
+        if seen > MOST_POINTS or (abs(length) < smallest).any():
             raise ConvergenceError(f"a zero lies on the contour near {start[0, 0]:.6g}", start[0, 0], step[0])
         halfway = (start[0] + end[0]) / 2
         middle = np.array([halfway, *_phase(function, halfway)])

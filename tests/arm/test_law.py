@@ -1,0 +1,159 @@
+"""Laws as records: from numbers, fractions, roots and python-control, and from TOML and .mat files."""
+
+from textwrap import dedent
+
+import control
+import numpy as np
+import pytest
+import scipy.io
+
+from tfarm import HubFeedback, Law, ParameterError
+from tfarm.arm.law_tables import load_law
+
+S = np.array([0.3j, 2 + 3j, -1.5 + 40j])
+
+
+def test_what_a_signal_is_multiplied_by_is_what_python_control_says():
+    s = control.tf("s")
+    notch = 3 * (s**2 + 0.2 * 57 * s + 57**2) / (s + 57) ** 2
+    lag = control.ss([[-1.0, 2.0], [0.0, -4.0]], [[0.0], [1.0]], [[2.0, 1.0]], [[0.5]])
+    law = Law({"hub_angle": notch, "tip_acceleration": lag, "hub_rate": 0.3}, delay=0.004)
+    expected = [notch(S), lag(S), np.full(3, 0.3)]
+    np.testing.assert_allclose(law.values(S), expected, rtol=1e-12)  # of polynomials of order 2: some eps
+    assert (law.signals, law.order, law.is_discrete) == (("hub_angle", "tip_acceleration", "hub_rate"), 4, False)
+    assert sorted(law.poles.real.round(4)) == [-57.0, -57.0, -4.0, -1.0]
+
+
+def test_all_parts_are_one_state_space():
+    law = Law({"hub_angle": ([1.0, 2.0], [1.0, 3.0, 50.0]), "hub_rate": {"zeros": [-1], "poles": [-2], "gain": 5}})
+    A, B, C, D = law.matrices()
+    for s in S:
+        found = (C @ np.linalg.solve(s * np.eye(len(A)) - A, B) + D)[0]
+        np.testing.assert_allclose(found, law.values(np.array([s]))[:, 0], rtol=1e-13)
+
+
+def test_matrices_from_several_signals_are_their_transfer_functions():
+    rng = np.random.default_rng(3)
+    A, B, C, D = rng.normal(size=(5, 5)), rng.normal(size=(5, 2)), rng.normal(size=(1, 5)), rng.normal(size=(1, 2))
+    law = Law.of_matrices(A, B, C, D, ["hub_angle", "root_moment"])
+    for s in S:
+        expected = (C @ np.linalg.solve(s * np.eye(5) - A, B) + D)[0]
+        np.testing.assert_allclose(law.values(np.array([s]))[:, 0], expected, rtol=1e-11)  # cond of s - A: 1e3
+
+
+def test_a_sign_and_references_do_what_they_say():
+    law = Law({"hub_angle": 2.0}, sign=1)
+    assert law.values(S)[0, 0] == -2.0
+    matrices = [[-1.0]], [[1.0, 2.0, 3.0]], [[1.0]], [[0.0, 0.0, 0.0]]
+    law = Law.of_matrices(*matrices, ["reference:hub_angle", "", "hub_angle"])
+    assert law.signals == ("hub_angle",)
+    assert law.values(np.array([0j]))[0, 0] == pytest.approx(3.0, rel=1e-15)
+
+
+@pytest.mark.parametrize("gains", [HubFeedback(K1=0.3, K2=0.2), HubFeedback(Kp=2.0, K1=-1.0), HubFeedback()])
+def test_gains_at_the_hub_are_a_law_and_come_back(gains):
+    assert Law.of_gains(gains).gains == gains
+    assert Law({"hub_rate": 0.3}, delay=1e-3).gains is None
+    assert Law({"hub_rate": ([0.3], [1.0, 1.0])}).gains is None
+    assert Law({"tip_acceleration": 0.3}).gains is None
+
+
+def test_one_number_of_a_law_changes_and_nothing_else():
+    law = Law({"hub_angle": ([1.0, 2.0], [1.0, 3.0]), "hub_rate": 0.5})
+    assert law.having("hub_angle.num.1", 7.0).parts[0].block.num == (1.0, 7.0)
+    assert law.having("hub_rate", 4.0).parts[1].block.num == (4.0,)
+    np.testing.assert_allclose(law.having("gain", 3.0).values(S), 3 * law.values(S), rtol=1e-15)
+    assert law.having("delay", 0.01).delay == 0.01
+    assert Law({"strain@0.05": ([1.0], [1.0, 2.0])}).having("strain@0.05.den.1", 9.0).parts[0].block.den == (1.0, 9.0)
+    with pytest.raises(ParameterError, match="hub_rate"):
+        law.having("hub_speed", 1.0)
+
+
+@pytest.mark.parametrize(
+    ("entries", "others", "key"),
+    [
+        ({}, {}, "law"),
+        ({"hub_rate": "much"}, {}, "hub_rate"),
+        ({"hub rate": 1.0}, {}, "signal"),
+        ({"hub_rate": ([1.0], [0.0])}, {}, "den"),
+        ({"hub_rate": ([np.inf], [1.0])}, {}, "num"),
+        ({"hub_rate": {"gain": 1.0, "poles": [[-1.0, 2.0]]}}, {}, "poles"),
+        ({"hub_rate": 1.0}, {"delay": -1.0}, "delay"),
+        ({"hub_rate": 1.0}, {"sign": 2}, "sign"),
+        ({"hub_rate": 1.0}, {"input": "torque"}, "input"),
+        ({"hub_rate": 1.0}, {"rule": "euler"}, "rule"),
+        ({"hub_rate": 1.0}, {"references": ("hub_angle",)}, "references"),
+        ({"hub_angle": control.tf([1.0], [1.0, 0.5], 0.01)}, {"period": 0.02}, "period"),
+        ({"hub_angle": ([1.0, 0.0], [1.0])}, {"period": 0.02}, "num"),
+    ],
+)
+def test_what_is_no_law_is_refused_by_its_key(entries, others, key):
+    with pytest.raises(ParameterError) as error:
+        Law(entries, **others)
+    assert error.value.key == key
+
+
+def written(path, text):
+    path.write_text(dedent(text))
+    return path
+
+
+def test_a_file_holds_what_the_record_does(tmp_path):
+    path = written(
+        tmp_path / "law.toml",
+        """
+        [law]
+        delay = 0.004
+        input = "hub_torque"
+        [law.hub_angle]
+        num = [2.0, 1]
+        den = [0.01, 1.0]
+        [law.strain]
+        x = 0.02
+        gain = 3.0
+        poles = [[-1.0, 2.0], [-1.0, -2.0]]
+        """,
+    )
+    expected = Law(
+        {"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "strain@0.02": {"gain": 3.0, "poles": [-1 + 2j, -1 - 2j]}},
+        delay=0.004,
+        input="hub_torque",
+    )  # fmt: skip
+    assert load_law(path) == expected
+    assert load_law("sasaki2012") is None
+
+
+def test_a_mat_file_holds_matrices_or_a_structure_of_them(tmp_path):
+    matrices = {"A": [[0.5]], "B": [[1.0, 2.0]], "C": [[3.0]], "D": [[0.0, 4.0]]}
+    scipy.io.savemat(tmp_path / "c.mat", matrices | {"lqg": matrices})
+    head = "[law]\nmatrices = 'c.mat'\nperiod = 0.01\nsignals = ['hub_angle', 'root_moment']\n"
+    for more, factor in (("", 1.0), ("system = 'lqg'\nscales = [1.0, 10.0]\n", 10.0)):
+        law = load_law(written(tmp_path / "law.toml", head + more))
+        z = np.array([1.2 + 0.1j])
+        np.testing.assert_allclose(law.values(z)[:, 0], [3 / (z[0] - 0.5), factor * (6 / (z[0] - 0.5) + 4)], rtol=1e-15)
+        assert law.period == 0.01
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("law = 3", "give a table, headed [law]"),
+        ("[law]\ndelya = 0.1", 'did you mean "delay"'),
+        ("[law]\n[law.hub_rate]\ngian = 1.0", 'did you mean "gain"'),
+        ("[law]\n[law.hub_rate]\nden = [1.0]", "law.hub_rate.num is missing"),
+        ("[law]\n[law.hub_rate]\nx = 0.1", "law.hub_rate.gain is missing"),
+        ("[law]\n[law.hub_rate]\ngain = 1.0\nnum = [1.0]", "either num and den"),
+        ("[law]\nmatrices = 'none.mat'\nsignals = ['hub_rate']", "none.mat"),
+        ("[law]\nmatrices = 'law.toml'\nsignals = ['hub_rate']", "no .mat file"),
+        ("[law]\nmatrices = 'empty.mat'\nsignals = ['hub_rate']", "holds no A, B, C, D"),
+        ("[law]\nsignals = ['hub_rate']\n[law.hub_rate]\ngain = 1.0", "law.matrices is missing"),
+        ("[law]", "name at least one signal"),
+    ],
+)
+def test_what_a_file_says_wrongly_is_refused_in_a_line_with_its_name(tmp_path, text, words):
+    scipy.io.savemat(tmp_path / "empty.mat", {"X": [[1.0]]})
+    with pytest.raises(ParameterError) as error:
+        load_law(written(tmp_path / "law.toml", text))
+    assert words in str(error.value)
+    assert "law.toml" in str(error.value)
+    assert "\n" not in str(error.value)

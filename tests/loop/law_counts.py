@@ -1,0 +1,202 @@
+"""Unstable poles under random laws, counted again by another road:  python -m tests.loop.law_counts 1000 [seed]
+
+Random arms (as in `tests.loop.arms`), one to three signals, rational entries of order 8 at most in all, some with
+unstable poles and zeros, delays of 0 to 50 ms at C > 0.  The number of unstable poles is compared with that of modal
+models of 30 and 40 modes closed with the law, wherever these agree: by eigenvalues, or with a delay by Nyquist; then by
+that of the exact transfer functions too.
+"""
+
+import os
+import sys
+import time
+from collections import Counter
+
+if __name__ == "__main__":
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import numpy as np
+
+import tfarm
+from tests.loop.arms import some_loop
+from tfarm.arm.law import Law
+from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.loop.law_stability import law_stability
+from tfarm.response.signals import Signals
+from tfarm.spectrum.scales import first_frequency
+
+SIGNALS = ("hub_angle", "hub_rate", "root_moment", "tip_displacement", "tip_acceleration", "moment@", "deflection@")
+MODELS = (30, 40)  # modes
+SLOWEST = 1e-6  # of w1: the radius of the arc around the poles at 0
+AT_REST, DOUBTFUL = 1e-9, 1e-7  # of w1: poles at 0 come out as small as the first; larger up to the second
+CLEAR = 1e-8  # of its size: a pole of a model nearer to the axis decides nothing
+
+
+def some_law(rng, arm, *, delay):
+    """One to three random entries, scaled so that the loop function is of the order of 1 somewhere near a mode."""
+    names = [str(each) for each in rng.choice(SIGNALS, size=rng.integers(1, 4), replace=False)]
+    names = [
+        f"{each}{round(float(rng.uniform(0.1, 0.9)) * arm.length, 6)}" if each.endswith("@") else each for each in names
+    ]
+    w1 = first_frequency(arm)
+    entries, left = {}, 8
+    for name in names:
+        order = int(rng.integers(0, min(left, 5) + 1))
+        left -= order
+        poles, zeros = _roots(rng, order, w1), _roots(rng, int(rng.integers(0, order + 1)), w1)
+        at = 1j * w1 * 10.0 ** rng.uniform(-1, 1.3)
+        G = Signals(arm, (name,)).values(np.array([at]))[0, 0]
+        shape = np.prod(at - np.array(zeros)) / np.prod(at - np.array(poles))
+        if not 0 < abs(G) < np.inf:  # where the tip is held nothing is to be read of it
+            continue
+        size = 10.0 ** rng.uniform(-2, 0.5) / abs(G * shape)
+        entries[name] = {"zeros": zeros, "poles": poles, "gain": float(size * rng.choice([-1, 1]))}
+    return Law(entries or {"hub_rate": 1e-3}, delay=delay)
+
+
+def some_delay(rng, arm):
+    """None, or from a hundredth of 1/w1 to three of it, at most 50 ms."""
+    return float(min(0.05, 10.0 ** rng.uniform(-2, 0.5) / first_frequency(arm))) if rng.random() < 0.5 else 0.0
+
+
+def _roots(rng, count, w1):
+    """Roots in conjugate pairs or alone, a tenth of them right of the axis."""
+    found = []
+    while len(found) < count:
+        size, side = w1 * 10.0 ** rng.uniform(-1, 1.5), 1 if rng.random() < 0.1 else -1
+        if count - len(found) > 1 and rng.random() < 0.5:
+            ratio = rng.uniform(0.02, 0.95)
+            root = complex(side * ratio * size, size * np.sqrt(1 - ratio**2))
+            found += [root, root.conjugate()]
+        else:
+            found.append(complex(side * size))
+    return found
+
+
+def by_eigenvalues(arm, law, count, band):
+    """Unstable poles of a modal model under the law below the band, or None where one is too near to it or the axis."""
+    A, B, C, D = model(arm, law.signals, count)
+    Ak, Bk, Ck, Dk = law.matrices()
+    whole = 1 + (Dk @ D)[0, 0]
+    closed = np.block([
+        [A - B @ Dk @ C / whole, -B @ Ck / whole],
+        [Bk @ (C - D @ Dk @ C / whole), Ak - Bk @ D @ Ck / whole],
+    ])  # fmt: skip
+    poles = np.linalg.eigvals(closed)
+    moving = abs(poles) > AT_REST * first_frequency(arm)
+    poles = poles[moving & (poles.real > -CLEAR * abs(poles)) & (abs(poles.imag) < 1.01 * band)]
+    doubtful = (poles.real < CLEAR * abs(poles)) | (abs(poles) < DOUBTFUL * first_frequency(arm))
+    if (doubtful | (abs(poles.imag) > 0.99 * band)).any():
+        return None
+    return poles.size
+
+
+def by_turns(values, poles, law, band, slow):
+    """The same of a delayed loop: turns of 1 + L around 0, along the axis and back far right of it.
+
+    `values` are 1 + L of one model or of two; None where two differ by a quarter of it somewhere, so that Rouche's
+    theorem does not reach the arm: what a model leaves out falls as one over the number of its modes.
+    """
+    right = 3 * max(band, *law.poles.real) if law.order else 3 * band
+    width = np.maximum(abs(poles.real), 1e-9 * abs(poles))
+    near = abs(poles.imag)[:, None] + width[:, None] * np.linspace(-20, 20, 161)
+    up = np.unique(np.r_[np.geomspace(slow, band, 2000), near[(near > slow) & (near < band)]])
+    arc = slow * np.exp(1j * np.linspace(0, np.pi / 2, 40))
+    path = np.r_[arc, 1j * up, 1j * band + np.linspace(0, right, 400), right + 1j * np.linspace(band, 0, 400)]
+    found = [value(path) for value in values]
+    for _ in range(30):
+        f = found[-1]
+        if not (abs(f - found[0]) <= abs(f) / 4).all():
+            return None
+        (fast,) = np.nonzero(~(abs(np.angle(f[1:] / f[:-1])) < 0.5))
+        if not fast.size:
+            turns = -np.angle(f[1:] / f[:-1]).sum() / np.pi
+            return round(turns) + int((law.poles.real > 0).sum()) if abs(turns - round(turns)) < 1e-6 else None
+        middle = (path[fast] + path[fast + 1]) / 2
+        path = np.insert(path, fast + 1, middle)
+        found = [np.insert(f, fast + 1, value(middle)) for f, value in zip(found, values, strict=True)]
+    return None
+
+
+def by_nyquist(arm, law, band):
+    """Turns of the exact loop function, from the public transfer functions, and of two models of light damping."""
+    omega, slow = tfarm.modes(arm, up_to=band).natural_frequency[1:], SLOWEST * first_frequency(arm)
+    near = np.r_[-arm.damping * omega**2 / 2 + 1j * omega, law.poles]
+    counts = [by_turns([exact(arm, law)], near, law, band, slow)]
+    if arm.damping * tfarm.modes(arm, MODELS[-1]).natural_frequency[-1] < 1:
+        (coarse, _), (fine, p) = (returned(arm, law, count) for count in MODELS)
+        counts.append(by_turns([coarse, fine], np.r_[p, law.poles], law, band, slow))
+    return counts
+
+
+def exact(arm, law):
+    """1 + L from the transfer functions of a rig."""
+    read = [name.partition("@") for name in law.signals]
+    G = [tfarm.transfer(arm, name, x=float(x) if x else None) for name, _, x in read]
+
+    def value(s):
+        return 1 + np.exp(-s * law.delay) * (law.values(s) * np.array([each(s) for each in G])).sum(axis=0)
+
+    return value
+
+
+def returned(arm, law, count):
+    """1 + L of a modal model under the law, as a function of s, and the poles of the model."""
+    A, B, C, D = model(arm, law.signals, count)
+    turns_freely = A[0, 1] == 1 and not A[1].any()  # the first two states are then a double integrator: no eigenvectors
+    first = 2 * turns_freely
+    p, R = np.linalg.eig(A[first:, first:])
+    residues = (C[:, first:] @ R) * np.linalg.solve(R, B[first:].astype(complex))[:, 0]
+
+    def value(s):
+        G = np.array([D[n, 0] + (residues[n] / (s[:, None] - p)).sum(axis=1) for n in range(len(C))])
+        G = G + B[1, 0] * C[:, :2] @ np.array([1 / s**2, 1 / s]) if turns_freely else G
+        return 1 + np.exp(-s * law.delay) * (law.values(s) * G).sum(axis=0)
+
+    return value, p
+
+
+def model(arm, names, count):
+    """The modal model of the signals, from the public reduced models, one output at a time."""
+    from tfarm.reduced.sensed import sensed_model
+
+    return sensed_model(arm, names, count)
+
+
+def judge(arm, law):
+    """ "right", "refused: ...", "wrong: ..." or "no second road"."""
+    try:
+        found = law_stability(arm, law)
+    except (ConvergenceError, ParameterError) as error:
+        return f"refused: {str(error).splitlines()[0]}"
+    if found.unstable_roots_infinite:
+        return "no second road"
+    try:
+        if law.delay:
+            other = [each for each in by_nyquist(arm, law, found.band) if each is not None] or [None]
+        else:
+            other = [by_eigenvalues(arm, law, count, found.band) for count in MODELS]
+    except ConvergenceError:  # residues of two eigenvalues that nearly coincide
+        return "no second road"
+    if None in other or other[0] != other[-1]:
+        return "no second road"
+    if (abs(found.poles.values[found.poles.values.real > 0]) > found.band).any():  # further right than the models reach
+        return "no second road"
+    return "right" if other[0] == found.unstable_roots else f"wrong: {found.unstable_roots}, by models {other}"
+
+
+def main(size, seed):
+    rng, found, spent = np.random.default_rng(seed), Counter(), []
+    for number in range(size):
+        arm = some_loop(rng)[0]
+        law = some_law(rng, arm, delay=some_delay(rng, arm) if arm.damping else 0.0)
+        start = time.perf_counter()
+        word = judge(arm, law)
+        spent.append(time.perf_counter() - start)
+        found[word.split(":")[0]] += 1
+        if word.startswith(("wrong", "refused")):
+            print(number, arm.damping, law.signals, law.delay, word, flush=True)
+    print(dict(found), f"{1e3 * np.median(spent):.0f} ms a loop", flush=True)
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 1)

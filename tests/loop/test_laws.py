@@ -1,0 +1,208 @@
+"""Any law on the exact arm: against gains at the hub, python-control, models closed otherwise, and theorems."""
+
+import json
+from itertools import pairwise
+
+import control
+import numpy as np
+import pytest
+
+import tfarm
+from tests.loop.arms import some_loop
+from tests.loop.law_counts import judge, some_delay, some_law
+from tests.shell import run
+from tfarm import HubFeedback, Law, ParameterError
+from tfarm.loop.law_loop import LawLoop
+from tfarm.loop.law_poles import law_poles, law_poles_below
+from tfarm.loop.law_stability import law_stability
+from tfarm.loop.margins import loop_margins
+from tfarm.loop.passivity import definite, is_hurwitz, polynomial, signs_of
+from tfarm.loop.stability import stability
+from tfarm.reduced.sensed import sensed_model
+from tfarm.response.signals import Signals
+
+LAB, BARE, RIG = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "quanser-2dsfl"))
+
+
+@pytest.mark.parametrize("arm", [LAB, BARE, RIG], ids=lambda arm: arm.name)
+@pytest.mark.parametrize("gains", [HubFeedback(K1=0.3, K2=0.3), HubFeedback(K1=0.1, K2=-0.5, Kp=2.0)])
+def test_gains_at_the_hub_have_the_same_poles_as_a_law(arm, gains):
+    mine, theirs = law_poles(arm, Law.of_gains(gains), 8), tfarm.closed_loop_poles(arm, gains, 8)
+    both = max(mine.values.size, theirs.values.size)
+    np.testing.assert_allclose(mine.values[:both], theirs.values[:both], rtol=0, atol=1e-11 * abs(theirs.values).max())
+
+
+def test_signals_are_the_transfer_functions_at_rest_too():
+    names = ("hub_angle", "tip_acceleration", "moment@0.2", "deflection@0.4", "rotation@0.3", "shear@0.1")
+    read = Signals(LAB, names)
+    for s in (1e-4j, 1e-2 + 1e-2j, 0.05j, 3j, 400 + 900j):
+        for name, value in zip(names, read.values(np.array([s]))[:, 0], strict=True):
+            output, _, x = name.partition("@")
+            exact = tfarm.transfer(LAB, output, x=float(x) if x else None)(s)
+            assert abs(value - exact) < 1e-11 * abs(exact), (name, s)  # (s/w1)^2 of the digits at the switch: 1e-5
+
+
+def test_every_crossing_and_its_sign_is_that_of_python_control():
+    verdict = law_stability(LAB, Law.of_gains(HubFeedback(K1=0.3, K2=0.3)))
+    mine = loop_margins(verdict)
+    known = {0.47466: 75.280, 63.2834: -7.901, 200.58: -31.56, 208.15: -155.10}
+    found = dict(mine.gain_crossovers)
+    for omega, angle in known.items():
+        nearest = min(found, key=lambda w: abs(w - omega))
+        assert nearest == pytest.approx(omega, rel=1e-4)
+        assert found[nearest] == pytest.approx(angle, abs=5e-3)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.002])
+def test_margins_of_a_law_are_those_of_python_control_on_a_model(delay):
+    """Order 40, the loop function's own values on a fine grid, so that the delay is exact."""
+    s = control.tf("s")
+    law = Law({"hub_angle": (2 * s + 1) / (0.01 * s + 1), "tip_acceleration": 0.05 / (s / 50 + 1)}, delay=delay)
+    A, B, C, D = sensed_model(LAB, law.signals, 20)
+    omega = np.unique(np.r_[np.geomspace(0.05, 1000, 900), np.linspace(40, 260, 1200)])
+    p, R = np.linalg.eig(A[2:, 2:])
+    residues = (C[:, 2:] @ R) * np.linalg.solve(R, B[2:].astype(complex))[:, 0]
+    at = 1j * omega
+    G = D + residues @ (1 / (at - p[:, None])) + B[1, 0] * C[:, :2] @ np.array([1 / at**2, 1 / at])
+    L = np.exp(-at * delay) * (law.values(at) * G).sum(axis=0)
+    gm, pm, _, wpc, wgc, _ = control.stability_margins(control.FRD(L, omega), returnall=True)
+    mine = loop_margins(law_stability(LAB, law))
+    by_phase = [pair for pair in mine.phase_crossovers if omega[0] < pair[0] < omega[-1]]
+    by_gain = [pair for pair in mine.gain_crossovers if omega[0] < pair[0] < omega[-1]]
+    np.testing.assert_allclose([w for w, _ in by_gain], np.sort(wgc), rtol=2e-5)  # the model's own error at 260 rad/s
+    theirs = [(angle + 180) % 360 - 180 for _, angle in sorted(zip(wgc, pm, strict=True))]
+    np.testing.assert_allclose([a for _, a in by_gain], theirs, atol=0.02)
+    shown = sorted((w, g) for w, g in zip(wpc, gm, strict=True) if w < 300)
+    np.testing.assert_allclose([p for p in by_phase if p[0] < 300], shown, rtol=1e-3)
+
+
+def test_random_loops_have_as_many_unstable_poles_by_another_road():
+    rng, words = np.random.default_rng(5), []
+    for _ in range(8):
+        arm = some_loop(rng)[0]
+        words.append(judge(arm, some_law(rng, arm, delay=some_delay(rng, arm) if arm.damping else 0.0)))
+    assert set(words) <= {"right", "no second road"}
+    assert words.count("right") >= 4
+
+
+def test_delays_add_up_poles_as_the_lambert_function_says():
+    """A rigid hub of great inertia: J s + K e^{-s tau} has its poles at W_n(-K tau/J)/tau."""
+    from dataclasses import replace
+
+    from scipy.special import lambertw
+
+    J = 1e6
+    arm = replace(LAB, hub=replace(LAB.hub, inertia=J))
+    K, tau = 1.5 * J, 2.0
+    poles = law_poles_below(LawLoop(arm, Law({"hub_rate": K}, delay=tau)), 12.0).moving
+    expected = np.array([lambertw(-K * tau / J, n) / tau for n in range(-4, 5)])
+    for pole in poles:
+        assert abs(expected - pole).min() < 1e-5 * abs(pole)  # the link's share of the inertia: 1e-6 of it
+    inside = [w for w in expected if 0 <= w.imag < 12 and w.real > -2 / tau]
+    assert len(poles) >= len(inside) > 2
+
+
+def test_without_damping_a_delay_drives_ever_more_modes():
+    law = Law({"hub_rate": 0.3, "root_moment": 0.3}, delay=0.005)
+    found = [law_stability(BARE, law, band) for band in (3e3, 1e4, 3e4)]
+    assert all(each.unstable_roots_infinite and each.verdict == "unstable" for each in found)
+    counts = [each.unstable_roots for each in found]
+    assert all(a < b for a, b in pairwise(counts))
+
+
+def test_a_law_with_a_sign_is_known_beyond_the_band():
+    for arm in (BARE, LAB, RIG):
+        found = law_stability(arm, Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0])}))
+        assert (found.verdict, found.is_known_beyond) == ("stable", True)
+    washout = law_stability(BARE, Law({"hub_rate": ([0.3, 0.0], [1.0, 5.0])}))
+    assert washout.verdict == "marginal"  # the hub drifts: two poles stay at 0
+    assert (washout.poles.values == 0).sum() == 2
+
+
+def test_positive_position_feedback_needs_a_spring_that_is_stiffer():
+    """-C = 3/(s^2 + 2 s + 5) is strictly negative imaginary, C(0) = -0.6."""
+    filters = ([-3.0], [1.0, 2.0, 5.0])
+    assert signs_of(Law({"hub_angle": filters})).kind == "negative imaginary"
+    assert law_stability(LAB, Law({"hub_angle": filters})).unstable_roots == 1
+    for Kp, stable in ((0.5, False), (0.7, True)):
+        held = Law.of_matrices([[-2.0, -5.0], [1.0, 0.0]], [[1.0], [0.0]], [[0.0, -3.0]], [[Kp]], ["hub_angle"])
+        num = np.polyadd(Kp * np.array([1.0, 2.0, 5.0]), [-3.0])
+        fraction = Law({"hub_angle": (num.tolist(), [1.0, 2.0, 5.0])})
+        assert signs_of(fraction).at_rest == pytest.approx(Kp - 0.6, abs=1e-15)
+        assert law_stability(LAB, held).is_stable == law_stability(LAB, fraction).is_stable == stable
+        assert law_stability(BARE, fraction).is_known_beyond == stable
+
+
+def test_signs_of_polynomials_are_those_of_their_roots():
+    rng = np.random.default_rng(7)
+    for _ in range(60):
+        roots = rng.integers(-5, 6, size=rng.integers(1, 6)).tolist()
+        poly = polynomial(np.poly(roots).round().tolist())
+        odd = any(roots.count(r) % 2 for r in roots if r > 0)
+        assert definite(poly) == ("" if odd else "not below" if max(roots) > 0 else "above"), roots
+        assert is_hurwitz(poly) == (max(roots) < 0)
+    for _ in range(60):
+        c = rng.integers(-9, 10, size=rng.integers(2, 8)).tolist()
+        roots = np.roots(c)
+        if c[0] and abs(roots.real).min(initial=1.0) > 1e-6:
+            assert is_hurwitz(polynomial(c)) == bool((roots.real < 0).all()), c
+
+
+@pytest.mark.parametrize(
+    ("entries", "others", "key"),
+    [
+        ({"root_moment": ([1.0, 0.0, 0.0], [1.0])}, {}, "law.root_moment.num"),
+        ({"hub_angle": ([1.0, 0.0, 0.0], [1.0])}, {}, "law.hub_angle.num"),
+        ({"hub_speed": 1.0}, {}, "output"),
+        ({"strain": 1.0}, {}, "strain.x"),
+        ({"moment@9": 1.0}, {}, "moment@9"),
+        ({"hub_rate@0.1": 1.0}, {}, "hub_rate@0.1"),
+        ({"hub_rate": 1.0}, {"period": 0.01}, "period"),
+        ({"hub_rate": 1.0}, {"input": "motor_current"}, "input"),
+    ],
+)
+def test_no_loop_is_refused_by_its_key(entries, others, key):
+    with pytest.raises(ParameterError) as error:
+        LawLoop(LAB, Law(entries, **others))
+    assert error.value.key == key
+
+
+def test_a_pure_derivative_of_the_angle_is_the_rate():
+    mine = law_poles(LAB, Law({"hub_angle": ([0.3, 0.0], [1.0])}), 6)
+    theirs = tfarm.closed_loop_poles(LAB, HubFeedback(K1=0.3), 6)
+    np.testing.assert_allclose(mine.values, theirs.values, atol=1e-11 * abs(theirs.values).max())
+
+
+def test_an_unstable_cancellation_in_the_law_is_said():
+    law = Law({"hub_angle": {"zeros": [2.0], "poles": [2.0, -5.0], "gain": 1.0}, "hub_rate": 0.3})
+    (words,) = LawLoop(LAB, law).warnings
+    assert "cancels its own unstable pole" in words
+    assert law_stability(LAB, law).unstable_roots == 1
+
+
+def test_commands_take_a_law_from_a_file_or_the_arm_s_own(capsys, tmp_path):
+    text = "[law]\nname = 'PD'\ndelay = 0.002\n[law.hub_angle]\nnum = [2.0, 1.0]\nden = [0.01, 1.0]\n"
+    (tmp_path / "law.toml").write_text(text)
+    (tmp_path / "arm.toml").write_text(tfarm.arm.to_toml(LAB) + "\n" + text)
+    code, of_file, err = run(capsys, "margins", "sasaki2012-lab", "--law", str(tmp_path / "law.toml"), "--json")
+    assert (code, err) == (0, "")
+    code, of_arm, _ = run(capsys, "margins", str(tmp_path / "arm.toml"), "--json")
+    assert json.loads(of_arm) == json.loads(of_file)
+    answer = json.loads(of_file)
+    law = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0])}, delay=0.002)
+    assert answer["phase_margin_deg"] == tfarm.margins(LAB, law).in_band.phase
+    assert answer["law_order"] == 1
+    code, out, _ = run(capsys, "margins", str(tmp_path / "arm.toml"))
+    assert "PD" not in out.splitlines()[0]
+    assert "STABLE" in out.splitlines()[0]
+    code, out, _ = run(capsys, "poles", str(tmp_path / "arm.toml"), "--K1", "0.3", "--json")
+    assert json.loads(out)["K1"] == 0.3  # gains that are typed come before the file's law
+    assert run(capsys, "margins", "sasaki2012-lab", "--law", str(tmp_path / "law.toml"), "--K1", "1")[0] == 2
+    assert run(capsys, "margins", "sasaki2012-lab", "--law", "sasaki2012")[0] == 2
+    assert run(capsys, "poles", "sasaki2012-lab", "--law", str(tmp_path / "law.toml"), "--certify")[0] == 3
+
+
+def test_a_law_of_gains_alone_is_taken_for_them():
+    found = tfarm.margins(LAB, Law({"hub_rate": 0.3, "root_moment": 0.3}))
+    assert found.windows.keys() == {"K1", "K2", "Kp"}
+    assert found.stability.unstable_roots == stability(LAB, HubFeedback(K1=0.3, K2=0.3)).unstable_roots

@@ -1,0 +1,278 @@
+"""The parts of a law: from one signal to the input as a ratio of polynomials, or from several as matrices.
+
+Both give numerators and one denominator, polynomials in s [1/s], or in z where the law is discrete, so that what is
+computed of a loop has no pole where a controller has one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tfarm.arm.checks import number
+from tfarm.errors import ParameterError
+from tfarm.records import record
+
+Complex = NDArray[np.complexfloating[Any, Any]]
+Real = NDArray[np.float64]
+Matrices = tuple[Real, Real, Real, Real]
+
+LARGEST = 1e150  # coefficient: the square of one is still a double
+MOST_ORDER = 60  # of one part: beyond it a polynomial of doubles says little
+REAL_PAIR = 1e-9  # of its size: how far a root may be from the conjugate of another
+
+
+@dataclass(frozen=True, slots=True)
+class Rational:
+    """num(s)/den(s), coefficients in descending powers, den[0] not 0.  Raises ParameterError for what is no such."""
+
+    num: tuple[float, ...]
+    den: tuple[float, ...] = (1.0,)
+
+    def __post_init__(self) -> None:
+        num, den = _polynomial("num", self.num), _polynomial("den", self.den)
+        if not any(den):
+            raise ParameterError(key="den", value=list(den), remedy="a denominator that is not 0 everywhere")
+        object.__setattr__(self, "num", num)
+        object.__setattr__(self, "den", den)
+
+    @classmethod
+    def of_roots(cls, zeros: ArrayLike, poles: ArrayLike, gain: float) -> Rational:
+        """gain prod(s - zeros)/prod(s - poles); complex roots in conjugate pairs."""
+        gain = number("gain", gain, "a finite number")
+        return cls(tuple(gain * _of_roots("zeros", zeros)), tuple(_of_roots("poles", poles)))
+
+    @property
+    def signals(self) -> int:
+        """How many signals it takes."""
+        return 1
+
+    @property
+    def order(self) -> int:
+        """How many states it has, where it is proper."""
+        return len(self.den) - 1
+
+    @property
+    def excess(self) -> int:
+        """Degree of the numerator over that of the denominator: above 0 it differentiates."""
+        return len(self.num) - len(self.den)
+
+    @property
+    def poles(self) -> Complex:
+        """The zeros of the denominator."""
+        return np.roots(self.den).astype(complex)
+
+    @property
+    def zeros(self) -> Complex:
+        """The zeros of the numerator."""
+        return np.roots(self.num).astype(complex)
+
+    def denominator(self, s: Complex) -> Complex:
+        """den(s)."""
+        return np.asarray(np.polyval(np.array(self.den), s))
+
+    def numerators(self, s: Complex) -> Complex:
+        """num(s) (1, n)."""
+        return np.asarray(np.polyval(np.array(self.num), s))[None]
+
+    def times(self, factor: float) -> Rational:
+        """Itself times a number."""
+        return Rational(tuple(factor * each for each in self.num), self.den)
+
+    def matrices(self) -> Matrices:
+        """A state space (controllable form, balanced); raises ParameterError where it is not proper."""
+        if self.excess > 0:
+            remedy = "of a higher degree than its denominator: no states give that; add a pole"
+            raise ParameterError(key="num", value=list(self.num), remedy=remedy)
+        den = np.array(self.den) / self.den[0]
+        num = np.r_[np.zeros(-self.excess), np.array(self.num) / self.den[0]]
+        n = self.order
+        A, B = np.eye(n, k=-1), np.eye(n, 1)
+        if n:
+            A[0] = -den[1:]
+        C = (num[1:] - num[0] * den[1:])[None]
+        return balanced(A, B, C, np.array([[num[0]]]))
+
+
+@dataclass(frozen=True)
+@record
+class StateSpace:
+    """x' = A x + B y, v = C x + D y from m signals to the input (or x of the next sample, of a discrete law).
+
+    A (n, n), B (n, m), C (1, n), D (1, m).  Raises ParameterError for shapes that do not fit and what is not finite.
+    """
+
+    A: Real
+    B: Real
+    C: Real
+    D: Real
+
+    def __post_init__(self) -> None:
+        for name in "ABCD":
+            object.__setattr__(self, name, _matrix(name, getattr(self, name)))
+        n, m = len(self.A), self.D.shape[1]
+        for name, shape in {"A": (n, n), "B": (n, m), "C": (1, n), "D": (1, m)}.items():
+            if getattr(self, name).shape != shape:
+                remedy = (
+                    f"is {getattr(self, name).shape}, and should be {shape}: A (n, n), B (n, m), C (1, n), D (1, m)"
+                )
+                raise ParameterError(key=name, value="matrix", remedy=remedy)
+        if n > MOST_ORDER:
+            raise ParameterError(key="A", value=n, remedy=f"at most {MOST_ORDER} states are read")
+
+    @property
+    def signals(self) -> int:
+        """How many signals it takes."""
+        return int(self.D.shape[1])
+
+    @property
+    def order(self) -> int:
+        """How many states it has."""
+        return len(self.A)
+
+    @property
+    def excess(self) -> int:
+        """0 where a signal passes at once, -1 where none does."""
+        return 0 if self.D.any() else -1
+
+    @cached_property
+    def poles(self) -> Complex:
+        """The eigenvalues of A."""
+        return np.linalg.eigvals(self.A).astype(complex)
+
+    def denominator(self, s: Complex) -> Complex:
+        """det(s - A)."""
+        return np.asarray(np.prod(s[..., None] - self.poles, axis=-1))
+
+    def numerators(self, s: Complex) -> Complex:
+        """det[[s - A, B_j], [-C, D_j]] (m, n): the transfer function of each signal j times det(s - A)."""
+        n, flat = self.order, np.ravel(s)
+        bordered = np.zeros((flat.size, n + 1, n + 1), complex)
+        bordered[:, :n, :n] = flat[:, None, None] * np.eye(n) - self.A
+        bordered[:, n, :n] = -self.C
+        found = []
+        for j in range(self.signals):
+            bordered[:, :n, n], bordered[:, n, n] = self.B[:, j], self.D[0, j]
+            found.append(np.linalg.det(bordered).reshape(np.shape(s)))
+        return np.array(found)
+
+    def times(self, factor: float) -> StateSpace:
+        """Itself times a number."""
+        return StateSpace(self.A, self.B, factor * self.C, factor * self.D)
+
+    def matrices(self) -> Matrices:
+        """A, B, C, D."""
+        return self.A, self.B, self.C, self.D
+
+
+Block = Rational | StateSpace
+
+
+def block_of(key: str, entry: Any) -> tuple[Block, float | None]:
+    """A part of a law from what a person has, and its sample period [s], None where it does not say or is continuous.
+
+    A number; a pair (num, den); a mapping with zeros, poles and gain; python-control's TransferFunction or StateSpace
+    with one output.  Raises ParameterError for anything else.
+    """
+    if isinstance(entry, Rational | StateSpace):
+        return entry, None
+    period = _period_of(getattr(entry, "dt", None))
+    if all(hasattr(entry, name) for name in "ABCD"):
+        system = entry if not hasattr(entry, "poles") else _balanced_system(entry)
+        return StateSpace(*system), period
+    if hasattr(entry, "num") and hasattr(entry, "den"):
+        num, den = (np.asarray(part[0][0], dtype=float) for part in (entry.num, entry.den))
+        if len(entry.num) != 1 or len(entry.num[0]) != 1:
+            remedy = "has several inputs or outputs; give one transfer function a signal, or matrices"
+            raise ParameterError(key=key, value=type(entry).__name__, remedy=remedy)
+        return Rational(tuple(num.tolist()), tuple(den.tolist())), period
+    if isinstance(entry, dict):
+        unknown = set(entry) - {"zeros", "poles", "gain"}
+        if unknown or "gain" not in entry:
+            remedy = "a mapping holds gain, and zeros and poles where there are any"
+            raise ParameterError(key=key, value=sorted(map(str, entry)), remedy=remedy)
+        return Rational.of_roots(entry.get("zeros", ()), entry.get("poles", ()), entry["gain"]), None
+    if isinstance(entry, tuple | list) and len(entry) == 2:
+        return Rational(*(tuple(np.atleast_1d(np.asarray(part, dtype=float)).tolist()) for part in entry)), None
+    remedy = "a finite number, (num, den), a mapping with zeros, poles and gain, or a python-control system"
+    return Rational((number(key, entry, remedy),)), None
+
+
+def balanced(A: Real, B: Real, C: Real, D: Real) -> Matrices:
+    """The same system with states of like size: a diagonal change of coordinates by powers of 2."""
+    if not len(A):
+        return A, B, C, D
+    from scipy.linalg import matrix_balance
+
+    balanced_A, (scale, _) = matrix_balance(A, permute=False, separate=True)
+    return np.asarray(balanced_A), B / scale[:, None], C * scale, D
+
+
+def _balanced_system(system: Any) -> Matrices:
+    """The matrices of a python-control system, its states of like size."""
+    A, B, C, D = (np.asarray(part, dtype=float) for part in (system.A, system.B, system.C, system.D))
+    return balanced(A, B, C, D)
+
+
+def _period_of(dt: Any) -> float | None:
+    """The period of a python-control system; None of a continuous one, or where none is said."""
+    if dt is None or dt is True or dt == 0:
+        return None
+    return float(dt)
+
+
+def _polynomial(name: str, values: Iterable[Any]) -> tuple[float, ...]:
+    """Coefficients without leading zeros, each finite."""
+    remedy = "numbers in descending powers, such as [1, 0.5]"
+    if isinstance(values, str) or not isinstance(values, Sequence | np.ndarray) or not len(values):
+        raise ParameterError(key=name, value=values, remedy=remedy)
+    found = [number(name, each, remedy) for each in values]
+    if not all(math.isfinite(each) and abs(each) <= LARGEST for each in found):
+        raise ParameterError(key=name, value=found, remedy=f"finite numbers, at most {LARGEST:g} in size")
+    while len(found) > 1 and found[0] == 0:
+        found.pop(0)
+    if len(found) > MOST_ORDER + 1:
+        raise ParameterError(key=name, value=len(found) - 1, remedy=f"a degree of at most {MOST_ORDER}")
+    return tuple(found)
+
+
+def _of_roots(name: str, roots: ArrayLike) -> Real:
+    """The monic real polynomial with these roots, (re, im) pairs or complex numbers, conjugates among them."""
+    try:
+        found = np.array([complex(*each) if isinstance(each, tuple | list) else complex(each) for each in list(roots)])  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        remedy = "numbers, complex ones as [re, im], with their conjugates"
+        raise ParameterError(key=name, value=roots, remedy=remedy) from None
+    if len(found) > MOST_ORDER:
+        raise ParameterError(key=name, value=len(found), remedy=f"at most {MOST_ORDER}")
+    upper = np.sort_complex(found[found.imag > 0])
+    lower = np.sort_complex(found[found.imag < 0].conj())
+    if upper.size != lower.size or (abs(upper - lower) > REAL_PAIR * abs(upper)).any():
+        remedy = "a complex root without its conjugate: a law with real coefficients has both"
+        raise ParameterError(key=name, value=[f"{each:g}" for each in found], remedy=remedy)
+    pairs = [np.array([1.0, -2 * each.real, abs(each) ** 2]) for each in upper]
+    alone = [np.array([1.0, -each.real]) for each in found[found.imag == 0]]
+    product = np.ones(1)
+    for factor in [*pairs, *alone]:
+        product = np.convolve(product, factor)
+    return product
+
+
+def _matrix(name: str, values: ArrayLike) -> Real:
+    try:
+        found = np.array(values, dtype=float, ndmin=2)
+    except (TypeError, ValueError):
+        raise ParameterError(key=name, value="matrix", remedy="rows of numbers") from None
+    if found.ndim != 2 or not np.isfinite(found).all():
+        raise ParameterError(key=name, value="matrix", remedy="rows of finite numbers")
+    if name == "A" and not found.size:
+        return np.empty((0, 0))
+    if name == "B" and not found.size:
+        return np.empty((0, found.shape[1] or 1))
+    return found

@@ -1,0 +1,286 @@
+"""Any linear law, as a record: what of each signal is fed back to the input of the rig.
+
+    v = -sum over signals of C_i(s) e^{-s tau} (y_i - r_i)
+
+with a minus, as the paper's (19) has it (`sign` = 1 for laws that are written the other way).  `HubFeedback` is the
+simplest of them: a number on hub angle, hub rate and root moment.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm.blocks import Block, Matrices, Rational, StateSpace, block_of
+from tfarm.arm.checks import not_negative, number, positive
+from tfarm.arm.feedback import GAINS, HubFeedback
+from tfarm.arm.records import INPUTS
+from tfarm.errors import ParameterError, did_you_mean
+from tfarm.records import record
+
+Complex = NDArray[np.complexfloating[Any, Any]]
+Real = NDArray[np.float64]
+
+MOST_SIGNALS = 12
+REFERENCE = "reference:"  # before the name of a signal: what that should be
+RULES = ("tustin", "zoh", "matched")  # by which a continuous law is made discrete
+
+
+@dataclass(frozen=True)
+@record
+class Part:
+    """One block of a law and the signals that it takes: names of outputs, with "@x" [m] for those along the link.
+
+    "reference:hub_angle" is what hub_angle should be: no part of the loop.  "" is a column that nothing is led to.
+    """
+
+    signals: tuple[str, ...]
+    block: Block
+
+
+@dataclass(frozen=True)
+@record
+class Law:
+    """A linear law from named signals to the rig's input.
+
+    `entries` maps a signal ("hub_angle", "tip_acceleration", "strain@0.05") to what it is multiplied by: a number, a
+    pair (num, den), a mapping of zeros, poles and gain, or a python-control system; `parts` are those, as blocks.
+    `delay` [s] lies in the loop; `input` is what the law drives, the arm's own where None; `period` [s] makes it a law
+    in z, None in s; signals among `references` enter as (signal - reference); `sign` is -1, or 1 for laws written
+    v = +C y; `rule` and `prewarp` [rad/s] say how a continuous law is sampled.
+    Raises ParameterError for what is no law, naming the key.
+    """
+
+    entries: Mapping[str, Any] = field(repr=False, compare=False)
+    delay: float = 0.0
+    input: str | None = None
+    period: float | None = None
+    references: tuple[str, ...] = ()
+    sign: int = -1
+    rule: str = "tustin"
+    prewarp: float = 0.0
+    name: str = "law"
+    parts: tuple[Part, ...] = ()
+
+    def __post_init__(self) -> None:
+        parts, periods = (self.parts, ()) if self.parts else _parts_of(self.entries)
+        object.__setattr__(self, "parts", parts)
+        object.__setattr__(self, "entries", {})
+        object.__setattr__(self, "delay", not_negative("delay", self.delay, "a delay in s, 0 or more"))
+        object.__setattr__(self, "period", _one_period(self.period, periods))
+        object.__setattr__(self, "references", tuple(self.references))
+        object.__setattr__(self, "prewarp", not_negative("prewarp", self.prewarp, "a frequency in rad/s, or 0"))
+        self._check()
+
+    def _check(self) -> None:
+        if isinstance(self.sign, bool) or self.sign not in (-1, 1):
+            raise ParameterError(key="sign", value=self.sign, remedy="-1 (v = -C y, the default) or 1 (v = C y)")
+        if self.input is not None and self.input not in INPUTS:
+            raise ParameterError(key="input", value=self.input, remedy=did_you_mean(str(self.input), INPUTS))
+        if self.rule not in RULES:
+            raise ParameterError(key="rule", value=self.rule, remedy=did_you_mean(str(self.rule), RULES))
+        if len(self.signals) > MOST_SIGNALS:
+            raise ParameterError(key="signals", value=len(self.signals), remedy=f"at most {MOST_SIGNALS} signals")
+        for each in self.references:
+            if each not in self.signals:
+                raise ParameterError(key="references", value=each, remedy=did_you_mean(str(each), self.signals))
+        if self.period is not None and self.is_improper:
+            remedy = "a discrete law needs no sample of the future: give num at most the degree of den"
+            raise ParameterError(key="num", value=self.name, remedy=remedy)
+
+    @classmethod
+    def of_matrices(cls, A: Any, B: Any, C: Any, D: Any, signals: Sequence[str], **others: Any) -> Law:
+        """One state space from several signals, in the order of the columns of B and D."""
+        block = StateSpace(A, B, C, D)
+        if block.signals != len(signals):
+            remedy = f"B has {block.signals} columns: name one signal for each"
+            raise ParameterError(key="signals", value=list(signals), remedy=remedy)
+        law = cls({}, parts=(Part(tuple(map(_column, signals)), block),), **others)
+        if not law.signals:
+            raise ParameterError(key="signals", value=list(signals), remedy="name at least one measured signal")
+        return law
+
+    @classmethod
+    def of_gains(cls, law: HubFeedback) -> Law:
+        """The hub's two or three gains as a law."""
+        used = {gain.output: law[gain.name] for gain in GAINS if law[gain.name]}
+        return cls(used or {"hub_rate": 0.0}, name="gains at the hub")
+
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """The signals that are fed back, each once."""
+        return tuple(dict.fromkeys(name for part in self.parts for name in part.signals if is_measured(name)))
+
+    @property
+    def is_discrete(self) -> bool:
+        """Whether it is a law in z."""
+        return self.period is not None
+
+    @property
+    def order(self) -> int:
+        """How many states it has."""
+        return sum(part.block.order for part in self.parts)
+
+    @property
+    def is_improper(self) -> bool:
+        """Whether a part of it differentiates."""
+        return any(part.block.excess > 0 for part in self.parts)
+
+    @property
+    def poles(self) -> Complex:
+        """Its own poles [1/s], or in z."""
+        return np.concatenate([np.empty(0, complex), *(part.block.poles for part in self.parts)])
+
+    @property
+    def gains(self) -> HubFeedback | None:
+        """The law as gains at the hub, where it is no more than that; None where it is."""
+        known = {gain.output: gain.name for gain in GAINS}
+        plain = all(isinstance(part.block, Rational) and not part.block.order for part in self.parts)
+        if self.delay or self.is_discrete or not plain or not set(self.signals) <= set(known):
+            return None
+        if self.is_improper:
+            return None
+        numbers = self.values(np.zeros(1, complex))[:, 0].real
+        return HubFeedback(**{known[name]: float(each) for name, each in zip(self.signals, numbers, strict=True)})
+
+    # ------------------------------------------------------------ values
+
+    def polynomials(self, s: Complex) -> tuple[Complex, Complex]:
+        """What the signals are multiplied by, (signals, n), and the denominator (n,) of all, without the delay.
+
+        With the sign of u = -sum: positive is what feeds back against a signal.
+        """
+        s = np.asarray(s, dtype=complex)
+        dens = [part.block.denominator(s) for part in self.parts]
+        whole = np.prod(dens, axis=0)
+        row = {name: n for n, name in enumerate(self.signals)}
+        numerators = np.zeros((len(row), *s.shape), complex)
+        for n, part in enumerate(self.parts):
+            others = np.prod([den for m, den in enumerate(dens) if m != n], axis=0) * -self.sign
+            for name, value in zip(part.signals, part.block.numerators(s), strict=True):
+                if name in row:
+                    numerators[row[name]] += value * others
+        return numerators, np.asarray(whole)
+
+    def values(self, s: Complex) -> Complex:
+        """C_i (signals, n) at s, or z, without the delay; infinite or nan at its poles."""
+        numerators, whole = self.polynomials(s)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(numerators / whole)
+
+    def matrices(self) -> Matrices:
+        """One state space from all signals to what is taken off the input (v = -out).
+
+        Raises ParameterError where a part differentiates.
+        """
+        blocks = [part.block.matrices() for part in self.parts]
+        n, m = self.order, len(self.signals)
+        A, B, C, D = np.zeros((n, n)), np.zeros((n, m)), np.zeros((1, n)), np.zeros((1, m))
+        start = 0
+        for part, (a, b, c, d) in zip(self.parts, blocks, strict=True):
+            states = slice(start, start + len(a))
+            A[states, states], C[:, states] = a, c
+            for j, name in enumerate(part.signals):
+                if name in self.signals:
+                    B[states, self.signals.index(name)] += b[:, j]
+                    D[:, self.signals.index(name)] += d[:, j]
+            start += len(a)
+        return A, B, -self.sign * C, -self.sign * D
+
+    # ------------------------------------------------------------ other laws
+
+    def times(self, factor: float) -> Law:
+        """Every part times a number."""
+        return replace(self, parts=tuple(Part(part.signals, part.block.times(factor)) for part in self.parts))
+
+    def having(self, key: str, value: float) -> Law:
+        """The law with another value of one number.
+
+        "delay"; "gain", a factor on everything; "hub_angle" or "hub_angle.gain", a factor on what a signal takes;
+        "hub_angle.num.1", a coefficient, counted from 0.  Raises ParameterError for a key that there is not.
+        """
+        value = number(key, value, "a finite number")
+        if key == "delay":
+            return replace(self, delay=value)
+        if key == "gain":
+            return self.times(value)
+        signal, _, rest = key.partition(".") if "@" not in key else _after_place(key)
+        for n, part in enumerate(self.parts):
+            if part.signals == (signal,):
+                changed = Part(part.signals, _varied(part.block, rest, value, key))
+                return replace(self, parts=(*self.parts[:n], changed, *self.parts[n + 1 :]))
+        known = ["gain", "delay", *(part.signals[0] for part in self.parts if len(part.signals) == 1)]
+        raise ParameterError(key="law", value=key, remedy=did_you_mean(key, known))
+
+
+def _parts_of(entries: Mapping[str, Any]) -> tuple[tuple[Part, ...], tuple[float, ...]]:
+    """The blocks of the entries of a law, and the sample periods that they bring."""
+    if not isinstance(entries, Mapping) or not entries:
+        raise ParameterError(key="law", value=entries, remedy='name at least one signal, such as {"hub_rate": 0.3}')
+    found: list[Part] = []
+    periods: list[float] = []
+    for name, entry in entries.items():
+        block, period = block_of(_signal(name), entry)
+        if block.signals != 1:
+            remedy = "takes several signals: use Law.of_matrices and name them"
+            raise ParameterError(key=name, value=type(entry).__name__, remedy=remedy)
+        found.append(Part((name,), block))
+        periods += [] if period is None else [period]
+    return tuple(found), tuple(periods)
+
+
+def _signal(name: Any) -> str:
+    """The name of an output, with a place along the link after an @ where it needs one."""
+    if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z_]\w*(@[0-9.eE+-]+)?", name):
+        remedy = 'an output such as hub_rate, or one along the link with its place, "strain@0.05"'
+        raise ParameterError(key="signal", value=name, remedy=remedy)
+    return name
+
+
+def _column(name: Any) -> str:
+    """The name of a column: a signal, a reference to one, or nothing."""
+    if name == "" or not isinstance(name, str):
+        return name if name == "" else _signal(name)
+    return REFERENCE + _signal(name.removeprefix(REFERENCE)) if name.startswith(REFERENCE) else _signal(name)
+
+
+def is_measured(name: str) -> bool:
+    """Whether a column of a law is fed from the rig: no reference, and not left open."""
+    return bool(name) and not name.startswith(REFERENCE)
+
+
+def _one_period(period: float | None, found: Iterable[float]) -> float | None:
+    """The sample period of the law, which its parts agree on."""
+    known = {float(each) for each in found}
+    if period is not None:
+        known.add(positive("period", period, "a sample period in s; leave it out for a continuous law"))
+    if len(known) > 1:
+        raise ParameterError(key="period", value=sorted(known), remedy="the parts of a law have one period in common")
+    return known.pop() if known else None
+
+
+def _after_place(key: str) -> tuple[str, str, str]:
+    """A key with a place, "strain@0.05.num.1", in front of and behind the dot that ends the place."""
+    match = re.fullmatch(r"(.*@[0-9.eE+-]*?[0-9])(?:\.((?:num|den|gain).*))?", key)
+    return (match[1], ".", match[2] or "") if match else (key, "", "")
+
+
+def _varied(block: Block, rest: str, value: float, key: str) -> Block:
+    """A block with another factor, or coefficient."""
+    if rest in ("", "gain"):
+        if isinstance(block, Rational) and not block.order and len(block.num) == 1:
+            return Rational((value,))  # of a plain gain, the gain itself
+        return block.times(value)
+    polynomial, _, place = rest.partition(".")
+    if isinstance(block, Rational) and polynomial in ("num", "den") and place.isdecimal():
+        numbers = list(getattr(block, polynomial))
+        if int(place) < len(numbers):
+            numbers[int(place)] = value
+            return replace(block, **{polynomial: tuple(numbers)})
+    remedy = "a number of the law is named signal, signal.num.N or signal.den.N with N counted from 0"
+    raise ParameterError(key="law", value=key, remedy=remedy)

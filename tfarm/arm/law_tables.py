@@ -1,0 +1,184 @@
+"""The table [law] of a TOML file: the arm's own, or one of its own beside it.
+
+    [law]
+    input = "hub_torque"        # else what the arm's file says
+    delay = 0.004               # s
+    [law.hub_angle]
+    num = [2.0, 1.0]            # descending powers of s; of z where the law has a period
+    den = [0.01, 1.0]
+    [law.strain]
+    x = 0.02                    # m from the clamp, for an output along the link
+    gain = 3.0                  # with zeros = [...] and poles = [...] too
+
+or `matrices = "file.mat"` with A, B, C, D and `signals = [...]`, a name for each column of B.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, cast
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from tfarm.arm.law import Law
+from tfarm.arm.reading import load_tables
+from tfarm.errors import MISSING, ParameterError, did_you_mean
+from tfarm.files import read_file
+
+LAW = "law"
+MOST_BYTES = 16 * 1024 * 1024  # of a .mat file
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class LawTable(_Table):
+    """[law], without the tables of its signals."""
+
+    name: str = "law"
+    input: str | None = None
+    delay: float = 0.0
+    period: float | None = None
+    sign: int = -1
+    references: list[str] = []
+    rule: str = "tustin"
+    prewarp: float = 0.0
+    matrices: str | None = None
+    system: str | None = None
+    signals: list[str] | None = None
+    scales: list[float] | None = None
+
+
+class SignalTable(_Table):
+    """[law.SIGNAL]: a gain, num and den, or zeros, poles and a gain."""
+
+    gain: float | None = None
+    num: list[float] | None = None
+    den: list[float] | None = None
+    zeros: list[float | list[float]] | None = None
+    poles: list[float | list[float]] | None = None
+    x: float | None = None
+
+    def build(self, key: str) -> Any:
+        """What `Law` takes for it."""
+        if self.num is not None:
+            if self.gain is not None or self.zeros is not None or self.poles is not None:
+                raise ParameterError(
+                    key=f"{key}.num", value=self.num, remedy="either num and den, or zeros, poles, gain"
+                )
+            return tuple(self.num), tuple(self.den or [1.0])
+        if self.den is not None:
+            raise ParameterError(key=f"{key}.num", value=MISSING, remedy="den stands with num")
+        if self.gain is None:
+            raise ParameterError(key=f"{key}.gain", value=MISSING, remedy="give gain, or num and den")
+        return {"zeros": self.zeros or (), "poles": self.poles or (), "gain": self.gain}
+
+
+def load_law(name_or_path: str | os.PathLike[str]) -> Law | None:
+    """The law of a file's [law] table, None where it has none.
+
+    Raises ParameterError for an unknown key, a wrong type or a value that cannot be, naming the file.
+    """
+    tables, file = load_tables(name_or_path)
+    try:
+        return law_of_table(tables[LAW], Path(file).parent) if LAW in tables else None
+    except ParameterError as error:
+        raise error.in_file(file) from None
+
+
+def law_of_table(table: Any, folder: Path) -> Law:
+    """The law of a parsed [law] table; a .mat file is looked for beside the file, in `folder`."""
+    if not isinstance(table, dict):
+        raise ParameterError(key=LAW, value=table, remedy="give a table, headed [law]")
+    signals = {key: value for key, value in table.items() if isinstance(value, dict)}
+    head = _validated(LawTable, {key: value for key, value in table.items() if key not in signals}, LAW)
+    common = {key: getattr(head, key) for key in ("name", "input", "delay", "period", "sign", "rule", "prewarp")}
+    common["references"] = tuple(head.references)
+    try:
+        if head.matrices is not None:
+            if signals:
+                remedy = "either matrices and signals, or a table for each signal"
+                raise ParameterError(key=next(iter(signals)), value=MISSING, remedy=remedy)
+            return _of_file(head, folder, common)
+        if head.signals is not None or head.system is not None or head.scales is not None:
+            raise ParameterError(
+                key="matrices", value=MISSING, remedy="signals, system and scales are those of a .mat file"
+            )
+        return Law(_entries(signals), **common)
+    except ParameterError as error:
+        raise ParameterError(key=_under(error.key), value=error.value, remedy=error.remedy) from None
+
+
+def _entries(signals: Mapping[str, Any]) -> dict[str, Any]:
+    """What `Law` takes, by the names of signals with their place."""
+    found = {}
+    for name, values in signals.items():
+        given = _validated(SignalTable, values, f"{LAW}.{name}")
+        found[name if given.x is None else f"{name}@{given.x!r}"] = given.build(f"{LAW}.{name}")
+    return found
+
+
+def _of_file(head: LawTable, folder: Path, common: dict[str, Any]) -> Law:
+    """The law of a .mat file."""
+    from scipy.io import loadmat
+    from scipy.io.matlab import MatReadError
+
+    assert head.matrices is not None
+    if head.signals is None:
+        raise ParameterError(key="signals", value=MISSING, remedy="name a signal for each column of B")
+    data = read_file(folder / head.matrices, MOST_BYTES, key="matrices", what="a .mat file")
+    try:
+        found = loadmat(cast("Any", io.BytesIO(data)), squeeze_me=False, struct_as_record=True)
+    except (MatReadError, ValueError, TypeError, NotImplementedError, IndexError, KeyError) as error:
+        remedy = f"no .mat file that can be read (up to version 7.2): {str(error)[:80]}"
+        raise ParameterError(key="matrices", value=head.matrices, remedy=remedy) from None
+    A, B, C, D = _four(found, head)
+    if head.scales is not None:
+        if len(head.scales) != len(head.signals):
+            raise ParameterError(key="scales", value=head.scales, remedy="one number for each signal")
+        B, D = B * head.scales, D * head.scales
+    return Law.of_matrices(A, B, C, D, head.signals, **common)
+
+
+def _four(found: Mapping[str, Any], head: LawTable) -> list[Any]:
+    """A, B, C and D of the file, or of the structure that `system` names."""
+    import numpy as np
+
+    holder: Any = found
+    if head.system is not None:
+        if head.system not in found or found[head.system].dtype.names is None:
+            structs = [key for key, value in found.items() if getattr(getattr(value, "dtype", None), "names", None)]
+            raise ParameterError(key="system", value=head.system, remedy=did_you_mean(head.system, structs))
+        holder = found[head.system][0, 0]
+        names = holder.dtype.names
+    else:
+        names = tuple(found)
+    missing = [name for name in "ABCD" if name not in names]
+    if missing:
+        remedy = f"holds no {', '.join(missing)}; it has {', '.join(n for n in names if not n.startswith('__'))}"
+        raise ParameterError(key="matrices", value=head.matrices, remedy=f"{remedy} (system = names a structure)")
+    try:
+        return [np.atleast_2d(np.asarray(holder[name], dtype=float)) for name in "ABCD"]
+    except (TypeError, ValueError):
+        raise ParameterError(key="matrices", value=head.matrices, remedy="A, B, C and D hold numbers") from None
+
+
+def _validated(model: type[Any], table: Mapping[str, Any], place: str) -> Any:
+    try:
+        return model.model_validate(table)
+    except ValidationError as error:
+        problem = min(error.errors(include_url=False), key=lambda problem: problem["type"] != "extra_forbidden")
+    key, word = ".".join(map(str, (place, *problem["loc"][:1]))), str(problem["loc"][0])
+    if problem["type"] == "extra_forbidden":
+        remedy = f"unknown key; {did_you_mean(word, model.model_fields)}"
+    else:
+        remedy = f"wrong value; {problem['msg'][:1].lower()}{problem['msg'][1:]}"
+    raise ParameterError(key=key, value=problem["input"], remedy=remedy)
+
+
+def _under(key: str) -> str:
+    return key if key.startswith(LAW) else f"{LAW}.{key}"

@@ -1,0 +1,61 @@
+"""What is asked of a loop, of whatever law: gains at the hub have theorems of their own, any other law has none.
+
+A law that is no more than these gains is taken for them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from tfarm.arm import Arm, HubFeedback
+from tfarm.arm.law import Law
+from tfarm.errors import ParameterError
+
+from .law_loop import LawLoop
+from .law_poles import law_poles
+from .law_stability import is_quiet_above, law_stability
+from .margins import Margins, loop_margins
+from .margins import margins as margins_of_gains
+from .poles import Poles
+from .poles import closed_loop_poles as poles_of_gains
+
+AnyLaw = HubFeedback | Law
+
+
+def through(arm: Arm, law: AnyLaw) -> tuple[Arm, AnyLaw]:
+    """The arm with the input that the law drives, and the law as gains at the hub where it is no more than those."""
+    if isinstance(law, HubFeedback):
+        return arm, law
+    if not isinstance(law, Law):
+        raise ParameterError(key="law", value=law, remedy="give a HubFeedback or a Law")
+    if law.input is not None and law.input != arm.input:
+        arm = replace(arm, input=law.input)  # type: ignore[arg-type]  # the record refuses what is none
+    return arm, law.gains or law
+
+
+def closed_loop_poles(arm: Arm, law: AnyLaw, count: int | None = None) -> Poles | Poles[LawLoop]:
+    """The first `count` closed-loop poles with Im >= 0, ascending in Im s, complete in the box of the record.
+
+    Without a count the first ten, or so.  Raises ParameterError where there is no loop, ConvergenceError where the box
+    cannot be completed.
+    """
+    arm, law = through(arm, law)
+    return poles_of_gains(arm, law, count) if isinstance(law, HubFeedback) else law_poles(arm, law, count)
+
+
+def margins(arm: Arm, law: AnyLaw, band: float | None = None) -> Margins | Margins[LawLoop]:
+    """Verdict first, then the margins of the loop; of gains at the hub the stable windows of each too.
+
+    Raises ParameterError where there is no loop, ConvergenceError where poles cannot be counted, or where with damping
+    one is on the axis to working precision.
+    """
+    arm, law = through(arm, law)
+    if isinstance(law, HubFeedback):
+        return margins_of_gains(arm, law, band)
+    verdict = law_stability(arm, law, band)
+    if not verdict.is_stable:
+        return Margins(verdict, {}, None, None, None, None)
+    found = loop_margins(verdict)
+    if arm.least_damping and is_quiet_above(verdict.loop, verdict.band):
+        return Margins(verdict, {}, found, found.delay, found.disk, found.peak_sensitivity)
+    return Margins(verdict, {}, found, None, None, None)

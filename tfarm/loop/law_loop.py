@@ -1,0 +1,173 @@
+"""The exact loop of a rig and any linear law: its loop function, and the analytic function whose zeros are its poles.
+
+    L(s) = e^{-s tau} sum of C_i(s) G_i(s),    D(s) = drive q(s) + e^{-s tau} sum of p_i(s) numerator_i(s)
+
+q being the common denominator of the law and p_i/q its entries: D has no poles but those of a damped link's -1/C, so
+its zeros can be counted.  Where the law and the rig share a zero and a pole D keeps both: what is cancelled is seen.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import INPUT_UNITS, Arm, must_be_arm
+from tfarm.arm.law import Law
+from tfarm.errors import ParameterError
+from tfarm.exact.characteristic import Analytic, deflated
+from tfarm.exact.system import System
+from tfarm.records import record
+from tfarm.response.signals import Signals
+from tfarm.spectrum.scales import first_frequency
+
+Complex = NDArray[np.complexfloating[Any, Any]]
+Real = NDArray[np.float64]
+
+STEP = 1e-6  # of |s|, or of the way to -1/C, for differences
+FAR = (1e5, 1e6, 1e7)  # of w1: how far right an improper law is looked at
+FARTHEST = 1e11  # of w1: where waves are no longer dispersed
+FALLS = 0.5  # L must fall by this there, from one to the next
+CANCELLED = 1e-6  # of its size: a zero of the law so near to an unstable pole of it cancels that
+
+
+@dataclass(frozen=True)
+@record
+class LawLoop:
+    """A rig under a law in s.  Raises ParameterError for a locked hub, a law in z, and an algebraic loop."""
+
+    arm: Arm
+    law: Law
+
+    def __post_init__(self) -> None:
+        must_be_arm(self.arm)
+        if self.law.input is not None and self.law.input != self.arm.input:
+            object.__setattr__(self, "arm", replace(self.arm, input=self.law.input))  # type: ignore[arg-type]
+        if self.arm.is_locked:
+            remedy = "a locked hub (inertia = inf) takes no input: there is no loop; give the hub a finite inertia"
+            raise ParameterError(key="hub.inertia", value=self.arm.hub_inertia, remedy=remedy)
+        if self.law.is_discrete:
+            remedy = "a law in z acts at samples: ask for the sampled loop, or leave the period out of a law in s"
+            raise ParameterError(key="period", value=self.law.period, remedy=remedy)
+        _ = self.signals.outputs  # refuses unknown ones
+        self._must_fall()
+
+    @cached_property
+    def signals(self) -> Signals:
+        """What is fed back."""
+        return Signals(self.arm, self.law.signals)
+
+    @property
+    def k(self) -> System:
+        """The exact system."""
+        return self.signals.system
+
+    @property
+    def takes_energy(self) -> int:
+        """0: no theorem of the hub's two gains tells what becomes of a mode without losses."""
+        return 0
+
+    @property
+    def input_unit(self) -> str:
+        """The SI unit of what the law drives."""
+        return INPUT_UNITS[self.arm.input]
+
+    def parts(self, s: NDArray[Any]) -> tuple[Complex, Complex]:
+        """Denominator and numerator of L at s, up to one factor: finite at poles too."""
+        drive, fed_back, _ = self._parts(np.asarray(s, dtype=complex))
+        return drive, fed_back
+
+    def loop_function(self, s: NDArray[Any]) -> Complex:
+        """L(s): closed-loop poles are at L = -1.  Infinite at poles of the rig or of the law."""
+        drive, fed_back = self.parts(s)
+        return np.asarray(np.divide(fed_back, drive, out=np.full(drive.shape, np.inf + 0j), where=drive != 0))
+
+    @cached_property
+    def zeros_at_origin(self) -> int:
+        """How often D vanishes at s = 0, taken as the least of its terms."""
+        integrators = int((self.law.poles == 0).sum())
+        terms = [self.k.at_rest + integrators]
+        numerators, _ = self.law.polynomials(np.array([1e-200 + 0j]))
+        for row, order in enumerate(self.signals.orders):
+            if abs(numerators[row, 0]) > 0:
+                terms.append(order + self._order_of(row))
+        return min(terms)
+
+    def _order_of(self, row: int) -> int:
+        """How often p_i vanishes at s = 0: those zeros of its parts, and integrators of the others."""
+        name, orders = self.law.signals[row], []
+        for n, part in enumerate(self.law.parts):
+            if name in part.signals:
+                others = sum(int((each.block.poles == 0).sum()) for m, each in enumerate(self.law.parts) if m != n)
+                own = _zeros_at_origin(part.block.numerators, part.signals.index(name))
+                orders.append(others + own)
+        return min(orders)
+
+    def function(self, s: Complex) -> Analytic:
+        """D/s^n, n = `zeros_at_origin`, with slopes from differences."""
+        s = np.asarray(s, dtype=complex)
+        near = np.min([np.ones(s.shape), *(abs(1.0 - s / each) for each in self.k.singular)], axis=0)
+        h = STEP * np.maximum(abs(s) * near, 1e-300)
+        at = np.array([s, s + h, s - h])
+        drive, fed_back, scale = self._parts(at)
+        scale = scale - self.delay_of_waves * at
+        up, down = (drive + fed_back)[1:] * np.exp(scale[1:] - scale[0])
+        return deflated((drive + fed_back)[0], (up - down) / (2 * h), scale[0], s, self.zeros_at_origin)
+
+    @cached_property
+    def delay_of_waves(self) -> float:
+        """T [s] with D ~ e^{s T} far right: D e^{-s T}, with the same zeros, does not turn along a wide box."""
+        far = FARTHEST * first_frequency(self.arm)
+        scale = self.signals.parts(np.array([far, 2 * far], complex)).scale.real
+        return float(max(0.0, scale[1] - scale[0]) / far)
+
+    def _parts(self, s: Complex) -> tuple[Complex, Complex, Complex]:
+        """drive q, the fed back sum, both times e^{-scale}, and scale."""
+        drive, numerators, scale = self.signals.parts(s)
+        entries, whole = self.law.polynomials(s)
+        fed_back = (entries * numerators).sum(axis=0)
+        late = s * self.law.delay
+        shift = np.maximum(0.0, -late.real)  # left of the axis the delayed part is the larger one
+        drive, fed_back = drive * whole * np.exp(-shift), fed_back * np.exp(-late - shift)
+        size = np.maximum(np.maximum(abs(drive), abs(fed_back)), 1e-300)
+        return drive / size, fed_back / size, scale + shift + np.log(size)
+
+    def _must_fall(self) -> None:
+        """Refuse a law that asks for more than the rig gives at once: then its loop is algebraic."""
+        if not self.law.is_improper:
+            return
+        far = first_frequency(self.arm) * np.array(FAR)
+        with np.errstate(all="ignore"):
+            size = abs(self.loop_function(far.astype(complex)) * np.exp(far * self.law.delay))
+        if not (np.isfinite(size).all() and (size[1:] < FALLS * size[:-1]).all()):
+            worst = next(p for p in self.law.parts if p.block.excess > 0)
+            remedy = (
+                "its numerator has too high a degree for this signal, so that the loop is algebraic; add a pole to den"
+            )
+            raise ParameterError(key=f"law.{worst.signals[0]}.num", value=worst.block.excess, remedy=remedy)
+
+    @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """What a person should know of the law: poles right of the axis that its own zeros cancel."""
+        found = []
+        for part in self.law.parts:
+            zeros = getattr(part.block, "zeros", np.empty(0, complex))
+            for pole in part.block.poles:
+                gap = abs(zeros - pole).min() if zeros.size else math.inf
+                if pole.real >= 0 and gap <= CANCELLED * max(abs(pole), 1e-12):
+                    name = ", ".join(part.signals)
+                    found.append(f"the law cancels its own unstable pole {pole:.6g} 1/s on {name}: it is not stable")
+        return tuple(found)
+
+
+def _zeros_at_origin(numerators: Any, row: int) -> int:
+    """How often a polynomial vanishes at 0, from its growth at three tiny arguments."""
+    at = np.array([1e-6, 1e-9], dtype=complex)
+    values = abs(numerators(at)[row])
+    if not values.all():
+        return 99
+    return max(0, round(float(np.log(values[0] / values[1]) / np.log(at.real[0] / at.real[1]))))

@@ -1,0 +1,139 @@
+"""The verdict on a rig under any linear law: poles counted up to a band, and what is known of those beyond it.
+
+Beyond the band there is
+
+* a law with a sign: on the hub's own angle or rate, through a torque that acts at once, passivity and negative
+  imaginary systems tell every mode of any rig (`passivity`);
+* small gain: with damping in every segment, once |L| stays below one half on the axis and on the upper edge of the
+  box, 1 + L has no zero above it;
+* without any damping and with a delay: the phase of what is fed back turns ever on from mode to mode, so that of
+  infinitely many modes infinitely many are driven.
+
+Else it is not known, and the verdict is that of the band.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import Arm
+from tfarm.arm.law import Law
+from tfarm.errors import ConvergenceError
+from tfarm.spectrum import modes_below
+
+from .frequencies import MOST_MODES, band_of, grid
+from .law_loop import LawLoop
+from .law_poles import law_box, law_poles_below
+from .passivity import Signs, signs_of
+from .poles import Poles
+from .stability import FEW, MARGIN_OF_ZERO, QUIET, Stability, is_felt
+
+Real = NDArray[np.float64]
+
+UNKNOWN = "not known beyond {band:.4g} rad/s: neither small gain nor a theorem tells the modes there"
+DELAYED = "without any damping a delayed law drives infinitely many modes beyond the band"
+NEAR = 0.5  # of 1/delay: how far left poles are listed, of ever more as |L| falls, to say which are right of the axis
+WIDENED = 1.6
+DECADES, POINTS = 100.0, 1600  # beyond the band that are looked at, and how closely
+CLEAR_OF_POLES = 1.3  # of the law's fastest pole: a band reaches so far
+SLOWEST_BAND = 3.0  # heights: as far above it are resonances looked at one by one
+
+
+def law_stability(arm: Arm, law: Law, band: float | None = None) -> Stability[LawLoop]:
+    """The verdict on the loop under a law.  `band` [rad/s] is chosen if it is not given.
+
+    Raises ParameterError where there is no loop, ConvergenceError where poles cannot be counted or one is on the axis.
+    """
+    loop = LawLoop(arm, law)
+    signs = signs_of_loop(loop)
+    height, quiet = (band, False) if band is not None else _band(loop, signs)
+    poles = law_poles_below(loop, height, NEAR)
+    infinite, tail, known = _beyond(loop, signs, quiet, height)
+    strict = signs.kind in ("strictly passive", "negative imaginary") and _holds(loop, signs)
+    verdict = _verdict(poles, infinite, loop, strict)
+    return Stability(loop, verdict, poles.unstable, infinite, poles.box.im_max, tail, poles, known)
+
+
+def signs_of_loop(loop: LawLoop) -> Signs:
+    """What the law's sign tells of this rig: nothing behind an inductance, or through anything but the hub."""
+    if loop.arm.input_lags:
+        return Signs("", "behind an inductance the torque comes late")
+    return signs_of(loop.law, loop.arm.rate_loss)
+
+
+def _holds(loop: LawLoop, signs: Signs) -> bool:
+    """Whether the theorem leaves no pole right of the axis on this rig."""
+    if signs.kind in ("strictly passive", "passive"):
+        return True
+    if signs.kind != "negative imaginary":
+        return False
+    spring = 0.0 if loop.arm.has_rigid_mode else loop.arm.hub.stiffness * loop.arm.input_per_torque
+    return spring + signs.at_rest > 0
+
+
+def _beyond(loop: LawLoop, signs: Signs, quiet: bool, band: float) -> tuple[bool, str, bool]:
+    """Whether infinitely many poles are unstable, what is known beyond the band, and whether it is."""
+    if _holds(loop, signs):
+        more = " and holds it statically" if signs.kind == "negative imaginary" else ""
+        return False, f"{signs.reason}{more}: no mode, however high, is driven", True
+    if loop.arm.is_undamped and loop.law.delay and _acts(loop):
+        return True, DELAYED, True
+    if quiet:
+        return False, f"beyond the band |L(iw)| < {QUIET:g} and falling: no unstable pole there (small gain)", True
+    return False, UNKNOWN.format(band=band), False
+
+
+def _acts(loop: LawLoop) -> bool:
+    """Whether the law feeds anything back."""
+    return bool(loop.law.polynomials(np.array([1j * band_of(loop.arm, 1)]))[0].any())
+
+
+def _verdict(poles: Poles[LawLoop], infinite: bool, loop: LawLoop, strict: bool) -> str:
+    """`strict`: a theorem puts every mode that the hub feels left of the axis, however little."""
+    moving = poles.moving
+    if infinite or bool((moving.real > MARGIN_OF_ZERO * abs(moving)).any()):
+        return "unstable"
+    at_zero = poles.values.size - moving.size
+    if at_zero > 1 or (at_zero == 1 and not loop.arm.has_rigid_mode):
+        return "marginal"
+    on_axis = moving[moving.real > -MARGIN_OF_ZERO * abs(moving)]
+    if loop.arm.is_undamped:
+        known = strict or not on_axis.size
+        return "stable" if known and is_felt(loop.arm, poles.box.im_max) else "marginal"
+    if on_axis.size:
+        text = f"the pole at {on_axis[0]:.6g} 1/s is on the imaginary axis to working precision: neither stable nor not"
+        raise ConvergenceError(text, complex(on_axis[0]), float(on_axis[0].real))
+    return "stable"
+
+
+def _band(loop: LawLoop, signs: Signs) -> tuple[float, bool]:
+    """The band [rad/s] in which poles are computed, and whether the loop is quiet beyond it."""
+    fastest = CLEAR_OF_POLES * float(abs(loop.law.poles).max(initial=0.0))
+    least = max(band_of(loop.arm, FEW), fastest)
+    while least <= fastest or modes_below(loop.arm, least) < FEW:
+        least *= WIDENED
+    if loop.arm.is_undamped or _holds(loop, signs) or not loop.arm.least_damping:
+        return least, False
+    band = least
+    while modes_below(loop.arm, band) <= MOST_MODES:
+        if is_quiet_above(loop, band):
+            return band, True
+        band *= WIDENED
+    return least, False
+
+
+def is_quiet_above(loop: LawLoop, band: float) -> bool:
+    """Whether 1 + L has no zero with Im s > band right of the axis, by |L| < 1/2 on the edges of that region.
+
+    On the axis two decades are looked at, where |L| falls, with every natural frequency up to three times the band; on
+    the upper edge of the box as far right as that reaches, and beyond |L| is smaller still.
+    """
+    near = np.asarray(grid(loop.arm, SLOWEST_BAND * band))
+    omega = np.unique(np.r_[near[near >= band], band * np.geomspace(1.0, DECADES, POINTS)])
+    size = abs(loop.loop_function(1j * omega))
+    if not size.max() < QUIET or size[omega > 10 * band].max() > size[omega <= 10 * band].max():
+        return False
+    right = law_box(loop, band).re_max
+    edge = np.r_[0.0, np.geomspace(1e-4 * band, right, POINTS // 4)] + 1j * band
+    return bool(abs(loop.loop_function(edge)).max() < QUIET)

@@ -1,0 +1,160 @@
+"""What a controller reads of a rig: named outputs, along the link with their place, as one row of analytic functions.
+
+A transfer function is numerator over drive, both analytic; a loop needs them apart, for its poles are where their sum
+vanishes, and there neither may be infinite.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import FED_BACK, Arm
+from tfarm.errors import MISSING, ParameterError
+from tfarm.exact.chain import Chain
+from tfarm.exact.chain_values import free_outputs, series_at_zero
+from tfarm.exact.chaining import chain_of
+from tfarm.exact.characteristic import LoopParts, float_units, loop_parts
+from tfarm.exact.outputs import Output
+from tfarm.exact.outputs import output as known_output
+from tfarm.exact.system import System, system_of
+from tfarm.exact.values import expansions_at_zero
+from tfarm.records import record
+from tfarm.spectrum import modes
+
+Complex = NDArray[np.complexfloating[Any, Any]]
+Real = NDArray[np.float64]
+
+AT_REST = 3e-3  # of the slowest frequency: there as many digits are left as a series of TERMS terms has
+TERMS = 8
+
+
+@dataclass(frozen=True)
+@record
+class Signals:
+    """Outputs of an arm by name, those along the link with their place in m: "hub_rate", "strain@0.05".
+
+    Raises ParameterError for an unknown output, and for a place that is missing, not wanted, or off the link.
+    """
+
+    arm: Arm
+    names: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        if not self.names:
+            raise ParameterError(key="signals", value=[], remedy="name at least one output")
+        for name in self.names:
+            self._placed(name)
+
+    @cached_property
+    def outputs(self) -> tuple[Output, ...]:
+        """The output that each reads."""
+        return tuple(self._placed(name)[0] for name in self.names)
+
+    @cached_property
+    def places(self) -> tuple[float, ...]:
+        """Where each is, as a share of the length; 0 for those that have their own place."""
+        return tuple(self._placed(name)[1] / self.arm.length for name in self.names)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """The SI unit of each."""
+        return tuple(each.unit for each in self.outputs)
+
+    @cached_property
+    def system(self) -> System:
+        """The exact system that they are read from: one link in closed form where they are those at its hub."""
+        at_hub = set(self.names) <= set(FED_BACK)
+        return system_of(self.arm, wanted=self.outputs) if at_hub else chain_of(self.arm)
+
+    def parts(self, s: NDArray[Any]) -> LoopParts:
+        """Drive (n,), numerators (signals, n) in SI per unit of the input, and scale, at s of any shape."""
+        k, s = self.system, np.asarray(s, dtype=complex)
+        if not isinstance(k, Chain):
+            found = loop_parts(k, s)
+            rows = [FED_BACK.index(name) for name in self.names]
+            units = float_units(k).reshape(-1, *[1] * s.ndim)
+            return LoopParts(found.drive, (found.numerators * units)[rows], found.scale)
+        numerators = np.empty((len(self.names), s.size), complex)
+        first: LoopParts | None = None
+        for share in dict.fromkeys(self.places):
+            rows = [n for n, place in enumerate(self.places) if place == share]
+            free = free_outputs(k, [self.outputs[n] for n in rows], s.ravel(), share)
+            first = first or LoopParts(free.drive, numerators, free.scale)
+            same = free.outputs * np.exp(free.scale - first.scale)  # a layout with more places may be scaled otherwise
+            numerators[rows] = same
+        assert first is not None  # there is at least one signal
+        self._mend_at_rest(s.ravel(), first.drive, numerators)
+        shape = s.shape
+        return LoopParts(first.drive.reshape(shape), numerators.reshape(-1, *shape), first.scale.reshape(shape))
+
+    def _mend_at_rest(self, s: Complex, drive: Complex, numerators: Complex) -> None:
+        """Numerators that are differences, relative to the hub, from their power series where s is small.
+
+        There W and x theta are nearly one, and the direct difference has lost (s/w1)^2 of its digits.
+        """
+        relative = [n for n, each in enumerate(self.outputs) if each.quantity in ("Y", "Phi")]
+        slow = np.flatnonzero(abs(s) < AT_REST * self._slowest) if relative else np.empty(0, np.int64)
+        if not slow.size:
+            return
+        for n in relative:
+            coefficients = self._series[n]
+            numerators[n, slow] = drive[slow] * np.polyval(coefficients[::-1], s[slow]) / s[slow] ** 2
+
+    @cached_property
+    def _slowest(self) -> float:
+        """A frequency [rad/s] within which the power series at rest converge."""
+        damping = [1.0 / each for each in (self.arm.damping,) if each]
+        singles = [1.0 / self.arm.rate_loss * self.arm.turned_inertia] if self.arm.rate_loss else []
+        first = float(modes(self.arm.elastic.lossless_hub, 1).natural_frequency[-1])
+        return min([first, *damping, *(1.0 / each for each in singles)])
+
+    @cached_property
+    def _series(self) -> dict[int, Real]:
+        """Power series at rest, coefficients from s^-2 on, of outputs relative to the hub."""
+        assert isinstance(self.system, Chain)
+        found = {}
+        for n, (wanted, share) in enumerate(zip(self.outputs, self.places, strict=True)):
+            if wanted.quantity in ("Y", "Phi"):
+                found[n] = np.array(series_at_zero(self.system, [wanted], share, TERMS)[0])
+        return found
+
+    def values(self, s: NDArray[Any]) -> Complex:
+        """The transfer functions (signals, ...) at s; infinite at their poles."""
+        drive, numerators, _ = self.parts(s)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(numerators / drive)
+
+    @cached_property
+    def orders(self) -> tuple[int, ...]:
+        """How often each numerator vanishes at s = 0; the drive does `system.at_rest` times."""
+        found = []
+        for wanted, share in zip(self.outputs, self.places, strict=True):
+            (series,) = expansions_at_zero(self.system, [wanted], share)
+            first = next((n for n, coefficient in enumerate(series) if coefficient != 0), len(series))
+            found.append(max(0, self.system.at_rest + first - 2))
+        return tuple(found)
+
+    def _placed(self, name: str) -> tuple[Output, float]:
+        """The output of a name and its place [m]."""
+        plain, at, text = name.partition("@")
+        wanted, length = known_output(plain), self.arm.length
+        if wanted.place != "x":
+            if at:
+                raise ParameterError(key=name, value=text, remedy=f"{plain} has its own place; leave out {at}{text}")
+            return wanted, 0.0
+        if not at:
+            remedy = f"say where: {plain}@x with x between 0 and {length:g} m"
+            raise ParameterError(key=f"{name}.x", value=MISSING, remedy=remedy)
+        try:
+            x = float(text)
+        except ValueError:
+            x = float("nan")
+        if not 0 <= x <= length:
+            remedy = f"a point of the arm lies between 0 and {length:g} m"
+            raise ParameterError(key=name, value=text, remedy=remedy)
+        return wanted, x
