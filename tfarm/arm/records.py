@@ -227,6 +227,10 @@ class Arm(Turning):
             arm = replace(arm, **{room: replace(getattr(arm, room), **{number: value})})
         return arm
 
+    def under(self, theory: Theory) -> Arm:
+        """The same under another of `THEORIES`.  Raises ParameterError for what is none."""
+        return replace(self, theory=theory)
+
     @property
     def elastic(self) -> Arm:
         """The same with C = 0 in every segment."""

@@ -6,8 +6,9 @@ import os
 import sys
 from collections.abc import Callable
 from contextlib import suppress
-from functools import cache
-from typing import IO, TYPE_CHECKING, Annotated, Any
+from functools import cache, wraps
+from inspect import Parameter, signature
+from typing import IO, TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
@@ -15,8 +16,44 @@ from tfarm.errors import ParameterError, one_line
 
 if TYPE_CHECKING:
     from tfarm.arm import Arm
+    from tfarm.exact.outputs import Output
 
-app = typer.Typer(
+
+class Asked(str):
+    """A preset's name or a file as it is typed, and the theory that is asked for instead of the arm's own."""
+
+    theory: str | None = None
+
+
+class Verbs(typer.Typer):
+    """The application, whose commands on an ARM all take --theory."""
+
+    def command(self, *arguments: Any, **options: Any) -> Callable[[Any], Any]:
+        """The decorator that makes a command of a function."""
+        register = super().command(*arguments, **options)
+        return lambda function: register(of_an_arm(function))
+
+
+def of_an_arm(command: Callable[..., None]) -> Callable[..., None]:
+    """The command with an option --theory before its last one, if it takes an ARM: what it gets is `Asked`."""
+    whole_signature = signature(command, eval_str=True)
+    *rest, last = whole_signature.parameters.values()
+    if "arm" not in whole_signature.parameters:
+        return command
+
+    @wraps(command)
+    def with_theory(arm: str, theory: str | None, **arguments: Any) -> None:
+        asked = Asked(arm)
+        asked.theory = theory
+        command(arm=asked, **arguments)
+
+    shown = [*rest, Parameter("theory", Parameter.KEYWORD_ONLY, default=None, annotation=TheoryName), last]
+    keywords = [each.replace(kind=Parameter.KEYWORD_ONLY) for each in shown]
+    with_theory.__signature__ = whole_signature.replace(parameters=keywords)  # type: ignore[attr-defined]
+    return with_theory
+
+
+app = Verbs(
     name="tfarm",
     help="Exact frequency-domain analysis of a rotating flexible Timoshenko arm.",
     add_completion=False,
@@ -25,21 +62,40 @@ app = typer.Typer(
 )
 
 ArmName = Annotated[str, typer.Argument(metavar="ARM", help="a preset's name or a TOML file", show_default=False)]
+TheoryName = Annotated[
+    str | None,
+    typer.Option("--theory", help="timoshenko, shear, rayleigh or euler-bernoulli; the arm's own if not said"),
+]
+Side = Annotated[
+    str | None, typer.Option("--side", help="outer (if not said) or inner side of a joint, for outputs along the arm")
+]
 Json = Annotated[bool, typer.Option("--json", help="one JSON object on standard output")]
 MethodName = Annotated[str, typer.Option("--method", help="closed-form, balls, or appendix: the paper's determinant")]
 Compare = Annotated[bool, typer.Option("--compare", help="all three methods beside each other, and where they part")]
 Digits = Annotated[str | None, typer.Option("--digits", metavar="D", help="right digits, proven; strings above 15")]
 
 
-def load_arm(name: str) -> Arm:
-    """The preset or file of that name; values that look like a slip of units are named on standard error."""
+def load_arm(name: str, theory: str | None = None) -> Arm:
+    """The preset or file of that name, under that theory, or what is `Asked`, or its own.
+
+    Values that look like a slip of units are named on standard error.
+    """
     from tfarm.arm import implausible, load
 
     say_when_compiling()
     arm = load(name)
+    if (other := theory or getattr(name, "theory", None)) is not None:
+        arm = arm.under(cast("Any", other))
     if texts := implausible(arm):
         tell(f"warning: {arm.name}: {'; '.join(texts)}")
     return arm
+
+
+def read_on(names: list[str], side: str | None) -> list[str | Output]:
+    """The outputs of these names, or those of them on one side of a joint of two segments."""
+    from tfarm.exact.outputs import on_side
+
+    return [name if side is None else on_side(name, cast("Any", side)) for name in names]
 
 
 def give(answer: dict[str, Any], json: bool, show: Callable[[dict[str, Any]], None]) -> None:

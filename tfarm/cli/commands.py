@@ -8,7 +8,21 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tfarm.cli.app import ArmName, Compare, Digits, Json, MethodName, app, give, load_arm, right_digits, whole
+from tfarm.cli.app import (
+    ArmName,
+    Compare,
+    Digits,
+    Json,
+    MethodName,
+    Side,
+    TheoryName,
+    app,
+    give,
+    load_arm,
+    read_on,
+    right_digits,
+    whole,
+)
 from tfarm.errors import one_line
 
 if TYPE_CHECKING:
@@ -32,9 +46,6 @@ def presets(json: Json = False) -> None:
 def modes(
     arm: ArmName,
     count: Annotated[str, typer.Option("--count", metavar="N", help="flexible modes, 1 to 1000")] = "10",
-    theory: Annotated[
-        str | None, typer.Option(help="timoshenko, shear, rayleigh or euler-bernoulli; the arm's own if not said")
-    ] = None,
     digits: Digits = None,
     certify: Annotated[bool, typer.Option("--certify", help="prove each bracket, and that no mode is missing")] = False,
     method: MethodName = "closed-form",
@@ -49,7 +60,7 @@ def modes(
     from tfarm.spectrum import modes as find_modes
     from tfarm.spectrum.answers import modes_answer
 
-    table = find_modes(subject, wanted, theory=theory)  # type: ignore[arg-type]
+    table = find_modes(subject, wanted)
     road = slow_method(method, len(table), right, compare)
     if compare:
         alone({"--certify": certify or None})
@@ -68,6 +79,7 @@ def response(
     stop: Annotated[float, typer.Option("--to", help="highest frequency [rad/s]")] = 1000.0,
     points: Annotated[str, typer.Option("--points", help="how many, logarithmically spaced")] = "500",
     x: Annotated[float | None, typer.Option("--x", help="place on the arm [m], for outputs along it")] = None,
+    side: Side = None,
     driven: Annotated[
         str | None,
         typer.Option(
@@ -93,11 +105,12 @@ def response(
     from tfarm.tables.terminal import show
 
     road = slow_method(method, at.size, right, compare)
+    (wanted,) = read_on([output], side)
     if compare:
         alone({"--csv": csv, "--input": driven})
-        give(compared_responses(subject, output, x, at), json, print_compared)
+        give(compared_responses(subject, wanted, x, at), json, print_compared)
         return
-    answer = response_answer(transfer(subject, output, x=x, method=road, input=driven), at, right)
+    answer = response_answer(transfer(subject, wanted, x=x, method=road, input=driven), at, right)
     if csv is not None:
         write_csv(response_table(answer), csv)
     if json or csv is None or say_written(csv):
@@ -111,12 +124,13 @@ def report(
     ] = None,
     out: Annotated[Path, typer.Option("--out", help="the folder to write to")] = Path("reports"),
     only: Annotated[str | None, typer.Option("--only", help="one page: bode, modes, margins, locus ...")] = None,
+    theory: TheoryName = None,
 ) -> None:
     """Write pages with pictures, tables and data: open index.html in a browser."""
     import tfarm
 
     names = arms or tfarm.presets()
-    subjects = [load_arm(name) for name in names]
+    subjects = [load_arm(name, theory) for name in names]
     from tfarm.dsp.reading import load_chain
 
     chains = [load_chain(name) for name in names]

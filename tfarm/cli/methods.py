@@ -17,6 +17,7 @@ from tfarm.tables.terminal import show
 
 if TYPE_CHECKING:
     from tfarm.arm import Arm
+    from tfarm.exact.outputs import Output
     from tfarm.spectrum import Modes
 
 MOST_SLOW = 2000  # points by balls or by the appendix, at some milliseconds each
@@ -46,7 +47,7 @@ def alone(others: dict[str, Any]) -> None:
             )
 
 
-def compared_responses(arm: Arm, output: str, x: float | None, s: NDArray[Any]) -> dict[str, Any]:
+def compared_responses(arm: Arm, output: str | Output, x: float | None, s: NDArray[Any]) -> dict[str, Any]:
     """One output at s by each method, and by what share of its size each differs from the closed form."""
     roads = {method: transfer(arm, output, x=x, method=method) for method in METHODS}
     found, G = {method: np.asarray(road(s)) for method, road in roads.items()}, roads["closed-form"]

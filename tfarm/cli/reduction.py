@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from tfarm.cli.app import ArmName, Json, app, give, load_arm, plain_number, whole
+from tfarm.cli.app import ArmName, Json, Side, app, give, load_arm, plain_number, read_on, whole
 from tfarm.errors import ParameterError
 
 
@@ -22,6 +22,7 @@ def reduce(
     band: Annotated[str, typer.Option("--band", metavar="LOW,HIGH", help="frequencies [rad/s]")] = "0.1,1000",
     method: Annotated[str | None, typer.Option("--method", help="modal or aaa; the better one if left out")] = None,
     x: Annotated[float | None, typer.Option("--x", help="place on the arm [m], for outputs along it")] = None,
+    side: Side = None,
     mat: Annotated[Path | None, typer.Option("--mat", help="write a MATLAB file, and a script beside it")] = None,
     json: Json = False,
 ) -> None:
@@ -32,8 +33,8 @@ def reduce(
     from tfarm.reduced import reduce as find
     from tfarm.reduced import reduced_answer, save_mat
 
-    names = [name.strip() for name in outputs.split(",")]
-    reduced = find(subject, names, order=states, error=error, method=method, band=edges, x=x)  # type: ignore[arg-type]
+    wanted = read_on([name.strip() for name in outputs.split(",")], side)
+    reduced = find(subject, wanted, order=states, error=error, method=method, band=edges, x=x)  # type: ignore[arg-type]
     written = () if mat is None else save_mat(reduced, mat, key="--mat")
     from tfarm.cli.tables import say_written
 

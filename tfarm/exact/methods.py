@@ -44,8 +44,9 @@ def slow_values(method: Method, arm: Arm, k: System, wanted: Sequence[Output], s
     if method == "balls":
         return np.array([[value_with_care(k, each, complex(at), each.share(x)) for at in s] for each in wanted])
 
-    if not arm.is_uniform:
-        raise ParameterError(key="method", value=method, remedy="the paper's appendix is of one uniform link on a hub")
+    if not (arm.is_uniform and arm.theory == "timoshenko"):
+        remedy = "the paper's appendix is of one uniform Timoshenko link on a hub"
+        raise ParameterError(key="method", value=method, remedy=remedy)
 
     for each in wanted:
         if each.is_of_a_chain:

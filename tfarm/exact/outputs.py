@@ -190,6 +190,22 @@ def output(wanted: str | Output) -> Output:
     return OUTPUTS[wanted]
 
 
+def on_side(wanted: str | Output, side: Side) -> Output:
+    """The output along the arm as it is read on that side of a joint of two segments, or of what is attached there.
+
+    One on the inner side has its own name.  Raises ParameterError for an output that is read at root or tip.
+    """
+    found = output(wanted)
+    if side not in get_args(Side):
+        raise ParameterError(key="side", value=side, remedy=did_you_mean(str(side), get_args(Side)))
+    if found.place != "x":
+        remedy = f"{found.name} is read at one place; take an output along the arm, such as moment with its x"
+        raise ParameterError(key="side", value=side, remedy=remedy)
+    if side == found.side:
+        return found
+    return replace(found, side=side, name=f"{found.name}_{side}", label=f"{found.label}, {side} side")
+
+
 def unit_scale(wanted: Output, k: Units) -> Fraction:
     """SI value of the output per N m of torque (per radian where the hub is locked), for one dimensionless unit."""
     units = {"W": k.length, "Y": k.length, "centre": k.length, "M": k.EI / k.length, "Q": k.EI / k.length**2}
