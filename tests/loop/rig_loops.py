@@ -2,8 +2,8 @@
 
     s^2 M y + s D y + K y = b i,    (L_a s + R) i + N Ke s theta = v,    input = -(Kp theta + K1 s theta + K2 m)
 
-with i the current where a voltage drives (without inductance it is left out), else the input itself; m = E I psi'(0) on
-the outer side of the clamp, read from the elements.
+with i the current where a voltage drives (without inductance it is left out), else the input itself; m = E I psi'(x) on
+the outer side of where the gauge sits, read from the elements.
 """
 
 import numpy as np
@@ -24,7 +24,7 @@ class RigLoop:
         free = self.system.K.shape[0]
         self.hub, self.gauge, self.works = (np.zeros(len(self.K)) for _ in range(3))
         self.hub[:free] = self.system.full[HUB]
-        self.gauge[:free] = self.system.model.output("root_moment", 0.0) @ self.system.full
+        self.gauge[:free] = self.system.model.output(("gauge", arm.gauge.x), 0.0) @ self.system.full
         if free < len(self.K):
             self.works[-1] = 1.0  # the voltage's own equation
         else:

@@ -34,6 +34,8 @@ class Turning:
         def links(self) -> tuple[Link, ...]: ...
         @property
         def centre_distance(self) -> float: ...
+        @property
+        def is_undamped(self) -> bool: ...
 
     @property
     def total_inertia(self) -> float:
@@ -88,6 +90,16 @@ class Turning:
     def input_lags(self) -> bool:
         """Whether the input is a voltage behind an inductance, whose torque comes late."""
         return self.input == "motor_voltage" and self.motor is not None and self.motor.inductance > 0
+
+    @property
+    def is_reactive(self) -> bool:
+        """Whether nothing dissipates and the input acts at once: at s = i w all but odd powers of s is real."""
+        return self.is_undamped and not self.input_lags
+
+    @property
+    def is_told_by_lyapunov(self) -> bool:
+        """Whether, besides, the gauge reads the hub's moment: then a theorem tells every mode under any law."""
+        return self.is_reactive and self.reads_hub_moment
 
     @property
     def loses_at_hub_alone(self) -> bool:

@@ -3,7 +3,8 @@
 Along laws g0 + t g1 the characteristic function is N(s) + t P(s), linear in t.  A real pole crosses at s = 0, where
 t(s) = -N/P for real s has a finite limit, and goes right if t(s) grows with s.
 
-At C = 0 h vanishes identically along K2: there is no curve, only the line K2 = 1; `margins` knows that case.
+At C = 0 h vanishes identically along K2 where the gauge reads the hub's moment: there is no curve, only the line
+K2 = 1; `windows` knows that case, and `lossless` that of other gauges.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from tfarm.arm import Arm, HubFeedback
 from tfarm.crossing import Crossing, Crossings, brackets, solved
 from tfarm.exact.characteristic import gains_of, loop_parts, torque
 from tfarm.exact.system import System, system_of
-from tfarm.spectrum import modes
+from tfarm.spectrum import flexible_frequencies, modes
 
 from .frequencies import grid
 from .plant import effective_inertia
@@ -26,6 +27,7 @@ from .plant import effective_inertia
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 NONE = HubFeedback()
+SAME = 1e-12  # of a frequency: nearer than this are two numbers for one
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,14 +60,17 @@ def crossings(arm: Arm, line: Line, band: float) -> Crossings:
     if unit:
         unified = Line(line.base, NONE.plus(line.direction, 1 / unit))
         omega = np.asarray(grid(arm, band))
-        N, P = _parts(k, unified, 1j * omega)
+        N, P = parts(k, unified, 1j * omega)
         (before,), change = brackets((N * P.conj()).imag)
-        at, t = solved(lambda w: _parts(k, unified, 1j * w), omega[before], omega[before + 1])
+        at, t = solved(lambda w: parts(k, unified, 1j * w), omega[before], omega[before + 1])
+        if arm.is_undamped and line.base == NONE:  # at its own frequencies there the poles of the arm without a law are
+            own = np.r_[np.inf, flexible_frequencies(arm, 1.01 * band)]
+            t = np.where(abs(at[:, None] - own).min(axis=1) < SAME * at, 0.0, t)
         found += [Crossing(*each) for each in zip(t / unit, at, change, strict=True)]
     return Crossings.of(found)
 
 
-def _parts(k: System, line: Line, s: NDArray[Any]) -> tuple[Complex, Complex]:
+def parts(k: System, line: Line, s: NDArray[Any]) -> tuple[Complex, Complex]:
     """N and P at s, up to one common positive factor."""
     drive, numerators, _ = loop_parts(k, s)
     base, way = (torque(map(float, gains_of(k, law)), numerators) for law in (line.base, line.direction))
@@ -112,7 +117,7 @@ def _change_with_stiffness(arm: Arm, law: HubFeedback) -> int:
 def _through_zero_held(arm: Arm, line: Line) -> Crossing | None:
     """Of an arm whose tip is held: where the static stiffness vanishes, from t(s) at two small s."""
     small = 1e-7 * float(modes(arm, 1).natural_frequency[-1])
-    N, P = _parts(system_of(arm), line, small * np.array([1 + 0j, 0.5]))
+    N, P = parts(system_of(arm), line, small * np.array([1 + 0j, 0.5]))
     if not P.all():
         return None
     far, near = -(N / P).real

@@ -163,6 +163,9 @@ def energy_along(arm: Arm, law: HubFeedback, duration: float, points: int = 501,
     if not arm.is_undamped:
         remedy = "0: modes of a damped arm do not share out its energy, and V_t has no such formula"
         raise ParameterError(key="link.damping", value=arm.damping, remedy=remedy)
+    if not arm.is_told_by_lyapunov:
+        remedy = "V_t has its formula where the gauge at the root of a hub without radius reads what turns the hub"
+        raise ParameterError(key="hub.radius", value=arm.hub.radius, remedy=remedy)
     points = whole("points", points, 2, MOST_POINTS, f"a whole number from 2 to {MOST_POINTS}")
     A, struck, angle, rate, weights = _closed_modal_model(loop, modes)
     hub = np.outer(rate, rate)

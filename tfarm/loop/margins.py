@@ -30,6 +30,7 @@ from tfarm.records import record
 from .frequencies import grid
 from .law_loop import LawLoop
 from .lines import NONE, Line, crossing_at_zero, crossings
+from .lossless import stable_moments
 from .plant import Loop
 from .poles import SMALLEST, AnyLoop
 from .stability import Stability, is_quiet, stability
@@ -94,13 +95,15 @@ def margins(arm: Arm, law: HubFeedback, band: float | None = None) -> Margins:
     if not verdict.is_stable:
         return Margins(verdict, windows, None, None, None, None)
     found = loop_margins(verdict)
+    if arm.is_undamped and not verdict.loop.is_told_by_theorem:
+        return Margins(verdict, windows, found, None, None, None)
     if arm.is_undamped and law.K2:
         return Margins(verdict, windows, found, 0.0, 0.0, math.inf)
     if arm.is_undamped and law.K1:  # 1 + L = 1 + (Kp + i K1 w) theta, theta real: no dip deepens with w
         return Margins(verdict, windows, found, 0.0, found.disk, found.peak_sensitivity)
     if arm.is_undamped or is_quiet(verdict.loop, verdict.band):
         return Margins(verdict, windows, found, found.delay, found.disk, found.peak_sensitivity)
-    if law.K2 == 0 and law.Kp == 0:  # rate feedback of a passive arm: L in the right half-plane at every frequency
+    if law.K2 == law.Kp == 0 and not arm.input_lags:  # rate feedback of a passive arm: L in the right half-plane
         return Margins(verdict, windows, found, None, found.disk, found.peak_sensitivity)
     return Margins(verdict, windows, found, None, None, None)
 
@@ -220,9 +223,9 @@ def _rigid(loop: Loop) -> tuple[float, float, float]:
 def gain_margin(loop: Loop, band: float) -> tuple[float, float]:
     """The factors on all gains at once, below and above 1, at which a pole first reaches the axis."""
     law, arm, line = loop.law, loop.arm, Line(NONE, loop.law)
-    if arm.is_undamped:
+    if arm.is_reactive:
         static = crossing_at_zero(arm, line)
-        factors = [1.0 / loop.moment_share] if law.K2 > 0 else []
+        factors = [end / law.K2 for end in stable_moments(arm) if law.K2 * end > 0 and math.isfinite(end)]
         factors += [] if static is None else [static.t]
     else:
         factors = crossings(arm, line, band).gain.tolist()

@@ -44,12 +44,9 @@ class Loop:
         if self.arm.has_massless_hub and self.law.K2:
             remedy = "with hub.inertia = 0 the root moment is -u at once: an algebraic loop; use K2 = 0 or some inertia"
             raise ParameterError(key="K2", value=self.law.K2, remedy=remedy)
-        if self.arm.is_undamped and not self.arm.reads_hub_moment:
-            remedy = (
-                "without any damping, and with a gauge that does not read the torque's own moment, no theorem tells "
-                "the modes beyond a band; give link.damping, hub.friction or another loss, as every rig has one"
-            )
-            raise ParameterError(key="link.damping", value=0.0, remedy=remedy)
+        if self.law.K2 and self.arm.is_undamped and not (self.arm.hub_side_inertia or self.arm.reads_hub_moment):
+            remedy = "with hub.inertia = 0 and no damping K2 moves poles through infinity; use K2 = 0 or some inertia"
+            raise ParameterError(key="K2", value=self.law.K2, remedy=remedy)
         least = SMALLEST_NORMAL * max(1.0, self.arm.total_inertia if self.arm.has_rigid_mode else 1.0)
         for gain in GAINS:
             if 0 < abs(self.law[gain.name]) < least:
@@ -87,7 +84,17 @@ class Loop:
 
         What hub, clamp and joint lose only adds to K1 > 0.
         """
-        return self.arm.has_elastic_link and not self.arm.input_lags and (self.arm.reads_hub_moment or not self.law.K2)
+        acts_well = not self.arm.input_lags and (self.arm.reads_hub_moment or not self.law.K2)
+        return self.arm.has_elastic_link and (acts_well or not any(self.law.row))
+
+    @property
+    def is_lossless(self) -> bool:
+        """Whether nothing takes or gives energy, so that zeros of D come in pairs +-s: K1 = 0 without any loss, or
+        K2 = 1 where a theorem tells."""
+        if not self.arm.is_undamped:
+            return False
+        is_even = not any(self.law.row) or (self.arm.is_reactive and not self.law.K1)
+        return is_even or (self.is_told_by_theorem and not self.takes_energy)
 
     @property
     def member(self) -> Member:

@@ -25,6 +25,7 @@ from tfarm.spectrum.enclose import Disc, disjoint, enclosed, proven_count
 
 from .frequencies import band_of, steep_places
 from .law_loop import LawLoop
+from .lossless import driven_modes
 from .plant import Loop, effective_inertia
 
 Complex = NDArray[np.complexfloating[Any, Any]]
@@ -66,11 +67,18 @@ class Poles(Generic[AnyLoop]):
     def unstable(self) -> int:
         """How many poles of the box, conjugates counted, lie to the right of the axis.
 
-        A real part below working precision decides nothing, but at C = 0 a theorem does (`Loop.takes_energy`).
+        A real part below working precision decides nothing, but at C = 0 a theorem does (`Loop.takes_energy`,
+        `driven_modes`).
         """
         right = self.values.real > ON_AXIS * abs(self.values)
-        if self.loop.arm.is_undamped and self.loop.takes_energy < 0:
+        loop = self.loop
+        if isinstance(loop, LawLoop):  # of which no theorem on gains at the hub tells anything
+            return counted(self.values[right])
+        if loop.arm.is_undamped and loop.is_told_by_theorem and loop.takes_energy < 0:
             right |= (self.values.imag > 0) & (abs(self.values.real) <= ON_AXIS * abs(self.values))
+        if loop.arm.is_reactive and not loop.is_told_by_theorem and loop.law.K1 > 0:
+            driven = driven_modes(loop.arm, loop.law.K2)
+            return max(counted(self.values[right]), 2 * int((driven.at < self.box.im_max).sum()))
         return counted(self.values[right])
 
     @property
@@ -154,8 +162,7 @@ def _on_its_axis(loop: Loop, found: Complex) -> Complex:
 
     At C = 0 the characteristic function is even in s where K1 = 0, so that a simple zero is its own mirror image.
     """
-    lossless = loop.arm.is_undamped and not loop.takes_energy
-    on_axis = lossless & (abs(found.real) <= ON_AXIS * abs(found))
+    on_axis = loop.is_lossless & (abs(found.real) <= ON_AXIS * abs(found))
     return np.where(on_axis, 1j * found.imag, found)
 
 

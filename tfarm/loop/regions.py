@@ -7,7 +7,7 @@ these curves bound regions of a constant number of unstable poles.  On a grid th
 
 At C = 0 the curves collapse onto the lines K1 = 0 and K2 = 1: between them every flexible mode is damped if K1 and
 1 - K2 have one sign, and unstable if not.  With both negative the hub acts like one of negative inertia, and some real
-pole is unstable.
+pole is unstable.  Where the gauge does not read the hub's moment each mode has such a line of its own (`lossless`).
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from tfarm.spectrum.scales import PAPER_GAINS, default_gains
 
 from .frequencies import grid
 from .lines import Complex, along, crossing_at_zero, crossings
+from .lossless import locked_edges, stable_moments
 from .plant import Loop
 from .stability import loop_band, stability
 from .windows import holds_undamped
@@ -43,8 +44,8 @@ MOST = 2000  # grid points along one gain
 class Region:
     """Unstable poles over a grid: `unstable` (len(K2), len(K1)), -1 where they are infinitely many.
 
-    `boundary` (n, 3) holds K1, K2 and w [rad/s] of the D-decomposition curve; empty at C = 0.  `band` [rad/s] is how
-    far up crossings were looked for; `crossings` those along K2 for each K1, none at C = 0.
+    `boundary` (n, 3) holds K1, K2 and w [rad/s] of the D-decomposition curve; empty without losses.  `band` [rad/s] is
+    how far up crossings were looked for, 0 where every mode is told; `crossings` those along K2 for each K1, or none.
     """
 
     arm: Arm
@@ -63,10 +64,10 @@ class Region:
         At C = 0 the same for every K1 > 0, by Lyapunov's theorem and the static balance, and none for others.
         """
         low, high = float(self.K2[0]), float(self.K2[-1])
-        if self.arm.is_undamped:
+        if self.arm.is_reactive:
             law = HubFeedback(K1=1.0, Kp=self.Kp)
             static = crossing_at_zero(self.arm, along("K2", law))
-            ends = {low, high, self.arm.input_per_torque, *([] if static is None else [static.t])}
+            ends = {low, high, *stable_moments(self.arm), *([] if static is None else [static.t])}
             pairs = itertools.pairwise(sorted(end for end in ends if low <= end <= high))
             loop = Loop(self.arm, law)
             held = [pair for pair in pairs if holds_undamped(loop, law.having("K2", sum(pair) / 2))]
@@ -89,8 +90,11 @@ def region(arm: Arm, K1: Real, K2: Real, Kp: float = 0.0) -> Region:
     """
     K1, K2 = _axis("K1", K1), _axis("K2", K2)
     Loop(arm, HubFeedback(K1=float(K1[-1]), K2=float(K2[-1]), Kp=Kp))
-    if arm.is_undamped:
+    if arm.is_told_by_lyapunov:
         return Region(arm, Kp, K1, K2, _undamped_counts(arm, K1, K2, Kp), np.empty((0, 3)), 0.0, [])
+    if arm.is_reactive:
+        band = float(locked_edges(arm).at.max())
+        return Region(arm, Kp, K1, K2, _lossless_counts(arm, K1, K2, Kp), np.empty((0, 3)), band, [])
     corners = [HubFeedback(K1=float(a), K2=float(b), Kp=Kp) for a in (K1[0], K1[-1]) for b in (K2[0], K2[-1])]
     band = max(loop_band(Loop(arm, law))[0] for law in corners)
     omega = np.asarray(grid(arm, band))
@@ -147,6 +151,20 @@ def _undamped_counts(arm: Arm, K1: Real, K2: Real, Kp: float) -> NDArray[np.int6
         if rows.size and columns.size:
             law = HubFeedback(K1=float(K1[columns[columns.size // 2]]), K2=float(K2[rows[rows.size // 2]]), Kp=Kp)
             unstable[np.ix_(rows, columns)] = stability(arm, law).unstable_roots
+    return unstable
+
+
+def _lossless_counts(arm: Arm, K1: Real, K2: Real, Kp: float) -> NDArray[np.int64]:
+    """The same where the gauge does not read the hub's moment: for K1 > 0 of the modes of `locked_edges`.
+
+    K1 < 0 mirrors the poles, so that infinitely many are unstable.
+    """
+    unstable = np.full((K2.size, K1.size), INFINITE, dtype=np.int64)
+    law = HubFeedback(K1=default_gains(arm).K1, Kp=Kp)
+    static = crossing_at_zero(arm, along("K2", law))
+    found = Crossings.of([*locked_edges(arm), *([] if static is None else [static])])
+    (counts,) = counts_over(K2, [found], 0.0, np.array([stability(arm, law).unstable_roots]))
+    unstable[:, K1 > 0] = counts[:, None]
     return unstable
 
 

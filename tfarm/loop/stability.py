@@ -3,7 +3,8 @@
 Poles are computed, completely, up to a band; what lies beyond is
 
 * at C = 0 a theorem: with K1 > 0 every flexible mode is damped if K2 < 1 and driven if K2 > 1, and K2 = 1 leaves the
-  modes of the locked hub alone (`lyapunov`), so a few modes tell the rest;
+  modes of the locked hub alone (`lyapunov`), so a few modes tell the rest; where the gauge does not read the moment on
+  the hub it tells nothing, and the edges of many modes are looked at (`lossless`);
 * at C > 0 bounded: from the band on |L(i w)| stays below one half, and falls (the hub's inertia against ever more
   heavily damped bending), so that 1 + L has no zero there, nor further right.  Where the band of that would hold more
   modes than `MOST_MODES` it is cut, and where a segment of a lossy rig has C = 0 there is none; the verdict says so.
@@ -14,7 +15,7 @@ A pole at 0 remains where Kp = 0, whatever K1 and K2: verdicts are apart from it
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Generic
+from typing import Generic, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,7 @@ from tfarm.records import record
 from tfarm.spectrum import modes, modes_below
 
 from .frequencies import MOST_MODES, band_of
+from .lossless import driven_modes, locked_edges
 from .plant import Loop
 from .poles import AnyLoop, Poles, poles_below
 
@@ -37,6 +39,8 @@ UNKNOWN = (  # beyond the band: of a rig with a segment without damping, and of 
     "beyond the band not bounded: with C = 0 in the link resonances are too narrow to be looked at",
     "beyond the band not bounded: the small-gain condition would need more modes than are looked at",
 )
+NO_THEOREM = "beyond the band no theorem tells the modes where the gauge does not read the moment on the hub"
+MIRRORED = "C = 0 and K1 < 0: the poles are those of -K1 mirrored, infinitely many of them unstable"
 DRIVEN = "C = 0: every flexible mode beyond the band is unstable too, with a growth rate that tends to 0"
 UNFELT = 1e-9  # a hub participation below this share of an ordinary one is none
 
@@ -73,20 +77,34 @@ def stability(arm: Arm, law: HubFeedback, band: float | None = None) -> Stabilit
     loop = Loop(arm, law)
     height, quiet = (band, False) if band is not None else loop_band(loop)
     poles = poles_below(loop, height)
-    infinite, tail = _beyond(loop, quiet)
-    verdict = _verdict(poles, infinite, loop)
-    return Stability(loop, verdict, poles.unstable, infinite, poles.box.im_max, tail, poles, tail not in UNKNOWN)
+    beyond = _beyond(loop, quiet)
+    verdict = _verdict(poles, beyond.is_unstable, loop)
+    return Stability(
+        loop, verdict, poles.unstable, beyond.is_infinite, poles.box.im_max, beyond.words, poles, beyond.is_known
+    )
 
 
-def _verdict(poles: Poles, infinite: bool, loop: Loop) -> str:
+class Beyond(NamedTuple):
+    """What is known beyond the band, in words: whether infinitely many poles are unstable, or at least one."""
+
+    words: str
+    is_infinite: bool = False
+    is_unstable: bool = False
+    is_known: bool = True
+
+
+def _verdict(poles: Poles, is_unstable: bool, loop: Loop) -> str:
     moving, law = poles.moving, loop.law
-    if infinite or bool((moving.real > MARGIN_OF_ZERO * abs(moving)).any()):
+    if is_unstable or bool((moving.real > MARGIN_OF_ZERO * abs(moving)).any()):
         return "unstable"
     at_zero = poles.values.size - moving.size
     if at_zero > 1 or (at_zero == 1 and law.K1 == 0):
         return "marginal"
-    if loop.arm.is_undamped:
-        return "marginal" if not loop.takes_energy or not is_felt(loop.arm, poles.box.im_max) else "stable"
+    if loop.is_lossless:
+        return "marginal"
+    if loop.arm.is_reactive:
+        told = loop.is_told_by_theorem
+        return "marginal" if told and not is_felt(loop.arm, poles.box.im_max) else "stable"
     on_axis = moving[moving.real > -MARGIN_OF_ZERO * abs(moving)]
     if on_axis.size:
         text = f"the pole at {on_axis[0]:.6g} 1/s is on the imaginary axis to working precision: neither stable nor not"
@@ -115,30 +133,43 @@ def felt(arm: Arm, up_to: float) -> Real:
     return np.array([b * scale / k, b * arm.hub_side_inertia * omega**2 * scale / (EI * k**2)])
 
 
-def _beyond(loop: Loop, quiet: bool) -> tuple[bool, str]:
-    """Whether infinitely many poles are unstable, and what is known beyond the band."""
+def _beyond(loop: Loop, quiet: bool) -> Beyond:
+    """What is known beyond the band."""
+    arm, law, told = loop.arm, loop.law, loop.is_told_by_theorem
+    if told and loop.takes_energy > 0:
+        return Beyond("C = 0: every mode beyond the band is damped (Lyapunov), with a decay rate that tends to 0")
+    if told and loop.takes_energy < 0 and arm.loses_at_hub_alone:
+        return Beyond(DRIVEN, is_infinite=True, is_unstable=True)
+    if arm.is_undamped and told:
+        if law.K1 == 0:
+            return Beyond("C = 0 and K1 = 0: nothing takes or gives energy, modes beyond the band lie on the axis")
+        return Beyond("C = 0 and K2 = 1: modes with the hub at rest stay undamped, in every band")
+    if arm.is_reactive:
+        return _beyond_lossless(loop)
+    if quiet:
+        return Beyond(f"beyond the band |L(iw)| < {QUIET:g} and falling: no unstable pole there (small gain)")
+    return Beyond(UNKNOWN[bool(arm.least_damping)], is_known=False)
+
+
+def _beyond_lossless(loop: Loop) -> Beyond:
+    """Without losses, where the gauge does not read the moment on the hub: by the modes of the locked hub."""
     law = loop.law
-    if not loop.arm.is_undamped and loop.is_told_by_theorem and loop.takes_energy > 0:
-        return False, "C = 0: every mode beyond the band is damped (Lyapunov), with a decay rate that tends to 0"
-    if not loop.arm.is_undamped and loop.is_told_by_theorem and loop.takes_energy < 0 and loop.arm.loses_at_hub_alone:
-        return True, DRIVEN
-    if not loop.arm.is_undamped:
-        if quiet:
-            return False, f"beyond the band |L(iw)| < {QUIET:g} and falling: no unstable pole there (small gain)"
-        return False, UNKNOWN[bool(loop.arm.least_damping)]
-    if law.K1 == 0:
-        return False, "C = 0 and K1 = 0: nothing takes or gives energy, modes beyond the band lie on the axis"
-    if loop.moment_share == 1:
-        return False, "C = 0 and K2 = 1: modes with the hub at rest stay undamped, in every band"
-    if loop.takes_energy > 0:
-        return False, "C = 0: every mode beyond the band is damped (Lyapunov), with a decay rate that tends to 0"
-    return True, DRIVEN
+    if not law.K1:
+        return Beyond(f"C = 0 and K1 = 0: nothing takes or gives energy; {NO_THEOREM}", is_known=False)
+    edges, driven = locked_edges(loop.arm), driven_modes(loop.arm, law.K2)
+    if law.K1 < 0:
+        return Beyond(MIRRORED, is_infinite=True, is_unstable=True)
+    which = f"the first {len(edges)} modes of the locked hub, up to {edges.at.max():.4g} rad/s"
+    if len(driven):
+        words = f"C = 0: K2 is beyond the edge of {len(driven)} among {which}: two poles of each grow, ever more slowly"
+        return Beyond(f"{words}; the lowest is that at {driven.at.min():.4g} rad/s", is_unstable=True)
+    return Beyond(f"C = 0: {NO_THEOREM}; K2 is beyond the edge of none among {which}", is_known=False)
 
 
 def loop_band(loop: Loop) -> tuple[float, bool]:
     """The band [rad/s] in which poles are computed, and whether the loop is quiet beyond it (always False at C = 0)."""
     few = band_of(loop.arm, FEW)
-    if loop.arm.is_undamped or (loop.is_told_by_theorem and loop.takes_energy > 0):
+    if loop.arm.is_reactive or (loop.is_told_by_theorem and (loop.arm.is_undamped or loop.takes_energy > 0)):
         return few, False
     band = few
     while modes_below(loop.arm, band) <= MOST_MODES:

@@ -16,6 +16,7 @@ from tfarm.spectrum import modes
 from tfarm.spectrum.scales import gain_unit, most_gain
 
 from .lines import along, crossing_at_zero, crossings
+from .lossless import locked_edges, stable_moments
 from .plant import Loop
 from .stability import Stability, loop_band, stability
 
@@ -53,7 +54,7 @@ def gain_windows(verdict: Stability, name: str) -> Windows:
     if name == "K2" and loop.arm.has_massless_hub:
         return Windows(name, None, (), (0.0, 0.0), Crossings.of([]))  # an algebraic loop but for K2 = 0
     low, high = looked_at(loop, name)
-    if loop.arm.is_undamped:
+    if loop.arm.is_reactive:
         found = _undamped(loop, name).within(low, high)
     else:
         ends = (Loop(loop.arm, law.having(name, end)) for end in (low, high))
@@ -81,20 +82,26 @@ def looked_at(loop: Loop, name: str) -> Interval:
 
 
 def _undamped(loop: Loop, name: str) -> Crossings:
-    """At C = 0: every mode at once at K2 = 1 and K1 = 0; a real pole at 0 where stiffness or inertia vanishes."""
-    static = crossing_at_zero(loop.arm, along(name, loop.law))
+    """Without losses: every mode at once at K2 = 1 (or each at its own K2, see `lossless`) and at K1 = 0.
+
+    A real pole passes through 0 where stiffness or inertia vanishes.
+    """
+    arm, K1 = loop.arm, loop.law.K1
+    static = crossing_at_zero(arm, along(name, loop.law))
     found = [] if static is None else [static]
-    if name == "K2":
-        found.append(Crossing(loop.arm.input_per_torque, math.inf, 1 if loop.law.K1 > 0 else -1))
+    if name == "K2" and arm.is_told_by_lyapunov:
+        found.append(Crossing(arm.input_per_torque, math.inf, 1 if K1 > 0 else -1))
+    elif name == "K2" and K1:
+        found += [each._replace(change=each.change * int(math.copysign(1, K1))) for each in locked_edges(arm)]
     if name == "K1" and (static is None or static.t != 0):
-        found.append(Crossing(0.0, math.inf, -1 if loop.moment_share < 1 else 1))
+        found.append(Crossing(0.0, math.inf, -1 if _is_braked(loop) else 1))
     return Crossings.of(found)
 
 
 def _counts(verdict: Stability, name: str, pairs: list[Interval], found: Crossings) -> list[int]:
     """Unstable poles in each window: counted in one, by the crossings in the others; at C = 0 whether there are any."""
     loop, value = verdict.loop, verdict.loop.law[name]
-    if loop.arm.is_undamped:
+    if loop.arm.is_reactive:
         return [0 if holds_undamped(loop, loop.law.having(name, (low + high) / 2)) else 1 for low, high in pairs]
     middles = np.array([(low + high) / 2 for low, high in pairs])
     if verdict.verdict != "marginal" and any(low < value < high for low, high in pairs):
@@ -107,9 +114,21 @@ def _counts(verdict: Stability, name: str, pairs: list[Interval], found: Crossin
     return [int(count) for count in counts]
 
 
+def _is_braked(loop: Loop) -> bool:
+    """Whether K1 > 0 takes energy from every mode by a theorem: at K2 = 0, or without losses (`lossless`)."""
+    if loop.law.K2 == 0 or not loop.arm.is_reactive:
+        return loop.law.K2 == 0
+    low, high = stable_moments(loop.arm)
+    return low < loop.law.K2 < high
+
+
 def holds_undamped(loop: Loop, law: HubFeedback) -> bool:
-    """Whether no pole is right of the axis at C = 0: K1 > 0, K2 < 1 (Lyapunov), and nothing falls statically."""
-    if not (law.K1 > 0 and loop.arm.input_per_torque > law.K2):
+    """Whether no pole is right of the axis without losses: K1 > 0, K2 < 1 (Lyapunov), and nothing falls statically.
+
+    K2 is between `stable_moments` where the gauge does not read the hub's moment: no pole of the modes looked at then.
+    """
+    low, high = stable_moments(loop.arm)
+    if not (law.K1 > 0 and low < law.K2 < high):
         return False
     small = np.array([1e-9 * float(modes(loop.arm, 1).natural_frequency[-1])], dtype=complex)
     return bool(law.Kp >= 0 or (1 + Loop(loop.arm, law).loop_function(small)[0]).real > 0)
@@ -119,13 +138,14 @@ def _with_proven_ends(loop: Loop, name: str, pair: Interval, limits: Interval) -
     """Ends at the edge of the search replaced by infinity where a theorem says that nothing changes beyond it.
 
     At C = 0 the Lyapunov argument holds for every K1 > 0, Kp >= 0, K2 < 1; at C > 0 for K2 = 0 (a passive hub).
+    Without losses no pole crosses at any K1 > 0 or Kp > 0, whatever the gauge reads (`lossless`).
     """
     low, high = pair
-    law, passive = loop.law, loop.arm.is_undamped or loop.law.K2 == 0
+    law = loop.law
     if loop.arm.input_lags:
         return low, high  # a voltage reaches the hub late: it is not passive
     if name == "K2":
-        is_proven = loop.arm.is_undamped and law.K1 > 0 and law.Kp >= 0
+        is_proven = loop.arm.is_told_by_lyapunov and law.K1 > 0 and law.Kp >= 0
         return (-math.inf if is_proven and low == limits[0] else low), high
-    is_proven = passive and loop.moment_share < 1 and (name == "K1" or law.K1 > 0) and (name == "Kp" or law.Kp >= 0)
+    is_proven = _is_braked(loop) and (name == "K1" or law.K1 > 0) and (name == "Kp" or law.Kp >= 0)
     return low, (math.inf if is_proven and high == limits[1] else high)

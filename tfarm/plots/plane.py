@@ -18,6 +18,7 @@ from tfarm.crossing import RegionPiece, pieces
 from tfarm.digits import SUPERSCRIPT, counted, plain, significant
 from tfarm.dsp import GainMap
 from tfarm.loop.edges import LINEAR_SCALE, Axis, edge, seen, stable_edge, static_edges
+from tfarm.loop.lossless import locked_edges
 from tfarm.loop.regions import INFINITE, Region
 from tfarm.spectrum import modes
 
@@ -119,7 +120,7 @@ def nice_levels(low: float, high: float) -> list[float]:
 
 def boundary(found: Region, points: Real, x: Axis, y: Axis, ax: Axes) -> None:
     """The exact edge (n, 3) with its frequencies; without damping the lines K1 = 0 and K2 = 1."""
-    if found.arm.is_undamped:
+    if found.arm.is_reactive:
         _undamped_boundary(found, x, y, ax)
         return
     ax.plot(points[:, 0], points[:, 1], color=INK, lw=1.6, label="poles on the axis at iω, exact")
@@ -146,13 +147,27 @@ def _undamped_boundary(found: Region, x: Axis, y: Axis, ax: Axes) -> None:
         corners = [(x.high, low)] * (low not in cut) + side + [(x.high, high)] * (high not in cut)
         ax.plot(*zip(*corners, strict=True), color=INK, lw=1.8, label=label)
         label = None
-    if not y.low < 1 < y.high:
+    if not found.arm.is_told_by_lyapunov:
+        _locked_lines(found, x, y, ax)
         return
-    ax.plot([0, 0], [1, y.high], color=INK, lw=0.8)
-    ax.plot([x.low, 0], [1, 1], color=INK, lw=0.8)
+    whole = found.arm.input_per_torque
+    if not y.low < whole < y.high:
+        return
+    ax.plot([0, 0], [whole, y.high], color=INK, lw=0.8)
+    ax.plot([x.low, 0], [whole, whole], color=INK, lw=0.8)
     omega = modes(found.arm.having(hub_inertia=math.inf), 3).natural_frequency
     text = f"on this line every mode with the hub at rest: {', '.join(significant(float(w), 4) for w in omega)} … rad/s"
-    ax.annotate(text, (x.high, 1.0), textcoords="offset points", xytext=(-6, 5), ha="right", fontsize=8.5)
+    ax.annotate(text, (x.high, whole), textcoords="offset points", xytext=(-6, 5), ha="right", fontsize=8.5)
+
+
+def _locked_lines(found: Region, x: Axis, y: Axis, ax: Axes) -> None:
+    """A thin line at the edge of each mode of the locked hub, the first few with their frequency."""
+    edges = sorted(locked_edges(found.arm).within(y.low, y.high), key=lambda each: each.at)
+    for each in edges:
+        ax.plot([0, x.high], [each.t, each.t], color=INK, lw=0.5)
+    for each in edges[:MARKS]:
+        text = f"{significant(each.at, 4)} rad/s, the hub at rest"
+        ax.annotate(text, (x.high, each.t), textcoords="offset points", xytext=(-6, 3), ha="right", fontsize=7.5)
 
 
 def sampled_region(plane: GainMap | None, ax: Axes) -> None:

@@ -47,7 +47,15 @@ NO_PROOF = (
     "The dashed frame is what the Lyapunov argument proves for an arm without damping; it is not a proof here, because "
     "the gauge does not feel C. At C > 0 it proves K2 = 0 alone (solid line). The true edge is the black line."
 )
-OF_NO_RIG = "No Lyapunov proof is claimed of a rig with losses; the edge is computed."
+OF_ELASTIC = (
+    "Lyapunov's argument proves all with K1 > {least} and K2 < {whole}: the links are elastic, and what hub, clamp and "
+    "joint lose only adds to K1."
+)
+OF_DAMPED = "At C > 0 Lyapunov's argument proves K2 = 0 alone, as the gauge does not feel C; the edge is computed."
+OF_OTHER_GAUGE = (
+    "The gauge does not read the moment on the hub, so Lyapunov's argument proves K2 = 0 alone; the edge is computed."
+)
+OF_LAG = "The voltage comes late through an inductance, so Lyapunov's argument proves nothing; the edge is computed."
 SAMPLED = (
     " Hatched: what is stable when the loop is sampled every {clock}, its edge exact for the first {modes} modes; with "
     "that clock no gains outside the hatching hold, whatever the continuous loop promises."
@@ -158,9 +166,9 @@ def _best_words(data: GainMap) -> str:
 
 
 def _map_caption(data: GainMap) -> str:
-    proof = PROOF if data.is_undamped else NO_PROOF if data.arm.is_uniform else OF_NO_RIG
+    proof = proof_words(data.arm)
     unit = f"{plain(rate_unit(data.arm), 4)} {unit_of('K1', data.arm)}"
-    reach = ALL_MODES if data.is_undamped else UP_TO.format(band=significant(data.region.band, 5))
+    reach = ALL_MODES if data.arm.is_told_by_lyapunov else UP_TO.format(band=significant(data.region.band, 5))
     free = data.arm.has_rigid_mode
     seen = MAP_SEEN.format(
         band=significant(data.band, 5), proof=proof, unit=unit, reach=reach, apart=APART * free, held=HELD * (not free)
@@ -172,6 +180,22 @@ def _map_caption(data: GainMap) -> str:
         seen
         + sampled.format(clock=clock, modes=modes)
         + DEPTH.format(deepest=plain(DEEPEST * data.arm.input_per_torque, 4)) * (not data.is_undamped)
+    )
+
+
+def proof_words(arm: Arm) -> str:
+    """What Lyapunov's argument proves in the plane of gains, as the margins' table says it of each law."""
+    if arm.is_uniform:
+        return PROOF if arm.is_undamped else NO_PROOF
+    if arm.input_lags:
+        return OF_LAG
+    if not arm.reads_hub_moment:
+        return OF_OTHER_GAUGE
+    if not arm.has_elastic_link:
+        return OF_DAMPED
+    whole, least = arm.input_per_torque, 0.0 - arm.rate_loss
+    return OF_ELASTIC.format(
+        whole=plain(whole, 5) + written_unit("K2", arm), least=plain(least, 5) + written_unit("K1", arm)
     )
 
 
@@ -188,7 +212,7 @@ def margins_section(arm: Arm, chain: Chain | None = None) -> Section:
         title="Is the loop stable, and by how much?",
         facts=tuple(verdict_facts(named, found, [brief_of(arm, each.law, chain) for each in named])),
         words=[verdict_words(*each) for each in zip(named, found, strict=True)],
-        blocks=(margin_table(named, found, arm.is_undamped), window_table(named, found, sign_words(arm))),
+        blocks=(margin_table(named, found, arm.is_told_by_lyapunov), window_table(named, found, sign_words(arm))),
     )
 
 
