@@ -20,7 +20,7 @@ from .lyapunov import lyapunov
 from .margins import Margins
 from .poles import Poles
 from .regions import INFINITE, Region
-from .windows import Interval, Windows
+from .windows import Interval, Windows, reach_words
 
 LAW = "u = -Kp theta - K1 theta_t - K2 E I phi'(0) + r"
 POLES = (  # of pairs Re s, Im s
@@ -70,6 +70,7 @@ WINDOWS = (  # of `GainRow`; JSON has the gain's name before each key
     Column("windows", of=lambda row: list(row.windows.all), on=(JSON,)),
     Column("windows_ends", of=lambda row: [list(map(row.windows.end, pair)) for pair in row.windows.all], on=(JSON,)),
     Column("looked_at", of=lambda row: list(row.windows.looked_at), on=(JSON,)),
+    Column("band_rad_s", of=lambda row: row.windows.band, on=(JSON,)),
     Column("", "stable around it", on=(TERMINAL,),
            of=lambda row: " ".join(row.spans(general, 8, row.windows.around)) or "-"),
     Column("", "all stable windows", on=(TERMINAL,),
@@ -197,7 +198,13 @@ def _known_of(found: Margins | Margins[LawLoop]) -> dict[str, Any]:
     return {
         "lyapunov": {"proven": proof.proven, "a1_over_a2": proof.a1_over_a2, "reason": proof.reason},
         **{f"{row.gain}_{key}": value for row, part in zip(rows, windows, strict=True) for key, value in part.items()},
+        "windows_note": unsettled(found) or None,
     }
+
+
+def unsettled(found: Margins[Any]) -> str:
+    """What the windows leave open where nothing is known beyond the band, in words; else empty."""
+    return "" if found.stability.is_known_beyond else reach_words(found.windows.values())
 
 
 def sizes_of(found: Margins[Any]) -> dict[str, tuple[float | None, float | None]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -34,6 +35,7 @@ class Windows:
 
     What an end of a window means says `end`: poles on the axis there ("edge"), an end of `looked_at`, up to which no
     limit was found and beyond which none was looked for ("search bound"), or infinity, which is a theorem ("no limit").
+    Crossings are those up to `band` [rad/s], inf where no pole crosses beyond any.
     """
 
     name: str
@@ -41,6 +43,7 @@ class Windows:
     all: tuple[Interval, ...]
     looked_at: Interval
     crossings: Crossings
+    band: float = math.inf
 
     def end(self, value: float) -> End:
         """What an end of one of the windows is."""
@@ -55,7 +58,7 @@ def gain_windows(verdict: Stability, name: str) -> Windows:
         return Windows(name, None, (), (0.0, 0.0), Crossings.of([]))  # an algebraic loop but for K2 = 0
     low, high = looked_at(loop, name)
     if loop.arm.is_reactive:
-        found = _undamped(loop, name).within(low, high)
+        found, band = _undamped(loop, name).within(low, high), _reach_undamped(loop, name)
     else:
         ends = (Loop(loop.arm, law.having(name, end)) for end in (low, high))
         band = max(verdict.band, *(loop_band(end)[0] for end in ends))
@@ -67,7 +70,7 @@ def gain_windows(verdict: Stability, name: str) -> Windows:
     at_edge = name == "Kp" and value == 0  # there the pole at 0 is, apart from which the verdict is
     inside = (pair for pair in stable if pair[0] < value < pair[1] or (at_edge and pair[0] == 0))
     around = next(inside, None) if verdict.is_stable else None
-    return Windows(name, around, tuple(stable), (low, high), found)
+    return Windows(name, around, tuple(stable), (low, high), found, band)
 
 
 def looked_at(loop: Loop, name: str) -> Interval:
@@ -96,6 +99,20 @@ def _undamped(loop: Loop, name: str) -> Crossings:
     if name == "K1" and (static is None or static.t != 0):
         found.append(Crossing(0.0, math.inf, -1 if _is_braked(loop) else 1))
     return Crossings.of(found)
+
+
+def _reach_undamped(loop: Loop, name: str) -> float:
+    """Up to which frequency [rad/s] `_undamped` has the crossings: every one where a theorem tells each mode."""
+    told = loop.arm.is_told_by_lyapunov or (name != "K2" and loop.law.K2 == 0)
+    return math.inf if told else float(locked_edges(loop.arm).at.max())
+
+
+def reach_words(windows: Iterable[Windows]) -> str:
+    """A sentence about window ends that are those of a band alone; empty where all are known."""
+    bands = [each.band for each in windows if math.isfinite(each.band)]
+    if not bands:
+        return ""
+    return f"window ends are those of poles up to {max(bands):.4g} rad/s: beyond, some may cross at smaller gains"
 
 
 def _counts(verdict: Stability, name: str, pairs: list[Interval], found: Crossings) -> list[int]:

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from tfarm.columns import Column, Table
 from tfarm.digits import counted, plain, significant, singly
 from tfarm.dsp.brief import SampledBrief
-from tfarm.loop.answers import MARGINS, NOTHING, WINDOWS, gain_rows, sizes_of
+from tfarm.loop.answers import MARGINS, NOTHING, WINDOWS, gain_rows, sizes_of, unsettled
 from tfarm.loop.lyapunov import lyapunov
 from tfarm.loop.margins import Margins
 from tfarm.report.loop_laws import NamedLaw
@@ -125,6 +125,12 @@ def _number(value: float) -> str:
     return plain(value, 6) if value.is_integer() else significant(value, 5)
 
 
+def _open_ends(laws: Sequence[NamedLaw], found: Sequence[Margins]) -> str:
+    """A sentence for each law whose windows are those of a band."""
+    texts = ((law.name, unsettled(each)) for law, each in zip(laws, found, strict=True))
+    return "".join(f" {name.capitalize()}: {typeset(text)}." for name, text in texts if text)
+
+
 def window_table(laws: Sequence[NamedLaw], found: Sequence[Margins], sign: str) -> Table:
     """A row a law and gain; none for K2 on a free pin, where it has no loop."""
     rows = [
@@ -137,7 +143,7 @@ def window_table(laws: Sequence[NamedLaw], found: Sequence[Margins], sign: str) 
     return Table(
         stem="windows",
         title="How far each gain may go alone",
-        caption=CAPTION_OF_WINDOWS.format(sign=sign),
+        caption=CAPTION_OF_WINDOWS.format(sign=sign) + _open_ends(laws, found),
         columns=(Column("law", "law", of=names), Column("verdict", "verdict", of=verdicts), *WINDOWS),
         record=gains,
     )

@@ -1,0 +1,33 @@
+"""Window ends that are those of a band alone say so, and rightly: a higher band has nearer ones."""
+
+import math
+
+import pytest
+
+import tfarm
+from tfarm.loop.answers import margins_answer
+from tfarm.loop.lines import along, crossings
+from tfarm.loop.margins import margins
+from tfarm.spectrum.scales import default_gains
+
+
+def test_behind_an_inductance_the_lowest_K2_is_that_of_its_band():
+    """Elastic links: each higher mode is driven by less; the answer names the band, which a higher one undercuts."""
+    arm = tfarm.load("quanser-flexlink")
+    law = default_gains(arm)
+    found = margins(arm, law)
+    answer = margins_answer(found)
+    assert "may cross at smaller gains" in answer["windows_note"]
+    band = answer["K2_band_rad_s"]
+    assert math.isfinite(band)
+    low = found.windows["K2"].around[0]
+    higher = crossings(arm, along("K2", law), 4 * band).gain
+    assert 0.5 * low < higher[higher < 0].max() < 0
+
+
+@pytest.mark.parametrize(("name", "reach"), [("sasaki2012", math.inf), ("sasaki2012-lab", None)])
+def test_where_all_is_known_nothing_is_said(name, reach):
+    arm = tfarm.load(name)
+    answer = margins_answer(margins(arm, default_gains(arm)))
+    assert answer["windows_note"] is None
+    assert reach in (None, answer["K2_band_rad_s"])
