@@ -5,6 +5,7 @@ import math
 import pytest
 
 import tfarm
+from tests.shell import run
 from tfarm.loop.answers import margins_answer
 from tfarm.loop.lines import along, crossings
 from tfarm.loop.margins import margins
@@ -23,6 +24,11 @@ def test_behind_an_inductance_the_lowest_K2_is_that_of_its_band():
     low = found.windows["K2"].around[0]
     higher = crossings(arm, along("K2", law), 4 * band).gain
     assert 0.5 * low < higher[higher < 0].max() < 0
+
+
+def test_the_table_says_so_too(capsys):
+    _, out, _ = run(capsys, "margins", "quanser-flexlink")
+    assert "window ends are those of poles up to" in out
 
 
 @pytest.mark.parametrize(("name", "reach"), [("sasaki2012", math.inf), ("sasaki2012-lab", None)])

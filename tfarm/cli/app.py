@@ -99,13 +99,15 @@ def read_on(names: list[str], side: str | None) -> list[str | Output]:
 
 
 def give(answer: dict[str, Any], json: bool, show: Callable[[dict[str, Any]], None]) -> None:
-    """The answer as one JSON object, or as `show` prints it, with a line about the gains that were not given."""
+    """The answer as one JSON object, or as `show` prints it, then what is not known and which gains are defaults."""
     if json:
         from tfarm.tables.files import to_json
 
         print(to_json(answer))
         return
     show(answer)
+    if answer.get("windows_note"):
+        print(answer["windows_note"])
     if answer.get("default_gains"):
         print(f"by default {answer['default_gains_in_words']}")
 
