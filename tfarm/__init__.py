@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from tfarm.loop.locus import locus
     from tfarm.loop.nyquist import nyquist
     from tfarm.loop.regions import region as map
+    from tfarm.loop.spill import spill
     from tfarm.reduced import reduce
     from tfarm.response import bode, transfer
     from tfarm.spectrum import damped_modes, modes
@@ -81,6 +82,7 @@ __all__ = [
     "reduce",
     "sampled",
     "simulate",
+    "spill",
     "transfer",
     "tune",
 ]
@@ -102,6 +104,7 @@ _ROOMS = {  # where a name stands; what it is called there after a colon, if not
     "reduce": "reduced",
     "sampled": "dsp.verdict:analyse",
     "simulate": "dsp.results",
+    "spill": "loop.spill",
     "transfer": "response",
     "tune": "tuner",
 }

@@ -82,6 +82,8 @@ def by_eigenvalues(arm, law, count, band):
         [Bk @ (C - D @ Dk @ C / whole), Ak - Bk @ D @ Ck / whole],
     ])  # fmt: skip
     poles = np.linalg.eigvals(closed)
+    if (abs(poles[poles.real > 0]) > 2 * band).any():  # of no arm: what the remainder makes up
+        return None
     moving = abs(poles) > AT_REST * first_frequency(arm)
     poles = poles[moving & (poles.real > -CLEAR * abs(poles)) & (abs(poles.imag) < 1.01 * band)]
     doubtful = (poles.real < CLEAR * abs(poles)) | (abs(poles) < DOUBTFUL * first_frequency(arm))

@@ -206,3 +206,48 @@ def test_a_law_of_gains_alone_is_taken_for_them():
     found = tfarm.margins(LAB, Law({"hub_rate": 0.3, "root_moment": 0.3}))
     assert found.windows.keys() == {"K1", "K2", "Kp"}
     assert found.stability.unstable_roots == stability(LAB, HubFeedback(K1=0.3, K2=0.3)).unstable_roots
+
+
+def with_a_notch():
+    """Tip feedback with its notch above mode 1: a design that two modes bear, and the third does not."""
+    s, w = control.tf("s"), float(tfarm.modes(BARE, 1).natural_frequency[-1])
+    notch = (s**2 + 0.02 * w * s + (1.08 * w) ** 2) / (s**2 + 1.4 * w * s + w**2)
+    return Law({"tip_displacement": 3.0 * notch * (0.3 * s + 1) / (0.015 * s + 1)})
+
+
+def test_a_law_that_two_modes_bear_drives_the_third():
+    found = tfarm.spill(BARE, with_a_notch(), 6)
+    assert found.unstable[:2].tolist() == [0, 0]
+    assert (found.unstable[2:] > 0).all()
+    assert (found.verdict.is_stable, found.first_mode, found.shown_from) == (False, 3, 3)
+    third = tfarm.modes(BARE, 3).natural_frequency[-1]
+    assert abs(found.driven[0].imag - third) < 0.01 * third
+    assert "models of 1 to 2 modes find nothing unstable" in found.in_words
+
+
+def test_models_of_ever_more_modes_find_what_the_exact_loop_has():
+    """The modal loop of 40 modes, its static remainder in, has the exact loop's unstable poles."""
+    law = with_a_notch()
+    A, B, C, D = sensed_model(BARE, law.signals, 40)
+    Ak, Bk, Ck, Dk = law.matrices()
+    assert not (Dk @ D).any() or abs((Dk @ D)[0, 0]) < 1
+    whole = 1 + (Dk @ D)[0, 0]
+    loop = np.block(
+        [[A - B @ Dk @ C / whole, -B @ Ck / whole], [Bk @ (C - D @ Dk @ C / whole), Ak - Bk @ D @ Ck / whole]]
+    )
+    poles = np.linalg.eigvals(loop)
+    for pole in tfarm.spill(BARE, law, 3).driven[:4]:
+        assert abs(poles - pole).min() < 1e-3 * abs(pole.real) + 1e-9 * abs(pole)
+
+
+def test_spill_is_a_command(capsys, tmp_path):
+    (tmp_path / "law.toml").write_text(
+        "[law.tip_acceleration]\ngain = 0.02\npoles = [-500.0]\n[law.hub_rate]\ngain = 0.1\n"
+    )
+    code, out, err = run(capsys, "spill", "sasaki2012", "--law", str(tmp_path / "law.toml"), "--modes", "4")
+    assert (code, err) == (0, "")
+    assert out.startswith("sasaki2012: the exact rig is ")
+    code, out, _ = run(capsys, "spill", "sasaki2012", "--K1", "0.3", "--json")
+    answer = json.loads(out)
+    assert [row["unstable"] for row in answer["models"]] == [0] * 20
+    assert answer["stable"]

@@ -57,6 +57,27 @@ def margins(arm: ArmName, json: Json = False, *, given: Given) -> None:
     give(margins_answer(found) | said, json, partial(print_margins, found))
 
 
+@app.command()
+@under_a_law
+def spill(
+    arm: ArmName,
+    modes: Annotated[str, typer.Option("--modes", metavar="N", help="models of 1 to so many modes")] = "20",
+    json: Json = False,
+    *,
+    given: Given,
+) -> None:
+    """Does a law drive a mode that its design model leaves out?  The exact loop beside models of 1, 2, 3 ... modes."""
+    number, subject = whole("--modes", modes, 1, 60), load_arm(arm)
+    law, said = law_of(subject, given)
+    from tfarm.arm.law import Law
+    from tfarm.cli.control_tables import print_spill
+    from tfarm.loop.spill import spill as find
+    from tfarm.loop.spill import spill_answer
+
+    found = find(subject, law if isinstance(law, Law) else Law.of_gains(law), number)
+    give(spill_answer(found) | said, json, print_spill)
+
+
 @app.command("map")
 def gain_map(
     arm: ArmName,

@@ -87,6 +87,14 @@ def _pair(pair: Any) -> str:
     return f"({pair[0]:.8g}, {pair[1]:.8g})"
 
 
+def print_spill(answer: dict[str, Any]) -> None:
+    """What it means, then a row a model."""
+    print(f"{answer['arm']}: {answer['in_words']}")
+    print(answer["beyond_the_band"])
+    show(answer["models"])
+    print(answer["sign_convention"])
+
+
 def print_map(answer: dict[str, Any]) -> None:
     """The shares of the plane, and a coarse picture."""
     counts = answer["unstable_roots"]
