@@ -5,16 +5,21 @@ from __future__ import annotations
 import math
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from tfarm.cli.app import ArmName, Json, app, give, load_arm, plain_number, whole
-from tfarm.cli.inputs import Given, Kp, law_of, under_a_law
+from tfarm.cli.inputs import Given, Kp, LawFile, law_of, under_a_law
 from tfarm.cli.sampling import Delay, DspFile, Period, chain_of
 from tfarm.errors import ParameterError
 
+if TYPE_CHECKING:
+    from tfarm.arm import Arm
+
 POLES = "poles with Im s >= 0, 1 to 1000; if not given ten, or those below the shear cut-off where they are fewer"
+
+OF_A_LAW = "twice: two numbers of a law and their ranges; gain, delay, SIGNAL, SIGNAL.num.N or SIGNAL.den.N"
 
 RANGES = {  # of a map
     "K1": "range of K1; by default -1,3 on the paper's arm, -3.33 to 10 times the default K1 on a rig",
@@ -84,12 +89,17 @@ def gain_map(
     k1: Annotated[str | None, typer.Option("--K1", metavar="LO,HI", help=RANGES["K1"])] = None,
     k2: Annotated[str | None, typer.Option("--K2", metavar="LO,HI", help=RANGES["K2"])] = None,
     kp: Kp = 0.0,
-    points: Annotated[str, typer.Option("--points", help="grid points along each gain")] = "101",
-    csv: Annotated[Path | None, typer.Option("--csv", help="write K1, K2 and the count to this file")] = None,
+    points: Annotated[str | None, typer.Option("--points", help="grid points along each; 101, of a law 60")] = None,
+    csv: Annotated[Path | None, typer.Option("--csv", help="write both numbers and the count to this file")] = None,
+    law: LawFile = None,
+    vary: Annotated[list[str] | None, typer.Option("--vary", metavar="NAME=LO,HI", help=OF_A_LAW)] = None,
     json: Json = False,
 ) -> None:
-    """How many poles are unstable over the plane of K1 and K2, and the exact boundary."""
-    number, subject = whole("--points", points, 2, 2000), load_arm(arm)
+    """How many poles are unstable over the plane of K1 and K2, and the exact boundary; or over two numbers of a law."""
+    number, subject = whole("--points", points or "101", 2, 2000), load_arm(arm)
+    if vary or law:
+        _law_map(subject, arm, law, vary or [], whole("--points", points or "60", 2, 400), csv, json)
+        return
     from tfarm.loop.regions import ranges_of
 
     usual = ranges_of(subject)
@@ -106,6 +116,36 @@ def gain_map(
 
     if json or say_written(csv):
         give(map_answer(found), json, print_map)
+
+
+def _law_map(
+    subject: Arm, name: str, law: str | None, vary: list[str], number: int, csv: Path | None, json: bool
+) -> None:
+    """The map over two numbers of a law, those of a file or of the arm's own."""
+    if len(vary) != 2:
+        remedy = "twice, such as --vary hub_angle=0,10 --vary delay=0,0.02"
+        raise ParameterError(key="--vary", value=vary, remedy=remedy)
+    ranges = [_range_of(each) for each in vary]
+    typed = law_of(subject, Given({}, law, name))[0]
+    from tfarm.arm.law import Law
+    from tfarm.cli.control_tables import print_law_map, write_law_map
+    from tfarm.cli.tables import say_written
+    from tfarm.loop.law_map import law_map, law_map_answer
+    from tfarm.loop.regions import between
+
+    any_law = typed if isinstance(typed, Law) else Law.of_gains(typed)
+    x, y = (between(*limits, number) for _, limits in ranges)
+    answer = law_map_answer(law_map(subject, any_law, (ranges[0][0], ranges[1][0]), x, y))
+    if csv is not None:
+        write_law_map(answer, csv)
+    if json or say_written(csv):
+        give(answer, json, print_law_map)
+
+
+def _range_of(text: str) -> tuple[str, tuple[float, float]]:
+    """A name and its range, of NAME=LO,HI."""
+    name, _, limits = text.partition("=")
+    return name, bounds(f"--vary {name}", limits)
 
 
 @app.command()

@@ -107,6 +107,28 @@ def print_map(answer: dict[str, Any]) -> None:
     print(answer["sign_convention"])
 
 
+def print_law_map(answer: dict[str, Any]) -> None:
+    """The share of the plane that is stable, and a coarse picture."""
+    counts, (first, second) = answer["unstable_roots"], answer["vary"]
+    flat = [count for row in counts for count in row]
+    reach = f"no unstable pole below {answer['band_rad_s']:.6g} rad/s"
+    print(f"{answer['arm']}: {flat.count(0)} of {len(flat)} pairs of {first} and {second} have {reach}")
+    step = max(1, len(counts) // 24), max(1, len(counts[0]) // 60)
+    for value, row in list(zip(answer["y"], counts, strict=True))[:: -step[0]]:
+        print(f"{value:9.3g} " + "".join("." if count == 0 else "#" for count in row[:: step[1]]))
+    print(f"{second} up, {first} from {answer['x'][0]:g} to {answer['x'][-1]:g} to the right; . stable, # unstable")
+    print(answer["sign_convention"])
+
+
+def write_law_map(answer: dict[str, Any], path: Path) -> None:
+    """Both numbers of the law and the number of unstable poles, one row a point."""
+    counts = [count for row in answer["unstable_roots"] for count in row]
+    x, y = answer["x"] * len(answer["y"]), [value for value in answer["y"] for _ in answer["x"]]
+    names = [name.replace(".", "_").replace("@", "_at_") for name in answer["vary"]]
+    columns = (Column(names[0], of=x), Column(names[1], of=y), Column("unstable_roots", of=counts))
+    write_csv(Table(columns=columns), path)
+
+
 def print_design(answer: dict[str, Any]) -> None:
     """The gains and what they reach."""
     print(f"{answer['arm']}, objective {answer['objective']}, {answer['modes']} modes in the band: {answer['verdict']}")

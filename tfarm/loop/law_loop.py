@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from tfarm.arm import INPUT_UNITS, Arm, must_be_arm
 from tfarm.arm.law import Law
 from tfarm.errors import ParameterError
-from tfarm.exact.characteristic import Analytic, deflated
+from tfarm.exact.characteristic import Analytic, LoopParts, deflated
 from tfarm.exact.system import System
 from tfarm.records import record
 from tfarm.response.signals import Signals
@@ -31,6 +31,7 @@ Real = NDArray[np.float64]
 STEP = 1e-6  # of |s|, or of the way to -1/C, for differences
 FAR = (1e5, 1e6, 1e7)  # of w1: how far right an improper law is looked at
 FARTHEST = 1e11  # of w1: where waves are no longer dispersed
+AT_REST = 1e-12  # of w1: where the function, its zeros at 0 divided out, is taken for its value at 0
 FALLS = 0.5  # L must fall by this there, from one to the next
 CANCELLED = 1e-6  # of its size: a zero of the law so near to an unstable pole of it cancels that
 
@@ -109,7 +110,7 @@ class LawLoop:
 
     def function(self, s: Complex) -> Analytic:
         """D/s^n, n = `zeros_at_origin`, with slopes from differences."""
-        s = np.asarray(s, dtype=complex)
+        s = np.where(s == 0, AT_REST * first_frequency(self.arm), np.asarray(s, dtype=complex))
         near = np.min([np.ones(s.shape), *(abs(1.0 - s / each) for each in self.k.singular)], axis=0)
         h = STEP * np.maximum(abs(s) * near, 1e-300)
         at = np.array([s, s + h, s - h])
@@ -124,6 +125,12 @@ class LawLoop:
         far = FARTHEST * first_frequency(self.arm)
         scale = self.signals.parts(np.array([far, 2 * far], complex)).scale.real
         return float(max(0.0, scale[1] - scale[0]) / far)
+
+    def characteristic(self, s: Complex, of_rig: LoopParts) -> Complex:
+        """D(s) up to a factor that no law changes, so that two laws may be added; `of_rig` are the signals' parts."""
+        entries, whole = self.law.polynomials(s)
+        late = np.exp(-s * self.law.delay)
+        return np.asarray(of_rig.drive * whole + late * (entries * of_rig.numerators).sum(axis=0))
 
     def _parts(self, s: Complex) -> tuple[Complex, Complex, Complex]:
         """drive q, the fed back sum, both times e^{-scale}, and scale."""

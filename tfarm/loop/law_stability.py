@@ -36,7 +36,8 @@ DELAYED = "without any damping a delayed law drives infinitely many modes beyond
 NEAR = 0.5  # of 1/delay: how far left poles are listed, of ever more as |L| falls, to say which are right of the axis
 WIDENED = 1.6
 DECADES, POINTS = 100.0, 1600  # beyond the band that are looked at, and how closely
-CLEAR_OF_POLES = 1.3  # of the law's fastest pole: a band reaches so far
+CLEAR_OF_POLES = 1.3  # of the fastest pole of the law that rings: a band reaches so far, if it can
+DULL = 0.7  # damping ratio from which on a pole of the law makes no peak
 SLOWEST_BAND = 3.0  # heights: as far above it are resonances looked at one by one
 
 
@@ -109,11 +110,11 @@ def _verdict(poles: Poles[LawLoop], infinite: bool, loop: LawLoop, strict: bool)
 
 def _band(loop: LawLoop, signs: Signs) -> tuple[float, bool]:
     """The band [rad/s] in which poles are computed, and whether the loop is quiet beyond it."""
-    fastest = CLEAR_OF_POLES * float(abs(loop.law.poles).max(initial=0.0))
-    least = max(band_of(loop.arm, FEW), fastest)
-    while least <= fastest or modes_below(loop.arm, least) < FEW:
-        least *= WIDENED
-    if loop.arm.is_undamped or _holds(loop, signs) or not loop.arm.least_damping:
+    own = loop.law.poles
+    ringing = own[own.real > -DULL * abs(own)]
+    fastest, highest = CLEAR_OF_POLES * float(abs(ringing).max(initial=0.0)), band_of(loop.arm, MOST_MODES)
+    least = max(band_of(loop.arm, FEW), min(fastest, highest))
+    if loop.arm.is_undamped or _holds(loop, signs) or not loop.arm.least_damping or fastest > highest:
         return least, False
     band = least
     while modes_below(loop.arm, band) <= MOST_MODES:
@@ -121,6 +122,11 @@ def _band(loop: LawLoop, signs: Signs) -> tuple[float, bool]:
             return band, True
         band *= WIDENED
     return least, False
+
+
+def band_for(loop: LawLoop) -> float:
+    """The band [rad/s] in which the poles of a loop are counted."""
+    return _band(loop, signs_of_loop(loop))[0]
 
 
 def is_quiet_above(loop: LawLoop, band: float) -> bool:

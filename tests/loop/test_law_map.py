@@ -1,0 +1,75 @@
+"""Maps over two numbers of a law: against full counts at single points, gains at the hub, and the command."""
+
+import json
+
+import numpy as np
+import pytest
+
+import tfarm
+from tests.shell import run
+from tfarm import HubFeedback, Law, ParameterError
+from tfarm.loop.law_loop import LawLoop
+from tfarm.loop.law_map import law_map, unstable_below
+from tfarm.loop.law_stability import law_stability
+from tfarm.loop.regions import between
+
+LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
+LAW = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "tip_acceleration": ([0.05], [0.02, 1.0])}, delay=0.002)
+
+
+@pytest.mark.parametrize(
+    ("vary", "x", "y"),
+    [
+        (("hub_angle.num.0", "tip_acceleration.num.0"), (-1, 10), (-2, 2)),
+        (("delay", "gain"), (0, 0.03), (-1, 9)),
+        (("gain", "delay"), (-1, 9), (0, 0.03)),
+        (("hub_angle.den.0", "gain"), (0.001, 0.1), (-1, 60)),
+    ],
+)
+def test_counts_are_those_of_full_searches(vary, x, y):
+    found = law_map(LAB, LAW, vary, between(*x, 8), between(*y, 10))
+    assert len(np.unique(found.unstable)) > 2
+    for i, j in np.random.default_rng(1).integers((8, 10), size=(4, 2)):
+        law = LAW.having(vary[0], found.x[i]).having(vary[1], found.y[j])
+        assert law_stability(LAB, law, found.band).unstable_roots == found.unstable[j, i], law
+
+
+def test_over_gains_at_the_hub_it_is_their_map():
+    K1, K2 = between(-1, 3, 10), between(-2, 2, 12)
+    law = Law({"hub_rate": 0.1, "root_moment": 0.1})
+    mine = law_map(LAB, law, ("hub_rate", "root_moment"), K1, K2)
+    np.testing.assert_array_equal(mine.unstable, tfarm.map(LAB, K1, K2).unstable)
+
+
+def test_a_count_by_half_a_box_is_that_of_a_list_of_poles():
+    for K1, K2 in ((0.3, 0.3), (0.3, 1.4), (-0.2, 0.5)):
+        law = Law.of_gains(HubFeedback(K1=K1, K2=K2))
+        loop = LawLoop(LAB, law)
+        poles = tfarm.closed_loop_poles(LAB, HubFeedback(K1=K1, K2=K2), 9)
+        assert unstable_below(loop, poles.box.im_max) == poles.unstable
+
+
+@pytest.mark.parametrize(
+    ("vary", "key"),
+    [(("gain", "gain"), "vary"), (("gain", "hub_speed"), "law"), (("gain", "hub_angle.num.7"), "law")],
+)
+def test_what_is_no_pair_of_numbers_is_refused(vary, key):
+    with pytest.raises(ParameterError) as error:
+        law_map(LAB, LAW, vary, between(0, 1, 3), between(0, 1, 3))
+    assert error.value.key == key
+
+
+def test_the_command_writes_what_the_map_says(capsys, tmp_path):
+    text = "[law]\ndelay = 0.002\n[law.hub_angle]\nnum = [2.0, 1.0]\nden = [0.01, 1.0]\n"
+    (tmp_path / "law.toml").write_text(text)
+    ranges = ("--vary", "gain=0,9", "--vary", "delay=0,0.03", "--points", "5")
+    code, out, err = run(capsys, "map", "sasaki2012-lab", "--law", str(tmp_path / "law.toml"), *ranges, "--json")
+    assert (code, err) == (0, "")
+    law = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0])}, delay=0.002)
+    found = law_map(LAB, law, ("gain", "delay"), between(0, 9, 5), between(0, 0.03, 5))
+    assert json.loads(out)["unstable_roots"] == found.unstable.tolist()
+    code, out, _ = run(
+        capsys, "map", "sasaki2012-lab", "--law", str(tmp_path / "law.toml"), *ranges, "--csv", str(tmp_path / "m.csv")
+    )
+    assert (tmp_path / "m.csv").read_text().splitlines()[0] == "gain,delay,unstable_roots"
+    assert run(capsys, "map", "sasaki2012-lab", "--law", str(tmp_path / "law.toml"), "--vary", "gain=0,9")[0] == 2

@@ -1,0 +1,185 @@
+"""How many poles are unstable over two numbers of a law: D-decomposition where the characteristic function is linear.
+
+In any one coefficient of a law, of its numerators or denominators, and in a factor on it, D is linear: D = A + g B.  So
+each column of the map has its crossings of the imaginary axis solved for, as along a gain (`tfarm.crossing`), and one
+count of unstable poles gives all the others.  In a delay it is not: that runs across the columns, each counted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import Arm
+from tfarm.arm.law import Law
+from tfarm.crossing import Crossing, Crossings, brackets, counts_over, solved
+from tfarm.errors import ParameterError
+from tfarm.exact.characteristic import LoopParts
+from tfarm.records import record
+from tfarm.response.signals import Signals
+from tfarm.spectrum.box import Box, winding_number
+from tfarm.spectrum.scales import first_frequency
+
+from .answers import law_answer
+from .frequencies import grid
+from .law_loop import LawLoop
+from .law_poles import law_box
+from .law_stability import band_for
+
+Complex = NDArray[np.complexfloating[Any, Any]]
+Real = NDArray[np.float64]
+
+MOST = 400  # values along one number
+NEAR = (1e-6, 5e-7)  # of the lowest frequency: where a real pole is looked for on its way through 0
+SETTLED = 1.5  # how much the gain of a pole at the first may be that at the second
+ORDER = (2e-3, 1e-3)  # of w1: where the order of a zero at s = 0 is read off
+SIMPLE = 3.0  # ratio of values at the first and the second: 2 of a simple zero, 4 of a double one
+BESIDE = 1e-3  # of the range: how far from such a place its counts are taken
+POINTS = 400  # of an edge of a contour, to begin with
+
+
+@dataclass(frozen=True)
+@record
+class LawMap:
+    """Unstable poles, `unstable` (len(y), len(x)), below `band` [rad/s] over two numbers of a law.
+
+    `vary` names them as `Law.having` does.  `crossings` are those along y for each x: (value, frequency, change).
+    """
+
+    arm: Arm
+    law: Law
+    vary: tuple[str, str]
+    x: Real
+    y: Real
+    unstable: NDArray[np.int64]
+    band: float
+    crossings: list[Crossings]
+
+    @property
+    def stable(self) -> NDArray[np.bool_]:
+        """Where no pole below the band is right of the axis."""
+        return np.asarray(self.unstable == 0)
+
+
+def law_map_answer(found: LawMap) -> dict[str, Any]:
+    """Unstable poles over the grid, rows of the second number, as plain lists."""
+    return {
+        "arm": found.arm.name,
+        **law_answer(found.law, found.arm),
+        "vary": list(found.vary),
+        "x": found.x.tolist(),
+        "y": found.y.tolist(),
+        "unstable_roots": found.unstable.tolist(),
+        "band_rad_s": found.band,
+    }
+
+
+def law_map(arm: Arm, law: Law, vary: tuple[str, str], x: Real, y: Real, band: float | None = None) -> LawMap:
+    """The map over two numbers of a law, x and y (1-D, ascending).
+
+    Raises ParameterError for what is no number of the law, no loop or no range; ConvergenceError where poles cannot be
+    counted.
+    """
+    if vary[0] == vary[1]:
+        raise ParameterError(key="vary", value=list(vary), remedy="two different numbers of the law")
+    x, y = _axis(vary[0], x), _axis(vary[1], y)
+    if vary[1] == "delay":
+        turned = law_map(arm, law, (vary[1], vary[0]), y, x, band)
+        return LawMap(turned.arm, law, vary, x, y, turned.unstable.T.copy(), turned.band, [])
+    arm = LawLoop(arm, law).arm
+    if band is None:
+        corners = [law.having(vary[0], a).having(vary[1], b) for a in (x[0], x[-1]) for b in (y[0], y[-1])]
+        band = max(band_for(LawLoop(arm, each)) for each in corners)
+    omega = np.asarray(grid(arm, band))
+    known = Signals(arm, law.signals).parts(1j * omega)
+    columns = [_along(arm, law.having(vary[0], float(value)), vary[1], y, omega, known, band) for value in x]
+    at, start = _clear_row(y, columns), x.size // 2
+    row = law.having(vary[1], float(y[at]))
+    if vary[0] == "delay":
+        there = [unstable_below(LawLoop(arm, row.having(vary[0], float(value))), band) for value in x]
+    else:
+        across = _along(arm, row, vary[0], x, omega, known, band)
+        first = unstable_below(LawLoop(arm, row.having(vary[0], float(x[start]))), band)
+        (there,) = counts_over(x, [across], float(x[start]), np.array([first]))
+    counts = counts_over(y, columns, float(y[at]), np.asarray(there))
+    return LawMap(arm, law, vary, x, y, counts.T.copy(), band, columns)
+
+
+def unstable_below(loop: LawLoop, band: float) -> int:
+    """Poles right of the axis with |Im s| < band, by the winding number around that half of the box alone.
+
+    Raises ConvergenceError where one is on the axis, to working precision.
+    """
+    right = law_box(loop, band).re_max
+    return winding_number(loop.function, Box(0.0, right, -band, band), POINTS)
+
+
+def _along(arm: Arm, law: Law, name: str, values: Real, omega: Real, known: LoopParts, band: float) -> Crossings:
+    """The crossings of the axis along one number, between its first and last value: D = A + t B, 0 < t < 1."""
+    low, span = float(values[0]), float(values[-1] - values[0])
+    first, last = (LawLoop(arm, law.having(name, float(end))) for end in (values[0], values[-1]))
+
+    def ends(s: Complex, of_rig: LoopParts) -> tuple[Complex, Complex]:
+        return first.characteristic(s, of_rig), last.characteristic(s, of_rig)
+
+    def parts(w: Real) -> tuple[Complex, Complex]:
+        s: Complex = 1j * w
+        A, end = ends(s, first.signals.parts(s))
+        return A, end - A
+
+    A, end = ends(1j * omega, known)
+    (before,), ways = brackets((A * (end - A).conj()).imag)
+    place, t = solved(parts, omega[before], omega[before + 1])
+    found = [Crossing(low + span * t, w, n) for t, w, n in zip(t, place, ways, strict=True)]
+    slow = np.concatenate([float(omega[0]) * np.array(NEAR), first_frequency(arm) * np.array(ORDER)]).astype(complex)
+    A, end = ends(slow, first.signals.parts(slow))
+    rest = _at_rest(A[:2], end[:2])
+    if rest is not None and 0 < rest.t < 1:
+        zero, half = abs((A + rest.t * (end - A))[2:])
+        change = rest.change if zero < SIMPLE * half else _change_at(arm, law, name, low, span, rest.t, found, band)
+        found.append(Crossing(low + span * rest.t, 0.0, change))
+    return Crossings.of(found)
+
+
+def _change_at(
+    arm: Arm, law: Law, name: str, low: float, span: float, t: float, others: list[Crossing], band: float
+) -> int:
+    """By how much the count grows at t where two poles meet at s = 0, from counts on either side."""
+    at = low + span * t
+    away = [abs(each.t - at) for each in others if each.t != at]
+    step = min([BESIDE * span, *(each / 2 for each in away)])
+    below, above = (unstable_below(LawLoop(arm, law.having(name, at + side * step)), band) for side in (-1, 1))
+    return above - below
+
+
+def _at_rest(A: Complex, end: Complex) -> Crossing | None:
+    """A real pole through s = 0, from A and A + B at two real s near 0: t(s) = -A/B has a finite limit.
+
+    It goes right if t grows with s.
+    """
+    B = end - A
+    if not B.all():
+        return None
+    far, near = -(A / B).real
+    if not abs(near) < SETTLED * abs(far):
+        return None
+    return Crossing(float(2 * near - far), 0.0, 1 if far > near else -1)
+
+
+def _clear_row(y: Real, columns: list[Crossings]) -> int:
+    """The value of y that is furthest from the crossings of all columns, as shares of the range."""
+    gains = np.concatenate([y[:0], *(each.gain for each in columns)])
+    if not gains.size:
+        return y.size // 2
+    return int(np.argmax(abs(y[:, None] - gains).min(axis=1)))
+
+
+def _axis(name: str, values: Real) -> Real:
+    values = np.atleast_1d(np.asarray(values, dtype=float))
+    if not (2 <= values.size <= MOST and np.isfinite(values).all() and (np.diff(values) > 0).all()):
+        remedy = f"an ascending range of 2 to {MOST} values"
+        raise ParameterError(key=name, value=f"{values.size} values", remedy=remedy)
+    return values
