@@ -32,8 +32,8 @@ if TYPE_CHECKING:
         presets,
     )
     from tfarm.arm.law import Law
+    from tfarm.dsp.closed import sampled
     from tfarm.dsp.results import simulate
-    from tfarm.dsp.verdict import analyse as sampled
     from tfarm.errors import CertificationError, ConvergenceError, ParameterError
     from tfarm.exact.outputs import Output
     from tfarm.loop.closed import closed_loop_poles, margins
@@ -102,7 +102,7 @@ _ROOMS = {  # where a name stands; what it is called there after a colon, if not
     "Output": "exact.outputs",
     "plots": "plots",
     "reduce": "reduced",
-    "sampled": "dsp.verdict:analyse",
+    "sampled": "dsp.closed",
     "simulate": "dsp.results",
     "spill": "loop.spill",
     "transfer": "response",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tfarm.cli.app import ArmName, Json, app, give, load_arm, whole
-from tfarm.cli.inputs import Given, gains_of, under_a_law
+from tfarm.cli.inputs import Given, gains_of, law_of, under_a_law
 
 if TYPE_CHECKING:
     from tfarm.dsp import Chain
@@ -38,15 +38,23 @@ def sampled(
     *,
     given: Given,
 ) -> None:
-    """Is the loop u = -Kp theta - K1 theta_t - K2 M stable when it is sampled?  Verdict, intervals, modes, margins."""
+    """Is the loop u = -Kp theta - K1 theta_t - K2 M stable when it is sampled?  Verdict, intervals, modes, margins.
+
+    A law of a file acts with its own period, which has to be that of the chain; one in s is made discrete by its rule.
+    """
     count = None if modes is None else whole("--modes", modes, 1, 400)
     subject, chain = load_arm(arm), chain_of(dsp or arm, period, delay_samples)
-    gains, said = gains_of(subject, given)
-    from tfarm.cli.sampling_tables import print_sampled
-    from tfarm.dsp.verdict import analyse, sampled_answer
+    law, said = law_of(subject, given)
+    from tfarm.cli.sampling_tables import print_sampled, print_sampled_law
+    from tfarm.dsp.closed import sampled as analysed
+    from tfarm.dsp.law_verdict import LawAnalysis, law_answer
+    from tfarm.dsp.verdict import sampled_answer
 
-    answer = sampled_answer(analyse(subject, gains, chain, count=count)) | said
-    give(answer, json, print_sampled)
+    found = analysed(subject, law, chain, count=count)
+    if isinstance(found, LawAnalysis):
+        give(law_answer(found) | said, json, print_sampled_law)
+    else:
+        give(sampled_answer(found) | said, json, print_sampled)
 
 
 @app.command()

@@ -31,6 +31,24 @@ def print_sampled(answer: dict[str, Any]) -> None:
     print(f"{answer['arm']}: {answer['verdict_in_words']}; spectral radius {answer['spectral_radius']:.12g}")
 
 
+def print_sampled_law(answer: dict[str, Any]) -> None:
+    """What a law is, how far it is from its edges, then the verdict."""
+    print(f"{answer['law']}, order {answer['law_order']}, {answer['rule_in_words']}: {answer['sign_convention']}")
+    late = f", {answer['delay_samples']:g} of them late" if answer["delay_samples"] else ""
+    print(f"samples every {answer['period_s']:g} s{late}; {answer['modes_used']} flexible modes in what follows")
+    if answer["free_hub_angle"]:
+        print("nothing regulates the hub's angle: its pole at z = 1 is left out")
+    for low, high in answer["stable_gain_factors"]:
+        print(f"stable with the whole law times {low:.6g} to {high:.6g}")
+    if answer["stable"]:
+        more = " or more" if answer["delay_margin_is_lower_bound"] else ""
+        seconds = f"{1e3 * answer['delay_margin_s']:.4g} ms"
+        print(f"further delay it bears: {answer['delay_margin_samples']:.4g} samples{more}, {seconds}")
+    elif not answer["stable_gain_factors"]:
+        print("stable with no factor on the law")
+    print(f"{answer['arm']}: {answer['verdict_in_words']}; spectral radius {answer['spectral_radius']:.12g}")
+
+
 def print_simulation(answer: dict[str, Any]) -> None:
     """What the simulation comes to."""
     print(f"{answer['arm']}, {answer['scenario_in_words']}: {len(answer['t'])} samples of {answer['period_s']:g} s")

@@ -15,23 +15,23 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Generic
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.dsp.circle import Circle
+from tfarm.dsp.law_loop import AnyLoop, SampledLaw
 from tfarm.dsp.loop import SampledLoop, resized
-from tfarm.dsp.plant import MEASURED
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
-from tfarm.response import transfer
 from tfarm.spectrum import modes
 from tfarm.spectrum.box import Box, winding_number
 from tfarm.spectrum.damped import member
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
+AnySampled = SampledLoop | SampledLaw
 
 SETTLED = 30.0  # e^-30 = 1e-13 is left over a sample of the poles on the line
 CLEAR = 0.8  # how far towards -1/C the line may lie
@@ -42,11 +42,11 @@ MOST_POINTS = 200_000
 
 @dataclass(frozen=True)
 @record
-class Band:
+class Band(Generic[AnyLoop]):
     """The poles of a loop's plant in a band up to `top` [rad/s], `kept` (poles,), and the bound `missing` (outputs,) on
     what the others of that band add to the pulse transfer functions, on the whole unit circle."""
 
-    loop: SampledLoop
+    loop: AnyLoop
     top: float
     kept: NDArray[np.bool_]
     missing: Real
@@ -58,16 +58,16 @@ class Band:
         return int(outside.min(initial=self.loop.plant.count + 1)) - 1
 
     @cached_property
-    def full(self) -> SampledLoop:
+    def full(self) -> AnyLoop:
         """The loop with all of them, or with one where there is none."""
         return resized(self.loop, max(1, self.modes))
 
-    def circle(self) -> Circle:
+    def circle(self) -> Circle[AnyLoop]:
         """The unit circle, on which poles outside are counted."""
         return Circle(self.loop, self.kept, self.missing)
 
 
-def band_of(loop: SampledLoop) -> Band | None:
+def band_of(loop: AnyLoop) -> Band[AnyLoop] | None:
     """The highest band in which the loop's plant is complete; None where it cannot be shown to be.
 
     Not without damping, nor with analog hub damping, whose poles the model has to its own accuracy alone.
@@ -85,7 +85,7 @@ def band_of(loop: SampledLoop) -> Band | None:
     return Band(loop, top, kept, missing + _of_the_filter(loop, line))
 
 
-def _highest(loop: SampledLoop, line: float) -> float | None:
+def _highest(loop: AnySampled, line: float) -> float | None:
     """The top of the highest box right of the line in which the exact arm has the plant's poles and no other."""
     plant, function = loop.plant, member(modes(loop.plant.arm, 1).system).function
     poles = plant.poles[(plant.mode > 0) & (plant.poles.real > -line)]
@@ -112,11 +112,10 @@ def _highest(loop: SampledLoop, line: float) -> float | None:
     return float(tops[low]) if is_complete(float(tops[low])) else None
 
 
-def _left_of(loop: SampledLoop, line: float, top: float) -> Real | None:
+def _left_of(loop: AnySampled, line: float, top: float) -> Real | None:
     """The bound on all poles of the band left of the line; None where the integral cannot be had."""
-    sampling, plant = loop.chain.sampling, loop.plant
+    sampling, exact = loop.chain.sampling, loop.exact
     T, remaining = sampling.period, sampling.period * (1 - sampling.fraction)
-    exact = transfer(plant.arm, list(MEASURED))
 
     def sizes(s: Complex) -> Real:
         damped = np.exp(s.real * remaining) / -np.expm1(s.real * T)
@@ -145,23 +144,22 @@ def _integral(size: Callable[[Real], Real], ends: Real) -> Real | None:
     return None
 
 
-def _filter_factors(loop: SampledLoop, s: Complex) -> Complex:
+def _filter_factors(loop: AnySampled, s: Complex) -> Complex:
     """What the analog filter makes of each output: wc/(s + wc) or 1."""
     corner = loop.chain.sampling.antialias_corner
     if np.isinf(corner):
-        return np.ones((len(MEASURED), 1), complex)
-    analog = ("root_moment",) if loop.differences else ("root_moment", "hub_rate")
-    return np.array([corner / (s + corner) if name in analog else np.ones(s.size) for name in MEASURED])
+        return np.ones((len(loop.analog), 1), complex)
+    return np.array([corner / (s + corner) if analog else np.ones(s.size) for analog in loop.analog])
 
 
-def _of_the_filter(loop: SampledLoop, line: float) -> Real:
+def _of_the_filter(loop: AnySampled, line: float) -> Real:
     """The bound on the error of the filter's own pole, whose residue has the model's value at -wc, not the arm's."""
     sampling, plant = loop.chain.sampling, loop.plant
     corner = sampling.antialias_corner
-    if corner >= line:  # then it is none of the kept poles, and the integral has its right value
-        return np.zeros(len(MEASURED))
+    if corner >= line or not any(loop.analog):  # then none of the kept poles is it, and the integral has it right
+        return np.zeros(len(loop.analog))
     own = plant.mode.size - 1
-    arm = transfer(plant.arm, list(MEASURED))(np.array([-corner + 0j]))[:, 0]
+    arm = loop.exact(np.array([-corner + 0j]))[:, 0]
     wrong = np.where(plant.residues[:, own] == 0, 0.0, abs(plant.residues[:, own] / corner - arm))
     left = sampling.period * corner
     bound: Real = wrong * np.exp(-left * (1 - sampling.fraction)) * 2 / (1 + np.exp(-left))

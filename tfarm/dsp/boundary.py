@@ -8,6 +8,7 @@ Robust Control, 1993, ch. 4).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import GAINS, HubFeedback
 from tfarm.crossing import Crossings, solved
+from tfarm.dsp.law_loop import SampledLaw
 from tfarm.dsp.loop import ANGLE, SampledLoop
 from tfarm.exact.characteristic import torque
 from tfarm.exact.outputs import OUTPUTS
@@ -26,6 +28,7 @@ from tfarm.spectrum.scales import most_gain
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 Whole = NDArray[np.int64]
+Split = Callable[[tuple[Any, Complex]], tuple[Complex, Complex]]  # of a grid's terms into A and B of A + g B
 
 A_DECADE = 48  # grid points a decade of the distance to a pole
 NARROWEST = 1e-17
@@ -38,7 +41,7 @@ NEAR_ONE = 1e-7  # where the values at z = 1 are read: they are even in q, so wr
 class CircleGrid:
     """Points z = e^{iq}, 0 < q < pi, each as a pole `base` and an angle `shift` from it."""
 
-    loop: SampledLoop
+    loop: SampledLoop | SampledLaw
     base: Whole
     shift: Real
 
@@ -65,7 +68,7 @@ class CircleGrid:
         return offset, self.loop.signals(np.exp(1j * (self.angles[base] + shift)), base, offset)
 
 
-def circle_grid(loop: SampledLoop) -> CircleGrid:
+def circle_grid(loop: SampledLoop | SampledLaw) -> CircleGrid:
     """The grid that resolves every pole of the loop (its gains do not matter)."""
     pulse = loop.pulse
     angles = np.angle(pulse.multipliers)
@@ -77,7 +80,7 @@ def circle_grid(loop: SampledLoop) -> CircleGrid:
     base, shift = [], []
     for i, pole in enumerate(bases):
         for edge in (seams[i] - angles[pole], seams[i + 1] - angles[pole]):
-            s = _geometric(abs(edge), width[pole]) * np.sign(edge)
+            s = geometric(abs(edge), width[pole]) * np.sign(edge)
             base.append(np.full(s.size, pole))
             shift.append(s)
     grid = CircleGrid(loop, np.concatenate(base), np.concatenate(shift))
@@ -86,7 +89,7 @@ def circle_grid(loop: SampledLoop) -> CircleGrid:
     return CircleGrid(loop, grid.base[inside], grid.shift[inside])
 
 
-def _geometric(edge: float, width: float) -> Real:
+def geometric(edge: float, width: float) -> Real:
     """Distances from a pole, from a hundredth of its width to the seam with its neighbour."""
     if edge <= width:
         return np.array([edge / 2])[: int(edge > 0)]
@@ -105,7 +108,7 @@ def crossings(grid: CircleGrid, name: str, law: HubFeedback) -> Crossings:
     A, B = line.split(grid.terms)
     rises = (A * B.conj()).imag >= 0
     step = np.nonzero(rises[1:] != rises[:-1])[0]
-    q, gain = _solved(grid, line, step)
+    q, gain = solved_on(grid, line.split, step)
     ends = [_at_minus_one(grid, line, bool(rises[-1])), *_at_one(grid, line, bool(rises[0]))]
     most = most_gain(grid.loop.plant.arm, name)
     found = [*zip(gain, q, np.where(rises[step], 2, -2), strict=True), *ends]
@@ -124,12 +127,12 @@ class _Line(NamedTuple):
         return offset + torque(self.others, signals), signals[self.place]
 
 
-def _solved(grid: CircleGrid, line: _Line, step: Whole) -> tuple[Real, Real]:
+def solved_on(grid: CircleGrid, split: Split, step: Whole) -> tuple[Real, Real]:
     """Angle and gain of the crossing in each step, by the angle from the nearer pole, down to its last bit."""
     base = np.where(abs(grid.shift[step]) < abs(grid.shift[step + 1]), grid.base[step], grid.base[step + 1])
     low = np.where(base == grid.base[step], grid.shift[step], grid.q[step] - grid.angles[base])
     high = np.where(base == grid.base[step + 1], grid.shift[step + 1], grid.q[step + 1] - grid.angles[base])
-    shift, gain = solved(lambda shift: line.split(grid.at(base, shift)), low, high)
+    shift, gain = solved(lambda shift: split(grid.at(base, shift)), low, high)
     return grid.angles[base] + shift, gain
 
 
@@ -137,7 +140,7 @@ def _at_minus_one(grid: CircleGrid, line: _Line, is_above: bool) -> tuple[float,
     """The crossing at z = -1; f vanishes there, so it falls where it is positive just before."""
     one = np.ones(1)
     A, B = line.split((one, grid.loop.signals(np.array([-1.0 + 0j]), None, one)))
-    return _real_gain(A[0], B[0]), float(np.pi), 1 if is_above else -1
+    return real_gain(A[0], B[0]), float(np.pi), 1 if is_above else -1
 
 
 def _at_one(grid: CircleGrid, line: _Line, is_above: bool) -> list[tuple[float, float, int]]:
@@ -149,8 +152,9 @@ def _at_one(grid: CircleGrid, line: _Line, is_above: bool) -> list[tuple[float, 
     if rigid[0] != 0.0:
         return [(0.0, 0.0, change)] if OUTPUTS[GAINS[line.place].output].quantity == "theta" else []
     A, B = line.split((one, loop.signals(np.exp(np.array([1j * NEAR_ONE])), None, one)))
-    return [(_real_gain(A[0], B[0]), 0.0, change)]
+    return [(real_gain(A[0], B[0]), 0.0, change)]
 
 
-def _real_gain(A: complex, B: complex) -> float:
+def real_gain(A: complex, B: complex) -> float:
+    """The real gain g of A + g B = 0 where A and B are real; inf where there is none."""
     return -A.real / B.real if abs(B.real) > 1e-12 * abs(A.real) else np.inf

@@ -14,12 +14,15 @@ disc holds 0 are cut.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Generic
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import HubFeedback
+from tfarm.dsp.law_loop import AnyLoop
 from tfarm.dsp.loop import ANGLE, RATE, SampledLoop
 from tfarm.records import record
 
@@ -87,7 +90,7 @@ class _Arcs:
 
 
 @dataclass
-class Circle:
+class Circle(Generic[AnyLoop]):
     """The upper half of the unit circle in arcs, and on each what a loop's plant is there; its gains do not matter.
 
     `missing` (outputs,) bounds |x sum over poles left out|.  `low` and `high` [rad] are the ends of the arcs, `parts`
@@ -95,7 +98,7 @@ class Circle:
     arcs are cut as counts need it.
     """
 
-    loop: SampledLoop
+    loop: AnyLoop
     kept: NDArray[np.bool_]
     missing: Real
     low: Real = field(init=False)
@@ -109,8 +112,12 @@ class Circle:
 
     def count(self, gains: HubFeedback) -> int | None:
         """Poles of the loop with these gains outside the circle, z = 1 of a free angle apart; None if not shown."""
+        return self.counted(lambda: self.characteristic(gains))
+
+    def counted(self, characteristic: Callable[[], Discs]) -> int | None:
+        """How many zeros a function has outside the circle, which `characteristic` gives on every arc as they are."""
         while True:
-            F = self.characteristic(gains)
+            F = characteristic()
             rough = ~(abs(F.middle) > F.radius)
             if not rough.any():
                 steps = np.angle(F.middle[1:] / F.middle[:-1])
@@ -128,17 +135,17 @@ class Circle:
         used = [(K, order, row) for row, (K, order) in enumerate(zip(gains.row, self.orders, strict=True)) if K]
         k = max((order for _, order, _ in used), default=0)
         x = self.parts[0]
-        total = _power(x, k)
+        total = power(x, k)
         for K, order, row in used:
             part = self.parts[1 + row]
-            total = total + (part if order == k else _power(x, k - order) * part).times(K)
+            total = total + (part if order == k else power(x, k - order) * part).times(K)
         return total
 
     @property
     def orders(self) -> list[int]:
         """The order at z = 1 of what each gain multiplies."""
         orders = [2 if twice else int(once != 0.0) for twice, once in self.loop.plant.rigid]
-        if self.loop.differences:
+        if isinstance(self.loop, SampledLoop) and self.loop.differences:
             orders[RATE] = max(0, orders[ANGLE] - 1)
         return orders
 
@@ -147,7 +154,7 @@ class Circle:
         arcs = _Arcs(low, high)
         sums = self._sums(low, high)
         found = [arcs.x, *(self._output(row, arcs, sums[row]) for row in range(len(self.orders)))]
-        if self.loop.differences:
+        if isinstance(self.loop, SampledLoop) and self.loop.differences:
             a, T = self.loop.smoothing, self.loop.chain.sampling.period
             rate = found[1 + ANGLE] * (arcs.turned(0) + arcs.turned(1).times(-a)).inverse().times((1 - a) / T)
             found[1 + RATE] = rate if self.orders[ANGLE] else rate * arcs.x
@@ -163,10 +170,10 @@ class Circle:
         at_rest = float(plant.static[row] - (plant.residues[row] / plant.poles).real.sum())
         sums = poles * x
         held = Discs(sums.middle, sums.radius + self.missing[row]) + late.times(at_rest)
-        total = _power(x, order) * held
+        total = power(x, order) * held
         push = arcs.turned(0).times((1 - f) * T) + late.times(f * T)
         if once:
-            total = total + (_power(x, order - 1) * push * late).times(once)
+            total = total + (power(x, order - 1) * push * late).times(once)
         if twice:
             ramp = arcs.turned(0).times(pulse.ramps[0]) + late.times(pulse.ramps[1])
             total = total + ((push * late).times(T) + x * ramp).times(twice) * late
@@ -207,7 +214,7 @@ class Circle:
         return Discs(np.concatenate(middles, axis=1), np.concatenate(radii, axis=1))
 
 
-def _power(x: Discs, n: int) -> Discs:
+def power(x: Discs, n: int) -> Discs:
     """x^n."""
     total = Discs(np.ones_like(x.middle), np.zeros_like(x.radius))
     for _ in range(n):

@@ -11,9 +11,10 @@ loss; then ln|z| = Re(pT) + ln|1 + delta e^{-pT}|.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,12 +26,14 @@ from tfarm.dsp.sampling import PulseTransfer
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exact.characteristic import torque
 from tfarm.records import record
+from tfarm.response import transfer
 from tfarm.spectrum.damped import all_damped_modes
 from tfarm.spectrum.scales import check_gains
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 Whole = NDArray[np.int64]
+Characteristic = Callable[[Complex, Whole | None, Any], Complex]  # offset F at z = e^{pT} + offset, p of that number
 
 ANGLE, RATE = (FED_BACK.index(name) for name in ("hub_angle", "hub_rate"))  # rows of what is measured
 TINY = 1e-30  # stands for zero where a root sits on the filter's own pole, which it does where nothing is fed back
@@ -104,6 +107,22 @@ class SampledLoop:
         """The pole a of the rate filter (1 - a)/(1 - a/z); 0 is none."""
         return float(np.exp(-self.chain.converters.rate_filter * self.chain.sampling.period))
 
+    @property
+    def exact(self) -> Callable[[Complex], Complex]:
+        """The exact transfer functions of what is fed back, at s (n,), without the filters."""
+        return transfer(self.plant.arm, list(FED_BACK))
+
+    @property
+    def analog(self) -> tuple[bool, ...]:
+        """Of what is fed back, what passes the anti-alias filter."""
+        names = ("root_moment",) if self.differences else ("root_moment", "hub_rate")
+        return tuple(name in names for name in FED_BACK)
+
+    @property
+    def push(self) -> Real:
+        """What the law adds to each pole of the plant, at most [1/s]."""
+        return np.asarray(abs(np.array(self.gains.row)[:, None] * self.plant.residues).sum(axis=0))
+
     # ------------------------------------------------------------ characteristic function
 
     def signals(self, z: Complex, base: Whole | None, offset: Any) -> Complex:
@@ -166,36 +185,40 @@ class SampledLoop:
     @cached_property
     def poles(self) -> Poles:
         """The closed-loop poles, polished."""
-        z = self.eigenvalues.copy()
-        open_loop = self.pulse.multipliers
-        base = abs(z[:, None] - open_loop).argmin(axis=1)
-        with np.errstate(divide="ignore"):
-            log_radius = np.maximum(np.log(abs(z)), -745.0)
-        bright = (abs(z) > FAINT) & (abs(open_loop[base]) > FAINT)
-        if bright.any():
-            offset = self._polished(z[bright], base[bright])
-            ratio = offset / open_loop[base[bright]]
-            own = self.pulse.poles[base[bright]].real * self.chain.sampling.period
-            log_radius[bright] = own + np.log1p(2 * ratio.real + abs(ratio) ** 2) / 2
-            z[bright] = open_loop[base[bright]] + offset
-        return Poles(z, log_radius, self.pulse.mode[base])
+        return polished(self.eigenvalues, self.pulse, self.characteristic)
 
-    def _polished(self, z: Complex, base: Whole) -> Complex:
-        """Offsets of the roots from their open-loop poles, by the secant method where it does not stray."""
-        open_loop = self.pulse.multipliers[base]
-        start = z - open_loop
-        start = np.where(start == 0, 1e-17, start)
-        old = start * (1 + 1e-4) + 1e-18
-        new, f_old = start, self.characteristic(open_loop + old, base, old)
-        with np.errstate(all="ignore"):  # a root that strays beyond any number is put back to its start below
-            for _ in range(8):
-                f_new = self.characteristic(open_loop + new, base, new)
-                slope = f_new - f_old
-                step = np.where(slope == 0, 0.0, f_new * (new - old) / np.where(slope == 0, 1.0, slope))
-                old, f_old, new = new, f_new, np.where(abs(new - step) < UNMOVED, UNMOVED, new - step)
-        near = abs(new - start) <= 1e-9 + 1e-3 * abs(start)
-        offset = np.where(near, new, start)
-        return np.where(abs(offset) <= UNMOVED, 0.0, offset)
+
+def polished(eigenvalues: Complex, pulse: PulseTransfer, characteristic: Characteristic) -> Poles:
+    """Closed-loop poles from eigenvalues that are nearly right, each as an offset from its nearest open-loop pole."""
+    z, open_loop = eigenvalues.copy(), pulse.multipliers
+    base = abs(z[:, None] - open_loop).argmin(axis=1)
+    with np.errstate(divide="ignore"):
+        log_radius = np.maximum(np.log(abs(z)), -745.0)
+    bright = (abs(z) > FAINT) & (abs(open_loop[base]) > FAINT)
+    if bright.any():
+        offset = _offsets(z[bright], base[bright], open_loop[base[bright]], characteristic)
+        ratio = offset / open_loop[base[bright]]
+        own = pulse.poles[base[bright]].real * pulse.sampling.period
+        log_radius[bright] = own + np.log1p(2 * ratio.real + abs(ratio) ** 2) / 2
+        z[bright] = open_loop[base[bright]] + offset
+    return Poles(z, log_radius, pulse.mode[base])
+
+
+def _offsets(z: Complex, base: Whole, open_loop: Complex, characteristic: Characteristic) -> Complex:
+    """Offsets of the roots from their open-loop poles, by the secant method where it does not stray."""
+    start = z - open_loop
+    start = np.where(start == 0, 1e-17, start)
+    old = start * (1 + 1e-4) + 1e-18
+    new, f_old = start, characteristic(open_loop + old, base, old)
+    with np.errstate(all="ignore"):  # a root that strays beyond any number is put back to its start below
+        for _ in range(8):
+            f_new = characteristic(open_loop + new, base, new)
+            slope = f_new - f_old
+            step = np.where(slope == 0, 0.0, f_new * (new - old) / np.where(slope == 0, 1.0, slope))
+            old, f_old, new = new, f_new, np.where(abs(new - step) < UNMOVED, UNMOVED, new - step)
+    near = abs(new - start) <= 1e-9 + 1e-3 * abs(start)
+    offset = np.where(near, new, start)
+    return np.where(abs(offset) <= UNMOVED, 0.0, offset)
 
 
 def sampled_loop(
@@ -215,7 +238,17 @@ def sampled_loop(
     return SampledLoop(loop_plant(arm, chain, count, branches), chain, gains)
 
 
-def resized(loop: SampledLoop, count: int) -> SampledLoop:
+class Resizable(Protocol):
+    """A loop that can be had with another number of flexible modes."""
+
+    def with_modes(self, count: int) -> Self:
+        """The same loop with that many."""
+
+
+Sized = TypeVar("Sized", bound=Resizable)
+
+
+def resized(loop: Sized, count: int) -> Sized:
     """The loop with another number of flexible modes, or a few less or more where two damped modes are one there."""
     for number in (count, count - 1, count + 1, count - 2, count + 2):
         try:

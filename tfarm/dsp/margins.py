@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
@@ -14,6 +15,7 @@ from tfarm.arm import Arm, HubFeedback
 from tfarm.crossing import joined
 from tfarm.dsp.boundary import circle_grid, crossings
 from tfarm.dsp.chain import Chain
+from tfarm.dsp.law_loop import AnyLoop, SampledLaw
 from tfarm.dsp.loop import SampledLoop, sampled_loop
 from tfarm.dsp.plant import Branching
 from tfarm.dsp.sampling import FORGOTTEN, held
@@ -23,6 +25,7 @@ from tfarm.spectrum.damped import COMPANY, LITTLE, Branches, all_damped_modes
 from tfarm.spectrum.scales import first_frequency
 
 Window = tuple[float, float]
+AnySampled = SampledLoop | SampledLaw
 
 LONGEST_DELAY = 20.0  # samples: the delay margin is looked for up to here
 MOST_STEPS = 2000
@@ -76,7 +79,7 @@ def around(windows: list[Window], gain: float) -> Window | None:
     return next((window for window in windows if window[0] < gain < window[1]), None)
 
 
-def delay_margin(loop: SampledLoop) -> DelayMargin:
+def delay_margin(loop: AnySampled) -> DelayMargin:
     """How many samples of further delay, any fraction, until a stable loop is stable no more; 0 if it is not stable.
 
     Scanned finely enough for the fastest mode that the loop can drive unstable, then bisected to 1e-10.
@@ -101,11 +104,10 @@ def delay_margin(loop: SampledLoop) -> DelayMargin:
     return DelayMargin(min(MOST_STEPS * step, LONGEST_DELAY), True)
 
 
-def _delay_step(loop: SampledLoop) -> float:
+def _delay_step(loop: AnySampled) -> float:
     """A twelfth of the turn, in samples, of the fastest mode whose own damping the feedback could outweigh."""
     plant, T = loop.plant, loop.chain.sampling.period
-    push = abs(np.array(loop.gains.row)[:, None] * plant.residues).sum(axis=0)
-    reach = 4 * push * abs(held(plant.poles, T))
+    reach = 4 * loop.push * abs(held(plant.poles, T))
     risky = (reach > -plant.poles.real * T) & (plant.poles.imag > 0)
     fastest = (plant.poles.imag[risky] * T).max(initial=np.pi / 4)
     return float(min(0.05, 2 * np.pi / fastest / 12))
@@ -174,7 +176,18 @@ def most_modes(arm: Arm, chain: Chain) -> int:
 
 
 def whole_loop(arm: Arm, gains: HubFeedback, chain: Chain, branches: Branching = all_damped_modes) -> SampledLoop:
-    """The loop of a damped arm with every mode that outlives a sample and a few, or with the first 128.
+    """The loop of a damped arm with every mode that outlives a sample and a few, or with the first 128: see `whole`."""
+
+    def loop_of(count: int, branches: Branching) -> SampledLoop:
+        return sampled_loop(arm, gains, chain, count=count, branches=branches)
+
+    return whole(arm, chain, loop_of, branches)
+
+
+def whole(
+    arm: Arm, chain: Chain, loop_of: Callable[[int, Branching], AnyLoop], branches: Branching = all_damped_modes
+) -> AnyLoop:
+    """The loop of a damped arm with as many modes as it takes, `loop_of` giving that with so many.
 
     With somewhat fewer where two damped modes cannot be told apart; with one where the first is far overdamped.
     Raises ConvergenceError where not even that one can be followed.
@@ -186,7 +199,7 @@ def whole_loop(arm: Arm, gains: HubFeedback, chain: Chain, branches: Branching =
         numbers, branches = [1], Branches(COMPANY[:1])
     for number in numbers:
         try:
-            return sampled_loop(arm, gains, chain, count=max(1, number), branches=branches)
+            return loop_of(max(1, number), branches)
         except ConvergenceError as error:
             lost = error
     where = f"C = {arm.damping:g} s, {criticals:.3g} times critical in the first mode"

@@ -84,13 +84,21 @@ def loop_plant(arm: Arm, chain: Chain, count: int, branches: Branching = all_dam
 
 def shorter_plant(plant: Plant, chain: Chain, count: int) -> Plant:
     """A plant of `loop_plant` with the first `count` modes of its model."""
-    return filtered(_with_modes(plant.model, chain, MEASURED, count), chain)
+    return filtered(with_modes(plant.model, chain, MEASURED, count), chain)
 
 
 def undelayed_plant(
-    arm: Arm, chain: Chain, outputs: Sequence[str], count: int, branches: Branching = all_damped_modes
+    arm: Arm,
+    chain: Chain,
+    outputs: Sequence[str],
+    count: int,
+    branches: Branching = all_damped_modes,
+    x: float | None = None,
 ) -> Plant:
-    """The arm with `count` flexible modes and the actuator's analog hub damping, its outputs not filtered."""
+    """The arm with `count` flexible modes and the actuator's analog hub damping, its outputs not filtered.
+
+    `x` [m] is the place of outputs along the arm.
+    """
     if arm.is_locked:
         remedy = "a locked hub has no loop: no torque turns it; give a finite inertia"
         raise ParameterError(key="hub.inertia", value=math.inf, remedy=remedy)
@@ -104,15 +112,15 @@ def undelayed_plant(
         remedy = "acts on the hub at once, and the input behind an inductance late: give it as hub.friction of the rig"
         raise ParameterError(key="actuator.hub_damping", value=damping, remedy=remedy)
     names = [*outputs, "hub_rate"] if damping > 0 else list(outputs)
-    return _with_modes(modal_model(arm, names, count, branches=branches), chain, outputs, count)
+    return with_modes(modal_model(arm, names, count, x, branches=branches), chain, outputs, count)
 
 
-def _with_modes(model: ModalModel, chain: Chain, outputs: Sequence[str], count: int) -> Plant:
+def with_modes(model: ModalModel, chain: Chain, outputs: Sequence[str], count: int) -> Plant:
     """The plant with the first `count` modes of a model, whose last output is the hub's rate where this is damped."""
     damping = chain.actuator.hub_damping * model.arm.input_per_torque
     some = model if count == model.index.size else model.first(count)
     plant = _with_hub_damping(some, outputs, damping) if damping > 0 else _of_model(some)
-    exact = transfer(model.arm, [*outputs, "hub_rate"])
+    exact = transfer(model.arm, [*outputs, "hub_rate"], x=model.x)
 
     def values(s: Complex) -> Complex:
         G = exact(s)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Generic
 
 from tfarm.arm import LISTED, Arm, HubFeedback, driven, unit_of
 from tfarm.arm.checks import whole
@@ -13,6 +13,7 @@ from tfarm.columns import Table
 from tfarm.dsp.band import Band, band_of
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.law import MODES, ModeTable, growing_mode, mode_table
+from tfarm.dsp.law_loop import AnyLoop, SampledLaw
 from tfarm.dsp.loop import SampledLoop, check_loop, resized, sampled_loop
 from tfarm.dsp.margins import DelayMargin, Window, around, whole_loop
 from tfarm.dsp.shown import Figure, ShownWindows, shown_damping, shown_delay, shown_windows
@@ -25,15 +26,15 @@ MOST_ASKED = 400
 
 @dataclass(frozen=True)
 @record
-class Verdict:
+class Verdict(Generic[AnyLoop]):
     """Whether a sampled loop is stable, apart from z = 1 of a hub angle that nothing regulates.
 
     `band` is the part of the arm for which it is proven (`tfarm.dsp.band`); None where nothing is, as at C = 0: then
     the verdict holds for the first `modes_used` modes, those of `loop`, and high ones may grow by 1e-9 a sample.
     """
 
-    loop: SampledLoop
-    band: Band | None = None
+    loop: AnyLoop
+    band: Band[AnyLoop] | None = None
 
     @property
     def is_settled(self) -> bool:
@@ -64,7 +65,7 @@ class Verdict:
         return self.full.poles.log_spectral_radius
 
     @property
-    def full(self) -> SampledLoop:
+    def full(self) -> AnyLoop:
         """The loop with every mode of the band, for other gains than these; that of the verdict where there is none."""
         return self.loop if self.band is None else self.band.full
 
@@ -76,14 +77,21 @@ class Verdict:
     @property
     def sentence(self) -> str:
         """The verdict in words, beginning with stable, unstable or marginal."""
-        growth, mode = self.log_radius, growing_mode(self.loop)
-        what = f"mode {mode}" if mode else "the hub"
+        growth, what = self.log_radius, self.slowest
         held = f" ({self.holds_for})"
         if growth > 0:
             return f"unstable: {what} grows by {_change(growth)} a sample{held}"
         if growth == 0:
             return f"marginal: {what} neither grows nor decays{held}"
         return f"stable: {what} decays most slowly, by {_change(growth)} a sample{held}"
+
+    @property
+    def slowest(self) -> str:
+        """What has the largest radius: a mode, the hub, or a pole of the law."""
+        if isinstance(self.loop, SampledLaw):
+            return self.loop.slowest
+        mode = growing_mode(self.loop)
+        return f"mode {mode}" if mode else "the hub"
 
     @property
     def holds_for(self) -> str:
@@ -116,10 +124,14 @@ def sampled_verdict(arm: Arm, gains: HubFeedback, chain: Chain | None = None, *,
     if arm.has_elastic_link:
         return Verdict(sampled_loop(arm, gains, chain, count=UNDAMPED_MODES))
     check_loop(arm, gains)
-    largest = whole_loop(arm, gains, chain)
+    return settled(whole_loop(arm, gains, chain), lambda band: band.circle().count(gains))
+
+
+def settled(largest: AnyLoop, outside: Callable[[Band[AnyLoop]], int | None]) -> Verdict[AnyLoop]:
+    """The verdict on a damped arm by as few modes as it takes, from the loop with all: `outside` counts its poles."""
     band = band_of(largest)
     full = largest if band is None else band.full
-    proven = None if band is None else band.circle().count(gains)
+    proven = None if band is None else outside(band)
     for loop in _growing(full):
         if _agree(loop, full) and proven in (None, _outside(loop)):
             break
@@ -127,7 +139,7 @@ def sampled_verdict(arm: Arm, gains: HubFeedback, chain: Chain | None = None, *,
     return Verdict(loop, band if is_proven else None)
 
 
-def _growing(full: SampledLoop) -> Iterator[SampledLoop]:
+def _growing(full: AnyLoop) -> Iterator[AnyLoop]:
     """Loops of 8, 16, 32 ... modes, and the full one."""
     most = full.plant.count
     number = min(8, most // 2)
@@ -137,11 +149,11 @@ def _growing(full: SampledLoop) -> Iterator[SampledLoop]:
     yield full
 
 
-def _outside(loop: SampledLoop) -> int:
+def _outside(loop: SampledLoop | SampledLaw) -> int:
     return int((loop.poles.log_radius > 0).sum())
 
 
-def _agree(loop: SampledLoop, full: SampledLoop) -> bool:
+def _agree(loop: AnyLoop, full: AnyLoop) -> bool:
     radius, true = loop.poles.log_spectral_radius, full.poles.log_spectral_radius
     return abs(radius - true) <= AGREE * abs(true) + NOISE and _outside(loop) == _outside(full)
 

@@ -5,11 +5,8 @@ A law that is no more than these gains is taken for them.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from tfarm.arm import Arm, HubFeedback
-from tfarm.arm.law import Law
-from tfarm.errors import ParameterError
+from tfarm.arm.driving import AnyLaw, through
 
 from .law_loop import LawLoop
 from .law_poles import law_poles
@@ -18,19 +15,6 @@ from .margins import Margins, loop_margins
 from .margins import margins as margins_of_gains
 from .poles import Poles
 from .poles import closed_loop_poles as poles_of_gains
-
-AnyLaw = HubFeedback | Law
-
-
-def through(arm: Arm, law: AnyLaw) -> tuple[Arm, AnyLaw]:
-    """The arm with the input that the law drives, and the law as gains at the hub where it is no more than those."""
-    if isinstance(law, HubFeedback):
-        return arm, law
-    if not isinstance(law, Law):
-        raise ParameterError(key="law", value=law, remedy="give a HubFeedback or a Law")
-    if law.input is not None and law.input != arm.input:
-        arm = replace(arm, input=law.input)  # type: ignore[arg-type]  # the record refuses what is none
-    return arm, law.gains or law
 
 
 def closed_loop_poles(arm: Arm, law: AnyLaw, count: int | None = None) -> Poles | Poles[LawLoop]:

@@ -1,0 +1,250 @@
+"""Any linear law on the sampled loop: against gains at the hub, python-control, models stepped otherwise, and edges."""
+
+from dataclasses import replace
+
+import control
+import numpy as np
+import pytest
+
+import tfarm
+from tests.dsp.law_verdicts import judge, some_case, stepped
+from tests.shell import answer, run
+from tfarm import HubFeedback, Law, ParameterError
+from tfarm.arm.blocks import Rational, StateSpace
+from tfarm.dsp import Chain, Converters, Sampling, sampled_loop
+from tfarm.dsp.discretise import discretised, held, matched, tustin
+from tfarm.dsp.law_loop import sampled_law
+from tfarm.dsp.law_margins import crossing_factors
+from tfarm.dsp.law_verdict import law_verdict
+
+T = 0.01
+LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
+CHAINS = {
+    "plain": Chain(),
+    "late and filtered": Chain(sampling=Sampling(delay_samples=1.3, antialias_corner=300.0)),
+    "encoder": Chain(converters=Converters(hub_rate="difference", rate_filter=100.0)),
+}
+BLOCKS = {
+    "lead": Rational((2.0, 1.0), (0.01, 1.0)),
+    "notch": Rational((1.0, 0.4, 900.0), (1.0, 24.0, 900.0)),
+    "integrator": Rational((1.0, 3.0), (1.0, 40.0, 0.0)),
+    "washout": Rational((1.0, 0.0), (1.0, 5.0)),
+}
+LAWS = {
+    "lead": Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "root_moment": 0.1}, delay=0.004),
+    "acceleration": Law({"hub_rate": ([0.3], [0.02, 1.0]), "tip_acceleration": ([0.002], [0.02, 1.0])}),
+    "along": Law({"hub_rate": 0.3, "moment@0.3": ([0.1], [0.05, 1.0])}, delay=0.013),
+    "in z": Law({"hub_angle": ([0.4, -0.3], [1.0, -0.5]), "root_moment": ([0.1, 0.0], [1.0, -0.9])}, period=T),
+}
+
+
+# ------------------------------------------------------------ rules
+
+
+@pytest.mark.parametrize("name", BLOCKS)
+@pytest.mark.parametrize("rule", ["tustin", "prewarped", "zoh", "matched"])
+def test_the_rules_are_those_of_python_control(name, rule):
+    block, warp = BLOCKS[name], 25.0
+    continuous = control.tf(block.num, block.den)
+    mine = {
+        "tustin": lambda: tustin(block, T),
+        "prewarped": lambda: tustin(block, T, warp),
+        "zoh": lambda: held(block, T),
+        "matched": lambda: matched(block, T),
+    }[rule]()
+    method = {"tustin": "bilinear", "prewarped": "bilinear"}.get(rule, rule)
+    others = {"prewarp_frequency": warp} if rule == "prewarped" else {}
+    if rule == "matched" and name in (
+        "integrator",
+        "washout",
+    ):  # python-control matches a value at rest that is 0 or inf
+        z = np.exp(1e-6j)
+        mine_there = mine.numerators(np.array([z]))[0, 0] / mine.denominator(np.array([z]))[0]
+        assert mine_there == pytest.approx(complex(continuous(np.log(z) / T)), rel=1e-5)
+        return
+    theirs = control.sample_system(continuous, T, method=method, **others)
+    z = np.exp(1j * np.array([0.1, 0.7, 2.0, 3.0]))
+    values = mine.numerators(z)[0] / mine.denominator(z)
+    np.testing.assert_allclose(values, theirs(z), rtol=1e-9)  # polynomials of python-control lose some digits
+
+
+def test_prewarping_keeps_the_values_where_it_says():
+    block, w0 = BLOCKS["notch"], 30.0
+    z = np.exp(np.array([1j * w0 * T]))
+    s = np.array([1j * w0])
+    exact = block.numerators(s)[0] / block.denominator(s)
+    for w, same in ((w0, True), (0.0, False)):
+        found = tustin(block, T, w)
+        assert np.allclose(found.numerators(z)[0] / found.denominator(z), exact, rtol=1e-12) == same
+
+
+def test_tustins_derivative_is_the_trapezoidal_rule_backwards():
+    law = discretised(Law({"hub_angle": ([1.0, 0.0], [1.0])}), T)
+    z = np.exp(1j * np.array([0.3, 2.0]))
+    np.testing.assert_allclose(law.values(z)[0], 2 / T * (z - 1) / (z + 1), rtol=1e-13)
+
+
+def test_several_signals_at_once_are_discretised_as_each_alone():
+    A, B, C, D = [[-3.0, 40.0], [-40.0, -3.0]], [[1.0, 0.5], [2.0, -1.0]], [[1.0, 2.0]], [[0.3, 0.0]]
+    both = Law.of_matrices(A, B, C, D, ["hub_angle", "root_moment"], rule="zoh")
+    z = np.exp(1j * np.array([0.3, 2.0]))
+    for column, values in enumerate(discretised(both, T).values(z)):
+        one = held(StateSpace(A, np.array(B)[:, [column]], C, np.array(D)[:, [column]]), T)
+        np.testing.assert_allclose(values, one.numerators(z)[0] / one.denominator(z), rtol=1e-12)
+
+
+# ------------------------------------------------------------ the loop
+
+
+@pytest.mark.parametrize("chain", CHAINS.values(), ids=CHAINS)
+@pytest.mark.parametrize("gains", [HubFeedback(K1=0.3, K2=0.3), HubFeedback(K1=1.0, K2=-0.1, Kp=1.0)])
+def test_gains_at_the_hub_have_the_same_poles_as_a_law(chain, gains):
+    theirs, mine = sampled_loop(LAB, gains, chain, count=10), sampled_law(LAB, Law.of_gains(gains), chain, count=10)
+    assert mine.has_free_angle == theirs.has_free_angle
+    assert mine.poles.log_spectral_radius == pytest.approx(theirs.poles.log_spectral_radius, rel=1e-12)
+    z = np.array([1.1j, 0.9 * np.exp(0.4j)])
+    other = mine.law.polynomials(z)[1]
+    np.testing.assert_allclose(mine(z) / other, theirs(z), rtol=1e-11)
+
+
+@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+def test_poles_are_those_of_a_model_stepped_by_matrix_exponentials(law):
+    loop = sampled_law(BARE, law, Chain(sampling=Sampling(delay_samples=1.25)), count=12)
+    M = stepped(BARE, loop.law, loop.chain, 12)
+    mine, theirs = np.sort_complex(loop.poles.z), np.sort_complex(np.linalg.eigvals(M))
+    mine, theirs = (z[abs(z) > 0.3] for z in (mine, theirs))
+    assert mine.size == theirs.size - loop.has_free_angle
+    gap = abs(mine[:, None] - theirs).min(axis=1)
+    assert gap.max() < 1e-9  # eigenvalues of a matrix of order 30, one pair of them near 1 twice
+
+
+def test_poles_are_those_of_python_control():
+    """The sampled plant as a state space, the law as a transfer function, closed by python-control."""
+    law = LAWS["in z"]
+    loop = sampled_law(LAB, law, Chain(), count=6)
+    plant = loop.pulse.state_space()
+    A, B, C, D = law.matrices()
+    controller = control.ss(A, B, C, D, T)
+    closed = control.feedback(plant, controller)
+    theirs = closed.poles()
+    assert abs(loop.poles.z[:, None] - theirs).min(axis=1).max() < 1e-9
+    assert abs(theirs).max() == pytest.approx(np.exp(loop.poles.log_spectral_radius), abs=1e-9)
+
+
+def test_a_difference_of_the_angle_leaves_it_free():
+    law = Law({"hub_angle": ([0.3, -0.3], [T, 0.0]), "root_moment": 0.3}, period=T)
+    loop = sampled_law(LAB, law, Chain(), count=10)
+    chain = Chain(converters=Converters(hub_rate="difference"))
+    theirs = sampled_loop(LAB, HubFeedback(K1=0.3, K2=0.3), chain, count=10)
+    assert loop.has_free_angle
+    assert loop.poles.log_spectral_radius == pytest.approx(theirs.poles.log_spectral_radius, rel=1e-12)
+    assert law_verdict(LAB, law).is_settled
+
+
+def test_a_law_on_the_moment_alone_leaves_the_hub_adrift():
+    verdict = law_verdict(LAB, Law({"root_moment": ([0.3], [0.01, 1.0])}))
+    assert (verdict.word, verdict.log_radius) == ("marginal", 0.0)
+
+
+def test_filtered_signals_are_what_the_analog_filter_makes_of_them():
+    """At a slow z the sampled filter is the continuous one: H(z) times z^d is nearly G(s) of the filtered signal."""
+    names = ("tip_acceleration", "moment@0.3", "hub_angle", "hub_rate")
+    chain = Chain(sampling=Sampling(period=1e-4, antialias_corner=200.0))
+    law = Law(dict.fromkeys(names, 1.0))
+    loop = sampled_law(LAB, law, chain, count=8)
+    assert loop.analog == (True, True, False, True)
+    s = 30j
+    wanted = loop.exact(np.array([s]))[:, 0] * np.where(loop.analog, 200 / (s + 200), 1.0) * np.exp(-s * 0.5e-4)
+    np.testing.assert_allclose(
+        loop.pulse(np.exp(s * 1e-4)), wanted, rtol=2e-3
+    )  # (s T)^2/24 of the hold, modes left out
+
+
+# ------------------------------------------------------------ verdicts and margins
+
+
+def test_random_laws_have_the_verdict_of_models_and_of_simulations():
+    rng, words = np.random.default_rng(3), []
+    while len(words) < 6:
+        case = some_case(rng)
+        if case is not None:
+            words.append(judge(*case)[0])
+    assert set(words) <= {"right", "no second road", "too near"}
+    assert words.count("right") >= 4
+
+
+@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+def test_poles_cross_the_circle_at_the_factors_that_are_named(law):
+    loop = sampled_law(LAB, law, Chain(), count=6)
+    found = crossing_factors(loop)
+    assert len(found)
+    for factor, _, change in list(found)[:4]:
+        before, after = (int((loop.times(factor * k).poles.log_radius > 0).sum()) for k in (1 - 1e-7, 1 + 1e-7))
+        assert after - before == change, factor
+
+
+def test_margins_end_where_the_verdict_turns():
+    found = tfarm.sampled(LAB, LAWS["lead"])
+    loop, (low, high) = found.loop, found.gain_factors
+    assert (found.verdict.word, low) == ("stable", 0.0)
+    assert loop.times(high * (1 - 1e-9)).poles.is_stable
+    assert not loop.times(high * (1 + 1e-9)).poles.is_stable
+    late = LAWS["lead"].delay / T + found.delay_margin.samples
+    for more, stable in ((-1e-6, True), (1e-6, False)):
+        assert tfarm.sampled(LAB, replace(LAWS["lead"], delay=(late + more) * T)).verdict.is_stable == stable
+
+
+def test_a_law_of_gains_alone_is_taken_for_them():
+    law, gains = Law({"hub_rate": 0.3, "root_moment": 0.3}), HubFeedback(K1=0.3, K2=0.3)
+    mine, theirs = (tfarm.sampled(LAB, each, count=4) for each in (law, gains))
+    assert mine.verdict.sentence == theirs.verdict.sentence
+    assert mine.K1_windows == theirs.K1_windows
+
+
+# ------------------------------------------------------------ bad input, commands
+
+
+@pytest.mark.parametrize(
+    ("entries", "others", "key"),
+    [
+        ({"hub_rate": 0.3}, {"period": 0.02}, "period"),
+        ({"hub_speed": ([1.0], [1.0, 1.0])}, {}, "output"),
+        ({"strain": ([1.0], [1.0, 1.0])}, {}, "strain.x"),
+        ({"hub_angle": ([1.0, 0.0], [1.0])}, {"rule": "zoh"}, "law.hub_angle.num"),
+        ({"hub_angle": ([1.0, 0.0], [1.0])}, {"rule": "matched"}, "law.hub_angle.num"),
+        ({"hub_rate": ([1.0], [1.0, 1.0])}, {"rule": "zoh", "prewarp": 3.0}, "prewarp"),
+        ({"hub_rate": ([1.0], [1.0, 1.0])}, {"prewarp": 400.0}, "prewarp"),
+        ({"hub_rate": ([1.0], [1.0, -200.0])}, {}, "rule"),
+        ({"hub_rate": 0.3}, {"delay": 3.0}, "delay"),
+    ],
+)
+def test_no_sampled_loop_is_refused_by_its_key(entries, others, key):
+    with pytest.raises(ParameterError) as error:
+        tfarm.sampled(LAB, Law(entries, **others))
+    assert error.value.key == key
+
+
+def test_both_periods_are_named_where_they_differ(capsys, tmp_path):
+    file = tmp_path / "law.toml"
+    file.write_text("[law]\nperiod = 0.004\n[law.hub_rate]\ngain = 0.3\n")
+    code, _, err = run(capsys, "sampled", "sasaki2012-lab", "--law", str(file))
+    assert code == 2
+    assert err.count("\n") == 1
+    assert all(period in err for period in ("0.004 s", "0.01 s"))
+    typed = ("sampled", "sasaki2012-lab", "--law", str(file), "--modes", "3")
+    assert answer(capsys, *typed, "--period", "0.004")["stable"]
+
+
+def test_the_command_says_which_rule_it_took(capsys, tmp_path):
+    text = "[law]\nname = 'PD'\ndelay = 0.002\nprewarp = 20.0\n[law.hub_angle]\nnum = [2.0, 1.0]\nden = [0.01, 1.0]\n"
+    (tmp_path / "law.toml").write_text(text)
+    found = answer(capsys, "sampled", "sasaki2012-lab", "--law", str(tmp_path / "law.toml"))
+    assert (found["rule"], found["delay_samples"], found["settled"]) == ("tustin", 0.2, True)
+    (tmp_path / "arm.toml").write_text(tfarm.arm.to_toml(LAB) + "\n" + text)
+    assert answer(capsys, "sampled", str(tmp_path / "arm.toml"))["gain_factors"] == found["gain_factors"]
+    code, out, _ = run(capsys, "sampled", str(tmp_path / "arm.toml"))
+    assert code == 0
+    assert "Tustin's rule, exact at 20 rad/s" in out
+    assert f"spectral radius {found['spectral_radius']:.12g}" in out
+    typed = answer(capsys, "sampled", str(tmp_path / "arm.toml"), "--K1", "0.3", "--modes", "3")
+    assert typed["K1"] == 0.3

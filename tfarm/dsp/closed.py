@@ -1,0 +1,22 @@
+"""What is asked of a sampled loop, of whatever law: gains at the hub have more to tell than any other."""
+
+from __future__ import annotations
+
+from tfarm.arm import Arm, HubFeedback
+from tfarm.arm.driving import AnyLaw, through
+from tfarm.dsp.chain import Chain
+from tfarm.dsp.law_verdict import LawAnalysis, analyse_law
+from tfarm.dsp.verdict import Analysis, analyse
+
+
+def sampled(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, count: int | None = None) -> Analysis | LawAnalysis:
+    """Is the sampled loop stable?  Of gains at the hub with intervals of each, modes one by one and the damping that
+    makes it safe; of any other law with the factors on it and the further delay that it bears.
+
+    `count` is the number of flexible modes, as many as it takes if not given.  Raises ParameterError for a locked hub,
+    an algebraic loop, an unknown signal, and a law in z whose period is not the chain's.
+    """
+    arm, law = through(arm, law)
+    if isinstance(law, HubFeedback):
+        return analyse(arm, law, chain, count=count)
+    return analyse_law(arm, law, chain, count=count)

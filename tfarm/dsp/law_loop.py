@@ -1,0 +1,240 @@
+"""The sampled loop of any linear law in z: its matrix, its characteristic function, its poles.
+
+    u_k = -(C x_k + D y_k) + r_k,  x_{k+1} = A x_k + B y_k          the law, p_i/q its entries
+    F(z) = q(z) + sum over signals of p_i(z) H_i(z) = 0             closed-loop poles
+
+Poles are polished as those of gains at the hub are (`loop`): q and p_i are polynomials, so that F has no other poles
+than the plant has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from typing_extensions import TypeVar
+
+from tfarm.arm import Arm
+from tfarm.arm.blocks import Rational, StateSpace
+from tfarm.arm.law import Law, Part
+from tfarm.dsp.chain import MOST_DELAY, Chain
+from tfarm.dsp.discretise import discretised
+from tfarm.dsp.law_plant import SensedPlant, is_analog, sensed_plant
+from tfarm.dsp.loop import Poles, SampledLoop, polished
+from tfarm.dsp.plant import Branching, Plant
+from tfarm.dsp.sampling import PulseTransfer
+from tfarm.errors import ParameterError
+from tfarm.records import record
+from tfarm.reduced.sensed import closed
+from tfarm.spectrum.damped import all_damped_modes
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complexfloating[Any, Any]]
+Whole = NDArray[np.int64]
+
+FREE = 1e-12  # of its terms: what is left of a sum that should be 0, states of a law of order ten
+
+
+@dataclass(frozen=True)
+@record
+class SampledLaw:
+    """A rig under a law at the samples of a chain: `asked` as it was given, `law` in z as it acts.
+
+    `sensed` is what the law reads, its delay among that of `chain`.
+    """
+
+    sensed: SensedPlant
+    chain: Chain
+    law: Law
+    asked: Law
+
+    @cached_property
+    def plant(self) -> Plant:
+        """From the input to the signals of the law, through their filters."""
+        return self.sensed.together
+
+    @cached_property
+    def pulse(self) -> PulseTransfer:
+        """The pulse transfer functions to the signals of the law."""
+        return PulseTransfer(self.plant, self.chain.sampling).folded()
+
+    def times(self, factor: float) -> SampledLaw:
+        """The same loop with a factor on the whole law."""
+        return replace(self, law=self.law.times(factor), asked=self.asked.times(factor))
+
+    def with_delay(self, samples: float) -> SampledLaw:
+        """The same loop with another delay in all."""
+        chain = replace(self.chain, sampling=replace(self.chain.sampling, delay_samples=samples))
+        return replace(self, chain=chain)
+
+    def with_modes(self, count: int, branches: Branching = all_damped_modes) -> SampledLaw:
+        """The same loop with another number of flexible modes."""
+        return replace(self, sensed=self.sensed.with_modes(count, branches))
+
+    @property
+    def exact(self) -> Callable[[Complex], Complex]:
+        """The exact transfer functions of the signals, at s (n,), without the filters."""
+        return self.sensed.read.values
+
+    @property
+    def analog(self) -> tuple[bool, ...]:
+        """Which signals pass the anti-alias filter."""
+        return tuple(is_analog(each, self.chain) for each in self.sensed.read.outputs)
+
+    @property
+    def push(self) -> Real:
+        """What the law adds to each pole of the plant, at most, where the samples see it [1/s]."""
+        seen = np.exp(1j * self.plant.poles.imag * self.chain.sampling.period)
+        entries, whole = self.law.polynomials(seen)
+        return np.asarray(abs(entries * self.plant.residues).sum(axis=0) / np.maximum(abs(whole), 1e-300))
+
+    def signals(self, z: Complex, base: Whole | None, offset: Any) -> Complex:
+        """Both `terms`, in rows."""
+        return np.array(self.terms(z, base, offset))
+
+    @property
+    def slowest(self) -> str:
+        """What has the largest radius: the flexible mode whose pole is nearest, the hub, or the law itself."""
+        n = int(self.poles.log_radius.argmax())
+        z, mode = self.poles.z[n], int(self.poles.mode[n])
+        own = abs(self.law.poles - z).min(initial=np.inf)
+        if own < abs(self.pulse.multipliers - z).min():
+            return "a pole of the law"
+        return f"mode {mode}" if mode else "the hub"
+
+    # ------------------------------------------------------------ characteristic function
+
+    def characteristic(self, z: Complex, base: Whole | None, offset: Any) -> Complex:
+        """offset F(z)."""
+        open_loop, fed_back = self.terms(z, base, offset)
+        return np.asarray(open_loop + fed_back)
+
+    def terms(self, z: Complex, base: Whole | None, offset: Any) -> tuple[Complex, Complex]:
+        """offset q and offset times the sum of p_i H_i at z = e^{pT} + offset (n,), p the pole number `base`."""
+        entries, whole = self.law.polynomials(z)
+        return offset * whole, (entries * self.pulse.scaled(z, base, offset)).sum(axis=0)
+
+    def __call__(self, z: Complex) -> Complex:
+        """F(z) at an array of z."""
+        z = np.asarray(z, dtype=complex)
+        return self.characteristic(z.ravel(), None, np.ones(z.size)).reshape(z.shape)
+
+    # ------------------------------------------------------------ poles
+
+    def matrix(self) -> Real:
+        """The closed-loop matrix: states of `PulseTransfer.matrices`, then those of the law."""
+        A, B, C = self.pulse.matrices()
+        return closed((A, B[:, None], C, np.zeros((len(C), 1))), self.law.matrices())
+
+    @property
+    def is_damped(self) -> bool:
+        """Whether friction makes the turning hub a single integral of the input."""
+        return bool(self.plant.arm.rate_loss or self.chain.actuator.hub_damping)
+
+    @cached_property
+    def at_rest(self) -> tuple[Real, bool]:
+        """The states of the law (n,) when the hub stands still an angle off, and whether it then does nothing.
+
+        Such an angle is regulated by nothing: a pole at z = 1.
+        """
+        A, B, C, D = self.law.matrices()
+        angle = self.plant.rigid[:, int(self.is_damped)]
+        pushed = B @ angle
+        states = np.zeros(0) if not len(A) else np.linalg.lstsq(np.eye(len(A)) - A, pushed, rcond=None)[0].astype(float)
+        left = abs(states - A @ states - pushed)
+        settles = (left <= FREE * (abs(states) + abs(A) @ abs(states) + abs(pushed))).all()
+        out, size = (C @ states + D @ angle)[0], (abs(C) @ abs(states) + abs(D) @ abs(angle))[0]
+        return states, bool(self.plant.arm.has_rigid_mode and settles and abs(out) <= FREE * size)
+
+    @property
+    def has_free_angle(self) -> bool:
+        """Whether the hub angle is a pole at z = 1 that nothing regulates."""
+        return self.at_rest[1]
+
+    def reduced_matrix(self) -> Real:
+        """The closed-loop matrix without the pole z = 1 of a free hub angle, or of a hub that cannot drift."""
+        A, first = self.matrix(), 2 * self.pulse.kept()[0].size + self.pulse.kept()[1].size
+        if not self.plant.arm.has_rigid_mode:
+            return np.delete(np.delete(A, [first, first + 1], 0), [first, first + 1], 1)
+        if self.is_damped:  # its angle is the single integral
+            A = np.delete(np.delete(A, first, 0), first, 1)
+        states, is_free = self.at_rest
+        if not is_free:
+            return A
+        shift = np.zeros(len(A))
+        shift[first], shift[len(A) - states.size :] = 1.0, states
+        others = np.arange(len(A)) != first
+        quotient: Real = A[others][:, others] - np.outer(shift[others], A[first, others])
+        return quotient
+
+    @cached_property
+    def eigenvalues(self) -> Complex:
+        """The closed-loop poles, not polished."""
+        return np.linalg.eigvals(self.reduced_matrix()).astype(complex)
+
+    @cached_property
+    def poles(self) -> Poles:
+        """The closed-loop poles, polished."""
+        return polished(self.eigenvalues, self.pulse, self.characteristic)
+
+
+AnyLoop = TypeVar("AnyLoop", bound=SampledLoop | SampledLaw, default=SampledLoop)  # hub gains, unless a law is said
+
+
+def sampled_law(
+    arm: Arm, law: Law, chain: Chain, *, count: int = 20, branches: Branching = all_damped_modes
+) -> SampledLaw:
+    """The loop with `count` flexible modes.
+
+    Raises ParameterError for a locked hub, an unknown signal, a law in z of another period, and what `discretised`
+    refuses, and for a massless hub whose moment is fed back (an algebraic loop).
+    """
+    T = chain.sampling.period
+    samples = chain.sampling.delay_samples + law.delay / T
+    if samples > MOST_DELAY:
+        remedy = f"with the chain's delay that is {samples:.4g} samples; at most {MOST_DELAY:g}"
+        raise ParameterError(key="delay", value=law.delay, remedy=remedy)
+    if arm.has_massless_hub and "root_moment" in law.signals:
+        remedy = "with hub.inertia = 0 the root moment is -u itself: an algebraic loop; give the hub an inertia"
+        raise ParameterError(key="signals", value="root_moment", remedy=remedy)
+    late = replace(chain, sampling=replace(chain.sampling, delay_samples=samples))
+    acting = with_estimate(discretised(law, T), chain)
+    return SampledLaw(sensed_plant(arm, late, acting.signals, count, branches), late, acting, law)
+
+
+def with_estimate(law: Law, chain: Chain) -> Law:
+    """The law in z with the difference of the encoder in it, where the chain makes the hub's rate so.
+
+    rate = (1 - a)/T (z - 1)/(z - a) angle,  a the pole of its filter.
+    """
+    if chain.converters.hub_rate != "difference" or "hub_rate" not in law.signals:
+        return law
+    T = chain.sampling.period
+    a = float(np.exp(-chain.converters.rate_filter * T))
+    return replace(law, parts=tuple(_differenced(part, a, T) for part in law.parts))
+
+
+def _differenced(part: Part, a: float, T: float) -> Part:
+    """A part of a law with its columns of the hub's rate led to the hub's angle."""
+    if "hub_rate" not in part.signals:
+        return part
+    signals = tuple("hub_angle" if name == "hub_rate" else name for name in part.signals)
+    if isinstance(part.block, Rational):
+        num = np.convolve(part.block.num, [(1 - a) / T, -(1 - a) / T])
+        return Part(signals, Rational(tuple(num), tuple(np.convolve(part.block.den, [1.0, -a]))))
+    A, B, C, D = part.block.matrices()
+    rate = np.array([name == "hub_rate" for name in part.signals], dtype=float)
+    through, kept = (1 - a) / T, 1.0 - rate
+    Br, Dr = (B @ rate)[:, None], (D @ rate)[:, None]
+    slope = through * (a - 1)
+    block = StateSpace(
+        np.block([[A, slope * Br], [np.zeros((1, len(A))), np.array([[a]])]]),
+        np.vstack([B * kept + through * Br * rate, rate[None]]),
+        np.hstack([C, slope * Dr]),
+        D * kept + through * Dr * rate,
+    )
+    return Part(signals, block)

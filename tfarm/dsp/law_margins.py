@@ -1,0 +1,94 @@
+"""By which factor on a whole law a pole of its sampled loop comes to the unit circle, and how much delay it bears.
+
+On z = e^{iq} the loop is A + g B, A = q(z), B = sum of p_i(z) H_i(z), g the factor: `tfarm.crossing` on the circle.
+The grid is that of the plant's poles (`boundary`), with points around each pole and zero of the law.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.crossing import Crossings, joined
+from tfarm.dsp.boundary import NARROWEST, NEAR_ONE, CircleGrid, circle_grid, geometric, real_gain, solved_on
+from tfarm.dsp.law_circle import polynomials
+from tfarm.dsp.law_loop import SampledLaw
+from tfarm.dsp.margins import Window
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complexfloating[Any, Any]]
+
+SMALLEST, LARGEST = 1e-9, 1e9  # factors that are looked at: beyond, a law is none, or its gain is beyond any number
+REAL = 1e-4  # of B/A next to z = 1: more imaginary than that it has a pole there, and no factor comes to it
+SAME = 1e-9  # relative: two crossings so near are one
+BRIGHT = 1e-2  # roots of the law nearer to z = 0 leave nothing on the circle to resolve
+
+
+def law_grid(loop: SampledLaw) -> CircleGrid:
+    """The grid of the plant, and points around the poles and zeros of the law."""
+    grid = circle_grid(loop)
+    q, angles = [], grid.q
+    for root in _roots(loop):
+        width, at = max(1e-2 * abs(1 - abs(root)), NARROWEST), abs(np.angle(root))
+        near = geometric(math.pi, width)
+        q.append(np.r_[at - near, at + near])
+    more = np.concatenate([np.empty(0), *q])
+    more = np.unique(more[(more > 0) & (more < math.pi)])
+    nearest = np.clip(np.searchsorted(angles, more), 0, angles.size - 1)
+    base = np.r_[grid.base, grid.base[nearest]]
+    shift = np.r_[grid.shift, more - grid.angles[grid.base[nearest]]]
+    order = np.argsort(np.r_[angles, more], kind="stable")
+    return CircleGrid(loop, base[order], shift[order])
+
+
+def _roots(loop: SampledLaw) -> Iterable[complex]:
+    """Poles and zeros of the law that the circle is near to, the upper of each pair."""
+    _, entries = polynomials(loop.law)
+    zeros = [np.roots(np.trim_zeros(each.coefficients, "f")) for each in entries]
+    every = np.concatenate([loop.law.poles, *zeros])
+    return [complex(root) for root in every if abs(root) > BRIGHT and root.imag >= 0]
+
+
+def crossing_factors(loop: SampledLaw) -> Crossings:
+    """The positive factors on the law at which poles are on the circle, `at` which angle [rad a sample]."""
+    grid = law_grid(loop)
+    A, B = _split(grid.terms)
+    rises = (A * B.conj()).imag >= 0
+    step = np.nonzero(rises[1:] != rises[:-1])[0]
+    q, factor = solved_on(grid, _split, step)
+    found = [*zip(factor, q, np.where(rises[step], 2, -2), strict=True), *_ends(loop, bool(rises[0]), bool(rises[-1]))]
+    return Crossings.of(each for each in found if SMALLEST < each[0] < LARGEST)
+
+
+def _split(terms: tuple[Any, Complex]) -> tuple[Complex, Complex]:
+    """A and B times the offset of each point."""
+    both = terms[1]
+    return both[0], both[1]
+
+
+def _ends(loop: SampledLaw, first: bool, last: bool) -> list[tuple[float, float, int]]:
+    """Single poles at z = 1 and z = -1, each for one factor."""
+    one, found = np.ones(1), []
+    for angle, z, change in ((0.0, np.exp(1j * NEAR_ONE), -1 if first else 1), (math.pi, -1.0 + 0j, 1 if last else -1)):
+        A, B = loop.terms(np.array([z]), None, one)
+        ratio = B[0] / A[0] if A[0] else np.inf
+        if abs(ratio.imag) <= REAL * abs(ratio) < np.inf:
+            found.append((float(real_gain(A[0], B[0])), angle, change))
+    return found
+
+
+def stable_factors(loop: SampledLaw) -> list[Window]:
+    """Every open interval of positive factors on the law in which the loop is stable.
+
+    Where the count between crossings says so the poles themselves confirm it.
+    """
+    found = crossing_factors(loop)
+    edges = np.unique(np.r_[0.0, found.gain, math.inf])
+    edges = edges[np.r_[True, ~(np.diff(edges) <= SAME * edges[1:])]]
+    middles = np.r_[(edges[1:-1] + edges[:-2]) / 2, 2 * max(edges[-2], 1.0)]
+    stable = [i for i, middle in enumerate(middles) if loop.times(float(middle)).poles.is_stable]
+    return joined([(float(edges[i]), float(edges[i + 1])) for i in stable])

@@ -1,0 +1,88 @@
+"""The analog plant before any law: outputs by name, those along the link with their place, through their filters.
+
+Which have the anti-alias filter of the chain: strain, moment and shear, current, accelerations and rates, as they leave
+analog amplifiers.  Angles and displacements do not, nor does the hub's rate where it is the difference of an encoder.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tfarm.arm import Arm
+from tfarm.dsp.chain import Chain
+from tfarm.dsp.plant import Branching, Plant, undelayed_plant, with_filter, with_modes
+from tfarm.exact.outputs import Output
+from tfarm.records import record
+from tfarm.response.signals import Signals
+from tfarm.spectrum.damped import all_damped_modes
+
+AMPLIFIED = ("M", "Q", "strain", "current")  # what a strain gauge, a load cell or a shunt reads
+
+
+def is_analog(wanted: Output, chain: Chain) -> bool:
+    """Whether a signal passes the analog anti-alias filter of a chain."""
+    if wanted.quantity == "theta" and wanted.power and chain.converters.hub_rate == "difference":
+        return False
+    return wanted.quantity in AMPLIFIED or wanted.power > 0
+
+
+@dataclass(frozen=True)
+@record
+class SensedPlant:
+    """An arm's signals with `count` modes: one plant for each place that signals are read at, and all of it together.
+
+    `plants` are not filtered, one for each of `places` [share of the length].  Raises ParameterError as `Signals` does,
+    for a locked hub, and for an output that grows with s without bound.
+    """
+
+    read: Signals
+    chain: Chain
+    plants: tuple[Plant, ...]
+
+    @property
+    def together(self) -> Plant:
+        """All signals in the order of their names, through their analog filters."""
+        places = list(dict.fromkeys(self.read.places))
+        first, rows = self.plants[0], []
+        for wanted, place in zip(self.read.outputs, self.read.places, strict=True):
+            plant = self.plants[places.index(place)]
+            assert np.array_equal(plant.poles, first.poles)  # the poles are the arm's, wherever it is looked at
+            rows.append((plant, plant.outputs.index(wanted.name)))
+        whole = replace(
+            first,
+            outputs=self.read.names,
+            residues=np.array([plant.residues[n] for plant, n in rows]),
+            rigid=np.array([plant.rigid[n] for plant, n in rows]),
+            static=np.array([plant.static[n] for plant, n in rows]),
+        )
+        corner = self.chain.sampling.antialias_corner
+        analog = [n for n, each in enumerate(self.read.outputs) if is_analog(each, self.chain)]
+        return whole if math.isinf(corner) or not analog else with_filter(whole, analog, corner)
+
+    def with_modes(self, count: int, branches: Branching = all_damped_modes) -> SensedPlant:
+        """The same with another number of modes; no work where the models have as many."""
+        if count > self.plants[0].model.index.size:
+            return sensed_plant(self.read.arm, self.chain, self.read.names, count, branches)
+        damped = self.chain.actuator.hub_damping > 0
+        shorter = [
+            with_modes(each.model, self.chain, each.model.outputs[: -1 if damped else None], count)
+            for each in self.plants
+        ]
+        return replace(self, plants=tuple(shorter))
+
+
+def sensed_plant(
+    arm: Arm, chain: Chain, names: Sequence[str], count: int, branches: Branching = all_damped_modes
+) -> SensedPlant:
+    """The signals of that name with `count` flexible modes."""
+    read, plants = Signals(arm, tuple(names)), []
+    for share in dict.fromkeys(read.places):
+        here = zip(read.outputs, read.places, strict=True)
+        wanted = list(dict.fromkeys(each.name for each, place in here if place == share))
+        along = any(each.place == "x" for each in read.outputs if each.name in wanted)
+        plants.append(undelayed_plant(arm, chain, wanted, count, branches, share * arm.length if along else None))
+    return SensedPlant(read, chain, tuple(plants))

@@ -1,0 +1,122 @@
+"""Is the sampled loop of any linear law stable, and how much more gain and delay does it bear?"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from tfarm.arm import Arm
+from tfarm.arm.checks import whole as whole_number
+from tfarm.arm.feedback import through
+from tfarm.arm.law import Law
+from tfarm.dsp.band import Band
+from tfarm.dsp.chain import Chain
+from tfarm.dsp.discretise import rule_in_words
+from tfarm.dsp.law_circle import LawCircle
+from tfarm.dsp.law_loop import SampledLaw, sampled_law
+from tfarm.dsp.law_margins import stable_factors
+from tfarm.dsp.margins import DelayMargin, Window, around, delay_margin, whole
+from tfarm.dsp.verdict import MOST_ASKED, UNDAMPED_MODES, Verdict, settled
+from tfarm.records import record
+from tfarm.response.signals import Signals
+
+
+@dataclass(frozen=True)
+@record
+class LawAnalysis:
+    """What is said of a sampled loop under a law: its verdict, every interval of a factor on the whole law in which it
+    is stable, and the further delay that it bears; both of the loop with the modes of the verdict."""
+
+    verdict: Verdict[SampledLaw]
+    factors: list[Window]
+    delay_margin: DelayMargin
+
+    @property
+    def loop(self) -> SampledLaw:
+        """The loop of the verdict."""
+        return self.verdict.loop
+
+    @property
+    def gain_factors(self) -> Window | None:
+        """The interval around 1 in which a factor on the law may lie; None where the loop is not stable."""
+        return around(self.factors, 1.0)
+
+    @property
+    def rule(self) -> str:
+        """How the law came to be one in z."""
+        return rule_in_words(self.loop.asked)
+
+
+def law_verdict(arm: Arm, law: Law, chain: Chain | None = None, *, count: int | None = None) -> Verdict[SampledLaw]:
+    """The verdict, with `count` modes, or as many as it takes (C > 0), or the first 20 (C = 0): see `sampled_verdict`.
+
+    Raises ParameterError for what `sampled_law` refuses and a count outside 1..400.
+    """
+    chain = Chain() if chain is None else chain
+    if count is not None:
+        words = f"a whole number of flexible modes from 1 to {MOST_ASKED}"
+        count = whole_number("modes", count, 1, MOST_ASKED, words)
+        return Verdict(sampled_law(arm, law, chain, count=count))
+    if arm.has_elastic_link:
+        return Verdict(sampled_law(arm, law, chain, count=UNDAMPED_MODES))
+    small = sampled_law(arm, law, chain, count=1)
+    return settled(whole(arm, small.chain, small.with_modes), _outside)
+
+
+def _outside(band: Band[SampledLaw]) -> int | None:
+    """Poles of a band's loop outside the unit circle, proven."""
+    return LawCircle(band.loop, band.kept, band.missing).outside()
+
+
+def analyse_law(arm: Arm, law: Law, chain: Chain | None = None, *, count: int | None = None) -> LawAnalysis:
+    """Verdict, stable factors on the law, and delay margin.  Raises ParameterError as `law_verdict` does."""
+    verdict = law_verdict(arm, law, chain, count=count)
+    return LawAnalysis(verdict, stable_factors(verdict.loop), delay_margin(verdict.loop))
+
+
+def law_answer(analysis: LawAnalysis) -> dict[str, Any]:
+    """The analysis as a dictionary of plain numbers, texts and lists."""
+    verdict, loop = analysis.verdict, analysis.loop
+    sampling, bound = loop.chain.sampling, analysis.delay_margin
+    return {
+        "arm": loop.plant.arm.name,
+        **described_law(loop.asked, loop),
+        "period_s": sampling.period,
+        "delay_samples": sampling.delay_samples,
+        "verdict": verdict.word,
+        "verdict_in_words": verdict.sentence,
+        "stable": verdict.is_stable,
+        "spectral_radius": math.exp(verdict.log_radius),
+        "log_spectral_radius": verdict.log_radius,
+        "unstable_poles": int((loop.poles.log_radius > 0).sum()),
+        "nearest": verdict.slowest,
+        "modes_used": verdict.modes_used,
+        "settled": verdict.is_settled,
+        "band_rad_s": verdict.band_rad_s,
+        "free_hub_angle": loop.has_free_angle,
+        "stable_gain_factors": [list(window) for window in analysis.factors],
+        "gain_factors": None if analysis.gain_factors is None else list(analysis.gain_factors),
+        "delay_margin_samples": bound.samples,
+        "delay_margin_s": bound.samples * sampling.period,
+        "delay_margin_is_lower_bound": bound.is_bound,
+        "unfiltered_signals": [name for name, analog in zip(loop.law.signals, loop.analog, strict=True) if not analog],
+    }
+
+
+def described_law(law: Law, loop: SampledLaw) -> dict[str, Any]:
+    """The law as it was given, how it is sampled, and what it reads and drives."""
+    units = Signals(loop.plant.arm, law.signals).units
+    sign, late = "-" if law.sign < 0 else "+", f", {law.delay:g} s late" if law.delay else ""
+    arm = loop.plant.arm
+    words = f"v = {sign}sum of C_i(z) y_i{late}; v is {through(arm)}, y = ({', '.join(law.signals)})"
+    return {
+        "law": law.name,
+        "signals": dict(zip(law.signals, units, strict=True)),
+        "law_order": law.order,
+        "delay_s": law.delay,
+        "rule": "none" if law.is_discrete else law.rule,
+        "rule_in_words": rule_in_words(law),
+        "sign_convention": words,
+        "input": arm.input,
+    }
