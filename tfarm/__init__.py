@@ -36,10 +36,9 @@ if TYPE_CHECKING:
     from tfarm.dsp.results import simulate
     from tfarm.errors import CertificationError, ConvergenceError, ParameterError
     from tfarm.exact.outputs import Output
-    from tfarm.loop.closed import closed_loop_poles, margins
+    from tfarm.loop.closed import closed_loop_poles, margins, nyquist
     from tfarm.loop.design import design
     from tfarm.loop.locus import locus
-    from tfarm.loop.nyquist import nyquist
     from tfarm.loop.regions import region as map
     from tfarm.loop.spill import spill
     from tfarm.reduced import reduce
@@ -91,7 +90,7 @@ _ROOMS = {  # where a name stands; what it is called there after a colon, if not
     "bode": "response",
     "design": "loop.design",
     "locus": "loop.locus",
-    "nyquist": "loop.nyquist",
+    "nyquist": "loop.closed",
     "closed_loop_poles": "loop.closed",
     "damped_modes": "spectrum",
     "default_gains": "spectrum.scales",

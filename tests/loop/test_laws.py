@@ -251,3 +251,30 @@ def test_spill_is_a_command(capsys, tmp_path):
     answer = json.loads(out)
     assert [row["unstable"] for row in answer["models"]] == [0] * 20
     assert answer["stable"]
+
+
+UNSTABLE = {"hub_angle": {"zeros": [-3.0], "poles": [4.0, -60.0], "gain": 900.0}, "hub_rate": 0.5}
+
+
+@pytest.mark.parametrize(
+    ("arm", "law"),
+    [
+        (LAB, Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0])}, delay=0.002)),
+        (LAB, Law(UNSTABLE)),
+        (BARE, Law({"hub_rate": 0.3, "tip_acceleration": ([0.05], [0.02, 1.0])})),
+        (BARE, with_a_notch()),
+        (LAB, Law({"hub_rate": ([0.3, 0.0], [1.0, 0.0, 900.0]), "root_moment": 0.2})),  # poles of the law on the axis
+    ],
+    ids=["PD", "unstable by itself", "acceleration", "notch", "resonant"],
+)
+def test_turns_around_the_point_are_the_poles_that_were_found(arm, law):
+    plot = tfarm.nyquist(arm, law)
+    assert plot.expected == plot.verdict.unstable_roots
+    assert plot.unstable_open == (law.poles.real > 0).sum()
+    assert plot.encirclements == plot.unstable_open - plot.expected
+    assert np.isfinite(plot.L[~plot.is_arc]).all()
+
+
+def test_a_nyquist_plot_of_a_law_can_be_drawn():
+    ax = tfarm.plots.nyquist(tfarm.nyquist(LAB, Law(UNSTABLE, name="unstable by itself")))
+    assert "unstable by itself" in ax.get_title()

@@ -17,10 +17,11 @@ from tfarm.dsp.chain import Sampling
 from tfarm.dsp.loop import sampled_loop
 from tfarm.errors import ConvergenceError
 from tfarm.loop import edges
+from tfarm.loop.closed import nyquist
 from tfarm.loop.damping import least_damping
 from tfarm.loop.edges import Axis, moment_axis, rate_axis, stable_edge
 from tfarm.loop.loci import loci, shown
-from tfarm.loop.nyquist import compressed, nyquist, nyquist_of
+from tfarm.loop.nyquist import compressed, nyquist_of
 from tfarm.loop.plant import Loop
 from tfarm.loop.poles import closed_loop_poles
 from tfarm.loop.stability import stability

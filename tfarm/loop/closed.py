@@ -13,8 +13,10 @@ from .law_poles import law_poles
 from .law_stability import is_quiet_above, law_stability
 from .margins import Margins, loop_margins
 from .margins import margins as margins_of_gains
+from .nyquist import Nyquist, nyquist_of
 from .poles import Poles
 from .poles import closed_loop_poles as poles_of_gains
+from .stability import stability
 
 
 def closed_loop_poles(arm: Arm, law: AnyLaw, count: int | None = None) -> Poles | Poles[LawLoop]:
@@ -43,3 +45,13 @@ def margins(arm: Arm, law: AnyLaw, band: float | None = None) -> Margins | Margi
     if arm.least_damping and is_quiet_above(verdict.loop, verdict.band):
         return Margins(verdict, {}, found, found.delay, found.disk, found.peak_sensitivity)
     return Margins(verdict, {}, found, None, None, None)
+
+
+def nyquist(arm: Arm, law: AnyLaw) -> Nyquist | Nyquist[LawLoop]:
+    """The loop function of a law on Nyquist's contour, its turns around -1 counted up to the verdict's band.
+
+    Raises what the verdict raises, and ConvergenceError where the curve passes -1 so close that its turns cannot be
+    counted, or where the two counts differ.
+    """
+    arm, law = through(arm, law)
+    return nyquist_of(stability(arm, law)) if isinstance(law, HubFeedback) else nyquist_of(law_stability(arm, law))

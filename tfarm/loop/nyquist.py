@@ -9,26 +9,27 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Generic
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, HubFeedback
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
 from tfarm.spectrum import flexible_frequencies
 
 from .frequencies import band_of, grid
+from .law_loop import LawLoop
 from .plant import Loop
-from .poles import ON_AXIS, counted
-from .stability import Stability, stability
+from .poles import ON_AXIS, AnyLoop, counted
+from .stability import Stability
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 INDENT = 0.05  # radius of a semicircle around a pole of L, in units of its residue: |L| is about 20 on it
 NEARER = 0.1  # of the way to the nearest closed-loop pole: no step past a pole of L leaves an unstable one out
+BESIDE = np.linspace(-4.0, 4.0, 41)  # points around a pole of the law, in its distances from the axis
 SLOW = 200  # points between that and the arm's own grid
 EDGE = 750  # points along an edge of the box, to begin with
 ARC = np.linspace(-math.pi / 2, math.pi / 2, 41)
@@ -39,11 +40,12 @@ ROUNDS = 24  # of halving where it turns more
 
 @dataclass(frozen=True)
 @record
-class Nyquist:
+class Nyquist(Generic[AnyLoop]):
     """L on the contour for Im s >= 0: `s` (n,), `L` (n,), `is_arc` where the contour passes a pole on the axis.
 
     `poles` [rad/s] are those of L on the axis, `encirclements` of -1 by the whole contour, counter-clockwise positive,
-    `verdict` what the poles say, counted in a box without this contour.
+    `verdict` what the poles say, counted in a box without this contour.  `unstable_open` poles of L lie inside the
+    contour: those of a law that is not stable by itself.
     """
 
     s: Complex
@@ -51,7 +53,8 @@ class Nyquist:
     is_arc: NDArray[np.bool_]
     poles: Real
     encirclements: int
-    verdict: Stability
+    verdict: Stability[AnyLoop]
+    unstable_open: int = 0
 
     @property
     def on_axis(self) -> int:
@@ -69,15 +72,10 @@ class Nyquist:
     @property
     def expected(self) -> int:
         """Unstable closed-loop poles by Nyquist's criterion."""
-        return -self.encirclements
+        return self.unstable_open - self.encirclements
 
 
-def nyquist(arm: Arm, law: HubFeedback) -> Nyquist:
-    """The loop function of a law on Nyquist's contour, its turns around -1 counted (see `nyquist_of`)."""
-    return nyquist_of(stability(arm, law))
-
-
-def nyquist_of(verdict: Stability) -> Nyquist:
+def nyquist_of(verdict: Stability[AnyLoop]) -> Nyquist[AnyLoop]:
     """The same for a verdict, its encirclements counted up to the verdict's band.
 
     The contour goes around the right part of the verdict's box, so both counts are of one region.  Raises
@@ -89,7 +87,8 @@ def nyquist_of(verdict: Stability) -> Nyquist:
     corner = complex(verdict.poles.box.re_max, band)
     across, down = np.linspace(1j * band, corner, EDGE), np.linspace(corner, corner.real, EDGE)
     turned = turning(loop, np.r_[s, across[1:], down[1:]])
-    plot = Nyquist(s, loop.loop_function(s), is_arc, poles, round(turned / math.pi), verdict)
+    inside = _inside(loop, band)
+    plot = Nyquist(s, loop.loop_function(s), is_arc, poles, round(turned / math.pi), verdict, inside)
     found = min(plot.clear, verdict.unstable_roots)
     if not found <= plot.expected <= found + plot.on_axis:
         text = (
@@ -99,19 +98,38 @@ def nyquist_of(verdict: Stability) -> Nyquist:
     return plot
 
 
-def poles_on_axis(loop: Loop, band: float) -> Real:
-    """Poles of L on the imaginary axis [rad/s], from 0 up: the rigid body's, and at C = 0 every natural frequency."""
-    arm, law = loop.arm, loop.law
-    zero = [0.0] if arm.has_rigid_mode and (law.K1 or law.Kp) else []
-    return np.r_[zero, flexible_frequencies(arm, band)] if arm.is_undamped else np.array(zero)
+def _inside(loop: Loop | LawLoop, band: float) -> int:
+    """Poles of L right of the axis below the band: those of a law that is not stable by itself."""
+    own = loop.law.poles if isinstance(loop, LawLoop) else np.empty(0, complex)
+    return int(((own.real > 0) & (abs(own.imag) < band)).sum())
 
 
-def upper_contour(loop: Loop, poles: Real, band: float, closed: Complex) -> tuple[Complex, NDArray[np.bool_]]:
+def poles_on_axis(loop: Loop | LawLoop, band: float) -> Real:
+    """Poles of L on the imaginary axis [rad/s], from 0 up: the rigid body's, and at C = 0 every natural frequency.
+
+    A law may have some of its own.
+    """
+    arm = loop.arm
+    flexible = np.asarray(flexible_frequencies(arm, band)) if arm.is_undamped else np.empty(0)
+    if isinstance(loop, LawLoop):
+        own = loop.law.poles
+        ringing = own.imag[(own.real == 0) & (own.imag > 0) & (own.imag < band)]
+        integrators = loop.k.at_rest + int((own == 0).sum())
+        return np.unique(np.r_[[0.0] * (integrators > loop.zeros_at_origin), flexible, ringing])
+    zero = [0.0] if arm.has_rigid_mode and (loop.law.K1 or loop.law.Kp) else []
+    return np.r_[zero, flexible]
+
+
+def upper_contour(loop: Loop | LawLoop, poles: Real, band: float, closed: Complex) -> tuple[Complex, NDArray[np.bool_]]:
     """From s = 0 (or right of it, where a pole is) up the axis to the band, past each pole on its right.
 
     `closed` are the closed loop's poles: each step past a pole of L goes nearer to it than the nearest of them.
     """
     omega = np.asarray(grid(loop.arm, band))
+    if isinstance(loop, LawLoop):
+        own = loop.law.poles[loop.law.poles.imag > 0]
+        near = (own.imag[:, None] + abs(own.real)[:, None] * BESIDE).ravel()
+        omega = np.unique(np.r_[omega, near[(near > omega[0]) & (near < band)]])
     s, is_arc = 1j * omega, np.zeros(omega.size, bool)
     for pole in poles:
         radius = indentation(loop, float(pole))
@@ -130,7 +148,7 @@ def upper_contour(loop: Loop, poles: Real, band: float, closed: Complex) -> tupl
     return s[order], is_arc[order]
 
 
-def smooth(loop: Loop, s: Complex, is_arc: NDArray[np.bool_]) -> tuple[Complex, NDArray[np.bool_]]:
+def smooth(loop: Loop | LawLoop, s: Complex, is_arc: NDArray[np.bool_]) -> tuple[Complex, NDArray[np.bool_]]:
     """More points on the axis wherever the drawn curve would have corners."""
     for _ in range(ROUNDS):
         length = abs(np.diff(compressed(loop.loop_function(s))))
@@ -142,7 +160,7 @@ def smooth(loop: Loop, s: Complex, is_arc: NDArray[np.bool_]) -> tuple[Complex, 
     return s, is_arc
 
 
-def indentation(loop: Loop, pole: float) -> float:
+def indentation(loop: Loop | LawLoop, pole: float) -> float:
     """The radius at which |L| is about 20, and at most a thousandth of the pole's frequency (at 0: of the first)."""
     scale = pole or band_of(loop.arm, 1)
     step = 1e-6 * scale
@@ -150,7 +168,7 @@ def indentation(loop: Loop, pole: float) -> float:
     return min(INDENT * float(abs(loop.loop_function(near)[0])) * step, 1e-3 * scale)
 
 
-def turning(loop: Loop, path: Complex) -> float:
+def turning(loop: Loop | LawLoop, path: Complex) -> float:
     """By how much [rad] the argument of 1 + L grows along a path, halved where it turns fast."""
     value = 1 + loop.loop_function(path)
     for _ in range(ROUNDS):

@@ -24,7 +24,7 @@ RINGS = (0.1, 0.3, 1.0, 3.0, 10.0)  # |L| of the rings
 RING, LAST, STEP = 1.04, 1.2, 0.03  # radius of the first arc at infinity, of the last at most, from one to the next
 
 
-def nyquist(data: Nyquist, *, ax: Axes | None = None, name: str = "") -> Axes:
+def nyquist(data: Nyquist[Any], *, ax: Axes | None = None, name: str = "") -> Axes:
     """L on Nyquist's contour (what `tfarm.nyquist` returns), verdict and encirclements above it; the axes.
 
     A size r of L is drawn as r/(1 + r): the rim is infinity, -1 lies half way.  `name`: what the law is called.
@@ -75,7 +75,7 @@ def _disc(ax: Axes) -> None:
     ax.spines[:].set_visible(False)
 
 
-def _curve(data: Nyquist, ax: Axes) -> None:
+def _curve(data: Nyquist[Any], ax: Axes) -> None:
     """Along the axis as a line, past each pole as an arc beyond the rim, arrows with rising frequency."""
     z = compressed(data.L)
     turn = np.flatnonzero(np.diff(data.is_arc.astype(int))) + 1
@@ -105,7 +105,7 @@ def arc_on_ring(L: Complex, radius: float) -> Complex:
     return np.asarray(radius * np.exp(1j * fine))
 
 
-def _arrows(data: Nyquist, z: Complex) -> list[NDArray[np.int64]]:
+def _arrows(data: Nyquist[Any], z: Complex) -> list[NDArray[np.int64]]:
     """Short pieces of the curve to bear arrows: an eighth, two fifths and three quarters of its drawn length on."""
     (along,) = np.nonzero(~data.is_arc)
     length = np.r_[0.0, np.cumsum(abs(np.diff(z[along])))]
@@ -125,7 +125,7 @@ def _arrow(piece: Complex, ax: Axes) -> None:
     )  # fmt: skip
 
 
-def _headings(name: str, data: Nyquist, ax: Axes) -> None:
+def _headings(name: str, data: Nyquist[Any], ax: Axes) -> None:
     """The verdict and the count above each disc."""
     verdict = data.verdict
     ax.set_title(

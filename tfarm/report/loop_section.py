@@ -11,7 +11,8 @@ from tfarm.digits import counted, plain, significant
 from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError
 from tfarm.loop.edges import DEEPEST
-from tfarm.loop.nyquist import Nyquist, nyquist, nyquist_of
+from tfarm.loop.nyquist import Nyquist, nyquist_of
+from tfarm.loop.stability import stability
 from tfarm.loop.windows import Windows
 from tfarm.plots.disc import draw_nyquist
 from tfarm.report.loop_laws import (
@@ -253,7 +254,7 @@ def _to_compare(arm: Arm) -> list[Curve]:
         else replace(law, K1=float(f"{-law.K1 / 10:.3g}"))
     )
     try:
-        return [Curve(NamedLaw(COMPARED, "unstable", drives), nyquist(arm, drives))]
+        return [Curve(NamedLaw(COMPARED, "unstable", drives), nyquist_of(stability(arm, drives)))]
     except ConvergenceError:
         return []
 
