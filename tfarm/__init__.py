@@ -37,7 +37,6 @@ if TYPE_CHECKING:
     from tfarm.errors import CertificationError, ConvergenceError, ParameterError
     from tfarm.exact.outputs import Output
     from tfarm.loop.closed import closed_loop_poles, margins, nyquist
-    from tfarm.loop.design import design
     from tfarm.loop.locus import locus
     from tfarm.loop.regions import region as map
     from tfarm.loop.spill import spill
@@ -45,6 +44,7 @@ if TYPE_CHECKING:
     from tfarm.response import bode, transfer
     from tfarm.spectrum import damped_modes, modes
     from tfarm.spectrum.scales import default_gains
+    from tfarm.synthesis.design import design
     from tfarm.tuner import tune
 
 __version__ = "0.1.0"
@@ -88,7 +88,7 @@ __all__ = [
 
 _ROOMS = {  # where a name stands; what it is called there after a colon, if not the same
     "bode": "response",
-    "design": "loop.design",
+    "design": "synthesis.design",
     "locus": "loop.locus",
     "nyquist": "loop.closed",
     "closed_loop_poles": "loop.closed",

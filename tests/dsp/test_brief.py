@@ -2,13 +2,11 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
-from scipy.linalg import expm
 
 import tfarm
-from tests.loop.ritz_loop import RitzLoop
 from tests.shell import answer, run
+from tests.synthesis.held_loop import HeldLoop
 from tfarm import HubFeedback
 from tfarm.arm import to_toml
 from tfarm.dsp import Chain
@@ -18,39 +16,25 @@ from tfarm.dsp.chain import Sampling
 LAB = tfarm.load("sasaki2012-lab")
 
 
-def held_radius(arm, law, period):
-    """The spectral radius of the Ritz model under a torque that is held from sample to sample."""
-    model = RitzLoop(arm, 12)
-    A, n = model.state_matrix(HubFeedback()), model.n
-    torque = np.zeros(len(A))
-    torque[n : 2 * n] = np.linalg.solve(model.M, model.b)
-    torque[-1] = (model.inertia * model.b @ torque[n : 2 * n] - 1) / model.damping
-    whole = np.zeros((len(A) + 1,) * 2)
-    whole[:-1, :-1], whole[:-1, -1] = A, torque
-    step = expm(whole * period)
-    rate, moment = np.zeros(len(A)), np.eye(len(A))[-1]
-    rate[n : 2 * n] = model.b
-    z = np.linalg.eigvals(step[:-1, :-1] - np.outer(step[:-1, -1], law.K1 * rate + law.K2 * moment))
-    return float(abs(z[abs(z - 1) > 1e-7]).max())  # z = 1 is the hub angle, which nothing regulates
-
-
 @pytest.mark.parametrize(
     ("K1", "K2", "period"), [(26.0, -3.0, 0.01), (20.0, -0.5, 0.01), (20.0, -0.5, 5e-4), (0.3, 0.3, 0.01)]
 )
 def test_the_radius_is_that_of_an_independent_model(K1, K2, period):
     law = HubFeedback(K1=K1, K2=K2)
     brief = sampled_brief(LAB, law, Chain(sampling=Sampling(period=period))).answer
-    radius = held_radius(LAB, law, period)
+    radius = HeldLoop(LAB, period).radius(law)
     assert brief["spectral_radius"] == pytest.approx(radius, rel=1e-5)  # of 12 Ritz modes
     assert brief["stable"] == (radius < 1)
 
 
 def test_gains_that_fail_when_sampled_are_not_recommended_without_a_word(capsys):
     """At 10 ms, which no file of a preset says and which is said to be a default."""
-    found = answer(capsys, "design", "sasaki2012-lab")["sampled"]
+    found = answer(capsys, "design", "sasaki2012-lab", "--continuous")["sampled"]
     assert (found["period_s"], found["period_is_default"], found["stable"]) == (0.01, True, False)
     assert found["spectral_radius"] > 2
-    _, out, _ = run(capsys, "design", "sasaki2012-lab")
+    _, out, _ = run(capsys, "design", "sasaki2012-lab", "--continuous")
+    assert "objective damping of the continuous loop" in out
+    assert "the bounds of K2 were widened to (" in out
     assert "BUT sampled every 10 ms (tfarm's default period) these gains are UNSTABLE: mode" in out
 
 

@@ -319,7 +319,7 @@ class Design:
     )
 
     def arguments(self, case):
-        return ["--objective", "damping"]
+        return ["--objective", "damping", "--continuous"]
 
     def judge(self, case, models, ran):
         judged, answer = Judged(), ran.answer

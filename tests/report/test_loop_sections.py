@@ -13,6 +13,7 @@ from tests.loop.nyquist_counts import survey
 from tests.report.coarse import coarsen
 from tfarm.arm import Hub, HubFeedback, many_laws
 from tfarm.dsp import Chain
+from tfarm.dsp.brief import sampled_brief
 from tfarm.dsp.chain import Sampling
 from tfarm.dsp.loop import sampled_loop
 from tfarm.errors import ConvergenceError
@@ -29,10 +30,10 @@ from tfarm.plots.plane import nice_levels
 from tfarm.plots.roots import zoomed
 from tfarm.report import loop_laws, loop_section, map, write, writing
 from tfarm.report.locus_section import beyond_table
-from tfarm.report.loop_laws import NamedLaw, has_loop, margins_of
+from tfarm.report.loop_laws import NamedLaw, has_loop, laws, margins_of
 from tfarm.report.loop_section import map_section, margins_section
 from tfarm.report.map import draw_map, gain_map, map_data
-from tfarm.report.margins_table import NOTHING, margin_table
+from tfarm.report.margins_table import NOTHING, margin_table, verdict_facts
 from tfarm.spectrum.scales import PAPER_GAINS, default_gains, rate_unit
 from tfarm.tables.files import as_json
 
@@ -60,7 +61,7 @@ def coarse():
     That takes longest and has its own tests.
     """
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(map, "best", lambda arm: None)
+        patch.setattr(map, "best", lambda arm, chain: None)
         coarsen(patch.setattr)
         return map_section(PURE)
 
@@ -290,7 +291,7 @@ def test_the_map_says_what_is_proven(coarse, section):
 
 
 def test_the_sign_convention_stands_wherever_K2_does(coarse, monkeypatch):
-    monkeypatch.setattr(loop_laws, "best", lambda arm: None)
+    monkeypatch.setattr(loop_laws, "best", lambda arm, chain: None)
     for section in (coarse, margins_section(PURE)):
         texts = [*section.words, *(block.caption for block in section.blocks)]
         assert any("Sign of K2" in text for text in texts)
@@ -314,17 +315,20 @@ def test_the_sampled_edge_on_the_map_is_where_a_pole_meets_the_circle(lab):
         assert min(outside) > 0
 
 
-def test_the_star_and_its_card_say_that_the_gains_do_not_hold_when_sampled(lab, section):
-    """Best damping without a clock is unstable at 10 ms and stable at 0.2 ms; the page says each at its own clock."""
-    assert [brief.is_stable for brief in lab.briefs] == [True, False]
+def test_the_star_holds_at_the_clock_of_its_page(lab, section):
+    """The best gains of a page are those of its own chain, and stable there; a law that is not says so in its card."""
+    assert [brief.is_stable for brief in lab.briefs] == [True, True]
     labels = [text.get_text() for text in draw_map(lab).legends[0].get_texts()]
-    assert any(label.startswith("best damping") and "UNSTABLE when sampled every 10 ms" in label for label in labels)
-    assert any(label.startswith("stable when sampled every 10 ms") for label in labels)
-    assert any("But sampled every 10 ms (tfarm's default period) these gains are UNSTABLE" in w for w in section.words)
+    assert any(label.startswith("best damping") and "stable when sampled every 10 ms" in label for label in labels)
+    assert any("Sampled every 10 ms (tfarm's default period) these gains are stable" in w for w in section.words)
     facts = margins_section(LAB).facts
-    assert [fact.beside.endswith("UNSTABLE when sampled every 10 ms") for fact in facts] == [False, True]
-    quick = margins_section(LAB, Chain(sampling=Sampling(period=2e-4))).facts
-    assert all(fact.beside.endswith("; stable when sampled every 0.2 ms") for fact in quick)
+    assert all(fact.beside.endswith("; stable when sampled every 10 ms") for fact in facts)
+    quick = Chain(sampling=Sampling(period=2e-4))
+    assert all(fact.beside.endswith("; stable when sampled every 0.2 ms") for fact in margins_section(LAB, quick).facts)
+    assert laws(LAB, quick)[1].law.K1 > laws(LAB, Chain())[1].law.K1
+    lost = NamedLaw("best without a clock", "best", HubFeedback(K1=26.0, K2=-3.0))
+    (fact,) = verdict_facts([lost], [margins_of(LAB, lost.law)], [sampled_brief(LAB, lost.law, Chain())])
+    assert fact.beside.endswith("UNSTABLE when sampled every 10 ms")
     assert set(map_data(lab).columns[0].values) == {"grid", "boundary", "sampled boundary"}
 
 

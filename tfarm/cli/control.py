@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
@@ -156,23 +156,24 @@ def design(
     k2: Annotated[str | None, typer.Option("--K2", metavar="LO,HI", help="bounds of K2")] = None,
     kp: Kp = 0.0,
     modes: Annotated[str, typer.Option("--modes", help="flexible modes in the band, 1 to 30")] = "2",
+    continuous: Annotated[bool, typer.Option("--continuous", help="for the continuous loop, without a clock")] = False,
     period: Period = None,
     delay_samples: Delay = None,
     dsp: DspFile = None,
     json: Json = False,
 ) -> None:
-    """The gains that serve an objective best, by the exact loop; and whether they hold when it is sampled."""
+    """The gains that serve an objective best in the sampled loop, at the file's period or else 10 ms."""
     number, subject = whole("--modes", modes, 1, 30), load_arm(arm)
     chain = chain_of(dsp or arm, period, delay_samples)
     limits = {name: None if text is None else bounds(f"--{name}", text) for name, text in (("K1", k1), ("K2", k2))}
     from tfarm.cli.control_tables import print_design
-    from tfarm.dsp.brief import sampled_brief
-    from tfarm.loop.answers import design_answer
-    from tfarm.loop.design import design as find_gains
+    from tfarm.synthesis.answers import design_answer
+    from tfarm.synthesis.design import design as find_gains
 
-    found = find_gains(subject, objective, Kp=kp, modes=number, **limits)  # type: ignore[arg-type]
-    sampled = {"sampled": sampled_brief(subject, found.law, chain).answer}
-    give(design_answer(found) | sampled, json, print_design)
+    found = find_gains(
+        subject, cast("Any", objective), Kp=kp, modes=number, chain=chain, continuous=continuous, **limits
+    )
+    give(design_answer(found), json, print_design)
 
 
 def bounds(key: str, text: str) -> tuple[float, float]:

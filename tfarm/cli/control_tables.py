@@ -131,7 +131,8 @@ def write_law_map(answer: dict[str, Any], path: Path) -> None:
 
 def print_design(answer: dict[str, Any]) -> None:
     """The gains and what they reach."""
-    print(f"{answer['arm']}, objective {answer['objective']}, {answer['modes']} modes in the band: {answer['verdict']}")
+    loop = f"the {answer['designed_for']} loop, {answer['modes']} modes in the band"
+    print(f"{answer['arm']}, objective {answer['objective']} of {loop}: {answer['verdict']} without a clock")
     units = {name: "" if unit == "1" else f" {unit}" for name, unit in answer["gain_units"].items()}
     law = f"K1 = {answer['K1']:.6g}{units['K1']}, K2 = {answer['K2']:.6g}{units['K2']}, Kp = {answer['Kp']:.6g}"
     print(f"{law}: {answer['value']:.6g}")
@@ -139,8 +140,14 @@ def print_design(answer: dict[str, Any]) -> None:
     warning = "" if sampled["stable"] else "BUT "
     print(f"{warning}{sampled['in_words']}")
     print(f"within one per cent of it: K1 {_pair(answer['flat_K1'])}, K2 {_pair(answer['flat_K2'])}")
-    if answer["at_bound"]:
-        ends = [f"{name} = {answer[name]:.6g} of {_pair(answer['bounds'][name])}" for name in answer["at_bound"]]
+    for name in answer["widened"]:
+        wider = _pair(answer["bounds"][name])
+        print(f"the bounds of {name} were widened to {wider}: the best gains lay on the first ones")
+    for name in answer["at_limit"]:
+        print(f"{name} = {answer[name]:.6g} is at the physical end of {_pair(answer['bounds'][name])}")
+    cut = [name for name in answer["at_bound"] if name not in answer["at_limit"]]
+    if cut:
+        ends = [f"{name} = {answer[name]:.6g} of {_pair(answer['bounds'][name])}" for name in cut]
         print(f"no optimum: {' and '.join(ends)} is where the search was cut off; it may get better beyond")
     print(answer["sign_convention"])
 

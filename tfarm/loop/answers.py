@@ -13,7 +13,6 @@ from tfarm.digits import general, plain, singly, within
 from tfarm.response.signals import Signals
 from tfarm.spectrum.answers import HELD
 
-from .design import Design
 from .law_loop import LawLoop
 from .law_stability import signs_of_loop
 from .lyapunov import lyapunov
@@ -235,21 +234,4 @@ def map_answer(found: Region) -> dict[str, Any]:
         "unstable_roots": rows,
         "boundary": inside,
         "band_rad_s": found.band,
-    }
-
-
-def design_answer(found: Design) -> dict[str, Any]:
-    """The gains, what they reach, the verdict, and how flat the optimum is."""
-    law, bounds = found.law, found.bounds
-    return {
-        "arm": found.verdict.loop.arm.name,
-        "objective": found.objective,
-        **law_answer(law, found.verdict.loop.arm),
-        "value": found.value,
-        "verdict": found.verdict.verdict,
-        "modes": found.modes,
-        "bounds": {name: list(pair) for name, pair in bounds.items()},
-        "at_bound": list(found.at_bound),
-        "flat_K1": list(found.flat_K1),
-        "flat_K2": list(found.flat_K2),
     }

@@ -11,10 +11,10 @@ from tfarm.digits import significant
 from tfarm.dsp import Chain
 from tfarm.dsp.brief import SampledBrief, sampled_brief
 from tfarm.errors import ConvergenceError
-from tfarm.loop.design import Design, design
 from tfarm.loop.margins import Margins, margins
 from tfarm.plots.words import gains_words
 from tfarm.spectrum.scales import default_gains
+from tfarm.synthesis.design import Design, design
 
 MODES = 2  # flexible modes in the band of the damping that is drawn and designed for, as `tfarm design` has it
 SIGN = (
@@ -78,12 +78,12 @@ def edge_of_K2(arm: Arm, law: HubFeedback) -> float | None:
 
 
 @lru_cache(maxsize=16)
-def best(arm: Arm) -> Design | None:
-    """What `tfarm design ARM` finds; None where no gains within its bounds are stable, or where K2 has no place."""
+def best(arm: Arm, chain: Chain) -> Design | None:
+    """What `tfarm design ARM` finds; None where no gains within its bounds hold, or where K2 has no place."""
     if not has_loop(arm):
         return None
     try:
-        return design(arm, modes=MODES)
+        return design(arm, modes=MODES, chain=chain)
     except ConvergenceError:
         return None
 
@@ -100,8 +100,8 @@ def margins_of(arm: Arm, law: HubFeedback) -> Margins:
     return margins(arm, law)
 
 
-def laws(arm: Arm) -> tuple[NamedLaw, ...]:
-    """The default gains, and the best ones if there are any."""
-    found = best(arm)
+def laws(arm: Arm, chain: Chain) -> tuple[NamedLaw, ...]:
+    """The default gains, and the best ones at the clock of a chain if there are any."""
+    found = best(arm, chain)
     default = NamedLaw("default gains", "default", default_gains(arm))
     return (default,) if found is None else (default, NamedLaw("best damping", "best", found.law))

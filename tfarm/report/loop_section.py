@@ -152,16 +152,18 @@ def _best_words(data: GainMap) -> str:
     found = data.design
     if found is None:
         return ""
-    cut = " and ".join(f"{name} = {plain(getattr(found.law, name), 4)}" for name in found.at_bound)
+    cut = " and ".join(
+        f"{name} = {plain(getattr(found.law, name), 4)}" for name in found.at_bound if name not in found.at_limit
+    )
     brief = data.briefs[-1]
     words = typeset(brief.words)
     sampled = f"{words[0].upper()}{words[1:]}" if brief.is_stable else f"But {words}"
     edge = f" That is no optimum: the dotted frame cuts the search off at {cut}, and there is more beyond." * bool(cut)
     return (
-        f"The best damping of the first {MODES} modes within the dotted frame is {significant(100 * found.value, 3)} % "
-        f"of critical, at K1 = {significant(found.law.K1, 4)}{written_unit('K1', data.arm)} and "
-        f"K2 = {significant(found.law.K2, 4)}{written_unit('K2', data.arm)} "
-        f"(tfarm design), a continuous loop that is {found.verdict.verdict}.{edge}"
+        f"The best damping of the first {MODES} modes that the sampled loop holds within the dotted frame is "
+        f"{significant(100 * found.value, 3)} % of critical, at K1 = {significant(found.law.K1, 4)}"
+        f"{written_unit('K1', data.arm)} and K2 = {significant(found.law.K2, 4)}{written_unit('K2', data.arm)} "
+        f"(tfarm design), without a clock {found.verdict.verdict}.{edge}"
         f" {sampled}."
     )
 
@@ -206,7 +208,7 @@ def proof_words(arm: Arm) -> str:
 def margins_section(arm: Arm, chain: Chain | None = None) -> Section:
     """The verdict on each law, continuous and at the chain's clock, then its margins."""
     chain = Chain() if chain is None else chain
-    named = laws(arm)
+    named = laws(arm, chain)
     found = [margins_of(arm, each.law) for each in named]
     return Section(
         anchor="margins",
@@ -220,9 +222,9 @@ def margins_section(arm: Arm, chain: Chain | None = None) -> Section:
 # ------------------------------------------------------------ Nyquist
 
 
-def nyquist_section(arm: Arm) -> Section:
+def nyquist_section(arm: Arm, chain: Chain | None = None) -> Section:
     """The loop function on a contour that hides nothing."""
-    named = laws(arm)
+    named = laws(arm, Chain() if chain is None else chain)
     plots = [Curve(each, nyquist_of(margins_of(arm, each.law).stability)) for each in named]
     counted = [*plots, *_to_compare(arm)]
     picture = Picture(

@@ -18,7 +18,6 @@ from tfarm.dsp.brief import SampledBrief
 from tfarm.dsp.regions import ends_of_K1, with_both_sides
 from tfarm.errors import ConvergenceError
 from tfarm.loop.damping import least_damping
-from tfarm.loop.design import Design
 from tfarm.loop.edges import Axis, edge, moment_axis, rate_axis
 from tfarm.loop.frequencies import band_of
 from tfarm.loop.regions import Region, region
@@ -27,6 +26,7 @@ from tfarm.plots.style import blank, headline, style
 from tfarm.records import record
 from tfarm.report.loop_laws import MODES, NamedLaw, best, brief_of, laws
 from tfarm.spectrum.scales import default_gains
+from tfarm.synthesis.design import Design
 
 if TYPE_CHECKING:
     from tfarm.plots.style import Figure
@@ -47,8 +47,9 @@ class GainMap:
 
     `region` is the exact count on the coloured grid, `edge` (n, 3) the exact boundary K1, K2, w within the picture
     with rows of nan where it leaves it; `damping` (rows, columns) the least damping ratio of the first `MODES` modes
-    on every fourth point of the grid; `design` the best gains.  `sampled` is where the loop is stable at the clock of
-    `chain` too, None where that could not be settled; `briefs` are the sampled verdicts on the laws.
+    on every fourth point of the grid; `design` the best gains for the sampled loop.  `sampled` is where the loop is
+    stable at the clock of `chain` too, None where that could not be settled; `briefs` are the sampled verdicts on the
+    laws.
     """
 
     arm: Arm
@@ -92,10 +93,12 @@ def gain_map(arm: Arm, chain: Chain | None = None) -> GainMap:
     K1, K2 = found.K1[half::SPARSE], found.K2[half::SPARSE]
     a, b = (each.ravel() for each in np.meshgrid(K1, K2))
     damping = least_damping(arm, many_laws(HubFeedback(), K1=a, K2=b), MODES).reshape(K2.size, K1.size)
-    named = laws(arm)
+    named = laws(arm, chain)
     briefs = tuple(brief_of(arm, each.law, chain) for each in named)
     sampled = sampled_region(arm, x, y, chain)
-    return GainMap(arm, x, y, found, edge(found, x, y), K1, K2, damping, named, best(arm), chain, sampled, briefs)
+    return GainMap(
+        arm, x, y, found, edge(found, x, y), K1, K2, damping, named, best(arm, chain), chain, sampled, briefs
+    )
 
 
 def sampled_region(arm: Arm, x: Axis, y: Axis, chain: Chain) -> SampledMap | None:

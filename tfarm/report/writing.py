@@ -75,7 +75,7 @@ PIECES = (
     ),
     Piece("margins", "margins", ("margins",), margins_section, has_rate_loop, is_sampled=True),
     Piece("root loci", "locus", ("locus",), locus_section, has_rate_loop),
-    Piece("Nyquist", "margins-nyquist", ("margins",), nyquist_section, has_rate_loop),
+    Piece("Nyquist", "margins-nyquist", ("margins",), nyquist_section, has_rate_loop, is_sampled=True),
     Piece("sampled loop", "sampled", ("sampled",), sampled_section, has_loop, is_sampled=True),
     Piece("gain tuner", "tune", ("tune",), tuner_section, has_loop, is_sampled=True),
     Piece("assumptions", "assumptions", ("assumptions",), assumptions_section),

@@ -7,19 +7,19 @@ import pytest
 from scipy.linalg import expm
 
 import tfarm
-from tests.loop.designs import grids, least_on
 from tests.loop.ritz_loop import RitzLoop
+from tests.synthesis.designs import grids, least_on
 from tfarm import HubFeedback
 from tfarm.arm import many_laws
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop.damping import least_damping
-from tfarm.loop.design import design
 from tfarm.loop.frequencies import band_of
 from tfarm.loop.lines import NONE
 from tfarm.loop.margins import loop_margins
 from tfarm.loop.regions import region
 from tfarm.loop.residual import RISE, SAMPLES, TRAVEL, residual_moment
 from tfarm.loop.stability import stability
+from tfarm.synthesis.design import design
 
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 BOUNDS = {"K1": (0.0, 20.0), "K2": (-2.0, 1.0)}
@@ -68,7 +68,7 @@ def test_what_an_unstable_loop_leaves_is_huge_but_finite() -> None:
 
 @pytest.fixture(scope="module")
 def damping():
-    return design(LAB, "damping", **BOUNDS)
+    return design(LAB, "damping", continuous=True, **BOUNDS)
 
 
 def random_gains(arm, number):
@@ -88,7 +88,7 @@ def test_two_hundred_random_gains_damp_no_better(damping) -> None:
 
 
 def test_two_hundred_random_gains_leave_no_less(damping) -> None:
-    found = design(LAB, "residual", **BOUNDS)
+    found = design(LAB, "residual", continuous=True, **BOUNDS)
     K1, K2 = random_gains(LAB, 200)
     assert residual_moment(LAB, many_laws(NONE, K1=K1, K2=K2), 2).min() >= found.value * (1 - 1e-9)
     assert found.value < residual_moment(LAB, many_laws(damping.law), 2)[0]
@@ -96,11 +96,11 @@ def test_two_hundred_random_gains_leave_no_less(damping) -> None:
 
 @pytest.fixture(scope="module")
 def residual():
-    return design(LAB, "residual")
+    return design(LAB, "residual", continuous=True)
 
 
 def test_no_grid_leaves_less(residual) -> None:
-    """The small case of `python -m tests.loop.designs SIZE SEED`, and a part of the box where a grid once did."""
+    """The small case of `python -m tests.synthesis.designs SIZE SEED`, and a part of the box where a grid once did."""
     best = min(least_on(LAB, *grid) for grid in grids(np.random.default_rng(1), residual))
     assert residual.value <= 1.01 * best
     assert residual.value <= 1.01 * least_on(LAB, np.linspace(1e-3, 0.1, 60), np.linspace(-3, -1, 60))
@@ -108,7 +108,7 @@ def test_no_grid_leaves_less(residual) -> None:
 
 def test_without_damping_a_slew_ends_in_whole_periods() -> None:
     """K1 -> 0 leaves a hub of I_h/(1 - K2); of its mode at w then sin^2(w T/4) is left: nothing at w T = 4 pi n."""
-    found = design(BARE, "residual", modes=1)
+    found = design(BARE, "residual", modes=1, continuous=True)
     hub = tfarm.Hub(inertia=BARE.hub.inertia / (1 - found.law.K2))
     periods = tfarm.modes(replace(BARE, hub=hub), 1).natural_frequency[-1] * RISE / (4 * np.pi)
     assert periods == pytest.approx(round(periods), abs=1e-6)
@@ -142,16 +142,16 @@ def test_the_flat_part_is_that_of_the_valley(name, request) -> None:
 def test_where_the_bounds_cut_the_search_off_is_no_optimum(damping) -> None:
     """More damping lies beyond the bounds named, and none beyond those that are not."""
     assert damping.at_bound == ("K1", "K2")
-    found = design(LAB, "damping")
-    assert found.at_bound == ("K2",)
-    K1, K2 = found.law.K1 * np.array([0.99, 1.01, 1.0]), found.law.K2 + np.array([0.0, 0.0, -0.1])
-    below, above, beyond = least_damping(LAB, many_laws(NONE, K1=K1, K2=K2), 2)
-    assert max(below, above) < found.value < beyond
+    found = design(LAB, "damping", continuous=True)
+    assert (found.widened, found.at_bound) == (("K2",), ())
+    assert found.bounds["K2"][0] < found.law.K2 < -3.0
+    K1, K2 = found.law.K1 * np.array([0.99, 1.01, 1.0, 1.0]), found.law.K2 + np.array([0.0, 0.0, -0.1, 0.1])
+    assert least_damping(LAB, many_laws(NONE, K1=K1, K2=K2), 2).max() < found.value
 
 
 def test_random_gains_have_no_better_disk_margin() -> None:
     bounds = {"K1": (0.1, 20.0), "K2": (0.3, 1.0)}
-    found = design(LAB, "margin", **bounds)
+    found = design(LAB, "margin", continuous=True, **bounds)
     rng, band = np.random.default_rng(6), band_of(LAB, 2)
     values = []
     for K1, K2 in zip(rng.uniform(0.1, 20.0, 30), rng.uniform(0.3, 1.0, 30), strict=True):
@@ -161,11 +161,11 @@ def test_random_gains_have_no_better_disk_margin() -> None:
 
 
 def test_gains_that_are_not_stable_never_win() -> None:
-    found = design(BARE, "residual", K1=(-1.0, 1.0), K2=(0.0, 3.0))
+    found = design(BARE, "residual", K1=(-1.0, 1.0), K2=(0.0, 3.0), continuous=True)
     assert found.verdict.is_stable
     assert found.law.K1 > 0
     with pytest.raises(ConvergenceError, match="widen the bounds"):
-        design(BARE, "damping", K1=(0.1, 1.0), K2=(1.1, 3.0))
+        design(BARE, "damping", K1=(0.1, 1.0), K2=(1.1, 3.0), continuous=True)
 
 
 @pytest.mark.parametrize("K1", [(1.0, 1.0), (2.0, 1.0), (float("nan"), 1.0), (0.0, float("inf"))])

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +28,16 @@ END = 1e-9  # share of an axis left out at either end: there verdicts are margin
 ROUNDS, SHRINK = 10, 0.5  # of the small grids, and by how much they shrink where their centre is the best
 HALVED, FEWEST = (4, 7), 6  # rounds after which the better half of the minima goes on, and how many do at least
 OFFSETS = np.array([(i, j) for i in (-1.0, -0.5, 0.0, 0.5, 1.0) for j in (-1.0, -0.5, 0.0, 0.5, 1.0)])
+TIE = 0.01  # weight of the damping ratio beside a disk margin: without a clock K2 = 0 has margin 2 at every K1
 POLISHED = 3  # minima that the simplex starts from
+
+
+class Effort(NamedTuple):
+    """Points of the grid along K1 and K2, and how many of its minima are refined."""
+
+    K1: int
+    K2: int
+    starts: int
 
 
 @dataclass(frozen=True)

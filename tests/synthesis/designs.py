@@ -1,4 +1,4 @@
-"""Gains that leave least after a slew, against grids of 60 x 60:  python -m tests.loop.designs SIZE SEED
+"""Gains that leave least after a slew, against grids of 60 x 60:  python -m tests.synthesis.designs SIZE SEED
 
 Plausible arms at random (5 cm to 10 m, five materials, a hub of a hundredth to a hundred times the beam, a payload or
 none, little damping or none).  Three grids look for gains that leave less than what `design` found: even in K1 over
@@ -15,10 +15,10 @@ import numpy as np
 import tfarm
 from tfarm import Arm, Hub, HubFeedback, Link, Payload, Section
 from tfarm.arm import many_laws
-from tfarm.loop.design import design
 from tfarm.loop.regions import region
 from tfarm.loop.residual import residual_moment
 from tfarm.spectrum.scales import rate_unit
+from tfarm.synthesis.design import design
 
 POINTS = 60  # of a grid, along each gain
 ALLOWED = 1.01  # a grid may be better by this factor
@@ -76,7 +76,7 @@ def least_on(arm, K1, K2):
 def compared(arm, rng):
     """What the design leaves over what the best grid leaves, and the CPU seconds that the design took."""
     start = time.process_time()
-    found = design(arm, "residual")
+    found = design(arm, "residual", continuous=True)
     seconds = time.process_time() - start
     return found.value / min(least_on(arm, *grid) for grid in grids(rng, found)), seconds
 

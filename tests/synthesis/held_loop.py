@@ -1,0 +1,64 @@
+"""A Galerkin model of an arm under a torque that is held from sample to sample: no modes, no residues, one expm."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import expm
+
+from tests.loop.ritz_loop import RitzLoop
+from tfarm import Arm, HubFeedback
+
+
+@dataclass(frozen=True)
+class HeldLoop:
+    """x' = A x + B u over a sample of length `period` [s], of a Ritz model with `terms`."""
+
+    arm: Arm
+    period: float
+    terms: int = 12
+
+    @cached_property
+    def parts(self):
+        """A (n, n) and B (n,) of one sample, and the rows (3, n) of hub angle, hub rate and root moment."""
+        model = RitzLoop(self.arm, self.terms)
+        continuous, n = model.state_matrix(HubFeedback()), model.n
+        torque, sense = np.zeros(2 * n + 1), np.zeros((3, 2 * n + 1))
+        torque[n : 2 * n] = np.linalg.solve(model.M, model.b)
+        torque[-1] = (model.inertia * model.b @ torque[n : 2 * n] - 1) / model.damping
+        sense[0, :n] = sense[1, n : 2 * n] = model.b
+        sense[2, -1] = 1.0
+        whole = np.pad(np.c_[continuous, torque], ((0, 1), (0, 0)))
+        step = expm(whole * self.period)
+        return step[:-1, :-1], step[:-1, -1], sense
+
+    def poles(self, law):
+        """Poles z of the closed loop, the z = 1 of a free hub angle among them."""
+        A, B, sense = self.parts
+        return np.linalg.eigvals(A - np.outer(B, np.array(law.row) @ sense)).astype(complex)
+
+    def radius(self, law):
+        """The spectral radius, z = 1 of the free hub angle left out."""
+        z = self.poles(law)
+        return float(abs(z[abs(z - 1) > 1e-7]).max())
+
+    def loop(self, law, q):
+        """L at e^{iq}."""
+        A, B, sense = self.parts
+        eye, row = np.eye(len(A)), np.array(law.row) @ sense
+        return np.array([row @ np.linalg.solve(np.exp(1j * each) * eye - A, B) for each in q])
+
+    def damping(self, law, modes, steps=300):
+        """Least damping ratio of the first modes' poles and the hub's, followed from the open loop as the law grows."""
+        own = RitzLoop(self.arm, self.terms).eigenvalues(HubFeedback())
+        own = own[own.imag > 0]
+        own = own[np.argsort(own.imag)][:modes]
+        z = np.r_[np.exp(own * self.period), 1.0, 1.0]
+        for share in np.linspace(0, 1, steps + 1)[1:]:
+            now = self.poles(HubFeedback(K1=share * law.K1, K2=share * law.K2, Kp=share * law.Kp))
+            gap = abs(z[:, None] - now)
+            for _ in z:  # the closest pair first
+                i, j = np.unravel_index(gap.argmin(), gap.shape)
+                z[i], gap[i], gap[:, j] = now[j], np.inf, np.inf
+        s = np.log(z[(abs(z) > 1e-12) & (abs(np.angle(z)) > 1e-9)])
+        return float((-s.real / abs(s)).min(initial=1.0))

@@ -1,0 +1,102 @@
+"""Gains for the 10 ms loop: stable there by a Galerkin model under a hold, their values by its poles, circle and slews,
+and never beaten by random ones."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tfarm
+from tests.shell import answer
+from tests.synthesis.held_loop import HeldLoop
+from tfarm import ConvergenceError, HubFeedback
+from tfarm.dsp import Chain, Slew, sampled_verdict
+from tfarm.dsp.chain import Sampling
+from tfarm.synthesis.design import design
+from tfarm.synthesis.sampled import RESERVE, sampled_judges, scaled
+
+LAB = tfarm.load("sasaki2012-lab")
+HELD = HeldLoop(LAB, 0.01)
+
+
+@pytest.mark.parametrize("name", tfarm.presets())
+def test_what_is_recommended_holds_when_sampled(name) -> None:
+    """By the whole verdict, at the gains and a quarter to either side, and without a clock."""
+    found = design(tfarm.load(name), chain=tfarm.dsp.load_chain(name))
+    laws = [scaled(found.law, share) for share in (1 / RESERVE, 1.0, RESERVE)]
+    assert all(sampled_verdict(tfarm.load(name), law, found.chain).is_stable for law in laws)
+    assert found.sampled.is_stable
+    assert found.verdict.is_stable
+
+
+@pytest.fixture(scope="module")
+def found():
+    return {objective: design(LAB, objective) for objective in ("damping", "margin", "residual")}
+
+
+def test_the_gains_that_are_best_without_a_clock_do_not_hold(found) -> None:
+    """K1 = 26, K2 = -3 has a radius of 2.5 at 10 ms; what is recommended stays inside, by another model."""
+    assert HELD.radius(HubFeedback(K1=26.0, K2=-3.0)) == pytest.approx(2.5, abs=0.1)
+    for each in found.values():
+        assert HELD.radius(each.law) < 1.0
+        # on the edge of the reserve a radius is 1, and the Ritz model's is right to 1e-6
+        assert max(HELD.radius(scaled(each.law, share)) for share in (1 / RESERVE, RESERVE)) < 1.0 + 1e-6
+
+
+def test_the_damping_is_that_of_poles_followed_from_the_open_loop(found) -> None:
+    """12 Ritz terms have the first two frequencies to 1e-6, and aliases of the higher ones do not count."""
+    assert HELD.damping(found["damping"].law, 2) == pytest.approx(found["damping"].value, rel=1e-4)
+
+
+def test_random_gains_are_no_better(found) -> None:
+    rng, grid = np.random.default_rng(8), np.linspace(1e-3, np.pi, 200)
+    tried = 0
+    for K1, K2 in zip(20 * rng.random(24) ** 2, rng.uniform(-1, 1, 24), strict=True):
+        law = HubFeedback(K1=K1, K2=K2)
+        if max(HELD.radius(scaled(law, share)) for share in (1 / RESERVE, 1.0, RESERVE)) >= 1.0:
+            continue
+        tried += 1
+        L = HELD.loop(law, grid)
+        assert (2 * abs(1 + L) / abs(1 - L)).min() <= found["margin"].value + 0.01
+        if tried <= 4:
+            assert HELD.damping(law, 2, 150) <= found["damping"].value * (1 + 1e-4)
+            assert slewed(LAB, law, Chain()) >= found["residual"].value * (1 - 1e-4)
+    assert tried > 6
+
+
+def test_the_disk_margin_is_that_of_the_circle(found) -> None:
+    law = HubFeedback(K1=3.0, K2=0.3)
+    judge = next(sampled_judges(LAB, Chain(), "margin", 0.0, 2))
+    q = np.r_[np.linspace(1e-4, np.pi, 4000)]
+    L = HELD.loop(law, q)
+    assert judge.disk(law) == pytest.approx((2 * abs(1 + L) / abs(1 - L)).min(), rel=1e-3)
+    assert found["margin"].value == pytest.approx(judge.disk(found["margin"].law), rel=1e-3)
+
+
+def slewed(arm, law, chain):
+    """Root mean square of the moment after a simulated slew, over a period of the first mode or 16 samples."""
+    T, first = chain.sampling.period, tfarm.modes(arm, 1).natural_frequency[-1]
+    last = chain.slew.rise_time + max(2 * np.pi / first, 16 * T)
+    run = tfarm.simulate(arm, law, chain=chain, duration=last)
+    after = run.at_samples.t >= chain.slew.rise_time * (1 - 1e-12)
+    return float(np.sqrt((run.at_samples.root_moment[after] ** 2).mean()))
+
+
+@pytest.mark.parametrize("Kp", [0.0, 4.0])
+def test_the_residual_is_that_of_the_simulated_slew(Kp) -> None:
+    chain = Chain(sampling=Sampling(period=0.008, delay_samples=0.5), slew=Slew(rise_time=0.5, travel=0.4))
+    found = design(LAB, "residual", Kp=Kp, chain=chain, K1=(0.1, 5.0), K2=(-0.5, 0.8))
+    assert found.value == pytest.approx(slewed(LAB, found.law, chain), rel=1e-3)  # of 8 modes beside 20
+
+
+def test_bounds_that_were_given_are_kept_and_said(capsys) -> None:
+    found = answer(capsys, "design", "sasaki2012-lab", "--K1", "0.1,2", "--K2=-0.1,0.1")
+    assert (found["designed_for"], found["widened"], found["at_limit"]) == ("sampled", [], [])
+    assert "K1" in found["at_bound"]
+    assert found["bounds"] == {"K1": [0.1, 2.0], "K2": [-0.1, 0.1]}
+
+
+def test_where_nothing_holds_nothing_is_recommended() -> None:
+    late = Chain(sampling=Sampling(delay_samples=3.0))
+    with pytest.raises(ConvergenceError, match="widen the bounds"):
+        design(replace(LAB, name="late"), K1=(30.0, 60.0), K2=(-3.0, -2.0), chain=late)

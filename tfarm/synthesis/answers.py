@@ -1,0 +1,29 @@
+"""What `tfarm design` prints with --json: a plain dictionary."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from tfarm.loop.answers import law_answer
+from tfarm.synthesis.design import Design
+
+
+def design_answer(found: Design) -> dict[str, Any]:
+    """The gains, what they reach, both verdicts, and how flat the optimum is."""
+    law, bounds = found.law, found.bounds
+    return {
+        "arm": found.verdict.loop.arm.name,
+        "objective": found.objective,
+        "designed_for": found.loop,
+        **law_answer(law, found.verdict.loop.arm),
+        "value": found.value,
+        "verdict": found.verdict.verdict,
+        "modes": found.modes,
+        "bounds": {name: list(pair) for name, pair in bounds.items()},
+        "at_bound": list(found.at_bound),
+        "at_limit": list(found.at_limit),
+        "widened": list(found.widened),
+        "flat_K1": list(found.flat_K1),
+        "flat_K2": list(found.flat_K2),
+        "sampled": found.sampled.answer,
+    }

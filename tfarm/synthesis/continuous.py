@@ -1,0 +1,113 @@
+"""Gains judged by the continuous loop of the exact arm: no clock."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import Arm, HubFeedback, law_of, many_laws
+from tfarm.errors import ConvergenceError
+from tfarm.loop.damping import least_damping
+from tfarm.loop.frequencies import band_of, grid
+from tfarm.loop.margins import disk_at
+from tfarm.loop.plant import Loop
+from tfarm.loop.regions import region
+from tfarm.loop.residual import RISE, residual_moment
+from tfarm.loop.stability import stability
+from tfarm.records import record
+from tfarm.spectrum import modes as natural_modes
+from tfarm.synthesis.search import TIE, Axis, Bounds, Effort, Score
+
+Real = NDArray[np.float64]
+
+BASIN = 6  # points of the grid in each basin of a residual
+
+
+@dataclass(frozen=True)
+@record
+class ContinuousJudge:
+    """What K1 and K2 are worth in the continuous loop, Kp held."""
+
+    arm: Arm
+    objective: str
+    Kp: float
+    modes: int
+
+    def effort(self, K2: Bounds) -> Effort:
+        """A residual has as many basins along K2 as its modes' frequencies run through periods of the slew.
+
+        Feeding K2 back makes of the hub one of inertia I_h/(1 - K2); from K2 = 1 on it stands still.
+        """
+        if self.objective == "margin":  # the one that is dear
+            return Effort(24, 24, 4)
+        if self.objective == "damping":  # which has few basins
+            return Effort(32, 36, 12)
+        starts = max(6, 80 // self.modes)
+        shares = (1 - gain / self.arm.input_per_torque for gain in K2)
+        hubs = (self.arm.hub_inertia / share if share > 0 else math.inf for share in shares)
+        ends = [
+            natural_modes(self.arm.having(hub_inertia=I), self.modes).natural_frequency[-self.modes :] for I in hubs
+        ]
+        basins = float(abs(ends[0] - ends[1]).max()) * RISE / (4 * math.pi)
+        return Effort(36, int(min(max(60.0, BASIN * basins), max(60, 1600 // self.modes))), starts)
+
+    def landscape(self, axes: tuple[Axis, Axis], effort: Effort) -> tuple[Real, Score]:
+        """Scores over the grid (rows of K2), inf where not stable; and the score where the grid is stable, else inf."""
+        K1, K2 = (axis.gain(axis.middles(number)) for axis, number in zip(axes, effort[:2], strict=True))
+        stable = region(self.arm, K1, K2, self.Kp).stable
+        grid_K1, grid_K2 = np.meshgrid(K1, K2)
+        values = np.full(stable.shape, np.inf)
+        if stable.any():
+            values[stable] = self.score(grid_K1[stable], grid_K2[stable])
+        return values, _inside(self.score, axes, stable)
+
+    def score(self, K1: Real, K2: Real) -> Real:
+        """What is minimised, for arrays of K1 and K2."""
+        laws = many_laws(HubFeedback(Kp=self.Kp), K1=K1, K2=K2)
+        if self.objective == "damping":
+            return -least_damping(self.arm, laws, self.modes)
+        if self.objective == "residual":
+            return residual_moment(self.arm, laws, self.modes)
+        size = np.array([self._disk(law_of(law)) for law in laws.T])
+        return np.asarray(-size - TIE * least_damping(self.arm, laws, self.modes))
+
+    def holds(self, law: HubFeedback) -> bool:
+        """Whether the loop is stable by its own verdict."""
+        try:
+            return stability(self.arm, law).is_stable
+        except ConvergenceError:  # on the edge
+            return False
+
+    def value(self, law: HubFeedback, score: float) -> float:
+        """The damping ratio, disk margin, or residual moment [N m] of a law of that score."""
+        if self.objective == "margin":
+            return self._disk(law)
+        return score if self.objective == "residual" else -score
+
+    @cached_property
+    def _omega(self) -> Real:
+        return np.asarray(grid(self.arm, band_of(self.arm, self.modes)))
+
+    def _disk(self, law: HubFeedback) -> float:
+        return float(disk_at(Loop(self.arm, law), self._omega).min())
+
+
+def _inside(score: Score, axes: tuple[Axis, Axis], stable: NDArray[np.bool_]) -> Score:
+    """The score where the nearest point of the grid is stable, inf elsewhere."""
+
+    def inside(K1: Real, K2: Real) -> Real:
+        places = [
+            np.clip((axis.share(gain) * number).astype(int), 0, number - 1)
+            for axis, gain, number in zip(axes, (K1, K2), stable.shape[::-1], strict=True)
+        ]
+        good = stable[places[1], places[0]]
+        values = np.full(K1.size, np.inf)
+        if good.any():
+            values[good] = score(K1[good], K2[good])
+        return values
+
+    return inside

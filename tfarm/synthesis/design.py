@@ -1,0 +1,250 @@
+"""Which gains?  The best K1, K2 (and Kp), judged by the sampled loop of the exact arm or by the continuous one.
+
+A grid over the bounds first, its minima refined together (`search`).  Gains that are not stable never win.  How flat
+the optimum is, and whether it is one or only where the bounds cut the search off, is part of the answer.  Bounds that
+nobody asked for are widened as long as the best gains lie on them: K2 < 0 until what it leaves of the hub's inertia,
+I_h/(1 - K2), is a sixty-fourth; not below K1 = 0, where the law drives the hub, nor above the K2 at which it holds it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import Arm, HubFeedback
+from tfarm.dsp import Chain
+from tfarm.dsp.brief import SampledBrief, sampled_brief
+from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.loop.frequencies import band_of
+from tfarm.loop.plant import Loop
+from tfarm.loop.stability import Stability, stability
+from tfarm.records import record
+from tfarm.spectrum.scales import check_gains, rate_unit, turning_inertia
+from tfarm.synthesis.continuous import ContinuousJudge
+from tfarm.synthesis.sampled import sampled_judges
+from tfarm.synthesis.search import (
+    END,
+    POLISHED,
+    Axis,
+    Bounds,
+    Effort,
+    Found,
+    Score,
+    minima,
+    polished,
+    rate_axis,
+    refined,
+)
+
+Real = NDArray[np.float64]
+Objective = Literal["damping", "margin", "residual"]
+LoopKind = Literal["sampled", "continuous"]
+
+OBJECTIVES = ("damping", "margin", "residual")
+FLAT = 0.01  # gains whose value is worse by less than this share bound the flat part
+AT_BOUND = 1e-3  # share of an axis: an optimum so near to its end is where the bound is
+SIMPLEX = 2.0**-8  # of a step of the grid: its first size
+HALVINGS = 40  # of an interval, for the ends of the flat part and the way back into the stable region
+WIDENINGS = 4  # K1 to 16 times its bound, 1 - K2 likewise
+LIMITS = (("K1", 0), ("K2", 1))  # ends of the usual bounds that are physical ones
+
+
+class Judge(Protocol):
+    """What gains are worth in a loop, Kp held."""
+
+    def effort(self, K2: Bounds) -> Effort:
+        """How fine a grid its objective needs."""
+
+    def landscape(self, axes: tuple[Axis, Axis], effort: Effort) -> tuple[Real, Score]:
+        """Scores over the grid, inf where not stable, and the score to refine with."""
+
+    def score(self, K1: Real, K2: Real) -> Real:
+        """What is minimised."""
+
+    def holds(self, law: HubFeedback) -> bool:
+        """Whether the loop is stable by the verdict of its kind."""
+
+    def value(self, law: HubFeedback, score: float) -> float:
+        """The objective of a law of that score."""
+
+
+@dataclass(frozen=True)
+@record
+class Design:
+    """The best law, its value (damping ratio, disk margin, or residual moment [N m]), its verdict, and how flat it is.
+
+    `loop` is what it was designed for: the "sampled" loop of `chain` or the "continuous" one; `verdict` is that of the
+    continuous loop, `sampled` that of the sampled one.  `flat_K1` and `flat_K2` are the gains between which, the other
+    held, the value is within one per cent of the best.  `widened` names the gains whose bounds were widened to
+    `bounds`; `at_bound` those that lie at an end of them even so: there the search was cut off, and the value is no
+    optimum; `at_limit` those of them that are at a physical end, K1 = 0 or the K2 = 1 that stops the hub.
+    """
+
+    objective: str
+    law: HubFeedback
+    value: float
+    verdict: Stability
+    bounds: dict[str, Bounds]
+    flat_K1: Bounds
+    flat_K2: Bounds
+    modes: int
+    at_bound: tuple[str, ...]
+    at_limit: tuple[str, ...]
+    widened: tuple[str, ...]
+    loop: LoopKind
+    chain: Chain
+    sampled: SampledBrief
+
+
+class _Best(NamedTuple):
+    """Gains K1, K2 and their score."""
+
+    gains: tuple[float, float]
+    score: float
+
+
+def design(
+    arm: Arm, objective: Objective = "damping", *, K1: Bounds | None = None, K2: Bounds | None = None,
+    Kp: float = 0.0, modes: int = 2, chain: Chain | None = None, continuous: bool = False,
+) -> Design:  # fmt: skip
+    """The gains that serve an objective best within bounds, in the sampled loop of a chain (10 ms unless given).
+
+    "damping" maximises the least damping ratio of the oscillating poles of the first `modes` modes; "margin" the disk
+    margin; "residual" minimises the root moment left after the slew.  What is recommended holds when sampled, with
+    every mode that its verdict takes, and with all gains a quarter larger or smaller.  `continuous`: of the continuous
+    loop instead; gains that are best there need not hold when sampled.  Raises ParameterError for a bad objective or
+    bounds, ConvergenceError if no gains within the bounds are stable.
+    """
+    if objective not in OBJECTIVES:
+        raise ParameterError(key="objective", value=objective, remedy=f"use one of {', '.join(OBJECTIVES)}")
+    unit, chain = arm.input_per_torque, Chain() if chain is None else chain
+    Loop(arm, HubFeedback(K1=1.0, K2=0.0 if arm.has_massless_hub else 0.5 * unit, Kp=Kp))
+    free = {name: bounds is None for name, bounds in (("K1", K1), ("K2", K2))}
+    start = {
+        "K1": _checked("K1", K1 or (0.0, 2.0 * turning_inertia(arm) * band_of(arm, 1))),
+        "K2": _checked("K2", K2 or (-3.0 * unit, 1.0 * unit)),
+    }
+    for K1_end, K2_end in zip(start["K1"], start["K2"], strict=True):
+        check_gains(arm, HubFeedback(K1=K1_end, K2=K2_end, Kp=Kp))
+    judges: Iterable[Judge] = (
+        [ContinuousJudge(arm, objective, Kp, modes)] if continuous else sampled_judges(arm, chain, objective, Kp, modes)
+    )
+    judge, bounds, best = _first_that_holds(judges, arm, start, free, Kp)
+    law = HubFeedback(K1=best.gains[0], K2=best.gains[1], Kp=Kp)
+    ends = _ends(arm, bounds, best)
+    flat = [_flat(judge.score, best, axis, bounds[name]) for axis, name in enumerate(bounds)]
+    return Design(
+        objective=objective, law=law, value=judge.value(law, best.score), verdict=stability(arm, law), bounds=bounds,
+        flat_K1=flat[0], flat_K2=flat[1], modes=modes, at_bound=tuple(name for name, _ in ends),
+        at_limit=tuple(name for name, end in ends if free[name] and (name, end) in LIMITS),
+        widened=tuple(name for name in bounds if bounds[name] != start[name]),
+        loop="continuous" if continuous else "sampled", chain=chain, sampled=sampled_brief(arm, law, chain),
+    )  # fmt: skip
+
+
+def _first_that_holds(
+    judges: Iterable[Judge], arm: Arm, bounds: dict[str, Bounds], free: dict[str, bool], Kp: float
+) -> tuple[Judge, dict[str, Bounds], _Best]:
+    """The best gains by the first judge whose gains hold.  Raises ConvergenceError where those of none do."""
+    lost = None
+    for judge in judges:
+        try:
+            return judge, *_widened(judge, arm, bounds, free, Kp)
+        except ConvergenceError as error:
+            lost = error
+    raise lost or AssertionError("no judge")
+
+
+def _widened(
+    judge: Judge, arm: Arm, bounds: dict[str, Bounds], free: dict[str, bool], Kp: float
+) -> tuple[dict[str, Bounds], _Best]:
+    """The best gains, and the bounds widened wherever they lie on one that is free: only what is new is searched."""
+    best = _best(judge, arm, bounds, Kp)
+    for _ in range(WIDENINGS):
+        ends = [(name, end) for name, end in _ends(arm, bounds, best) if free[name] and (name, end) not in LIMITS]
+        if not ends:
+            break
+        name, end = ends[0]
+        low, high = bounds[name]
+        wider = (low, 2 * high) if end else (arm.input_per_torque - 2 * (arm.input_per_torque - low), high)
+        new = (high, wider[1]) if end else (wider[0], low)
+        try:
+            beyond = _best(judge, arm, bounds | {name: new}, Kp)
+        except ConvergenceError:  # nothing holds there
+            beyond = best
+        bounds = bounds | {name: wider}
+        best = min(best, beyond, key=lambda each: each.score)
+    return bounds, best
+
+
+def _ends(arm: Arm, bounds: dict[str, Bounds], best: _Best) -> list[tuple[str, int]]:
+    """The gains that lie at an end of their bounds, and at which, 0 or 1."""
+    axes, found = _axes(arm, bounds), []
+    for name, axis, gain in zip(bounds, axes, best.gains, strict=True):
+        share = float(axis.share(np.array(gain)))
+        if min(share, 1 - share) < AT_BOUND:
+            found.append((name, int(share > 0.5)))
+    return found
+
+
+def _axes(arm: Arm, bounds: dict[str, Bounds]) -> tuple[Axis, Axis]:
+    return rate_axis(bounds["K1"], rate_unit(arm)), Axis(*bounds["K2"])
+
+
+def _best(judge: Judge, arm: Arm, bounds: dict[str, Bounds], Kp: float) -> _Best:
+    """The best gains that hold.  Raises ConvergenceError where none are stable."""
+    axes, effort = _axes(arm, bounds), judge.effort(bounds["K2"])
+    values, score = judge.landscape(axes, effort)
+    if not np.isfinite(values).any():
+        text = "K1 in ({:g}, {:g}) and K2 in ({:g}, {:g})".format(*bounds["K1"], *bounds["K2"])
+        raise ConvergenceError(f"no gains with {text} are stable: widen the bounds", None, values)
+    places = minima(values, effort.starts)[:, ::-1]
+    shares = [axis.middles(number) for axis, number in zip(axes, effort[:2], strict=True)]
+    starts = np.stack([share[places[:, i]] for i, share in enumerate(shares)], axis=1)
+    steps = 1 / np.array(effort[:2])
+    found = sorted(refined(score, axes, starts, steps), key=lambda each: each.score)
+    found = [polished(score, axes, each, SIMPLEX * float(steps.min())) for each in found[:POLISHED]] + found[POLISHED:]
+    grid_best = [Found(start, float(values[row, column])) for start, (column, row) in zip(starts, places, strict=True)]
+    for each in sorted([*found, *grid_best], key=lambda each: each.score):
+        K1, K2 = (float(axis.gain(share)) for axis, share in zip(axes, each.shares, strict=True))
+        if np.isfinite(each.score) and judge.holds(HubFeedback(K1=K1, K2=K2, Kp=Kp)):
+            return _Best((K1, K2), each.score)
+    raise ConvergenceError("none of the best gains found is stable", None, found)
+
+
+def _checked(name: str, bounds: Bounds) -> Bounds:
+    low, high = (float(value) for value in bounds)
+    if not (np.isfinite([low, high]).all() and low < high):
+        raise ParameterError(key=name, value=bounds, remedy="bounds are two finite numbers, the lower first")
+    return low, high
+
+
+def _flat(score: Score, best: _Best, axis: int, bounds: Bounds) -> Bounds:
+    """Between which values of one gain the score stays within `FLAT` of the best, the other held.
+
+    Walked outwards in steps that grow by three tenths, then halved: narrow valleys are seen as well as wide ones.
+    """
+    limit, centre = best.score + FLAT * abs(best.score), best.gains[axis]
+
+    def good(values: Real) -> NDArray[np.bool_]:
+        held = [np.full(values.size, gain) for gain in best.gains]
+        held[axis] = values
+        return np.asarray(score(*held) <= limit)
+
+    ends = []
+    for bound in bounds:
+        way = np.geomspace(1e-9, 1.0, 80) * (bound - centre)
+        (bad,) = np.nonzero(~good(centre + way * (1 - END)))
+        if not bad.size:
+            ends.append(bound)
+            continue
+        low, high = (way[bad[0] - 1] if bad[0] else 0.0), way[bad[0]]
+        for _ in range(HALVINGS):
+            middle = (low + high) / 2
+            low, high = (middle, high) if good(np.array([centre + middle]))[0] else (low, middle)
+        ends.append(centre + float(low))
+    return ends[0], ends[1]

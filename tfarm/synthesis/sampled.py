@@ -1,0 +1,220 @@
+"""Gains judged by the sampled loop, many at once.
+
+The closed-loop matrix of the modal model under a hold is affine in the gains, A(K) = A0 + K1 A1 + K2 A2, so that the
+poles of thousands of gains are one call of NumPy.  What wins is judged once more by `sampled_verdict`, with as many
+modes as that takes; a model of few modes only says where to look.
+
+    damping    least -Re s/|s| of the oscillating poles, s = ln z/T, of the first modes
+    margin     min 2 |1 + L|/|1 - L| over the unit circle, of nearly equal ones that with more damping
+    residual   root mean square of the root moment at the samples after the slew of the chain, M read as it says
+
+Poles of higher modes, which alias into the same angles, are told by where the open loop has them: a held torque moves a
+pole less the higher its mode.  They have to be stable and count no further.  So have all poles with every gain a
+quarter larger and smaller: the best damping of few modes often lies where a higher one is about to grow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+
+from tfarm.arm import FED_BACK, Arm, HubFeedback
+from tfarm.dsp import Chain, SampledLoop, sampled_loop, sampled_verdict, scenario
+from tfarm.dsp.margins import most_modes
+from tfarm.dsp.verdict import UNDAMPED_MODES
+from tfarm.errors import ConvergenceError
+from tfarm.loop.stability import stability
+from tfarm.records import record
+from tfarm.spectrum.scales import first_frequency
+from tfarm.synthesis.search import TIE, Axis, Bounds, Effort, Score
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complexfloating[Any, Any]]
+
+RESERVE = 1.25  # the loop holds with all its gains larger or smaller by this factor: what a gauge or motor is off by
+FEWEST_MODES = 8  # of the first model; more where its best gains do not hold
+BLOCK = 2000  # gains at a time
+REAL = 1e-9  # rad: a pole at a smaller angle is real
+SAMPLES_LEFT = 16  # of the record after the slew, where a period of the first mode has fewer
+AROUND = np.geomspace(1e-9, 0.5, 40)  # rad, to either side of the open loop's poles
+EVEN = 400  # points of the circle beside those
+DIPS = 5  # lowest points of the circle that are refined
+
+
+@dataclass(frozen=True)
+@record
+class SampledJudge:
+    """What K1 and K2 are worth in a sampled loop of few modes, its Kp held; the K1 and K2 of `loop` do not matter."""
+
+    loop: SampledLoop
+    objective: str
+    modes: int
+
+    def effort(self, K2: Bounds) -> Effort:
+        """The grid is cheap but for the residual, which is simulated."""
+        return {"margin": Effort(24, 32, 6), "damping": Effort(32, 36, 12)}.get(self.objective, Effort(36, 90, 20))
+
+    def landscape(self, axes: tuple[Axis, Axis], effort: Effort) -> tuple[Real, Score]:
+        """Scores over the grid (rows of K2), inf where not stable, and the score itself, which is so too."""
+        K1, K2 = (axis.gain(axis.middles(number)) for axis, number in zip(axes, effort[:2], strict=True))
+        grid_K1, grid_K2 = np.meshgrid(K1, K2)
+        return self.score(grid_K1.ravel(), grid_K2.ravel()).reshape(grid_K1.shape), self.score
+
+    def score(self, K1: Real, K2: Real) -> Real:
+        """What is minimised, for arrays of K1 and K2; inf where the loop does not hold with `RESERVE`."""
+        values = np.full(K1.size, np.inf)
+        for i in range(0, K1.size, BLOCK):
+            part = slice(i, i + BLOCK)
+            z = np.linalg.eigvals(self._matrices(K1[part], K2[part], 1.0))
+            good = abs(z).max(axis=1) < 1.0
+            for share in (RESERVE, 1 / RESERVE):
+                more = np.linalg.eigvals(self._matrices(K1[part][good], K2[part][good], share))
+                good[good] = abs(more).max(axis=1) < 1.0
+            if good.any():
+                values[part][good] = self._scores(K1[part][good], K2[part][good], z[good])
+        return values
+
+    def holds(self, law: HubFeedback) -> bool:
+        """Whether the loop is stable with as many modes as it takes, also with the reserve, and without a clock."""
+        arm, chain = self.loop.plant.arm, self.loop.chain
+        try:
+            return stability(arm, law).is_stable and all(
+                sampled_verdict(arm, scaled(law, share), chain).is_stable for share in (1.0, 1 / RESERVE, RESERVE)
+            )
+        except ConvergenceError:
+            return False
+
+    def value(self, law: HubFeedback, score: float) -> float:
+        """The damping ratio, disk margin, or residual moment [N m] of a law of that score."""
+        if self.objective == "margin":
+            return self.disk(law)
+        return score if self.objective == "residual" else -score
+
+    def _scores(self, K1: Real, K2: Real, z: Complex) -> Real:
+        if self.objective == "damping":
+            return -self.damping(z)
+        return self.residual(K1, K2) if self.objective == "residual" else -self._disks(K1, K2) - TIE * self.damping(z)
+
+    # ------------------------------------------------------------ matrices and poles
+
+    @cached_property
+    def _parts(self) -> tuple[Real, Real, Real, Real]:
+        """Closed-loop matrices without any gain, and what Kp as it is, K1 = 1 and K2 = 1 add."""
+        Kp, bare = self.loop.gains.Kp, self.loop.having(K1=0.0, K2=0.0)
+        start = bare.reduced_matrix()
+        by_angle = bare.having(Kp=2 * Kp).reduced_matrix() - start
+        by_rate, by_moment = (bare.having(**{name: 1.0}).reduced_matrix() - start for name in ("K1", "K2"))
+        return start - by_angle, by_angle, by_rate, by_moment
+
+    def _matrices(self, K1: Real, K2: Real, share: float) -> Real:
+        start, by_angle, by_rate, by_moment = self._parts
+        moving = K1[:, None, None] * by_rate + K2[:, None, None] * by_moment
+        return np.asarray(start + share * (by_angle + moving))
+
+    def damping(self, z: Complex) -> Real:
+        """The least damping ratio of the oscillating poles of the first modes, of closed-loop poles (gains, n)."""
+        z = np.where(z.imag >= 0, z, 0.0)  # one of each pair
+        rows = np.arange(len(z))
+        for own in self._higher:
+            z[rows, abs(z - own).argmin(axis=1)] = 0.0
+        angle, seen = np.angle(z), z != 0
+        s = np.log(np.where(seen, abs(z), 1.0)) + 1j * angle
+        ratio = -s.real / np.where(seen, abs(s), 1.0)
+        return np.asarray(np.where(seen & (angle > REAL), ratio, 1.0).min(axis=1))
+
+    @cached_property
+    def _higher(self) -> list[complex]:
+        """Open-loop poles in z, Im z >= 0, of the modes beyond the first ones: the highest come first."""
+        pulse = self.loop.pulse
+        places = np.nonzero((pulse.mode > self.modes) & (pulse.poles.imag >= 0))[0]
+        z = pulse.multipliers[places[np.argsort(-pulse.mode[places], kind="stable")]]
+        return [complex(each.real, abs(each.imag)) for each in z]
+
+    # ------------------------------------------------------------ disk margin
+
+    @cached_property
+    def _circle(self) -> Complex:
+        """H (gains, n) of what is fed back, at points of the circle that are dense about the open loop's poles."""
+        angle = abs(np.angle(self.loop.pulse.multipliers))
+        close = (angle[:, None] + np.r_[-AROUND, AROUND]).ravel()
+        q = np.unique(np.r_[np.linspace(0, np.pi, EVEN + 1)[1:], close[(close > 0) & (close <= np.pi)]])
+        return np.concatenate([np.exp(1j * q)[None], self._signals(q)])
+
+    def _signals(self, q: Real) -> Complex:
+        return self.loop.signals(np.exp(1j * q), None, np.ones(q.size))
+
+    def _disks(self, K1: Real, K2: Real) -> Real:
+        laws = np.array([np.full(K1.size, self.loop.gains.Kp), K1, K2])
+        return np.array([_disk_of(gains @ self._circle[1:]).min() for gains in laws.T])
+
+    def disk(self, law: HubFeedback) -> float:
+        """The disk margin of one law, its lowest dips refined between the points of the circle."""
+        row = np.array(law.row)
+        q = np.angle(self._circle[0])
+        values = _disk_of(row @ self._circle[1:])
+        best = [float(values.min())]
+        for i in np.argsort(values)[:DIPS]:
+            ends = (q[max(i - 1, 0)], q[min(i + 1, q.size - 1)])
+            done = minimize_scalar(
+                lambda at: float(_disk_of(row @ self._signals(np.array([at])))[0]),
+                bounds=ends, method="bounded", options={"xatol": 1e-9 * (ends[1] - ends[0])},
+            )  # fmt: skip
+            best.append(float(done.fun))
+        return min(best)
+
+    # ------------------------------------------------------------ residual
+
+    @cached_property
+    def _slew(self) -> tuple[Real, int]:
+        """What enters each sample per unit gain (n, 3): as it is, times K1, times K2; and the first sample after it."""
+        arm, chain = self.loop.plant.arm, self.loop.chain
+        T, rise = chain.sampling.period, chain.slew.rise_time
+        left = max(2 * np.pi / first_frequency(arm), SAMPLES_LEFT * T)
+        task = scenario("slew", arm, chain, rise + left)
+        fixed = task.feedforward + self.loop.gains.Kp * task.hub_angle
+        return np.c_[fixed, task.hub_rate, task.rigid_moment], int(np.searchsorted(task.t, rise * (1 - 1e-12)))
+
+    def residual(self, K1: Real, K2: Real) -> Real:
+        """Root mean square of the root moment [N m] over a period of the first mode after the slew."""
+        bare = self.loop.having(K1=0.0, K2=0.0)
+        start = bare.matrix()
+        by_rate, by_moment = (bare.having(**{name: 1.0}).matrix() - start for name in ("K1", "K2"))
+        A = start + K1[:, None, None] * by_rate + K2[:, None, None] * by_moment
+        _, B, C = self.loop.pulse.matrices()
+        drive, sense = np.zeros(len(start)), np.zeros(len(start))
+        drive[: B.size], sense[: B.size] = B, C[FED_BACK.index("root_moment")]
+        parts, first = self._slew
+        x, total = np.zeros((K1.size, len(start), 1)), np.zeros(K1.size)
+        for k, (fixed, rate, moment) in enumerate(parts):
+            if k >= first:
+                total += (x[..., 0] @ sense) ** 2
+            x = A @ x + drive[:, None] * (fixed + K1 * rate + K2 * moment)[:, None, None]
+        return np.asarray(np.sqrt(total / (len(parts) - first)))
+
+
+def scaled(law: HubFeedback, share: float) -> HubFeedback:
+    """The law with every gain times `share`."""
+    return HubFeedback(K1=share * law.K1, K2=share * law.K2, Kp=share * law.Kp)
+
+
+def sampled_judges(arm: Arm, chain: Chain, objective: str, Kp: float, modes: int) -> Iterator[SampledJudge]:
+    """Judges of 8 modes, of 16, ... up to as many as the loop has; without damping of as many as its verdict takes."""
+    law = HubFeedback(K1=1.0, K2=0.5 * arm.input_per_torque, Kp=Kp)
+    most = UNDAMPED_MODES if arm.has_elastic_link else most_modes(arm, chain)
+    count = most if arm.has_elastic_link else min(most, max(FEWEST_MODES, modes + FEWEST_MODES // 2))
+    while True:
+        yield SampledJudge(sampled_loop(arm, law, chain, count=count), objective, modes)
+        if count >= most:
+            return
+        count = min(2 * count, most)
+
+
+def _disk_of(L: Complex) -> Real:
+    """2 |1 + L|/|1 - L|."""
+    return np.asarray(2 * abs(1 + L) / np.maximum(abs(1 - L), 1e-300))
