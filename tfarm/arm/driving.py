@@ -24,3 +24,14 @@ def through(arm: Arm, law: AnyLaw) -> tuple[Arm, AnyLaw]:
     if law.input is not None and law.input != arm.input:
         arm = replace(arm, input=law.input)  # type: ignore[arg-type]  # the record refuses what is none
     return arm, law.gains or law
+
+
+def tracked(arm: Arm, law: AnyLaw) -> tuple[Arm, AnyLaw]:
+    """The same for a loop that is led: gains at the hub follow references in all that they feed back.
+
+    So a law that is no more than gains is taken for them where each of its signals is among its references.
+    """
+    driven, plain = through(arm, law)
+    if isinstance(law, Law) and not set(law.signals) <= set(law.references):
+        return driven, law
+    return driven, plain

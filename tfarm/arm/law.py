@@ -107,14 +107,20 @@ class Law:
 
     @classmethod
     def of_gains(cls, law: HubFeedback) -> Law:
-        """The hub's two or three gains as a law."""
-        used = {gain.output: law[gain.name] for gain in GAINS if law[gain.name]}
-        return cls(used or {"hub_rate": 0.0}, name="gains at the hub")
+        """The hub's two or three gains as a law, on what their signals are off their references."""
+        used = {gain.output: law[gain.name] for gain in GAINS if law[gain.name]} or {"hub_rate": 0.0}
+        return cls(used, name="gains at the hub", references=tuple(used))
 
     @property
     def signals(self) -> tuple[str, ...]:
         """The signals that are fed back, each once."""
         return tuple(dict.fromkeys(name for part in self.parts for name in part.signals if is_measured(name)))
+
+    @property
+    def wanted(self) -> tuple[str, ...]:
+        """The columns that are led to references, "reference:hub_angle", each once."""
+        every = (name for part in self.parts for name in part.signals)
+        return tuple(dict.fromkeys(name for name in every if name.startswith(REFERENCE)))
 
     @property
     def is_discrete(self) -> bool:
@@ -173,22 +179,23 @@ class Law:
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(numerators / whole)
 
-    def matrices(self) -> Matrices:
-        """One state space from all signals to what is taken off the input (v = -out).
+    def matrices(self, columns: Sequence[str] | None = None) -> Matrices:
+        """One state space from all signals, or these columns, to what is taken off the input (v = -out).
 
         Raises ParameterError where a part differentiates.
         """
+        columns = self.signals if columns is None else tuple(columns)
         blocks = [part.block.matrices() for part in self.parts]
-        n, m = self.order, len(self.signals)
+        n, m = self.order, len(columns)
         A, B, C, D = np.zeros((n, n)), np.zeros((n, m)), np.zeros((1, n)), np.zeros((1, m))
         start = 0
         for part, (a, b, c, d) in zip(self.parts, blocks, strict=True):
             states = slice(start, start + len(a))
             A[states, states], C[:, states] = a, c
             for j, name in enumerate(part.signals):
-                if name in self.signals:
-                    B[states, self.signals.index(name)] += b[:, j]
-                    D[:, self.signals.index(name)] += d[:, j]
+                if name in columns:
+                    B[states, columns.index(name)] += b[:, j]
+                    D[:, columns.index(name)] += d[:, j]
             start += len(a)
         return A, B, -self.sign * C, -self.sign * D
 

@@ -137,7 +137,7 @@ def gains_of(arm: Arm, given: Given) -> tuple[HubFeedback, dict[str, Any]]:
     from tfarm.spectrum.scales import default_gains, default_words
 
     if given.law is not None:
-        remedy = "this command knows gains at the hub; poles, margins, locus and sampled take any law"
+        remedy = "this command knows gains at the hub; poles, margins, sampled and simulate take any law"
         raise ParameterError(key="--law", value=given.law, remedy=remedy)
     missing = [name for name in HELP if given.gains.get(name) is None]
     law = replace(default_gains(arm), **{name: value for name, value in given.gains.items() if value is not None})

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tfarm.cli.app import ArmName, Json, app, give, load_arm, whole
-from tfarm.cli.inputs import Given, gains_of, law_of, under_a_law
+from tfarm.cli.inputs import Given, law_of, under_a_law
 
 if TYPE_CHECKING:
     from tfarm.dsp import Chain
@@ -84,8 +84,8 @@ def simulate(
     from tfarm.dsp.results import simulated_answer
 
     if controller is None:
-        gains, said = gains_of(subject, given)
-        answer = said | simulated_answer(subject, gains, chain, scenario, duration, count=count, between=records)
+        law, said = law_of(subject, given)
+        answer = said | simulated_answer(subject, law, chain, scenario, duration, count=count, between=records)
     else:
         from tfarm.tuner.saving import load_tuner
         from tfarm.tuner.tuning import controlled_answer

@@ -51,6 +51,8 @@ def print_sampled_law(answer: dict[str, Any]) -> None:
 
 def print_simulation(answer: dict[str, Any]) -> None:
     """What the simulation comes to."""
+    if "rule_in_words" in answer:
+        print(f"{answer['law']}, order {answer['law_order']}, {answer['rule_in_words']}: {answer['sign_convention']}")
     print(f"{answer['arm']}, {answer['scenario_in_words']}: {len(answer['t'])} samples of {answer['period_s']:g} s")
     change, known = answer["modes_change"], "as asked"
     if change is not None:

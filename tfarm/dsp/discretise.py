@@ -12,13 +12,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tfarm.arm import Arm
 from tfarm.arm.blocks import Block, Rational, StateSpace
+from tfarm.arm.feedback import through
 from tfarm.arm.law import Law, Part
 from tfarm.errors import ParameterError
+from tfarm.response.signals import Signals
 
 Real = NDArray[np.float64]
 
@@ -50,6 +54,23 @@ def rule_in_words(law: Law) -> str:
         return f"made discrete by Tustin's rule, exact at {law.prewarp:g} rad/s"
     words = {"tustin": "Tustin's rule", "zoh": "zero-order hold", "matched": "matched poles and zeros"}
     return f"made discrete by {words[law.rule]}"
+
+
+def described_law(law: Law, arm: Arm) -> dict[str, Any]:
+    """The law as it was given, how it is sampled, and what it reads and drives."""
+    units = Signals(arm, law.signals).units
+    sign, late = "-" if law.sign < 0 else "+", f", {law.delay:g} s late" if law.delay else ""
+    words = f"v = {sign}sum of C_i(z) y_i{late}; v is {through(arm)}, y = ({', '.join(law.signals)})"
+    return {
+        "law": law.name,
+        "signals": dict(zip(law.signals, units, strict=True)),
+        "law_order": law.order,
+        "delay_s": law.delay,
+        "rule": "none" if law.is_discrete else law.rule,
+        "rule_in_words": rule_in_words(law),
+        "sign_convention": words,
+        "input": arm.input,
+    }
 
 
 def _in_z(part: Part, law: Law, period: float) -> Block:

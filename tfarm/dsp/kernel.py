@@ -149,3 +149,69 @@ def run(
             strike(amplitude, rigid, impulse)
         advance(tables, amplitude, rigid, acting, held[(k - delay) % ring], disturbance[k], fine[k], work)
     return n
+
+
+@compiled
+def product(row: Any, values: Any, start: float, single: bool) -> float:
+    """start + row . values, in float64, or every product and sum rounded to float32."""
+    total = start
+    for j in range(values.size):
+        term = row[j] * values[j]
+        if single:
+            term = float(np.float32(term))
+        total += term
+        if single:
+            total = float(np.float32(total))
+    return total
+
+
+@compiled
+def run_law(
+    tables: Any, amplitude: Any, rigid: Any, held: Any, delay: int, matrices: Any, kinds: Any, references: Any,
+    ideal: Any, disturbance: Any, impulse: float, rows: Any, filter_: Any, single: bool, bound: float, record: Any,
+    torque: Any, fine: Any, saturated: Any, work: Any,
+) -> int:  # fmt: skip
+    """As `run`, under x_{k+1} = A x + B y, u = r - C x - D y, whose signals are the outputs from number 7 on.
+
+    `kinds` (signals,) says through what each goes: 0 nothing, 1 the encoder, 2 the strain amplifier, 3 the rate
+    estimate; `references` (n, columns) is taken off, and is all there is of columns beyond the signals (y = 0 there).
+    """
+    weights, rates, static = tables[3], tables[4], tables[5]
+    A, B, C, D = matrices
+    n, ring, memory = torque.size, held.size, np.zeros(3)
+    x, after, y = np.zeros(A.shape[0]), np.zeros(A.shape[0]), np.zeros(B.shape[1])
+    for k in range(n):
+        acting = held[(k - delay - 1) % ring]
+        extra = disturbance[k - 1] if k > 0 else 0.0
+        read(weights, rates, static, amplitude, rigid, acting + extra, record[k])
+        if not abs(record[k, 2]) <= bound:
+            return k
+        clipped = saturated[k]
+        angle = quantise(record[k, 0], rows[ANGLE], clipped, ANGLE)
+        moment = quantise(record[k, 2], rows[MOMENT], clipped, MOMENT)
+        rate = estimate(angle, record[k, 1], memory, filter_)
+        for j in range(y.size):
+            value = 0.0
+            if j < kinds.size:
+                value = record[k, 7 + j]
+                if kinds[j] == 1:
+                    value = angle
+                elif kinds[j] == 2:
+                    value = moment
+                elif kinds[j] == 3:
+                    value = rate
+            y[j] = value - references[k, j]
+            if single:
+                y[j] = float(np.float32(float(np.float32(value)) - float(np.float32(references[k, j]))))
+        u = ideal[k, 0] - product(D[0], y, product(C[0], x, 0.0, single), single)
+        if single:
+            u = float(np.float32(u))
+        for i in range(x.size):
+            after[i] = product(B[i], y, product(A[i], x, 0.0, single), single)
+        x[:] = after
+        u = quantise(u, rows[TORQUE], clipped, TORQUE)
+        held[k % ring] = torque[k] = u
+        if k == 0:
+            strike(amplitude, rigid, impulse)
+        advance(tables, amplitude, rigid, acting, held[(k - delay) % ring], disturbance[k], fine[k], work)
+    return n

@@ -193,6 +193,13 @@ def sampled_law(
     Raises ParameterError for a locked hub, an unknown signal, a law in z of another period, and what `discretised`
     refuses, and for a massless hub whose moment is fed back (an algebraic loop).
     """
+    acting, late = acting_law(arm, law, chain)
+    acting = with_estimate(acting, chain)
+    return SampledLaw(sensed_plant(arm, late, acting.signals, count, branches), late, acting, law)
+
+
+def acting_law(arm: Arm, law: Law, chain: Chain) -> tuple[Law, Chain]:
+    """The law in z, and the chain with its delay."""
     T = chain.sampling.period
     samples = chain.sampling.delay_samples + law.delay / T
     if samples > MOST_DELAY:
@@ -202,8 +209,7 @@ def sampled_law(
         remedy = "with hub.inertia = 0 the root moment is -u itself: an algebraic loop; give the hub an inertia"
         raise ParameterError(key="signals", value="root_moment", remedy=remedy)
     late = replace(chain, sampling=replace(chain.sampling, delay_samples=samples))
-    acting = with_estimate(discretised(law, T), chain)
-    return SampledLaw(sensed_plant(arm, late, acting.signals, count, branches), late, acting, law)
+    return discretised(law, T), late
 
 
 def with_estimate(law: Law, chain: Chain) -> Law:

@@ -8,18 +8,16 @@ from typing import Any
 
 from tfarm.arm import Arm
 from tfarm.arm.checks import whole as whole_number
-from tfarm.arm.feedback import through
 from tfarm.arm.law import Law
 from tfarm.dsp.band import Band
 from tfarm.dsp.chain import Chain
-from tfarm.dsp.discretise import rule_in_words
+from tfarm.dsp.discretise import described_law, rule_in_words
 from tfarm.dsp.law_circle import LawCircle
 from tfarm.dsp.law_loop import SampledLaw, sampled_law
 from tfarm.dsp.law_margins import stable_factors
 from tfarm.dsp.margins import DelayMargin, Window, around, delay_margin, whole
 from tfarm.dsp.verdict import MOST_ASKED, UNDAMPED_MODES, Verdict, settled
 from tfarm.records import record
-from tfarm.response.signals import Signals
 
 
 @dataclass(frozen=True)
@@ -81,7 +79,7 @@ def law_answer(analysis: LawAnalysis) -> dict[str, Any]:
     sampling, bound = loop.chain.sampling, analysis.delay_margin
     return {
         "arm": loop.plant.arm.name,
-        **described_law(loop.asked, loop),
+        **described_law(loop.asked, loop.plant.arm),
         "period_s": sampling.period,
         "delay_samples": sampling.delay_samples,
         "verdict": verdict.word,
@@ -101,22 +99,4 @@ def law_answer(analysis: LawAnalysis) -> dict[str, Any]:
         "delay_margin_s": bound.samples * sampling.period,
         "delay_margin_is_lower_bound": bound.is_bound,
         "unfiltered_signals": [name for name, analog in zip(loop.law.signals, loop.analog, strict=True) if not analog],
-    }
-
-
-def described_law(law: Law, loop: SampledLaw) -> dict[str, Any]:
-    """The law as it was given, how it is sampled, and what it reads and drives."""
-    units = Signals(loop.plant.arm, law.signals).units
-    sign, late = "-" if law.sign < 0 else "+", f", {law.delay:g} s late" if law.delay else ""
-    arm = loop.plant.arm
-    words = f"v = {sign}sum of C_i(z) y_i{late}; v is {through(arm)}, y = ({', '.join(law.signals)})"
-    return {
-        "law": law.name,
-        "signals": dict(zip(law.signals, units, strict=True)),
-        "law_order": law.order,
-        "delay_s": law.delay,
-        "rule": "none" if law.is_discrete else law.rule,
-        "rule_in_words": rule_in_words(law),
-        "sign_convention": words,
-        "input": arm.input,
     }

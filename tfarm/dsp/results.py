@@ -11,9 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import LISTED, Arm, HubFeedback, driven, unit_of
+from tfarm.arm.driving import AnyLaw, tracked
 from tfarm.columns import Column
 from tfarm.dsp.chain import Chain
+from tfarm.dsp.discretise import described_law
 from tfarm.dsp.enough import Enough, enough_modes
+from tfarm.dsp.law_simulate import LawSimulator
 from tfarm.dsp.scenarios import Scenario, described, scenario
 from tfarm.dsp.simulate import Simulation, Simulator, Trace
 
@@ -127,7 +130,7 @@ def _half_range(signal: Real) -> float:
 
 
 def simulation_answer(
-    arm: Arm, gains: HubFeedback, simulation: Simulation, cycle: LimitCycle | None, used: Enough
+    arm: Arm, law: AnyLaw, simulation: Simulation, cycle: LimitCycle | None, used: Enough
 ) -> dict[str, Any]:
     """The simulation as a dictionary of plain numbers, texts and lists.
 
@@ -136,15 +139,9 @@ def simulation_answer(
     """
     answer: dict[str, Any] = {
         "arm": arm.name,
-        "law": "u = r - Kp theta - K1 theta_t - K2 M, with references; a positive root moment M accelerates the hub"
-        + driven(arm),
-        "input": arm.input,
-        "gain_units": {gain.name: unit_of(gain.name, arm) for gain in LISTED},
+        **_led_by(arm, law),
         "scenario": simulation.scenario.name,
         "reading": simulation.chain.slew.reading,
-        "K1": gains.K1,
-        "K2": gains.K2,
-        "Kp": gains.Kp,
         "period_s": simulation.scenario.period,
         "modes_used": used.modes,
         "modes_change": None if math.isnan(used.change) else used.change,
@@ -160,6 +157,21 @@ def simulation_answer(
     if simulation.between is not None:
         answer["between"] = _columns(simulation.between)
     return answer
+
+
+def _led_by(arm: Arm, law: AnyLaw) -> dict[str, Any]:
+    """The law, and what it drives."""
+    if not isinstance(law, HubFeedback):
+        return described_law(law, arm) | {"references": list(law.references)}
+    words = "u = r - Kp theta - K1 theta_t - K2 M, with references; a positive root moment M accelerates the hub"
+    return {
+        "law": words + driven(arm),
+        "input": arm.input,
+        "gain_units": {gain.name: unit_of(gain.name, arm) for gain in LISTED},
+        "K1": law.K1,
+        "K2": law.K2,
+        "Kp": law.Kp,
+    }
 
 
 def _figures(simulation: Simulation) -> dict[str, Any]:
@@ -206,7 +218,7 @@ def ideal_chain(chain: Chain) -> Chain:
 
 def simulate(
     arm: Arm,
-    law: HubFeedback,
+    law: AnyLaw,
     chain: Chain | None = None,
     scenario_name: str = "slew",
     duration: float = 3.0,
@@ -217,23 +229,32 @@ def simulate(
     """The sampled loop in time, exact between the samples: a "slew", "step", "decay" or "impulse" of `duration` [s].
 
     With `count` flexible modes, or as many as the digits of the signals take, and `between` records between two
-    samples.  Raises ParameterError for a locked hub, for I_h = 0 with K2 != 0, and for what `scenario` refuses.
+    samples.  Raises ParameterError for a locked hub, an algebraic loop, an unknown signal, a law in z whose period is
+    not the chain's, and for what `scenario` refuses.
     """
     chain = Chain() if chain is None else chain
+    arm, law = tracked(arm, law)
     return _simulated(arm, law, chain, scenario(scenario_name, arm, chain, duration), count, between)[0]
 
 
+def simulation_of(arm: Arm, law: AnyLaw, chain: Chain, task: Scenario, *, count: int, between: int = 0) -> Simulation:
+    """A scenario simulated with `count` modes, gains at the hub following references in all that they feed back."""
+    if isinstance(law, HubFeedback):
+        return Simulator(arm, chain, task, count=count, between=between).linear(law)
+    return LawSimulator(arm, law, chain, task, count=count, between=between).run()
+
+
 def _simulated(
-    arm: Arm, law: HubFeedback, chain: Chain, task: Scenario, count: int | None, between: int
+    arm: Arm, law: AnyLaw, chain: Chain, task: Scenario, count: int | None, between: int
 ) -> tuple[Simulation, Enough]:
     """The simulation, and how many modes it took."""
-    used = modes_for(count, lambda n: Simulator(arm, ideal_chain(chain), task, count=n).linear(law))
-    return Simulator(arm, chain, task, count=used.modes, between=between).linear(law), used
+    used = modes_for(count, lambda n: simulation_of(arm, law, ideal_chain(chain), task, count=n))
+    return simulation_of(arm, law, chain, task, count=used.modes, between=between), used
 
 
 def simulated_answer(
     arm: Arm,
-    gains: HubFeedback,
+    law: AnyLaw,
     chain: Chain,
     name: str,
     duration: float,
@@ -243,13 +264,14 @@ def simulated_answer(
 ) -> dict[str, Any]:
     """Simulate a scenario by its name and say what came of it: with `count` modes, or as many as its digits take.
 
-    Raises ParameterError for a locked hub, for I_h = 0 with K2 != 0, and for what `scenario` and `Simulator` refuse.
+    Raises ParameterError as `simulate` does.
     """
+    arm, law = tracked(arm, law)
     task, cycle = scenario(name, arm, chain, duration), None
-    simulation, used = _simulated(arm, gains, chain, task, count, between)
+    simulation, used = _simulated(arm, law, chain, task, count, between)
     if not chain.is_linear:
-        cycle = limit_cycle(simulation, Simulator(arm, ideal_chain(chain), task, count=used.modes).linear(gains))
-    return simulation_answer(arm, gains, simulation, cycle, used) | {"scenario_in_words": described(task, arm, chain)}
+        cycle = limit_cycle(simulation, simulation_of(arm, law, ideal_chain(chain), task, count=used.modes))
+    return simulation_answer(arm, law, simulation, cycle, used) | {"scenario_in_words": described(task, arm, chain)}
 
 
 def modes_for(count: int | None, simulate: Callable[[int], Simulation]) -> Enough:

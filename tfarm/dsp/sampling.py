@@ -172,7 +172,7 @@ class PulseTransfer:
         return columns[0], columns[1]
 
     def state_space(self) -> control.StateSpace:
-        """The same as a discrete `control.StateSpace` with dt = T and named signals."""
+        """The same as a discrete `control.StateSpace` with dt = T and named signals, "moment@0_3" of moment@0.3."""
         import control
 
         A, B, C = self.matrices()
@@ -183,7 +183,7 @@ class PulseTransfer:
             np.zeros((len(C), 1)),
             self.sampling.period,
             inputs=["hub_torque"],
-            outputs=list(self.plant.outputs),
+            outputs=[name.replace(".", "_") for name in self.plant.outputs],  # a dot says there whose signal it is
             name=f"{self.plant.arm.name} sampled",
         )
 

@@ -121,13 +121,17 @@ class Simulator:
         remedy = f"a whole number of records between two samples, 0 to {MOST_BETWEEN}"
         between = whole("between", between, 0, MOST_BETWEEN, remedy)
         self.chain, self.scenario, self.between = chain, scenario, between
-        plant = undelayed_plant(arm, chain, (*MEASURED, *RECORDED), count)
-        self.plant = filtered(plant, chain)  # the first of each name: those that are recorded come later
+        self.plant = self.plant_of(arm, count)
         self._kept = np.nonzero(self.plant.poles.imag >= 0)[0]
         self._tables = _tables(self.plant, self._kept, chain, between)
         self._rows = quantisers(chain).rows
         self._ideal = np.c_[scenario.feedforward, scenario.hub_angle, scenario.hub_rate, scenario.rigid_moment]
         self._bound = FOLDED_UP * arm.bending_scale
+
+    def plant_of(self, arm: Arm, count: int) -> Plant:
+        """What is measured, through its filters, and then what is recorded."""
+        plant = undelayed_plant(arm, self.chain, (*MEASURED, *RECORDED), count)
+        return filtered(plant, self.chain)  # the first of each name: those that are recorded come later
 
     def linear(self, gains: HubFeedback, K2: Real | None = None) -> Simulation:
         """The law u = r + Kp (theta_ref - theta) + K1 (theta_t_ref - theta_t) - K2 x, compiled; `K2` (n,) may vary.

@@ -1,0 +1,188 @@
+"""Simulations under any law: against gains, a controller in Python, python-control; and those of a real rig."""
+
+from pathlib import Path
+
+import control
+import numpy as np
+import pytest
+from scipy.io import loadmat
+
+import tfarm
+from tests.dsp.law_verdicts import radius_of, stepped
+from tests.shell import answer, run
+from tfarm import HubFeedback, Law, ParameterError
+from tfarm.arm.law_tables import load_law
+from tfarm.dsp import Actuator, Chain, Converters, Sampling, Simulator, load_chain, scenario
+from tfarm.dsp.law_loop import sampled_law
+from tfarm.dsp.law_simulate import LawSimulator
+from tfarm.dsp.law_verdict import law_verdict
+from tfarm.dsp.scenarios import SCENARIOS
+
+T = 0.01
+LAB, RIG = tfarm.load("sasaki2012-lab"), tfarm.load("quanser-2dsfl")
+DATA = Path(__file__).parent.parent / "data" / "quanser-2dsfl"
+REAL = Chain(
+    sampling=Sampling(delay_samples=1.3, antialias_corner=300.0),
+    converters=Converters(
+        encoder_counts=4096, hub_rate="difference", rate_filter=100.0, moment_bits=10, moment_range=5.0
+    ),
+    actuator=Actuator(torque_limit=3.0),
+)
+ROUNDED = 1e-11  # of the largest: 200 samples of a loop that is stable
+
+
+def close(mine, theirs, tolerance=ROUNDED):
+    assert mine.at_samples.t.size == theirs.at_samples.t.size
+    for name in ("hub_angle", "root_moment", "tip_displacement"):
+        a, b = getattr(mine.at_samples, name), getattr(theirs.at_samples, name)
+        np.testing.assert_allclose(a, b, rtol=0, atol=tolerance * abs(b).max(), err_msg=name)
+    np.testing.assert_allclose(mine.torque, theirs.torque, rtol=0, atol=tolerance * abs(theirs.torque).max())
+    assert mine.saturated == theirs.saturated
+
+
+@pytest.mark.parametrize("chain", [Chain(), REAL], ids=["ideal", "real"])
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_gains_at_the_hub_do_the_same_as_a_law(name, chain):
+    gains, task = HubFeedback(K1=0.3, K2=0.3, Kp=1.0), scenario(name, LAB, chain, 2.0)
+    mine = LawSimulator(LAB, Law.of_gains(gains), chain, task, count=8).run()
+    close(mine, Simulator(LAB, chain, task, count=8).linear(gains))
+
+
+def test_float32_is_that_of_the_gains_to_its_last_bits():
+    chain, gains = Chain(converters=Converters(arithmetic="float32")), HubFeedback(K1=0.3, K2=0.3)
+    task = scenario("slew", LAB, chain, 2.0)
+    mine = LawSimulator(LAB, Law.of_gains(gains), chain, task, count=6).run()
+    close(mine, Simulator(LAB, chain, task, count=6).linear(gains), 20 * np.finfo(np.float32).eps)
+    assert (mine.torque == mine.torque.astype(np.float32)).all()
+
+
+def test_a_law_with_states_is_a_controller_that_remembers():
+    """The same filter in Python, without references: a lead on the angle, and a gain on the moment."""
+    law = Law({"hub_angle": ([4.0, -3.6], [1.0, -0.5]), "root_moment": 0.1}, period=T, delay=0.004)
+    task, memory = scenario("slew", LAB, Chain(), 2.0), [0.0, 0.0]
+
+    def controller(m):
+        out = 0.5 * memory[0] + 4.0 * m.hub_angle - 3.6 * memory[1]
+        memory[:] = out, m.hub_angle
+        return m.feedforward - out - 0.1 * m.root_moment
+
+    mine = LawSimulator(LAB, law, Chain(), task, count=8).run()
+    close(mine, Simulator(LAB, Chain(sampling=Sampling(delay_samples=0.4)), task, count=8).controller(controller))
+
+
+def test_a_servo_follows_as_python_control_says():
+    """A lead on hub angle less its reference, with a moment filter: the sampled plant and the law closed by hand."""
+    law = Law(
+        {"hub_angle": ([6.0, -5.4], [1.0, -0.5]), "moment@0.3": ([0.05], [1.0, -0.5])},
+        period=T, references=("hub_angle",),
+    )  # fmt: skip
+    task = scenario("slew", LAB, Chain(), 2.0)
+    mine = LawSimulator(LAB, law, Chain(), task, count=6).run()
+    A, B, C, D = law.matrices()
+    plant = sampled_law(LAB, law, Chain(), count=6).pulse.state_space()
+    loop, by_angle = control.feedback(plant, control.ss(A, B, C, D, T)), control.ss(A, B[:, [0]], C, D[:, [0]], T)
+    t = np.arange(task.feedforward.size) * T
+    led = task.feedforward + control.forced_response(by_angle, t, task.hub_angle).outputs
+    found = control.forced_response(loop, t, led).outputs[0]
+    np.testing.assert_allclose(mine.at_samples.hub_angle, found, atol=1e-9 * abs(found).max())
+
+
+def test_a_column_of_references_is_a_reference():
+    task, gain = scenario("slew", LAB, Chain(), 1.5), 3.0
+    one = Law({"hub_angle": gain, "hub_rate": 1.0}, references=("hub_angle",))
+    other = Law.of_matrices(
+        np.empty((0, 0)),
+        np.empty((0, 3)),
+        np.empty((1, 0)),
+        [[-gain, gain, -1.0]],
+        ["hub_angle", "reference:hub_angle", "hub_rate"],
+        sign=1,
+    )
+    close(*(LawSimulator(LAB, law, Chain(), task, count=6).run() for law in (one, other)))
+
+
+def test_what_a_law_of_gains_follows_are_its_references():
+    gains = HubFeedback(K1=0.3, K2=0.3)
+    led = tfarm.simulate(LAB, Law.of_gains(gains), count=6)
+    close(led, tfarm.simulate(LAB, gains, count=6), 0.0)
+    braked = tfarm.simulate(LAB, Law({"hub_rate": 0.3, "root_moment": 0.3}), count=6)
+    assert abs(braked.at_samples.hub_angle[-1]) < 0.9 * abs(led.at_samples.hub_angle[-1])
+
+
+def test_the_limit_of_the_input_is_that_of_the_law():
+    chain = Chain(actuator=Actuator(torque_limit=2.0))
+    found = tfarm.simulate(LAB, Law({"hub_rate": ([1.0], [0.01, 1.0])}), chain, count=6)
+    assert abs(found.torque).max() == 2.0
+    assert found.saturated["torque"] > 10
+
+
+def test_a_loop_that_grows_is_stopped():
+    found = tfarm.simulate(LAB, Law({"hub_angle": ([-50.0, 45.0], [1.0, 0.0])}, period=T), count=6)
+    assert found.stopped is not None
+
+
+def test_no_reference_is_made_up(capsys, tmp_path):
+    with pytest.raises(ParameterError) as error:
+        tfarm.simulate(LAB, Law({"tip_displacement": 1.0}, references=("tip_displacement",)))
+    assert error.value.key == "references"
+    (tmp_path / "law.toml").write_text("[law]\nperiod = 0.004\n[law.hub_rate]\nnum = [1.0, 0.0]\nden = [1.0, 0.5]\n")
+    code, _, err = run(capsys, "simulate", "sasaki2012-lab", "--law", str(tmp_path / "law.toml"))
+    assert code == 2
+    assert err.count("\n") == 1
+
+
+def test_the_command_simulates_a_law(capsys, tmp_path):
+    text = "[law]\nname = 'PD'\nreferences = ['hub_angle']\n[law.hub_angle]\nnum = [2.0, 1.0]\nden = [0.01, 1.0]\n"
+    (tmp_path / "law.toml").write_text(text)
+    typed = ("simulate", "sasaki2012-lab", "--law", str(tmp_path / "law.toml"), "--modes", "6")
+    found = answer(capsys, *typed)
+    law = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0])}, references=("hub_angle",))
+    assert found["hub_angle"] == tfarm.simulate(LAB, law, count=6).at_samples.hub_angle.tolist()
+    assert (found["law"], found["rule"], found["references"]) == ("PD", "tustin", ["hub_angle"])
+    assert "Tustin's rule" in run(capsys, *typed)[1]
+
+
+# ------------------------------------------------------------ controllers of a real rig
+
+
+def real(name):
+    return load_law(DATA / f"{name}.toml")
+
+
+def test_the_columns_are_what_the_law_files_take_them_for():
+    """The estimator's gain is on the measured angles; the file's own model is stabilised and led to the reference."""
+    data = loadmat(DATA / "orr_controllers.mat")
+    own, system = data["lqg"][0, 0], data["lqg_ss"][0, 0]
+    np.testing.assert_allclose(system["B"][:, :2], own["L"], rtol=1e-12)
+    np.testing.assert_allclose(system["D"][0, 4], own["K"][0, 0], rtol=1e-12)
+    for name in ("lqg", "hinf"):
+        A, B, C, D = (data[f"{name}_ss"][0, 0][key] for key in "ABCD")
+        n = len(A)
+        loop = np.block([
+            [own["Ad"] + own["Bd"] @ D[:, :4], own["Bd"] @ C],
+            [B[:, :4], A],
+        ])  # fmt: skip
+        assert abs(np.linalg.eigvals(loop)).max() < 1
+        rest = np.linalg.solve(np.eye(4 + n) - loop, np.vstack([own["Bd"] @ D[:, 4:5], B[:, 4:5]]))
+        np.testing.assert_allclose(rest[:2, 0], [1.0, 0.0], atol=1e-6)  # hub angle at the reference, no deflection
+
+
+@pytest.mark.parametrize("late", [0.0, 0.005, 0.01])
+@pytest.mark.parametrize("name", ["lqg", "hinf"])
+def test_the_exact_rig_under_the_real_controllers_is_that_of_a_model_of_order_80(name, late):
+    law = real(name)
+    chain = Chain(sampling=Sampling(delay_samples=late / T))
+    loop = law_verdict(RIG, law, chain, count=40).loop
+    other = radius_of(stepped(RIG, loop.law, loop.chain), loop.has_free_angle)
+    assert loop.poles.log_spectral_radius == pytest.approx(other, abs=1e-10)
+    assert loop.poles.is_stable == (name == "hinf")
+
+
+def test_real_controllers_bring_the_rig_to_the_reference_within_the_current():
+    chain = load_chain(DATA / "chain.toml")
+    wanted = np.radians(20)
+    for name in ("lqg", "hinf"):
+        found = tfarm.simulate(RIG, real(name), chain, duration=4.0, count=10)
+        assert found.stopped is None
+        assert abs(found.torque).max() <= 0.9
+        assert found.at_samples.hub_angle[-1] == pytest.approx(wanted, rel=0.02)

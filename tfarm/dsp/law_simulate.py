@@ -1,0 +1,95 @@
+"""The sampled loop of any linear law in time, exact between the samples.
+
+A signal among the law's references enters as signal - reference: those of the hub's angle and rate are the slew's, that
+of the root moment is the rigid arm's.  A column "reference:hub_angle" takes the reference alone.  The encoder's counts
+and the strain amplifier's range act on hub angle and root moment; other signals are read as they are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import Arm
+from tfarm.arm.law import REFERENCE, Law
+from tfarm.dsp import kernel
+from tfarm.dsp.chain import Chain
+from tfarm.dsp.law_loop import acting_law
+from tfarm.dsp.law_plant import sensed_plant
+from tfarm.dsp.plant import Plant
+from tfarm.dsp.scenarios import Scenario
+from tfarm.dsp.simulate import Simulation, Simulator
+from tfarm.errors import ParameterError, did_you_mean
+
+Real = NDArray[np.float64]
+
+KINDS = {"hub_angle": 1, "root_moment": 2, "hub_rate": 3}  # through what a signal goes, as `kernel.run_law` has it
+
+
+class LawSimulator(Simulator):
+    """An arm with `count` modes under a law, a chain and a scenario, prepared once.
+
+    Raises ParameterError as `acting_law` does, for an unknown signal, and for one whose reference no scenario has.
+    """
+
+    def __init__(
+        self, arm: Arm, law: Law, chain: Chain, scenario: Scenario, *, count: int = 20, between: int = 0
+    ) -> None:
+        self.law, late = acting_law(arm, law, chain)
+        self._references = references_of(self.law, scenario)
+        super().__init__(arm, late, scenario, count=count, between=between)
+
+    def plant_of(self, arm: Arm, count: int) -> Plant:
+        """What gains at the hub measure and what is recorded, and then the signals of the law through their filters."""
+        first = super().plant_of(arm, count)
+        more = sensed_plant(arm, self.chain, self.law.signals, count).together
+        residues = more.residues
+        assert np.array_equal(more.poles, first.poles[: more.poles.size])  # the arm's, whatever is read
+        if more.poles.size < first.poles.size:  # no signal of the law has the filter whose pole comes last
+            residues = np.c_[residues, np.zeros(len(residues))]
+        return replace(
+            first,
+            outputs=(*first.outputs, *more.outputs),
+            residues=np.r_[first.residues, residues],
+            rigid=np.r_[first.rigid, more.rigid],
+            static=np.r_[first.static, more.static],
+        )
+
+    def run(self) -> Simulation:
+        """The law from rest over the scenario."""
+        state, law = self._start(), self.law
+        matrices = tuple(np.ascontiguousarray(each) for each in law.matrices((*law.signals, *law.wanted)))
+        kinds = np.array([KINDS.get(name, 0) for name in law.signals])
+        single = self.chain.converters.arithmetic == "float32"
+        if single:
+            matrices = tuple(each.astype(np.float32).astype(float) for each in matrices)
+        done = kernel.run_law(
+            self._tables, state.amplitude, state.rigid, state.held, self.chain.sampling.whole_delay, matrices, kinds,
+            self._references, self._ideal, self.scenario.disturbance, self.scenario.impulse, self._rows, self._filter,
+            single, self._bound, state.record, state.torque, state.fine, state.saturated, state.work,
+        )  # fmt: skip
+        return self._result(state, int(done), None)
+
+
+def references_of(law: Law, task: Scenario) -> Real:
+    """What is taken off each column of the law at each sample (n, columns): of a column of references, minus it.
+
+    Raises ParameterError for a signal whose reference a scenario does not have.
+    """
+    known: dict[str, Any] = {
+        "hub_angle": task.hub_angle,
+        "hub_rate": task.hub_rate,
+        "root_moment": task.rigid_moment,
+    }
+    found = np.zeros((task.feedforward.size, len(law.signals) + len(law.wanted)))
+    for column, name in enumerate((*law.signals, *law.wanted)):
+        plain = name.removeprefix(REFERENCE)
+        if name == plain and name not in law.references:
+            continue
+        if plain not in known:
+            raise ParameterError(key="references", value=plain, remedy=did_you_mean(plain, known))
+        found[:, column] = known[plain] if name == plain else -known[plain]
+    return found
