@@ -221,7 +221,7 @@ def with_estimate(law: Law, chain: Chain) -> Law:
         return law
     T = chain.sampling.period
     a = float(np.exp(-chain.converters.rate_filter * T))
-    return replace(law, parts=tuple(_differenced(part, a, T) for part in law.parts))
+    return replace(law, parts=tuple(_differenced(part, a, T) for part in law.parts), references=())
 
 
 def _differenced(part: Part, a: float, T: float) -> Part:
