@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import tfarm
-from tfarm.dsp import Chain
+from tests.dsp.law_verdicts import stepped
+from tfarm import Law
+from tfarm.dsp import Chain, sampled_verdict
 from tfarm.dsp.chain import Actuator
 from tfarm.dsp.plant import undelayed_plant
 from tfarm.dsp.scenarios import slew
@@ -44,3 +46,17 @@ def test_analog_damping_behind_an_inductance_is_refused_with_a_remedy():
     arm = tfarm.load("quanser-flexlink")
     with pytest.raises(ParameterError, match=r"hub\.friction"):
         undelayed_plant(arm, Chain(actuator=Actuator(hub_damping=0.1)), ("hub_rate",), 4)
+
+
+@pytest.mark.parametrize("name", ["tests/rigs/bench-rig.toml", "quanser-2dsfl", "quanser-flexlink"])
+@pytest.mark.parametrize("factor", [1.0, -40.0])
+def test_the_verdict_on_a_damped_rig_is_proven(name, factor):
+    """Poles of friction and of the circuit are among those that are counted; as many grow as in a stepped model."""
+    arm = tfarm.load(name).having(damping=2e-5)
+    gains = tfarm.default_gains(arm).times(factor)
+    verdict = sampled_verdict(arm, gains)
+    assert verdict.is_settled
+    z = np.linalg.eigvals(stepped(arm, Law.of_gains(gains), Chain(), verdict.modes_used))
+    grow = int((np.log(abs(z)) > 1e-9).sum())
+    assert grow == (verdict.loop.poles.log_radius > 0).sum()
+    assert (grow > 0) == (factor < 0)

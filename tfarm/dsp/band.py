@@ -88,7 +88,8 @@ def band_of(loop: AnyLoop) -> Band[AnyLoop] | None:
 def _highest(loop: AnySampled, line: float) -> float | None:
     """The top of the highest box right of the line in which the exact arm has the plant's poles and no other."""
     plant, function = loop.plant, member(modes(loop.plant.arm, 1).system).function
-    poles = plant.poles[(plant.mode > 0) & (plant.poles.real > -line)]
+    poles = np.r_[plant.poles[plant.mode > 0], plant.model.single]
+    poles = poles[poles.real > -line]
 
     def is_complete(top: float) -> bool:
         box = Box(-line, line, -top, top)
