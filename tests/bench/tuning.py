@@ -64,14 +64,14 @@ def numpy_training(trial: Trial, network: Network, guard: Guard, trials: int, et
 
 def numpy_gradient(trial: Trial, network: Network, guard: Guard):
     """Forward, then back through time, with six inputs and a guard."""
-    _, A, B, rate, moment = trial.model
-    K1, a, b, T = trial.numbers[:4]
+    _, A, B, servo, moment = trial.model
+    a, b, T = trial.numbers[:3]
     W1, w2, span = network.W1 / network.scales, network.w2, guard.hi - guard.lo
     n, state, past = trial.n, np.zeros(B.size), np.zeros(3)
     kept, before = [], np.zeros(3)  # u, e, x of the sample before, and of that before it
     for k in range(n):
         wanted, counted, rest, rigid = trial.reference[k]
-        x, u = moment @ state - rigid, counted + K1 * (wanted - rate @ state)
+        x, u = moment @ state - rigid, counted + wanted - servo @ state
         row = np.array([u, before[0], before[1], past[1], x, before[2]])
         hidden = 1 / (1 + np.exp(-W1 @ row))
         s = 1 / (1 + np.exp(-w2 @ hidden))
@@ -89,7 +89,7 @@ def numpy_gradient(trial: Trial, network: Network, guard: Guard):
         by_W1 += np.outer(by_net, row / network.scales)
         by_row = by_net @ W1
         by_u, by_x = by_e + by_row[0] + late[2], T * a * x - K * by_e + by_row[4] + late[3]
-        back = A.T @ back + moment * by_x - K1 * rate * by_u
+        back = A.T @ back + moment * by_x - servo * by_u
         late = np.array([late[1] + by_row[2], by_row[3], by_row[1], by_row[5]])
     return np.r_[by_W1.ravel(), by_w2]
 

@@ -41,8 +41,8 @@ def moment_bound(trial, guard):
     proof, loop = guard.proofs[0], MovingGain(trial.loop)
     push = np.linalg.norm(proof.root.T @ loop.drive)
     reading = np.linalg.norm(np.linalg.solve(proof.root, loop.sense))
-    rate, counted, rest, rigid = trial.reference.T
-    steady = counted + rest + trial.loop.gains.K1 * rate
+    servo, counted, rest, rigid = trial.reference.T
+    steady = counted + rest + servo
     torque = np.maximum(abs(steady + guard.lo * rigid), abs(steady + guard.hi * rigid))
     bound, size = [0.0], 0.0
     for each in torque[:-1]:

@@ -14,9 +14,9 @@ RISE, TRAVEL = 1.0, 1.15
 class PlainTrial:
     """3 s of the slew with `count` modes at T = 10 ms."""
 
-    def __init__(self, arm, count=6, K1=0.3, a=1.0, b=2.6, signals="vibration", T=0.01, n=301):
-        self.K1, self.a, self.b, self.T, self.n, self.total = K1, a, b, T, n, signals == "total"
-        model = modal_model(arm, ["hub_rate", "root_moment"], count)
+    def __init__(self, arm, count=6, K1=0.3, a=1.0, b=2.6, signals="vibration", T=0.01, n=301, Kp=0.0):
+        self.Kp, self.K1, self.a, self.b, self.T, self.n, self.total = Kp, K1, a, b, T, n, signals == "total"
+        model = modal_model(arm, ["hub_angle", "hub_rate", "root_moment"], count)
         A, B, C, D = model.matrices()
         size = len(A)
         block = expm(np.block([[A, B], [np.zeros((1, size + 1))]]) * T)
@@ -26,6 +26,7 @@ class PlainTrial:
         acceleration[:half], acceleration[half:whole] = 1.0, -1.0
         acceleration *= 4 * TRAVEL / arm.link.length / RISE**2
         self.rate = np.r_[0.0, np.cumsum(acceleration)[:-1]] * T
+        self.angle = np.r_[0.0, np.cumsum(self.rate * T + acceleration * T**2 / 2)[:-1]]
         self.torque = arm.total_inertia * acceleration
         inertia = arm.total_inertia - arm.hub.inertia
         self.rigid = np.zeros(n) if self.total else -inertia * np.r_[0.0, acceleration[:-1]]
@@ -35,9 +36,10 @@ class PlainTrial:
         state = np.zeros(len(self.A), complex)
         before, signals = 0.0, np.zeros((self.n + 2, 4), complex)  # two empty samples first
         for k in range(self.n):
-            rate, moment = self.C @ state + self.D * before
+            angle, rate, moment = self.C @ state + self.D * before
             x = moment - self.rigid[k]
-            u = self.K1 * (self.rate[k] - rate) + (self.torque[k] if self.total else 0.0)
+            servo = self.Kp * (self.angle[k] - angle) + self.K1 * (self.rate[k] - rate)
+            u = servo + (self.torque[k] if self.total else 0.0)
             (_, _, e2, _), (x1, u1, e1, K1) = signals[k], signals[k + 1]
             K = gain(np.array([u, u1, e1, e2, x, x1, K1]))
             signals[k + 2] = x, u, u - K * x, K

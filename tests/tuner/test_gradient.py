@@ -78,7 +78,7 @@ def test_the_gradient_of_a_sample_is_that_of_complex_steps(lab, guard, k):
     signals, _ = plain.run(lambda row: plain_gain(row, network.weights, 6, network.scales, guard))
     x, u, e, _ = signals.real.T
     row = np.array([u[k], u[k - 1], e[k - 1], e[k - 2], x[k], x[k - 1]])
-    reply = plain.C[1] @ plain.B + plain.D[1]
+    reply = plain.C[-1] @ plain.B + plain.D[-1]
 
     def error(weights):
         e_k = u[k] - plain_gain(row, weights, 6, network.scales, guard) * x[k]

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
 from tfarm.cli.app import ArmName, Json, app, give, load_arm, whole
 from tfarm.cli.inputs import K1, Given, gains_of
 from tfarm.cli.sampling import Delay, DspFile, Period, chain_of
+
+if TYPE_CHECKING:
+    from tfarm.arm import Arm
 
 
 @app.command()
@@ -31,6 +34,9 @@ def tune(
     a: Annotated[float, typer.Option("--a", help="weight of the root moment in the cost")] = 1.0,
     b: Annotated[float, typer.Option("--b", help="weight of the control signal in the cost")] = 2.6,
     K1: K1 = None,
+    kp: Annotated[
+        float, typer.Option("--Kp", help="hub angle gain: the reference is tracked, K1 damps that by 0.71 if not given")
+    ] = 0.0,
     duration: Annotated[float, typer.Option("--duration", help="of a trial [s]")] = 3.0,
     enough: Annotated[float, typer.Option("--enough", help="stop once the rms of x is below this [N m]")] = 0.0,
     hidden: Annotated[str, typer.Option("--hidden", metavar="N", help="hidden neurons")] = "6",
@@ -47,9 +53,10 @@ def tune(
     numbers = whole("--trials", trials, 1, 1_000_000), whole("--seed", seed, 0, 2**53), whole("--modes", modes, 1, 48)
     neurons = whole("--hidden", hidden, 1, 1000)
     subject, chain = load_arm(arm), chain_of(dsp or arm, period, delay_samples)
-    law, said = gains_of(subject, Given({"K1": K1, "K2": 0.0}))
     from tfarm import tuner
     from tfarm.tuner.tuning import comparison_answer
+
+    rate_gain, said = _rate_gain(subject, K1, kp)
 
     learning = tuner.Learning(
         mode=cast("Any", mode), rule=cast("Any", rule), sensitivity=cast("Any", sensitivity), eta=eta, alpha=alpha,
@@ -57,7 +64,7 @@ def tune(
     )  # fmt: skip
     plan = tuner.Plan(
         cost=tuner.Cost(a=a, b=b), learning=learning, signals=cast("Any", signals), guard=cast("Any", guard),
-        trials=numbers[0], seed=numbers[1], count=numbers[2], K1=law.K1, duration=duration, hidden=neurons,
+        trials=numbers[0], seed=numbers[1], count=numbers[2], K1=rate_gain, Kp=kp, duration=duration, hidden=neurons,
         seventh_input=seventh_input,
     )  # fmt: skip
     tuning = tuner.tune(subject, plan, chain)
@@ -68,6 +75,18 @@ def tune(
     if save is not None:
         tuner.save(tuning.saved(), save)
     _show(answer, save, json)
+
+
+def _rate_gain(subject: Arm, K1: float | None, Kp: float) -> tuple[float, dict[str, Any]]:
+    """K1, and what the answer says of one that was not given: with Kp that which damps the angle."""
+    from tfarm.tuner.trial import usual_rate_gain
+
+    if K1 is not None or Kp == 0.0:
+        law, said = gains_of(subject, Given({"K1": K1, "K2": 0.0}))
+        return law.K1, said
+    rate_gain = usual_rate_gain(subject, Kp)
+    words = f"K1 = {rate_gain:.4g}, which damps the rigid arm under Kp by 0.71 of critical"
+    return rate_gain, {"default_gains": ["K1"], "default_gains_in_words": words}
 
 
 def _show(answer: dict[str, Any], save: Path | None, json: bool) -> None:

@@ -29,8 +29,17 @@ def print_tuning(answer: dict[str, Any]) -> None:
     print(f"gain: K from {min(K):.4g} to {max(K):.4g}")
     residual, without = answer["residual_moment_rms"], answer["residual_without"]
     print(f"residual root moment: {residual:.4g} N m rms, {residual / without:.3g} of that without moment feedback")
+    print(_tip_words(answer))
     if "comparison" in answer:
         _print_comparison(answer["comparison"])
+
+
+def _tip_words(answer: dict[str, Any]) -> str:
+    """How far off its target the tip ends."""
+    errors = [answer[f"tip_error{which}_m"] for which in ("", "_best_constant", "_without")]
+    tuned, constant, without = ("ran away" if each is None else f"{1e3 * each:.3g} mm" for each in errors)
+    held = f"Kp = {answer['Kp']:g} holds the angle" if answer["Kp"] else "nothing holds the angle: --Kp does"
+    return f"tip off its target at the end: {tuned}, {constant} with the best constant gain, {without} without ({held})"
 
 
 def warn_if_stopped(answer: dict[str, Any]) -> None:

@@ -157,12 +157,13 @@ class Simulator:
         """Any callable from a `Measurement` to a torque [N m]; its numbers are float32 if the arithmetic is."""
         return self._stepped(lambda m: (float(controller(m)), 0.0), None)
 
-    def gain_schedule(self, K1: float, gain: Callable[[Measurement], float]) -> Simulation:
-        """u = r + K1 (theta_t_ref - theta_t) - K x with K = gain(measurement) at each sample, recorded as `gain`."""
+    def gain_schedule(self, K1: float, gain: Callable[[Measurement], float], Kp: float = 0.0) -> Simulation:
+        """The law of `linear` with K2 = gain(measurement) at each sample, recorded as `gain`."""
 
         def torque(m: Measurement) -> tuple[float, float]:
             K = float(gain(m))
-            return m.feedforward + K1 * (m.rate_reference - m.hub_rate) - K * m.vibration, K
+            servo = Kp * (m.angle_reference - m.hub_angle) + K1 * (m.rate_reference - m.hub_rate)
+            return m.feedforward + servo - K * m.vibration, K
 
         return self._stepped(torque, np.zeros(self.scenario.feedforward.size))
 

@@ -23,6 +23,7 @@ from tfarm.report.tuner_words import (
     drift_words,
     headline_facts,
     learning_words,
+    servo_words,
     shaping_words,
     short_answer,
 )
@@ -71,6 +72,7 @@ def section_of(data: TunerStudy) -> Section:
         words=(
             short_answer(data),
             drift_words(data),
+            *([servo_words(data)] if data.servo else []),
             shaping_words(data),
             bound_words(data),
             learning_words(data),

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from tfarm.arm import written_unit
 from tfarm.digits import significant
 from tfarm.dsp.curves import away
 from tfarm.report.sections import Fact
 from tfarm.report.words import typeset
 from tfarm.tuner.overview import Curves, TunerStudy
+from tfarm.tuner.tuning import tip_errors
 
+SERVO = ("Kp", "K1")
 ROUNDED = 1e-10  # of the tip's travel: no slew ends nearer its target than rounding tells
 MORE = 3.0  # times as far off its target is more, and no coincidence
 SAME = 1e-4  # relative difference of two costs below which they are called the same
@@ -72,7 +75,34 @@ def drift_words(data: TunerStudy) -> str:
         f"What the cost does not see: the arm ends off its target, the tip {significant(1e3 * tuned, 2)} mm with the "
         f"tuner and {significant(1e3 * constant, 2)} mm with the best constant gain. The law regulates the hub rate "
         f"alone, and the moment feedback's torque adds up to an angle of its integral over K1: {what}. A tuner for use "
-        "needs Kp."
+        "needs Kp (tfarm tune --Kp)."
+    )
+
+
+def servo_words(data: TunerStudy) -> str:
+    """The same with the angle held: where the slew ends then, and what the tuner is worth beside its yardsticks."""
+    if data.servo is None:
+        return ""
+    tuning, plan, guard = data.servo, data.servo.plan, data.servo.training.guard
+    gains = " and ".join(
+        f"{name} = {significant(getattr(plan, name), 3)}{written_unit(name, data.arm)}" for name in SERVO
+    )
+    off = tip_errors(tuning)["tip_error_m"]
+    end = "runs away" if off is None else f"ends {significant(1e3 * abs(off), 2)} mm off its target"
+    if off is not None and abs(off) < ROUNDED * data.arm.length * float(abs(tuning.trial.task.hub_angle).max()):
+        end = "ends on its target"
+    proven = "proven" if guard.is_proven else "of the first modes alone"
+    costs = {
+        "no moment feedback": tuning.without.cost,
+        "the best constant gain": tuning.best_constant.cost,
+        "the tuner": tuning.training.result.cost,
+        **{f"the shaper {kind}": record.cost for kind, (_, record) in tuning.shaped.items()},
+        "the bound": tuning.bound.cost,
+    }
+    told = ", ".join(f"{name} {significant(cost, 3)}" for name, cost in costs.items())
+    return (
+        f"With the angle held, {gains}, the tuned slew {end}. The guard there is K2 from {significant(guard.lo, 3)} to "
+        f"{significant(guard.hi, 3)}, {proven} for any K(t). Costs of that slew: {told}."
     )
 
 

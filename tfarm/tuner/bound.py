@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from tfarm.tuner.kernel import MOMENT_WEIGHT, PERIOD, TORQUE_WEIGHT
 from tfarm.tuner.trial import Record, Trial
 
 Real = NDArray[np.float64]
@@ -21,7 +22,7 @@ def lq_bound(trial: Trial) -> Record:
     """The optimal trial; its K is zero, for it is no moment feedback, and its u is e."""
     _, A, B, _, c = trial.model
     rest, rigid = trial.reference[:, 2], trial.reference[:, 3]
-    T, a, b = trial.numbers[3], trial.numbers[1], trial.numbers[2]
+    a, b, T = (trial.numbers[i] for i in (MOMENT_WEIGHT, TORQUE_WEIGHT, PERIOD))
     n, size = trial.n, B.size
     gains, offsets = np.zeros((n, size)), np.zeros(n)
     P, q = np.zeros((size, size)), np.zeros(size)
@@ -45,5 +46,5 @@ def _played(trial: Trial, gains: Real, offsets: Real) -> Record:
         x[k] = c @ s - trial.reference[k, 3]
         e[k] = -(gains[k] @ s) - offsets[k]
         s = A @ s + B * (e[k] + trial.reference[k, 2])
-    cost = float(trial.numbers[3] * np.sum(trial.cost.a * x**2 + trial.cost.b * e**2) / 2)
+    cost = float(trial.numbers[PERIOD] * np.sum(trial.cost.a * x**2 + trial.cost.b * e**2) / 2)
     return Record(trial.task.t, x, e, e, np.zeros(trial.n), cost, None)

@@ -11,14 +11,14 @@ import math
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from tfarm.arm import Arm, HubFeedback
-from tfarm.dsp import Chain, Converters, Scenario, Simulator
+from tfarm.arm import Arm
+from tfarm.dsp import Chain, Converters, Scenario, Simulation, Simulator
 from tfarm.dsp.scenarios import torque_unit
 from tfarm.errors import ConvergenceError
 from tfarm.spectrum import modes
 from tfarm.tuner.bound import lq_bound
 from tfarm.tuner.constants import best_constant
-from tfarm.tuner.controller import TunedGain, judged, simulated
+from tfarm.tuner.controller import TunedGain, judged, tip_error
 from tfarm.tuner.guard import Guard
 from tfarm.tuner.sector import MovingGain
 from tfarm.tuner.shaping import shaped, shaper
@@ -35,10 +35,14 @@ DELAY = 1.0  # samples
 
 
 class Outcome(NamedTuple):
-    """`cost` of the trial, and root mean square of x after the slew [N m]; inf where the loop ran away."""
+    """`cost` of the trial, and root mean square of x after the slew [N m]; inf where the loop ran away.
+
+    `tip_error` [m] is how far the tip is off its target when the trial ends; None where it ran away, and of the bound.
+    """
 
     cost: float
     residual: float
+    tip_error: float | None
 
 
 @dataclass(frozen=True)
@@ -127,7 +131,7 @@ def compare(trial: Trial, gain: TunedGain, guard: Guard, listed: list[Condition]
 
 def _row(trial: Trial, gain: TunedGain, guard: Guard, nominal: float, condition: Condition) -> Row:
     here = slew_trial(
-        condition.arm, condition.chain, K1=gain.K1, cost=trial.cost, signals=trial.signals, known=trial.arm,
+        condition.arm, condition.chain, K1=gain.K1, Kp=gain.Kp, cost=trial.cost, signals=trial.signals, known=trial.arm,
         duration=trial.n * trial.task.period * (1 - 1e-9), count=trial.loop.plant.count,
     )  # fmt: skip
     here = replace(here, task=trial.task)
@@ -142,7 +146,7 @@ def _row(trial: Trial, gain: TunedGain, guard: Guard, nominal: float, condition:
         own_gain=own.gain,
         ZV=_constant(here, shapers["ZV"], 0.0),
         EI=_constant(here, shapers["EI"], 0.0),
-        tuner=_outcome(simulated(_simulator(here, here.task), gain, trial.cost), here.task),
+        tuner=_played(_simulator(here, here.task).gain_schedule(gain.K1, gain, Kp=gain.Kp), here),
         bound=_outcome(bound, here.task),
         proven=guard.is_proven and _proven(here, guard),
     )
@@ -163,11 +167,15 @@ def _simulator(trial: Trial, task: Scenario) -> Simulator:
 
 
 def _constant(trial: Trial, task: Scenario, K: float) -> Outcome:
-    run = _simulator(trial, task).linear(HubFeedback(K1=trial.loop.gains.K1, K2=K))
-    return _outcome(judged(run, trial.cost, trial.signals), task)
+    return _played(_simulator(trial, task).linear(trial.loop.gains.having("K2", K)), trial)
+
+
+def _played(run: Simulation, trial: Trial) -> Outcome:
+    outcome = _outcome(judged(run, trial.cost, trial.signals), run.scenario)
+    return outcome if math.isinf(outcome.cost) else outcome._replace(tip_error=tip_error(run, trial))
 
 
 def _outcome(record: Record, task: Scenario) -> Outcome:
     if record.stopped is not None or not math.isfinite(record.cost):
-        return Outcome(math.inf, math.inf)
-    return Outcome(record.cost, residual_rms(record, task.busy_until))
+        return Outcome(math.inf, math.inf, None)
+    return Outcome(record.cost, residual_rms(record, task.busy_until), None)

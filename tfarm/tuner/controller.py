@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tfarm.dsp import Measurement, Simulation, Simulator
 from tfarm.tuner.network import Network
-from tfarm.tuner.trial import Cost, Record, Signals
+from tfarm.tuner.trial import Cost, Record, Signals, Trial
 
 Real = NDArray[np.float64]
 
@@ -22,6 +22,7 @@ class TunedGain:
     guard: Real
     K1: float
     signals: Signals
+    Kp: float = 0.0
     _past: list[tuple[float, float, float, float]] = field(default_factory=list, init=False)
 
     def __call__(self, m: Measurement) -> float:
@@ -29,7 +30,8 @@ class TunedGain:
         if m.k == 0:
             self._past = [(0.0, 0.0, 0.0, 0.0)] * 2
         (u1, e1, x1, K_before), (_, e2, _, _) = self._past
-        u = self.K1 * (m.rate_reference - m.hub_rate) + (m.feedforward if self.signals == "total" else 0.0)
+        servo = self.Kp * (m.angle_reference - m.hub_angle) + self.K1 * (m.rate_reference - m.hub_rate)
+        u = servo + (m.feedforward if self.signals == "total" else 0.0)
         row = [u, u1, e1, e2, m.vibration, x1, K_before][: self.network.scales.size]
         K = self.network.gain(np.array(row), self.guard)
         self._past = [(u, u - K * m.vibration, m.vibration, K), self._past[0]]
@@ -50,4 +52,12 @@ def judged(simulation: Simulation, cost: Cost, signals: Signals) -> Record:
 
 def simulated(simulator: Simulator, gain: TunedGain, cost: Cost) -> Record:
     """The trained network in a simulator whose chain has the same reading of the signals."""
-    return judged(simulator.gain_schedule(gain.K1, gain), cost, gain.signals)
+    return judged(simulator.gain_schedule(gain.K1, gain, Kp=gain.Kp), cost, gain.signals)
+
+
+def tip_error(simulation: Simulation, trial: Trial) -> float | None:
+    """How far the tip is off its target [m] when a simulation of a slew ends; None where the loop ran away."""
+    if simulation.stopped is not None:
+        return None
+    chain, arm = trial.loop.chain, trial.arm
+    return float(simulation.at_samples.tip_displacement[-1] - chain.slew.travel_of(arm.length))

@@ -6,8 +6,9 @@
     none           the plain softplus, K >= 0
 
 A proven sector gives a contraction, so bounded references, and rounding by converters, leave bounded signals whatever
-K(t) does in it; a torque or a moment that saturates is not covered.  The proof is of the arm, K1, sampling and delay it
-was made for, with the modes that it names.
+K(t) does in it; a torque or a moment that saturates is not covered.  The proof is of the arm, K1, Kp, sampling and
+delay it was made for, with the modes that it names.  With a Kp > 0 the hub's angle is one of the states that contract:
+it follows its reference however K moves.
 
 The network's gain kappa = ln(1 + e^z) is bent into the interval by K = lo + (hi - lo)(1 - e^-kappa), which is
 lo + (hi - lo)/(1 + e^-z): smooth, so that the gradient sees it.
@@ -91,7 +92,7 @@ class Guard:
 
 
 def find_guard(loop: SampledLoop, kind: GuardKind, best_constant: float) -> Guard:
-    """The guard of a loop (its K1, chain and modes); its K2 does not matter.
+    """The guard of a loop (its K1, Kp, chain and modes); its K2 does not matter.
 
     Raises CertificationError where there is none, with the damping that would have one.
     """
@@ -186,8 +187,9 @@ def _settled(loops: list[SampledLoop], found: list[tuple[float, float]]) -> bool
 def is_quiet(loop: SampledLoop, highest: float) -> bool:
     """Whether the upper half of the modes lose more in a sample by themselves than the feedback could give them."""
     plant, T = loop.plant, loop.chain.sampling.period
-    _, rate, moment = abs(plant.residues)
-    push = 2 * (abs(loop.gains.K1) * rate + highest * moment) * abs(held(plant.poles, T))
+    angle, rate, moment = abs(plant.residues)
+    fed_back = abs(loop.gains.Kp) * angle + abs(loop.gains.K1) * rate + highest * moment
+    push = 2 * fed_back * abs(held(plant.poles, T))
     upper = (plant.mode > plant.count // 2) & (plant.poles.imag > 0)
     return bool((push[upper] < -plant.poles.real[upper] * T).all())
 
@@ -215,7 +217,9 @@ def _remedy(loop: SampledLoop, kind: str) -> str:
     """Why there is no guard, and the smallest damping tried that has one."""
     arm = loop.plant.arm
     what = "no sector of moving gains" if kind == "time-varying" else "no constant gain"
-    start = f"{arm.name}: {what} is proven stable at K1 = {loop.gains.K1:g}, C = {arm.damping:g} s"
+    gains = loop.gains
+    at = f"K1 = {gains.K1:g}" + (f", Kp = {gains.Kp:g}" if gains.Kp else "")
+    start = f"{arm.name}: {what} is proven stable at {at}, C = {arm.damping:g} s"
     for C in DAMPINGS[arm.damping < DAMPINGS]:
         if _has_guard(arm.having(damping=float(C)), loop, kind):
             return f"{start}; with a damping of C = {C:.1e} s there is one"

@@ -1,13 +1,14 @@
 """The compiled heart of the tuner: a trial forward, and its cost's gradient backward.  Arrays:
 
-    model       A^T, A (n, n), B (n,), rate (n,), moment (n,): s' = A s + B torque, read as rate.s and moment.s
-    reference   (N, 4): hub rate wanted, torque counted in u, torque not counted in it, rigid arm's moment
-    numbers     K1, a, b, T, bound, lag: the cost's weights, the period, the largest |moment|, samples until x answers
+    model       A^T, A (n, n), B (n,), servo (n,), moment (n,): s' = A s + B torque; servo.s = Kp angle + K1 rate
+    reference   (N, 4): Kp angle + K1 rate wanted, torque counted in u, torque not counted in it, rigid arm's moment
+    numbers     a, b, T, bound, lag: the cost's weights, the period, the largest |moment|, samples until x answers
     guard       1 with lo and hi, or 0
     weights     W1 (h, m) row by row, then w2 (h,)
     run         inputs (N, m), hidden (N, h), signals (N, 5): x, u, e, K, dK/dz
 
-With u = (torque counted) + K1 (rate wanted - rate) and e = u - K x the torque is e + (torque not counted).
+With u = (torque counted) + Kp (angle wanted - angle) + K1 (rate wanted - rate) and e = u - K x the torque is
+e + (torque not counted).
 """
 
 from __future__ import annotations
@@ -18,8 +19,8 @@ from typing import Any
 from tfarm.exact.compiled import compiled
 
 X, U, E, GAIN, SLOPE = range(5)  # columns of the signals
-TURNED, ADVANCE, DRIVE, RATE, MOMENT = range(5)  # A^T, A, B and the rows of the model
-RATE_GAIN, MOMENT_WEIGHT, TORQUE_WEIGHT, PERIOD, BOUND, LAG = range(6)  # of the numbers
+TURNED, ADVANCE, DRIVE, SERVO, MOMENT = range(5)  # A^T, A, B and the rows of the model
+MOMENT_WEIGHT, TORQUE_WEIGHT, PERIOD, BOUND, LAG = range(5)  # of the numbers
 
 
 @compiled
@@ -103,7 +104,7 @@ def sense(k: int, model: Any, reference: Any, numbers: Any, scales: Any, state: 
     if not abs(moment) <= numbers[BOUND]:
         return False
     signals[k, X] = moment - reference[k, 3]
-    signals[k, U] = reference[k, 1] + numbers[RATE_GAIN] * (reference[k, 0] - dot(model[RATE], state))
+    signals[k, U] = reference[k, 1] + reference[k, 0] - dot(model[SERVO], state)
     inputs[k].fill(0.0)
     inputs[k, 0], inputs[k, 4] = signals[k, U], signals[k, X]
     if k >= 1:
@@ -164,7 +165,7 @@ def backward(model: Any, numbers: Any, scales: Any, weights: Any, run: Any, work
     inputs, hidden, signals = run
     n, m, h = inputs.shape[0], inputs.shape[1], hidden.shape[1]
     back, spare, by_input, late = work[0], work[1], work[2], work[3]
-    K1, a, b, T = numbers[RATE_GAIN], numbers[MOMENT_WEIGHT], numbers[TORQUE_WEIGHT], numbers[PERIOD]
+    a, b, T = numbers[MOMENT_WEIGHT], numbers[TORQUE_WEIGHT], numbers[PERIOD]
     gradient.fill(0.0)
     back.fill(0.0)
     late.fill(0.0)
@@ -181,7 +182,7 @@ def backward(model: Any, numbers: Any, scales: Any, weights: Any, run: Any, work
         by_x = T * a * signals[k, X] - signals[k, GAIN] * by_e + by_input[4] + late[3]
         turn(model[ADVANCE], back, spare)
         for i in range(back.size):
-            back[i] = spare[i] + model[MOMENT][i] * by_x - K1 * model[RATE][i] * by_u
+            back[i] = spare[i] + model[MOMENT][i] * by_x - model[SERVO][i] * by_u
         late[0], late[1] = late[1] + by_input[2], by_input[3]
         late[2], late[3] = by_input[1], by_input[5]
         late[4] = by_input[6] if m > 6 else 0.0

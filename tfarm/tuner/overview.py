@@ -13,19 +13,23 @@ from tfarm.dsp import Chain, Simulation, Simulator
 from tfarm.dsp.curves import resolved
 from tfarm.dsp.results import ideal_chain
 from tfarm.dsp.scenarios import torque_unit
+from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.records import record
-from tfarm.spectrum.scales import default_gains
+from tfarm.spectrum.scales import default_gains, first_frequency
 from tfarm.tuner import Cost, Learning, Plan, Tuning, compare, conditions, tune
 from tfarm.tuner.comparison import Row, quantised_chain
 from tfarm.tuner.guard import GuardKind
 from tfarm.tuner.studies import PAPER, Finished, map_verdict, plans_of, run_study
 from tfarm.tuner.training import Rule
+from tfarm.tuner.trial import usual_rate_gain
 
 Real = NDArray[np.float64]
 
 SEEDS = 20  # of the learning curves
 MAP_SEEDS, MAP_TRIALS = 5, 60
 TRIAL = 3.0  # times the slew
+SERVO = 1 / 20  # of the first frequency: how fast the angle loop of the servo is, that its K1 leaves the mode alone
+SERVO_SAMPLES = 0.03  # rad a sample, where that is slower
 WORKERS = 2
 LEARNT: tuple[tuple[str, str, Rule, GuardKind], ...] = (
     ("default", "default, in the guard", "dynamic", "time-varying"),
@@ -101,7 +105,7 @@ class CostMap:
 @record
 class TunerStudy:
     """All of it.  `slews` and `coarse` hold two simulations each, without and with the tuner; `constant` is the slew
-    with the best constant gain.
+    with the best constant gain; `servo` the tuning with the angle held, None where no range of gains is proven there.
     """
 
     arm: Arm
@@ -112,6 +116,7 @@ class TunerStudy:
     curves: tuple[Curves, ...]
     cost_map: CostMap
     rows: tuple[Row, ...]
+    servo: Tuning | None
 
 
 def tuner_study(arm: Arm, chain: Chain) -> TunerStudy:
@@ -133,7 +138,18 @@ def tuner_study(arm: Arm, chain: Chain) -> TunerStudy:
         curves=tuple(_curves(arm, ideal, plan, *each) for each in LEARNT),
         cost_map=_cost_map(arm, ideal, plan),
         rows=tuple(rows),
+        servo=_servo(arm, plan, ideal),
     )
+
+
+def _servo(arm: Arm, plan: Plan, chain: Chain) -> Tuning | None:
+    """The same tuning with an angle loop a twentieth as fast as the first mode, or slower where the clock is slow."""
+    speed = min(SERVO * first_frequency(arm), SERVO_SAMPLES / chain.sampling.period)
+    Kp = float(f"{arm.turned_inertia * speed**2:.2g}")
+    try:
+        return tune(arm, replace(plan, Kp=Kp, K1=usual_rate_gain(arm, Kp)), chain)
+    except (CertificationError, ConvergenceError):
+        return None
 
 
 def plan_of(arm: Arm, chain: Chain) -> Plan:

@@ -20,8 +20,7 @@ from .kernel import (
     MOMENT,
     MOMENT_WEIGHT,
     PERIOD,
-    RATE,
-    RATE_GAIN,
+    SERVO,
     SLOPE,
     TORQUE_WEIGHT,
     E,
@@ -151,7 +150,7 @@ def _derive(k: int, model: Any, numbers: Any, scales: Any, weights: Any, run: An
     for i in range(S.shape[0]):
         for p in range(S.shape[1]):
             D[X, p] += model[MOMENT][i] * S[i, p]
-            D[U, p] -= numbers[RATE_GAIN] * model[RATE][i] * S[i, p]
+            D[U, p] -= model[SERVO][i] * S[i, p]
     gain_gradient(weights, inputs[k], hidden[k], signals[k, SLOPE], D[GAIN])
     for i in range(m):
         by_input = 0.0

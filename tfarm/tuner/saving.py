@@ -29,7 +29,7 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 @dataclass(frozen=True)
 @record
 class SavedTuner:
-    """What a tuner needs to run: network, guard, K1 and the reading of the signals; and where it was trained."""
+    """What a tuner needs to run: network, guard, K1, Kp and the reading of the signals; and where it was trained."""
 
     network: Network
     guard_kind: GuardKind
@@ -40,11 +40,12 @@ class SavedTuner:
     cost: Cost
     arm: str
     period: float
+    Kp: float = 0.0
 
     def gain(self) -> TunedGain:
         """The controller."""
         guard = np.zeros(3) if self.guard_kind == "none" else np.array([1.0, self.lo, self.hi])
-        return TunedGain(self.network, guard, self.K1, self.signals)
+        return TunedGain(self.network, guard, self.K1, self.signals, self.Kp)
 
 
 class TunerFile(BaseModel):
@@ -56,6 +57,7 @@ class TunerFile(BaseModel):
     arm: Annotated[str, Field(max_length=80)]
     period: Annotated[Finite, Field(gt=0)]
     K1: Finite
+    Kp: Annotated[Finite, Field(ge=0)] = 0.0  # absent in files of tuners without a servo
     signals: Literal["vibration", "total"]
     a: Annotated[Finite, Field(ge=0)]
     b: Annotated[Finite, Field(ge=0)]
@@ -81,7 +83,8 @@ class TunerFile(BaseModel):
             )
         network = Network(np.array(self.W1), np.array(self.w2), np.array(self.scales))
         cost = Cost(a=self.a, b=self.b)
-        return SavedTuner(network, self.guard_kind, lo, hi, self.K1, self.signals, cost, self.arm, self.period)
+        servo = self.K1, self.signals, cost
+        return SavedTuner(network, self.guard_kind, lo, hi, *servo, self.arm, self.period, self.Kp)
 
 
 def to_text(tuner: SavedTuner) -> str:
@@ -91,6 +94,7 @@ def to_text(tuner: SavedTuner) -> str:
         "arm": tuner.arm,
         "period": tuner.period,
         "K1": tuner.K1,
+        **({"Kp": tuner.Kp} if tuner.Kp else {}),
         "signals": tuner.signals,
         "a": tuner.cost.a,
         "b": tuner.cost.b,

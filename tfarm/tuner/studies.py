@@ -131,7 +131,14 @@ def _grounds(arm: Arm, chain: Chain | None, plans: Iterable[Plan]) -> dict[str, 
     for plan in plans:
         if _common(plan) not in grounds:
             trial = slew_trial(
-                arm, chain, K1=plan.K1, cost=plan.cost, signals=plan.signals, duration=plan.duration, count=plan.count
+                arm,
+                chain,
+                K1=plan.K1,
+                Kp=plan.Kp,
+                cost=plan.cost,
+                signals=plan.signals,
+                duration=plan.duration,
+                count=plan.count,
             )
             best = best_constant(trial)
             grounds[_common(plan)] = _Ground(trial, find_guard(trial.loop, plan.guard, best.gain), best)
@@ -139,7 +146,7 @@ def _grounds(arm: Arm, chain: Chain | None, plans: Iterable[Plan]) -> dict[str, 
 
 
 def _common(plan: Plan) -> str:
-    return repr((plan.cost, plan.signals, plan.guard, plan.K1, plan.duration, plan.count))
+    return repr((plan.cost, plan.signals, plan.guard, plan.K1, plan.Kp, plan.duration, plan.count))
 
 
 # ---------------------------------------------------------------- what is kept

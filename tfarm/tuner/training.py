@@ -25,6 +25,7 @@ from tfarm.errors import ParameterError, did_you_mean
 from tfarm.records import record
 from tfarm.tuner import rules
 from tfarm.tuner.guard import Guard
+from tfarm.tuner.kernel import BOUND
 from tfarm.tuner.network import Network
 from tfarm.tuner.trial import Record, Trial
 
@@ -129,7 +130,7 @@ def train(trial: Trial, network: Network, guard: Guard, learning: Learning, tria
     made, sample = _learn(trial, network, guard, learning, weights, costs)
     learnt = network.with_weights(weights)
     result = trial.with_network(learnt, guard.array)
-    stopped = Stopped(made - 1, int(sample), float(trial.numbers[4])) if sample >= 0 else None
+    stopped = Stopped(made - 1, int(sample), float(trial.numbers[BOUND])) if sample >= 0 else None
     return Training(learnt, guard, costs[:made], result, stopped, made < trials and stopped is None)
 
 

@@ -5,12 +5,16 @@
 x is the root moment, u the control input, K the gain on the moment (K2 of the law (19)).  What u and x contain during
 the slew the paper leaves open:
 
-    vibration   x: the moment less the rigid arm's; u = K1 (theta_t_ref - theta_t); torque = J theta_dd_ref + e
+    vibration   x: the moment less the rigid arm's; torque = J theta_dd_ref + e;
+                u = Kp (theta_ref - theta) + K1 (theta_t_ref - theta_t)
     total       x: the whole moment; u holds the feedforward J theta_dd_ref too; torque = e
+
+The paper's law has Kp = 0: nothing holds the angle then, and a slew ends where the moment feedback's torque leaves it.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal, NamedTuple
@@ -34,6 +38,7 @@ Signals = Literal["vibration", "total"]
 SILENT = Network(np.zeros((1, 6)), np.zeros(1), np.ones(6))
 FOLDED_UP = 10.0  # the loop has run away where the root moment is this many times EI/L
 DURATION, MODES = 3.0, 6
+ANGLE_GAIN = "the hub angle gain is zero or positive, in N m/rad"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,7 +81,7 @@ class Run(NamedTuple):
 @dataclass(frozen=True)
 @record
 class Trial:
-    """An arm's loop with `K1`, a chain whose converters are taken as ideal, a slew `task` and a cost.
+    """An arm's loop with `K1` and `Kp`, a chain whose converters are taken as ideal, a slew `task` and a cost.
 
     The controller knows the arm only by `task`, so the slew of one arm may be asked of another one's loop.
     """
@@ -98,34 +103,37 @@ class Trial:
 
     @cached_property
     def model(self) -> tuple[Real, ...]:
-        """A^T, A, B and the rows that read rate and moment: s' = A s + B torque (see `kernel`)."""
-        A = self.loop.having(K1=0.0, K2=0.0).matrix()
+        """A^T, A, B and the rows that read the servo and the moment: s' = A s + B torque (see `kernel`)."""
+        A = self.loop.having(Kp=0.0, K1=0.0, K2=0.0).matrix()
         upper, real = self.loop.pulse.kept()
         last = 2 * upper.size + real.size + 2  # where the torque of the sample before is kept: B is 1 there
-        rate, moment = (-self.loop.having(K1=K1, K2=1 - K1).matrix()[last] for K1 in (1.0, 0.0))
+        servo = -self.loop.having(K2=0.0).matrix()[last]
+        moment = -self.loop.having(Kp=0.0, K1=0.0, K2=1.0).matrix()[last]
         B = self.loop.pulse.matrices()[1]
         drive = np.r_[B, np.zeros(len(A) - len(B))]
-        return tuple(np.ascontiguousarray(each) for each in (A.T, A, drive, rate, moment))
+        return tuple(np.ascontiguousarray(each) for each in (A.T, A, drive, servo, moment))
 
     @cached_property
     def reference(self) -> Real:
         """What is wanted at each sample (see `kernel`)."""
         task, none = self.task, np.zeros(self.n)
         counted, rest = (task.feedforward, none) if self.signals == "total" else (none, task.feedforward)
-        return np.ascontiguousarray(np.c_[task.hub_rate, counted, rest, task.rigid_moment])
+        gains = self.loop.gains
+        servo = gains.Kp * task.hub_angle + gains.K1 * task.hub_rate
+        return np.ascontiguousarray(np.c_[servo, counted, rest, task.rigid_moment])
 
     @cached_property
     def numbers(self) -> Real:
-        """K1, a, b, T, the largest moment, and after how many samples x answers a torque."""
+        """a, b, T, the largest moment, and after how many samples x answers a torque."""
         sampling = self.loop.chain.sampling
         bound, lag = FOLDED_UP * self.arm.bending_scale, 1 + sampling.whole_delay
-        return np.array([self.loop.gains.K1, self.cost.a, self.cost.b, sampling.period, bound, float(lag)])
+        return np.array([self.cost.a, self.cost.b, sampling.period, bound, float(lag)])
 
     @cached_property
     def reply(self) -> float:
         """dx/d(torque) at the first sample that feels it: the one-step sensitivity of the plant."""
         _, A, B, _, moment = self.model
-        return float(moment @ np.linalg.matrix_power(A, int(self.numbers[5]) - 1) @ B)
+        return float(moment @ np.linalg.matrix_power(A, int(self.numbers[kernel.LAG]) - 1) @ B)
 
     def run(self, inputs: int = 6, hidden: int = 1) -> Run:
         """Empty arrays for a network of that size."""
@@ -169,7 +177,7 @@ class Trial:
 
         x depends on K(k) by the plant's one-step sensitivity, e directly; all earlier signals are data.
         """
-        run, lag = self.run(*network.W1.shape[::-1]), int(self.numbers[5])
+        run, lag = self.run(*network.W1.shape[::-1]), int(self.numbers[kernel.LAG])
         work, weights = self.work(network.scales.size), network.weights
         kernel.forward(self.model, self.reference, self.numbers, network.scales, guard, weights, run, work)
         gradient = np.zeros(weights.size)
@@ -190,6 +198,7 @@ def slew_trial(
     chain: Chain | None = None,
     *,
     K1: float | None = None,
+    Kp: float = 0.0,
     cost: Cost | None = None,
     signals: Signals = "vibration",
     duration: float = DURATION,
@@ -197,13 +206,14 @@ def slew_trial(
     known: Arm | None = None,
 ) -> Trial:
     """The slew of an arm with `count` flexible modes; `known` is the arm that the controller believes it moves,
-    `K1` by default that of `default_gains` for that arm.
+    `K1` by default that of `default_gains` for that arm, or with a `Kp` that of `usual_rate_gain`.
 
     Raises ParameterError for an arm that cannot turn, a hub without inertia, and numbers out of range.
     """
     if signals not in ("vibration", "total"):
         raise ParameterError(key="signals", value=signals, remedy=did_you_mean(str(signals), ("vibration", "total")))
-    K1 = default_gains(known or arm).K1 if K1 is None else K1
+    Kp = not_negative("Kp", Kp, ANGLE_GAIN)
+    K1 = usual_rate_gain(known or arm, Kp) if K1 is None else K1
     rate_gain = number("K1", K1, "the hub rate gain is a finite number of N m s/rad")
     length = positive("duration", duration, "a trial lasts a positive number of seconds")
     chain = with_signals(Chain() if chain is None else chain, signals)
@@ -213,9 +223,21 @@ def slew_trial(
     if arm.has_massless_hub:
         remedy = "the root moment of a hub without inertia is the torque itself, and feeding it back an algebraic loop"
         raise ParameterError(key="hub.inertia", value=0.0, remedy=f"{remedy}; give the hub an inertia")
-    loop = sampled_loop(arm, HubFeedback(K1=rate_gain, K2=1.0), chain, count=count)
+    loop = sampled_loop(arm, HubFeedback(K1=rate_gain, K2=1.0, Kp=Kp), chain, count=count)
     task = scenario("slew", arm if known is None else known, chain, length)
     return Trial(loop, task, Cost() if cost is None else cost, signals)
+
+
+def usual_rate_gain(arm: Arm, Kp: float) -> float:
+    """K1 [N m s/rad]: that of `default_gains`, or with Kp > 0 what damps the rigid arm under it by 1/sqrt(2).
+
+    J theta_tt + (K1 + losses) theta_t + Kp theta = 0 is damped so with K1 + losses = sqrt(2 Kp J).  Raises
+    ParameterError for a Kp below zero.
+    """
+    Kp = not_negative("Kp", Kp, ANGLE_GAIN)
+    if Kp == 0.0:
+        return default_gains(arm).K1
+    return max(0.0, math.sqrt(2 * Kp * arm.turned_inertia) - arm.rate_loss)
 
 
 def with_signals(chain: Chain, signals: Signals) -> Chain:

@@ -17,7 +17,7 @@ from tfarm.spectrum.scales import default_gains
 from tfarm.tuner.bound import lq_bound
 from tfarm.tuner.comparison import Row
 from tfarm.tuner.constants import BestConstant, best_constant
-from tfarm.tuner.controller import TunedGain
+from tfarm.tuner.controller import TunedGain, tip_error
 from tfarm.tuner.guard import GuardKind, find_guard
 from tfarm.tuner.network import initial_network
 from tfarm.tuner.saving import SavedTuner, weights_answer
@@ -36,8 +36,9 @@ BOUND_NOTES = {
 class Plan:
     """What to tune and how: the paper's figures where it gives them.
 
-    `K1` [N m s/rad], `duration` of a trial [s], flexible modes `count`, `hidden` neurons; `seventh_input` feeds K(t-1)
-    back too, the gain that the paper names among its inputs; `scale` [N m] divides the other six.
+    `K1` [N m s/rad] and `Kp` [N m/rad] of the servo, 0 in the paper, `duration` of a trial [s], flexible modes `count`,
+    `hidden` neurons; `seventh_input` feeds K(t-1) back too, the gain that the paper names among its inputs; `scale`
+    [N m] divides the other six.
     """
 
     cost: Cost = field(default_factory=Cost)
@@ -47,6 +48,7 @@ class Plan:
     trials: int = 100
     seed: int = 0
     K1: float = 0.3
+    Kp: float = 0.0
     duration: float = DURATION
     count: int = MODES
     hidden: int = 6
@@ -84,7 +86,9 @@ class Tuning:
         """What `saving.save` writes."""
         guard, plan, period = self.training.guard, self.plan, self.trial.task.period
         arm, network = self.trial.arm.name, self.training.network
-        return SavedTuner(network, guard.kind, guard.lo, guard.hi, plan.K1, plan.signals, plan.cost, arm, period)
+        return SavedTuner(
+            network, guard.kind, guard.lo, guard.hi, plan.K1, plan.signals, plan.cost, arm, period, plan.Kp
+        )
 
     def gain(self) -> TunedGain:
         """The trained controller."""
@@ -99,7 +103,14 @@ def tune(arm: Arm, plan: Plan | None = None, chain: Chain | None = None) -> Tuni
     plan = Plan(K1=default_gains(arm).K1) if plan is None else plan
     network = initial_network(plan.seed, hidden=plan.hidden, scales=plan.scales)
     trial = slew_trial(
-        arm, chain, K1=plan.K1, cost=plan.cost, signals=plan.signals, duration=plan.duration, count=plan.count
+        arm,
+        chain,
+        K1=plan.K1,
+        Kp=plan.Kp,
+        cost=plan.cost,
+        signals=plan.signals,
+        duration=plan.duration,
+        count=plan.count,
     )
     best = best_constant(trial)
     guard = find_guard(trial.loop, plan.guard, best.gain)
@@ -129,6 +140,7 @@ def tune_answer(tuning: Tuning) -> dict[str, Any]:
         "signals": plan.signals,
         "seed": plan.seed,
         "K1": plan.K1,
+        "Kp": plan.Kp,
         "trials": int(training.costs.size),
         "cost": training.costs.tolist(),
         "cost_tuned": result.cost,
@@ -142,6 +154,7 @@ def tune_answer(tuning: Tuning) -> dict[str, Any]:
         "residual_moment_rms": residual_rms(result, busy),
         "residual_raw_moment_rms": _raw_residual(tuning),
         "residual_without": residual_rms(tuning.without, busy),
+        **tip_errors(tuning),
         "guard": [guard.lo, guard.hi],
         "guard_kind": guard.kind,
         "guard_proven": guard.is_proven,
@@ -152,6 +165,18 @@ def tune_answer(tuning: Tuning) -> dict[str, Any]:
         "stopped": None if stopped is None else str(stopped),
         "weights": weights_answer(training.network),
     }
+
+
+def tip_errors(tuning: Tuning) -> dict[str, float | None]:
+    """How far off the tip is [m] when the trial ends: tuned, with the best constant gain, without moment feedback."""
+    trial = tuning.trial
+    simulator, law = Simulator(trial.arm, trial.loop.chain, trial.task, count=trial.loop.plant.count), trial.loop.gains
+    runs = {
+        "tip_error_m": simulator.gain_schedule(law.K1, tuning.gain(), Kp=law.Kp),
+        "tip_error_best_constant_m": simulator.linear(law.having("K2", tuning.best_constant.gain)),
+        "tip_error_without_m": simulator.linear(law.having("K2", 0.0)),
+    }
+    return {key: tip_error(run, trial) for key, run in runs.items()}
 
 
 def _raw_residual(tuning: Tuning) -> float:
@@ -197,13 +222,23 @@ def controlled_answer(
     chain = with_signals(chain, saved.signals)
     task = scenario(name, arm, chain, duration)
     ideal = ideal_chain(chain)
-    used = modes_for(count, lambda n: Simulator(arm, ideal, task, count=n).gain_schedule(saved.K1, saved.gain()))
-    run = Simulator(arm, chain, task, count=used.modes, between=between).gain_schedule(saved.K1, saved.gain())
-    answer = simulation_answer(arm, HubFeedback(K1=saved.K1, K2=0.0), run, None, used)
+    used = modes_for(
+        count, lambda n: Simulator(arm, ideal, task, count=n).gain_schedule(saved.K1, saved.gain(), Kp=saved.Kp)
+    )
+    run = Simulator(arm, chain, task, count=used.modes, between=between).gain_schedule(
+        saved.K1, saved.gain(), Kp=saved.Kp
+    )
+    answer = simulation_answer(arm, HubFeedback(K1=saved.K1, K2=0.0, Kp=saved.Kp), run, None, used)
     what = described(task, arm, chain)
     return answer | {"K2": None, "controller": _described(saved), "scenario_in_words": what}
 
 
 def _described(saved: SavedTuner) -> dict[str, Any]:
-    about = {"trained_on": saved.arm, "guard_kind": saved.guard_kind, "guard": [saved.lo, saved.hi], "K1": saved.K1}
+    about = {
+        "trained_on": saved.arm,
+        "guard_kind": saved.guard_kind,
+        "guard": [saved.lo, saved.hi],
+        "K1": saved.K1,
+        "Kp": saved.Kp,
+    }
     return about | {"signals": saved.signals, "period_s": saved.period, **asdict(saved.cost)}
