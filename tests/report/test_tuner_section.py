@@ -10,6 +10,7 @@ import pytest
 
 import tfarm
 from tests.shared import once
+from tfarm.digits import significant
 from tfarm.dsp import Chain
 from tfarm.dsp.curves import away
 from tfarm.errors import CertificationError
@@ -103,6 +104,8 @@ def test_the_words_begin_with_the_answer_and_carry_the_numbers(small):
     below = int((data.curves[0].final < data.tuning.best_constant.cost).sum())
     assert f"{below} of {SEEDS} seeds end below the best constant gain" in words[0]
     assert "0.256" in words[3]
+    assert "With the angle held, Kp = " in words[-2]
+    assert f"the tuner {significant(data.servo.training.result.cost, 3)}" in words[-2]
     facts = {fact.label: fact.value for fact in section.facts}
     assert facts["cost without moment feedback"] == "2.692"
     assert facts["best constant gain"] == "0.9531"

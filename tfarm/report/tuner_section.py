@@ -72,10 +72,10 @@ def section_of(data: TunerStudy) -> Section:
         words=(
             short_answer(data),
             drift_words(data),
-            *([servo_words(data)] if data.servo else []),
             shaping_words(data),
             bound_words(data),
             learning_words(data),
+            *([servo_words(data)] if data.servo else []),
             sign_words(data.arm),
         ),
         blocks=(
