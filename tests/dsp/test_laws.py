@@ -146,6 +146,33 @@ def test_a_law_on_the_moment_alone_leaves_the_hub_adrift():
     assert (verdict.word, verdict.log_radius) == ("marginal", 0.0)
 
 
+INTEGRATOR = ([0.02, 0.0], [1.0, -1.0])
+
+
+@pytest.mark.parametrize(
+    ("entries", "marginal"),
+    [
+        ({"hub_rate": 0.3, "root_moment": INTEGRATOR}, True),  # the moment of a hub that turns steadily is 0
+        ({"hub_angle": INTEGRATOR, "hub_rate": ([0.32, -0.3], [1.0, -1.0])}, True),  # of two only the sum is felt
+        ({"hub_angle": INTEGRATOR, "hub_rate": 0.3}, False),
+        ({"hub_angle": ([1.0, -1.0], [1.0, -1.0]), "hub_rate": 0.3}, True),  # cancelled in the law itself
+        ({"hub_rate": INTEGRATOR}, False),
+    ],
+)
+def test_integrators_of_what_is_0_at_rest_stay_at_one(entries, marginal):
+    loop = sampled_law(LAB, Law(entries, period=T), Chain(), count=6)
+    assert loop.poles_at_one == marginal
+    at_one = abs(loop.eigenvalues - 1) < 1e-7
+    assert at_one.sum() == marginal
+    assert (loop.poles.log_radius[at_one] == 0).all()
+
+
+def test_what_stays_at_one_is_left_out_of_what_is_proven():
+    verdict = law_verdict(LAB, Law({"hub_rate": 0.3, "root_moment": ([0.001, 0.0], [1.0, -1.0])}, period=T))
+    assert (verdict.word, verdict.log_radius, verdict.is_settled) == ("marginal", 0.0, True)
+    assert "a pole of the law neither grows nor decays" in verdict.sentence
+
+
 def test_filtered_signals_are_what_the_analog_filter_makes_of_them():
     """At a slow z the sampled filter is the continuous one: H(z) times z^d is nearly G(s) of the filtered signal."""
     names = ("tip_acceleration", "moment@0.3", "hub_angle", "hub_rate")
@@ -181,6 +208,19 @@ def test_poles_cross_the_circle_at_the_factors_that_are_named(law):
     for factor, _, change in list(found)[:4]:
         before, after = (int((loop.times(factor * k).poles.log_radius > 0).sum()) for k in (1 - 1e-7, 1 + 1e-7))
         assert after - before == change, factor
+
+
+def test_between_crossings_the_count_is_what_they_say():
+    """Random laws, integrators among them, at random factors."""
+    rng = np.random.default_rng(77)
+    for _ in range(6):
+        case = some_case(rng)
+        loop = case and sampled_law(*case, count=6)
+        if loop:
+            factors = np.r_[1.0, 10 ** rng.uniform(-4, 3, 5)]
+            passed = crossing_factors(loop).passed(factors)
+            counts = np.array([(loop.times(float(g)).poles.log_radius > 0).sum() for g in factors])
+            assert (counts - counts[0] == passed - passed[0]).all()
 
 
 def test_margins_end_where_the_verdict_turns():

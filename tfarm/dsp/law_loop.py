@@ -24,6 +24,7 @@ from tfarm.arm.law import Law, Part
 from tfarm.dsp.chain import MOST_DELAY, Chain
 from tfarm.dsp.discretise import discretised
 from tfarm.dsp.law_plant import SensedPlant, is_analog, sensed_plant
+from tfarm.dsp.law_polynomials import FREE, polynomials
 from tfarm.dsp.loop import Poles, SampledLoop, polished
 from tfarm.dsp.plant import Branching, Plant
 from tfarm.dsp.sampling import PulseTransfer
@@ -36,7 +37,7 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 Whole = NDArray[np.int64]
 
-FREE = 1e-12  # of its terms: what is left of a sum that should be 0, states of a law of order ten
+AT_REST = 1e-11  # of its terms: a static gain that is 0, summed over 400 modes
 
 
 @dataclass(frozen=True)
@@ -102,7 +103,7 @@ class SampledLaw:
         n = int(self.poles.log_radius.argmax())
         z, mode = self.poles.z[n], int(self.poles.mode[n])
         own = abs(self.law.poles - z).min(initial=np.inf)
-        if own < abs(self.pulse.multipliers - z).min():
+        if own <= abs(self.pulse.multipliers - z).min():  # the same where it is put at z = 1: an integrator's
             return "a pole of the law"
         return f"mode {mode}" if mode else "the hub"
 
@@ -177,9 +178,41 @@ class SampledLaw:
         return np.linalg.eigvals(self.reduced_matrix()).astype(complex)
 
     @cached_property
+    def near_one(self) -> tuple[tuple[int, float], list[tuple[int, float]]]:
+        """q, and p_i H_i of each signal that is fed back, as (n, c) of c x^n where x = 1 - 1/z is small."""
+        plant, T, most = self.plant, self.chain.sampling.period, self.law.order
+        at_rest = plant.static - (plant.residues / plant.poles).real.sum(axis=1)
+        size = abs(plant.static) + abs(plant.residues / plant.poles).sum(axis=1)
+        whole, entries = polynomials(self.law)
+        slopes, found = self.pulse.slopes_at_one, []
+        for row, entry in enumerate(entries):
+            if entry.coefficients.any():
+                (twice, once), gain, n, left = plant.rigid[row], at_rest[row], *entry.at_one(most)
+                own = (-2, twice * T * T) if twice else (-1, once * T) if once else (0, gain)
+                if own[0] == 0 and abs(gain) <= AT_REST * size[row]:
+                    own = (1, slopes[row])
+                found.append((n + own[0], float(own[1] * left.coefficients.sum())))
+        n, left = whole.at_one(most)
+        return (n, float(left.coefficients.sum())), found
+
+    @cached_property
+    def poles_at_one(self) -> int:
+        """How many closed-loop poles are at z = 1 for whatever numbers, a free hub angle apart.
+
+        So are an integrator of what is 0 at rest, one of two integrators side by side, a hub whose rate nothing feels:
+        x^N F, N the poles of the plant there, vanishes at x = 1 - 1/z = 0 as often as all of its terms do.
+        """
+        poles = 0 if not self.plant.arm.has_rigid_mode else (1 if self.is_damped else 2) - self.has_free_angle
+        whole, fed_back = self.near_one
+        return max(0, poles + min(n for n, _ in (whole, *fed_back)))
+
+    @cached_property
     def poles(self) -> Poles:
-        """The closed-loop poles, polished."""
-        return polished(self.eigenvalues, self.pulse, self.characteristic)
+        """The closed-loop poles, polished, those that are at z = 1 for whatever numbers put there."""
+        found = polished(self.eigenvalues, self.pulse, self.characteristic)
+        there = np.zeros(found.z.size, np.bool_)
+        there[np.argsort(abs(self.eigenvalues - 1), kind="stable")[: self.poles_at_one]] = True
+        return Poles(np.where(there, 1.0, found.z), np.where(there, 0.0, found.log_radius), found.mode)
 
 
 AnyLoop = TypeVar("AnyLoop", bound=SampledLoop | SampledLaw, default=SampledLoop)  # hub gains, unless a law is said

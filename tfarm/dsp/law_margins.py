@@ -14,16 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.crossing import Crossings, joined
-from tfarm.dsp.boundary import NARROWEST, NEAR_ONE, CircleGrid, circle_grid, geometric, real_gain, solved_on
-from tfarm.dsp.law_circle import polynomials
+from tfarm.dsp.boundary import NARROWEST, CircleGrid, circle_grid, geometric, real_gain, solved_on
 from tfarm.dsp.law_loop import SampledLaw
+from tfarm.dsp.law_polynomials import polynomials
 from tfarm.dsp.margins import Window
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 SMALLEST, LARGEST = 1e-9, 1e9  # factors that are looked at: beyond, a law is none, or its gain is beyond any number
-REAL = 1e-4  # of B/A next to z = 1: more imaginary than that it has a pole there, and no factor comes to it
+BLURRED = 1e-6  # rad: nearer to z = 1 a polynomial with two roots there is lost in rounding
 SAME = 1e-9  # relative: two crossings so near are one
 BRIGHT = 1e-2  # roots of the law nearer to z = 0 leave nothing on the circle to resolve
 
@@ -57,10 +57,12 @@ def crossing_factors(loop: SampledLaw) -> Crossings:
     """The positive factors on the law at which poles are on the circle, `at` which angle [rad a sample]."""
     grid = law_grid(loop)
     A, B = _split(grid.terms)
-    rises = (A * B.conj()).imag >= 0
-    step = np.nonzero(rises[1:] != rises[:-1])[0]
+    rises, told = (A * B.conj()).imag >= 0, grid.q > (BLURRED if _has_root_at_one(loop) else 0.0)
+    step = np.nonzero((rises[1:] != rises[:-1]) & told[:-1])[0]
     q, factor = solved_on(grid, _split, step)
-    found = [*zip(factor, q, np.where(rises[step], 2, -2), strict=True), *_ends(loop, bool(rises[0]), bool(rises[-1]))]
+    first = -1 if rises[told][0] else 1
+    found = [*zip(factor, q, np.where(rises[step], 2, -2), strict=True), (_at_one(loop), 0.0, first)]
+    found.append((_at_minus_one(loop), math.pi, 1 if rises[-1] else -1))
     return Crossings.of(each for each in found if SMALLEST < each[0] < LARGEST)
 
 
@@ -70,15 +72,24 @@ def _split(terms: tuple[Any, Complex]) -> tuple[Complex, Complex]:
     return both[0], both[1]
 
 
-def _ends(loop: SampledLaw, first: bool, last: bool) -> list[tuple[float, float, int]]:
-    """Single poles at z = 1 and z = -1, each for one factor."""
-    one, found = np.ones(1), []
-    for angle, z, change in ((0.0, np.exp(1j * NEAR_ONE), -1 if first else 1), (math.pi, -1.0 + 0j, 1 if last else -1)):
-        A, B = loop.terms(np.array([z]), None, one)
-        ratio = B[0] / A[0] if A[0] else np.inf
-        if abs(ratio.imag) <= REAL * abs(ratio) < np.inf:
-            found.append((float(real_gain(A[0], B[0])), angle, change))
-    return found
+def _has_root_at_one(loop: SampledLaw) -> bool:
+    """Whether a polynomial of the law vanishes at z = 1, and next to it is known to an absolute error alone."""
+    whole, entries = polynomials(loop.law)
+    return any(each.coefficients.any() and each.at_one(1)[0] for each in (whole, *entries))
+
+
+def _at_one(loop: SampledLaw) -> float:
+    """The factor that brings a single pole to z = 1, where both A and B go there as the same power of x; else inf."""
+    (n, A), fed_back = loop.near_one
+    lowest = min((order for order, _ in fed_back), default=n + 1)
+    B = sum(value for order, value in fed_back if order == lowest)
+    return float(real_gain(A, B)) if lowest == n else math.inf
+
+
+def _at_minus_one(loop: SampledLaw) -> float:
+    """The factor that brings a single pole to z = -1."""
+    A, B = loop.terms(np.array([-1.0 + 0j]), None, np.ones(1))
+    return float(real_gain(A[0], B[0]))
 
 
 def stable_factors(loop: SampledLaw) -> list[Window]:

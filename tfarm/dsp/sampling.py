@@ -78,6 +78,14 @@ class PulseTransfer:
         return np.exp(self.poles * ((1 - f) * T)) * held(self.poles, f * T)
 
     @property
+    def slopes_at_one(self) -> Real:
+        """dH/dz (outputs,) at z = 1, of the poles other than s = 0 and without the delay."""
+        gap, late = 1 - self.multipliers[:-1], self.late[:-1]
+        terms = late / gap + (self.early[:-1] + late) / gap**2
+        slope: Real = -(self.plant.residues @ terms).real - self.plant.static
+        return slope
+
+    @property
     def ramps(self) -> tuple[float, float]:
         """What u_{k-d} and u_{k-d-1} add to the double integral of the torque within a sample."""
         T, f = self.sampling.period, self.sampling.fraction
