@@ -1,8 +1,11 @@
-"""What a law drives, and whether it is more than gains at the hub."""
+"""What a law drives, whether it is more than gains at the hub, and what a person should know of it."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
+
+import numpy as np
 
 from tfarm.arm.feedback import HubFeedback
 from tfarm.arm.law import Law
@@ -10,6 +13,8 @@ from tfarm.arm.records import Arm
 from tfarm.errors import ParameterError
 
 AnyLaw = HubFeedback | Law
+
+CANCELLED = 1e-6  # of its size: a zero of the law so near to an unstable pole of it cancels that
 
 
 def through(arm: Arm, law: AnyLaw) -> tuple[Arm, AnyLaw]:
@@ -35,3 +40,19 @@ def tracked(arm: Arm, law: AnyLaw) -> tuple[Arm, AnyLaw]:
     if isinstance(law, Law) and not set(law.signals) <= set(law.references):
         return driven, law
     return driven, plain
+
+
+def cancelled(law: Law) -> tuple[str, ...]:
+    """Warnings: the law's own poles right of the axis, or outside the unit circle, that its own zeros cancel."""
+    found = []
+    for part in law.parts:
+        zeros = getattr(part.block, "zeros", np.empty(0, complex))
+        for pole in part.block.poles:
+            gap = abs(zeros - pole).min() if zeros.size else math.inf
+            grows = abs(pole) >= 1 if law.is_discrete else pole.real >= 0
+            if grows and gap <= CANCELLED * max(abs(pole), 1e-12):
+                where = f"z = {pole:.6g}" if law.is_discrete else f"{pole:.6g} 1/s"
+                found.append(
+                    f"the law cancels its own unstable pole {where} on {', '.join(part.signals)}: it is not stable"
+                )
+    return tuple(found)

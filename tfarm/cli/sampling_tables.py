@@ -36,6 +36,8 @@ def print_sampled_law(answer: dict[str, Any]) -> None:
     print(f"{answer['law']}, order {answer['law_order']}, {answer['rule_in_words']}: {answer['sign_convention']}")
     late = f", {answer['delay_samples']:g} of them late" if answer["delay_samples"] else ""
     print(f"samples every {answer['period_s']:g} s{late}; {answer['modes_used']} flexible modes in what follows")
+    for warning in answer["warnings"]:
+        print(f"warning: {warning}")
     if answer["free_hub_angle"]:
         print("nothing regulates the hub's angle: its pole at z = 1 is left out")
     for low, high in answer["stable_gain_factors"]:

@@ -8,6 +8,7 @@ from typing import Any
 
 from tfarm.arm import Arm
 from tfarm.arm.checks import whole as whole_number
+from tfarm.arm.driving import cancelled
 from tfarm.arm.law import Law
 from tfarm.dsp.band import Band
 from tfarm.dsp.chain import Chain
@@ -39,6 +40,11 @@ class LawAnalysis:
     def gain_factors(self) -> Window | None:
         """The interval around 1 in which a factor on the law may lie; None where the loop is not stable."""
         return around(self.factors, 1.0)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a person should know of the law: unstable poles of its own that its own zeros cancel."""
+        return cancelled(self.loop.law)
 
     @property
     def rule(self) -> str:
@@ -92,6 +98,7 @@ def law_answer(analysis: LawAnalysis) -> dict[str, Any]:
         "modes_used": verdict.modes_used,
         "settled": verdict.is_settled,
         "band_rad_s": verdict.band_rad_s,
+        "warnings": list(analysis.warnings),
         "free_hub_angle": loop.has_free_angle,
         "stable_gain_factors": [list(window) for window in analysis.factors],
         "gain_factors": None if analysis.gain_factors is None else list(analysis.gain_factors),

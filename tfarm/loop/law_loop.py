@@ -8,7 +8,6 @@ its zeros can be counted.  Where the law and the rig share a zero and a pole D k
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -17,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import INPUT_UNITS, Arm, must_be_arm
+from tfarm.arm.driving import cancelled
 from tfarm.arm.law import Law
 from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import Analytic, LoopParts, deflated
@@ -33,7 +33,6 @@ FAR = (1e5, 1e6, 1e7)  # of w1: how far right an improper law is looked at
 FARTHEST = 1e11  # of w1: where waves are no longer dispersed
 AT_REST = 1e-12  # of w1: where the function, its zeros at 0 divided out, is taken for its value at 0
 FALLS = 0.5  # L must fall by this there, from one to the next
-CANCELLED = 1e-6  # of its size: a zero of the law so near to an unstable pole of it cancels that
 
 
 @dataclass(frozen=True)
@@ -160,15 +159,7 @@ class LawLoop:
     @cached_property
     def warnings(self) -> tuple[str, ...]:
         """What a person should know of the law: poles right of the axis that its own zeros cancel."""
-        found = []
-        for part in self.law.parts:
-            zeros = getattr(part.block, "zeros", np.empty(0, complex))
-            for pole in part.block.poles:
-                gap = abs(zeros - pole).min() if zeros.size else math.inf
-                if pole.real >= 0 and gap <= CANCELLED * max(abs(pole), 1e-12):
-                    name = ", ".join(part.signals)
-                    found.append(f"the law cancels its own unstable pole {pole:.6g} 1/s on {name}: it is not stable")
-        return tuple(found)
+        return cancelled(self.law)
 
 
 def _zeros_at_origin(numerators: Any, row: int) -> int:
