@@ -19,6 +19,7 @@ VERBS = {  # those that take an arm, as short as they go
     "locus": ("--vary", "K2", "--from", "0", "--to", "0.2", "--points", "3", "--branches", "2"),
     "reduce": ("--order", "4"),
     "sampled": ("--modes", "4"),
+    "spill": ("--modes", "3"),
     "simulate": ("--modes", "4", "--duration", "0.05"),
 }
 UNASKED = {"assumptions", "design", "map", "report", "study", "tune"}  # whose runs take long: the option is one for all

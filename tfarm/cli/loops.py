@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from tfarm.cli.app import ArmName, Json, app, give, load_arm, whole
-from tfarm.cli.inputs import Given, gains_of, under_a_law
+from tfarm.cli.inputs import Given, law_of, under_a_law
 from tfarm.columns import Column, Table
 from tfarm.digits import singly
 
@@ -16,9 +16,12 @@ Vary = Annotated[
     str,
     typer.Option(
         "--vary",
-        help="K1, K2, Kp, all (a scale on the three), payload_mass, payload_inertia, hub_inertia, length or damping",
+        help="K1, K2, Kp, all (a scale on the three), payload_mass, payload_inertia, hub_inertia, length or damping; "
+        "of another law gain, delay, SIGNAL, SIGNAL.num.N or SIGNAL.den.N, too",
     ),
 ]
+POINTS = "values, equally spaced; 500, of another law than gains at the hub 100"
+BRANCHES = "branches, 1 to 200; of another law the flexible modes below the top of the box, up to 60"
 
 
 @app.command()
@@ -28,23 +31,32 @@ def locus(
     vary: Vary,
     start: Annotated[float, typer.Option("--from", help="value at which the locus begins")],
     stop: Annotated[float, typer.Option("--to", help="value at which it ends")],
-    points: Annotated[str, typer.Option("--points", metavar="N", help="values, equally spaced")] = "500",
-    branches: Annotated[str, typer.Option("--branches", metavar="N", help="branches, 1 to 200")] = "10",
+    points: Annotated[str | None, typer.Option("--points", metavar="N", help=POINTS)] = None,
+    branches: Annotated[str, typer.Option("--branches", metavar="N", help=BRANCHES)] = "10",
     csv: Annotated[Path | None, typer.Option("--csv", help="write the branches to this file")] = None,
     json: Json = False,
     *,
     given: Given,
 ) -> None:
     """Root locus of the exact arm along a gain or a parameter; crossings of the imaginary axis are solved for."""
-    number, count = whole("--points", points, 2, 100_000), whole("--branches", branches, 1, 200)
+    number, count = whole("--points", points or "500", 2, 100_000), whole("--branches", branches, 1, 200)
     subject = load_arm(arm)
-    law, said = gains_of(subject, given)
-    from tfarm.loop.locus import locus as find
-    from tfarm.loop.locus_answer import locus_answer
-    from tfarm.loop.reduced_locus import reduced_locus
+    law, said = law_of(subject, given)
+    from tfarm.arm.law import Law
 
-    exact = find(subject, law, vary, start, stop, number, count)
-    answer = locus_answer(exact, reduced_locus(exact)) | said
+    if isinstance(law, Law):
+        from tfarm.loop.law_locus import law_locus, law_locus_answer
+
+        number = whole("--points", points or "100", 2, 5000)
+        answer = law_locus_answer(law_locus(subject, law, vary, start, stop, number, min(count, 60)))
+        show = print_law_locus
+    else:
+        from tfarm.loop.locus import locus as find
+        from tfarm.loop.locus_answer import locus_answer
+        from tfarm.loop.reduced_locus import reduced_locus
+
+        exact = find(subject, law, vary, start, stop, number, count)
+        answer, show = locus_answer(exact, reduced_locus(exact)) | said, print_locus
     if csv is not None:
         from tfarm.tables.files import write_csv
 
@@ -52,7 +64,7 @@ def locus(
     from tfarm.cli.tables import say_written
 
     if json or say_written(csv):
-        give(answer, json, print_locus)
+        give(answer, json, show)
 
 
 def branches_table(answer: dict[str, Any]) -> Table:
@@ -77,22 +89,46 @@ def print_locus(answer: dict[str, Any]) -> None:
         Column("gap", "gap to reduced", of=answer["gap_by_branch"], digits=singly("{:.1e}".format)),
     )
     show(Table(columns=columns))
-    for each in answer["crossings"]:
-        where = f"{name} = {each['gain']:.10g}, {each['omega_rad_s']:.10g} rad/s ({each['frequency_hz']:.6g} Hz)"
-        which = "a pole that is on no branch" if each["branch"] is None else f"branch {each['branch']}"
-        print(f"{which} becomes {each['direction']} at {where}")
+    _print_crossings(answer)
     for each in answer["ends"]:
         print(f"branch {each['branch']} is followed to {name} = {each['gain']:.10g}: then it comes to -1/C, or is lost")
-    if not answer["crossings"]:
-        print("no branch crosses the imaginary axis")
     print(
         f"largest gap to python-control on a model of order {answer['reduced_order']}: {answer['gap_to_reduced']:.1e}"
     )
     print(answer["sign_convention"])
 
 
-def _complex(point: list[float] | None) -> str:
+def print_law_locus(answer: dict[str, Any]) -> None:
+    """A row a branch, then the crossings and the box."""
+    from tfarm.tables.terminal import show
+
+    first, last, name, branches = answer["gain"][0], answer["gain"][-1], answer["vary"], answer["branches"]
+    columns = (
+        Column("branch", "branch", of=range(len(branches))),
+        Column("first", f"s [1/s] at {name} = {first:g}", of=[_complex(branch[0], "-") for branch in branches]),
+        Column("last", f"at {name} = {last:g}", of=[_complex(branch[-1], "-") for branch in branches]),
+    )
+    show(Table(columns=columns))
+    _print_crossings(answer)
+    left, right, _, top = answer["box"]
+    print(f"all poles with {left:.6g} < Re s < {right:.6g} and |Im s| < {top:.6g}, complete at each value; - : outside")
+    print(answer["sign_convention"])
+
+
+def _print_crossings(answer: dict[str, Any]) -> None:
+    """A line a crossing of the imaginary axis."""
+    for each in answer["crossings"]:
+        where = (
+            f"{answer['vary']} = {each['gain']:.10g}, {each['omega_rad_s']:.10g} rad/s ({each['frequency_hz']:.6g} Hz)"
+        )
+        which = "a pole that is on no branch" if each["branch"] is None else f"branch {each['branch']}"
+        print(f"{which} becomes {each['direction']} at {where}")
+    if not answer["crossings"]:
+        print("no branch crosses the imaginary axis")
+
+
+def _complex(point: list[float] | None, none: str = "ended") -> str:
     if point is None:
-        return "ended"
+        return none
     re, im = point
     return f"{re:.10g}{im:+.10g}i" if im else f"{re:.10g}"

@@ -95,13 +95,13 @@ def law_map(arm: Arm, law: Law, vary: tuple[str, str], x: Real, y: Real, band: f
         band = max(band_for(LawLoop(arm, each)) for each in corners)
     omega = np.asarray(grid(arm, band))
     known = Signals(arm, law.signals).parts(1j * omega)
-    columns = [_along(arm, law.having(vary[0], float(value)), vary[1], y, omega, known, band) for value in x]
+    columns = [along(arm, law.having(vary[0], float(value)), vary[1], y, omega, known, band) for value in x]
     at, start = _clear_row(y, columns), x.size // 2
     row = law.having(vary[1], float(y[at]))
     if vary[0] == "delay":
         there = [unstable_below(LawLoop(arm, row.having(vary[0], float(value))), band) for value in x]
     else:
-        across = _along(arm, row, vary[0], x, omega, known, band)
+        across = along(arm, row, vary[0], x, omega, known, band)
         first = unstable_below(LawLoop(arm, row.having(vary[0], float(x[start]))), band)
         (there,) = counts_over(x, [across], float(x[start]), np.array([first]))
     counts = counts_over(y, columns, float(y[at]), np.asarray(there))
@@ -117,7 +117,7 @@ def unstable_below(loop: LawLoop, band: float) -> int:
     return winding_number(loop.function, Box(0.0, right, -band, band), POINTS)
 
 
-def _along(arm: Arm, law: Law, name: str, values: Real, omega: Real, known: LoopParts, band: float) -> Crossings:
+def along(arm: Arm, law: Law, name: str, values: Real, omega: Real, known: LoopParts, band: float) -> Crossings:
     """The crossings of the axis along one number, between its first and last value: D = A + t B, 0 < t < 1."""
     low, span = float(values[0]), float(values[-1] - values[0])
     first, last = (LawLoop(arm, law.having(name, float(end))) for end in (values[0], values[-1]))

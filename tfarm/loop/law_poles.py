@@ -18,7 +18,7 @@ from tfarm.spectrum.damped import CLEAR
 
 from .frequencies import band_of, steep_places
 from .law_loop import LawLoop
-from .poles import MOST_MODES, MOST_POLES, USUAL, Poles, first_poles
+from .poles import MOST_POLES, USUAL, Poles, first_poles
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 
@@ -28,7 +28,8 @@ LATE = 2.0  # of 1/delay: further left a delayed loop has ever more poles, and a
 BEYOND = (2.0, 5.0, 20.0)  # of its right edge, where the loop function is looked at again
 QUIET = 0.5  # |L| there, so that 1 + L has no zero
 WIDEST = 1e8  # heights that a box reaches right
-MORE = 4  # modes of the model above the box
+MORE, LARGEST = 4, 40  # modes of the model above the box, and at most
+MOST_MODES = 150  # flexible modes below the highest box that is searched for as many poles as are asked for
 
 
 def law_poles(arm: Arm, law: Law, count: int | None = None) -> Poles[LawLoop]:
@@ -44,8 +45,11 @@ def law_poles(arm: Arm, law: Law, count: int | None = None) -> Poles[LawLoop]:
         if poles.values.size >= wanted:
             real = int((poles.values.imag == 0).sum())
             return first_poles(poles, wanted if count is not None else max(wanted, real))
-        if number > MOST_MODES:
-            text = f"only {poles.values.size} poles were found in the highest box, not {wanted}"
+        if 2 * number > MOST_MODES:
+            if count is None:
+                return poles
+            left, _, _, top = poles.box
+            text = f"only {poles.values.size} poles right of {left:.4g} 1/s lie below {top:.4g} rad/s, not {wanted}"
             raise ConvergenceError(text, poles.values, wanted)
         number *= 2
 
@@ -55,7 +59,7 @@ def law_poles_below(loop: LawLoop, height: float, late: float = LATE) -> Poles[L
 
     Left it reaches to -late/delay at most.
     """
-    at_zero, starts = loop.zeros_at_origin, _starts(loop, 1.3 * height)
+    at_zero, starts = loop.zeros_at_origin, starting_points_of(loop, 1.3 * height)
     found, box = complete(loop.function, lambda top: law_box(loop, top, late), height, starts)
     upper = found[found.imag >= 0]
     upper = upper[np.lexsort((upper.real, upper.imag))]
@@ -76,7 +80,7 @@ def law_box(loop: LawLoop, height: float, late: float = LATE) -> Box:
     return Box(-float(left), float(right), -height, height)
 
 
-def _starts(loop: LawLoop, up_to: float) -> Complex:
+def starting_points_of(loop: LawLoop, up_to: float) -> Complex:
     """Where Newton's method starts: the loop of a modal model, the arm's own frequencies, and the law's poles."""
     omega, C = np.asarray(steep_places(loop.arm, up_to)), loop.arm.damping
     shift = np.array([0.0, 0.02, 0.3])[:, None]
@@ -94,7 +98,7 @@ def _of_model(loop: LawLoop, up_to: float) -> Complex:
     """Poles of a modal model under the law, its delay a Pade approximation; none where the law has no states."""
     if loop.law.is_improper:
         return np.empty(0, complex)
-    count = modes_below(loop.arm, up_to) + MORE
+    count = min(modes_below(loop.arm, up_to) + MORE, LARGEST)
     try:
         plant, law = sensed_model(loop.arm, loop.law.signals, count), loop.law.matrices()
         if loop.law.delay:

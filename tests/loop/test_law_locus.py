@@ -1,0 +1,85 @@
+"""Loci of any law: against gains at the hub, lists of poles, and crossings solved for in another way."""
+
+import json
+
+import numpy as np
+import pytest
+
+import tfarm
+from tests.shell import run
+from tfarm import HubFeedback, Law, ParameterError
+from tfarm.loop.law_locus import assigned, law_locus
+from tfarm.loop.law_loop import LawLoop
+from tfarm.loop.law_poles import law_poles_below
+from tfarm.spectrum.box import Box
+
+LAB = tfarm.load("sasaki2012-lab")
+LAW = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "tip_acceleration": ([0.05], [0.02, 1.0])}, delay=0.002)
+
+
+def test_along_a_gain_at_the_hub_it_is_the_locus_of_that():
+    mine = law_locus(LAB, Law({"hub_rate": 0.3, "root_moment": 0.3}), "root_moment", 0.1, 2.0, 24, 3)
+    theirs = tfarm.locus(LAB, HubFeedback(K1=0.3, K2=0.3), "K2", 0.1, 2.0, 24, 4)
+    for row in theirs.branches[1:3]:
+        away = np.nanmin(abs(mine.branches - row), axis=0)
+        assert (away[abs(row) < 500] < 1e-9 * 500).all()
+    (first,) = (each for each in theirs.crossings if each.omega < 500)
+    same = min(mine.crossings, key=lambda each: abs(each.gain - first.gain))
+    assert same.gain == pytest.approx(first.gain, rel=1e-9)
+    assert (same.omega, same.direction) == (pytest.approx(first.omega, rel=1e-9), first.direction)
+
+
+@pytest.mark.parametrize(
+    ("vary", "start", "stop"), [("gain", 0.5, 8.0), ("delay", 0.012, 0.001), ("payload_mass", 0.05, 0.5)]
+)
+def test_each_value_has_its_complete_list_of_poles(vary, start, stop):
+    found = law_locus(LAB, LAW, vary, start, stop, 12, 3)
+    for n in (0, 5, 11):
+        value = float(found.values[n])
+        arm = LAB.having(payload_mass=value) if vary == "payload_mass" else LAB
+        law = LAW if vary == "payload_mass" else LAW.having(vary, value)
+        poles = law_poles_below(LawLoop(arm, law), 1.2 * found.box.im_max).values
+        listed = np.sort_complex(found.branches[~np.isnan(found.branches[:, n]), n])
+        expected = np.sort_complex(poles[found.box.holds(poles)])
+        np.testing.assert_allclose(listed, expected, atol=1e-9 * found.box.im_max)
+    moved = abs(np.diff(found.branches, axis=1))
+    assert np.nanmax(moved) < 0.3 * found.box.im_max  # no branch jumps to another
+
+
+def test_crossings_are_where_a_delay_takes_the_phase_margin():
+    found = law_locus(LAB, LAW.having("delay", 0.0), "delay", 0.0005, 0.02, 24, 4)
+    margin = tfarm.margins(LAB, LAW.having("delay", 0.0005)).in_band
+    first = found.crossings[0]
+    assert first.direction == "unstable"
+    assert first.gain == pytest.approx(0.0005 + margin.delay, rel=1e-7)
+    assert first.omega == pytest.approx(margin.at["delay"], rel=1e-5)
+
+
+def test_poles_are_told_apart_or_it_is_said():
+    box = Box(-10.0, 10.0, -10.0, 10.0)
+    pairs, plain = assigned(np.array([1 + 2j, -3 + 4j]), np.array([-3 + 4.1j, 1.05 + 2j]), box)
+    assert (pairs, plain) == ({0: 1, 1: 0}, True)
+    pairs, plain = assigned(np.array([1 + 2j]), np.array([1 + 2.1j, 0 + 5j]), box)
+    assert not plain  # one more in the middle of the box
+    pairs, plain = assigned(np.array([1 + 2j]), np.array([1 + 2.1j, 0 + 9.9j]), box)
+    assert (pairs, plain) == ({0: 0}, True)  # it came in over the edge
+
+
+def test_the_command_follows_a_law(capsys, tmp_path):
+    text = "[law]\ndelay = 0.002\n[law.hub_angle]\nnum = [2.0, 1.0]\nden = [0.01, 1.0]\n"
+    (tmp_path / "law.toml").write_text(text)
+    way = ("--vary", "gain", "--from", "1", "--to", "9", "--points", "6", "--branches", "2")
+    code, out, err = run(capsys, "locus", "sasaki2012-lab", "--law", str(tmp_path / "law.toml"), *way, "--json")
+    assert (code, err) == (0, "")
+    law = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0])}, delay=0.002)
+    found = law_locus(LAB, law, "gain", 1.0, 9.0, 6, 2)
+    assert json.loads(out)["box"] == list(found.box)
+    code, out, _ = run(capsys, "locus", "sasaki2012-lab", "--law", str(tmp_path / "law.toml"), *way)
+    assert "complete at each value" in out
+    assert run(capsys, "locus", "sasaki2012-lab", "--law", str(tmp_path / "law.toml"), "--vary", "K1", *way[2:])[0] == 2
+
+
+def test_what_is_no_way_is_refused():
+    for vary, start, stop in (("hub_speed", 0.0, 1.0), ("gain", 1.0, 1.0), ("gain", 0.0, np.inf)):
+        with pytest.raises(ParameterError):
+            law_locus(LAB, LAW, vary, start, stop, 5, 2)

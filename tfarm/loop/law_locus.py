@@ -1,0 +1,254 @@
+"""Root loci of the exact rig under any law: at each value the complete set of poles in one box, joined to branches.
+
+Nothing is followed blindly: the winding number says at each value how many poles the box holds, and all are found.
+From one value to the next they are assigned to each other; where that is not plain a value between is looked at.  A
+branch that leaves the box ends there, one that enters begins, and two that meet on the real axis part there as a pair.
+Along a number in which the characteristic function is linear crossings of the imaginary axis are solved for without
+branches, too.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq, linear_sum_assignment
+
+from tfarm.arm import Arm
+from tfarm.arm.checks import whole
+from tfarm.arm.law import Law
+from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.records import record
+from tfarm.response.signals import Signals
+from tfarm.spectrum.box import Box, newton, zeros_in_box
+
+from .answers import law_answer
+from .crossings import BranchCrossing
+from .frequencies import band_of, grid
+from .law_loop import LawLoop
+from .law_map import along
+from .law_poles import law_box, starting_points_of
+from .variation import PARAMETERS
+
+Complex = NDArray[np.complexfloating[Any, Any]]
+Real = NDArray[np.float64]
+
+MOST_POINTS = 5000
+MOST_BRANCHES = 60
+PLAIN = 0.35  # of the distance to the next pole: one that moves by less is itself
+AT_EDGE = 0.05  # of the box's height or width: poles so near to its edge come and go
+DEEPEST = 3  # halvings of a step where poles are not plainly told apart; then a branch may end and another begin
+HEIGHTS = (1.0, 1.013, 1.031, 1.057, 0.985, 1.09)  # of the box, until no pole is on its edge at the first value
+SAME = 1e-3  # of the range: a crossing of a branch so near to one that was solved for is that one
+TINY = 1e-9  # of a pole's size: a real part below it is none
+
+
+@dataclass(frozen=True)
+@record
+class LawLocus:
+    """Poles of a rig under a law as one number varies: `branches` (b, n) [1/s] over `values` (n,), NaN out of `box`.
+
+    `vary` is a number of the law (as `Law.having` names it) or of the arm (payload_mass, payload_inertia, hub_inertia,
+    length, damping).  Branches have Im s >= 0; the box holds no other pole at any value.  `crossings` are those of the
+    imaginary axis, ascending along the way.
+    """
+
+    arm: Arm
+    law: Law
+    vary: str
+    values: Real
+    branches: Complex
+    box: Box
+    crossings: tuple[BranchCrossing, ...]
+
+
+def law_locus(
+    arm: Arm, law: Law, vary: str, start: float, stop: float, points: int = 200, branches: int = 8
+) -> LawLocus:
+    """The locus at `points` equally spaced values, in a box as high as the first `branches` flexible modes.
+
+    Raises ParameterError for what is no number of the law or the arm, no loop or no range, ConvergenceError where the
+    poles at a value cannot all be found.
+    """
+    points = whole("points", points, 2, MOST_POINTS, f"a whole number from 2 to {MOST_POINTS}")
+    branches = whole("branches", branches, 1, MOST_BRANCHES, f"a whole number from 1 to {MOST_BRANCHES}")
+    for key, value in (("from", start), ("to", stop)):
+        if not math.isfinite(value):
+            raise ParameterError(key=key, value=value, remedy="a finite number")
+    if start == stop:
+        raise ParameterError(key="to", value=stop, remedy="the range is empty: a locus runs to another value")
+    family, values = Family(arm, law, vary), np.linspace(start, stop, points)
+    box, first = family.started(values, branches)
+    rows = [np.r_[each, np.full(points - 1, np.nan)] for each in first[:, None].astype(complex)]
+    now = list(range(len(rows)))  # the row of each pole
+    here = first
+    for n in range(1, points):
+        there, now_there = family.joined(float(values[n - 1]), here, float(values[n]), box, DEEPEST)
+        places = []
+        for pole, before in zip(there, now_there, strict=True):
+            if before is None:
+                rows.append(np.full(points, np.nan, complex))
+            place = len(rows) - 1 if before is None else now[before]
+            rows[place][n] = pole
+            places.append(place)
+        here, now = there, places
+    found = np.array(rows)
+    return LawLocus(family.at(start).arm, law, vary, values, found, box, _crossings(family, values, found, box))
+
+
+@dataclass(frozen=True)
+class Family:
+    """The loops of an arm and a law, one number of which varies."""
+
+    arm: Arm
+    law: Law
+    vary: str
+
+    @property
+    def is_of_arm(self) -> bool:
+        """Whether the number is one of the arm."""
+        return self.vary in PARAMETERS
+
+    def at(self, value: float) -> LawLoop:
+        """The loop where the number has that value."""
+        if self.is_of_arm:
+            return LawLoop(self.arm.having(**{self.vary: value}), self.law)
+        return LawLoop(self.arm, self.law.having(self.vary, value))
+
+    def started(self, values: Real, branches: int) -> tuple[Box, Complex]:
+        """A box for the whole way, and the poles in it at the first value."""
+        loops = [self.at(float(value)) for value in (values[0], values[values.size // 2], values[-1])]
+        lost: ConvergenceError | None = None
+        for factor in HEIGHTS:
+            height = factor * max(band_of(loop.arm, branches) for loop in loops)
+            boxes = [law_box(loop, height) for loop in loops]
+            box = Box(max(each.re_min for each in boxes), max(each.re_max for each in boxes), -height, height)
+            try:
+                return box, self.poles(float(values[0]), box, np.empty(0, complex))
+            except ConvergenceError as error:
+                lost = error
+        assert lost is not None
+        raise lost
+
+    def poles(self, value: float, box: Box, near: Complex) -> Complex:
+        """All poles in the box with Im s >= 0 at one value, those at 0 too; `near` are some to begin with."""
+        loop = self.at(value)
+        known = near[near != 0]
+        starts = np.r_[known, known.conj()] if near.size else starting_points_of(loop, box.im_max)
+        found = zeros_in_box(loop.function, box, starts)
+        found = np.where(abs(found.imag) < TINY * abs(found), found.real, found)
+        return np.r_[np.zeros(loop.zeros_at_origin, complex), found[found.imag >= 0]]
+
+    def joined(self, low: float, here: Complex, high: float, box: Box, depth: int) -> tuple[Complex, list[int | None]]:
+        """The poles at `high`, and which of those at `low` each continues; None where it is new."""
+        there = self.poles(high, box, here)
+        pairs, is_plain = assigned(here, there, box)
+        if is_plain or not depth:
+            return there, [pairs.get(n) for n in range(there.size)]
+        middle = (low + high) / 2
+        between, first = self.joined(low, here, middle, box, depth - 1)
+        there, second = self.joined(middle, between, high, box, depth - 1)
+        return there, [None if n is None else first[n] for n in second]
+
+    def pole_near(self, value: float, start: complex) -> complex:
+        """The pole at a value that Newton's method finds from a start.  Raises ConvergenceError where it finds none."""
+        found = newton(self.at(value).function, np.array([start]))
+        if not found.size:
+            raise ConvergenceError(f"the pole near {start:.6g} is lost at {self.vary} = {value:.6g}", start, value)
+        return complex(found[0])
+
+
+def assigned(here: Complex, there: Complex, box: Box) -> tuple[dict[int, int], bool]:
+    """Which pole of `here` each of `there` continues, and whether that is plain."""
+    if not here.size or not there.size:
+        return {}, not _inside(np.r_[here, there], box).any()
+    away = abs(here[:, None] - there)
+    rows, columns = linear_sum_assignment(away)
+    moved = away[rows, columns]
+    room = np.minimum(_room(here)[rows], _room(there)[columns])
+    near = moved <= PLAIN * room
+    pairs = {int(j): int(i) for i, j, kept in zip(rows, columns, near | (moved <= room), strict=True) if kept}
+    alone = np.r_[np.delete(here, rows[near]), np.delete(there, columns[near])]
+    return pairs, not _inside(alone, box).any()
+
+
+def _room(poles: Complex) -> Real:
+    """How far each is from the next, its own mirror image among them; those at 0 count as one."""
+    everyone = np.r_[poles, poles.conj()]
+    away = abs(poles[:, None] - everyone)
+    away[away <= TINY * abs(poles)[:, None]] = math.inf
+    return np.asarray(away.min(axis=1, initial=math.inf))
+
+
+def _inside(poles: Complex, box: Box) -> NDArray[np.bool_]:
+    """Which are well inside the box."""
+    width, height = AT_EDGE * (box.re_max - box.re_min), AT_EDGE * box.im_max
+    across = (poles.real > box.re_min + min(width, height)) & (poles.real < box.re_max - min(width, height))
+    return np.asarray(across & (poles.imag < box.im_max - height))
+
+
+def _crossings(family: Family, values: Real, branches: Complex, box: Box) -> tuple[BranchCrossing, ...]:
+    """Where branches change sides, solved for; along a linear number also those that no branch has."""
+    found = []
+    for number, row in enumerate(branches):
+        side = np.where(abs(row.real) <= TINY * abs(row), 0, np.sign(row.real))
+        for n in np.flatnonzero(side[1:] * side[:-1] < 0):
+            each = _crossed(family, values[n : n + 2], row[n : n + 2])
+            way = "unstable" if side[n + 1] > 0 else "stable"
+            found.append(BranchCrossing(gain=each[0], omega=each[1], branch=number, direction=way))
+    if not family.is_of_arm and family.vary != "delay":
+        found += _others(family, values, found, box.im_max)
+    ascending = 1.0 if values[-1] > values[0] else -1.0
+    return tuple(sorted(found, key=lambda each: (ascending * each.gain, each.omega)))
+
+
+def _crossed(family: Family, values: Real, poles: Complex) -> tuple[float, float]:
+    """The value between two at which a branch is on the axis, and the frequency there."""
+
+    def pole(value: float) -> complex:
+        share = (value - values[0]) / (values[1] - values[0])
+        return family.pole_near(value, complex(poles[0] + share * (poles[1] - poles[0])))
+
+    at = float(brentq(lambda value: pole(value).real, values[0], values[1], xtol=1e-13 * abs(values).max()))
+    return at, abs(pole(at).imag)
+
+
+def _others(family: Family, values: Real, known: list[BranchCrossing], band: float) -> list[BranchCrossing]:
+    """Crossings solved for by D-decomposition that no branch was seen to make."""
+    loop, ascending = family.at(float(values[0])), np.sort(values)
+    omega = np.asarray(grid(loop.arm, band))
+    parts = Signals(loop.arm, loop.law.signals).parts(1j * omega)
+    found, span = [], float(ascending[-1] - ascending[0])
+    way = 1 if values[-1] > values[0] else -1
+    for t, w, change in along(loop.arm, family.law, family.vary, ascending, omega, parts, band):
+        same = [abs(each.gain - t) <= SAME * span and abs(each.omega - w) <= SAME * band for each in known]
+        if TINY * span < t - ascending[0] < (1 - TINY) * span and not any(same):
+            direction = "unstable" if way * change > 0 else "stable"
+            found.append(BranchCrossing(gain=t, omega=w, branch=None, direction=direction))
+    return found
+
+
+def law_locus_answer(found: LawLocus) -> dict[str, Any]:
+    """The branches at each value, null where they are not in the box, and where they cross the imaginary axis."""
+    return {
+        "arm": found.arm.name,
+        **law_answer(found.law, found.arm),
+        "vary": found.vary,
+        "unit": PARAMETERS.get(found.vary, "s" if found.vary == "delay" else "1"),
+        "gain": found.values.tolist(),
+        "branches": [[None if np.isnan(s) else [s.real, s.imag] for s in row] for row in found.branches.tolist()],
+        "box": list(found.box),
+        "crossings": [
+            {
+                "gain": each.gain,
+                "omega_rad_s": each.omega,
+                "frequency_hz": each.frequency_hz,
+                "branch": each.branch,
+                "direction": each.direction,
+            }
+            for each in found.crossings
+        ],
+    }
