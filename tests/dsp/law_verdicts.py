@@ -33,6 +33,7 @@ from tfarm.spectrum.scales import first_frequency
 MODES = 40
 CLOSE, SLOW = 1e-9, 1e-3  # ln of the radius from which on models, and simulations, decide
 SAMPLES, PART = 20_000, 2_000
+AT_ONE = 1e-4  # as near to 1 is an eigenvalue that is there three times
 
 
 def some_case(rng):
@@ -121,12 +122,12 @@ def stepped(arm, law, chain, count=MODES):
     return M
 
 
-def radius_of(M, has_free_angle):
-    """ln of the spectral radius, z = 1 of a free hub angle left out."""
+def radius_of(M, at_one=0):
+    """ln of the spectral radius, but for so many poles at z = 1, that of a free hub angle among them."""
     z = np.linalg.eigvals(M)
-    if has_free_angle:
-        z = np.delete(z, abs(z - 1).argmin())
-    return float(np.log(abs(z).max()))
+    near = np.argsort(abs(z - 1), kind="stable")[:at_one]
+    assert (abs(z[near] - 1) < AT_ONE).all()
+    return float(np.log(abs(np.delete(z, near)).max()))
 
 
 def grows(arm, law, chain, count):
@@ -150,13 +151,13 @@ def judge(arm, law, chain):
         M = stepped(arm, law, chain)
     except ConvergenceError:
         return "no second road", False
-    other = radius_of(M, verdict.loop.has_free_angle)
+    other = radius_of(M, verdict.loop.has_free_angle + verdict.loop.poles_at_one)
     if abs(other) < CLOSE:
         return "too near", False
     mine = verdict.log_radius
     if (mine > 0) != (other > 0):
         return f"wrong: ln radius {mine:.3e}, of a model {other:.3e}", False
-    if abs(other) > SLOW:
+    if abs(other) > SLOW and not verdict.loop.poles_at_one:
         if grows(arm, law, chain, verdict.modes_used) != (mine > 0):
             return f"wrong: ln radius {mine:.3e}, but a simulation says otherwise", True
         return "right", True

@@ -12,10 +12,13 @@ from tests.shell import answer, run
 from tfarm import HubFeedback, Law, ParameterError
 from tfarm.arm.blocks import Rational, StateSpace
 from tfarm.dsp import Chain, Converters, Sampling, sampled_loop
+from tfarm.dsp.band import band_of
 from tfarm.dsp.discretise import discretised, held, matched, tustin
+from tfarm.dsp.law_circle import LawCircle
 from tfarm.dsp.law_loop import sampled_law
 from tfarm.dsp.law_margins import crossing_factors
 from tfarm.dsp.law_verdict import law_verdict
+from tfarm.dsp.margins import whole
 
 T = 0.01
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
@@ -212,6 +215,23 @@ def test_random_laws_have_the_verdict_of_models_and_of_simulations():
             words.append(judge(*case)[0])
     assert set(words) <= {"right", "no second road", "too near"}
     assert words.count("right") >= 2
+
+
+def test_what_is_proven_of_random_laws_is_the_count_of_their_poles():
+    """By discs around the circle, against the polished eigenvalues of the loop with every mode of the band."""
+    rng, found = np.random.default_rng(6), []
+    while len(found) < 4:
+        case = some_case(rng)
+        if case is None or not case[0].least_damping:
+            continue
+        arm, law, chain = case
+        small = sampled_law(arm, law, chain, count=1)
+        band = band_of(whole(arm, small.chain, small.with_modes))
+        proven = LawCircle(band.loop, band.kept, band.missing).outside()
+        found.append(proven)
+        assert proven in (None, (band.full.poles.log_radius > 0).sum())
+    assert sum(each is not None for each in found) >= 3
+    assert any(found)
 
 
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
