@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+import sys
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tfarm.cli.app import ArmName, Json, app, give, load_arm, plain_number, whole
+from tfarm.cli.app import ArmName, Json, app, give, load_arm, plain_number, tell, whole
 from tfarm.cli.inputs import Given, Kp, LawFile, law_of, under_a_law
 from tfarm.cli.sampling import Delay, DspFile, Period, chain_of
 from tfarm.errors import ParameterError
@@ -21,6 +22,8 @@ POLES = "poles with Im s >= 0, 1 to 1000; if not given ten, or those below the s
 
 OF_A_LAW = "twice: two numbers of a law and their ranges; gain, delay, SIGNAL, SIGNAL.num.N or SIGNAL.den.N"
 
+OBJECTIVES = "damping, margin or residual; of another structure damping, margin, sensitivity or delay"
+STRUCTURES = "K1-K2, PD, PD+notch, lead, PPF or strain-rate"
 RANGES = {  # of a map
     "K1": "range of K1; by default -1,3 on the paper's arm, -3.33 to 10 times the default K1 on a rig",
     "K2": "range of K2; by default -2,2, times what one N m takes of the input of a rig",
@@ -151,7 +154,8 @@ def _range_of(text: str) -> tuple[str, tuple[float, float]]:
 @app.command()
 def design(
     arm: ArmName,
-    objective: Annotated[str, typer.Option("--objective", help="damping, margin or residual")] = "damping",
+    objective: Annotated[str, typer.Option("--objective", help=OBJECTIVES)] = "damping",
+    structure: Annotated[str, typer.Option("--structure", help=STRUCTURES)] = "K1-K2",
     k1: Annotated[str | None, typer.Option("--K1", metavar="LO,HI", help="bounds of K1")] = None,
     k2: Annotated[str | None, typer.Option("--K2", metavar="LO,HI", help="bounds of K2")] = None,
     kp: Kp = 0.0,
@@ -160,20 +164,34 @@ def design(
     period: Period = None,
     delay_samples: Delay = None,
     dsp: DspFile = None,
+    save: Annotated[Path | None, typer.Option("--save", help="write the law to this TOML file, for --law")] = None,
     json: Json = False,
 ) -> None:
-    """The gains that serve an objective best in the sampled loop, at the file's period or else 10 ms."""
+    """The law that serves an objective best in the sampled loop, at the file's period or else 10 ms."""
     number, subject = whole("--modes", modes, 1, 30), load_arm(arm)
     chain = chain_of(dsp or arm, period, delay_samples)
-    limits = {name: None if text is None else bounds(f"--{name}", text) for name, text in (("K1", k1), ("K2", k2))}
-    from tfarm.cli.control_tables import print_design
-    from tfarm.synthesis.answers import design_answer
-    from tfarm.synthesis.design import design as find_gains
+    K1, K2 = (None if text is None else bounds(key, text) for key, text in (("--K1", k1), ("--K2", k2)))
+    from tfarm.arm.law import Law
+    from tfarm.arm.law_writing import save_law
+    from tfarm.cli.control_tables import print_design, print_law_design
+    from tfarm.cli.tables import say_written
+    from tfarm.synthesis.answers import design_answer, law_design_answer
+    from tfarm.synthesis.chosen import design as find_law
+    from tfarm.synthesis.design import Design
 
-    found = find_gains(
-        subject, cast("Any", objective), Kp=kp, modes=number, chain=chain, continuous=continuous, **limits
-    )
-    give(design_answer(found), json, print_design)
+    found = find_law(
+        subject, objective, structure=structure, K1=K1, K2=K2, Kp=kp, modes=number, chain=chain, continuous=continuous,
+        progress=tell if sys.stderr.isatty() else None,
+    )  # fmt: skip
+    law = Law.of_gains(found.law) if isinstance(found, Design) else found.law
+    if save is not None:
+        save_law(law, save)
+    if not (json or say_written(save)):
+        return
+    if isinstance(found, Design):
+        give(design_answer(found), json, print_design)
+    else:
+        give(law_design_answer(found), json, print_law_design)
 
 
 def bounds(key: str, text: str) -> tuple[float, float]:

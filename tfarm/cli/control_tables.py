@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from tfarm.columns import Column, Table
+from tfarm.digits import general, singly
 from tfarm.loop.answers import MARGINS, POLES, WINDOWS, gain_rows
 from tfarm.loop.margins import Margins
 from tfarm.tables.files import write_csv
@@ -149,6 +150,23 @@ def print_design(answer: dict[str, Any]) -> None:
     if cut:
         ends = [f"{name} = {answer[name]:.6g} of {_pair(answer['bounds'][name])}" for name in cut]
         print(f"no optimum: {' and '.join(ends)} is where the search was cut off; it may get better beyond")
+    print(answer["sign_convention"])
+
+
+def print_law_design(answer: dict[str, Any]) -> None:
+    """The coefficients and what they reach."""
+    told = f"{answer['structure']}, objective {answer['objective']} of the sampled loop, {answer['modes']} modes"
+    print(f"{answer['arm']}, {told}: {answer['value']:.6g}")
+    columns = (
+        Column("coefficient", "coefficient", of=list(answer["coefficients"])),
+        Column("value", "value", of=list(answer["coefficients"].values()), digits=singly(general, 7)),
+    )
+    show(Table(columns=columns))
+    if answer["at_limit"]:
+        print(f"as fast as samples tell: {', '.join(answer['at_limit'])}")
+    print(answer["sampled"]["in_words"].replace("these gains are", "it is", 1))
+    beyond = "" if answer["known_beyond_the_band"] else f" up to {answer['band_rad_s']:.4g} rad/s, not known beyond"
+    print(f"without a clock it is {answer['verdict']}{beyond}; --save FILE keeps it for --law FILE")
     print(answer["sign_convention"])
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.dsp.chain import Chain, Sampling
-from tfarm.dsp.verdict import sampled_verdict
+from tfarm.dsp.verdict import Verdict, sampled_verdict
 from tfarm.errors import ConvergenceError
 
 
@@ -65,6 +65,11 @@ def sampled_brief(arm: Arm, law: HubFeedback, chain: Chain) -> SampledBrief:
         verdict = sampled_verdict(arm, law, chain)
     except ConvergenceError as error:
         return SampledBrief(sampling=chain.sampling, is_stable=None, log_radius=None, sentence=f"undecided: {error}")
+    return brief_of(verdict, chain)
+
+
+def brief_of(verdict: Verdict[Any], chain: Chain) -> SampledBrief:
+    """A verdict in short."""
     return SampledBrief(
         sampling=chain.sampling,
         is_stable=verdict.is_stable,

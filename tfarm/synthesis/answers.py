@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from tfarm.dsp.brief import brief_of
 from tfarm.loop.answers import law_answer
+from tfarm.synthesis.chosen import GAINS
 from tfarm.synthesis.design import Design
+from tfarm.synthesis.law_design import LawDesign
 
 
 def design_answer(found: Design) -> dict[str, Any]:
@@ -14,6 +17,7 @@ def design_answer(found: Design) -> dict[str, Any]:
     return {
         "arm": found.verdict.loop.arm.name,
         "objective": found.objective,
+        "structure": GAINS,
         "designed_for": found.loop,
         **law_answer(law, found.verdict.loop.arm),
         "value": found.value,
@@ -26,4 +30,23 @@ def design_answer(found: Design) -> dict[str, Any]:
         "flat_K1": list(found.flat_K1),
         "flat_K2": list(found.flat_K2),
         "sampled": found.sampled.answer,
+    }
+
+
+def law_design_answer(found: LawDesign) -> dict[str, Any]:
+    """The law and its coefficients, what it reaches, and both verdicts."""
+    return {
+        "arm": found.verdict.loop.arm.name,
+        "objective": found.objective,
+        "structure": found.structure,
+        "designed_for": "sampled",
+        **law_answer(found.law, found.verdict.loop.arm),
+        "coefficients": found.coefficients,
+        "at_limit": list(found.at_limit),
+        "value": found.value,
+        "verdict": found.verdict.verdict,
+        "known_beyond_the_band": found.verdict.is_known_beyond,
+        "band_rad_s": found.verdict.band,
+        "modes": found.modes,
+        "sampled": brief_of(found.sampled, found.chain).answer,
     }

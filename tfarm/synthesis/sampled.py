@@ -15,7 +15,7 @@ quarter larger and smaller: the best damping of few modes often lies where a hig
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -27,6 +27,7 @@ from scipy.optimize import minimize_scalar
 from tfarm.arm import FED_BACK, Arm, HubFeedback
 from tfarm.dsp import Chain, SampledLoop, sampled_loop, sampled_verdict, scenario
 from tfarm.dsp.margins import most_modes
+from tfarm.dsp.sampling import PulseTransfer
 from tfarm.dsp.verdict import UNDAMPED_MODES
 from tfarm.errors import ConvergenceError
 from tfarm.loop.stability import stability
@@ -38,6 +39,7 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 RESERVE = 1.25  # the loop holds with all its gains larger or smaller by this factor: what a gauge or motor is off by
+SEARCHED = 1.002 * RESERVE  # by as much in the search: the model's few modes have edges that are off by less
 FEWEST_MODES = 8  # of the first model; more where its best gains do not hold
 BLOCK = 2000  # gains at a time
 REAL = 1e-9  # rad: a pole at a smaller angle is real
@@ -73,7 +75,7 @@ class SampledJudge:
             part = slice(i, i + BLOCK)
             z = np.linalg.eigvals(self._matrices(K1[part], K2[part], 1.0))
             good = abs(z).max(axis=1) < 1.0
-            for share in (RESERVE, 1 / RESERVE):
+            for share in (SEARCHED, 1 / SEARCHED):
                 more = np.linalg.eigvals(self._matrices(K1[part][good], K2[part][good], share))
                 good[good] = abs(more).max(axis=1) < 1.0
             if good.any():
@@ -119,31 +121,18 @@ class SampledJudge:
 
     def damping(self, z: Complex) -> Real:
         """The least damping ratio of the oscillating poles of the first modes, of closed-loop poles (gains, n)."""
-        z = np.where(z.imag >= 0, z, 0.0)  # one of each pair
-        rows = np.arange(len(z))
-        for own in self._higher:
-            z[rows, abs(z - own).argmin(axis=1)] = 0.0
-        angle, seen = np.angle(z), z != 0
-        s = np.log(np.where(seen, abs(z), 1.0)) + 1j * angle
-        ratio = -s.real / np.where(seen, abs(s), 1.0)
-        return np.asarray(np.where(seen & (angle > REAL), ratio, 1.0).min(axis=1))
+        return first_damping(z, self._higher)
 
     @cached_property
     def _higher(self) -> list[complex]:
-        """Open-loop poles in z, Im z >= 0, of the modes beyond the first ones: the highest come first."""
-        pulse = self.loop.pulse
-        places = np.nonzero((pulse.mode > self.modes) & (pulse.poles.imag >= 0))[0]
-        z = pulse.multipliers[places[np.argsort(-pulse.mode[places], kind="stable")]]
-        return [complex(each.real, abs(each.imag)) for each in z]
+        return higher_poles(self.loop.pulse, self.modes)
 
     # ------------------------------------------------------------ disk margin
 
     @cached_property
     def _circle(self) -> Complex:
-        """H (gains, n) of what is fed back, at points of the circle that are dense about the open loop's poles."""
-        angle = abs(np.angle(self.loop.pulse.multipliers))
-        close = (angle[:, None] + np.r_[-AROUND, AROUND]).ravel()
-        q = np.unique(np.r_[np.linspace(0, np.pi, EVEN + 1)[1:], close[(close > 0) & (close <= np.pi)]])
+        """z and H (1 + gains, n) of what is fed back, at points of the circle dense about the open loop's poles."""
+        q = circle_angles(self.loop.pulse)
         return np.concatenate([np.exp(1j * q)[None], self._signals(q)])
 
     def _signals(self, q: Real) -> Complex:
@@ -151,22 +140,12 @@ class SampledJudge:
 
     def _disks(self, K1: Real, K2: Real) -> Real:
         laws = np.array([np.full(K1.size, self.loop.gains.Kp), K1, K2])
-        return np.array([_disk_of(gains @ self._circle[1:]).min() for gains in laws.T])
+        return np.array([disk_of(gains @ self._circle[1:]).min() for gains in laws.T])
 
     def disk(self, law: HubFeedback) -> float:
         """The disk margin of one law, its lowest dips refined between the points of the circle."""
         row = np.array(law.row)
-        q = np.angle(self._circle[0])
-        values = _disk_of(row @ self._circle[1:])
-        best = [float(values.min())]
-        for i in np.argsort(values)[:DIPS]:
-            ends = (q[max(i - 1, 0)], q[min(i + 1, q.size - 1)])
-            done = minimize_scalar(
-                lambda at: float(_disk_of(row @ self._signals(np.array([at])))[0]),
-                bounds=ends, method="bounded", options={"xatol": 1e-9 * (ends[1] - ends[0])},
-            )  # fmt: skip
-            best.append(float(done.fun))
-        return min(best)
+        return lowest(lambda q: disk_of(row @ self._signals(q)), np.angle(self._circle[0]))
 
     # ------------------------------------------------------------ residual
 
@@ -215,6 +194,46 @@ def sampled_judges(arm: Arm, chain: Chain, objective: str, Kp: float, modes: int
         count = min(2 * count, most)
 
 
-def _disk_of(L: Complex) -> Real:
+def higher_poles(pulse: PulseTransfer, modes: int) -> list[complex]:
+    """Open-loop poles in z, Im z >= 0, of the modes beyond the first ones: the highest come first."""
+    places = np.nonzero((pulse.mode > modes) & (pulse.poles.imag >= 0))[0]
+    z = pulse.multipliers[places[np.argsort(-pulse.mode[places], kind="stable")]]
+    return [complex(each.real, abs(each.imag)) for each in z]
+
+
+def first_damping(z: Complex, higher: list[complex]) -> Real:
+    """The least damping ratio of the oscillating poles (gains, n), those nearest to the `higher` ones left out."""
+    z = np.where(z.imag >= 0, z, 0.0)  # one of each pair
+    rows = np.arange(len(z))
+    for own in higher:
+        z[rows, abs(z - own).argmin(axis=1)] = 0.0
+    angle, seen = np.angle(z), z != 0
+    s = np.log(np.where(seen, abs(z), 1.0)) + 1j * angle
+    ratio = -s.real / np.where(seen, abs(s), 1.0)
+    return np.asarray(np.where(seen & (angle > REAL), ratio, 1.0).min(axis=1))
+
+
+def circle_angles(pulse: PulseTransfer) -> Real:
+    """Angles (0, pi] of the circle, dense about the poles of the open loop."""
+    angle = abs(np.angle(pulse.multipliers))
+    close = (angle[:, None] + np.r_[-AROUND, AROUND]).ravel()
+    return np.unique(np.r_[np.linspace(0, np.pi, EVEN + 1)[1:], close[(close > 0) & (close <= np.pi)]])
+
+
+def lowest(values: Callable[[Real], Real], q: Real) -> float:
+    """The least of a function of the angle on a grid, its lowest dips refined between the points."""
+    found = values(q)
+    best = [float(found.min())]
+    for i in np.argsort(found)[:DIPS]:
+        ends = (q[max(i - 1, 0)], q[min(i + 1, q.size - 1)])
+        done = minimize_scalar(
+            lambda at: float(values(np.array([at]))[0]),
+            bounds=ends, method="bounded", options={"xatol": 1e-9 * (ends[1] - ends[0])},
+        )  # fmt: skip
+        best.append(float(done.fun))
+    return min(best)
+
+
+def disk_of(L: Complex) -> Real:
     """2 |1 + L|/|1 - L|."""
     return np.asarray(2 * abs(1 + L) / np.maximum(abs(1 - L), 1e-300))
