@@ -101,11 +101,16 @@ def print_map(answer: dict[str, Any]) -> None:
     counts = answer["unstable_roots"]
     flat = [count for row in counts for count in row]
     print(f"{answer['arm']}: {flat.count(0)} of {len(flat)} gain pairs are stable")
-    step = max(1, len(counts) // 24), max(1, len(counts[0]) // 60)
-    for K2, row in list(zip(answer["K2"], counts, strict=True))[:: -step[0]]:
-        print(f"{K2:9.3g} " + "".join("." if count == 0 else "#" for count in row[:: step[1]]))
+    _print_plane(answer["K2"], counts)
     print(f"K2 up, K1 from {answer['K1'][0]:g} to {answer['K1'][-1]:g} to the right; . stable, # unstable")
     print(answer["sign_convention"])
+
+
+def _print_plane(upwards: list[float], counts: list[list[Any]]) -> None:
+    """A coarse picture of a plane: a dot where nothing is unstable."""
+    step = max(1, len(counts) // 24), max(1, len(counts[0]) // 60)
+    for value, row in list(zip(upwards, counts, strict=True))[:: -step[0]]:
+        print(f"{value:9.3g} " + "".join("." if count == 0 else "#" for count in row[:: step[1]]))
 
 
 def print_law_map(answer: dict[str, Any]) -> None:
@@ -114,9 +119,7 @@ def print_law_map(answer: dict[str, Any]) -> None:
     flat = [count for row in counts for count in row]
     reach = f"no unstable pole below {answer['band_rad_s']:.6g} rad/s"
     print(f"{answer['arm']}: {flat.count(0)} of {len(flat)} pairs of {first} and {second} have {reach}")
-    step = max(1, len(counts) // 24), max(1, len(counts[0]) // 60)
-    for value, row in list(zip(answer["y"], counts, strict=True))[:: -step[0]]:
-        print(f"{value:9.3g} " + "".join("." if count == 0 else "#" for count in row[:: step[1]]))
+    _print_plane(answer["y"], counts)
     print(f"{second} up, {first} from {answer['x'][0]:g} to {answer['x'][-1]:g} to the right; . stable, # unstable")
     print(answer["sign_convention"])
 

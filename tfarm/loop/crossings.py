@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +45,20 @@ class BranchCrossing:
     def frequency_hz(self) -> float:
         """omega in Hz."""
         return self.omega / (2 * math.pi)
+
+
+def crossing_answers(found: Iterable[BranchCrossing]) -> list[dict[str, Any]]:
+    """The crossings as plain dictionaries."""
+    return [
+        {
+            "gain": each.gain,
+            "omega_rad_s": each.omega,
+            "frequency_hz": each.frequency_hz,
+            "branch": each.branch,
+            "direction": each.direction,
+        }
+        for each in found
+    ]
 
 
 def crossings(variation: Variation, gain: Real, branches: Complex, lowest: float) -> tuple[BranchCrossing, ...]:

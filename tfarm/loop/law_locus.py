@@ -26,7 +26,7 @@ from tfarm.response.signals import Signals
 from tfarm.spectrum.box import Box, newton, zeros_in_box
 
 from .answers import law_answer
-from .crossings import BranchCrossing
+from .crossings import BranchCrossing, crossing_answers
 from .frequencies import band_of, grid
 from .law_loop import LawLoop
 from .law_map import along
@@ -241,14 +241,5 @@ def law_locus_answer(found: LawLocus) -> dict[str, Any]:
         "gain": found.values.tolist(),
         "branches": [[None if np.isnan(s) else [s.real, s.imag] for s in row] for row in found.branches.tolist()],
         "box": list(found.box),
-        "crossings": [
-            {
-                "gain": each.gain,
-                "omega_rad_s": each.omega,
-                "frequency_hz": each.frequency_hz,
-                "branch": each.branch,
-                "direction": each.direction,
-            }
-            for each in found.crossings
-        ],
+        "crossings": crossing_answers(found.crossings),
     }

@@ -9,6 +9,7 @@ import numpy as np
 from tfarm.arm import NAMES, unit_of
 
 from .answers import law_answer
+from .crossings import crossing_answers
 from .locus import Locus
 from .reduced_locus import ReducedLocus
 from .variation import VARIED
@@ -33,16 +34,7 @@ def locus_answer(exact: Locus, reduced: ReducedLocus) -> dict[str, Any]:
         "mode": exact.mode.tolist(),
         "branches": [[None if np.isnan(s) else [s.real, s.imag] for s in row] for row in exact.branches.tolist()],
         "branches_note": BRANCHES,
-        "crossings": [
-            {
-                "gain": each.gain,
-                "omega_rad_s": each.omega,
-                "frequency_hz": each.frequency_hz,
-                "branch": each.branch,
-                "direction": each.direction,
-            }
-            for each in exact.crossings
-        ],
+        "crossings": crossing_answers(exact.crossings),
         "ends": [{"branch": branch, "gain": gain} for branch, gain in exact.ends],
         "gap_to_reduced": reduced.worst,
         "gap_by_branch": reduced.gap.tolist(),
