@@ -23,7 +23,8 @@ from tfarm.dsp.law_verdict import law_verdict
 from tfarm.errors import ConvergenceError
 from tfarm.loop.law_stability import law_stability
 from tfarm.records import record
-from tfarm.reduced.sensed import closed
+from tfarm.reduced.partial_fractions import Matrices
+from tfarm.reduced.sensed import closed, sensed_model
 from tfarm.synthesis.sampled import RESERVE, SEARCHED, circle_angles, disk_of, first_damping, higher_poles, lowest
 
 Real = NDArray[np.float64]
@@ -31,6 +32,7 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 
 LAW_OBJECTIVES = ("damping", "margin", "sensitivity", "delay")
 LOST = 1e3  # score of a loop that is not stable, and more the further its poles are outside
+ON_AXIS = 1e-6  # of |s|: an eigenvalue so little right of the axis may be the model's own, of modes left out
 LONGEST = 100.0  # samples: the delay margin where |L| is nowhere 1
 
 
@@ -59,6 +61,9 @@ class LawJudge:
         outside = max(float(abs(z).max()) for z in poles) - 1.0
         if outside >= 0.0:
             return LOST * (1.0 + min(outside, 1e6))
+        s = np.linalg.eigvals(closed(self._continuous, law.matrices()))
+        if (grows := float((s.real / np.maximum(abs(s), 1e-300)).max())) > ON_AXIS:  # without a clock it does not hold
+            return LOST * (1.0 + grows)
         if self.objective == "damping":
             return -float(first_damping(poles[0][None].astype(complex), self._higher)[0])
         value = self._on_circle(acting)
@@ -97,6 +102,11 @@ class LawJudge:
         gone = [first, *([] if felt else [first + 1])] if self.loop.is_damped or not felt else []
         A, B, C = np.delete(np.delete(A, gone, 0), gone, 1), np.delete(B, gone), np.delete(C, gone, 1)
         return A, B[:, None], C, np.zeros((len(C), 1))
+
+    @cached_property
+    def _continuous(self) -> Matrices:
+        """The modal model without a clock."""
+        return sensed_model(self.arm, self.loop.asked.signals, self.loop.plant.count)
 
     @cached_property
     def _angles(self) -> Real:
