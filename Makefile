@@ -24,7 +24,7 @@ SURVEYS := \
 	loop.counts \
 	loop.agreement \
 	loop.loci \
-	loop.designs \
+	synthesis.designs \
 	loop.nyquist_counts \
 	reduced.errors \
 	dsp.verdicts \

@@ -159,7 +159,7 @@ def test_how_far_K2_may_go_is_what_the_poles_say(name):
 
 @pytest.mark.parametrize("name", LOOPS)
 def test_sentences_about_the_pole_at_0_and_J_are_for_arms_that_turn_freely(name, monkeypatch):
-    monkeypatch.setattr(loop_laws, "best", lambda arm: None)
+    monkeypatch.setattr(loop_laws, "best", lambda arm, chain: None)
     section = margins_section(ARMS[name])
     words = " ".join([*section.words, section.blocks[1].caption])
     turns = ARMS[name].has_rigid_mode
@@ -251,7 +251,7 @@ def test_a_free_pin_has_its_nyquist_plot():
 
 
 def test_a_margin_without_end_has_no_frequency(monkeypatch):
-    monkeypatch.setattr(loop_laws, "best", lambda arm: None)
+    monkeypatch.setattr(loop_laws, "best", lambda arm, chain: None)
     named = loop_laws.NamedLaw("default gains", "default", HubFeedback(K1=5.0338, K2=-3.0))
     found = loop_laws.margins_of(ARMS["pinned"], named.law)
     table = margin_table([named], [found], False)
