@@ -83,9 +83,10 @@ def best(arm: Arm, chain: Chain) -> Design | None:
     if not has_loop(arm):
         return None
     try:
-        return design(arm, modes=MODES, chain=chain)
+        found = design(arm, modes=MODES, chain=chain)
     except ConvergenceError:
         return None
+    return None if found.at_limit else found  # K2 of a hub that stands still is no law to draw
 
 
 @lru_cache(maxsize=64)
