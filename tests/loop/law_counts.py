@@ -1,9 +1,9 @@
 """Unstable poles under random laws, counted again by another road:  python -m tests.loop.law_counts 1000 [seed]
 
 Random arms (as in `tests.loop.arms`), one to three signals, rational entries of order 8 at most in all, some with
-unstable poles and zeros, delays of 0 to 50 ms at C > 0.  The number of unstable poles is compared with that of modal
-models of 30 and 40 modes closed with the law, wherever these agree: by eigenvalues, or with a delay by Nyquist; then by
-that of the exact transfer functions too.
+unstable poles and zeros, delays of 0 to 50 ms at C > 0.  Without damping the count is that of modal models of 30 and 40
+modes closed with the law, wherever these agree; with damping, by Nyquist, that of the turns of the loop function of the
+public transfer functions, and of models where their modes ring.
 """
 
 import os
@@ -93,14 +93,14 @@ def by_eigenvalues(arm, law, count, band):
 
 
 def by_turns(values, poles, law, band, slow):
-    """The same of a delayed loop: turns of 1 + L around 0, along the axis and back far right of it.
+    """The same of a damped or delayed loop: turns of 1 + L around 0, along the axis and back far right of it.
 
     `values` are 1 + L of one model or of two; None where two differ by a quarter of it somewhere, so that Rouche's
     theorem does not reach the arm: what a model leaves out falls as one over the number of its modes.
     """
     right = 3 * max(band, *law.poles.real) if law.order else 3 * band
     width = np.maximum(abs(poles.real), 1e-9 * abs(poles))
-    near = abs(poles.imag)[:, None] + width[:, None] * np.linspace(-20, 20, 161)
+    near = abs(poles.imag)[:, None] + width[:, None] * np.linspace(-20, 20, 160)
     up = np.unique(np.r_[np.geomspace(slow, band, 2000), near[(near > slow) & (near < band)]])
     arc = slow * np.exp(1j * np.linspace(0, np.pi / 2, 40))
     path = np.r_[arc, 1j * up, 1j * band + np.linspace(0, right, 400), right + 1j * np.linspace(band, 0, 400)]
@@ -173,11 +173,11 @@ def judge(arm, law):
     if found.unstable_roots_infinite:
         return "no second road"
     try:
-        if law.delay:
+        if arm.damping:
             other = [each for each in by_nyquist(arm, law, found.band) if each is not None] or [None]
         else:
             other = [by_eigenvalues(arm, law, count, found.band) for count in MODELS]
-    except ConvergenceError:  # residues of two eigenvalues that nearly coincide
+    except (ConvergenceError, ParameterError):  # residues of two eigenvalues that nearly coincide; a point on a pole
         return "no second road"
     if None in other or other[0] != other[-1]:
         return "no second road"
