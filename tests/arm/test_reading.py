@@ -38,7 +38,7 @@ GENERAL = EXAMPLE[EXAMPLE.index('shape = "general"') : EXAMPLE.index("[hub]")]
 
 @pytest.fixture
 def refused(tmp_path):
-    """Loads a file with this content, and gives the one line with which it is refused, within a second."""
+    """Loads a file with this content, and gives the one line with which it is refused: long before a parser is done."""
 
     def refuse(content):
         path = tmp_path / "arm.toml"
@@ -46,7 +46,7 @@ def refused(tmp_path):
         began = time.process_time()
         with pytest.raises(ParameterError) as caught:
             load(path)
-        assert time.process_time() - began < 1.0
+        assert time.process_time() - began < 3.0  # the parser alone takes 7 s of CPU; usually some milliseconds
         text = str(caught.value)
         assert text.startswith(f"{path}: ")
         assert text.isprintable()

@@ -151,7 +151,7 @@ def test_a_hub_is_massless_only_where_nothing_resists_its_turning(change):
 
 HELD = {
     "hub.stiffness": {"hub": Hub(inertia=0.002, stiffness=1.0)},
-    "attachment.2.stiffness": {"attachments": (Attachment(x=0, mass=1), Attachment(x=0, stiffness=1))},
+    "attachment.2.stiffness": {"attachments": (Attachment(x=0, mass=1), Attachment(x=0.05, stiffness=1))},
     "attachment.1.rotational_stiffness": {"attachments": (Attachment(x=0, rotational_stiffness=1),)},
     "payload.mass": {"payload": Payload(mass=math.inf, offset=0.01)},
 }

@@ -1,5 +1,6 @@
 """Modes of random rigs against finite elements and transition matrices (see `chains`), and what modes guarantee."""
 
+import math
 from dataclasses import replace
 
 import mpmath
@@ -12,6 +13,7 @@ from tests.spectrum.chains import judge, judge_damped
 from tests.test_chain_elements import lossless
 from tests.test_transition import rig
 from tests.transition import response
+from tfarm import Attachment, Hub, Payload, RotarySpring
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.exact.system import system_of
 from tfarm.reduced.residues import end_residues, undamped_residues
@@ -110,3 +112,20 @@ def test_residues_and_shapes_of_a_damped_rig(drive):
         assert shapes[n] ** 2 == pytest.approx(square, rel=1e-8)
         assert turns[n] / shapes[n] == pytest.approx(Psi / W, rel=1e-8)
         assert moments[n] / shapes[n] == pytest.approx(M / W, rel=1e-8)
+
+
+def test_a_spring_on_the_axis_holds_nothing():
+    """There nothing moves: the rig turns freely, as without it; clamped off the axis it does not."""
+    free = some_rig(np.random.default_rng(3), damped=False, segments=2)
+    free = replace(free, attachments=(), hub=Hub(inertia=0.01), clamp=RotarySpring(), joint=RotarySpring())
+    free = replace(free, payload=Payload(mass=0.1, inertia=1e-4), motor=None, input="hub_torque")
+    held = replace(free, attachments=(Attachment(x=0.0, stiffness=50.0, mass=0.01),))
+    same = replace(free, attachments=(Attachment(x=0.0, mass=0.01),))
+    assert held.has_rigid_mode
+    found = tfarm.modes(held, 6).natural_frequency
+    np.testing.assert_allclose(found, tfarm.modes(same, 6).natural_frequency, rtol=1e-14)
+    assert found[0] == 0
+    off = replace(held, hub=Hub(inertia=0.01, radius=0.05), attachments=(Attachment(x=0.0, stiffness=1e-3, mass=0.01),))
+    assert not off.has_rigid_mode
+    first = math.sqrt(1e-3 * 0.05**2 / off.total_inertia)
+    assert tfarm.modes(off, 1).natural_frequency[0] == pytest.approx(first, rel=1e-3)  # so soft that the rig is rigid

@@ -198,7 +198,8 @@ class Arm(Turning):
         """The key and the stiffness of each spring that could hold the rig."""
         yield "hub.stiffness", self.hub.stiffness
         for i, each in enumerate(self.attachments, 1):
-            yield f"attachment.{i}.stiffness", each.stiffness
+            on_axis = not (each.x or self.hub.radius)  # where nothing moves
+            yield f"attachment.{i}.stiffness", 0.0 if on_axis else each.stiffness
             yield f"attachment.{i}.rotational_stiffness", each.rotational_stiffness
 
     @property

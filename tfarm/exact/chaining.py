@@ -36,7 +36,10 @@ def chain_of(arm: Arm, theory: Theory | None = None) -> Chain:
             pieces.append(_body(each, translation, rotation))
         pieces.append(own.piece((position - start) / Fraction(link.length)))
         position = start
-    pieces += [_body(each, translation, rotation) for each in reversed(waiting)]
+    at_clamp = [_body(each, translation, rotation) for each in reversed(waiting)]
+    if not arm.hub.radius:  # on the axis nothing moves: a spring there holds nothing
+        at_clamp = [each._replace(stiffness=Fraction(0)) for each in at_clamp]
+    pieces += at_clamp
     pieces += _springs(arm.clamp, rotation)
     pieces += [Offset(Fraction(arm.hub.radius) / unit_length)] if arm.hub.radius else []
     pieces += _springs(arm.joint, rotation)
