@@ -31,7 +31,7 @@ REAL = Chain(
 ROUNDED = 1e-11  # of the largest: 200 samples of a loop that is stable
 
 
-def close(mine, theirs, tolerance=ROUNDED):
+def assert_close(mine, theirs, tolerance=ROUNDED):
     assert mine.at_samples.t.size == theirs.at_samples.t.size
     for name in ("hub_angle", "root_moment", "tip_displacement"):
         a, b = getattr(mine.at_samples, name), getattr(theirs.at_samples, name)
@@ -45,14 +45,14 @@ def close(mine, theirs, tolerance=ROUNDED):
 def test_gains_at_the_hub_do_the_same_as_a_law(name, chain):
     gains, task = HubFeedback(K1=0.3, K2=0.3, Kp=1.0), scenario(name, LAB, chain, 2.0)
     mine = LawSimulator(LAB, Law.of_gains(gains), chain, task, count=8).run()
-    close(mine, Simulator(LAB, chain, task, count=8).linear(gains))
+    assert_close(mine, Simulator(LAB, chain, task, count=8).linear(gains))
 
 
 def test_float32_is_that_of_the_gains_to_its_last_bits():
     chain, gains = Chain(converters=Converters(arithmetic="float32")), HubFeedback(K1=0.3, K2=0.3)
     task = scenario("slew", LAB, chain, 2.0)
     mine = LawSimulator(LAB, Law.of_gains(gains), chain, task, count=6).run()
-    close(mine, Simulator(LAB, chain, task, count=6).linear(gains), 20 * np.finfo(np.float32).eps)
+    assert_close(mine, Simulator(LAB, chain, task, count=6).linear(gains), 20 * np.finfo(np.float32).eps)
     assert (mine.torque == mine.torque.astype(np.float32)).all()
 
 
@@ -67,7 +67,9 @@ def test_a_law_with_states_is_a_controller_that_remembers():
         return m.feedforward - out - 0.1 * m.root_moment
 
     mine = LawSimulator(LAB, law, Chain(), task, count=8).run()
-    close(mine, Simulator(LAB, Chain(sampling=Sampling(delay_samples=0.4)), task, count=8).controller(controller))
+    assert_close(
+        mine, Simulator(LAB, Chain(sampling=Sampling(delay_samples=0.4)), task, count=8).controller(controller)
+    )
 
 
 def test_a_servo_follows_as_python_control_says():
@@ -98,13 +100,13 @@ def test_a_column_of_references_is_a_reference():
         ["hub_angle", "reference:hub_angle", "hub_rate"],
         sign=1,
     )
-    close(*(LawSimulator(LAB, law, Chain(), task, count=6).run() for law in (one, other)))
+    assert_close(*(LawSimulator(LAB, law, Chain(), task, count=6).run() for law in (one, other)))
 
 
 def test_what_a_law_of_gains_follows_are_its_references():
     gains = HubFeedback(K1=0.3, K2=0.3)
     led = tfarm.simulate(LAB, Law.of_gains(gains), count=6)
-    close(led, tfarm.simulate(LAB, gains, count=6), 0.0)
+    assert_close(led, tfarm.simulate(LAB, gains, count=6), 0.0)
     braked = tfarm.simulate(LAB, Law({"hub_rate": 0.3, "root_moment": 0.3}), count=6)
     assert abs(braked.at_samples.hub_angle[-1]) < 0.9 * abs(led.at_samples.hub_angle[-1])
 

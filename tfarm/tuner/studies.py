@@ -33,8 +33,8 @@ from tfarm.tuner.constants import BestConstant, best_constant
 from tfarm.tuner.guard import Guard, find_guard
 from tfarm.tuner.network import initial_network
 from tfarm.tuner.training import Training, train
-from tfarm.tuner.trial import Trial, residual_rms, slew_trial
-from tfarm.tuner.tuning import Plan
+from tfarm.tuner.trial import Trial, residual_rms
+from tfarm.tuner.tuning import Plan, trial_of
 
 Tell = Callable[[int, int], None]
 
@@ -130,16 +130,7 @@ def _grounds(arm: Arm, chain: Chain | None, plans: Iterable[Plan]) -> dict[str, 
     grounds: dict[str, _Ground] = {}
     for plan in plans:
         if _common(plan) not in grounds:
-            trial = slew_trial(
-                arm,
-                chain,
-                K1=plan.K1,
-                Kp=plan.Kp,
-                cost=plan.cost,
-                signals=plan.signals,
-                duration=plan.duration,
-                count=plan.count,
-            )
+            trial = trial_of(arm, plan, chain)
             best = best_constant(trial)
             grounds[_common(plan)] = _Ground(trial, find_guard(trial.loop, plan.guard, best.gain), best)
     return grounds

@@ -95,6 +95,14 @@ class Tuning:
         return self.saved().gain()
 
 
+def trial_of(arm: Arm, plan: Plan, chain: Chain | None) -> Trial:
+    """The slew that a plan learns from."""
+    return slew_trial(
+        arm, chain, K1=plan.K1, Kp=plan.Kp, cost=plan.cost, signals=plan.signals, duration=plan.duration,
+        count=plan.count,
+    )  # fmt: skip
+
+
 def tune(arm: Arm, plan: Plan | None = None, chain: Chain | None = None) -> Tuning:
     """Find the guard, train, and measure the yardsticks.
 
@@ -102,16 +110,7 @@ def tune(arm: Arm, plan: Plan | None = None, chain: Chain | None = None) -> Tuni
     """
     plan = Plan(K1=default_gains(arm).K1) if plan is None else plan
     network = initial_network(plan.seed, hidden=plan.hidden, scales=plan.scales)
-    trial = slew_trial(
-        arm,
-        chain,
-        K1=plan.K1,
-        Kp=plan.Kp,
-        cost=plan.cost,
-        signals=plan.signals,
-        duration=plan.duration,
-        count=plan.count,
-    )
+    trial = trial_of(arm, plan, chain)
     best = best_constant(trial)
     guard = find_guard(trial.loop, plan.guard, best.gain)
     training = train(trial, network, guard, plan.learning, plan.trials)
