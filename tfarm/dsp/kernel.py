@@ -104,6 +104,24 @@ def estimate(angle: float, rate: float, memory: Any, filter_: Any) -> float:
 
 
 @compiled
+def measured(record: Any, rows: Any, saturated: Any, memory: Any, filter_: Any) -> Any:
+    """Hub angle, hub rate and root moment as the controller has them, of the outputs of one sample."""
+    angle = quantise(record[0], rows[ANGLE], saturated, ANGLE)
+    moment = quantise(record[2], rows[MOMENT], saturated, MOMENT)
+    return angle, estimate(angle, record[1], memory, filter_), moment
+
+
+@compiled
+def signal(kind: int, own: float, angle: float, rate: float, moment: float) -> float:
+    """What a law reads of an output: itself (0), or what encoder (1), amplifier (2) or estimate (3) make of it."""
+    if kind == 1:
+        return angle
+    if kind == 2:
+        return moment
+    return rate if kind == 3 else own
+
+
+@compiled
 def law(gains: Any, K2: float, ideal: Any, angle: float, rate: float, moment: float, single: bool) -> float:
     """u = r + Kp (theta_ref - theta) + K1 (theta_t_ref - theta_t) - K2 (M - M_rigid), in float64 or float32.
 
@@ -140,9 +158,7 @@ def run(
         if not abs(record[k, 2]) <= bound:
             return k
         clipped = saturated[k]
-        angle = quantise(record[k, 0], rows[ANGLE], clipped, ANGLE)
-        moment = quantise(record[k, 2], rows[MOMENT], clipped, MOMENT)
-        rate = estimate(angle, record[k, 1], memory, filter_)
+        angle, rate, moment = measured(record[k], rows, clipped, memory, filter_)
         u = quantise(law(gains, K2[k], ideal[k], angle, rate, moment, single), rows[TORQUE], clipped, TORQUE)
         held[k % ring] = torque[k] = u
         if k == 0:
@@ -187,19 +203,9 @@ def run_law(
         if not abs(record[k, 2]) <= bound:
             return k
         clipped = saturated[k]
-        angle = quantise(record[k, 0], rows[ANGLE], clipped, ANGLE)
-        moment = quantise(record[k, 2], rows[MOMENT], clipped, MOMENT)
-        rate = estimate(angle, record[k, 1], memory, filter_)
+        angle, rate, moment = measured(record[k], rows, clipped, memory, filter_)
         for j in range(y.size):
-            value = 0.0
-            if j < kinds.size:
-                value = record[k, 7 + j]
-                if kinds[j] == 1:
-                    value = angle
-                elif kinds[j] == 2:
-                    value = moment
-                elif kinds[j] == 3:
-                    value = rate
+            value = signal(kinds[j], record[k, 7 + j], angle, rate, moment) if j < kinds.size else 0.0
             y[j] = value - references[k, j]
             if single:
                 y[j] = float(np.float32(float(np.float32(value)) - float(np.float32(references[k, j]))))

@@ -25,7 +25,7 @@ from tfarm.dsp.chain import MOST_DELAY, Chain
 from tfarm.dsp.discretise import discretised
 from tfarm.dsp.law_plant import SensedPlant, is_analog, sensed_plant
 from tfarm.dsp.law_polynomials import FREE, polynomials
-from tfarm.dsp.loop import Poles, SampledLoop, polished
+from tfarm.dsp.loop import Poles, SampledLoop, polished, without_drift
 from tfarm.dsp.plant import Branching, Plant
 from tfarm.dsp.sampling import PulseTransfer
 from tfarm.errors import ParameterError
@@ -168,9 +168,7 @@ class SampledLaw:
             return A
         shift = np.zeros(len(A))
         shift[first], shift[len(A) - states.size :] = 1.0, states
-        others = np.arange(len(A)) != first
-        quotient: Real = A[others][:, others] - np.outer(shift[others], A[first, others])
-        return quotient
+        return without_drift(A, first, shift)
 
     @cached_property
     def eigenvalues(self) -> Complex:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,7 +16,7 @@ from tfarm.dsp.law_circle import LawCircle
 from tfarm.dsp.law_loop import SampledLaw, sampled_law
 from tfarm.dsp.law_margins import stable_factors
 from tfarm.dsp.margins import DelayMargin, Window, around, delay_margin, whole
-from tfarm.dsp.verdict import MOST_ASKED, UNDAMPED_MODES, Verdict, settled
+from tfarm.dsp.verdict import MOST_ASKED, UNDAMPED_MODES, Verdict, settled, verdict_answer
 from tfarm.records import record
 
 
@@ -86,18 +85,8 @@ def law_answer(analysis: LawAnalysis) -> dict[str, Any]:
     return {
         "arm": loop.plant.arm.name,
         **described_law(loop.asked, loop.plant.arm),
-        "period_s": sampling.period,
-        "delay_samples": sampling.delay_samples,
-        "verdict": verdict.word,
-        "verdict_in_words": verdict.sentence,
-        "stable": verdict.is_stable,
-        "spectral_radius": math.exp(verdict.log_radius),
-        "log_spectral_radius": verdict.log_radius,
-        "unstable_poles": int((loop.poles.log_radius > 0).sum()),
+        **verdict_answer(verdict, sampling),
         "nearest": verdict.slowest,
-        "modes_used": verdict.modes_used,
-        "settled": verdict.is_settled,
-        "band_rad_s": verdict.band_rad_s,
         "warnings": list(analysis.warnings),
         "free_hub_angle": loop.has_free_angle,
         "stable_gain_factors": [list(window) for window in analysis.factors],

@@ -64,6 +64,12 @@ class Poles:
         return self.log_spectral_radius < 0.0
 
 
+def without_drift(A: Real, first: int, shift: Real) -> Real:
+    """A without its pole z = 1 at the direction `shift`, whose entry `first` is 1: the quotient by that direction."""
+    others = np.arange(len(A)) != first
+    return np.asarray(A[others][:, others] - np.outer(shift[others], A[first, others]))
+
+
 @dataclass(frozen=True)
 @record
 class SampledLoop:
@@ -173,9 +179,7 @@ class SampledLoop:
         shift[first] = 1.0
         if self.differences:
             shift[-2] = rigid[0] or rigid[1]
-        others = np.arange(len(A)) != first
-        quotient: Real = A[others][:, others] - np.outer(shift[others], A[first, others])
-        return quotient
+        return without_drift(A, first, shift)
 
     @cached_property
     def eigenvalues(self) -> Complex:

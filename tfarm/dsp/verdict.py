@@ -11,7 +11,7 @@ from tfarm.arm import LISTED, Arm, HubFeedback, driven, unit_of
 from tfarm.arm.checks import whole
 from tfarm.columns import Table
 from tfarm.dsp.band import Band, band_of
-from tfarm.dsp.chain import Chain
+from tfarm.dsp.chain import Chain, Sampling
 from tfarm.dsp.law import MODES, ModeTable, growing_mode, mode_table
 from tfarm.dsp.law_loop import AnyLoop, SampledLaw
 from tfarm.dsp.loop import SampledLoop, check_loop, resized, sampled_loop
@@ -209,10 +209,27 @@ def analyse(arm: Arm, gains: HubFeedback, chain: Chain | None = None, *, count: 
     )
 
 
+def verdict_answer(verdict: Verdict[Any], sampling: Sampling) -> dict[str, Any]:
+    """What is said of any sampled loop: the clock, the verdict, and how far it holds."""
+    return {
+        "period_s": sampling.period,
+        "delay_samples": sampling.delay_samples,
+        "verdict": verdict.word,
+        "verdict_in_words": verdict.sentence,
+        "stable": verdict.is_stable,
+        "spectral_radius": math.exp(verdict.log_radius),
+        "log_spectral_radius": verdict.log_radius,
+        "unstable_poles": int((verdict.loop.poles.log_radius > 0).sum()),
+        "modes_used": verdict.modes_used,
+        "settled": verdict.is_settled,
+        "band_rad_s": verdict.band_rad_s,
+    }
+
+
 def sampled_answer(analysis: Analysis) -> dict[str, Any]:
     """The analysis as a dictionary of plain numbers, texts, lists and the table of its modes."""
     verdict, gains = analysis.verdict, analysis.verdict.loop.gains
-    arm, poles, sampling = verdict.loop.plant.arm, verdict.loop.poles, verdict.loop.chain.sampling
+    arm, sampling = verdict.loop.plant.arm, verdict.loop.chain.sampling
     return {
         "arm": arm.name,
         "law": f"u = -Kp theta - K1 theta_t - K2 M; a positive root moment M accelerates the hub{driven(arm)}",
@@ -221,17 +238,7 @@ def sampled_answer(analysis: Analysis) -> dict[str, Any]:
         "K1": gains.K1,
         "K2": gains.K2,
         "Kp": gains.Kp,
-        "period_s": sampling.period,
-        "delay_samples": sampling.delay_samples,
-        "verdict": verdict.word,
-        "verdict_in_words": verdict.sentence,
-        "stable": verdict.is_stable,
-        "spectral_radius": math.exp(verdict.log_radius),
-        "log_spectral_radius": verdict.log_radius,
-        "unstable_poles": int((poles.log_radius > 0).sum()),
-        "modes_used": verdict.modes_used,
-        "settled": verdict.is_settled,
-        "band_rad_s": verdict.band_rad_s,
+        **verdict_answer(verdict, sampling),
         "K1_interval": _listed(around(analysis.K1_windows, gains.K1)),
         "K2_interval": _listed(around(analysis.K2_windows, gains.K2)),
         "K1_intervals": [list(window) for window in analysis.K1_windows],
