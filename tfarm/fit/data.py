@@ -1,0 +1,80 @@
+"""A measured frequency response: one signal of a rig over another, at frequencies of a swept sine or of an estimate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.errors import ParameterError
+from tfarm.records import record
+
+Complex = NDArray[np.complexfloating[Any, Any]]
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+@record
+class Measured:
+    """A measured response `output`/`input`: complex `values` (n,) in SI units at ascending `omega` (n,) [rad/s].
+
+    Both signals are named as in `response.signals` ("tip_acceleration", "strain@0.05"), `input` also as an arm's input
+    is ("hub_torque").  `sigma` (n,) is the standard deviation of the real and of the imaginary part, each; `coherence`
+    (n,) between 0 and 1 is that of an estimate from so many independent `averages`.  `source` says where they are from,
+    `digest` is the SHA-256 of the file.
+
+    Raises ParameterError for what no measurement can be: shapes that differ, frequencies that are not positive or do
+    not ascend, values that are no numbers, a coherence out of [0, 1] or 0 everywhere, a sigma that is not positive.
+    """
+
+    output: str
+    input: str
+    omega: Real
+    values: Complex
+    sigma: Real | None = None
+    coherence: Real | None = None
+    averages: int | None = None
+    source: str = "array"
+    digest: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "omega", np.atleast_1d(np.asarray(self.omega, dtype=float)))
+        object.__setattr__(self, "values", np.atleast_1d(np.asarray(self.values, dtype=complex)))
+        for name in ("sigma", "coherence"):
+            given = getattr(self, name)
+            if given is not None:
+                object.__setattr__(self, name, np.atleast_1d(np.asarray(given, dtype=float)))
+        _check(self)
+
+    @property
+    def name(self) -> str:
+        """What is measured, as the command line has it: tip_acceleration/hub_angle."""
+        return f"{self.output}/{self.input}"
+
+
+def _check(one: Measured) -> None:
+    for name in ("values", "sigma", "coherence"):
+        held = getattr(one, name)
+        if held is not None and held.shape != one.omega.shape:
+            remedy = f"one for each of the {one.omega.size} frequencies"
+            raise ParameterError(key=f"{one.name} {name}", value=held.shape, remedy=remedy)
+    if not (one.omega > 0).all() or not np.isfinite(one.omega).all():
+        bad = float(one.omega[~((one.omega > 0) & np.isfinite(one.omega))][0])
+        raise ParameterError(key="frequency", value=bad, remedy="positive and finite; leave other rows out")
+    steps = np.diff(one.omega)
+    if (steps <= 0).any():
+        at = float(one.omega[1:][steps <= 0][0])
+        remedy = "repeated or not in ascending order; sort the rows, and average those of one frequency"
+        raise ParameterError(key="frequency", value=at, remedy=remedy)
+    if not np.isfinite(one.values).all():
+        at = float(one.omega[~np.isfinite(one.values)][0])
+        raise ParameterError(key=f"value at {at:g} rad/s", value="no number", remedy="leave the row out")
+    if one.sigma is not None and not ((one.sigma > 0) & np.isfinite(one.sigma)).all():
+        raise ParameterError(key="sigma", value=float(one.sigma.min()), remedy="a standard deviation is positive")
+    if one.coherence is not None:
+        if not ((one.coherence >= 0) & (one.coherence <= 1)).all():
+            raise ParameterError(key="coherence", value=float(one.coherence.max()), remedy="between 0 and 1")
+        if not one.coherence.any():
+            raise ParameterError(key="coherence", value=0.0, remedy="0 everywhere: nothing was measured; leave it out")
