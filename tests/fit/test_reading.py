@@ -1,0 +1,173 @@
+"""Measured responses from files: the same response however a laboratory writes it, and one line for what is none."""
+
+import hashlib
+import sys
+
+import control
+import numpy as np
+import pytest
+
+from tfarm.errors import ParameterError
+from tfarm.fit.reading import data_of, measured_of, read_measured
+
+HZ = np.array([1.0, 1.5, 2.25, 40.0])
+VALUES = np.array([1.0 + 2.0j, -0.25 - 0.5j, 3.0e-5 - 4.0e-5j, -2.0 + 0.0j])
+NAMES = ("tip_acceleration", "hub_angle")
+
+
+def text(names, columns, separator=",", end="\n", decimal="."):
+    rows = [separator.join(f"{x:.17g}".replace(".", decimal) for x in row) for row in zip(*columns, strict=True)]
+    return end.join([separator.join(names), *rows, ""])
+
+
+def polar(decibels=False):
+    size = abs(VALUES)
+    return 20 * np.log10(size) if decibels else size, np.degrees(np.angle(VALUES))
+
+
+WRITTEN = {
+    "plain": text(("hz", "re", "im"), (HZ, VALUES.real, VALUES.imag)),
+    "rad/s": text(("rad_s", "re", "im"), (2 * np.pi * HZ, VALUES.real, VALUES.imag)),
+    "abs": text(("hz", "abs", "deg"), (HZ, *polar())),
+    "db": text(("deg", "db", "hz"), (polar(True)[1], polar(True)[0], HZ)),
+    "excel": "\ufeff" + text(("hz [Hz]", '"re"', "im"), (HZ, VALUES.real, VALUES.imag), ";", "\r\n", ","),
+    "comments": "# by hand\n\n" + text(("hz", "re", "im"), (HZ, VALUES.real, VALUES.imag), "\t").replace("\n", "\n#\n"),
+}
+
+
+@pytest.mark.parametrize("how", WRITTEN)
+def test_every_way_to_write_a_response_is_the_same_response(how, tmp_path):
+    """To rounding: a phase of half a turn in degrees is 4e-16 off, its logarithm by 200 dB times epsilon."""
+    path = tmp_path / "sweep.csv"
+    path.write_bytes(WRITTEN[how].encode())
+    found = data_of(f"tip_acceleration/hub_angle={path}")
+    assert (found.output, found.input, found.source) == (*NAMES, str(path))
+    assert found.omega == pytest.approx(2 * np.pi * HZ, rel=4e-16)
+    assert found.values == pytest.approx(VALUES, rel=1e-14)
+    assert found.digest == hashlib.sha256(path.read_bytes()).hexdigest()
+    assert (found.sigma, found.coherence, found.averages) == (None, None, None)
+
+
+def test_how_sure_it_is_stands_beside_it(tmp_path):
+    path = tmp_path / "sweep=1.csv"
+    path.write_text(text(("hz", "re", "im", "coherence", "averages"), (HZ, *[HZ / 40] * 3, [12] * 4)))
+    found = data_of(f"tip_acceleration/hub_angle={path}")
+    assert found.coherence.tolist() == (HZ / 40).tolist()
+    assert found.averages == 12
+    path.write_text(text(("hz", "re", "im", "sigma"), (HZ, *[HZ / 40] * 3)))
+    assert read_measured(path, *NAMES).sigma.tolist() == (HZ / 40).tolist()
+
+
+BAD = {
+    "hz,re,im\n1,2,3\n1,2,3": "line 3, hz = 1.0: is there twice",
+    "hz,re,im\n# a sweep down\n2,2,3\n1,2,3": "line 4, hz = 1.0: is below the one before; sort the rows",
+    "hz,re,im\n0,2,3\n1,2,3": "line 2, hz = 0.0: a frequency is positive",
+    "1,2,3\n2,2,3": "header is missing: the first line holds numbers",
+    "": "header is missing: the file is empty",
+    "hz,re,im": "rows = 0",
+    "frequency,re,im\n1,2,3": "header = 'frequency': known are: hz, rad_s",
+    "Hz,re,im\n1,2,3": "header = 'Hz': did you mean \"hz\"?",
+    "re,im\n1,2": "header = 're, im': one column of frequencies: hz or rad_s",
+    "hz,rad_s,re,im\n1,1,1,2": "one column of frequencies",
+    "hz [rad/s],re,im\n1,1,2": "unit of hz = 'rad/s': hz is in Hz",
+    "hz,re\n1,2": "header = 'hz, re': one pair of columns",
+    "hz,deg\n1,2": "one pair of columns",
+    "hz,re,im,db\n1,2,3,4": "one pair of columns",
+    "hz,re,im,deg\n1,2,3,4": "leave deg out",
+    "hz,re,re\n1,2,3": "header, column 3 = 're'",
+    "hz,re,im\n1,2,x": "line 2, im = 'x': no finite number",
+    "hz,re,im\n1,2,nan": "line 2, im = 'nan': no finite number",
+    "hz,re,im\n1,2,1_0": "line 2, im = '1_0'",
+    "hz,re,im\n1,2": "line 2 = '1,2': 2 columns where the header names 3",
+    "hz,abs,deg\n1,-20,3": "line 2, abs = -20.0: a magnitude is not negative; is it db?",
+    "hz,re,im,coherence\n1,2,3,0\n2,2,3,0": "coherence = 0.0: 0 everywhere",
+    "hz,re,im,coherence\n1,2,3,1.2": "coherence = 1.2: between 0 and 1",
+    "hz,re,im,sigma\n1,2,3,0": "sigma = 0.0: a standard deviation is positive",
+    "hz,re,im,averages\n1,2,3,2\n2,2,3,4": "line 3, averages = 4.0",
+}
+
+
+@pytest.mark.parametrize("content", BAD)
+def test_a_file_that_is_none_is_one_line_with_the_file(content, tmp_path):
+    path = tmp_path / "bad.csv"
+    path.write_text(content)
+    with pytest.raises(ParameterError) as error:
+        read_measured(path, *NAMES)
+    said = str(error.value)
+    assert said.startswith(f"{path}: ")
+    assert BAD[content] in said
+    assert "\n" not in said
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ("sweep.csv", "--data = 'sweep.csv': write OUTPUT/INPUT=FILE"),
+        ("tip_acceleration=sweep.csv", "write OUTPUT/INPUT=FILE"),
+        ("tip_acceleration/hub_angle=", "write OUTPUT/INPUT=FILE"),
+        ("tip_accelerometer/hub_angle=sweep.csv", "output = 'tip_accelerometer': did you mean \"tip_acceleration\"?"),
+        ("tip_acceleration/torque=sweep.csv", "input = 'torque'"),
+        ("tip_acceleration/hub_angle=/nowhere/sweep.csv", "tip_acceleration/hub_angle = '/nowhere/sweep.csv'"),
+        ("tip_acceleration/hub_angle=/", "is a folder"),
+    ],
+)
+def test_what_is_asked_wrongly_is_said(asked, said):
+    with pytest.raises(ParameterError) as error:
+        data_of(asked)
+    assert said in str(error.value)
+
+
+def test_signals_along_the_link_and_inputs_of_the_hub_are_known(tmp_path):
+    path = tmp_path / "strain.csv"
+    path.write_text(WRITTEN["plain"])
+    assert data_of(f"strain@0.05/motor_voltage={path}").name == "strain@0.05/motor_voltage"
+
+
+def test_data_of_python_control_are_taken_by_their_names():
+    two = np.array([[VALUES, 2 * VALUES], [3 * VALUES, 4 * VALUES]])
+    names = {"outputs": ["tip_acceleration", "strain"], "inputs": ["hub_torque", "hub_angle"]}
+    response = control.FrequencyResponseData(two, 2 * np.pi * HZ, **names)
+    found = measured_of(response, "strain", "hub_angle", averages=5)
+    assert found.omega.tolist() == (2 * np.pi * HZ).tolist()
+    assert found.values.tolist() == (4 * VALUES).tolist()
+    assert found.averages == 5
+    with pytest.raises(ParameterError, match="input = 'motor_voltage'"):
+        measured_of(response, "strain", "motor_voltage")
+    alone = control.FrequencyResponseData(VALUES, HZ)
+    assert measured_of(alone, *NAMES).values.tolist() == VALUES.tolist()
+
+
+def uff(values, start, step, function=4):
+    """A data set 58 by the format's own table: complex, double precision, even spacing (4E20.12)."""
+    flat = [f"{x:20.12E}" for value in values for x in (value.real, value.imag)]
+    body = ["".join(flat[i : i + 4]) for i in range(0, len(flat), 4)]
+    place = f"{function:5d}{0:10d}{0:5d}{0:10d} {'NONE':10s}{1:10d}{3:4d} {'NONE':10s}{2:10d}{3:4d}"
+    form = f"{6:10d}{len(values):10d}{1:10d}{start:13.5E}{step:13.5E}{0.0:13.5E}"
+    axes = [f"{kind:10d}{0:5d}{0:5d}{0:5d} {'NONE':20s} {'NONE':20s}" for kind in (18, 12, 13, 0)]
+    return "\n".join(["    -1", "    58", *["NONE"] * 5, place, form, *axes, *body, "    -1", ""])
+
+
+def test_a_uff_file_is_read_and_its_responses_are_chosen_by_number(tmp_path):
+    path = tmp_path / "sweep.uff"
+    path.write_text(uff(VALUES, 0.0, 0.5))
+    found = data_of(f"tip_acceleration/hub_angle={path}")
+    assert found.omega == pytest.approx(2 * np.pi * np.array([0.5, 1.0, 1.5]), rel=1e-15)  # without 0 Hz
+    assert found.values == pytest.approx(VALUES[1:], rel=1e-12)
+    path.write_text(uff(VALUES, 1.0, 0.5) + uff(VALUES, 1.0, 0.5, function=6) + uff(2 * VALUES, 1.0, 0.5))
+    assert data_of(f"tip_acceleration/hub_angle={path}#2").values == pytest.approx(2 * VALUES, rel=1e-12)
+    for asked, said in ((path, "holds 2 responses; choose one"), (f"{path}#3", "data set = 3: from 1 to 2")):
+        with pytest.raises(ParameterError, match=said):
+            data_of(f"tip_acceleration/hub_angle={asked}")
+
+
+def test_a_uff_file_without_its_package_or_without_a_response_is_one_line(tmp_path, monkeypatch):
+    path = tmp_path / "sweep.uff"
+    path.write_text(uff(VALUES, 1.0, 0.5, function=6))
+    with pytest.raises(ParameterError, match="holds no frequency response function"):
+        data_of(f"tip_acceleration/hub_angle={path}")
+    path.write_text("    -1\n    58\nNONE\n    -1\n")
+    with pytest.raises(ParameterError, match="no UFF file that can be read"):
+        data_of(f"tip_acceleration/hub_angle={path}")
+    monkeypatch.setitem(sys.modules, "pyuff", None)
+    with pytest.raises(ParameterError, match=r"pip install 'tfarm\[uff\]', or export the response as CSV"):
+        data_of(f"tip_acceleration/hub_angle={path}")

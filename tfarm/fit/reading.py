@@ -1,0 +1,246 @@
+"""Measured responses from files: CSV, UFF 58; and from arrays of python-control.
+
+    hz, re, im, coherence          hz or rad_s; re, im or abs, deg or db, deg; coherence or sigma and averages as known
+    1.00, 0.312, -0.004, 0.998
+
+Values are in SI units, sigma (of the real and of the imaginary part, each) in those of the response.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import INPUTS
+from tfarm.errors import MISSING, ParameterError, did_you_mean
+from tfarm.exact.outputs import OUTPUTS
+from tfarm.files import read_file
+
+from .data import Complex, Measured, Real
+from .sheets import MOST_BYTES, Sheet, digest_of, read_sheet
+
+if TYPE_CHECKING:
+    import control
+
+FREQUENCIES = {"hz": ("Hz", 2 * np.pi), "rad_s": ("rad/s", 1.0)}  # its unit, and rad/s in one
+VALUES = (("re", "im"), ("abs", "deg"), ("db", "deg"))
+BESIDE = ("coherence", "sigma", "averages")
+KNOWN = (*FREQUENCIES, "re", "im", "abs", "db", "deg", *BESIDE)
+FORM = "OUTPUT/INPUT=FILE, such as tip_acceleration/hub_angle=sweep.csv"
+UFF = (".uff", ".unv", ".uf")
+RESPONSE, FREQUENCY = 4, 18  # in UFF 58: the function type, and the kind of its abscissa
+
+
+def data_of(text: str, key: str = "--data") -> Measured:
+    """The measured response that the command line means by "tip_acceleration/hub_angle=sweep.csv".
+
+    Raises ParameterError for another form, a signal that is none, and for what `read_measured` refuses.
+    """
+    names, given, path = text.partition("=")
+    output, slash, input = (part.strip() for part in names.partition("/"))
+    if not (given and slash and path.strip()):
+        raise ParameterError(key=key, value=text, remedy=f"write {FORM}")
+    return read_measured(path.strip(), output, input)
+
+
+def read_measured(path: str | os.PathLike[str], output: str, input: str) -> Measured:
+    """The response `output`/`input` of a CSV file, or of a UFF file with a data set 58 (its number behind a #).
+
+    Raises ParameterError, naming file and line, for a header without frequency or value, for frequencies that are
+    repeated or not sorted, a coherence that is 0 everywhere, and for what else no measurement can be.
+    """
+    check_signal(output, "output")
+    check_signal(input, "input")
+    name = os.fspath(path)
+    if re.sub(r"#\d+$", "", name).lower().endswith(UFF):
+        return _of_uff(name, output, input)
+    sheet = read_sheet(path, key=f"{output}/{input}")
+    try:
+        omega, values = _frequencies(sheet), _values(sheet)
+        return Measured(
+            output=output,
+            input=input,
+            omega=omega,
+            values=values,
+            sigma=sheet.get("sigma"),
+            coherence=sheet.get("coherence"),
+            averages=_averages(sheet),
+            source=name,
+            digest=sheet.digest,
+        )
+    except ParameterError as error:
+        raise error.in_file(name) from None
+
+
+def measured_of(
+    response: control.FrequencyResponseData,
+    output: str,
+    input: str,
+    *,
+    sigma: Real | None = None,
+    coherence: Real | None = None,
+    averages: int | None = None,
+) -> Measured:
+    """One response of `control.FrequencyResponseData`, by its signals' names where it has several.
+
+    Raises ParameterError where it has several and none is of these names, and for what no measurement can be.
+    """
+    data = np.asarray(response.frdata)
+    places = [
+        _place(labels, wanted, size, key)
+        for labels, wanted, size, key in (
+            (response.output_labels, output, data.shape[0], "output"),
+            (response.input_labels, input, data.shape[1], "input"),
+        )
+    ]
+    values = data[places[0], places[1]]
+    return Measured(
+        output=output,
+        input=input,
+        omega=np.asarray(response.omega, dtype=float),
+        values=values,
+        sigma=sigma,
+        coherence=coherence,
+        averages=averages,
+        source=str(response.name),
+    )
+
+
+def check_signal(name: str, key: str) -> None:
+    """Raise ParameterError, with the nearest name, for what is neither an output of an arm nor an input of its hub.
+
+    Where along the link it is, and whether the arm has it, is seen when the arm is known.
+    """
+    plain, known = name.partition("@")[0], (*OUTPUTS, *(each for each in INPUTS if each not in OUTPUTS))
+    if plain not in known:
+        raise ParameterError(key=key, value=name, remedy=did_you_mean(plain, known))
+
+
+def _place(labels: list[str], wanted: str, size: int, key: str) -> int:
+    if wanted in labels:
+        return labels.index(wanted)
+    if size == 1:
+        return 0
+    raise ParameterError(key=key, value=wanted, remedy=did_you_mean(wanted, labels))
+
+
+# ------------------------------------------------------------ CSV
+
+
+def _frequencies(sheet: Sheet) -> Real:
+    """The frequencies [rad/s], once the header is known to be one and they ascend."""
+    for name in sheet.names:
+        if name not in KNOWN:
+            raise ParameterError(key="header", value=name, remedy=did_you_mean(name.lower(), KNOWN))
+    given = [name for name in FREQUENCIES if name in sheet]
+    if len(given) != 1:
+        remedy = "one column of frequencies: hz or rad_s"
+        raise ParameterError(key="header", value=", ".join(sheet.names), remedy=remedy)
+    (name,) = given
+    unit, scale = FREQUENCIES[name]
+    if sheet.units[sheet.names.index(name)].lower() not in ("", unit.lower()):
+        said = sheet.units[sheet.names.index(name)]
+        raise ParameterError(key=f"unit of {name}", value=said, remedy=f"{name} is in {unit}")
+    frequency = sheet[name]
+    _check_frequencies(name, frequency, sheet.lines)
+    return frequency * scale
+
+
+def _check_frequencies(name: str, frequency: Real, lines: tuple[int, ...]) -> None:
+    wrong = np.flatnonzero(~(frequency > 0))
+    if wrong.size:
+        remedy = "a frequency is positive; leave the row out"
+        raise ParameterError(key=f"line {lines[wrong[0]]}, {name}", value=float(frequency[wrong[0]]), remedy=remedy)
+    back = np.flatnonzero(np.diff(frequency) <= 0)
+    if back.size:
+        at = int(back[0]) + 1
+        again = bool(np.any(frequency[:at] == frequency[at]))
+        remedy = "is there twice; average its rows" if again else "is below the one before; sort the rows"
+        raise ParameterError(key=f"line {lines[at]}, {name}", value=float(frequency[at]), remedy=remedy)
+
+
+def _values(sheet: Sheet) -> Complex:
+    """The complex response, of whichever two columns there are."""
+    given = [pair for pair in VALUES if pair[0] in sheet or (pair[1] in sheet and pair[1] != "deg")]
+    if len(given) != 1 or not all(name in sheet for name in given[0]):
+        remedy = "one pair of columns for the value: re, im or abs, deg or db, deg"
+        raise ParameterError(key="header", value=", ".join(sheet.names), remedy=remedy)
+    first, second = (sheet[name] for name in given[0])
+    if given[0] == ("re", "im"):
+        if "deg" in sheet:
+            raise ParameterError(key="header", value="deg", remedy="re and im say it all; leave deg out")
+        return np.asarray(first + 1j * second)
+    if given[0][0] == "abs" and (first < 0).any():
+        at = int(np.flatnonzero(first < 0)[0])
+        remedy = "a magnitude is not negative; is it db?"
+        raise ParameterError(key=f"line {sheet.lines[at]}, abs", value=float(first[at]), remedy=remedy)
+    with np.errstate(over="ignore"):
+        size = first if given[0][0] == "abs" else 10.0 ** (first / 20)
+    return np.asarray(size * np.exp(1j * np.radians(second)))
+
+
+def _averages(sheet: Sheet) -> int | None:
+    """The number of independent averages, which is one for all rows."""
+    if "averages" not in sheet:
+        return None
+    found = sheet["averages"]
+    wrong = np.flatnonzero((found != found[0]) | (found < 1) | (found != np.round(found)))
+    if wrong.size:
+        remedy = "a whole number of averages, the same in every row"
+        raise ParameterError(key=f"line {sheet.lines[wrong[0]]}, averages", value=float(found[wrong[0]]), remedy=remedy)
+    return int(found[0])
+
+
+# ------------------------------------------------------------ UFF
+
+
+def _of_uff(name: str, output: str, input: str) -> Measured:
+    """The response of a UFF file: the one it has, or that of the number behind a # (from 1, as they stand there)."""
+    path, _, number = name.partition("#")
+    data = read_file(path, MOST_BYTES, key=f"{output}/{input}", what="a .uff file")
+    try:
+        chosen = _chosen(_responses(path), int(number) if number else None)
+        omega = 2 * np.pi * np.asarray(chosen["x"], dtype=float)
+        values: NDArray[Any] = np.asarray(chosen["data"], dtype=complex)
+        kept = slice(int(omega.size > 0 and omega[0] == 0), None)  # the line at 0 Hz that spectra begin with
+        return Measured(
+            output=output, input=input, omega=omega[kept], values=values[kept], source=name, digest=digest_of(data)
+        )
+    except ParameterError as error:
+        raise error.in_file(path) from None
+
+
+def _responses(path: str) -> list[dict[str, Any]]:
+    """The frequency response functions of a UFF file, as pyuff has them."""
+    try:
+        import pyuff
+    except ImportError:
+        remedy = "is not installed, and reads UFF files: pip install 'tfarm[uff]', or export the response as CSV"
+        raise ParameterError(key="package", value="pyuff", remedy=remedy) from None
+    try:
+        file = pyuff.UFF(path)
+        sets = [file.read_sets(n) for n, kind in enumerate(file.get_set_types()) if int(kind) == 58]
+    except Exception as error:  # a parser that is not ours, on data from outside: it may raise anything
+        remedy = f"no UFF file that can be read: {str(error)[:80]}"
+        raise ParameterError(key="data set", value=58, remedy=remedy) from None
+    return [
+        cast("dict[str, Any]", each)
+        for each in sets
+        if each.get("func_type") == RESPONSE and each.get("abscissa_spec_data_type", FREQUENCY) == FREQUENCY
+    ]
+
+
+def _chosen(found: list[dict[str, Any]], number: int | None) -> dict[str, Any]:
+    if not found:
+        remedy = "the file holds no frequency response function (type 58, function 4)"
+        raise ParameterError(key="data set", value=58, remedy=remedy)
+    if number is None and len(found) > 1:
+        remedy = f"the file holds {len(found)} responses; choose one by its number, as file.uff#2"
+        raise ParameterError(key="data set", value=MISSING, remedy=remedy)
+    if number is not None and not 1 <= number <= len(found):
+        raise ParameterError(key="data set", value=number, remedy=f"from 1 to {len(found)}, the responses of the file")
+    return found[(number or 1) - 1]
