@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 POLES = "poles with Im s >= 0, 1 to 1000; if not given ten, or those below the shear cut-off where they are fewer"
 
+ALSO = "a further arm that the law has to serve: the objective is the worst of all; may be repeated"
+RANGE = "numbers that the arm may have, such as payload.mass=0.1,0.5; up to four: corners, and a search inside"
 OF_A_LAW = "twice: two numbers of a law and their ranges; gain, delay, SIGNAL, SIGNAL.num.N or SIGNAL.den.N"
 
 OBJECTIVES = "damping, margin or residual; of another structure damping, margin, sensitivity or delay"
@@ -128,7 +130,7 @@ def _law_map(
     if len(vary) != 2:
         remedy = "twice, such as --vary hub_angle=0,10 --vary delay=0,0.02"
         raise ParameterError(key="--vary", value=vary, remedy=remedy)
-    ranges = [_range_of(each) for each in vary]
+    ranges = [_range_of("--vary", each) for each in vary]
     typed = law_of(subject, Given({}, law, name))[0]
     from tfarm.arm.law import Law
     from tfarm.cli.control_tables import print_law_map, write_law_map
@@ -145,10 +147,10 @@ def _law_map(
         give(answer, json, print_law_map)
 
 
-def _range_of(text: str) -> tuple[str, tuple[float, float]]:
+def _range_of(option: str, text: str) -> tuple[str, tuple[float, float]]:
     """A name and its range, of NAME=LO,HI."""
     name, _, limits = text.partition("=")
-    return name, bounds(f"--vary {name}", limits)
+    return name, bounds(f"{option} {name}", limits)
 
 
 @app.command()
@@ -164,6 +166,8 @@ def design(
     period: Period = None,
     delay_samples: Delay = None,
     dsp: DspFile = None,
+    also: Annotated[list[str] | None, typer.Option("--also", metavar="ARM", help=ALSO)] = None,
+    over: Annotated[list[str] | None, typer.Option("--range", metavar="KEY=LO,HI", help=RANGE)] = None,
     save: Annotated[Path | None, typer.Option("--save", help="write the law to this TOML file, for --law")] = None,
     json: Json = False,
 ) -> None:
@@ -171,6 +175,7 @@ def design(
     number, subject = whole("--modes", modes, 1, 30), load_arm(arm)
     chain = chain_of(dsp or arm, period, delay_samples)
     K1, K2 = (None if text is None else bounds(key, text) for key, text in (("--K1", k1), ("--K2", k2)))
+    ranges = dict(_range_of("--range", each) for each in over or [])
     from tfarm.arm.law import Law
     from tfarm.arm.law_writing import save_law
     from tfarm.cli.control_tables import print_design, print_law_design
@@ -181,7 +186,7 @@ def design(
 
     found = find_law(
         subject, objective, structure=structure, K1=K1, K2=K2, Kp=kp, modes=number, chain=chain, continuous=continuous,
-        progress=tell if sys.stderr.isatty() else None,
+        progress=tell if sys.stderr.isatty() else None, also=[load_arm(name) for name in also or []], ranges=ranges,
     )  # fmt: skip
     law = Law.of_gains(found.law) if isinstance(found, Design) else found.law
     if save is not None:

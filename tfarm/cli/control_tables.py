@@ -153,7 +153,24 @@ def print_design(answer: dict[str, Any]) -> None:
     if cut:
         ends = [f"{name} = {answer[name]:.6g} of {_pair(answer['bounds'][name])}" for name in cut]
         print(f"no optimum: {' and '.join(ends)} is where the search was cut off; it may get better beyond")
+    _print_arms(answer)
     print(answer["sign_convention"])
+
+
+def _print_arms(answer: dict[str, Any]) -> None:
+    """A row an arm, where there are several, and how they were chosen."""
+    arms = answer["arms"]
+    if len(arms) == 1:
+        return
+    held = ["undecided" if (s := each["sampled"]["stable"]) is None else "stable" if s else "UNSTABLE" for each in arms]
+    columns = (
+        Column("arm", "arm", of=[each["name"] for each in arms]),
+        Column("value", answer["objective"], of=[each["value"] for each in arms], digits=singly(general, 6)),
+        Column("sampled", "sampled", of=held),
+        Column("verdict", "without a clock", of=[each["verdict"] for each in arms]),
+    )
+    show(Table(columns=columns))
+    print(f"{answer['value']:.6g} is {answer['worst_case_in_words']}; {answer['worst_arm']} is the worst")
 
 
 def print_law_design(answer: dict[str, Any]) -> None:
@@ -170,6 +187,7 @@ def print_law_design(answer: dict[str, Any]) -> None:
     print(answer["sampled"]["in_words"].replace("these gains are", "it is", 1))
     beyond = "" if answer["known_beyond_the_band"] else f" up to {answer['band_rad_s']:.4g} rad/s, not known beyond"
     print(f"without a clock it is {answer['verdict']}{beyond}; --save FILE keeps it for --law FILE")
+    _print_arms(answer)
     print(answer["sign_convention"])
 
 

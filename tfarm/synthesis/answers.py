@@ -30,6 +30,7 @@ def design_answer(found: Design) -> dict[str, Any]:
         "flat_K1": list(found.flat_K1),
         "flat_K2": list(found.flat_K2),
         "sampled": found.sampled.answer,
+        **arms_answer(found),
     }
 
 
@@ -49,4 +50,27 @@ def law_design_answer(found: LawDesign) -> dict[str, Any]:
         "band_rad_s": found.verdict.band,
         "modes": found.modes,
         "sampled": brief_of(found.sampled, found.chain).answer,
+        **arms_answer(found),
+    }
+
+
+def arms_answer(found: Design | LawDesign) -> dict[str, Any]:
+    """What the law is on each arm that it was chosen for, which of them is the worst, and how they were chosen."""
+    worst = next(each.name for each in found.arms if each.value == found.value)
+    return {
+        "arms": [
+            {
+                "name": each.name,
+                "numbers": each.numbers,
+                "value": each.value,
+                "verdict": each.verdict.verdict,
+                "known_beyond_the_band": each.verdict.is_known_beyond,
+                "band_rad_s": each.verdict.band,
+                "sampled": each.sampled.answer,
+            }
+            for each in found.arms
+        ],
+        "worst_arm": worst,
+        "arms_tried_inside": found.worst_case.tried,
+        "worst_case_in_words": found.worst_case.sentence(len(found.arms)),
     }

@@ -1,16 +1,21 @@
-"""One call for both: gains K1 and K2, and laws of any other structure."""
+"""One call for all: gains K1 and K2 and laws of any other structure, for one arm or for the worst of several."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import cast
 
 from tfarm.arm import Arm
 from tfarm.dsp import Chain
 from tfarm.errors import ParameterError
-from tfarm.synthesis.design import Design, Objective
+from tfarm.synthesis import law_design as laws
+from tfarm.synthesis.arms import NamedArm, arms_of, box_of
+from tfarm.synthesis.design import Design, Objective, score_on
 from tfarm.synthesis.design import design as best_gains
 from tfarm.synthesis.law_design import LawDesign, Progress, law_design
 from tfarm.synthesis.search import Bounds
+from tfarm.synthesis.worst_case import for_the_worst, same_input
 
 GAINS = "K1-K2"
 
@@ -18,7 +23,7 @@ GAINS = "K1-K2"
 def design(
     arm: Arm, objective: str = "damping", *, structure: str = GAINS, K1: Bounds | None = None,
     K2: Bounds | None = None, Kp: float = 0.0, modes: int = 2, chain: Chain | None = None, continuous: bool = False,
-    progress: Progress | None = None,
+    progress: Progress | None = None, also: Sequence[Arm] = (), ranges: Mapping[str, Bounds] | None = None,
 ) -> Design | LawDesign:  # fmt: skip
     """The law of a structure that serves an objective best in the sampled loop of a chain (10 ms unless given).
 
@@ -27,14 +32,35 @@ def design(
     "strain-rate": a `tfarm.Law`, "damping", "margin", "sensitivity" or "delay" (see `structures`); `Kp` is chosen where
     it is 0, and `progress` is told how the search goes on.  What is recommended holds when sampled, with all gains a
     quarter larger or smaller, and without a clock.
-    Raises ParameterError for what does not go together, ConvergenceError where nothing found holds.
+
+    `also` are further arms that the law has to serve, `ranges` the ends of numbers of the arm, such as
+    {"payload.mass": (0.1, 0.5)}: the objective is then the worst of the arm, of those, of the corners of the box, and
+    of arms inside it that a search finds to be worse, which is no proof over the box.  The law holds on each arm that
+    is named in `.arms`.  Raises ParameterError for what does not go together, ConvergenceError where nothing found
+    holds.
     """
+    box = box_of(arm, ranges)
+    arms, tell = arms_of(arm, also, box), progress or (lambda text: None)
+    same_input(arms)
     if structure == GAINS:
-        return best_gains(
-            arm, cast("Objective", objective), K1=K1, K2=K2, Kp=Kp, modes=modes, chain=chain, continuous=continuous
-        )
+
+        def find(named: Sequence[NamedArm]) -> Design:
+            return best_gains(
+                arm, cast("Objective", objective), K1=K1, K2=K2, Kp=Kp, modes=modes, chain=chain,
+                continuous=continuous, others=named[1:],
+            )  # fmt: skip
+
+        gains, case = for_the_worst(arms, box, find, score_on, tell)
+        return replace(gains, worst_case=case)
     for name, given in (("K1", K1), ("K2", K2), ("continuous", continuous or None)):
         if given is not None:
             remedy = f"goes with the structure {GAINS} alone"
             raise ParameterError(key=name, value=given, remedy=remedy)
-    return law_design(arm, objective, structure, Kp=Kp, modes=modes, chain=chain, progress=progress)
+
+    def find_law(named: Sequence[NamedArm]) -> LawDesign:
+        return law_design(
+            arm, objective, structure, Kp=Kp, modes=modes, chain=chain, progress=progress, others=named[1:]
+        )
+
+    found, case = for_the_worst(arms, box, find_law, laws.score_on, tell)
+    return replace(found, worst_case=case)

@@ -30,12 +30,13 @@ BASIN = 6  # points of the grid in each basin of a residual
 @dataclass(frozen=True)
 @record
 class ContinuousJudge:
-    """What K1 and K2 are worth in the continuous loop, Kp held."""
+    """What K1 and K2 are worth in the continuous loop, Kp held; `known` is the arm that the slew is made for."""
 
     arm: Arm
     objective: str
     Kp: float
     modes: int
+    known: Arm
 
     def effort(self, K2: Bounds) -> Effort:
         """A residual has as many basins along K2 as its modes' frequencies run through periods of the slew.
@@ -71,7 +72,7 @@ class ContinuousJudge:
         if self.objective == "damping":
             return -least_damping(self.arm, laws, self.modes)
         if self.objective == "residual":
-            return residual_moment(self.arm, laws, self.modes)
+            return residual_moment(self.arm, laws, self.modes, self.known)
         size = np.array([self._disk(law_of(law)) for law in laws.T])
         return np.asarray(-size - TIE * least_damping(self.arm, laws, self.modes))
 

@@ -8,9 +8,10 @@ I_h/(1 - K2), is a sixty-fourth; not below K1 = 0, where the law drives the hub,
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple, Protocol
+from typing import Literal, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,7 @@ from tfarm.loop.plant import Loop
 from tfarm.loop.stability import Stability, stability
 from tfarm.records import record
 from tfarm.spectrum.scales import check_gains, rate_unit, turning_inertia
+from tfarm.synthesis.arms import NamedArm
 from tfarm.synthesis.continuous import ContinuousJudge
 from tfarm.synthesis.sampled import sampled_judges
 from tfarm.synthesis.search import (
@@ -31,7 +33,6 @@ from tfarm.synthesis.search import (
     POLISHED,
     Axis,
     Bounds,
-    Effort,
     Found,
     Score,
     minima,
@@ -39,6 +40,8 @@ from tfarm.synthesis.search import (
     rate_axis,
     refined,
 )
+from tfarm.synthesis.together import Judge, OnArm, Worst, in_step, worst_value
+from tfarm.synthesis.worst_case import ALONE, WorstCase
 
 Real = NDArray[np.float64]
 Objective = Literal["damping", "margin", "residual"]
@@ -53,35 +56,17 @@ WIDENINGS = 4  # K1 to 16 times its bound, 1 - K2 likewise
 LIMITS = (("K1", 0), ("K2", 1))  # ends of the usual bounds that are physical ones
 
 
-class Judge(Protocol):
-    """What gains are worth in a loop, Kp held."""
-
-    def effort(self, K2: Bounds) -> Effort:
-        """How fine a grid its objective needs."""
-
-    def landscape(self, axes: tuple[Axis, Axis], effort: Effort) -> tuple[Real, Score]:
-        """Scores over the grid, inf where not stable, and the score to refine with."""
-
-    def score(self, K1: Real, K2: Real) -> Real:
-        """What is minimised."""
-
-    def holds(self, law: HubFeedback) -> bool:
-        """Whether the loop is stable by the verdict of its kind."""
-
-    def value(self, law: HubFeedback, score: float) -> float:
-        """The objective of a law of that score."""
-
-
 @dataclass(frozen=True)
 @record
 class Design:
     """The best law, its value (damping ratio, disk margin, or residual moment [N m]), its verdict, and how flat it is.
 
     `loop` is what it was designed for: the "sampled" loop of `chain` or the "continuous" one; `verdict` is that of the
-    continuous loop, `sampled` that of the sampled one.  `flat_K1` and `flat_K2` are the gains between which, the other
-    held, the value is within one per cent of the best.  `widened` names the gains whose bounds were widened to
-    `bounds`; `at_bound` those that lie at an end of them even so: there the search was cut off, and the value is no
-    optimum; `at_limit` those of them that are at a physical end, K1 = 0 or the K2 = 1 that stops the hub.
+    continuous loop, `sampled` that of the sampled one, both of the arm itself; `arms` has them for each arm that it was
+    chosen for, the arm itself first, and `value` is the worst among them.  `flat_K1` and `flat_K2` are the gains
+    between which, the other held, the value is within one per cent of the best.  `widened` names the gains whose bounds
+    were widened to `bounds`; `at_bound` those that lie at an end of them even so: there the search was cut off, and the
+    value is no optimum; `at_limit` those of them that are at a physical end, K1 = 0 or the K2 = 1 that stops the hub.
     """
 
     objective: str
@@ -98,6 +83,8 @@ class Design:
     loop: LoopKind
     chain: Chain
     sampled: SampledBrief
+    arms: tuple[OnArm, ...]
+    worst_case: WorstCase = ALONE
 
 
 class _Best(NamedTuple):
@@ -110,45 +97,72 @@ class _Best(NamedTuple):
 def design(
     arm: Arm, objective: Objective = "damping", *, K1: Bounds | None = None, K2: Bounds | None = None,
     Kp: float = 0.0, modes: int = 2, chain: Chain | None = None, continuous: bool = False,
+    others: Sequence[NamedArm] = (),
 ) -> Design:  # fmt: skip
     """The gains that serve an objective best within bounds, in the sampled loop of a chain (10 ms unless given).
 
     "damping" maximises the least damping ratio of the oscillating poles of the first `modes` modes; "margin" the disk
     margin; "residual" minimises the root moment left after the slew.  What is recommended holds when sampled, with
     every mode that its verdict takes, and with all gains a quarter larger or smaller.  `continuous`: of the continuous
-    loop instead; gains that are best there need not hold when sampled.  Raises ParameterError for a bad objective or
-    bounds, ConvergenceError if no gains within the bounds are stable.
+    loop instead; gains that are best there need not hold when sampled.  With `others` the objective is the worst of the
+    arms, all of which hold; references and feed-forward are made for the arm itself.  Raises ParameterError for a bad
+    objective or bounds, ConvergenceError if no gains within the bounds are stable.
     """
     if objective not in OBJECTIVES:
         raise ParameterError(key="objective", value=objective, remedy=f"use one of {', '.join(OBJECTIVES)}")
     unit, chain = arm.input_per_torque, Chain() if chain is None else chain
-    Loop(arm, HubFeedback(K1=1.0, K2=0.0 if arm.has_massless_hub else 0.5 * unit, Kp=Kp))
+    arms = (NamedArm(arm.name, arm, {}), *others)
+    for each in arms:
+        Loop(each.arm, HubFeedback(K1=1.0, K2=0.0 if each.arm.has_massless_hub else 0.5 * unit, Kp=Kp))
     free = {name: bounds is None for name, bounds in (("K1", K1), ("K2", K2))}
     start = {
         "K1": _checked("K1", K1 or (0.0, 2.0 * turning_inertia(arm) * band_of(arm, 1))),
         "K2": _checked("K2", K2 or (-3.0 * unit, 1.0 * unit)),
     }
     for K1_end, K2_end in zip(start["K1"], start["K2"], strict=True):
-        check_gains(arm, HubFeedback(K1=K1_end, K2=K2_end, Kp=Kp))
-    judges: Iterable[Judge] = (
-        [ContinuousJudge(arm, objective, Kp, modes)] if continuous else sampled_judges(arm, chain, objective, Kp, modes)
-    )
-    judge, bounds, best = _first_that_holds(judges, arm, start, free, Kp)
+        for each in arms:
+            check_gains(each.arm, HubFeedback(K1=K1_end, K2=K2_end, Kp=Kp))
+    judges = [_judges(each.arm, arm, chain, objective, Kp, modes, continuous) for each in arms]
+    judge, bounds, best = _first_that_holds(map(Worst, in_step(judges)), arm, start, free, Kp)
     law = HubFeedback(K1=best.gains[0], K2=best.gains[1], Kp=Kp)
+    on_arms = tuple(
+        OnArm(each.name, each.numbers, value, stability(each.arm, law), sampled_brief(each.arm, law, chain))
+        for each, value in zip(arms, judge.values(law), strict=True)
+    )
     ends = _ends(arm, bounds, best)
     flat = [_flat(judge.score, best, axis, bounds[name]) for axis, name in enumerate(bounds)]
     return Design(
-        objective=objective, law=law, value=judge.value(law, best.score), verdict=stability(arm, law), bounds=bounds,
+        objective=objective, law=law, value=worst_value(objective, [each.value for each in on_arms]),
+        verdict=cast("Stability", on_arms[0].verdict), bounds=bounds,
         flat_K1=flat[0], flat_K2=flat[1], modes=modes, at_bound=tuple(name for name, _ in ends),
         at_limit=tuple(name for name, end in ends if free[name] and (name, end) in LIMITS),
         widened=tuple(name for name in bounds if bounds[name] != start[name]),
-        loop="continuous" if continuous else "sampled", chain=chain, sampled=sampled_brief(arm, law, chain),
+        loop="continuous" if continuous else "sampled", chain=chain, sampled=on_arms[0].sampled,
+        arms=on_arms,
     )  # fmt: skip
 
 
+def _judges(
+    arm: Arm, known: Arm, chain: Chain, objective: str, Kp: float, modes: int, continuous: bool
+) -> Iterator[Judge]:
+    """Judges of gains on an arm, of ever more modes; `known` is what the slew is made for."""
+    if continuous:
+        return iter([ContinuousJudge(arm, objective, Kp, modes, known)])
+    return sampled_judges(arm, chain, objective, Kp, modes, known)
+
+
+def score_on(found: Design, arm: Arm) -> float:
+    """What a design minimised, on another arm; inf where the loop does not hold."""
+    law, known = found.law, found.verdict.loop.arm
+    judge = next(_judges(arm, known, found.chain, found.objective, law.Kp, found.modes, found.loop == "continuous"))
+    if found.loop == "continuous" and not judge.holds(law):
+        return math.inf
+    return float(judge.score(np.array([law.K1]), np.array([law.K2]))[0])
+
+
 def _first_that_holds(
-    judges: Iterable[Judge], arm: Arm, bounds: dict[str, Bounds], free: dict[str, bool], Kp: float
-) -> tuple[Judge, dict[str, Bounds], _Best]:
+    judges: Iterable[Worst], arm: Arm, bounds: dict[str, Bounds], free: dict[str, bool], Kp: float
+) -> tuple[Worst, dict[str, Bounds], _Best]:
     """The best gains by the first judge whose gains hold.  Raises ConvergenceError where those of none do."""
     lost = None
     for judge in judges:

@@ -9,8 +9,10 @@ modes as that takes; a model of few modes only says where to look.
     residual   root mean square of the root moment at the samples after the slew of the chain, M read as it says
 
 Poles of higher modes, which alias into the same angles, are told by where the open loop has them: a held torque moves a
-pole less the higher its mode.  They have to be stable and count no further.  So have all poles with every gain a
-quarter larger and smaller: the best damping of few modes often lies where a higher one is about to grow.
+pole less the higher its mode.  They have to be stable and count no further; where two poles are about as near, the one
+that has decayed more is taken for that of the higher mode, so that no damping is claimed that is not there.  All poles
+are stable with every gain a quarter larger and smaller, too: the best damping of few modes often lies where a higher
+one is about to grow.
 """
 
 from __future__ import annotations
@@ -46,17 +48,22 @@ REAL = 1e-9  # rad: a pole at a smaller angle is real
 SAMPLES_LEFT = 16  # of the record after the slew, where a period of the first mode has fewer
 AROUND = np.geomspace(1e-9, 0.5, 40)  # rad, to either side of the open loop's poles
 EVEN = 400  # points of the circle beside those
+ALIKE = 4.0  # of the least distance to an open-loop pole: as far off a pole may be its own too
 DIPS = 5  # lowest points of the circle that are refined
 
 
 @dataclass(frozen=True)
 @record
 class SampledJudge:
-    """What K1 and K2 are worth in a sampled loop of few modes, its Kp held; the K1 and K2 of `loop` do not matter."""
+    """What K1 and K2 are worth in a sampled loop of few modes, its Kp held; the K1 and K2 of `loop` do not matter.
+
+    `known` is the arm that the slew's references and feed-forward are made for.
+    """
 
     loop: SampledLoop
     objective: str
     modes: int
+    known: Arm
 
     def effort(self, K2: Bounds) -> Effort:
         """The grid is cheap but for the residual, which is simulated."""
@@ -155,7 +162,7 @@ class SampledJudge:
         arm, chain = self.loop.plant.arm, self.loop.chain
         T, rise = chain.sampling.period, chain.slew.rise_time
         left = max(2 * np.pi / first_frequency(arm), SAMPLES_LEFT * T)
-        task = scenario("slew", arm, chain, rise + left)
+        task = scenario("slew", self.known, chain, rise + left)
         fixed = task.feedforward + self.loop.gains.Kp * task.hub_angle
         return np.c_[fixed, task.hub_rate, task.rigid_moment], int(np.searchsorted(task.t, rise * (1 - 1e-12)))
 
@@ -182,13 +189,18 @@ def scaled(law: HubFeedback, share: float) -> HubFeedback:
     return HubFeedback(K1=share * law.K1, K2=share * law.K2, Kp=share * law.Kp)
 
 
-def sampled_judges(arm: Arm, chain: Chain, objective: str, Kp: float, modes: int) -> Iterator[SampledJudge]:
-    """Judges of 8 modes, of 16, ... up to as many as the loop has; without damping of as many as its verdict takes."""
+def sampled_judges(
+    arm: Arm, chain: Chain, objective: str, Kp: float, modes: int, known: Arm | None = None
+) -> Iterator[SampledJudge]:
+    """Judges of 8 modes, of 16, ... up to as many as the loop has; without damping of as many as its verdict takes.
+
+    `known`, if not the arm itself, is the one that slews are made for.
+    """
     law = HubFeedback(K1=1.0, K2=0.5 * arm.input_per_torque, Kp=Kp)
     most = UNDAMPED_MODES if arm.has_elastic_link else most_modes(arm, chain)
     count = most if arm.has_elastic_link else min(most, max(FEWEST_MODES, modes + FEWEST_MODES // 2))
     while True:
-        yield SampledJudge(sampled_loop(arm, law, chain, count=count), objective, modes)
+        yield SampledJudge(sampled_loop(arm, law, chain, count=count), objective, modes, known or arm)
         if count >= most:
             return
         count = min(2 * count, most)
@@ -202,15 +214,22 @@ def higher_poles(pulse: PulseTransfer, modes: int) -> list[complex]:
 
 
 def first_damping(z: Complex, higher: list[complex]) -> Real:
-    """The least damping ratio of the oscillating poles (gains, n), those nearest to the `higher` ones left out."""
-    z = np.where(z.imag >= 0, z, 0.0)  # one of each pair
-    rows = np.arange(len(z))
-    for own in higher:
-        z[rows, abs(z - own).argmin(axis=1)] = 0.0
+    """The least damping ratio of the oscillating poles (gains, n), those of the `higher` modes left out."""
+    z = np.where(of_first_modes(z, higher), z, 0.0)
     angle, seen = np.angle(z), z != 0
     s = np.log(np.where(seen, abs(z), 1.0)) + 1j * angle
     ratio = -s.real / np.where(seen, abs(s), 1.0)
     return np.asarray(np.where(seen & (angle > REAL), ratio, 1.0).min(axis=1))
+
+
+def of_first_modes(z: Complex, higher: list[complex]) -> NDArray[np.bool_]:
+    """Which poles (gains, n) are none of a higher mode: one of each pair, those about the `higher` ones left out."""
+    left, rows = z.imag >= 0, np.arange(len(z))
+    for own in higher:
+        gap = np.where(left, abs(z - own), np.inf)
+        near = left & (gap <= ALIKE * gap.min(axis=1, keepdims=True))
+        left[rows, np.where(near, abs(z), np.inf).argmin(axis=1)] = False
+    return np.asarray(left)
 
 
 def circle_angles(pulse: PulseTransfer) -> Real:

@@ -1,0 +1,121 @@
+"""One law for several arms: each held by a Galerkin model, none inside the box worse, and no other gains better."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tfarm
+from tests.shell import answer, run
+from tests.synthesis.held_loop import HeldLoop
+from tfarm import HubFeedback
+from tfarm.arm import Hub
+from tfarm.synthesis.arms import Box, varied, worst_inside
+from tfarm.synthesis.chosen import design
+from tfarm.synthesis.sampled import RESERVE, scaled
+from tfarm.synthesis.worst_case import WORSE
+
+LAB, T = tfarm.load("sasaki2012-lab"), 0.01
+SHORT = replace(LAB, link=replace(LAB.link, length=0.8 * LAB.length), name="short")
+MASSES = (0.1, 0.5)  # kg
+
+
+@pytest.fixture(scope="module")
+def found():
+    return design(LAB, K1=(0.1, 30.0), K2=(-0.6, 0.95), also=[SHORT], ranges={"payload.mass": MASSES})
+
+
+def test_every_arm_is_held_and_damped_as_by_another_model(found):
+    ends = [LAB.having(payload_mass=mass) for mass in MASSES]
+    for each, arm in zip(found.arms, (LAB, SHORT, *ends), strict=False):
+        held = HeldLoop(arm, T)
+        assert held.damping(found.law, 2) == pytest.approx(each.value, rel=1e-4)
+        # on the edge of the reserve a radius is 1, and the Ritz model's is right to 1e-6
+        assert max(held.radius(scaled(found.law, share)) for share in (1 / RESERVE, 1.0, RESERVE)) < 1 + 1e-6
+        assert each.sampled.is_stable
+        assert each.verdict.is_stable
+    assert found.value == min(each.value for each in found.arms)
+
+
+def test_no_arm_inside_the_box_is_worse(found):
+    for mass in np.linspace(*MASSES, 9)[1:-1]:
+        assert HeldLoop(LAB.having(payload_mass=mass), T).damping(found.law, 2) >= found.value * (1 - 2 * WORSE)
+
+
+def test_no_other_gains_serve_all_arms_better(found):
+    """Nor those that are best for one of them."""
+    alone = design(LAB, K1=(0.1, 30.0), K2=(-0.6, 0.95)).law
+    models = [HeldLoop(arm, T) for arm in (LAB, SHORT, *(LAB.having(payload_mass=mass) for mass in MASSES))]
+    rng = np.random.default_rng(4)
+    K1, K2 = found.law.K1 * rng.uniform(0.8, 1.2, 30), found.law.K2 + rng.uniform(-0.1, 0.1, 30)
+    for law in [alone, *(HubFeedback(K1=a, K2=b) for a, b in zip(K1, K2, strict=True))]:
+        shares = (1 / RESERVE, 1.0, RESERVE)
+        if all(model.radius(scaled(law, share)) < 1.0 for model in models for share in shares):
+            values = (model.damping(law, 2, 100) for model in models)
+            assert any(value <= found.value * (1 + 1e-3) for value in values)
+
+
+def test_a_worst_arm_in_the_middle_of_a_box_is_found():
+    """Its place is known: the badness is greatest there, and less at every corner."""
+    box = Box(LAB, {"payload.mass": (0.0, 1.0), "hub.friction": (0.01, 1.0)})
+
+    def badness(arm):
+        return -(((arm.payload.mass - 0.37) / 1.0) ** 2) - (np.log10(arm.hub.friction / 0.08) / 2) ** 2
+
+    worst, score, tried = worst_inside(box, badness)
+    assert worst.arm.payload.mass == pytest.approx(0.37, abs=0.1)
+    assert worst.arm.hub.friction == pytest.approx(0.08, rel=0.6)
+    assert score == badness(worst.arm) > max(badness(each.arm) for each in box.corners)
+    assert tried == 24 + 3 * 4
+
+
+def test_a_law_for_structures_serves_both_ends_too():
+    both = design(LAB, "margin", structure="PD", ranges={"payload.mass": MASSES}, Kp=5.0)
+    assert [each.numbers for each in both.arms[:3]] == [{}, {"payload.mass": 0.1}, {"payload.mass": 0.5}]
+    assert both.value == min(each.value for each in both.arms)
+    assert "no proof over the box" in both.worst_case.sentence(3)
+    for each in both.arms:
+        arm = varied(LAB, "payload.mass", each.numbers.get("payload.mass", 0.0))
+        assert HeldLoop(arm, T).radius(HubFeedback(Kp=5.0, K1=both.coefficients["K1"])) < 1.0
+
+
+def test_a_number_is_named_as_in_the_file_or_as_of_a_locus():
+    assert varied(LAB, "payload.mass", 0.2) == varied(LAB, "payload_mass", 0.2) == LAB.having(payload_mass=0.2)
+    assert varied(LAB, "hub.friction", 0.3).hub == Hub(inertia=LAB.hub.inertia, friction=0.3)
+    assert Box(LAB, {"link.damping": (1e-5, 1e-3)}).at(np.array([0.5])).arm.damping == pytest.approx(1e-4)
+    assert Box(LAB, {"payload.mass": (0.1, 0.5)}).at(np.array([0.5])).arm.payload.mass == pytest.approx(0.3)
+
+
+def test_the_answer_names_every_arm(capsys):
+    given = ("--K1", "0.1,2", "--K2=-0.1,0.1", "--modes", "1", "--range", "hub.friction=0.0,0.2")
+    code, out, err = run(capsys, "design", "sasaki2012-lab", *given)
+    assert (code, err) == (0, "")
+    assert "hub.friction = 0.2" in out
+    assert "no proof over the box" in out
+
+
+def test_of_one_arm_the_answer_says_as_much(capsys):
+    found = answer(capsys, "design", "sasaki2012-lab", "--K1", "0.1,2", "--K2=-0.1,0.1")
+    (own,) = found["arms"]
+    assert (own["name"], own["value"]) == ("sasaki2012-lab", found["value"])
+    assert own["sampled"] == found["sampled"]
+    assert (found["worst_arm"], found["arms_tried_inside"], found["worst_case_in_words"]) == ("sasaki2012-lab", 0, "")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--range", "payload.mas=0.1,0.5"], "payload.mass"),
+        (["--range", "payload.mass=0.5,0.1"], "the lower first"),
+        (["--range", "payload.mass=-1,0.1"], "a payload mass is zero, positive"),
+        (["--range", "motor.resistance=1,2"], "known are"),
+        ([f"--range=payload.{n}=0.1,0.2" for n in ("mass", "inertia", "offset")] + ["--range=hub.radius=0,1",
+          "--range=hub.friction=0,1"], "at most 4"),
+        (["--also", "quanser-srvms"], "no such preset"),
+    ],
+)  # fmt: skip
+def test_ranges_that_are_none_are_one_line(capsys, arguments, told):
+    code, out, err = run(capsys, "design", "sasaki2012-lab", *arguments)
+    assert (code, out) == (2, "")
+    assert told in err
+    assert err.count("\n") == 1

@@ -1,0 +1,105 @@
+"""Gains judged on several arms at once: by the arm on which they are worst."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import zip_longest
+from typing import Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import HubFeedback
+from tfarm.dsp.brief import SampledBrief
+from tfarm.loop.law_loop import LawLoop
+from tfarm.loop.stability import Stability
+from tfarm.records import record
+from tfarm.synthesis.search import Axis, Bounds, Effort, Score
+
+Real = NDArray[np.float64]
+_One = TypeVar("_One")
+
+LEAST_IS_BEST = ("residual", "cost", "sensitivity")  # of the objectives
+
+
+@dataclass(frozen=True)
+@record
+class OnArm:
+    """What a law is on one of the arms it was chosen for: its objective's `value`, and both verdicts.
+
+    `numbers` are those that a box gave the arm.
+    """
+
+    name: str
+    numbers: dict[str, float]
+    value: float
+    verdict: Stability | Stability[LawLoop]
+    sampled: SampledBrief
+
+
+class Judge(Protocol):
+    """What gains are worth in a loop, Kp held."""
+
+    def effort(self, K2: Bounds) -> Effort:
+        """How fine a grid its objective needs."""
+
+    def landscape(self, axes: tuple[Axis, Axis], effort: Effort) -> tuple[Real, Score]:
+        """Scores over the grid, inf where not stable, and the score to refine with."""
+
+    def score(self, K1: Real, K2: Real) -> Real:
+        """What is minimised."""
+
+    def holds(self, law: HubFeedback) -> bool:
+        """Whether the loop is stable by the verdict of its kind."""
+
+    def value(self, law: HubFeedback, score: float) -> float:
+        """The objective of a law of that score."""
+
+
+@dataclass(frozen=True)
+class Worst:
+    """The judges of several arms as one: the largest of their scores."""
+
+    judges: tuple[Judge, ...]
+
+    def effort(self, K2: Bounds) -> Effort:
+        """The finest grid that any of them asks for."""
+        return Effort(*(max(each) for each in zip(*(judge.effort(K2) for judge in self.judges), strict=True)))
+
+    def landscape(self, axes: tuple[Axis, Axis], effort: Effort) -> tuple[Real, Score]:
+        """The largest scores over the grid, inf where one arm is not stable, and the score to refine with."""
+        values, scores = zip(*(judge.landscape(axes, effort) for judge in self.judges), strict=True)
+        return np.max(values, axis=0), lambda K1, K2: np.max([score(K1, K2) for score in scores], axis=0)
+
+    def score(self, K1: Real, K2: Real) -> Real:
+        """What is minimised: the largest score."""
+        return np.asarray(np.max([judge.score(K1, K2) for judge in self.judges], axis=0))
+
+    def holds(self, law: HubFeedback) -> bool:
+        """Whether the loop of every arm is stable by the verdict of its kind."""
+        return all(judge.holds(law) for judge in self.judges)
+
+    def value(self, law: HubFeedback, score: float) -> float:
+        """The objective of a law of that score, on the arm that has it."""
+        K1, K2 = np.array([law.K1]), np.array([law.K2])
+        worst = max(self.judges, key=lambda judge: float(judge.score(K1, K2)[0]))
+        return worst.value(law, score)
+
+    def values(self, law: HubFeedback) -> list[float]:
+        """The objective of a law on each arm."""
+        K1, K2 = np.array([law.K1]), np.array([law.K2])
+        return [judge.value(law, float(judge.score(K1, K2)[0])) for judge in self.judges]
+
+
+def worst_value(objective: str, values: Sequence[float]) -> float:
+    """The worst of the values of an objective."""
+    return max(values) if objective in LEAST_IS_BEST else min(values)
+
+
+def in_step(each: Sequence[Iterable[_One]]) -> Iterator[tuple[_One, ...]]:
+    """The first of all, the second of all, ...; one that has ended stays at its last."""
+    last: list[_One | None] = [None] * len(each)
+    for row in zip_longest(*each):
+        last = [old if new is None else new for old, new in zip(last, row, strict=True)]
+        yield tuple(one for one in last if one is not None)
