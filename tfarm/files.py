@@ -7,6 +7,7 @@ each temporary file or folder is locked as long as its writer lives, so a lock t
 from __future__ import annotations
 
 import errno
+import io
 import os
 import re
 import shutil
@@ -16,6 +17,7 @@ import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any, cast
 
 from tfarm.errors import ParameterError
 
@@ -48,6 +50,22 @@ def read_file(path: str | os.PathLike[str], most: int, *, key: str, what: str) -
         size = max(len(data), status.st_size)
         raise ParameterError(key="size in bytes", value=size, remedy=f"{what} of at most {most} is read", file=path)
     return data
+
+
+def read_mat(path: str | os.PathLike[str], most: int, *, key: str) -> tuple[dict[str, Any], bytes]:
+    """The variables of a .mat file (up to version 7.2) by name, and its bytes.
+
+    Raises ParameterError, naming `key`, where there is none or it cannot be read.
+    """
+    from scipy.io import loadmat
+
+    data = read_file(path, most, key=key, what="a .mat file")
+    try:
+        found = loadmat(cast("Any", io.BytesIO(data)), squeeze_me=False, struct_as_record=True)
+    except Exception as error:  # a parser that is not ours, on data from outside: it may raise anything
+        remedy = f"no .mat file that can be read (up to version 7.2): {str(error)[:80]}"
+        raise ParameterError(key=key, value=os.fspath(path), remedy=remedy) from None
+    return {name: value for name, value in found.items() if not name.startswith("__")}, data
 
 
 def write_file(path: Path, content: bytes, *, key: str) -> None:

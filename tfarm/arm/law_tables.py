@@ -15,18 +15,17 @@ or `matrices = "file.mat"` with A, B, C, D and `signals = [...]`, a name for eac
 
 from __future__ import annotations
 
-import io
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from tfarm.arm.law import Law
 from tfarm.arm.reading import load_tables
 from tfarm.errors import MISSING, ParameterError, did_you_mean
-from tfarm.files import read_file
+from tfarm.files import read_mat
 
 LAW = "law"
 MOST_BYTES = 16 * 1024 * 1024  # of a .mat file
@@ -124,17 +123,10 @@ def _entries(signals: Mapping[str, Any]) -> dict[str, Any]:
 
 def _of_file(head: LawTable, folder: Path, common: dict[str, Any]) -> Law:
     """The law of a .mat file."""
-    from scipy.io import loadmat
-
     assert head.matrices is not None
     if head.signals is None:
         raise ParameterError(key="signals", value=MISSING, remedy="name a signal for each column of B")
-    data = read_file(folder / head.matrices, MOST_BYTES, key="matrices", what="a .mat file")
-    try:
-        found = loadmat(cast("Any", io.BytesIO(data)), squeeze_me=False, struct_as_record=True)
-    except Exception as error:  # a parser that is not ours, on data from outside: it may raise anything
-        remedy = f"no .mat file that can be read (up to version 7.2): {str(error)[:80]}"
-        raise ParameterError(key="matrices", value=head.matrices, remedy=remedy) from None
+    found, _ = read_mat(folder / head.matrices, MOST_BYTES, key="matrices")
     A, B, C, D = _four(found, head)
     if head.scales is not None:
         if len(head.scales) != len(head.signals):
@@ -158,7 +150,7 @@ def _four(found: Mapping[str, Any], head: LawTable) -> list[Any]:
         names = tuple(found)
     missing = [name for name in "ABCD" if name not in names]
     if missing:
-        remedy = f"holds no {', '.join(missing)}; it has {', '.join(n for n in names if not n.startswith('__'))}"
+        remedy = f"holds no {', '.join(missing)}; it has {', '.join(names)}"
         raise ParameterError(key="matrices", value=head.matrices, remedy=f"{remedy} (system = names a structure)")
     try:
         return [np.atleast_2d(np.asarray(holder[name], dtype=float)) for name in "ABCD"]

@@ -1,0 +1,126 @@
+"""Frequency responses of records: against scipy, a known filter, and the scatter of Bendat and Piersol."""
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from tfarm.errors import ParameterError
+from tfarm.fit.recording import Recording
+from tfarm.fit.spectra import frequency_response, independent_averages
+
+T = 0.01
+B, A = [0.0, 0.5, 0.2], [1.0, -0.8, 0.4]  # rings for some ten samples: segments of a hundred leave little of it out
+
+
+def recorded(x, y, period=T):
+    signals = {"hub_torque": np.asarray(x, float), "tip_acceleration": np.asarray(y, float)}
+    return Recording(signals=signals, start=0.0, period=period, jitter=0.0, source="made", digest="")
+
+
+def estimate(x, y, **options):
+    return frequency_response(recorded(x, y), "tip_acceleration", "hub_torque", **options)
+
+
+def truth(omega):
+    return signal.freqz(B, A, worN=omega * T)[1]
+
+
+def noisy(rng, n, on_output=0.0, on_input=0.0):
+    """White excitation, the filter's answer, and white noise of these deviations on both as they are measured."""
+    x = rng.standard_normal(n)
+    y = signal.lfilter(B, A, x)
+    return x + on_input * rng.standard_normal(n), y + on_output * rng.standard_normal(n)
+
+
+@pytest.mark.parametrize(("window", "overlap"), [("hann", 0.5), ("hann", 0.75), ("boxcar", 0.0)])
+def test_spectra_are_those_of_scipy(window, overlap):
+    x, y = noisy(np.random.default_rng(1), 4096, 0.3)
+    found = estimate(x, y, window=window, segment=256 * T, overlap=overlap)
+    how = {"fs": 1 / T, "window": window, "nperseg": 256, "noverlap": round(256 * overlap)}
+    theirs = signal.csd(x, y, **how)[1] / signal.welch(x, **how)[1]
+    lines = slice(1, 128)
+    assert found.measured.omega == pytest.approx(2 * np.pi * signal.welch(x, **how)[0][lines], rel=1e-14)
+    assert found.measured.values == pytest.approx(theirs[lines], rel=1e-11)
+    assert found.measured.coherence == pytest.approx(signal.coherence(x, y, **how)[1][lines], rel=1e-11)
+    assert (found.resolution, found.segments) == (
+        pytest.approx(1 / 2.56),
+        1 + (4096 - 256) // round(256 * (1 - overlap)),
+    )
+
+
+def test_a_sine_swept_again_and_again_is_answered_exactly_by_segments_of_a_sweep():
+    """Nothing leaks from a period: the response of the filter, to rounding over the smallest line's power."""
+    n = 512
+    sweep = signal.chirp(np.arange(n) * T, 0.2, n * T, 45.0)
+    x = np.tile(sweep, 12)
+    y = signal.lfilter(B, A, x)
+    found = estimate(x[4 * n :], y[4 * n :], window="boxcar", segment=n * T)  # once the filter has settled: 0.63^2048
+    assert found.segments == 8
+    assert found.independent == pytest.approx(8, rel=1e-15)
+    assert found.measured.values == pytest.approx(truth(found.measured.omega), rel=1e-9)
+
+
+@pytest.mark.parametrize(("window", "overlap"), [("hann", 0.5), ("hann", 0.75), ("boxcar", 0.0)])
+def test_bias_and_scatter_are_those_of_the_formula(window, overlap):
+    """300 records, 33 lines, as much noise as excitation: H/H0 - 1 scatters in each part by sqrt((1 - g^2)/(2 N g^2)).
+
+    And by N/(N - 1) more in its square, as S_xx is an average of N too.  The pooled deviation is known to 1 % (some
+    4000 numbers, as neighbouring lines share noise), the mean of a line to 1/sqrt(300); 4.5 of that for the worst.
+    """
+    rng, n, size = np.random.default_rng(2), 2048, 128
+    away = []
+    for _ in range(300):
+        found = estimate(*noisy(rng, n, 1.0), window=window, segment=size * T, overlap=overlap)
+        lines = slice(2, 35)
+        H0 = truth(found.measured.omega)[lines]
+        g = abs(H0) ** 2 / (abs(H0) ** 2 + 1.0)  # true coherence: excitation and noise are white, of power 1
+        away.append((found.measured.values[lines] / H0 - 1) / np.sqrt((1 - g) / (2 * found.independent * g)))
+    away = np.array(away)
+    pooled, N = np.sqrt((abs(away) ** 2).mean() / 2), found.independent
+    assert pooled == pytest.approx(np.sqrt(N / (N - 1)), abs=0.025)
+    means = away.mean(axis=0)
+    assert abs(np.r_[means.real, means.imag]).max() < 4.5 / np.sqrt(300)
+    assert found.measured.averages == int(found.independent)
+
+
+def test_overlapped_segments_are_worth_fewer_averages():
+    """Hann at one half: rho(1) = 1/36 (the integral of sin^2 cos^2 over that of sin^4, squared: (1/6)^2)."""
+    w = np.hanning(1025)[:-1]
+    K = 50
+    assert independent_averages(w, 512, K) == pytest.approx(K / (1 + 2 * (1 - 1 / K) / 36), rel=1e-9)
+    assert independent_averages(np.ones(64), 64, 7) == 7
+
+
+def test_noise_on_the_input_lowers_h1_and_not_h2():
+    """H1 by 1/(1 + N/S), here 1/1.25; H2 by nothing, and Hv by the root of that."""
+    x, y = noisy(np.random.default_rng(3), 400_000, 0.0, 0.5)
+    found = {kind: estimate(x, y, estimator=kind, segment=128 * T).measured for kind in ("H1", "H2", "Hv")}
+    lines = slice(2, 30)
+    for kind, expected in (("H1", 0.8), ("H2", 1.0), ("Hv", np.sqrt(0.8))):
+        ratio = found[kind].values[lines] / truth(found[kind].omega)[lines]
+        assert ratio.mean() == pytest.approx(expected, abs=0.006)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"segment": 50.0}, "--segment = 50.0: seconds between 0.08 and 5"),
+        ({"segment": 0.01}, "--segment = 0.01"),
+        ({"overlap": 1.0}, "--overlap = 1.0"),
+        ({"estimator": "H3"}, "--estimator = 'H3'"),
+        ({"window": "han"}, 'did you mean "hann"'),
+        ({"columns": ("acc", "hub_torque")}, "--output = 'acc'"),
+    ],
+)
+def test_what_cannot_be_estimated_is_said(options, said):
+    x, y = noisy(np.random.default_rng(4), 1000)
+    with pytest.raises(ParameterError) as error:
+        estimate(x, y, **options)
+    assert said in str(error.value)
+
+
+@pytest.mark.parametrize(("x", "y", "said"), [(0.0, 1.0, "'hub_torque': does not move"), (1.0, 0.0, "'tip_acc")])
+def test_a_signal_that_does_not_move_is_named(x, y, said):
+    drawn = np.random.default_rng(5).standard_normal(400)
+    with pytest.raises(ParameterError, match=said):
+        estimate(x * drawn, y * drawn)

@@ -1,0 +1,146 @@
+"""Records over time: a column of times and named signals, from CSV or a .mat file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.errors import MISSING, ParameterError, did_you_mean
+from tfarm.files import read_mat
+from tfarm.records import record
+
+from .sheets import MOST_BYTES, digest_of, read_sheet
+
+Real = NDArray[np.float64]
+
+TIMES = ("t", "time")  # what the column of times is called
+JITTER = 0.1  # of the period: a sample further off its place has been dropped or doubled, or the clock is uneven
+SAID = 1e-3  # of the period: what a time written in few digits is off; more is said
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+@record
+class Recording:
+    """Signals (n,) by name, sampled every `period` [s] from `start` [s] on.
+
+    `jitter` is how far the times are from even ones, as a share of the period.
+    """
+
+    signals: dict[str, Real]
+    start: float
+    period: float
+    jitter: float
+    source: str
+    digest: str
+
+    @property
+    def count(self) -> int:
+        """Samples of each signal."""
+        return next(iter(self.signals.values())).size
+
+    @property
+    def times(self) -> Real:
+        """The times [s] of the samples (n,)."""
+        return np.asarray(self.start + self.period * np.arange(self.count))
+
+    def signal(self, name: str, key: str) -> Real:
+        """The signal of that name.  Raises ParameterError, naming `key`, with the nearest one there is."""
+        if name not in self.signals:
+            raise ParameterError(key=key, value=name, remedy=did_you_mean(name, self.signals), file=self.source)
+        return self.signals[name]
+
+    @property
+    def said(self) -> str:
+        """What is to be said of its clock; nothing where the samples are even."""
+        return f"sampled unevenly, by up to {100 * self.jitter:.2g} % of the period" if self.jitter > SAID else ""
+
+
+def read_recording(path: str | os.PathLike[str]) -> Recording:
+    """The record of a CSV file with a column t [s], or of a .mat file with a vector t (or time).
+
+    A matrix of a .mat file with a row a sample is one signal a column: "X.1", "X.2", ...  Raises ParameterError, naming
+    the file, where there are no times, no signals, or samples that are not even.
+    """
+    name = os.fspath(path)
+    read, digest = _read_mat(name) if name.lower().endswith(".mat") else _read_text(name)
+    try:
+        columns = read()
+        given = [each for each in TIMES if each in columns]
+        if not given:
+            remedy = f"a record has a column t, in seconds; this one has {', '.join(columns) or 'none'}"
+            raise ParameterError(key="t", value=MISSING, remedy=remedy)
+        start, period, jitter = _clock(columns.pop(given[0]))
+        if not columns:
+            raise ParameterError(key="signals", value=MISSING, remedy="a column of times and nothing beside it")
+    except ParameterError as error:
+        raise error.in_file(name) from None
+    return Recording(signals=columns, start=start, period=period, jitter=jitter, source=name, digest=digest)
+
+
+def _read_mat(name: str) -> tuple[Callable[[], dict[str, Real]], str]:
+    found, data = read_mat(name, MOST_BYTES, key="record")
+    return lambda: _columns(found), digest_of(data)
+
+
+def _read_text(name: str) -> tuple[Callable[[], dict[str, Real]], str]:
+    sheet = read_sheet(name, key="record")
+
+    def columns() -> dict[str, Real]:
+        _check_unit(dict(zip(sheet.names, sheet.units, strict=True)))
+        return dict(zip(sheet.names, sheet.values, strict=True))
+
+    return columns, sheet.digest
+
+
+def _check_unit(units: dict[str, str]) -> None:
+    for name in TIMES:
+        if units.get(name, "") not in ("", "s"):
+            raise ParameterError(key=f"unit of {name}", value=units[name], remedy="times are in seconds")
+
+
+def _columns(found: dict[str, Any]) -> dict[str, Real]:
+    """Vectors and the columns of matrices that have as many entries as there are times."""
+    real = {
+        name: np.asarray(value, dtype=float)
+        for name, value in found.items()
+        if getattr(value, "ndim", 0) == 2 and value.dtype.kind in "biuf"
+    }
+    times = next((real[each] for each in TIMES if each in real), None)
+    if times is None:
+        return dict.fromkeys(real, np.empty(0))
+    columns: dict[str, Real] = {}
+    for name, value in real.items():
+        if 1 in value.shape and value.size == times.size:
+            columns[name] = value.ravel()
+        elif value.shape[0] == times.size:
+            columns |= {f"{name}.{number}": column for number, column in enumerate(value.T, start=1)}
+    for name, column in columns.items():
+        if not np.isfinite(column).all():
+            at = int(np.flatnonzero(~np.isfinite(column))[0])
+            raise ParameterError(key=f"{name}, sample {at + 1}", value=float(column[at]), remedy="no finite number")
+    return columns
+
+
+def _clock(times: Real) -> tuple[float, float, float]:
+    """Start and period [s] of even samples, and the largest distance from them as a share of the period."""
+    if times.size < 8:
+        raise ParameterError(key="samples", value=times.size, remedy="a record has 8 samples at least")
+    steps = np.diff(times)
+    back = np.flatnonzero(steps <= 0)
+    if back.size:
+        at = int(back[0]) + 1
+        remedy = "is not later than the sample before; sort the rows, and leave doubled ones out"
+        raise ParameterError(key=f"t of sample {at + 1}", value=float(times[at]), remedy=remedy)
+    period = float((times[-1] - times[0]) / (times.size - 1))
+    usual = float(np.median(steps))
+    gap = int(np.argmax(abs(steps - usual)))
+    jitter = float(abs(times - times[0] - period * np.arange(times.size)).max() / period)
+    if abs(steps[gap] - usual) > JITTER * usual or jitter > JITTER:
+        remedy = f"{steps[gap]:.6g} s after the one before, where {usual:.6g} s is usual: samples have to be even"
+        raise ParameterError(key=f"t of sample {gap + 2}", value=float(times[gap + 1]), remedy=remedy)
+    return float(times[0]), period, jitter

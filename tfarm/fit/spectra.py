@@ -1,0 +1,176 @@
+"""A frequency response from a record over time: averaged cross-spectra, with coherence and what it is an average of.
+
+The record is cut into K segments of n samples, each begun S samples after the one before, less its mean, times a window
+w; their transforms X, Y give  S_xx = mean |X|^2,  S_xy = mean conj(X) Y,  S_yy = mean |Y|^2  (Welch 1967), and
+
+    H1 = S_xy/S_xx,    H2 = S_yy/conj(S_xy),    coherence  g^2 = |S_xy|^2/(S_xx S_yy).
+
+H1 is right where the noise is on the output, H2 where it is on the input; Hv, from the largest eigenvector of the
+matrix of the spectra, each scaled to the same noise, lies between them: |Hv|^2 = |H1| |H2|.  H1 is low by the factor
+1/(1 + N_xx/S_xx) where the input has noise N_xx.  Real and imaginary part each scatter by |H| sqrt((1 - g^2)/(2 N g^2))
+(Bendat and Piersol 2010, section 9.2), where N counts independent averages.  Overlapped segments are not: by Welch
+
+    N = K/(1 + 2 sum_j (1 - j/K) rho(j)),    rho(j) = (sum_i w_i w_{i + j S})^2/(sum_i w_i^2)^2.
+
+Random excitation wants a window that tapers ("hann"); a sine that is swept again and again wants segments as long as
+its sweep, "boxcar" and no overlap, and no window leaks.  A resonance narrower than 1/T of the segment is flattened.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+from tfarm.errors import ParameterError, did_you_mean
+from tfarm.records import record
+
+from .data import Measured
+from .reading import check_signal
+from .recording import Recording
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Estimator = Literal["H1", "H2", "Hv"]
+Window = Literal["hann", "boxcar"]
+
+SEGMENTS = 15  # of a record whose segments are not given: 8 lengths, half overlapped
+LEAST_POWER = 1e-24  # of the largest line of the input: below it there are rounding errors alone
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+@record
+class Estimate:
+    """A response with what it was estimated by: `segment` [s] each, `segments` of them, `overlap` as a share of one.
+
+    `independent` averages are in them, `resolution` [Hz] is 1/segment, `clock` says what is wrong with the times.
+    """
+
+    measured: Measured
+    estimator: Estimator
+    window: Window
+    segment: float
+    segments: int
+    overlap: float
+    independent: float
+    clock: str
+
+    @property
+    def resolution(self) -> float:
+        """The distance of the lines [Hz]."""
+        return 1.0 / self.segment
+
+
+def frequency_response(
+    recording: Recording,
+    output: str,
+    input: str,
+    *,
+    columns: tuple[str, str] | None = None,
+    estimator: str = "H1",
+    window: str = "hann",
+    segment: float | None = None,
+    overlap: float | None = None,
+) -> Estimate:
+    """The response `output`/`input` of a record, from its signals of these names or of those in `columns`.
+
+    `segment` [s] is by default an eighth of the record, `overlap` half of it with a window that tapers, else none.
+    Raises ParameterError for signals that are not there, for a segment that leaves no two of them, and for an input
+    that does not move.
+    """
+    check_signal(output, "--output")
+    check_signal(input, "--input")
+    names = columns or (output, input)
+    y, x = recording.signal(names[0], "--output"), recording.signal(names[1], "--input")
+    kind, taper = _one_of("--estimator", estimator, Estimator), _one_of("--window", window, Window)
+    size, step = _cut(recording, segment, (0.5 if taper == "hann" else 0.0) if overlap is None else overlap)
+    w = np.hanning(size + 1)[:-1] if taper == "hann" else np.ones(size)
+    Sxx, Sxy, Syy = cross_spectra(x, y, w, step)
+    lines = np.arange(1, (size + 1) // 2)  # without 0 and the last one, which are real
+    kept = lines[Sxx[lines] > LEAST_POWER * Sxx.max()]
+    if not kept.size or not Syy.any():
+        still = names[1] if not kept.size else names[0]
+        raise ParameterError(key="record", value=still, remedy="does not move", file=recording.source)
+    Sxx, Sxy, Syy = Sxx[kept], Sxy[kept], Syy[kept]
+    count = 1 + (recording.count - size) // step
+    averages = independent_averages(w, step, count)
+    return Estimate(
+        measured=Measured(
+            output=output,
+            input=input,
+            omega=2 * np.pi * kept / (size * recording.period),
+            values=_response(kind, Sxx, Sxy, Syy),
+            coherence=_coherence(Sxx, Sxy, Syy),
+            averages=max(1, math.floor(averages)),
+            source=recording.source,
+            digest=recording.digest,
+        ),
+        estimator=kind,
+        window=taper,
+        segment=size * recording.period,
+        segments=count,
+        overlap=1.0 - step / size,
+        independent=averages,
+        clock=recording.said,
+    )
+
+
+def cross_spectra(x: Real, y: Real, w: Real, step: int) -> tuple[Real, Complex, Real]:
+    """S_xx, S_xy and S_yy (lines,) of segments as long as w, begun `step` samples apart; up to a common factor."""
+    X, Y = (_transforms(each, w, step) for each in (x, y))
+    return (abs(X) ** 2).mean(0), (X.conj() * Y).mean(0), (abs(Y) ** 2).mean(0)
+
+
+def independent_averages(w: Real, step: int, count: int) -> float:
+    """How many independent averages so many overlapped segments are worth (Welch 1967)."""
+    power = float(w @ w)
+    shared = 0.0
+    for j in range(1, min(count, math.ceil(w.size / step))):
+        rho = (float(w[: w.size - j * step] @ w[j * step :]) / power) ** 2
+        shared += 2 * (1 - j / count) * rho
+    return count / (1 + shared)
+
+
+def _transforms(x: Real, w: Real, step: int) -> Complex:
+    segments = sliding_window_view(x, w.size)[::step]
+    return np.asarray(np.fft.rfft((segments - segments.mean(axis=1, keepdims=True)) * w, axis=1))
+
+
+def _response(kind: Estimator, Sxx: Real, Sxy: Complex, Syy: Real) -> Complex:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        phase = np.where(Sxy == 0, 1.0, Sxy / abs(Sxy))
+        sizes = {"H1": abs(Sxy) / Sxx, "H2": np.where(Sxy == 0, 0.0, Syy / abs(Sxy)), "Hv": np.sqrt(Syy / Sxx)}
+    return np.asarray(sizes[kind] * phase, dtype=complex)
+
+
+def _coherence(Sxx: Real, Sxy: Complex, Syy: Real) -> Real:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found = np.where(Syy > 0, abs(Sxy) ** 2 / (Sxx * Syy), 0.0)
+    return np.clip(found, 0.0, 1.0)
+
+
+def _cut(recording: Recording, segment: float | None, overlap: float) -> tuple[int, int]:
+    """Samples of a segment, and from one to the next."""
+    if not 0 <= overlap < 1:
+        raise ParameterError(
+            key="--overlap", value=overlap, remedy="a share of a segment from 0 to below 1, such as 0.5"
+        )
+    whole = recording.count * recording.period
+    wanted = 2 * whole / (SEGMENTS + 1) if segment is None else segment
+    if not 8 * recording.period <= wanted <= whole / 2 * (1 + 1e-9):
+        remedy = (
+            f"seconds between {8 * recording.period:.4g} and {whole / 2:.4g}, half the record: one average says nothing"
+        )
+        raise ParameterError(key="--segment", value=wanted, remedy=remedy)
+    size = min(round(wanted / recording.period), recording.count // 2)
+    return size, max(1, round(size * (1 - overlap)))
+
+
+def _one_of(key: str, word: str, kind: Any) -> Any:
+    if word not in get_args(kind):
+        raise ParameterError(key=key, value=word, remedy=did_you_mean(word, get_args(kind)))
+    return word
