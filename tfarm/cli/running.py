@@ -12,6 +12,7 @@ from tfarm.cli import (  # noqa: F401  each adds its verbs to the application
     commands,
     control,
     loops,
+    measuring,
     reduction,
     sampling,
     studies,
