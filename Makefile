@@ -4,6 +4,7 @@ PYTHON ?= python3
 ARM ?= sasaki2012-lab
 
 BIN := .venv/bin
+RIG := tests/data/quanser-2dsfl
 INSTALLED := .venv/.installed
 BENCH_INSTALLED := .venv/.bench
 PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check install -c requirements.lock
@@ -43,8 +44,9 @@ help: ## list these verbs
 
 install: $(INSTALLED) ## set up .venv with the locked versions and the tfarm command
 
-reports: $(INSTALLED) ## write every preset's report to reports/index.html
+reports: $(INSTALLED) ## write every preset's report, and that of a real rig's controllers, to reports/index.html
 	@$(BIN)/tfarm report --out reports
+	@$(BIN)/tfarm report $(RIG)/rig.toml --law $(RIG)/lqg.toml --law $(RIG)/hinf.toml --only sampled --out reports
 
 modes: $(INSTALLED) ## write one arm's modal tables and shapes (ARM=name-or-file)
 	@$(BIN)/tfarm report '$(ARM)' --only modes --out reports

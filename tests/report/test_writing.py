@@ -27,6 +27,7 @@ from tfarm.dsp import Chain, load_chain
 from tfarm.report import card as card_room
 from tfarm.report import readme_pictures, write, writing
 from tfarm.report.card import written_cards
+from tfarm.report.given_laws import Subject
 from tfarm.report.page import index_page
 from tfarm.report.paper import is_from_paper, paper_section
 from tfarm.report.sections import Section
@@ -116,7 +117,7 @@ def test_another_process_with_other_hashes_writes_the_same_bytes(pages, audit_ro
     made.mkdir()
     for i, piece in enumerate(writing.PIECES):
         if piece.anchor in ("margins-map", "bode-root-moment", "margins", "margins-nyquist"):
-            writing._make((ARM, Chain()), i, made)
+            writing._make(Subject(ARM, Chain()), i, made)
     there = files_of(pages / NAME)
     pictures = ("map", "bode-root-moment", "nyquist")
     assert {f"{picture}.{kind}" for picture in pictures for kind in ("svg", "png", "pdf")} <= set(files_of(made))
@@ -328,7 +329,7 @@ def test_a_name_too_long_for_a_folder_is_refused_too(tmp_path):
 
 @pytest.mark.usefixtures("audited")
 def test_work_that_fails_leaves_nothing(tmp_path, monkeypatch):
-    def fail(arm, folder):
+    def fail(_, folder, *__):
         (folder / "half.svg").write_text("half")
         raise tfarm.ConvergenceError("stopped short", None, None)
 
@@ -340,7 +341,7 @@ def test_work_that_fails_leaves_nothing(tmp_path, monkeypatch):
 
 
 def test_work_that_fails_leaves_an_earlier_report_as_it_was(pages, tmp_path, monkeypatch):
-    def fail(arm, folder):
+    def fail(*_):
         raise tfarm.ConvergenceError("stopped short", None, None)
 
     before, out = files_of(pages), tmp_path / "out"

@@ -156,11 +156,11 @@ class StateSpace:
         bordered = np.zeros((flat.size, n + 1, n + 1), complex)
         bordered[:, :n, :n] = flat[:, None, None] * np.eye(n) - self.A
         bordered[:, n, :n] = -self.C
-        found = []
-        for j in range(self.signals):
+        found = np.zeros((self.signals, *np.shape(s)), complex)
+        for j in np.flatnonzero(self.B.any(axis=0) | self.D.any(axis=0)):  # of an empty column it is 0
             bordered[:, :n, n], bordered[:, n, n] = self.B[:, j], self.D[0, j]
-            found.append(np.linalg.det(bordered).reshape(np.shape(s)))
-        return np.array(found)
+            found[j] = np.linalg.det(bordered).reshape(np.shape(s))
+        return found
 
     def times(self, factor: float) -> StateSpace:
         """Itself times a number."""

@@ -23,6 +23,8 @@ from tfarm.cli.app import (
     right_digits,
     whole,
 )
+from tfarm.cli.inputs import K1, K2, Kp, LawFiles, laws_of
+from tfarm.cli.sampling import Delay, DspFile, Period, chain_of
 from tfarm.errors import one_line
 
 if TYPE_CHECKING:
@@ -124,23 +126,33 @@ def report(
     ] = None,
     out: Annotated[Path, typer.Option("--out", help="the folder to write to")] = Path("reports"),
     only: Annotated[str | None, typer.Option("--only", help="one page: bode, modes, margins, locus ...")] = None,
+    k1: K1 = None,
+    k2: K2 = None,
+    kp: Kp = None,
+    law: LawFiles = None,
+    period: Period = None,
+    delay_samples: Delay = None,
+    dsp: DspFile = None,
     theory: TheoryName = None,
 ) -> None:
-    """Write pages with pictures, tables and data: open index.html in a browser."""
+    """Write pages with pictures, tables and data: open index.html in a browser.
+
+    With gains, or laws, or a [law] in an arm's file, the pages are about these; else about the default gains.
+    """
     import tfarm
 
     names = arms or tfarm.presets()
     subjects = [load_arm(name, theory) for name in names]
-    from tfarm.dsp.reading import load_chain
-
-    chains = [load_chain(name) for name in names]
+    chains = [chain_of(dsp or name, period, delay_samples) for name in names]
+    gains = {"K1": k1, "K2": k2, "Kp": kp}
+    laws = [laws_of(arm, name, gains, law or []) for arm, name in zip(subjects, names, strict=True)]
     from tfarm.cli.tables import progress
     from tfarm.report import write
 
     left_out: list[str] = []
     with progress() as advance:
         pages = None if only is None else (only,)
-        page = write(subjects, out, chains=chains, only=pages, progress=advance, notice=left_out.append)
+        page = write(subjects, out, chains=chains, laws=laws, only=pages, progress=advance, notice=left_out.append)
     for text in left_out:
         print(f"tfarm: {one_line(text, 1000)}", file=sys.stderr)
     print(page)

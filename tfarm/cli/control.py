@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tfarm.cli.app import ArmName, Json, app, give, load_arm, plain_number, tell, whole
-from tfarm.cli.inputs import Given, Kp, LawFile, law_of, under_a_law
+from tfarm.cli.inputs import FixedKp, Given, LawFile, law_of, under_a_law
 from tfarm.cli.sampling import Delay, DspFile, Period, chain_of
 from tfarm.errors import ParameterError
 
@@ -93,7 +93,7 @@ def gain_map(
     arm: ArmName,
     k1: Annotated[str | None, typer.Option("--K1", metavar="LO,HI", help=RANGES["K1"])] = None,
     k2: Annotated[str | None, typer.Option("--K2", metavar="LO,HI", help=RANGES["K2"])] = None,
-    kp: Kp = 0.0,
+    kp: FixedKp = 0.0,
     points: Annotated[str | None, typer.Option("--points", help="grid points along each; 101, of a law 60")] = None,
     csv: Annotated[Path | None, typer.Option("--csv", help="write both numbers and the count to this file")] = None,
     law: LawFile = None,
@@ -160,7 +160,7 @@ def design(
     structure: Annotated[str, typer.Option("--structure", help=STRUCTURES)] = "K1-K2",
     k1: Annotated[str | None, typer.Option("--K1", metavar="LO,HI", help="bounds of K1")] = None,
     k2: Annotated[str | None, typer.Option("--K2", metavar="LO,HI", help="bounds of K2")] = None,
-    kp: Kp = 0.0,
+    kp: FixedKp = 0.0,
     modes: Annotated[str, typer.Option("--modes", help="flexible modes in the band, 1 to 30")] = "2",
     continuous: Annotated[bool, typer.Option("--continuous", help="for the continuous loop, without a clock")] = False,
     period: Period = None,

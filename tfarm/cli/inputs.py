@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import wraps
 from inspect import Parameter, signature
@@ -20,6 +20,7 @@ from tfarm.errors import ParameterError
 if TYPE_CHECKING:
     from tfarm.arm import Arm, HubFeedback, Input
     from tfarm.arm.law import Law
+    from tfarm.report.given_laws import GivenLaw
 
 
 @dataclass(frozen=True)
@@ -36,8 +37,14 @@ HELP = {  # of the gains that have a default of their own
     "K2": "root moment gain, u = ... - K2 E I phi'(0); 0.3 by default, 0 on a hub without inertia",
 }
 K1 = Annotated[float | None, typer.Option("--K1", help=HELP["K1"])]
+K2 = Annotated[float | None, typer.Option("--K2", help=HELP["K2"])]
 LawFile = Annotated[str | None, typer.Option("--law", metavar="FILE", help="TOML file with a [law]; else the arm's")]
-Kp = Annotated[float, typer.Option("--Kp", help="hub angle gain [N m/rad]")]
+LawFiles = Annotated[
+    list[str] | None,
+    typer.Option("--law", metavar="FILE", help="TOML file with a [law]; again for more, on one page; else the arm's"),
+]
+FixedKp = Annotated[float, typer.Option("--Kp", help="hub angle gain [N m/rad]")]
+Kp = Annotated[float | None, typer.Option("--Kp", help="hub angle gain [N m/rad]")]
 
 
 def option_of(gain: Gain) -> Any:
@@ -125,6 +132,27 @@ def law_of(arm: Arm, given: Given) -> tuple[HubFeedback | Law, dict[str, Any]]:
         return law, {}
     own = None if typed or not given.arm else load_law(given.arm)
     return gains_of(arm, given) if own is None else (own, {})
+
+
+def laws_of(arm: Arm, name: str, gains: dict[str, float | None], files: Sequence[str]) -> tuple[GivenLaw, ...]:
+    """The laws that a page is about: those of files, gains that are typed, the arm's own [law]; else none."""
+    from pathlib import Path
+
+    from tfarm.arm.law_tables import load_law
+    from tfarm.dsp.measured import load_measured
+    from tfarm.report.given_laws import GivenLaw
+
+    if not files and all(value is None for value in gains.values()) and load_law(name) is None:
+        return ()
+    wanted = [Given(gains, file, name) for file in files] or [Given(gains, None, name)]
+    return tuple(
+        GivenLaw(
+            law_of(arm, given)[0],
+            file=Path(given.law).name if given.law else "",
+            measured=load_measured(given.law) if given.law else None,
+        )
+        for given in wanted
+    )
 
 
 def gains_of(arm: Arm, given: Given) -> tuple[HubFeedback, dict[str, Any]]:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from tfarm.arm import Arm, HubFeedback
 from tfarm.arm.driving import AnyLaw, through
 from tfarm.dsp.chain import Chain
-from tfarm.dsp.law_verdict import LawAnalysis, analyse_law
-from tfarm.dsp.verdict import Analysis, analyse
+from tfarm.dsp.law_verdict import LawAnalysis, analyse_law, law_verdict
+from tfarm.dsp.verdict import Analysis, Verdict, analyse, sampled_verdict
 
 
 def sampled(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, count: int | None = None) -> Analysis | LawAnalysis:
@@ -20,3 +22,9 @@ def sampled(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, count: int | N
     if isinstance(law, HubFeedback):
         return analyse(arm, law, chain, count=count)
     return analyse_law(arm, law, chain, count=count)
+
+
+def verdict_on(arm: Arm, law: AnyLaw, chain: Chain | None = None) -> Verdict[Any]:
+    """The verdict alone.  Raises what `sampled` raises."""
+    arm, law = through(arm, law)
+    return sampled_verdict(arm, law, chain) if isinstance(law, HubFeedback) else law_verdict(arm, law, chain)

@@ -16,7 +16,7 @@ from tfarm.arm import Arm
 from tfarm.arm.checks import whole
 from tfarm.arm.law import Law
 from tfarm.columns import Column, Table
-from tfarm.digits import general, singly
+from tfarm.digits import general, plain, singly
 from tfarm.errors import ParameterError
 from tfarm.records import record
 from tfarm.reduced.sensed import closed, in_series, pade, sensed_model
@@ -139,9 +139,11 @@ def _of_model(loop: LawLoop, count: int) -> tuple[int, complex]:
 SPILL = (
     Column("modes", "modes", of=lambda it: it.modes.tolist()),
     Column("unstable", "unstable poles of the model", of=lambda it: it.unstable.tolist()),
-    Column("re", "rightmost, Re", "1/s", of=lambda it: it.rightmost.real.tolist(), digits=singly(general, 6)),
-    Column("im", "Im", "rad/s", of=lambda it: abs(it.rightmost.imag).tolist(), digits=singly(general, 6)),
-)
+    Column("re", "rightmost, Re", "1/s", of=lambda it: it.rightmost.real.tolist(), digits=singly(plain, 6),
+           printed=singly(general, 6)),
+    Column("im", "Im", "rad/s", of=lambda it: abs(it.rightmost.imag).tolist(), digits=singly(plain, 6),
+           printed=singly(general, 6)),
+)  # fmt: skip
 
 
 def spill_answer(found: Spill) -> dict[str, Any]:

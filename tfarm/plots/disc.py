@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from tfarm.digits import plain, significant
 from tfarm.loop.nyquist import Nyquist, compressed
 
-from .style import BLUE, FAINT, GREY, ORANGE, Keys, alone, blank, headline, style
+from .style import BLUE, FAINT, GREY, ORANGE, Keys, alone, blank, headline, safe, style
 from .words import gains_words
 
 Complex = NDArray[np.complexfloating[Any, Any]]
@@ -128,8 +128,9 @@ def _arrow(piece: Complex, ax: Axes) -> None:
 def _headings(name: str, data: Nyquist[Any], ax: Axes) -> None:
     """The verdict and the count above each disc."""
     verdict = data.verdict
+    led, told = safe(name), safe(gains_words(verdict.loop.law).removeprefix(f"{name}, "))
     ax.set_title(
-        f"{name}{': ' * bool(name)}{verdict.verdict.upper()}\n{gains_words(verdict.loop.law)}\n"
+        f"{led}{': ' * bool(name)}{verdict.verdict.upper()}\n{told}\n"
         f"encirclements of −1: {data.encirclements:d};  unstable poles: {verdict.unstable_roots}",
         fontsize=9.0, loc="center",
     )  # fmt: skip

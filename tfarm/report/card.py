@@ -23,7 +23,7 @@ FACTS = 4  # of the headline numbers
 PAGES = {"index": "full report", **QUESTIONS}
 
 
-def save_card(arm: Arm, folder: Path) -> None:
+def save_card(arm: Arm, folder: Path, laws: Sequence[str] = ()) -> None:
     """card.svg and card.json; a picture that cannot be made is left out, as its section on the page is."""
     try:
         save(draw_card(bode(arm, "root_moment")), folder, "card", formats=("svg",))
@@ -32,7 +32,7 @@ def save_card(arm: Arm, folder: Path) -> None:
     else:
         picture = "card.svg"
     facts = [[f.label, f.value, f.unit, f.beside] for f in headline_numbers(arm)[:FACTS]]
-    keep(folder, "card", {"name": arm.name, "summary": summary(arm), "facts": facts, "picture": picture})
+    keep(folder, "card", {"name": arm.name, "summary": summary(arm, laws), "facts": facts, "picture": picture})
 
 
 def written_cards(out: Path) -> Sequence[Card]:

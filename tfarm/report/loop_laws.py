@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Protocol
 
 from tfarm.arm import Arm, HubFeedback, through
 from tfarm.digits import significant
@@ -26,6 +27,22 @@ NO_PLACE_FOR_K2 = (
     "The hub of this arm has no inertia: {gauge}, so feeding it back by K2 would be an algebraic loop. There is no map "
     "of K1 and K2; what K1 does at K2 = 0 is said below."
 )
+
+
+class Named(Protocol):
+    """A law as tables and pictures name it."""
+
+    @property
+    def name(self) -> str:
+        """In words."""
+
+    @property
+    def key(self) -> str:
+        """In keys."""
+
+    @property
+    def gains(self) -> str:
+        """Its gains with their values, or what it reads."""
 
 
 @dataclass(frozen=True, slots=True)

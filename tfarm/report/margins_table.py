@@ -11,7 +11,7 @@ from tfarm.dsp.brief import SampledBrief
 from tfarm.loop.answers import MARGINS, NOTHING, WINDOWS, gain_rows, sizes_of, unsettled
 from tfarm.loop.lyapunov import lyapunov
 from tfarm.loop.margins import Margins
-from tfarm.report.loop_laws import NamedLaw
+from tfarm.report.loop_laws import Named, NamedLaw
 from tfarm.report.sections import Fact
 from tfarm.report.words import typeset
 
@@ -20,7 +20,7 @@ UNLIMITED = {"disk": 2.0, "peak_sensitivity": 1.0}  # sizes of a passive loop, a
 CAPTION = (
     "Exact: of the infinite-dimensional loop; not known where nothing bounds L beyond the band. "
     "In the band: as far as the poles were computed{undamped}. Gain margin: "
-    "factors on both gains at once between which the loop stays stable. Phase margin: where |L| = 1, the angle from −1 "
+    "factors on the whole law between which the loop stays stable. Phase margin: where |L| = 1, the angle from −1 "
     "to L of least size, above 0 for lag that the loop bears and below 0 for lead; lag and lead: the least of each. "
     "Delay: what may be lost at the worst frequency. Disk margin: gain and phase may be off together by "
     "(2 + αδ)/(2 − αδ), |δ| < 1."
@@ -70,7 +70,7 @@ def _up_to(band: float) -> str:
     return f"up to {significant(band, 5)} rad/s"
 
 
-def margin_table(laws: Sequence[NamedLaw], found: Sequence[Margins], is_undamped: bool) -> Table:
+def margin_table(laws: Sequence[Named], found: Sequence[Margins], is_undamped: bool) -> Table:
     """A row a quantity, the verdict first; for each law the exact value, that in the band, and where."""
     rows = [list(_rows(each)) for each in found]
     columns = [
@@ -90,7 +90,7 @@ def margin_table(laws: Sequence[NamedLaw], found: Sequence[Margins], is_undamped
     )
 
 
-def _leads(laws: Sequence[NamedLaw], found: Sequence[Margins]) -> str:
+def _leads(laws: Sequence[Named], found: Sequence[Margins]) -> str:
     """What a phase margin below 0 means, for each law that has one."""
     bands = ((named, each.in_band) for named, each in zip(laws, found, strict=True))
     texts = (
@@ -125,13 +125,13 @@ def _number(value: float) -> str:
     return plain(value, 6) if value.is_integer() else significant(value, 5)
 
 
-def _open_ends(laws: Sequence[NamedLaw], found: Sequence[Margins]) -> str:
+def _open_ends(laws: Sequence[Named], found: Sequence[Margins]) -> str:
     """A sentence for each law whose windows are those of a band."""
     texts = ((law.name, unsettled(each)) for law, each in zip(laws, found, strict=True))
     return "".join(f" {name.capitalize()}: {typeset(text)}." for name, text in texts if text)
 
 
-def window_table(laws: Sequence[NamedLaw], found: Sequence[Margins], sign: str) -> Table:
+def window_table(laws: Sequence[Named], found: Sequence[Margins], sign: str) -> Table:
     """A row a law and gain; none for K2 on a free pin, where it has no loop."""
     rows = [
         (law.name, each.stability.verdict, row)

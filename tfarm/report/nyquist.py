@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from tfarm.columns import Column, Table
 from tfarm.digits import significant, singly
 from tfarm.loop.nyquist import Nyquist
-from tfarm.report.loop_laws import NamedLaw
+from tfarm.report.loop_laws import Named
 
 COUNTS = (
-    "L has no pole right of the contour, so each clockwise turn around −1 (counted negative) is one unstable "
+    "{open}, so each clockwise turn around −1 (counted negative) is one unstable "
     "closed-loop pole. The count in a box was made without Nyquist, by finding every pole; poles whose real part is "
     "less than 10⁻¹² of their size are not told apart from the axis there (undecided), though their turns around −1 "
     "are counted.{last}"
 )
+NO_OPEN, OPEN = "L has no pole right of the contour", "Beside the poles that a law itself has right of the contour"
 COMPARED = "to compare"
 COUNTED = " The last law is there to show that the count is not always 0."
 
@@ -25,8 +26,8 @@ COUNTED = " The last law is there to show that the count is not always 0."
 class Curve(NamedTuple):
     """One law's plot: its name, and the counted contour."""
 
-    named: NamedLaw
-    data: Nyquist
+    named: Named
+    data: Nyquist[Any]
 
 
 def count_table(plots: Sequence[Curve], names: Sequence[str]) -> Table:
@@ -40,7 +41,10 @@ def count_table(plots: Sequence[Curve], names: Sequence[str]) -> Table:
     return Table(
         stem="nyquist-count",
         title="Encirclements beside unstable poles",
-        caption=COUNTS.format(last=COUNTED if plots[-1].named.name == COMPARED and plots[-1].data.expected else ""),
+        caption=COUNTS.format(
+            open=NO_OPEN if not any(p.unstable_open for _, p in plots) else OPEN,
+            last=COUNTED if plots[-1].named.name == COMPARED and plots[-1].data.expected else "",
+        ),
         columns=(
             Column("law", "law", of=names),
             Column("verdict", "verdict", of=words),

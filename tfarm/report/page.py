@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 import shlex
 from collections.abc import Sequence
@@ -13,10 +14,15 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 import tfarm
-from tfarm.arm import Arm, load, presets
+from tfarm.arm import Arm, HubFeedback, load, presets
+from tfarm.arm.law import Law
+from tfarm.arm.law_writing import law_toml
+from tfarm.digits import listed
 from tfarm.dsp import Chain, load_chain
+from tfarm.dsp.writing import file_text
+from tfarm.errors import ParameterError
+from tfarm.report.given_laws import Subject
 from tfarm.report.sections import Fact, SavedSection
-from tfarm.report.trust_proofs import hash_of
 from tfarm.tables.html import symbol
 
 TEMPLATES = Path(__file__).parent / "templates"
@@ -56,11 +62,12 @@ def _templates() -> Environment:
     return environment
 
 
-def arm_page(arm: Arm, chain: Chain, sections: Sequence[SavedSection], only: str | None, *, trust: str) -> str:
-    """The page of one arm, with every section or with those of one question.
+def arm_page(subject: Subject, sections: Sequence[SavedSection], only: str | None, *, trust: str) -> str:
+    """The page of one arm, under its laws where they are given, with every section or with those of one question.
 
     `trust` is the page that says why it can be trusted, as seen from the arm's folder; empty if there is none.
     """
+    arm = subject.arm
     title = f"{arm.name}: {QUESTIONS[only].lower()}" if only else arm.name
     return render(
         "arm.html",
@@ -69,8 +76,9 @@ def arm_page(arm: Arm, chain: Chain, sections: Sequence[SavedSection], only: str
         sections=sections,
         only=only,
         trust=trust,
-        summary=summary(arm),
-        foot=foot(arm, chain, only),
+        summary=summary(arm, [each.given_name for each in subject.laws]),
+        foot=foot(subject, only),
+        has_proof=not (subject.laws and only),
     )
 
 
@@ -79,15 +87,36 @@ def index_page(cards: Sequence[Card], *, trust: str) -> str:
     return render("index.html", title="tfarm reports", cards=cards, trust=trust)
 
 
-def foot(arm: Arm, chain: Chain, only: str | None) -> dict[str, str]:
+def foot(subject: Subject, only: str | None) -> dict[str, str]:
     """What a reader needs to make the page again: version, hash of the arm's file, command."""
-    return {"sha256": hash_of(arm, chain), "command": command(arm, chain, only)}
+    sha256 = hashlib.sha256(file_of(subject).encode()).hexdigest()
+    return {"sha256": sha256, "command": command(subject, only)}
 
 
-def command(arm: Arm, chain: Chain, only: str | None) -> str:
-    """The command that writes this page; an arm that is no preset is named by its file."""
-    choice = f" --only {only}" if only else ""
-    return f"tfarm report {_argument(arm.name, is_preset(arm, chain))}{choice} --out reports"
+def file_of(subject: Subject) -> str:
+    """The arm's file with its chain, and with the law that the page is about where TOML can say that alone."""
+    law = own_law(subject)
+    return file_text(subject.arm, subject.chain) + ("" if law is None else f"\n{law}")
+
+
+def own_law(subject: Subject) -> str | None:
+    """The table [law] of the one law of a page; None where there are none or several, or that needs files beside it."""
+    if len(subject.laws) != 1 or subject.laws[0].measured is not None:
+        return None
+    law = subject.laws[0].law
+    try:
+        return law_toml(Law.of_gains(law) if isinstance(law, HubFeedback) else law)
+    except ParameterError:
+        return None
+
+
+def command(subject: Subject, only: str | None) -> str:
+    """The command that writes this page; an arm that is no preset is named by its file, as are laws beside it."""
+    arm, chain, laws = subject
+    law = own_law(subject)
+    files = "" if law is not None else "".join(f" --law {shlex.quote(each.file or 'FILE')}" for each in laws)
+    choice = f"{files} --only {only}" if only else files
+    return f"tfarm report {_argument(arm.name, law is None and is_preset(arm, chain))}{choice} --out reports"
 
 
 def command_for_all(arms: Sequence[tuple[str, bool]]) -> str:
@@ -106,8 +135,8 @@ def _argument(name: str, preset: bool) -> str:
     return shlex.quote(name if preset else f"{name}.toml")
 
 
-def summary(arm: Arm) -> str:
-    """The arm in one sentence."""
+def summary(arm: Arm, laws: Sequence[str] = ()) -> str:
+    """The arm in one sentence, and the laws that its page is about in another."""
     hub = "a locked hub" if arm.is_locked else "a free pin" if arm.has_massless_hub else "a hub"
     tip = "with a payload" if arm.payload.mass or arm.payload.inertia else "without payload"
     tip = "its tip pinned" if math.isinf(arm.payload.mass) else tip
@@ -115,7 +144,8 @@ def summary(arm: Arm) -> str:
     link = f"A flexible link of {len(arm.links)} segments" if arm.outer else "A flexible link"
     hub = hub if arm.motor is None else f"{hub} with a motor"
     theory = "-".join(part.capitalize() for part in arm.theory.split("-"))
-    return f"{link} on {hub}, {tip}, {damping}; {theory} theory, exact."
+    under = f" Under {listed(laws)}." if laws else ""
+    return f"{link} on {hub}, {tip}, {damping}; {theory} theory, exact.{under}"
 
 
 def render(template: str, **values: Any) -> str:

@@ -17,3 +17,8 @@ def typeset(text: str) -> str:
     for plain_text, shown in TYPESET.items():
         text = text.replace(plain_text, shown)
     return MINUS.sub("−", POWER.sub(lambda number: plain(float(number[0])), text))
+
+
+def upper(text: str) -> str:
+    """A text as it begins a sentence."""
+    return text[:1].upper() + text[1:]

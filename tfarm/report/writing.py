@@ -12,79 +12,34 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
-from functools import partial
 from multiprocessing import get_context, parent_process
 from pathlib import Path
 from threading import Thread
 
 from tfarm.arm import Arm
 from tfarm.dsp import Chain
-from tfarm.dsp.writing import file_text
 from tfarm.errors import ParameterError, TfarmError, did_you_mean
 from tfarm.files import temporary_folder
-from tfarm.report.arm_section import arm_section
-from tfarm.report.assumptions_section import assumptions_section
-from tfarm.report.bode_section import bode_section
 from tfarm.report.card import save_card, written_cards
-from tfarm.report.locus_section import locus_section
-from tfarm.report.loop_laws import has_loop, has_rate_loop
-from tfarm.report.loop_section import map_section, margins_section, no_loop_section, nyquist_section
-from tfarm.report.modes_section import modes_section
-from tfarm.report.page import QUESTIONS, arm_page, index_page
-from tfarm.report.paper import is_from_paper, paper_section
-from tfarm.report.sampled_section import sampled_section
+from tfarm.report.given_laws import GivenLaw, Subject, check_laws
+from tfarm.report.page import QUESTIONS, arm_page, file_of, index_page
+from tfarm.report.pieces import LAW_PIECES, PIECES, Piece
 from tfarm.report.sections import SavedSection, Section, save_section
 from tfarm.report.trust import FOLDER, Evidence, gather, write_trust
 from tfarm.report.trust_proofs import save_proof, written_proofs
-from tfarm.report.tuner_section import tuner_section
 from tfarm.report.words import typeset
 
 Progress = Callable[[int, int, str], object]
 Notice = Callable[[str], object]
 
 WORKERS = 2
-LOOP_PAGES = ("margins", "locus", "sampled", "tune")  # whose sections an arm without a loop has not
 OURS = ("index.html", "README.md", "pictures", "bench.json", "trust")  # names in `out` that no arm's folder may have
 
 
-@dataclass(frozen=True, slots=True)
-class Piece:
-    """One section of one arm's page: a name for the progress bar, the section's anchor, and how to make it.
-
-    `make` takes the arm, and for a section that says what the loop does when sampled (`is_sampled`) its chain.
-    """
-
-    name: str
-    anchor: str
-    questions: tuple[str, ...]  # the --only pages that have it; the full page has all
-    make: Callable[..., Section]
-    suits: Callable[[Arm], bool] = lambda arm: True
-    is_sampled: bool = False
-
-
-PIECES = (
-    Piece("map of the gains", "margins-map", ("margins",), map_section, has_loop, is_sampled=True),
-    Piece("the arm", "arm", tuple(QUESTIONS), arm_section),
-    Piece("the paper's values", "paper", (), paper_section, is_from_paper),
-    Piece("root moment", "bode-root-moment", ("bode",), partial(bode_section, output="root_moment")),
-    Piece("tip displacement", "bode-tip-displacement", ("bode",), partial(bode_section, output="tip_displacement")),
-    Piece("modes", "modes", ("modes",), modes_section),
-    Piece(
-        "no loop", "no-loop", ("margins", "locus", "sampled", "tune"), no_loop_section, lambda arm: not has_loop(arm)
-    ),
-    Piece("margins", "margins", ("margins",), margins_section, has_rate_loop, is_sampled=True),
-    Piece("root loci", "locus", ("locus",), locus_section, has_rate_loop),
-    Piece("Nyquist", "margins-nyquist", ("margins",), nyquist_section, has_rate_loop, is_sampled=True),
-    Piece("sampled loop", "sampled", ("sampled",), sampled_section, has_loop, is_sampled=True),
-    Piece("gain tuner", "tune", ("tune",), tuner_section, has_loop, is_sampled=True),
-    Piece("assumptions", "assumptions", ("assumptions",), assumptions_section),
-)
-CARD = "card"
+CARD, CARD_ALONE = "card", "card alone"  # with the proofs of the arm, and without
 EVIDENCE = (-1, "evidence")  # for the page on trust: of no arm
 TRUST = f"{FOLDER}/index.html"
 
-Subject = tuple[Arm, Chain]  # whose page it is
 Task = tuple[int, int | str]  # which arm, which piece (or its card and proof)
 Result = SavedSection | Evidence | None
 
@@ -94,21 +49,27 @@ def write(
     out: Path,
     *,
     chains: Sequence[Chain] | None = None,
+    laws: Sequence[Sequence[GivenLaw]] | None = None,
     only: tuple[str, ...] | None = None,
     progress: Progress | None = None,
     notice: Notice | None = None,
 ) -> Path:
     """Write the report of each arm to out/<name>/, out/trust/ and out/index.html; the page to open first.
 
-    `chains` are the arms' own sampling, converters, actuators and slews; ideal ones at 10 ms if not given.
+    `chains` are the arms' own sampling, converters, actuators and slews; ideal ones at 10 ms if not given.  `laws` are
+    those that each arm's page is about; where there is none it is about the default gains.
     `only` ("bode", "modes", "margins", ...) writes those pages alone, out/<name>/bode.html and so on.  `progress` is
     told (done, total, what) after each piece of work.  A section that tfarm cannot make of an arm says why in its
     place, and `notice` is told so in one line, once the pages are written.  Raises ParameterError before any work if
-    `out` cannot be written, two arms share a name or there is none.  If the work itself fails, `out` is as it was.
+    `out` cannot be written, two arms share a name or there is none, or an arm or its clock can make nothing of a law.
+    If the work itself fails, `out` is as it was.
     """
     _check(arms, only)
     chains = [Chain()] * len(arms) if chains is None else chains
-    subjects = list(zip(arms, chains, strict=True))
+    laws = [()] * len(arms) if laws is None else laws
+    subjects = [Subject(arm, chain, tuple(each)) for arm, chain, each in zip(arms, chains, laws, strict=True)]
+    for subject in subjects:
+        check_laws(*subject)
     out = Path(out)
     with _beside(out, [arm.name for arm in arms] + [FOLDER] * (not only)) as beside:
         folders = [beside / str(i) for i in range(len(arms))]
@@ -195,11 +156,11 @@ def _make_all(
     tasks: list[Task] = [] if only else [EVIDENCE]  # first: it takes longest
     tasks += [
         (i, j)
-        for i, (arm, _) in enumerate(subjects)
-        for j, piece in enumerate(PIECES)
-        if piece.suits(arm) and (not only or set(only) & set(piece.questions))
+        for i, subject in enumerate(subjects)
+        for j, piece in enumerate(pieces_of(subject))
+        if piece.is_for(subject) and (not only or set(only) & set(piece.questions))
     ]
-    tasks += [(i, CARD) for i in range(len(subjects))]
+    tasks += [(i, CARD_ALONE if subject.laws and only else CARD) for i, subject in enumerate(subjects)]
     done: dict[Task, Result] = {}
     if progress is not None:
         progress(0, len(tasks), subjects[0][0].name)
@@ -254,17 +215,22 @@ def _make(subject: Subject, piece: int | str, folder: Path) -> Result:
     if piece == EVIDENCE[1]:
         return gather()
     if isinstance(piece, str):
-        arm, chain = subject
-        save_card(arm, folder)
-        save_proof(arm, folder, chain)
+        save_card(subject.arm, folder, [each.given_name for each in subject.laws])
+        if piece == CARD:
+            save_proof(subject.arm, folder, subject.chain)
         return None
-    return save_section(_section(PIECES[piece], *subject), folder)
+    return save_section(_section(pieces_of(subject)[piece], subject), folder)
 
 
-def _section(piece: Piece, arm: Arm, chain: Chain) -> Section:
+def pieces_of(subject: Subject) -> Sequence[Piece]:
+    """The sections of a page on this subject, in their order."""
+    return LAW_PIECES if subject.laws else PIECES
+
+
+def _section(piece: Piece, subject: Subject) -> Section:
     """The section, or in its place why tfarm could not make it of this arm; a bug of ours stays loud."""
     try:
-        return piece.make(arm, chain) if piece.is_sampled else piece.make(arm)
+        return piece.made(subject)
     except TfarmError as error:
         title = f"{piece.name[0].upper()}{piece.name[1:]}"
         words = (f"This section could not be made for this arm: {typeset(str(error))}.",)
@@ -283,22 +249,23 @@ def _name_of(subjects: Sequence[Subject], task: Task) -> str:
     piece = task[1]
     if task == EVIDENCE:
         return "why trust this"
-    return f"{subjects[task[0]][0].name}: {piece if isinstance(piece, str) else PIECES[piece].name}"
+    subject = subjects[task[0]]
+    return f"{subject.arm.name}: {piece if isinstance(piece, str) else pieces_of(subject)[piece].name}"
 
 
 def _write_pages(
     subject: Subject, folder: Path, sections: Sequence[SavedSection], only: tuple[str, ...] | None, trust: str
 ) -> None:
     """The arm's file, with the chain that the page is about, and its page, or the page of each question asked."""
-    (folder / "arm.toml").write_text(file_text(*subject), encoding="utf-8", newline="")
+    (folder / "arm.toml").write_text(file_of(subject), encoding="utf-8", newline="")
     for question in only or (None,):
         wanted = [s for s in sections if question is None or _answers(s.section.anchor, question)]
-        page = arm_page(*subject, wanted, question, trust=f"../{trust}" if trust else "")
+        page = arm_page(subject, wanted, question, trust=f"../{trust}" if trust else "")
         (folder / f"{question or 'index'}.html").write_text(page, encoding="utf-8", newline="")
 
 
 def _answers(anchor: str, question: str) -> bool:
-    return anchor in ("arm", "no-loop") or anchor.startswith(question)
+    return anchor in ("arm", "law", "no-loop") or anchor.startswith(question)
 
 
 def _move_into(made: Path, folder: Path) -> None:

@@ -1,0 +1,307 @@
+"""Pages about laws: their numbers are the commands', their names are text, and bad input is one line."""
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import control
+import numpy as np
+import pytest
+
+import tfarm
+from tests.shell import answer, run
+from tfarm import HubFeedback, Law, ParameterError
+from tfarm.arm.law_tables import load_law
+from tfarm.dsp import Chain, load_chain
+from tfarm.dsp.law_loop import sampled_law
+from tfarm.dsp.law_verdict import law_verdict
+from tfarm.dsp.measured import beside, load_measured, overshoot
+from tfarm.report import law_sampled_section as in_time
+from tfarm.report import writing
+from tfarm.report.given_laws import GivenLaw, Subject, on_arm
+from tfarm.report.law_loop_section import law_margins_section, law_nyquist_section, law_poles_section
+from tfarm.report.law_section import law_section, written_polynomial
+from tfarm.report.page import file_of
+from tfarm.tables.files import to_json
+
+LAB, BARE, PRESET = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "quanser-2dsfl"))
+DATA = Path(__file__).parent.parent / "data" / "quanser-2dsfl"
+HOSTILE = "<script>alert(1)</script> & $x$ \\frac{"
+ORDER_8 = f"""[law]
+name = '{HOSTILE}'
+delay = 0.0005
+references = ["hub_angle"]
+[law.hub_angle]
+num = [2.0, 8.0]
+den = [0.002, 1.0]
+[law.hub_rate]
+num = [1.0e-4, 0.02, 1.0]
+den = [2.0e-6, 2.8e-3, 1.0]
+[law.root_moment]
+zeros = [-30.0, [-5.0, 71.0], [-5.0, -71.0], [-20.0, 200.0], [-20.0, -200.0]]
+poles = [-60.0, [-50.0, 71.0], [-50.0, -71.0], [-90.0, 200.0], [-90.0, -200.0]]
+gain = 0.2
+"""
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    path = tmp_path_factory.mktemp("laws") / "law.toml"
+    path.write_text(ORDER_8, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def given(file):
+    law = load_law(file)
+    assert law.order == 8
+    return (GivenLaw(law, file=file.name),)
+
+
+def table(section, stem):
+    (found,) = (block for block in section.blocks if block.stem == stem)
+    return {column.key: list(column.values) for column in found.columns}
+
+
+# ------------------------------------------------------------ numbers
+
+
+def test_margins_on_the_page_are_those_of_the_command(capsys, file, given):
+    section, found = law_margins_section(LAB, Chain(), given), answer(capsys, "margins", LAB.name, "--law", str(file))
+    shown = table(section, "margins")
+    exact = dict(zip(shown["quantity"], shown["law_exact"], strict=True))
+    assert (exact["verdict"], exact["unstable poles"]) == (found["verdict"], found["unstable_roots"])
+    assert [exact[f"gain margin, {way}"] for way in ("down", "up")] == found["gain_margin"]
+    for title, key in (
+        ("phase margin", "phase_margin_deg"),
+        ("delay margin", "delay_margin_s"),
+        ("disk margin α", "disk_margin"),
+        ("peak sensitivity", "peak_sensitivity"),
+        ("peak complementary sensitivity", "peak_complementary_sensitivity"),
+    ):
+        assert exact[title] == found[key]
+    crossed = table(section, "law-crossings")
+    rows = list(zip(crossed["omega_rad_s"], crossed["phase_margin_deg"], crossed["factor"], strict=True))
+    gain, phase = ([tuple(each.values()) for each in found[f"{kind}_crossovers"]] for kind in ("gain", "phase"))
+    assert [(w, margin) for w, margin, factor in rows if factor == ""] == gain
+    assert [(w, factor) for w, margin, factor in rows if margin == ""] == phase
+    assert len(gain) > 3
+    assert any(margin < 0 for _, margin in gain)  # signs stand
+    spilled = answer(capsys, "spill", LAB.name, "--law", str(file), "--modes", "12")
+    assert table(section, "law-spill")["unstable"] == [row["unstable"] for row in spilled["models"]]
+    assert "small gain" in found["beyond_the_band"]
+    assert "small gain" in section.words[0]
+
+
+def test_turns_and_poles_on_the_page_are_those_of_the_commands(capsys, file, given):
+    counted = table(law_nyquist_section(LAB, Chain(), given), "nyquist-count")
+    assert counted["unstable_by_nyquist"] == counted["unstable_in_box"] == [0]
+    shown = table(law_poles_section(LAB, Chain(), given), "law-poles")
+    poles = answer(capsys, "poles", LAB.name, "--law", str(file))["poles"]
+    assert list(map(list, zip(shown["real_1_s"], shown["imaginary_rad_s"], strict=True))) == poles
+
+
+def test_radii_on_the_page_are_those_of_the_command_at_each_delay(capsys, file, given):
+    section = in_time.law_sampled_section(LAB, Chain(), given)
+    shown = table(section, "sampled-delays")
+    for row, late in enumerate((0.0, 0.5, 1.0)):
+        found = answer(capsys, "sampled", LAB.name, "--law", str(file), "--delay-samples", str(late))
+        assert shown["further_delay_ms"][row] == 10 * late
+        assert (shown["verdict"][row], shown["spectral_radius"][row]) == (found["verdict"], found["spectral_radius"])
+    assert len(set(shown["verdict"])) == 2  # half a sample more stabilises this one
+    assert "Tustin" in law_section(LAB, Chain(), given).words[0]
+
+
+def test_gains_that_are_typed_have_their_windows_and_their_proof():
+    gains = HubFeedback(K1=0.5, K2=0.3, Kp=2.0)
+    section, found = law_margins_section(BARE, Chain(), (GivenLaw(gains),)), tfarm.margins(BARE, gains)
+    shown = table(section, "margins")
+    assert dict(zip(shown["quantity"], shown["law_band"], strict=True))["delay margin"] == found.in_band.delay
+    assert table(section, "windows")["value"] == [0.5, 0.3, 2.0]
+    assert "Lyapunov: proven" in section.words[0]
+
+
+def test_the_loop_function_of_an_unstable_loop_has_no_margins(given):
+    law = Law({"hub_angle": -5.0, "hub_rate": ([1.0], [0.01, 1.0])}, name="backwards")
+    section = law_margins_section(LAB, Chain(), (GivenLaw(law),))
+    assert section.facts[0].value == "UNSTABLE"
+    assert {block.stem for block in section.blocks} == {"law-bode", "law-spill"}
+
+
+def test_every_entry_is_in_the_table_with_every_digit(given):
+    (entries,) = law_section(LAB, Chain(), given).blocks
+    (each,) = on_arm(LAB, given)
+    rows = [dict(zip(("num", "den"), (row["numerator"], row["denominator"]), strict=True)) for row in entries]
+    for row, part in zip(rows, each.any_law.parts, strict=True):
+        for key in ("num", "den"):
+            assert tuple(map(float, row[key].partition(": ")[2].split())) == getattr(part.block, key)
+    assert written_polynomial("s: 0.02 -1.0 0.0 3.5") == "0.02 s³ − s² + 3.5"
+    assert written_polynomial("z: -0.5") == "−0.5"
+    assert written_polynomial("s: 0.0") == "0"
+
+
+# ------------------------------------------------------------ pages
+
+
+def test_a_page_is_about_its_law_and_its_file_says_it_again(file, tmp_path, monkeypatch, capsys):
+    few = [piece for piece in writing.LAW_PIECES if piece.anchor == "law"]
+    monkeypatch.setattr(writing, "LAW_PIECES", few)
+    code, out, err = run(
+        capsys, "report", LAB.name, "--law", str(file), "--period", "0.004", "--only", "margins", "--out", str(tmp_path)
+    )
+    assert (code, err) == (0, "")
+    page = (tmp_path / LAB.name / "margins.html").read_text(encoding="utf-8")
+    assert out.strip().endswith("margins.html")
+    assert "<script>" not in page
+    assert "&lt;script&gt;alert(1)&lt;/script&gt; &amp; $x$" in page
+    assert "sampled every 4 ms" in page
+    made = tmp_path / LAB.name / "arm.toml"
+    assert load_law(made) == load_law(file)
+    assert load_chain(made).sampling.period == 0.004
+    assert tfarm.load(made) == LAB
+    assert HOSTILE.split(" &")[0] in json.loads((tmp_path / LAB.name / "card.json").read_text())["summary"]
+    (tmp_path / "again").mkdir()
+    assert run(capsys, "report", str(made), "--only", "margins", "--out", str(tmp_path / "again"))[0] == 0
+    again = (tmp_path / "again" / LAB.name / "margins.html").read_text(encoding="utf-8")
+    assert again == page.replace(" (law.toml)", "")  # a law of the arm's own file has no file beside it
+
+
+def test_gains_typed_are_in_the_file_of_the_page():
+    gains = HubFeedback(K1=0.5, K2=-0.1)
+    text = file_of(Subject(LAB, Chain(), (GivenLaw(gains),)))
+    assert "[law.hub_rate]\ngain = 0.5" in text
+    assert "[law]" not in file_of(Subject(LAB, Chain()))
+
+
+def test_each_loop_page_of_laws_has_a_section_that_says_what_it_is_about():
+    subject = Subject(LAB, Chain(), (GivenLaw(Law({"hub_rate": ([1.0], [0.01, 1.0])})),))
+    for page in ("margins", "locus", "sampled", "tune"):
+        anchors = [
+            each.anchor for each in writing.pieces_of(subject) if page in each.questions and each.is_for(subject)
+        ]
+        assert "law" in anchors
+        assert all(writing._answers(anchor, page) for anchor in anchors)
+    discrete = Subject(LAB, Chain(), (GivenLaw(Law({"hub_rate": 0.3}, period=0.01)),))
+    anchors = {each.anchor for each in writing.pieces_of(discrete) if each.is_for(discrete)}
+    assert not anchors & {"margins", "margins-nyquist", "locus", "margins-map", "tune"}
+    assert "sampled loop" in law_section(*discrete).words[1]
+    held = replace(LAB, hub=tfarm.Hub(inertia=math.inf))
+    first = (each.anchor for each in writing.LAW_PIECES if each.is_for(Subject(held, Chain(), subject.laws)))
+    assert next(first) == "no-loop"
+
+
+@pytest.mark.parametrize(
+    ("text", "typed", "told"),
+    [
+        ("[law.hub_spin]\ngain = 1.0\n", (), "hub_spin"),
+        ("[law]\nperiod = 0.004\n[law.hub_rate]\ngain = 1.0\n", (), "period"),
+        ("[law.hub_rate]\nnum = [1.0, 0.0, 0.0]\n", (), "num"),
+        ("[law.hub_rate]\ngain = 1.0\n", ("--K1", "0.3"), "--K1"),
+        ("[slew]\nrise_time = 1.0\n", (), "[law]"),
+        ("[law.hub_rate]\ngain = 1.0\n[measured]\nfile = 'none.csv'\n", (), "none.csv"),
+        ("[law.hub_rate]\ngain = 1.0\n[measured]\nfiles = 'x.csv'\n", (), "measured"),
+        ("measured = 3\n[law.hub_rate]\ngain = 1.0\n", (), "measured"),
+        ("[law.hub_rate]\ngain = 1.0\n[measured]\nfile = 'words.csv'\n", (), "finite numbers"),
+        ("[law.hub_rate]\ngain = 1.0\n[measured]\nfile = 'late.csv'\n", (), "begins with 0"),
+        ("[law.hub_rate]\ngain = 1.0\n[measured]\nfile = 'other.csv'\n", (), "reference:hub_angle"),
+    ],
+)
+def test_bad_input_is_one_line_and_nothing_is_written(capsys, tmp_path, text, typed, told):
+    (tmp_path / "law.toml").write_text(text)
+    (tmp_path / "words.csv").write_text("t,reference:hub_angle,hub_angle\n0,0,0\n1,one,0\n")
+    (tmp_path / "late.csv").write_text("t,reference:hub_angle,hub_angle\n1,0,0\n2,1,0\n")
+    (tmp_path / "other.csv").write_text("time,angle\n1,0\n2,1\n")
+    out = tmp_path / "out"
+    code, _, err = run(capsys, "report", LAB.name, "--law", str(tmp_path / "law.toml"), *typed, "--out", str(out))
+    assert code == 2
+    assert err.count("\n") == 1
+    assert told in err
+    assert not out.exists()
+
+
+# ------------------------------------------------------------ a real rig
+
+
+def real(name):
+    return load_law(DATA / f"{name}.toml"), load_measured(DATA / f"{name}.toml")
+
+
+def test_the_rig_of_the_page_is_the_preset_with_the_chain_of_its_controllers():
+    rig = tfarm.load(DATA / "rig.toml")
+    assert rig == replace(PRESET, name=rig.name, assumptions=rig.assumptions)
+    assert rig.assumptions[: len(PRESET.assumptions)] == PRESET.assumptions
+    assert load_chain(DATA / "rig.toml") == load_chain(DATA / "chain.toml")
+    for words in ("39.957", "0.9 A", "4096", "measured state (4), reference state (4)"):
+        assert any(words in each for each in rig.assumptions[len(PRESET.assumptions) :])
+
+
+@pytest.mark.parametrize("name", ["lqg", "hinf"])
+def test_a_step_over_the_measured_one_is_that_of_python_control(name):
+    """The sampled plant and the controller's matrices closed by hand, led by the reference as it was recorded."""
+    law, measured = real(name)
+    mine = beside(PRESET, law, Chain(), measured)
+    count = 8
+    led = measured.scenario(0.01).hub_angle
+    np.testing.assert_allclose(led, measured.reference - measured.reference[0], atol=1e-15)  # every row is a sample
+    A, B, C, D = law.matrices((*law.signals, *law.wanted))
+    plant = sampled_law(PRESET, law, Chain(), count=count).pulse.state_space()
+    closed = control.feedback(plant, control.ss(A, B[:, :2], C, D[:, :2], 0.01))
+    given = control.forced_response(control.ss(A, -B[:, 2:], C, -D[:, 2:], 0.01), np.arange(led.size) * 0.01, led)
+    found = control.forced_response(closed, np.arange(led.size) * 0.01, given.outputs).outputs[0]
+    assert abs(mine.run.at_samples.hub_angle - found).max() < 1e-3 * abs(led).max()  # modes beyond the eighth
+
+
+def test_what_is_measured_and_computed_of_the_real_controllers():
+    chain = load_chain(DATA / "chain.toml")
+    for name, (over, end) in {"lqg": (0.40895, 0.04873), "hinf": (4.84993, 0.48027)}.items():  # all of theta11
+        law, measured = real(name)
+        found = beside(PRESET, law, chain, measured)
+        assert np.degrees(measured.step) == pytest.approx(30.0, abs=1e-5)
+        goal = measured.reference[-1]
+        assert 100 * overshoot(measured.hub_angle, measured.step, goal) == pytest.approx(over, abs=1e-3)
+        assert np.degrees(measured.hub_angle[-1] - goal) == pytest.approx(end, abs=1e-4)
+        (row,) = in_time.overshoot_table({name: found})
+        assert row["overshoot_measured_percent"] == pytest.approx(over, abs=1e-3)
+        assert row["end_computed_deg"] == pytest.approx(np.degrees(found.hub_angle[-1] - goal))
+        first = [
+            np.flatnonzero(abs(moment) > 0.5)[0] for moment in (measured.root_moment, found.run.at_samples.root_moment)
+        ]
+        assert measured.root_moment[first[0]] < 0  # the tip lags behind first, there and here
+        assert found.run.at_samples.root_moment[first[1]] < 0
+
+
+def test_a_little_damping_makes_the_rig_hold_and_a_quarter_of_it_does_not():
+    """The sentence, and the exact verdict at what it names."""
+    law, _ = real("lqg")
+    chain = load_chain(DATA / "chain.toml")
+    (each,) = on_arm(PRESET, (GivenLaw(law),))
+    words = in_time.cured(in_time.held_by(each, chain), chain)
+    assert "C = 1 × 10⁻⁶ s, 0.052 % of critical in mode 3, it is stable" in words
+    assert law_verdict(PRESET.having(damping=1e-6), law, chain).is_stable
+    assert not law_verdict(PRESET.having(damping=2.5e-7), law, chain).is_stable
+
+
+def test_a_measured_run_is_put_in_the_place_of_the_slew():
+    laws = tuple(GivenLaw(*_with_run(name)) for name in ("lqg", "hinf"))
+    section = in_time.law_sampled_section(tfarm.load(DATA / "rig.toml"), load_chain(DATA / "rig.toml"), laws)
+    stems = [block.stem for block in section.blocks]
+    assert stems == ["sampled-delays", "sampled-measured", "sampled-overshoot"]
+    shown = table(section, "sampled-delays")
+    assert shown["verdict"] == ["unstable"] * 3 + ["stable"] * 3
+    assert shown["further_delay_ms"] == [0.0, 5.0, 10.0] * 2
+    assert [fact.value for fact in section.facts] == ["UNSTABLE", "STABLE"]
+    assert "MIT" in section.blocks[1].caption
+
+
+def _with_run(name):
+    law, measured = real(name)
+    return law, f"{name}.toml", measured
+
+
+def test_laws_of_one_name_are_told_apart_and_what_no_arm_reads_is_refused():
+    two = tuple(GivenLaw(Law({"hub_rate": ([gain], [0.01, 1.0])}, name="PD")) for gain in (0.3, 0.6))
+    assert [each.name for each in on_arm(LAB, two)] == ["PD", "PD (2)"]
+    assert to_json({"rows": law_section(LAB, Chain(), two).blocks[0]}).count("PD (2)") == 1
+    with pytest.raises(ParameterError, match="hub_spin"):
+        writing.write([LAB], Path("nowhere"), laws=[(GivenLaw(Law({"hub_spin": 1.0})),)])

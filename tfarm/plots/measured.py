@@ -1,0 +1,51 @@
+"""Measured runs on a rig, and over each the exact sampled loop that was led by the same reference."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from tfarm.dsp.measured import Beside
+
+from .style import BLUE, GREY, ORANGE, blank, headline, safe, style
+
+DEGREES = 180.0 / np.pi
+
+
+def draw_beside(title: str, each: Mapping[str, Beside]) -> Figure:
+    """A column a law: hub angle above, root moment below where it was measured."""
+    moment = any(found.measured.root_moment.size for found in each.values())
+    with style():
+        figure = blank(max(4.7 * len(each), 6.0), 6.0 if moment else 3.6)
+        axes = figure.subplots(1 + moment, len(each), sharex="col", sharey="row", squeeze=False)
+        for column, (name, found) in enumerate(each.items()):
+            _angle(found, axes[0, column])
+            if moment:
+                _moment(found, axes[1, column])
+            axes[0, column].set_title(safe(name), fontsize=9.5)
+            axes[-1, column].set_xlabel("time  [s]")
+        axes[0, 0].set_ylabel("hub angle  [deg]")
+        if moment:
+            axes[1, 0].set_ylabel("root moment  [N m]")
+        figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower left", ncols=3)
+        headline(figure, title)
+    return figure
+
+
+def _angle(found: Beside, ax: Axes) -> None:
+    measured = found.measured
+    ax.plot(measured.t, DEGREES * measured.reference, color=GREY, lw=1.0, ls=(0, (4, 3)), label="reference")
+    if measured.hub_angle.size:
+        ax.plot(measured.t, DEGREES * measured.hub_angle, color=ORANGE, label="measured")
+    ax.plot(found.run.t, DEGREES * found.hub_angle, color=BLUE, lw=1.2, label="exact sampled loop")
+    ax.set_xlim(0.0, float(measured.t[-1]))
+
+
+def _moment(found: Beside, ax: Axes) -> None:
+    if found.measured.root_moment.size:
+        ax.plot(found.measured.t, found.measured.root_moment, color=ORANGE)
+    ax.plot(found.run.t, found.run.at_samples.root_moment, color=BLUE, lw=1.2)
+    ax.axhline(0.0, color=GREY, lw=0.6)

@@ -1,0 +1,114 @@
+"""The laws that a page is about where they are given: gains that were typed, the arm's own [law], files of laws."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from tfarm.arm import Arm, HubFeedback
+from tfarm.arm.driving import AnyLaw, through
+from tfarm.arm.law import Law
+from tfarm.dsp import Chain
+from tfarm.dsp.discretise import discretised
+from tfarm.dsp.loop import check_loop
+from tfarm.dsp.measured import Measured
+from tfarm.errors import one_line
+from tfarm.loop.law_loop import LawLoop
+from tfarm.plots.words import gains_words
+from tfarm.records import record
+from tfarm.response.signals import Signals
+
+GAINS = "the gains given"
+LONGEST = 60  # characters of a law's name in a heading
+
+
+@dataclass(frozen=True)
+@record
+class GivenLaw:
+    """A law, the name of its `file` where it has one, and a run that was `measured` under it on the rig."""
+
+    law: AnyLaw
+    file: str = ""
+    measured: Measured | None = None
+
+    @property
+    def given_name(self) -> str:
+        """What it is called, or its gains with their values."""
+        return gains_words(self.law) if isinstance(self.law, HubFeedback) else one_line(self.law.name, LONGEST)
+
+
+class Subject(NamedTuple):
+    """Whose page it is: an arm, its chain, and the laws that the page is about; none: the default gains."""
+
+    arm: Arm
+    chain: Chain
+    laws: tuple[GivenLaw, ...] = ()
+
+
+@dataclass(frozen=True)
+@record
+class LawOnArm:
+    """A given law on an arm: `arm` has the input that it drives, and `law` is gains at the hub where it is no more.
+
+    `name` is for reading, `key` for the columns and names of files, "law" or of several "law_1", "law_2" ...
+    """
+
+    arm: Arm
+    law: AnyLaw
+    given: GivenLaw
+    name: str
+    key: str
+
+    @property
+    def gains(self) -> str:
+        """Its gains with their values, or what it reads."""
+        if isinstance(self.law, HubFeedback):
+            return gains_words(self.law)
+        return f"order {self.law.order}, of {', '.join(self.law.signals)}"
+
+    @property
+    def any_law(self) -> Law:
+        """The law as one of signals, gains at the hub too."""
+        return Law.of_gains(self.law) if isinstance(self.law, HubFeedback) else self.law
+
+    @property
+    def is_discrete(self) -> bool:
+        """Whether it is a law in z, which acts at samples only."""
+        return self.any_law.is_discrete
+
+    @property
+    def measured(self) -> Measured | None:
+        """The run that was measured under it."""
+        return self.given.measured
+
+
+def on_arm(arm: Arm, laws: Sequence[GivenLaw]) -> tuple[LawOnArm, ...]:
+    """Each law on the arm, under a name that no other has."""
+    found: list[LawOnArm] = []
+    for number, given in enumerate(laws, 1):
+        driven, law = through(arm, given.law)
+        name = GAINS if isinstance(law, HubFeedback) else one_line(law.name, LONGEST)
+        if name in {each.name for each in found}:
+            name = f"{name} ({number})"
+        found.append(LawOnArm(driven, law, given, name, f"law_{number}" if len(laws) > 1 else "law"))
+    return tuple(found)
+
+
+def check_laws(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> None:
+    """Raise ParameterError for a law that this arm, or the clock of its chain, can make nothing of."""
+    if arm.is_locked:
+        return  # its page says that there is no loop
+    for each in on_arm(arm, laws):
+        if isinstance(each.law, HubFeedback):
+            check_loop(each.arm, each.law)
+            continue
+        _ = Signals(each.arm, each.law.signals)
+        if not each.is_discrete:
+            LawLoop(each.arm, each.law)
+        discretised(each.law, chain.sampling.period)
+
+
+def in_s(laws: Sequence[LawOnArm]) -> tuple[LawOnArm, ...]:
+    """Those that act on the continuous loop."""
+    return tuple(each for each in laws if not each.is_discrete)

@@ -1,0 +1,268 @@
+"""The continuous loop on the page of a law: verdict and margins with every crossing, spill-over, Nyquist, poles."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from tfarm.arm import Arm, HubFeedback
+from tfarm.columns import Column, Table
+from tfarm.digits import counted, lined, plain, significant, singly
+from tfarm.dsp import Chain
+from tfarm.errors import ParameterError
+from tfarm.loop.closed import closed_loop_poles
+from tfarm.loop.closed import margins as margins_under
+from tfarm.loop.closed import nyquist as nyquist_under
+from tfarm.loop.law_loop import LawLoop
+from tfarm.loop.law_stability import signs_of_loop
+from tfarm.loop.lyapunov import lyapunov
+from tfarm.loop.margins import Margins
+from tfarm.loop.nyquist import Nyquist
+from tfarm.loop.poles import Poles
+from tfarm.loop.spill import SPILL, Spill, spill
+from tfarm.plots.disc import draw_nyquist
+from tfarm.plots.loop import draw_loop, loop_data
+from tfarm.report.given_laws import GivenLaw, LawOnArm, in_s, on_arm
+from tfarm.report.loop_laws import sign_words
+from tfarm.report.margins_table import margin_table, window_table
+from tfarm.report.nyquist import Curve, count_table, curve_data
+from tfarm.report.sections import Fact, Picture, Section
+from tfarm.report.words import typeset, upper
+
+MODELS = 12  # flexible modes of the largest model that is put beside the exact loop
+CROSSINGS = (
+    "Every frequency up to the band where |L| = 1, with the phase margin there, above 0 for lag that the loop bears "
+    "and below 0 for lead; and every one where L is real and below 0, with the factor on the whole law that puts a "
+    "pole there."
+)
+BODE = (
+    "Diamonds: |L| = 1, with the phase margin there, green for lag and purple for lead. Dots: L is real and below 0, "
+    "and the dashed line is the way to −1, with the factor on the whole law that goes it."
+)
+SPILLED = "What models of so many flexible modes say of the same law: how many poles are unstable, and the rightmost."
+NYQUIST = (
+    "Every size of L(iω) from 0 to infinity is in the picture: a size r is drawn as r/(1 + r). The loop is stable "
+    "where the curve turns around −1 counter-clockwise as often as L has poles right of the axis{own}."
+)
+POLES = (
+    "Poles with Im s ≥ 0, those below the real axis being their mirror images. All of the box {box} 1/s are here, by "
+    "the winding number around it."
+)
+WINDING = "the winding number around the box"
+
+
+def margins_of_laws(laws: Sequence[LawOnArm]) -> list[Margins[Any]]:
+    """Verdict and margins of each law in s."""
+    return [margins_under(each.arm, each.law) for each in laws]
+
+
+# ------------------------------------------------------------ verdict and margins
+
+
+def law_margins_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> Section:
+    """The verdict on each law, what is known beyond its band, its margins and crossings, and what spills over."""
+    named = in_s(on_arm(arm, laws))
+    found = margins_of_laws(named)
+    both = list(zip(named, found, strict=True))
+    undamped = arm.is_told_by_lyapunov and all(isinstance(each.law, HubFeedback) for each in named)
+    blocks: list[Picture | Table] = []
+    for each, it in both:
+        blocks += [_bode_picture(each, it)]
+    if any(it.in_band is not None for it in found):
+        blocks.append(margin_table(named, found, undamped))
+    blocks += [crossings_table(each, it) for each, it in both if it.in_band is not None]
+    gains = [(each, it) for each, it in both if it.windows]
+    if gains:
+        blocks.append(window_table([each for each, _ in gains], [it for _, it in gains], sign_words(arm)))
+    spilled = [_spilled(each) for each in named]
+    blocks += [spill_table(each, it) for each, it in zip(named, spilled, strict=True) if isinstance(it, Spill)]
+    words = [text for each, it, far in zip(named, found, spilled, strict=True) for text in _words(each, it, far)]
+    facts = [verdict_fact(*each) for each in both]
+    title = "Is the loop stable, and by how much?"
+    return Section(anchor="margins", title=title, facts=facts, words=words, blocks=blocks)
+
+
+def verdict_fact(each: LawOnArm, found: Margins[Any]) -> Fact:
+    """The verdict, large, how many poles are unstable, and whether more is known beyond the band."""
+    it = found.stability
+    count = (
+        "infinitely many unstable poles" if it.unstable_roots_infinite else counted(it.unstable_roots, "unstable pole")
+    )
+    far = "" if it.is_known_beyond or it.verdict == "unstable" else ", not known beyond"
+    up_to = f"up to {significant(it.band, 5)} rad/s{far}"
+    return Fact(label=f"{each.name}: {each.gains}", value=it.verdict.upper(), beside=f"{count}, {up_to}")
+
+
+def _words(each: LawOnArm, found: Margins[Any], spilled: Spill | str) -> Iterator[str]:
+    """The verdict and what is known beyond, what a theorem says of the law, and what spills over."""
+    it = found.stability
+    free = it.poles.moving.size < it.poles.values.size
+    apart = ", the one at 0 of a hub whose angle is not held apart" if free else ""
+    count = (
+        "infinitely many" if it.unstable_roots_infinite else "no" if not it.unstable_roots else str(it.unstable_roots)
+    )
+    poles = f"{count} unstable pole{'s' * (count != '1')}"
+    yield (
+        f"{upper(each.name)}: {it.verdict.upper()}, with {poles} up to {significant(it.band, 5)} rad/s{apart}; "
+        f"{typeset(it.tail)}. {_theorem(found)}"
+    )
+    if isinstance(spilled, str):
+        yield f"Models of few modes are not put beside {each.name}: {typeset(spilled)}."
+    else:
+        yield f"Spill-over of {each.name}: {typeset(spilled.in_words)}."
+
+
+def _theorem(found: Margins[Any]) -> str:
+    """What Lyapunov's argument says of gains, or the sign of any other law."""
+    loop = found.stability.loop
+    if isinstance(loop, LawLoop):
+        signs = signs_of_loop(loop)
+        kind = f"it is {signs.kind}" if signs.kind else "no theorem on its sign helps"
+        words = f"Beside that, {kind}: {typeset(signs.reason)}."
+        return words + "".join(f" Warning: {typeset(text)}." for text in loop.warnings)
+    proof = lyapunov(loop.arm, loop.law)
+    return f"Lyapunov: {'proven' if proof.proven else 'no proof'}, {typeset(proof.reason)}."
+
+
+def _bode_picture(each: LawOnArm, found: Margins[Any]) -> Picture:
+    omega, L = loop_data(found)
+    stem = f"{each.key.replace('_', '-')}-bode"
+    none = "" if found.in_band is not None else " No margin is marked: the loop is not stable, and has none."
+    columns = (
+        Column("omega_rad_s", "angular frequency", "rad/s", of=omega),
+        Column("re_L", "Re L", of=L.real),
+        Column("im_L", "Im L", of=L.imag),
+    )
+    return Picture(
+        stem=stem,
+        title=f"The loop function of {each.name}",
+        caption=(BODE if found.in_band is not None else "Size and phase of L(iω).") + none,
+        alt=f"Bode plot of the loop function of {each.name}, {found.stability.verdict}.",
+        figure=draw_loop(found, each.name),
+        data=Table(stem=f"{stem}-data", title=f"The loop function of {each.name}", is_data=True, columns=columns),
+    )
+
+
+def crossings_table(each: LawOnArm, found: Margins[Any]) -> Table:
+    """Every crossing of |L| = 1 and of L < 0 in the band, ascending."""
+    band = found.in_band
+    assert band is not None
+    rows: list[tuple[float, str, float | str, float | str]] = [(w, "|L| = 1", it, "") for w, it in band.gain_crossovers]
+    rows += [(w, "L < 0", "", factor) for w, factor in band.phase_crossovers]
+    rows.sort(key=lambda row: row[0])
+    omega, what, margin, factor = ([row[i] for row in rows] for i in range(4))
+    return Table(
+        stem=f"{each.key.replace('_', '-')}-crossings",
+        title=f"Every crossing of {each.name}",
+        caption=CROSSINGS if rows else "Nowhere in the band is |L| = 1, or L real and below 0.",
+        columns=(
+            Column("omega_rad_s", "frequency", "rad/s", of=omega, digits=singly(significant, 6)),
+            Column("what", "what", of=what),
+            Column("phase_margin_deg", "phase margin", "deg", of=margin, digits=singly(significant, 5)),
+            Column("factor", "factor on L", of=factor, digits=singly(significant, 5)),
+        ),
+    )
+
+
+# ------------------------------------------------------------ spill-over
+
+
+def _spilled(each: LawOnArm) -> Spill | str:
+    """The exact loop beside models of few modes, or why there is no model."""
+    try:
+        return spill(each.arm, each.any_law, MODELS)
+    except ParameterError as error:
+        return str(error)
+
+
+def spill_table(each: LawOnArm, found: Spill) -> Table:
+    """A row a model, what the exact loop says in the caption."""
+    return Table(
+        stem=f"{each.key.replace('_', '-')}-spill",
+        title=f"Models of few modes under {each.name}",
+        caption=f"{SPILLED} {upper(typeset(found.in_words))}.",
+        columns=SPILL,
+        record=found,
+    )
+
+
+# ------------------------------------------------------------ Nyquist
+
+
+def law_nyquist_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> Section:
+    """The loop function of each law on a contour that hides nothing, its turns counted."""
+    plots = [Curve(each, nyquist_under(each.arm, each.law)) for each in in_s(on_arm(arm, laws))]
+    pictures = [_disc(arm, plots[i : i + 2], 1 + i // 2) for i in range(0, len(plots), 2)]
+    names = [f"{plot.named.name}: {plot.named.gains}" for plot in plots]
+    words = [upper(_turns(plot.named.name, plot.data)) for plot in plots]
+    words.append(NYQUIST.format(own=_own_poles([plot.data for plot in plots])))
+    title = "Nyquist: does the loop function turn around −1?"
+    blocks: list[Picture | Table] = [*pictures, count_table(plots, names)]
+    return Section(anchor="margins-nyquist", title=title, words=words, blocks=blocks)
+
+
+def _disc(arm: Arm, plots: list[Curve], number: int) -> Picture:
+    stem = "nyquist" if number == 1 else f"nyquist-{number}"
+    data = curve_data(plots)
+    return Picture(
+        stem=stem,
+        title="Nyquist plots of the exact loop function",
+        caption="Rings: sizes of L; −1 lies on the ring 1. Broad: ω > 0, arrows as ω rises; thin: its mirror image.",
+        alt="; ".join(_turns(plot.named.name, plot.data) for plot in plots),
+        figure=draw_nyquist(arm.name, {plot.named.name: plot.data for plot in plots}),
+        data=Table(stem=f"{stem}-data", title=data.title, is_data=True, columns=data.columns),
+    )
+
+
+def _turns(name: str, data: Nyquist[Any]) -> str:
+    """Turns counted, poles of the law's own, and the unstable poles that follow."""
+    own = f", {counted(data.unstable_open, 'unstable pole')} of its own" if data.unstable_open else ""
+    poles = counted(data.verdict.unstable_roots, "unstable pole")
+    turns = counted(abs(data.encirclements), "turn")
+    return f"{name}: {data.verdict.verdict}, {turns} around −1{own}, {poles} of the loop."
+
+
+def _own_poles(plots: Sequence[Nyquist[Any]]) -> str:
+    return "" if any(each.unstable_open for each in plots) else ", which here is never"
+
+
+# ------------------------------------------------------------ poles
+
+
+def law_poles_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> Section:
+    """The first closed-loop poles of each law, complete in a box."""
+    named = in_s(on_arm(arm, laws))
+    found = [closed_loop_poles(each.arm, each.law) for each in named]
+    words = [_rightmost(each, poles) for each, poles in zip(named, found, strict=True)]
+    blocks = [poles_table(each, poles) for each, poles in zip(named, found, strict=True)]
+    return Section(anchor="locus", title="Where are the poles?", words=words, blocks=blocks)
+
+
+def _rightmost(each: LawOnArm, poles: Poles[Any]) -> str:
+    moving = poles.moving
+    if not moving.size:
+        return f"{upper(each.name)}: no pole but those at 0 lies in the box."
+    furthest = moving[int(np.argmax(moving.real))]
+    beside = f" ± {significant(furthest.imag, 6)} i" if furthest.imag else ""
+    return f"{upper(each.name)}: furthest right of these lies {significant(furthest.real, 6)}{beside} 1/s."
+
+
+def poles_table(each: LawOnArm, poles: Poles[Any]) -> Table:
+    """Poles with Im s >= 0, with their damping ratio."""
+    values = poles.values
+    left, right, _, top = poles.box
+    box = f"{plain(left, 5)} < Re s < {plain(right, 5)} and |Im s| < {plain(top, 6)}"
+    ratio = [float(-100 * p.real / abs(p)) + 0.0 if p else "" for p in values]
+    return Table(
+        stem=f"{each.key.replace('_', '-')}-poles",
+        title=f"Closed-loop poles under {each.name}",
+        caption=POLES.format(box=box),
+        columns=(
+            Column("real_1_s", "Re s", "1/s", of=values.real, digits=lined(8, 4)),
+            Column("imaginary_rad_s", "Im s", "rad/s", of=values.imag, digits=lined(8, 7)),
+            Column("frequency_hz", "Im s/2π", "Hz", of=values.imag / (2 * np.pi), digits=lined(8, 7)),
+            Column("damping_percent", "damping ratio", "%", of=ratio, digits=singly(significant, 4)),
+        ),
+    )

@@ -1,0 +1,339 @@
+"""The sampled loop on the page of a law: verdict, further delay, the slew in time, and a run measured on the rig."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from tfarm.arm import Arm, HubFeedback, written_unit
+from tfarm.columns import Column, Table
+from tfarm.digits import plain, scientific, significant, singly
+from tfarm.dsp import Chain, Simulation, Verdict, analyse
+from tfarm.dsp.chain import MOST_DELAY
+from tfarm.dsp.closed import verdict_on
+from tfarm.dsp.law_margins import stable_factors
+from tfarm.dsp.law_verdict import law_verdict
+from tfarm.dsp.margins import DelayMargin, delay_margin
+from tfarm.dsp.measured import Beside, beside, overshoot
+from tfarm.dsp.results import residual_moment_rms, simulate
+from tfarm.dsp.slews import LASTING
+from tfarm.errors import ParameterError
+from tfarm.plots.measured import draw_beside
+from tfarm.plots.motion import draw_responses
+from tfarm.plots.style import safe
+from tfarm.records import record
+from tfarm.report.given_laws import GivenLaw, LawOnArm, on_arm
+from tfarm.report.sampled_words import in_ms, spans
+from tfarm.report.sections import Fact, Picture, Section
+from tfarm.report.time_responses import clipped_words, resolution_words, responses_table
+from tfarm.report.words import typeset, upper
+
+SMALL = 0.05  # a sample: growth up to which damping is first order
+MORE = (0.0, 0.5, 1.0)  # samples of further delay that the verdict is asked for again
+BETWEEN = 8  # records between two samples of a slew that is drawn
+LATER = (
+    "The exact loop with so much more delay between reading and acting. |z| is the largest of its poles{apart}; below "
+    "1 the loop is stable. {held}"
+)
+APART = ", that at z = 1 of a hub that nothing holds apart"
+BESIDE = (
+    "Grey: what the controller was led by. Orange: measured. Blue: the exact sampled loop, led by the same reference "
+    "from rest, with the steps and limits of its chain; drawn from the first reference on. {sources} {assumed}"
+)
+ASSUMED = (
+    "The exact loop is linear but for that chain: no dry friction, which on a rig holds the hub off its reference at "
+    "the end and at the beginning; the controller starts from rest, without what it had gathered before; nothing is "
+    "fitted."
+)
+OVERSHOOT = (
+    "Overshoot: how far the hub goes beyond the last reference, as a share of the whole step; below 0 it never gets "
+    "there. Off at the end: hub angle less reference at the last sample. Apart: root mean square of computed less "
+    "measured."
+)
+DEGREES = 180.0 / math.pi
+
+
+@dataclass(frozen=True)
+@record
+class Held:
+    """What is said of a law at a clock: its verdict, in words where it is stable, and what further delay it bears.
+
+    `margin` is None where nothing is proven: up to where it is right that would be of the first modes alone.
+    """
+
+    each: LawOnArm
+    verdict: Verdict[Any]
+    stable_for: str
+    margin: DelayMargin | None
+
+
+@dataclass(frozen=True)
+@record
+class Later:
+    """The verdict on a law with so much more delay [samples]."""
+
+    name: str
+    more: float
+    verdict: Verdict[Any]
+
+
+def law_sampled_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> Section:
+    """Does each law hold at the chain's clock, how much later may it act, and what does it do in time?
+
+    In time: runs that were measured under every law with the exact loop over them, else the slew.
+    """
+    named = on_arm(arm, laws)
+    found = [held_by(each, chain) for each in named]
+    blocks: list[Picture | Table] = [delays_table([row for each in found for row in later(each, chain)], chain)]
+    words = [chain_told(arm, chain), *(_answer(each) + cured(each, chain) for each in found)]
+    if any(each.measured is not None for each in named):
+        blocks += _measured_blocks(named, chain)
+    if arm.has_rigid_mode and any(each.measured is None for each in named):
+        slew, said = _slew(arm, chain, named)
+        blocks += slew
+        words += said
+    return Section(
+        anchor="sampled",
+        title=f"The sampled loop: does it hold at {in_ms(chain)} ms?",
+        facts=[_fact(each) for each in found],
+        words=words,
+        blocks=blocks,
+    )
+
+
+def held_by(each: LawOnArm, chain: Chain) -> Held:
+    """The verdict on a law, and the room that it leaves."""
+    if isinstance(each.law, HubFeedback):
+        analysis = analyse(each.arm, each.law, chain)
+        windows = (("K1", analysis.K1_windows), ("K2", analysis.K2_windows))
+        told = [f"{key} {spans(them, each.law[key])}{written_unit(key, each.arm)}" for key, them in windows]
+        words = f"Stable, the other held: {'; '.join(told)}."
+        return Held(each, analysis.verdict, words, analysis.delay_margin if analysis.verdict.is_settled else None)
+    verdict = law_verdict(each.arm, each.law, chain)
+    factors = [f"{plain(low, 5)} to {plain(high, 5)}" for low, high in stable_factors(verdict.loop)]
+    words = f"Stable with the whole law times {' and '.join(factors)}." if factors else "No factor on it is stable."
+    return Held(each, verdict, words, delay_margin(verdict.loop) if verdict.is_settled else None)
+
+
+# ------------------------------------------------------------ verdict
+
+
+def chain_told(arm: Arm, chain: Chain) -> str:
+    """What stands between the law and the rig, every part that is not ideal."""
+    sampling, converters, actuator = chain.sampling, chain.converters, chain.actuator
+    told = [f"sampled every {in_ms(chain)} ms"]
+    told += [f"{plain(sampling.delay_samples)} samples late"] * bool(sampling.delay_samples)
+    if not math.isinf(sampling.antialias_corner):
+        told.append(f"through an anti-alias filter at {plain(sampling.antialias_corner)} rad/s")
+    told += [f"an encoder of {converters.encoder_counts} counts a turn"] * (converters.encoder_counts is not None)
+    told += ["the hub rate differenced from it"] * (converters.hub_rate == "difference")
+    told += [f"a moment read with {converters.moment_bits} bits"] * (converters.moment_bits is not None)
+    if not math.isinf(actuator.torque_limit):
+        told.append(f"an input of at most {plain(actuator.torque_limit)} {arm.input_unit}")
+    told += [f"hub damping of {plain(actuator.hub_damping)} N m s/rad"] * bool(actuator.hub_damping)
+    steps = " Verdicts are of the linear loop; steps and limits act in the simulations." * (not chain.is_linear)
+    return f"The chain: {', '.join(told)}.{steps}"
+
+
+def _fact(found: Held) -> Fact:
+    verdict = found.verdict
+    return Fact(
+        label=f"{found.each.name}: {found.each.gains}",
+        value=verdict.word.upper(),
+        beside=typeset(f"|z| = {plain(math.exp(verdict.log_radius), 10)}, {verdict.holds_for}"),
+    )
+
+
+def _answer(found: Held) -> str:
+    """The verdict, the room for the gain and for delay."""
+    bound, verdict = found.margin, found.verdict
+    told = f"{upper(found.each.name)}: {typeset(verdict.sentence)}. {found.stable_for}"
+    if not verdict.is_stable or bound is None:
+        return told
+    ms = 1e3 * verdict.loop.chain.sampling.period * bound.samples
+    return f"{told} It bears {'more than ' if bound.is_bound else ''}{significant(ms, 4)} ms of further delay."
+
+
+def cured(found: Held, chain: Chain) -> str:
+    """What a little Kelvin-Voigt damping makes of an arm without any: twice what balances the growth to first order.
+
+    A mode at w that grows by g a sample of T is balanced by C = 2 g/(T w^2).  Empty where that is no answer.
+    """
+    verdict, arm = found.verdict, found.each.arm
+    poles, plant = verdict.loop.poles, verdict.loop.plant
+    worst = int(np.argmax(poles.log_radius))
+    mode, growth = int(poles.mode[worst]), float(poles.log_radius[worst])
+    if not arm.has_elastic_link or mode == 0 or not 0 < growth < SMALL:
+        return ""
+    w = float(abs(plant.poles[plant.mode == mode]).max())
+    C = float(f"{2 * 2 * growth / (chain.sampling.period * w * w):.1g}")
+    damped = verdict_on(arm.having(damping=C), found.each.law, chain)
+    ratio = significant(100 * C * w / 2, 2)
+    return (
+        f" Real arms have some damping: with C = {plain(C)} s, {ratio} % of critical in mode {mode}, it is "
+        f"{typeset(damped.sentence)}."
+    )
+
+
+def later(found: Held, chain: Chain) -> list[Later]:
+    """The verdict on a law as it is, and with half a sample and a whole one of further delay."""
+    each = found.each
+    rows = [Later(each.name, 0.0, found.verdict)]
+    for more in MORE[1:]:
+        delay = chain.sampling.delay_samples + more
+        if delay + each.any_law.delay / chain.sampling.period > MOST_DELAY:
+            continue
+        late = replace(chain, sampling=replace(chain.sampling, delay_samples=delay))
+        rows.append(Later(each.name, more, verdict_on(each.arm, each.law, late)))
+    return rows
+
+
+def delays_table(rows: Sequence[Later], chain: Chain) -> Table:
+    """A row a law and delay: verdict, largest |z|, what has it, and how far that is known."""
+    T = chain.sampling.period
+    free = any(getattr(row.verdict.loop, "has_free_angle", False) for row in rows)
+    held = dict.fromkeys(f"{row.verdict.holds_for[0].upper()}{row.verdict.holds_for[1:]}." for row in rows)
+    return Table(
+        stem="sampled-delays",
+        title="With more delay",
+        caption=LATER.format(apart=APART * free, held=typeset(" ".join(held))),
+        columns=(
+            Column("law", "law", of=[row.name for row in rows]),
+            Column("further_delay_ms", "further delay", "ms", of=[1e3 * T * row.more for row in rows],
+                   digits=singly(plain)),
+            Column("verdict", "verdict", of=[row.verdict.word for row in rows]),
+            Column("spectral_radius", "largest |z|", of=[math.exp(row.verdict.log_radius) for row in rows],
+                   digits=singly(plain, 10)),
+            Column("log_spectral_radius", "ln|z| a sample", of=[row.verdict.log_radius for row in rows],
+                   digits=singly(scientific, 4)),
+            Column("slowest", "decides", of=[row.verdict.slowest for row in rows]),
+            Column("modes_used", "modes", of=[row.verdict.modes_used for row in rows]),
+        ),
+    )  # fmt: skip
+
+
+# ------------------------------------------------------------ in time
+
+
+def _slew(arm: Arm, chain: Chain, named: Sequence[LawOnArm]) -> tuple[list[Picture | Table], list[str]]:
+    """The slew of the chain under each law, and why one is not there."""
+    runs: dict[str, Simulation] = {}
+    words, slew = [], chain.slew
+    for each in named:
+        try:
+            runs[each.name] = simulate(each.arm, each.law, chain, "slew", LASTING * slew.rise_time, between=BETWEEN)
+        except ParameterError as error:
+            words.append(f"No slew of {each.name} is simulated: {typeset(str(error))}.")
+    if not runs:
+        return [], words
+    driven = next(each.arm for each in named if each.name in runs)
+    if any(each.arm.input_unit != driven.input_unit for each in named):
+        return [], [*words, "The laws drive inputs of different units: their slews are not drawn together."]
+    what = f"{plain(slew.travel_of(arm.length), 3)} m of tip travel in {plain(slew.rise_time, 3)} s"
+    shown = {safe(name): run for name, run in runs.items()}
+    caption = " ".join(_slewed(each, runs[each.name]) for each in named if each.name in runs)
+    keys = {each.key: runs[each.name] for each in named if each.name in runs}
+    picture = Picture(
+        stem="sampled-slew",
+        title="The slew",
+        caption=(
+            f"{caption}{clipped_words(runs)}{resolution_words(runs.values())} A bang-bang slew with the rigid arm's "
+            "feedforward; the dotted line is its end; the tip is shown against L times the reference angle."
+        ),
+        alt=f"Root moment, tip and motor in a slew of {what}.",
+        figure=draw_responses(driven, shown, what),
+        data=responses_table("sampled-slew-data", "The slew in time", driven, keys),
+    )
+    return [picture], words
+
+
+def _slewed(each: LawOnArm, run: Simulation) -> str:
+    """What a law leaves of the moment, and where the hub ends."""
+    if run.stopped is not None:
+        return f"{upper(each.name)}: runs away until the arm is folded up, at {significant(run.stopped.time, 3)} s."
+    law = each.any_law
+    led = [*law.references, *(name.partition(":")[2] for name in law.wanted)]
+    end = DEGREES * float(run.at_samples.hub_angle[-1] - run.scenario.hub_angle[-1])
+    what = f"led by {', '.join(dict.fromkeys(led))}" if led else "led by nothing but the feedforward"
+    return (
+        f"{upper(each.name)}, {what}: {significant(residual_moment_rms(run), 3)} N m rms left after the slew, the hub "
+        f"{plain(end, 3)} deg off at the end."
+    )
+
+
+# ------------------------------------------------------------ measured
+
+
+def _measured_blocks(named: Sequence[LawOnArm], chain: Chain) -> list[Picture | Table]:
+    """Each measured run with the exact loop over it, and both in numbers; nothing where none was measured."""
+    found = {each.name: beside(each.arm, each.law, chain, each.measured) for each in named if each.measured is not None}
+    if not found:
+        return []
+    sources = " ".join(f"{name}: {it.measured.source}." for name, it in found.items() if it.measured.source)
+    steps = ", ".join(f"{name} by {plain(DEGREES * it.measured.step, 3)} deg" for name, it in found.items())
+    picture = Picture(
+        stem="sampled-measured",
+        title="Measured on the rig, and computed",
+        caption=BESIDE.format(sources=sources, assumed=ASSUMED),
+        alt=f"Hub angle and root moment over time, measured and computed: {steps}.",
+        figure=draw_beside("Measured steps, and the exact sampled loop", found),
+        data=beside_table({each.key: found[each.name] for each in named if each.name in found}),
+    )
+    angles = {name: it for name, it in found.items() if it.measured.hub_angle.size}
+    return [picture, *([overshoot_table(angles)] if angles else [])]
+
+
+def overshoot_table(found: Mapping[str, Beside]) -> Table:
+    """A row a law: overshoot, where it ends, and the greatest moment, measured and computed."""
+    rows = [_both(it) for it in found.values()]
+    titles = {"overshoot": ("overshoot", "%"), "end": ("off at the end", "deg"), "moment": ("largest |moment|", "N m")}
+    columns = [Column("law", "law", of=list(found)),
+               Column("step_deg", "step", "deg", of=[DEGREES * it.measured.step for it in found.values()],
+                      digits=singly(plain, 4))]  # fmt: skip
+    for key, (title, unit) in titles.items():
+        for place, which in enumerate(("measured", "computed")):
+            values = [row[key][place] for row in rows]
+            name = f"{key}_{which}_{unit.replace('%', 'percent').replace(' ', '_')}"
+            columns.append(Column(name, which, unit, of=values, digits=singly(significant, 3), group=title))
+    apart = [DEGREES * it.difference_rms for it in found.values()]
+    columns.append(Column("apart_rms_deg", "apart, rms", "deg", of=apart, digits=singly(significant, 3)))
+    return Table(
+        stem="sampled-overshoot", title="Measured and computed, in numbers", caption=OVERSHOOT, columns=tuple(columns)
+    )
+
+
+def _both(it: Beside) -> dict[str, tuple[float | str, float]]:
+    """Overshoot [%], what the hub is off at the end [deg] and the largest moment [N m]: measured, computed."""
+    measured, end, step = it.measured, float(it.measured.reference[-1]), it.measured.step
+    over = [100 * overshoot(angle, step, end) for angle in (measured.hub_angle, it.hub_angle)]
+    off = [DEGREES * float(angle[-1] - end) for angle in (measured.hub_angle, it.hub_angle)]
+    moment = measured.root_moment
+    computed = float(abs(it.run.at_samples.root_moment).max())
+    return {
+        "overshoot": (over[0], over[1]),
+        "end": (off[0], off[1]),
+        "moment": (float(abs(moment).max()) if moment.size else "", computed),
+    }
+
+
+def beside_table(found: Mapping[str, Beside]) -> Table:
+    """What the picture draws: a row a sample, measured values taken between their rows."""
+    t = min((it.run.t for it in found.values()), key=len)
+    columns = [Column("t_s", "time", "s", of=t)]
+    for key, it in found.items():
+        measured = it.measured
+        columns.append(
+            Column(f"reference_{key}_rad", "reference", "rad", of=np.interp(t, measured.t, measured.reference))
+        )
+        for name, unit, values, computed in (
+            ("hub_angle", "rad", measured.hub_angle, it.hub_angle),
+            ("root_moment", "N_m", measured.root_moment, it.run.at_samples.root_moment),
+        ):
+            if values.size:
+                columns.append(Column(f"{name}_measured_{key}_{unit}", name, of=np.interp(t, measured.t, values)))
+            columns.append(Column(f"{name}_computed_{key}_{unit}", name, of=computed[: t.size]))
+    return Table(stem="sampled-measured-data", title="Measured and computed", is_data=True, columns=tuple(columns))

@@ -1,0 +1,157 @@
+"""What a law is, on the page that is about it: every number as it was read, and what the page leaves out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from tfarm.arm import Arm
+from tfarm.arm.blocks import Rational, StateSpace
+from tfarm.arm.driving import cancelled
+from tfarm.arm.law import REFERENCE, is_measured
+from tfarm.columns import FILES, REPORT, Column, Table
+from tfarm.digits import plain, singly
+from tfarm.dsp import Chain
+from tfarm.dsp.discretise import rule_in_words
+from tfarm.loop.answers import law_answer
+from tfarm.report.given_laws import GivenLaw, LawOnArm, on_arm
+from tfarm.report.sections import Section
+from tfarm.report.words import typeset, upper
+from tfarm.response.signals import Signals
+
+OPEN, FILES_ALONE = "open", (FILES,)  # a column that nothing is led to
+POWERS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
+LEFT_OUT = (
+    "This page is about what stands here, not about the default gains. The map of K1 and K2, the loci along them and "
+    "the gain tuner are of the paper's two gains and are left out; tfarm map --law FILE counts unstable poles over any "
+    "two numbers of a law, tfarm locus --law FILE follows them along one."
+)
+IN_Z = (
+    "A law in z acts at its samples alone: all that is said of {which} is said of the sampled loop, and there is no "
+    "loop function of s, no margin and no pole without a clock."
+)
+CAPTION = (
+    "As it was read, in the files with every digit: coefficients in descending powers of s, of z where the law is "
+    "discrete. The input is the sum of the signals times these, with the sign that stands under “in the input”."
+)
+
+
+def law_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> Section:
+    """Each law: what it reads and drives, its entries, and how it is sampled."""
+    named = on_arm(arm, laws)
+    words = [_words(each, chain) for each in named]
+    discrete = [each for each in named if each.is_discrete]
+    if discrete:
+        which = "it" if len(named) == 1 else " and of ".join(each.name for each in discrete)
+        words.append(IN_Z.format(which=which))
+    blocks = [entries_table(named), *(table for each in named for table in matrices_tables(each))]
+    title = "The law" if len(named) == 1 else "The laws"
+    return Section(anchor="law", title=title, words=[*words, LEFT_OUT], blocks=blocks)
+
+
+def _words(each: LawOnArm, chain: Chain) -> str:
+    """What it reads and drives, how it comes to samples, and what a person should know of it."""
+    law, T = each.any_law, chain.sampling.period
+    told = typeset(str(law_answer(law, each.arm)["sign_convention"]))
+    told = told.replace("C_i(s)", "C_i(z)") if law.is_discrete else told
+    led = f" {', '.join(law.references)} enter{'s' * (len(law.references) == 1)} less what it should be." * bool(
+        law.references
+    )
+    warned = "".join(f" Warning: {typeset(text)}." for text in cancelled(law))
+    file = f" ({each.given.file})" * bool(each.given.file)
+    return (
+        f"{upper(each.name)}{file}, order {law.order}: {told}.{led} On the loop sampled every {plain(1e3 * T)} ms it "
+        f"is {rule_in_words(law)}.{warned}"
+    )
+
+
+def entries_table(laws: Sequence[LawOnArm]) -> Table:
+    """A row a signal of each law: how it enters, and its numerator and denominator."""
+    rows = [row for each in laws for row in _entries(each)]
+    name, signal, unit, enters, sign, num, den, delay, period = ([row[i] for row in rows] for i in range(9))
+    columns = (
+        Column("law", "law", of=name),
+        Column("signal", "signal", of=signal),
+        Column("unit", "unit", of=unit),
+        Column("enters", "enters", of=enters),
+        Column("sign", "in the input", of=sign),
+        Column("numerator", "numerator", of=num, shown=[written_polynomial(str(text)) for text in num]),
+        Column("denominator", "denominator", of=den, shown=[written_polynomial(str(text)) for text in den]),
+        Column("delay_s", "delay", "s", of=delay, digits=singly(plain)),
+        Column("period_s", "period", "s", of=period, digits=singly(plain)),
+    )
+    return Table(
+        stem="law-entries",
+        title="What each signal is multiplied by",
+        caption=CAPTION,
+        columns=columns,
+    )
+
+
+Row = tuple[str, str, str, str, str, str, str, float | str, float | str]
+
+
+def _entries(each: LawOnArm) -> Iterator[Row]:
+    law, letter = each.any_law, "z" if each.is_discrete else "s"
+    sign, period = "−" if law.sign < 0 else "+", "" if law.period is None else law.period
+    for part in law.parts:
+        for name in part.signals:
+            if not name:
+                continue
+            plain_name = name.removeprefix(REFERENCE)
+            unit = Signals(each.arm, (plain_name,)).units[0]
+            led = "less its reference" if name in law.references else "as it is"
+            how = led if is_measured(name) else "its reference alone"
+            yield each.name, plain_name, unit, how, sign, *_fraction(part.block, letter), law.delay, period
+
+
+def _fraction(block: Rational | StateSpace, letter: str) -> tuple[str, str]:
+    """Numerator and denominator as coefficients with every digit, the letter before them; or where matrices stand."""
+    if isinstance(block, StateSpace):
+        return "matrices, below", ""
+    num, den = (f"{letter}: {' '.join(repr(float(c)) for c in part)}" for part in (block.num, block.den))
+    return num, den
+
+
+def written_polynomial(text: str) -> str:
+    """Coefficients as a person writes the polynomial: "s: 0.02 1.0" is 0.02 s + 1."""
+    letter, _, numbers = text.partition(": ")
+    if not numbers:
+        return text
+    coefficients = [float(each) for each in numbers.split()]
+    top, terms = len(coefficients) - 1, []
+    for power, value in zip(range(top, -1, -1), coefficients, strict=True):
+        if not value and top:
+            continue
+        size = plain(abs(value), 6)
+        number = "" if size == "1" and power else f"{size} " if power else size
+        term = number + (letter + str(power).translate(POWERS) * (power > 1)) * (power > 0)
+        terms.append(("− " if value < 0 else "+ ") + term)
+    first, *others = terms or ["+ 0"]
+    return " ".join([first.removeprefix("+ ").replace("− ", "−"), *others])
+
+
+def matrices_tables(each: LawOnArm) -> list[Table]:
+    """A, B, C and D of each part of a law that has matrices, as one block [A B; C D]; its columns by their signals."""
+    found = []
+    for number, part in enumerate(each.any_law.parts, 1):
+        if not isinstance(part.block, StateSpace):
+            continue
+        A, B, C, D = part.block.matrices()
+        n, whole = len(A), np.block([[A, B], [C, D]])
+        step = "next " if each.is_discrete else "d/dt "
+        titles = [f"x{i}" for i in range(1, n + 1)] + [name or OPEN for name in part.signals]
+        keys = [f"x{i}" for i in range(1, n + 1)] + [f"{i}_{name or 'open'}" for i, name in enumerate(part.signals, 1)]
+        columns = (
+            Column("row", "", of=[*(f"{step}x{i}" for i in range(1, n + 1)), "input"]),
+            *(
+                Column(key, title, of=whole[:, i], digits=singly(plain, 5), on=FILES_ALONE if title == OPEN else REPORT)
+                for i, (key, title) in enumerate(zip(keys, titles, strict=True))
+            ),
+        )
+        left = ", and the columns that nothing is led to" * ("" in part.signals)
+        caption = f"{each.name}: A and C under the states, B and D under the signals; the files have every digit{left}."
+        stem = f"{each.key.replace('_', '-')}-matrices" + f"-{number}" * (number > 1)
+        found.append(Table(stem=stem, title=f"Matrices of {each.name}", caption=caption, columns=columns))
+    return found

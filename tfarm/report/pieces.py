@@ -1,0 +1,84 @@
+"""What pages are made of: the sections of an arm's page, and of one that is about laws that were given."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+from tfarm.arm import Arm
+from tfarm.report.arm_section import arm_section
+from tfarm.report.assumptions_section import assumptions_section
+from tfarm.report.bode_section import bode_section
+from tfarm.report.given_laws import Subject, in_s, on_arm
+from tfarm.report.law_loop_section import law_margins_section, law_nyquist_section, law_poles_section
+from tfarm.report.law_sampled_section import law_sampled_section
+from tfarm.report.law_section import law_section
+from tfarm.report.locus_section import locus_section
+from tfarm.report.loop_laws import has_loop, has_rate_loop
+from tfarm.report.loop_section import map_section, margins_section, no_loop_section, nyquist_section
+from tfarm.report.modes_section import modes_section
+from tfarm.report.page import QUESTIONS
+from tfarm.report.paper import is_from_paper, paper_section
+from tfarm.report.sampled_section import sampled_section
+from tfarm.report.sections import Section
+from tfarm.report.tuner_section import tuner_section
+
+LOOP_PAGES = ("margins", "locus", "sampled", "tune")  # whose sections an arm without a loop has not
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """One section of one arm's page: a name for the progress bar, the section's anchor, and how to make it.
+
+    `make` takes the arm, for a section that says what the loop does when sampled (`is_sampled`) its chain, and for one
+    of given laws (`is_of_laws`) chain and laws; `in_s`: only where one of these acts without a clock.
+    """
+
+    name: str
+    anchor: str
+    questions: tuple[str, ...]  # the --only pages that have it; the full page has all
+    make: Callable[..., Section]
+    suits: Callable[[Arm], bool] = lambda arm: True
+    is_sampled: bool = False
+    is_of_laws: bool = False
+    in_s: bool = False
+
+    def is_for(self, subject: Subject) -> bool:
+        """Whether a page on this subject has the section."""
+        return self.suits(subject.arm) and (not self.in_s or bool(in_s(on_arm(subject.arm, subject.laws))))
+
+    def made(self, subject: Subject) -> Section:
+        """The section."""
+        if self.is_of_laws:
+            return self.make(*subject)
+        return self.make(subject.arm, subject.chain) if self.is_sampled else self.make(subject.arm)
+
+
+PIECES = (
+    Piece("map of the gains", "margins-map", ("margins",), map_section, has_loop, is_sampled=True),
+    Piece("the arm", "arm", tuple(QUESTIONS), arm_section),
+    Piece("the paper's values", "paper", (), paper_section, is_from_paper),
+    Piece("root moment", "bode-root-moment", ("bode",), partial(bode_section, output="root_moment")),
+    Piece("tip displacement", "bode-tip-displacement", ("bode",), partial(bode_section, output="tip_displacement")),
+    Piece("modes", "modes", ("modes",), modes_section),
+    Piece(
+        "no loop", "no-loop", ("margins", "locus", "sampled", "tune"), no_loop_section, lambda arm: not has_loop(arm)
+    ),
+    Piece("margins", "margins", ("margins",), margins_section, has_rate_loop, is_sampled=True),
+    Piece("root loci", "locus", ("locus",), locus_section, has_rate_loop),
+    Piece("Nyquist", "margins-nyquist", ("margins",), nyquist_section, has_rate_loop, is_sampled=True),
+    Piece("sampled loop", "sampled", ("sampled",), sampled_section, has_loop, is_sampled=True),
+    Piece("gain tuner", "tune", ("tune",), tuner_section, has_loop, is_sampled=True),
+    Piece("assumptions", "assumptions", ("assumptions",), assumptions_section),
+)
+OF_THE_LOOP = {piece.name for piece in PIECES if set(piece.questions) & set(LOOP_PAGES) and piece.anchor != "arm"}
+LAW_PIECES = (
+    Piece("margins", "margins", ("margins",), law_margins_section, has_rate_loop, is_of_laws=True, in_s=True),
+    Piece("sampled loop", "sampled", ("sampled",), law_sampled_section, has_rate_loop, is_of_laws=True),
+    Piece("the law", "law", LOOP_PAGES, law_section, has_rate_loop, is_of_laws=True),
+    Piece("Nyquist", "margins-nyquist", ("margins",), law_nyquist_section, has_rate_loop, is_of_laws=True, in_s=True),
+    Piece("poles", "locus", ("locus",), law_poles_section, has_rate_loop, is_of_laws=True, in_s=True),
+    Piece("no loop", "no-loop", LOOP_PAGES, no_loop_section, lambda arm: not has_rate_loop(arm)),
+    *(piece for piece in PIECES if piece.name not in OF_THE_LOOP),
+)
