@@ -16,7 +16,7 @@ from tfarm.arm.law_tables import load_law
 from tfarm.dsp import Chain, load_chain
 from tfarm.dsp.law_loop import sampled_law
 from tfarm.dsp.law_verdict import law_verdict
-from tfarm.dsp.measured import beside, load_measured, overshoot
+from tfarm.fit.runs import beside, load_run, overshoot
 from tfarm.report import law_sampled_section as in_time
 from tfarm.report import writing
 from tfarm.report.given_laws import GivenLaw, Subject, on_arm
@@ -202,16 +202,14 @@ def test_each_loop_page_of_laws_has_a_section_that_says_what_it_is_about():
         ("[law.hub_rate]\ngain = 1.0\n[measured]\nfile = 'none.csv'\n", (), "none.csv"),
         ("[law.hub_rate]\ngain = 1.0\n[measured]\nfiles = 'x.csv'\n", (), "measured"),
         ("measured = 3\n[law.hub_rate]\ngain = 1.0\n", (), "measured"),
-        ("[law.hub_rate]\ngain = 1.0\n[measured]\nfile = 'words.csv'\n", (), "finite numbers"),
-        ("[law.hub_rate]\ngain = 1.0\n[measured]\nfile = 'late.csv'\n", (), "begins with 0"),
+        ("[law.hub_rate]\ngain = 1.0\n[measured]\nfile = 'words.csv'\n", (), "words.csv"),
         ("[law.hub_rate]\ngain = 1.0\n[measured]\nfile = 'other.csv'\n", (), "reference:hub_angle"),
     ],
 )
 def test_bad_input_is_one_line_and_nothing_is_written(capsys, tmp_path, text, typed, told):
     (tmp_path / "law.toml").write_text(text)
     (tmp_path / "words.csv").write_text("t,reference:hub_angle,hub_angle\n0,0,0\n1,one,0\n")
-    (tmp_path / "late.csv").write_text("t,reference:hub_angle,hub_angle\n1,0,0\n2,1,0\n")
-    (tmp_path / "other.csv").write_text("time,angle\n1,0\n2,1\n")
+    (tmp_path / "other.csv").write_text("time,angle\n" + "".join(f"{n},0\n" for n in range(9)))
     out = tmp_path / "out"
     code, _, err = run(capsys, "report", LAB.name, "--law", str(tmp_path / "law.toml"), *typed, "--out", str(out))
     assert code == 2
@@ -224,7 +222,7 @@ def test_bad_input_is_one_line_and_nothing_is_written(capsys, tmp_path, text, ty
 
 
 def real(name):
-    return load_law(DATA / f"{name}.toml"), load_measured(DATA / f"{name}.toml")
+    return load_law(DATA / f"{name}.toml"), load_run(DATA / f"{name}.toml")
 
 
 def test_the_rig_of_the_page_is_the_preset_with_the_chain_of_its_controllers():

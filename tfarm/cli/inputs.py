@@ -139,7 +139,7 @@ def laws_of(arm: Arm, name: str, gains: dict[str, float | None], files: Sequence
     from pathlib import Path
 
     from tfarm.arm.law_tables import load_law
-    from tfarm.dsp.measured import load_measured
+    from tfarm.fit.runs import load_run
     from tfarm.report.given_laws import GivenLaw
 
     if not files and all(value is None for value in gains.values()) and load_law(name) is None:
@@ -149,7 +149,7 @@ def laws_of(arm: Arm, name: str, gains: dict[str, float | None], files: Sequence
         GivenLaw(
             law_of(arm, given)[0],
             file=Path(given.law).name if given.law else "",
-            measured=load_measured(given.law) if given.law else None,
+            measured=load_run(given.law) if given.law else None,
         )
         for given in wanted
     )

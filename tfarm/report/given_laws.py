@@ -12,8 +12,8 @@ from tfarm.arm.law import Law
 from tfarm.dsp import Chain
 from tfarm.dsp.discretise import discretised
 from tfarm.dsp.loop import check_loop
-from tfarm.dsp.measured import Measured
 from tfarm.errors import one_line
+from tfarm.fit.runs import MeasuredRun
 from tfarm.loop.law_loop import LawLoop
 from tfarm.plots.words import gains_words
 from tfarm.records import record
@@ -30,7 +30,7 @@ class GivenLaw:
 
     law: AnyLaw
     file: str = ""
-    measured: Measured | None = None
+    measured: MeasuredRun | None = None
 
     @property
     def given_name(self) -> str:
@@ -78,7 +78,7 @@ class LawOnArm:
         return self.any_law.is_discrete
 
     @property
-    def measured(self) -> Measured | None:
+    def measured(self) -> MeasuredRun | None:
         """The run that was measured under it."""
         return self.given.measured
 

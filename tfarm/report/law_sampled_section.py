@@ -18,10 +18,10 @@ from tfarm.dsp.closed import verdict_on
 from tfarm.dsp.law_margins import stable_factors
 from tfarm.dsp.law_verdict import law_verdict
 from tfarm.dsp.margins import DelayMargin, delay_margin
-from tfarm.dsp.measured import Beside, beside, overshoot
 from tfarm.dsp.results import residual_moment_rms, simulate
 from tfarm.dsp.slews import LASTING
 from tfarm.errors import ParameterError
+from tfarm.fit.runs import Beside, beside, overshoot
 from tfarm.plots.measured import draw_beside
 from tfarm.plots.motion import draw_responses
 from tfarm.plots.style import safe

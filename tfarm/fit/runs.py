@@ -4,13 +4,12 @@
     file = "step.csv"                    # beside the law's file
     source = "laboratory X, run 7"       # said wherever it is shown
 
-The .csv has a column `t` [s], one `reference:hub_angle` [rad], which is what the controller was led by, and one for
-each of `hub_angle` [rad] and `root_moment` [N m] that was measured; lines that begin with # are remarks.
+The record (a .csv, or a .mat file) has a column `t` [s], one `reference:hub_angle` [rad], which is what the controller
+was led by, and one for each of `hub_angle` [rad] and `root_moment` [N m] that was measured.
 """
 
 from __future__ import annotations
 
-import csv
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,17 +27,16 @@ from tfarm.dsp.results import modes_for, simulation_of
 from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.simulate import Simulation
 from tfarm.errors import MISSING, ParameterError
-from tfarm.files import read_file
 from tfarm.records import record
+
+from .recording import read_recording
 
 Real = NDArray[np.float64]
 
-TIME, REFERENCE, SIGNALS = "t", "reference:hub_angle", ("hub_angle", "root_moment")
-MOST_BYTES = 8 * 1024 * 1024  # of a .csv: four columns of 100,000 rows
-FEWEST = 2  # rows
+REFERENCE, ANGLE, MOMENT = "reference:hub_angle", "hub_angle", "root_moment"
 
 
-class MeasuredTable(BaseModel):
+class RunTable(BaseModel):
     """[measured]."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
@@ -49,7 +47,7 @@ class MeasuredTable(BaseModel):
 
 @dataclass(frozen=True)
 @record
-class Measured:
+class MeasuredRun:
     """A measured run: `t` (n,) [s] from 0 on, the `reference` (n,) [rad] of the hub's angle, and what was read.
 
     `hub_angle` (n,) [rad] and `root_moment` (n,) [N m] are empty where they were not measured.
@@ -83,7 +81,7 @@ class Measured:
 class Beside:
     """A measured run and the exact sampled loop that was led the same way: `run` is what moves beyond the start."""
 
-    measured: Measured
+    measured: MeasuredRun
     run: Simulation
 
     @property
@@ -99,7 +97,7 @@ class Beside:
         return float(np.sqrt(np.mean((self.hub_angle - there) ** 2)))
 
 
-def beside(arm: Arm, law: AnyLaw, chain: Chain, measured: Measured) -> Beside:
+def beside(arm: Arm, law: AnyLaw, chain: Chain, measured: MeasuredRun) -> Beside:
     """The sampled loop led as the measured one was, with as many modes as its signals take.
 
     Raises ParameterError as `simulate` does.
@@ -118,55 +116,34 @@ def overshoot(angle: Real, step: float, end: float) -> float:
 # ------------------------------------------------------------ reading
 
 
-def load_measured(name_or_path: str | os.PathLike[str]) -> Measured | None:
+def load_run(name_or_path: str | os.PathLike[str]) -> MeasuredRun | None:
     """The run of a file's [measured] table, None where it has none.
 
-    Raises ParameterError for an unknown key, and a .csv without its columns or with what is no number, naming the file.
+    Raises ParameterError for an unknown key, and for a record without these signals or that is none, naming the file.
     """
     tables, file = load_tables(name_or_path)
     if "measured" not in tables:
         return None
     try:
         table = _validated(tables["measured"])
-        data = read_file(Path(file).parent / table.file, MOST_BYTES, key="measured.file", what="a .csv file")
-        return _run_of(_columns(data, table.file), table)
+        found = read_recording(Path(file).parent / table.file)
+        led = found.signal(REFERENCE, "measured.file")
+        if not {ANGLE, MOMENT} & set(found.signals):
+            remedy = f"has neither {ANGLE} [rad] nor {MOMENT} [N m] beside {REFERENCE} [rad]"
+            raise ParameterError(key="measured.file", value=table.file, remedy=remedy)
     except ParameterError as error:
-        raise error.in_file(file) from None
+        raise error if error.file else error.in_file(file) from None
+    angle, moment = (found.signals.get(name, np.empty(0)) for name in (ANGLE, MOMENT))
+    return MeasuredRun(found.times - found.start, led, angle, moment, table.source)
 
 
-def _validated(table: Any) -> MeasuredTable:
+def _validated(table: Any) -> RunTable:
     if not isinstance(table, dict):
         raise ParameterError(key="measured", value=table, remedy="give a table, headed [measured]")
     try:
-        return MeasuredTable.model_validate(table)
+        return RunTable.model_validate(table)
     except ValidationError as error:
         problem = error.errors(include_url=False)[0]
     key = ".".join(map(str, ("measured", *problem["loc"])))
     value = MISSING if problem["type"] == "missing" else problem["input"]
     raise ParameterError(key=key, value=value, remedy="file (a .csv) and source, both texts")
-
-
-def _columns(data: bytes, name: str) -> dict[str, Real]:
-    """The columns of a .csv by their names."""
-    lines = [line for line in data.decode("utf-8-sig", "replace").splitlines() if line and not line.startswith("#")]
-    head, *rows = list(csv.reader(lines)) or [[]]
-    missing = [each for each in (TIME, REFERENCE) if each not in head]
-    if missing or not set(SIGNALS) & set(head):
-        remedy = f"has columns t [s], {REFERENCE} [rad], and hub_angle [rad] or root_moment [N m]"
-        raise ParameterError(key="measured.file", value=name, remedy=remedy)
-    try:
-        values = np.array([[float(cell) for cell in row] for row in rows], ndmin=2)
-    except ValueError:
-        values = np.empty((0, 0))
-    if values.shape[1:] != (len(head),) or len(values) < FEWEST or not np.isfinite(values).all():
-        remedy = f"has at least {FEWEST} rows of as many finite numbers as there are columns"
-        raise ParameterError(key="measured.file", value=name, remedy=remedy)
-    return dict(zip(head, values.T, strict=True))
-
-
-def _run_of(columns: dict[str, Real], table: MeasuredTable) -> Measured:
-    t = columns[TIME]
-    if t[0] != 0.0 or not (np.diff(t) > 0).all():
-        raise ParameterError(key="measured.file", value=table.file, remedy="t begins with 0 and rises")
-    angle, moment = (columns.get(name, np.empty(0)) for name in SIGNALS)
-    return Measured(t, columns[REFERENCE], angle, moment, table.source)
