@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import cont2discrete
 
 import tfarm
-from tests.shell import answer, run
+from tests.shell import answer
 from tests.synthesis.held_loop import HeldLoop
 from tfarm import Law, ParameterError
 from tfarm.arm.law_tables import load_law
@@ -86,7 +86,7 @@ def test_the_delay_is_what_the_loop_bears():
 
 @pytest.fixture(scope="module")
 def found():
-    return design(LAB, "damping", structure="PD+notch")
+    return design(LAB, "damping", structure="strain-rate")
 
 
 def test_what_is_found_holds_and_has_the_radius_of_another_model(found):
@@ -100,21 +100,18 @@ def test_what_is_found_holds_and_has_the_radius_of_another_model(found):
 def test_it_damps_better_than_where_the_search_began(found):
     judge = law_judge(LAB, Chain(), found.law, "damping", 2, 8)
     assert found.value == pytest.approx(-judge.score(found.law), rel=1e-9)
-    form = STRUCTURES["PD+notch"](LAB, found.coefficients["Kp"], 2, T)
+    form = STRUCTURES["strain-rate"](LAB, found.coefficients["Kp"], 2, T)
     rng = np.random.default_rng(3)
-    assert all(-judge.score(form.law(rng.standard_normal(5))) <= found.value for _ in range(200))
+    assert all(-judge.score(form.law(rng.standard_normal(3))) <= found.value for _ in range(200))
 
 
 def test_a_design_is_saved_and_read_back(capsys, tmp_path):
     file = tmp_path / "lead.toml"
-    code, out, err = run(capsys, "design", "sasaki2012-lab", "--structure", "lead", "--save", str(file))
-    assert (code, err) == (0, "")
-    assert "written" in out
+    found = answer(capsys, "design", "sasaki2012-lab", "--structure", "lead", "--save", str(file))
     law = load_law(file)
     assert answer(capsys, "sampled", "sasaki2012-lab", "--law", str(file))["stable"] is True
-    found = answer(capsys, "design", "sasaki2012-lab", "--structure", "lead")
     zero, pole, Kp = (found["coefficients"][name] for name in ("zero_rad_s", "pole_rad_s", "Kp"))
-    assert law == Law({"hub_angle": ((Kp / zero, Kp), (1 / pole, 1.0))}, name="lead")
+    assert law == Law({"hub_angle": ((Kp / zero, Kp), (1 / pole, 1.0))}, name="lead", references=("hub_angle",))
     assert pole <= 2 / T
     assert found["sampled"]["stable"] is True
 
@@ -123,7 +120,7 @@ def test_a_design_is_saved_and_read_back(capsys, tmp_path):
     ("options", "key"),
     [
         ({"structure": "PID"}, "structure"),
-        ({"structure": "lead", "objective": "residual"}, "objective"),
+        ({"structure": "lead", "objective": "beauty"}, "objective"),
         ({"structure": "lead", "K1": (0.0, 1.0)}, "K1"),
         ({"structure": "lead", "continuous": True}, "continuous"),
         ({"structure": "PD", "Kp": -1.0}, "Kp"),

@@ -21,6 +21,8 @@ Real = NDArray[np.float64]
 
 MOST_SAMPLES = 4_000_000
 STEP_TORQUE, IMPULSE, TIP_OFFSET = 0.1, 0.01, 0.01  # N m, N m s, m: what the scenarios of the paper's arm start with
+TRIAL_COST = (1.0, 2.6)  # 1/(N m)^2 s: weights a and b of the paper's (23), of what vibrates and of what a law adds
+TRIAL_DURATION = 3.0  # s
 PAPER_TORQUE = 3.0  # N m, of the slew of 1.15 m in 1 s of the preset sasaki2012
 
 

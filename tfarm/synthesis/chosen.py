@@ -29,9 +29,9 @@ def design(
 
     "K1-K2": gains of rate and moment within bounds, "damping", "margin" or "residual", of the sampled loop or the
     `continuous` one (see `design.design`).  "PD", "PD+notch", "lead", "PPF" of the first `modes` modes and
-    "strain-rate": a `tfarm.Law`, "damping", "margin", "sensitivity" or "delay" (see `structures`); `Kp` is chosen where
-    it is 0, and `progress` is told how the search goes on.  What is recommended holds when sampled, with all gains a
-    quarter larger or smaller, and without a clock.
+    "strain-rate": a `tfarm.Law`, "damping", "margin", "sensitivity", "delay", "residual" or "cost" (see `law_judge`);
+    `Kp` is chosen where it is 0, and `progress` is told how the search goes on.  What is recommended holds when
+    sampled, with all gains a quarter larger or smaller, and without a clock.
 
     `also` are further arms that the law has to serve, `ranges` the ends of numbers of the arm, such as
     {"payload.mass": (0.1, 0.5)}: the objective is then the worst of the arm, of those, of the corners of the box, and

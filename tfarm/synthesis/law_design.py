@@ -1,18 +1,17 @@
-"""The best law of a structure for the sampled loop: a search from many starts, and a certified verdict.
+"""The best law of a structure: a minimax search from many starts, with exact slopes, and a certified verdict.
 
-The objectives have edges where another pole, or another frequency, is the worst, and there a gradient says nothing: the
-downhill simplex of Nelder and Mead (1965) goes on from the best of many starts about the sensible one, twice each.
+The objectives have edges where another pole, or another frequency, is the worst: `minimax` takes the tangents of all of
+them.  It is run from the best of many starts about the sensible one, and once more from the best found.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
 
 from tfarm.arm import Arm
 from tfarm.arm.law import Law
@@ -28,7 +27,8 @@ from tfarm.loop.law_stability import law_stability
 from tfarm.loop.stability import Stability
 from tfarm.records import record
 from tfarm.synthesis.arms import NamedArm
-from tfarm.synthesis.law_judge import LAW_OBJECTIVES, LOST, LawJudge, law_judge
+from tfarm.synthesis.law_judge import LAW_OBJECTIVES, LawJudge, law_judge
+from tfarm.synthesis.minimax import LOST, Pieces, joined, minimax
 from tfarm.synthesis.sampled import FEWEST_MODES
 from tfarm.synthesis.structures import STRUCTURES, Structure, usual_angle_gain
 from tfarm.synthesis.together import OnArm, in_step, worst_value
@@ -37,10 +37,8 @@ from tfarm.synthesis.worst_case import ALONE, WorstCase
 Real = NDArray[np.float64]
 Progress = Callable[[str], None]
 
-STARTS, WIDTH, SEED = 48, 1.0, 0  # points about the start, how far they are spread, and of which numbers
-REFINED = 3  # of them are refined
-STEPS = 100  # evaluations a coefficient of a simplex
-SIZE = 0.3  # of the first simplex, in logarithms
+STARTS, WIDTH, SEED = 16, 1.0, 0  # points about the start a coefficient, how far they are spread, of which numbers
+REFINED, MOST_REFINED = 2, 6  # of them a coefficient are searched from, and at most
 
 
 @dataclass(frozen=True)
@@ -92,20 +90,22 @@ def law_design(
     arms = (NamedArm(arm.name, arm, {}), *others)
     for counts in in_step([_counts(each.arm, chain, modes) for each in arms]):
         judges = [
-            law_judge(each.arm, chain, form.law(form.origin), objective, modes, count)
+            law_judge(each.arm, chain, form.law(form.origin), objective, modes, count, arm)
             for each, count in zip(arms, counts, strict=True)
         ]
         for x in _best(judges, form, tell):
             law = form.law(x)
             if all(judge.holds(law) for judge in judges):
                 named = dict(zip(form.names, form.coefficients(x).tolist(), strict=True))
+                sampled = [law_verdict(each.arm, law, chain) for each in arms]
                 on_arms = [
-                    _on_arm(each, judge.value(law), law, chain) for each, judge in zip(arms, judges, strict=True)
+                    OnArm(each.name, each.numbers, judge.value(law), law_stability(each.arm, law), brief_of(own, chain))
+                    for each, judge, own in zip(arms, judges, sampled, strict=True)
                 ]
                 return LawDesign(
                     objective, structure, law, {"Kp": Kp} | named, form.at_limit(x),
                     worst_value(objective, [each.value for each in on_arms]),
-                    cast("Stability[LawLoop]", on_arms[0].verdict), law_verdict(arm, law, chain), modes, chain,
+                    cast("Stability[LawLoop]", on_arms[0].verdict), sampled[0], modes, chain,
                     tuple(on_arms),
                 )  # fmt: skip
     raise ConvergenceError(
@@ -113,16 +113,11 @@ def law_design(
     )
 
 
-def _on_arm(each: NamedArm, value: float, law: Law, chain: Chain) -> OnArm:
-    """The verdicts on one arm."""
-    sampled = brief_of(law_verdict(each.arm, law, chain), chain)
-    return OnArm(each.name, each.numbers, value, law_stability(each.arm, law), sampled)
-
-
 def score_on(found: LawDesign, arm: Arm) -> float:
     """What a design minimised, on another arm; `LOST` and more where the loop does not hold."""
-    count = next(_counts(arm, found.chain, found.modes))
-    return law_judge(arm, found.chain, found.law, found.objective, found.modes, count).score(found.law)
+    count, known = next(_counts(arm, found.chain, found.modes)), found.verdict.loop.arm
+    judge = law_judge(arm, found.chain, found.law, found.objective, found.modes, count, known)
+    return judge.score(found.law)
 
 
 def _counts(arm: Arm, chain: Chain, modes: int) -> Iterator[int]:
@@ -140,23 +135,29 @@ def _counts(arm: Arm, chain: Chain, modes: int) -> Iterator[int]:
 
 def _best(judges: Sequence[LawJudge], form: Structure, tell: Progress) -> list[Real]:
     """The best points found, the best first; those that are not stable left out."""
+
+    def pieces(x: Real) -> Pieces:
+        return _pieces(judges, form, x)
+
     rng = np.random.default_rng(SEED)
-    points = [form.origin, *(WIDTH * rng.standard_normal((STARTS, form.origin.size)))]
+    points = [form.origin, *(WIDTH * rng.standard_normal((STARTS * form.origin.size, form.origin.size)))]
     scores = [_score(judges, form, x) for x in points]
-    order = np.argsort(scores, kind="stable")[:REFINED]
-    found = []
-    for number, n in enumerate(order, 1):
-        x = points[n]
-        for size in (SIZE, SIZE / 10):
-            x = _refined(judges, form, x, size)
-        found.append((_score(judges, form, x), x))
-        tell(f"{form.name}: search {number} of {len(order)}, best so far {min(found, key=_first)[0]:.6g}")
-    found += [(scores[n], points[n]) for n in order]
-    return [x for score, x in sorted(found, key=_first) if score < LOST]
+    best = [points[n] for n in np.argsort(scores, kind="stable")[: min(REFINED * (1 + form.origin.size), MOST_REFINED)]]
+
+    def told(number: int, score: float) -> None:
+        tell(f"{form.name}: search {number}, best so far {score:.6g}")
+
+    return [x for score, x in minimax(pieces, best, form.upper, told) if score < LOST]
 
 
-def _first(pair: tuple[float, Real]) -> float:
-    return pair[0]
+def _pieces(judges: Sequence[LawJudge], form: Structure, x: Real) -> Pieces:
+    """The functions of all arms, and their slopes; one that is lost where the coefficients are no law."""
+    try:
+        law, slopes = form.law(x), form.slopes(x)
+        return joined([judge.pieces(law, slopes) for judge in judges])
+    except (ParameterError, np.linalg.LinAlgError):  # coefficients too large to be a law
+        flat = np.zeros((1, x.size))
+        return Pieces(np.zeros(1), flat, np.array([1e6]), flat)
 
 
 def _score(judges: Sequence[LawJudge], form: Structure, x: Real) -> float:
@@ -168,16 +169,5 @@ def _score(judges: Sequence[LawJudge], form: Structure, x: Real) -> float:
             if worst >= LOST:
                 break
         return worst
-    except (ParameterError, np.linalg.LinAlgError):  # coefficients too large to be a law
+    except (ParameterError, np.linalg.LinAlgError):
         return LOST * 1e9
-
-
-def _refined(judges: Sequence[LawJudge], form: Structure, x: Real, size: float) -> Real:
-    simplex = x + size * np.vstack([np.zeros(x.size), np.eye(x.size)])
-    options: Any = {"initial_simplex": simplex, "xatol": 1e-6, "fatol": 1e-9, "maxfev": STEPS * x.size}
-
-    def score(at: Any) -> float:
-        return _score(judges, form, at)
-
-    done = minimize(score, x, method="Nelder-Mead", options=options)
-    return np.asarray(done.x, dtype=float)

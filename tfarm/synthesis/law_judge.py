@@ -1,14 +1,17 @@
-"""Laws judged by the sampled loop of few modes: the poles of its matrix, or its loop function on the unit circle.
+"""Laws judged by the sampled loop of few modes, with the slopes of what they are worth by their coefficients.
 
 damping       least damping ratio of the oscillating poles, those of higher modes left out (see `sampled`)
 margin        min 2 |1 + L|/|1 - L|
 sensitivity   max |S|, S = 1/(1 + L)
 delay         the least further delay [s] that turns L to -1 where |L| = 1: (pi + arg L)/q samples, q its angle
+residual      root mean square of the root moment at the samples after the slew of the chain
+cost          T sum of (a x^2 + b e^2)/2 over a slew, the tuner's: x the moment less the rigid arm's, e what is added
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -16,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm
-from tfarm.arm.law import Law
+from tfarm.arm.blocks import Rational
+from tfarm.arm.law import Law, Part
 from tfarm.dsp import Chain
 from tfarm.dsp.law_loop import SampledLaw, acting_law, sampled_law, with_estimate
 from tfarm.dsp.law_verdict import law_verdict
@@ -24,60 +28,72 @@ from tfarm.errors import ConvergenceError
 from tfarm.loop.law_stability import law_stability
 from tfarm.records import record
 from tfarm.reduced.partial_fractions import Matrices
-from tfarm.reduced.sensed import closed, sensed_model
-from tfarm.synthesis.sampled import RESERVE, SEARCHED, circle_angles, disk_of, first_damping, higher_poles, lowest
+from tfarm.reduced.sensed import sensed_model
+from tfarm.synthesis.law_slew import SLEWED, LawSlew
+from tfarm.synthesis.law_slopes import Clock, pole_slopes
+from tfarm.synthesis.minimax import Pieces
+from tfarm.synthesis.pieces import Curve, damping_pieces, growth_pieces
+from tfarm.synthesis.sampled import RESERVE, SEARCHED, circle_angles, disk_of, higher_poles, lowest, of_first_modes
+from tfarm.synthesis.structures import Slope
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
-LAW_OBJECTIVES = ("damping", "margin", "sensitivity", "delay")
-LOST = 1e3  # score of a loop that is not stable, and more the further its poles are outside
+LAW_OBJECTIVES = ("damping", "margin", "sensitivity", "delay", "residual", "cost")
 ON_AXIS = 1e-6  # of |s|: an eigenvalue so little right of the axis may be the model's own, of modes left out
-LONGEST = 100.0  # samples: the delay margin where |L| is nowhere 1
 
 
 @dataclass(frozen=True)
 @record
 class LawJudge:
-    """What laws on the signals of `loop` are worth in the sampled loop of its modes."""
+    """What laws on the signals of `loop` are worth in the sampled loop of its modes; slews are made for `known`."""
 
     arm: Arm
     chain: Chain
     loop: SampledLaw
     objective: str
     modes: int
-
-    def loop_of(self, law: Law) -> SampledLaw:
-        """The loop of a law on these signals."""
-        acting, late = acting_law(self.arm, law, self.chain)
-        return SampledLaw(self.loop.sensed, late, with_estimate(acting, late), law)
+    known: Arm
 
     def score(self, law: Law) -> float:
         """What is minimised; `LOST` and more where the loop is not stable, with `RESERVE` too."""
+        return self.pieces(law, ()).score
+
+    def pieces(self, law: Law, slopes: Sequence[Slope]) -> Pieces:
+        """What the score is the largest of, with its slopes: growth of poles, and the objective's own."""
         acting = with_estimate(acting_law(self.arm, law, self.chain)[0], self.chain)
-        A, B, C, D = acting.matrices()
-        shares = (1.0, 1 / SEARCHED, SEARCHED)
-        poles = [np.linalg.eigvals(closed(self._held, (A, B, share * C, share * D))) for share in shares]
-        outside = max(float(abs(z).max()) for z in poles) - 1.0
-        if outside >= 0.0:
-            return LOST * (1.0 + min(outside, 1e6))
-        s = np.linalg.eigvals(closed(self._continuous, law.matrices()))
-        if (grows := float((s.real / np.maximum(abs(s), 1e-300)).max())) > ON_AXIS:  # without a clock it does not hold
-            return LOST * (1.0 + grows)
+        A, B, C, D = acting.matrices(self._signals)
+        growth = []
+        for share in (1.0, 1 / SEARCHED, SEARCHED):
+            z, moves = pole_slopes(self._held, (A, B, share * C, share * D), slopes, share, self._signals, self._clock)
+            growth.append(
+                growth_pieces(np.log(np.maximum(abs(z), 1e-300)), (moves / np.where(z == 0, 1.0, z)[:, None]).real)
+            )
+            if share == 1.0:
+                poles, ways = z, moves
+        asked = self.loop.asked.signals
+        s, moves = pole_slopes(self._continuous, law.matrices(asked), slopes, 1.0, asked, Clock(None))
+        size = np.maximum(abs(s), 1e-300)
+        turn = moves.real / size[:, None] - (s.real / size**3)[:, None] * (s.conj()[:, None] * moves).real
+        growth.append(growth_pieces(s.real / size - ON_AXIS, turn))
+        g, dg = (np.concatenate(each) for each in zip(*growth, strict=True))
+        if g.max() >= 0.0:
+            return Pieces(np.zeros(1), np.zeros((1, dg.shape[1])), g, dg)
         if self.objective == "damping":
-            return -float(first_damping(poles[0][None].astype(complex), self._higher)[0])
-        value = self._on_circle(acting)
-        return value if self.objective == "sensitivity" else -value
+            first = of_first_modes(poles[None], self._higher)[0]
+            return Pieces(*damping_pieces(poles, ways, first), g, dg)
+        if self.objective in SLEWED:
+            return Pieces(*self._slew.pieces(self.objective, law, acting, slopes), g, dg)
+        return Pieces(*self._curve.pieces(self.objective, acting, slopes), g, dg)
 
     def value(self, law: Law) -> float:
         """The objective of one law, between the points of the circle too."""
-        loop = self.loop_of(law)
-        if self.objective == "damping":
-            return float(first_damping(loop.eigenvalues[None], self._higher)[0])
-        if self.objective == "delay":
-            return self._on_circle(loop.law)
+        if self.objective not in ("margin", "sensitivity"):
+            score = self.score(law)
+            return score if self.objective in SLEWED else -score
+        acting = with_estimate(acting_law(self.arm, law, self.chain)[0], self.chain)
         of = disk_of if self.objective == "margin" else _distance
-        least = lowest(lambda q: of(_loop_function(loop.law, q, loop.pulse(np.exp(1j * q)))), self._angles)
+        least = lowest(lambda q: of(self._loop_function(acting, q)), np.asarray(self._curve.places.imag, dtype=float))
         return least if self.objective == "margin" else 1 / least
 
     def holds(self, law: Law) -> bool:
@@ -89,18 +105,39 @@ class LawJudge:
         except ConvergenceError:
             return False
 
+    @property
+    def _signals(self) -> tuple[str, ...]:
+        return self.loop.law.signals
+
+    @cached_property
+    def _clock(self) -> Clock:
+        chain = self.chain
+        by_difference = chain.converters.hub_rate == "difference"
+        T = chain.sampling.period
+        return Clock(T, float(np.exp(-chain.converters.rate_filter * T)) if by_difference else None)
+
     @cached_property
     def _higher(self) -> list[complex]:
         return higher_poles(self.loop.pulse, self.modes)
 
     @cached_property
-    def _held(self) -> tuple[Real, Real, Real, Real]:
-        """The plant under a hold, without integrals of the input that it does not feel; a law holds the angle."""
+    def _gone(self) -> list[int]:
+        """States that are integrals of the input which the plant does not feel: a law holds the angle."""
+        first, felt = (
+            sum(each.size * n for each, n in zip(self.loop.pulse.kept(), (2, 1), strict=True)),
+            self.arm.has_rigid_mode,
+        )
+        return [first, *([] if felt else [first + 1])] if self.loop.is_damped or not felt else []
+
+    @cached_property
+    def _held(self) -> Matrices:
+        """The plant under a hold."""
         A, B, C = self.loop.pulse.matrices()
-        first = 2 * self.loop.pulse.kept()[0].size + self.loop.pulse.kept()[1].size
-        felt = self.arm.has_rigid_mode
-        gone = [first, *([] if felt else [first + 1])] if self.loop.is_damped or not felt else []
-        A, B, C = np.delete(np.delete(A, gone, 0), gone, 1), np.delete(B, gone), np.delete(C, gone, 1)
+        A, B, C = (
+            np.delete(np.delete(A, self._gone, 0), self._gone, 1),
+            np.delete(B, self._gone),
+            np.delete(C, self._gone, 1),
+        )
         return A, B[:, None], C, np.zeros((len(C), 1))
 
     @cached_property
@@ -109,26 +146,20 @@ class LawJudge:
         return sensed_model(self.arm, self.loop.asked.signals, self.loop.plant.count)
 
     @cached_property
-    def _angles(self) -> Real:
-        return circle_angles(self.loop.pulse)
+    def _curve(self) -> Curve:
+        """The circle, as i times its angles."""
+        q = circle_angles(self.loop.pulse)
+        z = np.exp(1j * q)
+        return Curve(1j * q, z, self.loop.pulse(z), self._signals, self._clock, self.chain.sampling.period)
 
     @cached_property
-    def _plant(self) -> Complex:
-        return self.loop.pulse(np.exp(1j * self._angles))
+    def _slew(self) -> LawSlew:
+        last = sum(each.size * n for each, n in zip(self.loop.pulse.kept(), (2, 1), strict=True)) + 2 - len(self._gone)
+        return LawSlew(self.arm, self.known, self.chain, self._held, self._signals, last, self._clock)
 
-    def _on_circle(self, law: Law) -> float:
-        """Disk margin, largest |S| or delay margin [s] of a law in z, by the points of a grid."""
-        L = _loop_function(law, self._angles, self._plant)
-        if self.objective == "margin":
-            return float(disk_of(L).min())
-        if self.objective == "sensitivity":
-            return float(1 / _distance(L).min())
-        return self.chain.sampling.period * _delay(self._angles, L)
-
-
-def _loop_function(law: Law, q: Real, plant: Complex) -> Complex:
-    """L at e^{iq} (n,), of the plant (signals, n) there."""
-    return np.asarray((law.values(np.exp(1j * q)) * plant).sum(axis=0))
+    def _loop_function(self, acting: Law, q: Real) -> Complex:
+        z = np.exp(1j * q)
+        return replace(self._curve, places=1j * q, points=z, plant=self.loop.pulse(z)).loop_function(acting)
 
 
 def _distance(L: Complex) -> Real:
@@ -136,18 +167,13 @@ def _distance(L: Complex) -> Real:
     return np.asarray(abs(1 + L))
 
 
-def _delay(q: Real, L: Complex) -> float:
-    """The least delay in samples at the points where |L| passes 1, between two points along straight lines."""
-    size, turn = np.log(np.maximum(abs(L), 1e-300)), np.mod(np.pi + np.unwrap(np.angle(L)), 2 * np.pi)
-    (at,) = np.nonzero(size[1:] * size[:-1] <= 0)
-    if not at.size:
-        return LONGEST
-    share = size[at] / np.where(size[at] == size[at + 1], 1.0, size[at] - size[at + 1])
-    step = np.mod(turn[at + 1] - turn[at] + np.pi, 2 * np.pi) - np.pi
-    angle, left = q[at] + share * (q[at + 1] - q[at]), np.mod(turn[at] + share * step, 2 * np.pi)
-    return min(LONGEST, float((left / angle).min()))
+def law_judge(
+    arm: Arm, chain: Chain, law: Law, objective: str, modes: int, count: int, known: Arm | None = None
+) -> LawJudge:
+    """The judge of laws on the signals of one, with `count` flexible modes; slews are made for `known`, or the arm.
 
-
-def law_judge(arm: Arm, chain: Chain, law: Law, objective: str, modes: int, count: int) -> LawJudge:
-    """The judge of laws on the signals of one, with `count` flexible modes."""
-    return LawJudge(arm, chain, sampled_law(arm, law, chain, count=count), objective, modes)
+    A law that does not read the root moment reads it with a gain of 0 where that is what counts.
+    """
+    if objective in SLEWED and "root_moment" not in law.signals:
+        law = replace(law, parts=(*law.parts, Part(("root_moment",), Rational((0.0,)))))
+    return LawJudge(arm, chain, sampled_law(arm, law, chain, count=count), objective, modes, known or arm)

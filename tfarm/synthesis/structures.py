@@ -7,14 +7,15 @@
     strain-rate   PD, and -g s/(1 + s/pole) M
 
 N(s) = (s^2 + 2 a w s + w^2)/(s^2 + 2 b w s + w^2).  M is the root moment: of either sign, as g is.  Kp is held: it says
-how fast the angle answers, sqrt(Kp/J), and the objectives would have it small.  A pole faster than 2/T is none when
-sampled by Tustin's rule, but rings: there the search ends.
+how fast the angle answers, sqrt(Kp/J), and the objectives would have it small.  Signals enter less their references.
+A pole faster than 2/T is none when sampled by Tustin's rule, but rings: there the search ends.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,16 +26,38 @@ from tfarm.records import record
 from tfarm.spectrum import modes as natural_modes
 
 Real = NDArray[np.float64]
+Numbers = NDArray[Any]  # real, or complex for a derivative
 
 SPEED = 0.1  # of the first frequency, and rad a sample: how fast the angle answers unless it is said
+WIDEST = 40.0  # of x
+AT_MOST = 1e-9  # relative: a coefficient so near to its limit is there
+ONE = np.ones(1)
+IMAGINARY = 1e-30  # of a step: its square is nothing beside 1 in float64
+
+
+class Entry(NamedTuple):
+    """What a signal is multiplied by: polynomials in s, descending, of the coefficients."""
+
+    signal: str
+    num: Numbers
+    den: Numbers
+
+
+class Slope(NamedTuple):
+    """An entry, and d num/dx_j and d den/dx_j (n, degrees) by the coordinates of the search."""
+
+    entry: Entry
+    num: Real
+    den: Real
 
 
 @dataclass(frozen=True)
 @record
 class Structure:
-    """A law with free coefficients: their `names`, where they `start` (n,) and end (`most`), and the law that has them.
+    """A law with free coefficients: their `names`, where they `start` (n,) and end (`most`), and its entries.
 
-    Coefficient i is start e^x where `is_positive`, else start sinh(x).
+    Coefficient i is start e^x where `is_positive`, else start sinh(x).  `entries` makes polynomials of coefficients, by
+    operations that are analytic in them.
     """
 
     name: str
@@ -42,21 +65,48 @@ class Structure:
     start: Real
     is_positive: tuple[bool, ...]
     most: Real
-    build: Callable[[Real], Law]
+    entries: Callable[[Numbers], tuple[Entry, ...]]
 
     def at_limit(self, x: Real) -> tuple[str, ...]:
         """The names of coefficients that are as large as they may be."""
-        return tuple(n for n, c, most in zip(self.names, self.coefficients(x), self.most, strict=True) if c >= most)
+        near = (1 - AT_MOST) * self.most
+        return tuple(n for n, c, most in zip(self.names, self.coefficients(x), near, strict=True) if c >= most)
 
     def coefficients(self, x: Real) -> Real:
         """The coefficients at x."""
         signs = np.array(self.is_positive)
-        x = np.clip(x, -40.0, 40.0)
+        x = np.clip(x, -WIDEST, WIDEST)
         return np.asarray(np.minimum(np.where(signs, self.start * np.exp(x), self.start * np.sinh(x)), self.most))
 
     def law(self, x: Real) -> Law:
         """The law at x."""
-        return self.build(self.coefficients(x))
+        entries = self.entries(self.coefficients(x))
+        blocks = {each.signal: (tuple(each.num.tolist()), tuple(each.den.tolist())) for each in entries}
+        return Law(blocks, name=self.name, references=tuple(blocks))
+
+    def slopes(self, x: Real) -> tuple[Slope, ...]:
+        """The entries at x and their derivatives by x, exact to rounding: f'(c) = Im f(c + i h)/h as h -> 0.
+
+        (Squire and Trapp, 1998.)
+        """
+        c, stepped = self.coefficients(x), np.where(self.is_positive, np.exp(x), np.cosh(x)) * self.start
+        steps = 1j * IMAGINARY * np.diag(stepped)
+        moved = [self.entries(c + step) for step in steps]
+        return tuple(
+            Slope(
+                entry,
+                np.array([row[n].num.imag / IMAGINARY for row in moved]),
+                np.array([row[n].den.imag / IMAGINARY for row in moved]),
+            )
+            for n, entry in enumerate(self.entries(c))
+        )
+
+    @property
+    def upper(self) -> Real:
+        """The largest x (n,): where a coefficient is as large as it may be."""
+        with np.errstate(over="ignore"):
+            share = self.most / self.start
+        return np.where(np.isfinite(share), np.log(np.abs(share)), WIDEST)
 
     @property
     def origin(self) -> Real:
@@ -75,67 +125,72 @@ def _rate_gain(arm: Arm, Kp: float) -> float:
     return float(np.sqrt(2 * Kp * arm.turned_inertia))
 
 
-def _pd(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
-    def build(c: Real) -> Law:
-        return Law({"hub_angle": Kp, "hub_rate": float(c[0])}, name="PD")
+def _servo(Kp: float, c: Numbers) -> tuple[Entry, Entry]:
+    """Kp on the angle, the first coefficient on its rate."""
+    return Entry("hub_angle", Kp * ONE, ONE), Entry("hub_rate", c[:1], ONE)
 
-    return Structure("PD", ("K1",), np.array([_rate_gain(arm, Kp)]), (True,), np.array([np.inf]), build)
+
+def _pd(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
+    def entries(c: Numbers) -> tuple[Entry, ...]:
+        return _servo(Kp, c)
+
+    return Structure("PD", ("K1",), np.array([_rate_gain(arm, Kp)]), (True,), np.array([np.inf]), entries)
 
 
 def _pd_notch(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
     first = float(natural_modes(arm, 1).natural_frequency[-1])
 
-    def build(c: Real) -> Law:
+    def entries(c: Numbers) -> tuple[Entry, ...]:
         K1, pole, w, a, b = c
         num = np.polymul([K1 + Kp / pole, Kp], [1.0, 2 * a * w, w * w])
         den = np.polymul([1 / pole, 1.0], [1.0, 2 * b * w, w * w])
-        return Law({"hub_angle": (num, den)}, name="PD+notch")
+        return (Entry("hub_angle", num, den),)
 
     names = ("K1", "pole_rad_s", "notch_rad_s", "notch_zero_damping", "notch_pole_damping")
     start = np.array(
         [_rate_gain(arm, Kp), 2 / period, min(first, 1 / period), 0.1, 0.7]
     )  # a derivative as fast as samples tell
     most = np.array([np.inf, 2 / period, 2 / period, np.inf, np.inf])
-    return Structure("PD+notch", names, start, (True,) * 5, most, build)
+    return Structure("PD+notch", names, start, (True,) * 5, most, entries)
 
 
 def _lead(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
-    def build(c: Real) -> Law:
+    def entries(c: Numbers) -> tuple[Entry, ...]:
         zero, pole = c
-        return Law({"hub_angle": ((Kp / zero, Kp), (1 / pole, 1.0))}, name="lead")
+        return (Entry("hub_angle", np.array([Kp / zero, Kp]), np.array([1 / pole, 1.0])),)
 
     start, most = np.array([Kp / _rate_gain(arm, Kp), 2 / period]), np.array([np.inf, 2 / period])
-    return Structure("lead", ("zero_rad_s", "pole_rad_s"), start, (True, True), most, build)
+    return Structure("lead", ("zero_rad_s", "pole_rad_s"), start, (True, True), most, entries)
 
 
 def _ppf(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
     frequencies = natural_modes(arm, modes).natural_frequency[-modes:]
 
-    def build(c: Real) -> Law:
-        num, den = np.zeros(1), np.ones(1)
+    def entries(c: Numbers) -> tuple[Entry, ...]:
+        num, den = np.zeros(1), ONE
         for g, w, zeta in c[1:].reshape(modes, 3):
             own = np.array([1.0, 2 * zeta * w, w * w])
             num = np.polyadd(np.polymul(num, own), g * w * w * den)
             den = np.polymul(den, own)
-        return Law({"hub_angle": Kp, "hub_rate": float(c[0]), "root_moment": (num, den)}, name="PPF")
+        return (*_servo(Kp, c), Entry("root_moment", num, den))
 
     names = ("K1", *(f"{each}_{n}" for n in range(1, modes + 1) for each in ("gain", "filter_rad_s", "filter_damping")))
     unit = 0.1 * arm.input_per_torque
     start = np.r_[_rate_gain(arm, Kp), np.array([[unit, min(w, 1 / period), 0.3] for w in frequencies]).ravel()]
     most = np.r_[np.inf, np.tile([np.inf, 2 / period, np.inf], modes)]
-    return Structure("PPF", names, start, (True, *(False, True, True) * modes), most, build)
+    return Structure("PPF", names, start, (True, *(False, True, True) * modes), most, entries)
 
 
 def _strain_rate(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
     first = float(natural_modes(arm, 1).natural_frequency[-1])
 
-    def build(c: Real) -> Law:
-        K1, g, pole = (float(each) for each in c)
-        return Law({"hub_angle": Kp, "hub_rate": K1, "root_moment": ((g, 0.0), (1 / pole, 1.0))}, name="strain-rate")
+    def entries(c: Numbers) -> tuple[Entry, ...]:
+        _, g, pole = c
+        return (*_servo(Kp, c), Entry("root_moment", np.array([g, 0.0]), np.array([1 / pole, 1.0])))
 
     start = np.array([_rate_gain(arm, Kp), 0.1 * arm.input_per_torque / first, 2 / period])
     most = np.array([np.inf, np.inf, 2 / period])
-    return Structure("strain-rate", ("K1", "gain_s", "pole_rad_s"), start, (True, False, True), most, build)
+    return Structure("strain-rate", ("K1", "gain_s", "pole_rad_s"), start, (True, False, True), most, entries)
 
 
 STRUCTURES: dict[str, Callable[[Arm, float, int, float], Structure]] = {

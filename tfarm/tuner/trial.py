@@ -26,6 +26,7 @@ from tfarm.arm import Arm, HubFeedback
 from tfarm.arm.checks import not_negative, number, positive
 from tfarm.dsp import Chain, SampledLoop, Scenario, sampled_loop, scenario
 from tfarm.dsp.results import rms_after
+from tfarm.dsp.scenarios import TRIAL_COST, TRIAL_DURATION
 from tfarm.errors import ParameterError, did_you_mean
 from tfarm.records import record
 from tfarm.spectrum.scales import default_gains
@@ -37,7 +38,7 @@ Signals = Literal["vibration", "total"]
 
 SILENT = Network(np.zeros((1, 6)), np.zeros(1), np.ones(6))
 FOLDED_UP = 10.0  # the loop has run away where the root moment is this many times EI/L
-DURATION, MODES = 3.0, 6
+DURATION, MODES = TRIAL_DURATION, 6
 ANGLE_GAIN = "the hub angle gain is zero or positive, in N m/rad"
 
 
@@ -45,8 +46,8 @@ ANGLE_GAIN = "the hub angle gain is zero or positive, in N m/rad"
 class Cost:
     """The weighting coefficients `a` [1/(N m)^2 s], of the root moment, and `b`, of the control signal e."""
 
-    a: float = 1.0
-    b: float = 2.6
+    a: float = TRIAL_COST[0]
+    b: float = TRIAL_COST[1]
 
     def __post_init__(self) -> None:
         for name in ("a", "b"):
