@@ -146,6 +146,6 @@ def cost_map(data: CostMap, *, ax: Axes) -> None:
     ax.xaxis.set_minor_locator(NullLocator())
     ax.tick_params(length=0)
     ax.grid(False)
-    ax.set_xlabel("learning rate η_c")
-    ax.set_ylabel("momentum α_c")
+    ax.set_xlabel(r"learning rate $\eta_c$")
+    ax.set_ylabel(r"momentum $\alpha_c$")
     ax.legend(loc="upper left", bbox_to_anchor=(0.0, -0.16), ncols=2, borderaxespad=0.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -32,6 +33,7 @@ LEAST_AREA = 0.004  # of the picture: smaller regions are not labelled
 LETTER = (0.01, 0.018)  # of the picture's width and height: what a letter takes, across and upright
 MARKS = 7  # frequencies written along the boundary
 DIAMOND, STAR = "D", "*"  # of laws
+HALO: dict[str, Any] = {"facecolor": "white", "edgecolor": "none", "pad": 0.4, "alpha": 0.75}  # of numbers
 K2_TICKS = (-50, -20, -10, -5, -2, -1, 0, 1, 2)
 
 
@@ -103,7 +105,8 @@ def contours(K1: Real, K2: Real, damping: Real, ax: Axes) -> None:
     if not levels:
         return
     lines = ax.contour(K1, K2, np.ma.masked_invalid(damping), levels=levels, colors=BLUE, linewidths=0.9)
-    ax.clabel(lines, fmt=lambda level: f"{plain(100 * level, 3)} %", fontsize=8.0, inline_spacing=3)
+    for label in ax.clabel(lines, fmt=lambda level: f"{plain(100 * level, 3)} %", fontsize=8.0, inline_spacing=3):
+        label.set(bbox=HALO, zorder=5.5)  # above the edges that it may lie next to
     ax.plot([], [], color=BLUE, lw=0.9, label="least damping ratio of the first two modes")
 
 
@@ -132,8 +135,8 @@ def boundary(found: Region, points: Real, x: Axis, y: Axis, ax: Axes) -> None:
     for K1, K2, omega in _chosen(stable_edge(found, points, x, y), x, y):
         ax.plot([K1], [K2], "o", ms=4.0, mfc="white", mec=INK, mew=1.0, zorder=5)
         ax.annotate(
-            f"{significant(omega, 3)}", (K1, K2), textcoords="offset points", xytext=(0, 5), ha="center",
-            fontsize=8.0, zorder=6,
+            f"{significant(omega, 3)}", (K1, K2), textcoords="offset points", xytext=(0, 6), ha="center",
+            fontsize=8.0, zorder=6, bbox=HALO,
         )  # fmt: skip
     ax.plot([], [], "o", ms=4.0, mfc="white", mec=INK, mew=1.0, label="with ω in rad/s")
 
