@@ -5,6 +5,7 @@ Segments are crossed by their transition functions, entire in s^2/(1 + C s): no 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
@@ -55,12 +56,12 @@ class Sweep:
     @cached_property
     def input(self) -> Any:
         """What the input must be for this response: zero at a pole."""
-        return drive_of(self.layout.chain.drive, self.s, self.theta, self.M)
+        return drive_of(self.layout.chain.drive, self.s, self.theta, self.M, self.exact)
 
     @cached_property
     def states(self) -> dict[int, Row]:
         """W, Psi, M and Q at each mark."""
-        one, none = rational(1) + 0 * self.s, 0 * self.s
+        one, none = self.exact(1) + 0 * self.s, 0 * self.s
         f: Row = (one, none, none, none)
         found: dict[int, Row] = {}
         for each in reversed(self.layout.elements):
@@ -72,19 +73,23 @@ class Sweep:
                 f = self._beyond(each, f)
         return found
 
+    def exact(self, number: Any) -> Any:
+        """An exact number of an element as one that s can be multiplied by."""
+        return rational(number)
+
     def _end(self, inertia: Inertia) -> tuple[Any, Any]:
         condition = Condition.of(inertia)
-        return self.S * rational(condition.inertia) + rational(condition.rest), rational(condition.force)
+        return self.S * self.exact(condition.inertia) + self.exact(condition.rest), self.exact(condition.force)
 
     def _inside(self, element: Element, p: Plane) -> Plane:
         match element:
             case Segment():
-                w, m, q = (rational(unit) for unit in element.units)
+                w, m, q = (self.exact(unit) for unit in element.units)
                 own = p[0] * w, p[1] * (w * m), p[2] * m, p[3] * q, p[4] * (m * q)
                 own = _across_rows(*self._transition(element), own)
                 return own[0] / w, own[1] / (w * m), own[2] / m, own[3] / q, own[4] / (m * q)
             case Offset():
-                return _inside_offset(rational(element.length), p)
+                return _inside_offset(self.exact(element.length), p)
             case Spring():
                 return _inside_spring(*self._spring(element), p)
         return _inside_body(*self._body(element), p)
@@ -92,19 +97,19 @@ class Sweep:
     def _beyond(self, element: Element, f: Row) -> Row:
         match element:
             case Segment():
-                w, m, q = (rational(unit) for unit in element.units)
+                w, m, q = (self.exact(unit) for unit in element.units)
                 own = _row_across(*self._transition(element), (f[0] / w, f[1], f[2] / m, f[3] / q))
                 return own[0] * w, own[1], own[2] * m, own[3] * q
             case Offset():
-                return _beyond_offset(rational(element.length), f)
+                return _beyond_offset(self.exact(element.length), f)
             case Spring():
                 return _beyond_spring(*self._spring(element), f)
         return _beyond_body(*self._body(element), f)
 
     def _transition(self, segment: Segment) -> tuple[Row, ...]:
         if segment not in self._rows:
-            a, b, g, sigma = (rational(number) for number in segment[:4])
-            S, over_d = self.S, 1 / (self.s * rational(segment.damping) + 1)
+            a, b, g, sigma = (self.exact(number) for number in segment[:4])
+            S, over_d = self.S, 1 / (self.s * self.exact(segment.damping) + 1)
             z_sum, z_product = S * (over_d * a + b), S * (S * (a * b) + g) * over_d
             functions = self._functions(z_sum, z_product)
             self._rows[segment] = _transition_rows(*functions, S, over_d, a, b, g, sigma)
@@ -115,19 +120,20 @@ class Sweep:
         return transition(z_sum, z_product, flint.arb(1))
 
     def _spring(self, spring: Spring) -> tuple[Any, Any]:
-        k = rational(spring.stiffness)
-        return self.s * (k * rational(spring.damping)) + k, rational(spring.compliance)
+        k = self.exact(spring.stiffness)
+        return self.s * (k * self.exact(spring.damping)) + k, self.exact(spring.compliance)
 
     def _body(self, body: Any) -> tuple[Any, Any]:
         assert isinstance(body, Body)
         return (
-            self.S * rational(body.mass) + rational(body.stiffness),
-            self.S * rational(body.inertia) + rational(body.rotational_stiffness),
+            self.S * self.exact(body.mass) + self.exact(body.stiffness),
+            self.S * self.exact(body.inertia) + self.exact(body.rotational_stiffness),
         )
 
 
-def drive_of(drive: Drive, s: Any, theta: Any, M: Any) -> Any:
+def drive_of(drive: Drive, s: Any, theta: Any, M: Any, number: Callable[[Any], Any] = rational) -> Any:
     """The input behind a response with that hub angle and moment on the hub."""
-    A, B = (drive.of_angle, drive.of_moment)
-    of_angle = ((s * rational(A[3]) + rational(A[2])) * s + rational(A[1])) * s + rational(A[0])
-    return of_angle * theta - (s * rational(B[1]) + rational(B[0])) * M
+    A, B = map(number, drive.of_angle), map(number, drive.of_moment)
+    A0, A1, A2, A3 = A
+    B0, B1 = B
+    return (((s * A3 + A2) * s + A1) * s + A0) * theta - (s * B1 + B0) * M

@@ -120,13 +120,14 @@ def readings(chain: Chain, wanted: tuple[Output, ...], x: float) -> Readings:
     """The outputs of a chain, laid out: once for each chain."""
     key = wanted, x
     if key not in chain.kept:
-        chain.kept[key] = _laid_out(chain, wanted, x)
+        chain.kept[key] = laid_out(chain, wanted, [x] * len(wanted))
     found: Readings = chain.kept[key]
     return found
 
 
-def _laid_out(chain: Chain, wanted: tuple[Output, ...], x: float) -> Readings:
-    each = tuple(reading_of(chain, one, x) for one in wanted)
+def laid_out(chain: Chain, wanted: Sequence[Output], shares: Sequence[float]) -> Readings:
+    """Outputs of a chain, each with its own share of the length, laid out anew."""
+    each = tuple(reading_of(chain, one, x) for one, x in zip(wanted, shares, strict=True))
     places = tuple(dict.fromkeys(one.place for one in each if one.place is not None))
     return Readings(chain.at(places), each)
 

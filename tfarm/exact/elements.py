@@ -36,7 +36,7 @@ class Segment(NamedTuple):
     @property
     def units(self) -> tuple[Fraction, Fraction, Fraction]:
         """What W, M and Q in the chain's units are multiplied by to be in the segment's own."""
-        return 1 / self.length, self.length / self.stiffness, self.length**2 / self.stiffness
+        return 1 / self.length, self.length / self.stiffness, self.length * self.length / self.stiffness
 
 
 class Offset(NamedTuple):

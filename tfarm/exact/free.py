@@ -154,14 +154,14 @@ def _jets(k: Coefficients, S: Jet, d: Complex, one: Wave, two: Wave) -> tuple[li
         z = Jet([wave.z, slope])
         is_far = abs(wave.z) > 1.0
         far, near = np.where(is_far, wave.z, 1.0), np.where(is_far, 0.0, wave.z)
-        by_z = np.where(is_far, (wave.c - wave.s) / (2 * far), wave.e * _slope_of_sinhc(near))
+        by_z = np.where(is_far, (wave.c - wave.s) / (2 * far), wave.e * sinhc_slope(near))
         c, sinhc = Jet([wave.c, wave.s / 2 * slope]), Jet([wave.s, by_z * slope])
         arguments += [c, sinhc, z, Jet([wave.v, slope - b * S.c[1]]), wave.e]
     gap = arguments[2] - arguments[7]
     return [*arguments, g * S, damper, *tip_condition(k, S)], 1.0 / (g * S * damper * gap * gap)
 
 
-def _slope_of_sinhc(z: Complex) -> Complex:
+def sinhc_slope(z: Complex) -> Complex:
     """d/dz of sinh sqrt z / sqrt z, by its series for |z| <= 1."""
     slope = np.zeros_like(z)
     for n in range(10, 0, -1):

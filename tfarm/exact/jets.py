@@ -28,10 +28,14 @@ class Jet:
         return other.c if isinstance(other, Jet) else [other] + [0.0] * (len(self.c) - 1)
 
     def __add__(self, other: Any) -> Jet:
-        return Jet([a + b for a, b in zip(self.c, self._other(other), strict=True)])
+        if not isinstance(other, Jet):
+            return Jet([self.c[0] + other, *self.c[1:]])
+        return Jet([a + b for a, b in zip(self.c, other.c, strict=True)])
 
     def __sub__(self, other: Any) -> Jet:
-        return Jet([a - b for a, b in zip(self.c, self._other(other), strict=True)])
+        if not isinstance(other, Jet):
+            return Jet([self.c[0] - other, *self.c[1:]])
+        return Jet([a - b for a, b in zip(self.c, other.c, strict=True)])
 
     def __rsub__(self, other: Any) -> Jet:
         return Jet([b - a for a, b in zip(self.c, self._other(other), strict=True)])
@@ -40,11 +44,20 @@ class Jet:
         return Jet([-a for a in self.c])
 
     def __mul__(self, other: Any) -> Jet:
-        b = self._other(other)
+        if not isinstance(other, Jet):
+            return Jet([a if type(a) is float and a == 0.0 else a * other for a in self.c])
+        b = other.c
+        if len(b) == 2:  # most of the work: a slope that is the plain number 0.0 costs nothing
+            (a0, a1), (b0, b1) = self.c, b
+            if type(b1) is float:
+                return Jet([a0 * b0, a1 if type(a1) is float else a1 * b0])
+            return Jet([a0 * b0, a0 * b1 if type(a1) is float else a0 * b1 + a1 * b0])
         return Jet([sum(self.c[i] * b[n - i] for i in range(n + 1)) for n in range(len(self.c))])
 
     def __truediv__(self, other: Any) -> Jet:
-        b = self._other(other)
+        if not isinstance(other, Jet):
+            return Jet([a / other for a in self.c])
+        b = other.c
         quotient: list[Any] = []
         for n, a in enumerate(self.c):
             rest = a - sum(quotient[i] * b[n - i] for i in range(n)) if n else a
