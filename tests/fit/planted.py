@@ -1,0 +1,142 @@
+"""Arms found again from responses of finite elements with noise:  python -m tests.fit.planted 300 [seed]
+
+Random arms, two or three responses of an independent model (`tests.chain_elements`, nothing of tfarm in it), noise of
+known size, four to six free numbers, each started up to 30 % off.  A fit is right where its sum of squares is at most
+that of the truth and every number within five deviations of it; nominal 95 % intervals are counted.
+"""
+
+import os
+import sys
+import time
+from collections import Counter, defaultdict
+
+if __name__ == "__main__":
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import numpy as np
+
+import tfarm
+from tests import chain_elements
+from tfarm.fit.data import Measured
+from tfarm.fit.fit import fit
+from tfarm.spectrum.scales import first_frequency
+
+ALWAYS = ("link.youngs_modulus", "hub.inertia", "link.damping")
+SOMETIMES = ("payload.mass", "payload.inertia", "clamp.stiffness", "gain", "delay", "link.section.second_moment")
+PAIRS = (  # of the arm's numbers, of which these responses know but one combination
+    ("tip_acceleration", "hub_angle"),
+    ("tip_acceleration", "hub_torque"),
+    ("hub_rate", "hub_torque"),
+    ("root_moment", "hub_torque"),
+)
+POINTS = 200
+OFF = 0.3  # of a number: its start
+
+
+def some_arm(rng):
+    """A slender arm with a clamp that yields, a payload and a little damping."""
+    length = rng.uniform(0.2, 1.5)
+    depth = length / rng.uniform(40, 200)
+    width = depth * rng.uniform(2, 15)
+    E, density = (70e9, 2700.0) if rng.random() < 0.5 else (205e9, 7850.0)
+    link = tfarm.Link.isotropic(
+        length=length, density=density, youngs_modulus=E, poissons_ratio=0.3,
+        section=tfarm.Section.general(area=width * depth, second_moment=width * depth**3 / 12, shear_factor=5 / 6),
+    )  # fmt: skip
+    own = density * width * depth * length
+    arm = tfarm.Arm(
+        link=link,
+        hub=tfarm.Hub(inertia=own * length**2 * 10 ** rng.uniform(-1, 0.7)),
+        payload=tfarm.Payload(mass=own * rng.uniform(0.1, 1), inertia=own * length**2 * rng.uniform(0.005, 0.05)),
+        clamp=tfarm.RotarySpring(stiffness=link.EI / length * 10 ** rng.uniform(0.5, 1.5)),
+        name="planted",
+    )
+    zeta = 10 ** rng.uniform(-2.7, -1.7)
+    return arm.having(damping=2 * zeta / first_frequency(arm))
+
+
+def elements_response(arm, omega, pairs):
+    """Responses (pairs, n) of finite elements, of one signal over another or over the torque."""
+    outputs = sorted({name for pair in pairs for name in pair if name != "hub_torque"})
+    names = [NAMED.get(name, name) for name in outputs]
+    model = chain_elements.assemble(arm, chain_elements.FINER * omega[-1], held=False)
+    system = chain_elements.System(model, omega[len(omega) // 2])
+    values = np.array([system.response(1j * w, names, None) for w in omega]).T
+    by = dict(zip(outputs, values, strict=True)) | {"hub_torque": np.ones(omega.size)}
+    return [by[over] / by[under] for over, under in pairs]
+
+
+NAMED: dict[str, str] = {}
+
+
+def planted(rng):
+    """An arm, its measured responses, the free keys, their true values, and an arm that starts elsewhere."""
+    arm = some_arm(rng)
+    w1 = first_frequency(arm)
+    omega = np.geomspace(0.3 * w1, rng.uniform(15, 60) * w1, POINTS)
+    some = rng.choice(len(PAIRS), size=rng.integers(2, 4), replace=False)
+    pairs = [PAIRS[n] for n in some]
+    others = [key for key in SOMETIMES if key != "link.section.second_moment"]
+    chosen = list(rng.choice(others, size=rng.integers(1, 4), replace=False))
+    keys = [*ALWAYS, *chosen]
+    truth = {
+        "link.youngs_modulus": arm.link.youngs_modulus, "hub.inertia": arm.hub.inertia,
+        "link.damping": arm.link.damping, "payload.mass": arm.payload.mass, "payload.inertia": arm.payload.inertia,
+        "clamp.stiffness": arm.clamp.stiffness,
+    }  # fmt: skip
+    gains = [float(rng.choice([-1, 1]) * 10 ** rng.uniform(-1, 1)) if "gain" in keys else 1.0 for _ in pairs]
+    delays = [float(rng.uniform(0, 0.3) / omega[-1]) if "delay" in keys else 0.0 for _ in pairs]
+    data = []
+    for (output, under), H, gain, delay in zip(pairs, elements_response(arm, omega, pairs), gains, delays, strict=True):
+        H = gain * H * np.exp(-1j * omega * delay)
+        sigma = abs(H) * 10 ** rng.uniform(-2.5, -1.3) + 1e-3 * np.median(abs(H))
+        noise = sigma * (rng.standard_normal(POINTS) + 1j * rng.standard_normal(POINTS))
+        data.append(Measured(output=output, input=under, omega=omega, values=H + noise, sigma=sigma))
+    for n in range(len(data)):
+        label = f":{n + 1}" if len(data) > 1 else ""
+        truth |= {f"gain{label}": gains[n], f"delay{label}": delays[n]}
+    start = {key: truth[key] * (1 + rng.uniform(-OFF, OFF)) for key in keys if key in truth and "." in key}
+    return arm, data, keys, truth, start
+
+
+def judged(seed, *, profile=True):
+    """What one fit came to: right or why not, and for each number whether its interval holds the truth."""
+    rng = np.random.default_rng([852780, seed])
+    arm, data, keys, truth, start = planted(rng)
+    found = fit(arm, data, free=keys, start=start, profile=profile)
+    covered = {}
+    verdict = "right"
+    if not found.converged:
+        verdict = "not converged"
+    at_truth = found.chi_squared_at(truth)
+    if found.chi_squared > at_truth * (1 + 1e-9):
+        verdict = "a worse minimum"
+    for each in found.parameters:
+        if not each.identified:
+            verdict = f"{each.key} not identified" if verdict == "right" else verdict
+            continue
+        if each.deviation and abs(each.value - truth[each.key]) > 5 * each.deviation:
+            verdict = f"{each.key} too far" if verdict == "right" else verdict
+        if profile:
+            covered.setdefault(each.key.partition(":")[0], []).append(each.low <= truth[each.key] <= each.high)
+    return verdict, covered, found
+
+
+def main(size, seed):
+    verdicts, covered, began = Counter(), defaultdict(list), time.perf_counter()
+    for n in range(seed * 10000, seed * 10000 + size):
+        verdict, inside, _ = judged(n)
+        verdicts[verdict] += 1
+        for key, each in inside.items():
+            covered[key] += each
+        if verdict != "right":
+            print(n, verdict, flush=True)
+    print(dict(verdicts), f"{(time.perf_counter() - began) / size:.2f} s a fit")
+    total = [one for each in covered.values() for one in each]
+    if total:
+        print(f"inside nominal 95 %: {np.mean(total):.3f} of {len(total)};", end=" ")
+        print(", ".join(f"{key} {np.mean(each):.3f}" for key, each in covered.items()))
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 1)

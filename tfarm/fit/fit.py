@@ -1,0 +1,117 @@
+"""The fit of an arm to what was measured of it: which numbers explain it, how sure, and which are left open."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import Arm
+from tfarm.errors import ParameterError
+from tfarm.records import record
+
+from .data import Measured
+from .model import DELAY, GAIN, Problem, problem
+from .parameters import Parameter, parameters
+from .solve import Solution, solved
+from .sure import Fitted, sureness
+
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+@record
+class Fit:
+    """An arm fitted to measured responses.
+
+    `parameters` are the free numbers with their intervals, `not_determined` the combinations that the data leave open;
+    `chi_squared` over `freedom` is about 1 where the arm and the noise explain all.
+    """
+
+    arm: Arm
+    before: Arm
+    converged: bool
+    parameters: tuple[Fitted, ...]
+    not_determined: tuple[str, ...]
+    chi_squared: float
+    freedom: int
+    solution: Solution
+
+    @property
+    def responses(self) -> tuple[Measured, ...]:
+        """What was measured."""
+        return tuple(each.data for each in self.solution.problem.responses)
+
+    def chi_squared_at(self, values: Mapping[str, float]) -> float:
+        """The sum of squared residuals at other numbers, by key."""
+        own = self.solution.problem
+        point = np.array([each.coordinate(values[each.key]) for each in own.parameters])
+        residuals = own.residuals(point)
+        return float(residuals @ residuals)
+
+
+def fit(
+    arm: Arm,
+    data: Sequence[Measured],
+    free: Sequence[str],
+    *,
+    start: Mapping[str, float] | None = None,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    priors: Mapping[str, tuple[float, float]] | None = None,
+    profile: bool = True,
+) -> Fit:
+    """The arm whose free numbers explain the measured responses best.
+
+    `free` are keys of the arm's TOML file, and "gain" and "delay" of each response's sensor; `start`, `bounds` and
+    `priors` (mean, deviation) are by key, in SI units.  With `profile` each interval is that of the profile likelihood.
+    Raises ParameterError for a key that is none, and for more numbers than data.
+    """
+    subject = _problem(arm, data, free, start, bounds, priors)
+    found = solved(subject)
+    sure = sureness(found, profile=profile)
+    return Fit(
+        arm=replace(found.problem.arm(found.point), name=f"{arm.name}-fitted"),
+        before=arm,
+        converged=found.converged,
+        parameters=sure.parameters,
+        not_determined=sure.not_determined,
+        chi_squared=found.chi_squared,
+        freedom=found.freedom,
+        solution=found,
+    )
+
+
+def _problem(arm: Arm, data: Any, free: Any, start: Any, bounds: Any, priors: Any) -> Problem:
+    data = (data,) if isinstance(data, Measured) else tuple(data)
+    if not data:
+        raise ParameterError(key="data", value=0, remedy="give at least one measured response")
+    keys = [str(key) for key in free if key not in (GAIN, DELAY)]
+    family, numbers = parameters(arm, keys, start=start, bounds=bounds, priors=priors)
+    subject = problem(arm, data, family, numbers, _sensors(data, free))
+    if not subject.parameters:
+        raise ParameterError(key="free", value="nothing", remedy="name what is free, such as link.youngs_modulus")
+    if subject.size < len(subject.parameters):
+        remedy = f"{subject.size} numbers were measured; leave some out"
+        raise ParameterError(key="free", value=len(subject.parameters), remedy=remedy)
+    return subject
+
+
+def _sensors(data: Sequence[Measured], free: Sequence[str]) -> dict[str, list[Parameter]]:
+    """The sensors' own numbers, one of a kind for each response."""
+    found = {}
+    for kind in (GAIN, DELAY):
+        if kind not in free:
+            continue
+        names = [kind if len(data) == 1 else f"{kind}:{n}" for n in range(1, len(data) + 1)]
+        sizes = [1.0 if kind == GAIN else 1.0 / float(each.omega[-1]) for each in data]
+        found[kind] = [
+            Parameter(
+                key=name, start=1.0 if kind == GAIN else 0.0, low=-np.inf, high=np.inf, by_logarithm=kind == GAIN,
+                size=size,
+            )
+            for name, size in zip(names, sizes, strict=True)
+        ]  # fmt: skip
+    return found

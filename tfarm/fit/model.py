@@ -1,0 +1,250 @@
+"""Measured less computed: the residuals of an arm whose numbers run, over their deviations, with exact derivatives.
+
+The response of one signal to another is the ratio of two of the arm's transfer functions, so of their numerators, times
+a sensor's gain and delay:  H = gain e^{-i w tau} N_out/N_in,  with the drive for N_in where the input is the arm's own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import INPUTS, Arm, Input
+from tfarm.errors import ParameterError
+from tfarm.exact.chain import Chain
+from tfarm.exact.chaining import chain_of
+from tfarm.exact.gradients import Direction, response_gradients
+from tfarm.exact.jets import Jet
+from tfarm.exact.outputs import OUTPUTS
+from tfarm.response.signals import Signals
+
+from .data import Measured
+from .noise import Noise, noise_of
+from .parameters import STEP, Family, Parameter
+from .reading import check_signal
+
+Complex = NDArray[np.complexfloating[Any, Any]]
+Real = NDArray[np.float64]
+
+GAIN, DELAY = "gain", "delay"  # of a sensor: free beside the numbers of the arm
+
+
+@dataclass(frozen=True)
+class Response:
+    """One measured response as the arm has it: its data, noise, and which numbers are its own gain and delay."""
+
+    data: Measured
+    noise: Noise
+    gain: int | None = None  # place in the vector of what is searched for
+    delay: int | None = None
+
+
+class Around:
+    """An arm and its neighbours a step below and above along each free number, as chains, made once for each drive."""
+
+    def __init__(self, arm: Arm, pairs: Sequence[tuple[Arm, ...]]) -> None:
+        self.arm, self._pairs = arm, pairs
+        self._chains: dict[str, tuple[Chain, list[tuple[Chain, Chain]]]] = {}
+
+    def gradients(self, driven: str, names: tuple[str, ...], s: Complex) -> tuple[Jet, list[Jet]]:
+        """Drive and signals at s, up to one factor, with their derivatives along the free numbers."""
+        if driven not in self._chains:
+            pairs = [(chain_of(driven_by(a, driven)), chain_of(driven_by(b, driven))) for a, b in self._pairs]
+            self._chains[driven] = chain_of(driven_by(self.arm, driven)), pairs
+        chain, pairs = self._chains[driven]
+        signals = Signals(self.arm, names)
+        along = [
+            Direction(below, above, Signals(a, names).places, Signals(b, names).places, 2 * STEP)
+            for (below, above), (a, b) in zip(pairs, self._pairs, strict=True)
+        ]
+        return response_gradients(chain, signals.outputs, signals.places, along, s)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What is searched for: `parameters` of the arm first, then those of the sensors, and what they have to explain."""
+
+    family: Family
+    parameters: tuple[Parameter, ...]
+    responses: tuple[Response, ...]
+
+    @cached_property
+    def _grids(self) -> dict[tuple[bytes, str], list[int]]:
+        """Responses that are computed together, by their frequencies and by what drives the arm."""
+        found: dict[tuple[bytes, str], list[int]] = {}
+        for number, each in enumerate(self.responses):
+            found.setdefault((each.data.omega.tobytes(), self.driven(each.data.input)), []).append(number)
+        return found
+
+    def driven(self, name: str) -> str:
+        """What drives the arm where that is the input: its own drive, where the response is over a signal."""
+        return name if name in INPUTS and name not in OUTPUTS else self.family.arm.input
+
+    @cached_property
+    def of_the_arm(self) -> tuple[Parameter, ...]:
+        """The parameters that are the arm's."""
+        return self.parameters[: len(self.family.keys)]
+
+    @cached_property
+    def bounds(self) -> tuple[Real, Real]:
+        """Lowest and highest coordinates."""
+        low, high = zip(*(each.bounds for each in self.parameters), strict=True)
+        return np.array(low), np.array(high)
+
+    @property
+    def size(self) -> int:
+        """How many real residuals there are: two a frequency, one a prior."""
+        priors = sum(each.prior is not None for each in self.parameters)
+        return sum(2 * int(np.isfinite(each.noise.sigma).sum()) for each in self.responses) + priors
+
+    def values(self, point: Real) -> dict[str, float]:
+        """The numbers at a point of the search, by key."""
+        return {each.key: each.value(float(x)) for each, x in zip(self.parameters, point, strict=True)}
+
+    def arm(self, point: Real) -> Arm:
+        """The arm at a point."""
+        values = {each.key: each.value(float(x)) for each, x in zip(self.of_the_arm, point, strict=False)}
+        return self.family.at(values)
+
+    # ------------------------------------------------------------ responses
+
+    def computed(self, point: Real) -> list[Complex]:
+        """Each response at its own frequencies."""
+        arm = self.arm(point)
+        found: list[Any] = [None] * len(self.responses)
+        for (_, driven), numbers in self._grids.items():
+            names = self._signals(numbers, driven)
+            parts = Signals(driven_by(arm, driven), names).parts(1j * self.responses[numbers[0]].data.omega)
+            for n in numbers:
+                over, under = self._over_and_under(n, names, parts.drive, parts.numerators)
+                found[n] = np.asarray(over / under * self._sensor(n, point))
+        return found
+
+    def slopes(self, point: Real) -> list[tuple[Complex, Complex]]:
+        """Each response, and its derivative (parameters, n) along each coordinate."""
+        here, found = self.around(point), list[Any]([None] * len(self.responses))
+        for (_, driven), numbers in self._grids.items():
+            names, s = self._signals(numbers, driven), 1j * self.responses[numbers[0]].data.omega
+            drive, outputs = here.gradients(driven, names, s)
+            for n in numbers:
+                over, under = self._over_and_under(n, names, drive, outputs)
+                found[n] = self._with_slopes(n, over, under, point, s)
+        return found
+
+    def around(self, point: Real) -> Around:
+        """The arm at a point, and those a step away along each of its own numbers."""
+        here = self.values(point)
+        base = {key: here[key] for key in self.family.keys}
+        pairs = []
+        for each, x in zip(self.of_the_arm, point, strict=False):
+            sides = (each.value(float(x) - STEP), each.value(float(x) + STEP))
+            pairs.append(tuple(self.family.at(base | {each.key: value}) for value in sides))
+        return Around(self.family.at(base), tuple(pairs))
+
+    def _with_slopes(self, n: int, over: Jet, under: Jet, point: Real, s: Complex) -> tuple[Complex, Complex]:
+        one = self.responses[n]
+        H = over.c[0] / under.c[0] * self._sensor(n, point)
+        slopes = np.zeros((len(self.parameters), s.size), complex)
+        slopes[: len(self.of_the_arm)] = H * (over.c[1] / over.c[0] - under.c[1] / under.c[0])
+        if one.gain is not None:
+            slopes[one.gain] = H  # by its logarithm
+        if one.delay is not None:
+            slopes[one.delay] = -s * H * self.parameters[one.delay].size
+        return H, slopes
+
+    def _signals(self, numbers: Sequence[int], driven: str) -> tuple[str, ...]:
+        """What is read of the arm for those responses."""
+        pairs = [(self.responses[n].data.output, self.responses[n].data.input) for n in numbers]
+        return tuple(dict.fromkeys(name for output, input in pairs for name in (output, input) if name != driven))
+
+    def _over_and_under(self, n: int, names: tuple[str, ...], drive: Any, numerators: Any) -> tuple[Any, Any]:
+        """Numerator and denominator of a response: jets or arrays."""
+        one = self.responses[n].data
+        if one.output == self.driven(one.input):  # the input over a signal
+            return drive, numerators[names.index(one.input)]
+        return numerators[names.index(one.output)], numerators[names.index(one.input)] if one.input in names else drive
+
+    def _sensor(self, n: int, point: Real) -> Any:
+        one, factor = self.responses[n], 1.0
+        if one.gain is not None:
+            factor = self.parameters[one.gain].value(float(point[one.gain]))
+        if one.delay is not None:
+            delay = self.parameters[one.delay].value(float(point[one.delay]))
+            return factor * np.exp(-1j * one.data.omega * delay)
+        return factor
+
+    # ------------------------------------------------------------ residuals
+
+    def residuals(self, point: Real) -> Real:
+        """(size,): real and imaginary parts of computed less measured over their deviations, then the priors."""
+        return np.concatenate(
+            [
+                *(_parts((H - one.data.values) / one.noise.sigma, one) for H, one in self._pairs(self.computed(point))),
+                self._priors(point),
+            ]
+        )
+
+    def jacobian(self, point: Real) -> Real:
+        """(size, parameters): the derivatives of the residuals."""
+        rows = [_parts(dH / one.noise.sigma, one) for (_, dH), one in self._pairs(self.slopes(point))]
+        return np.concatenate([*(row.T for row in rows), self._priors_slopes(point)])
+
+    def _pairs(self, each: Sequence[Any]) -> Any:
+        return zip(each, self.responses, strict=True)
+
+    def _priors(self, point: Real) -> Real:
+        values = [(each, each.value(float(x))) for each, x in zip(self.parameters, point, strict=True)]
+        return np.array([(value - each.prior[0]) / each.prior[1] for each, value in values if each.prior is not None])
+
+    def _priors_slopes(self, point: Real) -> Real:
+        rows = [
+            np.eye(len(self.parameters))[n] * each.slope(float(point[n])) / each.prior[1]
+            for n, each in enumerate(self.parameters)
+            if each.prior is not None
+        ]
+        return np.array(rows).reshape(-1, len(self.parameters))
+
+
+def driven_by(arm: Arm, driven: str) -> Arm:
+    return arm if arm.input == driven else replace(arm, input=cast("Input", driven))
+
+
+def _parts(values: Complex, one: Response) -> Real:
+    """Real and imaginary parts, one behind the other, of what was measured."""
+    kept = values[..., np.isfinite(one.noise.sigma)]
+    return np.concatenate([kept.real, kept.imag], axis=-1)
+
+
+def problem(
+    arm: Arm, data: Sequence[Measured], family: Family, numbers: Sequence[Parameter], sensors: Mapping[str, Any]
+) -> Problem:
+    """The problem of an arm's free numbers and its sensors' (see `sensor_parameters`)."""
+    check_signals(arm, data)
+    responses = []
+    own = [*numbers]
+    for number, each in enumerate(data):
+        places: dict[str, int] = {}
+        for kind in (GAIN, DELAY):
+            if kind in sensors:
+                places[kind] = len(own)
+                own.append(sensors[kind][number])
+        responses.append(Response(each, noise_of(each), places.get(GAIN), places.get(DELAY)))
+    return Problem(family, tuple(own), tuple(responses))
+
+
+def check_signals(arm: Arm, data: Sequence[Measured]) -> None:
+    """Raise ParameterError where a response names what is no signal of the arm."""
+    for each in data:
+        for name, role in ((each.output, "output"), (each.input, "input")):
+            check_signal(name, f"{role} of {each.name}")
+            if name in INPUTS and name not in OUTPUTS:
+                driven_by(arm, name)  # which needs a motor, or refuses
+            else:
+                Signals(arm, (name,))
+        if each.output == each.input:
+            raise ParameterError(key=each.name, value="1", remedy="a signal over itself says nothing of the arm")

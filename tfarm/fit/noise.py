@@ -1,0 +1,68 @@
+"""How far a measured value may be from the true one: by what the file says, by its coherence, or by its own scatter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.records import record
+
+from .data import Measured
+
+Real = NDArray[np.float64]
+
+LEAST = 1e-5  # of |H|: no measured response is better known than that, whatever its coherence says
+AROUND = 2  # neighbours on each side that a value is compared with
+TYPICAL = 0.6745  # the median of |x| of a normal x of deviation 1
+
+
+@dataclass(frozen=True, kw_only=True)
+@record
+class Noise:
+    """The standard deviation `sigma` (n,) of real and imaginary part, each; infinite where nothing was measured.
+
+    `is_known` is whether it is in the units of the values, or only up to a factor that the residuals have to say.
+    `road` says where it is from.
+    """
+
+    sigma: Real
+    is_known: bool
+    road: str
+
+
+def noise_of(data: Measured) -> Noise:
+    """The noise of a measured response.
+
+    With coherence g^2 of an estimate from n averages the relative deviation of a part is sqrt((1 - g^2)/(2 n g^2))
+    (Bendat and Piersol 2010, (9.90)); without n it is known up to a factor.  With nothing given it is the scatter of
+    the values about a parabola through their neighbours.
+    """
+    size = abs(data.values)
+    if data.sigma is not None:
+        return Noise(sigma=data.sigma, is_known=True, road="sigma of the file")
+    if data.coherence is not None:
+        g = data.coherence
+        with np.errstate(divide="ignore"):
+            share = np.sqrt((1.0 - g) / (2.0 * (data.averages or 1) * g))
+        sigma = np.asarray(size * np.maximum(share, LEAST), dtype=float)
+        sigma[g == 0] = np.inf
+        known = data.averages is not None
+        road = f"coherence of {data.averages} averages" if known else "coherence, up to a factor"
+        return Noise(sigma=sigma, is_known=known, road=road)
+    return Noise(sigma=_scatter(data.values), is_known=False, road="scatter of the values")
+
+
+def _scatter(values: NDArray[Any]) -> Real:
+    """The deviation of each value from a parabola through its four neighbours, smoothed; at least `LEAST` of it."""
+    n = values.size
+    if n < 2 * AROUND + 1:
+        return np.maximum(abs(values), LEAST * abs(values).max())
+    # x_k less the parabola through x_(k-2), x_(k-1), x_(k+1), x_(k+2): weights -1/6, 2/3, 2/3, -1/6 of these
+    weights = np.array([1 / 6, -2 / 3, 1.0, -2 / 3, 1 / 6])
+    away = np.convolve(values, weights, mode="valid") / np.sqrt((weights**2).sum())
+    relative = abs(away) / abs(values[AROUND:-AROUND])
+    typical = float(np.median(relative)) / TYPICAL / np.sqrt(2.0)
+    return np.maximum(abs(values), np.median(abs(values)) * 1e-3) * max(typical, LEAST)

@@ -1,0 +1,220 @@
+"""What of an arm may be free: any number of its TOML file, by its key, with a start, bounds and perhaps a prior.
+
+A number that cannot be negative is searched for by its logarithm, any other by itself over its size; so a step of the
+search is a share of the number.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import Arm
+from tfarm.arm.schema import arm_of_table
+from tfarm.arm.tables import TABLES
+from tfarm.arm.writing import to_toml
+from tfarm.errors import ParameterError, did_you_mean
+from tfarm.records import record
+from tfarm.spectrum.scales import first_frequency
+
+Real = NDArray[np.float64]
+
+SIGNED = ("offset",)  # numbers of an arm that may be negative
+MOST = {"gear_efficiency": 1.0, "poissons_ratio": 0.5}  # and those that end somewhere
+FARTHEST = 1e4  # times or a part of its start: beyond that a search has lost its way, or the data say nothing
+STEP = 2.0**-20  # of a derivative by differences: the rounding of a float over it is 1e-10, its square below
+
+
+@dataclass(frozen=True, kw_only=True)
+@record
+class Parameter:
+    """A free number: its key, where the search starts, its bounds, all in SI units, and a prior (mean, deviation).
+
+    `by_logarithm` says that the search is for ln(value/start), otherwise for (value - start)/size.
+    """
+
+    key: str
+    start: float
+    low: float
+    high: float
+    by_logarithm: bool
+    size: float
+    prior: tuple[float, float] | None = None
+
+    def value(self, coordinate: float) -> float:
+        """The number at a coordinate of the search, 0 at the start."""
+        if self.by_logarithm:
+            return self.start * math.exp(coordinate)
+        return self.start + self.size * coordinate
+
+    def coordinate(self, value: float) -> float:
+        """The coordinate of a number."""
+        if self.by_logarithm:
+            return math.log(value / self.start)
+        return (value - self.start) / self.size
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Of the coordinate."""
+        if not self.by_logarithm:
+            return self.coordinate(self.low), self.coordinate(self.high)
+        low = self.coordinate(self.low) if self.low > 0 else -math.inf
+        high = self.coordinate(self.high) if self.high < math.inf else math.inf
+        return max(low, -math.log(FARTHEST)), min(high, math.log(FARTHEST))
+
+    def slope(self, coordinate: float) -> float:
+        """d value/d coordinate."""
+        return self.value(coordinate) if self.by_logarithm else self.size
+
+
+class Family:
+    """The arms that an arm becomes as some of its numbers run, by their TOML keys.
+
+    Raises ParameterError for a key that the arm does not have, naming the nearest.
+    """
+
+    def __init__(self, arm: Arm, keys: Sequence[str]) -> None:
+        self.arm, self.keys = arm, tuple(keys)
+        self._table = tomllib.loads(to_toml(arm))
+        known = list(_known(self._table))
+        for key in keys:
+            if key not in known:
+                raise ParameterError(key="free", value=key, remedy=did_you_mean(key, known))
+        if repeated := {key for key in keys if keys.count(key) > 1}:
+            raise ParameterError(key="free", value=min(repeated), remedy="is named twice; once is enough")
+
+    def at(self, values: Mapping[str, float]) -> Arm:
+        """The arm with those numbers in their places.  Raises ParameterError where it is none."""
+        table = _copy(self._table)
+        for key, value in values.items():
+            _set(table, key, value)
+        return arm_of_table(table)
+
+    def value(self, key: str) -> float:
+        """The arm's own number: what its file says, or its default."""
+        place, name = _table_of(self._table, key)
+        if name == "poissons_ratio":
+            return float(place["youngs_modulus"] / (2 * place["shear_modulus"]) - 1)
+        if name in place:
+            return float(place[name])
+        if name == "back_emf_constant":
+            return float(place["torque_constant"])
+        words = key.split(".")
+        return float(TABLES[words[0]].model_fields[words[-1]].default)
+
+
+def parameters(
+    arm: Arm,
+    keys: Sequence[str],
+    *,
+    start: Mapping[str, float] | None = None,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    priors: Mapping[str, tuple[float, float]] | None = None,
+) -> tuple[Family, tuple[Parameter, ...]]:
+    """The family of an arm whose numbers under `keys` are free, and these numbers.
+
+    Each starts where `start` says, else at the arm's own value, or where that is 0 at a hundredth of what would matter.
+    Raises ParameterError for a key that is none or is not free, and for bounds or a start that leave no room.
+    """
+    start, bounds, priors = start or {}, bounds or {}, priors or {}
+    for said, what in ((start, "start"), (bounds, "bounds"), (priors, "prior")):
+        for key in said:
+            if key not in keys:
+                raise ParameterError(key=what, value=key, remedy=f"is not free; {did_you_mean(key, keys)}")
+    family = Family(arm, keys)
+    return family, tuple(
+        _parameter(family, key, start.get(key), bounds.get(key), priors.get(key)) for key in family.keys
+    )
+
+
+def _parameter(
+    family: Family,
+    key: str,
+    start: float | None,
+    bounds: tuple[float, float] | None,
+    prior: tuple[float, float] | None,
+) -> Parameter:
+    name = key.split(".")[-1]
+    own = family.value(key)
+    if start is None:
+        start = own if own and math.isfinite(own) else _typical(family.arm, key, own)
+    is_signed = name in SIGNED
+    most = family.arm.length if name == "x" else MOST.get(name, math.inf)
+    low, high = bounds or (-math.inf if is_signed else 0.0, most)
+    if not low <= start <= high or not low < high:
+        remedy = f"starts at {start:g}; give bounds low,high around it, or another start"
+        raise ParameterError(key=f"bounds of {key}", value=(low, high), remedy=remedy)
+    if not is_signed and start <= 0:
+        raise ParameterError(key=f"start of {key}", value=start, remedy="a positive number in SI units")
+    if prior is not None and not (math.isfinite(prior[0]) and prior[1] > 0):
+        raise ParameterError(key=f"prior of {key}", value=prior, remedy="mean,deviation with a deviation above 0")
+    size = max(abs(start), 0.1 * family.arm.length) if is_signed else abs(start)
+    return Parameter(key=key, start=start, low=low, high=high, by_logarithm=not is_signed, size=size, prior=prior)
+
+
+def _typical(arm: Arm, key: str, own: float) -> float:
+    """A hundredth of what would matter, for a number that is 0, or a hundred times that of one that is infinite."""
+    w1, inertia = first_frequency(arm), arm.turned_inertia if math.isfinite(arm.turned_inertia) else arm.carried_inertia
+    EI, length = arm.link.EI, arm.length
+    of_the_arm = {
+        "mass": arm.own_mass,
+        "inertia": inertia,
+        "rotor_inertia": inertia,
+        "rotor_friction": inertia * w1,
+        "friction": inertia * w1,
+        "damping": 1.0 / w1,
+        "radius": length,
+        "offset": length,
+        "x": length,
+        "rotational_stiffness": EI / length,
+        "stiffness": EI / length**3 if key.startswith("attachment") else EI / length,
+    }
+    name = key.split(".")[-1]
+    if name not in of_the_arm:
+        raise ParameterError(key=f"start of {key}", value=own, remedy="say where to start the search")
+    return 0.01 * of_the_arm[name] if own == 0 else 100 * of_the_arm[name]
+
+
+# ------------------------------------------------------------ places in a table
+
+
+def _known(table: Mapping[str, Any]) -> Iterator[str]:
+    """The keys of all numbers that the arm's file holds or could hold."""
+    alone = isinstance(table["link"], dict)
+    links = [table["link"]] if alone else table["link"]
+    for number, link in enumerate(links, start=1):
+        place = "link" if alone else f"link.{number}"
+        yield from (f"{place}.{name}" for name in TABLES["link"].model_fields if name != "section")
+        yield from (f"{place}.section.{name}" for name, value in link["section"].items() if not isinstance(value, str))
+    for number in range(1, 1 + len(table.get("attachment", ()))):
+        yield from (f"attachment.{number}.{name}" for name in TABLES["attachment"].model_fields)
+    for room in ("hub", "clamp", "joint", "payload", *(["motor"] if "motor" in table else [])):
+        yield from (f"{room}.{name}" for name in TABLES[room].model_fields)
+
+
+def _table_of(table: dict[str, Any], key: str) -> tuple[dict[str, Any], str]:
+    """The innermost table of a key, made where it is not there, and the name in it."""
+    *places, name = key.split(".")
+    here: Any = table
+    for place in places:
+        here = here[int(place) - 1] if isinstance(here, list) else here.setdefault(place, {})
+    return here, name
+
+
+def _set(table: dict[str, Any], key: str, value: float) -> None:
+    here, name = _table_of(table, key)
+    if name == "poissons_ratio":
+        del here["shear_modulus"]
+    here[name] = value
+
+
+def _copy(table: Any) -> Any:
+    if isinstance(table, dict):
+        return {key: _copy(value) for key, value in table.items()}
+    return [_copy(value) for value in table] if isinstance(table, list) else table

@@ -1,0 +1,133 @@
+"""The end of a fit: complex residuals over their deviations, least squares, from one start after another.
+
+A robust loss is no likelihood and the logarithm of a noisy value is biased at an antiresonance, so what is reported,
+and every interval, rests on Gaussian residuals alone.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+from scipy.stats import chi2
+
+from .model import Problem
+from .start import Starts
+
+Real = NDArray[np.float64]
+
+EXPLAINED = 1e-6  # a sum of squares that noise alone exceeds so rarely is no noise: another start may do better
+WORSE = 4.0  # times its degrees of freedom: a best sum beyond is tried from strayed starts too
+STRAYED = 6  # starts beside the first ones, strayed from the best by
+SPREAD = 0.15  # of ln p
+SEED = 852780
+MOST = 60  # evaluations from one start
+FIRM, FIRM_SUM = 1e-9, 1e-12  # of the coordinates, of the sum: a step that changes less ends a search
+EDGE = 1e-9  # of a coordinate: a search begins so far inside its bounds
+RESCALED = 3  # times that a noise known up to a factor takes its factor from the residuals
+
+
+@dataclass(frozen=True)
+class Solution:
+    """The best point found, with residuals, their Jacobian, and whether the search ended there in good order."""
+
+    problem: Problem
+    point: Real
+    residuals: Real
+    jacobian: Real
+    converged: bool
+    starts: int
+
+    @property
+    def chi_squared(self) -> float:
+        """The sum of squared residuals."""
+        return float(self.residuals @ self.residuals)
+
+    @property
+    def freedom(self) -> int:
+        """Residuals less parameters."""
+        return self.residuals.size - self.point.size
+
+
+def solved(problem: Problem) -> Solution:
+    """The least sum of squares over all starts; those of noise alone end the search early."""
+    found: list[Solution] = []
+
+    def best_after(subject: Problem, start: Real) -> Solution:
+        found.append(_rescaled(settled(subject, start)))
+        return min(found, key=_misfit)
+
+    for subject, start in Starts(problem):
+        best = best_after(subject, start)
+        if best.converged and _is_explained(best):
+            return replace(best, starts=len(found))
+    rng, (low, high) = np.random.default_rng(SEED), problem.bounds
+    for _ in range(STRAYED):
+        if best.converged and best.chi_squared < WORSE * best.freedom:
+            break
+        strayed = best.point + SPREAD * rng.standard_normal(best.point.size)
+        best = best_after(best.problem, np.clip(strayed, low + EDGE, high - EDGE))
+    return replace(best, starts=len(found))
+
+
+def _misfit(one: Solution) -> float:
+    """Minus the logarithm of the likelihood, but for a constant: with the noise, where that is from the residuals."""
+    spread = sum(
+        2 * float(np.log(each.noise.sigma[np.isfinite(each.noise.sigma)]).sum()) for each in one.problem.responses
+    )
+    return one.chi_squared / 2 + spread
+
+
+def _is_explained(one: Solution) -> bool:
+    """Whether noise alone gives such a sum often enough; where its size was taken from the residuals, never."""
+    known = all(each.noise.is_known for each in one.problem.responses)
+    return known and bool(chi2.sf(one.chi_squared, max(one.freedom, 1)) > EXPLAINED)
+
+
+def settled(problem: Problem, start: Real, held: dict[int, float] | None = None) -> Solution:
+    """The nearest minimum from a start, some coordinates held at a value."""
+    held = held or {}
+    free = np.array([n for n in range(start.size) if n not in held])
+    point = start.copy()
+    point[list(held)] = list(held.values())
+    low, high = (each[free] for each in problem.bounds)
+
+    def whole(x: Real) -> Real:
+        full = point.copy()
+        full[free] = x
+        return full
+
+    def residuals(x: Real) -> Real:
+        return problem.residuals(whole(x))
+
+    def jacobian(x: Real) -> Real:
+        return np.asarray(problem.jacobian(whole(x))[:, free])
+
+    inside = np.clip(point[free], low + EDGE, high - EDGE)
+    found = least_squares(
+        residuals, inside, jac=jacobian, bounds=(low, high), x_scale="jac", xtol=FIRM, ftol=FIRM_SUM, gtol=None,
+        max_nfev=MOST,
+    )  # fmt: skip
+    full, slopes = whole(found.x), np.zeros((found.fun.size, start.size))
+    slopes[:, free] = np.asarray(found.jac)
+    return Solution(problem, full, found.fun, slopes, bool(found.status > 0), 1)
+
+
+def _rescaled(found: Solution) -> Solution:
+    """The solution with each noise that is known up to a factor multiplied by what its residuals say."""
+    if all(each.noise.is_known for each in found.problem.responses):
+        return found
+    for _ in range(RESCALED):
+        responses, first = [], 0
+        for each in found.problem.responses:
+            size = 2 * int(np.isfinite(each.noise.sigma).sum())
+            own = found.residuals[first : first + size]
+            first += size
+            share = found.residuals.size / max(found.freedom, 1)
+            factor = math.sqrt(float(own @ own) / size * share) if not each.noise.is_known else 1.0
+            responses.append(replace(each, noise=replace(each.noise, sigma=each.noise.sigma * max(factor, 1e-12))))
+        found = settled(replace(found.problem, responses=tuple(responses)), found.point)
+    return found

@@ -1,0 +1,120 @@
+"""How sure a fit is: covariance, what the data do not determine, and intervals by the profile of the likelihood."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import norm, t
+
+from tfarm.records import record
+
+from .solve import Solution, settled
+
+Real = NDArray[np.float64]
+
+LEVEL = 0.95
+OPEN = 1.0  # of ln p: a combination with a larger deviation (a factor of e) is not determined by the data
+TAKES_PART = 0.1  # of a unit vector: a smaller component has no part in it
+ROUND = 0.02  # a power so near to 1 is written as 1
+CLOSE = 0.01  # of a deviation: where a profile has reached its level
+TRIES = 12
+
+
+@dataclass(frozen=True, kw_only=True)
+@record
+class Fitted:
+    """A fitted number: `value` in SI units, the ends of its 95 % interval, its standard deviation by the covariance.
+
+    What the data do not determine has no interval.
+    """
+
+    key: str
+    value: float
+    low: float | None
+    high: float | None
+    deviation: float | None
+    identified: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+@record
+class Sureness:
+    """The fitted numbers, and what is not determined, in words."""
+
+    parameters: tuple[Fitted, ...]
+    not_determined: tuple[str, ...]
+
+
+def sureness(found: Solution, *, profile: bool) -> Sureness:
+    """The intervals of a solution's numbers: by profiles, or by its covariance where they are not asked for."""
+    _, sizes, axes = np.linalg.svd(found.jacobian, full_matrices=False)
+    open_axes = axes[sizes < 1.0 / OPEN]
+    determined = sizes >= 1.0 / OPEN
+    covariance = (axes[determined].T / sizes[determined] ** 2) @ axes[determined]
+    unsure: list[bool] = np.any(abs(open_axes) > TAKES_PART, axis=0).tolist()
+    quantile = _quantile(found)
+    fitted = []
+    for n, each in enumerate(found.problem.parameters):
+        value = each.value(float(found.point[n]))
+        if unsure[n]:
+            fitted.append(Fitted(key=each.key, value=value, low=None, high=None, deviation=None, identified=False))
+            continue
+        deviation = math.sqrt(covariance[n, n])
+        ends = [found.point[n] - quantile * deviation, found.point[n] + quantile * deviation]
+        if profile:
+            ends = [_end(found, n, way, deviation, quantile) for way in (-1, 1)]
+        low, high = sorted(each.value(float(end)) for end in ends)
+        own = abs(each.slope(float(found.point[n]))) * deviation
+        fitted.append(Fitted(key=each.key, value=value, low=low, high=high, deviation=own, identified=True))
+    words = tuple(_said(axis, [each.key for each in found.problem.parameters]) for axis in open_axes)
+    return Sureness(parameters=tuple(fitted), not_determined=words)
+
+
+def _quantile(found: Solution) -> float:
+    """Of the normal distribution, or Student's where the noise was taken from the residuals."""
+    known = all(each.noise.is_known for each in found.problem.responses)
+    share = 0.5 + LEVEL / 2
+    return float(norm.ppf(share) if known else t.ppf(share, max(found.freedom, 1)))
+
+
+def _end(found: Solution, n: int, way: int, deviation: float, quantile: float) -> float:
+    """Where the least sum of squares with coordinate n held has grown by quantile^2, on one side of the best.
+
+    The root of that growth is nearly linear in the coordinate, so a secant finds it in two or three steps.
+    """
+    low, high = found.problem.bounds[0][n], found.problem.bounds[1][n]
+    rest = [m for m in range(found.point.size) if m != n]
+    slope = np.zeros(found.point.size)  # of the others where n is held elsewhere
+    slope[rest] = -np.linalg.lstsq(found.jacobian[:, rest], found.jacobian[:, n], rcond=None)[0]
+    slope[n] = 1.0
+    near, root_near = float(found.point[n]), 0.0
+    at = near + way * quantile * deviation
+    for _ in range(TRIES):
+        at = float(np.clip(at, low, high))
+        start = found.point + slope * (at - found.point[n])
+        growth = settled(found.problem, start, {n: at}).chi_squared - found.chi_squared
+        root = math.sqrt(max(growth, 0.0))
+        if abs(root - quantile) < CLOSE or (at in (low, high) and root < quantile):
+            return at
+        step = (quantile - root) * (at - near) / (root - root_near) if root != root_near else 2 * (at - near)
+        near, root_near, at = at, root, at + float(np.clip(step, -3 * abs(at - near), 3 * abs(at - near)))
+    return at
+
+
+def _said(axis: Real, keys: Sequence[str]) -> str:
+    """A direction along which nothing changes, in words; of two numbers, the combination that is known instead."""
+    part = [n for n in np.argsort(-abs(axis)) if abs(axis[n]) > TAKES_PART]
+    names = [keys[n] for n in part]
+    if len(part) == 1:
+        return f"{names[0]} is not determined by these data"
+    if len(part) == 2:
+        power = -axis[part[0]] / axis[part[1]]  # first * second^power does not change along the axis
+        known = f"{names[0]} {'*' if power > 0 else '/'} {names[1]}"
+        known += "" if abs(abs(power) - 1) < ROUND else f"^{abs(power):.3g}"
+        return f"{names[0]} and {names[1]} are not determined by these data: only {known} is"
+    shares = ", ".join(f"{name} {axis[n] / abs(axis[part[0]]):+.3g} %" for name, n in zip(names, part, strict=True))
+    return f"not determined by these data: {shares} together change nothing"
