@@ -101,7 +101,8 @@ def by_turns(values, poles, law, band, slow):
     right = 3 * max(band, *law.poles.real) if law.order else 3 * band
     width = np.maximum(abs(poles.real), 1e-9 * abs(poles))
     near = abs(poles.imag)[:, None] + width[:, None] * np.linspace(-20, 20, 160)
-    up = np.unique(np.r_[np.geomspace(slow, band, 2000), near[(near > slow) & (near < band)]])
+    turning = np.linspace(slow, band, 2 + int(4 * band * law.delay))  # a quarter of a radian of the delay a step
+    up = np.unique(np.r_[np.geomspace(slow, band, 2000), turning, near[(near > slow) & (near < band)]])
     arc = slow * np.exp(1j * np.linspace(0, np.pi / 2, 40))
     path = np.r_[arc, 1j * up, 1j * band + np.linspace(0, right, 400), right + 1j * np.linspace(band, 0, 400)]
     found = [value(path) for value in values]
