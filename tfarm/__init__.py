@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from tfarm.dsp.results import simulate
     from tfarm.errors import CertificationError, ConvergenceError, ParameterError
     from tfarm.exact.outputs import Output
+    from tfarm.fit.data import Measured
     from tfarm.loop.closed import closed_loop_poles, margins, nyquist
     from tfarm.loop.locus import locus
     from tfarm.loop.regions import region as map
@@ -59,6 +60,7 @@ __all__ = [
     "HubFeedback",
     "Law",
     "Link",
+    "Measured",
     "Motor",
     "Output",
     "ParameterError",
@@ -97,6 +99,7 @@ _ROOMS = {  # where a name stands; what it is called there after a colon, if not
     "map": "loop.regions:region",
     "margins": "loop.closed",
     "Law": "arm.law",
+    "Measured": "fit.data",
     "modes": "spectrum",
     "Output": "exact.outputs",
     "plots": "plots",

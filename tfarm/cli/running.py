@@ -11,6 +11,7 @@ from typer.exceptions import TyperException
 from tfarm.cli import (  # noqa: F401  each adds its verbs to the application
     commands,
     control,
+    fitting,
     loops,
     measuring,
     reduction,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,8 @@ from tfarm.records import record
 from .data import Measured
 from .model import DELAY, GAIN, Problem, problem
 from .parameters import Parameter, parameters
-from .solve import Solution, solved
+from .ringing import RingMode
+from .solve import Solution, is_explained, solved
 from .sure import Fitted, sureness
 
 Real = NDArray[np.float64]
@@ -39,11 +41,40 @@ class Fit:
     chi_squared: float
     freedom: int
     solution: Solution
+    profiled: bool
 
     @property
     def responses(self) -> tuple[Measured, ...]:
         """What was measured."""
         return tuple(each.data for each in self.solution.problem.responses)
+
+    @cached_property
+    def parts(self) -> tuple[Real, ...]:
+        """The residuals of each response, over their deviations."""
+        sizes = [2 * int(np.isfinite(each.noise.sigma).sum()) for each in self.solution.problem.responses]
+        return tuple(np.split(self.solution.residuals, np.cumsum(sizes))[: len(sizes)])
+
+    @cached_property
+    def rms_log_error(self) -> float | None:
+        """The root mean square of ln(computed/measured), complex, over all values; None where there are none."""
+        if not self.responses:
+            return None
+        computed = self.solution.problem.computed(self.solution.point)
+        pairs = zip(computed, self.responses, strict=True)
+        away = np.concatenate([np.log(H / each.values)[each.values != 0] for H, each in pairs])
+        return float(np.sqrt((abs(away) ** 2).mean()))
+
+    @property
+    def is_explained(self) -> bool | None:
+        """Whether noise alone is often so large; None where its size was taken from the residuals."""
+        return is_explained(self.solution)
+
+    @property
+    def verdict(self) -> str:
+        """In a word or three."""
+        if not self.converged:
+            return "not converged"
+        return "fitted, but the arm does not explain the data" if self.is_explained is False else "fitted"
 
     def chi_squared_at(self, values: Mapping[str, float]) -> float:
         """The sum of squared residuals at other numbers, by key."""
@@ -61,36 +92,39 @@ def fit(
     start: Mapping[str, float] | None = None,
     bounds: Mapping[str, tuple[float, float]] | None = None,
     priors: Mapping[str, tuple[float, float]] | None = None,
+    rings: Sequence[RingMode] = (),
     profile: bool = True,
 ) -> Fit:
     """The arm whose free numbers explain the measured responses best.
 
     `free` are keys of the arm's TOML file, and "gain" and "delay" of each response's sensor; `start`, `bounds` and
-    `priors` (mean, deviation) are by key, in SI units.  With `profile` each interval is that of the profile likelihood.
+    `priors` (mean, deviation) are by key, in SI units; `rings` are decays of single modes.  With `profile` each
+    interval is that of the profile likelihood, otherwise of the covariance.
     Raises ParameterError for a key that is none, and for more numbers than data.
     """
-    subject = _problem(arm, data, free, start, bounds, priors)
+    subject = _problem(arm, data, free, start, bounds, priors, rings)
     found = solved(subject)
     sure = sureness(found, profile=profile)
     return Fit(
         arm=replace(found.problem.arm(found.point), name=f"{arm.name}-fitted"),
-        before=arm,
+        before=replace(subject.arm(np.zeros(len(subject.parameters))), name=arm.name),
         converged=found.converged,
         parameters=sure.parameters,
         not_determined=sure.not_determined,
         chi_squared=found.chi_squared,
         freedom=found.freedom,
         solution=found,
+        profiled=profile,
     )
 
 
-def _problem(arm: Arm, data: Any, free: Any, start: Any, bounds: Any, priors: Any) -> Problem:
+def _problem(arm: Arm, data: Any, free: Any, start: Any, bounds: Any, priors: Any, rings: Any) -> Problem:
     data = (data,) if isinstance(data, Measured) else tuple(data)
-    if not data:
-        raise ParameterError(key="data", value=0, remedy="give at least one measured response")
+    if not data and not rings:
+        raise ParameterError(key="data", value=0, remedy="give at least one measured response, or a decay (--mode)")
     keys = [str(key) for key in free if key not in (GAIN, DELAY)]
     family, numbers = parameters(arm, keys, start=start, bounds=bounds, priors=priors)
-    subject = problem(arm, data, family, numbers, _sensors(data, free))
+    subject = problem(arm, data, family, numbers, _sensors(data, free), rings)
     if not subject.parameters:
         raise ParameterError(key="free", value="nothing", remedy="name what is free, such as link.youngs_modulus")
     if subject.size < len(subject.parameters):

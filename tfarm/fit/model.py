@@ -9,24 +9,23 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import INPUTS, Arm, Input
+from tfarm.arm import INPUTS, Arm
 from tfarm.errors import ParameterError
-from tfarm.exact.chain import Chain
-from tfarm.exact.chaining import chain_of
-from tfarm.exact.gradients import Direction, response_gradients
 from tfarm.exact.jets import Jet
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.response.signals import Signals
 
+from .around import Around, drive_behind, driven_by
 from .data import Measured
 from .noise import Noise, noise_of
 from .parameters import STEP, Family, Parameter
 from .reading import check_signal
+from .ringing import RingMode, ring_residuals
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
@@ -44,27 +43,6 @@ class Response:
     delay: int | None = None
 
 
-class Around:
-    """An arm and its neighbours a step below and above along each free number, as chains, made once for each drive."""
-
-    def __init__(self, arm: Arm, pairs: Sequence[tuple[Arm, ...]]) -> None:
-        self.arm, self._pairs = arm, pairs
-        self._chains: dict[str, tuple[Chain, list[tuple[Chain, Chain]]]] = {}
-
-    def gradients(self, driven: str, names: tuple[str, ...], s: Complex) -> tuple[Jet, list[Jet]]:
-        """Drive and signals at s, up to one factor, with their derivatives along the free numbers."""
-        if driven not in self._chains:
-            pairs = [(chain_of(driven_by(a, driven)), chain_of(driven_by(b, driven))) for a, b in self._pairs]
-            self._chains[driven] = chain_of(driven_by(self.arm, driven)), pairs
-        chain, pairs = self._chains[driven]
-        signals = Signals(self.arm, names)
-        along = [
-            Direction(below, above, Signals(a, names).places, Signals(b, names).places, 2 * STEP)
-            for (below, above), (a, b) in zip(pairs, self._pairs, strict=True)
-        ]
-        return response_gradients(chain, signals.outputs, signals.places, along, s)
-
-
 @dataclass(frozen=True)
 class Problem:
     """What is searched for: `parameters` of the arm first, then those of the sensors, and what they have to explain."""
@@ -72,6 +50,7 @@ class Problem:
     family: Family
     parameters: tuple[Parameter, ...]
     responses: tuple[Response, ...]
+    rings: tuple[RingMode, ...] = ()
 
     @cached_property
     def _grids(self) -> dict[tuple[bytes, str], list[int]]:
@@ -82,8 +61,8 @@ class Problem:
         return found
 
     def driven(self, name: str) -> str:
-        """What drives the arm where that is the input: its own drive, where the response is over a signal."""
-        return name if name in INPUTS and name not in OUTPUTS else self.family.arm.input
+        """What drives the arm where that is the input of a response."""
+        return drive_behind(self.family.arm, name)
 
     @cached_property
     def of_the_arm(self) -> tuple[Parameter, ...]:
@@ -98,9 +77,10 @@ class Problem:
 
     @property
     def size(self) -> int:
-        """How many real residuals there are: two a frequency, one a prior."""
+        """How many real residuals there are: two a frequency, one or two a decay, one a prior."""
         priors = sum(each.prior is not None for each in self.parameters)
-        return sum(2 * int(np.isfinite(each.noise.sigma).sum()) for each in self.responses) + priors
+        rings = sum(1 + (each.ratio is not None) for each in self.rings)
+        return sum(2 * int(np.isfinite(each.noise.sigma).sum()) for each in self.responses) + rings + priors
 
     def values(self, point: Real) -> dict[str, float]:
         """The numbers at a point of the search, by key."""
@@ -125,9 +105,9 @@ class Problem:
                 found[n] = np.asarray(over / under * self._sensor(n, point))
         return found
 
-    def slopes(self, point: Real) -> list[tuple[Complex, Complex]]:
+    def slopes(self, point: Real, here: Around | None = None) -> list[tuple[Complex, Complex]]:
         """Each response, and its derivative (parameters, n) along each coordinate."""
-        here, found = self.around(point), list[Any]([None] * len(self.responses))
+        here, found = here or self.around(point), list[Any]([None] * len(self.responses))
         for (_, driven), numbers in self._grids.items():
             names, s = self._signals(numbers, driven), 1j * self.responses[numbers[0]].data.omega
             drive, outputs = here.gradients(driven, names, s)
@@ -178,21 +158,30 @@ class Problem:
             return factor * np.exp(-1j * one.data.omega * delay)
         return factor
 
+    def at(self, number: int, omega: Real) -> Problem:
+        """The problem of one of its responses alone, at other frequencies: for curves."""
+        one = self.responses[number]
+        data = replace(one.data, omega=omega, values=np.ones(omega.size, complex), sigma=None, coherence=None)
+        return replace(self, responses=(replace(one, data=data),), rings=())
+
     # ------------------------------------------------------------ residuals
 
     def residuals(self, point: Real) -> Real:
         """(size,): real and imaginary parts of computed less measured over their deviations, then the priors."""
-        return np.concatenate(
-            [
-                *(_parts((H - one.data.values) / one.noise.sigma, one) for H, one in self._pairs(self.computed(point))),
-                self._priors(point),
-            ]
-        )
+        away = [_parts((H - one.data.values) / one.noise.sigma, one) for H, one in self._pairs(self.computed(point))]
+        rings = self.of_rings(point, Around(self.arm(point), ()))[0] if self.rings else np.empty(0)
+        return np.concatenate([*away, rings, self._priors(point)])
 
     def jacobian(self, point: Real) -> Real:
         """(size, parameters): the derivatives of the residuals."""
-        rows = [_parts(dH / one.noise.sigma, one) for (_, dH), one in self._pairs(self.slopes(point))]
-        return np.concatenate([*(row.T for row in rows), self._priors_slopes(point)])
+        here = self.around(point)
+        rows = [_parts(dH / one.noise.sigma, one) for (_, dH), one in self._pairs(self.slopes(point, here))]
+        rings = self.of_rings(point, here)[1]
+        return np.concatenate([*(row.T for row in rows), rings, self._priors_slopes(point)])
+
+    def of_rings(self, point: Real, here: Around) -> tuple[Real, Real]:
+        """Residuals (n,) of the decays, and their derivatives (n, parameters)."""
+        return ring_residuals(here, self.rings, point.size)
 
     def _pairs(self, each: Sequence[Any]) -> Any:
         return zip(each, self.responses, strict=True)
@@ -210,10 +199,6 @@ class Problem:
         return np.array(rows).reshape(-1, len(self.parameters))
 
 
-def driven_by(arm: Arm, driven: str) -> Arm:
-    return arm if arm.input == driven else replace(arm, input=cast("Input", driven))
-
-
 def _parts(values: Complex, one: Response) -> Real:
     """Real and imaginary parts, one behind the other, of what was measured."""
     kept = values[..., np.isfinite(one.noise.sigma)]
@@ -221,7 +206,12 @@ def _parts(values: Complex, one: Response) -> Real:
 
 
 def problem(
-    arm: Arm, data: Sequence[Measured], family: Family, numbers: Sequence[Parameter], sensors: Mapping[str, Any]
+    arm: Arm,
+    data: Sequence[Measured],
+    family: Family,
+    numbers: Sequence[Parameter],
+    sensors: Mapping[str, Any],
+    rings: Sequence[RingMode] = (),
 ) -> Problem:
     """The problem of an arm's free numbers and its sensors' (see `sensor_parameters`)."""
     check_signals(arm, data)
@@ -234,7 +224,7 @@ def problem(
                 places[kind] = len(own)
                 own.append(sensors[kind][number])
         responses.append(Response(each, noise_of(each), places.get(GAIN), places.get(DELAY)))
-    return Problem(family, tuple(own), tuple(responses))
+    return Problem(family, tuple(own), tuple(responses), tuple(rings))
 
 
 def check_signals(arm: Arm, data: Sequence[Measured]) -> None:

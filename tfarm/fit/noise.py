@@ -16,7 +16,7 @@ Real = NDArray[np.float64]
 
 LEAST = 1e-5  # of |H|: no measured response is better known than that, whatever its coherence says
 AROUND = 2  # neighbours on each side that a value is compared with
-TYPICAL = 0.6745  # the median of |x| of a normal x of deviation 1
+TYPICAL = 1.17741  # the median of |x + i y| of normal x and y of deviation 1: sqrt(2 ln 2)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,5 +64,5 @@ def _scatter(values: NDArray[Any]) -> Real:
     weights = np.array([1 / 6, -2 / 3, 1.0, -2 / 3, 1 / 6])
     away = np.convolve(values, weights, mode="valid") / np.sqrt((weights**2).sum())
     relative = abs(away) / abs(values[AROUND:-AROUND])
-    typical = float(np.median(relative)) / TYPICAL / np.sqrt(2.0)
+    typical = float(np.median(relative)) / TYPICAL
     return np.maximum(abs(values), np.median(abs(values)) * 1e-3) * max(typical, LEAST)

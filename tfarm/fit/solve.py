@@ -26,6 +26,8 @@ SPREAD = 0.15  # of ln p
 SEED = 852780
 MOST = 60  # evaluations from one start
 FIRM, FIRM_SUM = 1e-9, 1e-12  # of the coordinates, of the sum: a step that changes less ends a search
+OPEN = 1.0  # of ln p: a combination with a larger deviation (a factor of e) is not determined by the data
+SAME = 0.1  # of a sum of squares: less is no difference to speak of
 EDGE = 1e-9  # of a coordinate: a search begins so far inside its bounds
 RESCALED = 3  # times that a noise known up to a factor takes its factor from the residuals
 
@@ -62,15 +64,28 @@ def solved(problem: Problem) -> Solution:
 
     for subject, start in Starts(problem):
         best = best_after(subject, start)
-        if best.converged and _is_explained(best):
-            return replace(best, starts=len(found))
+        if best.converged and is_explained(best):
+            return replace(_nearest(best), starts=len(found))
     rng, (low, high) = np.random.default_rng(SEED), problem.bounds
     for _ in range(STRAYED):
         if best.converged and best.chi_squared < WORSE * best.freedom:
             break
         strayed = best.point + SPREAD * rng.standard_normal(best.point.size)
         best = best_after(best.problem, np.clip(strayed, low + EDGE, high - EDGE))
-    return replace(best, starts=len(found))
+    return replace(_nearest(best), starts=len(found))
+
+
+def _nearest(found: Solution) -> Solution:
+    """Of the points where what the data do not know is something else, the one nearest to the start."""
+    _, sizes, axes = np.linalg.svd(found.jacobian)
+    open_axes = axes[np.r_[sizes, np.zeros(len(axes) - sizes.size)] < 1.0 / OPEN]
+    if not open_axes.size:
+        return found
+    start = found.point - open_axes.T @ (open_axes @ found.point)
+    places = abs(open_axes).argmax(axis=1)
+    back = settled(found.problem, start, {int(n): float(start[n]) for n in places})
+    back = replace(back, jacobian=found.problem.jacobian(back.point), converged=found.converged)
+    return back if back.chi_squared < found.chi_squared + SAME else found
 
 
 def _misfit(one: Solution) -> float:
@@ -81,18 +96,21 @@ def _misfit(one: Solution) -> float:
     return one.chi_squared / 2 + spread
 
 
-def _is_explained(one: Solution) -> bool:
-    """Whether noise alone gives such a sum often enough; where its size was taken from the residuals, never."""
-    known = all(each.noise.is_known for each in one.problem.responses)
-    return known and bool(chi2.sf(one.chi_squared, max(one.freedom, 1)) > EXPLAINED)
+def is_explained(one: Solution) -> bool | None:
+    """Whether noise alone gives such a sum often enough; None where its size was taken from the residuals."""
+    if not all(each.noise.is_known for each in one.problem.responses):
+        return None
+    return bool(chi2.sf(one.chi_squared, max(one.freedom, 1)) > EXPLAINED)
 
 
 def settled(problem: Problem, start: Real, held: dict[int, float] | None = None) -> Solution:
     """The nearest minimum from a start, some coordinates held at a value."""
     held = held or {}
-    free = np.array([n for n in range(start.size) if n not in held])
+    free = [n for n in range(start.size) if n not in held]
     point = start.copy()
     point[list(held)] = list(held.values())
+    if not free:
+        return Solution(problem, point, problem.residuals(point), np.zeros((problem.size, start.size)), True, 1)
     low, high = (each[free] for each in problem.bounds)
 
     def whole(x: Real) -> Real:

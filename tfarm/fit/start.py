@@ -10,55 +10,24 @@ Tuned on the survey `tests.fit.planted`: the counts and shares below.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
-from scipy.signal import find_peaks
 
-from tfarm.response.signals import Signals
-
-from .data import Measured
-from .model import Around, Problem, driven_by
+from .features import features_of, match, near_zeros
+from .model import Problem
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
 
-PROMINENT = 0.35  # of ln |H|: what stands out by a factor of 1.4 is a peak, if the noise is below a quarter of that
-NOISY = 4.0  # deviations of the noise
-BEYOND = 1.6  # so far beyond both ends of a band the arm's own peaks are looked for
-GRID = 600  # points at which they are
-BROAD = 0.15  # of its frequency: a zero farther from the axis is no peak
-NUDGE = 1e-6  # of a frequency: for a slope along it
-SKIPPED = 0.25  # of ln w: what a peak that is matched with nothing costs
 HELD = 0.5  # of ln p: the deviation that a start is held with, where peaks do not decide
 ROUNDS = 8  # of Newton's method on the frequencies
 SHIFTS = (0.0, -0.15, 0.15, -0.3, 0.3)  # of ln w: of all the arm's peaks, before the first match
 CURVE = 150  # points of a response that its curve is followed at
 LOSS = 0.3  # of ln H: residuals beyond count less and less
-
-
-@dataclass(frozen=True)
-class Features:
-    """Peaks and dips [rad/s] of a response, ascending."""
-
-    peaks: Real
-    dips: Real
-
-
-def features_of(data: Measured, sigma: Real) -> Features:
-    """Those of a measured response that stand out of its noise."""
-    level = np.log(np.maximum(abs(data.values), np.finfo(float).tiny))
-    noise = np.minimum(sigma / np.maximum(abs(data.values), np.finfo(float).tiny), 10.0)
-
-    def found(curve: Real) -> Real:
-        at, how = find_peaks(curve, prominence=PROMINENT)
-        near = np.array([np.median(noise[max(0, n - 3) : n + 4]) for n in at])
-        return np.asarray(data.omega[at[how["prominences"] > NOISY * near]] if at.size else np.empty(0))
-
-    return Features(found(level), found(-level))
 
 
 class Starts:
@@ -72,7 +41,7 @@ class Starts:
     def __iter__(self) -> Iterator[tuple[Problem, Real]]:
         zero = np.zeros(len(self.problem.parameters))
         tried: list[Real] = []
-        for shift in SHIFTS:
+        for shift in SHIFTS if self._free else ():
             matched = self._matched(zero, shift)
             if any(abs(matched - other).max() < 1e-3 for other in tried):
                 continue
@@ -103,36 +72,17 @@ class Starts:
         rows, misfit = [np.empty((0, self._free))], [np.empty(0)]
         here = self.problem.around(point)
         for each, features in zip(self.problem.responses, self._features, strict=True):
-            for measured, (w, slopes) in zip((features.dips, features.peaks), self._own(here, each.data), strict=True):
+            for measured, (w, slopes) in zip((features.dips, features.peaks), near_zeros(here, each.data), strict=True):
                 pairs = match(np.log(measured), np.log(w) + shift)
                 rows.append(np.array([slopes[:, j] for _, j in pairs]).reshape(-1, self._free))
                 misfit.append(np.array([np.log(measured[i] / w[j]) for i, j in pairs]))
+        if self.problem.rings:
+            decays, slopes = self.problem.of_rings(point, here)
+            shares = np.array([each.frequency_deviation / each.frequency for each in self.problem.rings])
+            first = np.cumsum([0, *(1 + (each.ratio is not None) for each in self.problem.rings)])[:-1]
+            rows.append(slopes[first, : self._free] * shares[:, None])
+            misfit.append(-decays[first] * shares)
         return np.vstack(rows), np.concatenate(misfit)
-
-    def _own(self, here: Around, data: Measured) -> list[tuple[Real, Real]]:
-        """Dips, then peaks: zeros near the axis of what is over and under, w (k,), and d ln w (free, k).
-
-        From the smallest values on a grid a step of Newton's method leads to the zeros, its slope by a difference.
-        """
-        driven = self.problem.driven(data.input)
-        names = tuple(dict.fromkeys(each for each in (data.output, data.input) if each != driven))
-        grid = np.geomspace(data.omega[0] / BEYOND, data.omega[-1] * BEYOND, GRID)
-        parts = Signals(driven_by(here.arm, driven), names).parts(1j * grid)
-        rows = [names.index(each) if each != driven else None for each in (data.output, data.input)]
-        curves = [parts.drive if row is None else parts.numerators[row] for row in rows]
-        near = [grid[find_peaks(-(np.log(abs(each)) + parts.scale.real))[0]] for each in curves]
-        at = np.concatenate(near)
-        drive, outputs = here.gradients(driven, names, np.concatenate([1j * at, 1j * at * (1 + NUDGE)]))
-        found, first = [], 0
-        for row, w in zip(rows, near, strict=True):
-            jet, own = drive if row is None else outputs[row], slice(first, first + w.size)
-            first += w.size
-            f, by_s = jet.c[0][own], (jet.c[0][at.size :][own] - jet.c[0][own]) / (1j * w * NUDGE)
-            zero = 1j * w - f / by_s
-            kept = (abs(zero.real) < BROAD * w) & (abs(zero.imag / w - 1) < BROAD)
-            slopes = (-jet.c[1][:, own] / by_s).imag / zero.imag
-            found.append((zero.imag[kept], slopes[:, kept]))
-        return found
 
     # ------------------------------------------------------------ curves
 
@@ -145,6 +95,9 @@ class Starts:
         thin = thinned(whole, CURVE)
         low, high = thin.bounds
         point = np.clip(self._with_gains(thin, point), low + 1e-9, high - 1e-9)
+
+        if not thin.responses:
+            return whole, point
 
         def residuals(x: Real) -> Real:
             pairs = zip(thin.computed(x), thin.responses, strict=True)
@@ -177,30 +130,6 @@ def signed(problem: Problem, point: Real) -> Problem:
                 own = parameters[each.gain]
                 parameters[each.gain] = replace(own, start=-own.start)
     return replace(problem, parameters=tuple(parameters))
-
-
-def match(measured: Real, own: Real) -> list[tuple[int, int]]:
-    """Pairs of places in two ascending rows, in order, with the least sum of squared gaps; to skip one costs SKIPPED^2.
-
-    By dynamic programming over both rows; of the arm's own, those that nothing was measured at cost nothing.
-    """
-    n, m = measured.size, own.size
-    cost = np.zeros((n + 1, m + 1))
-    cost[1:, 0] = SKIPPED**2 * np.arange(1, n + 1)
-    for i in range(1, n + 1):
-        for j in range(1, m + 1):
-            gap = (measured[i - 1] - own[j - 1]) ** 2
-            cost[i, j] = min(cost[i - 1, j - 1] + gap, cost[i - 1, j] + SKIPPED**2, cost[i, j - 1])
-    pairs, i, j = [], n, m
-    while i and j:
-        if cost[i, j] == cost[i, j - 1]:
-            j -= 1
-        elif cost[i, j] == cost[i - 1, j] + SKIPPED**2:
-            i -= 1
-        else:
-            i, j = i - 1, j - 1
-            pairs.append((i, j))
-    return pairs[::-1]
 
 
 def thinned(problem: Problem, most: int) -> Problem:

@@ -8,20 +8,21 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 from scipy.stats import norm, t
 
 from tfarm.records import record
 
-from .solve import Solution, settled
+from .solve import OPEN, Solution, settled
 
 Real = NDArray[np.float64]
 
 LEVEL = 0.95
-OPEN = 1.0  # of ln p: a combination with a larger deviation (a factor of e) is not determined by the data
 TAKES_PART = 0.1  # of a unit vector: a smaller component has no part in it
 ROUND = 0.02  # a power so near to 1 is written as 1
 CLOSE = 0.01  # of a deviation: where a profile has reached its level
 TRIES = 12
+REACHES = (0.5, 1.0, 2.0, 4.0, 6.0, 9.0)  # of ln p: where a number that does not matter is tried
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,28 +51,66 @@ class Sureness:
 
 
 def sureness(found: Solution, *, profile: bool) -> Sureness:
-    """The intervals of a solution's numbers: by profiles, or by its covariance where they are not asked for."""
-    _, sizes, axes = np.linalg.svd(found.jacobian, full_matrices=False)
-    open_axes = axes[sizes < 1.0 / OPEN]
-    determined = sizes >= 1.0 / OPEN
-    covariance = (axes[determined].T / sizes[determined] ** 2) @ axes[determined]
-    unsure: list[bool] = np.any(abs(open_axes) > TAKES_PART, axis=0).tolist()
+    """The intervals of a solution's numbers: by profiles, or by its covariance where they are not asked for.
+
+    Along an open axis nothing changes, so one number of it is held while the others are profiled.
+    """
+    _, sizes, axes = np.linalg.svd(found.jacobian)
+    sizes = np.r_[sizes, np.zeros(len(axes) - sizes.size)]  # fewer residuals than numbers
+    is_open = sizes < 1.0 / OPEN
+    covariance = (axes[~is_open].T / sizes[~is_open] ** 2) @ axes[~is_open]
+    unsure: list[bool] = np.any(abs(axes[is_open]) > TAKES_PART, axis=0).tolist()
+    held = {int(abs(axis).argmax()): float(found.point[abs(axis).argmax()]) for axis in axes[is_open]}
     quantile = _quantile(found)
-    fitted = []
+    fitted, words = [], [_said(axis, [each.key for each in found.problem.parameters]) for axis in axes[is_open]]
+    alone = {int(abs(axis).argmax()): n for n, axis in enumerate(axes[is_open]) if (abs(axis) > TAKES_PART).sum() == 1}
     for n, each in enumerate(found.problem.parameters):
-        value = each.value(float(found.point[n]))
-        if unsure[n]:
-            fitted.append(Fitted(key=each.key, value=value, low=None, high=None, deviation=None, identified=False))
-            continue
-        deviation = math.sqrt(covariance[n, n])
-        ends = [found.point[n] - quantile * deviation, found.point[n] + quantile * deviation]
-        if profile:
-            ends = [_end(found, n, way, deviation, quantile) for way in (-1, 1)]
-        low, high = sorted(each.value(float(end)) for end in ends)
-        own = abs(each.slope(float(found.point[n]))) * deviation
-        fitted.append(Fitted(key=each.key, value=value, low=low, high=high, deviation=own, identified=True))
-    words = tuple(_said(axis, [each.key for each in found.problem.parameters]) for axis in open_axes)
-    return Sureness(parameters=tuple(fitted), not_determined=words)
+        value, slope = each.value(float(found.point[n])), abs(each.slope(float(found.point[n])))
+        low = high = deviation = None
+        if not unsure[n]:
+            deviation = math.sqrt(covariance[n, n])
+            ends = [found.point[n] - quantile * deviation, found.point[n] + quantile * deviation]
+            if profile:
+                ends = [_end(found, n, way, deviation, quantile, held) for way in (-1, 1)]
+            low, high = sorted(each.value(float(end)) for end in ends)
+        elif n in alone and (side := _one_sided(found, n, quantile)) is not None:
+            low, high = side
+            words[alone[n]] = ""
+        fitted.append(
+            Fitted(
+                key=each.key, value=value, low=low, high=high, identified=low is not None,
+                deviation=None if deviation is None else slope * deviation,
+            )
+        )  # fmt: skip
+    return Sureness(parameters=tuple(fitted), not_determined=tuple(word for word in words if word))
+
+
+def _one_sided(found: Solution, n: int, quantile: float) -> tuple[float, float] | None:
+    """The interval of a number that does not matter where it is, but would if it were larger, or smaller.
+
+    A payload of next to nothing is at most so heavy, a clamp that is all but rigid at least so stiff.  The others are
+    held: what they could take back is no more than a factor of the end.
+    """
+    each, limits = found.problem.parameters[n], (found.problem.bounds[0][n], found.problem.bounds[1][n])
+    if not each.by_logarithm:
+        return None
+
+    def excess(at: float) -> float:
+        point = found.point.copy()
+        point[n] = at
+        residuals = found.problem.residuals(point)
+        return float(residuals @ residuals) - found.chi_squared - quantile**2
+
+    ends: list[float | None] = []
+    for way in (-1, 1):
+        steps = (found.point[n] + way * reach for reach in REACHES)
+        inside = [float(at) for at in steps if limits[0] <= at <= limits[1]]
+        beyond = next((at for at in inside if excess(at) > 0), None)
+        ends.append(None if beyond is None else float(brentq(excess, found.point[n], beyond, xtol=1e-4)))
+    if ends == [None, None]:
+        return None
+    low, high = ends
+    return 0.0 if low is None else each.value(low), math.inf if high is None else each.value(high)
 
 
 def _quantile(found: Solution) -> float:
@@ -81,13 +120,13 @@ def _quantile(found: Solution) -> float:
     return float(norm.ppf(share) if known else t.ppf(share, max(found.freedom, 1)))
 
 
-def _end(found: Solution, n: int, way: int, deviation: float, quantile: float) -> float:
+def _end(found: Solution, n: int, way: int, deviation: float, quantile: float, held: dict[int, float]) -> float:
     """Where the least sum of squares with coordinate n held has grown by quantile^2, on one side of the best.
 
     The root of that growth is nearly linear in the coordinate, so a secant finds it in two or three steps.
     """
     low, high = found.problem.bounds[0][n], found.problem.bounds[1][n]
-    rest = [m for m in range(found.point.size) if m != n]
+    rest = [m for m in range(found.point.size) if m != n and m not in held]
     slope = np.zeros(found.point.size)  # of the others where n is held elsewhere
     slope[rest] = -np.linalg.lstsq(found.jacobian[:, rest], found.jacobian[:, n], rcond=None)[0]
     slope[n] = 1.0
@@ -96,7 +135,7 @@ def _end(found: Solution, n: int, way: int, deviation: float, quantile: float) -
     for _ in range(TRIES):
         at = float(np.clip(at, low, high))
         start = found.point + slope * (at - found.point[n])
-        growth = settled(found.problem, start, {n: at}).chi_squared - found.chi_squared
+        growth = settled(found.problem, start, held | {n: at}).chi_squared - found.chi_squared
         root = math.sqrt(max(growth, 0.0))
         if abs(root - quantile) < CLOSE or (at in (low, high) and root < quantile):
             return at

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import io
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from matplotlib.figure import Figure
+
+from tfarm.files import write_file
 
 from .style import style
 
@@ -20,14 +25,29 @@ DOTS_PER_INCH = 160
 
 def save(figure: Figure, folder: Path, stem: str, formats: tuple[str, ...] = FORMATS, dpi: int = DOTS_PER_INCH) -> None:
     """The figure as folder/stem.svg, .png and .pdf."""
+    with _laid_out(figure):
+        for kind in formats:
+            figure.savefig(folder / f"{stem}.{kind}", format=kind, dpi=dpi, metadata=METADATA[kind])
+
+
+def save_png(figure: Figure, path: Path, *, key: str = "--png") -> None:
+    """The figure as one PNG file, written beside and renamed.  Raises ParameterError, naming `key`, where it cannot."""
+    picture = io.BytesIO()
+    with _laid_out(figure):
+        figure.savefig(picture, format="png", dpi=DOTS_PER_INCH, metadata=METADATA["png"])
+    write_file(path, picture.getvalue(), key=key)
+
+
+@contextmanager
+def _laid_out(figure: Figure) -> Iterator[None]:
+    """The figure with its layout made once for all formats, in the house style."""
     with style(), warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph .* missing")  # an arm's name may hold any letter
         if (layout := figure.get_layout_engine()) is not None:
-            layout.execute(figure)  # once is enough for all formats
+            layout.execute(figure)
             figure.set_layout_engine(None)
         _settle(figure)
-        for kind in formats:
-            figure.savefig(folder / f"{stem}.{kind}", format=kind, dpi=dpi, metadata=METADATA[kind])
+        yield
 
 
 def _settle(figure: Figure) -> None:

@@ -1,0 +1,202 @@
+"""Arms fitted to responses of finite elements with noise, and to decays; what the data leave open is said."""
+
+import math
+import tomllib
+
+import numpy as np
+import pytest
+
+import tfarm
+from tests import chain_elements
+from tests.fit.planted import elements_response, judged
+from tests.shell import answer, run
+from tfarm.errors import ParameterError
+from tfarm.fit.answers import resonances
+from tfarm.fit.fit import fit
+from tfarm.fit.noise import noise_of
+from tfarm.fit.ringing import RingMode, mode_of
+
+LAB = tfarm.load("sasaki2012-lab")
+OMEGA = np.geomspace(8.0, 1200.0, 160)
+PAIRS = (("tip_acceleration", "hub_angle"), ("root_moment", "hub_torque"))
+
+
+def measured(arm=LAB, pairs=PAIRS, share=0.02, seed=1, omega=OMEGA):
+    """Responses of finite elements with noise of known size."""
+    rng, found = np.random.default_rng(seed), []
+    for (output, under), H in zip(pairs, elements_response(arm, omega, pairs), strict=True):
+        sigma = share * abs(H) + 1e-3 * np.median(abs(H))
+        noise = sigma * (rng.standard_normal(omega.size) + 1j * rng.standard_normal(omega.size))
+        found.append(tfarm.Measured(output=output, input=under, omega=omega, values=H + noise, sigma=sigma))
+    return found
+
+
+@pytest.mark.parametrize("seed", [1, 13, 10013])  # the last has sensors of the wrong sign
+def test_planted_numbers_are_found_again(seed):
+    verdict, _, found = judged(seed, profile=False)
+    assert verdict == "right"
+    assert found.is_explained
+    assert found.chi_squared / found.freedom == pytest.approx(1.0, abs=5 * math.sqrt(2 / found.freedom))
+
+
+def test_profiles_are_where_the_sum_of_squares_has_grown_by_the_quantile():
+    found = fit(LAB, measured(), free=["link.youngs_modulus", "hub.inertia"])
+    own, best = found.solution.problem, found.solution.point
+    for n, each in enumerate(found.parameters):
+        for end in (each.low, each.high):
+            held = own.parameters[n].coordinate(end)
+            grid = (
+                best[1 - n] + np.linspace(-4, 4, 401) * found.parameters[1 - n].deviation / own.parameters[1 - n].start
+            )
+            points = [np.array([held, other] if n == 0 else [other, held]) for other in grid]
+            sums = [float(r @ r) for r in map(own.residuals, points[150:251:5])]
+            assert min(sums) - found.chi_squared == pytest.approx(1.959964**2, rel=0.05)
+        assert each.low < each.value < each.high
+        assert (each.high - each.low) / (2 * 1.96 * each.deviation) == pytest.approx(1, abs=0.05)  # nearly Gaussian
+
+
+def test_of_a_product_only_the_product_is_known():
+    """A slender arm's bending knows E I alone; rotary inertia, which knows I, is four decades smaller."""
+    free = ["link.youngs_modulus", "link.section.second_moment"]
+    found = fit(LAB, measured(pairs=PAIRS[:1]), free=free, start={free[0]: 5e10}, profile=False)
+    assert [each.identified for each in found.parameters] == [False, False]
+    (words,) = found.not_determined
+    assert "only" in words
+    assert "*" in words
+    product = found.arm.link.youngs_modulus * found.arm.link.section.second_moment
+    assert product == pytest.approx(LAB.link.youngs_modulus * LAB.link.section.second_moment, rel=1e-3)
+
+
+def test_what_does_not_matter_is_bounded_on_one_side():
+    """The lab arm carries nothing: how heavy the payload is at most is known all the same."""
+    found = fit(LAB, measured(), free=["payload.mass", "hub.inertia"])
+    mass = found.parameters[0]
+    assert mass.low == 0.0
+    assert 1e-6 < mass.high < 1e-3 * LAB.own_mass
+    assert mass.deviation is None
+
+
+def test_decays_alone():
+    """Two frequencies and one ratio, of finite elements, for two numbers."""
+    s = chain_elements.eigenvalues(LAB, 400.0)
+    ringing = s[(s.imag > 1.0)][np.argsort(s.imag[s.imag > 1.0])]
+    rings = [
+        RingMode(
+            number=n + 1, frequency=float(p.imag), frequency_deviation=1e-6 * float(p.imag),
+            ratio=float(-p.real / abs(p)), ratio_deviation=1e-6,
+        )
+        for n, p in enumerate(ringing[:2])
+    ]  # fmt: skip
+    start = {"link.youngs_modulus": 5e10, "link.damping": 3e-4}
+    found = fit(LAB, [], free=list(start), start=start, rings=rings, profile=False)
+    assert found.arm.link.youngs_modulus == pytest.approx(LAB.link.youngs_modulus, rel=1e-5)
+    assert found.arm.link.damping == pytest.approx(LAB.link.damping, rel=1e-3)
+    assert found.rms_log_error is None
+
+
+def test_noise_by_its_coherence_and_by_its_scatter():
+    """Coherence of n averages: sqrt((1 - g)/(2 n g)) of each part; with nothing said, the values' own scatter."""
+    rng, sigma = np.random.default_rng(3), 0.03
+    H = 1 / (1 + 1j * OMEGA / 100)
+    values = H + sigma * abs(H) * (rng.standard_normal(OMEGA.size) + 1j * rng.standard_normal(OMEGA.size))
+    one = {"output": "hub_rate", "input": "hub_torque", "omega": OMEGA, "values": values}
+    found = noise_of(tfarm.Measured(**one))
+    assert not found.is_known
+    assert np.median(found.sigma / abs(H)) == pytest.approx(sigma, rel=0.25)
+    coherence = np.full(OMEGA.size, 1 / (1 + 2 * 10 * sigma**2))
+    known = noise_of(tfarm.Measured(**one, coherence=coherence, averages=10))
+    assert known.is_known
+    assert known.sigma == pytest.approx(sigma * abs(values), rel=1e-12)
+
+
+def test_noise_that_is_not_said_comes_from_the_residuals():
+    data = [tfarm.Measured(output=e.output, input=e.input, omega=e.omega, values=e.values) for e in measured()]
+    found = fit(LAB, data, free=["link.youngs_modulus", "hub.inertia"], start={"link.youngs_modulus": 6e10})
+    assert found.is_explained is None
+    assert found.chi_squared / found.freedom == pytest.approx(1.0, rel=0.02)
+    assert abs(found.arm.link.youngs_modulus / LAB.link.youngs_modulus - 1) < 2e-3
+
+
+def test_an_arm_that_is_wrong_is_not_said_to_explain_anything():
+    """The data are those of an arm with a clamp that yields; with a rigid one the fit ends, and says so."""
+    soft = tfarm.Arm(link=LAB.link, hub=LAB.hub, clamp=tfarm.RotarySpring(stiffness=300.0), name="soft")
+    found = fit(LAB, measured(soft), free=["link.youngs_modulus"], profile=False)
+    assert found.is_explained is False
+    assert "does not explain" in found.verdict
+
+
+def test_resonances_before_and_after_are_the_arms_own():
+    """Over torque they are natural frequencies, over the hub's angle those of a locked hub."""
+    start = {"link.youngs_modulus": 6e10}
+    found = fit(LAB, measured(), free=["link.youngs_modulus"], start=start, profile=False)
+    free = tfarm.modes(found.arm, 6).natural_frequency[1:] / 2 / math.pi
+    locked = tfarm.modes(found.arm.having(hub_inertia=math.inf), 6).natural_frequency / 2 / math.pi
+    for before, after, peak in resonances(found):
+        own = min([*free, *locked], key=lambda f: abs(f - after))
+        assert after == pytest.approx(own, rel=2e-3)  # w of an eigenvalue, damped
+        assert before / after == pytest.approx(
+            math.sqrt(6e10 / found.arm.link.youngs_modulus), rel=4e-3
+        )  # ratio^2/2 = 1.4e-3 each
+        assert peak == pytest.approx(after, rel=0.05)  # on a grid of 3 %
+
+
+def test_the_command_and_its_file(tmp_path, capsys):
+    path = tmp_path / "sweep.csv"
+    (one,) = measured(pairs=PAIRS[:1])
+    rows = (f"{w / 2 / math.pi!r},{v.real!r},{v.imag!r},{d!r}" for w, v, d in
+            zip(one.omega.tolist(), one.values.tolist(), one.sigma.tolist(), strict=True))  # fmt: skip
+    path.write_text("\n".join(["hz,re,im,sigma", *rows]))
+    save, png = tmp_path / "fitted.toml", tmp_path / "fit.png"
+    given = ("fit", "sasaki2012-lab", "--data", f"tip_acceleration/hub_angle={path}")
+    code, out, err = run(
+        capsys, *given, "--free", "link.youngs_modulus,gain", "--start", "link.youngs_modulus=6e10",
+        "--save", str(save), "--png", str(png), "--covariance",
+    )  # fmt: skip
+    assert (code, err) == (0, "")
+    assert "2 of 2 numbers are known from these data" in out
+    assert png.read_bytes().startswith(b"\x89PNG")
+    fitted = tfarm.load(save)
+    assert one.digest == ""
+    assert "SHA-256" in fitted.assumptions[-1]
+    assert tomllib.loads(save.read_text())["link"]["youngs_modulus"] == fitted.link.youngs_modulus
+    found = answer(capsys, *given, "--free", "link.youngs_modulus", "--covariance")
+    assert set(found["parameters"]["link.youngs_modulus"]) >= {"value", "low", "high", "std", "identified"}
+    assert set(found["frequencies_hz"]) == {"before", "after", "measured"}
+    assert found["converged"]
+    assert found["rms_log_error"] < 0.1
+    assert found["arm"]["link"]["youngs_modulus"] == found["parameters"]["link.youngs_modulus"]["value"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--free", "link.young", "--mode", "1=11hz"], 'did you mean "link.youngs_modulus"'),
+        (["--free", "hub.inertia"], "at least one measured response"),
+        (["--mode", "1=11hz"], "name what is free"),
+        (["--free", "hub.inertia,payload.mass", "--mode", "1=11hz"], "1 numbers were measured"),
+        (["--free", "hub.inertia", "--mode", "1=11"], "--mode = '1=11'"),
+        (["--free", "hub.inertia", "--start", "hub.inertia=x", "--mode", "1=11hz"], "write KEY=NUMBER"),
+        (["--free", "hub.inertia", "--bounds", "hub.inertia=1,2", "--mode", "1=11hz"], "starts at 0.1"),
+        (["--free", "hub.inertia", "--prior", "hub.radius=1,2", "--mode", "1=11hz"], "is not free"),
+        (["--free", "hub.inertia,hub.inertia", "--mode", "1=11hz"], "is named twice"),
+    ],
+)
+def test_bad_input_is_one_line(arguments, words, capsys):
+    code, out, err = run(capsys, "fit", "sasaki2012-lab", *arguments)
+    assert (code, out) == (2, "")
+    assert words in err
+    assert err.count("\n") == 1
+
+
+def test_a_response_over_itself_is_refused():
+    itself = tfarm.Measured(output="hub_rate", input="hub_rate", omega=OMEGA, values=np.ones(OMEGA.size))
+    with pytest.raises(ParameterError, match="over itself"):
+        fit(LAB, itself, free=["hub.inertia"])
+
+
+def test_the_form_of_a_decay():
+    one = mode_of("2=2.5hz~0.01,0.006~0.001")
+    assert (one.number, one.ratio, one.ratio_deviation) == (2, 0.006, 0.001)
+    assert one.frequency == pytest.approx(2.5 * 2 * math.pi)
+    assert one.frequency_deviation == pytest.approx(0.01 * 2 * math.pi)
+    assert mode_of("1=100rad_s").ratio is None

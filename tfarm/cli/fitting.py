@@ -1,0 +1,106 @@
+"""The verb that fits an arm to measured responses."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from tfarm.cli.app import ArmName, Json, app, give, load_arm
+from tfarm.errors import ParameterError
+
+if TYPE_CHECKING:
+    from tfarm.fit.fit import Fit
+
+DATA = "OUTPUT/INPUT=FILE, such as tip_acceleration/hub_angle=sweep.csv; again for each response"
+FREE = "what is free: keys of the arm's file, such as link.youngs_modulus, and gain, delay of each sensor"
+MODE = "N=FREQUENCY,RATIO of a ring-down, such as 1=2.52hz,0.006; deviations after ~: 1=2.52hz~0.01,0.006~0.001"
+
+
+@app.command()
+def fit(
+    arm: ArmName,
+    data: Annotated[list[str] | None, typer.Option("--data", metavar="OUTPUT/INPUT=FILE", help=DATA)] = None,
+    free: Annotated[str, typer.Option("--free", metavar="KEY,KEY", help=FREE)] = "",
+    start: Annotated[
+        list[str] | None, typer.Option("--start", metavar="KEY=VALUE", help="where a number starts, if elsewhere")
+    ] = None,
+    bounds: Annotated[list[str] | None, typer.Option("--bounds", metavar="KEY=LO,HI", help="its bounds")] = None,
+    prior: Annotated[
+        list[str] | None, typer.Option("--prior", metavar="KEY=MEAN,STD", help="what is known of it beforehand")
+    ] = None,
+    mode: Annotated[list[str] | None, typer.Option("--mode", metavar="N=HZ,RATIO", help=MODE)] = None,
+    covariance: Annotated[
+        bool, typer.Option("--covariance", help="intervals by the covariance alone, without profiles")
+    ] = False,
+    save: Annotated[Path | None, typer.Option("--save", help="write the fitted arm to this TOML file")] = None,
+    png: Annotated[Path | None, typer.Option("--png", help="draw measured over fitted curves into this file")] = None,
+    json: Json = False,
+) -> None:
+    """The numbers of an arm that explain what was measured of it, with intervals, and what is left open."""
+    subject = load_arm(arm)
+    from tfarm.cli.tables import say_written
+    from tfarm.fit.answers import fit_answer, save_fit
+    from tfarm.fit.fit import fit as find
+    from tfarm.fit.reading import data_of
+    from tfarm.fit.ringing import mode_of
+
+    found = find(
+        subject, [data_of(text) for text in data or []], [key.strip() for key in free.split(",") if key.strip()],
+        start={key: value for key, (value,) in _numbers("--start", start or [], 1)},
+        bounds=dict(_numbers("--bounds", bounds or [], 2)), priors=dict(_numbers("--prior", prior or [], 2)),
+        rings=[mode_of(text) for text in mode or []], profile=not covariance,
+    )  # fmt: skip
+    if save is not None:
+        save_fit(found, save)
+    if png is not None:
+        _draw(found, png)
+    if json or say_written(*(path for path in (save, png) if path is not None)):
+        give(fit_answer(found), json, lambda answer: _print(found, answer))
+    if not found.converged:
+        raise typer.Exit(3)
+
+
+def _numbers(option: str, texts: Iterable[str], count: int) -> Iterable[tuple[str, Any]]:
+    """Key and numbers of KEY=NUMBER,NUMBER."""
+    for text in texts:
+        key, given, numbers = text.partition("=")
+        try:
+            values = tuple(float(part) for part in numbers.split(","))
+        except ValueError:
+            values = ()
+        if not given or len(values) != count or any(map(math.isnan, values)):
+            form = "KEY=" + ",".join(["NUMBER"] * count)
+            raise ParameterError(key=option, value=text, remedy=f"write {form}, in SI units")
+        yield key.strip(), values
+
+
+def _draw(found: Fit, png: Path) -> None:
+    from tfarm.plots.files import save_png
+    from tfarm.plots.fitted import draw_fit
+
+    save_png(draw_fit(found), png)
+
+
+def _print(found: Fit, answer: dict[str, Any]) -> None:
+    from tfarm.fit.answers import parameters_table
+    from tfarm.tables.terminal import show
+
+    print(f"{answer['arm_name']}: {answer['in_words']}")
+    show(parameters_table(found))
+    print(
+        f"from and to: the 95 % interval {'of the covariance' if not found.profiled else 'of the profile likelihood'}"
+    )
+    for words in answer["not_determined"]:
+        print(words)
+    rows = zip(*answer["frequencies_hz"].values(), strict=True)
+    shown = [" -> ".join("-" if each is None else f"{each:.5g}" for each in row) for row in rows]
+    if shown:
+        print(f"resonances [Hz], before -> after -> measured: {'; '.join(shown)}")
+    for peak in answer["unexplained_peaks_hz"]:
+        print(f"the peak measured at {peak:.5g} Hz is none of the arm's")
+    if answer["rms_log_error"] is not None:
+        print(f"rms of ln(computed/measured): {answer['rms_log_error']:.4g}")

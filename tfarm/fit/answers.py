@@ -1,0 +1,168 @@
+"""What `tfarm fit` prints with --json, and the table of it that a terminal and a page show."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tfarm.arm.writing import to_toml
+from tfarm.columns import Column, Table
+from tfarm.digits import general, listed, singly
+from tfarm.files import write_file
+
+from .around import Around
+from .features import features_of, match, near_zeros
+from .fit import Fit
+from .sure import LEVEL, Fitted
+
+FAR = 0.1  # of ln w: a peak so far from all of the arm's is not one of them
+SAME = 0.02  # of ln w: peaks of two responses nearer than that are one
+UNITS = {  # of a number by the last word of its key, in SI
+    "length": "m", "radius": "m", "offset": "m", "x": "m", "width": "m", "depth": "m", "diameter": "m",
+    "outer_diameter": "m", "inner_diameter": "m", "area": "m^2", "second_moment": "m^4", "density": "kg/m^3",
+    "youngs_modulus": "Pa", "shear_modulus": "Pa", "damping": "s", "inertia": "kg m^2", "rotor_inertia": "kg m^2",
+    "mass": "kg", "friction": "N m s/rad", "rotor_friction": "N m s/rad", "rotational_stiffness": "N m/rad",
+    "stiffness": "N m/rad", "resistance": "ohm", "inductance": "H", "torque_constant": "N m/A",
+    "back_emf_constant": "V s/rad", "delay": "s",
+}  # fmt: skip
+PARAMETERS = (
+    Column("key", "number", of="key"),
+    Column("unit", "unit", of=lambda one: unit_of(one.key)),
+    Column("value", "value", of="value", digits=singly(general, 6)),
+    Column("low", "from", of=lambda one: none(one.low), digits=singly(general, 6)),
+    Column("high", "to", of=lambda one: none(one.high), digits=singly(general, 6)),
+    Column("std", "deviation", of=lambda one: none(one.deviation), digits=singly(general, 3)),
+    Column("identified", "known from these data", of=lambda one: "yes" if one.identified else "no"),
+)
+
+
+def none(value: float | None) -> float:
+    """A number that is not known, for a table."""
+    return float("nan") if value is None else value
+
+
+def unit_of(key: str) -> str:
+    """The SI unit of a free number; "1" where it has none, or that of its response."""
+    words = key.partition(":")[0].split(".")
+    if words[-1] == "stiffness" and words[0] == "attachment":
+        return "N/m"
+    return UNITS.get(words[-1], "1")
+
+
+def parameters_table(fit: Fit) -> Table:
+    """The fitted numbers with their intervals."""
+    return Table(columns=PARAMETERS, record=list(fit.parameters), stem="fit", title="Fitted numbers")
+
+
+def fit_answer(fit: Fit) -> dict[str, Any]:
+    """The fitted numbers and arm, what the data leave open, and whether the arm explains them."""
+    rows = resonances(fit)
+    return {
+        "arm_name": fit.before.name,
+        "converged": fit.converged,
+        "verdict": fit.verdict,
+        "parameters": {each.key: _parameter(fit, each) for each in fit.parameters},
+        "level": LEVEL,
+        "not_determined": list(fit.not_determined),
+        "frequencies_hz": {key: [row[n] for row in rows] for n, key in enumerate(("before", "after", "measured"))},
+        "rms_log_error": fit.rms_log_error,
+        "chi_squared": fit.chi_squared,
+        "freedom": fit.freedom,
+        "explained": fit.is_explained,
+        "unexplained_peaks_hz": [peak for _, after, peak in rows if after is None],
+        "responses": [
+            _response(each, rows) for each, rows in zip(fit.solution.problem.responses, fit.parts, strict=True)
+        ],
+        "starts": fit.solution.starts,
+        "in_words": in_words(fit),
+        "arm": tomllib.loads(to_toml(fit.arm)),
+    }
+
+
+def _parameter(fit: Fit, one: Fitted) -> dict[str, Any]:
+    start = next(each.start for each in fit.solution.problem.parameters if each.key == one.key)
+    return {
+        "value": one.value,
+        "low": one.low,
+        "high": None if one.high == math.inf else one.high,
+        "std": one.deviation,
+        "identified": one.identified,
+        "unit": unit_of(one.key),
+        "start": start,
+    }
+
+
+def _response(one: Any, residuals: Any) -> dict[str, Any]:
+    return {
+        "name": one.data.name,
+        "source": one.data.source,
+        "sha256": one.data.digest,
+        "frequencies": int(one.data.omega.size),
+        "from_hz": float(one.data.omega[0]) / (2 * np.pi),
+        "to_hz": float(one.data.omega[-1]) / (2 * np.pi),
+        "noise": one.noise.road,
+        "chi_squared": float(residuals @ residuals),
+    }
+
+
+def resonances(fit: Fit) -> list[tuple[float | None, float | None, float]]:
+    """Each measured peak [Hz] of all responses, with the arm's own before and after; None where it has none there.
+
+    A peak is a pole of its response: a natural frequency, with the hub held where the response is over the hub's angle.
+    """
+    found = {}
+    for each in fit.solution.problem.responses:
+        peaks = features_of(each.data, each.noise.sigma).peaks
+        before, after = (near_zeros(Around(arm, ()), each.data)[1][0] for arm in (fit.before, fit.arm))
+        places = dict(match(np.log(peaks), np.log(after)))
+        earlier = dict(match(np.log(after), np.log(before)))
+        for n, peak in enumerate(peaks):
+            own = places.get(n)
+            first = earlier.get(own) if own is not None else None
+            hertz = [None if row is None else float(w[row]) / (2 * np.pi) for w, row in ((before, first), (after, own))]
+            if own is None or abs(np.log(after[own] / peak)) > FAR:
+                hertz = [None, None]
+            found[each.data.input, round(float(np.log(peak)) / SAME)] = (*hertz, float(peak) / (2 * np.pi))
+    return sorted(found.values(), key=lambda row: row[2])  # type: ignore[arg-type]
+
+
+def in_words(fit: Fit) -> str:
+    """One sentence: whether the search ended, what is known, and whether the arm explains the data."""
+    known = [each.key for each in fit.parameters if each.identified]
+    parts = [f"{len(known)} of {len(fit.parameters)} numbers are known from these data"]
+    if not fit.converged:
+        parts.insert(0, "the search did not end: these are the best numbers so far")
+    share = fit.chi_squared / max(fit.freedom, 1)
+    if fit.is_explained is None:
+        parts.append(
+            "the size of the noise was taken from the residuals, so that they cannot say whether the arm is right"
+        )
+    elif fit.is_explained:
+        parts.append(f"arm and noise explain them (chi-squared {share:.3g} a degree of freedom)")
+    else:
+        parts.append(
+            f"THE ARM DOES NOT EXPLAIN THEM: chi-squared is {share:.3g} a degree of freedom, and the intervals, which"
+            " rest on the noise alone, are too narrow"
+        )
+    return "; ".join(parts)
+
+
+def fitted_toml(fit: Fit) -> str:
+    """The fitted arm as a TOML file, with what was fitted to what among its assumptions."""
+    values = listed([f"{each.key} = {each.value:.6g}" for each in fit.parameters if "." in each.key])
+    lines = [f"Fitted: {values}, from the arm {fit.before.name}; {in_words(fit)}."]
+    lines += [
+        f"Fitted to {each.name} of {Path(each.source).name}, SHA-256 {each.digest or 'none'}." for each in fit.responses
+    ]
+    lines += [f"Of the fit: {words}." for words in fit.not_determined]
+    return to_toml(replace(fit.arm, assumptions=(*fit.arm.assumptions, *lines)))
+
+
+def save_fit(fit: Fit, path: Path) -> None:
+    """Write the fitted arm beside, then rename."""
+    write_file(path, fitted_toml(fit).encode(), key="--save")

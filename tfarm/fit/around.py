@@ -1,0 +1,52 @@
+"""An arm and its neighbours, a step away along each number that is free: for derivatives of whatever is read of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import INPUTS, Arm, Input
+from tfarm.exact.chain import Chain
+from tfarm.exact.chaining import chain_of
+from tfarm.exact.gradients import Direction, response_gradients
+from tfarm.exact.jets import Jet
+from tfarm.exact.outputs import OUTPUTS
+from tfarm.response.signals import Signals
+
+from .parameters import STEP
+
+Complex = NDArray[np.complexfloating[Any, Any]]
+
+
+class Around:
+    """An arm and its neighbours a step below and above along each free number, as chains, made once for each drive."""
+
+    def __init__(self, arm: Arm, pairs: Sequence[tuple[Arm, ...]]) -> None:
+        self.arm, self._pairs = arm, pairs
+        self._chains: dict[str, tuple[Chain, list[tuple[Chain, Chain]]]] = {}
+
+    def gradients(self, driven: str, names: tuple[str, ...], s: Complex) -> tuple[Jet, list[Jet]]:
+        """Drive and signals at s, up to one factor, with their derivatives along the free numbers."""
+        if driven not in self._chains:
+            pairs = [(chain_of(driven_by(a, driven)), chain_of(driven_by(b, driven))) for a, b in self._pairs]
+            self._chains[driven] = chain_of(driven_by(self.arm, driven)), pairs
+        chain, pairs = self._chains[driven]
+        signals = Signals(self.arm, names)
+        along = [
+            Direction(below, above, Signals(a, names).places, Signals(b, names).places, 2 * STEP)
+            for (below, above), (a, b) in zip(pairs, self._pairs, strict=True)
+        ]
+        return response_gradients(chain, signals.outputs, signals.places, along, s)
+
+
+def drive_behind(arm: Arm, name: str) -> str:
+    """What drives an arm where that is the input of a response: the arm's own drive, where it is over a signal."""
+    return name if name in INPUTS and name not in OUTPUTS else arm.input
+
+
+def driven_by(arm: Arm, driven: str) -> Arm:
+    return arm if arm.input == driven else replace(arm, input=cast("Input", driven))

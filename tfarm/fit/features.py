@@ -1,0 +1,115 @@
+"""Peaks and dips: of a measured response, and of an arm, whose poles and zeros near the imaginary axis they are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import find_peaks
+
+from tfarm.response.signals import Signals
+
+from .around import Around, drive_behind, driven_by
+from .data import Measured
+
+Complex = NDArray[np.complexfloating[Any, Any]]
+Real = NDArray[np.float64]
+
+PROMINENT = 0.35  # of ln |H|: what stands out by a factor of 1.4 is a peak, if the noise is below a quarter of that
+NOISY = 4.0  # deviations of the noise
+BEYOND = 1.6  # so far beyond both ends of a band the arm's own peaks are looked for
+GRID = 600  # points at which they are
+BROAD = 0.15  # of its frequency: a zero farther from the axis is no peak
+NUDGE = 1e-6  # of a frequency: for a slope along it
+STEPS = 3  # of Newton's method from a grid's point
+SKIPPED = 0.25  # of ln w: what a peak that is matched with nothing costs
+
+
+@dataclass(frozen=True)
+class Features:
+    """Peaks and dips [rad/s] of a response, ascending."""
+
+    peaks: Real
+    dips: Real
+
+
+def features_of(data: Measured, sigma: Real) -> Features:
+    """Those of a measured response that stand out of its noise."""
+    level = np.log(np.maximum(abs(data.values), np.finfo(float).tiny))
+    noise = np.minimum(sigma / np.maximum(abs(data.values), np.finfo(float).tiny), 10.0)
+
+    def found(curve: Real) -> Real:
+        at, how = find_peaks(curve, prominence=PROMINENT)
+        near = np.array([np.median(noise[max(0, n - 3) : n + 4]) for n in at])
+        return np.asarray(data.omega[at[how["prominences"] > NOISY * near]] if at.size else np.empty(0))
+
+    return Features(found(level), found(-level))
+
+
+def near_zeros(here: Around, data: Measured) -> list[tuple[Real, Real]]:
+    """The arm's own dips and peaks: zeros near the axis of what is over and under, w (k,), and d ln w (free, k).
+
+    From the smallest values on a grid Newton's method leads to the zeros.
+    """
+    driven = drive_behind(here.arm, data.input)
+    names = tuple(dict.fromkeys(each for each in (data.output, data.input) if each != driven))
+    signals = Signals(driven_by(here.arm, driven), names)
+    rows = [names.index(each) if each != driven else None for each in (data.output, data.input)]
+    grid = np.geomspace(data.omega[0] / BEYOND, data.omega[-1] * BEYOND, GRID)
+    parts, found = signals.parts(1j * grid), []
+    for row in rows:
+        curve = parts.drive if row is None else parts.numerators[row]
+        w = grid[find_peaks(-(np.log(abs(curve)) + parts.scale.real))[0]]
+        zero = _newton(signals, row, 1j * w)
+        kept = (abs(zero.real) < BROAD * w) & (abs(zero.imag / w - 1) < BROAD)
+        found.append(zero[kept])
+    at = np.concatenate(found)
+    drive, outputs = here.gradients(driven, names, np.concatenate([at, at * (1 + NUDGE)]))
+    answers, first = [], 0
+    for row, zero in zip(rows, found, strict=True):
+        jet, own = drive if row is None else outputs[row], slice(first, first + zero.size)
+        first += zero.size
+        by_s = (jet.c[0][at.size :][own] - jet.c[0][own]) / (zero * NUDGE)
+        answers.append((zero.imag, (-jet.c[1][:, own] / by_s).imag / zero.imag))
+    return answers
+
+
+def _newton(signals: Signals, row: int | None, s: Complex) -> Complex:
+    """The zeros that Newton's method leads to, of a signal's numerator or (None) of the drive."""
+
+    def logarithm(s: Complex) -> Complex:
+        parts = signals.parts(s)
+        return np.asarray(np.log(parts.drive if row is None else parts.numerators[row]) + parts.scale)
+
+    for _ in range(STEPS):
+        with np.errstate(all="ignore"):
+            ratio = np.exp(logarithm(s * (1 + NUDGE)) - logarithm(s)) - 1
+            step = np.where(abs(ratio) > 0, s * NUDGE / ratio, 0.0)
+        s = s - np.where(np.isfinite(step), step, 0.0)
+    return s
+
+
+def match(measured: Real, own: Real) -> list[tuple[int, int]]:
+    """Pairs of places in two ascending rows, in order, with the least sum of squared gaps; to skip one costs SKIPPED^2.
+
+    By dynamic programming over both rows; of the arm's own, those that nothing was measured at cost nothing.
+    """
+    n, m = measured.size, own.size
+    cost = np.zeros((n + 1, m + 1))
+    cost[1:, 0] = SKIPPED**2 * np.arange(1, n + 1)
+    for i in range(1, n + 1):
+        for j in range(1, m + 1):
+            gap = (measured[i - 1] - own[j - 1]) ** 2
+            cost[i, j] = min(cost[i - 1, j - 1] + gap, cost[i - 1, j] + SKIPPED**2, cost[i, j - 1])
+    pairs, i, j = [], n, m
+    while i and j:
+        if cost[i, j] == cost[i, j - 1]:
+            j -= 1
+        elif cost[i, j] == cost[i - 1, j] + SKIPPED**2:
+            i -= 1
+        else:
+            i, j = i - 1, j - 1
+            pairs.append((i, j))
+    return pairs[::-1]
