@@ -72,7 +72,7 @@ def near_zeros(here: Around, data: Measured) -> list[tuple[Real, Real]]:
         jet, own = drive if row is None else outputs[row], slice(first, first + zero.size)
         first += zero.size
         by_s = (jet.c[0][at.size :][own] - jet.c[0][own]) / (zero * NUDGE)
-        answers.append((zero.imag, (-jet.c[1][:, own] / by_s).imag / zero.imag))
+        answers.append((np.asarray(zero.imag, dtype=float), np.asarray((-jet.c[1][:, own] / by_s).imag / zero.imag)))
     return answers
 
 

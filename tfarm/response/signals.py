@@ -90,7 +90,9 @@ class Signals:
         assert first is not None  # there is at least one signal
         self._mend_at_rest(s.ravel(), first.drive, numerators)
         shape = s.shape
-        return LoopParts(first.drive.reshape(shape), numerators.reshape(-1, *shape), first.scale.reshape(shape))
+        return LoopParts(
+            first.drive.reshape(shape), numerators.reshape(len(self.names), *shape), first.scale.reshape(shape)
+        )
 
     def _mend_at_rest(self, s: Complex, drive: Complex, numerators: Complex) -> None:
         """Numerators that are differences, relative to the hub, from their power series where s is small.
