@@ -1,15 +1,18 @@
 """Laws of a structure: their loops by a Galerkin model under a hold with SciPy's Tustin rule, files, and bad input."""
 
+import re
+
 import numpy as np
 import pytest
 from scipy.signal import cont2discrete
 
 import tfarm
-from tests.shell import answer
+from tests.shell import answer, run
 from tests.synthesis.held_loop import HeldLoop
 from tfarm import Law, ParameterError
 from tfarm.arm.law_tables import load_law
 from tfarm.dsp import Chain
+from tfarm.synthesis import law_design
 from tfarm.synthesis.chosen import design
 from tfarm.synthesis.law_judge import law_judge
 from tfarm.synthesis.sampled import RESERVE
@@ -129,3 +132,24 @@ def test_a_design_is_saved_and_read_back(capsys, tmp_path):
 def test_what_does_not_go_together_is_refused(options, key):
     with pytest.raises(ParameterError, match=key):
         design(LAB, **options)
+
+
+def test_an_undamped_link_has_a_mode_that_no_lead_law_damps(capsys, monkeypatch):
+    """The answer names it; a mode at e^{ip} grows in proportion to -Im(C e^{-ip/2}), first order in a law on the angle.
+
+    An input held over a sample is late by half of it: C has to lead by more than p/2, which no pole up to 2/T allows
+    where p is above a right angle.
+    """
+    bare = tfarm.load("sasaki2012")
+    monkeypatch.setattr(law_design, "MOST_REFINED", 1)  # of a search that finds nothing
+    code, out, err = run(capsys, "design", "sasaki2012", "--structure", "lead")
+    assert (code, out, err.count("\n")) == (3, "", 1)
+    (mode,) = re.findall(r"mode ([0-9]+) grows", err)
+    assert "link.damping = 0" in err
+    w = np.sort(tfarm.modes(bare, int(mode)).natural_frequency)[-1]
+    seen = abs(np.angle(np.exp(1j * w * T)))
+    assert seen > np.pi / 2
+    s = 2j / T * np.tan(seen / 2)
+    rng = np.random.default_rng(2)
+    for zero, pole in zip(10 ** rng.uniform(-2, 4, 200), 2 / T * 10 ** rng.uniform(-4, 0, 200), strict=True):
+        assert ((1 + s / zero) / (1 + s / pole) * np.exp(-0.5j * seen)).imag < 0

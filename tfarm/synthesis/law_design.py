@@ -28,7 +28,7 @@ from tfarm.loop.stability import Stability
 from tfarm.records import record
 from tfarm.synthesis.arms import NamedArm
 from tfarm.synthesis.law_judge import LAW_OBJECTIVES, LawJudge, law_judge
-from tfarm.synthesis.minimax import LOST, Pieces, joined, minimax
+from tfarm.synthesis.minimax import LOST, Found, Pieces, joined, minimax
 from tfarm.synthesis.sampled import FEWEST_MODES
 from tfarm.synthesis.structures import STRUCTURES, Structure, usual_angle_gain
 from tfarm.synthesis.together import OnArm, in_step, worst_value
@@ -88,14 +88,16 @@ def law_design(
     Kp = Kp or usual_angle_gain(arm, T)
     form = STRUCTURES[structure](arm, Kp, modes, T)
     arms = (NamedArm(arm.name, arm, {}), *others)
+    nearest = (np.inf, form.law(form.origin))
     for counts in in_step([_counts(each.arm, chain, modes) for each in arms]):
         judges = [
             law_judge(each.arm, chain, form.law(form.origin), objective, modes, count, arm)
             for each, count in zip(arms, counts, strict=True)
         ]
-        for x in _best(judges, form, tell):
+        for score, x in _best(judges, form, tell):
             law = form.law(x)
-            if all(judge.holds(law) for judge in judges):
+            nearest = min(nearest, (score, law), key=lambda pair: pair[0])
+            if score < LOST and all(judge.holds(law) for judge in judges):
                 named = dict(zip(form.names, form.coefficients(x).tolist(), strict=True))
                 sampled = [law_verdict(each.arm, law, chain) for each in arms]
                 on_arms = [
@@ -108,8 +110,21 @@ def law_design(
                     cast("Stability[LawLoop]", on_arms[0].verdict), sampled[0], modes, chain,
                     tuple(on_arms),
                 )  # fmt: skip
-    raise ConvergenceError(
-        f"no law {structure} was found that holds when sampled: try another Kp or period", None, None
+    raise ConvergenceError(_why_none(arms, structure, nearest[1], chain), nearest[1], None)
+
+
+def _why_none(arms: Sequence[NamedArm], structure: str, law: Law, chain: Chain) -> str:
+    """What drives the law that came nearest to holding, on the arm where it grows most, and what to try."""
+    text = f"no law {structure} was found that holds when sampled: "
+    verdict = max((law_verdict(each.arm, law, chain) for each in arms), key=lambda each: float(each.log_radius))
+    growth = float(np.expm1(verdict.log_radius))
+    slowest = f"under the nearest {verdict.slowest} grows by {growth:.2g} a sample"
+    grows, arm = slowest if growth > 0 else "none has a reserve", verdict.loop.plant.arm
+    if not arm.has_elastic_link:
+        return f"{text}{grows}; try another Kp or period"
+    return (
+        f"{text}{grows}; with link.damping = 0 no mode loses energy of its own, and a held input drives each "
+        "that the law does not damp where its alias is seen: give link.damping, or take K1-K2"
     )
 
 
@@ -133,8 +148,8 @@ def _counts(arm: Arm, chain: Chain, modes: int) -> Iterator[int]:
     yield most
 
 
-def _best(judges: Sequence[LawJudge], form: Structure, tell: Progress) -> list[Real]:
-    """The best points found, the best first; those that are not stable left out."""
+def _best(judges: Sequence[LawJudge], form: Structure, tell: Progress) -> list[Found]:
+    """The best points found and their scores, the best first."""
 
     def pieces(x: Real) -> Pieces:
         return _pieces(judges, form, x)
@@ -147,7 +162,7 @@ def _best(judges: Sequence[LawJudge], form: Structure, tell: Progress) -> list[R
     def told(number: int, score: float) -> None:
         tell(f"{form.name}: search {number}, best so far {score:.6g}")
 
-    return [x for score, x in minimax(pieces, best, form.upper, told) if score < LOST]
+    return minimax(pieces, best, form.upper, told)
 
 
 def _pieces(judges: Sequence[LawJudge], form: Structure, x: Real) -> Pieces:
