@@ -1,6 +1,7 @@
 """The sampled loop on rigs: what a slew asks of the input, and analog damping where the input is no torque."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,10 +10,12 @@ import tfarm
 from tests.dsp.law_verdicts import stepped
 from tfarm import Law
 from tfarm.dsp import Chain, sampled_verdict
-from tfarm.dsp.chain import Actuator
+from tfarm.dsp.chain import Actuator, Slew
+from tfarm.dsp.curves import away
 from tfarm.dsp.plant import undelayed_plant
 from tfarm.dsp.scenarios import slew
 from tfarm.errors import ParameterError
+from tfarm.tuner.controller import tip_error
 
 SLOW = 1e-3  # 1/s: the rig turns as one piece, and s^2 of its next term is beyond the digits compared
 
@@ -60,3 +63,19 @@ def test_the_verdict_on_a_damped_rig_is_proven(name, factor):
     grow = int((np.log(abs(z)) > 1e-9).sum())
     assert grow == (verdict.loop.poles.log_radius > 0).sum()
     assert (grow > 0) == (factor < 0)
+
+
+def test_the_tip_of_a_slew_goes_where_a_rigid_arm_on_the_hub_s_radius_has_it():
+    """G_tip/G_angle at rest is r + L: with the angle held the slew ends on its travel, as it does without a radius."""
+    bench = tfarm.load("tests/rigs/bench-rig.toml")
+    r, L = bench.hub.radius, bench.length
+    assert r > 0.05 * L
+    tip, angle = tfarm.transfer(bench, ["tip_displacement", "hub_angle"])(1e-3j)
+    assert bench.reach == pytest.approx((tip / angle).real, rel=1e-6)
+    for chain, travel in ((Chain(), 1.15 * (r + L)), (Chain(slew=Slew(travel=0.2)), 0.2)):
+        run = tfarm.simulate(bench, tfarm.HubFeedback(K1=0.05, Kp=0.5), chain, duration=10.0, count=4)
+        assert run.scenario.hub_angle[-1] == pytest.approx(travel / (r + L), rel=1e-12)
+        assert run.at_samples.tip_displacement[-1] == pytest.approx(travel, abs=1e-4)
+        assert abs(away(bench, run)[-1]) < 1e-4
+        of_trial = SimpleNamespace(arm=bench, loop=SimpleNamespace(chain=chain))
+        assert abs(tip_error(run, of_trial)) < 1e-4

@@ -107,9 +107,14 @@ class Arm(Turning):
         return math.fsum(link.length for link in self.links)
 
     @property
+    def reach(self) -> float:
+        """r + L [m], from the axis to the tip: a rigid arm turned by theta has moved its tip by (r + L) theta."""
+        return self.hub.radius + self.length
+
+    @property
     def centre_distance(self) -> float:
         """r + L + e [m], from the axis to the payload's centre of mass."""
-        return self.hub.radius + self.length + self.payload.offset
+        return self.reach + self.payload.offset
 
     @property
     def own_mass(self) -> float:

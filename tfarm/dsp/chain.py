@@ -153,13 +153,13 @@ class Slew:
         object.__setattr__(self, "rise_time", positive("slew.rise_time", self.rise_time, meaning))
         _choice("slew.reading", self.reading, ("vibration", "total"))
 
-    def travel_of(self, length: float) -> float:
-        """Tip travel [m] of an arm of that length [m]."""
-        return ANGLE * length if self.travel is None else self.travel
+    def travel_of(self, reach: float) -> float:
+        """Tip travel [m] of an arm whose tip is so far [m] from the axis."""
+        return ANGLE * reach if self.travel is None else self.travel
 
-    def acceleration(self, length: float) -> float:
-        """The hub's angular acceleration [rad/s^2] in the first half, 4 travel/(L rise^2)."""
-        return 4 * self.travel_of(length) / (length * self.rise_time**2)
+    def acceleration(self, reach: float) -> float:
+        """The hub's angular acceleration [rad/s^2] in the first half, 4 travel/(reach rise^2)."""
+        return 4 * self.travel_of(reach) / (reach * self.rise_time**2)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -73,8 +73,8 @@ def _heights(arm: Arm, run: Simulation) -> dict[str, float]:
 
 
 def away(arm: Arm, simulation: Simulation) -> Real:
-    """Tip displacement less L times the reference angle [m], at the samples."""
-    reference = arm.length * simulation.scenario.hub_angle[: simulation.t.size]
+    """Tip displacement less where a rigid arm on its reference has it [m], at the samples."""
+    reference = arm.reach * simulation.scenario.hub_angle[: simulation.t.size]
     error: Real = simulation.at_samples.tip_displacement - reference
     return error
 
@@ -90,9 +90,9 @@ def tip(simulation: Simulation) -> Curve:
 
 
 def tip_deviation(arm: Arm, simulation: Simulation) -> Curve:
-    """Tip displacement less L times the reference angle [m]."""
+    """Tip displacement less where a rigid arm on its reference has it [m]."""
     t, displacement = continuous(simulation, "tip_displacement")
-    return curve(t, displacement - arm.length * reference_angle(simulation.scenario, t))
+    return curve(t, displacement - arm.reach * reference_angle(simulation.scenario, t))
 
 
 def reference_angle(task: Scenario, t: Real) -> Real:

@@ -54,7 +54,7 @@ class Scenario:
 
 
 def slew(arm: Arm, chain: Chain, duration: float) -> Scenario:
-    """The bang-bang slew: hub acceleration +-4 travel/(L rise^2), as its mean over each sample, J of it as feedforward.
+    """The bang-bang slew: hub acceleration +-4 travel/((r + L) rise^2), its mean over a sample, J of it fed forward.
 
     On a rig also what friction and back-EMF take at the mean rate, all in the unit of its input.
     What the moment feedback sees is the moment less the rigid arm's -(J - I_h) theta_dd_ref of the interval before the
@@ -63,7 +63,7 @@ def slew(arm: Arm, chain: Chain, duration: float) -> Scenario:
     must_turn(arm)
     T, manoeuvre = chain.sampling.period, chain.slew
     n = _samples(duration, T)
-    peak = manoeuvre.acceleration(arm.length)
+    peak = manoeuvre.acceleration(arm.reach)
     t = T * np.arange(n + 1)
     rate = peak * np.clip(np.minimum(t, manoeuvre.rise_time - t), 0.0, None)
     acceleration = np.diff(rate) / T
@@ -88,7 +88,7 @@ def torque_unit(arm: Arm, chain: Chain) -> float:
 
     An arm that makes no slew has the torque of its own inertia about the hub for one, what is held apart.
     """
-    share = abs(turning_inertia(arm) * chain.slew.acceleration(arm.length)) / PAPER_TORQUE
+    share = abs(turning_inertia(arm) * chain.slew.acceleration(arm.reach)) / PAPER_TORQUE
     return float(f"{share:.1g}")
 
 
@@ -129,7 +129,7 @@ SCENARIOS: dict[str, Callable[[Arm, Chain, float], Scenario]] = {
 def described(task: Scenario, arm: Arm, chain: Chain) -> str:
     """What a scenario asks of the arm, with its size."""
     if task.name == "slew":
-        return f"a slew: the tip moves {chain.slew.travel_of(arm.length):.4g} m in {chain.slew.rise_time:g} s"
+        return f"a slew: the tip moves {chain.slew.travel_of(arm.reach):.4g} m in {chain.slew.rise_time:g} s"
     if task.name == "step":
         return f"a step of {task.feedforward[0]:.4g} {arm.input_unit}"
     if task.name == "decay":

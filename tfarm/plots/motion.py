@@ -22,7 +22,7 @@ Runs = Mapping[str, Simulation]
 def slew(arm: Arm, runs: Simulation | Runs, *, ax: Sequence[Axes] | None = None) -> tuple[Axes, Axes, Axes]:
     """Simulations of one scenario (what `tfarm.simulate` returns; several by name) in three axes, given or new; these.
 
-    Root moment [N m], tip less L times the reference angle [mm], and the torque of the motor [N m], or its input.
+    Root moment [N m], tip less a rigid arm's on its reference [mm], and the torque of the motor [N m], or its input.
     """
     each = {"": runs} if isinstance(runs, Simulation) else runs
     with style():

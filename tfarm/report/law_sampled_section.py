@@ -233,7 +233,7 @@ def _slew(arm: Arm, chain: Chain, named: Sequence[LawOnArm]) -> tuple[list[Pictu
     driven = next(each.arm for each in named if each.name in runs)
     if any(each.arm.input_unit != driven.input_unit for each in named):
         return [], [*words, "The laws drive inputs of different units: their slews are not drawn together."]
-    what = f"{plain(slew.travel_of(arm.length), 3)} m of tip travel in {plain(slew.rise_time, 3)} s"
+    what = f"{plain(slew.travel_of(arm.reach), 3)} m of tip travel in {plain(slew.rise_time, 3)} s"
     shown = {safe(name): run for name, run in runs.items()}
     caption = " ".join(_slewed(each, runs[each.name]) for each in named if each.name in runs)
     keys = {each.key: runs[each.name] for each in named if each.name in runs}
@@ -242,7 +242,7 @@ def _slew(arm: Arm, chain: Chain, named: Sequence[LawOnArm]) -> tuple[list[Pictu
         title="The slew",
         caption=(
             f"{caption}{clipped_words(runs)}{resolution_words(runs.values())} A bang-bang slew with the rigid arm's "
-            "feedforward; the dotted line is its end; the tip is shown against L times the reference angle."
+            "feedforward; the dotted line is its end; the tip is shown against a rigid arm's on its reference."
         ),
         alt=f"Root moment, tip and motor in a slew of {what}.",
         figure=draw_responses(driven, shown, what),

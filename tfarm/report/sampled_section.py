@@ -212,8 +212,8 @@ def _slew_picture(moved: Slews) -> Picture:
         title="The slew, with and without moment feedback",
         caption=(
             f"{what_slews_show(moved)} A bang-bang slew with rigid feedforward; the moment feedback sees "
-            f"{seen_words(moved)}. The dotted line is the end of the slew; the tip is shown against L times the "
-            f"reference angle.{resolution_words(moved.each.values())} {volts}{SHORT_SIGN}"
+            f"{seen_words(moved)}. The dotted line is the end of the slew; the tip is shown against a rigid "
+            f"arm's on its reference.{resolution_words(moved.each.values())} {volts}{SHORT_SIGN}"
         ),
         alt=f"Root moment, tip and motor torque of a slew. {what_slews_show(moved)}",
         figure=draw_slews(moved),

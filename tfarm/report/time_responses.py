@@ -24,7 +24,7 @@ UNTIL = 0.9  # of a record: what has settled after that may ring on
 def draw_slews(data: Slews) -> Figure:
     """Root moment, tip and motor torque over time."""
     slew = data.with_moment.chain.slew
-    travel = plain(slew.travel_of(data.arm.length), 3)
+    travel = plain(slew.travel_of(data.arm.reach), 3)
     what = f"{travel} m of tip travel in {plain(slew.rise_time, 3)} s, K1 = {plain(data.gains.K1)}"
     return draw_responses(data.arm, data.each, what)
 

@@ -89,7 +89,7 @@ def servo_words(data: TunerStudy) -> str:
     )
     off = tip_errors(tuning)["tip_error_m"]
     end = "runs away" if off is None else f"ends {significant(1e3 * abs(off), 2)} mm off its target"
-    if off is not None and abs(off) < ROUNDED * data.arm.length * float(abs(tuning.trial.task.hub_angle).max()):
+    if off is not None and abs(off) < ROUNDED * data.arm.reach * float(abs(tuning.trial.task.hub_angle).max()):
         end = "ends on its target"
     proven = "proven" if guard.is_proven else "of the first modes alone"
     costs = {
@@ -109,7 +109,7 @@ def servo_words(data: TunerStudy) -> str:
 def off_target(data: TunerStudy) -> tuple[float, float]:
     """How far off the tip ends [m], with the tuner and with the best constant gain."""
     runs = data.slews["with the tuner"], data.constant
-    travel = data.arm.length * float(abs(data.constant.scenario.hub_angle).max())
+    travel = data.arm.reach * float(abs(data.constant.scenario.hub_angle).max())
     tuned, constant = (abs(float(away(data.arm, each)[-1])) for each in runs)
     return tuned * (tuned > ROUNDED * travel), constant * (constant > ROUNDED * travel)
 

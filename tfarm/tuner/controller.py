@@ -60,4 +60,4 @@ def tip_error(simulation: Simulation, trial: Trial) -> float | None:
     if simulation.stopped is not None:
         return None
     chain, arm = trial.loop.chain, trial.arm
-    return float(simulation.at_samples.tip_displacement[-1] - chain.slew.travel_of(arm.length))
+    return float(simulation.at_samples.tip_displacement[-1] - chain.slew.travel_of(arm.reach))
