@@ -13,7 +13,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from . import elements, loci, loops, memory, responses, rigs, sampled, spectra, tuning
+from . import elements, fitting, loci, loops, memory, responses, rigs, sampled, spectra, tuning
 from .rows import Row, keep, show
 
 
@@ -31,6 +31,7 @@ def measure() -> Iterator[Row]:
     yield from loci.locus_rows()
     yield from sampled.sampled_rows()
     yield from tuning.tuner_rows()
+    yield from fitting.fit_rows()
 
 
 def main(path: Path) -> None:

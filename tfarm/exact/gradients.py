@@ -191,8 +191,8 @@ class GradientSweep(Sweep):
         super().__init__(layout, s)
 
     def exact(self, number: Any) -> Any:
-        """What it is: the layout's numbers are jets."""
-        return number
+        """What it is: the layout's numbers are jets.  A fraction beside them would make arrays of objects."""
+        return number if isinstance(number, Jet) else float(number)
 
     def output(self, one: Reading) -> Jet:
         """An output in SI, of the free response that has the sweep's drive."""

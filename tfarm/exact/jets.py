@@ -51,7 +51,10 @@ class Jet:
             (a0, a1), (b0, b1) = self.c, b
             if type(b1) is float:
                 return Jet([a0 * b0, a1 if type(a1) is float else a1 * b0])
-            return Jet([a0 * b0, a0 * b1 if type(a1) is float else a0 * b1 + a1 * b0])
+            slope = a0 * b1
+            if type(a1) is not float:
+                slope = slope + a1 * b0
+            return Jet([a0 * b0, slope])
         return Jet([sum(self.c[i] * b[n - i] for i in range(n + 1)) for n in range(len(self.c))])
 
     def __truediv__(self, other: Any) -> Jet:

@@ -25,7 +25,7 @@ STRAYED = 6  # starts beside the first ones, strayed from the best by
 SPREAD = 0.15  # of ln p
 SEED = 852780
 MOST = 60  # evaluations from one start
-FIRM, FIRM_SUM = 1e-9, 1e-12  # of the coordinates, of the sum: a step that changes less ends a search
+FIRM, FIRM_SUM = 1e-7, 1e-9  # of the coordinates, of the sum: a step that changes less ends a search
 OPEN = 1.0  # of ln p: a combination with a larger deviation (a factor of e) is not determined by the data
 SAME = 0.1  # of a sum of squares: less is no difference to speak of
 EDGE = 1e-9  # of a coordinate: a search begins so far inside its bounds
@@ -77,8 +77,8 @@ def solved(problem: Problem) -> Solution:
 
 def _nearest(found: Solution) -> Solution:
     """Of the points where what the data do not know is something else, the one nearest to the start."""
-    _, sizes, axes = np.linalg.svd(found.jacobian)
-    open_axes = axes[np.r_[sizes, np.zeros(len(axes) - sizes.size)] < 1.0 / OPEN]
+    sizes, axes = principal_axes(found.jacobian)
+    open_axes = axes[sizes < 1.0 / OPEN]
     if not open_axes.size:
         return found
     start = found.point - open_axes.T @ (open_axes @ found.point)
@@ -86,6 +86,13 @@ def _nearest(found: Solution) -> Solution:
     back = settled(found.problem, start, {int(n): float(start[n]) for n in places})
     back = replace(back, jacobian=found.problem.jacobian(back.point), converged=found.converged)
     return back if back.chi_squared < found.chi_squared + SAME else found
+
+
+def principal_axes(jacobian: Real) -> tuple[Real, Real]:
+    """What a unit step along each axis changes the residuals by (parameters,), largest first, and the axes (rows)."""
+    count = jacobian.shape[1]
+    _, sizes, axes = np.linalg.svd(np.vstack([jacobian, np.zeros((count, count))]), full_matrices=False)
+    return sizes, axes
 
 
 def _misfit(one: Solution) -> float:

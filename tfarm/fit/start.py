@@ -107,7 +107,15 @@ class Starts:
             return np.concatenate([_both(dH / H).T for H, dH in thin.slopes(x)])
 
         found = least_squares(
-            residuals, point, jac=jacobian, bounds=(low, high), loss="soft_l1", f_scale=LOSS, max_nfev=25, xtol=1e-5
+            residuals,
+            point,
+            jac=jacobian,
+            bounds=(low, high),
+            loss="soft_l1",
+            f_scale=LOSS,
+            max_nfev=25,
+            xtol=1e-3,
+            ftol=1e-3,
         )
         return whole, np.asarray(found.x)
 

@@ -13,7 +13,7 @@ from scipy.stats import norm, t
 
 from tfarm.records import record
 
-from .solve import OPEN, Solution, settled
+from .solve import OPEN, Solution, principal_axes, settled
 
 Real = NDArray[np.float64]
 
@@ -55,8 +55,7 @@ def sureness(found: Solution, *, profile: bool) -> Sureness:
 
     Along an open axis nothing changes, so one number of it is held while the others are profiled.
     """
-    _, sizes, axes = np.linalg.svd(found.jacobian)
-    sizes = np.r_[sizes, np.zeros(len(axes) - sizes.size)]  # fewer residuals than numbers
+    sizes, axes = principal_axes(found.jacobian)
     is_open = sizes < 1.0 / OPEN
     covariance = (axes[~is_open].T / sizes[~is_open] ** 2) @ axes[~is_open]
     unsure: list[bool] = np.any(abs(axes[is_open]) > TAKES_PART, axis=0).tolist()
