@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     from tfarm.errors import CertificationError, ConvergenceError, ParameterError
     from tfarm.exact.outputs import Output
     from tfarm.fit.data import Measured
+    from tfarm.fit.overlay import overlay
+    from tfarm.fit.reading import read_measured
     from tfarm.loop.closed import closed_loop_poles, margins, nyquist
     from tfarm.loop.locus import locus
     from tfarm.loop.regions import region as map
@@ -78,8 +80,10 @@ __all__ = [
     "margins",
     "modes",
     "nyquist",
+    "overlay",
     "plots",
     "presets",
+    "read_measured",
     "reduce",
     "sampled",
     "simulate",
@@ -102,7 +106,9 @@ _ROOMS = {  # where a name stands; what it is called there after a colon, if not
     "Measured": "fit.data",
     "modes": "spectrum",
     "Output": "exact.outputs",
+    "overlay": "fit.overlay",
     "plots": "plots",
+    "read_measured": "fit.reading",
     "reduce": "reduced",
     "sampled": "dsp.closed",
     "simulate": "dsp.results",

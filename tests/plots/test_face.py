@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 
 import tfarm
 from tfarm.dsp import gain_map
+from tfarm.fit.data import Measured
 from tfarm.loop.nyquist import compressed
 from tfarm.loop.reduced_locus import reduced_locus
 from tfarm.plots.plane import colours
@@ -38,6 +39,7 @@ def records():
         "bode": ([tfarm.bode(LAB, "root_moment", (1.0, 300.0))], 2),
         "gain_map": ([plane], 0),
         "locus": ([tfarm.locus(LAB, LAW, "K2", -1.0, 1.6, points=60, branches=3)], 0),
+        "measured": ([tfarm.overlay(LAB, sweep())], 3),
         "modes": ([tfarm.modes(LAB, count=3)], 3),
         "nyquist": ([tfarm.nyquist(LAB, LAW)], 0),
         "overlay": ([plane, gain_map(analysis.verdict.loop, K1, K2)], 0),
@@ -46,6 +48,15 @@ def records():
         "tuned_gain": ([tfarm.tune(LAB, Plan(trials=1))], 0),
         "slew": ([LAB, tfarm.simulate(LAB, LAW, duration=2.0, count=8, between=4)], 3),
     }
+
+
+def sweep():
+    """The lab arm's own response, half as high and with a coherence that falls."""
+    omega = np.linspace(5.0, 250.0, 120)
+    values = tfarm.transfer(LAB, "root_moment")(1j * omega) / 2
+    return Measured(
+        output="root_moment", input="hub_torque", omega=omega, values=values, coherence=np.linspace(1.0, 0.5, 120)
+    )
 
 
 def axes_for(count):
@@ -166,6 +177,20 @@ def test_a_reduced_locus_lies_beside_the_exact_one(vary, stop):
     drawn = [line.get_xdata() + 1j * line.get_ydata() for line in ax.lines if line.get_linestyle() == "--"]
     assert np.array(drawn) == pytest.approx(reduced.branches, rel=1e-9, abs=0)
     assert reduced.gain.size == 30 if vary == "K1" else reduced.gain.size < 30
+
+
+def test_measured_draws_both_curves_and_the_coherence(records):
+    (found,), _ = records["measured"]
+    upper, middle, lower = tfarm.plots.measured(found, ax=axes_for(3))
+    drawn = {line.get_label(): line.get_data() for line in upper.lines}
+    data = found.measured
+    assert drawn["measured"][0].tolist() == (data.omega / (2 * np.pi)).tolist()
+    assert drawn["measured"][1].tolist() == abs(data.values).tolist()
+    assert drawn["exact"][1].tolist() == abs(found.curve).tolist()
+    assert middle.lines[0].get_ydata().tolist() == np.degrees(np.angle(data.values)).tolist()
+    assert lower.lines[0].get_ydata().tolist() == data.coherence.tolist()
+    assert [ax.get_ylabel() for ax in (middle, lower)] == ["phase [deg]", "coherence [-]"]
+    assert ("[Hz]" in lower.get_xlabel(), upper.get_ylabel()) == (True, "magnitude [N m/(N m)]")
 
 
 def test_overlay_draws_both_regions_edges(records):

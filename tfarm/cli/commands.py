@@ -25,7 +25,7 @@ from tfarm.cli.app import (
 )
 from tfarm.cli.inputs import K1, K2, Kp, LawFiles, laws_of
 from tfarm.cli.sampling import Delay, DspFile, Period, chain_of
-from tfarm.errors import one_line
+from tfarm.errors import MISSING, ParameterError, one_line
 
 if TYPE_CHECKING:
     pass
@@ -74,7 +74,7 @@ def modes(
 @app.command()
 def response(
     arm: ArmName,
-    output: Annotated[str, typer.Option("--output", help="what is looked at, such as root_moment")],
+    output: Annotated[str | None, typer.Option("--output", help="what is looked at, such as root_moment")] = None,
     s: Annotated[str | None, typer.Option("--s", help="points s [1/s]: 0.3+57.1j,10j")] = None,
     omega: Annotated[str | None, typer.Option("--omega", help="frequencies [rad/s]: 1,10,100")] = None,
     start: Annotated[float, typer.Option("--from", help="lowest frequency [rad/s]")] = 0.1,
@@ -92,9 +92,25 @@ def response(
     method: MethodName = "closed-form",
     compare: Compare = False,
     csv: Annotated[Path | None, typer.Option("--csv", help="write a table to this file")] = None,
+    measured: Annotated[
+        str | None, typer.Option("--measured", metavar="OUTPUT/INPUT=FILE", help="lay a measured response over it")
+    ] = None,
+    png: Annotated[Path | None, typer.Option("--png", help="with --measured: write the picture to this file")] = None,
     json: Json = False,
 ) -> None:
-    """The exact response to the arm's input: hub torque unless its file says otherwise, hub angle of a locked hub."""
+    """The exact response to the arm's input: hub torque unless its file says otherwise, hub angle of a locked hub.
+
+    With --measured tip_acceleration/hub_angle=sweep.csv: that measured response beside the exact one.
+    """
+    if measured is not None:
+        from tfarm.cli.overlaying import lay_over
+
+        _alone_with_measured(s=s, omega=omega, output=output, x=x, side=side, digits=digits)
+        lay_over(load_arm(arm), measured, csv, png, json)
+        return
+    if output is None or png is not None:
+        option = "--output" if output is None else "--measured"
+        raise ParameterError(key=option, value=MISSING, remedy="say which response: --output root_moment, for one")
     from tfarm.cli.inputs import driven_by, points_on
 
     right, at = right_digits(digits), points_on(s, omega, start, stop, points)
@@ -117,6 +133,13 @@ def response(
         write_csv(response_table(answer), csv)
     if json or csv is None or say_written(csv):
         give(answer, json, (lambda found: show(response_table(found))) if csv is None else print_found)
+
+
+def _alone_with_measured(**options: object) -> None:
+    for name, value in options.items():
+        if value is not None:
+            remedy = "a measured response has its own outputs and frequencies; leave this out"
+            raise ParameterError(key=f"--{name}", value=value, remedy=remedy)
 
 
 @app.command()

@@ -41,7 +41,7 @@ OPTIONS = {
     "--from": ("--start", "--wmin", "--min"),
     "--to": ("--stop", "--end", "--wmax", "--max"),
 }
-PATHS = ("--csv", "--mat", "--save", "--out", "--keep", "--dsp", "--controller")  # may be called 1_0
+PATHS = ("--csv", "--mat", "--save", "--png", "--out", "--keep", "--dsp", "--controller")  # may be called 1_0
 
 
 def check_verb(word: str, group: Any) -> None:

@@ -11,10 +11,23 @@ from tfarm.plots.frequency import bode
 from tfarm.plots.growth import sampled_modes
 from tfarm.plots.learning import tuned_gain
 from tfarm.plots.motion import slew
+from tfarm.plots.overlaid import measured
 from tfarm.plots.plane import gain_map
 from tfarm.plots.regions import overlay
 from tfarm.plots.roots import locus
 from tfarm.plots.shapes import modes
 from tfarm.plots.sketch import sketch
 
-__all__ = ["bode", "gain_map", "locus", "modes", "nyquist", "overlay", "sampled_modes", "sketch", "slew", "tuned_gain"]
+__all__ = [
+    "bode",
+    "gain_map",
+    "locus",
+    "measured",
+    "modes",
+    "nyquist",
+    "overlay",
+    "sampled_modes",
+    "sketch",
+    "slew",
+    "tuned_gain",
+]

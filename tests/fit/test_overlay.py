@@ -1,0 +1,163 @@
+"""A measured response beside the exact one: planted differences are named, mode by mode, and mixed up units."""
+
+import csv
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tfarm
+from tests.shell import answer, run
+from tfarm.errors import ParameterError
+from tfarm.fit.data import Measured
+from tfarm.fit.overlay import overlay
+from tfarm.fit.ratio import Ratio
+from tfarm.fit.resonances import must_be_in_unit, paired
+
+LAB = tfarm.load("sasaki2012-lab")
+TRUE = replace(LAB, link=replace(LAB.link, youngs_modulus=1.2 * LAB.link.youngs_modulus, damping=2e-4))
+GAIN, NOISE = -0.9, 0.01
+OMEGA = np.linspace(5.0, 700.0, 3000)
+BARE = tfarm.load("sasaki2012")  # without damping, where poles and zeros are counted, not searched for
+PAIRS = (("tip_acceleration", "hub_angle"), ("root_moment", "hub_torque"))
+
+
+def measured(output, input, arm=TRUE, scale=1.0, seed=1):
+    """What a sensor of that gain and one per cent of noise in each part sees of another arm."""
+    rng = np.random.default_rng(seed)
+    noise = rng.standard_normal((2, OMEGA.size))
+    H = GAIN * Ratio(arm, output, input)(1j * OMEGA)
+    values = H * (1 + NOISE * (noise[0] + 1j * noise[1]))
+    return Measured(output=output, input=input, omega=OMEGA * scale, values=values, sigma=NOISE * abs(H))
+
+
+@pytest.fixture(scope="module")
+def found():
+    return {pair: overlay(LAB, measured(*pair)) for pair in PAIRS}
+
+
+@pytest.mark.parametrize("pair", PAIRS)
+def test_each_resonance_is_the_true_arms_pole_and_residue(pair, found):
+    """Within five of the deviations that the fit to its lines gives; the poles are followed from the undamped modes."""
+    one, ratio = found[pair], Ratio(TRUE, *pair)
+    eigenvalues = tfarm.damped_modes(tfarm.modes(ratio.driven, 4)).eigenvalues
+    poles = np.sort_complex(eigenvalues[eigenvalues.imag > 0])[::-1]
+    assert [row.mode for row in one.beside] == [1, 2, 3]
+    for row, pole in zip(one.beside, poles, strict=False):
+        near = row.measured
+        assert abs(near.pole.imag - pole.imag) < 5 * near.std[1]
+        assert abs(near.pole.real - pole.real) < 5 * near.std[0]
+        assert near.std[0] < 0.1 * abs(pole.real)
+        assert near.residue == pytest.approx(GAIN * ratio.residue(complex(pole), np.r_[poles, 0.0]), rel=0.1)
+        assert row.level.real < 0  # the sensor is the other way round
+    assert one.unmatched.size == 0
+
+
+def test_the_one_number_that_explains_a_mode_does(found):
+    """With Young's modulus changed as it says the arm has the measured frequency; of a power law all modes agree."""
+    one = found[PAIRS[0]]
+    for row in one.beside:
+        factor = one.required["youngs_modulus"][row.mode]
+        assert factor == pytest.approx(1.2, abs=0.01)
+        other = replace(LAB, input="hub_angle", link=replace(LAB.link, youngs_modulus=factor * LAB.link.youngs_modulus))
+        w = tfarm.modes(other, count=3).natural_frequency
+        assert w[row.mode - 1] == pytest.approx(abs(row.measured.pole), rel=2e-3)
+    assert "hub_inertia" not in one.required  # with the angle held it moves none
+    assert 1 in found[PAIRS[1]].required["hub_inertia"]
+
+
+def test_a_peak_that_the_arm_does_not_have_is_named():
+    data = measured("root_moment", "hub_torque")
+    s, p = 1j * OMEGA, complex(-1.0, 400.0)
+    alien = 3.0 * (1 / (s - p) + 1 / (s - p.conjugate()))
+    one = overlay(BARE, replace(data, values=data.values + alien))
+    assert one.unmatched == pytest.approx([400.0], abs=2.0)
+    assert [row.mode for row in one.beside if row.peak is not None] == [1, 2, 3]
+
+
+@pytest.mark.parametrize(("scale", "said"), [(2 * np.pi, "6.28"), (1 / (2 * np.pi), "0.159")])
+def test_frequencies_in_another_unit_than_the_file_says_are_one_line(scale, said):
+    with pytest.raises(ParameterError) as error:
+        overlay(BARE, measured("root_moment", "hub_torque", scale=scale))
+    words = "are rad/s given as Hz?" if scale > 1 else "are Hz given as rad/s?"
+    assert f"its peaks are {said} times the arm's frequencies: {words}" in str(error.value)
+
+
+def test_peaks_a_third_off_and_missing_ones_are_no_other_unit():
+    """Of an arm's frequencies up to 35 % off, each seen or not: in 300 draws none is taken for another unit."""
+    rng, refused = np.random.default_rng(5), 0
+    spectra = [
+        tfarm.modes(tfarm.load(name), count=40).natural_frequency[-40:] for name in ("sasaki2012", "quanser-2dsfl")
+    ]
+    for n in range(300):
+        own = spectra[n % 2]
+        first, count = rng.integers(0, 3), rng.integers(1, 6)
+        w = np.sort(own[first : first + count] * rng.uniform(0.7, 1.35) * np.exp(0.04 * rng.standard_normal(count)))
+        omega = np.r_[0.5 * w[0], np.repeat(w, 3) * np.tile([0.99, 1.0, 1.01], count), 1.5 * w[-1]]
+        heights = np.r_[1.0, np.ravel([(1.0, 9.0 if rng.random() < 0.85 else 1.0, 1.0) for _ in w]), 1.0]
+        if (np.diff(omega) <= 0).any():
+            continue
+        data = Measured(output="hub_angle", input="hub_torque", omega=omega, values=heights)
+        try:
+            must_be_in_unit(data, 0.01 * heights, 1j * own)
+        except ParameterError:
+            refused += 1
+    assert refused == 0
+
+
+def test_pairs_are_in_order_and_of_least_cost():
+    """By hand: 1.3 is nearer to 1 than leaving both costs; of 5 and 6 the nearer one; 40 has nobody."""
+    pairs, cost = paired(np.array([1.3, 5.0, 40.0]), np.array([1.0, 4.0, 6.0]), (0.5, 100.0))
+    assert pairs == [(0, 0), (1, 2)]
+    assert cost == pytest.approx(np.log(1.3) + np.log(6 / 5) + 0.3 + 0.3)
+
+
+@pytest.fixture(scope="module")
+def sweep(tmp_path_factory):
+    """A file as a laboratory writes it."""
+    path, data = tmp_path_factory.mktemp("sweep") / "sweep.csv", measured("root_moment", "hub_torque")
+    rows = zip(*(x.tolist() for x in (data.omega / (2 * np.pi), data.values.real, data.values.imag)), strict=True)
+    path.write_text("\n".join(["hz,re,im,coherence,averages", *(f"{a!r},{b!r},{c!r},0.998,10" for a, b, c in rows)]))
+    return path
+
+
+def test_the_command_prints_writes_and_draws(sweep, tmp_path, capsys):
+    asked = ("response", "sasaki2012", "--measured", f"root_moment/hub_torque={sweep}")
+    png, table = tmp_path / "o.png", tmp_path / "o.csv"
+    code, out, err = run(capsys, *asked, "--png", str(png), "--csv", str(table))
+    assert (code, err) == (0, "")
+    assert png.read_bytes().startswith(b"\x89PNG")
+    assert len(list(csv.reader(table.read_text().splitlines()))) == 1 + OMEGA.size
+    assert "each alone and for each mode" in out
+    assert "[N m/(N m)]" in out
+    given = answer(capsys, *asked)
+    one = overlay(BARE, measured("root_moment", "hub_torque"))
+    hz = [row["measured_hz"] for row in given["modes"]]
+    assert hz == pytest.approx([abs(row.measured.pole) / (2 * np.pi) for row in one.beside], rel=1e-4)
+    assert [row["exact_hz"] for row in given["modes"]] == [abs(row.pole) / (2 * np.pi) for row in one.beside]
+    assert given["required_percent"]["youngs_modulus"]["1"] == pytest.approx(20.0, abs=0.5)
+    assert given["power_at_zero"] == -0
+    assert given["poles"] == [[0.0, w] for w in tfarm.modes(BARE, up_to=1.8 * 700).natural_frequency[1:]]
+    assert given["noise"] == "coherence of 10 averages"
+
+
+@pytest.mark.parametrize(
+    ("extra", "said"),
+    [
+        (("--output", "root_moment"), "--output = 'root_moment': a measured response has its own"),
+        (("--omega", "1,2"), "--omega = '1,2'"),
+        (("--png", "/nowhere/o.png"), "--png = '/nowhere/o.png'"),
+    ],
+)
+def test_what_does_not_go_with_it_is_said(extra, said, sweep, capsys):
+    asked = ("response", "sasaki2012", "--measured", f"root_moment/hub_torque={sweep}")
+    code, _, err = run(capsys, *asked, *extra)
+    assert code == 2
+    assert said in err
+    assert len(err.splitlines()) == 1
+
+
+def test_without_an_output_the_command_asks_for_one(capsys):
+    code, out, err = run(capsys, "response", "sasaki2012-lab", "--s", "1j")
+    assert (code, out) == (2, "")
+    assert "--output is missing: say which response" in err

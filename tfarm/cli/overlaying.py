@@ -1,0 +1,60 @@
+"""A measured response over the exact one: what `tfarm response --measured` prints and writes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tfarm.cli.app import give
+from tfarm.cli.tables import say_written
+from tfarm.fit.overlay import overlay
+from tfarm.fit.overlay_answer import curves_table, overlay_answer, required_table
+from tfarm.fit.reading import data_of
+from tfarm.tables.files import write_csv
+from tfarm.tables.terminal import show
+
+if TYPE_CHECKING:
+    from tfarm.arm import Arm
+
+FEW = 12  # poles and zeros that are printed
+
+
+def lay_over(arm: Arm, text: str, csv: Path | None, png: Path | None, json: bool) -> None:
+    """Both curves: mode by mode on the terminal or as JSON, point by point as a table, and as a picture."""
+    found = overlay(arm, data_of(text, "--measured"))
+    if csv is not None:
+        write_csv(curves_table(found), csv)
+    if png is not None:
+        from tfarm.plots.files import save_png
+        from tfarm.plots.overlaid import draw_measured
+
+        save_png(draw_measured(found), png)
+    if json or say_written(csv, png):
+        give(overlay_answer(found), json, _print)
+
+
+def _print(answer: dict[str, Any]) -> None:
+    low, high = answer["band_hz"]
+    span = f"{answer['points']} points from {low:.6g} to {high:.6g} Hz"
+    print(f"{answer['arm']}: {answer['output']} over {answer['input']} [{answer['unit']}], {span}")
+    if len(answer["modes"]):
+        show(answer["modes"])
+    else:
+        print("no resonance of the arm lies in the band")
+    for peak in answer["unmatched_peaks_hz"]:
+        print(f"measured peak at {peak:.6g} Hz: none of the arm's is near")
+    if (table := required_table(answer)) is not None:
+        print("what the arm's numbers would have to be, each alone and for each mode (to first order in logarithms):")
+        show(table)
+    for what in ("poles", "zeros"):
+        print(f"{what} up to {answer['roots_up_to_rad_s']:.6g} rad/s [1/s]: {_listed(answer[what])}")
+    if answer["common"]:
+        print(f"common to both signals, and in neither: {_listed(answer['common'])}")
+    print(f"noise by {answer['noise']}; rms of ln |measured/exact| {answer['rms_log_error']:.4g}")
+
+
+def _listed(roots: list[list[float]]) -> str:
+    """Those in the upper half-plane, the first of them."""
+    texts = [f"{re:.6g}{im:+.6g}i" if im else f"{re:.6g}" for re, im in roots[:FEW]]
+    rest = f" and {len(roots) - FEW} more" if len(roots) > FEW else ""
+    return ", ".join(texts) + rest if texts else "none"

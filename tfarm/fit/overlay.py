@@ -1,0 +1,207 @@
+"""A measured response beside the exact one: mode by mode what differs, and which number alone would explain it."""
+
+from __future__ import annotations
+
+import math
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import Arm, must_be_arm
+from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.records import record
+from tfarm.response.frequency import refined_grid
+from tfarm.spectrum import Modes, modes_below
+from tfarm.spectrum import modes as modes_of
+
+from .data import Measured
+from .noise import Noise, noise_of
+from .ratio import Ratio, RatioRoots
+from .resonances import (
+    BEYOND,
+    TURN,
+    Resonance,
+    must_be_in_unit,
+    paired,
+    peaks_among,
+    peaks_of,
+    resonance_at,
+)
+
+Complex = NDArray[np.complexfloating[Any, Any]]
+Real = NDArray[np.float64]
+
+SAME = 0.1  # of its frequency: how near a pole of a damped arm is to that mode of the arm without damping
+FARTHEST = 3.0  # the factor on a number beyond which it is no explanation
+LEAST = 1e-3  # d ln w/d ln p below which a number does not move a mode
+
+
+@dataclass(frozen=True, kw_only=True)
+@record
+class Counterpart:
+    """A pole of the exact response and the resonance that was measured in its place, if one was.
+
+    `peak` [rad/s] is where the measured curve has its peak; `measured` is the pole fitted there, None where its lines
+    do not tell it.  `mode` is the arm's mode that it is, counted from 1; None where the ratio's poles are no modes.
+    """
+
+    pole: complex
+    residue: complex
+    mode: int | None
+    peak: float | None
+    measured: Resonance | None
+
+    @property
+    def frequency_ratio(self) -> float | None:
+        """|s| measured over exact; by the peak where there is no more."""
+        if self.measured is not None:
+            return abs(self.measured.pole) / abs(self.pole)
+        return None if self.peak is None else self.peak / abs(self.pole)
+
+    @property
+    def damping_ratio(self) -> float:
+        """Of the exact pole."""
+        return -self.pole.real / abs(self.pole) + 0.0
+
+    @property
+    def level(self) -> complex | None:
+        """The measured residue over the exact one: 1 where gain and sign agree, whatever the damping."""
+        return None if self.measured is None else self.measured.residue / self.residue
+
+
+@dataclass(frozen=True, kw_only=True)
+@record
+class Overlay:
+    """A measured response of an arm beside the exact one.
+
+    `exact` is at the measured frequencies, `curve` at those of a grid `omega` [rad/s] that misses no peak.  `beside`
+    has a row a pole in the band; `unmatched` [rad/s] are measured peaks that the arm does not have.
+    """
+
+    arm: Arm
+    measured: Measured
+    noise: Noise
+    ratio: Ratio
+    roots: RatioRoots
+    exact: Complex
+    omega: Real
+    curve: Complex
+    beside: tuple[Counterpart, ...]
+    unmatched: Real
+
+    @property
+    def rms_log_error(self) -> float:
+        """The root mean square of ln |measured/exact|, over frequencies that stand out of the noise."""
+        kept = (abs(self.measured.values) > self.noise.sigma) & np.isfinite(self.exact) & (self.exact != 0)
+        if not kept.any():
+            return math.inf
+        return float(np.sqrt((np.log(abs(self.measured.values[kept] / self.exact[kept])) ** 2).mean()))
+
+    @cached_property
+    def required(self) -> dict[str, dict[int, float]]:
+        """By parameter of `Modes.sensitivity` and number of the mode: the factor on it that alone would explain it.
+
+        exp(ln(measured/exact)/S) with S = d ln w/d ln p: exact for a power law, as of Young's modulus or the density,
+        else to first order.  Without those beyond FARTHEST, or of a number that hardly moves the mode.
+        """
+        numbers = [each.mode for each in self.beside if each.mode is not None and each.frequency_ratio is not None]
+        if not numbers:
+            return {}
+        table = modes_of(self.ratio.driven, max(numbers))
+        found: dict[str, dict[int, float]] = {}
+        for name, slopes in table.sensitivity.items():
+            factors = {}
+            for each in self.beside:
+                if each.mode is None or each.frequency_ratio is None:
+                    continue
+                slope = float(slopes[np.flatnonzero(table.index == each.mode)[0]])
+                exponent = math.log(each.frequency_ratio) / slope if abs(slope) > LEAST else math.inf
+                if abs(exponent) <= math.log(FARTHEST):
+                    factors[each.mode] = math.exp(exponent)
+            if factors:
+                found[name] = factors
+        return found
+
+
+def overlay(arm: Arm, measured: Measured) -> Overlay:
+    """A measured response beside the exact one of that arm.
+
+    Raises ParameterError for signals that the arm does not have, and where the frequencies of the file are in another
+    unit than it says (see `must_be_in_unit`).
+    """
+    must_be_arm(arm)
+    ratio, noise = _ratio(arm, measured), noise_of(measured)
+    low, high = float(measured.omega[0]), float(measured.omega[-1])
+    roots = ratio.roots(BEYOND * high)
+    places = peaks_of(measured, noise.sigma)
+    own = peaks_among(roots.poles)
+    own = own[own >= low / BEYOND]
+    pairs, _ = paired(measured.omega[places], own, (low, high))
+    if len(pairs) < max(places.size, int(((own >= low) & (own <= high)).sum())):
+        _check_unit(ratio, measured, noise)
+    at = {j: int(places[i]) for i, j in pairs}
+    shown = [j for j, w in enumerate(own) if j in at or low <= w <= high]
+    poles = roots.resonances
+    by_size = {j: complex(poles[np.argmin(abs(abs(poles) - own[j]))]) for j in shown}
+    table = _modes(ratio, max((abs(pole) for pole in by_size.values()), default=0.0))
+    others = np.r_[roots.poles, roots.zeros, 0.0]
+    grid = refined_grid((low, high), np.r_[roots.poles, roots.zeros]) if low < high else measured.omega
+    omega = np.asarray(grid, dtype=float)
+    return Overlay(
+        arm=arm,
+        measured=measured,
+        noise=noise,
+        ratio=ratio,
+        roots=roots,
+        exact=np.asarray(ratio(1j * measured.omega)),
+        omega=omega,
+        curve=np.asarray(ratio(1j * omega)),
+        beside=tuple(
+            Counterpart(
+                pole=pole,
+                residue=ratio.residue(pole, others),
+                mode=_mode(table, pole),
+                peak=float(measured.omega[at[j]]) if j in at else None,
+                measured=resonance_at(measured, noise.sigma, at[j]) if j in at else None,
+            )
+            for j, pole in by_size.items()
+        ),
+        unmatched=np.delete(measured.omega[places], [i for i, _ in pairs]),
+    )
+
+
+def _check_unit(ratio: Ratio, measured: Measured, noise: Noise) -> None:
+    """See `must_be_in_unit`; a hint, so where the poles so far up are not found it is left out."""
+    with suppress(ConvergenceError):
+        poles = ratio.poles(BEYOND * TURN * float(measured.omega[-1])).values
+        must_be_in_unit(measured, noise.sigma, poles)
+
+
+def _ratio(arm: Arm, measured: Measured) -> Ratio:
+    try:
+        return Ratio(arm, measured.output, measured.input)
+    except ParameterError as error:
+        raise ParameterError(
+            key=f"{measured.name} {error.key}", value=error.value, remedy=error.remedy, file=error.file
+        ) from None
+
+
+def _modes(ratio: Ratio, up_to: float) -> Modes | None:
+    """The arm's modes, where they are the poles of the ratio; None else."""
+    reach = (1 + SAME) * up_to
+    if not (ratio.is_driven and up_to) or modes_below(ratio.driven, reach) == 0:
+        return None
+    return modes_of(ratio.driven, up_to=reach)
+
+
+def _mode(table: Modes | None, pole: complex) -> int | None:
+    """The number of the mode that a pole is: that of the nearest natural frequency, if it is near."""
+    if table is None:
+        return None
+    away = abs(table.natural_frequency / abs(pole) - 1)
+    at = int(np.argmin(away))
+    return int(table.index[at]) if away[at] < SAME and table.index[at] > 0 else None

@@ -1,0 +1,200 @@
+"""Resonances of a measured response: where its peaks are, which of an arm's they are, and each one's pole.
+
+Near a resonance a response is, for any linear system,
+
+    H(s) = r/(s - p) + r*/(s - p*) + c0 + c1 (s/|p|) + ... + c4 (s/|p|)^4,
+
+with the rest of the system in the c.  Pole and residue are fitted by Gaussian least squares to the lines around a
+peak, up to the neighbouring dips, so that they need no model of the arm.  In an arm's order peaks are matched with its
+poles; where they would match far better 2 pi times lower or higher, the file's frequencies are in another unit.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.errors import ParameterError
+from tfarm.records import record
+
+from .data import Measured
+
+Complex = NDArray[np.complexfloating[Any, Any]]
+Real = NDArray[np.float64]
+
+PROMINENT = math.log(2)  # a peak is twice what is around it
+CLEAR = 5.0  # deviations of the noise that it stands above
+SKIPPED = 0.3  # of ln w: what a peak or a pole in the band costs that has no partner; so partners are 1.8 apart at most
+WIDEST = 0.5  # damping ratio of a pole that is no peak
+BEYOND = 1.8  # so far beyond the band partners are looked for
+WIDTHS = 3.0  # half-widths of a peak around it that its pole is fitted to: tuned with the next, for the least bias
+BACKGROUND = 5  # coefficients c
+CLOSE = 0.3  # of ln w, in the mean of the peaks: how well they fit in the other unit before that is said,
+ALIKE = 0.15  # and how far they may differ in that
+ALONE = math.log(2.0)  # of ln w: farther from every pole a peak has nothing to do with one
+MANY = 3  # peaks, whose spacing tells one match from another
+TURN = 2 * math.pi
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+@record
+class Resonance:
+    """A peak of a measured response: its `pole` [1/s] and `residue`; `std` (2,) of -Re and of Im of the pole [1/s]."""
+
+    pole: complex
+    residue: complex
+    std: Real
+
+    @property
+    def damping_ratio(self) -> float:
+        """-Re p/|p|."""
+        return -self.pole.real / abs(self.pole)
+
+
+def peaks_of(data: Measured, sigma: Real) -> NDArray[np.intp]:
+    """The places (n,) of the peaks that stand out of the noise."""
+    from scipy.signal import find_peaks
+
+    size = abs(data.values)
+    places, found = find_peaks(np.log(np.maximum(size, np.finfo(float).tiny)), prominence=PROMINENT)
+    rise = size[places] * -np.expm1(-found["prominences"])
+    return np.asarray(places[rise > CLEAR * sigma[places]])
+
+
+def paired(measured: Real, own: Real, band: tuple[float, float]) -> tuple[list[tuple[int, int]], float]:
+    """Pairs of places in two ascending rows of frequencies, in order, with the least cost, and that cost.
+
+    The cost of a pair is |ln w/w'|; one of a row that is left alone costs SKIPPED, but an own one outside of the band.
+    """
+    x, y = np.log(measured), np.log(own)
+    alone = np.where((own >= band[0]) & (own <= band[1]), SKIPPED, 0.0)
+    cost = np.zeros((x.size + 1, y.size + 1))
+    cost[1:, 0] = SKIPPED * np.arange(1, x.size + 1)
+    cost[0, 1:] = np.cumsum(alone)
+    ways = np.zeros(cost.shape, dtype=int)
+    ways[1:, 0], ways[0, 1:] = 1, 2
+    for i in range(1, x.size + 1):
+        for j in range(1, y.size + 1):
+            choices = (
+                cost[i - 1, j - 1] + abs(x[i - 1] - y[j - 1]),
+                cost[i - 1, j] + SKIPPED,
+                cost[i, j - 1] + alone[j - 1],
+            )
+            ways[i, j] = int(np.argmin(choices))
+            cost[i, j] = choices[ways[i, j]]
+    pairs, i, j = [], x.size, y.size
+    while i or j:
+        way = ways[i, j]
+        if way == 0:
+            pairs.append((i - 1, j - 1))
+        i, j = i - (way != 2), j - (way != 1)
+    return pairs[::-1], float(cost[-1, -1])
+
+
+def peaks_among(poles: Complex) -> Real:
+    """|s| (n,) [rad/s], ascending, of those poles that make a peak."""
+    upper = poles[(poles.imag > 0) & (-poles.real < WIDEST * abs(poles))]
+    return np.sort(abs(upper))
+
+
+def must_be_in_unit(data: Measured, sigma: Real, poles: Complex) -> None:
+    """Raise ParameterError where the peaks fit the arm's poles 2 pi lower or higher, and do not as they are.
+
+    `poles` are those of the response, complete up to BEYOND 2 pi times the highest frequency.  They fit as they are
+    where no more than two partners are missing; one peak alone decides only where it has no partner.
+    """
+    peaks, own = data.omega[peaks_of(data, sigma)], peaks_among(poles)
+    if not peaks.size or not own.size:
+        return
+    band = float(data.omega[0]), float(data.omega[-1])
+    _, cost = paired(peaks, own, band)
+    lonely = bool((abs(np.log(peaks[:, None] / own)).min(axis=1) > ALONE).all())
+    for factor, words in ((1 / TURN, "are rad/s given as Hz?"), (TURN, "are Hz given as rad/s?")):
+        there, fitting = paired(peaks * factor, own, (band[0] * factor, band[1] * factor))
+        better = cost - fitting > SKIPPED if peaks.size >= MANY else lonely
+        away = np.array([math.log(peaks[i] * factor / own[j]) for i, j in there])
+        if better and away.size == peaks.size and abs(away.mean()) < CLOSE and np.ptp(away) < ALIKE:
+            found = f"{peaks[0] / TURN:.4g} Hz"
+            remedy = f"its peaks are {TURN if factor < 1 else 1 / TURN:.3g} times the arm's frequencies: {words}"
+            raise ParameterError(key=f"{data.name} first peak", value=found, remedy=remedy, file=data.source)
+
+
+def resonance_at(data: Measured, sigma: Real, place: int) -> Resonance | None:
+    """The pole and residue of the peak at a place; None where its lines do not tell them."""
+    from scipy.optimize import least_squares
+
+    kept, x = _around(data, place), None
+    omega, values, weight = data.omega[kept], data.values[kept], 1 / np.clip(sigma[kept], 1e-300, 1e300)
+    background = min(BACKGROUND, 2 * omega.size - 6)
+    if background < 1 or not np.isfinite(weight).all():
+        return None
+    s, w = 1j * omega, float(data.omega[place])
+
+    def parts(z: Complex) -> Real:
+        return np.concatenate([z.real * weight, z.imag * weight])
+
+    def residuals(x: Real) -> Real:
+        return parts(_model(x, s, w, background)[0] - values)
+
+    def slopes(x: Real) -> Real:
+        return np.array([parts(column) for column in _model(x, s, w, background)[1]]).T
+
+    half = max(_half_width(data, place), (omega[-1] - omega[0]) / (4 * omega.size))
+    x = np.zeros(4 + background)
+    x[:2] = half, w
+    linear, *_ = np.linalg.lstsq(slopes(x)[:, 2:], parts(values), rcond=None)
+    x[2:] = linear
+    found = least_squares(residuals, x, jac=slopes, method="lm", x_scale="jac")
+    sigma_p, w_p = found.x[:2]
+    if not found.success or not omega[0] < w_p < omega[-1] or abs(sigma_p) > w_p:
+        return None
+    freedom = 2 * omega.size - x.size
+    J, e = slopes(found.x), residuals(found.x)
+    scale = np.sqrt((J**2).sum(axis=0))
+    spread = np.linalg.pinv((J / scale).T @ (J / scale)) / np.outer(scale, scale) * max(1.0, float(e @ e) / freedom)
+    std = np.sqrt(np.diag(spread)[:2])
+    return Resonance(pole=complex(-sigma_p, w_p), residue=complex(found.x[2], found.x[3]), std=std)
+
+
+def _model(x: Real, s: Complex, w: float, background: int) -> tuple[Complex, list[Complex]]:
+    """The formula, and its derivatives by -Re p, Im p, Re r, Im r and the c."""
+    p, r = complex(-x[0], x[1]), complex(x[2], x[3])
+    up, down = 1 / (s - p), 1 / (s - p.conjugate())
+    powers = [(s / w) ** n for n in range(background)]
+    value = r * up + r.conjugate() * down + sum(c * each for c, each in zip(x[4:], powers, strict=True))
+    by_sigma = -(r * up**2 + r.conjugate() * down**2)
+    by_w = 1j * (r * up**2 - r.conjugate() * down**2)
+    return value, [by_sigma, by_w, up + down, 1j * (up - down), *powers]
+
+
+def _half_width(data: Measured, place: int) -> float:
+    """Half the width [rad/s] of a peak where it has lost 3 dB, to the nearer side."""
+    size, limit = abs(data.values), abs(data.values[place]) / math.sqrt(2)
+    below = np.flatnonzero(size < limit)
+    if not below.size:
+        return float(data.omega[-1] - data.omega[0])
+    return float(abs(data.omega[below] - data.omega[place]).min())
+
+
+def _around(data: Measured, place: int) -> slice:
+    """The lines from dip to dip around a peak, and no farther than some of its widths, but three to each side."""
+    size, reach = abs(data.values), WIDTHS * _half_width(data, place)
+    low, high = place, place
+    lowest = size[place]
+    while low > 0 and (size[low - 1] < 2 * lowest) and (data.omega[place] - data.omega[low] < reach or place - low < 3):
+        low -= 1
+        lowest = min(lowest, size[low])
+    lowest = size[place]
+    last = data.omega.size - 1
+    while (
+        high < last
+        and size[high + 1] < 2 * lowest
+        and (data.omega[high] - data.omega[place] < reach or high - place < 3)
+    ):
+        high += 1
+        lowest = min(lowest, size[high])
+    return slice(low, high + 1)
