@@ -22,7 +22,15 @@ VERBS = {  # those that take an arm, as short as they go
     "spill": ("--modes", "3"),
     "simulate": ("--modes", "4", "--duration", "0.05"),
 }
-UNASKED = {"assumptions", "design", "map", "report", "study", "tune"}  # whose runs take long: the option is one for all
+UNASKED = {
+    "assumptions",
+    "design",
+    "fit",
+    "map",
+    "report",
+    "study",
+    "tune",
+}  # that take long, or a file: the option is one for all
 ARM = "sasaki2012-lab"
 
 
