@@ -9,11 +9,13 @@ import pytest
 import tfarm
 from tests.shell import answer
 from tests.synthesis.held_loop import HeldLoop
-from tfarm import ConvergenceError, HubFeedback
+from tfarm import ConvergenceError, HubFeedback, ParameterError
 from tfarm.dsp import Chain, Slew, sampled_verdict
 from tfarm.dsp.chain import Sampling
 from tfarm.synthesis.design import design
 from tfarm.synthesis.sampled import RESERVE, sampled_judges, scaled
+from tfarm.tuner.constants import best_constant
+from tfarm.tuner.trial import slew_trial
 
 LAB = tfarm.load("sasaki2012-lab")
 HELD = HeldLoop(LAB, 0.01)
@@ -87,6 +89,18 @@ def test_the_residual_is_that_of_the_simulated_slew(Kp) -> None:
     chain = Chain(sampling=Sampling(period=0.008, delay_samples=0.5), slew=Slew(rise_time=0.5, travel=0.4))
     found = design(LAB, "residual", Kp=Kp, chain=chain, K1=(0.1, 5.0), K2=(-0.5, 0.8))
     assert found.value == pytest.approx(slewed(LAB, found.law, chain), rel=1e-3)  # of 8 modes beside 20
+
+
+def test_the_cost_is_that_of_the_tuners_trial_and_no_gains_cost_less() -> None:
+    """Its trial has another model, of six modes; neighbours and the best constant K of the default K1 cost more."""
+    found = design(LAB, "cost", K1=(0.05, 5.0), K2=(-0.9, 0.9))
+    gains = [(found.law.K1, found.law.K2), (0.3, best_constant(slew_trial(LAB, K1=0.3)).gain)]
+    gains += [(found.law.K1 * a, found.law.K2 + b) for a, b in ((0.9, 0.0), (1.1, 0.0), (1.0, -0.02), (1.0, 0.02))]
+    first, *others = (slew_trial(LAB, K1=K1).with_constant(K2).cost for K1, K2 in gains)
+    assert found.value == pytest.approx(first, rel=1e-4)
+    assert all(each >= first * (1 - 1e-6) for each in others) or found.at_bound
+    with pytest.raises(ParameterError, match="samples"):
+        design(LAB, "cost", continuous=True)
 
 
 def test_bounds_that_were_given_are_kept_and_said(capsys) -> None:

@@ -24,7 +24,7 @@ ALSO = "a further arm that the law has to serve: the objective is the worst of a
 RANGE = "numbers that the arm may have, such as payload.mass=0.1,0.5; up to four: corners, and a search inside"
 OF_A_LAW = "twice: two numbers of a law and their ranges; gain, delay, SIGNAL, SIGNAL.num.N or SIGNAL.den.N"
 
-OBJECTIVES = "damping, margin or residual; of another structure sensitivity, delay or cost (of the tuner's trial) too"
+OBJECTIVES = "damping, margin, residual or cost (of the tuner's trial); of another structure sensitivity or delay too"
 STRUCTURES = "K1-K2, PD, PD+notch, lead, PPF or strain-rate"
 RANGES = {  # of a map
     "K1": "range of K1; by default -1,3 on the paper's arm, -3.33 to 10 times the default K1 on a rig",

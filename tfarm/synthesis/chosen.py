@@ -27,8 +27,8 @@ def design(
 ) -> Design | LawDesign:  # fmt: skip
     """The law of a structure that serves an objective best in the sampled loop of a chain (10 ms unless given).
 
-    "K1-K2": gains of rate and moment within bounds, "damping", "margin" or "residual", of the sampled loop or the
-    `continuous` one (see `design.design`).  "PD", "PD+notch", "lead", "PPF" of the first `modes` modes and
+    "K1-K2": gains of rate and moment within bounds, "damping", "margin", "residual" or "cost", of the sampled loop or
+    the `continuous` one (see `design.design`).  "PD", "PD+notch", "lead", "PPF" of the first `modes` modes and
     "strain-rate": a `tfarm.Law`, "damping", "margin", "sensitivity", "delay", "residual" or "cost" (see `law_judge`);
     `Kp` is chosen where it is 0, and `progress` is told how the search goes on.  What is recommended holds when
     sampled, with all gains a quarter larger or smaller, and without a clock.

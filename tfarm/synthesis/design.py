@@ -44,10 +44,10 @@ from tfarm.synthesis.together import Judge, OnArm, Worst, in_step, worst_value
 from tfarm.synthesis.worst_case import ALONE, WorstCase
 
 Real = NDArray[np.float64]
-Objective = Literal["damping", "margin", "residual"]
+Objective = Literal["damping", "margin", "residual", "cost"]
 LoopKind = Literal["sampled", "continuous"]
 
-OBJECTIVES = ("damping", "margin", "residual")
+OBJECTIVES = ("damping", "margin", "residual", "cost")
 FLAT = 0.01  # gains whose value is worse by less than this share bound the flat part
 AT_BOUND = 1e-3  # share of an axis: an optimum so near to its end is where the bound is
 SIMPLEX = 2.0**-8  # of a step of the grid: its first size
@@ -102,14 +102,18 @@ def design(
     """The gains that serve an objective best within bounds, in the sampled loop of a chain (10 ms unless given).
 
     "damping" maximises the least damping ratio of the oscillating poles of the first `modes` modes; "margin" the disk
-    margin; "residual" minimises the root moment left after the slew.  What is recommended holds when sampled, with
-    every mode that its verdict takes, and with all gains a quarter larger or smaller.  `continuous`: of the continuous
-    loop instead; gains that are best there need not hold when sampled.  With `others` the objective is the worst of the
-    arms, all of which hold; references and feed-forward are made for the arm itself.  Raises ParameterError for a bad
-    objective or bounds, ConvergenceError if no gains within the bounds are stable.
+    margin; "residual" minimises the root moment left after the slew, "cost" what the tuner's trial costs with constant
+    gains.  What is recommended holds when sampled, with every mode that its verdict takes, and with all gains a quarter
+    larger or smaller.  `continuous`: of the continuous loop instead; gains that are best there need not hold when
+    sampled.  With `others` the objective is the worst of the arms, all of which hold; references and feed-forward are
+    made for the arm itself.  Raises ParameterError for a bad objective or bounds, ConvergenceError if no gains within
+    the bounds are stable.
     """
     if objective not in OBJECTIVES:
         raise ParameterError(key="objective", value=objective, remedy=f"use one of {', '.join(OBJECTIVES)}")
+    if objective == "cost" and continuous:
+        remedy = "the cost of the tuner's trial is one of samples: leave the continuous loop out"
+        raise ParameterError(key="objective", value=objective, remedy=remedy)
     unit, chain = arm.input_per_torque, Chain() if chain is None else chain
     arms = (NamedArm(arm.name, arm, {}), *others)
     for each in arms:

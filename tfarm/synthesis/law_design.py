@@ -124,7 +124,7 @@ def _why_none(arms: Sequence[NamedArm], structure: str, law: Law, chain: Chain) 
         return f"{text}{grows}; try another Kp or period"
     return (
         f"{text}{grows}; with link.damping = 0 no mode loses energy of its own, and a held input drives each "
-        "that the law does not damp where its alias is seen: give link.damping, or take K1-K2"
+        "one that the law does not damp where its alias is seen: give link.damping, or take K1-K2"
     )
 
 

@@ -14,7 +14,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import bilinear, lfilter
 
 from tfarm.arm import Arm
 from tfarm.arm.law import Law
@@ -27,7 +26,7 @@ from tfarm.reduced.partial_fractions import Matrices
 from tfarm.reduced.sensed import closed
 from tfarm.spectrum.scales import first_frequency
 from tfarm.synthesis.law_slopes import Clock
-from tfarm.synthesis.sampled import SAMPLES_LEFT
+from tfarm.synthesis.sampled import SAMPLES_LEFT, trial_cost
 from tfarm.synthesis.structures import Slope
 
 Real = NDArray[np.float64]
@@ -70,7 +69,7 @@ class LawSlew:
         off, added = moment - task.rigid_moment[:, None], u - task.feedforward[:, None]
         if self.chain.slew.reading == "total":
             added = u
-        value = (a * off**2 + b * added**2).sum(axis=0) / 2
+        value = trial_cost(task, self.chain, moment, u)
         return value, (a * off * d_moment + b * added * d_u).sum(axis=0)[None]
 
     def _task(self, objective: str) -> Scenario:
@@ -97,6 +96,8 @@ class LawSlew:
 
     def _change(self, x: Real, references: dict[str, Real], slopes: Sequence[Slope]) -> Real:
         """-sum over entries of dC_i/dx_j (signal - reference): (samples, coefficients)."""
+        from scipy.signal import bilinear, lfilter
+
         _, B, C, _ = self.held
         seen = dict(zip(self.signals, (x[:-1, : len(B)] @ C.T).T, strict=True))
         T, total = self.chain.sampling.period, np.zeros((len(x) - 1, len(slopes[0].num) if slopes else 0))
@@ -111,6 +112,8 @@ class LawSlew:
 
     def _rate(self, angle: Real) -> Real:
         """The rate as the difference of the angle, filtered."""
+        from scipy.signal import lfilter
+
         a, T = self.clock.estimate or 0.0, self.chain.sampling.period
         return np.asarray(lfilter([(1 - a) / T, -(1 - a) / T], [1.0, -a], angle))
 

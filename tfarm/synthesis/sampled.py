@@ -7,6 +7,7 @@ modes as that takes; a model of few modes only says where to look.
     damping    least -Re s/|s| of the oscillating poles, s = ln z/T, of the first modes
     margin     min 2 |1 + L|/|1 - L| over the unit circle, of nearly equal ones that with more damping
     residual   root mean square of the root moment at the samples after the slew of the chain, M read as it says
+    cost       that of the tuner's trial with constant gains
 
 Poles of higher modes, which alias into the same angles, are told by where the open loop has them: a held torque moves a
 pole less the higher its mode.  They have to be stable and count no further; where two poles are about as near, the one
@@ -27,9 +28,10 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from tfarm.arm import FED_BACK, Arm, HubFeedback
-from tfarm.dsp import Chain, SampledLoop, sampled_loop, sampled_verdict, scenario
+from tfarm.dsp import Chain, SampledLoop, Scenario, sampled_loop, sampled_verdict, scenario
 from tfarm.dsp.margins import most_modes
 from tfarm.dsp.sampling import PulseTransfer
+from tfarm.dsp.scenarios import TRIAL_COST, TRIAL_DURATION
 from tfarm.dsp.verdict import UNDAMPED_MODES
 from tfarm.errors import ConvergenceError
 from tfarm.loop.stability import stability
@@ -66,8 +68,9 @@ class SampledJudge:
     known: Arm
 
     def effort(self, K2: Bounds) -> Effort:
-        """The grid is cheap but for the residual, which is simulated."""
-        return {"margin": Effort(24, 32, 6), "damping": Effort(32, 36, 12)}.get(self.objective, Effort(36, 90, 20))
+        """The grid is cheap but for slews, which are simulated."""
+        smooth = {"margin": Effort(24, 32, 6), "cost": Effort(24, 32, 6), "damping": Effort(32, 36, 12)}
+        return smooth.get(self.objective, Effort(36, 90, 20))
 
     def landscape(self, axes: tuple[Axis, Axis], effort: Effort) -> tuple[Real, Score]:
         """Scores over the grid (rows of K2), inf where not stable, and the score itself, which is so too."""
@@ -100,15 +103,17 @@ class SampledJudge:
             return False
 
     def value(self, law: HubFeedback, score: float) -> float:
-        """The damping ratio, disk margin, or residual moment [N m] of a law of that score."""
+        """The damping ratio, disk margin, residual moment [N m] or cost of a law of that score."""
         if self.objective == "margin":
             return self.disk(law)
-        return score if self.objective == "residual" else -score
+        return -score if self.objective == "damping" else score
 
     def _scores(self, K1: Real, K2: Real, z: Complex) -> Real:
         if self.objective == "damping":
             return -self.damping(z)
-        return self.residual(K1, K2) if self.objective == "residual" else -self._disks(K1, K2) - TIE * self.damping(z)
+        if self.objective == "margin":
+            return -self._disks(K1, K2) - TIE * self.damping(z)
+        return self.residual(K1, K2) if self.objective == "residual" else self.cost(K1, K2)
 
     # ------------------------------------------------------------ matrices and poles
 
@@ -156,32 +161,48 @@ class SampledJudge:
 
     # ------------------------------------------------------------ residual
 
-    @cached_property
-    def _slew(self) -> tuple[Real, int]:
-        """What enters each sample per unit gain (n, 3): as it is, times K1, times K2; and the first sample after it."""
-        arm, chain = self.loop.plant.arm, self.loop.chain
-        T, rise = chain.sampling.period, chain.slew.rise_time
-        left = max(2 * np.pi / first_frequency(arm), SAMPLES_LEFT * T)
-        task = scenario("slew", self.known, chain, rise + left)
-        fixed = task.feedforward + self.loop.gains.Kp * task.hub_angle
-        return np.c_[fixed, task.hub_rate, task.rigid_moment], int(np.searchsorted(task.t, rise * (1 - 1e-12)))
+    def _task(self, lasting: float) -> Scenario:
+        """The slew, and what follows it for so long [s]."""
+        chain = self.loop.chain
+        return scenario("slew", self.known, chain, chain.slew.rise_time + lasting)
 
-    def residual(self, K1: Real, K2: Real) -> Real:
-        """Root mean square of the root moment [N m] over a period of the first mode after the slew."""
-        bare = self.loop.having(K1=0.0, K2=0.0)
+    def _run(self, task: Scenario, K1: Real, K2: Real) -> tuple[Real, Real]:
+        """Root moment and input at the samples of a slew, (samples, gains)."""
+        bare, Kp = self.loop.having(K1=0.0, K2=0.0), self.loop.gains.Kp
         start = bare.matrix()
         by_rate, by_moment = (bare.having(**{name: 1.0}).matrix() - start for name in ("K1", "K2"))
         A = start + K1[:, None, None] * by_rate + K2[:, None, None] * by_moment
         _, B, C = self.loop.pulse.matrices()
         drive, sense = np.zeros(len(start)), np.zeros(len(start))
         drive[: B.size], sense[: B.size] = B, C[FED_BACK.index("root_moment")]
-        parts, first = self._slew
-        x, total = np.zeros((K1.size, len(start), 1)), np.zeros(K1.size)
-        for k, (fixed, rate, moment) in enumerate(parts):
-            if k >= first:
-                total += (x[..., 0] @ sense) ** 2
-            x = A @ x + drive[:, None] * (fixed + K1 * rate + K2 * moment)[:, None, None]
-        return np.asarray(np.sqrt(total / (len(parts) - first)))
+        kept = B.size - 1 - self.loop.chain.sampling.whole_delay  # the state that keeps the input of the sample before
+        x, (moment, u) = np.zeros((K1.size, len(start), 1)), np.zeros((2, task.t.size, K1.size))
+        fixed = task.feedforward + Kp * task.hub_angle
+        for k in range(task.t.size):
+            moment[k] = x[..., 0] @ sense
+            x = A @ x + drive[:, None] * (fixed[k] + K1 * task.hub_rate[k] + K2 * task.rigid_moment[k])[:, None, None]
+            u[k] = x[:, kept, 0]
+        return moment, u
+
+    def residual(self, K1: Real, K2: Real) -> Real:
+        """Root mean square of the root moment [N m] over a period of the first mode after the slew."""
+        period = 2 * np.pi / first_frequency(self.loop.plant.arm)
+        task = self._task(max(period, SAMPLES_LEFT * self.loop.chain.sampling.period))
+        moment, _ = self._run(task, K1, K2)
+        return np.asarray(np.sqrt((moment[task.t >= task.busy_until * (1 - 1e-12)] ** 2).mean(axis=0)))
+
+    def cost(self, K1: Real, K2: Real) -> Real:
+        """What the trial of the tuner costs with constant gains."""
+        chain = self.loop.chain
+        task = self._task(max(0.0, TRIAL_DURATION - chain.slew.rise_time))
+        return trial_cost(task, chain, *self._run(task, K1, K2))
+
+
+def trial_cost(task: Scenario, chain: Chain, moment: Real, u: Real) -> Real:
+    """T sum of (a x^2 + b e^2)/2 of a slew whose root moment and input are (samples, n)."""
+    a, b = TRIAL_COST
+    x, added = moment - task.rigid_moment[:, None], u - (chain.slew.reading == "vibration") * task.feedforward[:, None]
+    return np.asarray(task.period * (a * x**2 + b * added**2).sum(axis=0) / 2)
 
 
 def scaled(law: HubFeedback, share: float) -> HubFeedback:
