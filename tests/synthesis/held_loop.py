@@ -5,9 +5,20 @@ from functools import cached_property
 
 import numpy as np
 from scipy.linalg import expm
+from scipy.signal import cont2discrete
 
 from tests.loop.ritz_loop import RitzLoop
 from tfarm import Arm, HubFeedback
+
+ROWS = ("hub_angle", "hub_rate", "root_moment")
+
+
+def blocks(law, T):
+    """(row, numerator, denominator in z) of each signal of a law, by SciPy's bilinear rule."""
+    for part in law.parts:
+        system = part.block.num, part.block.den
+        num, den, _ = cont2discrete(system, T, "bilinear") if part.block.order else (*system, T)
+        yield ROWS.index(part.signals[0]), np.atleast_1d(np.squeeze(num)), np.atleast_1d(den)
 
 
 @dataclass(frozen=True)
@@ -36,6 +47,20 @@ class HeldLoop:
         """Poles z of the closed loop, the z = 1 of a free hub angle among them."""
         A, B, sense = self.parts
         return np.linalg.eigvals(A - np.outer(B, np.array(law.row) @ sense)).astype(complex)
+
+    def law_poles(self, law):
+        """Closed-loop poles under any law: eigenvalues of the loop's whole state matrix, block after block."""
+        A, B, sense = self.parts
+        for row, num, den in blocks(law, self.period):
+            order, num = len(den) - 1, np.r_[np.zeros(len(den) - len(num)), num] / den[0]
+            den = den / den[0]
+            through, rest = num[0], num[1:] - num[0] * den[1:]
+            own = np.vstack([-den[1:], np.eye(order)[:-1]]) if order else np.zeros((0, 0))
+            enter = np.eye(order)[:, :1] if order else np.zeros((0, 1))
+            seen = np.r_[sense[row], np.zeros(len(A) - len(sense[row]))][None]
+            A = np.block([[A - np.outer(B, through * seen), -np.outer(B, rest)], [enter @ seen, own]])
+            B = np.r_[B, np.zeros(order)]
+        return np.linalg.eigvals(A)
 
     def radius(self, law):
         """The spectral radius, z = 1 of the free hub angle left out."""

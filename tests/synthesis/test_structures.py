@@ -4,11 +4,10 @@ import re
 
 import numpy as np
 import pytest
-from scipy.signal import cont2discrete
 
 import tfarm
 from tests.shell import answer, run
-from tests.synthesis.held_loop import HeldLoop
+from tests.synthesis.held_loop import HeldLoop, blocks
 from tfarm import Law, ParameterError
 from tfarm.arm.law_tables import load_law
 from tfarm.dsp import Chain
@@ -20,30 +19,11 @@ from tfarm.synthesis.structures import STRUCTURES, usual_angle_gain
 
 LAB, T = tfarm.load("sasaki2012-lab"), 0.01
 HELD = HeldLoop(LAB, T)
-ROWS = ("hub_angle", "hub_rate", "root_moment")
-
-
-def blocks(law):
-    """(row, (A, B, C, D)) of each signal of a law, by SciPy's bilinear rule."""
-    for part in law.parts:
-        system = part.block.num, part.block.den
-        num, den, _ = cont2discrete(system, T, "bilinear") if part.block.order else (*system, T)
-        yield ROWS.index(part.signals[0]), np.atleast_1d(np.squeeze(num)), np.atleast_1d(den)
 
 
 def poles(law):
-    """Closed-loop poles: zeros of the characteristic polynomial of the loop's whole state matrix."""
-    A, B, sense = HELD.parts
-    for row, num, den in blocks(law):
-        order, num = len(den) - 1, np.r_[np.zeros(len(den) - len(num)), num] / den[0]
-        den = den / den[0]
-        through, rest = num[0], num[1:] - num[0] * den[1:]
-        own = np.vstack([-den[1:], np.eye(order)[:-1]]) if order else np.zeros((0, 0))
-        enter = np.eye(order)[:, :1] if order else np.zeros((0, 1))
-        seen = np.r_[sense[row], np.zeros(len(A) - len(sense[row]))][None]
-        A = np.block([[A - np.outer(B, through * seen), -np.outer(B, rest)], [enter @ seen, own]])
-        B = np.r_[B, np.zeros(order)]
-    return np.linalg.eigvals(A)
+    """Closed-loop poles by the Galerkin model."""
+    return HELD.law_poles(law)
 
 
 def loop(law, q):
@@ -51,7 +31,7 @@ def loop(law, q):
     A, B, sense = HELD.parts
     z, eye = np.exp(1j * q), np.eye(len(A))
     H = np.array([sense @ np.linalg.solve(each * eye - A, B) for each in z]).T
-    return sum(np.polyval(num, z) / np.polyval(den, z) * H[row] for row, num, den in blocks(law))
+    return sum(np.polyval(num, z) / np.polyval(den, z) * H[row] for row, num, den in blocks(law, T))
 
 
 def least(of, law):
