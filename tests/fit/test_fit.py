@@ -8,7 +8,7 @@ import pytest
 
 import tfarm
 from tests import chain_elements
-from tests.fit.planted import elements_response, judged
+from tests.fit.planted import elements_response, judged, judged_pair
 from tests.shell import answer, run
 from tfarm.errors import ParameterError
 from tfarm.fit.answers import resonances
@@ -65,6 +65,11 @@ def test_of_a_product_only_the_product_is_known():
     assert "*" in words
     product = found.arm.link.youngs_modulus * found.arm.link.section.second_moment
     assert product == pytest.approx(LAB.link.youngs_modulus * LAB.link.section.second_moment, rel=1e-3)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_planted_pairs_are_told_apart(seed):
+    assert judged_pair(seed) == "right"
 
 
 def test_what_does_not_matter_is_bounded_on_one_side():

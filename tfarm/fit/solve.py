@@ -27,7 +27,9 @@ SEED = 852780
 MOST = 60  # evaluations from one start
 FIRM, FIRM_SUM = 1e-7, 1e-9  # of the coordinates, of the sum: a step that changes less ends a search
 OPEN = 1.0  # of ln p: a combination with a larger deviation (a factor of e) is not determined by the data
+WEAK = 0.1  # of ln p: what is known so badly is looked at again
 SAME = 0.1  # of a sum of squares: less is no difference to speak of
+EXCLUDED = 3.84  # of a sum of squares: a number that costs more is outside of its 95 % interval
 EDGE = 1e-9  # of a coordinate: a search begins so far inside its bounds
 RESCALED = 3  # times that a noise known up to a factor takes its factor from the residuals
 
@@ -76,16 +78,23 @@ def solved(problem: Problem) -> Solution:
 
 
 def _nearest(found: Solution) -> Solution:
-    """Of the points where what the data do not know is something else, the one nearest to the start."""
+    """Of the points where what the data do not know is something else, the one nearest to the start.
+
+    A valley may be open where the search began and closed where it ended, by what noise makes of an effect too small
+    to be measured (the rotary inertia of E I): then too, if the data do not exclude the open part.
+    """
     sizes, axes = principal_axes(found.jacobian)
-    open_axes = axes[sizes < 1.0 / OPEN]
-    if not open_axes.size:
-        return found
-    start = found.point - open_axes.T @ (open_axes @ found.point)
-    places = abs(open_axes).argmax(axis=1)
-    back = settled(found.problem, start, {int(n): float(start[n]) for n in places})
-    back = replace(back, jacobian=found.problem.jacobian(back.point), converged=found.converged)
-    return back if back.chi_squared < found.chi_squared + SAME else found
+    for limit, most in ((OPEN, SAME), (WEAK, EXCLUDED)):
+        some = axes[sizes < 1.0 / limit]
+        if not some.size:
+            continue
+        start = found.point - some.T @ (some @ found.point)
+        back = settled(found.problem, start, {int(n): float(start[n]) for n in abs(some).argmax(axis=1)})
+        back = replace(back, jacobian=found.problem.jacobian(back.point), converged=found.converged)
+        more = int((principal_axes(back.jacobian)[0] < 1.0 / OPEN).sum())
+        if back.chi_squared < found.chi_squared + most and more >= max(1, int((sizes < 1.0 / OPEN).sum())):
+            return back
+    return found
 
 
 def principal_axes(jacobian: Real) -> tuple[Real, Real]:

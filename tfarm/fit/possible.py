@@ -1,0 +1,115 @@
+"""The arms that the data leave possible: drawn about the best one, and what a loop is on each of them.
+
+Drawn from the normal distribution that the residuals have about their least sum, and kept where the true sum of squares
+agrees with it; along what the data do not determine, within a factor of e of the start, which is no knowledge of theirs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from tfarm.arm import Arm, HubFeedback
+from tfarm.errors import ConvergenceError
+from tfarm.loop.margins import margins
+from tfarm.loop.regions import region
+from tfarm.records import record
+from tfarm.response import transfer
+
+from .fit import Fit
+from .solve import OPEN, principal_axes
+
+Real = NDArray[np.float64]
+
+ARMS = 40
+SEED = 852780
+FARTHEST = 0.999  # of the draws of a normal distribution: one whose sum of squares is larger is none of them
+TRIES = 10  # times so many are drawn before it is given up
+EDGE = 1e-9  # of a coordinate: inside its bounds
+
+
+@dataclass(frozen=True)
+@record
+class Possible:
+    """`arms` that the data leave possible, the best one not among them, and the points (arms, numbers) they are at."""
+
+    fit: Fit
+    arms: tuple[Arm, ...]
+    points: Real
+
+
+def possible(fit: Fit, count: int = ARMS, seed: int = SEED) -> Possible:
+    """So many arms that explain the data as well as the best one does, but for what noise is worth.
+
+    Raises ConvergenceError where the sum of squares is so far from a parabola that draws of one are none of it.
+    """
+    found, rng = fit.solution, np.random.default_rng(seed)
+    sizes, axes = principal_axes(found.jacobian)
+    spread = np.minimum(1.0 / np.maximum(sizes, 1e-300), OPEN)
+    low, high = found.problem.bounds
+    most = found.chi_squared + float(chi2.ppf(FARTHEST, found.point.size)) + 2 * int((sizes < 1 / OPEN).sum())
+    kept: list[Real] = []
+    for _ in range(TRIES * count):
+        point = found.point + axes.T @ (spread * rng.standard_normal(spread.size))
+        point = np.clip(point, low + EDGE, high - EDGE)
+        residuals = found.problem.residuals(point)
+        if float(residuals @ residuals) <= most:
+            kept.append(point)
+        if len(kept) == count:
+            return Possible(fit, tuple(found.problem.arm(each) for each in kept), np.array(kept))
+    message = f"only {len(kept)} of {TRIES * count} arms drawn explain the data: their likelihood is far from normal"
+    raise ConvergenceError(message, kept, len(kept))
+
+
+@dataclass(frozen=True, kw_only=True)
+@record
+class LoopOnAll:
+    """A law on each possible arm: how many it holds, and the margins of those (stable arms,) in SI and degrees."""
+
+    law: HubFeedback
+    stable: int
+    of: int
+    gain_up: Real
+    phase: Real
+    delay: Real
+    disk: Real
+
+
+def loop_on_all(those: Possible, law: HubFeedback) -> LoopOnAll:
+    """The verdict on each arm, and its margins where it holds: None of an arm where a margin is not."""
+    found = [margins(arm, law) for arm in those.arms]
+    bands = [each.in_band for each in found if each.in_band is not None]
+
+    def column(name: str) -> Real:
+        return np.array([float(value) for each in bands if (value := getattr(each, name, None)) is not None])
+
+    ups = [each.windows["K2"].around for each in found if each.in_band is not None]
+    return LoopOnAll(
+        law=law,
+        stable=len(bands),
+        of=len(found),
+        gain_up=np.array([pair[1] for pair in ups if pair is not None]),
+        phase=column("phase"),
+        delay=column("delay"),
+        disk=column("disk"),
+    )
+
+
+def share_stable(those: Possible, K1: Real, K2: Real) -> Real:
+    """The share of the arms on which gains hold (len(K2), len(K1)), without a clock."""
+    return np.asarray(np.mean([region(arm, K1, K2).unstable == 0 for arm in those.arms], axis=0))
+
+
+def response_band(those: Possible, output: str, omega: Real) -> tuple[Real, Real, Real]:
+    """The lowest and highest magnitude of the possible arms, and the best one's, at frequencies [rad/s]."""
+    sizes = [abs(transfer(arm, output)(1j * omega)) for arm in those.arms]
+    return np.min(sizes, axis=0), np.max(sizes, axis=0), np.asarray(abs(transfer(those.fit.arm, output)(1j * omega)))
+
+
+def interval(values: Any) -> tuple[float, float] | None:
+    """Lowest and highest; None of nothing."""
+    return (float(np.min(values)), float(np.max(values))) if len(values) else None
