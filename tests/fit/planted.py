@@ -125,7 +125,7 @@ def judged(seed, *, profile=True):
 
 
 def planted_pair(rng):
-    """A very slender arm, of whose E and I, or (without a payload, over the hub's angle) E and density, one is known."""
+    """A very slender arm, of whose E and I, or (no payload, over the hub's angle) E and density, one is known."""
     arm = some_arm(rng)
     depth = arm.length / rng.uniform(300, 1000)
     section = tfarm.Section.general(area=depth * 5 * depth, second_moment=5 * depth**4 / 12, shear_factor=5 / 6)

@@ -1,7 +1,7 @@
 """The arms that the data leave possible: drawn about the best one, and what a loop is on each of them.
 
-Drawn from the normal distribution that the residuals have about their least sum, and kept where the true sum of squares
-agrees with it; along what the data do not determine, within a factor of e of the start, which is no knowledge of theirs.
+Drawn from the normal distribution that the residuals have about their least sum, kept where the true sum of squares
+agrees with it; along what the data do not determine, within a factor of e of the start: no knowledge of theirs.
 """
 
 from __future__ import annotations
