@@ -9,6 +9,7 @@ import pytest
 
 from tfarm.errors import ParameterError
 from tfarm.fit.reading import data_of, measured_of, read_measured
+from tfarm.fit.recording import read_recording
 
 HZ = np.array([1.0, 1.5, 2.25, 40.0])
 VALUES = np.array([1.0 + 2.0j, -0.25 - 0.5j, 3.0e-5 - 4.0e-5j, -2.0 + 0.0j])
@@ -171,3 +172,48 @@ def test_a_uff_file_without_its_package_or_without_a_response_is_one_line(tmp_pa
     monkeypatch.setitem(sys.modules, "pyuff", None)
     with pytest.raises(ParameterError, match=r"pip install 'tfarm\[uff\]', or export the response as CSV"):
         data_of(f"tip_acceleration/hub_angle={path}")
+
+
+ODD = (
+    "",
+    "nan",
+    "inf",
+    "1e400",
+    "-1",
+    "1_0",
+    "é",
+    '"',
+    "\0",
+    "1e-320",
+    "9" * 300,
+    "hz",
+    "#",
+    "[",
+    ";",
+    "\t",
+    "1;2",
+    "\u2028",
+)
+
+
+def test_whatever_is_in_a_file_it_is_read_or_refused_in_one_line(tmp_path):
+    """Cells, lines and bytes of a good file changed at random, 300 times: a record or a ParameterError, never more."""
+    rng, path, found = np.random.default_rng(6), tmp_path / "odd.csv", 0
+    said: list[str] = []
+    for _ in range(300):
+        lines = [line.split(",") for line in text(("hz", "re", "im", "coherence"), (HZ, *[HZ / 40] * 3)).splitlines()]
+        for _ in range(rng.integers(1, 3)):
+            row = lines[rng.integers(len(lines))]
+            row[rng.integers(len(row))] = ODD[rng.integers(len(ODD))]
+        content = bytearray("\n".join(map(",".join, lines)).encode())
+        if rng.random() < 0.2:
+            content[rng.integers(len(content))] = rng.integers(256)
+        path.write_bytes(bytes(content))
+        for read in (lambda: read_measured(path, *NAMES), lambda: read_recording(path)):
+            try:
+                read()
+                found += 1
+            except ParameterError as error:
+                said.append(str(error))
+    assert found > 10
+    assert not any("\n" in each for each in said)

@@ -26,6 +26,7 @@ def test_two_modes_and_an_offset_without_noise_come_back_to_rounding():
     assert found.natural_frequency == pytest.approx([41.0, 20.0], rel=1e-11)
     assert found.damping_ratio == pytest.approx([0.05, 0.02], rel=1e-9)
     assert found.amplitude == pytest.approx([1.0, 0.3], rel=1e-9)
+    assert found.notes == ()  # rounding has no colour
 
 
 def test_a_decay_is_found_in_part_of_a_record_and_far_oversampled():

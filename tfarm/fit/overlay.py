@@ -70,7 +70,7 @@ class Counterpart:
     @property
     def level(self) -> complex | None:
         """The measured residue over the exact one: 1 where gain and sign agree, whatever the damping."""
-        return None if self.measured is None else self.measured.residue / self.residue
+        return self.measured.residue / self.residue if self.measured is not None and self.residue else None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -142,7 +142,7 @@ def overlay(arm: Arm, measured: Measured) -> Overlay:
     own = own[own >= low / BEYOND]
     pairs, _ = paired(measured.omega[places], own, (low, high))
     if len(pairs) < max(places.size, int(((own >= low) & (own <= high)).sum())):
-        _check_unit(ratio, measured, noise)
+        check_unit(ratio, measured, noise)
     at = {j: int(places[i]) for i, j in pairs}
     shown = [j for j, w in enumerate(own) if j in at or low <= w <= high]
     poles = roots.resonances
@@ -174,8 +174,11 @@ def overlay(arm: Arm, measured: Measured) -> Overlay:
     )
 
 
-def _check_unit(ratio: Ratio, measured: Measured, noise: Noise) -> None:
-    """See `must_be_in_unit`; a hint, so where the poles so far up are not found it is left out."""
+def check_unit(ratio: Ratio, measured: Measured, noise: Noise) -> None:
+    """Raise ParameterError where the file's frequencies are in another unit than it says (see `must_be_in_unit`).
+
+    Where the arm's poles so far up are not found nothing is said.
+    """
     with suppress(ConvergenceError):
         poles = ratio.poles(BEYOND * TURN * float(measured.omega[-1])).values
         must_be_in_unit(measured, noise.sigma, poles)

@@ -27,18 +27,16 @@ def _known(value: Any) -> Any:
 
 def _of(row: Counterpart, what: str) -> Any:
     """A number of the resonance that was measured, if one was told."""
-    one = row.measured
-    if one is None:
+    one, level = row.measured, row.level
+    if one is None or (level is None and what in ("db", "deg")):
         return MISSING
-    level = row.level
-    assert level is not None  # there is one with the resonance
     return {
         "hz": abs(one.pole) / TURN,
         "std": one.std[1] / TURN,
         "zeta": one.damping_ratio,
         "zeta_std": one.std[0] / abs(one.pole),
         "db": 20 * math.log10(abs(level)) if level else MISSING,
-        "deg": math.degrees(np.angle(level)),
+        "deg": math.degrees(np.angle(level)) if level else MISSING,
     }[what]
 
 

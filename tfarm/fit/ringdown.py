@@ -37,6 +37,7 @@ THINNER = 4  # from one such mean to the next
 SPARE = 4  # further poles of the start, which take up drift and noise
 NOT_WHITE = 1e-3  # probability below which residuals are called correlated
 LEVEL = 0.95  # of the intervals
+ROUNDED = 1e-9  # of the signal and of w: what is less is rounding, of which nothing is said
 APART = 4.0  # standard deviations that the two halves of a record differ by before it is said
 TOLD = 8.0  # its amplitude's deviations that an oscillation has in a half of a record that tells of it: noise has 4
 LINEAR = 1  # the constant c, the last of the parameters
@@ -112,7 +113,7 @@ class Ring:
     @property
     def drifts(self) -> NDArray[np.bool_]:
         """Whether the two halves of the record differ in w (n,) by more than chance."""
-        return np.asarray(abs(self.early - self.late) > APART * self.halves_std)
+        return np.asarray(abs(self.early - self.late) > APART * self.halves_std + ROUNDED * self.frequency)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -155,7 +156,8 @@ def ring(
         raise ParameterError(key="--signal", value=name, remedy="does not move there", file=recording.source)
     x, J, e = _fitted(t - t[0], y, modes)
     order = np.argsort(-_energy(x, t[-1] - t[0]), kind="stable")
-    freedom, white = y.size - x.size, whiteness(e)
+    freedom = y.size - x.size
+    white = whiteness(e) if e @ e > y.size * (ROUNDED * abs(y).max()) ** 2 else 1.0
     all_covariance = _covariance(J, e, freedom, is_white=white >= NOT_WHITE)
     places = EACH * order
     early, late, std = _halves(t - t[0], y, x, order)
