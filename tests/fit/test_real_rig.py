@@ -13,6 +13,7 @@ import pytest
 import tfarm
 from tests.shell import answer, run
 from tfarm.fit.recording import read_recording
+from tfarm.fit.ringing import mode_of
 
 DATA = Path(__file__).parent.parent / "data" / "quanser-2dsfl"
 RUNS = ("ring-20deg.csv", "ring-neg-10deg.csv")
@@ -41,6 +42,9 @@ def test_the_inner_stage_rings_between_1_79_and_1_86_hz(name, capsys):
     assert mode["frequency_low_hz"] < mode["frequency_hz"] < mode["frequency_high_hz"]
     assert 0.003 < mode["damping_ratio"] < 0.04
     assert found["residuals_white"] is False
+    option = mode_of(f"1={mode['mode_option']}")
+    assert option.frequency == pytest.approx(2 * math.pi * mode["frequency_hz"], rel=1e-6)
+    assert option.ratio_deviation == pytest.approx(mode["damping_ratio_std"], rel=1e-2)
     record = read_recording(DATA / name)
     late = record.times >= 2
     hub, tip = (record.signals[each][late] for each in ("hub_angle", "tip_angle_against_hub"))

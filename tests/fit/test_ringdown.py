@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.fit.decays import model, whiteness
 from tfarm.fit.recording import Recording
-from tfarm.fit.ringdown import model, ring, whiteness
+from tfarm.fit.ringdown import ring
 
 T = 0.01
 t = T * np.arange(150)

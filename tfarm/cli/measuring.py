@@ -103,5 +103,7 @@ def _rung(answer: dict[str, Any]) -> None:
     span = f"{answer['from_s']:g} to {answer['to_s']:g} s, {answer['samples']} samples"
     print(f"{answer['signal']} from {span}; residual {answer['residual_rms']:.4g} rms")
     print(f"from and to: the interval that holds the true value in {100 * answer['level']:.0f} of 100 such records")
+    for mode in answer["modes"]:
+        print(f"for tfarm fit: --mode N={mode['mode_option']}, where it is the arm's flexible mode N")
     for note in answer["notes"]:
         print(f"note: {note}")

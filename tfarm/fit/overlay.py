@@ -144,11 +144,7 @@ def overlay(arm: Arm, measured: Measured) -> Overlay:
     if len(pairs) < max(places.size, int(((own >= low) & (own <= high)).sum())):
         check_unit(ratio, measured, noise)
     at = {j: int(places[i]) for i, j in pairs}
-    shown = [j for j, w in enumerate(own) if j in at or low <= w <= high]
-    poles = roots.resonances
-    by_size = {j: complex(poles[np.argmin(abs(abs(poles) - own[j]))]) for j in shown}
-    table = _modes(ratio, max((abs(pole) for pole in by_size.values()), default=0.0))
-    others = np.r_[roots.poles, roots.zeros, 0.0]
+    shown = [(w, at.get(j)) for j, w in enumerate(own) if j in at or low <= w <= high]
     grid = refined_grid((low, high), np.r_[roots.poles, roots.zeros]) if low < high else measured.omega
     omega = np.asarray(grid, dtype=float)
     return Overlay(
@@ -160,18 +156,30 @@ def overlay(arm: Arm, measured: Measured) -> Overlay:
         exact=np.asarray(ratio(1j * measured.omega)),
         omega=omega,
         curve=np.asarray(ratio(1j * omega)),
-        beside=tuple(
+        beside=_counterparts(ratio, roots, measured, noise, shown),
+        unmatched=np.delete(measured.omega[places], [i for i, _ in pairs]),
+    )
+
+
+def _counterparts(
+    ratio: Ratio, roots: RatioRoots, measured: Measured, noise: Noise, shown: list[tuple[float, int | None]]
+) -> tuple[Counterpart, ...]:
+    """A row a pole: of each |s| [rad/s] that is shown, with the place of its measured peak, if it has one."""
+    table = _modes(ratio, max((w for w, _ in shown), default=0.0))
+    others, upper = np.r_[roots.poles, roots.zeros, 0.0], roots.resonances
+    found = []
+    for w, place in shown:
+        pole = complex(upper[np.argmin(abs(abs(upper) - w))])
+        found.append(
             Counterpart(
                 pole=pole,
                 residue=ratio.residue(pole, others),
                 mode=_mode(table, pole),
-                peak=float(measured.omega[at[j]]) if j in at else None,
-                measured=resonance_at(measured, noise.sigma, at[j]) if j in at else None,
+                peak=None if place is None else float(measured.omega[place]),
+                measured=None if place is None else resonance_at(measured, noise.sigma, place),
             )
-            for j, pole in by_size.items()
-        ),
-        unmatched=np.delete(measured.omega[places], [i for i, _ in pairs]),
-    )
+        )
+    return tuple(found)
 
 
 def check_unit(ratio: Ratio, measured: Measured, noise: Noise) -> None:

@@ -68,6 +68,7 @@ RINGS = (
     Column("damping_ratio_high", "to", of=lambda one: _reaches(one)[3], digits=singly(general, 4)),
     Column("damping_ratio_std", on=(JSON,)),
     Column("amplitude", "amplitude at the start", digits=singly(general, 4), on=ANSWER),
+    Column("mode_option", of=lambda one: list(map(_as_option, *_parts(one))), on=(JSON,)),
     Column("frequency_first_half_hz", of=lambda one: _told(one, one.early), on=(JSON,)),
     Column("frequency_second_half_hz", of=lambda one: _told(one, one.late), on=(JSON,)),
 )
@@ -78,6 +79,16 @@ def _reaches(one: Ring) -> tuple[Any, ...]:
     f, df = one.frequency / HERTZ, one.reach * one.frequency_std / HERTZ
     z, dz = one.damping_ratio, one.reach * one.damping_ratio_std
     return f - df, f + df, z - dz, z + dz
+
+
+def _parts(one: Ring) -> tuple[Any, ...]:
+    return one.frequency / HERTZ, one.frequency_std / HERTZ, one.damping_ratio, one.damping_ratio_std
+
+
+def _as_option(hz: float, deviation: float, ratio: float, spread: float) -> str:
+    """What `tfarm fit --mode N=` takes of it, with standard deviations; without a ratio that is not positive."""
+    damping = f",{ratio:.6g}~{spread:.3g}" if 0 < ratio < 1 and spread > 0 else ""
+    return f"{hz:.8g}hz~{deviation:.3g}{damping}"
 
 
 def _told(one: Ring, w: Any) -> list[Any]:

@@ -14,7 +14,6 @@ and the answer says so: intervals of a wrong model are too narrow by any formula
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -25,23 +24,18 @@ from numpy.typing import NDArray
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 
+from .decays import EACH, LINEAR, covariance, energy, later, least_squares, model, start_of, whiteness
 from .recording import Recording
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 MOST_MODES = 20
-MOST_ROWS = 160  # of the Hankel matrix of the start; slower oscillations are looked for in means of so many samples
-FASTEST = 3.0  # the logarithm by which a pole of the start may grow during the record
-THINNER = 4  # from one such mean to the next
-SPARE = 4  # further poles of the start, which take up drift and noise
 NOT_WHITE = 1e-3  # probability below which residuals are called correlated
 LEVEL = 0.95  # of the intervals
 ROUNDED = 1e-9  # of the signal and of w: what is less is rounding, of which nothing is said
 APART = 4.0  # standard deviations that the two halves of a record differ by before it is said
 TOLD = 8.0  # its amplitude's deviations that an oscillation has in a half of a record that tells of it: noise has 4
-LINEAR = 1  # the constant c, the last of the parameters
-EACH = 4  # parameters of a mode: sigma, w, a, b
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,25 +134,12 @@ def ring(
     Raises ParameterError for a signal or times that are not there and for too few samples, ConvergenceError where so
     many oscillations are not found.
     """
-    y, t = recording.signal(name, "--signal"), recording.times
-    low, high = t[0] if start is None else start, t[-1] if stop is None else stop
-    half = recording.period / 2
-    kept = (t >= low - half * 1e-6) & (t <= high + half * 1e-6)
-    if not 1 <= modes <= MOST_MODES:
-        raise ParameterError(key="--modes", value=modes, remedy=f"a whole number from 1 to {MOST_MODES}")
-    least = 4 * (EACH * modes + LINEAR)
-    if kept.sum() < least:
-        span = f"the record goes from {t[0]:g} to {t[-1]:g} s"
-        remedy = f"{kept.sum()} samples from {low:g} to {high:g} s; {modes} modes take {least} ({span})"
-        raise ParameterError(key="--from", value=float(low), remedy=remedy, file=recording.source)
-    y, t = y[kept], t[kept]
-    if np.ptp(y) == 0:
-        raise ParameterError(key="--signal", value=name, remedy="does not move there", file=recording.source)
+    t, y = _part(recording, name, start, stop, modes)
     x, J, e = _fitted(t - t[0], y, modes)
-    order = np.argsort(-_energy(x, t[-1] - t[0]), kind="stable")
+    order = np.argsort(-energy(x, t[-1] - t[0]), kind="stable")
     freedom = y.size - x.size
     white = whiteness(e) if e @ e > y.size * (ROUNDED * abs(y).max()) ** 2 else 1.0
-    all_covariance = _covariance(J, e, freedom, is_white=white >= NOT_WHITE)
+    spread = covariance(J, e, freedom, is_white=white >= NOT_WHITE)
     places = EACH * order
     early, late, std = _halves(t - t[0], y, x, order)
     return Ring(
@@ -170,7 +151,7 @@ def ring(
         samples=y.size,
         poles=-x[places] + 1j * x[places + 1],
         amplitude=np.hypot(x[places + 2], x[places + 3]),
-        covariance=np.array([all_covariance[p : p + 2, p : p + 2] for p in places]),
+        covariance=np.array([spread[p : p + 2, p : p + 2] for p in places]),
         freedom=freedom,
         residual=float(np.sqrt(e @ e / freedom)),
         white=white,
@@ -180,136 +161,32 @@ def ring(
     )
 
 
+def _part(recording: Recording, name: str, start: float | None, stop: float | None, modes: int) -> tuple[Real, Real]:
+    """Times and samples between two times, refused where they are too few for so many modes."""
+    y, t = recording.signal(name, "--signal"), recording.times
+    low, high = t[0] if start is None else start, t[-1] if stop is None else stop
+    half = recording.period / 2
+    kept = (t >= low - half * 1e-6) & (t <= high + half * 1e-6)
+    if not 1 <= modes <= MOST_MODES:
+        raise ParameterError(key="--modes", value=modes, remedy=f"a whole number from 1 to {MOST_MODES}")
+    least = 4 * (EACH * modes + LINEAR)
+    if kept.sum() < least:
+        span = f"the record goes from {t[0]:g} to {t[-1]:g} s"
+        remedy = f"{kept.sum()} samples from {low:g} to {high:g} s; {modes} modes take {least} ({span})"
+        raise ParameterError(key="--from", value=float(low), remedy=remedy, file=recording.source)
+    if np.ptp(y[kept]) == 0:
+        raise ParameterError(key="--signal", value=name, remedy="does not move there", file=recording.source)
+    return t[kept], y[kept]
+
+
 def _fitted(t: Real, y: Real, modes: int) -> tuple[Real, Real, Real]:
     """The parameters, their Jacobian (samples, parameters) and the residuals, from a start of our own."""
-    x = _least_squares(t, y, start_of(t, y, modes))
+    x = least_squares(t, y, start_of(t, y, modes))
     if x is None:
         word = "oscillation" if modes == 1 else f"{modes} oscillations"
         raise ConvergenceError(f"no {word} found in the decay: choose other times, or fewer modes", None, None)
     values, J = model(x, t)
     return x, J, y - values
-
-
-def _least_squares(t: Real, y: Real, start: Real | None) -> Real | None:
-    from scipy.optimize import least_squares
-
-    if start is None:
-        return None
-
-    def residuals(x: Real) -> Real:
-        return np.asarray(model(x, t)[0] - y)
-
-    def slopes(x: Real) -> Real:
-        return model(x, t)[1]
-
-    found = least_squares(residuals, start, jac=slopes, method="lm", x_scale="jac", xtol=1e-12)
-    w, sigma = found.x[1:-LINEAR:EACH], found.x[:-LINEAR:EACH]
-    period = t[1] - t[0]
-    inside = (w > 0) & (w < np.pi / period) & (abs(sigma) < 2 / period)
-    return found.x if found.success and inside.all() else None
-
-
-def model(x: Real, t: Real) -> tuple[Real, Real]:
-    """The formula at times t (n,), and its derivatives by (sigma, w, a, b) of each mode and c: (n, 4 modes + 1)."""
-    values, J = np.full(t.size, x[-1]), np.empty((t.size, x.size))
-    J[:, -1] = 1.0
-    for at in range(0, x.size - LINEAR, EACH):
-        sigma, w, a, b = x[at : at + EACH]
-        decay = np.exp(np.clip(-sigma * t, -700, 700))
-        C, S = decay * np.cos(w * t), decay * np.sin(w * t)
-        part = a * C + b * S
-        values += part
-        J[:, at : at + EACH] = np.c_[-t * part, t * (b * C - a * S), C, S]
-    return values, J
-
-
-def start_of(t: Real, y: Real, modes: int) -> Real | None:
-    """Parameters to start from: of ESPRIT's poles at several rates of sampling those that leave least, one by one.
-
-    None if there are not so many poles that turn half a turn in the record, and neither die in a sample nor explode.
-    """
-    period, duration, thin, found = t[1] - t[0], t[-1] - t[0], 1, []
-    while thin == 1 or t.size // thin >= MOST_ROWS:
-        means = (y - y.mean())[: t.size // thin * thin].reshape(-1, thin).mean(axis=1)
-        found.append(_poles(means, 2 * modes + SPARE) / (thin * period))
-        thin *= THINNER
-    s = np.concatenate(found)
-    s = s[(s.imag > math.pi / duration) & (s.real * period > -1) & (s.real * duration < FASTEST)]
-    chosen, x = s[:0], None
-    for _ in range(modes):
-        tried = [_linear(np.r_[chosen, each], t, y) for each in s if each not in chosen]
-        if not tried:
-            return None
-        _, x = min(tried, key=lambda pair: pair[0])
-        chosen = -x[:-LINEAR:EACH] + 1j * x[1:-LINEAR:EACH]
-    return x
-
-
-def _linear(s: Complex, t: Real, y: Real) -> tuple[float, Real]:
-    """What those with these poles leave of y, squared, and their parameters: the linear ones by least squares."""
-    x = np.zeros(EACH * s.size + LINEAR)
-    x[:-LINEAR:EACH], x[1:-LINEAR:EACH] = -s.real, s.imag
-    linear = np.r_[[EACH * m + k for m in range(s.size) for k in (2, 3)], x.size - 1]
-    basis = model(x, t)[1][:, linear]
-    x[linear], *_ = np.linalg.lstsq(basis, y, rcond=None)
-    return float(((basis @ x[linear] - y) ** 2).sum()), x
-
-
-def _poles(y: Real, count: int) -> Complex:
-    """ln of the eigenvalues by which the signal subspace of so many dimensions moves in one sample."""
-    rows = min(y.size // 2, MOST_ROWS)
-    hankel = np.lib.stride_tricks.sliding_window_view(y, rows)
-    _, V = np.linalg.eigh(hankel.T @ hankel)
-    V = V[:, -min(count, rows - 1) :]
-    turn, *_ = np.linalg.lstsq(V[:-1], V[1:], rcond=None)
-    z = np.linalg.eigvals(turn)
-    return np.asarray(np.log(z[z != 0]))
-
-
-def _energy(x: Real, duration: float) -> Real:
-    """Of each mode: amplitude squared times the integral of exp(-2 sigma t)."""
-    sigma, a, b = (x[place:-LINEAR:EACH] for place in (0, 2, 3))
-    decay = np.where(abs(sigma) * duration < 1e-9, 1e-9 / duration, sigma)
-    return np.asarray((a**2 + b**2) * -np.expm1(np.clip(-2 * decay * duration, -700, 700)) / (2 * decay))
-
-
-def _covariance(J: Real, e: Real, freedom: int, *, is_white: bool) -> Real:
-    """Of the parameters (parameters, parameters); the columns of J are scaled for the inverse's sake."""
-    scale = np.sqrt((J**2).sum(axis=0))
-    scaled = J / scale
-    bread = np.linalg.pinv(scaled.T @ scaled)
-    meat = scaled.T @ scaled * (e @ e) / freedom if is_white else _meat(scaled, e) * e.size / freedom
-    return np.asarray(bread @ meat @ bread / np.outer(scale, scale))
-
-
-def _meat(J: Real, e: Real) -> Real:
-    """J' R J with the residuals' autocovariances r_k, tapered (1 - k/M) up to thrice where they first cross zero."""
-    r = _autocovariance(e)
-    below = np.flatnonzero(r <= 0)
-    lags = min(e.size // 4, 3 * int(below[0] if below.size else e.size) + 1)
-    found = J.T @ J * r[0]
-    for k in range(1, lags):
-        across = J[k:].T @ J[:-k] * r[k] * (1 - k / lags)
-        found += across + across.T
-    return np.asarray(found)
-
-
-def whiteness(e: Real) -> float:
-    """The probability of autocorrelations as large as these in white noise (Ljung and Box 1978), of the first lags."""
-    from scipy.special import chdtrc
-
-    r, n = _autocovariance(e), e.size
-    if r[0] == 0:
-        return 1.0
-    lags = np.arange(1, min(20, n // 5) + 1)
-    Q = n * (n + 2) * ((r[lags] / r[0]) ** 2 / (n - lags)).sum()
-    return float(chdtrc(lags.size, Q))
-
-
-def _autocovariance(e: Real) -> Real:
-    size = 2 ** math.ceil(math.log2(2 * e.size))
-    power = abs(np.fft.rfft(e, size)) ** 2
-    return np.asarray(np.fft.irfft(power, size)[: e.size] / e.size)
 
 
 def _halves(t: Real, y: Real, x: Real, order: NDArray[np.intp]) -> tuple[Real, Real, Real]:
@@ -320,26 +197,16 @@ def _halves(t: Real, y: Real, x: Real, order: NDArray[np.intp]) -> tuple[Real, R
     middle = t.size // 2
     pairs = []
     for part in (slice(None, middle), slice(middle, None)):
-        shifted = _later(x, t[part][0])
-        found = _least_squares(t[part] - t[part][0], y[part], shifted) if y[part].size > 2 * x.size else None
+        shifted = later(x, t[part][0])
+        found = least_squares(t[part] - t[part][0], y[part], shifted) if y[part].size > 2 * x.size else None
         if found is None:
             pairs.append((x[1:-LINEAR:EACH], np.full(order.size, np.inf)))
             continue
         values, J = model(found, t[part] - t[part][0])
         e = y[part] - values
-        C = _covariance(J, e, e.size - x.size, is_white=whiteness(e) >= NOT_WHITE)
+        C = covariance(J, e, e.size - x.size, is_white=whiteness(e) >= NOT_WHITE)
         w, variance = found[1:-LINEAR:EACH], np.diag(C)[1:-LINEAR:EACH]
         a, b, of_a, of_b = (x[k:-LINEAR:EACH] for x in (found, np.diag(C)) for k in (2, 3))
         pairs.append((w, np.where(a**2 + b**2 > TOLD**2 * (of_a + of_b) / 2, variance, np.inf)))
     (early, one), (late, other) = pairs
     return early[order], late[order], np.sqrt(one + other)[order]
-
-
-def _later(x: Real, by: float) -> Real:
-    """The parameters of the same decay with t counted from `by` [s] on."""
-    found = x.copy()
-    for at in range(0, x.size - LINEAR, EACH):
-        sigma, w, a, b = x[at : at + EACH]
-        turned = (a - 1j * b) * np.exp((-sigma + 1j * w) * by)
-        found[at + 2], found[at + 3] = turned.real, -turned.imag
-    return found

@@ -89,26 +89,21 @@ def frequency_response(
     kind, taper = _one_of("--estimator", estimator, Estimator), _one_of("--window", window, Window)
     size, step = _cut(recording, segment, (0.5 if taper == "hann" else 0.0) if overlap is None else overlap)
     w = np.hanning(size + 1)[:-1] if taper == "hann" else np.ones(size)
-    Sxx, Sxy, Syy = cross_spectra(x, y, w, step)
-    lines = np.arange(1, (size + 1) // 2)  # without 0 and the last one, which are real
-    kept = lines[Sxx[lines] > LEAST_POWER * Sxx.max()]
-    if not kept.size or not Syy.any():
-        still = names[1] if not kept.size else names[0]
-        raise ParameterError(key="record", value=still, remedy="does not move", file=recording.source)
-    Sxx, Sxy, Syy = Sxx[kept], Sxy[kept], Syy[kept]
+    kept, spectra = _moving(cross_spectra(x, y, w, step), names, recording)
     count = 1 + (recording.count - size) // step
     averages = independent_averages(w, step, count)
+    measured = Measured(
+        output=output,
+        input=input,
+        omega=np.asarray(2 * np.pi * kept / (size * recording.period), dtype=float),
+        values=_response(kind, *spectra),
+        coherence=_coherence(*spectra),
+        averages=max(1, math.floor(averages)),
+        source=recording.source,
+        digest=recording.digest,
+    )
     return Estimate(
-        measured=Measured(
-            output=output,
-            input=input,
-            omega=2 * np.pi * kept / (size * recording.period),
-            values=_response(kind, Sxx, Sxy, Syy),
-            coherence=_coherence(Sxx, Sxy, Syy),
-            averages=max(1, math.floor(averages)),
-            source=recording.source,
-            digest=recording.digest,
-        ),
+        measured=measured,
         estimator=kind,
         window=taper,
         segment=size * recording.period,
@@ -117,6 +112,22 @@ def frequency_response(
         independent=averages,
         clock=recording.said,
     )
+
+
+def _moving(
+    spectra: tuple[Real, Complex, Real], names: tuple[str, str], recording: Recording
+) -> tuple[NDArray[np.intp], tuple[Real, Complex, Real]]:
+    """The lines that the input has power in, and their spectra; refused where a signal has none at all.
+
+    Without the line at 0 and the last one, at half the rate of sampling, which are real.
+    """
+    Sxx, Sxy, Syy = spectra
+    lines = np.arange(1, Sxx.size - 1)
+    kept = lines[Sxx[lines] > LEAST_POWER * Sxx.max()]
+    if not kept.size or not Syy.any():
+        still = names[1] if not kept.size else names[0]
+        raise ParameterError(key="record", value=still, remedy="does not move", file=recording.source)
+    return kept, (Sxx[kept], Sxy[kept], Syy[kept])
 
 
 def cross_spectra(x: Real, y: Real, w: Real, step: int) -> tuple[Real, Complex, Real]:
