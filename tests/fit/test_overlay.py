@@ -10,6 +10,7 @@ import tfarm
 from tests.shell import answer, run
 from tfarm.errors import ParameterError
 from tfarm.fit.data import Measured
+from tfarm.fit.noise import noise_of
 from tfarm.fit.overlay import overlay
 from tfarm.fit.ratio import Ratio
 from tfarm.fit.resonances import must_be_in_unit, paired
@@ -110,6 +111,15 @@ def test_pairs_are_in_order_and_of_least_cost():
     pairs, cost = paired(np.array([1.3, 5.0, 40.0]), np.array([1.0, 4.0, 6.0]), (0.5, 100.0))
     assert pairs == [(0, 0), (1, 2)]
     assert cost == pytest.approx(np.log(1.3) + np.log(6 / 5) + 0.3 + 0.3)
+
+
+def test_values_of_zero_leave_every_other_value_its_noise():
+    """A line at which nothing came through is no number to divide by, and no certainty either."""
+    data = measured("root_moment", "hub_torque")
+    noise = [noise_of(replace(data, sigma=None, values=np.where(w > OMEGA, 0.0, data.values))) for w in (0, 8, 690)]
+    assert all((one.sigma > 0).all() and np.isfinite(one.sigma).all() for one in noise)
+    assert noise[1].sigma[200:] == pytest.approx(noise[0].sigma[200:], rel=0.2)
+    assert np.median(noise[0].sigma / (NOISE * abs(data.values))) == pytest.approx(1.0, abs=0.15)
 
 
 @pytest.fixture(scope="module")

@@ -82,6 +82,7 @@ BAD = {
     "hz,re,im\n1,2": "line 2 = '1,2': 2 columns where the header names 3",
     "hz,abs,deg\n1,-20,3": "line 2, abs = -20.0: a magnitude is not negative; is it db?",
     "hz,re,im,coherence\n1,2,3,0\n2,2,3,0": "coherence = 0.0: 0 everywhere",
+    "hz,re,im\n1,0,0\n2,0,0": "values = 0.0: 0 everywhere: nothing was measured",
     "hz,re,im,coherence\n1,2,3,1.2": "coherence = 1.2: between 0 and 1",
     "hz,re,im,sigma\n1,2,3,0": "sigma = 0.0: a standard deviation is positive",
     "hz,re,im,averages\n1,2,3,2\n2,2,3,4": "line 3, averages = 4.0",

@@ -26,7 +26,8 @@ class Measured:
     `digest` is the SHA-256 of the file.
 
     Raises ParameterError for what no measurement can be: shapes that differ, frequencies that are not positive or do
-    not ascend, values that are no numbers, a coherence out of [0, 1] or 0 everywhere, a sigma that is not positive.
+    not ascend, values that are no numbers or 0 everywhere, a coherence out of [0, 1] or 0 everywhere, a sigma that is
+    not positive.
     """
 
     output: str
@@ -71,6 +72,8 @@ def _check(one: Measured) -> None:
     if not np.isfinite(one.values).all():
         at = float(one.omega[~np.isfinite(one.values)][0])
         raise ParameterError(key=f"value at {at:g} rad/s", value="no number", remedy="leave the row out")
+    if not one.values.any():
+        raise ParameterError(key=f"{one.name} values", value=0.0, remedy="0 everywhere: nothing was measured")
     if one.sigma is not None and not ((one.sigma > 0) & np.isfinite(one.sigma)).all():
         raise ParameterError(key="sigma", value=float(one.sigma.min()), remedy="a standard deviation is positive")
     if one.coherence is not None:

@@ -63,6 +63,8 @@ def _scatter(values: NDArray[Any]) -> Real:
     # x_k less the parabola through x_(k-2), x_(k-1), x_(k+1), x_(k+2): weights -1/6, 2/3, 2/3, -1/6 of these
     weights = np.array([1 / 6, -2 / 3, 1.0, -2 / 3, 1 / 6])
     away = np.convolve(values, weights, mode="valid") / np.sqrt((weights**2).sum())
-    relative = abs(away) / abs(values[AROUND:-AROUND])
-    typical = float(np.median(relative)) / TYPICAL
-    return np.maximum(abs(values), np.median(abs(values)) * 1e-3) * max(typical, LEAST)
+    size, inside = abs(values), abs(values[AROUND:-AROUND])
+    relative = abs(away[inside > 0]) / inside[inside > 0]
+    typical = float(np.median(relative)) / TYPICAL if relative.size else 1.0
+    least = max(1e-3 * float(np.median(size)), 1e-6 * float(size.max()))  # which a value of 0 is taken for
+    return np.maximum(size, least) * max(typical, LEAST)

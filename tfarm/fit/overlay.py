@@ -69,7 +69,7 @@ class Counterpart:
 
     @property
     def level(self) -> complex | None:
-        """The measured residue over the exact one: 1 where gain and sign agree, whatever the damping."""
+        """The measured residue over the exact one: the sensor's gain and sign, and what shifts the mode besides."""
         return self.measured.residue / self.residue if self.measured is not None and self.residue else None
 
 
@@ -142,7 +142,7 @@ def overlay(arm: Arm, measured: Measured) -> Overlay:
     own = own[own >= low / BEYOND]
     pairs, _ = paired(measured.omega[places], own, (low, high))
     if len(pairs) < max(places.size, int(((own >= low) & (own <= high)).sum())):
-        check_unit(ratio, measured, noise)
+        check_unit(arm, measured)
     at = {j: int(places[i]) for i, j in pairs}
     shown = [(w, at.get(j)) for j, w in enumerate(own) if j in at or low <= w <= high]
     grid = refined_grid((low, high), np.r_[roots.poles, roots.zeros]) if low < high else measured.omega
@@ -182,14 +182,15 @@ def _counterparts(
     return tuple(found)
 
 
-def check_unit(ratio: Ratio, measured: Measured, noise: Noise) -> None:
+def check_unit(arm: Arm, measured: Measured) -> None:
     """Raise ParameterError where the file's frequencies are in another unit than it says (see `must_be_in_unit`).
 
     Where the arm's poles so far up are not found nothing is said.
     """
+    ratio = _ratio(arm, measured)
     with suppress(ConvergenceError):
         poles = ratio.poles(BEYOND * TURN * float(measured.omega[-1])).values
-        must_be_in_unit(measured, noise.sigma, poles)
+        must_be_in_unit(measured, noise_of(measured).sigma, poles)
 
 
 def _ratio(arm: Arm, measured: Measured) -> Ratio:
