@@ -18,6 +18,7 @@ MOST_ROWS = 160  # of the Hankel matrix of the start; slower oscillations are lo
 FASTEST = 3.0  # the logarithm by which a pole of the start may grow during the record
 THINNER = 4  # from one such mean to the next
 SPARE = 4  # further poles of the start, which take up drift and noise
+CLEAR = 2.5  # deviations of an autocorrelation of white noise, 1/sqrt(n), above which one stands out
 LINEAR = 1  # the constant c, the last of the parameters
 EACH = 4  # parameters of a mode: sigma, w, a, b
 
@@ -116,10 +117,10 @@ def covariance(J: Real, e: Real, freedom: int, *, is_white: bool) -> Real:
 
 
 def _meat(J: Real, e: Real) -> Real:
-    """J' R J with the residuals' autocovariances r_k, tapered (1 - k/M) up to thrice where they first cross zero."""
-    r = _autocovariance(e)
-    below = np.flatnonzero(r <= 0)
-    lags = min(e.size // 4, 3 * int(below[0] if below.size else e.size) + 1)
+    """J' R J with the residuals' autocovariances r_k, tapered (1 - k/M), M twice the last lag that stands out."""
+    r, most = _autocovariance(e), max(2, e.size // 3)
+    (clear,) = np.nonzero(abs(r[:most]) > CLEAR * r[0] / math.sqrt(e.size))
+    lags = min(most, 2 * int(clear.max(initial=0)) + 1)
     found = J.T @ J * r[0]
     for k in range(1, lags):
         across = J[k:].T @ J[:-k] * r[k] * (1 - k / lags)

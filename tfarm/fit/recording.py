@@ -140,7 +140,7 @@ def _clock(times: Real) -> tuple[float, float, float]:
     usual = float(np.median(steps))
     gap = int(np.argmax(abs(steps - usual)))
     jitter = float(abs(times - times[0] - period * np.arange(times.size)).max() / period)
-    if abs(steps[gap] - usual) > JITTER * usual or jitter > JITTER:
+    if jitter > JITTER:
         remedy = f"{steps[gap]:.6g} s after the one before, where {usual:.6g} s is usual: samples have to be even"
         raise ParameterError(key=f"t of sample {gap + 2}", value=float(times[gap + 1]), remedy=remedy)
     return float(times[0]), period, jitter

@@ -9,7 +9,8 @@ what is left is noise with a spectrum or something that the model lacks; the cov
 
     (J' J)^-1 J' R J (J' J)^-1,   R the residuals' autocovariance, tapered (Newey and West 1987),
 
-and the answer says so: intervals of a wrong model are too narrow by any formula.
+and the answer says so: of noise that rings with the decay the fit has taken part away, so that nominal 95 % hold some
+85, and intervals of a wrong model are too narrow by any formula.
 """
 
 from __future__ import annotations
@@ -116,7 +117,7 @@ class Ring:
         if not self.is_white:
             found.append(
                 f"the residuals are correlated (probability {self.white:.1g} if they were white noise): intervals are "
-                "by their autocovariance, and too narrow if what is left is another mode or no linear decay"
+                "by their autocovariance, and may be too narrow, above all if what is left is no noise"
             )
         for mode in np.flatnonzero(self.drifts):
             pair = f"{self.early[mode] / (2 * np.pi):.4g} Hz in its first half, {self.late[mode] / (2 * np.pi):.4g} Hz"
