@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tfarm.cli.app import ArmName, Json, app, give, load_arm
+from tfarm.cli.app import ArmName, Json, app, give, load_arm, tell
 from tfarm.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -38,6 +38,10 @@ def fit(
     ] = False,
     save: Annotated[Path | None, typer.Option("--save", help="write the fitted arm to this TOML file")] = None,
     png: Annotated[Path | None, typer.Option("--png", help="draw measured over fitted curves into this file")] = None,
+    report: Annotated[
+        bool, typer.Option("--report", help="write the fitted arm's pages, with what the data leave open")
+    ] = False,
+    out: Annotated[Path, typer.Option("--out", help="the folder of the pages")] = Path("reports"),
     json: Json = False,
 ) -> None:
     """The numbers of an arm that explain what was measured of it, with intervals, and what is left open."""
@@ -58,7 +62,8 @@ def fit(
         save_fit(found, save)
     if png is not None:
         _draw(found, png)
-    if json or say_written(*(path for path in (save, png) if path is not None)):
+    page = _report(found, out) if report else None
+    if json or say_written(*(path for path in (save, png, page) if path is not None)):
         give(fit_answer(found), json, lambda answer: _print(found, answer))
     if not found.converged:
         raise typer.Exit(3)
@@ -83,6 +88,14 @@ def _draw(found: Fit, png: Path) -> None:
     from tfarm.plots.fitted import draw_fit
 
     save_png(draw_fit(found), png)
+
+
+def _report(found: Fit, out: Path) -> Path:
+    from tfarm.cli.tables import progress
+    from tfarm.report import write
+
+    with progress() as advance:
+        return write([found.arm], out, fits=[found], progress=advance, notice=tell)
 
 
 def _print(found: Fit, answer: dict[str, Any]) -> None:

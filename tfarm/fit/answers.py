@@ -30,20 +30,22 @@ UNITS = {  # of a number by the last word of its key, in SI
     "stiffness": "N m/rad", "resistance": "ohm", "inductance": "H", "torque_constant": "N m/A",
     "back_emf_constant": "V s/rad", "delay": "s",
 }  # fmt: skip
+
+
+def known(value: float | None, digits: int) -> str:
+    """A number's digits, or a dash where there is none."""
+    return "-" if value is None else general(value, digits)
+
+
 PARAMETERS = (
     Column("key", "number", of="key"),
     Column("unit", "unit", of=lambda one: unit_of(one.key)),
     Column("value", "value", of="value", digits=singly(general, 6)),
-    Column("low", "from", of=lambda one: none(one.low), digits=singly(general, 6)),
-    Column("high", "to", of=lambda one: none(one.high), digits=singly(general, 6)),
-    Column("std", "deviation", of=lambda one: none(one.deviation), digits=singly(general, 3)),
+    Column("low", "from", of="low", digits=singly(known, 6)),
+    Column("high", "to", of=lambda one: None if one.high == math.inf else one.high, digits=singly(known, 6)),
+    Column("std", "deviation", of="deviation", digits=singly(known, 3)),
     Column("identified", "known from these data", of=lambda one: "yes" if one.identified else "no"),
 )
-
-
-def none(value: float | None) -> float:
-    """A number that is not known, for a table."""
-    return float("nan") if value is None else value
 
 
 def unit_of(key: str) -> str:

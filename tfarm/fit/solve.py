@@ -29,7 +29,7 @@ FIRM, FIRM_SUM = 1e-7, 1e-9  # of the coordinates, of the sum: a step that chang
 OPEN = 1.0  # of ln p: a combination with a larger deviation (a factor of e) is not determined by the data
 WEAK = 0.1  # of ln p: what is known so badly is looked at again
 SAME = 0.1  # of a sum of squares: less is no difference to speak of
-EXCLUDED = 3.84  # of a sum of squares: a number that costs more is outside of its 95 % interval
+EXCLUDED = 16.0  # of a sum of squares: noise alone makes up an effect of four deviations once in 15,000 fits
 EDGE = 1e-9  # of a coordinate: a search begins so far inside its bounds
 RESCALED = 3  # times that a noise known up to a factor takes its factor from the residuals
 

@@ -13,6 +13,7 @@ from tfarm.dsp import Chain
 from tfarm.dsp.discretise import discretised
 from tfarm.dsp.loop import check_loop
 from tfarm.errors import one_line
+from tfarm.fit.fit import Fit
 from tfarm.fit.runs import MeasuredRun
 from tfarm.loop.law_loop import LawLoop
 from tfarm.plots.words import gains_words
@@ -39,11 +40,15 @@ class GivenLaw:
 
 
 class Subject(NamedTuple):
-    """Whose page it is: an arm, its chain, and the laws that the page is about; none: the default gains."""
+    """Whose page it is: an arm, its chain, and the laws that the page is about; none: the default gains.
+
+    `fit` is where its numbers are from, if they were fitted to measurements.
+    """
 
     arm: Arm
     chain: Chain
     laws: tuple[GivenLaw, ...] = ()
+    fit: Fit | None = None
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from tfarm.arm import Arm
 from tfarm.report.arm_section import arm_section
 from tfarm.report.assumptions_section import assumptions_section
 from tfarm.report.bode_section import bode_section
+from tfarm.report.fit_section import fit_section
 from tfarm.report.given_laws import Subject, in_s, on_arm
 from tfarm.report.law_loop_section import law_margins_section, law_nyquist_section, law_poles_section
 from tfarm.report.law_sampled_section import law_sampled_section
@@ -31,8 +32,9 @@ LOOP_PAGES = ("margins", "locus", "sampled", "tune")  # whose sections an arm wi
 class Piece:
     """One section of one arm's page: a name for the progress bar, the section's anchor, and how to make it.
 
-    `make` takes the arm, for a section that says what the loop does when sampled (`is_sampled`) its chain, and for one
-    of given laws (`is_of_laws`) chain and laws; `in_s`: only where one of these acts without a clock.
+    `make` takes the arm, for a section that says what the loop does when sampled (`is_sampled`) its chain, for one of
+    given laws (`is_of_laws`) chain and laws, for one of a fit (`is_of_fit`) that alone; `in_s`: only where one of the
+    laws acts without a clock.
     """
 
     name: str
@@ -43,19 +45,25 @@ class Piece:
     is_sampled: bool = False
     is_of_laws: bool = False
     in_s: bool = False
+    is_of_fit: bool = False
 
     def is_for(self, subject: Subject) -> bool:
         """Whether a page on this subject has the section."""
+        if self.is_of_fit and subject.fit is None:
+            return False
         return self.suits(subject.arm) and (not self.in_s or bool(in_s(on_arm(subject.arm, subject.laws))))
 
     def made(self, subject: Subject) -> Section:
         """The section."""
+        if self.is_of_fit:
+            return self.make(subject.fit)
         if self.is_of_laws:
-            return self.make(*subject)
+            return self.make(subject.arm, subject.chain, subject.laws)
         return self.make(subject.arm, subject.chain) if self.is_sampled else self.make(subject.arm)
 
 
 PIECES = (
+    Piece("the fit", "fit", (), fit_section, is_of_fit=True),
     Piece("map of the gains", "margins-map", ("margins",), map_section, has_loop, is_sampled=True),
     Piece("the arm", "arm", tuple(QUESTIONS), arm_section),
     Piece("the paper's values", "paper", (), paper_section, is_from_paper),

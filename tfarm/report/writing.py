@@ -20,6 +20,7 @@ from tfarm.arm import Arm
 from tfarm.dsp import Chain
 from tfarm.errors import ParameterError, TfarmError, did_you_mean
 from tfarm.files import temporary_folder
+from tfarm.fit.fit import Fit
 from tfarm.report.card import save_card, written_cards
 from tfarm.report.given_laws import GivenLaw, Subject, check_laws
 from tfarm.report.page import QUESTIONS, arm_page, file_of, index_page
@@ -50,6 +51,7 @@ def write(
     *,
     chains: Sequence[Chain] | None = None,
     laws: Sequence[Sequence[GivenLaw]] | None = None,
+    fits: Sequence[Fit | None] | None = None,
     only: tuple[str, ...] | None = None,
     progress: Progress | None = None,
     notice: Notice | None = None,
@@ -57,7 +59,8 @@ def write(
     """Write the report of each arm to out/<name>/, out/trust/ and out/index.html; the page to open first.
 
     `chains` are the arms' own sampling, converters, actuators and slews; ideal ones at 10 ms if not given.  `laws` are
-    those that each arm's page is about; where there is none it is about the default gains.
+    those that each arm's page is about; where there is none it is about the default gains.  `fits` are where the arms'
+    numbers are from, if they were fitted to measurements: their pages begin with these.
     `only` ("bode", "modes", "margins", ...) writes those pages alone, out/<name>/bode.html and so on.  `progress` is
     told (done, total, what) after each piece of work.  A section that tfarm cannot make of an arm says why in its
     place, and `notice` is told so in one line, once the pages are written.  Raises ParameterError before any work if
@@ -67,9 +70,11 @@ def write(
     _check(arms, only)
     chains = [Chain()] * len(arms) if chains is None else chains
     laws = [()] * len(arms) if laws is None else laws
-    subjects = [Subject(arm, chain, tuple(each)) for arm, chain, each in zip(arms, chains, laws, strict=True)]
+    fits = [None] * len(arms) if fits is None else fits
+    each = zip(arms, chains, laws, fits, strict=True)
+    subjects = [Subject(arm, chain, tuple(own), fit) for arm, chain, own, fit in each]
     for subject in subjects:
-        check_laws(*subject)
+        check_laws(subject.arm, subject.chain, subject.laws)
     out = Path(out)
     with _beside(out, [arm.name for arm in arms] + [FOLDER] * (not only)) as beside:
         folders = [beside / str(i) for i in range(len(arms))]
