@@ -1,0 +1,118 @@
+"""The fit on an arm's page: measured over fitted curves, the numbers with intervals, and what they leave of a loop."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from tfarm.columns import Column, Table
+from tfarm.digits import general, listed, plain, singly
+from tfarm.errors import ConvergenceError
+from tfarm.fit.answers import in_words, known, parameters_table, resonances
+from tfarm.fit.fit import Fit
+from tfarm.fit.possible import ARMS, Possible, interval, loop_on_all, possible
+from tfarm.loop.regions import ranges_of
+from tfarm.plots.fitted import draw_fit
+from tfarm.plots.possible import draw_band, draw_share
+from tfarm.plots.words import gains_words
+from tfarm.report.loop_laws import has_loop
+from tfarm.report.sections import Picture, Section
+from tfarm.report.words import typeset
+from tfarm.spectrum.scales import default_gains
+
+LEVEL = "The interval holds the true number in 95 of 100 measurements, if the arm is right and the noise is as said."
+MARGINS = (
+    Column("margin", "of the loop", of=lambda row: row[0]),
+    Column("unit", "unit", of=lambda row: row[1]),
+    Column("lowest", "lowest", of=lambda row: row[2][0], digits=singly(general, 4)),
+    Column("highest", "highest", of=lambda row: row[2][1], digits=singly(general, 4)),
+)
+RESONANCES = (
+    Column("before_hz", "start", "Hz", of=lambda row: row[0], digits=singly(known, 6)),
+    Column("after_hz", "fitted", "Hz", of=lambda row: row[1], digits=singly(known, 6)),
+    Column("measured_hz", "measured", "Hz", of=lambda row: row[2], digits=singly(general, 6)),
+)
+
+
+def fit_section(fit: Fit, count: int = ARMS) -> Section:
+    """What was measured, what explains it, how sure, and on how many arms of those that remain a loop holds."""
+    words = [typeset(f"{fit.verdict[0].upper()}{fit.verdict[1:]}: {in_words(fit)}. {LEVEL}")]
+    words += [typeset(f"{each[0].upper()}{each[1:]}.") for each in fit.not_determined]
+    blocks: list[Picture | Table] = []
+    if fit.responses:
+        blocks.append(_overlay(fit))
+    blocks.append(parameters_table(fit))
+    if rows := resonances(fit):
+        caption = (
+            "Peaks of the measured responses, and poles of the arm's: with a held hub where they are over its angle."
+        )
+        blocks.append(
+            Table(columns=RESONANCES, record=rows, stem="fit-resonances", title="Resonances", caption=caption)
+        )
+    try:
+        those = possible(fit, count)
+    except ConvergenceError as error:
+        words.append(typeset(f"What the data leave of a loop is not drawn: {error}."))
+    else:
+        said, more = _onwards(those)
+        words += said
+        blocks += more
+    return Section(anchor="fit", title="Fitted to measurements", words=words, blocks=blocks)
+
+
+def _overlay(fit: Fit) -> Picture:
+    names = listed([each.name for each in fit.responses])
+    return Picture(
+        stem="fit-overlay",
+        title="Measured over fitted",
+        caption=f"Points: {names} as measured. Blue: the fitted arm, exact; grey: the arm that the search began with.",
+        alt=f"Measured and computed responses: {names}.",
+        figure=draw_fit(fit),
+    )
+
+
+def _onwards(those: Possible) -> tuple[list[str], list[Picture | Table]]:
+    """The band of a response, the map with the share of arms, and the margins over all arms."""
+    words: list[str] = []
+    blocks: list[Picture | Table] = []
+    count = len(those.arms)
+    if those.fit.responses:
+        blocks.append(Picture(
+            stem="fit-band", title="The arms that the data leave possible",
+            caption=f"The magnitude of the root moment of {count} arms drawn about the best: all explain the data.",
+            alt="Band of the root moment's magnitude over frequency.", figure=draw_band(those, "root_moment"),
+        ))  # fmt: skip
+    arm = those.fit.arm
+    if has_loop(arm):
+        law = default_gains(arm)
+        found = loop_on_all(those, law)
+        share = plain(100 * found.stable / found.of, 3)
+        words.append(
+            typeset(
+                f"With {gains_words(law)} the loop holds on {found.stable} of {found.of} of these arms ({share} %)."
+            )
+        )
+        K1, K2 = ranges_of(arm)
+        blocks.append(Picture(
+            stem="fit-map", title="Gains on all of these arms",
+            caption="Dark: the gains hold on every arm that the data leave possible; white: on none. Without a clock.",
+            alt="Map of the share of arms on which gains hold.", figure=draw_share(those, K1, K2),
+        ))  # fmt: skip
+        rows = [(name, unit, ends) for name, unit, ends in _rows(found) if ends is not None]
+        if rows:
+            caption = f"Of {gains_words(law)} over the {found.stable} arms on which it holds."
+            blocks.append(
+                Table(
+                    columns=MARGINS, record=rows, stem="fit-margins", title="Margins over these arms", caption=caption
+                )
+            )
+    return words, blocks
+
+
+def _rows(found: object) -> Iterator[tuple[str, str, tuple[float, float] | None]]:
+    names = (
+        ("K2 up to", "", "gain_up"),
+        ("phase margin", "deg", "phase"),
+        ("delay margin", "s", "delay"),
+        ("disk margin", "", "disk"),
+    )
+    return ((title, unit, interval(getattr(found, name))) for title, unit, name in names)
