@@ -2,6 +2,7 @@
 
 import math
 import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -170,6 +171,33 @@ def test_the_command_and_its_file(tmp_path, capsys):
     assert found["converged"]
     assert found["rms_log_error"] < 0.1
     assert found["arm"]["link"]["youngs_modulus"] == found["parameters"]["link.youngs_modulus"]["value"]
+
+
+def test_from_a_file_to_margins_in_three_commands(tmp_path, capsys):
+    """The README's example; what the file was made of is in the README beside it."""
+    save = tmp_path / "fitted.toml"
+    free = "link.youngs_modulus,link.damping,hub.inertia,payload.mass"
+    data = "tip_acceleration/hub_torque=tests/data/sweep/tip.csv"
+    given = ("fit", "sasaki2012-lab", "--data", data, "--free", free, "--save", str(save))
+    found = answer(capsys, *given, "--covariance")
+    truth = {"youngs_modulus": 6.3e10, "damping": 1.6e-4, "inertia": 0.085, "mass": 0.12}
+    for key, each in found["parameters"].items():
+        assert abs(each["value"] - truth[key.split(".")[1]]) < 4 * each["std"]
+    assert found["explained"]
+    assert found["unexplained_peaks_hz"] == []
+    assert answer(capsys, "margins", str(save))["verdict"] == "stable"
+    proven = answer(capsys, "poles", str(save), "--count", "3", "--certify")
+    assert proven["proven_complete"]
+
+
+def test_rad_s_given_as_hz_are_asked_about(tmp_path, capsys):
+    cells = [row.split(",") for row in Path("tests/data/sweep/tip.csv").read_text().splitlines()[2:]]
+    wrong = tmp_path / "wrong.csv"
+    wrong.write_text("\n".join(["hz,re,im,sigma", *(f"{6.283185 * float(f)!r},{a},{b},{c}" for f, a, b, c in cells)]))
+    data = f"tip_acceleration/hub_torque={wrong}"
+    code, out, err = run(capsys, "fit", "sasaki2012-lab", "--free", "link.youngs_modulus", "--data", data)
+    assert (code, out) == (2, "")
+    assert "rad/s given as Hz?" in err
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -21,9 +21,9 @@ PROMINENT = 0.35  # of ln |H|: what stands out by a factor of 1.4 is a peak, if 
 NOISY = 4.0  # deviations of the noise
 BEYOND = 1.6  # so far beyond both ends of a band the arm's own peaks are looked for
 GRID = 600  # points at which they are
-BROAD = 0.15  # of its frequency: a zero farther from the axis is no peak
+BROAD = 0.3  # of its frequency: a zero farther from the axis is no peak
 NUDGE = 1e-6  # of a frequency: for a slope along it
-STEPS = 3  # of Newton's method from a grid's point
+STEPS = 6  # of Newton's method from a grid's point
 SKIPPED = 0.25  # of ln w: what a peak that is matched with nothing costs
 
 
@@ -51,14 +51,14 @@ def features_of(data: Measured, sigma: Real) -> Features:
 def near_zeros(here: Around, data: Measured) -> list[tuple[Real, Real]]:
     """The arm's own dips and peaks: zeros near the axis of what is over and under, w (k,), and d ln w (free, k).
 
-    From the smallest values on a grid Newton's method leads to the zeros.
+    From where they are without the links' damping, smallest values on a grid, Newton's method leads to the zeros.
     """
     driven = drive_behind(here.arm, data.input)
     names = tuple(dict.fromkeys(each for each in (data.output, data.input) if each != driven))
     signals = Signals(driven_by(here.arm, driven), names)
     rows = [names.index(each) if each != driven else None for each in (data.output, data.input)]
     grid = np.geomspace(data.omega[0] / BEYOND, data.omega[-1] * BEYOND, GRID)
-    parts, found = signals.parts(1j * grid), []
+    parts, found = replace(signals, arm=signals.arm.having(damping=0.0)).parts(1j * grid), []
     for row in rows:
         curve = parts.drive if row is None else parts.numerators[row]
         w = grid[find_peaks(-(np.log(abs(curve)) + parts.scale.real))[0]]
