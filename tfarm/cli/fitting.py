@@ -49,15 +49,13 @@ def fit(
     from tfarm.cli.tables import say_written
     from tfarm.fit.answers import fit_answer, save_fit
     from tfarm.fit.fit import fit as find
-    from tfarm.fit.noise import noise_of
     from tfarm.fit.overlay import check_unit
-    from tfarm.fit.ratio import Ratio
     from tfarm.fit.reading import data_of
     from tfarm.fit.ringing import mode_of
 
     measured = [data_of(text) for text in data or []]
     for each in measured:
-        check_unit(Ratio(subject, each.output, each.input), each, noise_of(each))
+        check_unit(subject, each)
     found = find(
         subject, measured, [key.strip() for key in free.split(",") if key.strip()],
         start={key: value for key, (value,) in _numbers("--start", start or [], 1)},
