@@ -5,6 +5,7 @@ import importlib
 import pkgutil
 import re
 from functools import cached_property
+from html.parser import HTMLParser
 
 import numpy as np
 import pytest
@@ -127,3 +128,42 @@ def test_every_record_with_arrays_is_one() -> None:
         types = " ".join(str(each.type) for each in dataclasses.fields(value))
         if value.__dataclass_params__.frozen and re.search(r"\b(NDArray|Real|Complex|Whole)\b", types):
             assert name.startswith("_") or value.__repr__.__module__ == "tfarm.records", (module, name)
+
+
+class Texts(HTMLParser):
+    """The texts of a table's cells, a list a row, and every tag that there is."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.rows: list[list[str]] = []
+        self.tags: set[str] = set()
+        self.feed(html)
+
+    def handle_starttag(self, tag: str, attrs: object) -> None:
+        self.tags.add(tag)
+        if tag == "tr":
+            self.rows.append([])
+        elif tag in ("th", "td"):
+            self.rows[-1].append("")
+
+    def handle_data(self, data: str) -> None:
+        if self.rows:
+            self.rows[-1][-1] += data
+
+
+@pytest.mark.parametrize("make", MAKERS.values(), ids=MAKERS)
+def test_a_notebook_shows_a_record_as_a_small_table(make) -> None:
+    """What the repr says where it is not cut, an entry a row, and the same entry first."""
+    answer = make()
+    found = Texts(answer._repr_html_())
+    assert found.tags == {"table", "caption", "tbody", "tr", "th", "td"}
+    first, *_ = ("=".join(row) for row in found.rows)
+    assert repr(answer).startswith(f"{type(answer).__name__}({first}"[:150])
+    assert len(answer._repr_html_()) < 10_000
+
+
+def test_a_hostile_name_is_text_in_a_notebook() -> None:
+    hostile = "<script>alert('&amp;')</script>"
+    html = Pair(np.zeros(1), {hostile: 1})._repr_html_()
+    assert "<script" not in html
+    assert Texts(html).rows == [["here", "[0]"], ["there", f"<{hostile}>"]]

@@ -1,4 +1,4 @@
-"""What a frozen record with arrays promises besides: arrays that cannot be written, an answer to `==`, a short repr."""
+"""What a frozen record with arrays promises: arrays that cannot be written, an `==` that answers, a short repr, a table."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
 from functools import cached_property
+from html import escape
 from typing import Any, TypeVar
 
 import numpy as np
@@ -21,7 +22,8 @@ def record(cls: _Class) -> _Class:
     """Decorates a class inside `@dataclass(frozen=True)`.
 
     Arrays in its fields (in tuples, lists and dictionaries too) and in its cached properties become read-only views;
-    two records of a class are equal where all their entries are, NaN to NaN; the repr is short, the verdict first.
+    two records of a class are equal where all their entries are, NaN to NaN; the repr is short, the verdict first, and
+    a notebook shows the same as a small table.
     """
     after = cls.__dict__.get("__post_init__")
 
@@ -36,7 +38,13 @@ def record(cls: _Class) -> _Class:
     for value in vars(cls).values():
         if isinstance(value, cached_property):
             value.func = _read_only_result(value.func)
-    methods = {"__post_init__": after_init, "__eq__": _equal, "__hash__": _hash, "__repr__": _repr}
+    methods = {
+        "__post_init__": after_init,
+        "__eq__": _equal,
+        "__hash__": _hash,
+        "__repr__": _repr,
+        "_repr_html_": _repr_html,
+    }
     for name, method in methods.items():
         setattr(cls, name, method)
     return cls
@@ -105,6 +113,13 @@ def _repr(self: Any) -> str:
     text = ", ".join(f"{name}={_shown(value)}" for name, value in _entries(self))
     text = text if len(text) <= LONGEST else f"{text[: LONGEST - 4]} ..."
     return f"{type(self).__name__}({text})"
+
+
+def _repr_html(self: Any) -> str:
+    """A row an entry, the finding first, for a notebook; whatever a name holds is text."""
+    row = '<tr><th scope="row" style="text-align:left">{}</th><td style="text-align:left">{}</td></tr>'
+    rows = "".join(row.format(escape(name), escape(_shown(value))) for name, value in _entries(self))
+    return f"<table><caption>{escape(type(self).__name__)}</caption><tbody>{rows}</tbody></table>"
 
 
 def _entries(self: Any) -> Iterator[tuple[str, Any]]:

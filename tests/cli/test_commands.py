@@ -127,7 +127,7 @@ BAD = [
     (["response", "sasaki2012", "--output", "root_moment", "--s", "1_0j"], "write numbers as 50"),
     (["sampled", "sasaki2012", "--Ts", "0.01"], "did you mean --period?"),
     (["modes", "sasaki2012", "--n", "3"], "did you mean --count?"),
-    (["bode", "sasaki2012"], 'did you mean "response, or report ARM --only bode"?'),
+    (["rlocus", "sasaki2012"], 'did you mean "locus"?'),
     (["response", "sasaki2012", "--output", "tip"], 'did you mean "tip_displacement"'),
     (["modes", "sasaki2012", "--digits", "1001"], "1 to 1000"),
     (["modes", "sasaki2012", "--cuont", "3"], "did you mean --count"),

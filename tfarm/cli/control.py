@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tfarm.cli.app import ArmName, Json, app, give, load_arm, plain_number, tell, whole
-from tfarm.cli.inputs import FixedKp, Given, LawFile, law_of, under_a_law
+from tfarm.cli.inputs import FixedKp, Given, LawFile, Png, law_of, under_a_law
 from tfarm.cli.sampling import Delay, DspFile, Period, chain_of
 from tfarm.errors import ParameterError
 
@@ -96,6 +96,7 @@ def gain_map(
     kp: FixedKp = 0.0,
     points: Annotated[str | None, typer.Option("--points", help="grid points along each; 101, of a law 60")] = None,
     csv: Annotated[Path | None, typer.Option("--csv", help="write both numbers and the count to this file")] = None,
+    png: Png = None,
     law: LawFile = None,
     vary: Annotated[list[str] | None, typer.Option("--vary", metavar="NAME=LO,HI", help=OF_A_LAW)] = None,
     json: Json = False,
@@ -103,7 +104,7 @@ def gain_map(
     """How many poles are unstable over the plane of K1 and K2, and the exact boundary; or over two numbers of a law."""
     number, subject = whole("--points", points or "101", 2, 2000), load_arm(arm)
     if vary or law:
-        _law_map(subject, arm, law, vary or [], whole("--points", points or "60", 2, 400), csv, json)
+        _law_map(subject, arm, law, vary or [], whole("--points", points or "60", 2, 400), csv, png, json)
         return
     from tfarm.loop.regions import ranges_of
 
@@ -117,14 +118,26 @@ def gain_map(
     found = region(subject, between(*ranges[0], number), between(*ranges[1], number), kp)
     if csv is not None:
         write_map(map_answer(found), csv)
+    if png is not None:
+        from tfarm.plots.files import save_png
+        from tfarm.plots.plane import draw_map
+
+        save_png(draw_map(found), png)
     from tfarm.cli.tables import say_written
 
-    if json or say_written(csv):
+    if json or say_written(csv, png):
         give(map_answer(found), json, print_map)
 
 
 def _law_map(
-    subject: Arm, name: str, law: str | None, vary: list[str], number: int, csv: Path | None, json: bool
+    subject: Arm,
+    name: str,
+    law: str | None,
+    vary: list[str],
+    number: int,
+    csv: Path | None,
+    png: Path | None,
+    json: bool,
 ) -> None:
     """The map over two numbers of a law, those of a file or of the arm's own."""
     if len(vary) != 2:
@@ -140,10 +153,16 @@ def _law_map(
 
     any_law = typed if isinstance(typed, Law) else Law.of_gains(typed)
     x, y = (between(*limits, number) for _, limits in ranges)
-    answer = law_map_answer(law_map(subject, any_law, (ranges[0][0], ranges[1][0]), x, y))
+    found = law_map(subject, any_law, (ranges[0][0], ranges[1][0]), x, y)
+    answer = law_map_answer(found)
     if csv is not None:
         write_law_map(answer, csv)
-    if json or say_written(csv):
+    if png is not None:
+        from tfarm.plots.files import save_png
+        from tfarm.plots.laws import draw_law_map
+
+        save_png(draw_law_map(found), png)
+    if json or say_written(csv, png):
         give(answer, json, print_law_map)
 
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import wraps
 from inspect import Parameter, signature
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar, cast
 
 import numpy as np
@@ -43,6 +44,7 @@ LawFiles = Annotated[
     list[str] | None,
     typer.Option("--law", metavar="FILE", help="TOML file with a [law]; again for more, on one page; else the arm's"),
 ]
+Png = Annotated[Path | None, typer.Option("--png", help="draw it into this file")]
 FixedKp = Annotated[float, typer.Option("--Kp", help="hub angle gain [N m/rad]")]
 Kp = Annotated[float | None, typer.Option("--Kp", help="hub angle gain [N m/rad]")]
 
@@ -136,8 +138,6 @@ def law_of(arm: Arm, given: Given) -> tuple[HubFeedback | Law, dict[str, Any]]:
 
 def laws_of(arm: Arm, name: str, gains: dict[str, float | None], files: Sequence[str]) -> tuple[GivenLaw, ...]:
     """The laws that a page is about: those of files, gains that are typed, the arm's own [law]; else none."""
-    from pathlib import Path
-
     from tfarm.arm.law_tables import load_law
     from tfarm.fit.runs import load_run
     from tfarm.report.given_laws import GivenLaw

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from tfarm.cli.app import ArmName, Json, app, give, load_arm, whole
-from tfarm.cli.inputs import Given, law_of, under_a_law
+from tfarm.cli.inputs import Given, Png, law_of, under_a_law
 from tfarm.columns import Column, Table
 from tfarm.digits import singly
 
@@ -33,6 +33,7 @@ def locus(
     stop: Annotated[float, typer.Option("--to", help="value at which it ends")],
     points: Annotated[str | None, typer.Option("--points", metavar="N", help=POINTS)] = None,
     branches: Annotated[str, typer.Option("--branches", metavar="N", help=BRANCHES)] = "10",
+    png: Png = None,
     csv: Annotated[Path | None, typer.Option("--csv", help="write the branches to this file")] = None,
     json: Json = False,
     *,
@@ -48,22 +49,33 @@ def locus(
         from tfarm.loop.law_locus import law_locus, law_locus_answer
 
         number = whole("--points", points or "100", 2, 5000)
-        answer = law_locus_answer(law_locus(subject, law, vary, start, stop, number, min(count, 60)))
-        show = print_law_locus
+        found = law_locus(subject, law, vary, start, stop, number, min(count, 60))
+        answer, show = law_locus_answer(found), print_law_locus
+        if png is not None:
+            from tfarm.plots.files import save_png
+            from tfarm.plots.laws import draw_law_locus
+
+            save_png(draw_law_locus(found), png)
     else:
         from tfarm.loop.locus import locus as find
         from tfarm.loop.locus_answer import locus_answer
         from tfarm.loop.reduced_locus import reduced_locus
 
         exact = find(subject, law, vary, start, stop, number, count)
-        answer, show = locus_answer(exact, reduced_locus(exact)) | said, print_locus
+        reduced = reduced_locus(exact)
+        answer, show = locus_answer(exact, reduced) | said, print_locus
+        if png is not None:
+            from tfarm.plots.files import save_png
+            from tfarm.plots.roots import draw_locus
+
+            save_png(draw_locus(exact, reduced), png)
     if csv is not None:
         from tfarm.tables.files import write_csv
 
         write_csv(branches_table(answer), csv)
     from tfarm.cli.tables import say_written
 
-    if json or say_written(csv):
+    if json or say_written(csv, png):
         give(answer, json, show)
 
 

@@ -8,8 +8,6 @@ from typing import Any
 from tfarm.errors import ParameterError, did_you_mean
 
 VERBS = {  # words of other tools
-    "bode": "response, or report ARM --only bode",
-    "nyquist": "report ARM --only margins",
     "rlocus": "locus",
     "eig": "modes",
     "eigenvalues": "modes",
@@ -41,7 +39,7 @@ OPTIONS = {
     "--from": ("--start", "--wmin", "--min"),
     "--to": ("--stop", "--end", "--wmax", "--max"),
 }
-PATHS = ("--csv", "--mat", "--save", "--png", "--out", "--keep", "--dsp", "--controller")  # may be called 1_0
+PATHS = ("--csv", "--png", "--mat", "--save", "--png", "--out", "--keep", "--dsp", "--controller")  # may be called 1_0
 
 
 def check_verb(word: str, group: Any) -> None:

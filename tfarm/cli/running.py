@@ -14,6 +14,7 @@ from tfarm.cli import (  # noqa: F401  each adds its verbs to the application
     fitting,
     loops,
     measuring,
+    pictures,
     reduction,
     sampling,
     studies,

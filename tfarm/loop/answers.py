@@ -17,6 +17,7 @@ from .law_loop import LawLoop
 from .law_stability import signs_of_loop
 from .lyapunov import lyapunov
 from .margins import Margins
+from .nyquist import Nyquist
 from .poles import Poles
 from .regions import INFINITE, Region
 from .windows import Interval, Windows, reach_words
@@ -214,6 +215,38 @@ def sizes_of(found: Margins[Any]) -> dict[str, tuple[float | None, float | None]
         exact["peak_complementary"] = found.exact_peak
     sizes = {column.of: None if limits is None else getattr(limits, column.of) for column in MARGINS}
     return {column.key: (exact.get(column.of, sizes[column.of]), sizes[column.of]) for column in MARGINS}
+
+
+NYQUIST = (  # of `Nyquist`
+    Column("re_s", "Re s", "1/s", of=lambda found: found.s.real),
+    Column("im_s", "Im s", "rad/s", of=lambda found: found.s.imag),
+    Column("re_L", "Re L", of=lambda found: found.L.real),
+    Column("im_L", "Im L", of=lambda found: found.L.imag),
+)
+
+
+def nyquist_answer(found: Nyquist[Any]) -> dict[str, Any]:
+    """The verdict, the turns around -1 beside the unstable poles found in a box, and L on the contour for Im s >= 0."""
+    verdict = found.verdict
+    return {
+        "arm": verdict.loop.arm.name,
+        **law_answer(verdict.loop.law, verdict.loop.arm),
+        "verdict": verdict.verdict,
+        "encirclements": found.encirclements,
+        "unstable_open": found.unstable_open,
+        "unstable_by_nyquist": found.expected,
+        "unstable_roots": verdict.unstable_roots,
+        "on_axis": found.on_axis,
+        "band_rad_s": verdict.band,
+        "beyond_the_band": verdict.tail,
+        "s": [[s.real, s.imag] for s in found.s.tolist()],
+        "L": [[L.real, L.imag] for L in found.L.tolist()],
+    }
+
+
+def nyquist_table(found: Nyquist[Any]) -> Table:
+    """L on the contour, a row a point."""
+    return Table(columns=NYQUIST, record=found)
 
 
 def map_answer(found: Region) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from tfarm.digits import plain, significant
 from tfarm.loop.nyquist import Nyquist, compressed
 
-from .style import BLUE, FAINT, GREY, ORANGE, Keys, alone, blank, headline, safe, style
+from .style import BLUE, FAINT, GREY, ORANGE, Keys, New, alone, blank, headline, safe, style, window
 from .words import gains_words
 
 Complex = NDArray[np.complexfloating[Any, Any]]
@@ -30,13 +30,18 @@ def nyquist(data: Nyquist[Any], *, ax: Axes | None = None, name: str = "") -> Ax
     A size r of L is drawn as r/(1 + r): the rim is infinity, -1 lies half way.  `name`: what the law is called.
     """
     if ax is None:
-        title = f"{data.verdict.loop.arm.name}: the loop function L(iω)"
-        return alone(lambda own: nyquist(data, ax=own, name=name), (5.0, 5.8), title, _legend())
+        return draw_disc(data, name, window).axes[0]
     with style():
         _disc(ax)
         _curve(data, ax)
         _headings(name, data, ax)
     return ax
+
+
+def draw_disc(data: Nyquist[Any], name: str = "", new: New = blank) -> Figure:
+    """One disc, on a figure of its own."""
+    title = f"{data.verdict.loop.arm.name}: the loop function L(iω)"
+    return alone(lambda own: nyquist(data, ax=own, name=name), (5.0, 5.8), title, _legend(), new)
 
 
 def draw_nyquist(title: str, plots: Mapping[str, Nyquist]) -> Figure:

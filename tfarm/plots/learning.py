@@ -17,7 +17,7 @@ from tfarm.tuner import Tuning
 from tfarm.tuner.overview import CostMap, Curves, TunerStudy
 
 from .regions import overlay
-from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, alone, blank, headline, style
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, alone, blank, headline, style, window
 
 Real = NDArray[np.float64]
 
@@ -30,7 +30,7 @@ def tuned_gain(found: Tuning, *, ax: Axes | None = None) -> Axes:
     """A tuned gain over time (what `tfarm.tune` returns) in its guard, in the axes given or new ones; the axes."""
     if ax is None:
         title = f"{found.trial.arm.name}: the tuner's gain, and where it is proven stable"
-        return alone(lambda own: tuned_gain(found, ax=own), (7.0, 4.4), title)
+        return alone(lambda own: tuned_gain(found, ax=own), (7.0, 4.4), title, new=window).axes[0]
     with style():
         gain(found, ax=ax)
         ax.set_ylabel("gain on the root moment, K2  [-]")

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter, SymmetricalLogLocator
 from numpy.typing import NDArray
 from scipy import ndimage
@@ -23,7 +24,7 @@ from tfarm.loop.lossless import locked_edges
 from tfarm.loop.regions import INFINITE, Region
 from tfarm.spectrum import modes
 
-from .style import BLUE, GREY, INK, ORANGE, PURPLE, alone, style
+from .style import BLUE, GREY, INK, ORANGE, PURPLE, New, alone, blank, style, window
 
 Real = NDArray[np.float64]
 
@@ -42,15 +43,20 @@ def gain_map(found: Region, *, ax: Axes | None = None) -> Axes:
 
     Colours for the number of unstable poles, a black line for the exact boundary with frequencies [rad/s] along it.
     """
-    x, y = Axis.of(found.K1), Axis.of(found.K2)
     if ax is None:
-        title = f"{found.arm.name}: unstable poles over the plane of both gains"
-        return alone(lambda own: gain_map(found, ax=own), (7.0, 5.4), title)
+        return draw_map(found, window).axes[0]
+    x, y = Axis.of(found.K1), Axis.of(found.K2)
     with style():
         ground(found, x, y, ax)
         boundary(found, edge(found, x, y), x, y, ax)
         count_labels(found, x, y, ax)
     return ax
+
+
+def draw_map(found: Region, new: New = blank) -> Figure:
+    """The plane, on a figure of its own."""
+    title = f"{found.arm.name}: unstable poles over the plane of both gains"
+    return alone(lambda own: gain_map(found, ax=own), (7.0, 5.4), title, new=new)
 
 
 def ground(found: Region, x: Axis, y: Axis, ax: Axes) -> None:
@@ -238,7 +244,7 @@ def count_labels(found: Region, x: Axis, y: Axis, ax: Axes) -> None:
             inside = np.asarray(parts == part)
             if inside.mean() < LEAST_AREA:
                 continue
-            row, column, words, turn = _placed(inside, _words(int(count)), str(count).replace("-1", "∞"))
+            row, column, words, turn = _placed(inside, words_of_count(int(count)), str(count).replace("-1", "∞"))
             ax.annotate(
                 words, (grid.K1[column], grid.K2[row]), ha="center", va="center", rotation=turn, zorder=4,
                 fontsize=9.0, color=INK if count else "#00543f",
@@ -269,7 +275,8 @@ def _run(inside: NDArray[np.bool_], at: int) -> tuple[int, int]:
     return int(outside[n - 1]) + 1, int(outside[n]) - 1
 
 
-def _words(count: int) -> str:
+def words_of_count(count: int) -> str:
+    """What a number of unstable poles means."""
     if count == 0:
         return "stable"
     return "every flexible mode unstable" if count == INFINITE else counted(count, "unstable pole")

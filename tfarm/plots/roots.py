@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from tfarm.loop.locus import Locus
 from tfarm.loop.reduced_locus import ReducedLocus
 from tfarm.spectrum import modes
 
-from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, Keys, alone, blank, headline, style
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, Keys, New, alone, blank, headline, style, window
 from .words import gains_words
 
 Real = NDArray[np.float64]
@@ -37,8 +38,7 @@ def locus(exact: Locus, *, reduced: ReducedLocus | None = None, ax: Axes | None 
     and a diamond where one crosses the axis.  Thin: those of `reduced` (`tfarm.loop.reduced_locus`), if given.
     """
     if ax is None:
-        title = f"{exact.arm.name}: closed-loop poles as {_range(exact)}"
-        return alone(lambda own: locus(exact, reduced=reduced, ax=own), (7.0, 5.6), title, _legend(exact, reduced))
+        return draw_locus(exact, reduced, window).axes[0]
     with style():
         every = range(len(exact.branches))
         _panel(exact, reduced, every, ax, named=[*every, None])
@@ -46,6 +46,13 @@ def locus(exact: Locus, *, reduced: ReducedLocus | None = None, ax: Axes | None 
         ax.set_xlabel("Re s [1/s]")
         ax.set_ylabel("Im s [rad/s]")
     return ax
+
+
+def draw_locus(exact: Locus, reduced: ReducedLocus | None = None, new: New = blank) -> Figure:
+    """All branches in one panel, on a figure of its own."""
+    title = f"{exact.arm.name}: closed-loop poles as {_range(exact)}"
+    draw = partial(locus, exact, reduced=reduced)
+    return alone(lambda own: draw(ax=own), (7.0, 5.6), title, _legend(exact, reduced), new)
 
 
 def zoomed(exact: Locus) -> list[int]:

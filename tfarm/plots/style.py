@@ -78,15 +78,17 @@ def window(width: float, height: float) -> Figure:
     return pyplot.figure(figsize=(width, height), layout="constrained")
 
 
-def alone(draw: Callable[[Axes], object], size: tuple[float, float], title: str, keys: Keys | None = None) -> Axes:
-    """The axes of a picture in a figure of its own, of that size [inches]; below a legend, of `keys` or labels."""
+def alone(
+    draw: Callable[[Axes], object], size: tuple[float, float], title: str, keys: Keys | None = None, new: New = blank
+) -> Figure:
+    """A picture in a figure of its own, of that size [inches], its axes the first; a legend of `keys` or labels."""
     with style():
-        figure = window(*size)
-        ax = figure.subplots()
-        draw(ax)
-        figure.legend(*(keys or ()), loc="outside lower left", ncols=2, fontsize=8.5)
+        figure = new(*size)
+        draw(figure.subplots())
+        if keys is not None or any(ax.get_legend_handles_labels()[0] for ax in figure.axes):
+            figure.legend(*(keys or ()), loc="outside lower left", ncols=2, fontsize=8.5)
         headline(figure, title)
-    return ax
+    return figure
 
 
 def taken(ax: Sequence[Axes], number: int) -> list[Axes]:

@@ -1,15 +1,20 @@
-"""A response as commands have it: the answer of `tfarm response`, and its table for a terminal or a file."""
+"""Responses as commands have them: the answers of `tfarm response` and `tfarm bode`, and their tables."""
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
 from tfarm.columns import Column, Table
-from tfarm.digits import general, singly
+from tfarm.digits import general, singly, within
+from tfarm.spectrum.answers import HELD
 
+from .frequency import Bode
 from .transfer import TransferFunction
+
+HERTZ = 2 * math.pi
 
 
 def response_answer(G: TransferFunction, s: np.ndarray[Any, Any], digits: int | None) -> dict[str, Any]:
@@ -43,3 +48,46 @@ def response_table(answer: dict[str, Any]) -> Table:
             Column(f"im_{output}", f"Im {output}", unit, of=im, digits=twelve, head="Im"),
         )
     )
+
+
+ROOTS = (  # of (s, |G| at i Im s, or of a real root at i |s|)
+    Column(
+        "re",
+        "Re s",
+        "1/s",
+        of=lambda row: float(row[0].real),
+        shown=lambda row: within(float(row[0].real), HELD * abs(row[0]), 10),
+    ),
+    Column("im", "Im s", "rad/s", of=lambda row: float(row[0].imag), digits=singly(general, 10)),
+    Column("frequency_hz", "Im s/2 pi", "Hz", of=lambda row: float(row[0].imag) / HERTZ, digits=singly(general, 8)),
+    Column("magnitude", "|G| there", of=lambda row: float(row[1]), digits=singly(general, 6)),
+)
+BODE = (  # of `Bode`
+    Column("omega_rad_s", "angular frequency", "rad/s", of="omega"),
+    Column("frequency_hz", "frequency", "Hz", of=lambda data: data.omega / HERTZ),
+    Column("real", "real part", of=lambda data: data.value.real),
+    Column("imaginary", "imaginary part", of=lambda data: data.value.imag),
+    Column("magnitude", "magnitude", of=lambda data: abs(data.value)),
+    Column("phase_deg", "phase", "deg", of="phase"),
+)
+
+
+def bode_answer(data: Bode) -> dict[str, Any]:
+    """Poles and zeros of a Bode plot with |G| there ("inf" and 0 on the axis), then its curve, refined around them."""
+    roots = {"poles": (data.poles, data.peaks), "zeros": (data.zeros, data.dips)}
+    return {
+        "arm": data.arm.name,
+        "input": "hub_angle" if data.arm.is_locked else data.arm.input,
+        "output": data.output,
+        "unit": data.gain_unit,
+        "band_rad_s": list(data.band),
+        **{key: Table(columns=ROOTS, record=list(zip(*pair, strict=True))) for key, pair in roots.items()},
+        "omega_rad_s": data.omega.tolist(),
+        "value": [[v.real, v.imag] for v in data.value.tolist()],
+        "phase_deg": data.phase.tolist(),
+    }
+
+
+def bode_table(data: Bode) -> Table:
+    """The curve of a Bode plot, a row a frequency."""
+    return Table(columns=BODE, record=data)

@@ -1,0 +1,101 @@
+"""The verbs that draw, and --png: the picture is a picture, and the numbers beside it are those of Python."""
+
+import csv
+
+import numpy as np
+import pytest
+from matplotlib import image
+
+import tfarm
+from tests.shell import answer, run
+
+LAB = "sasaki2012-lab"
+LAW = """
+[law]
+delay = 0.002
+[law.hub_angle]
+num = [2.0, 1.0]
+den = [0.01, 1.0]
+"""
+
+
+@pytest.fixture
+def law(tmp_path):
+    file = tmp_path / "law.toml"
+    file.write_text(LAW, encoding="utf-8")
+    return str(file)
+
+
+DRAWN = {
+    "bode": ["bode", LAB, "--to", "300"],
+    "nyquist": ["nyquist", LAB],
+    "nyquist of a law": ["nyquist", LAB, "--law", "LAW"],
+    "locus": ["locus", LAB, "--vary", "K2", "--from", "0", "--to", "2", "--points", "40", "--branches", "3"],
+    "locus of a law": [
+        *("locus", LAB, "--law", "LAW", "--vary", "gain", "--from", "0", "--to", "40"),
+        *("--points", "20", "--branches", "2"),
+    ],
+    "map": ["map", LAB, "--points", "21"],
+    "map of a law": [
+        *("map", LAB, "--law", "LAW", "--points", "8"),
+        *("--vary", "hub_angle.num.0=0,20", "--vary", "delay=0,0.02"),
+    ],
+}
+
+
+@pytest.mark.parametrize("words", DRAWN.values(), ids=DRAWN)
+def test_a_picture_is_written_and_said(words, law, tmp_path, capsys):
+    file = tmp_path / "drawn.png"
+    code, out, err = run(capsys, *(law if word == "LAW" else word for word in words), "--png", str(file))
+    assert (code, err) == (0, "")
+    assert out.startswith(f"written: {file}\n")
+    pixels = image.imread(file)
+    assert min(pixels.shape[:2]) > 600
+    assert 0.002 < np.mean(pixels[..., :3].min(axis=-1) < 0.5) < 0.5  # ink on paper
+
+
+def test_bode_prints_what_the_record_holds(capsys, tmp_path):
+    """On the undamped arm: |G| is infinite at each mode, and the zeros are the clamped arm's frequencies."""
+    found = answer(capsys, "bode", "sasaki2012", "--output", "hub_angle", "--to", "300")
+    arm = tfarm.load("sasaki2012")
+    data = tfarm.bode(arm, "hub_angle", (found["band_rad_s"][0], 300.0))
+    modes, locked = tfarm.modes(arm, 2), tfarm.modes(arm.having(hub_inertia=np.inf), 3).natural_frequency
+    assert found["omega_rad_s"] == data.omega.tolist()
+    assert [complex(*pair) for pair in found["value"]] == data.value.tolist()
+    assert [pole["im"] for pole in found["poles"]] == pytest.approx(modes.natural_frequency[1:], rel=1e-13)
+    assert {pole["magnitude"] for pole in found["poles"]} == {"inf"}
+    assert [zero["im"] for zero in found["zeros"]] == pytest.approx(locked[locked < 300.0], rel=1e-13)
+    code, _, _ = run(capsys, "bode", "sasaki2012", "--to", "300", "--csv", str(tmp_path / "bode.csv"))
+    header, *rows = csv.reader((tmp_path / "bode.csv").read_text().splitlines())
+    assert (code, header[0], float(rows[-1][0])) == (0, "omega_rad_s [rad/s]", 300.0)
+
+
+@pytest.mark.parametrize(("K2", "unstable"), [("0.3", 0), ("1.5", 2)])
+def test_nyquist_counts_what_the_map_counts(capsys, K2, unstable):
+    found = answer(capsys, "nyquist", LAB, "--K1", "0.3", "--K2", K2)
+    assert tfarm.map(tfarm.load(LAB), np.array([0.3, 0.4]), np.array([0.0, float(K2)])).unstable[1, 0] == unstable
+    assert found["encirclements"] == -unstable
+    assert (found["unstable_by_nyquist"], found["unstable_roots"]) == (unstable, unstable)
+    assert found["verdict"] == ("unstable" if unstable else "stable")
+    assert len(found["s"]) == len(found["L"]) > 100
+    _, out, _ = run(capsys, "nyquist", LAB, "--K1", "0.3", "--K2", K2)
+    assert f"unstable poles by Nyquist's criterion: {unstable}, in a box: {unstable}" in out
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["bode", LAB, "--output", "root_momnt"], 'did you mean "root_moment"'),
+        (["bode", LAB, "--from", "-1"], "--from = -1.0: a positive frequency"),
+        (["bode", LAB, "--from", "10", "--to", "1"], "--to = 1.0: a frequency above --from"),
+        (["bode", LAB, "--to", "nan"], "--to = nan"),
+        (["bode", LAB, "--to", "100", "--png", "no/such/folder/b.png"], "--png"),
+        (["nyquist", LAB, "--K1", "nan"], "K1"),
+        (["nyquist", LAB, "--law", "no-such.toml"], "no-such.toml"),
+    ],
+)
+def test_bad_input_is_one_line(capsys, words, said):
+    code, out, err = run(capsys, *words)
+    assert (code, out) == (2, "")
+    assert said in err
+    assert err.count("\n") == 1

@@ -1,0 +1,117 @@
+"""The verbs that draw: a Bode plot and a Nyquist plot, with the numbers that stand in them."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from tfarm.cli.app import ArmName, Json, app, give, load_arm
+from tfarm.cli.inputs import Given, Png, law_of, under_a_law
+from tfarm.errors import ParameterError
+
+if TYPE_CHECKING:
+    from tfarm.arm import Arm
+
+Csv = Annotated[Path | None, typer.Option("--csv", help="write the curve to this file")]
+
+
+@app.command()
+def bode(
+    arm: ArmName,
+    output: Annotated[
+        str, typer.Option("--output", help="what is looked at, such as tip_displacement")
+    ] = "root_moment",
+    start: Annotated[float | None, typer.Option("--from", help="lowest frequency [rad/s]")] = None,
+    stop: Annotated[float | None, typer.Option("--to", help="highest; by default ten flexible modes are seen")] = None,
+    png: Png = None,
+    csv: Csv = None,
+    json: Json = False,
+) -> None:
+    """Bode plot of the exact response to the arm's input, with the poles and zeros that the output shows."""
+    subject = load_arm(arm)
+    band = _band(subject, start, stop)
+    from tfarm.cli.tables import say_written
+    from tfarm.response import bode as find
+    from tfarm.response.answers import bode_answer, bode_table
+    from tfarm.tables.files import write_csv
+
+    found = find(subject, output, band)
+    if csv is not None:
+        write_csv(bode_table(found), csv)
+    if png is not None:
+        from tfarm.plots.files import save_png
+        from tfarm.plots.frequency import draw_bode
+
+        save_png(draw_bode(found), png)
+    if json or say_written(csv, png):
+        give(bode_answer(found), json, _print_bode)
+
+
+@app.command()
+@under_a_law
+def nyquist(arm: ArmName, png: Png = None, csv: Csv = None, json: Json = False, *, given: Given) -> None:
+    """Nyquist plot of the exact loop: the turns around -1 counted, beside the poles found in a box."""
+    subject = load_arm(arm)
+    law, said = law_of(subject, given)
+    from tfarm.cli.tables import say_written
+    from tfarm.loop.answers import nyquist_answer, nyquist_table
+    from tfarm.loop.closed import nyquist as find
+    from tfarm.tables.files import write_csv
+
+    found = find(subject, law)
+    if csv is not None:
+        write_csv(nyquist_table(found), csv)
+    if png is not None:
+        from tfarm.plots.disc import draw_disc
+        from tfarm.plots.files import save_png
+
+        save_png(draw_disc(found), png)
+    if json or say_written(csv, png):
+        give(nyquist_answer(found) | said, json, _print_nyquist)
+
+
+def _band(arm: Arm, start: float | None, stop: float | None) -> tuple[float, float] | None:
+    """The band [rad/s] that is asked for, an end that is not given as a page has it; None for the page's own."""
+    if start is None and stop is None:
+        return None
+    from tfarm.response.frequency import band_of
+
+    low, high = band_of(arm)
+    low, high = low if start is None else start, high if stop is None else stop
+    if not 0 < low < math.inf:
+        raise ParameterError(key="--from", value=low, remedy="a positive frequency in rad/s")
+    if not low < high < math.inf:
+        raise ParameterError(key="--to", value=high, remedy=f"a frequency above --from, {low:g} rad/s")
+    return low, high
+
+
+def _print_bode(answer: dict[str, Any]) -> None:
+    """Poles, then zeros."""
+    from tfarm.tables.terminal import show
+
+    low, high = answer["band_rad_s"]
+    print(f"{answer['arm']}: {answer['output']} / {answer['input']} [{answer['unit']}], {low:g} to {high:g} rad/s")
+    for kind in ("poles", "zeros"):
+        if len(answer[kind]):
+            print(f"{kind}:")
+            show(answer[kind])
+        else:
+            print(f"no {kind}")
+
+
+def _print_nyquist(answer: dict[str, Any]) -> None:
+    """The verdict, then the two counts."""
+    reach = f"up to {answer['band_rad_s']:.6g} rad/s"
+    print(f"{answer['arm']}: {answer['verdict'].upper()}")
+    print(f"turns around -1 {reach}, counter-clockwise positive: {answer['encirclements']}")
+    print(f"poles of L right of the contour: {answer['unstable_open']}")
+    print(
+        f"unstable poles by Nyquist's criterion: {answer['unstable_by_nyquist']}, in a box: {answer['unstable_roots']}"
+    )
+    if answer["on_axis"]:
+        print(f"undecided: {answer['on_axis']} that lie on the axis to working precision")
+    print(answer["beyond_the_band"])
+    print(answer["sign_convention"])

@@ -1,0 +1,71 @@
+"""Pictures of any linear law: its locus along one number, and the plane of two of them."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from tfarm.digits import plain, significant
+from tfarm.loop.law_locus import LawLocus
+from tfarm.loop.law_map import LawMap
+from tfarm.loop.loci import shown
+
+from .plane import colours, words_of_count
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, New, alone, blank, safe
+
+COLOURS = (BLUE, GREEN, PURPLE, "#7a5a00", GREY)  # of branches, in turn
+MARKED = 5  # values of the range that are marked along each branch
+FEWEST = 0.02  # of the picture: a count that holds in less of it has no name in the legend
+
+
+def draw_law_locus(found: LawLocus, new: New = blank) -> Figure:
+    """The poles of a `LawLocus` with Im s >= 0, on a figure of its own."""
+    title = f"{found.arm.name}: closed-loop poles of {found.law.name} along {found.vary}"
+    return alone(lambda ax: law_locus(found, ax=ax), (7.0, 5.6), title, new=new)
+
+
+def law_locus(found: LawLocus, *, ax: Axes) -> None:
+    """Branches [1/s] in the box, a cross where one begins, dots at every fourth of the range, diamonds on the axis."""
+    first, *rest = np.linspace(0, found.values.size - 1, MARKED).round().astype(int)
+    ax.axvline(0.0, color=INK, lw=0.9, zorder=1)
+    for number, branch in enumerate(shown(found.branches)):
+        colour = COLOURS[number % len(COLOURS)]
+        ax.plot(branch.real, branch.imag, color=colour, lw=1.4, zorder=2)
+        ax.plot(branch.real[first], branch.imag[first], "x", color=colour, ms=6, mew=1.4, zorder=4)
+        ax.plot(branch.real[rest], branch.imag[rest], "o", color=colour, ms=3.2, zorder=4)
+    for each in found.crossings:
+        ax.plot([0], [each.omega], "D", ms=6, mfc=ORANGE, mec="white", mew=0.8, zorder=6)
+        text = f"{plain(each.gain, 5)}, {significant(each.omega, 4)} rad/s"
+        ax.annotate(text, (0, each.omega), textcoords="offset points", xytext=(7, 0), fontsize=7.5, va="center")
+    begins, others = plain(float(found.values[first]), 3), [plain(float(found.values[n]), 3) for n in rest]
+    ax.plot([], [], "x", color=GREY, label=f"{safe(found.vary)} = {begins}")
+    ax.plot([], [], "o", color=GREY, ms=3.2, label=f"{safe(found.vary)} = {', '.join(others)}")
+    if found.crossings:
+        ax.plot([], [], "D", color=ORANGE, label=f"crosses the axis, at this {safe(found.vary)}")
+    ax.set_xlabel("Re s [1/s]")
+    ax.set_ylabel("Im s [rad/s]")
+
+
+def draw_law_map(found: LawMap, new: New = blank) -> Figure:
+    """The plane of a `LawMap`, on a figure of its own."""
+    title = f"{found.arm.name}: unstable poles below {significant(found.band, 5)} rad/s under {found.law.name}"
+    return alone(lambda ax: law_map(found, ax=ax), (7.0, 5.4), title, new=new)
+
+
+def law_map(found: LawMap, *, ax: Axes) -> None:
+    """Colours for the number of unstable poles, black dots for the exact crossings along the second number."""
+    image = colours(found.unstable)
+    ax.pcolormesh(found.x, found.y, image, shading="nearest", rasterized=True, zorder=0.1)
+    for count in np.unique(found.unstable):
+        if np.mean(there := found.unstable == count) > FEWEST:
+            ax.fill_between([], [], [], color=image[there][0], label=words_of_count(int(count)))
+    points = [(x, t) for x, each in zip(found.x, found.crossings, strict=False) for t in each.gain]
+    if points:
+        x, t = np.array(points).T
+        ax.plot(x, t, ".", color=INK, ms=2.0, label="a pole on the imaginary axis, exact")
+    ax.set_xlim(found.x[0], found.x[-1])
+    ax.set_ylim(found.y[0], found.y[-1])
+    ax.grid(False)
+    ax.set_xlabel(safe(found.vary[0]))
+    ax.set_ylabel(safe(found.vary[1]))
