@@ -1,4 +1,4 @@
-"""What a frozen record with arrays promises: arrays that cannot be written, an `==` that answers, a short repr, a table."""
+"""What frozen records with arrays promise: arrays that cannot be written, an `==` that answers, a short repr, HTML."""
 
 from __future__ import annotations
 

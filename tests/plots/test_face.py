@@ -1,5 +1,9 @@
 """Pictures from Python: what is drawn are the record's own numbers, in the axes that are given and in no other."""
 
+import importlib
+import inspect
+import pkgutil
+
 import matplotlib as mpl
 import numpy as np
 import pytest
@@ -267,3 +271,10 @@ def test_of_more_modes_than_axes_the_first_are_drawn():
 def test_too_few_axes_are_refused_with_how_many_it_takes(name, number, records):
     with pytest.raises(tfarm.ParameterError, match=rf"ax = 1: {number} axes, as figure.subplots\({number}\)"):
         getattr(tfarm.plots, name)(*records[name][0], ax=axes_for(0))
+
+
+def test_no_file_takes_the_name_of_a_picture_away():
+    """A submodule that is imported becomes an attribute of the room, in the place of a function of that name."""
+    for module in pkgutil.iter_modules(tfarm.plots.__path__):
+        importlib.import_module(f"tfarm.plots.{module.name}")
+    assert [name for name in tfarm.plots.__all__ if inspect.ismodule(getattr(tfarm.plots, name))] == []

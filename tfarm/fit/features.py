@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import find_peaks
 
+from tfarm.records import record
 from tfarm.response.signals import Signals
 
 from .around import Around, drive_behind, driven_by
@@ -28,6 +29,7 @@ SKIPPED = 0.25  # of ln w: what a peak that is matched with nothing costs
 
 
 @dataclass(frozen=True)
+@record
 class Features:
     """Peaks and dips [rad/s] of a response, ascending."""
 

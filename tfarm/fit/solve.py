@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.stats import chi2
 
+from tfarm.records import record
+
 from .model import Problem
 from .start import Starts
 
@@ -35,6 +37,7 @@ RESCALED = 3  # times that a noise known up to a factor takes its factor from th
 
 
 @dataclass(frozen=True)
+@record
 class Solution:
     """The best point found, with residuals, their Jacobian, and whether the search ended there in good order."""
 
