@@ -53,7 +53,7 @@ def model(x: Real, t: Real) -> tuple[Real, Real]:
         C, S = decay * np.cos(w * t), decay * np.sin(w * t)
         part = a * C + b * S
         values += part
-        J[:, at : at + EACH] = np.c_[-t * part, t * (b * C - a * S), C, S]
+        J[:, at], J[:, at + 1], J[:, at + 2], J[:, at + 3] = -t * part, t * (b * C - a * S), C, S
     return values, J
 
 
