@@ -90,7 +90,8 @@ def _estimated(answer: dict[str, Any]) -> None:
     segments = f"{answer['segments']} segments of {answer['segment_s']:.6g} s ({answer['window']}{overlapped})"
     print(f"{answer['output']} / {answer['input']}: {len(rows)} lines from {first:.6g} to {last:.6g} Hz")
     print(f"{answer['estimator']} of {segments}, worth {answer['independent_averages']:.4g} independent averages")
-    flat = f"a resonance narrower than {answer['resolution_hz']:.4g} Hz is flattened"
+    apart = f"{answer['resolution_hz']:.4g} Hz"
+    flat = f"a resonance narrower than {apart} is flattened" if answer["window"] == "hann" else f"lines {apart} apart"
     print(f"median coherence {answer['median_coherence']:.4g}; {flat}")
     if answer["note"]:
         tell(answer["note"])

@@ -33,6 +33,7 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 
 MOST_MODES = 20
 NOT_WHITE = 1e-3  # probability below which residuals are called correlated
+RARE = 1e-9  # a probability below which its size says nothing more
 LEVEL = 0.95  # of the intervals
 ROUNDED = 1e-9  # of the signal and of w: what is less is rounding, of which nothing is said
 APART = 4.0  # standard deviations that the two halves of a record differ by before it is said
@@ -115,8 +116,9 @@ class Ring:
         """What is to be said beside the intervals."""
         found = [self.clock] if self.clock else []
         if not self.is_white:
+            chance = f"{self.white:.1g}" if self.white > RARE else f"below {RARE:g}"
             found.append(
-                f"the residuals are correlated (probability {self.white:.1g} if they were white noise): intervals are "
+                f"the residuals are correlated (probability {chance} if they were white noise): intervals are "
                 "by their autocovariance, and may be too narrow, above all if what is left is no noise"
             )
         for mode in np.flatnonzero(self.drifts):
