@@ -113,6 +113,10 @@ def _print(found: Fit, answer: dict[str, Any]) -> None:
     )
     for words in answer["not_determined"]:
         print(words)
+    if answer["records"] is not None:
+        print(answer["records"]["in_words"])
+        for key, (low, high) in answer["records"]["intervals"].items():
+            print(f"{key} by records: {low:.6g} to {high:.6g}")
     rows = zip(*answer["frequencies_hz"].values(), strict=True)
     shown = [" -> ".join("-" if each is None else f"{each:.5g}" for each in row) for row in rows]
     if shown:

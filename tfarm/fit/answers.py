@@ -18,6 +18,7 @@ from tfarm.files import write_file
 from .around import Around
 from .features import features_of, match, near_zeros
 from .fit import Fit
+from .repeats import WIDER, repeats
 from .sure import LEVEL, Fitted
 
 FAR = 0.1  # of ln w: a peak so far from all of the arm's is not one of them
@@ -80,6 +81,7 @@ def fit_answer(fit: Fit) -> dict[str, Any]:
         "responses": [
             _response(each, rows) for each, rows in zip(fit.solution.problem.responses, fit.parts, strict=True)
         ],
+        "records": _records(fit),
         "starts": fit.solution.starts,
         "in_words": in_words(fit),
         "arm": tomllib.loads(to_toml(fit.arm)),
@@ -109,6 +111,29 @@ def _response(one: Any, residuals: Any) -> dict[str, Any]:
         "to_hz": float(one.data.omega[-1]) / (2 * np.pi),
         "noise": one.noise.road,
         "chi_squared": float(residuals @ residuals),
+    }
+
+
+def _records(fit: Fit) -> dict[str, Any] | None:
+    """What the scatter between the records of one response says, where there are three of them or more."""
+    found = repeats(fit)
+    if found is None:
+        return None
+    wider = dict(zip(found.keys, found.times_wider.tolist(), strict=True))
+    told = [f"{key} {times:.3g} times" for key, times in wider.items() if times > WIDER]
+    words = f"drawn anew from {len(found.each)} records of {found.response}, "
+    words += (
+        f"the numbers scatter more than their noise says: {listed(told)}"
+        if told
+        else "they scatter as their noise says"
+    )
+    return {
+        "response": found.response,
+        "count": len(found.each),
+        "each": [dict(zip(found.keys, row, strict=True)) for row in found.each.tolist()],
+        "intervals": dict(zip(found.keys, found.intervals.tolist(), strict=True)),
+        "times_wider": wider,
+        "in_words": words,
     }
 
 

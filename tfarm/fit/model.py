@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import INPUTS, Arm
+from tfarm.arm.keys import Family
 from tfarm.errors import ParameterError
 from tfarm.exact.jets import Jet
 from tfarm.exact.outputs import OUTPUTS
@@ -23,7 +24,7 @@ from tfarm.response.signals import Signals
 from .around import Around, drive_behind, driven_by
 from .data import Measured
 from .noise import Noise, noise_of
-from .parameters import STEP, Family, Parameter
+from .parameters import STEP, Parameter
 from .reading import check_signal
 from .ringing import RingMode, ring_residuals
 

@@ -7,18 +7,14 @@ search is a share of the number.
 from __future__ import annotations
 
 import math
-import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm
-from tfarm.arm.schema import arm_of_table
-from tfarm.arm.tables import TABLES
-from tfarm.arm.writing import to_toml
+from tfarm.arm.keys import Family
 from tfarm.errors import ParameterError, did_you_mean
 from tfarm.records import record
 from tfarm.spectrum.scales import first_frequency
@@ -71,42 +67,6 @@ class Parameter:
     def slope(self, coordinate: float) -> float:
         """d value/d coordinate."""
         return self.value(coordinate) if self.by_logarithm else self.size
-
-
-class Family:
-    """The arms that an arm becomes as some of its numbers run, by their TOML keys.
-
-    Raises ParameterError for a key that the arm does not have, naming the nearest.
-    """
-
-    def __init__(self, arm: Arm, keys: Sequence[str]) -> None:
-        self.arm, self.keys = arm, tuple(keys)
-        self._table = tomllib.loads(to_toml(arm))
-        known = list(_known(self._table))
-        for key in keys:
-            if key not in known:
-                raise ParameterError(key="free", value=key, remedy=did_you_mean(key, known))
-        if repeated := {key for key in keys if keys.count(key) > 1}:
-            raise ParameterError(key="free", value=min(repeated), remedy="is named twice; once is enough")
-
-    def at(self, values: Mapping[str, float]) -> Arm:
-        """The arm with those numbers in their places.  Raises ParameterError where it is none."""
-        table = _copy(self._table)
-        for key, value in values.items():
-            _set(table, key, value)
-        return arm_of_table(table)
-
-    def value(self, key: str) -> float:
-        """The arm's own number: what its file says, or its default."""
-        place, name = _table_of(self._table, key)
-        if name == "poissons_ratio":
-            return float(place["youngs_modulus"] / (2 * place["shear_modulus"]) - 1)
-        if name in place:
-            return float(place[name])
-        if name == "back_emf_constant":
-            return float(place["torque_constant"])
-        words = key.split(".")
-        return float(TABLES[words[0]].model_fields[words[-1]].default)
 
 
 def parameters(
@@ -179,42 +139,3 @@ def _typical(arm: Arm, key: str, own: float) -> float:
     if name not in of_the_arm:
         raise ParameterError(key=f"start of {key}", value=own, remedy="say where to start the search")
     return 0.01 * of_the_arm[name] if own == 0 else 100 * of_the_arm[name]
-
-
-# ------------------------------------------------------------ places in a table
-
-
-def _known(table: Mapping[str, Any]) -> Iterator[str]:
-    """The keys of all numbers that the arm's file holds or could hold."""
-    alone = isinstance(table["link"], dict)
-    links = [table["link"]] if alone else table["link"]
-    for number, link in enumerate(links, start=1):
-        place = "link" if alone else f"link.{number}"
-        yield from (f"{place}.{name}" for name in TABLES["link"].model_fields if name != "section")
-        yield from (f"{place}.section.{name}" for name, value in link["section"].items() if not isinstance(value, str))
-    for number in range(1, 1 + len(table.get("attachment", ()))):
-        yield from (f"attachment.{number}.{name}" for name in TABLES["attachment"].model_fields)
-    for room in ("hub", "clamp", "joint", "payload", *(["motor"] if "motor" in table else [])):
-        yield from (f"{room}.{name}" for name in TABLES[room].model_fields)
-
-
-def _table_of(table: dict[str, Any], key: str) -> tuple[dict[str, Any], str]:
-    """The innermost table of a key, made where it is not there, and the name in it."""
-    *places, name = key.split(".")
-    here: Any = table
-    for place in places:
-        here = here[int(place) - 1] if isinstance(here, list) else here.setdefault(place, {})
-    return here, name
-
-
-def _set(table: dict[str, Any], key: str, value: float) -> None:
-    here, name = _table_of(table, key)
-    if name == "poissons_ratio":
-        del here["shear_modulus"]
-    here[name] = value
-
-
-def _copy(table: Any) -> Any:
-    if isinstance(table, dict):
-        return {key: _copy(value) for key, value in table.items()}
-    return [_copy(value) for value in table] if isinstance(table, list) else table

@@ -9,15 +9,15 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm
+from tfarm.arm.keys import Family
 from tfarm.arm.records import ADJUSTABLE
-from tfarm.errors import ParameterError, did_you_mean
+from tfarm.errors import ParameterError
 from tfarm.records import record
 
 Real = NDArray[np.float64]
@@ -28,7 +28,6 @@ MOST_ARMS = 8  # of a list
 DECADE = 10.0  # a range of numbers of one sign whose ends are further apart is one of logarithms
 TRIED, SEED = 24, 0  # arms inside the box, and of which numbers
 STEPS = (0.25, 0.125, 0.0625)  # of the box: from the worst of them on, along each of its numbers
-ROOMS = ("link", "hub", "payload", "clamp", "joint", "motor", "gauge")
 DOTTED = {f"{room}.{field}": name for name, (room, field) in ADJUSTABLE.items()}
 
 
@@ -50,20 +49,7 @@ def varied(arm: Arm, key: str, value: float) -> Arm:
     name = DOTTED.get(key, key)
     if name in ADJUSTABLE:
         return arm.having(**{name: value})
-    room, _, number = key.partition(".")
-    part: Any = getattr(arm, room) if room in ROOMS else None
-    known = sorted([*DOTTED, *ADJUSTABLE, *(f"{each}.{n}" for each in ROOMS for n in _numbers(getattr(arm, each)))])
-    if part is None or number not in _numbers(part):
-        raise ParameterError(key="range", value=key, remedy=did_you_mean(key, known))
-    if room == "link" and arm.outer:
-        remedy = f"which of the {len(arm.links)} segments is meant? write their [[link]] tables anew, and take a list"
-        raise ParameterError(key="range", value=key, remedy=remedy)
-    return replace(arm, **{room: replace(part, **{number: value})})
-
-
-def _numbers(part: Any) -> list[str]:
-    """The fields of a part of an arm that hold one number; none of a part that is not there."""
-    return [] if part is None else [each.name for each in fields(part) if isinstance(getattr(part, each.name), float)]
+    return Family(arm, (key,), "range").at({key: value})
 
 
 @dataclass(frozen=True)
