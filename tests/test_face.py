@@ -53,6 +53,8 @@ def test_no_name_of_the_face_is_a_room_but_plots():
         "loop",
         "dsp",
         "tuner",
+        "fitting",
+        "synthesis",
         "audit",
         "report",
         "cli",
@@ -69,6 +71,7 @@ def test_a_name_in_the_place_of_an_arm_is_refused_with_what_to_write(arm):
         lambda: tfarm.closed_loop_poles(arm, law, 3),
         lambda: tfarm.margins(arm, law),
         lambda: tfarm.reduce(arm, ["root_moment"], order=4),
+        lambda: tfarm.fit(arm, [], free=["hub.inertia"]),
     )
     for call in calls:
         with pytest.raises(tfarm.ParameterError, match=r"arm = .*: is no Arm; give tfarm.load\('[\w.]+'\)"):

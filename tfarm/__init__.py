@@ -36,9 +36,10 @@ if TYPE_CHECKING:
     from tfarm.dsp.results import simulate
     from tfarm.errors import CertificationError, ConvergenceError, ParameterError
     from tfarm.exact.outputs import Output
-    from tfarm.fit.data import Measured
-    from tfarm.fit.overlay import overlay
-    from tfarm.fit.reading import read_measured
+    from tfarm.fitting.data import Measured
+    from tfarm.fitting.fit import fit
+    from tfarm.fitting.overlay import overlay
+    from tfarm.fitting.reading import read_measured
     from tfarm.loop.closed import closed_loop_poles, margins, nyquist
     from tfarm.loop.locus import locus
     from tfarm.loop.regions import region as map
@@ -74,6 +75,7 @@ __all__ = [
     "damped_modes",
     "default_gains",
     "design",
+    "fit",
     "load",
     "locus",
     "map",
@@ -103,12 +105,13 @@ _ROOMS = {  # where a name stands; what it is called there after a colon, if not
     "map": "loop.regions:region",
     "margins": "loop.closed",
     "Law": "arm.law",
-    "Measured": "fit.data",
+    "Measured": "fitting.data",
+    "fit": "fitting.fit",
     "modes": "spectrum",
     "Output": "exact.outputs",
-    "overlay": "fit.overlay",
+    "overlay": "fitting.overlay",
     "plots": "plots",
-    "read_measured": "fit.reading",
+    "read_measured": "fitting.reading",
     "reduce": "reduced",
     "sampled": "dsp.closed",
     "simulate": "dsp.results",

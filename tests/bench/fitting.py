@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 import tfarm
-from tests.fit.planted import elements_response
+from tests.fitting.planted import elements_response
 from tfarm import Arm, Measured
-from tfarm.fit.fit import fit
-from tfarm.fit.model import Problem
-from tfarm.fit.solve import settled
+from tfarm.fitting.fit import fit
+from tfarm.fitting.model import Problem
+from tfarm.fitting.solve import settled
 
 from .reference import Complex
 from .rows import Row, Target

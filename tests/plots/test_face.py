@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 import tfarm
 from tfarm.dsp import gain_map
-from tfarm.fit.data import Measured
+from tfarm.fitting.data import Measured
 from tfarm.loop.nyquist import compressed
 from tfarm.loop.reduced_locus import reduced_locus
 from tfarm.plots.plane import colours

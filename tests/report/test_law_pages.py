@@ -16,7 +16,7 @@ from tfarm.arm.law_tables import load_law
 from tfarm.dsp import Chain, load_chain
 from tfarm.dsp.law_loop import sampled_law
 from tfarm.dsp.law_verdict import law_verdict
-from tfarm.fit.runs import beside, load_run, overshoot
+from tfarm.fitting.runs import beside, load_run, overshoot
 from tfarm.report import law_sampled_section as in_time
 from tfarm.report import writing
 from tfarm.report.given_laws import GivenLaw, Subject, on_arm

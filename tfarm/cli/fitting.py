@@ -13,7 +13,7 @@ from tfarm.cli.app import ArmName, Json, app, give, load_arm, tell
 from tfarm.errors import ParameterError
 
 if TYPE_CHECKING:
-    from tfarm.fit.fit import Fit
+    from tfarm.fitting.fit import Fit
 
 DATA = "OUTPUT/INPUT=FILE, such as tip_acceleration/hub_angle=sweep.csv; again for each response"
 FREE = "what is free: keys of the arm's file, such as link.youngs_modulus, and gain, delay of each sensor"
@@ -47,11 +47,11 @@ def fit(
     """The numbers of an arm that explain what was measured of it, with intervals, and what is left open."""
     subject = load_arm(arm)
     from tfarm.cli.tables import say_written
-    from tfarm.fit.answers import fit_answer, save_fit
-    from tfarm.fit.fit import fit as find
-    from tfarm.fit.overlay import check_unit
-    from tfarm.fit.reading import data_of
-    from tfarm.fit.ringing import mode_of
+    from tfarm.fitting.answers import fit_answer, save_fit
+    from tfarm.fitting.fit import fit as find
+    from tfarm.fitting.overlay import check_unit
+    from tfarm.fitting.reading import data_of
+    from tfarm.fitting.ringing import mode_of
 
     measured = [data_of(text) for text in data or []]
     for each in measured:
@@ -103,7 +103,7 @@ def _report(found: Fit, out: Path) -> Path:
 
 
 def _print(found: Fit, answer: dict[str, Any]) -> None:
-    from tfarm.fit.answers import parameters_table
+    from tfarm.fitting.answers import parameters_table
     from tfarm.tables.terminal import show
 
     print(f"{answer['arm_name']}: {answer['in_words']}")

@@ -139,7 +139,7 @@ def law_of(arm: Arm, given: Given) -> tuple[HubFeedback | Law, dict[str, Any]]:
 def laws_of(arm: Arm, name: str, gains: dict[str, float | None], files: Sequence[str]) -> tuple[GivenLaw, ...]:
     """The laws that a page is about: those of files, gains that are typed, the arm's own [law]; else none."""
     from tfarm.arm.law_tables import load_law
-    from tfarm.fit.runs import load_run
+    from tfarm.fitting.runs import load_run
     from tfarm.report.given_laws import GivenLaw
 
     if not files and all(value is None for value in gains.values()) and load_law(name) is None:

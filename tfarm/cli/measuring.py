@@ -38,9 +38,9 @@ def frf(
     """The frequency response of a record over time, by averaged cross-spectra, with coherence."""
     named, columns = zip(*(_named(each) for each in (output, input)), strict=True)
     from tfarm.cli.tables import say_written
-    from tfarm.fit.record_answers import estimate_answer, measured_table
-    from tfarm.fit.recording import read_recording
-    from tfarm.fit.spectra import frequency_response
+    from tfarm.fitting.record_answers import estimate_answer, measured_table
+    from tfarm.fitting.recording import read_recording
+    from tfarm.fitting.spectra import frequency_response
     from tfarm.tables.files import write_csv
     from tfarm.tables.terminal import show
 
@@ -65,10 +65,10 @@ def ring(
     json: Json = False,
 ) -> None:
     """Frequency and damping of a decay, with intervals."""
-    from tfarm.fit.record_answers import ring_answer
-    from tfarm.fit.recording import read_recording
-    from tfarm.fit.ringdown import MOST_MODES
-    from tfarm.fit.ringdown import ring as find
+    from tfarm.fitting.record_answers import ring_answer
+    from tfarm.fitting.recording import read_recording
+    from tfarm.fitting.ringdown import MOST_MODES
+    from tfarm.fitting.ringdown import ring as find
 
     count = whole("--modes", modes, 1, MOST_MODES)
     found = find(read_recording(record), signal, start=start, stop=stop, modes=count)

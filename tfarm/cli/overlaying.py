@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from tfarm.cli.app import give
 from tfarm.cli.tables import say_written
-from tfarm.fit.overlay import overlay
-from tfarm.fit.overlay_answer import curves_table, overlay_answer, required_table
-from tfarm.fit.reading import data_of
+from tfarm.fitting.overlay import overlay
+from tfarm.fitting.overlay_answer import curves_table, overlay_answer, required_table
+from tfarm.fitting.reading import data_of
 from tfarm.tables.files import write_csv
 from tfarm.tables.terminal import show
 

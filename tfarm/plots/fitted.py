@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tfarm.fit.fit import Fit
+from tfarm.fitting.fit import Fit
 
 from .style import BLUE, GREY, ORANGE, New, blank, headline, style
 

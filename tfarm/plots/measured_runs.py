@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tfarm.fit.runs import Beside
+from tfarm.fitting.runs import Beside
 
 from .style import BLUE, GREY, ORANGE, blank, headline, safe, style
 

@@ -13,7 +13,7 @@ from matplotlib.ticker import FuncFormatter, MultipleLocator, NullFormatter
 from numpy.typing import NDArray
 
 from tfarm.digits import plain
-from tfarm.fit.overlay import Overlay
+from tfarm.fitting.overlay import Overlay
 
 from .style import BLUE, FAINT, GREY, INK, ORANGE, New, blank, headline, style, taken, window
 

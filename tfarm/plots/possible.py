@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tfarm.arm import unit_of, written_unit
-from tfarm.fit.possible import Possible, response_band, share_stable
+from tfarm.fitting.possible import Possible, response_band, share_stable
 
 from .style import BLUE, New, blank, headline, style
 

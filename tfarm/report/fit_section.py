@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from tfarm.columns import Column, Table
 from tfarm.digits import general, listed, plain, singly
 from tfarm.errors import ConvergenceError
-from tfarm.fit.answers import in_words, known, parameters_table, resonances
-from tfarm.fit.fit import Fit
-from tfarm.fit.possible import ARMS, Possible, interval, loop_on_all, possible
+from tfarm.fitting.answers import in_words, known, parameters_table, resonances
+from tfarm.fitting.fit import Fit
+from tfarm.fitting.possible import ARMS, Possible, interval, loop_on_all, possible
 from tfarm.loop.regions import ranges_of
 from tfarm.plots.fitted import draw_fit
 from tfarm.plots.possible import draw_band, draw_share

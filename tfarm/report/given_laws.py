@@ -13,8 +13,8 @@ from tfarm.dsp import Chain
 from tfarm.dsp.discretise import discretised
 from tfarm.dsp.loop import check_loop
 from tfarm.errors import one_line
-from tfarm.fit.fit import Fit
-from tfarm.fit.runs import MeasuredRun
+from tfarm.fitting.fit import Fit
+from tfarm.fitting.runs import MeasuredRun
 from tfarm.loop.law_loop import LawLoop
 from tfarm.plots.words import gains_words
 from tfarm.records import record

@@ -21,7 +21,7 @@ from tfarm.dsp.margins import DelayMargin, delay_margin
 from tfarm.dsp.results import residual_moment_rms, simulate
 from tfarm.dsp.slews import LASTING
 from tfarm.errors import ParameterError
-from tfarm.fit.runs import Beside, beside, overshoot
+from tfarm.fitting.runs import Beside, beside, overshoot
 from tfarm.plots.measured_runs import draw_beside
 from tfarm.plots.motion import draw_responses
 from tfarm.plots.style import safe

@@ -20,7 +20,7 @@ from tfarm.arm import Arm
 from tfarm.dsp import Chain
 from tfarm.errors import ParameterError, TfarmError, did_you_mean
 from tfarm.files import temporary_folder
-from tfarm.fit.fit import Fit
+from tfarm.fitting.fit import Fit
 from tfarm.report.card import save_card, written_cards
 from tfarm.report.given_laws import GivenLaw, Subject, check_laws
 from tfarm.report.page import QUESTIONS, arm_page, file_of, index_page

@@ -4,7 +4,7 @@ The squares of complex residuals have a minimum for every peak that lies on a wr
 30 % off ends in one of them.  Peaks and dips of a measured response are poles and zeros near the imaginary axis;
 matched in their order with those of the arm, their logarithms are nearly linear in those of the parameters.  From there
 the logarithms of the curves, under a loss that lets wrong pieces be, lead to where the squares have one minimum.
-Tuned on the survey `tests.fit.planted`: the counts and shares below.
+Tuned on the survey `tests.fitting.planted`: the counts and shares below.
 """
 
 from __future__ import annotations

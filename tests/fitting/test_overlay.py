@@ -9,11 +9,11 @@ import pytest
 import tfarm
 from tests.shell import answer, run
 from tfarm.errors import ParameterError
-from tfarm.fit.data import Measured
-from tfarm.fit.noise import noise_of
-from tfarm.fit.overlay import overlay
-from tfarm.fit.ratio import Ratio
-from tfarm.fit.resonances import must_be_in_unit, paired
+from tfarm.fitting.data import Measured
+from tfarm.fitting.noise import noise_of
+from tfarm.fitting.overlay import overlay
+from tfarm.fitting.ratio import Ratio
+from tfarm.fitting.resonances import must_be_in_unit, paired
 
 LAB = tfarm.load("sasaki2012-lab")
 TRUE = replace(LAB, link=replace(LAB.link, youngs_modulus=1.2 * LAB.link.youngs_modulus, damping=2e-4))

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tfarm.fit.recording import read_recording
-from tfarm.fit.spectra import frequency_response
+from tfarm.fitting.recording import read_recording
+from tfarm.fitting.spectra import frequency_response
 
 RECORD = read_recording(Path(__file__).parent.parent / "data" / "daisy-robot-arm" / "robot_arm.csv")
 SWEEP = 512  # samples

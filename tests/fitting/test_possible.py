@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.fit.test_fit import LAB, PAIRS, measured
-from tfarm.fit.fit import fit
-from tfarm.fit.possible import interval, loop_on_all, possible, response_band, share_stable
+from tests.fitting.test_fit import LAB, PAIRS, measured
+from tfarm.fitting.fit import fit
+from tfarm.fitting.possible import interval, loop_on_all, possible, response_band, share_stable
 from tfarm.report.fit_section import fit_section
 
 LAW = tfarm.HubFeedback(K1=0.3, K2=0.3)

@@ -5,7 +5,7 @@ import pytest
 import scipy.io
 
 from tfarm.errors import ParameterError
-from tfarm.fit.recording import read_recording
+from tfarm.fitting.recording import read_recording
 
 T = 0.002 * np.arange(50) + 1.0
 X, Y = np.sin(T), np.cos(T)

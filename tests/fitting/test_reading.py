@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from tfarm.errors import ParameterError
-from tfarm.fit.reading import data_of, measured_of, read_measured
-from tfarm.fit.recording import read_recording
+from tfarm.fitting.reading import data_of, measured_of, read_measured
+from tfarm.fitting.recording import read_recording
 
 HZ = np.array([1.0, 1.5, 2.25, 40.0])
 VALUES = np.array([1.0 + 2.0j, -0.25 - 0.5j, 3.0e-5 - 4.0e-5j, -2.0 + 0.0j])

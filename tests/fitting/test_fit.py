@@ -9,13 +9,13 @@ import pytest
 
 import tfarm
 from tests import chain_elements
-from tests.fit.planted import elements_response, judged, judged_pair
+from tests.fitting.planted import elements_response, judged, judged_pair
 from tests.shell import answer, run
 from tfarm.errors import ParameterError
-from tfarm.fit.answers import resonances
-from tfarm.fit.fit import fit
-from tfarm.fit.noise import noise_of
-from tfarm.fit.ringing import RingMode, mode_of
+from tfarm.fitting.answers import resonances
+from tfarm.fitting.fit import fit
+from tfarm.fitting.noise import noise_of
+from tfarm.fitting.ringing import RingMode, mode_of
 
 LAB = tfarm.load("sasaki2012-lab")
 OMEGA = np.geomspace(8.0, 1200.0, 160)

@@ -1,4 +1,4 @@
-"""Arms found again from responses of finite elements with noise:  python -m tests.fit.planted 300 [seed] [pairs]
+"""Arms found again from responses of finite elements with noise:  python -m tests.fitting.planted 300 [seed] [pairs]
 
 Random arms, two or three responses of an independent model (`tests.chain_elements`, nothing of tfarm in it), noise of
 known size, four to six free numbers, each started up to 30 % off.  A fit is right where its sum of squares is at most
@@ -19,8 +19,8 @@ import numpy as np
 
 import tfarm
 from tests import chain_elements
-from tfarm.fit.data import Measured
-from tfarm.fit.fit import fit
+from tfarm.fitting.data import Measured
+from tfarm.fitting.fit import fit
 from tfarm.spectrum.scales import first_frequency
 
 ALWAYS = ("link.youngs_modulus", "hub.inertia", "link.damping")

@@ -12,8 +12,8 @@ import pytest
 
 import tfarm
 from tests.shell import answer, run
-from tfarm.fit.recording import read_recording
-from tfarm.fit.ringing import mode_of
+from tfarm.fitting.recording import read_recording
+from tfarm.fitting.ringing import mode_of
 
 DATA = Path(__file__).parent.parent / "data" / "quanser-2dsfl"
 RUNS = ("ring-20deg.csv", "ring-neg-10deg.csv")

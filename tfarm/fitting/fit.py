@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm
+from tfarm.arm import Arm, must_be_arm
 from tfarm.errors import ParameterError
 from tfarm.records import record
 
@@ -119,6 +119,7 @@ def fit(
 
 
 def _problem(arm: Arm, data: Any, free: Any, start: Any, bounds: Any, priors: Any, rings: Any) -> Problem:
+    must_be_arm(arm)
     data = (data,) if isinstance(data, Measured) else tuple(data)
     if not data and not rings:
         raise ParameterError(key="data", value=0, remedy="give at least one measured response, or a decay (--mode)")

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.fit.test_fit import LAB, PAIRS, measured
-from tfarm.fit.fit import fit
-from tfarm.fit.repeats import repeats
+from tests.fitting.test_fit import LAB, PAIRS, measured
+from tfarm.fitting.fit import fit
+from tfarm.fitting.repeats import repeats
 
 OMEGA = np.geomspace(8.0, 600.0, 60)
 

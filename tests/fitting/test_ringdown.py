@@ -5,9 +5,9 @@ import pytest
 from scipy.signal import lfilter
 
 from tfarm.errors import ConvergenceError, ParameterError
-from tfarm.fit.decays import model, whiteness
-from tfarm.fit.recording import Recording
-from tfarm.fit.ringdown import ring
+from tfarm.fitting.decays import model, whiteness
+from tfarm.fitting.recording import Recording
+from tfarm.fitting.ringdown import ring
 
 T = 0.01
 t = T * np.arange(150)
