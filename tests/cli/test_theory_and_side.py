@@ -24,9 +24,11 @@ VERBS = {  # those that take an arm, as short as they go
 }
 UNASKED = {
     "assumptions",
+    "bode",
     "design",
     "fit",
     "map",
+    "nyquist",
     "report",
     "study",
     "tune",
