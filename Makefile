@@ -25,11 +25,15 @@ SURVEYS := \
 	loop.counts \
 	loop.agreement \
 	loop.loci \
+	loop.law_counts \
 	synthesis.designs \
+	synthesis.held_designs \
 	loop.nyquist_counts \
 	reduced.errors \
 	dsp.verdicts \
 	dsp.settled \
+	dsp.law_verdicts \
+	fitting.planted \
 	tuner.bounded \
 	cli.fuzz \
 	cli.kills \

@@ -199,7 +199,8 @@ def main(size, seed):
         if word.startswith(("wrong", "refused")):
             print(number, arm.damping, law.signals, law.delay, word, flush=True)
     print(dict(found), f"{1e3 * np.median(spent):.0f} ms a loop", flush=True)
+    return found["wrong"]
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 1)
+    sys.exit(main(int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 1) > 0)
