@@ -46,7 +46,7 @@ def fit(
 ) -> None:
     """The numbers of an arm that explain what was measured of it, with intervals, and what is left open."""
     subject = load_arm(arm)
-    from tfarm.cli.tables import say_written
+    from tfarm.cli.tables import progress, say_written
     from tfarm.fitting.answers import fit_answer, save_fit
     from tfarm.fitting.fit import fit as find
     from tfarm.fitting.overlay import check_unit
@@ -56,12 +56,13 @@ def fit(
     measured = [data_of(text) for text in data or []]
     for each in measured:
         check_unit(subject, each)
-    found = find(
-        subject, measured, [key.strip() for key in free.split(",") if key.strip()],
-        start={key: value for key, (value,) in _numbers("--start", start or [], 1)},
-        bounds=dict(_numbers("--bounds", bounds or [], 2)), priors=dict(_numbers("--prior", prior or [], 2)),
-        rings=[mode_of(text) for text in mode or []], profile=not covariance,
-    )  # fmt: skip
+    with progress() as advance:
+        found = find(
+            subject, measured, [key.strip() for key in free.split(",") if key.strip()],
+            start={key: value for key, (value,) in _numbers("--start", start or [], 1)},
+            bounds=dict(_numbers("--bounds", bounds or [], 2)), priors=dict(_numbers("--prior", prior or [], 2)),
+            rings=[mode_of(text) for text in mode or []], profile=not covariance, progress=advance,
+        )  # fmt: skip
     if save is not None:
         save_fit(found, save)
     if png is not None:

@@ -19,7 +19,7 @@ from .model import DELAY, GAIN, Problem, problem
 from .parameters import Parameter, parameters
 from .ringing import RingMode
 from .solve import Solution, is_explained, solved
-from .sure import Fitted, sureness
+from .sure import Fitted, Progress, sureness
 
 Real = NDArray[np.float64]
 
@@ -94,17 +94,18 @@ def fit(
     priors: Mapping[str, tuple[float, float]] | None = None,
     rings: Sequence[RingMode] = (),
     profile: bool = True,
+    progress: Progress | None = None,
 ) -> Fit:
     """The arm whose free numbers explain the measured responses best.
 
     `free` are keys of the arm's TOML file, and "gain" and "delay" of each response's sensor; `start`, `bounds` and
     `priors` (mean, deviation) are by key, in SI units; `rings` are decays of single modes.  With `profile` each
-    interval is that of the profile likelihood, otherwise of the covariance.
+    interval is that of the profile likelihood, otherwise of the covariance; `progress` is told (done, total, what).
     Raises ParameterError for a key that is none, and for more numbers than data.
     """
     subject = _problem(arm, data, free, start, bounds, priors, rings)
     found = solved(subject)
-    sure = sureness(found, profile=profile)
+    sure = sureness(found, profile=profile, progress=progress)
     return Fit(
         arm=replace(found.problem.arm(found.point), name=f"{arm.name}-fitted"),
         before=replace(subject.arm(np.zeros(len(subject.parameters))), name=arm.name),

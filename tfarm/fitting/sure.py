@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +16,8 @@ from tfarm.records import record
 from .solve import OPEN, Solution, principal_axes, settled
 
 Real = NDArray[np.float64]
+
+Progress = Callable[[int, int, str], object]
 
 LEVEL = 0.95
 TAKES_PART = 0.1  # of a unit vector: a smaller component has no part in it
@@ -50,10 +52,11 @@ class Sureness:
     not_determined: tuple[str, ...]
 
 
-def sureness(found: Solution, *, profile: bool) -> Sureness:
+def sureness(found: Solution, *, profile: bool, progress: Progress | None = None) -> Sureness:
     """The intervals of a solution's numbers: by profiles, or by its covariance where they are not asked for.
 
-    Along an open axis nothing changes, so one number of it is held while the others are profiled.
+    Along an open axis nothing changes, so one number of it is held while the others are profiled.  `progress` is told
+    (done, total, key) before each.
     """
     sizes, axes = principal_axes(found.jacobian)
     is_open = sizes < 1.0 / OPEN
@@ -64,6 +67,8 @@ def sureness(found: Solution, *, profile: bool) -> Sureness:
     fitted, words = [], [_said(axis, [each.key for each in found.problem.parameters]) for axis in axes[is_open]]
     alone = {int(abs(axis).argmax()): n for n, axis in enumerate(axes[is_open]) if (abs(axis) > TAKES_PART).sum() == 1}
     for n, each in enumerate(found.problem.parameters):
+        if progress is not None:
+            progress(n, len(found.problem.parameters), f"interval of {each.key}")
         value, slope = each.value(float(found.point[n])), abs(each.slope(float(found.point[n])))
         low = high = deviation = None
         if not unsure[n]:
