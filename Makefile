@@ -40,7 +40,7 @@ SURVEYS := \
 	report.plausible \
 	report.twice
 
-.PHONY: help install reports modes bode margins locus sampled tune audit test kernels survey lint bench clean
+.PHONY: help install reports modes bode margins locus sampled tune audit reference test kernels survey lint bench clean
 
 help: ## list these verbs
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile | while IFS="$$(printf '\t')" read -r verb what; do \
@@ -73,6 +73,9 @@ tune: $(INSTALLED) ## write one arm's gain tuner beside what it has to beat (ARM
 audit: $(INSTALLED) ## check the paper equation by equation
 	@$(BIN)/tfarm audit
 
+reference: $(INSTALLED) ## write the reference of the public names to reference/index.html
+	@$(BIN)/python -m pdoc --no-show-source -o reference tfarm && echo reference/index.html
+
 test: $(INSTALLED) ## run the tests
 	@$(BIN)/python -m pytest -n 2 --dist worksteal
 
@@ -94,7 +97,7 @@ bench: $(BENCH_INSTALLED) ## measure speed and memory, beside other packages
 	@$(BIN)/python -m tests.bench
 
 clean: ## remove everything that was generated
-	@rm -rf .venv build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	@rm -rf .venv build dist reference *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
 	@find reports -mindepth 1 -maxdepth 1 ! -name README.md ! -name pictures -exec rm -rf {} +
 	@find tfarm tests -name __pycache__ -type d -prune -exec rm -rf {} +
 

@@ -55,11 +55,28 @@ def of_an_arm(command: Callable[..., None]) -> Callable[..., None]:
 
 app = Verbs(
     name="tfarm",
-    help="Exact frequency-domain analysis of a rotating flexible Timoshenko arm.",
     add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
+
+
+def _say_version(asked: bool) -> None:
+    if asked:
+        from tfarm import __version__
+
+        print(f"tfarm {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def options_of_all(
+    version: Annotated[
+        bool, typer.Option("--version", is_eager=True, callback=_say_version, help="print the version, and exit")
+    ] = False,
+) -> None:
+    """Exact frequency-domain analysis of a rotating flexible Timoshenko arm."""
+
 
 ArmName = Annotated[str, typer.Argument(metavar="ARM", help="a preset's name or a TOML file", show_default=False)]
 TheoryName = Annotated[

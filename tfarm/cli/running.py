@@ -12,6 +12,7 @@ from tfarm.cli import (  # noqa: F401  each adds its verbs to the application
     commands,
     control,
     fitting,
+    help,
     loops,
     measuring,
     pictures,
@@ -54,11 +55,6 @@ def run(arguments: list[str]) -> int:
 
 def _call(arguments: list[str]) -> int:
     command = typer.main.get_command(app)
-    if arguments == ["--version"]:
-        from tfarm import __version__
-
-        print(f"tfarm {__version__}")
-        return 0
     check_verb(arguments[0], command)
     check_numbers(arguments)
     try:  # not command.main, which takes a closed pipe for an error

@@ -1,0 +1,35 @@
+"""Fit, design, export: from a measured response to the file of a law that holds on the arm that was measured."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+import tfarm
+from tfarm.arm.law_tables import load_law
+from tfarm.arm.law_writing import save_law
+from tfarm.fit.answers import save_fit
+from tfarm.fit.fit import fit
+
+sheet = tfarm.load("sasaki2012-lab")
+softer = replace(sheet.link, youngs_modulus=0.93 * sheet.link.youngs_modulus)
+bench = replace(sheet, link=softer)  # the rig, of which only `measured` is known
+omega = np.linspace(15.0, 300.0, 80)
+values = tfarm.transfer(bench, "root_moment")(1j * omega)
+measured = tfarm.Measured(output="root_moment", input="hub_torque", omega=omega, values=values)
+
+found = fit(sheet, [measured], free=["link.youngs_modulus"], profile=False)
+save_fit(found, Path("fitted.toml"))
+arm = tfarm.load("./fitted.toml")  # an arm as any other, for every command
+print(f"E = {arm.link.youngs_modulus:.8g} Pa, fitted to {omega.size} lines")
+
+chosen = tfarm.design(arm)  # K1 and K2 for the 10 ms loop
+save_law(tfarm.Law.of_gains(chosen.law), Path("law.toml"))  # for `--law law.toml`
+law = load_law("./law.toml")
+print(f"damping {100 * chosen.value:.4g} %;", tfarm.sampled(arm, law).verdict.sentence)
+print("on the rig itself:", tfarm.sampled(bench, law).verdict.word)
+
+model = tfarm.reduce(arm, ["root_moment", "hub_angle"], order=10)  # for a simulator of one's own
+matrices = model.state_space()  # of python-control
+np.savez("model.npz", A=matrices.A, B=matrices.B, C=matrices.C, D=matrices.D)
+print(f"order {model.order}, off by at most {model.worst_error:.1e}")
