@@ -9,8 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 import tfarm
-from tfarm.fit.fit import fit
-from tfarm.fit.reading import read_measured
+from tfarm.fitting.reading import read_measured
 
 sheet = tfarm.load("sasaki2012-lab")
 softer = replace(sheet.link, youngs_modulus=0.93 * sheet.link.youngs_modulus)
@@ -25,7 +24,7 @@ columns = np.column_stack([hertz, value.real, value.imag, sigma])
 np.savetxt("sweep.csv", columns, delimiter=",", header="hz,re,im,sigma", comments="")
 
 measured = read_measured("sweep.csv", "root_moment", "hub_torque")
-found = fit(sheet, [measured], free=["link.youngs_modulus", "hub.inertia"], profile=False)
+found = tfarm.fit(sheet, [measured], free=["link.youngs_modulus", "hub.inertia"], profile=False)
 print(found.verdict)
 for each in found.parameters:
     print(f"{each.key}: {each.value:.5g}, 95 % interval {each.low:.5g} to {each.high:.5g}")

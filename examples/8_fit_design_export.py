@@ -8,8 +8,7 @@ import numpy as np
 import tfarm
 from tfarm.arm.law_tables import load_law
 from tfarm.arm.law_writing import save_law
-from tfarm.fit.answers import save_fit
-from tfarm.fit.fit import fit
+from tfarm.fitting.answers import save_fit
 
 sheet = tfarm.load("sasaki2012-lab")
 softer = replace(sheet.link, youngs_modulus=0.93 * sheet.link.youngs_modulus)
@@ -18,7 +17,7 @@ omega = np.linspace(15.0, 300.0, 80)
 values = tfarm.transfer(bench, "root_moment")(1j * omega)
 measured = tfarm.Measured(output="root_moment", input="hub_torque", omega=omega, values=values)
 
-found = fit(sheet, [measured], free=["link.youngs_modulus"], profile=False)
+found = tfarm.fit(sheet, [measured], free=["link.youngs_modulus"], profile=False)
 save_fit(found, Path("fitted.toml"))
 arm = tfarm.load("./fitted.toml")  # an arm as any other, for every command
 print(f"E = {arm.link.youngs_modulus:.8g} Pa, fitted to {omega.size} lines")
