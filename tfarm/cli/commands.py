@@ -157,6 +157,7 @@ def report(
     delay_samples: Delay = None,
     dsp: DspFile = None,
     theory: TheoryName = None,
+    force: Annotated[bool, typer.Option("--force", help="make pages that are up to date again, too")] = False,
 ) -> None:
     """Write pages with pictures, tables and data: open index.html in a browser.
 
@@ -175,7 +176,16 @@ def report(
     left_out: list[str] = []
     with progress() as advance:
         pages = None if only is None else (only,)
-        page = write(subjects, out, chains=chains, laws=laws, only=pages, progress=advance, notice=left_out.append)
+        page = write(
+            subjects,
+            out,
+            chains=chains,
+            laws=laws,
+            only=pages,
+            force=force,
+            progress=advance,
+            notice=left_out.append,
+        )
     for text in left_out:
         print(f"tfarm: {one_line(text, 1000)}", file=sys.stderr)
     print(page)

@@ -7,14 +7,18 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from itertools import groupby
 from pathlib import Path
+from threading import Event, Thread
 from typing import Any
 
 from rich.console import Console
 
 from tfarm.arm import Arm
+from tfarm.cli.app import tell
 from tfarm.columns import Column, Table
 from tfarm.files import is_standard_output
 from tfarm.tables.terminal import show
+
+EVERY = 4.0  # seconds from one line of progress to the next
 
 
 def presets_table(arms: list[Arm]) -> Table:
@@ -129,12 +133,34 @@ def say_written(*paths: Path | None) -> bool:
 
 @contextmanager
 def progress() -> Iterator[Callable[[int, int, str], None] | None]:
-    """A progress bar on a terminal, nothing in a pipe."""
+    """A progress bar on a terminal; in a pipe a line every few seconds, of what was done last."""
     if not sys.stderr.isatty():
-        yield None
+        with _lines() as advance:
+            yield advance
         return
     from rich.progress import Progress
 
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("", total=None)
         yield lambda done, total, text: bar.update(task, completed=done, total=total, description=text)
+
+
+@contextmanager
+def _lines() -> Iterator[Callable[[int, int, str], None]]:
+    """A line on standard error every EVERY seconds that the work takes."""
+    state, over = ["starting"], Event()
+
+    def advance(done: int, total: int, text: str) -> None:
+        state[0] = f"{done} of {total} done, last: {text}" if done else f"0 of {total} done"
+
+    def speak() -> None:
+        while not over.wait(EVERY):
+            tell(state[0])
+
+    speaker = Thread(target=speak, daemon=True)
+    speaker.start()
+    try:
+        yield advance
+    finally:
+        over.set()
+        speaker.join()

@@ -49,7 +49,7 @@ STYLE = {
     "svg.hashsalt": "tfarm",
     "svg.fonttype": "path",
     "pdf.fonttype": 42,
-    "path.simplify": False,
+    "path.simplify": True,  # where a line strays less than a ninth of a pixel
 }
 
 Keys = tuple[list[Line2D], list[str]]  # of a legend

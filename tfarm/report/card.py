@@ -16,7 +16,7 @@ from tfarm.plots.frequency import draw_card
 from tfarm.report.arm_section import headline_numbers
 from tfarm.report.kept import keep, kept
 from tfarm.report.page import QUESTIONS, Card, summary
-from tfarm.report.sections import Fact
+from tfarm.report.sections import PICTURES, Fact
 from tfarm.response.frequency import bode
 
 FACTS = 4  # of the headline numbers
@@ -24,9 +24,10 @@ PAGES = {"index": "full report", **QUESTIONS}
 
 
 def save_card(arm: Arm, folder: Path, laws: Sequence[str] = ()) -> None:
-    """card.svg and card.json; a picture that cannot be made is left out, as its section on the page is."""
+    """pictures/card.svg and card.json; a picture that cannot be made is left out, as its section on the page is."""
     try:
-        save(draw_card(bode(arm, "root_moment")), folder, "card", formats=("svg",))
+        (folder / PICTURES).mkdir(exist_ok=True)
+        save(draw_card(bode(arm, "root_moment")), folder / PICTURES, "card", formats=("svg",))
     except TfarmError:
         picture = ""
     else:
@@ -44,6 +45,6 @@ def _card(read: dict[str, Any], folder: Path) -> Card | None:
     """None for an arm that has no page."""
     pages = tuple((f"{page}.html", title) for page, title in PAGES.items() if (folder / f"{page}.html").is_file())
     facts = [Fact(label=str(a), value=str(b), unit=str(c), beside=str(d)) for a, b, c, d in read["facts"]]
-    picture = "card.svg" if read.get("picture", "card.svg") else ""
+    picture = "pictures/card.svg" if read.get("picture", "card.svg") else ""
     card = Card(name=folder.name, summary=str(read["summary"]), facts=facts, pages=pages, picture=picture)
     return card if pages else None

@@ -10,12 +10,15 @@ from typing import TYPE_CHECKING
 from markupsafe import Markup
 
 from tfarm.columns import Table
-from tfarm.plots.files import FORMATS, save
+from tfarm.plots.files import save
 from tfarm.tables.files import save as save_table
 from tfarm.tables.html import as_html
 
 if TYPE_CHECKING:
     from tfarm.plots.style import Figure
+
+
+PICTURES, DATA = "pictures", "data"  # the folders of an arm's folder, beside its pages
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,7 +87,9 @@ class SavedSection:
 
 
 def save_section(section: Section, folder: Path) -> SavedSection:
-    """Every picture as SVG, PNG and PDF, every table as CSV and JSON."""
+    """Every picture as pictures/*.svg, its numbers as data/*.csv; every table as data/*.csv and .json."""
+    for name in (PICTURES, DATA):
+        (folder / name).mkdir(exist_ok=True)
     blocks = tuple(_save(block, folder) for block in section.blocks)
     words = Section(
         anchor=section.anchor,
@@ -99,10 +104,14 @@ def save_section(section: Section, folder: Path) -> SavedSection:
 
 def _save(block: Picture | Table, folder: Path) -> Block:
     if isinstance(block, Table):
-        table, files = as_html(block), save_table(block, folder)
+        table, files = as_html(block), _below(DATA, save_table(block, folder / DATA))
         return Block(stem=block.stem, title=block.title, caption=block.caption, table=table, files=files)
-    save(block.figure, folder, block.stem)
-    files = tuple(f"{block.stem}.{kind}" for kind in FORMATS)
+    save(block.figure, folder / PICTURES, block.stem, formats=("svg",))
+    files = _below(PICTURES, [f"{block.stem}.svg"])
     if block.data is not None:
-        files += save_table(block.data, folder)
+        files += _below(DATA, save_table(block.data, folder / DATA, kinds=("csv",)))
     return Block(stem=block.stem, title=block.title, caption=block.caption, alt=block.alt, size=block.size, files=files)
+
+
+def _below(folder: str, names: Sequence[str]) -> tuple[str, ...]:
+    return tuple(f"{folder}/{name}" for name in names)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tfarm.arm import Arm
 from tfarm.columns import Column, Table
-from tfarm.digits import plain, significant
+from tfarm.digits import held, plain, significant
 from tfarm.dsp import Simulation, curves
 from tfarm.dsp.results import residual_moment_rms, settling_time
 from tfarm.dsp.slews import Slews
@@ -18,6 +19,7 @@ from tfarm.plots.motion import draw_responses
 if TYPE_CHECKING:
     from tfarm.plots.style import Figure
 
+HELD = 7  # digits of a curve in its file: a hundredth of the width of a line is four
 UNTIL = 0.9  # of a record: what has settled after that may ring on
 
 
@@ -97,7 +99,8 @@ def slews_table(data: Slews, stem: str) -> Table:
 def responses_table(stem: str, title: str, arm: Arm, each: Mapping[str, Simulation]) -> Table:
     """The curves of some simulations of one scenario as they are drawn: a row a point, or a piece of the bands.
 
-    Torques and gains are those held at that time, the rigid arm's moment that of the sample after it.
+    Torques and gains are those held at that time, the rigid arm's moment that of the sample after it.  Numbers have
+    HELD digits: a page's folder is no place for six thousand rows of eleven columns to the last bit.
     """
     found = [(key, curves.root_moment(run), curves.tip_deviation(arm, run), run) for key, run in each.items()]
     t = min((moment.t for _, moment, _, _ in found), key=len)
@@ -116,4 +119,5 @@ def responses_table(stem: str, title: str, arm: Arm, each: Mapping[str, Simulati
         columns.append(Column(name, given, arm.input_unit, of=curves.held(run, run.torque, t)))
         if run.gain is not None and np.ptp(run.gain):
             columns.append(Column(f"K_{key}", "gain", of=curves.held(run, run.gain, t)))
+    columns = [replace(each, of=held(map(float, each.values), HELD)) for each in columns]
     return Table(stem=stem, title=title, is_data=True, columns=tuple(columns))

@@ -6,9 +6,10 @@ arm (`trust_proofs.Proof`) is in its folder.  This module turns both into sectio
 
 from __future__ import annotations
 
+import json
 import platform
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -19,16 +20,17 @@ from tfarm.arm import load, presets
 from tfarm.audit import published
 from tfarm.columns import Column, Table
 from tfarm.digits import scientific, significant, singly, worded
+from tfarm.report.kept import LARGEST, keep
 from tfarm.report.page import command_for_all, render
-from tfarm.report.sections import Fact, Section, save_section
+from tfarm.report.sections import DATA, Fact, Section, save_section
 from tfarm.report.trust_audit import VERDICTS, audit_table, counts, shown
 from tfarm.report.trust_proofs import DIGITS, Proof, hash_of
 from tfarm.report.trust_tables import accuracy_table, boxes_tables, counts_table, digits_table
+from tfarm.report.unchanged import PACKAGES, makers
 from tfarm.response.accuracy import POINTS
 from tfarm.tables.files import save as save_table
 
-FOLDER = "trust"
-PACKAGES = ("numpy", "scipy", "numba", "mpmath", "python-flint", "sympy", "control", "matplotlib", "latex2mathml")
+FOLDER, KEPT = "trust", "evidence"
 
 PROOFS = (
     "Modes are counted before they are looked for: a chain of signs in the manner of Wittrick and Williams (1971) "
@@ -67,11 +69,30 @@ def gather() -> Evidence:
     return Evidence(audit=audit.audit(), published=published.validate())
 
 
+def keep_evidence(evidence: Evidence, folder: Path) -> None:
+    """evidence.json: for the next report of the same tfarm, which need not gather it again."""
+    keep(folder, KEPT, {"name": folder.name, "makers": makers(), **asdict(evidence)})
+
+
+def kept_evidence(folder: Path) -> Evidence | None:
+    """What is in evidence.json; None where it is of another tfarm or other versions, or none of ours."""
+    try:
+        file = folder / f"{KEPT}.json"
+        read = json.loads(file.read_text(encoding="utf-8")) if file.stat().st_size <= LARGEST else {}
+        if read["makers"] != makers():
+            return None
+        rows = tuple(audit.Row(**row) for row in read["audit"])
+        return Evidence(audit=rows, published=tuple(published.Row(**row) for row in read["published"]))
+    except (OSError, ValueError, TypeError, KeyError, RecursionError):
+        return None
+
+
 def write_trust(evidence: Evidence, proofs: Sequence[Proof], folder: Path) -> None:
     """index.html and its tables, into a folder of their own."""
     folder.mkdir()
     sections = {s.anchor: save_section(s, folder) for s in _sections(evidence, proofs)}
-    files = save_table(audit_table(evidence.audit), folder)
+    files = save_table(audit_table(evidence.audit), folder / DATA)
+    keep_evidence(evidence, folder)
     page = render(
         "trust.html",
         title="Why trust this",

@@ -26,14 +26,17 @@ from tfarm.report.given_laws import GivenLaw, Subject, check_laws
 from tfarm.report.page import QUESTIONS, arm_page, file_of, index_page
 from tfarm.report.pieces import LAW_PIECES, PIECES, Piece
 from tfarm.report.sections import SavedSection, Section, save_section
-from tfarm.report.trust import FOLDER, Evidence, gather, write_trust
+from tfarm.report.trust import FOLDER, Evidence, gather, kept_evidence, write_trust
 from tfarm.report.trust_proofs import save_proof, written_proofs
+from tfarm.report.unchanged import is_unchanged, key_of, note_made
 from tfarm.report.words import typeset
 
 Progress = Callable[[int, int, str], object]
 Notice = Callable[[str], object]
 
 WORKERS = 2
+ENOUGH = 8  # pieces of work of one arm for which a second process, which takes a second or two to start, is worth it
+LONG = ("tune", "sampled", "modes")  # anchors of the sections that take longest
 OURS = ("index.html", "README.md", "pictures", "bench.json", "trust")  # names in `out` that no arm's folder may have
 
 
@@ -53,6 +56,7 @@ def write(
     laws: Sequence[Sequence[GivenLaw]] | None = None,
     fits: Sequence[Fit | None] | None = None,
     only: tuple[str, ...] | None = None,
+    force: bool = False,
     progress: Progress | None = None,
     notice: Notice | None = None,
 ) -> Path:
@@ -61,9 +65,10 @@ def write(
     `chains` are the arms' own sampling, converters, actuators and slews; ideal ones at 10 ms if not given.  `laws` are
     those that each arm's page is about; where there is none it is about the default gains.  `fits` are where the arms'
     numbers are from, if they were fitted to measurements: their pages begin with these.
-    `only` ("bode", "modes", "margins", ...) writes those pages alone, out/<name>/bode.html and so on.  `progress` is
-    told (done, total, what) after each piece of work.  A section that tfarm cannot make of an arm says why in its
-    place, and `notice` is told so in one line, once the pages are written.  Raises ParameterError before any work if
+    `only` ("bode", "modes", "margins", ...) writes those pages alone, out/<name>/bode.html and so on.  An arm whose
+    pages are up to date is left as it is, unless `force`.  `progress` is told (done, total, what) after each piece of
+    work.  A section that tfarm cannot make of an arm says why in its place, and `notice` is told so in one line, once
+    the pages are written, as it is of an arm left as it was.  Raises ParameterError before any work if
     `out` cannot be written, two arms share a name or there is none, or an arm or its clock can make nothing of a law.
     If the work itself fails, `out` is as it was.
     """
@@ -76,23 +81,31 @@ def write(
     for subject in subjects:
         check_laws(subject.arm, subject.chain, subject.laws)
     out = Path(out)
+    told: list[str] = []
     with _beside(out, [arm.name for arm in arms] + [FOLDER] * (not only)) as beside:
-        folders = [beside / str(i) for i in range(len(arms))]
+        trust = TRUST if not only or (out / TRUST).is_file() else ""
+        left = [not force and is_unchanged(out / each.arm.name, _pages(only), trust, each) for each in subjects]
+        told += [_left(each.arm) for each, same in zip(subjects, left, strict=True) if same]
+        changed = [each for each, same in zip(subjects, left, strict=True) if not same]
+        folders = [beside / str(i) for i in range(len(changed))]
         for folder in folders:
             folder.mkdir()
-        sections, evidence = _make_all(subjects, folders, only or (), progress)
-        trust = TRUST if evidence is not None or (out / TRUST).is_file() else ""
-        for subject, folder, parts in zip(subjects, folders, sections, strict=True):
+        evidence = None if only or force else kept_evidence(out / FOLDER)
+        sections, gathered = _make_all(changed, folders, only or (), not only and evidence is None, progress)
+        for subject, folder, parts in zip(changed, folders, sections, strict=True):
             _write_pages(subject, folder, parts, only, trust)
-        for arm, folder in zip(arms, folders, strict=True):
-            _move_into(folder, out / arm.name)
-        if evidence is not None:
+            failures = list(_failures(subject.arm, parts))
+            told += failures
+            note_made(folder, out / subject.arm.name, () if failures else _pages(only), key_of(subject, trust))
+        for subject, folder in zip(changed, folders, strict=True):
+            _move_into(folder, out / subject.arm.name)
+        if (evidence := gathered or evidence) is not None:
             write_trust(evidence, written_proofs(out), beside / FOLDER)
             _move_into(beside / FOLDER, out / FOLDER)
         index = index_page(written_cards(out), trust=trust)
         (beside / "index.html").write_text(index, encoding="utf-8", newline="")
         os.replace(beside / "index.html", out / "index.html")
-    for text in _failures(arms, sections):
+    for text in told:
         if notice is not None:
             notice(text)
     alone = len(arms) == 1 and only is not None and len(only) == 1
@@ -155,10 +168,14 @@ def _remove(made: Sequence[Path]) -> None:
 
 
 def _make_all(
-    subjects: Sequence[Subject], folders: Sequence[Path], only: tuple[str, ...], progress: Progress | None
+    subjects: Sequence[Subject],
+    folders: Sequence[Path],
+    only: tuple[str, ...],
+    with_evidence: bool,
+    progress: Progress | None,
 ) -> tuple[list[list[SavedSection]], Evidence | None]:
-    """The sections of each arm's page, in the order of PIECES, and the evidence if whole reports are asked for."""
-    tasks: list[Task] = [] if only else [EVIDENCE]  # first: it takes longest
+    """The sections of each arm's page, in the order of PIECES, and the evidence if that is asked for."""
+    tasks: list[Task] = [EVIDENCE] * with_evidence
     tasks += [
         (i, j)
         for i, subject in enumerate(subjects)
@@ -168,7 +185,7 @@ def _make_all(
     tasks += [(i, CARD_ALONE if subject.laws and only else CARD) for i, subject in enumerate(subjects)]
     done: dict[Task, Result] = {}
     if progress is not None:
-        progress(0, len(tasks), subjects[0][0].name)
+        progress(0, len(tasks), _name_of(subjects, tasks[0]) if tasks else "nothing to make")
     for task, section in _results(subjects, folders, tasks):
         done[task] = section
         if progress is not None:
@@ -182,19 +199,32 @@ def _make_all(
 def _results(
     subjects: Sequence[Subject], folders: Sequence[Path], tasks: Sequence[Task]
 ) -> Iterator[tuple[Task, Result]]:
-    """Each task with its result as it comes: here, or by two processes where there is more than one arm."""
-    if len(subjects) == 1 or not _may_start_processes():
+    """Each task with its result as it comes: here, or by two processes where there is work for them."""
+    if not tasks or (len(subjects) == 1 and len(tasks) < ENOUGH) or WORKERS == 1 or not _may_start_processes():
         for task in tasks:
             yield task, _make(subjects[task[0]], task[1], folders[task[0]])
         return
     with ProcessPoolExecutor(WORKERS, get_context("spawn"), _leave_with_parent) as pool:
-        futures = {pool.submit(_make, subjects[i], piece, folders[i]): (i, piece) for i, piece in tasks}
+        futures = {
+            pool.submit(_make, subjects[i], piece, folders[i]): (i, piece)
+            for i, piece in _longest_first(subjects, tasks)
+        }
         try:
             for future in as_completed(futures):
                 yield futures[future], future.result()
         except BaseException:
             pool.shutdown(wait=True, cancel_futures=True)
             raise
+
+
+def _longest_first(subjects: Sequence[Subject], tasks: Sequence[Task]) -> list[Task]:
+    """The tasks with what takes longest before the rest, so that neither process waits for the other at the end."""
+
+    def is_short(task: Task) -> bool:
+        i, piece = task
+        return task != EVIDENCE and (isinstance(piece, str) or pieces_of(subjects[i])[piece].anchor not in LONG)
+
+    return sorted(tasks, key=is_short)
 
 
 def _leave_with_parent() -> None:
@@ -242,12 +272,20 @@ def _section(piece: Piece, subject: Subject) -> Section:
         return Section(anchor=piece.anchor, title=title, words=words, failure=str(error))
 
 
-def _failures(arms: Sequence[Arm], sections: Sequence[Sequence[SavedSection]]) -> Iterator[str]:
+def _failures(arm: Arm, parts: Sequence[SavedSection]) -> Iterator[str]:
     """A line for each section that could not be made."""
-    for arm, parts in zip(arms, sections, strict=True):
-        for part in parts:
-            if part.section.failure:
-                yield f"{arm.name}: the page leaves out “{part.section.title}” and says why: {part.section.failure}"
+    for part in parts:
+        if part.section.failure:
+            yield f"{arm.name}: the page leaves out “{part.section.title}” and says why: {part.section.failure}"
+
+
+def _pages(only: tuple[str, ...] | None) -> tuple[str, ...]:
+    """The pages written of an arm, as made.json names them."""
+    return only or ("index",)
+
+
+def _left(arm: Arm) -> str:
+    return f"{arm.name}: left as it is, for nothing that its page is made of has changed; --force makes it again"
 
 
 def _name_of(subjects: Sequence[Subject], task: Task) -> str:
@@ -275,5 +313,8 @@ def _answers(anchor: str, question: str) -> bool:
 
 def _move_into(made: Path, folder: Path) -> None:
     """Every file replaced in one step each, pages last, so that a page never names a file that is not there."""
-    for file in sorted(made.iterdir(), key=lambda file: (file.suffix == ".html", file.name)):
-        os.replace(file, folder / file.name)
+    files = [file for file in made.rglob("*") if file.is_file()]
+    for file in sorted(files, key=lambda file: (file.suffix == ".html", file.relative_to(made).as_posix())):
+        place = folder / file.relative_to(made)
+        place.parent.mkdir(exist_ok=True)
+        os.replace(file, place)

@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -67,9 +68,11 @@ def write_csv(table: Table, path: Path) -> None:
     write_file(path, as_csv(table, units=True).encode(), key="--csv")
 
 
-def save(table: Table, folder: Path) -> tuple[str, ...]:
-    """A report's table as CSV and JSON: the names of the two files."""
-    names = f"{table.stem}.csv", f"{table.stem}.json"
-    for name, text in zip(names, (as_csv(table), as_json(table)), strict=True):
-        (folder / name).write_text(text, encoding="utf-8", newline="")
-    return names
+RENDERERS = {"csv": as_csv, "json": as_json}
+
+
+def save(table: Table, folder: Path, kinds: Sequence[str] = tuple(RENDERERS)) -> tuple[str, ...]:
+    """A report's table as CSV and JSON, or one of these: the names of the files."""
+    for kind in kinds:
+        (folder / f"{table.stem}.{kind}").write_text(RENDERERS[kind](table), encoding="utf-8", newline="")
+    return tuple(f"{table.stem}.{kind}" for kind in kinds)
