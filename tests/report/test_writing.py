@@ -532,7 +532,9 @@ def test_a_bug_of_ours_stays_loud(tmp_path, monkeypatch):
 
 def test_every_piece_knows_the_anchor_of_its_section(pages):
     ids = links_of(pages / NAME / "index.html").ids
-    assert [piece.anchor for piece in writing.PIECES if piece.suits(ARM)] == [i for i in ids if i in ANCHORS]
+    assert [piece.anchor for piece in writing.PIECES if piece.is_for(Subject(ARM, Chain()))] == [
+        i for i in ids if i in ANCHORS
+    ]
     assert all(writing._answers(piece.anchor, page) for piece in writing.PIECES for page in piece.questions)
 
 
