@@ -122,7 +122,7 @@ def _of_the_loop(folder: Path) -> list[str]:
 
 def _rows(folder: Path, stem: str) -> list[dict[str, float | str]]:
     """The rows of a table's file; none where there is no such table."""
-    file = folder / f"{stem}.json"
+    file = folder / "data" / f"{stem}.json"
     return json.loads(file.read_text(encoding="utf-8"))["rows"] if file.is_file() else []
 
 

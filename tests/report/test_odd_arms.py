@@ -124,7 +124,8 @@ def test_a_contradiction_on_a_page_is_found(tmp_path):
     """The survey of plausible arms sees a count that differs from another, NaN, and a picture that is missing."""
     (tmp_path / "index.html").write_text("<p>K2 up to nan, at 1e-05</p><img src='gone.svg'>")
     rows = {"law": "x", "unstable_by_nyquist": 5, "unstable_in_box": 7, "on_axis_in_box": 0}
-    (tmp_path / "nyquist-count.json").write_text(json.dumps({"rows": [rows]}))
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data" / "nyquist-count.json").write_text(json.dumps({"rows": [rows]}))
     found = " ".join(plausible.contradictions(tmp_path))
     assert all(word in found for word in ("gone.svg", "'nan'", "'1e-05'", "5 by Nyquist, 7 in a box"))
     arms = [plausible.some_arm(np.random.default_rng([1, n]), "some") for n in range(3)]

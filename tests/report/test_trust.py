@@ -207,7 +207,7 @@ def test_versions_hashes_and_the_command_are_there(page, proof, tmp_path):
     assert proof.sha256 in page
     for name in ("numpy", "scipy", "mpmath", "python-flint", "sympy", "control", "matplotlib"):
         assert f">{name}</td>" in page
-    rows = json.loads((tmp_path / "trust" / "audit.json").read_text(encoding="utf-8"))["rows"]
+    rows = json.loads((tmp_path / "trust" / "data" / "audit.json").read_text(encoding="utf-8"))["rows"]
     assert {row["equation"] for row in rows} == set(CHEAP)
 
 

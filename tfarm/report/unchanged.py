@@ -1,7 +1,8 @@
 """Which pages need not be made again: what each was made of, and the hash of every file of it, kept in made.json.
 
 A page is made of the arm's file with its chain, the laws that it is about, the fit that its numbers are from, tfarm's
-own files and the versions of what computes and draws.  It is up to date if all of these are what they were and each of its files is as it was written.
+own files and the versions of what computes and draws.  It is up to date if all of these are what they were and each
+of its files is as it was written.
 """
 
 from __future__ import annotations
