@@ -11,6 +11,7 @@ import tfarm
 from tests import chain_elements
 from tests.fitting.planted import elements_response, judged, judged_pair
 from tests.shell import answer, run
+from tfarm.arm.keys import Family
 from tfarm.errors import ParameterError
 from tfarm.fitting.answers import resonances
 from tfarm.fitting.fit import fit
@@ -223,6 +224,43 @@ def test_bad_input_is_one_line(arguments, words, capsys):
     assert (code, out) == (2, "")
     assert words in err
     assert err.count("\n") == 1
+
+
+def test_young_s_modulus_takes_the_shear_modulus_along():
+    """Poisson's ratio stays, so that no step leads to a material that there is not."""
+    rig = tfarm.load("tests/rigs/bench-rig.toml")
+    family = Family(rig, ["link.1.youngs_modulus"])
+    stiff = family.at({"link.1.youngs_modulus": 3 * rig.link.youngs_modulus}).link
+    assert stiff.shear_modulus / stiff.youngs_modulus == pytest.approx(rig.link.shear_modulus / rig.link.youngs_modulus)
+    both = {"link.1.youngs_modulus": 1.1 * rig.link.youngs_modulus, "link.1.shear_modulus": rig.link.shear_modulus}
+    assert Family(rig, list(both)).at(both).link.shear_modulus == rig.link.shear_modulus
+
+
+def test_a_step_to_no_arm_is_a_wall():
+    """An attachment beside the tip that would pass it where the link grows shorter: the search ends at an arm."""
+    rig = tfarm.load("tests/rigs/bench-rig.toml")
+    omega = np.geomspace(20, 600, 60)
+    H = tfarm.transfer(rig, "tip_acceleration")(1j * omega)
+    sigma = 0.01 * abs(H)
+    data = tfarm.Measured(output="tip_acceleration", input="hub_torque", omega=omega, values=H, sigma=sigma)
+    found = fit(rig, data, free=["attachment.1.x", "link.2.length"], start={"attachment.1.x": 0.44}, profile=False)
+    assert found.arm.attachments[0].x <= found.arm.length * (1 + 1e-9)
+    near = fit(rig, data, free=["attachment.1.x", "link.2.length"], start={"attachment.1.x": 0.36}, profile=False)
+    assert near.arm.attachments[0].x == pytest.approx(0.3, abs=1e-4)
+    assert near.arm.links[1].length == pytest.approx(0.39, abs=1e-5)
+
+
+def test_a_profile_that_finds_a_better_valley_moves_there():
+    """From noise three times the signal: the interval holds the value, whatever valley the search began in."""
+    omega = np.geomspace(5, 800, 60)
+    rng = np.random.default_rng(0)
+    H = tfarm.transfer(LAB, "root_moment")(1j * omega)
+    values = H * (1 + 3 * (rng.standard_normal(60) + 1j * rng.standard_normal(60)))
+    data = tfarm.Measured(output="root_moment", input="hub_torque", omega=omega, values=values)
+    found = fit(LAB, data, free=["link.youngs_modulus", "hub.inertia"])
+    for each in found.parameters:
+        assert each.low is None or each.low <= each.value
+        assert each.high is None or each.value <= each.high
 
 
 def test_a_response_over_itself_is_refused():

@@ -16,7 +16,8 @@ from tfarm.errors import ParameterError, did_you_mean
 class Family:
     """The arms that an arm becomes as some of its numbers run, by their TOML keys.
 
-    Raises ParameterError, naming `what`, for a key that the arm does not have, with the nearest.
+    Poisson's ratio stays where Young's modulus runs alone: the shear modulus goes along.  Raises ParameterError, naming
+    `what`, for a key that the arm does not have, with the nearest.
     """
 
     def __init__(self, arm: Arm, keys: Sequence[str], what: str = "free") -> None:
@@ -33,7 +34,13 @@ class Family:
         """The arm with those numbers in their places.  Raises ParameterError where it is none."""
         table = _copy(self._table)
         for key, value in values.items():
-            _set(table, key, value)
+            here, name = _table_of(table, key)
+            place = key.removesuffix(name)
+            if name == "youngs_modulus" and not {f"{place}shear_modulus", f"{place}poissons_ratio"} & set(values):
+                here["shear_modulus"] *= value / here[name]
+            if name == "poissons_ratio":
+                del here["shear_modulus"]
+            here[name] = value
         return arm_of_table(table)
 
     def value(self, key: str) -> float:
@@ -70,13 +77,6 @@ def _table_of(table: dict[str, Any], key: str) -> tuple[dict[str, Any], str]:
     for place in places:
         here = here[int(place) - 1] if isinstance(here, list) else here.setdefault(place, {})
     return here, name
-
-
-def _set(table: dict[str, Any], key: str, value: float) -> None:
-    here, name = _table_of(table, key)
-    if name == "poissons_ratio":
-        del here["shear_modulus"]
-    here[name] = value
 
 
 def _copy(table: Any) -> Any:

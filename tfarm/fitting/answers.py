@@ -2,26 +2,33 @@
 
 from __future__ import annotations
 
-import math
 import tomllib
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from tfarm.arm import Arm
 from tfarm.arm.writing import to_toml
 from tfarm.columns import Column, Table
 from tfarm.digits import general, listed, singly
+from tfarm.errors import ConvergenceError
 from tfarm.files import write_file
 
 from .around import Around
-from .features import features_of, match, near_zeros
+from .data import Measured
+from .features import BEYOND, features_of, match, near_zeros
 from .fit import Fit
+from .ratio import Ratio
 from .repeats import WIDER, repeats
 from .sure import LEVEL, Fitted
 
-FAR = 0.1  # of ln w: a peak so far from all of the arm's is not one of them
+Real = NDArray[np.float64]
+
+FAR = 0.1  # of ln w, and the damping ratio: a peak farther from all of the arm's is not one of them
+BROADER = 2.0  # times the damping ratio: what a broad peak may lie off its pole
 SAME = 0.02  # of ln w: peaks of two responses nearer than that are one
 UNITS = {  # of a number by the last word of its key, in SI
     "length": "m", "radius": "m", "offset": "m", "x": "m", "width": "m", "depth": "m", "diameter": "m",
@@ -43,7 +50,7 @@ PARAMETERS = (
     Column("unit", "unit", of=lambda one: unit_of(one.key)),
     Column("value", "value", of="value", digits=singly(general, 6)),
     Column("low", "from", of="low", digits=singly(known, 6)),
-    Column("high", "to", of=lambda one: None if one.high == math.inf else one.high, digits=singly(known, 6)),
+    Column("high", "to", of="high", digits=singly(known, 6)),
     Column("std", "deviation", of="deviation", digits=singly(known, 3)),
     Column("identified", "known from these data", of=lambda one: "yes" if one.identified else "no"),
 )
@@ -93,7 +100,7 @@ def _parameter(fit: Fit, one: Fitted) -> dict[str, Any]:
     return {
         "value": one.value,
         "low": one.low,
-        "high": None if one.high == math.inf else one.high,
+        "high": one.high,
         "std": one.deviation,
         "identified": one.identified,
         "unit": unit_of(one.key),
@@ -145,17 +152,33 @@ def resonances(fit: Fit) -> list[tuple[float | None, float | None, float]]:
     found = {}
     for each in fit.solution.problem.responses:
         peaks = features_of(each.data, each.noise.sigma).peaks
-        before, after = (near_zeros(Around(arm, ()), each.data)[1][0] for arm in (fit.before, fit.arm))
+        (before, _), (after, ratio) = (_own_peaks(arm, each.data) for arm in (fit.before, fit.arm))
         places = dict(match(np.log(peaks), np.log(after)))
         earlier = dict(match(np.log(after), np.log(before)))
         for n, peak in enumerate(peaks):
-            own = places.get(n)
+            own = places.get(n, int(np.argmin(abs(np.log(after / peak)))) if after.size else None)
             first = earlier.get(own) if own is not None else None
             hertz = [None if row is None else float(w[row]) / (2 * np.pi) for w, row in ((before, first), (after, own))]
-            if own is None or abs(np.log(after[own] / peak)) > FAR:
+            if own is None or abs(np.log(after[own] / peak)) > FAR + BROADER * ratio[own]:
                 hertz = [None, None]
             found[each.data.input, round(float(np.log(peak)) / SAME)] = (*hertz, float(peak) / (2 * np.pi))
     return sorted(found.values(), key=lambda row: row[2])  # type: ignore[arg-type]
+
+
+def _own_peaks(arm: Arm, data: Measured) -> tuple[Real, Real]:
+    """|s| [rad/s], ascending, and damping ratio of a response's poles that oscillate, complete as far as was measured.
+
+    Where they cannot be told completely, those near the axis, as if undamped.
+    """
+    try:
+        poles = Ratio(arm, data.output, data.input).poles(BEYOND * float(data.omega[-1])).values
+    except ConvergenceError:
+        w = near_zeros(Around(arm, ()), data)[1][0]
+        return w, 0 * w
+    upper = poles[poles.imag > 0]
+    w = np.abs(upper)
+    order = np.argsort(w)
+    return w[order], (-upper.real / w)[order]
 
 
 def in_words(fit: Fit) -> str:

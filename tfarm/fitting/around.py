@@ -23,7 +23,10 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 
 
 class Around:
-    """An arm and its neighbours a step below and above along each free number, as chains, made once for each drive."""
+    """An arm and its neighbours a step below and above along each free number, as chains, made once for each drive.
+
+    Where there is no arm on one side, at the tip for what is attached, the arm itself stands in its place.
+    """
 
     def __init__(self, arm: Arm, pairs: Sequence[tuple[Arm, ...]]) -> None:
         self.arm, self._pairs = arm, pairs
@@ -35,9 +38,11 @@ class Around:
             pairs = [(chain_of(driven_by(a, driven)), chain_of(driven_by(b, driven))) for a, b in self._pairs]
             self._chains[driven] = chain_of(driven_by(self.arm, driven)), pairs
         chain, pairs = self._chains[driven]
-        signals = Signals(self.arm, names)
+        signals, own = Signals(self.arm, names), self.arm
         along = [
-            Direction(below, above, Signals(a, names).places, Signals(b, names).places, 2 * STEP)
+            Direction(
+                below, above, Signals(a, names).places, Signals(b, names).places, STEP * ((a != own) + (b != own))
+            )
             for (below, above), (a, b) in zip(pairs, self._pairs, strict=True)
         ]
         return response_gradients(chain, signals.outputs, signals.places, along, s)

@@ -18,10 +18,12 @@ from .data import Measured
 from .model import DELAY, GAIN, Problem, problem
 from .parameters import Parameter, parameters
 from .ringing import RingMode
-from .solve import Solution, is_explained, solved
-from .sure import Fitted, Progress, sureness
+from .solve import Solution, is_explained, settled, solved
+from .sure import BetterError, Fitted, Progress, sureness
 
 Real = NDArray[np.float64]
+
+MENDED = 4  # times that a profile may find a lower sum of squares than the search did
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,7 +107,15 @@ def fit(
     """
     subject = _problem(arm, data, free, start, bounds, priors, rings)
     found = solved(subject)
-    sure = sureness(found, profile=profile, progress=progress)
+    for _ in range(MENDED):
+        try:
+            sure = sureness(found, profile=profile, progress=progress)
+            break
+        except BetterError as better:
+            found = replace(settled(better.found.problem, better.found.point), starts=found.starts)
+    else:  # one valley after another: no end of it
+        found = replace(found, converged=False)
+        sure = sureness(found, profile=False)
     return Fit(
         arm=replace(found.problem.arm(found.point), name=f"{arm.name}-fitted"),
         before=replace(subject.arm(np.zeros(len(subject.parameters))), name=arm.name),

@@ -6,7 +6,7 @@ a sensor's gain and delay:  H = gain e^{-i w tau} N_out/N_in,  with the drive fo
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -31,6 +31,7 @@ from .ringing import RingMode, ring_residuals
 Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
 
+WALL = 10.0
 GAIN, DELAY = "gain", "delay"  # of a sensor: free beside the numbers of the arm
 
 
@@ -121,11 +122,16 @@ class Problem:
         """The arm at a point, and those a step away along each of its own numbers."""
         here = self.values(point)
         base = {key: here[key] for key in self.family.keys}
-        pairs = []
+        own, pairs = self.family.at(base), []
         for each, x in zip(self.of_the_arm, point, strict=False):
-            sides = (each.value(float(x) - STEP), each.value(float(x) + STEP))
-            pairs.append(tuple(self.family.at(base | {each.key: value}) for value in sides))
-        return Around(self.family.at(base), tuple(pairs))
+            sides = []
+            for step in (-STEP, STEP):
+                try:
+                    sides.append(self.family.at(base | {each.key: each.value(float(x) + step)}))
+                except ParameterError:
+                    sides.append(own)
+            pairs.append(tuple(sides))
+        return Around(own, tuple(pairs))
 
     def _with_slopes(self, n: int, over: Jet, under: Jet, point: Real, s: Complex) -> tuple[Complex, Complex]:
         one = self.responses[n]
@@ -198,6 +204,24 @@ class Problem:
             if each.prior is not None
         ]
         return np.array(rows).reshape(-1, len(self.parameters))
+
+
+def walled(residuals: Callable[[Real], Real]) -> Callable[[Real], Real]:
+    """The residuals, and a wall where there is no arm (a mass beyond the tip): `WALL` times the first one's largest."""
+    walls: list[Real] = []
+
+    def found(x: Real) -> Real:
+        try:
+            values = residuals(x)
+        except ParameterError:
+            if not walls:
+                raise
+            return walls[0]
+        if not walls:
+            walls.append(np.full(values.size, WALL * max(float(abs(values).max(initial=0.0)), 1.0)))
+        return values
+
+    return found
 
 
 def _parts(values: Complex, one: Response) -> Real:

@@ -7,6 +7,7 @@ and every interval, rests on Gaussian residuals alone.
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,9 +15,10 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.stats import chi2
 
+from tfarm.errors import ParameterError
 from tfarm.records import record
 
-from .model import Problem
+from .model import Problem, walled
 from .start import Starts
 
 Real = NDArray[np.float64]
@@ -76,7 +78,8 @@ def solved(problem: Problem) -> Solution:
         if best.converged and best.chi_squared < WORSE * best.freedom:
             break
         strayed = best.point + SPREAD * rng.standard_normal(best.point.size)
-        best = best_after(best.problem, np.clip(strayed, low + EDGE, high - EDGE))
+        with suppress(ParameterError):  # no arm there
+            best = best_after(best.problem, np.clip(strayed, low + EDGE, high - EDGE))
     return replace(_nearest(best), starts=len(found))
 
 
@@ -145,7 +148,7 @@ def settled(problem: Problem, start: Real, held: dict[int, float] | None = None)
 
     inside = np.clip(point[free], low + EDGE, high - EDGE)
     found = least_squares(
-        residuals, inside, jac=jacobian, bounds=(low, high), x_scale="jac", xtol=FIRM, ftol=FIRM_SUM, gtol=None,
+        walled(residuals), inside, jac=jacobian, bounds=(low, high), x_scale="jac", xtol=FIRM, ftol=FIRM_SUM, gtol=None,
         max_nfev=MOST,
     )  # fmt: skip
     full, slopes = whole(found.x), np.zeros((found.fun.size, start.size))

@@ -10,12 +10,15 @@ Tuned on the survey `tests.fitting.planted`: the counts and shares below.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
+
+from tfarm.errors import ParameterError
 
 from .features import features_of, match, near_zeros
 from .model import Problem
@@ -26,6 +29,7 @@ Real = NDArray[np.float64]
 HELD = 0.5  # of ln p: the deviation that a start is held with, where peaks do not decide
 ROUNDS = 8  # of Newton's method on the frequencies
 SHIFTS = (0.0, -0.15, 0.15, -0.3, 0.3)  # of ln w: of all the arm's peaks, before the first match
+SHARES = (1.0, 0.5, 0.2, 0.05)  # of a step: where a whole one leads to no arm
 CURVE = 150  # points of a response that its curve is followed at
 LOSS = 0.3  # of ln H: residuals beyond count less and less
 
@@ -46,25 +50,38 @@ class Starts:
             if any(abs(matched - other).max() < 1e-3 for other in tried):
                 continue
             tried.append(matched)
-            yield self._along_curves(matched)
+            try:
+                found = self._along_curves(matched)
+            except ParameterError:  # no arm there
+                continue
+            yield found
         yield self._along_curves(zero)
 
     # ------------------------------------------------------------ peaks
 
     def _matched(self, point: Real, shift: float) -> Real:
         """The point where the arm's peaks and dips are those measured, matched anew in each round."""
-        point = point.copy()
-        low, high = self.problem.bounds
         for turn in range(ROUNDS):
             rows, misfit = self._frequency_rows(point, shift * max(0.0, 1.0 - turn / 3))
             held = np.eye(self._free) / HELD
             matrix, right = np.vstack([rows, held / 10]), np.concatenate([misfit, -point[: self._free] / HELD / 10])
             step = np.linalg.lstsq(matrix * 10, right * 10, rcond=None)[0]
             step *= min(1.0, 0.3 / max(abs(step).max(), 1e-12))
-            point[: self._free] += step
-            point = np.clip(point, low + 1e-9, high - 1e-9)
+            point = self._stepped(point, step)
             if abs(step).max() < 1e-4:
                 break
+        return point
+
+    def _stepped(self, point: Real, step: Real) -> Real:
+        """The point a step further on, or as much of it as there are arms."""
+        low, high = self.problem.bounds
+        for share in SHARES:
+            beyond = point.copy()
+            beyond[: self._free] += share * step
+            beyond = np.clip(beyond, low + 1e-9, high - 1e-9)
+            with suppress(ParameterError):
+                self.problem.arm(beyond)
+                return beyond
         return point
 
     def _frequency_rows(self, point: Real, shift: float) -> tuple[Real, Real]:

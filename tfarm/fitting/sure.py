@@ -13,6 +13,7 @@ from scipy.stats import norm, t
 
 from tfarm.records import record
 
+from .parameters import FARTHEST, Parameter
 from .solve import OPEN, Solution, principal_axes, settled
 
 Real = NDArray[np.float64]
@@ -23,6 +24,8 @@ LEVEL = 0.95
 TAKES_PART = 0.1  # of a unit vector: a smaller component has no part in it
 ROUND = 0.02  # a power so near to 1 is written as 1
 CLOSE = 0.01  # of a deviation: where a profile has reached its level
+BETTER = 0.05  # of a sum of squares: a profile that falls by more has left the valley of the best
+SAME_END = 1e-6  # of ln p
 TRIES = 12
 REACHES = (0.5, 1.0, 2.0, 4.0, 6.0, 9.0)  # of ln p: where a number that does not matter is tried
 
@@ -52,11 +55,19 @@ class Sureness:
     not_determined: tuple[str, ...]
 
 
+class BetterError(Exception):
+    """A profile has come to a lower sum of squares than the best: carries where."""
+
+    def __init__(self, found: Solution) -> None:
+        super().__init__(found)
+        self.found = found
+
+
 def sureness(found: Solution, *, profile: bool, progress: Progress | None = None) -> Sureness:
     """The intervals of a solution's numbers: by profiles, or by its covariance where they are not asked for.
 
     Along an open axis nothing changes, so one number of it is held while the others are profiled.  `progress` is told
-    (done, total, key) before each.
+    (done, total, key) before each.  Raises BetterError where a profile comes to a lower sum than the solution's.
     """
     sizes, axes = principal_axes(found.jacobian)
     is_open = sizes < 1.0 / OPEN
@@ -77,19 +88,36 @@ def sureness(found: Solution, *, profile: bool, progress: Progress | None = None
             if profile:
                 ends = [_end(found, n, way, deviation, quantile, held) for way in (-1, 1)]
             low, high = sorted(each.value(float(end)) for end in ends)
+            low, high = _where_it_ends(each, ends, low, high)
         elif n in alone and (side := _one_sided(found, n, quantile)) is not None:
             low, high = side
             words[alone[n]] = ""
         fitted.append(
             Fitted(
-                key=each.key, value=value, low=low, high=high, identified=low is not None,
+                key=each.key, value=value, low=low, high=high, identified=low is not None and high is not None,
                 deviation=None if deviation is None else slope * deviation,
             )
         )  # fmt: skip
+    words += [_half_known(each) for each in fitted if (each.low is None) != (each.high is None)]
     return Sureness(parameters=tuple(fitted), not_determined=tuple(word for word in words if word))
 
 
-def _one_sided(found: Solution, n: int, quantile: float) -> tuple[float, float] | None:
+def _half_known(one: Fitted) -> str:
+    side = f"at least {one.low:.4g}" if one.high is None else f"at most {one.high:.4g}"
+    return f"{one.key} is {side}: these data say no more"
+
+
+def _where_it_ends(one: Parameter, ends: Sequence[float], low: float, high: float) -> tuple[float | None, float | None]:
+    """The ends of an interval, None where only the reach of the search ended it and no bound of the number."""
+    reach, limits = math.log(FARTHEST), (one.low, one.high)
+    if not one.by_logarithm or one.start < 0:
+        return low, high
+    first = None if ends[0] <= -reach + SAME_END and limits[0] <= 0 else low
+    last = None if ends[1] >= reach - SAME_END and limits[1] == math.inf else high
+    return first, last
+
+
+def _one_sided(found: Solution, n: int, quantile: float) -> tuple[float, float | None] | None:
     """The interval of a number that does not matter where it is, but would if it were larger, or smaller.
 
     A payload of next to nothing is at most so heavy, a clamp that is all but rigid at least so stiff.  The others are
@@ -114,7 +142,7 @@ def _one_sided(found: Solution, n: int, quantile: float) -> tuple[float, float] 
     if ends == [None, None]:
         return None
     low, high = ends
-    return 0.0 if low is None else each.value(low), math.inf if high is None else each.value(high)
+    return 0.0 if low is None else each.value(low), None if high is None else each.value(high)
 
 
 def _quantile(found: Solution) -> float:
@@ -139,7 +167,10 @@ def _end(found: Solution, n: int, way: int, deviation: float, quantile: float, h
     for _ in range(TRIES):
         at = float(np.clip(at, low, high))
         start = found.point + slope * (at - found.point[n])
-        growth = settled(found.problem, start, held | {n: at}).chi_squared - found.chi_squared
+        there = settled(found.problem, start, held | {n: at})
+        growth = there.chi_squared - found.chi_squared
+        if growth < -BETTER:
+            raise BetterError(there)
         root = math.sqrt(max(growth, 0.0))
         if abs(root - quantile) < CLOSE or (at in (low, high) and root < quantile):
             return at
