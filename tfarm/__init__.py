@@ -32,6 +32,7 @@ if TYPE_CHECKING:
         presets,
     )
     from tfarm.arm.law import Law
+    from tfarm.comparing import compare
     from tfarm.dsp.closed import sampled
     from tfarm.dsp.results import simulate
     from tfarm.errors import CertificationError, ConvergenceError, ParameterError
@@ -72,6 +73,7 @@ __all__ = [
     "Section",
     "bode",
     "closed_loop_poles",
+    "compare",
     "damped_modes",
     "default_gains",
     "design",
@@ -100,6 +102,7 @@ _ROOMS = {  # where a name stands; what it is called there after a colon, if not
     "locus": "loop.locus",
     "nyquist": "loop.closed",
     "closed_loop_poles": "loop.closed",
+    "compare": "comparing",
     "damped_modes": "spectrum",
     "default_gains": "spectrum.scales",
     "map": "loop.regions:region",

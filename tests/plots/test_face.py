@@ -40,6 +40,7 @@ def records():
     K1, K2 = np.linspace(0.05, 2.0, 40), np.linspace(-1.0, 1.5, 41)
     plane, analysis = tfarm.map(LAB, K1, K2), tfarm.sampled(LAB, LAW)
     return {
+        "comparison": ([tfarm.compare([LAB, LAB.having(hub_inertia=0.2)], modes=2)], 3),
         "bode": ([tfarm.bode(LAB, "root_moment", (1.0, 300.0))], 2),
         "gain_map": ([plane], 0),
         "locus": ([tfarm.locus(LAB, LAW, "K2", -1.0, 1.6, points=60, branches=3)], 0),
@@ -195,6 +196,20 @@ def test_measured_draws_both_curves_and_the_coherence(records):
     assert lower.lines[0].get_ydata().tolist() == data.coherence.tolist()
     assert [ax.get_ylabel() for ax in (middle, lower)] == ["phase [deg]", "coherence [-]"]
     assert ("[Hz]" in lower.get_xlabel(), upper.get_ylabel()) == (True, "magnitude [N m/(N m)]")
+
+
+def test_a_comparison_draws_both_responses_and_both_regions(records):
+    (found,), _ = records["comparison"]
+    upper, lower, plane = tfarm.plots.comparison(found, ax=axes_for(3))
+    for data, above, below in zip(found.responses, upper.lines, lower.lines, strict=False):
+        assert above.get_xdata().tolist() == data.omega.tolist()
+        assert above.get_ydata().tolist() == abs(data.value).tolist()
+        assert below.get_ydata().tolist() == data.phase.tolist()
+    drawn = {(float(x), float(y)) for line in plane.lines for x, y in zip(*line.get_data(), strict=True)}
+    for region, side in zip(found.regions, found.sides, strict=True):
+        columns = zip(region.K1.tolist(), region.stable_intervals, strict=True)
+        assert {(K1, end) for K1, column in columns for window in column for end in window} <= drawn
+        assert (side.law.K1, side.law.K2) in drawn
 
 
 def test_overlay_draws_both_regions_edges(records):

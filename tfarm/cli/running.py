@@ -10,6 +10,7 @@ from typer.exceptions import TyperException
 
 from tfarm.cli import (  # noqa: F401  each adds its verbs to the application
     commands,
+    comparing,
     control,
     fitting,
     help,

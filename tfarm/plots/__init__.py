@@ -6,6 +6,7 @@
 In the look of the report's pages, whose pictures these are.  This is the only room with matplotlib.
 """
 
+from tfarm.plots.compared import comparison
 from tfarm.plots.disc import nyquist
 from tfarm.plots.frequency import bode
 from tfarm.plots.growth import sampled_modes
@@ -20,6 +21,7 @@ from tfarm.plots.sketch import sketch
 
 __all__ = [
     "bode",
+    "comparison",
     "gain_map",
     "locus",
     "measured",

@@ -1,0 +1,157 @@
+"""Two arms or two laws beside each other: differences known in closed form, and each side what it is alone."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from matplotlib import image
+
+import tfarm
+from tests.shell import answer, run
+from tfarm.comparing.answers import Quantity, comparison_answer, margins_table, modes_table, poles_table
+from tfarm.loop.answers import margins_answer
+from tfarm.plots.compared import draw_comparison
+
+BARE, LAB = tfarm.load("sasaki2012"), tfarm.load("sasaki2012-lab")
+LAW = tfarm.HubFeedback(K1=0.3, K2=0.3)
+GAINS = "[law]\n[law.hub_rate]\ngain = {}\n[law.root_moment]\ngain = {}\n"
+LATE = "[law]\ndelay = 0.002\n[law.hub_angle]\nnum = [2.0, 1.0]\nden = [0.01, 1.0]\n"
+
+
+@pytest.fixture
+def files(tmp_path):
+    """The paths of law files: mild and wild gains, and a law of other signals."""
+    texts = {"mild": GAINS.format(0.3, 0.3), "wild": GAINS.format(0.3, 1.5), "late": LATE}
+    for name, text in texts.items():
+        (tmp_path / f"{name}.toml").write_text(text, encoding="utf-8")
+    return {name: str(tmp_path / f"{name}.toml") for name in texts}
+
+
+def test_four_times_as_stiff_is_twice_as_fast():
+    """w goes with the root of E where G goes with it: every natural frequency by 100 %, to rounding."""
+    link = replace(BARE.link, youngs_modulus=4 * BARE.link.youngs_modulus, shear_modulus=4 * BARE.link.shear_modulus)
+    found = tfarm.compare([BARE, replace(BARE, link=link, name="stiff")], modes=5)
+    apart = [row["natural_frequency_rad_s_difference_percent"] for row in modes_table(found)]
+    assert apart == pytest.approx([100.0] * 5, rel=1e-13)
+    assert found.is_of_arms
+
+
+def test_twice_the_damping_is_twice_the_ratio():
+    """To first order in C; the shear that C does not damp makes it less by a share of C w."""
+    found = tfarm.compare([LAB, LAB.having(damping=2 * LAB.damping)], names=("C", "2 C"), modes=2)
+    first, second = (row["damping_ratio_difference_percent"] for row in modes_table(found))
+    assert first == pytest.approx(100.0, abs=0.1)
+    assert second == pytest.approx(100.0, abs=0.5)
+
+
+def test_an_arm_beside_itself_differs_in_nothing():
+    found = tfarm.compare([LAB, LAB], LAW, modes=3)
+    assert not found.is_of_arms
+    for table in (modes_table(found), poles_table(found), margins_table(found)):
+        apart = [value for row in table for key, value in row.items() if key.endswith("difference_percent")]
+        assert apart == [0.0] * len(apart)
+        assert apart
+    assert found.regions[0] == found.regions[1]
+
+
+def test_each_side_is_what_it_is_alone():
+    other = tfarm.HubFeedback(K1=2.0, K2=-0.2)
+    found = tfarm.compare(LAB, [LAW, other], modes=3)
+    for side, law, loop in zip(found.sides, (LAW, other), comparison_answer(found)["loops"], strict=True):
+        assert side.margins == tfarm.margins(LAB, law)
+        assert {key: loop[key] for key in ("delay_margin_s", "disk_margin")} == {
+            key: margins_answer(side.margins)[key] for key in ("delay_margin_s", "disk_margin")
+        }
+        assert side.sampled.is_stable == tfarm.sampled(LAB, law).verdict.is_stable
+        alone = tfarm.closed_loop_poles(LAB, law, 6).values
+        assert side.oscillating[:3] == pytest.approx(alone[alone.imag > 0][:3], rel=1e-12)
+    rows = {row["margin"]: row for row in margins_table(found)}
+    delays = [tfarm.margins(LAB, law).exact_delay for law in (LAW, other)]
+    expected = 100 * (delays[1] / delays[0] - 1)
+    assert rows["delay_margin_s"]["value_difference_percent"] == pytest.approx(expected, rel=1e-12)
+
+
+def test_an_unstable_loop_has_no_margins_to_compare(capsys, files):
+    found = answer(capsys, "compare", "sasaki2012-lab", "--law", files["mild"], "--law", files["wild"], "--modes", "2")
+    assert (found["of"], found["names"], found["verdicts"]) == ("laws", ["mild", "wild"], ["stable", "unstable"])
+    assert {row["value_other"] for row in found["margins"]} == {None}
+    assert {row["value_difference_percent"] for row in found["margins"]} == {None}
+    assert [loop["K2"] for loop in found["loops"]] == [0.3, 1.5]
+    assert [row["size_rad_s_one"] > 0 for row in found["poles"]] == [True] * len(found["poles"])
+
+
+def test_without_damping_phases_are_of_the_band_alone():
+    """A delay of nothing ends an undamped loop: no phase is exact there, as `tfarm margins` has it."""
+    rows = {row["margin"]: row for row in margins_table(tfarm.compare([BARE, LAB], LAW, modes=2))}
+    assert rows["phase_lag_deg"]["known_one"] == "in the band"
+    assert (rows["delay_margin_s"]["known_one"], rows["delay_margin_s"]["value_one"]) == ("exact", 0.0)
+    assert rows["phase_lag_deg"]["known_other"] == "exact"
+
+
+def test_a_law_of_other_signals_is_mapped_over_factor_and_delay():
+    """The delay where each loop ends at its own gain is its delay margin."""
+    late = tfarm.Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0])}, delay=0.002)
+    found = tfarm.compare(LAB, [LAW, late], modes=2)
+    assert found.regions is None
+    for plane, side in zip(found.delays, found.sides, strict=True):
+        column = plane.stable[:, int(np.argmin(abs(plane.x - 1.0)))]
+        last = plane.y[column].max()
+        step = plane.y[1] - plane.y[0]
+        assert last - plane.law.delay == pytest.approx(side.margins.exact_delay, abs=2 * step)
+    drawn = draw_comparison(found).axes[1].collections
+    images = [each.get_array().reshape(*found.delays[0].stable.shape, 4) for each in drawn if hasattr(each, "cmap")]
+    seen = [each[..., 3] > 0 for each in images if each.size]
+    assert all(np.array_equal(one, plane.stable) for one, plane in zip(seen, found.delays, strict=False))
+
+
+def test_two_laws_are_called_by_their_files_and_drawn(capsys, files, tmp_path):
+    picture = tmp_path / "both.png"
+    words = ("--law", files["mild"], "--law", files["wild"], "--modes", "2", "--png", str(picture))
+    code, out, err = run(capsys, "compare", "sasaki2012-lab", *words)
+    assert (code, err) == (0, "")
+    first, *lines = out.splitlines()
+    assert first == f"written: {picture}"
+    assert [line.split(";")[0] for line in lines[:2]] == ["mild: STABLE", "wild: UNSTABLE"]
+    assert min(image.imread(picture).shape[:2]) > 800
+
+
+def test_two_arms_are_printed_with_their_modes(capsys):
+    code, out, err = run(capsys, "compare", "sasaki2012", "sasaki2012-lab", "--modes", "2")
+    assert (code, err) == (0, "")
+    assert "sasaki2012-lab: STABLE; sampled every 10 ms" in out
+    assert "natural frequencies and damping of the arms" in out
+    assert "0 %" in out
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "shown"),
+    [(1.0, 1.0 + 1e-15, 0.0), (2.0, 1.0, -50.0), (0.0, 1.0, None), (None, 1.0, None), (1.0, np.inf, None)],
+)
+def test_a_difference_is_a_number_or_none(one, other, shown):
+    assert Quantity("a", "", relative=1e-14).percent(one, other) == shown
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["sasaki2012"], "give a second arm, or --law FILE twice"),
+        (["sasaki2012", "sasaki2012-lab", "stocky-steel"], "two at most"),
+        (["sasaki2012", "--law", "a.toml"], "give a second arm, or --law FILE twice"),
+        (["sasaki2012", "sasaki2021"], 'did you mean "sasaki2012"'),
+        (["sasaki2012", "sasaki2012-lab", "--modes", "31"], "1 to 30"),
+        (["sasaki2012", "quanser-2dsfl"], "gains of sasaki2012 are in another unit"),
+    ],
+)
+def test_bad_input_is_one_line(capsys, words, said):
+    code, out, err = run(capsys, "compare", *words)
+    assert (code, out) == (2, "")
+    assert said in err
+    assert err.count("\n") == 1
+
+
+def test_python_refuses_what_are_not_two():
+    for arms, laws in ((LAB, None), (LAB, LAW), ([LAB] * 3, None), (LAB, [LAW] * 3)):
+        with pytest.raises(tfarm.ParameterError, match="two arms, or one arm and two laws"):
+            tfarm.compare(arms, laws)
+    with pytest.raises(tfarm.ParameterError, match="is no Arm"):
+        tfarm.compare(["sasaki2012", LAB])

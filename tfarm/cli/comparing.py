@@ -1,0 +1,100 @@
+"""The verb that sets two arms, or two laws on one arm, beside each other."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from tfarm.cli.app import Json, TheoryName, app, give, load_arm, whole
+from tfarm.cli.inputs import K1, K2, Given, Kp, Png, law_of
+from tfarm.cli.sampling import Delay, DspFile, Period, chain_of
+from tfarm.errors import ParameterError
+
+if TYPE_CHECKING:
+    from tfarm.comparing import Comparison
+
+Arms = Annotated[list[str], typer.Argument(metavar="ARM [ARM]", help="presets or TOML files", show_default=False)]
+Laws = Annotated[
+    list[str] | None,
+    typer.Option("--law", metavar="FILE", help="of one arm two laws; of two arms one for both, or one each"),
+]
+
+
+@app.command()
+def compare(
+    arms: Arms,
+    k1: K1 = None,
+    k2: K2 = None,
+    kp: Kp = None,
+    law: Laws = None,
+    modes: Annotated[str, typer.Option("--modes", metavar="N", help="flexible modes, 1 to 30")] = "10",
+    output: Annotated[str, typer.Option("--output", help="what the Bode plot of two arms shows")] = "root_moment",
+    period: Period = None,
+    delay_samples: Delay = None,
+    dsp: DspFile = None,
+    theory: TheoryName = None,
+    png: Png = None,
+    json: Json = False,
+) -> None:
+    """Two arms, or two laws on one arm, beside each other: modes, poles, verdicts, margins; differences in per cent."""
+    count, files = whole("--modes", modes, 1, 30), law or []
+    _check_number(arms, files)
+    subjects = [load_arm(name, theory) for name in arms]
+    chain = chain_of(dsp or arms[0], period, delay_samples)
+    gains = {"K1": k1, "K2": k2, "Kp": kp}
+    pairs = [(subjects[min(n, len(arms) - 1)], arms[min(n, len(arms) - 1)]) for n in (0, 1)]
+    wanted = [None, None] if not files else files * (2 // len(files))
+    laws = [law_of(arm, Given(gains, file, name))[0] for (arm, name), file in zip(pairs, wanted, strict=True)]
+    from tfarm.cli.tables import say_written
+    from tfarm.comparing import compare as find
+    from tfarm.comparing.answers import comparison_answer
+
+    names = _names([arm.name for arm in subjects], files)
+    found = find(subjects, laws, names=names, modes=count, output=output, chain=chain)
+    if png is not None:
+        from tfarm.plots.compared import draw_comparison
+        from tfarm.plots.files import save_png
+
+        save_png(draw_comparison(found), png)
+    if json or say_written(png):
+        give(comparison_answer(found), json, lambda answer: _print(found, answer))
+
+
+def _check_number(arms: list[str], files: list[str]) -> None:
+    """Raise ParameterError where there are not two of anything."""
+    if len(arms) > 2 or len(files) > 2:
+        key, given = ("ARM", arms) if len(arms) > 2 else ("--law", files)
+        raise ParameterError(key=key, value=given[2], remedy="two at most can be compared")
+    if len(arms) == 1 and len(files) < 2:
+        raise ParameterError(key="ARM", value=arms[0], remedy="give a second arm, or --law FILE twice")
+
+
+def _names(arms: list[str], files: list[str]) -> list[str]:
+    """What the two are called: by their arms, else by their laws' files, else by their numbers."""
+    stems, whole_names = [Path(file).stem for file in files], [str(file) for file in files]
+    for names in (arms, stems, whole_names):
+        if len(names) == 2 and names[0] != names[1]:
+            return names
+    return ["first", "second"]
+
+
+def _print(found: Comparison, answer: dict[str, Any]) -> None:
+    """The verdicts, then each table; of two laws on one arm its modes are the same, and left out."""
+    from tfarm.comparing.answers import verdict_words, windows_table
+    from tfarm.tables.terminal import show
+
+    for side in found.sides:
+        print(verdict_words(side))
+    if found.is_of_arms:
+        print("\nnatural frequencies and damping of the arms by themselves:")
+        show(answer["modes"])
+    print("\noscillating closed-loop poles in the order of Im s (the n-th of both need not be the same mode):")
+    show(answer["poles"])
+    print()
+    show(answer["margins"])
+    if (windows := windows_table(found)) is not None:
+        show(windows)
+        print("* no limit was found up to there, and beyond none was looked for")
+    print(answer["loops"][0]["sign_convention"])

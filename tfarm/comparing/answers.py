@@ -1,0 +1,160 @@
+"""Two loops beside each other as commands and pages have them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from tfarm.columns import JSON, TERMINAL, Column, Table
+from tfarm.digits import general, within
+from tfarm.loop.answers import MARGINS, gain_rows, margins_answer, sizes_of
+from tfarm.loop.margins import Margins
+from tfarm.spectrum.answers import HELD
+
+from .comparison import Comparison, Side
+
+Values = Sequence[float | None]
+DIGITS = 8
+MARGIN = 1e-8  # of its size: what a margin may be off, which is found by search on the grid of the loop
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What stands in a column for each side: `key`, title, unit, and by how much a value may be off.
+
+    That is the larger of `relative`, a share of it, and `absolute`: what two values differ by less is no difference.
+    """
+
+    key: str
+    title: str
+    unit: str = ""
+    relative: float = 0.0
+    absolute: float = 0.0
+
+    def percent(self, one: float | None, other: float | None) -> float | None:
+        """By how much the second is larger, in per cent of the first's size; None where that is no number."""
+        if one is None or other is None or not (math.isfinite(one) and math.isfinite(other)):
+            return None
+        if abs(other - one) <= 2 * max(self.relative * abs(one), self.absolute):
+            return 0.0
+        return 100 * (other - one) / abs(one) if one else None
+
+    def cell(self, value: float | None) -> str:
+        """The value in the digits that hold, eight at most; "-" where there is none."""
+        if value is None or math.isinf(value):
+            return "-" if value is None else general(value, DIGITS)
+        error = max(self.relative * abs(value), self.absolute)
+        return within(value, error, DIGITS) if error else general(value, DIGITS)
+
+    def columns(self, found: Comparison, one: Values, other: Values) -> list[Column]:
+        """Of both sides, and the difference."""
+        apart = [self.percent(*pair) for pair in zip(one, other, strict=True)]
+        return [
+            Column(f"{self.key}_one", f"{self.title}{found.one.name}", self.unit, of=one, digits=self._cells),
+            Column(f"{self.key}_other", f"{self.title}{found.other.name}", self.unit, of=other, digits=self._cells),
+            Column(f"{self.key}_difference_percent", "difference", of=apart, digits=_percents),
+        ]
+
+    def _cells(self, values: Values) -> list[str]:
+        return [self.cell(value) for value in values]
+
+
+def _percents(values: Values) -> list[str]:
+    return ["-" if value is None else f"{value:+.3g} %" if value else "0 %" for value in values]
+
+
+def modes_table(found: Comparison) -> Table:
+    """A row a flexible mode: natural frequencies and damping ratios of both arms, and how they differ."""
+    one, other = ([float(w) for w in side.modes.natural_frequency[side.modes.index > 0]] for side in found.sides)
+    columns = (
+        Column("mode", "mode", of=range(1, len(one) + 1)),
+        *Quantity("natural_frequency_rad_s", "w of ", "rad/s", relative=HELD).columns(found, one, other),
+        *Quantity("damping_ratio", "damping of ", absolute=HELD).columns(
+            found, found.one.damping_ratio, found.other.damping_ratio
+        ),
+    )
+    return Table(columns=columns)
+
+
+def poles_table(found: Comparison) -> Table:
+    """A row an oscillating closed-loop pole, in the order of Im s: the n-th of both, which need not be one mode."""
+    pairs = list(zip(*(side.oscillating.tolist() for side in found.sides), strict=False))
+    sizes = [[abs(pole) for pole in side] for side in zip(*pairs, strict=True)] or [[], []]
+    ratios = [[-pole.real / abs(pole) + 0.0 for pole in side] for side in zip(*pairs, strict=True)] or [[], []]
+    columns = (
+        Column("number", "pole", of=range(1, len(pairs) + 1)),
+        *Quantity("size_rad_s", "|s| of ", "rad/s", relative=HELD).columns(found, *sizes),
+        *Quantity("damping_ratio", "damping of ", absolute=HELD).columns(found, *ratios),
+    )
+    return Table(columns=columns)
+
+
+def margins_table(found: Comparison) -> Table:
+    """A row a margin: what is exact where that is known, else what holds in the band, which `known` says."""
+    one, other = (_known(side.margins) for side in found.sides)
+    units = [column.unit for column in MARGINS]
+    columns = (
+        Column("margin", on=(JSON,), of=[column.key for column in MARGINS]),
+        Column("", "margin", on=(TERMINAL,), of=[_titled(column) for column in MARGINS]),
+        Column("unit", on=(JSON,), of=units),
+        *Quantity("value", "", relative=MARGIN).columns(found, [each for each, _ in one], [each for each, _ in other]),
+        Column("known_one", f"known of {found.one.name}", of=[known for _, known in one]),
+        Column("known_other", f"of {found.other.name}", of=[known for _, known in other]),
+    )
+    return Table(columns=columns)
+
+
+def windows_table(found: Comparison) -> Table | None:
+    """How far each gain may go alone in both; None where a law is not these gains, or a loop is unstable."""
+    rows = [gain_rows(side.margins) for side in found.sides]
+    if not all(rows):
+        return None
+    spans = [[" ".join(row.spans(general, 8, row.windows.around)) or "-" for row in each] for each in rows]
+    columns = (
+        Column("gain", "gain", of=[row.gain for row in rows[0]]),
+        Column("", f"stable around it, {found.one.name}", of=spans[0]),
+        Column("other", found.other.name, of=spans[1]),
+    )
+    return Table(columns=columns)
+
+
+def comparison_answer(found: Comparison) -> dict[str, Any]:
+    """Names and verdicts, the tables, and of each side the whole answer of `tfarm margins`."""
+    return {
+        "of": "arms" if found.is_of_arms else "laws",
+        "names": [side.name for side in found.sides],
+        "verdicts": [side.verdict for side in found.sides],
+        "sampled": [side.sampled.answer for side in found.sides],
+        "modes": modes_table(found),
+        "poles": poles_table(found),
+        "margins": margins_table(found),
+        "loops": [margins_answer(side.margins) for side in found.sides],
+    }
+
+
+def verdict_words(side: Side) -> str:
+    """A line: both verdicts on one side, with what is known beyond the band, and its law."""
+    verdict = side.margins.stability
+    far = verdict.verdict == "unstable" or verdict.is_known_beyond
+    reach = "" if far else f" up to {verdict.band:.4g} rad/s, not known beyond"
+    return f"{side.name}: {verdict.verdict.upper()}{reach}; {side.sampled.at}: {side.sampled.sentence}"
+
+
+def _known(found: Margins[Any]) -> list[tuple[float | None, str]]:
+    """Each margin with what is known of it; a phase that a delay takes away has no exact value."""
+    known: list[tuple[float | None, str]] = []
+    for column in MARGINS:
+        exact, in_band = sizes_of(found)[column.key]
+        if in_band is None:
+            known.append((None, "-"))
+        elif exact is None or (column.unit == "deg" and not found.exact_delay):
+            known.append((in_band, "in the band"))
+        else:
+            known.append((exact, "exact"))
+    return known
+
+
+def _titled(column: Column) -> str:
+    return f"{column.title} [{column.unit}]" if column.unit else column.title

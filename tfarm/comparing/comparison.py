@@ -1,0 +1,212 @@
+"""What is computed of two loops to set them beside each other; each by the very functions that answer for it alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import Arm, HubFeedback, must_be_arm
+from tfarm.arm.checks import whole
+from tfarm.arm.driving import AnyLaw, through
+from tfarm.arm.law import Law
+from tfarm.dsp import Chain
+from tfarm.dsp.brief import SampledBrief, brief_of
+from tfarm.dsp.closed import verdict_on
+from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.loop.closed import closed_loop_poles
+from tfarm.loop.closed import margins as margins_of
+from tfarm.loop.law_map import LawMap, law_map
+from tfarm.loop.margins import Margins, dense
+from tfarm.loop.regions import Region, between, ranges_of, region
+from tfarm.records import record
+from tfarm.response.frequency import Bode, band_of, bode
+from tfarm.spectrum import Modes, damped_modes
+from tfarm.spectrum import modes as modes_of
+from tfarm.spectrum.scales import default_gains
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complexfloating[Any, Any]]
+
+MOST_MODES = 30
+SPARE = 6  # poles with Im s >= 0 beyond the modes: real ones, those of the hub, the motor and a law
+COLUMNS, ROWS = 80, 40  # of the plane of K1 and K2; its edges along K2 are exact
+NEXT = 1e-6  # of the largest K1: where the first column beyond K1 = 0 is, from which most regions begin
+ROOM = 1.5  # how far the plane reaches beyond the laws' own gains
+PLAIN = 40  # values along each axis of the plane of a factor and a delay
+MOST_FACTOR, LONGEST_DELAY = 4.0, 0.02  # where that plane ends: factor on the law, delay [s] where no law has more
+FAR = 0.05  # of the first mode: where the curve of a loop begins
+
+
+@dataclass(frozen=True, kw_only=True)
+@record
+class Side:
+    """One of the two: what it is called, its arm and law, the modes of the arm, and what the loop is worth.
+
+    `damping_ratio` is that of each flexible mode of the arm by itself, None where a mode could not be followed; `poles`
+    are closed-loop poles with Im s >= 0, complete in their box; `sampled` is the verdict at the chain's clock.
+    """
+
+    name: str
+    arm: Arm
+    law: AnyLaw
+    modes: Modes
+    damping_ratio: tuple[float | None, ...]
+    poles: Complex
+    margins: Margins[Any]
+    sampled: SampledBrief
+
+    @property
+    def verdict(self) -> str:
+        """Of the loop without a clock."""
+        return self.margins.stability.verdict
+
+    @property
+    def oscillating(self) -> Complex:
+        """The closed-loop poles with Im s > 0, ascending in Im s."""
+        return self.poles[self.poles.imag > 0]
+
+    @property
+    def loop_function(self) -> tuple[Real, Complex]:
+        """Frequencies [rad/s] (n,) about every steep place of the loop, and L(i w) there, as far as that is finite."""
+        omega = dense(self.margins.stability)
+        L = np.asarray(self.margins.stability.loop.loop_function(1j * omega), dtype=np.complex128)
+        flexible = self.modes.natural_frequency[self.modes.index > 0]
+        told = np.isfinite(L) & (L != 0) & (omega > FAR * flexible[0])
+        return omega[told], L[told]
+
+
+@dataclass(frozen=True)
+@record
+class Comparison:
+    """Two sides, the first the one that differences are from.  `output` is what the Bode plot of two arms shows."""
+
+    one: Side
+    other: Side
+    output: str
+
+    @property
+    def sides(self) -> tuple[Side, Side]:
+        """Both."""
+        return self.one, self.other
+
+    @property
+    def verdict(self) -> str:
+        """Both verdicts in a line."""
+        return "; ".join(f"{side.name}: {side.verdict}, {side.sampled.short}" for side in self.sides)
+
+    @property
+    def is_of_arms(self) -> bool:
+        """Whether two arms are compared, not two laws on one."""
+        return self.one.arm != self.other.arm
+
+    @cached_property
+    def responses(self) -> tuple[Bode, Bode]:
+        """The exact response of both arms over one band, which holds ten flexible modes of each."""
+        bands = [band_of(side.arm) for side in self.sides]
+        band = min(low for low, _ in bands), max(high for _, high in bands)
+        first, second = (bode(side.arm, self.output, band) for side in self.sides)
+        return first, second
+
+    @cached_property
+    def regions(self) -> tuple[Region, Region] | None:
+        """The plane of K1 and K2 for each, on one grid that holds both laws; None where a law is not these gains."""
+        laws = [side.law for side in self.sides if isinstance(side.law, HubFeedback)]
+        if len(laws) < 2:
+            return None
+        ranges = [ranges_of(side.arm) for side in self.sides]
+        x, y = (
+            between(
+                min([pair[n][0] for pair in ranges] + [ROOM * law[name] for law in laws]),
+                max([pair[n][1] for pair in ranges] + [ROOM * law[name] for law in laws]),
+                number,
+            )
+            for n, (name, number) in enumerate((("K1", COLUMNS), ("K2", ROWS)))
+        )
+        x = np.union1d(x, [NEXT * x[-1]])
+        first, second = (region(side.arm, x, y, law.Kp) for side, law in zip(self.sides, laws, strict=True))
+        return first, second
+
+    @cached_property
+    def delays(self) -> tuple[LawMap, LawMap]:
+        """The plane of a factor on each law and its whole delay [s]: for laws that are more than gains at the hub."""
+        laws = [side.law if isinstance(side.law, Law) else Law.of_gains(side.law) for side in self.sides]
+        longest = max(LONGEST_DELAY, *(2 * law.delay for law in laws))
+        x, y = between(0.0, MOST_FACTOR, PLAIN), between(0.0, longest, PLAIN)
+        first, second = (
+            law_map(side.arm, law, ("gain", "delay"), x, y) for side, law in zip(self.sides, laws, strict=True)
+        )
+        return first, second
+
+
+def compare(
+    arms: Arm | Sequence[Arm], laws: AnyLaw | Sequence[AnyLaw] | None = None, *, names: Sequence[str] = (),
+    modes: int = 10, output: str = "root_moment", chain: Chain | None = None,
+) -> Comparison:  # fmt: skip
+    """Two arms under one law, or each under its own, or one arm under two laws.
+
+    Without a law each arm has its default gains.  `names` are what the two are called, if not by their arms or laws;
+    the sampled verdicts are those at the clock of `chain`, 10 ms unless given.  Raises ParameterError where there are
+    not two, or where their laws close through different inputs, and what `tfarm.margins` raises for either.
+    """
+    pairs = _pairs(arms, laws)
+    modes = whole("modes", modes, 1, MOST_MODES, f"a whole number from 1 to {MOST_MODES}")
+    called = tuple(names) or _names(pairs)
+    if len(called) != 2:
+        raise ParameterError(key="names", value=list(called), remedy="two names")
+    one, other = (
+        _side(name, arm, law, modes, chain or Chain()) for name, (arm, law) in zip(called, pairs, strict=True)
+    )
+    if one.arm.input_unit != other.arm.input_unit:
+        remedy = f"gains of {one.name} are in another unit, its input being {one.arm.input}: give both one input"
+        raise ParameterError(key="input", value=other.arm.input, remedy=remedy)
+    return Comparison(one, other, output)
+
+
+def _pairs(arms: Arm | Sequence[Arm], laws: AnyLaw | Sequence[AnyLaw] | None) -> list[tuple[Arm, AnyLaw]]:
+    """Both arms with their laws."""
+    given: list[Any] = list(arms) if isinstance(arms, list | tuple) else [arms]
+    for arm in given:
+        must_be_arm(arm)
+    some: list[Any] = [] if laws is None else list(laws) if isinstance(laws, list | tuple) else [laws]
+    if not (1 <= len(given) <= 2 and len(some) <= 2 and max(len(given), len(some)) == 2):
+        counts = f"{len(given)} arms, {len(some)} laws"
+        raise ParameterError(key="compare", value=counts, remedy="give two arms, or one arm and two laws")
+    pair = given if len(given) == 2 else given * 2
+    each = [default_gains(arm) for arm in pair] if not some else some if len(some) == 2 else some * 2
+    return [through(arm, law) for arm, law in zip(pair, each, strict=True)]
+
+
+def _names(pairs: list[tuple[Arm, AnyLaw]]) -> tuple[str, ...]:
+    """The arms' names where they differ, else the laws', else their numbers."""
+    arms = [arm.name for arm, _ in pairs]
+    laws = [law.name if isinstance(law, Law) else f"K1 = {law.K1:.4g}, K2 = {law.K2:.4g}" for _, law in pairs]
+    return tuple(next((names for names in (arms, laws) if names[0] != names[1]), ["first", "second"]))
+
+
+def _side(name: str, arm: Arm, law: AnyLaw, count: int, chain: Chain) -> Side:
+    found = modes_of(arm, count)
+    ratio = dict.fromkeys(range(1, count + 1), 0.0 if arm.is_undamped else None)
+    if not arm.is_undamped:
+        with suppress(ConvergenceError):
+            damped = damped_modes(found)
+            ratio |= dict(zip(damped.index.tolist(), damped.damping_ratio.tolist(), strict=True))
+    try:
+        sampled = brief_of(verdict_on(arm, law, chain), chain)
+    except ConvergenceError as error:
+        sampled = SampledBrief(sampling=chain.sampling, is_stable=None, log_radius=None, sentence=f"undecided: {error}")
+    return Side(
+        name=name,
+        arm=arm,
+        law=law,
+        modes=found,
+        damping_ratio=tuple(ratio[n] for n in range(1, count + 1)),
+        poles=closed_loop_poles(arm, law, count + SPARE).values,
+        margins=margins_of(arm, law),
+        sampled=sampled,
+    )

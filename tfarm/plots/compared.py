@@ -1,0 +1,148 @@
+"""Two arms, or two laws on one arm, in one Bode plot and one map."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgba
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
+
+from tfarm.arm import HubFeedback, unit_of, written_unit
+from tfarm.comparing import Comparison
+from tfarm.crossing import pieces
+from tfarm.digits import plain
+from tfarm.loop.regions import Region
+from tfarm.response.frequency import Bode
+
+from .frequency import hertz_axis, magnitude_limits
+from .plane import outline
+from .style import BLUE, GREEN, GREY, INK, ORANGE, New, blank, headline, safe, style, taken, window
+
+COLOURS = (BLUE, ORANGE)
+DEEPEST = 1e-4  # of 1: how small a loop function is drawn
+HIGHEST = 1e3  # and how large
+
+
+def comparison(data: Comparison, *, ax: Sequence[Axes] | None = None) -> tuple[Axes, Axes, Axes]:
+    """Magnitude, phase and map of both (what `tfarm.compare` returns), in three axes, those given or new ones: these.
+
+    Of two arms the exact responses, of two laws the loop functions L; the map is that of K1 and K2, with exact edges,
+    or, where a law is more than these gains, of a factor on each law and its delay, counted on a grid.
+    """
+    with style():
+        if ax is None:
+            upper, right, lower = draw_comparison(data, window).axes
+            return upper, lower, right
+        upper, lower, right = taken(ax, 3)
+        if data.is_of_arms:
+            _responses(data, upper, lower)
+        else:
+            _loops(data, upper, lower)
+        _map(data, right)
+    return upper, lower, right
+
+
+def draw_comparison(data: Comparison, new: New = blank) -> Figure:
+    """The three on a figure of their own."""
+    with style():
+        figure = new(12.0, 6.2)
+        grid = figure.add_gridspec(2, 2, width_ratios=[1.25, 1.0], height_ratios=[1.6, 1.0])
+        upper, right = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[:, 1])
+        comparison(data, ax=(upper, figure.add_subplot(grid[1, 0], sharex=upper), right))
+        headline(figure, data.verdict)
+    return figure
+
+
+def _responses(data: Comparison, upper: Axes, lower: Axes) -> None:
+    """The exact responses of both arms; roots on the axis run off the picture."""
+    limits = np.array([magnitude_limits(each) for each in data.responses])
+    for each, side, colour in zip(data.responses, data.sides, COLOURS, strict=True):
+        _curve(each, upper, lower, colour, side.name)
+    first = data.responses[0]
+    upper.set_ylim(float(limits[:, 0].min()), float(limits[:, 1].max()))
+    upper.set_ylabel(f"|{first.label} / {first.input_label}|  [{first.gain_unit}]")
+    _finished(first.band, upper, lower)
+
+
+def _curve(each: Bode, upper: Axes, lower: Axes, colour: str, name: str) -> None:
+    upper.plot(each.omega, abs(each.value), color=colour, label=safe(name))
+    lower.plot(each.omega, each.phase, color=colour, lw=1.0)
+
+
+def _loops(data: Comparison, upper: Axes, lower: Axes) -> None:
+    """|L| with the line 1, and its angle from -180 to 180 degrees, broken where it goes round."""
+    ends = []
+    for side, colour in zip(data.sides, COLOURS, strict=True):
+        omega, L = side.loop_function
+        angle = np.degrees(np.angle(L))
+        jump = np.flatnonzero(abs(np.diff(angle)) > 180) + 1
+        upper.plot(omega, abs(L), color=colour, label=safe(side.name))
+        lower.plot(np.insert(omega, jump, np.nan), np.insert(angle, jump, np.nan), color=colour, lw=1.0)
+        ends.append((omega[0], omega[-1], max(abs(L).min(), DEEPEST), min(abs(L).max(), HIGHEST)))
+    low, high, least, most = zip(*ends, strict=True)
+    upper.axhline(1.0, color=GREY, lw=0.9)
+    upper.set_ylim(min(least) / 1.5, 1.5 * max(most))
+    upper.set_ylabel("|L|, loop opened at the input")
+    lower.set_ylim(-190, 190)
+    lower.set_yticks([-180, -90, 0, 90, 180])
+    _finished((min(low), max(high)), upper, lower)
+
+
+def _finished(band: tuple[float, float], upper: Axes, lower: Axes) -> None:
+    upper.set_xscale("log")
+    upper.set_yscale("log")
+    lower.set_xscale("log")
+    for ax in (upper, lower):
+        ax.set_xlim(*band)
+    hertz_axis(upper, 1.0)
+    upper.legend(loc="best")
+    lower.set_ylabel("phase [deg]")
+    lower.set_xlabel("angular frequency [rad/s]")
+
+
+def _map(data: Comparison, ax: Axes) -> None:
+    """Where each is stable: the plane of both gains, or that of a factor and a delay."""
+    ax.grid(False)
+    if data.regions is None:
+        _delays(data, ax)
+        return
+    first, other = data.regions
+    if first == other:
+        _region(first, GREEN, "stable", ax)
+    else:
+        for found, side, colour in zip(data.regions, data.sides, COLOURS, strict=True):
+            _region(found, colour, f"{side.name}: stable", ax)
+    for side, colour in zip(data.sides, COLOURS, strict=True):
+        if isinstance(side.law, HubFeedback):
+            ax.plot([side.law.K1], [side.law.K2], "o", mfc=colour, mec="white", ms=7.5, zorder=7)
+    arm = data.one.arm
+    ax.set_xlim(first.K1[0], first.K1[-1])
+    ax.set_ylim(first.K2[0], first.K2[-1])
+    ax.set_xlabel(f"K1, gain on the hub rate [{unit_of('K1', arm)}]")
+    ax.set_ylabel(f"K2, gain on the root moment [{written_unit('K2', arm).strip() or '−'}]")
+    ax.legend(loc="upper left", bbox_to_anchor=(0.0, -0.1), borderaxespad=0.0)
+
+
+def _region(found: Region, colour: str, label: str, ax: Axes) -> None:
+    for piece in pieces(found.K1, found.stable_intervals):
+        x, low, high = np.array(piece.points).T
+        ax.fill_between(x, low, high, facecolor=colour, alpha=0.22, lw=0, zorder=1)
+        outline(piece, colour, 1.4, 3.0, ax)
+    ax.fill_between([], [], [], facecolor=colour, alpha=0.4, label=safe(label))
+
+
+def _delays(data: Comparison, ax: Axes) -> None:
+    for found, side, colour in zip(data.delays, data.sides, COLOURS, strict=True):
+        image = np.zeros((*found.stable.shape, 4))
+        image[found.stable] = to_rgba(colour, 0.3)
+        ax.pcolormesh(found.x, found.y, image, shading="nearest", rasterized=True)
+        ax.fill_between([], [], [], facecolor=colour, alpha=0.4, label=safe(f"{side.name}: stable"))
+        ax.plot([1.0], [found.law.delay], "o", mfc=colour, mec="white", ms=7.5, zorder=7, clip_on=False)
+    ax.set_xlabel("factor on the law")
+    ax.set_ylabel("delay of the law [ms]")
+    ax.yaxis.set_major_formatter(FuncFormatter(lambda seconds, _: plain(1e3 * seconds, 3)))
+    ax.axvline(1.0, color=INK, lw=0.6)
+    ax.legend(loc="upper left", bbox_to_anchor=(0.0, -0.1), borderaxespad=0.0)
