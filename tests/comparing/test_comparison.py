@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from matplotlib import image
+from matplotlib.collections import QuadMesh
 
 import tfarm
 from tests.shell import answer, run
@@ -99,9 +100,10 @@ def test_a_law_of_other_signals_is_mapped_over_factor_and_delay():
         step = plane.y[1] - plane.y[0]
         assert last - plane.law.delay == pytest.approx(side.margins.exact_delay, abs=2 * step)
     drawn = draw_comparison(found).axes[1].collections
-    images = [each.get_array().reshape(*found.delays[0].stable.shape, 4) for each in drawn if hasattr(each, "cmap")]
-    seen = [each[..., 3] > 0 for each in images if each.size]
-    assert all(np.array_equal(one, plane.stable) for one, plane in zip(seen, found.delays, strict=False))
+    meshes = [each for each in drawn if isinstance(each, QuadMesh)]
+    for mesh, plane in zip(meshes, found.delays, strict=True):
+        opaque = np.asarray(mesh.get_array())[..., 3] > 0
+        assert np.array_equal(opaque, plane.stable)
 
 
 def test_two_laws_are_called_by_their_files_and_drawn(capsys, files, tmp_path):
