@@ -157,6 +157,9 @@ def report(
     delay_samples: Delay = None,
     dsp: DspFile = None,
     theory: TheoryName = None,
+    measured: Annotated[
+        list[str] | None, typer.Option("--measured", metavar="OUTPUT/INPUT=FILE", help="lay this over the exact one")
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="make pages that are up to date again, too")] = False,
 ) -> None:
     """Write pages with pictures, tables and data: open index.html in a browser.
@@ -171,8 +174,10 @@ def report(
     gains = {"K1": k1, "K2": k2, "Kp": kp}
     laws = [laws_of(arm, name, gains, law or []) for arm, name in zip(subjects, names, strict=True)]
     from tfarm.cli.tables import progress
+    from tfarm.fitting.reading import data_of
     from tfarm.report import write
 
+    responses = [data_of(text, "--measured") for text in measured or []]
     left_out: list[str] = []
     with progress() as advance:
         pages = None if only is None else (only,)
@@ -181,6 +186,7 @@ def report(
             out,
             chains=chains,
             laws=laws,
+            measured=responses,
             only=pages,
             force=force,
             progress=advance,

@@ -13,6 +13,7 @@ from tfarm.dsp import Chain
 from tfarm.dsp.discretise import discretised
 from tfarm.dsp.loop import check_loop
 from tfarm.errors import one_line
+from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
 from tfarm.fitting.runs import MeasuredRun
 from tfarm.loop.law_loop import LawLoop
@@ -42,13 +43,15 @@ class GivenLaw:
 class Subject(NamedTuple):
     """Whose page it is: an arm, its chain, and the laws that the page is about; none: the default gains.
 
-    `fit` is where its numbers are from, if they were fitted to measurements.
+    `fit` is where its numbers are from, if they were fitted to measurements; `measured` are responses to be laid over
+    its own.
     """
 
     arm: Arm
     chain: Chain
     laws: tuple[GivenLaw, ...] = ()
     fit: Fit | None = None
+    measured: tuple[Measured, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -112,9 +112,10 @@ def own_law(subject: Subject) -> str | None:
 
 def command(subject: Subject, only: str | None) -> str:
     """The command that writes this page; an arm that is no preset is named by its file, as are laws beside it."""
-    arm, chain, laws, _ = subject
+    arm, chain, laws, *_ = subject
     law = own_law(subject)
     files = "" if law is not None else "".join(f" --law {shlex.quote(each.file or 'FILE')}" for each in laws)
+    files += "".join(f" --measured {shlex.quote(f'{each.name}={each.source}')}" for each in subject.measured)
     choice = f"{files} --only {only}" if only else files
     return f"tfarm report {_argument(arm.name, law is None and is_preset(arm, chain))}{choice} --out reports"
 

@@ -18,6 +18,7 @@ from tfarm.report.law_section import law_section
 from tfarm.report.locus_section import locus_section
 from tfarm.report.loop_laws import has_loop, has_rate_loop
 from tfarm.report.loop_section import map_section, margins_section, no_loop_section, nyquist_section
+from tfarm.report.measured_section import measured_section
 from tfarm.report.modes_section import modes_section
 from tfarm.report.page import QUESTIONS
 from tfarm.report.paper import is_from_paper, paper_section
@@ -33,8 +34,8 @@ class Piece:
     """One section of one arm's page: a name for the progress bar, the section's anchor, and how to make it.
 
     `make` takes the arm, for a section that says what the loop does when sampled (`is_sampled`) its chain, for one of
-    given laws (`is_of_laws`) chain and laws, for one of a fit (`is_of_fit`) that alone; `in_s`: only where one of the
-    laws acts without a clock.
+    given laws (`is_of_laws`) chain and laws, for one of a fit (`is_of_fit`) that alone, for one of measured responses
+    (`is_measured`) these too; `in_s`: only where one of the laws acts without a clock.
     """
 
     name: str
@@ -46,10 +47,13 @@ class Piece:
     is_of_laws: bool = False
     in_s: bool = False
     is_of_fit: bool = False
+    is_measured: bool = False
 
     def is_for(self, subject: Subject) -> bool:
         """Whether a page on this subject has the section."""
         if self.is_of_fit and subject.fit is None:
+            return False
+        if self.is_measured and not subject.measured:
             return False
         return self.suits(subject.arm) and (not self.in_s or bool(in_s(on_arm(subject.arm, subject.laws))))
 
@@ -57,6 +61,8 @@ class Piece:
         """The section."""
         if self.is_of_fit:
             return self.make(subject.fit)
+        if self.is_measured:
+            return self.make(subject.arm, subject.measured)
         if self.is_of_laws:
             return self.make(subject.arm, subject.chain, subject.laws)
         return self.make(subject.arm, subject.chain) if self.is_sampled else self.make(subject.arm)
@@ -69,6 +75,7 @@ PIECES = (
     Piece("the paper's values", "paper", (), paper_section, is_from_paper),
     Piece("root moment", "bode-root-moment", ("bode",), partial(bode_section, output="root_moment")),
     Piece("tip displacement", "bode-tip-displacement", ("bode",), partial(bode_section, output="tip_displacement")),
+    Piece("measured responses", "bode-measured", ("bode",), measured_section, is_measured=True),
     Piece("modes", "modes", ("modes",), modes_section),
     Piece(
         "no loop", "no-loop", ("margins", "locus", "sampled", "tune"), no_loop_section, lambda arm: not has_loop(arm)

@@ -1,8 +1,8 @@
 """Which pages need not be made again: what each was made of, and the hash of every file of it, kept in made.json.
 
-A page is made of the arm's file with its chain, the laws that it is about, the fit that its numbers are from, tfarm's
-own files and the versions of what computes and draws.  It is up to date if all of these are what they were and each
-of its files is as it was written.
+A page is made of the arm's file with its chain, the laws that it is about, the fit that its numbers are from, what was
+measured, tfarm's own files and the versions of what computes and draws.  It is up to date if all of these are what they
+were and each of its files is as it was written.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def makers() -> str:
 
 def key_of(subject: Subject, trust: str) -> str:
     """What the pages on this subject are made of, `trust` being the page that they lead to: a hash."""
-    given = pickle.dumps((subject.laws, subject.fit), protocol=4)  # only hashed, never read
+    given = pickle.dumps((subject.laws, subject.fit, subject.measured), protocol=4)  # only hashed, never read
     text = "\n".join((makers(), trust, subject.arm.name, file_text(subject.arm, subject.chain)))
     return hashlib.sha256(text.encode() + given).hexdigest()
 

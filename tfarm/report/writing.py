@@ -20,6 +20,7 @@ from tfarm.arm import Arm
 from tfarm.dsp import Chain
 from tfarm.errors import ParameterError, TfarmError, did_you_mean
 from tfarm.files import temporary_folder
+from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
 from tfarm.report.card import save_card, written_cards
 from tfarm.report.given_laws import GivenLaw, Subject, check_laws
@@ -55,6 +56,7 @@ def write(
     chains: Sequence[Chain] | None = None,
     laws: Sequence[Sequence[GivenLaw]] | None = None,
     fits: Sequence[Fit | None] | None = None,
+    measured: Sequence[Measured] = (),
     only: tuple[str, ...] | None = None,
     force: bool = False,
     progress: Progress | None = None,
@@ -64,7 +66,8 @@ def write(
 
     `chains` are the arms' own sampling, converters, actuators and slews; ideal ones at 10 ms if not given.  `laws` are
     those that each arm's page is about; where there is none it is about the default gains.  `fits` are where the arms'
-    numbers are from, if they were fitted to measurements: their pages begin with these.
+    numbers are from, if they were fitted to measurements: their pages begin with these.  Responses that were `measured`
+    are laid over those of every arm.
     `only` ("bode", "modes", "margins", ...) writes those pages alone, out/<name>/bode.html and so on.  An arm whose
     pages are up to date is left as it is, unless `force`.  `progress` is told (done, total, what) after each piece of
     work.  A section that tfarm cannot make of an arm says why in its place, and `notice` is told so in one line, once
@@ -77,7 +80,7 @@ def write(
     laws = [()] * len(arms) if laws is None else laws
     fits = [None] * len(arms) if fits is None else fits
     each = zip(arms, chains, laws, fits, strict=True)
-    subjects = [Subject(arm, chain, tuple(own), fit) for arm, chain, own, fit in each]
+    subjects = [Subject(arm, chain, tuple(own), fit, tuple(measured)) for arm, chain, own, fit in each]
     for subject in subjects:
         check_laws(subject.arm, subject.chain, subject.laws)
     out = Path(out)

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from tfarm.columns import FILES, Table
+from tfarm.errors import MISSING
 from tfarm.files import write_file
 
 
@@ -36,7 +37,10 @@ def as_json(table: Table) -> str:
     """{"table", "units", "rows": [{key: value}, ...]}, a line a row."""
     columns = table.on(FILES)
     rows = zip(*(plain(column.values) for column in columns), strict=True)
-    texts = (_dumped({column.key: value for column, value in zip(columns, row, strict=True)}) for row in rows)
+    texts = (
+        _dumped({column.key: value for column, value in zip(columns, row, strict=True) if value is not MISSING})
+        for row in rows
+    )
     lines = ",\n  ".join(texts)
     head = _dumped({"table": table.title, "units": {column.key: column.unit for column in columns if column.unit}})
     return f'{head[:-1]}, "rows": [\n  {lines}\n]}}\n'
@@ -59,6 +63,8 @@ def as_csv(table: Table, *, units: bool = False) -> str:
 
 
 def _csv_cell(value: Any) -> str:
+    if value is MISSING or value is None:
+        return ""
     found = plain(value)
     return " ".join(map(str, found)) if isinstance(found, list) else str(found)
 

@@ -1,0 +1,30 @@
+"""Measured responses on an arm's page: the numbers of the command, the picture, and the page that is made again."""
+
+import tfarm
+from tests.shell import answer, run
+from tfarm.fitting.reading import read_measured
+from tfarm.report.measured_section import measured_section
+
+FILE = "tests/data/sweep/tip.csv"
+GIVEN = f"tip_acceleration/hub_torque={FILE}"
+
+
+def test_the_tables_are_those_of_the_command(capsys):
+    arm = tfarm.load("sasaki2012-lab")
+    section = measured_section(arm, [read_measured(FILE, "tip_acceleration", "hub_torque")])
+    picture, modes, required = section.blocks
+    assert (picture.stem, modes.stem, required.stem) == ("measured", "measured-modes", "measured-required")
+    command = answer(capsys, "response", "sasaki2012-lab", "--measured", GIVEN)
+    assert [dict(row) for row in modes] == command["modes"]
+    assert f"{command['rms_log_error']:.3g}" in section.words[0]
+    assert len(picture.data) == command["points"]
+
+
+def test_the_page_says_how_it_is_made_again(tmp_path, capsys):
+    given = ("report", "sasaki2012-lab", "--only", "bode", "--measured", GIVEN, "--out", str(tmp_path))
+    code, out, _ = run(capsys, *given)
+    assert code == 0
+    page = (tmp_path / "sasaki2012-lab" / "bode.html").read_text()
+    assert out.strip().endswith("bode.html")
+    assert f"--measured {GIVEN} --only bode" in page
+    assert "What would explain it" in page
