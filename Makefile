@@ -7,6 +7,7 @@ BIN := .venv/bin
 RIG := tests/data/quanser-2dsfl
 INSTALLED := .venv/.installed
 BENCH_INSTALLED := .venv/.bench
+BROWSER_INSTALLED := .venv/.browser
 PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check install -c requirements.lock
 
 # What `make survey` runs, one module of tests a line; each takes a size and a seed.
@@ -40,11 +41,11 @@ SURVEYS := \
 	report.plausible \
 	report.twice
 
-.PHONY: help install reports modes bode margins locus sampled tune audit reference test kernels survey lint bench clean
+.PHONY: help install reports modes bode margins locus sampled tune audit reference test test-browser kernels survey lint bench clean
 
 help: ## list these verbs
-	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile | while IFS="$$(printf '\t')" read -r verb what; do \
-		printf '  make %-9s %s\n' "$$verb" "$$what"; done
+	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' Makefile | while IFS="$$(printf '\t')" read -r verb what; do \
+		printf '  make %-12s %s\n' "$$verb" "$$what"; done
 
 install: $(INSTALLED) ## set up .venv with the locked versions and the tfarm command
 
@@ -78,6 +79,9 @@ reference: $(INSTALLED) ## write the reference of the public names to reference/
 
 test: $(INSTALLED) ## run the tests
 	@$(BIN)/python -m pytest -n 2 --dist worksteal
+
+test-browser: $(BROWSER_INSTALLED) ## open pages in Chromium: errors, the digits shown, times, phone, dark
+	@$(BIN)/python -m pytest tests/browser/pages.py -n 0
 
 kernels: $(INSTALLED) ## run the numerical rooms under other kernels of BLAS and NumPy (ONLY=--marked: CI's minute)
 	@$(BIN)/python -m tests.kernels $(ONLY)
@@ -120,4 +124,8 @@ $(INSTALLED): pyproject.toml requirements.lock
 
 $(BENCH_INSTALLED): $(INSTALLED)
 	@$(PIP) -e '.[bench]'
+	@touch $@
+
+$(BROWSER_INSTALLED): $(INSTALLED)
+	@$(PIP) -e '.[browser]'
 	@touch $@

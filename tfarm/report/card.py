@@ -20,7 +20,7 @@ from tfarm.report.sections import PICTURES, Fact
 from tfarm.response.frequency import bode
 
 FACTS = 4  # of the headline numbers
-PAGES = {"index": "full report", **QUESTIONS}
+PAGES = {"index": "full report", "live": "live loop", **QUESTIONS}
 
 
 def save_card(arm: Arm, folder: Path, laws: Sequence[str] = ()) -> None:

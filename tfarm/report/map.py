@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -101,6 +102,7 @@ def gain_map(arm: Arm, chain: Chain | None = None) -> GainMap:
     )
 
 
+@lru_cache(maxsize=8)
 def sampled_region(arm: Arm, x: Axis, y: Axis, chain: Chain) -> SampledMap | None:
     """Where in the picture the sampled loop is stable, with the modes of the verdict on the default gains."""
     try:

@@ -62,10 +62,13 @@ def _templates() -> Environment:
     return environment
 
 
-def arm_page(subject: Subject, sections: Sequence[SavedSection], only: str | None, *, trust: str) -> str:
+def arm_page(
+    subject: Subject, sections: Sequence[SavedSection], only: str | None, *, trust: str, live: bool = False
+) -> str:
     """The page of one arm, under its laws where they are given, with every section or with those of one question.
 
     `trust` is the page that says why it can be trusted, as seen from the arm's folder; empty if there is none.
+    `live`: whether a live page is beside it.
     """
     arm = subject.arm
     title = f"{arm.name}: {QUESTIONS[only].lower()}" if only else arm.name
@@ -76,6 +79,7 @@ def arm_page(subject: Subject, sections: Sequence[SavedSection], only: str | Non
         sections=sections,
         only=only,
         trust=trust,
+        live=live,
         summary=summary(arm, [each.given_name for each in subject.laws]),
         foot=foot(subject, only),
         has_proof=not (subject.laws and only),
@@ -117,14 +121,14 @@ def command(subject: Subject, only: str | None) -> str:
     files = "" if law is not None else "".join(f" --law {shlex.quote(each.file or 'FILE')}" for each in laws)
     files += "".join(f" --measured {shlex.quote(f'{each.name}={each.source}')}" for each in subject.measured)
     choice = f"{files} --only {only}" if only else files
-    return f"tfarm report {_argument(arm.name, law is None and is_preset(arm, chain))}{choice} --out reports"
+    return f"tfarm report {argument(arm.name, law is None and is_preset(arm, chain))}{choice} --out reports"
 
 
 def command_for_all(arms: Sequence[tuple[str, bool]]) -> str:
     """The command that writes the pages of these arms, each a name and whether it is a preset."""
     if sorted(name for name, preset in arms if preset) == sorted(presets()) and all(preset for _, preset in arms):
         return "tfarm report --out reports"
-    return f"tfarm report {' '.join(_argument(name, preset) for name, preset in arms)} --out reports"
+    return f"tfarm report {' '.join(argument(name, preset) for name, preset in arms)} --out reports"
 
 
 def is_preset(arm: Arm, chain: Chain) -> bool:
@@ -132,7 +136,8 @@ def is_preset(arm: Arm, chain: Chain) -> bool:
     return arm.name in presets() and (load(arm.name), load_chain(arm.name)) == (arm, chain)
 
 
-def _argument(name: str, preset: bool) -> str:
+def argument(name: str, preset: bool) -> str:
+    """How a command names an arm."""
     return shlex.quote(name if preset else f"{name}.toml")
 
 

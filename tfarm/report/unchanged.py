@@ -23,7 +23,18 @@ from tfarm.report.given_laws import Subject
 from tfarm.report.kept import LARGEST, keep
 
 KIND = "made"
-PACKAGES = ("numpy", "scipy", "numba", "mpmath", "python-flint", "sympy", "control", "matplotlib", "latex2mathml")
+PACKAGES = (
+    "numpy",
+    "scipy",
+    "numba",
+    "mpmath",
+    "python-flint",
+    "sympy",
+    "control",
+    "matplotlib",
+    "latex2mathml",
+    "vl-convert-python",
+)
 
 
 @cache

@@ -24,6 +24,7 @@ from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
 from tfarm.report.card import save_card, written_cards
 from tfarm.report.given_laws import GivenLaw, Subject, check_laws
+from tfarm.report.live import ASSETS, PAGE, has_assets, is_live, save_live, write_assets
 from tfarm.report.page import QUESTIONS, arm_page, file_of, index_page
 from tfarm.report.pieces import LAW_PIECES, PIECES, Piece
 from tfarm.report.sections import SavedSection, Section, save_section
@@ -38,10 +39,11 @@ Notice = Callable[[str], object]
 WORKERS = 2
 ENOUGH = 8  # pieces of work of one arm for which a second process, which takes a second or two to start, is worth it
 LONG = ("tune", "sampled", "modes")  # anchors of the sections that take longest
-OURS = ("index.html", "README.md", "pictures", "bench.json", "trust")  # names in `out` that no arm's folder may have
+OURS = ("index.html", "README.md", "pictures", "bench.json", "trust", ASSETS)  # names that no arm's folder may have
 
 
 CARD, CARD_ALONE = "card", "card alone"  # with the proofs of the arm, and without
+LIVE = "live loop"
 EVIDENCE = (-1, "evidence")  # for the page on trust: of no arm
 TRUST = f"{FOLDER}/index.html"
 
@@ -85,7 +87,7 @@ def write(
         check_laws(subject.arm, subject.chain, subject.laws)
     out = Path(out)
     told: list[str] = []
-    with _beside(out, [arm.name for arm in arms] + [FOLDER] * (not only)) as beside:
+    with _beside(out, [arm.name for arm in arms] + [FOLDER, ASSETS] * (not only)) as beside:
         trust = TRUST if not only or (out / TRUST).is_file() else ""
         left = [not force and is_unchanged(out / each.arm.name, _pages(only), trust, each) for each in subjects]
         told += [_left(each.arm) for each, same in zip(subjects, left, strict=True) if same]
@@ -100,6 +102,9 @@ def write(
             failures = list(_failures(subject.arm, parts))
             told += failures
             note_made(folder, out / subject.arm.name, () if failures else _pages(only), key_of(subject, trust))
+        if not only and any(map(is_live, subjects)) and (changed or not has_assets(out / ASSETS)):
+            write_assets(beside / ASSETS, out / ASSETS)
+            _move_into(beside / ASSETS, out / ASSETS)
         for subject, folder in zip(changed, folders, strict=True):
             _move_into(folder, out / subject.arm.name)
         if (evidence := gathered or evidence) is not None:
@@ -185,6 +190,7 @@ def _make_all(
         for j, piece in enumerate(pieces_of(subject))
         if piece.is_for(subject) and (not only or set(only) & set(piece.questions))
     ]
+    tasks += [(i, LIVE) for i, subject in enumerate(subjects) if not only and is_live(subject)]
     tasks += [(i, CARD_ALONE if subject.laws and only else CARD) for i, subject in enumerate(subjects)]
     done: dict[Task, Result] = {}
     if progress is not None:
@@ -252,6 +258,9 @@ def _may_start_processes() -> bool:
 def _make(subject: Subject, piece: int | str, folder: Path) -> Result:
     if piece == EVIDENCE[1]:
         return gather()
+    if piece == LIVE:
+        save_live(subject, folder)
+        return None
     if isinstance(piece, str):
         save_card(subject.arm, folder, [each.given_name for each in subject.laws])
         if piece == CARD:
@@ -306,7 +315,8 @@ def _write_pages(
     (folder / "arm.toml").write_text(file_of(subject), encoding="utf-8", newline="")
     for question in only or (None,):
         wanted = [s for s in sections if question is None or _answers(s.section.anchor, question)]
-        page = arm_page(subject, wanted, question, trust=f"../{trust}" if trust else "")
+        live = (folder / PAGE).is_file()
+        page = arm_page(subject, wanted, question, trust=f"../{trust}" if trust else "", live=live)
         (folder / f"{question or 'index'}.html").write_text(page, encoding="utf-8", newline="")
 
 

@@ -1,0 +1,206 @@
+"""Pages in a real browser, from the disk: `make test-browser` (Playwright with the system's Chromium).
+
+Not collected by `make test`.  It prints how soon a live page answers and how long a move takes.
+"""
+
+from __future__ import annotations
+
+import math
+import shutil
+import statistics
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser, Page, sync_playwright
+
+import tfarm
+from tfarm.arm import HubFeedback
+from tfarm.dsp import load_chain
+from tfarm.loop.margins import LoopMargins, margins
+from tfarm.report import write
+from tfarm.report.given_laws import Subject
+from tfarm.report.live import ASSETS, save_live, write_assets
+
+ARMS = ("sasaki2012-lab", "stocky-steel", "quanser-flexlink")
+REPORTED = "stocky-steel"  # of which there are report pages too
+FLAGS = ("--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--no-first-run")
+GAINS, MOVES = 10, 30
+INTERACTIVE, MOVE = 1.0, 0.15  # s: what they should take; printed, and asserted with room for a busy machine
+BUSY = 5.0
+NAMES = ("phase", "phase_lag", "phase_lead", "delay", "disk", "peak_sensitivity", "peak_complementary")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    out = tmp_path_factory.mktemp("pages")
+    write([tfarm.load(REPORTED)], out, only=("modes", "margins"))
+    for name in ARMS:
+        (out / name).mkdir(exist_ok=True)
+        save_live(Subject(tfarm.load(name), load_chain(name)), out / name)
+    write_assets(out / ASSETS, out / ASSETS)
+    return out
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    found = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if found is None:
+        pytest.fail("no Chromium on this machine: apt-get install chromium")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=found, args=list(FLAGS))
+        yield browser
+        browser.close()
+
+
+class Opened:
+    """A page with what it said and what it asked for."""
+
+    def __init__(self, browser: Browser, file: Path, width: int = 1400, scheme: Any = "light"):
+        self.context = browser.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme)
+        self.page: Page = self.context.new_page()
+        self.said: list[str] = []
+        self.asked: list[str] = []
+        self.page.on("console", lambda message: self.said.append(f"{message.type}: {message.text}"))
+        self.page.on("pageerror", lambda error: self.said.append(str(error)))
+        self.page.on("request", lambda request: self.asked.append(request.url))
+        self.page.on("requestfailed", lambda request: self.said.append(f"not there: {request.url}"))
+        self.page.goto(file.as_uri())
+        if file.name == "live.html":
+            self.page.wait_for_selector("body[data-ready]", timeout=20_000)
+
+    def __enter__(self) -> Opened:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.context.close()
+
+
+def set_gains(page: Page, law: HubFeedback) -> None:
+    """Typed into the fields, as a reader does; waits until the page has drawn the last of them."""
+    before = page.evaluate("window.live.moves.length")
+    for name in ("K1", "K2", "Kp"):
+        page.locator(f"#{name}").fill(repr(law[name]))
+        page.locator(f"#{name}").dispatch_event("change")
+    page.wait_for_function(
+        "([n, gains]) => live.moves.length > n && Object.keys(gains).every(k => live.law[k] === gains[k])",
+        arg=[before, {name: law[name] for name in ("K1", "K2", "Kp")}],
+    )
+    page.evaluate("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+
+def shown(page: Page) -> dict[str, str]:
+    ids = [f"m-{name}" for name in (*NAMES, "gain")] + ["verdict"]
+    return page.evaluate("ids => Object.fromEntries(ids.map(id => [id, document.getElementById(id).textContent]))", ids)
+
+
+def printed(found: LoopMargins) -> dict[str, str]:
+    """As `tfarm margins` prints them."""
+    low, high = found.gain
+    return {f"m-{name}": f"{getattr(found, name):.6g}" for name in NAMES} | {"m-gain": f"{low:.8g} to {high:.8g}"}
+
+
+def random_gains(data: dict[str, Any], number: int) -> Iterator[HubFeedback]:
+    rng = np.random.default_rng(15)
+    K1, K2, Kp = (data["axes"][name] for name in ("K1", "K2", "Kp"))
+    for i in range(number):
+        rate = math.exp(rng.uniform(math.log(K1["linear"]), math.log(K1["high"])))
+        angle = rng.uniform(0.0, 0.1 * Kp["high"]) if i % 3 == 2 else 0.0
+        yield HubFeedback(K1=rate, K2=rng.uniform(max(K2["low"], -K2["high"]), 0.7 * K2["high"]), Kp=angle)
+
+
+def test_every_page_opens_from_the_disk_without_a_word(browser, folder):
+    pages = sorted(folder.rglob("*.html"))
+    assert len(pages) >= len(ARMS) + 3
+    for file in pages:
+        with Opened(browser, file) as opened:
+            assert not opened.said, file
+            assert all(url.startswith(("file://", "data:")) for url in opened.asked), file
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_what_is_shown_at_ten_gains_is_what_tfarm_margins_prints(browser, folder, name):
+    arm = tfarm.load(name)
+    with Opened(browser, folder / name / "live.html") as opened:
+        page = opened.page
+        data = page.evaluate("JSON.parse(document.getElementById('live-data').textContent)")
+        stable = 0
+        for law in random_gains(data, GAINS):
+            set_gains(page, law)
+            here = shown(page)
+            found = margins(arm, law, data["band"])
+            assert here["verdict"].startswith("stable") == found.stability.is_stable, law
+            if found.in_band is not None:
+                stable += 1
+                wanted = printed(found.in_band)
+                assert {key: here[key] for key in wanted} == wanted, law
+            poles = found.stability.poles.values
+            for re, im in page.evaluate("() => window.live.loop.poles(window.live.law)"):
+                assert abs(poles - complex(re, im)).min() < 5e-4 * abs(complex(re, im)), law
+        assert stable >= 2
+        assert not opened.said
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_it_answers_soon(browser, folder, name, capsys):
+    with Opened(browser, folder / name / "live.html") as opened:
+        page = opened.page
+        box = page.locator("#map canvas").bounding_box()
+        assert box is not None
+        page.mouse.move(box["x"] + 0.3 * box["width"], box["y"] + 0.6 * box["height"])
+        page.mouse.down()
+        for step in range(MOVES):
+            x = box["x"] + (0.3 + 0.5 * step / MOVES) * box["width"]
+            count = page.evaluate("window.live.moves.length")
+            page.mouse.move(x, box["y"] + 0.6 * box["height"])
+            page.wait_for_function("n => window.live.moves.length > n", arg=count)
+        page.mouse.up()
+        ready, moves = page.evaluate("[window.live.ready, window.live.moves]")
+        median = statistics.median(moves)
+        with capsys.disabled():
+            print(
+                f"\n{name}: interactive after {ready:.0f} ms, a move {median:.0f} ms (median of {len(moves)} dragged)"
+            )
+        assert page.locator("#K1").input_value() != str(page.evaluate("window.live.loop.start.K1"))
+        assert ready < 1e3 * INTERACTIVE * BUSY
+        assert median < 1e3 * MOVE * BUSY
+        assert not opened.said
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [400, 1400])
+def test_nothing_is_hidden_on_a_phone_nor_in_the_dark(browser, folder, width, scheme):
+    for name in ARMS:
+        with Opened(browser, folder / name / "live.html", width, scheme) as opened:
+            beyond = opened.page.evaluate(
+                """() => [...document.querySelectorAll("td, th, canvas, input, p, figcaption")]
+                .filter(e => e.offsetParent && e.getBoundingClientRect().right > innerWidth + 0.5)
+                .map(e => e.outerHTML.slice(0, 80))"""
+            )
+            assert not beyond, name
+            assert opened.page.evaluate("document.documentElement.scrollWidth") <= width
+            ink, ground = opened.page.evaluate(
+                "['color', 'backgroundColor'].map(k => getComputedStyle(document.body)[k].match(/\\d+/g).map(Number))"
+            )
+            assert (sum(ink) > sum(ground)) == (scheme == "dark")
+            assert abs(sum(ink) - sum(ground)) > 400
+            assert not opened.said
+
+
+def test_pointing_at_a_curve_reads_both_units(browser, folder):
+    with Opened(browser, folder / ARMS[0] / "live.html") as opened:
+        page = opened.page
+        canvas = page.locator("#bode canvas")
+        canvas.scroll_into_view_if_needed()
+        box = canvas.bounding_box()
+        assert box is not None
+        page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 0.2 * box["height"])
+        page.wait_for_function("document.getElementById('reading').textContent.includes('Hz')")
+        words = page.locator("#reading").text_content() or ""
+        rad, hertz = words.split(" rad/s = ")[0], words.split(" rad/s = ")[1].split(" Hz")[0]
+        assert float(rad) == pytest.approx(2 * math.pi * float(hertz), rel=1e-4)
+        at = f"window.live.loop.parts(window.live.loop.at({rad}), window.live.law)"
+        size = page.evaluate(f"(() => {{ const [D, N] = {at}; return Math.hypot(...N) / Math.hypot(...D); }})()")
+        assert f"L {20 * math.log10(size):.2f}"[:5] in words

@@ -1,0 +1,149 @@
+"""The arithmetic of the live page in Python, from the numbers in the page alone: the second road of its tests."""
+
+from __future__ import annotations
+
+import base64
+import itertools
+
+import numpy as np
+from scipy.optimize import brentq, minimize_scalar
+
+POINTS = 24
+X = np.cos(np.pi * (np.arange(POINTS) + 0.5) / POINTS)
+TO_SERIES = np.cos(np.outer(np.arange(POINTS), np.arccos(X))) * 2 / POINTS
+
+
+class Page:
+    """What live_loop.js does, with Chebyshev series where that has the barycentric formula."""
+
+    def __init__(self, data):
+        self.data = data
+        self.low, self.high = np.array(data["low"]), np.array(data["high"])
+        values = np.frombuffer(base64.b64decode(data["samples"]), "<f8").view(complex).reshape(-1, 3, POINTS)
+        self.series = values @ TO_SERIES.T
+        self.series[..., 0] /= 2
+        self.grid = self._grid()
+
+    def at(self, omega):
+        """d, theta and m (3, n)."""
+        omega = np.atleast_1d(omega)
+        panel = np.minimum(np.searchsorted(self.high, omega), self.high.size - 1)
+        x = (2 * omega - self.low[panel] - self.high[panel]) / (self.high[panel] - self.low[panel])
+        basis = np.cos(np.outer(np.arange(POINTS), np.arccos(np.clip(x, -1, 1))))
+        return np.einsum("npk,kn->pn", self.series[panel], basis)
+
+    def parts(self, omega, law):
+        """D and N, up to one positive factor for each panel."""
+        (d, theta, m), s = self.at(omega), 1j * np.atleast_1d(omega)
+        return s ** self.data["order"] * d, (law.Kp + law.K1 * s) * theta + law.K2 * s**2 * m
+
+    def loop(self, omega, law):
+        D, N = self.parts(omega, law)
+        return N / D
+
+    def _grid(self):
+        places, band = np.array(self.data["places"]), self.data["band"]
+        lowest, away = 1e-6 * min(band, places[0]), np.geomspace(1e-10, 0.06, 14)
+        corners = np.r_[lowest, places[places < band], band]
+        between = [np.linspace(a, b, 24, endpoint=False) for a, b in itertools.pairwise(corners)]
+        close = np.outer(places, 1 + np.r_[-away, away]).ravel()
+        omega = np.unique(np.concatenate([close, *between, np.geomspace(lowest, corners[1], 60), [band]]))
+        return omega[(omega >= lowest) & (omega <= band)]
+
+    def zeros(self, f, omega):
+        """Where f changes its sign, and to which."""
+        value = f(omega)
+        omega, value = omega[value != 0], value[value != 0]
+        before = np.nonzero(value[1:] * value[:-1] < 0)[0]
+        places = [brentq(lambda w: float(f(w)[0]), omega[i], omega[i + 1], xtol=1e-300, rtol=1e-15) for i in before]
+        return np.array(places), np.where(value[before] > 0, 2, -2)
+
+    def count(self, law):
+        """Unstable poles: those of the reference and what crosses on the way, Kp last."""
+        data, start = self.data, law.having("Kp", 0.0)
+        start = start.having("K1", data["reference"]["K1"]).having("K2", data["reference"]["K2"])
+        corner, loss = law.having("Kp", 0.0), data["rate_loss"]
+        found = data["reference_count"] + self._crossed(start, corner) + self._crossed(corner, law)
+        way = corner.K1 - start.K1
+        t = -(start.K1 + loss) / way if way else -1.0
+        if 0 < t < 1:
+            found -= int(np.sign(way * (data["inertia"] - (start.K2 + t * (law.K2 - start.K2)) * data["gauged"])))
+        return found + (law.Kp * (law.K1 + loss) < 0)
+
+    def _crossed(self, start, end):
+        way = end.plus(start, -1.0)
+
+        def both(w):
+            D, N = self.parts(w, start)
+            return D + N, self.parts(w, way)[1]
+
+        def h(w):
+            A, B = both(w)
+            return (A * B.conj()).imag
+
+        if not any(way.row):
+            return 0
+        places, change = self.zeros(h, self.grid)
+        A, B = both(places) if places.size else (np.empty(0), np.ones(0))
+        t = -(A / B).real
+        return int(change[(t > 0) & (t < 1)].sum())
+
+    def verdict(self, law):
+        data = self.data
+        if data["kind"] == "reactive":
+            low, high = (np.inf * sign if m is None else m for m, sign in zip(data["moments"], (-1, 1), strict=True))
+            return "stable" if law.K1 > 0 and low < law.K2 < high and law.Kp >= 0 else "not"
+        if self.count(law):
+            return "unstable"
+        takes = np.sign(law.K1 + data["rate_loss"]) * np.sign(1 - law.K2 / data["whole"]) if data["told"] else 0
+        return "unstable" if data["kind"] == "band" and takes < 0 and data["hub_alone"] else "stable"
+
+    def margins(self, law, poles):
+        """Each margin with where it is; `gain`; `crossed`."""
+        away = np.geomspace(0.05, 20.0, 12)
+        close = (poles.imag[:, None] + abs(poles.real[:, None]) * np.r_[-away, 0.0, away]).ravel()
+        omega = np.unique(np.r_[self.grid, close[(close > self.grid[0]) & (close < self.data["band"])]])
+        crossed, _ = self.zeros(lambda w: np.log(abs(self.loop(w, law))), omega)
+        angle = np.degrees(np.angle(-self.loop(crossed, law)))
+        real, _ = self.zeros(lambda w: self.loop(w, law).imag * abs(self.parts(w, law)[0]) ** 2, omega)
+        found = {
+            "phase": self._least(angle, crossed),
+            "phase_lag": self._least(angle[angle > 0], crossed[angle > 0]),
+            "phase_lead": self._least(-angle[angle < 0], crossed[angle < 0]),
+            "delay": self._least(np.radians(np.mod(angle, 360)) / crossed, crossed),
+            "crossed": list(zip(crossed, angle, strict=True)),
+            "gain": self._gain(law, -1 / self.loop(real, law).real),
+        }
+        disk, at = self._lowest(lambda D, N: abs(D + N) / abs(D - N), omega, law)
+        S, at_S = self._lowest(lambda D, N: abs(D + N) / abs(D), omega, law)
+        T, at_T = self._lowest(lambda D, N: abs(D + N) / abs(N), omega, law)
+        return found | {
+            "disk": (2 * disk, at),
+            "peak_sensitivity": (max(1, 1 / S), at_S),
+            "peak_complementary": (1 / T, at_T),
+        }
+
+    @staticmethod
+    def _least(values, places):
+        i = np.argmin(abs(values)) if values.size else None
+        return (np.inf, 0.0) if i is None else (values[i], places[i])
+
+    def _gain(self, law, factors):
+        data = self.data
+        if data["kind"] == "reactive":
+            factors = [m / law.K2 for m in data["moments"] if m is not None and m * law.K2 > 0]
+        loss = data["rate_loss"]
+        rest = 0.0 if law.Kp else 0.0 - loss / law.K1 if law.K1 else data["inertia"] / data["gauged"] / law.K2
+        each = [*factors, rest]
+        return max((t for t in each if 0 <= t < 1), default=0.0), min((t for t in each if t > 1), default=np.inf)
+
+    def _lowest(self, of, omega, law):
+        value = of(*self.parts(omega, law))
+        dips = np.nonzero((value[1:-1] <= value[:-2]) & (value[1:-1] <= value[2:]))[0] + 1
+        best = min(zip(value, omega, strict=True))
+        for i in dips[np.argsort(value[dips])][:6]:
+            low, width = omega[i - 1], omega[i + 1] - omega[i - 1]
+            f = lambda share, low=low, width=width: float(of(*self.parts(low + share * width, law))[0])  # noqa: E731
+            found = minimize_scalar(f, bounds=(0.0, 1.0), method="bounded", options={"xatol": 1e-8})
+            best = min(best, (found.fun, low + found.x * width))
+        return best

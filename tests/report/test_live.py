@@ -1,0 +1,146 @@
+"""The live page of a loop: what it holds is the library's, and arithmetic on that alone gives the library's margins."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tfarm
+from tests.report.live_arithmetic import Page
+from tfarm.arm import HubFeedback
+from tfarm.dsp import Chain, load_chain, sampled_verdict
+from tfarm.exact.characteristic import float_units, loop_parts
+from tfarm.exact.system import system_of
+from tfarm.loop.margins import margins
+from tfarm.loop.panels import WRONG, loop_panels
+from tfarm.loop.plant import Loop
+from tfarm.loop.stability import stability
+from tfarm.report.given_laws import Subject
+from tfarm.report.live import save_live
+from tfarm.report.live_data import live_data
+
+ARMS = ("sasaki2012-lab", "stocky-steel", "quanser-flexlink")
+DIGITS = {"phase": 6, "phase_lag": 6, "phase_lead": 6, "delay": 6, "disk": 6, "peak_sensitivity": 6,
+          "peak_complementary": 6}  # as `tfarm margins` prints them  # fmt: skip
+
+
+@pytest.fixture(scope="module", params=ARMS)
+def case(request):
+    arm = tfarm.load(request.param)
+    data = json.loads(json.dumps(live_data(arm, load_chain(request.param)), allow_nan=False))
+    return arm, data, Page(data)
+
+
+def some_gains(data, seed, number):
+    """Gains over the whole of the page's axes, every second with Kp = 0."""
+    rng = np.random.default_rng(seed)
+    K1, K2, Kp = (data["axes"][name] for name in ("K1", "K2", "Kp"))
+    for i in range(number):
+        rate = math.exp(rng.uniform(math.log(0.2 * K1["linear"]), math.log(K1["high"])))
+        angle = math.exp(rng.uniform(math.log(Kp["linear"]), math.log(Kp["high"]))) if i % 2 else 0.0
+        yield HubFeedback(K1=rate, K2=rng.uniform(max(K2["low"], -K2["high"]), K2["high"]), Kp=angle)
+
+
+def test_samples_are_the_parts_of_the_loop_function(case):
+    """Not at the samples, and with gains of every kind: L of the page is that of `Loop`, as closely as L is steep."""
+    arm, data, page = case
+    omega = np.random.default_rng(3).uniform(1e-3, 1.0, 200) * data["band"]
+    for law in some_gains(data, 5, 3):
+        drive, fed_back = Loop(arm, law).parts(1j * omega)
+        D, N = page.parts(omega, law)
+        size = (abs(drive) * abs(D) + abs(fed_back) * abs(N) + abs(drive) * abs(N) + abs(fed_back) * abs(D)) / 2
+        assert np.max(abs(drive * N - fed_back * D) / size) < 1e-9
+
+
+def test_the_error_that_the_page_states_is_not_exceeded(case):
+    """Each part between the samples, at places that were not looked at when the page was written."""
+    arm, data, page = case
+    k = system_of(arm)
+    for low, high in zip(data["low"], data["high"], strict=True):
+        omega = np.linspace(max(low, 1e-3 * high), high, 23)[1:-1]
+        drive, numerators, scale = loop_parts(k, 1j * omega)
+        theta, _, gauge = float_units(k) * numerators
+        s = 1j * omega
+        exact = np.stack([drive / s ** data["order"], theta, gauge / s**2]) * np.exp(scale - scale.real.max())
+        held = page.at(omega)
+        factor = (held * exact.conj()).sum() / (abs(exact) ** 2).sum()
+        missed = abs(held - factor * exact).max(axis=1) / abs(held).max(axis=1)
+        assert missed.max() < 100 * WRONG
+    assert data["error"] <= WRONG
+
+
+def test_margins_are_the_librarys_to_the_printed_digits(case):
+    arm, data, page = case
+    compared = 0
+    for law in some_gains(data, 1, 8):
+        found = margins(arm, law, data["band"])
+        told = page.verdict(law)
+        assert told.startswith("stable") == found.stability.is_stable, law
+        if found.in_band is None:
+            continue
+        compared += 1
+        poles = found.stability.poles.values
+        here = page.margins(law, poles[poles.imag > 0])
+        for name, digits in DIGITS.items():
+            assert f"{float(f'{here[name][0]:.9g}'):.{digits}g}" == f"{getattr(found.in_band, name):.{digits}g}", (
+                name,
+                law,
+            )
+        assert [f"{t:.8g}" for t in here["gain"]] == [f"{t:.8g}" for t in found.in_band.gain], law
+        assert [(f"{w:.7g}", f"{a:.6g}") for w, a in here["crossed"]] == [
+            (f"{w:.7g}", f"{a:.6g}") for w, a in found.in_band.gain_crossovers
+        ]
+    assert compared >= 1
+
+
+def test_verdicts_are_the_librarys_counts(case):
+    arm, data, page = case
+    for law in some_gains(data, 9, 12):
+        try:
+            known = stability(arm, law, data["band"])
+        except tfarm.ConvergenceError:
+            continue
+        assert page.verdict(law).startswith("stable") == known.is_stable, law
+        if data["kind"] == "quiet":  # else poles may come from beyond the band
+            assert page.count(law) == known.unstable_roots, law
+
+
+def test_the_sampled_region_holds_at_its_columns(case):
+    """Just inside and outside each end, by the verdict that counts no crossings."""
+    arm, data, _ = case
+    chain, plane = load_chain(arm.name), data["sampled_map"]
+    for i in np.linspace(1, len(plane["K1"]) - 2, 3).astype(int):
+        for low, high in plane["intervals"][i]:
+            middle = HubFeedback(K1=plane["K1"][i], K2=(low + high) / 2)
+            assert sampled_verdict(arm, middle, chain).is_stable
+
+
+def test_the_page_stays_small_and_has_its_text_alone(tmp_path):
+    odd = replace(tfarm.load("sasaki2012-lab"), name="arm & 'co'")
+    save_live(Subject(odd, Chain()), tmp_path)
+    page = (tmp_path / "live.html").read_text(encoding="utf-8")
+    assert len(page) < 3e6
+    assert "<h1>arm &amp; &#39;co&#39;: live loop</h1>" in page
+    assert page.count("</script>") == 3
+    (text,) = re.findall(r'<script type="application/json" id="live-data">(.*?)</script>', page, re.S)
+    assert json.loads(text)["name"] == odd.name
+
+
+def test_an_arm_that_cannot_turn_freely_has_no_samples():
+    arm = tfarm.load("sasaki2012")
+    with pytest.raises(tfarm.ParameterError, match="turns freely"):
+        loop_panels(arm.having(payload_mass=math.inf), 1000.0)
+
+
+def test_a_page_that_cannot_be_made_says_why(tmp_path, monkeypatch):
+    def fails(*_):
+        raise tfarm.ConvergenceError("no digits left", 0.0, 1.0)
+
+    monkeypatch.setattr("tfarm.report.live.live_data", fails)
+    save_live(Subject(tfarm.load("sasaki2012"), Chain()), tmp_path)
+    assert "no digits left" in (tmp_path / "live.html").read_text(encoding="utf-8")

@@ -1,0 +1,110 @@
+"""The parts of the loop function along the imaginary axis, as polynomials through exact samples.
+
+Drive, hub angle and gauge at s = i w have neither poles nor branches (but for s = -1/C, off the axis): resonances are
+zeros of the drive.  So on a panel of a few resonances polynomials through Chebyshev points hold all digits, between
+the samples and, for poles, some way off the axis too (Trefethen 2013, theorem 8.2).  L is a quotient of them, linear
+in the gains: whoever has the samples has the loop for any gains, without the arm.
+
+    L(s) = (K2 s^2 m + (Kp + K1 s) theta) / (s^n d),   drive = s^n d, gauge = s^2 m,  n = 2, or 1 where the hub loses
+
+The powers of s are taken out so that slow gains lose no digits next to s = 0.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import Arm
+from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.exact.characteristic import float_units, loop_parts
+from tfarm.exact.system import system_of
+from tfarm.records import record
+
+from .frequencies import steep_places
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complexfloating[Any, Any]]
+
+SAMPLES = 24  # of a panel; entire functions of order 1/2, so that few more never help where panels hold one mode
+STEEP = 3  # steep places a panel: each mode has one of the own, the locked and the free hub
+WRONG = 1e-11  # of the size of a part on its panel: a panel whose polynomials miss by more is halved
+MOST = 400  # panels
+BETWEEN = np.linspace(-0.97, 0.97, 40)  # where they are compared, in the panel: not at s = 0
+POINTS = np.cos(np.pi * (np.arange(SAMPLES) + 0.5) / SAMPLES)  # Chebyshev's of the first kind: none in the middle
+WEIGHTS = (-1.0) ** np.arange(SAMPLES) * np.sin(np.pi * (np.arange(SAMPLES) + 0.5) / SAMPLES)
+
+
+@dataclass(frozen=True)
+@record
+class Panels:
+    """Samples of d, theta and m, `values` (3, panels, SAMPLES), on panels of the axis up to `band` [rad/s].
+
+    A panel is from `low` to `high` [rad/s], the first from -`high`, and has one positive factor on its values; `order`
+    is n of the drive's s^n.  `error` is the largest miss between samples, as a share of a part's size on its panel.
+    """
+
+    arm: Arm
+    band: float
+    low: Real
+    high: Real
+    values: Complex
+    order: int
+    error: float
+
+
+def loop_panels(arm: Arm, band: float) -> Panels:
+    """The samples up to a band [rad/s].  Raises ParameterError for an arm that cannot turn freely, ConvergenceError
+    where halving panels does not help."""
+    if not arm.has_rigid_mode:
+        raise ParameterError(key="arm", value=arm.name, remedy="samples of a loop are of an arm that turns freely")
+    places = np.asarray(steep_places(arm, band))[STEEP - 1 :: STEEP]
+    edges = np.r_[0.0, places[places < band], band]
+    waiting = [(-edges[1], edges[1]), *itertools.pairwise(edges[1:])]
+    done: list[tuple[float, float, Complex, float]] = []
+    while waiting:
+        low, high = waiting.pop()
+        values, error = _panel(arm, low, high)
+        if error <= WRONG:
+            done.append((float(low), float(high), values, error))
+        elif low == -high:
+            waiting += [(low / 2, high / 2), (high / 2, high)]
+        else:
+            waiting += [(low, (low + high) / 2), ((low + high) / 2, high)]
+        if len(done) + len(waiting) > MOST:
+            raise ConvergenceError("polynomials do not follow the loop's parts along the axis", high, error)
+    lows, highs, parts, errors = zip(*sorted(done, key=lambda each: each[1]), strict=True)
+    return Panels(
+        arm, band, np.array(lows), np.array(highs), np.stack(parts, axis=1), _order(arm), max(errors)
+    )  # fmt: skip
+
+
+def _order(arm: Arm) -> int:
+    return 1 if arm.rate_loss else 2
+
+
+def _panel(arm: Arm, low: float, high: float) -> tuple[Complex, float]:
+    """Samples on one panel, the largest 1, and the largest miss between them."""
+    middle, half = (low + high) / 2, (high - low) / 2
+    both = _parts(arm, middle + half * np.r_[POINTS, BETWEEN])
+    size = abs(both).max()
+    values, between = both[:, :SAMPLES] / size, both[:, SAMPLES:] / size
+    weights = WEIGHTS / (BETWEEN[:, None] - POINTS)
+    missed = abs(values @ weights.T / weights.sum(axis=1) - between)
+    return values, float((missed.max(axis=1) / abs(values).max(axis=1)).max())
+
+
+def _parts(arm: Arm, omega: Real) -> Complex:
+    """d, theta and m at i omega (3, n), with one positive factor.
+
+    Without losses they are real but for rounding, which is taken off: next to a resonance it would be a loss.
+    """
+    k, s = system_of(arm), 1j * omega
+    drive, numerators, scale = loop_parts(k, s)
+    theta, _, gauge = float_units(k) * numerators
+    parts = np.stack([drive / s ** _order(arm), theta, gauge / s**2]) * np.exp(scale - scale.real.max())
+    return np.asarray(parts.real + 0j if arm.is_reactive else parts)

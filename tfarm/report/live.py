@@ -1,0 +1,73 @@
+"""The live page of an arm's loop, live.html, and the scripts that all such pages share, in assets/."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path
+
+import vl_convert
+
+from tfarm.arm import HubFeedback
+from tfarm.errors import TfarmError
+from tfarm.loop.panels import SAMPLES
+from tfarm.report.given_laws import Subject
+from tfarm.report.live_charts import charts
+from tfarm.report.live_data import COLUMNS, live_data
+from tfarm.report.loop_laws import has_loop, sign_words
+from tfarm.report.page import TEMPLATES, argument, is_preset, render
+
+PAGE, ASSETS = "live.html", "assets"
+RUNTIME, SCRIPT = f"vega-{vl_convert.get_vega_version()}.js", "live.js"
+BUNDLED = "window.vegaEmbed = vegaEmbed;"
+SCRIPTS = ("live_loop.js", "live_page.js")
+
+
+def is_live(subject: Subject) -> bool:
+    """Whether the arm has such a page: its hub turns freely and has inertia."""
+    return has_loop(subject.arm) and subject.arm.has_rigid_mode
+
+
+def save_live(subject: Subject, folder: Path) -> None:
+    """live.html in the arm's folder.  It begins at the gains that the arm's pages are about.
+
+    Where its numbers cannot be made the page says why.
+    """
+    arm, chain, laws = subject.arm, subject.chain, subject.laws
+    title, out = f"{arm.name}: live loop", folder / PAGE
+    given = [each.law for each in laws if isinstance(each.law, HubFeedback)]
+    try:
+        data = live_data(arm, chain, given[0] if given else None)
+    except TfarmError as error:
+        out.write_text(render("live_failed.html", title=title, why=str(error)), encoding="utf-8", newline="")
+        return
+    data["command_name"] = argument(arm.name, is_preset(arm, chain))
+    text = json.dumps(data, separators=(",", ":"), ensure_ascii=True, allow_nan=False).replace("<", "\\u003c")
+    page = render("live.html", title=title, data=data, text=text, sign=sign_words(arm), columns=COLUMNS,
+                  samples=SAMPLES * len(data["low"]),
+                  assets=f"../{ASSETS}", runtime=RUNTIME, script=SCRIPT)  # fmt: skip
+    out.write_text(page, encoding="utf-8", newline="")
+
+
+def write_assets(folder: Path, there: Path) -> None:
+    """Vega's runtime, as vl-convert carries it, and this page's own script with its charts.
+
+    They are on their way from `folder` to `there`, where the runtime may be already.
+    """
+    folder.mkdir(exist_ok=True)
+    if not (there / RUNTIME).is_file():
+        (folder / RUNTIME).write_text(_runtime(), encoding="utf-8", newline="")
+    named = json.dumps(charts(), separators=(",", ":"), sort_keys=True)
+    scripts = "".join((TEMPLATES / name).read_text(encoding="utf-8") for name in SCRIPTS)
+    own = f"(() => {{\nconst LIVE_CHARTS = {named};\n{scripts}}})();\n"  # the runtime has names of its own
+    (folder / SCRIPT).write_text(own, encoding="utf-8", newline="")
+
+
+def has_assets(folder: Path) -> bool:
+    """Whether the scripts are there."""
+    return all((folder / name).is_file() for name in (RUNTIME, SCRIPT))
+
+
+@cache
+def _runtime() -> str:
+    return vl_convert.javascript_bundle(BUNDLED)

@@ -1,0 +1,169 @@
+"""The charts of the live page, by Vega-Lite: what they draw is put into their data sets by the page as the gains move.
+
+Colours in "@..." are set by the page, for a light screen or a dark one.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import altair as alt
+import vl_convert
+
+INK, GREY, FAINT = "@ink", "@grey", "@faint"
+BLUE, ORANGE, GREEN = "@blue", "@orange", "@green"
+WIDE, LOW, SQUARE = 620, 170, 300  # pixels before the page fits them to its width
+REACH = 2.5  # of the Nyquist plane to either side of 0, before it is zoomed
+ANGLES = [-180, -90, 0, 90, 180]
+CROSS = "M-.7,-.7L.7,.7M-.7,.7L.7,-.7"
+SHIFTED = "wheel![event.shiftKey]"  # so that a page can be scrolled over a chart
+
+
+@cache
+def charts() -> dict[str, dict[str, Any]]:
+    """The compiled charts by name: "bode", "nyquist", "poles" and "map", whose axes each page sets to its arm's."""
+    made = {"bode": _bode(), "nyquist": _nyquist(), "poles": _poles(), "map": _map()}
+    return {name: _compiled(chart) for name, chart in made.items()}
+
+
+def _compiled(chart: Any) -> dict[str, Any]:
+    """The chart's Vega, which the runtime draws without Vega-Lite's compiler."""
+    chart = chart.configure(background="transparent", padding=4).configure_view(stroke=FAINT)
+    chart = chart.configure_axis(
+        labelColor=GREY, titleColor=GREY, gridColor=FAINT, domainColor=GREY, tickColor=GREY, titleFontWeight="normal"
+    )
+    chart = chart.configure_legend(labelColor=GREY, titleColor=GREY, orient="top", title=None, symbolType="stroke")
+    return dict(vl_convert.vegalite_to_vega(chart.to_dict()))
+
+
+def _data(name: str) -> Any:
+    return alt.NamedData(name=name)
+
+
+def _bode() -> Any:
+    """|L|, its angle above -180 degrees, |S| and |T| over w, their margins as upright lines; zoom is one for all."""
+    zoom = alt.selection_interval(name="zoom", bind="scales", encodings=["x"], zoom=SHIFTED)
+    ticks, scale = alt.Axis(format=".3~r", tickCount=8), alt.Scale(type="log", nice=False)
+    x = alt.X("w:Q", scale=scale, title=None, axis=ticks)
+    below = alt.X("w:Q", scale=scale, title="frequency [rad/s]", axis=ticks)
+    magnitude = _row(
+        "L",
+        x,
+        [_line("dB", BLUE), _level(0), _stems("gain", ORANGE)],
+        alt.Scale(domain=[-80, 60]),
+        "|L| [dB]",
+    )
+    phase = _row(
+        "phase",
+        x,
+        [_line("angle", BLUE, detail="branch"), _level(0), _stems("phase", ORANGE)],
+        alt.Scale(domain=[-180, 180], nice=False),
+        "angle of −L [deg]",
+    )
+    sensitivity = _row(
+        "S",
+        below,
+        [_line("S", GREEN), _line("T", ORANGE), _level(0), _stems("peak", GREY)],
+        alt.Scale(domain=[-60, 30]),
+        "|S| and |T| [dB]",
+    )
+    return alt.vconcat(magnitude.add_params(zoom), phase, sensitivity, spacing=8).resolve_scale(x="shared")
+
+
+def _row(name: str, x: Any, layers: list[Any], scale: Any, title: str) -> Any:
+    """Layers over w, the lines in their order, and the line at the cursor."""
+    y = alt.Y("y:Q", scale=scale, title=title, axis=alt.Axis(values=ANGLES) if name == "phase" else alt.Axis())
+    drawn = [layer.encode(x=x, y=y) if layer.mark.type != "rule" else layer for layer in layers]
+    at = alt.Chart(_data("cursor_at")).mark_rule(color=GREY, strokeDash=[3, 3]).encode(x="w:Q")
+    return alt.layer(*drawn, at).properties(width=WIDE, height=LOW, name=name)
+
+
+def _line(of: str, colour: str, detail: str = "") -> Any:
+    chart = (
+        alt.Chart(_data("curve"))
+        .transform_calculate(y=f"datum.{of}")
+        .mark_line(color=colour, clip=True, strokeWidth=1.4)
+    )
+    return chart.encode(order="w:Q", detail=f"{detail}:N") if detail else chart.encode(order="w:Q")
+
+
+def _level(y: float) -> Any:
+    return alt.Chart(alt.InlineData([{"y": y}])).mark_rule(color=GREY).encode(y="y:Q")
+
+
+def _stems(kind: str, colour: str) -> Any:
+    """Margins as lines from the level that they are counted from."""
+    chart = alt.Chart(_data("stems")).transform_filter(f"datum.kind == '{kind}'")
+    return chart.mark_rule(color=colour, strokeWidth=2, clip=True).encode(x="w:Q", y="low:Q", y2="high:Q")
+
+
+def _nyquist() -> Any:
+    """L(i w) for w > 0, the unit circle, the disk that the disk margin keeps free, and -1."""
+    zoom = alt.selection_interval(name="zoom", bind="scales", zoom=SHIFTED)
+    plane = {
+        "x": alt.X("x:Q", scale=alt.Scale(domain=[-REACH, REACH]), title="Re L"),
+        "y": alt.Y("y:Q", scale=alt.Scale(domain=[-REACH, REACH]), title="Im L"),
+    }
+    curve = alt.Chart(_data("curve")).mark_line(color=BLUE, clip=True, strokeWidth=1.4)
+    rings = alt.Chart(_data("rings")).mark_line(clip=True, strokeWidth=1.2)
+    rings = rings.encode(
+        **plane, order="t:Q", detail="ring:N", color=_keyed(["unit circle", "disk margin"], [GREY, ORANGE])
+    )
+    critical = alt.Chart(alt.InlineData([{"x": -1, "y": 0}])).mark_point(shape="cross", color=INK, size=90, filled=True)
+    at = alt.Chart(_data("cursor_at")).mark_point(color=BLUE, size=60, filled=True, clip=True).encode(**plane)
+    layers = curve.encode(**plane, order="w:Q").add_params(zoom), rings, critical.encode(**plane), at
+    return alt.layer(*layers).properties(width=SQUARE, height=SQUARE)
+
+
+def _keyed(names: list[str], colours: list[str]) -> Any:
+    return alt.Color("ring:N", scale=alt.Scale(domain=names, range=colours), title=None)
+
+
+def _poles() -> Any:
+    """Closed-loop poles near the axis, with lines of equal damping ratio."""
+    x = alt.X("re:Q", title="Re s [1/s]", scale=alt.Scale(zero=True))
+    y = alt.Y("im:Q", title="Im s [rad/s]", scale=alt.Scale(zero=True))
+    rays = alt.Chart(_data("rays")).mark_line(color=FAINT, clip=True, strokeDash=[4, 3])
+    names = (
+        alt.Chart(_data("rays")).transform_filter("datum.end").mark_text(color=GREY, align="left", dx=3, fontSize=10)
+    )
+    axis = alt.Chart(alt.InlineData([{"x": 0}])).mark_rule(color=GREY).encode(x="x:Q")
+    points = alt.Chart(_data("poles")).mark_point(shape=CROSS, size=90, strokeWidth=1.8)
+    colour = alt.condition("datum.re < 0", alt.value(BLUE), alt.value(ORANGE))
+    tips = [
+        alt.Tooltip("re:Q", title="Re s [1/s]"),
+        alt.Tooltip("im:Q", title="Im s [rad/s]"),
+        "Hz:N",
+        "damping ratio:N",
+    ]
+    layers = (
+        rays.encode(x=x, y=y, detail="ratio:N", order="im:Q"),
+        names.encode(x=x, y=y, text="ratio:N"),
+        axis,
+        points.encode(x=x, y=y, color=colour, tooltip=tips),
+    )
+    return alt.layer(*layers).properties(width=SQUARE, height=SQUARE)
+
+
+def _map() -> Any:
+    """The plane of K1 and K2 with its regions, the curve of poles on the axis at this Kp, and the gains."""
+    scale, ticks = alt.Scale(domain=[-1, 1], nice=False), alt.Axis(format=".3~r", grid=False)
+    x, y = (alt.X("K1:Q", scale=scale, title="K1", axis=ticks), alt.Y("K2:Q", scale=scale, title="K2", axis=ticks))
+    low = alt.Y("low:Q", scale=scale, title="K2", axis=ticks)
+    keys = ["stable, continuous", "stable, sampled"]
+    legend = alt.Legend(symbolType="square", columns=1, labelLimit=260)
+    colour = alt.Color("what:N", scale=alt.Scale(domain=keys, range=[ORANGE, BLUE]), title=None, legend=legend)
+    areas = alt.Chart(_data("areas")).mark_area(opacity=0.28, clip=True)
+    edge = alt.Chart(_data("edge")).mark_line(color=ORANGE, strokeWidth=1, clip=True)
+    proven = alt.Chart(_data("proven")).mark_line(color=GREEN, strokeWidth=1.5, strokeDash=[5, 3], clip=True)
+    here = alt.Chart(_data("here"))
+    layers = (
+        areas.encode(x=x, y=low, y2="high:Q", color=colour, detail="part:N"),
+        edge.encode(x=x, y=y, order="w:Q", detail="piece:N"),
+        proven.encode(x=x, y=y, order="t:Q"),
+        here.mark_rule(color=GREY).encode(x=x),
+        here.mark_rule(color=GREY).encode(y=y),
+        here.mark_point(color=INK, size=110, filled=True).encode(x=x, y=y),
+    )
+    return alt.layer(*layers).properties(width=SQUARE, height=SQUARE)

@@ -1,0 +1,135 @@
+"""What the live page of an arm's loop carries: exact samples, the map's regions, and what is known beyond the band."""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from tfarm.arm import GAINS, Arm, HubFeedback, unit_of, written_unit
+from tfarm.crossing import pieces
+from tfarm.dsp import Chain
+from tfarm.dsp import GainMap as SampledMap
+from tfarm.loop.edges import Axis, moment_axis, rate_axis
+from tfarm.loop.frequencies import steep_places
+from tfarm.loop.lossless import stable_moments
+from tfarm.loop.panels import Panels, loop_panels
+from tfarm.loop.plant import Loop
+from tfarm.loop.regions import Region, region
+from tfarm.loop.stability import loop_band, stability
+from tfarm.report.map import OUTSIDE, sampled_region
+from tfarm.spectrum.scales import angle_unit, default_gains
+
+COLUMNS = 90  # values of K1 at which the continuous region is cut
+STIFFEST = 0.1  # of J w1^2: the largest Kp of the page
+SMALLEST = 1e-4  # of that: where its slider begins to be logarithmic
+DIGITS = 7  # of the edges of the map's regions: far more than a screen has
+
+
+def live_data(arm: Arm, chain: Chain, law: HubFeedback | None = None) -> dict[str, Any]:
+    """Everything as plain numbers and words.  `law` is where the page begins: the default gains if not given.
+
+    Raises what `region` and `loop_panels` raise.
+    """
+    x = rate_axis(arm)
+    y, Kp = moment_axis(arm, x), STIFFEST * angle_unit(arm)
+    reference = default_gains(arm)
+    band, is_quiet = _band(arm, x, y, Kp)
+    samples = loop_panels(arm, band)
+    continuous, sampled = _region(arm, x, y), sampled_region(arm, x, y, chain)
+    return {
+        "name": arm.name,
+        "units": {gain.name: written_unit(gain.name, arm).strip() or unit_of(gain.name, arm) for gain in GAINS},
+        "axes": {"K1": _axis(x), "K2": _axis(y), "Kp": {"low": 0.0, "high": Kp, "linear": SMALLEST * Kp}},
+        "start": {gain.name: (law or reference)[gain.name] for gain in GAINS},
+        **_samples(samples),
+        **_known(arm, band, is_quiet),
+        "reference": {"K1": reference.K1, "K2": reference.K2},
+        "reference_count": stability(arm, reference, band).unstable_roots,
+        "continuous": _areas(continuous.K1, continuous.stable_intervals),
+        "sampled_map": None if sampled is None else _sampled(sampled, chain),
+        "lyapunov": arm.is_uniform,
+    }
+
+
+def _band(arm: Arm, x: Axis, y: Axis, Kp: float) -> tuple[float, bool]:
+    """A band [rad/s] for all gains of the page, and whether all their loops are quiet beyond it.
+
+    |L| is convex in the gains, so that it is largest at a corner of their box.
+    """
+    corners = [HubFeedback(K1=a, K2=b, Kp=c) for a in (x.low, x.high) for b in (y.low, y.high) for c in (0.0, Kp)]
+    bands, quiet = zip(*(loop_band(Loop(arm, law)) for law in corners), strict=True)
+    return max(bands), all(quiet)
+
+
+def _axis(axis: Axis) -> dict[str, Any]:
+    return {"low": axis.low, "high": axis.high, "linear": None if axis.is_linear else axis.linear}
+
+
+def _samples(panels: Panels) -> dict[str, Any]:
+    """The samples as the bytes of doubles, by panel, part and point, and where they are."""
+    doubles = np.ascontiguousarray(panels.values.transpose(1, 0, 2)).view(float).astype("<f8")
+    return {
+        "samples": base64.b64encode(doubles.tobytes()).decode("ascii"),
+        "low": panels.low.tolist(),
+        "high": panels.high.tolist(),
+        "order": panels.order,
+        "error": float(f"{panels.error:.0e}"),
+        "places": np.asarray(steep_places(panels.arm, 1.05 * panels.band)).tolist(),
+        "band": panels.band,
+    }
+
+
+def _known(arm: Arm, band: float, is_quiet: bool) -> dict[str, Any]:
+    """What a verdict on any gains rests on: theorems and bounds beyond the band, and the static balance."""
+    kind = "reactive" if arm.is_reactive else "quiet" if is_quiet else "band"
+    by_energy = "C = 0: every mode beyond the band is damped (Lyapunov), with a decay rate that tends to 0"
+    beyond = "beyond the band |L| stays below one half at all gains of this page: no unstable pole there (small gain)"
+    if arm.is_reactive and not arm.is_told_by_lyapunov:
+        by_energy = "C = 0: none of the modes looked at is driven; no theorem tells the others"
+    return {
+        "kind": kind,
+        "beyond": beyond if kind == "quiet" else by_energy,
+        "moments": [_finite(each) for each in (stable_moments(arm) if arm.is_reactive else (-math.inf, math.inf))],
+        "told": arm.has_elastic_link and arm.reads_hub_moment and not arm.input_lags,
+        "hub_alone": arm.loses_at_hub_alone,
+        "whole": arm.input_per_torque,
+        "rate_loss": arm.rate_loss,
+        "inertia": arm.turned_inertia,
+        "gauged": arm.gauged_inertia,
+    }
+
+
+def _finite(value: float) -> float | None:
+    """The value, or None where it is infinite: JSON has no infinity."""
+    return value if math.isfinite(value) else None
+
+
+def _region(arm: Arm, x: Axis, y: Axis) -> Region:
+    K1 = x.grid(COLUMNS)
+    return region(arm, np.unique(np.r_[K1[K1 > 0], x.high]), np.array([y.low - OUTSIDE, y.high + OUTSIDE]))
+
+
+def _areas(K1: Any, intervals: Sequence[Sequence[tuple[float, float]]]) -> list[dict[str, float]]:
+    """Rows K1, low, high of the parts of a region, each part with its number."""
+    rows = [(number, *point) for number, piece in enumerate(pieces(K1, intervals)) for point in piece.points]
+    return [{"part": n, "K1": _short(a), "low": _short(low), "high": _short(high)} for n, a, low, high in rows]
+
+
+def _sampled(plane: SampledMap, chain: Chain) -> dict[str, Any]:
+    """The sampled region, its columns with exact ends, and what it holds for."""
+    ms = f"{1e3 * chain.sampling.period:g} ms"
+    C = plane.loop.plant.arm.damping
+    return {
+        "areas": _areas(plane.K1, plane.stable_intervals),
+        "K1": plane.K1.tolist(),
+        "intervals": plane.stable_intervals,
+        "words": f"every {ms}" + ("" if C else f", of the first {plane.modes_used} modes"),
+    }
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.{DIGITS}g}")
