@@ -36,6 +36,7 @@ def compare(
     dsp: DspFile = None,
     theory: TheoryName = None,
     png: Png = None,
+    out: Annotated[Path | None, typer.Option("--out", help="write a page, compare.html, to this folder")] = None,
     json: Json = False,
 ) -> None:
     """Two arms, or two laws on one arm, beside each other: modes, poles, verdicts, margins; differences in per cent."""
@@ -58,7 +59,12 @@ def compare(
         from tfarm.plots.files import save_png
 
         save_png(draw_comparison(found), png)
-    if json or say_written(png):
+    page = None
+    if out is not None:
+        from tfarm.report.comparison_page import write_comparison
+
+        page = write_comparison(found, out)
+    if json or say_written(png, page):
         give(comparison_answer(found), json, lambda answer: _print(found, answer))
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from tfarm.columns import JSON, TERMINAL, Column, Table
+from tfarm.columns import FILES, JSON, PAGE, TERMINAL, Column, Table
 from tfarm.digits import general, within
 from tfarm.loop.answers import MARGINS, gain_rows, margins_answer, sizes_of
 from tfarm.loop.margins import Margins
@@ -96,9 +96,9 @@ def margins_table(found: Comparison) -> Table:
     one, other = (_known(side.margins) for side in found.sides)
     units = [column.unit for column in MARGINS]
     columns = (
-        Column("margin", on=(JSON,), of=[column.key for column in MARGINS]),
-        Column("", "margin", on=(TERMINAL,), of=[_titled(column) for column in MARGINS]),
-        Column("unit", on=(JSON,), of=units),
+        Column("margin", on=(JSON, FILES), of=[column.key for column in MARGINS]),
+        Column("", "margin", on=(TERMINAL, PAGE), of=[_titled(column) for column in MARGINS]),
+        Column("unit", on=(JSON, FILES), of=units),
         *Quantity("value", "", relative=MARGIN).columns(found, [each for each, _ in one], [each for each, _ in other]),
         Column("known_one", f"known of {found.one.name}", of=[known for _, known in one]),
         Column("known_other", f"of {found.other.name}", of=[known for _, known in other]),

@@ -106,10 +106,10 @@ def write(
             write_assets(beside / ASSETS, out / ASSETS)
             _move_into(beside / ASSETS, out / ASSETS)
         for subject, folder in zip(changed, folders, strict=True):
-            _move_into(folder, out / subject.arm.name)
+            move_into(folder, out / subject.arm.name)
         if (evidence := gathered or evidence) is not None:
             write_trust(evidence, written_proofs(out), beside / FOLDER)
-            _move_into(beside / FOLDER, out / FOLDER)
+            move_into(beside / FOLDER, out / FOLDER)
         index = index_page(written_cards(out), trust=trust)
         (beside / "index.html").write_text(index, encoding="utf-8", newline="")
         os.replace(beside / "index.html", out / "index.html")
@@ -324,7 +324,7 @@ def _answers(anchor: str, question: str) -> bool:
     return anchor in ("arm", "law", "no-loop") or anchor.startswith(question)
 
 
-def _move_into(made: Path, folder: Path) -> None:
+def move_into(made: Path, folder: Path) -> None:
     """Every file replaced in one step each, pages last, so that a page never names a file that is not there."""
     files = [file for file in made.rglob("*") if file.is_file()]
     for file in sorted(files, key=lambda file: (file.suffix == ".html", file.relative_to(made).as_posix())):

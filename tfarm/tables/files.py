@@ -66,6 +66,8 @@ def _csv_cell(value: Any) -> str:
     if value is MISSING or value is None:
         return ""
     found = plain(value)
+    if found is None:
+        return ""
     return " ".join(map(str, found)) if isinstance(found, list) else str(found)
 
 

@@ -1,0 +1,79 @@
+"""The page of a comparison: its numbers are the command's, names are text, and its files are there."""
+
+import csv
+from html.parser import HTMLParser
+
+import pytest
+
+import tfarm
+from tests.shell import run
+from tfarm.comparing.answers import comparison_answer
+from tfarm.report.comparison_page import write_comparison
+from tfarm.tables.files import plain
+
+LAB = tfarm.load("sasaki2012-lab")
+HOSTILE = "<script>alert(1)</script> & $x$ \\frac{"
+
+
+class Found(HTMLParser):
+    """Every tag, the files that are named, and the cells of tables."""
+
+    def __init__(self, page):
+        super().__init__()
+        self.tags, self.files, self.text = set(), [], []
+        self.feed(page)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.add(tag)
+        self.files += [value for key, value in attrs if key in ("src", "href") and not value.startswith("#")]
+
+    def handle_data(self, data):
+        self.text.append(data)
+
+
+@pytest.fixture(scope="module")
+def compared():
+    return tfarm.compare([LAB, LAB.having(hub_inertia=0.15)], names=("lab", HOSTILE), modes=2)
+
+
+@pytest.fixture(scope="module")
+def folder(compared, tmp_path_factory):
+    """A folder that was not there before, with the page."""
+    place = tmp_path_factory.mktemp("pages") / "new" / "folder"
+    assert write_comparison(compared, place) == place / "compare.html"
+    return place
+
+
+def test_the_tables_hold_the_numbers_of_the_command(compared, folder):
+    answer = plain(comparison_answer(compared))
+    for name in ("modes", "poles", "margins"):
+        with open(folder / "data" / f"compare-{name}.csv", encoding="utf-8", newline="") as file:
+            rows = list(csv.DictReader(file))
+        wanted = [{key: "" if cell is None else str(cell) for key, cell in row.items()} for row in answer[name]]
+        assert rows == wanted
+        assert rows
+
+
+def test_names_are_text_and_every_file_is_there(folder):
+    found = Found((folder / "compare.html").read_text(encoding="utf-8"))
+    assert "script" not in found.tags
+    assert any(HOSTILE in text for text in found.text)
+    assert found.files
+    assert [name for name in found.files if not (folder / name).is_file()] == []
+    assert {path.name for path in folder.iterdir()} == {"compare.html", "data", "pictures"}
+
+
+def test_the_same_comparison_is_the_same_bytes(compared, folder, tmp_path):
+    again = write_comparison(compared, tmp_path).parent
+    files = [path.relative_to(folder) for path in folder.rglob("*") if path.is_file()]
+    assert len(files) == 8
+    assert [name for name in files if (folder / name).read_bytes() != (again / name).read_bytes()] == []
+
+
+def test_a_folder_that_cannot_be_written_is_one_line(capsys, tmp_path):
+    (tmp_path / "taken").write_text("a file")
+    words = ("compare", "sasaki2012", "sasaki2012-lab", "--modes", "1", "--out", str(tmp_path / "taken"))
+    code, out, err = run(capsys, *words)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert "--out" in err
+    assert "give a folder that can" in err
