@@ -104,7 +104,7 @@ def write(
             note_made(folder, out / subject.arm.name, () if failures else _pages(only), key_of(subject, trust))
         if not only and any(map(is_live, subjects)) and (changed or not has_assets(out / ASSETS)):
             write_assets(beside / ASSETS, out / ASSETS)
-            _move_into(beside / ASSETS, out / ASSETS)
+            move_into(beside / ASSETS, out / ASSETS)
         for subject, folder in zip(changed, folders, strict=True):
             move_into(folder, out / subject.arm.name)
         if (evidence := gathered or evidence) is not None:

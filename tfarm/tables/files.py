@@ -66,8 +66,6 @@ def _csv_cell(value: Any) -> str:
     if value is MISSING or value is None:
         return ""
     found = plain(value)
-    if found is None:
-        return ""
     return " ".join(map(str, found)) if isinstance(found, list) else str(found)
 
 
