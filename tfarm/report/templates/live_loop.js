@@ -29,19 +29,19 @@ class LiveLoop {
   at(w) {
     let p = 0;
     while (p < this.low.length - 1 && w > this.high[p]) p += 1;
-    const x = (2 * w - this.low[p] - this.high[p]) / (this.high[p] - this.low[p]), sum = [0, 0, 0, 0, 0, 0];
-    let weights = 0;
-    for (let j = 0; j < POINTS; j++) {
-      const c = C[j] / (x - X[j] || 1e-300), v = this.values, start = 2 * (p * 3 * POINTS + j);
+    const x = (2 * w - this.low[p] - this.high[p]) / (this.high[p] - this.low[p]), v = this.values;
+    let weights = 0, d = 0, e = 0, f = 0, g = 0, h = 0, k = 0, i = 6 * p * POINTS; // one number each: it is asked for thousands of times
+    for (let j = 0; j < POINTS; j++, i += 2) {
+      const c = C[j] / (x - X[j] || 1e-300);
       weights += c;
-      for (let part = 0; part < 3; part++) {
-        const i = start + 2 * part * POINTS;
-        sum[2 * part] += c * v[i];
-        sum[2 * part + 1] += c * v[i + 1];
-      }
+      d += c * v[i];
+      e += c * v[i + 1];
+      f += c * v[i + 2 * POINTS];
+      g += c * v[i + 2 * POINTS + 1];
+      h += c * v[i + 4 * POINTS];
+      k += c * v[i + 4 * POINTS + 1];
     }
-    const [a, b, c, d, e, f] = sum.map(each => each / weights);
-    return { w, d: [a, b], theta: [c, d], m: [e, f] };
+    return { w, d: [d / weights, e / weights], theta: [f / weights, g / weights], m: [h / weights, k / weights] };
   }
 
   // drive s^n d and what the law makes of hub angle and gauge, at s = i w
@@ -127,7 +127,9 @@ class LiveLoop {
     const away = geometric(0.05, 20, 12), top = this.band, slow = this.rigidCrossings(law).filter(w => w < this.base[0].w);
     const close = poles.filter(s => s[1] > 0).flatMap(s => [0, ...away, ...away.map(x => -x)].map(x => s[1] + Math.abs(s[0]) * x));
     const more = [...close, ...slow.flatMap(w => [w / 2, w, 2 * w])].filter(w => w > 0 && w < top).map(w => this.at(w));
-    return [...this.base, ...more].sort((a, b) => a.w - b.w);
+    const all = [...this.base, ...more].sort((a, b) => a.w - b.w);
+    for (const point of all) point.both = this.parts(point, law); // asked for again and again
+    return all;
   }
 
   // Where the rigid arm has |L| = 1: (1 - k^2) w^4 - (2 b k + a^2) w^2 - b^2 = 0, a = K1/J, b = Kp/J
@@ -138,16 +140,17 @@ class LiveLoop {
   }
 
   margins(law, points) {
-    const L = point => { const [D, N] = this.parts(point, law); return div(N, D); };
-    const logsize = point => { const [D, N] = this.parts(point, law); return Math.log(size(N) / size(D)); };
+    const both = point => point.both || this.parts(point, law);
+    const L = point => { const [D, N] = both(point); return div(N, D); };
+    const logsize = point => { const [D, N] = both(point); return Math.log(size(N) / size(D)); };
     const crossed = this.zeros(points, logsize).map(point => ({ w: point.w, angle: degrees(times(-1, L(point))) }));
     const least = (rows, value) => rows.reduce((best, row) => Math.abs(value(row)) < Math.abs(best.value) ? { value: value(row), at: row.w } : best, { value: Infinity, at: 0 });
-    const real = this.zeros(points, point => { const [D, N] = this.parts(point, law); return D[1] * N[0] - D[0] * N[1]; });
-    const factors = real.map(point => { const [D, N] = this.parts(point, law); return { w: point.w, factor: -div(D, N)[0] }; });
-    const ratio = (above, below) => point => { const [D, N] = this.parts(point, law); return size(above(D, N)) / Math.max(size(below(D, N)), 1e-300); };
+    const real = this.zeros(points, point => { const [D, N] = both(point); return D[1] * N[0] - D[0] * N[1]; });
+    const factors = real.map(point => { const [D, N] = both(point); return { w: point.w, factor: -div(D, N)[0] }; });
+    const ratio = (above, below) => point => { const [D, N] = both(point); return size(above(D, N)) / Math.max(size(below(D, N)), 1e-300); };
     const disk = this.lowest(points, ratio(add, minus)), S = this.lowest(points, ratio(add, D => D)), T = this.lowest(points, ratio(add, (_, N) => N));
     const crossovers = factors.filter(row => row.factor > AT_POLE && row.factor < 1 / AT_POLE);
-    const [D, N] = this.parts(points[0], law), low = size(N) ? times(-1, div(D, N)) : [0, 0];
+    const [D, N] = both(points[0]), low = size(N) ? times(-1, div(D, N)) : [0, 0];
     if (low[0] > AT_POLE && Math.abs(low[1]) < 1e-3 * low[0]) crossovers.unshift({ w: 0, factor: low[0] });
     return {
       gain: this.gainMargin(law, factors.map(row => row.factor)), crossed, crossovers,
@@ -208,13 +211,10 @@ class LiveLoop {
   }
 
   // K1, K2 with poles at +- i w: the D-decomposition curve at this Kp
-  boundary(law) {
-    const cross = (a, b) => a[1] * b[0] - a[0] * b[1];
-    return this.base.map(point => {
-      const [D, N] = this.parts(point, { K1: 0, K2: 0, Kp: law.Kp }), P = add(D, N);
-      const a = this.parts(point, { K1: 1, K2: 0, Kp: 0 })[1], b = this.parts(point, { K1: 0, K2: 1, Kp: 0 })[1], det = cross(a, b);
-      return { K1: -cross(P, b) / det, K2: cross(P, a) / det, w: point.w };
-    });
+  boundary(point, law) {
+    const cross = (a, b) => a[1] * b[0] - a[0] * b[1], [D, N] = this.parts(point, { K1: 0, K2: 0, Kp: law.Kp }), P = add(D, N);
+    const a = this.parts(point, { K1: 1, K2: 0, Kp: 0 })[1], b = this.parts(point, { K1: 0, K2: 1, Kp: 0 })[1], det = cross(a, b);
+    return { K1: -cross(P, b) / det, K2: cross(P, a) / det, w: point.w };
   }
 
   // The sampled loop at Kp = 0: exact at the columns of K1, told between two only where both agree

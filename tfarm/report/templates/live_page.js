@@ -117,7 +117,7 @@
         poles: near.map(([re, im]) => ({ re, im, Hz: general(hertz(im), 5), "damping ratio": ratio([re, im]) })),
         rays: rays(Math.min(...near.map(s => s[0]), -1e-3 * top), top),
       },
-      map: { here: [{ K1: law.K1, K2: law.K2 }], edge: edge(law), areas: law.Kp ? [] : areas(), proven: proven() },
+      map: { here: [{ K1: law.K1, K2: law.K2 }], edge: mapped === law.Kp ? [] : edge(law), areas: law.Kp ? [] : areas(), proven: proven() },
     };
   }
   // The curve over w: points that would not be told apart left out, others put in where L turns
@@ -125,7 +125,7 @@
     const rows = [], small = L => times(1 / (1 + size(L)), L);
     let branch = 0, last = null;
     const push = point => {
-      const [D, N] = loop.parts(point, law), L = div(N, D), abs = Math.max(size(L), 1e-12), angle = degrees(times(-1, L));
+      const [D, N] = point.both || loop.parts(point, law), L = div(N, D), abs = Math.max(size(L), 1e-12), angle = degrees(times(-1, L));
       if (last && Math.abs(angle - last.angle) > 180) branch += 1;
       const sum = Math.max(size(add(D, N)), 1e-300);
       last = { w: point.w, x: L[0], y: L[1], abs, dB: dB(abs), angle, branch, S: dB(size(D) / sum), T: dB(Math.max(size(N) / sum, 1e-12)) };
@@ -134,7 +134,7 @@
     for (const point of points) {
       if (point.w < loop.places[0] / 200 || (last && point.w < last.w * (1 + 2e-5))) continue;
       if (last) {
-        const [D, N] = loop.parts(point, law), from = last.w;
+        const [D, N] = point.both, from = last.w;
         const steps = Math.min(12, Math.ceil(size(minus(small(div(N, D)), small([last.x, last.y]))) / 0.03));
         for (let k = 1; k < steps; k++) push(loop.at(from + (point.w - from) * k / steps));
       }
@@ -169,17 +169,26 @@
     const rows = (what, list) => list.map(row => ({ ...row, what, part: `${what}${row.part}` }));
     return [...rows("stable, continuous", data.continuous), ...rows("stable, sampled", data.sampled_map ? data.sampled_map.areas : [])];
   }
+  // The curve of gains with a pole on the axis, halved where it is coarse, cut where it leaves the map
   function edge(law) {
     if (loop.kind === "reactive") return [];
-    const { K1, K2 } = data.axes, wide = axis => 0.2 * (axis.high - axis.low);
-    let piece = 0, inside = false;
-    const found = [];
-    for (const point of loop.boundary(law)) {
-      const here = Math.abs(point.K1) < K1.high + wide(K1) && point.K2 > K2.low - wide(K2) && point.K2 < K2.high + wide(K2) && point.K1 > K1.low - wide(K1);
-      if (here && !inside) piece += 1;
-      inside = here;
-      if (here) found.push({ ...point, piece });
-    }
+    const at = w => loop.boundary(loop.at(w), law), found = [], { K1, K2 } = data.axes;
+    const placed = row => [place(K1, row.K1), place(K2, row.K2)], seen = ([x, y]) => x > -0.1 && x < 1.1 && y > -0.1 && y < 1.1;
+    let piece = 0;
+    const trace = (a, b, depth) => {
+      const [p, q] = [placed(a), placed(b)], long = size(minus(p, q));
+      if (!(seen(p) || seen(q))) return;
+      if (long > 0.02 && depth) {
+        const middle = at((a.w + b.w) / 2);
+        trace(a, middle, depth - 1);
+        trace(middle, b, depth - 1);
+      } else if (long < 0.2) {
+        if (!found.length || found[found.length - 1].w !== a.w) found.push({ ...a, piece: ++piece });
+        found.push({ ...b, piece });
+      }
+    };
+    const rows = loop.base.map(point => loop.boundary(point, law));
+    rows.slice(1).forEach((row, i) => trace(rows[i], row, 8));
     return found;
   }
 
@@ -191,7 +200,7 @@
     waiting = true;
     requestAnimationFrame(() => { waiting = false; move(law); });
   }
-  let mapped = law.Kp; // of which Kp the map shows the curve
+  let mapped = null; // of which Kp the map shows the curve
   async function move(gains) {
     const start = performance.now(), sets = show(gains);
     for (const [name, view] of Object.entries(views)) for (const [of, rows] of Object.entries(sets[name])) {
@@ -240,6 +249,7 @@
   window.live = { loop, law, moves: [], set, move: gains => { Object.assign(law, gains); return move(law); } };
   const sets = show(law);
   Promise.all(["map", "bode", "nyquist", "poles"].map(name => draw(name, sets[name]))).then(() => {
+    mapped = law.Kp;
     drag();
     hover();
     window.live.ready = performance.now();
