@@ -16,6 +16,7 @@ from tfarm.arm import implausible
 from tfarm.audit import candidates
 from tfarm.audit.assumptions import LoopVerdict, has_hub_inertia, hub_study, section_study
 from tfarm.columns import PAGE
+from tfarm.dsp import Chain
 from tfarm.loop import loci as loci_room
 from tfarm.loop.locus import locus
 from tfarm.loop.plant import Loop
@@ -24,6 +25,7 @@ from tfarm.report import assumptions_pictures, assumptions_section, loop_laws, l
 from tfarm.report.arm_section import arm_section, derived_table
 from tfarm.report.bode_section import bode_section
 from tfarm.report.damped_table import damped_table
+from tfarm.report.given_laws import Subject
 from tfarm.report.locus_section import beyond_table, locus_section
 from tfarm.report.loop_laws import has_loop
 from tfarm.report.loop_section import margins_section, nyquist_section
@@ -234,7 +236,7 @@ def test_a_free_pin_has_its_rate_loop(monkeypatch):
     section = margins_section(arm)
     assert section.facts[0].value == "STABLE"
     assert set(column(section.blocks[1], "gain").values) == {"K1", "Kp"}
-    pieces = [piece.name for piece in writing.PIECES if piece.suits(arm)]
+    pieces = [piece.name for piece in writing.PIECES if piece.is_for(Subject(arm, Chain()))]
     assert pieces[4:8] == ["no loop", "margins", "root loci", "Nyquist"]
 
 

@@ -104,13 +104,12 @@ def test_the_words_begin_with_the_answer_and_carry_the_numbers(small):
     below = int((data.curves[0].final < data.tuning.best_constant.cost).sum())
     assert f"{below} of {SEEDS} seeds end below the best constant gain" in words[0]
     assert "0.256" in words[3]
-    assert "With the angle held, Kp = " in words[-2]
-    assert f"the tuner {significant(data.servo.training.result.cost, 3)}" in words[-2]
+    assert "With the angle held, Kp = " in words[-1]
+    assert f"the tuner {significant(data.servo.training.result.cost, 3)}" in words[-1]
     facts = {fact.label: fact.value for fact in section.facts}
     assert facts["cost without moment feedback"] == "2.692"
     assert facts["best constant gain"] == "0.9531"
     assert all(block.alt for block in section.blocks if hasattr(block, "alt"))
-    assert sum("accelerates the hub" in block.caption for block in section.blocks) == 4
 
 
 def test_the_angle_that_a_moving_gain_leaves_is_its_integral_over_K1(small):

@@ -5,6 +5,7 @@ import hashlib
 import json
 import math
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -24,16 +25,19 @@ from tests.shell import run
 from tfarm.arm import to_toml
 from tfarm.audit.published import validate
 from tfarm.cli import tables as cli_tables
+from tfarm.digits import plain
 from tfarm.dsp import Chain, load_chain
 from tfarm.report import card as card_room
 from tfarm.report import readme_pictures, trust, unchanged, write, writing
 from tfarm.report.card import written_cards
+from tfarm.report.frame import first_sentence
 from tfarm.report.given_laws import GivenLaw, Subject
 from tfarm.report.page import index_page
 from tfarm.report.paper import is_from_paper, paper_section
 from tfarm.report.sections import Section
 from tfarm.report.trust import Evidence, kept_evidence, write_trust
 from tfarm.report.trust_proofs import written_proofs
+from tfarm.spectrum.scales import default_gains
 
 ATTACK = "<script>alert(1)</script> & <b>bold</b>, I_h in kg m^2"
 ANCHORS = {piece.anchor for piece in writing.PIECES}
@@ -204,6 +208,72 @@ def test_the_foot_tells_how_to_write_the_page_again(pages):
     assert tfarm.load(pages / NAME / "arm.toml") == ARM
     assert f"tfarm {tfarm.__version__}" in page
     assert "--out reports" in page
+
+
+# ------------------------------------------------------------ what a reader sees at once
+
+
+def test_the_sign_of_the_gains_stands_once_and_the_words_are_explained(pages):
+    text = (pages / NAME / "index.html").read_text(encoding="utf-8")
+    assert text.count("accelerates the hub") == 1
+    assert text.count("<dt>proven</dt>") == text.count("<dt>Lyapunov region</dt>") == 1
+
+
+def test_long_matter_is_folded_away_and_answers_stand_first(pages):
+    """No table outside <details>; the verdict in the contents; each answer at the top leads to its section."""
+    text = (pages / NAME / "index.html").read_text(encoding="utf-8")
+    assert "<table" not in re.sub(r"<details>.*?</details>", "", text, flags=re.DOTALL)
+    assert text.count("<details>") == text.count("</details>")
+    contents = text.partition('class="contents"')[2].partition("</nav>")[0]
+    assert 'href="#margins">Is the loop stable, and by how much? <span class="verdict ok">stable</span>' in contents
+    answers = text.partition('id="answers"')[2].partition("</section>")[0]
+    assert "the loop is stable" in answers
+    assert {f'href="#{anchor}"' for anchor in ("margins-map", "margins", "sampled")} <= set(
+        re.findall(r'href="#[^"]*"', answers)
+    )
+
+
+def test_every_cell_of_a_narrow_page_says_what_it_is(pages):
+    """A table is stacked on a phone: each cell bears the title that stands above its column."""
+    text = (pages / NAME / "index.html").read_text(encoding="utf-8")
+    assert "<td" in text
+    assert all('data-label="' in cell for cell in re.findall(r"<td[^>]*>", text))
+
+
+def test_the_pages_of_an_arm_lead_to_each_other(tmp_path, monkeypatch):
+    piece = next(piece for piece in writing.PIECES if piece.name == "the arm")
+    monkeypatch.setattr(writing, "PIECES", (piece,))
+    monkeypatch.setattr(writing, "save_proof", lambda *_: None)
+    write([replace(ARM, name="plain")], tmp_path, only=("modes", "bode"))
+    assert "bode.html" in Links(tmp_path / "plain" / "modes.html").targets
+    assert "modes.html" in Links(tmp_path / "plain" / "bode.html").targets
+    write([replace(ARM, name="plain")], tmp_path, only=("locus",))
+    assert {"bode.html", "modes.html"} <= set(Links(tmp_path / "plain" / "locus.html").targets)
+
+
+def test_the_index_compares_the_arms(pages):
+    """The cells are those of `tfarm margins`: verdict and windows of the default gains."""
+    law = default_gains(ARM)
+    windows = tfarm.margins(ARM, law).windows
+    table = (pages / "index.html").read_text(encoding="utf-8").partition('id="compared"')[2].partition("</section>")[0]
+    assert '<span class="verdict ok">stable</span>' in table
+    for name in ("K1", "K2"):
+        ends = [f"{plain(end, 5)}{'*' * (windows[name].end(end) == 'search bound')}" for end in windows[name].around]
+        assert f">{' … '.join(ends)}</td>" in table
+
+
+@pytest.mark.parametrize(
+    ("text", "first"),
+    [
+        ("A little. A constant K2 of 0.336 takes 65 % off the cost. And more.",
+         "A little. A constant K2 of 0.336 takes 65 % off the cost."),
+        ("One sentence alone", "One sentence alone"),
+        ("Stable up to 12.5 rad/s, and no further than that at all (see below). Next.",
+         "Stable up to 12.5 rad/s, and no further than that at all (see below)."),
+    ],
+)  # fmt: skip
+def test_a_short_answer_ends_where_a_sentence_does(text, first):
+    assert first_sentence(text) == first
 
 
 # ------------------------------------------------------------ tables
@@ -381,13 +451,13 @@ def made_of(monkeypatch, arm, out, **options):
 
 @pytest.mark.usefixtures("quick")
 def test_an_arm_that_did_not_change_is_left_as_it_is(tmp_path, monkeypatch):
-    plain = replace(ARM, name="plain")
-    assert made_of(monkeypatch, plain, tmp_path) == (["plain"], [])
+    arm = replace(ARM, name="plain")
+    assert made_of(monkeypatch, arm, tmp_path) == (["plain"], [])
     before = files_of(tmp_path)
-    made, (told,) = made_of(monkeypatch, plain, tmp_path)
+    made, (told,) = made_of(monkeypatch, arm, tmp_path)
     assert (made, files_of(tmp_path)) == ([], before)
     assert "plain: left as it is" in told
-    assert made_of(monkeypatch, plain, tmp_path, force=True) == (["plain"], [])
+    assert made_of(monkeypatch, arm, tmp_path, force=True) == (["plain"], [])
     assert files_of(tmp_path) == before
 
 

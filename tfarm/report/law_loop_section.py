@@ -25,7 +25,6 @@ from tfarm.loop.spill import SPILL, Spill, spill
 from tfarm.plots.disc import draw_nyquist
 from tfarm.plots.loop import draw_loop, loop_data
 from tfarm.report.given_laws import GivenLaw, LawOnArm, in_s, on_arm
-from tfarm.report.loop_laws import sign_words
 from tfarm.report.margins_table import margin_table, window_table
 from tfarm.report.nyquist import Curve, count_table, curve_data
 from tfarm.report.sections import Fact, Picture, Section
@@ -75,7 +74,7 @@ def law_margins_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> Sec
     blocks += [crossings_table(each, it) for each, it in both if it.in_band is not None]
     gains = [(each, it) for each, it in both if it.windows]
     if gains:
-        blocks.append(window_table([each for each, _ in gains], [it for _, it in gains], sign_words(arm)))
+        blocks.append(window_table([each for each, _ in gains], [it for _, it in gains]))
     spilled = [_spilled(each) for each in named]
     blocks += [spill_table(each, it) for each, it in zip(named, spilled, strict=True) if isinstance(it, Spill)]
     words = [text for each, it, far in zip(named, found, spilled, strict=True) for text in _words(each, it, far)]

@@ -15,7 +15,7 @@ from tfarm.loop.loci import Loci, loci
 from tfarm.loop.stability import MARGIN_OF_ZERO, Stability, stability
 from tfarm.plots.roots import draw_loci
 from tfarm.report.locus_tables import crossing_table, gap_table, loci_data
-from tfarm.report.loop_laws import edge_of_K2, has_loop, margins_of, sign_words
+from tfarm.report.loop_laws import edge_of_K2, has_loop, margins_of
 from tfarm.report.sections import Picture, Section
 from tfarm.response.frequency import Real
 from tfarm.spectrum.scales import default_gains, rate_unit
@@ -69,7 +69,7 @@ def locus_section(arm: Arm) -> Section:
             blocks.append(crossing_table(data, f"locus-{name}-crossings"))
     if has_loop(arm):
         blocks.append(beyond_table(arm, held))
-    return Section(anchor="locus", title="Where do the poles go?", words=[*words, sign_words(arm)], blocks=blocks)
+    return Section(anchor="locus", title="Where do the poles go?", words=words, blocks=blocks)
 
 
 def _locus_words(data: Loci) -> str:

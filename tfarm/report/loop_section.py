@@ -23,7 +23,6 @@ from tfarm.report.loop_laws import (
     has_loop,
     laws,
     margins_of,
-    sign_words,
     why_no_loop,
 )
 from tfarm.report.map import GainMap, draw_map, gain_map, map_data
@@ -103,7 +102,7 @@ def map_section(arm: Arm, chain: Chain | None = None) -> Section:
         figure=draw_map(data),
         data=map_data(data),
     )
-    words = (_answer(arm), _best_words(data), sign_words(arm))
+    words = (_answer(arm), _best_words(data))
     return Section(
         anchor="margins-map", title="How high may the gains go?", words=[w for w in words if w], blocks=(picture,)
     )
@@ -130,7 +129,7 @@ def _room(windows: Windows, unit: str) -> str:
         if windows.end(value) == "no limit":
             ways.append(f"go {way} without limit")
         elif windows.end(value) == "search bound":
-            ways.append(f"go {way} at least to {place}, where the search ends")
+            ways.append(f"go {way} with no limit found as far as {place}")
         else:
             ways.append(f"go {way} to {place}{_crossing_there(windows, value)}")
     return ", and may ".join(ways)
@@ -215,7 +214,7 @@ def margins_section(arm: Arm, chain: Chain | None = None) -> Section:
         title="Is the loop stable, and by how much?",
         facts=tuple(verdict_facts(named, found, [brief_of(arm, each.law, chain) for each in named])),
         words=[verdict_words(*each) for each in zip(named, found, strict=True)],
-        blocks=(margin_table(named, found, arm.is_told_by_lyapunov), window_table(named, found, sign_words(arm))),
+        blocks=(margin_table(named, found, arm.is_told_by_lyapunov), window_table(named, found)),
     )
 
 

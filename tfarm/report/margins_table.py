@@ -31,7 +31,7 @@ UNDAMPED = (
 )
 CAPTION_OF_WINDOWS = (
     "The others held, each gain may move within its window before the first pole reaches the axis. Ends ±∞ are proven; "
-    "an end with a star is no edge: up to there none was found, and beyond none was looked for. {sign}"
+    "an end with a star is no edge: up to there none was found, and beyond none was looked for."
 )
 TITLES = {"disk": "disk margin α"}
 QUANTITIES = ("gain margin, down", "gain margin, up", *(TITLES.get(each.of, each.title) for each in MARGINS))
@@ -131,7 +131,7 @@ def _open_ends(laws: Sequence[Named], found: Sequence[Margins]) -> str:
     return "".join(f" {name.capitalize()}: {typeset(text)}." for name, text in texts if text)
 
 
-def window_table(laws: Sequence[Named], found: Sequence[Margins], sign: str) -> Table:
+def window_table(laws: Sequence[Named], found: Sequence[Margins]) -> Table:
     """A row a law and gain; none for K2 on a free pin, where it has no loop."""
     rows = [
         (law.name, each.stability.verdict, row)
@@ -143,7 +143,7 @@ def window_table(laws: Sequence[Named], found: Sequence[Margins], sign: str) -> 
     return Table(
         stem="windows",
         title="How far each gain may go alone",
-        caption=CAPTION_OF_WINDOWS.format(sign=sign) + _open_ends(laws, found),
+        caption=CAPTION_OF_WINDOWS + _open_ends(laws, found),
         columns=(Column("law", "law", of=names), Column("verdict", "verdict", of=verdicts), *WINDOWS),
         record=gains,
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -21,31 +21,28 @@ from tfarm.digits import listed
 from tfarm.dsp import Chain, load_chain
 from tfarm.dsp.writing import file_text
 from tfarm.errors import ParameterError
+from tfarm.report.frame import VERDICTS, framed, glossary, signs
 from tfarm.report.given_laws import Subject
+from tfarm.report.page_names import QUESTIONS as QUESTIONS
 from tfarm.report.sections import Fact, SavedSection
 from tfarm.tables.html import symbol
 
 TEMPLATES = Path(__file__).parent / "templates"
-QUESTIONS = {
-    "bode": "Bode plots",
-    "modes": "Modes",
-    "margins": "Gains and margins",
-    "locus": "Root loci",
-    "sampled": "The sampled loop",
-    "tune": "The gain tuner",
-    "assumptions": "What the assumptions do",
-}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Card:
-    """An arm on the index: its folder's name, a few numbers, its pages and whether there is a picture."""
+    """An arm on the index: its folder's name, a few numbers, its pages and whether there is a picture.
+
+    `loop` are the cells of the default gains in the table of arms, all "" where there is no loop.
+    """
 
     name: str
     summary: str
     facts: Sequence[Fact]
     pages: Sequence[tuple[str, str]]
     picture: str
+    loop: Mapping[str, str]
 
 
 @cache
@@ -63,12 +60,18 @@ def _templates() -> Environment:
 
 
 def arm_page(
-    subject: Subject, sections: Sequence[SavedSection], only: str | None, *, trust: str, live: bool = False
+    subject: Subject,
+    sections: Sequence[SavedSection],
+    only: str | None,
+    *,
+    trust: str,
+    live: bool = False,
+    others: Sequence[tuple[str, str]] = (),
 ) -> str:
     """The page of one arm, under its laws where they are given, with every section or with those of one question.
 
     `trust` is the page that says why it can be trusted, as seen from the arm's folder; empty if there is none.
-    `live`: whether a live page is beside it.
+    `live`: whether a live page is beside it.  `others` are the file and title of each other page of this arm.
     """
     arm = subject.arm
     title = f"{arm.name}: {QUESTIONS[only].lower()}" if only else arm.name
@@ -76,8 +79,11 @@ def arm_page(
         "arm.html",
         title=title,
         arm=arm,
-        sections=sections,
+        framed=[framed(saved) for saved in sections],
         only=only,
+        others=others,
+        signs=signs(arm),
+        glossary=glossary(),
         trust=trust,
         live=live,
         summary=summary(arm, [each.given_name for each in subject.laws]),
@@ -88,7 +94,7 @@ def arm_page(
 
 def index_page(cards: Sequence[Card], *, trust: str) -> str:
     """The page that leads to all others."""
-    return render("index.html", title="tfarm reports", cards=cards, trust=trust)
+    return render("index.html", title="tfarm reports", cards=cards, trust=trust, looks=VERDICTS)
 
 
 def foot(subject: Subject, only: str | None) -> dict[str, str]:

@@ -12,17 +12,17 @@ MODE_TABLE = (
     "ln|z| is what a mode gains (+) or loses (−) per sample: its size is multiplied by |z| every {ms} ms. Own damping "
     "is what the arm does by itself, K1 and K2 what the gains add to first order; the closed loop is the exact pole, "
     "which large gains move further than first order says. Band 0 lies below {half} Hz; from there on the mode is "
-    "aliased, and the samples see it at the frequency given. {sign}"
+    "aliased, and the samples see it at the frequency given."
 )
 
 
-def mode_rows(loop: SampledLoop, table: ModeTable, stem: str, sign: str) -> Table:
+def mode_rows(loop: SampledLoop, table: ModeTable, stem: str) -> Table:
     """A row a mode that outlives a sample."""
     T = loop.chain.sampling.period
     return Table(
         stem=stem,
         title="The sampled loop, mode by mode",
-        caption=MODE_TABLE.format(ms=plain(1e3 * T), half=plain(0.5 / T), sign=sign),
+        caption=MODE_TABLE.format(ms=plain(1e3 * T), half=plain(0.5 / T)),
         columns=MODES,
         record=table,
     )

@@ -17,11 +17,10 @@ from tfarm.dsp.strip_chart import StripChart, strip_chart
 from tfarm.plots.folded import draw_loci
 from tfarm.plots.growth import draw_modes
 from tfarm.plots.strip import draw_strip_chart
-from tfarm.report.loop_laws import has_loop, sign_words, why_no_loop
+from tfarm.report.loop_laws import has_loop, why_no_loop
 from tfarm.report.overlay import draw_overlay, overlay_table
 from tfarm.report.sampled_modes import loci_table, mode_rows
 from tfarm.report.sampled_words import (
-    SHORT_SIGN,
     Sampled,
     Window,
     chain_words,
@@ -58,7 +57,7 @@ def sampled_section(arm: Arm, chain: Chain | None = None) -> Section:
         return Section(anchor="sampled", title=title, words=(why_no_loop(arm),))
     data = study(arm, chain)
     blocks: list[Picture | Table] = [_overlay_picture(data), _periods_table(data), *_mode_blocks(data)]
-    words = [short_answer(data), chain_words(arm, chain), compared(data), cure(data), sign_words(arm)]
+    words = [short_answer(data), chain_words(arm, chain), compared(data), cure(data)]
     if arm.has_rigid_mode:
         blocks += _time_blocks(data)
     else:
@@ -84,7 +83,7 @@ def _overlay_picture(data: Sampled) -> Picture:
             f"blue is what a controller that ignores its clock would wrongly trust. {layers}{proven}"
             "All edges are exact crossings of the axis or the unit circle. "
             f"The axis is logarithmic: K1 = 0 lies beyond its left end at {low}{below}. "
-            f"{SHORT_SIGN}"
+            f""
         ),
         alt=(
             f"Map of K1 and K2: at K1 = {plain(data.gains.K1)} the continuous loop is stable for K2 "
@@ -111,7 +110,7 @@ def _periods_table(data: Sampled) -> Table:
             f"The same gains, K1 = {plain(data.gains.K1)} and K2 = {plain(data.gains.K2)}, at other sample periods; "
             f"the verdicts hold for the modes given ({held}). Growth is that of the pole that decides, per second: "
             "negative is stable. Where the gains are not stable, the intervals are those that would be. "
-            f"{SHORT_SIGN}"
+            f""
         ),
         record=rows,
         columns=(
@@ -156,14 +155,14 @@ def _mode_blocks(data: Sampled) -> list[Picture | Table]:
             f"is seen, and moved by the gains, where the arrows end. {first}Lines: K1 alone, growing from the open "
             "circles to the dots; the real axis is logarithmic away from 0. Right: the z-plane, stable inside the "
             "circle; open circles where the range begins, dots at the gains, orange the aliased modes, grey hub and "
-            f"delay. What looks like lying on the circle is told apart by the next picture. {SHORT_SIGN}"
+            f"delay. What looks like lying on the circle is told apart by the next picture."
         ),
         alt=f"Root loci of the sampled loop in the folded s-plane and the z-plane; {len(aliased)} aliased modes.",
         figure=draw_loci(found),
         data=loci_table(found, "sampled-loci-data"),
     )
     grown = table.index[table.log_radius > 0]
-    rows = mode_rows(loop, table, "sampled-modes", SHORT_SIGN)
+    rows = mode_rows(loop, table, "sampled-modes")
     said = grown_words(grown.tolist())
     chart = Picture(
         stem="sampled-growth",
@@ -173,7 +172,7 @@ def _mode_blocks(data: Sampled) -> list[Picture | Table]:
             "feedback destabilises, as the samples see a rate of the wrong sign there; above the narrowest one shown "
             "they alternate too closely to draw. Root moment feedback with K2 > 0 damps in every band to first order; "
             "where a filled dot lies far from that, another mode in the loop decides. "
-            f"Of {table.index.size} modes, {said}. {SHORT_SIGN}"
+            f"Of {table.index.size} modes, {said}."
         ),
         alt=f"Growth per sample of {table.index.size} modes over their frequency; {said}.",
         figure=draw_modes(loop, table),
@@ -213,7 +212,7 @@ def _slew_picture(moved: Slews) -> Picture:
         caption=(
             f"{what_slews_show(moved)} A bang-bang slew with rigid feedforward; the moment feedback sees "
             f"{seen_words(moved)}. The dotted line is the end of the slew; the tip is shown against a rigid "
-            f"arm's on its reference.{resolution_words(moved.each.values())} {volts}{SHORT_SIGN}"
+            f"arm's on its reference.{resolution_words(moved.each.values())} {volts}"
         ),
         alt=f"Root moment, tip and motor torque of a slew. {what_slews_show(moved)}",
         figure=draw_slews(moved),

@@ -25,7 +25,6 @@ MOVED = 1e-4  # an end of a window that sampling moves by less is said to stay, 
 DAY = 86400.0  # s
 SLOW = 60.0  # s: what takes longer to double is no growth that anyone would see
 ANYONE_HAS = 0.05  # % of critical damping: less than any real arm has
-SHORT_SIGN = "A positive root moment accelerates the hub; with the gauge reversed K2 changes its sign."
 Window = tuple[float, float]
 
 

@@ -13,9 +13,8 @@ from tfarm.dsp import Chain
 from tfarm.errors import CertificationError
 from tfarm.plots.learning import draw_cost_map, draw_curves, draw_gain
 from tfarm.plots.motion import draw_responses
-from tfarm.report.loop_laws import has_loop, sign_words, why_no_loop
+from tfarm.report.loop_laws import has_loop, why_no_loop
 from tfarm.report.overlay import overlay
-from tfarm.report.sampled_words import SHORT_SIGN
 from tfarm.report.sections import Picture, Section
 from tfarm.report.time_responses import clipped_words, resolution_words, responses_table
 from tfarm.report.tuner_words import (
@@ -76,7 +75,6 @@ def section_of(data: TunerStudy) -> Section:
             bound_words(data),
             learning_words(data),
             *([servo_words(data)] if data.servo else []),
-            sign_words(data.arm),
         ),
         blocks=(
             _gain_picture(data),
@@ -116,7 +114,7 @@ def _gain_picture(data: TunerStudy) -> Picture:
             "constant gains. A gain that moves needs its own proof, and gets it only in the green bar: "
             f"{typeset(guard.sentence)}. Black: the gains that the tuner takes, {significant(float(K.min()), 3)} to "
             f"{significant(float(K.max()), 3)}, at K1 = {plain(tuning.plan.K1)}. Right: the same over time (the "
-            f"paper's Figure 3), seed {tuning.plan.seed}; without the tuner K2 = 0. {SHORT_SIGN}"
+            f"paper's Figure 3), seed {tuning.plan.seed}; without the tuner K2 = 0."
         ),
         alt=f"Map of K1 and K2 with the tuner's guard from {guard.lo:.3f} to {guard.hi:.3f}, and its gain over time.",
         figure=draw_gain(data, *plane),
@@ -140,7 +138,7 @@ def _slew_picture(data: TunerStudy) -> Picture:
         caption=(
             f"Root moment, tip and motor over an ideal chain (the paper's Figures 4 and 6). {_residuals(data, 0)} The "
             "dotted line is the end of the slew; dashed, the rigid arm."
-            f"{resolution_words(data.slews.values())} {SHORT_SIGN}"
+            f"{resolution_words(data.slews.values())}"
         ),
         alt=f"Root moment, tip and motor torque of the slew. {_residuals(data, 0)}",
         figure=draw_responses(data.arm, data.slews, "the slew, ideal chain"),
@@ -155,7 +153,7 @@ def _coarse_picture(data: TunerStudy) -> Picture:
         caption=(
             f"{_converter_words(data)} (the paper's Figures 8 and 9). {_residuals(data, 1)} Nothing regulates the hub "
             "angle (no Kp), so what it loses to delay and steps it keeps."
-            f"{clipped_words(data.coarse)}{resolution_words(data.coarse.values())} {SHORT_SIGN}"
+            f"{clipped_words(data.coarse)}{resolution_words(data.coarse.values())}"
         ),
         alt=f"The slew with converters and delay. {_residuals(data, 1)}",
         figure=draw_responses(data.arm, data.coarse, "the slew, converters and one sample of delay"),
@@ -265,7 +263,7 @@ def comparison_table(data: TunerStudy) -> Table:
             "input shaping with no moment feedback, judged by their own, later slew, so that the bound is not theirs. "
             "Guard proven: "
             f"whether the same range of gains is proven for that arm and chain too, with the trial's "
-            f"{data.tuning.trial.loop.plant.count} modes{away_from_it}.{units} {SHORT_SIGN}"
+            f"{data.tuning.trial.loop.plant.count} modes{away_from_it}.{units}"
         ),
         record=data.rows,
         columns=(

@@ -23,6 +23,7 @@ from tfarm.files import temporary_folder
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
 from tfarm.report.card import save_card, written_cards
+from tfarm.report.frame import beside
 from tfarm.report.given_laws import GivenLaw, Subject, check_laws
 from tfarm.report.live import ASSETS, PAGE, has_assets, is_live, save_live, write_assets
 from tfarm.report.page import QUESTIONS, arm_page, file_of, index_page
@@ -98,7 +99,7 @@ def write(
         evidence = None if only or force else kept_evidence(out / FOLDER)
         sections, gathered = _make_all(changed, folders, only or (), not only and evidence is None, progress)
         for subject, folder, parts in zip(changed, folders, sections, strict=True):
-            _write_pages(subject, folder, parts, only, trust)
+            _write_pages(subject, folder, parts, only, trust, out / subject.arm.name)
             failures = list(_failures(subject.arm, parts))
             told += failures
             note_made(folder, out / subject.arm.name, () if failures else _pages(only), key_of(subject, trust))
@@ -262,7 +263,7 @@ def _make(subject: Subject, piece: int | str, folder: Path) -> Result:
         save_live(subject, folder)
         return None
     if isinstance(piece, str):
-        save_card(subject.arm, folder, [each.given_name for each in subject.laws])
+        save_card(subject.arm, folder, [each.given_name for each in subject.laws], subject.chain)
         if piece == CARD:
             save_proof(subject.arm, folder, subject.chain)
         return None
@@ -309,14 +310,23 @@ def _name_of(subjects: Sequence[Subject], task: Task) -> str:
 
 
 def _write_pages(
-    subject: Subject, folder: Path, sections: Sequence[SavedSection], only: tuple[str, ...] | None, trust: str
+    subject: Subject,
+    folder: Path,
+    sections: Sequence[SavedSection],
+    only: tuple[str, ...] | None,
+    trust: str,
+    earlier: Path,
 ) -> None:
-    """The arm's file, with the chain that the page is about, and its page, or the page of each question asked."""
+    """The arm's file, with the chain that the page is about, and its page, or the page of each question asked.
+
+    These lead to each other, and to what is in the `earlier` folder of the arm.
+    """
     (folder / "arm.toml").write_text(file_of(subject), encoding="utf-8", newline="")
     for question in only or (None,):
         wanted = [s for s in sections if question is None or _answers(s.section.anchor, question)]
         live = (folder / PAGE).is_file()
-        page = arm_page(subject, wanted, question, trust=f"../{trust}" if trust else "", live=live)
+        others = beside(earlier, _pages(only), question or "index")
+        page = arm_page(subject, wanted, question, trust=f"../{trust}" if trust else "", live=live, others=others)
         (folder / f"{question or 'index'}.html").write_text(page, encoding="utf-8", newline="")
 
 

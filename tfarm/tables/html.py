@@ -42,11 +42,12 @@ def _column(column: Column) -> list[Markup]:
     styles = (
         Markup(' style="background:{}"').format(tint) if tint else "" for tint in column.tint or [""] * len(cells)
     )
-    cell = Markup('<td class="{}{}{}"{}>{}</td>')
+    label = f"{column.title} [{column.unit}]" if column.unit else column.title
+    cell = Markup('<td class="{}{}{}" data-label="{}"{}>{}</td>')
     return [
         head,
         *(
-            cell.format(text, " wide" * (len(words) > WIDE), tinted, style, symbol(words))
+            cell.format(text, " wide" * (len(words) > WIDE), tinted, label, style, symbol(words))
             for words, style in zip(cells, styles, strict=True)
         ),
     ]

@@ -1,0 +1,83 @@
+"""What stands around the sections of an arm's page: the answers in short, contents with verdicts, signs, a glossary."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from tfarm.arm import Arm
+from tfarm.glossary import TERMS, Term
+from tfarm.report.loop_laws import has_rate_loop, sign_words
+from tfarm.report.page_names import QUESTIONS
+from tfarm.report.sections import Block, SavedSection, Section
+
+SHORTEST = 40  # characters of an answer; one that is shorter takes the next sentence too
+ANSWERS = ("margins-map", "margins", "locus", "sampled", "tune", "fit", "law", "no-loop")  # whose first words answer
+VERDICTS = {"stable": "ok", "yes": "ok", "unstable": "corrected", "no": "corrected", "marginal": "undecided",
+            "undecided": "undecided"}  # fmt: skip
+OPEN_PICTURES = 2  # of a section: those that answer its question; the rest is a click away
+TOLD = ("certified", "complete", "enclosed", "Lyapunov region", "proven", "settled", "small gain", "winding number",
+        "band", "window", "default gains")  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Framed:
+    """A section as its page shows it: in the contents with a badge, answered above, long matter folded away.
+
+    `badge` is the verdict, with the class of its look; `answer` the sentence for the top of the page; both may be "".
+    """
+
+    saved: SavedSection
+    badge: tuple[str, str]
+    answer: str
+    words: Sequence[str]
+    more_words: Sequence[str]
+    blocks: Sequence[Block]
+    more_blocks: Sequence[Block]
+
+
+def framed(saved: SavedSection) -> Framed:
+    """What is seen at once of a section, and what is folded away."""
+    section, pictures = saved.section, [block for block in saved.blocks if block.table is None]
+    shown = pictures[:OPEN_PICTURES]
+    return Framed(
+        saved=saved,
+        badge=_badge(section),
+        answer=first_sentence(section.words[0]) if section.anchor in ANSWERS and section.words else "",
+        words=section.words[:1],
+        more_words=section.words[1:],
+        blocks=shown,
+        more_blocks=[block for block in saved.blocks if block not in shown],
+    )
+
+
+def _badge(section: Section) -> tuple[str, str]:
+    for fact in section.facts:
+        if fact.value.lower() in VERDICTS:
+            return fact.value.lower(), VERDICTS[fact.value.lower()]
+    return "", ""
+
+
+def first_sentence(text: str) -> str:
+    """A text up to the end of its first sentence that says something, its full stop included."""
+    ends = [found.end() for found in re.finditer(r"(?<=[\w%)])\.(?= [A-Z])", text)]
+    return next((text[:end] for end in ends if end >= SHORTEST), text)
+
+
+def signs(arm: Arm) -> str:
+    """The law and the sign of its K2, once a page; empty where there is no loop."""
+    return sign_words(arm) if has_rate_loop(arm) else ""
+
+
+def glossary() -> Sequence[Term]:
+    """The words of these pages that promise something."""
+    return [term for term in TERMS if term.name in TOLD]
+
+
+def beside(folder: Path, writing: Sequence[str], page: str) -> Sequence[tuple[str, str]]:
+    """(file, title) of the arm's other pages: those in its folder, and those written with this one."""
+    names = {"index": "full report", **QUESTIONS}
+    there = [name for name in names if name in writing or (folder / f"{name}.html").is_file()]
+    return [(f"{name}.html", names[name]) for name in there if name != page]
