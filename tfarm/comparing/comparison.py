@@ -159,12 +159,13 @@ def compare(
     called = tuple(names) or _names(pairs)
     if len(called) != 2:
         raise ParameterError(key="names", value=list(called), remedy="two names")
+    (first, _), (second, _) = pairs
+    if first.input_unit != second.input_unit:
+        remedy = f"gains of {called[0]} are in another unit, its input being {first.input}: give both one input"
+        raise ParameterError(key="input", value=second.input, remedy=remedy)
     one, other = (
         _side(name, arm, law, modes, chain or Chain()) for name, (arm, law) in zip(called, pairs, strict=True)
     )
-    if one.arm.input_unit != other.arm.input_unit:
-        remedy = f"gains of {one.name} are in another unit, its input being {one.arm.input}: give both one input"
-        raise ParameterError(key="input", value=other.arm.input, remedy=remedy)
     return Comparison(one, other, output)
 
 
