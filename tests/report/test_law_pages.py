@@ -185,7 +185,7 @@ def test_each_loop_page_of_laws_has_a_section_that_says_what_it_is_about():
     discrete = Subject(LAB, Chain(), (GivenLaw(Law({"hub_rate": 0.3}, period=0.01)),))
     anchors = {each.anchor for each in writing.pieces_of(discrete) if each.is_for(discrete)}
     assert not anchors & {"margins", "margins-nyquist", "locus", "margins-map", "tune"}
-    assert "sampled loop" in law_section(*discrete).words[1]
+    assert "sampled loop" in law_section(*discrete[:3]).words[1]
     held = replace(LAB, hub=tfarm.Hub(inertia=math.inf))
     first = (each.anchor for each in writing.LAW_PIECES if each.is_for(Subject(held, Chain(), subject.laws)))
     assert next(first) == "no-loop"

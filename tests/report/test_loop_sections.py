@@ -29,6 +29,7 @@ from tfarm.loop.stability import stability
 from tfarm.plots.plane import nice_levels
 from tfarm.plots.roots import zoomed
 from tfarm.report import loop_laws, loop_section, map, write, writing
+from tfarm.report.frame import signs
 from tfarm.report.locus_section import beyond_table
 from tfarm.report.loop_laws import NamedLaw, has_loop, laws, margins_of
 from tfarm.report.loop_section import map_section, margins_section
@@ -290,11 +291,13 @@ def test_the_map_says_what_is_proven(coarse, section):
         assert ("not a proof here" in picture.caption) == (page is section)
 
 
-def test_the_sign_convention_stands_wherever_K2_does(coarse, monkeypatch):
+def test_the_sign_convention_is_the_pages_and_no_sections(coarse, monkeypatch):
+    """It stands once, at the foot of the page: tests/report/test_writing.py counts it there."""
     monkeypatch.setattr(loop_laws, "best", lambda arm, chain: None)
+    assert "Sign of K2" in signs(PURE)
     for section in (coarse, margins_section(PURE)):
         texts = [*section.words, *(block.caption for block in section.blocks)]
-        assert any("Sign of K2" in text for text in texts)
+        assert not any("Sign of K2" in text for text in texts)
 
 
 # ------------------------------------------------------------ the same gains, sampled

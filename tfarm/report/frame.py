@@ -18,6 +18,7 @@ ANSWERS = ("margins-map", "margins", "locus", "sampled", "tune", "fit", "law", "
 VERDICTS = {"stable": "ok", "yes": "ok", "unstable": "corrected", "no": "corrected", "marginal": "undecided",
             "undecided": "undecided"}  # fmt: skip
 OPEN_PICTURES = 2  # of a section: those that answer its question; the rest is a click away
+FOLDED = ("assumptions",)  # sections whose pictures are for those who ask further
 TOLD = ("certified", "complete", "enclosed", "Lyapunov region", "proven", "settled", "small gain", "winding number",
         "band", "window", "default gains")  # fmt: skip
 
@@ -41,7 +42,7 @@ class Framed:
 def framed(saved: SavedSection) -> Framed:
     """What is seen at once of a section, and what is folded away."""
     section, pictures = saved.section, [block for block in saved.blocks if block.table is None]
-    shown = pictures[:OPEN_PICTURES]
+    shown = pictures[: 0 if section.anchor in FOLDED else OPEN_PICTURES]
     return Framed(
         saved=saved,
         badge=_badge(section),
