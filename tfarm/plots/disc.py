@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from tfarm.digits import plain, significant
@@ -73,7 +74,7 @@ def _disc(ax: Axes) -> None:
     ax.plot([0, 0], [-1, 1], color=FAINT, lw=0.7, zorder=0.5)
     ax.plot([-0.5], [0], "+", color=ORANGE, ms=11, mew=2.2, zorder=6)
     ax.annotate("−1", (-0.5, 0), textcoords="offset points", xytext=(-4, 6), ha="right", color=ORANGE, weight="bold",
-                bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.4}, zorder=5)  # fmt: skip
+                path_effects=[withStroke(linewidth=2.0, foreground="white")], zorder=5)  # fmt: skip
     ax.set_aspect("equal")
     ax.set_xticks([])
     ax.set_yticks([])

@@ -33,6 +33,7 @@ STYLE = {
     "axes.labelcolor": INK,
     "axes.linewidth": 0.8,
     "axes.grid": True,
+    "axes.formatter.useoffset": False,  # ticks are read as they stand, with no "+3.322e4" to add
     "axes.axisbelow": True,
     "grid.color": "#e6e6e6",
     "grid.linewidth": 0.6,

@@ -74,7 +74,7 @@ def margin_table(laws: Sequence[Named], found: Sequence[Margins], is_undamped: b
     """A row a quantity, the verdict first; for each law the exact value, that in the band, and where."""
     rows = [list(_rows(each)) for each in found]
     columns = [
-        Column("quantity", "", of=[row[0] for row in rows[0]]),
+        Column("quantity", "quantity", of=[row[0] for row in rows[0]]),
         Column("unit", "unit", of=[row[1] for row in rows[0]]),
     ]
     for named, part in zip(laws, rows, strict=True):

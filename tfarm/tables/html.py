@@ -29,8 +29,10 @@ def _groups(columns: list[Column]) -> Markup:
     runs = [(name, len(list(run))) for name, run in itertools.groupby(column.group for column in columns)]
     if not any(name for name, _ in runs):
         return Markup("")
-    named = Markup(' class="named" scope="colgroup"')
-    cells = (Markup('<th colspan="{}"{}>{}</th>').format(count, named * bool(name), name) for name, count in runs)
+    headed = Markup('<th colspan="{}" class="named" scope="colgroup">{}</th>')
+    cells = (
+        headed.format(count, name) if name else Markup('<td colspan="{}"></td>').format(count) for name, count in runs
+    )
     return Markup('<tr class="group">{}</tr>\n').format(Markup("").join(cells))
 
 
