@@ -99,3 +99,27 @@ def test_zeros_are_the_closed_ones_to_the_last_bit_and_soon(number, most):
 
 def test_no_bracket_has_no_zero():
     assert zeros_between(lambda x: x, np.empty(0), np.empty(0)).size == 0
+
+
+@pytest.mark.parametrize(
+    ("h", "before", "change"),
+    [
+        ([1.0, 0.0, -1.0], [0], [2]),
+        ([-1.0, 0.0, 0.0, 2.0, -1.0], [0, 3], [-2, 2]),
+        ([1.0, 0.0, 1.0], [], []),
+        ([0.0, 0.0, 1.0, -1.0, 0.0], [2], [2]),
+        ([0.0, 0.0], [], []),
+    ],
+)
+def test_a_zero_exactly_at_a_point_is_not_lost(h, before, change):
+    (found,), ways = brackets(np.array(h))
+    assert found.tolist() == before
+    assert ways.tolist() == change
+    (rows, columns), both = brackets(np.array([h, h]))
+    assert columns.tolist() == 2 * before
+    assert rows.tolist() == [0] * len(before) + [1] * len(before)
+    assert both.tolist() == 2 * change
+
+
+def test_the_zero_at_the_end_of_its_bracket_is_found():
+    assert zeros_between(lambda x: x - 2.0, np.array([1.0]), np.array([2.0])) == pytest.approx([2.0], rel=1e-15)

@@ -74,9 +74,16 @@ class Crossings:
 def brackets(h: Real) -> tuple[tuple[Whole, ...], Whole]:
     """Where h (..., points) changes sign between neighbours, as indices of the first, and what that changes.
 
-    2 more zeros beyond the curve where h falls, 2 fewer where it rises, the mirror image counted.
+    2 more zeros beyond the curve where h falls, 2 fewer where it rises, the mirror image counted.  A point at which h
+    is 0 to the last bit counts for the sign that follows.
     """
     sign = np.sign(h)
+    if (sign == 0).any():
+        count = h.shape[-1]
+        following = np.where(sign != 0, np.arange(count), count)
+        following = np.minimum.accumulate(following[..., ::-1], axis=-1)[..., ::-1]
+        ended = np.concatenate([sign, np.zeros((*h.shape[:-1], 1))], axis=-1)
+        sign = np.take_along_axis(ended, following, axis=-1)
     before = np.nonzero(sign[..., 1:] * sign[..., :-1] < 0)
     return before, np.where(sign[before] > 0, 2, -2)
 
