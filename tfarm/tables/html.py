@@ -40,7 +40,8 @@ def _column(column: Column) -> list[Markup]:
     """The heading, then the cells: words to the left, long ones wide, some with a background."""
     text, tinted, cells = "text" * column.is_text, " tinted" * bool(column.tint), column.cells
     of = Markup('<span class="unit">{}</span>').format(column.unit) if column.unit else ""
-    head = Markup('<th scope="col" class="{}{}">{}{}</th>').format(text, tinted, symbol(column.title), of)
+    shape = Markup('<th scope="col" class="{}{}">{}{}</th>' if column.title else '<td class="{}{}">{}{}</td>')
+    head = shape.format(text, tinted, symbol(column.title), of)
     styles = (
         Markup(' style="background:{}"').format(tint) if tint else "" for tint in column.tint or [""] * len(cells)
     )
