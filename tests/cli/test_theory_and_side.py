@@ -25,6 +25,7 @@ VERBS = {  # those that take an arm, as short as they go
 UNASKED = {
     "assumptions",
     "bode",
+    "compare",
     "design",
     "fit",
     "map",
