@@ -32,6 +32,7 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
 
 WALL = 10.0
+EDGE = 1e-9  # of a coordinate: so far inside its bounds a search begins
 GAIN, DELAY = "gain", "delay"  # of a sensor: free beside the numbers of the arm
 
 
@@ -76,6 +77,11 @@ class Problem:
         """Lowest and highest coordinates."""
         low, high = zip(*(each.bounds for each in self.parameters), strict=True)
         return np.array(low), np.array(high)
+
+    def inside(self, point: Real) -> Real:
+        """The point, or the nearest one by `EDGE` inside the bounds."""
+        low, high = self.bounds
+        return np.clip(point, low + EDGE, high - EDGE)
 
     @property
     def size(self) -> int:

@@ -29,7 +29,6 @@ ARMS = 40
 SEED = 852780
 FARTHEST = 0.999  # of the draws of a normal distribution: one whose sum of squares is larger is none of them
 TRIES = 10  # times so many are drawn before it is given up
-EDGE = 1e-9  # of a coordinate: inside its bounds
 
 
 @dataclass(frozen=True)
@@ -50,12 +49,11 @@ def possible(fit: Fit, count: int = ARMS, seed: int = SEED) -> Possible:
     found, rng = fit.solution, np.random.default_rng(seed)
     sizes, axes = principal_axes(found.jacobian)
     spread = np.minimum(1.0 / np.maximum(sizes, 1e-300), OPEN)
-    low, high = found.problem.bounds
     most = found.chi_squared + float(chi2.ppf(FARTHEST, found.point.size)) + 2 * int((sizes < 1 / OPEN).sum())
     kept: list[Real] = []
     for _ in range(TRIES * count):
         point = found.point + axes.T @ (spread * rng.standard_normal(spread.size))
-        point = np.clip(point, low + EDGE, high - EDGE)
+        point = found.problem.inside(point)
         residuals = found.problem.residuals(point)
         if float(residuals @ residuals) <= most:
             kept.append(point)

@@ -34,7 +34,6 @@ OPEN = 1.0  # of ln p: a combination with a larger deviation (a factor of e) is 
 WEAK = 0.1  # of ln p: what is known so badly is looked at again
 SAME = 0.1  # of a sum of squares: less is no difference to speak of
 EXCLUDED = 16.0  # of a sum of squares: noise alone makes up an effect of four deviations once in 15,000 fits
-EDGE = 1e-9  # of a coordinate: a search begins so far inside its bounds
 RESCALED = 3  # times that a noise known up to a factor takes its factor from the residuals
 
 
@@ -73,13 +72,13 @@ def solved(problem: Problem) -> Solution:
         best = best_after(subject, start)
         if best.converged and is_explained(best):
             return replace(_nearest(best), starts=len(found))
-    rng, (low, high) = np.random.default_rng(SEED), problem.bounds
+    rng = np.random.default_rng(SEED)
     for _ in range(STRAYED):
         if best.converged and best.chi_squared < WORSE * best.freedom:
             break
         strayed = best.point + SPREAD * rng.standard_normal(best.point.size)
         with suppress(ParameterError):  # no arm there
-            best = best_after(best.problem, np.clip(strayed, low + EDGE, high - EDGE))
+            best = best_after(best.problem, problem.inside(strayed))
     return replace(_nearest(best), starts=len(found))
 
 
@@ -146,7 +145,7 @@ def settled(problem: Problem, start: Real, held: dict[int, float] | None = None)
     def jacobian(x: Real) -> Real:
         return np.asarray(problem.jacobian(whole(x))[:, free])
 
-    inside = np.clip(point[free], low + EDGE, high - EDGE)
+    inside = problem.inside(point)[free]
     found = least_squares(
         walled(residuals), inside, jac=jacobian, bounds=(low, high), x_scale="jac", xtol=FIRM, ftol=FIRM_SUM, gtol=None,
         max_nfev=MOST,

@@ -74,11 +74,10 @@ class Starts:
 
     def _stepped(self, point: Real, step: Real) -> Real:
         """The point a step further on, or as much of it as there are arms."""
-        low, high = self.problem.bounds
         for share in SHARES:
             beyond = point.copy()
             beyond[: self._free] += share * step
-            beyond = np.clip(beyond, low + 1e-9, high - 1e-9)
+            beyond = self.problem.inside(beyond)
             with suppress(ParameterError):
                 self.problem.arm(beyond)
                 return beyond
@@ -111,7 +110,7 @@ class Starts:
         whole = signed(self.problem, point)
         thin = thinned(whole, CURVE)
         low, high = thin.bounds
-        point = np.clip(self._with_gains(thin, point), low + 1e-9, high - 1e-9)
+        point = thin.inside(self._with_gains(thin, point))
 
         if not thin.responses:
             return whole, point
