@@ -216,7 +216,10 @@ def test_the_foot_tells_how_to_write_the_page_again(pages):
 def test_the_sign_of_the_gains_stands_once_and_the_words_are_explained(pages):
     text = (pages / NAME / "index.html").read_text(encoding="utf-8")
     assert text.count("accelerates the hub") == 1
-    assert text.count("<dt>proven</dt>") == text.count("<dt>Lyapunov region</dt>") == 1
+    for name in ("proven", "lyapunov-region"):
+        assert text.count(f'<dt id="word-{name}">') == 1
+    answers = text.partition('id="answers"')[2].partition("</section>")[0]
+    assert 'href="#word-default-gains">default gains</a>' in answers
 
 
 def test_long_matter_is_folded_away_and_answers_stand_first(pages):

@@ -7,11 +7,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from markupsafe import Markup
+
 from tfarm.arm import Arm
 from tfarm.glossary import TERMS, Term
 from tfarm.report.loop_laws import has_rate_loop, sign_words
 from tfarm.report.page_names import QUESTIONS
 from tfarm.report.sections import Block, SavedSection, Section
+from tfarm.tables.html import symbol
 
 SHORTEST = 40  # characters of an answer; one that is shorter takes the next sentence too
 ANSWERS = ("margins-map", "margins", "locus", "sampled", "tune", "fit", "law", "no-loop")  # whose first words answer
@@ -21,6 +24,9 @@ OPEN_PICTURES = 2  # of a section: those that answer its question; the rest is a
 FOLDED = ("assumptions",)  # sections whose pictures are for those who ask further
 TOLD = ("certified", "complete", "enclosed", "Lyapunov region", "proven", "settled", "small gain", "winding number",
         "band", "window", "default gains")  # fmt: skip
+PLAIN_WORDS = ("band", "window")  # of these: too common in another sense to lead to their meaning wherever they stand
+EXPLAINED = re.compile(rf"\b(?:{'|'.join(name for name in TOLD if name not in PLAIN_WORDS)})\b", re.IGNORECASE)
+ABREAST = ("bode-root-moment", "bode-tip-displacement")  # sections of one picture each that stand beside each other
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,6 +58,37 @@ def framed(saved: SavedSection) -> Framed:
         blocks=shown,
         more_blocks=[block for block in saved.blocks if block not in shown],
     )
+
+
+def rows(sections: Sequence[Framed]) -> Sequence[Sequence[Framed]]:
+    """The sections in their order, those that stand beside each other in one row."""
+    found: list[list[Framed]] = []
+    for each in sections:
+        anchors = [found[-1][-1].saved.section.anchor, each.saved.section.anchor] if found else []
+        if tuple(anchors) == ABREAST:
+            found[-1].append(each)
+        else:
+            found.append([each])
+    return found
+
+
+def explained(text: str) -> Markup:
+    """A sentence as a page shows it; a word that promises something leads to its meaning, where it stands first."""
+    seen: set[str] = set()
+
+    def linked(found: re.Match[str]) -> str:
+        word = found[0].lower()
+        if word in seen:
+            return found[0]
+        seen.add(word)
+        return f'<a class="term" href="#{word_id(word)}">{found[0]}</a>'
+
+    return Markup(EXPLAINED.sub(linked, str(symbol(text))))
+
+
+def word_id(name: str) -> str:
+    """Where a word of the glossary stands on a page."""
+    return f"word-{name.lower().replace(' ', '-')}"
 
 
 def _badge(section: Section) -> tuple[str, str]:

@@ -21,7 +21,7 @@ from tfarm.digits import listed
 from tfarm.dsp import Chain, load_chain
 from tfarm.dsp.writing import file_text
 from tfarm.errors import ParameterError
-from tfarm.report.frame import VERDICTS, framed, glossary, signs
+from tfarm.report.frame import VERDICTS, explained, framed, glossary, rows, signs, word_id
 from tfarm.report.given_laws import Subject
 from tfarm.report.page_names import QUESTIONS as QUESTIONS
 from tfarm.report.sections import Fact, SavedSection
@@ -55,7 +55,7 @@ def _templates() -> Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.filters["symbol"] = symbol
+    environment.filters.update(symbol=symbol, explained=explained, word_id=word_id)
     return environment
 
 
@@ -75,11 +75,13 @@ def arm_page(
     """
     arm = subject.arm
     title = f"{arm.name}: {QUESTIONS[only].lower()}" if only else arm.name
+    shown = [framed(saved) for saved in sections]
     return render(
         "arm.html",
         title=title,
         arm=arm,
-        framed=[framed(saved) for saved in sections],
+        framed=shown,
+        rows=rows(shown),
         only=only,
         others=others,
         signs=signs(arm),
