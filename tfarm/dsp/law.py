@@ -10,6 +10,7 @@ destabilises.  At finite gains the closed-loop pole itself says it: it is follow
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from typing import Any
@@ -136,10 +137,14 @@ def root_locus(loop: SampledLoop, name: str, values: Real) -> Complex:
 
     The other gains are those of the loop.  Values are taken as they are: give them close enough to tell branches apart.
     """
+    return followed([loop.having(**{name: float(value)}).poles.z for value in values], values)
+
+
+def followed(poles: Sequence[Complex], values: Real) -> Complex:
+    """The poles at each of the values, in any order, as branches (values, poles)."""
     rows: list[Complex] = []
-    for value in values:
-        z = loop.having(**{name: float(value)}).poles.z
-        rows.append(z if not rows else z[_matched(_ahead(rows), z)])
+    for number, z in enumerate(poles):
+        rows.append(z if not rows else z[_matched(_ahead(rows, values[max(0, number - 2) : number + 1]), z)])
     return np.array(rows)
 
 
@@ -151,11 +156,12 @@ def origins(loop: SampledLoop) -> NDArray[np.int64]:
     """
     labels = np.nonzero(loop.pulse.poles != 0)[0]
     ahead, rows = loop.pulse.multipliers[labels], []
-    for scale in np.r_[1e-6, np.arange(1, STEPS + 1) / STEPS]:
+    scales = np.r_[1e-6, np.arange(1, STEPS + 1) / STEPS, 1.0]
+    for number, scale in enumerate(scales[:-1]):
         z = _scaled(loop, float(scale)).eigenvalues
         order = _matched(ahead, z)
         rows.append(z[order])
-        ahead = _ahead(rows)
+        ahead = _ahead(rows, scales[max(0, number - 1) : number + 2])
     origin = np.full(z.size, -1)
     origin[order] = labels
     origin.flags.writeable = False
@@ -172,9 +178,12 @@ def _scaled(loop: SampledLoop, scale: float) -> SampledLoop:
     return replace(loop, gains=loop.gains.times(scale))
 
 
-def _ahead(rows: list[Complex]) -> Complex:
-    """Where the branches should be next."""
-    return rows[-1] if len(rows) < 3 else 2 * rows[-1] - rows[-2]
+def _ahead(rows: list[Complex], values: Real) -> Complex:
+    """Where the branches should be at the last of the values, the rows before it being those of the others."""
+    if len(rows) < 3:
+        return rows[-1]
+    before, last, wanted = values
+    return rows[-1] + (wanted - last) / (last - before) * (rows[-1] - rows[-2])
 
 
 def _matched(ahead: Complex, z: Complex) -> NDArray[np.int64]:

@@ -1,6 +1,7 @@
 """Where the poles of the sampled loop go as a gain grows: three loci of one loop, each branch named after its mode.
 
-Branches are followed by `dsp.law.root_locus`; each is named after the mode that it comes from at zero gain.
+Branches are followed by `dsp.law.followed`, through as many values as it takes to be round; each is named after the
+mode that it comes from at zero gain.
 """
 
 from __future__ import annotations
@@ -13,14 +14,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import HubFeedback
-from tfarm.dsp.law import origins, root_locus
+from tfarm.crossing.turning import loose
+from tfarm.dsp.law import followed, origins
 from tfarm.dsp.loop import SampledLoop
 from tfarm.records import record
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
-VALUES = 91  # of a gain along its locus
+VALUES = 61  # of a gain along its locus, to begin with
+ROUNDS = 24  # of halving the steps where a branch bends, at most
+REAL = 1e-12  # imaginary part of a real z: rounding
+RIM = 1.12  # radius up to which the z-plane is shown
+BEYOND = 1.2 * RIM  # and up to which a branch is drawn, so that its line runs out of the picture
 DECADES = 3  # of K1
 STRONGER = 10.0  # how many times its own K1 the locus of K1 alone goes
 
@@ -81,7 +87,22 @@ def loci(loop: SampledLoop, K1_top: float, K2_range: tuple[float, float]) -> Loc
 
 
 def _locus(loop: SampledLoop, gain: str, values: Real) -> Locus:
-    z = root_locus(loop, gain, values)
+    """The locus at these values, that of the loop, and those between at which a branch turns in its picture."""
+
+    def poles(value: float) -> Complex:
+        z = loop.having(**{gain: value}).poles.z
+        return np.where(abs(z.imag) <= REAL, z.real, z)
+
+    known: dict[float, Complex] = {}
+    wanted = np.union1d(values, loop.gains[gain]) if values[0] < loop.gains[gain] < values[-1] else values
+    for _ in range(ROUNDS):
+        known |= {value: poles(value) for value in wanted.tolist() if value not in known}
+        values = np.array(sorted(known))
+        z = followed([known[value] for value in values.tolist()], values)
+        bent = loose(np.where((z.imag >= 0) & (abs(z) < BEYOND), z, np.nan).T, 2 * RIM, 2 * RIM)
+        if not bent.any():
+            break
+        wanted = (values[:-1] + values[1:])[bent] / 2
     first = loop.having(**{gain: float(values[0])})
     origin = origins(first)
     mode = np.where(origin < 0, 0, loop.pulse.mode[origin])

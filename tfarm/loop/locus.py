@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.arm.checks import whole
+from tfarm.crossing.turning import loose
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 from tfarm.spectrum.continuation import Member, corrected, follow
@@ -30,6 +31,7 @@ MOST_BRANCHES = 200
 SHARE = 0.25  # how far a zero may be polished from its guess, in distances to the next branch
 SETTLED = 1e-10  # of its size: one step more is taken where Newton's method still moves a zero by this
 STEPS = 6
+ROUNDS = 24  # of halving at most: where two branches meet their distance goes with the root of that of the gain
 SAME = 1e-12  # relative: a gain so near to that at which a pole passes through 0 has the pole there
 
 
@@ -86,17 +88,64 @@ def locus(
     points = whole("points", points, 2, MOST_POINTS, f"a whole number from 2 to {MOST_POINTS}")
     branches = whole("branches", branches, 1, MOST_BRANCHES, f"a whole number from 1 to {MOST_BRANCHES}")
     _range(Variation(arm, law, vary), start, stop)
-    freed, loss = free_of_loss(arm)
-    variation = Variation(freed, law, vary, loss)
-    gain = np.linspace(start, stop, points)
-    cut, lowest = followed(variation, start, stop, branches + 1)
-    evaluator = Evaluator(variation, gain)
-    curves = _Polish(variation, evaluator, FREE * lowest).curves(cut)
-    rows, mode = _listed(curves, variation, branches)
+    return _traced(Variation(arm, law, vary), np.linspace(start, stop, points), branches, rounds=0)
+
+
+def rounded(found: Locus) -> Locus:
+    """The same locus with more values between its own, until no branch turns by more than 5 degrees as it is drawn.
+
+    Each is seen in a picture of its own and in one of all, down to pieces of a pixel.
+    """
+    return _traced(Variation(found.arm, found.law, found.vary), found.gain, len(found.branches), ROUNDS)
+
+
+def _traced(wanted: Variation, gain: Real, branches: int, rounds: int) -> Locus:
+    """The locus at these values, and at those between that so many rounds find to be needed."""
+    freed, loss = free_of_loss(wanted.arm)
+    variation = Variation(freed, wanted.law, wanted.vary, loss)
+    cut, lowest = followed(variation, float(gain[0]), float(gain[-1]), branches + 1)
+    way = float(np.sign(gain[-1] - gain[0]))
+
+    def curves(values: Real) -> Complex:
+        return _Polish(variation, Evaluator(variation, values), FREE * lowest, way).curves(cut)
+
+    every = curves(gain)
+    kept, mode = _listed(every, variation, branches)
+    for _ in range(rounds):
+        more = _between(gain, _rows(every, kept))
+        if not more.size or more.size + gain.size > MOST_POINTS:
+            break
+        try:
+            added = curves(more)
+        except ConvergenceError:  # next to where two meet: what is known so far is exact, and less round
+            break
+        order = np.argsort(way * np.r_[gain, more], kind="stable")
+        gain, every = np.r_[gain, more][order], np.concatenate([every, added], axis=1)[:, order]
+    rows = _rows(every, kept)
     found = crossings(variation, gain, rows, lowest)
-    if np.isnan(curves[: 2 * branches]).any():
+    if np.isnan(every[: 2 * branches]).any():
         found = with_others(variation, gain, rows, found)
-    return Locus(arm, law, vary, gain, rows, mode, found)
+    return Locus(wanted.arm, wanted.law, wanted.vary, gain, rows, mode, found)
+
+
+def _between(gain: Real, rows: Complex) -> Real:
+    """Half way between values where a branch is to be known more closely, in a frame of its own or of all."""
+    frames = np.array([[*map(frame, rows)], [frame(rows)] * len(rows)])  # (2, b, 4)
+    width, height = frames[..., 1] - frames[..., 0], frames[..., 3] - frames[..., 2]
+    own, every = (loose(rows, width[n, :, None], height[n, :, None]) for n in (0, 1))
+    return np.asarray((gain[:-1] + gain[1:])[own | every] / 2)
+
+
+def frame(branches: Complex) -> tuple[float, float, float, float]:
+    """Left, right, low and high of the picture of these branches [1/s]: all of them, with the imaginary axis."""
+    points = branches[~np.isnan(branches)]
+    if not points.size:
+        return 0.0, 1.0, 0.0, 1.0
+    left, right = min(float(points.real.min()), 0.0), max(float(points.real.max()), 0.0)
+    low, high = float(points.imag.min()), float(points.imag.max())
+    wide = max(right - left, 1e-12 * float(abs(points).max())) or 1.0  # where no pole moves from 0
+    tall = max(high - low, 1e-9 * high) or wide  # where none of them swings
+    return left, left + wide, low, low + tall
 
 
 def _range(variation: Variation, start: float, stop: float) -> None:
@@ -111,10 +160,10 @@ def _range(variation: Variation, start: float, stop: float) -> None:
         raise ParameterError(key="vary", value="all", remedy="every gain is 0: give K1, K2 or Kp to be scaled")
 
 
-def _listed(curves: Complex, variation: Variation, number: int) -> tuple[Complex, NDArray[np.int64]]:
-    """The first branches that are no mirror images, and the modes they continue from; zeros nobody follows at 0 first.
+def _listed(curves: Complex, variation: Variation, number: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Which curves are the first branches that are no mirror images, and the modes that these continue from.
 
-    NaN beyond the end of one that was not followed all the way.
+    Zeros at 0 that nobody follows come first, with negative numbers.
     """
     at_zero = variation.zeros_at_origin
     follows_rigid = at_zero < 2 and variation.arm.has_rigid_mode
@@ -128,14 +177,20 @@ def _listed(curves: Complex, variation: Variation, number: int) -> tuple[Complex
     kept = np.nonzero(lives.any(axis=1) & (real | ~(curves.imag < 0).any(axis=1)))[0][:number]
     if kept.size < number:
         raise ConvergenceError(f"only {kept.size} branches could be followed: ask for fewer", kept.size, number)
-    return np.where(curves[kept] == 0, 0.0, curves[kept]), mode[kept]
+    return kept - idle, mode[kept]
+
+
+def _rows(curves: Complex, kept: NDArray[np.int64]) -> Complex:
+    """The branches; NaN beyond the end of one that was not followed all the way."""
+    rows = np.where(kept[:, None] < 0, 0.0, curves[kept])
+    return np.where(rows == 0, 0.0, rows)  # no -0
 
 
 class _Polish:
     """From the nodes of the tracker to every zero at every value."""
 
-    def __init__(self, variation: Variation, evaluator: Evaluator, free: float) -> None:
-        self.variation, self.evaluator, self.free = variation, evaluator, free
+    def __init__(self, variation: Variation, evaluator: Evaluator, free: float, way: float) -> None:
+        self.variation, self.evaluator, self.free, self.way = variation, evaluator, free, way
         self.gain = evaluator.values
         self.at_zero = variation.zeros_at_origin
         self.static = _at_static_crossing(variation, self.gain)
@@ -144,9 +199,8 @@ class _Polish:
         """The branches (slots, n); those which do not live all the way are left out."""
         number = max(int(each.slots.max()) for each in cut) + 1
         curves = np.full((number, self.gain.size), np.nan, complex)
-        way = np.sign(self.gain[-1] - self.gain[0])
         ends = np.array([each.nodes[-1].at for each in cut[:-1]])
-        owner = np.searchsorted(way * ends, way * self.gain, side="left")
+        owner = np.searchsorted(self.way * ends, self.way * self.gain, side="left")
         for n, segment in enumerate(cut):
             (which,) = np.nonzero(owner == n)
             if which.size:
@@ -208,7 +262,7 @@ class _Polish:
         member = member_of(self.variation, value, self.at_zero, self.free)
         found, stray = corrected(member, guess)
         if stray.any():
-            nodes = [node for node in segment.nodes if (value - node.at) * (self.gain[-1] - self.gain[0]) >= 0]
+            nodes = [node for node in segment.nodes if (value - node.at) * self.way >= 0]
             last = nodes[-1] if nodes else segment.nodes[0]
             found = follow(self._member, last, value, (value - last.at) / 8, len(last.zeros))[-1].zeros[: len(guess)]
         return ordered(found, segment.pinned)

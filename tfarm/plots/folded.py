@@ -15,7 +15,7 @@ from matplotlib.ticker import FuncFormatter, NullLocator
 from numpy.typing import NDArray
 
 from tfarm.digits import plain
-from tfarm.dsp.loci import Loci, Locus
+from tfarm.dsp.loci import BEYOND, RIM, Loci, Locus
 
 from .style import BLUE, GREY, INK, ORANGE, blank, headline, style
 from .words import gains_words
@@ -23,8 +23,8 @@ from .words import gains_words
 STRIPS = 2.0  # how many strips are shown at least
 ALIASED = "#eef0f3"
 NEAR_AXIS = 0.01  # 1/s: the real axis is linear up to here, logarithmic beyond
+SCALE = 0.9 / math.log(10)  # of its linear part: there is no corner where the two meet
 TICKS = (-100.0, -10.0, -1.0, -0.1, 0.0, 0.1, 1.0)
-RIM = 1.12  # radius up to which the z-plane is shown
 
 
 def draw_loci(data: Loci) -> Figure:
@@ -49,7 +49,7 @@ def folded(data: Loci, *, ax: Axes) -> None:
     above = hertz[hertz > half]
     top = STRIPS * half if not above.size else max(STRIPS * half, 1.12 * float(above.min()))
     shown = hertz < top
-    ax.set_xscale("symlog", linthresh=NEAR_AXIS, linscale=0.6)
+    ax.set_xscale("symlog", linthresh=NEAR_AXIS, linscale=SCALE)
     ax.axhspan(half, top, color=ALIASED, zorder=0)
     for k in range(2, math.ceil(top / half)):
         ax.axhline(k * half, color="white", lw=1.2, zorder=0.5)
@@ -97,13 +97,13 @@ def _branches(data: Loci, modes: NDArray[np.int64], ax: Axes) -> list[float]:
 def z_plane(data: Loci, locus: Locus, *, ax: Axes) -> None:
     """The upper half of the z-plane with one gain's locus; open circles at its start, dots at the loop's gains."""
     angle = np.linspace(0.0, math.pi, 181)
-    ax.fill_between(RIM * 1.2 * np.cos(angle), 0, RIM * 1.2 * np.sin(angle), color="#f7e9de", zorder=0)
+    ax.fill_between(BEYOND * np.cos(angle), 0, BEYOND * np.sin(angle), color="#f7e9de", zorder=0)
     ax.fill_between(np.cos(angle), 0, np.sin(angle), color="white", zorder=0.2)
     ax.plot(np.cos(angle), np.sin(angle), color=INK, lw=0.9, zorder=1)
     here = int(abs(locus.values - data.loop.gains[locus.gain]).argmin())
     for branch in np.argsort(locus.mode):
         z, mode = locus.z[:, branch], int(locus.mode[branch])
-        visible = np.where((z.imag >= -1e-12) & (abs(z) < RIM * 1.2), z, np.nan)
+        visible = np.where((z.imag >= -1e-12) & (abs(z) < BEYOND), z, np.nan)
         if not np.isfinite(visible).any():
             continue
         colour = _colour(data, mode) if mode else GREY

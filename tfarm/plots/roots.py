@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,8 +14,9 @@ from numpy.typing import NDArray
 
 from tfarm.digits import held, plain, significant
 from tfarm.loop.loci import GAPS_HELD, HELD, Loci, shown
-from tfarm.loop.locus import Locus
+from tfarm.loop.locus import Locus, frame, rounded
 from tfarm.loop.reduced_locus import ReducedLocus
+from tfarm.loop.variation import OF_THE_LAW
 from tfarm.spectrum import modes
 
 from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, Keys, New, alone, blank, headline, style, window
@@ -28,31 +28,37 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 ZOOMED = 4  # modes drawn on their own
 COLORS = (INK, BLUE, GREEN, PURPLE, "#7a5a00", GREY)  # by mode
 ROOM = 0.12  # around a branch, as a share of its extent
-MARKED = 5  # values marked along each branch
+OPEN: dict[str, Any] = {"ls": "none", "marker": "x", "ms": 6, "mew": 1.4}  # poles without the gain that varies
+FIRST: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 6, "mfc": "white", "mew": 1.2}  # with the first of it
+QUARTERS = (0.25, 0.5, 0.75)  # of the way that the modes go, on average: where a value is marked along each branch
 
 
 def locus(exact: Locus, *, reduced: ReducedLocus | None = None, ax: Axes | None = None) -> Axes:
     """Closed-loop poles as one number varies (what `tfarm.locus` returns), in the axes given or in new ones; the axes.
 
-    Broad lines: the branches [1/s], a colour a mode, a cross at their beginning, dots at every fourth of the range,
-    and a diamond where one crosses the axis.  Thin: those of `reduced` (`tfarm.loop.reduced_locus`), if given.
+    Broad lines: the branches [1/s], a colour a mode, with values between those of `exact` where they bend; a cross
+    where the gain is 0, an open circle at another beginning, dots at a few values, one of them that which damps the
+    first mode best, and a diamond where one crosses the axis.  Thin: those of `reduced` (`tfarm.loop.reduced_locus`).
     """
     if ax is None:
         return draw_locus(exact, reduced, window).axes[0]
     with style():
-        every = range(len(exact.branches))
-        _panel(exact, reduced, every, ax, named=[*every, None])
-        _frame(shown(exact.branches), ax)
-        ax.set_xlabel("Re s [1/s]")
-        ax.set_ylabel("Im s [rad/s]")
+        _all(rounded(exact), exact, reduced, ax)
     return ax
 
 
 def draw_locus(exact: Locus, reduced: ReducedLocus | None = None, new: New = blank) -> Figure:
     """All branches in one panel, on a figure of its own."""
-    title = f"{exact.arm.name}: closed-loop poles as {_range(exact)}"
-    draw = partial(locus, exact, reduced=reduced)
-    return alone(lambda own: draw(ax=own), (7.0, 5.6), title, _legend(exact, reduced), new)
+    title, fine = f"{exact.arm.name}: closed-loop poles as {_range(exact)}", rounded(exact)
+    return alone(lambda ax: _all(fine, exact, reduced, ax), (7.0, 5.6), title, _legend(fine, reduced), new)
+
+
+def _all(fine: Locus, exact: Locus, reduced: ReducedLocus | None, ax: Axes) -> None:
+    every = range(len(exact.branches))
+    _panel(fine, exact, reduced, every, ax, named=[*every, None])
+    _frame(shown(fine.branches), ax)
+    ax.set_xlabel("Re s [1/s]")
+    ax.set_ylabel("Im s [rad/s]")
 
 
 def zoomed(exact: Locus) -> list[int]:
@@ -69,27 +75,27 @@ def color_of(exact: Locus, branch: int) -> str:
 
 def draw_loci(data: Loci) -> Figure:
     """All branches in one panel, and each mode enlarged beside it."""
-    exact = data.exact
+    exact, fine = data.exact, rounded(data.exact)
     with style():
         figure = blank(9.0, 5.6)
         grid = figure.add_gridspec(2, 4, width_ratios=[1.7, 1.7, 1.3, 1.3])
         whole = figure.add_subplot(grid[:, :2])
         numbers = range(len(exact.branches))
-        _panel(exact, data.reduced, numbers, whole, named=sorted(set(numbers) - set(zoomed(exact))))
-        _frame(shown(exact.branches), whole)
+        _panel(fine, exact, data.reduced, numbers, whole, named=sorted(set(numbers) - set(zoomed(exact))))
+        _frame(shown(fine.branches), whole)
         whole.set_title("all of them", fontsize=9.0)
         whole.set_xlabel("Re s [1/s]")
         whole.set_ylabel("Im s [rad/s]")
         for place, n in enumerate(zoomed(exact)):
             ax = figure.add_subplot(grid[place // 2, 2 + place % 2])
-            _panel(exact, data.reduced, [n], ax, named=[n])
+            _panel(fine, exact, data.reduced, [n], ax, named=[n])
             ax.xaxis.set_major_locator(MaxNLocator(3))
-            branch = shown(exact.branches[n])
+            branch = shown(fine.branches[n])
             _frame(branch[branch.imag >= 0], ax)
             name = f"mode {exact.mode[n]}" if exact.mode[n] else "rigid body"
             ax.set_title(name, fontsize=9.0, color=color_of(exact, n))
             ax.tick_params(labelsize=7.5)
-        figure.legend(*_legend(exact, data.reduced), loc="outside lower left", ncols=5, fontsize=8.2, columnspacing=1.2)
+        figure.legend(*_legend(fine, data.reduced), loc="outside lower left", ncols=5, fontsize=8.2, columnspacing=1.2)
         headline(figure, f"{exact.arm.name}: closed-loop poles as {_range(exact)}")
     return figure
 
@@ -99,28 +105,59 @@ def _range(exact: Locus) -> str:
     return f"{exact.vary} goes from {first} to {last}, {gains_words(exact.law, but=exact.vary)} held"
 
 
-def _marked(exact: Locus) -> Real:
-    """The values that are marked along each branch."""
-    return np.linspace(exact.gain[0], exact.gain[-1], MARKED)
+def _marked(exact: Locus) -> tuple[float, list[float]]:
+    """The value whose poles bear a cross or a circle, the gain 0 where that is on the way; and those that bear dots.
+
+    Dots are where the modes have gone a quarter, a half, three quarters and all of their way on average, at two digits;
+    the one of these next to the value that damps the first mode best is at that, at three.
+    """
+    gain, last = exact.gain, float(exact.gain[-1])
+    begins = 0.0 if exact.vary in OF_THE_LAW and min(gain[0], last) <= 0 <= max(gain[0], last) else float(gain[0])
+    gone = np.zeros(gain.size)
+    for row in exact.branches[zoomed(exact)]:
+        left, right, low, high = frame(row)
+        step = np.nan_to_num(abs(np.diff(row.real / (right - left) + 1j * row.imag / (high - low))))
+        gone[1:] += np.cumsum(step) / (step.sum() or 1.0)
+    places = [float(f"{value:.2g}") for value in np.interp(QUARTERS, gone / (gone[-1] or 1.0), gain)]
+    if (best := _best(exact)) is not None:
+        places[int(np.argmin([abs(place - best) for place in places]))] = float(f"{best:.3g}")
+    return begins, sorted({*places, last} - {begins}, reverse=bool(last < gain[0]))
+
+
+def _best(exact: Locus) -> float | None:
+    """The value at which the first mode is damped best; None where that is an end, or it no longer swings."""
+    rows = exact.branches[exact.mode == 1]
+    if not rows.size or np.isnan(rows[0]).any() or not (rows[0].imag > 0).all():
+        return None
+    at = int(np.argmax(-rows[0].real / abs(rows[0])))
+    return float(exact.gain[at]) if 0 < at < exact.gain.size - 1 else None
+
+
+def _at(exact: Locus, branch: int, values: Sequence[float]) -> Complex:
+    """Where a branch is at these values, on the line that is drawn."""
+    way = 1.0 if exact.gain[-1] > exact.gain[0] else -1.0
+    return np.asarray(np.interp(way * np.asarray(values), way * exact.gain, shown(exact.branches[branch])))
 
 
 def _panel(
-    exact: Locus, reduced: ReducedLocus | None, numbers: Sequence[int], ax: Axes, named: Sequence[int | None]
-) -> None:
+    fine: Locus, exact: Locus, reduced: ReducedLocus | None, numbers: Sequence[int], ax: Axes,
+    named: Sequence[int | None],
+) -> None:  # fmt: skip
     """Some branches, exact and reduced, with their crossings; gain and frequency beside those of the named ones.
 
-    None names crossings that lie on no branch that is drawn.
+    `fine` is `exact` with the values between that a round line takes, `reduced` stands beside `exact`.  None names
+    crossings that lie on no branch that is drawn.
     """
-    branches = shown(exact.branches)
+    branches, (begins, others) = shown(fine.branches), _marked(fine)
     ax.axvline(0, color=INK, lw=0.9, zorder=1)
-    at = [int(np.argmin(abs(exact.gain - value))) for value in _marked(exact)]
     for n in numbers:
-        color, s = color_of(exact, n), branches[n]
+        color, s = color_of(fine, n), branches[n]
         ax.plot(s.real, s.imag, color=color, lw=2.6, alpha=0.4, zorder=2, solid_capstyle="round")
         if reduced is not None:
             _reduced_branch(exact, reduced, n, color, ax)
-        ax.plot(s[0].real, s[0].imag, "x", color=color, ms=6, mew=1.4, zorder=4)
-        ax.plot(s[at[1:]].real, s[at[1:]].imag, "o", color=color, ms=3.2, zorder=4)
+        (start,), dots = _at(fine, n, [begins]), _at(fine, n, others)
+        ax.plot(start.real, start.imag, color=color, zorder=4, **(OPEN if begins == 0 else FIRST))
+        ax.plot(dots.real, dots.imag, "o", color=color, ms=3.2, zorder=4)
     everything = len(numbers) == len(branches)
     for each in exact.crossings:
         if each.branch in numbers or (each.branch is None and everything):
@@ -148,28 +185,27 @@ def _reduced_branch(exact: Locus, reduced: ReducedLocus, n: int, color: str, ax:
     normal = 1j * along / np.where(along == 0, 1, abs(along))
     edge = np.r_[curve + width * normal, (curve - width * normal)[::-1]]
     ax.fill(edge.real, edge.imag, facecolor=color, alpha=0.15, lw=0, zorder=1.5)
-    ax.plot(curve.real, curve.imag, color=color, lw=0.9, ls=(0, (2, 1.5)), zorder=3)
+    meets = np.flatnonzero(np.diff((curve.imag == 0).astype(int))) + 1  # between two values: no corner is cut off
+    ax.plot(*(np.insert(part, meets, np.nan) for part in (curve.real, curve.imag)), color=color, lw=0.9,
+            ls=(0, (2, 1.5)), zorder=3)  # fmt: skip
 
 
 def _frame(points: Complex, ax: Axes) -> None:
     """Limits with all of the branch, the axis and some room: nothing is cut off."""
-    points = points[~np.isnan(points)]
-    real, imag = points.real, points.imag
-    left, right = min(float(real.min()), 0.0), max(float(real.max()), 0.0)
-    low, high = float(imag.min()), float(imag.max())
-    wide = max(right - left, 1e-12 * abs(points).max()) or 1.0  # where no pole moves from 0
-    tall = max(high - low, 1e-9 * high) or wide  # where none of them swings
-    ax.set_xlim(left - ROOM * wide, right + 2 * ROOM * wide)
-    ax.set_ylim(low - ROOM * tall, high + ROOM * tall)
+    left, right, low, high = frame(points)
+    ax.set_xlim(left - ROOM * (right - left), right + 2 * ROOM * (right - left))
+    ax.set_ylim(low - ROOM * (high - low), high + ROOM * (high - low))
 
 
 def _legend(exact: Locus, reduced: ReducedLocus | None) -> Keys:
-    start, *others = (plain(float(value), 3) for value in _marked(exact))
+    begins, others = _marked(exact)
     keys = {"exact": Line2D([], [], color=GREY, lw=2.6, alpha=0.4)}
     if reduced is not None:
         keys[f"python-control, order {reduced.order}"] = Line2D([], [], color=GREY, lw=0.9, ls=(0, (2, 1.5)))
-    keys[f"{exact.vary} = {start}"] = Line2D([], [], color=GREY, ls="none", marker="x")
-    keys[f"{exact.vary} = {', '.join(others)}"] = Line2D([], [], color=GREY, ls="none", marker="o", ms=3.2)
+    keys[f"{exact.vary} = {plain(begins, 3)}"] = Line2D([], [], color=GREY, **(OPEN if begins == 0 else FIRST))
+    keys[f"{exact.vary} = {', '.join(plain(value, 3) for value in others)}"] = Line2D(
+        [], [], color=GREY, ls="none", marker="o", ms=3.2
+    )
     if exact.crossings:
         keys["crosses the axis"] = Line2D([], [], color=ORANGE, ls="none", marker="D")
     return list(keys.values()), list(keys)

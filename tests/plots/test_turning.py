@@ -1,0 +1,70 @@
+"""Loci as they are drawn: on no piece of a line is a corner to be seen that the poles have not."""
+
+import numpy as np
+import pytest
+
+import tfarm
+from tfarm.dsp.loci import loci as sampled_loci
+from tfarm.loop.locus import locus, rounded
+from tfarm.loop.poles import poles_below
+from tfarm.plots.folded import draw_loci
+from tfarm.plots.roots import draw_locus
+from tfarm.spectrum.scales import default_gains, rate_unit
+
+LAB, STOCKY = tfarm.load("sasaki2012-lab"), tfarm.load("stocky-steel")
+MOST = 5.0  # degrees from one piece of a line to the next
+PIXEL = 2.0  # as wide as the thinnest line: a corner between pieces that are shorter is not seen
+
+
+def seen_turns(line):
+    """How far [deg] a line turns at each point between pieces longer than a pixel, where it does not leave or meet the
+    real axis."""
+    x, y = line.get_data()
+    pixels = line.axes.transData.transform(np.c_[x, y]) @ [1, 1j]
+    pieces, is_real = np.diff(pixels), np.asarray(y) == 0
+    with np.errstate(invalid="ignore", divide="ignore"):
+        turn = abs(np.degrees(np.angle(pieces[1:] / pieces[:-1])))
+    corner = (is_real[1:-1] != is_real[:-2]) | (is_real[1:-1] != is_real[2:])
+    seen = (abs(pieces) > PIXEL)[1:] | (abs(pieces) > PIXEL)[:-1]
+    parted = is_real[:-1] != is_real[1:]
+    assert not (abs(pieces[parted & np.isfinite(pieces)]) > PIXEL).any()  # a true corner, and nothing of it cut off
+    along = is_real[:-2] & is_real[1:-1] & is_real[2:]
+    return turn[np.isfinite(turn) & seen & ~corner & ~along], int((parted & np.isfinite(pieces)).sum())
+
+
+@pytest.mark.parametrize(
+    ("arm", "vary", "start", "stop", "corners"),
+    [(LAB, "K2", -1.0, 1.6, 2), (STOCKY, "K1", 0.0, 2 * rate_unit(STOCKY), 0)],
+    ids=["through a breakaway", "without"],
+)
+def test_no_branch_turns_by_more_than_five_degrees(arm, vary, start, stop, corners):
+    """Two roots that meet on the real axis part at a right angle: a true corner, once on either branch."""
+    found = locus(arm, default_gains(arm), vary, start, stop, points=60, branches=5)
+    figure = draw_locus(found)
+    figure.canvas.draw()
+    told = [seen_turns(line) for line in figure.axes[0].lines if line.get_linewidth() == 2.6]
+    assert sum(count for _, count in told) == corners
+    assert max(turn.max(initial=0.0) for turn, _ in told) <= MOST
+
+
+def test_the_values_between_are_poles_too():
+    """Road: the winding number's complete list at each of the values that were added."""
+    found = locus(LAB, default_gains(LAB), "K2", -1.0, 1.6, points=20, branches=3)
+    fine = rounded(found)
+    more = np.nonzero(~np.isin(fine.gain, found.gain))[0]
+    assert np.isin(found.gain, fine.gain).all()
+    assert more.size > 20
+    for n in more[::12]:
+        branch = fine.branches[2, n]
+        poles = poles_below(fine.variation.at(fine.gain[n]), 150.0).values
+        assert abs(poles - branch).min() <= 1e-9 * abs(branch)
+
+
+def test_the_sampled_locus_is_round_too():
+    loop = tfarm.sampled(LAB, default_gains(LAB), count=3).verdict.loop
+    figure = draw_loci(sampled_loci(loop, 25.0, (-0.5, 1.5)))
+    figure.canvas.draw()
+    for ax in figure.axes[1:]:
+        told = [seen_turns(line)[0] for line in ax.lines if line.get_linewidth() == 1.4 and len(line.get_xdata()) > 1]
+        assert sum(turn.size for turn in told) > 5
+        assert max(turn.max(initial=0.0) for turn in told) <= MOST
