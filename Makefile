@@ -14,6 +14,7 @@ PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check install -c requi
 SIZE ?= 100
 SEED ?= 1
 SURVEYS := \
+	left_out \
 	plausible \
 	properties \
 	audit.slips \

@@ -84,7 +84,8 @@ def main(arguments: list[str]) -> int:
     marked, seen = "--marked" in arguments, {}
     paths = [argument for argument in arguments if argument != "--marked"] or ROOMS
     paths = with_the_mark(paths) if marked else paths
-    pytest = [sys.executable, "-m", "pytest", "-q", "-n", "0", *(("-m", "kernels") if marked else ()), *paths]
+    only = ("-m", "kernels and not survey") if marked else ()
+    pytest = [sys.executable, "-m", "pytest", "-q", "-n", "0", *only, *paths]
     print(f"own: {probed({})}", flush=True)
     for title, environment in variants(FEW if marked else CORES).items():
         what = probed(environment)

@@ -3,6 +3,8 @@
 import fcntl
 import os
 
+import pytest
+
 
 def once(factory, name, make):
     """The file `name`, which make(file) wrote in this process or in another; those that come meanwhile wait for it.
@@ -18,3 +20,14 @@ def once(factory, name, make):
             make(folder / f"{name}.part")
             (folder / f"{name}.part").rename(folder / name)
     return folder / name
+
+
+def thinned(cases, every):
+    """Of a family of cases each `every`th for `make test`; the others are marked, and run by `make survey`.
+
+    Cases are values, or tuples of them where a test has several arguments, in an order in which neighbours are alike.
+    """
+    mark = pytest.mark.survey
+    for number, case in enumerate(cases):
+        values = case if isinstance(case, tuple) else (case,)
+        yield case if number % every == 0 else pytest.param(*values, marks=mark)

@@ -11,6 +11,7 @@ import pytest
 import tfarm
 from tests.outputs import OF_ONE_LINK
 from tests.rigs import some_point, some_rig
+from tests.shared import thinned
 from tests.strategies import some_arm
 from tests.test_chain_elements import lossless
 from tests.test_transition import rig
@@ -187,7 +188,7 @@ AT_REST = {
 }
 
 
-@pytest.mark.parametrize("name", AT_REST)
+@pytest.mark.parametrize("name", thinned(AT_REST, 3))
 def test_the_expansion_at_rest(name):
     """From values at +-h and +-ih: powers s^-2 and s^0 stay in the mean of a pair, s^-1 and s in its difference."""
     arm = AT_REST[name]
@@ -280,7 +281,7 @@ def test_what_is_zero_or_rigid_leaves_the_papers_arm():
     assert all(isinstance(system_of(replace(arm, **{name: part})), Chain) for name, part in more.items())
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", thinned(range(12), 4))
 def test_the_papers_arm_as_a_chain(seed):
     """One segment, solved as chains are: the closed form's frequencies, responses and expansions at rest."""
     rng = np.random.default_rng([3, seed])

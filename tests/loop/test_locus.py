@@ -9,6 +9,7 @@ import pytest
 
 import tfarm
 from tests.loop.arms import window_arm, with_damping
+from tests.shared import thinned
 from tfarm import Hub, HubFeedback, ParameterError, Payload
 from tfarm.cli import main
 from tfarm.loop import reduced_locus as reduced_locus_room
@@ -52,7 +53,7 @@ def upper(zeros):
 # ------------------------------------------------------------ complete, and the same in both directions
 
 
-@pytest.mark.parametrize(("arm", "law", "vary", "start", "stop"), RANGES, ids=NAMES)
+@pytest.mark.parametrize(("arm", "law", "vary", "start", "stop"), thinned(RANGES, 3), ids=NAMES)
 def test_branches_are_all_poles_of_the_box_and_the_same_backwards(arm, law, vary, start, stop):
     """Road: winding numbers, which know of no continuation; then the same way back, from other modes and gains."""
     found = locus(arm, law, vary, start, stop, points=11, branches=8)

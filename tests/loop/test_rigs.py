@@ -1,6 +1,7 @@
 """Loops of rigs against a state-space model of finite elements (`rig_loops`): poles, counts, edges, samples."""
 
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import tfarm
 from tests.chain_elements import reached
 from tests.loop.rig_loops import RigLoop
 from tests.rigs import some_rig
+from tests.shared import thinned
 from tfarm import HubFeedback
 from tfarm.dsp import Chain, Sampling, sampled_verdict
 from tfarm.loop.frequencies import band_of
@@ -47,7 +49,7 @@ def laws(arm):
         yield HubFeedback(K1=K1, K2=0.0 if arm.has_massless_hub else K2, Kp=Kp)
 
 
-@pytest.mark.parametrize("name", RIGS)
+@pytest.mark.parametrize("name", thinned(RIGS, 2))
 def test_poles_are_those_of_the_elements_and_no_others(name):
     """Six poles of each loop: as many of the elements in the box, each where it is listed, and as many unstable."""
     arm = RIGS[name]
@@ -78,8 +80,7 @@ def test_no_bound_is_claimed_where_elastic_links_ring_beyond_the_band():
     assert abs(theirs - first).min() < 1e-9 * abs(first)
 
 
-@pytest.mark.parametrize("gain", ["K1", "K2"])
-@pytest.mark.parametrize("name", RIGS)
+@pytest.mark.parametrize(("name", "gain"), thinned(product(RIGS, ("K1", "K2")), 3))
 def test_at_an_edge_of_a_window_poles_of_the_elements_cross(name, gain):
     """Just inside none is unstable, just outside one or two are, at the crossing's frequency."""
     arm = RIGS[name]
@@ -99,7 +100,7 @@ def test_at_an_edge_of_a_window_poles_of_the_elements_cross(name, gain):
         assert (abs(abs(moved)[:, None] - at) < 1e-2 * (at + model.a)).any()
 
 
-@pytest.mark.parametrize(("period", "K2", "stable"), SAMPLED)
+@pytest.mark.parametrize(("period", "K2", "stable"), thinned(SAMPLED, 3))
 def test_the_sampled_loop_is_that_of_the_elements_under_a_hold(period, K2, stable):
     """The largest |z|, of the loop stable and not, the free angle's z = 1 apart."""
     arm = REAL["bench-rig"]
