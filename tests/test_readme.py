@@ -50,7 +50,15 @@ def by_a_shell(line: str, folder: Path) -> tuple[int, str, str]:
     return done.returncode, done.stdout, heard(done.stderr)
 
 
-@pytest.mark.parametrize("line", [line for line in COMMANDS if not line.startswith("tfarm report ")])
+DEAR = ("PD+notch", "--digits 30 --certify")  # a quarter of a minute and some seconds
+QUICK = [
+    pytest.param(line, marks=pytest.mark.survey) if any(word in line for word in DEAR) else line
+    for line in COMMANDS
+    if not line.startswith("tfarm report ")
+]
+
+
+@pytest.mark.parametrize("line", QUICK)
 def test_shell_examples_run(
     line: str,
     tmp_path: Path,

@@ -1,6 +1,7 @@
 """Poles and damping of many laws at once, against the complete lists of `poles_below` and a Legendre-Ritz model."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 import tfarm
 from tests.loop.agreement import some_free_arm, some_gains
 from tests.loop.ritz_loop import RitzLoop
+from tests.shared import thinned
 from tfarm import HubFeedback
 from tfarm.arm import law_of, many_laws
 from tfarm.errors import ConvergenceError
@@ -26,8 +28,7 @@ def some_laws(rng, arm, number):
     return many_laws(HubFeedback(Kp=Kp), K1=K1, K2=rng.permutation(K2))
 
 
-@pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("number", [1, 4])
+@pytest.mark.parametrize(("seed", "number"), thinned(product(range(4), (1, 4)), 3))
 def test_they_are_the_poles_of_the_complete_list(seed, number) -> None:
     rng = np.random.default_rng(30 + seed)
     arm = some_free_arm(rng, damped=bool(seed % 2))

@@ -9,6 +9,7 @@ import tfarm
 from tests.chain_elements import reached
 from tests.loop.rig_loops import RigLoop
 from tests.rigs import some_rig
+from tests.shared import thinned
 from tfarm import HubFeedback, Payload
 from tfarm.arm import Gauge
 from tfarm.loop.frequencies import band_of
@@ -65,7 +66,7 @@ def test_closed_form_of_a_gauge_on_a_slender_cantilever(x):
     assert edges.gain[first] == pytest.approx(1 / bending, rel=1e-10)
 
 
-@pytest.mark.parametrize("name", RIGS)
+@pytest.mark.parametrize("name", thinned(RIGS, 2))
 def test_the_edges_are_all_crossings_along_K2(name):
     """The D-decomposition, which knows no locked hub, finds the same gains, frequencies and ways, and no others."""
     arm = RIGS[name]
@@ -81,7 +82,7 @@ def test_the_edges_are_all_crossings_along_K2(name):
         assert n == m
 
 
-@pytest.mark.parametrize("name", RIGS)
+@pytest.mark.parametrize("name", thinned(RIGS, 2))
 def test_a_pole_of_the_elements_crosses_at_each_edge(name):
     """Half a per cent to either side of K2_n, at two K1, it is as far from the axis near i w_n, on the right beyond."""
     arm = RIGS[name]
@@ -95,7 +96,7 @@ def test_a_pole_of_the_elements_crosses_at_each_edge(name):
             assert abs(inside + outside) < 0.2 * outside
 
 
-@pytest.mark.parametrize("name", RIGS)
+@pytest.mark.parametrize("name", thinned(RIGS, 2))
 def test_verdict_windows_and_map_follow_the_edges(name):
     arm = RIGS[name]
     law = default_gains(arm).having("K2", 0.0)

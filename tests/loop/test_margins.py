@@ -14,6 +14,7 @@ from tests.loop.arms import window_arm
 from tests.loop.test_lines import held
 from tests.loop.test_stability import exceptional
 from tests.odd_arms import odd_arms
+from tests.shared import thinned
 from tfarm import Arm, Hub, HubFeedback
 from tfarm.loop.answers import margins_answer
 from tfarm.loop.frequencies import grid
@@ -44,7 +45,7 @@ def response(arm, law, up_to):
     return control.frd((law.Kp + law.K1 * 1j * omega) * theta + law.K2 * moment, omega, smooth=False)
 
 
-@pytest.mark.parametrize(("arm", "law"), LOOPS)
+@pytest.mark.parametrize(("arm", "law"), thinned(LOOPS, 2))
 def test_margins_are_those_of_python_control_on_a_fine_grid(arm, law) -> None:
     found = margins(arm, law).in_band
     L = response(arm, law, found.band)
@@ -101,7 +102,7 @@ def test_rigid_crossings_are_where_the_rigid_loop_function_has_size_one(law) -> 
     np.testing.assert_allclose(Loop(LAB, law).loop_function(1j * omega), L, rtol=1e-6)
 
 
-@pytest.mark.parametrize(("arm", "law"), LOOPS[:4])
+@pytest.mark.parametrize(("arm", "law"), thinned(LOOPS[:4], 2))
 def test_the_disk_margin_is_that_of_python_control_for_a_modal_model(arm, law) -> None:
     """Skew 0 is the symmetric disk; the model is right to the third digit at the frequency where it counts."""
     found = margins(arm, law).in_band
@@ -136,7 +137,7 @@ def turns(arm, law, delay, height) -> int:
     raise AssertionError("the phase does not settle")
 
 
-@pytest.mark.parametrize(("arm", "law"), LOOPS[:5])
+@pytest.mark.parametrize(("arm", "law"), thinned(LOOPS[:5], 2))
 def test_the_loop_bears_just_less_than_the_delay_margin(arm, law) -> None:
     found = margins(arm, law)
     band = 1.01 * found.in_band.at["delay"] * 3
@@ -172,7 +173,7 @@ def scaled(law, factor) -> HubFeedback:
     return HubFeedback(K1=factor * law.K1, K2=factor * law.K2, Kp=factor * law.Kp)
 
 
-@pytest.mark.parametrize(("arm", "law"), [*LOOPS, (BARE, LAW), (held(0.0), HubFeedback(K1=0.3, Kp=-2.0))])
+@pytest.mark.parametrize(("arm", "law"), thinned([*LOOPS, (BARE, LAW), (held(0.0), HubFeedback(K1=0.3, Kp=-2.0))], 2))
 def test_the_loop_bears_just_less_than_the_gain_margin(arm, law) -> None:
     low, high = margins(arm, law).in_band.gain
     assert 0 <= low < 1 < high
@@ -190,7 +191,7 @@ def test_a_spring_that_pushes_limits_the_gain_of_an_undamped_held_arm() -> None:
     assert gain_margin(loop, 1e3)[1] == pytest.approx(1 / (0.1 + 0.4), rel=1e-9)
 
 
-@pytest.mark.parametrize(("arm", "law"), LOOPS[:4])
+@pytest.mark.parametrize(("arm", "law"), thinned(LOOPS[:4], 2))
 def test_the_disk_margin_is_bounded_by_the_classical_ones(arm, law) -> None:
     """A disk of size alpha holds gains from (2 - alpha)/(2 + alpha) to its inverse and phases of 2 atan(alpha/2)."""
     found = margins(arm, law).in_band

@@ -9,6 +9,7 @@ from scipy.special import spherical_jn
 import tfarm
 from tests import elements
 from tests.models import Ritz
+from tests.shared import thinned
 from tfarm import Arm, Hub, Link, Payload, Section
 
 pytestmark = pytest.mark.kernels
@@ -50,7 +51,7 @@ def test_finite_elements_converge_at_twice_their_degree(name: str, degree: int) 
     assert (abs(limit - true) < 0.03 * (close - true)).all()
 
 
-@pytest.mark.parametrize("name", ARMS)
+@pytest.mark.parametrize("name", thinned(ARMS, 2))
 def test_legendre_ritz_comes_from_above_and_never_turns_back(name: str) -> None:
     """Rayleigh and Ritz: every model is an upper bound, and more terms never raise it."""
     subject = ARMS[name]
@@ -61,7 +62,7 @@ def test_legendre_ritz_comes_from_above_and_never_turns_back(name: str) -> None:
     np.testing.assert_allclose(omega[-1], exact(subject), rtol=1e-12)
 
 
-@pytest.mark.parametrize("name", ["free", "locked", "slender"])
+@pytest.mark.parametrize("name", thinned(["free", "locked", "slender"], 2))
 def test_legendre_ritz_converges_as_the_legendre_series_of_its_waves(name: str) -> None:
     """The strains of a mode are waves of wave number k; what N terms leave of cos(kx) has the square of the first
     coefficient left out, (2 N + 1) j_N(k L/2)^2 (Gegenbauer): faster than any power, and than any geometric series.

@@ -9,6 +9,7 @@ import pytest
 
 import tfarm
 from tests.rigs import some_rig
+from tests.shared import thinned
 from tfarm import Hub, Payload
 from tfarm.arm import Attachment, Motor, RotarySpring
 from tfarm.arm.link import Section
@@ -93,7 +94,7 @@ RIGS = {
 }
 
 
-@pytest.mark.parametrize("rig", RIGS)
+@pytest.mark.parametrize("rig", thinned(RIGS, 2))
 def test_each_is_the_difference_between_neighbours(rig):
     """Of the logarithms, fourth order with 4 h: their error is h^4 of the fifth derivative and eps/h."""
     arm, h = RIGS[rig], 2.0**-9
@@ -133,7 +134,7 @@ def unit_of(name):
     return UNITS[max((key for key in UNITS if name.endswith(key)), key=len)]
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", thinned(range(12), 4))
 def test_units_that_a_frequency_does_not_know(seed):
     """Metres are in no frequency; of stiffnesses half a power, of inertias half a power less; segments add up.
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import tfarm
+from tests.shared import thinned
 from tests.shell import answer
 from tests.synthesis.held_loop import HeldLoop
 from tfarm import ConvergenceError, HubFeedback, ParameterError
@@ -21,7 +22,7 @@ LAB = tfarm.load("sasaki2012-lab")
 HELD = HeldLoop(LAB, 0.01)
 
 
-@pytest.mark.parametrize("name", tfarm.presets())
+@pytest.mark.parametrize("name", thinned(tfarm.presets(), 3))
 def test_what_is_recommended_holds_when_sampled(name) -> None:
     """By the whole verdict, at the gains and a quarter to either side, and without a clock."""
     found = design(tfarm.load(name), chain=tfarm.dsp.load_chain(name))
@@ -84,7 +85,7 @@ def slewed(arm, law, chain):
     return float(np.sqrt((run.at_samples.root_moment[after] ** 2).mean()))
 
 
-@pytest.mark.parametrize("Kp", [0.0, 4.0])
+@pytest.mark.parametrize("Kp", thinned([4.0, 0.0], 2))
 def test_the_residual_is_that_of_the_simulated_slew(Kp) -> None:
     chain = Chain(sampling=Sampling(period=0.008, delay_samples=0.5), slew=Slew(rise_time=0.5, travel=0.4))
     found = design(LAB, "residual", Kp=Kp, chain=chain, K1=(0.1, 5.0), K2=(-0.5, 0.8))
