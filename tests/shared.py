@@ -27,7 +27,5 @@ def thinned(cases, every):
 
     Cases are values, or tuples of them where a test has several arguments, in an order in which neighbours are alike.
     """
-    mark = pytest.mark.survey
-    for number, case in enumerate(cases):
-        values = case if isinstance(case, tuple) else (case,)
-        yield case if number % every == 0 else pytest.param(*values, marks=mark)
+    own = [case if isinstance(case, tuple) else (case,) for case in cases]
+    return [pytest.param(*each, marks=() if n % every == 0 else pytest.mark.survey) for n, each in enumerate(own)]
