@@ -1,34 +1,19 @@
 """The page of a comparison: its numbers are the command's, names are text, and its files are there."""
 
 import csv
-from html.parser import HTMLParser
 
 import pytest
 
 import tfarm
+from tests.hostile import LONG, TEXT, Read, check_drawing, check_page
 from tests.shell import run
 from tfarm.comparing.answers import comparison_answer
+from tfarm.errors import one_line
 from tfarm.report.comparison_page import write_comparison
 from tfarm.tables.files import plain
 
 LAB = tfarm.load("sasaki2012-lab")
-HOSTILE = "<script>alert(1)</script> & $x$ \\frac{"
-
-
-class Found(HTMLParser):
-    """Every tag, the files that are named, and the cells of tables."""
-
-    def __init__(self, page):
-        super().__init__()
-        self.tags, self.files, self.text = set(), [], []
-        self.feed(page)
-
-    def handle_starttag(self, tag, attrs):
-        self.tags.add(tag)
-        self.files += [value for key, value in attrs if key in ("src", "href") and not value.startswith("#")]
-
-    def handle_data(self, data):
-        self.text.append(data)
+HOSTILE = f"{TEXT} {LONG}"
 
 
 @pytest.fixture(scope="module")
@@ -55,11 +40,14 @@ def test_the_tables_hold_the_numbers_of_the_command(compared, folder):
 
 
 def test_names_are_text_and_every_file_is_there(folder):
-    found = Found((folder / "compare.html").read_text(encoding="utf-8"))
-    assert "script" not in found.tags
-    assert any(HOSTILE in text for text in found.text)
-    assert found.files
-    assert [name for name in found.files if not (folder / name).is_file()] == []
+    page = (folder / "compare.html").read_text(encoding="utf-8")
+    check_page(page, one_line(HOSTILE, 60))
+    assert "\u202e" not in page  # which would turn the line around
+    for drawing in folder.rglob("*.svg"):
+        check_drawing(drawing.read_text(encoding="utf-8"))
+    names = [value for key, value in Read(page).attributes if key in ("src", "href") and not value.startswith("#")]
+    assert names
+    assert [name for name in names if not (folder / name).is_file()] == []
     assert {path.name for path in folder.iterdir()} == {"compare.html", "data", "pictures"}
 
 

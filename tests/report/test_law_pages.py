@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 
 import tfarm
+from tests.hostile import check_page
 from tests.shell import answer, run
 from tfarm import HubFeedback, Law, ParameterError
 from tfarm.arm.law_tables import load_law
 from tfarm.dsp import Chain, load_chain
 from tfarm.dsp.law_loop import sampled_law
 from tfarm.dsp.law_verdict import law_verdict
+from tfarm.errors import one_line
 from tfarm.fitting.runs import beside, load_run, overshoot
 from tfarm.report import law_sampled_section as in_time
 from tfarm.report import writing
@@ -27,9 +29,9 @@ from tfarm.tables.files import to_json
 
 LAB, BARE, PRESET = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "quanser-2dsfl"))
 DATA = Path(__file__).parent.parent / "data" / "quanser-2dsfl"
-HOSTILE = "<script>alert(1)</script> & $x$ \\frac{"
+HOSTILE = "<script>alert(1)</script> & $x$ \\frac{ \u202e{{7+7}} <evil"
 ORDER_8 = f"""[law]
-name = '{HOSTILE}'
+name = {json.dumps(HOSTILE)}
 delay = 0.0005
 references = ["hub_angle"]
 [law.hub_angle]
@@ -153,8 +155,8 @@ def test_a_page_is_about_its_law_and_its_file_says_it_again(file, tmp_path, monk
     assert (code, err) == (0, "")
     page = (tmp_path / LAB.name / "margins.html").read_text(encoding="utf-8")
     assert out.strip().endswith("margins.html")
-    assert "<script>" not in page
-    assert "&lt;script&gt;alert(1)&lt;/script&gt; &amp; $x$" in page
+    check_page(page, one_line(HOSTILE, 60))
+    assert "\u202e" not in page  # which would turn the line around
     assert "sampled every 4 ms" in page
     made = tmp_path / LAB.name / "arm.toml"
     assert load_law(made) == load_law(file)

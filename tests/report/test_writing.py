@@ -4,14 +4,13 @@ import csv
 import hashlib
 import json
 import math
-import os
 import re
 import shutil
 import subprocess
 import sys
 import time
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache
 from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote
@@ -19,8 +18,9 @@ from urllib.parse import unquote
 import pytest
 
 import tfarm
+from tests.hostile import LONG, NAME, PRINTED, check_drawing, check_page
 from tests.report.coarse import coarsen
-from tests.shared import once
+from tests.report.full import ARM
 from tests.shell import run
 from tfarm.arm import to_toml
 from tfarm.audit.published import validate
@@ -39,43 +39,8 @@ from tfarm.report.trust import Evidence, kept_evidence, write_trust
 from tfarm.report.trust_proofs import written_proofs
 from tfarm.spectrum.scales import default_gains
 
-ATTACK = "<script>alert(1)</script> & <b>bold</b>, I_h in kg m^2"
 ANCHORS = {piece.anchor for piece in writing.PIECES}
-NAME = "Ärm & co's #1 $x$ 100%"
-ARM = replace(tfarm.load("stocky-steel"), name=NAME, assumptions=(ATTACK, "second assumption"))
-
-
 HELD = replace(ARM, hub=tfarm.Hub(inertia=math.inf))  # no loop: its proofs are quick
-REPORT = (
-    "import pickle, sys, tfarm; from pathlib import Path; from tfarm import audit; from tfarm.report import write;"
-    "rows = pickle.loads(Path(sys.argv[3]).read_bytes()); audit.audit = lambda: rows;"
-    "from tests.report.coarse import coarsen; coarsen();"  # the map and the sampled section have tests of their own
-    "print(write([tfarm.load(sys.argv[1])], Path(sys.argv[2])));"
-    "pyplot = sys.modules.get('matplotlib.pyplot');"  # python-control imports it; no figure may be its own
-    "print(bool(pyplot and pyplot.get_fignums()))"
-)
-
-
-@pytest.fixture(scope="module")
-def pages(tmp_path_factory, audit_file):
-    """A full report on one arm, one a session, by a process with other hashes and in another time zone.
-
-    Its audit is the one that the command of this session has made.
-    """
-    return once(tmp_path_factory, "pages", partial(report_elsewhere, audit_file))
-
-
-def report_elsewhere(audit_file, out):
-    file = out.with_suffix(".toml")
-    file.write_text(to_toml(ARM), encoding="utf-8")
-    done = subprocess.run(
-        [sys.executable, "-c", REPORT, str(file), str(out), str(audit_file)],
-        env={**os.environ, "PYTHONHASHSEED": "12345", "TZ": "Asia/Tokyo"},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert (done.stdout.splitlines(), done.stderr) == ([str(out / "index.html"), "False"], "")
 
 
 def files_of(folder):
@@ -193,12 +158,15 @@ def test_no_file_is_left_unlinked_or_half_written(pages):
     assert sorted(p.name for p in pages.iterdir()) == ["assets", "index.html", "trust", NAME]
 
 
-def test_assumptions_are_text_and_nothing_else(pages):
+def test_names_and_assumptions_are_text_and_nothing_else(pages):
+    """On the page of the arm, the live one, the index and the one on trust, and in every drawing."""
+    for page in pages.rglob("*.html"):
+        check_page(page.read_text(encoding="utf-8"), NAME, scripts=3 * (page.name == "live.html"))
     page = (pages / NAME / "index.html").read_text(encoding="utf-8")
-    assert "<script" not in page
-    assert "&lt;script&gt;alert(1)&lt;/script&gt; &amp; &lt;b&gt;bold&lt;/b&gt;, I<sub>h</sub> in kg m²" in page
-    assert "second assumption" in page
-    assert "&amp; co&#39;s #1 $x$ 100%" in page
+    check_page(page, PRINTED.partition("I_h")[0], "second assumption", LONG)
+    assert "I<sub>h</sub> in kg m² \u05e9" in page
+    for drawing in pages.rglob("*.svg"):
+        check_drawing(drawing.read_text(encoding="utf-8"))
 
 
 def test_the_foot_tells_how_to_write_the_page_again(pages):

@@ -18,7 +18,7 @@ from tfarm.arm.law import Law
 from tfarm.dsp import Chain
 from tfarm.dsp.brief import SampledBrief, brief_of
 from tfarm.dsp.closed import verdict_on
-from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.errors import ConvergenceError, ParameterError, one_line
 from tfarm.loop.closed import closed_loop_poles
 from tfarm.loop.closed import margins as margins_of
 from tfarm.loop.law_map import LawMap, law_map
@@ -34,6 +34,7 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 MOST_MODES = 30
+LONGEST = 60  # characters of a name: of two in one legend
 SPARE = 6  # poles with Im s >= 0 beyond the modes: real ones, those of the hub, the motor and a law
 COLUMNS, ROWS = 80, 40  # of the plane of K1 and K2; its edges along K2 are exact
 NEXT = 1e-6  # of the largest K1: where the first column beyond K1 = 0 is, from which most regions begin
@@ -156,7 +157,7 @@ def compare(
     """
     pairs = _pairs(arms, laws)
     modes = whole("modes", modes, 1, MOST_MODES, f"a whole number from 1 to {MOST_MODES}")
-    called = tuple(names) or _names(pairs)
+    called = tuple(one_line(name, LONGEST) for name in names) or _names(pairs)
     if len(called) != 2:
         raise ParameterError(key="names", value=list(called), remedy="two names")
     (first, _), (second, _) = pairs
@@ -185,8 +186,11 @@ def _pairs(arms: Arm | Sequence[Arm], laws: AnyLaw | Sequence[AnyLaw] | None) ->
 
 def _names(pairs: list[tuple[Arm, AnyLaw]]) -> tuple[str, ...]:
     """The arms' names where they differ, else the laws', else their numbers."""
-    arms = [arm.name for arm, _ in pairs]
-    laws = [law.name if isinstance(law, Law) else f"K1 = {law.K1:.4g}, K2 = {law.K2:.4g}" for _, law in pairs]
+    arms = [one_line(arm.name, LONGEST) for arm, _ in pairs]
+    laws = [
+        one_line(law.name, LONGEST) if isinstance(law, Law) else f"K1 = {law.K1:.4g}, K2 = {law.K2:.4g}"
+        for _, law in pairs
+    ]
     return tuple(next((names for names in (arms, laws) if names[0] != names[1]), ["first", "second"]))
 
 
