@@ -5,12 +5,13 @@ Types and names are checked here, physics in the records.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from tfarm.arm import declared
+from tfarm.arm.declared import Table
 from tfarm.arm.link import Link
 from tfarm.arm.records import MOST, Arm
 from tfarm.arm.rig import Attachment, Gauge, Hub, Motor, Payload, RotarySpring
@@ -20,76 +21,40 @@ from tfarm.errors import MISSING, ParameterError
 _Part = TypeVar("_Part")
 
 
-class Table(BaseModel):
-    """A TOML table: no unknown keys, no conversions."""
-
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
-
-    def given(self) -> dict[str, Any]:
-        """What the file says, and nothing that it leaves out."""
-        return {name: getattr(self, name) for name in self.model_fields_set}
-
-
+@declared.of(Section.rectangle)
 class Rectangle(Table):
     """[link.section] with shape = "rectangle"."""
 
     shape: Literal["rectangle"]
-    width: float
-    depth: float
-    shear_factor: float | None = None
-
-    def build(self) -> Section:
-        return Section.rectangle(width=self.width, depth=self.depth, shear_factor=self.shear_factor)
 
 
+@declared.of(Section.round)
 class Round(Table):
     """[link.section] with shape = "round"."""
 
     shape: Literal["round"]
-    diameter: float
-    shear_factor: float | None = None
-
-    def build(self) -> Section:
-        return Section.round(diameter=self.diameter, shear_factor=self.shear_factor)
 
 
+@declared.of(Section.tube)
 class Tube(Table):
     """[link.section] with shape = "tube"."""
 
     shape: Literal["tube"]
-    outer_diameter: float
-    inner_diameter: float
-    shear_factor: float | None = None
-
-    def build(self) -> Section:
-        return Section.tube(
-            outer_diameter=self.outer_diameter,
-            inner_diameter=self.inner_diameter,
-            shear_factor=self.shear_factor,
-        )
 
 
+@declared.of(Section.general)
 class General(Table):
     """[link.section] with shape = "general"."""
 
     shape: Literal["general"]
-    area: float
-    second_moment: float
-    shear_factor: float
-
-    def build(self) -> Section:
-        return Section.general(area=self.area, second_moment=self.second_moment, shear_factor=self.shear_factor)
 
 
+@declared.of(Link)
 class LinkTable(Table):
     """[link], or one [[link]] of several: exactly one of shear_modulus and poissons_ratio."""
 
-    length: float
-    density: float
-    youngs_modulus: float
     shear_modulus: float | None = None
     poissons_ratio: float | None = None
-    damping: float = 0.0
     section: Annotated[Rectangle | Round | Tube | General, Field(discriminator="shape")]
 
     def build(self) -> Link:
@@ -103,71 +68,41 @@ class LinkTable(Table):
         return Link(**given) if self.poissons_ratio is None else Link.isotropic(**given)
 
 
+@declared.of(Hub)
 class HubTable(Table):
     """[hub]."""
 
-    inertia: float
-    friction: float = 0.0
-    radius: float = 0.0
-    stiffness: float = 0.0
 
-
+@declared.of(RotarySpring)
 class SpringTable(Table):
     """[clamp] and [joint], optional."""
 
-    stiffness: float = math.inf
-    damping: float = 0.0
 
-    def build(self) -> RotarySpring:
-        return RotarySpring(**self.given())
-
-
+@declared.of(Motor)
 class MotorTable(Table):
     """[motor], optional."""
 
-    resistance: float
-    torque_constant: float
-    back_emf_constant: float | None = None
-    inductance: float = 0.0
-    gear_ratio: float = 1.0
-    rotor_inertia: float = 0.0
-    rotor_friction: float = 0.0
-    gear_efficiency: float = 1.0
 
-
+@declared.of(Attachment)
 class AttachmentTable(Table):
     """One [[attachment]]."""
 
-    x: float
-    mass: float = 0.0
-    inertia: float = 0.0
-    stiffness: float = 0.0
-    rotational_stiffness: float = 0.0
 
-    def build(self) -> Attachment:
-        return Attachment(**self.given())
-
-
+@declared.of(Gauge)
 class GaugeTable(Table):
     """[gauge], optional."""
 
-    x: float = 0.0
-    side: str = "outer"
 
-
+@declared.of(Payload)
 class PayloadTable(Table):
     """[payload], optional."""
-
-    mass: float = 0.0
-    inertia: float = 0.0
-    offset: float = 0.0
 
 
 class ArmTable(Table):
     """The whole file, its [link] as a list of one."""
 
     name: str
-    assumptions: list[str] = []
+    assumptions: list[str] = Field([])
     theory: str = "timoshenko"
     input: str = "hub_torque"
     link: Annotated[list[LinkTable], Field(min_length=1, max_length=MOST)]
@@ -175,7 +110,7 @@ class ArmTable(Table):
     clamp: SpringTable = SpringTable()
     joint: SpringTable = SpringTable()
     motor: MotorTable | None = None
-    attachment: Annotated[list[AttachmentTable], Field(max_length=MOST)] = []
+    attachment: Annotated[list[AttachmentTable], Field(max_length=MOST)] = Field([])
     gauge: GaugeTable = GaugeTable()
     payload: PayloadTable = PayloadTable()
 
@@ -191,13 +126,13 @@ class ArmTable(Table):
             assumptions=tuple(self.assumptions),
             link=link,
             outer=tuple(outer),
-            hub=Hub(**self.hub.given()),
+            hub=self.hub.build(),
             clamp=_within("clamp", self.clamp.build),
             joint=_within("joint", self.joint.build),
-            motor=None if self.motor is None else Motor(**self.motor.given()),
+            motor=None if self.motor is None else self.motor.build(),
             attachments=tuple(attachments),
-            gauge=Gauge(**self.gauge.given()),
-            payload=Payload(**self.payload.given()),
+            gauge=self.gauge.build(),
+            payload=self.payload.build(),
         )
 
 

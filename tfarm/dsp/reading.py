@@ -4,62 +4,41 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import fields
-from typing import Any, Literal
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import ValidationError
 
+from tfarm.arm import declared
+from tfarm.arm.declared import Table
 from tfarm.arm.reading import load_tables
 from tfarm.arm.tables import ArmTable
 from tfarm.dsp.chain import Actuator, Chain, Converters, Sampling, Slew
 from tfarm.errors import ParameterError, did_you_mean
 
-RECORDS = {"sampling": Sampling, "converters": Converters, "actuator": Actuator, "slew": Slew}
 OF_AN_ARM = (*ArmTable.model_fields, "law")
 
 
-class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
-
-
-class SamplingTable(_Table):
+@declared.of(Sampling)
+class SamplingTable(Table):
     """[sampling]."""
 
-    period: float | None = None
-    delay_samples: float | None = None
-    antialias_corner: float | None = None
 
-
-class ConvertersTable(_Table):
+@declared.of(Converters)
+class ConvertersTable(Table):
     """[converters]."""
 
-    encoder_counts: int | None = None
-    hub_rate: Literal["ideal", "difference"] | None = None
-    rate_filter: float | None = None
-    moment_bits: int | None = None
-    moment_range: float | None = None
-    torque_bits: int | None = None
-    torque_range: float | None = None
-    arithmetic: Literal["float64", "float32"] | None = None
 
-
-class ActuatorTable(_Table):
+@declared.of(Actuator)
+class ActuatorTable(Table):
     """[actuator]."""
 
-    torque_limit: float | None = None
-    motor_constant: float | None = None
-    hub_damping: float | None = None
 
-
-class SlewTable(_Table):
+@declared.of(Slew)
+class SlewTable(Table):
     """[slew]."""
 
-    travel: float | None = None
-    rise_time: float | None = None
-    reading: Literal["vibration", "total"] | None = None
 
-
-TABLES: dict[str, type[_Table]] = {
+TABLES: dict[str, type[Table]] = {
     "sampling": SamplingTable,
     "converters": ConvertersTable,
     "actuator": ActuatorTable,
@@ -92,18 +71,16 @@ def _record(name: str, table: object) -> Any:
     if not isinstance(table, dict):
         raise ParameterError(key=name, value=table, remedy=f"give a table, headed [{name}]")
     try:
-        given = TABLES[name].model_validate(table).model_dump(exclude_unset=True)
+        return TABLES[name].model_validate(table).build()
     except ValidationError as error:
         raise _in_one_line(name, error) from None
-    return RECORDS[name](**given)
 
 
 def _in_one_line(name: str, error: ValidationError) -> ParameterError:
     problem = min(error.errors(include_url=False), key=lambda problem: problem["type"] != "extra_forbidden")
     key = ".".join(map(str, (name, *problem["loc"])))
     if problem["type"] == "extra_forbidden":
-        known = [entry.name for entry in fields(RECORDS[name])]
-        remedy = f"unknown key; {did_you_mean(str(problem['loc'][-1]), known)}"
+        remedy = f"unknown key; {did_you_mean(str(problem['loc'][-1]), TABLES[name].model_fields)}"
     else:
         remedy = f"wrong value; {problem['msg'][:1].lower()}{problem['msg'][1:]}"
     return ParameterError(key=key, value=problem["input"], remedy=remedy)

@@ -1,0 +1,69 @@
+"""A table of the file is what its record's constructor asks for: keys, types and defaults, each said once."""
+
+from dataclasses import dataclass
+
+import pytest
+from pydantic import ValidationError
+
+from tfarm.arm import declared
+from tfarm.arm.tables import SHAPES, TABLES
+from tfarm.errors import ParameterError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Spring:
+    stiffness: float
+    coils: int = 7
+
+    def __post_init__(self):
+        if self.stiffness < 0:
+            raise ParameterError(key="spring.stiffness", value=self.stiffness, remedy="zero or more")
+
+
+@declared.of(Spring)
+class SpringTable(declared.Table):
+    """[spring], with a colour that no spring asks for."""
+
+    colour: str = "grey"
+
+
+def test_keys_and_defaults_are_those_of_the_record():
+    assert list(SpringTable.model_fields) == ["colour", "stiffness", "coils"]
+    assert SpringTable.__doc__.startswith("[spring], with a colour")
+    assert SpringTable.model_validate({"stiffness": 2.0, "colour": "red"}).build() == Spring(stiffness=2.0, coils=7)
+    with pytest.raises(ParameterError, match="zero or more"):
+        SpringTable.model_validate({"stiffness": -1.0}).build()
+
+
+@pytest.mark.parametrize(
+    ("table", "kind"),
+    [
+        ({}, "missing"),
+        ({"stiffness": "2"}, "float_type"),
+        ({"stiffness": 2.0, "coils": 7.5}, "int_type"),
+        ({"stiffness": 2.0, "coil": 7}, "extra_forbidden"),
+    ],
+)
+def test_types_are_strict_and_other_keys_are_refused(table, kind):
+    with pytest.raises(ValidationError) as refused:
+        SpringTable.model_validate(table)
+    assert [problem["type"] for problem in refused.value.errors()] == [kind]
+
+
+def test_what_a_file_may_say_is_what_it_was_before_records_declared_it():
+    """The keys are a contract with every file there is."""
+    assert {name: set(table.model_fields) for name, table in (TABLES | SHAPES).items() if name} == {
+        "link": {"length", "density", "youngs_modulus", "shear_modulus", "poissons_ratio", "damping", "section"},
+        "hub": {"inertia", "friction", "radius", "stiffness"},
+        "clamp": {"stiffness", "damping"},
+        "joint": {"stiffness", "damping"},
+        "motor": {"resistance", "torque_constant", "back_emf_constant", "inductance", "gear_ratio", "rotor_inertia",
+                  "rotor_friction", "gear_efficiency"},
+        "attachment": {"x", "mass", "inertia", "stiffness", "rotational_stiffness"},
+        "gauge": {"x", "side"},
+        "payload": {"mass", "inertia", "offset"},
+        "rectangle": {"shape", "width", "depth", "shear_factor"},
+        "round": {"shape", "diameter", "shear_factor"},
+        "tube": {"shape", "outer_diameter", "inner_diameter", "shear_factor"},
+        "general": {"shape", "area", "second_moment", "shear_factor"},
+    }  # fmt: skip

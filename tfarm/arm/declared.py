@@ -1,0 +1,48 @@
+"""A TOML table is declared by what it builds: a strict pydantic model with the parameters of a record's constructor."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from inspect import Parameter, signature
+from typing import Any, ClassVar, TypeVar, get_type_hints
+
+from pydantic import BaseModel, ConfigDict, create_model
+
+_Table = TypeVar("_Table", bound="Table")
+
+
+class Table(BaseModel):
+    """A TOML table: no unknown keys, no conversions."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+    makes: ClassVar[Callable[..., Any]]
+
+    def given(self) -> dict[str, Any]:
+        """What the file says, and nothing that it leaves out."""
+        return {name: getattr(self, name) for name in self.model_fields_set}
+
+    def build(self) -> Any:
+        """What the table declares.  Raises ParameterError where its numbers make none."""
+        known = signature(type(self).makes).parameters
+        return type(self).makes(**{name: value for name, value in self.given().items() if name in known})
+
+
+def of(makes: Callable[..., Any]) -> Callable[[type[_Table]], type[_Table]]:
+    """A decorator: the table has the parameters of a dataclass, or of another constructor, as its keys.
+
+    Names, types and defaults are theirs, but for keys that the class itself declares.
+    """
+
+    def with_keys(table: type[_Table]) -> type[_Table]:
+        hints, known = get_type_hints(makes), signature(makes).parameters.values()
+        keys: dict[str, Any] = {each.name: (hints[each.name], _default(each)) for each in known}
+        own = {name: key for name, key in keys.items() if name not in table.model_fields}
+        made: type[_Table] = create_model(table.__name__, __base__=table, __doc__=table.__doc__, **own)
+        made.makes = makes
+        return made
+
+    return with_keys
+
+
+def _default(declared: Parameter) -> Any:
+    return ... if declared.default is Parameter.empty else declared.default
