@@ -10,6 +10,7 @@ from matplotlib.collections import QuadMesh
 import tfarm
 from tests.shell import answer, run
 from tfarm.comparing.answers import Quantity, comparison_answer, margins_table, modes_table, poles_table
+from tfarm.dsp.law_verdict import analyse_law
 from tfarm.loop.answers import margins_answer
 from tfarm.plots.compared import draw_comparison
 
@@ -106,6 +107,47 @@ def test_a_law_of_other_signals_is_mapped_over_factor_and_delay():
     for mesh, plane in zip(meshes, found.delays, strict=True):
         opaque = np.asarray(mesh.get_array())[..., 3] > 0
         assert np.array_equal(opaque, plane.stable)
+
+
+def test_gains_as_a_law_in_z_are_the_same_loop_at_the_samples():
+    """The same numbers act at the same samples, by another road: poles, factors and delay differ in nothing."""
+    found = tfarm.compare(LAB, [LAW, tfarm.Law({"hub_rate": 0.3, "root_moment": 0.3}, period=0.01)], modes=2)
+    assert found.is_clocked
+    assert [side.verdict for side in found.sides] == ["stable", "stable"]
+    for table in (poles_table(found), margins_table(found)):
+        apart = [value for row in table for key, value in row.items() if key.endswith("difference_percent")]
+        assert apart
+        assert apart == pytest.approx([0.0] * len(apart), abs=1e-6)
+    assert [side.margins for side in found.sides] == [None, None]
+
+
+def test_a_law_in_z_beside_gains_is_judged_at_the_clock_of_both():
+    """At the largest stable factor L passes -1 over it; at no further delay the plane's edges are these factors."""
+    late = tfarm.Law({"hub_rate": ([0.35, -0.1], [1.0, -0.2]), "root_moment": 0.3}, period=0.01)
+    found = tfarm.compare(LAB, [LAW, late], modes=1)
+    for side, law, plane in zip(found.sides, (LAW, late), found.reaches, strict=True):
+        alone = analyse_law(LAB, tfarm.Law.of_gains(law) if law is LAW else law)
+        assert side.clocked.margins["gain_factor_up"] == alone.gain_factors[1]
+        assert side.sampled.is_stable == alone.verdict.is_stable
+        _, L = side.loop_function
+        assert abs(1 + alone.gain_factors[1] * L).min() < 1e-2
+        assert alone.gain_factors in plane.stable_intervals[0]
+        stable = [any(low < 1 < high for low, high in each) for each in plane.stable_intervals]
+        last = plane.delay[stable].max()
+        assert last <= side.clocked.margins["delay_margin_s"] < last + plane.delay[1]
+    upper, right = draw_comparison(found).axes[:2]
+    assert upper.get_xlim()[1] == pytest.approx(np.pi / 0.01, rel=1e-3)  # the last point of its grid
+    assert right.get_xlabel() == "further delay [ms]"
+    answered = comparison_answer(found)
+    assert answered["at_samples"]
+    assert [loop["stable"] for loop in answered["loops"]] == [True, True]
+
+
+def test_a_law_in_z_of_another_clock_is_one_line(capsys, files, tmp_path):
+    (tmp_path / "z.toml").write_text(f"{GAINS.format(0.3, 0.3)}".replace("[law]", "[law]\nperiod = 0.005", 1))
+    code, out, err = run(capsys, "compare", "sasaki2012-lab", "--law", files["mild"], "--law", str(tmp_path / "z.toml"))
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert "period = 0.005" in err
 
 
 def test_two_arms_are_printed_with_their_modes(capsys):

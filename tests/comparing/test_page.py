@@ -8,8 +8,11 @@ import tfarm
 from tests.hostile import LONG, TEXT, Read, check_drawing, check_page
 from tests.shell import run
 from tfarm.comparing.answers import comparison_answer
+from tfarm.dsp import Chain
 from tfarm.errors import one_line
 from tfarm.report.comparison_page import write_comparison
+from tfarm.report.given_laws import Subject
+from tfarm.report.writing import _write_pages
 from tfarm.tables.files import plain
 
 LAB = tfarm.load("sasaki2012-lab")
@@ -48,14 +51,32 @@ def test_names_are_text_and_every_file_is_there(folder):
     names = [value for key, value in Read(page).attributes if key in ("src", "href") and not value.startswith("#")]
     assert names
     assert [name for name in names if not (folder / name).is_file()] == []
-    assert {path.name for path in folder.iterdir()} == {"compare.html", "data", "pictures"}
+    assert {path.name for path in folder.iterdir()} == {"compare.html", "compare.json", "data", "pictures"}
 
 
 def test_the_same_comparison_is_the_same_bytes(compared, folder, tmp_path):
     again = write_comparison(compared, tmp_path).parent
     files = [path.relative_to(folder) for path in folder.rglob("*") if path.is_file()]
-    assert len(files) == 8
+    assert len(files) == 9
     assert [name for name in files if (folder / name).read_bytes() != (again / name).read_bytes()] == []
+
+
+def test_an_index_leads_to_the_comparison_and_back(compared, tmp_path):
+    """One that is there; an arm's page that is made later leads to it too."""
+    index, arm = tmp_path / "index.html", tmp_path / LAB.name
+    index.write_text("an old index", encoding="utf-8")
+    shown = write_comparison(compared, tmp_path)
+    assert "index.html" in _leads_to(shown)
+    assert "compare.html" in _leads_to(index)
+    check_page(index.read_text(encoding="utf-8"), one_line(HOSTILE, 60))
+    assert "prefers-color-scheme: dark" in shown.read_text(encoding="utf-8")
+    arm.mkdir()
+    _write_pages(Subject(LAB, Chain()), arm, [], ("modes",), "", arm)
+    assert "../compare.html" in _leads_to(arm / "modes.html")
+
+
+def _leads_to(page):
+    return [value for key, value in Read(page.read_text(encoding="utf-8")).attributes if key == "href"]
 
 
 def test_a_folder_that_cannot_be_written_is_one_line(capsys, tmp_path):

@@ -96,6 +96,8 @@ def _print(found: Comparison, answer: dict[str, Any]) -> None:
     if found.is_of_arms:
         print("\nnatural frequencies and damping of the arms by themselves:")
         show(answer["modes"])
+    if found.is_clocked:
+        print("\none law is a law in z: both loops are compared at their samples, each pole z as s = ln(z)/T")
     print("\noscillating closed-loop poles in the order of Im s (the n-th of both need not be the same mode):")
     show(answer["poles"])
     print()

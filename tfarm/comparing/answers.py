@@ -9,10 +9,12 @@ from typing import Any
 
 from tfarm.columns import FILES, JSON, PAGE, TERMINAL, Column, Table
 from tfarm.digits import general, within
+from tfarm.dsp.law_verdict import law_answer as sampled_law_answer
 from tfarm.loop.answers import MARGINS, gain_rows, margins_answer, sizes_of
 from tfarm.loop.margins import Margins
 from tfarm.spectrum.answers import HELD
 
+from .clocked import TITLES
 from .comparison import Comparison, Side
 
 Values = Sequence[float | None]
@@ -92,13 +94,21 @@ def poles_table(found: Comparison) -> Table:
 
 
 def margins_table(found: Comparison) -> Table:
-    """A row a margin: what is exact where that is known, else what holds in the band, which `known` says."""
-    one, other = (_known(side.margins) for side in found.sides)
-    units = [column.unit for column in MARGINS]
+    """A row a margin: what is exact where that is known, else what holds in the band, which `known` says.
+
+    Of loops at their samples: between which factors on the law they are stable, and how much later it may act.
+    """
+    one, other = (_known(side) for side in found.sides)
+    names = TITLES if found.is_clocked else {column.key: (column.title, column.unit) for column in MARGINS}
     columns = (
-        Column("margin", on=(JSON, FILES), of=[column.key for column in MARGINS]),
-        Column("", "margin", on=(TERMINAL, PAGE), of=[_titled(column) for column in MARGINS]),
-        Column("unit", on=(JSON, FILES), of=units),
+        Column("margin", on=(JSON, FILES), of=list(names)),
+        Column(
+            "",
+            "margin",
+            on=(TERMINAL, PAGE),
+            of=[f"{title} [{unit}]" if unit else title for title, unit in names.values()],
+        ),
+        Column("unit", on=(JSON, FILES), of=[unit for _, unit in names.values()]),
         *Quantity("value", "", relative=MARGIN).columns(found, [each for each, _ in one], [each for each, _ in other]),
         Column("known_one", f"known of {found.one.name}", of=[known for _, known in one]),
         Column("known_other", f"of {found.other.name}", of=[known for _, known in other]),
@@ -108,7 +118,7 @@ def margins_table(found: Comparison) -> Table:
 
 def windows_table(found: Comparison) -> Table | None:
     """How far each gain may go alone in both; None where a law is not these gains, or a loop is unstable."""
-    rows = [gain_rows(side.margins) for side in found.sides]
+    rows = [gain_rows(side.margins) if side.margins is not None else [] for side in found.sides]
     if not all(rows):
         return None
     spans = [[" ".join(row.spans(general, 8, row.windows.around)) or "-" for row in each] for each in rows]
@@ -121,7 +131,7 @@ def windows_table(found: Comparison) -> Table | None:
 
 
 def comparison_answer(found: Comparison) -> dict[str, Any]:
-    """Names and verdicts, the tables, and of each side the whole answer of `tfarm margins`."""
+    """Names and verdicts, the tables, and of each side the whole answer of `tfarm margins`, or of `tfarm sampled`."""
     return {
         "of": "arms" if found.is_of_arms else "laws",
         "names": [side.name for side in found.sides],
@@ -130,20 +140,33 @@ def comparison_answer(found: Comparison) -> dict[str, Any]:
         "modes": modes_table(found),
         "poles": poles_table(found),
         "margins": margins_table(found),
-        "loops": [margins_answer(side.margins) for side in found.sides],
+        "at_samples": found.is_clocked,
+        "loops": [_loop(side) for side in found.sides],
     }
+
+
+def _loop(side: Side) -> dict[str, Any]:
+    if side.margins is not None:
+        return margins_answer(side.margins)
+    return {} if side.clocked is None else sampled_law_answer(side.clocked.analysis)
 
 
 def verdict_words(side: Side) -> str:
     """A line: both verdicts on one side, with what is known beyond the band, and its law."""
+    if side.margins is None:
+        return f"{side.name}: {side.verdict.upper()}; {side.sampled.at}: {side.sampled.sentence}"
     verdict = side.margins.stability
     far = verdict.verdict == "unstable" or verdict.is_known_beyond
     reach = "" if far else f" up to {verdict.band:.4g} rad/s, not known beyond"
     return f"{side.name}: {verdict.verdict.upper()}{reach}; {side.sampled.at}: {side.sampled.sentence}"
 
 
-def _known(found: Margins[Any]) -> list[tuple[float | None, str]]:
+def _known(side: Side) -> list[tuple[float | None, str]]:
     """Each margin with what is known of it; a phase that a delay takes away has no exact value."""
+    if side.clocked is not None:
+        return [(value, "-" if value is None else side.clocked.known) for value in side.clocked.margins.values()]
+    assert side.margins is not None
+    found: Margins[Any] = side.margins
     known: list[tuple[float | None, str]] = []
     for column in MARGINS:
         exact, in_band = sizes_of(found)[column.key]
@@ -154,7 +177,3 @@ def _known(found: Margins[Any]) -> list[tuple[float | None, str]]:
         else:
             known.append((exact, "exact"))
     return known
-
-
-def _titled(column: Column) -> str:
-    return f"{column.title} [{column.unit}]" if column.unit else column.title

@@ -30,6 +30,8 @@ from tfarm.spectrum import Modes, damped_modes
 from tfarm.spectrum import modes as modes_of
 from tfarm.spectrum.scales import default_gains
 
+from .clocked import Clocked, Reach, clocked
+
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
@@ -41,6 +43,9 @@ NEXT = 1e-6  # of the largest K1: where the first column beyond K1 = 0 is, from 
 ROOM = 1.5  # how far the plane reaches beyond the laws' own gains
 PLAIN = 40  # values along each axis of the plane of a factor and a delay
 MOST_FACTOR, LONGEST_DELAY = 4.0, 0.02  # where that plane ends: factor on the law, delay [s] where no law has more
+WAITS = 25  # further delays of which the plane of a loop at its samples consists
+LONGEST_WAIT, BORNE = 2.0, 1.2  # samples up to which these go, or this much beyond what either loop bears
+MOST_DELAYED = 10.0  # samples at most
 FAR = 0.05  # of the first mode: where the curve of a loop begins
 
 
@@ -50,7 +55,9 @@ class Side:
     """One of the two: what it is called, its arm and law, the modes of the arm, and what the loop is worth.
 
     `damping_ratio` is that of each flexible mode of the arm by itself, None where a mode could not be followed; `poles`
-    are closed-loop poles with Im s >= 0, complete in their box; `sampled` is the verdict at the chain's clock.
+    are closed-loop poles with Im s >= 0, complete in their box; `sampled` is the verdict at the chain's clock.  Where
+    one of the laws compared is a law in z there is no loop without a clock on either side: no `margins`, and `clocked`
+    is the loop at its samples, with its poles as s = ln(z)/T.
     """
 
     name: str
@@ -59,12 +66,15 @@ class Side:
     modes: Modes
     damping_ratio: tuple[float | None, ...]
     poles: Complex
-    margins: Margins[Any]
+    margins: Margins[Any] | None
     sampled: SampledBrief
+    clocked: Clocked | None = None
 
     @property
     def verdict(self) -> str:
-        """Of the loop without a clock."""
+        """Of the loop without a clock, or of that at its samples where there is no other."""
+        if self.margins is None:
+            return "undecided" if self.clocked is None else self.clocked.analysis.verdict.word
         return self.margins.stability.verdict
 
     @property
@@ -74,9 +84,16 @@ class Side:
 
     @property
     def loop_function(self) -> tuple[Real, Complex]:
-        """Frequencies [rad/s] (n,) about every steep place of the loop, and L(i w) there, as far as that is finite."""
-        omega = dense(self.margins.stability)
-        L = np.asarray(self.margins.stability.loop.loop_function(1j * omega), dtype=np.complex128)
+        """Frequencies [rad/s] (n,) about every steep place of the loop, and L(i w) there, as far as that is finite.
+
+        L(e^{iwT}), up to half the sample rate, where the loop is one at its samples.
+        """
+        if self.margins is None:
+            assert self.clocked is not None
+            omega, L = self.clocked.loop_function
+        else:
+            omega = dense(self.margins.stability)
+            L = np.asarray(self.margins.stability.loop.loop_function(1j * omega), dtype=np.complex128)
         flexible = self.modes.natural_frequency[self.modes.index > 0]
         told = np.isfinite(L) & (L != 0) & (omega > FAR * flexible[0])
         return omega[told], L[told]
@@ -99,7 +116,14 @@ class Comparison:
     @property
     def verdict(self) -> str:
         """Both verdicts in a line."""
+        if self.is_clocked:
+            return "; ".join(f"{side.name}: {side.sampled.short}" for side in self.sides)
         return "; ".join(f"{side.name}: {side.verdict}, {side.sampled.short}" for side in self.sides)
+
+    @property
+    def is_clocked(self) -> bool:
+        """Whether the loops are compared at their samples, one of the laws being a law in z."""
+        return self.one.clocked is not None
 
     @property
     def is_of_arms(self) -> bool:
@@ -134,6 +158,16 @@ class Comparison:
         return first, second
 
     @cached_property
+    def reaches(self) -> tuple[Reach, Reach]:
+        """Of each loop at its samples the factors on its law that keep it stable, over further delays."""
+        each = [side.clocked for side in self.sides]
+        assert each[0] is not None
+        assert each[1] is not None
+        borne = [found.analysis.delay_margin.samples for found in each if found is not None]
+        samples = np.linspace(0.0, min(max(LONGEST_WAIT, BORNE * max(borne)), MOST_DELAYED), WAITS)
+        return each[0].reach(samples), each[1].reach(samples)
+
+    @cached_property
     def delays(self) -> tuple[LawMap, LawMap]:
         """The plane of a factor on each law and its whole delay [s]: for laws that are more than gains at the hub."""
         laws = [side.law if isinstance(side.law, Law) else Law.of_gains(side.law) for side in self.sides]
@@ -152,8 +186,9 @@ def compare(
     """Two arms under one law, or each under its own, or one arm under two laws.
 
     Without a law each arm has its default gains.  `names` are what the two are called, if not by their arms or laws;
-    the sampled verdicts are those at the clock of `chain`, 10 ms unless given.  Raises ParameterError where there are
-    not two, or where their laws close through different inputs, and what `tfarm.margins` raises for either.
+    the sampled verdicts are those at the clock of `chain`, 10 ms unless given.  Where a law is one in z both loops are
+    compared at their samples.  Raises ParameterError where there are not two, or where their laws close through
+    different inputs, and what `tfarm.margins`, or then `tfarm.sampled`, raises for either.
     """
     pairs = _pairs(arms, laws)
     modes = whole("modes", modes, 1, MOST_MODES, f"a whole number from 1 to {MOST_MODES}")
@@ -164,8 +199,10 @@ def compare(
     if first.input_unit != second.input_unit:
         remedy = f"gains of {called[0]} are in another unit, its input being {first.input}: give both one input"
         raise ParameterError(key="input", value=second.input, remedy=remedy)
+    is_clocked = any(isinstance(law, Law) and law.is_discrete for _, law in pairs)
     one, other = (
-        _side(name, arm, law, modes, chain or Chain()) for name, (arm, law) in zip(called, pairs, strict=True)
+        _side(name, arm, law, modes, chain or Chain(), is_clocked)
+        for name, (arm, law) in zip(called, pairs, strict=True)
     )
     return Comparison(one, other, output)
 
@@ -194,7 +231,7 @@ def _names(pairs: list[tuple[Arm, AnyLaw]]) -> tuple[str, ...]:
     return tuple(next((names for names in (arms, laws) if names[0] != names[1]), ["first", "second"]))
 
 
-def _side(name: str, arm: Arm, law: AnyLaw, count: int, chain: Chain) -> Side:
+def _side(name: str, arm: Arm, law: AnyLaw, count: int, chain: Chain, is_clocked: bool) -> Side:
     found = modes_of(arm, count)
     ratio = dict.fromkeys(range(1, count + 1), 0.0 if arm.is_undamped else None)
     if not arm.is_undamped:
@@ -205,13 +242,15 @@ def _side(name: str, arm: Arm, law: AnyLaw, count: int, chain: Chain) -> Side:
         sampled = brief_of(verdict_on(arm, law, chain), chain)
     except ConvergenceError as error:
         sampled = SampledBrief(sampling=chain.sampling, is_stable=None, log_radius=None, sentence=f"undecided: {error}")
+    at = clocked(arm, law, chain) if is_clocked else None
     return Side(
         name=name,
         arm=arm,
         law=law,
         modes=found,
         damping_ratio=tuple(ratio[n] for n in range(1, count + 1)),
-        poles=closed_loop_poles(arm, law, count + SPARE).values,
-        margins=margins_of(arm, law),
+        poles=closed_loop_poles(arm, law, count + SPARE).values if at is None else at.poles[: count + SPARE],
+        margins=margins_of(arm, law) if at is None else None,
         sampled=sampled,
+        clocked=at,
     )

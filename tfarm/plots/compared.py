@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -30,7 +31,8 @@ def comparison(data: Comparison, *, ax: Sequence[Axes] | None = None) -> tuple[A
     """Magnitude, phase and map of both (what `tfarm.compare` returns), in three axes, those given or new ones: these.
 
     Of two arms the exact responses, of two laws the loop functions L; the map is that of K1 and K2, with exact edges,
-    or, where a law is more than these gains, of a factor on each law and its delay, counted on a grid.
+    or, where a law is more than these gains, of a factor on each law and its delay, counted on a grid.  With a law in z
+    all is of the loops at their samples, and the map has the exact factors over further delays.
     """
     with style():
         if ax is None:
@@ -85,7 +87,7 @@ def _loops(data: Comparison, upper: Axes, lower: Axes) -> None:
     low, high, least, most = zip(*ends, strict=True)
     upper.axhline(1.0, color=GREY, lw=0.9)
     upper.set_ylim(min(least) / 1.5, 1.5 * max(most))
-    upper.set_ylabel("|L|, loop opened at the input")
+    upper.set_ylabel("|L| at the samples" if data.is_clocked else "|L|, loop opened at the input")
     lower.set_ylim(-190, 190)
     lower.set_yticks([-180, -90, 0, 90, 180])
     _finished((min(low), max(high)), upper, lower)
@@ -106,6 +108,9 @@ def _finished(band: tuple[float, float], upper: Axes, lower: Axes) -> None:
 def _map(data: Comparison, ax: Axes) -> None:
     """Where each is stable: the plane of both gains, or that of a factor and a delay."""
     ax.grid(False)
+    if data.is_clocked:
+        _reaches(data, ax)
+        return
     if data.regions is None:
         _delays(data, ax)
         return
@@ -132,6 +137,26 @@ def _region(found: Region, colour: str, label: str, ax: Axes) -> None:
         ax.fill_between(x, low, high, facecolor=colour, alpha=0.22, lw=0, zorder=1)
         outline(piece, colour, 1.4, 3.0, ax)
     ax.fill_between([], [], [], facecolor=colour, alpha=0.4, label=safe(label))
+
+
+def _reaches(data: Comparison, ax: Axes) -> None:
+    """Which factors keep each loop stable, as its law acts later and later."""
+    highest = 1.0
+    for found, side, colour in zip(data.reaches, data.sides, COLOURS, strict=True):
+        ends = [end for column in found.stable_intervals for window in column for end in window if math.isfinite(end)]
+        highest = max([highest, *ends])
+        for piece in pieces(1e3 * found.delay, found.stable_intervals):
+            x, low, high = np.array(piece.points).T
+            ax.fill_between(x, low, high, facecolor=colour, alpha=0.22, lw=0, zorder=1)
+            outline(piece, colour, 1.4, 3.0, ax)
+        ax.fill_between([], [], [], facecolor=colour, alpha=0.4, label=safe(f"{side.name}: stable"))
+    ax.plot([0.0], [1.0], "o", mfc=INK, mec="white", ms=7.5, zorder=7, clip_on=False, label="the laws as they are")
+    ax.set_xlim(0.0, 1e3 * data.reaches[0].delay[-1])
+    ax.set_ylim(0.0, min(1.15 * highest, HIGHEST))
+    ax.axhline(1.0, color=INK, lw=0.6)
+    ax.set_xlabel("further delay [ms]")
+    ax.set_ylabel("factor on the law")
+    ax.legend(loc="upper left", bbox_to_anchor=(0.0, -0.1), borderaxespad=0.0)
 
 
 def _delays(data: Comparison, ax: Axes) -> None:

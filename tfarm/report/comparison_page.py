@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,28 +11,47 @@ from tfarm.comparing.answers import margins_table, modes_table, poles_table, ver
 from tfarm.errors import ParameterError
 from tfarm.files import temporary_folder
 from tfarm.plots.compared import draw_comparison
-from tfarm.report.page import render
+from tfarm.report.card import written_cards
+from tfarm.report.kept import COMPARED, COMPARISON, keep
+from tfarm.report.page import index_page, render
 from tfarm.report.sections import Picture, Section, save_section
-from tfarm.report.writing import move_into
+from tfarm.report.writing import TRUST, move_into
 
 APART = "Differences are those of the second from the first, in per cent of the first."
 ORDER = "The n-th of both in the order of Im s, which need not be the same mode of the link."
+IN_Z = "One of the laws is a law in z: both loops are compared at their samples, each pole z as s = ln(z)/T."
+AT_SAMPLES = "Of the exact loop at its samples, with as many modes as its verdict takes."
 KNOWN = "Exact: of the loop at every frequency. In the band: read up to the verdict's band, no exact value being known."
 
 
 def write_comparison(found: Comparison, out: Path, *, key: str = "--out") -> Path:
-    """Write compare.html with its picture and tables to a folder: the page.  Raises ParameterError where it cannot."""
+    """Write compare.html with its picture and tables to a folder: the page.  Raises ParameterError where it cannot.
+
+    An index of reports that is there leads to it from then on, and pages of its arms that are made later.
+    """
     try:
         out.mkdir(parents=True, exist_ok=True)
         with temporary_folder(out) as made:
             saved = [save_section(section, made) for section in _sections(found)]
-            page = render("compare.html", title=_title(found), lead=_lead(found), sections=saved)
-            (made / "compare.html").write_text(page, encoding="utf-8", newline="")
+            arms = list(dict.fromkeys(side.arm.name for side in found.sides))
+            page = render(COMPARISON, title=_title(found), lead=_lead(found), sections=saved, pages=_beside(out, arms))
+            (made / COMPARISON).write_text(page, encoding="utf-8", newline="")
+            keep(made, COMPARED, {"title": _title(found), "arms": arms})
+            if (out / "index.html").is_file():
+                trust = TRUST if (out / TRUST).is_file() else ""
+                index = index_page(written_cards(out), trust=trust, compared=_title(found))
+                (made / "index.html").write_text(index, encoding="utf-8", newline="")
             move_into(made, out)
     except OSError as error:
         remedy = f"cannot be written to ({error.strerror or error}); give a folder that can"
         raise ParameterError(key=key, value=str(out), remedy=remedy) from None
-    return out / "compare.html"
+    return out / COMPARISON
+
+
+def _beside(out: Path, arms: Sequence[str]) -> list[tuple[str, str]]:
+    """(file, title) of the index and of the arms' own pages, as far as they are in the folder."""
+    pages = [("index.html", "all arms"), *((f"{name}/index.html", name) for name in arms)]
+    return [(file, title) for file, title in pages if (out / file).is_file()]
 
 
 def _title(found: Comparison) -> str:
@@ -44,7 +63,8 @@ def _lead(found: Comparison) -> str:
 
 
 def _sections(found: Comparison) -> Iterator[Section]:
-    yield Section(anchor="verdicts", title="Verdicts", words=[verdict_words(side) for side in found.sides])
+    words = [*map(verdict_words, found.sides), *[IN_Z] * found.is_clocked]
+    yield Section(anchor="verdicts", title="Verdicts", words=words)
     yield Section(anchor="both", title="Both in one picture", blocks=(_picture(found),))
     if found.is_of_arms:
         table = replace(
@@ -52,15 +72,20 @@ def _sections(found: Comparison) -> Iterator[Section]:
         )
         yield Section(anchor="modes", title="Modes", blocks=(table,))
     poles = replace(poles_table(found), stem="compare-poles", title="Closed-loop poles", caption=f"{ORDER} {APART}")
+    known = AT_SAMPLES if found.is_clocked else KNOWN
     yield Section(anchor="poles", title="Closed-loop poles", blocks=(poles,))
-    margins = replace(margins_table(found), stem="compare-margins", title="Margins", caption=f"{KNOWN} {APART}")
+    margins = replace(margins_table(found), stem="compare-margins", title="Margins", caption=f"{known} {APART}")
     yield Section(anchor="margins", title="Margins", blocks=(margins,))
 
 
 def _picture(found: Comparison) -> Picture:
     curves = "exact response" if found.is_of_arms else "loop function"
     plane = (
-        "K1 and K2, with exact edges" if found.regions is not None else "a factor on each law and its delay, on a grid"
+        "further delay and a factor on its law, with exact edges"
+        if found.is_clocked
+        else "K1 and K2, with exact edges"
+        if found.regions is not None
+        else "a factor on each law and its delay, on a grid"
     )
     caption = (
         f"The {curves} of both over frequency, and where each loop is stable over {plane}; the points are the laws."

@@ -7,6 +7,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
+COMPARED = "compare"  # what is kept of a comparison
+COMPARISON = "compare.html"
 LARGEST = 1 << 20  # bytes of a file worth reading
 
 T = TypeVar("T")
@@ -16,6 +18,18 @@ def keep(folder: Path, kind: str, content: Mapping[str, Any]) -> None:
     """kind.json, with a mark of what it is."""
     text = json.dumps({f"tfarm_{kind}": 1, **content}, ensure_ascii=False, indent=1) + "\n"
     (folder / f"{kind}.json").write_text(text, encoding="utf-8", newline="")
+
+
+def kept_comparison(out: Path) -> tuple[str, tuple[str, ...]]:
+    """The title of compare.html beside the reports, and the arms that it compares; ("", ()) where there is none."""
+    file = out / f"{COMPARED}.json"
+    try:
+        read = json.loads(file.read_text(encoding="utf-8")) if file.stat().st_size <= LARGEST else {}
+        if read[f"tfarm_{COMPARED}"] == 1 and (out / COMPARISON).is_file():
+            return str(read["title"]), tuple(str(name) for name in read["arms"])
+    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        pass
+    return "", ()
 
 
 def kept(out: Path, kind: str, made_of: Callable[[dict[str, Any], Path], T | None]) -> list[T]:

@@ -94,9 +94,9 @@ def arm_page(
     )
 
 
-def index_page(cards: Sequence[Card], *, trust: str) -> str:
-    """The page that leads to all others."""
-    return render("index.html", title="tfarm reports", cards=cards, trust=trust, looks=VERDICTS)
+def index_page(cards: Sequence[Card], *, trust: str, compared: str = "") -> str:
+    """The page that leads to all others; `compared` is the title of the comparison beside it, if there is one."""
+    return render("index.html", title="tfarm reports", cards=cards, trust=trust, compared=compared, looks=VERDICTS)
 
 
 def foot(subject: Subject, only: str | None) -> dict[str, str]:

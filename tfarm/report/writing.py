@@ -25,6 +25,7 @@ from tfarm.fitting.fit import Fit
 from tfarm.report.card import save_card, written_cards
 from tfarm.report.frame import beside
 from tfarm.report.given_laws import GivenLaw, Subject, check_laws
+from tfarm.report.kept import COMPARISON, kept_comparison
 from tfarm.report.live import ASSETS, PAGE, has_assets, is_live, save_live, write_assets
 from tfarm.report.page import QUESTIONS, arm_page, file_of, index_page
 from tfarm.report.pieces import LAW_PIECES, PIECES, Piece
@@ -40,7 +41,17 @@ Notice = Callable[[str], object]
 WORKERS = 2
 ENOUGH = 8  # pieces of work of one arm for which a second process, which takes a second or two to start, is worth it
 LONG = ("tune", "sampled", "modes")  # anchors of the sections that take longest
-OURS = ("index.html", "README.md", "pictures", "bench.json", "trust", ASSETS)  # names that no arm's folder may have
+OURS = (
+    "index.html",
+    "README.md",
+    "pictures",
+    "bench.json",
+    "trust",
+    "data",
+    "compare.html",
+    "compare.json",
+    ASSETS,
+)  # names that no arm's folder may have
 
 
 CARD, CARD_ALONE = "card", "card alone"  # with the proofs of the arm, and without
@@ -90,7 +101,10 @@ def write(
     told: list[str] = []
     with _beside(out, [arm.name for arm in arms] + [FOLDER, ASSETS] * (not only)) as beside:
         trust = TRUST if not only or (out / TRUST).is_file() else ""
-        left = [not force and is_unchanged(out / each.arm.name, _pages(only), trust, each) for each in subjects]
+        left = [
+            not force and is_unchanged(out / each.arm.name, _pages(only), _leads(trust, out, each.arm), each)
+            for each in subjects
+        ]
         told += [_left(each.arm) for each, same in zip(subjects, left, strict=True) if same]
         changed = [each for each, same in zip(subjects, left, strict=True) if not same]
         folders = [beside / str(i) for i in range(len(changed))]
@@ -102,7 +116,12 @@ def write(
             _write_pages(subject, folder, parts, only, trust, out / subject.arm.name)
             failures = list(_failures(subject.arm, parts))
             told += failures
-            note_made(folder, out / subject.arm.name, () if failures else _pages(only), key_of(subject, trust))
+            note_made(
+                folder,
+                out / subject.arm.name,
+                () if failures else _pages(only),
+                key_of(subject, _leads(trust, out, subject.arm)),
+            )
         if not only and any(map(is_live, subjects)) and (changed or not has_assets(out / ASSETS)):
             write_assets(beside / ASSETS, out / ASSETS)
             move_into(beside / ASSETS, out / ASSETS)
@@ -111,7 +130,7 @@ def write(
         if (evidence := gathered or evidence) is not None:
             write_trust(evidence, written_proofs(out), beside / FOLDER)
             move_into(beside / FOLDER, out / FOLDER)
-        index = index_page(written_cards(out), trust=trust)
+        index = index_page(written_cards(out), trust=trust, compared=kept_comparison(out)[0])
         (beside / "index.html").write_text(index, encoding="utf-8", newline="")
         os.replace(beside / "index.html", out / "index.html")
     for text in told:
@@ -325,9 +344,20 @@ def _write_pages(
     for question in only or (None,):
         wanted = [s for s in sections if question is None or _answers(s.section.anchor, question)]
         live = (folder / PAGE).is_file()
-        others = beside(earlier, _pages(only), question or "index")
+        others = [*beside(earlier, _pages(only), question or "index"), *_compared(earlier.parent, subject.arm)]
         page = arm_page(subject, wanted, question, trust=f"../{trust}" if trust else "", live=live, others=others)
         (folder / f"{question or 'index'}.html").write_text(page, encoding="utf-8", newline="")
+
+
+def _compared(out: Path, arm: Arm) -> list[tuple[str, str]]:
+    """(file, title) of the comparison beside the reports, as an arm's page sees it, where it is one of this arm."""
+    title, arms = kept_comparison(out)
+    return [(f"../{COMPARISON}", title)] if arm.name in arms else []
+
+
+def _leads(trust: str, out: Path, arm: Arm) -> str:
+    """The pages that an arm's page leads to besides its own."""
+    return "\n".join((trust, *(title for _, title in _compared(out, arm))))
 
 
 def _answers(anchor: str, question: str) -> bool:

@@ -1,0 +1,92 @@
+"""A loop at its samples: what is compared of two laws where one of them is a law in z, and acts there alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tfarm.arm import Arm, HubFeedback
+from tfarm.arm.driving import AnyLaw
+from tfarm.arm.law import Law
+from tfarm.dsp import Chain
+from tfarm.dsp.law_margins import law_grid, stable_factors
+from tfarm.dsp.law_verdict import LawAnalysis, analyse_law
+from tfarm.dsp.margins import Window
+from tfarm.records import record
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complexfloating[Any, Any]]
+
+GONE = 1e-3  # |z| of a pole that leaves this much of itself after a sample: of those nothing is compared
+REAL = 1e-12  # imaginary part of a real z: rounding
+TITLES = {"gain_factor_up": ("stable up to this factor on the law", ""),
+          "gain_factor_down": ("and down to this one", ""), "delay_margin_s": ("delay margin", "s")}  # fmt: skip
+
+
+@dataclass(frozen=True)
+@record
+class Reach:
+    """The intervals of a factor on a law in which its loop is stable, at each further delay [s]."""
+
+    delay: Real
+    stable_intervals: tuple[tuple[Window, ...], ...]
+
+
+@dataclass(frozen=True)
+@record
+class Clocked:
+    """A rig under a law at the samples of a chain, gains at the hub taken as a law like any other."""
+
+    analysis: LawAnalysis
+
+    @property
+    def period(self) -> float:
+        """[s]"""
+        return float(self.analysis.loop.chain.sampling.period)
+
+    @property
+    def poles(self) -> Complex:
+        """The poles s = ln(z)/T [1/s] with Im s >= 0, ascending in Im s, of all that outlives a sample."""
+        z = self.analysis.loop.poles.z
+        z = np.where(abs(z.imag) <= REAL, z.real, z)
+        s = np.log(z[(abs(z) > GONE) & (z.imag >= 0)]) / self.period
+        return np.asarray(s[np.lexsort((s.real, s.imag))])
+
+    @property
+    def loop_function(self) -> tuple[Real, Complex]:
+        """Frequencies [rad/s] (n,) up to half the sample rate, and L(e^{iwT}) there."""
+        grid = law_grid(self.analysis.loop)
+        whole, fed_back = grid.terms[1]
+        with np.errstate(all="ignore"):
+            L = np.asarray(fed_back / whole, dtype=np.complex128)
+        return grid.q / self.period, L
+
+    @property
+    def margins(self) -> dict[str, float | None]:
+        """By `TITLES`: between which factors on the law, and up to which further delay [s], the loop is stable."""
+        low, high = self.analysis.gain_factors or (None, None)
+        delay = self.analysis.delay_margin.samples * self.period if self.analysis.verdict.is_stable else None
+        return dict(zip(TITLES, (high, low, delay), strict=True))
+
+    @cached_property
+    def known(self) -> str:
+        """What the margins hold for."""
+        return f"with {self.analysis.verdict.modes_used} modes"
+
+    def reach(self, samples: Real) -> Reach:
+        """The stable factors with so much further delay each [samples]."""
+        loop = self.analysis.loop
+        now = loop.chain.sampling.delay_samples
+        return Reach(
+            self.period * samples,
+            tuple(tuple(stable_factors(loop.with_delay(now + more))) for more in samples.tolist()),
+        )
+
+
+def clocked(arm: Arm, law: AnyLaw, chain: Chain) -> Clocked:
+    """The law at the clock of a chain.  Raises what `tfarm.sampled` raises."""
+    return Clocked(analyse_law(arm, Law.of_gains(law) if isinstance(law, HubFeedback) else law, chain))
