@@ -16,6 +16,10 @@ from tfarm.report.sections import Fact, Picture, Section
 FIRST = 3  # natural frequencies among the headline numbers
 MOST_POISSON = 0.5  # of an isotropic material; a larger E/2G - 1 is none's ratio
 BELOW_CUTOFF = "Below the shear cut-off one pair of the beam's waves decays along it, above it both pairs travel."
+GIVEN = (
+    "What the arm's file says, in SI units. An infinite hub inertia locks the hub, an infinite payload mass pins "
+    "the tip, an infinite payload inertia keeps it from rotating."
+)
 RIG_GIVEN = (
     "What the rig's file says, in SI units, from the hub outwards; parts that are not listed are not there: a clamp or "
     "joint is rigid then, the radius 0, the payload's centre at the tip."
@@ -119,31 +123,7 @@ def _drive(arm: Arm) -> str:
 
 def given_table(arm: Arm) -> Table:
     """The arm's file as a table."""
-    if not arm.is_uniform:
-        return _table("parameters", "Parameters", RIG_GIVEN, given_rows(arm))
-    link, section = arm.link, arm.link.section
-    kappa = "shear factor, given" if section.shear_factor is not None else "shear factor, Cowper (1966)"
-    rows: list[Row] = [
-        ("length", "L", link.length, "m"),
-        ("density", "ρ", link.density, "kg/m^3"),
-        ("Young's modulus", "E", link.youngs_modulus, "Pa"),
-        ("shear modulus", "G", link.shear_modulus, "Pa"),
-        ("Kelvin-Voigt damping, on bending", "C", link.damping, "s"),
-        *((f"section ({section.shape}): {n.replace('_', ' ')}", "", value, "m") for n, value in section.dimensions),
-        ("area of the section", "A", section.area, "m^2"),
-        ("second moment of area", "I", section.second_moment, "m^4"),
-        (kappa, "κ", link.shear_factor, ""),
-        ("hub inertia", "I_h", arm.hub.inertia, "kg m^2"),
-        ("payload mass", "m", arm.payload.mass, "kg"),
-        ("payload inertia", "I_c", arm.payload.inertia, "kg m^2"),
-    ]
-    return _table(
-        "parameters",
-        "Parameters",
-        "What the arm's file says, in SI units. An infinite hub inertia locks the hub, an infinite payload mass pins "
-        "the tip, an infinite payload inertia keeps it from rotating.",
-        rows,
-    )
+    return _table("parameters", "Parameters", GIVEN if arm.is_uniform else RIG_GIVEN, given_rows(arm))
 
 
 def derived_table(arm: Arm) -> Table:
