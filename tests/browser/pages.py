@@ -17,9 +17,11 @@ import pytest
 from playwright.sync_api import Browser, Page, sync_playwright
 
 import tfarm
-from tfarm.arm import HubFeedback
-from tfarm.dsp import load_chain
+from tfarm.arm import Arm, HubFeedback
+from tfarm.dsp import Chain, load_chain, sampled_verdict
+from tfarm.dsp.results import simulated_answer
 from tfarm.loop.margins import LoopMargins, margins
+from tfarm.loop.stability import stability
 from tfarm.report import write
 from tfarm.report.given_laws import Subject
 from tfarm.report.live import ASSETS, save_live, write_assets
@@ -58,8 +60,12 @@ def browser() -> Iterator[Browser]:
 class Opened:
     """A page with what it said and what it asked for."""
 
-    def __init__(self, browser: Browser, file: Path, width: int = 1400, scheme: Any = "light"):
-        self.context = browser.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme)
+    def __init__(
+        self, browser: Browser, file: Path, width: int = 1400, scheme: Any = "light", motion: Any = "no-preference"
+    ):
+        self.context = browser.new_context(
+            viewport={"width": width, "height": 900}, color_scheme=scheme, reduced_motion=motion
+        )
         self.page: Page = self.context.new_page()
         self.said: list[str] = []
         self.asked: list[str] = []
@@ -85,21 +91,51 @@ def set_gains(page: Page, law: HubFeedback) -> None:
         page.locator(f"#{name}").fill(repr(law[name]))
         page.locator(f"#{name}").dispatch_event("change")
     page.wait_for_function(
-        "([n, gains]) => live.moves.length > n && Object.keys(gains).every(k => live.law[k] === gains[k])",
+        "([n, gains]) => live.moves.length > n && Object.keys(gains).every(k => live.now.law[k] === gains[k])",
         arg=[before, {name: law[name] for name in ("K1", "K2", "Kp")}],
     )
     page.evaluate("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
 
 def shown(page: Page) -> dict[str, str]:
-    ids = [f"m-{name}" for name in (*NAMES, "gain")] + ["verdict"]
-    return page.evaluate("ids => Object.fromEntries(ids.map(id => [id, document.getElementById(id).textContent]))", ids)
+    return texts(page, [*(f"m-{name}" for name in (*NAMES, "gain")), "verdict"])
 
 
 def printed(found: LoopMargins) -> dict[str, str]:
     """As `tfarm margins` prints them."""
     low, high = found.gain
     return {f"m-{name}": f"{getattr(found, name):.6g}" for name in NAMES} | {"m-gain": f"{low:.8g} to {high:.8g}"}
+
+
+def sampled_words(arm: Arm, law: HubFeedback, chain: Chain) -> tuple[str, str]:
+    """The sampled verdict and the spectral radius as `tfarm sampled` prints them."""
+    verdict = sampled_verdict(arm, law, chain)
+    return verdict.word, f"{math.exp(verdict.log_radius):.12g}"
+
+
+def slew_words(arm: Arm, law: HubFeedback, chain: Chain, modes: int) -> dict[str, str]:
+    """What the page shows of a slew, from the answer of `tfarm simulate`."""
+    answer = simulated_answer(arm, law, chain, "slew", 3 * chain.slew.rise_time, count=modes)
+    settled = answer["settling_time_s"]
+    largest = {name: max(map(abs, answer[key])) for name, key in (("torque", "torque"), ("moment", "root_moment"))}
+    figures = largest | {"residual": answer["residual_moment_rms"]}
+    return {f"slew-{name}": f"{value:.5g}" for name, value in figures.items()} | {
+        "slew-settled": f"{settled:.5g}" if math.isfinite(settled) else "not in this time"
+    }
+
+
+def texts(page: Page, ids: list[str]) -> dict[str, str]:
+    return page.evaluate("ids => Object.fromEntries(ids.map(id => [id, document.getElementById(id).textContent]))", ids)
+
+
+def show_chart(page: Page, name: str) -> Any:
+    """A chart is made when it comes into view: its box then."""
+    page.locator(f"#{name}").scroll_into_view_if_needed()
+    page.wait_for_selector(f"#{name} canvas")
+    page.wait_for_timeout(300)
+    box = page.locator(f"#{name} canvas").bounding_box()
+    assert box is not None
+    return box
 
 
 def random_gains(data: dict[str, Any], number: int) -> Iterator[HubFeedback]:
@@ -140,6 +176,76 @@ def test_what_is_shown_at_ten_gains_is_what_tfarm_margins_prints(browser, folder
             for re, im in page.evaluate("() => window.live.loop.poles(window.live.law)"):
                 assert abs(poles - complex(re, im)).min() < 5e-4 * abs(complex(re, im)), law
         assert stable >= 2
+        assert not opened.said
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_sampled_loop_and_slew_at_ten_gains_are_what_tfarm_prints(browser, folder, name):
+    arm, chain = tfarm.load(name), load_chain(name)
+    with Opened(browser, folder / name / "live.html") as opened:
+        page, stable = opened.page, 0
+        data = page.evaluate("JSON.parse(document.getElementById('live-data').textContent)")
+        slow = HubFeedback(K1=0.1 * data["axes"]["K1"]["linear"], K2=data["start"]["K2"])
+        for law in (slow, *random_gains(data, GAINS)):
+            set_gains(page, law)
+            word, radius = sampled_words(arm, law, chain)
+            wanted = {"sampled": word} | slew_words(arm, law, chain, data["slew"]["modes"])
+            assert texts(page, list(wanted)) == wanted, law
+            assert f"spectral radius {radius}," in (page.locator("#sampled-note").text_content() or ""), law
+            stable += word == "stable"
+        assert stable > 0
+        assert not opened.said
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_loci_have_the_poles_of_their_gains(browser, folder, name):
+    """Points along both loci against the exact poles there; what is pointed at reads as one of them."""
+    arm, chain = tfarm.load(name), load_chain(name)
+    with Opened(browser, folder / name / "live.html") as opened:
+        page = opened.page
+        show_chart(page, "zplane")
+        page.wait_for_function("live.now.discs?.length && live.now.locus?.length", timeout=60_000)
+        law = HubFeedback(**page.evaluate("live.now.law"))
+        band = page.evaluate("live.loop.band")
+        rows, discs = page.evaluate("[live.now.locus, live.now.discs]")
+        for row in rows[:: len(rows) // 6]:
+            exact = stability(arm, law.having("K2", row["gain"]), band).poles.values
+            s = complex(row["re"], row["im"])
+            assert abs(exact - s).min() < 5e-4 * abs(s), row
+        loop = sampled_verdict(arm, law, chain).full
+        for row in discs[:: len(discs) // 12]:
+            z = complex(row["re"], row["im"])
+            assert abs(loop.having(K2=row["gain"]).poles.z - z).min() < 1e-6, row
+        box = show_chart(page, "poles")
+        pole = page.evaluate("[live.now.near[1][0], live.now.near[1][1], live.now.frame]")
+        x, y = ((pole[i] - pole[2][k][0]) / (pole[2][k][1] - pole[2][k][0]) for i, k in enumerate("xy"))
+        page.mouse.move(box["x"] + box["width"] * (0.13 + 0.85 * x), box["y"] + box["height"] * (0.03 + 0.85 * (1 - y)))
+        page.wait_for_function("document.getElementById('poles-reading').textContent.includes('K2 = ')")
+        assert not opened.said
+
+
+@pytest.mark.parametrize("motion", ["no-preference", "reduce"])
+def test_the_player_plays_when_asked_and_is_still_for_who_wants_that(browser, folder, motion):
+    with Opened(browser, folder / ARMS[0] / "live.html", motion=motion) as opened:
+        page = opened.page
+        began = page.evaluate("live.player.time")
+        page.locator("#arm").scroll_into_view_if_needed()
+        page.wait_for_timeout(300)
+        assert page.evaluate("live.player.time") == began  # nothing moves by itself
+        picture = page.evaluate("document.getElementById('arm').toDataURL()")
+        if motion == "reduce":
+            assert not page.locator("#play").is_visible()
+            assert page.locator("#still").is_visible()
+        else:
+            page.locator("#play").click()
+            page.wait_for_function("t => live.player.time > t + 0.05", arg=began)
+            page.locator("#play").click()
+            assert not page.evaluate("live.player.playing")
+        page.locator("#scrub").fill("0.75")
+        end = page.evaluate("(live.slew.n - 1) * live.slew.period")
+        assert page.evaluate("live.player.time") == pytest.approx(0.75 * end, abs=1e-9)
+        assert f"t = {0.75 * end:.3f} s" in (page.locator("#frame").text_content() or "")
+        assert page.evaluate("document.getElementById('arm').toDataURL()") != picture
         assert not opened.said
 
 
@@ -192,10 +298,7 @@ def test_nothing_is_hidden_on_a_phone_nor_in_the_dark(browser, folder, width, sc
 def test_pointing_at_a_curve_reads_both_units(browser, folder):
     with Opened(browser, folder / ARMS[0] / "live.html") as opened:
         page = opened.page
-        canvas = page.locator("#bode canvas")
-        canvas.scroll_into_view_if_needed()
-        box = canvas.bounding_box()
-        assert box is not None
+        box = show_chart(page, "bode")
         page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 0.2 * box["height"])
         page.wait_for_function("document.getElementById('reading').textContent.includes('Hz')")
         words = page.locator("#reading").text_content() or ""

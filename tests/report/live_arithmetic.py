@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import itertools
 
+import control
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
@@ -147,3 +148,50 @@ class Page:
             found = minimize_scalar(f, bounds=(0.0, 1.0), method="bounded", options={"xatol": 1e-8})
             best = min(best, (found.fun, low + found.x * width))
         return best
+
+
+def complex_rows(text, rows):
+    """The complex numbers of packed doubles, in so many rows."""
+    return np.frombuffer(base64.b64decode(text), "<f8").view(complex).reshape(rows, -1)
+
+
+class Plant:
+    """The modal plant in the page as a real state space, discretised by python-control: the page has closed forms.
+
+    States: real and imaginary part of the amplitude of each pole above the axis, each real one, the integrals of the
+    torque, and the torque before, which static parts and nothing else see.
+    """
+
+    def __init__(self, data, weight):
+        """`weight`: what a pole above the axis counts in the residues of the page, whose conjugate is not there."""
+        poles, rows = complex_rows(data["eigenvalues"], 1)[0], complex_rows(data["residues"], len(data["static"]))
+        upper, real = poles.imag > 0, poles.imag == 0
+        n = 2 * int(upper.sum()) + int(real.sum()) + 2
+        A, B, C = np.zeros((n, n)), np.zeros((n, 1)), np.zeros((len(rows), n))
+        for i, (p, r) in enumerate(zip(poles[upper], rows[:, upper].T * weight, strict=True)):
+            pair = slice(2 * i, 2 * i + 2)
+            A[pair, pair], B[2 * i, 0] = [[p.real, -p.imag], [p.imag, p.real]], 1.0
+            C[:, pair] = np.c_[r.real, -r.imag]
+        for i, (p, r) in enumerate(zip(poles[real], rows[:, real].T, strict=True), 2 * int(upper.sum())):
+            A[i, i], B[i, 0], C[:, i] = p.real, 1.0, r.real
+        A[n - 2, n - 1], B[n - 1, 0], C[:, n - 2 :] = 1.0, 1.0, data["rigid"]
+        held = control.sample_system(control.StateSpace(A, B, C, 0), data["period"], "zoh")
+        zero, static = np.zeros((1, n)), np.array(data["static"])[:, None]
+        self.A = np.block([[held.A, np.zeros((n, 1))], [zero, np.zeros((1, 1))]])
+        self.B = np.r_[held.B[:, 0], 1.0]
+        self.C = np.c_[held.C, static]
+
+    def poles(self, law):
+        """Closed-loop poles."""
+        return np.linalg.eigvals(self.A - np.outer(self.B, np.array(law.row) @ self.C[:3]))
+
+    def slew(self, data, law):
+        """Torque, and every output at the samples (outputs, n)."""
+        ideal = np.frombuffer(base64.b64decode(data["ideal"]), "<f8").reshape(-1, 4)
+        x, torque, outputs = np.zeros(len(self.A)), [], []
+        for r, theta, rate, moment in ideal:
+            y = self.C @ x
+            torque.append(r + law.Kp * (theta - y[0]) + law.K1 * (rate - y[1]) - law.K2 * (y[2] - moment))
+            outputs.append(y)
+            x = self.A @ x + self.B * torque[-1]
+        return np.array(torque), np.array(outputs).T

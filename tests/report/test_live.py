@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.report.live_arithmetic import Page
+from tests.report.live_arithmetic import Page, Plant, complex_rows
 from tfarm.arm import HubFeedback
-from tfarm.dsp import Chain, load_chain, sampled_verdict
+from tfarm.dsp import Chain, Sampling, load_chain, sampled_verdict
 from tfarm.exact.characteristic import float_units, loop_parts
 from tfarm.exact.system import system_of
 from tfarm.loop.margins import margins
@@ -23,7 +23,9 @@ from tfarm.loop.stability import stability
 from tfarm.report.given_laws import Subject
 from tfarm.report.live import save_live
 from tfarm.report.live_data import live_data
+from tfarm.report.live_sampled import slew_numbers
 
+SIGNALS = ("hub_angle", "hub_rate", "root_moment", "tip_displacement")
 ARMS = ("sasaki2012-lab", "stocky-steel", "quanser-flexlink")
 DIGITS = {"phase": 6, "phase_lag": 6, "phase_lead": 6, "delay": 6, "disk": 6, "peak_sensitivity": 6,
           "peak_complementary": 6}  # as `tfarm margins` prints them  # fmt: skip
@@ -118,6 +120,55 @@ def test_the_sampled_region_holds_at_its_columns(case):
         for low, high in plane["intervals"][i]:
             middle = HubFeedback(K1=plane["K1"][i], K2=(low + high) / 2)
             assert sampled_verdict(arm, middle, chain).is_stable
+
+
+def test_sampled_poles_of_the_plant_in_the_page_are_the_librarys(case):
+    """At three laws, the hub's angle fed back or not; an eigenvalue is right to eps times the size of the matrix."""
+    arm, data, _ = case
+    held, chain = data["sampled_loop"], load_chain(arm.name)
+    plant, error = Plant(held, 2.0), 1e-11
+    for law in some_gains(data, 3, 3):
+        z = plant.poles(law)
+        if law.Kp == 0 or held["states"] < 2:
+            z = np.delete(z, abs(z - 1).argmin())  # the angle that nothing regulates, or an integral that none feels
+        if law.Kp == 0 and held["states"] < 2:
+            z = np.delete(z, abs(z - 1).argmin())
+        known = sampled_verdict(arm, law, chain)
+        assert math.log(abs(z).max()) == pytest.approx(known.log_radius, rel=1e-6, abs=error), law
+        assert (abs(z).max() < 1) == known.is_stable or abs(known.log_radius) < error, law
+
+
+def test_the_slew_of_the_plant_in_the_page_is_the_librarys(case):
+    arm, data, _ = case
+    held = data["slew"]
+    gains = HubFeedback(**data["start"])
+    for law in (gains, gains.having("K2", 0.0).having("Kp", 0.3 * gains.K1)):
+        found = tfarm.simulate(arm, law, load_chain(arm.name), duration=3 * held["rise"], count=held["modes"])
+        torque, outputs = Plant(held, 1.0).slew(held, law)
+        pairs = [(torque, found.torque)]
+        pairs += [(row, getattr(found.at_samples, name)) for row, name in zip(outputs[3:], SIGNALS, strict=True)]
+        for here, there in pairs:
+            assert abs(here - there).max() < 1e-9 * abs(there).max()
+
+
+def test_the_arm_bends_in_its_own_shapes(case):
+    """Displacement over that of the tip at each pole, against the shapes of the modes."""
+    arm, data, _ = case
+    held, modes = data["slew"], tfarm.modes(arm, count=3)
+    shapes = complex_rows(held["shapes"], len(held["x"]))
+    shape = tfarm.damped_modes(modes).shape if not arm.is_undamped else lambda x: modes.shape(x)[1:, None] + 0j
+    wanted = shape(np.array(held["x"]))
+    poles = complex_rows(held["eigenvalues"], 1)[0]
+    for mode in (1, 2, 3):
+        here = shapes[:, next(i for i, n in enumerate(held["mode"]) if n == mode and poles[i].imag > 0)]
+        both = [w / w[-1] for w in wanted[mode - 1]]
+        assert min(abs(here - each).max() for each in both) < 1e-6
+    assert arm.reach == pytest.approx(held["offset"] + arm.length)
+
+
+def test_a_slew_of_too_many_samples_is_left_to_the_command():
+    arm, fast = tfarm.load("sasaki2012"), Chain(sampling=Sampling(period=1e-4))
+    assert slew_numbers(arm, fast, HubFeedback(K1=0.3)) is None
 
 
 def test_the_page_stays_small_and_has_its_text_alone(tmp_path):

@@ -13,8 +13,9 @@ import vl_convert
 
 INK, GREY, FAINT = "@ink", "@grey", "@faint"
 BLUE, ORANGE, GREEN = "@blue", "@orange", "@green"
-WIDE, LOW, SQUARE = 620, 170, 300  # pixels before the page fits them to its width
+WIDE, LOW, SHALLOW, SQUARE = 620, 170, 100, 300  # pixels before the page fits them to its width
 REACH = 2.5  # of the Nyquist plane to either side of 0, before it is zoomed
+DISC = 1.25  # of the z-plane to either side of 0
 ANGLES = [-180, -90, 0, 90, 180]
 CROSS = "M-.7,-.7L.7,.7M-.7,.7L.7,-.7"
 SHIFTED = "wheel![event.shiftKey]"  # so that a page can be scrolled over a chart
@@ -22,8 +23,15 @@ SHIFTED = "wheel![event.shiftKey]"  # so that a page can be scrolled over a char
 
 @cache
 def charts() -> dict[str, dict[str, Any]]:
-    """The compiled charts by name: "bode", "nyquist", "poles" and "map", whose axes each page sets to its arm's."""
-    made = {"bode": _bode(), "nyquist": _nyquist(), "poles": _poles(), "map": _map()}
+    """The compiled charts by name; the axes of "map", "poles" and "sensor" each page sets to its arm's."""
+    made = {
+        "bode": _bode(),
+        "nyquist": _nyquist(),
+        "poles": _poles(),
+        "zplane": _zplane(),
+        "map": _map(),
+        "slew": _slew(),
+    }
     return {name: _compiled(chart) for name, chart in made.items()}
 
 
@@ -121,29 +129,76 @@ def _keyed(names: list[str], colours: list[str]) -> Any:
 
 
 def _poles() -> Any:
-    """Closed-loop poles near the axis, with lines of equal damping ratio."""
-    x = alt.X("re:Q", title="Re s [1/s]", scale=alt.Scale(zero=True))
-    y = alt.Y("im:Q", title="Im s [rad/s]", scale=alt.Scale(zero=True))
-    rays = alt.Chart(_data("rays")).mark_line(color=FAINT, clip=True, strokeDash=[4, 3])
+    """Closed-loop poles near the axis on the locus of one gain, with lines of equal damping ratio."""
+    x = alt.X("re:Q", title="Re s [1/s]", scale=alt.Scale(nice=False))
+    y = alt.Y("im:Q", title="Im s [rad/s]", scale=alt.Scale(nice=False))
     names = (
         alt.Chart(_data("rays")).transform_filter("datum.end").mark_text(color=GREY, align="left", dx=3, fontSize=10)
     )
     axis = alt.Chart(alt.InlineData([{"x": 0}])).mark_rule(color=GREY).encode(x="x:Q")
-    points = alt.Chart(_data("poles")).mark_point(shape=CROSS, size=90, strokeWidth=1.8)
-    colour = alt.condition("datum.re < 0", alt.value(BLUE), alt.value(ORANGE))
-    tips = [
-        alt.Tooltip("re:Q", title="Re s [1/s]"),
-        alt.Tooltip("im:Q", title="Im s [rad/s]"),
-        "Hz:N",
-        "damping ratio:N",
-    ]
+    tips = [alt.Tooltip("re:Q", title="Re s [1/s]"), alt.Tooltip("im:Q", title="Im s [rad/s]")]
     layers = (
-        rays.encode(x=x, y=y, detail="ratio:N", order="im:Q"),
+        _grid(x, y),
         names.encode(x=x, y=y, text="ratio:N"),
         axis,
-        points.encode(x=x, y=y, color=colour, tooltip=tips),
+        *_locus(x, y),
+        _crosses("datum.re < 0", [*tips, "Hz:N", "damping ratio:N"]).encode(x=x, y=y),
     )
     return alt.layer(*layers).properties(width=SQUARE, height=SQUARE)
+
+
+def _zplane() -> Any:
+    """The same of the sampled loop: z, with the unit circle."""
+    x = alt.X("re:Q", title="Re z", scale=alt.Scale(domain=[-DISC, DISC], nice=False))
+    y = alt.Y("im:Q", title="Im z", scale=alt.Scale(domain=[-DISC, DISC], nice=False))
+    circle = alt.Chart(_data("circle")).mark_line(color=GREY, strokeWidth=1.2).encode(x=x, y=y, order="q:Q")
+    tips = [
+        alt.Tooltip("re:Q", title="Re z"),
+        alt.Tooltip("im:Q", title="Im z"),
+        alt.Tooltip("growth:N", title="ln|z|"),
+    ]
+    layers = (_grid(x, y), circle, *_locus(x, y), _crosses("datum.inside", tips).encode(x=x, y=y))
+    return alt.layer(*layers).properties(width=SQUARE, height=SQUARE)
+
+
+def _grid(x: Any, y: Any) -> Any:
+    """Lines of equal damping ratio."""
+    rays = alt.Chart(_data("rays")).mark_line(color=FAINT, clip=True, strokeDash=[4, 3])
+    return rays.encode(x=x, y=y, detail="ratio:N", order="at:Q")
+
+
+def _locus(x: Any, y: Any) -> tuple[Any, Any]:
+    """Where poles go as one gain goes along its axis, and the place that is pointed at."""
+    lines = alt.Chart(_data("locus")).mark_line(color=GREEN, clip=True, strokeWidth=1.2)
+    at = alt.Chart(_data("pointed")).mark_point(color=GREEN, size=60, filled=True, clip=True)
+    return lines.encode(x=x, y=y, detail="piece:N", order="gain:Q"), at.encode(x=x, y=y)
+
+
+def _crosses(good: str, tips: list[Any]) -> Any:
+    points = alt.Chart(_data("poles")).mark_point(shape=CROSS, size=90, strokeWidth=1.8, clip=True)
+    return points.encode(color=alt.condition(good, alt.value(BLUE), alt.value(ORANGE)), tooltip=tips)
+
+
+def _slew() -> Any:
+    """Hub angle with its reference, torque, root moment and tip over time."""
+    ticks = alt.Axis(tickCount=8)
+    x = alt.X("t:Q", title=None, axis=ticks, scale=alt.Scale(nice=False))
+    below = alt.X("t:Q", title="time [s]", axis=ticks, scale=alt.Scale(nice=False))
+    reference = alt.Chart(_data("torque")).mark_line(color=GREY, strokeDash=[5, 3]).encode(y="reference:Q")
+    torque = alt.Chart(_data("torque")).mark_line(color=ORANGE, interpolate="step-after", strokeWidth=1.2)
+    rows = (
+        [_trace("angle", BLUE, "hub angle [rad]", x), reference.encode(x=x)],
+        [torque.encode(x=x, y=alt.Y("torque:Q", title="@drive"))],
+        [_trace("moment", BLUE, "root moment [N m]", x)],
+        [_trace("tip", GREEN, "tip, off a rigid arm [m]", below)],
+    )
+    drawn = [alt.layer(*layers).properties(width=WIDE, height=SHALLOW) for layers in rows]
+    return alt.vconcat(*drawn, spacing=8).resolve_scale(x="shared")
+
+
+def _trace(name: str, colour: str, title: str, x: Any) -> Any:
+    lines = alt.Chart(_data(name)).mark_line(color=colour, strokeWidth=1.2)
+    return lines.encode(x=x, y=alt.Y("y:Q", title=title, axis=alt.Axis(tickCount=4)), order="i:Q")
 
 
 def _map() -> Any:

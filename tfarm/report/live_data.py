@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -20,6 +19,7 @@ from tfarm.loop.panels import Panels, loop_panels
 from tfarm.loop.plant import Loop
 from tfarm.loop.regions import Region, region
 from tfarm.loop.stability import loop_band, stability
+from tfarm.report.live_sampled import packed, sampled_numbers, slew_numbers
 from tfarm.report.map import OUTSIDE, sampled_region
 from tfarm.spectrum.scales import angle_unit, default_gains
 
@@ -51,6 +51,8 @@ def live_data(arm: Arm, chain: Chain, law: HubFeedback | None = None) -> dict[st
         "reference_count": stability(arm, reference, band).unstable_roots,
         "continuous": _areas(continuous.K1, continuous.stable_intervals),
         "sampled_map": None if sampled is None else _sampled(sampled, chain),
+        "sampled_loop": None if sampled is None else sampled_numbers(sampled.loop),
+        "slew": slew_numbers(arm, chain, law or reference),
         "lyapunov": arm.is_uniform,
     }
 
@@ -71,9 +73,8 @@ def _axis(axis: Axis) -> dict[str, Any]:
 
 def _samples(panels: Panels) -> dict[str, Any]:
     """The samples as the bytes of doubles, by panel, part and point, and where they are."""
-    doubles = np.ascontiguousarray(panels.values.transpose(1, 0, 2)).view(float).astype("<f8")
     return {
-        "samples": base64.b64encode(doubles.tobytes()).decode("ascii"),
+        "samples": packed(panels.values.transpose(1, 0, 2)),
         "low": panels.low.tolist(),
         "high": panels.high.tolist(),
         "order": panels.order,

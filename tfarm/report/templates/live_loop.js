@@ -6,9 +6,10 @@ const X = [...Array(POINTS).keys()].map(j => Math.cos(Math.PI * (j + 0.5) / POIN
 const C = X.map((_, j) => (-1) ** j * Math.sin(Math.PI * (j + 0.5) / POINTS));
 const add = (a, b) => [a[0] + b[0], a[1] + b[1]], minus = (a, b) => [a[0] - b[0], a[1] - b[1]];
 const mul = (a, b) => [a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]], times = (k, a) => [k * a[0], k * a[1]];
-const size = a => Math.hypot(a[0], a[1]), conj = a => [a[0], -a[1]];
+const size = a => Math.sqrt(a[0] * a[0] + a[1] * a[1]), conj = a => [a[0], -a[1]];
 const div = (a, b) => times(1 / (b[0] * b[0] + b[1] * b[1]), mul(a, conj(b)));
 const geometric = (a, b, n) => [...Array(n).keys()].map(i => a * (b / a) ** (i / (n - 1)));
+const SERIES = X.map((_, k) => X.map((_, j) => (k ? 2 : 1) / POINTS * Math.cos(k * Math.PI * (j + 0.5) / POINTS)));
 const degrees = a => Math.atan2(a[1], a[0]) * 180 / Math.PI;
 
 class LiveLoop {
@@ -191,10 +192,12 @@ class LiveLoop {
     return best;
   }
 
-  // Closed-loop poles s near the axis: every zero of each panel's Chebyshev series, those off its panel left out
-  poles(law) {
-    const found = [], zero = law.Kp ? 0 : law.K1 || this.rate_loss ? 1 : 2;
+  // Closed-loop poles s near the axis, up to `top`: every zero of each panel's Chebyshev series, those off its panel left
+  // out.  `near`: those of gains close by, from which they are soon found
+  poles(law, near = null, top = Infinity) {
+    const found = [], zero = law.Kp ? 0 : law.K1 || this.rate_loss ? 1 : 2, zeros = [];
     this.low.forEach((low, p) => {
+      if (low > top) return;
       const middle = (low + this.high[p]) / 2, half = (this.high[p] - low) / 2;
       const f = X.map((x, j) => {
         const w = middle + half * x, point = { w, d: this.sample(p, 0, j), theta: this.sample(p, 1, j), m: this.sample(p, 2, j) };
@@ -202,12 +205,14 @@ class LiveLoop {
         for (let k = 0; k < zero; k++) value = div(value, [0, w]);
         return value;
       });
-      for (const z of zerosOfSeries(f)) {
+      zeros[p] = zerosOfSeries(f, near && near.zeros[p]);
+      for (const z of zeros[p]) {
         const s = [-half * z[1], middle + half * z[0]], inside = Math.abs(z[0]) <= 1 && (p > 0 || s[1] > -1e-9 * half);
         if (inside && Math.abs(z[1]) <= 1) found.push([s[0], Math.abs(s[1]) < 1e-9 * half ? 0 : s[1]]);
       }
     });
-    return found.sort((a, b) => a[1] - b[1] || b[0] - a[0]).filter((s, i, all) => !i || size(minus(s, all[i - 1])) > 1e-7 * size(s));
+    const apart = found.sort((a, b) => a[1] - b[1] || b[0] - a[0]).filter((s, i, all) => !i || size(minus(s, all[i - 1])) > 1e-7 * size(s));
+    return Object.assign(apart, { zeros });
   }
 
   // K1, K2 with poles at +- i w: the D-decomposition curve at this Kp
@@ -216,25 +221,15 @@ class LiveLoop {
     const a = this.parts(point, { K1: 1, K2: 0, Kp: 0 })[1], b = this.parts(point, { K1: 0, K2: 1, Kp: 0 })[1], det = cross(a, b);
     return { K1: -cross(P, b) / det, K2: cross(P, a) / det, w: point.w };
   }
-
-  // The sampled loop at Kp = 0: exact at the columns of K1, told between two only where both agree
-  sampled({ K1, K2, Kp }) {
-    const { K1: columns, intervals } = this.sampled_map || { K1: [] };
-    if (!columns.length || Kp) return ["not computed", Kp ? "the sampled region is that of Kp = 0" : "no sampled region of this arm"];
-    const i = columns.findIndex(each => each >= K1), inside = j => intervals[j].some(([low, high]) => low < K2 && K2 < high);
-    if (i < 0 || (i === 0 && columns[0] !== K1)) return ["not computed", "K1 is outside the sampled map"];
-    const both = [inside(i), inside(columns[i] === K1 ? i : i - 1)], note = "exact at the map's columns of K1, interpolated between";
-    if (both[0] !== both[1]) return ["at the edge", `stable at one of the neighbouring columns of K1 alone; ${note}`];
-    return [both[0] ? "stable" : "unstable", note];
-  }
 }
 
 // The zeros of the polynomial through f at X, by Aberth's iteration (1973) on its Chebyshev series, cut where it is rounding
-function zerosOfSeries(f) {
-  let a = X.map((_, k) => f.reduce((sum, value, j) => add(sum, times((k ? 2 : 1) / POINTS * Math.cos(k * Math.PI * (j + 0.5) / POINTS), value)), [0, 0]));
+function zerosOfSeries(f, near = null) {
+  const a = X.map((_, k) => f.reduce((sum, value, j) => add(sum, times(SERIES[k][j], value)), [0, 0]));
   const largest = Math.max(...a.map(size));
   while (a.length > 1 && size(a[a.length - 1]) < 1e-14 * largest) a.pop();
-  const n = a.length - 1, z = [...Array(n).keys()].map(i => { const t = 0.4 + 2 * Math.PI * i / n; return [1.25 * Math.cos(t), 0.75 * Math.sin(t)]; });
+  const n = a.length - 1, warm = near && near.length === n, around = i => [1.25 * Math.cos(0.4 + 2 * Math.PI * i / n), 0.75 * Math.sin(0.4 + 2 * Math.PI * i / n)];
+  const z = [...Array(n).keys()].map(i => warm ? near[i] : around(i));
   const settled = z.map(() => false);
   for (let round = 0; round < 80 && settled.includes(false); round++) {
     for (let i = 0; i < n; i++) {
@@ -259,7 +254,7 @@ function zerosOfSeries(f) {
       settled[i] = size(step) < 1e-13 * (1 + size(z[i]));
     }
   }
-  return z;
+  return warm && settled.includes(false) ? zerosOfSeries(f) : z;
 }
 
 // A number in at most so many digits, as `tfarm` prints it (Python's format %g)

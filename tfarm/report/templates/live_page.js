@@ -1,30 +1,45 @@
-// The live page: gains from sliders, fields and the map; numbers by LiveLoop; charts by Vega.
+// The live page: gains from sliders, fields and the map; numbers by LiveLoop, SampledLoop and Slew; charts by Vega.
 "use strict";
 (() => {
   const $ = id => document.getElementById(id), read = id => JSON.parse($(id).textContent);
-  const data = read("live-data"), loop = new LiveLoop(data), law = { ...data.start }, views = {}, names = ["K1", "K2", "Kp"];
-  const dark = matchMedia("(prefers-color-scheme: dark)").matches;
+  const data = read("live-data"), loop = new LiveLoop(data), law = { ...data.start }, names = ["K1", "K2", "Kp"];
+  const discrete = data.sampled_loop && new SampledLoop(data.sampled_loop), slew = data.slew && new Slew(data.slew);
+  const dark = matchMedia("(prefers-color-scheme: dark)").matches, REST = 200; // ms without a move until everything is drawn in full
   const colours = dark
     ? { ink: "#f2f2f2", grey: "#a8adb3", faint: "#3a3f45", blue: "#6db3f2", orange: "#f0a05a", green: "#5fc79a" }
     : { ink: "#1a1a1a", grey: "#5a5a5a", faint: "#d9d9d9", blue: "#0060a8", orange: "#c2571a", green: "#00785a" };
-  const dB = x => 20 * Math.log10(x), hertz = w => w / (2 * Math.PI), clip = (x, a, b) => Math.min(Math.max(x, a), b);
   const text = (id, words) => { $(id).textContent = words; };
 
-  // Where a gain is along its axis, 0 to 1, and back: logarithmic away from 0
-  const stretched = ({ linear }, x) => linear === null ? x : Math.sign(x) * Math.log1p(Math.abs(x) / linear);
-  const place = (axis, x) => (stretched(axis, x) - stretched(axis, axis.low)) / (stretched(axis, axis.high) - stretched(axis, axis.low));
-  const gainAt = (axis, share) => {
-    const y = stretched(axis, axis.low) + share * (stretched(axis, axis.high) - stretched(axis, axis.low));
-    return +(axis.linear === null ? y : Math.sign(y) * axis.linear * Math.expm1(Math.abs(y))).toPrecision(4);
-  };
+  // ---------------------------------------------------------------- charts: made when they come into view, and then kept up
 
-  // A chart in the colours of the screen, the map with this arm's axes
+  const views = {}, inView = new Set(), charts = {
+    map: (now, fine) => ({
+      here: [{ K1: now.law.K1, K2: now.law.K2 }],
+      ...(views.map && mapped === now.law.Kp ? {} : { edge: loop.kind === "reactive" ? [] : edgeOf(w => loop.boundary(loop.at(w), now.law), loop.base.map(point => point.w), data.axes), areas: now.law.Kp ? [] : areas(), proven: proven() }),
+    }),
+    poles: now => ({ poles: now.near.map(([re, im]) => ({ re, im, Hz: general(hertz(im), 5), "damping ratio": dampingRatio([re, im]) })), rays: rays(now.frame), locus: now.locus || [], pointed: [] }),
+    zplane: now => ({
+      poles: (now.z || []).map(({ z, growth }) => ({ re: z[0], im: z[1], inside: growth < 0, growth: general(growth, 4) })),
+      circle: unitCircle(), rays: spirals(), locus: now.discs || [], pointed: [],
+    }),
+    bode: (now, fine) => ({ curve: now.curve(fine), stems: stems(now.margins, now.curve(fine)[0].w), cursor_at: now.curve(fine).slice(0, 1) }),
+    nyquist: (now, fine) => ({ curve: now.curve(fine).filter(row => row.abs < 50), rings: rings(now.margins), cursor_at: [] }),
+    slew: (now, fine) => slewSets(slew, now.run, fine ? Math.ceil(20 * slew.fastest(now.run) * slew.period / (2 * Math.PI)) : 0, $("slew").clientWidth),
+  };
+  const made = name => name !== "slew" && name !== "zplane" || (name === "slew" ? slew : discrete);
+
+  // A chart in the colours of the screen, with this arm's axes
+  const given = { ...colours, drive: slew ? `${slew.drive} [${slew.unit}]` : "" };
   function spec(name) {
-    const found = JSON.parse(JSON.stringify(LIVE_CHARTS[name]).replace(/"@(\w+)"/g, (_, colour) => JSON.stringify(colours[colour])));
-    if (name === "map") for (const [scale, gain] of [["x", "K1"], ["y", "K2"]]) {
-      const { low, high, linear } = data.axes[gain], axis = found.axes.find(each => each.scale === scale), unit = data.units[gain];
-      const kind = linear === null ? {} : { type: "symlog", constant: linear };
-      Object.assign(found.scales.find(each => each.name === scale), { domain: [low, high], ...kind });
+    const found = JSON.parse(JSON.stringify(LIVE_CHARTS[name]).replace(/"@(\w+)"/g, (_, name) => JSON.stringify(given[name])));
+    const scale = of => found.scales.find(each => each.name === of);
+    if (name === "poles") for (const of of ["x", "y"]) {
+      found.signals = [...(found.signals || []), { name: `framed_${of}`, value: now.frame[of] }];
+      scale(of).domain = { signal: `framed_${of}` };
+    }
+    if (name === "map") for (const [of, gain] of [["x", "K1"], ["y", "K2"]]) {
+      const { low, high, linear } = data.axes[gain], axis = found.axes.find(each => each.scale === of), unit = data.units[gain];
+      Object.assign(scale(of), { domain: [low, high], ...(linear === null ? {} : { type: "symlog", constant: linear }) });
       axis.title = unit === "1" ? gain : `${gain} [${unit}]`;
       if (linear !== null) axis.values = ticks(low, high, linear);
     }
@@ -36,42 +51,77 @@
     const shown = sizes.filter((_, i) => sizes.length < 5 || (sizes.length - 1 - i) % 2 === 0);
     return [0, ...shown, ...shown.map(x => -x)].filter(x => low <= x && x <= high);
   }
-  // A chart as wide as the room that the page leaves, with its first data in it
-  async function draw(name, sets) {
-    const made = spec(name), [width, height] = room(name);
-    made.width = width;
-    if (height) made.height = height;
-    for (const each of made.data) if (sets[each.name]) each.values = sets[each.name];
-    views[name] = (await vegaEmbed(`#${name}`, made, { mode: "vega", actions: false, renderer: "canvas" })).view;
+  async function draw(name) {
+    const drawn = spec(name), [width, height] = room(name), sets = charts[name](now, true);
+    drawn.width = width;
+    if (height) drawn.height = height;
+    for (const each of drawn.data) if (sets[each.name]) each.values = sets[each.name];
+    views[name] = (await vegaEmbed(`#${name}`, drawn, { mode: "vega", actions: false, renderer: "canvas" })).view;
+    if (name === "map") mapped = now.law.Kp;
+    begun[name]?.();
   }
+  const STACKED = { bode: 580, slew: 520 }; // pixels of charts that are several, one below the other
   function room(name) {
     const wide = Math.max($(name).clientWidth - 70, 200);
-    return name === "bode" ? [wide, 0] : [Math.min(wide, 420), Math.min(wide, 340)];
+    return STACKED[name] ? [wide, 0] : name === "zplane" ? [Math.min(wide, 340), Math.min(wide, 340)] : [Math.min(wide, 420), Math.min(wide, 340)];
   }
   function fit(name) {
     const [width, height] = room(name);
     views[name].width(width);
     if (height) views[name].height(height);
   }
+  const areas = () => {
+    const rows = (what, list) => list.map(row => ({ ...row, what, part: `${what}${row.part}` }));
+    return [...rows("stable, continuous", data.continuous), ...rows("stable, sampled", data.sampled_map ? data.sampled_map.areas : [])];
+  };
+  const proven = () => data.lyapunov ? [[0, data.axes.K2.low], [0, 1], [data.axes.K1.high, 1]].map(([K1, K2], t) => ({ K1, K2, t })) : [];
+  let mapped = null; // of which Kp the map shows the curve
 
-  // Verdict and tables of these gains; what the charts draw of them
-  function show(law) {
-    const poles = loop.poles(law), [verdict, why] = loop.verdict(law, poles), points = loop.dense(poles, law);
-    const stable = verdict.startsWith("stable"), margins = stable ? loop.margins(law, points) : null;
+  // ---------------------------------------------------------------- numbers of these gains
+
+  let now = null; // of the gains last moved to
+  now = numbers(law);
+  function numbers(gains) {
+    const law = { ...gains }, poles = loop.poles(law, now?.poles), [verdict, why] = loop.verdict(law, poles), points = loop.dense(poles, law);
+    const margins = verdict.startsWith("stable") ? loop.margins(law, points) : null, near = poles.slice(0, +$("shown").value), top = 1.08 * Math.max(...near.map(s => s[1]), 1), drawn = {};
+    const left = 1.15 * Math.min(...near.map(s => s[0]), -1e-4 * top), right = Math.max(-0.05 * left, 1.3 * Math.max(...near.map(s => s[0])));
+    return {
+      law, poles, verdict, why, margins, near, frame: { x: [left, right], y: [0, top] },
+      z: discrete && discrete.poles(law, now?.z), run: slew && slew.run(law), curve: fine => drawn[fine] ||= curveOf(loop, law, points, fine),
+    };
+  }
+  function show() {
+    const { law, verdict, why, margins } = now;
     text("verdict", verdict);
-    $("verdict").className = `verdict ${stable ? "ok" : "corrected"}`;
+    $("verdict").className = `verdict ${verdict.startsWith("stable") ? "ok" : "corrected"}`;
     text("why", why);
-    const [sampled, note] = loop.sampled(law);
-    text("sampled", sampled);
-    text("sampled-note", note);
     names.forEach(name => { $(`slider-${name}`).value = place(data.axes[name], law[name]); if (document.activeElement !== $(name)) $(name).value = law[name]; });
-    text("command", `tfarm margins ${data.command_name} --K1 ${law.K1} --K2 ${law.K2} --Kp ${law.Kp}`);
+    const gains = `${data.command_name} --K1 ${law.K1} --K2 ${law.K2} --Kp ${law.Kp}`;
+    text("command", `tfarm margins ${gains}`);
     $("map-note").hidden = !law.Kp;
     table(margins);
-    poleTable(poles);
-    return datasets(law, points, margins, poles);
+    rows("pole-rows", now.poles.slice(0, 8).map(s => [general(s[0], 6), general(s[1], 7), general(hertz(s[1]), 5), dampingRatio(s)]));
+    showSampled(gains);
+    if (slew) showSlew(gains);
   }
-
+  function showSampled(gains) {
+    const most = now.z && Math.max(...now.z.map(each => each.growth)), change = now.z && general(Math.abs(Math.expm1(most)), 3);
+    const word = most > 0 ? "unstable" : most < 0 ? "stable" : "marginal";
+    text("sampled", now.z ? word : "not computed");
+    $("sampled").className = `verdict ${now.z && most < 0 ? "ok" : "corrected"}`;
+    text("sampled-note", now.z ? `${most > 0 ? `grows by ${change} a sample` : `the slowest pole decays by ${change} a sample`}; spectral radius ${general(Math.exp(most), 12)}, of the first ${discrete.modes} modes` : "the sampled poles of these gains are not all found");
+    text("sampled-command", discrete ? `tfarm sampled ${gains}` : "");
+    rows("z-rows", (now.z || []).filter(({ z }) => z[1] > -1e-14).sort((a, b) => b.growth - a.growth).slice(0, 8).map(({ z, growth }) => [general(z[0], 5), general(Math.abs(z[1]) > 1e-14 ? z[1] : 0, 5), general(Math.exp(growth), 7), general(growth, 4)]));
+  }
+  function showSlew(gains) {
+    const { moment, torque, residual, settled } = slew.figures(now.run), stopped = now.run.stopped;
+    text("slew-torque", general(torque, 5));
+    text("slew-moment", general(moment, 5));
+    text("slew-residual", general(residual, 5));
+    text("slew-settled", Number.isFinite(settled) ? general(settled, 5) : "not in this time");
+    text("slew-stopped", stopped === null ? "" : `The arm is folded up after ${general(stopped, 4)} s.`);
+    text("slew-command", `tfarm simulate ${gains} --duration ${general(slew.n * slew.period - slew.period, 6)} --modes ${slew.modes}`);
+  }
   function table(margins) {
     $("margins").hidden = !margins;
     $("no-margins").hidden = !!margins;
@@ -80,14 +130,14 @@
     text("m-gain", `${general(margins.gain[0], 8)} to ${general(margins.gain[1], 8)}`);
     for (const name of ["phase", "phase_lag", "phase_lead", "delay", "disk", "peak_sensitivity", "peak_complementary"]) {
       const { value, at } = margins[name];
-      text(`m-${name}`, general(held(value), 6));
+      text(`m-${name}`, general(reliable(value), 6));
       text(`at-${name}`, at ? `${general(at, 6)} rad/s = ${general(hertz(at), 5)} Hz` : "");
     }
     text("whole", whole());
     rows("gain-crossovers", margins.crossed.map(({ w, angle }) => [general(w, 7), general(hertz(w), 5), general(angle, 6)]));
     rows("phase-crossovers", margins.crossovers.map(({ w, factor }) => [general(w, 7), general(hertz(w), 5), general(factor, 6)]));
   }
-  const held = x => Number.isFinite(x) ? +x.toPrecision(9) : x; // to the digits that hold, as `tfarm margins` has it
+  const reliable = x => Number.isFinite(x) ? +x.toPrecision(9) : x; // to the digits that hold, as `tfarm margins` has it
   function rows(id, cells) {
     $(id).replaceChildren(...cells.map(row => {
       const line = document.createElement("tr");
@@ -101,120 +151,79 @@
     if (loop.kind !== "reactive" || !loop.told) return "Of the whole loop they are not known.";
     return law.K2 ? "Of the whole loop, whose undamped modes have no end, delay and disk margin are 0 and the peaks infinite." : "Of the whole loop, whose undamped modes have no end, the delay margin is 0; the others hold.";
   }
-  const ratio = ([re, im]) => im ? general(-re / Math.hypot(re, im), 4) : "";
-  function poleTable(poles) {
-    rows("pole-rows", poles.slice(0, 8).map(s => [general(s[0], 6), general(s[1], 7), general(hertz(s[1]), 5), ratio(s)]));
-  }
 
-  let curve = [];
-  function datasets(law, points, margins, poles) {
-    curve = drawn(law, points);
-    const near = poles.slice(0, 10), top = Math.max(...near.map(s => s[1]), 1);
-    return {
-      bode: { curve, stems: [...none(curve[0].w), ...(margins ? stems(margins) : [])], cursor_at: curve.slice(0, 1) },
-      nyquist: { curve: curve.filter(row => row.abs < 50), rings: rings(margins), cursor_at: [] },
-      poles: {
-        poles: near.map(([re, im]) => ({ re, im, Hz: general(hertz(im), 5), "damping ratio": ratio([re, im]) })),
-        rays: rays(Math.min(...near.map(s => s[0]), -1e-3 * top), top),
-      },
-      map: { here: [{ K1: law.K1, K2: law.K2 }], edge: mapped === law.Kp ? [] : edge(law), areas: law.Kp ? [] : areas(), proven: proven() },
-    };
-  }
-  // The curve over w: points that would not be told apart left out, others put in where L turns
-  function drawn(law, points) {
-    const rows = [], small = L => times(1 / (1 + size(L)), L);
-    let branch = 0, last = null;
-    const push = point => {
-      const [D, N] = point.both || loop.parts(point, law), L = div(N, D), abs = Math.max(size(L), 1e-12), angle = degrees(times(-1, L));
-      if (last && Math.abs(angle - last.angle) > 180) branch += 1;
-      const sum = Math.max(size(add(D, N)), 1e-300);
-      last = { w: point.w, x: L[0], y: L[1], abs, dB: dB(abs), angle, branch, S: dB(size(D) / sum), T: dB(Math.max(size(N) / sum, 1e-12)) };
-      rows.push(last);
-    };
-    for (const point of points) {
-      if (point.w < loop.places[0] / 200 || (last && point.w < last.w * (1 + 2e-5))) continue;
-      if (last) {
-        const [D, N] = point.both, from = last.w;
-        const steps = Math.min(12, Math.ceil(size(minus(small(div(N, D)), small([last.x, last.y]))) / 0.03));
-        for (let k = 1; k < steps; k++) push(loop.at(from + (point.w - from) * k / steps));
-      }
-      push(point);
-    }
-    return rows;
-  }
-  const proven = () => data.lyapunov ? [[0, data.axes.K2.low], [0, 1], [data.axes.K1.high, 1]].map(([K1, K2], t) => ({ K1, K2, t })) : [];
-  // Of each kind one without length: Vega asks every set for its range
-  const none = w => ["gain", "phase", "peak"].map(kind => ({ w, kind, low: 0, high: 0 }));
-  function stems(margins) {
-    const gain = margins.crossovers.filter(row => row.w > 0).map(({ w, factor }) => ({ w, kind: "gain", low: Math.max(-dB(factor), -80), high: 0 }));
-    const phase = margins.crossed.map(({ w, angle }) => ({ w, kind: "phase", low: 0, high: angle }));
-    const peak = [margins.peak_sensitivity, margins.peak_complementary].map(({ value, at }) => ({ w: at, kind: "peak", low: 0, high: dB(value) }));
-    return [...gain, ...phase, ...peak.filter(row => row.w > 0 && Number.isFinite(row.high))];
-  }
-  function rings(margins) {
-    const circle = (ring, centre, radius) => [...Array(121).keys()].map(t => ({ t, ring, x: centre + radius * Math.cos(t * Math.PI / 60), y: radius * Math.sin(t * Math.PI / 60) }));
-    const a = margins ? margins.disk.value / 2 : 1; // no L within |1 + L| = a |1 - L|
-    const disk = a < 0.9 ? circle("disk margin", -(1 + a * a) / (1 - a * a), 2 * a / (1 - a * a)) : [];
-    return [...circle("unit circle", 0, 1), ...disk];
-  }
-  function rays(left, top) {
-    const found = [];
-    for (const each of [0.01, 0.02, 0.05, 0.1, 0.2, 0.5]) {
-      const slope = each / Math.sqrt(1 - each * each), im = Math.min(top, -left / slope);
-      found.push({ ratio: each, re: 0, im: 0, end: false }, { ratio: each, re: -slope * im, im, end: true });
-    }
-    return found;
-  }
-  function areas() {
-    const rows = (what, list) => list.map(row => ({ ...row, what, part: `${what}${row.part}` }));
-    return [...rows("stable, continuous", data.continuous), ...rows("stable, sampled", data.sampled_map ? data.sampled_map.areas : [])];
-  }
-  // The curve of gains with a pole on the axis, halved where it is coarse, cut where it leaves the map
-  function edge(law) {
-    if (loop.kind === "reactive") return [];
-    const at = w => loop.boundary(loop.at(w), law), found = [], { K1, K2 } = data.axes;
-    const placed = row => [place(K1, row.K1), place(K2, row.K2)], seen = ([x, y]) => x > -0.1 && x < 1.1 && y > -0.1 && y < 1.1;
-    let piece = 0;
-    const trace = (a, b, depth) => {
-      const [p, q] = [placed(a), placed(b)], long = size(minus(p, q));
-      if (!(seen(p) || seen(q))) return;
-      if (long > 0.02 && depth) {
-        const middle = at((a.w + b.w) / 2);
-        trace(a, middle, depth - 1);
-        trace(middle, b, depth - 1);
-      } else if (long < 0.2) {
-        if (!found.length || found[found.length - 1].w !== a.w) found.push({ ...a, piece: ++piece });
-        found.push({ ...b, piece });
-      }
-    };
-    const rows = loop.base.map(point => loop.boundary(point, law));
-    rows.slice(1).forEach((row, i) => trace(rows[i], row, 8));
-    return found;
-  }
+  // ---------------------------------------------------------------- moves: gains change here alone, a frame draws the last of them
 
-  // Gains change here alone; a frame draws the last of them
-  let waiting = false;
+  let waiting = false, resting = 0;
   function set(changes) {
     for (const [name, value] of Object.entries(changes)) if (Number.isFinite(value)) law[name] = clip(value, data.axes[name].low, data.axes[name].high);
     if (waiting) return;
     waiting = true;
-    requestAnimationFrame(() => { waiting = false; move(law); });
+    requestAnimationFrame(() => { waiting = false; move(); });
   }
-  let mapped = null; // of which Kp the map shows the curve
-  async function move(gains) {
-    const start = performance.now(), sets = show(gains);
-    for (const [name, view] of Object.entries(views)) for (const [of, rows] of Object.entries(sets[name])) {
-      if (name !== "map" || of === "here" || mapped !== gains.Kp) view.data(of, rows);
-    }
-    mapped = gains.Kp;
-    await Promise.all(Object.values(views).map(view => view.runAsync()));
+  async function move() {
+    const start = performance.now();
+    clearTimeout(resting);
+    now = numbers(law);
+    show();
+    await keepUp(false);
+    player?.show(now.run);
+    resting = setTimeout(rest, REST, now);
     window.live.moves.push(performance.now() - start);
   }
+  async function keepUp(fine) {
+    await Promise.all([...inView].filter(name => views[name]).map(name => update(name, fine)));
+  }
+  function update(name, fine) {
+    const view = views[name];
+    for (const [of, rows] of Object.entries(charts[name](now, fine))) view.data(of, rows);
+    if (name === "poles") view.signal("framed_x", now.frame.x).signal("framed_y", now.frame.y);
+    if (name === "map") mapped = now.law.Kp;
+    return view.runAsync();
+  }
+  // All points, and then the loci of the charts in view, a few gains at a time
+  const LOCI = [["poles", "locus", inS], ["zplane", "discs", inZ]];
+  async function rest(of) {
+    if (of.resting) return;
+    of.resting = true;
+    await keepUp(true);
+    for (let next; (next = LOCI.find(([name, key]) => views[name] && inView.has(name) && !of[key]));) {
+      const [name, key, work] = next, found = await inSlices(work(), of);
+      if (!found) return;
+      of[key] = found;
+      await views[name].data("locus", found).runAsync();
+    }
+    of.resting = false;
+    window.live.rested = of.law;
+  }
+  const along = gain => [share => gainAt(data.axes[gain], share, 8), K => ({ ...now.law, [gain]: K })];
+  function inS() {
+    const [gain, law] = along($("vary").value), { frame } = now;
+    return locus((K, before) => { const found = loop.poles(law(K), before?.found, frame.y[1]); return { points: [...found], found }; }, gain, frame);
+  }
+  function inZ() {
+    const [gain, law] = along($("vary").value), view = { x: [-1.25, 1.25], y: [-1.25, 1.25] };
+    return locus((K, before) => { const found = discrete.poles(law(K), before?.found, 1e-6); return { points: (found || []).filter(each => size(each.z) > FAINT).map(each => each.z), found }; }, gain, view);
+  }
+  async function inSlices(work, of) {
+    for (;;) {
+      for (const start = performance.now(); performance.now() - start < 12;) {
+        const { done, value } = work.next();
+        if (done) return value;
+      }
+      await new Promise(done => setTimeout(done));
+      if (of !== now) return null;
+    }
+  }
+
+  // ---------------------------------------------------------------- pointing
+
+  const canvas = view => view.container().querySelector("canvas").getBoundingClientRect();
   function drag() {
     const view = views.map;
     let going = false;
     const follow = event => {
-      const box = view.container().querySelector("canvas").getBoundingClientRect(), [left, top] = view.origin();
+      const box = canvas(view), [left, top] = view.origin();
       const x = view.scale("x").invert(event.clientX - box.left - left), y = view.scale("y").invert(event.clientY - box.top - top);
       set({ K1: +x.toPrecision(4), K2: +y.toPrecision(4) });
     };
@@ -224,35 +233,61 @@
     view.container().style.touchAction = "none";
   }
   // What the curves are under the pointer, in words
-  function hover() {
+  function readCurves() {
     const view = views.bode, group = () => view.scenegraph().root.items[0].items.find(mark => mark.marktype === "group").items[0];
     view.container().addEventListener("pointermove", event => {
-      const box = view.container().querySelector("canvas").getBoundingClientRect();
-      const w = view.scale("x").invert(event.clientX - box.left - view.origin()[0] - group().x);
+      const w = view.scale("x").invert(event.clientX - canvas(view).left - view.origin()[0] - group().x), curve = now.curve(true);
       let low = 0, high = curve.length - 1;
       while (high - low > 1) { const middle = (low + high) >> 1; if (curve[middle].w < w) low = middle; else high = middle; }
       const row = curve[high];
       if (!row) return;
       const both = x => `${general(x, 4)} dB (${general(10 ** (x / 20), 4)})`;
       text("reading", `${general(row.w, 5)} rad/s = ${general(hertz(row.w), 5)} Hz: L ${both(row.dB)}, angle of −L ${general(row.angle, 4)}°, S ${both(row.S)}, T ${both(row.T)}`);
-      view.data("cursor_at", [row]).runAsync();
-      views.nyquist.data("cursor_at", [row]).runAsync();
+      for (const name of ["bode", "nyquist"]) views[name]?.data("cursor_at", [row]).runAsync();
     });
   }
+  // The gain at the place of a locus that is nearest to the pointer
+  function readLocus(name, key, words) {
+    const view = views[name];
+    view.container().addEventListener("pointermove", event => {
+      const box = canvas(view), x = event.clientX - box.left - view.origin()[0], y = event.clientY - box.top - view.origin()[1], [sx, sy] = [view.scale("x"), view.scale("y")];
+      let best = null, gap = 30 ** 2;
+      for (const row of now[key] || []) { const far = (sx(row.re) - x) ** 2 + (sy(row.im) - y) ** 2; if (far < gap) [best, gap] = [row, far]; }
+      if (best) text(`${name}-reading`, `${$("vary").value} = ${general(best.gain, 5)}: ${words(best)}`);
+      view.data("pointed", best ? [best] : []).runAsync();
+    });
+  }
+  const complex = ({ re, im }) => `${general(re, 5)} ${im < 0 ? "−" : "+"} ${general(Math.abs(im), 5)}i`;
+  const begun = {
+    map: drag,
+    bode: readCurves,
+    poles: () => readLocus("poles", "locus", row => `s = ${complex(row)} 1/s, ${general(hertz(row.im), 4)} Hz${row.im ? `, damping ratio ${dampingRatio([row.re, row.im])}` : ""}`),
+    zplane: () => readLocus("zplane", "discs", row => `z = ${complex(row)}, |z| = ${general(size([row.re, row.im]), 5)}`),
+    slew: () => player?.place(views.slew),
+  };
 
   for (const name of names) {
     $(`slider-${name}`).addEventListener("input", event => set({ [name]: gainAt(data.axes[name], +event.target.value) }));
     $(name).addEventListener("change", event => set({ [name]: +event.target.value }));
   }
   $("reset").addEventListener("click", () => set(data.start));
+  for (const id of ["vary", "shown"]) $(id).addEventListener("change", () => set({}));
   addEventListener("resize", () => { Object.keys(views).forEach(fit); set({}); });
-  window.live = { loop, law, moves: [], set, move: gains => { Object.assign(law, gains); return move(law); } };
-  const sets = show(law);
-  Promise.all(["map", "bode", "nyquist", "poles"].map(name => draw(name, sets[name]))).then(() => {
-    mapped = law.Kp;
-    drag();
-    hover();
-    window.live.ready = performance.now();
-    document.body.dataset.ready = "yes";
-  });
+  const player = slew && makePlayer(slew, colours, now.run);
+  window.live = { loop, discrete, slew, law, player, moves: [], set, get now() { return now; }, rested: null };
+  show();
+  const watcher = new IntersectionObserver(entries => {
+    const came = entries.filter(each => each.isIntersecting).map(each => each.target.id);
+    entries.forEach(each => inView[each.isIntersecting ? "add" : "delete"](each.target.id));
+    Promise.all(came.map(name => views[name] ? update(name, true) : draw(name))).then(() => {
+      window.live.ready ??= performance.now();
+      document.body.dataset.ready = "yes";
+      clearTimeout(resting);
+      resting = setTimeout(rest, REST, now);
+    });
+  }, { rootMargin: "100px" });
+  for (const name of Object.keys(charts).filter(made)) {
+    $(name).style.minHeight = `${STACKED[name] || room(name)[1] + 60}px`;
+    watcher.observe($(name));
+  }
 })();

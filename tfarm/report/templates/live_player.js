@@ -1,0 +1,110 @@
+// The player: the arm over its slew, its deflection enlarged, with torque and root moment; still unless it is asked to play.
+"use strict";
+const ENLARGED = 0.2; // of the length: how far the largest deflection is drawn
+
+function slewSets(slew, found, between, width) {
+  const { t, angle, moment, tip } = slew.traces(found, Math.min(between, Math.ceil(40_000 / found.n))), rows = y => shownOver(t, y, Math.max(width, 300));
+  const torque = [...Array(found.n).keys()].map(k => ({ t: k * slew.period, torque: found.torque[k], reference: slew.ideal[4 * k + 1] }));
+  return { angle: rows(angle), moment: rows(moment), tip: rows(tip), torque };
+}
+
+function makePlayer(slew, colours, first) {
+  const $ = id => document.getElementById(id), canvas = $("arm"), still = matchMedia("(prefers-reduced-motion: reduce)");
+  const end = () => (found.n - 1) * slew.period, round = x => [1, 2, 5, 10].map(k => k * 10 ** Math.floor(Math.log10(x))).filter(k => k <= x * 1.0001).pop();
+  let found = first, t = 0, playing = false, last = 0, factor = 1, most = { torque: 1, moment: 1 }, view = null;
+
+  // Another run: how much its deflection is enlarged, and how long its bars are at most
+  function show(run) {
+    found = run;
+    const figures = slew.figures(run), bent = run.tip.reduce((top, x, k) => Math.max(top, Math.abs(x - slew.reach * run.angle[k])), 0);
+    factor = bent > 0 ? Math.max(1, round(ENLARGED * slew.length / bent)) : 1;
+    most = { torque: figures.torque || 1, moment: figures.moment || 1 };
+    $("factor").textContent = factor > 1 ? `Deflection is drawn ${factor} times as large.` : "Deflection is drawn to scale.";
+    go(Math.min(t, end()));
+  }
+  function go(time) {
+    t = clip(time, 0, end());
+    $("scrub").value = end() ? t / end() : 0;
+    const state = slew.at(found, t), { angle, deflection } = slew.shape(state), moment = slew.read(5, state.a, state.rigid, state.u);
+    paint(angle, deflection, state.u, moment, slew.ideal[4 * state.k + 1]);
+    $("frame").textContent = `t = ${t.toFixed(3)} s: hub ${angle.toFixed(4)} rad, ${slew.drive} ${general(state.u, 3)} ${slew.unit}, root moment ${general(moment, 3)} N m, tip deflection ${general(deflection[deflection.length - 1], 3)} m`;
+    mark();
+  }
+
+  // The arm from above: hub, its line, where the reference has it, and the arm as it is bent
+  function paint(angle, deflection, torque, moment, reference) {
+    const ratio = devicePixelRatio || 1, width = canvas.clientWidth, height = canvas.clientHeight, draw = canvas.getContext("2d");
+    if (canvas.width !== Math.round(width * ratio)) { canvas.width = Math.round(width * ratio); canvas.height = Math.round(height * ratio); }
+    draw.setTransform(ratio, 0, 0, ratio, 0, 0);
+    draw.clearRect(0, 0, width, height);
+    const side = slew.travel > 0 ? 1 : -1, x0 = 0.2 * Math.min(width, 500), y0 = side > 0 ? height - 46 : 46, scale = Math.min(width - x0 - 120, height - 90) / slew.reach;
+    const at = (along, across, turned) => [x0 + scale * (along * Math.cos(turned) - across * Math.sin(turned)), y0 - scale * (along * Math.sin(turned) + across * Math.cos(turned))];
+    const line = (points, colour, thick, dash = []) => {
+      draw.beginPath();
+      points.forEach(([x, y], i) => i ? draw.lineTo(x, y) : draw.moveTo(x, y));
+      Object.assign(draw, { strokeStyle: colour, lineWidth: thick, lineJoin: "round" });
+      draw.setLineDash(dash);
+      draw.stroke();
+    };
+    line([at(0, 0, reference), at(slew.reach, 0, reference)], colours.grey, 1, [5, 4]);
+    line([at(0, 0, angle), at(slew.reach, 0, angle)], colours.faint, 1);
+    const bent = slew.x.map((x, i) => at(x + slew.offset, factor * deflection[i], angle));
+    line([at(0, 0, angle), ...bent], colours.blue, 4);
+    for (const [point, radius, colour] of [[at(0, 0, angle), 14, colours.grey], [bent[bent.length - 1], 6, colours.blue]]) {
+      draw.beginPath();
+      draw.arc(...point, radius, 0, 2 * Math.PI);
+      draw.fillStyle = colour;
+      draw.fill();
+    }
+    bar(draw, width - 92, height, torque / most.torque, slew.drive, colours.orange);
+    bar(draw, width - 40, height, moment / most.moment, "moment", colours.blue);
+  }
+  function bar(draw, x, height, share, name, colour) {
+    const middle = height / 2, half = height / 2 - 34;
+    draw.fillStyle = colours.faint;
+    draw.fillRect(x - 1, middle - half, 2, 2 * half);
+    draw.fillRect(x - 14, middle - 1, 28, 2);
+    draw.fillStyle = colour;
+    draw.fillRect(x - 7, Math.min(middle, middle - share * half), 14, Math.abs(share) * half);
+    Object.assign(draw, { fillStyle: colours.ink, font: "12px system-ui, sans-serif", textAlign: "center" });
+    draw.fillText(name, x, height - 10);
+  }
+
+  // The line over the curves at this time
+  function mark() {
+    if (!view) return;
+    const origin = view.origin()[0], group = view.scenegraph().root.items[0].items.find(each => each.marktype === "group").items[0];
+    $("played").style.left = `${origin + group.x + view.scale("x")(t)}px`;
+    $("played").hidden = false;
+  }
+  function step(time) {
+    if (!playing) return;
+    const next = t + (time - last) / 1000 * +$("speed").value;
+    last = time;
+    go(next);
+    if (next >= end()) pause(); else requestAnimationFrame(step);
+  }
+  function play() {
+    if (t >= end()) go(0);
+    playing = true;
+    $("play").textContent = "pause";
+    requestAnimationFrame(time => { last = time; step(time); });
+  }
+  function pause() {
+    playing = false;
+    $("play").textContent = "play";
+  }
+  function heed() {
+    if (still.matches) pause();
+    $("play").hidden = still.matches;
+    $("still").hidden = !still.matches;
+  }
+  $("play").addEventListener("click", () => playing ? pause() : play());
+  $("scrub").addEventListener("input", event => { pause(); go(+event.target.value * end()); });
+  still.addEventListener("change", heed);
+  addEventListener("resize", () => go(t));
+  heed();
+  t = 0.4 * slew.rise; // a bent arm tells more than one at rest
+  show(first);
+  return { show, go, play, pause, place: chart => { view = chart; mark(); }, get time() { return t; }, get playing() { return playing; } };
+}

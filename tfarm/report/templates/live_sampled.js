@@ -1,0 +1,299 @@
+// The sampled loop of any gains, and its slew, from the poles and residues of the modal plant: tfarm.dsp.sampling, loop, simulate.
+"use strict";
+const FAINT = 0.2; // a pole nearer to z = 0 decides nothing, and where many gather there none is told from the others
+const doubles = packed => new Float64Array(Uint8Array.from(atob(packed), c => c.charCodeAt(0)).buffer);
+const exp = a => times(Math.exp(a[0]), [Math.cos(a[1]), Math.sin(a[1])]), pair = (v, i) => [v[2 * i], v[2 * i + 1]];
+// (e^{pt} - 1)/p, without loss where p t is small
+function held(p, t) {
+  const [x, y] = times(t, p), half = Math.sin(y / 2);
+  return p[0] || p[1] ? div([Math.expm1(x) * Math.cos(y) - 2 * half * half, Math.exp(x) * Math.sin(y)], p) : [t, 0];
+}
+
+class SampledLoop {
+  constructor(data) {
+    Object.assign(this, data);
+    const T = this.period, f = this.fraction, p = doubles(data.eigenvalues), r = doubles(data.residues), m = p.length / 2;
+    this.p = [...Array(m).keys()].map(i => pair(p, i)).concat([[0, 0]]); // s = 0 is the last one
+    this.b = this.p.map(each => exp(times(T, each)));
+    this.early = this.p.map(each => held(each, (1 - f) * T));
+    this.late = this.p.map(each => mul(exp(times((1 - f) * T, each)), held(each, f * T)));
+    this.residues = this.rigid.map(([, once], o) => [...r.slice(2 * m * o, 2 * m * (o + 1)), once, 0]);
+    this.flat = { b: this.b.flat(), early: this.early.flat(), late: this.late.flat() };
+    this.ramps = [(1 - f) ** 2 * T * T / 2, f * (1 - f / 2) * T * T];
+  }
+
+  // What the law makes of each output: residues and static parts of their weighted sum, the rate apart where it is a difference
+  weighted({ K1, K2, Kp }) {
+    const rate = this.smoothing === null ? K1 : 0, gains = [Kp, rate, K2];
+    const sum = of => Float64Array.from({ length: 2 * this.b.length }, (_, i) => of.reduce((total, K, o) => total + K * this.residues[o][i], 0));
+    const real = (of, values) => of.reduce((total, K, o) => total + K * values[o], 0), twice = this.rigid.map(row => row[0]);
+    const make = of => ({ r: sum(of), static: real(of, this.static), twice: real(of, twice) });
+    const difference = this.smoothing === null || !K1 ? null : make([K1 * (1 - this.smoothing) / this.period, 0, 0]);
+    return { law: make(gains), difference };
+  }
+
+  // H and H' of one weighted sum at z = b[base] + offset, the share of the pole `base` times the offset apart
+  transfer({ r, static: rest, twice }, z, base, offset) {
+    const inverse = div([1, 0], z), square = mul(inverse, inverse);
+    const { b, early, late } = this.flat, [zr, zi] = z, [ur, ui] = inverse, [vr, vi] = square;
+    let [xr, xi] = times(rest, inverse), [yr, yi] = times(-rest, square), own = [0, 0], ownSlope = [0, 0];
+    for (let i = 0; i < r.length; i += 2) { // real numbers, for it is asked for thousands of times
+      const pr = early[i] + late[i] * ur - late[i + 1] * ui, pi = early[i + 1] + late[i] * ui + late[i + 1] * ur;
+      const tr = late[i + 1] * vi - late[i] * vr, ti = -late[i] * vi - late[i + 1] * vr;
+      const ar = r[i] * pr - r[i + 1] * pi, ai = r[i] * pi + r[i + 1] * pr, cr = r[i] * tr - r[i + 1] * ti, ci = r[i] * ti + r[i + 1] * tr;
+      if (i === 2 * base) { own = [ar, ai]; ownSlope = [cr, ci]; continue; }
+      const dx = zr - b[i], dy = zi - b[i + 1], q = 1 / (dx * dx + dy * dy), gr = dx * q, gi = -dy * q;
+      const sr = ar * gr - ai * gi, si = ar * gi + ai * gr, er = cr - sr, ei = ci - si;
+      xr += sr; xi += si;
+      yr += er * gr - ei * gi; yi += er * gi + ei * gr;
+    }
+    let value = [xr, xi], slope = [yr, yi];
+    if (twice) { // T push/(z - 1)^2 + ramp/(z - 1), push and ramp of s = 0
+      const i = this.b.length - 1, gap = div([1, 0], base === i ? offset : minus(z, [1, 0])), T = this.period;
+      const push = add(times(T, this.early[i]), times(T, mul(this.late[i], inverse))), ramp = add([this.ramps[0], 0], times(this.ramps[1], inverse));
+      const pushed = times(-T, mul(this.late[i], square)), ramped = times(-this.ramps[1], square), inner = add(mul(push, gap), ramp);
+      value = add(value, times(twice, mul(inner, gap)));
+      slope = add(slope, times(twice, minus(mul(add(minus(mul(pushed, gap), mul(push, mul(gap, gap))), ramped), gap), mul(inner, mul(gap, gap)))));
+    }
+    return [value, slope, own, ownSlope];
+  }
+
+  // g = offset F and g' at z = b[base] + offset, F = 1 + gains . H, without loss however small the offset
+  characteristic(weights, z, base, offset) {
+    let [value, slope, own, ownSlope] = this.transfer(weights.law, z, base, offset);
+    if (weights.difference) {
+      const [h, hs, o, os] = this.transfer(weights.difference, z, base, offset), a = this.smoothing;
+      const lag = div([1, 0], minus(z, [a, 0])), step = mul(base === this.b.length - 1 ? offset : minus(z, [1, 0]), lag), steep = times(1 - a, mul(lag, lag));
+      [value, slope] = [add(value, mul(h, step)), add(slope, add(mul(hs, step), mul(h, steep)))];
+      [own, ownSlope] = [add(own, mul(o, step)), add(ownSlope, add(mul(os, step), mul(o, steep)))];
+    }
+    const late = this.delay ? exp(times(-this.delay, [Math.log(size(z)), Math.atan2(z[1], z[0])])) : [1, 0], n = times(-this.delay, div(late, z));
+    [slope, ownSlope] = [add(mul(slope, late), mul(value, n)), add(mul(ownSlope, late), mul(own, n))];
+    [value, own] = [mul(value, late), mul(own, late)];
+    const whole = add([1, 0], value);
+    return [add(mul(offset, whole), own), add(add(whole, mul(offset, slope)), ownSlope)];
+  }
+
+  // Every closed-loop pole with ln|z|, z = 1 of a free angle left out, `near` being those of gains close by; null if not all are had
+  poles(law, near = null, exact = 1e-13) {
+    return (near && this.iterated(law, near, 0, exact)) || this.iterated(law, null, 0.02, exact) || this.iterated(law, null, 0.3, exact);
+  }
+
+  // Aberth's iteration (1973) on F times its poles, from `near` or from all poles of the plant moved by `away`
+  iterated(law, near, away, exact) {
+    const last = this.b.length - 1, ones = Math.max(0, this.states - (law.Kp ? 0 : 1)), weights = this.weighted(law);
+    const at = this.b.map((b, i) => ({ b, n: i === last ? ones : 1 })).filter(each => each.n > 0);
+    const others = [{ b: [0, 0], n: this.delay + 1 }, ...(weights.difference && this.smoothing ? [{ b: [this.smoothing, 0], n: 1 }] : [])];
+    const starts = [...at, ...others].flatMap(({ b, n }) => Array(n).fill(b)).map((b, i) => add(b, times(away, [Math.cos(2.4 * i), Math.sin(2.4 * i)])));
+    if (near && near.length !== starts.length) return null;
+    const z = near ? near.map(each => each.z) : starts;
+    const roots = z.map(each => this.based(each));
+    const settled = roots.map(() => false), all = [...at, ...others];
+    const waits = () => roots.some((root, i) => !settled[i] && size(root.z) > FAINT);
+    for (let round = 0; round < 120 && settled.includes(false) && (waits() || (!near && round < 30)); round++) roots.forEach((root, i) => {
+      if (settled[i]) return;
+      if (size(root.z) < 1e-6) { settled[i] = true; return; } // it decides nothing
+      const [g, slope] = this.characteristic(weights, root.z, root.base, root.offset);
+      if (!(g[0] || g[1])) { settled[i] = true; return; }
+      let sum = div(slope, g);
+      for (const { b, n } of all) {
+        const mine = b === this.b[root.base] ? n - 1 : n;
+        if (mine) sum = add(sum, div([mine, 0], b === this.b[root.base] ? root.offset : minus(root.z, b)));
+      }
+      for (let k = 0; k < roots.length; k++) if (k !== i) {
+        const other = roots[k], [u, v] = root.base === other.base ? [root.offset, other.offset] : [root.z, other.z];
+        const x = u[0] - v[0], y = u[1] - v[1], q = x * x + y * y;
+        if (q) { sum[0] -= x / q; sum[1] += y / q; }
+      }
+      const step = div([1, 0], sum);
+      if (!Number.isFinite(step[0] + step[1])) { settled[i] = true; return; }
+      settled[i] = size(step) < exact * size(root.offset) || size(step) < 1e-60;
+      root.offset = minus(root.offset, step);
+      root.z = add(this.b[root.base], root.offset);
+      const better = this.based(root.z);
+      if (better.base !== root.base && size(better.offset) < 0.5 * size(root.offset)) Object.assign(root, better);
+    });
+    const bright = roots.every((root, i) => settled[i] || size(root.z) < FAINT);
+    const sum = roots.reduce((total, root) => add(total, root.z), [0, 0]);
+    if (!bright || size(minus(sum, this.sumOfPoles(law, all))) > FAINT / 4) return null;
+    return roots.map(({ z, base, offset }) => ({ z, growth: this.growth(base, offset, z) }));
+  }
+
+  // What all poles add up to, by the two highest powers of z in F times its poles: none is missing then
+  sumOfPoles({ K1, K2, Kp }, all) {
+    const sum = all.reduce((total, { b, n }) => add(total, times(n, b)), [0, 0]);
+    if (this.delay) return sum;
+    const first = this.rigid.map(([twice], o) => {
+      const residues = this.residues[o];
+      let total = this.static[o] + twice * this.ramps[0];
+      for (let i = 0; i < this.b.length; i++) total += residues[2 * i] * this.early[i][0] - residues[2 * i + 1] * this.early[i][1];
+      return total;
+    });
+    const rate = this.smoothing === null ? first[1] : first[0] * (1 - this.smoothing) / this.period;
+    return minus(sum, [Kp * first[0] + K1 * rate + K2 * first[2], 0]);
+  }
+
+  // z as an offset from the pole of the plant that is nearest
+  based(z) {
+    let base = 0;
+    this.b.forEach((b, i) => { if (size(minus(z, b)) < size(minus(z, this.b[base]))) base = i; });
+    return { z, base, offset: minus(z, this.b[base]) };
+  }
+
+  // ln|z|, resolved below the last bit of 1
+  growth(base, offset, z) {
+    if (size(this.b[base]) < 0.2) return Math.log(Math.max(size(z), 1e-300));
+    const ratio = div(offset, this.b[base]);
+    return this.p[base][0] * this.period + Math.log1p(2 * ratio[0] + ratio[0] ** 2 + ratio[1] ** 2) / 2;
+  }
+}
+
+// The slew under any gains, as `tfarm simulate` makes it: exact steps of the modal amplitudes, converters and all
+class Slew {
+  constructor(data) {
+    Object.assign(this, data);
+    const p = doubles(data.eigenvalues), m = p.length / 2;
+    this.m = m;
+    this.p = [...Array(m).keys()].map(i => pair(p, i));
+    this.w = doubles(data.residues);
+    this.ideal = doubles(data.ideal);
+    this.n = this.ideal.length / 4;
+    this.shapes = doubles(data.shapes);
+    this.early = this.steps((1 - this.fraction) * this.period);
+    this.late = this.steps(this.fraction * this.period);
+  }
+
+  // e^{pt} and (e^{pt} - 1)/p of every pole, one after the other
+  steps(t) {
+    const found = { t, turn: new Float64Array(2 * this.m), push: new Float64Array(2 * this.m) };
+    this.p.forEach((p, i) => { found.turn.set(exp(times(t, p)), 2 * i); found.push.set(held(p, t), 2 * i); });
+    return found;
+  }
+
+  advance(a, rigid, { t, turn, push }, u) {
+    for (let i = 0; i < a.length; i += 2) {
+      const re = turn[i] * a[i] - turn[i + 1] * a[i + 1] + push[i] * u, im = turn[i] * a[i + 1] + turn[i + 1] * a[i] + push[i + 1] * u;
+      a[i] = re;
+      a[i + 1] = im;
+    }
+    rigid[0] += t * rigid[1] + t * t * u / 2;
+    rigid[1] += t * u;
+  }
+
+  // Output number o under the torque u that acts
+  read(o, a, rigid, u) {
+    let value = this.rigid[o][0] * rigid[0] + this.rigid[o][1] * rigid[1] + this.static[o] * u;
+    for (let i = 0, k = 2 * o * this.m; i < a.length; i += 2) value += this.w[k + i] * a[i] - this.w[k + i + 1] * a[i + 1];
+    return value;
+  }
+
+  quantise(x, row) {
+    const [step, low, high] = this.converters[row], even = q => q - Math.floor(q) === 0.5 ? 2 * Math.round(q / 2) : Math.round(q);
+    const near = step ? even(x / step) * step : x; // halves to the even step, as IEEE has it
+    return Math.min(Math.max(near, low ?? -Infinity), high ?? Infinity);
+  }
+
+  // u = r + Kp (theta_ref - theta) + K1 (theta_t_ref - theta_t) - K2 (M - M_rigid)
+  torque({ K1, K2, Kp }, k, angle, rate, moment) {
+    const f = this.single ? Math.fround : x => x, [r, theta, speed, rigid] = [0, 1, 2, 3].map(i => f(this.ideal[4 * k + i]));
+    const servo = f(f(r + f(f(Kp) * f(theta - f(angle)))) + f(f(K1) * f(speed - f(rate))));
+    return f(servo - f(f(K2) * f(f(moment) - rigid)));
+  }
+
+  // All samples: amplitudes, rigid motion and torques at each; it stops where the arm is folded up
+  run(law) {
+    const { n, m, delay } = this, a = new Float64Array(2 * m), rigid = [0, 0], u = new Float64Array(n), late = k => k < 0 ? 0 : u[k];
+    const found = { amplitudes: new Float64Array(2 * m * n), rigid: [], torque: u, moment: [], angle: [], tip: [], n, stopped: null };
+    let before = 0, rate = 0;
+    for (let k = 0; k < n; k++) {
+      const acting = late(k - delay - 1), [theta, speed, M] = [0, 1, 2].map(o => this.read(o, a, rigid, acting));
+      if (!(Math.abs(M) <= this.bound)) { found.n = k; found.stopped = k * this.period; break; }
+      found.amplitudes.set(a, 2 * m * k);
+      found.rigid.push([...rigid]);
+      [found.angle, found.moment, found.tip].forEach((list, i) => list.push(this.read([3, 5, 6][i], a, rigid, acting)));
+      const angle = this.quantise(theta, 0), moment = this.quantise(M, 1), s = this.smoothing;
+      rate = s === null ? speed : s * rate + (1 - s) * (angle - (k ? before : angle)) / this.period;
+      before = angle;
+      u[k] = this.quantise(this.torque(law, k, angle, rate, moment), 2);
+      if (this.fraction) this.advance(a, rigid, this.late, acting);
+      this.advance(a, rigid, this.early, late(k - delay));
+    }
+    return found;
+  }
+
+  // Root moment and torque at their largest, what rings on after the slew, and when it is settled: tfarm.dsp.results
+  figures({ moment, torque, n, stopped }) {
+    const largest = list => list.reduce((top, x) => Math.max(top, Math.abs(x)), 0), T = this.period, top = largest(moment);
+    const after = moment.map((x, k) => x - this.ideal[4 * k + 3]).filter((_, k) => k * T >= this.rise * (1 - 1e-12));
+    let last = n - 1;
+    while (last >= 0 && !(Math.abs(moment[last]) > 0.05 * top)) last -= 1;
+    const settled = stopped !== null || last === n - 1 ? Infinity : (last + 1) * T;
+    return { moment: top, torque: largest(torque.slice(0, n)), residual: after.length ? Math.sqrt(after.reduce((sum, x) => sum + x * x, 0) / after.length) : 0, settled };
+  }
+
+  // The state at any time t [s]: amplitudes, rigid motion, and the torque that acts
+  at(found, t) {
+    const k = Math.min(Math.max(Math.floor(t / this.period), 0), found.n - 1), late = this.fraction * this.period, rest = t - k * this.period;
+    const a = found.amplitudes.slice(2 * this.m * k, 2 * this.m * (k + 1)), rigid = [...found.rigid[k]], held = j => j < 0 ? 0 : found.torque[j];
+    const before = Math.min(rest, late), after = rest - before;
+    if (before > 0) this.advance(a, rigid, this.steps(before), held(k - this.delay - 1));
+    if (after > 0) this.advance(a, rigid, this.steps(after), held(k - this.delay));
+    return { a, rigid, u: rest > late ? held(k - this.delay) : held(k - this.delay - 1), k };
+  }
+
+  // The fastest mode [rad/s] that rings with a hundredth of the root moment's range: amplitudes about their rest u/p
+  fastest({ amplitudes, torque, moment, n }) {
+    const range = Math.max(...moment) - Math.min(...moment);
+    let top = 0;
+    this.p.forEach((p, j) => {
+      const weight = size(pair(this.w, 5 * this.m + j));
+      let ring = 0;
+      for (let k = 0; k < n; k++) ring = Math.max(ring, size(add(pair(amplitudes, k * this.m + j), div([torque[k], 0], p))));
+      if (p[1] > -p[0] && 2 * ring * weight > range / 100) top = Math.max(top, p[1]);
+    });
+    return top;
+  }
+
+  // Hub angle, root moment and tip (less that of a rigid arm at its reference) at the samples and `between` times in each
+  traces(found, between) {
+    const t = [], angle = [], moment = [], tip = [], pieces = [], T = this.period, late = this.fraction * T;
+    const ends = [...Array(between).keys()].map(i => T * (i + 1) / (between + 1));
+    for (const end of [...new Set([...ends, late])].filter(x => x > 0).sort((a, b) => a - b)) {
+      const from = pieces.length ? pieces[pieces.length - 1].end : 0;
+      pieces.push({ end, early: end > late, kept: ends.includes(end), step: this.steps(end - from) });
+    }
+    const push = (time, state) => {
+      const row = 4 * Math.min(Math.floor(time / T + 1e-9), this.n - 1), rest = time - row / 4 * T;
+      const slope = row + 6 < this.ideal.length ? (this.ideal[row + 6] - this.ideal[row + 2]) / T : 0;
+      t.push(time);
+      angle.push(this.read(3, ...state));
+      moment.push(this.read(5, ...state));
+      tip.push(this.read(6, ...state) - this.reach * (this.ideal[row + 1] + rest * (this.ideal[row + 2] + slope * rest / 2)));
+    };
+    for (let k = 0; k < found.n; k++) {
+      const a = found.amplitudes.slice(2 * this.m * k, 2 * this.m * (k + 1)), rigid = [...found.rigid[k]], u = j => j < 0 ? 0 : found.torque[j];
+      push(k * T, [a, rigid, u(k - this.delay - 1)]);
+      if (k < found.n - 1) for (const { end, early, kept, step } of pieces) {
+        const acting = u(k - this.delay - (early ? 0 : 1));
+        this.advance(a, rigid, step, acting);
+        if (kept) push(k * T + end, [a, rigid, acting]);
+      }
+    }
+    return { t, angle, moment, tip };
+  }
+
+  // Hub angle [rad] and deflection [m] from the line that turns with it, at the stations along the arm
+  shape({ a, rigid, u }) {
+    const angle = this.read(3, a, rigid, u), k = 2 * 6 * this.m, turned = this.rigid[3][0] * rigid[0] + this.rigid[3][1] * rigid[1];
+    const deflection = this.x.map((x, i) => {
+      let total = (x + this.offset) * (turned - angle);
+      for (let j = 0; j < this.m; j++) {
+        const [re, im] = mul(pair(this.shapes, i * this.m + j), [this.w[k + 2 * j], this.w[k + 2 * j + 1]]);
+        total += re * a[2 * j] - im * a[2 * j + 1];
+      }
+      return total;
+    });
+    return { angle, deflection };
+  }
+}
+if (typeof window !== "undefined") Object.assign(window, { SampledLoop, Slew });

@@ -1,0 +1,101 @@
+// What the charts of the live page draw: rows for Vega, of numbers by LiveLoop and SampledLoop.
+"use strict";
+const dB = x => 20 * Math.log10(x), hertz = w => w / (2 * Math.PI), clip = (x, a, b) => Math.min(Math.max(x, a), b);
+const RATIOS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5], DISC_RATIOS = [0.02, 0.1, 0.3, 0.6];
+const dampingRatio = ([re, im]) => im ? general(-re / Math.sqrt(re * re + im * im), 4) : "";
+
+// Where a gain is along its axis, 0 to 1, and back: logarithmic away from 0
+const stretched = ({ linear }, x) => linear === null ? x : Math.sign(x) * Math.log1p(Math.abs(x) / linear);
+const place = (axis, x) => (stretched(axis, x) - stretched(axis, axis.low)) / (stretched(axis, axis.high) - stretched(axis, axis.low));
+function gainAt(axis, share, digits = 4) {
+  const y = stretched(axis, axis.low) + share * (stretched(axis, axis.high) - stretched(axis, axis.low));
+  return +(axis.linear === null ? y : Math.sign(y) * axis.linear * Math.expm1(Math.abs(y))).toPrecision(digits);
+}
+
+// The curve over w: points that would not be told apart left out, others put in where L turns (`fine`)
+function curveOf(loop, law, points, fine) {
+  const rows = [], small = L => times(1 / (1 + size(L)), L), apart = fine ? 2e-5 : 1e-3;
+  let branch = 0, last = null;
+  const push = point => {
+    const [D, N] = point.both || loop.parts(point, law), L = div(N, D), abs = Math.max(size(L), 1e-12), angle = degrees(times(-1, L));
+    if (last && Math.abs(angle - last.angle) > 180) branch += 1;
+    const sum = Math.max(size(add(D, N)), 1e-300);
+    last = { w: point.w, x: L[0], y: L[1], abs, dB: dB(abs), angle, branch, S: dB(size(D) / sum), T: dB(Math.max(size(N) / sum, 1e-12)) };
+    rows.push(last);
+  };
+  for (const point of points) {
+    if (point.w < loop.places[0] / 200 || (last && point.w < last.w * (1 + apart))) continue;
+    if (last && fine) {
+      const [D, N] = point.both, from = last.w;
+      const steps = Math.min(12, Math.ceil(size(minus(small(div(N, D)), small([last.x, last.y]))) / 0.03));
+      for (let k = 1; k < steps; k++) push(loop.at(from + (point.w - from) * k / steps));
+    }
+    push(point);
+  }
+  return rows;
+}
+
+// Margins as lines; of each kind one without length: Vega asks every set for its range
+function stems(margins, w) {
+  const none = ["gain", "phase", "peak"].map(kind => ({ w, kind, low: 0, high: 0 }));
+  if (!margins) return none;
+  const gain = margins.crossovers.filter(row => row.w > 0).map(({ w, factor }) => ({ w, kind: "gain", low: Math.max(-dB(factor), -80), high: 0 }));
+  const phase = margins.crossed.map(({ w, angle }) => ({ w, kind: "phase", low: 0, high: angle }));
+  const peak = [margins.peak_sensitivity, margins.peak_complementary].map(({ value, at }) => ({ w: at, kind: "peak", low: 0, high: dB(value) }));
+  return [...none, ...gain, ...phase, ...peak.filter(row => row.w > 0 && Number.isFinite(row.high))];
+}
+function rings(margins) {
+  const circle = (ring, centre, radius) => [...Array(121).keys()].map(t => ({ t, ring, x: centre + radius * Math.cos(t * Math.PI / 60), y: radius * Math.sin(t * Math.PI / 60) }));
+  const a = margins ? margins.disk.value / 2 : 1; // no L within |1 + L| = a |1 - L|
+  const disk = a < 0.9 ? circle("disk margin", -(1 + a * a) / (1 - a * a), 2 * a / (1 - a * a)) : [];
+  return [...circle("unit circle", 0, 1), ...disk];
+}
+
+// Lines of equal damping ratio, in s up to `top` and in z
+function rays({ x, y }) {
+  return RATIOS.flatMap(ratio => {
+    const slope = ratio / Math.sqrt(1 - ratio * ratio), im = Math.min(y[1], -x[0] / slope);
+    return [{ ratio, re: 0, im: 0, at: 0, end: false }, { ratio, re: -slope * im, im, at: 1, end: true }];
+  });
+}
+function spirals() {
+  return DISC_RATIOS.flatMap(ratio => [-1, 1].flatMap(side => [...Array(49).keys()].map(k => {
+    const q = Math.PI * k / 48, r = Math.exp(-ratio / Math.sqrt(1 - ratio * ratio) * q);
+    return { ratio: side * ratio, re: r * Math.cos(q), im: side * r * Math.sin(q), at: k };
+  })));
+}
+const unitCircle = () => [...Array(121).keys()].map(q => ({ q, re: Math.cos(q * Math.PI / 60), im: Math.sin(q * Math.PI / 60) }));
+
+// The curve of gains with a pole on the axis, or on the unit circle: `at(w)` is a point of it; halved where it is coarse, cut where it leaves the map
+function edgeOf(at, frequencies, { K1, K2 }) {
+  const found = [], placed = row => [place(K1, row.K1), place(K2, row.K2)], seen = ([x, y]) => x > -0.1 && x < 1.1 && y > -0.1 && y < 1.1;
+  let piece = 0;
+  const trace = (a, b, depth) => {
+    if (!a || !b) return;
+    const [p, q] = [placed(a), placed(b)], long = size(minus(p, q));
+    if (!(seen(p) || seen(q))) return;
+    if (long > 0.02 && depth) {
+      const middle = at((a.w + b.w) / 2);
+      trace(a, middle, depth - 1);
+      trace(middle, b, depth - 1);
+    } else if (long < 0.2) {
+      if (!found.length || found[found.length - 1].w !== a.w) found.push({ ...a, piece: ++piece });
+      found.push({ ...b, piece });
+    }
+  };
+  const rows = frequencies.map(at);
+  rows.slice(1).forEach((row, i) => trace(rows[i], row, 8));
+  return found;
+}
+
+// Rows of a signal over time: as it is where a screen can show that, else its least and largest value in each pixel
+function shownOver(t, y, pixels) {
+  if (t.length <= 2 * pixels) return t.map((each, i) => ({ t: each, y: y[i], i }));
+  const rows = [], step = Math.ceil(t.length / pixels);
+  for (let k = 0; k < t.length; k += step) {
+    let low = k, high = k;
+    for (let i = k; i < Math.min(k + step, t.length); i++) { if (y[i] < y[low]) low = i; if (y[i] > y[high]) high = i; }
+    for (const i of [Math.min(low, high), Math.max(low, high)]) rows.push({ t: t[i], y: y[i], i: rows.length });
+  }
+  return rows;
+}
