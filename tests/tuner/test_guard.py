@@ -13,7 +13,7 @@ from tests.dsp.roads import aliased_loop
 from tfarm.arm import HubFeedback
 from tfarm.dsp import Chain, Sampling, sampled_loop
 from tfarm.errors import CertificationError, ParameterError
-from tfarm.tuner import find_guard, slew_trial
+from tfarm.tuner import find_guard, guard, slew_trial
 from tfarm.tuner.guard import is_quiet
 from tfarm.tuner.lyapunov import common_lyapunov, is_positive_definite, whole
 from tfarm.tuner.sector import SHARE, MovingGain
@@ -34,6 +34,11 @@ def moving(arm, count=6, delay=0.0):
 @pytest.fixture(scope="module")
 def loop(lab):
     return moving(lab)
+
+
+def test_gains_of_a_tuner_are_those_that_hold_from_0_to_10(monkeypatch, lab):
+    monkeypatch.setattr(guard, "stable_windows", lambda loop, vary: [(-3.0, -1.0), (-0.5, 0.4), (0.6, 12.0)])
+    assert guard.gain_windows(sampled_loop(lab, HubFeedback(K1=0.3), count=2)) == [(0.0, 0.4), (0.6, 10.0)]
 
 
 @pytest.mark.parametrize(("lo", "hi"), [(0.1, 0.326), (0.2, 0.49), (0.3, 0.642)])
