@@ -166,28 +166,44 @@ class SampledJudge:
         chain = self.loop.chain
         return scenario("slew", self.known, chain, chain.slew.rise_time + lasting)
 
-    def _run(self, task: Scenario, K1: Real, K2: Real) -> tuple[Real, Real]:
-        """Root moment and input at the samples of a slew, (samples, gains)."""
-        bare, Kp = self.loop.having(K1=0.0, K2=0.0), self.loop.gains.Kp
+    @cached_property
+    def _with_angle(self) -> tuple[Real, Real, Real, Real, Real]:
+        """Closed-loop matrices with the hub angle: without K1 and K2, what 1 of each adds; input, root moment."""
+        bare = self.loop.having(K1=0.0, K2=0.0)
         start = bare.matrix()
         by_rate, by_moment = (bare.having(**{name: 1.0}).matrix() - start for name in ("K1", "K2"))
-        A = start + K1[:, None, None] * by_rate + K2[:, None, None] * by_moment
         _, B, C = self.loop.pulse.matrices()
-        drive, sense = np.zeros(len(start)), np.zeros(len(start))
-        drive[: B.size], sense[: B.size] = B, C[FED_BACK.index("root_moment")]
-        kept = B.size - 1 - self.loop.chain.sampling.whole_delay  # the state that keeps the input of the sample before
+        more = len(start) - B.size
+        return start, by_rate, by_moment, np.pad(B, (0, more)), np.pad(C[FED_BACK.index("root_moment")], (0, more))
+
+    @cached_property
+    def _keeps(self) -> int:
+        """The state that keeps the input of the sample before."""
+        upper, real = self.loop.pulse.kept()
+        return int(2 * upper.size + real.size + 2)
+
+    def _run(self, task: Scenario, K1: Real, K2: Real) -> tuple[Real, Real]:
+        """Root moment and input at the samples of a slew, (samples, gains)."""
+        start, by_rate, by_moment, drive, sense = self._with_angle
+        A = start + K1[:, None, None] * by_rate + K2[:, None, None] * by_moment
+        kept = self._keeps
         x, (moment, u) = np.zeros((K1.size, len(start), 1)), np.zeros((2, task.t.size, K1.size))
-        fixed = task.feedforward + Kp * task.hub_angle
+        fixed = task.feedforward + self.loop.gains.Kp * task.hub_angle
         for k in range(task.t.size):
             moment[k] = x[..., 0] @ sense
             x = A @ x + drive[:, None] * (fixed[k] + K1 * task.hub_rate[k] + K2 * task.rigid_moment[k])[:, None, None]
             u[k] = x[:, kept, 0]
         return moment, u
 
+    @cached_property
+    def _slew(self) -> Scenario:
+        """The slew, and a period of the first mode."""
+        period = 2 * np.pi / first_frequency(self.loop.plant.arm)
+        return self._task(max(period, SAMPLES_LEFT * self.loop.chain.sampling.period))
+
     def residual(self, K1: Real, K2: Real) -> Real:
         """Root mean square of the root moment [N m] over a period of the first mode after the slew."""
-        period = 2 * np.pi / first_frequency(self.loop.plant.arm)
-        task = self._task(max(period, SAMPLES_LEFT * self.loop.chain.sampling.period))
+        task = self._slew
         moment, _ = self._run(task, K1, K2)
         return np.asarray(np.sqrt((moment[task.t >= task.busy_until * (1 - 1e-12)] ** 2).mean(axis=0)))
 
