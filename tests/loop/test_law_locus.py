@@ -33,8 +33,8 @@ def test_along_a_gain_at_the_hub_it_is_the_locus_of_that():
     ("vary", "start", "stop"), [("gain", 0.5, 8.0), ("delay", 0.012, 0.001), ("payload_mass", 0.05, 0.5)]
 )
 def test_each_value_has_its_complete_list_of_poles(vary, start, stop):
-    found = law_locus(LAB, LAW, vary, start, stop, 12, 3)
-    for n in (0, 5, 11):
+    found = law_locus(LAB, LAW, vary, start, stop, 6, 3)
+    for n in (0, 2, 5):
         value = float(found.values[n])
         arm = LAB.having(payload_mass=value) if vary == "payload_mass" else LAB
         law = LAW if vary == "payload_mass" else LAW.having(vary, value)

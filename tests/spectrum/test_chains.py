@@ -33,9 +33,9 @@ def test_twenty_frequencies_of_random_rigs():
 
 
 def test_damped_modes_of_random_rigs():
-    verdicts = [judge_damped(arm, 3, certify=n == 0) for n, arm in enumerate(rigs(12, 3, damped=True, segments=2))]
+    verdicts = [judge_damped(arm, 3, certify=n == 0) for n, arm in enumerate(rigs(6, 3, damped=True, segments=2))]
     assert [each.reason for each in verdicts if each.outcome != "right"] == []
-    assert sum(each.inside for each in verdicts) >= 6
+    assert sum(each.inside for each in verdicts) >= 3
 
 
 def test_a_prescribed_angle_has_the_modes_of_a_locked_hub():
