@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,6 @@ from tfarm.arm.checks import whole
 from tfarm.arm.law import Law
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
-from tfarm.response.signals import Signals
 from tfarm.spectrum.box import Box, newton, zeros_in_box
 
 from .answers import law_answer
@@ -80,7 +80,7 @@ def law_locus(
             raise ParameterError(key=key, value=value, remedy="a finite number")
     if start == stop:
         raise ParameterError(key="to", value=stop, remedy="the range is empty: a locus runs to another value")
-    family, values = Family(arm, law, vary), np.linspace(start, stop, points)
+    family, values = Family(arm, law, vary, start), np.linspace(start, stop, points)
     box, first = family.started(values, branches)
     rows = [np.r_[each, np.full(points - 1, np.nan)] for each in first[:, None].astype(complex)]
     now = list(range(len(rows)))  # the row of each pole
@@ -106,6 +106,7 @@ class Family:
     arm: Arm
     law: Law
     vary: str
+    start: float
 
     @property
     def is_of_arm(self) -> bool:
@@ -116,7 +117,12 @@ class Family:
         """The loop where the number has that value."""
         if self.is_of_arm:
             return LawLoop(self.arm.having(**{self.vary: value}), self.law)
-        return LawLoop(self.arm, self.law.having(self.vary, value))
+        return self._first.under(self.law.having(self.vary, value))
+
+    @cached_property
+    def _first(self) -> LawLoop:
+        """The loop where the way begins, of whose rig the others are."""
+        return LawLoop(self.arm, self.law.having(self.vary, self.start))
 
     def started(self, values: Real, branches: int) -> tuple[Box, Complex]:
         """A box for the whole way, and the poles in it at the first value."""
@@ -220,10 +226,10 @@ def _others(family: Family, values: Real, known: list[BranchCrossing], band: flo
     """Crossings solved for by D-decomposition that no branch was seen to make."""
     loop, ascending = family.at(float(values[0])), np.sort(values)
     omega = np.asarray(grid(loop.arm, band))
-    parts = Signals(loop.arm, loop.law.signals).parts(1j * omega)
+    parts = loop.signals.parts(1j * omega)
     found, span = [], float(ascending[-1] - ascending[0])
     way = 1 if values[-1] > values[0] else -1
-    for t, w, change in along(loop.arm, family.law, family.vary, ascending, omega, parts, band):
+    for t, w, change in along(loop, family.vary, ascending, omega, parts, band):
         same = [abs(each.gain - t) <= SAME * span and abs(each.omega - w) <= SAME * band for each in known]
         if TINY * span < t - ascending[0] < (1 - TINY) * span and not any(same):
             direction = "unstable" if way * change > 0 else "stable"

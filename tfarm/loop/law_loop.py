@@ -8,9 +8,9 @@ its zeros can be counted.  Where the law and the rig share a zero and a pole D k
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,10 +38,14 @@ FALLS = 0.5  # L must fall by this there, from one to the next
 @dataclass(frozen=True)
 @record
 class LawLoop:
-    """A rig under a law in s.  Raises ParameterError for a locked hub, a law in z, and an algebraic loop."""
+    """A rig under a law in s.  Raises ParameterError for a locked hub, a law in z, and an algebraic loop.
+
+    `signals` are what is fed back: made unless they are given, as `under` gives those of another law.
+    """
 
     arm: Arm
     law: Law
+    signals: Signals = field(default=cast("Signals", None), repr=False, compare=False)
 
     def __post_init__(self) -> None:
         must_be_arm(self.arm)
@@ -53,13 +57,14 @@ class LawLoop:
         if self.law.is_discrete:
             remedy = "a law in z acts at samples: ask for the sampled loop, or leave the period out of a law in s"
             raise ParameterError(key="period", value=self.law.period, remedy=remedy)
-        _ = self.signals.outputs  # refuses unknown ones
+        given: Signals | None = self.signals
+        if given is None or given.names != self.law.signals or given.arm != self.arm:
+            object.__setattr__(self, "signals", Signals(self.arm, self.law.signals))
         self._must_fall()
 
-    @cached_property
-    def signals(self) -> Signals:
-        """What is fed back."""
-        return Signals(self.arm, self.law.signals)
+    def under(self, law: Law) -> LawLoop:
+        """The same rig under another law: what its signals are at rest is not worked out again."""
+        return LawLoop(self.arm, law, self.signals)
 
     @property
     def k(self) -> System:

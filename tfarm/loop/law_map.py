@@ -19,7 +19,6 @@ from tfarm.crossing import Crossing, Crossings, brackets, counts_over, solved
 from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import LoopParts
 from tfarm.records import record
-from tfarm.response.signals import Signals
 from tfarm.spectrum.box import Box, winding_number
 from tfarm.spectrum.scales import first_frequency
 
@@ -89,23 +88,23 @@ def law_map(arm: Arm, law: Law, vary: tuple[str, str], x: Real, y: Real, band: f
     if vary[1] == "delay":
         turned = law_map(arm, law, (vary[1], vary[0]), y, x, band)
         return LawMap(turned.arm, law, vary, x, y, turned.unstable.T.copy(), turned.band, [])
-    arm = LawLoop(arm, law).arm
+    own = LawLoop(arm, law)
     if band is None:
         corners = [law.having(vary[0], a).having(vary[1], b) for a in (x[0], x[-1]) for b in (y[0], y[-1])]
-        band = max(band_for(LawLoop(arm, each)) for each in corners)
-    omega = np.asarray(grid(arm, band))
-    known = Signals(arm, law.signals).parts(1j * omega)
-    columns = [along(arm, law.having(vary[0], float(value)), vary[1], y, omega, known, band) for value in x]
+        band = max(band_for(own.under(each)) for each in corners)
+    omega = np.asarray(grid(own.arm, band))
+    known = own.signals.parts(1j * omega)
+    columns = [along(own.under(law.having(vary[0], float(value))), vary[1], y, omega, known, band) for value in x]
     at, start = _clear_row(y, columns), x.size // 2
     row = law.having(vary[1], float(y[at]))
     if vary[0] == "delay":
-        there = [unstable_below(LawLoop(arm, row.having(vary[0], float(value))), band) for value in x]
+        there = [unstable_below(own.under(row.having(vary[0], float(value))), band) for value in x]
     else:
-        across = along(arm, row, vary[0], x, omega, known, band)
-        first = unstable_below(LawLoop(arm, row.having(vary[0], float(x[start]))), band)
+        across = along(own.under(row), vary[0], x, omega, known, band)
+        first = unstable_below(own.under(row.having(vary[0], float(x[start]))), band)
         (there,) = counts_over(x, [across], float(x[start]), np.array([first]))
     counts = counts_over(y, columns, float(y[at]), np.asarray(there))
-    return LawMap(arm, law, vary, x, y, counts.T.copy(), band, columns)
+    return LawMap(own.arm, law, vary, x, y, counts.T.copy(), band, columns)
 
 
 def unstable_below(loop: LawLoop, band: float) -> int:
@@ -117,10 +116,13 @@ def unstable_below(loop: LawLoop, band: float) -> int:
     return winding_number(loop.function, Box(0.0, right, -band, band), POINTS)
 
 
-def along(arm: Arm, law: Law, name: str, values: Real, omega: Real, known: LoopParts, band: float) -> Crossings:
-    """The crossings of the axis along one number, between its first and last value: D = A + t B, 0 < t < 1."""
+def along(loop: LawLoop, name: str, values: Real, omega: Real, known: LoopParts, band: float) -> Crossings:
+    """The crossings of the axis along one number of a loop's law, between its first and last value.
+
+    D = A + t B, 0 < t < 1; `known` are the parts of the loop's signals at `omega`.
+    """
     low, span = float(values[0]), float(values[-1] - values[0])
-    first, last = (LawLoop(arm, law.having(name, float(end))) for end in (values[0], values[-1]))
+    first, last = (loop.under(loop.law.having(name, float(end))) for end in (values[0], values[-1]))
 
     def ends(s: Complex, of_rig: LoopParts) -> tuple[Complex, Complex]:
         return first.characteristic(s, of_rig), last.characteristic(s, of_rig)
@@ -134,24 +136,24 @@ def along(arm: Arm, law: Law, name: str, values: Real, omega: Real, known: LoopP
     (before,), ways = brackets((A * (end - A).conj()).imag)
     place, t = solved(parts, omega[before], omega[before + 1])
     found = [Crossing(low + span * t, w, n) for t, w, n in zip(t, place, ways, strict=True)]
-    slow = np.concatenate([float(omega[0]) * np.array(NEAR), first_frequency(arm) * np.array(ORDER)]).astype(complex)
+    slow = np.concatenate([float(omega[0]) * np.array(NEAR), first_frequency(loop.arm) * np.array(ORDER)]).astype(
+        complex
+    )
     A, end = ends(slow, first.signals.parts(slow))
     rest = _at_rest(A[:2], end[:2])
     if rest is not None and 0 < rest.t < 1:
         zero, half = abs((A + rest.t * (end - A))[2:])
-        change = rest.change if zero < SIMPLE * half else _change_at(arm, law, name, low, span, rest.t, found, band)
+        change = rest.change if zero < SIMPLE * half else _change_at(loop, name, low, span, rest.t, found, band)
         found.append(Crossing(low + span * rest.t, 0.0, change))
     return Crossings.of(found)
 
 
-def _change_at(
-    arm: Arm, law: Law, name: str, low: float, span: float, t: float, others: list[Crossing], band: float
-) -> int:
+def _change_at(loop: LawLoop, name: str, low: float, span: float, t: float, others: list[Crossing], band: float) -> int:
     """By how much the count grows at t where two poles meet at s = 0, from counts on either side."""
     at = low + span * t
     away = [abs(each.t - at) for each in others if each.t != at]
     step = min([BESIDE * span, *(each / 2 for each in away)])
-    below, above = (unstable_below(LawLoop(arm, law.having(name, at + side * step)), band) for side in (-1, 1))
+    below, above = (unstable_below(loop.under(loop.law.having(name, at + side * step)), band) for side in (-1, 1))
     return above - below
 
 
