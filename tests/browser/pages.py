@@ -224,6 +224,32 @@ def test_loci_have_the_poles_of_their_gains(browser, folder, name):
         assert not opened.said
 
 
+@pytest.mark.parametrize("kind", ["displacement", "moment"])
+def test_a_sensor_sees_the_modes_and_has_the_zeros_of_its_place(browser, folder, kind):
+    arm = tfarm.load(ARMS[0])
+    with Opened(browser, folder / ARMS[0] / "live.html") as opened:
+        page = opened.page
+        show_chart(page, "sensor")
+        page.locator("#sensor-kind").select_option(kind)
+        page.locator("#sensor-at").fill("9")
+        held = page.evaluate("JSON.parse(document.getElementById('live-data').textContent)")["sensor"][kind]
+        x = held["x"][9]
+        rows = page.evaluate(
+            "['modes', 'zeros'].map(n => [...document.querySelectorAll(`#sensor-${n} tr`)]"
+            ".map(row => [...row.cells].map(cell => cell.textContent)))"
+        )
+        places = np.linspace(0.0, arm.length, 17)
+        modes = tfarm.modes(arm, count=len(rows[0]))
+        field = modes.shape if kind == "displacement" else modes.moment
+        seen = field(np.array([x]))[1:, 0] / abs(field(places)[1:]).max(axis=1)
+        assert [row[3] for row in rows[0]] == [f"{each:.3f}".replace("-0.000", "0.000") for each in seen]
+        zeros = tfarm.transfer(arm, kind, x=x).zeros(up_to=held["band"]).values
+        for re, im, *_ in rows[1][:3]:
+            s = complex(float(re), float(im))
+            assert abs(zeros - s).min() < 1e-4 * abs(s)
+        assert not opened.said
+
+
 @pytest.mark.parametrize("motion", ["no-preference", "reduce"])
 def test_the_player_plays_when_asked_and_is_still_for_who_wants_that(browser, folder, motion):
     with Opened(browser, folder / ARMS[0] / "live.html", motion=motion) as opened:

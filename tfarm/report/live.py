@@ -20,7 +20,7 @@ from tfarm.report.page import TEMPLATES, argument, is_preset, render
 PAGE, ASSETS = "live.html", "assets"
 RUNTIME, SCRIPT = f"vega-{vl_convert.get_vega_version()}.js", "live.js"
 BUNDLED = "window.vegaEmbed = vegaEmbed;"
-SCRIPTS = tuple(f"live_{name}.js" for name in ("loop", "sampled", "locus", "sets", "player", "page"))
+SCRIPTS = tuple(f"live_{name}.js" for name in ("loop", "sampled", "locus", "sets", "player", "sensor", "page"))
 
 
 def is_live(subject: Subject) -> bool:

@@ -15,6 +15,7 @@ INK, GREY, FAINT = "@ink", "@grey", "@faint"
 BLUE, ORANGE, GREEN = "@blue", "@orange", "@green"
 WIDE, LOW, SHALLOW, SQUARE = 620, 170, 100, 300  # pixels before the page fits them to its width
 REACH = 2.5  # of the Nyquist plane to either side of 0, before it is zoomed
+PLANE = {"re": "Re s [1/s]", "im": "Im s [rad/s]"}
 DISC = 1.25  # of the z-plane to either side of 0
 ANGLES = [-180, -90, 0, 90, 180]
 CROSS = "M-.7,-.7L.7,.7M-.7,.7L.7,-.7"
@@ -23,7 +24,7 @@ SHIFTED = "wheel![event.shiftKey]"  # so that a page can be scrolled over a char
 
 @cache
 def charts() -> dict[str, dict[str, Any]]:
-    """The compiled charts by name; the axes of "map", "poles" and "sensor" each page sets to its arm's."""
+    """The compiled charts by name; the axes of "map" and "poles" each page sets to its arm's."""
     made = {
         "bode": _bode(),
         "nyquist": _nyquist(),
@@ -31,6 +32,7 @@ def charts() -> dict[str, dict[str, Any]]:
         "zplane": _zplane(),
         "map": _map(),
         "slew": _slew(),
+        "sensor": _sensor(),
     }
     return {name: _compiled(chart) for name, chart in made.items()}
 
@@ -136,7 +138,7 @@ def _poles() -> Any:
         alt.Chart(_data("rays")).transform_filter("datum.end").mark_text(color=GREY, align="left", dx=3, fontSize=10)
     )
     axis = alt.Chart(alt.InlineData([{"x": 0}])).mark_rule(color=GREY).encode(x="x:Q")
-    tips = [alt.Tooltip("re:Q", title="Re s [1/s]"), alt.Tooltip("im:Q", title="Im s [rad/s]")]
+    tips = [alt.Tooltip(f"{key}:Q", title=title) for key, title in PLANE.items()]
     layers = (
         _grid(x, y),
         names.encode(x=x, y=y, text="ratio:N"),
@@ -194,6 +196,27 @@ def _slew() -> Any:
     )
     drawn = [alt.layer(*layers).properties(width=WIDE, height=SHALLOW) for layers in rows]
     return alt.vconcat(*drawn, spacing=8).resolve_scale(x="shared")
+
+
+def _sensor() -> Any:
+    """Zeros over the sensor's position, natural frequencies across, and the position that is looked at."""
+    x = alt.X("x:Q", title="sensor at x [m] from the clamp", scale=alt.Scale(nice=False))
+    y = alt.Y("w:Q", title="frequency [rad/s]", scale=alt.Scale(type="log", nice=False), axis=alt.Axis(format=".3~r"))
+    kinds = ["zero on or left of the imaginary axis", "zero right of it"]
+    legend = alt.Legend(columns=1, symbolType="circle", labelLimit=260)
+    colour = alt.Color("kind:N", scale=alt.Scale(domain=kinds, range=[GREEN, ORANGE]), legend=legend, title=None)
+    tips = [alt.Tooltip(f"{key}:Q", title=title) for key, title in (("x", "x [m]"), *PLANE.items())]
+    zeros = alt.Chart(_data("zeros")).mark_point(shape="circle", size=36, filled=False, strokeWidth=1.6)
+    modes = alt.Chart(_data("modes")).mark_rule(color=BLUE, strokeDash=[5, 3])
+    names = alt.Chart(_data("modes")).mark_text(color=BLUE, align="left", dx=4, fontSize=10)
+    here = alt.Chart(_data("here")).mark_rule(color=GREY)
+    layers = (
+        modes.encode(y=y),
+        names.encode(x=alt.value("width"), y=y, text="name:N"),
+        here.encode(x=x),
+        zeros.encode(x=x, y=y, color=colour, tooltip=tips),
+    )
+    return alt.layer(*layers).properties(width=SQUARE, height=SQUARE)
 
 
 def _trace(name: str, colour: str, title: str, x: Any) -> Any:

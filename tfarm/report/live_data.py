@@ -20,6 +20,7 @@ from tfarm.loop.plant import Loop
 from tfarm.loop.regions import Region, region
 from tfarm.loop.stability import loop_band, stability
 from tfarm.report.live_sampled import packed, sampled_numbers, slew_numbers
+from tfarm.report.live_sensor import sensor_numbers
 from tfarm.report.map import OUTSIDE, sampled_region
 from tfarm.spectrum.scales import angle_unit, default_gains
 
@@ -53,6 +54,7 @@ def live_data(arm: Arm, chain: Chain, law: HubFeedback | None = None) -> dict[st
         "sampled_map": None if sampled is None else _sampled(sampled, chain),
         "sampled_loop": None if sampled is None else sampled_numbers(sampled.loop),
         "slew": slew_numbers(arm, chain, law or reference),
+        "sensor": sensor_numbers(arm),
         "lyapunov": arm.is_uniform,
     }
 

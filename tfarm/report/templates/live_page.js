@@ -26,6 +26,7 @@
     nyquist: (now, fine) => ({ curve: now.curve(fine).filter(row => row.abs < 50), rings: rings(now.margins), cursor_at: [] }),
     slew: (now, fine) => slewSets(slew, now.run, fine ? Math.ceil(20 * slew.fastest(now.run) * slew.period / (2 * Math.PI)) : 0, $("slew").clientWidth),
   };
+  if (data.sensor) charts.sensor = () => sensor.sets();
   const made = name => name !== "slew" && name !== "zplane" || (name === "slew" ? slew : discrete);
 
   // A chart in the colours of the screen, with this arm's axes
@@ -172,7 +173,7 @@
     window.live.moves.push(performance.now() - start);
   }
   async function keepUp(fine) {
-    await Promise.all([...inView].filter(name => views[name]).map(name => update(name, fine)));
+    await Promise.all([...inView].filter(name => views[name] && name !== "sensor").map(name => update(name, fine)));
   }
   function update(name, fine) {
     const view = views[name];
@@ -264,6 +265,7 @@
     poles: () => readLocus("poles", "locus", row => `s = ${complex(row)} 1/s, ${general(hertz(row.im), 4)} Hz${row.im ? `, damping ratio ${dampingRatio([row.re, row.im])}` : ""}`),
     zplane: () => readLocus("zplane", "discs", row => `z = ${complex(row)}, |z| = ${general(size([row.re, row.im]), 5)}`),
     slew: () => player?.place(views.slew),
+    sensor: () => sensor.place(views.sensor),
   };
 
   for (const name of names) {
@@ -273,8 +275,8 @@
   $("reset").addEventListener("click", () => set(data.start));
   for (const id of ["vary", "shown"]) $(id).addEventListener("change", () => set({}));
   addEventListener("resize", () => { Object.keys(views).forEach(fit); set({}); });
-  const player = slew && makePlayer(slew, colours, now.run);
-  window.live = { loop, discrete, slew, law, player, moves: [], set, get now() { return now; }, rested: null };
+  const sensor = data.sensor && makeSensor(data.sensor, colours), player = slew && makePlayer(slew, colours, now.run);
+  window.live = { loop, discrete, slew, law, player, sensor, moves: [], set, get now() { return now; }, rested: null };
   show();
   const watcher = new IntersectionObserver(entries => {
     const came = entries.filter(each => each.isIntersecting).map(each => each.target.id);

@@ -1,0 +1,49 @@
+"""Sensors along the arm: zeros against the complete search in a box, and against the nodes of the modes."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import tfarm
+from tfarm.loop.positions import positions
+
+
+@pytest.mark.parametrize(("sensor", "share"), [("displacement", 0.6), ("moment", 0.3)])
+def test_zeros_are_those_of_the_complete_search(sensor, share):
+    """`zeros` counts them by the winding number around a box; slow real ones to the left are not looked for here."""
+    arm = tfarm.load("sasaki2012-lab")
+    x = share * arm.length
+    found = positions(arm, sensor, np.array([x]), 4)
+    all_zeros = tfarm.transfer(arm, sensor, x=x).zeros(up_to=found.band).values
+    wanted = all_zeros[(all_zeros.imag > 1e-6) | ((all_zeros.real > 1e-6) & (all_zeros.real < found.band))]
+    here = found.zeros[0]
+    assert len(here) == len(wanted) > 2
+    for s in wanted:
+        assert abs(here - s).min() < 1e-7 * abs(s)
+
+
+@pytest.mark.parametrize("name", ["sasaki2012", "quanser-2dsfl"])
+def test_a_sensor_at_a_node_has_the_mode_for_a_zero_and_sees_none_of_it(name):
+    arm = tfarm.load(name)
+    modes = tfarm.modes(arm, count=3)
+    node = modes.nodes[-1][0]
+    found = positions(arm, "displacement", np.array([node, arm.length]), 3)
+    assert found.participation[2, 0] == pytest.approx(0.0, abs=1e-9)
+    assert abs(found.zeros[0] - 1j * modes.natural_frequency[-1]).min() < 1e-7 * modes.natural_frequency[-1]
+
+
+def test_participation_is_the_shape_over_its_largest():
+    arm = tfarm.load("stocky-steel")
+    x = np.linspace(0.0, arm.length, 5)[1:]
+    found, modes = positions(arm, "displacement", x, 2), tfarm.modes(arm, count=2)
+    w = modes.shape(x)[1:]
+    assert found.participation == pytest.approx(w / abs(w).max(axis=1)[:, None])
+    assert found.natural_frequency == pytest.approx(modes.natural_frequency[1:])
+
+
+def test_an_arm_that_cannot_turn_has_no_such_zeros():
+    with pytest.raises(tfarm.ParameterError):
+        positions(tfarm.load("sasaki2012").having(hub_inertia=math.inf), "moment", np.array([0.1]), 2)

@@ -1,0 +1,135 @@
+"""Sensors along the arm: what each of many positions sees of every mode, and the zeros that it has.
+
+From the hub's input to a sensor at x the numerator N = G drive is a function along s = i w like those of `panels`:
+without poles or branches (but for s = -1/C), so that its zeros near the axis are those of polynomials through exact
+samples of it, and so are those near the positive real axis, which no law outruns.  A law at the hub leaves them where
+they are: it changes the drive alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from numpy.typing import NDArray
+
+from tfarm.arm import Arm, must_turn
+from tfarm.errors import ConvergenceError
+from tfarm.exact.characteristic import loop_parts
+from tfarm.exact.system import system_of
+from tfarm.loop.frequencies import band_of, steep_places
+from tfarm.loop.panels import BETWEEN, POINTS, SAMPLES
+from tfarm.records import record
+from tfarm.response import TransferFunction, transfer
+from tfarm.spectrum import modes
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complexfloating[Any, Any]]
+Sensor = Literal["displacement", "moment"]
+
+WRONG = 1e-8  # of the numerator on a panel, between samples: zeros are shown to five digits
+ROUNDING = 1e-13  # of the largest coefficient: a series ends where it is that
+BESIDE = 1.0  # of a panel's half width: how far from the axis zeros are looked for
+EDGE = 1e-7  # of a panel's half width: panels end at modes, where a sensor at a node has its zero
+SAME = 1e-5  # relative: a zero near both lines is found from both
+AT_REST = {"displacement": 0, "moment": 2}  # powers of s that a sensor's numerator has at s = 0
+AS_SERIES = np.cos(np.outer(np.arange(SAMPLES), np.arccos(POINTS))) * 2 / SAMPLES  # coefficients of Chebyshev's series
+AS_SERIES[0] /= 2
+STEEP = 4  # steep places a panel
+
+
+@dataclass(frozen=True)
+@record
+class Positions:
+    """Of the first flexible modes with `natural_frequency` (modes,) [rad/s] what a sensor at each `x` (n,) [m] from the
+    clamp sees: `participation` (modes, n), a mode's largest 1 in size.  `zeros` [1/s] of each position are those near
+    the imaginary and the positive real axis up to `band` [rad/s], with Im s >= 0.
+    """
+
+    sensor: Sensor
+    x: Real
+    band: float
+    natural_frequency: Real
+    participation: Real
+    zeros: tuple[Complex, ...]
+
+
+def positions(arm: Arm, sensor: Sensor, x: Real, count: int) -> Positions:
+    """Participation of the first `count` modes, and the zeros below the next, from hub input to a sensor at each x [m].
+
+    Raises ParameterError for an arm that cannot turn, ConvergenceError where the numerator is not resolved.
+    """
+    must_turn(arm)
+    found = modes(arm, count)
+    flexible = found.index > 0
+    field = (found.shape if sensor == "displacement" else found.moment)(x)[flexible]
+    band = band_of(arm, count)
+    lines = [_Panels.of(arm, sensor, unit, band) for unit in (1j, 1.0 + 0j)]
+    return Positions(
+        sensor,
+        x,
+        band,
+        found.natural_frequency[flexible],
+        field / abs(field).max(axis=1, keepdims=True),
+        tuple(_zeros(transfer(arm, sensor, x=float(place)), lines) for place in x),
+    )
+
+
+def _zeros(G: TransferFunction, lines: Sequence[_Panels]) -> Complex:
+    """The zeros with Im s > 0, and the positive real ones, each once."""
+    found: list[complex] = []
+    for s in (s for line in lines for s in line.zeros(G)):
+        is_real = abs(s.imag) < SAME * abs(s)
+        if (s.real > 0 if is_real else s.imag > 0) and all(abs(s - each) > SAME * abs(s) for each in found):
+            found.append(complex(s.real, 0.0) if is_real else s)
+    return np.array(sorted(found, key=lambda s: (s.imag, s.real)), dtype=complex)
+
+
+@dataclass(frozen=True)
+class _Panels:
+    """Panels of a line through s = 0 in the direction of `unit`, from `low` to `high` (n,) [rad/s]; `s` (n, points) are
+    the samples and the places between, `factor` (n, points) is what makes the numerator of a sensor's G there."""
+
+    unit: complex
+    low: Real
+    high: Real
+    s: Complex
+    factor: Complex
+    is_real: bool
+
+    @classmethod
+    def of(cls, arm: Arm, sensor: Sensor, unit: complex, band: float) -> _Panels:
+        """Panels of the line up to the band: along the imaginary axis the first begins at -`high`, as all is even."""
+        places = np.asarray(steep_places(arm, band))[STEEP - 1 :: STEEP]
+        edges = np.r_[0.0, places[places < band], band]
+        low, high = edges[:-1].copy(), edges[1:]
+        low[0] = -high[0] if unit == 1j else 0.0
+        s = unit * ((low + high)[:, None] / 2 + (high - low)[:, None] / 2 * np.r_[POINTS, BETWEEN])
+        parts = loop_parts(system_of(arm), s.ravel())
+        drive, scale = parts.drive.reshape(s.shape), parts.scale.reshape(s.shape)
+        factor = drive / s ** AT_REST[sensor] * np.exp(scale - scale.real.max(axis=1, keepdims=True))
+        return cls(unit, low, high, s, factor, arm.is_reactive)
+
+    def zeros(self, G: TransferFunction) -> list[complex]:
+        """The zeros of a sensor along the line and near it.  Raises ConvergenceError where they are not resolved."""
+        values = G(self.s.ravel()).reshape(self.s.shape) * self.factor
+        values = values.real + 0j if self.is_real else values
+        found: list[complex] = []
+        for low, high, both in zip(self.low, self.high, values, strict=True):
+            series = AS_SERIES @ both[:SAMPLES]
+            missed = abs(chebyshev.chebval(BETWEEN, series) - both[SAMPLES:]).max() / abs(both).max()
+            if missed > WRONG:
+                raise ConvergenceError(f"polynomials do not follow the numerator of {G.outputs[0]}", high, missed)
+            roots = (low + high) / 2 + (high - low) / 2 * _roots(series)
+            found += [self.unit * z for z in roots if z.real > -1e-9 * high]
+        return found
+
+
+def _roots(series: Complex) -> Complex:
+    """The roots of a Chebyshev series in its interval and not far beside it."""
+    last = int(np.nonzero(abs(series) > ROUNDING * abs(series).max())[0].max())
+    roots = np.asarray(chebyshev.chebroots(series[: last + 1]), dtype=complex)
+    return roots[(abs(roots.real) <= 1 + EDGE) & (abs(roots.imag) <= BESIDE)]
