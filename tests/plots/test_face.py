@@ -11,11 +11,13 @@ from matplotlib import pyplot
 from matplotlib.figure import Figure
 
 import tfarm
+from tests.plots.labels import complaints, drawn
 from tfarm.dsp import gain_map
 from tfarm.fitting.data import Measured
 from tfarm.loop.nyquist import compressed
 from tfarm.loop.reduced_locus import reduced_locus
 from tfarm.plots.plane import colours
+from tfarm.spectrum.scales import default_gains
 from tfarm.tuner import Plan
 
 mpl.use("Agg")
@@ -102,6 +104,45 @@ def test_without_axes_a_figure_is_made_in_the_look_of_the_pages(name, records):
         sizes |= {axis.label.get_fontsize() for axis in each}
     assert max(sizes) < 12
     pyplot.close(figure)
+
+
+@pytest.mark.parametrize("name", tfarm.plots.__all__)
+def test_words_overlap_nothing(name, records):
+    """Neither each other, nor a frame or the edge of the picture, nor a curve."""
+    figure = as_tuple(getattr(tfarm.plots, name)(*records[name][0]))[0].get_figure()
+    assert complaints(figure) == []
+    assert len(drawn(figure)) > 3
+    pyplot.close(figure)
+
+
+@pytest.mark.parametrize("name", ["sasaki2012", "quanser-flexlink"])
+def test_words_overlap_nothing_without_damping_or_torque(name):
+    """Curves that run to infinity, poles on the axis, a rig driven by voltage."""
+    arm = tfarm.load(name)
+    law, unit = default_gains(arm), arm.input_per_torque
+    found = tfarm.locus(arm, law, "K2", -unit, 1.6 * unit, points=40, branches=4)
+    axes = {
+        "bode": tfarm.plots.bode(tfarm.bode(arm, "root_moment", (1.0, 1000.0)))[0],
+        "nyquist": tfarm.plots.nyquist(tfarm.nyquist(arm, law)),
+        "locus": tfarm.plots.locus(found),
+        "map": tfarm.plots.gain_map(tfarm.map(arm, np.linspace(-1, 4, 40) * law.K1, np.linspace(-1, 1.5, 41) * unit)),
+    }
+    told = {name: complaints(each.get_figure()) for name, each in axes.items()}
+    pyplot.close("all")
+    assert told == {name: [] for name in axes}
+
+
+def test_words_that_do_overlap_are_told():
+    """Of which the tests above say that there are none."""
+    figure = Figure(figsize=(4.0, 3.0))
+    ax = figure.add_axes((0.1, 0.1, 0.8, 0.8))
+    ax.plot([0, 1, np.nan, 1, 1], [0, 1, np.nan, 0, 1], color="#0060a8")
+    ax.set(xlim=(0, 1), ylim=(0, 1))
+    for x, y, text in ((0.5, 0.5, "on the line"), (0.1, 0.8, "one"), (0.12, 0.81, "other"), (0.97, 0.3, "frame")):
+        ax.text(x, y, text)
+    told = complaints(figure)
+    assert {"'on the line' on a curve", "'one' on 'other'", "'frame' across a frame"} <= set(told)
+    assert "'one' on a curve" not in told
 
 
 def test_bode_draws_the_response(records):

@@ -10,6 +10,7 @@ import pytest
 import tfarm
 from tests.loop.arms import window_arm
 from tests.loop.nyquist_counts import survey
+from tests.plots.labels import complaints
 from tests.report.coarse import coarsen
 from tfarm.arm import Hub, HubFeedback, many_laws
 from tfarm.dsp import Chain
@@ -28,6 +29,7 @@ from tfarm.loop.poles import closed_loop_poles
 from tfarm.loop.stability import stability
 from tfarm.plots.plane import nice_levels
 from tfarm.plots.roots import zoomed
+from tfarm.plots.style import BLUE
 from tfarm.report import loop_laws, loop_section, map, write, writing
 from tfarm.report.frame import signs
 from tfarm.report.locus_section import beyond_table
@@ -114,6 +116,16 @@ def test_the_colours_are_the_counts_of_the_poles(lab, column):
     for row in (50, top, min(top + 3, map.ROWS - 1)):
         law = HubFeedback(K1=float(lab.region.K1[column]), K2=float(lab.region.K2[row]))
         assert stability(LAB, law).unstable_roots == lab.region.unstable[row, column]
+
+
+def test_contours_reach_the_frame_and_words_overlap_nothing(lab):
+    """A line of equal damping ends at the frame, at the stability boundary, or where it began."""
+    figure = draw_map(lab)
+    assert complaints(figure) == []
+    assert (lab.K1[0], lab.K1[-1], lab.K2[0], lab.K2[-1]) == (lab.x.low, lab.x.high, lab.y.low, lab.y.high)
+    lines = [line for line in figure.axes[0].lines if line.get_color() == BLUE and len(line.get_xdata()) > 20]
+    assert len(lines) > 3
+    assert sum(min(line.get_ydata()[0], line.get_ydata()[-1]) == lab.y.low for line in lines) > 3
 
 
 def test_the_contours_are_the_damping_of_the_poles(lab):

@@ -16,13 +16,18 @@ from numpy.typing import NDArray
 from tfarm.digits import plain, significant
 from tfarm.loop.nyquist import Nyquist, compressed
 
+from .labels import AROUND, UPON, Label
 from .style import BLUE, FAINT, GREY, ORANGE, Keys, New, alone, blank, headline, safe, style, window
 from .words import gains_words
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 RINGS = (0.1, 0.3, 1.0, 3.0, 10.0)  # |L| of the rings
+NAMED = np.r_[56:360:17, 0:56:17]  # degrees on a ring where its size may stand, in the order in which they are tried
 RING, LAST, STEP = 1.04, 1.2, 0.03  # radius of the first arc at infinity, of the last at most, from one to the next
+BEYOND, OUTER = 1.12, 1.16  # radii of words beyond the rim: of its name, and of how many arcs turn alike
+ALIKE = math.radians(20.0)  # arcs whose ends are as near as that turn alike
+HALO: dict[str, Any] = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
 
 
 def nyquist(data: Nyquist[Any], *, ax: Axes | None = None, name: str = "") -> Axes:
@@ -48,13 +53,10 @@ def draw_disc(data: Nyquist[Any], name: str = "", new: New = blank) -> Figure:
 def draw_nyquist(title: str, plots: Mapping[str, Nyquist]) -> Figure:
     """One disc a law, of at most two, by the laws' names."""
     with style():
-        figure = blank(9.0, 5.3)
-        axes = figure.subplots(1, 2)
-        for ax in axes[len(plots) :]:
-            ax.set_visible(False)
-        for ax, (name, data) in zip(axes, plots.items(), strict=False):
+        figure = blank(9.0 if len(plots) > 1 else 5.6, 5.3)
+        for ax, (name, data) in zip(figure.subplots(1, len(plots), squeeze=False)[0], plots.items(), strict=True):
             nyquist(data, ax=ax, name=name)
-        figure.legend(*_legend(), loc="outside lower left", ncols=4, fontsize=8.5)
+        figure.legend(*_legend(), loc="outside lower left", ncols=2 * len(plots), fontsize=8.5)
         band = significant(max(data.verdict.band for data in plots.values()), 5)
         headline(figure, f"{title}: the loop function L(iω) up to {band} rad/s")
     return figure
@@ -66,42 +68,53 @@ def _disc(ax: Axes) -> None:
     for size in (*RINGS, math.inf):
         ring = turn * (1.0 if math.isinf(size) else size / (1 + size))
         ax.plot(ring.real, ring.imag, color=GREY if size in (1.0, math.inf) else FAINT, lw=0.7, zorder=0.6)
-        at = ring[56 if math.isfinite(size) else 124]
+        at = [(float(z.real), float(z.imag)) for z in ring[NAMED] * (BEYOND if math.isinf(size) else 1.0)]
         text = "|L| = ∞" if math.isinf(size) else plain(size)
-        ax.text(at.real, at.imag, text, fontsize=7.5, color=GREY, ha="center", va="center", zorder=0.7,
-                bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6})  # fmt: skip
+        ax.add_artist(Label(text, at, UPON, may_go=True, fontsize=7.5, color=GREY, bbox=HALO))
     ax.plot([-1, 1], [0, 0], color=FAINT, lw=0.7, zorder=0.5)
     ax.plot([0, 0], [-1, 1], color=FAINT, lw=0.7, zorder=0.5)
     ax.plot([-0.5], [0], "+", color=ORANGE, ms=11, mew=2.2, zorder=6)
-    ax.annotate("−1", (-0.5, 0), textcoords="offset points", xytext=(-4, 6), ha="right", color=ORANGE, weight="bold",
-                path_effects=[withStroke(linewidth=2.0, foreground="white")], zorder=5)  # fmt: skip
+    minus_one = Label("−1", [(-0.5, 0.0)], AROUND, fontsize=10.0, color=ORANGE, weight="bold")
+    minus_one.set_path_effects([withStroke(linewidth=2.0, foreground="white")])
+    ax.add_artist(minus_one)
     ax.set_aspect("equal")
     ax.set_xticks([])
     ax.set_yticks([])
-    ax.spines[:].set_visible(False)
+    ax.set_frame_on(False)
 
 
 def _curve(data: Nyquist[Any], ax: Axes) -> None:
-    """Along the axis as a line, past each pole as an arc beyond the rim, arrows with rising frequency."""
+    """Along the axis as a line, past poles as arcs beyond the rim, one for all that turn alike; arrows as w rises."""
     z = compressed(data.L)
     turn = np.flatnonzero(np.diff(data.is_arc.astype(int))) + 1
-    step = min(STEP, (LAST - RING) / max(1, data.poles.size - 1))
-    number = 0
+    alike: dict[tuple[int, int], list[NDArray[np.int64]]] = {}
     for piece in np.split(np.arange(z.size), turn):
         if not data.is_arc[piece[0]]:
             ax.plot(z[piece].real, z[piece].imag, color=BLUE, lw=1.3, zorder=3)
             ax.plot(z[piece].real, -z[piece].imag, color=BLUE, lw=0.6, alpha=0.55, zorder=2)
             continue
-        ring = arc_on_ring(data.L[piece], RING + step * number)
-        ends = np.r_[z[max(0, piece[0] - 1)], ring, z[min(z.size - 1, piece[-1] + 1)]]
-        ends = ends[1:] if piece[0] == 0 else ends
-        ax.plot(ends.real, ends.imag, color=BLUE, lw=0.8, ls=(0, (3, 1.5)), zorder=3)
-        _arrow(ring, ax)
-        number += 1
+        angle = np.unwrap(np.angle(data.L[piece]))
+        alike.setdefault((round(angle[0] / ALIKE), round(angle[-1] / ALIKE)), []).append(piece)
+    step = min(STEP, (LAST - RING) / max(1, len(alike) - 1))
+    for number, pieces in enumerate(alike.values()):
+        _arc(data, z, pieces, RING + step * number, ax)
     for at in _arrows(data, z):
         _arrow(z[at], ax)
     ax.set_xlim(-LAST - STEP, LAST + STEP)
     ax.set_ylim(-LAST - STEP, LAST + STEP)
+
+
+def _arc(data: Nyquist[Any], z: Complex, pieces: list[NDArray[np.int64]], radius: float, ax: Axes) -> None:
+    """The first of some arcs that turn alike, and how many they are."""
+    piece = pieces[0]
+    ring = arc_on_ring(data.L[piece], radius)
+    ends = np.r_[z[max(0, piece[0] - 1)], ring, z[min(z.size - 1, piece[-1] + 1)]]
+    ends = ends[1:] if piece[0] == 0 else ends
+    ax.plot(ends.real, ends.imag, color=BLUE, lw=0.8, ls=(0, (3, 1.5)), zorder=3)
+    _arrow(ring, ax)
+    if len(pieces) > 1:
+        places = [(float(s.real), float(s.imag)) for s in OUTER * ring[10:-10:5] / radius]
+        ax.add_artist(Label(f"{len(pieces)} ×", places, UPON, fontsize=8.0, color=BLUE))
 
 
 def arc_on_ring(L: Complex, radius: float) -> Complex:
@@ -149,4 +162,4 @@ def _legend() -> Keys:
         Line2D([], [], color=BLUE, lw=0.8, ls=(0, (3, 1.5))),
         Line2D([], [], color=ORANGE, ls="none", marker="+", ms=9, mew=2.0),
     ]
-    return handles, ["ω > 0, arrows as it rises", "ω < 0", "past a pole on the axis", "the point −1"]
+    return handles, ["ω > 0, arrows as it rises", "ω < 0", "past poles on the axis", "the point −1"]

@@ -11,6 +11,7 @@ from tfarm.loop.law_locus import LawLocus
 from tfarm.loop.law_map import LawMap
 from tfarm.loop.loci import shown
 
+from .labels import BESIDE, Label
 from .plane import colours, words_of_count
 from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, New, alone, blank, safe
 
@@ -37,7 +38,7 @@ def law_locus(found: LawLocus, *, ax: Axes) -> None:
     for each in found.crossings:
         ax.plot([0], [each.omega], "D", ms=6, mfc=ORANGE, mec="white", mew=0.8, zorder=6)
         text = f"{plain(each.gain, 5)}, {significant(each.omega, 4)} rad/s"
-        ax.annotate(text, (0, each.omega), textcoords="offset points", xytext=(7, 0), fontsize=7.5, va="center")
+        ax.add_artist(Label(text, [(0.0, each.omega)], BESIDE, fontsize=7.5))
     begins, others = plain(float(found.values[first]), 3), [plain(float(found.values[n]), 3) for n in rest]
     ax.plot([], [], "x", color=GREY, label=f"{safe(found.vary)} = {begins}")
     ax.plot([], [], "o", color=GREY, ms=3.2, label=f"{safe(found.vary)} = {', '.join(others)}")

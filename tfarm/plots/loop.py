@@ -14,6 +14,7 @@ from tfarm.loop.margins import Margins, dense
 from tfarm.spectrum.scales import first_frequency
 
 from .frequency import hertz_axis
+from .labels import BESIDE, Label
 from .style import BLUE, GREEN, GREY, ORANGE, PURPLE, blank, headline, style
 
 Real = NDArray[np.float64]
@@ -117,7 +118,4 @@ def _crossed(crossings: tuple[tuple[float, float], ...], heights: list[float], l
 
 
 def _named(text: str, w: float, height: float, ax: Axes) -> None:
-    ax.annotate(
-        text, (w, height), textcoords="offset points", xytext=(5, 3), fontsize=7.5, zorder=5,
-        bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5, "alpha": 0.8}, annotation_clip=True,
-    )  # fmt: skip
+    ax.add_artist(Label(text, [(w, height)], BESIDE, fontsize=7.5))

@@ -24,6 +24,7 @@ from tfarm.loop.lossless import locked_edges
 from tfarm.loop.regions import INFINITE, Region
 from tfarm.spectrum import modes
 
+from .labels import AROUND, UPON, Label
 from .style import BLUE, GREY, INK, ORANGE, PURPLE, New, alone, blank, style, window
 
 Real = NDArray[np.float64]
@@ -32,8 +33,10 @@ STABLE, FEWEST, MOST, BOUNDLESS = "#dcefe6", "#fbeadd", "#eebd95", "#f3d9c6"
 STEPS, MOST_LEVELS = (1.0, 2.0, 5.0), 7  # of the contours
 LEAST_AREA = 0.004  # of the picture: smaller regions are not labelled
 LETTER = (0.01, 0.018)  # of the picture's width and height: what a letter takes, across and upright
+TALL = 2.5  # letters' widths: what a line takes across its letters, with room
 MARKS = 7  # frequencies written along the boundary
 DIAMOND, STAR = "D", "*"  # of laws
+AT_RIGHT = tuple((-6.0, up) for up in (4.0, -4.0, 16.0, -16.0, 28.0))  # points, from where a line ends to its words
 HALO: dict[str, Any] = {"facecolor": "white", "edgecolor": "none", "pad": 0.4, "alpha": 0.75}  # of numbers
 K2_TICKS = (-50, -20, -10, -5, -2, -1, 0, 1, 2)
 
@@ -110,10 +113,25 @@ def contours(K1: Real, K2: Real, damping: Real, ax: Axes) -> None:
     levels = nice_levels(float(np.nanmin(damping)), float(np.nanmax(damping)))
     if not levels:
         return
-    lines = ax.contour(K1, K2, np.ma.masked_invalid(damping), levels=levels, colors=BLUE, linewidths=0.9)
-    for label in ax.clabel(lines, fmt=lambda level: f"{plain(100 * level, 3)} %", fontsize=8.0, inline_spacing=3):
-        label.set(bbox=HALO, zorder=5.5)  # above the edges that it may lie next to
+    with np.errstate(invalid="ignore", divide="ignore"):  # by its logarithm, which is straighter
+        lines = ax.contour(K1, K2, np.ma.masked_invalid(np.log(damping)), levels=np.log(levels))
+    parts = lines.allsegs
+    lines.remove()
+    for level, pieces_of_level in zip(levels, parts, strict=True):
+        longest = sorted((piece for piece in pieces_of_level if len(piece) > 1), key=len, reverse=True)
+        for number, piece in enumerate(longest):
+            (line,) = ax.plot(piece[:, 0], piece[:, 1], color=BLUE, lw=0.9, zorder=2.5)
+            if not number:
+                places = [(float(x), float(y)) for x, y in piece[_along(len(piece))]]
+                text = f"{plain(100 * level, 3)} %"
+                ax.add_artist(Label(text, places, UPON, own=line, may_go=True, fontsize=8.0, color=BLUE, bbox=HALO))
     ax.plot([], [], color=BLUE, lw=0.9, label="least damping ratio of the first two modes")
+
+
+def _along(number: int) -> NDArray[np.int64]:
+    """Numbers of points of a line, its middle first, then outwards to both sides."""
+    away = np.arange(number) - number // 2
+    return np.asarray(number // 2 + away[np.argsort(abs(away), kind="stable")])[::3]
 
 
 def nice_levels(low: float, high: float) -> list[float]:
@@ -140,10 +158,7 @@ def boundary(found: Region, points: Real, x: Axis, y: Axis, ax: Axes) -> None:
         ax.plot([x.low, x.high], [level, level], color=INK, lw=1.6)
     for K1, K2, omega in _chosen(stable_edge(found, points, x, y), x, y):
         ax.plot([K1], [K2], "o", ms=4.0, mfc="white", mec=INK, mew=1.0, zorder=5)
-        ax.annotate(
-            f"{significant(omega, 3)}", (K1, K2), textcoords="offset points", xytext=(0, 6), ha="center",
-            fontsize=8.0, zorder=6, bbox=HALO,
-        )  # fmt: skip
+        ax.add_artist(Label(significant(omega, 3), [(K1, K2)], AROUND, may_go=True, fontsize=8.0, bbox=HALO))
     ax.plot([], [], "o", ms=4.0, mfc="white", mec=INK, mew=1.0, label="with ω in rad/s")
 
 
@@ -166,7 +181,7 @@ def _undamped_boundary(found: Region, x: Axis, y: Axis, ax: Axes) -> None:
     ax.plot([x.low, 0], [whole, whole], color=INK, lw=0.8)
     omega = modes(found.arm.having(hub_inertia=math.inf), 3).natural_frequency
     text = f"on this line every mode with the hub at rest: {', '.join(significant(float(w), 4) for w in omega)} … rad/s"
-    ax.annotate(text, (x.high, whole), textcoords="offset points", xytext=(-6, 5), ha="right", fontsize=8.5)
+    ax.add_artist(Label(text, [(x.high, whole)], AT_RIGHT, fontsize=8.5))
 
 
 def _locked_lines(found: Region, x: Axis, y: Axis, ax: Axes) -> None:
@@ -176,7 +191,7 @@ def _locked_lines(found: Region, x: Axis, y: Axis, ax: Axes) -> None:
         ax.plot([0, x.high], [each.t, each.t], color=INK, lw=0.5)
     for each in edges[:MARKS]:
         text = f"{significant(each.at, 4)} rad/s, the hub at rest"
-        ax.annotate(text, (x.high, each.t), textcoords="offset points", xytext=(-6, 3), ha="right", fontsize=7.5)
+        ax.add_artist(Label(text, [(x.high, each.t)], AT_RIGHT, may_go=True, fontsize=7.5))
 
 
 def sampled_region(plane: GainMap | None, ax: Axes) -> None:
@@ -237,14 +252,17 @@ def lyapunov(arm: Arm, x: Axis, y: Axis, ax: Axes) -> None:
 def count_labels(found: Region, x: Axis, y: Axis, ax: Axes) -> None:
     """In every region that is large enough, how many poles are unstable there."""
     grid = seen(found, x, y)
-    image = colours(grid.unstable)
+    image, clear = colours(grid.unstable), ~_taken(grid.unstable.shape, ax)
     for count in np.unique(grid.unstable):
         parts, number = ndimage.label(grid.unstable == count)
         for part in range(1, number + 1):
             inside = np.asarray(parts == part)
             if inside.mean() < LEAST_AREA:
                 continue
-            row, column, words, turn = _placed(inside, words_of_count(int(count)), str(count).replace("-1", "∞"))
+            placed = _placed(inside & clear, words_of_count(int(count)), str(count).replace("-1", "∞"))
+            if placed is None:
+                continue
+            row, column, words, turn = placed
             ax.annotate(
                 words, (grid.K1[column], grid.K2[row]), ha="center", va="center", rotation=turn, zorder=4,
                 fontsize=9.0, color=INK if count else "#00543f",
@@ -252,27 +270,43 @@ def count_labels(found: Region, x: Axis, y: Axis, ax: Axes) -> None:
             )  # fmt: skip
 
 
-def _placed(inside: NDArray[np.bool_], words: str, short: str) -> tuple[int, int, str, int]:
-    """Row, column, words and rotation: across if that fits, else upright, else the bare number."""
-    depth = ndimage.distance_transform_edt(np.pad(inside, 1))[1:-1, 1:-1]
-    deep = np.argwhere(depth > 0.8 * depth.max())
-    centre = np.argwhere(inside).mean(axis=0)
-    row, column = (int(i) for i in deep[np.argmin(((deep - centre) ** 2).sum(axis=1))])
-    left, right = _run(inside[row], column)
-    low, high = _run(inside[:, column], row)
-    across, up = LETTER[0] * inside.shape[1], LETTER[1] * inside.shape[0]
-    if right - left > across * len(words):
-        return row, (left + right) // 2, words, 0
-    if high - low > up * len(words):
-        return (low + high) // 2, column, words, 90
-    return row, column, short, 0
+def _placed(clear: NDArray[np.bool_], words: str, short: str) -> tuple[int, int, str, int] | None:
+    """Row, column, words and rotation: across if that fits, else upright, else the bare number; None if not even that.
+
+    Of the places where the words fit that nearest to the middle of what is clear.
+    """
+    if not clear.any():
+        return None
+    middle = np.argwhere(clear).mean(axis=0)
+    rows, columns = clear.shape
+    for text, turn in ((words, 0), (words, 90), (short, 0)):
+        sides = (TALL * LETTER[1] * rows, len(text) * LETTER[0] * columns)
+        if turn:
+            sides = (len(text) * LETTER[1] * rows, TALL * LETTER[0] * columns)
+        size = tuple(max(1, math.ceil(side)) for side in sides)
+        fits = np.argwhere(ndimage.minimum_filter(clear, size=size, mode="constant", cval=False))
+        if fits.size:
+            row, column = fits[np.argmin(((fits - middle) ** 2).sum(axis=1))].tolist()
+            return row, column, text, turn
+    return None
 
 
-def _run(inside: NDArray[np.bool_], at: int) -> tuple[int, int]:
-    """First and last place of the run of trues around one of them."""
-    outside = np.r_[-1, np.nonzero(~inside)[0], inside.size]
-    n = int(np.searchsorted(outside, at))
-    return int(outside[n - 1]) + 1, int(outside[n]) - 1
+def _taken(shape: tuple[int, ...], ax: Axes) -> NDArray[np.bool_]:
+    """Which cells of a grid over the axes have a line or a mark in them."""
+    taken = np.zeros(shape, np.bool_)
+    rows, columns = shape
+    for line in ax.lines:
+        data = np.asarray(line.get_xydata(), dtype=float)
+        at = (line.get_transform() - ax.transAxes).transform(data) * (columns, rows)
+        if line.get_linestyle() != "None" and len(at) > 1:  # with points between, closer than a cell
+            steps = np.nan_to_num(abs(np.diff(at, axis=0)).max(axis=1), posinf=0.0)
+            more = np.clip(np.ceil(2 * steps), 1, 4 * (rows + columns)).astype(int)
+            share = np.concatenate([np.arange(n) / n for n in more])
+            first = np.repeat(np.arange(more.size), more)
+            at = np.vstack([at[first] + share[:, None] * (at[first + 1] - at[first]), at[-1:]])
+        at = at[np.isfinite(at).all(axis=1) & (at >= 0).all(axis=1) & (at < (columns, rows)).all(axis=1)].astype(int)
+        taken[at[:, 1], at[:, 0]] = True
+    return taken
 
 
 def words_of_count(count: int) -> str:

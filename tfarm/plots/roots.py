@@ -19,6 +19,7 @@ from tfarm.loop.reduced_locus import ReducedLocus
 from tfarm.loop.variation import OF_THE_LAW
 from tfarm.spectrum import modes
 
+from .labels import BESIDE, Label
 from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, Keys, New, alone, blank, headline, style, window
 from .words import gains_words
 
@@ -84,6 +85,7 @@ def draw_loci(data: Loci) -> Figure:
         _panel(fine, exact, data.reduced, numbers, whole, named=sorted(set(numbers) - set(zoomed(exact))))
         _frame(shown(fine.branches), whole)
         whole.set_title("all of them", fontsize=9.0)
+        whole.xaxis.set_major_locator(MaxNLocator(5))
         whole.set_xlabel("Re s [1/s]")
         whole.set_ylabel("Im s [rad/s]")
         for place, n in enumerate(zoomed(exact)):
@@ -166,10 +168,7 @@ def _panel(
             if each.branch not in named:
                 continue
             text = f"{exact.vary} = {plain(each.gain, 5)}\n{significant(each.omega, 4)} rad/s"
-            ax.annotate(
-                text, (0, omega), textcoords="offset points", xytext=(7, 0), fontsize=7.5, va="center", zorder=6,
-                bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8, "alpha": 0.8},
-            )  # fmt: skip
+            ax.add_artist(Label(text, [(0, omega)], BESIDE, fontsize=7.5))
 
 
 def _reduced_branch(exact: Locus, reduced: ReducedLocus, n: int, color: str, ax: Axes) -> None:

@@ -53,6 +53,7 @@ STYLE = {
     "path.simplify": True,  # where a line strays less than a ninth of a pixel
 }
 
+WIDEST = 0.95  # of a figure's width: letters are a little wider or narrower in a file of other dots an inch
 Keys = tuple[list[Line2D], list[str]]  # of a legend
 New = Callable[[float, float], Figure]  # how a figure of that width and height [inches] is made
 
@@ -90,6 +91,18 @@ def alone(
             figure.legend(*(keys or ()), loc="outside lower left", ncols=2, fontsize=8.5)
         headline(figure, title)
     return figure
+
+
+def legend_below(figure: Figure, columns: int = 3) -> None:
+    """A legend of all labels below the axes, in as many columns, up to that number, as fit into the figure."""
+    for number in range(columns, 0, -1):
+        legend = figure.legend(
+            loc="outside lower left", ncols=number, fontsize=8.2, handlelength=1.8, columnspacing=1.2
+        )
+        width = legend.get_window_extent(figure.canvas.get_renderer()).width  # type: ignore[attr-defined]
+        if number == 1 or width < WIDEST * figure.bbox.width:
+            return
+        legend.remove()
 
 
 def taken(ax: Sequence[Axes], number: int) -> list[Axes]:

@@ -72,12 +72,12 @@ ONE_POLE = (
 )
 ALL_POLES = (
     "Without damping L has a pole on the imaginary axis at 0 and at every natural frequency. At each the contour steps "
-    "to the right, and the curve turns clockwise through half a circle at infinity, drawn dashed beyond the rim, one "
-    "ring for each of the {count} poles up to {band} rad/s."
+    "to the right, and the curve turns clockwise through half a circle at infinity, drawn dashed beyond the rim: "
+    "of the {count} poles up to {band} rad/s one arc for all that turn alike, with their number."
 )
 HELD_POLES = (
     "Without damping L has a pole on the imaginary axis at every natural frequency; past each the curve turns "
-    "clockwise through half a circle at infinity, drawn dashed beyond the rim."
+    "clockwise through half a circle at infinity, drawn dashed beyond the rim, one arc for all that turn alike."
 )
 NO_POLE = "L has no pole on the imaginary axis."
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,7 +23,7 @@ from tfarm.loop.edges import Axis, edge, moment_axis, rate_axis
 from tfarm.loop.frequencies import band_of
 from tfarm.loop.regions import Region, region
 from tfarm.plots import plane
-from tfarm.plots.style import blank, headline, style
+from tfarm.plots.style import blank, headline, legend_below, style
 from tfarm.records import record
 from tfarm.report.loop_laws import MODES, NamedLaw, best, brief_of, laws
 from tfarm.spectrum.scales import default_gains
@@ -48,9 +48,9 @@ class GainMap:
 
     `region` is the exact count on the coloured grid, `edge` (n, 3) the exact boundary K1, K2, w within the picture
     with rows of nan where it leaves it; `damping` (rows, columns) the least damping ratio of the first `MODES` modes
-    on every fourth point of the grid; `design` the best gains for the sampled loop.  `sampled` is where the loop is
-    stable at the clock of `chain` too, None where that could not be settled; `briefs` are the sampled verdicts on the
-    laws.
+    on every fourth point of the grid and on the frame; `design` the best gains for the sampled loop.  `sampled` is
+    where the loop is stable at the clock of `chain` too, None where that could not be settled; `briefs` are the sampled
+    verdicts on the laws.
     """
 
     arm: Arm
@@ -72,11 +72,10 @@ class GainMap:
         """Whether C = 0."""
         return self.arm.is_undamped
 
-    @property
+    @cached_property
     def counts(self) -> NDArray[np.int64]:
         """Unstable poles on the grid of the damping."""
-        half = SPARSE // 2
-        return np.asarray(self.region.unstable[half::SPARSE, half::SPARSE])
+        return np.asarray(region(self.arm, self.K1, self.K2).unstable)
 
     @property
     def band(self) -> float:
@@ -91,7 +90,10 @@ def gain_map(arm: Arm, chain: Chain | None = None) -> GainMap:
     y = moment_axis(arm, x)
     found = region(arm, x.grid(COLUMNS), y.grid(ROWS))
     half = SPARSE // 2
-    K1, K2 = found.K1[half::SPARSE], found.K2[half::SPARSE]
+    K1, K2 = (
+        np.r_[ends[0], each[half::SPARSE], ends[1]]
+        for ends, each in (((x.low, x.high), found.K1), ((y.low, y.high), found.K2))
+    )
     a, b = (each.ravel() for each in np.meshgrid(K1, K2))
     damping = least_damping(arm, many_laws(HubFeedback(), K1=a, K2=b), MODES).reshape(K2.size, K1.size)
     named = laws(arm, chain)
@@ -126,12 +128,12 @@ def draw_map(data: GainMap) -> Figure:
         plane.sampled_region(data.sampled, ax)
         if data.arm.is_uniform:
             plane.lyapunov(data.arm, x, y, ax)
-        plane.count_labels(found, x, y, ax)
         for law, brief in zip(data.laws, data.briefs, strict=True):
             plane.law_mark(law.law, MARKERS[law.key], f"{law.name}: {law.gains};\n{brief.short}", ax)
         if data.design is not None:
             plane.search_frame(data.design.bounds, ax)
-        figure.legend(loc="outside lower left", ncols=3, fontsize=8.2, handlelength=1.8, columnspacing=1.2)
+        plane.count_labels(found, x, y, ax)
+        legend_below(figure)
         headline(figure, f"{data.arm.name}: how high may the gains go?")
     return figure
 
