@@ -6,7 +6,8 @@ import pytest
 
 import tfarm
 from tfarm.errors import ParameterError
-from tfarm.tuner import Plan, tune
+from tfarm.tuner import Plan, studies, tune
+from tfarm.tuner.guard import find_guard
 from tfarm.tuner.studies import PAPER, map_verdict, plans_of, run_study, study_answer
 
 
@@ -27,6 +28,15 @@ def test_a_study_is_its_tunings(lab):
         assert result.cost == training.result.cost
     curve = study_answer("curves", results, 3)
     assert curve["median"][0] == sorted(each.costs[0] for each in results)[1]
+
+
+def test_a_study_on_the_ground_of_a_tuning_is_the_same_and_finds_no_guard_again(lab, monkeypatch):
+    plans = [*plans_of("curves", BASE, 2), *plans_of("curves", replace(BASE, guard="none"), 1)]
+    alone, tuned, asked = run_study(lab, plans), tune(lab, BASE), []
+    monkeypatch.setattr(studies, "best_constant", lambda trial: pytest.fail("the tuning has it"))
+    monkeypatch.setattr(studies, "find_guard", lambda *given: [asked.append(given[1]), find_guard(*given)][1])
+    assert run_study(lab, plans, tuned=tuned) == alone
+    assert asked == ["none"]
 
 
 def test_a_stopped_study_goes_on(lab, tmp_path):

@@ -122,9 +122,15 @@ def _dampings(arm: Arm) -> list[float]:
     return [float(f"{2 * zeta / first:.1g}") for zeta in GIVEN]
 
 
-def compare(trial: Trial, gain: TunedGain, guard: Guard, listed: list[Condition] | None = None) -> list[Row]:
-    """A row a condition; `trial` is the one that the tuner was trained on."""
-    nominal = best_constant(trial).gain
+def compare(
+    trial: Trial,
+    gain: TunedGain,
+    guard: Guard,
+    listed: list[Condition] | None = None,
+    nominal: float | None = None,
+) -> list[Row]:
+    """A row a condition; `trial` is the one that the tuner was trained on, `nominal` its best constant gain."""
+    nominal = best_constant(trial).gain if nominal is None else nominal
     wanted = conditions(trial.arm, trial.loop.chain) if listed is None else listed
     return [_row(trial, gain, guard, nominal, each) for each in wanted]
 

@@ -128,15 +128,15 @@ def tuner_study(arm: Arm, chain: Chain) -> TunerStudy:
     tuning = tune(arm, plan, ideal_chain(chain))
     ideal = tuning.trial.loop.chain
     listed = conditions(arm, ideal, quantised_chain(arm, chain))
-    rows = compare(tuning.trial, tuning.gain(), tuning.training.guard, listed)
+    rows = compare(tuning.trial, tuning.gain(), tuning.training.guard, listed, tuning.best_constant.gain)
     return TunerStudy(
         arm=arm,
         tuning=tuning,
         slews=_simulated(tuning, ideal),
         constant=_simulator(tuning, ideal).linear(HubFeedback(K1=tuning.plan.K1, K2=tuning.best_constant.gain)),
         coarse=_simulated(tuning, next(each.chain for each in listed if each.name == COARSE)),
-        curves=tuple(_curves(arm, ideal, plan, *each) for each in LEARNT),
-        cost_map=_cost_map(arm, ideal, plan),
+        curves=tuple(_curves(tuning, *each) for each in LEARNT),
+        cost_map=_cost_map(tuning),
         rows=tuple(rows),
         servo=_servo(arm, plan, ideal),
     )
@@ -175,19 +175,22 @@ def _simulated(tuning: Tuning, chain: Chain) -> dict[str, Simulation]:
     return {"without moment feedback, K2 = 0": without, "with the tuner": tuned}
 
 
-def _curves(arm: Arm, chain: Chain, plan: Plan, key: str, title: str, rule: Rule, guard: GuardKind) -> Curves:
-    base = replace(plan, learning=Learning(rule=rule), guard=guard)
-    plans = plans_of("curves", base, SEEDS)
-    finished = run_study(arm, plans, chain, workers=WORKERS)
+def _curves(tuning: Tuning, key: str, title: str, rule: Rule, guard: GuardKind) -> Curves:
+    base = replace(tuning.plan, learning=Learning(rule=rule), guard=guard)
+    finished = _studied(tuning, plans_of("curves", base, SEEDS))
     costs = np.full((SEEDS, base.trials), np.inf)
     for row, each in zip(costs, finished, strict=True):
         row[: len(each.costs)] = each.costs
     return Curves(key, title, costs, tuple(finished))
 
 
-def _cost_map(arm: Arm, chain: Chain, plan: Plan) -> CostMap:
-    base = replace(plan, trials=MAP_TRIALS)
-    finished = run_study(arm, plans_of("map", base, MAP_SEEDS), chain, workers=WORKERS)
+def _studied(tuning: Tuning, plans: list[Plan]) -> list[Finished]:
+    return run_study(tuning.trial.arm, plans, tuning.trial.loop.chain, workers=WORKERS, tuned=tuning)
+
+
+def _cost_map(tuning: Tuning) -> CostMap:
+    base = replace(tuning.plan, trials=MAP_TRIALS)
+    finished = _studied(tuning, plans_of("map", base, MAP_SEEDS))
     groups = [finished[i : i + MAP_SEEDS] for i in range(0, len(finished), MAP_SEEDS)]
     medians = {
         (group[0].plan.learning.alpha, float(np.asarray(group[0].plan.learning.eta))): float(

@@ -34,7 +34,7 @@ from tfarm.tuner.guard import Guard, find_guard
 from tfarm.tuner.network import initial_network
 from tfarm.tuner.training import Training, train
 from tfarm.tuner.trial import Trial, residual_rms
-from tfarm.tuner.tuning import Plan, trial_of
+from tfarm.tuner.tuning import Plan, Tuning, trial_of
 
 Tell = Callable[[int, int], None]
 
@@ -87,17 +87,19 @@ def run_study(
     keep: Path | None = None,
     tell: Tell | None = None,
     workers: int | None = None,
+    tuned: Tuning | None = None,
 ) -> list[Finished]:
     """Each plan's tuning, in their order.  `keep` is a file of one JSON object a line that a second run starts from.
 
-    `tell(done, all)` is called after each.  Raises what `tune` raises, and ParameterError for a file that is not a
+    `tell(done, all)` is called after each.  `tuned` is a tuning of this arm and chain, whose trial and guard serve
+    where a plan has the same.  Raises what `tune` raises, and ParameterError for a file that is not a
     study's.
     """
     wanted = list(plans)
     keys = [_key(arm, chain, plan) for plan in wanted]
     known = _resumed(keep)
     todo = {key: plan for key, plan in zip(keys, wanted, strict=True) if key not in known}
-    grounds = _grounds(arm, chain, todo.values())
+    grounds = _grounds(arm, chain, todo.values(), tuned)
     done = len(keys) - len(todo)
     with ThreadPoolExecutor(workers or os.cpu_count()) as pool:  # the compiled loops let other threads run
         running = {pool.submit(_finished, grounds[_common(plan)], plan): key for key, plan in todo.items()}
@@ -126,18 +128,29 @@ def _finished(ground: _Ground, plan: Plan) -> dict[str, Any]:
     }
 
 
-def _grounds(arm: Arm, chain: Chain | None, plans: Iterable[Plan]) -> dict[str, _Ground]:
+def _grounds(arm: Arm, chain: Chain | None, plans: Iterable[Plan], tuned: Tuning | None) -> dict[str, _Ground]:
+    """What each plan stands on, by `_common`; the trial and its best constant gain are the same for every guard."""
     grounds: dict[str, _Ground] = {}
+    trials: dict[str, tuple[Trial, BestConstant]] = {}
+    if tuned is not None:
+        trials[_trial(tuned.plan)] = tuned.trial, tuned.best_constant
+        grounds[_common(tuned.plan)] = _Ground(tuned.trial, tuned.training.guard, tuned.best_constant)
     for plan in plans:
-        if _common(plan) not in grounds:
+        if _trial(plan) not in trials:
             trial = trial_of(arm, plan, chain)
-            best = best_constant(trial)
+            trials[_trial(plan)] = trial, best_constant(trial)
+        if _common(plan) not in grounds:
+            trial, best = trials[_trial(plan)]
             grounds[_common(plan)] = _Ground(trial, find_guard(trial.loop, plan.guard, best.gain), best)
     return grounds
 
 
 def _common(plan: Plan) -> str:
-    return repr((plan.cost, plan.signals, plan.guard, plan.K1, plan.Kp, plan.duration, plan.count))
+    return f"{plan.guard} {_trial(plan)}"
+
+
+def _trial(plan: Plan) -> str:
+    return repr((plan.cost, plan.signals, plan.K1, plan.Kp, plan.duration, plan.count))
 
 
 # ---------------------------------------------------------------- what is kept
