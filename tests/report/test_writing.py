@@ -28,7 +28,7 @@ from tfarm.cli import tables as cli_tables
 from tfarm.digits import plain
 from tfarm.dsp import Chain, load_chain
 from tfarm.report import card as card_room
-from tfarm.report import readme_pictures, trust, unchanged, write, writing
+from tfarm.report import readme_pictures, trust, unchanged, workers, write, writing
 from tfarm.report.card import written_cards
 from tfarm.report.frame import first_sentence
 from tfarm.report.given_laws import GivenLaw, Subject
@@ -634,9 +634,9 @@ def test_a_plain_script_starts_no_processes(monkeypatch):
         __spec__ = None
 
     monkeypatch.setitem(sys.modules, "__main__", Script())
-    assert not writing._may_start_processes()
+    assert not workers.may_start_processes()
     monkeypatch.delattr(Script, "__file__")
-    assert writing._may_start_processes()
+    assert workers.may_start_processes()
 
 
 # ------------------------------------------------------------ odd arms, the README
@@ -669,9 +669,9 @@ POOL = """
 import os, time
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
-from tfarm.report.writing import _leave_with_parent
+from tfarm.report.workers import leave_with_parent
 if __name__ == "__main__":
-    pool = ProcessPoolExecutor(1, get_context("spawn"), _leave_with_parent)
+    pool = ProcessPoolExecutor(1, get_context("spawn"), leave_with_parent)
     print(pool.submit(os.getpid).result(), flush=True)
     time.sleep(60)
 """

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
+from tfarm.arm import Arm
 from tfarm.columns import Column, Table
 from tfarm.digits import plain, significant
-from tfarm.spectrum import Modes, damped_modes
+from tfarm.spectrum import DampedModes, Modes, damped_modes, modes
 from tfarm.spectrum.answers import DAMPED_MODES
 
 DAMPED = (
@@ -31,18 +34,30 @@ OUTSIDE = (
 )
 
 
+PROVEN = 12  # digits
 PLACES = {True: "in the box", False: "outside"}
 
 
-def damped_table(modes: Modes) -> Table:
+@lru_cache(maxsize=8)  # the arm's page and the page on trust speak of the same ones, and a proof takes seconds
+def proven_damped_modes(arm: Arm, count: int) -> DampedModes:
+    """The arm's first damped modes, each enclosed to 12 digits, none missing in their box.
+
+    Raises CertificationError where that cannot be proven, ConvergenceError where they cannot be told apart.
+    """
+    found = damped_modes(modes(arm, count))
+    found.certify(PROVEN)
+    return found
+
+
+def damped_table(undamped: Modes) -> Table:
     """The table of the arm's damped modes, each number proven to 12 digits and printed to fewer."""
-    damped = damped_modes(modes)
-    damped.certify(12)
-    C, box = modes.arm.damping, damped.box
+    arm = undamped.arm
+    damped = proven_damped_modes(arm, int(undamped.index[-1]))
+    C, box = arm.damping, damped.box
     edges = {"left": box.re_min, "right": box.re_max, "top": box.im_max, "limit": -1 / C if C else 0.0}
     resisted = damped.single.size - len(damped.others)
-    rigid = ", with 0 twice" if modes.arm.has_rigid_mode else ""
-    if modes.arm.has_rigid_mode and resisted:
+    rigid = ", with 0 twice" if arm.has_rigid_mode else ""
+    if arm.has_rigid_mode and resisted:
         rigid = f", with 0 and the {significant(damped.single[0], 6)} 1/s to which friction resists the turning rig"
     for each in damped.others:
         rigid += f"; {significant(each, 6)} 1/s, of the motor's circuit, is one of no mode"

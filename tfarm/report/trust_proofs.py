@@ -15,19 +15,20 @@ from typing import Any
 import numpy as np
 
 import tfarm
-from tfarm.arm import Arm
+from tfarm.arm import Arm, HubFeedback
 from tfarm.dsp import Chain
 from tfarm.dsp.writing import file_text
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.loop.poles import Poles, closed_loop_poles
 from tfarm.plots.words import gains_words
+from tfarm.report.damped_table import PROVEN, proven_damped_modes
 from tfarm.report.kept import keep, kept
 from tfarm.report.loop_laws import has_loop
 from tfarm.response.accuracy import POINTS, worst_error
 from tfarm.spectrum import DampedModes, Modes
 from tfarm.spectrum.scales import default_gains
 
-MODES, DIGITS, BOX_DIGITS = 10, 20, 12
+MODES, DIGITS = 10, 20
 OUTPUTS = ("root_moment", "tip_displacement")
 PLAIN = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹−", "-0123456789-")
 TWO_PI = Decimal("6.2831853071795864769252867665590057683943387987502")
@@ -87,26 +88,31 @@ def prove(arm: Arm, chain: Chain | None = None) -> Proof:
         has_rigid_mode=arm.has_rigid_mode,
         band=band,
         errors=tuple((output, worst) for output in OUTPUTS if (worst := worst_error(arm, output, band)) is not None),
-        boxes=tuple(boxed(arm, modes)),
+        boxes=tuple(boxed(arm)),
         **found,
     )
 
 
-def boxed(arm: Arm, modes: Modes) -> Iterator[Boxed]:
+def boxed(arm: Arm) -> Iterator[Boxed]:
     """Damped modes and the default loop's poles, each enclosed and counted; what cannot be proven is said."""
     boxes: list[tuple[str, Callable[[], DampedModes | Poles]]] = []
     if not arm.is_undamped:
-        boxes.append((f"damped modes, C = {arm.damping:g} s", lambda: tfarm.damped_modes(modes)))
+        boxes.append((f"damped modes, C = {arm.damping:g} s", lambda: proven_damped_modes(arm, MODES)))
     if has_loop(arm):
         law = default_gains(arm)
-        boxes.append((f"closed loop, {gains_words(law, 6)}", lambda: closed_loop_poles(arm, law, MODES)))
-    for what, enclosed in boxes:
+        boxes.append((f"closed loop, {gains_words(law, 6)}", lambda: _proven_poles(arm, law)))
+    for what, proven in boxes:
         try:
-            found = enclosed()
-            found.certify(BOX_DIGITS)
+            found = proven()
             yield Boxed(what=what, count=found.count, box=_four(found.box))
         except (CertificationError, ConvergenceError) as error:
             yield Boxed(what=what, failure=str(error))
+
+
+def _proven_poles(arm: Arm, law: HubFeedback) -> Poles:
+    poles = closed_loop_poles(arm, law, MODES)
+    poles.certify(PROVEN)
+    return poles
 
 
 def _four(box: Sequence[float]) -> tuple[float, float, float, float]:

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 from tfarm.columns import Column, Table
 from tfarm.digits import scientific, significant, singly, worded
-from tfarm.report.trust_proofs import BOX_DIGITS, DIGITS, MODES, OUTPUTS, Proof, digits_of
+from tfarm.report.damped_table import PROVEN
+from tfarm.report.trust_proofs import DIGITS, MODES, OUTPUTS, Proof, digits_of
 from tfarm.report.words import typeset
 
 UNPROVEN = "not proven"
@@ -20,7 +21,7 @@ COUNTS_CAPTION = (
 )
 BOXES_CAPTION = (
     "Eigenvalues off the axis, s in 1/s, conjugates and those at 0 counted. Each is enclosed in a disc of "
-    f"{BOX_DIGITS} digits that holds exactly one (Rouché's theorem), and the argument principle, evaluated in ball "
+    f"{PROVEN} digits that holds exactly one (Rouché's theorem), and the argument principle, evaluated in ball "
     "arithmetic around the box, counts as many inside: none is missing there. With damping no box can hold all: "
     "lightly damped shear modes exist far above any, and slow real eigenvalues accumulate at -1/C."
 )

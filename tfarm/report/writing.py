@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import errno
 import os
-import sys
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import Executor, Future
 from contextlib import contextmanager, suppress
-from multiprocessing import get_context, parent_process
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
-from threading import Thread
 
 from tfarm.arm import Arm
 from tfarm.dsp import Chain
@@ -34,13 +33,13 @@ from tfarm.report.trust import FOLDER, Evidence, gather, kept_evidence, write_tr
 from tfarm.report.trust_proofs import save_proof, written_proofs
 from tfarm.report.unchanged import is_unchanged, key_of, note_made
 from tfarm.report.words import typeset
+from tfarm.report.workers import may_start_processes, shared
 
 Progress = Callable[[int, int, str], object]
 Notice = Callable[[str], object]
 
 WORKERS = 2
 ENOUGH = 8  # pieces of work of one arm for which a second process, which takes a second or two to start, is worth it
-LONG = ("tune", "sampled", "modes")  # anchors of the sections that take longest
 OURS = (
     "index.html",
     "README.md",
@@ -56,6 +55,7 @@ OURS = (
 
 CARD, CARD_ALONE = "card", "card alone"  # with the proofs of the arm, and without
 LIVE = "live loop"
+FIRST = ("tune", "sampled", "modes", CARD, "locus")  # what takes longest, modes beside the proofs that they share
 EVIDENCE = (-1, "evidence")  # for the page on trust: of no arm
 TRUST = f"{FOLDER}/index.html"
 
@@ -229,50 +229,27 @@ def _results(
     subjects: Sequence[Subject], folders: Sequence[Path], tasks: Sequence[Task]
 ) -> Iterator[tuple[Task, Result]]:
     """Each task with its result as it comes: here, or by two processes where there is work for them."""
-    if not tasks or (len(subjects) == 1 and len(tasks) < ENOUGH) or WORKERS == 1 or not _may_start_processes():
+    if not tasks or (len(subjects) == 1 and len(tasks) < ENOUGH) or WORKERS == 1 or not may_start_processes():
         for task in tasks:
             yield task, _make(subjects[task[0]], task[1], folders[task[0]])
         return
-    with ProcessPoolExecutor(WORKERS, get_context("spawn"), _leave_with_parent) as pool:
-        futures = {
-            pool.submit(_make, subjects[i], piece, folders[i]): (i, piece)
-            for i, piece in _longest_first(subjects, tasks)
-        }
-        try:
-            for future in as_completed(futures):
-                yield futures[future], future.result()
-        except BaseException:
-            pool.shutdown(wait=True, cancel_futures=True)
-            raise
 
-
-def _longest_first(subjects: Sequence[Subject], tasks: Sequence[Task]) -> list[Task]:
-    """The tasks with what takes longest before the rest, so that neither process waits for the other at the end."""
-
-    def is_short(task: Task) -> bool:
+    def submit(pool: Executor, task: Task) -> Future[Result]:
         i, piece = task
-        return task != EVIDENCE and (isinstance(piece, str) or pieces_of(subjects[i])[piece].anchor not in LONG)
+        return pool.submit(_make, subjects[i], piece, folders[i])
 
-    return sorted(tasks, key=is_short)
-
-
-def _leave_with_parent() -> None:
-    """In a worker: end when the process that started it is gone; a pool's workers would wait for work for ever."""
-    parent = parent_process()
-
-    def leave() -> None:
-        if parent is not None:
-            parent.join()
-            os._exit(1)
-
-    Thread(target=leave, daemon=True).start()
+    yield from shared(_by_arm(subjects, tasks), submit, WORKERS)
 
 
-def _may_start_processes() -> bool:
-    """A new process runs the main script again: not where that is a plain script, which may have no guard."""
-    main = sys.modules.get("__main__")
-    file = getattr(main, "__file__", None)
-    return file is None or getattr(main, "__spec__", None) is not None or not str(file).endswith(".py")
+def _by_arm(subjects: Sequence[Subject], tasks: Sequence[Task]) -> list[list[Task]]:
+    """The tasks of each arm, and before them those of none; what takes longest first, so that no end is long."""
+
+    def place(task: Task) -> int:
+        i, piece = task
+        what = piece if isinstance(piece, str) else pieces_of(subjects[i])[piece].anchor
+        return FIRST.index(what) if what in FIRST else len(FIRST)
+
+    return [sorted(each, key=place) for _, each in groupby(sorted(tasks, key=itemgetter(0)), itemgetter(0))]
 
 
 def _make(subject: Subject, piece: int | str, folder: Path) -> Result:
