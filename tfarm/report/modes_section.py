@@ -16,6 +16,7 @@ from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.plots.shapes import Shape, draw_differences, draw_shapes, shapes_of, theory_name
 from tfarm.report.damped_table import damped_table
 from tfarm.report.locked_table import locked_table, locked_words
+from tfarm.report.mode_cards import mode_cards
 from tfarm.report.sections import Picture, Section
 from tfarm.report.trust_proofs import how_proven
 from tfarm.response.frequency import Real
@@ -73,6 +74,7 @@ def modes_section(arm: Arm) -> Section:
     theories: dict[str, Real] = {t: _flexible(tfarm.modes(arm, count=MODES, theory=t)) for t in SIMPLER}
     differences: dict[str, Real] = {theory: 100 * (simpler / exact - 1) for theory, simpler in theories.items()}
     damped, missing = _damped(modes)
+    shapes = shapes_of(modes, SHAPES)
     return Section(
         anchor="modes",
         title="Modes",
@@ -81,11 +83,12 @@ def modes_section(arm: Arm) -> Section:
             modal_table(modes),
             *([] if arm.is_uniform else [locked_table(modes)]),
             *damped,
-            _shapes(arm.name, shapes_of(modes, SHAPES)),
+            _shapes(arm.name, shapes),
             theories_table(exact, theories, differences),
             _differences(arm.name, differences),
             sensitivity_table(modes),
         ),
+        cards=mode_cards(shapes),
     )
 
 

@@ -11,6 +11,7 @@ from markupsafe import Markup
 
 from tfarm.columns import Table
 from tfarm.plots.files import save
+from tfarm.report.mode_cards import ModeCard
 from tfarm.tables.files import save as save_table
 from tfarm.tables.html import as_html
 
@@ -51,7 +52,7 @@ class Picture:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Section:
-    """A part of a page.  `words` are paragraphs, `items` a list; `blocks` pictures and tables in their order.
+    """A part of a page.  `words` are paragraphs, `items` a list; `blocks` pictures and tables, `cards` of modes.
 
     `failure` says why the section could not be made, where the words say so in its place; empty otherwise.
     """
@@ -62,6 +63,7 @@ class Section:
     items: Sequence[str] = ()
     facts: Sequence[Fact] = ()
     blocks: Sequence[Picture | Table] = ()
+    cards: Sequence[ModeCard] = ()
     failure: str = ""
 
 
@@ -97,6 +99,7 @@ def save_section(section: Section, folder: Path) -> SavedSection:
         words=section.words,
         items=section.items,
         facts=section.facts,
+        cards=section.cards,
         failure=section.failure,
     )
     return SavedSection(section=words, blocks=blocks)
