@@ -117,7 +117,7 @@ def _corrected(kind: Kind, model: ModalModel, laws: Real, top: float) -> tuple[C
     wanted = kind(starts, 1.2 * top)
     order = np.argsort(~wanted, axis=1, kind="stable")[:, : max(1, int(wanted.sum(1).max()))]
     s = np.where(np.take_along_axis(wanted, order, 1), np.take_along_axis(starts, order, 1), np.nan)
-    polished, settled = _newton(model.arm, s, laws)
+    polished, settled = exact_poles_next_to(model.arm, s, laws)
     poles = np.where(kind(polished, top), polished, np.nan)
     return poles, settled.all(1) & _are_distinct(poles)
 
@@ -131,8 +131,11 @@ def _model(arm: Arm, count: int) -> ModalModel | ConvergenceError:
         return error
 
 
-def _newton(arm: Arm, starts: Complex, laws: Real) -> tuple[Complex, NDArray[np.bool_]]:
-    """The exact poles next to the starts, and which settled there (nan where there is no start)."""
+def exact_poles_next_to(arm: Arm, starts: Complex, laws: Real) -> tuple[Complex, NDArray[np.bool_]]:
+    """The exact poles next to the starts (n, slots), and which settled there; nan where there is no start.
+
+    `laws` (gains, n) are those of `many_laws`.
+    """
     k = system_of(arm)
     laws = dimensionless(k, laws)
     rows, columns = np.nonzero(~np.isnan(starts))

@@ -11,6 +11,7 @@ from tfarm.arm import NAMES, unit_of
 from .answers import law_answer
 from .crossings import crossing_answers
 from .locus import Locus
+from .most_damped import MostDamped, most_damped
 from .reduced_locus import ReducedLocus
 from .variation import VARIED
 
@@ -36,9 +37,14 @@ def locus_answer(exact: Locus, reduced: ReducedLocus) -> dict[str, Any]:
         "branches_note": BRANCHES,
         "crossings": crossing_answers(exact.crossings),
         "ends": [{"branch": branch, "gain": gain} for branch, gain in exact.ends],
+        "first_mode_most_damped": _most_damped_answer(most_damped(exact)),
         "gap_to_reduced": reduced.worst,
         "gap_by_branch": reduced.gap.tolist(),
         "gap_note": GAP,
         "reduced_order": reduced.order,
         "reduced_points": int(reduced.gain.size),
     }
+
+
+def _most_damped_answer(found: MostDamped | None) -> dict[str, float] | None:
+    return None if found is None else {"gain": found.gain, "damping_ratio": found.damping_ratio}

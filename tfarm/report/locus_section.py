@@ -12,6 +12,7 @@ from tfarm.columns import Column, Table
 from tfarm.digits import counted, listed, plain, scientific, significant, singly
 from tfarm.errors import ConvergenceError
 from tfarm.loop.loci import Loci, loci
+from tfarm.loop.most_damped import most_damped
 from tfarm.loop.stability import MARGIN_OF_ZERO, Stability, stability
 from tfarm.plots.roots import draw_loci
 from tfarm.report.locus_tables import crossing_table, gap_table, loci_data
@@ -82,19 +83,15 @@ def _locus_words(data: Loci) -> str:
 
 def _more_K1(data: Loci) -> str:
     """How the damping of the first mode rises, and whether it falls again."""
-    exact = data.exact
-    rows = exact.branches[(exact.mode == 1) & (exact.branches.imag > 0).any(axis=1)]
-    rows = rows[~np.isnan(rows).any(axis=1)]
-    if not rows.size:
+    exact, found = data.exact, most_damped(data.exact)
+    start = f"More K1 (K2 = {plain(exact.law.K2)} held)"
+    if found is None:
         return f"More K1, with K2 = {plain(exact.law.K2)} held"
     unit = written_unit("K1", exact.arm)
-    ratio = np.where(rows[0].imag > 0, -rows[0].real / np.maximum(abs(rows[0]), 1e-300), -np.inf)
-    at = int(np.argmax(ratio))
-    best_ratio, gain = significant(100 * float(ratio[at]), 3), significant(float(exact.gain[at]), 3)
-    start = f"More K1 (K2 = {plain(exact.law.K2)} held)"
-    if not (rows[0].imag[at:] > 0).all():
+    best_ratio, gain = significant(100 * found.damping_ratio, 3), significant(found.gain, 3)
+    if not found.swings_on:
         return f"{start} damps the first mode until it no longer swings, a little above K1 = {gain}{unit}"
-    then = ", and less from there on: the hub is then held too firmly to take energy out" if at < ratio.size - 1 else ""
+    then = ", and less from there on: the hub is then held too firmly to take energy out" * found.falls
     return f"{start} damps the first mode up to {best_ratio} % of critical at K1 = {gain}{unit}{then}"
 
 

@@ -93,12 +93,12 @@ def no_loop_section(arm: Arm) -> Section:
 def map_section(arm: Arm, chain: Chain | None = None) -> Section:
     """How high may the gains go?  And how high when the loop is sampled by the chain's clock?"""
     data = gain_map(arm, chain)
-    share = significant(100 * float(data.region.stable.mean()), 2)
     picture = Picture(
         stem="map",
         title="The plane of both gains",
         caption=_map_caption(data),
-        alt=f"Map of K1 and K2: {share} % of the area shown is stable; how far each gain may go is said above.",
+        alt="Map of K1 and K2: the stable gains, and how many poles are unstable elsewhere; how far each gain may go "
+        "is said above.",
         figure=draw_map(data),
         data=map_data(data),
     )

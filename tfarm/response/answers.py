@@ -73,7 +73,10 @@ BODE = (  # of `Bode`
 
 
 def bode_answer(data: Bode) -> dict[str, Any]:
-    """Poles and zeros of a Bode plot with |G| there ("inf" and 0 on the axis), then its curve, refined around them."""
+    """Poles and zeros of a Bode plot with |G| there ("inf" and 0 on the axis), then its curve, refined around them.
+
+    They are complete up to the band's end in Im s, and in Re s between the two numbers beside each.
+    """
     roots = {"poles": (data.poles, data.peaks), "zeros": (data.zeros, data.dips)}
     return {
         "arm": data.arm.name,
@@ -82,6 +85,8 @@ def bode_answer(data: Bode) -> dict[str, Any]:
         "unit": data.gain_unit,
         "band_rad_s": list(data.band),
         **{key: Table(columns=ROOTS, record=list(zip(*pair, strict=True))) for key, pair in roots.items()},
+        "poles_between_re_1_s": list(data.pole_width),
+        "zeros_between_re_1_s": list(data.zero_width),
         "omega_rad_s": data.omega.tolist(),
         "value": [[v.real, v.imag] for v in data.value.tolist()],
         "phase_deg": data.phase.tolist(),

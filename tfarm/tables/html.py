@@ -37,11 +37,12 @@ def _groups(columns: list[Column]) -> Markup:
 
 
 def _column(column: Column) -> list[Markup]:
-    """The heading, then the cells: words to the left, long ones wide, some with a background."""
+    """The heading with its key in JSON, then the cells: words to the left, long ones wide, some with a background."""
     text, tinted, cells = "text" * column.is_text, " tinted" * bool(column.tint), column.cells
     of = Markup('<span class="unit">{}</span>').format(column.unit) if column.unit else ""
-    shape = Markup('<th scope="col" class="{}{}">{}{}</th>' if column.title else '<td class="{}{}">{}{}</td>')
-    head = shape.format(text, tinted, symbol(column.title), of)
+    tag, scope = ("th", Markup(' scope="col"')) if column.title else ("td", "")
+    shape = Markup('<{0}{1} class="{2}{3}" data-key="{4}">{5}{6}</{0}>')
+    head = shape.format(tag, scope, text, tinted, column.key, symbol(column.title), of)
     styles = (
         Markup(' style="background:{}"').format(tint) if tint else "" for tint in column.tint or [""] * len(cells)
     )
