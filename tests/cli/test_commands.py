@@ -74,13 +74,13 @@ def test_response_digits_are_pairs_of_strings(capsys: pytest.CaptureFixture[str]
 
 def test_csv_is_the_same_table(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     file = tmp_path / "root.csv"
-    code, out, _ = run(
+    code, out, err = run(
         capsys, "response", "sasaki2012", "--output", "root_moment", "--omega", "1,2", "--csv", str(file)
     )
+    assert err == f"written: {file}\n"
     largest = abs(tfarm.transfer(tfarm.load("sasaki2012"), "root_moment")(2j))
     assert code == 0
     assert out.splitlines() == [
-        f"written: {file}",
         f"sasaki2012: 2 points, largest |root_moment / hub_torque| {largest:.6g} N m / N m at s = 0+2i 1/s",
     ]
     header, *rows = csv.reader(file.read_text().splitlines())

@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import tfarm
 from tests.odd_arms import odd_arms
 from tfarm.dsp import Chain, Slew, scenario
-from tfarm.dsp.curves import BETWEEN, MOST_LINE, PERIODS, POINTS, curve, reference_angle, root_moment
+from tfarm.dsp.curves import BETWEEN, MOST_LINE, PERIODS, POINTS, curve, points_a_period, reference_angle, root_moment
+from tfarm.dsp.results import drawn
 from tfarm.dsp.slews import slews
 from tfarm.report.time_responses import slews_table
 from tfarm.spectrum.scales import default_gains
@@ -40,6 +42,20 @@ def test_the_slew_of_a_stiff_arm_is_not_aliased_and_its_file_has_the_curve():
     assert columns["root_moment_without_N_m_low"] == pytest.approx(drawn.low, abs=rounded)
     assert columns["root_moment_without_N_m_high"] == pytest.approx(drawn.high, abs=rounded)
     assert (columns["root_moment_without_N_m_low"] <= columns["root_moment_without_N_m_high"]).all()
+
+
+def test_a_slew_under_any_law_is_resolved_too():
+    """On the page of a law: 20 records in each period of the first mode, which rings at 368 Hz, or a band around it."""
+    law = tfarm.Law({"hub_rate": ([40.0, 0.0], [1.0, 300.0]), "hub_angle": 100.0})
+    run = drawn(STEEL, law, Chain(), "impulse", 0.1)
+    first = tfarm.modes(STEEL, 1).natural_frequency[-1] / (2 * np.pi)
+    assert (run.between.t.size / run.t.size + 1) * 100 >= POINTS * first
+    found, needed = points_a_period(STEEL, run)
+    assert found >= POINTS
+    coarse = tfarm.simulate(STEEL, law, scenario_name="impulse", duration=0.1, count=20)
+    assert points_a_period(STEEL, coarse)[0] == pytest.approx(POINTS / (needed + 1), rel=0.1)
+    assert "points a period" in tfarm.plots.slew(STEEL, coarse, ax=Figure().subplots(3))[0].get_title("right")
+    assert tfarm.plots.slew(STEEL, run, ax=Figure().subplots(3))[0].get_title("right") == ""
 
 
 def test_a_slow_arm_is_a_line_of_the_simulators_own_records():

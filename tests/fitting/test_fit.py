@@ -163,7 +163,7 @@ def test_the_command_and_its_file(tmp_path, capsys):
         capsys, *given, "--free", "link.youngs_modulus,gain", "--start", "link.youngs_modulus=6e10",
         "--save", str(save), "--png", str(png), "--covariance",
     )  # fmt: skip
-    assert (code, err) == (0, "")
+    assert (code, err) == (0, f"written: {save}\nwritten: {png}\n")
     assert "2 of 2 numbers are known from these data" in out
     assert png.read_bytes().startswith(b"\x89PNG")
     fitted = tfarm.load(save)

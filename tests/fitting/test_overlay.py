@@ -135,7 +135,7 @@ def test_the_command_prints_writes_and_draws(sweep, tmp_path, capsys):
     asked = ("response", "sasaki2012", "--measured", f"root_moment/hub_torque={sweep}")
     png, table = tmp_path / "o.png", tmp_path / "o.csv"
     code, out, err = run(capsys, *asked, "--png", str(png), "--csv", str(table))
-    assert (code, err) == (0, "")
+    assert (code, err) == (0, f"written: {table}\nwritten: {png}\n")
     assert png.read_bytes().startswith(b"\x89PNG")
     assert len(list(csv.reader(table.read_text().splitlines()))) == 1 + OMEGA.size
     assert "each alone and for each mode" in out

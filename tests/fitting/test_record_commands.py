@@ -26,7 +26,7 @@ NAMED = ("--input", "hub_torque", "--output", "tip_acceleration=acc1")
 def test_a_record_becomes_a_file_that_the_other_commands_read(record, tmp_path, capsys):
     save = tmp_path / "sweep.csv"
     code, out, err = run(capsys, "frf", str(record), *NAMED, "--save", str(save))
-    assert (code, err) == (0, "")
+    assert (code, err) == (0, f"written: {save}\n")
     assert "H1 of 15 segments of 2 s (hann, 50 % overlapped), worth 14.2" in out
     data = data_of(f"tip_acceleration/hub_torque={save}")
     found = answer(capsys, "frf", str(record), *NAMED)

@@ -131,7 +131,7 @@ def response(
     answer = response_answer(transfer(subject, wanted, x=x, method=road, input=driven), at, right)
     if csv is not None:
         write_csv(response_table(answer), csv)
-    if json or csv is None or say_written(csv):
+    if say_written(csv) or json:
         give(answer, json, (lambda found: show(response_table(found))) if csv is None else print_found)
 
 

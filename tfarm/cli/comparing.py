@@ -64,7 +64,7 @@ def compare(
         from tfarm.report.comparison_page import write_comparison
 
         page = write_comparison(found, out)
-    if json or say_written(png, page):
+    if say_written(png, page) or json:
         give(comparison_answer(found), json, lambda answer: _print(found, answer))
 
 

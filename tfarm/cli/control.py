@@ -125,7 +125,7 @@ def gain_map(
         save_png(draw_map(found), png)
     from tfarm.cli.tables import say_written
 
-    if json or say_written(csv, png):
+    if say_written(csv, png) or json:
         give(map_answer(found), json, print_map)
 
 
@@ -162,7 +162,7 @@ def _law_map(
         from tfarm.plots.laws import draw_law_map
 
         save_png(draw_law_map(found), png)
-    if json or say_written(csv, png):
+    if say_written(csv, png) or json:
         give(answer, json, print_law_map)
 
 
@@ -210,7 +210,7 @@ def design(
     law = Law.of_gains(found.law) if isinstance(found, Design) else found.law
     if save is not None:
         save_law(law, save)
-    if not (json or say_written(save)):
+    if not (say_written(save) or json):
         return
     if isinstance(found, Design):
         give(design_answer(found), json, print_design)

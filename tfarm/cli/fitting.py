@@ -68,7 +68,7 @@ def fit(
     if png is not None:
         _draw(found, png)
     page = _report(found, out) if report else None
-    if json or say_written(*(path for path in (save, png, page) if path is not None)):
+    if say_written(*(path for path in (save, png, page) if path is not None)) or json:
         give(fit_answer(found), json, lambda answer: _print(found, answer))
     if not found.converged:
         raise typer.Exit(3)

@@ -75,7 +75,7 @@ def locus(
         write_csv(branches_table(answer), csv)
     from tfarm.cli.tables import say_written
 
-    if json or say_written(csv, png):
+    if say_written(csv, png) or json:
         give(answer, json, show)
 
 

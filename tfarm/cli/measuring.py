@@ -48,7 +48,7 @@ def frf(
     found = frequency_response(read_recording(record), *named, columns=columns, segment=segment, overlap=overlap, **how)
     if csv is not None:
         write_csv(measured_table(found.measured), csv)
-    if json or csv is None or say_written(csv):
+    if say_written(csv) or json:
         answer = estimate_answer(found)
         if not json and csv is None:
             show(answer["response"])

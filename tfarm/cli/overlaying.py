@@ -29,7 +29,7 @@ def lay_over(arm: Arm, text: str, csv: Path | None, png: Path | None, json: bool
         from tfarm.plots.overlaid import draw_measured
 
         save_png(draw_measured(found), png)
-    if json or say_written(csv, png):
+    if say_written(csv, png) or json:
         give(overlay_answer(found), json, _print)
 
 

@@ -46,7 +46,7 @@ def bode(
         from tfarm.plots.frequency import draw_bode
 
         save_png(draw_bode(found), png)
-    if json or say_written(csv, png):
+    if say_written(csv, png) or json:
         give(bode_answer(found), json, _print_bode)
 
 
@@ -69,7 +69,7 @@ def nyquist(arm: ArmName, png: Png = None, csv: Csv = None, json: Json = False, 
         from tfarm.plots.files import save_png
 
         save_png(draw_disc(found), png)
-    if json or say_written(csv, png):
+    if say_written(csv, png) or json:
         give(nyquist_answer(found) | said, json, _print_nyquist)
 
 

@@ -38,8 +38,7 @@ def reduce(
     written = () if mat is None else save_mat(reduced, mat, key="--mat")
     from tfarm.cli.tables import say_written
 
-    if not json:
-        say_written(*written)
+    say_written(*written)
     give(reduced_answer(reduced), json, _show)
 
 

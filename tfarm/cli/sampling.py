@@ -105,7 +105,7 @@ def _show(answer: dict[str, Any], csv: Path | None, mat: Path | None, json: bool
     if mat is not None:
         sampling_tables.write_mat(answer, mat)
     sampling_tables.warn_if_stopped(answer)
-    if json or say_written(csv, mat):
+    if say_written(csv, mat) or json:
         give(answer, json, sampling_tables.print_simulation)
         if not json and csv is None and mat is None:
             print("--json, --csv or --mat give the signals")

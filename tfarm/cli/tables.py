@@ -122,12 +122,12 @@ def print_found(answer: dict[str, Any]) -> None:
 
 
 def say_written(*paths: Path | None) -> bool:
-    """Say which files were written; False where one is standard output itself, which holds the table then."""
+    """Say on standard error which files were written; False where one is standard output, which holds the table."""
     given = [path for path in paths if path is not None]
     if any(map(is_standard_output, given)):
         return False
     for path in given:
-        print(f"written: {path}")
+        print(f"written: {path}", file=sys.stderr)
     return True
 
 

@@ -95,5 +95,5 @@ def _show(answer: dict[str, Any], save: Path | None, json: bool) -> None:
     from tfarm.cli.tables import say_written
 
     tuning_tables.warn_if_stopped(answer)
-    if json or say_written(save):
+    if say_written(save) or json:
         give(answer, json, tuning_tables.print_tuning)

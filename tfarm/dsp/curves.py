@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ from tfarm.dsp.simulate import Simulation, Simulator
 from tfarm.records import record
 
 Real = NDArray[np.float64]
+AnySimulator = TypeVar("AnySimulator", bound=Simulator)
 
 BETWEEN = 3  # records between two samples at least
 MOST_LINE = 6000  # points of a line: at 20 a period still three pixels a period
@@ -58,13 +60,22 @@ class Curve:
         )
 
 
-def resolved(simulator: Simulator, arm: Arm, *runs: Callable[[Simulator], Simulation]) -> list[Simulation]:
+def resolved(simulator: AnySimulator, arm: Arm, *runs: Callable[[AnySimulator], Simulation]) -> list[Simulation]:
     """The simulations of one picture, with as many records between their samples as its fastest visible mode takes."""
     rough = [run(simulator) for run in runs]
     needed = [records_between(simulator, each, _heights(arm, each)) for each in rough if each.t.size > 1]
     most = max(BETWEEN, MOST_RECORDS // simulator.scenario.t.size)
     finer = simulator.finer(min(max(BETWEEN, *needed), most) if needed else BETWEEN)
     return [run(finer) for run in runs]
+
+
+def points_a_period(arm: Arm, run: Simulation) -> tuple[float, int]:
+    """How many points the records have in a period of the fastest mode that is seen, and how many between two samples
+    there would have to be for 20; infinitely many where none is seen."""
+    simulator = Simulator(arm, run.chain, run.scenario)
+    needed = records_between(simulator, run, _heights(arm, run)) if run.t.size > 1 else 0
+    there = 0 if run.between is None else run.between.t.size // max(1, run.t.size)
+    return (POINTS * (there + 1) / (needed + 1) if needed else math.inf), needed
 
 
 def _heights(arm: Arm, run: Simulation) -> dict[str, float]:

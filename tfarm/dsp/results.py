@@ -14,6 +14,7 @@ from tfarm.arm import LISTED, Arm, HubFeedback, driven, unit_of
 from tfarm.arm.driving import AnyLaw, tracked
 from tfarm.columns import Column
 from tfarm.dsp.chain import Chain
+from tfarm.dsp.curves import resolved
 from tfarm.dsp.discretise import described_law
 from tfarm.dsp.enough import Enough, enough_modes
 from tfarm.dsp.law_simulate import LawSimulator
@@ -235,6 +236,19 @@ def simulate(
     chain = Chain() if chain is None else chain
     arm, law = tracked(arm, law)
     return _simulated(arm, law, chain, scenario(scenario_name, arm, chain, duration), count, between)[0]
+
+
+def drawn(arm: Arm, law: AnyLaw, chain: Chain, scenario_name: str, duration: float) -> Simulation:
+    """The same for a picture: with 20 records in each period of the fastest mode that is seen (`curves.resolved`)."""
+    arm, law = tracked(arm, law)
+    task = scenario(scenario_name, arm, chain, duration)
+    used = modes_for(None, lambda n: simulation_of(arm, law, ideal_chain(chain), task, count=n))
+    if isinstance(law, HubFeedback):
+        gains = law
+        (found,) = resolved(Simulator(arm, chain, task, count=used.modes), arm, lambda it: it.linear(gains))
+        return found
+    (found,) = resolved(LawSimulator(arm, law, chain, task, count=used.modes), arm, LawSimulator.run)
+    return found
 
 
 def simulation_of(arm: Arm, law: AnyLaw, chain: Chain, task: Scenario, *, count: int, between: int = 0) -> Simulation:

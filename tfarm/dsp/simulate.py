@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -167,7 +167,7 @@ class Simulator:
 
         return self._stepped(torque, np.zeros(self.scenario.feedforward.size))
 
-    def finer(self, between: int) -> Simulator:
+    def finer(self, between: int) -> Self:
         """The same with so many records in each sample."""
         other = copy(self)
         other.between = between

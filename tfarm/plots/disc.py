@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tfarm.digits import plain, significant
 from tfarm.loop.nyquist import Nyquist, compressed
 
-from .labels import AROUND, UPON, Label
+from .labels import FURTHER, UPON, Label
 from .style import BLUE, FAINT, GREY, ORANGE, Keys, New, alone, blank, headline, safe, style, window
 from .words import gains_words
 
@@ -74,7 +74,7 @@ def _disc(ax: Axes) -> None:
     ax.plot([-1, 1], [0, 0], color=FAINT, lw=0.7, zorder=0.5)
     ax.plot([0, 0], [-1, 1], color=FAINT, lw=0.7, zorder=0.5)
     ax.plot([-0.5], [0], "+", color=ORANGE, ms=11, mew=2.2, zorder=6)
-    minus_one = Label("−1", [(-0.5, 0.0)], AROUND, fontsize=10.0, color=ORANGE, weight="bold")
+    minus_one = Label("−1", [(-0.5, 0.0)], FURTHER, fontsize=10.0, color=ORANGE, weight="bold")
     minus_one.set_path_effects([withStroke(linewidth=2.0, foreground="white")])
     ax.add_artist(minus_one)
     ax.set_aspect("equal")

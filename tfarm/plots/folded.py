@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from tfarm.digits import plain
 from tfarm.dsp.loci import BEYOND, RIM, Loci, Locus
 
+from .labels import BESIDE, Label
 from .style import BLUE, GREY, INK, ORANGE, blank, headline, style
 from .words import gains_words
 
@@ -64,8 +65,7 @@ def folded(data: Loci, *, ax: Axes) -> None:
                 arrowprops={"arrowstyle": "->", "color": colour, "lw": 0.9, "linestyle": (0, (4, 3))},
             )  # fmt: skip
         ax.plot(pole.real, f, "o", mfc="white", mec=colour, mew=1.3, ms=6, zorder=5)
-        below = (7, 4 if f > half else -12)
-        ax.annotate(f"mode {mode}", (pole.real, f), xytext=below, textcoords="offset points", fontsize=8.5)
+        ax.add_artist(Label(f"mode {mode}", [(float(pole.real), float(f))], BESIDE, fontsize=8.5))
     ax.axvline(0.0, color=INK, lw=0.9)
     ax.set_xlim(3.0 * min(*ends, -1.0), 3.0 * max(*ends, 0.1))
     ax.set_ylim(0.0, top)
@@ -113,6 +113,7 @@ def z_plane(data: Loci, locus: Locus, *, ax: Axes) -> None:
         if np.isfinite(visible[here]):
             ax.plot(z[here].real, z[here].imag, "o", color=colour, ms=4.5, zorder=5)
     ax.set_xlim(-RIM, RIM)
+    ax.set_xticks([-1.0, -0.5, 0.0, 0.5, 1.0])
     ax.set_ylim(0.0, RIM)
     ax.set_aspect("equal")
     ax.grid(False)

@@ -23,6 +23,7 @@ AWAY = (6.0, 11.0)  # points from a mark to its words
 SIDES, CORNERS = ((0, 1), (0, -1), (1, 0), (-1, 0)), ((1, 1), (-1, 1), (1, -1), (-1, -1))
 AROUND: tuple[Offset, ...] = tuple((r * x, r * y) for r in AWAY for x, y in (*SIDES, *CORNERS))
 BESIDE: tuple[Offset, ...] = tuple((r * x, r * y) for r in AWAY for x, y in (*SIDES[2:], *CORNERS, *SIDES[:2]))
+FURTHER: tuple[Offset, ...] = (*AROUND, *((r * x, r * y) for r in (17.0, 24.0) for x, y in (*SIDES, *CORNERS)))
 UPON: tuple[Offset, ...] = ((0.0, 0.0),)  # in the middle of the place itself, as on a contour
 CLEAR = 1.5  # pixels around words that nothing else comes into
 

@@ -9,8 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tfarm.arm import Arm
+from tfarm.digits import plain
 from tfarm.dsp import Simulation, curves
 from tfarm.dsp.curves import Curve
+from tfarm.dsp.ringing import POINTS
 
 from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, New, blank, headline, style, taken, window
 
@@ -23,6 +25,7 @@ def slew(arm: Arm, runs: Simulation | Runs, *, ax: Sequence[Axes] | None = None)
     """Simulations of one scenario (what `tfarm.simulate` returns; several by name) in three axes, given or new; these.
 
     Root moment [N m], tip less a rigid arm's on its reference [mm], and the torque of the motor [N m], or its input.
+    Above them it is said where records are too few for the fastest mode that is seen.
     """
     each = {"": runs} if isinstance(runs, Simulation) else runs
     with style():
@@ -34,7 +37,16 @@ def slew(arm: Arm, runs: Simulation | Runs, *, ax: Sequence[Axes] | None = None)
             tip_error(arm, each, ax=tip)
             motor_torque(each, arm.input_unit, ax=torque)
             torque.set_xlabel("time  [s]")
+        moment.set_title(_coarse_words(arm, each), loc="right", fontsize=8.0, color=GREY)
     return moment, tip, torque
+
+
+def _coarse_words(arm: Arm, each: Runs) -> str:
+    """What is said of records with less than 20 points in a period of the fastest mode that is seen."""
+    found = min(curves.points_a_period(arm, run) for run in each.values())
+    if found[0] >= POINTS:
+        return ""
+    return f"{plain(found[0], 2)} points a period of the fastest mode seen; between={found[1]} gives {POINTS}"
 
 
 def draw_responses(arm: Arm, each: Runs, what: str, new: New = blank) -> Figure:

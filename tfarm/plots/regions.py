@@ -47,6 +47,7 @@ def overlay(continuous: Region, sampled: GainMap | Sequence[GainMap], *, ax: Axe
             (line,) = ax.plot(ax.get_xlim(), (1.0, 1.0), color=INK, lw=1.1, ls=(0, (5, 3)), zorder=4)
             line.set_label("below it: proven by energy at C = 0 (K1 > 0, K2 < 1)")
             keys.append(line)
+        keys.append(Patch(facecolor="white", edgecolor=GREY, linewidth=0.9, label="stable in neither"))
         law = planes[0].loop.gains
         (point,) = ax.plot(law.K1, law.K2, "o", color="white", mec=INK, mew=1.4, ms=7, zorder=6, ls="none")
         point.set_label(gains_words(law))

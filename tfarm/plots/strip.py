@@ -13,6 +13,7 @@ from tfarm.digits import counted, plain, significant
 from tfarm.dsp.curves import Curve, continuous, root_moment
 from tfarm.dsp.strip_chart import StripChart
 
+from .labels import FURTHER, Label
 from .motion import draw_curve, motor_words
 from .style import BLUE, FAINT, GREEN, GREY, INK, ORANGE, blank, headline, style
 
@@ -94,7 +95,7 @@ def torque(data: StripChart, is_close: bool, *, ax: Axes) -> None:
             "", (s.t[k] + late, s.torque[k]), (s.t[k], s.torque[k]), zorder=6,
             arrowprops={"arrowstyle": "->", "color": INK, "lw": 1.2, "shrinkA": 0, "shrinkB": 0},
         )  # fmt: skip
-        ax.annotate("delay", (s.t[k] + late / 2, s.torque[k]), xytext=(0, 5), textcoords="offset points", ha="center")
+        ax.add_artist(Label("delay", [(s.t[k] + late / 2, float(s.torque[k]))], FURTHER, fontsize=10.0))
 
 
 def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:

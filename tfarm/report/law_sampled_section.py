@@ -18,7 +18,7 @@ from tfarm.dsp.closed import verdict_on
 from tfarm.dsp.law_margins import stable_factors
 from tfarm.dsp.law_verdict import law_verdict
 from tfarm.dsp.margins import DelayMargin, delay_margin
-from tfarm.dsp.results import residual_moment_rms, simulate
+from tfarm.dsp.results import drawn, residual_moment_rms
 from tfarm.dsp.slews import LASTING
 from tfarm.errors import ParameterError
 from tfarm.fitting.runs import Beside, beside, overshoot
@@ -34,7 +34,6 @@ from tfarm.report.words import typeset, upper
 
 SMALL = 0.05  # a sample: growth up to which damping is first order
 MORE = (0.0, 0.5, 1.0)  # samples of further delay that the verdict is asked for again
-BETWEEN = 8  # records between two samples of a slew that is drawn
 LATER = (
     "The exact loop with so much more delay between reading and acting. |z| is the largest of its poles{apart}; below "
     "1 the loop is stable. {held}"
@@ -225,7 +224,7 @@ def _slew(arm: Arm, chain: Chain, named: Sequence[LawOnArm]) -> tuple[list[Pictu
     words, slew = [], chain.slew
     for each in named:
         try:
-            runs[each.name] = simulate(each.arm, each.law, chain, "slew", LASTING * slew.rise_time, between=BETWEEN)
+            runs[each.name] = drawn(each.arm, each.law, chain, "slew", LASTING * slew.rise_time)
         except ParameterError as error:
             words.append(f"No slew of {each.name} is simulated: {typeset(str(error))}.")
     if not runs:
