@@ -202,7 +202,7 @@ class Worker:
 
 def judge(arguments, code, out, err, seconds):
     """The case with what is wrong with it, or with an empty text."""
-    lines = [line for line in err.splitlines() if line]
+    lines = [line for line in err.splitlines() if line and not line.startswith("written: ")]
     errors = [line for line in lines if not line.startswith(("tfarm: warning:", "tfarm: compiling once"))]
     wrong = ""
     if code is None or seconds > CPU_SECONDS:
