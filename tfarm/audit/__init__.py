@@ -2,9 +2,24 @@
 
 for row in tfarm.audit.audit():
     print(row.equation, row.verdict, row.residual_printed, row.residual_corrected)
+
+What needs SymPy is loaded when it is asked for: a report's processes want this room for its studies of assumptions.
 """
 
-from .paper import PAPER, audit, audit_answer, claims, records, to_json
+from importlib import import_module
+from typing import TYPE_CHECKING
+
 from .rows import Claim, Row, is_zero
 
+if TYPE_CHECKING:
+    from .paper import PAPER, audit, audit_answer, claims, records, to_json
+
 __all__ = ["PAPER", "Claim", "Row", "audit", "audit_answer", "claims", "is_zero", "records", "to_json"]
+
+
+def __getattr__(name: str) -> object:
+    if name not in __all__:
+        raise AttributeError(f"module 'tfarm.audit' has no attribute {name!r}")
+    value = getattr(import_module("tfarm.audit.paper"), name)
+    globals()[name] = value
+    return value

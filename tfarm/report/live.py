@@ -12,7 +12,6 @@ from tfarm.arm import HubFeedback
 from tfarm.errors import TfarmError
 from tfarm.loop.panels import SAMPLES
 from tfarm.report.given_laws import Subject
-from tfarm.report.live_charts import charts
 from tfarm.report.live_data import COLUMNS, live_data
 from tfarm.report.loop_laws import has_loop, sign_words
 from tfarm.report.page import TEMPLATES, argument, is_preset, render
@@ -57,6 +56,8 @@ def write_assets(folder: Path, there: Path) -> None:
     folder.mkdir(exist_ok=True)
     if not (there / RUNTIME).is_file():
         (folder / RUNTIME).write_text(_runtime(), encoding="utf-8", newline="")
+    from tfarm.report.live_charts import charts  # and Altair, which the processes that make pages do not need
+
     named = json.dumps(charts(), separators=(",", ":"), sort_keys=True)
     scripts = "".join((TEMPLATES / name).read_text(encoding="utf-8") for name in SCRIPTS)
     own = f"(() => {{\nconst LIVE_CHARTS = {named};\n{scripts}}})();\n"  # the runtime has names of its own
