@@ -166,6 +166,16 @@ def test_the_arm_bends_in_its_own_shapes(case):
     assert arm.reach == pytest.approx(held["offset"] + arm.length)
 
 
+def test_a_sensor_is_offered_where_there_is_something_to_sense(case):
+    """A clamp on the axis does not move, and a free tip without inertia does not bend: no place for those sensors."""
+    arm, data, _ = case
+    moves, bends = (data["sensor"][kind]["x"] for kind in ("displacement", "moment"))
+    assert (0.0 in moves) == (arm.reach > arm.length)
+    assert (arm.length in bends) == (arm.payload.inertia > 0)
+    assert 0.0 in bends
+    assert arm.length in moves
+
+
 def test_a_slew_of_too_many_samples_is_left_to_the_command():
     arm, fast = tfarm.load("sasaki2012"), Chain(sampling=Sampling(period=1e-4))
     assert slew_numbers(arm, fast, HubFeedback(K1=0.3)) is None

@@ -200,7 +200,7 @@ def _slew() -> Any:
 
 def _sensor() -> Any:
     """Zeros over the sensor's position, natural frequencies across, and the position that is looked at."""
-    x = alt.X("x:Q", title="sensor at x [m] from the clamp", scale=alt.Scale(nice=False))
+    x = alt.X("x:Q", title="sensor at x [m] from the clamp", scale=alt.Scale(nice=False), axis=alt.Axis(tickCount=5))
     y = alt.Y("w:Q", title="frequency [rad/s]", scale=alt.Scale(type="log", nice=False), axis=alt.Axis(format=".3~r"))
     kinds = ["zero on or left of the imaginary axis", "zero right of it"]
     legend = alt.Legend(columns=1, symbolType="circle", labelLimit=260)

@@ -5,24 +5,34 @@ from __future__ import annotations
 from typing import Any, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tfarm.arm import Arm
 from tfarm.errors import TfarmError
 from tfarm.loop.positions import Positions, Sensor, positions
+from tfarm.spectrum import modes
+
+Real = NDArray[np.float64]
 
 PLACES = 16  # pieces of the arm between two positions
 MODES = 6
-ENDS: dict[str, slice] = {"displacement": slice(1, None), "moment": slice(None, -1)}  # no sensor where all is 0
+NOTHING = 1e-9  # of a mode's largest: an end that no mode moves, or bends, by more has no sensor
 DIGITS = 6
 
 
 def sensor_numbers(arm: Arm) -> dict[str, Any] | None:
     """Participation and zeros at every position, by the kind of sensor; None where they cannot be had."""
-    x = np.linspace(0.0, arm.length, PLACES + 1)
     try:
-        return {kind: _numbers(positions(arm, kind, x[ENDS[kind]], MODES)) for kind in get_args(Sensor)}
+        return {kind: _numbers(positions(arm, kind, _places(arm, kind), MODES)) for kind in get_args(Sensor)}
     except TfarmError:
         return None
+
+
+def _places(arm: Arm, kind: Sensor) -> Real:
+    """Places along the arm [m], without ends at which there is nothing to sense."""
+    x, found = np.linspace(0.0, arm.length, PLACES + 1), modes(arm, MODES)
+    size = abs((found.shape if kind == "displacement" else found.moment)(x)[found.index > 0])
+    return np.asarray(x[(size > NOTHING * size.max(axis=1, keepdims=True)).any(axis=0)])
 
 
 def _numbers(found: Positions) -> dict[str, Any]:

@@ -64,6 +64,7 @@
   const STACKED = { bode: 580, slew: 520 }; // pixels of charts that are several, one below the other
   function room(name) {
     const wide = Math.max($(name).clientWidth - 70, 200);
+    if (name === "sensor") return [Math.min(wide - 40, 420), Math.min(wide, 340)]; // names stand beside it
     return STACKED[name] ? [wide, 0] : name === "zplane" ? [Math.min(wide, 340), Math.min(wide, 340)] : [Math.min(wide, 420), Math.min(wide, 340)];
   }
   function fit(name) {
@@ -85,10 +86,11 @@
   function numbers(gains) {
     const law = { ...gains }, poles = loop.poles(law, now?.poles), [verdict, why] = loop.verdict(law, poles), points = loop.dense(poles, law);
     const margins = verdict.startsWith("stable") ? loop.margins(law, points) : null, near = poles.slice(0, +$("shown").value), top = 1.08 * Math.max(...near.map(s => s[1]), 1), drawn = {};
+    const lowest = Math.min(loop.places[0] / 200, ...(margins ? margins.crossed.map(row => row.w / 3) : []));
     const left = 1.15 * Math.min(...near.map(s => s[0]), -1e-4 * top), right = Math.max(-0.05 * left, 1.3 * Math.max(...near.map(s => s[0])));
     return {
       law, poles, verdict, why, margins, near, frame: { x: [left, right], y: [0, top] },
-      z: discrete && discrete.poles(law, now?.z), run: slew && slew.run(law), curve: fine => drawn[fine] ||= curveOf(loop, law, points, fine),
+      z: discrete && discrete.poles(law, now?.z), run: slew && slew.run(law), curve: fine => drawn[fine] ||= curveOf(loop, law, points, fine, lowest),
     };
   }
   function show() {
@@ -110,7 +112,7 @@
     const word = most > 0 ? "unstable" : most < 0 ? "stable" : "marginal";
     text("sampled", now.z ? word : "not computed");
     $("sampled").className = `verdict ${now.z && most < 0 ? "ok" : "corrected"}`;
-    text("sampled-note", now.z ? `${most > 0 ? `grows by ${change} a sample` : `the slowest pole decays by ${change} a sample`}; spectral radius ${general(Math.exp(most), 12)}, of the first ${discrete.modes} modes` : "the sampled poles of these gains are not all found");
+    text("sampled-note", now.z ? `${most > 0 ? `grows by ${change} a sample` : `the slowest pole decays by ${change} a sample`}; spectral radius ${general(Math.exp(most), 12)}, of the first ${discrete.modes} mode${discrete.modes > 1 ? "s" : ""}` : "the sampled poles of these gains are not all found");
     text("sampled-command", discrete ? `tfarm sampled ${gains}` : "");
     rows("z-rows", (now.z || []).filter(({ z }) => z[1] > -1e-14).sort((a, b) => b.growth - a.growth).slice(0, 8).map(({ z, growth }) => [general(z[0], 5), general(Math.abs(z[1]) > 1e-14 ? z[1] : 0, 5), general(Math.exp(growth), 7), general(growth, 4)]));
   }
@@ -188,7 +190,7 @@
     if (of.resting) return;
     of.resting = true;
     await keepUp(true);
-    for (let next; (next = LOCI.find(([name, key]) => views[name] && inView.has(name) && !of[key]));) {
+    for (let next; (next = LOCI.find(([name, key]) => views[name] && (name === "poles" || inView.has(name)) && !of[key]));) {
       const [name, key, work] = next, found = await inSlices(work(), of);
       if (!found) return;
       of[key] = found;

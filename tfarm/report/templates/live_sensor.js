@@ -14,6 +14,7 @@ function makeSensor(kinds, colours) {
     return bar;
   }
   function show() {
+    $("sensor-at").max = held().x.length - 1; // an end where there is nothing to sense is left out
     const { x, modes, participation, zeros } = held(), i = at();
     $("sensor-x").textContent = `x = ${general(x[i], 5)} m`;
     fill("sensor-modes", modes.map((w, n) => [cell(n + 1), cell(general(w, 6)), cell(general(hertz(w), 5)), cell(participation[i][n].toFixed(3)), share(participation[i][n])]));

@@ -12,8 +12,8 @@ function gainAt(axis, share, digits = 4) {
   return +(axis.linear === null ? y : Math.sign(y) * axis.linear * Math.expm1(Math.abs(y))).toPrecision(digits);
 }
 
-// The curve over w: points that would not be told apart left out, others put in where L turns (`fine`)
-function curveOf(loop, law, points, fine) {
+// The curve over w: points that would not be told apart left out, others put in where L turns (`fine`); it begins at the frequency `from`
+function curveOf(loop, law, points, fine, from) {
   const rows = [], small = L => times(1 / (1 + size(L)), L), apart = fine ? 2e-5 : 1e-3;
   let branch = 0, last = null;
   const push = point => {
@@ -24,7 +24,7 @@ function curveOf(loop, law, points, fine) {
     rows.push(last);
   };
   for (const point of points) {
-    if (point.w < loop.places[0] / 200 || (last && point.w < last.w * (1 + apart))) continue;
+    if (point.w < from || (last && point.w < last.w * (1 + apart))) continue;
     if (last && fine) {
       const [D, N] = point.both, from = last.w;
       const steps = Math.min(12, Math.ceil(size(minus(small(div(N, D)), small([last.x, last.y]))) / 0.03));
