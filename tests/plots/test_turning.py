@@ -5,9 +5,13 @@ import pytest
 
 import tfarm
 from tfarm.dsp.loci import loci as sampled_loci
+from tfarm.loop.law_locus import law_locus
+from tfarm.loop.law_locus import rounded as rounded_law
+from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.locus import locus, rounded
 from tfarm.loop.poles import poles_below
 from tfarm.plots.folded import draw_loci
+from tfarm.plots.laws import draw_law_locus
 from tfarm.plots.roots import draw_locus
 from tfarm.spectrum.scales import default_gains, rate_unit
 
@@ -68,3 +72,21 @@ def test_the_sampled_locus_is_round_too():
         told = [seen_turns(line)[0] for line in ax.lines if line.get_linewidth() == 1.4 and len(line.get_xdata()) > 1]
         assert sum(turn.size for turn in told) > 5
         assert max(turn.max(initial=0.0) for turn in told) <= MOST
+
+
+def test_a_locus_under_any_law_is_round_too():
+    """No turn beyond 5 degrees but at a corner; the poles of the record stay, those between are zeros of 1 + L."""
+    law = tfarm.Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0])}, delay=0.002)
+    found = law_locus(LAB, law, "gain", 1.0, 8.0, points=8, branches=1)
+    fine = rounded_law(found)
+    more = np.nonzero(~np.isin(fine.values, found.values))[0]
+    assert more.size
+    assert np.array_equal(fine.branches[:, np.isin(fine.values, found.values)], found.branches, equal_nan=True)
+    for n in more[::3]:
+        loop = LawLoop(LAB, law.having("gain", float(fine.values[n])))
+        told = fine.branches[np.isfinite(fine.branches[:, n]), n]
+        assert abs(1 + loop.loop_function(told)).max() < 1e-6
+    figure = draw_law_locus(found)
+    figure.canvas.draw()
+    told = [seen_turns(line)[0] for line in figure.axes[0].lines if line.get_linewidth() == 1.4]
+    assert max(turn.max(initial=0.0) for turn in told) <= MOST

@@ -10,7 +10,7 @@ branches, too.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -21,6 +21,7 @@ from scipy.optimize import brentq, linear_sum_assignment
 from tfarm.arm import Arm
 from tfarm.arm.checks import whole
 from tfarm.arm.law import Law
+from tfarm.crossing.turning import loose
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 from tfarm.spectrum.box import Box, newton, zeros_in_box
@@ -31,6 +32,7 @@ from .frequencies import band_of, grid
 from .law_loop import LawLoop
 from .law_map import along
 from .law_poles import law_box, starting_points_of
+from .locus import frame
 from .variation import PARAMETERS
 
 Complex = NDArray[np.complexfloating[Any, Any]]
@@ -40,6 +42,7 @@ MOST_POINTS = 5000
 MOST_BRANCHES = 60
 PLAIN = 0.35  # of the distance to the next pole: one that moves by less is itself
 AT_EDGE = 0.05  # of the box's height or width: poles so near to its edge come and go
+ROUNDS = 18  # of halving at most where a branch bends, or two meet
 DEEPEST = 3  # halvings of a step where poles are not plainly told apart; then a branch may end and another begin
 HEIGHTS = (1.0, 1.013, 1.031, 1.057, 0.985, 1.09)  # of the box, until no pole is on its edge at the first value
 SAME = 1e-3  # of the range: a crossing of a branch so near to one that was solved for is that one
@@ -97,6 +100,30 @@ def law_locus(
         here, now = there, places
     found = np.array(rows)
     return LawLocus(family.at(start).arm, law, vary, values, found, box, _crossings(family, values, found, box))
+
+
+def rounded(found: LawLocus) -> LawLocus:
+    """The same locus with values between, until no branch turns by more than 5 degrees as it is drawn.
+
+    Poles between are Newton's, from half way, or where two meet from either side.  A value at which one of them is not
+    plainly that of its branch is left out.
+    """
+    values, rows = found.values, found.branches
+    family = Family(found.arm, found.law, found.vary, float(values[0]))
+    left_out: set[float] = set()
+    left, right, low, high = frame(rows)
+    for _ in range(ROUNDS):
+        bent = np.nonzero(loose(rows, right - left, high - low))[0]
+        wanted = [n for n in bent.tolist() if float(values[n] + values[n + 1]) / 2 not in left_out]
+        added = {n: family.between(values[n : n + 2], rows[:, n : n + 2]) for n in wanted}
+        left_out |= {float(values[n] + values[n + 1]) / 2 for n, poles in added.items() if poles is None}
+        told = [(n, poles) for n, poles in added.items() if poles is not None]
+        if not told:
+            break
+        places = [n + 1 for n, _ in told]
+        values = np.insert(values, places, [(values[n] + values[n + 1]) / 2 for n, _ in told])
+        rows = np.insert(rows, places, np.array([poles for _, poles in told]).T, axis=1)
+    return replace(found, values=values, branches=rows)
 
 
 @dataclass(frozen=True)
@@ -158,6 +185,30 @@ class Family:
         between, first = self.joined(low, here, middle, box, depth - 1)
         there, second = self.joined(middle, between, high, box, depth - 1)
         return there, [None if n is None else first[n] for n in second]
+
+    def between(self, values: Real, rows: Complex) -> Complex | None:
+        """The poles half way between two values, from those (b, 2) at both; None where one is not plainly its own."""
+        poles = np.full(len(rows), np.nan, complex)
+        for n in np.nonzero(np.isfinite(rows).all(axis=1))[0]:
+            room, is_real = abs(rows[n, 1] - rows[n, 0]), rows[n].imag == 0
+            starts = rows[n][np.argsort(is_real)] if is_real.any() != is_real.all() else [rows[n].mean()]
+            found = (
+                [self._near(float(values.mean()), complex(start), room) for start in starts] if room else [rows[n, 0]]
+            )
+            told = [pole for pole in found if pole is not None]
+            if not told:
+                return None
+            poles[n] = told[0]
+        return poles
+
+    def _near(self, value: float, start: complex, room: float) -> complex | None:
+        """The pole at a value that is near to a start, and real where that is; None where there is none."""
+        try:
+            pole = self.pole_near(value, start)
+        except ConvergenceError:
+            return None
+        pole = pole.real if abs(pole.imag) <= TINY * abs(pole) else pole
+        return pole if abs(pole - start) <= room and (pole.imag != 0) == (start.imag != 0) else None
 
     def pole_near(self, value: float, start: complex) -> complex:
         """The pole at a value that Newton's method finds from a start.  Raises ConvergenceError where it finds none."""

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tfarm.digits import plain, significant
-from tfarm.loop.law_locus import LawLocus
+from tfarm.loop.law_locus import LawLocus, rounded
 from tfarm.loop.law_map import LawMap
 from tfarm.loop.loci import shown
 
@@ -28,7 +28,9 @@ def draw_law_locus(found: LawLocus, new: New = blank) -> Figure:
 
 def law_locus(found: LawLocus, *, ax: Axes) -> None:
     """Branches [1/s] in the box, a cross where one begins, dots at every fourth of the range, diamonds on the axis."""
-    first, *rest = np.linspace(0, found.values.size - 1, MARKED).round().astype(int)
+    marked = np.linspace(found.values[0], found.values[-1], MARKED)
+    found = rounded(found)
+    first, *rest = (int(abs(found.values - value).argmin()) for value in marked)
     ax.axvline(0.0, color=INK, lw=0.9, zorder=1)
     for number, branch in enumerate(shown(found.branches)):
         colour = COLOURS[number % len(COLOURS)]
