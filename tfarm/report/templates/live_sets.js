@@ -1,7 +1,7 @@
 // What the charts of the live page draw: rows for Vega, of numbers by LiveLoop and SampledLoop.
 "use strict";
 const dB = x => 20 * Math.log10(x), hertz = w => w / (2 * Math.PI), clip = (x, a, b) => Math.min(Math.max(x, a), b);
-const RATIOS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5], DISC_RATIOS = [0.02, 0.1, 0.3, 0.6];
+const RATIOS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5], DISC_RATIOS = [0.02, 0.1, 0.3, 0.6], CROWDED = 0.05; // of the height: lower rays lie on each other
 const dampingRatio = ([re, im]) => im ? general(-re / Math.sqrt(re * re + im * im), 4) : "";
 
 // Where a gain is along its axis, 0 to 1, and back: logarithmic away from 0
@@ -55,7 +55,7 @@ function rings(margins) {
 function rays({ x, y }) {
   return RATIOS.flatMap(ratio => {
     const slope = ratio / Math.sqrt(1 - ratio * ratio), im = Math.min(y[1], -x[0] / slope);
-    return [{ ratio, re: 0, im: 0, at: 0, end: false }, { ratio, re: -slope * im, im, at: 1, end: true }];
+    return im < CROWDED * y[1] ? [] : [{ ratio, re: 0, im: 0, at: 0, end: false }, { ratio, re: -slope * im, im, at: 1, end: true }];
   });
 }
 function spirals() {
