@@ -13,6 +13,7 @@ from tfarm.loop.loci import shown
 
 from .labels import BESIDE, Label
 from .plane import colours, words_of_count
+from .roots import FIRST, OPEN
 from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, New, alone, blank, safe
 
 COLOURS = (BLUE, GREEN, PURPLE, "#7a5a00", GREY)  # of branches, in turn
@@ -27,7 +28,8 @@ def draw_law_locus(found: LawLocus, new: New = blank) -> Figure:
 
 
 def law_locus(found: LawLocus, *, ax: Axes) -> None:
-    """Branches [1/s] in the box, a cross where one begins, dots at every fourth of the range, diamonds on the axis."""
+    """Branches [1/s]: a cross at the gain 0, else a circle, where one begins, dots, and diamonds on the axis."""
+    begin = OPEN if found.vary == "gain" and found.values[0] == 0 else FIRST
     marked = np.linspace(found.values[0], found.values[-1], MARKED)
     found = rounded(found)
     first, *rest = (int(abs(found.values - value).argmin()) for value in marked)
@@ -35,14 +37,14 @@ def law_locus(found: LawLocus, *, ax: Axes) -> None:
     for number, branch in enumerate(shown(found.branches)):
         colour = COLOURS[number % len(COLOURS)]
         ax.plot(branch.real, branch.imag, color=colour, lw=1.4, zorder=2)
-        ax.plot(branch.real[first], branch.imag[first], "x", color=colour, ms=6, mew=1.4, zorder=4)
+        ax.plot(branch.real[first], branch.imag[first], color=colour, zorder=4, **begin)
         ax.plot(branch.real[rest], branch.imag[rest], "o", color=colour, ms=3.2, zorder=4)
     for each in found.crossings:
         ax.plot([0], [each.omega], "D", ms=6, mfc=ORANGE, mec="white", mew=0.8, zorder=6)
         text = f"{plain(each.gain, 5)}, {significant(each.omega, 4)} rad/s"
         ax.add_artist(Label(text, [(0.0, each.omega)], BESIDE, fontsize=7.5))
     begins, others = plain(float(found.values[first]), 3), [plain(float(found.values[n]), 3) for n in rest]
-    ax.plot([], [], "x", color=GREY, label=f"{safe(found.vary)} = {begins}")
+    ax.plot([], [], color=GREY, label=f"{safe(found.vary)} = {begins}", **begin)
     ax.plot([], [], "o", color=GREY, ms=3.2, label=f"{safe(found.vary)} = {', '.join(others)}")
     if found.crossings:
         ax.plot([], [], "D", color=ORANGE, label=f"crosses the axis, at this {safe(found.vary)}")
