@@ -12,7 +12,7 @@ from matplotlib import pyplot
 
 import tfarm
 from tests.shell import heard, run
-from tfarm.report import writing
+from tfarm.report import making
 
 ROOT = Path(__file__).parent.parent
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -85,8 +85,8 @@ def test_the_example_of_a_report_runs(
 ) -> None:
     """With two of its sections and no proof; a report with all of them is that of tests/report."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(writing, "save_proof", lambda *_: None)
-    monkeypatch.setattr(writing, "PIECES", [each for each in writing.PIECES if each.name in ("the arm", "margins")])
+    monkeypatch.setattr(making, "save_proof", lambda *_: None)
+    monkeypatch.setattr(making, "PIECES", [each for each in making.PIECES if each.name in ("the arm", "margins")])
     (line,) = (line for line in COMMANDS if line.startswith("tfarm report "))
     code, out, err = run(capsys, *shlex.split(line)[1:])
     assert (code, out.strip()) == (0, "pages/index.html")

@@ -3,7 +3,7 @@
 from tfarm.dsp import loci as sampled_loci
 from tfarm.dsp import periods
 from tfarm.loop import loci
-from tfarm.report import map, overlay, writing
+from tfarm.report import making, map, overlay
 
 COARSE = (
     (map, "COLUMNS", 48),
@@ -13,7 +13,7 @@ COARSE = (
     (loci, "POINTS", 60),
     (sampled_loci, "VALUES", 31),
     (periods, "SHARES", (1.0, 5.0)),
-    (writing, "WORKERS", 1),  # a second process would have its own grids
+    (making, "WORKERS", 1),  # a second process would have its own grids
 )
 
 

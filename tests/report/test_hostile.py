@@ -8,7 +8,7 @@ import tfarm
 from tests.hostile import NAME, TEXT, check_drawing, check_page
 from tfarm.dsp import Chain
 from tfarm.fitting.fit import fit
-from tfarm.report import writing
+from tfarm.report import making, writing
 from tfarm.report.fit_section import fit_section
 from tfarm.report.given_laws import Subject
 from tfarm.report.live import save_live
@@ -42,8 +42,8 @@ def test_of_a_section_and_a_live_page_that_cannot_be_made(tmp_path, monkeypatch)
     monkeypatch.setattr("tfarm.report.live.live_data", fails)
     save_live(Subject(LAB, Chain()), tmp_path)
     check_page((tmp_path / "live.html").read_text(encoding="utf-8"), NAME, TEXT)
-    piece = replace(writing.PIECES[1], make=fails)
-    section = writing._section(piece, Subject(LAB, Chain()))
+    piece = replace(making.PIECES[1], make=fails)
+    section = making._section(piece, Subject(LAB, Chain()))
     assert isinstance(section, Section)
     saved = save_section(section, tmp_path)
     writing._write_pages(Subject(LAB, Chain()), tmp_path, [saved], None, "", tmp_path)

@@ -21,7 +21,7 @@ from tfarm.loop import loci as loci_room
 from tfarm.loop.locus import locus
 from tfarm.loop.plant import Loop
 from tfarm.loop.poles import poles_below
-from tfarm.report import assumptions_pictures, assumptions_section, loop_laws, loop_section, writing
+from tfarm.report import assumptions_pictures, assumptions_section, loop_laws, loop_section, making
 from tfarm.report.arm_section import arm_section, derived_table
 from tfarm.report.bode_section import bode_section
 from tfarm.report.damped_table import damped_table
@@ -237,7 +237,7 @@ def test_a_free_pin_has_its_rate_loop(monkeypatch):
     section = margins_section(arm)
     assert section.facts[0].value == "STABLE"
     assert set(column(section.blocks[1], "gain").values) == {"K1", "Kp"}
-    pieces = [piece.name for piece in writing.PIECES if piece.is_for(Subject(arm, Chain()))]
+    pieces = [piece.name for piece in making.PIECES if piece.is_for(Subject(arm, Chain()))]
     assert pieces[4:8] == ["no loop", "margins", "root loci", "Nyquist"]
 
 

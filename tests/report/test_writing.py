@@ -28,7 +28,7 @@ from tfarm.cli import tables as cli_tables
 from tfarm.digits import plain
 from tfarm.dsp import Chain, load_chain
 from tfarm.report import card as card_room
-from tfarm.report import readme_pictures, trust, unchanged, workers, write, writing
+from tfarm.report import making, readme_pictures, trust, unchanged, workers, write, writing
 from tfarm.report.card import written_cards
 from tfarm.report.frame import first_sentence
 from tfarm.report.given_laws import GivenLaw, Subject
@@ -39,7 +39,7 @@ from tfarm.report.trust import Evidence, kept_evidence, write_trust
 from tfarm.report.trust_proofs import written_proofs
 from tfarm.spectrum.scales import default_gains
 
-ANCHORS = {piece.anchor for piece in writing.PIECES}
+ANCHORS = {piece.anchor for piece in making.PIECES}
 HELD = replace(ARM, hub=tfarm.Hub(inertia=math.inf))  # no loop: its proofs are quick
 
 
@@ -85,9 +85,9 @@ def test_another_process_with_other_hashes_writes_the_same_bytes(pages, audit_ro
     coarsen(monkeypatch.setattr)
     made = tmp_path / "made"
     made.mkdir()
-    for i, piece in enumerate(writing.PIECES):
+    for i, piece in enumerate(making.PIECES):
         if piece.anchor in ("margins-map", "bode-root-moment", "margins", "margins-nyquist"):
-            writing._make(Subject(ARM, Chain()), i, made)
+            making.make(Subject(ARM, Chain()), i, made)
     there = files_of(pages / NAME)
     pictures = ("map", "bode-root-moment", "nyquist")
     assert {f"pictures/{picture}.svg" for picture in pictures} <= set(files_of(made))
@@ -214,9 +214,9 @@ def test_every_cell_of_a_narrow_page_says_what_it_is(pages):
 
 
 def test_the_pages_of_an_arm_lead_to_each_other(tmp_path, monkeypatch):
-    piece = next(piece for piece in writing.PIECES if piece.name == "the arm")
-    monkeypatch.setattr(writing, "PIECES", (piece,))
-    monkeypatch.setattr(writing, "save_proof", lambda *_: None)
+    piece = next(piece for piece in making.PIECES if piece.name == "the arm")
+    monkeypatch.setattr(making, "PIECES", (piece,))
+    monkeypatch.setattr(making, "save_proof", lambda *_: None)
     write([replace(ARM, name="plain")], tmp_path, only=("modes", "bode"))
     assert "bode.html" in Links(tmp_path / "plain" / "modes.html").targets
     assert "modes.html" in Links(tmp_path / "plain" / "bode.html").targets
@@ -357,7 +357,7 @@ def test_an_unwritable_out_is_refused_before_any_work_and_left_alone(tmp_path, m
     (tmp_path / "file").write_text("mine")
     (tmp_path / "taken").mkdir()
     (tmp_path / "taken" / NAME).write_text("mine")
-    monkeypatch.setattr(writing, "_make_all", lambda *_: pytest.fail("work began"))
+    monkeypatch.setattr(writing, "make_all", lambda *_: pytest.fail("work began"))
     before = files_of(tmp_path)
     with pytest.raises(tfarm.ParameterError) as caught:
         write([ARM], tmp_path / where)
@@ -380,8 +380,8 @@ def test_work_that_fails_leaves_nothing(tmp_path, monkeypatch):
         (folder / "half.svg").write_text("half")
         raise tfarm.ConvergenceError("stopped short", None, None)
 
-    monkeypatch.setattr(writing, "PIECES", ())
-    monkeypatch.setattr(writing, "save_card", fail)
+    monkeypatch.setattr(making, "PIECES", ())
+    monkeypatch.setattr(making, "save_card", fail)
     with pytest.raises(tfarm.ConvergenceError):
         write([ARM], tmp_path / "new" / "out")
     assert not (tmp_path / "new").exists()
@@ -393,8 +393,8 @@ def test_work_that_fails_leaves_an_earlier_report_as_it_was(pages, tmp_path, mon
 
     before, out = files_of(pages), tmp_path / "out"
     shutil.copytree(pages, out)
-    monkeypatch.setattr(writing, "PIECES", [piece for piece in writing.PIECES if piece.name == "the arm"])
-    monkeypatch.setattr(writing, "save_card", fail)
+    monkeypatch.setattr(making, "PIECES", [piece for piece in making.PIECES if piece.name == "the arm"])
+    monkeypatch.setattr(making, "save_card", fail)
     with pytest.raises(tfarm.ConvergenceError):
         write([ARM], out, only=("modes",))
     assert files_of(out) == before
@@ -406,18 +406,18 @@ def test_work_that_fails_leaves_an_earlier_report_as_it_was(pages, tmp_path, mon
 @pytest.fixture
 def quick(monkeypatch):
     """Reports of one short section."""
-    piece = next(piece for piece in writing.PIECES if piece.name == "the arm")
+    piece = next(piece for piece in making.PIECES if piece.name == "the arm")
     for pieces in ("PIECES", "LAW_PIECES"):
-        monkeypatch.setattr(writing, pieces, (piece,))
-    monkeypatch.setattr(writing, "save_proof", lambda *_: None)
+        monkeypatch.setattr(making, pieces, (piece,))
+    monkeypatch.setattr(making, "save_proof", lambda *_: None)
 
 
 def made_of(monkeypatch, arm, out, **options):
     """Which arms of a run were made, and what was said of the others."""
     made, told = [], []
-    section = writing._section
+    section = making._section
     with monkeypatch.context() as patch:
-        patch.setattr(writing, "_section", lambda piece, of: [made.append(of.arm.name), section(piece, of)][1])
+        patch.setattr(making, "_section", lambda piece, of: [made.append(of.arm.name), section(piece, of)][1])
         write([arm], out, only=("modes",), notice=told.append, **options)
     return made, told
 
@@ -460,7 +460,7 @@ def test_what_changed_in_any_way_is_made_again(tmp_path, monkeypatch):
 @pytest.mark.usefixtures("quick")
 def test_a_page_that_leaves_a_section_out_is_tried_again(tmp_path, monkeypatch):
     error = tfarm.ConvergenceError("stopped short", None, None)
-    monkeypatch.setattr(writing, "PIECES", (replace(writing.PIECES[0], make=Unmakeable(error)),))
+    monkeypatch.setattr(making, "PIECES", (replace(making.PIECES[0], make=Unmakeable(error)),))
     for _ in range(2):
         made, told = made_of(monkeypatch, ARM, tmp_path)
         assert made == [NAME]
@@ -509,8 +509,8 @@ def test_a_page_is_about_the_arms_own_file(tmp_path, monkeypatch, capsys):
         seen.append((arm.name, chain))
         return Section(anchor="sampled", title="The sampled loop")
 
-    monkeypatch.setattr(writing, "PIECES", (writing.Piece("s", "sampled", ("sampled",), section, is_sampled=True),))
-    monkeypatch.setattr(writing, "save_proof", lambda *_: None)
+    monkeypatch.setattr(making, "PIECES", (making.Piece("s", "sampled", ("sampled",), section, is_sampled=True),))
+    monkeypatch.setattr(making, "save_proof", lambda *_: None)
     file = tmp_path / "bench.toml"
     tables = "[sampling]\nperiod = 0.004\n[converters]\nmoment_bits = 12\nmoment_range = 5.0\n[slew]\ntravel = 0.7\n"
     file.write_text(to_toml(ARM) + tables, encoding="utf-8")
@@ -525,10 +525,10 @@ def test_a_page_is_about_the_arms_own_file(tmp_path, monkeypatch, capsys):
 
 def without_a_section(monkeypatch, error):
     """A report of two sections, the second of which meets that error."""
-    pieces = {piece.name: piece for piece in writing.PIECES}
+    pieces = {piece.name: piece for piece in making.PIECES}
     broken = replace(pieces["root loci"], make=Unmakeable(error))
-    monkeypatch.setattr(writing, "PIECES", (pieces["the arm"], broken))
-    monkeypatch.setattr(writing, "save_proof", lambda *_: None)
+    monkeypatch.setattr(making, "PIECES", (pieces["the arm"], broken))
+    monkeypatch.setattr(making, "save_proof", lambda *_: None)
 
 
 @pytest.mark.parametrize(
@@ -576,10 +576,10 @@ def test_a_bug_of_ours_stays_loud(tmp_path, monkeypatch):
 
 def test_every_piece_knows_the_anchor_of_its_section(pages):
     ids = links_of(pages / NAME / "index.html").ids
-    assert [piece.anchor for piece in writing.PIECES if piece.is_for(Subject(ARM, Chain()))] == [
+    assert [piece.anchor for piece in making.PIECES if piece.is_for(Subject(ARM, Chain()))] == [
         i for i in ids if i in ANCHORS
     ]
-    assert all(writing._answers(piece.anchor, page) for piece in writing.PIECES for page in piece.questions)
+    assert all(writing._answers(piece.anchor, page) for piece in making.PIECES for page in piece.questions)
 
 
 @pytest.mark.parametrize(
@@ -611,7 +611,7 @@ STRANGE_CARDS = (
 
 @pytest.mark.usefixtures("audited")
 def test_other_files_in_the_folder_are_kept_and_strange_cards_passed_over(tmp_path, monkeypatch):
-    monkeypatch.setattr(writing, "PIECES", ())
+    monkeypatch.setattr(making, "PIECES", ())
     (tmp_path / NAME).mkdir()
     (tmp_path / NAME / "mine.txt").write_text("mine")
     for i, card in enumerate(STRANGE_CARDS):

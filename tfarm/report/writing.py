@@ -1,45 +1,33 @@
-"""From arms to a folder of pages: everything is made beside, and moved into place only when all of it is there.
-
-The work is a list of pieces, one a section of an arm's page, each independent of the others, so two processes can
-share it.  What a piece returns are words and file names; its pictures and tables are on disk already.
-"""
+"""From arms to a folder of pages: everything is made beside, and moved into place only when all of it is there."""
 
 from __future__ import annotations
 
 import errno
 import os
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, Future
 from contextlib import contextmanager, suppress
-from itertools import groupby
-from operator import itemgetter
 from pathlib import Path
 
 from tfarm.arm import Arm
 from tfarm.dsp import Chain
-from tfarm.errors import ParameterError, TfarmError, did_you_mean
+from tfarm.errors import ParameterError, did_you_mean
 from tfarm.files import temporary_folder
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
-from tfarm.report.card import save_card, written_cards
+from tfarm.report.card import written_cards
 from tfarm.report.frame import beside
 from tfarm.report.given_laws import GivenLaw, Subject, check_laws
 from tfarm.report.kept import COMPARISON, kept_comparison
-from tfarm.report.live import ASSETS, PAGE, has_assets, is_live, save_live, write_assets
+from tfarm.report.live import ASSETS, PAGE, has_assets, is_live, write_assets
+from tfarm.report.making import Progress, make_all
 from tfarm.report.page import QUESTIONS, arm_page, file_of, index_page
-from tfarm.report.pieces import LAW_PIECES, PIECES, Piece
-from tfarm.report.sections import SavedSection, Section, save_section
-from tfarm.report.trust import FOLDER, Evidence, gather, kept_evidence, write_trust
-from tfarm.report.trust_proofs import save_proof, written_proofs
+from tfarm.report.sections import SavedSection
+from tfarm.report.trust import FOLDER, kept_evidence, write_trust
+from tfarm.report.trust_proofs import written_proofs
 from tfarm.report.unchanged import is_unchanged, key_of, note_made
-from tfarm.report.words import typeset
-from tfarm.report.workers import may_start_processes, shared
 
-Progress = Callable[[int, int, str], object]
 Notice = Callable[[str], object]
 
-WORKERS = 2
-ENOUGH = 8  # pieces of work of one arm for which a second process, which takes a second or two to start, is worth it
 OURS = (
     "index.html",
     "README.md",
@@ -53,14 +41,7 @@ OURS = (
 )  # names that no arm's folder may have
 
 
-CARD, CARD_ALONE = "card", "card alone"  # with the proofs of the arm, and without
-LIVE = "live loop"
-FIRST = ("tune", "sampled", "modes", CARD, "locus")  # what takes longest, modes beside the proofs that they share
-EVIDENCE = (-1, "evidence")  # for the page on trust: of no arm
 TRUST = f"{FOLDER}/index.html"
-
-Task = tuple[int, int | str]  # which arm, which piece (or its card and proof)
-Result = SavedSection | Evidence | None
 
 
 def write(
@@ -90,6 +71,26 @@ def write(
     If the work itself fails, `out` is as it was.
     """
     _check(arms, only)
+    subjects = _subjects(arms, chains, laws, fits, measured)
+    out = Path(out)
+    names = [arm.name for arm in arms] + [FOLDER, ASSETS] * (not only)
+    with _beside(out, names) as beside:
+        told = _written(subjects, out, beside, only, force, progress)
+    for text in told:
+        if notice is not None:
+            notice(text)
+    alone = len(arms) == 1 and only is not None and len(only) == 1
+    return out / arms[0].name / f"{only[0]}.html" if alone and only else out / "index.html"
+
+
+def _subjects(
+    arms: Sequence[Arm],
+    chains: Sequence[Chain] | None,
+    laws: Sequence[Sequence[GivenLaw]] | None,
+    fits: Sequence[Fit | None] | None,
+    measured: Sequence[Measured],
+) -> list[Subject]:
+    """What each arm's page is about.  Raises ParameterError where an arm or its clock can make nothing of a law."""
     chains = [Chain()] * len(arms) if chains is None else chains
     laws = [()] * len(arms) if laws is None else laws
     fits = [None] * len(arms) if fits is None else fits
@@ -97,47 +98,51 @@ def write(
     subjects = [Subject(arm, chain, tuple(own), fit, tuple(measured)) for arm, chain, own, fit in each]
     for subject in subjects:
         check_laws(subject.arm, subject.chain, subject.laws)
-    out = Path(out)
-    told: list[str] = []
-    with _beside(out, [arm.name for arm in arms] + [FOLDER, ASSETS] * (not only)) as beside:
-        trust = TRUST if not only or (out / TRUST).is_file() else ""
-        left = [
-            not force and is_unchanged(out / each.arm.name, _pages(only), _leads(trust, out, each.arm), each)
-            for each in subjects
-        ]
-        told += [_left(each.arm) for each, same in zip(subjects, left, strict=True) if same]
-        changed = [each for each, same in zip(subjects, left, strict=True) if not same]
-        folders = [beside / str(i) for i in range(len(changed))]
-        for folder in folders:
-            folder.mkdir()
-        evidence = None if only or force else kept_evidence(out / FOLDER)
-        sections, gathered = _make_all(changed, folders, only or (), not only and evidence is None, progress)
-        for subject, folder, parts in zip(changed, folders, sections, strict=True):
-            _write_pages(subject, folder, parts, only, trust, out / subject.arm.name)
-            failures = list(_failures(subject.arm, parts))
-            told += failures
-            note_made(
-                folder,
-                out / subject.arm.name,
-                () if failures else _pages(only),
-                key_of(subject, _leads(trust, out, subject.arm)),
-            )
-        if not only and any(map(is_live, subjects)) and (changed or not has_assets(out / ASSETS)):
-            write_assets(beside / ASSETS, out / ASSETS)
-            move_into(beside / ASSETS, out / ASSETS)
-        for subject, folder in zip(changed, folders, strict=True):
-            move_into(folder, out / subject.arm.name)
-        if (evidence := gathered or evidence) is not None:
-            write_trust(evidence, written_proofs(out), beside / FOLDER)
-            move_into(beside / FOLDER, out / FOLDER)
-        index = index_page(written_cards(out), trust=trust, compared=kept_comparison(out)[0])
-        (beside / "index.html").write_text(index, encoding="utf-8", newline="")
-        os.replace(beside / "index.html", out / "index.html")
-    for text in told:
-        if notice is not None:
-            notice(text)
-    alone = len(arms) == 1 and only is not None and len(only) == 1
-    return out / arms[0].name / f"{only[0]}.html" if alone and only else out / "index.html"
+    return subjects
+
+
+def _written(
+    subjects: Sequence[Subject],
+    out: Path,
+    beside: Path,
+    only: tuple[str, ...] | None,
+    force: bool,
+    progress: Progress | None,
+) -> list[str]:
+    """Make all pages in `beside`, move them to `out`, and the index last; what is to be said of them."""
+    trust = TRUST if not only or (out / TRUST).is_file() else ""
+    left = [not force and _is_left(each, out, only, trust) for each in subjects]
+    told = [_left(each.arm) for each, same in zip(subjects, left, strict=True) if same]
+    changed = [each for each, same in zip(subjects, left, strict=True) if not same]
+    folders = [beside / str(i) for i in range(len(changed))]
+    for folder in folders:
+        folder.mkdir()
+    evidence = None if only or force else kept_evidence(out / FOLDER)
+    sections, gathered = make_all(changed, folders, only or (), not only and evidence is None, progress)
+    for subject, folder, parts in zip(changed, folders, sections, strict=True):
+        _write_pages(subject, folder, parts, only, trust, out / subject.arm.name)
+        failures = list(_failures(subject.arm, parts))
+        told += failures
+        done = () if failures else _pages(only)
+        note_made(folder, out / subject.arm.name, done, key_of(subject, _leads(trust, out, subject.arm)))
+    if not only and any(map(is_live, subjects)) and (changed or not has_assets(out / ASSETS)):
+        write_assets(beside / ASSETS, out / ASSETS)
+        move_into(beside / ASSETS, out / ASSETS)
+    for subject, folder in zip(changed, folders, strict=True):
+        move_into(folder, out / subject.arm.name)
+    if (evidence := gathered or evidence) is not None:
+        write_trust(evidence, written_proofs(out), beside / FOLDER)
+        move_into(beside / FOLDER, out / FOLDER)
+    index = index_page(written_cards(out), trust=trust, compared=kept_comparison(out)[0])
+    (beside / "index.html").write_text(index, encoding="utf-8", newline="")
+    os.replace(beside / "index.html", out / "index.html")
+    return told
+
+
+def _is_left(subject: Subject, out: Path, only: tuple[str, ...] | None, trust: str) -> bool:
+    """Whether the arm's pages in `out` are what they would be now."""
+    arm = subject.arm
+    return is_unchanged(out / arm.name, _pages(only), _leads(trust, out, arm), subject)
 
 
 def _check(arms: Sequence[Arm], only: tuple[str, ...] | None) -> None:
@@ -195,92 +200,6 @@ def _remove(made: Sequence[Path]) -> None:
             folder.rmdir()
 
 
-def _make_all(
-    subjects: Sequence[Subject],
-    folders: Sequence[Path],
-    only: tuple[str, ...],
-    with_evidence: bool,
-    progress: Progress | None,
-) -> tuple[list[list[SavedSection]], Evidence | None]:
-    """The sections of each arm's page, in the order of PIECES, and the evidence if that is asked for."""
-    tasks: list[Task] = [EVIDENCE] * with_evidence
-    tasks += [
-        (i, j)
-        for i, subject in enumerate(subjects)
-        for j, piece in enumerate(pieces_of(subject))
-        if piece.is_for(subject) and (not only or set(only) & set(piece.questions))
-    ]
-    tasks += [(i, LIVE) for i, subject in enumerate(subjects) if not only and is_live(subject)]
-    tasks += [(i, CARD_ALONE if subject.laws and only else CARD) for i, subject in enumerate(subjects)]
-    done: dict[Task, Result] = {}
-    if progress is not None:
-        progress(0, len(tasks), _name_of(subjects, tasks[0]) if tasks else "nothing to make")
-    for task, section in _results(subjects, folders, tasks):
-        done[task] = section
-        if progress is not None:
-            progress(len(done), len(tasks), _name_of(subjects, task))
-    places = range(len(subjects))
-    sections = [[s for t in tasks if t[0] == i and isinstance(s := done[t], SavedSection)] for i in places]
-    evidence = done.get(EVIDENCE)
-    return sections, evidence if isinstance(evidence, Evidence) else None
-
-
-def _results(
-    subjects: Sequence[Subject], folders: Sequence[Path], tasks: Sequence[Task]
-) -> Iterator[tuple[Task, Result]]:
-    """Each task with its result as it comes: here, or by two processes where there is work for them."""
-    if not tasks or (len(subjects) == 1 and len(tasks) < ENOUGH) or WORKERS == 1 or not may_start_processes():
-        for task in tasks:
-            yield task, _make(subjects[task[0]], task[1], folders[task[0]])
-        return
-
-    def submit(pool: Executor, task: Task) -> Future[Result]:
-        i, piece = task
-        return pool.submit(_make, subjects[i], piece, folders[i])
-
-    yield from shared(_by_arm(subjects, tasks), submit, WORKERS)
-
-
-def _by_arm(subjects: Sequence[Subject], tasks: Sequence[Task]) -> list[list[Task]]:
-    """The tasks of each arm, and before them those of none; what takes longest first, so that no end is long."""
-
-    def place(task: Task) -> int:
-        i, piece = task
-        what = piece if isinstance(piece, str) else pieces_of(subjects[i])[piece].anchor
-        return FIRST.index(what) if what in FIRST else len(FIRST)
-
-    return [sorted(each, key=place) for _, each in groupby(sorted(tasks, key=itemgetter(0)), itemgetter(0))]
-
-
-def _make(subject: Subject, piece: int | str, folder: Path) -> Result:
-    if piece == EVIDENCE[1]:
-        return gather()
-    if piece == LIVE:
-        save_live(subject, folder)
-        return None
-    if isinstance(piece, str):
-        save_card(subject.arm, folder, [each.given_name for each in subject.laws], subject.chain)
-        if piece == CARD:
-            save_proof(subject.arm, folder, subject.chain)
-        return None
-    return save_section(_section(pieces_of(subject)[piece], subject), folder)
-
-
-def pieces_of(subject: Subject) -> Sequence[Piece]:
-    """The sections of a page on this subject, in their order."""
-    return LAW_PIECES if subject.laws else PIECES
-
-
-def _section(piece: Piece, subject: Subject) -> Section:
-    """The section, or in its place why tfarm could not make it of this arm; a bug of ours stays loud."""
-    try:
-        return piece.made(subject)
-    except TfarmError as error:
-        title = f"{piece.name[0].upper()}{piece.name[1:]}"
-        words = (f"This section could not be made for this arm: {typeset(str(error))}.",)
-        return Section(anchor=piece.anchor, title=title, words=words, failure=str(error))
-
-
 def _failures(arm: Arm, parts: Sequence[SavedSection]) -> Iterator[str]:
     """A line for each section that could not be made."""
     for part in parts:
@@ -295,14 +214,6 @@ def _pages(only: tuple[str, ...] | None) -> tuple[str, ...]:
 
 def _left(arm: Arm) -> str:
     return f"{arm.name}: left as it is, for nothing that its page is made of has changed; --force makes it again"
-
-
-def _name_of(subjects: Sequence[Subject], task: Task) -> str:
-    piece = task[1]
-    if task == EVIDENCE:
-        return "why trust this"
-    subject = subjects[task[0]]
-    return f"{subject.arm.name}: {piece if isinstance(piece, str) else pieces_of(subject)[piece].name}"
 
 
 def _write_pages(
