@@ -91,6 +91,15 @@ def test_people_get_a_page_with_the_sign_convention(capsys, verb) -> None:
     assert "nan" not in out
 
 
+@pytest.mark.parametrize("Kp", ["0", "0.5"])
+def test_the_verdict_sets_a_pole_at_0_apart_where_there_is_one(capsys, Kp) -> None:
+    """That pole is in the list of poles, or not."""
+    listed = answer(capsys, "poles", "sasaki2012-lab", "--Kp", Kp, "--count", "2")["poles"]
+    at_rest = [0.0, 0.0] in listed
+    _, out, _ = run(capsys, "margins", "sasaki2012-lab", "--Kp", Kp)
+    assert ("apart from the pole at 0" in out.splitlines()[0]) is at_rest is (Kp == "0")
+
+
 @pytest.mark.parametrize(
     "arguments",
     [

@@ -18,7 +18,7 @@ from tests.shared import thinned
 from tfarm import Arm, Hub, HubFeedback
 from tfarm.loop.answers import margins_answer
 from tfarm.loop.frequencies import grid
-from tfarm.loop.margins import gain_margin, lowest, rigid_crossings, unit_crossings
+from tfarm.loop.margins import gain_margin, lowest, phase_crossovers, rigid_crossings, unit_crossings
 from tfarm.loop.plant import Loop
 from tfarm.loop.stability import stability
 from tfarm.reduced import relaxed_model
@@ -292,3 +292,20 @@ def test_a_dip_is_found_to_nine_digits_however_narrow_it_is_beside_its_frequency
         least, at = lowest(lambda w, p=complex(real, imag): abs(1j * w - p), omega)
         assert least == pytest.approx(abs(real), rel=1e-9)
         assert abs(at - imag) < 1e-4 * abs(real)
+
+
+@pytest.mark.parametrize("Kp", [1e-3, 0.5, 20.0])
+def test_where_an_angle_is_held_alone_L_settles_nowhere_at_rest(Kp) -> None:
+    """L ~ Kp/(J s^2): its factor at the lowest frequency is small, and no crossing; every one listed is one."""
+    law = HubFeedback(K1=0.3, K2=0.3, Kp=Kp)
+    for w, factor in margins(LAB, law).in_band.phase_crossovers:
+        assert w > 0
+        assert abs(1 + factor * Loop(LAB, law).loop_function(np.array([1j * w]))[0]) < 1e-6
+
+
+def test_a_held_arm_has_a_crossing_at_rest() -> None:
+    link = held(0.0).link
+    stiffness = 1 / (link.length / (3 * link.EI) + 1 / (link.kGA * link.length))
+    loop = Loop(held(0.0), HubFeedback(K1=0.3, K2=0.1, Kp=-0.4 * stiffness))
+    (w, factor), *_ = phase_crossovers(loop, np.asarray(grid(loop.arm, 1e3)))
+    assert (w, factor) == (0.0, pytest.approx(2.0, rel=1e-4))

@@ -31,9 +31,9 @@ def print_margins(found: Margins[Any], answer: dict[str, Any]) -> None:
     """The verdict, then everything else."""
     far = answer["verdict"] == "unstable" or answer["known_beyond_the_band"]
     reach = "" if far else f" up to {answer['band_rad_s']:.4g} rad/s, not known beyond"
-    apart = " (apart from the pole at 0 that Kp = 0 leaves)" if found.windows else ""
-    if not found.windows and found.stability.poles.moving.size < found.stability.poles.values.size:
-        apart = " (apart from the pole at 0 of a hub whose angle is not held)"
+    poles = found.stability.poles
+    why = "that Kp = 0 leaves" if found.windows else "of a hub whose angle is not held"
+    apart = f" (apart from the pole at 0 {why})" if poles.moving.size < poles.values.size else ""
     print(f"{answer['arm']}: {answer['verdict'].upper()}{reach}{apart}")
     more = " (infinitely many in all)" if answer["unstable_roots_infinite"] else ""
     print(f"unstable poles up to {answer['band_rad_s']:.6g} rad/s: {answer['unstable_roots']}{more}")

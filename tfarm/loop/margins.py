@@ -42,7 +42,7 @@ DIGITS, PLACE_DIGITS = 9, 7  # of a margin, and of the frequency of a dip, which
 BOTTOM = 1e-6  # of the gap between grid points: a dip's bottom is flat, so its depth is right to the square of that
 LOWEST = 6  # local minima on the grid that are refined
 AT_POLE = 1e-9  # a factor on L so small belongs to a pole of L on the axis, where L changes its sign through infinity
-REST = 1e-3  # of its size: what Im L may be at the lowest frequency for L to have settled there
+REST = 1e-3  # of the size of -1/L: what its imaginary part and its way from half the lowest frequency on may be at rest
 NEAR_POLES = np.geomspace(0.05, 20.0, 12)  # points about a pole, in its distances from the axis
 
 
@@ -152,8 +152,9 @@ def phase_crossovers(loop: Loop | LawLoop, omega: Real) -> tuple[tuple[float, fl
     (before,), _ = brackets((drive * fed_back.conj()).imag)
     place, factor = solved(lambda w: loop.parts(1j * w), omega[before], omega[before + 1])
     found = [(float(w), float(t)) for w, t in zip(place, factor, strict=True) if AT_POLE < t < 1 / AT_POLE]
-    low = -(drive[0] / fed_back[0]) if fed_back[0] else 0j
-    if low.real > AT_POLE and abs(low.imag) < REST * low.real:
+    drive, fed_back = loop.parts(1j * omega[0] * np.array([1.0, 0.5]))
+    low, lower = -drive / np.where(fed_back == 0, np.inf, fed_back)
+    if low.real > AT_POLE and max(abs(low.imag), abs(low - lower)) < REST * low.real:
         found.append((0.0, float(low.real)))
     return tuple(sorted(found))
 
