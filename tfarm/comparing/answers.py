@@ -124,7 +124,7 @@ def windows_table(found: Comparison) -> Table | None:
     spans = [[" ".join(row.spans(general, 8, row.windows.around)) or "-" for row in each] for each in rows]
     columns = (
         Column("gain", "gain", of=[row.gain for row in rows[0]]),
-        Column("", f"stable around it, {found.one.name}", of=spans[0]),
+        Column("one", f"stable around it, {found.one.name}", of=spans[0]),
         Column("other", found.other.name, of=spans[1]),
     )
     return Table(columns=columns)
