@@ -66,9 +66,8 @@ def test_the_map_counts_unstable_poles_over_its_grid(capsys, tmp_path) -> None:
     assert found["K1"] == [-0.75, -0.25, 0.25, 0.75]
     assert found["unstable_roots"] == [["inf", "inf", 0, 0]] * 2 + [[1, 1, "inf", "inf"]] * 2
     file = tmp_path / "map.csv"
-    code, out, err = run(capsys, "map", "sasaki2012-lab", "--points", "3", "--csv", str(file))
-    assert (code, err) == (0, "")
-    assert str(file) in out
+    code, _, err = run(capsys, "map", "sasaki2012-lab", "--points", "3", "--csv", str(file))
+    assert (code, err) == (0, f"written: {file}\n")
     rows = list(csv.reader(file.read_text().splitlines()))
     assert rows[0] == ["K1", "K2", "unstable_roots"]
     assert len(rows) == 10

@@ -30,7 +30,7 @@ from tfarm.loop.stability import stability
 from tfarm.plots.plane import nice_levels
 from tfarm.plots.roots import zoomed
 from tfarm.plots.style import BLUE
-from tfarm.report import loop_laws, loop_section, map, write, writing
+from tfarm.report import loop_laws, loop_section, making, map, write
 from tfarm.report.frame import signs
 from tfarm.report.locus_section import beyond_table
 from tfarm.report.loop_laws import NamedLaw, has_loop, laws, margins_of
@@ -282,7 +282,7 @@ def test_nothing_is_cut_off_by_the_compression():
 @pytest.mark.parametrize(("inertia", "reason"), [(math.inf, "locked"), (0.0, "no inertia")])
 def test_an_arm_without_a_loop_gets_a_sentence(tmp_path, monkeypatch, inertia, reason):
     for kept in ("save_proof", "save_card"):  # which have their own tests
-        monkeypatch.setattr(writing, kept, lambda *_: None)
+        monkeypatch.setattr(making, kept, lambda *_: None)
     arm = replace(PURE, name="held", hub=Hub(inertia=inertia))
     assert not has_loop(arm)
     page = write([arm], tmp_path, only=("margins",)).read_text()
