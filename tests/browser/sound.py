@@ -24,7 +24,7 @@ from tests.report.full import ARM, report_elsewhere
 from tests.shared import once
 from tfarm.dsp import load_chain
 from tfarm.fitting.fit import fit
-from tfarm.report import write, writing
+from tfarm.report import making, write, writing
 from tfarm.report.comparison_page import write_comparison
 from tfarm.report.given_laws import GivenLaw, Subject
 from tfarm.report.live import ASSETS, save_live, write_assets
@@ -51,10 +51,10 @@ def few(tmp_path_factory):
     out = tmp_path_factory.mktemp("few")
     chain = load_chain("sasaki2012-lab")
     few = [piece for piece in PIECES if piece.anchor in ("arm", "modes", "margins")]
-    laws = [piece for piece in writing.LAW_PIECES if piece.anchor in ("law", "margins")]
+    laws = [piece for piece in making.LAW_PIECES if piece.anchor in ("law", "margins")]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(making, "PIECES", tuple(few))
-        patch.setattr(writing, "LAW_PIECES", tuple(laws))
+        patch.setattr(making, "LAW_PIECES", tuple(laws))
         patch.setattr(making, "save_proof", lambda *_: None)
         write([LAB], out, only=("modes", "margins"))
         write([replace(LAB, name="law")], out, laws=[[GivenLaw(LAW)]], only=("margins",))
