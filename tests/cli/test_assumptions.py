@@ -52,6 +52,7 @@ def test_a_bad_count_is_refused_in_one_line(capsys, count):
     assert err.startswith(f"tfarm: --count = {count!r}: a whole number from 1 to 100")
 
 
+@pytest.mark.survey
 def test_it_loads_neither_matplotlib_nor_control():
     code = (
         "import sys; from tfarm.cli.running import run; run(['assumptions', 'sasaki2012', '--count', '1', '--json']);"

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import tfarm
+from tests.shared import thinned
 from tests.shell import answer, heard, run
 from tfarm.arm.reading import PRESETS
 
@@ -193,7 +194,9 @@ HEAVY = ("control", "matplotlib", "sympy", "scipy.signal", "scipy.optimize")
 
 @pytest.mark.parametrize(
     "arguments",
-    [["presets"], ["modes", "sasaki2012", "--count", "3"], ["response", "sasaki2012", "--output", "hub_rate"]],
+    thinned(
+        [["modes", "sasaki2012", "--count", "3"], ["presets"], ["response", "sasaki2012", "--output", "hub_rate"]], 3
+    ),
 )
 def test_commands_that_print_json_load_nothing_heavy(arguments: list[str]) -> None:
     script = (

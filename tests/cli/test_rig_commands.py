@@ -8,6 +8,7 @@ import pytest
 
 import tfarm
 from tests import chain_elements
+from tests.shared import thinned
 from tests.shell import answer, run
 
 RIGS = {"bench-rig": "tests/rigs/bench-rig.toml"} | {name: name for name in ("quanser-2dsfl", "quanser-flexlink")}
@@ -72,7 +73,7 @@ QUICK = {  # each verb, as short as it goes
 }
 
 
-@pytest.mark.parametrize("verb", QUICK)
+@pytest.mark.parametrize("verb", thinned(QUICK, 2))
 def test_every_verb_says_through_what_the_loop_closes_and_each_gains_unit(capsys, verb):
     found = answer(capsys, verb, RIGS["quanser-2dsfl"], *QUICK[verb])
     assert found["input"] == "motor_current"

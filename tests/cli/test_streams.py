@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import tfarm
+from tests.shared import thinned
 from tests.shell import heard, run
 from tfarm.cli.app import say_when_compiling
 
@@ -39,7 +40,7 @@ def test_output_that_cannot_be_written_is_one_line(command, code, why):
     assert why in err
 
 
-@pytest.mark.parametrize("command", ["tfarm modes sasaki2021 2>&-", "tfarm modes sasaki2021 2>/dev/full"])
+@pytest.mark.parametrize("command", thinned(["tfarm modes sasaki2021 2>&-", "tfarm modes sasaki2021 2>/dev/full"], 2))
 def test_a_message_that_nobody_hears_goes_nowhere_else(command):
     assert shell(command) == (2, b"", "")
 
@@ -63,7 +64,7 @@ for more in ([], ["--json"]):
 """
 
 
-@pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
+@pytest.mark.parametrize("encoding", thinned(["ascii", "latin-1"], 2))
 def test_letters_that_a_terminal_does_not_have_are_escaped(encoding, tmp_path):
     text = (Path(tfarm.__file__).parent / "arm" / "presets" / "stocky-steel.toml").read_text(encoding="utf-8")
     name = "Ölarm-λ"

@@ -6,6 +6,7 @@ import pytest
 import typer
 
 import tfarm
+from tests.shared import thinned
 from tests.shell import answer, run
 from tfarm.arm.reading import PRESETS
 from tfarm.arm.writing import to_toml
@@ -53,7 +54,7 @@ def test_every_command_that_takes_an_arm_has_the_option():
         assert any(p.name == "theory" and "--theory" in p.opts for p in commands[name].params), name
 
 
-@pytest.mark.parametrize("verb", VERBS)
+@pytest.mark.parametrize("verb", thinned(VERBS, 3))
 def test_the_option_does_what_the_files_key_does(verb, slender, capsys):
     """All numbers are those of the file with that theory, and not those of the arm's own."""
     asked = answer(capsys, verb, ARM, *VERBS[verb], "--theory", "euler-bernoulli")

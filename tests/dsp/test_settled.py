@@ -84,6 +84,7 @@ def test_the_radius_is_that_of_every_mode_of_the_band():
     assert verdict.log_radius == pytest.approx(fine, abs=4 * abs(fine - coarse) + 1e-13)
 
 
+@pytest.mark.survey
 def test_no_edge_asks_for_modes_that_a_sample_leaves_nothing_of(monkeypatch):
     """Each takes seconds to follow: this wire once took 40 s for the digits of its delay margin."""
     gains = HubFeedback(K1=0.015303840530141454, K2=-1.3140758590396808, Kp=0.0029035773498561667)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import tfarm
+from tests.shared import thinned
 from tests.transition import response
 from tfarm.errors import ParameterError
 
@@ -30,8 +31,7 @@ def inputs(arm):
     yield f"moment_pair@{low!r},{high!r}", ("moment_pair", low, high)
 
 
-@pytest.mark.parametrize("s", S)
-@pytest.mark.parametrize("arm", [BENCH, FLEX], ids=lambda arm: arm.name)
+@pytest.mark.parametrize(("arm", "s"), thinned([(arm, s) for arm in (BENCH, FLEX) for s in S], 2))
 def test_every_output_of_a_load(arm, s):
     for text, load in inputs(arm):
         for name, (theirs, shares) in READ.items():

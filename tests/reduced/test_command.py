@@ -82,6 +82,7 @@ def test_an_error_below_that_of_the_exact_values_is_refused_at_once(capsys):
     )
 
 
+@pytest.mark.survey
 def test_the_search_ends_where_more_modes_no_longer_help(monkeypatch):
     """The relaxed model's error has a floor, that of one state for all modes left out: no 199 damped modes for it."""
     asked = []

@@ -203,6 +203,7 @@ def test_the_strip_chart_has_steps_delay_and_saturation():
 # ------------------------------------------------------------ bytes and odd arms
 
 
+@pytest.mark.survey
 def test_the_same_bytes_twice(tmp_path, monkeypatch):
     monkeypatch.setattr("tfarm.report.overlay.COLUMNS", 16)
     loop = sampled_verdict(LAB, GAINS).loop

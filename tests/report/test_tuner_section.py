@@ -139,6 +139,7 @@ def test_the_papers_pair_is_judged_by_the_map(small):
     assert not replace(at_edge, median=np.where(np.indices((6, 7)).sum(axis=0) == 3, 0.0, 1.0)).best_at_edge
 
 
+@pytest.mark.survey
 def test_the_same_bytes_twice(small, tmp_path):
     for name in ("a", "b"):
         (tmp_path / name).mkdir()

@@ -101,6 +101,7 @@ def test_another_process_with_other_hashes_writes_the_same_bytes(pages, audit_ro
     assert (pages / "index.html").read_text(encoding="utf-8") == index
 
 
+@pytest.mark.survey
 def test_two_processes_write_what_one_does(pages, tmp_path):
     """The modes, the card and the proof: by two processes, each with hashes of its own, and by the one of `pages`."""
     told = []
