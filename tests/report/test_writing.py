@@ -435,6 +435,7 @@ def test_an_arm_that_did_not_change_is_left_as_it_is(tmp_path, monkeypatch):
     assert files_of(tmp_path) == before
 
 
+@pytest.mark.survey
 @pytest.mark.usefixtures("quick")
 def test_what_changed_in_any_way_is_made_again(tmp_path, monkeypatch):
     """The arm's file, its chain, its laws, tfarm itself, or a file of the page that somebody has touched."""

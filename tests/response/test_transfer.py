@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 
 import tfarm
 from tests.outputs import OF_ONE_LINK
+from tests.shared import thinned
 from tfarm import Arm, Hub, ParameterError, Payload
 from tfarm.exact import appendix, balls, enclosures
 from tfarm.exact.coefficients import coefficients
@@ -33,7 +34,7 @@ def test_values_agree_with_the_determinants_of_the_paper(arm: Arm, name: str) ->
         assert abs(G(s) - expected) <= 90 * EPS * (1 + slope) * abs(expected)
 
 
-@pytest.mark.parametrize("name", ALONG)
+@pytest.mark.parametrize("name", thinned(ALONG, 3))
 def test_values_along_the_arm_agree_with_the_paper(arm: Arm, name: str) -> None:
     for share in (0.07, 0.6, 0.93):
         x = share * arm.link.length
@@ -149,7 +150,7 @@ def test_poles_without_damping_are_the_natural_frequencies() -> None:
 
 
 @pytest.mark.parametrize("name", ["hub_angle", "root_moment", "tip_displacement", "tip_deflection", "root_shear"])
-@pytest.mark.parametrize("preset", ["sasaki2012", "sasaki2012-lab"])
+@pytest.mark.parametrize("preset", thinned(["sasaki2012", "sasaki2012-lab"], 3))
 def test_zeros_are_zeros_and_as_many_as_the_argument_turns(preset: str, name: str) -> None:
     G = tfarm.transfer(tfarm.load(preset), name)
     zeros, poles = G.zeros(up_to=1500.0), G.poles(up_to=1500.0)

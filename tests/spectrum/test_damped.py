@@ -69,6 +69,7 @@ def test_extreme_ends(C: float, slenderness: float) -> None:
             assert verdict.outcome == "right", (hub, mass, inertia, count, verdict.reason)
 
 
+@pytest.mark.survey
 def test_sixty_modes_of_the_lab_arm() -> None:
     verdict = judge(tfarm.load("sasaki2012-lab"), 60, certify=False, model=False)
     assert (verdict.outcome, verdict.reason) == ("right", "")

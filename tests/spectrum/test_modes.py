@@ -13,6 +13,7 @@ from numpy.polynomial import chebyshev
 
 import tfarm
 from tests.models import Ritz
+from tests.shared import thinned
 from tests.strategies import BOUNDARY_CASES, some_arm
 from tfarm import Hub, Link, ParameterError, Payload, Section
 from tfarm.arm import THEORIES
@@ -153,7 +154,7 @@ def test_modal_sums_give_the_response():
     assert all(after < before / 100 for before, after in pairwise(left))
 
 
-@pytest.mark.parametrize("case", BOUNDARY_CASES, ids="-".join)
+@pytest.mark.parametrize("case", thinned(BOUNDARY_CASES, 3), ids="-".join)
 def test_shapes_and_nodes_are_those_of_a_ritz_model(case):
     """As many nodes as the shape of a model of polynomials changes sign, and zeros of the shape each of them."""
     arm = arm_for(case)
@@ -265,6 +266,7 @@ def test_the_root_moment_of_a_light_hub_is_not_rounding():
     np.testing.assert_allclose(tfarm.modes(light, COUNT).modal_moment[1:] / 1e-12, limit, rtol=1e-6)
 
 
+@pytest.mark.survey
 def test_memory_does_not_grow_with_the_square_of_the_count(monkeypatch):
     """Twice the modes have four times the points; what is evaluated at once stays the same, and so do the numbers."""
     whole = tfarm.modes(tfarm.load("sasaki2012"), 40)

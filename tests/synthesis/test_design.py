@@ -99,6 +99,7 @@ def residual():
     return design(LAB, "residual", continuous=True)
 
 
+@pytest.mark.survey
 def test_no_grid_leaves_less(residual) -> None:
     """The small case of `python -m tests.synthesis.designs SIZE SEED`, and a part of the box where a grid once did."""
     best = min(least_on(LAB, *grid) for grid in grids(np.random.default_rng(1), residual))

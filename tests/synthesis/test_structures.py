@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import tfarm
+from tests.shared import thinned
 from tests.shell import answer, run
 from tests.synthesis.held_loop import HeldLoop, blocks
 from tfarm import Law, ParameterError
@@ -46,7 +47,7 @@ def start_of(name):
     return form.law(form.origin + 0.3)
 
 
-@pytest.mark.parametrize("name", STRUCTURES)
+@pytest.mark.parametrize("name", thinned(STRUCTURES, 2))
 def test_a_law_of_each_structure_is_judged_as_by_another_model(name):
     """Margin, peak of S and, without the higher modes, the radius."""
     law = start_of(name)

@@ -42,6 +42,7 @@ def test_no_arm_inside_the_box_is_worse(found):
         assert HeldLoop(LAB.having(payload_mass=mass), T).damping(found.law, 2) >= found.value * (1 - 2 * WORSE)
 
 
+@pytest.mark.survey
 def test_no_other_gains_serve_all_arms_better(found):
     """Nor those that are best for one of them."""
     alone = design(LAB, K1=(0.1, 30.0), K2=(-0.6, 0.95)).law
@@ -69,6 +70,7 @@ def test_a_worst_arm_in_the_middle_of_a_box_is_found():
     assert tried == 24 + 3 * 4
 
 
+@pytest.mark.survey
 def test_a_law_for_structures_serves_both_ends_too():
     both = design(LAB, "margin", structure="PD", ranges={"payload.mass": MASSES}, Kp=5.0)
     assert [each.numbers for each in both.arms[:3]] == [{}, {"payload.mass": 0.1}, {"payload.mass": 0.5}]

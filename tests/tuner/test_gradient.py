@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import tfarm
+from tests.shared import thinned
 from tests.tuner.plain import PlainTrial, complex_step, plain_gain
 from tfarm.dsp import Chain, Converters, Sampling
 from tfarm.tuner import initial_network, rules, slew_trial
@@ -24,7 +25,7 @@ def some_network(seed, inputs=6, hidden=6):
 
 @pytest.mark.parametrize("signals", ["vibration", "total"])
 @pytest.mark.parametrize("guard", [NONE, SECTOR])
-@pytest.mark.parametrize("inputs", [6, 7])
+@pytest.mark.parametrize("inputs", thinned([6, 7], 2))
 def test_the_gradient_of_a_trial_is_that_of_complex_steps(lab, signals, guard, inputs):
     network = some_network(inputs, inputs)
     cost, gradient = slew_trial(lab, signals=signals).gradient(network, guard)
