@@ -65,7 +65,7 @@ WANTED += [(name, 0.6) for name in ("gauge", "moment", "shear", "rotation", "twi
 
 
 @pytest.mark.parametrize("drive", ["hub_torque", "motor_current", "motor_voltage", "hub_angle"])
-@pytest.mark.parametrize("load", thinned([None, ("force", 0.4), ("moment_pair", 0.1, 0.7)], 3))
+@pytest.mark.parametrize("load", thinned([(None,), (("force", 0.4),), (("moment_pair", 0.1, 0.7),)], 3))
 def test_responses_are_those_of_the_transition_matrices(drive, load):
     arm = rig(input=drive)
     for s in (130j, -4 + 900j):
