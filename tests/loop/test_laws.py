@@ -278,3 +278,15 @@ def test_turns_around_the_point_are_the_poles_that_were_found(arm, law):
 def test_a_nyquist_plot_of_a_law_can_be_drawn():
     ax = tfarm.plots.nyquist(tfarm.nyquist(LAB, Law(UNSTABLE, name="unstable by itself")))
     assert "unstable by itself" in ax.get_title()
+
+
+@pytest.mark.parametrize(
+    "entries", [{"hub_rate": 0.1, "root_moment": 0.8}, {"root_moment": 0.8, "tip_acceleration": 0.01}]
+)
+def test_a_loop_under_another_law_is_that_made_anew(entries):
+    """Of the same signals, which are taken over, and of others, which are not."""
+    first, law = LawLoop(LAB, Law({"hub_rate": 0.3, "root_moment": 0.3})), Law(entries)
+    mine, anew, s = first.under(law), LawLoop(LAB, law), np.array([0.3 + 2j, 70j, -5 + 400j])
+    assert (mine.signals is first.signals) is (set(entries) == set(first.law.signals))
+    assert mine.zeros_at_origin == anew.zeros_at_origin
+    np.testing.assert_array_equal(mine.loop_function(s), anew.loop_function(s))
