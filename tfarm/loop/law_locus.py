@@ -10,7 +10,7 @@ branches, too.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -21,7 +21,6 @@ from scipy.optimize import brentq, linear_sum_assignment
 from tfarm.arm import Arm
 from tfarm.arm.checks import whole
 from tfarm.arm.law import Law
-from tfarm.crossing.turning import loose
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 from tfarm.spectrum.box import Box, newton, zeros_in_box
@@ -32,7 +31,6 @@ from .frequencies import band_of, grid
 from .law_loop import LawLoop
 from .law_map import along
 from .law_poles import law_box, starting_points_of
-from .locus import frame
 from .variation import PARAMETERS
 
 Complex = NDArray[np.complexfloating[Any, Any]]
@@ -42,7 +40,6 @@ MOST_POINTS = 5000
 MOST_BRANCHES = 60
 PLAIN = 0.35  # of the distance to the next pole: one that moves by less is itself
 AT_EDGE = 0.05  # of the box's height or width: poles so near to its edge come and go
-ROUNDS = 18  # of halving at most where a branch bends, or two meet
 DEEPEST = 3  # halvings of a step where poles are not plainly told apart; then a branch may end and another begin
 HEIGHTS = (1.0, 1.013, 1.031, 1.057, 0.985, 1.09)  # of the box, until no pole is on its edge at the first value
 SAME = 1e-3  # of the range: a crossing of a branch so near to one that was solved for is that one
@@ -100,30 +97,6 @@ def law_locus(
         here, now = there, places
     found = np.array(rows)
     return LawLocus(family.at(start).arm, law, vary, values, found, box, _crossings(family, values, found, box))
-
-
-def rounded(found: LawLocus) -> LawLocus:
-    """The same locus with values between, until no branch turns by more than 5 degrees as it is drawn.
-
-    Poles between are Newton's, from half way, or where two meet from either side.  A value at which one of them is not
-    plainly that of its branch is left out.
-    """
-    values, rows = found.values, found.branches
-    family = Family(found.arm, found.law, found.vary, float(values[0]))
-    left_out: set[float] = set()
-    left, right, low, high = frame(rows)
-    for _ in range(ROUNDS):
-        bent = np.nonzero(loose(rows, right - left, high - low))[0]
-        wanted = [n for n in bent.tolist() if float(values[n] + values[n + 1]) / 2 not in left_out]
-        added = {n: family.between(values[n : n + 2], rows[:, n : n + 2]) for n in wanted}
-        left_out |= {float(values[n] + values[n + 1]) / 2 for n, poles in added.items() if poles is None}
-        told = [(n, poles) for n, poles in added.items() if poles is not None]
-        if not told:
-            break
-        places = [n + 1 for n, _ in told]
-        values = np.insert(values, places, [(values[n] + values[n + 1]) / 2 for n, _ in told])
-        rows = np.insert(rows, places, np.array([poles for _, poles in told]).T, axis=1)
-    return replace(found, values=values, branches=rows)
 
 
 @dataclass(frozen=True)
@@ -186,15 +159,17 @@ class Family:
         there, second = self.joined(middle, between, high, box, depth - 1)
         return there, [None if n is None else first[n] for n in second]
 
-    def between(self, values: Real, rows: Complex) -> Complex | None:
-        """The poles half way between two values, from those (b, 2) at both; None where one is not plainly its own."""
+    def between(self, value: float, share: float, rows: Complex) -> Complex | None:
+        """The poles at a value that lies a share of the way between two, from those (b, 2) at both.
+
+        None where one is not plainly its own.
+        """
         poles = np.full(len(rows), np.nan, complex)
         for n in np.nonzero(np.isfinite(rows).all(axis=1))[0]:
             room, is_real = abs(rows[n, 1] - rows[n, 0]), rows[n].imag == 0
-            starts = rows[n][np.argsort(is_real)] if is_real.any() != is_real.all() else [rows[n].mean()]
-            found = (
-                [self._near(float(values.mean()), complex(start), room) for start in starts] if room else [rows[n, 0]]
-            )
+            on_line = rows[n, 0] + share * (rows[n, 1] - rows[n, 0])
+            starts = rows[n][np.argsort(is_real)] if is_real.any() != is_real.all() else [on_line]
+            found = [self._near(value, complex(start), room) for start in starts] if room else [rows[n, 0]]
             told = [pole for pole in found if pole is not None]
             if not told:
                 return None
@@ -221,7 +196,7 @@ class Family:
 def assigned(here: Complex, there: Complex, box: Box) -> tuple[dict[int, int], bool]:
     """Which pole of `here` each of `there` continues, and whether that is plain."""
     if not here.size or not there.size:
-        return {}, not _inside(np.r_[here, there], box).any()
+        return {}, not inside(np.r_[here, there], box).any()
     away = abs(here[:, None] - there)
     rows, columns = linear_sum_assignment(away)
     moved = away[rows, columns]
@@ -229,7 +204,7 @@ def assigned(here: Complex, there: Complex, box: Box) -> tuple[dict[int, int], b
     near = moved <= PLAIN * room
     pairs = {int(j): int(i) for i, j, kept in zip(rows, columns, near | (moved <= room), strict=True) if kept}
     alone = np.r_[np.delete(here, rows[near]), np.delete(there, columns[near])]
-    return pairs, not _inside(alone, box).any()
+    return pairs, not inside(alone, box).any()
 
 
 def _room(poles: Complex) -> Real:
@@ -240,7 +215,7 @@ def _room(poles: Complex) -> Real:
     return np.asarray(away.min(axis=1, initial=math.inf))
 
 
-def _inside(poles: Complex, box: Box) -> NDArray[np.bool_]:
+def inside(poles: Complex, box: Box) -> NDArray[np.bool_]:
     """Which are well inside the box."""
     width, height = AT_EDGE * (box.re_max - box.re_min), AT_EDGE * box.im_max
     across = (poles.real > box.re_min + min(width, height)) & (poles.real < box.re_max - min(width, height))

@@ -7,8 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tfarm.digits import plain, significant
-from tfarm.loop.law_locus import LawLocus, rounded
+from tfarm.loop.law_locus import LawLocus
 from tfarm.loop.law_map import LawMap
+from tfarm.loop.law_rounded import rounded
 from tfarm.loop.loci import shown
 
 from .labels import BESIDE, Label
