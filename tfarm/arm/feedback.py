@@ -8,6 +8,7 @@ where it accelerates the hub; a static torque u gives it the value -(J - I_h)/J 
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -20,21 +21,27 @@ from tfarm.errors import ParameterError
 
 @dataclass(frozen=True, slots=True)
 class Gain:
-    """One entry of the law: its `name`, the `output` that it multiplies and its SI `unit`."""
+    """One entry of the law: its `name`, the `output` that it multiplies and its `letter`, and its SI `unit`."""
 
     name: str
     output: str
     unit: str
+    letter: str
 
 
 GAINS = (
-    Gain("Kp", "hub_angle", "N m/rad"),
-    Gain("K1", "hub_rate", "N m s/rad"),
-    Gain("K2", "root_moment", "1"),
+    Gain("Kp", "hub_angle", "N m/rad", "theta"),
+    Gain("K1", "hub_rate", "N m s/rad", "theta_t"),
+    Gain("K2", "root_moment", "1", "M"),
 )  # in the order in which the outputs are fed back, everywhere
 FED_BACK = tuple(gain.output for gain in GAINS)
 LISTED = tuple(sorted(GAINS, key=lambda gain: gain.name))  # in the order in which a person lists them
 NAMES = tuple(gain.name for gain in LISTED)
+ON = {gain.output: gain.name for gain in GAINS}  # the name of the gain on each output
+ANGLE_GAIN, RATE_GAIN, MOMENT_GAIN = ON["hub_angle"], ON["hub_rate"], ON["root_moment"]
+PLANE = (RATE_GAIN, MOMENT_GAIN)  # the gains of the paper's own law: across and up the map of a loop
+TWO_GAINS = "-".join(PLANE)  # the structure of a law that is these, beside PD, lead, ...
+TAKEN_OFF = " - ".join(f"{gain.name} {gain.letter}" for gain in GAINS)  # off the input of the arm, by the law
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,6 +75,21 @@ class HubFeedback:
         value: float = getattr(self, name)
         return value
 
+    @property
+    def by_name(self) -> dict[str, float]:
+        """The gains, as a person lists them."""
+        return {name: self[name] for name in NAMES}
+
+    @property
+    def point(self) -> tuple[float, float]:
+        """Where the law lies in the plane of its two gains: across, up."""
+        across, up = (self[name] for name in PLANE)
+        return across, up
+
+    def told(self, how: Callable[[float], str], names: Iterable[str] = PLANE, arm: Arm | None = None) -> list[str]:
+        """`K1 = 0.3` of each gain of those names, the value written by `how`, with its unit on an arm."""
+        return [f"{name} = {how(self[name])}{'' if arm is None else written_unit(name, arm)}" for name in names]
+
     def having(self, name: str, value: float) -> HubFeedback:
         """The law with another value of one gain."""
         return replace(self, **{name: value})
@@ -93,10 +115,16 @@ def unit_of(name: str, arm: Arm) -> str:
     return unit.replace("N m", given)
 
 
+def shown_unit(name: str, arm: Arm) -> str:
+    """The unit of that gain as a table heads it: nothing of a pure number."""
+    unit = unit_of(name, arm)
+    return "" if unit == "1" else unit
+
+
 def written_unit(name: str, arm: Arm) -> str:
     """What follows a value of that gain in a sentence: a space and its unit, nothing of a pure number."""
-    unit = unit_of(name, arm)
-    return "" if unit == "1" else f" {unit}"
+    unit = shown_unit(name, arm)
+    return f" {unit}" if unit else ""
 
 
 def through(arm: Arm) -> str:
@@ -107,7 +135,7 @@ def through(arm: Arm) -> str:
 
 def driven(arm: Arm) -> str:
     """A clause that says what u is, where it is no torque."""
-    return "" if unit_of("K2", arm) == "1" else f"; u is {through(arm)}"
+    return f"; u is {through(arm)}" if shown_unit(MOMENT_GAIN, arm) else ""
 
 
 def many_laws(law: HubFeedback, **varied: ArrayLike) -> NDArray[np.float64]:

@@ -23,7 +23,7 @@ from tfarm.cli.app import (
     right_digits,
     whole,
 )
-from tfarm.cli.inputs import K1, K2, Kp, LawFiles, laws_of
+from tfarm.cli.inputs import GAIN_OPTIONS, LawFiles, Typed, laws_of, with_options
 from tfarm.cli.sampling import Delay, DspFile, Period, chain_of
 from tfarm.errors import MISSING, ParameterError, one_line
 
@@ -143,15 +143,13 @@ def _alone_with_measured(**options: object) -> None:
 
 
 @app.command()
+@with_options(GAIN_OPTIONS, after="only")
 def report(
     arms: Annotated[
         list[str] | None, typer.Argument(metavar="[ARM ...]", help="presets or files; all presets if none")
     ] = None,
     out: Annotated[Path, typer.Option("--out", help="the folder to write to")] = Path("reports"),
     only: Annotated[str | None, typer.Option("--only", help="one page: bode, modes, margins, locus ...")] = None,
-    k1: K1 = None,
-    k2: K2 = None,
-    kp: Kp = None,
     law: LawFiles = None,
     period: Period = None,
     delay_samples: Delay = None,
@@ -161,6 +159,8 @@ def report(
         list[str] | None, typer.Option("--measured", metavar="OUTPUT/INPUT=FILE", help="lay this over the exact one")
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="make pages that are up to date again, too")] = False,
+    *,
+    gains: Typed,
 ) -> None:
     """Write pages with pictures, tables and data: open index.html in a browser.
 
@@ -171,7 +171,6 @@ def report(
     names = arms or tfarm.presets()
     subjects = [load_arm(name, theory) for name in names]
     chains = [chain_of(dsp or name, period, delay_samples) for name in names]
-    gains = {"K1": k1, "K2": k2, "Kp": kp}
     laws = [laws_of(arm, name, gains, law or []) for arm, name in zip(subjects, names, strict=True)]
     from tfarm.cli.tables import progress
     from tfarm.fitting.reading import data_of

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tfarm.cli.app import Json, TheoryName, app, give, load_arm, whole
-from tfarm.cli.inputs import K1, K2, Given, Kp, Png, law_of
+from tfarm.cli.inputs import GAIN_OPTIONS, Given, Png, Typed, law_of, with_options
 from tfarm.cli.sampling import Delay, DspFile, Period, chain_of
 from tfarm.errors import ParameterError
 
@@ -23,11 +23,9 @@ Laws = Annotated[
 
 
 @app.command()
+@with_options(GAIN_OPTIONS, after="arms")
 def compare(
     arms: Arms,
-    k1: K1 = None,
-    k2: K2 = None,
-    kp: Kp = None,
     law: Laws = None,
     modes: Annotated[str, typer.Option("--modes", metavar="N", help="flexible modes, 1 to 30")] = "10",
     output: Annotated[str, typer.Option("--output", help="what the Bode plot of two arms shows")] = "root_moment",
@@ -38,13 +36,14 @@ def compare(
     png: Png = None,
     out: Annotated[Path | None, typer.Option("--out", help="write a page, compare.html, to this folder")] = None,
     json: Json = False,
+    *,
+    gains: Typed,
 ) -> None:
     """Two arms, or two laws on one arm, beside each other: modes, poles, verdicts, margins; differences in per cent."""
     count, files = whole("--modes", modes, 1, 30), law or []
     _check_number(arms, files)
     subjects = [load_arm(name, theory) for name in arms]
     chain = chain_of(dsp or arms[0], period, delay_samples)
-    gains = {"K1": k1, "K2": k2, "Kp": kp}
     pairs = [(subjects[min(n, len(arms) - 1)], arms[min(n, len(arms) - 1)]) for n in (0, 1)]
     wanted = [None, None] if not files else files * (2 // len(files))
     laws = [law_of(arm, Given(gains, file, name))[0] for (arm, name), file in zip(pairs, wanted, strict=True)]

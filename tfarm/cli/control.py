@@ -6,12 +6,13 @@ import math
 import sys
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, TWO_GAINS
 from tfarm.cli.app import ArmName, Json, app, give, load_arm, plain_number, tell, whole
-from tfarm.cli.inputs import FixedKp, Given, LawFile, Png, law_of, under_a_law
+from tfarm.cli.inputs import Given, HeldAngle, LawFile, Png, law_of, range_option, under_a_law, with_options
 from tfarm.cli.sampling import Delay, DspFile, Period, chain_of
 from tfarm.errors import ParameterError
 
@@ -24,12 +25,18 @@ ALSO = "a further arm that the law has to serve: the objective is the worst of a
 RANGE = "numbers that the arm may have, such as payload.mass=0.1,0.5; up to four: corners, and a search inside"
 OF_A_LAW = "twice: two numbers of a law and their ranges; gain, delay, SIGNAL, SIGNAL.num.N or SIGNAL.den.N"
 
+MAP = (
+    f"How many poles are unstable over the plane of {' and '.join(PLANE)}, and the exact boundary; "
+    "or over two numbers of a law."
+)
 OBJECTIVES = "damping, margin, residual or cost (of the tuner's trial); of another structure sensitivity or delay too"
-STRUCTURES = "K1-K2, PD, PD+notch, lead, PPF or strain-rate"
-RANGES = {  # of a map
-    "K1": "range of K1; by default -1,3 on the paper's arm, -3.33 to 10 times the default K1 on a rig",
-    "K2": "range of K2; by default -2,2, times what one N m takes of the input of a rig",
+STRUCTURES = f"{TWO_GAINS}, PD, PD+notch, lead, PPF or strain-rate"
+USUAL = {  # of a map
+    RATE_GAIN: f"by default -1,3 on the paper's arm, -3.33 to 10 times the default {RATE_GAIN} on a rig",
+    MOMENT_GAIN: "by default -2,2, times what one N m takes of the input of a rig",
 }
+RANGES = {name: range_option(name, f"range of {name}; {usual}") for name, usual in USUAL.items()}
+BOUNDS = {name: range_option(name, f"bounds of {name}") for name in PLANE}
 
 
 @app.command()
@@ -88,34 +95,34 @@ def spill(
     give(spill_answer(found) | said, json, print_spill)
 
 
-@app.command("map")
+@app.command("map", help=MAP)
+@with_options(RANGES, after="arm")
 def gain_map(
     arm: ArmName,
-    k1: Annotated[str | None, typer.Option("--K1", metavar="LO,HI", help=RANGES["K1"])] = None,
-    k2: Annotated[str | None, typer.Option("--K2", metavar="LO,HI", help=RANGES["K2"])] = None,
-    kp: FixedKp = 0.0,
+    kp: HeldAngle = 0.0,
     points: Annotated[str | None, typer.Option("--points", help="grid points along each; 101, of a law 60")] = None,
     csv: Annotated[Path | None, typer.Option("--csv", help="write both numbers and the count to this file")] = None,
     png: Png = None,
     law: LawFile = None,
     vary: Annotated[list[str] | None, typer.Option("--vary", metavar="NAME=LO,HI", help=OF_A_LAW)] = None,
     json: Json = False,
+    *,
+    typed: dict[str, str | None],
 ) -> None:
-    """How many poles are unstable over the plane of K1 and K2, and the exact boundary; or over two numbers of a law."""
+    """The map over the plane of both gains, or over two numbers of a law."""
     number, subject = whole("--points", points or "101", 2, 2000), load_arm(arm)
     if vary or law:
         _law_map(subject, arm, law, vary or [], whole("--points", points or "60", 2, 400), csv, png, json)
         return
     from tfarm.loop.regions import ranges_of
 
-    usual = ranges_of(subject)
-    given = zip(("--K1", "--K2"), (k1, k2), usual, strict=True)
-    ranges = [known if text is None else bounds(key, text) for key, text, known in given]
+    usual, given = ranges_of(subject), _bounds_of(typed)
+    x, y = (given[name] or known for name, known in zip(PLANE, usual, strict=True))
     from tfarm.cli.control_tables import print_map, write_map
     from tfarm.loop.answers import map_answer
     from tfarm.loop.regions import between, region
 
-    found = region(subject, between(*ranges[0], number), between(*ranges[1], number), kp)
+    found = region(subject, between(*x, number), between(*y, number), kp)
     if csv is not None:
         write_map(map_answer(found), csv)
     if png is not None:
@@ -173,13 +180,12 @@ def _range_of(option: str, text: str) -> tuple[str, tuple[float, float]]:
 
 
 @app.command()
+@with_options(BOUNDS, after="structure")
 def design(
     arm: ArmName,
     objective: Annotated[str, typer.Option("--objective", help=OBJECTIVES)] = "damping",
-    structure: Annotated[str, typer.Option("--structure", help=STRUCTURES)] = "K1-K2",
-    k1: Annotated[str | None, typer.Option("--K1", metavar="LO,HI", help="bounds of K1")] = None,
-    k2: Annotated[str | None, typer.Option("--K2", metavar="LO,HI", help="bounds of K2")] = None,
-    kp: FixedKp = 0.0,
+    structure: Annotated[str, typer.Option("--structure", help=STRUCTURES)] = TWO_GAINS,
+    kp: HeldAngle = 0.0,
     modes: Annotated[str, typer.Option("--modes", help="flexible modes in the band, 1 to 30")] = "2",
     continuous: Annotated[bool, typer.Option("--continuous", help="for the continuous loop, without a clock")] = False,
     period: Period = None,
@@ -189,11 +195,13 @@ def design(
     over: Annotated[list[str] | None, typer.Option("--range", metavar="KEY=LO,HI", help=RANGE)] = None,
     save: Annotated[Path | None, typer.Option("--save", help="write the law to this TOML file, for --law")] = None,
     json: Json = False,
+    *,
+    typed: dict[str, str | None],
 ) -> None:
     """The law that serves an objective best in the sampled loop, at the file's period or else 10 ms."""
     number, subject = whole("--modes", modes, 1, 30), load_arm(arm)
     chain = chain_of(dsp or arm, period, delay_samples)
-    K1, K2 = (None if text is None else bounds(key, text) for key, text in (("--K1", k1), ("--K2", k2)))
+    within: Any = {**_bounds_of(typed), ANGLE_GAIN: kp}
     ranges = dict(_range_of("--range", each) for each in over or [])
     from tfarm.arm.law import Law
     from tfarm.arm.law_writing import save_law
@@ -204,8 +212,9 @@ def design(
     from tfarm.synthesis.design import Design
 
     found = find_law(
-        subject, objective, structure=structure, K1=K1, K2=K2, Kp=kp, modes=number, chain=chain, continuous=continuous,
-        progress=tell if sys.stderr.isatty() else None, also=[load_arm(name) for name in also or []], ranges=ranges,
+        subject, objective, structure=structure, **within, modes=number, chain=chain,
+        continuous=continuous, progress=tell if sys.stderr.isatty() else None,
+        also=[load_arm(name) for name in also or []], ranges=ranges,
     )  # fmt: skip
     law = Law.of_gains(found.law) if isinstance(found, Design) else found.law
     if save is not None:
@@ -216,6 +225,11 @@ def design(
         give(design_answer(found), json, print_design)
     else:
         give(law_design_answer(found), json, print_law_design)
+
+
+def _bounds_of(typed: dict[str, str | None]) -> dict[str, tuple[float, float] | None]:
+    """The ranges of gains, None where not typed."""
+    return {name: None if text is None else bounds(f"--{name}", text) for name, text in typed.items()}
 
 
 def bounds(key: str, text: str) -> tuple[float, float]:

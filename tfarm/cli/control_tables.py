@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from tfarm.arm import ANGLE_GAIN, NAMES, PLANE
 from tfarm.columns import Column, Table
 from tfarm.digits import general, singly
 from tfarm.loop.answers import MARGINS, POLES, WINDOWS, gain_rows
@@ -32,7 +34,7 @@ def print_margins(found: Margins[Any], answer: dict[str, Any]) -> None:
     far = answer["verdict"] == "unstable" or answer["known_beyond_the_band"]
     reach = "" if far else f" up to {answer['band_rad_s']:.4g} rad/s, not known beyond"
     poles = found.stability.poles
-    why = "that Kp = 0 leaves" if found.windows else "of a hub whose angle is not held"
+    why = f"that {ANGLE_GAIN} = 0 leaves" if found.windows else "of a hub whose angle is not held"
     apart = f" (apart from the pole at 0 {why})" if poles.moving.size < poles.values.size else ""
     print(f"{answer['arm']}: {answer['verdict'].upper()}{reach}{apart}")
     more = " (infinitely many in all)" if answer["unstable_roots_infinite"] else ""
@@ -101,16 +103,17 @@ def print_map(answer: dict[str, Any]) -> None:
     counts = answer["unstable_roots"]
     flat = [count for row in counts for count in row]
     print(f"{answer['arm']}: {flat.count(0)} of {len(flat)} gain pairs are stable")
-    _print_plane(answer["K2"], counts)
-    print(f"K2 up, K1 from {answer['K1'][0]:g} to {answer['K1'][-1]:g} to the right; . stable, # unstable")
-    print(answer["sign_convention"])
+    _print_plane(answer, *PLANE)
 
 
-def _print_plane(upwards: list[float], counts: list[list[Any]]) -> None:
-    """A coarse picture of a plane: a dot where nothing is unstable."""
+def _print_plane(answer: dict[str, Any], x: str, y: str, names: Sequence[str] | None = None) -> None:
+    """A coarse picture of a plane over the values under two keys: a dot where nothing is unstable."""
+    counts, (across, up) = answer["unstable_roots"], names or (x, y)
     step = max(1, len(counts) // 24), max(1, len(counts[0]) // 60)
-    for value, row in list(zip(upwards, counts, strict=True))[:: -step[0]]:
+    for value, row in list(zip(answer[y], counts, strict=True))[:: -step[0]]:
         print(f"{value:9.3g} " + "".join("." if count == 0 else "#" for count in row[:: step[1]]))
+    print(f"{up} up, {across} from {answer[x][0]:g} to {answer[x][-1]:g} to the right; . stable, # unstable")
+    print(answer["sign_convention"])
 
 
 def print_law_map(answer: dict[str, Any]) -> None:
@@ -119,17 +122,18 @@ def print_law_map(answer: dict[str, Any]) -> None:
     flat = [count for row in counts for count in row]
     reach = f"no unstable pole below {answer['band_rad_s']:.6g} rad/s"
     print(f"{answer['arm']}: {flat.count(0)} of {len(flat)} pairs of {first} and {second} have {reach}")
-    _print_plane(answer["y"], counts)
-    print(f"{second} up, {first} from {answer['x'][0]:g} to {answer['x'][-1]:g} to the right; . stable, # unstable")
-    print(answer["sign_convention"])
+    _print_plane(answer, "x", "y", (first, second))
 
 
 def write_law_map(answer: dict[str, Any], path: Path) -> None:
     """Both numbers of the law and the number of unstable poles, one row a point."""
+    _write_plane(answer, "x", "y", [name.replace(".", "_").replace("@", "_at_") for name in answer["vary"]], path)
+
+
+def _write_plane(answer: dict[str, Any], x: str, y: str, names: Sequence[str], path: Path) -> None:
     counts = [count for row in answer["unstable_roots"] for count in row]
-    x, y = answer["x"] * len(answer["y"]), [value for value in answer["y"] for _ in answer["x"]]
-    names = [name.replace(".", "_").replace("@", "_at_") for name in answer["vary"]]
-    columns = (Column(names[0], of=x), Column(names[1], of=y), Column("unstable_roots", of=counts))
+    across, up = answer[x] * len(answer[y]), [value for value in answer[y] for _ in answer[x]]
+    columns = (Column(names[0], of=across), Column(names[1], of=up), Column("unstable_roots", of=counts))
     write_csv(Table(columns=columns), path)
 
 
@@ -138,12 +142,14 @@ def print_design(answer: dict[str, Any]) -> None:
     loop = f"the {answer['designed_for']} loop, {answer['modes']} modes in the band"
     print(f"{answer['arm']}, objective {answer['objective']} of {loop}: {answer['verdict']} without a clock")
     units = {name: "" if unit == "1" else f" {unit}" for name, unit in answer["gain_units"].items()}
-    law = f"K1 = {answer['K1']:.6g}{units['K1']}, K2 = {answer['K2']:.6g}{units['K2']}, Kp = {answer['Kp']:.6g}"
-    print(f"{law}: {answer['value']:.6g}")
+    searched = [f"{name} = {answer[name]:.6g}{units[name]}" for name in PLANE]
+    held = [f"{name} = {answer[name]:.6g}" for name in NAMES if name not in PLANE]
+    print(f"{', '.join(searched + held)}: {answer['value']:.6g}")
     sampled = answer["sampled"]
     warning = "" if sampled["stable"] else "BUT "
     print(f"{warning}{sampled['in_words']}")
-    print(f"within one per cent of it: K1 {_pair(answer['flat_K1'])}, K2 {_pair(answer['flat_K2'])}")
+    flat = [f"{name} {_pair(answer[f'flat_{name}'])}" for name in PLANE]
+    print(f"within one per cent of it: {', '.join(flat)}")
     for name in answer["widened"]:
         wider = _pair(answer["bounds"][name])
         print(f"the bounds of {name} were widened to {wider}: the best gains lay on the first ones")
@@ -192,8 +198,5 @@ def print_law_design(answer: dict[str, Any]) -> None:
 
 
 def write_map(answer: dict[str, Any], path: Path) -> None:
-    """K1, K2 and the number of unstable poles, one row a point."""
-    counts = [count for row in answer["unstable_roots"] for count in row]
-    K1, K2 = answer["K1"] * len(answer["K2"]), [K2 for K2 in answer["K2"] for _ in answer["K1"]]
-    columns = (Column("K1", of=K1), Column("K2", of=K2), Column("unstable_roots", of=counts))
-    write_csv(Table(columns=columns), path)
+    """Both gains and the number of unstable poles, one row a point."""
+    _write_plane(answer, *PLANE, PLANE, path)

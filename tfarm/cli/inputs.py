@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import wraps
 from inspect import Parameter, signature
@@ -14,7 +14,7 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
-from tfarm.arm import GAINS, LISTED, Gain
+from tfarm.arm import FED_BACK, GAINS, LISTED, MOMENT_GAIN, RATE_GAIN, Gain
 from tfarm.cli.app import whole
 from tfarm.errors import ParameterError
 
@@ -24,54 +24,78 @@ if TYPE_CHECKING:
     from tfarm.report.given_laws import GivenLaw
 
 
+Command = Callable[..., None]
+Typed = dict[str, float | None]  # gains by name, None where not given
+
+
 @dataclass(frozen=True)
 class Given:
     """What is typed of a law: `gains` by name, None where not given; the `law` of a file; and the `arm`'s own name."""
 
-    gains: dict[str, float | None]
+    gains: Typed
     law: str | None = None
     arm: str = ""
 
 
 HELP = {  # of the gains that have a default of their own
-    "K1": "hub rate gain [N m s/rad, V s/rad or A s/rad]; by default 0.00642 J w1, the paper's 0.3 on its arm",
-    "K2": "root moment gain, u = ... - K2 E I phi'(0); 0.3 by default, 0 on a hub without inertia",
+    RATE_GAIN: "hub rate gain [N m s/rad, V s/rad or A s/rad]; by default 0.00642 J w1, the paper's 0.3 on its arm",
+    MOMENT_GAIN: f"root moment gain, u = ... - {MOMENT_GAIN} E I phi'(0); 0.3 by default, 0 on a hub without inertia",
 }
-K1 = Annotated[float | None, typer.Option("--K1", help=HELP["K1"])]
-K2 = Annotated[float | None, typer.Option("--K2", help=HELP["K2"])]
 LawFile = Annotated[str | None, typer.Option("--law", metavar="FILE", help="TOML file with a [law]; else the arm's")]
 LawFiles = Annotated[
     list[str] | None,
     typer.Option("--law", metavar="FILE", help="TOML file with a [law]; again for more, on one page; else the arm's"),
 ]
 Png = Annotated[Path | None, typer.Option("--png", help="draw it into this file")]
-FixedKp = Annotated[float, typer.Option("--Kp", help="hub angle gain [N m/rad]")]
-Kp = Annotated[float | None, typer.Option("--Kp", help="hub angle gain [N m/rad]")]
 
 
-def option_of(gain: Gain) -> Any:
+def gain_option(gain: Gain, kind: Any = float | None) -> Any:
     """The type of the option of a gain: a number, or None where it is not given."""
     words = HELP.get(gain.name, f"{gain.output.replace('_', ' ')} gain [{gain.unit}]")
-    return Annotated[float | None, typer.Option(f"--{gain.name}", help=words)]
+    return Annotated[kind, typer.Option(f"--{gain.name}", help=words)]
 
 
-def under_a_law(command: Callable[..., None]) -> Callable[..., None]:
+def range_option(name: str, words: str) -> Any:
+    """The type of the option of a range, typed as two numbers, or None where it is not given."""
+    return Annotated[str | None, typer.Option(f"--{name}", metavar="LO,HI", help=words)]
+
+
+GAIN_OPTIONS = {gain.name: gain_option(gain) for gain in LISTED}
+HeldAngle = gain_option(GAINS[FED_BACK.index("hub_angle")], float)  # of commands on the plane of the other two gains
+
+
+def with_options(
+    options: Mapping[str, Any], after: str, gathered: Callable[[dict[str, Any], Mapping[str, Any]], Any] | None = None
+) -> Callable[[Command], Command]:
+    """A command with these options, None where not given, after the argument of that name, instead of its last one.
+
+    The last one is what they are by name, or what `gathered` makes of that and of the other arguments.
+    """
+
+    def decorated(command: Command) -> Command:
+        own = signature(command, eval_str=True)
+        *kept, last = (each.replace(kind=Parameter.KEYWORD_ONLY) for each in own.parameters.values())
+        added = [Parameter(name, Parameter.KEYWORD_ONLY, default=None, annotation=options[name]) for name in options]
+        place = 1 + [each.name for each in kept].index(after)
+
+        @wraps(command)
+        def called(**arguments: Any) -> None:
+            typed = {name: arguments.pop(name) for name in options}
+            command(**{last.name: gathered(typed, arguments) if gathered else typed, **arguments})
+
+        called.__signature__ = own.replace(parameters=[*kept[:place], *added, *kept[place:]])  # type: ignore[attr-defined]
+        return called
+
+    return decorated
+
+
+def under_a_law(command: Command) -> Command:
     """The command with options for each gain and for a law's file after its arm, instead of its last argument."""
-    whole_signature = signature(command, eval_str=True)
-    first, *rest, given = whole_signature.parameters.values()
-    options = {**{gain.name: option_of(gain) for gain in LISTED}, "law": LawFile}
-    added = [Parameter(name, Parameter.KEYWORD_ONLY, default=None, annotation=kind) for name, kind in options.items()]
 
-    @wraps(command)
-    def with_options(**arguments: Any) -> None:
-        gains = {gain.name: arguments.pop(gain.name) for gain in GAINS}
-        typed = Given(gains, arguments.pop("law"), arguments[first.name])
-        command(**{given.name: typed, **arguments})
+    def given(typed: dict[str, Any], others: Mapping[str, Any]) -> Given:
+        return Given({gain.name: typed[gain.name] for gain in GAINS}, typed["law"], others["arm"])
 
-    keywords = [each.replace(kind=Parameter.KEYWORD_ONLY) for each in (first, *rest)]
-    shown = [keywords[0], *added, *keywords[1:]]
-    with_options.__signature__ = whole_signature.replace(parameters=shown)  # type: ignore[attr-defined]
-    return with_options
+    return with_options({**GAIN_OPTIONS, "law": LawFile}, "arm", given)(command)
 
 
 MOST_POINTS = 1_000_000
@@ -136,7 +160,7 @@ def law_of(arm: Arm, given: Given) -> tuple[HubFeedback | Law, dict[str, Any]]:
     return gains_of(arm, given) if own is None else (own, {})
 
 
-def laws_of(arm: Arm, name: str, gains: dict[str, float | None], files: Sequence[str]) -> tuple[GivenLaw, ...]:
+def laws_of(arm: Arm, name: str, gains: Typed, files: Sequence[str]) -> tuple[GivenLaw, ...]:
     """The laws that a page is about: those of files, gains that are typed, the arm's own [law]; else none."""
     from tfarm.arm.law_tables import load_law
     from tfarm.fitting.runs import load_run

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from tfarm.arm import NAMES
 from tfarm.cli.app import ArmName, Json, app, give, load_arm, whole
 from tfarm.cli.inputs import Given, Png, law_of, under_a_law
 from tfarm.columns import Column, Table
@@ -16,8 +17,8 @@ Vary = Annotated[
     str,
     typer.Option(
         "--vary",
-        help="K1, K2, Kp, all (a scale on the three), payload_mass, payload_inertia, hub_inertia, length or damping; "
-        "of another law gain, delay, SIGNAL, SIGNAL.num.N or SIGNAL.den.N, too",
+        help=f"{', '.join(NAMES)}, all (a scale on the three), payload_mass, payload_inertia, hub_inertia, length or "
+        "damping; of another law gain, delay, SIGNAL, SIGNAL.num.N or SIGNAL.den.N, too",
     ),
 ]
 POINTS = "values, equally spaced; 500, of another law than gains at the hub 100"

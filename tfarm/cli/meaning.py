@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Any
 
+from tfarm.arm import GAINS
 from tfarm.errors import ParameterError, did_you_mean
 
 VERBS = {  # words of other tools
@@ -24,7 +25,8 @@ VERBS = {  # words of other tools
     "version": "--version",
     "help": "--help",
 }
-OPTIONS = {
+GAINS_ELSEWHERE = {"hub_angle": ("--K0",), "hub_rate": ("--Kd",), "root_moment": ("--Km",)}
+OPTIONS: dict[str, tuple[str, ...]] = {
     "--period": ("--Ts", "--ts", "--dt", "--T", "--sample-time", "--sampling-time", "--sample", "-T"),
     "--count": ("--n", "--num", "--number", "--modes", "-n", "-N"),
     "--modes": ("--n", "--num", "--number", "--count", "-n", "-N"),
@@ -33,9 +35,7 @@ OPTIONS = {
     "--csv": ("--out", "--file", "--save", "-o"),
     "--out": ("--output", "--folder", "--dir", "-o"),
     "--duration": ("--time", "--tend", "--tmax", "-t"),
-    "--Kp": ("--K0", "--kp"),
-    "--K1": ("--Kd", "--k1"),
-    "--K2": ("--Km", "--k2"),
+    **{f"--{gain.name}": (*GAINS_ELSEWHERE.get(gain.output, ()), f"--{gain.name.lower()}") for gain in GAINS},
     "--from": ("--start", "--wmin", "--min"),
     "--to": ("--stop", "--end", "--wmax", "--max"),
 }

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from tfarm.arm import MOMENT_GAIN, RATE_GAIN, TAKEN_OFF
 from tfarm.cli.app import ArmName, Json, app, give, load_arm, whole
 from tfarm.cli.inputs import Given, law_of, under_a_law
 
@@ -24,9 +25,14 @@ DspFile = Annotated[
 Modes = Annotated[
     str | None, typer.Option("--modes", metavar="N", help="flexible modes; as many as it takes if not said")
 ]
+SAMPLED = f"""Is the loop u = -{TAKEN_OFF} stable when it is sampled?  Verdict, intervals, modes, margins.
+
+A law of a file acts with its own period, which has to be that of the chain; one in s is made discrete by its rule.
+"""
+TUNER = f"a tuner from `tfarm tune --save`: it sets {MOMENT_GAIN}, with its own {RATE_GAIN}"
 
 
-@app.command()
+@app.command(help=SAMPLED)
 @under_a_law
 def sampled(
     arm: ArmName,
@@ -38,10 +44,7 @@ def sampled(
     *,
     given: Given,
 ) -> None:
-    """Is the loop u = -Kp theta - K1 theta_t - K2 M stable when it is sampled?  Verdict, intervals, modes, margins.
-
-    A law of a file acts with its own period, which has to be that of the chain; one in s is made discrete by its rule.
-    """
+    """Verdict, intervals, modes and margins of the loop when it is sampled."""
     count = None if modes is None else whole("--modes", modes, 1, 400)
     subject, chain = load_arm(arm), chain_of(dsp or arm, period, delay_samples)
     law, said = law_of(subject, given)
@@ -70,9 +73,7 @@ def simulate(
     between: Annotated[str, typer.Option("--between", metavar="N", help="records between two samples")] = "0",
     csv: Annotated[Path | None, typer.Option("--csv", help="write the signals to this file")] = None,
     mat: Annotated[Path | None, typer.Option("--mat", help="write the signals to this MATLAB file")] = None,
-    controller: Annotated[
-        Path | None, typer.Option("--controller", help="a tuner from `tfarm tune --save`: it sets K2, with its own K1")
-    ] = None,
+    controller: Annotated[Path | None, typer.Option("--controller", help=TUNER)] = None,
     json: Json = False,
     *,
     given: Given,

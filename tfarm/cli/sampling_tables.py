@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from tfarm.arm import PLANE
 from tfarm.cli.app import tell
 from tfarm.columns import Column, Table
 from tfarm.dsp.results import SIGNALS
@@ -22,8 +23,8 @@ def print_sampled(answer: dict[str, Any]) -> None:
     show(answer["modes"])
     print(answer["law"])
     shown, band = answer["shown"], answer["band_rad_s"]
-    print(f"stable at this K2 for K1 in {_texts(shown['K1_intervals'], band)}")
-    print(f"stable at this K1 for K2 in {_texts(shown['K2_intervals'], band)}")
+    for name, held in (PLANE, PLANE[::-1]):
+        print(f"stable at this {held} for {name} in {_texts(shown[f'{name}_intervals'], band)}")
     delay, damping = shown["delay_margin_samples"], shown["required_damping_s"]
     more = " or more" if answer["delay_margin_is_lower_bound"] else ""
     print(f"further delay it bears: {delay['text']} samples{more}{_held([delay], band)}")

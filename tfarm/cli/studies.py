@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, cast
 
@@ -25,17 +26,16 @@ def study(
     """Studies of the tuner on all cores: learning curves, the map of (alpha_c, eta_c), a and b, inputs, rules."""
     number, slews = whole("--seeds", seeds, 1, 10_000), whole("--trials", trials, 1, 1_000_000)
     subject = load_arm(arm)
-    from tfarm.spectrum.scales import default_gains
-    from tfarm.tuner import Learning, Plan
+    from tfarm.tuner import Learning
     from tfarm.tuner.studies import plans_of, run_study, study_answer
+    from tfarm.tuner.tuning import usual_plan
 
-    learning = Learning(rule=cast("Any", rule))
-    base = Plan(
-        learning=learning,
+    base = replace(
+        usual_plan(subject),
+        learning=Learning(rule=cast("Any", rule)),
         signals=cast("Any", signals),
         guard=cast("Any", guard),
         trials=slews,
-        K1=default_gains(subject).K1,
     )
     plans = plans_of(what, base, number)
     from tfarm.cli.tables import progress

@@ -12,7 +12,7 @@ from typing import Any
 
 from rich.console import Console
 
-from tfarm.arm import Arm
+from tfarm.arm import MOMENT_GAIN, Arm
 from tfarm.cli.app import tell
 from tfarm.columns import Column, Table
 from tfarm.files import is_standard_output
@@ -91,8 +91,8 @@ def print_assumptions(answer: dict[str, Any]) -> None:
     )
     print(f"one per cent more of I (with {section['held']})")
     print("or of I_h (with all else held).")
-    gains = answer["gains"]
-    print(f"loop: the verdict at K1 = {gains['K1']:g}, K2 = {gains['K2']:g}, and up to which K2 it stays stable.")
+    gains = ", ".join(f"{name} = {value:g}" for name, value in answer["gains"].items())
+    print(f"loop: the verdict at {gains}, and up to which {MOMENT_GAIN} it stays stable.")
 
 
 def print_validation(answer: dict[str, Any]) -> None:

@@ -7,12 +7,15 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
+from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN
 from tfarm.cli.app import ArmName, Json, app, give, load_arm, whole
-from tfarm.cli.inputs import K1, Given, gains_of
+from tfarm.cli.inputs import HELP, Given, gains_of
 from tfarm.cli.sampling import Delay, DspFile, Period, chain_of
 
 if TYPE_CHECKING:
     from tfarm.arm import Arm
+
+TRACKED = f"hub angle gain: the reference is tracked, {RATE_GAIN} damps that by 0.71 if not given"
 
 
 @app.command()
@@ -33,10 +36,8 @@ def tune(
     alpha: Annotated[float, typer.Option("--alpha", help="momentum, in [0, 1)")] = 0.6,
     a: Annotated[float, typer.Option("--a", help="weight of the root moment in the cost")] = 1.0,
     b: Annotated[float, typer.Option("--b", help="weight of the control signal in the cost")] = 2.6,
-    K1: K1 = None,
-    kp: Annotated[
-        float, typer.Option("--Kp", help="hub angle gain: the reference is tracked, K1 damps that by 0.71 if not given")
-    ] = 0.0,
+    on_rate: Annotated[float | None, typer.Option(f"--{RATE_GAIN}", help=HELP[RATE_GAIN])] = None,
+    on_angle: Annotated[float, typer.Option(f"--{ANGLE_GAIN}", help=TRACKED)] = 0.0,
     duration: Annotated[float, typer.Option("--duration", help="of a trial [s]")] = 3.0,
     enough: Annotated[float, typer.Option("--enough", help="stop once the rms of x is below this [N m]")] = 0.0,
     hidden: Annotated[str, typer.Option("--hidden", metavar="N", help="hidden neurons")] = "6",
@@ -56,7 +57,7 @@ def tune(
     from tfarm import tuner
     from tfarm.tuner.tuning import comparison_answer
 
-    rate_gain, said = _rate_gain(subject, K1, kp)
+    servo, said = _servo(subject, on_rate, on_angle)
 
     learning = tuner.Learning(
         mode=cast("Any", mode), rule=cast("Any", rule), sensitivity=cast("Any", sensitivity), eta=eta, alpha=alpha,
@@ -64,8 +65,8 @@ def tune(
     )  # fmt: skip
     plan = tuner.Plan(
         cost=tuner.Cost(a=a, b=b), learning=learning, signals=cast("Any", signals), guard=cast("Any", guard),
-        trials=numbers[0], seed=numbers[1], count=numbers[2], K1=rate_gain, Kp=kp, duration=duration, hidden=neurons,
-        seventh_input=seventh_input,
+        trials=numbers[0], seed=numbers[1], count=numbers[2], duration=duration, hidden=neurons,
+        seventh_input=seventh_input, **servo,
     )  # fmt: skip
     tuning = tuner.tune(subject, plan, chain)
     answer = tuner.tune_answer(tuning) | said
@@ -77,16 +78,17 @@ def tune(
     _show(answer, save, json)
 
 
-def _rate_gain(subject: Arm, K1: float | None, Kp: float) -> tuple[float, dict[str, Any]]:
-    """K1, and what the answer says of one that was not given: with Kp that which damps the angle."""
+def _servo(subject: Arm, on_rate: float | None, on_angle: float) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The gains of the servo, and what the answer says of a rate gain that was not given: it damps a held angle."""
     from tfarm.tuner.trial import usual_rate_gain
 
-    if K1 is not None or Kp == 0.0:
-        law, said = gains_of(subject, Given({"K1": K1, "K2": 0.0}))
-        return law.K1, said
-    rate_gain = usual_rate_gain(subject, Kp)
-    words = f"K1 = {rate_gain:.4g}, which damps the rigid arm under Kp by 0.71 of critical"
-    return rate_gain, {"default_gains": ["K1"], "default_gains_in_words": words}
+    if on_rate is not None or on_angle == 0.0:
+        law, said = gains_of(subject, Given({RATE_GAIN: on_rate, MOMENT_GAIN: 0.0}))
+        return {RATE_GAIN: law[RATE_GAIN], ANGLE_GAIN: on_angle}, said
+    usual = usual_rate_gain(subject, on_angle)
+    words = f"{RATE_GAIN} = {usual:.4g}, which damps the rigid arm under {ANGLE_GAIN} by 0.71 of critical"
+    said = {"default_gains": [RATE_GAIN], "default_gains_in_words": words}
+    return {RATE_GAIN: usual, ANGLE_GAIN: on_angle}, said
 
 
 def _show(answer: dict[str, Any], save: Path | None, json: bool) -> None:

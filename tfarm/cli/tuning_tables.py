@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from tfarm.arm import ANGLE_GAIN
 from tfarm.cli.app import tell
 from tfarm.columns import Column, Table
 from tfarm.digits import general, singly
@@ -38,7 +39,8 @@ def _tip_words(answer: dict[str, Any]) -> str:
     """How far off its target the tip ends."""
     errors = [answer[f"tip_error{which}_m"] for which in ("", "_best_constant", "_without")]
     tuned, constant, without = ("ran away" if each is None else f"{1e3 * each:.3g} mm" for each in errors)
-    held = f"Kp = {answer['Kp']:g} holds the angle" if answer["Kp"] else "nothing holds the angle: --Kp does"
+    name = ANGLE_GAIN
+    held = f"{name} = {answer[name]:g} holds the angle" if answer[name] else f"nothing holds the angle: --{name} does"
     return f"tip off its target at the end: {tuned}, {constant} with the best constant gain, {without} without ({held})"
 
 

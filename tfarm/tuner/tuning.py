@@ -95,6 +95,11 @@ class Tuning:
         return self.saved().gain()
 
 
+def usual_plan(arm: Arm) -> Plan:
+    """The paper's figures, at the arm's own default rate gain."""
+    return Plan(K1=default_gains(arm).K1)
+
+
 def trial_of(arm: Arm, plan: Plan, chain: Chain | None) -> Trial:
     """The slew that a plan learns from."""
     return slew_trial(
@@ -108,7 +113,7 @@ def tune(arm: Arm, plan: Plan | None = None, chain: Chain | None = None) -> Tuni
 
     Raises ParameterError for what cannot be, and CertificationError where there is no guard.
     """
-    plan = Plan(K1=default_gains(arm).K1) if plan is None else plan
+    plan = usual_plan(arm) if plan is None else plan
     network = initial_network(plan.seed, hidden=plan.hidden, scales=plan.scales)
     trial = trial_of(arm, plan, chain)
     best = best_constant(trial)
