@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import os
 import sys
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Run one command and exit: 0, 2 for bad input, 3 for what could not be solved or proven, 130 if interrupted.
 
-    Everything is imported inside, so that an interrupt is one line from the first moment on.
+    Everything is imported inside, so that an interrupt is one line from the first moment on.  BLAS has one thread,
+    unless the user chose a number: on matrices of a hundred rows more only wait for each other.
     """
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         from tfarm.cli.running import run
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -111,8 +112,17 @@ def undelayed_plant(
     if damping > 0 and arm.input_lags:
         remedy = "acts on the hub at once, and the input behind an inductance late: give it as hub.friction of the rig"
         raise ParameterError(key="actuator.hub_damping", value=damping, remedy=remedy)
-    names = [*outputs, "hub_rate"] if damping > 0 else list(outputs)
-    return with_modes(modal_model(arm, names, count, x, branches=branches), chain, outputs, count)
+    names = (*outputs, "hub_rate") if damping > 0 else tuple(outputs)
+    if branches is all_damped_modes:
+        model = _modelled(arm, names, count, x)
+    else:
+        model = modal_model(arm, names, count, x, branches=branches)
+    return with_modes(model, chain, outputs, count)
+
+
+@lru_cache(maxsize=32)  # the simulations of one page ask for the same model some twenty times
+def _modelled(arm: Arm, names: tuple[str, ...], count: int, x: float | None) -> ModalModel:
+    return modal_model(arm, names, count, x)
 
 
 def with_modes(model: ModalModel, chain: Chain, outputs: Sequence[str], count: int) -> Plant:

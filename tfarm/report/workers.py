@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from contextlib import ExitStack, contextmanager
 from multiprocessing import get_context, parent_process
+from multiprocessing.context import BaseContext
 from threading import Thread
 from typing import TypeVar
 
@@ -32,7 +33,8 @@ def shared(
     waiting = deque(deque(each) for each in lists)
     with ExitStack() as stack:
         stack.enter_context(one_thread_each())
-        pools = [ProcessPoolExecutor(1, get_context("spawn"), leave_with_parent) for _ in range(workers)]
+        context = _prepared()
+        pools = [ProcessPoolExecutor(1, context, leave_with_parent) for _ in range(workers)]
         for pool in pools:
             stack.callback(pool.shutdown, wait=True, cancel_futures=True)
         own: list[deque[Task]] = [deque() for _ in pools]
@@ -48,6 +50,18 @@ def shared(
             ended = [(future.result(), *running.pop(future)) for future in done]
             idle = [i for _, i, _ in ended]
             yield from ((task, result) for result, _, task in ended)
+
+
+def _prepared() -> BaseContext:
+    """How processes are started: on Linux from one that has loaded what they all need, elsewhere each anew.
+
+    (None is forked from the caller's own, whose threads it would not have.)
+    """
+    if sys.platform != "linux":
+        return get_context("spawn")
+    context = get_context("forkserver")
+    context.set_forkserver_preload(["tfarm.report.pieces"])
+    return context
 
 
 def _next(own: list[deque[Task]], i: int, waiting: deque[deque[Task]]) -> Task | None:
