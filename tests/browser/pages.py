@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from playwright.sync_api import Browser, Page, sync_playwright
 
 import tfarm
@@ -26,12 +27,16 @@ from tfarm.report import write
 from tfarm.report.given_laws import Subject
 from tfarm.report.live import ASSETS, save_live, write_assets
 
+Real = NDArray[np.float64]
+
 ARMS = ("sasaki2012-lab", "stocky-steel", "quanser-flexlink")
 REPORTED = "stocky-steel"  # of which there are report pages too
 FLAGS = ("--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--no-first-run")
 GAINS, MOVES = 10, 30
 INTERACTIVE, MOVE = 1.0, 0.15  # s: what they should take; printed, and asserted with room for a busy machine
 BUSY = 5.0
+LARGEST_TURN = 5.0  # deg, of the line of a locus at a point of it
+CHART, SEEN = (420.0, 340.0), 1.5  # pixels: a chart of poles at its largest, and a piece whose ends are seen
 NAMES = ("phase", "phase_lag", "phase_lead", "delay", "disk", "peak_sensitivity", "peak_complementary")
 
 
@@ -197,9 +202,29 @@ def test_sampled_loop_and_slew_at_ten_gains_are_what_tfarm_prints(browser, folde
         assert not opened.said
 
 
+def seen_turns(rows: list[dict[str, float]], frame: dict[str, list[float]]) -> Real:
+    """How far [deg] the lines through these rows turn at each point in the frame, between pieces one of which is seen.
+
+    Left out is where a line comes to the real axis or leaves it: a true corner.
+    """
+    found: list[Real] = []
+    (left, right), (low, high) = frame["x"], frame["y"]
+    for number in {row["piece"] for row in rows}:
+        line = sorted((row for row in rows if row["piece"] == number), key=lambda row: row["gain"])
+        s = np.array([complex(row["re"], row["im"]) for row in line])
+        x, y = (s.real - left) / (right - left), (s.imag - low) / (high - low)
+        step = np.diff(CHART[0] * x + 1j * CHART[1] * y)
+        is_real = abs(s.imag) < 1e-9 * (high - low)
+        inside = (x > 0) & (x < 1) & (y >= 0) & (y < 1)
+        told = inside[1:-1] & ~is_real[1:-1] & ~is_real[:-2] & ~is_real[2:]
+        seen = np.maximum(abs(step[1:]), abs(step[:-1])) > SEEN
+        found.append(abs(np.degrees(np.angle(step[1:] * step[:-1].conj())))[told & seen])
+    return np.concatenate(found)
+
+
 @pytest.mark.parametrize("name", ARMS)
 def test_loci_have_the_poles_of_their_gains(browser, folder, name):
-    """Points along both loci against the exact poles there; what is pointed at reads as one of them."""
+    """Points along both loci against the exact poles there, round lines; what is pointed at reads as one of them."""
     arm, chain = tfarm.load(name), load_chain(name)
     with Opened(browser, folder / name / "live.html") as opened:
         page = opened.page
@@ -208,6 +233,11 @@ def test_loci_have_the_poles_of_their_gains(browser, folder, name):
         law = HubFeedback(**page.evaluate("live.now.law"))
         band = page.evaluate("live.loop.band")
         rows, discs = page.evaluate("[live.now.locus, live.now.discs]")
+        disc = {"x": [-1.25, 1.25], "y": [-1.25, 1.25]}
+        for each, frame in ((rows, page.evaluate("live.now.frame")), (discs, disc)):
+            turns = seen_turns(each, frame)
+            assert turns.size > 5
+            assert turns.max() <= LARGEST_TURN
         for row in rows[:: len(rows) // 6]:
             exact = stability(arm, law.having("K2", row["gain"]), band).poles.values
             s = complex(row["re"], row["im"])

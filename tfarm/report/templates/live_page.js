@@ -202,11 +202,11 @@
   const along = gain => [share => gainAt(data.axes[gain], share, 8), K => ({ ...now.law, [gain]: K })];
   function inS() {
     const [gain, law] = along($("vary").value), { frame } = now;
-    return locus((K, before) => { const found = loop.poles(law(K), before?.found, frame.y[1]); return { points: [...found], found }; }, gain, frame);
+    return locus((K, before) => { const found = loop.poles(law(K), before?.found, frame.y[1]); return { points: [...found], found }; }, gain, frame, room("poles"));
   }
   function inZ() {
     const [gain, law] = along($("vary").value), view = { x: [-1.25, 1.25], y: [-1.25, 1.25] };
-    return locus((K, before) => { const found = discrete.poles(law(K), before?.found, 1e-6); return { points: (found || []).filter(each => size(each.z) > FAINT).map(each => each.z), found }; }, gain, view);
+    return locus((K, before) => { const found = discrete.poles(law(K), before?.found, 1e-6); return { points: (found || []).filter(each => size(each.z) > FAINT).map(each => each.z), found }; }, gain, view, room("zplane"));
   }
   async function inSlices(work, of) {
     for (;;) {
