@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import find_peaks
 
 from tfarm.records import record
 from tfarm.response.signals import Signals
@@ -39,6 +38,8 @@ class Features:
 
 def features_of(data: Measured, sigma: Real) -> Features:
     """Those of a measured response that stand out of its noise."""
+    from scipy.signal import find_peaks  # here, because it takes half a second to load
+
     level = np.log(np.maximum(abs(data.values), np.finfo(float).tiny))
     noise = np.minimum(sigma / np.maximum(abs(data.values), np.finfo(float).tiny), 10.0)
 
@@ -55,6 +56,8 @@ def near_zeros(here: Around, data: Measured) -> list[tuple[Real, Real]]:
 
     From where they are without the links' damping, smallest values on a grid, Newton's method leads to the zeros.
     """
+    from scipy.signal import find_peaks
+
     driven = drive_behind(here.arm, data.input)
     names = tuple(dict.fromkeys(each for each in (data.output, data.input) if each != driven))
     signals = Signals(driven_by(here.arm, driven), names)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.errors import ConvergenceError
@@ -49,7 +49,8 @@ def possible(fit: Fit, count: int = ARMS, seed: int = SEED) -> Possible:
     found, rng = fit.solution, np.random.default_rng(seed)
     sizes, axes = principal_axes(found.jacobian)
     spread = np.minimum(1.0 / np.maximum(sizes, 1e-300), OPEN)
-    most = found.chi_squared + float(chi2.ppf(FARTHEST, found.point.size)) + 2 * int((sizes < 1 / OPEN).sum())
+    apart = 2.0 * float(gammaincinv(found.point.size / 2, FARTHEST))  # the quantile of chi squared
+    most = found.chi_squared + apart + 2 * int((sizes < 1 / OPEN).sum())
     kept: list[Real] = []
     for _ in range(TRIES * count):
         point = found.point + axes.T @ (spread * rng.standard_normal(spread.size))

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from tfarm.errors import ParameterError
 from tfarm.records import record
@@ -121,7 +121,7 @@ def is_explained(one: Solution) -> bool | None:
     """Whether noise alone gives such a sum often enough; None where its size was taken from the residuals."""
     if not all(each.noise.is_known for each in one.problem.responses):
         return None
-    return bool(chi2.sf(one.chi_squared, max(one.freedom, 1)) > EXPLAINED)
+    return bool(chdtrc(max(one.freedom, 1), one.chi_squared) > EXPLAINED)
 
 
 def settled(problem: Problem, start: Real, held: dict[int, float] | None = None) -> Solution:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
-from scipy.stats import norm, t
+from scipy.special import ndtri, stdtrit
 
 from tfarm.records import record
 
@@ -149,7 +149,7 @@ def _quantile(found: Solution) -> float:
     """Of the normal distribution, or Student's where the noise was taken from the residuals."""
     known = all(each.noise.is_known for each in found.problem.responses)
     share = 0.5 + LEVEL / 2
-    return float(norm.ppf(share) if known else t.ppf(share, max(found.freedom, 1)))
+    return float(ndtri(share) if known else stdtrit(max(found.freedom, 1), share))
 
 
 def _end(found: Solution, n: int, way: int, deviation: float, quantile: float, held: dict[int, float]) -> float:
