@@ -22,13 +22,14 @@ from tests.hostile import LONG, NAME, PRINTED, check_drawing, check_page
 from tests.report.coarse import coarsen
 from tests.report.full import ARM
 from tests.shell import run
+from tfarm import processes
 from tfarm.arm import to_toml
 from tfarm.audit.published import validate
 from tfarm.cli import tables as cli_tables
 from tfarm.digits import plain
 from tfarm.dsp import Chain, load_chain
 from tfarm.report import card as card_room
-from tfarm.report import making, readme_pictures, trust, unchanged, workers, write, writing
+from tfarm.report import making, readme_pictures, trust, unchanged, write, writing
 from tfarm.report.card import written_cards
 from tfarm.report.frame import first_sentence
 from tfarm.report.given_laws import GivenLaw, Subject
@@ -636,9 +637,9 @@ def test_a_plain_script_starts_no_processes(monkeypatch):
         __spec__ = None
 
     monkeypatch.setitem(sys.modules, "__main__", Script())
-    assert not workers.may_start_processes()
+    assert not processes.may_start_processes()
     monkeypatch.delattr(Script, "__file__")
-    assert workers.may_start_processes()
+    assert processes.may_start_processes()
 
 
 # ------------------------------------------------------------ odd arms, the README
@@ -670,10 +671,9 @@ def test_the_pictures_of_the_readme(tmp_path):
 POOL = """
 import os, time
 from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
-from tfarm.report.workers import leave_with_parent
+from tfarm.processes import leave_with_parent, load_beforehand
 if __name__ == "__main__":
-    pool = ProcessPoolExecutor(1, get_context("spawn"), leave_with_parent)
+    pool = ProcessPoolExecutor(1, load_beforehand(["tfarm.errors"]), leave_with_parent)
     print(pool.submit(os.getpid).result(), flush=True)
     time.sleep(60)
 """

@@ -166,6 +166,10 @@ def report(
 
     With gains, or laws, or a [law] in an arm's file, the pages are about these; else about the default gains.
     """
+    from tfarm.processes import load_beforehand
+
+    if only is None:
+        load_beforehand(["tfarm.report.making"])
     import tfarm
 
     names = arms or tfarm.presets()

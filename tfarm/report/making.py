@@ -13,6 +13,7 @@ from operator import itemgetter
 from pathlib import Path
 
 from tfarm.errors import TfarmError
+from tfarm.processes import may_start_processes, shared
 from tfarm.report.card import save_card
 from tfarm.report.given_laws import Subject
 from tfarm.report.live import is_live, save_live
@@ -21,7 +22,6 @@ from tfarm.report.sections import SavedSection, Section, save_section
 from tfarm.report.trust import Evidence, gather
 from tfarm.report.trust_proofs import save_proof
 from tfarm.report.words import typeset
-from tfarm.report.workers import may_start_processes, shared
 
 Progress = Callable[[int, int, str], object]
 
@@ -79,7 +79,7 @@ def _results(
         i, piece = task
         return pool.submit(make, subjects[i], piece, folders[i])
 
-    yield from shared(_by_arm(subjects, tasks), submit, WORKERS)
+    yield from shared(_by_arm(subjects, tasks), submit, WORKERS, [__name__])
 
 
 def _by_arm(subjects: Sequence[Subject], tasks: Sequence[Task]) -> list[list[Task]]:

@@ -7,7 +7,7 @@ from concurrent.futures import Executor, Future
 
 import pytest
 
-from tfarm.report.workers import BLAS, one_thread_each, shared
+from tfarm.processes import BLAS, one_thread_each, shared
 
 
 class Steps:
@@ -34,7 +34,7 @@ def by_turns(monkeypatch):
         future.set_result(task.upper())
         return type("Done", (), {"done": {future}})
 
-    monkeypatch.setattr("tfarm.report.workers.wait", wait)
+    monkeypatch.setattr("tfarm.processes.wait", wait)
     return steps
 
 

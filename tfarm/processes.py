@@ -7,33 +7,38 @@ for the other at the end.
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from contextlib import ExitStack, contextmanager
-from multiprocessing import get_context, parent_process
+from multiprocessing import forkserver, get_context, parent_process
 from multiprocessing.context import BaseContext
-from threading import Thread
+from threading import Thread, current_thread, main_thread
 from typing import TypeVar
 
 BLAS = "OPENBLAS_NUM_THREADS"
+LOADS_ONCE = sys.platform == "linux"  # macOS' own libraries do not bear a fork, and Windows has none
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 
 
 def shared(
-    lists: Sequence[Sequence[Task]], submit: Callable[[Executor, Task], Future[Result]], workers: int
+    lists: Sequence[Sequence[Task]],
+    submit: Callable[[Executor, Task], Future[Result]],
+    workers: int,
+    modules: Sequence[str] = (),
 ) -> Iterator[tuple[Task, Result]]:
-    """Each task of the lists with its result, as it comes.  `submit` hands one to a process.
+    """Each task of the lists with its result, as it comes.  `submit` hands one to a process, which has the `modules`.
 
     What a task raises is raised here, when those that run have ended; the others are not begun.
     """
     waiting = deque(deque(each) for each in lists)
     with ExitStack() as stack:
         stack.enter_context(one_thread_each())
-        context = _prepared()
+        context = load_beforehand(modules)
         pools = [ProcessPoolExecutor(1, context, leave_with_parent) for _ in range(workers)]
         for pool in pools:
             stack.callback(pool.shutdown, wait=True, cancel_futures=True)
@@ -52,16 +57,32 @@ def shared(
             yield from ((task, result) for result, _, task in ended)
 
 
-def _prepared() -> BaseContext:
-    """How processes are started: on Linux from one that has loaded what they all need, elsewhere each anew.
+def load_beforehand(modules: Sequence[str]) -> BaseContext:
+    """How processes are started: on Linux from one that loads the modules for all of them, elsewhere each anew.
 
-    (None is forked from the caller's own, whose threads it would not have.)
+    That one begins at once, while this process may still be busy.  (None is forked from the caller's own, whose threads
+    it would not have.)
     """
-    if sys.platform != "linux":
+    if not LOADS_ONCE:
         return get_context("spawn")
     context = get_context("forkserver")
-    context.set_forkserver_preload(["tfarm.report.pieces"])
+    context.set_forkserver_preload(list(modules))
+    with _deaf_to_interrupts():
+        forkserver.ensure_running()
     return context
+
+
+@contextmanager
+def _deaf_to_interrupts() -> Iterator[None]:
+    """New processes ignore Ctrl-C, which would stop them amid their imports with a traceback."""
+    if current_thread() is not main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _next(own: list[deque[Task]], i: int, waiting: deque[deque[Task]]) -> Task | None:
@@ -90,7 +111,11 @@ def one_thread_each() -> Iterator[None]:
 
 
 def leave_with_parent() -> None:
-    """In a worker: end when the process that started it is gone; a pool's workers would wait for work for ever."""
+    """In a worker: end when the process that started it is gone; a pool's workers would wait for work for ever.
+
+    Ctrl-C stops what it does.
+    """
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     parent = parent_process()
 
     def leave() -> None:
