@@ -36,7 +36,7 @@ GAINS, MOVES = 10, 30
 INTERACTIVE, MOVE = 1.0, 0.15  # s: what they should take; printed, and asserted with room for a busy machine
 BUSY = 5.0
 LARGEST_TURN = 5.0  # deg, of the line of a locus at a point of it
-CHART, SEEN = (420.0, 340.0), 1.5  # pixels: a chart of poles at its largest, and a piece whose ends are seen
+SEEN = 1.5  # pixels: a piece of a line whose ends are seen
 NAMES = ("phase", "phase_lag", "phase_lead", "delay", "disk", "peak_sensitivity", "peak_complementary")
 
 
@@ -202,10 +202,10 @@ def test_sampled_loop_and_slew_at_ten_gains_are_what_tfarm_prints(browser, folde
         assert not opened.said
 
 
-def seen_turns(rows: list[dict[str, float]], frame: dict[str, list[float]]) -> Real:
+def seen_turns(rows: list[dict[str, float]], frame: dict[str, list[float]], chart: list[float]) -> Real:
     """How far [deg] the lines through these rows turn at each point in the frame, between pieces one of which is seen.
 
-    Left out is where a line comes to the real axis or leaves it: a true corner.
+    `chart`: its width and height in pixels.  Left out is where a line comes to the real axis or leaves it: a true corner.
     """
     found: list[Real] = []
     (left, right), (low, high) = frame["x"], frame["y"]
@@ -213,7 +213,7 @@ def seen_turns(rows: list[dict[str, float]], frame: dict[str, list[float]]) -> R
         line = sorted((row for row in rows if row["piece"] == number), key=lambda row: row["gain"])
         s = np.array([complex(row["re"], row["im"]) for row in line])
         x, y = (s.real - left) / (right - left), (s.imag - low) / (high - low)
-        step = np.diff(CHART[0] * x + 1j * CHART[1] * y)
+        step = np.diff(chart[0] * x + 1j * chart[1] * y)
         is_real = abs(s.imag) < 1e-9 * (high - low)
         inside = (x > 0) & (x < 1) & (y >= 0) & (y < 1)
         told = inside[1:-1] & ~is_real[1:-1] & ~is_real[:-2] & ~is_real[2:]
@@ -234,8 +234,8 @@ def test_loci_have_the_poles_of_their_gains(browser, folder, name):
         band = page.evaluate("live.loop.band")
         rows, discs = page.evaluate("[live.now.locus, live.now.discs]")
         disc = {"x": [-1.25, 1.25], "y": [-1.25, 1.25]}
-        for each, frame in ((rows, page.evaluate("live.now.frame")), (discs, disc)):
-            turns = seen_turns(each, frame)
+        for chart, each, frame in (("poles", rows, page.evaluate("live.now.frame")), ("zplane", discs, disc)):
+            turns = seen_turns(each, frame, page.evaluate(f"live.room('{chart}')"))
             assert turns.size > 5
             assert turns.max() <= LARGEST_TURN
         for row in rows[:: len(rows) // 6]:

@@ -278,7 +278,7 @@
   for (const id of ["vary", "shown"]) $(id).addEventListener("change", () => set({}));
   addEventListener("resize", () => { Object.keys(views).forEach(fit); set({}); });
   const sensor = data.sensor && makeSensor(data.sensor, colours), player = slew && makePlayer(slew, colours, now.run);
-  window.live = { loop, discrete, slew, law, player, sensor, moves: [], set, get now() { return now; }, rested: null };
+  window.live = { loop, discrete, slew, law, player, sensor, moves: [], set, room, get now() { return now; }, rested: null };
   show();
   const watcher = new IntersectionObserver(entries => {
     const came = entries.filter(each => each.isIntersecting).map(each => each.target.id);
