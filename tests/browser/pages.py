@@ -22,6 +22,7 @@ from tfarm.arm import Arm, HubFeedback
 from tfarm.dsp import Chain, load_chain, sampled_verdict
 from tfarm.dsp.results import simulated_answer
 from tfarm.loop.margins import LoopMargins, margins
+from tfarm.loop.regions import region
 from tfarm.loop.stability import stability
 from tfarm.report import write
 from tfarm.report.given_laws import Subject
@@ -205,7 +206,7 @@ def test_sampled_loop_and_slew_at_ten_gains_are_what_tfarm_prints(browser, folde
 def seen_turns(rows: list[dict[str, float]], frame: dict[str, list[float]], chart: list[float]) -> Real:
     """How far [deg] the lines through these rows turn at each point in the frame, between pieces one of which is seen.
 
-    `chart`: its width and height in pixels.  Left out is where a line comes to the real axis or leaves it: a true corner.
+    `chart`: its width and height in pixels.  Left out is where a line meets the real axis: a true corner.
     """
     found: list[Real] = []
     (left, right), (low, high) = frame["x"], frame["y"]
@@ -251,6 +252,27 @@ def test_loci_have_the_poles_of_their_gains(browser, folder, name):
         x, y = ((pole[i] - pole[2][k][0]) / (pole[2][k][1] - pole[2][k][0]) for i, k in enumerate("xy"))
         page.mouse.move(box["x"] + box["width"] * (0.13 + 0.85 * x), box["y"] + box["height"] * (0.03 + 0.85 * (1 - y)))
         page.wait_for_function("document.getElementById('poles-reading').textContent.includes('K2 = ')")
+        assert not opened.said
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_the_region_of_a_hub_that_is_held_is_the_librarys(browser, folder, name):
+    """Its ends at a few of the page's K1 against `tfarm.map` there; the sampled region is shown as that of Kp = 0."""
+    arm = tfarm.load(name)
+    with Opened(browser, folder / name / "live.html") as opened:
+        page = opened.page
+        axes = page.evaluate("live.loop.axes")
+        set_gains(page, HubFeedback(**page.evaluate("live.loop.start")).having("Kp", 0.02 * axes["Kp"]["high"]))
+        page.wait_for_function("live.now.areas")
+        areas, Kp = page.evaluate("[live.now.areas, live.now.law.Kp]")
+        assert {row["what"] for row in areas} == {"stable, continuous"}
+        columns = sorted({row["K1"] for row in areas})[3 :: len(areas) // 5]
+        known = region(arm, np.array(columns), np.array([axes["K2"]["low"], axes["K2"]["high"]]), Kp)
+        for gain, intervals in zip(columns, known.stable_intervals, strict=True):
+            here = [(row["low"], row["high"]) for row in areas if row["K1"] == gain]
+            cut = [(max(row[0], axes["K2"]["low"]), row[1]) for row in here]
+            np.testing.assert_allclose(cut, intervals, rtol=1e-6)
+        assert "Grey: the sampled region at Kp = 0" in page.locator("#map-note").inner_text()
         assert not opened.said
 
 

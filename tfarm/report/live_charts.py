@@ -233,10 +233,12 @@ def _map() -> Any:
     legend = alt.Legend(symbolType="square", columns=1, labelLimit=260)
     colour = alt.Color("what:N", scale=alt.Scale(domain=keys, range=[ORANGE, BLUE]), title=None, legend=legend)
     areas = alt.Chart(_data("areas")).mark_area(opacity=0.28, clip=True)
+    stale = alt.Chart(_data("stale")).mark_area(color=GREY, opacity=0.22, clip=True)
     edge = alt.Chart(_data("edge")).mark_line(color=ORANGE, strokeWidth=1, clip=True)
     proven = alt.Chart(_data("proven")).mark_line(color=GREEN, strokeWidth=1.5, strokeDash=[5, 3], clip=True)
     here = alt.Chart(_data("here"))
     layers = (
+        stale.encode(x=x, y=low, y2="high:Q", detail="part:N"),
         areas.encode(x=x, y=low, y2="high:Q", color=colour, detail="part:N"),
         edge.encode(x=x, y=y, order="w:Q", detail="piece:N"),
         proven.encode(x=x, y=y, order="t:Q"),

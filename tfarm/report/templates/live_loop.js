@@ -92,16 +92,30 @@ class LiveLoop {
   }
 
   crossed(from, to) {
+    return this.crossings(from, to).reduce((n, each) => n + each.change, 0);
+  }
+
+  // Where on the straight way between two laws, 0 to 1, a pair of poles crosses the axis, and by how much it changes the count
+  crossings(from, to) {
     const way = { K1: to.K1 - from.K1, K2: to.K2 - from.K2, Kp: to.Kp - from.Kp };
-    if (!(way.K1 || way.K2 || way.Kp)) return 0;
+    if (!(way.K1 || way.K2 || way.Kp)) return [];
     const both = point => { const [drive, N] = this.parts(point, from); return [add(drive, N), this.parts(point, way)[1]]; };
     const h = point => { const [a, b] = both(point); return a[1] * b[0] - a[0] * b[1]; };
-    let n = 0;
-    for (const point of this.zeros(this.base, h)) {
-      const t = -div(...both(point))[0];
-      if (t > 0 && t < 1) n += point.change;
+    return this.zeros(this.base, h).map(point => ({ t: -div(...both(point))[0], change: point.change })).filter(({ t }) => t > 0 && t < 1);
+  }
+
+  // The intervals of K2 from low to high in which no pole of the band is unstable, and beyond it not every mode is driven
+  intervals(K1, Kp, low, high) {
+    const at = t => low + t * (high - low), from = { K1, K2: low, Kp }, found = this.crossings(from, { K1, K2: high, Kp }).sort((a, b) => a.t - b.t);
+    const driven = this.told && this.hub_alone && this.kind === "band", end = driven && K1 + this.rate_loss > 0 ? this.whole : Infinity;
+    const rows = [];
+    let n = this.count(from), begin = n ? null : 0;
+    for (const { t, change } of [...found, { t: 1, change: 0 }]) {
+      n += change;
+      if (begin !== null && (n || t === 1)) { rows.push([at(begin), Math.min(at(t), end)]); begin = null; }
+      else if (begin === null && !n) begin = t;
     }
-    return n;
+    return driven && K1 + this.rate_loss < 0 ? [] : rows.filter(([a, b]) => a < b);
   }
 
   // [verdict, why]; never "stable" for what is not known

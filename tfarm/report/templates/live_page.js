@@ -15,7 +15,7 @@
   const views = {}, inView = new Set(), charts = {
     map: (now, fine) => ({
       here: [{ K1: now.law.K1, K2: now.law.K2 }],
-      ...(views.map && mapped === now.law.Kp ? {} : { edge: loop.kind === "reactive" ? [] : edgeOf(w => loop.boundary(loop.at(w), now.law), loop.base.map(point => point.w), data.axes), areas: now.law.Kp ? [] : areas(), proven: proven() }),
+      ...(views.map && mapped === now.law.Kp ? {} : { edge: loop.kind === "reactive" ? [] : edgeOf(w => loop.boundary(loop.at(w), now.law), loop.base.map(point => point.w), data.axes), areas: now.areas || [], stale: stale(now.law), proven: proven() }),
     }),
     poles: now => ({ poles: now.near.map(([re, im]) => ({ re, im, Hz: general(hertz(im), 5), "damping ratio": dampingRatio([re, im]) })), rays: rays(now.frame), locus: now.locus || [], pointed: [] }),
     zplane: now => ({
@@ -72,10 +72,11 @@
     views[name].width(width);
     if (height) views[name].height(height);
   }
-  const areas = () => {
-    const rows = (what, list) => list.map(row => ({ ...row, what, part: `${what}${row.part}` }));
-    return [...rows("stable, continuous", data.continuous), ...rows("stable, sampled", data.sampled_map ? data.sampled_map.areas : [])];
-  };
+  const area = (what, list) => list.map(row => ({ ...row, what, part: `${what}${row.part}` })), sampledArea = () => data.sampled_map ? data.sampled_map.areas : [];
+  const continuousArea = list => area("stable, continuous", list);
+  // The regions where they are known at once: the sampled one is known at Kp = 0 alone, and Kp > 0 moves no edge of a lossless loop
+  const areas = ({ Kp }) => !Kp ? [...continuousArea(data.continuous), ...area("stable, sampled", sampledArea())] : loop.kind === "reactive" ? continuousArea(data.continuous) : null;
+  const stale = ({ Kp }) => Kp ? area("of Kp = 0", sampledArea()) : [];
   const proven = () => data.lyapunov ? [[0, data.axes.K2.low], [0, 1], [data.axes.K1.high, 1]].map(([K1, K2], t) => ({ K1, K2, t })) : [];
   let mapped = null; // of which Kp the map shows the curve
 
@@ -89,7 +90,7 @@
     const lowest = Math.min(loop.places[0] / 200, ...(margins ? margins.crossed.map(row => row.w / 3) : []));
     const left = 1.15 * Math.min(...near.map(s => s[0]), -1e-4 * top), right = Math.max(-0.05 * left, 1.3 * Math.max(...near.map(s => s[0])));
     return {
-      law, poles, verdict, why, margins, near, frame: { x: [left, right], y: [0, top] },
+      law, poles, verdict, why, margins, near, areas: now?.law.Kp === law.Kp ? now.areas : areas(law), frame: { x: [left, right], y: [0, top] },
       z: discrete && discrete.poles(law, now?.z), run: slew && slew.run(law), curve: fine => drawn[fine] ||= curveOf(loop, law, points, fine, lowest),
     };
   }
@@ -184,22 +185,25 @@
     if (name === "map") mapped = now.law.Kp;
     return view.runAsync();
   }
-  // All points, and then the loci of the charts in view, a few gains at a time
-  const LOCI = [["poles", "locus", inS], ["zplane", "discs", inZ]];
+  // All points, and then the region and the loci of the charts in view, a few gains at a time
+  const WORK = [["map", "areas", inPlane, "areas"], ["poles", "locus", inS, "locus"], ["zplane", "discs", inZ, "locus"]];
   async function rest(of) {
     if (of.resting) return;
     of.resting = true;
     await keepUp(true);
-    for (let next; (next = LOCI.find(([name, key]) => views[name] && (name === "poles" || inView.has(name)) && !of[key]));) {
-      const [name, key, work] = next, found = await inSlices(work(), of);
+    for (let next; (next = WORK.find(([name, key]) => views[name] && (name === "poles" || inView.has(name)) && !of[key]));) {
+      const [name, key, work, set] = next, found = await inSlices(work(), of);
       if (!found) return;
       of[key] = found;
-      await views[name].data("locus", found).runAsync();
+      await views[name].data(set, found).runAsync();
     }
     of.resting = false;
     window.live.rested = of.law;
   }
   const along = gain => [share => gainAt(data.axes[gain], share, 8), K => ({ ...now.law, [gain]: K })];
+  function* inPlane() {
+    return continuousArea(yield* regionOf(loop, now.law.Kp, data.axes));
+  }
   function inS() {
     const [gain, law] = along($("vary").value), { frame } = now;
     return locus((K, before) => { const found = loop.poles(law(K), before?.found, frame.y[1]); return { points: [...found], found }; }, gain, frame, room("poles"));

@@ -88,6 +88,34 @@ function edgeOf(at, frequencies, { K1, K2 }) {
   return found;
 }
 
+// The stable region at one Kp, by intervals of K2 at values of K1 that are halved where a part begins or ends: a generator that yields before each
+const SLICES = 80, CLOSER = 5; // values of K1, and halvings between two of them
+function* regionOf(loop, Kp, { K1, K2 }) {
+  const column = share => { const gain = gainAt(K1, share, 12); return { share, gain, rows: loop.intervals(gain, Kp, K2.low, K2.high) }; };
+  const goesOn = (a, b) => a.rows.length === b.rows.length && a.rows.every(([low, high], i) => low < b.rows[i][1] && b.rows[i][0] < high);
+  const found = [];
+  function* between(a, b, depth) {
+    if (!depth || goesOn(a, b)) return;
+    yield;
+    const middle = column((a.share + b.share) / 2);
+    yield* between(a, middle, depth - 1);
+    found.push(middle);
+    yield* between(middle, b, depth - 1);
+  }
+  for (let k = 0, last = null; k <= SLICES; k++) {
+    yield;
+    const next = column((k + 0.003) / (SLICES + 0.006)); // K1 = 0 may be an edge
+    if (last) yield* between(last, next, CLOSER);
+    found.push(next);
+    last = next;
+  }
+  let part = 0;
+  return found.flatMap((each, k) => {
+    if (k && !goesOn(found[k - 1], each)) part += 1000;
+    return each.rows.map(([low, high], i) => ({ part: part + i, K1: each.gain, low, high }));
+  });
+}
+
 // Rows of a signal over time: as it is where a screen can show that, else its least and largest value in each pixel
 function shownOver(t, y, pixels) {
   if (t.length <= 2 * pixels) return t.map((each, i) => ({ t: each, y: y[i], i }));
