@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, HubFeedback, Section
+from tfarm.arm import MOMENT_GAIN, Arm, HubFeedback, Section
 from tfarm.arm.checks import positive
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop.stability import stability
@@ -76,10 +76,11 @@ class HubStudy:
 
 @dataclass(frozen=True, slots=True)
 class LoopVerdict:
-    """What becomes of the default loop: "stable", "marginal", "unstable" or "undecided", and the upper edge of K2.
+    """What becomes of the default loop: "stable", "marginal", "unstable" or "undecided", and the upper edge of
+    the gain on the moment.
 
     `K2_below` is None where the loop is not stable.  `is_edge`: whether poles reach the axis there; the search for
-    such a K2 may have ended before.
+    such a gain may have ended before.
     """
 
     verdict: str
@@ -90,7 +91,7 @@ class LoopVerdict:
 def loop_verdicts(study: SectionStudy | HubStudy) -> tuple[LoopVerdict, ...] | None:
     """The verdict on each candidate under the default gains of the arm itself.
 
-    None where the hub is locked or a free pin: K2 has no loop there.
+    None where the hub is locked or a free pin: the moment has no loop there.
     """
     if not all(has_hub_inertia(arm) for arm in study.arms):
         return None
@@ -101,7 +102,7 @@ def loop_verdicts(study: SectionStudy | HubStudy) -> tuple[LoopVerdict, ...] | N
 def _loop_verdict(arm: Arm, law: HubFeedback) -> LoopVerdict:
     try:
         found = stability(arm, law)
-        windows = gain_windows(found, "K2")
+        windows = gain_windows(found, MOMENT_GAIN)
     except ConvergenceError:
         return LoopVerdict("undecided", None)
     if windows.around is None:

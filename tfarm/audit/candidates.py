@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
-from tfarm.arm import Arm
+from tfarm.arm import MOMENT_GAIN, PLANE, Arm
 from tfarm.columns import ANSWER, JSON, REPORT, TERMINAL, Column, Table
 from tfarm.digits import fixed, general, plain, significant, singly
 from tfarm.errors import ParameterError
@@ -28,7 +28,7 @@ Study = SectionStudy | HubStudy
 HELD_SECTION = "area, shear factor and all else held: I = A depth^2/12, so one per cent of depth counts twice"
 HELD_HUB = "all else held"
 OWN = "#eaf1f8"  # on a page behind the row of the arm itself
-EDGE = "-"  # where no K2 is stable
+EDGE = "-"  # where no gain on the moment is stable
 
 
 def _tints(study: Study) -> list[str]:
@@ -74,25 +74,27 @@ def _modes(study: Study, parameter: str) -> Iterator[Column]:
 
 
 def loop_columns(study: Study, found: tuple[LoopVerdict, ...] | None) -> Iterator[Column]:
-    """The verdict on the default loop, and up to which K2 it stays stable; not on a page where there is no loop."""
+    """The verdict on the default loop, and up to which gain on the moment it stays stable; not on a page where there is no loop."""
     verdicts = found or (LoopVerdict("no loop", None),) * len(study.arms)
     law, edges = default_gains(study.arm), [each.K2_below for each in verdicts]
-    group = f"loop at K1 = {plain(law.K1, 4)}, K2 = {plain(law.K2, 4)}"
+    group = f"loop at {', '.join(law.told(lambda gain: plain(gain, 4)))}"
     everywhere = (*ANSWER, *REPORT) if found else ANSWER
     words = [each.verdict for each in verdicts]
     yield Column("verdict", "verdict", of=words, head="loop", group=group, tint=_tints, on=everywhere)
-    shown = [EDGE if K2 is None else general(K2, 6) for K2 in edges]
-    yield Column("K2_below", of=edges, head="K2 below", shown=shown, on=ANSWER)
+    shown = [EDGE if edge is None else general(edge, 6) for edge in edges]
+    yield Column("K2_below", of=edges, head=f"{MOMENT_GAIN} below", shown=shown, on=ANSWER)
     yield Column("K2_below_is_edge", of=[each.is_edge for each in verdicts], on=(JSON,))
     if found:
         texts = [EDGE if each.K2_below is None else _edge(each.K2_below, each.is_edge) for each in found]
-        values = ["" if K2 is None else K2 for K2 in edges]
-        yield Column("K2_below", "stable below K2", of=values, shown=texts, group=group, tint=_tints, on=REPORT)
+        values = ["" if edge is None else edge for edge in edges]
+        yield Column(
+            "K2_below", f"stable below {MOMENT_GAIN}", of=values, shown=texts, group=group, tint=_tints, on=REPORT
+        )
 
 
-def _edge(K2: float, is_edge: bool) -> str:
+def _edge(gain: float, is_edge: bool) -> str:
     """An edge, or with a star the end of a search that found none."""
-    return significant(K2, 6) if is_edge else f"{plain(K2, 6)}*"
+    return significant(gain, 6) if is_edge else f"{plain(gain, 6)}*"
 
 
 def assumptions_answer(arm: Arm, count: int = COUNT) -> dict[str, Any]:
@@ -122,4 +124,10 @@ def assumptions_answer(arm: Arm, count: int = COUNT) -> dict[str, Any]:
             "pinned_rad_s": study.pinned.tolist(),
         }
     law = default_gains(arm)
-    return {"arm": arm.name, "count": count, "gains": {"K1": law.K1, "K2": law.K2}, "section": section, "hub": hub}
+    return {
+        "arm": arm.name,
+        "count": count,
+        "gains": {name: law[name] for name in PLANE},
+        "section": section,
+        "hub": hub,
+    }

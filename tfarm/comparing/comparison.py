@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, HubFeedback, must_be_arm
+from tfarm.arm import ANGLE_GAIN, PLANE, Arm, HubFeedback, must_be_arm
 from tfarm.arm.checks import whole
 from tfarm.arm.driving import AnyLaw, through
 from tfarm.arm.law import Law
@@ -38,8 +38,8 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 MOST_MODES = 30
 LONGEST = 60  # characters of a name: of two in one legend
 SPARE = 6  # poles with Im s >= 0 beyond the modes: real ones, those of the hub, the motor and a law
-COLUMNS, ROWS = 80, 40  # of the plane of K1 and K2; its edges along K2 are exact
-NEXT = 1e-6  # of the largest K1: where the first column beyond K1 = 0 is, from which most regions begin
+COLUMNS, ROWS = 80, 40  # of the plane of both gains; its edges upwards are exact
+NEXT = 1e-6  # of the largest rate gain: where the first column beyond 0 is, from which most regions begin
 ROOM = 1.5  # how far the plane reaches beyond the laws' own gains
 PLAIN = 40  # values along each axis of the plane of a factor and a delay
 MOST_FACTOR, LONGEST_DELAY = 4.0, 0.02  # where that plane ends: factor on the law, delay [s] where no law has more
@@ -140,7 +140,7 @@ class Comparison:
 
     @cached_property
     def regions(self) -> tuple[Region, Region] | None:
-        """The plane of K1 and K2 for each, on one grid that holds both laws; None where a law is not these gains."""
+        """The plane of both gains for each, on one grid that holds both laws; None where a law is not these gains."""
         laws = [side.law for side in self.sides if isinstance(side.law, HubFeedback)]
         if len(laws) < 2:
             return None
@@ -151,10 +151,10 @@ class Comparison:
                 max([pair[n][1] for pair in ranges] + [ROOM * law[name] for law in laws]),
                 number,
             )
-            for n, (name, number) in enumerate((("K1", COLUMNS), ("K2", ROWS)))
+            for n, (name, number) in enumerate(zip(PLANE, (COLUMNS, ROWS), strict=True))
         )
         x = np.union1d(x, [NEXT * x[-1]])
-        first, second = (region(side.arm, x, y, law.Kp) for side, law in zip(self.sides, laws, strict=True))
+        first, second = (region(side.arm, x, y, law[ANGLE_GAIN]) for side, law in zip(self.sides, laws, strict=True))
         return first, second
 
     @cached_property
@@ -225,7 +225,7 @@ def _names(pairs: list[tuple[Arm, AnyLaw]]) -> tuple[str, ...]:
     """The arms' names where they differ, else the laws', else their numbers."""
     arms = [one_line(arm.name, LONGEST) for arm, _ in pairs]
     laws = [
-        one_line(law.name, LONGEST) if isinstance(law, Law) else f"K1 = {law.K1:.4g}, K2 = {law.K2:.4g}"
+        one_line(law.name, LONGEST) if isinstance(law, Law) else ", ".join(law.told("{:.4g}".format))
         for _, law in pairs
     ]
     return tuple(next((names for names in (arms, laws) if names[0] != names[1]), ["first", "second"]))

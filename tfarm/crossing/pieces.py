@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 Real = NDArray[np.float64]
 Window = tuple[float, float]
-Slice = tuple[float, float, float]  # K1, and an interval of K2 there
+Slice = tuple[float, float, float]  # a value of the gain across, and an interval of the other there
 
 
 @dataclass
 class RegionPiece:
-    """A part of a region to fill: (K1, low, high) from column to column.
+    """A part of a region to fill: (across, low, high) from column to column.
 
     `begins`, `ends`: whether the region itself does at that side, and not only the piece.
     """
@@ -26,11 +26,11 @@ class RegionPiece:
     ends: bool = True
 
 
-def pieces(K1: Real, intervals: Sequence[Sequence[Window]]) -> list[RegionPiece]:
+def pieces(across: Real, intervals: Sequence[Sequence[Window]]) -> list[RegionPiece]:
     """The region cut into parts with one interval a column; where intervals part or join, parts meet without a gap."""
     done: list[RegionPiece] = []
     going: list[RegionPiece] = []
-    for gain, column in zip(K1, intervals, strict=True):
+    for gain, column in zip(across, intervals, strict=True):
         here = [(float(gain), low, high) for low, high in column]
         last = [piece.points[-1] for piece in going]
         parents = [[i for i, one in enumerate(last) if _overlap(one, each)] for each in here]

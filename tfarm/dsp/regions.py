@@ -38,6 +38,11 @@ class GainMap:
     crossings: list[Crossings]
 
     @property
+    def axes(self) -> tuple[Real, Real]:
+        """The values of both gains: across the plane, and up it."""
+        return self.K1, self.K2
+
+    @property
     def modes_used(self) -> int:
         """How many flexible modes the loop has."""
         return self.loop.plant.count

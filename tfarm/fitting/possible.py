@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaincinv
 
-from tfarm.arm import Arm, HubFeedback
+from tfarm.arm import MOMENT_GAIN, Arm, HubFeedback
 from tfarm.errors import ConvergenceError
 from tfarm.loop.margins import margins
 from tfarm.loop.regions import region
@@ -86,7 +86,7 @@ def loop_on_all(those: Possible, law: HubFeedback) -> LoopOnAll:
     def column(name: str) -> Real:
         return np.array([float(value) for each in bands if (value := getattr(each, name, None)) is not None])
 
-    ups = [each.windows["K2"].around for each in found if each.in_band is not None]
+    ups = [each.windows[MOMENT_GAIN].around for each in found if each.in_band is not None]
     return LoopOnAll(
         law=law,
         stable=len(bands),
@@ -98,9 +98,9 @@ def loop_on_all(those: Possible, law: HubFeedback) -> LoopOnAll:
     )
 
 
-def share_stable(those: Possible, K1: Real, K2: Real) -> Real:
-    """The share of the arms on which gains hold (len(K2), len(K1)), without a clock."""
-    return np.asarray(np.mean([region(arm, K1, K2).unstable == 0 for arm in those.arms], axis=0))
+def share_stable(those: Possible, across: Real, up: Real) -> Real:
+    """The share of the arms on which both gains hold (up, across), without a clock."""
+    return np.asarray(np.mean([region(arm, across, up).unstable == 0 for arm in those.arms], axis=0))
 
 
 def response_band(those: Possible, output: str, omega: Real) -> tuple[Real, Real, Real]:

@@ -58,6 +58,11 @@ class Region:
     crossings: list[Crossings]
 
     @property
+    def axes(self) -> tuple[Real, Real]:
+        """The values of both gains: across the plane, and up it."""
+        return self.K1, self.K2
+
+    @property
     def stable_intervals(self) -> list[list[Window]]:
         """For each K1 the intervals of K2, cut to the map, in which nothing grows: the region with exact edges.
 

@@ -11,7 +11,7 @@ from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
-from tfarm.arm import HubFeedback, unit_of, written_unit
+from tfarm.arm import HubFeedback
 from tfarm.comparing import Comparison
 from tfarm.crossing import pieces
 from tfarm.digits import plain
@@ -21,6 +21,7 @@ from tfarm.response.frequency import Bode
 from .frequency import hertz_axis, magnitude_limits
 from .plane import outline
 from .style import BLUE, GREEN, GREY, INK, ORANGE, New, blank, headline, safe, style, taken, window
+from .words import name_axes
 
 COLOURS = (BLUE, ORANGE)
 DEEPEST = 1e-4  # of 1: how small a loop function is drawn
@@ -30,7 +31,7 @@ HIGHEST = 1e3  # and how large
 def comparison(data: Comparison, *, ax: Sequence[Axes] | None = None) -> tuple[Axes, Axes, Axes]:
     """Magnitude, phase and map of both (what `tfarm.compare` returns), in three axes, those given or new ones: these.
 
-    Of two arms the exact responses, of two laws the loop functions L; the map is that of K1 and K2, with exact edges,
+    Of two arms the exact responses, of two laws the loop functions L; the map is that of both gains, with exact edges,
     or, where a law is more than these gains, of a factor on each law and its delay, counted on a grid.  With a law in z
     all is of the loops at their samples, and the map has the exact factors over further delays.
     """
@@ -122,17 +123,15 @@ def _map(data: Comparison, ax: Axes) -> None:
             _region(found, colour, f"{side.name}: stable", ax)
     for side, colour in zip(data.sides, COLOURS, strict=True):
         if isinstance(side.law, HubFeedback):
-            ax.plot([side.law.K1], [side.law.K2], "o", mfc=colour, mec="white", ms=7.5, zorder=7)
-    arm = data.one.arm
-    ax.set_xlim(first.K1[0], first.K1[-1])
-    ax.set_ylim(first.K2[0], first.K2[-1])
-    ax.set_xlabel(f"K1, gain on the hub rate [{unit_of('K1', arm)}]")
-    ax.set_ylabel(f"K2, gain on the root moment [{written_unit('K2', arm).strip() or '−'}]")
+            ax.plot(*side.law.point, "o", mfc=colour, mec="white", ms=7.5, zorder=7)
+    across, up = first.axes
+    ax.set(xlim=(across[0], across[-1]), ylim=(up[0], up[-1]))
+    name_axes(data.one.arm, ax)
     ax.legend(loc="upper left", bbox_to_anchor=(0.0, -0.1), borderaxespad=0.0)
 
 
 def _region(found: Region, colour: str, label: str, ax: Axes) -> None:
-    for piece in pieces(found.K1, found.stable_intervals):
+    for piece in pieces(found.axes[0], found.stable_intervals):
         x, low, high = np.array(piece.points).T
         ax.fill_between(x, low, high, facecolor=colour, alpha=0.22, lw=0, zorder=1)
         outline(piece, colour, 1.4, 3.0, ax)

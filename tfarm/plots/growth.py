@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
+from tfarm.arm import PLANE
 from tfarm.digits import SUPERSCRIPT, plain
 from tfarm.dsp import Analysis
 from tfarm.dsp.law import ModeTable
@@ -46,7 +47,7 @@ def draw_modes(loop: SampledLoop, table: ModeTable, new: New = blank) -> Figure:
 
 
 def growths(loop: SampledLoop, table: ModeTable, *, ax: Axes) -> None:
-    """The chart; shaded where K1 destabilises to first order."""
+    """The chart; shaded where the rate gain destabilises to first order."""
     w, T = table.natural_frequency, loop.chain.sampling.period
     low, high = 0.7 * float(w[0]), 1.25 * float(w[-1])
     ax.set_xscale("log")
@@ -63,8 +64,12 @@ def growths(loop: SampledLoop, table: ModeTable, *, ax: Axes) -> None:
     ax.axhline(0.0, color=INK, lw=0.9)
     ax.vlines(w, 0, table.log_radius, color=BLUE, lw=1.2, zorder=2)
     ax.plot(w, table.log_radius, "o", color=BLUE, ms=6, label="closed loop, exact", zorder=4)
-    ax.plot(w, table.by_rate, "^", mfc="none", mec=ORANGE, mew=1.3, ms=7, label="by K1, first order", zorder=5)
-    ax.plot(w, table.by_moment, "s", mfc="none", mec=INK, mew=1.1, ms=6, label="by K2, first order", zorder=5)
+    ax.plot(
+        w, table.by_rate, "^", mfc="none", mec=ORANGE, mew=1.3, ms=7, label=f"by {RATE_GAIN}, first order", zorder=5
+    )
+    ax.plot(
+        w, table.by_moment, "s", mfc="none", mec=INK, mew=1.1, ms=6, label=f"by {MOMENT_GAIN}, first order", zorder=5
+    )
     if table.by_damping.any():
         ax.plot(w, table.by_damping, "_", color=GREY, mew=1.6, ms=13, label="own damping", zorder=3)
     ax.yaxis.set_major_formatter(FuncFormatter(_power))

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 from numpy.typing import NDArray
 
+from tfarm.arm import MOMENT_GAIN
 from tfarm.digits import plain, significant
 from tfarm.dsp import GainMap
 from tfarm.loop.regions import Region
@@ -33,12 +34,12 @@ def tuned_gain(found: Tuning, *, ax: Axes | None = None) -> Axes:
         return alone(lambda own: tuned_gain(found, ax=own), (7.0, 4.4), title, new=window).axes[0]
     with style():
         gain(found, ax=ax)
-        ax.set_ylabel("gain on the root moment, K2  [-]")
+        ax.set_ylabel(f"gain on the root moment, {MOMENT_GAIN}  [-]")
     return ax
 
 
 def draw_gain(data: TunerStudy, continuous: Region, sampled: Sequence[GainMap]) -> Figure:
-    """Left the map with the tuner's path and guard, right the gain over time, on the same axis of K2."""
+    """Left the map with the tuner's path and guard, right the gain over time, on the same axis."""
     with style():
         figure = blank(9.0, 4.9)
         left, right = figure.subplots(1, 2, sharey=True, width_ratios=[1.0, 1.35])
@@ -55,10 +56,11 @@ def draw_gain(data: TunerStudy, continuous: Region, sampled: Sequence[GainMap]) 
 
 
 def path(tuning: Tuning, *, ax: Axes) -> None:
-    """The guard as a bar at the loop's K1, and in it the gains that the tuner takes."""
-    K1, guard, K = tuning.plan.K1, tuning.training.guard, tuning.training.result.K
-    ax.plot([K1, K1], [guard.lo, guard.hi], color=GREEN, lw=9, solid_capstyle="butt", alpha=0.75, zorder=6)
-    ax.plot([K1, K1], [float(K.min()), float(K.max())], color=INK, lw=2.4, solid_capstyle="butt", zorder=7)
+    """The guard as a bar at the loop's rate gain, and in it the gains that the tuner takes."""
+    guard, K = tuning.training.guard, tuning.training.result.K
+    at, _ = tuning.trial.loop.gains.point
+    ax.plot([at, at], [guard.lo, guard.hi], color=GREEN, lw=9, solid_capstyle="butt", alpha=0.75, zorder=6)
+    ax.plot([at, at], [float(K.min()), float(K.max())], color=INK, lw=2.4, solid_capstyle="butt", zorder=7)
     for line in ax.lines:
         if line.get_marker() == "o":
             line.remove()

@@ -15,7 +15,7 @@ from matplotlib.ticker import FuncFormatter, NullFormatter, SymmetricalLogLocato
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from tfarm.arm import Arm, HubFeedback, unit_of, written_unit
+from tfarm.arm import MOMENT_GAIN, PLANE, Arm, HubFeedback
 from tfarm.crossing import RegionPiece, pieces
 from tfarm.digits import SUPERSCRIPT, counted, plain, significant
 from tfarm.dsp import GainMap
@@ -26,6 +26,7 @@ from tfarm.spectrum import modes
 
 from .labels import AROUND, UPON, Label
 from .style import BLUE, GREY, INK, ORANGE, PURPLE, New, alone, blank, style, window
+from .words import LYAPUNOV, name_axes
 
 Real = NDArray[np.float64]
 
@@ -38,17 +39,17 @@ MARKS = 7  # frequencies written along the boundary
 DIAMOND, STAR = "D", "*"  # of laws
 AT_RIGHT = tuple((-6.0, up) for up in (4.0, -4.0, 16.0, -16.0, 28.0))  # points, from where a line ends to its words
 HALO: dict[str, Any] = {"facecolor": "white", "edgecolor": "none", "pad": 0.4, "alpha": 0.75}  # of numbers
-K2_TICKS = (-50, -20, -10, -5, -2, -1, 0, 1, 2)
+TICKS_UP = (-50, -20, -10, -5, -2, -1, 0, 1, 2)
 
 
 def gain_map(found: Region, *, ax: Axes | None = None) -> Axes:
-    """The plane of K1 and K2 (what `tfarm.map` returns), in the axes given or in new ones; the axes.
+    """The plane of both gains (what `tfarm.map` returns), in the axes given or in new ones; the axes.
 
     Colours for the number of unstable poles, a black line for the exact boundary with frequencies [rad/s] along it.
     """
     if ax is None:
         return draw_map(found, window).axes[0]
-    x, y = Axis.of(found.K1), Axis.of(found.K2)
+    x, y = map(Axis.of, found.axes)
     with style():
         ground(found, x, y, ax)
         boundary(found, edge(found, x, y), x, y, ax)
@@ -95,26 +96,26 @@ def _scale(arm: Arm, x: Axis, y: Axis, ax: Axes) -> None:
     if not y.is_linear:
         unit = arm.input_per_torque
         if unit == 1.0:
-            ax.set_yticks([tick for tick in K2_TICKS if y.low <= tick <= y.high])
+            ax.set_yticks([tick for tick in TICKS_UP if y.low <= tick <= y.high])
     ax.grid(False)
     stretched = "" if x.is_linear or x.low >= x.linear else f"; linear up to {plain(x.linear)}, logarithmic beyond"
-    ax.set_xlabel(f"K1, gain on the hub rate [{unit_of('K1', arm)}]{stretched}")
-    ax.set_ylabel(f"K2, gain on the root moment [{written_unit('K2', arm).strip() or '−'}]")
+    name_axes(arm, ax)
+    ax.set_xlabel(ax.get_xlabel() + stretched)
 
 
 def _tick(x: float, _: object = None) -> str:
     return plain(x, 3) if abs(x) < 1e4 else f"10{str(round(math.log10(x))).translate(SUPERSCRIPT)}"
 
 
-def contours(K1: Real, K2: Real, damping: Real, ax: Axes) -> None:
-    """Of the least damping ratio (K2, K1), where it is a number: inside the stable region."""
+def contours(across: Real, up: Real, damping: Real, ax: Axes) -> None:
+    """Of the least damping ratio (up, across), where it is a number: inside the stable region."""
     if np.isnan(damping).all():
         return
     levels = nice_levels(float(np.nanmin(damping)), float(np.nanmax(damping)))
     if not levels:
         return
     with np.errstate(invalid="ignore", divide="ignore"):  # by its logarithm, which is straighter
-        lines = ax.contour(K1, K2, np.ma.masked_invalid(np.log(damping)), levels=np.log(levels))
+        lines = ax.contour(across, up, np.ma.masked_invalid(np.log(damping)), levels=np.log(levels))
     parts = lines.allsegs
     lines.remove()
     for level, pieces_of_level in zip(levels, parts, strict=True):
@@ -146,7 +147,7 @@ def nice_levels(low: float, high: float) -> list[float]:
 
 
 def boundary(found: Region, points: Real, x: Axis, y: Axis, ax: Axes) -> None:
-    """The exact edge (n, 3) with its frequencies; without damping the lines K1 = 0 and K2 = 1."""
+    """The exact edge (n, 3) with its frequencies; without damping an upright line and a level one."""
     if found.arm.is_reactive:
         _undamped_boundary(found, x, y, ax)
         return
@@ -156,16 +157,17 @@ def boundary(found: Region, points: Real, x: Axis, y: Axis, ax: Axes) -> None:
         ax.plot([upright, upright], [y.low, y.high], color=INK, lw=1.6)
     if level is not None and y.low <= level <= y.high:
         ax.plot([x.low, x.high], [level, level], color=INK, lw=1.6)
-    for K1, K2, omega in _chosen(stable_edge(found, points, x, y), x, y):
-        ax.plot([K1], [K2], "o", ms=4.0, mfc="white", mec=INK, mew=1.0, zorder=5)
-        ax.add_artist(Label(significant(omega, 3), [(K1, K2)], AROUND, may_go=True, fontsize=8.0, bbox=HALO))
+    for across, up, omega in _chosen(stable_edge(found, points, x, y), x, y):
+        ax.plot([across], [up], "o", ms=4.0, mfc="white", mec=INK, mew=1.0, zorder=5)
+        ax.add_artist(Label(significant(omega, 3), [(across, up)], AROUND, may_go=True, fontsize=8.0, bbox=HALO))
     ax.plot([], [], "o", ms=4.0, mfc="white", mec=INK, mew=1.0, label="with ω in rad/s")
 
 
 def _undamped_boundary(found: Region, x: Axis, y: Axis, ax: Axes) -> None:
     """Strong around what is stable, thin where only the number of unstable poles changes."""
     label: str | None = "stability boundary, exact"
-    cut = {float(found.K2[0]): y.low, float(found.K2[-1]): y.high}  # an end there is the map's and not the region's
+    _, up = found.axes
+    cut = {float(up[0]): y.low, float(up[-1]): y.high}  # an end there is the map's and not the region's
     for low, high in found.stable_intervals[-1]:
         side = [(0.0, cut.get(end, end)) for end in (low, high)]
         corners = [(x.high, low)] * (low not in cut) + side + [(x.high, high)] * (high not in cut)
@@ -199,11 +201,12 @@ def sampled_region(plane: GainMap | None, ax: Axes) -> None:
     if plane is None:
         return
     ms = plain(1e3 * plane.loop.chain.sampling.period)
-    parts = pieces(plane.K1, plane.stable_intervals)
+    across, _ = plane.axes
+    parts = pieces(across, plane.stable_intervals)
     for piece in parts:
         x, low, high = np.array(piece.points).T
         ax.fill_between(x, low, high, facecolor="none", edgecolor=ORANGE, alpha=0.45, hatch="////", lw=0, zorder=1)
-        outline(replace(piece, begins=piece.begins and x[0] > plane.K1[0]), ORANGE, 1.2, 4.5, ax)
+        outline(replace(piece, begins=piece.begins and x[0] > across[0]), ORANGE, 1.2, 4.5, ax)
     none = "" if parts else ": nowhere in this picture"
     label = f"stable when sampled every {ms} ms (first {plane.modes_used} modes){none}"
     ax.fill_between([], [], [], facecolor="none", edgecolor=ORANGE, hatch="////", lw=1.0, label=label)
@@ -236,22 +239,23 @@ def _chosen(points: Real, x: Axis, y: Axis) -> Real:
 
 
 def lyapunov(arm: Arm, x: Axis, y: Axis, ax: Axes) -> None:
-    """K1 > 0, K2 < 1: proven at C = 0; at C > 0 only its line K2 = 0 is."""
+    """The quarter of the plane that is proven at C = 0; at C > 0 only the line without moment feedback is."""
     inset = 1.0 if not arm.is_undamped else 1.0 - 0.008 * (y.high - y.low)
     corner = 0.0 if not arm.is_undamped else 0.04 * x.linear
     dashes, label = (
-        ("-", "Lyapunov (K1 > 0, K2 < 1): proven")
+        ("-", f"Lyapunov ({LYAPUNOV}): proven")
         if arm.is_undamped
-        else ((0, (5, 3)), "Lyapunov (K1 > 0, K2 < 1): not a proof here")
+        else ((0, (5, 3)), f"Lyapunov ({LYAPUNOV}): not a proof here")
     )
     ax.plot([corner, corner, x.high], [y.low, inset, inset], color=PURPLE, lw=1.6, ls=dashes, label=label)
     if not arm.is_undamped:
-        ax.plot([0, x.high], [0, 0], color=PURPLE, lw=1.6, label="Lyapunov at C > 0: K2 = 0 proven")
+        ax.plot([0, x.high], [0, 0], color=PURPLE, lw=1.6, label=f"Lyapunov at C > 0: {MOMENT_GAIN} = 0 proven")
 
 
 def count_labels(found: Region, x: Axis, y: Axis, ax: Axes) -> None:
     """In every region that is large enough, how many poles are unstable there."""
     grid = seen(found, x, y)
+    across, up = grid.axes
     image, clear = colours(grid.unstable), ~_taken(grid.unstable.shape, ax)
     for count in np.unique(grid.unstable):
         parts, number = ndimage.label(grid.unstable == count)
@@ -264,7 +268,7 @@ def count_labels(found: Region, x: Axis, y: Axis, ax: Axes) -> None:
                 continue
             row, column, words, turn = placed
             ax.annotate(
-                words, (grid.K1[column], grid.K2[row]), ha="center", va="center", rotation=turn, zorder=4,
+                words, (across[column], up[row]), ha="center", va="center", rotation=turn, zorder=4,
                 fontsize=9.0, color=INK if count else "#00543f",
                 bbox={"facecolor": image[row, column], "edgecolor": "none", "pad": 1.5},
             )  # fmt: skip
@@ -319,12 +323,12 @@ def words_of_count(count: int) -> str:
 def law_mark(law: HubFeedback, marker: str, label: str, ax: Axes) -> None:
     """One law, as a point."""
     ax.plot(
-        [law.K1], [law.K2], marker, ms=13.0 if marker == STAR else 8.0, mfc=ORANGE, mec="white", mew=1.0, zorder=7,
+        *law.point, marker, ms=13.0 if marker == STAR else 8.0, mfc=ORANGE, mec="white", mew=1.0, zorder=7,
         ls="none", label=label,
     )  # fmt: skip
 
 
 def search_frame(bounds: Mapping[str, tuple[float, float]], ax: Axes) -> None:
     """Where a design looked for the best gains."""
-    (a, b), (c, d) = bounds["K1"], bounds["K2"]
+    (a, b), (c, d) = (bounds[name] for name in PLANE)
     ax.plot([a, b, b, a, a], [c, c, d, d, c], color=GREY, lw=0.8, ls=(0, (1, 2)), label="bounds of its search")

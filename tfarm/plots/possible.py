@@ -8,10 +8,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tfarm.arm import unit_of, written_unit
 from tfarm.fitting.possible import Possible, response_band, share_stable
 
+from .regions import LABEL
 from .style import BLUE, New, blank, headline, style
+from .words import name_axes
+
+Bounds = tuple[float, float]
 
 FINE = 800  # points of a band of responses
 MESH = 60  # gains of each axis of a map
@@ -36,9 +39,9 @@ def draw_band(those: Possible, output: str, new: New = blank) -> Figure:
     return figure
 
 
-def draw_share(those: Possible, K1: tuple[float, float], K2: tuple[float, float], new: New = blank) -> Figure:
+def draw_share(those: Possible, ranges: tuple[Bounds, Bounds], new: New = blank) -> Figure:
     """The share of the possible arms on which each pair of gains holds, without a clock."""
-    grid = np.linspace(*K1, MESH), np.linspace(*K2, MESH)
+    grid = [np.linspace(*ends, MESH) for ends in ranges]
     with style():
         figure = new(8.0, 5.0)
         share_map(those, *grid, ax=figure.subplots())
@@ -46,14 +49,12 @@ def draw_share(those: Possible, K1: tuple[float, float], K2: tuple[float, float]
     return figure
 
 
-def share_map(those: Possible, K1: np.ndarray, K2: np.ndarray, *, ax: Axes) -> Axes:
+def share_map(those: Possible, across: np.ndarray, up: np.ndarray, *, ax: Axes) -> Axes:
     """The same on axes of your own."""
-    share = share_stable(those, K1, K2)
-    picture = ax.pcolormesh(K1, K2, share, cmap=BLUES, vmin=0.0, vmax=1.0, shading="nearest", rasterized=True)
+    share = share_stable(those, across, up)
+    picture = ax.pcolormesh(across, up, share, cmap=BLUES, vmin=0.0, vmax=1.0, shading="nearest", rasterized=True)
     bar = ax.figure.colorbar(picture, ax=ax)
     bar.set_label("share of the arms that the gains hold")
-    arm = those.fit.arm
-    ax.set_xlabel(f"K1, on the hub rate  [{unit_of('K1', arm)}]")
-    ax.set_ylabel(f"K2, on the root moment  [{written_unit('K2', arm).strip() or '-'}]")
+    name_axes(those.fit.arm, ax, LABEL, "-")
     ax.grid(False)
     return ax

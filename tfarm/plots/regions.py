@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from tfarm.arm import unit_of, written_unit
+from tfarm.arm import PLANE
 from tfarm.crossing import pieces
 from tfarm.digits import plain, scientific
 from tfarm.dsp import GainMap
@@ -18,15 +18,16 @@ from tfarm.loop.regions import Region
 
 from .plane import outline
 from .style import BLUE, GREY, INK, ORANGE, headline, style, window
-from .words import gains_words
+from .words import LYAPUNOV, gains_words, name_axes
 
 SAND = "#f6dfcb"
 BLUES = ("#c9dcef", "#7fb0da", "#2f7cbc")  # lightest: most damping
-CONVENTION = "u = −K1 dθ/dt − K2 M;  a positive root moment M accelerates the hub"
+CONVENTION = "u = −{} dθ/dt − {} M;  a positive root moment M accelerates the hub".format(*PLANE)
+LABEL = "{name}, on the {output}  [{unit}]"
 
 
 def overlay(continuous: Region, sampled: GainMap | Sequence[GainMap], *, ax: Axes | None = None) -> Axes:
-    """Both regions of K1 and K2, in the axes given or in new ones; the axes.
+    """Both regions of the two gains, in the axes given or in new ones; the axes.
 
     `continuous` is what `tfarm.map` returns, `sampled` what `tfarm.dsp.gain_map` does: several, for arms with less and
     less damping, lie on each other.  The point is the law of the sampled loop.
@@ -45,11 +46,11 @@ def overlay(continuous: Region, sampled: GainMap | Sequence[GainMap], *, ax: Axe
             keys.append(_fill(ax, plane, colour, BLUE, f"stable, sampled{sampled_label(continuous, plane)}"))
         if continuous.arm.is_uniform:  # of a rig the argument needs more: see `tfarm.loop.lyapunov`
             (line,) = ax.plot(ax.get_xlim(), (1.0, 1.0), color=INK, lw=1.1, ls=(0, (5, 3)), zorder=4)
-            line.set_label("below it: proven by energy at C = 0 (K1 > 0, K2 < 1)")
+            line.set_label(f"below it: proven by energy at C = 0 ({LYAPUNOV})")
             keys.append(line)
         keys.append(Patch(facecolor="white", edgecolor=GREY, linewidth=0.9, label="stable in neither"))
         law = planes[0].loop.gains
-        (point,) = ax.plot(law.K1, law.K2, "o", color="white", mec=INK, mew=1.4, ms=7, zorder=6, ls="none")
+        (point,) = ax.plot(*law.point, "o", color="white", mec=INK, mew=1.4, ms=7, zorder=6, ls="none")
         point.set_label(gains_words(law))
         handles = [*keys, point]
         ax.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.0, -0.13), ncols=2, borderaxespad=0.0)
@@ -57,18 +58,17 @@ def overlay(continuous: Region, sampled: GainMap | Sequence[GainMap], *, ax: Axe
 
 
 def _scale(continuous: Region, ax: Axes) -> None:
-    """Logarithmic in K1 where that is positive."""
-    K1, K2 = continuous.K1, continuous.K2
-    if K1[0] > 0:
+    """Logarithmic across where that gain is positive."""
+    across, up = continuous.axes
+    if across[0] > 0:
         ax.set_xscale("log")
         ax.xaxis.set_minor_formatter(NullFormatter())
     ax.xaxis.set_major_formatter(FuncFormatter(lambda x, _: plain(x, 3)))
-    ax.set_xlim(float(K1[0]), float(K1[-1]))
-    ax.set_ylim(float(K2[0]), float(K2[-1]))
+    ax.set_xlim(float(across[0]), float(across[-1]))
+    ax.set_ylim(float(up[0]), float(up[-1]))
     ax.grid(False)
     ax.axhline(0.0, color=GREY, lw=0.7, zorder=3.5)
-    ax.set_xlabel(f"K1, on the hub rate  [{unit_of('K1', continuous.arm)}]")
-    ax.set_ylabel(f"K2, on the root moment  [{written_unit('K2', continuous.arm).strip() or '-'}]")
+    name_axes(continuous.arm, ax, LABEL, "-")
     ax.set_title(CONVENTION, loc="right", fontsize=8.5, color=GREY)
 
 
@@ -81,7 +81,7 @@ def sampled_label(continuous: Region, plane: GainMap) -> str:
 
 
 def _fill(ax: Axes, region: Region | GainMap, colour: str, edge: str, label: str) -> Patch:
-    for piece in pieces(region.K1, region.stable_intervals):
+    for piece in pieces(region.axes[0], region.stable_intervals):
         x, low, high = np.array(piece.points).T
         ax.fill_between(x, low, high, facecolor=colour, edgecolor="none", zorder=2)
         outline(piece, edge, 0.9, 2.5, ax)

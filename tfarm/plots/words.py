@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from tfarm.arm import HubFeedback
-from tfarm.arm.feedback import LISTED
+from matplotlib.axes import Axes
+
+from tfarm.arm import GAINS, LISTED, PLANE, Arm, HubFeedback, shown_unit
 from tfarm.arm.law import Law
 from tfarm.digits import plain
 
+LYAPUNOV = "{} > 0, {} < 1".format(*PLANE)  # what the paper's argument proves at C = 0
 NOT_THE_PAPERS = ("hub_angle",)  # outputs whose gain is an extension of the paper's law: named where it is used
 
 
@@ -16,3 +18,11 @@ def gains_words(law: HubFeedback | Law, digits: int = 4, but: str = "") -> str:
         return f"{law.name}, of {', '.join(law.signals)}"
     named = [gain.name for gain in LISTED if law[gain.name] or gain.output not in NOT_THE_PAPERS]
     return ", ".join(f"{name} = {plain(law[name], digits)}" for name in named if name != but)
+
+
+def name_axes(arm: Arm, ax: Axes, label: str = "{name}, gain on the {output} [{unit}]", pure: str = "−") -> None:
+    """Along the axes of the plane of gains: their names, what they act on, and their units, `pure` for none."""
+    outputs = {gain.name: gain.output.replace("_", " ") for gain in GAINS}
+    across, up = (label.format(name=name, output=outputs[name], unit=shown_unit(name, arm) or pure) for name in PLANE)
+    ax.set_xlabel(across)
+    ax.set_ylabel(up)

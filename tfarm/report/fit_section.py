@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from tfarm.arm import MOMENT_GAIN
 from tfarm.columns import Column, Table
 from tfarm.digits import general, listed, plain, singly
 from tfarm.errors import ConvergenceError
@@ -91,11 +92,10 @@ def _onwards(those: Possible) -> tuple[list[str], list[Picture | Table]]:
                 f"With {gains_words(law)} the loop holds on {found.stable} of {found.of} of these arms ({share} %)."
             )
         )
-        K1, K2 = ranges_of(arm)
         blocks.append(Picture(
             stem="fit-map", title="Gains on all of these arms",
             caption="Dark: the gains hold on every arm that the data leave possible; white: on none. Without a clock.",
-            alt="Map of the share of arms on which gains hold.", figure=draw_share(those, K1, K2),
+            alt="Map of the share of arms on which gains hold.", figure=draw_share(those, ranges_of(arm)),
         ))  # fmt: skip
         rows = [(name, unit, ends) for name, unit, ends in _rows(found) if ends is not None]
         if rows:
@@ -110,7 +110,7 @@ def _onwards(those: Possible) -> tuple[list[str], list[Picture | Table]]:
 
 def _rows(found: object) -> Iterator[tuple[str, str, tuple[float, float] | None]]:
     names = (
-        ("K2 up to", "", "gain_up"),
+        (f"{MOMENT_GAIN} up to", "", "gain_up"),
         ("phase margin", "deg", "phase"),
         ("delay margin", "s", "delay"),
         ("disk margin", "", "disk"),
