@@ -122,7 +122,7 @@ def test_contours_reach_the_frame_and_words_overlap_nothing(lab):
     """A line of equal damping ends at the frame, at the stability boundary, or where it began."""
     figure = draw_map(lab)
     assert complaints(figure) == []
-    assert (lab.K1[0], lab.K1[-1], lab.K2[0], lab.K2[-1]) == (lab.x.low, lab.x.high, lab.y.low, lab.y.high)
+    assert (*lab.axes[0][[0, -1]], *lab.axes[1][[0, -1]]) == (lab.x.low, lab.x.high, lab.y.low, lab.y.high)
     lines = [line for line in figure.axes[0].lines if line.get_color() == BLUE and len(line.get_xdata()) > 20]
     assert len(lines) > 3
     assert sum(min(line.get_ydata()[0], line.get_ydata()[-1]) == lab.y.low for line in lines) > 3
@@ -131,7 +131,7 @@ def test_contours_reach_the_frame_and_words_overlap_nothing(lab):
 def test_the_contours_are_the_damping_of_the_poles(lab):
     """Least damping ratio by the exact poles in a box, below the band that the caption names."""
     for row, column in ((5, 20), (25, 40), (30, 55)):
-        law = HubFeedback(K1=float(lab.K1[column]), K2=float(lab.K2[row]))
+        law = HubFeedback(K1=float(lab.axes[0][column]), K2=float(lab.axes[1][row]))
         poles = closed_loop_poles(LAB, law, 6).values
         poles = poles[(poles.imag > 0) & (poles.imag < lab.band)]
         expected = (-poles.real / abs(poles)).min()
@@ -145,10 +145,10 @@ def test_the_data_behind_the_map_is_what_is_drawn(lab):
     edge = [row for row in rows if row["what"] == "boundary"]
     assert len(grid) == lab.damping.size
     assert len(edge) == int((~np.isnan(lab.edge[:, 0])).sum())
-    at = grid[7 * lab.K1.size + 31]
-    assert (at["K1_N_m_s_rad"], at["K2"]) == (lab.K1[31], lab.K2[7])
+    at = grid[7 * lab.axes[0].size + 31]
+    assert (at["K1_N_m_s_rad"], at["K2"]) == (lab.axes[0][31], lab.axes[1][7])
     assert at["unstable_poles"] == lab.counts[7, 31]
-    fresh = least_damping(LAB, many_laws(HubFeedback(), K1=lab.K1[31:32], K2=lab.K2[7:8]), loop_laws.MODES)
+    fresh = least_damping(LAB, many_laws(HubFeedback(), K1=lab.axes[0][31:32], K2=lab.axes[1][7:8]), loop_laws.MODES)
     assert at["least_damping_ratio"] == pytest.approx(fresh[0], rel=1e-12, abs=0)
 
 

@@ -129,4 +129,5 @@ def test_the_table_of_modes_has_the_pole_that_the_verdict_names(name):
 
 
 def test_rows_keep_every_interval():
-    assert AtPeriod(0.01, 4, True, -0.1, default_gains(ARMS["boom"]), ((0.0, 1.0),), ()).K1 == ((0.0, 1.0),)
+    every = {"K1": ((0.0, 1.0),), "K2": ()}
+    assert AtPeriod(0.01, 4, True, -0.1, default_gains(ARMS["boom"]), every).windows["K1"] == ((0.0, 1.0),)

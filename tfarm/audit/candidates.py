@@ -74,7 +74,7 @@ def _modes(study: Study, parameter: str) -> Iterator[Column]:
 
 
 def loop_columns(study: Study, found: tuple[LoopVerdict, ...] | None) -> Iterator[Column]:
-    """The verdict on the default loop, and up to which gain on the moment it stays stable; not on a page where there is no loop."""
+    """The verdict on the default loop, and the upper edge of its moment gain; not on a page where there is no loop."""
     verdicts = found or (LoopVerdict("no loop", None),) * len(study.arms)
     law, edges = default_gains(study.arm), [each.K2_below for each in verdicts]
     group = f"loop at {', '.join(law.told(lambda gain: plain(gain, 4)))}"

@@ -5,7 +5,7 @@ function of the plant is
 
     H(z) = z^-d [ g0/z + x sum over poles of (r_j/p_j) a_j/(z - b_j) + the rigid body's terms in 1/x ]
 
-so a pole that has settled before the sample weighs nothing, and x^k F(z) = x^k (1 + Kp Theta + K1 R + K2 M), k the
+so a pole that has settled before the sample weighs nothing, and x^k F(z) = x^k (1 + gains . H), k the
 order of the pole at z = 1, is analytic on the circle and outside.  On an arc it stays in a disc about its value in the
 middle, for 1/(z - b) changes by h/(|z - b| (|z - b| - h)) at most over h.  Where no disc holds 0, the phase between
 neighbouring middles is known without doubt, and half the circle gives the count (the argument principle).  Arcs whose

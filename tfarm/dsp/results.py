@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import LISTED, Arm, HubFeedback, driven, unit_of
+from tfarm.arm import LISTED, TAKEN_OFF, Arm, HubFeedback, driven, unit_of
 from tfarm.arm.driving import AnyLaw, tracked
 from tfarm.columns import Column
 from tfarm.dsp.chain import Chain
@@ -164,14 +164,12 @@ def _led_by(arm: Arm, law: AnyLaw) -> dict[str, Any]:
     """The law, and what it drives."""
     if not isinstance(law, HubFeedback):
         return described_law(law, arm) | {"references": list(law.references)}
-    words = "u = r - Kp theta - K1 theta_t - K2 M, with references; a positive root moment M accelerates the hub"
+    words = f"u = r - {TAKEN_OFF}, with references; a positive root moment M accelerates the hub"
     return {
         "law": words + driven(arm),
         "input": arm.input,
         "gain_units": {gain.name: unit_of(gain.name, arm) for gain in LISTED},
-        "K1": law.K1,
-        "K2": law.K2,
-        "Kp": law.Kp,
+        **law.by_name,
     }
 
 

@@ -47,6 +47,10 @@ class Measurement(NamedTuple):
     rate_reference: float
     rigid_moment: float
 
+    def servo(self, law: HubFeedback) -> float:
+        """What a law asks of the input [N m] for the hub's angle and rate, as they are off what is wanted."""
+        return law.Kp * (self.angle_reference - self.hub_angle) + law.K1 * (self.rate_reference - self.hub_rate)
+
 
 Controller = Callable[[Measurement], float]
 
@@ -159,11 +163,11 @@ class Simulator:
 
     def gain_schedule(self, K1: float, gain: Callable[[Measurement], float], Kp: float = 0.0) -> Simulation:
         """The law of `linear` with K2 = gain(measurement) at each sample, recorded as `gain`."""
+        law = HubFeedback(K1=K1, Kp=Kp)
 
         def torque(m: Measurement) -> tuple[float, float]:
             K = float(gain(m))
-            servo = Kp * (m.angle_reference - m.hub_angle) + K1 * (m.rate_reference - m.hub_rate)
-            return m.feedforward + servo - K * m.vibration, K
+            return m.feedforward + m.servo(law) - K * m.vibration, K
 
         return self._stepped(torque, np.zeros(self.scenario.feedforward.size))
 

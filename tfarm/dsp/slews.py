@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 
-from tfarm.arm import Arm, HubFeedback
+from tfarm.arm import MOMENT_GAIN, RATE_GAIN, Arm, HubFeedback
 from tfarm.digits import plain
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.curves import resolved
@@ -14,13 +14,14 @@ from tfarm.dsp.scenarios import scenario
 from tfarm.dsp.simulate import Simulation, Simulator
 from tfarm.records import record
 
+WITHOUT = f"without moment feedback, {MOMENT_GAIN} = 0"
 LASTING = 3.0  # times the slew: how long a record is
 
 
 @dataclass(frozen=True)
 @record
 class Slews:
-    """One slew simulated twice: `without` (K2 = 0) and `with_moment` feedback, K1 the same."""
+    """One slew simulated twice: `without` and `with_moment` feedback, the other gains the same."""
 
     arm: Arm
     gains: HubFeedback
@@ -30,7 +31,17 @@ class Slews:
     @property
     def each(self) -> Mapping[str, Simulation]:
         """Both, by what they are called; the one without comes first."""
-        return {"without moment feedback, K2 = 0": self.without, f"with, K2 = {plain(self.gains.K2)}": self.with_moment}
+        return {WITHOUT: self.without, f"with, {self.fed_back}": self.with_moment}
+
+    @property
+    def held(self) -> str:
+        """The gain on the hub rate, which both have."""
+        return self.gains.told(plain, [RATE_GAIN])[0]
+
+    @property
+    def fed_back(self) -> str:
+        """The gain on the root moment of the second."""
+        return self.gains.told(plain, [MOMENT_GAIN])[0]
 
 
 def slews(arm: Arm, gains: HubFeedback, chain: Chain, modes: int) -> Slews:
@@ -40,6 +51,6 @@ def slews(arm: Arm, gains: HubFeedback, chain: Chain, modes: int) -> Slews:
     """
     task = scenario("slew", arm, chain, LASTING * chain.slew.rise_time)
     simulator = Simulator(arm, chain, task, count=modes)
-    without = HubFeedback(K1=gains.K1, K2=0.0)
-    both = resolved(simulator, arm, *(partial(Simulator.linear, gains=law) for law in (without, gains)))
+    laws = (gains.having(MOMENT_GAIN, 0.0), gains)
+    both = resolved(simulator, arm, *(partial(Simulator.linear, gains=law) for law in laws))
     return Slews(arm, gains, *both)

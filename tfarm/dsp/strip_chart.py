@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, HubFeedback
+from tfarm.arm import MOMENT_GAIN, Arm, HubFeedback
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.curves import resolved
 from tfarm.dsp.scenarios import scenario
@@ -65,7 +65,7 @@ def strip_chart(arm: Arm, gains: HubFeedback, ideal: Simulation, modes: int) -> 
     read, asked = np.zeros(task.t.size), np.zeros(task.t.size)
 
     def controller(m: Measurement) -> float:
-        u = m.feedforward + gains.K1 * (m.rate_reference - m.hub_rate) - gains.K2 * m.vibration
+        u = m.feedforward + m.servo(gains) - gains[MOMENT_GAIN] * m.vibration
         read[m.k], asked[m.k] = m.root_moment, u
         return u
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic
 
-from tfarm.arm import LISTED, Arm, HubFeedback, driven, unit_of
+from tfarm.arm import LISTED, MOMENT_GAIN, PLANE, RATE_GAIN, TAKEN_OFF, Arm, HubFeedback, driven, unit_of
 from tfarm.arm.checks import whole
 from tfarm.columns import Table
 from tfarm.dsp.band import Band, band_of
@@ -115,7 +115,7 @@ def sampled_verdict(arm: Arm, gains: HubFeedback, chain: Chain | None = None, *,
 
     As many as it takes: poles of the loop outside the circle are as many as are proven for its whole band, and the
     largest radius is that of the loop with every mode of the band.  Raises ParameterError for a locked hub, for I_h = 0
-    with K2 != 0 (an algebraic loop), and a count outside 1..400.
+    with moment feedback (an algebraic loop), and a count outside 1..400.
     """
     chain = Chain() if chain is None else chain
     if count is not None:
@@ -161,11 +161,13 @@ def _agree(loop: AnyLoop, full: AnyLoop) -> bool:
 @dataclass(frozen=True)
 @record
 class Analysis:
-    """Everything that is said of a sampled loop at its gains, with how far each edge is proven."""
+    """Everything that is said of a sampled loop at its gains, with how far each edge is proven.
+
+    `shown` has the stable intervals of both gains of the plane, by name.
+    """
 
     verdict: Verdict
-    K1: ShownWindows
-    K2: ShownWindows
+    shown: Mapping[str, ShownWindows]
     modes: ModeTable
     delay_margin: DelayMargin
     delay: Figure
@@ -173,13 +175,13 @@ class Analysis:
 
     @property
     def K1_windows(self) -> list[Window]:
-        """The stable intervals of K1."""
-        return self.K1.windows
+        """The stable intervals of the gain on the hub rate."""
+        return self.shown[RATE_GAIN].windows
 
     @property
     def K2_windows(self) -> list[Window]:
-        """The stable intervals of K2."""
-        return self.K2.windows
+        """The stable intervals of the gain on the root moment."""
+        return self.shown[MOMENT_GAIN].windows
 
     @property
     def required_damping(self) -> float:
@@ -198,11 +200,10 @@ def analyse(arm: Arm, gains: HubFeedback, chain: Chain | None = None, *, count: 
     chain = Chain() if chain is None else chain
     verdict = sampled_verdict(arm, gains, chain, count=count)
     loop, band = verdict.loop, verdict.band
-    has_moment = not arm.has_massless_hub
+    without_loop = (MOMENT_GAIN,) if arm.has_massless_hub else ()
     return Analysis(
         verdict,
-        shown_windows(loop, band, "K1"),
-        shown_windows(loop, band, "K2") if has_moment else ShownWindows([], []),
+        {name: ShownWindows([], []) if name in without_loop else shown_windows(loop, band, name) for name in PLANE},
         mode_table(loop),
         *shown_delay(loop, band),
         shown_damping(arm, gains, chain, count=count or UNDAMPED_MODES),
@@ -229,27 +230,22 @@ def verdict_answer(verdict: Verdict[Any], sampling: Sampling) -> dict[str, Any]:
 def sampled_answer(analysis: Analysis) -> dict[str, Any]:
     """The analysis as a dictionary of plain numbers, texts, lists and the table of its modes."""
     verdict, gains = analysis.verdict, analysis.verdict.loop.gains
-    arm, sampling = verdict.loop.plant.arm, verdict.loop.chain.sampling
+    arm, sampling, shown = verdict.loop.plant.arm, verdict.loop.chain.sampling, analysis.shown.items()
     return {
         "arm": arm.name,
-        "law": f"u = -Kp theta - K1 theta_t - K2 M; a positive root moment M accelerates the hub{driven(arm)}",
+        "law": f"u = -{TAKEN_OFF}; a positive root moment M accelerates the hub{driven(arm)}",
         "input": arm.input,
         "gain_units": {gain.name: unit_of(gain.name, arm) for gain in LISTED},
-        "K1": gains.K1,
-        "K2": gains.K2,
-        "Kp": gains.Kp,
+        **gains.by_name,
         **verdict_answer(verdict, sampling),
-        "K1_interval": _listed(around(analysis.K1_windows, gains.K1)),
-        "K2_interval": _listed(around(analysis.K2_windows, gains.K2)),
-        "K1_intervals": [list(window) for window in analysis.K1_windows],
-        "K2_intervals": [list(window) for window in analysis.K2_windows],
+        **{f"{name}_interval": _listed(around(each.windows, gains[name])) for name, each in shown},
+        **{f"{name}_intervals": [list(window) for window in each.windows] for name, each in shown},
         "first_unstable_mode": analysis.first_unstable_mode,
         "delay_margin_samples": analysis.delay_margin.samples,
         "delay_margin_is_lower_bound": analysis.delay_margin.is_bound,
         "required_damping_s": analysis.required_damping,
         "shown": {
-            "K1_intervals": [[_figure(edge) for edge in pair] for pair in analysis.K1.figures],
-            "K2_intervals": [[_figure(edge) for edge in pair] for pair in analysis.K2.figures],
+            **{f"{name}_intervals": [list(map(_figure, pair)) for pair in each.figures] for name, each in shown},
             "delay_margin_samples": _figure(analysis.delay),
             "required_damping_s": _figure(analysis.damping),
         },

@@ -64,12 +64,9 @@ def growths(loop: SampledLoop, table: ModeTable, *, ax: Axes) -> None:
     ax.axhline(0.0, color=INK, lw=0.9)
     ax.vlines(w, 0, table.log_radius, color=BLUE, lw=1.2, zorder=2)
     ax.plot(w, table.log_radius, "o", color=BLUE, ms=6, label="closed loop, exact", zorder=4)
-    ax.plot(
-        w, table.by_rate, "^", mfc="none", mec=ORANGE, mew=1.3, ms=7, label=f"by {RATE_GAIN}, first order", zorder=5
-    )
-    ax.plot(
-        w, table.by_moment, "s", mfc="none", mec=INK, mew=1.1, ms=6, label=f"by {MOMENT_GAIN}, first order", zorder=5
-    )
+    on_rate, on_moment = (f"by {name}, first order" for name in PLANE)
+    ax.plot(w, table.by_rate, "^", mfc="none", mec=ORANGE, mew=1.3, ms=7, label=on_rate, zorder=5)
+    ax.plot(w, table.by_moment, "s", mfc="none", mec=INK, mew=1.1, ms=6, label=on_moment, zorder=5)
     if table.by_damping.any():
         ax.plot(w, table.by_damping, "_", color=GREY, mew=1.6, ms=13, label="own damping", zorder=3)
     ax.yaxis.set_major_formatter(FuncFormatter(_power))

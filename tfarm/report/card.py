@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from tfarm.arm import Arm
+from tfarm.arm import PLANE, Arm
 from tfarm.digits import plain
 from tfarm.dsp import Chain
 from tfarm.errors import TfarmError
@@ -26,7 +26,7 @@ from tfarm.response.frequency import bode
 from tfarm.spectrum.scales import default_gains
 
 FACTS = 4  # of the headline numbers
-COMPARED = ("gains", "verdict", "K1", "K2", "sampled")  # columns of the index's table of arms
+COMPARED = ("gains", "verdict", *PLANE, "sampled")  # columns of the index's table of arms
 PAGES = {"index": "full report", "live": "live loop", **QUESTIONS}
 
 
@@ -57,8 +57,7 @@ def compared(arm: Arm, chain: Chain) -> dict[str, str]:
     return {
         "gains": gains_words(law),
         "verdict": found.stability.verdict,
-        "K1": _window(found.windows["K1"]),
-        "K2": _window(found.windows["K2"]),
+        **{name: _window(found.windows[name]) for name in PLANE},
         "sampled": sampled.short,
     }
 

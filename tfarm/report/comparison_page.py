@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from tfarm.arm import PLANE
 from tfarm.comparing import Comparison
 from tfarm.comparing.answers import margins_table, modes_table, poles_table, verdict_words
 from tfarm.errors import ParameterError
@@ -83,7 +84,7 @@ def _picture(found: Comparison) -> Picture:
     plane = (
         "further delay and a factor on its law, with exact edges"
         if found.is_clocked
-        else "K1 and K2, with exact edges"
+        else f"{' and '.join(PLANE)}, with exact edges"
         if found.regions is not None
         else "a factor on each law and its delay, on a grid"
     )

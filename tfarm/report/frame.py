@@ -105,7 +105,7 @@ def first_sentence(text: str) -> str:
 
 
 def signs(arm: Arm) -> str:
-    """The law and the sign of its K2, once a page; empty where there is no loop."""
+    """The law and the sign of its moment gain, once a page; empty where there is no loop."""
     return sign_words(arm) if has_rate_loop(arm) else ""
 
 

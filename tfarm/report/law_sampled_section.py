@@ -108,8 +108,10 @@ def held_by(each: LawOnArm, chain: Chain) -> Held:
     """The verdict on a law, and the room that it leaves."""
     if isinstance(each.law, HubFeedback):
         analysis = analyse(each.arm, each.law, chain)
-        windows = (("K1", analysis.K1_windows), ("K2", analysis.K2_windows))
-        told = [f"{key} {spans(them, each.law[key])}{written_unit(key, each.arm)}" for key, them in windows]
+        told = [
+            f"{name} {spans(shown.windows, each.law[name])}{written_unit(name, each.arm)}"
+            for name, shown in analysis.shown.items()
+        ]
         words = f"Stable, the other held: {'; '.join(told)}."
         return Held(each, analysis.verdict, words, analysis.delay_margin if analysis.verdict.is_settled else None)
     verdict = law_verdict(each.arm, each.law, chain)

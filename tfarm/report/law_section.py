@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from tfarm.arm import Arm
+from tfarm.arm import PLANE, Arm
 from tfarm.arm.blocks import Rational, StateSpace
 from tfarm.arm.driving import cancelled
 from tfarm.arm.law import REFERENCE, is_measured
@@ -23,9 +23,9 @@ from tfarm.response.signals import Signals
 OPEN, FILES_ALONE = "open", (FILES,)  # a column that nothing is led to
 POWERS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 LEFT_OUT = (
-    "This page is about what stands here, not about the default gains. The map of K1 and K2, the loci along them and "
-    "the gain tuner are of the paper's two gains and are left out; tfarm map --law FILE counts unstable poles over any "
-    "two numbers of a law, tfarm locus --law FILE follows them along one."
+    f"This page is about what stands here, not about the default gains. The map of {' and '.join(PLANE)}, the loci "
+    "along them and the gain tuner are of the paper's two gains and are left out; tfarm map --law FILE counts unstable "
+    "poles over any two numbers of a law, tfarm locus --law FILE follows them along one."
 )
 IN_Z = (
     "A law in z acts at its samples alone: all that is said of {which} is said of the sampled loop, and there is no "

@@ -225,10 +225,11 @@ def _trace(name: str, colour: str, title: str, x: Any) -> Any:
 
 
 def _map() -> Any:
-    """The plane of K1 and K2 with its regions, the curve of poles on the axis at this Kp, and the gains."""
+    """The plane of both gains with its regions, the curve of poles on the axis with the third held, and the gains."""
     scale, ticks = alt.Scale(domain=[-1, 1], nice=False), alt.Axis(format=".3~r", grid=False)
-    x, y = (alt.X("K1:Q", scale=scale, title="K1", axis=ticks), alt.Y("K2:Q", scale=scale, title="K2", axis=ticks))
-    low = alt.Y("low:Q", scale=scale, title="K2", axis=ticks)
+    across, up = PLANE
+    x, y = (each(f"{name}:Q", scale=scale, title=name, axis=ticks) for name, each in ((across, alt.X), (up, alt.Y)))
+    low = alt.Y("low:Q", scale=scale, title=up, axis=ticks)
     keys = ["stable, continuous", "stable, sampled"]
     legend = alt.Legend(symbolType="square", columns=1, labelLimit=260)
     colour = alt.Color("what:N", scale=alt.Scale(domain=keys, range=[ORANGE, BLUE]), title=None, legend=legend)

@@ -1,4 +1,4 @@
-"""The (K1, K2) map: where the exact loop is stable, what its boundary is made of, and how well its modes are damped."""
+"""The map of both gains: where the exact loop is stable, what its boundary is made of, how well modes are damped."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, HubFeedback, many_laws, unit_of, written_unit
+from tfarm.arm import PLANE, Arm, HubFeedback, many_laws, shown_unit
 from tfarm.columns import Column, Table
 from tfarm.dsp import Chain, sampled_verdict
 from tfarm.dsp import GainMap as SampledMap
@@ -37,8 +37,8 @@ Real = NDArray[np.float64]
 COLUMNS, ROWS = 240, 200  # of the coloured grid
 MARKERS = {"default": plane.DIAMOND, "best": plane.STAR}
 SPARSE = 4  # every so many of them the damping is computed
-SAMPLED_COLUMNS = 120  # values of K1 at which the sampled region is cut, besides its exact ends
-OUTSIDE = 0.1  # of K2, beyond the picture: an edge there is none of the region
+SAMPLED_COLUMNS = 120  # values of the gain across at which the sampled region is cut, besides its exact ends
+OUTSIDE = 0.1  # of the gain up the plane, beyond the picture: an edge there is none of the region
 
 
 @dataclass(frozen=True)
@@ -46,11 +46,11 @@ OUTSIDE = 0.1  # of K2, beyond the picture: an edge there is none of the region
 class GainMap:
     """What the map shows.
 
-    `region` is the exact count on the coloured grid, `edge` (n, 3) the exact boundary K1, K2, w within the picture
-    with rows of nan where it leaves it; `damping` (rows, columns) the least damping ratio of the first `MODES` modes
-    on every fourth point of the grid and on the frame; `design` the best gains for the sampled loop.  `sampled` is
-    where the loop is stable at the clock of `chain` too, None where that could not be settled; `briefs` are the sampled
-    verdicts on the laws.
+    `region` is the exact count on the coloured grid, `edge` (n, 3) the exact boundary, both gains and w, within the
+    picture with rows of nan where it leaves it; `damping` (rows, columns) the least damping ratio of the first `MODES`
+    modes at `axes`, every fourth value of each gain on the grid and the frame's; `design` the best gains for the
+    sampled loop.  `sampled` is where the loop is stable at the clock of `chain` too, None where that could not be
+    settled; `briefs` are the sampled verdicts on the laws.
     """
 
     arm: Arm
@@ -58,8 +58,7 @@ class GainMap:
     y: Axis
     region: Region
     edge: Real
-    K1: Real
-    K2: Real
+    axes: tuple[Real, Real]
     damping: Real
     laws: tuple[NamedLaw, ...]
     design: Design | None
@@ -75,7 +74,7 @@ class GainMap:
     @cached_property
     def counts(self) -> NDArray[np.int64]:
         """Unstable poles on the grid of the damping."""
-        return np.asarray(region(self.arm, self.K1, self.K2).unstable)
+        return np.asarray(region(self.arm, *self.axes).unstable)
 
     @property
     def band(self) -> float:
@@ -90,17 +89,14 @@ def gain_map(arm: Arm, chain: Chain | None = None) -> GainMap:
     y = moment_axis(arm, x)
     found = region(arm, x.grid(COLUMNS), y.grid(ROWS))
     half = SPARSE // 2
-    K1, K2 = (
-        np.r_[ends[0], each[half::SPARSE], ends[1]]
-        for ends, each in (((x.low, x.high), found.K1), ((y.low, y.high), found.K2))
-    )
-    a, b = (each.ravel() for each in np.meshgrid(K1, K2))
-    damping = least_damping(arm, many_laws(HubFeedback(), K1=a, K2=b), MODES).reshape(K2.size, K1.size)
+    across, up = (np.r_[axis.low, each[half::SPARSE], axis.high] for axis, each in zip((x, y), found.axes, strict=True))
+    points = dict(zip(PLANE, map(np.ravel, np.meshgrid(across, up)), strict=True))
+    damping = least_damping(arm, many_laws(HubFeedback(), **points), MODES).reshape(up.size, across.size)
     named = laws(arm, chain)
     briefs = tuple(brief_of(arm, each.law, chain) for each in named)
     sampled = sampled_region(arm, x, y, chain)
     return GainMap(
-        arm, x, y, found, edge(found, x, y), K1, K2, damping, named, best(arm, chain), chain, sampled, briefs
+        arm, x, y, found, edge(found, x, y), (across, up), damping, named, best(arm, chain), chain, sampled, briefs
     )
 
 
@@ -109,21 +105,21 @@ def sampled_region(arm: Arm, x: Axis, y: Axis, chain: Chain) -> SampledMap | Non
     """Where in the picture the sampled loop is stable, with the modes of the verdict on the default gains."""
     try:
         loop = sampled_verdict(arm, default_gains(arm), chain).full
-        K1 = x.grid(SAMPLED_COLUMNS)
-        K1 = with_both_sides(K1[K1 > 0], ends_of_K1(loop))
-        return sampled_map(loop, K1[x.high > K1], [y.low - OUTSIDE, y.high + OUTSIDE])
+        across = x.grid(SAMPLED_COLUMNS)
+        across = with_both_sides(across[across > 0], ends_of_K1(loop))
+        return sampled_map(loop, across[x.high > across], [y.low - OUTSIDE, y.high + OUTSIDE])
     except ConvergenceError:
         return None
 
 
 def draw_map(data: GainMap) -> Figure:
-    """K1 across, K2 up: the count, its boundary, the damping, what sampling leaves, Lyapunov's frame, and the laws."""
+    """Both gains: the count, its boundary, the damping, what sampling leaves, Lyapunov's frame, and the laws."""
     found, x, y = data.region, data.x, data.y
     with style():
         figure = blank(9.0, 6.2)
         ax = figure.subplots()
         plane.ground(found, x, y, ax)
-        plane.contours(data.K1, data.K2, np.where(data.counts == 0, data.damping, np.nan), ax)
+        plane.contours(*data.axes, np.where(data.counts == 0, data.damping, np.nan), ax)
         plane.boundary(found, data.edge, x, y, ax)
         plane.sampled_region(data.sampled, ax)
         if data.arm.is_uniform:
@@ -140,33 +136,33 @@ def draw_map(data: GainMap) -> Figure:
 
 def map_data(data: GainMap) -> Table:
     """The grid with counts and damping, the boundary with its frequencies, then the ends of the sampled intervals."""
-    K1, K2 = (each.ravel() for each in np.meshgrid(data.K1, data.K2))
+    grid = [each.ravel() for each in np.meshgrid(*data.axes)]
     edge = data.edge[~np.isnan(data.edge[:, 0])] if data.edge.size else data.edge
     counts: list[float | int | str] = [math.inf if count < 0 else int(count) for count in data.counts.ravel()]
     none: list[float | int | str] = [""]
     sampled = _sampled_ends(data)
     beyond = len(edge) + len(sampled)
-    what = ["grid"] * K1.size + ["boundary"] * len(edge) + ["sampled boundary"] * len(sampled)
+    what = ["grid"] * grid[0].size + ["boundary"] * len(edge) + ["sampled boundary"] * len(sampled)
     columns = (
         Column("what", "what", of=what),
-        Column(_key_of_K1(data.arm), "K1", unit_of("K1", data.arm), of=np.r_[K1, edge[:, 0], sampled[:, 0]]),
-        Column("K2", "K2", written_unit("K2", data.arm).strip(), of=np.r_[K2, edge[:, 1], sampled[:, 1]]),
+        *(_column_of(name, data.arm, np.r_[grid[n], edge[:, n], sampled[:, n]]) for n, name in enumerate(PLANE)),
         Column("unstable_poles", "unstable poles", of=counts + none * beyond),
         Column("least_damping_ratio", "least damping ratio", of=[*data.damping.ravel().tolist(), *none * beyond]),
-        Column("omega_rad_s", "frequency", "rad/s", of=none * K1.size + edge[:, 2].tolist() + none * len(sampled)),
+        Column("omega_rad_s", "frequency", "rad/s", of=none * grid[0].size + edge[:, 2].tolist() + none * len(sampled)),
     )  # fmt: skip
-    return Table(stem="map-data", title="The map of K1 and K2", is_data=True, columns=columns)
+    return Table(stem="map-data", title=f"The map of {' and '.join(PLANE)}", is_data=True, columns=columns)
 
 
-def _key_of_K1(arm: Arm) -> str:
-    """K1 with its unit, as a key."""
-    return "K1_" + unit_of("K1", arm).replace(" ", "_").replace("/", "_")
+def _column_of(name: str, arm: Arm, values: Real) -> Column:
+    """A gain, with its unit in the key too."""
+    unit = shown_unit(name, arm)
+    return Column("_".join([name, *unit.replace("/", " ").split()]), name, unit, of=values)
 
 
 def _sampled_ends(data: GainMap) -> Real:
-    """K1 and K2 (n, 2) of the ends of the sampled loop's stable intervals, those cut by the picture left out."""
+    """Both gains (n, 2) at the ends of the sampled loop's stable intervals, those cut by the picture left out."""
     if data.sampled is None:
         return np.empty((0, 2))
-    columns = zip(data.sampled.K1, data.sampled.stable_intervals, strict=True)
-    ends = [(float(K1), end) for K1, column in columns for window in column for end in window]
+    columns = zip(data.sampled.axes[0], data.sampled.stable_intervals, strict=True)
+    ends = [(float(across), end) for across, column in columns for window in column for end in window]
     return np.array([each for each in ends if data.y.low <= each[1] <= data.y.high]).reshape(-1, 2)

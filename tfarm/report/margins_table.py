@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
+from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN
 from tfarm.columns import Column, Table
 from tfarm.digits import counted, plain, significant, singly
 from tfarm.dsp.brief import SampledBrief
@@ -57,7 +58,8 @@ def verdict_words(named: NamedLaw, found: Margins) -> str:
     it = found.stability
     proof = lyapunov(it.loop.arm, named.law)
     proven = "proven" if proof.proven else "no proof"
-    apart = ", the one at 0 that the hub angle leaves apart" if it.loop.arm.has_rigid_mode and not named.law.Kp else ""
+    is_free = it.loop.arm.has_rigid_mode and not named.law[ANGLE_GAIN]
+    apart = ", the one at 0 that the hub angle leaves apart" if is_free else ""
     return (
         f"{named.name.capitalize()}, {named.gains}: {it.verdict.upper()}, with "
         f"{counted(it.unstable_roots, 'unstable pole')} "
@@ -132,12 +134,12 @@ def _open_ends(laws: Sequence[Named], found: Sequence[Margins]) -> str:
 
 
 def window_table(laws: Sequence[Named], found: Sequence[Margins]) -> Table:
-    """A row a law and gain; none for K2 on a free pin, where it has no loop."""
+    """A row a law and gain; none for the moment on a free pin, where it has no loop."""
     rows = [
         (law.name, each.stability.verdict, row)
         for law, each in zip(laws, found, strict=True)
         for row in gain_rows(each)
-        if row.gain != "K2" or not each.stability.loop.arm.has_massless_hub
+        if row.gain != MOMENT_GAIN or not each.stability.loop.arm.has_massless_hub
     ]
     names, verdicts, gains = zip(*rows, strict=True)
     return Table(

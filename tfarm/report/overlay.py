@@ -1,7 +1,7 @@
 """The plane of both gains twice on the same axes: where the continuous loop is stable, and where the sampled one is.
 
-Each region is a list of intervals of K2 at each K1, with exact edges (D-decomposition in `loop` and in `dsp`); nothing
-is read off a raster.
+Each region is a list of intervals of one gain at each value of the other, with exact edges (D-decomposition in `loop`
+and in `dsp`); nothing is read off a raster.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import Arm, HubFeedback, unit_of
+from tfarm.arm import PLANE, Arm, HubFeedback, shown_unit
 from tfarm.columns import Column, Table
 from tfarm.digits import plain
 from tfarm.dsp import GainMap, gain_map, sampled_verdict
@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 
 K2_RANGE = (-1.0, 1.5)
 CUT = (-1.02, 1.52)  # where intervals are cut, just outside the picture: no cut is seen as an edge
-COLUMNS = 72  # values of K1, and either side of upright edges
+COLUMNS = 72  # values of the gain across, and either side of upright edges
 DAMPINGS = (1e-4, 1e-6)  # s: what is drawn beside C = 0
-BEYOND = 1.7  # of the largest stable K1: how far the picture goes
-SAME = 1e-3  # ends of K1 as close as this are seen as one
+BEYOND = 1.7  # of the largest stable gain across: how far the picture goes
+SAME = 1e-3  # ends as close as this are seen as one
 BELOW = 15.0  # of the gain itself
 
 
@@ -46,10 +46,11 @@ def overlay(arm: Arm, gains: HubFeedback, chain: Chain) -> Overlay:
     loops = [sampled_verdict(arm.having(damping=C), gains, chain).full for C in dampings]
     ends = np.unique(np.concatenate([ends_of_K1(loop) for loop in loops]))
     ends = ends[np.diff(ends, prepend=0.0) > SAME * ends]
-    low, top = gains.K1 / BELOW, _round_up(BEYOND * max([gains.K1, *ends]))
-    K1 = with_both_sides(np.geomspace(low, top, COLUMNS), ends)
-    K1 = K1[(low <= K1) & (top >= K1)]
-    return Overlay(region(arm, K1, np.array(CUT)), tuple(gain_map(loop, K1, CUT) for loop in loops))
+    own, _ = gains.point
+    low, top = own / BELOW, _round_up(BEYOND * max([own, *ends]))
+    across = with_both_sides(np.geomspace(low, top, COLUMNS), ends)
+    across = across[(low <= across) & (top >= across)]
+    return Overlay(region(arm, across, np.array(CUT)), tuple(gain_map(loop, across, CUT) for loop in loops))
 
 
 def _round_up(x: float) -> float:
@@ -70,7 +71,7 @@ def draw_overlay(data: Overlay) -> Figure:
 
 
 def overlay_table(data: Overlay, stem: str) -> Table:
-    """The numbers of the picture: at each K1 the ends of the stable intervals of K2."""
+    """The numbers of the picture: at each value of the gain across the ends of the stable intervals of the other."""
     own = data.continuous.arm.damping
     each = {"continuous_K2_intervals": data.continuous.stable_intervals}
     for plane in data.sampled:
@@ -80,6 +81,7 @@ def overlay_table(data: Overlay, stem: str) -> Table:
         Column(key, key, of=[tuple(float(end) for window in column for end in window) for column in intervals])
         for key, intervals in each.items()
     ]
-    K1 = Column("K1", "K1", unit_of("K1", data.continuous.arm), of=data.continuous.K1)
-    title = "Stable intervals of K2, continuous and sampled"
-    return Table(stem=stem, title=title, is_data=True, columns=(K1, *columns))
+    across, up = PLANE
+    values = Column(across, across, shown_unit(across, data.continuous.arm), of=data.continuous.axes[0])
+    title = f"Stable intervals of {up}, continuous and sampled"
+    return Table(stem=stem, title=title, is_data=True, columns=(values, *columns))

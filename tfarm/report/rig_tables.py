@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from tfarm.arm import Arm, Link, RotarySpring, unit_of
+from tfarm.arm import MOMENT_GAIN, RATE_GAIN, Arm, Link, RotarySpring, unit_of
 
 Row = tuple[str, str, float, str]
 
@@ -102,8 +102,8 @@ def derived_rows(arm: Arm) -> list[Row]:
     if arm.has_rigid_mode and not arm.is_locked:
         rows.append(("root moment per torque at rest", "", -arm.gauged_inertia / arm.total_inertia, "N m/(N m)"))
     if arm.input_per_torque != 1.0:
-        rows.append(("input for a torque of 1 N m", "", arm.input_per_torque, unit_of("K2", arm)))
+        rows.append(("input for a torque of 1 N m", "", arm.input_per_torque, unit_of(MOMENT_GAIN, arm)))
     if arm.rate_loss:
-        rows.append(("what the losses at the hub add to K1", "", arm.rate_loss, unit_of("K1", arm)))
+        rows.append((f"what the losses at the hub add to {RATE_GAIN}", "", arm.rate_loss, unit_of(RATE_GAIN, arm)))
     rows.append(("shear cut-off, of several segments the lowest", "√(κGA/ρI)", arm.shear_cutoff, "rad/s"))
     return [*rows, ("shear cut-off", "", arm.shear_cutoff / (2 * math.pi), "Hz")]

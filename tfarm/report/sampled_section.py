@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tfarm.arm import Arm, unit_of, written_unit
+from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, shown_unit
 from tfarm.columns import Column, Table
 from tfarm.digits import counted, plain, scientific, significant, singly
 from tfarm.dsp import Chain, sampled_verdict
@@ -22,7 +22,6 @@ from tfarm.report.overlay import draw_overlay, overlay_table
 from tfarm.report.sampled_modes import loci_table, mode_rows
 from tfarm.report.sampled_words import (
     Sampled,
-    Window,
     chain_words,
     compared,
     cure,
@@ -44,7 +43,7 @@ from tfarm.report.time_responses import (
 )
 from tfarm.report.words import typeset
 
-PAST_HUB = 1.25  # times the K1 at which sampling the hub alone would break it: how far its locus goes
+PAST_HUB = 1.25  # times the rate gain at which sampling the hub alone would break it: how far its locus goes
 
 LOCUS_K2 = (-0.5, 1.5)
 
@@ -67,8 +66,8 @@ def sampled_section(arm: Arm, chain: Chain | None = None) -> Section:
 
 def _overlay_picture(data: Sampled) -> Picture:
     regions = data.regions
-    below = ", and nothing is stable at K1 < 0" if data.arm.has_rigid_mode else ""
-    low = plain(float(regions.continuous.K1[0]), 2)
+    below = f", and nothing is stable at {RATE_GAIN} < 0" if data.arm.has_rigid_mode else ""
+    low = plain(float(regions.continuous.axes[0][0]), 2)
     layers = (
         "Nested blues: C = 0 (for the first modes only), and what the same arm would do with a little damping. "
         if len(regions.sampled) > 1
@@ -82,11 +81,11 @@ def _overlay_picture(data: Sampled) -> Picture:
             "Sand: where the continuous loop is stable, with every mode. Blue: where the sampled one is. Sand without "
             f"blue is what a controller that ignores its clock would wrongly trust. {layers}{proven}"
             "All edges are exact crossings of the axis or the unit circle. "
-            f"The axis is logarithmic: K1 = 0 lies beyond its left end at {low}{below}. "
+            f"The axis is logarithmic: {RATE_GAIN} = 0 lies beyond its left end at {low}{below}. "
             f""
         ),
         alt=(
-            f"Map of K1 and K2: at K1 = {plain(data.gains.K1)} the continuous loop is stable for K2 "
+            f"Map of {' and '.join(PLANE)}: at {data.held} the continuous loop is stable for {MOMENT_GAIN} "
             f"{interval(data.continuous.around, data.continuous.looked_at)}, the sampled one "
             f"{interval(data.sampled_K2)}."
         ),
@@ -107,7 +106,7 @@ def _periods_table(data: Sampled) -> Table:
         stem="sampled-periods",
         title="Faster or slower sampling",
         caption=(
-            f"The same gains, K1 = {plain(data.gains.K1)} and K2 = {plain(data.gains.K2)}, at other sample periods; "
+            f"The same gains, {' and '.join(data.gains.told(plain))}, at other sample periods; "
             f"the verdicts hold for the modes given ({held}). Growth is that of the pole that decides, per second: "
             "negative is stable. Where the gains are not stable, the intervals are those that would be. "
             f""
@@ -119,10 +118,7 @@ def _periods_table(data: Sampled) -> Table:
             Column("verdict", "verdict", of=lambda row: "stable" if row.log_radius < 0 else "unstable"),
             Column("growth_1_s", "growth", "1/s", of=growth, digits=singly(scientific, 3)),
             Column("modes", "modes", of="analysis_modes", shown=first),
-            _window_column("stable_K1", "stable K1", unit_of("K1", data.arm), [(row.K1, row.gains.K1) for row in rows]),
-            _window_column(
-                "stable_K2", "stable K2", written_unit("K2", data.arm).strip(), [(row.K2, row.gains.K2) for row in rows]
-            ),
+            *(_window_column(name, data) for name in PLANE),
         ),
     )
 
@@ -132,18 +128,20 @@ def _hub_in_input(arm: Arm) -> float:
     return arm.hub_side_inertia * arm.input_per_torque
 
 
-def _window_column(key: str, title: str, unit: str, rows: list[tuple[tuple[Window, ...], float]]) -> Column:
-    """The interval around the gain, or the ends of all that there are."""
+def _window_column(name: str, data: Sampled) -> Column:
+    """The interval around the gain of that name, or the ends of all that there are, at each period."""
+    rows = [(row.windows[name], row.gains[name]) for row in data.periods]
     here = [around(list(windows), gain) for windows, gain in rows]
     every = [tuple(end for window in windows for end in window) for windows, _ in rows]
     values = [window or others for window, others in zip(here, every, strict=True)]
-    return Column(key, title, unit, of=values, shown=[spans(*row) for row in rows])
+    shown = [spans(*row) for row in rows]
+    return Column(f"stable_{name}", f"stable {name}", shown_unit(name, data.arm), of=values, shown=shown)
 
 
 def _mode_blocks(data: Sampled) -> list[Picture | Table]:
     loop, table = data.analysis.verdict.loop, data.analysis.modes
     T = loop.chain.sampling.period
-    top = max(PAST_HUB * 2 * _hub_in_input(data.arm) / T, STRONGER * data.gains.K1)
+    top = max(PAST_HUB * 2 * _hub_in_input(data.arm) / T, STRONGER * data.gains[RATE_GAIN])
     found = loci(loop, top, LOCUS_K2)
     aliased = [int(i) for i, band in zip(table.index, table.band, strict=True) if band > 0]
     first = f"From mode {aliased[0]} on all are aliased. " if aliased else "No mode here is aliased. "
@@ -152,8 +150,8 @@ def _mode_blocks(data: Sampled) -> list[Picture | Table]:
         title="Poles of the sampled loop",
         caption=(
             f"Left: the samples tell frequencies apart up to {plain(0.5 / T)} Hz only; what lies in the shaded strips "
-            f"is seen, and moved by the gains, where the arrows end. {first}Lines: K1 alone, growing from the open "
-            "circles to the dots; the real axis is logarithmic away from 0. Right: the z-plane, stable inside the "
+            f"is seen, and moved by the gains, where the arrows end. {first}Lines: {RATE_GAIN} alone, growing from the "
+            "open circles to the dots; the real axis is logarithmic away from 0. Right: the z-plane, stable inside the "
             "circle; open circles where the range begins, dots at the gains, orange the aliased modes, grey hub and "
             f"delay. What looks like lying on the circle is told apart by the next picture."
         ),
@@ -170,8 +168,8 @@ def _mode_blocks(data: Sampled) -> list[Picture | Table]:
         caption=(
             "Upwards is growth, downwards decay, both on logarithmic scales. Shaded are the bands in which hub rate "
             "feedback destabilises, as the samples see a rate of the wrong sign there; above the narrowest one shown "
-            "they alternate too closely to draw. Root moment feedback with K2 > 0 damps in every band to first order; "
-            "where a filled dot lies far from that, another mode in the loop decides. "
+            f"they alternate too closely to draw. Root moment feedback with {MOMENT_GAIN} > 0 damps in every band to first "
+            "order; where a filled dot lies far from that, another mode in the loop decides. "
             f"Of {table.index.size} modes, {said}."
         ),
         alt=f"Growth per sample of {table.index.size} modes over their frequency; {said}.",

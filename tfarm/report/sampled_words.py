@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tfarm.arm import Arm, HubFeedback, unit_of, written_unit
+from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, HubFeedback, unit_of
 from tfarm.digits import plain, scientific, significant
 from tfarm.dsp import Analysis, Verdict, analyse
 from tfarm.dsp.chain import Chain
@@ -31,7 +31,7 @@ Window = tuple[float, float]
 @dataclass(frozen=True)
 @record
 class Sampled:
-    """Everything that the section says and draws.  `continuous` are the windows of K2 of the continuous loop."""
+    """Everything that the section says and draws.  `continuous`: the moment gain's windows without a clock."""
 
     arm: Arm
     analysis: Analysis
@@ -56,8 +56,13 @@ class Sampled:
 
     @property
     def sampled_K2(self) -> Window | None:
-        """The stable interval of K2 around the gains."""
-        return around(self.analysis.K2_windows, self.gains.K2)
+        """The stable interval of the moment gain around the gains."""
+        return around(self.analysis.K2_windows, self.gains[MOMENT_GAIN])
+
+    @property
+    def held(self) -> str:
+        """The rate gain that the intervals of the moment gain hold for."""
+        return self.gains.told(plain, [RATE_GAIN])[0]
 
 
 def in_ms(chain: Chain) -> str:
@@ -69,7 +74,7 @@ def study(arm: Arm, chain: Chain) -> Sampled:
     """The numbers of the section.  Raises ParameterError for an arm without a loop."""
     gains = default_gains(arm)
     analysis = analyse(arm, gains, chain)
-    windows = gain_windows(stability(arm, gains), "K2")
+    windows = gain_windows(stability(arm, gains), MOMENT_GAIN)
     return Sampled(arm, analysis, windows, overlay(arm, gains, chain), at_periods(arm, gains, chain))
 
 
@@ -79,8 +84,7 @@ def study(arm: Arm, chain: Chain) -> Sampled:
 def short_answer(data: Sampled) -> str:
     """Yes or no, by how much, for how many modes, and how fast."""
     verdict = data.analysis.verdict
-    units = [written_unit(name, data.arm) for name in ("K1", "K2")]
-    gains = f"K1 = {plain(data.gains.K1)}{units[0]} and K2 = {plain(data.gains.K2)}{units[1]}"
+    gains = " and ".join(data.gains.told(plain, arm=data.arm))
     settled = f"with {_modes(verdict)}" if verdict.is_settled else f"as far as its {_modes(verdict)} go"
     is_stable = verdict.is_stable
     margin = f" and bears {_delay(data)} more of delay" if is_stable else ""
@@ -151,14 +155,14 @@ def duration(seconds: float) -> str:
 
 
 def compared(data: Sampled) -> str:
-    """The continuous interval of K2 against the sampled one, end by end."""
+    """The continuous interval of the moment gain against the sampled one, end by end."""
     verdict, before, after = data.analysis.verdict, data.continuous.around, data.sampled_K2
-    modes = "" if data.analysis.K2.is_settled else f" (first {verdict.modes_used} modes)"
+    modes = "" if data.analysis.shown[MOMENT_GAIN].is_settled else f" (first {verdict.modes_used} modes)"
     both = (
-        f"the continuous loop is stable for K2 {interval(before, data.continuous.looked_at)}; the sampled one "
-        f"{interval(after)}{modes}"
+        f"the continuous loop is stable for {MOMENT_GAIN} {interval(before, data.continuous.looked_at)}; "
+        f"the sampled one {interval(after)}{modes}"
     )
-    told = f"At K1 = {plain(data.gains.K1)} {both}."
+    told = f"At {data.held} {both}."
     if after is None:
         return told if before is None else f"{told} Sampling loses what holds without it."
     if before is None:
@@ -174,11 +178,12 @@ def compared(data: Sampled) -> str:
 
 
 def _lower_end(before: Window, after: Window, looked_at: Window) -> list[str]:
-    """What sampling does to the lower end of K2."""
+    """What sampling does to the lower end of the moment gain."""
     if abs(after[0] - before[0]) <= MOVED * abs(before[0]) or (before[0] == looked_at[0] and after[0] <= before[0]):
         return []
     if after[0] > before[0]:
-        return ["takes away all negative K2" if after[0] == 0 else f"takes away K2 below {significant(after[0], 3)}"]
+        below = f"takes away {MOMENT_GAIN} below {significant(after[0], 3)}"
+        return [f"takes away all negative {MOMENT_GAIN}" if after[0] == 0 else below]
     return [f"adds room down to {significant(after[0], 3)}"]
 
 
@@ -186,14 +191,14 @@ def _upper_end(before: Window, after: Window) -> list[str]:
     """And to the upper one, beside the continuous edge."""
     if abs(after[1] - before[1]) <= MOVED * abs(before[1]):
         return []
-    verb = "adds room up to" if after[1] > before[1] else "takes away K2 above"
+    verb = "adds room up to" if after[1] > before[1] else f"takes away {MOMENT_GAIN} above"
     return [f"{verb} {significant(after[1], 4)}"]
 
 
 def interval(window: Window | None, looked_at: Window = EVERYWHERE) -> str:
-    """An interval of K2 in words; an end of what was looked at is no edge, and is said to be none."""
+    """An interval of the moment gain in words; an end of what was looked at is no edge, and is said to be none."""
     if window is None:
-        return "for no K2 around this one"
+        return f"for no {MOMENT_GAIN} around this one"
     low, high = window
     no_low, no_high = (math.isinf(end) or end == bound for end, bound in zip(window, looked_at, strict=True))
     bounds = [f"down to {plain(low, 4)}"] * (no_low and not math.isinf(low))
@@ -247,17 +252,17 @@ def headline_facts(data: Sampled) -> tuple[Fact, ...]:
     held = _modes(verdict)
     late = f"{significant(margin.samples, 3)} samples"
     by = f"by {late} of delay" if verdict.is_stable else verdict.word
-    K2 = span(data.continuous.around, data.continuous.looked_at)
-    K1 = spans(analysis.K1_windows, gains.K1)
+    continuous = span(data.continuous.around, data.continuous.looked_at)
+    on_rate, on_moment = (spans(analysis.shown[name].windows, gains[name]) for name in PLANE)
     return (
         Fact(label=f"does a {data.ms} ms loop hold?", value=_yes_or_no(data).lower(), beside=f"{by}, {held}"),
         Fact(label="ln|z| a sample, largest", value=scientific(growth, 3), beside="below 0 is stable"),
-        Fact(label="stable K2", value=spans(analysis.K2_windows, gains.K2), beside=f"continuous: {K2}"),
+        Fact(label=f"stable {MOMENT_GAIN}", value=on_moment, beside=f"continuous: {continuous}"),
         Fact(
-            label="stable K1",
-            value=K1,
-            unit=unit_of("K1", data.arm) if K1 != "none" else "",
-            beside=f"at K2 = {plain(gains.K2)}",
+            label=f"stable {RATE_GAIN}",
+            value=on_rate,
+            unit=unit_of(RATE_GAIN, data.arm) if on_rate != "none" else "",
+            beside=f"at {gains.told(plain, [MOMENT_GAIN])[0]}",
         ),
         Fact(
             label="further delay it bears",

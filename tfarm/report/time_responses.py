@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tfarm.arm import Arm
+from tfarm.arm import MOMENT_GAIN, Arm
 from tfarm.columns import Column, Table
 from tfarm.digits import held, plain, significant
 from tfarm.dsp import Simulation, curves
@@ -27,7 +27,7 @@ def draw_slews(data: Slews) -> Figure:
     """Root moment, tip and motor torque over time."""
     slew = data.with_moment.chain.slew
     travel = plain(slew.travel_of(data.arm.reach), 3)
-    what = f"{travel} m of tip travel in {plain(slew.rise_time, 3)} s, K1 = {plain(data.gains.K1)}"
+    what = f"{travel} m of tip travel in {plain(slew.rise_time, 3)} s, {data.held}"
     return draw_responses(data.arm, data.each, what)
 
 
@@ -47,8 +47,8 @@ def what_slews_show(data: Slews) -> str:
     both = f"With moment feedback or without it {settled[0]}" if settled[0] == settled[1] else each
     ratio = "" if before == 0 or after == 0 else f", {significant(before / after, 3)} times as much without as with it"
     return (
-        f"Root moment left after the slew, less the rigid arm's: {significant(before, 3)} N m rms with K2 = 0, "
-        f"{significant(after, 3)} N m with K2 = {plain(data.gains.K2)}{ratio}. "
+        f"Root moment left after the slew, less the rigid arm's: {significant(before, 3)} N m rms with "
+        f"{MOMENT_GAIN} = 0, {significant(after, 3)} N m with {data.fed_back}{ratio}. "
         f"{both}.{clipped}"
     )
 
