@@ -168,8 +168,8 @@ def _mode_blocks(data: Sampled) -> list[Picture | Table]:
         caption=(
             "Upwards is growth, downwards decay, both on logarithmic scales. Shaded are the bands in which hub rate "
             "feedback destabilises, as the samples see a rate of the wrong sign there; above the narrowest one shown "
-            f"they alternate too closely to draw. Root moment feedback with {MOMENT_GAIN} > 0 damps in every band to first "
-            "order; where a filled dot lies far from that, another mode in the loop decides. "
+            f"they alternate too closely to draw. Root moment feedback with {MOMENT_GAIN} > 0 damps in every band to "
+            "first order; where a filled dot lies far from that, another mode in the loop decides. "
             f"Of {table.index.size} modes, {said}."
         ),
         alt=f"Growth per sample of {table.index.size} modes over their frequency; {said}.",
