@@ -39,7 +39,7 @@ def data_of(name, period=0.01):
     )  # fmt: skip
     analysis = SimpleNamespace(
         verdict=verdict, K1_windows=stable_windows(loop, "K1"), K2_windows=stable_windows(loop, "K2"),
-        K2=SimpleNamespace(is_settled=False),
+        shown={"K2": SimpleNamespace(is_settled=False)},
         delay_margin=SimpleNamespace(samples=1.25, is_bound=False), required_damping=0.0,
         damping=SimpleNamespace(is_settled=False, modes=MODES),
         modes=SimpleNamespace(natural_frequency=tfarm.modes(arm, 1).natural_frequency[-1:]),

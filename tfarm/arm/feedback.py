@@ -42,6 +42,7 @@ ANGLE_GAIN, RATE_GAIN, MOMENT_GAIN = ON["hub_angle"], ON["hub_rate"], ON["root_m
 PLANE = (RATE_GAIN, MOMENT_GAIN)  # the gains of the paper's own law: across and up the map of a loop
 TWO_GAINS = "-".join(PLANE)  # the structure of a law that is these, beside PD, lead, ...
 TAKEN_OFF = " - ".join(f"{gain.name} {gain.letter}" for gain in GAINS)  # off the input of the arm, by the law
+SPELT_OUT = TAKEN_OFF.replace(" M", " E I phi'(0)")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -211,8 +211,8 @@ def parts_at(s: complex, k: Any) -> Any:
 def zeros_at_origin(k: System, gains: Sequence[Fraction | float] = OPEN) -> int:
     """How often D vanishes at s = 0: twice where the whole arm turns freely, once where the hub's rate is fed back.
 
-    Not where its angle is.  (A third time at K1 = Kp = 0 and K2 = J/(J - I_h), where gauge and inertia cancel: that
-    zero is left in D.)
+    Not where its angle is.  (A third time under the moment's gain J/(J - I_h) alone, where gauge and inertia cancel:
+    that zero is left in D.)
     """
     used = [OUTPUTS[gain.output] for gain, value in zip(GAINS, gains, strict=True) if value]
     return min(k.at_rest, *(each.power for each in used if each.quantity == "theta"), 2)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from tfarm.arm import LISTED, Arm, HubFeedback, through, unit_of, written_unit
+from tfarm.arm import ANGLE_GAIN, LISTED, PLANE, SPELT_OUT, Arm, HubFeedback, shown_unit, through, unit_of
 from tfarm.arm.law import Law
 from tfarm.columns import JSON, REPORT, TERMINAL, Column, Table
 from tfarm.digits import general, plain, singly, within
@@ -22,7 +22,7 @@ from .poles import Poles
 from .regions import INFINITE, Region
 from .windows import Interval, Windows, reach_words
 
-LAW = "u = -Kp theta - K1 theta_t - K2 E I phi'(0) + r"
+LAW = f"u = -{SPELT_OUT} + r"
 POLES = (  # of pairs Re s, Im s
     Column("re", "Re s", "1/s", of=lambda pole: within(pole[0], HELD * math.hypot(*pole), 12)),
     Column("im", "Im s", "rad/s", of=lambda pole: pole[1], digits=singly(general, 12)),
@@ -51,7 +51,7 @@ class GainRow(NamedTuple):
 def gain_rows(found: Margins[Any]) -> list[GainRow]:
     """The gains of a loop."""
     loop, rows = found.stability.loop, found.windows.items()
-    return [GainRow(name, loop.law[name], windows, written_unit(name, loop.arm).strip()) for name, windows in rows]
+    return [GainRow(name, loop.law[name], windows, shown_unit(name, loop.arm)) for name, windows in rows]
 
 
 def _joined(*pairs: Interval) -> str:
@@ -105,7 +105,7 @@ PHASE_CROSSOVERS = (  # of pairs: where L < 0, and the factor that puts a pole t
 
 
 def sign_of(arm: Arm) -> str:
-    """The law, and what a gauge reads of a static torque: with it the sign of K2; of a rig what u is."""
+    """The law, and what a gauge reads of a static torque: with it the sign of its gain; of a rig what u is."""
     if arm.is_uniform:
         return f"{LAW}; a static torque u gives the moment -(J - I_h)/J u"
     if not arm.has_rigid_mode:
@@ -115,9 +115,9 @@ def sign_of(arm: Arm) -> str:
 
 
 def law_answer(law: HubFeedback | Law, arm: Arm) -> dict[str, Any]:
-    """The gains, with the sign convention that K2 needs, and what the loop closes through; or what a law reads."""
+    """The gains, with the sign convention that they need, and what the loop closes through; or what a law reads."""
     if isinstance(law, HubFeedback):
-        return {"K1": law.K1, "K2": law.K2, "Kp": law.Kp} | convention(arm)
+        return law.by_name | convention(arm)
     sign = "-" if law.sign < 0 else "+"
     late = f", {law.delay:g} s late" if law.delay else ""
     words = f"v = {sign}sum of C_i(s) y_i{late}; v is {through(arm)}, y = ({', '.join(law.signals)})"
@@ -132,7 +132,7 @@ def law_answer(law: HubFeedback | Law, arm: Arm) -> dict[str, Any]:
 
 
 def convention(arm: Arm) -> dict[str, Any]:
-    """Of the answers of every loop: the sign of K2, the input, and each gain's unit."""
+    """Of the answers of every loop: the sign of the moment's gain, the input, and each gain's unit."""
     units = {gain.name: unit_of(gain.name, arm) for gain in LISTED}
     return {"sign_convention": sign_of(arm), "input": arm.input, "gain_units": units}
 
@@ -250,20 +250,18 @@ def nyquist_table(found: Nyquist[Any]) -> Table:
 
 
 def map_answer(found: Region) -> dict[str, Any]:
-    """Unstable poles over the grid (rows of K2), "inf" where they are infinitely many, and the boundary curve."""
+    """Unstable poles over the grid, rows upwards, "inf" where they are infinitely many, and the boundary curve."""
     rows = [["inf" if count == INFINITE else int(count) for count in row] for row in found.unstable]
-    low, high = (found.K1[0], found.K1[-1]), (found.K2[0], found.K2[-1])
     inside = [
         [float(value) for value in point]
         for point in found.boundary
-        if low[0] <= point[0] <= low[1] and high[0] <= point[1] <= high[1]
+        if all(values[0] <= value <= values[-1] for value, values in zip(point, found.axes, strict=False))
     ]
     return {
         "arm": found.arm.name,
-        "Kp": found.Kp,
+        ANGLE_GAIN: found.held[ANGLE_GAIN],
         **convention(found.arm),
-        "K1": found.K1.tolist(),
-        "K2": found.K2.tolist(),
+        **{name: values.tolist() for name, values in zip(PLANE, found.axes, strict=True)},
         "unstable_roots": rows,
         "boundary": inside,
         "band_rad_s": found.band,

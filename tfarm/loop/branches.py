@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, HubFeedback
+from tfarm.arm import RATE_GAIN, Arm, HubFeedback
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
 from tfarm.spectrum import damped_modes, modes
@@ -172,10 +172,10 @@ def _closed(loop: Loop, zeros: Complex, wanted: int, lowest: float) -> Complex:
     try:
         return Stage(Variation(arm, law, "all"), 0.0, 1.0, lowest).follow(zeros, wanted)[-1].zeros
     except ConvergenceError:
-        aside = law.K1 + ASIDE * rate_unit(arm)
-        around = law.having("K1", aside)
+        aside = law[RATE_GAIN] + ASIDE * rate_unit(arm)
+        around = law.having(RATE_GAIN, aside)
         there = Stage(Variation(arm, around, "all"), 0.0, 1.0, lowest).follow(zeros, wanted)[-1].zeros
-        return Stage(Variation(arm, law, "K1"), aside, law.K1, lowest).follow(there, wanted)[-1].zeros
+        return Stage(Variation(arm, law, RATE_GAIN), aside, law[RATE_GAIN], lowest).follow(there, wanted)[-1].zeros
 
 
 def open_pairs(arm: Arm, number: int, wanted: int) -> tuple[Complex, float]:
@@ -204,9 +204,9 @@ def _alone(zeros: Sequence[float]) -> Complex:
 
 
 def rigid_pair(loop: Loop, _: Complex) -> Complex:
-    """The zeros of J_eff s^2 + K1 s + Kp: what the rigid body's become under small gains."""
+    """The zeros of J_eff s^2 + b s + c (`Loop.at_hub`): what the rigid body's become under small gains."""
     J = effective_inertia(loop.arm, loop.law) or 1e-9 * loop.arm.total_inertia
-    b, c = (loop.law.K1 + loop.arm.rate_loss) / J, loop.law.Kp / J
+    b, c = (each / J for each in loop.at_hub)
     root = np.sqrt(complex(b * b / 4 - c))
     far = -b / 2 - np.copysign(root.real, b) if root.real else -b / 2 + 1j * root.imag
     near = c / far if root.real else np.conj(far)
@@ -214,8 +214,9 @@ def rigid_pair(loop: Loop, _: Complex) -> Complex:
 
 
 def _slow_zero(loop: Loop, pair: Complex) -> Complex:
-    """The pair with its zero at 0 moved to -Kp/K1: where it goes at small Kp."""
-    return np.array([-loop.law.Kp / (loop.law.K1 + loop.arm.rate_loss), pair[1]], complex)
+    """The pair with its zero at 0 moved to -c/b: where it goes while little holds the hub's angle."""
+    b, c = loop.at_hub
+    return np.array([-c / b, pair[1]], complex)
 
 
 def segments(nodes: list[Node], pinned: bool = False) -> list[Segment]:

@@ -152,8 +152,8 @@ def _on_axis(variation: Variation, gains: Real, omega: Real) -> Complex:
     """D(i w; g) for each gain and frequency, all on the scale of the first.
 
     Without losses drive and numerators are real there, or imaginary with an odd power of s, and what rounding adds is
-    taken off: then Im D is that of the rate gain alone, and the crossings at K1 = 0 and K2 = 1 come out to the last
-    digit.
+    taken off: then Im D is that of the rate gain alone, and the crossings that theorems put at 0 and 1 come out to the
+    last digit.
     """
     values, base = np.empty(omega.size, complex), 0.0
     for n, (gain, w) in enumerate(zip(gains, omega, strict=True)):

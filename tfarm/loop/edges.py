@@ -7,12 +7,12 @@ the D-decomposition is evaluated between; where the curve leaves the picture, or
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, HubFeedback
+from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN, Arm
 from tfarm.spectrum.scales import default_gains, rate_unit
 
 from .lines import along, crossing_at_zero
@@ -24,7 +24,7 @@ LOG_BASE = math.log(10.0)
 LINEAR_SCALE = 0.5  # decades that the linear part of an axis takes on each side of 0, as matplotlib's `linscale` has it
 LINEAR_SHARE = LINEAR_SCALE / (1 - 1 / 10)  # what these are multiplied by there
 EVEN = 1e-9  # of its range: by less may the steps of an even grid differ
-LOW, HIGH, DEEPEST = -4.0, 2.0, -50.0  # K2: the range shown, and how deep windows are looked for
+LOW, HIGH, DEEPEST = -4.0, 2.0, -50.0  # of the moment gain: the range shown, and how deep windows are looked for
 SHORT, LONG, ROUNDS = 0.008, 0.03, 30  # lengths of the boundary's segments, as shares of the picture
 SCAN = 32  # columns in which they are looked for
 NEAR = 1.5  # beyond this many rows from the boundary the count must have changed
@@ -75,23 +75,23 @@ class Axis:
 
 
 def rate_axis(arm: Arm) -> Axis:
-    """K1 from just below 0 to 10 J w1, logarithmic from well below the default gain on."""
+    """The rate gain from just below 0 to 10 J w1, logarithmic from well below the default gain on."""
     unit = rate_unit(arm)
-    linear = 10.0 ** math.floor(math.log10(default_gains(arm).K1))
+    linear = 10.0 ** math.floor(math.log10(default_gains(arm)[RATE_GAIN]))
     return Axis(-linear, 10 * unit, linear)
 
 
 def moment_axis(arm: Arm, x: Axis) -> Axis:
-    """K2 from -4 to 2, or as deep as unstable windows go, times what one N m takes of a rig's input."""
+    """The moment gain from -4 to 2, or as deep as unstable windows go, times what one N m takes of a rig's input."""
     low, high, deepest = (each * arm.input_per_torque for each in (LOW, HIGH, DEEPEST))
     if arm.is_undamped:
         return Axis(low, high)
-    K1 = x.grid(SCAN)
-    deep = region(arm, K1[K1 > 0], between(deepest, low, 400))
+    across = x.grid(SCAN)
+    deep = region(arm, across[across > 0], between(deepest, low, 400))
     rows = np.nonzero(~deep.stable.all(axis=1))[0]
     if not rows.size:
         return Axis(low, high)
-    return Axis(max(deepest, 1.4 * float(deep.K2[rows[0]])), high, high)
+    return Axis(max(deepest, 1.4 * float(deep.axes[1][rows[0]])), high, high)
 
 
 def edge(found: Region, x: Axis, y: Axis) -> Real:
@@ -106,7 +106,7 @@ def edge(found: Region, x: Axis, y: Axis) -> Real:
             break
         middle = np.sqrt(points[coarse, 2] * points[coarse + 1, 2])
         middle = middle[(middle > points[coarse, 2]) & (middle < points[coarse + 1, 2])]
-        points = np.concatenate([points, boundary(found.arm, middle, found.Kp)])
+        points = np.concatenate([points, boundary(found.arm, middle, found.held[ANGLE_GAIN])])
         points = points[np.unique(points[:, 2], return_index=True)[1]]
     length, is_seen = _segments(points, x, y)
     return _cut(points, is_seen & (length < LONG))
@@ -136,9 +136,9 @@ def stable_edge(found: Region, points: Real, x: Axis, y: Axis) -> Real:
     if not points.size:
         return points
     across, up = x.place(points[:, 0]), y.place(points[:, 1])
-    column = np.searchsorted(_middles(x.place(found.K1)), across)
-    row = np.interp(up, y.place(found.K2), np.arange(found.K2.size))
-    below, above = (np.clip(np.round(row + way).astype(int), 0, found.K2.size - 1) for way in (-NEAR, NEAR))
+    columns, rows = (axis.place(values) for axis, values in zip((x, y), found.axes, strict=True))
+    column, row = np.searchsorted(_middles(columns), across), np.interp(up, rows, np.arange(rows.size))
+    below, above = (np.clip(np.round(row + way).astype(int), 0, rows.size - 1) for way in (-NEAR, NEAR))
     differ = (found.unstable[below, column] == 0) != (found.unstable[above, column] == 0)
     return np.asarray(points[differ & (up >= 0) & (up <= 1) & (across <= 1) & (points[:, 0] > 0)])
 
@@ -149,13 +149,13 @@ def _middles(values: Real) -> Real:
 
 def seen(found: Region, x: Axis, y: Axis) -> Region:
     """The counts of a map on a grid that is even as seen: at each of its points those of the nearest one computed."""
-    K1, K2 = x.grid(found.K1.size), y.grid(found.K2.size)
-    rows, columns = np.searchsorted(_middles(found.K2), K2), np.searchsorted(_middles(found.K1), K1)
-    return replace(found, K1=K1, K2=K2, unstable=found.unstable[np.ix_(rows, columns)])
+    across, up = (axis.grid(values.size) for axis, values in zip((x, y), found.axes, strict=True))
+    columns, rows = (np.searchsorted(_middles(old), new) for old, new in zip(found.axes, (across, up), strict=True))
+    return found.on(across, up, found.unstable[np.ix_(rows, columns)])
 
 
 def static_edges(found: Region) -> tuple[float | None, float | None]:
-    """Where a real pole passes through 0: the K1 of an upright line of the boundary, and the K2 of a level one."""
-    upright = crossing_at_zero(found.arm, along("K1", HubFeedback(Kp=found.Kp)))
-    level = crossing_at_zero(found.arm, along("K2", HubFeedback(K1=1.0, Kp=found.Kp)))
+    """Where a real pole passes through 0: an upright line of the boundary, and a level one."""
+    upright = crossing_at_zero(found.arm, along(RATE_GAIN, found.held))
+    level = crossing_at_zero(found.arm, along(MOMENT_GAIN, found.held.having(RATE_GAIN, 1.0)))
     return None if upright is None else upright.t, None if level is None else level.t

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, HubFeedback
+from tfarm.arm import NAMES, Arm, HubFeedback
 from tfarm.arm.checks import whole
 from tfarm.crossing.turning import loose
 from tfarm.errors import ConvergenceError, ParameterError
@@ -80,7 +80,7 @@ def locus(
 ) -> Locus:
     """The exact locus at `points` equally spaced values from `start` to `stop`, of the first `branches` branches.
 
-    `vary` is K1, K2, Kp, "all" (a scale on the law) or a parameter of the arm: payload_mass, payload_inertia,
+    `vary` is a gain, "all" (a scale on the law) or a parameter of the arm: payload_mass, payload_inertia,
     hub_inertia, length, damping; what it names in `arm` or `law` is replaced.  Raises ParameterError for what is no
     loop or no range, ConvergenceError where branches cannot be told apart, and where one has ended and an unstable pole
     is on none (along a gain that is no error: its crossing is listed).
@@ -157,7 +157,8 @@ def _range(variation: Variation, start: float, stop: float) -> None:
     if start == stop:
         raise ParameterError(key="to", value=stop, remedy="the range is empty: a locus runs to another value")
     if variation.vary == "all" and variation.law == HubFeedback():
-        raise ParameterError(key="vary", value="all", remedy="every gain is 0: give K1, K2 or Kp to be scaled")
+        one_of = f"{', '.join(NAMES[:-1])} or {NAMES[-1]}"
+        raise ParameterError(key="vary", value="all", remedy=f"every gain is 0: give {one_of} to be scaled")
 
 
 def _listed(curves: Complex, variation: Variation, number: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -273,7 +274,7 @@ class _Polish:
 
 def _at_static_crossing(variation: Variation, gain: Real) -> NDArray[np.int64]:
     """1 at each gain where a pole of an arm that is held at its tip passes through s = 0, and 0 elsewhere."""
-    if variation.arm.has_rigid_mode or variation.vary not in ("K1", "K2", "Kp"):
+    if variation.arm.has_rigid_mode or variation.vary not in NAMES:
         return np.zeros(gain.size, np.int64)
     there = crossing_at_zero(variation.arm, variation.line)
     if there is None or not math.isfinite(there.t):

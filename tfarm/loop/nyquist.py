@@ -14,6 +14,7 @@ from typing import Any, Generic
 import numpy as np
 from numpy.typing import NDArray
 
+from tfarm.arm import ANGLE_GAIN, RATE_GAIN
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
 from tfarm.spectrum import flexible_frequencies
@@ -116,7 +117,7 @@ def poles_on_axis(loop: Loop | LawLoop, band: float) -> Real:
         ringing = own.imag[(own.real == 0) & (own.imag > 0) & (own.imag < band)]
         integrators = loop.k.at_rest + int((own == 0).sum())
         return np.unique(np.r_[[0.0] * (integrators > loop.zeros_at_origin), flexible, ringing])
-    zero = [0.0] if arm.has_rigid_mode and (loop.law.K1 or loop.law.Kp) else []
+    zero = [0.0] if arm.has_rigid_mode and (loop.law[RATE_GAIN] or loop.law[ANGLE_GAIN]) else []
     return np.r_[zero, flexible]
 
 

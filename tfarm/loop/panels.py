@@ -5,7 +5,7 @@ zeros of the drive.  So on a panel of a few resonances polynomials through Cheby
 the samples and, for poles, some way off the axis too (Trefethen 2013, theorem 8.2).  L is a quotient of them, linear
 in the gains: whoever has the samples has the loop for any gains, without the arm.
 
-    L(s) = (K2 s^2 m + (Kp + K1 s) theta) / (s^n d),   drive = s^n d, gauge = s^2 m,  n = 2, or 1 where the hub loses
+    L(s) = gains . (theta, s theta, s^2 m) / (s^n d),   drive = s^n d, gauge = s^2 m,  n = 2, or 1 where the hub loses
 
 The powers of s are taken out so that slow gains lose no digits next to s = 0.
 """

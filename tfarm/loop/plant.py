@@ -74,6 +74,11 @@ class Loop:
         return int(np.sign(self.law.K1 + self.arm.rate_loss)) * int(np.sign(1.0 - self.moment_share))
 
     @property
+    def at_hub(self) -> tuple[float, float]:
+        """b and c of  D/theta = J s^2 + b s + c + ...  of a turning arm: K1 with what the hub loses, and Kp."""
+        return self.law.K1 + self.arm.rate_loss, self.law.Kp
+
+    @property
     def moment_share(self) -> float:
         """How much of the moment on the hub the law takes off it: K2, over the input that a torque of 1 N m takes."""
         return self.law.K2 / self.arm.input_per_torque

@@ -76,8 +76,9 @@ class Poles(Generic[AnyLoop]):
             return counted(self.values[right])
         if loop.arm.is_undamped and loop.is_told_by_theorem and loop.takes_energy < 0:
             right |= (self.values.imag > 0) & (abs(self.values.real) <= ON_AXIS * abs(self.values))
-        if loop.arm.is_reactive and not loop.is_told_by_theorem and loop.law.K1 > 0:
-            driven = driven_modes(loop.arm, loop.law.K2)
+        on_rate, on_moment = loop.law.point
+        if loop.arm.is_reactive and not loop.is_told_by_theorem and on_rate > 0:
+            driven = driven_modes(loop.arm, on_moment)
             return max(counted(self.values[right]), 2 * int((driven.at < self.box.im_max).sum()))
         return counted(self.values[right])
 
@@ -88,7 +89,7 @@ class Poles(Generic[AnyLoop]):
 
     @property
     def moving(self) -> Complex:
-        """The poles apart from those at 0, which the hub angle leaves there where Kp = 0."""
+        """The poles apart from those at 0, which the hub angle leaves there where nothing holds it."""
         return self.values[self.values != 0]
 
     @property
@@ -160,7 +161,7 @@ def poles_below(loop: Loop, height: float, factors: tuple[float, ...] = GROWTH) 
 def _on_its_axis(loop: Loop, found: Complex) -> Complex:
     """The poles, rounding taken off the real part of those that a lossless loop has on the imaginary axis.
 
-    At C = 0 the characteristic function is even in s where K1 = 0, so that a simple zero is its own mirror image.
+    At C = 0 and without rate feedback the characteristic function is even in s: a simple zero is its own mirror image.
     """
     on_axis = loop.is_lossless & (abs(found.real) <= ON_AXIS * abs(found))
     return np.where(on_axis, 1j * found.imag, found)
@@ -171,7 +172,7 @@ def box_of(loop: Loop, height: float) -> Box:
     right, edge = 0.1 * height, 1j * np.linspace(0.0, height, 40)
     while right < 1e3 * height:
         L = loop.loop_function(np.r_[right + edge, right * np.array([2, 5, 20])])
-        if L.real.min() > -0.5:  # then 1 + L has no zero there; L > 0 may be large, as K1's on a hub without inertia
+        if L.real.min() > -0.5:  # then 1 + L has no zero there; L > 0 may be large, as on a hub without inertia
             break
         right *= 1.7
     left, C = 1.5 * height, loop.arm.damping
@@ -179,18 +180,19 @@ def box_of(loop: Loop, height: float) -> Box:
 
 
 def slow_poles(loop: Loop, below: float) -> Complex:
-    """Poles [1/s] but 0 of the turning arm under small gains, of size up to `below`: zeros of J s^2 + K1 s + Kp.
+    """Poles [1/s] but 0 of the turning arm under small gains, of size up to `below`: zeros of J s^2 + b s + c.
 
-    J is the effective inertia.  They are corrected on the characteristic function where their squares are full doubles;
-    smaller ones are right as they are, flexibility and damping adding terms of the order |s|/w1 and C |s|.
+    J is the effective inertia, b and c are `Loop.at_hub`.  They are corrected on the characteristic function where
+    their squares are full doubles; smaller ones are right as they are, flexibility and damping adding terms of the
+    order |s|/w1 and C |s|.
     """
-    law = loop.law
-    if not loop.arm.has_rigid_mode or not (law.K1 or law.Kp or loop.arm.rate_loss):
+    b, c = loop.at_hub
+    if not loop.arm.has_rigid_mode or not (b or c):
         return np.empty(0, complex)
-    J, K1 = effective_inertia(loop.arm, law), law.K1 + loop.arm.rate_loss
-    unit = max(abs(K1), math.sqrt(abs(law.Kp)) * math.sqrt(abs(J)), 1e-300)  # K1 and sqrt(Kp J) alike
+    J = effective_inertia(loop.arm, loop.law)
+    unit = max(abs(b), math.sqrt(abs(c)) * math.sqrt(abs(J)), 1e-300)  # b and sqrt(c J) alike
     with np.errstate(over="ignore"):
-        roots = unit * np.roots([J, K1 / unit, law.Kp / unit / unit]).astype(complex)
+        roots = unit * np.roots([J, b / unit, c / unit / unit]).astype(complex)
     slow = roots[(roots != 0) & (abs(roots) <= below)]
     exact = slow.copy()
     for _ in range(SLOW_STEPS):
@@ -207,7 +209,7 @@ def starting_points(loop: Loop, up_to: float) -> Complex:
     decay = C * omega**2 / 2
     near = (-decay - shift * omega + 1j * omega * np.sqrt(np.maximum(1 - (C * omega / 2) ** 2, 0.0))).ravel()
     J = arm.turned_inertia if arm.has_rigid_mode else arm.hub_side_inertia + 1e-12
-    slow = np.roots([J, loop.law.K1 + arm.rate_loss, loop.law.Kp]).astype(complex)
+    slow = np.roots([J, *loop.at_hub]).astype(complex)
     slow = slow[abs(slow) > SMALLEST]  # zeros at 0 are divided out
     real = -np.geomspace(up_to / 300, 1.4 * up_to, 25)
     return np.concatenate([near, near.conj(), slow, real, -real])

@@ -13,7 +13,7 @@ pole is unstable.  Where the gauge does not read the hub's moment each mode has 
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,6 +61,15 @@ class Region:
     def axes(self) -> tuple[Real, Real]:
         """The values of both gains: across the plane, and up it."""
         return self.K1, self.K2
+
+    @property
+    def held(self) -> HubFeedback:
+        """The law without these two gains."""
+        return HubFeedback(Kp=self.Kp)
+
+    def on(self, across: Real, up: Real, unstable: NDArray[np.int64]) -> Region:
+        """The same plane, with counts on another grid."""
+        return replace(self, K1=across, K2=up, unstable=unstable)
 
     @property
     def stable_intervals(self) -> list[list[Window]]:

@@ -1,9 +1,9 @@
 """The root moment that a slew leaves behind, from the exact closed-loop poles and residues: no simulation.
 
-A reference slew of the hub angle with bang-bang acceleration +-a over a time T enters as r = J theta_ref_tt + K1
-theta_ref_t + Kp theta_ref.  Once it has ended, each pole p answers with  residue(p) R(p) e^{p t}, R the Laplace
+A reference slew of the hub angle with bang-bang acceleration +-a over a time T enters as r = J theta_ref_tt and what
+the law makes of the reference.  Once it has ended, each pole p answers with  residue(p) R(p) e^{p t}, R the Laplace
 transform of r: the response of the moment after T is that sum, and its root-mean-square over one period of the first
-mode is what is left.  Real poles count too: at K2 other than 0 the slow one of K1 and the inertia answers, as the
+mode is what is left.  Real poles count too: under moment feedback the slow one of rate gain and inertia answers, as the
 reference is made for the arm's own inertia and not for the effective one.
 """
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import LISTED, NAMES, Arm, HubFeedback
+from tfarm.arm import LISTED, NAMES, RATE_GAIN, Arm, HubFeedback
 from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import Analytic, gains_of, quick_characteristics, zeros_at_origin
 from tfarm.exact.system import System, system_of
@@ -101,14 +101,14 @@ class Variation:
 
 
 def free_of_loss(arm: Arm) -> tuple[Arm, HubFeedback]:
-    """An arm whose hub loses less, and the law that takes as much beside any other: a K1.
+    """An arm whose hub loses less, and the law that takes as much beside any other: a rate gain.
 
     That is b + N^2 b_m and the back-EMF.  Behind an inductance it is the back-EMF alone: friction acts at once.
     """
     if arm.motor is None or not arm.input_lags:
-        return arm.lossless_hub, HubFeedback(K1=arm.rate_loss)
+        return arm.lossless_hub, NONE.having(RATE_GAIN, arm.rate_loss)
     motor = replace(arm.motor, back_emf_constant=0.0)
-    return replace(arm, motor=motor), HubFeedback(K1=arm.motor.gear_ratio * arm.motor.back_emf_constant)
+    return replace(arm, motor=motor), NONE.having(RATE_GAIN, arm.motor.gear_ratio * arm.motor.back_emf_constant)
 
 
 class Evaluator:

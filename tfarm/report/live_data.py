@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
 
-from tfarm.arm import GAINS, Arm, HubFeedback, unit_of, written_unit
+from tfarm.arm import ANGLE_GAIN, GAINS, PLANE, Arm, HubFeedback, unit_of
 from tfarm.crossing import pieces
 from tfarm.dsp import Chain
 from tfarm.dsp import GainMap as SampledMap
@@ -24,8 +25,8 @@ from tfarm.report.live_sensor import sensor_numbers
 from tfarm.report.map import OUTSIDE, sampled_region
 from tfarm.spectrum.scales import angle_unit, default_gains
 
-COLUMNS = 90  # values of K1 at which the continuous region is cut
-STIFFEST = 0.1  # of J w1^2: the largest Kp of the page
+COLUMNS = 90  # values of the gain across at which the continuous region is cut
+STIFFEST = 0.1  # of J w1^2: the largest gain on the hub angle of the page
 SMALLEST = 1e-4  # of that: where its slider begins to be logarithmic
 DIGITS = 7  # of the edges of the map's regions: far more than a screen has
 
@@ -36,21 +37,24 @@ def live_data(arm: Arm, chain: Chain, law: HubFeedback | None = None) -> dict[st
     Raises what `region` and `loop_panels` raise.
     """
     x = rate_axis(arm)
-    y, Kp = moment_axis(arm, x), STIFFEST * angle_unit(arm)
+    y, stiffest = moment_axis(arm, x), STIFFEST * angle_unit(arm)
     reference = default_gains(arm)
-    band, is_quiet = _band(arm, x, y, Kp)
+    band, is_quiet = _band(arm, x, y, stiffest)
     samples = loop_panels(arm, band)
     continuous, sampled = _region(arm, x, y), sampled_region(arm, x, y, chain)
     return {
         "name": arm.name,
-        "units": {gain.name: written_unit(gain.name, arm).strip() or unit_of(gain.name, arm) for gain in GAINS},
-        "axes": {"K1": _axis(x), "K2": _axis(y), "Kp": {"low": 0.0, "high": Kp, "linear": SMALLEST * Kp}},
+        "units": {gain.name: unit_of(gain.name, arm) for gain in GAINS},
+        "axes": {
+            **dict(zip(PLANE, map(_axis, (x, y)), strict=True)),
+            ANGLE_GAIN: {"low": 0.0, "high": stiffest, "linear": SMALLEST * stiffest},
+        },
         "start": {gain.name: (law or reference)[gain.name] for gain in GAINS},
         **_samples(samples),
         **_known(arm, band, is_quiet),
-        "reference": {"K1": reference.K1, "K2": reference.K2},
+        "reference": {name: reference[name] for name in PLANE},
         "reference_count": stability(arm, reference, band).unstable_roots,
-        "continuous": _areas(continuous.K1, continuous.stable_intervals),
+        "continuous": _areas(continuous.axes[0], continuous.stable_intervals),
         "sampled_map": None if sampled is None else _sampled(sampled, chain),
         "sampled_loop": None if sampled is None else sampled_numbers(sampled.loop),
         "slew": slew_numbers(arm, chain, law or reference),
@@ -59,12 +63,13 @@ def live_data(arm: Arm, chain: Chain, law: HubFeedback | None = None) -> dict[st
     }
 
 
-def _band(arm: Arm, x: Axis, y: Axis, Kp: float) -> tuple[float, bool]:
+def _band(arm: Arm, x: Axis, y: Axis, stiffest: float) -> tuple[float, bool]:
     """A band [rad/s] for all gains of the page, and whether all their loops are quiet beyond it.
 
     |L| is convex in the gains, so that it is largest at a corner of their box.
     """
-    corners = [HubFeedback(K1=a, K2=b, Kp=c) for a in (x.low, x.high) for b in (y.low, y.high) for c in (0.0, Kp)]
+    names, ends = (*PLANE, ANGLE_GAIN), ((x.low, x.high), (y.low, y.high), (0.0, stiffest))
+    corners = [HubFeedback(**dict(zip(names, each, strict=True))) for each in product(*ends)]
     bands, quiet = zip(*(loop_band(Loop(arm, law)) for law in corners), strict=True)
     return max(bands), all(quiet)
 
@@ -112,14 +117,14 @@ def _finite(value: float) -> float | None:
 
 
 def _region(arm: Arm, x: Axis, y: Axis) -> Region:
-    K1 = x.grid(COLUMNS)
-    return region(arm, np.unique(np.r_[K1[K1 > 0], x.high]), np.array([y.low - OUTSIDE, y.high + OUTSIDE]))
+    across = x.grid(COLUMNS)
+    return region(arm, np.unique(np.r_[across[across > 0], x.high]), np.array([y.low - OUTSIDE, y.high + OUTSIDE]))
 
 
-def _areas(K1: Any, intervals: Sequence[Sequence[tuple[float, float]]]) -> list[dict[str, float]]:
-    """Rows K1, low, high of the parts of a region, each part with its number."""
-    rows = [(number, *point) for number, piece in enumerate(pieces(K1, intervals)) for point in piece.points]
-    return [{"part": n, "K1": _short(a), "low": _short(low), "high": _short(high)} for n, a, low, high in rows]
+def _areas(across: Any, intervals: Sequence[Sequence[tuple[float, float]]]) -> list[dict[str, float]]:
+    """Rows across, low, high of the parts of a region, each part with its number."""
+    rows = [(number, *point) for number, piece in enumerate(pieces(across, intervals)) for point in piece.points]
+    return [{"part": n, PLANE[0]: _short(a), "low": _short(low), "high": _short(high)} for n, a, low, high in rows]
 
 
 def _sampled(plane: SampledMap, chain: Chain) -> dict[str, Any]:
@@ -127,8 +132,8 @@ def _sampled(plane: SampledMap, chain: Chain) -> dict[str, Any]:
     ms = f"{1e3 * chain.sampling.period:g} ms"
     C = plane.loop.plant.arm.damping
     return {
-        "areas": _areas(plane.K1, plane.stable_intervals),
-        "K1": plane.K1.tolist(),
+        "areas": _areas(plane.axes[0], plane.stable_intervals),
+        PLANE[0]: plane.axes[0].tolist(),
         "intervals": plane.stable_intervals,
         "words": f"every {ms}" + ("" if C else f", of the first {plane.modes_used} modes"),
     }
