@@ -25,6 +25,20 @@ def test_zeros_are_those_of_the_complete_search(sensor, share):
         assert abs(here - s).min() < 1e-7 * abs(s)
 
 
+@pytest.mark.parametrize("C", [0.01, 0.1])
+def test_the_zeros_of_a_heavily_damped_arm_are_those_of_the_complete_search(C):
+    """-1/C lies nearer to s = 0 than the first mode: every real zero to the right is found, and no other is told."""
+    arm = tfarm.load("sasaki2012-lab").having(damping=C)
+    for sensor, share in (("displacement", 1.0), ("moment", 0.3)):
+        x = share * arm.length
+        found = positions(arm, sensor, np.array([x]), 4)
+        all_zeros = tfarm.transfer(arm, sensor, x=x).zeros(up_to=found.band).values
+        assert all(abs(all_zeros - s).min() < 1e-7 * abs(s) for s in found.zeros[0])
+        real = all_zeros[(abs(all_zeros.imag) < 1e-6) & (all_zeros.real > 1e-6)]
+        assert len(real) == (sensor == "displacement")
+        assert all(abs(found.zeros[0] - s).min() < 1e-7 * abs(s) for s in real)
+
+
 @pytest.mark.parametrize("name", ["sasaki2012", "quanser-2dsfl"])
 def test_a_sensor_at_a_node_has_the_mode_for_a_zero_and_sees_none_of_it(name):
     arm = tfarm.load(name)

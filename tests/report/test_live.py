@@ -24,6 +24,7 @@ from tfarm.report.given_laws import Subject
 from tfarm.report.live import save_live
 from tfarm.report.live_data import live_data
 from tfarm.report.live_sampled import slew_numbers
+from tfarm.report.live_sensor import sensor_numbers
 
 SIGNALS = ("hub_angle", "hub_rate", "root_moment", "tip_displacement")
 ARMS = ("sasaki2012-lab", "stocky-steel", "quanser-flexlink")
@@ -174,6 +175,21 @@ def test_a_sensor_is_offered_where_there_is_something_to_sense(case):
     assert (arm.length in bends) == (arm.payload.inertia > 0)
     assert 0.0 in bends
     assert arm.length in moves
+
+
+def test_where_zeros_of_sensors_cannot_be_told_the_page_says_why(case, monkeypatch, tmp_path):
+    _, data, _ = case
+
+    def fails(*_):
+        raise tfarm.ConvergenceError("no polynomial follows", 0.0, 1.0)
+
+    monkeypatch.setattr("tfarm.report.live_sensor.positions", fails)
+    arm = tfarm.load("sasaki2012-lab")
+    found = sensor_numbers(arm)
+    assert found == {"sensor": None, "no_sensor": "no polynomial follows"}
+    monkeypatch.setattr("tfarm.report.live.live_data", lambda *_: {**data, **found})
+    save_live(Subject(arm, Chain()), tmp_path)
+    assert "as its zeros cannot be told: no polynomial follows." in (tmp_path / "live.html").read_text(encoding="utf-8")
 
 
 def test_a_slew_of_too_many_samples_is_left_to_the_command():

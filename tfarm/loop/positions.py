@@ -39,6 +39,8 @@ AT_REST = {"displacement": 0, "moment": 2}  # powers of s that a sensor's numera
 AS_SERIES = np.cos(np.outer(np.arange(SAMPLES), np.arccos(POINTS))) * 2 / SAMPLES  # coefficients of Chebyshev's series
 AS_SERIES[0] /= 2
 STEEP = 4  # steep places a panel
+ROOM = 0.7  # of the way from a panel's middle to -1/C: its half width at most, so that 24 samples leave about 1e-9
+HALVINGS = 40  # of a panel next to -1/C
 
 
 @dataclass(frozen=True)
@@ -104,7 +106,7 @@ class _Panels:
     def of(cls, arm: Arm, sensor: Sensor, unit: complex, band: float) -> _Panels:
         """Panels of the line up to the band: along the imaginary axis the first begins at -`high`, as all is even."""
         places = np.asarray(steep_places(arm, band))[STEEP - 1 :: STEEP]
-        edges = np.r_[0.0, places[places < band], band]
+        edges = _graded(np.r_[0.0, places[places < band], band], unit, arm.damping)
         low, high = edges[:-1].copy(), edges[1:]
         low[0] = -high[0] if unit == 1j else 0.0
         s = unit * ((low + high)[:, None] / 2 + (high - low)[:, None] / 2 * np.r_[POINTS, BETWEEN])
@@ -126,6 +128,22 @@ class _Panels:
             roots = (low + high) / 2 + (high - low) / 2 * _roots(series)
             found += [self.unit * z for z in roots if z.real > -1e-9 * high]
         return found
+
+
+def _graded(edges: Real, unit: complex, C: float) -> Real:
+    """Edges of panels of a line, more of them where it is so near to -1/C that a polynomial would not follow.
+
+    The first panel of the imaginary axis is twice as wide as from 0 to its edge.
+    """
+    for _ in range(HALVINGS if C else 0):
+        middle, half = (edges[1:] + edges[:-1]) / 2, np.diff(edges) / 2
+        if unit == 1j:
+            middle[0], half[0] = 0.0, edges[1]
+        near = half > ROOM * abs(unit * middle + 1 / C)
+        if not near.any():
+            break
+        edges = np.sort(np.r_[edges, ((edges[1:] + edges[:-1]) / 2)[near]])
+    return edges
 
 
 def _roots(series: Complex) -> Complex:

@@ -58,7 +58,7 @@ def live_data(arm: Arm, chain: Chain, law: HubFeedback | None = None) -> dict[st
         "sampled_map": None if sampled is None else _sampled(sampled, chain),
         "sampled_loop": None if sampled is None else sampled_numbers(sampled.loop),
         "slew": slew_numbers(arm, chain, law or reference),
-        "sensor": sensor_numbers(arm),
+        **sensor_numbers(arm),
         "lyapunov": arm.is_uniform,
     }
 

@@ -20,12 +20,14 @@ NOTHING = 1e-9  # of a mode's largest: an end that no mode moves, or bends, by m
 DIGITS = 6
 
 
-def sensor_numbers(arm: Arm) -> dict[str, Any] | None:
-    """Participation and zeros at every position, by the kind of sensor; None where they cannot be had."""
+def sensor_numbers(arm: Arm) -> dict[str, Any]:
+    """`sensor`: participation and zeros at every position, by the kind of sensor; None where they cannot be had, and
+    then `no_sensor` says why."""
     try:
-        return {kind: _numbers(positions(arm, kind, _places(arm, kind), MODES)) for kind in get_args(Sensor)}
-    except TfarmError:
-        return None
+        found = {kind: _numbers(positions(arm, kind, _places(arm, kind), MODES)) for kind in get_args(Sensor)}
+    except TfarmError as error:
+        return {"sensor": None, "no_sensor": str(error)}
+    return {"sensor": found}
 
 
 def _places(arm: Arm, kind: Sensor) -> Real:
