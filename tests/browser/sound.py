@@ -164,6 +164,23 @@ def test_a_report_has_at_most_eight_screens_after_its_answers(browser, full):  #
             "document.documentElement.scrollHeight - document.getElementById('answers').getBoundingClientRect().bottom"
         )
         assert opened.page.evaluate(height) / 900 <= SCREENS
-        opened.page.emulate_media(media="print")
-        heights = "[...document.querySelectorAll('details table')].map(each => each.getBoundingClientRect().height)"
-        assert all(opened.page.evaluate(heights))  # on paper nothing is folded away
+        assert nothing_is_folded_on_paper(opened.page)
+
+
+def nothing_is_folded_on_paper(page: Any) -> bool:
+    page.emulate_media(media="print")
+    folded = "[...document.querySelectorAll('details table, details .claim')]"
+    return all(page.evaluate(f"{folded}.map(each => each.getBoundingClientRect().height)"))
+
+
+def test_the_page_on_trust_has_at_most_eight_screens_and_a_chip_opens_its_claim(browser, full):  # noqa: F811
+    with Opened(browser, full / "trust" / "index.html") as opened:
+        page = opened.page
+        assert page.evaluate("document.documentElement.scrollHeight") / 900 <= SCREENS
+        chip = page.locator(".chips a").last
+        claim = page.locator(chip.get_attribute("href") or "")
+        assert not claim.is_visible()
+        chip.click()
+        assert claim.is_visible()
+        assert claim.bounding_box()["y"] < 900
+        assert nothing_is_folded_on_paper(page)

@@ -180,6 +180,14 @@ def test_the_page_shows_verdicts_in_words_and_formulas_as_mathml(page):
     assert page.count('class="claim"') == len(CHEAP)
 
 
+def test_long_tables_and_claims_are_folded_below_their_answers(page):
+    """What stands unfolded: how many are counted, how exact curves are, and numbers; a chip for every claim."""
+    unfolded = re.sub(r"<details.*?</details>", "", page, flags=re.DOTALL)
+    assert re.findall(r'id="(table-[^"]*)"', unfolded) == ["table-counts", "table-accuracy"]
+    assert "<article" not in unfolded
+    assert unfolded.count('href="#eq-') == len(CHEAP)
+
+
 def test_what_is_not_proven_is_said(page, proof):
     assert "Not so for other" in page
     assert "not proven: a double frequency near 7 rad/s" in page
