@@ -37,6 +37,7 @@ Characteristic = Callable[[Complex, Whole | None, Any], Complex]  # offset F at 
 
 ANGLE, RATE = (FED_BACK.index(name) for name in ("hub_angle", "hub_rate"))  # rows of what is measured
 TINY = 1e-30  # stands for zero where a root sits on the filter's own pole, which it does where nothing is fed back
+LAST_STEP = 1e-12  # of the offset: the secant method's next step would be below its rounding
 UNMOVED = 1e-50  # an offset this small is a pole that the loop does not move
 FAINT = 0.2  # a pole nearer to z = 0 decides nothing and is not polished
 
@@ -220,6 +221,8 @@ def _offsets(z: Complex, base: Whole, open_loop: Complex, characteristic: Charac
             slope = f_new - f_old
             step = np.where(slope == 0, 0.0, f_new * (new - old) / np.where(slope == 0, 1.0, slope))
             old, f_old, new = new, f_new, np.where(abs(new - step) < UNMOVED, UNMOVED, new - step)
+            if not (abs(step) > LAST_STEP * abs(new)).any():
+                break
     near = abs(new - start) <= 1e-9 + 1e-3 * abs(start)
     offset = np.where(near, new, start)
     return np.where(abs(offset) <= UNMOVED, 0.0, offset)

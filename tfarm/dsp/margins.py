@@ -16,7 +16,7 @@ from tfarm.crossing import joined
 from tfarm.dsp.boundary import circle_grid, crossings
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.law_loop import AnyLoop, SampledLaw
-from tfarm.dsp.loop import SampledLoop, sampled_loop
+from tfarm.dsp.loop import SampledLoop, polished, sampled_loop
 from tfarm.dsp.plant import Branching
 from tfarm.dsp.sampling import FORGOTTEN, held
 from tfarm.errors import ConvergenceError
@@ -91,7 +91,8 @@ def delay_margin(loop: AnySampled) -> DelayMargin:
 
     def grows(more: float) -> bool:
         later = loop.with_delay(now + more)
-        return bool(abs(later.eigenvalues).max() > 1 - CLEARLY) and later.poles.log_spectral_radius >= 0
+        near = later.eigenvalues[abs(later.eigenvalues) > 1 - CLEARLY]
+        return near.size > 0 and polished(near, later.pulse, later.characteristic).log_spectral_radius >= 0
 
     if log_radius(0.0) >= 0:
         return DelayMargin(0.0, False)
