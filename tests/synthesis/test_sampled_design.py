@@ -14,7 +14,7 @@ from tfarm import ConvergenceError, HubFeedback, ParameterError
 from tfarm.dsp import Chain, Slew, sampled_verdict
 from tfarm.dsp.chain import Sampling
 from tfarm.synthesis.design import design
-from tfarm.synthesis.sampled import RESERVE, sampled_judges, scaled
+from tfarm.synthesis.sampled import RESERVE, sampled_judges
 from tfarm.tuner.constants import best_constant
 from tfarm.tuner.trial import slew_trial
 
@@ -26,7 +26,7 @@ HELD = HeldLoop(LAB, 0.01)
 def test_what_is_recommended_holds_when_sampled(name) -> None:
     """By the whole verdict, at the gains and a quarter to either side, and without a clock."""
     found = design(tfarm.load(name), chain=tfarm.dsp.load_chain(name))
-    laws = [scaled(found.law, share) for share in (1 / RESERVE, 1.0, RESERVE)]
+    laws = [found.law.times(share) for share in (1 / RESERVE, 1.0, RESERVE)]
     assert all(sampled_verdict(tfarm.load(name), law, found.chain).is_stable for law in laws)
     assert found.sampled.is_stable
     assert found.verdict.is_stable
@@ -43,7 +43,7 @@ def test_the_gains_that_are_best_without_a_clock_do_not_hold(found) -> None:
     for each in found.values():
         assert HELD.radius(each.law) < 1.0
         # on the edge of the reserve a radius is 1, and the Ritz model's is right to 1e-6
-        assert max(HELD.radius(scaled(each.law, share)) for share in (1 / RESERVE, RESERVE)) < 1.0 + 1e-6
+        assert max(HELD.radius(each.law.times(share)) for share in (1 / RESERVE, RESERVE)) < 1.0 + 1e-6
 
 
 def test_the_damping_is_that_of_poles_followed_from_the_open_loop(found) -> None:
@@ -56,7 +56,7 @@ def test_random_gains_are_no_better(found) -> None:
     tried = 0
     for K1, K2 in zip(20 * rng.random(24) ** 2, rng.uniform(-1, 1, 24), strict=True):
         law = HubFeedback(K1=K1, K2=K2)
-        if max(HELD.radius(scaled(law, share)) for share in (1 / RESERVE, 1.0, RESERVE)) >= 1.0:
+        if max(HELD.radius(law.times(share)) for share in (1 / RESERVE, 1.0, RESERVE)) >= 1.0:
             continue
         tried += 1
         L = HELD.loop(law, grid)
@@ -69,7 +69,7 @@ def test_random_gains_are_no_better(found) -> None:
 
 def test_the_disk_margin_is_that_of_the_circle(found) -> None:
     law = HubFeedback(K1=3.0, K2=0.3)
-    judge = next(sampled_judges(LAB, Chain(), "margin", 0.0, 2))
+    judge = next(sampled_judges(LAB, Chain(), "margin", HubFeedback(), 2))
     q = np.r_[np.linspace(1e-4, np.pi, 4000)]
     L = HELD.loop(law, q)
     assert judge.disk(law) == pytest.approx((2 * abs(1 + L) / abs(1 - L)).min(), rel=1e-3)

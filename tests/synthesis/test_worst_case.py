@@ -12,7 +12,7 @@ from tfarm import HubFeedback
 from tfarm.arm import Hub
 from tfarm.synthesis.arms import Box, varied, worst_inside
 from tfarm.synthesis.chosen import design
-from tfarm.synthesis.sampled import RESERVE, scaled
+from tfarm.synthesis.sampled import RESERVE
 from tfarm.synthesis.worst_case import WORSE
 
 LAB, T = tfarm.load("sasaki2012-lab"), 0.01
@@ -31,7 +31,7 @@ def test_every_arm_is_held_and_damped_as_by_another_model(found):
         held = HeldLoop(arm, T)
         assert held.damping(found.law, 2) == pytest.approx(each.value, rel=1e-4)
         # on the edge of the reserve a radius is 1, and the Ritz model's is right to 1e-6
-        assert max(held.radius(scaled(found.law, share)) for share in (1 / RESERVE, 1.0, RESERVE)) < 1 + 1e-6
+        assert max(held.radius(found.law.times(share)) for share in (1 / RESERVE, 1.0, RESERVE)) < 1 + 1e-6
         assert each.sampled.is_stable
         assert each.verdict.is_stable
     assert found.value == min(each.value for each in found.arms)
@@ -51,7 +51,7 @@ def test_no_other_gains_serve_all_arms_better(found):
     K1, K2 = found.law.K1 * rng.uniform(0.8, 1.2, 30), found.law.K2 + rng.uniform(-0.1, 0.1, 30)
     for law in [alone, *(HubFeedback(K1=a, K2=b) for a, b in zip(K1, K2, strict=True))]:
         shares = (1 / RESERVE, 1.0, RESERVE)
-        if all(model.radius(scaled(law, share)) < 1.0 for model in models for share in shares):
+        if all(model.radius(law.times(share)) < 1.0 for model in models for share in shares):
             values = (model.damping(law, 2, 100) for model in models)
             assert any(value <= found.value * (1 + 1e-3) for value in values)
 

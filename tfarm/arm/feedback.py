@@ -87,6 +87,10 @@ class HubFeedback:
         across, up = (self[name] for name in PLANE)
         return across, up
 
+    def at(self, across: float, up: float) -> HubFeedback:
+        """The law with its gains of the plane at this point of it."""
+        return replace(self, **dict(zip(PLANE, (across, up), strict=True)))
+
     def told(self, how: Callable[[float], str], names: Iterable[str] = PLANE, arm: Arm | None = None) -> list[str]:
         """`K1 = 0.3` of each gain of those names, the value written by `how`, with its unit on an arm."""
         return [f"{name} = {how(self[name])}{'' if arm is None else written_unit(name, arm)}" for name in names]
@@ -143,6 +147,11 @@ def many_laws(law: HubFeedback, **varied: ArrayLike) -> NDArray[np.float64]:
     """Rows (gains, n) in the order of `GAINS`: the law's gains, but for those named, which take n values together."""
     columns = [np.asarray(varied.get(gain.name, law[gain.name]), dtype=float) for gain in GAINS]
     return np.array(np.broadcast_arrays(*(np.atleast_1d(column) for column in columns)))
+
+
+def laws_at(held: HubFeedback, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rows (gains, n) in the order of `GAINS`: the law with its gains of the plane at n points (2, n) of it."""
+    return many_laws(held, **dict(zip(PLANE, points, strict=True)))
 
 
 def law_of(row: ArrayLike) -> HubFeedback:

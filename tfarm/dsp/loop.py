@@ -87,7 +87,11 @@ class SampledLoop:
 
     def having(self, **gains: float) -> SampledLoop:
         """The same loop with other values of the gains that are named."""
-        return replace(self, gains=replace(self.gains, **gains))
+        return self.under(replace(self.gains, **gains))
+
+    def under(self, gains: HubFeedback) -> SampledLoop:
+        """The same loop under another law."""
+        return replace(self, gains=gains)
 
     def with_delay(self, samples: float) -> SampledLoop:
         """The same loop with another computational delay."""

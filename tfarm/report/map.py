@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import PLANE, Arm, HubFeedback, many_laws, shown_unit
+from tfarm.arm import PLANE, Arm, HubFeedback, laws_at, shown_unit
 from tfarm.columns import Column, Table
 from tfarm.dsp import Chain, sampled_verdict
 from tfarm.dsp import GainMap as SampledMap
@@ -90,8 +90,8 @@ def gain_map(arm: Arm, chain: Chain | None = None) -> GainMap:
     found = region(arm, x.grid(COLUMNS), y.grid(ROWS))
     half = SPARSE // 2
     across, up = (np.r_[axis.low, each[half::SPARSE], axis.high] for axis, each in zip((x, y), found.axes, strict=True))
-    points = dict(zip(PLANE, map(np.ravel, np.meshgrid(across, up)), strict=True))
-    damping = least_damping(arm, many_laws(HubFeedback(), **points), MODES).reshape(up.size, across.size)
+    points = np.reshape(np.meshgrid(across, up), (2, -1))
+    damping = least_damping(arm, laws_at(HubFeedback(), points), MODES).reshape(up.size, across.size)
     named = laws(arm, chain)
     briefs = tuple(brief_of(arm, each.law, chain) for each in named)
     sampled = sampled_region(arm, x, y, chain)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import cast
 
-from tfarm.arm import Arm
+from tfarm.arm import TWO_GAINS, Arm
 from tfarm.dsp import Chain
 from tfarm.errors import ParameterError
 from tfarm.synthesis import law_design as laws
@@ -17,7 +17,7 @@ from tfarm.synthesis.law_design import LawDesign, Progress, law_design
 from tfarm.synthesis.search import Bounds
 from tfarm.synthesis.worst_case import for_the_worst, same_input
 
-GAINS = "K1-K2"
+GAINS = TWO_GAINS
 
 
 def design(

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, HubFeedback, law_of, many_laws
+from tfarm.arm import ANGLE_GAIN, Arm, HubFeedback, law_of, laws_at
 from tfarm.errors import ConvergenceError
 from tfarm.loop.damping import least_damping
 from tfarm.loop.frequencies import band_of, grid
@@ -30,25 +30,25 @@ BASIN = 6  # points of the grid in each basin of a residual
 @dataclass(frozen=True)
 @record
 class ContinuousJudge:
-    """What K1 and K2 are worth in the continuous loop, Kp held; `known` is the arm that the slew is made for."""
+    """What both gains are worth in the continuous loop, beside those of `held`; the slew is made for the arm `known`."""
 
     arm: Arm
     objective: str
-    Kp: float
+    held: HubFeedback
     modes: int
     known: Arm
 
-    def effort(self, K2: Bounds) -> Effort:
-        """A residual has as many basins along K2 as its modes' frequencies run through periods of the slew.
+    def effort(self, up: Bounds) -> Effort:
+        """A residual has as many basins along the moment gain as its modes' frequencies run through slews.
 
-        Feeding K2 back makes of the hub one of inertia I_h/(1 - K2); from K2 = 1 on it stands still.
+        Feeding back a share k of the moment makes of the hub one of inertia I_h/(1 - k); from k = 1 on it stands still.
         """
         if self.objective == "margin":  # the one that is dear
             return Effort(24, 24, 4)
         if self.objective == "damping":  # which has few basins
             return Effort(32, 36, 12)
         starts = max(6, 80 // self.modes)
-        shares = (1 - gain / self.arm.input_per_torque for gain in K2)
+        shares = (1 - gain / self.arm.input_per_torque for gain in up)
         hubs = (self.arm.hub_inertia / share if share > 0 else math.inf for share in shares)
         ends = [
             natural_modes(self.arm.having(hub_inertia=I), self.modes).natural_frequency[-self.modes :] for I in hubs
@@ -57,18 +57,18 @@ class ContinuousJudge:
         return Effort(36, int(min(max(60.0, BASIN * basins), max(60, 1600 // self.modes))), starts)
 
     def landscape(self, axes: tuple[Axis, Axis], effort: Effort) -> tuple[Real, Score]:
-        """Scores over the grid (rows of K2), inf where not stable; and the score where the grid is stable, else inf."""
-        K1, K2 = (axis.gain(axis.middles(number)) for axis, number in zip(axes, effort[:2], strict=True))
-        stable = region(self.arm, K1, K2, self.Kp).stable
-        grid_K1, grid_K2 = np.meshgrid(K1, K2)
+        """Scores over the grid, rows upwards, inf where not stable; and the score where it is stable, else inf."""
+        gains = [axis.gain(axis.middles(number)) for axis, number in zip(axes, effort[:2], strict=True)]
+        stable = region(self.arm, gains[0], gains[1], self.held[ANGLE_GAIN]).stable
+        grid = np.array(np.meshgrid(*gains))
         values = np.full(stable.shape, np.inf)
         if stable.any():
-            values[stable] = self.score(grid_K1[stable], grid_K2[stable])
+            values[stable] = self.score(grid[:, stable])
         return values, _inside(self.score, axes, stable)
 
-    def score(self, K1: Real, K2: Real) -> Real:
-        """What is minimised, for arrays of K1 and K2."""
-        laws = many_laws(HubFeedback(Kp=self.Kp), K1=K1, K2=K2)
+    def score(self, points: Real) -> Real:
+        """What is minimised, at points (2, n) of the plane."""
+        laws = laws_at(self.held, points)
         if self.objective == "damping":
             return -least_damping(self.arm, laws, self.modes)
         if self.objective == "residual":
@@ -100,15 +100,15 @@ class ContinuousJudge:
 def _inside(score: Score, axes: tuple[Axis, Axis], stable: NDArray[np.bool_]) -> Score:
     """The score where the nearest point of the grid is stable, inf elsewhere."""
 
-    def inside(K1: Real, K2: Real) -> Real:
+    def inside(points: Real) -> Real:
         places = [
             np.clip((axis.share(gain) * number).astype(int), 0, number - 1)
-            for axis, gain, number in zip(axes, (K1, K2), stable.shape[::-1], strict=True)
+            for axis, gain, number in zip(axes, points, stable.shape[::-1], strict=True)
         ]
         good = stable[places[1], places[0]]
-        values = np.full(K1.size, np.inf)
+        values = np.full(good.size, np.inf)
         if good.any():
-            values[good] = score(K1[good], K2[good])
+            values[good] = score(points[:, good])
         return values
 
     return inside

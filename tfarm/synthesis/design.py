@@ -40,7 +40,7 @@ from tfarm.synthesis.search import (
     rate_axis,
     refined,
 )
-from tfarm.synthesis.together import Judge, OnArm, Worst, in_step, worst_value
+from tfarm.synthesis.together import Judge, OnArm, Worst, in_step, score_of, worst_value
 from tfarm.synthesis.worst_case import ALONE, WorstCase
 
 Real = NDArray[np.float64]
@@ -88,7 +88,7 @@ class Design:
 
 
 class _Best(NamedTuple):
-    """Gains K1, K2 and their score."""
+    """Both gains and their score."""
 
     gains: tuple[float, float]
     score: float
@@ -126,9 +126,10 @@ def design(
     for K1_end, K2_end in zip(start["K1"], start["K2"], strict=True):
         for each in arms:
             check_gains(each.arm, HubFeedback(K1=K1_end, K2=K2_end, Kp=Kp))
-    judges = [_judges(each.arm, arm, chain, objective, Kp, modes, continuous) for each in arms]
-    judge, bounds, best = _first_that_holds(map(Worst, in_step(judges)), arm, start, free, Kp)
-    law = HubFeedback(K1=best.gains[0], K2=best.gains[1], Kp=Kp)
+    held = HubFeedback(Kp=Kp)
+    judges = [_judges(each.arm, arm, chain, objective, held, modes, continuous) for each in arms]
+    judge, bounds, best = _first_that_holds(map(Worst, in_step(judges)), arm, start, free, held)
+    law = held.at(*best.gains)
     on_arms = tuple(
         OnArm(each.name, each.numbers, value, stability(each.arm, law), sampled_brief(each.arm, law, chain))
         for each, value in zip(arms, judge.values(law), strict=True)
@@ -147,41 +148,41 @@ def design(
 
 
 def _judges(
-    arm: Arm, known: Arm, chain: Chain, objective: str, Kp: float, modes: int, continuous: bool
+    arm: Arm, known: Arm, chain: Chain, objective: str, held: HubFeedback, modes: int, continuous: bool
 ) -> Iterator[Judge]:
     """Judges of gains on an arm, of ever more modes; `known` is what the slew is made for."""
     if continuous:
-        return iter([ContinuousJudge(arm, objective, Kp, modes, known)])
-    return sampled_judges(arm, chain, objective, Kp, modes, known)
+        return iter([ContinuousJudge(arm, objective, held, modes, known)])
+    return sampled_judges(arm, chain, objective, held, modes, known)
 
 
 def score_on(found: Design, arm: Arm) -> float:
     """What a design minimised, on another arm; inf where the loop does not hold."""
     law, known = found.law, found.verdict.loop.arm
-    judge = next(_judges(arm, known, found.chain, found.objective, law.Kp, found.modes, found.loop == "continuous"))
+    judge = next(_judges(arm, known, found.chain, found.objective, law, found.modes, found.loop == "continuous"))
     if found.loop == "continuous" and not judge.holds(law):
         return math.inf
-    return float(judge.score(np.array([law.K1]), np.array([law.K2]))[0])
+    return score_of(judge, law)
 
 
 def _first_that_holds(
-    judges: Iterable[Worst], arm: Arm, bounds: dict[str, Bounds], free: dict[str, bool], Kp: float
+    judges: Iterable[Worst], arm: Arm, bounds: dict[str, Bounds], free: dict[str, bool], held: HubFeedback
 ) -> tuple[Worst, dict[str, Bounds], _Best]:
     """The best gains by the first judge whose gains hold.  Raises ConvergenceError where those of none do."""
     lost = None
     for judge in judges:
         try:
-            return judge, *_widened(judge, arm, bounds, free, Kp)
+            return judge, *_widened(judge, arm, bounds, free, held)
         except ConvergenceError as error:
             lost = error
     raise lost or AssertionError("no judge")
 
 
 def _widened(
-    judge: Judge, arm: Arm, bounds: dict[str, Bounds], free: dict[str, bool], Kp: float
+    judge: Judge, arm: Arm, bounds: dict[str, Bounds], free: dict[str, bool], held: HubFeedback
 ) -> tuple[dict[str, Bounds], _Best]:
     """The best gains, and the bounds widened wherever they lie on one that is free: only what is new is searched."""
-    best = _best(judge, arm, bounds, Kp)
+    best = _best(judge, arm, bounds, held)
     for _ in range(WIDENINGS):
         ends = [(name, end) for name, end in _ends(arm, bounds, best) if free[name] and (name, end) not in LIMITS]
         if not ends:
@@ -191,7 +192,7 @@ def _widened(
         wider = (low, 2 * high) if end else (arm.input_per_torque - 2 * (arm.input_per_torque - low), high)
         new = (high, wider[1]) if end else (wider[0], low)
         try:
-            beyond = _best(judge, arm, bounds | {name: new}, Kp)
+            beyond = _best(judge, arm, bounds | {name: new}, held)
         except ConvergenceError:  # nothing holds there
             beyond = best
         bounds = bounds | {name: wider}
@@ -213,7 +214,7 @@ def _axes(arm: Arm, bounds: dict[str, Bounds]) -> tuple[Axis, Axis]:
     return rate_axis(bounds["K1"], rate_unit(arm)), Axis(*bounds["K2"])
 
 
-def _best(judge: Judge, arm: Arm, bounds: dict[str, Bounds], Kp: float) -> _Best:
+def _best(judge: Judge, arm: Arm, bounds: dict[str, Bounds], held: HubFeedback) -> _Best:
     """The best gains that hold.  Raises ConvergenceError where none are stable."""
     axes, effort = _axes(arm, bounds), judge.effort(bounds["K2"])
     values, score = judge.landscape(axes, effort)
@@ -228,9 +229,9 @@ def _best(judge: Judge, arm: Arm, bounds: dict[str, Bounds], Kp: float) -> _Best
     found = [polished(score, axes, each, SIMPLEX * float(steps.min())) for each in found[:POLISHED]] + found[POLISHED:]
     grid_best = [Found(start, float(values[row, column])) for start, (column, row) in zip(starts, places, strict=True)]
     for each in sorted([*found, *grid_best], key=lambda each: each.score):
-        K1, K2 = (float(axis.gain(share)) for axis, share in zip(axes, each.shares, strict=True))
-        if np.isfinite(each.score) and judge.holds(HubFeedback(K1=K1, K2=K2, Kp=Kp)):
-            return _Best((K1, K2), each.score)
+        across, up = (float(axis.gain(share)) for axis, share in zip(axes, each.shares, strict=True))
+        if np.isfinite(each.score) and judge.holds(held.at(across, up)):
+            return _Best((across, up), each.score)
     raise ConvergenceError("none of the best gains found is stable", None, found)
 
 
@@ -249,9 +250,9 @@ def _flat(score: Score, best: _Best, axis: int, bounds: Bounds) -> Bounds:
     limit, centre = best.score + FLAT * abs(best.score), best.gains[axis]
 
     def good(values: Real) -> NDArray[np.bool_]:
-        held = [np.full(values.size, gain) for gain in best.gains]
-        held[axis] = values
-        return np.asarray(score(*held) <= limit)
+        points = np.array([np.full(values.size, gain) for gain in best.gains])
+        points[axis] = values
+        return np.asarray(score(points) <= limit)
 
     ends = []
     for bound in bounds:

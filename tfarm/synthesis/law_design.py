@@ -13,7 +13,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm
+from tfarm.arm import TWO_GAINS, Arm
 from tfarm.arm.law import Law
 from tfarm.dsp import Chain, Verdict
 from tfarm.dsp.brief import brief_of
@@ -77,7 +77,7 @@ def law_design(
     Raises ParameterError for an unknown structure or objective, ConvergenceError where no law found holds.
     """
     if structure not in STRUCTURES:
-        raise ParameterError(key="structure", value=structure, remedy=did_you_mean(structure, ["K1-K2", *STRUCTURES]))
+        raise ParameterError(key="structure", value=structure, remedy=did_you_mean(structure, [TWO_GAINS, *STRUCTURES]))
     if objective not in LAW_OBJECTIVES:
         remedy = f"of a structure use one of {', '.join(LAW_OBJECTIVES)}"
         raise ParameterError(key="objective", value=objective, remedy=remedy)
@@ -124,7 +124,7 @@ def _why_none(arms: Sequence[NamedArm], structure: str, law: Law, chain: Chain) 
         return f"{text}{grows}; try another Kp or period"
     return (
         f"{text}{grows}; with link.damping = 0 no mode loses energy of its own, and a held input drives each "
-        "one that the law does not damp where its alias is seen: give link.damping, or take K1-K2"
+        f"one that the law does not damp where its alias is seen: give link.damping, or take {TWO_GAINS}"
     )
 
 

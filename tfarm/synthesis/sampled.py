@@ -1,8 +1,8 @@
 """Gains judged by the sampled loop, many at once.
 
-The closed-loop matrix of the modal model under a hold is affine in the gains, A(K) = A0 + K1 A1 + K2 A2, so that the
-poles of thousands of gains are one call of NumPy.  What wins is judged once more by `sampled_verdict`, with as many
-modes as that takes; a model of few modes only says where to look.
+The closed-loop matrix of the modal model under a hold is affine in the gains, so that the poles of thousands of gains
+are one call of NumPy.  What wins is judged once more by `sampled_verdict`, with as many modes as that takes; a model of
+few modes only says where to look.
 
     damping    least -Re s/|s| of the oscillating poles, s = ln z/T, of the first modes
     margin     min 2 |1 + L|/|1 - L| over the unit circle, of nearly equal ones that with more damping
@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from tfarm.arm import FED_BACK, Arm, HubFeedback
+from tfarm.arm import ANGLE_GAIN, FED_BACK, PLANE, Arm, HubFeedback, laws_at
 from tfarm.dsp import Chain, SampledLoop, Scenario, sampled_loop, sampled_verdict, scenario
 from tfarm.dsp.margins import most_modes
 from tfarm.dsp.sampling import PulseTransfer
@@ -57,7 +57,7 @@ DIPS = 5  # lowest points of the circle that are refined
 @dataclass(frozen=True)
 @record
 class SampledJudge:
-    """What K1 and K2 are worth in a sampled loop of few modes, its Kp held; the K1 and K2 of `loop` do not matter.
+    """What both gains are worth in a sampled loop of few modes, the others held; those two of `loop` do not matter.
 
     `known` is the arm that the slew's references and feed-forward are made for.
     """
@@ -67,29 +67,30 @@ class SampledJudge:
     modes: int
     known: Arm
 
-    def effort(self, K2: Bounds) -> Effort:
+    def effort(self, up: Bounds) -> Effort:
         """The grid is cheap but for slews, which are simulated."""
         smooth = {"margin": Effort(24, 32, 6), "cost": Effort(24, 32, 6), "damping": Effort(32, 36, 12)}
         return smooth.get(self.objective, Effort(36, 90, 20))
 
     def landscape(self, axes: tuple[Axis, Axis], effort: Effort) -> tuple[Real, Score]:
-        """Scores over the grid (rows of K2), inf where not stable, and the score itself, which is so too."""
-        K1, K2 = (axis.gain(axis.middles(number)) for axis, number in zip(axes, effort[:2], strict=True))
-        grid_K1, grid_K2 = np.meshgrid(K1, K2)
-        return self.score(grid_K1.ravel(), grid_K2.ravel()).reshape(grid_K1.shape), self.score
+        """Scores over the grid, rows upwards, inf where not stable, and the score itself, which is so too."""
+        gains = (axis.gain(axis.middles(number)) for axis, number in zip(axes, effort[:2], strict=True))
+        grid = np.array(np.meshgrid(*gains))
+        return self.score(grid.reshape(2, -1)).reshape(grid.shape[1:]), self.score
 
-    def score(self, K1: Real, K2: Real) -> Real:
-        """What is minimised, for arrays of K1 and K2; inf where the loop does not hold with `RESERVE`."""
-        values = np.full(K1.size, np.inf)
-        for i in range(0, K1.size, BLOCK):
-            part = slice(i, i + BLOCK)
-            z = np.linalg.eigvals(self._matrices(K1[part], K2[part], 1.0))
+    def score(self, points: Real) -> Real:
+        """What is minimised, at points (2, n) of the plane; inf where the loop does not hold with `RESERVE`."""
+        number = points.shape[1]
+        values = np.full(number, np.inf)
+        for i in range(0, number, BLOCK):
+            part = points[:, i : i + BLOCK]
+            z = np.linalg.eigvals(self._matrices(part, 1.0))
             good = abs(z).max(axis=1) < 1.0
             for share in (SEARCHED, 1 / SEARCHED):
-                more = np.linalg.eigvals(self._matrices(K1[part][good], K2[part][good], share))
+                more = np.linalg.eigvals(self._matrices(part[:, good], share))
                 good[good] = abs(more).max(axis=1) < 1.0
             if good.any():
-                values[part][good] = self._scores(K1[part][good], K2[part][good], z[good])
+                values[i : i + BLOCK][good] = self._scores(part[:, good], z[good])
         return values
 
     def holds(self, law: HubFeedback) -> bool:
@@ -97,7 +98,7 @@ class SampledJudge:
         arm, chain = self.loop.plant.arm, self.loop.chain
         try:
             return stability(arm, law).is_stable and all(
-                sampled_verdict(arm, scaled(law, share), chain).is_stable for share in (1.0, 1 / RESERVE, RESERVE)
+                sampled_verdict(arm, law.times(share), chain).is_stable for share in (1.0, 1 / RESERVE, RESERVE)
             )
         except ConvergenceError:
             return False
@@ -108,28 +109,32 @@ class SampledJudge:
             return self.disk(law)
         return -score if self.objective == "damping" else score
 
-    def _scores(self, K1: Real, K2: Real, z: Complex) -> Real:
+    def _scores(self, points: Real, z: Complex) -> Real:
         if self.objective == "damping":
             return -self.damping(z)
         if self.objective == "margin":
-            return -self._disks(K1, K2) - TIE * self.damping(z)
-        return self.residual(K1, K2) if self.objective == "residual" else self.cost(K1, K2)
+            return -self._disks(points) - TIE * self.damping(z)
+        return self.residual(points) if self.objective == "residual" else self.cost(points)
 
     # ------------------------------------------------------------ matrices and poles
 
     @cached_property
-    def _parts(self) -> tuple[Real, Real, Real, Real]:
-        """Closed-loop matrices without any gain, and what Kp as it is, K1 = 1 and K2 = 1 add."""
-        Kp, bare = self.loop.gains.Kp, self.loop.having(K1=0.0, K2=0.0)
+    def _parts(self) -> tuple[Real, Real, Real]:
+        """Closed-loop matrices without any gain, what the held ones add, and what 1 of each of both does (2, n, n)."""
+        bare = self._bare
         start = bare.reduced_matrix()
-        by_angle = bare.having(Kp=2 * Kp).reduced_matrix() - start
-        by_rate, by_moment = (bare.having(**{name: 1.0}).reduced_matrix() - start for name in ("K1", "K2"))
-        return start - by_angle, by_angle, by_rate, by_moment
+        by_held = bare.under(bare.gains.times(2.0)).reduced_matrix() - start
+        by_each = np.array([bare.having(**{name: 1.0}).reduced_matrix() - start for name in PLANE])
+        return start - by_held, by_held, by_each
 
-    def _matrices(self, K1: Real, K2: Real, share: float) -> Real:
-        start, by_angle, by_rate, by_moment = self._parts
-        moving = K1[:, None, None] * by_rate + K2[:, None, None] * by_moment
-        return np.asarray(start + share * (by_angle + moving))
+    @property
+    def _bare(self) -> SampledLoop:
+        """The loop without both gains."""
+        return self.loop.under(self.loop.gains.at(0.0, 0.0))
+
+    def _matrices(self, points: Real, share: float) -> Real:
+        start, by_held, by_each = self._parts
+        return np.asarray(start + share * (by_held + _added(points, by_each)))
 
     def damping(self, z: Complex) -> Real:
         """The least damping ratio of the oscillating poles of the first modes, of closed-loop poles (gains, n)."""
@@ -150,8 +155,8 @@ class SampledJudge:
     def _signals(self, q: Real) -> Complex:
         return self.loop.signals(np.exp(1j * q), None, np.ones(q.size))
 
-    def _disks(self, K1: Real, K2: Real) -> Real:
-        laws = np.array([np.full(K1.size, self.loop.gains.Kp), K1, K2])
+    def _disks(self, points: Real) -> Real:
+        laws = laws_at(self.loop.gains, points)
         return np.array([disk_of(gains @ self._circle[1:]).min() for gains in laws.T])
 
     def disk(self, law: HubFeedback) -> float:
@@ -167,14 +172,14 @@ class SampledJudge:
         return scenario("slew", self.known, chain, chain.slew.rise_time + lasting)
 
     @cached_property
-    def _with_angle(self) -> tuple[Real, Real, Real, Real, Real]:
-        """Closed-loop matrices with the hub angle: without K1 and K2, what 1 of each adds; input, root moment."""
-        bare = self.loop.having(K1=0.0, K2=0.0)
+    def _with_angle(self) -> tuple[Real, Real, Real, Real]:
+        """Closed-loop matrices with the hub angle: without both gains, what 1 of each adds; input, root moment."""
+        bare = self._bare
         start = bare.matrix()
-        by_rate, by_moment = (bare.having(**{name: 1.0}).matrix() - start for name in ("K1", "K2"))
+        by_each = np.array([bare.having(**{name: 1.0}).matrix() - start for name in PLANE])
         _, B, C = self.loop.pulse.matrices()
         more = len(start) - B.size
-        return start, by_rate, by_moment, np.pad(B, (0, more)), np.pad(C[FED_BACK.index("root_moment")], (0, more))
+        return start, by_each, np.pad(B, (0, more)), np.pad(C[FED_BACK.index("root_moment")], (0, more))
 
     @cached_property
     def _keeps(self) -> int:
@@ -182,16 +187,18 @@ class SampledJudge:
         upper, real = self.loop.pulse.kept()
         return int(2 * upper.size + real.size + 2)
 
-    def _run(self, task: Scenario, K1: Real, K2: Real) -> tuple[Real, Real]:
+    def _run(self, task: Scenario, points: Real) -> tuple[Real, Real]:
         """Root moment and input at the samples of a slew, (samples, gains)."""
-        start, by_rate, by_moment, drive, sense = self._with_angle
-        A = start + K1[:, None, None] * by_rate + K2[:, None, None] * by_moment
+        start, by_each, drive, sense = self._with_angle
+        (on_rate, on_moment), number = points, points.shape[1]
+        A = start + on_rate[:, None, None] * by_each[0] + on_moment[:, None, None] * by_each[1]
         kept = self._keeps
-        x, (moment, u) = np.zeros((K1.size, len(start), 1)), np.zeros((2, task.t.size, K1.size))
-        fixed = task.feedforward + self.loop.gains.Kp * task.hub_angle
+        x, (moment, u) = np.zeros((number, len(start), 1)), np.zeros((2, task.t.size, number))
+        fixed = task.feedforward + self.loop.gains[ANGLE_GAIN] * task.hub_angle
         for k in range(task.t.size):
             moment[k] = x[..., 0] @ sense
-            x = A @ x + drive[:, None] * (fixed[k] + K1 * task.hub_rate[k] + K2 * task.rigid_moment[k])[:, None, None]
+            wanted = fixed[k] + on_rate * task.hub_rate[k] + on_moment * task.rigid_moment[k]
+            x = A @ x + drive[:, None] * wanted[:, None, None]
             u[k] = x[:, kept, 0]
         return moment, u
 
@@ -201,17 +208,17 @@ class SampledJudge:
         period = 2 * np.pi / first_frequency(self.loop.plant.arm)
         return self._task(max(period, SAMPLES_LEFT * self.loop.chain.sampling.period))
 
-    def residual(self, K1: Real, K2: Real) -> Real:
+    def residual(self, points: Real) -> Real:
         """Root mean square of the root moment [N m] over a period of the first mode after the slew."""
         task = self._slew
-        moment, _ = self._run(task, K1, K2)
+        moment, _ = self._run(task, points)
         return np.asarray(np.sqrt((moment[task.t >= task.busy_until * (1 - 1e-12)] ** 2).mean(axis=0)))
 
-    def cost(self, K1: Real, K2: Real) -> Real:
+    def cost(self, points: Real) -> Real:
         """What the trial of the tuner costs with constant gains."""
         chain = self.loop.chain
         task = self._task(max(0.0, TRIAL_DURATION - chain.slew.rise_time))
-        return trial_cost(task, chain, *self._run(task, K1, K2))
+        return trial_cost(task, chain, *self._run(task, points))
 
 
 def trial_cost(task: Scenario, chain: Chain, moment: Real, u: Real) -> Real:
@@ -221,19 +228,20 @@ def trial_cost(task: Scenario, chain: Chain, moment: Real, u: Real) -> Real:
     return np.asarray(task.period * (a * x**2 + b * added**2).sum(axis=0) / 2)
 
 
-def scaled(law: HubFeedback, share: float) -> HubFeedback:
-    """The law with every gain times `share`."""
-    return HubFeedback(K1=share * law.K1, K2=share * law.K2, Kp=share * law.Kp)
+def _added(points: Real, by_each: Real) -> Real:
+    """What both gains add to a matrix (n, m, m) at points (2, n), of what 1 of each does (2, m, m)."""
+    across, up = points[..., None, None] * by_each[:, None]
+    return np.asarray(across + up)
 
 
 def sampled_judges(
-    arm: Arm, chain: Chain, objective: str, Kp: float, modes: int, known: Arm | None = None
+    arm: Arm, chain: Chain, objective: str, held: HubFeedback, modes: int, known: Arm | None = None
 ) -> Iterator[SampledJudge]:
     """Judges of 8 modes, of 16, ... up to as many as the loop has; without damping of as many as its verdict takes.
 
     `known`, if not the arm itself, is the one that slews are made for.
     """
-    law = HubFeedback(K1=1.0, K2=0.5 * arm.input_per_torque, Kp=Kp)
+    law = held.at(1.0, 0.5 * arm.input_per_torque)
     most = UNDAMPED_MODES if arm.has_elastic_link else most_modes(arm, chain)
     count = most if arm.has_elastic_link else min(most, max(FEWEST_MODES, modes + FEWEST_MODES // 2))
     while True:

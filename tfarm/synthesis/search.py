@@ -1,10 +1,10 @@
 """The search behind `design`: a grid that sees every basin, its minima refined all together, the best ones polished.
 
-K1 is searched on a scale that is logarithmic from a hundred-millionth of J w1 on: what a slew leaves behind is least
-where the loop hardly brakes, and there every decade of K1 counts.  Along K2 the scale is linear, and as fine as the
-basins are: a slew of time T leaves a mode of frequency w in proportion to sin^2(w T/4), so that each mode has a basin
-wherever w(K2) grows by 4 pi/T.  A minimum of the grid is then refined on ever smaller grids of 5 x 5 around it, all
-minima at once; the best are polished by the downhill simplex of Nelder and Mead (1965).
+The rate gain is searched on a scale that is logarithmic from a hundred-millionth of J w1 on: what a slew leaves behind
+is least where the loop hardly brakes, and there every decade counts.  Along the moment gain the scale is linear, and as
+fine as the basins are: a slew of time T leaves a mode of frequency w in proportion to sin^2(w T/4), so that each mode
+has a basin wherever its w under that gain grows by 4 pi/T.  A minimum of the grid is then refined on ever smaller grids
+of 5 x 5 around it, all minima at once; the best are polished by the downhill simplex of Nelder and Mead (1965).
 """
 
 from __future__ import annotations
@@ -21,22 +21,22 @@ from tfarm.records import record
 
 Real = NDArray[np.float64]
 Bounds = tuple[float, float]
-Score = Callable[[Real, Real], Real]  # of arrays of K1 and K2; what is least is best
+Score = Callable[[Real], Real]  # of points (2, n) of the plane of gains; what is least is best
 
-LEAST = 1e-8  # of the unit of K1: below it K1 is linear, and nothing is found that is not found at it
+LEAST = 1e-8  # of the unit of the rate gain: below it the scale is linear, and nothing is found that is not found at it
 END = 1e-9  # share of an axis left out at either end: there verdicts are marginal
 ROUNDS, SHRINK = 10, 0.5  # of the small grids, and by how much they shrink where their centre is the best
 HALVED, FEWEST = (4, 7), 6  # rounds after which the better half of the minima goes on, and how many do at least
 OFFSETS = np.array([(i, j) for i in (-1.0, -0.5, 0.0, 0.5, 1.0) for j in (-1.0, -0.5, 0.0, 0.5, 1.0)])
-TIE = 0.01  # weight of the damping ratio beside a disk margin: without a clock K2 = 0 has margin 2 at every K1
+TIE = 0.01  # weight of the damping ratio beside a disk margin: without a clock rate feedback alone has margin 2
 POLISHED = 3  # minima that the simplex starts from
 
 
 class Effort(NamedTuple):
-    """Points of the grid along K1 and K2, and how many of its minima are refined."""
+    """Points of the grid across and up the plane of gains, and how many of its minima are refined."""
 
-    K1: int
-    K2: int
+    across: int
+    up: int
     starts: int
 
 
@@ -68,7 +68,7 @@ class Axis:
 
 
 def rate_axis(bounds: Bounds, unit: float) -> Axis:
-    """The axis of K1 for a unit J w1 [N m s/rad]; one that begins at 0 begins at the least K1 that is told from 0."""
+    """The axis of the rate gain for a unit J w1 [N m s/rad]; one that begins at 0 begins at the least told from 0."""
     low, high = bounds
     least = LEAST * min(unit, max(abs(low), abs(high)))
     return Axis(least if low == 0 else low, -least if high == 0 else high, least)
@@ -102,8 +102,8 @@ def refined(score: Score, axes: tuple[Axis, Axis], starts: Real, steps: Real) ->
             kept = np.argsort(best, kind="stable")[: max(FEWEST, len(best) // 2)]
             at, size, best = at[kept], size[kept], best[kept]
         points = np.clip(at[:, None] + size[:, None, None] * OFFSETS * steps, END, 1 - END)
-        gains = [axis.gain(points[..., i].ravel()) for i, axis in enumerate(axes)]
-        values = score(*gains).reshape(points.shape[:2])
+        gains = np.array([axis.gain(points[..., i].ravel()) for i, axis in enumerate(axes)])
+        values = score(gains).reshape(points.shape[:2])
         least = values.argmin(axis=1)
         rows = np.arange(len(at))
         at, best = points[rows, least], values[rows, least]
@@ -116,8 +116,8 @@ def polished(score: Score, axes: tuple[Axis, Axis], found: Found, size: float) -
 
     def of_shares(x: Any) -> float:
         inside = np.clip(x, END, 1 - END)
-        gains = [axis.gain(inside[i : i + 1]) for i, axis in enumerate(axes)]
-        value = float(score(*gains)[0])
+        gains = np.array([axis.gain(inside[i : i + 1]) for i, axis in enumerate(axes)])
+        value = float(score(gains)[0])
         return value + abs(value) * float(abs(x - inside).sum())
 
     simplex = found.shares + size * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])

@@ -39,16 +39,16 @@ class OnArm:
 
 
 class Judge(Protocol):
-    """What gains are worth in a loop, Kp held."""
+    """What both gains of the plane are worth in a loop, the others held."""
 
-    def effort(self, K2: Bounds) -> Effort:
+    def effort(self, up: Bounds) -> Effort:
         """How fine a grid its objective needs."""
 
     def landscape(self, axes: tuple[Axis, Axis], effort: Effort) -> tuple[Real, Score]:
         """Scores over the grid, inf where not stable, and the score to refine with."""
 
-    def score(self, K1: Real, K2: Real) -> Real:
-        """What is minimised."""
+    def score(self, points: Real) -> Real:
+        """What is minimised, at points (2, n) of the plane."""
 
     def holds(self, law: HubFeedback) -> bool:
         """Whether the loop is stable by the verdict of its kind."""
@@ -63,18 +63,18 @@ class Worst:
 
     judges: tuple[Judge, ...]
 
-    def effort(self, K2: Bounds) -> Effort:
+    def effort(self, up: Bounds) -> Effort:
         """The finest grid that any of them asks for."""
-        return Effort(*(max(each) for each in zip(*(judge.effort(K2) for judge in self.judges), strict=True)))
+        return Effort(*(max(each) for each in zip(*(judge.effort(up) for judge in self.judges), strict=True)))
 
     def landscape(self, axes: tuple[Axis, Axis], effort: Effort) -> tuple[Real, Score]:
         """The largest scores over the grid, inf where one arm is not stable, and the score to refine with."""
         values, scores = zip(*(judge.landscape(axes, effort) for judge in self.judges), strict=True)
-        return np.max(values, axis=0), lambda K1, K2: np.max([score(K1, K2) for score in scores], axis=0)
+        return np.max(values, axis=0), lambda points: np.max([score(points) for score in scores], axis=0)
 
-    def score(self, K1: Real, K2: Real) -> Real:
+    def score(self, points: Real) -> Real:
         """What is minimised: the largest score."""
-        return np.asarray(np.max([judge.score(K1, K2) for judge in self.judges], axis=0))
+        return np.asarray(np.max([judge.score(points) for judge in self.judges], axis=0))
 
     def holds(self, law: HubFeedback) -> bool:
         """Whether the loop of every arm is stable by the verdict of its kind."""
@@ -82,14 +82,17 @@ class Worst:
 
     def value(self, law: HubFeedback, score: float) -> float:
         """The objective of a law of that score, on the arm that has it."""
-        K1, K2 = np.array([law.K1]), np.array([law.K2])
-        worst = max(self.judges, key=lambda judge: float(judge.score(K1, K2)[0]))
+        worst = max(self.judges, key=lambda judge: score_of(judge, law))
         return worst.value(law, score)
 
     def values(self, law: HubFeedback) -> list[float]:
         """The objective of a law on each arm."""
-        K1, K2 = np.array([law.K1]), np.array([law.K2])
-        return [judge.value(law, float(judge.score(K1, K2)[0])) for judge in self.judges]
+        return [judge.value(law, score_of(judge, law)) for judge in self.judges]
+
+
+def score_of(judge: Judge, law: HubFeedback) -> float:
+    """What a judge minimises, at one law."""
+    return float(judge.score(np.array(law.point)[:, None])[0])
 
 
 def worst_value(objective: str, values: Sequence[float]) -> float:
