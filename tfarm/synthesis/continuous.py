@@ -30,7 +30,7 @@ BASIN = 6  # points of the grid in each basin of a residual
 @dataclass(frozen=True)
 @record
 class ContinuousJudge:
-    """What both gains are worth in the continuous loop, beside those of `held`; the slew is made for the arm `known`."""
+    """What both gains are worth without a clock, beside those of `held`; the slew is made for the arm `known`."""
 
     arm: Arm
     objective: str
