@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from tfarm.arm import Arm, HubFeedback
+from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, Arm
 from tfarm.columns import Column, Table
 from tfarm.digits import counted, lined, plain, significant, worded
 from tfarm.dsp import Chain
@@ -42,8 +42,8 @@ ELASTIC = (
     "give the link a measured damping, or see what tfarm tune makes of the first modes."
 )
 RUNS_AWAY = (
-    "No tuner here: at the default K1 and this period the slew without moment feedback runs away, so that there is no "
-    "cost to compare with. The sampled loop above says which K1 holds."
+    f"No tuner here: at the default {RATE_GAIN} and this period the slew without moment feedback runs away, so that "
+    f"there is no cost to compare with. The sampled loop above says which {RATE_GAIN} holds."
 )
 
 
@@ -104,8 +104,9 @@ def why_not(arm: Arm) -> str:
 
 def _gain_picture(data: TunerStudy) -> Picture:
     tuning = data.tuning
-    plane = overlay(data.arm, HubFeedback(K1=tuning.plan.K1, K2=tuning.best_constant.gain), tuning.trial.loop.chain)
+    plane = overlay(data.arm, tuning.constant, tuning.trial.loop.chain)
     guard, K = tuning.training.guard, tuning.training.result.K
+    (rate,) = tuning.constant.told(plain, [RATE_GAIN])
     return Picture(
         stem="tune-gain",
         title="The tuner's path and its guard on the map",
@@ -113,10 +114,11 @@ def _gain_picture(data: TunerStudy) -> Picture:
             "Left: the map of both gains, sand where the continuous loop is stable, blue where the sampled one is, for "
             "constant gains. A gain that moves needs its own proof, and gets it only in the green bar: "
             f"{typeset(guard.sentence)}. Black: the gains that the tuner takes, {significant(float(K.min()), 3)} to "
-            f"{significant(float(K.max()), 3)}, at K1 = {plain(tuning.plan.K1)}. Right: the same over time (the "
-            f"paper's Figure 3), seed {tuning.plan.seed}; without the tuner K2 = 0."
+            f"{significant(float(K.max()), 3)}, at {rate}. Right: the same over time (the "
+            f"paper's Figure 3), seed {tuning.plan.seed}; without the tuner {MOMENT_GAIN} = 0."
         ),
-        alt=f"Map of K1 and K2 with the tuner's guard from {guard.lo:.3f} to {guard.hi:.3f}, and its gain over time.",
+        alt=f"Map of {' and '.join(PLANE)} with the tuner's guard from {guard.lo:.3f} to {guard.hi:.3f}, and its gain "
+        "over time.",
         figure=draw_gain(data, *plane),
         data=Table(
             stem="tune-gain-data",
@@ -152,7 +154,7 @@ def _coarse_picture(data: TunerStudy) -> Picture:
         title="The same with the DSP's effects on",
         caption=(
             f"{_converter_words(data)} (the paper's Figures 8 and 9). {_residuals(data, 1)} Nothing regulates the hub "
-            "angle (no Kp), so what it loses to delay and steps it keeps."
+            f"angle (no {ANGLE_GAIN}), so what it loses to delay and steps it keeps."
             f"{clipped_words(data.coarse)}{resolution_words(data.coarse.values())}"
         ),
         alt=f"The slew with converters and delay. {_residuals(data, 1)}",
@@ -249,7 +251,7 @@ CONTROLLERS = {
 
 def comparison_table(data: TunerStudy) -> Table:
     """Cost of a slew, a row a condition, a column a controller, and whether the guard is proven there too."""
-    unit, K2 = data.tuning.plan.scale, significant(data.tuning.best_constant.gain, 3)
+    unit, best = data.tuning.plan.scale, significant(data.tuning.best_constant.gain, 3)
     units = f" Costs count moments and torques in units of {plain(unit)} N m, as suits this arm." * (unit != 1.0)
     away_from_it = "; ∞ where the loop ran away" if any(math.isinf(row.tuner.cost) for row in data.rows) else ""
     return Table(
@@ -257,8 +259,8 @@ def comparison_table(data: TunerStudy) -> Table:
         title="Cost of the slew, beside what it has to beat",
         caption=(
             "Every controller knows the arm by its name plate only: what was trained or chosen as trained is used on "
-            f"all others. None: no moment feedback. Constant: the best constant gain as trained, K2 = {K2}; own "
-            "constant: the best one for that row, of those that leave its loop stable, steps apart. "
+            f"all others. None: no moment feedback. Constant: the best constant gain as trained, {MOMENT_GAIN} = {best}; "
+            "own constant: the best one for that row, of those that leave its loop stable, steps apart. "
             f"Tuner: that of seed {data.tuning.plan.seed}. Bound: the linear-quadratic optimum. ZV and EI: "
             "input shaping with no moment feedback, judged by their own, later slew, so that the bound is not theirs. "
             "Guard proven: "

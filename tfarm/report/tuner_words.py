@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tfarm.arm import written_unit
+from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN
 from tfarm.digits import significant
 from tfarm.dsp.curves import away
 from tfarm.report.sections import Fact
@@ -12,7 +12,7 @@ from tfarm.report.words import typeset
 from tfarm.tuner.overview import Curves, TunerStudy
 from tfarm.tuner.tuning import tip_errors
 
-SERVO = ("Kp", "K1")
+SERVO = (ANGLE_GAIN, RATE_GAIN)
 ROUNDED = 1e-10  # of the tip's travel: no slew ends nearer its target than rounding tells
 MORE = 3.0  # times as far off its target is more, and no coincidence
 SAME = 1e-4  # relative difference of two costs below which they are called the same
@@ -39,10 +39,12 @@ def short_answer(data: TunerStudy) -> str:
 def _constant_words(gain: float, best: float, without: float) -> str:
     """What the best constant gain does by itself."""
     if best >= (1 - SAME) * without:
-        return f"No constant K2 takes anything off the cost of a slew ({significant(without, 3)} without it);"
+        nothing = f"No constant {MOMENT_GAIN} takes anything off the cost of a slew"
+        return f"{nothing} ({significant(without, 3)} without it);"
     return (
-        f"A constant K2 of {significant(gain, 3)} already takes {significant(100 * (1 - best / without), 2)} % off the "
-        f"cost of a slew ({significant(without, 3)} without moment feedback, {significant(best, 3)} with it);"
+        f"A constant {MOMENT_GAIN} of {significant(gain, 3)} already takes "
+        f"{significant(100 * (1 - best / without), 2)} % off the cost of a slew "
+        f"({significant(without, 3)} without moment feedback, {significant(best, 3)} with it);"
     )
 
 
@@ -74,8 +76,8 @@ def drift_words(data: TunerStudy) -> str:
     return (
         f"What the cost does not see: the arm ends off its target, the tip {significant(1e3 * tuned, 2)} mm with the "
         f"tuner and {significant(1e3 * constant, 2)} mm with the best constant gain. The law regulates the hub rate "
-        f"alone, and the moment feedback's torque adds up to an angle of its integral over K1: {what}. A tuner for use "
-        "needs Kp (tfarm tune --Kp)."
+        f"alone, and the moment feedback's torque adds up to an angle of its integral over {RATE_GAIN}: {what}. A "
+        f"tuner for use needs {ANGLE_GAIN} (tfarm tune --{ANGLE_GAIN})."
     )
 
 
@@ -83,10 +85,8 @@ def servo_words(data: TunerStudy) -> str:
     """The same with the angle held: where the slew ends then, and what the tuner is worth beside its yardsticks."""
     if data.servo is None:
         return ""
-    tuning, plan, guard = data.servo, data.servo.plan, data.servo.training.guard
-    gains = " and ".join(
-        f"{name} = {significant(getattr(plan, name), 3)}{written_unit(name, data.arm)}" for name in SERVO
-    )
+    tuning, guard = data.servo, data.servo.training.guard
+    gains = " and ".join(data.servo.plan.servo.told(lambda gain: significant(gain, 3), SERVO, data.arm))
     off = tip_errors(tuning)["tip_error_m"]
     end = "runs away" if off is None else f"ends {significant(1e3 * abs(off), 2)} mm off its target"
     if off is not None and abs(off) < ROUNDED * data.arm.reach * float(abs(tuning.trial.task.hub_angle).max()):
@@ -101,8 +101,8 @@ def servo_words(data: TunerStudy) -> str:
     }
     told = ", ".join(f"{name} {significant(cost, 3)}" for name, cost in costs.items())
     return (
-        f"With the angle held, {gains}, the tuned slew {end}. The guard there is K2 from {significant(guard.lo, 3)} to "
-        f"{significant(guard.hi, 3)}, {proven} for any K(t). Costs of that slew: {told}."
+        f"With the angle held, {gains}, the tuned slew {end}. The guard there is {MOMENT_GAIN} from "
+        f"{significant(guard.lo, 3)} to {significant(guard.hi, 3)}, {proven} for any K(t). Costs of that slew: {told}."
     )
 
 
@@ -197,11 +197,11 @@ def headline_facts(data: TunerStudy) -> tuple[Fact, ...]:
     shaped = min((record.cost, kind) for kind, (_, record) in tuning.shaped.items())
     later = any(trial.task.busy_until > tuning.trial.task.busy_until for trial, _ in tuning.shaped.values())
     how = f"{shaped[1]}, a later slew" if later else "no mode slow enough to shape"
-    K = significant(tuning.best_constant.gain, 3)
+    K = f"{MOMENT_GAIN} = {significant(tuning.best_constant.gain, 3)}"
     return (
         Fact(label="does tuning beat a constant gain?", value=helps, beside=f"median of {final.size} seeds"),
         Fact(label="cost without moment feedback", value=significant(tuning.without.cost, 4)),
-        Fact(label="best constant gain", value=significant(tuning.best_constant.cost, 4), beside=f"K2 = {K}"),
+        Fact(label="best constant gain", value=significant(tuning.best_constant.cost, 4), beside=K),
         Fact(
             label="tuner",
             value=significant(median, 4),

@@ -1,4 +1,4 @@
-"""The neural gain tuner: a network that sets K2 while the arm slews, kept where the loop is proven stable."""
+"""The neural gain tuner: a network that sets the moment gain while the arm slews, kept where that is proven stable."""
 
 from tfarm.tuner.bound import lq_bound
 from tfarm.tuner.comparison import compare, conditions

@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from tfarm.arm import Arm
+from tfarm.arm import MOMENT_GAIN, Arm
 from tfarm.dsp import Chain, Converters, Scenario, Simulation, Simulator
 from tfarm.dsp.scenarios import torque_unit
 from tfarm.errors import ConvergenceError
@@ -22,7 +22,7 @@ from tfarm.tuner.controller import TunedGain, judged, tip_error
 from tfarm.tuner.guard import Guard
 from tfarm.tuner.sector import MovingGain
 from tfarm.tuner.shaping import shaped, shaper
-from tfarm.tuner.trial import Record, Trial, residual_rms, slew_trial
+from tfarm.tuner.trial import Record, Trial, residual_rms
 
 ADDED = (0.06, 0.15, 0.3)  # of the arm's mass, for one without payload: 0.1, 0.25 and 0.5 kg on the paper's
 CARRIED = (0.5, 1.5, 2.0)  # of the payload, for one that has one
@@ -136,11 +136,7 @@ def compare(
 
 
 def _row(trial: Trial, gain: TunedGain, guard: Guard, nominal: float, condition: Condition) -> Row:
-    here = slew_trial(
-        condition.arm, condition.chain, K1=gain.K1, Kp=gain.Kp, cost=trial.cost, signals=trial.signals, known=trial.arm,
-        duration=trial.n * trial.task.period * (1 - 1e-9), count=trial.loop.plant.count,
-    )  # fmt: skip
-    here = replace(here, task=trial.task)
+    here = trial.asked_of(condition.arm, condition.chain, gain.servo)
     own = best_constant(here)
     shapers = {kind: shaped(trial.task, shaper(trial.loop, kind)) for kind in ("ZV", "EI")}
     bound = lq_bound(here)
@@ -152,7 +148,7 @@ def _row(trial: Trial, gain: TunedGain, guard: Guard, nominal: float, condition:
         own_gain=own.gain,
         ZV=_constant(here, shapers["ZV"], 0.0),
         EI=_constant(here, shapers["EI"], 0.0),
-        tuner=_played(_simulator(here, here.task).gain_schedule(gain.K1, gain, Kp=gain.Kp), here),
+        tuner=_played(gain.run(_simulator(here, here.task)), here),
         bound=_outcome(bound, here.task),
         proven=guard.is_proven and _proven(here, guard),
     )
@@ -173,7 +169,7 @@ def _simulator(trial: Trial, task: Scenario) -> Simulator:
 
 
 def _constant(trial: Trial, task: Scenario, K: float) -> Outcome:
-    return _played(_simulator(trial, task).linear(trial.loop.gains.having("K2", K)), trial)
+    return _played(_simulator(trial, task).linear(trial.loop.gains.having(MOMENT_GAIN, K)), trial)
 
 
 def _played(run: Simulation, trial: Trial) -> Outcome:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tfarm.arm import HubFeedback
 from tfarm.dsp import Measurement, Simulation, Simulator
 from tfarm.tuner.network import Network
 from tfarm.tuner.trial import Cost, Record, Signals, Trial
@@ -25,13 +27,21 @@ class TunedGain:
     Kp: float = 0.0
     _past: list[tuple[float, float, float, float]] = field(default_factory=list, init=False)
 
+    @cached_property
+    def servo(self) -> HubFeedback:
+        """The law beside the moment."""
+        return HubFeedback(K1=self.K1, Kp=self.Kp)
+
+    def run(self, simulator: Simulator) -> Simulation:
+        """The loop of a simulator under the servo and this gain."""
+        return simulator.gain_schedule(self.K1, self, Kp=self.Kp)
+
     def __call__(self, m: Measurement) -> float:
         """The gain at this sample."""
         if m.k == 0:
             self._past = [(0.0, 0.0, 0.0, 0.0)] * 2
         (u1, e1, x1, K_before), (_, e2, _, _) = self._past
-        servo = self.Kp * (m.angle_reference - m.hub_angle) + self.K1 * (m.rate_reference - m.hub_rate)
-        u = servo + (m.feedforward if self.signals == "total" else 0.0)
+        u = m.servo(self.servo) + (m.feedforward if self.signals == "total" else 0.0)
         row = [u, u1, e1, e2, m.vibration, x1, K_before][: self.network.scales.size]
         K = self.network.gain(np.array(row), self.guard)
         self._past = [(u, u - K * m.vibration, m.vibration, K), self._past[0]]
@@ -52,7 +62,7 @@ def judged(simulation: Simulation, cost: Cost, signals: Signals) -> Record:
 
 def simulated(simulator: Simulator, gain: TunedGain, cost: Cost) -> Record:
     """The trained network in a simulator whose chain has the same reading of the signals."""
-    return judged(simulator.gain_schedule(gain.K1, gain, Kp=gain.Kp), cost, gain.signals)
+    return judged(gain.run(simulator), cost, gain.signals)
 
 
 def tip_error(simulation: Simulation, trial: Trial) -> float | None:

@@ -1,14 +1,13 @@
 """The compiled heart of the tuner: a trial forward, and its cost's gradient backward.  Arrays:
 
-    model       A^T, A (n, n), B (n,), servo (n,), moment (n,): s' = A s + B torque; servo.s = Kp angle + K1 rate
-    reference   (N, 4): Kp angle + K1 rate wanted, torque counted in u, torque not counted in it, rigid arm's moment
+    model       A^T, A (n, n), B (n,), servo (n,), moment (n,): s' = A s + B torque; servo.s by angle and rate
+    reference   (N, 4): what servo.s should be, torque counted in u, torque not counted in it, rigid arm's moment
     numbers     a, b, T, bound, lag: the cost's weights, the period, the largest |moment|, samples until x answers
     guard       1 with lo and hi, or 0
     weights     W1 (h, m) row by row, then w2 (h,)
     run         inputs (N, m), hidden (N, h), signals (N, 5): x, u, e, K, dK/dz
 
-With u = (torque counted) + Kp (angle wanted - angle) + K1 (rate wanted - rate) and e = u - K x the torque is
-e + (torque not counted).
+With u = (torque counted) + (what servo.s should be) - servo.s and e = u - K x the torque is e + (torque not counted).
 """
 
 from __future__ import annotations

@@ -8,27 +8,28 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, HubFeedback
+from tfarm.arm import Arm
 from tfarm.dsp import Chain, Simulation, Simulator
 from tfarm.dsp.curves import resolved
 from tfarm.dsp.results import ideal_chain
 from tfarm.dsp.scenarios import torque_unit
+from tfarm.dsp.slews import WITHOUT
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.records import record
-from tfarm.spectrum.scales import default_gains, first_frequency
+from tfarm.spectrum.scales import first_frequency
 from tfarm.tuner import Cost, Learning, Plan, Tuning, compare, conditions, tune
 from tfarm.tuner.comparison import Row, quantised_chain
 from tfarm.tuner.guard import GuardKind
 from tfarm.tuner.studies import PAPER, Finished, map_verdict, plans_of, run_study
 from tfarm.tuner.training import Rule
-from tfarm.tuner.trial import usual_rate_gain
+from tfarm.tuner.tuning import usual_plan
 
 Real = NDArray[np.float64]
 
 SEEDS = 20  # of the learning curves
 MAP_SEEDS, MAP_TRIALS = 5, 60
 TRIAL = 3.0  # times the slew
-SERVO = 1 / 20  # of the first frequency: how fast the angle loop of the servo is, that its K1 leaves the mode alone
+SERVO = 1 / 20  # of the first frequency: how fast the servo's angle loop is, that its damping leaves the mode alone
 SERVO_SAMPLES = 0.03  # rad a sample, where that is slower
 WORKERS = 2
 LEARNT: tuple[tuple[str, str, Rule, GuardKind], ...] = (
@@ -133,7 +134,7 @@ def tuner_study(arm: Arm, chain: Chain) -> TunerStudy:
         arm=arm,
         tuning=tuning,
         slews=_simulated(tuning, ideal),
-        constant=_simulator(tuning, ideal).linear(HubFeedback(K1=tuning.plan.K1, K2=tuning.best_constant.gain)),
+        constant=_simulator(tuning, ideal).linear(tuning.constant),
         coarse=_simulated(tuning, next(each.chain for each in listed if each.name == COARSE)),
         curves=tuple(_curves(tuning, *each) for each in LEARNT),
         cost_map=_cost_map(tuning),
@@ -145,9 +146,9 @@ def tuner_study(arm: Arm, chain: Chain) -> TunerStudy:
 def _servo(arm: Arm, plan: Plan, chain: Chain) -> Tuning | None:
     """The same tuning with an angle loop a twentieth as fast as the first mode, or slower where the clock is slow."""
     speed = min(SERVO * first_frequency(arm), SERVO_SAMPLES / chain.sampling.period)
-    Kp = float(f"{arm.turned_inertia * speed**2:.2g}")
+    on_angle = float(f"{arm.turned_inertia * speed**2:.2g}")
     try:
-        return tune(arm, replace(plan, Kp=Kp, K1=usual_rate_gain(arm, Kp)), chain)
+        return tune(arm, plan.holding(arm, on_angle), chain)
     except (CertificationError, ConvergenceError):
         return None
 
@@ -156,7 +157,7 @@ def plan_of(arm: Arm, chain: Chain) -> Plan:
     """The paper's figures at the arm's own gain and in its own unit of torque, for trials of three times the slew."""
     unit = torque_unit(arm, chain)
     cost = Cost(a=Cost().a / unit**2, b=Cost().b / unit**2)
-    return Plan(K1=default_gains(arm).K1, duration=TRIAL * chain.slew.rise_time, cost=cost, scale=unit)
+    return replace(usual_plan(arm), duration=TRIAL * chain.slew.rise_time, cost=cost, scale=unit)
 
 
 def _simulator(tuning: Tuning, chain: Chain) -> Simulator:
@@ -165,14 +166,13 @@ def _simulator(tuning: Tuning, chain: Chain) -> Simulator:
 
 
 def _simulated(tuning: Tuning, chain: Chain) -> dict[str, Simulation]:
-    simulator, K1 = _simulator(tuning, chain), tuning.plan.K1
     without, tuned = resolved(
-        simulator,
+        _simulator(tuning, chain),
         tuning.trial.arm,
-        lambda each: each.linear(HubFeedback(K1=K1, K2=0.0)),
-        lambda each: each.gain_schedule(K1, tuning.gain()),
+        lambda each: each.linear(tuning.gain().servo),
+        lambda each: tuning.gain().run(each),
     )
-    return {"without moment feedback, K2 = 0": without, "with the tuner": tuned}
+    return {WITHOUT: without, "with the tuner": tuned}
 
 
 def _curves(tuning: Tuning, key: str, title: str, rule: Rule, guard: GuardKind) -> Curves:

@@ -19,7 +19,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import FED_BACK
+from tfarm.arm import FED_BACK, MOMENT_GAIN
 from tfarm.dsp import SampledLoop
 from tfarm.records import record
 from tfarm.tuner.lyapunov import Lyapunov, common_lyapunov
@@ -33,7 +33,7 @@ AROUND = np.r_[-np.geomspace(100.0, 0.01, 30), 0.0, np.geomspace(0.01, 100.0, 30
 @dataclass(frozen=True)
 @record
 class MovingGain:
-    """A sampled loop whose K2 moves: A(K) = open - K drive sense^T, apart from the free hub angle."""
+    """A sampled loop whose moment gain K moves: A(K) = open - K drive sense^T, apart from the free hub angle."""
 
     loop: SampledLoop
 
@@ -63,7 +63,10 @@ class MovingGain:
 
     def at(self, K: float) -> Real:
         """The closed-loop matrix at a gain."""
-        return self.loop.having(K2=K).reduced_matrix()
+        return self._under(K).reduced_matrix()
+
+    def _under(self, K: float) -> SampledLoop:
+        return self.loop.under(self.loop.gains.having(MOMENT_GAIN, K))
 
     def radius(self, m: float) -> float:
         """Half the width of the widest sector around m; 0 where m itself is unstable."""
@@ -85,7 +88,7 @@ class MovingGain:
         """1 + (lo + hi) Re H + lo hi |H|^2 at z = e^{i theta}, by transfer functions."""
         z = np.exp(1j * theta)
         moment = self.loop.signals(z, None, np.ones(theta.size))[FED_BACK.index("root_moment")]
-        H = moment / self.loop.having(K2=0.0)(z)
+        H = moment / self._under(0.0)(z)
         return np.asarray(1 + (lo + hi) * H.real + lo * hi * abs(H) ** 2)
 
 

@@ -20,6 +20,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from tfarm.arm import MOMENT_GAIN
 from tfarm.dsp import SampledLoop, Scenario
 from tfarm.tuner.trial import Trial
 
@@ -83,7 +84,7 @@ def shaped_trial(trial: Trial, kind: Shaper) -> Trial:
 
 
 def _poles(loop: SampledLoop, modes: int) -> list[complex]:
-    poles: Any = loop.having(K2=0.0).poles
+    poles: Any = loop.under(loop.gains.having(MOMENT_GAIN, 0.0)).poles
     found = []
     for mode in range(1, modes + 1):
         own = loop.plant.poles[(loop.plant.mode == mode) & (loop.plant.poles.imag > 0)]

@@ -150,7 +150,7 @@ def _common(plan: Plan) -> str:
 
 
 def _trial(plan: Plan) -> str:
-    return repr((plan.cost, plan.signals, plan.K1, plan.Kp, plan.duration, plan.count))
+    return repr((plan.cost, plan.signals, plan.servo, plan.duration, plan.count))
 
 
 # ---------------------------------------------------------------- what is kept

@@ -136,6 +136,14 @@ class Trial:
         _, A, B, _, moment = self.model
         return float(moment @ np.linalg.matrix_power(A, int(self.numbers[kernel.LAG]) - 1) @ B)
 
+    def asked_of(self, arm: Arm, chain: Chain, servo: HubFeedback) -> Trial:
+        """The same slew asked of another loop, whose controller knows the arm of this one."""
+        here = slew_trial(
+            arm, chain, K1=servo.K1, Kp=servo.Kp, cost=self.cost, signals=self.signals, known=self.arm,
+            duration=self.n * self.task.period * (1 - 1e-9), count=self.loop.plant.count,
+        )  # fmt: skip
+        return replace(here, task=self.task)
+
     def run(self, inputs: int = 6, hidden: int = 1) -> Run:
         """Empty arrays for a network of that size."""
         return Run(np.zeros((self.n, inputs)), np.zeros((self.n, hidden)), np.zeros((self.n, 5)))

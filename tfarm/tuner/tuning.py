@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
 
-from tfarm.arm import Arm, HubFeedback
+from tfarm.arm import MOMENT_GAIN, Arm, HubFeedback
 from tfarm.dsp import Chain, Simulator, scenario
 from tfarm.dsp.results import ideal_chain, modes_for, rms_after, simulation_answer
 from tfarm.dsp.scenarios import described
@@ -23,7 +23,18 @@ from tfarm.tuner.network import initial_network
 from tfarm.tuner.saving import SavedTuner, weights_answer
 from tfarm.tuner.shaping import shaped_trial
 from tfarm.tuner.training import Learning, Training, train
-from tfarm.tuner.trial import DURATION, MODES, Cost, Record, Signals, Trial, residual_rms, slew_trial, with_signals
+from tfarm.tuner.trial import (
+    DURATION,
+    MODES,
+    Cost,
+    Record,
+    Signals,
+    Trial,
+    residual_rms,
+    slew_trial,
+    usual_rate_gain,
+    with_signals,
+)
 
 BOUND_NOTES = {
     "vibration": "the least cost of any control signal e on this slew, with full state and preview",
@@ -60,6 +71,15 @@ class Plan:
             raise ParameterError(key="scale", value=self.scale, remedy="a scale is a positive, finite number of N m")
 
     @property
+    def servo(self) -> HubFeedback:
+        """The law beside the moment."""
+        return HubFeedback(K1=self.K1, Kp=self.Kp)
+
+    def holding(self, arm: Arm, Kp: float) -> Plan:
+        """The plan with the hub's angle held by this gain, and the rate gain that damps it."""
+        return replace(self, Kp=Kp, K1=usual_rate_gain(arm, Kp))
+
+    @property
     def scales(self) -> np.ndarray[Any, Any]:
         """The scales of the network's inputs."""
         return np.r_[np.full(6, self.scale), np.ones(int(self.seventh_input))]
@@ -93,6 +113,11 @@ class Tuning:
     def gain(self) -> TunedGain:
         """The trained controller."""
         return self.saved().gain()
+
+    @property
+    def constant(self) -> HubFeedback:
+        """The law with the best constant gain."""
+        return self.trial.loop.gains.having(MOMENT_GAIN, self.best_constant.gain)
 
 
 def usual_plan(arm: Arm) -> Plan:
@@ -174,11 +199,11 @@ def tune_answer(tuning: Tuning) -> dict[str, Any]:
 def tip_errors(tuning: Tuning) -> dict[str, float | None]:
     """How far off the tip is [m] when the trial ends: tuned, with the best constant gain, without moment feedback."""
     trial = tuning.trial
-    simulator, law = Simulator(trial.arm, trial.loop.chain, trial.task, count=trial.loop.plant.count), trial.loop.gains
+    simulator = Simulator(trial.arm, trial.loop.chain, trial.task, count=trial.loop.plant.count)
     runs = {
-        "tip_error_m": simulator.gain_schedule(law.K1, tuning.gain(), Kp=law.Kp),
-        "tip_error_best_constant_m": simulator.linear(law.having("K2", tuning.best_constant.gain)),
-        "tip_error_without_m": simulator.linear(law.having("K2", 0.0)),
+        "tip_error_m": tuning.gain().run(simulator),
+        "tip_error_best_constant_m": simulator.linear(tuning.constant),
+        "tip_error_without_m": simulator.linear(tuning.gain().servo),
     }
     return {key: tip_error(run, trial) for key, run in runs.items()}
 
@@ -226,15 +251,11 @@ def controlled_answer(
     chain = with_signals(chain, saved.signals)
     task = scenario(name, arm, chain, duration)
     ideal = ideal_chain(chain)
-    used = modes_for(
-        count, lambda n: Simulator(arm, ideal, task, count=n).gain_schedule(saved.K1, saved.gain(), Kp=saved.Kp)
-    )
-    run = Simulator(arm, chain, task, count=used.modes, between=between).gain_schedule(
-        saved.K1, saved.gain(), Kp=saved.Kp
-    )
-    answer = simulation_answer(arm, HubFeedback(K1=saved.K1, K2=0.0, Kp=saved.Kp), run, None, used)
+    used = modes_for(count, lambda n: saved.gain().run(Simulator(arm, ideal, task, count=n)))
+    run = saved.gain().run(Simulator(arm, chain, task, count=used.modes, between=between))
+    answer = simulation_answer(arm, saved.gain().servo, run, None, used)
     what = described(task, arm, chain)
-    return answer | {"K2": None, "controller": _described(saved), "scenario_in_words": what}
+    return answer | {MOMENT_GAIN: None, "controller": _described(saved), "scenario_in_words": what}
 
 
 def _described(saved: SavedTuner) -> dict[str, Any]:
