@@ -170,7 +170,7 @@ def test_an_end_of_the_search_is_not_sold_as_a_proof(window, looked_at, text):
 def test_loci_are_the_poles_at_their_gains_and_aliased_modes_are_told_apart():
     loop = sampled_verdict(LAB, GAINS).loop
     data = loci(loop, 20.0, (-0.5, 1.5))
-    for locus, i in itertools.product((data.by_K1, data.by_K2), (0, 45, 90)):
+    for locus, i in itertools.product(data.by.values(), (0, 45, 90)):
         value = float(locus.values[i])
         z = loop.having(**{locus.gain: value}).poles.z
         assert np.sort_complex(locus.z[i]) == pytest.approx(np.sort_complex(z), abs=1e-12)

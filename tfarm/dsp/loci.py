@@ -7,13 +7,14 @@ mode that it comes from at zero gain.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import HubFeedback
+from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, HubFeedback
 from tfarm.crossing.turning import loose
 from tfarm.dsp.law import followed, origins
 from tfarm.dsp.loop import SampledLoop
@@ -27,8 +28,8 @@ ROUNDS = 24  # of halving the steps where a branch bends, at most
 REAL = 1e-12  # imaginary part of a real z: rounding
 RIM = 1.12  # radius up to which the z-plane is shown
 BEYOND = 1.2 * RIM  # and up to which a branch is drawn, so that its line runs out of the picture
-DECADES = 3  # of K1
-STRONGER = 10.0  # how many times its own K1 the locus of K1 alone goes
+DECADES = 3  # of the rate gain
+STRONGER = 10.0  # how many times its own rate gain the locus of that alone goes
 
 
 @dataclass(frozen=True)
@@ -49,14 +50,13 @@ class Locus:
 @dataclass(frozen=True)
 @record
 class Loci:
-    """Loci of K1 alone (K2 = 0), and of both gains through those of the loop; `poles` [1/s] are the arm's own,
-    one a flexible mode, `mode` their numbers.
+    """Loci of the rate gain alone, and `by` each of both gains through those of the loop; `poles` [1/s] are the arm's
+    own, one a flexible mode, `mode` their numbers.
     """
 
     loop: SampledLoop
     alone: Locus
-    by_K1: Locus
-    by_K2: Locus
+    by: Mapping[str, Locus]
     poles: Complex
     mode: NDArray[np.int64]
 
@@ -71,19 +71,19 @@ class Loci:
         return bool(at.size and self.poles[at[0]].imag > 2 * math.pi * self.half_rate)
 
 
-def loci(loop: SampledLoop, K1_top: float, K2_range: tuple[float, float]) -> Loci:
-    """The loci of K1 from nearly 0 to `K1_top` and of K2 over `K2_range`, the other gain as it is.
+def loci(loop: SampledLoop, top: float, moments: tuple[float, float]) -> Loci:
+    """The loci of the rate gain from nearly 0 to `top` and of the moment gain over `moments`, the other as it is.
 
     Both begin below the gains of the loop.
     """
-    K1 = np.geomspace(min(K1_top / 10**DECADES, loop.gains.K1 / STRONGER), K1_top, VALUES)
-    K2 = np.linspace(*K2_range, VALUES)
+    own, gains = loop.gains[RATE_GAIN], loop.gains
+    values = (np.geomspace(min(top / 10**DECADES, own / STRONGER), top, VALUES), np.linspace(*moments, VALUES))
     upper = np.nonzero((loop.pulse.poles.imag > 0) & (loop.pulse.mode > 0))[0]
     upper = upper[np.argsort(loop.pulse.mode[upper])]
-    small = np.geomspace(1e-3, STRONGER, VALUES) * loop.gains.K1
-    alone = _locus(loop.having(K2=0.0), "K1", small)
-    by_K1, by_K2 = _locus(loop, "K1", K1), _locus(loop, "K2", K2)
-    return Loci(loop, alone, by_K1, by_K2, loop.pulse.poles[upper], loop.pulse.mode[upper])
+    small = np.geomspace(1e-3, STRONGER, VALUES) * own
+    alone = _locus(loop.under(gains.having(MOMENT_GAIN, 0.0)), RATE_GAIN, small)
+    by = {name: _locus(loop, name, each) for name, each in zip(PLANE, values, strict=True)}
+    return Loci(loop, alone, by, loop.pulse.poles[upper], loop.pulse.mode[upper])
 
 
 def _locus(loop: SampledLoop, gain: str, values: Real) -> Locus:

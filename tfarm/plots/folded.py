@@ -35,8 +35,8 @@ def draw_loci(data: Loci) -> Figure:
         places = figure.add_gridspec(2, 2, width_ratios=[1.0, 1.25])
         folded(data, ax=figure.add_subplot(places[:, 0]))
         upper, lower = figure.add_subplot(places[0, 1]), figure.add_subplot(places[1, 1])
-        z_plane(data, data.by_K1, ax=upper)
-        z_plane(data, data.by_K2, ax=lower)
+        for locus, ax in zip(data.by.values(), (upper, lower), strict=True):
+            z_plane(data, locus, ax=ax)
         upper.set_xlabel("")
         arm, ms = data.loop.plant.arm.name, plain(1e3 * data.loop.chain.sampling.period)
         headline(figure, f"{arm}: poles of the loop sampled every {ms} ms")

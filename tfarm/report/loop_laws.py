@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Protocol
 
-from tfarm.arm import Arm, HubFeedback, through
+from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, HubFeedback, through
 from tfarm.digits import significant
 from tfarm.dsp import Chain
 from tfarm.dsp.brief import SampledBrief, sampled_brief
@@ -19,13 +19,13 @@ from tfarm.synthesis.design import Design, design
 
 MODES = 2  # flexible modes in the band of the damping that is drawn and designed for, as `tfarm design` has it
 SIGN = (
-    "Law: u = −K1 dθ/dt − K2 E I φ′(0) + r. Sign of K2: the strain gauge reads E I φ′(0), positive where it "
-    "accelerates the hub; {rest}. With the gauge reversed every K2 changes its sign."
+    f"Law: u = −{RATE_GAIN} dθ/dt − {MOMENT_GAIN} E I φ′(0) + r. Sign of {MOMENT_GAIN}: the strain gauge reads "
+    f"E I φ′(0), positive where it accelerates the hub; {{rest}}. With the gauge reversed every {MOMENT_GAIN} changes its sign."
 )
 AT_REST, HELD = "a torque u at rest gives −(J − I_h)/J u", "a torque u that lasts gives −u, as the tip holds the arm"
 NO_PLACE_FOR_K2 = (
-    "The hub of this arm has no inertia: {gauge}, so feeding it back by K2 would be an algebraic loop. There is no map "
-    "of K1 and K2; what K1 does at K2 = 0 is said below."
+    f"The hub of this arm has no inertia: {{gauge}}, so feeding it back by {MOMENT_GAIN} would be an algebraic loop. "
+    f"There is no map of {' and '.join(PLANE)}; what {RATE_GAIN} does at {MOMENT_GAIN} = 0 is said below."
 )
 
 
@@ -55,7 +55,7 @@ class NamedLaw:
 
     @property
     def gains(self) -> str:
-        """K1 = ..., K2 = ..., for reading."""
+        """Each gain with its value, for reading."""
         return gains_words(self.law)
 
 
@@ -65,7 +65,7 @@ def has_loop(arm: Arm) -> bool:
 
 
 def has_rate_loop(arm: Arm) -> bool:
-    """Whether K1 can be closed: the hub can turn."""
+    """Whether the hub rate can be fed back: the hub can turn."""
     return not arm.is_locked
 
 
@@ -79,7 +79,7 @@ def why_no_loop(arm: Arm) -> str:
 
 
 def sign_words(arm: Arm) -> str:
-    """The law, and the sign of its K2."""
+    """The law, and the sign of its moment gain."""
     if arm.is_uniform:
         return SIGN.format(rest=AT_REST if arm.has_rigid_mode else HELD)
     share = significant(arm.gauged_inertia / arm.total_inertia, 5) if arm.has_rigid_mode else ""
@@ -88,22 +88,22 @@ def sign_words(arm: Arm) -> str:
 
 
 def edge_of_K2(arm: Arm, law: HubFeedback) -> float | None:
-    """The K2 at which the loop loses its stability as K2 grows, the other gains held; None where none was found."""
-    windows = margins_of(arm, law).windows["K2"]
+    """The moment gain at which the loop loses its stability as it grows alone; None where none was found."""
+    windows = margins_of(arm, law).windows[MOMENT_GAIN]
     top = math.inf if windows.around is None else windows.around[1]
     return top if windows.around is not None and windows.end(top) == "edge" else None
 
 
 @lru_cache(maxsize=16)
 def best(arm: Arm, chain: Chain) -> Design | None:
-    """What `tfarm design ARM` finds; None where no gains within its bounds hold, or where K2 has no place."""
+    """What `tfarm design ARM` finds; None where no gains within its bounds hold, or the moment has no place."""
     if not has_loop(arm):
         return None
     try:
         found = design(arm, modes=MODES, chain=chain)
     except ConvergenceError:
         return None
-    return None if found.at_limit else found  # K2 of a hub that stands still is no law to draw
+    return None if found.at_limit else found  # the gain at which the hub stands still is no law to draw
 
 
 @lru_cache(maxsize=64)

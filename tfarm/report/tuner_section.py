@@ -259,8 +259,8 @@ def comparison_table(data: TunerStudy) -> Table:
         title="Cost of the slew, beside what it has to beat",
         caption=(
             "Every controller knows the arm by its name plate only: what was trained or chosen as trained is used on "
-            f"all others. None: no moment feedback. Constant: the best constant gain as trained, {MOMENT_GAIN} = {best}; "
-            "own constant: the best one for that row, of those that leave its loop stable, steps apart. "
+            f"all others. None: no moment feedback. Constant: the best constant gain as trained, {MOMENT_GAIN} = "
+            f"{best}; own constant: the best one for that row, of those that leave its loop stable, steps apart. "
             f"Tuner: that of seed {data.tuning.plan.seed}. Bound: the linear-quadratic optimum. ZV and EI: "
             "input shaping with no moment feedback, judged by their own, later slew, so that the bound is not theirs. "
             "Guard proven: "
