@@ -20,7 +20,8 @@ from tfarm.synthesis.design import Design, design
 MODES = 2  # flexible modes in the band of the damping that is drawn and designed for, as `tfarm design` has it
 SIGN = (
     f"Law: u = −{RATE_GAIN} dθ/dt − {MOMENT_GAIN} E I φ′(0) + r. Sign of {MOMENT_GAIN}: the strain gauge reads "
-    f"E I φ′(0), positive where it accelerates the hub; {{rest}}. With the gauge reversed every {MOMENT_GAIN} changes its sign."
+    f"E I φ′(0), positive where it accelerates the hub; {{rest}}. With the gauge reversed every "
+    f"{MOMENT_GAIN} changes its sign."
 )
 AT_REST, HELD = "a torque u at rest gives −(J − I_h)/J u", "a torque u that lasts gives −u, as the tip holds the arm"
 NO_PLACE_FOR_K2 = (
