@@ -1,5 +1,6 @@
 """What is said of the sampled loop of odd arms: each sentence against poles that it was not made from."""
 
+import math
 import re
 from dataclasses import replace
 from functools import cache
@@ -17,7 +18,7 @@ from tfarm.loop.stability import stability
 from tfarm.loop.windows import gain_windows
 from tfarm.report.overlay import Overlay
 from tfarm.report.sampled_section import grown_words
-from tfarm.report.sampled_words import Sampled, chain_words, compared, cure, short_answer, spans
+from tfarm.report.sampled_words import Sampled, chain_words, compared, cure, damping_fact, short_answer, spans
 from tfarm.spectrum.scales import default_gains
 
 ARMS = odd_arms()
@@ -98,6 +99,24 @@ def test_damping_that_is_not_enough_is_not_said_to_be():
     for needed, is_little in ((1e-9, True), (1e-3, False)):
         analysis = SimpleNamespace(**{**vars(data.analysis), "required_damping": needed})
         assert ("Every real arm has more" in cure(replace(data, arm=bare, analysis=analysis))) == is_little
+
+
+@pytest.mark.parametrize(
+    ("needed", "value", "beside"),
+    [
+        (0.0, "none", "for the first 4 modes"),
+        (1e-14, "next to none", "1.0 × 10⁻¹⁴ s: 3.6 × 10⁻¹¹ % of critical in the first mode for the first 4 modes"),
+        (1e-3, "1.0 × 10⁻³", "for the first 4 modes"),
+        (math.inf, "none helps", "up to 15 % of critical in the first mode"),
+    ],
+)
+def test_damping_that_is_needed_is_said_as_a_person_would(needed, value, beside):
+    """Shares of critical damping: C w1/2, w1 = 71.506 rad/s of the paper's arm."""
+    data = data_of("boom")
+    modes = SimpleNamespace(natural_frequency=[71.505682])
+    analysis = SimpleNamespace(**{**vars(data.analysis), "required_damping": needed, "modes": modes})
+    fact = damping_fact(replace(data, analysis=analysis))
+    assert (fact.value, fact.beside) == (value, beside)
 
 
 def test_how_many_modes_grow_is_not_taken_for_which():

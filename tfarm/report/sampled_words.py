@@ -226,16 +226,29 @@ def cure(data: Sampled) -> str:
         )
     if own:
         enough = "and this arm has" if own >= needed else "but this arm has only"
+        little = f", {_share(data)} and less than any real arm has," if _is_next_to_nothing(data) else ""
         return (
-            f"Without damping the sampled loop would not hold. What cures it: C = {scientific(needed, 2)} s is "
+            f"Without damping the sampled loop would not hold. What cures it: C = {scientific(needed, 2)} s{little} is "
             f"enough{_for_modes(data)}, {enough} {scientific(own, 2)} s."
         )
-    percent = 50 * needed * float(data.analysis.modes.natural_frequency[0])
-    more = " Every real arm has more." if percent < ANYONE_HAS else ""
+    more = " Every real arm has more." if _is_next_to_nothing(data) else ""
     return (
-        f"What cures it: Kelvin-Voigt damping of C = {scientific(needed, 2)} s, {scientific(percent, 2)} % of critical "
-        f"in the first mode, and these gains are stable{_for_modes(data)}.{more}"
+        f"What cures it: Kelvin-Voigt damping of C = {scientific(needed, 2)} s, {_share(data)}, "
+        f"and these gains are stable{_for_modes(data)}.{more}"
     )
+
+
+def _percent(data: Sampled) -> float:
+    """The damping that the gains need, in per cent of critical damping of the first mode."""
+    return 50 * data.analysis.required_damping * float(data.analysis.modes.natural_frequency[0])
+
+
+def _share(data: Sampled) -> str:
+    return f"{scientific(_percent(data), 2)} % of critical in the first mode"
+
+
+def _is_next_to_nothing(data: Sampled) -> bool:
+    return 0 < _percent(data) < ANYONE_HAS
 
 
 def _for_modes(data: Sampled) -> str:
@@ -270,13 +283,20 @@ def headline_facts(data: Sampled) -> tuple[Fact, ...]:
             unit="ms",
             beside=f"{significant(margin.samples, 3)} samples",
         ),
-        Fact(
-            label="damping C that it needs",
-            value=scientific(analysis.required_damping, 2),
-            unit="s",
-            beside=_for_modes(data).strip(),
-        ),
+        damping_fact(data),
     )
+
+
+def damping_fact(data: Sampled) -> Fact:
+    """The damping that the gains need: none, next to none, so much, or more than was looked at."""
+    label, needed, held = "damping C that it needs", data.analysis.required_damping, _for_modes(data)
+    if needed == 0:
+        return Fact(label=label, value="none", beside=held.strip())
+    if math.isinf(needed):
+        return Fact(label=label, value="none helps", beside="up to 15 % of critical in the first mode")
+    if _is_next_to_nothing(data):
+        return Fact(label=label, value="next to none", beside=f"{scientific(needed, 2)} s: {_share(data)}{held}")
+    return Fact(label=label, value=scientific(needed, 2), unit="s", beside=held.strip())
 
 
 def spans(windows: Sequence[Window], gain: float) -> str:
