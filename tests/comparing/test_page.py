@@ -1,6 +1,7 @@
 """The page of a comparison: its numbers are the command's, names are text, and its files are there."""
 
 import csv
+import re
 
 import pytest
 
@@ -40,6 +41,17 @@ def test_the_tables_hold_the_numbers_of_the_command(compared, folder):
         wanted = [{key: "" if cell is None else str(cell) for key, cell in row.items()} for row in answer[name]]
         assert rows == wanted
         assert rows
+
+
+def test_the_page_sets_its_numbers_and_every_column_has_a_key(folder):
+    """No power of ten in the letters of a terminal, and no column that a file or a reader cannot name."""
+    page = (folder / "compare.html").read_text(encoding="utf-8")
+    cells = re.findall(r"<td[^>]*>([^<]*)</td>", page)
+    assert any("−" in cell for cell in cells)
+    assert [cell for cell in cells if re.search(r"\de[-+]\d|^-\d", cell)] == []
+    heads = re.findall(r'<th scope="col"[^>]*data-key="([^"]*)"[^>]*>([^<]*)', page)
+    assert ("margin", "margin") in heads
+    assert all(key and title for key, title in heads)
 
 
 def test_names_are_text_and_every_file_is_there(folder):

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from tfarm.columns import FILES, JSON, PAGE, TERMINAL, Column, Table
+from tfarm.columns import FILES, JSON, Column, Table
 from tfarm.digits import general, within
 from tfarm.dsp.law_verdict import law_answer as sampled_law_answer
 from tfarm.loop.answers import MARGINS, gain_rows, margins_answer, sizes_of
@@ -101,17 +101,21 @@ def margins_table(found: Comparison) -> Table:
     one, other = (_known(side) for side in found.sides)
     names = TITLES if found.is_clocked else {column.key: (column.title, column.unit) for column in MARGINS}
     columns = (
-        Column("margin", on=(JSON, FILES), of=list(names)),
         Column(
-            "",
             "margin",
-            on=(TERMINAL, PAGE),
-            of=[f"{title} [{unit}]" if unit else title for title, unit in names.values()],
+            "margin",
+            of=list(names),
+            shown=[f"{title} [{unit}]" if unit else title for title, unit in names.values()],
         ),
         Column("unit", on=(JSON, FILES), of=[unit for _, unit in names.values()]),
         *Quantity("value", "", relative=MARGIN).columns(found, [each for each, _ in one], [each for each, _ in other]),
         Column("known_one", f"known of {found.one.name}", of=[known for _, known in one]),
-        Column("known_other", f"of {found.other.name}", of=[known for _, known in other]),
+        Column(
+            "known_other",
+            f"known of {found.other.name}",
+            head=f"of {found.other.name}",
+            of=[known for _, known in other],
+        ),
     )
     return Table(columns=columns)
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from tfarm.arm import PLANE
+from tfarm.columns import Table
 from tfarm.comparing import Comparison
 from tfarm.comparing.answers import margins_table, modes_table, poles_table, verdict_words
 from tfarm.errors import ParameterError
@@ -16,8 +18,10 @@ from tfarm.report.card import written_cards
 from tfarm.report.kept import COMPARED, COMPARISON, keep
 from tfarm.report.page import index_page, render
 from tfarm.report.sections import Picture, Section, save_section
+from tfarm.report.words import typeset
 from tfarm.report.writing import TRUST, move_into
 
+LEADING = re.compile(r"^-(?=\d|inf)")  # a minus sign before a number
 APART = "Differences are those of the second from the first, in per cent of the first."
 ORDER = "The n-th of both in the order of Im s, which need not be the same mode of the link."
 IN_Z = "One of the laws is a law in z: both loops are compared at their samples, each pole z as s = ln(z)/T."
@@ -69,14 +73,22 @@ def _sections(found: Comparison) -> Iterator[Section]:
     yield Section(anchor="both", title="Both in one picture", blocks=(_picture(found),))
     if found.is_of_arms:
         table = replace(
-            modes_table(found), stem="compare-modes", title="Natural frequencies and damping", caption=APART
+            _set(modes_table(found)), stem="compare-modes", title="Natural frequencies and damping", caption=APART
         )
         yield Section(anchor="modes", title="Modes", blocks=(table,))
-    poles = replace(poles_table(found), stem="compare-poles", title="Closed-loop poles", caption=f"{ORDER} {APART}")
+    poles = replace(
+        _set(poles_table(found)), stem="compare-poles", title="Closed-loop poles", caption=f"{ORDER} {APART}"
+    )
     known = AT_SAMPLES if found.is_clocked else KNOWN
     yield Section(anchor="poles", title="Closed-loop poles", blocks=(poles,))
-    margins = replace(margins_table(found), stem="compare-margins", title="Margins", caption=f"{known} {APART}")
+    margins = replace(_set(margins_table(found)), stem="compare-margins", title="Margins", caption=f"{known} {APART}")
     yield Section(anchor="margins", title="Margins", blocks=(margins,))
+
+
+def _set(table: Table) -> Table:
+    """The table with the numbers of its cells as pages show them: powers of ten and minus signs."""
+    columns = [replace(each, shown=[LEADING.sub("−", typeset(cell)) for cell in each.cells]) for each in table.columns]
+    return replace(table, columns=tuple(columns), record=None)
 
 
 def _picture(found: Comparison) -> Picture:
