@@ -8,7 +8,7 @@ where it accelerates the hub; a static torque u gives it the value -(J - I_h)/J 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -91,9 +91,9 @@ class HubFeedback:
         """The law with its gains of the plane at this point of it."""
         return replace(self, **dict(zip(PLANE, (across, up), strict=True)))
 
-    def told(self, how: Callable[[float], str], names: Iterable[str] = PLANE, arm: Arm | None = None) -> list[str]:
-        """`K1 = 0.3` of each gain of those names, the value written by `how`, with its unit on an arm."""
-        return [f"{name} = {how(self[name])}{'' if arm is None else written_unit(name, arm)}" for name in names]
+    def told(self, name: str, how: Callable[[float], str], arm: Arm | None = None) -> str:
+        """`K1 = 0.3`: the gain of that name, its value written by `how`, with its unit on an arm."""
+        return f"{name} = {how(self[name])}{'' if arm is None else written_unit(name, arm)}"
 
     def having(self, name: str, value: float) -> HubFeedback:
         """The law with another value of one gain."""

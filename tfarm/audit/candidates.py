@@ -77,7 +77,7 @@ def loop_columns(study: Study, found: tuple[LoopVerdict, ...] | None) -> Iterato
     """The verdict on the default loop, and the upper edge of its moment gain; not on a page where there is no loop."""
     verdicts = found or (LoopVerdict("no loop", None),) * len(study.arms)
     law, edges = default_gains(study.arm), [each.K2_below for each in verdicts]
-    group = f"loop at {', '.join(law.told(lambda gain: plain(gain, 4)))}"
+    group = f"loop at {', '.join(law.told(name, lambda gain: plain(gain, 4)) for name in PLANE)}"
     everywhere = (*ANSWER, *REPORT) if found else ANSWER
     words = [each.verdict for each in verdicts]
     yield Column("verdict", "verdict", of=words, head="loop", group=group, tint=_tints, on=everywhere)

@@ -224,11 +224,12 @@ def _pairs(arms: Arm | Sequence[Arm], laws: AnyLaw | Sequence[AnyLaw] | None) ->
 def _names(pairs: list[tuple[Arm, AnyLaw]]) -> tuple[str, ...]:
     """The arms' names where they differ, else the laws', else their numbers."""
     arms = [one_line(arm.name, LONGEST) for arm, _ in pairs]
-    laws = [
-        one_line(law.name, LONGEST) if isinstance(law, Law) else ", ".join(law.told("{:.4g}".format))
-        for _, law in pairs
-    ]
+    laws = [one_line(law.name, LONGEST) if isinstance(law, Law) else _gains(law) for _, law in pairs]
     return tuple(next((names for names in (arms, laws) if names[0] != names[1]), ["first", "second"]))
+
+
+def _gains(law: HubFeedback) -> str:
+    return ", ".join(law.told(name, "{:.4g}".format) for name in PLANE)
 
 
 def _side(name: str, arm: Arm, law: AnyLaw, count: int, chain: Chain, is_clocked: bool) -> Side:

@@ -36,12 +36,12 @@ class Slews:
     @property
     def held(self) -> str:
         """The gain on the hub rate, which both have."""
-        return self.gains.told(plain, [RATE_GAIN])[0]
+        return self.gains.told(RATE_GAIN, plain)
 
     @property
     def fed_back(self) -> str:
         """The gain on the root moment of the second."""
-        return self.gains.told(plain, [MOMENT_GAIN])[0]
+        return self.gains.told(MOMENT_GAIN, plain)
 
 
 def slews(arm: Arm, gains: HubFeedback, chain: Chain, modes: int) -> Slews:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from tfarm.arm import Arm, HubFeedback, unit_of, written_unit
+from tfarm.arm import MOMENT_GAIN, RATE_GAIN, Arm, HubFeedback, shown_unit, written_unit
 from tfarm.columns import Column, Table
 from tfarm.digits import counted, listed, plain, scientific, significant, singly
 from tfarm.errors import ConvergenceError
@@ -24,6 +24,7 @@ from tfarm.spectrum.scales import default_gains, rate_unit
 BEYOND = (0.9, 1.0, 1.01, 1.1, 1.5)  # values of K2 whose exact poles are listed
 AROUND_EDGE = (0.9, 1.1)  # times the edge, if that lies above all of them
 RANGE_OF_K2 = (-1.0, 1.6)
+shortly = partial(plain, digits=4)  # how a gain is written in a sentence
 
 SEEN = (
     "Broad lines: exact poles, followed along {name}. Dashed: python-control on a modal model of order {order}, its "
@@ -56,13 +57,13 @@ def locus_section(arm: Arm) -> Section:
     words, blocks = [], list[Picture | Table]()
     held = default_gains(arm)
     low, high = (share * arm.input_per_torque for share in RANGE_OF_K2)
-    ranges = {"K1": (0.0, 2.0 * rate_unit(arm)), "K2": (low, high)}
-    for name, (start, stop) in ranges.items() if has_loop(arm) else [("K1", ranges["K1"])]:
+    ranges = {RATE_GAIN: (0.0, 2.0 * rate_unit(arm)), **({MOMENT_GAIN: (low, high)} if has_loop(arm) else {})}
+    for name, (start, stop) in ranges.items():
         try:
             data = loci(arm, held, name, start, stop)
         except ConvergenceError:
             words.append(NOT_FOLLOWED.format(name=name))
-            blocks += [rates_table(arm, held)] * (name == "K1")
+            blocks += [rates_table(arm, held)] * (name == RATE_GAIN)
             continue
         words.append(_locus_words(data))
         blocks += [_locus_picture(data), gap_table(data, f"locus-{name}-gap")]
@@ -78,27 +79,28 @@ def _locus_words(data: Loci) -> str:
     gap = f"python-control's locus of order {data.reduced.order} is within {size} of |s| of the exact one."
     cut = CUT.format(name=data.name, end=plain(float(data.exact.gain[-1]), 4)) if data.is_cut else ""
     ended = "".join(ENDED.format(name=data.name, gain=significant(gain, 3)) for _, gain in data.exact.ends)
-    return f"{_more_K1(data) if data.name == 'K1' else _more_K2(data)}; {gap}{cut}{ended}"
+    return f"{_more_damping(data) if data.name == RATE_GAIN else _more_moment(data)}; {gap}{cut}{ended}"
 
 
-def _more_K1(data: Loci) -> str:
+def _more_damping(data: Loci) -> str:
     """How the damping of the first mode rises, and whether it falls again."""
     exact, found = data.exact, most_damped(data.exact)
-    start = f"More K1 (K2 = {plain(exact.law.K2)} held)"
+    held = exact.law.told(MOMENT_GAIN, plain)
     if found is None:
-        return f"More K1, with K2 = {plain(exact.law.K2)} held"
-    unit = written_unit("K1", exact.arm)
-    best_ratio, gain = significant(100 * found.damping_ratio, 3), significant(found.gain, 3)
+        return f"More {data.name}, with {held} held"
+    start = f"More {data.name} ({held} held)"
+    at = f"{data.name} = {significant(found.gain, 3)}{written_unit(data.name, exact.arm)}"
     if not found.swings_on:
-        return f"{start} damps the first mode until it no longer swings, a little above K1 = {gain}{unit}"
+        return f"{start} damps the first mode until it no longer swings, a little above {at}"
     then = ", and less from there on: the hub is then held too firmly to take energy out" * found.falls
-    return f"{start} damps the first mode up to {best_ratio} % of critical at K1 = {gain}{unit}{then}"
+    return f"{start} damps the first mode up to {significant(100 * found.damping_ratio, 3)} % of critical at {at}{then}"
 
 
-def _more_K2(data: Loci) -> str:
+def _more_moment(data: Loci) -> str:
     """From where on the loop is unstable."""
     exact = data.exact
-    more = f"More K2 (K1 = {plain(exact.law.K1, 4)} held)"
+    held = exact.law.told(RATE_GAIN, shortly)
+    more = f"More {data.name} ({held} held)"
     unstable = [each for each in exact.crossings if each.direction == "unstable"]
     if not unstable:
         return f"{more} makes no branch that is drawn unstable in this range"
@@ -107,7 +109,8 @@ def _more_K2(data: Loci) -> str:
     many = [significant(omega, 4) for omega in there if omega > 0]
     how = f"poles cross at {listed(many)} rad/s" if many else "a real pole passes through 0"
     on = "from" if not any(each.direction == "stable" and each.gain > first for each in exact.crossings) else "at"
-    return f"{more} makes the loop unstable {on} K2 = {significant(first, 6)}{' on' * (on == 'from')}, where {how}"
+    edge = f"{data.name} = {significant(first, 6)}{' on' * (on == 'from')}"
+    return f"{more} makes the loop unstable {on} {edge}, where {how}"
 
 
 def _locus_picture(data: Loci) -> Picture:
@@ -128,27 +131,26 @@ def beyond_table(arm: Arm, held: HubFeedback) -> Table:
     """Verdict and poles of the exact loop for a few K2 around 1 and beyond."""
     edge, unit = edge_of_K2(arm, held) or 0.0, arm.input_per_torque
     more = [float(f"{share * edge:.3g}") for share in AROUND_EDGE if edge > BEYOND[-1] * unit]
-    gains = np.array([*(K2 * unit for K2 in BEYOND), *(K2 for K2 in more if BEYOND[-1] * unit < K2)])
+    gains = np.array([*(share * unit for share in BEYOND), *(gain for gain in more if BEYOND[-1] * unit < gain)])
     on_edge = np.isclose(gains, edge, rtol=1e-9, atol=0.0) & (not arm.is_undamped)  # no list of poles ends there
-    found = [None if on else _judged(arm, replace(held, K2=float(K2))) for K2, on in zip(gains, on_edge, strict=True)]
-    one = f"K2 = {plain(unit, 4)}{written_unit('K2', arm)}"
-    title = f"What {one} and beyond does, at K1 = " + plain(held.K1, 4)
-    return _poles_table(
-        "beyond", title, _beyond_caption(arm, held, found), "K2", written_unit("K2", arm).strip(), gains, found
-    )
+    laws = [held.having(MOMENT_GAIN, float(gain)) for gain in gains]
+    found = [None if on else _judged(arm, law) for law, on in zip(laws, on_edge, strict=True)]
+    one = held.having(MOMENT_GAIN, unit).told(MOMENT_GAIN, shortly, arm)
+    title = f"What {one} and beyond does, at {held.told(RATE_GAIN, shortly)}"
+    return _poles_table("beyond", title, _beyond_caption(arm, held, found), MOMENT_GAIN, arm, gains, found)
 
 
 def rates_table(arm: Arm, held: HubFeedback) -> Table:
-    """Verdict and poles of the exact loop for a few K1."""
-    K1 = np.array([float(f"{share * rate_unit(arm):.3g}") for share in RATES])
-    found = [_judged(arm, replace(held, K1=float(gain))) for gain in K1]
-    title = "Poles at a few K1, at K2 = " + plain(held.K2, 4)
+    """Verdict and poles of the exact loop for a few rate gains."""
+    gains = np.array([float(f"{share * rate_unit(arm):.3g}") for share in RATES])
+    found = [_judged(arm, held.having(RATE_GAIN, float(gain))) for gain in gains]
+    title = f"Poles at a few {RATE_GAIN}, at {held.told(MOMENT_GAIN, shortly)}"
     caption = "Exact poles, each list complete in its box."
-    return _poles_table("rates", title, caption, "K1", unit_of("K1", arm), K1, found)
+    return _poles_table("rates", title, caption, RATE_GAIN, arm, gains, found)
 
 
 def _poles_table(
-    stem: str, title: str, caption: str, name: str, unit: str, gains: Real, found: Sequence[Stability | None]
+    stem: str, title: str, caption: str, name: str, arm: Arm, gains: Real, found: Sequence[Stability | None]
 ) -> Table:
     """A row a gain: verdict, unstable poles, the rightmost and the first pairs."""
     return Table(
@@ -157,7 +159,7 @@ def _poles_table(
         caption=caption,
         record=list(found),
         columns=(
-            Column(name, name, unit, of=gains, digits=singly(plain, 4)),
+            Column(name, name, shown_unit(name, arm), of=gains, digits=singly(plain, 4)),
             Column("verdict", "verdict", of=lambda it: it.verdict if it else "on the axis, not decided"),
             Column("unstable_poles", "unstable poles", of=_count),
             Column("spectral_abscissa_1_s", "fastest growth", "1/s",
@@ -209,7 +211,7 @@ def _beyond_caption(arm: Arm, held: HubFeedback, found: Sequence[Stability | Non
 
 def _edge_words(arm: Arm, held: HubFeedback) -> str:
     """Up to which K2 the loop stays stable, from the windows of the gains held."""
-    windows, edge = margins_of(arm, held).windows["K2"], edge_of_K2(arm, held)
+    windows, edge = margins_of(arm, held).windows[MOMENT_GAIN], edge_of_K2(arm, held)
     if windows.around is None:
         return ""
     if edge is None:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from tfarm.arm import Arm, unit_of, written_unit
+from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, unit_of, written_unit
 from tfarm.digits import counted, plain, significant
 from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError
@@ -109,15 +107,16 @@ def map_section(arm: Arm, chain: Chain | None = None) -> Section:
 
 
 def _answer(arm: Arm) -> str:
-    """The windows of K1 and K2 through the default gains, in words."""
+    """The windows of both gains through the default ones, in words."""
     found = margins_of(arm, default_gains(arm))
     start = f"With the default gains {typeset(default_words(arm))} the loop is {found.stability.verdict}"
-    K1, K2 = found.windows["K1"], found.windows["K2"]
-    if K1.around is None or K2.around is None:
+    across, up = PLANE
+    if any(found.windows[name].around is None for name in PLANE):
         return f"{start}; the picture shows which gains are stable."
-    again = f" K2 has {len(K2.all)} separate stable windows at that K1, listed below." if len(K2.all) > 1 else ""
-    more_K2, more_K1 = (_room(windows, written_unit(name, arm)) for name, windows in (("K2", K2), ("K1", K1)))
-    return f"{start}: at that K1, K2 may {more_K2}; at that K2, K1 may {more_K1}.{again}"
+    many = len(found.windows[up].all)
+    again = f" {up} has {many} separate stable windows at that {across}, listed below." if many > 1 else ""
+    more = {name: _room(found.windows[name], written_unit(name, arm)) for name in PLANE}
+    return f"{start}: at that {across}, {up} may {more[up]}; at that {up}, {across} may {more[across]}.{again}"
 
 
 def _room(windows: Windows, unit: str) -> str:
@@ -152,24 +151,23 @@ def _best_words(data: GainMap) -> str:
     if found is None:
         return ""
     cut = " and ".join(
-        f"{name} = {plain(getattr(found.law, name), 4)}" for name in found.at_bound if name not in found.at_limit
+        found.law.told(name, lambda gain: plain(gain, 4)) for name in found.at_bound if name not in found.at_limit
     )
+    gains = " and ".join(found.law.told(name, lambda gain: significant(gain, 4), data.arm) for name in PLANE)
     brief = data.briefs[-1]
     words = typeset(brief.words)
     sampled = f"{words[0].upper()}{words[1:]}" if brief.is_stable else f"But {words}"
     edge = f" That is no optimum: the dotted frame cuts the search off at {cut}, and there is more beyond." * bool(cut)
     return (
         f"The best damping of the first {MODES} modes that the sampled loop holds within the dotted frame is "
-        f"{significant(100 * found.value, 3)} % of critical, at K1 = {significant(found.law.K1, 4)}"
-        f"{written_unit('K1', data.arm)} and K2 = {significant(found.law.K2, 4)}{written_unit('K2', data.arm)} "
-        f"(tfarm design), without a clock {found.verdict.verdict}.{edge}"
-        f" {sampled}."
+        f"{significant(100 * found.value, 3)} % of critical, at {gains} (tfarm design), without a clock "
+        f"{found.verdict.verdict}.{edge} {sampled}."
     )
 
 
 def _map_caption(data: GainMap) -> str:
     proof = proof_words(data.arm)
-    unit = f"{plain(rate_unit(data.arm), 4)} {unit_of('K1', data.arm)}"
+    unit = f"{plain(rate_unit(data.arm), 4)} {unit_of(RATE_GAIN, data.arm)}"
     reach = ALL_MODES if data.arm.is_told_by_lyapunov else UP_TO.format(band=significant(data.region.band, 5))
     free = data.arm.has_rigid_mode
     seen = MAP_SEEN.format(
@@ -197,7 +195,7 @@ def proof_words(arm: Arm) -> str:
         return OF_DAMPED
     whole, least = arm.input_per_torque, 0.0 - arm.rate_loss
     return OF_ELASTIC.format(
-        whole=plain(whole, 5) + written_unit("K2", arm), least=plain(least, 5) + written_unit("K1", arm)
+        whole=plain(whole, 5) + written_unit(MOMENT_GAIN, arm), least=plain(least, 5) + written_unit(RATE_GAIN, arm)
     )
 
 
@@ -250,9 +248,9 @@ def _to_compare(arm: Arm) -> list[Curve]:
     law = default_gains(arm)
     beyond = float(f"{BEYOND_EDGE * (edge_of_K2(arm, law) or arm.input_per_torque):.3g}")
     drives = (
-        replace(law, K2=max(UNSTABLE_K2 * arm.input_per_torque, beyond))
+        law.having(MOMENT_GAIN, max(UNSTABLE_K2 * arm.input_per_torque, beyond))
         if has_loop(arm)
-        else replace(law, K1=float(f"{-law.K1 / 10:.3g}"))
+        else law.having(RATE_GAIN, float(f"{-law[RATE_GAIN] / 10:.3g}"))
     )
     try:
         return [Curve(NamedLaw(COMPARED, "unstable", drives), nyquist_of(stability(arm, drives)))]

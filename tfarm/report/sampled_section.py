@@ -106,7 +106,7 @@ def _periods_table(data: Sampled) -> Table:
         stem="sampled-periods",
         title="Faster or slower sampling",
         caption=(
-            f"The same gains, {' and '.join(data.gains.told(plain))}, at other sample periods; "
+            f"The same gains, {' and '.join(data.gains.told(name, plain) for name in PLANE)}, at other sample periods; "
             f"the verdicts hold for the modes given ({held}). Growth is that of the pole that decides, per second: "
             "negative is stable. Where the gains are not stable, the intervals are those that would be. "
             f""

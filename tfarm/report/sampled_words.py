@@ -62,7 +62,7 @@ class Sampled:
     @property
     def held(self) -> str:
         """The rate gain that the intervals of the moment gain hold for."""
-        return self.gains.told(plain, [RATE_GAIN])[0]
+        return self.gains.told(RATE_GAIN, plain)
 
 
 def in_ms(chain: Chain) -> str:
@@ -84,7 +84,7 @@ def study(arm: Arm, chain: Chain) -> Sampled:
 def short_answer(data: Sampled) -> str:
     """Yes or no, by how much, for how many modes, and how fast."""
     verdict = data.analysis.verdict
-    gains = " and ".join(data.gains.told(plain, arm=data.arm))
+    gains = " and ".join(data.gains.told(name, plain, data.arm) for name in PLANE)
     settled = f"with {_modes(verdict)}" if verdict.is_settled else f"as far as its {_modes(verdict)} go"
     is_stable = verdict.is_stable
     margin = f" and bears {_delay(data)} more of delay" if is_stable else ""
@@ -275,7 +275,7 @@ def headline_facts(data: Sampled) -> tuple[Fact, ...]:
             label=f"stable {RATE_GAIN}",
             value=on_rate,
             unit=unit_of(RATE_GAIN, data.arm) if on_rate != "none" else "",
-            beside=f"at {gains.told(plain, [MOMENT_GAIN])[0]}",
+            beside=f"at {gains.told(MOMENT_GAIN, plain)}",
         ),
         Fact(
             label="further delay it bears",

@@ -106,7 +106,7 @@ def _gain_picture(data: TunerStudy) -> Picture:
     tuning = data.tuning
     plane = overlay(data.arm, tuning.constant, tuning.trial.loop.chain)
     guard, K = tuning.training.guard, tuning.training.result.K
-    (rate,) = tuning.constant.told(plain, [RATE_GAIN])
+    rate = tuning.constant.told(RATE_GAIN, plain)
     return Picture(
         stem="tune-gain",
         title="The tuner's path and its guard on the map",

@@ -86,7 +86,8 @@ def servo_words(data: TunerStudy) -> str:
     if data.servo is None:
         return ""
     tuning, guard = data.servo, data.servo.training.guard
-    gains = " and ".join(data.servo.plan.servo.told(lambda gain: significant(gain, 3), SERVO, data.arm))
+    law = tuning.plan.servo
+    gains = " and ".join(law.told(name, lambda gain: significant(gain, 3), data.arm) for name in SERVO)
     off = tip_errors(tuning)["tip_error_m"]
     end = "runs away" if off is None else f"ends {significant(1e3 * abs(off), 2)} mm off its target"
     if off is not None and abs(off) < ROUNDED * data.arm.reach * float(abs(tuning.trial.task.hub_angle).max()):

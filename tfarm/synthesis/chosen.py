@@ -59,7 +59,7 @@ def design(
 
     def find_law(named: Sequence[NamedArm]) -> LawDesign:
         return law_design(
-            arm, objective, structure, Kp=Kp, modes=modes, chain=chain, progress=progress, others=named[1:]
+            arm, objective, structure, on_angle=Kp, modes=modes, chain=chain, progress=progress, others=named[1:]
         )
 
     found, case = for_the_worst(arms, box, find_law, laws.score_on, tell)

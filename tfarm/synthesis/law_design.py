@@ -13,7 +13,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import TWO_GAINS, Arm
+from tfarm.arm import ANGLE_GAIN, TWO_GAINS, Arm
 from tfarm.arm.law import Law
 from tfarm.dsp import Chain, Verdict
 from tfarm.dsp.brief import brief_of
@@ -67,10 +67,10 @@ class LawDesign:
 
 
 def law_design(
-    arm: Arm, objective: str, structure: str, *, Kp: float = 0.0, modes: int = 2, chain: Chain | None = None,
+    arm: Arm, objective: str, structure: str, *, on_angle: float = 0.0, modes: int = 2, chain: Chain | None = None,
     progress: Progress | None = None, others: Sequence[NamedArm] = (),
 ) -> LawDesign:  # fmt: skip
-    """The law of a structure that serves an objective best in the sampled loop; `Kp` holds the angle.
+    """The law of a structure that serves an objective best in the sampled loop; the gain `on_angle` holds that.
 
     With `others` the objective is the worst of the arms, all of which hold.
 
@@ -81,12 +81,12 @@ def law_design(
     if objective not in LAW_OBJECTIVES:
         remedy = f"of a structure use one of {', '.join(LAW_OBJECTIVES)}"
         raise ParameterError(key="objective", value=objective, remedy=remedy)
-    if not (0.0 <= Kp < np.inf):
-        raise ParameterError(key="Kp", value=Kp, remedy="the hub angle gain is zero (chosen) or positive")
+    if not (0.0 <= on_angle < np.inf):
+        raise ParameterError(key=ANGLE_GAIN, value=on_angle, remedy="the hub angle gain is zero (chosen) or positive")
     chain, tell = Chain() if chain is None else chain, progress or (lambda text: None)
     T = chain.sampling.period
-    Kp = Kp or usual_angle_gain(arm, T)
-    form = STRUCTURES[structure](arm, Kp, modes, T)
+    on_angle = on_angle or usual_angle_gain(arm, T)
+    form = STRUCTURES[structure](arm, on_angle, modes, T)
     arms = (NamedArm(arm.name, arm, {}), *others)
     nearest = (np.inf, form.law(form.origin))
     for counts in in_step([_counts(each.arm, chain, modes) for each in arms]):
@@ -105,7 +105,7 @@ def law_design(
                     for each, judge, own in zip(arms, judges, sampled, strict=True)
                 ]
                 return LawDesign(
-                    objective, structure, law, {"Kp": Kp} | named, form.at_limit(x),
+                    objective, structure, law, {ANGLE_GAIN: on_angle} | named, form.at_limit(x),
                     worst_value(objective, [each.value for each in on_arms]),
                     cast("Stability[LawLoop]", on_arms[0].verdict), sampled[0], modes, chain,
                     tuple(on_arms),
@@ -121,7 +121,7 @@ def _why_none(arms: Sequence[NamedArm], structure: str, law: Law, chain: Chain) 
     slowest = f"under the nearest {verdict.slowest} grows by {growth:.2g} a sample"
     grows, arm = slowest if growth > 0 else "none has a reserve", verdict.loop.plant.arm
     if not arm.has_elastic_link:
-        return f"{text}{grows}; try another Kp or period"
+        return f"{text}{grows}; try another {ANGLE_GAIN} or period"
     return (
         f"{text}{grows}; with link.damping = 0 no mode loses energy of its own, and a held input drives each "
         f"one that the law does not damp where its alias is seen: give link.damping, or take {TWO_GAINS}"
