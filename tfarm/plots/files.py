@@ -36,15 +36,18 @@ def save(
 
 
 def _shorter(svg: bytes) -> bytes:
-    """The drawing with the coordinates of its paths at so many decimals: a third of the bytes less."""
+    """The drawing with the coordinates of paths and marks at so many decimals, and no space where none is needed."""
 
-    def rounded(number: re.Match[bytes]) -> bytes:
+    def decimals(number: re.Match[bytes]) -> bytes:
         return f"{float(number[0]):.{DRAWN}f}".rstrip("0").rstrip(".").encode()
 
-    def path(found: re.Match[bytes]) -> bytes:
-        return re.sub(rb"-?\d+\.\d{4,}", rounded, found[0])
+    def rounded(found: re.Match[bytes]) -> bytes:
+        return re.sub(rb"-?\d+\.\d{4,}", decimals, found[0])
 
-    return re.sub(rb' d="M[^"]*"', path, svg)
+    def path(found: re.Match[bytes]) -> bytes:
+        return re.sub(rb"\s*([MLQCz])\s*", rb"\1", rounded(found))
+
+    return re.sub(rb'(?<= d=")M[^"]*', path, re.sub(rb'<use xlink:href="[^"]*" x="[^"]*" y="[^"]*"', rounded, svg))
 
 
 def save_png(figure: Figure, path: Path, *, key: str = "--png") -> None:
