@@ -11,11 +11,13 @@ from typing import Any
 import altair as alt
 import vl_convert
 
+from tfarm.arm import PLANE
+
 INK, GREY, FAINT = "@ink", "@grey", "@faint"
 BLUE, ORANGE, GREEN = "@blue", "@orange", "@green"
 WIDE, LOW, SHALLOW, SQUARE = 620, 170, 100, 300  # pixels before the page fits them to its width
 REACH = 2.5  # of the Nyquist plane to either side of 0, before it is zoomed
-PLANE = {"re": "Re s [1/s]", "im": "Im s [rad/s]"}
+S_PLANE = {"re": "Re s [1/s]", "im": "Im s [rad/s]"}
 DISC = 1.25  # of the z-plane to either side of 0
 ANGLES = [-180, -90, 0, 90, 180]
 CROSS = "M-.7,-.7L.7,.7M-.7,.7L.7,-.7"
@@ -138,7 +140,7 @@ def _poles() -> Any:
         alt.Chart(_data("rays")).transform_filter("datum.end").mark_text(color=GREY, align="left", dx=3, fontSize=10)
     )
     axis = alt.Chart(alt.InlineData([{"x": 0}])).mark_rule(color=GREY).encode(x="x:Q")
-    tips = [alt.Tooltip(f"{key}:Q", title=title) for key, title in PLANE.items()]
+    tips = [alt.Tooltip(f"{key}:Q", title=title) for key, title in S_PLANE.items()]
     layers = (
         _grid(x, y),
         names.encode(x=x, y=y, text="ratio:N"),
@@ -205,7 +207,7 @@ def _sensor() -> Any:
     kinds = ["zero on or left of the imaginary axis", "zero right of it"]
     legend = alt.Legend(columns=1, symbolType="circle", labelLimit=260)
     colour = alt.Color("kind:N", scale=alt.Scale(domain=kinds, range=[GREEN, ORANGE]), legend=legend, title=None)
-    tips = [alt.Tooltip(f"{key}:Q", title=title) for key, title in (("x", "x [m]"), *PLANE.items())]
+    tips = [alt.Tooltip(f"{key}:Q", title=title) for key, title in (("x", "x [m]"), *S_PLANE.items())]
     zeros = alt.Chart(_data("zeros")).mark_point(shape="circle", size=36, filled=False, strokeWidth=1.6)
     modes = alt.Chart(_data("modes")).mark_rule(color=BLUE, strokeDash=[5, 3])
     names = alt.Chart(_data("modes")).mark_text(color=BLUE, align="left", dx=4, fontSize=10)

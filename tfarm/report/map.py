@@ -142,21 +142,18 @@ def map_data(data: GainMap) -> Table:
     none: list[float | int | str] = [""]
     sampled = _sampled_ends(data)
     beyond = len(edge) + len(sampled)
+    across, up = PLANE
+    key = "_".join([across, *shown_unit(across, data.arm).replace("/", " ").split()])
     what = ["grid"] * grid[0].size + ["boundary"] * len(edge) + ["sampled boundary"] * len(sampled)
     columns = (
         Column("what", "what", of=what),
-        *(_column_of(name, data.arm, np.r_[grid[n], edge[:, n], sampled[:, n]]) for n, name in enumerate(PLANE)),
+        Column(key, across, shown_unit(across, data.arm), of=np.r_[grid[0], edge[:, 0], sampled[:, 0]]),
+        Column(up, up, shown_unit(up, data.arm), of=np.r_[grid[1], edge[:, 1], sampled[:, 1]]),
         Column("unstable_poles", "unstable poles", of=counts + none * beyond),
         Column("least_damping_ratio", "least damping ratio", of=[*data.damping.ravel().tolist(), *none * beyond]),
         Column("omega_rad_s", "frequency", "rad/s", of=none * grid[0].size + edge[:, 2].tolist() + none * len(sampled)),
     )  # fmt: skip
     return Table(stem="map-data", title=f"The map of {' and '.join(PLANE)}", is_data=True, columns=columns)
-
-
-def _column_of(name: str, arm: Arm, values: Real) -> Column:
-    """A gain, with its unit in the key too."""
-    unit = shown_unit(name, arm)
-    return Column("_".join([name, *unit.replace("/", " ").split()]), name, unit, of=values)
 
 
 def _sampled_ends(data: GainMap) -> Real:

@@ -39,7 +39,7 @@ Signals = Literal["vibration", "total"]
 SILENT = Network(np.zeros((1, 6)), np.zeros(1), np.ones(6))
 FOLDED_UP = 10.0  # the loop has run away where the root moment is this many times EI/L
 DURATION, MODES = TRIAL_DURATION, 6
-ANGLE_GAIN = "the hub angle gain is zero or positive, in N m/rad"
+ANGLE_REMEDY = "the hub angle gain is zero or positive, in N m/rad"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -221,7 +221,7 @@ def slew_trial(
     """
     if signals not in ("vibration", "total"):
         raise ParameterError(key="signals", value=signals, remedy=did_you_mean(str(signals), ("vibration", "total")))
-    Kp = not_negative("Kp", Kp, ANGLE_GAIN)
+    Kp = not_negative("Kp", Kp, ANGLE_REMEDY)
     K1 = usual_rate_gain(known or arm, Kp) if K1 is None else K1
     rate_gain = number("K1", K1, "the hub rate gain is a finite number of N m s/rad")
     length = positive("duration", duration, "a trial lasts a positive number of seconds")
@@ -243,7 +243,7 @@ def usual_rate_gain(arm: Arm, Kp: float) -> float:
     J theta_tt + (K1 + losses) theta_t + Kp theta = 0 is damped so with K1 + losses = sqrt(2 Kp J).  Raises
     ParameterError for a Kp below zero.
     """
-    Kp = not_negative("Kp", Kp, ANGLE_GAIN)
+    Kp = not_negative("Kp", Kp, ANGLE_REMEDY)
     if Kp == 0.0:
         return default_gains(arm).K1
     return max(0.0, math.sqrt(2 * Kp * arm.turned_inertia) - arm.rate_loss)
