@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 
 import tfarm
+from tfarm.crossing import pieces
+from tfarm.dsp import load_chain
 from tfarm.dsp.loci import loci as sampled_loci
+from tfarm.loop.edges import moment_axis, rate_axis
 from tfarm.loop.law_locus import law_locus
 from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.law_rounded import rounded as rounded_law
@@ -13,6 +16,7 @@ from tfarm.loop.poles import poles_below
 from tfarm.plots.folded import draw_loci
 from tfarm.plots.laws import draw_law_locus
 from tfarm.plots.roots import draw_locus
+from tfarm.report.map import sampled_region
 from tfarm.spectrum.scales import default_gains, rate_unit
 
 LAB, STOCKY = tfarm.load("sasaki2012-lab"), tfarm.load("stocky-steel")
@@ -72,6 +76,45 @@ def test_the_sampled_locus_is_round_too():
         told = [seen_turns(line)[0] for line in ax.lines if line.get_linewidth() == 1.4 and len(line.get_xdata()) > 1]
         assert sum(turn.size for turn in told) > 5
         assert max(turn.max(initial=0.0) for turn in told) <= MOST
+
+
+def test_the_outline_of_a_sampled_region_is_that_of_its_poles():
+    """Road: eigenvalues a little inside and outside the middle of each piece of the outline that is drawn, and no turn
+    beyond 5 degrees but where it is no longer than a pixel."""
+    x = rate_axis(LAB)
+    y = moment_axis(LAB, x)
+    plane = sampled_region(LAB, x, y, load_chain(LAB.name))
+    aside, checked = 0.004, 0
+    for piece in pieces(plane.K1, plane.stable_intervals):
+        K1, low, high = np.array(piece.points).T
+        line = x.place(np.r_[K1, K1[::-1]]) * 1.5 + 1j * y.place(np.r_[low, high[::-1]])
+        line = line[np.abs(np.diff(line, prepend=np.nan)) != 0]
+        step = np.diff(line)
+        turn = abs(np.degrees(np.angle(step[1:] / step[:-1])))
+        seen = (np.maximum(abs(step[1:]), abs(step[:-1])) > 2e-3) & (line[1:-1].imag > 0) & (line[1:-1].real < 1.5)
+        assert turn[seen].max() <= MOST
+        for n in np.flatnonzero(line[:-1].real > 0.9)[::4]:
+            middle, normal = (line[n] + line[n + 1]) / 2, 1j * step[n] / abs(step[n])
+            for side in (1, -1):  # the outline runs with its inside on the left
+                place = middle + side * aside * normal
+                K = [
+                    np.interp(each, axis.place(g), g)
+                    for each, axis, g in zip(
+                        (place.real / 1.5, place.imag), (x, y), (x.grid(4000), y.grid(4000)), strict=True
+                    )
+                ]
+                inside = plane.loop.having(K1=K[0], K2=K[1]).poles.is_stable
+                checked += inside == (side > 0)
+                assert inside == (side > 0) or _near_a_corner(line, n)
+    assert checked > 40
+
+
+def _near_a_corner(line, n):
+    """Whether another piece of the outline is as near as the points at the side of this one."""
+    middle = (line[n] + line[n + 1]) / 2
+    away = abs(line - middle)
+    away[max(0, n - 3) : n + 5] = np.inf
+    return away.min() < 0.02
 
 
 def test_a_locus_under_any_law_is_round_too():

@@ -7,10 +7,13 @@ there, at a right angle, the corner is true: it is approached until nobody sees 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from .pieces import RegionPiece
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
@@ -37,3 +40,39 @@ def loose(curves: Complex, width: Real | float, height: Real | float) -> NDArray
     wanted[:, :-1] |= bent
     wanted[:, 1:] |= bent
     return np.asarray((wanted & (size > SHORT)).any(axis=0))
+
+
+def loose_columns(across: Real, parts: Sequence[RegionPiece], drawn: Callable[[Real, Real], Complex]) -> Real:
+    """Values of a gain between columns (n,) of a region, next to corners of the outlines of its parts.
+
+    `drawn` says where a point of the plane is in the picture, 1 high and about as wide; corners outside are not seen.
+    """
+    wanted: set[float] = set()
+    for part in parts:
+        gain, low, high = np.array(part.points).T
+        gain, outline = np.r_[gain, gain[::-1]], drawn(np.r_[gain, gain[::-1]], np.r_[low, high[::-1]])
+        for before, here, after in _corners(outline):
+            for other in (before, after):
+                if abs(outline[other] - outline[here]) > SHORT:
+                    wanted.update(_halves(across, float(gain[here]), float(gain[other])))
+    return np.array(sorted(wanted))
+
+
+def _corners(outline: Complex) -> list[tuple[int, int, int]]:
+    """The numbers of points of a closed line at which it turns by more than 5 degrees, with their neighbours."""
+    kept = np.flatnonzero(abs(outline - np.roll(outline, 1)) > 0)
+    before, after = np.roll(kept, 1), np.roll(kept, -1)
+    with np.errstate(all="ignore"):
+        turn = abs(np.angle((outline[after] - outline[kept]) / (outline[kept] - outline[before])))
+    seen = (outline[kept].real > 0) & (outline[kept].imag > 0) & (outline[kept].imag < 1)
+    found = np.flatnonzero(seen & (turn > STRETCH * TURN))
+    return [(int(before[n]), int(kept[n]), int(after[n])) for n in found]
+
+
+def _halves(across: Real, here: float, other: float) -> list[float]:
+    """Half way between two columns; of a side that is upright, half way to the columns beside it."""
+    if here != other:
+        return [(here + other) / 2]
+    n = int(np.searchsorted(across, here))
+    beside = [float(across[k]) for k in (n - 1, n + 1) if 0 <= k < across.size]
+    return [(here + each) / 2 for each in beside]

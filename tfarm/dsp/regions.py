@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.crossing import Crossings, counts_over, intervals
+from tfarm.crossing import Crossings, counts_over, intervals, pieces
+from tfarm.crossing.turning import loose_columns
 from tfarm.dsp.boundary import circle_grid, crossings
 from tfarm.dsp.loop import SampledLoop
 from tfarm.dsp.margins import Window, stable_windows
@@ -17,9 +19,11 @@ from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 
 Real = NDArray[np.float64]
+Complex = NDArray[np.complexfloating[Any, Any]]
 
 MOST_GAINS = 4000
 ENDS_AT = (-0.9, 0.3, 0.9)  # K2 at which upright edges are looked for
+MOST_COLUMNS, ROUNDS = 400, 12  # of K1 in a picture, and of halving where the outline bends
 SIDE = 1e-9  # relative: so far to either side of such an edge a region is cut
 
 
@@ -71,6 +75,34 @@ def gain_map(loop: SampledLoop, K1: Sequence[float] | Real, K2: Sequence[float] 
     plane = GainMap(loop, rows, columns, counts_over(columns, found, first.K2, at_start), found)
     _check(plane)
     return plane
+
+
+def rounded(plane: GainMap, drawn: Callable[[Real, Real], Complex]) -> GainMap:
+    """The same region at more values of K1, until its outline has no corner in a picture that the region has not.
+
+    `drawn` says where points of the plane are in the picture, 1 high.
+    """
+    for _ in range(ROUNDS):
+        more = loose_columns(plane.K1, pieces(plane.K1, plane.stable_intervals), drawn)
+        if not more.size or plane.K1.size + more.size > MOST_COLUMNS:
+            break
+        plane = with_more(plane, more)
+    return plane
+
+
+def with_more(plane: GainMap, K1: Real) -> GainMap:
+    """The map with further values of K1, of those that it has not."""
+    fresh = np.setdiff1d(K1, plane.K1)
+    if not fresh.size:
+        return plane
+    more = gain_map(plane.loop, fresh, plane.K2)
+    both = np.r_[plane.K1, more.K1]
+    order = np.argsort(both, kind="stable")
+    found = plane.crossings + more.crossings
+    return GainMap(
+        plane.loop, both[order], plane.K2, np.concatenate([plane.unstable, more.unstable])[order],
+        [found[n] for n in order],
+    )  # fmt: skip
 
 
 def ends_of_K1(loop: SampledLoop) -> Real:

@@ -16,7 +16,7 @@ from tfarm.dsp import Chain, sampled_verdict
 from tfarm.dsp import GainMap as SampledMap
 from tfarm.dsp import gain_map as sampled_map
 from tfarm.dsp.brief import SampledBrief
-from tfarm.dsp.regions import ends_of_K1, with_both_sides
+from tfarm.dsp.regions import ends_of_K1, rounded, with_both_sides
 from tfarm.errors import ConvergenceError
 from tfarm.loop.damping import least_damping
 from tfarm.loop.edges import Axis, edge, moment_axis, rate_axis
@@ -38,6 +38,7 @@ COLUMNS, ROWS = 240, 200  # of the coloured grid
 MARKERS = {"default": plane.DIAMOND, "best": plane.STAR}
 SPARSE = 4  # every so many of them the damping is computed
 SAMPLED_COLUMNS = 120  # values of the gain across at which the sampled region is cut, besides its exact ends
+WIDE = 1.5  # times as wide as high the picture is, about
 OUTSIDE = 0.1  # of the gain up the plane, beyond the picture: an edge there is none of the region
 
 
@@ -107,7 +108,8 @@ def sampled_region(arm: Arm, x: Axis, y: Axis, chain: Chain) -> SampledMap | Non
         loop = sampled_verdict(arm, default_gains(arm), chain).full
         across = x.grid(SAMPLED_COLUMNS)
         across = with_both_sides(across[across > 0], ends_of_K1(loop))
-        return sampled_map(loop, across[x.high > across], [y.low - OUTSIDE, y.high + OUTSIDE])
+        plane = sampled_map(loop, across[x.high > across], [y.low - OUTSIDE, y.high + OUTSIDE])
+        return rounded(plane, lambda K1, K2: np.asarray(WIDE * x.place(K1) + 1j * y.place(K2)))
     except ConvergenceError:
         return None
 

@@ -16,7 +16,7 @@ from tfarm.columns import Column, Table
 from tfarm.digits import plain
 from tfarm.dsp import GainMap, gain_map, sampled_verdict
 from tfarm.dsp.chain import Chain
-from tfarm.dsp.regions import ends_of_K1, with_both_sides
+from tfarm.dsp.regions import Complex, Real, ends_of_K1, rounded, with_both_sides, with_more
 from tfarm.loop.regions import Region, region
 from tfarm.plots import regions
 from tfarm.plots.style import blank, headline, style
@@ -28,6 +28,7 @@ K2_RANGE = (-1.0, 1.5)
 CUT = (-1.02, 1.52)  # where intervals are cut, just outside the picture: no cut is seen as an edge
 COLUMNS = 72  # values of the gain across, and either side of upright edges
 DAMPINGS = (1e-4, 1e-6)  # s: what is drawn beside C = 0
+WIDE = 1.8  # times as wide as high the picture is, about
 BEYOND = 1.7  # of the largest stable gain across: how far the picture goes
 SAME = 1e-3  # ends as close as this are seen as one
 BELOW = 15.0  # of the gain itself
@@ -50,7 +51,16 @@ def overlay(arm: Arm, gains: HubFeedback, chain: Chain) -> Overlay:
     low, top = own / BELOW, _round_up(BEYOND * max([own, *ends]))
     across = with_both_sides(np.geomspace(low, top, COLUMNS), ends)
     across = across[(low <= across) & (top >= across)]
-    return Overlay(region(arm, across, np.array(CUT)), tuple(gain_map(loop, across, CUT) for loop in loops))
+
+    def drawn(K1: Real, K2: Real) -> Complex:
+        return np.asarray(WIDE * np.log(K1 / low) / np.log(top / low) + 1j * (K2 - K2_RANGE[0]) / np.ptp(K2_RANGE))
+
+    planes = [rounded(gain_map(loop, across, CUT), drawn) for loop in loops]
+    every = np.unique(np.concatenate([plane.axes[0] for plane in planes]))
+    planes = [
+        with_more(plane, more) if (more := np.setdiff1d(every, plane.axes[0])).size else plane for plane in planes
+    ]
+    return Overlay(region(arm, every, np.array(CUT)), tuple(planes))
 
 
 def _round_up(x: float) -> float:
