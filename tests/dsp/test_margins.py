@@ -179,6 +179,9 @@ def test_the_answer_is_plain_and_consistent(lab):
     assert unstable["K2_interval"] is None
     assert unstable["K2_intervals"] == answer["K2_intervals"]
     assert unstable["delay_margin_samples"] == 0.0
+    outside = abs(np.linalg.eigvals(sampled_loop(lab, HubFeedback(K1=0.3, K2=1.3)).reduced_matrix())) > 1
+    assert unstable["unstable_poles"] == outside.sum() == 2
+    assert answer["unstable_poles"] == 0
 
 
 def test_a_count_of_modes_is_checked(lab):

@@ -13,6 +13,7 @@ from tfarm.dsp import (
     Converters,
     Sampling,
     analyse,
+    band,
     plant,
     sampled_loop,
     sampled_verdict,
@@ -150,6 +151,29 @@ def test_the_count_does_not_depend_on_the_arcs_to_begin_with(lab, coarser, monke
     for K2 in (0.3, -0.05, 1.3):
         other = loop.having(K1=0.3, K2=K2)
         assert circle.count(other.gains) == (other.poles.log_radius > 0).sum()
+
+
+@pytest.mark.parametrize(
+    ("K1", "K2", "Kp"),
+    [(0.3, 0.3, 0.0), (-0.3, 0.1, 0.0), (-0.3, 0.0, 0.0), (0.3, 0.3, -2.0), (1.0, -1.0, -1.0), (30.0, 0.0, 0.0)],
+)
+def test_the_count_is_that_of_the_eigenvalues_outside_odd_ones_too(lab, K1, K2, Kp):
+    """An odd number of them: F begins or ends on the negative real axis, and its turn is none of whole turns."""
+    loop = sampled_loop(lab, HubFeedback(K1=K1, K2=K2, Kp=Kp), Chain())
+    outside = abs(np.linalg.eigvals(loop.reduced_matrix())) > 1 + 1e-9
+    assert band_of(loop).circle().count(loop.gains) == outside.sum()
+
+
+@pytest.mark.parametrize("hub_rate", ["ideal", "difference"])
+def test_what_the_anti_alias_filter_leaves_in_the_band_is_wc_over_s_and_wc(lab, hub_rate):
+    """Of the signals that pass it: the gauge, and the rate where that is no difference of the encoder's angle."""
+    corner = 900.0
+    chain = Chain(sampling=Sampling(antialias_corner=corner), converters=Converters(hub_rate=hub_rate))
+    s = np.array([-20 + 300j, 5 + 40j])
+    lag = 1 / (1 + s / corner)
+    rate = np.ones(2) if hub_rate == "difference" else lag
+    found = band._filter_factors(sampled_loop(lab, HubFeedback(K1=0.3, K2=0.3), chain, count=4), s)
+    np.testing.assert_allclose(found, [np.ones(2), rate, lag], rtol=1e-14)
 
 
 @pytest.mark.parametrize("Kp", [0.0, 0.5])

@@ -198,6 +198,9 @@ def test_the_strip_chart_has_steps_delay_and_saturation():
     assert chart.saturated.sum() == chart.simulation.saturated["torque"] > 0
     assert np.array_equal(chart.simulation.torque, np.clip(chart.asked, -chart.limit, chart.limit))
     assert chart.simulation.chain.sampling.delay_samples == 1.0
+    room = 1.2 * abs(ideal.with_moment.at_samples.root_moment).max()
+    span = chart.simulation.chain.converters.moment_range
+    assert room <= span == float(f"{span:.2g}") < 1.1 * room
 
 
 # ------------------------------------------------------------ bytes and odd arms
