@@ -171,6 +171,10 @@ def test_the_answer_is_plain_and_consistent(lab):
     edges = answer["shown"]["K2_intervals"][0]
     assert [float(edge["text"]) for edge in edges] == pytest.approx([low, high], rel=5e-6)
     assert all(edge["settled"] and edge["band_rad_s"] == answer["band_rad_s"] > 1e5 for edge in edges)
+    for key in ("delay_margin_samples", "required_damping_s"):
+        figure = answer["shown"][key]
+        assert (figure["settled"], figure["digits"]) == (True, 4)
+        assert float(figure["text"]) == pytest.approx(answer[key], rel=5e-4)
     assert answer["first_unstable_mode"] is None
     assert [mode["index"] for mode in answer["modes"]] == list(range(1, len(answer["modes"]) + 1))
     unstable = sampled_answer(analyse(lab, HubFeedback(K1=0.3, K2=1.3)))
