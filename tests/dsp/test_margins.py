@@ -20,6 +20,7 @@ from tfarm.dsp import (
 )
 from tfarm.dsp.boundary import circle_grid, crossings
 from tfarm.dsp.margins import around, stable_windows
+from tfarm.dsp.regions import ENDS_AT, ends_of_K1
 from tfarm.dsp.verdict import sampled_answer, sampled_verdict
 from tfarm.errors import ParameterError
 
@@ -141,8 +142,22 @@ def test_the_required_damping_is_where_the_verdict_turns(lossless):
     def at(damping):
         return sampled_loop(replace(lossless, link=replace(lossless.link, damping=damping)), GAINS, chain).poles
 
-    assert at(1.001 * C).is_stable
-    assert not at(0.999 * C).is_stable
+    assert at(C).is_stable
+    assert not at((1 - 4e-6) * C).is_stable
+
+
+def test_the_region_is_upright_where_intervals_of_the_rate_gain_end(lab):
+    """Stable on one side of each end, not on the other, by the eigenvalues at one of the gains that were looked at."""
+    loop = sampled_loop(lab, GAINS, count=14)
+    ends = ends_of_K1(loop)
+    assert ends.size
+    assert (ends > 0).all()
+    for end in ends.tolist():
+        sides = [
+            [abs(loop.having(K1=end * share, K2=K2).eigenvalues).max() < 1 for share in (1 - 1e-5, 1 + 1e-5)]
+            for K2 in ENDS_AT
+        ]
+        assert [True, False] in sides or [False, True] in sides
 
 
 def test_no_damping_cures_a_gain_far_out_and_none_is_needed_for_few_modes(lossless):

@@ -1,6 +1,6 @@
 """Simulations: energy, poles seen in time, two implementations, converters, limit cycles, running away."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from math import comb
 
 import numpy as np
@@ -20,6 +20,7 @@ from tfarm.dsp import (
     sampled_loop,
     scenario,
 )
+from tfarm.dsp.enough import change
 from tfarm.dsp.law import growing_mode
 from tfarm.dsp.results import (
     ideal_chain,
@@ -372,3 +373,14 @@ def test_a_disturbance_is_held_over_its_sample(lossless):
     for got in (run.at_samples, called.at_samples):
         np.testing.assert_allclose(got.root_moment, np.array(expected)[:, 0], atol=1e-11)
         np.testing.assert_allclose(got.hub_angle, np.array(expected)[:, 1], atol=1e-12)
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
+def test_the_change_of_a_trace_is_relative_to_each_signal_and_of_the_samples_that_both_have(lab, scale):
+    """Moments that differ by 3 % of their largest change by 0.03, in whatever unit; times of another run count not."""
+    run = Simulator(lab, Chain(), scenario("slew", lab, Chain(), 0.5), count=4).linear(GAINS).at_samples
+    trace = replace(run, root_moment=scale * run.root_moment)
+    other = replace(trace, t=trace.t + 1.0, root_moment=trace.root_moment + 0.03 * abs(trace.root_moment).max())
+    assert change(other, trace) == pytest.approx(0.03, rel=1e-12)
+    shorter = type(trace)(*(getattr(trace, field.name)[:-7] for field in fields(trace)))
+    assert change(shorter, trace) == change(trace, shorter) == 0.0
