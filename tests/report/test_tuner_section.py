@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import tfarm
+from tests.report.walked import Walk, columns_of, numbers_of, read, shown_in, told, untraced, untraced_cells
 from tests.shared import once
 from tfarm.digits import significant
 from tfarm.dsp import Chain
@@ -17,7 +18,10 @@ from tfarm.errors import CertificationError
 from tfarm.plots.files import save
 from tfarm.plots.learning import draw_cost_map, draw_curves
 from tfarm.report import tuner_section as tuner_section_room
+from tfarm.report.given_laws import Subject
+from tfarm.report.sections import save_section
 from tfarm.report.tuner_section import section_of, tuner_section
+from tfarm.report.writing import _write_pages
 from tfarm.tuner import Learning, Plan, conditions, initial_network, train, tune
 from tfarm.tuner import overview as study_module
 from tfarm.tuner.overview import NOMINAL, CostMap, tuner_study
@@ -177,3 +181,82 @@ def test_a_slew_that_runs_away_and_a_guard_that_fails_are_a_sentence(monkeypatch
     monkeypatch.setattr(tuner_section_room, "tuner_study", unproven)
     (words,) = tuner_section_room.tuner_section(LAB).words
     assert "K1 = 3210000, C = 6.94 × 10⁻⁵ s" in words
+
+
+# ------------------------------------------------------------ a walk of every number
+
+
+@pytest.fixture(scope="module")
+def walked(small, tmp_path_factory):
+    """The page of the tuner without its drawings, its section walked, and its folder."""
+    folder = tmp_path_factory.mktemp("tuned")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("tfarm.report.sections.save", lambda *_, **__: None)
+        saved = save_section(small[1], folder)
+    _write_pages(Subject(LAB, Chain()), folder, [saved], ("tune",), "", folder)
+    page = Walk((folder / "tune.html").read_text(encoding="utf-8"))
+    return next(part for part in page.parts if part.anchor == "tune"), folder
+
+
+@pytest.fixture(scope="module")
+def values(small, walked):
+    """What the section may say: the command's JSON, the page's files, and what follows from these."""
+    data, (_, folder) = small[0], walked
+    servo = data.servo.plan.servo
+    own = told("tune", LAB.name)
+    held = told("tune", LAB.name, "--K1", repr(servo.K1), "--Kp", repr(servo.Kp))
+    files = [columns_of(file) for file in sorted((folder / "data").glob("*-data.csv"))]
+    rows = [read(folder / "data" / f"tune-{name}.json")["rows"] for name in ("comparison", "residual")]
+    coarse = next(iter(data.coarse.values())).chain.converters
+    settings = [coarse.moment_bits, coarse.moment_range, coarse.torque_bits, coarse.torque_range, coarse.encoder_counts]
+    drawn = [getattr(tuner_section_room, name) for name in ("SEEDS", "MAP_SEEDS", "MAP_TRIALS")]
+    late = [1e3 * each["arrives_later_by_s"] for each in own["shaped"].values()]
+    off = [1e3 * abs(each) for each in (*(own[key] for key in TIPS), held["tip_error_m"])]
+    more = [*_learned(own), *settings, *drawn, *late, *off]
+    return np.unique(numbers_of([own, held, files, rows]) + [float(each) for each in more])
+
+
+def _learned(own):
+    """Final costs of every seed by the command, how many are below the best constant gain, and shares of medians."""
+    rules = ((), ("--guard", "none"), ("--guard", "none", "--rule", "plain"))
+    asked = [[told("tune", LAB.name, "--seed", str(n), *rule)["cost_tuned"] for n in range(SEEDS)] for rule in rules]
+    costs = np.array([[math.inf if each is None else float(each) for each in of] for of in asked])
+    best, without = own["cost_best_constant"], own["cost_without"]
+    medians = np.quantile(costs, 0.5, axis=1, method="nearest")
+    numbers = [*costs.ravel(), *(costs < best).sum(axis=1), SEEDS, 100 * (1 - best / without)]
+    return [each for each in (*numbers, *100 * abs(1 - medians / best)) if math.isfinite(each)]
+
+
+TIPS = ("tip_error_m", "tip_error_best_constant_m")
+SAID = {  # phrases with numbers that are no results
+    r"as Figure \d|Figures? \d(?: and \d)?": "the paper's figures",
+    r"\(21\) as printed": "an equation of the paper",
+    r"K2 = 0\b|died at K = 0": "no moment feedback",
+    r"norm 0\.5": "where the gradient is cut",
+    r"middle half": "a quartile",
+}
+
+
+def test_every_number_about_the_tuner_is_one_of_the_command_or_its_files(walked, values):
+    part, folder = walked
+    left = untraced(part.texts, values, SAID)
+    assert [(each.value, each.where) for each in left] == []
+    count = 0
+    for name in ("comparison", "residual"):
+        sheet, rows = part.tables[f"tune-{name}"], read(folder / "data" / f"tune-{name}.json")["rows"]
+        assert untraced_cells(sheet, rows, []) == []
+        count += sum(len(shown_in(cell)) for row in sheet.rows for cell in row)
+    assert count > 40
+
+
+def test_the_rows_of_the_table_are_the_costs_of_the_command(walked):
+    _, folder = walked
+    own, (first, *_) = told("tune", LAB.name), read(folder / "data" / "tune-comparison.json")["rows"]
+    for key, name in (
+        ("tuner", "tuned"),
+        ("without", "without"),
+        ("best_constant", "best_constant"),
+        ("bound", "lq_bound"),
+    ):
+        assert first[f"{key}_cost"] == pytest.approx(own[f"cost_{name}"], rel=1e-9)
+    assert first["EI_cost"] == pytest.approx(own["shaped"]["EI"]["cost"], rel=1e-9)
