@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from inspect import Parameter, signature
 from typing import Any, ClassVar, TypeVar, get_type_hints
 
@@ -23,8 +24,14 @@ class Table(BaseModel):
 
     def build(self) -> Any:
         """What the table declares.  Raises ParameterError where its numbers make none."""
-        known = signature(type(self).makes).parameters
+        known = _parameters(type(self).makes)
         return type(self).makes(**{name: value for name, value in self.given().items() if name in known})
+
+
+@cache  # a fit builds a thousand arms
+def _parameters(makes: Callable[..., Any]) -> frozenset[str]:
+    """The names of a constructor's parameters."""
+    return frozenset(signature(makes).parameters)
 
 
 def of(makes: Callable[..., Any]) -> Callable[[type[_Table]], type[_Table]]:

@@ -208,5 +208,8 @@ def on_side(wanted: str | Output, side: Side) -> Output:
 
 def unit_scale(wanted: Output, k: Units) -> Fraction:
     """SI value of the output per N m of torque (per radian where the hub is locked), for one dimensionless unit."""
-    units = {"W": k.length, "Y": k.length, "centre": k.length, "M": k.EI / k.length, "Q": k.EI / k.length**2}
-    return units.get(wanted.quantity, Fraction(1)) / k.input_unit
+    if wanted.quantity in ("W", "Y", "centre"):
+        return k.length / k.input_unit
+    if wanted.quantity in ("M", "Q"):
+        return k.EI / k.length ** (1 if wanted.quantity == "M" else 2) / k.input_unit
+    return 1 / k.input_unit
