@@ -33,6 +33,7 @@ SAME = 0.1  # of its size: a zero found so near a known one is that one
 DEEPEST = 60  # cuts: then a box is a share of 2^-30 of the first, less than float64 can search
 REAL = 1e-11  # of its size: a smaller imaginary part is rounding
 GROWTH = (1.0, 1.0041, 1.0093, 1.0171, 1.0311, 1.0573, 1.113)  # heights tried where a zero lies on the edge of a box
+SHRINKING = 0.9  # of a move of Newton's: the next one, at a zero of order up to ten
 SPLIT = 0.4871  # where a box is cut: off the axes, on which zeros like to lie
 
 
@@ -112,20 +113,27 @@ def _phase(function: Function, points: Complex) -> tuple[NDArray[np.float64], Co
 
 
 def newton(function: Function, starts: Complex, steps: int = 60) -> Complex:
-    """Newton's method from every start at once; the points that have settled, each zero once."""
+    """Newton's method from every start at once; the points that have settled, each zero once.
+
+    A point that has settled goes on while its moves shrink: until they are what f is rounded by.
+    """
     s = np.array(starts, dtype=complex)
-    settled = np.zeros(s.size, bool)
+    settled, moving, last = np.zeros(s.size, bool), np.arange(s.size), np.full(s.size, np.inf)
     for _ in range(steps):
-        at = function(s)
-        with np.errstate(all="ignore"):  # a start that runs away, or stands where f is flat, is dropped below
+        at = function(s[moving])
+        with np.errstate(all="ignore"):  # a start that runs away, or stands where f is flat, is dropped
             move = at.value / at.slope
         known = np.isfinite(move)
-        move[~known] = 0.0
-        limit = 0.3 * abs(s)
+        settled[moving[~known]] = False
+        moving, move = moving[known], move[known]
+        limit = 0.3 * abs(s[moving])
         move = np.where(abs(move) > limit, limit * (move / np.maximum(abs(move), 1e-300)), move)
-        s = s - move
-        settled = known & (abs(move) < 1e-11 * abs(s))
-        if (~known | (abs(move) <= 1e-15 * abs(s))).all():
+        s[moving] -= move
+        away, size = abs(move), abs(s[moving])
+        settled[moving] = away < 1e-11 * size
+        ended = (away <= 1e-15 * size) | (settled[moving] & (away > SHRINKING * last[moving]))
+        last[moving], moving = away, moving[~ended]
+        if not moving.size:
             break
     return distinct(s[settled & np.isfinite(s)])
 
