@@ -79,7 +79,7 @@ reference: $(INSTALLED) ## write the reference of the public names to reference/
 	@$(BIN)/python -m pdoc --no-show-source -o reference tfarm && echo reference/index.html
 
 test: $(INSTALLED) ## run the tests
-	@$(BIN)/python -m pytest -n 2 --dist worksteal
+	@PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 2 --dist worksteal # else each process compiles what it loads
 
 test-browser: $(INSTALLED) ## open pages in Chromium: errors, digits, times, phone, dark, axe, Nu (ONLY=--marked: CI's part)
 	@if ! { command -v chromium || command -v chromium-browser || command -v google-chrome; } > /dev/null; then \

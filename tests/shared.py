@@ -29,3 +29,8 @@ def thinned(cases, every):
     """
     own = [case if isinstance(case, tuple) else (case,) for case in cases]
     return [pytest.param(*each, marks=() if n % every == 0 else pytest.mark.survey) for n, each in enumerate(own)]
+
+
+def sized(small, full):
+    """A size for `make test`, and the full one, which is marked and run by `make survey`."""
+    return [small, pytest.param(full, marks=pytest.mark.survey)]

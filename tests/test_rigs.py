@@ -88,7 +88,7 @@ def test_the_two_oracles_agree(seed):
     assert frequency_response(arm, s, wanted) == pytest.approx(exact, rel=1e-6, abs=1e-20)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", thinned([1, 0, 2], 3))
 def test_damped_eigenvalues_are_zeros_of_the_determinant(seed):
     arm = some_rig(np.random.default_rng([6, seed]), damped=True)
     arm = replace(arm, hub=replace(arm.hub, inertia=1.0) if math.isinf(arm.hub.inertia) else arm.hub)

@@ -7,6 +7,7 @@ import pytest
 
 from tests.dsp.hold import HoldModel
 from tests.dsp.settled import survey
+from tests.shared import thinned
 from tfarm.arm import Arm, Hub, HubFeedback, Link, Payload, Section
 from tfarm.dsp import (
     Chain,
@@ -49,7 +50,7 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", thinned(CASES, 2))
 def test_modes_beyond_the_sixteenth_can_be_the_unstable_ones(name):
     """Sixteen modes are stable, forty are not; the verdict says so, and so does a hold model that shares no code."""
     arm, gains, chain = CASES[name]

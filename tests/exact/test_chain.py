@@ -188,7 +188,7 @@ AT_REST = {
 }
 
 
-@pytest.mark.parametrize("name", thinned(AT_REST, 3))
+@pytest.mark.parametrize("name", thinned(AT_REST, 4))
 def test_the_expansion_at_rest(name):
     """From values at +-h and +-ih: powers s^-2 and s^0 stay in the mean of a pair, s^-1 and s in its difference."""
     arm = AT_REST[name]

@@ -45,7 +45,7 @@ def response(arm, law, up_to):
     return control.frd((law.Kp + law.K1 * 1j * omega) * theta + law.K2 * moment, omega, smooth=False)
 
 
-@pytest.mark.parametrize(("arm", "law"), thinned(LOOPS, 2))
+@pytest.mark.parametrize(("arm", "law"), thinned(LOOPS, 3))
 def test_margins_are_those_of_python_control_on_a_fine_grid(arm, law) -> None:
     found = margins(arm, law).in_band
     L = response(arm, law, found.band)

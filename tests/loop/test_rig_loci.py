@@ -36,7 +36,9 @@ def ranges(arm, law):
     return {"K1": (-0.5 * law.K1, 3 * law.K1), "K2": (-2 * unit, 0.9 * unit), "all": (0.0, 2.0)}
 
 
-@pytest.mark.parametrize(("name", "vary"), thinned(CASES, 4))
+@pytest.mark.parametrize(
+    ("name", "vary"), thinned(CASES[2:] + CASES[:2], 4)
+)  # the first case alone takes a second and a half
 def test_branches_are_poles_of_the_elements_and_all_of_a_box(name, vary):
     """At three gains; the circuit's own pole -R/L_a lies beyond what the elements of one rig have."""
     arm = RIGS[name]

@@ -12,6 +12,7 @@ import pytest
 
 import tfarm
 from tests.report.live_arithmetic import Page, Plant, complex_rows
+from tests.shared import thinned
 from tfarm.arm import HubFeedback
 from tfarm.dsp import Chain, Sampling, load_chain, sampled_verdict
 from tfarm.exact.characteristic import float_units, loop_parts
@@ -32,7 +33,7 @@ DIGITS = {"phase": 6, "phase_lag": 6, "phase_lead": 6, "delay": 6, "disk": 6, "p
           "peak_complementary": 6}  # as `tfarm margins` prints them  # fmt: skip
 
 
-@pytest.fixture(scope="module", params=ARMS)
+@pytest.fixture(scope="module", params=thinned(ARMS, 2))
 def case(request):
     arm = tfarm.load(request.param)
     data = json.loads(json.dumps(live_data(arm, load_chain(request.param)), allow_nan=False))

@@ -8,6 +8,7 @@ from scipy.linalg import expm
 
 import tfarm
 from tests.loop.ritz_loop import RitzLoop
+from tests.shared import sized
 from tests.synthesis.designs import grids, least_on
 from tfarm import HubFeedback
 from tfarm.arm import many_laws
@@ -150,12 +151,13 @@ def test_where_the_bounds_cut_the_search_off_is_no_optimum(damping) -> None:
     assert least_damping(LAB, many_laws(NONE, K1=K1, K2=K2), 2).max() < found.value
 
 
-def test_random_gains_have_no_better_disk_margin() -> None:
+@pytest.mark.parametrize("number", sized(8, 30))
+def test_random_gains_have_no_better_disk_margin(number) -> None:
     bounds = {"K1": (0.1, 20.0), "K2": (0.3, 1.0)}
     found = design(LAB, "margin", continuous=True, **bounds)
     rng, band = np.random.default_rng(6), band_of(LAB, 2)
     values = []
-    for K1, K2 in zip(rng.uniform(0.1, 20.0, 30), rng.uniform(0.3, 1.0, 30), strict=True):
+    for K1, K2 in zip(rng.uniform(0.1, 20.0, number), rng.uniform(0.3, 1.0, number), strict=True):
         values.append(loop_margins(stability(LAB, HubFeedback(K1=K1, K2=K2), band)).disk)
     assert max(values) <= found.value * (1 + 1e-6)
     assert found.value == pytest.approx(loop_margins(stability(LAB, found.law, band)).disk, rel=1e-3)

@@ -22,7 +22,7 @@ LAB = tfarm.load("sasaki2012-lab")
 HELD = HeldLoop(LAB, 0.01)
 
 
-@pytest.mark.parametrize("name", thinned(tfarm.presets(), 3))
+@pytest.mark.parametrize("name", thinned(tfarm.presets(), 4))
 def test_what_is_recommended_holds_when_sampled(name) -> None:
     """By the whole verdict, at the gains and a quarter to either side, and without a clock."""
     found = design(tfarm.load(name), chain=tfarm.dsp.load_chain(name))

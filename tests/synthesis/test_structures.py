@@ -47,7 +47,7 @@ def start_of(name):
     return form.law(form.origin + 0.3)
 
 
-@pytest.mark.parametrize("name", thinned(STRUCTURES, 2))
+@pytest.mark.parametrize("name", thinned(STRUCTURES, 3))
 def test_a_law_of_each_structure_is_judged_as_by_another_model(name):
     """Margin, peak of S and, without the higher modes, the radius."""
     law = start_of(name)

@@ -10,6 +10,7 @@ from scipy.linalg import solve_discrete_lyapunov
 
 import tfarm
 from tests.dsp.roads import aliased_loop
+from tests.shared import sized, thinned
 from tfarm.arm import HubFeedback
 from tfarm.dsp import Chain, Sampling, sampled_loop
 from tfarm.errors import CertificationError, ParameterError
@@ -49,8 +50,7 @@ def test_sectors_of_a_prototype(loop, lo, hi):
     assert m + radius == pytest.approx(hi, abs=1.5e-3)
 
 
-@pytest.mark.parametrize("m", [0.05, 0.2, 0.47, 0.9])
-@pytest.mark.parametrize("delay", [0.0, 0.6])
+@pytest.mark.parametrize(("m", "delay"), thinned(product([0.05, 0.2, 0.47, 0.9], [0.0, 0.6]), 3))
 def test_the_radius_is_where_the_criterion_first_fails(lab, m, delay):
     """The state-space peak against 1 + (lo + hi) Re H + lo hi |H|^2 by pulse transfer functions."""
     loop = moving(lab, delay=delay)
@@ -96,8 +96,9 @@ def test_switching_between_stable_gains_can_destabilise(loop):
     assert max(growth(loop, *p) for p in patterns) > 1.06
 
 
-def test_no_switching_inside_a_sector_destabilises(loop):
-    patterns = [p for n in range(2, 9) for p in product((0.3, 0.64), repeat=n)]
+@pytest.mark.parametrize("longest", sized(6, 8))
+def test_no_switching_inside_a_sector_destabilises(loop, longest):
+    patterns = [p for n in range(2, longest + 1) for p in product((0.3, 0.64), repeat=n)]
     assert max(growth(loop, *p) for p in patterns) < 1
 
 
