@@ -37,21 +37,22 @@ def places(tree):
 
 
 def change(node):
-    """Change a node in place; the line that it stands on."""
+    """Change a node in place; the line that it stands on, and what it was and is."""
+    before = ast.unparse(node)
     if isinstance(node, ast.Constant):
         node.value = node.value + 1 if isinstance(node.value, int) else node.value * 1.5 + (node.value == 0)
     elif hasattr(node, "ops"):
         node.ops[0] = SWAPS[type(node.ops[0])]()
     else:
         node.op = SWAPS[type(node.op)]()
-    return node.lineno
+    return node.lineno, f"{before}  ->  {ast.unparse(node)}"
 
 
 def mutant(path, number):
-    """The text of a file with its place of that number changed, and the line."""
+    """The text of a file with its place of that number changed, the line, and the change."""
     tree = ast.parse(path.read_text())
-    line = change(places(tree)[number])
-    return ast.unparse(tree), line
+    line, said = change(places(tree)[number])
+    return ast.unparse(tree), line, said
 
 
 def nearest_first(room, module):
@@ -79,18 +80,17 @@ def survey(size, seed, rooms):
         copy = Path(folder) / "copy"
         shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(".git", ".venv", "reports", ".mypy_cache"))
         for room in rooms:
-            files = sorted((ROOT / "tfarm" / room).glob("*.py"))
+            files = sorted((copy / "tfarm" / room).glob("*.py"))
             drawn = [(path, n) for path in files for n in range(len(places(ast.parse(path.read_text()))))]
             chosen, killed = rng.sample(drawn, min(size, len(drawn))), 0
             for path, number in chosen:
-                text, line = mutant(path, number)
-                target, name = copy / path.relative_to(ROOT), f"{path.relative_to(ROOT)}:{line}"
-                target.write_text(text)
+                whole, (text, line, said) = path.read_text(), mutant(path, number)
+                path.write_text(text)
                 alive = survives(copy, room, path.stem)
-                target.write_text(path.read_text())
+                path.write_text(whole)
                 killed += not alive
                 if alive:
-                    print(f"survives: {name} {path.read_text().splitlines()[line - 1].strip()}", flush=True)
+                    print(f"survives: {path.relative_to(copy)}:{line} {said}", flush=True)
             tally[room] = killed, len(chosen)
             print(f"{room}: {killed} of {len(chosen)} killed", flush=True)
     return tally

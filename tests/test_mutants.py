@@ -10,10 +10,13 @@ def test_each_place_is_changed_once_and_said():
     changed = set()
     for number in range(len(places(ast.parse(text)))):
         tree = ast.parse(text)
-        line = change(places(tree)[number])
+        line, said = change(places(tree)[number])
         (where,) = [n for n, both in enumerate(zip(text.splitlines(), ast.unparse(tree).splitlines(), strict=True), 1)
                     if both[0] != both[1]]  # fmt: skip
         assert where == line
+        before, after = said.split("  ->  ")
+        assert before in ast.unparse(ast.parse(text))
+        assert after in ast.unparse(tree)
         changed.add(ast.unparse(tree).splitlines()[line - 1].strip())
     assert changed == {
         "if a < 2 or b == 0:", "if a >= 2 and b == 0:", "if a < 2 and b != 0:", "if a < 3 and b == 0:",
@@ -24,4 +27,4 @@ def test_each_place_is_changed_once_and_said():
 def test_a_mutant_of_a_file_is_that_file_but_for_one_line(tmp_path):
     path = tmp_path / "room.py"
     path.write_text("ONE = 1\n\n\ndef double(x):\n    return 2 * x\n")
-    assert mutant(path, 0) == ("ONE = 1\n\ndef double(x):\n    return 2 / x", 5)
+    assert mutant(path, 0) == ("ONE = 1\n\ndef double(x):\n    return 2 / x", 5, "2 * x  ->  2 / x")
