@@ -109,7 +109,7 @@ def sampled_region(arm: Arm, x: Axis, y: Axis, chain: Chain) -> SampledMap | Non
         across = x.grid(SAMPLED_COLUMNS)
         across = with_both_sides(across[across > 0], ends_of_K1(loop))
         plane = sampled_map(loop, across[x.high > across], [y.low - OUTSIDE, y.high + OUTSIDE])
-        return rounded(plane, lambda K1, K2: np.asarray(WIDE * x.place(K1) + 1j * y.place(K2)))
+        return rounded(plane, lambda across, up: np.asarray(WIDE * x.place(across) + 1j * y.place(up)))
     except ConvergenceError:
         return None
 

@@ -52,8 +52,8 @@ def overlay(arm: Arm, gains: HubFeedback, chain: Chain) -> Overlay:
     across = with_both_sides(np.geomspace(low, top, COLUMNS), ends)
     across = across[(low <= across) & (top >= across)]
 
-    def drawn(K1: Real, K2: Real) -> Complex:
-        return np.asarray(WIDE * np.log(K1 / low) / np.log(top / low) + 1j * (K2 - K2_RANGE[0]) / np.ptp(K2_RANGE))
+    def drawn(across: Real, up: Real) -> Complex:
+        return np.asarray(WIDE * np.log(across / low) / np.log(top / low) + 1j * (up - K2_RANGE[0]) / np.ptp(K2_RANGE))
 
     planes = [rounded(gain_map(loop, across, CUT), drawn) for loop in loops]
     every = np.unique(np.concatenate([plane.axes[0] for plane in planes]))

@@ -6,9 +6,9 @@
     none           the plain softplus, K >= 0
 
 A proven sector gives a contraction, so bounded references, and rounding by converters, leave bounded signals whatever
-K(t) does in it; a torque or a moment that saturates is not covered.  The proof is of the arm, K1, Kp, sampling and
-delay it was made for, with the modes that it names.  With a Kp > 0 the hub's angle is one of the states that contract:
-it follows its reference however K moves.
+K(t) does in it; a torque or a moment that saturates is not covered.  The proof is of the arm, servo, sampling and
+delay it was made for, with the modes that it names.  Where the hub's angle is held, it is one of the states that
+contract: it follows its reference however K moves.
 
 The network's gain kappa = ln(1 + e^z) is bent into the interval by K = lo + (hi - lo)(1 - e^-kappa), which is
 lo + (hi - lo)/(1 + e^-z): smooth, so that the gradient sees it.
@@ -21,13 +21,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm
+from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN, Arm
 from tfarm.dsp import SampledLoop, sampled_loop, stable_windows
 from tfarm.dsp.margins import around
 from tfarm.dsp.sampling import held
@@ -92,7 +92,7 @@ class Guard:
 
 
 def find_guard(loop: SampledLoop, kind: GuardKind, best_constant: float) -> Guard:
-    """The guard of a loop (its K1, Kp, chain and modes); its K2 does not matter.
+    """The guard of a loop (its servo, chain and modes); its moment gain does not matter.
 
     Raises CertificationError where there is none, with the damping that would have one.
     """
@@ -109,7 +109,7 @@ def find_guard(loop: SampledLoop, kind: GuardKind, best_constant: float) -> Guar
 
 def gain_windows(loop: SampledLoop) -> list[tuple[float, float]]:
     """The intervals of constant gains K >= 0, up to 10, that leave the loop stable."""
-    return [(max(low, 0.0), min(high, MOST_GAIN)) for low, high in stable_windows(loop, "K2") if high > 0]
+    return [(max(low, 0.0), min(high, MOST_GAIN)) for low, high in stable_windows(loop, MOMENT_GAIN) if high > 0]
 
 
 def _frozen(loops: list[SampledLoop], best_constant: float) -> Guard | None:
@@ -187,8 +187,7 @@ def _settled(loops: list[SampledLoop], found: list[tuple[float, float]]) -> bool
 def is_quiet(loop: SampledLoop, highest: float) -> bool:
     """Whether the upper half of the modes lose more in a sample by themselves than the feedback could give them."""
     plant, T = loop.plant, loop.chain.sampling.period
-    angle, rate, moment = abs(plant.residues)
-    fed_back = abs(loop.gains.Kp) * angle + abs(loop.gains.K1) * rate + highest * moment
+    fed_back = loop.under(loop.gains.having(MOMENT_GAIN, highest)).push
     push = 2 * fed_back * abs(held(plant.poles, T))
     upper = (plant.mode > plant.count // 2) & (plant.poles.imag > 0)
     return bool((push[upper] < -plant.poles.real[upper] * T).all())
@@ -206,7 +205,7 @@ def _larger(loop: SampledLoop) -> Iterator[SampledLoop]:
         if number <= count:
             return
         try:
-            more = sampled_loop(arm, replace(loop.gains, K2=1.0), loop.chain, count=number)
+            more = sampled_loop(arm, loop.gains.having(MOMENT_GAIN, 1.0), loop.chain, count=number)
         except ConvergenceError:
             continue
         yield more
@@ -217,18 +216,18 @@ def _remedy(loop: SampledLoop, kind: str) -> str:
     """Why there is no guard, and the smallest damping tried that has one."""
     arm = loop.plant.arm
     what = "no sector of moving gains" if kind == "time-varying" else "no constant gain"
-    gains = loop.gains
-    at = f"K1 = {gains.K1:g}" + (f", Kp = {gains.Kp:g}" if gains.Kp else "")
+    served = [name for name in (RATE_GAIN, ANGLE_GAIN) if name == RATE_GAIN or loop.gains[name]]
+    at = ", ".join(loop.gains.told(name, "{:g}".format) for name in served)
     start = f"{arm.name}: {what} is proven stable at {at}, C = {arm.damping:g} s"
     for C in DAMPINGS[arm.damping < DAMPINGS]:
         if _has_guard(arm.having(damping=float(C)), loop, kind):
             return f"{start}; with a damping of C = {C:.1e} s there is one"
-    return f"{start}, nor with any damping up to {DAMPINGS[-1]:g} s; take another K1, or a shorter period or delay"
+    return f"{start}, nor with any damping up to {DAMPINGS[-1]:g} s; take another {RATE_GAIN}, or a shorter period or delay"
 
 
 def _has_guard(arm: Arm, loop: SampledLoop, kind: str) -> bool:
     try:
-        first = sampled_loop(arm, replace(loop.gains, K2=1.0), loop.chain, count=loop.plant.count)
+        first = sampled_loop(arm, loop.gains.having(MOMENT_GAIN, 1.0), loop.chain, count=loop.plant.count)
         if not gain_windows(first):
             return False
         loops = list(_larger(first))
