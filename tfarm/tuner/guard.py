@@ -222,7 +222,8 @@ def _remedy(loop: SampledLoop, kind: str) -> str:
     for C in DAMPINGS[arm.damping < DAMPINGS]:
         if _has_guard(arm.having(damping=float(C)), loop, kind):
             return f"{start}; with a damping of C = {C:.1e} s there is one"
-    return f"{start}, nor with any damping up to {DAMPINGS[-1]:g} s; take another {RATE_GAIN}, or a shorter period or delay"
+    remedy = f"take another {RATE_GAIN}, or a shorter period or delay"
+    return f"{start}, nor with any damping up to {DAMPINGS[-1]:g} s; {remedy}"
 
 
 def _has_guard(arm: Arm, loop: SampledLoop, kind: str) -> bool:
