@@ -12,7 +12,7 @@ import tfarm
 from tests.dsp.roads import aliased_loop
 from tests.shared import sized, thinned
 from tfarm.arm import HubFeedback
-from tfarm.dsp import Chain, Sampling, sampled_loop
+from tfarm.dsp import Chain, SampledLoop, Sampling, sampled_loop
 from tfarm.errors import CertificationError, ParameterError
 from tfarm.tuner import find_guard, guard, slew_trial
 from tfarm.tuner.guard import is_quiet
@@ -210,9 +210,7 @@ def test_modes_are_quiet_where_they_lose_more_than_the_feedback_could_give():
         residues=np.array([[0.0, 0.0], [9.0, 0.01], [9.0, 0.02]], complex),
         poles=np.array([-1e-3 + 1e-6j, -0.05 + 1e-6j]), mode=np.array([1, 2]), count=2,
     )  # fmt: skip
-    loop = SimpleNamespace(
-        plant=plant, chain=SimpleNamespace(sampling=SimpleNamespace(period=1.0)), gains=HubFeedback(K1=-0.5)
-    )
+    loop = SampledLoop(plant, Chain(sampling=Sampling(period=1.0)), HubFeedback(K1=-0.5))
     hold = (1 - np.exp(-0.05)) / 0.05
     edge = (0.05 / hold / 2 - 0.5 * 0.01) / 0.02
     assert is_quiet(loop, 0.999 * edge)
