@@ -34,3 +34,16 @@ def thinned(cases, every):
 def sized(small, full):
     """A size for `make test`, and the full one, which is marked and run by `make survey`."""
     return [small, pytest.param(full, marks=pytest.mark.survey)]
+
+
+def remembered(function):
+    """The function, called once for the same arguments, as they are printed; where a test asks for an answer twice."""
+    answers = {}
+
+    def again(*given, **named):
+        key = repr((given, named))
+        if key not in answers:
+            answers[key] = function(*given, **named)
+        return answers[key]
+
+    return again

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import tfarm
+from tests.shared import thinned
 from tests.strategies import some_arm
 from tests.transition import ALIASES, determinant, response
 from tfarm import Section
@@ -155,7 +156,7 @@ def test_the_motor_is_a_filter_and_a_damper_around_the_torque():
     assert complex(current) == pytest.approx(complex(g * G), rel=8 * EPS)
 
 
-@pytest.mark.parametrize("drive", ["hub_torque", "motor_voltage", "hub_angle"])
+@pytest.mark.parametrize("drive", thinned(["hub_torque", "motor_voltage", "hub_angle"], 2))
 def test_reciprocity_off_the_axis(drive):
     """What a force at a does to w at b, a force at b does to w at a; so with the pair, the turn and the torque."""
     arm, s = rig(input=drive), -4 + 321j

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import tfarm
+from tests.shared import thinned
 from tfarm.audit.assumptions import (
     candidate_depths,
     candidate_inertias,
@@ -81,7 +82,7 @@ def test_what_is_no_candidate_is_refused(bad):
 # ------------------------------------------------------------ the arm's own values
 
 
-@pytest.mark.parametrize("arm", ARMS, ids=NAMES)
+@pytest.mark.parametrize("arm", thinned(ARMS, 2), ids=NAMES)
 def test_the_own_section_gives_the_arms_own_table(arm):
     study = section_study(arm, count=6)
     assert study.is_own.sum() == 1
@@ -118,7 +119,7 @@ def slopes(values, frequency):
 NEIGHBOURS = np.geomspace(0.998, 1.002, 5)
 
 
-@pytest.mark.parametrize("arm", ARMS, ids=NAMES)
+@pytest.mark.parametrize("arm", thinned(ARMS, 3), ids=NAMES)
 @pytest.mark.parametrize("share", [0.3, 1.0, 4.0])
 def test_the_sensitivity_to_the_section_is_the_slope_between_neighbours(arm, share):
     study = section_study(arm, own_depth(arm) * share * NEIGHBOURS)
@@ -128,7 +129,7 @@ def test_the_sensitivity_to_the_section_is_the_slope_between_neighbours(arm, sha
     )  # order four: 0.001^4 x its factor (a veering pair: 600)
 
 
-@pytest.mark.parametrize("arm", [PAPER, STOCKY], ids=NAMES[:2])
+@pytest.mark.parametrize("arm", thinned([PAPER, STOCKY], 2), ids=NAMES[:2])
 @pytest.mark.parametrize("share", [0.1, 1.0, 10.0])
 def test_the_sensitivity_to_the_hub_is_the_slope_between_neighbours(arm, share):
     study = hub_study(arm, arm.hub.inertia * share * NEIGHBOURS)

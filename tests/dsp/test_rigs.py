@@ -8,6 +8,7 @@ import pytest
 
 import tfarm
 from tests.dsp.law_verdicts import stepped
+from tests.shared import thinned
 from tfarm import Law
 from tfarm.dsp import Chain, sampled_verdict
 from tfarm.dsp.chain import Actuator, Slew
@@ -51,7 +52,7 @@ def test_analog_damping_behind_an_inductance_is_refused_with_a_remedy():
         undelayed_plant(arm, Chain(actuator=Actuator(hub_damping=0.1)), ("hub_rate",), 4)
 
 
-@pytest.mark.parametrize("name", ["tests/rigs/bench-rig.toml", "quanser-2dsfl", "quanser-flexlink"])
+@pytest.mark.parametrize("name", thinned(["tests/rigs/bench-rig.toml", "quanser-2dsfl", "quanser-flexlink"], 2))
 @pytest.mark.parametrize("factor", [1.0, -40.0])
 def test_the_verdict_on_a_damped_rig_is_proven(name, factor):
     """Poles of friction and of the circuit are among those that are counted; as many grow as in a stepped model."""

@@ -10,6 +10,7 @@ import pytest
 import tfarm
 from tests.loop.arms import some_loop
 from tests.loop.law_counts import judge, some_delay, some_law
+from tests.shared import thinned
 from tests.shell import run
 from tfarm import HubFeedback, Law, ParameterError
 from tfarm.loop.law_loop import LawLoop
@@ -24,7 +25,7 @@ from tfarm.response.signals import Signals
 LAB, BARE, RIG = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "quanser-2dsfl"))
 
 
-@pytest.mark.parametrize("arm", [LAB, BARE, RIG], ids=lambda arm: arm.name)
+@pytest.mark.parametrize("arm", thinned([LAB, BARE, RIG], 2), ids=lambda arm: arm.name)
 @pytest.mark.parametrize("gains", [HubFeedback(K1=0.3, K2=0.3), HubFeedback(K1=0.1, K2=-0.5, Kp=2.0)])
 def test_gains_at_the_hub_have_the_same_poles_as_a_law(arm, gains):
     mine, theirs = law_poles(arm, Law.of_gains(gains), 8), tfarm.closed_loop_poles(arm, gains, 8)

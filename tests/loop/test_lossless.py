@@ -96,7 +96,7 @@ def test_a_pole_of_the_elements_crosses_at_each_edge(name):
             assert abs(inside + outside) < 0.2 * outside
 
 
-@pytest.mark.parametrize("name", thinned(RIGS, 2))
+@pytest.mark.parametrize("name", thinned(RIGS, 4))
 def test_verdict_windows_and_map_follow_the_edges(name):
     arm = RIGS[name]
     law = default_gains(arm).having("K2", 0.0)

@@ -180,7 +180,7 @@ def test_the_equivalent_hub_has_the_poles_of_the_damped_gauge() -> None:
             assert abs(determinant(s) / slope / s) < 1e-13
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", thinned(range(3), 2))
 def test_without_K2_damping_does_no_harm(seed: int) -> None:
     rng = np.random.default_rng(seed)
     for _ in range(6):

@@ -12,6 +12,7 @@ from tests.loop.arms import window_arm
 from tests.loop.nyquist_counts import survey
 from tests.plots.labels import complaints
 from tests.report.coarse import coarsen
+from tests.shared import thinned
 from tfarm.arm import Hub, HubFeedback, many_laws
 from tfarm.dsp import Chain
 from tfarm.dsp.brief import sampled_brief
@@ -250,7 +251,7 @@ def test_beyond_one_infinitely_many_poles_are_unstable_without_damping():
 # ------------------------------------------------------------ Nyquist
 
 
-@pytest.mark.parametrize("arm", [PURE, LAB, STOCKY], ids=lambda arm: arm.name)
+@pytest.mark.parametrize("arm", thinned([PURE, LAB, STOCKY], 2), ids=lambda arm: arm.name)
 @pytest.mark.parametrize("K2", [-2.0, 0.3, 1.5])
 def test_turns_around_minus_one_are_unstable_poles(arm, K2):
     """Two counts that share nothing: the turns of 1 + L along a contour, and all poles found in a box."""

@@ -11,6 +11,7 @@ import pytest
 import tfarm
 from tests.odd_arms import odd_arms
 from tests.report import plausible
+from tests.shared import thinned
 from tfarm import HubFeedback
 from tfarm.arm import implausible
 from tfarm.audit import candidates
@@ -146,7 +147,7 @@ def is_stable(arm, law, up_to):
     return poles_below(Loop(arm, law), up_to).unstable == 0
 
 
-@pytest.mark.parametrize("name", LOOPS)
+@pytest.mark.parametrize("name", thinned(LOOPS, 2))
 def test_how_far_K2_may_go_is_what_the_poles_say(name):
     """On either side of an edge; at the end of a search nothing happens, and no edge is claimed."""
     arm, law = ARMS[name], default_gains(ARMS[name])
@@ -175,7 +176,7 @@ def test_sentences_about_the_pole_at_0_and_J_are_for_arms_that_turn_freely(name,
         assert {end.rstrip("*") for end in ends[0] if "*" in end} == {end.rstrip("*") for end in ends[0]} & ends[1]
 
 
-@pytest.mark.parametrize("name", LOOPS)
+@pytest.mark.parametrize("name", thinned(LOOPS, 2))
 def test_what_K2_beyond_1_is_said_to_do_is_what_the_rows_show(name):
     arm, law = ARMS[name], default_gains(ARMS[name])
     table = beyond_table(arm, law)

@@ -10,6 +10,7 @@ import pytest
 
 import tfarm
 from tests.odd_arms import odd_arms
+from tests.shared import thinned
 from tfarm.dsp import Chain, Sampling, sampled_loop, stable_windows
 from tfarm.dsp.chain import Converters
 from tfarm.dsp.law import growing_mode, mode_table
@@ -53,7 +54,7 @@ def number(text):
     return float(text.replace("−", "-"))
 
 
-@pytest.mark.parametrize("name", LOOPS)
+@pytest.mark.parametrize("name", thinned(LOOPS, 2))
 def test_room_that_sampling_adds_or_takes_is_where_the_poles_say_so(name):
     """Just inside what is added the continuous loop is unstable and the sampled one stable; the other way round too."""
     data = data_of(name)
@@ -68,7 +69,7 @@ def test_room_that_sampling_adds_or_takes_is_where_the_poles_say_so(name):
     assert "without limit" not in words
 
 
-@pytest.mark.parametrize("name", LOOPS)
+@pytest.mark.parametrize("name", thinned(LOOPS, 2))
 def test_yes_carries_its_margin_and_no_says_unstable(name):
     for period in (0.01, 0.0003):
         data = data_of(name, period)
