@@ -178,6 +178,14 @@ def test_a_sensor_is_offered_where_there_is_something_to_sense(case):
     assert arm.length in moves
 
 
+def test_a_zero_on_the_axis_has_no_real_part_of_rounding():
+    """The rig's link loses nothing, so that zeros lie on the axis, in pairs across it, or are real."""
+    found = sensor_numbers(tfarm.load("quanser-2dsfl"))["sensor"]
+    zeros = [zero for kind in found.values() for place in kind["zeros"] for zero in place]
+    assert sum(re == 0.0 for re, _ in zeros) > 20
+    assert not [(re, im) for re, im in zeros if 0 < abs(re) < 1e-9 * abs(im)]
+
+
 def test_where_zeros_of_sensors_cannot_be_told_the_page_says_why(case, monkeypatch, tmp_path):
     _, data, _ = case
 

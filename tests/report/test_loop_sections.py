@@ -33,7 +33,7 @@ from tfarm.plots.roots import zoomed
 from tfarm.plots.style import BLUE
 from tfarm.report import loop_laws, loop_section, making, map, write
 from tfarm.report.frame import signs
-from tfarm.report.locus_section import beyond_table
+from tfarm.report.locus_section import _more_damping, beyond_table
 from tfarm.report.loop_laws import NamedLaw, has_loop, laws, margins_of
 from tfarm.report.loop_section import map_section, margins_section
 from tfarm.report.map import draw_map, gain_map, map_data
@@ -389,3 +389,17 @@ def test_poles_that_only_a_theorem_tells_from_the_axis_may_be_on_either_side_of_
     assert plot.on_axis > 0
     assert plot.clear + plot.on_axis == plot.verdict.unstable_roots
     assert plot.clear <= plot.expected <= plot.verdict.unstable_roots
+
+
+def test_a_rate_gain_that_only_takes_damping_is_not_said_to_add_it():
+    """The geared rig's own friction damps its first mode most; more rate gain takes of it (poles at a few gains)."""
+    rig = tfarm.load("quanser-2dsfl")
+    law = default_gains(rig)
+    found = loci(rig, law, "K1", 0.0, 2 * law.K1)
+    branch = found.exact.branches[found.exact.mode == 1][0]
+    first = -branch.real / abs(branch)
+    assert (np.diff(first) < 0).all()
+    words = _more_damping(found)
+    assert "only takes damping from the first mode, which has" in words
+    assert words.endswith("at K1 = 0 A s/rad")
+    assert f"{100 * first[0]:.1f} %" in words

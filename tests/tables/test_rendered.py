@@ -14,7 +14,7 @@ from tfarm.columns import ANSWER, FILES, PAGE, REPORT, Column, Table
 from tfarm.digits import lined, significant, singly, worded
 from tfarm.errors import MISSING
 from tfarm.tables.files import as_csv, as_json, save, to_json
-from tfarm.tables.html import as_html
+from tfarm.tables.html import as_html, symbol
 
 
 @dataclass
@@ -157,3 +157,17 @@ def test_a_report_s_table_has_two_files(table, tmp_path):
     assert save(table, tmp_path) == ("found.csv", "found.json")
     assert (tmp_path / "found.csv").read_text(encoding="utf-8") == as_csv(table)
     assert (tmp_path / "found.json").read_bytes().decode() == as_json(table)
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("I = 1.8e-9 m^4, E = 2.07e11 Pa.", "I = 1.8 × 10⁻⁹ m⁴, E = 2.07 × 10¹¹ Pa."),
+        (
+            "I_h of commit 48ab0ce, 1e5f, file1e5.mat <i>",
+            "I<sub>h</sub> of commit 48ab0ce, 1e5f, file1e5.mat &lt;i&gt;",
+        ),
+    ],
+)
+def test_texts_of_files_have_their_powers_of_ten_set(text, shown):
+    assert symbol(text) == shown

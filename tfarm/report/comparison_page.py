@@ -18,10 +18,12 @@ from tfarm.report.card import written_cards
 from tfarm.report.kept import COMPARED, COMPARISON, keep
 from tfarm.report.page import index_page, render
 from tfarm.report.sections import Picture, Section, save_section
-from tfarm.report.words import typeset
+from tfarm.report.words import typeset, upper
 from tfarm.report.writing import TRUST, move_into
 
-LEADING = re.compile(r"^-(?=\d|inf)")  # a minus sign before a number
+LEADING = re.compile(r"^-(?=\d)")  # a minus sign before a number
+FREQUENCY = re.compile(r"^w(?= of )")
+NUMBERS = {"inf": "∞", "-inf": "−∞", "-": "–"}
 APART = "Differences are those of the second from the first, in per cent of the first."
 ORDER = "The n-th of both in the order of Im s, which need not be the same mode of the link."
 IN_Z = "One of the laws is a law in z: both loops are compared at their samples, each pole z as s = ln(z)/T."
@@ -68,7 +70,7 @@ def _lead(found: Comparison) -> str:
 
 
 def _sections(found: Comparison) -> Iterator[Section]:
-    words = [*map(verdict_words, found.sides), *[IN_Z] * found.is_clocked]
+    words = [*(f"{typeset(verdict_words(side))}." for side in found.sides), *[IN_Z] * found.is_clocked]
     yield Section(anchor="verdicts", title="Verdicts", words=words)
     yield Section(anchor="both", title="Both in one picture", blocks=(_picture(found),))
     if found.is_of_arms:
@@ -77,18 +79,29 @@ def _sections(found: Comparison) -> Iterator[Section]:
         )
         yield Section(anchor="modes", title="Modes", blocks=(table,))
     poles = replace(
-        _set(poles_table(found)), stem="compare-poles", title="Closed-loop poles", caption=f"{ORDER} {APART}"
+        _set(poles_table(found)), stem="compare-poles", title="Those that oscillate", caption=f"{ORDER} {APART}"
     )
     known = AT_SAMPLES if found.is_clocked else KNOWN
     yield Section(anchor="poles", title="Closed-loop poles", blocks=(poles,))
-    margins = replace(_set(margins_table(found)), stem="compare-margins", title="Margins", caption=f"{known} {APART}")
+    margins = replace(
+        _set(margins_table(found)), stem="compare-margins", title="How far from unstable", caption=f"{known} {APART}"
+    )
     yield Section(anchor="margins", title="Margins", blocks=(margins,))
 
 
 def _set(table: Table) -> Table:
-    """The table with the numbers of its cells as pages show them: powers of ten and minus signs."""
-    columns = [replace(each, shown=[LEADING.sub("−", typeset(cell)) for cell in each.cells]) for each in table.columns]
+    """The table as pages show such: powers of ten, minus signs, infinity, and w in Greek."""
+    columns = [
+        replace(
+            each, title=FREQUENCY.sub("ω", each.title), shown=[NUMBERS.get(cell, _number(cell)) for cell in each.cells]
+        )
+        for each in table.columns
+    ]
     return replace(table, columns=tuple(columns), record=None)
+
+
+def _number(cell: str) -> str:
+    return LEADING.sub("−", typeset(cell))
 
 
 def _picture(found: Comparison) -> Picture:
@@ -104,6 +117,6 @@ def _picture(found: Comparison) -> Picture:
         f"The {curves} of both over frequency, and where each loop is stable over {plane}; the points are the laws."
     )
     return Picture(
-        stem="comparison", title="Both in one picture", caption=caption, alt=f"{found.verdict}.",
+        stem="comparison", title=f"{upper(curves)} and stable region", caption=caption, alt=f"{found.verdict}.",
         figure=draw_comparison(found),
     )  # fmt: skip

@@ -134,8 +134,9 @@ def _keyed(names: list[str], colours: list[str]) -> Any:
 
 def _poles() -> Any:
     """Closed-loop poles near the axis on the locus of one gain, with lines of equal damping ratio."""
-    x = alt.X("re:Q", title="Re s [1/s]", scale=alt.Scale(nice=False))
-    y = alt.Y("im:Q", title="Im s [rad/s]", scale=alt.Scale(nice=False))
+    plain = alt.Axis(format="~g")
+    x = alt.X("re:Q", title="Re s [1/s]", scale=alt.Scale(nice=False), axis=plain)
+    y = alt.Y("im:Q", title="Im s [rad/s]", scale=alt.Scale(nice=False), axis=plain)
     names = (
         alt.Chart(_data("rays")).transform_filter("datum.end").mark_text(color=GREY, align="left", dx=3, fontSize=10)
     )

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import Arm
 from tfarm.errors import TfarmError
-from tfarm.loop.positions import Positions, Sensor, positions
+from tfarm.loop.positions import WRONG, Positions, Sensor, positions
 from tfarm.spectrum import modes
 
 Real = NDArray[np.float64]
@@ -43,9 +43,14 @@ def _numbers(found: Positions) -> dict[str, Any]:
         "band": found.band,
         "modes": [_short(w) for w in found.natural_frequency],
         "participation": [[_short(each) for each in column] for column in found.participation.T],
-        "zeros": [[[_short(s.real), _short(s.imag)] for s in zeros] for zeros in found.zeros],
+        "zeros": [[[_part(s.real, s), _part(s.imag, s)] for s in zeros] for zeros in found.zeros],
     }
 
 
 def _short(value: float) -> float:
     return float(f"{value:.{DIGITS}g}")
+
+
+def _part(part: float, whole: complex) -> float:
+    """A part of a zero, 0 where that is all that is known of it."""
+    return _short(part) if abs(part) > WRONG * abs(whole) else 0.0

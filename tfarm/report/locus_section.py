@@ -92,8 +92,11 @@ def _more_damping(data: Loci) -> str:
     at = f"{data.name} = {significant(found.gain, 3)}{written_unit(data.name, exact.arm)}"
     if not found.swings_on:
         return f"{start} damps the first mode until it no longer swings, a little above {at}"
+    share = f"{significant(100 * found.damping_ratio, 3)} % of critical"
+    if found.gain == exact.gain[0]:
+        return f"{start} only takes damping from the first mode, which has {share} at {at}"
     then = ", and less from there on: the hub is then held too firmly to take energy out" * found.falls
-    return f"{start} damps the first mode up to {significant(100 * found.damping_ratio, 3)} % of critical at {at}{then}"
+    return f"{start} damps the first mode up to {share} at {at}{then}"
 
 
 def _more_moment(data: Loci) -> str:
