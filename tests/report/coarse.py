@@ -2,6 +2,7 @@
 
 from tfarm.dsp import loci as sampled_loci
 from tfarm.dsp import periods
+from tfarm.dsp import regions as sampled_regions
 from tfarm.loop import loci
 from tfarm.report import making, map, overlay
 
@@ -10,6 +11,7 @@ COARSE = (
     (map, "ROWS", 40),
     (map, "SAMPLED_COLUMNS", 24),
     (overlay, "COLUMNS", 8),
+    (sampled_regions, "MOST_COLUMNS", 0),  # with the corners that so few have
     (loci, "POINTS", 60),
     (sampled_loci, "VALUES", 31),
     (periods, "SHARES", (1.0, 5.0)),
