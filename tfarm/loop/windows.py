@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from tfarm.arm import HubFeedback
+from tfarm.arm import MOMENT_GAIN, HubFeedback
 from tfarm.crossing import Crossing, Crossings, counts_over
 from tfarm.records import record
 from tfarm.spectrum import modes
@@ -24,7 +24,7 @@ from .stability import Stability, loop_band, stability
 Interval = tuple[float, float]
 End = Literal["edge", "search bound", "no limit"]
 
-REACH = {"K1": 20.0, "K2": 50.0, "Kp": 20.0}  # how far windows are looked for: times J w1, times 1, times J w1^2
+REACH, FARTHER = 20.0, {MOMENT_GAIN: 50.0}  # how far windows are looked for, times `gain_unit`
 BEYOND_STATIC = 2.0  # times J/(J - I_h), where K2 cancels the inertia: windows are looked for at least so far
 
 
@@ -51,7 +51,7 @@ class Windows:
 
 
 def gain_windows(verdict: Stability, name: str) -> Windows:
-    """The windows of "K1", "K2" or "Kp" through the loop whose verdict is given."""
+    """The windows of the gain of that name through the loop whose verdict is given."""
     loop, law = verdict.loop, verdict.loop.law
     value = law[name]
     if name == "K2" and loop.arm.has_massless_hub:
@@ -76,7 +76,7 @@ def gain_windows(verdict: Stability, name: str) -> Windows:
 def looked_at(loop: Loop, name: str) -> Interval:
     """The range of a gain that is searched, symmetric and well beyond what matters to the first mode."""
     arm, law = loop.arm, loop.law
-    reach = max(REACH[name] * gain_unit(arm, name), 10.0 * abs(law[name]))
+    reach = max(FARTHER.get(name, REACH) * gain_unit(arm, name), 10.0 * abs(law[name]))
     carried = arm.gauged_inertia
     if name == "K2" and 0 < carried < math.inf:
         reach = max(reach, BEYOND_STATIC * arm.turned_inertia / carried)
