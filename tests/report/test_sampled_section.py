@@ -26,6 +26,7 @@ from tfarm.report.sampled_modes import loci_table
 from tfarm.report.sampled_section import sampled_section
 from tfarm.report.sampled_words import Sampled, compared, cure, duration, interval, short_answer
 from tfarm.report.time_responses import HELD
+from tfarm.spectrum.scales import default_gains
 from tfarm.tables.files import as_csv, as_json
 
 LAB, PAPER = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
@@ -54,6 +55,20 @@ def values_of(table):
 
 
 # ------------------------------------------------------------ the overlay
+
+
+def test_the_picture_of_a_rig_is_as_high_as_its_own_gains(monkeypatch):
+    """Driven by its motor's current, K2 balances a torque at 0.112 A/(N m), and not at 1."""
+    monkeypatch.setattr("tfarm.report.overlay.COLUMNS", 12)
+    monkeypatch.setattr("tfarm.report.overlay.DAMPINGS", ())
+    rig = tfarm.load("quanser-2dsfl")
+    data = overlay(rig, default_gains(rig), Chain())
+    low, high = draw_overlay(data).axes[0].get_ylim()
+    assert 0.112 < high < 0.2
+    (sampled,) = data.sampled
+    ((bottom, top),) = sampled.stable_intervals[0]
+    assert top - bottom > 0.4 * (high - low)
+    assert low < bottom < top < high
 
 
 def test_the_map_of_both_regions_is_what_poles_say():

@@ -22,7 +22,7 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 MOST_GAINS = 4000
-ENDS_AT = (-0.9, 0.3, 0.9)  # K2 at which upright edges are looked for
+ENDS_AT = (-0.9, 0.3, 0.9)  # K2 at which upright edges are looked for, of what balances a torque
 MOST_COLUMNS, ROUNDS = 400, 12  # of K1 in a picture, and of halving where the outline bends
 SIDE = 1e-9  # relative: so far to either side of such an edge a region is cut
 
@@ -107,7 +107,8 @@ def with_more(plane: GainMap, K1: Real) -> GainMap:
 
 def ends_of_K1(loop: SampledLoop) -> Real:
     """Where stable intervals of K1 > 0 end, at a few K2: there the region has upright edges."""
-    found = [window for K2 in ENDS_AT for window in stable_windows(loop.having(K2=K2), "K1")]
+    unit = loop.plant.arm.input_per_torque
+    found = [window for K2 in ENDS_AT for window in stable_windows(loop.having(K2=unit * K2), "K1")]
     return np.array(sorted({end for window in found for end in window if math.isfinite(end) and end > 0}))
 
 

@@ -24,8 +24,8 @@ from tfarm.plots.style import blank, headline, style
 if TYPE_CHECKING:
     from tfarm.plots.style import Figure
 
-K2_RANGE = (-1.0, 1.5)
-CUT = (-1.02, 1.52)  # where intervals are cut, just outside the picture: no cut is seen as an edge
+K2_RANGE = (-1.0, 1.5)  # of what balances a torque: 1 where the input is one, less where it is a motor's current
+CUT = (-1.02, 1.52)  # of the same: where intervals are cut, just outside the picture: no cut is seen as an edge
 COLUMNS = 72  # values of the gain across, and either side of upright edges
 DAMPINGS = (1e-4, 1e-6)  # s: what is drawn beside C = 0
 WIDE = 1.8  # times as wide as high the picture is, about
@@ -48,19 +48,17 @@ def overlay(arm: Arm, gains: HubFeedback, chain: Chain) -> Overlay:
     ends = np.unique(np.concatenate([ends_of_K1(loop) for loop in loops]))
     ends = ends[np.diff(ends, prepend=0.0) > SAME * ends]
     own, _ = gains.point
+    span, cut = (arm.input_per_torque * np.array(ends) for ends in (K2_RANGE, CUT))
     low, top = own / BELOW, _round_up(BEYOND * max([own, *ends]))
     across = with_both_sides(np.geomspace(low, top, COLUMNS), ends)
     across = across[(low <= across) & (top >= across)]
 
     def drawn(across: Real, up: Real) -> Complex:
-        return np.asarray(WIDE * np.log(across / low) / np.log(top / low) + 1j * (up - K2_RANGE[0]) / np.ptp(K2_RANGE))
+        return np.asarray(WIDE * np.log(across / low) / np.log(top / low) + 1j * (up - span[0]) / np.ptp(span))
 
-    planes = [rounded(gain_map(loop, across, CUT), drawn) for loop in loops]
+    planes = [rounded(gain_map(loop, across, cut), drawn) for loop in loops]
     every = np.unique(np.concatenate([plane.axes[0] for plane in planes]))
-    planes = [
-        with_more(plane, more) if (more := np.setdiff1d(every, plane.axes[0])).size else plane for plane in planes
-    ]
-    return Overlay(region(arm, every, np.array(CUT)), tuple(planes))
+    return Overlay(region(arm, every, cut), tuple(with_more(plane, every) for plane in planes))
 
 
 def _round_up(x: float) -> float:
@@ -73,7 +71,8 @@ def draw_overlay(data: Overlay) -> Figure:
     """The picture of this tool: a continuous region and a sampled one on the same axes."""
     with style():
         figure = blank(9.0, 5.4)
-        regions.overlay(*data, ax=figure.subplots()).set_ylim(*K2_RANGE)
+        unit = data.continuous.arm.input_per_torque
+        regions.overlay(*data, ax=figure.subplots()).set_ylim(*(unit * K2 for K2 in K2_RANGE))
         ms = plain(1e3 * data.sampled[0].loop.chain.sampling.period)
         name = data.continuous.arm.name
         headline(figure, f"{name}: gains that keep the loop stable, continuous and sampled every {ms} ms")

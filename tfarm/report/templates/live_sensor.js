@@ -7,6 +7,7 @@ function makeSensor(kinds, colours) {
   const cell = (words, className = "") => Object.assign(document.createElement("td"), { textContent: words, className });
   const fill = (id, lines) => $(id).replaceChildren(...lines.map(cells => { const row = document.createElement("tr"); row.append(...cells); return row; }));
 
+  const side = (re, im) => Math.abs(re) <= 1e-6 * far([re, im]) ? "on the axis" : re > 0 ? "right of the axis" : "left of the axis";
   function share(x) {
     const bar = cell("", "share"), inner = document.createElement("span");
     Object.assign(inner.style, { width: `${50 * Math.abs(x)}%`, left: `${x < 0 ? 50 - 50 * Math.abs(x) : 50}%`, background: x < 0 ? colours.orange : colours.blue });
@@ -18,7 +19,7 @@ function makeSensor(kinds, colours) {
     const { x, modes, participation, zeros } = held(), i = at();
     $("sensor-x").textContent = `x = ${general(x[i], 5)} m`;
     fill("sensor-modes", modes.map((w, n) => [cell(n + 1), cell(general(w, 6)), cell(general(hertz(w), 5)), cell(participation[i][n].toFixed(3)), share(participation[i][n])]));
-    fill("sensor-zeros", zeros[i].map(([re, im]) => [cell(general(re, 5)), cell(general(im, 5)), cell(general(hertz(far([re, im])), 5)), cell(re > 1e-6 * far([re, im]) ? "right of the axis" : "", "text")]));
+    fill("sensor-zeros", zeros[i].map(([re, im]) => [cell(general(re, 5)), cell(general(im, 5)), cell(general(hertz(far([re, im])), 5)), cell(side(re, im), "text")]));
     if (view) for (const [of, rows] of Object.entries(sets())) view.data(of, rows);
     view?.runAsync();
   }
