@@ -72,7 +72,7 @@ def draw_overlay(data: Overlay) -> Figure:
     with style():
         figure = blank(9.0, 5.4)
         unit = data.continuous.arm.input_per_torque
-        regions.overlay(*data, ax=figure.subplots()).set_ylim(*(unit * K2 for K2 in K2_RANGE))
+        regions.overlay(*data, ax=figure.subplots()).set_ylim(*(unit * end for end in K2_RANGE))
         ms = plain(1e3 * data.sampled[0].loop.chain.sampling.period)
         name = data.continuous.arm.name
         headline(figure, f"{name}: gains that keep the loop stable, continuous and sampled every {ms} ms")
