@@ -54,7 +54,7 @@ def test_every_command_that_takes_an_arm_has_the_option():
         assert any(p.name == "theory" and "--theory" in p.opts for p in commands[name].params), name
 
 
-@pytest.mark.parametrize("verb", thinned(VERBS, 3))
+@pytest.mark.parametrize("verb", thinned(VERBS, 4))
 def test_the_option_does_what_the_files_key_does(verb, slender, capsys):
     """All numbers are those of the file with that theory, and not those of the arm's own."""
     asked = answer(capsys, verb, ARM, *VERBS[verb], "--theory", "euler-bernoulli")

@@ -1,5 +1,7 @@
 """Gradients of a trial and of a sample against complex steps, and reverse against forward accumulation."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 
@@ -23,9 +25,9 @@ def some_network(seed, inputs=6, hidden=6):
     return initial_network(seed, hidden=hidden, scales=np.linspace(0.6, 1.7, inputs))
 
 
-@pytest.mark.parametrize("signals", ["vibration", "total"])
-@pytest.mark.parametrize("guard", [NONE, SECTOR])
-@pytest.mark.parametrize("inputs", thinned([6, 7], 2))
+@pytest.mark.parametrize(
+    ("inputs", "signals", "guard"), thinned(product([6, 7], ["vibration", "total"], [NONE, SECTOR]), 3)
+)
 def test_the_gradient_of_a_trial_is_that_of_complex_steps(lab, signals, guard, inputs):
     network = some_network(inputs, inputs)
     cost, gradient = slew_trial(lab, signals=signals).gradient(network, guard)
@@ -69,8 +71,7 @@ def test_the_gradient_falls_to_zero_where_it_should(lab):
     assert np.log2(left[1] / left[2]) == pytest.approx(2, abs=0.1)
 
 
-@pytest.mark.parametrize("guard", [NONE, SECTOR])
-@pytest.mark.parametrize("k", [5, 47, 160])
+@pytest.mark.parametrize(("k", "guard"), thinned(product([5, 47, 160], [NONE, SECTOR]), 3))
 def test_the_gradient_of_a_sample_is_that_of_complex_steps(lab, guard, k):
     """E = a x(k+1)^2/2 + b e(k)^2/2 by the gain at k: x(k+1) answers to the torque with the plant's first sample."""
     trial, network = slew_trial(lab), some_network(2)
