@@ -80,7 +80,7 @@ def slewed(arm, law, chain):
     """Root mean square of the moment after a simulated slew, over a period of the first mode or 16 samples."""
     T, first = chain.sampling.period, tfarm.modes(arm, 1).natural_frequency[-1]
     last = chain.slew.rise_time + max(2 * np.pi / first, 16 * T)
-    run = tfarm.simulate(arm, law, chain=chain, duration=last)
+    run = tfarm.simulate(arm, law, chain=chain, duration=last, count=20)
     after = run.at_samples.t >= chain.slew.rise_time * (1 - 1e-12)
     return float(np.sqrt((run.at_samples.root_moment[after] ** 2).mean()))
 
