@@ -16,7 +16,7 @@ from tfarm.cli import main
 from tfarm.loop import reduced_locus as reduced_locus_room
 from tfarm.loop.lines import along
 from tfarm.loop.lines import crossings as line_crossings
-from tfarm.loop.locus import locus
+from tfarm.loop.locus import frame, locus
 from tfarm.loop.plant import Loop
 from tfarm.loop.poles import poles_below
 from tfarm.loop.reduced_locus import reduced_locus
@@ -249,6 +249,18 @@ def test_reduced_poles_do_not_depend_on_the_eigenvalue_solver(law):
 
 
 # ------------------------------------------------------------ refusals and the command
+
+
+@pytest.mark.parametrize("turned", [1.0, -1.0])
+def test_the_frame_of_a_picture_touches_its_outermost_points_and_holds_the_axis(turned):
+    branches = turned * np.array([[-3 + 2j, -1 + 5j], [np.nan, -0.5 + 9j]])
+    left, right, low, high = frame(branches)
+    assert (left, right) == ((-3, 0) if turned > 0 else (0, 3))
+    assert (low, high) == ((2, 9) if turned > 0 else (-9, -2))
+    still = frame(np.zeros((1, 3), complex))
+    assert still[0] < still[1]
+    assert still[2] < still[3]
+    assert frame(np.full((1, 3), np.nan + 0j)) == (0, 1, 0, 1)
 
 
 @pytest.mark.parametrize(
