@@ -1,0 +1,28 @@
+"""Nyquist's contour: where the loop function has a pole at 0, told by its growth towards it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tfarm
+from tfarm import Hub, HubFeedback, Payload
+from tfarm.loop.nyquist import poles_on_axis
+from tfarm.loop.plant import Loop
+
+LAB = tfarm.load("sasaki2012-lab")
+ARMS = {
+    "free": LAB,
+    "held by a spring at the hub": replace(LAB, hub=Hub(inertia=0.1, stiffness=3.0)),
+    "held at the payload": replace(LAB, payload=Payload(mass=np.inf)),
+}
+
+
+@pytest.mark.parametrize("name", ARMS)
+@pytest.mark.parametrize("law", [{"K1": 0.3}, {"Kp": 2.0}, {"K1": 0.3, "K2": 0.3}, {"K2": 0.3}])
+def test_the_loop_function_has_a_pole_at_rest_where_it_grows_without_bound(name, law):
+    """Nearer to 0 by a factor of ten L is ten or a hundred times as large there, and nowhere else."""
+    loop = Loop(ARMS[name], HubFeedback(**law))
+    near = abs(loop.loop_function(1j * 1e-4 * np.array([10.0, 1.0])))
+    grows = bool(near[1] > 5 * near[0])
+    assert (0.0 in poles_on_axis(loop, 1000.0)) == grows
