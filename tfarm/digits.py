@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import Any
 
+POWER = re.compile(r"(?<![\w.])(\d(?:\.\d+)?)e([-+]?\d{1,2})(?!\w|\.\d)")
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 SMALLEST, LARGEST = 1e-3, 1e7  # outside, powers of ten read better
 SPARE = 2  # digits beyond its own that the largest number of a column may have for the sake of the smallest
@@ -105,6 +106,11 @@ def counted(count: float, what: str) -> str:
 def listed(words: Sequence[str]) -> str:
     """One, or several with commas and an "and" before the last."""
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+
+
+def powers(text: str) -> str:
+    """A text in which numbers as files have them are set: 1.8e-9 becomes 1.8 × 10⁻⁹."""
+    return POWER.sub(lambda number: f"{number[1]} × 10{str(int(number[2])).translate(SUPERSCRIPT)}", text)
 
 
 def unit(text: str) -> str:

@@ -17,6 +17,7 @@ from tfarm.audit.published import Row as PublishedRow
 from tfarm.report import making, trust_proofs, write
 from tfarm.report.modes_section import modal_table
 from tfarm.report.trust import Evidence, sources_table, write_trust
+from tfarm.report.trust_audit import in_letters
 from tfarm.report.trust_proofs import digits_of, how_proven, prove, rounds_to, save_proof, written_proofs
 from tfarm.report.trust_tables import boxes_tables
 from tfarm.response import accuracy
@@ -184,6 +185,10 @@ def test_long_tables_and_claims_are_folded_below_their_answers(page):
     assert re.findall(r'id="(table-[^"]*)"', unfolded) == ["table-counts", "table-accuracy"]
     assert "<article" not in unfolded
     assert unfolded.count('href="#eq-') == len(CHEAP)
+
+
+def test_plain_letters_of_the_audit_are_set():
+    assert in_letters("6e-4 m^2 of theta_t, K2 < 1") == "6 × 10⁻⁴ m² of θ<sub>t</sub>, K2 &lt; 1"
 
 
 def test_what_is_not_proven_is_said(page, proof):

@@ -2,6 +2,7 @@
 
 import math
 import pickle
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -247,6 +248,11 @@ def test_every_number_about_the_tuner_is_one_of_the_command_or_its_files(walked,
         assert untraced_cells(sheet, rows, []) == []
         count += sum(len(shown_in(cell)) for row in sheet.rows for cell in row)
     assert count > 40
+
+
+def test_no_letters_of_the_code_are_on_the_page(walked):
+    part, _ = walked
+    assert [text for text in part.texts if re.search(r"[a-z]_[a-z]", text)] == []
 
 
 def test_the_rows_of_the_table_are_the_costs_of_the_command(walked):

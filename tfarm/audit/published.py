@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.columns import JSON, REPORT, Column, Table
-from tfarm.digits import TEXTS, general, significant, singly, worded
+from tfarm.digits import TEXTS, general, powers, significant, singly, worded
 from tfarm.errors import CertificationError
 from tfarm.spectrum import modes
 
@@ -41,7 +41,7 @@ class Row:
 
 def lettered(text: str) -> str:
     """Words with formulas in plain letters, with Greek ones."""
-    return text.replace("rhoA", "ρA").replace("w^2", "ω^2").replace("w L", "ω L")
+    return powers(text.replace("rhoA", "ρA").replace("w^2", "ω^2").replace("w L", "ω L"))
 
 
 ALL = (*SOURCES, *RIG_SOURCES)

@@ -12,7 +12,7 @@ from markupsafe import Markup, escape
 from tfarm.audit import Row
 from tfarm.audit.rows import ROWS, is_zero
 from tfarm.columns import Table
-from tfarm.digits import unit
+from tfarm.digits import powers, unit
 from tfarm.report.trust_math import compared, formulas, lines, width
 
 VERDICTS = {"ok": ("✓", "right as printed"), "corrected": ("≠", "corrected"), "undecided": ("?", "undecided")}
@@ -67,7 +67,7 @@ def shown(row: Row) -> Shown:
 def in_letters(text: str) -> Markup:
     """The audit's plain text with Greek letters, subscripts and exponents: theta_t^2 becomes θ<sub>t</sub>²."""
     greek = re.sub(
-        rf"(?<![A-Za-z])({'|'.join(GREEK)})(?![A-Za-z])", lambda name: GREEK[name[1]], unit(str(escape(text)))
+        rf"(?<![A-Za-z])({'|'.join(GREEK)})(?![A-Za-z])", lambda name: GREEK[name[1]], powers(unit(str(escape(text))))
     )
     return Markup(
         re.sub(r"(?<![^\W\d_])([A-Za-zΑ-Ωα-ω])_([a-z]{1,2}|\d{1,2})(?![A-Za-z0-9])", r"\1<sub>\2</sub>", greek)
@@ -94,4 +94,4 @@ def _left(residual: str) -> str:
     """What a formula leaves in the check, in words."""
     if residual == "0":
         return "nothing"
-    return f"nothing but rounding at 50 digits, {residual}" if is_zero(residual) else residual
+    return f"nothing but rounding at 50 digits, {powers(residual)}" if is_zero(residual) else residual

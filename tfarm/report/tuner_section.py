@@ -26,7 +26,7 @@ from tfarm.report.tuner_words import (
     shaping_words,
     short_answer,
 )
-from tfarm.report.words import typeset
+from tfarm.report.words import typeset, upper
 from tfarm.tuner.overview import COARSE, MAP_SEEDS, MAP_TRIALS, NOMINAL, SEEDS, TunerStudy, tuner_study
 
 TITLE = "The gain tuner: does a self-tuning gain help?"
@@ -230,9 +230,9 @@ def _map_picture(data: TunerStudy) -> Picture:
         title="Momentum and learning rate",
         caption=(
             f"Median of the final cost over {MAP_SEEDS} seeds after {MAP_TRIALS} trials; lower is darker. "
-            f"{found.verdict}. {edge}"
+            f"{upper(typeset(found.verdict))}. {edge}"
         ),
-        alt=f"Map of the final cost over momentum and learning rate. {found.verdict}.",
+        alt=f"Map of the final cost over momentum and learning rate. {upper(typeset(found.verdict))}.",
         figure=draw_cost_map(data),
         data=Table(stem="tune-map-data", title="Final cost", is_data=True, columns=columns),
     )

@@ -8,6 +8,7 @@ from tfarm.digits import plain
 
 TYPESET = {
     "theta_t^2": "(dθ/dt)²", "theta_t": "dθ/dt", "phi_xt(0)": "∂φ′(0)/∂t", "L(iw)": "L(iω)", "J w1": "J ω₁",
+    "(alpha_c, eta_c)": "momentum and learning rate",
 }  # fmt: skip
 POWER, MINUS = re.compile(r"\d(?:\.\d+)?e[-+]\d+"), re.compile(r"(?<= )-(?=\w)")
 

@@ -8,9 +8,8 @@ import re
 from markupsafe import Markup, escape
 
 from tfarm.columns import PAGE, Column, Table
-from tfarm.digits import SUPERSCRIPT, unit
+from tfarm.digits import powers, unit
 
-POWER = re.compile(r"(?<![\w.])(\d(?:\.\d+)?)e([-+]?\d{1,2})(?!\w|\.\d)")  # a number as a file has it: 1.8e-9
 WIDE = 44  # characters of a text from which its cell is a wide one
 
 
@@ -60,7 +59,5 @@ def _column(column: Column) -> list[Markup]:
 
 def symbol(text: str) -> Markup:
     """A text with true subscripts and exponents: I_h becomes I<sub>h</sub>, m^2 becomes m², 1e-4 becomes 1 × 10⁻⁴."""
-    plain = POWER.sub(
-        lambda number: f"{number[1]} × 10{str(int(number[2])).translate(SUPERSCRIPT)}", unit(str(escape(text)))
-    )
+    plain = powers(unit(str(escape(text))))
     return Markup(re.sub(r"\b([A-Za-zθ])_([a-z0-9])\b", r"\1<sub>\2</sub>", plain))
