@@ -104,7 +104,7 @@ def odd_options(rng, options):
     if verb == "study":
         arguments += [str(rng.choice(["curves", "map", "nonsense"]))]
     known = options[verb]
-    for _ in range(int(rng.integers(1, 5))):
+    for _ in range(int(rng.integers(1, 5)) if known else 0):  # a verb may have none
         name, is_flag = known[int(rng.integers(len(known)))]
         arguments += [name] if is_flag else [name, str(rng.choice(WORDS))]
     return tuple(arguments)
