@@ -13,6 +13,7 @@ from tests.loop.test_lines import held
 from tests.shared import thinned
 from tfarm import Hub, HubFeedback
 from tfarm.errors import ParameterError
+from tfarm.loop.answers import map_answer
 from tfarm.loop.plant import Loop
 from tfarm.loop.poles import poles_below
 from tfarm.loop.regions import INFINITE, between, region
@@ -127,6 +128,17 @@ def test_a_range_of_k1_that_ends_at_zero_counts_as_one_that_goes_beyond() -> Non
 
 def test_points_are_the_middles_of_equal_parts() -> None:
     assert between(-1.0, 3.0, 4).tolist() == [-0.5, 0.5, 1.5, 2.5]
+
+
+def test_the_answer_holds_the_boundary_inside_the_map_to_its_very_corner() -> None:
+    """Every point of it that lies in the rectangle of the two ranges, and no other."""
+    found = region(LAB, np.linspace(0.0, 20.0, 3), np.linspace(-0.5, 1.5, 3))
+    answer = map_answer(found)
+    K1, K2 = found.boundary[:, 0], found.boundary[:, 1]
+    inside = (K1 >= 0.0) & (K1 <= 20.0) & (K2 >= -0.5) & (K2 <= 1.5)
+    np.testing.assert_array_equal(answer["boundary"], found.boundary[inside])
+    assert (inside & (K1 > 10.0) & (K2 > 0.5)).any()  # in the last square of the grid
+    assert not inside.all()
 
 
 @pytest.mark.parametrize(
