@@ -20,7 +20,7 @@ METADATA: dict[str, dict[str, str | None]] = {
     "png": {"Software": "tfarm"},
 }
 DOTS_PER_INCH = 160
-DRAWN = 3  # decimals of a point (1/72 inch) in an SVG: a 500th of a pixel's width, where matplotlib writes six
+DRAWN = 2  # decimals of a point (1/72 inch) in an SVG: a 60th of a pixel, where matplotlib writes six
 
 
 def save(

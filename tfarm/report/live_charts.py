@@ -134,7 +134,7 @@ def _keyed(names: list[str], colours: list[str]) -> Any:
 
 def _poles() -> Any:
     """Closed-loop poles near the axis on the locus of one gain, with lines of equal damping ratio."""
-    plain = alt.Axis(format="~g")
+    plain = alt.Axis(format=".6~g")
     x = alt.X("re:Q", title="Re s [1/s]", scale=alt.Scale(nice=False), axis=plain)
     y = alt.Y("im:Q", title="Im s [rad/s]", scale=alt.Scale(nice=False), axis=plain)
     names = (
