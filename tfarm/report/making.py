@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future
+from functools import partial
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
@@ -16,7 +17,7 @@ from tfarm.errors import TfarmError
 from tfarm.processes import may_start_processes, shared
 from tfarm.report.card import save_card
 from tfarm.report.given_laws import Subject
-from tfarm.report.live import is_live, save_live
+from tfarm.report.live import is_live, save_live, write_assets
 from tfarm.report.pieces import LAW_PIECES, PIECES, Piece
 from tfarm.report.sections import SavedSection, Section, save_section
 from tfarm.report.trust import Evidence, gather
@@ -30,10 +31,11 @@ ENOUGH = 8  # pieces of work of one arm for which a second process, which takes 
 CARD, CARD_ALONE = "card", "card alone"  # with the proofs of the arm, and without
 LIVE = "live loop"
 FIRST = ("tune", "sampled", "modes", CARD, "locus")  # what takes longest, modes beside the proofs that they share
-EVIDENCE = (-1, "evidence")  # for the page on trust: of no arm
-
 Task = tuple[int, int | str]  # which arm, which piece (or its card and proof)
 Result = SavedSection | Evidence | None
+
+EVIDENCE: Task = (-1, "why trust this")  # of no arm
+SCRIPTS: Task = (-1, "scripts of the live pages")
 
 
 def make_all(
@@ -41,22 +43,27 @@ def make_all(
     folders: Sequence[Path],
     only: tuple[str, ...],
     with_evidence: bool,
+    scripts: tuple[Path, Path] | None,
     progress: Progress | None,
 ) -> tuple[list[list[SavedSection]], Evidence | None]:
-    """The sections of each arm's page, in the order of PIECES, and the evidence if that is asked for."""
-    tasks: list[Task] = [EVIDENCE] * with_evidence
-    tasks += [
-        (i, j)
-        for i, subject in enumerate(subjects)
-        for j, piece in enumerate(pieces_of(subject))
-        if piece.is_for(subject) and (not only or set(only) & set(piece.questions))
-    ]
-    tasks += [(i, LIVE) for i, subject in enumerate(subjects) if not only and is_live(subject)]
-    tasks += [(i, CARD_ALONE if subject.laws and only else CARD) for i, subject in enumerate(subjects)]
+    """The sections of each arm's page, in the order of PIECES, and the evidence if that is asked for.
+
+    `scripts`: the folder that the live pages' scripts are made in, and that which they are for (see `write_assets`).
+    """
+    of_none = [EVIDENCE] * with_evidence + [SCRIPTS] * (scripts is not None)
+    tasks = [*of_none, *_tasks(subjects, only)]
     done: dict[Task, Result] = {}
     if progress is not None:
         progress(0, len(tasks), _name_of(subjects, tasks[0]) if tasks else "nothing to make")
-    for task, section in _results(subjects, folders, tasks):
+
+    def work(task: Task) -> Callable[[], Result]:
+        if task == EVIDENCE:
+            return gather
+        if task == SCRIPTS and scripts is not None:
+            return partial(write_assets, *scripts)
+        return partial(make, subjects[task[0]], task[1], folders[task[0]])
+
+    for task, section in _results(subjects, tasks, work):
         done[task] = section
         if progress is not None:
             progress(len(done), len(tasks), _name_of(subjects, task))
@@ -66,18 +73,28 @@ def make_all(
     return sections, evidence if isinstance(evidence, Evidence) else None
 
 
+def _tasks(subjects: Sequence[Subject], only: tuple[str, ...]) -> Iterator[Task]:
+    """What is to be made of each arm."""
+    for i, subject in enumerate(subjects):
+        for j, piece in enumerate(pieces_of(subject)):
+            if piece.is_for(subject) and (not only or set(only) & set(piece.questions)):
+                yield i, j
+        if not only and is_live(subject):
+            yield i, LIVE
+        yield i, CARD_ALONE if subject.laws and only else CARD
+
+
 def _results(
-    subjects: Sequence[Subject], folders: Sequence[Path], tasks: Sequence[Task]
+    subjects: Sequence[Subject], tasks: Sequence[Task], work: Callable[[Task], Callable[[], Result]]
 ) -> Iterator[tuple[Task, Result]]:
     """Each task with its result as it comes: here, or by two processes where there is work for them."""
     if not tasks or (len(subjects) == 1 and len(tasks) < ENOUGH) or WORKERS == 1 or not may_start_processes():
         for task in tasks:
-            yield task, make(subjects[task[0]], task[1], folders[task[0]])
+            yield task, work(task)()
         return
 
     def submit(pool: Executor, task: Task) -> Future[Result]:
-        i, piece = task
-        return pool.submit(make, subjects[i], piece, folders[i])
+        return pool.submit(work(task))
 
     yield from shared(_by_arm(subjects, tasks), submit, WORKERS, [__name__])
 
@@ -94,8 +111,6 @@ def _by_arm(subjects: Sequence[Subject], tasks: Sequence[Task]) -> list[list[Tas
 
 
 def make(subject: Subject, piece: int | str, folder: Path) -> Result:
-    if piece == EVIDENCE[1]:
-        return gather()
     if piece == LIVE:
         save_live(subject, folder)
         return None
@@ -124,7 +139,7 @@ def _section(piece: Piece, subject: Subject) -> Section:
 
 def _name_of(subjects: Sequence[Subject], task: Task) -> str:
     piece = task[1]
-    if task == EVIDENCE:
-        return "why trust this"
+    if task in (EVIDENCE, SCRIPTS):
+        return str(piece)
     subject = subjects[task[0]]
     return f"{subject.arm.name}: {piece if isinstance(piece, str) else pieces_of(subject)[piece].name}"

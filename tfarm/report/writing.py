@@ -18,7 +18,7 @@ from tfarm.report.card import written_cards
 from tfarm.report.frame import beside
 from tfarm.report.given_laws import GivenLaw, Subject, check_laws
 from tfarm.report.kept import COMPARISON, kept_comparison
-from tfarm.report.live import ASSETS, PAGE, has_assets, is_live, write_assets
+from tfarm.report.live import ASSETS, PAGE, has_assets, is_live
 from tfarm.report.making import Progress, make_all
 from tfarm.report.page import QUESTIONS, arm_page, file_of, index_page
 from tfarm.report.sections import SavedSection
@@ -118,15 +118,16 @@ def _written(
     for folder in folders:
         folder.mkdir()
     evidence = None if only or force else kept_evidence(out / FOLDER)
-    sections, gathered = make_all(changed, folders, only or (), not only and evidence is None, progress)
+    wants_scripts = not only and any(map(is_live, subjects)) and bool(changed or not has_assets(out / ASSETS))
+    scripts = (beside / ASSETS, out / ASSETS) if wants_scripts else None
+    sections, gathered = make_all(changed, folders, only or (), not only and evidence is None, scripts, progress)
     for subject, folder, parts in zip(changed, folders, sections, strict=True):
         _write_pages(subject, folder, parts, only, trust, out / subject.arm.name)
         failures = list(_failures(subject.arm, parts))
         told += failures
         done = () if failures else _pages(only)
         note_made(folder, out / subject.arm.name, done, key_of(subject, _leads(trust, out, subject.arm)))
-    if not only and any(map(is_live, subjects)) and (changed or not has_assets(out / ASSETS)):
-        write_assets(beside / ASSETS, out / ASSETS)
+    if wants_scripts:
         move_into(beside / ASSETS, out / ASSETS)
     for subject, folder in zip(changed, folders, strict=True):
         move_into(folder, out / subject.arm.name)
