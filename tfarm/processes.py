@@ -66,7 +66,7 @@ def load_beforehand(modules: Sequence[str]) -> BaseContext:
     if not LOADS_ONCE:
         return get_context("spawn")
     context = get_context("forkserver")
-    context.set_forkserver_preload(list(modules))
+    context.set_forkserver_preload([*modules, "tfarm.frozen"])
     with _deaf_to_interrupts():
         forkserver.ensure_running()
     return context

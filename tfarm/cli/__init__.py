@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import atexit
+import gc
 import os
 import sys
 
@@ -13,6 +15,8 @@ def main(arguments: list[str] | None = None) -> None:
     unless the user chose a number: on matrices of a hundred rows more only wait for each other.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    if arguments is None:
+        atexit.register(gc.freeze)  # a last look through all that was loaded takes half a second, and frees nothing
     try:
         from tfarm.cli.running import run
 

@@ -30,7 +30,7 @@ WORKERS = 2
 ENOUGH = 8  # pieces of work of one arm for which a second process, which takes a second or two to start, is worth it
 CARD, CARD_ALONE = "card", "card alone"  # with the proofs of the arm, and without
 LIVE = "live loop"
-FIRST = ("tune", "sampled", "modes", CARD, "locus")  # what takes longest, modes beside the proofs that they share
+FIRST = ("tune", "sampled", "locus", "modes", CARD)  # what takes longest, modes beside the proofs that they share
 Task = tuple[int, int | str]  # which arm, which piece (or its card and proof)
 Result = SavedSection | Evidence | None
 
