@@ -26,6 +26,7 @@ from tfarm.dsp.band import band_of
 from tfarm.dsp.circle import Circle
 from tfarm.dsp.margins import most_modes, whole_loop
 from tfarm.dsp.shown import Edge, shown_windows
+from tfarm.dsp.verdict import settled
 from tfarm.errors import ConvergenceError
 from tfarm.spectrum import continuation, damped, modes
 from tfarm.spectrum.damped import damped_modes
@@ -243,6 +244,18 @@ def test_digits_are_found_by_bisection():
         ends = {n: (float(f"{np.pi:.{n}g}"), 0.5 * 10.0 ** (1 - n)) for n in range(2, 7)}
         hold = [n for n, (at, half) in ends.items() if (below(at - half)[0], below(at + half)[0]) == (True, False)]
         assert figure.digits == max(hold, default=0)
+
+
+@pytest.mark.parametrize("K2", [0.3, 1.3])
+@pytest.mark.parametrize("counted", ["as they are", "not", "otherwise"])
+def test_only_a_count_on_the_circle_that_the_poles_agree_with_settles(lab, K2, counted):
+    """Stable and unstable: none to be had, or one of the other kind, settles nothing, and the poles speak."""
+    gains = HubFeedback(K1=0.3, K2=K2)
+    there = int((abs(sampled_loop(lab, gains).eigenvalues) > 1).sum())
+    count = {"as they are": there, "not": None, "otherwise": 0 if there else 1}[counted]
+    verdict = settled(whole_loop(lab, gains, Chain()), lambda band: count)
+    assert verdict.is_settled is (counted == "as they are")
+    assert verdict.is_stable is (there == 0)
 
 
 def test_without_damping_nothing_is_settled(lossless):
