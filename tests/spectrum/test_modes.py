@@ -21,6 +21,7 @@ from tfarm.exact import balls
 from tfarm.exact.coefficients import coefficients
 from tfarm.spectrum import PARAMETERS
 from tfarm.spectrum.precise import refine
+from tfarm.spectrum.table import flexible_frequencies
 
 EPS = np.finfo(float).eps
 COUNT = 10
@@ -282,3 +283,12 @@ def test_memory_does_not_grow_with_the_square_of_the_count(monkeypatch):
         for ours, theirs in zip(found, expected, strict=True):
             np.testing.assert_allclose(ours[:41], theirs, rtol=1e-12)  # rounding of sums over 40 modes' points
     assert peaks[1] < 2.5 * peaks[0]
+
+
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_flexible_frequencies_below_are_the_first_ones_of_the_table(count):
+    """Half way between two of them, as many as lie below: none, one, two, the rigid body not among them."""
+    lab = tfarm.load("sasaki2012-lab")
+    w = tfarm.modes(lab, 4).natural_frequency
+    found = flexible_frequencies(lab, float(w[count] + w[count + 1]) / 2)
+    np.testing.assert_array_equal(found, w[1 : count + 1])
