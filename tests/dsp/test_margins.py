@@ -146,6 +146,17 @@ def test_the_required_damping_is_where_the_verdict_turns(lossless):
     assert not at((1 - 4e-6) * C).is_stable
 
 
+@pytest.mark.parametrize("gain", ["K1", "K2"])
+def test_at_a_crossing_the_closed_loop_matrix_has_an_eigenvalue_at_its_angle(lab, gain):
+    """Not only the gain of a crossing is right, but the place on the circle, too."""
+    loop = sampled_loop(lab, GAINS, count=6)
+    found = crossings(circle_grid(loop), gain, GAINS)
+    assert found.gain.size > 3
+    for value, angle in zip(found.gain.tolist(), found.at.tolist(), strict=True):
+        eigenvalues = loop.having(**{gain: value}).eigenvalues
+        assert abs(eigenvalues - np.exp(1j * angle)).min() < 1e-6
+
+
 def test_the_region_is_upright_where_intervals_of_the_rate_gain_end(lab):
     """Stable on one side of each end, not on the other, by the eigenvalues at one of the gains that were looked at."""
     loop = sampled_loop(lab, GAINS, count=14)
