@@ -6,13 +6,13 @@ import pytest
 import tfarm
 from tfarm.plots.frequency import broken, draw_bode, magnitude, magnitude_limits, phase
 from tfarm.plots.style import blank, style
-from tfarm.response.frequency import band_of, bode
+from tfarm.response.frequency import bode, resonant_band
 
 
 @pytest.fixture(scope="module")
 def data():
     arm = tfarm.load("sasaki2012")
-    return bode(arm, "root_moment", band_of(arm, 4))
+    return bode(arm, "root_moment", resonant_band(arm, 4))
 
 
 @pytest.fixture

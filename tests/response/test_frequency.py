@@ -9,7 +9,7 @@ from scipy.optimize import minimize_scalar
 
 import tfarm
 from tests.shared import thinned
-from tfarm.response.frequency import PER_DECADE, band_of, bode, refined_grid, without_cancelled
+from tfarm.response.frequency import EVEN_PER_DECADE, bode, refined_grid, resonant_band, without_cancelled
 
 UNDAMPED = tfarm.load("sasaki2012")
 STOCKY = tfarm.load("stocky-steel")
@@ -20,7 +20,7 @@ def damped(C, arm=UNDAMPED):
 
 
 def response(arm, output, count=7):
-    return bode(arm, output, band_of(arm, count - 1))
+    return bode(arm, output, resonant_band(arm, count - 1))
 
 
 def extreme_near(G, root, sign):
@@ -61,7 +61,7 @@ def test_the_grid_is_dense_away_from_roots_and_holds_none_on_the_axis():
     data = response(UNDAMPED, "root_moment")
     step = np.diff(np.log10(data.omega))
     assert (step > 0).all()
-    assert step.max() <= 1.0001 / PER_DECADE
+    assert step.max() <= 1.0001 / EVEN_PER_DECADE
     for root in (*data.infinite, *data.vanishing):
         gap = abs(data.omega / root - 1)
         assert 1e-9 < gap.min() < 2e-6

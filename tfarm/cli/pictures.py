@@ -77,9 +77,9 @@ def _band(arm: Arm, start: float | None, stop: float | None) -> tuple[float, flo
     """The band [rad/s] that is asked for, an end that is not given as a page has it; None for the page's own."""
     if start is None and stop is None:
         return None
-    from tfarm.response.frequency import band_of
+    from tfarm.response.frequency import resonant_band
 
-    low, high = band_of(arm)
+    low, high = resonant_band(arm)
     low, high = low if start is None else start, high if stop is None else stop
     if not 0 < low < math.inf:
         raise ParameterError(key="--from", value=low, remedy="a positive frequency in rad/s")

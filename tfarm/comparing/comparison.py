@@ -25,7 +25,7 @@ from tfarm.loop.law_map import LawMap, law_map
 from tfarm.loop.margins import Margins, dense
 from tfarm.loop.regions import Region, between, ranges_of, region
 from tfarm.records import record
-from tfarm.response.frequency import Bode, band_of, bode
+from tfarm.response.frequency import Bode, bode, resonant_band
 from tfarm.spectrum import Modes, damped_modes
 from tfarm.spectrum import modes as modes_of
 from tfarm.spectrum.scales import default_gains
@@ -133,7 +133,7 @@ class Comparison:
     @cached_property
     def responses(self) -> tuple[Bode, Bode]:
         """The exact response of both arms over one band, which holds ten flexible modes of each."""
-        bands = [band_of(side.arm) for side in self.sides]
+        bands = [resonant_band(side.arm) for side in self.sides]
         band = min(low for low, _ in bands), max(high for _, high in bands)
         first, second = (bode(side.arm, self.output, band) for side in self.sides)
         return first, second

@@ -24,7 +24,7 @@ from tfarm.dsp.chain import Chain
 from tfarm.errors import ParameterError
 from tfarm.records import record
 from tfarm.reduced import ModalModel, modal_model
-from tfarm.reduced.remainder import OVERDAMPED, slow_remainder
+from tfarm.reduced.remainder import SLOW_POLES_FROM, slow_remainder
 from tfarm.response import transfer
 from tfarm.spectrum import DampedModes, Modes
 from tfarm.spectrum.damped import all_damped_modes
@@ -138,7 +138,7 @@ def with_modes(model: ModalModel, chain: Chain, outputs: Sequence[str], count: i
         return damped
 
     plant, C = replace(plant, model=model), model.arm.damping
-    if C * some.natural_frequency.max(initial=0.0) < OVERDAMPED:
+    if C * some.natural_frequency.max(initial=0.0) < SLOW_POLES_FROM:
         return plant
     corners, shares = slow_remainder(C, lambda s: values(s) - np.array([plant(each) for each in s]).T)
     return replace(

@@ -13,10 +13,10 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from tfarm.arm import FED_BACK, Arm, HubFeedback
+from tfarm.arm.blocks import Matrices
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 from tfarm.reduced import ModalModel, modal_model
-from tfarm.reduced.partial_fractions import Matrices
 from tfarm.spectrum import modes
 
 from .locus import Locus

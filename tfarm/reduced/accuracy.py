@@ -2,7 +2,7 @@
 
 The norm is finite at zeros and at poles of G.  Between samples the error moves on the scale of the exact poles, of the
 zeros of G and of G', and of the model's own poles; so the samples crowd there, and every high local maximum is then
-closed in on.  What is printed is the largest value found, and a little more (`MARGIN`, tuned on random arms).
+closed in on.  What is printed is the largest value found, and a little more (`FOUND_TO_WORST`, tuned on random arms).
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from .partial_fractions import PartialFractions
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
-MARGIN = 1.02
-ROUNDING = 1e-14  # what the exact values themselves may be off, in the same norm
-EPS = 4 * float(np.finfo(float).eps)  # of the terms of a model, which cancel where G is small: rounding in their sum
-AT_A_POLE = 1e-12  # nearer to a pole nothing new happens, and nothing can be evaluated on it
-CROWD = 10.0 ** -np.arange(1, 8)
-PER_DECADE = 60
-MOST_PEAKS = 12
+FOUND_TO_WORST = 1.02  # times the worst that was found: tuned on random arms
+EXACT_ROUNDING = 1e-14  # what the exact values themselves may be off, in the same norm
+TERM_ROUNDING = 4 * float(np.finfo(float).eps)  # of a model's terms, which cancel where G is small, in their sum
+CLEAR_OF_POLES = 1e-12  # nearer to a pole nothing new happens, and nothing can be evaluated on it
+POLE_DISTANCES = 10.0 ** -np.arange(1, 8)  # of samples from a pole, as shares of its frequency: tuned on random arms
+SAMPLES_PER_DECADE = 60  # of the even grid: tuned on random arms
+MOST_PEAKS = 12  # local maxima of the error that are closed in on, the highest first
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class Ruler:
                 if found[top[best], best] > worst[row]:
                     worst[row], at[row] = found[top[best], best], inner[top[best], best]
                 low, high = inner[np.maximum(top - 1, 0), columns], inner[np.minimum(top + 1, 16), columns]
-        return Accuracy(worst * MARGIN + ROUNDING, at)
+        return Accuracy(worst * FOUND_TO_WORST + EXACT_ROUNDING, at)
 
     def _brackets(self, error: Real) -> tuple[Real, Real]:
         """The samples on either side of each high local maximum."""
@@ -105,7 +105,7 @@ class Ruler:
 
     def _dips(self, w: Real) -> Real:
         """Points around the dips of |G| and |G'|, where the norm is small on one side."""
-        slopes = slope(self.G, w, self._poles)
+        slopes = axis_slope(self.G, w, self._poles)
         dips = [
             np.flatnonzero((size[1:-1] < size[:-2]) & (size[1:-1] < size[2:])) + 1
             for size in abs(np.concatenate([self.G(1j * w), slopes]))
@@ -117,15 +117,15 @@ class Ruler:
         return w[self._is_clear(w)]
 
     def _is_clear(self, w: Real) -> NDArray[np.bool_]:
-        return distance(w, self._poles) > AT_A_POLE * w
+        return distance(w, self._poles) > CLEAR_OF_POLES * w
 
 
 def norm(G: TransferFunction, w: Real, values: Complex, poles: Real) -> Real:
     """|G| + |w dG/dw| (outputs, w) on the imaginary axis, given G(i w)."""
-    return abs(values) + abs(w * slope(G, w, poles))
+    return abs(values) + abs(w * axis_slope(G, w, poles))
 
 
-def slope(G: TransferFunction, w: Real, poles: Real) -> Complex:
+def axis_slope(G: TransferFunction, w: Real, poles: Real) -> Complex:
     """dG/ds (outputs, w) at i w; along the arm by differences across the axis, short against the nearest frequency."""
     if all(each.is_at_end for each in G.rows):
         return np.atleast_2d(G.derivative(1j * w))
@@ -147,9 +147,9 @@ def frequencies_around(arm: Arm, high: float) -> Real:
 
 
 def _samples(low: float, high: float, poles: Real) -> Real:
-    """Even in frequency and in its logarithm, between neighbouring poles, and crowded around each."""
-    count = 200 + int(PER_DECADE * np.log10(high / low))
-    crowd = np.concatenate([poles[:, None] * (1 - CROWD), poles[:, None] * (1 + CROWD)]).ravel()
+    """Frequencies even by themselves and in their logarithm, between neighbouring poles, and crowded around each."""
+    count = 200 + int(SAMPLES_PER_DECADE * np.log10(high / low))
+    crowd = np.concatenate([poles[:, None] * (1 - POLE_DISTANCES), poles[:, None] * (1 + POLE_DISTANCES)]).ravel()
     knots = np.r_[low, poles[(poles > low) & (poles < high)], high]
     share = (1 - np.cos(np.linspace(0, np.pi, 26)[1:-1])) / 2
     between = (knots[:-1, None] + np.diff(knots)[:, None] * share).ravel()
@@ -160,5 +160,5 @@ def _samples(low: float, high: float, poles: Real) -> Real:
 
 def _errors(model: PartialFractions, w: Real, exact: Complex, size: Real) -> Real:
     """|dG|, and what rounding a state space adds to it, over the norm; none for an output that is zero throughout."""
-    gap = abs(model(1j * w) - exact) + EPS * model.magnitude(1j * w)
+    gap = abs(model(1j * w) - exact) + TERM_ROUNDING * model.magnitude(1j * w)
     return np.divide(gap, size, out=np.where(gap > 0, np.inf, 0.0), where=size > 0)

@@ -19,7 +19,7 @@ from tfarm.errors import ParameterError
 from tfarm.files import write_file
 from tfarm.response import transfer
 
-from .accuracy import AT_A_POLE, distance, frequencies_around
+from .accuracy import CLEAR_OF_POLES, distance, frequencies_around
 from .reduction import ReducedModel
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 MAT_HEADER = b"MATLAB 5.0 MAT-file, written by tfarm"  # SciPy's own has the date in it: same inputs, same bytes
 WRITTEN_BY = ": written by tfarm."  # ends the first line of every script
-POINTS = 1000
+MAT_POINTS = 1000  # of the exact response in the file, even in ln w
 
 
 def transfer_function(reduced: ReducedModel) -> control.TransferFunction:
@@ -126,8 +126,8 @@ def _loads(path: Path) -> str:
 def _contents(reduced: ReducedModel) -> dict[str, Any]:
     A, B, C, D = reduced.matrices()
     model = reduced.model
-    omega = np.geomspace(*reduced.band, POINTS)
-    omega = omega[distance(omega, frequencies_around(model.arm, reduced.band[1])) > AT_A_POLE * omega]
+    omega = np.geomspace(*reduced.band, MAT_POINTS)
+    omega = omega[distance(omega, frequencies_around(model.arm, reduced.band[1])) > CLEAR_OF_POLES * omega]
     response = transfer(model.arm, model.rows, x=model.x)(1j * omega)
     return {
         "A": A,

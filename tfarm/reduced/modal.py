@@ -34,7 +34,7 @@ from .residues import contour_residues, end_residues, undamped_residues
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 Real = NDArray[np.float64]
-MOST_MODES = 1000
+MOST_MODELLED = 1000  # of a model: its matrices of 2000 states take 32 MB
 MOST_PROPER = 2  # power of s: a mode's share r s^2/(s^2 + w^2) is bounded, and one of s^3 is not
 
 
@@ -71,7 +71,7 @@ def modal_model(
     Raises ParameterError for an unknown output, a count out of range, and an output that grows with s without bound.
     """
     G = transfer(arm, outputs, x=x)
-    count = whole("count", count, 0, MOST_MODES, f"a whole number of flexible modes, 0 to {MOST_MODES}")
+    count = whole("count", count, 0, MOST_MODELLED, f"a whole number of flexible modes, 0 to {MOST_MODELLED}")
     k, share = G.system, 0.0 if x is None else x / arm.length
     wanted = [proper(k, each, share) for each in G.rows]
     table = modes(arm, max(1, int(count)))
@@ -137,12 +137,6 @@ def slow_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None) ->
     )
 
 
-def _of_torque(arm: Arm) -> Arm:
-    """The rig without anything that dissipates, driven by a torque."""
-    clamp, joint = replace(arm.clamp, damping=0.0), replace(arm.joint, damping=0.0)
-    return replace(arm.elastic.lossless_hub, clamp=clamp, joint=joint, input="hub_torque")
-
-
 def tailed_model(arm: Arm, count: int) -> ModalModel:
     """The modal model of what a law feeds back, with one pair of poles more in the place of all modes left out.
 
@@ -151,8 +145,11 @@ def tailed_model(arm: Arm, count: int) -> ModalModel:
     Where a law changes what the hub weighs few modes do then: those of a free hub make up a clamped one but slowly.
     The root moment of a rig agrees at s = w, too, its hub inertia being no longer all that stands before the gauge.
     """
-    model, whole_rig = modal_model(arm, FED_BACK, count), () if arm.is_uniform else ("root_moment",)
-    undamped = modal_model(arm.elastic if arm.is_uniform else _of_torque(arm), ("hub_angle", *whole_rig), count)
+    model, lossless = modal_model(arm, FED_BACK, count), arm.elastic
+    if not arm.is_uniform:  # without anything that dissipates, driven by a torque
+        clamp, joint = replace(arm.clamp, damping=0.0), replace(arm.joint, damping=0.0)
+        lossless = replace(lossless.lossless_hub, clamp=clamp, joint=joint, input="hub_torque")
+    undamped = modal_model(lossless, ("hub_angle",) if arm.is_uniform else ("hub_angle", "root_moment"), count)
     s, whole = float(undamped.natural_frequency[-1]), float(undamped.static[0])
     fallen, *others = (undamped(s) - transfer(undamped.arm, undamped.outputs)(s)).real.tolist()
     if not 0 < fallen < whole:  # what is left out drowns in rounding
@@ -198,15 +195,19 @@ def _poles_and_residues(
 ) -> tuple[Complex, Complex, Real, Real]:
     """Eigenvalues (n, 2) and residues (outputs, n, 2) at them; single real ones (m,) and theirs (outputs, m)."""
     none = np.empty(0), np.empty((len(wanted), 0))
-    if arm.is_undamped and not arm.input_lags:
+    if arm.is_undamped:
         s = 1j * table.natural_frequency[table.index > 0]
-        powers = np.array([[each.power] for each in wanted])
-        upper = undamped_residues(table, wanted, k, share) * s**powers / (2 * s)
-        return np.stack([s, s.conj()], axis=1), np.stack([upper, upper.conj()], axis=2), *none
-    p, single = _eigenvalues(arm, table, branches)
-    along = isinstance(k, Coefficients) and any(not each.is_at_end for each in wanted)
+        p = np.stack([s, s.conj()], axis=1)
+        if not arm.input_lags:
+            powers = np.array([[each.power] for each in wanted])
+            upper = undamped_residues(table, wanted, k, share) * s**powers / (2 * s)
+            return p, np.stack([upper, upper.conj()], axis=2), *none
+        single = np.array(single_zeros(table, 1.0))  # of the motor's circuit
+    else:
+        damped = branches(table)
+        p, single = damped.eigenvalues[table.index > 0], damped.single
     residues, doubtful = end_residues(k, wanted, p.ravel(), share)
-    doubtful = doubtful | along
+    doubtful = doubtful | (isinstance(k, Coefficients) and any(not each.is_at_end for each in wanted))
     if doubtful.any():
         residues[:, doubtful] = contour_residues(k, wanted, p.ravel()[doubtful], share)
     residues = residues.reshape(len(wanted), *p.shape)
@@ -219,12 +220,3 @@ def _poles_and_residues(
     at = single.astype(complex)
     alone = contour_residues(k, wanted, at, share) if apart else end_residues(k, wanted, at, share)[0]
     return p, residues, single, alone.real.astype(float)
-
-
-def _eigenvalues(arm: Arm, table: Modes, branches: Callable[[Modes], DampedModes]) -> tuple[Complex, Real]:
-    """Those of the flexible modes (n, 2), and single real ones (m,): of an undamped rig its circuit's alone."""
-    if arm.is_undamped:
-        s = 1j * table.natural_frequency[table.index > 0]
-        return np.stack([s, s.conj()], axis=1), np.array(single_zeros(table, 1.0))
-    damped = branches(table)
-    return damped.eigenvalues[table.index > 0], damped.single

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tfarm.arm import Arm
+from tfarm.arm.blocks import Matrices
 from tfarm.errors import ParameterError
 from tfarm.exact.outputs import Output
 from tfarm.records import record
@@ -18,9 +19,8 @@ if TYPE_CHECKING:
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
-Matrices = tuple[Real, Real, Real, Real]
 
-BLOCK = 1 << 18  # entries of (poles, s) held at a time
+TERMS_AT_ONCE = 1 << 18  # entries of (poles, s) held at a time
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,7 +103,7 @@ class PartialFractions:
         """Values (outputs, *s.shape) at complex s [1/s].  Raises ParameterError at a pole of the model."""
         points = np.asarray(s, dtype=complex)
         flat, values = points.ravel(), np.empty((len(self.outputs), points.size), complex)
-        step = max(1, BLOCK // max(1, self.index.size))
+        step = max(1, TERMS_AT_ONCE // max(1, self.index.size))
         for start in range(0, flat.size, step):
             values[:, start : start + step] = self._values(flat[start : start + step])
         return values.reshape(len(self.outputs), *points.shape)

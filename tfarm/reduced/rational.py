@@ -26,17 +26,17 @@ from tfarm.response import TransferFunction, Wanted, transfer
 from tfarm.spectrum import modes_below
 
 from .accuracy import distance, frequencies_around, norm
-from .modal import MOST_MODES, modal_model
+from .modal import MOST_MODELLED, modal_model
 from .partial_fractions import PartialFractions
 
 Real = NDArray[np.float64]
 
-CLEAR = 1.02  # modes up to so much above the band's end are taken exactly: a pole nearer to the band would show
-POINTS = 300
-NOISE = 1e-10  # relative; a pole whose imaginary part is below it is real
+BEYOND_BAND = 1.02  # modes up to so much above the band's end are taken exactly: a pole nearer to the band would show
+REMAINDER_POINTS = 300  # of the band, denser towards its end, where poles above it show most
+REAL_SQUARE = 1e-10  # relative; a pole whose imaginary part is below it is real
 PATIENCE = 3  # degrees without progress, after which rounding rules
-ENOUGH = 5e-14  # errors below this are all alike
-FLOOR = 1e-14  # a weighted error below this is rounding; more poles would fit noise
+ERRORS_ALIKE = 5e-14  # errors below this are all alike
+ERROR_FLOOR = 1e-14  # a weighted error below this is rounding; more poles would fit noise
 
 
 class RationalModel(PartialFractions):
@@ -60,9 +60,10 @@ class _Remainders:
 
 def modes_in(arm: Arm, high: float) -> int:
     """How many modes a model for frequencies up to `high` [rad/s] takes exactly.  Raises ParameterError over 1000."""
-    count = modes_below(arm, CLEAR * high)
-    if count > MOST_MODES:
-        raise ParameterError(key="band", value=high, remedy=f"{count} modes lie below it, over {MOST_MODES}; lower it")
+    count = modes_below(arm, BEYOND_BAND * high)
+    if count > MOST_MODELLED:
+        remedy = f"{count} modes lie below it, over {MOST_MODELLED}; lower it"
+        raise ParameterError(key="band", value=high, remedy=remedy)
     return count
 
 
@@ -88,7 +89,7 @@ def rational_model(arm: Arm, outputs: Wanted, pairs: int, high: float, x: float 
         inside = modal_model(arm, G.rows, exact, x)
         rest = _remainders(G, inside, high, frequencies)
         poles, shares, error = _best_poles(rest, pairs - exact)
-        found.append(((max(error, ENOUGH), -exact - poles.size), _assembled(inside, rest, poles, shares)))
+        found.append(((max(error, ERRORS_ALIKE), -exact - poles.size), _assembled(inside, rest, poles, shares)))
         if exact + poles.size == pairs:
             break
         exact = pairs - poles.size
@@ -98,14 +99,15 @@ def rational_model(arm: Arm, outputs: Wanted, pairs: int, high: float, x: float 
 def _remainders(G: TransferFunction, inside: PartialFractions, high: float, frequencies: Real) -> _Remainders:
     """Samples over the band.  Below high/100 the point S = 0 says all there is to say."""
     k, share = G.system, 0.0 if G.x is None else G.x / G.arm.length
-    w = high * np.sin(np.linspace(0.01, np.pi / 2, POINTS))
+    w = high * np.sin(np.linspace(0.01, np.pi / 2, REMAINDER_POINTS))
     w = w[distance(w, frequencies) > 1e-9 * w]
     S, power = -(w**2), np.array([[each.power] for each in G.rows])
     bases = [each.base for each in G.rows]
     at_zero = np.array(expansions_at_zero(k, bases, share))
     by_S = ((at_zero[:, 0] != 0) | (power[:, 0] > 0))[:, None]
     square = inside.natural_frequency**2
-    r = _residues_in_S(inside, power)
+    p = inside.eigenvalues[:, 0]
+    r = (inside.residues[..., 0] * 2 * p / p**power).real  # of each output over its power of s, in the variable S
     values = G(1j * w)
     base = (values / (1j * w) ** power).real
     shared = 1 / (S + square[:, None])
@@ -118,12 +120,6 @@ def _remainders(G: TransferFunction, inside: PartialFractions, high: float, freq
         F[same], weight[same] = F[same[0]], weight[same].max(axis=0)
     beyond = max(high, inside.natural_frequency.max(initial=0.0))
     return _Remainders(S, F, weight, by_S[:, 0], beyond)
-
-
-def _residues_in_S(model: PartialFractions, power: NDArray[Any]) -> Real:
-    """Residues (outputs, n) in the variable S of each output over s^power."""
-    p = model.eigenvalues[:, 0]
-    return (model.residues[..., 0] * 2 * p / p**power).real
 
 
 def _best_poles(rest: _Remainders, most: int) -> tuple[Real, Real, float]:
@@ -139,16 +135,23 @@ def _best_poles(rest: _Remainders, most: int) -> tuple[Real, Real, float]:
         idle += 1
         if error < least:
             best, least, idle = (np.sqrt(square), shares), error, 0
-        if least < FLOOR or idle == PATIENCE:
+        if least < ERROR_FLOOR or idle == PATIENCE:
             break
     return *best, least
 
 
 def _checked(rest: _Remainders, square: Real) -> tuple[Real, Real]:
-    """The poles without those whose residue in the hub's own output has the wrong sign, and the shares of the rest."""
+    """The poles without those whose residue in the hub's own output has the wrong sign, and the shares of the rest.
+
+    Shares (outputs, poles) by weighted least squares for each output.
+    """
     sign = 1.0 if rest.by_S[0] else -1.0
     while True:
-        shares = _fitted(rest, square)
+        basis, shares = _basis(rest, square), np.empty((len(rest.F), square.size))
+        for row, (F, weight) in enumerate(zip(rest.F, rest.weight, strict=True)):
+            columns = basis * weight[:, None]
+            size = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
+            shares[row] = np.linalg.lstsq(columns / size, F * weight)[0] / size
         wrong = np.flatnonzero(sign * shares[0] < 0)
         if not wrong.size:
             return square, shares
@@ -157,16 +160,6 @@ def _checked(rest: _Remainders, square: Real) -> tuple[Real, Real]:
 
 def _basis(rest: _Remainders, square: Real) -> Real:
     return rest.S[:, None] / (rest.S[:, None] + square)
-
-
-def _fitted(rest: _Remainders, square: Real) -> Real:
-    """Weighted least squares for each output, poles given: (outputs, poles)."""
-    basis, shares = _basis(rest, square), np.empty((len(rest.F), square.size))
-    for row, (F, weight) in enumerate(zip(rest.F, rest.weight, strict=True)):
-        columns = basis * weight[:, None]
-        size = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
-        shares[row] = np.linalg.lstsq(columns / size, F * weight)[0] / size
-    return shares
 
 
 def aaa_poles(S: Real, F: Real, weight: Real, degree: int) -> Iterator[Real]:
@@ -190,7 +183,7 @@ def aaa_poles(S: Real, F: Real, weight: Real, degree: int) -> Iterator[Real]:
         error = np.zeros_like(F)
         error[:, others] = abs(fit - F[:, others]) * weight[:, others]
         poles = -_zeros_of_denominator(S[support], w) * unit
-        yield np.sort(poles.real[(abs(poles.imag) <= NOISE * abs(poles)) & (poles.real > 0)])
+        yield np.sort(poles.real[(abs(poles.imag) <= REAL_SQUARE * abs(poles)) & (poles.real > 0)])
 
 
 def _zeros_of_denominator(nodes: Real, weights: Real) -> NDArray[Any]:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tfarm.arm import Arm
+from tfarm.arm.blocks import Matrices
 from tfarm.arm.checks import whole
 from tfarm.errors import MISSING, ConvergenceError, ParameterError
 from tfarm.exact.outputs import Output
@@ -22,23 +23,23 @@ from tfarm.records import record
 from tfarm.response import Wanted, transfer
 from tfarm.spectrum import modes
 
-from .accuracy import ROUNDING, Ruler
+from .accuracy import EXACT_ROUNDING, Ruler
 from .modal import modal_model, relaxed_model, slow_model
-from .partial_fractions import Complex, Matrices, PartialFractions
+from .partial_fractions import Complex, PartialFractions
 from .rational import modes_in, rational_model
-from .remainder import OVERDAMPED, SLOW_PAIRS
+from .remainder import SLOW_PAIRS, SLOW_POLES_FROM
 
 if TYPE_CHECKING:
     import control
 
 Real = NDArray[np.float64]
-Method = Literal["modal", "aaa"]
+Reduction = Literal["modal", "aaa"]
 
-BAND = (0.1, 1000.0)
-MOST_ORDER = 400
-MOST_TAILS = 12  # pairs of poles above the band; more fit rounding
-FALLS = 0.5  # of the error, or more, goes with 2.25 times the modes, even where it falls as 1/n; less is its floor
-SAME = 1e-6  # relative gap within which a pole of the model is a mode of the arm
+BAND = (0.1, 1000.0)  # rad/s, unless told
+MOST_STATES = 400  # states: where the search for a model within an error ends
+MOST_TAILS = 12  # pairs of poles above the band: more fit rounding
+LEAST_FALL = 0.5  # of the error, or more, goes with 2.25 times the modes, even where it falls as 1/n; less is its floor
+POLE_IS_MODE = 1e-6  # relative gap within which a pole of the model is a mode of the arm
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,7 @@ class ReducedModel:
     """
 
     model: PartialFractions
-    method: Method
+    method: Reduction
     band: tuple[float, float]
     errors: Real
     worst_at: Real
@@ -116,7 +117,7 @@ def reduce(
     *,
     order: int | None = None,
     error: float | None = None,
-    method: Method | None = None,
+    method: Reduction | None = None,
     band: tuple[float, float] = BAND,
     x: float | None = None,
 ) -> ReducedModel:
@@ -133,7 +134,7 @@ def reduce(
     low, high = _band(band)
     if len(set(names)) < len(names):
         raise ParameterError(key="outputs", value=names, remedy="name each output once")
-    if method is not None and method not in get_args(Method):
+    if method is not None and method not in get_args(Reduction):
         raise ParameterError(key="method", value=method, remedy="modal or aaa, or leave it out for the better one")
     if method == "aaa" and (not arm.is_undamped or arm.input_lags):
         remedy = "AAA in s^2 is for C = 0, no friction and no inductance; take modal, which has them"
@@ -149,7 +150,7 @@ class _Bench:
     """Models of one arm over one band, tried and measured."""
 
     def __init__(
-        self, arm: Arm, rows: tuple[Output, ...], band: tuple[float, float], x: float | None, method: Method | None
+        self, arm: Arm, rows: tuple[Output, ...], band: tuple[float, float], x: float | None, method: Reduction | None
     ) -> None:
         self.arm, self.rows, self.band, self.x = arm, rows, band, x
         self.fixed = modal_model(arm, rows, 0, x).order
@@ -176,7 +177,7 @@ class _Bench:
 
     def _with_slow_poles(self, count: int) -> list[ReducedModel]:
         """The model of so many modes and slow poles, where those that it leaves out are overdamped."""
-        if count < 1 or self.arm.damping * modes(self.arm, count).natural_frequency[-1] < OVERDAMPED:
+        if count < 1 or self.arm.damping * modes(self.arm, count).natural_frequency[-1] < SLOW_POLES_FROM:
             return []
         return [self._measured(slow_model(self.arm, self.rows, count, self.x), "modal", "")]
 
@@ -194,7 +195,7 @@ class _Bench:
         if not found:
             best = self.of_order(2 * min(self.inside + MOST_TAILS, self._most()) + self.fixed)
             message = (
-                f"found no model of up to {MOST_ORDER} states within {error:g} from {self.band[0]:g} to "
+                f"found no model of up to {MOST_STATES} states within {error:g} from {self.band[0]:g} to "
                 f"{self.band[1]:g} rad/s; order {best.order} has {best.worst_error:.2g}: allow more, or narrow the band"
             )
             raise ConvergenceError(message, best, best.worst_error)
@@ -223,7 +224,7 @@ class _Bench:
         try:
             while (size := rough(good)) > error:
                 sizes += [size] * (good > self.inside)
-                if good == most or (len(sizes) > 2 and sizes[-1] > FALLS * sizes[-3]):
+                if good == most or (len(sizes) > 2 and sizes[-1] > LEAST_FALL * sizes[-3]):
                     return None
                 good, bad = min(good + max(good // 2, 2), most), good
         except ConvergenceError:  # at C > 0 no more damped modes can be told apart
@@ -237,21 +238,21 @@ class _Bench:
                 return measured
         return None
 
-    def _measured(self, model: PartialFractions, method: Method, note: str) -> ReducedModel:
+    def _measured(self, model: PartialFractions, method: Reduction, note: str) -> ReducedModel:
         accuracy = self.ruler.measure(model)
         number, frequency = first_mode_lacking(model)
         return ReducedModel(model, method, self.band, accuracy.worst, accuracy.at, number, frequency, note)
 
     def _most(self) -> int:
-        return (MOST_ORDER - self.fixed) // 2
+        return (MOST_STATES - self.fixed) // 2
 
     def _pairs(self, order: object) -> int:
         """Flexible pairs of poles in a model of so many states."""
         rigid = {0: "", 2: "two for the rigid body, "}.get(self.fixed, f"{self.fixed} besides the modes, ")
-        remedy = f"states come in pairs, {rigid}two a mode: an even number from 2 to {MOST_ORDER}"
+        remedy = f"states come in pairs, {rigid}two a mode: an even number from 2 to {MOST_STATES}"
         if not self.arm.is_undamped:
-            remedy = f"two states a mode, {rigid}and one for relaxation where it is odd: from 2 to {MOST_ORDER}"
-        order = whole("order", order, 2, MOST_ORDER, remedy)
+            remedy = f"two states a mode, {rigid}and one for relaxation where it is odd: from 2 to {MOST_STATES}"
+        order = whole("order", order, 2, MOST_STATES, remedy)
         if order % 2 and not self.arm.damping and self.arm.is_uniform:
             raise ParameterError(key="order", value=order, remedy=remedy)
         return (order - self.fixed) // 2
@@ -261,7 +262,7 @@ def first_mode_lacking(model: PartialFractions) -> tuple[int, float]:
     """Number and undamped frequency [rad/s] of the arm's first flexible mode that is not one of the model's."""
     table = modes(model.arm, model.index.size + 1)
     omega = table.natural_frequency[table.index > 0]
-    has = (abs(model.natural_frequency[:, None] - omega) <= SAME * omega).any(axis=0)
+    has = (abs(model.natural_frequency[:, None] - omega) <= POLE_IS_MODE * omega).any(axis=0)
     first = int(np.argmin(has))
     return first + 1, float(omega[first])
 
@@ -280,7 +281,7 @@ def _band(band: Any) -> tuple[float, float]:
 def _error(error: Any) -> float:
     if isinstance(error, bool) or not isinstance(error, int | float) or not 0 < error < math.inf:
         raise ParameterError(key="error", value=error, remedy="a positive number, such as 1e-6")
-    if error < ROUNDING:
-        remedy = f"the exact values it is measured against are float64 numbers; ask for {ROUNDING:g} or more"
+    if error < EXACT_ROUNDING:
+        remedy = f"the exact values it is measured against are float64 numbers; ask for {EXACT_ROUNDING:g} or more"
         raise ParameterError(key="error", value=error, remedy=remedy)
     return float(error)

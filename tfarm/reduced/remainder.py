@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
 
-RATIOS = 1 + np.geomspace(0.02, 30.0, 14)  # c_j C, and below s C of the fit: tuned by hand on the lab arm
-SLOW_PAIRS = RATIOS.size // 2
-AT = np.geomspace(0.02, 5.0, 60)
-OVERDAMPED = 1.2  # C w of the last mode from which on it serves; below, the modes left out still ring
+CORNER_RATIOS = 1 + np.geomspace(0.02, 30.0, 14)  # c_j C, and below s C of the fit: tuned by hand on the lab arm
+SLOW_PAIRS = CORNER_RATIOS.size // 2  # the corners, two a pair
+FITTED_AT = np.geomspace(0.02, 5.0, 60)  # s C at which they are fitted: tuned with CORNER_RATIOS
+SLOW_POLES_FROM = 1.2  # C w of the last mode from which on it serves; below, the modes left out still ring
 
 
 def slow_remainder(C: float, missing: Callable[[Complex], Complex]) -> tuple[Real, Real]:
@@ -28,7 +28,7 @@ def slow_remainder(C: float, missing: Callable[[Complex], Complex]) -> tuple[Rea
 
     `missing` gives what the modes leave out of each output (outputs, n) at s (n,).
     """
-    basis = 1 / (1 + AT[:, None] / RATIOS) - 1
-    left = missing((AT / C).astype(complex)).real
+    basis = 1 / (1 + FITTED_AT[:, None] / CORNER_RATIOS) - 1
+    left = missing((FITTED_AT / C).astype(complex)).real
     shares: Real = np.linalg.lstsq(basis, left.T, rcond=1e-12)[0].T.astype(float)
-    return RATIOS / C, shares
+    return CORNER_RATIOS / C, shares

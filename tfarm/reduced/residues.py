@@ -27,9 +27,9 @@ from tfarm.spectrum import Modes
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
-CLOSE = 1e-6  # relative gap under which two frequencies are told apart by their shapes alone
-CIRCLE = np.exp(2j * np.pi * np.arange(32) / 32)
-AGREE = 1e-11  # of the largest value on the circle: what two radii may differ by
+CLOSE_FREQUENCIES = 1e-6  # relative gap under which two frequencies are told apart by their shapes alone
+UNIT_CIRCLE = np.exp(2j * np.pi * np.arange(32) / 32)  # of Cauchy's integral: a pole 4 radii off adds 4^-32 of its own
+RADII_AGREE = 1e-11  # of the largest value on the circle: what two radii may differ by
 
 
 def undamped_residues(table: Modes, wanted: Sequence[Output], k: System, x: float) -> Real:
@@ -42,7 +42,7 @@ def undamped_residues(table: Modes, wanted: Sequence[Output], k: System, x: floa
     if isinstance(k, Chain):
         powers = np.array([[each.power] for each in wanted])
         return np.asarray((_of_chain(k, wanted, 1j * omega, x)[0] * 2j * omega / (1j * omega) ** powers).real)
-    close = np.r_[False, np.diff(omega) < CLOSE * omega[1:], False]
+    close = np.r_[False, np.diff(omega) < CLOSE_FREQUENCIES * omega[1:], False]
     by_shapes = close[:-1] | close[1:]
     if any(not each.is_at_end for each in wanted):
         by_shapes[:] = True
@@ -101,7 +101,7 @@ def contour_residues(k: System, wanted: Sequence[Output], p: Complex, x: float) 
     for _ in range(9):
         radius[todo] /= 3
         again, smaller = _around(k, wanted, p[todo], radius[todo], x)
-        right = (abs(again - residues[:, todo]) <= AGREE * np.maximum(size[:, todo], smaller)).all(axis=0)
+        right = (abs(again - residues[:, todo]) <= RADII_AGREE * np.maximum(size[:, todo], smaller)).all(axis=0)
         residues[:, todo[~right]], size[:, todo[~right]] = again[:, ~right], smaller[:, ~right]
         todo = todo[~right]
         if not todo.size:
@@ -114,7 +114,7 @@ def _around(
     k: System, wanted: Sequence[Output], p: Complex, radius: Real, x: float
 ) -> tuple[Complex, NDArray[np.float64]]:
     """Cauchy's integral on the circles, and the largest |G| radius on each."""
-    arrow = radius[:, None] * CIRCLE
+    arrow = radius[:, None] * UNIT_CIRCLE
     values = evaluate_outputs(k, wanted, kernel_table(k, wanted), (p[:, None] + arrow).ravel(), x)
     values = values.reshape(len(wanted), *arrow.shape) * arrow
     return values.mean(axis=2), abs(values).max(axis=2)

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm
-from tfarm.arm.blocks import Rational
+from tfarm.arm.blocks import Matrices, Rational
 from tfarm.errors import ParameterError
 from tfarm.reduced.modal import modal_model
-from tfarm.reduced.partial_fractions import Matrices
 from tfarm.response.signals import Signals
 
 Real = NDArray[np.float64]

@@ -11,7 +11,7 @@ from tfarm.columns import Column, Table
 from tfarm.digits import counted, lined, plain, scientific, significant, singly, unit
 from tfarm.plots.frequency import draw_bode
 from tfarm.report.sections import Picture, Section
-from tfarm.response.frequency import ON_AXIS, Bode, bode
+from tfarm.response.frequency import AXIS_SHARE, Bode, bode
 
 ROOTS = (
     "Those below the real axis are their mirror images. A damping ratio of 100 % is a real root in the left "
@@ -70,7 +70,7 @@ def what_it_means(data: Bode) -> str:
     if not data.resonances.size:
         return "Nothing resonates here: no pole that oscillates shows at this output."
     turned = f"{np.ptp(data.phase):.0f} degrees over the band"
-    right = data.zeros[data.zeros.real > ON_AXIS * abs(data.zeros)]
+    right = data.zeros[data.zeros.real > AXIS_SHARE * abs(data.zeros)]
     if right.size:
         count = int(np.sum(right.imag == 0) + 2 * np.sum(right.imag > 0))
         slowest = significant(float(abs(right).min()), 4)

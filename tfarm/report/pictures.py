@@ -11,7 +11,7 @@ from tfarm.plots.files import save
 from tfarm.plots.frequency import draw_compared
 from tfarm.plots.shapes import draw_shapes, shapes_of
 from tfarm.report.overlay import draw_overlay, overlay
-from tfarm.response.frequency import band_of, bode
+from tfarm.response.frequency import bode, resonant_band
 from tfarm.spectrum.scales import default_gains
 
 DOTS_PER_INCH = 100
@@ -25,7 +25,7 @@ def readme_pictures(out: Path) -> tuple[Path, ...]:
     """
     out.mkdir(parents=True, exist_ok=True)
     lab, undamped = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
-    band, labels = band_of(lab, 6), ("exact, no damping", f"exact, damping C = {plain(lab.damping)} s")
+    band, labels = resonant_band(lab, 6), ("exact, no damping", f"exact, damping C = {plain(lab.damping)} s")
     main, other = (bode(arm, "root_moment", band) for arm in (undamped, lab))
     figures = {
         "bode-root-moment": draw_compared(main, other, labels),

@@ -27,7 +27,7 @@ from tfarm.report.trust_audit import VERDICTS, audit_table, counts, shown
 from tfarm.report.trust_proofs import DIGITS, Proof, hash_of
 from tfarm.report.trust_tables import accuracy_table, boxes_tables, counts_table, digits_table
 from tfarm.report.unchanged import PACKAGES, makers
-from tfarm.response.accuracy import POINTS
+from tfarm.response.accuracy import BAND_POINTS
 from tfarm.tables.files import save as save_table
 
 FOLDER, KEPT = "trust", "evidence"
@@ -39,8 +39,8 @@ PROOFS = (
     "error: what follows is a proof, not an estimate. Where the enclosures are as many as the count, none is missing."
 )
 ACCURACY = (
-    f"The plots are computed in double precision from a closed form without cancellation. At {POINTS} frequencies of "
-    f"each response, from a tenth of the first natural frequency to beyond the tenth, it was compared with ball "
+    f"The plots are computed in double precision from a closed form without cancellation. At {BAND_POINTS} frequencies "
+    f"of each response, from a tenth of the first natural frequency to beyond the tenth, it was compared with ball "
     "arithmetic at 30 proven digits. The error is counted in the change of G that a relative change of its argument "
     "brings about, |G₆₄/G − 1| / (1 + |s G′/G|): near an undamped resonance no more can be asked of any number format. "
     "One unit in the last place of a double is 2.2 × 10⁻¹⁶."
@@ -138,7 +138,7 @@ def _short(evidence: Evidence, proofs: Sequence[Proof]) -> dict[str, Any]:
         "arms": len(proven),
         "unproven": [proof.name for proof in proofs if proof.failure],
         "digits": DIGITS,
-        "points": POINTS,
+        "points": BAND_POINTS,
         "worst": scientific(max(errors), 2) if errors else "",
         "published": len(evidence.published),
         "agree": sum(row.agrees for row in evidence.published),

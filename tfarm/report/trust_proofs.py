@@ -24,7 +24,7 @@ from tfarm.plots.words import gains_words
 from tfarm.report.damped_table import PROVEN, proven_damped_modes
 from tfarm.report.kept import keep, kept
 from tfarm.report.loop_laws import has_loop
-from tfarm.response.accuracy import POINTS, worst_error
+from tfarm.response.accuracy import BAND_POINTS, worst_error
 from tfarm.spectrum import DampedModes, Modes
 from tfarm.spectrum.scales import default_gains
 
@@ -65,7 +65,7 @@ class Proof:
     count: int = 0
     below: str = ""
     failure: str = ""
-    points: int = POINTS
+    points: int = BAND_POINTS
     band: tuple[float, float]
     errors: tuple[tuple[str, float], ...]
     boxes: tuple[Boxed, ...] = ()

@@ -11,7 +11,8 @@ from tfarm.errors import CertificationError, ConvergenceError
 
 from .transfer import transfer
 
-POINTS, DIGITS = 100, 30
+BAND_POINTS = 100  # at which the error is looked at, even in ln w
+RIGHT_DIGITS = 30  # of the value that is taken for exact: twice those of float64
 
 
 def worst_error(arm: Arm, output: str, band: tuple[float, float]) -> float | None:
@@ -20,14 +21,14 @@ def worst_error(arm: Arm, output: str, band: tuple[float, float]) -> float | Non
     Counted in the change of G that a relative change of its argument brings about: |G_64/G - 1| / (1 + |s G'/G|).
     """
     G = transfer(arm, output)
-    s = 1j * np.geomspace(*band, POINTS)
+    s = 1j * np.geomspace(*band, BAND_POINTS)
     values, slopes = G(s), G.derivative(s)
     if not np.any(values):
         return None
     errors = []
     for point, value, slope in zip(s, values, slopes, strict=True):
         try:
-            pair = G.digits(complex(point), DIGITS)
+            pair = G.digits(complex(point), RIGHT_DIGITS)
         except (CertificationError, ConvergenceError):  # a zero of G, where a relative error means nothing
             continue
         parts = zip(pair, (value.real, value.imag), strict=True)

@@ -14,7 +14,7 @@ from tfarm.spectrum.answers import HELD
 from .frequency import Bode
 from .transfer import TransferFunction
 
-HERTZ = 2 * math.pi
+HERTZ = 2 * math.pi  # rad/s
 
 
 def response_answer(G: TransferFunction, s: np.ndarray[Any, Any], digits: int | None) -> dict[str, Any]:
@@ -50,7 +50,7 @@ def response_table(answer: dict[str, Any]) -> Table:
     )
 
 
-ROOTS = (  # of (s, |G| at i Im s, or of a real root at i |s|)
+ROOT_COLUMNS = (  # of (s, |G| at i Im s, or of a real root at i |s|)
     Column(
         "re",
         "Re s",
@@ -62,7 +62,7 @@ ROOTS = (  # of (s, |G| at i Im s, or of a real root at i |s|)
     Column("frequency_hz", "Im s/2 pi", "Hz", of=lambda row: float(row[0].imag) / HERTZ, digits=singly(general, 8)),
     Column("magnitude", "|G| there", of=lambda row: float(row[1]), digits=singly(general, 6)),
 )
-BODE = (  # of `Bode`
+BODE_COLUMNS = (  # of `Bode`
     Column("omega_rad_s", "angular frequency", "rad/s", of="omega"),
     Column("frequency_hz", "frequency", "Hz", of=lambda data: data.omega / HERTZ),
     Column("real", "real part", of=lambda data: data.value.real),
@@ -84,7 +84,7 @@ def bode_answer(data: Bode) -> dict[str, Any]:
         "output": data.output,
         "unit": data.gain_unit,
         "band_rad_s": list(data.band),
-        **{key: Table(columns=ROOTS, record=list(zip(*pair, strict=True))) for key, pair in roots.items()},
+        **{key: Table(columns=ROOT_COLUMNS, record=list(zip(*pair, strict=True))) for key, pair in roots.items()},
         "poles_between_re_1_s": list(data.pole_width),
         "zeros_between_re_1_s": list(data.zero_width),
         "omega_rad_s": data.omega.tolist(),
@@ -95,4 +95,4 @@ def bode_answer(data: Bode) -> dict[str, Any]:
 
 def bode_table(data: Bode) -> Table:
     """The curve of a Bode plot, a row a frequency."""
-    return Table(columns=BODE, record=data)
+    return Table(columns=BODE_COLUMNS, record=data)

@@ -28,11 +28,11 @@ from .transfer import TransferFunction, transfer
 Real = NDArray[np.floating[Any]]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
-RESONANCES = 10  # flexible modes in a band, unless told
-PER_DECADE = 120  # points of the even grid
+RESONANCES_SHOWN = 10  # flexible modes in a band, unless told
+EVEN_PER_DECADE = 120  # points of the even grid
 PER_ROOT_DECADE = 12  # points a decade of distance, on each side of a pole or zero
 NEAREST = 1e-6  # relative distance of the nearest point to a root on the axis
-ON_AXIS = 1e-12  # |Re s|/|s| below which a root is on the imaginary axis
+AXIS_SHARE = 1e-12  # |Re s|/|s| below which a root is on the imaginary axis
 COINCIDE = 1e-9  # relative distance below which a pole and a zero cancel
 
 
@@ -102,7 +102,7 @@ class Bode:
         return "hub angle" if self.arm.is_locked else named.get(self.arm.input, "torque")
 
 
-def band_of(arm: Arm, resonances: int = RESONANCES) -> tuple[float, float]:
+def resonant_band(arm: Arm, resonances: int = RESONANCES_SHOWN) -> tuple[float, float]:
     """From far below the first flexible mode to midway (geometrically) between the last shown and the next [rad/s]."""
     table = modes(arm, resonances + 1)
     natural_frequency = table.natural_frequency[table.index > 0]
@@ -115,9 +115,10 @@ def band_of(arm: Arm, resonances: int = RESONANCES) -> tuple[float, float]:
 def bode(arm: Arm, output: str, band: tuple[float, float] | None = None) -> Bode:
     """The exact frequency response of one output over a band [rad/s], refined at every pole and zero.
 
-    Without a band it holds the first ten flexible modes (`band_of`).  Raises ParameterError for an unknown output.
+    Without a band it holds the first ten flexible modes (`resonant_band`).  Raises ParameterError for an unknown
+    output.
     """
-    band = band_of(arm) if band is None else band
+    band = resonant_band(arm) if band is None else band
     G = transfer(arm, output)
     if not np.any(G(1j * np.geomspace(*band, 3))):
         return _no_motion(arm, output, band)
@@ -174,7 +175,7 @@ def without_cancelled(poles: Complex, zeros: Complex) -> tuple[Complex, Complex]
 def refined_grid(band: tuple[float, float], roots: Complex) -> Real:
     """Frequencies [rad/s], ascending, even on a log scale and geometric around every root off the real axis."""
     low, high = band
-    even = np.geomspace(low, high, 1 + math.ceil(PER_DECADE * math.log10(high / low)))
+    even = np.geomspace(low, high, 1 + math.ceil(EVEN_PER_DECADE * math.log10(high / low)))
     grid = np.unique(np.r_[even, *(_around(root) for root in roots if root.imag > 0)])
     on_axis = roots.imag[_on_axis(roots)]
     if on_axis.size:  # none on a root itself, nor nearer than rounding lets a value mean something
@@ -186,8 +187,8 @@ def refined_grid(band: tuple[float, float], roots: Complex) -> Real:
 def _around(root: complex) -> Real:
     """w and w +- sigma t, as far out as two steps of the even grid."""
     centre = root.imag
-    reach = 2 * centre * math.log(10) / PER_DECADE
-    on_axis = abs(root.real) <= ON_AXIS * abs(root)
+    reach = 2 * centre * math.log(10) / EVEN_PER_DECADE
+    on_axis = abs(root.real) <= AXIS_SHARE * abs(root)
     nearest = NEAREST * centre if on_axis else abs(root.real) / 20
     if nearest >= reach:
         return np.array([centre])
@@ -209,7 +210,7 @@ def phase_of(omega: Real, value: Complex, poles: Complex, zeros: Complex, *, is_
 
 
 def _on_axis(roots: Complex) -> NDArray[np.bool_]:
-    return (abs(roots.real) <= ON_AXIS * abs(roots)) & (roots.imag > 0)
+    return (abs(roots.real) <= AXIS_SHARE * abs(roots)) & (roots.imag > 0)
 
 
 def _magnitude_at(G: TransferFunction, roots: Complex, *, on_axis: float) -> Real:

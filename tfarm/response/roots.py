@@ -47,10 +47,10 @@ def poles_of(arm: Arm, up_to: float) -> Roots:
     k = system_of(arm)
     if arm.is_undamped:
         return _on_axis(flexible_frequencies(arm, up_to), k.at_rest, up_to)
-    return _in_box(k, _drive(k), k.at_rest, up_to, _damped_starts(arm, up_to))
+    return _in_box(k, lambda s: characteristic(k, s, at_zero=k.at_rest), k.at_rest, up_to, _damped_starts(arm, up_to))
 
 
-def zeros_of(arm: Arm, wanted: Output, up_to: float, x: float = 0.0) -> Roots:
+def zeros_of(arm: Arm, wanted: Output, up_to: float, x: float) -> Roots:
     """The zeros of one output with |Im s| <= up_to; x is a share of the length, for outputs along the arm.
 
     One that its end condition holds constant has none but those of its power of s (at the tip: 0 throughout has none).
@@ -100,17 +100,11 @@ def _starts_by_sampling(numerator: Function, up_to: float) -> Complex:
     return np.r_[found, found.conj(), -found, -found.conj()]
 
 
-def _drive(k: System) -> Function:
-    """The characteristic function with its zeros at s = 0 divided out."""
-    return lambda s: characteristic(k, s, at_zero=k.at_rest)
-
-
 def _numerator(k: System, wanted: Output, x: float) -> tuple[int, Function]:
     """How often an output over its power of s vanishes at s = 0, and the function without these zeros."""
-    base = replace(wanted.base, gauge=False)
     if isinstance(k, Coefficients):
-        name = wanted.quantity if wanted.is_at_end else f"tip {wanted.quantity}"
-        return _order(k, name), _function(k, name)
+        return _of_one_link(k, wanted.quantity, at_tip=not wanted.is_at_end)
+    base = replace(wanted.base, gauge=False)
     order = order_at_zero(k, base, x)
 
     def function(s: Complex) -> Analytic:
@@ -120,25 +114,22 @@ def _numerator(k: System, wanted: Output, x: float) -> tuple[int, Function]:
     return order, function
 
 
-def _order(k: Coefficients, name: str) -> int:
-    """How often the free response's quantity vanishes at s = 0."""
+def _of_one_link(k: Coefficients, quantity: str, *, at_tip: bool) -> tuple[int, Function]:
+    """Order of the zero at s = 0 of the free response's quantity, and the quantity over s to that order."""
     s = Jet.variable(0.0, 6)
-    jets = dict(zip(("theta", "M", "Q", "W", "Y", "drive"), low_frequency(k, s), strict=True))
-    jets |= zip(("tip Phi", "tip M", "tip Q"), low_frequency_tip(k, s), strict=True)
-    return next(n for n, coefficient in enumerate(jets[name].c) if coefficient != 0)
-
-
-def _function(k: Coefficients, name: str) -> Function:
-    """The quantity of the free response with its zeros at s = 0 divided out."""
-    order = _order(k, name)
+    if at_tip:
+        series = dict(zip(("Phi", "M", "Q"), low_frequency_tip(k, s), strict=True))[quantity]
+    else:
+        series = dict(zip(("theta", "M", "Q", "W", "Y", "drive"), low_frequency(k, s), strict=True))[quantity]
+    order = next(n for n, coefficient in enumerate(series.c) if coefficient != 0)
 
     def function(s: Complex) -> Analytic:
-        free = tip_response(k, s) if name.startswith("tip ") else free_response(k, s)
-        value, slope = getattr(free, name.removeprefix("tip ")).c
+        free = tip_response(k, s) if at_tip else free_response(k, s)
+        value, slope = getattr(free, quantity).c
         s = np.where(s == 0, 1e-300, s)
         return Analytic(value / s**order, (slope - order * value / s) / s**order, free.scale)
 
-    return function
+    return order, function
 
 
 def _in_box(k: System, function: Function, at_zero: int, up_to: float, starts: Complex) -> Roots:

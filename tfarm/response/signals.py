@@ -29,8 +29,8 @@ from tfarm.spectrum import modes
 Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
 
-AT_REST = 3e-3  # of the slowest frequency: there as many digits are left as a series of TERMS terms has
-TERMS = 8
+SERIES_BELOW = 3e-3  # of the slowest frequency: there as many digits are left as a series of REST_TERMS terms has
+REST_TERMS = 8  # of that series: the next is below 1e-20 of the first
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ class Signals:
         There W and x theta are nearly one, and the direct difference has lost (s/w1)^2 of its digits.
         """
         relative = [n for n, each in enumerate(self.outputs) if each.quantity in ("Y", "Phi")]
-        slow = np.flatnonzero(abs(s) < AT_REST * self._slowest) if relative else np.empty(0, np.int64)
+        slow = np.flatnonzero(abs(s) < SERIES_BELOW * self._slowest) if relative else np.empty(0, np.int64)
         if not slow.size:
             return
         for n in relative:
@@ -122,7 +122,7 @@ class Signals:
         found = {}
         for n, (wanted, share) in enumerate(zip(self.outputs, self.places, strict=True)):
             if wanted.quantity in ("Y", "Phi"):
-                found[n] = np.array(series_at_zero(self.system, [wanted], share, TERMS)[0])
+                found[n] = np.array(series_at_zero(self.system, [wanted], share, REST_TERMS)[0])
         return found
 
     def values(self, s: NDArray[Any]) -> Complex:

@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     import control
 
 Complex = NDArray[np.complexfloating[Any, Any]]
-BLOCK = 1 << 16
-LARGEST = 1e20  # 1/s; far beyond any arm, and the powers of s that are taken do not overflow
+POINTS_AT_ONCE = 1 << 16  # points s at once: their values fill a megabyte an output, and few loops are begun
+LARGEST_S = 1e20  # 1/s: far beyond any arm, and the powers of s that are taken do not overflow
 
 
 Wanted = str | Output | Sequence[str | Output]  # one output or several
@@ -153,10 +153,7 @@ class TransferFunction:
         import control
 
         grid = np.atleast_1d(np.asarray(omega, dtype=float))
-        data = np.empty((len(self.outputs), 1, grid.size), complex)
-        for start in range(0, grid.size, BLOCK):
-            part = slice(start, start + BLOCK)
-            data[:, 0, part] = self._values(1j * grid[part])
+        data = self._values(1j * grid)[:, None, :]
         return control.FrequencyResponseData(
             data, grid, inputs=[self.input], outputs=list(self.outputs), name=self.arm.name
         )
@@ -170,11 +167,11 @@ class TransferFunction:
             return of_load
         if self.method != "closed-form":
             return slow_values(self.method, self.arm, self._k, self.rows, s, self._share)
-        if s.size <= BLOCK:
+        if s.size <= POINTS_AT_ONCE:
             return evaluate_outputs(self._k, self.rows, self._table, s, self._share)
         values = np.empty((len(self.outputs), s.size), complex)
-        for start in range(0, s.size, BLOCK):
-            part = slice(start, start + BLOCK)
+        for start in range(0, s.size, POINTS_AT_ONCE):
+            part = slice(start, start + POINTS_AT_ONCE)
             values[:, part] = evaluate_outputs(self._k, self.rows, self._table, s[part], self._share)
         return values
 
@@ -251,9 +248,9 @@ def _finite(s: ArrayLike) -> Complex:
         bad = points[~np.isfinite(points)].ravel()[0]
         raise ParameterError(key="s", value=complex(bad), remedy="a transfer function wants finite s in 1/s")
     parts = (points.real, points.imag) if points.size else ()
-    if any(part.max() > LARGEST or part.min() < -LARGEST for part in parts):
+    if any(part.max() > LARGEST_S or part.min() < -LARGEST_S for part in parts):
         bad = points.ravel()[abs(points.ravel()).argmax()]
-        raise ParameterError(key="s", value=complex(bad), remedy=f"beyond any arm; at most {LARGEST:g} 1/s")
+        raise ParameterError(key="s", value=complex(bad), remedy=f"beyond any arm; at most {LARGEST_S:g} 1/s")
     return points
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm
-from tfarm.arm.blocks import Rational
+from tfarm.arm.blocks import Matrices, Rational
 from tfarm.arm.law import Law, Part
 from tfarm.dsp import Chain
 from tfarm.dsp.law_loop import SampledLaw, acting_law, sampled_law, with_estimate
@@ -27,7 +27,6 @@ from tfarm.dsp.law_verdict import law_verdict
 from tfarm.errors import ConvergenceError
 from tfarm.loop.law_stability import law_stability
 from tfarm.records import record
-from tfarm.reduced.partial_fractions import Matrices
 from tfarm.reduced.sensed import sensed_model
 from tfarm.synthesis.law_slew import SLEWED, LawSlew
 from tfarm.synthesis.law_slopes import Clock, pole_slopes

@@ -16,13 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm
+from tfarm.arm.blocks import Matrices
 from tfarm.arm.law import Law
 from tfarm.dsp import Chain, Scenario, scenario
 from tfarm.dsp.law_loop import acting_law
 from tfarm.dsp.law_simulate import references_of
 from tfarm.dsp.scenarios import TRIAL_COST, TRIAL_DURATION
 from tfarm.records import record
-from tfarm.reduced.partial_fractions import Matrices
 from tfarm.reduced.sensed import closed
 from tfarm.spectrum.scales import first_frequency
 from tfarm.synthesis.law_slopes import Clock

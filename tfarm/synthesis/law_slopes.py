@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tfarm.arm.blocks import Matrices
 from tfarm.records import record
-from tfarm.reduced.partial_fractions import Matrices
 from tfarm.reduced.sensed import closed
 from tfarm.synthesis.structures import Slope
 
