@@ -6,7 +6,7 @@ import pytest
 from pydantic import ValidationError
 
 from tfarm.arm import declared
-from tfarm.arm.tables import SHAPES, TABLES
+from tfarm.arm.tables import ARM_TABLES, SHAPE_TABLES
 from tfarm.errors import ParameterError
 
 
@@ -21,7 +21,7 @@ class Spring:
 
 
 @declared.of(Spring)
-class SpringTable(declared.Table):
+class SpringTable(declared.TomlTable):
     """[spring], with a colour that no spring asks for."""
 
     colour: str = "grey"
@@ -52,7 +52,7 @@ def test_types_are_strict_and_other_keys_are_refused(table, kind):
 
 def test_what_a_file_may_say_is_what_it_was_before_records_declared_it():
     """The keys are a contract with every file there is."""
-    assert {name: set(table.model_fields) for name, table in (TABLES | SHAPES).items() if name} == {
+    assert {name: set(table.model_fields) for name, table in (ARM_TABLES | SHAPE_TABLES).items() if name} == {
         "link": {"length", "density", "youngs_modulus", "shear_modulus", "poissons_ratio", "damping", "section"},
         "hub": {"inertia", "friction", "radius", "stiffness"},
         "clamp": {"stiffness", "damping"},

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tfarm.arm import Arm, Hub, Link, Payload, Section, load, presets, to_toml
-from tfarm.arm.reading import MOST_BYTES
+from tfarm.arm.reading import MOST_ARM_BYTES
 from tfarm.errors import ParameterError
 
 # The example of the documentation, letter by letter
@@ -230,7 +230,7 @@ def test_a_tube_thinner_than_nothing(refused):
 
 CHOKING = {
     "nothing": (b"", "name is missing"),
-    "more than 64 KiB": (b"#" * (MOST_BYTES + 1), "size in bytes = 65537: a .toml file of at most 65536 is read"),
+    "more than 64 KiB": (b"#" * (MOST_ARM_BYTES + 1), "size in bytes = 65537: a .toml file of at most 65536 is read"),
     "not UTF-8": (b'name = "\xff"', "byte 8 = b'\\xff': is not UTF-8; save the file as UTF-8"),
     "UTF-16": (EXAMPLE.encode("utf-16"), "is not UTF-8"),
     "zeros": (b"\0" * 1000, "is not TOML"),

@@ -7,7 +7,7 @@ import pytest
 
 import tfarm
 from tfarm.arm import HubFeedback, to_toml
-from tfarm.arm.checks import LARGEST
+from tfarm.arm.checks import LARGEST_NUMBER
 from tfarm.arm.schema import arm_of_table
 from tfarm.dsp import Actuator, Chain, Converters, Sampling, Slew, load_chain
 from tfarm.dsp.converters import MOMENT, TORQUE, quantisers
@@ -128,7 +128,7 @@ def test_bad_tables_are_named(table, content, message):
     assert "\n" not in str(refused.value)
 
 
-@pytest.mark.parametrize("value", [math.nan, math.inf, 2 * LARGEST, "0.3", True])
+@pytest.mark.parametrize("value", [math.nan, math.inf, 2 * LARGEST_NUMBER, "0.3", True])
 def test_gains_are_finite_numbers(value):
     with pytest.raises(ParameterError, match="K2"):
         HubFeedback(K1=0.3, K2=value)

@@ -13,7 +13,7 @@ from tests import chain_elements
 from tests.fitting.planted import elements_response, judged, judged_pair
 from tests.shared import thinned
 from tests.shell import answer, run
-from tfarm.arm.keys import Family
+from tfarm.arm.keys import KeyedArms
 from tfarm.errors import ParameterError
 from tfarm.fitting.answers import resonances
 from tfarm.fitting.fit import fit
@@ -237,11 +237,11 @@ def test_bad_input_is_one_line(arguments, words, capsys):
 def test_young_s_modulus_takes_the_shear_modulus_along():
     """Poisson's ratio stays, so that no step leads to a material that there is not."""
     rig = tfarm.load("tests/rigs/bench-rig.toml")
-    family = Family(rig, ["link.1.youngs_modulus"])
+    family = KeyedArms(rig, ["link.1.youngs_modulus"])
     stiff = family.at({"link.1.youngs_modulus": 3 * rig.link.youngs_modulus}).link
     assert stiff.shear_modulus / stiff.youngs_modulus == pytest.approx(rig.link.shear_modulus / rig.link.youngs_modulus)
     both = {"link.1.youngs_modulus": 1.1 * rig.link.youngs_modulus, "link.1.shear_modulus": rig.link.shear_modulus}
-    assert Family(rig, list(both)).at(both).link.shear_modulus == rig.link.shear_modulus
+    assert KeyedArms(rig, list(both)).at(both).link.shear_modulus == rig.link.shear_modulus
 
 
 def test_a_step_to_no_arm_is_a_wall():

@@ -23,8 +23,8 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
 Matrices = tuple[Real, Real, Real, Real]
 
-LARGEST = 1e150  # coefficient: the square of one is still a double
-MOST_ORDER = 60  # of one part: beyond it a polynomial of doubles says little
+LARGEST_COEFFICIENT = 1e150  # the square of one is still a double
+MOST_DEGREE = 60  # of one part: beyond it a polynomial of doubles says little
 REAL_PAIR = 1e-9  # of its size: how far a root may be from the conjugate of another
 
 
@@ -123,8 +123,8 @@ class StateSpace:
                     f"is {getattr(self, name).shape}, and should be {shape}: A (n, n), B (n, m), C (1, n), D (1, m)"
                 )
                 raise ParameterError(key=name, value="matrix", remedy=remedy)
-        if n > MOST_ORDER:
-            raise ParameterError(key="A", value=n, remedy=f"at most {MOST_ORDER} states are read")
+        if n > MOST_DEGREE:
+            raise ParameterError(key="A", value=n, remedy=f"at most {MOST_DEGREE} states are read")
 
     @property
     def signals(self) -> int:
@@ -171,10 +171,10 @@ class StateSpace:
         return self.A, self.B, self.C, self.D
 
 
-Block = Rational | StateSpace
+LawBlock = Rational | StateSpace
 
 
-def block_of(key: str, entry: Any) -> tuple[Block, float | None]:
+def block_of(key: str, entry: Any) -> tuple[LawBlock, float | None]:
     """A part of a law from what a person has, and its sample period [s], None where it does not say or is continuous.
 
     A number; a pair (num, den); a mapping with zeros, poles and gain; python-control's TransferFunction or StateSpace
@@ -182,9 +182,12 @@ def block_of(key: str, entry: Any) -> tuple[Block, float | None]:
     """
     if isinstance(entry, Rational | StateSpace):
         return entry, None
-    period = _period_of(getattr(entry, "dt", None))
+    dt = getattr(entry, "dt", None)  # python-control's: 0 of a continuous system, True of a period that is not said
+    period = None if dt is None or dt is True or dt == 0 else float(dt)
     if all(hasattr(entry, name) for name in "ABCD"):
-        system = entry if not hasattr(entry, "poles") else _balanced_system(entry)
+        system = [getattr(entry, name) for name in "ABCD"]
+        if hasattr(entry, "poles"):  # a control system, whose states may be of any size
+            system = list(balanced(*(np.asarray(part, dtype=float) for part in system)))
         return StateSpace(*system), period
     if hasattr(entry, "num") and hasattr(entry, "den"):
         num, den = (np.asarray(part[0][0], dtype=float) for part in (entry.num, entry.den))
@@ -214,31 +217,18 @@ def balanced(A: Real, B: Real, C: Real, D: Real) -> Matrices:
     return np.asarray(balanced_A), B / scale[:, None], C * scale, D
 
 
-def _balanced_system(system: Any) -> Matrices:
-    """The matrices of a python-control system, its states of like size."""
-    A, B, C, D = (np.asarray(part, dtype=float) for part in (system.A, system.B, system.C, system.D))
-    return balanced(A, B, C, D)
-
-
-def _period_of(dt: Any) -> float | None:
-    """The period of a python-control system; None of a continuous one, or where none is said."""
-    if dt is None or dt is True or dt == 0:
-        return None
-    return float(dt)
-
-
 def _polynomial(name: str, values: Iterable[Any]) -> tuple[float, ...]:
     """Coefficients without leading zeros, each finite."""
     remedy = "numbers in descending powers, such as [1, 0.5]"
     if isinstance(values, str) or not isinstance(values, Sequence | np.ndarray) or not len(values):
         raise ParameterError(key=name, value=values, remedy=remedy)
     found = [number(name, each, remedy) for each in values]
-    if not all(math.isfinite(each) and abs(each) <= LARGEST for each in found):
-        raise ParameterError(key=name, value=found, remedy=f"finite numbers, at most {LARGEST:g} in size")
+    if not all(math.isfinite(each) and abs(each) <= LARGEST_COEFFICIENT for each in found):
+        raise ParameterError(key=name, value=found, remedy=f"finite numbers, at most {LARGEST_COEFFICIENT:g} in size")
     while len(found) > 1 and found[0] == 0:
         found.pop(0)
-    if len(found) > MOST_ORDER + 1:
-        raise ParameterError(key=name, value=len(found) - 1, remedy=f"a degree of at most {MOST_ORDER}")
+    if len(found) > MOST_DEGREE + 1:
+        raise ParameterError(key=name, value=len(found) - 1, remedy=f"a degree of at most {MOST_DEGREE}")
     return tuple(found)
 
 
@@ -249,8 +239,8 @@ def _of_roots(name: str, roots: ArrayLike) -> Real:
     except (TypeError, ValueError):
         remedy = "numbers, complex ones as [re, im], with their conjugates"
         raise ParameterError(key=name, value=roots, remedy=remedy) from None
-    if len(found) > MOST_ORDER:
-        raise ParameterError(key=name, value=len(found), remedy=f"at most {MOST_ORDER}")
+    if len(found) > MOST_DEGREE:
+        raise ParameterError(key=name, value=len(found), remedy=f"at most {MOST_DEGREE}")
     upper = np.sort_complex(found[found.imag > 0])
     lower = np.sort_complex(found[found.imag < 0].conj())
     if upper.size != lower.size or (abs(upper - lower) > REAL_PAIR * abs(upper)).any():

@@ -11,7 +11,8 @@ from numbers import Integral, Real
 
 from tfarm.errors import ParameterError
 
-SMALLEST, LARGEST = 1e-40, 1e40  # far outside any arm, yet no product of a few such numbers overflows
+SMALLEST_NUMBER = 1e-40  # far outside any arm, yet no product of a few such numbers underflows
+LARGEST_NUMBER = 1e40  # nor overflows
 
 
 def number(key: str, value: object, meaning: str) -> float:
@@ -42,7 +43,9 @@ def positive(key: str, value: object, meaning: str) -> float:
     x = number(key, value, meaning)
     if x <= 0.0 or math.isinf(x):
         raise ParameterError(key=key, value=x, remedy=meaning)
-    return _sane(key, x)
+    if not SMALLEST_NUMBER <= x <= LARGEST_NUMBER:
+        raise _too_far(key, x)
+    return x
 
 
 def not_negative(key: str, value: object, meaning: str) -> float:
@@ -56,7 +59,7 @@ def signed(key: str, value: object, meaning: str) -> float:
     x = number(key, value, meaning)
     if math.isinf(x):
         raise ParameterError(key=key, value=x, remedy=meaning)
-    if x != 0.0 and not SMALLEST <= abs(x) <= LARGEST:
+    if x != 0.0 and not SMALLEST_NUMBER <= abs(x) <= LARGEST_NUMBER:
         raise _too_far(key, x)
     return x + 0.0  # -0.0 becomes 0.0
 
@@ -67,12 +70,6 @@ def extended(key: str, value: object, meaning: str) -> float:
     return x if x == math.inf else not_negative(key, x, meaning)
 
 
-def _sane(key: str, x: float) -> float:
-    if not SMALLEST <= x <= LARGEST:
-        raise _too_far(key, x)
-    return x
-
-
 def _too_far(key: str, value: object) -> ParameterError:
-    remedy = f"beyond any arm ({SMALLEST:g} to {LARGEST:g}); check the unit: m, kg, s, Pa throughout"
+    remedy = f"beyond any arm ({SMALLEST_NUMBER:g} to {LARGEST_NUMBER:g}); check the unit: m, kg, s, Pa throughout"
     return ParameterError(key=key, value=value, remedy=remedy)

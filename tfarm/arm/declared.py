@@ -9,10 +9,10 @@ from typing import Any, ClassVar, TypeVar, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, create_model
 
-_Table = TypeVar("_Table", bound="Table")
+_Table = TypeVar("_Table", bound="TomlTable")
 
 
-class Table(BaseModel):
+class TomlTable(BaseModel):
     """A TOML table: no unknown keys, no conversions."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
@@ -42,14 +42,13 @@ def of(makes: Callable[..., Any]) -> Callable[[type[_Table]], type[_Table]]:
 
     def with_keys(table: type[_Table]) -> type[_Table]:
         hints, known = get_type_hints(makes), signature(makes).parameters.values()
-        keys: dict[str, Any] = {each.name: (hints[each.name], _default(each)) for each in known}
-        own = {name: key for name, key in keys.items() if name not in table.model_fields}
+        own: dict[str, Any] = {
+            each.name: (hints[each.name], ... if each.default is Parameter.empty else each.default)
+            for each in known
+            if each.name not in table.model_fields
+        }
         made: type[_Table] = create_model(table.__name__, __base__=table, __doc__=table.__doc__, **own)
         made.makes = makes
         return made
 
     return with_keys
-
-
-def _default(declared: Parameter) -> Any:
-    return ... if declared.default is Parameter.empty else declared.default

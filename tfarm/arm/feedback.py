@@ -14,7 +14,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tfarm.arm.checks import LARGEST, number
+from tfarm.arm.checks import LARGEST_NUMBER, number
 from tfarm.arm.records import INPUT_UNITS, Arm
 from tfarm.errors import ParameterError
 
@@ -60,9 +60,9 @@ class HubFeedback:
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            remedy = f"a gain is a finite number, at most {LARGEST:g} in size"
+            remedy = f"a gain is a finite number, at most {LARGEST_NUMBER:g} in size"
             value = number(field.name, getattr(self, field.name), remedy)
-            if not abs(value) <= LARGEST:
+            if not abs(value) <= LARGEST_NUMBER:
                 raise ParameterError(key=field.name, value=value, remedy=remedy)
             object.__setattr__(self, field.name, value)
 
@@ -132,7 +132,7 @@ def written_unit(name: str, arm: Arm) -> str:
     return f" {unit}" if unit else ""
 
 
-def through(arm: Arm) -> str:
+def input_words(arm: Arm) -> str:
     """What the loop of an arm closes through, in words."""
     words = {"motor_voltage": "the motor's voltage [V]", "motor_current": "the motor's current [A]"}
     return words.get(arm.input, "the torque at the hub [N m]")
@@ -140,7 +140,7 @@ def through(arm: Arm) -> str:
 
 def driven(arm: Arm) -> str:
     """A clause that says what u is, where it is no torque."""
-    return f"; u is {through(arm)}" if shown_unit(MOMENT_GAIN, arm) else ""
+    return f"; u is {input_words(arm)}" if shown_unit(MOMENT_GAIN, arm) else ""
 
 
 def many_laws(law: HubFeedback, **varied: ArrayLike) -> NDArray[np.float64]:

@@ -8,12 +8,12 @@ from typing import Any
 
 from tfarm.arm.records import Arm
 from tfarm.arm.schema import arm_of_table
-from tfarm.arm.tables import TABLES
+from tfarm.arm.tables import ARM_TABLES
 from tfarm.arm.writing import to_toml
 from tfarm.errors import ParameterError, did_you_mean
 
 
-class Family:
+class KeyedArms:
     """The arms that an arm becomes as some of its numbers run, by their TOML keys.
 
     Poisson's ratio stays where Young's modulus runs alone: the shear modulus goes along.  Raises ParameterError, naming
@@ -53,7 +53,7 @@ class Family:
         if name == "back_emf_constant":
             return float(place["torque_constant"])
         words = key.split(".")
-        return float(TABLES[words[0]].model_fields[words[-1]].default)
+        return float(ARM_TABLES[words[0]].model_fields[words[-1]].default)
 
 
 def _known(table: Mapping[str, Any]) -> Iterator[str]:
@@ -62,12 +62,12 @@ def _known(table: Mapping[str, Any]) -> Iterator[str]:
     links = [table["link"]] if alone else table["link"]
     for number, link in enumerate(links, start=1):
         place = "link" if alone else f"link.{number}"
-        yield from (f"{place}.{name}" for name in TABLES["link"].model_fields if name != "section")
+        yield from (f"{place}.{name}" for name in ARM_TABLES["link"].model_fields if name != "section")
         yield from (f"{place}.section.{name}" for name, value in link["section"].items() if not isinstance(value, str))
     for number in range(1, 1 + len(table.get("attachment", ()))):
-        yield from (f"attachment.{number}.{name}" for name in TABLES["attachment"].model_fields)
+        yield from (f"attachment.{number}.{name}" for name in ARM_TABLES["attachment"].model_fields)
     for room in ("hub", "clamp", "joint", "payload", *(["motor"] if "motor" in table else [])):
-        yield from (f"{room}.{name}" for name in TABLES[room].model_fields)
+        yield from (f"{room}.{name}" for name in ARM_TABLES[room].model_fields)
 
 
 def _table_of(table: dict[str, Any], key: str) -> tuple[dict[str, Any], str]:

@@ -9,14 +9,14 @@ simplest of them: a number on hub angle, hub rate and root moment.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm.blocks import Block, Matrices, Rational, StateSpace, block_of
+from tfarm.arm.blocks import LawBlock, Matrices, Rational, StateSpace, block_of
 from tfarm.arm.checks import not_negative, number, positive
 from tfarm.arm.feedback import GAINS, HubFeedback
 from tfarm.arm.records import INPUTS
@@ -26,9 +26,9 @@ from tfarm.records import record
 Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
 
-MOST_SIGNALS = 12
+MOST_SIGNALS = 12  # of a law: more than any rig measures
 REFERENCE = "reference:"  # before the name of a signal: what that should be
-RULES = ("tustin", "zoh", "matched")  # by which a continuous law is made discrete
+SAMPLING_RULES = ("tustin", "zoh", "matched")  # by which a continuous law is made discrete
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Part:
     """
 
     signals: tuple[str, ...]
-    block: Block
+    block: LawBlock
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,13 @@ class Law:
         object.__setattr__(self, "parts", parts)
         object.__setattr__(self, "entries", {})
         object.__setattr__(self, "delay", not_negative("delay", self.delay, "a delay in s, 0 or more"))
-        object.__setattr__(self, "period", _one_period(self.period, periods))
+        known = {float(each) for each in periods}
+        if self.period is not None:
+            known.add(positive("period", self.period, "a sample period in s; leave it out for a continuous law"))
+        if len(known) > 1:
+            remedy = "the parts of a law have one period in common"
+            raise ParameterError(key="period", value=sorted(known), remedy=remedy)
+        object.__setattr__(self, "period", known.pop() if known else None)
         object.__setattr__(self, "references", tuple(self.references))
         object.__setattr__(self, "prewarp", not_negative("prewarp", self.prewarp, "a frequency in rad/s, or 0"))
         self._check()
@@ -82,8 +88,8 @@ class Law:
             raise ParameterError(key="sign", value=self.sign, remedy="-1 (v = -C y, the default) or 1 (v = C y)")
         if self.input is not None and self.input not in INPUTS:
             raise ParameterError(key="input", value=self.input, remedy=did_you_mean(str(self.input), INPUTS))
-        if self.rule not in RULES:
-            raise ParameterError(key="rule", value=self.rule, remedy=did_you_mean(str(self.rule), RULES))
+        if self.rule not in SAMPLING_RULES:
+            raise ParameterError(key="rule", value=self.rule, remedy=did_you_mean(str(self.rule), SAMPLING_RULES))
         if len(self.signals) > MOST_SIGNALS:
             raise ParameterError(key="signals", value=len(self.signals), remedy=f"at most {MOST_SIGNALS} signals")
         for each in self.references:
@@ -100,7 +106,8 @@ class Law:
         if block.signals != len(signals):
             remedy = f"B has {block.signals} columns: name one signal for each"
             raise ParameterError(key="signals", value=list(signals), remedy=remedy)
-        law = cls({}, parts=(Part(tuple(map(_column, signals)), block),), **others)
+        columns = tuple(name if name == "" else _signal(name, of_reference=True) for name in signals)
+        law = cls({}, parts=(Part(columns, block),), **others)
         if not law.signals:
             raise ParameterError(key="signals", value=list(signals), remedy="name at least one measured signal")
         return law
@@ -216,7 +223,10 @@ class Law:
             return replace(self, delay=value)
         if key == "gain":
             return self.times(value)
-        signal, _, rest = key.partition(".") if "@" not in key else _after_place(key)
+        signal, _, rest = key.partition(".")
+        if "@" in key:  # "strain@0.05.num.1": the place has a dot of its own
+            match = re.fullmatch(r"(.*@[0-9.eE+-]*?[0-9])(?:\.((?:num|den|gain).*))?", key)
+            signal, rest = (match[1], match[2] or "") if match else (key, "")
         for n, part in enumerate(self.parts):
             if part.signals == (signal,):
                 changed = Part(part.signals, _varied(part.block, rest, value, key))
@@ -241,19 +251,13 @@ def _parts_of(entries: Mapping[str, Any]) -> tuple[tuple[Part, ...], tuple[float
     return tuple(found), tuple(periods)
 
 
-def _signal(name: Any) -> str:
-    """The name of an output, with a place along the link after an @ where it needs one."""
-    if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z_]\w*(@[0-9.eE+-]+)?", name):
+def _signal(name: Any, *, of_reference: bool = False) -> str:
+    """The name of an output, with a place along the link after an @ where it needs one; that of its reference too."""
+    plain = name.removeprefix(REFERENCE) if of_reference and isinstance(name, str) else name
+    if not isinstance(plain, str) or not re.fullmatch(r"[A-Za-z_]\w*(@[0-9.eE+-]+)?", plain):
         remedy = 'an output such as hub_rate, or one along the link with its place, "strain@0.05"'
-        raise ParameterError(key="signal", value=name, remedy=remedy)
-    return name
-
-
-def _column(name: Any) -> str:
-    """The name of a column: a signal, a reference to one, or nothing."""
-    if name == "" or not isinstance(name, str):
-        return name if name == "" else _signal(name)
-    return REFERENCE + _signal(name.removeprefix(REFERENCE)) if name.startswith(REFERENCE) else _signal(name)
+        raise ParameterError(key="signal", value=plain, remedy=remedy)
+    return str(name)
 
 
 def is_measured(name: str) -> bool:
@@ -261,23 +265,7 @@ def is_measured(name: str) -> bool:
     return bool(name) and not name.startswith(REFERENCE)
 
 
-def _one_period(period: float | None, found: Iterable[float]) -> float | None:
-    """The sample period of the law, which its parts agree on."""
-    known = {float(each) for each in found}
-    if period is not None:
-        known.add(positive("period", period, "a sample period in s; leave it out for a continuous law"))
-    if len(known) > 1:
-        raise ParameterError(key="period", value=sorted(known), remedy="the parts of a law have one period in common")
-    return known.pop() if known else None
-
-
-def _after_place(key: str) -> tuple[str, str, str]:
-    """A key with a place, "strain@0.05.num.1", in front of and behind the dot that ends the place."""
-    match = re.fullmatch(r"(.*@[0-9.eE+-]*?[0-9])(?:\.((?:num|den|gain).*))?", key)
-    return (match[1], ".", match[2] or "") if match else (key, "", "")
-
-
-def _varied(block: Block, rest: str, value: float, key: str) -> Block:
+def _varied(block: LawBlock, rest: str, value: float, key: str) -> LawBlock:
     """A block with another factor, or coefficient."""
     if rest in ("", "gain"):
         if isinstance(block, Rational) and not block.order and len(block.num) == 1:

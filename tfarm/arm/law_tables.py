@@ -27,8 +27,8 @@ from tfarm.arm.reading import load_tables
 from tfarm.errors import MISSING, ParameterError, did_you_mean
 from tfarm.files import read_mat
 
-LAW = "law"
-MOST_BYTES = 16 * 1024 * 1024  # of a .mat file
+LAW_TABLE = "law"  # the table's name
+MOST_MAT_BYTES = 16 * 1024 * 1024  # of a .mat file
 
 
 class _Table(BaseModel):
@@ -84,7 +84,7 @@ def load_law(name_or_path: str | os.PathLike[str]) -> Law | None:
     """
     tables, file = load_tables(name_or_path)
     try:
-        return law_of_table(tables[LAW], Path(file).parent) if LAW in tables else None
+        return law_of_table(tables[LAW_TABLE], Path(file).parent) if LAW_TABLE in tables else None
     except ParameterError as error:
         raise error.in_file(file) from None
 
@@ -92,9 +92,9 @@ def load_law(name_or_path: str | os.PathLike[str]) -> Law | None:
 def law_of_table(table: Any, folder: Path) -> Law:
     """The law of a parsed [law] table; a .mat file is looked for beside the file, in `folder`."""
     if not isinstance(table, dict):
-        raise ParameterError(key=LAW, value=table, remedy="give a table, headed [law]")
+        raise ParameterError(key=LAW_TABLE, value=table, remedy="give a table, headed [law]")
     signals = {key: value for key, value in table.items() if isinstance(value, dict)}
-    head = _validated(LawTable, {key: value for key, value in table.items() if key not in signals}, LAW)
+    head = _validated(LawTable, {key: value for key, value in table.items() if key not in signals}, LAW_TABLE)
     common = {key: getattr(head, key) for key in ("name", "input", "delay", "period", "sign", "rule", "prewarp")}
     common["references"] = tuple(head.references)
     try:
@@ -107,55 +107,44 @@ def law_of_table(table: Any, folder: Path) -> Law:
             raise ParameterError(
                 key="matrices", value=MISSING, remedy="signals, system and scales are those of a .mat file"
             )
-        return Law(_entries(signals), **common)
+        entries = {}
+        for name, values in signals.items():
+            given = _validated(SignalTable, values, f"{LAW_TABLE}.{name}")
+            entries[name if given.x is None else f"{name}@{given.x!r}"] = given.build(f"{LAW_TABLE}.{name}")
+        return Law(entries, **common)
     except ParameterError as error:
-        raise ParameterError(key=_under(error.key), value=error.value, remedy=error.remedy) from None
-
-
-def _entries(signals: Mapping[str, Any]) -> dict[str, Any]:
-    """What `Law` takes, by the names of signals with their place."""
-    found = {}
-    for name, values in signals.items():
-        given = _validated(SignalTable, values, f"{LAW}.{name}")
-        found[name if given.x is None else f"{name}@{given.x!r}"] = given.build(f"{LAW}.{name}")
-    return found
+        key = error.key if error.key.startswith(LAW_TABLE) else f"{LAW_TABLE}.{error.key}"
+        raise ParameterError(key=key, value=error.value, remedy=error.remedy) from None
 
 
 def _of_file(head: LawTable, folder: Path, common: dict[str, Any]) -> Law:
-    """The law of a .mat file."""
+    """The law of a .mat file with A, B, C and D, or of the structure in it that `system` names."""
+    import numpy as np
+
     assert head.matrices is not None
     if head.signals is None:
         raise ParameterError(key="signals", value=MISSING, remedy="name a signal for each column of B")
-    found, _ = read_mat(folder / head.matrices, MOST_BYTES, key="matrices")
-    A, B, C, D = _four(found, head)
+    found, _ = read_mat(folder / head.matrices, MOST_MAT_BYTES, key="matrices")
+    holder, names = found, tuple(found)
+    if head.system is not None:
+        structs = [key for key, value in found.items() if getattr(getattr(value, "dtype", None), "names", None)]
+        if head.system not in structs:
+            raise ParameterError(key="system", value=head.system, remedy=did_you_mean(head.system, structs))
+        holder = found[head.system][0, 0]
+        names = holder.dtype.names
+    missing = [name for name in "ABCD" if name not in names]
+    if missing:
+        remedy = f"holds no {', '.join(missing)}; it has {', '.join(names)} (system = names a structure)"
+        raise ParameterError(key="matrices", value=head.matrices, remedy=remedy)
+    try:
+        A, B, C, D = (np.atleast_2d(np.asarray(holder[name], dtype=float)) for name in "ABCD")
+    except (TypeError, ValueError):
+        raise ParameterError(key="matrices", value=head.matrices, remedy="A, B, C and D hold numbers") from None
     if head.scales is not None:
         if len(head.scales) != len(head.signals):
             raise ParameterError(key="scales", value=head.scales, remedy="one number for each signal")
         B, D = B * head.scales, D * head.scales
     return Law.of_matrices(A, B, C, D, head.signals, **common)
-
-
-def _four(found: Mapping[str, Any], head: LawTable) -> list[Any]:
-    """A, B, C and D of the file, or of the structure that `system` names."""
-    import numpy as np
-
-    holder: Any = found
-    if head.system is not None:
-        if head.system not in found or found[head.system].dtype.names is None:
-            structs = [key for key, value in found.items() if getattr(getattr(value, "dtype", None), "names", None)]
-            raise ParameterError(key="system", value=head.system, remedy=did_you_mean(head.system, structs))
-        holder = found[head.system][0, 0]
-        names = holder.dtype.names
-    else:
-        names = tuple(found)
-    missing = [name for name in "ABCD" if name not in names]
-    if missing:
-        remedy = f"holds no {', '.join(missing)}; it has {', '.join(names)}"
-        raise ParameterError(key="matrices", value=head.matrices, remedy=f"{remedy} (system = names a structure)")
-    try:
-        return [np.atleast_2d(np.asarray(holder[name], dtype=float)) for name in "ABCD"]
-    except (TypeError, ValueError):
-        raise ParameterError(key="matrices", value=head.matrices, remedy="A, B, C and D hold numbers") from None
 
 
 def _validated(model: type[Any], table: Mapping[str, Any], place: str) -> Any:
@@ -169,7 +158,3 @@ def _validated(model: type[Any], table: Mapping[str, Any], place: str) -> Any:
     else:
         remedy = f"wrong value; {problem['msg'][:1].lower()}{problem['msg'][1:]}"
     raise ParameterError(key=key, value=problem["input"], remedy=remedy)
-
-
-def _under(key: str) -> str:
-    return key if key.startswith(LAW) else f"{LAW}.{key}"

@@ -12,7 +12,7 @@ from tfarm.arm.law import Law, Part
 from tfarm.errors import ParameterError
 from tfarm.files import write_file
 
-USUAL: dict[str, Any] = {  # what a [law] is where it does not say otherwise
+LAW_DEFAULTS: dict[str, Any] = {  # what a [law] is where it does not say otherwise
     "input": None, "delay": 0.0, "period": None, "sign": -1, "references": (), "rule": "tustin", "prewarp": 0.0,
 }  # fmt: skip
 
@@ -24,7 +24,7 @@ def law_toml(law: Law) -> str:
     signal.
     """
     head = [f"name = {json.dumps(law.name, ensure_ascii=False)}"]
-    given = ((key, getattr(law, key), usual) for key, usual in USUAL.items())
+    given = ((key, getattr(law, key), usual) for key, usual in LAW_DEFAULTS.items())
     head += [f"{key} = {_value(value)}" for key, value, usual in given if value != usual]
     names = [name for part in law.parts for name in part.signals]
     if len(set(names)) < len(names):

@@ -55,7 +55,10 @@ class Link:
     ) -> Link:
         """The link of an isotropic material: G = E / (2 (1 + nu)) from Poisson's ratio nu."""
         E = positive("link.youngs_modulus", youngs_modulus, MEANINGS["youngs_modulus"])
-        nu = _poissons_ratio(poissons_ratio)
+        meaning = "Poisson's ratio lies above -1, up to 0.5 (incompressible); about 0.3 for metals"
+        nu = number("link.poissons_ratio", poissons_ratio, meaning)
+        if not -1.0 < nu <= 0.5:
+            raise ParameterError(key="link.poissons_ratio", value=nu, remedy=meaning)
         return cls(
             length=length,
             density=density,
@@ -115,11 +118,3 @@ class Link:
     def slenderness(self) -> float:
         """L / sqrt(I/A) [-]; for a rectangle sqrt(12) times length over depth."""
         return self.length / self.section.radius_of_gyration
-
-
-def _poissons_ratio(value: object) -> float:
-    meaning = "Poisson's ratio lies above -1, up to 0.5 (incompressible); about 0.3 for metals"
-    nu = number("link.poissons_ratio", value, meaning)
-    if not -1.0 < nu <= 0.5:
-        raise ParameterError(key="link.poissons_ratio", value=nu, remedy=meaning)
-    return nu

@@ -15,10 +15,10 @@ from tfarm.errors import shown
 
 SOFTEST, STIFFEST = 1e5, 2e12  # Pa; soft silicone has 3e5, diamond 1.2e12
 LIGHTEST, DENSEST = 25.0, 25_000.0  # kg/m^3; light foam has 30, osmium 22,600: in g/cm^3 everything is below 25
-LONGEST = 100.0  # m; the arm of the space station has 17
-DAMPED = 0.1  # damping ratio of the clamped link; rubber has about 0.05
+LONGEST_ARM = 100.0  # m; the arm of the space station has 17
+MOST_DAMPED = 0.1  # damping ratio of the clamped link; rubber has about 0.05
 HEAVIEST = 1e5  # times the link's own mass or inertia
-FARTHEST = 10.0  # times the link's length; a hub's radius and a payload's offset are a fraction of it
+FARTHEST_OFFSET = 10.0  # times the link's length; a hub's radius and a payload's offset are a fraction of it
 YIELDING = 10.0  # times the link's own flexibility L/(3 EI); a clamp that is meant to hold has a tenth of it
 RUBBING = 50.0  # times 2 sqrt(3 EI/L J), beyond which the link cannot turn the hub; a harmonic drive reaches 1
 FIRST_CLAMPED = 1.8751040687119611  # first root of 1 + cos(b) cosh(b) = 0, for the clamped Euler-Bernoulli beam
@@ -35,13 +35,10 @@ def implausible(arm: Arm) -> tuple[str, ...]:
 
 
 def _segment(key: str, link: Link, length: float) -> Iterator[str]:
-    """What looks odd in a segment of an arm of that length [m]; its texts begin with its key in the file."""
-    yield from _material(key, link)
-    yield from _size(key, link, length)
-    yield from _damping(key, link, length)
+    """What looks odd in a segment of an arm of that length [m]; its texts begin with its key in the file.
 
-
-def _material(key: str, link: Link) -> Iterator[str]:
+    Material, size, and the damping ratio C w/2 of the clamped arm in its first mode, w = (b/L)^2 sqrt(EI / rhoA).
+    """
     for name in ("youngs_modulus", "shear_modulus"):
         value = getattr(link, name)
         if value < SOFTEST:
@@ -52,23 +49,15 @@ def _material(key: str, link: Link) -> Iterator[str]:
         yield f"{key}.density = {shown(link.density)}: lighter than foam; it is taken in kg/m^3, not in g/cm^3"
     elif link.density > DENSEST:
         yield f"{key}.density = {shown(link.density)}: denser than osmium; it is taken in kg/m^3"
-
-
-def _size(key: str, link: Link, length: float) -> Iterator[str]:
-    if link.length > LONGEST:
+    if link.length > LONGEST_ARM:
         yield f"{key}.length = {shown(link.length)}: longer than any arm; it is taken in m, not in mm"
     sides = link.section.dimensions or (("second_moment", math.sqrt(12) * link.section.radius_of_gyration),)
     for name, side in sides:
         if name != "inner_diameter" and side > length:
             what = "means a depth of" if name == "second_moment" else "is"
             yield f"{key}.section.{name} {what} {side:.4g} m, above the length of {length:.4g} m: no slender link"
-
-
-def _damping(key: str, link: Link, length: float) -> Iterator[str]:
-    """The damping ratio C w/2 of the clamped arm in its first mode, w = (b/L)^2 sqrt(EI / rhoA) of this segment."""
-    w = (FIRST_CLAMPED / length) ** 2 * math.sqrt(link.EI / link.rhoA)
-    ratio = link.damping * w / 2
-    if ratio > DAMPED:
+    ratio = link.damping * (FIRST_CLAMPED / length) ** 2 * math.sqrt(link.EI / link.rhoA) / 2
+    if ratio > MOST_DAMPED:
         yield (
             f"{key}.damping = {shown(link.damping)}: a damping ratio of {ratio:.2g} in the first mode "
             "of the clamped link; it is taken in s (E (1 + C s)), it is no ratio"
@@ -98,7 +87,7 @@ def _rig(arm: Arm) -> Iterator[str]:
     """The parts that the paper's arm has not: bounds on what a slip of units by 50 or more does to them."""
     hub, bending = arm.hub, 3 * arm.bending_scale
     for key, value in (("hub.radius", hub.radius), ("payload.offset", abs(arm.payload.offset))):
-        if value > FARTHEST * arm.length:
+        if value > FARTHEST_OFFSET * arm.length:
             times = value / arm.length
             yield f"{key} = {shown(value)}: {times:.3g} times the link's length; it is taken in m, not in mm"
     if arm.clamp.stiffness < bending / YIELDING:

@@ -17,10 +17,12 @@ from tfarm.errors import ParameterError, did_you_mean
 from tfarm.files import read_file
 
 PRESETS = files("tfarm.arm") / "presets"
-MOST_BYTES = 64 * 1024
+MOST_ARM_BYTES = 64 * 1024  # of an arm's file; those of 64 segments have 20 KB
 # tomllib takes seconds on one dotted key of 40 KB and recurses on every bracket; an arm's file needs
 # a line of text and a depth of two.
-LONGEST_LINE, MOST_DOTS, DEEPEST = 8192, 64, 16
+LONGEST_LINE = 8192  # characters
+MOST_DOTS = 64  # in a line
+MOST_BRACKETS = 16  # brackets open at once
 
 
 @cache
@@ -34,7 +36,8 @@ def load(name_or_path: str | os.PathLike[str]) -> Arm:
     name = _text_of(name_or_path)
     if not isinstance(name_or_path, os.PathLike) and name in presets():
         return _arm_of(PRESETS.joinpath(f"{name}.toml").read_bytes(), f"{name}.toml")
-    if not isinstance(name_or_path, os.PathLike) and not _looks_like_a_path(name):
+    is_path = isinstance(name_or_path, os.PathLike) or name.endswith(".toml") or {"/", "\\", os.sep} & set(name)
+    if not is_path and not os.path.lexists(name):
         remedy = f"no such preset: {did_you_mean(name, presets())}; or give the path of a .toml file"
         raise ParameterError(key="arm", value=name, remedy=remedy)
     return _arm_of(_read(name), name)
@@ -61,13 +64,8 @@ def _text_of(name_or_path: object) -> str:
     return name
 
 
-def _looks_like_a_path(name: str) -> bool:
-    separators = {"/", "\\", os.sep}
-    return name.endswith(".toml") or bool(separators & set(name)) or os.path.lexists(name)
-
-
 def _read(path: str) -> bytes:
-    return read_file(path, MOST_BYTES, key="arm", what="a .toml file")
+    return read_file(path, MOST_ARM_BYTES, key="arm", what="a .toml file")
 
 
 def _arm_of(data: bytes, file: str) -> Arm:
@@ -88,41 +86,37 @@ def _decoded(data: bytes) -> str:
 
 
 def _table_of(text: str) -> dict[str, Any]:
-    """The TOML table, after a look at what would choke the parser."""
-    _check_lines(text)
-    _check_depth(text)
+    """The TOML table, after a look at what would choke the parser.
+
+    Its complaint stands with the line it is about, the last one where it names none.
+    """
+    _check(text)
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise _no_toml(text, str(error)) from None
+        what, _, where = str(error).rstrip(")").partition(" (at ")
+        number = re.match(r"line (\d+)", where)
+        line = text.split("\n")[int(number[1]) - 1 if number else -1]
+        raise ParameterError(key=where or "TOML", value=line, remedy=f"is not TOML: {what}") from None
     except (ValueError, RecursionError):
         remedy = "an integer of thousands of digits, or brackets nested too deep"
         raise ParameterError(key="TOML", value=text, remedy=remedy) from None
 
 
-def _no_toml(text: str, complaint: str) -> ParameterError:
-    """The parser's complaint with the line it is about, the last one where it names none."""
-    what, _, where = complaint.rstrip(")").partition(" (at ")
-    number = re.match(r"line (\d+)", where)
-    line = text.split("\n")[int(number[1]) - 1 if number else -1]
-    return ParameterError(key=where or "TOML", value=line, remedy=f"is not TOML: {what}")
-
-
-def _check_lines(text: str) -> None:
-    for i, line in enumerate(text.split("\n"), 1):
+def _check(text: str) -> None:
+    """Refuse what tomllib takes seconds for: a long line, one of many dots, and brackets in brackets in brackets."""
+    lines = text.split("\n")
+    for i, line in enumerate(lines, 1):
         if len(line) > LONGEST_LINE:
             remedy = f"{len(line)} characters in a line; at most {LONGEST_LINE}"
             raise ParameterError(key=f"line {i}", value=line, remedy=remedy)
         if line.count(".") > MOST_DOTS:
             remedy = f"{line.count('.')} dots in a line; at most {MOST_DOTS}"
             raise ParameterError(key=f"line {i}", value=line, remedy=remedy)
-
-
-def _check_depth(text: str) -> None:
     depth = 0
     for bracket in re.finditer(r"[\[\]{}]", text):
         depth = depth + 1 if bracket[0] in "[{" else max(depth - 1, 0)
-        if depth > DEEPEST:
+        if depth > MOST_BRACKETS:
             i = text.count("\n", 0, bracket.start()) + 1
-            remedy = f"more than {DEEPEST} brackets open; an arm's file needs no nesting"
-            raise ParameterError(key=f"line {i}", value=text.split("\n")[i - 1], remedy=remedy)
+            remedy = f"more than {MOST_BRACKETS} brackets open; an arm's file needs no nesting"
+            raise ParameterError(key=f"line {i}", value=lines[i - 1], remedy=remedy)

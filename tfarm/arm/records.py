@@ -21,9 +21,9 @@ from tfarm.errors import ParameterError, did_you_mean, shown
 Input = Literal["hub_torque", "motor_voltage", "motor_current", "hub_angle"]
 INPUTS: tuple[Input, ...] = get_args(Input)
 INPUT_UNITS = {"hub_torque": "N m", "motor_voltage": "V", "motor_current": "A", "hub_angle": "rad"}
-MOST = 64  # segments, and attachments: more than any rig has, and 64 equal pieces are a check of the chain
+MOST_PARTS = 64  # segments, and attachments: more than any rig has, and 64 equal pieces are a check of the chain
 FLATTEST = 1e-3  # arm's length over a segment's radius of gyration: below it the units are mixed up
-ROUNDED = 1e-12  # of the length: what a person's sum of up to 64 decimal lengths may differ from ours
+LENGTH_ROUNDING = 1e-12  # of the length: what a person's sum of up to 64 decimal lengths may differ from ours
 
 _Part = TypeVar("_Part")
 
@@ -55,8 +55,8 @@ class Arm(Turning):
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", plain_name(self.name))
         object.__setattr__(self, "assumptions", plain_texts(self.assumptions))
-        object.__setattr__(self, "outer", _parts("outer", self.outer, Link, MOST - 1))
-        object.__setattr__(self, "attachments", _parts("attachments", self.attachments, Attachment, MOST))
+        object.__setattr__(self, "outer", _parts("outer", self.outer, Link, MOST_PARTS - 1))
+        object.__setattr__(self, "attachments", _parts("attachments", self.attachments, Attachment, MOST_PARTS))
         _one_of("theory", self.theory, THEORIES)
         _one_of("input", self.input, INPUTS)
         self._check_slenderness()
@@ -76,7 +76,7 @@ class Arm(Turning):
     def _check_places(self) -> None:
         """Attachments on the link, those at the tip exactly there; no pin on the axis, which stands anyway."""
         for i, attachment in enumerate(self.attachments, 1):
-            if attachment.x > self.length * (1 + ROUNDED):
+            if attachment.x > self.length * (1 + LENGTH_ROUNDING):
                 remedy = f"is beyond the tip; x counts from the clamp, up to the link's length of {self.length!r} m"
                 raise ParameterError(key=f"attachment.{i}.x", value=attachment.x, remedy=remedy)
         on_it = tuple(each if each.x <= self.length else replace(each, x=self.length) for each in self.attachments)

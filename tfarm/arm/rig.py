@@ -16,13 +16,13 @@ from tfarm.errors import ParameterError
 
 def differing(record: Any, always: int) -> dict[str, Any]:
     """The first `always` fields of a record's repr, and of the others those that differ from their defaults."""
-    known = [each for each in fields(record) if each.repr]
-    held = [(each.name, getattr(record, each.name), _default(each)) for each in known]
-    return {name: value for i, (name, value, default) in enumerate(held) if i < always or value != default}
-
-
-def _default(field: Any) -> Any:
-    return field.default if field.default_factory is MISSING else field.default_factory()
+    found = {}
+    for i, each in enumerate(known for known in fields(record) if known.repr):
+        value = getattr(record, each.name)
+        default = each.default if each.default_factory is MISSING else each.default_factory()
+        if i < always or value != default:
+            found[each.name] = value
+    return found
 
 
 def brief_repr(record: Any, always: int) -> str:

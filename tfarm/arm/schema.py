@@ -8,8 +8,8 @@ from typing import Any
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from tfarm.arm.records import INPUTS, MOST, Arm
-from tfarm.arm.tables import SHAPES, TABLES, ArmTable
+from tfarm.arm.records import INPUTS, MOST_PARTS, Arm
+from tfarm.arm.tables import ARM_TABLES, SHAPE_TABLES, ArmTable
 from tfarm.arm.theories import THEORIES
 from tfarm.errors import MISSING, ParameterError, did_you_mean
 
@@ -36,21 +36,26 @@ def _in_one_line(problems: Sequence[ErrorDetails], alone: bool) -> ParameterErro
     `alone` is whether there is but one link, which then has no number.
     """
     problem = min(problems, key=lambda problem: problem["type"] != "extra_forbidden")
-    key, kind = _key(problem["loc"], alone), problem["type"]
-    expected = _expected(problem["loc"])
+    place, kind = problem["loc"], problem["type"]
+    key, value = _key(place, alone), problem["input"]
     if kind in ("missing", "too_short"):
-        return ParameterError(key=key, value=MISSING, remedy=f"give {expected}")
+        return ParameterError(key=key, value=MISSING, remedy=f"give {_expected(place)}")
     if kind == "union_tag_not_found":
-        return ParameterError(key=f"{key}.shape", value=MISSING, remedy=f"give one of {', '.join(SHAPES)}")
+        return ParameterError(key=f"{key}.shape", value=MISSING, remedy=f"give one of {', '.join(SHAPE_TABLES)}")
     if kind == "extra_forbidden":
-        return ParameterError(key=key, value=problem["input"], remedy=f"unknown key; {_meant(problem['loc'])}")
+        word, names = str(place[-1]), [name for name in place[:-1] if isinstance(name, str)]
+        table = SHAPE_TABLES[names[2]] if names[:2] == ["link", "section"] else ARM_TABLES[names[0] if names else ""]
+        meant = did_you_mean(word, table.model_fields)
+        if names and word in AT_THE_TOP:
+            meant = f"{word} belongs at the top of the file, before its first table"
+        return ParameterError(key=key, value=value, remedy=f"unknown key; {meant}")
     if kind == "union_tag_invalid":
         shape = str(problem["ctx"]["tag"])
-        remedy = f"unknown shape; {did_you_mean(shape, SHAPES)}"
+        remedy = f"unknown shape; {did_you_mean(shape, SHAPE_TABLES)}"
         return ParameterError(key=f"{key}.shape", value=shape, remedy=remedy)
     if kind == "too_long":
-        return ParameterError(key=key, value=problem["ctx"]["actual_length"], remedy=f"at most {MOST} are read")
-    return ParameterError(key=key, value=problem["input"], remedy=f"wrong type; give {expected}")
+        return ParameterError(key=key, value=problem["ctx"]["actual_length"], remedy=f"at most {MOST_PARTS} are read")
+    return ParameterError(key=key, value=value, remedy=f"wrong type; give {_expected(place)}")
 
 
 def _key(place: Sequence[str | int], alone: bool) -> str:
@@ -77,20 +82,9 @@ def _expected(place: Sequence[str | int]) -> str:
         "assumptions": "a text in double quotes" if place[1:] else 'a list of texts such as ["density from a table"]',
         "theory": f"one of {', '.join(THEORIES)}, in double quotes",
         "input": f"one of {', '.join(INPUTS)}, in double quotes",
-        "link.section.shape": f"one of {', '.join(SHAPES)}",
+        "link.section.shape": f"one of {', '.join(SHAPE_TABLES)}",
         "link": "a table, headed [link], or [[link]] for each of several",
         "attachment": "a table for each, headed [[attachment]]",
         **dict.fromkeys(("hub", "clamp", "joint", "motor", "payload", "link.section"), f"a table, headed [{key}]"),
     }
     return known.get(key, "a number without quotes, in SI units")
-
-
-def _meant(place: Sequence[str | int]) -> str:
-    """What an unknown key may have been meant for."""
-    word, table = str(place[-1]), place[:-1]
-    if table and word in AT_THE_TOP:
-        return f"{word} belongs at the top of the file, before its first table"
-    names = [name for name in table if isinstance(name, str)]
-    in_section = names[:2] == ["link", "section"]
-    known = SHAPES[names[2]] if in_section else TABLES[names[0] if names else ""]
-    return did_you_mean(word, known.model_fields)

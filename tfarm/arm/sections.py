@@ -13,11 +13,11 @@ from dataclasses import dataclass
 from tfarm.arm.checks import positive
 from tfarm.errors import MISSING, ParameterError, did_you_mean
 
-KEY = "link.section"
+KEY = "link.section"  # before the names of its numbers in messages
 
 
 @dataclass(frozen=True, slots=True)
-class Shape:
+class NamedShape:
     """A named shape: its dimensions [m]; area [m^2], second moment [m^4], Cowper's factor as functions."""
 
     dimensions: tuple[str, ...]
@@ -42,20 +42,20 @@ def cowper_tube(nu: float, *, outer_diameter: float, inner_diameter: float) -> f
     return 6 * (1 + nu) * (1 + m2) ** 2 / ((7 + 6 * nu) * (1 + m2) ** 2 + (20 + 12 * nu) * m2)
 
 
-SHAPES: Mapping[str, Shape] = {
-    "rectangle": Shape(
+SHAPES: Mapping[str, NamedShape] = {
+    "rectangle": NamedShape(
         dimensions=("width", "depth"),
         area=lambda width, depth: width * depth,
         second_moment=lambda width, depth: width * depth**3 / 12,
         cowper=cowper_rectangle,
     ),
-    "round": Shape(
+    "round": NamedShape(
         dimensions=("diameter",),
         area=lambda diameter: math.pi * diameter**2 / 4,
         second_moment=lambda diameter: math.pi * diameter**4 / 64,
         cowper=cowper_round,
     ),
-    "tube": Shape(
+    "tube": NamedShape(
         dimensions=("outer_diameter", "inner_diameter"),
         area=lambda outer_diameter, inner_diameter: (
             math.pi * (outer_diameter - inner_diameter) * (outer_diameter + inner_diameter) / 4
@@ -90,10 +90,12 @@ class Section:
         for name, unit in (("area", "m^2"), ("second_moment", "m^4")):
             meaning = f"a section has a positive, finite {name.replace('_', ' ')} in {unit}"
             object.__setattr__(self, name, positive(f"{KEY}.{name}", getattr(self, name), meaning))
-        object.__setattr__(self, "shear_factor", _shear_factor(self.shear_factor))
-        self._check_shape()
-
-    def _check_shape(self) -> None:
+        if self.shear_factor is not None:
+            meaning = "a shear factor multiplies G A: above 0, up to 1 (a form factor of 6/5 is entered as 5/6)"
+            kappa = positive(f"{KEY}.shear_factor", self.shear_factor, meaning)
+            if kappa > 1.0:
+                raise ParameterError(key=f"{KEY}.shear_factor", value=kappa, remedy=meaning)
+            object.__setattr__(self, "shear_factor", kappa)
         if self.shape != "general":
             if (self.area, self.second_moment) != _properties(self.shape, dict(self.dimensions)):
                 remedy = f"does not fit this {self.shape}; use Section.{self.shape}() or Section.general()"
@@ -124,7 +126,10 @@ class Section:
 
     @classmethod
     def _named(cls, shape: str, shear_factor: float | None, **given: float) -> Section:
-        dimensions = {name: _dimension(name, value) for name, value in given.items()}
+        dimensions = {}
+        for name, value in given.items():
+            meaning = f"the {name.replace('_', ' ')} is a positive, finite number of metres"
+            dimensions[name] = positive(f"{KEY}.{name}", value, meaning)
         area, second_moment = _properties(shape, dimensions)
         return cls(
             shape=shape,
@@ -163,19 +168,3 @@ def _properties(shape: str, dimensions: Mapping[str, float]) -> tuple[float, flo
         remedy = f"a tube is hollow: less than its outer diameter, {dimensions['outer_diameter']:g} m"
         raise ParameterError(key=f"{KEY}.inner_diameter", value=dimensions["inner_diameter"], remedy=remedy)
     return SHAPES[shape].area(**dimensions), SHAPES[shape].second_moment(**dimensions)
-
-
-def _dimension(name: str, value: object) -> float:
-    meaning = f"the {name.replace('_', ' ')} is a positive, finite number of metres"
-    return positive(f"{KEY}.{name}", value, meaning)
-
-
-def _shear_factor(value: object) -> float | None:
-    """The factor multiplies G A, so it lies in (0, 1]."""
-    if value is None:
-        return None
-    meaning = "a shear factor multiplies G A: above 0, up to 1 (a form factor of 6/5 is entered as 5/6)"
-    kappa = positive(f"{KEY}.shear_factor", value, meaning)
-    if kappa > 1.0:
-        raise ParameterError(key=f"{KEY}.shear_factor", value=kappa, remedy=meaning)
-    return kappa

@@ -11,9 +11,9 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import Field
 
 from tfarm.arm import declared
-from tfarm.arm.declared import Table
+from tfarm.arm.declared import TomlTable
 from tfarm.arm.link import Link
-from tfarm.arm.records import MOST, Arm
+from tfarm.arm.records import MOST_PARTS, Arm
 from tfarm.arm.rig import Attachment, Gauge, Hub, Motor, Payload, RotarySpring
 from tfarm.arm.sections import Section
 from tfarm.errors import MISSING, ParameterError
@@ -22,35 +22,35 @@ _Part = TypeVar("_Part")
 
 
 @declared.of(Section.rectangle)
-class Rectangle(Table):
+class Rectangle(TomlTable):
     """[link.section] with shape = "rectangle"."""
 
     shape: Literal["rectangle"]
 
 
 @declared.of(Section.round)
-class Round(Table):
+class Round(TomlTable):
     """[link.section] with shape = "round"."""
 
     shape: Literal["round"]
 
 
 @declared.of(Section.tube)
-class Tube(Table):
+class Tube(TomlTable):
     """[link.section] with shape = "tube"."""
 
     shape: Literal["tube"]
 
 
 @declared.of(Section.general)
-class General(Table):
+class General(TomlTable):
     """[link.section] with shape = "general"."""
 
     shape: Literal["general"]
 
 
 @declared.of(Link)
-class LinkTable(Table):
+class LinkTable(TomlTable):
     """[link], or one [[link]] of several: exactly one of shear_modulus and poissons_ratio."""
 
     shear_modulus: float | None = None
@@ -69,48 +69,48 @@ class LinkTable(Table):
 
 
 @declared.of(Hub)
-class HubTable(Table):
+class HubTable(TomlTable):
     """[hub]."""
 
 
 @declared.of(RotarySpring)
-class SpringTable(Table):
+class SpringTable(TomlTable):
     """[clamp] and [joint], optional."""
 
 
 @declared.of(Motor)
-class MotorTable(Table):
+class MotorTable(TomlTable):
     """[motor], optional."""
 
 
 @declared.of(Attachment)
-class AttachmentTable(Table):
+class AttachmentTable(TomlTable):
     """One [[attachment]]."""
 
 
 @declared.of(Gauge)
-class GaugeTable(Table):
+class GaugeTable(TomlTable):
     """[gauge], optional."""
 
 
 @declared.of(Payload)
-class PayloadTable(Table):
+class PayloadTable(TomlTable):
     """[payload], optional."""
 
 
-class ArmTable(Table):
+class ArmTable(TomlTable):
     """The whole file, its [link] as a list of one."""
 
     name: str
     assumptions: list[str] = Field([])
     theory: str = "timoshenko"
     input: str = "hub_torque"
-    link: Annotated[list[LinkTable], Field(min_length=1, max_length=MOST)]
+    link: Annotated[list[LinkTable], Field(min_length=1, max_length=MOST_PARTS)]
     hub: HubTable
     clamp: SpringTable = SpringTable()
     joint: SpringTable = SpringTable()
     motor: MotorTable | None = None
-    attachment: Annotated[list[AttachmentTable], Field(max_length=MOST)] = Field([])
+    attachment: Annotated[list[AttachmentTable], Field(max_length=MOST_PARTS)] = Field([])
     gauge: GaugeTable = GaugeTable()
     payload: PayloadTable = PayloadTable()
 
@@ -145,8 +145,8 @@ def _within(place: str, build: Callable[[], _Part]) -> _Part:
         raise ParameterError(key=key, value=error.value, remedy=error.remedy) from None
 
 
-SHAPES: dict[str, type[Table]] = {"rectangle": Rectangle, "round": Round, "tube": Tube, "general": General}
-TABLES: dict[str, type[Table]] = {
+SHAPE_TABLES: dict[str, type[TomlTable]] = {"rectangle": Rectangle, "round": Round, "tube": Tube, "general": General}
+ARM_TABLES: dict[str, type[TomlTable]] = {
     "": ArmTable,
     "link": LinkTable,
     "hub": HubTable,

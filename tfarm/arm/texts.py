@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tfarm.errors import ParameterError
 
-MOST_BYTES = 200  # of a name in UTF-8: file systems stop at 255, and a temporary file's name is longer than its own
+MOST_NAME_BYTES = 200  # in UTF-8: file systems stop at 255, and a temporary file's name is longer than its own
 DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in "0123456789¹²³")}
 
 
@@ -15,8 +15,8 @@ def plain_name(name: object) -> str:
         raise ParameterError(key="name", value=name, remedy=remedy)
     if not name[0].isalnum() or name[-1] in " ." or set(name) & set('/\\:*?"<>|'):
         raise ParameterError(key="name", value=name, remedy=remedy)
-    if len(name.encode()) > MOST_BYTES:
-        raise ParameterError(key="name", value=name, remedy=f"{len(name.encode())} bytes; at most {MOST_BYTES}")
+    if len(name.encode()) > MOST_NAME_BYTES:
+        raise ParameterError(key="name", value=name, remedy=f"{len(name.encode())} bytes; at most {MOST_NAME_BYTES}")
     if name.partition(".")[0].rstrip().casefold() in DEVICES:
         raise ParameterError(key="name", value=name, remedy="is a device to Windows; give the arm another name")
     return name

@@ -8,7 +8,6 @@ from collections.abc import Iterable, Mapping
 from tfarm.arm.link import Link
 from tfarm.arm.records import Arm
 from tfarm.arm.rig import Motor, differing
-from tfarm.arm.sections import Section
 
 
 def to_toml(arm: Arm) -> str:
@@ -43,13 +42,15 @@ def _lines(numbers: Mapping[str, float]) -> Iterable[str]:
     return (f"{name} = {value!r}" for name, value in numbers.items())
 
 
-def _numbers(record: object, *names: str) -> Iterable[str]:
-    return _lines({name: getattr(record, name) for name in names})
-
-
 def _link(link: Link, heading: str) -> Iterable[list[str]]:
-    yield [heading, *_numbers(link, "length", "density", "youngs_modulus", "shear_modulus", "damping")]
-    yield ["[link.section]", f"shape = {_text(link.section.shape)}", *_section(link.section)]
+    """The tables of a link and of its section: the dimensions of that, or else its area and second moment."""
+    names = ("length", "density", "youngs_modulus", "shear_modulus", "damping")
+    yield [heading, *_lines({name: getattr(link, name) for name in names})]
+    section = link.section
+    numbers = dict(section.dimensions) or {"area": section.area, "second_moment": section.second_moment}
+    if section.shear_factor is not None:
+        numbers["shear_factor"] = section.shear_factor
+    yield ["[link.section]", f"shape = {_text(section.shape)}", *_lines(numbers)]
 
 
 def _motor(motor: Motor) -> Iterable[str]:
@@ -58,16 +59,6 @@ def _motor(motor: Motor) -> Iterable[str]:
     if motor.back_emf_constant == motor.torque_constant:
         del numbers["back_emf_constant"]
     return _lines(numbers)
-
-
-def _section(section: Section) -> Iterable[str]:
-    """The numbers that define a section: its dimensions, or else its area and second moment."""
-    if section.dimensions:
-        yield from (f"{name} = {value!r}" for name, value in section.dimensions)
-    else:
-        yield from _numbers(section, "area", "second_moment")
-    if section.shear_factor is not None:
-        yield from _numbers(section, "shear_factor")
 
 
 def _text(text: str) -> str:

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm
-from tfarm.arm.blocks import Block, Rational, StateSpace
-from tfarm.arm.feedback import through
+from tfarm.arm.blocks import LawBlock, Rational, StateSpace
+from tfarm.arm.feedback import input_words
 from tfarm.arm.law import Law, Part
 from tfarm.errors import ParameterError
 from tfarm.response.signals import Signals
@@ -60,7 +60,7 @@ def described_law(law: Law, arm: Arm) -> dict[str, Any]:
     """The law as it was given, how it is sampled, and what it reads and drives."""
     units = Signals(arm, law.signals).units
     sign, late = "-" if law.sign < 0 else "+", f", {law.delay:g} s late" if law.delay else ""
-    words = f"v = {sign}sum of C_i(z) y_i{late}; v is {through(arm)}, y = ({', '.join(law.signals)})"
+    words = f"v = {sign}sum of C_i(z) y_i{late}; v is {input_words(arm)}, y = ({', '.join(law.signals)})"
     return {
         "law": law.name,
         "signals": dict(zip(law.signals, units, strict=True)),
@@ -73,7 +73,7 @@ def described_law(law: Law, arm: Arm) -> dict[str, Any]:
     }
 
 
-def _in_z(part: Part, law: Law, period: float) -> Block:
+def _in_z(part: Part, law: Law, period: float) -> LawBlock:
     """A block of the law in z."""
     block, key = part.block, f"law.{part.signals[0]}.num"
     if block.excess > 0 and law.rule != "tustin":
@@ -91,7 +91,7 @@ def _in_z(part: Part, law: Law, period: float) -> Block:
     return tustin(block, period, law.prewarp)
 
 
-def tustin(block: Block, period: float, prewarp: float = 0.0) -> Block:
+def tustin(block: LawBlock, period: float, prewarp: float = 0.0) -> LawBlock:
     """The block with s = c (z - 1)/(z + 1).  Raises ParameterError where it has a pole at s = c."""
     c = prewarp / math.tan(prewarp * period / 2) if prewarp else 2 / period
     if isinstance(block, Rational) and block.excess > 0:
@@ -106,7 +106,7 @@ def tustin(block: Block, period: float, prewarp: float = 0.0) -> Block:
     return StateSpace(within @ (unit + A / c), within @ B * (2 / c), C @ within, D + C @ within @ B / c)
 
 
-def held(block: Block, period: float) -> StateSpace:
+def held(block: LawBlock, period: float) -> StateSpace:
     """What the block makes at the samples of signals that are held between them."""
     from scipy.linalg import expm
 

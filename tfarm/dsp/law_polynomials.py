@@ -12,7 +12,7 @@ import numpy as np
 from numpy.polynomial.polynomial import polyval
 from numpy.typing import NDArray
 
-from tfarm.arm.blocks import Block, Rational
+from tfarm.arm.blocks import LawBlock, Rational
 from tfarm.arm.law import Law
 from tfarm.records import record
 
@@ -77,11 +77,11 @@ def _product(factors: list[Real]) -> Real:
     return total
 
 
-def _denominator(block: Block) -> Real:
+def _denominator(block: LawBlock) -> Real:
     return np.array(block.den) if isinstance(block, Rational) else np.atleast_1d(np.poly(block.A)).real
 
 
-def _numerators(block: Block, den: Real) -> list[Real]:
+def _numerators(block: LawBlock, den: Real) -> list[Real]:
     """Of each signal, as many coefficients as the denominator has: det(z - A + B C) = den (1 + C (z - A)^-1 B)."""
     if isinstance(block, Rational):
         return [np.r_[np.zeros(len(block.den) - len(block.num)), block.num]]

@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from tfarm.arm import declared
-from tfarm.arm.declared import Table
+from tfarm.arm.declared import TomlTable
 from tfarm.arm.reading import load_tables
 from tfarm.arm.tables import ArmTable
 from tfarm.dsp.chain import Actuator, Chain, Converters, Sampling, Slew
@@ -19,26 +19,26 @@ OF_AN_ARM = (*ArmTable.model_fields, "law")
 
 
 @declared.of(Sampling)
-class SamplingTable(Table):
+class SamplingTable(TomlTable):
     """[sampling]."""
 
 
 @declared.of(Converters)
-class ConvertersTable(Table):
+class ConvertersTable(TomlTable):
     """[converters]."""
 
 
 @declared.of(Actuator)
-class ActuatorTable(Table):
+class ActuatorTable(TomlTable):
     """[actuator]."""
 
 
 @declared.of(Slew)
-class SlewTable(Table):
+class SlewTable(TomlTable):
     """[slew]."""
 
 
-TABLES: dict[str, type[Table]] = {
+TABLES: dict[str, type[TomlTable]] = {
     "sampling": SamplingTable,
     "converters": ConvertersTable,
     "actuator": ActuatorTable,

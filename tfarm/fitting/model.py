@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import INPUTS, Arm
-from tfarm.arm.keys import Family
+from tfarm.arm.keys import KeyedArms
 from tfarm.errors import ParameterError
 from tfarm.exact.jets import Jet
 from tfarm.exact.outputs import OUTPUTS
@@ -50,7 +50,7 @@ class Response:
 class Problem:
     """What is searched for: `parameters` of the arm first, then those of the sensors, and what they have to explain."""
 
-    family: Family
+    family: KeyedArms
     parameters: tuple[Parameter, ...]
     responses: tuple[Response, ...]
     rings: tuple[RingMode, ...] = ()
@@ -239,7 +239,7 @@ def _parts(values: Complex, one: Response) -> Real:
 def problem(
     arm: Arm,
     data: Sequence[Measured],
-    family: Family,
+    family: KeyedArms,
     numbers: Sequence[Parameter],
     sensors: Mapping[str, Any],
     rings: Sequence[RingMode] = (),

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm
-from tfarm.arm.keys import Family
+from tfarm.arm.keys import KeyedArms
 from tfarm.errors import ParameterError, did_you_mean
 from tfarm.records import record
 from tfarm.spectrum.scales import first_frequency
@@ -76,7 +76,7 @@ def parameters(
     start: Mapping[str, float] | None = None,
     bounds: Mapping[str, tuple[float, float]] | None = None,
     priors: Mapping[str, tuple[float, float]] | None = None,
-) -> tuple[Family, tuple[Parameter, ...]]:
+) -> tuple[KeyedArms, tuple[Parameter, ...]]:
     """The family of an arm whose numbers under `keys` are free, and these numbers.
 
     Each starts where `start` says, else at the arm's own value, or where that is 0 at a hundredth of what would matter.
@@ -87,14 +87,14 @@ def parameters(
         for key in said:
             if key not in keys:
                 raise ParameterError(key=what, value=key, remedy=f"is not free; {did_you_mean(key, keys)}")
-    family = Family(arm, keys)
+    family = KeyedArms(arm, keys)
     return family, tuple(
         _parameter(family, key, start.get(key), bounds.get(key), priors.get(key)) for key in family.keys
     )
 
 
 def _parameter(
-    family: Family,
+    family: KeyedArms,
     key: str,
     start: float | None,
     bounds: tuple[float, float] | None,

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from tfarm.arm import ANGLE_GAIN, LISTED, PLANE, SPELT_OUT, Arm, HubFeedback, shown_unit, through, unit_of
+from tfarm.arm import ANGLE_GAIN, LISTED, PLANE, SPELT_OUT, Arm, HubFeedback, input_words, shown_unit, unit_of
 from tfarm.arm.law import Law
 from tfarm.columns import JSON, REPORT, TERMINAL, Column, Table
 from tfarm.digits import general, plain, singly, within
@@ -109,9 +109,9 @@ def sign_of(arm: Arm) -> str:
     if arm.is_uniform:
         return f"{LAW}; a static torque u gives the moment -(J - I_h)/J u"
     if not arm.has_rigid_mode:
-        return f"{LAW}; u is {through(arm)}"
+        return f"{LAW}; u is {input_words(arm)}"
     share = arm.gauged_inertia / arm.total_inertia
-    return f"{LAW}; u is {through(arm)}, and a static torque at the hub gives the moment {-share:.6g} times as much"
+    return f"{LAW}; u is {input_words(arm)}, and a static torque at the hub gives the moment {-share:.6g} times as much"
 
 
 def law_answer(law: HubFeedback | Law, arm: Arm) -> dict[str, Any]:
@@ -120,7 +120,7 @@ def law_answer(law: HubFeedback | Law, arm: Arm) -> dict[str, Any]:
         return law.by_name | convention(arm)
     sign = "-" if law.sign < 0 else "+"
     late = f", {law.delay:g} s late" if law.delay else ""
-    words = f"v = {sign}sum of C_i(s) y_i{late}; v is {through(arm)}, y = ({', '.join(law.signals)})"
+    words = f"v = {sign}sum of C_i(s) y_i{late}; v is {input_words(arm)}, y = ({', '.join(law.signals)})"
     return {
         "law": law.name,
         "signals": dict(zip(law.signals, Signals(arm, law.signals).units, strict=True)),

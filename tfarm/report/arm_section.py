@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 
 import tfarm
-from tfarm.arm import Arm, implausible, through
+from tfarm.arm import Arm, implausible, input_words
 from tfarm.columns import Column, Table
 from tfarm.digits import plain, significant, singly, unit
 from tfarm.plots.sketch import draw_arm
@@ -54,7 +54,7 @@ def _rig_words(arm: Arm) -> list[str]:
     """Of a rig: by which theory, and through what its loops close."""
     if arm.is_uniform:
         return []
-    driven = "It is led through the hub's angle" if arm.is_locked else f"Its input is {through(arm)}"
+    driven = "It is led through the hub's angle" if arm.is_locked else f"Its input is {input_words(arm)}"
     return [f"The theory of its link is {THEORIES[arm.theory]}. {driven}; all loops on this page close through that."]
 
 
@@ -115,7 +115,7 @@ def _drive(arm: Arm) -> str:
     if arm.is_locked:
         return "The hub is locked: no torque turns it; it is led through the angle θ (positive anticlockwise)."
     if arm.input_per_torque != 1.0:
-        return f"The hub turns the link through its motor; the input u is {through(arm)}."
+        return f"The hub turns the link through its motor; the input u is {input_words(arm)}."
     if arm.has_massless_hub:
         return "The torque u (positive anticlockwise) acts on the root of the link itself: the pin has no inertia."
     return "The hub turns the link by the torque u (positive anticlockwise)."

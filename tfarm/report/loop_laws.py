@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Protocol
 
-from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, HubFeedback, through
+from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, HubFeedback, input_words
 from tfarm.digits import significant
 from tfarm.dsp import Chain
 from tfarm.dsp.brief import SampledBrief, sampled_brief
@@ -85,7 +85,7 @@ def sign_words(arm: Arm) -> str:
         return SIGN.format(rest=AT_REST if arm.has_rigid_mode else HELD)
     share = significant(arm.gauged_inertia / arm.total_inertia, 5) if arm.has_rigid_mode else ""
     rest = f"a static torque at the hub gives −{share} times as much" if share else HELD
-    return f"Here u is {through(arm)}. {SIGN.format(rest=rest)}"
+    return f"Here u is {input_words(arm)}. {SIGN.format(rest=rest)}"
 
 
 def edge_of_K2(arm: Arm, law: HubFeedback) -> float | None:

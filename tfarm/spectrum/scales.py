@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from tfarm.arm import GAINS, Arm, HubFeedback, load, through, written_unit
+from tfarm.arm import GAINS, Arm, HubFeedback, input_words, load, written_unit
 from tfarm.errors import ParameterError
 
 from .table import modes
@@ -88,7 +88,7 @@ def default_words(arm: Arm, names: Iterable[str] = ("K1", "K2")) -> str:
     why = "as in the paper" if is_paper else f"{RATE_SHARE:g} J w1 of this arm"
     units = {name: written_unit(name, arm) for name in ("K1", "K2")}
     words = {"K1": f"K1 = {law.K1:g}{units['K1']} ({why})", "K2": f"K2 = {law.K2:g}{units['K2']}"}
-    driven = f", through {through(arm)}" if arm.input_per_torque != 1.0 else ""
+    driven = f", through {input_words(arm)}" if arm.input_per_torque != 1.0 else ""
     return " and ".join(words[name] for name in names) + driven
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm
-from tfarm.arm.keys import Family
+from tfarm.arm.keys import KeyedArms
 from tfarm.arm.records import ADJUSTABLE
 from tfarm.errors import ParameterError
 from tfarm.records import record
@@ -49,7 +49,7 @@ def varied(arm: Arm, key: str, value: float) -> Arm:
     name = DOTTED.get(key, key)
     if name in ADJUSTABLE:
         return arm.having(**{name: value})
-    return Family(arm, (key,), "range").at({key: value})
+    return KeyedArms(arm, (key,), "range").at({key: value})
 
 
 @dataclass(frozen=True)
