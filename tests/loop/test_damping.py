@@ -77,7 +77,7 @@ def test_a_hub_as_good_as_clamped_needs_no_larger_model(monkeypatch):
     arm = replace(arm, link=replace(arm.link, density=58453563.61002201))
     K1, K2, top = np.geomspace(1.0, 1e4, 5).repeat(4), np.tile([-2, 0.5, 0.95, 0.9972], 5), band_of(arm, 1)
     model = RitzLoop(arm, 12)
-    monkeypatch.setattr(damping, "BEYOND", damping.BEYOND[:1])
+    monkeypatch.setattr(damping, "MODES_BEYOND_BAND", damping.MODES_BEYOND_BAND[:1])
     monkeypatch.setattr(damping, "poles_below", None)
     for own, a, b in zip(band_poles(arm, many_laws(HubFeedback(), K1=K1, K2=K2), 1), K1, K2, strict=True):
         s = model.eigenvalues(HubFeedback(K1=float(a), K2=float(b)))

@@ -18,7 +18,7 @@ from tfarm.dsp import Chain, Sampling, load_chain, sampled_verdict
 from tfarm.exact.characteristic import float_units, loop_parts
 from tfarm.exact.system import system_of
 from tfarm.loop.margins import margins
-from tfarm.loop.panels import WRONG, loop_panels
+from tfarm.loop.panels import MOST_MISS, loop_panels
 from tfarm.loop.plant import Loop
 from tfarm.loop.stability import stability
 from tfarm.report.given_laws import Subject
@@ -74,8 +74,8 @@ def test_the_error_that_the_page_states_is_not_exceeded(case):
         held = page.at(omega)
         factor = (held * exact.conj()).sum() / (abs(exact) ** 2).sum()
         missed = abs(held - factor * exact).max(axis=1) / abs(held).max(axis=1)
-        assert missed.max() < 100 * WRONG
-    assert data["error"] <= WRONG
+        assert missed.max() < 100 * MOST_MISS
+    assert data["error"] <= MOST_MISS
 
 
 def test_margins_are_the_librarys_to_the_printed_digits(case):

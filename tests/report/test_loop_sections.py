@@ -92,7 +92,7 @@ def _single(K1, K2):
 def test_the_edge_is_smooth_and_inside_the_picture(lab):
     """Neighbours lie close as seen, so that what is drawn between them is the curve itself."""
     places = np.stack([lab.x.place(lab.edge[:, 0]), lab.y.place(lab.edge[:, 1])])
-    assert np.nanmax(np.hypot(*np.diff(places))) < edges.LONG
+    assert np.nanmax(np.hypot(*np.diff(places))) < edges.LONG_SEGMENT
     assert np.isnan(lab.edge[-1]).all()
 
 
@@ -106,7 +106,7 @@ def test_no_part_of_the_edge_is_missing(lab):
             if axis == 1 and lab.region.K1[column] < 0 < lab.region.K1[column + 1]:
                 continue  # the line K1 = 0 is drawn on its own
             beside = across[column] + (0.5 / map.COLUMNS) * axis, up[row] + (0.5 / map.ROWS) * (1 - axis)
-            assert np.hypot(*(edge - beside).T).min() < edges.SHORT
+            assert np.hypot(*(edge - beside).T).min() < edges.SHORT_SEGMENT
 
 
 @pytest.mark.parametrize("column", [20, 120, 200])
@@ -158,7 +158,7 @@ def test_the_ranges_show_what_there_is():
     for arm in (LAB, STOCKY):
         omega = tfarm.modes(arm, 1).natural_frequency[-1]
         assert rate_axis(arm).high == pytest.approx(10 * arm.total_inertia * omega, rel=1e-14, abs=0)
-    assert moment_axis(LAB, rate_axis(LAB)).low == edges.LOW
+    assert moment_axis(LAB, rate_axis(LAB)).low == edges.LOWEST_MOMENT_GAIN
     deep = moment_axis(window_arm(), rate_axis(window_arm()))
     assert deep.low < -11.47
     assert not deep.is_linear

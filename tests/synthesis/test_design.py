@@ -15,10 +15,10 @@ from tfarm.arm import many_laws
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop.damping import least_damping
 from tfarm.loop.frequencies import band_of
-from tfarm.loop.lines import NONE
+from tfarm.loop.lines import NO_FEEDBACK
 from tfarm.loop.margins import loop_margins
 from tfarm.loop.regions import region
-from tfarm.loop.residual import RISE, SAMPLES, TRAVEL, residual_moment
+from tfarm.loop.residual import PERIOD_SAMPLES, RISE, TRAVEL, residual_moment
 from tfarm.loop.stability import stability
 from tfarm.synthesis.design import design
 
@@ -43,9 +43,9 @@ def slew(model, law):
         z = half @ z
     assert z[N] == pytest.approx(TRAVEL / arm.link.length)
     z[-1] = 0.0
-    step = expm(whole * 2 * np.pi / tfarm.modes(arm, 1).natural_frequency[-1] / SAMPLES)
+    step = expm(whole * 2 * np.pi / tfarm.modes(arm, 1).natural_frequency[-1] / PERIOD_SAMPLES)
     moment = []
-    for _ in range(SAMPLES):
+    for _ in range(PERIOD_SAMPLES):
         moment.append(z[N - 1])
         z = step @ z
     return np.array(moment)
@@ -62,7 +62,7 @@ def test_the_residual_moment_is_that_of_a_simulated_slew(K1, K2, Kp) -> None:
 
 
 def test_what_an_unstable_loop_leaves_is_huge_but_finite() -> None:
-    left = residual_moment(BARE, many_laws(NONE, K1=[0.3, 0.3, -1e4], K2=[0.3, 6.0, 0.3]), 2)
+    left = residual_moment(BARE, many_laws(NO_FEEDBACK, K1=[0.3, 0.3, -1e4], K2=[0.3, 6.0, 0.3]), 2)
     assert np.isfinite(left).all()
     assert (left[1:] > left[0]).all()
 
@@ -83,7 +83,7 @@ def random_gains(arm, number):
 
 def test_two_hundred_random_gains_damp_no_better(damping) -> None:
     K1, K2 = random_gains(LAB, 200)
-    assert least_damping(LAB, many_laws(NONE, K1=K1, K2=K2), 2).max() <= damping.value * (1 + 1e-9)
+    assert least_damping(LAB, many_laws(NO_FEEDBACK, K1=K1, K2=K2), 2).max() <= damping.value * (1 + 1e-9)
     assert damping.verdict.is_stable
     assert least_damping(LAB, many_laws(damping.law), 2)[0] == damping.value
 
@@ -91,7 +91,7 @@ def test_two_hundred_random_gains_damp_no_better(damping) -> None:
 def test_two_hundred_random_gains_leave_no_less(damping) -> None:
     found = design(LAB, "residual", continuous=True, **BOUNDS)
     K1, K2 = random_gains(LAB, 200)
-    assert residual_moment(LAB, many_laws(NONE, K1=K1, K2=K2), 2).min() >= found.value * (1 - 1e-9)
+    assert residual_moment(LAB, many_laws(NO_FEEDBACK, K1=K1, K2=K2), 2).min() >= found.value * (1 - 1e-9)
     assert found.value < residual_moment(LAB, many_laws(damping.law), 2)[0]
 
 
@@ -126,8 +126,8 @@ def test_the_flat_part_is_that_of_the_valley(name, request) -> None:
 
     def value(K1, K2):
         if name == "damping":
-            return least_damping(LAB, many_laws(NONE, K1=K1, K2=K2), 2) - worse
-        return worse - residual_moment(LAB, many_laws(NONE, K1=K1, K2=K2), 2)
+            return least_damping(LAB, many_laws(NO_FEEDBACK, K1=K1, K2=K2), 2) - worse
+        return worse - residual_moment(LAB, many_laws(NO_FEEDBACK, K1=K1, K2=K2), 2)
 
     for axis, (low, high) in enumerate((found.flat_K1, found.flat_K2)):
         bounds = found.bounds[("K1", "K2")[axis]]
@@ -148,7 +148,7 @@ def test_where_the_bounds_cut_the_search_off_is_no_optimum(damping) -> None:
     assert (found.widened, found.at_bound) == (("K2",), ())
     assert found.bounds["K2"][0] < found.law.K2 < -3.0
     K1, K2 = found.law.K1 * np.array([0.99, 1.01, 1.0, 1.0]), found.law.K2 + np.array([0.0, 0.0, -0.1, 0.1])
-    assert least_damping(LAB, many_laws(NONE, K1=K1, K2=K2), 2).max() < found.value
+    assert least_damping(LAB, many_laws(NO_FEEDBACK, K1=K1, K2=K2), 2).max() < found.value
 
 
 @pytest.mark.parametrize("number", sized(8, 30))

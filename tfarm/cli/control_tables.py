@@ -10,7 +10,7 @@ from typing import Any
 from tfarm.arm import ANGLE_GAIN, NAMES, PLANE
 from tfarm.columns import Column, Table
 from tfarm.digits import general, singly
-from tfarm.loop.answers import MARGINS, POLES, WINDOWS, gain_rows
+from tfarm.loop.answers import MARGIN_COLUMNS, POLE_COLUMNS, WINDOW_COLUMNS, gain_rows
 from tfarm.loop.margins import Margins
 from tfarm.tables.files import write_csv
 from tfarm.tables.terminal import heading, show
@@ -18,7 +18,7 @@ from tfarm.tables.terminal import heading, show
 
 def print_poles(answer: dict[str, Any]) -> None:
     """A row a pole, then the box."""
-    show(Table(columns=POLES, record=answer["poles"]))
+    show(Table(columns=POLE_COLUMNS, record=answer["poles"]))
     left, right, _, top = answer["box"]
     proven = "proven" if "discs" in answer else "by winding number"
     print(f"all poles with {left:.6g} < Re s < {right:.6g} and |Im s| < {top:.6g} ({proven}),")
@@ -54,7 +54,7 @@ def print_margins(found: Margins[Any], answer: dict[str, Any]) -> None:
 def _print_windows(found: Margins[Any], answer: dict[str, Any]) -> None:
     """What Lyapunov's argument says of gains at the hub, and how far each may go alone."""
     print(f"Lyapunov: {answer['lyapunov']['reason']}")
-    show(Table(columns=WINDOWS, record=gain_rows(found)))
+    show(Table(columns=WINDOW_COLUMNS, record=gain_rows(found)))
     spans = ", ".join(
         f"{name} ({each.looked_at[0]:.6g}, {each.looked_at[1]:.6g})" for name, each in found.windows.items()
     )
@@ -64,14 +64,16 @@ def _print_windows(found: Margins[Any], answer: dict[str, Any]) -> None:
 def _print_loop_margins(answer: dict[str, Any]) -> None:
     band = answer["in_band"]
     hidden = not answer["delay_margin_s"]  # what a delay takes away has no exact phase
-    sizes = ["not known" if (size := answer[each.key]) is None else f"{size:.6g}" for each in MARGINS]
-    exact = ["" if hidden and each.unit == "deg" else size for each, size in zip(MARGINS, sizes, strict=True)]
-    at = ["-" if math.isinf(band[each.key]) else f"{band['at_rad_s'][each.of]:.6g}" for each in MARGINS]
+    sizes = ["not known" if (size := answer[each.key]) is None else f"{size:.6g}" for each in MARGIN_COLUMNS]
+    exact = ["" if hidden and each.unit == "deg" else size for each, size in zip(MARGIN_COLUMNS, sizes, strict=True)]
+    at = ["-" if math.isinf(band[each.key]) else f"{band['at_rad_s'][each.of]:.6g}" for each in MARGIN_COLUMNS]
     columns = (
-        Column("margin", "margin", of=["gain (factors)", *map(heading, MARGINS)]),
+        Column("margin", "margin", of=["gain (factors)", *map(heading, MARGIN_COLUMNS)]),
         Column("exact", "exact", of=[_pair(answer["gain_margin"]), *exact]),
         Column(
-            "band", f"up to {band['band_rad_s']:.6g} rad/s", of=["", *(f"{band[each.key]:.6g}" for each in MARGINS)]
+            "band",
+            f"up to {band['band_rad_s']:.6g} rad/s",
+            of=["", *(f"{band[each.key]:.6g}" for each in MARGIN_COLUMNS)],
         ),
         Column("at", "at", "rad/s", of=["", *at]),
     )

@@ -10,7 +10,7 @@ from typing import Any
 from tfarm.columns import FILES, JSON, Column, Table
 from tfarm.digits import general, within
 from tfarm.dsp.law_verdict import law_answer as sampled_law_answer
-from tfarm.loop.answers import MARGINS, gain_rows, margins_answer, sizes_of
+from tfarm.loop.answers import MARGIN_COLUMNS, gain_rows, margins_answer, sizes_of
 from tfarm.loop.margins import Margins
 from tfarm.spectrum.answers import HELD
 
@@ -99,7 +99,7 @@ def margins_table(found: Comparison) -> Table:
     Of loops at their samples: between which factors on the law they are stable, and how much later it may act.
     """
     one, other = (_known(side) for side in found.sides)
-    names = TITLES if found.is_clocked else {column.key: (column.title, column.unit) for column in MARGINS}
+    names = TITLES if found.is_clocked else {column.key: (column.title, column.unit) for column in MARGIN_COLUMNS}
     columns = (
         Column(
             "margin",
@@ -172,7 +172,7 @@ def _known(side: Side) -> list[tuple[float | None, str]]:
     assert side.margins is not None
     found: Margins[Any] = side.margins
     known: list[tuple[float | None, str]] = []
-    for column in MARGINS:
+    for column in MARGIN_COLUMNS:
         exact, in_band = sizes_of(found)[column.key]
         if in_band is None:
             known.append((None, "-"))

@@ -19,8 +19,8 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 STRETCH = 2.0  # how much wider than high, or higher than wide, a picture is at most: so much more a curve turns in it
-TURN = math.radians(5.0) / STRETCH  # from one piece of a curve to the next, where the picture is as high as wide
-SHORT = 2e-3  # of the picture, a pixel: the corners of what is no longer nobody sees
+MOST_TURN = math.radians(5.0) / STRETCH  # from one piece of a curve to the next, where the picture is as high as wide
+PIXEL = 2e-3  # of the picture, a pixel: the corners of what is no longer nobody sees
 
 
 def loose(curves: Complex, width: Real | float, height: Real | float) -> NDArray[np.bool_]:
@@ -35,11 +35,11 @@ def loose(curves: Complex, width: Real | float, height: Real | float) -> NDArray
         turn = abs(np.angle(piece[:, 1:] / piece[:, :-1]))
     parts = is_real[:, 1:] != is_real[:, :-1]
     stays = is_real[:, 2:] & is_real[:, 1:-1] & is_real[:, :-2]
-    bent = np.isfinite(turn) & (turn > TURN) & ~(stays | parts[:, 1:] | parts[:, :-1])
+    bent = np.isfinite(turn) & (turn > MOST_TURN) & ~(stays | parts[:, 1:] | parts[:, :-1])
     wanted = parts.copy()
     wanted[:, :-1] |= bent
     wanted[:, 1:] |= bent
-    return np.asarray((wanted & (size > SHORT)).any(axis=0))
+    return np.asarray((wanted & (size > PIXEL)).any(axis=0))
 
 
 def loose_columns(across: Real, parts: Sequence[RegionPiece], drawn: Callable[[Real, Real], Complex]) -> Real:
@@ -53,7 +53,7 @@ def loose_columns(across: Real, parts: Sequence[RegionPiece], drawn: Callable[[R
         gain, outline = np.r_[gain, gain[::-1]], drawn(np.r_[gain, gain[::-1]], np.r_[low, high[::-1]])
         for before, here, after in _corners(outline):
             for other in (before, after):
-                if abs(outline[other] - outline[here]) > SHORT:
+                if abs(outline[other] - outline[here]) > PIXEL:
                     wanted.update(_halves(across, float(gain[here]), float(gain[other])))
     return np.array(sorted(wanted))
 
@@ -65,7 +65,7 @@ def _corners(outline: Complex) -> list[tuple[int, int, int]]:
     with np.errstate(all="ignore"):
         turn = abs(np.angle((outline[after] - outline[kept]) / (outline[kept] - outline[before])))
     seen = (outline[kept].real > 0) & (outline[kept].imag > 0) & (outline[kept].imag < 1)
-    found = np.flatnonzero(seen & (turn > STRETCH * TURN))
+    found = np.flatnonzero(seen & (turn > STRETCH * MOST_TURN))
     return [(int(before[n]), int(kept[n]), int(after[n])) for n in found]
 
 

@@ -22,8 +22,8 @@ from .poles import Poles
 from .regions import INFINITE, Region
 from .windows import Interval, Windows, reach_words
 
-LAW = f"u = -{SPELT_OUT} + r"
-POLES = (  # of pairs Re s, Im s
+LAW_IN_WORDS = f"u = -{SPELT_OUT} + r"
+POLE_COLUMNS = (  # of pairs Re s, Im s
     Column("re", "Re s", "1/s", of=lambda pole: within(pole[0], HELD * math.hypot(*pole), 12)),
     Column("im", "Im s", "rad/s", of=lambda pole: pole[1], digits=singly(general, 12)),
     Column("ratio", "damping ratio", of=lambda pole: within(-pole[0] / math.hypot(*pole), HELD, 6) if pole[1] else "-"),
@@ -59,8 +59,8 @@ def _joined(*pairs: Interval) -> str:
     return " ".join(repr(float(end)) for pair in pairs for end in pair)
 
 
-NOTHING = "none: not stable"
-WINDOWS = (  # of `GainRow`; JSON has the gain's name before each key
+NOT_STABLE = "none: not stable"
+WINDOW_COLUMNS = (  # of `GainRow`; JSON has the gain's name before each key
     Column("gain", "gain", on=(TERMINAL, *REPORT)),
     Column("unit", "unit", on=REPORT),
     Column("value", "value", digits=singly(plain, 5), printed=singly(general, 6), on=(TERMINAL, *REPORT)),
@@ -76,15 +76,15 @@ WINDOWS = (  # of `GainRow`; JSON has the gain's name before each key
     Column("", "all stable windows", on=(TERMINAL,),
            of=lambda row: " ".join(row.spans(general, 8, *row.windows.all)) or "none"),
     Column("stable_around_it", "stable around it", on=REPORT,
-           of=lambda row: _joined(row.windows.around) if row.windows.around else NOTHING,
-           shown=lambda row: " ".join(row.spans(plain, 5, row.windows.around)) or NOTHING),
+           of=lambda row: _joined(row.windows.around) if row.windows.around else NOT_STABLE,
+           shown=lambda row: " ".join(row.spans(plain, 5, row.windows.around)) or NOT_STABLE),
     Column("stable_windows", "all stable windows", on=REPORT,
            of=lambda row: _joined(*row.windows.all) or "none",
            shown=lambda row: ", ".join(row.spans(plain, 5, *row.windows.all)) or "none"),
     Column("looked_at", "looked at", on=REPORT, of=lambda row: _joined(row.windows.looked_at),
            shown=lambda row: "({}, {})".format(*(plain(end, 5) for end in row.windows.looked_at))),
 )  # fmt: skip
-MARGINS = (  # of `LoopMargins`, beside the factors of the gain
+MARGIN_COLUMNS = (  # of `LoopMargins`, beside the factors of the gain
     Column("phase_margin_deg", "phase margin", "deg", of="phase"),
     Column("phase_lag_deg", "phase lag", "deg", of="phase_lag"),
     Column("phase_lead_deg", "phase lead", "deg", of="phase_lead"),
@@ -107,11 +107,12 @@ PHASE_CROSSOVERS = (  # of pairs: where L < 0, and the factor that puts a pole t
 def sign_of(arm: Arm) -> str:
     """The law, and what a gauge reads of a static torque: with it the sign of its gain; of a rig what u is."""
     if arm.is_uniform:
-        return f"{LAW}; a static torque u gives the moment -(J - I_h)/J u"
+        return f"{LAW_IN_WORDS}; a static torque u gives the moment -(J - I_h)/J u"
     if not arm.has_rigid_mode:
-        return f"{LAW}; u is {input_words(arm)}"
+        return f"{LAW_IN_WORDS}; u is {input_words(arm)}"
     share = arm.gauged_inertia / arm.total_inertia
-    return f"{LAW}; u is {input_words(arm)}, and a static torque at the hub gives the moment {-share:.6g} times as much"
+    static = f"a static torque at the hub gives the moment {-share:.6g} times as much"
+    return f"{LAW_IN_WORDS}; u is {input_words(arm)}, and {static}"
 
 
 def law_answer(law: HubFeedback | Law, arm: Arm) -> dict[str, Any]:
@@ -194,7 +195,7 @@ def _known_of(found: Margins | Margins[LawLoop]) -> dict[str, Any]:
         return {"passivity": {"kind": signs.kind, "reason": signs.reason}, "warnings": list(loop.warnings)}
     proof = lyapunov(found.stability.loop.arm, found.stability.loop.law)
     rows = gain_rows(found)
-    windows = Table(columns=WINDOWS, record=rows)
+    windows = Table(columns=WINDOW_COLUMNS, record=rows)
     return {
         "lyapunov": {"proven": proof.proven, "a1_over_a2": proof.a1_over_a2, "reason": proof.reason},
         **{f"{row.gain}_{key}": value for row, part in zip(rows, windows, strict=True) for key, value in part.items()},
@@ -208,16 +209,16 @@ def unsettled(found: Margins[Any]) -> str:
 
 
 def sizes_of(found: Margins[Any]) -> dict[str, tuple[float | None, float | None]]:
-    """Of each of MARGINS what is exact and what holds in the band; None where not known, or where there is none."""
+    """Of each of `MARGIN_COLUMNS` what is exact and what holds in the band; None where not known, or where none is."""
     limits: Any = found.in_band
     exact = {"delay": found.exact_delay, "disk": found.exact_disk, "peak_sensitivity": found.exact_peak}
     if found.exact_peak is None or math.isinf(found.exact_peak):  # T = 1 - S: as little known, or as large
         exact["peak_complementary"] = found.exact_peak
-    sizes = {column.of: None if limits is None else getattr(limits, column.of) for column in MARGINS}
-    return {column.key: (exact.get(column.of, sizes[column.of]), sizes[column.of]) for column in MARGINS}
+    sizes = {column.of: None if limits is None else getattr(limits, column.of) for column in MARGIN_COLUMNS}
+    return {column.key: (exact.get(column.of, sizes[column.of]), sizes[column.of]) for column in MARGIN_COLUMNS}
 
 
-NYQUIST = (  # of `Nyquist`
+NYQUIST_COLUMNS = (  # of `Nyquist`
     Column("re_s", "Re s", "1/s", of=lambda found: found.s.real),
     Column("im_s", "Im s", "rad/s", of=lambda found: found.s.imag),
     Column("re_L", "Re L", of=lambda found: found.L.real),
@@ -246,7 +247,7 @@ def nyquist_answer(found: Nyquist[Any]) -> dict[str, Any]:
 
 def nyquist_table(found: Nyquist[Any]) -> Table:
     """L on the contour, a row a point."""
-    return Table(columns=NYQUIST, record=found)
+    return Table(columns=NYQUIST_COLUMNS, record=found)
 
 
 def map_answer(found: Region) -> dict[str, Any]:

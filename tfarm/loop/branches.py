@@ -26,15 +26,15 @@ from tfarm.spectrum.scales import rate_unit
 from .plant import Loop, effective_inertia
 from .variation import Complex, Real, Variation, member_of
 
-FREE = 1e-6  # of the lowest flexible frequency: zeros closer to the origin may pass it
-FIRST = 0.01  # the first step along a parameter, as a share of the way
+MAY_PASS_ORIGIN = 1e-6  # of the lowest flexible frequency: zeros closer to the origin may pass it
+FIRST_STEP_SHARE = 0.01  # the first step along a parameter, as a share of the way
 SOFT = 1e-6  # where the rigid body's zeros meet at s = 0, this share of the way is left out
-SMALLEST = 1e-15  # share of the way at which they are no longer looked for on the other side
-SAME = 1e-9  # of its size: a zero paired anew is known again so closely
+LEAST_STEP_SHARE = 1e-15  # share of the way at which they are no longer looked for on the other side
+SAME_ZERO = 1e-9  # of its size: a zero paired anew is known again so closely
 NOBODY = -1  # the number of the branch of a zero that has ended
 ASIDE = 1e-3  # of J w1: a rate gain that keeps modes from meeting on the axis
-AROUND = 4  # nodes through which a guess between two of them goes
-APART = 0.02  # of the lowest flexible frequency: how far the rigid body's zeros may be there
+GUESSING_NODES = 4  # nodes through which a guess between two of them goes
+FARTHEST_RIGID = 0.02  # of the lowest flexible frequency: how far the rigid body's zeros may be there
 
 
 @dataclass(frozen=True)
@@ -53,8 +53,8 @@ class Segment:
         which = np.clip(np.searchsorted(way * at, way * values) - 1, 0, max(0, at.size - 2))
         guess = np.empty((values.size, *self.slots.shape), complex)
         for n in np.unique(which):
-            low = max(0, min(int(n) + 1 - AROUND // 2, at.size - AROUND))
-            guess[which == n] = through(self.nodes[low : low + AROUND], values[which == n])
+            low = max(0, min(int(n) + 1 - GUESSING_NODES // 2, at.size - GUESSING_NODES))
+            guess[which == n] = through(self.nodes[low : low + GUESSING_NODES], values[which == n])
         return ordered(guess, self.pinned)
 
 
@@ -78,7 +78,7 @@ class Stage:
         ends = (self.start, (self.start + self.stop) / 2, self.stop)
         return self.variation.arm.has_rigid_mode and any(self.turns(value) for value in ends)
 
-    def follow(self, zeros: Complex, wanted: int, first: float = FIRST) -> list[Node]:
+    def follow(self, zeros: Complex, wanted: int, first: float = FIRST_STEP_SHARE) -> list[Node]:
         """All nodes; `zeros` (n, 2) at `start` hold the rigid body's pair first where it moves and already has.
 
         `first` is the first step, as a share of the way.
@@ -86,9 +86,9 @@ class Stage:
         way, before = self.stop - self.start, Node(self.start, zeros)
         if self.moves and not self.turns(self.start):
             before = Node(self.start, np.concatenate([np.zeros((1, 2), complex), zeros]))
-            rest = self._followed(self._leaving(before, rigid_pair), wanted, FIRST * way, (before,))
+            rest = self._followed(self._leaving(before, rigid_pair), wanted, FIRST_STEP_SHARE * way, (before,))
         elif self.moves and self.at_zero == 0 and zeros[0, 0] == 0:
-            rest = self._followed(self._leaving(before, _slow_zero), wanted, FIRST * way, (before,))
+            rest = self._followed(self._leaving(before, _slow_zero), wanted, FIRST_STEP_SHARE * way, (before,))
         else:
             return self._followed(before, wanted, first * way, ())
         return [before, *rest]
@@ -109,16 +109,16 @@ class Stage:
         return 2 if not self.moves else 0 if not self.variation.left_at_origin(np.array(ends)).all() else 1
 
     def _member(self, value: float) -> Any:
-        return member_of(self.variation, value, self.at_zero, FREE * self.lowest)
+        return member_of(self.variation, value, self.at_zero, MAY_PASS_ORIGIN * self.lowest)
 
     def _leaving(self, before: Node, rigid: Callable[[Loop, Complex], Complex]) -> Node:
         """The first node after the start, where the rigid body's zeros leave s = 0 as `rigid` says."""
-        share = FIRST
-        while share > SMALLEST:
+        share = FIRST_STEP_SHARE
+        while share > LEAST_STEP_SHARE:
             value = self.start + share * (self.stop - self.start)
             guess = before.zeros.copy()
             guess[0] = rigid(self.variation.at(value), guess[0])
-            if abs(guess[0] - before.zeros[0]).max() < APART * self.lowest:
+            if abs(guess[0] - before.zeros[0]).max() < FARTHEST_RIGID * self.lowest:
                 found, stray = corrected(self._member(value), guess)
                 if not stray.any():
                     return Node(value, found)
@@ -127,7 +127,7 @@ class Stage:
 
     def _met(self, last: Node) -> Node:
         """The node at the end, where the rigid body's zeros meet again at s = 0."""
-        member = member_of(self.variation, self.stop, 2, FREE * self.lowest)
+        member = member_of(self.variation, self.stop, 2, MAY_PASS_ORIGIN * self.lowest)
         found, stray = corrected(member, last.zeros[1:])
         if stray.any():
             raise ConvergenceError("branches cannot be told apart at the end of the range", last.zeros, found)
@@ -153,29 +153,25 @@ def followed(variation: Variation, start: float, stop: float, wanted: int) -> tu
 
 
 def _followed(variation: Variation, start: float, stop: float, wanted: int, number: int) -> tuple[list[Segment], float]:
-    first = variation.at(start)
-    zeros, lowest = open_pairs(first.arm, number, wanted)
-    wanted += len(single_zeros(modes(first.arm, 1), 1.0))  # which stand before the flexible modes
-    if any(first.law.row):
-        zeros = _closed(first, zeros, wanted, lowest)
+    """The locus with so many modes in all: first from the open arm to the law at the start, all gains growing together.
+
+    Without losses two modes may meet on that way and leave the imaginary axis as a quadruple: then around that, with a
+    little feedback of the hub's rate that is taken back at the end.
+    """
+    arm, law = variation.at(start).arm, variation.at(start).law
+    zeros, lowest = open_pairs(arm, number, wanted)
+    wanted += len(single_zeros(modes(arm, 1), 1.0))  # which stand before the flexible modes
+    if any(law.row):
+        try:
+            zeros = Stage(Variation(arm, law, "all"), 0.0, 1.0, lowest).follow(zeros, wanted)[-1].zeros
+        except ConvergenceError:
+            aside = law[RATE_GAIN] + ASIDE * rate_unit(arm)
+            around = Variation(arm, law.having(RATE_GAIN, aside), "all")
+            zeros = Stage(around, 0.0, 1.0, lowest).follow(zeros, wanted)[-1].zeros
+            back = Stage(Variation(arm, law, RATE_GAIN), aside, law[RATE_GAIN], lowest)
+            zeros = back.follow(zeros, wanted)[-1].zeros
     stage = Stage(variation, start, stop, lowest)
     return segments(stage.follow(zeros, wanted), stage.at_zero == 1), lowest
-
-
-def _closed(loop: Loop, zeros: Complex, wanted: int, lowest: float) -> Complex:
-    """The pairs under the loop's law: of the open arm, all gains growing together.
-
-    Without losses two modes may meet on the imaginary axis and leave it as a quadruple: then around that, with a little
-    feedback of the hub's rate that is taken back at the end.
-    """
-    arm, law = loop.arm, loop.law
-    try:
-        return Stage(Variation(arm, law, "all"), 0.0, 1.0, lowest).follow(zeros, wanted)[-1].zeros
-    except ConvergenceError:
-        aside = law[RATE_GAIN] + ASIDE * rate_unit(arm)
-        around = law.having(RATE_GAIN, aside)
-        there = Stage(Variation(arm, around, "all"), 0.0, 1.0, lowest).follow(zeros, wanted)[-1].zeros
-        return Stage(Variation(arm, law, RATE_GAIN), aside, law[RATE_GAIN], lowest).follow(there, wanted)[-1].zeros
 
 
 def open_pairs(arm: Arm, number: int, wanted: int) -> tuple[Complex, float]:
@@ -195,7 +191,7 @@ def open_pairs(arm: Arm, number: int, wanted: int) -> tuple[Complex, float]:
         turning = found.eigenvalues[(found.index == 0) & (found.eigenvalues[:, 1] != 0)]
         return np.concatenate([turning, _alone(found.others), found.eigenvalues[found.index > 0]]), lowest
     stage = Stage(Variation(arm, HubFeedback(), "damping"), 0.0, C, lowest)
-    return stage.follow(zeros, wanted, min(1.0, FIRST / (omega[-1] * C)))[-1].zeros, lowest
+    return stage.follow(zeros, wanted, min(1.0, FIRST_STEP_SHARE / (omega[-1] * C)))[-1].zeros, lowest
 
 
 def _alone(zeros: Sequence[float]) -> Complex:
@@ -240,7 +236,7 @@ def _handed_on(old: Complex, new: Complex, slots: NDArray[np.int64], fresh: int)
     handed = np.full(new.shape, NOBODY)
     for i, j in zip(*np.nonzero(~np.isnan(new)), strict=True):
         apart = abs(old - new[i, j])
-        same = np.nanmin(apart) <= SAME * abs(new[i, j])
+        same = np.nanmin(apart) <= SAME_ZERO * abs(new[i, j])
         handed[i, j] = slots.ravel()[int(np.nanargmin(apart))] if same else fresh
         fresh += not same
     return handed

@@ -9,23 +9,22 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import GAINS
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import loop_parts, quick_characteristics, torque
 from tfarm.exact.outputs import OUTPUTS
+from tfarm.response.frequency import ON_AXIS
 
 from .variation import Complex, Evaluator, Real, Variation
 
-ON_AXIS = 1e-12  # a real part below this share of a zero's size is none, to working precision
-AT_REST = 1e-9  # of the largest of its branch: a pole so near to 0 is there but for the last step of its correction
+AT_ORIGIN = 1e-9  # of the largest of its branch: a pole so near to 0 is there but for the last step of its correction
 NEAR_ZERO = 1e-50  # of the lowest frequency: where D is taken for its value at s = 0
-SETTLED = 1e-6  # of the distance of two points: a crossing must be known so well at least
-STEP = 1e-5  # of a frequency, or of the distance of two gains, for differences
-STEPS = 30
+CROSSING_SETTLED = 1e-6  # of the distance of two points: a crossing must be known so well at least
+CROSSING_STEP = 1e-5  # of a frequency, or of the distance of two gains, for differences
+CROSSING_STEPS = 30  # of Newton's method, at most: linear convergence at a double root leaves 1e-9
 ODD = np.array([OUTPUTS[gain.output].power % 2 == 1 for gain in GAINS])  # powers of s: imaginary on the axis
-HALVINGS = (0, 4, 12)  # of the distance of two points, before Newton's method is tried
+CROSSING_HALVINGS = (0, 4, 12)  # of the distance of two points, before Newton's method is tried
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,31 +63,25 @@ def crossing_answers(found: Iterable[BranchCrossing]) -> list[dict[str, Any]]:
 def crossings(variation: Variation, gain: Real, branches: Complex, lowest: float) -> tuple[BranchCrossing, ...]:
     """All changes of sign of Re s between neighbours of the sampled branches, in the order in which they come.
 
-    Raises ConvergenceError where one cannot be solved for.
+    Neighbours are on both sides of the axis, points on it left out; or one is on it at i w, and one real and off it.
+    The mirror image of a branch that is listed, with Im s < 0, is left out.  Raises ConvergenceError where a crossing
+    cannot be solved for.
     """
     size = abs(branches)
-    on_axis = (abs(branches.real) <= ON_AXIS * size) | (size <= AT_REST * np.fmax.reduce(size, axis=1)[:, None])
+    on_axis = (abs(branches.real) <= ON_AXIS * size) | (size <= AT_ORIGIN * np.fmax.reduce(size, axis=1)[:, None])
     side = np.where(on_axis | np.isnan(branches), 0, np.sign(branches.real)).astype(int)
     found = []
     for number, (sides, zeros) in enumerate(zip(side, branches, strict=True)):
-        for low, high in _changes(sides, zeros):
+        across = [(a, b) for a, b in pairwise(np.flatnonzero(sides)) if sides[a] != sides[b]]
+        left = np.flatnonzero((sides[:-1] == 0) & (sides[1:] != 0))
+        away = [(n, n + 1) for n in left if zeros[n].imag > 0 == zeros[n + 1].imag]
+        listed = ((a, b) for a, b in sorted({*across, *away}) if zeros[a].imag >= 0 <= zeros[b].imag)
+        for low, high in listed:
             at, omega = _solved(variation, gain[[low, high]], zeros[[low, high]], lowest)
             direction = "unstable" if sides[high] > 0 else "stable"
             found.append(BranchCrossing(gain=at, omega=omega, branch=number, direction=direction))
     way = np.sign(gain[-1] - gain[0])
     return tuple(sorted(found, key=lambda each: (way * each.gain, each.omega)))
-
-
-def _changes(sides: NDArray[np.int64], zeros: Complex) -> list[tuple[int, int]]:
-    """Neighbours on both sides of the axis, points on it left out; or one on it at i w, and one real and off it.
-
-    (The mirror image of a branch that is listed, with Im s < 0, is left out.)
-    """
-    off = [int(n) for n in np.nonzero(sides)[0]]
-    across = [(a, b) for a, b in pairwise(off) if sides[a] != sides[b]]
-    left = [int(n) for n in np.nonzero((sides[:-1] == 0) & (sides[1:] != 0))[0]]
-    away = [(n, n + 1) for n in left if zeros[n].imag > 0 == zeros[n + 1].imag]
-    return [(a, b) for a, b in sorted({*across, *away}) if zeros[a].imag >= 0 <= zeros[b].imag]
 
 
 def _solved(variation: Variation, gains: Real, zeros: Complex, lowest: float) -> tuple[float, float]:
@@ -97,7 +90,7 @@ def _solved(variation: Variation, gains: Real, zeros: Complex, lowest: float) ->
         at = _through_origin(variation, gains, lowest)
         if at is not None:
             return at, 0.0
-    for halvings in HALVINGS:
+    for halvings in CROSSING_HALVINGS:
         ends, points = _halved(variation, gains, zeros, halvings)
         share = points.real[0] / (points.real[0] - points.real[1])
         g, w = float(ends[0] + share * (ends[1] - ends[0])), float((points[0] + share * (points[1] - points[0])).imag)
@@ -105,20 +98,29 @@ def _solved(variation: Variation, gains: Real, zeros: Complex, lowest: float) ->
             g, w, step = _newton(variation, g, w, gains)
         except np.linalg.LinAlgError:
             continue
-        if step < SETTLED and w > 0:
+        if step < CROSSING_SETTLED and w > 0:
             return g, w
     raise ConvergenceError(f"a crossing of the imaginary axis near {gains.mean():.6g} could not be solved", g, w)
 
 
 def _newton(variation: Variation, g: float, w: float, gains: Real) -> tuple[float, float, float]:
-    """Gain and frequency by Newton's method between two gains, and its last step as a share of their distance or w."""
+    """Gain and frequency by Newton's method between two gains, and its last step as a share of their distance or w.
+
+    D(i w; g) = 0 is one complex equation in two real unknowns, its slopes from differences; LinAlgError if that has no
+    solution.
+    """
     low, high = float(gains.min()), float(gains.max())
     step, width = math.inf, high - low
-    for _ in range(STEPS if w > 0 else 0):
-        dg, dw = _newton_step(variation, g, w, low, high)
+    for _ in range(CROSSING_STEPS if w > 0 else 0):
+        dg, dw = CROSSING_STEP * width, CROSSING_STEP * w
+        up, down = min(g + dg, high), max(g - dg, low)
+        values = _on_axis(variation, np.array([g, g, g, up, down]), np.array([w, w + dw, w - dw, w, w]))
+        by_omega, by_gain = (values[1] - values[2]) / (2 * dw), (values[3] - values[4]) / (up - down)
+        matrix = np.array([[by_gain.real, by_omega.real], [by_gain.imag, by_omega.imag]])
+        dg, dw = np.linalg.solve(matrix, [values[0].real, values[0].imag]).tolist()
         g, w = min(max(g - dg, low), high), w - dw
         last, step = step, max(abs(dg) / width, abs(dw) / abs(w))
-        if step == 0 or (step < SETTLED and step >= last / 2):
+        if step == 0 or (step < CROSSING_SETTLED and step >= last / 2):
             break
     return g, w, step
 
@@ -129,23 +131,12 @@ def _halved(variation: Variation, gains: Real, zeros: Complex, times: int) -> tu
     for _ in range(times):
         middle, s = ends.mean(), points.mean(keepdims=True)
         here = Evaluator(variation, np.array([middle]))
-        for _ in range(STEPS):
+        for _ in range(CROSSING_STEPS):
             value, slope, _ = here(s, np.zeros(1, int), variation.zeros_at_origin)
             s = s - value / slope
         side = int(np.sign(s.real[0]) == np.sign(points.real[1]))
         ends[side], points[side] = middle, s[0]
     return ends, points
-
-
-def _newton_step(variation: Variation, g: float, w: float, low: float, high: float) -> tuple[float, float]:
-    """Newton's step for D(i w; g) = 0, one complex equation in two real unknowns; LinAlgError if it has none."""
-    dg, dw = STEP * (high - low), STEP * w
-    up, down = min(g + dg, high), max(g - dg, low)
-    values = _on_axis(variation, np.array([g, g, g, up, down]), np.array([w, w + dw, w - dw, w, w]))
-    by_omega, by_gain = (values[1] - values[2]) / (2 * dw), (values[3] - values[4]) / (up - down)
-    matrix = np.array([[by_gain.real, by_omega.real], [by_gain.imag, by_omega.imag]])
-    step = np.linalg.solve(matrix, [values[0].real, values[0].imag])
-    return float(step[0]), float(step[1])
 
 
 def _on_axis(variation: Variation, gains: Real, omega: Real) -> Complex:

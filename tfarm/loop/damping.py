@@ -28,10 +28,11 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
 Kind = Callable[[Complex, float], NDArray[np.bool_]]  # which poles below a top frequency are meant
 
-BEYOND = (5, 30)  # modes of the model above those of the band; more where those do not do, a box where these do not
-STEPS = 6  # of Newton's method: the start is right to a few digits, so the last ones change nothing
-SETTLED, NEAR = 1e-9, 0.05  # shares of |s|: of the last correction, and of the whole way from the start
-BLOCK = 4000  # gains at a time
+MODES_BEYOND_BAND = (5, 30)  # of the model; 30 where 5 do not do, and a box where these do not
+CORRECTIONS = 6  # of Newton's method: the start is right to a few digits, so the last ones change nothing
+LAST_CORRECTION = 1e-9  # of |s|: squared by the quadratic convergence, far below the last digit
+WHOLE_CORRECTION = 0.05  # of |s|: farther from its start a pole may be another's
+GAINS_AT_A_TIME = 4000  # memory, whatever the grid
 
 
 def band_poles(arm: Arm, laws: Real, number: int) -> Complex:
@@ -50,7 +51,7 @@ def band_and_real_poles(arm: Arm, laws: Real, number: int) -> Complex:
 def _in_blocks(kind: Kind, arm: Arm, laws: Real, number: int) -> Complex:
     Loop(arm, law_of(abs(laws).max(axis=1)))
     top = band_of(arm, number)
-    parts = [slice(i, i + BLOCK) for i in range(0, laws.shape[1], BLOCK)]
+    parts = [slice(i, i + GAINS_AT_A_TIME) for i in range(0, laws.shape[1], GAINS_AT_A_TIME)]
     found = [_of_block(kind, arm, laws[:, part], number, top) for part in parts]
     slots = max(part.shape[1] for part in found)
     padded = [np.pad(part, ((0, 0), (0, slots - part.shape[1])), constant_values=np.nan) for part in found]
@@ -74,22 +75,19 @@ def _oscillating(s: Complex, top: float) -> NDArray[np.bool_]:
     return is_oscillating(s) & (s.imag < top)
 
 
-def _real(s: Complex, top: float) -> NDArray[np.bool_]:
-    """Real ones, apart from 0 and from what rounding makes of it."""
-    return np.asarray((abs(s.imag) <= 1e-9 * abs(s)) & (abs(s) > 1e-9 * top) & (abs(s) < top))
-
-
 def _either(s: Complex, top: float) -> NDArray[np.bool_]:
-    return _oscillating(s, top) | _real(s, top)
+    """Those, and real ones apart from 0 and from what rounding makes of it."""
+    real = (abs(s.imag) <= 1e-9 * abs(s)) & (abs(s) > 1e-9 * top) & (abs(s) < top)
+    return _oscillating(s, top) | real
 
 
 def _of_block(kind: Kind, arm: Arm, laws: Real, number: int, top: float) -> Complex:
     """The poles (n, slots) of one block."""
     poles, left = np.empty((laws.shape[1], 0), complex), np.arange(laws.shape[1])
-    for beyond in BEYOND:
+    for beyond in MODES_BEYOND_BAND:
         model = _model(arm, number + beyond)
         if isinstance(model, ConvergenceError):
-            if beyond == BEYOND[0]:  # boxes for all of them would take minutes
+            if beyond == MODES_BEYOND_BAND[0]:  # boxes for all of them would take minutes
                 raise model
             break
         found, is_done = _corrected(kind, model, laws[:, left], top)
@@ -119,7 +117,10 @@ def _corrected(kind: Kind, model: ModalModel, laws: Real, top: float) -> tuple[C
     s = np.where(np.take_along_axis(wanted, order, 1), np.take_along_axis(starts, order, 1), np.nan)
     polished, settled = exact_poles_next_to(model.arm, s, laws)
     poles = np.where(kind(polished, top), polished, np.nan)
-    return poles, settled.all(1) & _are_distinct(poles)
+    apart = abs(poles[:, :, None] - poles[:, None, :]) / abs(poles[:, :, None])
+    apart[:, np.arange(poles.shape[1]), np.arange(poles.shape[1])] = np.nan
+    is_twice = np.where(np.isnan(apart), 1.0, apart) < 1e-7
+    return poles, np.asarray(settled.all(1) & ~is_twice.any(axis=(1, 2)))
 
 
 @lru_cache(maxsize=16)
@@ -141,7 +142,7 @@ def exact_poles_next_to(arm: Arm, starts: Complex, laws: Real) -> tuple[Complex,
     rows, columns = np.nonzero(~np.isnan(starts))
     s = starts[rows, columns]
     begin, move = s.copy(), np.zeros_like(s)
-    for _ in range(STEPS):
+    for _ in range(CORRECTIONS):
         at = quick_characteristics(k, s, laws[:, rows])
         with np.errstate(all="ignore"):  # a start that runs away has not settled
             move = at.value / at.slope
@@ -149,13 +150,5 @@ def exact_poles_next_to(arm: Arm, starts: Complex, laws: Real) -> tuple[Complex,
         s = s - np.where(abs(move) > 0.1 * abs(s), move * (0.1 * abs(s) / np.maximum(abs(move), 1e-300)), move)
     polished, settled = np.full(starts.shape, np.nan, complex), np.ones(starts.shape, bool)
     polished[rows, columns] = s
-    settled[rows, columns] = (abs(move) < SETTLED * abs(s)) & (abs(s - begin) < NEAR * abs(s))
+    settled[rows, columns] = (abs(move) < LAST_CORRECTION * abs(s)) & (abs(s - begin) < WHOLE_CORRECTION * abs(s))
     return polished, settled
-
-
-def _are_distinct(poles: Complex) -> NDArray[np.bool_]:
-    """Of each row, whether no pole stands twice."""
-    apart = abs(poles[:, :, None] - poles[:, None, :]) / abs(poles[:, :, None])
-    apart[:, np.arange(poles.shape[1]), np.arange(poles.shape[1])] = np.nan
-    close = np.where(np.isnan(apart), 1.0, apart) < 1e-7
-    return np.asarray(~close.any(axis=(1, 2)))

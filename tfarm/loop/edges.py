@@ -23,11 +23,14 @@ Real = NDArray[np.float64]
 LOG_BASE = math.log(10.0)
 LINEAR_SCALE = 0.5  # decades that the linear part of an axis takes on each side of 0, as matplotlib's `linscale` has it
 LINEAR_SHARE = LINEAR_SCALE / (1 - 1 / 10)  # what these are multiplied by there
-EVEN = 1e-9  # of its range: by less may the steps of an even grid differ
-LOW, HIGH, DEEPEST = -4.0, 2.0, -50.0  # of the moment gain: the range shown, and how deep windows are looked for
-SHORT, LONG, ROUNDS = 0.008, 0.03, 30  # lengths of the boundary's segments, as shares of the picture
-SCAN = 32  # columns in which they are looked for
-NEAR = 1.5  # beyond this many rows from the boundary the count must have changed
+EVEN_GRID = 1e-9  # of its range: by less may the steps of an even grid differ
+LOWEST_MOMENT_GAIN, HIGHEST_MOMENT_GAIN = -4.0, 2.0  # of what balances a torque: the range that is shown
+DEEPEST_MOMENT_GAIN = -50.0  # and how deep unstable windows are looked for
+SHORT_SEGMENT = 0.008  # of the picture: longer pieces of the boundary are seen as straight, and are cut
+LONG_SEGMENT = 0.03  # of the picture: what is longer after all cuts is a jump through infinity, and is not drawn
+EDGE_ROUNDS = 30  # of cutting at most: 2^-30 of a step between frequencies is below what a picture shows
+SCAN = 32  # columns of the picture in which unstable windows are looked for
+ROWS_BESIDE_EDGE = 1.5  # beyond this many rows from the boundary the count must have changed
 
 
 @dataclass(frozen=True)
@@ -69,7 +72,7 @@ class Axis:
     def of(cls, values: Real) -> Axis:
         """That on which a grid (n,), ascending, is nearly even: linear, or logarithmic beyond its smallest size."""
         low, high = float(values[0]), float(values[-1])
-        if np.ptp(np.diff(values)) <= EVEN * (high - low):
+        if np.ptp(np.diff(values)) <= EVEN_GRID * (high - low):
             return cls(low, high)
         return cls(low, high, float(abs(values[values != 0]).min()))
 
@@ -83,7 +86,9 @@ def rate_axis(arm: Arm) -> Axis:
 
 def moment_axis(arm: Arm, x: Axis) -> Axis:
     """The moment gain from -4 to 2, or as deep as unstable windows go, times what one N m takes of a rig's input."""
-    low, high, deepest = (each * arm.input_per_torque for each in (LOW, HIGH, DEEPEST))
+    low, high, deepest = (
+        each * arm.input_per_torque for each in (LOWEST_MOMENT_GAIN, HIGHEST_MOMENT_GAIN, DEEPEST_MOMENT_GAIN)
+    )
     if arm.is_undamped:
         return Axis(low, high)
     across = x.grid(SCAN)
@@ -95,13 +100,13 @@ def moment_axis(arm: Arm, x: Axis) -> Axis:
 
 
 def edge(found: Region, x: Axis, y: Axis) -> Real:
-    """The boundary in the picture, finer where it is coarse, with rows of nan between its parts."""
+    """The boundary in the picture, finer where it is coarse, with a row of nan after each of its parts."""
     points = found.boundary
     if not points.size:
         return points
-    for _ in range(ROUNDS):
+    for _ in range(EDGE_ROUNDS):
         length, is_seen = _segments(points, x, y)
-        (coarse,) = np.nonzero((length > SHORT) & is_seen)
+        (coarse,) = np.nonzero((length > SHORT_SEGMENT) & is_seen)
         if not coarse.size:
             break
         middle = np.sqrt(points[coarse, 2] * points[coarse + 1, 2])
@@ -109,7 +114,13 @@ def edge(found: Region, x: Axis, y: Axis) -> Real:
         points = np.concatenate([points, boundary(found.arm, middle, found.held[ANGLE_GAIN])])
         points = points[np.unique(points[:, 2], return_index=True)[1]]
     length, is_seen = _segments(points, x, y)
-    return _cut(points, is_seen & (length < LONG))
+    kept = is_seen & (length < LONG_SEGMENT)
+    rows: list[Real] = []
+    for i in np.nonzero(np.r_[kept, False] | np.r_[False, kept])[0]:  # points of a segment that is kept
+        rows.append(points[i])
+        if i == len(points) - 1 or not kept[i]:
+            rows.append(np.full(3, np.nan))
+    return np.array(rows).reshape(-1, 3)
 
 
 def _segments(points: Real, x: Axis, y: Axis) -> tuple[Real, NDArray[np.bool_]]:
@@ -117,17 +128,6 @@ def _segments(points: Real, x: Axis, y: Axis) -> tuple[Real, NDArray[np.bool_]]:
     places = np.stack([axis.place(points[:, i]) for i, axis in enumerate((x, y))])
     low, high = np.minimum(places[:, 1:], places[:, :-1]), np.maximum(places[:, 1:], places[:, :-1])
     return np.hypot(*np.diff(places)), np.asarray(((high >= 0) & (low <= 1)).all(axis=0))
-
-
-def _cut(points: Real, kept: NDArray[np.bool_]) -> Real:
-    """The points that belong to kept segments, a row of nan after each run."""
-    belongs = np.r_[kept, False] | np.r_[False, kept]
-    rows: list[Real] = []
-    for i in np.nonzero(belongs)[0]:
-        rows.append(points[i])
-        if i == len(points) - 1 or not kept[i]:
-            rows.append(np.full(3, np.nan))
-    return np.array(rows).reshape(-1, 3)
 
 
 def stable_edge(found: Region, points: Real, x: Axis, y: Axis) -> Real:
@@ -138,7 +138,9 @@ def stable_edge(found: Region, points: Real, x: Axis, y: Axis) -> Real:
     across, up = x.place(points[:, 0]), y.place(points[:, 1])
     columns, rows = (axis.place(values) for axis, values in zip((x, y), found.axes, strict=True))
     column, row = np.searchsorted(_middles(columns), across), np.interp(up, rows, np.arange(rows.size))
-    below, above = (np.clip(np.round(row + way).astype(int), 0, rows.size - 1) for way in (-NEAR, NEAR))
+    below, above = (
+        np.clip(np.round(row + way).astype(int), 0, rows.size - 1) for way in (-ROWS_BESIDE_EDGE, ROWS_BESIDE_EDGE)
+    )
     differ = (found.unstable[below, column] == 0) != (found.unstable[above, column] == 0)
     return np.asarray(points[differ & (up >= 0) & (up <= 1) & (across <= 1) & (points[:, 0] > 0)])
 

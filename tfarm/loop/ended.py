@@ -9,15 +9,16 @@ from __future__ import annotations
 import numpy as np
 
 from tfarm.errors import ConvergenceError
+from tfarm.response.frequency import ON_AXIS
 
 from .crossings import BranchCrossing
 from .lines import crossings as line_crossings
-from .poles import ON_AXIS, counted, poles_below
+from .poles import counted, poles_below
 from .variation import Complex, Real, Variation
 
-ALIKE = 1e-6  # of gain and frequency: two roads to one crossing
-LOOPS = 12  # that are counted along a parameter of the arm
-BELOW = (0.97, 0.95, 0.93, 0.9)  # shares of that frequency: heights of the box that are tried
+SAME_CROSSING = 1e-6  # of gain and frequency: two roads to one crossing
+LOOPS = 12  # whose poles are counted along a parameter of the arm
+BOX_HEIGHTS = (0.97, 0.95, 0.93, 0.9)  # that are tried, as shares of the lowest end of the highest branch
 
 
 def with_others(
@@ -33,12 +34,14 @@ def with_others(
         _refuse_hidden(variation, gain, branches, top)
         return found
     way, width = np.sign(gain[-1] - gain[0]), abs(gain[-1] - gain[0])
-    ends = gain.min() + ALIKE * width, gain.max() - ALIKE * width
+    ends = gain.min() + SAME_CROSSING * width, gain.max() - SAME_CROSSING * width
     inside = line_crossings(variation.arm, variation.line, top).within(*ends)
     more = [
         BranchCrossing(gain=t, omega=w, branch=None, direction="unstable" if change * way > 0 else "stable")
         for t, w, change in inside
-        if not any(abs(t - it.gain) <= ALIKE * width and abs(w - it.omega) <= ALIKE * top for it in found)
+        if not any(
+            abs(t - it.gain) <= SAME_CROSSING * width and abs(w - it.omega) <= SAME_CROSSING * top for it in found
+        )
     ]
     return tuple(sorted([*found, *more], key=lambda each: (way * each.gain, each.omega)))
 
@@ -48,7 +51,7 @@ def _refuse_hidden(variation: Variation, gain: Real, branches: Complex, top: flo
     for n in np.unique(np.linspace(0, gain.size - 1, LOOPS).round().astype(int)):
         here = branches[:, n]
         right = (here.real > ON_AXIS * abs(here)) & (abs(here.imag) < top)
-        poles = poles_below(variation.at(float(gain[n])), top, BELOW)
+        poles = poles_below(variation.at(float(gain[n])), top, BOX_HEIGHTS)
         if poles.unstable > counted(here[right]):
             where = f"{variation.vary} = {gain[n]:.6g}"
             text = f"at {where} an unstable pole is on none of the branches that could be followed: use another range"

@@ -21,10 +21,10 @@ from tfarm.spectrum import flexible_frequencies, modes
 
 Real = NDArray[np.float64]
 
-NARROWEST, WIDEST = 1e-10, 0.06  # distances from a steep place, as shares of its frequency
-AROUND = 14  # points on either side of it
-BETWEEN = 24  # and between two of them
-MOST_MODES = 150  # flexible modes that a band holds at most
+NEAREST_TO_STEEP, FARTHEST_FROM_STEEP = 1e-10, 0.06  # distances from a steep place, as shares of its frequency
+POINTS_BESIDE_STEEP = 14  # of a grid on either side of a steep place, one and a half a decade
+POINTS_BETWEEN_STEEP = 24  # and between two of them
+MOST_BAND_MODES = 150  # flexible: what is not settled within so many is left open
 
 
 @lru_cache(maxsize=64)
@@ -42,10 +42,12 @@ def grid(arm: Arm, up_to: float) -> Any:
     """Frequencies [rad/s] from a millionth of the first natural one to `up_to`, dense at steep places; read-only."""
     places = np.asarray(steep_places(arm, 1.05 * up_to))
     lowest = 1e-6 * min(up_to, places[0] if places.size else up_to)
-    away = np.geomspace(NARROWEST, WIDEST, AROUND)
+    away = np.geomspace(NEAREST_TO_STEEP, FARTHEST_FROM_STEEP, POINTS_BESIDE_STEEP)
     close = (places[:, None] * (1 + np.r_[-away[::-1], away])).ravel()
     corners = np.r_[lowest, places[places < up_to], up_to]
-    between = np.concatenate([np.linspace(a, b, BETWEEN, endpoint=False) for a, b in itertools.pairwise(corners)])
+    between = np.concatenate(
+        [np.linspace(a, b, POINTS_BETWEEN_STEEP, endpoint=False) for a, b in itertools.pairwise(corners)]
+    )
     slow = np.geomspace(lowest, corners[1], 60)
     omega = np.unique(np.concatenate([close, between, slow]))
     omega = np.append(omega[(omega >= lowest) & (omega < up_to)], up_to)

@@ -21,7 +21,7 @@ from scipy.optimize import brentq, linear_sum_assignment
 from tfarm.arm import Arm
 from tfarm.arm.checks import whole
 from tfarm.arm.law import Law
-from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.errors import ConvergenceError
 from tfarm.records import record
 from tfarm.spectrum.box import Box, newton, zeros_in_box
 
@@ -31,19 +31,19 @@ from .frequencies import band_of, grid
 from .law_loop import LawLoop
 from .law_map import along
 from .law_poles import law_box, starting_points_of
-from .variation import PARAMETERS
+from .variation import ARM_PARAMETERS, must_be_way
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
 
-MOST_POINTS = 5000
-MOST_BRANCHES = 60
-PLAIN = 0.35  # of the distance to the next pole: one that moves by less is itself
+MOST_LAW_LOCUS_POINTS = 5000  # values: at each all poles of a box are found
+MOST_LAW_BRANCHES = 60  # flexible modes below the top of the box
+PLAIN_MOVE = 0.35  # of the distance to the next pole: one that moves by less is itself
 AT_EDGE = 0.05  # of the box's height or width: poles so near to its edge come and go
-DEEPEST = 3  # halvings of a step where poles are not plainly told apart; then a branch may end and another begin
+STEP_HALVINGS = 3  # halvings of a step where poles are not plainly told apart; then a branch may end and another begin
 HEIGHTS = (1.0, 1.013, 1.031, 1.057, 0.985, 1.09)  # of the box, until no pole is on its edge at the first value
-SAME = 1e-3  # of the range: a crossing of a branch so near to one that was solved for is that one
-TINY = 1e-9  # of a pole's size: a real part below it is none
+SEEN_CROSSING = 1e-3  # of the range: a crossing of a branch so near to one that was solved for is that one
+NO_PART = 1e-9  # of a pole's size: a smaller real or imaginary part is rounding, as is a smaller distance of two
 
 
 @dataclass(frozen=True)
@@ -73,20 +73,16 @@ def law_locus(
     Raises ParameterError for what is no number of the law or the arm, no loop or no range, ConvergenceError where the
     poles at a value cannot all be found.
     """
-    points = whole("points", points, 2, MOST_POINTS, f"a whole number from 2 to {MOST_POINTS}")
-    branches = whole("branches", branches, 1, MOST_BRANCHES, f"a whole number from 1 to {MOST_BRANCHES}")
-    for key, value in (("from", start), ("to", stop)):
-        if not math.isfinite(value):
-            raise ParameterError(key=key, value=value, remedy="a finite number")
-    if start == stop:
-        raise ParameterError(key="to", value=stop, remedy="the range is empty: a locus runs to another value")
+    points = whole("points", points, 2, MOST_LAW_LOCUS_POINTS, f"a whole number from 2 to {MOST_LAW_LOCUS_POINTS}")
+    branches = whole("branches", branches, 1, MOST_LAW_BRANCHES, f"a whole number from 1 to {MOST_LAW_BRANCHES}")
+    must_be_way(start, stop)
     family, values = Family(arm, law, vary, start), np.linspace(start, stop, points)
     box, first = family.started(values, branches)
     rows = [np.r_[each, np.full(points - 1, np.nan)] for each in first[:, None].astype(complex)]
     now = list(range(len(rows)))  # the row of each pole
     here = first
     for n in range(1, points):
-        there, now_there = family.joined(float(values[n - 1]), here, float(values[n]), box, DEEPEST)
+        there, now_there = family.joined(float(values[n - 1]), here, float(values[n]), box, STEP_HALVINGS)
         places = []
         for pole, before in zip(there, now_there, strict=True):
             if before is None:
@@ -111,7 +107,7 @@ class Family:
     @property
     def is_of_arm(self) -> bool:
         """Whether the number is one of the arm."""
-        return self.vary in PARAMETERS
+        return self.vary in ARM_PARAMETERS
 
     def at(self, value: float) -> LawLoop:
         """The loop where the number has that value."""
@@ -145,7 +141,7 @@ class Family:
         known = near[near != 0]
         starts = np.r_[known, known.conj()] if near.size else starting_points_of(loop, box.im_max)
         found = zeros_in_box(loop.function, box, starts)
-        found = np.where(abs(found.imag) < TINY * abs(found), found.real, found)
+        found = np.where(abs(found.imag) < NO_PART * abs(found), found.real, found)
         return np.r_[np.zeros(loop.zeros_at_origin, complex), found[found.imag >= 0]]
 
     def joined(self, low: float, here: Complex, high: float, box: Box, depth: int) -> tuple[Complex, list[int | None]]:
@@ -182,7 +178,7 @@ class Family:
             pole = self.pole_near(value, start)
         except ConvergenceError:
             return None
-        pole = pole.real if abs(pole.imag) <= TINY * abs(pole) else pole
+        pole = pole.real if abs(pole.imag) <= NO_PART * abs(pole) else pole
         return pole if abs(pole - start) <= room and (pole.imag != 0) == (start.imag != 0) else None
 
     def pole_near(self, value: float, start: complex) -> complex:
@@ -201,7 +197,7 @@ def assigned(here: Complex, there: Complex, box: Box) -> tuple[dict[int, int], b
     rows, columns = linear_sum_assignment(away)
     moved = away[rows, columns]
     room = np.minimum(_room(here)[rows], _room(there)[columns])
-    near = moved <= PLAIN * room
+    near = moved <= PLAIN_MOVE * room
     pairs = {int(j): int(i) for i, j, kept in zip(rows, columns, near | (moved <= room), strict=True) if kept}
     alone = np.r_[np.delete(here, rows[near]), np.delete(there, columns[near])]
     return pairs, not inside(alone, box).any()
@@ -211,7 +207,7 @@ def _room(poles: Complex) -> Real:
     """How far each is from the next, its own mirror image among them; those at 0 count as one."""
     everyone = np.r_[poles, poles.conj()]
     away = abs(poles[:, None] - everyone)
-    away[away <= TINY * abs(poles)[:, None]] = math.inf
+    away[away <= NO_PART * abs(poles)[:, None]] = math.inf
     return np.asarray(away.min(axis=1, initial=math.inf))
 
 
@@ -226,15 +222,15 @@ def _crossings(family: Family, values: Real, branches: Complex, box: Box) -> tup
     """Where branches change sides, solved for; along a linear number also those that no branch has."""
     found = []
     for number, row in enumerate(branches):
-        side = np.where(abs(row.real) <= TINY * abs(row), 0, np.sign(row.real))
+        side = np.where(abs(row.real) <= NO_PART * abs(row), 0, np.sign(row.real))
         for n in np.flatnonzero(side[1:] * side[:-1] < 0):
             each = _crossed(family, values[n : n + 2], row[n : n + 2])
             way = "unstable" if side[n + 1] > 0 else "stable"
             found.append(BranchCrossing(gain=each[0], omega=each[1], branch=number, direction=way))
     if not family.is_of_arm and family.vary != "delay":
         found += _others(family, values, found, box.im_max)
-    ascending = 1.0 if values[-1] > values[0] else -1.0
-    return tuple(sorted(found, key=lambda each: (ascending * each.gain, each.omega)))
+    sign = 1.0 if values[-1] > values[0] else -1.0
+    return tuple(sorted(found, key=lambda each: (sign * each.gain, each.omega)))
 
 
 def _crossed(family: Family, values: Real, poles: Complex) -> tuple[float, float]:
@@ -256,8 +252,10 @@ def _others(family: Family, values: Real, known: list[BranchCrossing], band: flo
     found, span = [], float(ascending[-1] - ascending[0])
     way = 1 if values[-1] > values[0] else -1
     for t, w, change in along(loop, family.vary, ascending, omega, parts, band):
-        same = [abs(each.gain - t) <= SAME * span and abs(each.omega - w) <= SAME * band for each in known]
-        if TINY * span < t - ascending[0] < (1 - TINY) * span and not any(same):
+        same = [
+            abs(each.gain - t) <= SEEN_CROSSING * span and abs(each.omega - w) <= SEEN_CROSSING * band for each in known
+        ]
+        if NO_PART * span < t - ascending[0] < (1 - NO_PART) * span and not any(same):
             direction = "unstable" if way * change > 0 else "stable"
             found.append(BranchCrossing(gain=t, omega=w, branch=None, direction=direction))
     return found
@@ -269,7 +267,7 @@ def law_locus_answer(found: LawLocus) -> dict[str, Any]:
         "arm": found.arm.name,
         **law_answer(found.law, found.arm),
         "vary": found.vary,
-        "unit": PARAMETERS.get(found.vary, "s" if found.vary == "delay" else "1"),
+        "unit": ARM_PARAMETERS.get(found.vary, "s" if found.vary == "delay" else "1"),
         "gain": found.values.tolist(),
         "branches": [[None if np.isnan(s) else [s.real, s.imag] for s in row] for row in found.branches.tolist()],
         "box": list(found.box),

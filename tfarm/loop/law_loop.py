@@ -19,7 +19,7 @@ from tfarm.arm import INPUT_UNITS, Arm, must_be_arm
 from tfarm.arm.driving import cancelled
 from tfarm.arm.law import Law
 from tfarm.errors import ParameterError
-from tfarm.exact.characteristic import Analytic, LoopParts, deflated
+from tfarm.exact.characteristic import STEP, Analytic, LoopParts, deflated
 from tfarm.exact.system import System
 from tfarm.records import record
 from tfarm.response.signals import Signals
@@ -28,11 +28,10 @@ from tfarm.spectrum.scales import first_frequency
 Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
 
-STEP = 1e-6  # of |s|, or of the way to -1/C, for differences
-FAR = (1e5, 1e6, 1e7)  # of w1: how far right an improper law is looked at
-FARTHEST = 1e11  # of w1: where waves are no longer dispersed
-AT_REST = 1e-12  # of w1: where the function, its zeros at 0 divided out, is taken for its value at 0
-FALLS = 0.5  # L must fall by this there, from one to the next
+FAR_RIGHT = (1e5, 1e6, 1e7)  # of w1: how far right an improper law is looked at
+UNDISPERSED = 1e11  # of w1: where waves are no longer dispersed
+NEAREST_TO_ORIGIN = 1e-12  # of w1: where the function, its zeros at 0 divided out, is taken for its value at 0
+FALL_FACTOR = 0.5  # L must fall by this there, from one to the next
 
 
 @dataclass(frozen=True)
@@ -103,18 +102,22 @@ class LawLoop:
         return min(terms)
 
     def _order_of(self, row: int) -> int:
-        """How often p_i vanishes at s = 0: those zeros of its parts, and integrators of the others."""
-        name, orders = self.law.signals[row], []
+        """How often p_i vanishes at s = 0: those zeros of its parts, and integrators of the others.
+
+        A part's own are told from the growth of its polynomial between two tiny arguments.
+        """
+        name, orders, at = self.law.signals[row], [], np.array([1e-6, 1e-9], dtype=complex)
         for n, part in enumerate(self.law.parts):
             if name in part.signals:
                 others = sum(int((each.block.poles == 0).sum()) for m, each in enumerate(self.law.parts) if m != n)
-                own = _zeros_at_origin(part.block.numerators, part.signals.index(name))
+                values = abs(part.block.numerators(at)[part.signals.index(name)])
+                own = max(0, round(float(np.log(values[0] / values[1]) / np.log(1e3)))) if values.all() else 99
                 orders.append(others + own)
         return min(orders)
 
     def function(self, s: Complex) -> Analytic:
         """D/s^n, n = `zeros_at_origin`, with slopes from differences."""
-        s = np.where(s == 0, AT_REST * first_frequency(self.arm), np.asarray(s, dtype=complex))
+        s = np.where(s == 0, NEAREST_TO_ORIGIN * first_frequency(self.arm), np.asarray(s, dtype=complex))
         near = np.min([np.ones(s.shape), *(abs(1.0 - s / each) for each in self.k.singular)], axis=0)
         h = STEP * np.maximum(abs(s) * near, 1e-300)
         at = np.array([s, s + h, s - h])
@@ -126,7 +129,7 @@ class LawLoop:
     @cached_property
     def delay_of_waves(self) -> float:
         """T [s] with D ~ e^{s T} far right: D e^{-s T}, with the same zeros, does not turn along a wide box."""
-        far = FARTHEST * first_frequency(self.arm)
+        far = UNDISPERSED * first_frequency(self.arm)
         scale = self.signals.parts(np.array([far, 2 * far], complex)).scale.real
         return float(max(0.0, scale[1] - scale[0]) / far)
 
@@ -151,10 +154,10 @@ class LawLoop:
         """Refuse a law that asks for more than the rig gives at once: then its loop is algebraic."""
         if not self.law.is_improper:
             return
-        far = first_frequency(self.arm) * np.array(FAR)
+        far = first_frequency(self.arm) * np.array(FAR_RIGHT)
         with np.errstate(all="ignore"):
             size = abs(self.loop_function(far.astype(complex)) * np.exp(far * self.law.delay))
-        if not (np.isfinite(size).all() and (size[1:] < FALLS * size[:-1]).all()):
+        if not (np.isfinite(size).all() and (size[1:] < FALL_FACTOR * size[:-1]).all()):
             worst = next(p for p in self.law.parts if p.block.excess > 0)
             remedy = (
                 "its numerator has too high a degree for this signal, so that the loop is algebraic; add a pole to den"
@@ -165,12 +168,3 @@ class LawLoop:
     def warnings(self) -> tuple[str, ...]:
         """What a person should know of the law: poles right of the axis that its own zeros cancel."""
         return cancelled(self.law)
-
-
-def _zeros_at_origin(numerators: Any, row: int) -> int:
-    """How often a polynomial vanishes at 0, from its growth at three tiny arguments."""
-    at = np.array([1e-6, 1e-9], dtype=complex)
-    values = abs(numerators(at)[row])
-    if not values.all():
-        return 99
-    return max(0, round(float(np.log(values[0] / values[1]) / np.log(at.real[0] / at.real[1]))))

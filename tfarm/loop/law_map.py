@@ -27,17 +27,17 @@ from .frequencies import grid
 from .law_loop import LawLoop
 from .law_poles import law_box
 from .law_stability import band_for
+from .lines import ascending, through_origin
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
 
-MOST = 400  # values along one number
-NEAR = (1e-6, 5e-7)  # of the lowest frequency: where a real pole is looked for on its way through 0
-SETTLED = 1.5  # how much the gain of a pole at the first may be that at the second
-ORDER = (2e-3, 1e-3)  # of w1: where the order of a zero at s = 0 is read off
+MOST_MAP_VALUES = 400  # along one number: each column is a line of crossings of its own
+NEAR_ORIGIN = (1e-6, 5e-7)  # of the lowest frequency: where a real pole is looked for on its way through 0
+ORDER_READ_AT = (2e-3, 1e-3)  # of w1: where the order of a zero at s = 0 is read off
 SIMPLE = 3.0  # ratio of values at the first and the second: 2 of a simple zero, 4 of a double one
-BESIDE = 1e-3  # of the range: how far from such a place its counts are taken
-POINTS = 400  # of an edge of a contour, to begin with
+BESIDE_MEETING = 1e-3  # of the range: how far from such a place its counts are taken
+CONTOUR_POINTS = 400  # of an edge of a contour, to begin with
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ def law_map(arm: Arm, law: Law, vary: tuple[str, str], x: Real, y: Real, band: f
     """
     if vary[0] == vary[1]:
         raise ParameterError(key="vary", value=list(vary), remedy="two different numbers of the law")
-    x, y = _axis(vary[0], x), _axis(vary[1], y)
+    x, y = ascending(vary[0], x, MOST_MAP_VALUES), ascending(vary[1], y, MOST_MAP_VALUES)
     if vary[1] == "delay":
         turned = law_map(arm, law, (vary[1], vary[0]), y, x, band)
         return LawMap(turned.arm, law, vary, x, y, turned.unstable.T.copy(), turned.band, [])
@@ -95,7 +95,8 @@ def law_map(arm: Arm, law: Law, vary: tuple[str, str], x: Real, y: Real, band: f
     omega = np.asarray(grid(own.arm, band))
     known = own.signals.parts(1j * omega)
     columns = [along(own.under(law.having(vary[0], float(value))), vary[1], y, omega, known, band) for value in x]
-    at, start = _clear_row(y, columns), x.size // 2
+    gains, start = np.concatenate([y[:0], *(each.gain for each in columns)]), x.size // 2
+    at = int(np.argmax(abs(y[:, None] - gains).min(axis=1))) if gains.size else y.size // 2  # farthest from a crossing
     row = law.having(vary[1], float(y[at]))
     if vary[0] == "delay":
         there = [unstable_below(own.under(row.having(vary[0], float(value))), band) for value in x]
@@ -113,7 +114,7 @@ def unstable_below(loop: LawLoop, band: float) -> int:
     Raises ConvergenceError where one is on the axis, to working precision.
     """
     right = law_box(loop, band).re_max
-    return winding_number(loop.function, Box(0.0, right, -band, band), POINTS)
+    return winding_number(loop.function, Box(0.0, right, -band, band), CONTOUR_POINTS)
 
 
 def along(loop: LawLoop, name: str, values: Real, omega: Real, known: LoopParts, band: float) -> Crossings:
@@ -136,11 +137,9 @@ def along(loop: LawLoop, name: str, values: Real, omega: Real, known: LoopParts,
     (before,), ways = brackets((A * (end - A).conj()).imag)
     place, t = solved(parts, omega[before], omega[before + 1])
     found = [Crossing(low + span * t, w, n) for t, w, n in zip(t, place, ways, strict=True)]
-    slow = np.concatenate([float(omega[0]) * np.array(NEAR), first_frequency(loop.arm) * np.array(ORDER)]).astype(
-        complex
-    )
+    slow = np.r_[float(omega[0]) * np.array(NEAR_ORIGIN), first_frequency(loop.arm) * np.array(ORDER_READ_AT)] + 0j
     A, end = ends(slow, first.signals.parts(slow))
-    rest = _at_rest(A[:2], end[:2])
+    rest = through_origin(A[:2], (end - A)[:2])
     if rest is not None and 0 < rest.t < 1:
         zero, half = abs((A + rest.t * (end - A))[2:])
         change = rest.change if zero < SIMPLE * half else _change_at(loop, name, low, span, rest.t, found, band)
@@ -152,36 +151,6 @@ def _change_at(loop: LawLoop, name: str, low: float, span: float, t: float, othe
     """By how much the count grows at t where two poles meet at s = 0, from counts on either side."""
     at = low + span * t
     away = [abs(each.t - at) for each in others if each.t != at]
-    step = min([BESIDE * span, *(each / 2 for each in away)])
+    step = min([BESIDE_MEETING * span, *(each / 2 for each in away)])
     below, above = (unstable_below(loop.under(loop.law.having(name, at + side * step)), band) for side in (-1, 1))
     return above - below
-
-
-def _at_rest(A: Complex, end: Complex) -> Crossing | None:
-    """A real pole through s = 0, from A and A + B at two real s near 0: t(s) = -A/B has a finite limit.
-
-    It goes right if t grows with s.
-    """
-    B = end - A
-    if not B.all():
-        return None
-    far, near = -(A / B).real
-    if not abs(near) < SETTLED * abs(far):
-        return None
-    return Crossing(float(2 * near - far), 0.0, 1 if far > near else -1)
-
-
-def _clear_row(y: Real, columns: list[Crossings]) -> int:
-    """The value of y that is furthest from the crossings of all columns, as shares of the range."""
-    gains = np.concatenate([y[:0], *(each.gain for each in columns)])
-    if not gains.size:
-        return y.size // 2
-    return int(np.argmax(abs(y[:, None] - gains).min(axis=1)))
-
-
-def _axis(name: str, values: Real) -> Real:
-    values = np.atleast_1d(np.asarray(values, dtype=float))
-    if not (2 <= values.size <= MOST and np.isfinite(values).all() and (np.diff(values) > 0).all()):
-        remedy = f"an ascending range of 2 to {MOST} values"
-        raise ParameterError(key=name, value=f"{values.size} values", remedy=remedy)
-    return values

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from tfarm.arm import Arm
 from tfarm.arm.checks import whole
 from tfarm.arm.law import Law
 from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.reduced.partial_fractions import Matrices
 from tfarm.reduced.sensed import closed, in_series, pade, sensed_model
 from tfarm.spectrum import modes_below
 from tfarm.spectrum.box import Box, complete
@@ -18,18 +20,16 @@ from tfarm.spectrum.damped import CLEAR
 
 from .frequencies import band_of, steep_places
 from .law_loop import LawLoop
-from .poles import MOST_POLES, USUAL, Poles, first_poles
+from .poles import MOST_POLES, USUAL_POLES, Poles, first_poles, near_modes, quiet_edge
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 PADE = 8  # order of the approximation of a delay in the model that starts are taken from
-LEFT = 1.5  # heights that a box reaches left
+HEIGHTS_LEFT = 1.5  # heights that a box reaches left
 LATE = 2.0  # of 1/delay: further left a delayed loop has ever more poles, and all of them are fast
-BEYOND = (2.0, 5.0, 20.0)  # of its right edge, where the loop function is looked at again
-QUIET = 0.5  # |L| there, so that 1 + L has no zero
-WIDEST = 1e8  # heights that a box reaches right
-MORE, LARGEST = 4, 40  # modes of the model above the box, and at most
-MOST_MODES = 150  # flexible modes below the highest box that is searched for as many poles as are asked for
+HEIGHTS_RIGHT = 1e8  # heights that a box reaches right
+MODES_ABOVE_BOX, MOST_MODEL_MODES = 4, 40  # modes of the model above the box, and at most
+MOST_LAW_BOX_MODES = 150  # flexible, below the highest box of a law that is searched for as many poles as are asked for
 
 
 def law_poles(arm: Arm, law: Law, count: int | None = None) -> Poles[LawLoop]:
@@ -38,14 +38,14 @@ def law_poles(arm: Arm, law: Law, count: int | None = None) -> Poles[LawLoop]:
     Raises ParameterError where there is no loop, ConvergenceError where the box cannot be completed.
     """
     remedy = f"a whole number from 1 to {MOST_POLES}"
-    wanted = USUAL if count is None else whole("count", count, 1, MOST_POLES, remedy)
+    wanted = USUAL_POLES if count is None else whole("count", count, 1, MOST_POLES, remedy)
     loop, number = LawLoop(arm, law), wanted + 2
     while True:
         poles = law_poles_below(loop, band_of(loop.arm, number))
         if poles.values.size >= wanted:
             real = int((poles.values.imag == 0).sum())
             return first_poles(poles, wanted if count is not None else max(wanted, real))
-        if 2 * number > MOST_MODES:
+        if 2 * number > MOST_LAW_BOX_MODES:
             if count is None:
                 return poles
             left, _, _, top = poles.box
@@ -69,40 +69,28 @@ def law_poles_below(loop: LawLoop, height: float, late: float = LATE) -> Poles[L
 def law_box(loop: LawLoop, height: float, late: float = LATE) -> Box:
     """A box of that height, right of the law's poles and until |L| is small; left short of -1/C and -late/delay."""
     own, C = loop.law.poles, loop.arm.damping
-    right = 1.1 * max([0.1 * height, *own.real.tolist()])
-    edge = 1j * np.linspace(0.0, height, 60)
-    while right < WIDEST * height:
-        L = loop.loop_function(np.r_[right + edge, right * np.array(BEYOND)])
-        if L.real.min() > -QUIET:
-            break
-        right *= 1.7
-    left = min(LEFT * height, CLEAR / C if C else np.inf, late / loop.law.delay if loop.law.delay else np.inf)
+    right = quiet_edge(loop, 1.1 * max([0.1 * height, *own.real.tolist()]), height, 60, HEIGHTS_RIGHT)
+    left = min(HEIGHTS_LEFT * height, CLEAR / C if C else np.inf, late / loop.law.delay if loop.law.delay else np.inf)
     return Box(-float(left), float(right), -height, height)
 
 
 def starting_points_of(loop: LawLoop, up_to: float) -> Complex:
     """Where Newton's method starts: the loop of a modal model, the arm's own frequencies, and the law's poles."""
     omega, C = np.asarray(steep_places(loop.arm, up_to)), loop.arm.damping
-    shift = np.array([0.0, 0.02, 0.3])[:, None]
-    decay = C * omega**2 / 2
-    near = (-decay - shift * omega + 1j * omega * np.sqrt(np.maximum(1 - (C * omega / 2) ** 2, 0.0))).ravel()
+    near = near_modes(omega, C)
     real = np.geomspace(up_to / 300, 1.4 * up_to, 25)
-    own = loop.law.poles
-    starts = np.concatenate(
-        [near, near.conj(), real, -real, own * 1.01, own * 0.9 + 0.1j * abs(own), _of_model(loop, up_to)]
-    )
+    own, of_model = loop.law.poles, np.empty(0, complex)
+    if not loop.law.is_improper:  # else it has no states
+        count = min(modes_below(loop.arm, up_to) + MODES_ABOVE_BOX, MOST_MODEL_MODES)
+        with suppress(ParameterError, ConvergenceError):  # the winding number says whether something is missing
+            of_model = poles_of_model(loop, sensed_model(loop.arm, loop.law.signals, count))
+    starts = np.concatenate([near, near.conj(), real, -real, own * 1.01, own * 0.9 + 0.1j * abs(own), of_model])
     return starts[abs(starts) > 1e-100]
 
 
-def _of_model(loop: LawLoop, up_to: float) -> Complex:
-    """Poles of a modal model under the law, its delay a Pade approximation; none where the law has no states."""
-    if loop.law.is_improper:
-        return np.empty(0, complex)
-    count = min(modes_below(loop.arm, up_to) + MORE, LARGEST)
-    try:
-        plant, law = sensed_model(loop.arm, loop.law.signals, count), loop.law.matrices()
-        if loop.law.delay:
-            law = in_series(law, pade(loop.law.delay, PADE).matrices())
-        return np.linalg.eigvals(closed(plant, law)).astype(complex)
-    except (ParameterError, ConvergenceError):
-        return np.empty(0, complex)  # starts alone: the winding number says whether something is missing
+def poles_of_model(loop: LawLoop, plant: Matrices) -> Complex:
+    """Poles of a model of the rig, from its input to the law's signals, under the law, a delay by Pade's fraction."""
+    law = loop.law.matrices()
+    if loop.law.delay:
+        law = in_series(law, pade(loop.law.delay, PADE).matrices())
+    return np.linalg.eigvals(closed(plant, law)).astype(complex)

@@ -24,12 +24,12 @@ from .locus import frame
 Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
 
-ROUNDS = 18  # of halving at most where a branch bends, or two meet
-DEEPEST = 7  # halvings of a step until two poles that meet in it are apart from the others
-ALONE = 1.5  # times as far as the two from the middle of a circle around them is any other pole
-AROUND = 128  # points of that circle: by the trapezoidal rule its integrals err by less than ALONE^(-AROUND/2), 1e-11
-LEAST = 1e-13  # of a value: so closely it is known where two meet
-ABSENT, ON_AXIS, IN_PAIR = 0, 1, 2  # what a branch is at a value
+LAW_HALVING_ROUNDS = 18  # of halving at most where a branch bends, or two meet
+MEETING_HALVINGS = 7  # halvings of a step until two poles that meet in it are apart from the others
+CLEAR_RADIUS = 1.5  # times as far as the two from the middle of a circle around them is any other pole
+CIRCLE_POINTS = 128  # of it: integrals err by CLEAR_RADIUS^(-CIRCLE_POINTS/2) at most by the trapezoidal rule, 1e-11
+MEETING_KNOWN = 1e-13  # of a value: so closely it is known where two meet
+ABSENT, ON_REAL_AXIS, IN_PAIR = 0, 1, 2  # what a branch is at a value
 
 
 def rounded(found: LawLocus) -> LawLocus:
@@ -43,7 +43,7 @@ def rounded(found: LawLocus) -> LawLocus:
     values, rows = _closed(family, found)
     left_out: set[float] = set()
     left, right, low, high = frame(rows)
-    for _ in range(ROUNDS):
+    for _ in range(LAW_HALVING_ROUNDS):
         bent = np.nonzero(loose(rows, right - left, high - low))[0]
         halves = {n: float(values[n] + values[n + 1]) / 2 for n in bent.tolist()}
         added = {
@@ -62,7 +62,7 @@ def rounded(found: LawLocus) -> LawLocus:
 def _closed(family: Family, found: LawLocus) -> tuple[Real, Complex]:
     """Values and branches with every meeting on the real axis among them that could be told apart."""
     values, rows = found.values, found.branches
-    n, shortest = 0, abs(np.diff(values)).min() * 2.0**-DEEPEST
+    n, shortest = 0, abs(np.diff(values)).min() * 2.0**-MEETING_HALVINGS
     while n < values.size - 1:
         gap = _Gap(family, found.box, values[n : n + 2], rows[:, n : n + 2])
         met = gap.met() if gap.is_open else None
@@ -110,8 +110,8 @@ class _Gap:
 
     @property
     def kinds(self) -> NDArray[np.int64]:
-        """What each branch is at both values: ABSENT, ON_AXIS or IN_PAIR."""
-        return np.where(np.isnan(self.rows), ABSENT, np.where(self.rows.imag == 0, ON_AXIS, IN_PAIR))
+        """What each branch is at both values: ABSENT, ON_REAL_AXIS or IN_PAIR."""
+        return np.where(np.isnan(self.rows), ABSENT, np.where(self.rows.imag == 0, ON_REAL_AXIS, IN_PAIR))
 
     @property
     def is_open(self) -> bool:
@@ -148,7 +148,7 @@ class _Gap:
         """Which are on the axis at a side alone, and which are in a pair at the other side alone."""
         here, there = self.kinds[:, side], self.kinds[:, 1 - side]
         return (
-            np.flatnonzero((here == ON_AXIS) & (there != ON_AXIS)),
+            np.flatnonzero((here == ON_REAL_AXIS) & (there != ON_REAL_AXIS)),
             np.flatnonzero((there == IN_PAIR) & (here != IN_PAIR)),
         )
 
@@ -161,9 +161,9 @@ class _Gap:
         others = np.r_[others[np.isfinite(others)], self.family.at(float(self.values.mean())).k.singular]
         reach = float(max(abs(two - middle).max(), abs(complex_one - middle)))
         clear = float(abs(others - middle).min(initial=np.inf))
-        if clear < ALONE**2 * reach:
+        if clear < CLEAR_RADIUS**2 * reach:
             raise ConvergenceError("other poles lie too near to two that meet", middle, clear)
-        circle = ALONE * reach * np.exp(2j * np.pi * (np.arange(AROUND) + 0.5) / AROUND)
+        circle = CLEAR_RADIUS * reach * np.exp(2j * np.pi * (np.arange(CIRCLE_POINTS) + 0.5) / CIRCLE_POINTS)
 
         def squared(value: float) -> float:
             if value == self.values[side]:
@@ -173,7 +173,7 @@ class _Gap:
             return _pair_in(self.family, value, middle, circle)[1]
 
         low, high = sorted(self.values.tolist())
-        value = float(brentq(squared, low, high, xtol=LEAST * max(abs(low), abs(high))))
+        value = float(brentq(squared, low, high, xtol=MEETING_KNOWN * max(abs(low), abs(high))))
         return value, _pair_in(self.family, value, middle, circle)[0]
 
     def halved(self) -> tuple[float, Complex, Complex, Complex] | None:
@@ -189,15 +189,11 @@ class _Gap:
         sides = np.full((2, len(self.rows)), np.nan, complex)
         told = [(0, int(alive[0][i]), j) for j, i in assigned(here, poles, self.box)[0].items()]
         told += [(1, int(alive[1][j]), i) for j, i in assigned(poles, there, self.box)[0].items()]
-        told = [each for each in told if _alike(self.rows[each[1], each[0]], poles[each[2]])]
+        # both on the axis, or neither: of two that meet each begins a branch at the meeting
+        told = [(side, row, n) for side, row, n in told if (self.rows[row, side].imag == 0) == (poles[n].imag == 0)]
         for side, row, pole in told:
             sides[side, row] = poles[pole]
         return value, *sides, np.delete(poles, [pole for _, _, pole in told])
-
-
-def _alike(one: complex, other: complex) -> bool:
-    """Whether both are on the axis, or neither: of two that meet each begins a branch at the meeting."""
-    return (one.imag == 0) == (other.imag == 0)
 
 
 def _pair_in(family: Family, value: float, middle: float, circle: Complex) -> tuple[float, float]:

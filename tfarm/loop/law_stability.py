@@ -19,23 +19,23 @@ from numpy.typing import NDArray
 
 from tfarm.arm import Arm
 from tfarm.arm.law import Law
-from tfarm.errors import ConvergenceError
 from tfarm.spectrum import modes_below
 
-from .frequencies import MOST_MODES, band_of, grid
+from .frequencies import MOST_BAND_MODES, band_of, grid
 from .law_loop import LawLoop
 from .law_poles import law_box, law_poles_below
 from .passivity import Signs, signs_of
 from .poles import Poles
-from .stability import FEW, MARGIN_OF_ZERO, QUIET, Stability, is_felt
+from .stability import LEAST_BAND_MODES, MARGIN_OF_ZERO, QUIET, Stability, is_felt, must_be_off_axis
 
 Real = NDArray[np.float64]
 
-UNKNOWN = "not known beyond {band:.4g} rad/s: neither small gain nor a theorem tells the modes there"
+UNKNOWN_ABOVE = "not known beyond {band:.4g} rad/s: neither small gain nor a theorem tells the modes there"
 DELAYED = "without any damping a delayed law drives infinitely many modes beyond the band"
-NEAR = 0.5  # of 1/delay: how far left poles are listed, of ever more as |L| falls, to say which are right of the axis
-WIDENED = 1.6
-DECADES, POINTS = 100.0, 1600  # beyond the band that are looked at, and how closely
+LISTED_LEFT = 0.5  # of 1/delay: poles are listed so far left, of ever more as |L| falls, to tell the unstable ones
+WIDENED = 1.6  # from one band that is tried to the next
+QUIET_REACH = 100.0  # bands up to which |L| is looked at: two decades of its fall
+QUIET_POINTS = 1600  # in them, 800 a decade
 CLEAR_OF_POLES = 1.3  # of the fastest pole of the law that rings: a band reaches so far, if it can
 DULL = 0.7  # damping ratio from which on a pole of the law makes no peak
 SLOWEST_BAND = 3.0  # heights: as far above it are resonances looked at one by one
@@ -49,7 +49,7 @@ def law_stability(arm: Arm, law: Law, band: float | None = None) -> Stability[La
     loop = LawLoop(arm, law)
     signs = signs_of_loop(loop)
     height, quiet = (band, False) if band is not None else _band(loop, signs)
-    poles = law_poles_below(loop, height, NEAR)
+    poles = law_poles_below(loop, height, LISTED_LEFT)
     infinite, tail, known = _beyond(loop, signs, quiet, height)
     strict = signs.kind in ("strictly passive", "negative imaginary") and _holds(loop, signs)
     verdict = _verdict(poles, infinite, loop, strict)
@@ -78,16 +78,12 @@ def _beyond(loop: LawLoop, signs: Signs, quiet: bool, band: float) -> tuple[bool
     if _holds(loop, signs):
         more = " and holds it statically" if signs.kind == "negative imaginary" else ""
         return False, f"{signs.reason}{more}: no mode, however high, is driven", True
-    if loop.arm.is_undamped and loop.law.delay and _acts(loop):
+    late = loop.arm.is_undamped and loop.law.delay > 0
+    if late and loop.law.polynomials(np.array([1j * band_of(loop.arm, 1)]))[0].any():
         return True, DELAYED, True
     if quiet:
         return False, f"beyond the band |L(iw)| < {QUIET:g} and falling: no unstable pole there (small gain)", True
-    return False, UNKNOWN.format(band=band), False
-
-
-def _acts(loop: LawLoop) -> bool:
-    """Whether the law feeds anything back."""
-    return bool(loop.law.polynomials(np.array([1j * band_of(loop.arm, 1)]))[0].any())
+    return False, UNKNOWN_ABOVE.format(band=band), False
 
 
 def _verdict(poles: Poles[LawLoop], infinite: bool, loop: LawLoop, strict: bool) -> str:
@@ -98,13 +94,10 @@ def _verdict(poles: Poles[LawLoop], infinite: bool, loop: LawLoop, strict: bool)
     at_zero = poles.values.size - moving.size
     if at_zero > 1 or (at_zero == 1 and not loop.arm.has_rigid_mode):
         return "marginal"
-    on_axis = moving[moving.real > -MARGIN_OF_ZERO * abs(moving)]
     if loop.arm.is_undamped:
-        known = strict or not on_axis.size
+        known = strict or not (moving.real > -MARGIN_OF_ZERO * abs(moving)).any()
         return "stable" if known and is_felt(loop.arm, poles.box.im_max) else "marginal"
-    if on_axis.size:
-        text = f"the pole at {on_axis[0]:.6g} 1/s is on the imaginary axis to working precision: neither stable nor not"
-        raise ConvergenceError(text, complex(on_axis[0]), float(on_axis[0].real))
+    must_be_off_axis(moving)
     return "stable"
 
 
@@ -112,12 +105,12 @@ def _band(loop: LawLoop, signs: Signs) -> tuple[float, bool]:
     """The band [rad/s] in which poles are computed, and whether the loop is quiet beyond it."""
     own = loop.law.poles
     ringing = own[own.real > -DULL * abs(own)]
-    fastest, highest = CLEAR_OF_POLES * float(abs(ringing).max(initial=0.0)), band_of(loop.arm, MOST_MODES)
-    least = max(band_of(loop.arm, FEW), min(fastest, highest))
+    fastest, highest = CLEAR_OF_POLES * float(abs(ringing).max(initial=0.0)), band_of(loop.arm, MOST_BAND_MODES)
+    least = max(band_of(loop.arm, LEAST_BAND_MODES), min(fastest, highest))
     if loop.arm.is_undamped or _holds(loop, signs) or not loop.arm.least_damping or fastest > highest:
         return least, False
     band = least
-    while modes_below(loop.arm, band) <= MOST_MODES:
+    while modes_below(loop.arm, band) <= MOST_BAND_MODES:
         if is_quiet_above(loop, band):
             return band, True
         band *= WIDENED
@@ -136,10 +129,10 @@ def is_quiet_above(loop: LawLoop, band: float) -> bool:
     the upper edge of the box as far right as that reaches, and beyond |L| is smaller still.
     """
     near = np.asarray(grid(loop.arm, SLOWEST_BAND * band))
-    omega = np.unique(np.r_[near[near >= band], band * np.geomspace(1.0, DECADES, POINTS)])
+    omega = np.unique(np.r_[near[near >= band], band * np.geomspace(1.0, QUIET_REACH, QUIET_POINTS)])
     size = abs(loop.loop_function(1j * omega))
     if not size.max() < QUIET or size[omega > 10 * band].max() > size[omega <= 10 * band].max():
         return False
     right = law_box(loop, band).re_max
-    edge = np.r_[0.0, np.geomspace(1e-4 * band, right, POINTS // 4)] + 1j * band
+    edge = np.r_[0.0, np.geomspace(1e-4 * band, right, QUIET_POINTS // 4)] + 1j * band
     return bool(abs(loop.loop_function(edge)).max() < QUIET)

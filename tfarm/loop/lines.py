@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.crossing import Crossing, Crossings, brackets, solved
+from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import gains_of, loop_parts, torque
 from tfarm.exact.system import System, system_of
 from tfarm.spectrum import flexible_frequencies, modes
@@ -25,9 +26,11 @@ from .frequencies import grid
 from .plant import effective_inertia
 
 Complex = NDArray[np.complexfloating[Any, Any]]
+Real = NDArray[np.float64]
 
-NONE = HubFeedback()
-SAME = 1e-12  # of a frequency: nearer than this are two numbers for one
+NO_FEEDBACK = HubFeedback()
+SAME_FREQUENCY = 1e-12  # of a frequency: nearer than this are two numbers for one
+FINITE_LIMIT = 1.5  # times the gain at the farther of two small s: more at the nearer one is a gain without a limit
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,23 +52,23 @@ class Line:
 
 def along(name: str, law: HubFeedback) -> Line:
     """The line on which one gain takes every value, t being that value, and the others keep theirs."""
-    return Line(law.having(name, 0.0), NONE.having(name, 1.0))
+    return Line(law.having(name, 0.0), NO_FEEDBACK.having(name, 1.0))
 
 
 def crossings(arm: Arm, line: Line, band: float) -> Crossings:
     """All crossings of the imaginary axis at frequencies `at` up to `band` [rad/s], ascending in t."""
-    k, unit = system_of(arm), line.length
-    static = crossing_at_zero(arm, line)
-    found = [] if static is None else [static]
+    k, unit, found = system_of(arm), line.length, static_crossings(arm, line)
     if unit:
-        unified = Line(line.base, NONE.plus(line.direction, 1 / unit))
+        unified = Line(line.base, NO_FEEDBACK.plus(line.direction, 1 / unit))
         omega = np.asarray(grid(arm, band))
         N, P = parts(k, unified, 1j * omega)
         (before,), change = brackets((N * P.conj()).imag)
         at, t = solved(lambda w: parts(k, unified, 1j * w), omega[before], omega[before + 1])
-        if arm.is_undamped and line.base == NONE:  # at its own frequencies there the poles of the arm without a law are
+        if (
+            arm.is_undamped and line.base == NO_FEEDBACK
+        ):  # at its own frequencies there the poles of the arm without a law are
             own = np.r_[np.inf, flexible_frequencies(arm, 1.01 * band)]
-            t = np.where(abs(at[:, None] - own).min(axis=1) < SAME * at, 0.0, t)
+            t = np.where(abs(at[:, None] - own).min(axis=1) < SAME_FREQUENCY * at, 0.0, t)
         found += [Crossing(*each) for each in zip(t / unit, at, change, strict=True)]
     return Crossings.of(found)
 
@@ -77,17 +80,22 @@ def parts(k: System, line: Line, s: NDArray[Any]) -> tuple[Complex, Complex]:
     return drive + base, way
 
 
+def static_crossings(arm: Arm, line: Line) -> list[Crossing]:
+    """That of `crossing_at_zero`, if there is one."""
+    found = crossing_at_zero(arm, line)
+    return [] if found is None else [found]
+
+
 def crossing_at_zero(arm: Arm, line: Line) -> Crossing | None:
-    """A real pole through s = 0, if there is a t at which one passes."""
-    return _through_zero_free(arm, line) if arm.has_rigid_mode else _through_zero_held(arm, line)
+    """A real pole through s = 0, if there is a t at which one passes.
 
-
-def _through_zero_free(arm: Arm, line: Line) -> Crossing | None:
-    """Of an arm that turns freely:  D/theta = Kp + K1 s + J s^2 + c s^3 + ...,  with J the effective inertia
-    and the hub's friction in K1.
-
-    The lowest coefficient that does not vanish all along the line decides: the pole passes where it is 0.
+    Of an arm that turns freely  D/theta = Kp + K1 s + J s^2 + c s^3 + ...,  with J the effective inertia and the hub's
+    friction in K1: the lowest coefficient that does not vanish all along the line decides, and the pole passes where it
+    is 0.  Of an arm whose tip is held it passes where the static stiffness vanishes.
     """
+    if not arm.has_rigid_mode:
+        small = 1e-7 * float(modes(arm, 1).natural_frequency[-1])
+        return through_origin(*parts(system_of(arm), line, small * np.array([1 + 0j, 0.5])))
     base, way = line.base, line.direction
     if way.Kp:
         t = -base.Kp / way.Kp + 0.0
@@ -114,16 +122,23 @@ def _change_with_stiffness(arm: Arm, law: HubFeedback) -> int:
     return _sign(J) * (oscillating - 1)
 
 
-def _through_zero_held(arm: Arm, line: Line) -> Crossing | None:
-    """Of an arm whose tip is held: where the static stiffness vanishes, from t(s) at two small s."""
-    small = 1e-7 * float(modes(arm, 1).natural_frequency[-1])
-    N, P = parts(system_of(arm), line, small * np.array([1 + 0j, 0.5]))
+def through_origin(N: Complex, P: Complex) -> Crossing | None:
+    """A real pole through s = 0, from N and P at two small real s, the second half the first; None without a limit."""
     if not P.all():
         return None
     far, near = -(N / P).real
-    if not abs(near) < 1.5 * abs(far):
+    if not abs(near) < FINITE_LIMIT * abs(far):
         return None
     return Crossing(float(2 * near - far), 0.0, 1 if far > near else -1)
+
+
+def ascending(name: str, values: Any, most: int) -> Real:
+    """The values (n,) of one number of a map.  Raises ParameterError for what is no ascending range of 2 to `most`."""
+    values = np.atleast_1d(np.asarray(values, dtype=float))
+    if not (2 <= values.size <= most and np.isfinite(values).all() and (np.diff(values) > 0).all()):
+        remedy = f"an ascending range of 2 to {most} values"
+        raise ParameterError(key=name, value=f"{values.size} values", remedy=remedy)
+    return np.asarray(values)
 
 
 def _sign(value: float) -> int:

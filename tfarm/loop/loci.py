@@ -18,9 +18,9 @@ from .reduced_locus import ReducedLocus, reduced_locus
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 
-POINTS = 300
-TRIES = ((7, 1.0), (4, 1.0), (4, 0.75), (2, 0.5))  # branches, and the share of the range that they are followed over
-HELD = 10  # digits of |s| that are drawn and written: poles differ from processor to processor by 1e-14 at most
+LOCUS_POINTS = 300  # values of the gain
+LOCUS_TRIES = ((7, 1.0), (4, 1.0), (4, 0.75), (2, 0.5))  # branches, and how much of the range they are followed over
+POLE_DIGITS = 10  # digits of |s| that are drawn and written: poles differ from processor to processor by 1e-14 at most
 GAPS_HELD = 5  # digits of a gap, 1e-5 of |s| or less between two such poles
 
 
@@ -57,7 +57,7 @@ class Loci:
 def shown(branches: Complex) -> Complex:
     """Branches to the digits that hold on every processor: as shares of |s|, so that a small Re s keeps its place."""
     size = np.maximum(abs(branches), np.finfo(float).tiny)
-    unit = 10.0 ** (np.floor(np.log10(size)) + 1 - HELD)
+    unit = 10.0 ** (np.floor(np.log10(size)) + 1 - POLE_DIGITS)
     return np.round(branches.real / unit) * unit + 1j * (np.round(branches.imag / unit) * unit)
 
 
@@ -67,10 +67,10 @@ def loci(arm: Arm, law: HubFeedback, vary: str, start: float, stop: float) -> Lo
     Raises ConvergenceError where none can, and what `reduced_locus` raises.
     """
     lost: ConvergenceError | None = None
-    for branches, share in TRIES:
+    for branches, share in LOCUS_TRIES:
         end = start + share * (stop - start)
         try:
-            exact = locus(arm, law, vary, start, end, POINTS, branches)
+            exact = locus(arm, law, vary, start, end, LOCUS_POINTS, branches)
         except ConvergenceError as error:
             lost = error
             continue

@@ -20,19 +20,19 @@ from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 from tfarm.spectrum.continuation import Member, corrected, follow
 
-from .branches import FREE, NOBODY, Segment, followed, ordered
+from .branches import MAY_PASS_ORIGIN, NOBODY, Segment, followed, ordered
 from .crossings import BranchCrossing, crossings
 from .ended import with_others
-from .lines import crossing_at_zero
-from .variation import Complex, Evaluator, Real, Variation, free_of_loss, member_of
+from .lines import static_crossings
+from .variation import Complex, Evaluator, Real, Variation, free_of_loss, member_of, must_be_way
 
-MOST_POINTS = 100_000
-MOST_BRANCHES = 200
-SHARE = 0.25  # how far a zero may be polished from its guess, in distances to the next branch
-SETTLED = 1e-10  # of its size: one step more is taken where Newton's method still moves a zero by this
-STEPS = 6
-ROUNDS = 24  # of halving at most: where two branches meet their distance goes with the root of that of the gain
-SAME = 1e-12  # relative: a gain so near to that at which a pole passes through 0 has the pole there
+MOST_LOCUS_POINTS = 100_000  # values, those between that make it round among them
+MOST_BRANCHES = 200  # as many modes are followed
+FARTHEST_POLISH = 0.25  # how far a zero may be polished from its guess, in distances to the next branch
+POLISHED_TO = 1e-10  # of its size: one step more is taken where Newton's method still moves a zero by this
+POLISH_STEPS = 6  # of Newton's method from a guess right to some digits: what has not settled then is followed again
+HALVING_ROUNDS = 24  # of halving at most: where two branches meet their distance goes with the root of that of the gain
+SAME_STATIC_GAIN = 1e-12  # relative: a gain so near to that at which a pole passes through 0 has the pole there
 
 
 @dataclass(frozen=True)
@@ -85,10 +85,16 @@ def locus(
     loop or no range, ConvergenceError where branches cannot be told apart, and where one has ended and an unstable pole
     is on none (along a gain that is no error: its crossing is listed).
     """
-    points = whole("points", points, 2, MOST_POINTS, f"a whole number from 2 to {MOST_POINTS}")
+    points = whole("points", points, 2, MOST_LOCUS_POINTS, f"a whole number from 2 to {MOST_LOCUS_POINTS}")
     branches = whole("branches", branches, 1, MOST_BRANCHES, f"a whole number from 1 to {MOST_BRANCHES}")
-    _range(Variation(arm, law, vary), start, stop)
-    return _traced(Variation(arm, law, vary), np.linspace(start, stop, points), branches, rounds=0)
+    variation = Variation(arm, law, vary)
+    must_be_way(start, stop)
+    for value in (start, stop):
+        variation.at(value)
+    if vary == "all" and law == HubFeedback():
+        one_of = f"{', '.join(NAMES[:-1])} or {NAMES[-1]}"
+        raise ParameterError(key="vary", value="all", remedy=f"every gain is 0: give {one_of} to be scaled")
+    return _traced(variation, np.linspace(start, stop, points), branches, rounds=0)
 
 
 def rounded(found: Locus) -> Locus:
@@ -96,7 +102,7 @@ def rounded(found: Locus) -> Locus:
 
     Each is seen in a picture of its own and in one of all, down to pieces of a pixel.
     """
-    return _traced(Variation(found.arm, found.law, found.vary), found.gain, len(found.branches), ROUNDS)
+    return _traced(found.variation, found.gain, len(found.branches), HALVING_ROUNDS)
 
 
 def _traced(wanted: Variation, gain: Real, branches: int, rounds: int) -> Locus:
@@ -107,13 +113,13 @@ def _traced(wanted: Variation, gain: Real, branches: int, rounds: int) -> Locus:
     way = float(np.sign(gain[-1] - gain[0]))
 
     def curves(values: Real) -> Complex:
-        return _Polish(variation, Evaluator(variation, values), FREE * lowest, way).curves(cut)
+        return _Polish(variation, Evaluator(variation, values), MAY_PASS_ORIGIN * lowest, way).curves(cut)
 
     every = curves(gain)
     kept, mode = _listed(every, variation, branches)
     for _ in range(rounds):
         more = _between(gain, _rows(every, kept))
-        if not more.size or more.size + gain.size > MOST_POINTS:
+        if not more.size or more.size + gain.size > MOST_LOCUS_POINTS:
             break
         try:
             added = curves(more)
@@ -146,19 +152,6 @@ def frame(branches: Complex) -> tuple[float, float, float, float]:
     wide = max(right - left, 1e-12 * float(abs(points).max())) or 1.0  # where no pole moves from 0
     tall = max(high - low, 1e-9 * high) or wide  # where none of them swings
     return left, left + wide, low, low + tall
-
-
-def _range(variation: Variation, start: float, stop: float) -> None:
-    """Raise ParameterError for what is no range, or no loop at its ends."""
-    for key, value in (("from", start), ("to", stop)):
-        if not math.isfinite(value):
-            raise ParameterError(key=key, value=value, remedy="a finite number")
-        variation.at(value)
-    if start == stop:
-        raise ParameterError(key="to", value=stop, remedy="the range is empty: a locus runs to another value")
-    if variation.vary == "all" and variation.law == HubFeedback():
-        one_of = f"{', '.join(NAMES[:-1])} or {NAMES[-1]}"
-        raise ParameterError(key="vary", value="all", remedy=f"every gain is 0: give {one_of} to be scaled")
 
 
 def _listed(curves: Complex, variation: Variation, number: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -194,7 +187,10 @@ class _Polish:
         self.variation, self.evaluator, self.free, self.way = variation, evaluator, free, way
         self.gain = evaluator.values
         self.at_zero = variation.zeros_at_origin
-        self.static = _at_static_crossing(variation, self.gain)
+        self.static = np.zeros(self.gain.size, np.int64)  # 1 where a pole of an arm held at its tip passes through 0
+        if variation.vary in NAMES and not variation.arm.has_rigid_mode:
+            for each in static_crossings(variation.arm, variation.line):
+                self.static += math.isfinite(each.t) & (abs(self.gain - each.t) <= SAME_STATIC_GAIN * abs(each.t))
 
     def curves(self, cut: list[Segment]) -> Complex:
         """The branches (slots, n); those which do not live all the way are left out."""
@@ -217,7 +213,7 @@ class _Polish:
         guess = segment.guess(self.gain[which])
         origin = self._at_origin(guess, which, segment.pinned)
         zeros, settled = self._newton(np.where(origin, 0.0, guess), which, origin)
-        moved = abs(zeros - guess) > SHARE * _gaps(zeros)
+        moved = abs(zeros - guess) > FARTHEST_POLISH * _gaps(zeros)
         parted = abs(zeros[..., 0] - zeros[..., 1]) <= 1e-3 * abs(guess[..., 0] - guess[..., 1])
         changed = (zeros.imag > 0) != (guess.imag > 0)
         wrong = (((moved | changed) & ~origin).any(axis=2) | (parted & ~origin.all(axis=2))).any(axis=1)
@@ -243,13 +239,13 @@ class _Polish:
         wanted[..., 1] &= ~mirrored
         owner = np.broadcast_to(which[:, None, None], zeros.shape)[wanted]
         s, still = zeros[wanted], np.ones(int(wanted.sum()), bool)
-        for _ in range(STEPS):
+        for _ in range(POLISH_STEPS):
             value, slope, _ = self.evaluator(s[still], owner[still], self.at_zero)
             with np.errstate(all="ignore"):
                 move = value / slope
             move = np.where(s[still].imag == 0, move.real, move)
             s[still] -= move
-            still[still] = np.isfinite(s[still]) & ~(abs(move) <= SETTLED * abs(s[still]))
+            still[still] = np.isfinite(s[still]) & ~(abs(move) <= POLISHED_TO * abs(s[still]))
             if not still.any():
                 break
         found, settled = zeros.copy(), np.ones(zeros.shape, bool)
@@ -260,8 +256,7 @@ class _Polish:
     def _stepped(self, segment: Segment, number: int, guess: Complex) -> Complex:
         """The pairs at one value, all corrected together, or followed there from the last node before it."""
         value = float(self.gain[number])
-        member = member_of(self.variation, value, self.at_zero, self.free)
-        found, stray = corrected(member, guess)
+        found, stray = corrected(self._member(value), guess)
         if stray.any():
             nodes = [node for node in segment.nodes if (value - node.at) * self.way >= 0]
             last = nodes[-1] if nodes else segment.nodes[0]
@@ -270,16 +265,6 @@ class _Polish:
 
     def _member(self, value: float) -> Member:
         return member_of(self.variation, value, self.at_zero, self.free)
-
-
-def _at_static_crossing(variation: Variation, gain: Real) -> NDArray[np.int64]:
-    """1 at each gain where a pole of an arm that is held at its tip passes through s = 0, and 0 elsewhere."""
-    if variation.arm.has_rigid_mode or variation.vary not in NAMES:
-        return np.zeros(gain.size, np.int64)
-    there = crossing_at_zero(variation.arm, variation.line)
-    if there is None or not math.isfinite(there.t):
-        return np.zeros(gain.size, np.int64)
-    return np.asarray(abs(gain - there.t) <= SAME * abs(there.t), np.int64)
 
 
 def _gaps(zeros: Complex) -> Real:

@@ -29,27 +29,27 @@ from tfarm.errors import ConvergenceError
 from tfarm.exact.system import system_of
 from tfarm.spectrum import modes
 
-from .frequencies import MOST_MODES
+from .frequencies import MOST_BAND_MODES
 from .lines import along, parts
 
-UNFELT = 1e-9  # a K2_n below this share of a whole moment is none: the hub feels nothing of that mode
+UNFELT_MOMENT = 1e-9  # a K2_n below this share of a whole moment is none: the hub feels nothing of that mode
 
 
 @lru_cache(maxsize=64)
 def locked_edges(arm: Arm) -> Crossings:
-    """The K2_n of the first `MOST_MODES` modes of the locked hub, `at` their w_n [rad/s], `change` for K1 > 0.
+    """The K2_n of the first `MOST_BAND_MODES` modes of the locked hub, `at` their w_n [rad/s], `change` for K1 > 0.
 
     Of an arm that `is_reactive`.  They are those of a hub without inertia, whose drive is -(M0 + r Q0) and no small
     difference.  Raises ConvergenceError for a mode that the hub does not feel.
     """
-    omega = modes(arm.having(hub_inertia=math.inf), MOST_MODES).natural_frequency
+    omega = modes(arm.having(hub_inertia=math.inf), MOST_BAND_MODES).natural_frequency
     hub = replace(arm.hub, inertia=0.0, friction=0.0, stiffness=0.0)
     pin = system_of(replace(arm, hub=hub, motor=None, input="hub_torque"))
     drive, M = parts(pin, along("K2", HubFeedback()), 1j * omega)
     with np.errstate(divide="ignore", invalid="ignore"):  # a gauge where the mode has no moment: no K2 does anything
         K2 = -(drive * M.conj()).real / abs(M) ** 2 * arm.input_per_torque
-    if (abs(K2) < UNFELT * arm.input_per_torque).any():
-        first = float(omega[abs(K2) < UNFELT * arm.input_per_torque][0])
+    if (abs(K2) < UNFELT_MOMENT * arm.input_per_torque).any():
+        first = float(omega[abs(K2) < UNFELT_MOMENT * arm.input_per_torque][0])
         raise ConvergenceError(f"the hub does not feel the mode at {first:.6g} rad/s: no gain decides", first, 0.0)
     return Crossings.of(zip(K2, omega, 2 * np.sign(K2), strict=True))
 

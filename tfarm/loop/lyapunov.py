@@ -38,7 +38,7 @@ from .plant import Loop
 Real = NDArray[np.float64]
 Kind = Literal["dissipated", "conserved", "unproven"]
 
-MOST_POINTS = 100_000
+MOST_ENERGY_POINTS = 100_000  # of time, each a step of the model
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,10 @@ def _with_whole_moment(loop: Loop) -> Lyapunov:
         return _unproven(loop, f"a1/a2 = 1 - K2 = {weight:g} is negative, so V has no sign")
     if K1 < 0:
         return _unproven(loop, f"K1 = {law.K1:g} feeds energy in: V_t = -a2 K1 theta_t^2 has the wrong sign")
-    if law.Kp < 0 and law.Kp < (least := -weight * _static_stiffness(loop.arm)):
+    stiffness = 0.0  # of the hub at rest [N m/rad]: more than 0 where the tip is held
+    if law.Kp < 0 and not loop.arm.has_rigid_mode:
+        stiffness = 1.0 / float(transfer(loop.arm, "hub_angle").static)
+    if law.Kp < 0 and law.Kp < (least := -weight * stiffness):
         return _unproven(
             loop, f"Kp = {law.Kp:g} is below {least:g} N m/rad, where the spring at the hub makes V negative"
         )
@@ -138,11 +141,6 @@ def _with_whole_moment(loop: Loop) -> Lyapunov:
 
 def _unproven(loop: Loop, reason: str) -> Lyapunov:
     return Lyapunov(loop, False, None, "unproven", reason)
-
-
-def _static_stiffness(arm: Arm) -> float:
-    """Torque per angle of the hub at rest [N m/rad]: more than 0 where the tip is held."""
-    return 0.0 if arm.has_rigid_mode else 1.0 / float(transfer(arm, "hub_angle").static)
 
 
 # ------------------------------------------------------------ along a trajectory
@@ -166,7 +164,7 @@ def energy_along(arm: Arm, law: HubFeedback, duration: float, points: int = 501,
     if not arm.is_told_by_lyapunov:
         remedy = "V_t has its formula where the gauge at the root of a hub without radius reads what turns the hub"
         raise ParameterError(key="hub.radius", value=arm.hub.radius, remedy=remedy)
-    points = whole("points", points, 2, MOST_POINTS, f"a whole number from 2 to {MOST_POINTS}")
+    points = whole("points", points, 2, MOST_ENERGY_POINTS, f"a whole number from 2 to {MOST_ENERGY_POINTS}")
     A, struck, angle, rate, weights = _closed_modal_model(loop, modes)
     hub = np.outer(rate, rate)
     P = (1.0 - law.K2) * (np.diag(weights) - arm.hub_inertia * hub) + arm.hub_inertia * hub

@@ -29,16 +29,16 @@ from tfarm.records import record
 
 from .frequencies import grid
 from .law_loop import LawLoop
-from .lines import NONE, Line, crossing_at_zero, crossings
+from .lines import NO_FEEDBACK, Line, crossings, static_crossings
 from .lossless import stable_moments
 from .plant import Loop
-from .poles import SMALLEST, AnyLoop
+from .poles import LEAST_SQUARABLE, AnyLoop
 from .stability import Stability, is_quiet, stability
 from .windows import Windows, gain_windows
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
-DIGITS, PLACE_DIGITS = 9, 7  # of a margin, and of the frequency of a dip, which its depth hardly feels
+MARGIN_DIGITS, PLACE_DIGITS = 9, 7  # of a margin, and of the frequency of a dip, which its depth hardly feels
 BOTTOM = 1e-6  # of the gap between grid points: a dip's bottom is flat, so its depth is right to the square of that
 LOWEST = 6  # local minima on the grid that are refined
 AT_POLE = 1e-9  # a factor on L so small belongs to a pole of L on the axis, where L changes its sign through infinity
@@ -127,7 +127,7 @@ def loop_margins(verdict: Stability[Any]) -> LoopMargins:
     least["peak_sensitivity"] = max(1.0, 1.0 / dip), at_peak
     dip, at_peak = lowest(lambda w: inverse_peak(loop, w, of=1), omega)
     least["peak_complementary"] = 1.0 / dip if dip else math.inf, at_peak
-    values = {name: _held(value, DIGITS) for name, (value, _) in least.items()}
+    values = {name: _held(value, MARGIN_DIGITS) for name, (value, _) in least.items()}
     places = {name: _held(where, PLACE_DIGITS) for name, (_, where) in least.items()}
     by_phase = phase_crossovers(loop, omega)
     gain = gain_margin(loop, band) if isinstance(loop, Loop) else _nearest_to_one([t for _, t in by_phase])
@@ -160,8 +160,8 @@ def phase_crossovers(loop: Loop | LawLoop, omega: Real) -> tuple[tuple[float, fl
 
 
 def _nearest_to_one(factors: list[float]) -> tuple[float, float]:
-    """The largest factor below 1, or 0, and the least above it, or infinity."""
-    return max((t for t in factors if t < 1), default=0.0), min((t for t in factors if t > 1), default=math.inf)
+    """The largest factor from 0 up to 1, or 0, and the least above 1, or infinity."""
+    return max((t for t in factors if 0 <= t < 1), default=0.0), min((t for t in factors if t > 1), default=math.inf)
 
 
 def disk_at(loop: Loop | LawLoop, omega: Real) -> Real:
@@ -184,12 +184,12 @@ def dense(verdict: Stability[Any]) -> Real:
     omega = np.asarray(grid(verdict.loop.arm, verdict.band))
     slow = np.outer(rigid_crossings(verdict.loop), [0.5, 2.0]).ravel()
     more = np.concatenate([close[close < omega[-1]], slow[slow < omega[0]]])
-    return np.unique(np.concatenate([omega, more[more > SMALLEST]]))
+    return np.unique(np.concatenate([omega, more[more > LEAST_SQUARABLE]]))
 
 
 def minus_loop(loop: Loop | LawLoop, omega: Real) -> Complex:
-    """-L(i w); below `SMALLEST` that of the rigid arm, from which the arm's own cannot be told there."""
-    rigid = omega <= SMALLEST
+    """-L(i w); below `LEAST_SQUARABLE` that of the rigid arm, from which the arm's own cannot be told there."""
+    rigid = omega <= LEAST_SQUARABLE
     value = -loop.loop_function(1j * np.where(rigid, 1.0, omega))
     if isinstance(loop, Loop) and rigid.any():
         a, b, k = _rigid(loop)
@@ -223,20 +223,18 @@ def _rigid(loop: Loop) -> tuple[float, float, float]:
 
 def gain_margin(loop: Loop, band: float) -> tuple[float, float]:
     """The factors on all gains at once, below and above 1, at which a pole first reaches the axis."""
-    law, arm, line = loop.law, loop.arm, Line(NONE, loop.law)
+    law, arm, line = loop.law, loop.arm, Line(NO_FEEDBACK, loop.law)
     if arm.is_reactive:
-        static = crossing_at_zero(arm, line)
         factors = [end / law.K2 for end in stable_moments(arm) if law.K2 * end > 0 and math.isfinite(end)]
-        factors += [] if static is None else [static.t]
+        factors += [each.t for each in static_crossings(arm, line)]
     else:
         factors = crossings(arm, line, band).gain.tolist()
-    below = max((t for t in factors if 0 <= t < 1), default=0.0)
-    return below, min((t for t in factors if t > 1), default=math.inf)
+    return _nearest_to_one(factors)
 
 
 def unit_crossings(loop: Loop | LawLoop, omega: Real) -> Real:
     """Frequencies [rad/s] where |L(i w)| = 1."""
-    if loop.law == NONE:
+    if loop.law == NO_FEEDBACK:
         return np.empty(0)
 
     def size(w: Real) -> Real:
@@ -245,7 +243,7 @@ def unit_crossings(loop: Loop | LawLoop, omega: Real) -> Real:
 
     (before,), _ = brackets(size(omega))
     slow = rigid_crossings(loop)
-    return np.concatenate([slow[slow <= SMALLEST], zeros_between(size, omega[before], omega[before + 1])])
+    return np.concatenate([slow[slow <= LEAST_SQUARABLE], zeros_between(size, omega[before], omega[before + 1])])
 
 
 def lowest(f: Callable[[Real], Real], omega: Real) -> tuple[float, float]:

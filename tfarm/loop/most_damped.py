@@ -13,8 +13,8 @@ from .damping import exact_poles_next_to
 from .locus import Locus, locus
 from .variation import Complex, Real
 
-POINTS = 17  # of each round between two neighbours, so that it is an eighth as wide as the one before
-NARROW = 1e-7  # of the gain: where rounds end; a damping ratio, flat there, is known to 1e-14 of its curvature
+ROUND_POINTS = 17  # of each round between two neighbours, so that it is an eighth as wide as the one before
+NARROWEST_ROUND = 1e-7  # of the gain: where rounds end; a damping ratio, flat there, is known to 1e-14 of its curvature
 
 
 @dataclass(frozen=True)
@@ -55,25 +55,24 @@ def damping_ratios(s: Complex) -> Real:
 
 
 def _between(found: Locus, gain: Real, branch: Complex) -> tuple[float, float]:
-    """The gain of largest damping ratio between three neighbours of which the middle one has the largest, and it."""
+    """The gain of largest damping ratio between three neighbours of which the middle one has the largest, and it.
+
+    On each grid between them the branch is next to their parabola, or followed where that is too coarse.
+    """
     best = float(gain[1]), float(damping_ratios(branch[1:2])[0])
-    while gain[2] - gain[0] > NARROW * abs(gain[1]):
-        grid = np.linspace(gain[0], gain[2], POINTS)
-        poles = _poles(found, grid, gain, branch)
+    while gain[2] - gain[0] > NARROWEST_ROUND * abs(gain[1]):
+        grid = np.linspace(gain[0], gain[2], ROUND_POINTS)
+        starts = np.polyval(np.polyfit(gain - gain[1], branch, 2), grid - gain[1])
+        near, settled = exact_poles_next_to(found.arm, starts[:, None], many_laws(found.law, **{found.vary: grid}))
+        poles = near[:, 0]
+        if not settled.all():
+            ends = float(grid[0]), float(grid[-1])
+            more = locus(found.arm, found.law, found.vary, *ends, grid.size, len(found.branches)).branches
+            poles = more[np.argmin(abs(more[:, 0] - branch[0]))]
         ratios = damping_ratios(poles)
         at = int(np.argmax(ratios))
-        if not 0 < at < POINTS - 1:
+        if not 0 < at < ROUND_POINTS - 1:
             break
         best = float(grid[at]), float(ratios[at])
         gain, branch = grid[at - 1 : at + 2], poles[at - 1 : at + 2]
     return best
-
-
-def _poles(found: Locus, grid: Real, gain: Real, branch: Complex) -> Complex:
-    """The branch on a grid between three of its points: next to their parabola, or followed where it is too coarse."""
-    starts = np.polyval(np.polyfit(gain - gain[1], branch, 2), grid - gain[1])
-    poles, settled = exact_poles_next_to(found.arm, starts[:, None], many_laws(found.law, **{found.vary: grid}))
-    if settled.all():
-        return poles[:, 0]
-    more = locus(found.arm, found.law, found.vary, grid[0], grid[-1], points=grid.size, branches=len(found.branches))
-    return more.branches[np.argmin(abs(more.branches[:, 0] - branch[0]))]

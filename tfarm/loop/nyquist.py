@@ -17,26 +17,27 @@ from numpy.typing import NDArray
 from tfarm.arm import ANGLE_GAIN, RATE_GAIN
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
+from tfarm.response.frequency import ON_AXIS
 from tfarm.spectrum import flexible_frequencies
 
 from .frequencies import band_of, grid
 from .law_loop import LawLoop
 from .plant import Loop
-from .poles import ON_AXIS, AnyLoop, counted
+from .poles import AnyLoop, counted
 from .stability import Stability
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
-INDENT = 0.05  # radius of a semicircle around a pole of L, in units of its residue: |L| is about 20 on it
+INDENT_RADIUS = 0.05  # radius of a semicircle around a pole of L, in units of its residue: |L| is about 20 on it
 NEARER = 0.1  # of the way to the nearest closed-loop pole: no step past a pole of L leaves an unstable one out
-BESIDE = np.linspace(-4.0, 4.0, 41)  # points around a pole of the law, in its distances from the axis
-SLOW = 200  # points between that and the arm's own grid
-EDGE = 750  # points along an edge of the box, to begin with
-ARC = np.linspace(-math.pi / 2, math.pi / 2, 41)
+AROUND_LAW_POLE = np.linspace(-4.0, 4.0, 41)  # points around a pole of the law, in its distances from the axis
+SLOW_POINTS = 200  # points between that and the arm's own grid
+EDGE_POINTS = 750  # points along an edge of the box, to begin with
+ARC = np.linspace(-math.pi / 2, math.pi / 2, 41)  # rad, along a semicircle around a pole of L
 FAST = 0.7  # radians: where the argument of 1 + L turns by more between neighbours of the contour it is halved
-FINE = 0.02  # of the rim's radius: the longest straight piece of a drawn curve
-ROUNDS = 24  # of halving where it turns more
+LONGEST_PIECE = 0.02  # of the rim's radius: the longest straight piece of a drawn curve
+TURN_ROUNDS = 24  # of halving where it turns more
 
 
 @dataclass(frozen=True)
@@ -86,9 +87,10 @@ def nyquist_of(verdict: Stability[AnyLoop]) -> Nyquist[AnyLoop]:
     poles = poles_on_axis(loop, band)
     s, is_arc = smooth(loop, *upper_contour(loop, poles, band, verdict.poles.moving))
     corner = complex(verdict.poles.box.re_max, band)
-    across, down = np.linspace(1j * band, corner, EDGE), np.linspace(corner, corner.real, EDGE)
+    across, down = np.linspace(1j * band, corner, EDGE_POINTS), np.linspace(corner, corner.real, EDGE_POINTS)
     turned = turning(loop, np.r_[s, across[1:], down[1:]])
-    inside = _inside(loop, band)
+    own = loop.law.poles if isinstance(loop, LawLoop) else np.empty(0, complex)
+    inside = int(((own.real > 0) & (abs(own.imag) < band)).sum())
     plot = Nyquist(s, loop.loop_function(s), is_arc, poles, round(turned / math.pi), verdict, inside)
     found = min(plot.clear, verdict.unstable_roots)
     if not found <= plot.expected <= found + plot.on_axis:
@@ -97,12 +99,6 @@ def nyquist_of(verdict: Stability[AnyLoop]) -> Nyquist[AnyLoop]:
         )
         raise ConvergenceError(text, plot, plot.expected - verdict.unstable_roots)
     return plot
-
-
-def _inside(loop: Loop | LawLoop, band: float) -> int:
-    """Poles of L right of the axis below the band: those of a law that is not stable by itself."""
-    own = loop.law.poles if isinstance(loop, LawLoop) else np.empty(0, complex)
-    return int(((own.real > 0) & (abs(own.imag) < band)).sum())
 
 
 def poles_on_axis(loop: Loop | LawLoop, band: float) -> Real:
@@ -129,7 +125,7 @@ def upper_contour(loop: Loop | LawLoop, poles: Real, band: float, closed: Comple
     omega = np.asarray(grid(loop.arm, band))
     if isinstance(loop, LawLoop):
         own = loop.law.poles[loop.law.poles.imag > 0]
-        near = (own.imag[:, None] + abs(own.real)[:, None] * BESIDE).ravel()
+        near = (own.imag[:, None] + abs(own.real)[:, None] * AROUND_LAW_POLE).ravel()
         omega = np.unique(np.r_[omega, near[(near > omega[0]) & (near < band)]])
     s, is_arc = 1j * omega, np.zeros(omega.size, bool)
     for pole in poles:
@@ -137,7 +133,7 @@ def upper_contour(loop: Loop | LawLoop, poles: Real, band: float, closed: Comple
         away = abs(closed - 1j * pole)
         radius = min(radius, NEARER * float(away[away > ON_AXIS * pole].min(initial=math.inf)))
         if pole == 0:
-            slow = 1j * np.geomspace(radius, omega[0], SLOW)[1:-1]
+            slow = 1j * np.geomspace(radius, omega[0], SLOW_POINTS)[1:-1]
             s, is_arc = np.r_[s, slow], np.r_[is_arc, np.zeros(slow.size, bool)]
         clear = abs(s - 1j * pole) > radius
         arc = 1j * pole + radius * np.exp(1j * (ARC[ARC >= 0] if pole == 0 else ARC))
@@ -151,9 +147,9 @@ def upper_contour(loop: Loop | LawLoop, poles: Real, band: float, closed: Comple
 
 def smooth(loop: Loop | LawLoop, s: Complex, is_arc: NDArray[np.bool_]) -> tuple[Complex, NDArray[np.bool_]]:
     """More points on the axis wherever the drawn curve would have corners."""
-    for _ in range(ROUNDS):
+    for _ in range(TURN_ROUNDS):
         length = abs(np.diff(compressed(loop.loop_function(s))))
-        (coarse,) = np.nonzero((length > FINE) & ~is_arc[1:] & ~is_arc[:-1])
+        (coarse,) = np.nonzero((length > LONGEST_PIECE) & ~is_arc[1:] & ~is_arc[:-1])
         if not coarse.size:
             break
         s = np.insert(s, coarse + 1, (s[coarse] + s[coarse + 1]) / 2)
@@ -166,13 +162,13 @@ def indentation(loop: Loop | LawLoop, pole: float) -> float:
     scale = pole or band_of(loop.arm, 1)
     step = 1e-6 * scale
     near = np.array([step + 0j if pole == 0 else 1j * (pole + step)])
-    return min(INDENT * float(abs(loop.loop_function(near)[0])) * step, 1e-3 * scale)
+    return min(INDENT_RADIUS * float(abs(loop.loop_function(near)[0])) * step, 1e-3 * scale)
 
 
 def turning(loop: Loop | LawLoop, path: Complex) -> float:
     """By how much [rad] the argument of 1 + L grows along a path, halved where it turns fast."""
     value = 1 + loop.loop_function(path)
-    for _ in range(ROUNDS):
+    for _ in range(TURN_ROUNDS):
         with np.errstate(invalid="ignore"):  # what is no number is refused below
             step = np.angle(value[1:] / value[:-1])
         (fast,) = np.nonzero(~(abs(step) <= FAST))

@@ -30,19 +30,20 @@ from .frequencies import steep_places
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
-SAMPLES = 24  # of a panel; entire functions of order 1/2, so that few more never help where panels hold one mode
-STEEP = 3  # steep places a panel: each mode has one of the own, the locked and the free hub
-WRONG = 1e-11  # of the size of a part on its panel: a panel whose polynomials miss by more is halved
-MOST = 400  # panels
-BETWEEN = np.linspace(-0.97, 0.97, 40)  # where they are compared, in the panel: not at s = 0
-POINTS = np.cos(np.pi * (np.arange(SAMPLES) + 0.5) / SAMPLES)  # Chebyshev's of the first kind: none in the middle
-WEIGHTS = (-1.0) ** np.arange(SAMPLES) * np.sin(np.pi * (np.arange(SAMPLES) + 0.5) / SAMPLES)
+PANEL_SAMPLES = 24  # of order 1/2 as the parts are, few more never help where a panel holds one mode
+STEEP_A_PANEL = 3  # steep places a panel: each mode has one of the own, the locked and the free hub
+MOST_MISS = 1e-11  # of the size of a part on its panel: a panel whose polynomials miss by more is halved
+MOST_PANELS = 400  # more mean that halving does not help
+BETWEEN_SAMPLES = np.linspace(-0.97, 0.97, 40)  # where they are compared, in the panel: not at s = 0
+_ANGLES = np.pi * (np.arange(PANEL_SAMPLES) + 0.5) / PANEL_SAMPLES
+CHEBYSHEV = np.cos(_ANGLES)  # points of the first kind, where the samples are: none in the middle
+BARYCENTRIC = (-1.0) ** np.arange(PANEL_SAMPLES) * np.sin(_ANGLES)  # weights of the polynomial through them
 
 
 @dataclass(frozen=True)
 @record
 class Panels:
-    """Samples of d, theta and m, `values` (3, panels, SAMPLES), on panels of the axis up to `band` [rad/s].
+    """Samples of d, theta and m, `values` (3, panels, PANEL_SAMPLES), on panels of the axis up to `band` [rad/s].
 
     A panel is from `low` to `high` [rad/s], the first from -`high`, and has one positive factor on its values; `order`
     is n of the drive's s^n.  `error` is the largest miss between samples, as a share of a part's size on its panel.
@@ -62,20 +63,20 @@ def loop_panels(arm: Arm, band: float) -> Panels:
     where halving panels does not help."""
     if not arm.has_rigid_mode:
         raise ParameterError(key="arm", value=arm.name, remedy="samples of a loop are of an arm that turns freely")
-    places = np.asarray(steep_places(arm, band))[STEEP - 1 :: STEEP]
+    places = np.asarray(steep_places(arm, band))[STEEP_A_PANEL - 1 :: STEEP_A_PANEL]
     edges = np.r_[0.0, places[places < band], band]
     waiting = [(-edges[1], edges[1]), *itertools.pairwise(edges[1:])]
     done: list[tuple[float, float, Complex, float]] = []
     while waiting:
         low, high = waiting.pop()
         values, error = _panel(arm, low, high)
-        if error <= WRONG:
+        if error <= MOST_MISS:
             done.append((float(low), float(high), values, error))
         elif low == -high:
             waiting += [(low / 2, high / 2), (high / 2, high)]
         else:
             waiting += [(low, (low + high) / 2), ((low + high) / 2, high)]
-        if len(done) + len(waiting) > MOST:
+        if len(done) + len(waiting) > MOST_PANELS:
             raise ConvergenceError("polynomials do not follow the loop's parts along the axis", high, error)
     lows, highs, parts, errors = zip(*sorted(done, key=lambda each: each[1]), strict=True)
     return Panels(
@@ -88,23 +89,18 @@ def _order(arm: Arm) -> int:
 
 
 def _panel(arm: Arm, low: float, high: float) -> tuple[Complex, float]:
-    """Samples on one panel, the largest 1, and the largest miss between them."""
-    middle, half = (low + high) / 2, (high - low) / 2
-    both = _parts(arm, middle + half * np.r_[POINTS, BETWEEN])
-    size = abs(both).max()
-    values, between = both[:, :SAMPLES] / size, both[:, SAMPLES:] / size
-    weights = WEIGHTS / (BETWEEN[:, None] - POINTS)
-    missed = abs(values @ weights.T / weights.sum(axis=1) - between)
-    return values, float((missed.max(axis=1) / abs(values).max(axis=1)).max())
-
-
-def _parts(arm: Arm, omega: Real) -> Complex:
-    """d, theta and m at i omega (3, n), with one positive factor.
+    """Samples of d, theta and m on one panel, the largest 1, and the largest miss between them.
 
     Without losses they are real but for rounding, which is taken off: next to a resonance it would be a loss.
     """
-    k, s = system_of(arm), 1j * omega
+    middle, half, k = (low + high) / 2, (high - low) / 2, system_of(arm)
+    s = 1j * (middle + half * np.r_[CHEBYSHEV, BETWEEN_SAMPLES])
     drive, numerators, scale = loop_parts(k, s)
     theta, _, gauge = float_units(k) * numerators
-    parts = np.stack([drive / s ** _order(arm), theta, gauge / s**2]) * np.exp(scale - scale.real.max())
-    return np.asarray(parts.real + 0j if arm.is_reactive else parts)
+    both = np.stack([drive / s ** _order(arm), theta, gauge / s**2]) * np.exp(scale - scale.real.max())
+    both = both.real + 0j if arm.is_reactive else both
+    size = abs(both).max()
+    values, between = both[:, :PANEL_SAMPLES] / size, both[:, PANEL_SAMPLES:] / size
+    weights = BARYCENTRIC / (BETWEEN_SAMPLES[:, None] - CHEBYSHEV)
+    missed = abs(values @ weights.T / weights.sum(axis=1) - between)
+    return values, float((missed.max(axis=1) / abs(values).max(axis=1)).max())

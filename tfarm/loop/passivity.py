@@ -23,7 +23,7 @@ from tfarm.records import record
 if TYPE_CHECKING:
     Poly = Any  # of sympy, over the rationals: it comes without types, and is imported where it is used
 
-MOST = 40  # degree: exact arithmetic with such polynomials takes a moment
+MOST_EXACT_DEGREE = 40  # degree: exact arithmetic with such polynomials takes a moment
 
 
 @dataclass(frozen=True)
@@ -48,26 +48,20 @@ def signs_of(law: Law, friction: float = 0.0) -> Signs:
         return Signs("", "the sign of a law tells something where it reads the hub's own angle or rate")
     if not all(isinstance(part.block, Rational) for part in law.parts):
         return Signs("", "matrices are not looked at: give transfer functions")
-    if law.order > MOST:
-        return Signs("", f"of a law of more than {MOST} states the sign is not looked for")
-    num, den = _on_angle(law)
+    if law.order > MOST_EXACT_DEGREE:
+        return Signs("", f"of a law of more than {MOST_EXACT_DEGREE} states the sign is not looked for")
+    num, den = polynomial([0.0]), polynomial([1.0])  # of the whole law as one fraction on the angle
+    for part in law.parts:
+        assert isinstance(part.block, Rational)  # seen above
+        p, q = polynomial(part.block.num) * -law.sign, polynomial(part.block.den)
+        if part.signals == ("hub_rate",):
+            p = p * polynomial([1.0, 0.0])
+        num, den = num * q + p * den, den * q
     return (
         _positive_real(num + polynomial([friction, 0.0]) * den, den)
         or _negative_imaginary(num, den)
         or Signs("", "neither passive nor negative imaginary")
     )
-
-
-def _on_angle(law: Law) -> tuple[Poly, Poly]:
-    """The whole law as one fraction on the angle."""
-    num, den = polynomial([0.0]), polynomial([1.0])
-    for part in law.parts:
-        assert isinstance(part.block, Rational)  # checked before
-        p, q = polynomial(part.block.num) * -law.sign, polynomial(part.block.den)
-        if part.signals == ("hub_rate",):
-            p = p * polynomial([1.0, 0.0])
-        num, den = num * q + p * den, den * q
-    return num, den
 
 
 def _positive_real(num: Poly, den: Poly) -> Signs | None:
@@ -129,15 +123,10 @@ def definite(poly: Poly) -> Literal["above", "not below", "zero", ""]:
         return "zero"
     if poly.LC() < 0:
         return ""
-    odd_or_even = [(order, _roots_above_zero(factor)) for factor, order in poly.sqf_list()[1]]
-    if any(found for order, found in odd_or_even if order % 2):
+    with_roots = [order for factor, order in poly.sqf_list()[1] if factor.count_roots(0, None) > (factor.eval(0) == 0)]
+    if any(order % 2 for order in with_roots):
         return ""
-    return "not below" if any(found for _, found in odd_or_even) else "above"
-
-
-def _roots_above_zero(poly: Poly) -> int:
-    """How many different roots a polynomial has in v > 0."""
-    return int(poly.count_roots(0, None)) - int(poly.eval(0) == 0)
+    return "not below" if with_roots else "above"
 
 
 def is_hurwitz(poly: Poly) -> bool:

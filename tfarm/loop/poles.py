@@ -19,6 +19,7 @@ from tfarm.arm.checks import whole
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
 from tfarm.exact.characteristic import zeros_at_origin
 from tfarm.records import record
+from tfarm.response.frequency import ON_AXIS
 from tfarm.spectrum.box import GROWTH, Box, complete
 from tfarm.spectrum.damped import CLEAR
 from tfarm.spectrum.enclose import Disc, disjoint, enclosed, proven_count
@@ -31,16 +32,17 @@ from .plant import Loop, effective_inertia
 Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
 
-ON_AXIS = 1e-12  # a pole whose real part is below this share of its size is on the imaginary axis to working precision
-MOST_POLES = 1000
-USUAL = 10  # poles listed where no count is asked for
-MOST_MODES = 4000  # of the undamped arm, below the highest box that is searched for as many poles as are asked for
-SLOW = 1e-6  # of a box's height: poles nearer to 0 are the rigid arm's, and known beforehand
+MOST_POLES = 1000  # that may be asked for
+USUAL_POLES = 10  # poles listed where no count is asked for
+MOST_BOX_MODES = 4000  # flexible, below the highest box that is searched for as many poles as are asked for
+SLOW_SHARE = 1e-6  # of a box's height: poles nearer to 0 are the rigid arm's, and known beforehand
 SLOW_STEPS = 4  # of Newton's method from there
 NEAR_RIGID = 0.01  # of its size: how far it may be from the rigid arm's
-SMALLEST = 1e-140  # 1/s: whose square is still a full double
+LEAST_SQUARABLE = 1e-140  # 1/s: whose square is still a full double
 AnyLoop = TypeVar("AnyLoop", bound=Loop | LawLoop, default=Loop)  # hub gains, unless another law is said
-SHRINK = tuple(1 / factor for factor in GROWTH)
+LEAST_REAL_PART = -0.5  # of L, so that 1 + L has no zero
+BEYOND_EDGE = (2.0, 5.0, 20.0)  # times the right edge of a box, where L is looked at again
+SHRUNK_HEIGHTS = tuple(1 / factor for factor in GROWTH)
 
 
 def counted(zeros: Complex) -> int:
@@ -124,12 +126,12 @@ def closed_loop_poles(arm: Arm, law: HubFeedback, count: int | None = None) -> P
     if count is not None:
         count = whole("count", count, 1, MOST_POLES, f"a whole number from 1 to {MOST_POLES}")
     loop, cut_off = Loop(arm, law), arm.shear_cutoff
-    wanted, limit = (USUAL, cut_off) if count is None else (count, math.inf)
+    wanted, limit = (USUAL_POLES, cut_off) if count is None else (count, math.inf)
     number = wanted + 2
     while True:
         height = band_of(arm, number)
         if height >= limit:
-            poles = poles_below(loop, limit, SHRINK)
+            poles = poles_below(loop, limit, SHRUNK_HEIGHTS)
             if poles.values.size <= wanted:
                 return replace(poles, ends_at_shear_cutoff=True)
         else:
@@ -137,7 +139,7 @@ def closed_loop_poles(arm: Arm, law: HubFeedback, count: int | None = None) -> P
         if poles.values.size >= wanted:
             real = int((poles.values.imag == 0).sum())
             return first_poles(poles, wanted if count is not None else max(wanted, real))
-        if number > MOST_MODES:
+        if number > MOST_BOX_MODES:
             text = f"only {poles.values.size} poles right of -1/C lie below {height:.4g} rad/s, not {count}"
             raise ConvergenceError(text, poles.values, count)
         number *= 2
@@ -149,34 +151,35 @@ def poles_below(loop: Loop, height: float, factors: tuple[float, ...] = GROWTH) 
     Where a zero lies on the edge of the box the next of the `factors` on the height is tried.
     """
     at_zero = zeros_at_origin(loop.k, loop.gains)
-    starts, known = starting_points(loop, 1.3 * height), slow_poles(loop, SLOW * height)
+    starts, known = starting_points(loop, 1.3 * height), slow_poles(loop, SLOW_SHARE * height)
     function = loop.member.function
     found, box = complete(function, lambda height: box_of(loop, height), height, starts, known, factors)
-    found = _on_its_axis(loop, found)
+    # without losses the function is even in s: a simple zero is its own mirror image, its real part is rounding
+    on_axis = loop.is_lossless & (abs(found.real) <= ON_AXIS * abs(found))
+    found = np.where(on_axis, 1j * found.imag, found)
     upper = found[found.imag >= 0]
     upper = upper[np.lexsort((upper.real, upper.imag))]
     return Poles(loop, np.r_[np.zeros(at_zero, complex), upper], box)
 
 
-def _on_its_axis(loop: Loop, found: Complex) -> Complex:
-    """The poles, rounding taken off the real part of those that a lossless loop has on the imaginary axis.
-
-    At C = 0 and without rate feedback the characteristic function is even in s: a simple zero is its own mirror image.
-    """
-    on_axis = loop.is_lossless & (abs(found.real) <= ON_AXIS * abs(found))
-    return np.where(on_axis, 1j * found.imag, found)
-
-
 def box_of(loop: Loop, height: float) -> Box:
     """A box of that height which reaches far enough right for any unstable pole, and left short of -1/C."""
-    right, edge = 0.1 * height, 1j * np.linspace(0.0, height, 40)
-    while right < 1e3 * height:
-        L = loop.loop_function(np.r_[right + edge, right * np.array([2, 5, 20])])
-        if L.real.min() > -0.5:  # then 1 + L has no zero there; L > 0 may be large, as on a hub without inertia
+    right, left, C = quiet_edge(loop, 0.1 * height, height, 40, 1e3), 1.5 * height, loop.arm.damping
+    return Box(-min(left, CLEAR / C) if C else -left, right, -height, height)
+
+
+def quiet_edge(loop: Loop | LawLoop, right: float, height: float, points: int, heights: float) -> float:
+    """The right edge [1/s] of a box of that height, from `right` on: where 1 + L has no zero, or after so many heights.
+
+    That is where Re L > -1/2, on the edge and at a few places beyond; L > 0 may be large, as on a hub without inertia.
+    """
+    edge = 1j * np.linspace(0.0, height, points)
+    while right < heights * height:
+        L = loop.loop_function(np.r_[right + edge, right * np.array(BEYOND_EDGE)])
+        if L.real.min() > LEAST_REAL_PART:
             break
         right *= 1.7
-    left, C = 1.5 * height, loop.arm.damping
-    return Box(-min(left, CLEAR / C) if C else -left, float(right), -height, height)
+    return float(right)
 
 
 def slow_poles(loop: Loop, below: float) -> Complex:
@@ -196,23 +199,27 @@ def slow_poles(loop: Loop, below: float) -> Complex:
     slow = roots[(roots != 0) & (abs(roots) <= below)]
     exact = slow.copy()
     for _ in range(SLOW_STEPS):
-        at = loop.member.function(np.where(abs(exact) > SMALLEST, exact, 1.0))
-        exact = exact - np.where(abs(exact) > SMALLEST, at.value / at.slope, 0.0)
+        at = loop.member.function(np.where(abs(exact) > LEAST_SQUARABLE, exact, 1.0))
+        exact = exact - np.where(abs(exact) > LEAST_SQUARABLE, at.value / at.slope, 0.0)
     return exact[abs(exact - slow) <= NEAR_RIGID * abs(slow)]
 
 
 def starting_points(loop: Loop, up_to: float) -> Complex:
     """Where Newton's method starts: the arm's own frequencies, those with the hub locked, and the rigid arm's poles."""
     arm, C = loop.arm, loop.arm.damping
-    omega = np.asarray(steep_places(arm, up_to))
-    shift = np.array([0.0, 0.02, 0.3])[:, None]
-    decay = C * omega**2 / 2
-    near = (-decay - shift * omega + 1j * omega * np.sqrt(np.maximum(1 - (C * omega / 2) ** 2, 0.0))).ravel()
+    near = near_modes(np.asarray(steep_places(arm, up_to)), C)
     J = arm.turned_inertia if arm.has_rigid_mode else arm.hub_side_inertia + 1e-12
     slow = np.roots([J, *loop.at_hub]).astype(complex)
-    slow = slow[abs(slow) > SMALLEST]  # zeros at 0 are divided out
+    slow = slow[abs(slow) > LEAST_SQUARABLE]  # zeros at 0 are divided out
     real = -np.geomspace(up_to / 300, 1.4 * up_to, 25)
     return np.concatenate([near, near.conj(), slow, real, -real])
+
+
+def near_modes(omega: Real, C: float) -> Complex:
+    """Starts [1/s] beside the poles of modes of those frequencies [rad/s] that bending alone damps, and further left."""
+    shift = np.array([0.0, 0.02, 0.3])[:, None]
+    decay = C * omega**2 / 2
+    return (-decay - shift * omega + 1j * omega * np.sqrt(np.maximum(1 - (C * omega / 2) ** 2, 0.0))).ravel()
 
 
 def first_poles(poles: Poles[AnyLoop], count: int) -> Poles[AnyLoop]:

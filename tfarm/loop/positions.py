@@ -21,7 +21,7 @@ from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import loop_parts
 from tfarm.exact.system import system_of
 from tfarm.loop.frequencies import band_of, steep_places
-from tfarm.loop.panels import BETWEEN, POINTS, SAMPLES
+from tfarm.loop.panels import BETWEEN_SAMPLES, CHEBYSHEV, PANEL_SAMPLES
 from tfarm.records import record
 from tfarm.response import TransferFunction, transfer
 from tfarm.spectrum import modes
@@ -30,17 +30,17 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 Sensor = Literal["displacement", "moment"]
 
-WRONG = 1e-8  # of the numerator on a panel, between samples: zeros are shown to five digits
-ROUNDING = 1e-13  # of the largest coefficient: a series ends where it is that
-BESIDE = 1.0  # of a panel's half width: how far from the axis zeros are looked for
-EDGE = 1e-7  # of a panel's half width: panels end at modes, where a sensor at a node has its zero
-SAME = 1e-5  # relative: a zero near both lines is found from both
-AT_REST = {"displacement": 0, "moment": 2}  # powers of s that a sensor's numerator has at s = 0
-AS_SERIES = np.cos(np.outer(np.arange(SAMPLES), np.arccos(POINTS))) * 2 / SAMPLES  # coefficients of Chebyshev's series
+MOST_SENSOR_MISS = 1e-8  # of the numerator on a panel, between samples: zeros are shown to five digits
+SERIES_END = 1e-13  # of the largest coefficient: a series ends where it is that
+BESIDE_LINE = 1.0  # of a panel's half width: how far from the axis zeros are looked for
+PAST_EDGE = 1e-7  # of a panel's half width: panels end at modes, where a sensor at a node has its zero
+SAME_SENSOR_ZERO = 1e-5  # relative: a zero near both lines is found from both
+POWERS_AT_REST = {"displacement": 0, "moment": 2}  # powers of s that a sensor's numerator has at s = 0
+AS_SERIES = np.cos(np.outer(np.arange(PANEL_SAMPLES), np.arccos(CHEBYSHEV))) * 2 / PANEL_SAMPLES  # samples to a series
 AS_SERIES[0] /= 2
-STEEP = 4  # steep places a panel
-ROOM = 0.7  # of the way from a panel's middle to -1/C: its half width at most, so that 24 samples leave about 1e-9
-HALVINGS = 40  # of a panel next to -1/C
+STEEP_A_SENSOR_PANEL = 4  # steep places a panel
+ROOM_TO_SINGULAR = 0.7  # of its middle's way to -1/C: the half width of a panel at most, so that 24 samples leave 1e-9
+GRADING_HALVINGS = 40  # of a panel next to -1/C
 
 
 @dataclass(frozen=True)
@@ -84,8 +84,8 @@ def _zeros(G: TransferFunction, lines: Sequence[_Panels]) -> Complex:
     """The zeros with Im s > 0, and the positive real ones, each once."""
     found: list[complex] = []
     for s in (s for line in lines for s in line.zeros(G)):
-        is_real = abs(s.imag) < SAME * abs(s)
-        if (s.real > 0 if is_real else s.imag > 0) and all(abs(s - each) > SAME * abs(s) for each in found):
+        is_real = abs(s.imag) < SAME_SENSOR_ZERO * abs(s)
+        if (s.real > 0 if is_real else s.imag > 0) and all(abs(s - each) > SAME_SENSOR_ZERO * abs(s) for each in found):
             found.append(complex(s.real, 0.0) if is_real else s)
     return np.array(sorted(found, key=lambda s: (s.imag, s.real)), dtype=complex)
 
@@ -105,14 +105,14 @@ class _Panels:
     @classmethod
     def of(cls, arm: Arm, sensor: Sensor, unit: complex, band: float) -> _Panels:
         """Panels of the line up to the band: along the imaginary axis the first begins at -`high`, as all is even."""
-        places = np.asarray(steep_places(arm, band))[STEEP - 1 :: STEEP]
+        places = np.asarray(steep_places(arm, band))[STEEP_A_SENSOR_PANEL - 1 :: STEEP_A_SENSOR_PANEL]
         edges = _graded(np.r_[0.0, places[places < band], band], unit, arm.damping)
         low, high = edges[:-1].copy(), edges[1:]
         low[0] = -high[0] if unit == 1j else 0.0
-        s = unit * ((low + high)[:, None] / 2 + (high - low)[:, None] / 2 * np.r_[POINTS, BETWEEN])
+        s = unit * ((low + high)[:, None] / 2 + (high - low)[:, None] / 2 * np.r_[CHEBYSHEV, BETWEEN_SAMPLES])
         parts = loop_parts(system_of(arm), s.ravel())
         drive, scale = parts.drive.reshape(s.shape), parts.scale.reshape(s.shape)
-        factor = drive / s ** AT_REST[sensor] * np.exp(scale - scale.real.max(axis=1, keepdims=True))
+        factor = drive / s ** POWERS_AT_REST[sensor] * np.exp(scale - scale.real.max(axis=1, keepdims=True))
         return cls(unit, low, high, s, factor, arm.is_reactive)
 
     def zeros(self, G: TransferFunction) -> list[complex]:
@@ -121,11 +121,14 @@ class _Panels:
         values = values.real + 0j if self.is_real else values
         found: list[complex] = []
         for low, high, both in zip(self.low, self.high, values, strict=True):
-            series = AS_SERIES @ both[:SAMPLES]
-            missed = abs(chebyshev.chebval(BETWEEN, series) - both[SAMPLES:]).max() / abs(both).max()
-            if missed > WRONG:
+            series = AS_SERIES @ both[:PANEL_SAMPLES]
+            missed = abs(chebyshev.chebval(BETWEEN_SAMPLES, series) - both[PANEL_SAMPLES:]).max() / abs(both).max()
+            if missed > MOST_SENSOR_MISS:
                 raise ConvergenceError(f"polynomials do not follow the numerator of {G.outputs[0]}", high, missed)
-            roots = (low + high) / 2 + (high - low) / 2 * _roots(series)
+            last = int(np.nonzero(abs(series) > SERIES_END * abs(series).max())[0].max())
+            roots = np.asarray(chebyshev.chebroots(series[: last + 1]), dtype=complex)
+            roots = roots[(abs(roots.real) <= 1 + PAST_EDGE) & (abs(roots.imag) <= BESIDE_LINE)]
+            roots = (low + high) / 2 + (high - low) / 2 * roots
             found += [self.unit * z for z in roots if z.real > -1e-9 * high]
         return found
 
@@ -135,19 +138,12 @@ def _graded(edges: Real, unit: complex, C: float) -> Real:
 
     The first panel of the imaginary axis is twice as wide as from 0 to its edge.
     """
-    for _ in range(HALVINGS if C else 0):
+    for _ in range(GRADING_HALVINGS if C else 0):
         middle, half = (edges[1:] + edges[:-1]) / 2, np.diff(edges) / 2
         if unit == 1j:
             middle[0], half[0] = 0.0, edges[1]
-        near = half > ROOM * abs(unit * middle + 1 / C)
+        near = half > ROOM_TO_SINGULAR * abs(unit * middle + 1 / C)
         if not near.any():
             break
         edges = np.sort(np.r_[edges, ((edges[1:] + edges[:-1]) / 2)[near]])
     return edges
-
-
-def _roots(series: Complex) -> Complex:
-    """The roots of a Chebyshev series in its interval and not far beside it."""
-    last = int(np.nonzero(abs(series) > ROUNDING * abs(series).max())[0].max())
-    roots = np.asarray(chebyshev.chebroots(series[: last + 1]), dtype=complex)
-    return roots[(abs(roots.real) <= 1 + EDGE) & (abs(roots.imag) <= BESIDE)]

@@ -25,11 +25,11 @@ from .variation import OF_THE_LAW, Complex, Real, Variation
 if TYPE_CHECKING:
     import control
 
-LEAST_ORDER = 20
-BEYOND = 2  # modes of the reduced model above the last branch, if the order is not said
+LEAST_ORDER = 20  # of the model, ten modes, where no order is asked for
+MODES_BEYOND_BRANCHES = 2  # modes of the reduced model above the last branch, if the order is not said
 POLISHING = 4  # steps of Newton's method: they start from a dozen right digits
-BELIEVED = 1e-6  # of its size: a pole that Newton's method would move further is none of its own
-FEW = 9  # values at which an arm is reduced anew, where a parameter of it varies
+OWN_POLE = 1e-6  # of its size: a pole that Newton's method would move further is none of its own
+REDUCED_VALUES = 9  # values at which an arm is reduced anew, where a parameter of it varies
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ def reduced_locus(exact: Locus, order: int | None = None) -> ReducedLocus:
     arm, rigid = exact.arm, exact.arm.has_rigid_mode
     least = int(exact.mode.max()) + rigid
     if order is None:
-        order = max(LEAST_ORDER, 2 * (least + BEYOND))
+        order = max(LEAST_ORDER, 2 * (least + MODES_BEYOND_BRANCHES))
     if isinstance(order, bool) or not isinstance(order, int) or order % 2 or order < 2 * least:
         raise ParameterError(key="order", value=order, remedy=f"an even number from {2 * least}: two a mode")
     count = order // 2 - rigid
@@ -69,13 +69,16 @@ def reduced_locus(exact: Locus, order: int | None = None) -> ReducedLocus:
         which = np.arange(exact.gain.size)
         poles = _polished(exact.variation, exact.gain, root_locus(arm, exact.law, exact.vary, exact.gain, count), count)
     else:
-        which = np.unique(np.linspace(0, exact.gain.size - 1, FEW).round().astype(int))
+        which = np.unique(np.linspace(0, exact.gain.size - 1, REDUCED_VALUES).round().astype(int))
         loops = [exact.variation.at(float(value)) for value in exact.gain[which]]
         none = np.zeros(len(FED_BACK))
         closed = [_closed(each.arm, np.array(each.law.row), count, none)[0][0] for each in loops]
         poles = np.array([np.linalg.eigvals(A) for A in closed])
     branches = exact.branches[:, which]
-    paired = np.array([_paired(*each) for each in zip(branches.T, poles, strict=True)]).T
+    paired = np.full(branches.shape, np.nan, complex)
+    for n, (zeros, found) in enumerate(zip(branches.T, poles, strict=True)):
+        _, chosen = linear_sum_assignment(np.nan_to_num(abs(zeros[:, None] - found)))
+        paired[:, n] = np.where(np.isnan(zeros), np.nan, found[chosen])
     size = np.maximum(abs(branches), modes(arm, 1).natural_frequency[-1])
     return ReducedLocus(order, exact.gain[which], paired, np.fmax.reduce(abs(paired - branches) / size, axis=1))
 
@@ -103,7 +106,7 @@ def _polished(variation: Variation, gain: Real, poles: Complex, count: int) -> C
         value, slope = _return_difference(model, laws, found)
         with np.errstate(all="ignore"):
             move = value / slope
-        near = abs(move) <= BELIEVED * abs(found)
+        near = abs(move) <= OWN_POLE * abs(found)
         found = np.where(near, found - np.where(found.imag == 0, move.real, move), found)
     return found
 
@@ -140,9 +143,3 @@ def _closed(arm: Arm, fixed: Real, count: int, moving: Real) -> tuple[Matrices, 
     used[FED_BACK.index("hub_angle")] |= bool(arm.rate_loss) and arm.has_rigid_mode  # or its pole at 0 is not a state
     model = modal_model(arm, [name for name, is_used in zip(FED_BACK, used, strict=True) if is_used], count)
     return model.closed(fixed[used]), moving[None, used]
-
-
-def _paired(exact: Complex, poles: Complex) -> Complex:
-    """Of the poles the one that belongs to each exact zero; NaN where that has ended."""
-    _, chosen = linear_sum_assignment(np.nan_to_num(abs(exact[:, None] - poles[None, :])))
-    return np.where(np.isnan(exact), np.nan, poles[chosen])

@@ -20,14 +20,13 @@ from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.crossing import Crossings, brackets, counts_over, intervals, solved
-from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import gains_of, loop_parts, torque
 from tfarm.exact.system import System, system_of
 from tfarm.records import record
 from tfarm.spectrum.scales import PAPER_GAINS, default_gains
 
 from .frequencies import grid
-from .lines import Complex, along, crossing_at_zero, crossings
+from .lines import Complex, along, ascending, crossing_at_zero, crossings, static_crossings
 from .lossless import locked_edges, stable_moments
 from .plant import Loop
 from .stability import loop_band, stability
@@ -36,7 +35,7 @@ from .windows import holds_undamped
 Real = NDArray[np.float64]
 Window = tuple[float, float]
 INFINITE = -1  # stands for infinitely many unstable poles
-MOST = 2000  # grid points along one gain
+MOST_GRID_GAINS = 2000  # of a map, along one gain
 
 
 @dataclass(frozen=True)
@@ -80,8 +79,8 @@ class Region:
         low, high = float(self.K2[0]), float(self.K2[-1])
         if self.arm.is_reactive:
             law = HubFeedback(K1=1.0, Kp=self.Kp)
-            static = crossing_at_zero(self.arm, along("K2", law))
-            ends = {low, high, *stable_moments(self.arm), *([] if static is None else [static.t])}
+            static = [each.t for each in static_crossings(self.arm, along("K2", law))]
+            ends = {low, high, *stable_moments(self.arm), *static}
             pairs = itertools.pairwise(sorted(end for end in ends if low <= end <= high))
             loop = Loop(self.arm, law)
             held = [pair for pair in pairs if holds_undamped(loop, law.having("K2", sum(pair) / 2))]
@@ -102,7 +101,7 @@ def region(arm: Arm, K1: Real, K2: Real, Kp: float = 0.0) -> Region:
     A grid line exactly on K1 = 0 or K2 = 1 at C = 0 is marginal and counts as unstable, and K1 = 0 is never stable
     where the hub angle is free.  Raises ParameterError where there is no loop or the grid is empty.
     """
-    K1, K2 = _axis("K1", K1), _axis("K2", K2)
+    K1, K2 = ascending("K1", K1, MOST_GRID_GAINS), ascending("K2", K2, MOST_GRID_GAINS)
     Loop(arm, HubFeedback(K1=float(K1[-1]), K2=float(K2[-1]), Kp=Kp))
     if arm.is_told_by_lyapunov:
         return Region(arm, Kp, K1, K2, _undamped_counts(arm, K1, K2, Kp), np.empty((0, 3)), 0.0, [])
@@ -144,15 +143,6 @@ def between(low: float, high: float, number: int) -> Real:
     return np.asarray(low + (high - low) * (np.arange(number) + 0.5) / number)
 
 
-def _axis(name: str, values: Real) -> Real:
-    values = np.atleast_1d(np.asarray(values, dtype=float))
-    if not (2 <= values.size <= MOST and np.isfinite(values).all() and (np.diff(values) > 0).all()):
-        raise ParameterError(
-            key=name, value=f"{values.size} values", remedy=f"an ascending range of 2 to {MOST} values"
-        )
-    return values
-
-
 def _undamped_counts(arm: Arm, K1: Real, K2: Real, Kp: float) -> NDArray[np.int64]:
     """Unstable poles at C = 0: one count for each side of the static limit where they are finitely many."""
     static = crossing_at_zero(arm, along("K2", HubFeedback(K1=1.0, Kp=Kp)))
@@ -175,8 +165,7 @@ def _lossless_counts(arm: Arm, K1: Real, K2: Real, Kp: float) -> NDArray[np.int6
     """
     unstable = np.full((K2.size, K1.size), INFINITE, dtype=np.int64)
     law = HubFeedback(K1=default_gains(arm).K1, Kp=Kp)
-    static = crossing_at_zero(arm, along("K2", law))
-    found = Crossings.of([*locked_edges(arm), *([] if static is None else [static])])
+    found = Crossings.of([*locked_edges(arm), *static_crossings(arm, along("K2", law))])
     (counts,) = counts_over(K2, [found], 0.0, np.array([stability(arm, law).unstable_roots]))
     unstable[:, K1 > 0] = counts[:, None]
     return unstable
@@ -198,9 +187,9 @@ def _crossings_along_K2(arm: Arm, K1: Real, Kp: float, omega: Real) -> list[Cros
     at, t = solved(parts, omega[before], omega[before + 1])
     found = []
     for n, law in enumerate(laws):
-        static, here = crossing_at_zero(arm, along("K2", law)), column == n
+        here = column == n
         solved_here = zip(t[here], at[here], change[here], strict=True)
-        found.append(Crossings.of([*solved_here, *([] if static is None else [static])]))
+        found.append(Crossings.of([*solved_here, *static_crossings(arm, along("K2", law))]))
     return found
 
 

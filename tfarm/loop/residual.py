@@ -25,32 +25,28 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
 
 RISE, TRAVEL = 1.0, 1.15  # the paper's slew: rise time [s] and tip travel [m]
-MOST_EXPONENT = 100.0
-SAMPLES = 64  # of the period after the slew
+MOST_EXPONENT = 100.0  # e^100 = 3e43 is more than any stable loop leaves, and its square no overflow
+PERIOD_SAMPLES = 64  # of the period after the slew
 
 
 def residual_moment(arm: Arm, laws: Real, number: int, known: Arm | None = None) -> Real:
     """Root-mean-square of the root moment [N m] over the first mode's period after the slew, for `laws` (gains, n).
 
-    `known` is the arm that the slew is made for, the arm itself unless given.  Raises ParameterError for an arm that
-    cannot turn.
+    Of the first `number` modes and of real poles.  `known` is the arm that the slew is made for, the arm itself unless
+    given.  Raises ParameterError for an arm that cannot turn.
     """
     must_turn(arm)
-    poles = band_and_real_poles(arm, laws, number)
+    poles = band_and_real_poles(arm, laws, number)  # (n, slots)
     period = 2 * np.pi / first_frequency(arm)
-    moment = _answers(arm, poles, laws, period * np.arange(SAMPLES) / SAMPLES, known or arm)
-    return np.asarray(np.sqrt((moment**2).mean(axis=1)))
-
-
-def _answers(arm: Arm, poles: Complex, laws: Real, t: Real, known: Arm) -> Real:
-    """Real part of the sum over poles (gains, slots) and their conjugates at times t after the slew: (gains, times)."""
+    t = period * np.arange(PERIOD_SAMPLES) / PERIOD_SAMPLES
     rows, columns = np.nonzero(~np.isnan(poles))
     s = poles[rows, columns]
     amplitude = np.zeros(poles.shape, complex)
-    amplitude[rows, columns] = residues(arm, s, laws[:, rows]) * command(known, s, laws[:, rows])
-    amplitude *= np.where(is_oscillating(poles), 2.0, 1.0)
+    amplitude[rows, columns] = residues(arm, s, laws[:, rows]) * command(known or arm, s, laws[:, rows])
+    amplitude *= np.where(is_oscillating(poles), 2.0, 1.0)  # with its conjugate
     with np.errstate(under="ignore"):
-        return np.asarray((amplitude[..., None] * _exp(np.nan_to_num(poles)[..., None] * t)).real.sum(axis=1))
+        moment = (amplitude[..., None] * _exp(np.nan_to_num(poles)[..., None] * t)).real.sum(axis=1)
+    return np.asarray(np.sqrt((moment**2).mean(axis=1)))
 
 
 def _exp(z: Complex) -> Complex:

@@ -19,21 +19,21 @@ from tfarm.columns import Column, Table
 from tfarm.digits import general, plain, singly
 from tfarm.errors import ParameterError
 from tfarm.records import record
-from tfarm.reduced.sensed import closed, in_series, pade, sensed_model
+from tfarm.reduced.sensed import sensed_model
 from tfarm.spectrum import modes
 
 from .answers import law_answer
 from .law_loop import LawLoop
-from .law_poles import PADE
+from .law_poles import poles_of_model
 from .law_stability import law_stability
 from .stability import Stability
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 
-MOST = 60  # modes of a model
-USUAL = 20
-AT_REST = 1e-7  # of w1: poles at 0 come out as small
-ON_AXIS = 1e-9  # of its size: what a real part may be of a pole that no model damps
+MOST_SPILL_MODES = 60  # modes of a model
+USUAL_SPILL_MODES = 20  # up to which models are looked at where nothing else is asked for
+REST_SHARE = 1e-7  # of w1: poles at 0 come out as small
+UNDAMPED_SHARE = 1e-9  # of its size: what a real part may be of a pole that no model damps
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Spill:
     def driven(self) -> Complex:
         """The exact loop's unstable poles, ascending in Im s."""
         moving = self.verdict.poles.moving
-        return moving[moving.real > ON_AXIS * abs(moving)]
+        return moving[moving.real > UNDAMPED_SHARE * abs(moving)]
 
     @property
     def first_mode(self) -> int | None:
@@ -93,47 +93,34 @@ class Spill:
         words = f"{exact}: {which} is driven, at {abs(self.driven[0]):.6g} rad/s"
         if not self.content.size:
             return f"{words}; every model says so"
-        last = (
-            f"from {self.shown_from} modes on they show it" if self.shown_from else "none looked at shows it for good"
-        )
-        return f"{words}; models of {_listed(self.content)} find nothing unstable, {last}"
+        first, last = int(self.content[0]), int(self.content[-1])
+        models = f"{first} to {last} modes" if first != last else f"{first} mode{'s' * (first > 1)}"
+        if last - first + 1 != self.content.size:
+            models = f"{self.content.size} orders up to {last}"
+        end = f"from {self.shown_from} modes on they show it" if self.shown_from else "none looked at shows it for good"
+        return f"{words}; models of {models} find nothing unstable, {end}"
 
 
-def _listed(numbers: NDArray[np.int64]) -> str:
-    """So many modes: one number, a range or the ends of what has gaps."""
-    first, last = int(numbers[0]), int(numbers[-1])
-    if first == last:
-        return f"{first} mode{'s' * (first > 1)}"
-    return f"{first} to {last} modes" if last - first + 1 == numbers.size else f"{numbers.size} orders up to {last}"
-
-
-def spill(arm: Arm, law: Law, most: int = USUAL) -> Spill:
+def spill(arm: Arm, law: Law, most: int = USUAL_SPILL_MODES) -> Spill:
     """The exact loop beside models of 1 to `most` flexible modes, their static remainder left out.
 
     The models are those that a law is designed on: bare modes.  A delay is in them as a Pade approximation.
     Raises ParameterError where there is no loop, or none of finite order; ConvergenceError as `law_stability` does.
     """
-    most = whole("modes", most, 1, MOST, f"a whole number of modes, 1 to {MOST}")
+    most = whole("modes", most, 1, MOST_SPILL_MODES, f"a whole number of modes, 1 to {MOST_SPILL_MODES}")
     if law.is_improper:
         remedy = "differentiates, and has no states; add a fast pole to den"
         raise ParameterError(key="law", value=law.name, remedy=remedy)
     verdict = law_stability(arm, law)
-    numbers = np.arange(1, most + 1)
-    found = [_of_model(verdict.loop, int(number)) for number in numbers]
-    unstable, rightmost = (np.array(each) for each in zip(*found, strict=True))
-    return Spill(verdict, numbers, unstable, rightmost)
-
-
-def _of_model(loop: LawLoop, count: int) -> tuple[int, complex]:
-    """Unstable poles of a model of so many modes under the law, and the one furthest right."""
-    A, B, C, D = sensed_model(loop.arm, loop.law.signals, count)
-    law = loop.law.matrices()
-    if loop.law.delay:
-        law = in_series(law, pade(loop.law.delay, PADE).matrices())
-    poles = np.linalg.eigvals(closed((A, B, C, 0 * D), law))
-    slowest = AT_REST * float(modes(loop.arm, 1).natural_frequency[-1])
-    moving = poles[abs(poles) > slowest]
-    return int((moving.real > ON_AXIS * abs(moving)).sum()), complex(moving[np.argmax(moving.real)])
+    loop, numbers, unstable, rightmost = verdict.loop, np.arange(1, most + 1), [], []
+    slowest = REST_SHARE * float(modes(loop.arm, 1).natural_frequency[-1])
+    for number in numbers.tolist():
+        A, B, C, D = sensed_model(loop.arm, loop.law.signals, number)
+        poles = poles_of_model(loop, (A, B, C, 0 * D))
+        moving = poles[abs(poles) > slowest]
+        unstable.append(int((moving.real > UNDAMPED_SHARE * abs(moving)).sum()))
+        rightmost.append(moving[np.argmax(moving.real)])
+    return Spill(verdict, numbers, np.array(unstable), np.array(rightmost))
 
 
 SPILL = (

@@ -7,7 +7,8 @@ Poles are computed, completely, up to a band; what lies beyond is
   the hub it tells nothing, and the edges of many modes are looked at (`lossless`);
 * at C > 0 bounded: from the band on |L(i w)| stays below one half, and falls (the hub's inertia against ever more
   heavily damped bending), so that 1 + L has no zero there, nor further right.  Where the band of that would hold more
-  modes than `MOST_MODES` it is cut, and where a segment of a lossy rig has C = 0 there is none; the verdict says so.
+  modes than `MOST_BAND_MODES` it is cut, and where a segment of a lossy rig has C = 0 there is none: the verdict says
+  so.
 
 A pole at 0 remains where Kp = 0, whatever K1 and K2: verdicts are apart from it.
 """
@@ -15,7 +16,7 @@ A pole at 0 remains where Kp = 0, whatever K1 and K2: verdicts are apart from it
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Generic, NamedTuple
+from typing import Any, Generic, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,17 +26,18 @@ from tfarm.errors import ConvergenceError
 from tfarm.records import record
 from tfarm.spectrum import modes, modes_below
 
-from .frequencies import MOST_MODES, band_of
+from .frequencies import MOST_BAND_MODES, band_of
 from .lossless import driven_modes, locked_edges
 from .plant import Loop
 from .poles import AnyLoop, Poles, poles_below
 
+Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
 
-FEW = 12  # flexible modes in the band at C = 0, and at least
+LEAST_BAND_MODES = 12  # flexible modes in the band at C = 0, and at least
 QUIET = 0.5  # |L| beyond the band, at C > 0
 MARGIN_OF_ZERO = 1e-11  # a real part below this share of |s| is none: the poles are right to a few eps
-UNKNOWN = (  # beyond the band: of a rig with a segment without damping, and of others
+NOT_BOUNDED = (  # beyond the band: of a rig with a segment without damping, and of others
     "beyond the band not bounded: with C = 0 in the link resonances are too narrow to be looked at",
     "beyond the band not bounded: the small-gain condition would need more modes than are looked at",
 )
@@ -105,11 +107,16 @@ def _verdict(poles: Poles, is_unstable: bool, loop: Loop) -> str:
     if loop.arm.is_reactive:
         told = loop.is_told_by_theorem
         return "marginal" if told and not is_felt(loop.arm, poles.box.im_max) else "stable"
-    on_axis = moving[moving.real > -MARGIN_OF_ZERO * abs(moving)]
+    must_be_off_axis(moving)
+    return "stable"
+
+
+def must_be_off_axis(stable: Complex) -> None:
+    """Refuse poles [1/s], none of which is right of the axis, where one may be on it, by ConvergenceError."""
+    on_axis = stable[stable.real > -MARGIN_OF_ZERO * abs(stable)]
     if on_axis.size:
         text = f"the pole at {on_axis[0]:.6g} 1/s is on the imaginary axis to working precision: neither stable nor not"
         raise ConvergenceError(text, complex(on_axis[0]), float(on_axis[0].real))
-    return "stable"
 
 
 def is_felt(arm: Arm, up_to: float) -> bool:
@@ -148,7 +155,7 @@ def _beyond(loop: Loop, quiet: bool) -> Beyond:
         return _beyond_lossless(loop)
     if quiet:
         return Beyond(f"beyond the band |L(iw)| < {QUIET:g} and falling: no unstable pole there (small gain)")
-    return Beyond(UNKNOWN[bool(arm.least_damping)], is_known=False)
+    return Beyond(NOT_BOUNDED[bool(arm.least_damping)], is_known=False)
 
 
 def _beyond_lossless(loop: Loop) -> Beyond:
@@ -168,11 +175,11 @@ def _beyond_lossless(loop: Loop) -> Beyond:
 
 def loop_band(loop: Loop) -> tuple[float, bool]:
     """The band [rad/s] in which poles are computed, and whether the loop is quiet beyond it (always False at C = 0)."""
-    few = band_of(loop.arm, FEW)
+    few = band_of(loop.arm, LEAST_BAND_MODES)
     if loop.arm.is_reactive or (loop.is_told_by_theorem and (loop.arm.is_undamped or loop.takes_energy > 0)):
         return few, False
     band = few
-    while modes_below(loop.arm, band) <= MOST_MODES:
+    while modes_below(loop.arm, band) <= MOST_BAND_MODES:
         if _has_fallen(loop, band):
             return band, is_quiet(loop, band)
         band *= 1.6

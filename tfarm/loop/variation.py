@@ -17,16 +17,18 @@ from tfarm.exact.system import System, system_of
 from tfarm.records import record
 from tfarm.spectrum.continuation import Member
 
-from .lines import NONE, Line
+from .lines import NO_FEEDBACK, Line
 from .plant import Loop
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
 
-OF_THE_LAW = {gain.name: gain.unit for gain in LISTED} | {"all": "1"}
-PARAMETERS = {"payload_mass": "kg", "payload_inertia": "kg m^2", "hub_inertia": "kg m^2", "length": "m", "damping": "s"}
-ENDS = 0.05  # of 1/C: nearer to -1/C, where real zeros accumulate, no zero is followed from the right
-VARIED = OF_THE_LAW | PARAMETERS  # what may be varied, and its unit
+OF_THE_LAW = {gain.name: gain.unit for gain in LISTED} | {"all": "1"}  # units, as of the arm's below
+ARM_PARAMETERS = {
+    "payload_mass": "kg", "payload_inertia": "kg m^2", "hub_inertia": "kg m^2", "length": "m", "damping": "s"
+}  # fmt: skip
+ENDS_BEFORE = 0.05  # of 1/C: nearer to -1/C, where real zeros accumulate, no zero is followed from the right
+VARIABLES = OF_THE_LAW | ARM_PARAMETERS  # what may be varied, and its unit
 
 
 @dataclass(frozen=True)
@@ -35,17 +37,17 @@ class Variation:
     """The loops of an arm under a law, one of whose numbers varies: a gain, "all" (a scale on the law), or the arm's.
 
     `beside` is another law, which acts too and does not vary.  Raises ParameterError for a name that is not in
-    `VARIED`.
+    `VARIABLES`.
     """
 
     arm: Arm
     law: HubFeedback
     vary: str
-    beside: HubFeedback = NONE
+    beside: HubFeedback = NO_FEEDBACK
 
     def __post_init__(self) -> None:
-        if self.vary not in VARIED:
-            raise ParameterError(key="vary", value=self.vary, remedy=f"use one of {', '.join(VARIED)}")
+        if self.vary not in VARIABLES:
+            raise ParameterError(key="vary", value=self.vary, remedy=f"use one of {', '.join(VARIABLES)}")
 
     @property
     def is_of_gains(self) -> bool:
@@ -63,7 +65,7 @@ class Variation:
         """The laws, where a gain or their scale varies."""
         if self.vary == "all":
             return Line(self.beside, self.law)
-        return Line(self.beside.plus(self.law.having(self.vary, 0.0)), NONE.having(self.vary, 1.0))
+        return Line(self.beside.plus(self.law.having(self.vary, 0.0)), NO_FEEDBACK.having(self.vary, 1.0))
 
     def system(self, value: float) -> tuple[System, Real]:
         """The arm's system, and gains without dimensions (gains, 1), where the varied number has that value."""
@@ -100,15 +102,24 @@ class Variation:
         return np.array([zeros_at_origin(self._k, row) for row in rows], dtype=np.int64)
 
 
+def must_be_way(start: float, stop: float) -> None:
+    """Raise ParameterError for two values that are not the ends of a locus."""
+    for key, value in (("from", start), ("to", stop)):
+        if not math.isfinite(value):
+            raise ParameterError(key=key, value=value, remedy="a finite number")
+    if start == stop:
+        raise ParameterError(key="to", value=stop, remedy="the range is empty: a locus runs to another value")
+
+
 def free_of_loss(arm: Arm) -> tuple[Arm, HubFeedback]:
     """An arm whose hub loses less, and the law that takes as much beside any other: a rate gain.
 
     That is b + N^2 b_m and the back-EMF.  Behind an inductance it is the back-EMF alone: friction acts at once.
     """
     if arm.motor is None or not arm.input_lags:
-        return arm.lossless_hub, NONE.having(RATE_GAIN, arm.rate_loss)
+        return arm.lossless_hub, NO_FEEDBACK.having(RATE_GAIN, arm.rate_loss)
     motor = replace(arm.motor, back_emf_constant=0.0)
-    return replace(arm, motor=motor), NONE.having(RATE_GAIN, arm.motor.gear_ratio * arm.motor.back_emf_constant)
+    return replace(arm, motor=motor), NO_FEEDBACK.having(RATE_GAIN, arm.motor.gear_ratio * arm.motor.back_emf_constant)
 
 
 class Evaluator:
@@ -142,4 +153,4 @@ def member_of(variation: Variation, value: float, at_zero: int, free: float) -> 
             value, slope = np.where(s == 0, 0.0, value), np.where(s == 0, 1.0, slope)
         return Analytic(value, slope, scale)
 
-    return Member(function, variation.singular(value), free, ENDS)
+    return Member(function, variation.singular(value), free, ENDS_BEFORE)

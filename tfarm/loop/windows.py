@@ -16,7 +16,7 @@ from tfarm.records import record
 from tfarm.spectrum import modes
 from tfarm.spectrum.scales import gain_unit, most_gain
 
-from .lines import along, crossing_at_zero, crossings
+from .lines import along, crossings, static_crossings
 from .lossless import locked_edges, stable_moments
 from .plant import Loop
 from .stability import Stability, loop_band, stability
@@ -24,7 +24,7 @@ from .stability import Stability, loop_band, stability
 Interval = tuple[float, float]
 End = Literal["edge", "search bound", "no limit"]
 
-REACH, FARTHER = 20.0, {MOMENT_GAIN: 50.0}  # how far windows are looked for, times `gain_unit`
+WINDOW_REACH, FARTHER_REACH = 20.0, {MOMENT_GAIN: 50.0}  # how far windows are looked for, times `gain_unit`
 BEYOND_STATIC = 2.0  # times J/(J - I_h), where K2 cancels the inertia: windows are looked for at least so far
 
 
@@ -58,7 +58,9 @@ def gain_windows(verdict: Stability, name: str) -> Windows:
         return Windows(name, None, (), (0.0, 0.0), Crossings.of([]))  # an algebraic loop but for K2 = 0
     low, high = looked_at(loop, name)
     if loop.arm.is_reactive:
-        found, band = _undamped(loop, name).within(low, high), _reach_undamped(loop, name)
+        found, told = _undamped(loop, name).within(low, high), name != "K2" and law.K2 == 0
+        told = told or loop.arm.is_told_by_lyapunov  # every mode, by a theorem
+        band = math.inf if told else float(locked_edges(loop.arm).at.max())
     else:
         ends = (Loop(loop.arm, law.having(name, end)) for end in (low, high))
         band = max(verdict.band, *(loop_band(end)[0] for end in ends))
@@ -76,7 +78,7 @@ def gain_windows(verdict: Stability, name: str) -> Windows:
 def looked_at(loop: Loop, name: str) -> Interval:
     """The range of a gain that is searched, symmetric and well beyond what matters to the first mode."""
     arm, law = loop.arm, loop.law
-    reach = max(FARTHER.get(name, REACH) * gain_unit(arm, name), 10.0 * abs(law[name]))
+    reach = max(FARTHER_REACH.get(name, WINDOW_REACH) * gain_unit(arm, name), 10.0 * abs(law[name]))
     carried = arm.gauged_inertia
     if name == "K2" and 0 < carried < math.inf:
         reach = max(reach, BEYOND_STATIC * arm.turned_inertia / carried)
@@ -90,21 +92,14 @@ def _undamped(loop: Loop, name: str) -> Crossings:
     A real pole passes through 0 where stiffness or inertia vanishes.
     """
     arm, K1 = loop.arm, loop.law.K1
-    static = crossing_at_zero(arm, along(name, loop.law))
-    found = [] if static is None else [static]
+    found = static_crossings(arm, along(name, loop.law))
     if name == "K2" and arm.is_told_by_lyapunov:
         found.append(Crossing(arm.input_per_torque, math.inf, 1 if K1 > 0 else -1))
     elif name == "K2" and K1:
         found += [each._replace(change=each.change * int(math.copysign(1, K1))) for each in locked_edges(arm)]
-    if name == "K1" and (static is None or static.t != 0):
+    if name == "K1" and not any(each.t == 0 for each in found):
         found.append(Crossing(0.0, math.inf, -1 if _is_braked(loop) else 1))
     return Crossings.of(found)
-
-
-def _reach_undamped(loop: Loop, name: str) -> float:
-    """Up to which frequency [rad/s] `_undamped` has the crossings: every one where a theorem tells each mode."""
-    told = loop.arm.is_told_by_lyapunov or (name != "K2" and loop.law.K2 == 0)
-    return math.inf if told else float(locked_edges(loop.arm).at.max())
 
 
 def reach_words(windows: Iterable[Windows]) -> str:

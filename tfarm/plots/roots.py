@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from tfarm.digits import held, plain, significant
-from tfarm.loop.loci import GAPS_HELD, HELD, Loci, shown
+from tfarm.loop.loci import GAPS_HELD, POLE_DIGITS, Loci, shown
 from tfarm.loop.locus import Locus, frame, rounded
 from tfarm.loop.reduced_locus import ReducedLocus
 from tfarm.loop.variation import OF_THE_LAW
@@ -163,7 +163,7 @@ def _panel(
     everything = len(numbers) == len(branches)
     for each in exact.crossings:
         if each.branch in numbers or (each.branch is None and everything):
-            omega = held([each.omega], HELD)[0]
+            omega = held([each.omega], POLE_DIGITS)[0]
             ax.plot([0], [omega], "D", ms=6, mfc=ORANGE, mec="white", mew=0.8, zorder=6)
             if each.branch not in named:
                 continue

@@ -11,7 +11,7 @@ import vl_convert
 from tfarm.arm import HubFeedback
 from tfarm.digits import scientific
 from tfarm.errors import TfarmError
-from tfarm.loop.panels import SAMPLES
+from tfarm.loop.panels import PANEL_SAMPLES
 from tfarm.report.given_laws import Subject
 from tfarm.report.live_data import COLUMNS, live_data
 from tfarm.report.loop_laws import has_loop, sign_words
@@ -44,7 +44,7 @@ def save_live(subject: Subject, folder: Path) -> None:
     data["command_name"] = argument(arm.name, is_preset(arm, chain))
     text = json.dumps(data, separators=(",", ":"), ensure_ascii=True, allow_nan=False).replace("<", "\\u003c")
     page = render("live.html", title=title, data=data, text=text, sign=sign_words(arm), columns=COLUMNS,
-                  samples=SAMPLES * len(data["low"]), error=scientific(data["error"], 1),
+                  samples=PANEL_SAMPLES * len(data["low"]), error=scientific(data["error"], 1),
                   assets=f"../{ASSETS}", runtime=RUNTIME, script=SCRIPT)  # fmt: skip
     out.write_text(page, encoding="utf-8", newline="")
 

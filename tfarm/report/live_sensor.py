@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import Arm
 from tfarm.errors import TfarmError
-from tfarm.loop.positions import WRONG, Positions, Sensor, positions
+from tfarm.loop.positions import MOST_SENSOR_MISS, Positions, Sensor, positions
 from tfarm.spectrum import modes
 
 Real = NDArray[np.float64]
@@ -53,4 +53,4 @@ def _short(value: float) -> float:
 
 def _part(part: float, whole: complex) -> float:
     """A part of a zero, 0 where that is all that is known of it."""
-    return _short(part) if abs(part) > WRONG * abs(whole) else 0.0
+    return _short(part) if abs(part) > MOST_SENSOR_MISS * abs(whole) else 0.0

@@ -8,13 +8,13 @@ import numpy as np
 
 from tfarm.columns import Column, Table
 from tfarm.digits import held, scientific, significant, singly
-from tfarm.loop.loci import GAPS_HELD, HELD, Loci, shown
+from tfarm.loop.loci import GAPS_HELD, POLE_DIGITS, Loci, shown
 
 
 def crossing_table(data: Loci, stem: str) -> Table:
     """Where the branches cross the imaginary axis."""
     found = list(data.exact.crossings)
-    gain, omega = (held([getattr(each, key) for each in found], HELD) for key in ("gain", "omega"))
+    gain, omega = (held([getattr(each, key) for each in found], POLE_DIGITS) for key in ("gain", "omega"))
     return Table(
         stem=stem,
         title=f"Crossings of the imaginary axis along {data.name}",

@@ -8,7 +8,7 @@ from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, unit_of, written_unit
 from tfarm.digits import counted, plain, significant
 from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError
-from tfarm.loop.edges import DEEPEST
+from tfarm.loop.edges import DEEPEST_MOMENT_GAIN
 from tfarm.loop.nyquist import Nyquist, nyquist_of
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import Windows
@@ -179,7 +179,7 @@ def _map_caption(data: GainMap) -> str:
     return (
         seen
         + sampled.format(clock=clock, modes=modes)
-        + DEPTH.format(deepest=plain(DEEPEST * data.arm.input_per_torque, 4)) * (not data.is_undamped)
+        + DEPTH.format(deepest=plain(DEEPEST_MOMENT_GAIN * data.arm.input_per_torque, 4)) * (not data.is_undamped)
     )
 
 

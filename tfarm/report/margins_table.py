@@ -9,7 +9,7 @@ from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN
 from tfarm.columns import Column, Table
 from tfarm.digits import counted, plain, significant, singly
 from tfarm.dsp.brief import SampledBrief
-from tfarm.loop.answers import MARGINS, NOTHING, WINDOWS, gain_rows, sizes_of, unsettled
+from tfarm.loop.answers import MARGIN_COLUMNS, NOT_STABLE, WINDOW_COLUMNS, gain_rows, sizes_of, unsettled
 from tfarm.loop.lyapunov import lyapunov
 from tfarm.loop.margins import Margins
 from tfarm.report.loop_laws import Named, NamedLaw
@@ -35,7 +35,7 @@ CAPTION_OF_WINDOWS = (
     "an end with a star is no edge: up to there none was found, and beyond none was looked for."
 )
 TITLES = {"disk": "disk margin α"}
-QUANTITIES = ("gain margin, down", "gain margin, up", *(TITLES.get(each.of, each.title) for each in MARGINS))
+QUANTITIES = ("gain margin, down", "gain margin, up", *(TITLES.get(each.of, each.title) for each in MARGIN_COLUMNS))
 
 Row = tuple[str, str, float | str, float | str, float | str]  # quantity, unit, exact, in the band, at
 
@@ -112,11 +112,11 @@ def _rows(found: Margins) -> Iterator[Row]:
     yield "band", "rad/s", "", it.band, ""
     if band is None:
         for name in QUANTITIES:
-            yield name, "", NOTHING, "", ""
+            yield name, "", NOT_STABLE, "", ""
         return
     yield "gain margin, down", "factor", band.gain[0], "", ""
     yield "gain margin, up", "factor", band.gain[1], "", ""
-    for column, (exact, size) in zip(MARGINS, sizes_of(found).values(), strict=True):
+    for column, (exact, size) in zip(MARGIN_COLUMNS, sizes_of(found).values(), strict=True):
         assert size is not None
         known = "" if column.unit == "deg" and not found.exact_delay else UNKNOWN if exact is None else exact
         where = "" if abs(size) == UNLIMITED.get(column.of, math.inf) else band.at[column.of]
@@ -146,6 +146,6 @@ def window_table(laws: Sequence[Named], found: Sequence[Margins]) -> Table:
         stem="windows",
         title="How far each gain may go alone",
         caption=CAPTION_OF_WINDOWS + _open_ends(laws, found),
-        columns=(Column("law", "law", of=names), Column("verdict", "verdict", of=verdicts), *WINDOWS),
+        columns=(Column("law", "law", of=names), Column("verdict", "verdict", of=verdicts), *WINDOW_COLUMNS),
         record=gains,
     )
