@@ -123,7 +123,8 @@ def definite(poly: Poly) -> Literal["above", "not below", "zero", ""]:
         return "zero"
     if poly.LC() < 0:
         return ""
-    with_roots = [order for factor, order in poly.sqf_list()[1] if factor.count_roots(0, None) > (factor.eval(0) == 0)]
+    factors = poly.sqf_list()[1]
+    with_roots = [order for each, order in factors if int(each.count_roots(0, None)) > int(each.eval(0) == 0)]
     if any(order % 2 for order in with_roots):
         return ""
     return "not below" if with_roots else "above"
