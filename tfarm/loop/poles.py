@@ -216,7 +216,7 @@ def starting_points(loop: Loop, up_to: float) -> Complex:
 
 
 def near_modes(omega: Real, C: float) -> Complex:
-    """Starts [1/s] next to the poles of modes of those frequencies [rad/s] that bending alone damps, and further left."""
+    """Starts [1/s] at and left of the poles of modes of those frequencies [rad/s] that bending alone damps."""
     shift = np.array([0.0, 0.02, 0.3])[:, None]
     decay = C * omega**2 / 2
     return (-decay - shift * omega + 1j * omega * np.sqrt(np.maximum(1 - (C * omega / 2) ** 2, 0.0))).ravel()
