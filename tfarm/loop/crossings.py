@@ -14,7 +14,7 @@ from tfarm.arm import GAINS
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import loop_parts, quick_characteristics, torque
 from tfarm.exact.outputs import OUTPUTS
-from tfarm.response.frequency import ON_AXIS
+from tfarm.response.frequency import AXIS_SHARE
 
 from .variation import Complex, Evaluator, Real, Variation
 
@@ -68,7 +68,7 @@ def crossings(variation: Variation, gain: Real, branches: Complex, lowest: float
     cannot be solved for.
     """
     size = abs(branches)
-    on_axis = (abs(branches.real) <= ON_AXIS * size) | (size <= AT_ORIGIN * np.fmax.reduce(size, axis=1)[:, None])
+    on_axis = (abs(branches.real) <= AXIS_SHARE * size) | (size <= AT_ORIGIN * np.fmax.reduce(size, axis=1)[:, None])
     side = np.where(on_axis | np.isnan(branches), 0, np.sign(branches.real)).astype(int)
     found = []
     for number, (sides, zeros) in enumerate(zip(side, branches, strict=True)):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from tfarm.errors import ConvergenceError
-from tfarm.response.frequency import ON_AXIS
+from tfarm.response.frequency import AXIS_SHARE
 
 from .crossings import BranchCrossing
 from .lines import crossings as line_crossings
@@ -50,7 +50,7 @@ def _refuse_hidden(variation: Variation, gain: Real, branches: Complex, top: flo
     """Raise ConvergenceError where at one of a few values more poles below `top` are unstable than branches are."""
     for n in np.unique(np.linspace(0, gain.size - 1, LOOPS).round().astype(int)):
         here = branches[:, n]
-        right = (here.real > ON_AXIS * abs(here)) & (abs(here.imag) < top)
+        right = (here.real > AXIS_SHARE * abs(here)) & (abs(here.imag) < top)
         poles = poles_below(variation.at(float(gain[n])), top, BOX_HEIGHTS)
         if poles.unstable > counted(here[right]):
             where = f"{variation.vary} = {gain[n]:.6g}"

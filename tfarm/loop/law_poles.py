@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm
+from tfarm.arm.blocks import Matrices
 from tfarm.arm.checks import whole
 from tfarm.arm.law import Law
 from tfarm.errors import ConvergenceError, ParameterError
-from tfarm.reduced.partial_fractions import Matrices
 from tfarm.reduced.sensed import closed, in_series, pade, sensed_model
 from tfarm.spectrum import modes_below
 from tfarm.spectrum.box import Box, complete

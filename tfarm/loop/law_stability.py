@@ -36,7 +36,7 @@ LISTED_LEFT = 0.5  # of 1/delay: poles are listed so far left, of ever more as |
 WIDENED = 1.6  # from one band that is tried to the next
 QUIET_REACH = 100.0  # bands up to which |L| is looked at: two decades of its fall
 QUIET_POINTS = 1600  # in them, 800 a decade
-CLEAR_OF_POLES = 1.3  # of the fastest pole of the law that rings: a band reaches so far, if it can
+BEYOND_LAW_POLES = 1.3  # of the fastest pole of the law that rings: a band reaches so far, if it can
 DULL = 0.7  # damping ratio from which on a pole of the law makes no peak
 SLOWEST_BAND = 3.0  # heights: as far above it are resonances looked at one by one
 
@@ -105,7 +105,7 @@ def _band(loop: LawLoop, signs: Signs) -> tuple[float, bool]:
     """The band [rad/s] in which poles are computed, and whether the loop is quiet beyond it."""
     own = loop.law.poles
     ringing = own[own.real > -DULL * abs(own)]
-    fastest, highest = CLEAR_OF_POLES * float(abs(ringing).max(initial=0.0)), band_of(loop.arm, MOST_BAND_MODES)
+    fastest, highest = BEYOND_LAW_POLES * float(abs(ringing).max(initial=0.0)), band_of(loop.arm, MOST_BAND_MODES)
     least = max(band_of(loop.arm, LEAST_BAND_MODES), min(fastest, highest))
     if loop.arm.is_undamped or _holds(loop, signs) or not loop.arm.least_damping or fastest > highest:
         return least, False

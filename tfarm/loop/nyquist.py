@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from tfarm.arm import ANGLE_GAIN, RATE_GAIN
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
-from tfarm.response.frequency import ON_AXIS
+from tfarm.response.frequency import AXIS_SHARE
 from tfarm.spectrum import flexible_frequencies
 
 from .frequencies import band_of, grid
@@ -62,14 +62,14 @@ class Nyquist(Generic[AnyLoop]):
     def on_axis(self) -> int:
         """Poles of the box that lie on the axis to working precision, apart from that at 0."""
         moving = self.verdict.poles.moving
-        near = abs(moving.real) <= ON_AXIS * abs(moving)
+        near = abs(moving.real) <= AXIS_SHARE * abs(moving)
         return counted(moving[near])
 
     @property
     def clear(self) -> int:
         """Poles of the box that lie right of the axis by more than working precision: at C = 0 a theorem knows more."""
         moving = self.verdict.poles.moving
-        return counted(moving[moving.real > ON_AXIS * abs(moving)])
+        return counted(moving[moving.real > AXIS_SHARE * abs(moving)])
 
     @property
     def expected(self) -> int:
@@ -131,7 +131,7 @@ def upper_contour(loop: Loop | LawLoop, poles: Real, band: float, closed: Comple
     for pole in poles:
         radius = indentation(loop, float(pole))
         away = abs(closed - 1j * pole)
-        radius = min(radius, NEARER * float(away[away > ON_AXIS * pole].min(initial=math.inf)))
+        radius = min(radius, NEARER * float(away[away > AXIS_SHARE * pole].min(initial=math.inf)))
         if pole == 0:
             slow = 1j * np.geomspace(radius, omega[0], SLOW_POINTS)[1:-1]
             s, is_arc = np.r_[s, slow], np.r_[is_arc, np.zeros(slow.size, bool)]

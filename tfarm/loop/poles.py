@@ -19,7 +19,7 @@ from tfarm.arm.checks import whole
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
 from tfarm.exact.characteristic import zeros_at_origin
 from tfarm.records import record
-from tfarm.response.frequency import ON_AXIS
+from tfarm.response.frequency import AXIS_SHARE
 from tfarm.spectrum.box import GROWTH, Box, complete
 from tfarm.spectrum.damped import CLEAR
 from tfarm.spectrum.enclose import Disc, disjoint, enclosed, proven_count
@@ -72,12 +72,12 @@ class Poles(Generic[AnyLoop]):
         A real part below working precision decides nothing, but at C = 0 a theorem does (`Loop.takes_energy`,
         `driven_modes`).
         """
-        right = self.values.real > ON_AXIS * abs(self.values)
+        right = self.values.real > AXIS_SHARE * abs(self.values)
         loop = self.loop
         if isinstance(loop, LawLoop):  # of which no theorem on gains at the hub tells anything
             return counted(self.values[right])
         if loop.arm.is_undamped and loop.is_told_by_theorem and loop.takes_energy < 0:
-            right |= (self.values.imag > 0) & (abs(self.values.real) <= ON_AXIS * abs(self.values))
+            right |= (self.values.imag > 0) & (abs(self.values.real) <= AXIS_SHARE * abs(self.values))
         on_rate, on_moment = loop.law.point
         if loop.arm.is_reactive and not loop.is_told_by_theorem and on_rate > 0:
             driven = driven_modes(loop.arm, on_moment)
@@ -155,7 +155,7 @@ def poles_below(loop: Loop, height: float, factors: tuple[float, ...] = GROWTH) 
     function = loop.member.function
     found, box = complete(function, lambda height: box_of(loop, height), height, starts, known, factors)
     # without losses the function is even in s: a simple zero is its own mirror image, its real part is rounding
-    on_axis = loop.is_lossless & (abs(found.real) <= ON_AXIS * abs(found))
+    on_axis = loop.is_lossless & (abs(found.real) <= AXIS_SHARE * abs(found))
     found = np.where(on_axis, 1j * found.imag, found)
     upper = found[found.imag >= 0]
     upper = upper[np.lexsort((upper.real, upper.imag))]
