@@ -16,9 +16,10 @@ import tfarm
 from tests.synthesis.designs import log, some_arm
 from tests.synthesis.held_loop import HeldLoop
 from tfarm import ConvergenceError, HubFeedback, Law
+from tfarm.arm import TWO_GAINS
 from tfarm.dsp import Chain
 from tfarm.dsp.chain import Sampling
-from tfarm.synthesis.chosen import GAINS, design
+from tfarm.synthesis.chosen import design
 from tfarm.synthesis.sampled import RESERVE
 from tfarm.synthesis.structures import STRUCTURES
 
@@ -32,7 +33,7 @@ def damped_arm(rng):
     return arm if arm.damping else replace(arm, link=replace(arm.link, damping=2 * log(rng, 1e-3, 2e-2) / first)), first
 
 
-def excess(rng, structures=(GAINS, *STRUCTURES)):
+def excess(rng, structures=(TWO_GAINS, *STRUCTURES)):
     """By how much the largest radius, with the reserve, is above 1 on the other model; the arm's name and the law's."""
     arm, first = damped_arm(rng)
     chain, structure = Chain(sampling=Sampling(period=1 / (first * rng.uniform(0.5, 5.0)))), str(rng.choice(structures))
@@ -41,7 +42,7 @@ def excess(rng, structures=(GAINS, *STRUCTURES)):
     held, radii = HeldLoop(arm, chain.sampling.period, 20), []
     for share in (1 / RESERVE, 1.0, RESERVE):
         z = held.law_poles(law.times(share))
-        radii.append(abs(z[abs(z - 1) > 1e-7] if structure == GAINS else z).max())
+        radii.append(abs(z[abs(z - 1) > 1e-7] if structure == TWO_GAINS else z).max())
     return max(radii[0], radii[2]) - 1 - EDGE, radii[1] - 1, f"{arm.name}, {structure}"
 
 

@@ -122,7 +122,7 @@ def test_an_undamped_link_has_a_mode_that_no_lead_law_damps(capsys, monkeypatch)
     where p is above a right angle.
     """
     bare = tfarm.load("sasaki2012")
-    monkeypatch.setattr(law_design, "MOST_REFINED", 1)  # of a search that finds nothing
+    monkeypatch.setattr(law_design, "MOST_SEARCHES", 1)  # of a search that finds nothing
     code, out, err = run(capsys, "design", "sasaki2012", "--structure", "lead")
     assert (code, out, err.count("\n")) == (3, "", 1)
     (mode,) = re.findall(r"mode ([0-9]+) grows", err)

@@ -10,10 +10,10 @@ from tests.shell import answer, run
 from tests.synthesis.held_loop import HeldLoop
 from tfarm import HubFeedback
 from tfarm.arm import Hub
-from tfarm.synthesis.arms import Box, varied, worst_inside
+from tfarm.synthesis.arms import ArmBox, varied, worst_inside
 from tfarm.synthesis.chosen import design
 from tfarm.synthesis.sampled import RESERVE
-from tfarm.synthesis.worst_case import WORSE
+from tfarm.synthesis.worst_case import MUCH_WORSE
 
 LAB, T = tfarm.load("sasaki2012-lab"), 0.01
 SHORT = replace(LAB, link=replace(LAB.link, length=0.8 * LAB.length), name="short")
@@ -39,7 +39,7 @@ def test_every_arm_is_held_and_damped_as_by_another_model(found):
 
 def test_no_arm_inside_the_box_is_worse(found):
     for mass in np.linspace(*MASSES, 9)[1:-1]:
-        assert HeldLoop(LAB.having(payload_mass=mass), T).damping(found.law, 2) >= found.value * (1 - 2 * WORSE)
+        assert HeldLoop(LAB.having(payload_mass=mass), T).damping(found.law, 2) >= found.value * (1 - 2 * MUCH_WORSE)
 
 
 @pytest.mark.survey
@@ -58,7 +58,7 @@ def test_no_other_gains_serve_all_arms_better(found):
 
 def test_a_worst_arm_in_the_middle_of_a_box_is_found():
     """Its place is known: the badness is greatest there, and less at every corner."""
-    box = Box(LAB, {"payload.mass": (0.0, 1.0), "hub.friction": (0.01, 1.0)})
+    box = ArmBox(LAB, {"payload.mass": (0.0, 1.0), "hub.friction": (0.01, 1.0)})
 
     def badness(arm):
         return -(((arm.payload.mass - 0.37) / 1.0) ** 2) - (np.log10(arm.hub.friction / 0.08) / 2) ** 2
@@ -84,8 +84,8 @@ def test_a_law_for_structures_serves_both_ends_too():
 def test_a_number_is_named_as_in_the_file_or_as_of_a_locus():
     assert varied(LAB, "payload.mass", 0.2) == varied(LAB, "payload_mass", 0.2) == LAB.having(payload_mass=0.2)
     assert varied(LAB, "hub.friction", 0.3).hub == Hub(inertia=LAB.hub.inertia, friction=0.3)
-    assert Box(LAB, {"link.damping": (1e-5, 1e-3)}).at(np.array([0.5])).arm.damping == pytest.approx(1e-4)
-    assert Box(LAB, {"payload.mass": (0.1, 0.5)}).at(np.array([0.5])).arm.payload.mass == pytest.approx(0.3)
+    assert ArmBox(LAB, {"link.damping": (1e-5, 1e-3)}).at(np.array([0.5])).arm.damping == pytest.approx(1e-4)
+    assert ArmBox(LAB, {"payload.mass": (0.1, 0.5)}).at(np.array([0.5])).arm.payload.mass == pytest.approx(0.3)
 
 
 def test_the_answer_names_every_arm(capsys):

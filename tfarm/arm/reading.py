@@ -17,7 +17,7 @@ from tfarm.errors import ParameterError, did_you_mean
 from tfarm.files import read_file
 
 PRESETS = files("tfarm.arm") / "presets"
-MOST_ARM_BYTES = 64 * 1024  # of an arm's file; those of 64 segments have 20 KB
+MOST_ARM_BYTES = 64 * 1024  # of an arm's file; that of 64 segments has 15 KB
 # tomllib takes seconds on one dotted key of 40 KB and recurses on every bracket; an arm's file needs
 # a line of text and a depth of two.
 LONGEST_LINE = 8192  # characters

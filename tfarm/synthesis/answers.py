@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from tfarm.arm import TWO_GAINS
 from tfarm.dsp.brief import brief_of
 from tfarm.loop.answers import law_answer
-from tfarm.synthesis.chosen import GAINS
 from tfarm.synthesis.design import Design
 from tfarm.synthesis.law_design import LawDesign
 
@@ -17,7 +17,7 @@ def design_answer(found: Design) -> dict[str, Any]:
     return {
         "arm": found.verdict.loop.arm.name,
         "objective": found.objective,
-        "structure": GAINS,
+        "structure": TWO_GAINS,
         "designed_for": found.loop,
         **law_answer(law, found.verdict.loop.arm),
         "value": found.value,

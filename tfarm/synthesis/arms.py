@@ -19,15 +19,15 @@ from tfarm.arm.keys import KeyedArms
 from tfarm.arm.records import ADJUSTABLE
 from tfarm.errors import ParameterError
 from tfarm.records import record
+from tfarm.synthesis.search import Bounds
 
 Real = NDArray[np.float64]
-Bounds = tuple[float, float]
-
-MOST_RANGES = 4  # 16 corners
-MOST_ARMS = 8  # of a list
+MOST_RANGES = 4  # 16 corners: a search takes so many times as long
+MOST_ARMS = 8  # of a list, for the same reason
 DECADE = 10.0  # a range of numbers of one sign whose ends are further apart is one of logarithms
-TRIED, SEED = 24, 0  # arms inside the box, and of which numbers
-STEPS = (0.25, 0.125, 0.0625)  # of the box: from the worst of them on, along each of its numbers
+ARMS_TRIED = 24  # arms at random inside the box
+ARMS_SEED = 0  # of those
+BOX_STEPS = (0.25, 0.125, 0.0625)  # of the box: from the worst of them on, along each of its numbers
 DOTTED = {f"{room}.{field}": name for name, (room, field) in ADJUSTABLE.items()}
 
 
@@ -54,7 +54,7 @@ def varied(arm: Arm, key: str, value: float) -> Arm:
 
 @dataclass(frozen=True)
 @record
-class Box:
+class ArmBox:
     """The arms that have numbers of `ranges` (key: its ends), and all else of `arm`.
 
     Raises ParameterError for an unknown key, too many of them, ends that are not finite or in order, and corners that
@@ -92,7 +92,7 @@ class Box:
         return NamedArm(f"{self.arm.name}, {told}", arm, numbers)
 
 
-def worst_inside(box: Box, badness: Callable[[Arm], float]) -> tuple[NamedArm, float, int]:
+def worst_inside(box: ArmBox, badness: Callable[[Arm], float]) -> tuple[NamedArm, float, int]:
     """The worst arm found in a box, how bad it is, and how many were tried.
 
     Arms at random, then steps along each number from the worst of them, ever smaller.  No proof that none is worse.
@@ -106,8 +106,8 @@ def worst_inside(box: Box, badness: Callable[[Arm], float]) -> tuple[NamedArm, f
         n = int(np.argmax(scores))
         return scores[n], places[n]
 
-    worst, place = worst_of(list(np.random.default_rng(SEED).random((TRIED, size))))
-    for step in STEPS:
+    worst, place = worst_of(list(np.random.default_rng(ARMS_SEED).random((ARMS_TRIED, size))))
+    for step in BOX_STEPS:
         if math.isinf(worst):
             break
         around = [np.clip(place + step * way, 0.0, 1.0) for way in (*np.eye(size), *-np.eye(size))]
@@ -115,7 +115,7 @@ def worst_inside(box: Box, badness: Callable[[Arm], float]) -> tuple[NamedArm, f
     return box.at(place), worst, tried
 
 
-def arms_of(arm: Arm, also: Sequence[Arm], box: Box | None) -> list[NamedArm]:
+def arms_of(arm: Arm, also: Sequence[Arm], box: ArmBox | None) -> list[NamedArm]:
     """The arm, those of the list, and the corners of the box.  Raises ParameterError for too many in the list."""
     if len(also) > MOST_ARMS:
         raise ParameterError(key="also", value=len(also), remedy=f"at most {MOST_ARMS} further arms")
@@ -124,6 +124,6 @@ def arms_of(arm: Arm, also: Sequence[Arm], box: Box | None) -> list[NamedArm]:
     return [*listed, *(each for each in corners if each.arm != arm)]
 
 
-def box_of(arm: Arm, ranges: Mapping[str, Bounds] | None) -> Box | None:
+def arm_box(arm: Arm, ranges: Mapping[str, Bounds] | None) -> ArmBox | None:
     """The box over an arm, or None where no range is given."""
-    return Box(arm, {key: (float(low), float(high)) for key, (low, high) in ranges.items()}) if ranges else None
+    return ArmBox(arm, {key: (float(low), float(high)) for key, (low, high) in ranges.items()}) if ranges else None

@@ -10,20 +10,18 @@ from tfarm.arm import TWO_GAINS, Arm
 from tfarm.dsp import Chain
 from tfarm.errors import ParameterError
 from tfarm.synthesis import law_design as laws
-from tfarm.synthesis.arms import NamedArm, arms_of, box_of
-from tfarm.synthesis.design import Design, Objective, score_on
+from tfarm.synthesis.arms import NamedArm, arm_box, arms_of
+from tfarm.synthesis.design import Design, Objective, gains_score_on
 from tfarm.synthesis.design import design as best_gains
-from tfarm.synthesis.law_design import LawDesign, Progress, law_design
+from tfarm.synthesis.law_design import LawDesign, law_design
 from tfarm.synthesis.search import Bounds
-from tfarm.synthesis.worst_case import for_the_worst, same_input
-
-GAINS = TWO_GAINS
+from tfarm.synthesis.worst_case import Tell, for_the_worst, same_input
 
 
 def design(
-    arm: Arm, objective: str = "damping", *, structure: str = GAINS, K1: Bounds | None = None,
+    arm: Arm, objective: str = "damping", *, structure: str = TWO_GAINS, K1: Bounds | None = None,
     K2: Bounds | None = None, Kp: float = 0.0, modes: int = 2, chain: Chain | None = None, continuous: bool = False,
-    progress: Progress | None = None, also: Sequence[Arm] = (), ranges: Mapping[str, Bounds] | None = None,
+    progress: Tell | None = None, also: Sequence[Arm] = (), ranges: Mapping[str, Bounds] | None = None,
 ) -> Design | LawDesign:  # fmt: skip
     """The law of a structure that serves an objective best in the sampled loop of a chain (10 ms unless given).
 
@@ -39,10 +37,10 @@ def design(
     is named in `.arms`.  Raises ParameterError for what does not go together, ConvergenceError where nothing found
     holds.
     """
-    box = box_of(arm, ranges)
+    box = arm_box(arm, ranges)
     arms, tell = arms_of(arm, also, box), progress or (lambda text: None)
     same_input(arms)
-    if structure == GAINS:
+    if structure == TWO_GAINS:
 
         def find(named: Sequence[NamedArm]) -> Design:
             return best_gains(
@@ -50,11 +48,11 @@ def design(
                 continuous=continuous, others=named[1:],
             )  # fmt: skip
 
-        gains, case = for_the_worst(arms, box, find, score_on, tell)
+        gains, case = for_the_worst(arms, box, find, gains_score_on, tell)
         return replace(gains, worst_case=case)
     for name, given in (("K1", K1), ("K2", K2), ("continuous", continuous or None)):
         if given is not None:
-            remedy = f"goes with the structure {GAINS} alone"
+            remedy = f"goes with the structure {TWO_GAINS} alone"
             raise ParameterError(key=name, value=given, remedy=remedy)
 
     def find_law(named: Sequence[NamedArm]) -> LawDesign:
@@ -62,5 +60,5 @@ def design(
             arm, objective, structure, on_angle=Kp, modes=modes, chain=chain, progress=progress, others=named[1:]
         )
 
-    found, case = for_the_worst(arms, box, find_law, laws.score_on, tell)
+    found, case = for_the_worst(arms, box, find_law, laws.law_score_on, tell)
     return replace(found, worst_case=case)

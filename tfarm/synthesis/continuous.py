@@ -20,11 +20,11 @@ from tfarm.loop.residual import RISE, residual_moment
 from tfarm.loop.stability import stability
 from tfarm.records import record
 from tfarm.spectrum import modes as natural_modes
-from tfarm.synthesis.search import TIE, Axis, Bounds, Effort, Score
+from tfarm.synthesis.search import TIE, Bounds, Effort, GainAxis, Score
 
 Real = NDArray[np.float64]
 
-BASIN = 6  # points of the grid in each basin of a residual
+POINTS_A_BASIN = 6  # points of the grid in each basin of a residual
 
 
 @dataclass(frozen=True)
@@ -54,17 +54,29 @@ class ContinuousJudge:
             natural_modes(self.arm.having(hub_inertia=I), self.modes).natural_frequency[-self.modes :] for I in hubs
         ]
         basins = float(abs(ends[0] - ends[1]).max()) * RISE / (4 * math.pi)
-        return Effort(36, int(min(max(60.0, BASIN * basins), max(60, 1600 // self.modes))), starts)
+        return Effort(36, int(min(max(60.0, POINTS_A_BASIN * basins), max(60, 1600 // self.modes))), starts)
 
-    def landscape(self, axes: tuple[Axis, Axis], effort: Effort) -> tuple[Real, Score]:
-        """Scores over the grid, rows upwards, inf where not stable; and the score where it is stable, else inf."""
+    def landscape(self, axes: tuple[GainAxis, GainAxis], effort: Effort) -> tuple[Real, Score]:
+        """Scores over the grid, rows upwards, inf where not stable; and the score where its nearest point is stable."""
         gains = [axis.gain(axis.middles(number)) for axis, number in zip(axes, effort[:2], strict=True)]
         stable = region(self.arm, gains[0], gains[1], self.held[ANGLE_GAIN]).stable
         grid = np.array(np.meshgrid(*gains))
         values = np.full(stable.shape, np.inf)
         if stable.any():
             values[stable] = self.score(grid[:, stable])
-        return values, _inside(self.score, axes, stable)
+
+        def inside(points: Real) -> Real:
+            places = [
+                np.clip((axis.share(gain) * number).astype(int), 0, number - 1)
+                for axis, gain, number in zip(axes, points, stable.shape[::-1], strict=True)
+            ]
+            good = stable[places[1], places[0]]
+            found = np.full(good.size, np.inf)
+            if good.any():
+                found[good] = self.score(points[:, good])
+            return found
+
+        return values, inside
 
     def score(self, points: Real) -> Real:
         """What is minimised, at points (2, n) of the plane."""
@@ -95,20 +107,3 @@ class ContinuousJudge:
 
     def _disk(self, law: HubFeedback) -> float:
         return float(disk_at(Loop(self.arm, law), self._omega).min())
-
-
-def _inside(score: Score, axes: tuple[Axis, Axis], stable: NDArray[np.bool_]) -> Score:
-    """The score where the nearest point of the grid is stable, inf elsewhere."""
-
-    def inside(points: Real) -> Real:
-        places = [
-            np.clip((axis.share(gain) * number).astype(int), 0, number - 1)
-            for axis, gain, number in zip(axes, points, stable.shape[::-1], strict=True)
-        ]
-        good = stable[places[1], places[0]]
-        values = np.full(good.size, np.inf)
-        if good.any():
-            values[good] = score(points[:, good])
-        return values
-
-    return inside

@@ -29,31 +29,31 @@ from tfarm.synthesis.arms import NamedArm
 from tfarm.synthesis.continuous import ContinuousJudge
 from tfarm.synthesis.sampled import sampled_judges
 from tfarm.synthesis.search import (
-    END,
+    AXIS_END,
     POLISHED,
-    Axis,
     Bounds,
     Found,
+    GainAxis,
     Score,
+    by_simplex,
     minima,
-    polished,
-    rate_axis,
     refined,
+    searched_rates,
 )
 from tfarm.synthesis.together import Judge, OnArm, Worst, in_step, score_of, worst_value
-from tfarm.synthesis.worst_case import ALONE, WorstCase
+from tfarm.synthesis.worst_case import WITHOUT_BOX, WorstCase
 
 Real = NDArray[np.float64]
 Objective = Literal["damping", "margin", "residual", "cost"]
 LoopKind = Literal["sampled", "continuous"]
 
-OBJECTIVES = ("damping", "margin", "residual", "cost")
-FLAT = 0.01  # gains whose value is worse by less than this share bound the flat part
+GAIN_OBJECTIVES = ("damping", "margin", "residual", "cost")
+FLAT_WITHIN = 0.01  # gains whose value is worse by less than this share bound the flat part
 AT_BOUND = 1e-3  # share of an axis: an optimum so near to its end is where the bound is
-SIMPLEX = 2.0**-8  # of a step of the grid: its first size
-HALVINGS = 40  # of an interval, for the ends of the flat part and the way back into the stable region
+SIMPLEX_SIZE = 2.0**-8  # of a step of the grid: its first size
+INTERVAL_HALVINGS = 40  # of an interval, for the ends of the flat part and the way back into the stable region
 WIDENINGS = 4  # K1 to 16 times its bound, 1 - K2 likewise
-LIMITS = (("K1", 0), ("K2", 1))  # ends of the usual bounds that are physical ones
+PHYSICAL_ENDS = (("K1", 0), ("K2", 1))  # ends of the usual bounds that are physical ones
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class Design:
     chain: Chain
     sampled: SampledBrief
     arms: tuple[OnArm, ...]
-    worst_case: WorstCase = ALONE
+    worst_case: WorstCase = WITHOUT_BOX
 
 
 class _Best(NamedTuple):
@@ -109,8 +109,8 @@ def design(
     made for the arm itself.  Raises ParameterError for a bad objective or bounds, ConvergenceError if no gains within
     the bounds are stable.
     """
-    if objective not in OBJECTIVES:
-        raise ParameterError(key="objective", value=objective, remedy=f"use one of {', '.join(OBJECTIVES)}")
+    if objective not in GAIN_OBJECTIVES:
+        raise ParameterError(key="objective", value=objective, remedy=f"use one of {', '.join(GAIN_OBJECTIVES)}")
     if objective == "cost" and continuous:
         remedy = "the cost of the tuner's trial is one of samples: leave the continuous loop out"
         raise ParameterError(key="objective", value=objective, remedy=remedy)
@@ -140,7 +140,7 @@ def design(
         objective=objective, law=law, value=worst_value(objective, [each.value for each in on_arms]),
         verdict=cast("Stability", on_arms[0].verdict), bounds=bounds,
         flat_K1=flat[0], flat_K2=flat[1], modes=modes, at_bound=tuple(name for name, _ in ends),
-        at_limit=tuple(name for name, end in ends if free[name] and (name, end) in LIMITS),
+        at_limit=tuple(name for name, end in ends if free[name] and (name, end) in PHYSICAL_ENDS),
         widened=tuple(name for name in bounds if bounds[name] != start[name]),
         loop="continuous" if continuous else "sampled", chain=chain, sampled=on_arms[0].sampled,
         arms=on_arms,
@@ -156,7 +156,7 @@ def _judges(
     return sampled_judges(arm, chain, objective, held, modes, known)
 
 
-def score_on(found: Design, arm: Arm) -> float:
+def gains_score_on(found: Design, arm: Arm) -> float:
     """What a design minimised, on another arm; inf where the loop does not hold."""
     law, known = found.law, found.verdict.loop.arm
     judge = next(_judges(arm, known, found.chain, found.objective, law, found.modes, found.loop == "continuous"))
@@ -184,7 +184,7 @@ def _widened(
     """The best gains, and the bounds widened wherever they lie on one that is free: only what is new is searched."""
     best = _best(judge, arm, bounds, held)
     for _ in range(WIDENINGS):
-        ends = [(name, end) for name, end in _ends(arm, bounds, best) if free[name] and (name, end) not in LIMITS]
+        ends = [each for each in _ends(arm, bounds, best) if free[each[0]] and each not in PHYSICAL_ENDS]
         if not ends:
             break
         name, end = ends[0]
@@ -210,8 +210,8 @@ def _ends(arm: Arm, bounds: dict[str, Bounds], best: _Best) -> list[tuple[str, i
     return found
 
 
-def _axes(arm: Arm, bounds: dict[str, Bounds]) -> tuple[Axis, Axis]:
-    return rate_axis(bounds["K1"], rate_unit(arm)), Axis(*bounds["K2"])
+def _axes(arm: Arm, bounds: dict[str, Bounds]) -> tuple[GainAxis, GainAxis]:
+    return searched_rates(bounds["K1"], rate_unit(arm)), GainAxis(*bounds["K2"])
 
 
 def _best(judge: Judge, arm: Arm, bounds: dict[str, Bounds], held: HubFeedback) -> _Best:
@@ -226,7 +226,8 @@ def _best(judge: Judge, arm: Arm, bounds: dict[str, Bounds], held: HubFeedback) 
     starts = np.stack([share[places[:, i]] for i, share in enumerate(shares)], axis=1)
     steps = 1 / np.array(effort[:2])
     found = sorted(refined(score, axes, starts, steps), key=lambda each: each.score)
-    found = [polished(score, axes, each, SIMPLEX * float(steps.min())) for each in found[:POLISHED]] + found[POLISHED:]
+    size = SIMPLEX_SIZE * float(steps.min())
+    found = [by_simplex(score, axes, each, size) for each in found[:POLISHED]] + found[POLISHED:]
     grid_best = [Found(start, float(values[row, column])) for start, (column, row) in zip(starts, places, strict=True)]
     for each in sorted([*found, *grid_best], key=lambda each: each.score):
         across, up = (float(axis.gain(share)) for axis, share in zip(axes, each.shares, strict=True))
@@ -243,11 +244,11 @@ def _checked(name: str, bounds: Bounds) -> Bounds:
 
 
 def _flat(score: Score, best: _Best, axis: int, bounds: Bounds) -> Bounds:
-    """Between which values of one gain the score stays within `FLAT` of the best, the other held.
+    """Between which values of one gain the score stays within `FLAT_WITHIN` of the best, the other held.
 
     Walked outwards in steps that grow by three tenths, then halved: narrow valleys are seen as well as wide ones.
     """
-    limit, centre = best.score + FLAT * abs(best.score), best.gains[axis]
+    limit, centre = best.score + FLAT_WITHIN * abs(best.score), best.gains[axis]
 
     def good(values: Real) -> NDArray[np.bool_]:
         points = np.array([np.full(values.size, gain) for gain in best.gains])
@@ -257,12 +258,12 @@ def _flat(score: Score, best: _Best, axis: int, bounds: Bounds) -> Bounds:
     ends = []
     for bound in bounds:
         way = np.geomspace(1e-9, 1.0, 80) * (bound - centre)
-        (bad,) = np.nonzero(~good(centre + way * (1 - END)))
+        (bad,) = np.nonzero(~good(centre + way * (1 - AXIS_END)))
         if not bad.size:
             ends.append(bound)
             continue
         low, high = (way[bad[0] - 1] if bad[0] else 0.0), way[bad[0]]
-        for _ in range(HALVINGS):
+        for _ in range(INTERVAL_HALVINGS):
             middle = (low + high) / 2
             low, high = (middle, high) if good(np.array([centre + middle]))[0] else (low, middle)
         ends.append(centre + float(low))

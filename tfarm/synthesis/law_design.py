@@ -6,7 +6,7 @@ them.  It is run from the best of many starts about the sensible one, and once m
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import cast
 
@@ -28,17 +28,19 @@ from tfarm.loop.stability import Stability
 from tfarm.records import record
 from tfarm.synthesis.arms import NamedArm
 from tfarm.synthesis.law_judge import LAW_OBJECTIVES, LawJudge, law_judge
-from tfarm.synthesis.minimax import LOST, Found, Pieces, joined, minimax
+from tfarm.synthesis.minimax import LOST, Pieces, ScoredPoint, joined_pieces, minimax
 from tfarm.synthesis.sampled import FEWEST_MODES
 from tfarm.synthesis.structures import STRUCTURES, Structure, usual_angle_gain
 from tfarm.synthesis.together import OnArm, in_step, worst_value
-from tfarm.synthesis.worst_case import ALONE, WorstCase
+from tfarm.synthesis.worst_case import WITHOUT_BOX, Tell, WorstCase
 
 Real = NDArray[np.float64]
-Progress = Callable[[str], None]
 
-STARTS, WIDTH, SEED = 16, 1.0, 0  # points about the start a coefficient, how far they are spread, of which numbers
-REFINED, MOST_REFINED = 2, 6  # of them a coefficient are searched from, and at most
+STARTS_EACH = 16  # points about the start, a coefficient
+START_WIDTH = 1.0  # of x: the deviation of these points
+STARTS_SEED = 0  # of these points
+SEARCHES_EACH = 2  # of them are searched from, a coefficient
+MOST_SEARCHES = 6  # at most
 
 
 @dataclass(frozen=True)
@@ -63,12 +65,12 @@ class LawDesign:
     modes: int
     chain: Chain
     arms: tuple[OnArm, ...]
-    worst_case: WorstCase = ALONE
+    worst_case: WorstCase = WITHOUT_BOX
 
 
 def law_design(
     arm: Arm, objective: str, structure: str, *, on_angle: float = 0.0, modes: int = 2, chain: Chain | None = None,
-    progress: Progress | None = None, others: Sequence[NamedArm] = (),
+    progress: Tell | None = None, others: Sequence[NamedArm] = (),
 ) -> LawDesign:  # fmt: skip
     """The law of a structure that serves an objective best in the sampled loop; the gain `on_angle` holds that.
 
@@ -128,7 +130,7 @@ def _why_none(arms: Sequence[NamedArm], structure: str, law: Law, chain: Chain) 
     )
 
 
-def score_on(found: LawDesign, arm: Arm) -> float:
+def law_score_on(found: LawDesign, arm: Arm) -> float:
     """What a design minimised, on another arm; `LOST` and more where the loop does not hold."""
     count, known = next(_counts(arm, found.chain, found.modes)), found.verdict.loop.arm
     judge = law_judge(arm, found.chain, found.law, found.objective, found.modes, count, known)
@@ -148,41 +150,34 @@ def _counts(arm: Arm, chain: Chain, modes: int) -> Iterator[int]:
     yield most
 
 
-def _best(judges: Sequence[LawJudge], form: Structure, tell: Progress) -> list[Found]:
-    """The best points found and their scores, the best first."""
+def _best(judges: Sequence[LawJudge], form: Structure, tell: Tell) -> list[ScoredPoint]:
+    """The best points found and their scores, the best first: the worst of all arms, and lost where x is no law."""
 
     def pieces(x: Real) -> Pieces:
-        return _pieces(judges, form, x)
+        try:
+            law, slopes = form.law(x), form.slopes(x)
+            return joined_pieces([judge.pieces(law, slopes) for judge in judges])
+        except (ParameterError, np.linalg.LinAlgError):  # coefficients too large to be a law
+            flat = np.zeros((1, x.size))
+            return Pieces(np.zeros(1), flat, np.array([1e6]), flat)
 
-    rng = np.random.default_rng(SEED)
-    points = [form.origin, *(WIDTH * rng.standard_normal((STARTS * form.origin.size, form.origin.size)))]
-    scores = [_score(judges, form, x) for x in points]
-    best = [points[n] for n in np.argsort(scores, kind="stable")[: min(REFINED * (1 + form.origin.size), MOST_REFINED)]]
+    def score(x: Real) -> float:
+        try:
+            law, worst = form.law(x), -np.inf
+            for judge in judges:
+                worst = max(worst, judge.score(law))
+                if worst >= LOST:  # the next arm need not be asked
+                    break
+            return worst
+        except (ParameterError, np.linalg.LinAlgError):
+            return LOST * 1e9
+
+    rng = np.random.default_rng(STARTS_SEED)
+    points = [form.origin, *(START_WIDTH * rng.standard_normal((STARTS_EACH * form.origin.size, form.origin.size)))]
+    number = min(SEARCHES_EACH * (1 + form.origin.size), MOST_SEARCHES)
+    best = [points[n] for n in np.argsort([score(x) for x in points], kind="stable")[:number]]
 
     def told(number: int, score: float) -> None:
         tell(f"{form.name}: search {number}, best so far {score:.6g}")
 
     return minimax(pieces, best, form.upper, told)
-
-
-def _pieces(judges: Sequence[LawJudge], form: Structure, x: Real) -> Pieces:
-    """The functions of all arms, and their slopes; one that is lost where the coefficients are no law."""
-    try:
-        law, slopes = form.law(x), form.slopes(x)
-        return joined([judge.pieces(law, slopes) for judge in judges])
-    except (ParameterError, np.linalg.LinAlgError):  # coefficients too large to be a law
-        flat = np.zeros((1, x.size))
-        return Pieces(np.zeros(1), flat, np.array([1e6]), flat)
-
-
-def _score(judges: Sequence[LawJudge], form: Structure, x: Real) -> float:
-    """The worst score of the arms; where one is lost, it alone, so that the next need not be asked."""
-    try:
-        law, worst = form.law(x), -np.inf
-        for judge in judges:
-            worst = max(worst, judge.score(law))
-            if worst >= LOST:
-                break
-        return worst
-    except (ParameterError, np.linalg.LinAlgError):
-        return LOST * 1e9

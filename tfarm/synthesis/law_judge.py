@@ -10,7 +10,7 @@ cost          T sum of (a x^2 + b e^2)/2 over a slew, the tuner's: x the moment 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -31,15 +31,23 @@ from tfarm.reduced.sensed import sensed_model
 from tfarm.synthesis.law_slew import SLEWED, LawSlew
 from tfarm.synthesis.law_slopes import Clock, pole_slopes
 from tfarm.synthesis.minimax import Pieces
-from tfarm.synthesis.pieces import Curve, damping_pieces, growth_pieces
-from tfarm.synthesis.sampled import RESERVE, SEARCHED, circle_angles, disk_of, higher_poles, lowest, of_first_modes
+from tfarm.synthesis.pieces import LoopCurve, damping_pieces, growth_pieces
+from tfarm.synthesis.sampled import (
+    RESERVE,
+    SEARCH_RESERVE,
+    circle_angles,
+    disk_of,
+    higher_poles,
+    lowest_on_circle,
+    of_first_modes,
+)
 from tfarm.synthesis.structures import Slope
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 LAW_OBJECTIVES = ("damping", "margin", "sensitivity", "delay", "residual", "cost")
-ON_AXIS = 1e-6  # of |s|: an eigenvalue so little right of the axis may be the model's own, of modes left out
+GROWTH_OF_MODEL = 1e-6  # of |s|: an eigenvalue so little right of the axis may be the model's own, of modes left out
 
 
 @dataclass(frozen=True)
@@ -63,7 +71,7 @@ class LawJudge:
         acting = with_estimate(acting_law(self.arm, law, self.chain)[0], self.chain)
         A, B, C, D = acting.matrices(self._signals)
         growth = []
-        for share in (1.0, 1 / SEARCHED, SEARCHED):
+        for share in (1.0, 1 / SEARCH_RESERVE, SEARCH_RESERVE):
             z, moves = pole_slopes(self._held, (A, B, share * C, share * D), slopes, share, self._signals, self._clock)
             growth.append(
                 growth_pieces(np.log(np.maximum(abs(z), 1e-300)), (moves / np.where(z == 0, 1.0, z)[:, None]).real)
@@ -74,7 +82,7 @@ class LawJudge:
         s, moves = pole_slopes(self._continuous, law.matrices(asked), slopes, 1.0, asked, Clock(None))
         size = np.maximum(abs(s), 1e-300)
         turn = moves.real / size[:, None] - (s.real / size**3)[:, None] * (s.conj()[:, None] * moves).real
-        growth.append(growth_pieces(s.real / size - ON_AXIS, turn))
+        growth.append(growth_pieces(s.real / size - GROWTH_OF_MODEL, turn))
         g, dg = (np.concatenate(each) for each in zip(*growth, strict=True))
         if g.max() >= 0.0:
             return Pieces(np.zeros(1), np.zeros((1, dg.shape[1])), g, dg)
@@ -91,8 +99,9 @@ class LawJudge:
             score = self.score(law)
             return score if self.objective in SLEWED else -score
         acting = with_estimate(acting_law(self.arm, law, self.chain)[0], self.chain)
-        of = disk_of if self.objective == "margin" else _distance
-        least = lowest(lambda q: of(self._loop_function(acting, q)), np.asarray(self._curve.places.imag, dtype=float))
+        of: Callable[[Complex], Real] = disk_of if self.objective == "margin" else lambda L: np.asarray(abs(1 + L))
+        angles = np.asarray(self._curve.places.imag, dtype=float)
+        least = lowest_on_circle(lambda q: of(self._loop_function(acting, q)), angles)
         return least if self.objective == "margin" else 1 / least
 
     def holds(self, law: Law) -> bool:
@@ -145,11 +154,11 @@ class LawJudge:
         return sensed_model(self.arm, self.loop.asked.signals, self.loop.plant.count)
 
     @cached_property
-    def _curve(self) -> Curve:
+    def _curve(self) -> LoopCurve:
         """The circle, as i times its angles."""
         q = circle_angles(self.loop.pulse)
         z = np.exp(1j * q)
-        return Curve(1j * q, z, self.loop.pulse(z), self._signals, self._clock, self.chain.sampling.period)
+        return LoopCurve(1j * q, z, self.loop.pulse(z), self._signals, self._clock, self.chain.sampling.period)
 
     @cached_property
     def _slew(self) -> LawSlew:
@@ -159,11 +168,6 @@ class LawJudge:
     def _loop_function(self, acting: Law, q: Real) -> Complex:
         z = np.exp(1j * q)
         return replace(self._curve, places=1j * q, points=z, plant=self.loop.pulse(z)).loop_function(acting)
-
-
-def _distance(L: Complex) -> Real:
-    """|1 + L| = 1/|S|."""
-    return np.asarray(abs(1 + L))
 
 
 def law_judge(

@@ -26,7 +26,7 @@ from tfarm.records import record
 from tfarm.reduced.sensed import closed
 from tfarm.spectrum.scales import first_frequency
 from tfarm.synthesis.law_slopes import Clock
-from tfarm.synthesis.sampled import SAMPLES_LEFT, trial_cost
+from tfarm.synthesis.sampled import SAMPLES_LEFT, slew_cost
 from tfarm.synthesis.structures import Slope
 
 Real = NDArray[np.float64]
@@ -69,7 +69,7 @@ class LawSlew:
         off, added = moment - task.rigid_moment[:, None], u - task.feedforward[:, None]
         if self.chain.slew.reading == "total":
             added = u
-        value = trial_cost(task, self.chain, moment, u)
+        value = slew_cost(task, self.chain, moment, u)
         return value, (a * off * d_moment + b * added * d_u).sum(axis=0)[None]
 
     def _task(self, objective: str) -> Scenario:

@@ -20,19 +20,28 @@ from scipy.optimize import linprog
 Real = NDArray[np.float64]
 
 LOST = 1e3  # score where the g are not below 0, and more the larger they are
-PRICE, WITHIN = 100.0, 1e-5  # of a g above -WITHIN: tuned on the laws of all structures for the preset sasaki2012-lab
+PRICE = 100.0  # of a g above -WITHIN: tuned on the laws of all structures for the preset sasaki2012-lab
+WITHIN = 1e-5  # below 0, so that what is found holds: tuned with it
+# The others are customary, or were chosen by hand.
 TURNS = 120  # steps of the first part
-BEST = 2  # of the points that it comes to, the second part begins at
-TRIES = 25  # trials of a step's length
-EVERY, SLOW = 15, 1e-4  # turns after which so small a relative gain ends the first part
-FIRST, FURTHEST = 0.3, 2.0  # the largest part of the first step, and of any
-ARMIJO, WOLFE = 1e-4, 0.5  # of the slope: decrease that a step has to make, and slope that it may leave
-STEPS = 40  # of the second part, at most
-RADIUS, LEAST, LARGEST = 0.1, 1e-6, 2.0  # of the box: the first, where the search ends, and the most
-GOOD, POOR = 0.75, 0.25  # of what was foretold: the box grows, or shrinks
-GROW, SHRINK = 2.0, 0.3
-KEPT = 0.05  # of the distance to g = 0 that a step leaves
-GAIN = 1e-7  # relative: less is none
+GO_ON = 2  # of the points that it comes to, the second part begins at
+LENGTHS_TRIED = 25  # trials of a step's length
+TURNS_A_CHECK = 15  # turns after which a gain below LEAST_PROGRESS ends the first part
+LEAST_PROGRESS = 1e-4  # relative
+FIRST_STEP = 0.3  # of x: the largest part of the first step
+LONGEST_STEP = 2.0  # of any step
+ARMIJO = 1e-4  # of the slope: the decrease that a step has to make
+WOLFE = 0.5  # of the slope that a step may leave
+TANGENT_STEPS = 40  # of the second part, at most
+FIRST_RADIUS = 0.1  # of its first box, in x
+LEAST_RADIUS = 1e-6  # of the box, where the search ends
+LARGEST_RADIUS = 2.0  # of any box
+FORETOLD_WELL = 0.75  # of what was foretold: from there on the box grows
+FORETOLD_BADLY = 0.25  # and below it shrinks
+RADIUS_GROWS = 2.0
+RADIUS_SHRINKS = 0.3
+GROWTH_KEPT = 0.05  # of the distance to g = 0 that a step leaves
+LEAST_GAIN = 1e-7  # relative: less is none
 
 
 class Pieces(NamedTuple):
@@ -58,34 +67,36 @@ class Pieces(NamedTuple):
         return float(self.values[i]) + PRICE * over, self.slopes[i] + PRICE * self.growth_slopes[j]
 
 
-Function = Callable[[Real], Pieces]
-Found = tuple[float, Real]  # score and point
+PiecesAt = Callable[[Real], Pieces]
+ScoredPoint = tuple[float, Real]  # score and point
 
 
-def joined(parts: list[Pieces]) -> Pieces:
+def joined_pieces(parts: list[Pieces]) -> Pieces:
     """The functions of all together."""
     return Pieces(*(np.concatenate(each) for each in zip(*parts, strict=True)))
 
 
-def minimax(pieces: Function, starts: Sequence[Real], upper: Real, tell: Callable[[int, float], None]) -> list[Found]:
+def minimax(
+    pieces: PiecesAt, starts: Sequence[Real], upper: Real, tell: Callable[[int, float], None]
+) -> list[ScoredPoint]:
     """Scores and points x <= upper that the search from so many starts comes to, the lowest first.
 
     The best of them go on along tangents.  `tell` is told how many are done, and the lowest score.
     """
-    found: list[Found] = []
+    found: list[ScoredPoint] = []
     for n, start in enumerate(starts, 1):
         then = descended(pieces, start, upper)
         found += [(pieces(x).score, x) for x in (start, then)]
         tell(n, min(found, key=_first)[0])
-    found += [along_tangents(pieces, x, upper) for _, x in sorted(found, key=_first)[:BEST]]
+    found += [along_tangents(pieces, x, upper) for _, x in sorted(found, key=_first)[:GO_ON]]
     return sorted(found, key=_first)
 
 
-def _first(found: Found) -> float:
+def _first(found: ScoredPoint) -> float:
     return found[0]
 
 
-def descended(pieces: Function, start: Real, upper: Real) -> Real:
+def descended(pieces: PiecesAt, start: Real, upper: Real) -> Real:
     """Where the quasi-Newton search on the price ends."""
 
     def priced(x: Real) -> tuple[float, Real]:
@@ -96,12 +107,12 @@ def descended(pieces: Function, start: Real, upper: Real) -> Real:
     value, slope = priced(x)
     before = np.inf
     for turn in range(TURNS):
-        if turn % EVERY == 0:
-            if before - value < SLOW * abs(value):
+        if turn % TURNS_A_CHECK == 0:
+            if before - value < LEAST_PROGRESS * abs(value):
                 break
             before = value
         step = -inverse @ slope
-        step = step * min(1.0, (FURTHEST if turn else FIRST) / max(float(abs(step).max()), 1e-300))
+        step = step * min(1.0, (LONGEST_STEP if turn else FIRST_STEP) / max(float(abs(step).max()), 1e-300))
         if not step @ slope < 0.0:
             break
         length, then, new = _weak_wolfe(priced, x, step, value, float(step @ slope))
@@ -109,9 +120,11 @@ def descended(pieces: Function, start: Real, upper: Real) -> Real:
             break
         step, change = length * step, new - slope
         x, value, slope = x + step, then, new
-        if (turned := float(step @ change)) > 0.0:
-            inverse = _updated(inverse if turn else inverse * turned / (change @ change), step, change, turned)
-        if abs(step).max() < LEAST:
+        if (turned := float(step @ change)) > 0.0:  # so that the inverse maps the change of slope onto the step
+            inverse = inverse if turn else inverse * turned / (change @ change)
+            left = np.eye(step.size) - np.outer(step, change) / turned
+            inverse = left @ inverse @ left.T + np.outer(step, step) / turned
+        if abs(step).max() < LEAST_RADIUS:
             break
     return np.asarray(np.minimum(x, upper))
 
@@ -121,11 +134,11 @@ def _weak_wolfe(
 ) -> tuple[float, float, Real]:
     """A share of a step that goes down enough and leaves less of the slope; value and slope there."""
     low, high, share = 0.0, np.inf, 1.0
-    for _ in range(TRIES):
+    for _ in range(LENGTHS_TRIED):
         then, new = priced(x + share * step)
         if not then <= value + ARMIJO * share * slope:
             high = share
-        elif new @ step < WOLFE * slope and share < FURTHEST / abs(step).max():
+        elif new @ step < WOLFE * slope and share < LONGEST_STEP / abs(step).max():
             low = share
         else:
             break
@@ -133,32 +146,29 @@ def _weak_wolfe(
     return share, then, new
 
 
-def _updated(inverse: Real, step: Real, change: Real, turned: float) -> Real:
-    """The inverse of the second derivatives that maps the change of slope onto the step."""
-    left = np.eye(step.size) - np.outer(step, change) / turned
-    return np.asarray(left @ inverse @ left.T + np.outer(step, step) / turned)
-
-
-def along_tangents(pieces: Function, start: Real, upper: Real) -> tuple[float, Real]:
+def along_tangents(pieces: PiecesAt, start: Real, upper: Real) -> tuple[float, Real]:
     """The score and the point that linear programmes over the tangents come to."""
-    x, radius = start, RADIUS
+    x, radius = start, FIRST_RADIUS
     now = pieces(x)
-    for _ in range(STEPS):
+    for _ in range(TANGENT_STEPS):
         step, foretold = _tangent_step(now, -radius, np.minimum(radius, upper - x))
-        if foretold <= GAIN * abs(now.score):
+        if foretold <= LEAST_GAIN * abs(now.score):
             break
         then = pieces(x + step)
         share = (now.score - then.score) / foretold
         if share > 0.0:
             x, now = x + step, then
-        radius = min(GROW * radius, LARGEST) if share > GOOD else radius * SHRINK if share < POOR else radius
-        if radius < LEAST:
+        if share > FORETOLD_WELL:
+            radius = min(RADIUS_GROWS * radius, LARGEST_RADIUS)
+        elif share < FORETOLD_BADLY:
+            radius *= RADIUS_SHRINKS
+        if radius < LEAST_RADIUS:
             break
     return now.score, x
 
 
 def _tangent_step(now: Pieces, low: float, high: Real) -> tuple[Real, float]:
-    """The step d of least max f + f' d in a box, with g + g' d <= KEPT g; and by how much it lowers the score.
+    """The step d of least max f + f' d in a box, with g + g' d <= GROWTH_KEPT g; and by how much it lowers the score.
 
     Where some g is not below 0, that of least max g + g' d.
     """
@@ -167,7 +177,7 @@ def _tangent_step(now: Pieces, low: float, high: Real) -> tuple[Real, float]:
     rows, right = np.c_[slopes, -np.ones(len(f))], -f
     if not lost:
         rows = np.r_[rows, np.c_[now.growth_slopes, np.zeros(len(now.growth))]]
-        right = np.r_[right, (KEPT - 1.0) * now.growth]
+        right = np.r_[right, (GROWTH_KEPT - 1.0) * now.growth]
     n = slopes.shape[1]
     bounds = [*((low, float(top)) for top in high), (None, None)]
     size = np.maximum(abs(rows[:, :n]).max(axis=1, initial=0.0), 1.0)

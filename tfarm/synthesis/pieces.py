@@ -12,32 +12,33 @@ from numpy.typing import NDArray
 from tfarm.arm.law import Law
 from tfarm.records import record
 from tfarm.synthesis.law_slopes import Clock, changes
+from tfarm.synthesis.sampled import REAL_ANGLE
 from tfarm.synthesis.structures import Slope
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 Sloped = tuple[Real, Real]  # values (m,) and slopes (m, n)
 
-NEAR, MOST = -1.2, 40  # growth of poles that are looked at, a sample or of |s|, and how many
-REAL = 1e-9  # rad: a pole at a smaller angle is real
-DIPS = 12  # lowest places of a curve that count
-LONGEST = 100.0  # samples, or s: the delay margin where |L| is nowhere 1
+GROWTH_SEEN = -1.2  # a sample, or of |s|: poles that grow less, |z| < 0.3, are left out while others grow more
+POLES_SEEN = 40  # poles that count, those that grow most: by hand
+PEAKS_SEEN = 12  # highest places of a curve that count: by hand
+LONGEST_MARGIN = 100.0  # samples, or s: the delay margin where |L| is nowhere 1
 
 
 def growth_pieces(growth: Real, slopes: Real) -> Sloped:
     """The poles that are nearest to growing."""
-    order = np.argsort(-growth, kind="stable")[:MOST]
-    order = order[growth[order] > NEAR] if growth[order[0]] > NEAR else order[:1]
+    order = np.argsort(-growth, kind="stable")[:POLES_SEEN]
+    order = order[growth[order] > GROWTH_SEEN] if growth[order[0]] > GROWTH_SEEN else order[:1]
     return growth[order], slopes[order]
 
 
-def damping_pieces(z: Complex, moves: Complex, counted: NDArray[np.bool_], period: float | None = 1.0) -> Sloped:
-    """-zeta of the oscillating poles that are counted; -1 where there is none.  z in samples, or s without a period."""
-    oscillating = counted & (np.angle(z) > REAL if period else z.imag > REAL * abs(z)) & (z != 0)
+def damping_pieces(z: Complex, moves: Complex, counted: NDArray[np.bool_]) -> Sloped:
+    """-zeta of the oscillating poles in z that are counted; -1 where there is none."""
+    oscillating = counted & (np.angle(z) > REAL_ANGLE) & (z != 0)
     z, moves = z[oscillating], moves[oscillating]
     if not z.size:
         return -np.ones(1), np.zeros((1, moves.shape[1]))
-    s, ds = (np.log(z), moves / z[:, None]) if period else (z, moves)
+    s, ds = np.log(z), moves / z[:, None]  # times the period
     size = np.asarray(abs(s))
     slopes = ds.real / size[:, None] - (s.real / size**3)[:, None] * (s.conj()[:, None] * ds).real
     return np.asarray(s.real / size), np.asarray(slopes)
@@ -45,7 +46,7 @@ def damping_pieces(z: Complex, moves: Complex, counted: NDArray[np.bool_], perio
 
 @dataclass(frozen=True)
 @record
-class Curve:
+class LoopCurve:
     """What the loop function is made of on a curve: `places` i w or i q, points s or z, the plant (signals, n) there.
 
     `unit` [s] of an angle is a sample, 1 of a frequency.
@@ -71,7 +72,9 @@ class Curve:
             across = 1.0 - L
             f = -2 * abs(apart) / np.maximum(abs(across), 1e-300)
             slope = f[:, None] * (1 / apart + 1 / across)[:, None]
-        at = _highest(f)
+        padded = np.r_[-np.inf, f, -np.inf]
+        (peaks,) = np.nonzero((f >= padded[:-2]) & (f >= padded[2:]))
+        at = np.asarray(peaks[np.argsort(-f[peaks], kind="stable")[:PEAKS_SEEN]])
         return f[at], np.asarray((slope[at] * self._moves(at, slopes)).real)
 
     def loop_function(self, law: Law) -> Complex:
@@ -96,7 +99,7 @@ class Curve:
         at = at[size[at] != size[at + 1]]
         n = len(slopes[0].num) if slopes else 0
         if not at.size:
-            return np.array([-LONGEST * self.unit]), np.zeros((1, n))
+            return np.array([-LONGEST_MARGIN * self.unit]), np.zeros((1, n))
         ends = [self._moves(at + k, slopes) / L[at + k, None] for k in (0, 1)]  # d ln L
         gap = (size[at] - size[at + 1])[:, None]
         share = size[at] / gap[:, 0]
@@ -107,12 +110,5 @@ class Curve:
         d_left = ends[0].imag + d_share * step[:, None] + share[:, None] * (ends[1] - ends[0]).imag
         delay = left / angle
         d_delay = (d_left - delay[:, None] * d_angle) / angle[:, None]
-        long = delay > LONGEST
-        return -self.unit * np.minimum(delay, LONGEST), -self.unit * np.where(long[:, None], 0.0, d_delay)
-
-
-def _highest(f: Real) -> NDArray[np.int64]:
-    """Where the highest peaks of values along a curve are."""
-    padded = np.r_[-np.inf, f, -np.inf]
-    (peaks,) = np.nonzero((f >= padded[:-2]) & (f >= padded[2:]))
-    return np.asarray(peaks[np.argsort(-f[peaks], kind="stable")[:DIPS]])
+        long = delay > LONGEST_MARGIN
+        return -self.unit * np.minimum(delay, LONGEST_MARGIN), -self.unit * np.where(long[:, None], 0.0, d_delay)

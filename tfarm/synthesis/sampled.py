@@ -37,21 +37,21 @@ from tfarm.errors import ConvergenceError
 from tfarm.loop.stability import stability
 from tfarm.records import record
 from tfarm.spectrum.scales import first_frequency
-from tfarm.synthesis.search import TIE, Axis, Bounds, Effort, Score
+from tfarm.synthesis.search import TIE, Bounds, Effort, GainAxis, Score
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 RESERVE = 1.25  # the loop holds with all its gains larger or smaller by this factor: what a gauge or motor is off by
-SEARCHED = 1.002 * RESERVE  # by as much in the search: the model's few modes have edges that are off by less
+SEARCH_RESERVE = 1.002 * RESERVE  # by as much in the search: the model's few modes have edges that are off by less
 FEWEST_MODES = 8  # of the first model; more where its best gains do not hold
-BLOCK = 2000  # gains at a time
-REAL = 1e-9  # rad: a pole at a smaller angle is real
+GAINS_AT_ONCE = 2000  # gains at a time
+REAL_ANGLE = 1e-9  # rad: a pole at a smaller angle is real
 SAMPLES_LEFT = 16  # of the record after the slew, where a period of the first mode has fewer
-AROUND = np.geomspace(1e-9, 0.5, 40)  # rad, to either side of the open loop's poles
-EVEN = 400  # points of the circle beside those
-ALIKE = 4.0  # of the least distance to an open-loop pole: as far off a pole may be its own too
-DIPS = 5  # lowest points of the circle that are refined
+POLE_OFFSETS = np.geomspace(1e-9, 0.5, 40)  # rad, to either side of the open loop's poles
+EVEN_ANGLES = 400  # points of the circle beside those
+AS_NEAR = 4.0  # of the least distance to an open-loop pole: as far off a pole may be its own too
+DIPS_REFINED = 5  # lowest points of the circle that are refined
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class SampledJudge:
         smooth = {"margin": Effort(24, 32, 6), "cost": Effort(24, 32, 6), "damping": Effort(32, 36, 12)}
         return smooth.get(self.objective, Effort(36, 90, 20))
 
-    def landscape(self, axes: tuple[Axis, Axis], effort: Effort) -> tuple[Real, Score]:
+    def landscape(self, axes: tuple[GainAxis, GainAxis], effort: Effort) -> tuple[Real, Score]:
         """Scores over the grid, rows upwards, inf where not stable, and the score itself, which is so too."""
         gains = (axis.gain(axis.middles(number)) for axis, number in zip(axes, effort[:2], strict=True))
         grid = np.array(np.meshgrid(*gains))
@@ -82,15 +82,15 @@ class SampledJudge:
         """What is minimised, at points (2, n) of the plane; inf where the loop does not hold with `RESERVE`."""
         number = points.shape[1]
         values = np.full(number, np.inf)
-        for i in range(0, number, BLOCK):
-            part = points[:, i : i + BLOCK]
+        for i in range(0, number, GAINS_AT_ONCE):
+            part = points[:, i : i + GAINS_AT_ONCE]
             z = np.linalg.eigvals(self._matrices(part, 1.0))
             good = abs(z).max(axis=1) < 1.0
-            for share in (SEARCHED, 1 / SEARCHED):
+            for share in (SEARCH_RESERVE, 1 / SEARCH_RESERVE):
                 more = np.linalg.eigvals(self._matrices(part[:, good], share))
                 good[good] = abs(more).max(axis=1) < 1.0
             if good.any():
-                values[i : i + BLOCK][good] = self._scores(part[:, good], z[good])
+                values[i : i + GAINS_AT_ONCE][good] = self._scores(part[:, good], z[good])
         return values
 
     def holds(self, law: HubFeedback) -> bool:
@@ -134,7 +134,8 @@ class SampledJudge:
 
     def _matrices(self, points: Real, share: float) -> Real:
         start, by_held, by_each = self._parts
-        return np.asarray(start + share * (by_held + _added(points, by_each)))
+        across, up = points[..., None, None] * by_each[:, None]
+        return np.asarray(start + share * (by_held + (across + up)))
 
     def damping(self, z: Complex) -> Real:
         """The least damping ratio of the oscillating poles of the first modes, of closed-loop poles (gains, n)."""
@@ -162,7 +163,7 @@ class SampledJudge:
     def disk(self, law: HubFeedback) -> float:
         """The disk margin of one law, its lowest dips refined between the points of the circle."""
         row = np.array(law.row)
-        return lowest(lambda q: disk_of(row @ self._signals(q)), np.angle(self._circle[0]))
+        return lowest_on_circle(lambda q: disk_of(row @ self._signals(q)), np.angle(self._circle[0]))
 
     # ------------------------------------------------------------ residual
 
@@ -218,20 +219,14 @@ class SampledJudge:
         """What the trial of the tuner costs with constant gains."""
         chain = self.loop.chain
         task = self._task(max(0.0, TRIAL_DURATION - chain.slew.rise_time))
-        return trial_cost(task, chain, *self._run(task, points))
+        return slew_cost(task, chain, *self._run(task, points))
 
 
-def trial_cost(task: Scenario, chain: Chain, moment: Real, u: Real) -> Real:
+def slew_cost(task: Scenario, chain: Chain, moment: Real, u: Real) -> Real:
     """T sum of (a x^2 + b e^2)/2 of a slew whose root moment and input are (samples, n)."""
     a, b = TRIAL_COST
     x, added = moment - task.rigid_moment[:, None], u - (chain.slew.reading == "vibration") * task.feedforward[:, None]
     return np.asarray(task.period * (a * x**2 + b * added**2).sum(axis=0) / 2)
-
-
-def _added(points: Real, by_each: Real) -> Real:
-    """What both gains add to a matrix (n, m, m) at points (2, n), of what 1 of each does (2, m, m)."""
-    across, up = points[..., None, None] * by_each[:, None]
-    return np.asarray(across + up)
 
 
 def sampled_judges(
@@ -264,7 +259,7 @@ def first_damping(z: Complex, higher: list[complex]) -> Real:
     angle, seen = np.angle(z), z != 0
     s = np.log(np.where(seen, abs(z), 1.0)) + 1j * angle
     ratio = -s.real / np.where(seen, abs(s), 1.0)
-    return np.asarray(np.where(seen & (angle > REAL), ratio, 1.0).min(axis=1))
+    return np.asarray(np.where(seen & (angle > REAL_ANGLE), ratio, 1.0).min(axis=1))
 
 
 def of_first_modes(z: Complex, higher: list[complex]) -> NDArray[np.bool_]:
@@ -272,7 +267,7 @@ def of_first_modes(z: Complex, higher: list[complex]) -> NDArray[np.bool_]:
     left, rows = z.imag >= 0, np.arange(len(z))
     for own in higher:
         gap = np.where(left, abs(z - own), np.inf)
-        near = left & (gap <= ALIKE * gap.min(axis=1, keepdims=True))
+        near = left & (gap <= AS_NEAR * gap.min(axis=1, keepdims=True))
         left[rows, np.where(near, abs(z), np.inf).argmin(axis=1)] = False
     return np.asarray(left)
 
@@ -280,15 +275,15 @@ def of_first_modes(z: Complex, higher: list[complex]) -> NDArray[np.bool_]:
 def circle_angles(pulse: PulseTransfer) -> Real:
     """Angles (0, pi] of the circle, dense about the poles of the open loop."""
     angle = abs(np.angle(pulse.multipliers))
-    close = (angle[:, None] + np.r_[-AROUND, AROUND]).ravel()
-    return np.unique(np.r_[np.linspace(0, np.pi, EVEN + 1)[1:], close[(close > 0) & (close <= np.pi)]])
+    close = (angle[:, None] + np.r_[-POLE_OFFSETS, POLE_OFFSETS]).ravel()
+    return np.unique(np.r_[np.linspace(0, np.pi, EVEN_ANGLES + 1)[1:], close[(close > 0) & (close <= np.pi)]])
 
 
-def lowest(values: Callable[[Real], Real], q: Real) -> float:
+def lowest_on_circle(values: Callable[[Real], Real], q: Real) -> float:
     """The least of a function of the angle on a grid, its lowest dips refined between the points."""
     found = values(q)
     best = [float(found.min())]
-    for i in np.argsort(found)[:DIPS]:
+    for i in np.argsort(found)[:DIPS_REFINED]:
         ends = (q[max(i - 1, 0)], q[min(i + 1, q.size - 1)])
         done = minimize_scalar(
             lambda at: float(values(np.array([at]))[0]),

@@ -23,10 +23,12 @@ Real = NDArray[np.float64]
 Bounds = tuple[float, float]
 Score = Callable[[Real], Real]  # of points (2, n) of the plane of gains; what is least is best
 
-LEAST = 1e-8  # of the unit of the rate gain: below it the scale is linear, and nothing is found that is not found at it
-END = 1e-9  # share of an axis left out at either end: there verdicts are marginal
-ROUNDS, SHRINK = 10, 0.5  # of the small grids, and by how much they shrink where their centre is the best
-HALVED, FEWEST = (4, 7), 6  # rounds after which the better half of the minima goes on, and how many do at least
+LINEAR_BELOW = 1e-8  # of the unit of the rate gain: below it the scale is linear, and nothing new is found
+AXIS_END = 1e-9  # share of an axis left out at either end: there verdicts are marginal
+GRID_ROUNDS = 10  # of the small grids
+GRID_SHRINKS = 0.5  # by so much they shrink where their centre is the best
+HALVED_AFTER = (4, 7)  # rounds after which the better half of the minima goes on
+FEWEST_MINIMA = 6  # minima that go on at least
 OFFSETS = np.array([(i, j) for i in (-1.0, -0.5, 0.0, 0.5, 1.0) for j in (-1.0, -0.5, 0.0, 0.5, 1.0)])
 TIE = 0.01  # weight of the damping ratio beside a disk margin: without a clock rate feedback alone has margin 2
 POLISHED = 3  # minima that the simplex starts from
@@ -41,7 +43,7 @@ class Effort(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Axis:
+class GainAxis:
     """The range of one gain on its scale, in shares from 0 to 1: g = least sinh(x), or linear where `least` is inf."""
 
     low: float
@@ -67,11 +69,11 @@ class Axis:
         return (np.arange(number) + 0.5) / number
 
 
-def rate_axis(bounds: Bounds, unit: float) -> Axis:
+def searched_rates(bounds: Bounds, unit: float) -> GainAxis:
     """The axis of the rate gain for a unit J w1 [N m s/rad]; one that begins at 0 begins at the least told from 0."""
     low, high = bounds
-    least = LEAST * min(unit, max(abs(low), abs(high)))
-    return Axis(least if low == 0 else low, -least if high == 0 else high, least)
+    least = LINEAR_BELOW * min(unit, max(abs(low), abs(high)))
+    return GainAxis(least if low == 0 else low, -least if high == 0 else high, least)
 
 
 @dataclass(frozen=True)
@@ -93,29 +95,29 @@ def minima(values: Real, most: int) -> NDArray[np.int64]:
     return np.asarray(places[np.argsort(values[least], kind="stable")[:most]])
 
 
-def refined(score: Score, axes: tuple[Axis, Axis], starts: Real, steps: Real) -> list[Found]:
+def refined(score: Score, axes: tuple[GainAxis, GainAxis], starts: Real, steps: Real) -> list[Found]:
     """The lowest minima of the basins around the starts (n, 2), in shares; `steps` (2,) are those of the grid."""
     at, size = starts.copy(), np.ones(len(starts))
     best = np.full(len(starts), np.inf)
-    for number in range(ROUNDS):
-        if number in HALVED:
-            kept = np.argsort(best, kind="stable")[: max(FEWEST, len(best) // 2)]
+    for number in range(GRID_ROUNDS):
+        if number in HALVED_AFTER:
+            kept = np.argsort(best, kind="stable")[: max(FEWEST_MINIMA, len(best) // 2)]
             at, size, best = at[kept], size[kept], best[kept]
-        points = np.clip(at[:, None] + size[:, None, None] * OFFSETS * steps, END, 1 - END)
+        points = np.clip(at[:, None] + size[:, None, None] * OFFSETS * steps, AXIS_END, 1 - AXIS_END)
         gains = np.array([axis.gain(points[..., i].ravel()) for i, axis in enumerate(axes)])
         values = score(gains).reshape(points.shape[:2])
         least = values.argmin(axis=1)
         rows = np.arange(len(at))
         at, best = points[rows, least], values[rows, least]
-        size = np.where(abs(OFFSETS[least]).max(axis=1) < 1.0, size * SHRINK, size)
+        size = np.where(abs(OFFSETS[least]).max(axis=1) < 1.0, size * GRID_SHRINKS, size)
     return [Found(*each) for each in zip(at, best.tolist(), strict=True)]
 
 
-def polished(score: Score, axes: tuple[Axis, Axis], found: Found, size: float) -> Found:
+def by_simplex(score: Score, axes: tuple[GainAxis, GainAxis], found: Found, size: float) -> Found:
     """The minimum by the downhill simplex, from a triangle of this size in shares."""
 
     def of_shares(x: Any) -> float:
-        inside = np.clip(x, END, 1 - END)
+        inside = np.clip(x, AXIS_END, 1 - AXIS_END)
         gains = np.array([axis.gain(inside[i : i + 1]) for i, axis in enumerate(axes)])
         value = float(score(gains)[0])
         return value + abs(value) * float(abs(x - inside).sum())
@@ -123,4 +125,4 @@ def polished(score: Score, axes: tuple[Axis, Axis], found: Found, size: float) -
     simplex = found.shares + size * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     options: Any = {"initial_simplex": simplex, "xatol": 1e-3 * size, "fatol": 0.0, "maxfev": 120}
     done = minimize(of_shares, found.shares, method="Nelder-Mead", options=options)
-    return min(found, Found(np.clip(done.x, END, 1 - END), float(done.fun)), key=lambda each: each.score)
+    return min(found, Found(np.clip(done.x, AXIS_END, 1 - AXIS_END), float(done.fun)), key=lambda each: each.score)

@@ -28,11 +28,11 @@ from tfarm.spectrum import modes as natural_modes
 Real = NDArray[np.float64]
 Numbers = NDArray[Any]  # real, or complex for a derivative
 
-SPEED = 0.1  # of the first frequency, and rad a sample: how fast the angle answers unless it is said
-WIDEST = 40.0  # of x
-AT_MOST = 1e-9  # relative: a coefficient so near to its limit is there
+ANGLE_SPEED = 0.1  # of the first frequency, and rad a sample: how fast the angle answers unless it is said
+LARGEST_X = 40.0  # of x
+AT_LIMIT = 1e-9  # relative: a coefficient so near to its limit is there
 ONE = np.ones(1)
-IMAGINARY = 1e-30  # of a step: its square is nothing beside 1 in float64
+IMAGINARY_STEP = 1e-30  # of a step: its square is nothing beside 1 in float64
 
 
 class Entry(NamedTuple):
@@ -69,13 +69,13 @@ class Structure:
 
     def at_limit(self, x: Real) -> tuple[str, ...]:
         """The names of coefficients that are as large as they may be."""
-        near = (1 - AT_MOST) * self.most
+        near = (1 - AT_LIMIT) * self.most
         return tuple(n for n, c, most in zip(self.names, self.coefficients(x), near, strict=True) if c >= most)
 
     def coefficients(self, x: Real) -> Real:
         """The coefficients at x."""
         signs = np.array(self.is_positive)
-        x = np.clip(x, -WIDEST, WIDEST)
+        x = np.clip(x, -LARGEST_X, LARGEST_X)
         return np.asarray(np.minimum(np.where(signs, self.start * np.exp(x), self.start * np.sinh(x)), self.most))
 
     def law(self, x: Real) -> Law:
@@ -90,13 +90,13 @@ class Structure:
         (Squire and Trapp, 1998.)
         """
         c, stepped = self.coefficients(x), np.where(self.is_positive, np.exp(x), np.cosh(x)) * self.start
-        steps = 1j * IMAGINARY * np.diag(stepped)
+        steps = 1j * IMAGINARY_STEP * np.diag(stepped)
         moved = [self.entries(c + step) for step in steps]
         return tuple(
             Slope(
                 entry,
-                np.array([row[n].num.imag / IMAGINARY for row in moved]),
-                np.array([row[n].den.imag / IMAGINARY for row in moved]),
+                np.array([row[n].num.imag / IMAGINARY_STEP for row in moved]),
+                np.array([row[n].den.imag / IMAGINARY_STEP for row in moved]),
             )
             for n, entry in enumerate(self.entries(c))
         )
@@ -106,7 +106,7 @@ class Structure:
         """The largest x (n,): where a coefficient is as large as it may be."""
         with np.errstate(over="ignore"):
             share = self.most / self.start
-        return np.where(np.isfinite(share), np.log(np.abs(share)), WIDEST)
+        return np.where(np.isfinite(share), np.log(np.abs(share)), LARGEST_X)
 
     @property
     def origin(self) -> Real:
@@ -117,7 +117,7 @@ class Structure:
 def usual_angle_gain(arm: Arm, period: float) -> float:
     """Kp [input/rad]: the angle answers at a tenth of the first frequency, or of a radian a sample if that is less."""
     first = float(natural_modes(arm, 1).natural_frequency[-1])
-    return float(f"{arm.turned_inertia * (SPEED * min(first, 1 / period)) ** 2:.3g}")
+    return float(f"{arm.turned_inertia * (ANGLE_SPEED * min(first, 1 / period)) ** 2:.3g}")
 
 
 def _rate_gain(arm: Arm, Kp: float) -> float:

@@ -15,7 +15,7 @@ from tfarm.dsp.brief import SampledBrief
 from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.stability import Stability
 from tfarm.records import record
-from tfarm.synthesis.search import Axis, Bounds, Effort, Score
+from tfarm.synthesis.search import Bounds, Effort, GainAxis, Score
 
 Real = NDArray[np.float64]
 _One = TypeVar("_One")
@@ -44,7 +44,7 @@ class Judge(Protocol):
     def effort(self, up: Bounds) -> Effort:
         """How fine a grid its objective needs."""
 
-    def landscape(self, axes: tuple[Axis, Axis], effort: Effort) -> tuple[Real, Score]:
+    def landscape(self, axes: tuple[GainAxis, GainAxis], effort: Effort) -> tuple[Real, Score]:
         """Scores over the grid, inf where not stable, and the score to refine with."""
 
     def score(self, points: Real) -> Real:
@@ -67,7 +67,7 @@ class Worst:
         """The finest grid that any of them asks for."""
         return Effort(*(max(each) for each in zip(*(judge.effort(up) for judge in self.judges), strict=True)))
 
-    def landscape(self, axes: tuple[Axis, Axis], effort: Effort) -> tuple[Real, Score]:
+    def landscape(self, axes: tuple[GainAxis, GainAxis], effort: Effort) -> tuple[Real, Score]:
         """The largest scores over the grid, inf where one arm is not stable, and the score to refine with."""
         values, scores = zip(*(judge.landscape(axes, effort) for judge in self.judges), strict=True)
         return np.max(values, axis=0), lambda points: np.max([score(points) for score in scores], axis=0)

@@ -16,13 +16,14 @@ from typing import TypeVar
 from tfarm.arm import Arm
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
-from tfarm.synthesis.arms import Bounds, Box, NamedArm, worst_inside
+from tfarm.synthesis.arms import ArmBox, NamedArm, worst_inside
+from tfarm.synthesis.search import Bounds
 
 _Found = TypeVar("_Found")
 Tell = Callable[[str], None]
 
-ROUNDS = 4  # of the exchange, at most
-WORSE = 0.01  # of a score: an arm inside that is so much worse is named
+MOST_EXCHANGES = 4  # of the exchange, at most
+MUCH_WORSE = 0.01  # of a score: an arm inside that is so much worse is named
 
 
 @dataclass(frozen=True)
@@ -49,11 +50,11 @@ class WorstCase:
         )
 
 
-ALONE = WorstCase({}, 0)  # of a list, or of one arm
+WITHOUT_BOX = WorstCase({}, 0)  # of a list, or of one arm
 
 
 def for_the_worst(
-    arms: Sequence[NamedArm], box: Box | None, find: Callable[[Sequence[NamedArm]], _Found],
+    arms: Sequence[NamedArm], box: ArmBox | None, find: Callable[[Sequence[NamedArm]], _Found],
     score_on: Callable[[_Found, Arm], float], tell: Tell,
 ) -> tuple[_Found, WorstCase]:  # fmt: skip
     """What `find` finds for the arms, and for those inside the box on which it is worse.
@@ -63,31 +64,26 @@ def for_the_worst(
     """
     named, tried = list(arms), 0
     while True:
-        found = _asked(find, named)
+        try:
+            found = find(named)
+        except ConvergenceError as error:
+            if len(named) == 1:
+                raise
+            text = f"{error.message}; asked of {len(named)} arms at once: {'; '.join(each.name for each in named)}"
+            raise ConvergenceError(text, error.best, error.residual) from None
         if box is None:
-            return found, ALONE
+            return found, WITHOUT_BOX
         limit = max(score_on(found, each.arm) for each in named)
         worst, score, number = worst_inside(box, partial(score_on, found))
         tried += number
-        if score <= limit + WORSE * abs(limit):
+        if score <= limit + MUCH_WORSE * abs(limit):
             return found, WorstCase(box.ranges, tried)
-        if len(named) == len(arms) + ROUNDS:
+        if len(named) == len(arms) + MOST_EXCHANGES:
             if math.isinf(score):
                 raise ConvergenceError(f"no law found holds on {worst.name}: narrow the ranges", None, None)
             return found, WorstCase(box.ranges, tried, worst.name)
         tell(f"{worst.name} is worse than the {len(named)} arms before: the law is chosen for it too")
         named.append(worst)
-
-
-def _asked(find: Callable[[Sequence[NamedArm]], _Found], named: Sequence[NamedArm]) -> _Found:
-    """What is found; a failure says of how many arms it was asked."""
-    try:
-        return find(named)
-    except ConvergenceError as error:
-        if len(named) == 1:
-            raise
-        text = f"{error.message}; asked of {len(named)} arms at once: {'; '.join(each.name for each in named)}"
-        raise ConvergenceError(text, error.best, error.residual) from None
 
 
 def same_input(arms: Sequence[NamedArm]) -> None:
