@@ -10,7 +10,7 @@ from tfarm.arm import HubFeedback, to_toml
 from tfarm.arm.checks import LARGEST_NUMBER
 from tfarm.arm.schema import arm_of_table
 from tfarm.dsp import Actuator, Chain, Converters, Sampling, Slew, load_chain
-from tfarm.dsp.converters import MOMENT, TORQUE, quantisers
+from tfarm.dsp.converters import DAC, MOMENT, quantisers
 from tfarm.dsp.reading import chain_of_tables
 from tfarm.dsp.writing import file_text
 from tfarm.errors import ParameterError
@@ -141,7 +141,7 @@ def test_steps_and_ranges():
     )
     rows = quantisers(chain).rows
     assert rows[MOMENT].tolist() == [1.0, -8.0, 7.0]
-    assert rows[TORQUE].tolist() == [1.0, -2.5, 2.5]
+    assert rows[DAC].tolist() == [1.0, -2.5, 2.5]
 
 
 def test_quantise_rounds_clips_and_says_so():

@@ -7,7 +7,16 @@ from matplotlib.figure import Figure
 import tfarm
 from tests.odd_arms import odd_arms
 from tfarm.dsp import Chain, Slew, scenario
-from tfarm.dsp.curves import BETWEEN, MOST_LINE, PERIODS, POINTS, curve, points_a_period, reference_angle, root_moment
+from tfarm.dsp.curves import (
+    LEAST_BETWEEN,
+    MOST_LINE,
+    PERIODS,
+    POINTS,
+    curve,
+    points_a_period,
+    reference_angle,
+    root_moment,
+)
 from tfarm.dsp.results import drawn
 from tfarm.dsp.slews import slews
 from tfarm.report.time_responses import slews_table
@@ -63,7 +72,7 @@ def test_a_slow_arm_is_a_line_of_the_simulators_own_records():
     data = slews(lab, default_gains(lab), Chain(), 8)
     drawn = root_moment(data.with_moment)
     assert not drawn.is_band
-    assert drawn.t.size == data.with_moment.t.size + data.with_moment.between.t.size >= (BETWEEN + 1) * 301
+    assert drawn.t.size == data.with_moment.t.size + data.with_moment.between.t.size >= (LEAST_BETWEEN + 1) * 301
 
 
 def test_the_reference_between_the_samples_is_that_of_the_slew():

@@ -8,7 +8,7 @@ import pytest
 import tfarm
 from tfarm.arm import HubFeedback
 from tfarm.dsp import Chain, Sampling, Simulator, scenario
-from tfarm.dsp.ringing import POINTS, records_between, ringing
+from tfarm.dsp.ringing import POINTS_A_PERIOD, records_between, ringing
 
 STEEL = tfarm.load("stocky-steel")
 
@@ -47,7 +47,7 @@ def test_the_slew_of_a_stiff_arm_gets_twenty_points_a_period():
     height = float(np.ptp(run.at_samples.root_moment))
     records = records_between(simulator, run, {"root_moment": height})
     fastest = ringing(simulator, run).fastest("root_moment", height) / (2 * np.pi)
-    assert records / chain.sampling.period < POINTS * fastest <= (records + 1) / chain.sampling.period
+    assert records / chain.sampling.period < POINTS_A_PERIOD * fastest <= (records + 1) / chain.sampling.period
     assert fastest >= first * (1 - 1e-9)
     fine = simulator.finer(records).linear(HubFeedback(K1=1.0, K2=0.0))
     np.testing.assert_allclose(fine.at_samples.root_moment, run.at_samples.root_moment, rtol=0, atol=1e-9)

@@ -253,7 +253,7 @@ def test_an_arm_without_a_loop_gets_one_sentence(inertia):
 def test_a_held_tip_has_a_map_but_no_slew(monkeypatch):
     monkeypatch.setattr("tfarm.report.overlay.COLUMNS", 8)
     monkeypatch.setattr("tfarm.dsp.regions.MOST_COLUMNS", 0)
-    monkeypatch.setattr("tfarm.dsp.periods.SHARES", (1.0,))
+    monkeypatch.setattr("tfarm.dsp.periods.PERIOD_SHARES", (1.0,))
     section = sampled_section(replace(LAB, payload=tfarm.Payload(mass=math.inf)))
     assert "no slew" in section.words[-1]
     assert "sampled-overlay" in blocks_of(section)

@@ -12,7 +12,7 @@ import numpy as np
 from tfarm.arm import PLANE
 from tfarm.cli.app import tell
 from tfarm.columns import Column, Table
-from tfarm.dsp.results import SIGNALS
+from tfarm.dsp.results import SIGNAL_COLUMNS
 from tfarm.files import write_file
 from tfarm.tables.files import write_csv
 from tfarm.tables.terminal import show
@@ -107,8 +107,8 @@ def write_mat(answer: dict[str, Any], path: Path) -> None:
 
 
 def _present(answer: dict[str, Any]) -> list[Column]:
-    units = {"torque": answer["torque_unit"]}
-    return [replace(column, unit=units.get(column.key, column.unit)) for column in SIGNALS if answer.get(column.key)]
+    units, columns = {"torque": answer["torque_unit"]}, (each for each in SIGNAL_COLUMNS if answer.get(each.key))
+    return [replace(column, unit=units.get(column.key, column.unit)) for column in columns]
 
 
 def _texts(windows: list[list[dict[str, Any]]], band: float | None) -> str:

@@ -8,6 +8,7 @@ Robust Control, 1993, ch. 4).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 from tfarm.arm import GAINS, HubFeedback
 from tfarm.crossing import Crossings, solved
 from tfarm.dsp.law_loop import SampledLaw
-from tfarm.dsp.loop import ANGLE, SampledLoop
+from tfarm.dsp.loop import ANGLE_ROW, SampledLoop
 from tfarm.exact.characteristic import torque
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.records import record
@@ -31,7 +32,7 @@ Whole = NDArray[np.int64]
 Split = Callable[[tuple[Any, Complex]], tuple[Complex, Complex]]  # of a grid's terms into A and B of A + g B
 
 A_DECADE = 48  # grid points a decade of the distance to a pole
-NARROWEST = 1e-17
+NARROWEST_WIDTH = 1e-17  # rad, of a pole: closer to it no angle is told from another
 COARSEST = 2000  # points of the uniform grid over the half circle
 NEAR_ONE = 1e-7  # where the values at z = 1 are read: they are even in q, so wrong by 1e-14
 
@@ -72,7 +73,7 @@ def circle_grid(loop: SampledLoop | SampledLaw) -> CircleGrid:
     """The grid that resolves every pole of the loop (its gains do not matter)."""
     pulse = loop.pulse
     angles = np.angle(pulse.multipliers)
-    width = np.maximum(abs(pulse.poles.real) * pulse.sampling.period * 1e-2, NARROWEST)
+    width = np.maximum(abs(pulse.poles.real) * pulse.sampling.period * 1e-2, NARROWEST_WIDTH)
     felt = pulse.residues.any(axis=0) | (np.arange(angles.size) == angles.size - 1)
     bases = np.nonzero((angles >= 0) & (abs(pulse.multipliers) > 1e-2) & felt)[0]
     bases = bases[np.argsort(angles[bases], kind="stable")]
@@ -102,15 +103,19 @@ def geometric(edge: float, width: float) -> Real:
 def crossings(grid: CircleGrid, name: str, law: HubFeedback) -> Crossings:
     """Where poles cross the circle, at angles `at`, as one gain runs from minus to plus the largest of `most_gain`.
 
-    The others are those of the law; exact to rounding.
+    The others are those of the law; exact to rounding.  At z = -1 f vanishes: so it falls where it is positive just
+    before.
     """
     line = _Line([gain.name for gain in GAINS].index(name), law.having(name, 0.0).row)
     A, B = line.split(grid.terms)
     rises = (A * B.conj()).imag >= 0
     step = np.nonzero(rises[1:] != rises[:-1])[0]
     q, gain = solved_on(grid, line.split, step)
-    ends = [_at_minus_one(grid, line, bool(rises[-1])), *_at_one(grid, line, bool(rises[0]))]
+    one = np.ones(1)
+    A, B = line.split((one, grid.loop.signals(np.array([-1.0 + 0j]), None, one)))
+    last = real_gain(A[0], B[0]), math.pi, 1 if rises[-1] else -1
     most = most_gain(grid.loop.plant.arm, name)
+    ends = [last, *_at_one(grid, line, bool(rises[0]))]
     found = [*zip(gain, q, np.where(rises[step], 2, -2), strict=True), *ends]
     return Crossings.of(each for each in found if abs(each[0]) <= most)
 
@@ -136,18 +141,11 @@ def solved_on(grid: CircleGrid, split: Split, step: Whole) -> tuple[Real, Real]:
     return grid.angles[base] + shift, gain
 
 
-def _at_minus_one(grid: CircleGrid, line: _Line, is_above: bool) -> tuple[float, float, int]:
-    """The crossing at z = -1; f vanishes there, so it falls where it is positive just before."""
-    one = np.ones(1)
-    A, B = line.split((one, grid.loop.signals(np.array([-1.0 + 0j]), None, one)))
-    return real_gain(A[0], B[0]), float(np.pi), 1 if is_above else -1
-
-
 def _at_one(grid: CircleGrid, line: _Line, is_above: bool) -> list[tuple[float, float, int]]:
     """The crossing at z = 1: at no gain on the rate where the arm can drift, else by a static balance."""
     loop, one = grid.loop, np.ones(1)
-    rigid, change = loop.plant.rigid[ANGLE], -1 if is_above else 1
-    if line.others[ANGLE] != 0.0 and rigid.any():
+    rigid, change = loop.plant.rigid[ANGLE_ROW], -1 if is_above else 1
+    if line.others[ANGLE_ROW] != 0.0 and rigid.any():
         return []
     if rigid[0] != 0.0:
         return [(0.0, 0.0, change)] if OUTPUTS[GAINS[line.place].output].quantity == "theta" else []

@@ -13,9 +13,9 @@ from tfarm.arm.checks import extended, not_negative, number, positive, whole
 from tfarm.errors import ParameterError, did_you_mean
 
 Reading = Literal["vibration", "total"]
-LEAST_BITS, MOST_BITS = 2, 32
-MOST_DELAY = 100.0
-ANGLE = 1.15  # rad, as tip travel over length: the paper moves the tip of its 1 m by 1.15 m
+LEAST_BITS, MOST_BITS = 2, 32  # of a converter: of one bit there are no steps, of more than 32 no part
+MOST_DELAY = 100.0  # samples: each whole one is a state more
+PAPER_ANGLE = 1.15  # rad, as tip travel over length: the paper moves the tip of its 1 m by 1.15 m
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,7 +52,7 @@ class Sampling:
         return self.delay_samples - self.whole_delay
 
 
-UNITS = {"moment": " of N m", "torque": " of N m (of V or A where that is the arm's input)"}  # of ranges
+RANGE_UNITS = {"moment": " of N m", "torque": " of N m (of V or A where that is the arm's input)"}  # of ranges
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,12 +88,10 @@ class Converters:
         bits, span = getattr(self, f"{signal}_bits"), getattr(self, f"{signal}_range")
         _whole(f"converters.{signal}_bits", bits, LEAST_BITS, MOST_BITS, "bits")
         if span is not None:
-            meaning = f"the range +-R of a converter is a positive, finite number{UNITS[signal]}"
+            meaning = f"the range +-R of a converter is a positive, finite number{RANGE_UNITS[signal]}"
             object.__setattr__(self, f"{signal}_range", positive(f"converters.{signal}_range", span, meaning))
         elif bits is not None:
-            remedy = (
-                f"{bits} bits of what? give the range +-R{UNITS[signal]} too, or leave converters.{signal}_bits out"
-            )
+            remedy = f"{bits} bits of what? give the range +-R{RANGE_UNITS[signal]} too, or leave converters.{signal}_bits out"
             raise ParameterError(key=f"converters.{signal}_range", value=span, remedy=remedy)
 
     @property
@@ -155,7 +153,7 @@ class Slew:
 
     def travel_of(self, reach: float) -> float:
         """Tip travel [m] of an arm whose tip is so far [m] from the axis."""
-        return ANGLE * reach if self.travel is None else self.travel
+        return PAPER_ANGLE * reach if self.travel is None else self.travel
 
     def acceleration(self, reach: float) -> float:
         """The hub's angular acceleration [rad/s^2] in the first half, 4 travel/(reach rise^2)."""

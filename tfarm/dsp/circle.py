@@ -23,19 +23,19 @@ from numpy.typing import NDArray
 
 from tfarm.arm import HubFeedback
 from tfarm.dsp.law_loop import AnyLoop
-from tfarm.dsp.loop import ANGLE, RATE, SampledLoop
+from tfarm.dsp.loop import ANGLE_ROW, RATE_ROW, SampledLoop
 from tfarm.records import record
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-EPS = float(np.finfo(float).eps)
+MACHINE_EPS = float(np.finfo(float).eps)
 ARCS = 64  # of half the circle to begin with
-FINEST = 1e-13  # rad: no arc is cut further
-PIECES = 4  # into which one is cut that is too long
-MOST_ARCS = 60_000
+SHORTEST_ARC = 1e-13  # rad: no arc is cut further, as its ends are known to a few last bits
+PIECES_OF_ARC = 4  # into which one is cut that is too long
+MOST_ARCS = 60_000  # a loop that takes more is not shown
 ON_IT = 1e-100  # stands for the distance from the circle of a pole on it: its disc is wide, and holds 0
-BLOCK = 1 << 19  # terms 1/(z - b) at a time, lest they leave the cache
+TERMS_AT_A_TIME = 1 << 19  # terms 1/(z - b) at a time, lest they leave the cache
 
 
 @dataclass(frozen=True)
@@ -81,12 +81,12 @@ class _Arcs:
     def x(self) -> Discs:
         """1 - 1/z."""
         middle, half = (self.low + self.high) / 2, (self.high - self.low) / 2
-        return Discs(-np.expm1(-1j * middle), half + EPS)
+        return Discs(-np.expm1(-1j * middle), half + MACHINE_EPS)
 
     def turned(self, n: int) -> Discs:
         """z^-n."""
         middle, half = (self.low + self.high) / 2, (self.high - self.low) / 2
-        return Discs(np.exp(-1j * n * middle), n * (half + 4 * EPS))
+        return Discs(np.exp(-1j * n * middle), n * (half + 4 * MACHINE_EPS))
 
 
 @dataclass
@@ -124,7 +124,7 @@ class Circle(Generic[AnyLoop]):
                 start, end = np.angle(F.middle[0]), np.angle(F.middle[-1])
                 return -round(float(steps.sum() + _to_the_axis(start) - _to_the_axis(end)) / np.pi)
             width = self.high[rough] - self.low[rough]
-            if width.min() < FINEST or (PIECES - 1) * rough.sum() + rough.size > MOST_ARCS:
+            if width.min() < SHORTEST_ARC or (PIECES_OF_ARC - 1) * rough.sum() + rough.size > MOST_ARCS:
                 return None
             self._cut(rough)
 
@@ -146,7 +146,7 @@ class Circle(Generic[AnyLoop]):
         """The order at z = 1 of what each gain multiplies."""
         orders = [2 if twice else int(once != 0.0) for twice, once in self.loop.plant.rigid]
         if isinstance(self.loop, SampledLoop) and self.loop.differences:
-            orders[RATE] = max(0, orders[ANGLE] - 1)
+            orders[RATE_ROW] = max(0, orders[ANGLE_ROW] - 1)
         return orders
 
     def _parts(self, low: Real, high: Real) -> Discs:
@@ -156,8 +156,8 @@ class Circle(Generic[AnyLoop]):
         found = [arcs.x, *(self._output(row, arcs, sums[row]) for row in range(len(self.orders)))]
         if isinstance(self.loop, SampledLoop) and self.loop.differences:
             a, T = self.loop.smoothing, self.loop.chain.sampling.period
-            rate = found[1 + ANGLE] * (arcs.turned(0) + arcs.turned(1).times(-a)).inverse().times((1 - a) / T)
-            found[1 + RATE] = rate if self.orders[ANGLE] else rate * arcs.x
+            rate = found[1 + ANGLE_ROW] * (arcs.turned(0) + arcs.turned(1).times(-a)).inverse().times((1 - a) / T)
+            found[1 + RATE_ROW] = rate if self.orders[ANGLE_ROW] else rate * arcs.x
         return Discs(np.array([each.middle for each in found]), np.array([each.radius for each in found]))
 
     def _output(self, row: int, arcs: _Arcs, poles: Discs) -> Discs:
@@ -183,7 +183,7 @@ class Circle(Generic[AnyLoop]):
 
     def _cut(self, rough: NDArray[np.bool_]) -> None:
         """Cut some arcs into shorter ones."""
-        ends = np.linspace(self.low[rough], self.high[rough], PIECES + 1)
+        ends = np.linspace(self.low[rough], self.high[rough], PIECES_OF_ARC + 1)
         new_low, new_high = ends[:-1].ravel(), ends[1:].ravel()
         new = self._parts(new_low, new_high)
         all_low = np.r_[self.low[~rough], new_low]
@@ -200,9 +200,9 @@ class Circle(Generic[AnyLoop]):
         p, T = plant.poles[self.kept], sampling.period
         b, room = np.exp(p * T), np.maximum(-np.expm1(p.real * T), ON_IT)
         weights = plant.residues[:, self.kept] / p * np.exp(p * ((1 - sampling.fraction) * T))
-        blur = EPS * (4 + abs(p * T))
+        blur = MACHINE_EPS * (4 + abs(p * T))
         middles, radii = [], []
-        for some in np.array_split(np.arange(low.size), 1 + low.size * p.size // BLOCK):
+        for some in np.array_split(np.arange(low.size), 1 + low.size * p.size // TERMS_AT_A_TIME):
             q, h = (low[some] + high[some]) / 2, (high[some] - low[some])[:, None] / 2
             away = np.exp(1j * q)[:, None] - b
             away = np.where(away == 0, ON_IT, away)

@@ -13,15 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.dsp.chain import Chain
+from tfarm.dsp.kernel import DAC
 from tfarm.records import record
-
-ANGLE, MOMENT, TORQUE = 0, 1, 2  # rows of `Quantisers.rows`
 
 
 @dataclass(frozen=True)
 @record
 class Quantisers:
-    """`rows` (3, 3): step, lowest and highest value of the angle, the moment and the torque; step 0 is ideal."""
+    """`rows` (3, 3): step, lowest and highest value of the angle, the moment and the torque; step 0 is ideal.
+
+    Their numbers are those of `kernel`: ENCODER, AMPLIFIER, DAC.
+    """
 
     rows: NDArray[np.float64]
 
@@ -35,8 +37,8 @@ def quantisers(chain: Chain) -> Quantisers:
         _converter(converters.moment_bits, converters.moment_range),
         _converter(converters.torque_bits, converters.torque_range),
     ])  # fmt: skip
-    rows[TORQUE, 1] = max(rows[TORQUE, 1], -limit)
-    rows[TORQUE, 2] = min(rows[TORQUE, 2], limit)
+    rows[DAC, 1] = max(rows[DAC, 1], -limit)
+    rows[DAC, 2] = min(rows[DAC, 2], limit)
     return Quantisers(rows)
 
 

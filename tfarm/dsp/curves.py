@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import Arm
 from tfarm.columns import Column
-from tfarm.dsp.ringing import POINTS, records_between
+from tfarm.dsp.ringing import POINTS_A_PERIOD, records_between
 from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.simulate import Simulation, Simulator
 from tfarm.records import record
@@ -25,10 +25,10 @@ from tfarm.records import record
 Real = NDArray[np.float64]
 AnySimulator = TypeVar("AnySimulator", bound=Simulator)
 
-BETWEEN = 3  # records between two samples at least
+LEAST_BETWEEN = 3  # records between two samples at least
 MOST_LINE = 6000  # points of a line: at 20 a period still three pixels a period
 PERIODS = 2  # of the fastest mode that each piece of a band holds at least
-PIECES = 1500  # of a band at most
+BAND_PIECES = 1500  # of a band at most
 MOST_RECORDS = 400_000  # of a simulation for a picture, some 30 MB
 
 
@@ -64,8 +64,8 @@ def resolved(simulator: AnySimulator, arm: Arm, *runs: Callable[[AnySimulator], 
     """The simulations of one picture, with as many records between their samples as its fastest visible mode takes."""
     rough = [run(simulator) for run in runs]
     needed = [records_between(simulator, each, _heights(arm, each)) for each in rough if each.t.size > 1]
-    most = max(BETWEEN, MOST_RECORDS // simulator.scenario.t.size)
-    finer = simulator.finer(min(max(BETWEEN, *needed), most) if needed else BETWEEN)
+    most = max(LEAST_BETWEEN, MOST_RECORDS // simulator.scenario.t.size)
+    finer = simulator.finer(min(max(LEAST_BETWEEN, *needed), most) if needed else LEAST_BETWEEN)
     return [run(finer) for run in runs]
 
 
@@ -75,7 +75,7 @@ def points_a_period(arm: Arm, run: Simulation) -> tuple[float, int]:
     simulator = Simulator(arm, run.chain, run.scenario)
     needed = records_between(simulator, run, _heights(arm, run)) if run.t.size > 1 else 0
     there = 0 if run.between is None else run.between.t.size // max(1, run.t.size)
-    return (POINTS * (there + 1) / (needed + 1) if needed else math.inf), needed
+    return (POINTS_A_PERIOD * (there + 1) / (needed + 1) if needed else math.inf), needed
 
 
 def _heights(arm: Arm, run: Simulation) -> dict[str, float]:
@@ -120,7 +120,7 @@ def curve(t: Real, y: Real) -> Curve:
     """A line where a page can show one, else a band."""
     if t.size <= MOST_LINE:
         return Curve(t, y, y, False)
-    step = max(PERIODS * POINTS, math.ceil(t.size / PIECES))
+    step = max(PERIODS * POINTS_A_PERIOD, math.ceil(t.size / BAND_PIECES))
     starts = np.arange(0, t.size, step)
     return Curve(t[starts], np.minimum.reduceat(y, starts), np.maximum.reduceat(y, starts), True)
 

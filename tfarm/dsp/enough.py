@@ -17,8 +17,8 @@ import numpy as np
 from tfarm.dsp.simulate import Simulation, Trace
 from tfarm.errors import ConvergenceError
 
-COUNTS = (10, 20, 40)  # flexible modes; 80 would take a heavily damped arm 8 s of CPU time
-DIGITS = 1e-4  # of each signal's largest value: as many as a table of a simulation shows
+MODE_COUNTS = (10, 20, 40)  # flexible modes; 80 would take a heavily damped arm 8 s of CPU time
+ENOUGH_CHANGE = 1e-4  # of each signal's largest value: as many as a table of a simulation shows
 
 
 class Enough(NamedTuple):
@@ -33,14 +33,14 @@ def enough_modes(simulate: Callable[[int], Simulation]) -> Enough:
 
     `simulate` makes the simulation with so many modes, its converters ideal: steps would hide what modes do.
     """
-    before, found = simulate(COUNTS[0]), Enough(COUNTS[0], np.inf)
-    for count in COUNTS[1:]:
+    before, found = simulate(MODE_COUNTS[0]), Enough(MODE_COUNTS[0], np.inf)
+    for count in MODE_COUNTS[1:]:
         try:
             now = simulate(count)
         except ConvergenceError:  # two damped modes that cannot be told apart: what there is must do
             return found
         found = Enough(count, change(before.at_samples, now.at_samples))
-        if found.change <= DIGITS:
+        if found.change <= ENOUGH_CHANGE:
             return found
         before = now
     return found

@@ -17,7 +17,7 @@ import numpy as np
 
 from tfarm.exact.compiled import compiled
 
-ANGLE, MOMENT, TORQUE = 0, 1, 2
+ENCODER, AMPLIFIER, DAC = 0, 1, 2
 
 
 @compiled
@@ -106,8 +106,8 @@ def estimate(angle: float, rate: float, memory: Any, filter_: Any) -> float:
 @compiled
 def measured(record: Any, rows: Any, saturated: Any, memory: Any, filter_: Any) -> Any:
     """Hub angle, hub rate and root moment as the controller has them, of the outputs of one sample."""
-    angle = quantise(record[0], rows[ANGLE], saturated, ANGLE)
-    moment = quantise(record[2], rows[MOMENT], saturated, MOMENT)
+    angle = quantise(record[0], rows[ENCODER], saturated, ENCODER)
+    moment = quantise(record[2], rows[AMPLIFIER], saturated, AMPLIFIER)
     return angle, estimate(angle, record[1], memory, filter_), moment
 
 
@@ -159,7 +159,7 @@ def run(
             return k
         clipped = saturated[k]
         angle, rate, moment = measured(record[k], rows, clipped, memory, filter_)
-        u = quantise(law(gains, K2[k], ideal[k], angle, rate, moment, single), rows[TORQUE], clipped, TORQUE)
+        u = quantise(law(gains, K2[k], ideal[k], angle, rate, moment, single), rows[DAC], clipped, DAC)
         held[k % ring] = torque[k] = u
         if k == 0:
             strike(amplitude, rigid, impulse)
@@ -215,7 +215,7 @@ def run_law(
         for i in range(x.size):
             after[i] = product(B[i], y, product(A[i], x, 0.0, single), single)
         x[:] = after
-        u = quantise(u, rows[TORQUE], clipped, TORQUE)
+        u = quantise(u, rows[DAC], clipped, DAC)
         held[k % ring] = torque[k] = u
         if k == 0:
             strike(amplitude, rigid, impulse)

@@ -29,14 +29,14 @@ from tfarm.spectrum import modes
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
-STEPS = 24  # of the continuation from zero gain
-SETTLED = -20.0  # modes that lose more than this in ln|a| between two samples are not listed
+FOLLOWING_STEPS = 24  # of the continuation from zero gain
+LISTED_DECAY = -20.0  # modes that lose more than this in ln|a| between two samples are not listed
 
 
 _LOG = "ln|z| per sample"
 _log = partial(Column, printed=singly("{:.3e}".format), on=ANSWER)
 _page_log = partial(Column, digits=singly(scientific, 3), group=_LOG, on=REPORT)
-MODES = (  # of a `ModeTable`; what of it is small is the change of ln|z| per sample
+MODE_COLUMNS = (  # of a `ModeTable`; what of it is small is the change of ln|z| per sample
     Column("index", "mode", on=ANSWER),
     Column("mode", "mode", of="index", on=REPORT),
     Column("natural_frequency_rad_s", of="natural_frequency", head="rad/s", printed=singly(general, 6), on=ANSWER),
@@ -101,7 +101,7 @@ def mode_table(loop: SampledLoop) -> ModeTable:
     """The modes of a loop one by one."""
     pulse = loop.pulse
     own = np.asarray(pulse.poles.real * pulse.sampling.period, dtype=float)
-    upper = np.nonzero((pulse.poles.imag > 0) & (pulse.mode > 0) & (own > SETTLED))[0]
+    upper = np.nonzero((pulse.poles.imag > 0) & (pulse.mode > 0) & (own > LISTED_DECAY))[0]
     upper = upper[np.argsort(pulse.mode[upper])]
     index = pulse.mode[upper]
     table = modes(pulse.plant.arm, max(1, int(index.max(initial=1))))
@@ -114,6 +114,9 @@ def mode_table(loop: SampledLoop) -> ModeTable:
         inertia = np.divide(-table.modal_moment[flexible], w**2 * b, out=np.zeros_like(b), where=b != 0)
     by_rate, by_moment = first_order_law(w, b, inertia, gains, T, pulse.sampling.delay_samples)
     turns, origin = np.round(w * T / (2 * np.pi)), origins(loop)
+    # what comes from a mode's pole or its conjugate: two radii where both have become real
+    conjugate = abs(pulse.poles - pulse.poles[upper].conj()[:, None]).argmin(axis=1)
+    radii = [loop.poles.log_radius[np.isin(origin, pair)].max() for pair in zip(upper, conjugate, strict=True)]
     return ModeTable(
         index=index,
         natural_frequency=w,
@@ -122,14 +125,8 @@ def mode_table(loop: SampledLoop) -> ModeTable:
         by_rate=by_rate,
         by_moment=by_moment,
         by_damping=own[upper],
-        log_radius=np.array([loop.poles.log_radius[_of_pair(loop, origin, int(i))].max() for i in upper]),
+        log_radius=np.array(radii),
     )
-
-
-def _of_pair(loop: SampledLoop, origin: NDArray[np.int64], i: int) -> NDArray[np.bool_]:
-    """Which closed-loop poles come from open-loop pole `i` or its conjugate: two radii where both have become real."""
-    conjugate = int(abs(loop.pulse.poles - loop.pulse.poles[i].conjugate()).argmin())
-    return np.isin(origin, (i, conjugate))
 
 
 def root_locus(loop: SampledLoop, name: str, values: Real) -> Complex:
@@ -156,9 +153,9 @@ def origins(loop: SampledLoop) -> NDArray[np.int64]:
     """
     labels = np.nonzero(loop.pulse.poles != 0)[0]
     ahead, rows = loop.pulse.multipliers[labels], []
-    scales = np.r_[1e-6, np.arange(1, STEPS + 1) / STEPS, 1.0]
+    scales = np.r_[1e-6, np.arange(1, FOLLOWING_STEPS + 1) / FOLLOWING_STEPS, 1.0]
     for number, scale in enumerate(scales[:-1]):
-        z = _scaled(loop, float(scale)).eigenvalues
+        z = replace(loop, gains=loop.gains.times(float(scale))).eigenvalues
         order = _matched(ahead, z)
         rows.append(z[order])
         ahead = _ahead(rows, scales[max(0, number - 1) : number + 2])
@@ -172,10 +169,6 @@ def growing_mode(loop: SampledLoop) -> int:
     """The flexible mode whose closed-loop pole has the largest radius; 0 for the hub, a filter or the delay."""
     origin = int(origins(loop)[loop.poles.log_radius.argmax()])
     return 0 if origin < 0 else int(loop.pulse.mode[origin])
-
-
-def _scaled(loop: SampledLoop, scale: float) -> SampledLoop:
-    return replace(loop, gains=loop.gains.times(scale))
 
 
 def _ahead(rows: list[Complex], values: Real) -> Complex:

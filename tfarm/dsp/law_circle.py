@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 from numpy.polynomial.polynomial import polyval
 
-from tfarm.dsp.circle import EPS, Circle, Discs, power
+from tfarm.dsp.circle import MACHINE_EPS, Circle, Discs, power
 from tfarm.dsp.law_loop import SampledLaw
 from tfarm.dsp.law_polynomials import Polynomial, polynomials
 
@@ -57,6 +57,6 @@ def on_discs(polynomial: Polynomial, w: Discs) -> Discs:
     c, j = polynomial.coefficients, np.arange(polynomial.coefficients.size)
     slope = abs(polyval(w.middle, (j * c)[1:])) if c.size > 1 else 0.0
     curve = float((j * (j - 1) * abs(c)).sum()) / 2
-    rounding = polynomial.error + EPS * c.size * float(abs(c).sum())
+    rounding = polynomial.error + MACHINE_EPS * c.size * float(abs(c).sum())
     middle = np.asarray(polyval(w.middle, c), dtype=np.complex128)
     return Discs(middle, w.radius * (slope + w.radius * curve) + rounding)

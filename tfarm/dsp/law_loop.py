@@ -24,7 +24,7 @@ from tfarm.arm.law import Law, Part
 from tfarm.dsp.chain import MOST_DELAY, Chain
 from tfarm.dsp.discretise import discretised
 from tfarm.dsp.law_plant import SensedPlant, is_analog, sensed_plant
-from tfarm.dsp.law_polynomials import FREE, polynomials
+from tfarm.dsp.law_polynomials import VANISHED, polynomials
 from tfarm.dsp.loop import Poles, SampledLoop, polished, without_drift
 from tfarm.dsp.plant import Branching, Plant
 from tfarm.dsp.sampling import PulseTransfer
@@ -37,7 +37,7 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 Whole = NDArray[np.int64]
 
-AT_REST = 1e-11  # of its terms: a static gain that is 0, summed over 400 modes
+STATIC_ZERO = 1e-11  # of its terms: a static gain that is 0, summed over 400 modes
 
 
 @dataclass(frozen=True)
@@ -147,9 +147,9 @@ class SampledLaw:
         pushed = B @ angle
         states = np.zeros(0) if not len(A) else np.linalg.lstsq(np.eye(len(A)) - A, pushed, rcond=None)[0].astype(float)
         left = abs(states - A @ states - pushed)
-        settles = (left <= FREE * (abs(states) + abs(A) @ abs(states) + abs(pushed))).all()
+        settles = (left <= VANISHED * (abs(states) + abs(A) @ abs(states) + abs(pushed))).all()
         out, size = (C @ states + D @ angle)[0], (abs(C) @ abs(states) + abs(D) @ abs(angle))[0]
-        return states, bool(self.plant.arm.has_rigid_mode and settles and abs(out) <= FREE * size)
+        return states, bool(self.plant.arm.has_rigid_mode and settles and abs(out) <= VANISHED * size)
 
     @property
     def has_free_angle(self) -> bool:
@@ -187,7 +187,7 @@ class SampledLaw:
             if entry.coefficients.any():
                 (twice, once), gain, n, left = plant.rigid[row], at_rest[row], *entry.at_one(most)
                 own = (-2, twice * T * T) if twice else (-1, once * T) if once else (0, gain)
-                if own[0] == 0 and abs(gain) <= AT_REST * size[row]:
+                if own[0] == 0 and abs(gain) <= STATIC_ZERO * size[row]:
                     own = (1, slopes[row])
                 found.append((n + own[0], float(own[1] * left.coefficients.sum())))
         n, left = whole.at_one(most)

@@ -7,24 +7,23 @@ The grid is that of the plant's poles (`boundary`), with points around each pole
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.crossing import Crossings, joined
-from tfarm.dsp.boundary import NARROWEST, CircleGrid, circle_grid, geometric, real_gain, solved_on
+from tfarm.dsp.boundary import NARROWEST_WIDTH, CircleGrid, circle_grid, geometric, real_gain, solved_on
 from tfarm.dsp.law_loop import SampledLaw
 from tfarm.dsp.law_polynomials import polynomials
-from tfarm.dsp.margins import Window
+from tfarm.dsp.margins import SAME_EDGE, Window
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
-SMALLEST, LARGEST = 1e-9, 1e9  # factors that are looked at: beyond, a law is none, or its gain is beyond any number
+LEAST_LAW_FACTOR = 1e-9  # that is looked at: with less a law is none
+MOST_LAW_FACTOR = 1e9  # with more its gain is beyond any number
 BLURRED = 1e-6  # rad: nearer to z = 1 a polynomial with two roots there is lost in rounding
-SAME = 1e-9  # relative: two crossings so near are one
 BRIGHT = 1e-2  # roots of the law nearer to z = 0 leave nothing on the circle to resolve
 
 
@@ -32,8 +31,11 @@ def law_grid(loop: SampledLaw) -> CircleGrid:
     """The grid of the plant, and points around the poles and zeros of the law."""
     grid = circle_grid(loop)
     q, angles = [], grid.q
-    for root in _roots(loop):
-        width, at = max(1e-2 * abs(1 - abs(root)), NARROWEST), abs(np.angle(root))
+    _, entries = polynomials(loop.law)
+    zeros = [np.roots(np.trim_zeros(each.coefficients, "f")) for each in entries]
+    roots = np.concatenate([loop.law.poles, *zeros])
+    for root in roots[(abs(roots) > BRIGHT) & (roots.imag >= 0)]:  # the upper of each pair
+        width, at = max(1e-2 * abs(1 - abs(root)), NARROWEST_WIDTH), abs(np.angle(root))
         near = geometric(math.pi, width)
         q.append(np.r_[at - near, at + near])
     more = np.concatenate([np.empty(0), *q])
@@ -45,37 +47,29 @@ def law_grid(loop: SampledLaw) -> CircleGrid:
     return CircleGrid(loop, base[order], shift[order])
 
 
-def _roots(loop: SampledLaw) -> Iterable[complex]:
-    """Poles and zeros of the law that the circle is near to, the upper of each pair."""
-    _, entries = polynomials(loop.law)
-    zeros = [np.roots(np.trim_zeros(each.coefficients, "f")) for each in entries]
-    every = np.concatenate([loop.law.poles, *zeros])
-    return [complex(root) for root in every if abs(root) > BRIGHT and root.imag >= 0]
-
-
 def crossing_factors(loop: SampledLaw) -> Crossings:
-    """The positive factors on the law at which poles are on the circle, `at` which angle [rad a sample]."""
+    """The positive factors on the law at which poles are on the circle, `at` which angle [rad a sample].
+
+    A polynomial of the law that vanishes at z = 1 is known to an absolute error alone next to it.
+    """
     grid = law_grid(loop)
     A, B = _split(grid.terms)
-    rises, told = (A * B.conj()).imag >= 0, grid.q > (BLURRED if _has_root_at_one(loop) else 0.0)
+    whole, entries = polynomials(loop.law)
+    has_root_at_one = any(each.coefficients.any() and each.at_one(1)[0] for each in (whole, *entries))
+    rises, told = (A * B.conj()).imag >= 0, grid.q > (BLURRED if has_root_at_one else 0.0)
     step = np.nonzero((rises[1:] != rises[:-1]) & told[:-1])[0]
     q, factor = solved_on(grid, _split, step)
-    first = -1 if rises[told][0] else 1
-    found = [*zip(factor, q, np.where(rises[step], 2, -2), strict=True), (_at_one(loop), 0.0, first)]
-    found.append((_at_minus_one(loop), math.pi, 1 if rises[-1] else -1))
-    return Crossings.of(each for each in found if SMALLEST < each[0] < LARGEST)
+    A, B = loop.terms(np.array([-1.0 + 0j]), None, np.ones(1))
+    first, last = -1 if rises[told][0] else 1, 1 if rises[-1] else -1
+    ends = [(_at_one(loop), 0.0, first), (float(real_gain(A[0], B[0])), math.pi, last)]
+    found = [*zip(factor, q, np.where(rises[step], 2, -2), strict=True), *ends]
+    return Crossings.of(each for each in found if LEAST_LAW_FACTOR < each[0] < MOST_LAW_FACTOR)
 
 
 def _split(terms: tuple[Any, Complex]) -> tuple[Complex, Complex]:
     """A and B times the offset of each point."""
     both = terms[1]
     return both[0], both[1]
-
-
-def _has_root_at_one(loop: SampledLaw) -> bool:
-    """Whether a polynomial of the law vanishes at z = 1, and next to it is known to an absolute error alone."""
-    whole, entries = polynomials(loop.law)
-    return any(each.coefficients.any() and each.at_one(1)[0] for each in (whole, *entries))
 
 
 def _at_one(loop: SampledLaw) -> float:
@@ -86,12 +80,6 @@ def _at_one(loop: SampledLaw) -> float:
     return float(real_gain(A, B)) if lowest == n else math.inf
 
 
-def _at_minus_one(loop: SampledLaw) -> float:
-    """The factor that brings a single pole to z = -1."""
-    A, B = loop.terms(np.array([-1.0 + 0j]), None, np.ones(1))
-    return float(real_gain(A[0], B[0]))
-
-
 def stable_factors(loop: SampledLaw) -> list[Window]:
     """Every open interval of positive factors on the law in which the loop is stable.
 
@@ -99,7 +87,7 @@ def stable_factors(loop: SampledLaw) -> list[Window]:
     """
     found = crossing_factors(loop)
     edges = np.unique(np.r_[0.0, found.gain, math.inf])
-    edges = edges[np.r_[True, ~(np.diff(edges) <= SAME * edges[1:])]]
+    edges = edges[np.r_[True, ~(np.diff(edges) <= SAME_EDGE * edges[1:])]]
     middles = np.r_[(edges[1:-1] + edges[:-2]) / 2, 2 * max(edges[-2], 1.0)]
     stable = [i for i, middle in enumerate(middles) if loop.times(float(middle)).poles.is_stable]
     return joined([(float(edges[i]), float(edges[i + 1])) for i in stable])

@@ -19,7 +19,7 @@ from tfarm.records import record
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
-FREE = 1e-12  # of its terms: what is left of a sum that should be 0, states of a law of order ten
+VANISHED = 1e-12  # of its terms: what is left of a sum that should be 0, states of a law of order ten
 CHECKED = 64  # points of half the circle at which coefficients are held against the law's own values
 SAFETY = 4.0  # times the largest difference there
 
@@ -34,7 +34,7 @@ class Polynomial:
 
     def over_x(self) -> Polynomial | None:
         """Itself over 1 - w; None where it does not vanish at w = 1."""
-        if abs(self.coefficients.sum()) > FREE * abs(self.coefficients).sum() + self.error:
+        if abs(self.coefficients.sum()) > VANISHED * abs(self.coefficients).sum() + self.error:
             return None
         return Polynomial(np.cumsum(self.coefficients)[:-1], self.error * self.coefficients.size)
 
@@ -48,7 +48,10 @@ class Polynomial:
 
 def polynomials(law: Law) -> tuple[Polynomial, list[Polynomial]]:
     """q~ of a law in z and p~_i of each of its signals, against its own values on the circle."""
-    dens = [np.array(_denominator(part.block)) for part in law.parts]
+    blocks = [part.block for part in law.parts]
+    dens = [
+        np.array(each.den) if isinstance(each, Rational) else np.atleast_1d(np.poly(each.A)).real for each in blocks
+    ]
     n = sum(den.size - 1 for den in dens)
     entries = {name: np.zeros(n + 1) for name in law.signals}
     for i, part in enumerate(law.parts):
@@ -75,10 +78,6 @@ def _product(factors: list[Real]) -> Real:
     for factor in factors:
         total = np.convolve(total, factor)
     return total
-
-
-def _denominator(block: LawBlock) -> Real:
-    return np.array(block.den) if isinstance(block, Rational) else np.atleast_1d(np.poly(block.A)).real
 
 
 def _numerators(block: LawBlock, den: Real) -> list[Real]:

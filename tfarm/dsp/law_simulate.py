@@ -26,7 +26,7 @@ from tfarm.errors import ParameterError, did_you_mean
 
 Real = NDArray[np.float64]
 
-KINDS = {"hub_angle": 1, "root_moment": 2, "hub_rate": 3}  # through what a signal goes, as `kernel.run_law` has it
+SIGNAL_KINDS = {"hub_angle": 1, "root_moment": 2, "hub_rate": 3}  # through what one goes, as in `kernel.run_law`
 
 
 class LawSimulator(Simulator):
@@ -62,7 +62,7 @@ class LawSimulator(Simulator):
         """The law from rest over the scenario."""
         state, law = self._start(), self.law
         matrices = tuple(np.ascontiguousarray(each) for each in law.matrices((*law.signals, *law.wanted)))
-        kinds = np.array([KINDS.get(name, 0) for name in law.signals])
+        kinds = np.array([SIGNAL_KINDS.get(name, 0) for name in law.signals])
         single = self.chain.converters.arithmetic == "float32"
         if single:
             matrices = tuple(each.astype(np.float32).astype(float) for each in matrices)

@@ -9,7 +9,6 @@ from tfarm.arm import Arm
 from tfarm.arm.checks import whole as whole_number
 from tfarm.arm.driving import cancelled
 from tfarm.arm.law import Law
-from tfarm.dsp.band import Band
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.discretise import described_law, rule_in_words
 from tfarm.dsp.law_circle import LawCircle
@@ -64,12 +63,8 @@ def law_verdict(arm: Arm, law: Law, chain: Chain | None = None, *, count: int | 
     if arm.has_elastic_link:
         return Verdict(sampled_law(arm, law, chain, count=UNDAMPED_MODES))
     small = sampled_law(arm, law, chain, count=1)
-    return settled(whole(arm, small.chain, small.with_modes), _outside)
-
-
-def _outside(band: Band[SampledLaw]) -> int | None:
-    """Poles of a band's loop outside the unit circle, proven."""
-    return LawCircle(band.loop, band.kept, band.missing).outside()
+    largest = whole(arm, small.chain, small.with_modes)
+    return settled(largest, lambda band: LawCircle(band.loop, band.kept, band.missing).outside())
 
 
 def analyse_law(arm: Arm, law: Law, chain: Chain | None = None, *, count: int | None = None) -> LawAnalysis:

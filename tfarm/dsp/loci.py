@@ -23,12 +23,12 @@ from tfarm.records import record
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
-VALUES = 61  # of a gain along its locus, to begin with
-ROUNDS = 24  # of halving the steps where a branch bends, at most
-REAL = 1e-12  # imaginary part of a real z: rounding
+LOCUS_VALUES = 61  # of a gain along its locus, to begin with
+BRANCH_ROUNDS = 24  # of halving the steps where a branch bends, at most
+IMAGINARY_ROUNDING = 1e-12  # imaginary part of a real z: rounding
 RIM = 1.12  # radius up to which the z-plane is shown
-BEYOND = 1.2 * RIM  # and up to which a branch is drawn, so that its line runs out of the picture
-DECADES = 3  # of the rate gain
+DRAWN_RADIUS = 1.2 * RIM  # and up to which a branch is drawn, so that its line runs out of the picture
+RATE_DECADES = 3  # of the rate gain
 STRONGER = 10.0  # how many times its own rate gain the locus of that alone goes
 
 
@@ -77,10 +77,13 @@ def loci(loop: SampledLoop, top: float, moments: tuple[float, float]) -> Loci:
     Both begin below the gains of the loop.
     """
     own, gains = loop.gains[RATE_GAIN], loop.gains
-    values = (np.geomspace(min(top / 10**DECADES, own / STRONGER), top, VALUES), np.linspace(*moments, VALUES))
+    values = (
+        np.geomspace(min(top / 10**RATE_DECADES, own / STRONGER), top, LOCUS_VALUES),
+        np.linspace(*moments, LOCUS_VALUES),
+    )
     upper = np.nonzero((loop.pulse.poles.imag > 0) & (loop.pulse.mode > 0))[0]
     upper = upper[np.argsort(loop.pulse.mode[upper])]
-    small = np.geomspace(1e-3, STRONGER, VALUES) * own
+    small = np.geomspace(1e-3, STRONGER, LOCUS_VALUES) * own
     alone = _locus(loop.under(gains.having(MOMENT_GAIN, 0.0)), RATE_GAIN, small)
     by = {name: _locus(loop, name, each) for name, each in zip(PLANE, values, strict=True)}
     return Loci(loop, alone, by, loop.pulse.poles[upper], loop.pulse.mode[upper])
@@ -91,15 +94,15 @@ def _locus(loop: SampledLoop, gain: str, values: Real) -> Locus:
 
     def poles(value: float) -> Complex:
         z = loop.having(**{gain: value}).poles.z
-        return np.where(abs(z.imag) <= REAL, z.real, z)
+        return np.where(abs(z.imag) <= IMAGINARY_ROUNDING, z.real, z)
 
     known: dict[float, Complex] = {}
     wanted = np.union1d(values, loop.gains[gain]) if values[0] < loop.gains[gain] < values[-1] else values
-    for _ in range(ROUNDS):
+    for _ in range(BRANCH_ROUNDS):
         known |= {value: poles(value) for value in wanted.tolist() if value not in known}
         values = np.array(sorted(known))
         z = followed([known[value] for value in values.tolist()], values)
-        bent = loose(np.where((z.imag >= 0) & (abs(z) < BEYOND), z, np.nan).T, 2 * RIM, 2 * RIM)
+        bent = loose(np.where((z.imag >= 0) & (abs(z) < DRAWN_RADIUS), z, np.nan).T, 2 * RIM, 2 * RIM)
         if not bent.any():
             break
         wanted = (values[:-1] + values[1:])[bent] / 2

@@ -35,11 +35,11 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 Whole = NDArray[np.int64]
 Characteristic = Callable[[Complex, Whole | None, Any], Complex]  # offset F at z = e^{pT} + offset, p of that number
 
-ANGLE, RATE = (FED_BACK.index(name) for name in ("hub_angle", "hub_rate"))  # rows of what is measured
-TINY = 1e-30  # stands for zero where a root sits on the filter's own pole, which it does where nothing is fed back
+ANGLE_ROW, RATE_ROW = (FED_BACK.index(name) for name in ("hub_angle", "hub_rate"))  # rows of what is measured
+NO_LAG = 1e-30  # stands for zero where a root sits on the filter's own pole, which it does where nothing is fed back
 LAST_STEP = 1e-12  # of the offset: the secant method's next step would be below its rounding
 UNMOVED = 1e-50  # an offset this small is a pole that the loop does not move
-FAINT = 0.2  # a pole nearer to z = 0 decides nothing and is not polished
+FADED_RADIUS = 0.2  # a pole nearer to z = 0 decides nothing and is not polished
 
 
 @dataclass(frozen=True)
@@ -58,6 +58,11 @@ class Poles:
     def log_spectral_radius(self) -> float:
         """The largest ln|z|."""
         return float(self.log_radius.max())
+
+    @property
+    def unstable(self) -> int:
+        """How many lie outside the unit circle."""
+        return int((self.log_radius > 0).sum())
 
     @property
     def is_stable(self) -> bool:
@@ -111,7 +116,7 @@ class SampledLoop:
     @property
     def has_free_angle(self) -> bool:
         """Whether the hub angle is a pole at z = 1 that nothing regulates."""
-        return self.gains.Kp == 0.0 and bool(self.plant.rigid[ANGLE].any())
+        return self.gains.Kp == 0.0 and bool(self.plant.rigid[ANGLE_ROW].any())
 
     @property
     def smoothing(self) -> float:
@@ -144,8 +149,8 @@ class SampledLoop:
             step = z - 1.0
             if base is not None:
                 step = np.where(base == self.pulse.poles.size - 1, offset, step)
-            lag = np.where(z == a, TINY, z - a)
-            measured[RATE] = measured[ANGLE] * step * ((1 - a) / T) / lag
+            lag = np.where(z == a, NO_LAG, z - a)
+            measured[RATE_ROW] = measured[ANGLE_ROW] * step * ((1 - a) / T) / lag
         return measured
 
     def characteristic(self, z: Complex, base: Whole | None, offset: Any) -> Complex:
@@ -165,15 +170,15 @@ class SampledLoop:
         if self.differences:
             n, a, T = len(A), self.smoothing, self.chain.sampling.period
             A, B, C = np.pad(A, (0, 2)), np.pad(B, (0, 2)), np.pad(C, ((0, 0), (0, 2)))
-            A[n] = C[ANGLE]  # two states more: the angle and the rate of the sample before
-            A[n + 1] = C[RATE] = (1 - a) / T * (C[ANGLE] - np.eye(n + 2)[n]) + a * np.eye(n + 2)[n + 1]
+            A[n] = C[ANGLE_ROW]  # two states more: the angle and the rate of the sample before
+            A[n + 1] = C[RATE_ROW] = (1 - a) / T * (C[ANGLE_ROW] - np.eye(n + 2)[n]) + a * np.eye(n + 2)[n + 1]
         closed: Real = A - np.outer(B, np.array(self.gains.row) @ C)
         return closed
 
     def reduced_matrix(self) -> Real:
         """The closed-loop matrix without the pole z = 1 of a free hub angle, or of a hub that cannot drift."""
         A, first = self.matrix(), 2 * self.pulse.kept()[0].size + self.pulse.kept()[1].size
-        rigid = self.plant.rigid[ANGLE]
+        rigid = self.plant.rigid[ANGLE_ROW]
         if not rigid.any():  # neither integral of the torque is felt
             return np.delete(np.delete(A, [first, first + 1], 0), [first, first + 1], 1)
         if rigid[0] == 0.0:  # a damped hub: the angle feels the single integral alone
@@ -203,7 +208,7 @@ def polished(eigenvalues: Complex, pulse: PulseTransfer, characteristic: Charact
     base = abs(z[:, None] - open_loop).argmin(axis=1)
     with np.errstate(divide="ignore"):
         log_radius = np.maximum(np.log(abs(z)), -745.0)
-    bright = (abs(z) > FAINT) & (abs(open_loop[base]) > FAINT)
+    bright = (abs(z) > FADED_RADIUS) & (abs(open_loop[base]) > FADED_RADIUS)
     if bright.any():
         offset = _offsets(z[bright], base[bright], open_loop[base[bright]], characteristic)
         ratio = offset / open_loop[base[bright]]

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from tfarm.arm import Arm, HubFeedback
@@ -27,17 +26,20 @@ from tfarm.spectrum.scales import first_frequency
 Window = tuple[float, float]
 AnySampled = SampledLoop | SampledLaw
 
-LONGEST_DELAY = 20.0  # samples: the delay margin is looked for up to here
-MOST_STEPS = 2000
+LONGEST_DELAY_SAMPLES = 20.0  # samples: the delay margin is looked for up to here
+MOST_STEPS = 2000  # of a scan of the delay
 CLEARLY = 1e-6  # within the circle: an eigenvalue there is not polished, as even a double one is right to 1e-7
-FEW = 2  # modes kept beyond the last one that outlives a sample
-BEYOND, MOST = 4, 128  # those of a whole loop, and the most that it has: half a second of work
-FEWER = (0.85, 0.72, 0.61, 0.54)
-OVERDAMPED = 2.5  # C w from which on a bending mode surely is: following it further costs a hundred times as much
+KEPT_BEYOND = 2  # modes kept beyond the last one that outlives a sample
+MODES_BEYOND = 4  # those of a whole loop that do not outlive a sample
+MOST_LOOP_MODES = 128  # of a whole loop: half a second of work
+FEWER_SHARES = (0.85, 0.72, 0.61, 0.54)  # of these, tried in turn where two damped modes cannot be told apart
+SURELY_OVERDAMPED = (
+    2.5  # C w from which on a bending mode surely is: following it further costs a hundred times as much
+)
 FAR_BEYOND = 5.0  # of critical in the first mode: all poles of bending lie left of any line, one mode shows it as well
 STRONGEST = 0.15  # of critical in the first mode: no stronger damping is looked at
-DECADES = 16  # down from there
-SAME = 1e-9  # relative: next to z = 1 one static crossing is read several times, each with an error near 1e-12
+DAMPING_DECADES = 16  # down from there
+SAME_EDGE = 1e-9  # relative: next to z = 1 one static crossing is read several times, each with an error near 1e-12
 
 
 @dataclass(frozen=True)
@@ -56,22 +58,17 @@ def stable_windows(loop: SampledLoop, name: str) -> list[Window]:
     gain has no count of its own.
     """
     found = crossings(circle_grid(loop), name, loop.gains)
-    edges = np.r_[-math.inf, found.gain, math.inf]
-    middles = _middles(found.gain)
+    edges, middles = np.r_[-math.inf, found.gain, math.inf], np.zeros(1)  # a gain inside each gap
+    if found.gain.size:
+        beyond = abs(found.gain).max() or 1.0  # no crossing lies beyond: any distance would do
+        between = (found.gain[1:] + found.gain[:-1]) / 2
+        middles = np.r_[found.gain[0] - beyond, between, found.gain[-1] + beyond]
     totals = found.passed(middles)
-    is_gap = np.r_[True, np.diff(found.gain) > SAME * abs(found.gain[1:]), True][: totals.size]
+    is_gap = np.r_[True, np.diff(found.gain) > SAME_EDGE * abs(found.gain[1:]), True][: totals.size]
     lowest = is_gap & (totals == totals[is_gap].min())  # the same up to a constant: only its minima can be zero
     gaps = [int(i) for i in np.nonzero(lowest)[0] if edges[i] < edges[i + 1]]
     stable = [i for i in gaps if loop.having(**{name: float(middles[i])}).poles.is_stable]
     return joined([(float(edges[i]), float(edges[i + 1])) for i in stable])
-
-
-def _middles(gain: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A gain inside each gap."""
-    if not gain.size:
-        return np.zeros(1)
-    beyond = abs(gain).max() or 1.0  # no crossing lies beyond: any distance would do
-    return np.r_[gain[0] - beyond, (gain[1:] + gain[:-1]) / 2, gain[-1] + beyond]
 
 
 def around(windows: list[Window], gain: float) -> Window | None:
@@ -98,11 +95,11 @@ def delay_margin(loop: AnySampled) -> DelayMargin:
         return DelayMargin(0.0, False)
     step = _delay_step(loop)
     for i in range(1, MOST_STEPS + 1):
-        if i * step > LONGEST_DELAY:
+        if i * step > LONGEST_DELAY_SAMPLES:
             break
         if grows(i * step):
             return DelayMargin(float(brentq(log_radius, (i - 1) * step, i * step, xtol=1e-10)), False)
-    return DelayMargin(min(MOST_STEPS * step, LONGEST_DELAY), True)
+    return DelayMargin(min(MOST_STEPS * step, LONGEST_DELAY_SAMPLES), True)
 
 
 def _delay_step(loop: AnySampled) -> float:
@@ -133,7 +130,7 @@ def required_damping(
     high = 2 * STRONGEST / first_frequency(arm)
     if log_radius(high) >= 0:
         return math.inf
-    for _ in range(DECADES):
+    for _ in range(DAMPING_DECADES):
         low = high / 10
         if log_radius(low) >= 0:  # a radius is nearly linear in C where C is small
             return float(brentq(log_radius, low, high, xtol=1e-7 * low, rtol=4e-7)) * (1 + 1e-6)
@@ -148,7 +145,9 @@ def log_radius_with(
 
     Modes that a strong C has settled before the next sample, or overdamped, are left to the remainder, but for a few.
     """
-    count = min(count, FEW + alive(arm.having(damping=C), chain), FEW + modes_below(arm, OVERDAMPED / C))
+    count = min(
+        count, KEPT_BEYOND + alive(arm.having(damping=C), chain), KEPT_BEYOND + modes_below(arm, SURELY_OVERDAMPED / C)
+    )
     for nudge in (0.0, 1e-6, -1e-6):
         try:
             loop = sampled_loop(arm.having(damping=C * (1 + nudge)), gains, chain, count=count, branches=branches)
@@ -172,8 +171,10 @@ def most_modes(arm: Arm, chain: Chain) -> int:
     What is overdamped has its slow poles beside -1/C, where the remainder has them too.
     """
     if not arm.least_damping:
-        return MOST
-    return min(MOST, BEYOND + min(alive(arm, chain), modes_below(arm, OVERDAMPED / arm.least_damping)))
+        return MOST_LOOP_MODES
+    return min(
+        MOST_LOOP_MODES, MODES_BEYOND + min(alive(arm, chain), modes_below(arm, SURELY_OVERDAMPED / arm.least_damping))
+    )
 
 
 def whole_loop(arm: Arm, gains: HubFeedback, chain: Chain, branches: Branching = all_damped_modes) -> SampledLoop:
@@ -195,7 +196,7 @@ def whole(
     """
     criticals = arm.damping * first_frequency(arm) / 2
     most = most_modes(arm, chain)
-    numbers = [most, *(int(share * most) for share in FEWER)]
+    numbers = [most, *(int(share * most) for share in FEWER_SHARES)]
     if criticals > FAR_BEYOND:
         numbers, branches = [1], Branches(COMPANY[:1])
     for number in numbers:

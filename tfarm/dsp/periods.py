@@ -10,7 +10,7 @@ from tfarm.dsp.chain import Chain
 from tfarm.dsp.margins import Window, stable_windows
 from tfarm.dsp.verdict import sampled_verdict
 
-SHARES = (0.1, 0.5, 1.0, 2.0, 5.0)  # of the chain's own period
+PERIOD_SHARES = (0.1, 0.5, 1.0, 2.0, 5.0)  # of the chain's own period
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class AtPeriod:
 def at_periods(arm: Arm, gains: HubFeedback, chain: Chain) -> tuple[AtPeriod, ...]:
     """The gains from a tenth to five times the chain's own period.  Raises ParameterError for an arm without a loop."""
     rows = []
-    for share in SHARES:
+    for share in PERIOD_SHARES:
         period = float(f"{share * chain.sampling.period:.12g}")  # 1 ms, and no 1.0000000000000002 ms
         verdict = sampled_verdict(arm, gains, replace(chain, sampling=replace(chain.sampling, period=period)))
         windows = {name: tuple(stable_windows(verdict.full, name)) for name in PLANE}

@@ -34,7 +34,6 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 
 Branching = Callable[[Modes], DampedModes]
 
-MEASURED = FED_BACK
 RECORDED = ("hub_angle", "hub_rate", "root_moment", "tip_displacement")
 
 
@@ -80,12 +79,12 @@ def loop_plant(arm: Arm, chain: Chain, count: int, branches: Branching = all_dam
 
     Raises ParameterError for a locked hub, which no torque turns.
     """
-    return filtered(undelayed_plant(arm, chain, MEASURED, count, branches), chain)
+    return filtered(undelayed_plant(arm, chain, FED_BACK, count, branches), chain)
 
 
 def shorter_plant(plant: Plant, chain: Chain, count: int) -> Plant:
     """A plant of `loop_plant` with the first `count` modes of its model."""
-    return filtered(with_modes(plant.model, chain, MEASURED, count), chain)
+    return filtered(with_modes(plant.model, chain, FED_BACK, count), chain)
 
 
 def undelayed_plant(

@@ -38,7 +38,7 @@ class SlewTable(TomlTable):
     """[slew]."""
 
 
-TABLES: dict[str, type[TomlTable]] = {
+CHAIN_TABLES: dict[str, type[TomlTable]] = {
     "sampling": SamplingTable,
     "converters": ConvertersTable,
     "actuator": ActuatorTable,
@@ -60,27 +60,23 @@ def load_chain(name_or_path: str | os.PathLike[str]) -> Chain:
 
 def chain_of_tables(tables: Mapping[str, Any]) -> Chain:
     """The chain of a parsed file; the tables of an arm may stand beside its own."""
-    unknown = [key for key in tables if key not in TABLES and key not in OF_AN_ARM]
+    unknown = [key for key in tables if key not in CHAIN_TABLES and key not in OF_AN_ARM]
     if unknown:
-        remedy = f"unknown table; {did_you_mean(unknown[0], TABLES)}"
+        remedy = f"unknown table; {did_you_mean(unknown[0], CHAIN_TABLES)}"
         raise ParameterError(key=unknown[0], value=tables[unknown[0]], remedy=remedy)
-    return Chain(**{name: _record(name, tables[name]) for name in TABLES if name in tables})
+    return Chain(**{name: _record(name, tables[name]) for name in CHAIN_TABLES if name in tables})
 
 
 def _record(name: str, table: object) -> Any:
     if not isinstance(table, dict):
         raise ParameterError(key=name, value=table, remedy=f"give a table, headed [{name}]")
     try:
-        return TABLES[name].model_validate(table).build()
+        return CHAIN_TABLES[name].model_validate(table).build()
     except ValidationError as error:
-        raise _in_one_line(name, error) from None
-
-
-def _in_one_line(name: str, error: ValidationError) -> ParameterError:
-    problem = min(error.errors(include_url=False), key=lambda problem: problem["type"] != "extra_forbidden")
+        problem = min(error.errors(include_url=False), key=lambda problem: problem["type"] != "extra_forbidden")
     key = ".".join(map(str, (name, *problem["loc"])))
     if problem["type"] == "extra_forbidden":
-        remedy = f"unknown key; {did_you_mean(str(problem['loc'][-1]), TABLES[name].model_fields)}"
+        remedy = f"unknown key; {did_you_mean(str(problem['loc'][-1]), CHAIN_TABLES[name].model_fields)}"
     else:
         remedy = f"wrong value; {problem['msg'][:1].lower()}{problem['msg'][1:]}"
-    return ParameterError(key=key, value=problem["input"], remedy=remedy)
+    raise ParameterError(key=key, value=problem["input"], remedy=remedy)

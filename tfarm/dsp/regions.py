@@ -21,10 +21,11 @@ from tfarm.records import record
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
-MOST_GAINS = 4000
+MOST_GAINS = 4000  # of a map, along one gain
 ENDS_AT = (-0.9, 0.3, 0.9)  # K2 at which upright edges are looked for, of what balances a torque
-MOST_COLUMNS, ROUNDS = 400, 12  # of K1 in a picture, and of halving where the outline bends
-SIDE = 1e-9  # relative: so far to either side of such an edge a region is cut
+MOST_COLUMNS = 400  # of K1 in a picture
+OUTLINE_ROUNDS = 12  # of halving where its outline bends
+BESIDE_EDGE = 1e-9  # relative: so far to either side of such an edge a region is cut
 
 
 @dataclass(frozen=True)
@@ -64,17 +65,23 @@ class GainMap:
 def gain_map(loop: SampledLoop, K1: Sequence[float] | Real, K2: Sequence[float] | Real) -> GainMap:
     """The map over the grid K1 x K2 (both ascending), the other settings as those of the loop.
 
-    From the exact crossings of every row (D-decomposition) and one count by eigenvalues; a second one, at the far
-    corner, must agree with what the crossings say, or a ConvergenceError is raised.
+    From the exact crossings of every row (D-decomposition) and one count by eigenvalues; those at three corners must
+    agree with what the crossings say, or a ConvergenceError is raised.
     """
     rows, columns = _ascending("K1", K1), _ascending("K2", K2)
     grid, start = circle_grid(loop), loop.having(K1=_off_the_edge(rows), K2=_off_the_edge(columns))
-    first, there = start.gains, np.array([(start.poles.log_radius > 0).sum()])
+    first, there = start.gains, np.array([start.poles.unstable])
     (at_start,) = counts_over(rows, [crossings(grid, "K1", first)], first.K1, there)
     found = [crossings(grid, "K2", first.having("K1", float(gain))) for gain in rows]
-    plane = GainMap(loop, rows, columns, counts_over(columns, found, first.K2, at_start), found)
-    _check(plane)
-    return plane
+    unstable = counts_over(columns, found, first.K2, at_start)
+    for i, j in ((0, 0), (-1, 0), (-1, -1)):
+        corner = loop.having(K1=float(rows[i]), K2=float(columns[j]))
+        is_told = abs(corner.poles.log_radius).min() >= 1e-9  # else on an edge, or too close to it
+        if is_told and (count := corner.poles.unstable) != unstable[i, j]:
+            where = f"at K1 = {corner.gains.K1:g}, K2 = {corner.gains.K2:g}"
+            message = f"{where} the crossings count {unstable[i, j]} growing poles, not {count}"
+            raise ConvergenceError(message, GainMap(loop, rows, columns, unstable, found), abs(count - unstable[i, j]))
+    return GainMap(loop, rows, columns, unstable, found)
 
 
 def rounded(plane: GainMap, drawn: Callable[[Real, Real], Complex]) -> GainMap:
@@ -82,7 +89,7 @@ def rounded(plane: GainMap, drawn: Callable[[Real, Real], Complex]) -> GainMap:
 
     `drawn` says where points of the plane are in the picture, 1 high.
     """
-    for _ in range(ROUNDS):
+    for _ in range(OUTLINE_ROUNDS):
         more = loose_columns(plane.K1, pieces(plane.K1, plane.stable_intervals), drawn)
         if not more.size or plane.K1.size + more.size > MOST_COLUMNS:
             break
@@ -114,21 +121,7 @@ def ends_of_K1(loop: SampledLoop) -> Real:
 
 def with_both_sides(K1: Real, ends: Real) -> Real:
     """Values of K1 ascending, and among them either side of each upright edge."""
-    return np.unique(np.concatenate([K1, ends * (1 - SIDE), ends * (1 + SIDE)]))
-
-
-def _check(plane: GainMap) -> None:
-    """Counts by eigenvalues at three corners against those of the map."""
-    for i, j in ((0, 0), (-1, 0), (-1, -1)):
-        K1, K2 = float(plane.K1[i]), float(plane.K2[j])
-        poles = plane.loop.having(K1=K1, K2=K2).poles
-        if abs(poles.log_radius).min() < 1e-9:  # on an edge, or too close to tell
-            continue
-        if (count := int((poles.log_radius > 0).sum())) != plane.unstable[i, j]:
-            message = (
-                f"at K1 = {K1:g}, K2 = {K2:g} the crossings count {plane.unstable[i, j]} growing poles, not {count}"
-            )
-            raise ConvergenceError(message, plane, abs(count - plane.unstable[i, j]))
+    return np.unique(np.concatenate([K1, ends * (1 - BESIDE_EDGE), ends * (1 + BESIDE_EDGE)]))
 
 
 def _off_the_edge(values: Real) -> float:

@@ -23,14 +23,14 @@ from tfarm.dsp.simulate import Simulation, Simulator, Trace
 
 Real = NDArray[np.float64]
 
-SETTLED = 0.05  # of the largest root moment
-LASTING = 0.7  # a limit cycle keeps at least this much of its amplitude over a quarter of the record
+SETTLED_SHARE = 0.05  # of the largest root moment, within which a slew has settled
+CYCLE_LASTS = 0.7  # a limit cycle keeps at least this much of its amplitude over a quarter of the record
 BEYOND_IDEAL = 2.0  # and is this much larger than what an ideal chain leaves at that time
 FEWEST_TURNS = 1.0  # of the moment about its mean in a quarter of the record: fewer are a drift and no vibration
-FEWEST = 40  # samples without which a limit cycle cannot be told
+FEWEST_SAMPLES = 40  # samples without which a limit cycle cannot be told
 
 
-SIGNALS = (  # of a simulation's answer: the first are those of a `Trace`, the others stand at the samples only
+SIGNAL_COLUMNS = (  # of a simulation's answer: the first are those of a `Trace`, the others stand at the samples only
     Column("t", "time", "s"),
     Column("hub_angle", "hub angle", "rad"),
     Column("hub_rate", "hub rate", "rad/s"),
@@ -80,7 +80,7 @@ def rms_after(t: Real, signal: Real, start: float) -> float:
 def settling_time(simulation: Simulation) -> float:
     """The time [s] from which on the root moment stays within 5 % of its largest; inf where it does not settle."""
     moment = abs(simulation.at_samples.root_moment)
-    (above,) = np.nonzero(moment > SETTLED * moment.max(initial=0.0))
+    (above,) = np.nonzero(moment > SETTLED_SHARE * moment.max(initial=0.0))
     if simulation.stopped or (above.size and above[-1] == moment.size - 1):
         return math.inf
     return float(simulation.t[above[-1] + 1]) if above.size else 0.0
@@ -93,15 +93,16 @@ def limit_cycle(simulation: Simulation, ideal: Simulation) -> LimitCycle | None:
     The same loop with ideal converters (`ideal`) has died down further, or where they are clipped it runs away.
     """
     n = simulation.t.size
-    if simulation.stopped or simulation.chain.is_linear or n < FEWEST:
+    if simulation.stopped or simulation.chain.is_linear or n < FEWEST_SAMPLES:
         return None
     last, before = slice(n - n // 4, n), slice(n - n // 2, n - n // 4)
     moment = simulation.at_samples.root_moment
     size, earlier = _half_range(moment[last]), _half_range(moment[before])
     is_clipped = bool(simulation.saturated_at[last].any())
-    if size == 0.0 or size < LASTING * earlier or (is_clipped and earlier < LASTING * size):
+    if size == 0.0 or size < CYCLE_LASTS * earlier or (is_clipped and earlier < CYCLE_LASTS * size):
         return None
-    if not (is_clipped and _runs_away(ideal, last, before)) and size <= BEYOND_IDEAL * _left(ideal, last):
+    runs_away = ideal.stopped is not None or _left(ideal, last) > _left(ideal, before)
+    if not (is_clipped and runs_away) and size <= BEYOND_IDEAL * _left(ideal, last):
         return None
     about = moment[last] - moment[last].mean()
     turns = np.count_nonzero(np.diff(np.signbit(about))) / 2
@@ -121,11 +122,6 @@ def _left(ideal: Simulation, part: slice) -> float:
     return math.inf if ideal.stopped else _half_range(ideal.at_samples.root_moment[part])
 
 
-def _runs_away(ideal: Simulation, last: slice, before: slice) -> bool:
-    """Whether the ideal chain's moment has grown, or has run away altogether."""
-    return ideal.stopped is not None or _left(ideal, last) > _left(ideal, before)
-
-
 def _half_range(signal: Real) -> float:
     return float(np.ptp(signal)) / 2 if signal.size else 0.0
 
@@ -138,6 +134,7 @@ def simulation_answer(
     `modes_change`: by how much the signals changed when the modes were doubled to `modes_used`, relative to the
     largest value of each; null where the number of modes was asked for.
     """
+    stopped = simulation.stopped
     answer: dict[str, Any] = {
         "arm": arm.name,
         **_led_by(arm, law),
@@ -150,7 +147,13 @@ def simulation_answer(
         "torque": simulation.torque.tolist(),
         "torque_unit": arm.input_unit,
         "gain": [] if simulation.gain is None else simulation.gain.tolist(),
-        **_figures(simulation),
+        "residual_moment_rms": residual_moment_rms(simulation),
+        "residual_raw_moment_rms": residual_raw_moment_rms(simulation),
+        "settling_time_s": settling_time(simulation),
+        "saturated_samples": simulation.saturated,
+        "energy_error": simulation.energy_error,
+        "stopped_at_s": None if stopped is None else stopped.time,
+        "growing_mode": None if stopped is None else stopped.mode,
         "limit_cycle": None if cycle is None else _cycle_answer(cycle),
     }
     if simulation.volts is not None:
@@ -173,20 +176,6 @@ def _led_by(arm: Arm, law: AnyLaw) -> dict[str, Any]:
     }
 
 
-def _figures(simulation: Simulation) -> dict[str, Any]:
-    """What a simulation comes to, in single numbers."""
-    stopped = simulation.stopped
-    return {
-        "residual_moment_rms": residual_moment_rms(simulation),
-        "residual_raw_moment_rms": residual_raw_moment_rms(simulation),
-        "settling_time_s": settling_time(simulation),
-        "saturated_samples": simulation.saturated,
-        "energy_error": simulation.energy_error,
-        "stopped_at_s": None if stopped is None else stopped.time,
-        "growing_mode": None if stopped is None else stopped.mode,
-    }
-
-
 def _cycle_answer(cycle: LimitCycle) -> dict[str, Any]:
     return {
         "root_moment_amplitude": cycle.root_moment,
@@ -198,7 +187,7 @@ def _cycle_answer(cycle: LimitCycle) -> dict[str, Any]:
 
 
 def _columns(trace: Trace) -> dict[str, Sequence[float]]:
-    return {column.key: column.read(trace).values for column in SIGNALS if hasattr(trace, column.key)}
+    return {column.key: column.read(trace).values for column in SIGNAL_COLUMNS if hasattr(trace, column.key)}
 
 
 def ideal_chain(chain: Chain) -> Chain:

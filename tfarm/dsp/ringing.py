@@ -12,13 +12,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tfarm.dsp.plant import RECORDED
 from tfarm.dsp.simulate import Simulation, Simulator
 
 Real = NDArray[np.float64]
 
-POINTS = 20  # of a curve in each period of the fastest mode that is seen
+POINTS_A_PERIOD = 20  # of a curve in each period of the fastest mode that is seen
 VISIBLE = 1 / 300  # of the height of a curve: a pixel of a picture
-RECORDED = ("hub_angle", "hub_rate", "root_moment", "tip_displacement")
 
 
 class Ringing(NamedTuple):
@@ -56,4 +56,4 @@ def records_between(simulator: Simulator, run: Simulation, heights: dict[str, fl
     """How many records between two samples show every mode that is seen in curves of these heights [SI]."""
     found = ringing(simulator, run)
     fastest = max((found.fastest(signal, height) for signal, height in heights.items()), default=0.0)
-    return max(0, math.ceil(POINTS * fastest * run.scenario.period / (2 * math.pi)) - 1)
+    return max(0, math.ceil(POINTS_A_PERIOD * fastest * run.scenario.period / (2 * math.pi)) - 1)

@@ -19,7 +19,7 @@ from tfarm.spectrum.scales import turning_inertia
 
 Real = NDArray[np.float64]
 
-MOST_SAMPLES = 4_000_000
+MOST_TASK_SAMPLES = 4_000_000  # of a record, a few hundred MB of signals
 STEP_TORQUE, IMPULSE, TIP_OFFSET = 0.1, 0.01, 0.01  # N m, N m s, m: what the scenarios of the paper's arm start with
 TRIAL_COST = (1.0, 2.6)  # 1/(N m)^2 s: weights a and b of the paper's (23), of what vibrates and of what a law adds
 TRIAL_DURATION = 3.0  # s
@@ -158,7 +158,7 @@ def _with(resting: Scenario, **changes: Any) -> Scenario:
 def _samples(duration: float, period: float) -> int:
     """How many samples lie in 0 .. duration, both ends counted."""
     length = positive("duration", duration, "a duration is a positive, finite number of seconds")
-    if length / period >= MOST_SAMPLES:
-        remedy = f"at most {MOST_SAMPLES} samples of {period:g} s; a shorter one, or a longer period"
+    if length / period >= MOST_TASK_SAMPLES:
+        remedy = f"at most {MOST_TASK_SAMPLES} samples of {period:g} s; a shorter one, or a longer period"
         raise ParameterError(key="duration", value=length, remedy=remedy)
     return math.floor(length / period * (1 + 1e-12)) + 1

@@ -30,13 +30,11 @@ from tfarm.dsp.margins import (
 from tfarm.records import record
 from tfarm.spectrum.damped import LITTLE, Branches
 
-MANY = 64  # modes: edges are not looked for with more
+MOST_EDGE_MODES = 64  # edges are not looked for with more modes
 GAIN_DIGITS, OTHER_DIGITS = 6, 4  # that are printed where all are settled
-SMALL = 1e-6  # of a window's other edge: what an edge at 0 is told from
+TOLD_FROM_ZERO = 1e-6  # of a window's other edge: what an edge at 0 is told from
 
-Proof = tuple[
-    bool | None, float
-]  # whether a loop is stable (None: not shown), and the band [rad/s] that it is shown in
+Proof = tuple[bool | None, float]  # whether a loop is stable (None: not shown), and in which band [rad/s] that is shown
 Test = Callable[[float], Proof]
 
 
@@ -131,7 +129,7 @@ def shown_windows(loop: SampledLoop, band: Band | None, gain: str) -> ShownWindo
     """The windows of one gain, with more modes than the loop's until their edges are proven to the last digit."""
     circle = None if band is None else band.circle()
     found = ShownWindows([], [])
-    for each in _sizes(loop, band, MANY):
+    for each in _sizes(loop, band, MOST_EDGE_MODES):
         found = _windows(each, band, circle, gain)
         if all(edge.is_sharp(GAIN_DIGITS) for pair in found.figures for edge in pair):
             break
@@ -139,8 +137,8 @@ def shown_windows(loop: SampledLoop, band: Band | None, gain: str) -> ShownWindo
 
 
 def _sizes(loop: SampledLoop, band: Band | None, most: int) -> Iterator[SampledLoop]:
-    """The loop, at most MANY modes of it, and where anything can be proven the same with 2, 4 ... times as many."""
-    loop = loop if loop.plant.count <= MANY else resized(loop, MANY)
+    """The loop, at most MOST_EDGE_MODES of its modes, and where anything can be proven with 2, 4 ... times as many."""
+    loop = loop if loop.plant.count <= MOST_EDGE_MODES else resized(loop, MOST_EDGE_MODES)
     yield loop
     most = min(most, _most(loop)) if band is not None else 0
     while loop.plant.count < most:
@@ -176,7 +174,7 @@ def _windows(loop: SampledLoop, band: Band | None, circle: Circle | None, gain: 
 
 
 def _near_zero(other: float) -> float:
-    return SMALL * (abs(other) if other and math.isfinite(other) else 1.0)
+    return TOLD_FROM_ZERO * (abs(other) if other and math.isfinite(other) else 1.0)
 
 
 def another(count: int, most: int) -> int:
@@ -186,7 +184,7 @@ def another(count: int, most: int) -> int:
 
 def _most(loop: SampledLoop) -> int:
     """The most that edges are looked for with: what a sample leaves nothing of is hard to follow and adds nothing."""
-    return min(MANY, most_modes(loop.plant.arm, loop.chain))
+    return min(MOST_EDGE_MODES, most_modes(loop.plant.arm, loop.chain))
 
 
 def proof_of(loop: SampledLoop) -> Proof:
@@ -201,7 +199,7 @@ def proof_of(loop: SampledLoop) -> Proof:
 def shown_delay(loop: SampledLoop, band: Band | None) -> tuple[DelayMargin, Figure]:
     """The delay margin, and its samples as a figure, with more modes until it is proven to the last digit."""
     found = DelayMargin(0.0, False), Figure(0.0, 0, None, 0)
-    for each in _sizes(loop, band, MANY // 2):
+    for each in _sizes(loop, band, MOST_EDGE_MODES // 2):
         found = _delay(each, band)
         if found[0].is_bound or found[1].is_sharp(OTHER_DIGITS):
             break
@@ -228,14 +226,14 @@ def _delay(loop: SampledLoop, band: Band | None) -> tuple[DelayMargin, Figure]:
 
 def shown_damping(arm: Arm, gains: HubFeedback, chain: Chain, *, count: int) -> Figure:
     """The damping from which on the gains are stable, as a figure [s]."""
-    count, branches = min(count, MANY), Branches(LITTLE)
+    count, branches = min(count, MOST_EDGE_MODES), Branches(LITTLE)
     C = required_damping(arm, gains, chain, count=count, branches=branches)
 
     def proof(value: float) -> Proof:
         return proof_of(whole_loop(arm.having(damping=value), gains, chain, branches))
 
     def holds(value: float) -> Proof:
-        return log_radius_with(arm, gains, chain, value, another(count, MANY), branches) < 0, math.inf
+        return log_radius_with(arm, gains, chain, value, another(count, MOST_EDGE_MODES), branches) < 0, math.inf
 
     if C == 0.0:
         return Figure(C, OTHER_DIGITS, None, count)

@@ -11,13 +11,13 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, HubFeedback
+from tfarm.arm import FED_BACK, Arm, HubFeedback
 from tfarm.arm.checks import whole
 from tfarm.dsp import kernel
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.converters import quantisers
 from tfarm.dsp.loop import check_loop
-from tfarm.dsp.plant import MEASURED, RECORDED, Plant, filtered, undelayed_plant
+from tfarm.dsp.plant import RECORDED, Plant, filtered, undelayed_plant
 from tfarm.dsp.sampling import held
 from tfarm.dsp.scenarios import Scenario
 from tfarm.errors import ParameterError
@@ -27,7 +27,7 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 FOLDED_UP = 10.0  # rad: an arm bent by the moment EI/L times this is no arm any more, and the simulation stops
-MOST_BETWEEN = 1000
+MOST_BETWEEN = 1000  # records between two samples
 
 
 class Measurement(NamedTuple):
@@ -134,7 +134,7 @@ class Simulator:
 
     def plant_of(self, arm: Arm, count: int) -> Plant:
         """What is measured, through its filters, and then what is recorded."""
-        plant = undelayed_plant(arm, self.chain, (*MEASURED, *RECORDED), count)
+        plant = undelayed_plant(arm, self.chain, (*FED_BACK, *RECORDED), count)
         return filtered(plant, self.chain)  # the first of each name: those that are recorded come later
 
     def linear(self, gains: HubFeedback, K2: Real | None = None) -> Simulation:
@@ -204,7 +204,7 @@ class Simulator:
             if not math.isfinite(u):
                 raise ParameterError(key="controller", value=u, remedy=f"its torque at sample {k} is not finite")
             u = float(np.float32(u)) if single else u
-            u = kernel.quantise(u, self._rows[kernel.TORQUE], state.saturated[k], kernel.TORQUE)
+            u = kernel.quantise(u, self._rows[kernel.DAC], state.saturated[k], kernel.DAC)
             state.held[k % ring] = state.torque[k] = u
             if gain is not None:
                 gain[k] = K
@@ -217,8 +217,8 @@ class Simulator:
         return self._result(state, state.torque.size, gain)
 
     def _measurement(self, k: int, state: _State, memory: Real, single: bool) -> Measurement:
-        angle = kernel.quantise(state.record[k, 0], self._rows[kernel.ANGLE], state.saturated[k], kernel.ANGLE)
-        moment = kernel.quantise(state.record[k, 2], self._rows[kernel.MOMENT], state.saturated[k], kernel.MOMENT)
+        angle = kernel.quantise(state.record[k, 0], self._rows[kernel.ENCODER], state.saturated[k], kernel.ENCODER)
+        moment = kernel.quantise(state.record[k, 2], self._rows[kernel.AMPLIFIER], state.saturated[k], kernel.AMPLIFIER)
         rate = kernel.estimate(angle, state.record[k, 1], memory, self._filter)
         forward, angle_wanted, rate_wanted, rigid = (float(value) for value in self._ideal[k])
         values = [angle, rate, moment, moment - rigid, forward, angle_wanted, rate_wanted, rigid]

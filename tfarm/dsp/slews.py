@@ -15,7 +15,7 @@ from tfarm.dsp.simulate import Simulation, Simulator
 from tfarm.records import record
 
 WITHOUT = f"without moment feedback, {MOMENT_GAIN} = 0"
-LASTING = 3.0  # times the slew: how long a record is
+RECORD_LENGTH = 3.0  # times the slew: how long a record is
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ def slews(arm: Arm, gains: HubFeedback, chain: Chain, modes: int) -> Slews:
 
     Raises ParameterError for an arm that cannot turn.
     """
-    task = scenario("slew", arm, chain, LASTING * chain.slew.rise_time)
+    task = scenario("slew", arm, chain, RECORD_LENGTH * chain.slew.rise_time)
     simulator = Simulator(arm, chain, task, count=modes)
     laws = (gains.having(MOMENT_GAIN, 0.0), gains)
     both = resolved(simulator, arm, *(partial(Simulator.linear, gains=law) for law in laws))

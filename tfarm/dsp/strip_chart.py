@@ -17,11 +17,11 @@ from tfarm.records import record
 
 Real = NDArray[np.float64]
 
-BITS = 6  # of the ADC: few, so that its steps are seen
-SHARE = 0.8  # of the torque that the ideal chain takes: what the motor gives at most
-ROOM = 1.2  # times the largest moment: the ADC's range
-DELAY = 1.0  # samples
-LASTING = 2.0  # times the slew
+COARSE_BITS = 6  # of the ADC: few, so that its steps are seen
+MOTOR_SHARE = 0.8  # of the torque that the ideal chain takes: what the motor gives at most
+RANGE_SHARE = 1.2  # times the largest moment: the ADC's range
+CHART_DELAY = 1.0  # samples, where the chain has none
+CHART_LENGTH = 2.0  # times the slew
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class StripChart:
 def strip_chart(arm: Arm, gains: HubFeedback, ideal: Simulation, modes: int) -> StripChart:
     """The same slew as that of an ideal chain, with a coarse ADC, a weak motor and one more sample of delay."""
     chain = coarse_chain(ideal)
-    task = scenario("slew", arm, chain, LASTING * chain.slew.rise_time)
+    task = scenario("slew", arm, chain, CHART_LENGTH * chain.slew.rise_time)
     read, asked = np.zeros(task.t.size), np.zeros(task.t.size)
 
     def controller(m: Measurement) -> float:
@@ -79,20 +79,16 @@ def coarse_chain(ideal: Simulation) -> Chain:
     the motor's limit, and one sample of delay."""
     chain, c = ideal.chain, ideal.chain.converters
     if c.moment_bits is None:
-        span = c.moment_range or _nice(ROOM * float(abs(ideal.at_samples.root_moment).max()))
-        c = replace(c, moment_bits=BITS, moment_range=span)
+        span = RANGE_SHARE * float(abs(ideal.at_samples.root_moment).max())
+        unit = 10.0 ** (math.floor(math.log10(span)) - 1)
+        span = c.moment_range or float(f"{math.ceil(span / unit) * unit:.2g}")  # rounded up to two digits
+        c = replace(c, moment_bits=COARSE_BITS, moment_range=span)
     limit = min(chain.actuator.torque_limit, c.torque_range or math.inf)
     if math.isinf(limit):
-        limit = float(f"{SHARE * float(abs(ideal.torque).max()):.2g}")
+        limit = float(f"{MOTOR_SHARE * float(abs(ideal.torque).max()):.2g}")
     return replace(
         chain,
-        sampling=replace(chain.sampling, delay_samples=chain.sampling.delay_samples or DELAY),
+        sampling=replace(chain.sampling, delay_samples=chain.sampling.delay_samples or CHART_DELAY),
         converters=c,
         actuator=replace(chain.actuator, torque_limit=limit),
     )
-
-
-def _nice(x: float) -> float:
-    """Rounded up to two digits."""
-    power = 10.0 ** (math.floor(math.log10(x)) - 1)
-    return float(f"{math.ceil(x / power) * power:.2g}")

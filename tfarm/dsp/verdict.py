@@ -12,16 +12,17 @@ from tfarm.arm.checks import whole
 from tfarm.columns import Table
 from tfarm.dsp.band import Band, band_of
 from tfarm.dsp.chain import Chain, Sampling
-from tfarm.dsp.law import MODES, ModeTable, growing_mode, mode_table
+from tfarm.dsp.law import MODE_COLUMNS, ModeTable, growing_mode, mode_table
 from tfarm.dsp.law_loop import AnyLoop, SampledLaw
-from tfarm.dsp.loop import SampledLoop, check_loop, resized, sampled_loop
+from tfarm.dsp.loop import check_loop, resized, sampled_loop
 from tfarm.dsp.margins import DelayMargin, Window, around, whole_loop
 from tfarm.dsp.shown import Figure, ShownWindows, shown_damping, shown_delay, shown_windows
 from tfarm.records import record
 
-UNDAMPED_MODES = 20
-AGREE, NOISE = 1e-4, 1e-12
-MOST_ASKED = 400
+UNDAMPED_MODES = 20  # of an undamped arm, whose verdict is of the first modes alone
+RADIUS_AGREES = 1e-4  # of ln of the spectral radius: how well fewer modes must have it
+RADIUS_NOISE = 1e-12  # and what it is known to at all
+MOST_ASKED = 400  # modes that may be asked for
 
 
 @dataclass(frozen=True)
@@ -131,11 +132,12 @@ def settled(largest: AnyLoop, outside: Callable[[Band[AnyLoop]], int | None]) ->
     """The verdict on a damped arm by as few modes as it takes, from the loop with all: `outside` counts its poles."""
     band = band_of(largest)
     full = largest if band is None else band.full
-    proven = None if band is None else outside(band)
+    proven, radius = None if band is None else outside(band), full.poles.log_spectral_radius
     for loop in _growing(full):
-        if _agree(loop, full) and proven in (None, _outside(loop)):
+        agrees = abs(loop.poles.log_spectral_radius - radius) <= RADIUS_AGREES * abs(radius) + RADIUS_NOISE
+        if agrees and loop.poles.unstable == full.poles.unstable and proven in (None, loop.poles.unstable):
             break
-    is_proven = proven is not None and (proven == 0) == (_outside(loop) == 0)
+    is_proven = proven is not None and (proven == 0) == (loop.poles.unstable == 0)
     return Verdict(loop, band if is_proven else None)
 
 
@@ -147,15 +149,6 @@ def _growing(full: AnyLoop) -> Iterator[AnyLoop]:
         yield resized(full, number)
         number *= 2
     yield full
-
-
-def _outside(loop: SampledLoop | SampledLaw) -> int:
-    return int((loop.poles.log_radius > 0).sum())
-
-
-def _agree(loop: AnyLoop, full: AnyLoop) -> bool:
-    radius, true = loop.poles.log_spectral_radius, full.poles.log_spectral_radius
-    return abs(radius - true) <= AGREE * abs(true) + NOISE and _outside(loop) == _outside(full)
 
 
 @dataclass(frozen=True)
@@ -220,7 +213,7 @@ def verdict_answer(verdict: Verdict[Any], sampling: Sampling) -> dict[str, Any]:
         "stable": verdict.is_stable,
         "spectral_radius": math.exp(verdict.log_radius),
         "log_spectral_radius": verdict.log_radius,
-        "unstable_poles": int((verdict.loop.poles.log_radius > 0).sum()),
+        "unstable_poles": verdict.loop.poles.unstable,
         "modes_used": verdict.modes_used,
         "settled": verdict.is_settled,
         "band_rad_s": verdict.band_rad_s,
@@ -238,7 +231,7 @@ def sampled_answer(analysis: Analysis) -> dict[str, Any]:
         "gain_units": {gain.name: unit_of(gain.name, arm) for gain in LISTED},
         **gains.by_name,
         **verdict_answer(verdict, sampling),
-        **{f"{name}_interval": _listed(around(each.windows, gains[name])) for name, each in shown},
+        **{f"{name}_interval": (it := around(each.windows, gains[name])) and list(it) for name, each in shown},
         **{f"{name}_intervals": [list(window) for window in each.windows] for name, each in shown},
         "first_unstable_mode": analysis.first_unstable_mode,
         "delay_margin_samples": analysis.delay_margin.samples,
@@ -249,7 +242,7 @@ def sampled_answer(analysis: Analysis) -> dict[str, Any]:
             "delay_margin_samples": _figure(analysis.delay),
             "required_damping_s": _figure(analysis.damping),
         },
-        "modes": Table(columns=MODES, record=analysis.modes),
+        "modes": Table(columns=MODE_COLUMNS, record=analysis.modes),
     }
 
 
@@ -262,7 +255,3 @@ def _figure(figure: Figure) -> dict[str, Any]:
         "band_rad_s": figure.band,
         "modes": figure.modes,
     }
-
-
-def _listed(window: Window | None) -> list[float] | None:
-    return None if window is None else list(window)

@@ -15,7 +15,7 @@ from matplotlib.ticker import FuncFormatter, NullLocator
 from numpy.typing import NDArray
 
 from tfarm.digits import plain
-from tfarm.dsp.loci import BEYOND, RIM, Loci, Locus
+from tfarm.dsp.loci import DRAWN_RADIUS, RIM, Loci, Locus
 
 from .labels import BESIDE, Label
 from .style import BLUE, GREY, INK, ORANGE, blank, headline, style
@@ -97,13 +97,13 @@ def _branches(data: Loci, modes: NDArray[np.int64], ax: Axes) -> list[float]:
 def z_plane(data: Loci, locus: Locus, *, ax: Axes) -> None:
     """The upper half of the z-plane with one gain's locus; open circles at its start, dots at the loop's gains."""
     angle = np.linspace(0.0, math.pi, 181)
-    ax.fill_between(BEYOND * np.cos(angle), 0, BEYOND * np.sin(angle), color="#f7e9de", zorder=0)
+    ax.fill_between(DRAWN_RADIUS * np.cos(angle), 0, DRAWN_RADIUS * np.sin(angle), color="#f7e9de", zorder=0)
     ax.fill_between(np.cos(angle), 0, np.sin(angle), color="white", zorder=0.2)
     ax.plot(np.cos(angle), np.sin(angle), color=INK, lw=0.9, zorder=1)
     here = int(abs(locus.values - data.loop.gains[locus.gain]).argmin())
     for branch in np.argsort(locus.mode):
         z, mode = locus.z[:, branch], int(locus.mode[branch])
-        visible = np.where((z.imag >= -1e-12) & (abs(z) < BEYOND), z, np.nan)
+        visible = np.where((z.imag >= -1e-12) & (abs(z) < DRAWN_RADIUS), z, np.nan)
         if not np.isfinite(visible).any():
             continue
         colour = _colour(data, mode) if mode else GREY

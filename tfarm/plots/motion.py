@@ -12,7 +12,7 @@ from tfarm.arm import Arm
 from tfarm.digits import plain
 from tfarm.dsp import Simulation, curves
 from tfarm.dsp.curves import Curve
-from tfarm.dsp.ringing import POINTS
+from tfarm.dsp.ringing import POINTS_A_PERIOD
 
 from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, New, blank, headline, style, taken, window
 
@@ -44,9 +44,9 @@ def slew(arm: Arm, runs: Simulation | Runs, *, ax: Sequence[Axes] | None = None)
 def _coarse_words(arm: Arm, each: Runs) -> str:
     """What is said of records with less than 20 points in a period of the fastest mode that is seen."""
     found = min(curves.points_a_period(arm, run) for run in each.values())
-    if found[0] >= POINTS:
+    if found[0] >= POINTS_A_PERIOD:
         return ""
-    return f"{plain(found[0], 2)} points a period of the fastest mode seen; between={found[1]} gives {POINTS}"
+    return f"{plain(found[0], 2)} points a period of the fastest mode seen; between={found[1]} gives {POINTS_A_PERIOD}"
 
 
 def draw_responses(arm: Arm, each: Runs, what: str, new: New = blank) -> Figure:

@@ -19,7 +19,7 @@ from tfarm.dsp.law_margins import stable_factors
 from tfarm.dsp.law_verdict import law_verdict
 from tfarm.dsp.margins import DelayMargin, delay_margin
 from tfarm.dsp.results import drawn, residual_moment_rms
-from tfarm.dsp.slews import LASTING
+from tfarm.dsp.slews import RECORD_LENGTH
 from tfarm.errors import ParameterError
 from tfarm.fitting.runs import Beside, beside, overshoot
 from tfarm.plots.measured_runs import draw_beside
@@ -226,7 +226,7 @@ def _slew(arm: Arm, chain: Chain, named: Sequence[LawOnArm]) -> tuple[list[Pictu
     words, slew = [], chain.slew
     for each in named:
         try:
-            runs[each.name] = drawn(each.arm, each.law, chain, "slew", LASTING * slew.rise_time)
+            runs[each.name] = drawn(each.arm, each.law, chain, "slew", RECORD_LENGTH * slew.rise_time)
         except ParameterError as error:
             words.append(f"No slew of {each.name} is simulated: {typeset(str(error))}.")
     if not runs:

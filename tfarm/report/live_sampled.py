@@ -21,7 +21,7 @@ from tfarm.dsp.enough import enough_modes
 from tfarm.dsp.plant import Plant
 from tfarm.dsp.results import ideal_chain
 from tfarm.dsp.simulate import FOLDED_UP
-from tfarm.dsp.slews import LASTING
+from tfarm.dsp.slews import RECORD_LENGTH
 from tfarm.errors import TfarmError
 from tfarm.response import transfer
 
@@ -49,7 +49,7 @@ def slew_numbers(arm: Arm, chain: Chain, law: HubFeedback) -> dict[str, Any] | N
     """The slew of the chain for three times as long as it takes, with the modes that it takes under `law`, and the
     arm's shapes; None where there is no such slew."""
     try:
-        task = scenario("slew", arm, chain, LASTING * chain.slew.rise_time)
+        task = scenario("slew", arm, chain, RECORD_LENGTH * chain.slew.rise_time)
         if task.t.size > MOST_SAMPLES:
             return None
         count = enough_modes(partial(_slewed, arm, chain, task, law)).modes
