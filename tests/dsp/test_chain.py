@@ -10,7 +10,8 @@ from tfarm.arm import HubFeedback, to_toml
 from tfarm.arm.checks import LARGEST_NUMBER
 from tfarm.arm.schema import arm_of_table
 from tfarm.dsp import Actuator, Chain, Converters, Sampling, Slew, load_chain
-from tfarm.dsp.converters import DAC, MOMENT, quantisers
+from tfarm.dsp.converters import quantisers
+from tfarm.dsp.kernel import AMPLIFIER, DAC
 from tfarm.dsp.reading import chain_of_tables
 from tfarm.dsp.writing import file_text
 from tfarm.errors import ParameterError
@@ -140,7 +141,7 @@ def test_steps_and_ranges():
         actuator=Actuator(torque_limit=2.5),
     )
     rows = quantisers(chain).rows
-    assert rows[MOMENT].tolist() == [1.0, -8.0, 7.0]
+    assert rows[AMPLIFIER].tolist() == [1.0, -8.0, 7.0]
     assert rows[DAC].tolist() == [1.0, -2.5, 2.5]
 
 

@@ -11,7 +11,7 @@ from tfarm.dsp.curves import (
     LEAST_BETWEEN,
     MOST_LINE,
     PERIODS,
-    POINTS,
+    POINTS_A_PERIOD,
     curve,
     points_a_period,
     reference_angle,
@@ -28,7 +28,7 @@ STEEL = tfarm.load("stocky-steel")
 def test_a_fast_ringing_is_drawn_as_a_band_that_holds_the_curve():
     """The band of a known oscillation is its amplitude: no piece of it is shorter than a period."""
     t = np.linspace(0.0, 3.0, 30_001)
-    f = 10_000 / POINTS  # Hz, twenty points a period
+    f = 10_000 / POINTS_A_PERIOD  # Hz, twenty points a period
     found = curve(t, 2.0 + np.cos(2 * np.pi * f * t))
     assert found.is_band
     assert found.low[:-1] == pytest.approx(1.0, abs=0.05)  # the cosine's lowest of twenty points, at most 9 degrees off
@@ -43,7 +43,7 @@ def test_the_slew_of_a_stiff_arm_is_not_aliased_and_its_file_has_the_curve():
     data = slews(STEEL, default_gains(STEEL), Chain(), 8)
     records = data.without.between.t.size / data.without.t.size
     first = tfarm.modes(STEEL, 1).natural_frequency[-1] / (2 * np.pi)
-    assert (records + 1) * 100 >= POINTS * first > 400  # 400 a second is what three records gave
+    assert (records + 1) * 100 >= POINTS_A_PERIOD * first > 400  # 400 a second is what three records gave
     drawn, table = root_moment(data.without), slews_table(data, "t")
     columns = {column.key: np.array(column.values) for column in table.columns}
     assert drawn.is_band
@@ -58,11 +58,11 @@ def test_a_slew_under_any_law_is_resolved_too():
     law = tfarm.Law({"hub_rate": ([40.0, 0.0], [1.0, 300.0]), "hub_angle": 100.0})
     run = drawn(STEEL, law, Chain(), "impulse", 0.1)
     first = tfarm.modes(STEEL, 1).natural_frequency[-1] / (2 * np.pi)
-    assert (run.between.t.size / run.t.size + 1) * 100 >= POINTS * first
+    assert (run.between.t.size / run.t.size + 1) * 100 >= POINTS_A_PERIOD * first
     found, needed = points_a_period(STEEL, run)
-    assert found >= POINTS
+    assert found >= POINTS_A_PERIOD
     coarse = tfarm.simulate(STEEL, law, scenario_name="impulse", duration=0.1, count=20)
-    assert points_a_period(STEEL, coarse)[0] == pytest.approx(POINTS / (needed + 1), rel=0.1)
+    assert points_a_period(STEEL, coarse)[0] == pytest.approx(POINTS_A_PERIOD / (needed + 1), rel=0.1)
     assert "points a period" in tfarm.plots.slew(STEEL, coarse, ax=Figure().subplots(3))[0].get_title("right")
     assert tfarm.plots.slew(STEEL, run, ax=Figure().subplots(3))[0].get_title("right") == ""
 

@@ -11,7 +11,8 @@ from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import Analytic
 from tfarm.spectrum import box as box_module
 from tfarm.spectrum.box import Box, winding_number, zeros_in_box
-from tfarm.spectrum.continuation import Member, Node, follow, improved, predicted
+from tfarm.spectrum.continuation import Node, follow, predicted
+from tfarm.spectrum.correction import Member, improved
 from tfarm.spectrum.damped import complete_box, damped_modes, member
 
 

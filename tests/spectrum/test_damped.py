@@ -308,7 +308,7 @@ def test_shapes_are_conjugate_and_of_the_shape_of_x() -> None:
 
 def test_modes_that_cannot_be_followed_are_counted_in_the_record(monkeypatch) -> None:
     """As the command line answers: the first four of six, each as if four had been asked for, and proven."""
-    monkeypatch.setattr("tfarm.spectrum.damped.FEWER", (4, 2))
+    monkeypatch.setattr("tfarm.spectrum.damped.FEWER_MODES", (4, 2))
     undamped = tfarm.modes(tfarm.load("sasaki2012-lab"), 6)
     few, four = damped_modes(undamped), damped_modes(tfarm.modes(undamped.arm, 4))
     assert (few.left_out, four.left_out) == (2, 0)

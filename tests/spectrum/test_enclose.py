@@ -84,7 +84,7 @@ def test_a_double_eigenvalue_has_no_disc(monkeypatch: pytest.MonkeyPatch) -> Non
     omega = tfarm.modes(rigid, 2, theory="euler-bernoulli").natural_frequency
     arm = replace(rigid, link=replace(rigid.link, damping=2 / float(omega[1])))
     k = coefficients(arm, "euler-bernoulli")
-    monkeypatch.setattr(ball_axis, "MOST_BITS", 1000)
+    monkeypatch.setattr(ball_axis, "MOST_AXIS_BITS", 1000)
     with pytest.raises(CertificationError) as refused:
         enclosed(k, complex(-omega[1]) * (1 + 1e-4), 5)
     assert "\n" not in str(refused.value)

@@ -272,7 +272,7 @@ def test_memory_does_not_grow_with_the_square_of_the_count(monkeypatch):
     """Twice the modes have four times the points; what is evaluated at once stays the same, and so do the numbers."""
     whole = tfarm.modes(tfarm.load("sasaki2012"), 40)
     expected = whole.hub_participation, whole.sensitivity["length"]
-    monkeypatch.setattr("tfarm.spectrum.shapes.BLOCK", 2**10)
+    monkeypatch.setattr("tfarm.spectrum.shapes.QUADRATURE_BLOCK", 2**10)
     peaks = []
     for count in (40, 80):
         table = tfarm.modes(tfarm.load("sasaki2012"), count)

@@ -15,7 +15,7 @@ from tfarm.dsp.loop import sampled_loop
 from tfarm.dsp.verdict import sampled_verdict
 from tfarm.errors import ParameterError
 from tfarm.spectrum.scales import (
-    DIGITS,
+    DEFAULT_DIGITS,
     OF_THE_PAPER,
     PAPER_GAINS,
     RATE_SHARE,
@@ -52,7 +52,7 @@ def test_similar_arms_have_the_same_loop(arm, size):
     other, time, inertia = similar(arm, size, 0.3, 5.0)
     assert rate_unit(other) == pytest.approx(rate_unit(arm) * inertia / time, rel=100 * EPS)
     assert angle_unit(other) == pytest.approx(angle_unit(arm) * inertia / time**2, rel=100 * EPS)
-    rounding = 10.0 ** (1 - DIGITS)  # of both gains together
+    rounding = 10.0 ** (1 - DEFAULT_DIGITS)  # of both gains together
     assert pytest.approx(default_gains(arm).K1 * inertia / time, rel=rounding) == default_gains(other).K1
     here, there = (tfarm.closed_loop_poles(each, default_gains(each), 3).values for each in (arm, other))
     assert there * time == pytest.approx(here, rel=rounding)  # none moves by more than its gain does
@@ -62,7 +62,8 @@ def test_the_papers_arms_keep_the_papers_gains():
     """The misprinted density too, though its J w1 is twice as large; any other arm has its own."""
     assert {name for name in tfarm.presets() if name.startswith("sasaki")} == set(OF_THE_PAPER)
     assert {default_gains(tfarm.load(name)) for name in OF_THE_PAPER} == {PAPER_GAINS}
-    assert float(f"{RATE_SHARE * rate_unit(LAB):.{DIGITS}g}") == PAPER_GAINS.K1  # by the rule for every arm as well
+    rounded = f"{RATE_SHARE * rate_unit(LAB):.{DEFAULT_DIGITS}g}"
+    assert float(rounded) == PAPER_GAINS.K1  # by the rule for every arm as well
     renamed = replace(LAB, name="mine", assumptions=())
     assert default_gains(renamed) == PAPER_GAINS
     assert default_gains(replace(LAB, hub=Hub(inertia=10.0))).K1 > 1.0

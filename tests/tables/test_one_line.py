@@ -23,7 +23,7 @@ TWICE = Column(
 
 
 def test_one_more_column_of_the_modal_table_is_everywhere(monkeypatch, capsys):
-    monkeypatch.setattr(answers, "MODES", (*answers.MODES, TWICE))
+    monkeypatch.setattr(answers, "MODE_COLUMNS", (*answers.MODE_COLUMNS, TWICE))
     modes = tfarm.modes(tfarm.load("sasaki2012"), count=2)
     exact = (2 * modes.natural_frequency).tolist()
     table = modal_table(modes)

@@ -12,7 +12,7 @@ from tfarm.digits import general, within
 from tfarm.dsp.law_verdict import law_answer as sampled_law_answer
 from tfarm.loop.answers import MARGIN_COLUMNS, gain_rows, margins_answer, sizes_of
 from tfarm.loop.margins import Margins
-from tfarm.spectrum.answers import HELD
+from tfarm.spectrum.answers import EIGENVALUE_ERROR
 
 from .clocked import TITLES
 from .comparison import Comparison, Side
@@ -72,8 +72,8 @@ def modes_table(found: Comparison) -> Table:
     one, other = ([float(w) for w in side.modes.natural_frequency[side.modes.index > 0]] for side in found.sides)
     columns = (
         Column("mode", "mode", of=range(1, len(one) + 1)),
-        *Quantity("natural_frequency_rad_s", "w of ", "rad/s", relative=HELD).columns(found, one, other),
-        *Quantity("damping_ratio", "damping of ", absolute=HELD).columns(
+        *Quantity("natural_frequency_rad_s", "w of ", "rad/s", relative=EIGENVALUE_ERROR).columns(found, one, other),
+        *Quantity("damping_ratio", "damping of ", absolute=EIGENVALUE_ERROR).columns(
             found, found.one.damping_ratio, found.other.damping_ratio
         ),
     )
@@ -87,8 +87,8 @@ def poles_table(found: Comparison) -> Table:
     ratios = [[-pole.real / abs(pole) + 0.0 for pole in side] for side in zip(*pairs, strict=True)] or [[], []]
     columns = (
         Column("number", "pole", of=range(1, len(pairs) + 1)),
-        *Quantity("size_rad_s", "|s| of ", "rad/s", relative=HELD).columns(found, *sizes),
-        *Quantity("damping_ratio", "damping of ", absolute=HELD).columns(found, *ratios),
+        *Quantity("size_rad_s", "|s| of ", "rad/s", relative=EIGENVALUE_ERROR).columns(found, *sizes),
+        *Quantity("damping_ratio", "damping of ", absolute=EIGENVALUE_ERROR).columns(found, *ratios),
     )
     return Table(columns=columns)
 

@@ -27,7 +27,7 @@ from tfarm.errors import ConvergenceError
 from tfarm.records import record
 from tfarm.spectrum import modes
 from tfarm.spectrum.box import Box, winding_number
-from tfarm.spectrum.damped import CLEAR, member
+from tfarm.spectrum.damped import TOWARD_SINGULAR, member
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
@@ -75,7 +75,7 @@ def band_of(loop: AnyLoop) -> Band[AnyLoop] | None:
     C, remaining = plant.arm.damping, sampling.period * (1 - sampling.fraction)
     if C == 0.0 or loop.chain.actuator.hub_damping > 0.0:
         return None
-    line = min(CLEAR / C, DECAYED_EXPONENT / remaining)
+    line = min(TOWARD_SINGULAR / C, DECAYED_EXPONENT / remaining)
     top = _highest(loop, line)
     missing = None if top is None else _left_of(loop, line, top)
     if top is None or missing is None:
@@ -114,13 +114,12 @@ def _highest(loop: AnySampled, line: float) -> float | None:
 
 def _left_of(loop: AnySampled, line: float, top: float) -> Real | None:
     """The bound on all poles of the band left of the line; None where the integral cannot be had."""
-    sampling, exact, analog = loop.chain.sampling, loop.exact, np.array(loop.analog)[:, None]
-    T, remaining, corner = sampling.period, sampling.period * (1 - sampling.fraction), sampling.antialias_corner
+    sampling, exact = loop.chain.sampling, loop.exact
+    T, remaining = sampling.period, sampling.period * (1 - sampling.fraction)
 
     def sizes(s: Complex) -> Real:
         damped = np.exp(s.real * remaining) / -np.expm1(s.real * T)
-        passed = 1.0 if np.isinf(corner) else np.where(analog, corner / (s + corner), 1.0)  # by the analog filter
-        size: Real = abs(exact(s) * passed / s) * damped
+        size: Real = abs(exact(s) * _filter_factors(loop, s) / s) * damped
         return size
 
     up = _integral(lambda w: sizes(-line + 1j * w), np.r_[0.0, _graded(line / 10, top)])
@@ -143,6 +142,14 @@ def _integral(size: Callable[[Real], Real], ends: Real) -> Real | None:
             return found
         before, ends = values, np.sort(np.r_[ends, (ends[1:] + ends[:-1]) / 2])
     return None
+
+
+def _filter_factors(loop: AnySampled, s: Complex) -> Complex:
+    """What the analog filter makes of each output: wc/(s + wc) or 1."""
+    corner = loop.chain.sampling.antialias_corner
+    if np.isinf(corner):
+        return np.ones((len(loop.analog), 1), complex)
+    return np.array([corner / (s + corner) if analog else np.ones(s.size) for analog in loop.analog])
 
 
 def _of_the_filter(loop: AnySampled, line: float) -> Real:

@@ -91,7 +91,8 @@ class Converters:
             meaning = f"the range +-R of a converter is a positive, finite number{RANGE_UNITS[signal]}"
             object.__setattr__(self, f"{signal}_range", positive(f"converters.{signal}_range", span, meaning))
         elif bits is not None:
-            remedy = f"{bits} bits of what? give the range +-R{RANGE_UNITS[signal]} too, or leave converters.{signal}_bits out"
+            unit = RANGE_UNITS[signal]
+            remedy = f"{bits} bits of what? give the range +-R{unit} too, or leave converters.{signal}_bits out"
             raise ParameterError(key=f"converters.{signal}_range", value=span, remedy=remedy)
 
     @property

@@ -36,7 +36,7 @@ LISTED_DECAY = -20.0  # modes that lose more than this in ln|a| between two samp
 _LOG = "ln|z| per sample"
 _log = partial(Column, printed=singly("{:.3e}".format), on=ANSWER)
 _page_log = partial(Column, digits=singly(scientific, 3), group=_LOG, on=REPORT)
-MODE_COLUMNS = (  # of a `ModeTable`; what of it is small is the change of ln|z| per sample
+SAMPLED_MODE_COLUMNS = (  # of a `ModeTable`; what of it is small is the change of ln|z| per sample
     Column("index", "mode", on=ANSWER),
     Column("mode", "mode", of="index", on=REPORT),
     Column("natural_frequency_rad_s", of="natural_frequency", head="rad/s", printed=singly(general, 6), on=ANSWER),

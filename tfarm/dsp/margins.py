@@ -33,9 +33,7 @@ KEPT_BEYOND = 2  # modes kept beyond the last one that outlives a sample
 MODES_BEYOND = 4  # those of a whole loop that do not outlive a sample
 MOST_LOOP_MODES = 128  # of a whole loop: half a second of work
 FEWER_SHARES = (0.85, 0.72, 0.61, 0.54)  # of these, tried in turn where two damped modes cannot be told apart
-SURELY_OVERDAMPED = (
-    2.5  # C w from which on a bending mode surely is: following it further costs a hundred times as much
-)
+SURELY_OVERDAMPED = 2.5  # C w from which on a mode surely is: following it further costs a hundred times as much
 FAR_BEYOND = 5.0  # of critical in the first mode: all poles of bending lie left of any line, one mode shows it as well
 STRONGEST = 0.15  # of critical in the first mode: no stronger damping is looked at
 DAMPING_DECADES = 16  # down from there
@@ -145,9 +143,8 @@ def log_radius_with(
 
     Modes that a strong C has settled before the next sample, or overdamped, are left to the remainder, but for a few.
     """
-    count = min(
-        count, KEPT_BEYOND + alive(arm.having(damping=C), chain), KEPT_BEYOND + modes_below(arm, SURELY_OVERDAMPED / C)
-    )
+    outliving = min(alive(arm.having(damping=C), chain), modes_below(arm, SURELY_OVERDAMPED / C))
+    count = min(count, KEPT_BEYOND + outliving)
     for nudge in (0.0, 1e-6, -1e-6):
         try:
             loop = sampled_loop(arm.having(damping=C * (1 + nudge)), gains, chain, count=count, branches=branches)
@@ -172,9 +169,8 @@ def most_modes(arm: Arm, chain: Chain) -> int:
     """
     if not arm.least_damping:
         return MOST_LOOP_MODES
-    return min(
-        MOST_LOOP_MODES, MODES_BEYOND + min(alive(arm, chain), modes_below(arm, SURELY_OVERDAMPED / arm.least_damping))
-    )
+    outliving = min(alive(arm, chain), modes_below(arm, SURELY_OVERDAMPED / arm.least_damping))
+    return min(MOST_LOOP_MODES, MODES_BEYOND + outliving)
 
 
 def whole_loop(arm: Arm, gains: HubFeedback, chain: Chain, branches: Branching = all_damped_modes) -> SampledLoop:

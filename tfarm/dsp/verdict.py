@@ -12,7 +12,7 @@ from tfarm.arm.checks import whole
 from tfarm.columns import Table
 from tfarm.dsp.band import Band, band_of
 from tfarm.dsp.chain import Chain, Sampling
-from tfarm.dsp.law import MODE_COLUMNS, ModeTable, growing_mode, mode_table
+from tfarm.dsp.law import SAMPLED_MODE_COLUMNS, ModeTable, growing_mode, mode_table
 from tfarm.dsp.law_loop import AnyLoop, SampledLaw
 from tfarm.dsp.loop import check_loop, resized, sampled_loop
 from tfarm.dsp.margins import DelayMargin, Window, around, whole_loop
@@ -242,7 +242,7 @@ def sampled_answer(analysis: Analysis) -> dict[str, Any]:
             "delay_margin_samples": _figure(analysis.delay),
             "required_damping_s": _figure(analysis.damping),
         },
-        "modes": Table(columns=MODE_COLUMNS, record=analysis.modes),
+        "modes": Table(columns=SAMPLED_MODE_COLUMNS, record=analysis.modes),
     }
 
 

@@ -11,7 +11,7 @@ from tfarm.arm.law import Law
 from tfarm.columns import JSON, REPORT, TERMINAL, Column, Table
 from tfarm.digits import general, plain, singly, within
 from tfarm.response.signals import Signals
-from tfarm.spectrum.answers import HELD
+from tfarm.spectrum.answers import EIGENVALUE_ERROR
 
 from .law_loop import LawLoop
 from .law_stability import signs_of_loop
@@ -24,9 +24,13 @@ from .windows import Interval, Windows, reach_words
 
 LAW_IN_WORDS = f"u = -{SPELT_OUT} + r"
 POLE_COLUMNS = (  # of pairs Re s, Im s
-    Column("re", "Re s", "1/s", of=lambda pole: within(pole[0], HELD * math.hypot(*pole), 12)),
+    Column("re", "Re s", "1/s", of=lambda pole: within(pole[0], EIGENVALUE_ERROR * math.hypot(*pole), 12)),
     Column("im", "Im s", "rad/s", of=lambda pole: pole[1], digits=singly(general, 12)),
-    Column("ratio", "damping ratio", of=lambda pole: within(-pole[0] / math.hypot(*pole), HELD, 6) if pole[1] else "-"),
+    Column(
+        "ratio",
+        "damping ratio",
+        of=lambda pole: within(-pole[0] / math.hypot(*pole), EIGENVALUE_ERROR, 6) if pole[1] else "-",
+    ),
 )
 
 

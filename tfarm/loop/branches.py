@@ -19,7 +19,8 @@ from tfarm.arm import RATE_GAIN, Arm, HubFeedback
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
 from tfarm.spectrum import damped_modes, modes
-from tfarm.spectrum.continuation import Node, corrected, follow, through
+from tfarm.spectrum.continuation import Node, follow, through
+from tfarm.spectrum.correction import corrected
 from tfarm.spectrum.damped import COMPANY, single_zeros
 from tfarm.spectrum.scales import rate_unit
 

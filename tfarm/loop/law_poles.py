@@ -16,7 +16,7 @@ from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.reduced.sensed import closed, in_series, pade, sensed_model
 from tfarm.spectrum import modes_below
 from tfarm.spectrum.box import Box, complete
-from tfarm.spectrum.damped import CLEAR
+from tfarm.spectrum.damped import TOWARD_SINGULAR
 
 from .frequencies import band_of, steep_places
 from .law_loop import LawLoop
@@ -70,8 +70,9 @@ def law_box(loop: LawLoop, height: float, late: float = LATE) -> Box:
     """A box of that height, right of the law's poles and until |L| is small; left short of -1/C and -late/delay."""
     own, C = loop.law.poles, loop.arm.damping
     right = quiet_edge(loop, 1.1 * max([0.1 * height, *own.real.tolist()]), height, 60, HEIGHTS_RIGHT)
-    left = min(HEIGHTS_LEFT * height, CLEAR / C if C else np.inf, late / loop.law.delay if loop.law.delay else np.inf)
-    return Box(-float(left), float(right), -height, height)
+    clear = TOWARD_SINGULAR / C if C else np.inf
+    left = min(HEIGHTS_LEFT * height, clear, late / loop.law.delay if loop.law.delay else np.inf)
+    return Box(-float(left), right, -height, height)
 
 
 def starting_points_of(loop: LawLoop, up_to: float) -> Complex:

@@ -18,7 +18,8 @@ from tfarm.arm.checks import whole
 from tfarm.crossing.turning import loose
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
-from tfarm.spectrum.continuation import Member, corrected, follow
+from tfarm.spectrum.continuation import follow
+from tfarm.spectrum.correction import Member, corrected
 
 from .branches import MAY_PASS_ORIGIN, NOBODY, Segment, followed, ordered
 from .crossings import BranchCrossing, crossings

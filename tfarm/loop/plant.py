@@ -14,7 +14,7 @@ from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import Gains, gains_of, loop_parts, torque
 from tfarm.exact.system import System, system_of
 from tfarm.records import record
-from tfarm.spectrum.continuation import Member
+from tfarm.spectrum.correction import Member
 from tfarm.spectrum.damped import member
 from tfarm.spectrum.scales import check_gains
 

@@ -20,8 +20,8 @@ from tfarm.errors import CertificationError, ConvergenceError, ParameterError
 from tfarm.exact.characteristic import zeros_at_origin
 from tfarm.records import record
 from tfarm.response.frequency import AXIS_SHARE
-from tfarm.spectrum.box import GROWTH, Box, complete
-from tfarm.spectrum.damped import CLEAR
+from tfarm.spectrum.box import TRIED_HEIGHTS, Box, complete
+from tfarm.spectrum.damped import TOWARD_SINGULAR
 from tfarm.spectrum.enclose import Disc, disjoint, enclosed, proven_count
 
 from .frequencies import band_of, steep_places
@@ -42,7 +42,7 @@ LEAST_SQUARABLE = 1e-140  # 1/s: whose square is still a full double
 AnyLoop = TypeVar("AnyLoop", bound=Loop | LawLoop, default=Loop)  # hub gains, unless another law is said
 LEAST_REAL_PART = -0.5  # of L, so that 1 + L has no zero
 BEYOND_EDGE = (2.0, 5.0, 20.0)  # times the right edge of a box, where L is looked at again
-SHRUNK_HEIGHTS = tuple(1 / factor for factor in GROWTH)
+SHRUNK_HEIGHTS = tuple(1 / factor for factor in TRIED_HEIGHTS)
 
 
 def counted(zeros: Complex) -> int:
@@ -145,7 +145,7 @@ def closed_loop_poles(arm: Arm, law: HubFeedback, count: int | None = None) -> P
         number *= 2
 
 
-def poles_below(loop: Loop, height: float, factors: tuple[float, ...] = GROWTH) -> Poles:
+def poles_below(loop: Loop, height: float, factors: tuple[float, ...] = TRIED_HEIGHTS) -> Poles:
     """All closed-loop poles with |Im s| <= height, and more than about -1.5 heights or -0.8/C in Re s.
 
     Where a zero lies on the edge of the box the next of the `factors` on the height is tried.
@@ -165,7 +165,7 @@ def poles_below(loop: Loop, height: float, factors: tuple[float, ...] = GROWTH) 
 def box_of(loop: Loop, height: float) -> Box:
     """A box of that height which reaches far enough right for any unstable pole, and left short of -1/C."""
     right, left, C = quiet_edge(loop, 0.1 * height, height, 40, 1e3), 1.5 * height, loop.arm.damping
-    return Box(-min(left, CLEAR / C) if C else -left, right, -height, height)
+    return Box(-min(left, TOWARD_SINGULAR / C) if C else -left, right, -height, height)
 
 
 def quiet_edge(loop: Loop | LawLoop, right: float, height: float, points: int, heights: float) -> float:

@@ -15,7 +15,7 @@ from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import Analytic, gains_of, quick_characteristics, zeros_at_origin
 from tfarm.exact.system import System, system_of
 from tfarm.records import record
-from tfarm.spectrum.continuation import Member
+from tfarm.spectrum.correction import Member
 
 from .lines import NO_FEEDBACK, Line
 from .plant import Loop

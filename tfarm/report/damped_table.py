@@ -10,7 +10,7 @@ from tfarm.arm import Arm
 from tfarm.columns import Column, Table
 from tfarm.digits import plain, significant
 from tfarm.spectrum import DampedModes, Modes, damped_modes, modes
-from tfarm.spectrum.answers import DAMPED_MODES
+from tfarm.spectrum.answers import DAMPED_MODE_COLUMNS
 
 DAMPED = (
     "Eigenvalues of the arm with its own damping, C = {C} s, each continued from the undamped mode of its number. "
@@ -70,6 +70,6 @@ def damped_table(undamped: Modes) -> Table:
         caption=(DAMPED if C else NO_C).format(
             C=plain(C), count=damped.count, rigid=rigid, outside=("" if inside.all() else OUTSIDE) + left_out, **words
         ),
-        columns=(*DAMPED_MODES, Column("complete", "list complete", of=[PLACES[bool(each)] for each in inside])),
+        columns=(*DAMPED_MODE_COLUMNS, Column("complete", "list complete", of=[PLACES[bool(each)] for each in inside])),
         record=damped,
     )

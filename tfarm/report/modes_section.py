@@ -109,10 +109,11 @@ def _flexible(modes: Modes) -> Real:
 def modal_table(modes: Modes) -> Table:
     """Frequencies, hub participation, modal moment and nodes."""
     nodes = [", ".join(places(node, modes.arm.length)) or "none" for node in modes.nodes]
-    decimals = answers.KEPT - 1 - math.floor(math.log10(modes.arm.length))  # a node is known as a share of the length
+    # a node is known as a share of the length
+    decimals = answers.SHAPE_DIGITS - 1 - math.floor(math.log10(modes.arm.length))
     at = [tuple(np.round(node, decimals).tolist()) for node in modes.nodes]
     rigid = "Row 0 is the arm turning as a rigid body. " if modes.arm.has_rigid_mode else ""
-    omega, hertz = (column.read(modes).cells for column in answers.MODES[1:3])
+    omega, hertz = (column.read(modes).cells for column in answers.MODE_COLUMNS[1:3])
     return Table(
         stem="modal-table",
         title="Modal table",
@@ -122,7 +123,7 @@ def modal_table(modes: Modes) -> Table:
             hub=LOCKED if modes.arm.is_locked else FREE_PIN if modes.arm.has_massless_hub else "",
             proof=how_proven(modes, omega, hertz),
         ),
-        columns=(*answers.MODES, Column("nodes_m", "nodes", "m", of=at, shown=nodes, on=REPORT)),
+        columns=(*answers.MODE_COLUMNS, Column("nodes_m", "nodes", "m", of=at, shown=nodes, on=REPORT)),
         record=modes,
     )
 
@@ -145,7 +146,7 @@ def _shapes(name: str, shapes: tuple[Shape, ...]) -> Picture:
     counts = ", ".join(str(len(shape.nodes)) for shape in shapes)
     columns = [Column("x_m", "x", "m", of=shapes[0].x)]
     columns += [
-        Column(f"mode_{s.number}", f"mode {s.number}", of=np.round(s.w, answers.KEPT - 1) + 0.0) for s in shapes
+        Column(f"mode_{s.number}", f"mode {s.number}", of=np.round(s.w, answers.SHAPE_DIGITS - 1) + 0.0) for s in shapes
     ]
     return Picture(
         stem="mode-shapes",
@@ -200,7 +201,7 @@ def sensitivity_table(modes: Modes) -> Table:
     """Per cent of frequency per per cent of each parameter: a row a parameter, a column a mode."""
     flexible = modes.index > 0
     rows = {
-        name.replace("youngs", "Young's").replace("_", " "): np.round(values[flexible], answers.KEPT - 1) + 0.0
+        name.replace("youngs", "Young's").replace("_", " "): np.round(values[flexible], answers.SHAPE_DIGITS - 1) + 0.0
         for name, values in modes.sensitivity.items()
     }
     shown = {name: values for name, values in rows.items() if abs(values).max() > NEGLECTED}

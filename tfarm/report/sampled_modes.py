@@ -5,7 +5,7 @@ from __future__ import annotations
 from tfarm.arm import PLANE
 from tfarm.columns import Column, Table
 from tfarm.digits import plain
-from tfarm.dsp.law import MODE_COLUMNS, ModeTable
+from tfarm.dsp.law import SAMPLED_MODE_COLUMNS, ModeTable
 from tfarm.dsp.loci import Loci
 from tfarm.dsp.loop import SampledLoop
 
@@ -24,7 +24,7 @@ def mode_rows(loop: SampledLoop, table: ModeTable, stem: str) -> Table:
         stem=stem,
         title="The sampled loop, mode by mode",
         caption=MODE_TABLE.format(ms=plain(1e3 * T), half=plain(0.5 / T), gains=" and ".join(PLANE)),
-        columns=MODE_COLUMNS,
+        columns=SAMPLED_MODE_COLUMNS,
         record=table,
     )
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from tfarm.columns import Column, Table
 from tfarm.digits import general, singly, within
-from tfarm.spectrum.answers import HELD
+from tfarm.spectrum.answers import EIGENVALUE_ERROR
 
 from .frequency import Bode
 from .transfer import TransferFunction
@@ -56,7 +56,7 @@ ROOT_COLUMNS = (  # of (s, |G| at i Im s, or of a real root at i |s|)
         "Re s",
         "1/s",
         of=lambda row: float(row[0].real),
-        shown=lambda row: within(float(row[0].real), HELD * abs(row[0]), 10),
+        shown=lambda row: within(float(row[0].real), EIGENVALUE_ERROR * abs(row[0]), 10),
     ),
     Column("im", "Im s", "rad/s", of=lambda row: float(row[0].imag), digits=singly(general, 10)),
     Column("frequency_hz", "Im s/2 pi", "Hz", of=lambda row: float(row[0].imag) / HERTZ, digits=singly(general, 8)),

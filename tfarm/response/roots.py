@@ -21,11 +21,10 @@ from tfarm.exact.outputs import Output
 from tfarm.exact.system import System, system_of
 from tfarm.records import record
 from tfarm.spectrum import flexible_frequencies
-from tfarm.spectrum.box import REAL, Box, Function, complete
+from tfarm.spectrum.box import REAL_SHARE, Box, Function, complete
+from tfarm.spectrum.damped import TOWARD_SINGULAR
 
 Complex = NDArray[np.complexfloating[Any, Any]]
-
-CLEAR = 0.8  # how far towards the accumulation point -1/C a box may reach
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,10 +135,10 @@ def _in_box(k: System, function: Function, at_zero: int, up_to: float, starts: C
     """Zeros of the quantity in a box of that height; the box grows a little where a zero lies on its edge."""
 
     def box_of(height: float) -> Box:
-        return Box(-min(CLEAR / k.damping, height) if k.damping else -height, height, -height, height)
+        return Box(-min(TOWARD_SINGULAR / k.damping, height) if k.damping else -height, height, -height, height)
 
     found, box = complete(function, box_of, up_to, starts)
     if k.is_undamped:  # zeros come in +- pairs too
-        found = np.where(abs(found.real) < REAL * abs(found), 1j * found.imag, found)
+        found = np.where(abs(found.real) < REAL_SHARE * abs(found), 1j * found.imag, found)
     found = found[np.lexsort((-found.imag, found.real.round(9), abs(found.imag).round(9)))]
     return Roots(np.r_[np.zeros(at_zero, complex), found], (*box,), "winding number")

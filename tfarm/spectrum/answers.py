@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -17,12 +17,12 @@ from tfarm.exact.methods import Method
 from .damped import DampedModes, damped_modes
 from .table import Modes, Real, compare_theories, hub_locked
 
-KEPT = 10  # digits in a report's files of what shapes are needed for: these differ by 1e-14 from processor to processor
-HELD = 2e-14  # of an eigenvalue's size: what its float64 may be off (tests: 1e-14 to 50 digits, 64 eps in closed form)
-SMALL = 1e-3  # a damping ratio below this has less than three digits in five decimals
+SHAPE_DIGITS = 10  # in a report's files, of what shapes are needed for: these differ by 1e-14 between processors
+EIGENVALUE_ERROR = 2e-14  # of its size: what a float64 may be off (tests: 1e-14 to 50 digits, 64 eps in closed form)
+SMALL_RATIO = 1e-3  # a damping ratio below this has less than three digits in five decimals
 IN_THE_BOX = "complete in the box; lightly damped shear modes exist above any box, real eigenvalues accumulate at -1/C"
-NO_C = "complete in the box; above it there are more, ever less damped, as no segment is (C = 0)"
-LOCKED = (
+IN_THE_BOX_WITHOUT_C = "complete in the box; above it there are more, ever less damped, as no segment is (C = 0)"
+LOCKED_NOTE = (
     "hub locked: the frequencies with the hub held still. A hub that dry friction holds, as it mostly does once a slew "
     "is over, rings there and not at the free ones: a measured number near this column says that the hub stood still."
 )
@@ -34,11 +34,7 @@ def _by_row(columns: Mapping[Any, Real]) -> list[dict[str, float]]:
     return [dict(zip(columns, row, strict=True)) for row in rows]
 
 
-def _places(nodes: Sequence[Real]) -> list[str]:
-    return [" ".join(f"{x:.4f}" for x in each) or "-" for each in nodes]
-
-
-MODES = (  # of `Modes`; a page adds the nodes, which it rounds to a share of the length
+MODE_COLUMNS = (  # of `Modes`; a page adds the nodes, which it rounds to a share of the length
     Column("index", "mode"),
     Column(
         "natural_frequency_rad_s", "natural frequency", "rad/s", of="natural_frequency", digits=lined(8, 7),
@@ -47,14 +43,14 @@ MODES = (  # of `Modes`; a page adds the nodes, which it rounds to a share of th
     Column("natural_frequency_hz", "", "Hz", digits=lined(8, 7), head="Hz", printed=singly(general, 9)),
     Column("hub_participation", "hub participation b", printed=singly(general, 6), on=ANSWER),
     Column("modal_moment", "modal moment", "N m", printed=singly(general, 6), on=ANSWER),
-    Column("nodes_m", "nodes", "m", of=lambda modes: [x.tolist() for x in modes.nodes], printed=_places, folds=True,
-           on=ANSWER),
+    Column("nodes_m", "nodes", "m", of=lambda modes: [x.tolist() for x in modes.nodes], folds=True, on=ANSWER,
+           printed=lambda nodes: [" ".join(f"{x:.4f}" for x in each) or "-" for each in nodes]),
     Column("theories_rad_s", of=lambda modes: _by_row(compare_theories(modes)), on=(JSON,)),
     Column("sensitivity", of=lambda modes: _by_row(modes.sensitivity), on=(JSON,)),
     Column("hub_participation", "hub participation b", "1/√(kg m²)",
-           of=lambda modes: held(modes.hub_participation, KEPT), digits=lined(7, 4), on=REPORT),
-    Column("modal_moment", "modal moment", "N m/√(kg m²)", of=lambda modes: held(modes.modal_moment + 0.0, KEPT),
-           digits=lined(7, 4), on=REPORT),
+           of=lambda modes: held(modes.hub_participation, SHAPE_DIGITS), digits=lined(7, 4), on=REPORT),
+    Column("modal_moment", "modal moment", "N m/√(kg m²)",
+           of=lambda modes: held(modes.modal_moment + 0.0, SHAPE_DIGITS), digits=lined(7, 4), on=REPORT),
 )  # fmt: skip
 
 
@@ -67,10 +63,10 @@ def _imaginary(damped: DampedModes) -> list[str]:
 
 def _ratio(ratio: float) -> str:
     """Five decimals; a ratio that would lose its digits there has four of its own; 0 of a rigid body."""
-    return "0" if ratio == 0 else f"{ratio:.5f}" if ratio >= SMALL else significant(ratio, 4)
+    return "0" if ratio == 0 else f"{ratio:.5f}" if ratio >= SMALL_RATIO else significant(ratio, 4)
 
 
-DAMPED_MODES = (  # of `DampedModes`, on a page; a command has them beside the undamped ones
+DAMPED_MODE_COLUMNS = (  # of `DampedModes`, on a page; a command has them beside the undamped ones
     Column("index", "mode"),
     Column("eigenvalue_re", "Re s", "1/s", of=lambda damped: damped.eigenvalues[:, 0].real, digits=lined(7, 6)),
     Column("eigenvalue_im", "Im s", "rad/s", of=lambda damped: damped.eigenvalues[:, 0].imag, shown=_imaginary),
@@ -94,7 +90,7 @@ def modes_answer(
         "theory": modes.theory,
         "method": method,
         "input": modes.arm.input,
-        "hub_locked_note": None if modes.arm.is_locked else LOCKED,
+        "hub_locked_note": None if modes.arm.is_locked else LOCKED_NOTE,
     }
     if digits is not None:
         answer["digits"] = digits
@@ -107,33 +103,40 @@ def modes_answer(
         answer |= {"proven_complete": True, "proof": {"count": proof.count, "below_rad_s": proof.below}}
     if not modes.arm.is_undamped:
         damped = damped_modes(modes)
-        columns = _with_damping(columns, damped, len(modes), wanted)
+        columns = [replace(column, on=(JSON,)) if column.key == "nodes_m" else column for column in columns]
+        discs = [] if wanted is None else [_discs(damped, len(modes), wanted)]
+        columns = [*columns[:3], *_damped(damped, len(modes)), *columns[3:], *discs]
         answer |= _damped_answer(damped) | ({} if wanted is None else {"proven_complete_in_box": True})
     return answer | {"modes": Table(columns=tuple(columns), record=modes)}
 
 
 def _undamped(modes: Modes, digits: int | None, method: Method) -> list[Column]:
-    """The columns of `MODES`, frequencies in the digits asked for, and those with the hub locked beside them."""
+    """`MODE_COLUMNS`, frequencies in the digits asked for, and beside each that of its number with the hub locked.
+
+    None stands beside a rigid body's; on a terminal the column is there if the hub turns.
+    """
     exact = modes.digits(digits) if digits is not None else []
     found = modes.frequencies(method)
     given = {
         "natural_frequency_rad_s": exact if digits is not None and digits > 15 else found,
         "natural_frequency_hz": found / (2 * math.pi),
     }
-    columns = [replace(column, of=given.get(column.key, column.of)) for column in MODES]
-    return [*columns[:3], _locked(modes, digits), *columns[3:]]
-
-
-def _with_damping(columns: list[Column], damped: DampedModes, rows: int, wanted: int | None) -> list[Column]:
-    """The columns with those of the eigenvalues, and of their discs in so many digits; the nodes go to files."""
-    shown = [replace(column, on=(JSON,)) if column.key == "nodes_m" else column for column in columns]
-    discs = [] if wanted is None else [_discs(damped, rows, wanted)]
-    return [*shown[:3], *_damped(damped, rows), *shown[3:], *discs]
+    columns = [replace(column, of=given.get(column.key, column.of)) for column in MODE_COLUMNS]
+    held_still, rigid = hub_locked(modes), [MISSING] * int(np.sum(modes.index == 0))
+    flexible = held_still.index > 0
+    if digits is not None and digits > 15:
+        still: list[Any] = held_still.digits(digits)[-int(flexible.sum()) :]
+    else:
+        still = held_still.natural_frequency[flexible].tolist()
+    texts = ["-"] * len(rigid) + [each if isinstance(each, str) else general(each, 12) for each in still]
+    on = (JSON,) if modes.arm.is_locked else ANSWER
+    locked = Column("hub_locked_rad_s", "hub locked", "rad/s", of=[*rigid, *still], shown=texts, on=on)
+    return [*columns[:3], locked, *columns[3:]]
 
 
 def _damped_answer(damped: DampedModes) -> dict[str, Any]:
     """The box of the eigenvalues, and what of them is in no row."""
-    note = IN_THE_BOX if damped.undamped.arm.damping else NO_C
+    note = IN_THE_BOX if damped.undamped.arm.damping else IN_THE_BOX_WITHOUT_C
     answer: dict[str, Any] = {"box": list(damped.box), "eigenvalues_in_box": damped.count, "box_note": note}
     if damped.others:
         answer["circuit_eigenvalues"] = list(damped.others)
@@ -143,30 +146,17 @@ def _damped_answer(damped: DampedModes) -> dict[str, Any]:
     return answer
 
 
-def _locked(modes: Modes, digits: int | None) -> Column:
-    """The frequency of each number with the hub locked; none beside a rigid body.  On a terminal if the hub turns."""
-    held_still, rigid = hub_locked(modes), [MISSING] * int(np.sum(modes.index == 0))
-    flexible = held_still.index > 0
-    if digits is not None and digits > 15:
-        found: list[Any] = held_still.digits(digits)[-int(flexible.sum()) :]
-    else:
-        found = held_still.natural_frequency[flexible].tolist()
-    texts = ["-"] * len(rigid) + [each if isinstance(each, str) else general(each, 12) for each in found]
-    on = (JSON,) if modes.arm.is_locked else ANSWER
-    return Column("hub_locked_rad_s", "hub locked", "rad/s", of=[*rigid, *found], shown=texts, on=on)
-
-
 def _damped(damped: DampedModes, rows: int) -> list[Column]:
     """Eigenvalue, or two real ones, and damping ratio of each mode that was followed, in as many rows as there are."""
     turning = (damped.index == 0) & (damped.eigenvalues[:, 1] != 0)  # friction resists the rigid body
     over, ratios = (damped.is_overdamped | turning).tolist(), damped.damping_ratio.tolist()
     pairs = list(zip(damped.eigenvalues.tolist(), over, strict=True))
     texts = [
-        f"{p.real:.8g} and {q.real:.8g}" if both else f"{within(p.real, HELD * abs(p), 8)} + {p.imag:.10g}i"
+        f"{p.real:.8g} and {q.real:.8g}" if both else f"{within(p.real, EIGENVALUE_ERROR * abs(p), 8)} + {p.imag:.10g}i"
         for (p, q), both in pairs
     ]
     words = [
-        f"{ratio:.6g} (overdamped)" if ratio and both else within(ratio, HELD, 6)
+        f"{ratio:.6g} (overdamped)" if ratio and both else within(ratio, EIGENVALUE_ERROR, 6)
         for ratio, both in zip(ratios, over, strict=True)
     ]
     rest = [MISSING] * (rows - len(pairs))

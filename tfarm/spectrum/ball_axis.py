@@ -21,7 +21,7 @@ from .half_waves import pinned_count, real_waves
 Ball = Any
 _minors = plain(from_waves)
 
-MOST_BITS = 40_000
+MOST_AXIS_BITS = 40_000  # of working precision: a root that needs more is double
 
 
 class Axis:
@@ -85,6 +85,6 @@ def secant(axis: Axis | ChainAxis, omega: float, digits: int) -> Ball | None:
 def precisions(digits: int) -> Iterator[int]:
     """Working precisions [bits] worth trying for so many digits, each twice the one before."""
     bits = int(3.33 * digits) + 80
-    while bits < MOST_BITS:
+    while bits < MOST_AXIS_BITS:
         yield bits
         bits *= 2

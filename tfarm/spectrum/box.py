@@ -22,17 +22,17 @@ from tfarm.exact.characteristic import Analytic
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 
-TURN = 0.6  # rad: a longer step of the phase along the contour is halved
+LONGEST_TURN = 0.6  # rad: a longer step of the phase along the contour is halved
 FORESEEN = 1.0  # so is one over which ln f, phase or size, would change by more at the rate of either end
-FINEST = 1e-13  # a contour cannot be resolved closer to a zero than this share of |s|
-NARROW = 1e-8  # of a box: in a wide one the part near s = 0 is resolved as finely as in one of this size
-MOST_POINTS = 200_000  # of a contour
+NEAREST_TO_ZERO = 1e-13  # a contour cannot be resolved closer to a zero than this share of |s|
+NARROW_BOX = 1e-8  # of a box: in a wide one the part near s = 0 is resolved as finely as in one of this size
+MOST_CONTOUR_POINTS = 200_000  # of a contour
 MOST_CALLS = 30_000  # of the function in one search; the most that 300 random loops took is 4,100
-DEAD = 1e-8  # nearer to s = 0 than this share of a box Newton's method is not believed: a zero there forces cuts
-SAME = 0.1  # of its size: a zero found so near a known one is that one
-DEEPEST = 60  # cuts: then a box is a share of 2^-30 of the first, less than float64 can search
-REAL = 1e-11  # of its size: a smaller imaginary part is rounding
-GROWTH = (1.0, 1.0041, 1.0093, 1.0171, 1.0311, 1.0573, 1.113)  # heights tried where a zero lies on the edge of a box
+DEAD_ZONE = 1e-8  # nearer to s = 0 than this share of a box Newton's method is not believed: a zero there forces cuts
+SAME_BOX_ZERO = 0.1  # of its size: a zero found so near a known one is that one
+MOST_CUTS = 60  # cuts: then a box is a share of 2^-30 of the first, less than float64 can search
+REAL_SHARE = 1e-11  # of its size: a smaller imaginary part is rounding
+TRIED_HEIGHTS = (1.0, 1.0041, 1.0093, 1.0171, 1.0311, 1.0573, 1.113)  # of a box, where a zero lies on its edge
 SHRINKING = 0.9  # of a move of Newton's: the next one, at a zero of order up to ten
 SPLIT = 0.4871  # where a box is cut: off the axes, on which zeros like to lie
 
@@ -89,13 +89,13 @@ def winding_number(function: Function, box: Box, points: int = 40) -> int:
     while True:
         length, step = end[0] - start[0], np.angle(np.exp(1j * (end[1] - start[1]).real))
         foreseen = abs(length) * np.maximum(abs(start[2]), abs(end[2]))
-        smooth = (abs(step) <= TURN) & (foreseen <= FORESEEN)  # not so what is no number
+        smooth = (abs(step) <= LONGEST_TURN) & (foreseen <= FORESEEN)  # not so what is no number
         turned += float(step[smooth].sum())
         start, end, length, step = start[:, ~smooth], end[:, ~smooth], length[~smooth], step[~smooth]
         if not length.size:
             break
-        smallest = FINEST * np.clip(abs(start[0]), NARROW * across, across)
-        if seen > MOST_POINTS or (abs(length) < smallest).any():
+        smallest = NEAREST_TO_ZERO * np.clip(abs(start[0]), NARROW_BOX * across, across)
+        if seen > MOST_CONTOUR_POINTS or (abs(length) < smallest).any():
             raise ConvergenceError(f"a zero lies on the contour near {start[0, 0]:.6g}", start[0, 0], step[0])
         halfway = (start[0] + end[0]) / 2
         middle = np.array([halfway, *_phase(function, halfway)])
@@ -173,7 +173,7 @@ def complete(
     height: float,
     starts: Complex,
     known: Complex = NOTHING_KNOWN,
-    factors: Sequence[float] = GROWTH,
+    factors: Sequence[float] = TRIED_HEIGHTS,
 ) -> tuple[Complex, Box]:
     """All zeros of a function that is real on the real axis in the box of a height, and that box.
 
@@ -185,7 +185,7 @@ def complete(
             return complete(function, box_of, factor * height, starts, known, (1.0,))
     box = box_of(factors[-1] * height)
     found = zeros_in_box(function, box, starts, known)
-    return np.where(abs(found.imag) < REAL * abs(found), found.real, found), box
+    return np.where(abs(found.imag) < REAL_SHARE * abs(found), found.real, found), box
 
 
 def _search(function: Function, box: Box, starts: Complex, known: Complex, depth: int) -> Complex:
@@ -197,14 +197,14 @@ def _search(function: Function, box: Box, starts: Complex, known: Complex, depth
     ).ravel()
     found = newton(function, np.concatenate([starts[box.holds(starts)], grid]))
     width = max(box.re_max - box.re_min, box.im_max - box.im_min)
-    found = found[box.holds(found) & (abs(found) > DEAD * width)]  # deflated zeros at s = 0 leave noise around it
-    again = (abs(found[:, None] - known) < SAME * abs(known)).any(axis=1)
+    found = found[box.holds(found) & (abs(found) > DEAD_ZONE * width)]  # deflated zeros at s = 0 leave noise around it
+    again = (abs(found[:, None] - known) < SAME_BOX_ZERO * abs(known)).any(axis=1)
     found = np.concatenate([known[box.holds(known)], found[~again]])
     if found.size == expected:
         return found
     if found.size == 1 and width < 1e-6 * abs(found[0]):
         return np.repeat(found, expected)
-    if depth > DEEPEST:
+    if depth > MOST_CUTS:
         where = f"{box.re_min:.3g} < Re s < {box.re_max:.3g}, {box.im_min:.3g} < Im s < {box.im_max:.3g}"
         raise ConvergenceError(
             f"of {expected} zeros with {where} only {found.size} could be told apart", found, expected

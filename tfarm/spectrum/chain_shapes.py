@@ -20,9 +20,9 @@ from tfarm.exact.chain import Chain
 from tfarm.exact.chain_values import free_fields
 from tfarm.exact.elements import Body, Place, Segment
 
-Real = NDArray[np.float64]
+from .shapes import GAUSS_POINTS
 
-GAUSS = 16  # points a panel; exact for the products of waves below once a panel holds a few radians
+Real = NDArray[np.float64]
 
 
 class ChainShapes:
@@ -106,7 +106,7 @@ class ChainShapes:
 
     def panels(self) -> Iterator[tuple[Segment, Real, tuple[Place, ...]]]:
         """Each segment with Gauss points along it and their weights as shares of the whole length."""
-        nodes, weights = np.polynomial.legendre.leggauss(GAUSS)
+        nodes, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
         position = Fraction(1)
         for each in self.chain.segments:
             S = self.omega.max(initial=0.0) ** 2

@@ -4,9 +4,8 @@ A mode is a pair of zeros of a real-analytic function, conjugate or both real.  
 distance or (where they are far apart) their product, stay smooth where a pair meets on the real axis and parts there,
 and for Kelvin-Voigt damping of a bending mode they are polynomials in C: so they, not the zeros, are what is predicted.
 
-The corrector is Newton's method with the repulsion of Ehrlich (1967) and Aberth (1973) between all zeros, so that two
-branches cannot fall onto one zero; two zeros close to each other are corrected together, by the cubic through both.
-A step is believed if no zero moved further from its prediction than a share of its distance to the next one, and is
+At each value all zeros are corrected together (`correction`), so that two branches cannot fall onto one zero.  A step
+is believed if no zero moved further from its prediction than a share of its distance to the next one, and is
 shortened otherwise.  Where a real zero runs into one of another pair, or into one that no pair holds, no step is short
 enough: then the two become one pair.  (A damped Timoshenko beam has a third, real zero for each bending wave, coming
 from s = -inf as C grows from 0.  It meets the fast zero of the overdamped mode; together they ring again, in shear.)
@@ -20,7 +19,7 @@ None of this is a proof: a winding number is, and `damped` asks for it.
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import combinations, product
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -29,32 +28,15 @@ from numpy.typing import NDArray
 from tfarm.errors import ConvergenceError
 
 from .box import Complex, Function
+from .correction import Member, corrected, paired
 
 Real = NDArray[np.float64]
 
 
-class Member(NamedTuple):
-    """One function of a family, and the real point where it is singular (-1/C; -inf if it is entire).
-
-    Zeros nearer to the origin than `free` may pass it; others may not come near it in one step.  A real zero that comes
-    from the right to within the share `ends` of the singular point ends there.
-    """
-
-    function: Function
-    singular: float = -np.inf
-    free: float = 0.0
-    ends: float = 0.0
-
-
 Family = Callable[[float], Member]
 
-NEIGHBOURS = 8  # zeros that repel each other: those further away move too little to matter
-FARTHEST = 1e150  # where the tree has what has ended
-FEW = 64  # zeros: of so many all distances are found sooner than a tree is built
-BELIEVED = 0.2  # how far a zero may land from its prediction, in distances to the next one
-SETTLED = 1e-6  # a correction smaller than this share of that distance ends a step
-CLOSING = 0.2  # two real zeros whose distance would shrink by more than this share in a step refused are a pair
-FINEST = 1e-10  # no step is smaller beside the way from the start
+CLOSING_SHARE = 0.2  # two real zeros whose distance would shrink by more than this share in a step refused are a pair
+SMALLEST_STEP = 1e-10  # no step is smaller beside the way from the start
 STUCK = 1e-4  # a step this small beside the way so far ends a mode
 MOST_REFUSALS = 300  # steps; lists that arrive take up to 120 (tuned: survey tests.spectrum.damped)
 
@@ -100,10 +82,10 @@ def follow(
         if refusals > MOST_REFUSALS:
             raise ConvergenceError(f"branches cannot be told apart beyond {nodes[-1].at:.6g}", nodes[-1], step)
         step = (at - nodes[-1].at) / 2.5
-        close = abs(step) < 1e-3 * abs(at - anchor) or abs(step) < FINEST * abs(at - start.at)
+        close = abs(step) < 1e-3 * abs(at - anchor) or abs(step) < SMALLEST_STEP * abs(at - start.at)
         if close and _exchange(family, recent, stray, at):
             nodes.append(recent[-1])
-        elif stray[:wanted].any() and FINEST * abs(at - start.at) < abs(step) < STUCK * abs(at - anchor):
+        elif stray[:wanted].any() and SMALLEST_STEP * abs(at - start.at) < abs(step) < STUCK * abs(at - anchor):
             anchor = nodes[-1].at  # what counts as a small step is measured anew from here
         elif close and abs(step) < STUCK * abs(at - anchor):
             recent = [_shortened(nodes[-1], stray, wanted)]
@@ -153,11 +135,12 @@ def through(nodes: list[Node], at: float | Real) -> Complex:
     0 in all nodes stays there.
     """
     value = np.asarray(at)
-    weights = np.array([_product([(value - b.at) / (a.at - b.at) for b in nodes if b is not a]) for a in nodes]).T
+    ratios = ([(value - b.at) / (a.at - b.at) for b in nodes if b is not a] for a in nodes)
+    weights = np.array([np.prod(np.array(each), axis=0) for each in ratios]).T
     zeros = np.stack([node.zeros for node in nodes])
     mean, half = zeros.mean(2).real, (zeros[..., 0] - zeros[..., 1]) / 2
     square = (half * half).real
-    pairs = _pairs(weights @ mean, weights @ square)
+    pairs = paired(weights @ mean, weights @ square)
     slow = zeros[..., 0].real
     far = ((square > 0.1 * mean**2) & (slow * slow[0] > 0)).all(0)
     inverse = weights @ np.where(far, 1 / np.where(far, slow, 1), 1)
@@ -169,38 +152,6 @@ def through(nodes: list[Node], at: float | Real) -> Complex:
     alone: NDArray[np.bool_] = np.all(np.isnan(zeros[..., 1]), axis=0)
     nothing = np.full_like(beside, np.nan)
     return np.where(alone[:, None], np.stack([weights @ zeros[..., 0].real, nothing], -1), found)
-
-
-def _product(factors: list[Real]) -> Real:
-    return np.asarray(np.prod(np.array(factors), axis=0))
-
-
-def _pairs(mean: Real, square: Real) -> Complex:
-    """mean +- sqrt(square), with Im > 0 or the slower first."""
-    root = np.sqrt(abs(square))
-    upper, away = mean + 1j * root, np.copysign(root, mean)
-    real = np.stack([mean - away, mean + away], -1).astype(complex)
-    return np.where((square < 0)[..., None], np.stack([upper, upper.conj()], -1), real)
-
-
-def corrected(member: Member, guess: Complex) -> tuple[Complex, NDArray[np.bool_]]:
-    """The pairs of zeros next to the guess, and which of them did not settle there."""
-    zeros, beside = guess, nearest(guess)
-    for _ in range(12):
-        zeros, moved = improved(member, zeros, beside)
-        if not (np.isfinite(zeros) | np.isnan(guess)).all():
-            break
-        if (moved < SETTLED).all():
-            return zeros, _strayed(guess, zeros, member)
-    return guess, ~(moved < SETTLED)
-
-
-def _strayed(guess: Complex, found: Complex, member: Member) -> NDArray[np.bool_]:
-    gap, _ = _gaps(found, member, nearest(found))
-    met = (guess[:, 0].imag > 0) != (found[:, 0].imag > 0)  # around a meeting on the axis only the mean is compared
-    moved = np.where(met[:, None], abs((guess - found).mean(1))[:, None], abs(guess - found))
-    strayed: NDArray[np.bool_] = np.any(~(moved < BELIEVED * gap) & ~np.isnan(guess), axis=1)
-    return strayed
 
 
 def _exchange(family: Family, nodes: list[Node], stray: NDArray[np.bool_], at: float) -> bool:
@@ -219,7 +170,7 @@ def _exchange(family: Family, nodes: list[Node], stray: NDArray[np.bool_], at: f
         both = np.array([zero, near])
         with np.errstate(divide="ignore", invalid="ignore"):  # a double zero has no slope: nothing is known of its way
             move = -(there(both).value / here(both).slope * np.exp(there(both).scale - here(both).scale)).real
-        if not (move[1] - move[0]) / (near - zero.real) <= -CLOSING:
+        if not (move[1] - move[0]) / (near - zero.real) <= -CLOSING_SHARE:
             continue
         m, n = np.unravel_index(np.nanargmin(abs(zeros - near)), zeros.shape)
         meeting = sorted(both, key=abs)
@@ -227,7 +178,8 @@ def _exchange(family: Family, nodes: list[Node], stray: NDArray[np.bool_], at: f
             lone, zeros[i], changed = zeros[i, 1 - j], meeting, [i]
             if family(at).ends and lone != 0 and not np.isnan(lone):  # the one that is left goes on alone
                 zeros = np.concatenate([zeros, [[lone, np.nan]]])
-                nodes[:-1] = [Node(node.at, _longer(node.zeros)) for node in nodes[:-1]]
+                unknown = np.full((1, 2), np.nan + 0j)
+                nodes[:-1] = [Node(node.at, np.concatenate([node.zeros, unknown])) for node in nodes[:-1]]
         else:
             left = sorted([zeros[i, 1 - j], zeros[m, 1 - n]], key=lambda zero: (np.isnan(zero), abs(zero)))
             zeros[min(i, m)], zeros[max(i, m)], changed = left, meeting, [i, m]
@@ -238,11 +190,6 @@ def _exchange(family: Family, nodes: list[Node], stray: NDArray[np.bool_], at: f
         nodes[-1] = Node(nodes[-1].at, zeros)
         return True
     return False
-
-
-def _longer(zeros: Complex) -> Complex:
-    """The pairs and one more of which nothing is known."""
-    return np.concatenate([zeros, np.full((1, 2), np.nan + 0j)])
 
 
 def _shortened(node: Node, stray: NDArray[np.bool_], wanted: int) -> Node:
@@ -270,104 +217,3 @@ def _next_zero(function: Function, zero: float) -> float:
             ends = zero + side * away[n], zero + side * away[n + 1]
             found.append(brentq(lambda s: float(deflated(np.array([s]))[0]), *ends, rtol=1e-14))
     return min(found, key=lambda s: abs(s - zero), default=np.inf)
-
-
-class Neighbours(NamedTuple):
-    """The numbers (2 n, m) of the m zeros next to each of the pairs' zeros, and which of them are others."""
-
-    which: NDArray[np.int64]
-    itself: NDArray[np.bool_]
-    own_pair: NDArray[np.bool_]
-
-
-def nearest(zeros: Complex) -> Neighbours:
-    """The zeros next to each of the pairs' zeros (n, 2), itself among them."""
-    flat = zeros.ravel()
-    number, each = min(NEIGHBOURS, flat.size), np.arange(flat.size)[:, None]
-    if flat.size <= FEW:
-        away = abs(flat[:, None] - flat)
-        which = np.argpartition(away, number - 1, axis=1)[:, :number]
-    else:
-        from scipy.spatial import cKDTree  # takes a third of a second to load, and most tables are short
-
-        plane = np.nan_to_num(np.column_stack([flat.real, flat.imag]), nan=FARTHEST)
-        which = np.reshape(cKDTree(plane).query(plane, k=number)[1], (flat.size, number))
-    return Neighbours(which, which == each, which // 2 == each // 2)
-
-
-def _gaps(zeros: Complex, member: Member, beside: Neighbours) -> tuple[Real, Complex]:
-    """Of each zero its distance to the nearest zero of another pair or to the singular point, and the way to each."""
-    flat = zeros.ravel()
-    way = flat[:, None] - flat[beside.which]
-    apart, from_origin = abs(way), np.maximum(2 * abs(flat), member.free + 1e-300)
-    apart[beside.own_pair | np.isnan(apart)] = np.inf
-    gap = np.minimum(apart.min(1), np.minimum(from_origin, abs(flat - member.singular)))
-    gap[np.isnan(gap)] = np.inf
-    return gap.reshape(zeros.shape), way
-
-
-def improved(member: Member, zeros: Complex, beside: Neighbours | None = None) -> tuple[Complex, Real]:
-    """One correction of every pair, and how far each moved, as a share of its distance to the next zero.
-
-    `beside` are the `nearest` zeros, where they are known from before the first of a few corrections.
-    """
-    beside = beside or nearest(zeros)
-    gap, way = _gaps(zeros, member, beside)
-    is_real = zeros.imag[:, 0] == 0
-    value, slope, scale = _of_pairs(member.function, zeros, is_real)
-    ended = np.isnan(zeros)
-    way[beside.itself | (way == 0)] = np.inf  # two that have become one do not part by repulsion
-    if ended.any():
-        way[np.isnan(way)] = np.inf
-    with np.errstate(all="ignore"):
-        step = value / slope
-        repulsion = (1 / way).sum(1).reshape(zeros.shape)
-        new = zeros - step / (1 - step * repulsion)
-        new[:, 1] = np.where(is_real, new[:, 1].real, new[:, 0].conj())
-        new[:, 0] = np.where(is_real, new[:, 0].real, new[:, 0])
-        apart = abs(zeros[:, 0] - zeros[:, 1])
-        close = (apart < gap.min(1)) & (zeros[:, 0] != 0)
-        for i in np.nonzero(close & ~(abs(new - zeros).max(1) < 0.1 * apart))[0]:
-            twist = np.exp(scale[i, 1] - scale[i, 0])  # both values on the scale of the first
-            new[i] = _together(zeros[i], value[i] * [1, twist], slope[i] * [1, twist])
-        away = abs(new - zeros)
-        away[ended] = 0.0
-        floor = 4 * np.finfo(float).eps * abs(zeros)  # nearer no zero is known
-        moved = np.where(away <= floor, 0.0, away / gap).max(1)  # no gap is left between two that have become one
-    return new, moved
-
-
-def _of_pairs(function: Function, zeros: Complex, is_real: NDArray[np.bool_]) -> list[Complex]:
-    """Value, slope and scale at pairs (n, 2); of a conjugate pair the function is asked at the upper zero alone."""
-    count = len(zeros)
-    asked = np.concatenate([zeros[:, 0], zeros[is_real, 1]])
-    ended, found = np.isnan(asked), []
-    value, slope, scale = function(np.where(ended, 1.0, asked) if ended.any() else asked)
-    if ended.any():
-        value, slope = np.where(ended, 0.0, value), np.where(ended, 1.0, slope)
-    for part in (value, slope, scale):
-        both = np.empty(zeros.shape, complex)
-        both[:, 0] = part[:count]
-        both[:, 1] = both[:, 0].conj()
-        both[is_real, 1] = part[count:]
-        found.append(both)
-    return found
-
-
-def _together(zeros: Complex, value: Complex, slope: Complex) -> Complex:
-    """Two zeros, conjugate or real, near two given ones, from the cubic with the values and slopes there."""
-    middle, half = zeros.mean(), (zeros[0] - zeros[1]) / 2
-    g = slope * half
-    a2 = (g[0] - g[1]) / 4
-    a0 = (value[0] + value[1]) / 2 - a2
-    a3 = ((g[0] + g[1]) - (value[0] - value[1])) / 4
-    a1 = (value[0] - value[1]) / 2 - a3
-    if not np.isfinite([a0, a1, a2, a3]).all() or a2 == 0 == a3:
-        return zeros * np.nan
-    roots = combinations(np.roots([a3, a2, a1, a0]), 2)
-    one, two = min(
-        roots, key=lambda x: abs(x[0] + x[1]) + abs(x[0] * x[1] + 1), default=(np.nan, np.nan)
-    )  # most like +-1
-    mean = (middle + half * (one + two) / 2).real
-    square = ((half * (one - two) / 2) ** 2).real
-    return _pairs(np.array([mean]), np.array([square]))[0]

@@ -23,19 +23,20 @@ from tfarm.records import record
 
 from .box import Box, Complex, Function, winding_number
 from .complex_shapes import mode_field
-from .continuation import Member, Node, follow, improved
+from .continuation import Node, follow
+from .correction import Member, improved
 from .enclose import Disc, disjoint, enclosed, proven_count
 from .table import Modes, modes
 
 Real = NDArray[np.float64]
 
 COMPANY = (6, 11, 17, 29)  # modes followed beyond those wanted, lest the last be led astray: the next if that fails
-FEWER = (300, 150, 60, 20, 5, 1)  # modes that are tried where more are asked for, or not all can be followed
+FEWER_MODES = (300, 150, 60, 20, 5, 1)  # that are tried where more are asked for, or not all can be followed
 LITTLE = (2, *COMPANY)  # where many C are met and more modes than matter are followed anyway
-MANY = 30  # modes: of more one number in company is tried, as each step takes long
-BESIDE = 1e-12  # how far a listed eigenvalue may be from its disc, of its size (more beside its own partner)
-CLEAR = 0.8  # how far towards -1/C a box may reach
-FIRST = 0.01  # the first step in C, over 1/w of the highest mode
+MANY_MODES = 30  # of more one number in company is tried, as each step takes long
+BESIDE_DISC = 1e-12  # how far a listed eigenvalue may be from its disc, of its size (more beside its own partner)
+TOWARD_SINGULAR = 0.8  # how far towards -1/C, where real eigenvalues accumulate, a box may reach
+FIRST_STEP = 0.01  # the first step in C, over 1/w of the highest mode
 
 
 @dataclass(frozen=True)
@@ -91,8 +92,12 @@ class DampedModes:
         for pair in self._listed:
             wanted = pair[:1] if pair[0].imag > 0 else pair[np.isfinite(pair)]
             discs.append(tuple(enclosed(k, complex(zero), digits) for zero in wanted))
-            for zero, disc in zip(wanted, discs[-1], strict=True):
-                _compared(complex(zero), disc, abs(pair[0] - pair[-1]) if np.isfinite(pair[-1]) else abs(zero))
+            for zero, disc in zip(wanted.tolist(), discs[-1], strict=True):
+                apart = max(abs(pair[0] - pair[-1]) if np.isfinite(pair[-1]) else abs(zero), 1e-300)
+                away = abs(complex(float(disc.re), float(disc.im)) - zero)
+                if away > float(disc.radius) + BESIDE_DISC * abs(zero) * max(1.0, abs(zero) / apart):
+                    text = f"next to {zero:.12g} 1/s lies {disc.re} + {disc.im}i, not the eigenvalue listed"
+                    raise CertificationError(text)
         if not disjoint([disc for pair in discs for disc in pair]):
             raise CertificationError("the discs of two eigenvalues touch: ask for more digits")
         proven = proven_count(k, self.box)
@@ -147,13 +152,6 @@ class DampedModes:
         return np.array(values, dtype=complex).reshape(*zeros.shape, *share.shape)
 
 
-def _compared(zero: complex, disc: Disc, apart: float) -> None:
-    """Raise CertificationError where a disc lies elsewhere than the listed eigenvalue it was sought for."""
-    away = abs(complex(float(disc.re), float(disc.im)) - zero)
-    if away > float(disc.radius) + BESIDE * abs(zero) * max(1.0, abs(zero) / max(apart, 1e-300)):
-        raise CertificationError(f"next to {zero:.12g} 1/s lies {disc.re} + {disc.im}i, not the eigenvalue listed")
-
-
 def damped_modes(undamped: Modes) -> DampedModes:
     """The modes of the arm with its own C, continued from the undamped ones: all, or the first that can be followed.
 
@@ -161,12 +159,12 @@ def damped_modes(undamped: Modes) -> DampedModes:
     are missing.  Raises ConvergenceError where not even the first can be followed.
     """
     asked, lost = int(undamped.index.max()), None
-    for count in sorted({asked, *FEWER}, reverse=True):
-        if count > asked or (count > FEWER[0] and not undamped.arm.is_undamped):
+    for count in sorted({asked, *FEWER_MODES}, reverse=True):
+        if count > asked or (count > FEWER_MODES[0] and not undamped.arm.is_undamped):
             continue
         some = undamped if count == asked else modes(undamped.arm, count, theory=undamped.theory)
         try:
-            found = all_damped_modes(some, COMPANY if count == asked <= MANY else COMPANY[:1])
+            found = all_damped_modes(some, COMPANY if count == asked <= MANY_MODES else COMPANY[:1])
         except ConvergenceError as error:
             lost = error
             continue
@@ -232,7 +230,7 @@ class Branches:
                 continue
             met = self._met.get(key) or [_first_node(undamped, wanted + company, C)]
             start = sorted((node for node in met if node.at <= C), key=lambda node: node.at)[-1]
-            first = C - start.at if len(met) > 1 else min(C, FIRST / abs(start.zeros[-1, 0]))
+            first = C - start.at if len(met) > 1 else min(C, FIRST_STEP / abs(start.zeros[-1, 0]))
             try:
                 nodes = follow(lambda level: member(k.with_damping(level / C if C else 0.0)), start, C, first, wanted)
             except ConvergenceError as error:
@@ -263,20 +261,15 @@ def single_zeros(undamped: Modes, share: float) -> list[float]:
 def _first_node(undamped: Modes, count: int, level: float) -> Node:
     """Where the way begins: at no damping, or at so little that what friction makes of the zeros at 0 is apart."""
     alone = single_zeros(undamped, 1.0)
-    node = _undamped_node(undamped, count - len(alone))
+    more = modes(undamped.arm, count - len(alone), theory=undamped.theory)
+    omega = more.natural_frequency[more.index > 0]
+    node = Node(0.0, np.stack([1j * omega, -1j * omega], 1))
     if not alone:
         return node
     share = min(1e-3, 1e-3 * abs(node.zeros[0, 0] / alone[0]))
     single = np.array([[zero, np.nan] for zero in single_zeros(undamped, share)], dtype=complex)
     start = member(undamped.system.with_damping(share))
     return Node(share * level, polished(start, np.concatenate([single, node.zeros])))
-
-
-def _undamped_node(undamped: Modes, count: int) -> Node:
-    """The first `count` modes of the table's arm at C = 0."""
-    more = modes(undamped.arm, count, theory=undamped.theory)
-    omega = more.natural_frequency[more.index > 0]
-    return Node(0.0, np.stack([1j * omega, -1j * omega], 1))
 
 
 def member(k: System, gains: Gains = OPEN) -> Member:
@@ -322,7 +315,7 @@ def complete_box(f: Function, listed: Complex, others: Complex, C: float) -> tup
 
 def _heights(known: Complex, is_listed: NDArray[np.bool_], C: float) -> Real:
     """Heights between the zeros to the right of -1/C, ascending, below the first one that is not listed."""
-    right = known.real > -CLEAR / C if C else np.ones(known.size, bool)
+    right = known.real > -TOWARD_SINGULAR / C if C else np.ones(known.size, bool)
     imag, mine = known.imag[right], is_listed[right]
     order = np.argsort(imag)
     imag, mine = imag[order], mine[order]
@@ -336,8 +329,8 @@ def _heights(known: Complex, is_listed: NDArray[np.bool_], C: float) -> Real:
 def _box(height: float, known: Complex, C: float) -> Box:
     """A box of that height, its left edge clear of -1/C and, of a few, the furthest from any known zero."""
     reach = 1.5 * height
-    if C and reach > CLEAR / C:
-        edges = -np.array([CLEAR, 0.77, 0.74, 0.7]) / C
+    if C and reach > TOWARD_SINGULAR / C:
+        edges = -np.array([TOWARD_SINGULAR, 0.77, 0.74, 0.7]) / C
         room = [abs(known.real[abs(known.imag) < height] - edge).min(initial=np.inf) for edge in edges]
         reach = -float(edges[int(np.argmax(room))])
     return Box(-reach, 0.1 * height, -height, height)

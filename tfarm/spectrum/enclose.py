@@ -28,10 +28,10 @@ from tfarm.exact.wide_balls import characteristic_over, tangent
 from .ball_axis import precisions
 from .box import Box
 
-FINEST = 2.0**-26  # a piece of contour shorter than this share of it means a zero on it
+SHORTEST_PIECE = 2.0**-26  # a piece of contour shorter than this share of it means a zero on it
 MOST_PIECES = 6000  # of one side of a contour, some 10 s of CPU time; the longest of the presets' lists take 2,000
-CONTOUR_BITS = 96
-GROWTH = 1.125  # of a step that went well; tuned: with 2 every second step went too far, and was half of the work
+CONTOUR_BITS = 96  # of working precision along a contour, whose angles alone are wanted
+STEP_GROWTH = 1.125  # of a step that went well; tuned: with 2 every second step went too far, and was half of the work
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,12 +81,12 @@ def _turning(k: System, gains: Gains, a: Ball, b: Ball) -> Ball:
             raise CertificationError(f"the edge of the box takes more than {MOST_PIECES} pieces: prove a shorter list")
         if not over.is_finite() or over.contains(0):
             step /= 2
-            if step < FINEST:
+            if step < SHORTEST_PIECE:
                 raise CertificationError(f"a zero lies on the edge of the box, near {complex(here):.6g}")
             continue
         end_value = characteristic_over(k, there, gains)
         total += (end_value / value).log().imag
-        start, here, value, step = end, there, end_value, GROWTH * step
+        start, here, value, step = end, there, end_value, STEP_GROWTH * step
     return total
 
 

@@ -20,7 +20,7 @@ from .table import modes
 PAPER_GAINS = HubFeedback(K1=0.3, K2=0.3)  # of the paper's arms
 RATE_SHARE = 6.42e-3  # of J w1: what K1 = 0.3 N m s/rad is on the preset sasaki2012
 MOST_UNITS = 1e9  # of J w1, 1 and J w1^2: far beyond what a loop can tell from infinite, far from overflow
-DIGITS = 3  # of a default K1, so that it can be read and typed
+DEFAULT_DIGITS = 3  # of a default K1, so that it can be read and typed
 OF_THE_PAPER = ("sasaki2012", "sasaki2012-lab", "sasaki2012-as-printed")  # presets
 
 
@@ -45,13 +45,13 @@ def angle_unit(arm: Arm) -> float:
     return turning_inertia(arm) * first_frequency(arm) ** 2
 
 
-UNITS = {"hub_angle": ("J w1^2", angle_unit), "hub_rate": ("J w1", rate_unit)}  # of a gain on that output, else 1
+UNITS_OF_OUTPUTS = {"hub_angle": ("J w1^2", angle_unit), "hub_rate": ("J w1", rate_unit)}  # of a gain on each, else 1
 
 
 def gain_unit(arm: Arm, name: str) -> float:
     """The unit of the gain of that name on this arm, in that gain's SI unit."""
     (output,) = (gain.output for gain in GAINS if gain.name == name)
-    return UNITS[output][1](arm) if output in UNITS else arm.input_per_torque
+    return UNITS_OF_OUTPUTS[output][1](arm) if output in UNITS_OF_OUTPUTS else arm.input_per_torque
 
 
 def most_gain(arm: Arm, name: str) -> float:
@@ -64,7 +64,7 @@ def check_gains(arm: Arm, law: HubFeedback) -> None:
     for gain in GAINS:
         value = law[gain.name]
         if value and not abs(value) <= (most := most_gain(arm, gain.name)):
-            unit = UNITS[gain.output][0] if gain.output in UNITS else "1"
+            unit = UNITS_OF_OUTPUTS[gain.output][0] if gain.output in UNITS_OF_OUTPUTS else "1"
             remedy = f"for this arm at most {MOST_UNITS:g} times {unit} in size, {most:.3g}: beyond any machine"
             raise ParameterError(key=gain.name, value=value, remedy=remedy)
 
@@ -77,8 +77,8 @@ def default_gains(arm: Arm) -> HubFeedback:
     """
     if _is_of_the_paper(arm):
         return PAPER_GAINS
-    K1 = float(f"{RATE_SHARE * rate_unit(arm):.{DIGITS}g}")
-    K2 = float(f"{PAPER_GAINS.K2 * arm.input_per_torque:.{DIGITS}g}")
+    K1 = float(f"{RATE_SHARE * rate_unit(arm):.{DEFAULT_DIGITS}g}")
+    K2 = float(f"{PAPER_GAINS.K2 * arm.input_per_torque:.{DEFAULT_DIGITS}g}")
     return HubFeedback(K1=K1, K2=0.0 if arm.has_massless_hub else K2)
 
 

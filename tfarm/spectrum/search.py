@@ -19,8 +19,8 @@ from tfarm.exact.system import System
 from .ball_axis import axis_of
 from .counting import ChainCounter, Counter, counter_of
 
-CLOSE = 1e-3  # share of the mean spacing; further apart, rounding moves neither by more than a few last units
-REACH = 4e-6  # relative width in which float64 surely has each of a close pair
+CLOSE_SHARE = 1e-3  # share of the mean spacing; further apart, rounding moves neither by more than a few last units
+PAIR_REACH = 4e-6  # relative width in which float64 surely has each of a close pair
 PAIR_BITS = 256  # of working precision, for a double frequency to its last float64 digit
 
 
@@ -29,32 +29,27 @@ def natural_frequencies(k: System, first: int, last: int) -> NDArray[np.float64]
     """The natural frequencies [rad/s] number first..last of the undamped arm, counted from 1, double ones twice.
 
     Each is the point where the count steps from below its number to it, bisected to neighbouring floats: no
-    start value, no sign change needed, so close and double roots are like any other.
+    start value, no sign change needed, so close and double roots are like any other.  Those close to a neighbour are
+    bisected by the count in balls, or in float64 where a ball cannot tell.
     Raises ConvergenceError if the count does not reach `last` (beyond 1e9 rad/s times the arm's own unit).
     """
     lowest = min(first, 1 + k.has_rigid_mode)  # not the rigid body at zero: bisection would run down all exponents
     number = np.arange(max(first - 1, lowest), last + 2)  # with both neighbours: one of them may be close
     count = counter_of(k)
     omega = count.first_reaching(number, _upper_bound(count, k, int(number[-1])))
-    close = np.diff(omega) * number[1:] < CLOSE * omega[1:]
+    close = np.diff(omega) * number[1:] < CLOSE_SHARE * omega[1:]
     for i in np.nonzero(np.r_[close, False] | np.r_[False, close])[0]:
-        omega[i] = _settle(k, int(number[i]), float(omega[i]))
+        low, high = float(omega[i] * (1 - PAIR_REACH)), float(omega[i] * (1 + PAIR_REACH))
+        with precision(PAIR_BITS):
+            axis = axis_of(k)
+            while low < (middle := 0.5 * (low + high)) < high:
+                below = axis.count(rational(middle))
+                below = int(count(np.array([middle]))[0]) if below is None else below
+                low, high = (low, middle) if below >= number[i] else (middle, high)
+        omega[i] = high
     found = omega[(first <= number) & (number <= last)]
     found.flags.writeable = False
     return found
-
-
-def _settle(k: System, number: int, omega: float) -> float:
-    """The frequency of that number, close to omega, by the count in balls (in float64 where a ball cannot tell)."""
-    count = counter_of(k)
-    low, high = omega * (1 - REACH), omega * (1 + REACH)
-    with precision(PAIR_BITS):
-        axis = axis_of(k)
-        while low < (middle := 0.5 * (low + high)) < high:
-            below = axis.count(rational(middle))
-            below = int(count(np.array([middle]))[0]) if below is None else below
-            low, high = (low, middle) if below >= number else (middle, high)
-    return high
 
 
 def count_below(k: System, omega: float) -> int:

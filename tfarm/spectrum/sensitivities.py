@@ -54,7 +54,12 @@ def chain_sensitivities(arm: Arm, shapes: ChainShapes) -> dict[str, Real]:
     A rig has those of the arm, of all segments together; "segment_1_length", ... of each where there are several;
     "attachment_1_x", ... and the springs, rotor and offsets that it has.  A length takes along what is attached to it.
     """
-    segments = _segments(arm, shapes)
+    ends = list(accumulate(Fraction(link.length) / shapes.chain.length for link in arm.links))  # from the hub outwards
+    totals = [np.zeros((5, shapes.omega.size)) for _ in arm.links]
+    for piece, weight, at in shapes.panels():
+        terms = _densities(piece, shapes.omega[:, None], *shapes.states(at)[0])
+        totals[bisect(ends, at[0].share)] += np.array([term @ weight for term in terms])
+    segments = [_of_link(*total) for total in totals]
     found = {name: np.sum([each[name] for each in segments], axis=0) for name in LINK}
     found |= _hub(arm, shapes) | _payload(arm, shapes)
     for number, each in enumerate(segments if len(segments) > 1 else (), start=1):
@@ -96,17 +101,6 @@ def _energies(k: Coefficients, shapes: Shapes) -> tuple[Real, ...]:
 
 
 # ------------------------------------------------------------ rigs
-
-
-def _segments(arm: Arm, shapes: ChainShapes) -> list[Doubled]:
-    """Of each segment of the link, from the hub outwards."""
-    ends = list(accumulate(Fraction(link.length) / shapes.chain.length for link in arm.links))
-    totals = [np.zeros((5, shapes.omega.size)) for _ in arm.links]
-    for piece, weight, at in shapes.panels():
-        W, Psi, M, Q = shapes.states(at)[0]
-        terms = _densities(piece, shapes.omega[:, None], W, Psi, M, Q)
-        totals[bisect(ends, at[0].share)] += np.array([term @ weight for term in terms])
-    return [_of_link(*total) for total in totals]
 
 
 def _densities(piece: Segment, omega: Any, W: Any, Psi: Any, M: Any, Q: Any) -> tuple[Any, ...]:

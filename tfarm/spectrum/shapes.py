@@ -24,10 +24,10 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 _even = plain(even_functions)
 
-GAUSS = 16  # points a panel; exact for the products of waves below once a panel holds a few radians
+GAUSS_POINTS = 16  # a panel; exact for the products of waves once a panel holds a few radians
 DOUBLE = 4e-15  # relative gap under which two frequencies are one, with two modes
-CLOSE = 1e-5  # relative gap under which rounding would leave two modes not quite orthogonal
-BLOCK = 2**17  # modes times points that are evaluated at once, each of 256 bytes: memory, whatever the count
+CLOSE_MODES = 1e-5  # relative gap under which rounding would leave two modes not quite orthogonal
+QUADRATURE_BLOCK = 2**17  # modes times points that are evaluated at once, each of 256 bytes: memory, whatever the count
 
 
 class Shapes:
@@ -68,11 +68,11 @@ class Shapes:
         return part
 
     def blocks(self) -> Iterator[slice]:
-        """Neighbouring modes, so few at a time that `quadrature` has `BLOCK` points for them in all."""
+        """Neighbouring modes, so few at a time that `quadrature` has `QUADRATURE_BLOCK` points for them in all."""
         first = 0
         while first < self.omega.size:
             last = min(2 * first + 4, self.omega.size)
-            while last > first + 1 and (last - first) * GAUSS * self.part(first, last).panels > BLOCK:
+            while last > first + 1 and (last - first) * GAUSS_POINTS * self.part(first, last).panels > QUADRATURE_BLOCK:
                 last = (first + last) // 2
             yield slice(first, last)
             first = last
@@ -96,7 +96,7 @@ class Shapes:
     def quadrature(self) -> tuple[Real, Real]:
         """Gauss points and weights on 0..1 for products of these modes."""
         panels = self.panels
-        nodes, weights = np.polynomial.legendre.leggauss(GAUSS)
+        nodes, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
         start = np.arange(panels)[:, None]
         return ((start + (nodes + 1) / 2) / panels).ravel(), np.tile(weights / 2 / panels, panels)
 
@@ -121,11 +121,19 @@ class Shapes:
         return W, Psi, weight, [(float(inertia), motion) for inertia, motion in ends if math.isfinite(inertia)]
 
     def _basis(self, x: Real) -> Complex:
-        """The four waves of the modes above the low ones, at x: shape (4 waves, 4 fields, modes, x)."""
-        high = ~self._low
-        gS = self._gS[high, None]
-        pairs = [_pair(Wave._make(part[high] for part in wave), gS, x) for wave in (self._one, self._two)]
-        return np.array([solution for pair in pairs for solution in pair]).transpose(1, 0, 2, 3)
+        """The four waves of the modes above the low ones, at x: shape (4 fields, 4 waves, modes, x).
+
+        Of each of the two wave numbers two solutions: from the root and from the tip, or even and odd in x.
+        """
+        high = np.flatnonzero(~self._low)
+        found = np.empty((2, 2, 4, high.size, x.size), complex)
+        for wave, pair in zip((self._one, self._two), found, strict=True):
+            slow = abs(wave.z[high]) < 1.0
+            for rows, solutions in ((slow, _even_and_odd), (~slow, _from_the_ends)):
+                if rows.any():
+                    part = Wave._make(each[high[rows], None] for each in wave)
+                    pair[:, :, rows] = solutions(part, self._gS[high[rows], None], x)
+        return found.reshape(4, 4, high.size, x.size).transpose(1, 0, 2, 3)
 
     def _null_vectors(self) -> Complex:
         """Weights of the four waves, (4, modes), that satisfy the four end conditions."""
@@ -179,7 +187,7 @@ class Shapes:
 
     def _orthogonalise(self) -> None:
         """Gram-Schmidt in the modal mass within each pair of close or double frequencies."""
-        (pairs,) = np.nonzero(np.diff(self.omega) < CLOSE * self.omega[1:])
+        (pairs,) = np.nonzero(np.diff(self.omega) < CLOSE_MODES * self.omega[1:])
         for first in map(int, pairs):
             overlap = self.part(first, first + 2).mass_matrix()[0, 1]
             above = first - int(self._low[: first + 1].sum())
@@ -187,16 +195,6 @@ class Shapes:
             factor = np.ones_like(self.omega)
             factor[first + 1] = 1.0 / math.sqrt(self.part(first + 1, first + 2).masses()[0])
             self._scale(factor)
-
-
-def _pair(wave: Wave, gS: Any, x: Real) -> tuple[Any, Any]:
-    """Two independent solutions (W, Psi, M, Q) of one wave: from the root and from the tip, or even and odd in x."""
-    slow = abs(wave.z) < 1.0
-    pair = np.empty((2, 4, slow.size, x.size), complex)
-    for rows, solutions in ((slow, _even_and_odd), (~slow, _from_the_ends)):
-        if rows.any():
-            pair[:, :, rows] = solutions(Wave._make(part[rows, None] for part in wave), gS[rows], x)
-    return pair[0], pair[1]
 
 
 def _even_and_odd(wave: Wave, gS: Any, x: Real) -> Any:

@@ -28,7 +28,7 @@ from .shapes import Shapes
 
 Real = NDArray[np.float64]
 
-MOST_MODES = 10_000
+MOST_TABLE_MODES = 10_000  # at a time
 
 
 @dataclass(frozen=True)
@@ -227,11 +227,11 @@ def modes(arm: Arm, count: int | None = None, *, up_to: float | None = None, the
             raise ParameterError(key="up_to", value=up_to, remedy="a positive, finite frequency in rad/s")
         count = modes_below(arm, up_to, theory=theory)
     else:
-        count = whole("count", count, 1, math.inf, f"a whole number of modes from 1 to {MOST_MODES}")
+        count = whole("count", count, 1, math.inf, f"a whole number of modes from 1 to {MOST_TABLE_MODES}")
     if count == 0:
         raise ParameterError(key="up_to", value=up_to, remedy="no flexible mode lies below it; choose a higher one")
-    if count > MOST_MODES:
-        raise ParameterError(key="count", value=count, remedy=f"at most {MOST_MODES} modes at a time")
+    if count > MOST_TABLE_MODES:
+        raise ParameterError(key="count", value=count, remedy=f"at most {MOST_TABLE_MODES} modes at a time")
     flexible = natural_frequencies(k, rigid + 1, rigid + count)
     index = np.arange(1 - rigid, count + 1)
     return Modes(arm, theory, index, np.r_[[0.0] * rigid, flexible], k)
