@@ -16,7 +16,7 @@ from tfarm.dsp.curves import away
 from tfarm.dsp.plant import undelayed_plant
 from tfarm.dsp.scenarios import slew
 from tfarm.errors import ParameterError
-from tfarm.tuner.controller import tip_error
+from tfarm.tuner.controller import tip_off
 
 SLOW = 1e-3  # 1/s: the rig turns as one piece, and s^2 of its next term is beyond the digits compared
 
@@ -79,4 +79,4 @@ def test_the_tip_of_a_slew_goes_where_a_rigid_arm_on_the_hub_s_radius_has_it():
         assert run.at_samples.tip_displacement[-1] == pytest.approx(travel, abs=1e-4)
         assert abs(away(bench, run)[-1]) < 1e-4
         of_trial = SimpleNamespace(arm=bench, loop=SimpleNamespace(chain=chain))
-        assert abs(tip_error(run, of_trial)) < 1e-4
+        assert abs(tip_off(run, of_trial)) < 1e-4

@@ -23,7 +23,7 @@ from tfarm.report.given_laws import Subject
 from tfarm.report.sections import save_section
 from tfarm.report.tuner_section import section_of, tuner_section
 from tfarm.report.writing import _write_pages
-from tfarm.tuner import Learning, Plan, conditions, initial_network, train, tune
+from tfarm.tuner import Learning, Plan, initial_network, train, tried_loops, tune
 from tfarm.tuner import overview as study_module
 from tfarm.tuner.overview import NOMINAL, CostMap, tuner_study
 
@@ -35,10 +35,10 @@ SEEDS = 3
 def small(tmp_path_factory):
     """The section and its numbers with few seeds, few trials and the first four conditions."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(study_module, "SEEDS", SEEDS)
+        patch.setattr(study_module, "CURVE_SEEDS", SEEDS)
         patch.setattr(study_module, "MAP_SEEDS", 1)
         patch.setattr(study_module, "MAP_TRIALS", 3)
-        patch.setattr(study_module, "conditions", lambda *each: conditions(*each)[:4])
+        patch.setattr(study_module, "tried_loops", lambda *each: tried_loops(*each)[:4])
         data = pickle.loads(once(tmp_path_factory, "tuner", save_study).read_bytes())
         yield data, section_of(data)
 
@@ -210,7 +210,7 @@ def values(small, walked):
     rows = [read(folder / "data" / f"tune-{name}.json")["rows"] for name in ("comparison", "residual")]
     coarse = next(iter(data.coarse.values())).chain.converters
     settings = [coarse.moment_bits, coarse.moment_range, coarse.torque_bits, coarse.torque_range, coarse.encoder_counts]
-    drawn = [getattr(tuner_section_room, name) for name in ("SEEDS", "MAP_SEEDS", "MAP_TRIALS")]
+    drawn = [getattr(tuner_section_room, name) for name in ("CURVE_SEEDS", "MAP_SEEDS", "MAP_TRIALS")]
     late = [1e3 * each["arrives_later_by_s"] for each in own["shaped"].values()]
     off = [1e3 * abs(each) for each in (*(own[key] for key in TIPS), held["tip_error_m"])]
     more = [*_learned(own), *settings, *drawn, *late, *off]

@@ -13,7 +13,7 @@ from tfarm.dsp.curves import away
 from tfarm.report.tuner_words import beside, drift_words, learning_words, shaping_words, short_answer
 from tfarm.report.words import typeset
 from tfarm.spectrum.scales import default_gains
-from tfarm.tuner.comparison import conditions, quantised_chain
+from tfarm.tuner.comparison import quantised_chain, tried_loops
 from tfarm.tuner.overview import plan_of
 from tfarm.tuner.shaping import shaper
 
@@ -114,7 +114,7 @@ def test_the_scales_of_the_tuner_are_the_arms_own(name):
     assert torque < converters.moment_range < 10 * torque
     assert 2 < torque / plan.scale < 4.5  # one digit of a third: the paper's 3 N m over its 1 N m
     assert plan.cost.b * plan.scale**2 == pytest.approx(2.6)
-    conditioned = {each.name: each.arm for each in conditions(arm, chain)}
+    conditioned = {each.name: each.arm for each in tried_loops(arm, chain)}
     loads = [each.payload.mass for key, each in conditioned.items() if key.startswith("payload")]
     assert max(loads) <= 2 * (arm.payload.mass or arm.link.rhoA * arm.link.length)
     shares = sorted(e.link.damping / arm.link.damping for key, e in conditioned.items() if key.startswith("C ="))
@@ -123,7 +123,7 @@ def test_the_scales_of_the_tuner_are_the_arms_own(name):
 
 def test_the_papers_arm_keeps_the_papers():
     lab = tfarm.load("sasaki2012-lab")
-    names = [each.name for each in conditions(lab, Chain())]
+    names = [each.name for each in tried_loops(lab, Chain())]
     assert names[4:] == [
         "payload 0.1 kg", "payload 0.25 kg", "payload 0.5 kg", "hub -20%", "hub +20%", "C = 0 s", "C = 1e-05 s",
         "C = 0.001 s",

@@ -8,8 +8,8 @@ import pytest
 
 import tfarm
 from tests.shell import answer, run
-from tfarm.tuner import Plan, compare, shaped_trial, slew_trial, tune
-from tfarm.tuner.comparison import conditions
+from tfarm.tuner import Plan, compare_controllers, shaped_trial, slew_trial, tune
+from tfarm.tuner.comparison import tried_loops
 
 
 def test_tune_lab(capsys, tmp_path):
@@ -125,9 +125,9 @@ def test_the_comparison_is_of_one_run():
     """On the arm as trained it repeats what the tuning says, by the simulator; the bound bounds every unshaped row."""
     lab = tfarm.load("sasaki2012-lab")
     tuning = tune(lab, Plan(trials=40, guard="frozen"))
-    listed = [each for each in conditions(lab, tuning.trial.loop.chain) if "C =" not in each.name]
+    listed = [each for each in tried_loops(lab, tuning.trial.loop.chain) if "C =" not in each.name]
     assert len(listed) == 9
-    rows = compare(tuning.trial, tuning.gain(), tuning.training.guard, listed[:1] + listed[3:5])
+    rows = compare_controllers(tuning.trial, tuning.gain(), tuning.training.guard, listed[:1] + listed[3:5])
     first = rows[0]
     assert first.without.cost == pytest.approx(tuning.without.cost, rel=1e-10)
     assert first.best_constant.cost == pytest.approx(tuning.best_constant.cost, rel=1e-10)

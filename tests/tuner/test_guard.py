@@ -15,9 +15,9 @@ from tfarm.arm import HubFeedback
 from tfarm.dsp import Chain, SampledLoop, Sampling, sampled_loop
 from tfarm.errors import CertificationError, ParameterError
 from tfarm.tuner import find_guard, guard, slew_trial
-from tfarm.tuner.guard import is_quiet
-from tfarm.tuner.lyapunov import common_lyapunov, is_positive_definite, whole
-from tfarm.tuner.sector import SHARE, MovingGain
+from tfarm.tuner.guard import upper_modes_are_quiet
+from tfarm.tuner.lyapunov import as_integers, common_lyapunov, is_positive_definite
+from tfarm.tuner.sector import RADIUS_SHARE, MovingGain
 
 FINE = np.r_[np.geomspace(1e-6, 1e-2, 500), np.linspace(1e-2, np.pi, 100_001)]
 
@@ -39,7 +39,7 @@ def loop(lab):
 
 def test_gains_of_a_tuner_are_those_that_hold_from_0_to_10(monkeypatch, lab):
     monkeypatch.setattr(guard, "stable_windows", lambda loop, vary: [(-3.0, -1.0), (-0.5, 0.4), (0.6, 12.0)])
-    assert guard.gain_windows(sampled_loop(lab, HubFeedback(K1=0.3), count=2)) == [(0.0, 0.4), (0.6, 10.0)]
+    assert guard.constant_windows(sampled_loop(lab, HubFeedback(K1=0.3), count=2)) == [(0.0, 0.4), (0.6, 10.0)]
 
 
 @pytest.mark.parametrize(("lo", "hi"), [(0.1, 0.326), (0.2, 0.49), (0.3, 0.642)])
@@ -62,7 +62,7 @@ def test_the_radius_is_where_the_criterion_first_fails(lab, m, delay):
 @pytest.mark.parametrize("m", [0.2, 0.47])
 def test_what_the_criterion_allows_is_proven_and_nothing_beyond(loop, m):
     radius = loop.radius(m)
-    proof = loop.proof(m - SHARE * radius, m + SHARE * radius)
+    proof = loop.proof(m - RADIUS_SHARE * radius, m + RADIUS_SHARE * radius)
     assert proof is not None
     assert proof.contraction < 1
     assert loop.proof(m - 1.01 * radius, m + 1.01 * radius) is None
@@ -119,7 +119,7 @@ def test_the_exact_arm_obeys_the_criterion_too(lab, loop):
         rate, moment = aliased_loop(lab, z, 0.01, terms=3000)
         H = moment / (1 + 0.3 * rate)
         sizes.append(abs(H / (1 + m * H)))
-        assert 1 + 2 * m * H.real + (m**2 - (SHARE * radius) ** 2) * abs(H) ** 2 > 0
+        assert 1 + 2 * m * H.real + (m**2 - (RADIUS_SHARE * radius) ** 2) * abs(H) ** 2 > 0
     z = np.exp(1j * theta)
     _, rate, moment = loop.loop.signals(z, None, np.ones(z.size))
     H = moment / (1 + 0.3 * rate)
@@ -152,7 +152,7 @@ def test_a_singular_matrix_is_not_positive_definite():
 
 def test_doubles_are_whole_numbers_over_a_power_of_two():
     A = np.random.default_rng(0).normal(size=(5, 5)) * 10.0 ** np.arange(-8, 2, 2)
-    N, shift = whole(A)
+    N, shift = as_integers(A)
     np.testing.assert_array_equal(np.array([[n / 2**shift for n in row] for row in N]), A)
 
 
@@ -213,8 +213,8 @@ def test_modes_are_quiet_where_they_lose_more_than_the_feedback_could_give():
     loop = SampledLoop(plant, Chain(sampling=Sampling(period=1.0)), HubFeedback(K1=-0.5))
     hold = (1 - np.exp(-0.05)) / 0.05
     edge = (0.05 / hold / 2 - 0.5 * 0.01) / 0.02
-    assert is_quiet(loop, 0.999 * edge)
-    assert not is_quiet(loop, 1.001 * edge)
+    assert upper_modes_are_quiet(loop, 0.999 * edge)
+    assert not upper_modes_are_quiet(loop, 1.001 * edge)
 
 
 def test_the_frozen_guard_is_stable_inside_and_not_beyond(lab):

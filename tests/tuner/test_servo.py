@@ -15,7 +15,7 @@ from tfarm.errors import ParameterError
 from tfarm.tuner import (
     Plan,
     TunedGain,
-    compare,
+    compare_controllers,
     find_guard,
     initial_network,
     load_tuner,
@@ -25,7 +25,7 @@ from tfarm.tuner import (
     tune,
 )
 from tfarm.tuner.saving import to_text
-from tfarm.tuner.sector import SHARE, MovingGain
+from tfarm.tuner.sector import RADIUS_SHARE, MovingGain
 from tfarm.tuner.trial import usual_rate_gain
 
 LAB = tfarm.load("sasaki2012-lab")
@@ -87,12 +87,12 @@ def test_what_the_criterion_allows_is_proven_the_angle_among_the_states():
     loop, m = moving(), 0.3
     radius = loop.radius(m)
     assert loop.open.shape == loop.loop.matrix().shape
-    proof = loop.proof(m - SHARE * radius, m + SHARE * radius)
+    proof = loop.proof(m - RADIUS_SHARE * radius, m + RADIUS_SHARE * radius)
     assert proof is not None
     assert loop.proof(m - 1.01 * radius, m + 1.01 * radius) is None
     rng, state = np.random.default_rng(1), np.random.default_rng(2).normal(size=loop.drive.size)
     size = [np.linalg.norm(proof.root.T @ state)]
-    for K in rng.choice([m - SHARE * radius, m + SHARE * radius, m], size=400):
+    for K in rng.choice([m - RADIUS_SHARE * radius, m + RADIUS_SHARE * radius, m], size=400):
         state = loop.at(K) @ state
         size.append(np.linalg.norm(proof.root.T @ state))
     assert np.all(np.diff(np.log(size)) <= np.log(proof.contraction) + 1e-12)
@@ -117,7 +117,7 @@ def test_the_tuned_slew_ends_on_its_target(tuning):
 
 def test_it_is_held_against_the_same_yardsticks(tuning):
     """By the simulator, and the bound below every unshaped slew."""
-    (row,) = compare(tuning.trial, tuning.gain(), tuning.training.guard, [as_trained(tuning)])
+    (row,) = compare_controllers(tuning.trial, tuning.gain(), tuning.training.guard, [as_trained(tuning)])
     assert row.tuner.cost == pytest.approx(tuning.training.result.cost, rel=1e-9)
     assert row.best_constant.cost == pytest.approx(tuning.best_constant.cost, rel=1e-9)
     assert row.bound.cost < min(row.without.cost, row.own_constant.cost, row.tuner.cost)
@@ -126,7 +126,7 @@ def test_it_is_held_against_the_same_yardsticks(tuning):
 
 
 def as_trained(tuning):
-    return tfarm.tuner.comparison.Condition("as trained", LAB, tuning.trial.loop.chain)
+    return tfarm.tuner.comparison.NamedLoop("as trained", LAB, tuning.trial.loop.chain)
 
 
 def test_the_usual_rate_gain_damps_the_rigid_arm():

@@ -8,7 +8,7 @@ import tfarm
 from tfarm.errors import ParameterError
 from tfarm.tuner import Plan, studies, tune
 from tfarm.tuner.guard import find_guard
-from tfarm.tuner.studies import PAPER, map_verdict, plans_of, run_study, study_answer
+from tfarm.tuner.studies import PAPER_PAIR, map_verdict, plans_of, run_study, study_answer
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +66,7 @@ def test_a_file_that_is_no_study_is_refused(lab, tmp_path):
 def test_every_study_has_its_plans():
     sizes = {name: len(plans_of(name, BASE, 2)) for name in ("curves", "map", "weights", "inputs", "rules")}
     assert sizes == {"curves": 2, "map": 84, "weights": 14, "inputs": 4, "rules": 12}
-    assert PAPER in [(plan.learning.alpha, plan.learning.eta) for plan in plans_of("map", BASE, 1)]
+    assert PAPER_PAIR in [(plan.learning.alpha, plan.learning.eta) for plan in plans_of("map", BASE, 1)]
     with pytest.raises(ParameterError, match="known are"):
         plans_of("colours", BASE, 1)
 

@@ -55,7 +55,7 @@ def tune(
     neurons = whole("--hidden", hidden, 1, 1000)
     subject, chain = load_arm(arm), chain_of(dsp or arm, period, delay_samples)
     from tfarm import tuner
-    from tfarm.tuner.tuning import comparison_answer
+    from tfarm.tuner.tuning import outcomes_answer
 
     servo, said = _servo(subject, on_rate, on_angle)
 
@@ -71,8 +71,8 @@ def tune(
     tuning = tuner.tune(subject, plan, chain)
     answer = tuner.tune_answer(tuning) | said
     if compare:
-        rows = tuner.compare(tuning.trial, tuning.gain(), tuning.training.guard)
-        answer["comparison"] = comparison_answer(rows)
+        rows = tuner.compare_controllers(tuning.trial, tuning.gain(), tuning.training.guard)
+        answer["comparison"] = outcomes_answer(rows)
     if save is not None:
         tuner.save(tuning.saved(), save)
     _show(answer, save, json)

@@ -27,7 +27,7 @@ from tfarm.report.tuner_words import (
     short_answer,
 )
 from tfarm.report.words import typeset, upper
-from tfarm.tuner.overview import COARSE, MAP_SEEDS, MAP_TRIALS, NOMINAL, SEEDS, TunerStudy, tuner_study
+from tfarm.tuner.overview import COARSE, CURVE_SEEDS, MAP_SEEDS, MAP_TRIALS, NOMINAL, TunerStudy, tuner_study
 
 TITLE = "The gain tuner: does a self-tuning gain help?"
 UNDAMPED = (
@@ -206,11 +206,11 @@ def _curves_picture(data: TunerStudy) -> Picture:
         stem="tune-curves",
         title="Learning",
         caption=(
-            f"Cost of each trial over {SEEDS} seeds (the paper's Figure 5): grey each seed, blue the median and the "
-            "middle half; what diverges leaves through the top. The default cuts the gradient to norm 0.5 and takes a "
-            "step back where the cost rises; (21) as printed has its sign mended and nothing else."
+            f"Cost of each trial over {CURVE_SEEDS} seeds (the paper's Figure 5): grey each seed, blue the median and "
+            "the middle half; what diverges leaves through the top. The default cuts the gradient to norm 0.5 and "
+            "takes a step back where the cost rises; (21) as printed has its sign mended and nothing else."
         ),
-        alt=f"Learning curves of {SEEDS} seeds for two rules, beside the best constant gain and the bound.",
+        alt=f"Learning curves of {CURVE_SEEDS} seeds for two rules, beside the best constant gain and the bound.",
         figure=draw_curves(data),
         data=Table(stem="tune-curves-data", title="Learning curves", is_data=True, columns=(first, *columns)),
     )

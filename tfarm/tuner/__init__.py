@@ -1,7 +1,7 @@
 """The neural gain tuner: a network that sets the moment gain while the arm slews, kept where that is proven stable."""
 
 from tfarm.tuner.bound import lq_bound
-from tfarm.tuner.comparison import compare, conditions
+from tfarm.tuner.comparison import compare_controllers, tried_loops
 from tfarm.tuner.constants import BestConstant, best_constant
 from tfarm.tuner.controller import TunedGain, simulated
 from tfarm.tuner.guard import Guard, find_guard
@@ -27,8 +27,7 @@ __all__ = [
     "TunedGain",
     "Tuning",
     "best_constant",
-    "compare",
-    "conditions",
+    "compare_controllers",
     "extra_insensitive",
     "find_guard",
     "initial_network",
@@ -40,6 +39,7 @@ __all__ = [
     "simulated",
     "slew_trial",
     "train",
+    "tried_loops",
     "tune",
     "tune_answer",
     "zero_vibration",

@@ -10,12 +10,9 @@ every e(t), for this arm, slew, sampling and cost, whatever network, gain or law
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.tuner.kernel import MOMENT_WEIGHT, PERIOD, TORQUE_WEIGHT
 from tfarm.tuner.trial import Record, Trial
-
-Real = NDArray[np.float64]
 
 
 def lq_bound(trial: Trial) -> Record:
@@ -35,16 +32,10 @@ def lq_bound(trial: Trial) -> Record:
         q = closed.T @ (q + P @ B * (rest[k] - offsets[k])) + T * b * gains[k] * offsets[k] - T * a * rigid[k] * c
         P = closed.T @ P @ closed + T * b * np.outer(gains[k], gains[k]) + T * a * np.outer(c, c)
         P = (P + P.T) / 2
-    return _played(trial, gains, offsets)
-
-
-def _played(trial: Trial, gains: Real, offsets: Real) -> Record:
-    """The optimal e applied forward."""
-    _, A, B, _, c = trial.model
-    s, x, e = np.zeros(B.size), np.zeros(trial.n), np.zeros(trial.n)
-    for k in range(trial.n):
-        x[k] = c @ s - trial.reference[k, 3]
+    s, x, e = np.zeros(size), np.zeros(n), np.zeros(n)
+    for k in range(n):  # the optimal e applied forward
+        x[k] = c @ s - rigid[k]
         e[k] = -(gains[k] @ s) - offsets[k]
-        s = A @ s + B * (e[k] + trial.reference[k, 2])
-    cost = float(trial.numbers[PERIOD] * np.sum(trial.cost.a * x**2 + trial.cost.b * e**2) / 2)
-    return Record(trial.task.t, x, e, e, np.zeros(trial.n), cost, None)
+        s = A @ s + B * (e[k] + rest[k])
+    cost = float(T * np.sum(trial.cost.a * x**2 + trial.cost.b * e**2) / 2)
+    return Record(trial.task.t, x, e, e, np.zeros(n), cost, None)

@@ -12,26 +12,28 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from tfarm.arm import MOMENT_GAIN, Arm
-from tfarm.dsp import Chain, Converters, Scenario, Simulation, Simulator
+from tfarm.dsp import Chain, Converters, Scenario, Simulation
 from tfarm.dsp.scenarios import torque_unit
 from tfarm.errors import ConvergenceError
 from tfarm.spectrum import modes
 from tfarm.tuner.bound import lq_bound
 from tfarm.tuner.constants import best_constant
-from tfarm.tuner.controller import TunedGain, judged, tip_error
+from tfarm.tuner.controller import TunedGain, judged, tip_off
 from tfarm.tuner.guard import Guard
 from tfarm.tuner.sector import MovingGain
 from tfarm.tuner.shaping import shaped, shaper
 from tfarm.tuner.trial import Record, Trial, residual_rms
 
-ADDED = (0.06, 0.15, 0.3)  # of the arm's mass, for one without payload: 0.1, 0.25 and 0.5 kg on the paper's
-CARRIED = (0.5, 1.5, 2.0)  # of the payload, for one that has one
-HUBS = (0.8, 1.2)  # times the hub's inertia
-DAMPINGS = (0.1, 10.0)  # times the arm's own C
-GIVEN = (3.575e-4, 3.575e-2)  # of critical in the first mode, for an arm without: C = 1e-5 and 1e-3 s on the paper's
-COUNTS, BITS = 8192, 12
-MOMENT_RANGE, TORQUE_RANGE = 20.0, 10.0  # N m, of the paper's arm: times the arm's unit of torque
-DELAY = 1.0  # samples
+ADDED_MASSES = (0.06, 0.15, 0.3)  # of the arm's mass, for one without payload: 0.1, 0.25 and 0.5 kg on the paper's
+PAYLOAD_SHARES = (0.5, 1.5, 2.0)  # of the payload, for one that has one
+HUB_SHARES = (0.8, 1.2)  # times the hub's inertia
+DAMPING_SHARES = (0.1, 10.0)  # times the arm's own C
+GIVEN_RATIOS = (3.575e-4, 3.575e-2)  # of critical in mode 1, for an arm without C: 1e-5 and 1e-3 s on the paper's
+ENCODER_COUNTS = 8192  # a turn, of the encoder
+CONVERTER_BITS = 12  # of the other converters
+MOMENT_RANGE = 20.0  # N m, of the paper's arm: times the arm's unit of torque
+TORQUE_RANGE = 10.0  # N m, likewise
+COMPUTER_DELAY = 1.0  # samples that the computer takes, beyond the chain's own
 
 
 class Outcome(NamedTuple):
@@ -46,7 +48,7 @@ class Outcome(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Row:
+class Outcomes:
     """One condition: what each controller makes of it.
 
     `best_constant` is the best constant gain of the trained condition, used here; `own_constant` the best for this
@@ -67,7 +69,7 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Condition:
+class NamedLoop:
     """An arm and a chain under their name."""
 
     name: str
@@ -81,66 +83,59 @@ def quantised_chain(arm: Arm, chain: Chain) -> Chain:
         return chain
     unit = torque_unit(arm, chain)
     converters = Converters(
-        encoder_counts=COUNTS, hub_rate="difference", moment_bits=BITS, moment_range=MOMENT_RANGE * unit,
-        torque_bits=BITS, torque_range=TORQUE_RANGE * unit,
+        encoder_counts=ENCODER_COUNTS, hub_rate="difference",
+        moment_bits=CONVERTER_BITS, moment_range=MOMENT_RANGE * unit,
+        torque_bits=CONVERTER_BITS, torque_range=TORQUE_RANGE * unit,
     )  # fmt: skip
     return replace(chain, converters=converters)
 
 
-def conditions(arm: Arm, chain: Chain, quantised: Chain | None = None) -> list[Condition]:
+def tried_loops(arm: Arm, chain: Chain, quantised: Chain | None = None) -> list[NamedLoop]:
     """The trained condition, converters and delay, then the arms that it was not trained on.
 
     `quantised` is the chain with converters, that of `quantised_chain` if it is not given.
     """
     quantised = quantised_chain(arm, chain) if quantised is None else quantised
-    sampling = replace(chain.sampling, delay_samples=chain.sampling.delay_samples + DELAY)
+    sampling = replace(chain.sampling, delay_samples=chain.sampling.delay_samples + COMPUTER_DELAY)
     listed = [
-        Condition("as trained", arm, chain),
-        Condition("quantised", arm, quantised),
-        Condition("one sample of delay", arm, replace(chain, sampling=sampling)),
-        Condition("quantised, one sample of delay", arm, replace(quantised, sampling=sampling)),
+        NamedLoop("as trained", arm, chain),
+        NamedLoop("quantised", arm, quantised),
+        NamedLoop("one sample of delay", arm, replace(chain, sampling=sampling)),
+        NamedLoop("quantised, one sample of delay", arm, replace(quantised, sampling=sampling)),
     ]
-    loads = {f"payload {mass:g} kg": arm.having(payload_mass=mass) for mass in _payloads(arm)}
-    inertias = {f"hub {share - 1:+.0%}": share * arm.hub_inertia for share in HUBS}
-    hubs = {name: arm.having(hub_inertia=inertia) for name, inertia in inertias.items()}
-    dampings = {f"C = {C:g} s": arm.having(damping=C) for C in _dampings(arm)}
-    return listed + [Condition(name, other, chain) for name, other in (loads | hubs | dampings).items()]
-
-
-def _payloads(arm: Arm) -> list[float]:
-    """Other masses at the tip [kg]: shares of the payload, or of the arm itself where it has none."""
-    mass, beam = arm.payload_mass, arm.own_mass
-    return [float(f"{x:.2g}") for x in ([share * mass for share in CARRIED] if mass else [s * beam for s in ADDED])]
-
-
-def _dampings(arm: Arm) -> list[float]:
-    """Other dampings C [s], none among them where the arm has some."""
-    own = arm.damping
+    mass, own = arm.payload_mass, arm.damping
+    masses = [share * mass for share in PAYLOAD_SHARES] if mass else [share * arm.own_mass for share in ADDED_MASSES]
+    payloads = [float(f"{each:.2g}") for each in masses]
     if own:
-        return [0.0, *(float(f"{share * own:.3g}") for share in DAMPINGS)]
-    first = float(modes(arm, 1).natural_frequency[-1])
-    return [float(f"{2 * zeta / first:.1g}") for zeta in GIVEN]
+        dampings = [0.0, *(float(f"{share * own:.3g}") for share in DAMPING_SHARES)]
+    else:
+        first = float(modes(arm, 1).natural_frequency[-1])
+        dampings = [float(f"{2 * zeta / first:.1g}") for zeta in GIVEN_RATIOS]
+    others = {f"payload {each:g} kg": arm.having(payload_mass=each) for each in payloads}
+    others |= {f"hub {share - 1:+.0%}": arm.having(hub_inertia=share * arm.hub_inertia) for share in HUB_SHARES}
+    others |= {f"C = {C:g} s": arm.having(damping=C) for C in dampings}
+    return listed + [NamedLoop(name, other, chain) for name, other in others.items()]
 
 
-def compare(
+def compare_controllers(
     trial: Trial,
     gain: TunedGain,
     guard: Guard,
-    listed: list[Condition] | None = None,
+    listed: list[NamedLoop] | None = None,
     nominal: float | None = None,
-) -> list[Row]:
+) -> list[Outcomes]:
     """A row a condition; `trial` is the one that the tuner was trained on, `nominal` its best constant gain."""
     nominal = best_constant(trial).gain if nominal is None else nominal
-    wanted = conditions(trial.arm, trial.loop.chain) if listed is None else listed
+    wanted = tried_loops(trial.arm, trial.loop.chain) if listed is None else listed
     return [_row(trial, gain, guard, nominal, each) for each in wanted]
 
 
-def _row(trial: Trial, gain: TunedGain, guard: Guard, nominal: float, condition: Condition) -> Row:
+def _row(trial: Trial, gain: TunedGain, guard: Guard, nominal: float, condition: NamedLoop) -> Outcomes:
     here = trial.asked_of(condition.arm, condition.chain, gain.servo)
     own = best_constant(here)
     shapers = {kind: shaped(trial.task, shaper(trial.loop, kind)) for kind in ("ZV", "EI")}
     bound = lq_bound(here)
-    return Row(
+    return Outcomes(
         condition=condition.name,
         without=_constant(here, here.task, 0.0),
         best_constant=_constant(here, here.task, nominal),
@@ -148,7 +143,7 @@ def _row(trial: Trial, gain: TunedGain, guard: Guard, nominal: float, condition:
         own_gain=own.gain,
         ZV=_constant(here, shapers["ZV"], 0.0),
         EI=_constant(here, shapers["EI"], 0.0),
-        tuner=_played(gain.run(_simulator(here, here.task)), here),
+        tuner=_played(gain.run(here.simulator()), here),
         bound=_outcome(bound, here.task),
         proven=guard.is_proven and _proven(here, guard),
     )
@@ -164,17 +159,13 @@ def _proven(here: Trial, guard: Guard) -> bool:
         return False
 
 
-def _simulator(trial: Trial, task: Scenario) -> Simulator:
-    return Simulator(trial.arm, trial.loop.chain, task, count=trial.loop.plant.count)
-
-
 def _constant(trial: Trial, task: Scenario, K: float) -> Outcome:
-    return _played(_simulator(trial, task).linear(trial.loop.gains.having(MOMENT_GAIN, K)), trial)
+    return _played(trial.simulator(task=task).linear(trial.loop.gains.having(MOMENT_GAIN, K)), trial)
 
 
 def _played(run: Simulation, trial: Trial) -> Outcome:
     outcome = _outcome(judged(run, trial.cost, trial.signals), run.scenario)
-    return outcome if math.isinf(outcome.cost) else outcome._replace(tip_error=tip_error(run, trial))
+    return outcome if math.isinf(outcome.cost) else outcome._replace(tip_error=tip_off(run, trial))
 
 
 def _outcome(record: Record, task: Scenario) -> Outcome:

@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from tfarm.tuner.guard import gain_windows
+from tfarm.tuner.guard import constant_windows
 from tfarm.tuner.trial import Trial
 
-GRID = 200
+CONSTANT_GAINS = 200  # constant gains of a window that are tried, before the best are refined
 
 
 class BestConstant(NamedTuple):
@@ -25,19 +25,18 @@ def best_constant(trial: Trial) -> BestConstant:
 
     Where no constant gain is stable, K = 0.
     """
-    windows = gain_windows(trial.loop)
+    windows = constant_windows(trial.loop)
     found = [BestConstant(0.0, trial.with_constant(0.0).cost)] if not windows or windows[0][0] == 0.0 else []
     for low, high in windows:
-        gains = np.linspace(low, high, GRID + 2)[1:-1]
+        gains = np.linspace(low, high, CONSTANT_GAINS + 2)[1:-1]
         costs = np.array([trial.with_constant(float(K)).cost for K in gains])
-        step = (high - low) / (GRID + 1)
-        found += [_refined(trial, float(gains[i]), step, low, high) for i in np.argsort(costs)[:3]]
+        step = (high - low) / (CONSTANT_GAINS + 1)
+        for i in np.argsort(costs)[:3]:
+            done = minimize_scalar(
+                lambda K: trial.with_constant(float(K)).cost,
+                bounds=(max(float(gains[i]) - step, low), min(float(gains[i]) + step, high)),
+                method="bounded",
+                options={"xatol": 1e-9},
+            )
+            found.append(BestConstant(float(done.x), float(done.fun)))
     return min(found, key=lambda each: each.cost)
-
-
-def _refined(trial: Trial, K: float, step: float, low: float, high: float) -> BestConstant:
-    ends = (max(K - step, low), min(K + step, high))
-    done = minimize_scalar(
-        lambda K: trial.with_constant(float(K)).cost, bounds=ends, method="bounded", options={"xatol": 1e-9}
-    )
-    return BestConstant(float(done.x), float(done.fun))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tfarm.arm import HubFeedback
 from tfarm.dsp import Measurement, Simulation, Simulator
 from tfarm.tuner.network import Network
-from tfarm.tuner.trial import Cost, Record, Signals, Trial
+from tfarm.tuner.trial import Cost, Reading, Record, Trial
 
 Real = NDArray[np.float64]
 
@@ -23,7 +23,7 @@ class TunedGain:
     network: Network
     guard: Real
     K1: float
-    signals: Signals
+    signals: Reading
     Kp: float = 0.0
     _past: list[tuple[float, float, float, float]] = field(default_factory=list, init=False)
 
@@ -48,7 +48,7 @@ class TunedGain:
         return K
 
 
-def judged(simulation: Simulation, cost: Cost, signals: Signals) -> Record:
+def judged(simulation: Simulation, cost: Cost, signals: Reading) -> Record:
     """A simulation's x, u, e and cost: x from the moment that the arm has, e from the torque that leaves the DAC."""
     task, done = simulation.scenario, simulation.torque.size
     rest = 0.0 if signals == "total" else task.feedforward[:done]
@@ -65,7 +65,7 @@ def simulated(simulator: Simulator, gain: TunedGain, cost: Cost) -> Record:
     return judged(gain.run(simulator), cost, gain.signals)
 
 
-def tip_error(simulation: Simulation, trial: Trial) -> float | None:
+def tip_off(simulation: Simulation, trial: Trial) -> float | None:
     """How far the tip is off its target [m] when a simulation of a slew ends; None where the loop ran away."""
     if simulation.stopped is not None:
         return None

@@ -33,20 +33,21 @@ from tfarm.dsp.margins import around
 from tfarm.dsp.sampling import held
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError, did_you_mean
 from tfarm.records import record
-from tfarm.tuner.lyapunov import Lyapunov
-from tfarm.tuner.sector import SHARE, MovingGain
+from tfarm.tuner.lyapunov import CommonLyapunov
+from tfarm.tuner.sector import RADIUS_SHARE, MovingGain
 
 Real = NDArray[np.float64]
 GuardKind = Literal["time-varying", "frozen", "none"]
-KINDS = ("time-varying", "frozen", "none")
+GUARD_KINDS = ("time-varying", "frozen", "none")
 
 INSIDE = 0.8  # of half the width: how far the best constant gain may be from the middle
 MOST_GAIN = 10.0  # where the frozen interval has no upper end
-MIDDLES = 60
-NARROW = 1e-4  # a sector this narrow is none
-AGREE = 1e-3  # of the width: how little more modes may change it
-UNDAMPED_MODES, MOST_MODES = 20, 48
-DAMPINGS = np.geomspace(1e-12, 1e-2, 11)  # s, tried for the remedy
+MIDDLE_GAINS = 60  # gains of a window that a sector is tried around
+NARROWEST_SECTOR = 1e-4  # a sector this narrow is none
+SECTORS_AGREE = 1e-3  # of the width: how little more modes may change it
+GUARD_MODES_UNDAMPED = 20  # of the larger loop that a guard is held against at C = 0
+MOST_GUARD_MODES = 48  # of that at C > 0
+REMEDY_DAMPINGS = np.geomspace(1e-12, 1e-2, 11)  # s, tried for the remedy
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,7 @@ class Guard:
     hi: float
     modes_used: int
     is_settled: bool
-    proofs: tuple[Lyapunov, ...] = ()
+    proofs: tuple[CommonLyapunov, ...] = ()
 
     @property
     def is_proven(self) -> bool:
@@ -96,8 +97,8 @@ def find_guard(loop: SampledLoop, kind: GuardKind, best_constant: float) -> Guar
 
     Raises CertificationError where there is none, with the damping that would have one.
     """
-    if kind not in KINDS:
-        raise ParameterError(key="guard", value=kind, remedy=did_you_mean(str(kind), KINDS))
+    if kind not in GUARD_KINDS:
+        raise ParameterError(key="guard", value=kind, remedy=did_you_mean(str(kind), GUARD_KINDS))
     if kind == "none":
         return Guard("none", 0.0, math.inf, loop.plant.count, False)
     loops = list(_larger(loop))
@@ -107,7 +108,7 @@ def find_guard(loop: SampledLoop, kind: GuardKind, best_constant: float) -> Guar
     return guard
 
 
-def gain_windows(loop: SampledLoop) -> list[tuple[float, float]]:
+def constant_windows(loop: SampledLoop) -> list[tuple[float, float]]:
     """The intervals of constant gains K >= 0, up to 10, that leave the loop stable."""
     return [(max(low, 0.0), min(high, MOST_GAIN)) for low, high in stable_windows(loop, MOMENT_GAIN) if high > 0]
 
@@ -116,13 +117,13 @@ def _frozen(loops: list[SampledLoop], best_constant: float) -> Guard | None:
     """The interval that holds in every model, without its outermost hundredth."""
     found = []
     for loop in loops:
-        windows = gain_windows(loop)
+        windows = constant_windows(loop)
         if not windows:
             return None
         found.append(around(windows, best_constant) or min(windows, key=lambda w: abs(sum(w) / 2 - best_constant)))
     low, high = max(low for low, _ in found), min(high for _, high in found)
-    edge = (1 - SHARE) * (high - low)
-    if high - low < NARROW:
+    edge = (1 - RADIUS_SHARE) * (high - low)
+    if high - low < NARROWEST_SECTOR:
         return None
     return Guard("frozen", low + edge * (low > 0), high - edge, loops[-1].plant.count, _settled(loops, found))
 
@@ -135,11 +136,11 @@ def _moving(loops: list[SampledLoop], best_constant: float) -> Guard | None:
         return None
     radii = [model.radius(m) for model in models]
     found = [(m - radius, m + radius) for radius in radii]
-    share = SHARE
+    share = RADIUS_SHARE
     for _ in range(6):
         half = share * min(radii)
         lo, hi = max(0.0, m - half), m + half
-        if half < NARROW:
+        if half < NARROWEST_SECTOR:
             return None
         proofs = [model.proof(lo, hi) for model in models]
         if all(proofs):
@@ -151,10 +152,10 @@ def _moving(loops: list[SampledLoop], best_constant: float) -> Guard | None:
 
 def _middle(model: MovingGain, best_constant: float) -> float | None:
     """The middle gain of the default rule; None where no gain is stable."""
-    windows = gain_windows(model.loop)
-    middles = np.array([m for low, high in windows for m in np.linspace(low, high, MIDDLES + 2)[1:-1]])
+    windows = constant_windows(model.loop)
+    middles = np.array([m for low, high in windows for m in np.linspace(low, high, MIDDLE_GAINS + 2)[1:-1]])
     radii = np.array([model.radius(float(m)) for m in middles])
-    if not (radii > NARROW).any():
+    if not (radii > NARROWEST_SECTOR).any():
         return None
     beyond = abs(best_constant - middles) - INSIDE * radii
     holds = beyond <= 0
@@ -180,11 +181,11 @@ def _settled(loops: list[SampledLoop], found: list[tuple[float, float]]) -> bool
     if loops[0].plant.arm.is_undamped or len(found) < 2:
         return False
     (low, high), (before_low, before_high) = found[-1], found[-2]
-    agree = max(abs(low - before_low), abs(high - before_high)) <= AGREE * (high - low)
-    return agree and is_quiet(loops[-1], high)
+    agree = max(abs(low - before_low), abs(high - before_high)) <= SECTORS_AGREE * (high - low)
+    return agree and upper_modes_are_quiet(loops[-1], high)
 
 
-def is_quiet(loop: SampledLoop, highest: float) -> bool:
+def upper_modes_are_quiet(loop: SampledLoop, highest: float) -> bool:
     """Whether the upper half of the modes lose more in a sample by themselves than the feedback could give them."""
     plant, T = loop.plant, loop.chain.sampling.period
     fed_back = loop.under(loop.gains.having(MOMENT_GAIN, highest)).push
@@ -200,8 +201,8 @@ def _larger(loop: SampledLoop) -> Iterator[SampledLoop]:
     """
     yield loop
     arm, count = loop.plant.arm, loop.plant.count
-    wanted = (4 * count, 3 * count, 2 * count) if arm.damping else (UNDAMPED_MODES,)
-    for number in (min(number, MOST_MODES) for number in wanted):
+    wanted = (4 * count, 3 * count, 2 * count) if arm.damping else (GUARD_MODES_UNDAMPED,)
+    for number in (min(number, MOST_GUARD_MODES) for number in wanted):
         if number <= count:
             return
         try:
@@ -219,17 +220,17 @@ def _remedy(loop: SampledLoop, kind: str) -> str:
     served = [name for name in (RATE_GAIN, ANGLE_GAIN) if name == RATE_GAIN or loop.gains[name]]
     at = ", ".join(loop.gains.told(name, "{:g}".format) for name in served)
     start = f"{arm.name}: {what} is proven stable at {at}, C = {arm.damping:g} s"
-    for C in DAMPINGS[arm.damping < DAMPINGS]:
+    for C in REMEDY_DAMPINGS[arm.damping < REMEDY_DAMPINGS]:
         if _has_guard(arm.having(damping=float(C)), loop, kind):
             return f"{start}; with a damping of C = {C:.1e} s there is one"
     remedy = f"take another {RATE_GAIN}, or a shorter period or delay"
-    return f"{start}, nor with any damping up to {DAMPINGS[-1]:g} s; {remedy}"
+    return f"{start}, nor with any damping up to {REMEDY_DAMPINGS[-1]:g} s; {remedy}"
 
 
 def _has_guard(arm: Arm, loop: SampledLoop, kind: str) -> bool:
     try:
         first = sampled_loop(arm, loop.gains.having(MOMENT_GAIN, 1.0), loop.chain, count=loop.plant.count)
-        if not gain_windows(first):
+        if not constant_windows(first):
             return False
         loops = list(_larger(first))
     except ConvergenceError:
@@ -242,4 +243,5 @@ def _has_guard(arm: Arm, loop: SampledLoop, kind: str) -> bool:
     if m is None:
         return False
     radii = [model.radius(m) for model in models]
-    return SHARE * min(radii) > NARROW and _settled(loops, [(m - radius, m + radius) for radius in radii])
+    sectors = [(m - radius, m + radius) for radius in radii]
+    return RADIUS_SHARE * min(radii) > NARROWEST_SECTOR and _settled(loops, sectors)

@@ -17,8 +17,8 @@ from typing import Any
 
 from tfarm.exact.compiled import compiled
 
-X, U, E, GAIN, SLOPE = range(5)  # columns of the signals
-TURNED, ADVANCE, DRIVE, SERVO, MOMENT = range(5)  # A^T, A, B and the rows of the model
+X, U, E, GAIN_USED, SLOPE = range(5)  # columns of the signals
+TURNED_ROWS, ADVANCE_ROWS, DRIVE_ROW, SERVO_ROW, MOMENT_ROW = range(5)  # A^T, A, B and the rows of the model
 MOMENT_WEIGHT, TORQUE_WEIGHT, PERIOD, BOUND, LAG = range(5)  # of the numbers
 
 
@@ -45,7 +45,7 @@ def guarded(z: float, guard: Any) -> tuple[float, float]:
 
 
 @compiled
-def gain(weights: Any, inputs: Any, hidden: Any, guard: Any) -> tuple[float, float]:
+def network_gain(weights: Any, inputs: Any, hidden: Any, guard: Any) -> tuple[float, float]:
     """The network's gain and its derivative by the output neuron's sum; fills `hidden`."""
     m, h = inputs.size, hidden.size
     z = 0.0
@@ -99,17 +99,17 @@ def dot(a: Any, b: Any) -> float:
 def sense(k: int, model: Any, reference: Any, numbers: Any, scales: Any, state: Any, run: Any) -> bool:
     """Reads x and u at sample k and fills the network's inputs there; False where the moment passes the bound."""
     inputs, _, signals = run
-    moment = dot(model[MOMENT], state)
+    moment = dot(model[MOMENT_ROW], state)
     if not abs(moment) <= numbers[BOUND]:
         return False
     signals[k, X] = moment - reference[k, 3]
-    signals[k, U] = reference[k, 1] + reference[k, 0] - dot(model[SERVO], state)
+    signals[k, U] = reference[k, 1] + reference[k, 0] - dot(model[SERVO_ROW], state)
     inputs[k].fill(0.0)
     inputs[k, 0], inputs[k, 4] = signals[k, U], signals[k, X]
     if k >= 1:
         inputs[k, 1], inputs[k, 2], inputs[k, 5] = signals[k - 1, U], signals[k - 1, E], signals[k - 1, X]
         if inputs.shape[1] > 6:
-            inputs[k, 6] = signals[k - 1, GAIN]
+            inputs[k, 6] = signals[k - 1, GAIN_USED]
     if k >= 2:
         inputs[k, 3] = signals[k - 2, E]
     for i in range(inputs.shape[1]):
@@ -121,13 +121,13 @@ def sense(k: int, model: Any, reference: Any, numbers: Any, scales: Any, state: 
 def act(k: int, model: Any, reference: Any, weights: Any, guard: Any, state: Any, spare: Any, run: Any) -> None:
     """The gain, e and the torque at sample k; then one sample on."""
     inputs, hidden, signals = run
-    K, slope = gain(weights, inputs[k], hidden[k], guard)
-    signals[k, GAIN], signals[k, SLOPE] = K, slope
+    K, slope = network_gain(weights, inputs[k], hidden[k], guard)
+    signals[k, GAIN_USED], signals[k, SLOPE] = K, slope
     signals[k, E] = signals[k, U] - K * signals[k, X]
     torque = signals[k, E] + reference[k, 2]
-    turn(model[TURNED], state, spare)
+    turn(model[TURNED_ROWS], state, spare)
     for i in range(state.size):
-        state[i] = spare[i] + model[DRIVE][i] * torque
+        state[i] = spare[i] + model[DRIVE_ROW][i] * torque
 
 
 @compiled
@@ -169,7 +169,7 @@ def backward(model: Any, numbers: Any, scales: Any, weights: Any, run: Any, work
     back.fill(0.0)
     late.fill(0.0)
     for k in range(n - 1, -1, -1):
-        by_e = T * b * signals[k, E] + dot(model[DRIVE], back) + late[0]
+        by_e = T * b * signals[k, E] + dot(model[DRIVE_ROW], back) + late[0]
         by_sum = (late[4] - signals[k, X] * by_e) * signals[k, SLOPE]
         gain_gradient(weights, inputs[k], hidden[k], by_sum, gradient)
         by_input.fill(0.0)
@@ -178,10 +178,10 @@ def backward(model: Any, numbers: Any, scales: Any, weights: Any, run: Any, work
             for i in range(m):
                 by_input[i] += by_net * weights[j * m + i] / scales[i]
         by_u = by_e + by_input[0] + late[2]
-        by_x = T * a * signals[k, X] - signals[k, GAIN] * by_e + by_input[4] + late[3]
-        turn(model[ADVANCE], back, spare)
+        by_x = T * a * signals[k, X] - signals[k, GAIN_USED] * by_e + by_input[4] + late[3]
+        turn(model[ADVANCE_ROWS], back, spare)
         for i in range(back.size):
-            back[i] = spare[i] + model[MOMENT][i] * by_x - model[SERVO][i] * by_u
+            back[i] = spare[i] + model[MOMENT_ROW][i] * by_x - model[SERVO_ROW][i] * by_u
         late[0], late[1] = late[1] + by_input[2], by_input[3]
         late[2], late[3] = by_input[1], by_input[5]
         late[4] = by_input[6] if m > 6 else 0.0

@@ -20,15 +20,15 @@ from scipy.linalg import LinAlgError, solve_discrete_are, solve_triangular
 from tfarm.records import record
 
 Real = NDArray[np.float64]
-Whole = list[list[int]]
+IntegerMatrix = list[list[int]]
 
 SLACKS = (1e-3, 1e-5, 1e-7, 1e-9)  # how strictly the inequality is asked for, in balanced states
-DIGITS = 60  # bits that P is rounded to before the proof
+BITS_OF_P = 60  # bits that P is rounded to before the proof
 
 
 @dataclass(frozen=True)
 @record
-class Lyapunov:
+class CommonLyapunov:
     """V = s^T P s falls with both matrices `low` and `high` (n, n), and with all between them.
 
     `contraction` rho < 1: |s| in the norm of P shrinks at least by it at every sample (float64).
@@ -55,12 +55,12 @@ class Lyapunov:
             return False
         units = 2.0 ** np.round(-np.log2(diagonal) / 2)
         scaled = self.P * units * units[:, None]
-        P, _ = whole(np.round(np.ldexp(scaled / abs(scaled).max(), DIGITS)))
+        P, _ = as_integers(np.round(np.ldexp(scaled / abs(scaled).max(), BITS_OF_P)))
         ends = (A * units / units[:, None] for A in (self.low, self.high))
         return is_positive_definite(P) and all(_falls(P, A) for A in ends)
 
 
-def common_lyapunov(middle: Real, drive: Real, sense: Real, low: Real, high: Real) -> Lyapunov | None:
+def common_lyapunov(middle: Real, drive: Real, sense: Real, low: Real, high: Real) -> CommonLyapunov | None:
     """The Lyapunov function of the segment from `low` to `high`, or None where none is found.
 
     `middle` lies between them, and drive sense^T is half of low - high.  Of several strictnesses the best is taken.
@@ -70,26 +70,19 @@ def common_lyapunov(middle: Real, drive: Real, sense: Real, low: Real, high: Rea
         return None
     scale = _sizes(middle, drive)
     A, b, c = middle * scale / scale[:, None], (drive / scale)[:, None], (sense * scale)[None]
-    found: list[Lyapunov] = []
+    found: list[CommonLyapunov] = []
     for slack in SLACKS:
         try:
             P = solve_discrete_are(A, b, c.T @ c + slack * (c @ c.T).item() * np.eye(len(A)), -np.eye(1))
+            P = (P + P.T) / 2 / scale / scale[:, None]
+            L = np.linalg.cholesky(P)
         except (LinAlgError, ValueError):
             continue
-        P = (P + P.T) / 2 / scale / scale[:, None]
-        rho = _contraction(P, low, high)
+        ends = [solve_triangular(L, (L.T @ each).T, lower=True) for each in (low, high)]
+        rho = float(max(np.linalg.norm(each, 2) for each in ends))
         if rho < 1.0:
-            found.append(Lyapunov(low, high, P, rho))
+            found.append(CommonLyapunov(low, high, P, rho))
     return min(found, key=lambda each: each.contraction, default=None)
-
-
-def _contraction(P: Real, low: Real, high: Real) -> float:
-    try:
-        L = np.linalg.cholesky(P)
-    except LinAlgError:
-        return np.inf
-    ends = [solve_triangular(L, (L.T @ A).T, lower=True) for A in (low, high)]
-    return float(max(np.linalg.norm(each, 2) for each in ends))
 
 
 def _sizes(A: Real, b: Real) -> Real:
@@ -104,14 +97,14 @@ def _sizes(A: Real, b: Real) -> Real:
 # ---------------------------------------------------------------- whole numbers
 
 
-def whole(matrix: Real) -> tuple[Whole, int]:
+def as_integers(matrix: Real) -> tuple[IntegerMatrix, int]:
     """The whole numbers N and the shift k with matrix = N / 2^k, exactly."""
     pairs = [[float(value).as_integer_ratio() for value in row] for row in matrix]
     shift = max(bottom.bit_length() - 1 for row in pairs for _, bottom in row)
     return [[top << (shift - bottom.bit_length() + 1) for top, bottom in row] for row in pairs], shift
 
 
-def is_positive_definite(matrix: Whole) -> bool:
+def is_positive_definite(matrix: IntegerMatrix) -> bool:
     """Whether a symmetric matrix of whole numbers has only positive leading minors (Bareiss' elimination)."""
     M, before = [list(row) for row in matrix], 1
     n = len(M)
@@ -127,9 +120,9 @@ def is_positive_definite(matrix: Whole) -> bool:
     return True
 
 
-def _falls(P: Whole, A: Real) -> bool:
+def _falls(P: IntegerMatrix, A: Real) -> bool:
     """Whether P - A^T P A > 0."""
-    N, shift = whole(A)
+    N, shift = as_integers(A)
     columns: Any = list(zip(*N, strict=True))
     PN = [[sum(p * a for p, a in zip(row, column, strict=True)) for column in columns] for row in P]
     across: Any = list(zip(*PN, strict=True))

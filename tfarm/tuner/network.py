@@ -20,8 +20,8 @@ from tfarm.tuner import kernel
 
 Real = NDArray[np.float64]
 
-INPUTS = ("u(t)", "u(t-1)", "e(t-1)", "e(t-2)", "x(t)", "x(t-1)", "K(t-1)")
-MOST_HIDDEN = 1000
+NETWORK_INPUTS = ("u(t)", "u(t-1)", "e(t-1)", "e(t-2)", "x(t)", "x(t-1)", "K(t-1)")
+MOST_HIDDEN = 1000  # neurons; the paper has 6
 HALF_WIDTH = 0.5  # of the uniform distribution of the initial weights
 
 
@@ -41,7 +41,8 @@ class Network:
         for name in ("W1", "w2", "scales"):
             value = np.array(getattr(self, name), dtype=float)
             if not np.isfinite(value).all():
-                raise ParameterError(key=name, value=_odd(value), remedy="every weight and scale is a finite number")
+                odd = float(value[~np.isfinite(value)][0])
+                raise ParameterError(key=name, value=odd, remedy="every weight and scale is a finite number")
             value.setflags(write=False)
             object.__setattr__(self, name, value)
         self._check_shapes()
@@ -73,7 +74,7 @@ class Network:
     def gain_and_gradient(self, signals: Real, guard: Real) -> tuple[float, Real]:
         """K, and dK/dw by every weight as `weights` lists them."""
         weights, hidden, inputs = self.weights, np.zeros(self.w2.size), np.asarray(signals, dtype=float) / self.scales
-        K, slope = kernel.gain(weights, inputs, hidden, guard)
+        K, slope = kernel.network_gain(weights, inputs, hidden, guard)
         gradient = np.zeros(weights.size)
         kernel.gain_gradient(weights, inputs, hidden, slope, gradient)
         return float(K), gradient
@@ -86,7 +87,3 @@ def initial_network(seed: int, *, hidden: int = 6, scales: Real | None = None) -
     widths = np.ones(6) if scales is None else np.asarray(scales, dtype=float)
     draw = np.random.default_rng(seed).uniform(-HALF_WIDTH, HALF_WIDTH, hidden * (widths.size + 1))
     return Network(draw[:-hidden].reshape(hidden, widths.size), draw[-hidden:], widths)
-
-
-def _odd(values: Real) -> float:
-    return float(values[~np.isfinite(values)][0])

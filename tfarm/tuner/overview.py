@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm
-from tfarm.dsp import Chain, Simulation, Simulator
+from tfarm.dsp import Chain, Simulation
 from tfarm.dsp.curves import resolved
 from tfarm.dsp.results import ideal_chain
 from tfarm.dsp.scenarios import torque_unit
@@ -17,27 +17,29 @@ from tfarm.dsp.slews import WITHOUT
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.records import record
 from tfarm.spectrum.scales import first_frequency
-from tfarm.tuner import Cost, Learning, Plan, Tuning, compare, conditions, tune
-from tfarm.tuner.comparison import Row, quantised_chain
+from tfarm.tuner import Cost, Learning, Plan, Tuning, compare_controllers, tried_loops, tune
+from tfarm.tuner.comparison import Outcomes, quantised_chain
 from tfarm.tuner.guard import GuardKind
-from tfarm.tuner.studies import PAPER, Finished, map_verdict, plans_of, run_study
+from tfarm.tuner.studies import PAPER_PAIR, Finished, final_cost, learning_costs, map_verdict, plans_of, run_study
 from tfarm.tuner.training import Rule
 from tfarm.tuner.tuning import usual_plan
 
 Real = NDArray[np.float64]
 
-SEEDS = 20  # of the learning curves
-MAP_SEEDS, MAP_TRIALS = 5, 60
-TRIAL = 3.0  # times the slew
-SERVO = 1 / 20  # of the first frequency: how fast the servo's angle loop is, that its damping leaves the mode alone
-SERVO_SAMPLES = 0.03  # rad a sample, where that is slower
-WORKERS = 2
+CURVE_SEEDS = 20  # of the learning curves
+MAP_SEEDS = 5  # of each point of the map of the rates
+MAP_TRIALS = 60  # of each of its runs
+TRIAL_SLEWS = 3.0  # times the slew
+SERVO_SPEED = 1 / 20  # of the first frequency: the servo's angle loop is so slow that it leaves the mode alone
+SERVO_TURN = 0.03  # rad a sample, where that is slower
+STUDY_THREADS = 2  # threads; a report uses no more cores
 LEARNT: tuple[tuple[str, str, Rule, GuardKind], ...] = (
     ("default", "default, in the guard", "dynamic", "time-varying"),
     ("default_no_guard", "default, no guard", "dynamic", "none"),
     ("plain", "(21) as printed, no guard", "plain", "none"),
 )
-NOMINAL, COARSE = "as trained", "quantised, one sample of delay"  # rows of the comparison
+NOMINAL = "as trained"  # the first row of the comparison
+COARSE = "quantised, one sample of delay"  # its last row of the arm itself
 
 
 @dataclass(frozen=True)
@@ -89,7 +91,7 @@ class CostMap:
     @property
     def papers(self) -> tuple[int, int]:
         """Row and column of the paper's pair."""
-        return int(np.argmin(abs(self.alphas - PAPER[0]))), int(np.argmin(abs(self.etas - PAPER[1])))
+        return int(np.argmin(abs(self.alphas - PAPER_PAIR[0]))), int(np.argmin(abs(self.etas - PAPER_PAIR[1])))
 
     @property
     def is_papers_best(self) -> bool:
@@ -116,7 +118,7 @@ class TunerStudy:
     coarse: Mapping[str, Simulation]
     curves: tuple[Curves, ...]
     cost_map: CostMap
-    rows: tuple[Row, ...]
+    rows: tuple[Outcomes, ...]
     servo: Tuning | None
 
 
@@ -128,13 +130,13 @@ def tuner_study(arm: Arm, chain: Chain) -> TunerStudy:
     plan = plan_of(arm, chain)
     tuning = tune(arm, plan, ideal_chain(chain))
     ideal = tuning.trial.loop.chain
-    listed = conditions(arm, ideal, quantised_chain(arm, chain))
-    rows = compare(tuning.trial, tuning.gain(), tuning.training.guard, listed, tuning.best_constant.gain)
+    listed = tried_loops(arm, ideal, quantised_chain(arm, chain))
+    rows = compare_controllers(tuning.trial, tuning.gain(), tuning.training.guard, listed, tuning.best_constant.gain)
     return TunerStudy(
         arm=arm,
         tuning=tuning,
         slews=_simulated(tuning, ideal),
-        constant=_simulator(tuning, ideal).linear(tuning.constant),
+        constant=tuning.trial.simulator(chain=ideal).linear(tuning.constant),
         coarse=_simulated(tuning, next(each.chain for each in listed if each.name == COARSE)),
         curves=tuple(_curves(tuning, *each) for each in LEARNT),
         cost_map=_cost_map(tuning),
@@ -145,7 +147,7 @@ def tuner_study(arm: Arm, chain: Chain) -> TunerStudy:
 
 def _servo(arm: Arm, plan: Plan, chain: Chain) -> Tuning | None:
     """The same tuning with an angle loop a twentieth as fast as the first mode, or slower where the clock is slow."""
-    speed = min(SERVO * first_frequency(arm), SERVO_SAMPLES / chain.sampling.period)
+    speed = min(SERVO_SPEED * first_frequency(arm), SERVO_TURN / chain.sampling.period)
     on_angle = float(f"{arm.turned_inertia * speed**2:.2g}")
     try:
         return tune(arm, plan.holding(arm, on_angle), chain)
@@ -157,17 +159,12 @@ def plan_of(arm: Arm, chain: Chain) -> Plan:
     """The paper's figures at the arm's own gain and in its own unit of torque, for trials of three times the slew."""
     unit = torque_unit(arm, chain)
     cost = Cost(a=Cost().a / unit**2, b=Cost().b / unit**2)
-    return replace(usual_plan(arm), duration=TRIAL * chain.slew.rise_time, cost=cost, scale=unit)
-
-
-def _simulator(tuning: Tuning, chain: Chain) -> Simulator:
-    trial = tuning.trial
-    return Simulator(trial.arm, chain, trial.task, count=trial.loop.plant.count)
+    return replace(usual_plan(arm), duration=TRIAL_SLEWS * chain.slew.rise_time, cost=cost, scale=unit)
 
 
 def _simulated(tuning: Tuning, chain: Chain) -> dict[str, Simulation]:
     without, tuned = resolved(
-        _simulator(tuning, chain),
+        tuning.trial.simulator(chain=chain),
         tuning.trial.arm,
         lambda each: each.linear(tuning.gain().servo),
         lambda each: tuning.gain().run(each),
@@ -177,27 +174,21 @@ def _simulated(tuning: Tuning, chain: Chain) -> dict[str, Simulation]:
 
 def _curves(tuning: Tuning, key: str, title: str, rule: Rule, guard: GuardKind) -> Curves:
     base = replace(tuning.plan, learning=Learning(rule=rule), guard=guard)
-    finished = _studied(tuning, plans_of("curves", base, SEEDS))
-    costs = np.full((SEEDS, base.trials), np.inf)
-    for row, each in zip(costs, finished, strict=True):
-        row[: len(each.costs)] = each.costs
-    return Curves(key, title, costs, tuple(finished))
+    finished = _studied(tuning, plans_of("curves", base, CURVE_SEEDS))
+    return Curves(key, title, learning_costs(finished, base.trials), tuple(finished))
 
 
 def _studied(tuning: Tuning, plans: list[Plan]) -> list[Finished]:
-    return run_study(tuning.trial.arm, plans, tuning.trial.loop.chain, workers=WORKERS, tuned=tuning)
+    return run_study(tuning.trial.arm, plans, tuning.trial.loop.chain, workers=STUDY_THREADS, tuned=tuning)
 
 
 def _cost_map(tuning: Tuning) -> CostMap:
     base = replace(tuning.plan, trials=MAP_TRIALS)
     finished = _studied(tuning, plans_of("map", base, MAP_SEEDS))
     groups = [finished[i : i + MAP_SEEDS] for i in range(0, len(finished), MAP_SEEDS)]
-    medians = {
-        (group[0].plan.learning.alpha, float(np.asarray(group[0].plan.learning.eta))): float(
-            np.quantile([each.cost for each in group], 0.5, method="nearest")
-        )
-        for group in groups
-    }
+    learnt = [group[0].plan.learning for group in groups]
+    pairs = [(each.alpha, float(np.asarray(each.eta))) for each in learnt]
+    medians = {pair: final_cost(group, 0.5) for pair, group in zip(pairs, groups, strict=True)}
     alphas, etas = (np.array(sorted({pair[i] for pair in medians})) for i in (0, 1))
     median = np.array([[medians[alpha, eta] for eta in etas] for alpha in alphas])
     return CostMap(alphas, etas, median, map_verdict(groups))

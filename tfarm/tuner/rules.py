@@ -13,14 +13,14 @@ import numpy as np
 from tfarm.exact.compiled import compiled
 
 from .kernel import (
-    ADVANCE,
-    DRIVE,
-    GAIN,
+    ADVANCE_ROWS,
+    DRIVE_ROW,
+    GAIN_USED,
     LAG,
-    MOMENT,
+    MOMENT_ROW,
     MOMENT_WEIGHT,
     PERIOD,
-    SERVO,
+    SERVO_ROW,
     SLOPE,
     TORQUE_WEIGHT,
     E,
@@ -36,8 +36,8 @@ from .kernel import (
     trial_cost,
 )
 
-PLAIN, CLIPPED, BACKTRACKING = 0, 1, 2
-SOURCE = (1, 5, 6, 10, 0, 4, 7)  # of each input in the rows of `_derive`: x, u, e, K now, before, and before that
+PLAIN_RULE, CLIPPED_RULE, BACKTRACKING_RULE = 0, 1, 2
+INPUT_ROWS = (1, 5, 6, 10, 0, 4, 7)  # of each input in the rows of `_derive`: x, u, e, K now, before, and before that
 
 
 @compiled
@@ -69,9 +69,9 @@ def learn_by_trials(
     """Learning after each trial; fills `costs`, changes `weights`.
 
     Returns how many trials were made and the sample at which the last one passed the bound (-1: none did); `weights`
-    are then those of the last trial that did not.  Under
-    BACKTRACKING a trial that costs more than the last accepted one is taken back, its step halved and the momentum set
-    to zero; an accepted one lets the step grow by a fifth, up to its full size.
+    are then those of the last trial that did not.  Under BACKTRACKING_RULE a trial that costs more than the last
+    accepted one is taken back, its step halved and the momentum set to zero; an accepted one lets the step grow by a
+    fifth, up to its full size.
     """
     n, size = reference.shape[0], weights.size
     gradient, change, kept, slope = np.zeros(size), np.zeros(size), weights.copy(), np.zeros(size)
@@ -80,7 +80,7 @@ def learn_by_trials(
         done = forward(model, reference, numbers, scales, guard, weights, run, work)
         cost = trial_cost(done, numbers, run[2]) if done == n else np.inf
         costs[trial] = cost
-        if rule == BACKTRACKING and not cost <= best and best < np.inf:
+        if rule == BACKTRACKING_RULE and not cost <= best and best < np.inf:
             share *= 0.5
             copied(kept, weights)
             change.fill(0.0)
@@ -93,12 +93,12 @@ def learn_by_trials(
             return trial + 1, -1
         backward(model, numbers, scales, weights, run, work, gradient)
         copied(weights, kept)
-        if rule == BACKTRACKING:
+        if rule == BACKTRACKING_RULE:
             copied(gradient, slope)
             share = min(1.0, 1.2 * share) if best < np.inf else 1.0
             best = cost
         _step(weights, change, gradient, rates, momentum, share, longest)
-    if rule == BACKTRACKING:
+    if rule == BACKTRACKING_RULE:
         copied(kept, weights)
     return costs.size, -1
 
@@ -149,26 +149,26 @@ def _derive(k: int, model: Any, numbers: Any, scales: Any, weights: Any, run: An
         D[row].fill(0.0)
     for i in range(S.shape[0]):
         for p in range(S.shape[1]):
-            D[X, p] += model[MOMENT][i] * S[i, p]
-            D[U, p] -= model[SERVO][i] * S[i, p]
-    gain_gradient(weights, inputs[k], hidden[k], signals[k, SLOPE], D[GAIN])
+            D[X, p] += model[MOMENT_ROW][i] * S[i, p]
+            D[U, p] -= model[SERVO_ROW][i] * S[i, p]
+    gain_gradient(weights, inputs[k], hidden[k], signals[k, SLOPE], D[GAIN_USED])
     for i in range(m):
         by_input = 0.0
         for j in range(h):
             by_input += weights[h * m + j] * hidden[k, j] * (1.0 - hidden[k, j]) * weights[j * m + i]
         share = signals[k, SLOPE] * by_input / scales[i]
         for p in range(S.shape[1]):
-            D[GAIN, p] += share * D[SOURCE[i], p]
+            D[GAIN_USED, p] += share * D[INPUT_ROWS[i], p]
     for p in range(S.shape[1]):
-        D[E, p] = D[U, p] - signals[k, GAIN] * D[X, p] - signals[k, X] * D[GAIN, p]
+        D[E, p] = D[U, p] - signals[k, GAIN_USED] * D[X, p] - signals[k, X] * D[GAIN_USED, p]
     spare.fill(0.0)
     for i in range(S.shape[0]):
         for j in range(S.shape[0]):
-            if model[ADVANCE][i, j] != 0.0:
+            if model[ADVANCE_ROWS][i, j] != 0.0:
                 for p in range(S.shape[1]):
-                    spare[i, p] += model[ADVANCE][i, j] * S[j, p]
+                    spare[i, p] += model[ADVANCE_ROWS][i, j] * S[j, p]
         for p in range(S.shape[1]):
-            spare[i, p] += model[DRIVE][i] * D[E, p]
+            spare[i, p] += model[DRIVE_ROW][i] * D[E, p]
     for i in range(S.shape[0]):
         copied(spare[i], S[i])
 
@@ -183,7 +183,7 @@ def learn_by_sensitivities(
     The gradient of a x^2/2 + b e^2/2 now, by weights taken for constant all the trial (Williams and Zipser, 1989).
     `total` collects T times the gradients of a trial: with rates of zero that is the gradient of its cost.
     """
-    n, size, states = reference.shape[0], weights.size, model[DRIVE].size
+    n, size, states = reference.shape[0], weights.size, model[DRIVE_ROW].size
     gradient, change, kept = np.zeros(size), np.zeros(size), weights.copy()
     S, room, D = np.zeros((states, size)), np.zeros((states, size)), np.zeros((12, size))
     state, spare = work[0], work[1]

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from tfarm.errors import MISSING, ParameterError, TfarmError
@@ -19,10 +18,10 @@ from tfarm.records import record
 from tfarm.tuner.controller import TunedGain
 from tfarm.tuner.guard import GuardKind
 from tfarm.tuner.network import MOST_HIDDEN, Network
-from tfarm.tuner.trial import Cost, Signals
+from tfarm.tuner.trial import Cost, Reading
 
 FORMAT = "tfarm tuner 1"
-LARGEST = 4_000_000  # bytes
+MOST_TUNER_BYTES = 4_000_000  # bytes of a tuner's file: more than a network of MOST_HIDDEN neurons takes
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
@@ -36,7 +35,7 @@ class SavedTuner:
     lo: float
     hi: float
     K1: float
-    signals: Signals
+    signals: Reading
     cost: Cost
     arm: str
     period: float
@@ -107,7 +106,7 @@ def to_text(tuner: SavedTuner) -> str:
 
 def weights_answer(network: Network) -> dict[str, list[float] | list[list[float]]]:
     """scales, W1 and w2 as lists."""
-    return {name: _listed(getattr(network, name)) for name in ("scales", "W1", "w2")}
+    return {name: getattr(network, name).tolist() for name in ("scales", "W1", "w2")}
 
 
 def save(tuner: SavedTuner, path: Path) -> None:
@@ -117,7 +116,7 @@ def save(tuner: SavedTuner, path: Path) -> None:
 
 def load_tuner(path: str | os.PathLike[str]) -> SavedTuner:
     """The tuner of a file.  Raises ParameterError, in one line, for whatever is wrong with it."""
-    text = read_file(path, LARGEST, key="controller", what="a tuner's file")
+    text = read_file(path, MOST_TUNER_BYTES, key="controller", what="a tuner's file")
     try:
         return TunerFile.model_validate_json(text).build()
     except ValidationError as error:
@@ -125,15 +124,8 @@ def load_tuner(path: str | os.PathLike[str]) -> SavedTuner:
         key = ".".join(map(str, problem["loc"])) or "file"
         special = {"json_invalid": os.fspath(path), "missing": MISSING}
         what = special.get(problem["type"], problem["input"])
-        raise ParameterError(key=key, value=what, remedy=_remedy(problem["msg"]), file=path) from None
+        message = f"{problem['msg'][:1].lower()}{problem['msg'][1:]}"
+        remedy = f"{message}; save it again with tfarm tune ARM --save FILE.json"
+        raise ParameterError(key=key, value=what, remedy=remedy, file=path) from None
     except TfarmError as error:
         raise error.in_file(path) if isinstance(error, ParameterError) else error from None
-
-
-def _remedy(message: str) -> str:
-    return f"{message[:1].lower()}{message[1:]}; save it again with tfarm tune ARM --save FILE.json"
-
-
-def _listed(values: NDArray[np.float64]) -> list[float] | list[list[float]]:
-    listed: list[float] | list[list[float]] = values.tolist()
-    return listed

@@ -22,12 +22,12 @@ from numpy.typing import NDArray
 from tfarm.arm import FED_BACK, MOMENT_GAIN
 from tfarm.dsp import SampledLoop
 from tfarm.records import record
-from tfarm.tuner.lyapunov import Lyapunov, common_lyapunov
+from tfarm.tuner.lyapunov import CommonLyapunov, common_lyapunov
 
 Real = NDArray[np.float64]
 
-SHARE = 0.99  # of the radius that the criterion allows: room for the modes left out, and for a strict proof
-AROUND = np.r_[-np.geomspace(100.0, 0.01, 30), 0.0, np.geomspace(0.01, 100.0, 30)]  # half-widths around a pole's angle
+RADIUS_SHARE = 0.99  # of the radius that the criterion allows: room for the modes left out, and for a strict proof
+POLE_WIDTHS = np.r_[-np.geomspace(100.0, 0.01, 30), 0.0, np.geomspace(0.01, 100.0, 30)]  # around a pole's angle
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class MovingGain:
         r = (self.sense @ V) * np.linalg.solve(V, self.drive.astype(complex))
         return float(1.0 / _peak(r, w))
 
-    def proof(self, lo: float, hi: float) -> Lyapunov | None:
+    def proof(self, lo: float, hi: float) -> CommonLyapunov | None:
         """The Lyapunov function of [lo, hi], proven in exact arithmetic; None where there is none."""
         half = (hi - lo) / 2
         found = common_lyapunov(
@@ -95,7 +95,7 @@ class MovingGain:
 def _peak(residues: NDArray[np.complexfloating], poles: NDArray[np.complexfloating]) -> float:
     """max over the unit circle of |sum of residues/(z - poles)|."""
     angle, width = abs(np.angle(poles)), np.maximum(1 - abs(poles), 1e-12)
-    dense = (angle[:, None] + width[:, None] * AROUND).ravel()
+    dense = (angle[:, None] + width[:, None] * POLE_WIDTHS).ravel()
     theta = np.unique(np.clip(np.r_[np.linspace(0, np.pi, 1001), dense], 0, np.pi))
 
     def size(theta: Real) -> Real:

@@ -27,8 +27,8 @@ from tfarm.tuner.trial import Trial
 Real = NDArray[np.float64]
 Shaper = Literal["ZV", "EI"]
 
-SHAPED_MODES = 2
-TOLERATED = 0.05  # V: the vibration that EI leaves at the mode itself
+SHAPED_MODES = 2  # which a slew excites most
+TOLERATED = 0.05  # V: the share of the vibration that EI leaves at the mode itself, as its authors have it
 
 
 def zero_vibration(z: complex) -> Real:
@@ -42,9 +42,9 @@ def zero_vibration(z: complex) -> Real:
     return impulses
 
 
-def extra_insensitive(z: complex, tolerated: float = TOLERATED) -> Real:
+def extra_insensitive(z: complex) -> Real:
     """Two such shapers in a row, beside the frequency of z."""
-    d = math.acos((1 - tolerated) / (1 + tolerated)) / math.pi
+    d = math.acos((1 - TOLERATED) / (1 + TOLERATED)) / math.pi
     turn = float(np.angle(z))
     beside = [abs(z) * np.exp(1j * min(turn * factor, 0.999 * math.pi)) for factor in (1 - d, 1 + d)]
     return np.convolve(zero_vibration(complex(beside[0])), zero_vibration(complex(beside[1])))
@@ -53,8 +53,12 @@ def extra_insensitive(z: complex, tolerated: float = TOLERATED) -> Real:
 def shaper(loop: SampledLoop, kind: Shaper, modes: int = SHAPED_MODES) -> Real:
     """The impulses for the first modes below half the sample rate, at the poles of the loop without moment feedback."""
     impulses, build = np.ones(1), zero_vibration if kind == "ZV" else extra_insensitive
-    for z in _poles(loop, modes):
-        impulses = np.convolve(impulses, build(z))
+    poles: Any = loop.under(loop.gains.having(MOMENT_GAIN, 0.0)).poles
+    for mode in range(1, modes + 1):
+        own = loop.plant.poles[(loop.plant.mode == mode) & (loop.plant.poles.imag > 0)]
+        upper = poles.z[(poles.mode == mode) & (poles.z.imag > 0)]
+        if own.size and upper.size and own[0].imag * loop.chain.sampling.period < math.pi:
+            impulses = np.convolve(impulses, build(complex(upper[0])))
     return impulses
 
 
@@ -81,14 +85,3 @@ def shaped_trial(trial: Trial, kind: Shaper) -> Trial:
     does not hold: it arrives later.
     """
     return replace(trial, task=shaped(trial.task, shaper(trial.loop, kind)))
-
-
-def _poles(loop: SampledLoop, modes: int) -> list[complex]:
-    poles: Any = loop.under(loop.gains.having(MOMENT_GAIN, 0.0)).poles
-    found = []
-    for mode in range(1, modes + 1):
-        own = loop.plant.poles[(loop.plant.mode == mode) & (loop.plant.poles.imag > 0)]
-        if own.size and own[0].imag * loop.chain.sampling.period < math.pi:
-            upper = poles.z[(poles.mode == mode) & (poles.z.imag > 0)]
-            found += [complex(upper[0])] if upper.size else []
-    return found

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tfarm.arm import Arm
 from tfarm.arm.writing import to_toml
@@ -32,17 +33,18 @@ from tfarm.records import record
 from tfarm.tuner.constants import BestConstant, best_constant
 from tfarm.tuner.guard import Guard, find_guard
 from tfarm.tuner.network import initial_network
-from tfarm.tuner.training import Training, train
+from tfarm.tuner.training import Mode, Rule, Sensitivity, Training, train
 from tfarm.tuner.trial import Trial, residual_rms
 from tfarm.tuner.tuning import Plan, Tuning, trial_of
 
-Tell = Callable[[int, int], None]
+TellDone = Callable[[int, int], None]
+Real = NDArray[np.float64]
 
-ALPHAS = (0.0, 0.2, 0.4, 0.6, 0.8, 0.9)
-ETAS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
-PAPER = (0.6, 0.8)
-WEIGHTS = ((1.0, 0.65), (1.0, 1.3), (1.0, 2.6), (1.0, 5.2), (1.0, 10.4), (0.25, 2.6), (4.0, 2.6))
-RULES = (
+ALPHAS = (0.0, 0.2, 0.4, 0.6, 0.8, 0.9)  # momentum factors of the map, about the paper's
+ETAS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)  # learning rates, likewise
+PAPER_PAIR = (0.6, 0.8)  # its momentum factor and learning rate
+WEIGHT_PAIRS = ((1.0, 0.65), (1.0, 1.3), (1.0, 2.6), (1.0, 5.2), (1.0, 10.4), (0.25, 2.6), (4.0, 2.6))  # a, b
+STUDIED_RULES: tuple[tuple[Rule, Mode, Sensitivity], ...] = (
     ("dynamic", "trial", "one-step"),
     ("clipped", "trial", "one-step"),
     ("plain", "trial", "one-step"),
@@ -50,8 +52,8 @@ RULES = (
     ("plain", "online", "one-step"),
     ("clipped", "online", "whole"),
 )
-LARGEST = 1_000_000_000  # bytes of a file of results; a line has a few thousand
-BEGINNING = b'{"key": "'  # of every line that is kept
+MOST_STUDY_BYTES = 1_000_000_000  # bytes of a file of results; a line has a few thousand
+LINE_BEGINS = b'{"key": "'  # of every line that is kept
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,7 @@ def run_study(
     chain: Chain | None = None,
     *,
     keep: Path | None = None,
-    tell: Tell | None = None,
+    tell: TellDone | None = None,
     workers: int | None = None,
     tuned: Tuning | None = None,
 ) -> list[Finished]:
@@ -165,10 +167,10 @@ def _resumed(keep: Path | None) -> dict[str, Any]:
     """What an earlier run kept; a last line that was cut short is taken off the file."""
     if keep is None or not keep.exists():
         return {}
-    content = read_file(keep, LARGEST, key="--keep", what="the file of a study")
+    content = read_file(keep, MOST_STUDY_BYTES, key="--keep", what="the file of a study")
     complete, _, cut = content.rpartition(b"\n")
     lines, known = complete.splitlines(), {}
-    for i, line in enumerate([*lines, cut] if not BEGINNING.startswith(cut[: len(BEGINNING)]) else lines):
+    for i, line in enumerate([*lines, cut] if not LINE_BEGINS.startswith(cut[: len(LINE_BEGINS)]) else lines):
         try:
             entry = json.loads(line)
             known[entry["key"]] = {name: entry[name] for name in Finished.__dataclass_fields__ if name != "plan"}
@@ -195,45 +197,40 @@ def _append(keep: Path | None, key: str, result: dict[str, Any]) -> None:
 
 def plans_of(study: str, base: Plan, seeds: int) -> list[Plan]:
     """The plans of a study by its name."""
-    build = {"curves": _curves, "map": _map, "weights": _weights, "inputs": _inputs, "rules": _rules}
-    if study not in build:
-        raise ParameterError(key="study", value=study, remedy=f"known are: {', '.join(build)}")
-    return [replace(plan, seed=base.seed + i) for plan in build[study](base) for i in range(seeds)]
-
-
-def _curves(base: Plan) -> list[Plan]:
-    return [base]
-
-
-def _map(base: Plan) -> list[Plan]:
-    return [replace(base, learning=replace(base.learning, alpha=alpha, eta=eta)) for alpha in ALPHAS for eta in ETAS]
-
-
-def _weights(base: Plan) -> list[Plan]:
-    return [replace(base, cost=replace(base.cost, a=a, b=b)) for a, b in WEIGHTS]
-
-
-def _inputs(base: Plan) -> list[Plan]:
-    return [replace(base, seventh_input=seventh) for seventh in (False, True)]
-
-
-def _rules(base: Plan) -> list[Plan]:
-    return [
-        replace(base, learning=replace(base.learning, rule=rule, mode=mode, sensitivity=sensitivity))  # type: ignore[arg-type]
-        for rule, mode, sensitivity in RULES
-    ]
+    learning = base.learning
+    known = {
+        "curves": [base],
+        "map": [replace(base, learning=replace(learning, alpha=alpha, eta=eta)) for alpha in ALPHAS for eta in ETAS],
+        "weights": [replace(base, cost=replace(base.cost, a=a, b=b)) for a, b in WEIGHT_PAIRS],
+        "inputs": [replace(base, seventh_input=seventh) for seventh in (False, True)],
+        "rules": [
+            replace(base, learning=replace(learning, rule=rule, mode=mode, sensitivity=sensitivity))
+            for rule, mode, sensitivity in STUDIED_RULES
+        ],
+    }
+    if study not in known:
+        raise ParameterError(key="study", value=study, remedy=f"known are: {', '.join(known)}")
+    return [replace(plan, seed=base.seed + i) for plan in known[study] for i in range(seeds)]
 
 
 # ---------------------------------------------------------------- what came of them
 
 
-def _cost(group: list[Finished], share: float) -> float:
-    """A quantile of the final costs over the seeds."""
+def final_cost(group: list[Finished], share: float) -> float:
+    """A quantile of the final costs over the seeds: always one of the costs."""
     return float(np.quantile([each.cost for each in group], share, method="nearest"))
 
 
+def learning_costs(finished: list[Finished], trials: int) -> Real:
+    """Costs (seeds, trials); a run that ended early counts as inf from there on."""
+    costs = np.full((len(finished), trials), np.inf)
+    for row, each in zip(costs, finished, strict=True):
+        row[: len(each.costs)] = each.costs
+    return costs
+
+
 _four = partial(Column, digits=singly(general, 4))
-PLANS = (  # what the seeds of a group have in common
+PLAN_COLUMNS = (  # what the seeds of a group have in common
     Column("alpha", "alpha", of=lambda group: group[0].plan.learning.alpha),
     Column("eta", "eta", of=lambda group: np.asarray(group[0].plan.learning.eta).tolist()),
     Column("a", "a", of=lambda group: group[0].plan.cost.a),
@@ -243,11 +240,11 @@ PLANS = (  # what the seeds of a group have in common
     Column("mode", "mode", of=lambda group: group[0].plan.learning.mode),
     Column("sensitivity", "sensitivity", of=lambda group: group[0].plan.learning.sensitivity),
 )
-GROUPS = (  # of the runs of one plan, a run a seed
-    _four("cost_median", "median", of=lambda group: _cost(group, 0.5)),
-    Column("cost_quartiles", of=lambda group: [_cost(group, 0.25), _cost(group, 0.75)], on=(JSON,)),
-    _four("", "lower quartile", of=lambda group: _cost(group, 0.25), on=(TERMINAL,)),
-    _four("", "upper quartile", of=lambda group: _cost(group, 0.75), on=(TERMINAL,)),
+GROUP_COLUMNS = (  # of the runs of one plan, a run a seed
+    _four("cost_median", "median", of=lambda group: final_cost(group, 0.5)),
+    Column("cost_quartiles", of=lambda group: [final_cost(group, 0.25), final_cost(group, 0.75)], on=(JSON,)),
+    _four("", "lower quartile", of=lambda group: final_cost(group, 0.25), on=(TERMINAL,)),
+    _four("", "upper quartile", of=lambda group: final_cost(group, 0.75), on=(TERMINAL,)),
     _four("cost_best", "best", of=lambda group: min(each.cost for each in group)),
     _four("cost_worst", "worst", of=lambda group: max(each.cost for each in group)),
     Column("below_best_constant", "below best constant", of=lambda group: _below(group),
@@ -273,35 +270,29 @@ def study_answer(study: str, results: list[Finished], seeds: int) -> dict[str, A
     """
     groups = [results[i : i + seeds] for i in range(0, len(results), seeds)]
     varied = (
-        replace(column, on=(JSON, TERMINAL) if len(set(column.read(groups).cells)) > 1 else (JSON,)) for column in PLANS
+        replace(column, on=(JSON, TERMINAL) if len(set(column.read(groups).cells)) > 1 else (JSON,))
+        for column in PLAN_COLUMNS
     )
-    table = Table(columns=(*varied, *GROUPS), record=groups)
+    table = Table(columns=(*varied, *GROUP_COLUMNS), record=groups)
     answer: dict[str, Any] = {"study": study, "seeds": seeds, "groups": table}
     if study == "curves":
-        answer |= _learning_curve(results)
+        costs = learning_costs(results, max(len(each.costs) for each in results))
+        low, middle, high = np.quantile(costs, [0.25, 0.5, 0.75], axis=0, method="nearest").tolist()
+        answer |= {"median": middle, "lower_quartile": low, "upper_quartile": high}
     if study == "map":
         answer["verdict"] = map_verdict(groups)
     return answer
 
 
-def _learning_curve(results: list[Finished]) -> dict[str, Any]:
-    """Median and quartiles over the seeds after each trial; a run that ended early counts as inf from there on."""
-    longest = max(len(each.costs) for each in results)
-    rows = np.full((len(results), longest), np.inf)
-    for row, each in zip(rows, results, strict=True):
-        row[: len(each.costs)] = each.costs
-    low, middle, high = np.quantile(rows, [0.25, 0.5, 0.75], axis=0, method="nearest")
-    return {"median": middle.tolist(), "lower_quartile": low.tolist(), "upper_quartile": high.tolist()}
-
-
 def map_verdict(groups: list[list[Finished]]) -> str:
     """Is the paper's (alpha_c, eta_c) the best of the map?  By medians, with the spread over the seeds beside it."""
-    medians = np.array([np.quantile([each.cost for each in group], 0.5, method="nearest") for group in groups])
+    medians = np.array([final_cost(group, 0.5) for group in groups])
     at = [(group[0].plan.learning.alpha, group[0].plan.learning.eta) for group in groups]
-    paper, best = at.index(PAPER), int(np.argmin(medians))
-    spread = np.quantile([each.cost for each in groups[paper]], [0.25, 0.75], method="nearest")
+    paper, best = at.index(PAPER_PAIR), int(np.argmin(medians))
+    spread = [final_cost(groups[paper], share) for share in (0.25, 0.75)]
     rank = int((medians < medians[paper]).sum()) + 1
-    start = f"(alpha_c, eta_c) = {PAPER}: median cost {medians[paper]:.4g} (quartiles {spread[0]:.4g}, {spread[1]:.4g})"
+    quartiles = ", ".join(f"{cost:.4g}" for cost in spread)
+    start = f"(alpha_c, eta_c) = {PAPER_PAIR}: median cost {medians[paper]:.4g} (quartiles {quartiles})"
     if rank == 1:
         return f"{start}, the best of {len(at)} points"
     within = "within" if medians[best] >= spread[0] else "beyond"

@@ -34,8 +34,8 @@ Mode = Literal["trial", "online"]
 Rule = Literal["dynamic", "clipped", "plain"]
 Sensitivity = Literal["one-step", "whole"]
 
-RULES: dict[str, int] = {"dynamic": rules.BACKTRACKING, "clipped": rules.CLIPPED, "plain": rules.PLAIN}
-MOST_TRIALS = 1_000_000
+RULE_NUMBERS = {"dynamic": rules.BACKTRACKING_RULE, "clipped": rules.CLIPPED_RULE, "plain": rules.PLAIN_RULE}
+MOST_TRIALS = 1_000_000  # of a tuning: a bound on what a slip of the hand may ask for
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,7 +56,7 @@ class Learning:
     enough: float = 0.0
 
     def __post_init__(self) -> None:
-        wanted = {"mode": ("trial", "online"), "rule": tuple(RULES), "sensitivity": ("one-step", "whole")}
+        wanted = {"mode": ("trial", "online"), "rule": tuple(RULE_NUMBERS), "sensitivity": ("one-step", "whole")}
         for key, choices in wanted.items():
             value = getattr(self, key)
             if value not in choices:
@@ -151,7 +151,7 @@ def _learn(
         return rules.learn_by_samples(
             *common, float(learning.alpha), trial.reply, longest, float(learning.enough), costs, run, work
         )
-    rule = RULES[learning.rule]
+    rule = RULE_NUMBERS[learning.rule]
     return rules.learn_by_trials(
         *common, float(learning.alpha), rule, longest, float(learning.enough), costs, run, work
     )

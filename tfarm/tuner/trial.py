@@ -24,9 +24,10 @@ from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.arm.checks import not_negative, number, positive
-from tfarm.dsp import Chain, SampledLoop, Scenario, sampled_loop, scenario
+from tfarm.dsp import Chain, SampledLoop, Scenario, Simulator, sampled_loop, scenario
 from tfarm.dsp.results import rms_after
 from tfarm.dsp.scenarios import TRIAL_COST, TRIAL_DURATION
+from tfarm.dsp.simulate import FOLDED_UP
 from tfarm.errors import ParameterError, did_you_mean
 from tfarm.records import record
 from tfarm.spectrum.scales import default_gains
@@ -34,11 +35,10 @@ from tfarm.tuner import kernel
 from tfarm.tuner.network import Network
 
 Real = NDArray[np.float64]
-Signals = Literal["vibration", "total"]
+Reading = Literal["vibration", "total"]
 
-SILENT = Network(np.zeros((1, 6)), np.zeros(1), np.ones(6))
-FOLDED_UP = 10.0  # the loop has run away where the root moment is this many times EI/L
-DURATION, MODES = TRIAL_DURATION, 6
+SILENT = Network(np.zeros((1, 6)), np.zeros(1), np.ones(6))  # for a guard that leaves no choice
+TRIAL_MODES = 6  # flexible modes of a trial, unless told
 ANGLE_REMEDY = "the hub angle gain is zero or positive, in N m/rad"
 
 
@@ -90,7 +90,7 @@ class Trial:
     loop: SampledLoop
     task: Scenario
     cost: Cost
-    signals: Signals
+    signals: Reading
 
     @property
     def arm(self) -> Arm:
@@ -144,6 +144,11 @@ class Trial:
         )  # fmt: skip
         return replace(here, task=self.task)
 
+    def simulator(self, *, chain: Chain | None = None, task: Scenario | None = None) -> Simulator:
+        """The loop beside the compiled one, with converters where the chain has any: that of the trial unless given."""
+        chain, task = chain or self.loop.chain, task or self.task
+        return Simulator(self.arm, chain, task, count=self.loop.plant.count)
+
     def run(self, inputs: int = 6, hidden: int = 1) -> Run:
         """Empty arrays for a network of that size."""
         return Run(np.zeros((self.n, inputs)), np.zeros((self.n, hidden)), np.zeros((self.n, 5)))
@@ -196,7 +201,7 @@ class Trial:
 
     def record(self, done: int, run: Run) -> Record:
         """What the arrays hold, as a record; a run that was stopped costs inf."""
-        x, u, e, K = (run.signals[:done, i].copy() for i in (kernel.X, kernel.U, kernel.E, kernel.GAIN))
+        x, u, e, K = (run.signals[:done, i].copy() for i in (kernel.X, kernel.U, kernel.E, kernel.GAIN_USED))
         whole = done == self.n
         cost = float(kernel.trial_cost(done, self.numbers, run.signals)) if whole else np.inf
         return Record(self.task.t[:done], x, u, e, K, cost, None if whole else int(done))
@@ -209,9 +214,9 @@ def slew_trial(
     K1: float | None = None,
     Kp: float = 0.0,
     cost: Cost | None = None,
-    signals: Signals = "vibration",
-    duration: float = DURATION,
-    count: int = MODES,
+    signals: Reading = "vibration",
+    duration: float = TRIAL_DURATION,
+    count: int = TRIAL_MODES,
     known: Arm | None = None,
 ) -> Trial:
     """The slew of an arm with `count` flexible modes; `known` is the arm that the controller believes it moves,
@@ -249,14 +254,9 @@ def usual_rate_gain(arm: Arm, Kp: float) -> float:
     return max(0.0, math.sqrt(2 * Kp * arm.turned_inertia) - arm.rate_loss)
 
 
-def with_signals(chain: Chain, signals: Signals) -> Chain:
+def with_signals(chain: Chain, signals: Reading) -> Chain:
     """The chain with that reading of the moment during the slew."""
     return replace(chain, slew=replace(chain.slew, reading=signals))
-
-
-def no_guard() -> Real:
-    """The plain softplus."""
-    return np.zeros(3)
 
 
 def residual_rms(record: Record, busy_until: float) -> float:

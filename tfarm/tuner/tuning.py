@@ -10,25 +10,24 @@ import numpy as np
 from tfarm.arm import MOMENT_GAIN, Arm, HubFeedback
 from tfarm.dsp import Chain, Simulator, scenario
 from tfarm.dsp.results import ideal_chain, modes_for, rms_after, simulation_answer
-from tfarm.dsp.scenarios import described
+from tfarm.dsp.scenarios import TRIAL_DURATION, described
 from tfarm.errors import ParameterError
 from tfarm.records import record
 from tfarm.spectrum.scales import default_gains
 from tfarm.tuner.bound import lq_bound
-from tfarm.tuner.comparison import Row
+from tfarm.tuner.comparison import Outcomes
 from tfarm.tuner.constants import BestConstant, best_constant
-from tfarm.tuner.controller import TunedGain, tip_error
+from tfarm.tuner.controller import TunedGain, tip_off
 from tfarm.tuner.guard import GuardKind, find_guard
 from tfarm.tuner.network import initial_network
 from tfarm.tuner.saving import SavedTuner, weights_answer
 from tfarm.tuner.shaping import shaped_trial
 from tfarm.tuner.training import Learning, Training, train
 from tfarm.tuner.trial import (
-    DURATION,
-    MODES,
+    TRIAL_MODES,
     Cost,
+    Reading,
     Record,
-    Signals,
     Trial,
     residual_rms,
     slew_trial,
@@ -54,14 +53,14 @@ class Plan:
 
     cost: Cost = field(default_factory=Cost)
     learning: Learning = field(default_factory=Learning)
-    signals: Signals = "vibration"
+    signals: Reading = "vibration"
     guard: GuardKind = "time-varying"
     trials: int = 100
     seed: int = 0
     K1: float = 0.3
     Kp: float = 0.0
-    duration: float = DURATION
-    count: int = MODES
+    duration: float = TRIAL_DURATION
+    count: int = TRIAL_MODES
     hidden: int = 6
     seventh_input: bool = False
     scale: float = 1.0
@@ -199,13 +198,13 @@ def tune_answer(tuning: Tuning) -> dict[str, Any]:
 def tip_errors(tuning: Tuning) -> dict[str, float | None]:
     """How far off the tip is [m] when the trial ends: tuned, with the best constant gain, without moment feedback."""
     trial = tuning.trial
-    simulator = Simulator(trial.arm, trial.loop.chain, trial.task, count=trial.loop.plant.count)
+    simulator = trial.simulator()
     runs = {
         "tip_error_m": tuning.gain().run(simulator),
         "tip_error_best_constant_m": simulator.linear(tuning.constant),
         "tip_error_without_m": simulator.linear(tuning.gain().servo),
     }
-    return {key: tip_error(run, trial) for key, run in runs.items()}
+    return {key: tip_off(run, trial) for key, run in runs.items()}
 
 
 def _raw_residual(tuning: Tuning) -> float:
@@ -228,7 +227,7 @@ def _shaped(tuning: Tuning) -> dict[str, Any]:
     }
 
 
-def comparison_answer(rows: list[Row]) -> list[dict[str, Any]]:
+def outcomes_answer(rows: list[Outcomes]) -> list[dict[str, Any]]:
     """The rows of a comparison as dictionaries."""
     items = ([(each.name, getattr(row, each.name)) for each in fields(row)] for row in rows)
     return [{key: value._asdict() if hasattr(value, "_asdict") else value for key, value in row} for row in items]
@@ -241,8 +240,8 @@ def controlled_answer(
     name: str,
     duration: float,
     *,
-    count: int | None = None,
-    between: int = 0,
+    count: int | None,
+    between: int,
 ) -> dict[str, Any]:
     """A scenario simulated with a saved tuner as the gain, as `tfarm.dsp.results.simulated_answer` says it.
 
@@ -254,16 +253,15 @@ def controlled_answer(
     used = modes_for(count, lambda n: saved.gain().run(Simulator(arm, ideal, task, count=n)))
     run = saved.gain().run(Simulator(arm, chain, task, count=used.modes, between=between))
     answer = simulation_answer(arm, saved.gain().servo, run, None, used)
-    what = described(task, arm, chain)
-    return answer | {MOMENT_GAIN: None, "controller": _described(saved), "scenario_in_words": what}
-
-
-def _described(saved: SavedTuner) -> dict[str, Any]:
-    about = {
+    controller = {
         "trained_on": saved.arm,
         "guard_kind": saved.guard_kind,
         "guard": [saved.lo, saved.hi],
         "K1": saved.K1,
         "Kp": saved.Kp,
+        "signals": saved.signals,
+        "period_s": saved.period,
+        **asdict(saved.cost),
     }
-    return about | {"signals": saved.signals, "period_s": saved.period, **asdict(saved.cost)}
+    what = described(task, arm, chain)
+    return answer | {MOMENT_GAIN: None, "controller": controller, "scenario_in_words": what}
