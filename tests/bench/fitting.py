@@ -13,7 +13,7 @@ from tests.fitting.planted import elements_response
 from tfarm import Arm, Measured
 from tfarm.fitting.fit import fit
 from tfarm.fitting.model import Problem
-from tfarm.fitting.solve import settled
+from tfarm.fitting.solve import nearest_minimum
 
 from .reference import Complex
 from .rows import Row, Target
@@ -55,10 +55,10 @@ def fit_rows() -> Iterator[Row]:
     own = found.solution.problem
     near, elements = found.solution.point + NEAR, ElementProblem(own.family, own.parameters, own.responses)
     begin = time.perf_counter()
-    settled(own, near)
+    nearest_minimum(own, near)
     ours = time.perf_counter() - begin
     begin = time.perf_counter()
-    settled(elements, near)
+    nearest_minimum(elements, near)
     theirs = time.perf_counter() - begin
     yield Row(
         group=GROUP, what=f"the last search, with {ELEMENTS} elements of two nodes", n=1, each="fit", seconds=theirs,

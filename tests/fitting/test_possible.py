@@ -6,7 +6,7 @@ import pytest
 import tfarm
 from tests.fitting.test_fit import LAB, PAIRS, measured
 from tfarm.fitting.fit import fit
-from tfarm.fitting.possible import interval, loop_on_all, possible, response_band, share_stable
+from tfarm.fitting.possible import extremes, loop_on_all, possible, response_band, share_stable
 from tfarm.report.fit_section import fit_section
 
 LAW = tfarm.HubFeedback(K1=0.3, K2=0.3)
@@ -42,7 +42,7 @@ def test_a_loop_on_all_of_them(known):
     found = loop_on_all(those, LAW)
     assert (found.stable, found.of) == (5, 5)
     each = [tfarm.margins(arm, LAW) for arm in those.arms]
-    assert interval(found.disk) == (min(m.in_band.disk for m in each), max(m.in_band.disk for m in each))
+    assert extremes(found.disk) == (min(m.in_band.disk for m in each), max(m.in_band.disk for m in each))
     share = share_stable(those, np.array([0.3, 0.5]), np.array([0.3, 3.0]))
     assert share.tolist() == [[1.0, 1.0], [0.0, 0.0]]
     low, high, best = response_band(those, "root_moment", np.geomspace(10, 300, 50))

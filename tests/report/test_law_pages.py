@@ -19,7 +19,7 @@ from tfarm.dsp import Chain, load_chain
 from tfarm.dsp.law_loop import sampled_law
 from tfarm.dsp.law_verdict import law_verdict
 from tfarm.errors import one_line
-from tfarm.fitting.runs import beside, load_run, overshoot
+from tfarm.fitting.runs import beside_exact, load_run, overshoot
 from tfarm.report import law_sampled_section as in_time
 from tfarm.report import making, writing
 from tfarm.report.given_laws import GivenLaw, Subject, on_arm
@@ -241,7 +241,7 @@ def test_the_rig_of_the_page_is_the_preset_with_the_chain_of_its_controllers():
 def test_a_step_over_the_measured_one_is_that_of_python_control(name):
     """The sampled plant and the controller's matrices closed by hand, led by the reference as it was recorded."""
     law, measured = real(name)
-    mine = beside(PRESET, law, Chain(), measured)
+    mine = beside_exact(PRESET, law, Chain(), measured)
     count = 8
     led = measured.scenario(0.01).hub_angle
     np.testing.assert_allclose(led, measured.reference - measured.reference[0], atol=1e-15)  # every row is a sample
@@ -257,7 +257,7 @@ def test_what_is_measured_and_computed_of_the_real_controllers():
     chain = load_chain(DATA / "chain.toml")
     for name, (over, end) in {"lqg": (0.40895, 0.04873), "hinf": (4.84993, 0.48027)}.items():  # all of theta11
         law, measured = real(name)
-        found = beside(PRESET, law, chain, measured)
+        found = beside_exact(PRESET, law, chain, measured)
         assert np.degrees(measured.step) == pytest.approx(30.0, abs=1e-5)
         goal = measured.reference[-1]
         assert 100 * overshoot(measured.hub_angle, measured.step, goal) == pytest.approx(over, abs=1e-3)

@@ -51,7 +51,7 @@ def load_tables(name_or_path: str | os.PathLike[str]) -> tuple[dict[str, Any], s
     else:
         data = _read(name)
     try:
-        return _table_of(_decoded(data)), name
+        return _table_of(data), name
     except ParameterError as error:
         raise error.in_file(name) from None
 
@@ -72,24 +72,26 @@ def _arm_of(data: bytes, file: str) -> Arm:
     from tfarm.arm.schema import arm_of_table  # here, because pydantic takes a while to import
 
     try:
-        return arm_of_table(_table_of(_decoded(data)))
+        return arm_of_table(_table_of(data))
     except ParameterError as error:
         raise error.in_file(file) from None
 
 
-def _decoded(data: bytes) -> str:
+def decoded(data: bytes, remedy: str) -> str:
+    """The text of a file in UTF-8.  Raises ParameterError, naming the first byte that is none, with the remedy."""
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        bad, remedy = data[error.start : error.start + 1], "is not UTF-8; save the file as UTF-8"
+        bad = data[error.start : error.start + 1]
         raise ParameterError(key=f"byte {error.start}", value=bad, remedy=remedy) from None
 
 
-def _table_of(text: str) -> dict[str, Any]:
+def _table_of(data: bytes) -> dict[str, Any]:
     """The TOML table, after a look at what would choke the parser.
 
     Its complaint stands with the line it is about, the last one where it names none.
     """
+    text = decoded(data, "is not UTF-8; save the file as UTF-8")
     _check(text)
     try:
         return tomllib.loads(text)

@@ -104,7 +104,7 @@ def _report(found: Fit, out: Path) -> Path:
 
 
 def _print(found: Fit, answer: dict[str, Any]) -> None:
-    from tfarm.fitting.answers import FAR, parameters_table
+    from tfarm.fitting.answers import PEAK_REACH, parameters_table
     from tfarm.tables.terminal import show
 
     print(f"{answer['arm_name']}: {answer['in_words']}")
@@ -123,6 +123,6 @@ def _print(found: Fit, answer: dict[str, Any]) -> None:
     if shown:
         print(f"resonances [Hz], before -> after -> measured: {'; '.join(shown)}")
     for peak in answer["unexplained_peaks_hz"]:
-        print(f"the peak measured at {peak:.5g} Hz is {100 * FAR:.0f} % and more from every pole of the arm")
+        print(f"the peak measured at {peak:.5g} Hz is {100 * PEAK_REACH:.0f} % and more from every pole of the arm")
     if answer["rms_log_error"] is not None:
         print(f"rms of ln(computed/measured): {answer['rms_log_error']:.4g}")

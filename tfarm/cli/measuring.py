@@ -67,10 +67,10 @@ def ring(
     """Frequency and damping of a decay, with intervals."""
     from tfarm.fitting.record_answers import ring_answer
     from tfarm.fitting.recording import read_recording
-    from tfarm.fitting.ringdown import MOST_MODES
+    from tfarm.fitting.ringdown import MOST_RINGING
     from tfarm.fitting.ringdown import ring as find
 
-    count = whole("--modes", modes, 1, MOST_MODES)
+    count = whole("--modes", modes, 1, MOST_RINGING)
     found = find(read_recording(record), signal, start=start, stop=stop, modes=count)
     give(ring_answer(found), json, _rung)
 

@@ -19,18 +19,19 @@ from tfarm.files import write_file
 
 from .around import Around
 from .data import Measured
-from .features import BEYOND, features_of, match, near_zeros
+from .features import PEAKS_BEYOND, features_of, match, near_zeros
 from .fit import Fit
+from .noise import CONFIDENCE
 from .ratio import Ratio
 from .repeats import WIDER, repeats
-from .sure import LEVEL, Fitted
+from .sure import Fitted
 
 Real = NDArray[np.float64]
 
-FAR = 0.1  # of ln w, and the damping ratio: a peak farther from all of the arm's is not one of them
+PEAK_REACH = 0.1  # of ln w, and the damping ratio: a peak farther from all of the arm's is not one of them
 BROADER = 2.0  # times the damping ratio: what a broad peak may lie off its pole
-SAME = 0.02  # of ln w: peaks of two responses nearer than that are one
-UNITS = {  # of a number by the last word of its key, in SI
+SAME_PEAK = 0.02  # of ln w: peaks of two responses nearer than that are one
+NUMBER_UNITS = {  # of a number by the last word of its key, in SI
     "length": "m", "radius": "m", "offset": "m", "x": "m", "width": "m", "depth": "m", "diameter": "m",
     "outer_diameter": "m", "inner_diameter": "m", "area": "m^2", "second_moment": "m^4", "density": "kg/m^3",
     "youngs_modulus": "Pa", "shear_modulus": "Pa", "damping": "s", "inertia": "kg m^2", "rotor_inertia": "kg m^2",
@@ -45,9 +46,9 @@ def known(value: float | None, digits: int) -> str:
     return "-" if value is None else general(value, digits)
 
 
-PARAMETERS = (
+PARAMETER_COLUMNS = (
     Column("key", "number", of="key"),
-    Column("unit", "unit", of=lambda one: unit_of(one.key)),
+    Column("unit", "unit", of=lambda one: number_unit(one.key)),
     Column("value", "value", of="value", digits=singly(general, 6)),
     Column("low", "from", of="low", digits=singly(known, 6)),
     Column("high", "to", of="high", digits=singly(known, 6)),
@@ -56,17 +57,17 @@ PARAMETERS = (
 )
 
 
-def unit_of(key: str) -> str:
+def number_unit(key: str) -> str:
     """The SI unit of a free number; "1" where it has none, or that of its response."""
     words = key.partition(":")[0].split(".")
     if words[-1] == "stiffness" and words[0] == "attachment":
         return "N/m"
-    return UNITS.get(words[-1], "1")
+    return NUMBER_UNITS.get(words[-1], "1")
 
 
 def parameters_table(fit: Fit) -> Table:
     """The fitted numbers with their intervals."""
-    return Table(columns=PARAMETERS, record=list(fit.parameters), stem="fit", title="Fitted numbers")
+    return Table(columns=PARAMETER_COLUMNS, record=list(fit.parameters), stem="fit", title="Fitted numbers")
 
 
 def fit_answer(fit: Fit) -> dict[str, Any]:
@@ -77,7 +78,7 @@ def fit_answer(fit: Fit) -> dict[str, Any]:
         "converged": fit.converged,
         "verdict": fit.verdict,
         "parameters": {each.key: _parameter(fit, each) for each in fit.parameters},
-        "level": LEVEL,
+        "level": CONFIDENCE,
         "not_determined": list(fit.not_determined),
         "frequencies_hz": {key: [row[n] for row in rows] for n, key in enumerate(("before", "after", "measured"))},
         "rms_log_error": fit.rms_log_error,
@@ -90,7 +91,7 @@ def fit_answer(fit: Fit) -> dict[str, Any]:
         ],
         "records": _records(fit),
         "starts": fit.solution.starts,
-        "in_words": in_words(fit),
+        "in_words": fit_in_words(fit),
         "arm": tomllib.loads(to_toml(fit.arm)),
     }
 
@@ -103,7 +104,7 @@ def _parameter(fit: Fit, one: Fitted) -> dict[str, Any]:
         "high": one.high,
         "std": one.deviation,
         "identified": one.identified,
-        "unit": unit_of(one.key),
+        "unit": number_unit(one.key),
         "start": start,
     }
 
@@ -159,9 +160,9 @@ def resonances(fit: Fit) -> list[tuple[float | None, float | None, float]]:
             own = places.get(n, int(np.argmin(abs(np.log(after / peak)))) if after.size else None)
             first = earlier.get(own) if own is not None else None
             hertz = [None if row is None else float(w[row]) / (2 * np.pi) for w, row in ((before, first), (after, own))]
-            if own is None or abs(np.log(after[own] / peak)) > FAR + BROADER * ratio[own]:
+            if own is None or abs(np.log(after[own] / peak)) > PEAK_REACH + BROADER * ratio[own]:
                 hertz = [None, None]
-            found[each.data.input, round(float(np.log(peak)) / SAME)] = (*hertz, float(peak) / (2 * np.pi))
+            found[each.data.input, round(float(np.log(peak)) / SAME_PEAK)] = (*hertz, float(peak) / (2 * np.pi))
     return sorted(found.values(), key=lambda row: row[2])  # type: ignore[arg-type]
 
 
@@ -171,7 +172,7 @@ def _own_peaks(arm: Arm, data: Measured) -> tuple[Real, Real]:
     Where they cannot be told completely, those near the axis, as if undamped.
     """
     try:
-        poles = Ratio(arm, data.output, data.input).poles(BEYOND * float(data.omega[-1])).values
+        poles = Ratio(arm, data.output, data.input).poles(PEAKS_BEYOND * float(data.omega[-1])).values
     except ConvergenceError:
         w = near_zeros(Around(arm, ()), data)[1][0]
         return w, 0 * w
@@ -181,7 +182,7 @@ def _own_peaks(arm: Arm, data: Measured) -> tuple[Real, Real]:
     return w[order], (-upper.real / w)[order]
 
 
-def in_words(fit: Fit) -> str:
+def fit_in_words(fit: Fit) -> str:
     """One sentence: whether the search ended, what is known, and whether the arm explains the data."""
     known = [each.key for each in fit.parameters if each.identified]
     parts = [f"{len(known)} of {len(fit.parameters)} numbers are known from these data"]
@@ -205,7 +206,7 @@ def in_words(fit: Fit) -> str:
 def fitted_toml(fit: Fit) -> str:
     """The fitted arm as a TOML file, with what was fitted to what among its assumptions."""
     values = listed([f"{each.key} = {each.value:.6g}" for each in fit.parameters if "." in each.key])
-    lines = [f"Fitted: {values}, from the arm {fit.before.name}; {in_words(fit)}."]
+    lines = [f"Fitted: {values}, from the arm {fit.before.name}; {fit_in_words(fit)}."]
     lines += [
         f"Fitted to {each.name} of {Path(each.source).name}, SHA-256 {each.digest or 'none'}." for each in fit.responses
     ]

@@ -17,9 +17,11 @@ from tfarm.exact.jets import Jet
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.response.signals import Signals
 
-from .parameters import STEP
+from .parameters import DIFFERENCE_STEP
 
 Complex = NDArray[np.complexfloating[Any, Any]]
+
+NUDGE = 1e-6  # of s: for a slope along it; the rounding of a float over it is 1e-10, and so is what the slope bends by
 
 
 class Around:
@@ -35,13 +37,17 @@ class Around:
     def gradients(self, driven: str, names: tuple[str, ...], s: Complex) -> tuple[Jet, list[Jet]]:
         """Drive and signals at s, up to one factor, with their derivatives along the free numbers."""
         if driven not in self._chains:
-            pairs = [(chain_of(driven_by(a, driven)), chain_of(driven_by(b, driven))) for a, b in self._pairs]
-            self._chains[driven] = chain_of(driven_by(self.arm, driven)), pairs
+            pairs = [(chain_of(under_drive(a, driven)), chain_of(under_drive(b, driven))) for a, b in self._pairs]
+            self._chains[driven] = chain_of(under_drive(self.arm, driven)), pairs
         chain, pairs = self._chains[driven]
         signals, own = Signals(self.arm, names), self.arm
         along = [
             Direction(
-                below, above, Signals(a, names).places, Signals(b, names).places, STEP * ((a != own) + (b != own))
+                below,
+                above,
+                Signals(a, names).places,
+                Signals(b, names).places,
+                DIFFERENCE_STEP * ((a != own) + (b != own)),
             )
             for (below, above), (a, b) in zip(pairs, self._pairs, strict=True)
         ]
@@ -53,5 +59,5 @@ def drive_behind(arm: Arm, name: str) -> str:
     return name if name in INPUTS and name not in OUTPUTS else arm.input
 
 
-def driven_by(arm: Arm, driven: str) -> Arm:
+def under_drive(arm: Arm, driven: str) -> Arm:
     return arm if arm.input == driven else replace(arm, input=cast("Input", driven))

@@ -47,37 +47,37 @@ class Measured:
             given = getattr(self, name)
             if given is not None:
                 object.__setattr__(self, name, np.atleast_1d(np.asarray(given, dtype=float)))
-        _check(self)
+        self._check()
 
     @property
     def name(self) -> str:
         """What is measured, as the command line has it: tip_acceleration/hub_angle."""
         return f"{self.output}/{self.input}"
 
-
-def _check(one: Measured) -> None:
-    for name in ("values", "sigma", "coherence"):
-        held = getattr(one, name)
-        if held is not None and held.shape != one.omega.shape:
-            remedy = f"one for each of the {one.omega.size} frequencies"
-            raise ParameterError(key=f"{one.name} {name}", value=held.shape, remedy=remedy)
-    if not (one.omega > 0).all() or not np.isfinite(one.omega).all():
-        bad = float(one.omega[~((one.omega > 0) & np.isfinite(one.omega))][0])
-        raise ParameterError(key="frequency", value=bad, remedy="positive and finite; leave other rows out")
-    steps = np.diff(one.omega)
-    if (steps <= 0).any():
-        at = float(one.omega[1:][steps <= 0][0])
-        remedy = "repeated or not in ascending order; sort the rows, and average those of one frequency"
-        raise ParameterError(key="frequency", value=at, remedy=remedy)
-    if not np.isfinite(one.values).all():
-        at = float(one.omega[~np.isfinite(one.values)][0])
-        raise ParameterError(key=f"value at {at:g} rad/s", value="no number", remedy="leave the row out")
-    if not one.values.any():
-        raise ParameterError(key=f"{one.name} values", value=0.0, remedy="0 everywhere: nothing was measured")
-    if one.sigma is not None and not ((one.sigma > 0) & np.isfinite(one.sigma)).all():
-        raise ParameterError(key="sigma", value=float(one.sigma.min()), remedy="a standard deviation is positive")
-    if one.coherence is not None:
-        if not ((one.coherence >= 0) & (one.coherence <= 1)).all():
-            raise ParameterError(key="coherence", value=float(one.coherence.max()), remedy="between 0 and 1")
-        if not one.coherence.any():
-            raise ParameterError(key="coherence", value=0.0, remedy="0 everywhere: nothing was measured; leave it out")
+    def _check(self) -> None:
+        for name in ("values", "sigma", "coherence"):
+            held = getattr(self, name)
+            if held is not None and held.shape != self.omega.shape:
+                remedy = f"one for each of the {self.omega.size} frequencies"
+                raise ParameterError(key=f"{self.name} {name}", value=held.shape, remedy=remedy)
+        if not (self.omega > 0).all() or not np.isfinite(self.omega).all():
+            bad = float(self.omega[~((self.omega > 0) & np.isfinite(self.omega))][0])
+            raise ParameterError(key="frequency", value=bad, remedy="positive and finite; leave other rows out")
+        steps = np.diff(self.omega)
+        if (steps <= 0).any():
+            at = float(self.omega[1:][steps <= 0][0])
+            remedy = "repeated or not in ascending order; sort the rows, and average those of one frequency"
+            raise ParameterError(key="frequency", value=at, remedy=remedy)
+        if not np.isfinite(self.values).all():
+            at = float(self.omega[~np.isfinite(self.values)][0])
+            raise ParameterError(key=f"value at {at:g} rad/s", value="no number", remedy="leave the row out")
+        if not self.values.any():
+            raise ParameterError(key=f"{self.name} values", value=0.0, remedy="0 everywhere: nothing was measured")
+        if self.sigma is not None and not ((self.sigma > 0) & np.isfinite(self.sigma)).all():
+            raise ParameterError(key="sigma", value=float(self.sigma.min()), remedy="a standard deviation is positive")
+        if self.coherence is not None:
+            if not ((self.coherence >= 0) & (self.coherence <= 1)).all():
+                raise ParameterError(key="coherence", value=float(self.coherence.max()), remedy="between 0 and 1")
+            if not self.coherence.any():
+                remedy = "0 everywhere: nothing was measured; leave it out"
+                raise ParameterError(key="coherence", value=0.0, remedy=remedy)

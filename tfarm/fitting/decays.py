@@ -17,8 +17,8 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 MOST_ROWS = 160  # of the Hankel matrix of the start; slower oscillations are looked for in means of so many samples
 FASTEST = 3.0  # the logarithm by which a pole of the start may grow during the record
 THINNER = 4  # from one such mean to the next
-SPARE = 4  # further poles of the start, which take up drift and noise
-CLEAR = 2.5  # deviations of an autocorrelation of white noise, 1/sqrt(n), above which one stands out
+SPARE_POLES = 4  # further poles of the start, which take up drift and noise
+CLEAR_LAG = 2.5  # deviations of an autocorrelation of white noise, 1/sqrt(n), above which one stands out
 LINEAR = 1  # the constant c, the last of the parameters
 EACH = 4  # parameters of a mode: sigma, w, a, b
 
@@ -65,7 +65,7 @@ def start_of(t: Real, y: Real, modes: int) -> Real | None:
     period, duration, thin, found = t[1] - t[0], t[-1] - t[0], 1, []
     while thin == 1 or t.size // thin >= MOST_ROWS:
         means = (y - y.mean())[: t.size // thin * thin].reshape(-1, thin).mean(axis=1)
-        found.append(_poles(means, 2 * modes + SPARE) / (thin * period))
+        found.append(_poles(means, 2 * modes + SPARE_POLES) / (thin * period))
         thin *= THINNER
     s = np.concatenate(found)
     s = s[(s.imag > math.pi / duration) & (s.real * period > -1) & (s.real * duration < FASTEST)]
@@ -100,7 +100,7 @@ def _poles(y: Real, count: int) -> Complex:
     return np.asarray(np.log(z[z != 0]))
 
 
-def energy(x: Real, duration: float) -> Real:
+def mode_energy(x: Real, duration: float) -> Real:
     """Of each mode: amplitude squared times the integral of exp(-2 sigma t)."""
     sigma, a, b = (x[place:-LINEAR:EACH] for place in (0, 2, 3))
     decay = np.where(abs(sigma) * duration < 1e-9, 1e-9 / duration, sigma)
@@ -119,7 +119,7 @@ def covariance(J: Real, e: Real, freedom: int, *, is_white: bool) -> Real:
 def _meat(J: Real, e: Real) -> Real:
     """J' R J with the residuals' autocovariances r_k, tapered (1 - k/M), M twice the last lag that stands out."""
     r, most = _autocovariance(e), max(2, e.size // 3)
-    (clear,) = np.nonzero(abs(r[:most]) > CLEAR * r[0] / math.sqrt(e.size))
+    (clear,) = np.nonzero(abs(r[:most]) > CLEAR_LAG * r[0] / math.sqrt(e.size))
     lags = min(most, 2 * int(clear.max(initial=0)) + 1)
     found = J.T @ J * r[0]
     for k in range(1, lags):
@@ -146,7 +146,7 @@ def _autocovariance(e: Real) -> Real:
     return np.asarray(np.fft.irfft(power, size)[: e.size] / e.size)
 
 
-def later(x: Real, by: float) -> Real:
+def counted_from(x: Real, by: float) -> Real:
     """The parameters of the same decay with t counted from `by` [s] on."""
     found = x.copy()
     for at in range(0, x.size - LINEAR, EACH):

@@ -11,20 +11,19 @@ from numpy.typing import NDArray
 from tfarm.records import record
 from tfarm.response.signals import Signals
 
-from .around import Around, drive_behind, driven_by
+from .around import NUDGE, Around, drive_behind, under_drive
 from .data import Measured
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
 
-PROMINENT = 0.35  # of ln |H|: what stands out by a factor of 1.4 is a peak, if the noise is below a quarter of that
+PEAK_PROMINENCE = 0.35  # of ln |H|: what stands out by a factor of 1.4 is a peak, if the noise is below a quarter
 NOISY = 4.0  # deviations of the noise
-BEYOND = 1.6  # so far beyond both ends of a band the arm's own peaks are looked for
-GRID = 600  # points at which they are
+PEAKS_BEYOND = 1.6  # so far beyond both ends of a band the arm's own peaks are looked for
+PEAK_GRID = 600  # points at which they are
 BROAD = 0.3  # of its frequency: a zero farther from the axis is no peak
-NUDGE = 1e-6  # of a frequency: for a slope along it
-STEPS = 6  # of Newton's method from a grid's point
-SKIPPED = 0.25  # of ln w: what a peak that is matched with nothing costs
+ZERO_STEPS = 6  # of Newton's method from a grid's point
+UNMATCHED_PEAK = 0.25  # of ln w: what a peak that is matched with nothing costs
 
 
 @dataclass(frozen=True)
@@ -44,7 +43,7 @@ def features_of(data: Measured, sigma: Real) -> Features:
     noise = np.minimum(sigma / np.maximum(abs(data.values), np.finfo(float).tiny), 10.0)
 
     def found(curve: Real) -> Real:
-        at, how = find_peaks(curve, prominence=PROMINENT)
+        at, how = find_peaks(curve, prominence=PEAK_PROMINENCE)
         near = np.array([np.median(noise[max(0, n - 3) : n + 4]) for n in at])
         return np.asarray(data.omega[at[how["prominences"] > NOISY * near]] if at.size else np.empty(0))
 
@@ -60,9 +59,9 @@ def near_zeros(here: Around, data: Measured) -> list[tuple[Real, Real]]:
 
     driven = drive_behind(here.arm, data.input)
     names = tuple(dict.fromkeys(each for each in (data.output, data.input) if each != driven))
-    signals = Signals(driven_by(here.arm, driven), names)
+    signals = Signals(under_drive(here.arm, driven), names)
     rows = [names.index(each) if each != driven else None for each in (data.output, data.input)]
-    grid = np.geomspace(data.omega[0] / BEYOND, data.omega[-1] * BEYOND, GRID)
+    grid = np.geomspace(data.omega[0] / PEAKS_BEYOND, data.omega[-1] * PEAKS_BEYOND, PEAK_GRID)
     parts, found = replace(signals, arm=signals.arm.having(damping=0.0)).parts(1j * grid), []
     for row in rows:
         curve = parts.drive if row is None else parts.numerators[row]
@@ -88,7 +87,7 @@ def _newton(signals: Signals, row: int | None, s: Complex) -> Complex:
         parts = signals.parts(s)
         return np.asarray(np.log(parts.drive if row is None else parts.numerators[row]) + parts.scale)
 
-    for _ in range(STEPS):
+    for _ in range(ZERO_STEPS):
         with np.errstate(all="ignore"):
             ratio = np.exp(logarithm(s * (1 + NUDGE)) - logarithm(s)) - 1
             step = np.where(abs(ratio) > 0, s * NUDGE / ratio, 0.0)
@@ -97,22 +96,23 @@ def _newton(signals: Signals, row: int | None, s: Complex) -> Complex:
 
 
 def match(measured: Real, own: Real) -> list[tuple[int, int]]:
-    """Pairs of places in two ascending rows, in order, with the least sum of squared gaps; to skip one costs SKIPPED^2.
+    """Pairs of places in two ascending rows, in order, with the least sum of squared gaps.
 
-    By dynamic programming over both rows; of the arm's own, those that nothing was measured at cost nothing.
+    To skip one costs UNMATCHED_PEAK^2; of the arm's own, those that nothing was measured at cost nothing.  By dynamic
+    programming over both rows.
     """
     n, m = measured.size, own.size
     cost = np.zeros((n + 1, m + 1))
-    cost[1:, 0] = SKIPPED**2 * np.arange(1, n + 1)
+    cost[1:, 0] = UNMATCHED_PEAK**2 * np.arange(1, n + 1)
     for i in range(1, n + 1):
         for j in range(1, m + 1):
             gap = (measured[i - 1] - own[j - 1]) ** 2
-            cost[i, j] = min(cost[i - 1, j - 1] + gap, cost[i - 1, j] + SKIPPED**2, cost[i, j - 1])
+            cost[i, j] = min(cost[i - 1, j - 1] + gap, cost[i - 1, j] + UNMATCHED_PEAK**2, cost[i, j - 1])
     pairs, i, j = [], n, m
     while i and j:
         if cost[i, j] == cost[i, j - 1]:
             j -= 1
-        elif cost[i, j] == cost[i - 1, j] + SKIPPED**2:
+        elif cost[i, j] == cost[i - 1, j] + UNMATCHED_PEAK**2:
             i -= 1
         else:
             i, j = i - 1, j - 1

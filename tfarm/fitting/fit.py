@@ -15,11 +15,11 @@ from tfarm.errors import ParameterError
 from tfarm.records import record
 
 from .data import Measured
-from .model import DELAY, GAIN, Problem, problem
+from .model import SENSOR_DELAY, SENSOR_GAIN, Problem, problem
 from .parameters import Parameter, parameters
 from .ringing import RingMode
-from .solve import Solution, is_explained, settled, solved
-from .sure import BetterError, Fitted, Progress, sureness
+from .solve import Solution, best_solution, is_explained, nearest_minimum
+from .sure import BetterError, Fitted, ToldInterval, sureness
 
 Real = NDArray[np.float64]
 
@@ -96,7 +96,7 @@ def fit(
     priors: Mapping[str, tuple[float, float]] | None = None,
     rings: Sequence[RingMode] = (),
     profile: bool = True,
-    progress: Progress | None = None,
+    progress: ToldInterval | None = None,
 ) -> Fit:
     """The arm whose free numbers explain the measured responses best.
 
@@ -106,13 +106,13 @@ def fit(
     Raises ParameterError for a key that is none, and for more numbers than data.
     """
     subject = _problem(arm, data, free, start, bounds, priors, rings)
-    found = solved(subject)
+    found = best_solution(subject)
     for _ in range(MENDED):
         try:
             sure = sureness(found, profile=profile, progress=progress)
             break
         except BetterError as better:
-            found = replace(settled(better.found.problem, better.found.point), starts=found.starts)
+            found = replace(nearest_minimum(better.found.problem, better.found.point), starts=found.starts)
     else:  # one valley after another: no end of it
         found = replace(found, converged=False)
         sure = sureness(found, profile=False)
@@ -130,34 +130,26 @@ def fit(
 
 
 def _problem(arm: Arm, data: Any, free: Any, start: Any, bounds: Any, priors: Any, rings: Any) -> Problem:
+    """What is searched for: the arm's numbers, then the sensors' own, one of a kind for each response."""
     must_be_arm(arm)
     data = (data,) if isinstance(data, Measured) else tuple(data)
     if not data and not rings:
         raise ParameterError(key="data", value=0, remedy="give at least one measured response, or a decay (--mode)")
-    keys = [str(key) for key in free if key not in (GAIN, DELAY)]
-    family, numbers = parameters(arm, keys, start=start, bounds=bounds, priors=priors)
-    subject = problem(arm, data, family, numbers, _sensors(data, free), rings)
+    keys = [str(key) for key in free if key not in (SENSOR_GAIN, SENSOR_DELAY)]
+    family, numbers = parameters(arm, keys, start=start or {}, bounds=bounds or {}, priors=priors or {})
+    sensors = {}
+    for kind in (each for each in (SENSOR_GAIN, SENSOR_DELAY) if each in free):
+        names = [kind if len(data) == 1 else f"{kind}:{n}" for n in range(1, len(data) + 1)]
+        is_gain = kind == SENSOR_GAIN
+        sizes = [1.0 if is_gain else 1.0 / float(each.omega[-1]) for each in data]
+        sensors[kind] = [
+            Parameter(key=name, start=float(is_gain), low=-np.inf, high=np.inf, by_logarithm=is_gain, size=size)
+            for name, size in zip(names, sizes, strict=True)
+        ]
+    subject = problem(arm, data, family, numbers, sensors, rings)
     if not subject.parameters:
         raise ParameterError(key="free", value="nothing", remedy="name what is free, such as link.youngs_modulus")
     if subject.size < len(subject.parameters):
         remedy = f"{subject.size} numbers were measured; leave some out"
         raise ParameterError(key="free", value=len(subject.parameters), remedy=remedy)
     return subject
-
-
-def _sensors(data: Sequence[Measured], free: Sequence[str]) -> dict[str, list[Parameter]]:
-    """The sensors' own numbers, one of a kind for each response."""
-    found = {}
-    for kind in (GAIN, DELAY):
-        if kind not in free:
-            continue
-        names = [kind if len(data) == 1 else f"{kind}:{n}" for n in range(1, len(data) + 1)]
-        sizes = [1.0 if kind == GAIN else 1.0 / float(each.omega[-1]) for each in data]
-        found[kind] = [
-            Parameter(
-                key=name, start=1.0 if kind == GAIN else 0.0, low=-np.inf, high=np.inf, by_logarithm=kind == GAIN,
-                size=size,
-            )
-            for name, size in zip(names, sizes, strict=True)
-        ]  # fmt: skip
-    return found

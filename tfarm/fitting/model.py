@@ -21,19 +21,20 @@ from tfarm.exact.jets import Jet
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.response.signals import Signals
 
-from .around import Around, drive_behind, driven_by
+from .around import Around, drive_behind, under_drive
 from .data import Measured
 from .noise import Noise, noise_of
-from .parameters import STEP, Parameter
+from .parameters import DIFFERENCE_STEP, Parameter
 from .reading import check_signal
 from .ringing import RingMode, ring_residuals
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
 
-WALL = 10.0
-EDGE = 1e-9  # of a coordinate: so far inside its bounds a search begins
-GAIN, DELAY = "gain", "delay"  # of a sensor: free beside the numbers of the arm
+WALL = 10.0  # times the largest residual of the first point: so high that no search goes on there
+INSIDE_BOUNDS = 1e-9  # of a coordinate: so far inside its bounds a search begins
+SENSOR_GAIN = "gain"  # of a sensor: free beside the numbers of the arm
+SENSOR_DELAY = "delay"  # likewise
 
 
 @dataclass(frozen=True)
@@ -79,9 +80,9 @@ class Problem:
         return np.array(low), np.array(high)
 
     def inside(self, point: Real) -> Real:
-        """The point, or the nearest one by `EDGE` inside the bounds."""
+        """The point, or the nearest one by `INSIDE_BOUNDS` inside the bounds."""
         low, high = self.bounds
-        return np.clip(point, low + EDGE, high - EDGE)
+        return np.clip(point, low + INSIDE_BOUNDS, high - INSIDE_BOUNDS)
 
     @property
     def size(self) -> int:
@@ -107,7 +108,7 @@ class Problem:
         found: list[Any] = [None] * len(self.responses)
         for (_, driven), numbers in self._grids.items():
             names = self._signals(numbers, driven)
-            parts = Signals(driven_by(arm, driven), names).parts(1j * self.responses[numbers[0]].data.omega)
+            parts = Signals(under_drive(arm, driven), names).parts(1j * self.responses[numbers[0]].data.omega)
             for n in numbers:
                 over, under = self._over_and_under(n, names, parts.drive, parts.numerators)
                 found[n] = np.asarray(over / under * self._sensor(n, point))
@@ -131,7 +132,7 @@ class Problem:
         own, pairs = self.family.at(base), []
         for each, x in zip(self.of_the_arm, point, strict=False):
             sides = []
-            for step in (-STEP, STEP):
+            for step in (-DIFFERENCE_STEP, DIFFERENCE_STEP):
                 try:
                     sides.append(self.family.at(base | {each.key: each.value(float(x) + step)}))
                 except ParameterError:
@@ -242,19 +243,19 @@ def problem(
     family: KeyedArms,
     numbers: Sequence[Parameter],
     sensors: Mapping[str, Any],
-    rings: Sequence[RingMode] = (),
+    rings: Sequence[RingMode],
 ) -> Problem:
-    """The problem of an arm's free numbers and its sensors' (see `sensor_parameters`)."""
+    """The problem of an arm's free numbers and its sensors'."""
     check_signals(arm, data)
     responses = []
     own = [*numbers]
     for number, each in enumerate(data):
         places: dict[str, int] = {}
-        for kind in (GAIN, DELAY):
+        for kind in (SENSOR_GAIN, SENSOR_DELAY):
             if kind in sensors:
                 places[kind] = len(own)
                 own.append(sensors[kind][number])
-        responses.append(Response(each, noise_of(each), places.get(GAIN), places.get(DELAY)))
+        responses.append(Response(each, noise_of(each), places.get(SENSOR_GAIN), places.get(SENSOR_DELAY)))
     return Problem(family, tuple(own), tuple(responses), tuple(rings))
 
 
@@ -264,7 +265,7 @@ def check_signals(arm: Arm, data: Sequence[Measured]) -> None:
         for name, role in ((each.output, "output"), (each.input, "input")):
             check_signal(name, f"{role} of {each.name}")
             if name in INPUTS and name not in OUTPUTS:
-                driven_by(arm, name)  # which needs a motor, or refuses
+                under_drive(arm, name)  # which needs a motor, or refuses
             else:
                 Signals(arm, (name,))
         if each.output == each.input:

@@ -14,8 +14,9 @@ from .data import Measured
 
 Real = NDArray[np.float64]
 
-LEAST = 1e-5  # of |H|: no measured response is better known than that, whatever its coherence says
-AROUND = 2  # neighbours on each side that a value is compared with
+CONFIDENCE = 0.95  # of every interval of a fit: the usual one
+LEAST_SHARE = 1e-5  # of |H|: no measured response is better known than that, whatever its coherence says
+NEIGHBOURS = 2  # neighbours on each side that a value is compared with
 TYPICAL = 1.17741  # the median of |x + i y| of normal x and y of deviation 1: sqrt(2 ln 2)
 
 
@@ -47,7 +48,7 @@ def noise_of(data: Measured) -> Noise:
         g = data.coherence
         with np.errstate(divide="ignore"):
             share = np.sqrt((1.0 - g) / (2.0 * (data.averages or 1) * g))
-        sigma = np.asarray(size * np.maximum(share, LEAST), dtype=float)
+        sigma = np.asarray(size * np.maximum(share, LEAST_SHARE), dtype=float)
         sigma[g == 0] = np.inf
         known = data.averages is not None
         road = f"coherence of {data.averages} averages" if known else "coherence, up to a factor"
@@ -56,15 +57,18 @@ def noise_of(data: Measured) -> Noise:
 
 
 def _scatter(values: NDArray[Any]) -> Real:
-    """The deviation of each value from a parabola through its four neighbours, smoothed; at least `LEAST` of it."""
+    """The deviation of each value from a parabola through its four neighbours, smoothed.
+
+    It is LEAST_SHARE of the value at least.
+    """
     n = values.size
-    if n < 2 * AROUND + 1:
-        return np.maximum(abs(values), LEAST * abs(values).max())
+    if n < 2 * NEIGHBOURS + 1:
+        return np.maximum(abs(values), LEAST_SHARE * abs(values).max())
     # x_k less the parabola through x_(k-2), x_(k-1), x_(k+1), x_(k+2): weights -1/6, 2/3, 2/3, -1/6 of these
     weights = np.array([1 / 6, -2 / 3, 1.0, -2 / 3, 1 / 6])
     away = np.convolve(values, weights, mode="valid") / np.sqrt((weights**2).sum())
-    size, inside = abs(values), abs(values[AROUND:-AROUND])
+    size, inside = abs(values), abs(values[NEIGHBOURS:-NEIGHBOURS])
     relative = abs(away[inside > 0]) / inside[inside > 0]
     typical = float(np.median(relative)) / TYPICAL if relative.size else 1.0
     least = max(1e-3 * float(np.median(size)), 1e-6 * float(size.max()))  # which a value of 0 is taken for
-    return np.maximum(size, least) * max(typical, LEAST)
+    return np.maximum(size, least) * max(typical, LEAST_SHARE)

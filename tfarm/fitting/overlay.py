@@ -14,16 +14,16 @@ from numpy.typing import NDArray
 from tfarm.arm import Arm, must_be_arm
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
+from tfarm.response.answers import HERTZ
 from tfarm.response.frequency import refined_grid
-from tfarm.spectrum import Modes, modes_below
 from tfarm.spectrum import modes as modes_of
+from tfarm.spectrum import modes_below
 
 from .data import Measured
 from .noise import Noise, noise_of
 from .ratio import Ratio, RatioRoots
 from .resonances import (
-    BEYOND,
-    TURN,
+    PARTNERS_BEYOND,
     Resonance,
     must_be_in_unit,
     paired,
@@ -35,9 +35,9 @@ from .resonances import (
 Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
 
-SAME = 0.1  # of its frequency: how near a pole of a damped arm is to that mode of the arm without damping
-FARTHEST = 3.0  # the factor on a number beyond which it is no explanation
-LEAST = 1e-3  # d ln w/d ln p below which a number does not move a mode
+SAME_MODE = 0.1  # of its frequency: how near a pole of a damped arm is to that mode of the arm without damping
+LARGEST_FACTOR = 3.0  # the factor on a number beyond which it is no explanation
+LEAST_SENSITIVITY = 1e-3  # d ln w/d ln p below which a number does not move a mode
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,7 +106,7 @@ class Overlay:
         """By parameter of `Modes.sensitivity` and number of the mode: the factor on it that alone would explain it.
 
         exp(ln(measured/exact)/S) with S = d ln w/d ln p: exact for a power law, as of Young's modulus or the density,
-        else to first order.  Without those beyond FARTHEST, or of a number that hardly moves the mode.
+        else to first order.  Without those beyond LARGEST_FACTOR, or of a number that hardly moves the mode.
         """
         numbers = [each.mode for each in self.beside if each.mode is not None and each.frequency_ratio is not None]
         if not numbers:
@@ -119,8 +119,8 @@ class Overlay:
                 if each.mode is None or each.frequency_ratio is None:
                     continue
                 slope = float(slopes[np.flatnonzero(table.index == each.mode)[0]])
-                exponent = math.log(each.frequency_ratio) / slope if abs(slope) > LEAST else math.inf
-                if abs(exponent) <= math.log(FARTHEST):
+                exponent = math.log(each.frequency_ratio) / slope if abs(slope) > LEAST_SENSITIVITY else math.inf
+                if abs(exponent) <= math.log(LARGEST_FACTOR):
                     factors[each.mode] = math.exp(exponent)
             if factors:
                 found[name] = factors
@@ -136,10 +136,10 @@ def overlay(arm: Arm, measured: Measured) -> Overlay:
     must_be_arm(arm)
     ratio, noise = _ratio(arm, measured), noise_of(measured)
     low, high = float(measured.omega[0]), float(measured.omega[-1])
-    roots = ratio.roots(BEYOND * high)
+    roots = ratio.roots(PARTNERS_BEYOND * high)
     places = peaks_of(measured, noise.sigma)
     own = peaks_among(roots.poles)
-    own = own[own >= low / BEYOND]
+    own = own[own >= low / PARTNERS_BEYOND]
     pairs, _ = paired(measured.omega[places], own, (low, high))
     if len(pairs) < max(places.size, int(((own >= low) & (own <= high)).sum())):
         check_unit(arm, measured)
@@ -164,17 +164,26 @@ def overlay(arm: Arm, measured: Measured) -> Overlay:
 def _counterparts(
     ratio: Ratio, roots: RatioRoots, measured: Measured, noise: Noise, shown: list[tuple[float, int | None]]
 ) -> tuple[Counterpart, ...]:
-    """A row a pole: of each |s| [rad/s] that is shown, with the place of its measured peak, if it has one."""
-    table = _modes(ratio, max((w for w, _ in shown), default=0.0))
+    """A row a pole: of each |s| [rad/s] that is shown, with the place of its measured peak, if it has one.
+
+    The arm's modes are told where they are the poles of the ratio, each by the nearest natural frequency.
+    """
+    up_to = (1 + SAME_MODE) * max((w for w, _ in shown), default=0.0)
+    are_modes = ratio.is_driven and up_to > 0 and modes_below(ratio.driven, up_to) > 0
+    table = modes_of(ratio.driven, up_to=up_to) if are_modes else None
     others, upper = np.r_[roots.poles, roots.zeros, 0.0], roots.resonances
     found = []
     for w, place in shown:
-        pole = complex(upper[np.argmin(abs(abs(upper) - w))])
+        pole, mode = complex(upper[np.argmin(abs(abs(upper) - w))]), None
+        if table is not None:
+            away = abs(table.natural_frequency / abs(pole) - 1)
+            at = int(np.argmin(away))
+            mode = int(table.index[at]) if away[at] < SAME_MODE and table.index[at] > 0 else None
         found.append(
             Counterpart(
                 pole=pole,
                 residue=ratio.residue(pole, others),
-                mode=_mode(table, pole),
+                mode=mode,
                 peak=None if place is None else float(measured.omega[place]),
                 measured=None if place is None else resonance_at(measured, noise.sigma, place),
             )
@@ -189,7 +198,7 @@ def check_unit(arm: Arm, measured: Measured) -> None:
     """
     ratio = _ratio(arm, measured)
     with suppress(ConvergenceError):
-        poles = ratio.poles(BEYOND * TURN * float(measured.omega[-1])).values
+        poles = ratio.poles(PARTNERS_BEYOND * HERTZ * float(measured.omega[-1])).values
         must_be_in_unit(measured, noise_of(measured).sigma, poles)
 
 
@@ -200,20 +209,3 @@ def _ratio(arm: Arm, measured: Measured) -> Ratio:
         raise ParameterError(
             key=f"{measured.name} {error.key}", value=error.value, remedy=error.remedy, file=error.file
         ) from None
-
-
-def _modes(ratio: Ratio, up_to: float) -> Modes | None:
-    """The arm's modes, where they are the poles of the ratio; None else."""
-    reach = (1 + SAME) * up_to
-    if not (ratio.is_driven and up_to) or modes_below(ratio.driven, reach) == 0:
-        return None
-    return modes_of(ratio.driven, up_to=reach)
-
-
-def _mode(table: Modes | None, pole: complex) -> int | None:
-    """The number of the mode that a pole is: that of the nearest natural frequency, if it is near."""
-    if table is None:
-        return None
-    away = abs(table.natural_frequency / abs(pole) - 1)
-    at = int(np.argmin(away))
-    return int(table.index[at]) if away[at] < SAME and table.index[at] > 0 else None

@@ -10,9 +10,9 @@ import numpy as np
 from tfarm.columns import JSON, Column, Table
 from tfarm.digits import general, singly
 from tfarm.errors import MISSING
+from tfarm.response.answers import HERTZ
 
 from .overlay import Counterpart, Overlay
-from .resonances import TURN
 
 DASH = "-"  # what was not measured, on a terminal
 
@@ -31,8 +31,8 @@ def _of(row: Counterpart, what: str) -> Any:
     if one is None or (level is None and what in ("db", "deg")):
         return MISSING
     return {
-        "hz": abs(one.pole) / TURN,
-        "std": one.std[1] / TURN,
+        "hz": abs(one.pole) / HERTZ,
+        "std": one.std[1] / HERTZ,
         "zeta": one.damping_ratio,
         "zeta_std": one.std[0] / abs(one.pole),
         "db": 20 * math.log10(abs(level)) if level else MISSING,
@@ -40,14 +40,16 @@ def _of(row: Counterpart, what: str) -> Any:
     }[what]
 
 
-def _measured_hz(row: Counterpart) -> Any:
-    return _known(None if row.frequency_ratio is None else row.frequency_ratio * abs(row.pole) / TURN)
-
-
-BESIDE = (
+COUNTERPARTS = (
     Column("mode", "mode", of=lambda row: _known(row.mode), digits=_or_dash(3)),
-    Column("exact_hz", "exact", "Hz", of=lambda row: abs(row.pole) / TURN, digits=singly(general, 7)),
-    Column("measured_hz", "measured", "Hz", of=_measured_hz, digits=_or_dash(7)),
+    Column("exact_hz", "exact", "Hz", of=lambda row: abs(row.pole) / HERTZ, digits=singly(general, 7)),
+    Column(
+        "measured_hz",
+        "measured",
+        "Hz",
+        of=lambda row: _known(None if row.frequency_ratio is None else row.frequency_ratio * abs(row.pole) / HERTZ),
+        digits=_or_dash(7),
+    ),
     Column("measured_std_hz", "+-", "Hz", of=lambda row: _of(row, "std"), digits=_or_dash(2)),
     Column(
         "frequency_residual_percent",
@@ -76,11 +78,11 @@ def overlay_answer(found: Overlay) -> dict[str, Any]:
         "measured": data.source,
         "sha256": data.digest,
         "points": data.omega.size,
-        "band_hz": [float(data.omega[0]) / TURN, float(data.omega[-1]) / TURN],
+        "band_hz": [float(data.omega[0]) / HERTZ, float(data.omega[-1]) / HERTZ],
         "noise": found.noise.road,
         "rms_log_error": found.rms_log_error,
-        "modes": Table(columns=BESIDE, record=list(found.beside)),
-        "unmatched_peaks_hz": (found.unmatched / TURN).tolist(),
+        "modes": Table(columns=COUNTERPARTS, record=list(found.beside)),
+        "unmatched_peaks_hz": (found.unmatched / HERTZ).tolist(),
         "poles": _pairs(roots.poles),
         "zeros": _pairs(roots.zeros),
         "common": _pairs(roots.common),
@@ -110,7 +112,7 @@ def curves_table(found: Overlay) -> Table:
     """A row a frequency: measured and exact, for a file."""
     data = found.measured
     columns = [
-        Column("hz", "", "Hz", of=data.omega / TURN),
+        Column("hz", "", "Hz", of=data.omega / HERTZ),
         Column("re", of=data.values.real),
         Column("im", of=data.values.imag),
         Column("exact_re", of=found.exact.real),

@@ -22,9 +22,9 @@ from tfarm.spectrum.scales import first_frequency
 Real = NDArray[np.float64]
 
 SIGNED = ("offset",)  # numbers of an arm that may be negative
-MOST = {"gear_efficiency": 1.0, "poissons_ratio": 0.5}  # and those that end somewhere
-FARTHEST = 1e4  # times or a part of its start: beyond that a search has lost its way, or the data say nothing
-STEP = 2.0**-20  # of a derivative by differences: the rounding of a float over it is 1e-10, its square below
+UPPER_ENDS = {"gear_efficiency": 1.0, "poissons_ratio": 0.5}  # and those that end somewhere
+FARTHEST_FROM_START = 1e4  # times or a part of it: beyond, a search has lost its way, or the data say nothing
+DIFFERENCE_STEP = 2.0**-20  # of a derivative by differences: the rounding of a float over it is 1e-10, its square below
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,7 +62,7 @@ class Parameter:
             return self.coordinate(self.low), self.coordinate(self.high)
         low = self.coordinate(self.low) if self.low > 0 else -math.inf
         high = self.coordinate(self.high) if self.high < math.inf else math.inf
-        return max(low, -math.log(FARTHEST)), min(high, math.log(FARTHEST))
+        return max(low, -math.log(FARTHEST_FROM_START)), min(high, math.log(FARTHEST_FROM_START))
 
     def slope(self, coordinate: float) -> float:
         """d value/d coordinate."""
@@ -73,16 +73,15 @@ def parameters(
     arm: Arm,
     keys: Sequence[str],
     *,
-    start: Mapping[str, float] | None = None,
-    bounds: Mapping[str, tuple[float, float]] | None = None,
-    priors: Mapping[str, tuple[float, float]] | None = None,
+    start: Mapping[str, float],
+    bounds: Mapping[str, tuple[float, float]],
+    priors: Mapping[str, tuple[float, float]],
 ) -> tuple[KeyedArms, tuple[Parameter, ...]]:
     """The family of an arm whose numbers under `keys` are free, and these numbers.
 
     Each starts where `start` says, else at the arm's own value, or where that is 0 at a hundredth of what would matter.
     Raises ParameterError for a key that is none or is not free, and for bounds or a start that leave no room.
     """
-    start, bounds, priors = start or {}, bounds or {}, priors or {}
     for said, what in ((start, "start"), (bounds, "bounds"), (priors, "prior")):
         for key in said:
             if key not in keys:
@@ -105,7 +104,7 @@ def _parameter(
     if start is None:
         start = own if own and math.isfinite(own) else _typical(family.arm, key, own)
     is_signed = name in SIGNED
-    most = family.arm.length if name == "x" else MOST.get(name, math.inf)
+    most = family.arm.length if name == "x" else UPPER_ENDS.get(name, math.inf)
     low, high = bounds or (-math.inf if is_signed else 0.0, most)
     if not low <= start <= high or not low < high:
         remedy = f"starts at {start:g}; give bounds low,high around it, or another start"

@@ -21,14 +21,13 @@ from tfarm.records import record
 from tfarm.response import transfer
 
 from .fit import Fit
-from .solve import OPEN, principal_axes
+from .solve import FIT_SEED, OPEN_DEVIATION, principal_axes
 
 Real = NDArray[np.float64]
 
-ARMS = 40
-SEED = 852780
-FARTHEST = 0.999  # of the draws of a normal distribution: one whose sum of squares is larger is none of them
-TRIES = 10  # times so many are drawn before it is given up
+ARMS = 40  # that a report draws
+DRAWS_KEPT = 0.999  # of the draws of a normal distribution: one whose sum of squares is larger is none of them
+DRAWS_EACH = 10  # times so many are drawn before it is given up
 
 
 @dataclass(frozen=True)
@@ -41,18 +40,18 @@ class Possible:
     points: Real
 
 
-def possible(fit: Fit, count: int = ARMS, seed: int = SEED) -> Possible:
+def possible(fit: Fit, count: int) -> Possible:
     """So many arms that explain the data as well as the best one does, but for what noise is worth.
 
     Raises ConvergenceError where the sum of squares is so far from a parabola that draws of one are none of it.
     """
-    found, rng = fit.solution, np.random.default_rng(seed)
+    found, rng = fit.solution, np.random.default_rng(FIT_SEED)
     sizes, axes = principal_axes(found.jacobian)
-    spread = np.minimum(1.0 / np.maximum(sizes, 1e-300), OPEN)
-    apart = 2.0 * float(gammaincinv(found.point.size / 2, FARTHEST))  # the quantile of chi squared
-    most = found.chi_squared + apart + 2 * int((sizes < 1 / OPEN).sum())
+    spread = np.minimum(1.0 / np.maximum(sizes, 1e-300), OPEN_DEVIATION)
+    apart = 2.0 * float(gammaincinv(found.point.size / 2, DRAWS_KEPT))  # the quantile of chi squared
+    most = found.chi_squared + apart + 2 * int((sizes < 1 / OPEN_DEVIATION).sum())
     kept: list[Real] = []
-    for _ in range(TRIES * count):
+    for _ in range(DRAWS_EACH * count):
         point = found.point + axes.T @ (spread * rng.standard_normal(spread.size))
         point = found.problem.inside(point)
         residuals = found.problem.residuals(point)
@@ -60,7 +59,8 @@ def possible(fit: Fit, count: int = ARMS, seed: int = SEED) -> Possible:
             kept.append(point)
         if len(kept) == count:
             return Possible(fit, tuple(found.problem.arm(each) for each in kept), np.array(kept))
-    message = f"only {len(kept)} of {TRIES * count} arms drawn explain the data: their likelihood is far from normal"
+    drawn = DRAWS_EACH * count
+    message = f"only {len(kept)} of {drawn} arms drawn explain the data: their likelihood is far from normal"
     raise ConvergenceError(message, kept, len(kept))
 
 
@@ -109,6 +109,6 @@ def response_band(those: Possible, output: str, omega: Real) -> tuple[Real, Real
     return np.min(sizes, axis=0), np.max(sizes, axis=0), np.asarray(abs(transfer(those.fit.arm, output)(1j * omega)))
 
 
-def interval(values: Any) -> tuple[float, float] | None:
+def extremes(values: Any) -> tuple[float, float] | None:
     """Lowest and highest; None of nothing."""
     return (float(np.min(values)), float(np.max(values))) if len(values) else None

@@ -21,18 +21,19 @@ from tfarm.exact.outputs import OUTPUTS
 from tfarm.files import read_file
 
 from .data import Complex, Measured, Real
-from .sheets import MOST_BYTES, Sheet, digest_of, read_sheet
+from .sheets import MOST_RECORD_BYTES, Sheet, digest_of, read_sheet
 
 if TYPE_CHECKING:
     import control
 
 FREQUENCIES = {"hz": ("Hz", 2 * np.pi), "rad_s": ("rad/s", 1.0)}  # its unit, and rad/s in one
-VALUES = (("re", "im"), ("abs", "deg"), ("db", "deg"))
-BESIDE = ("coherence", "sigma", "averages")
-KNOWN = (*FREQUENCIES, "re", "im", "abs", "db", "deg", *BESIDE)
-FORM = "OUTPUT/INPUT=FILE, such as tip_acceleration/hub_angle=sweep.csv"
+VALUE_PAIRS = (("re", "im"), ("abs", "deg"), ("db", "deg"))
+OTHER_COLUMNS = ("coherence", "sigma", "averages")
+KNOWN_COLUMNS = (*FREQUENCIES, "re", "im", "abs", "db", "deg", *OTHER_COLUMNS)
+DATA_FORM = "OUTPUT/INPUT=FILE, such as tip_acceleration/hub_angle=sweep.csv"
 UFF = (".uff", ".unv", ".uf")
-RESPONSE, FREQUENCY = 4, 18  # in UFF 58: the function type, and the kind of its abscissa
+UFF_RESPONSE = 4  # in UFF 58 the type of a function that is a frequency response
+UFF_FREQUENCY = 18  # and the kind of an abscissa that is a frequency
 
 
 def data_of(text: str, key: str = "--data") -> Measured:
@@ -43,7 +44,7 @@ def data_of(text: str, key: str = "--data") -> Measured:
     names, given, path = text.partition("=")
     output, slash, input = (part.strip() for part in names.partition("/"))
     if not (given and slash and path.strip()):
-        raise ParameterError(key=key, value=text, remedy=f"write {FORM}")
+        raise ParameterError(key=key, value=text, remedy=f"write {DATA_FORM}")
     return read_measured(path.strip(), output, input)
 
 
@@ -90,19 +91,19 @@ def measured_of(
     Raises ParameterError where it has several and none is of these names, and for what no measurement can be.
     """
     data = np.asarray(response.frdata)
-    places = [
-        _place(labels, wanted, size, key)
-        for labels, wanted, size, key in (
-            (response.output_labels, output, data.shape[0], "output"),
-            (response.input_labels, input, data.shape[1], "input"),
-        )
-    ]
-    values = data[places[0], places[1]]
+    places = []
+    for labels, wanted, size, key in (
+        (response.output_labels, output, data.shape[0], "output"),
+        (response.input_labels, input, data.shape[1], "input"),
+    ):
+        if wanted not in labels and size > 1:
+            raise ParameterError(key=key, value=wanted, remedy=did_you_mean(wanted, labels))
+        places.append(labels.index(wanted) if wanted in labels else 0)
     return Measured(
         output=output,
         input=input,
         omega=np.asarray(response.omega, dtype=float),
-        values=values,
+        values=data[places[0], places[1]],
         sigma=sigma,
         coherence=coherence,
         averages=averages,
@@ -120,22 +121,14 @@ def check_signal(name: str, key: str) -> None:
         raise ParameterError(key=key, value=name, remedy=did_you_mean(plain, known))
 
 
-def _place(labels: list[str], wanted: str, size: int, key: str) -> int:
-    if wanted in labels:
-        return labels.index(wanted)
-    if size == 1:
-        return 0
-    raise ParameterError(key=key, value=wanted, remedy=did_you_mean(wanted, labels))
-
-
 # ------------------------------------------------------------ CSV
 
 
 def _frequencies(sheet: Sheet) -> Real:
     """The frequencies [rad/s], once the header is known to be one and they ascend."""
     for name in sheet.names:
-        if name not in KNOWN:
-            raise ParameterError(key="header", value=name, remedy=did_you_mean(name.lower(), KNOWN))
+        if name not in KNOWN_COLUMNS:
+            raise ParameterError(key="header", value=name, remedy=did_you_mean(name.lower(), KNOWN_COLUMNS))
     given = [name for name in FREQUENCIES if name in sheet]
     if len(given) != 1:
         remedy = "one column of frequencies: hz or rad_s"
@@ -146,26 +139,22 @@ def _frequencies(sheet: Sheet) -> Real:
         said = sheet.units[sheet.names.index(name)]
         raise ParameterError(key=f"unit of {name}", value=said, remedy=f"{name} is in {unit}")
     frequency = sheet[name]
-    _check_frequencies(name, frequency, sheet.lines)
-    return frequency * scale
-
-
-def _check_frequencies(name: str, frequency: Real, lines: tuple[int, ...]) -> None:
     wrong = np.flatnonzero(~(frequency > 0))
     if wrong.size:
-        remedy = "a frequency is positive; leave the row out"
-        raise ParameterError(key=f"line {lines[wrong[0]]}, {name}", value=float(frequency[wrong[0]]), remedy=remedy)
+        key, bad = f"line {sheet.lines[wrong[0]]}, {name}", float(frequency[wrong[0]])
+        raise ParameterError(key=key, value=bad, remedy="a frequency is positive; leave the row out")
     back = np.flatnonzero(np.diff(frequency) <= 0)
     if back.size:
         at = int(back[0]) + 1
         again = bool(np.any(frequency[:at] == frequency[at]))
         remedy = "is there twice; average its rows" if again else "is below the one before; sort the rows"
-        raise ParameterError(key=f"line {lines[at]}, {name}", value=float(frequency[at]), remedy=remedy)
+        raise ParameterError(key=f"line {sheet.lines[at]}, {name}", value=float(frequency[at]), remedy=remedy)
+    return frequency * scale
 
 
 def _values(sheet: Sheet) -> Complex:
     """The complex response, of whichever two columns there are."""
-    given = [pair for pair in VALUES if pair[0] in sheet or (pair[1] in sheet and pair[1] != "deg")]
+    given = [pair for pair in VALUE_PAIRS if pair[0] in sheet or (pair[1] in sheet and pair[1] != "deg")]
     if len(given) != 1 or not all(name in sheet for name in given[0]):
         remedy = "one pair of columns for the value: re, im or abs, deg or db, deg"
         raise ParameterError(key="header", value=", ".join(sheet.names), remedy=remedy)
@@ -201,11 +190,21 @@ def _averages(sheet: Sheet) -> int | None:
 def _of_uff(name: str, output: str, input: str) -> Measured:
     """The response of a UFF file: the one it has, or that of the number behind a # (from 1, as they stand there)."""
     path, _, number = name.partition("#")
-    data = read_file(path, MOST_BYTES, key=f"{output}/{input}", what="a .uff file")
+    data = read_file(path, MOST_RECORD_BYTES, key=f"{output}/{input}", what="a .uff file")
     try:
-        chosen = _chosen(_responses(path), int(number) if number else None)
-        omega = 2 * np.pi * np.asarray(chosen["x"], dtype=float)
-        values: NDArray[Any] = np.asarray(chosen["data"], dtype=complex)
+        found = _responses(path)
+        if not found:
+            remedy = "the file holds no frequency response function (type 58, function 4)"
+            raise ParameterError(key="data set", value=58, remedy=remedy)
+        if not number and len(found) > 1:
+            remedy = f"the file holds {len(found)} responses; choose one by its number, as file.uff#2"
+            raise ParameterError(key="data set", value=MISSING, remedy=remedy)
+        place = int(number or 1)
+        if not 1 <= place <= len(found):
+            remedy = f"from 1 to {len(found)}, the responses of the file"
+            raise ParameterError(key="data set", value=place, remedy=remedy)
+        omega = 2 * np.pi * np.asarray(found[place - 1]["x"], dtype=float)
+        values: NDArray[Any] = np.asarray(found[place - 1]["data"], dtype=complex)
         kept = slice(int(omega.size > 0 and omega[0] == 0), None)  # the line at 0 Hz that spectra begin with
         return Measured(
             output=output, input=input, omega=omega[kept], values=values[kept], source=name, digest=digest_of(data)
@@ -230,17 +229,5 @@ def _responses(path: str) -> list[dict[str, Any]]:
     return [
         cast("dict[str, Any]", each)
         for each in sets
-        if each.get("func_type") == RESPONSE and each.get("abscissa_spec_data_type", FREQUENCY) == FREQUENCY
+        if each.get("func_type") == UFF_RESPONSE and each.get("abscissa_spec_data_type", UFF_FREQUENCY) == UFF_FREQUENCY
     ]
-
-
-def _chosen(found: list[dict[str, Any]], number: int | None) -> dict[str, Any]:
-    if not found:
-        remedy = "the file holds no frequency response function (type 58, function 4)"
-        raise ParameterError(key="data set", value=58, remedy=remedy)
-    if number is None and len(found) > 1:
-        remedy = f"the file holds {len(found)} responses; choose one by its number, as file.uff#2"
-        raise ParameterError(key="data set", value=MISSING, remedy=remedy)
-    if number is not None and not 1 <= number <= len(found):
-        raise ParameterError(key="data set", value=number, remedy=f"from 1 to {len(found)}, the responses of the file")
-    return found[(number or 1) - 1]

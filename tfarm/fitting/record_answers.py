@@ -9,12 +9,13 @@ import numpy as np
 from tfarm.columns import ANSWER, FILES, JSON, Column, Table
 from tfarm.digits import general, singly
 from tfarm.errors import MISSING
+from tfarm.response.answers import HERTZ
 
 from .data import Measured
-from .ringdown import LEVEL, Ring
+from .noise import CONFIDENCE
+from .ringdown import Ring
 from .spectra import Estimate
 
-HERTZ = 2 * np.pi
 SIX, NINE, WHOLE = singly(general, 6), singly(general, 9), singly(general, 17)
 
 
@@ -56,7 +57,7 @@ def estimate_answer(found: Estimate) -> dict[str, Any]:
     }
 
 
-RINGS = (
+RING_COLUMNS = (
     Column("mode", of=lambda one: range(1, one.poles.size + 1)),
     Column("frequency_hz", "frequency", "Hz", of=lambda one: one.frequency / HERTZ, digits=singly(general, 7)),
     Column("frequency_low_hz", "from", "Hz", of=lambda one: _reaches(one)[0], digits=singly(general, 7)),
@@ -68,7 +69,7 @@ RINGS = (
     Column("damping_ratio_high", "to", of=lambda one: _reaches(one)[3], digits=singly(general, 4)),
     Column("damping_ratio_std", on=(JSON,)),
     Column("amplitude", "amplitude at the start", digits=singly(general, 4), on=ANSWER),
-    Column("mode_option", of=lambda one: list(map(_as_option, *_parts(one))), on=(JSON,)),
+    Column("mode_option", of=lambda one: _options(one), on=(JSON,)),
     Column("frequency_first_half_hz", of=lambda one: _told(one, one.early), on=(JSON,)),
     Column("frequency_second_half_hz", of=lambda one: _told(one, one.late), on=(JSON,)),
 )
@@ -81,14 +82,14 @@ def _reaches(one: Ring) -> tuple[Any, ...]:
     return f - df, f + df, z - dz, z + dz
 
 
-def _parts(one: Ring) -> tuple[Any, ...]:
-    return one.frequency / HERTZ, one.frequency_std / HERTZ, one.damping_ratio, one.damping_ratio_std
-
-
-def _as_option(hz: float, deviation: float, ratio: float, spread: float) -> str:
-    """What `tfarm fit --mode N=` takes of it, with standard deviations; without a ratio that is not positive."""
-    damping = f",{ratio:.6g}~{spread:.3g}" if 0 < ratio < 1 and spread > 0 else ""
-    return f"{hz:.8g}hz~{deviation:.3g}{damping}"
+def _options(one: Ring) -> list[str]:
+    """What `tfarm fit --mode N=` takes of each mode, with deviations; without a ratio that is not positive."""
+    found = []
+    columns = (one.frequency / HERTZ, one.frequency_std / HERTZ, one.damping_ratio, one.damping_ratio_std)
+    for hz, deviation, ratio, spread in zip(*columns, strict=True):
+        damping = f",{ratio:.6g}~{spread:.3g}" if 0 < ratio < 1 and spread > 0 else ""
+        found.append(f"{hz:.8g}hz~{deviation:.3g}{damping}")
+    return found
 
 
 def _told(one: Ring, w: Any) -> list[Any]:
@@ -104,8 +105,8 @@ def ring_answer(found: Ring) -> dict[str, Any]:
         "from_s": found.start,
         "to_s": found.stop,
         "samples": found.samples,
-        "level": LEVEL,
-        "modes": Table(columns=RINGS, record=found),
+        "level": CONFIDENCE,
+        "modes": Table(columns=RING_COLUMNS, record=found),
         "residual_rms": found.residual,
         "residuals_white": found.is_white,
         "whiteness_probability": found.white,

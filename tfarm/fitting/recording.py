@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +13,7 @@ from tfarm.errors import MISSING, ParameterError, did_you_mean
 from tfarm.files import read_mat
 from tfarm.records import record
 
-from .sheets import MOST_BYTES, digest_of, read_sheet
+from .sheets import MOST_RECORD_BYTES, digest_of, read_sheet
 
 Real = NDArray[np.float64]
 
@@ -67,9 +66,19 @@ def read_recording(path: str | os.PathLike[str]) -> Recording:
     the file, where there are no times, no signals, or samples that are not even.
     """
     name = os.fspath(path)
-    read, digest = _read_mat(name) if name.lower().endswith(".mat") else _read_text(name)
+    units: dict[str, str] = {}
+    if name.lower().endswith(".mat"):
+        held, data = read_mat(name, MOST_RECORD_BYTES, key="record")
+        digest = digest_of(data)
+    else:
+        sheet = read_sheet(name, key="record")
+        held, digest = dict(zip(sheet.names, sheet.values, strict=True)), sheet.digest
+        units = dict(zip(sheet.names, sheet.units, strict=True))
     try:
-        columns = read()
+        for each in TIMES:
+            if units.get(each, "") not in ("", "s"):
+                raise ParameterError(key=f"unit of {each}", value=units[each], remedy="times are in seconds")
+        columns = held if units else _columns(held)
         given = [each for each in TIMES if each in columns]
         if not given:
             remedy = f"a record has a column t, in seconds; this one has {', '.join(columns) or 'none'}"
@@ -80,27 +89,6 @@ def read_recording(path: str | os.PathLike[str]) -> Recording:
     except ParameterError as error:
         raise error.in_file(name) from None
     return Recording(signals=columns, start=start, period=period, jitter=jitter, source=name, digest=digest)
-
-
-def _read_mat(name: str) -> tuple[Callable[[], dict[str, Real]], str]:
-    found, data = read_mat(name, MOST_BYTES, key="record")
-    return lambda: _columns(found), digest_of(data)
-
-
-def _read_text(name: str) -> tuple[Callable[[], dict[str, Real]], str]:
-    sheet = read_sheet(name, key="record")
-
-    def columns() -> dict[str, Real]:
-        _check_unit(dict(zip(sheet.names, sheet.units, strict=True)))
-        return dict(zip(sheet.names, sheet.values, strict=True))
-
-    return columns, sheet.digest
-
-
-def _check_unit(units: dict[str, str]) -> None:
-    for name in TIMES:
-        if units.get(name, "") not in ("", "s"):
-            raise ParameterError(key=f"unit of {name}", value=units[name], remedy="times are in seconds")
 
 
 def _columns(found: dict[str, Any]) -> dict[str, Real]:

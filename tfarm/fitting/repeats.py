@@ -16,14 +16,13 @@ from numpy.typing import NDArray
 from tfarm.records import record
 
 from .fit import Fit
-from .model import Problem
-from .solve import settled
+from .solve import FIT_SEED, nearest_minimum
 
 Real = NDArray[np.float64]
 
-LEAST = 3  # records of one response, for a scatter
-DRAWS, SEED = 40, 852780
-ENDS = (2.5, 97.5)  # per cent of the draws: a 95 % interval
+FEWEST_RECORDS = 3  # records of one response, for a scatter
+DRAWS = 40  # of records
+INTERVAL_PERCENTS = (2.5, 97.5)  # per cent of the draws: a 95 % interval
 WIDER = 1.5  # times what the noise says: a scatter beyond is told
 
 
@@ -44,7 +43,7 @@ class Repeats:
     @property
     def intervals(self) -> Real:
         """(numbers, 2): what 95 % of the draws of records lie in."""
-        return np.asarray(np.percentile(self.drawn, ENDS, axis=0).T)
+        return np.asarray(np.percentile(self.drawn, INTERVAL_PERCENTS, axis=0).T)
 
     @property
     def times_wider(self) -> Real:
@@ -52,39 +51,31 @@ class Repeats:
         return np.asarray(self.drawn.std(axis=0, ddof=1) / self.by_noise)
 
 
-def repeats(fit: Fit, draws: int = DRAWS, seed: int = SEED) -> Repeats | None:
-    """The scatter between the records of the response that there are most of; None where there are fewer than three."""
+def repeats(fit: Fit, draws: int = DRAWS) -> Repeats | None:
+    """The scatter between the records of the response that there are most of; None where there are fewer than three.
+
+    Each least sum over some of the responses begins at that over all; sensors of the others are held, and so is what
+    all together do not determine.
+    """
     own = fit.solution.problem
     names = [each.data.name for each in own.responses]
-    if not names or names.count(most := max(names, key=names.count)) < LEAST:
+    if not names or names.count(most := max(names, key=names.count)) < FEWEST_RECORDS:
         return None
     records = [n for n, name in enumerate(names) if name == most]
     others = [n for n, name in enumerate(names) if name != most]
-    known = [
-        n for n, each in enumerate(fit.parameters) if each.identified and each.deviation and not _is_of_one(each.key)
-    ]
+    every = list(enumerate(fit.parameters))  # a key with a colon is of one record's sensor, which others do not know
+    known = [n for n, each in every if each.identified and each.deviation and ":" not in each.key]
     keys = tuple(fit.parameters[n].key for n in known)
-    rng = np.random.default_rng(seed)
+    rng, start = np.random.default_rng(FIT_SEED), fit.solution.point
 
     def numbers(chosen: Sequence[int]) -> Real:
-        point = _fitted_to(fit, own, [*chosen, *others])
+        some = replace(own, responses=tuple(own.responses[n] for n in (*chosen, *others)))
+        used = {place for each in some.responses for place in (each.gain, each.delay) if place is not None}
+        sensors = range(len(own.of_the_arm), len(own.parameters))
+        held = [*(n for n in sensors if n not in used), *(n for n, each in every if not each.identified)]
+        point = nearest_minimum(some, start, {n: float(start[n]) for n in held}).point
         return np.array([own.parameters[n].value(float(point[n])) for n in known])
 
     alone = np.array([numbers([n]) for n in records])
     drawn = np.array([numbers(rng.choice(records, size=len(records)).tolist()) for _ in range(draws)])
     return Repeats(most, keys, alone, drawn, np.array([fit.parameters[n].deviation for n in known]))
-
-
-def _is_of_one(key: str) -> bool:
-    """Whether a number is the sensor's of one record, which the others do not know."""
-    return ":" in key
-
-
-def _fitted_to(fit: Fit, own: Problem, chosen: Sequence[int]) -> Real:
-    """The least sum over some of the responses, from the least over all; sensors of the others are held."""
-    some = replace(own, responses=tuple(own.responses[n] for n in chosen))
-    used = {place for each in some.responses for place in (each.gain, each.delay) if place is not None}
-    first = len(own.of_the_arm)
-    held = {n: float(fit.solution.point[n]) for n in range(first, len(own.parameters)) if n not in used}
-    held |= {n: float(fit.solution.point[n]) for n, each in enumerate(fit.parameters) if not each.identified}
-    return settled(some, fit.solution.point, held).point

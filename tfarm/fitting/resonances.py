@@ -20,24 +20,24 @@ from numpy.typing import NDArray
 
 from tfarm.errors import ParameterError
 from tfarm.records import record
+from tfarm.response.answers import HERTZ
 
 from .data import Measured
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
 
-PROMINENT = math.log(2)  # a peak is twice what is around it
-CLEAR = 5.0  # deviations of the noise that it stands above
-SKIPPED = 0.3  # of ln w: what a peak or a pole in the band costs that has no partner; so partners are 1.8 apart at most
-WIDEST = 0.5  # damping ratio of a pole that is no peak
-BEYOND = 1.8  # so far beyond the band partners are looked for
+PROMINENCE = math.log(2)  # a peak is twice what is around it
+CLEAR_OF_NOISE = 5.0  # deviations of the noise that it stands above
+UNPAIRED = 0.3  # of ln w: what a peak or a pole in the band costs without a partner; so partners are 1.8 apart at most
+WIDEST_PEAK = 0.5  # damping ratio of a pole that is no peak
+PARTNERS_BEYOND = 1.8  # so far beyond the band partners are looked for
 WIDTHS = 3.0  # half-widths of a peak around it that its pole is fitted to: tuned with the next, for the least bias
 BACKGROUND = 5  # coefficients c
-CLOSE = 0.3  # of ln w, in the mean of the peaks: how well they fit in the other unit before that is said,
-ALIKE = 0.15  # and how far they may differ in that
-ALONE = math.log(2.0)  # of ln w: farther from every pole a peak has nothing to do with one
-MANY = 3  # peaks, whose spacing tells one match from another
-TURN = 2 * math.pi
+CLOSE_IN_UNIT = 0.3  # of ln w, in the mean of the peaks: how well they fit in the other unit before that is said,
+ALIKE_IN_UNIT = 0.15  # and how far they may differ in that
+PEAK_ALONE = math.log(2.0)  # of ln w: farther from every pole a peak has nothing to do with one
+PEAKS_THAT_TELL = 3  # peaks, whose spacing tells one match from another
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,20 +60,20 @@ def peaks_of(data: Measured, sigma: Real) -> NDArray[np.intp]:
     from scipy.signal import find_peaks
 
     size = abs(data.values)
-    places, found = find_peaks(np.log(np.maximum(size, np.finfo(float).tiny)), prominence=PROMINENT)
+    places, found = find_peaks(np.log(np.maximum(size, np.finfo(float).tiny)), prominence=PROMINENCE)
     rise = size[places] * -np.expm1(-found["prominences"])
-    return np.asarray(places[rise > CLEAR * sigma[places]])
+    return np.asarray(places[rise > CLEAR_OF_NOISE * sigma[places]])
 
 
 def paired(measured: Real, own: Real, band: tuple[float, float]) -> tuple[list[tuple[int, int]], float]:
     """Pairs of places in two ascending rows of frequencies, in order, with the least cost, and that cost.
 
-    The cost of a pair is |ln w/w'|; one of a row that is left alone costs SKIPPED, but an own one outside of the band.
+    The cost of a pair is |ln w/w'|; one of a row that is left alone costs UNPAIRED, but an own one outside of the band.
     """
     x, y = np.log(measured), np.log(own)
-    alone = np.where((own >= band[0]) & (own <= band[1]), SKIPPED, 0.0)
+    alone = np.where((own >= band[0]) & (own <= band[1]), UNPAIRED, 0.0)
     cost = np.zeros((x.size + 1, y.size + 1))
-    cost[1:, 0] = SKIPPED * np.arange(1, x.size + 1)
+    cost[1:, 0] = UNPAIRED * np.arange(1, x.size + 1)
     cost[0, 1:] = np.cumsum(alone)
     ways = np.zeros(cost.shape, dtype=int)
     ways[1:, 0], ways[0, 1:] = 1, 2
@@ -81,7 +81,7 @@ def paired(measured: Real, own: Real, band: tuple[float, float]) -> tuple[list[t
         for j in range(1, y.size + 1):
             choices = (
                 cost[i - 1, j - 1] + abs(x[i - 1] - y[j - 1]),
-                cost[i - 1, j] + SKIPPED,
+                cost[i - 1, j] + UNPAIRED,
                 cost[i, j - 1] + alone[j - 1],
             )
             ways[i, j] = int(np.argmin(choices))
@@ -97,29 +97,29 @@ def paired(measured: Real, own: Real, band: tuple[float, float]) -> tuple[list[t
 
 def peaks_among(poles: Complex) -> Real:
     """|s| (n,) [rad/s], ascending, of those poles that make a peak."""
-    upper = poles[(poles.imag > 0) & (-poles.real < WIDEST * abs(poles))]
+    upper = poles[(poles.imag > 0) & (-poles.real < WIDEST_PEAK * abs(poles))]
     return np.sort(abs(upper))
 
 
 def must_be_in_unit(data: Measured, sigma: Real, poles: Complex) -> None:
     """Raise ParameterError where the peaks fit the arm's poles 2 pi lower or higher, and do not as they are.
 
-    `poles` are those of the response, complete up to BEYOND 2 pi times the highest frequency.  They fit as they are
-    where no more than two partners are missing; one peak alone decides only where it has no partner.
+    `poles` are those of the response, complete up to PARTNERS_BEYOND 2 pi times the highest frequency.  They fit as
+    they are where no more than two partners are missing; one peak alone decides only where it has no partner.
     """
     peaks, own = data.omega[peaks_of(data, sigma)], peaks_among(poles)
     if not peaks.size or not own.size:
         return
     band = float(data.omega[0]), float(data.omega[-1])
     _, cost = paired(peaks, own, band)
-    lonely = bool((abs(np.log(peaks[:, None] / own)).min(axis=1) > ALONE).all())
-    for factor, words in ((1 / TURN, "are rad/s given as Hz?"), (TURN, "are Hz given as rad/s?")):
+    lonely = bool((abs(np.log(peaks[:, None] / own)).min(axis=1) > PEAK_ALONE).all())
+    for factor, words in ((1 / HERTZ, "are rad/s given as Hz?"), (HERTZ, "are Hz given as rad/s?")):
         there, fitting = paired(peaks * factor, own, (band[0] * factor, band[1] * factor))
-        better = cost - fitting > SKIPPED if peaks.size >= MANY else lonely
+        better = cost - fitting > UNPAIRED if peaks.size >= PEAKS_THAT_TELL else lonely
         away = np.array([math.log(peaks[i] * factor / own[j]) for i, j in there])
-        if better and away.size == peaks.size and abs(away.mean()) < CLOSE and np.ptp(away) < ALIKE:
-            found = f"{peaks[0] / TURN:.4g} Hz"
-            remedy = f"its peaks are {TURN if factor < 1 else 1 / TURN:.3g} times the arm's frequencies: {words}"
+        if better and away.size == peaks.size and abs(away.mean()) < CLOSE_IN_UNIT and np.ptp(away) < ALIKE_IN_UNIT:
+            found = f"{peaks[0] / HERTZ:.4g} Hz"
+            remedy = f"its peaks are {HERTZ if factor < 1 else 1 / HERTZ:.3g} times the arm's frequencies: {words}"
             raise ParameterError(key=f"{data.name} first peak", value=found, remedy=remedy, file=data.source)
 
 

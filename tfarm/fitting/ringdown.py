@@ -25,19 +25,19 @@ from numpy.typing import NDArray
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 
-from .decays import EACH, LINEAR, covariance, energy, later, least_squares, model, start_of, whiteness
+from .decays import EACH, LINEAR, counted_from, covariance, least_squares, mode_energy, model, start_of, whiteness
+from .noise import CONFIDENCE
 from .recording import Recording
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
-MOST_MODES = 20
+MOST_RINGING = 20  # of one decay
 NOT_WHITE = 1e-3  # probability below which residuals are called correlated
 RARE = 1e-9  # a probability below which its size says nothing more
-LEVEL = 0.95  # of the intervals
-ROUNDED = 1e-9  # of the signal and of w: what is less is rounding, of which nothing is said
-APART = 4.0  # standard deviations that the two halves of a record differ by before it is said
-TOLD = 8.0  # its amplitude's deviations that an oscillation has in a half of a record that tells of it: noise has 4
+RING_ROUNDING = 1e-9  # of the signal and of w: what is less is rounding, of which nothing is said
+HALVES_APART = 4.0  # standard deviations that the two halves of a record differ by before it is said
+AMPLITUDE_TOLD = 8.0  # deviations of its amplitude in a half of a record that tells of an oscillation: noise has 4
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,7 +99,7 @@ class Ring:
         """How many standard deviations an interval reaches to each side (Student's t)."""
         from scipy.special import stdtrit
 
-        return float(stdtrit(self.freedom, 0.5 + LEVEL / 2))
+        return float(stdtrit(self.freedom, 0.5 + CONFIDENCE / 2))
 
     @property
     def is_white(self) -> bool:
@@ -109,7 +109,7 @@ class Ring:
     @property
     def drifts(self) -> NDArray[np.bool_]:
         """Whether the two halves of the record differ in w (n,) by more than chance."""
-        return np.asarray(abs(self.early - self.late) > APART * self.halves_std + ROUNDED * self.frequency)
+        return np.asarray(abs(self.early - self.late) > HALVES_APART * self.halves_std + RING_ROUNDING * self.frequency)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -139,9 +139,9 @@ def ring(
     """
     t, y = _part(recording, name, start, stop, modes)
     x, J, e = _fitted(t - t[0], y, modes)
-    order = np.argsort(-energy(x, t[-1] - t[0]), kind="stable")
+    order = np.argsort(-mode_energy(x, t[-1] - t[0]), kind="stable")
     freedom = y.size - x.size
-    white = whiteness(e) if e @ e > y.size * (ROUNDED * abs(y).max()) ** 2 else 1.0
+    white = whiteness(e) if e @ e > y.size * (RING_ROUNDING * abs(y).max()) ** 2 else 1.0
     spread = covariance(J, e, freedom, is_white=white >= NOT_WHITE)
     places = EACH * order
     early, late, std = _halves(t - t[0], y, x, order)
@@ -170,8 +170,8 @@ def _part(recording: Recording, name: str, start: float | None, stop: float | No
     low, high = t[0] if start is None else start, t[-1] if stop is None else stop
     half = recording.period / 2
     kept = (t >= low - half * 1e-6) & (t <= high + half * 1e-6)
-    if not 1 <= modes <= MOST_MODES:
-        raise ParameterError(key="--modes", value=modes, remedy=f"a whole number from 1 to {MOST_MODES}")
+    if not 1 <= modes <= MOST_RINGING:
+        raise ParameterError(key="--modes", value=modes, remedy=f"a whole number from 1 to {MOST_RINGING}")
     least = 4 * (EACH * modes + LINEAR)
     if kept.sum() < least:
         span = f"the record goes from {t[0]:g} to {t[-1]:g} s"
@@ -200,7 +200,7 @@ def _halves(t: Real, y: Real, x: Real, order: NDArray[np.intp]) -> tuple[Real, R
     middle = t.size // 2
     pairs = []
     for part in (slice(None, middle), slice(middle, None)):
-        shifted = later(x, t[part][0])
+        shifted = counted_from(x, t[part][0])
         found = least_squares(t[part] - t[part][0], y[part], shifted) if y[part].size > 2 * x.size else None
         if found is None:
             pairs.append((x[1:-LINEAR:EACH], np.full(order.size, np.inf)))
@@ -210,6 +210,6 @@ def _halves(t: Real, y: Real, x: Real, order: NDArray[np.intp]) -> tuple[Real, R
         C = covariance(J, e, e.size - x.size, is_white=whiteness(e) >= NOT_WHITE)
         w, variance = found[1:-LINEAR:EACH], np.diag(C)[1:-LINEAR:EACH]
         a, b, of_a, of_b = (x[k:-LINEAR:EACH] for x in (found, np.diag(C)) for k in (2, 3))
-        pairs.append((w, np.where(a**2 + b**2 > TOLD**2 * (of_a + of_b) / 2, variance, np.inf)))
+        pairs.append((w, np.where(a**2 + b**2 > AMPLITUDE_TOLD**2 * (of_a + of_b) / 2, variance, np.inf)))
     (early, one), (late, other) = pairs
     return early[order], late[order], np.sqrt(one + other)[order]

@@ -14,16 +14,19 @@ from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 from tfarm.spectrum import modes
 
-from .around import Around
+from .around import NUDGE, Around
 
 Real = NDArray[np.float64]
 
-FREQUENCY_KNOWN, RATIO_KNOWN = 2e-3, 0.1  # of themselves: what a decay says of both, where its deviations are not said
-NUDGE = 1e-6  # of an eigenvalue: for a slope along s
-STEPS, FIRM = 30, 1e-12  # of Newton's method; of an eigenvalue, where it ends
-MOST = 100  # number of a mode
-FORM = "N=FREQUENCY,RATIO such as 1=2.52hz,0.006 (hz or rad_s; a deviation after ~: 2.52hz~0.01)"
-PATTERN = re.compile(r"\s*(\d+)\s*=\s*([\d.eE+-]+)\s*(hz|rad_s)\s*(?:~\s*([\d.eE+-]+))?\s*(?:,(.*))?", re.IGNORECASE)
+FREQUENCY_KNOWN = 2e-3  # of itself: what a decay says of it, where its deviation is not said
+RATIO_KNOWN = 0.1  # of itself, likewise
+EIGENVALUE_STEPS = 30  # of Newton's method, at most: from an undamped frequency on a few do
+EIGENVALUE_FIRM = 1e-12  # of an eigenvalue: a step that is less ends it
+MOST_NUMBER = 100  # number of a mode
+MODE_FORM = "N=FREQUENCY,RATIO such as 1=2.52hz,0.006 (hz or rad_s; a deviation after ~: 2.52hz~0.01)"
+MODE_PATTERN = re.compile(
+    r"\s*(\d+)\s*=\s*([\d.eE+-]+)\s*(hz|rad_s)\s*(?:~\s*([\d.eE+-]+))?\s*(?:,(.*))?", re.IGNORECASE
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,34 +44,30 @@ class RingMode:
     ratio_deviation: float = math.inf
 
 
-def mode_of(text: str, key: str = "--mode") -> RingMode:
+def mode_of(text: str) -> RingMode:
     """The decay that the command line means by "1=2.52hz,0.006".  Raises ParameterError for another form."""
-    found = PATTERN.fullmatch(text)
+    found = MODE_PATTERN.fullmatch(text)
     try:
         if found is None:
             raise ValueError
         number, unit = int(found[1]), 2 * math.pi if found[3].lower() == "hz" else 1.0
         frequency = float(found[2]) * unit
         deviation = float(found[4]) * unit if found[4] else FREQUENCY_KNOWN * frequency
-        ratio, spread = _ratio(found[5])
-        if not (1 <= number <= MOST and frequency > 0 and deviation > 0 and math.isfinite(frequency * deviation)):
+        ratio, spread = None, math.inf
+        if found[5] is not None:
+            value, _, said = found[5].partition("~")
+            ratio = float(value)
+            spread = float(said) if said else RATIO_KNOWN * ratio
+            if not (0 < ratio < 1 and spread > 0):
+                raise ValueError
+        sizes_fit = frequency > 0 and deviation > 0 and math.isfinite(frequency * deviation)
+        if not (1 <= number <= MOST_NUMBER and sizes_fit):
             raise ValueError
     except ValueError:
-        raise ParameterError(key=key, value=text, remedy=f"write {FORM}") from None
+        raise ParameterError(key="--mode", value=text, remedy=f"write {MODE_FORM}") from None
     return RingMode(
         number=number, frequency=frequency, frequency_deviation=deviation, ratio=ratio, ratio_deviation=spread
     )
-
-
-def _ratio(text: str | None) -> tuple[float | None, float]:
-    if text is None:
-        return None, math.inf
-    value, _, spread = text.partition("~")
-    ratio = float(value)
-    deviation = float(spread) if spread else RATIO_KNOWN * ratio
-    if not (0 < ratio < 1 and deviation > 0):
-        raise ValueError
-    return ratio, deviation
 
 
 def ring_residuals(here: Around, rings: tuple[RingMode, ...], size: int) -> tuple[Real, Real]:
@@ -96,12 +95,12 @@ def eigenvalue(here: Around, number: int) -> tuple[complex, NDArray[Any]]:
     """
     arm = here.arm
     s = 1j * float(modes(arm, number).natural_frequency[-1])
-    for _ in range(STEPS):
+    for _ in range(EIGENVALUE_STEPS):
         drive, _ = here.gradients(arm.input, ("hub_angle",), np.array([s, s * (1 + NUDGE)]))
         f, by_s = drive.c[0][0], (drive.c[0][1] - drive.c[0][0]) / (s * NUDGE)
         step = complex(f / by_s)
         s -= step
-        if abs(step) < FIRM * abs(s) or not abs(step) < abs(s):
+        if abs(step) < EIGENVALUE_FIRM * abs(s) or not abs(step) < abs(s):
             break
     if not (abs(step) < 1e-8 * abs(s) and s.imag > 0):
         raise ConvergenceError(f"mode {number} of {arm.name} does not ring near its undamped frequency", s, abs(step))

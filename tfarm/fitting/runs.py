@@ -33,7 +33,9 @@ from .recording import read_recording
 
 Real = NDArray[np.float64]
 
-REFERENCE, ANGLE, MOMENT = "reference:hub_angle", "hub_angle", "root_moment"
+LED_BY = "reference:hub_angle"  # columns of the record
+ANGLE_COLUMN = "hub_angle"
+MOMENT_COLUMN = "root_moment"
 
 
 class RunTable(BaseModel):
@@ -97,7 +99,7 @@ class Beside:
         return float(np.sqrt(np.mean((self.hub_angle - there) ** 2)))
 
 
-def beside(arm: Arm, law: AnyLaw, chain: Chain, measured: MeasuredRun) -> Beside:
+def beside_exact(arm: Arm, law: AnyLaw, chain: Chain, measured: MeasuredRun) -> Beside:
     """The sampled loop led as the measured one was, with as many modes as its signals take.
 
     Raises ParameterError as `simulate` does.
@@ -127,13 +129,13 @@ def load_run(name_or_path: str | os.PathLike[str]) -> MeasuredRun | None:
     try:
         table = _validated(tables["measured"])
         found = read_recording(Path(file).parent / table.file)
-        led = found.signal(REFERENCE, "measured.file")
-        if not {ANGLE, MOMENT} & set(found.signals):
-            remedy = f"has neither {ANGLE} [rad] nor {MOMENT} [N m] beside {REFERENCE} [rad]"
+        led = found.signal(LED_BY, "measured.file")
+        if not {ANGLE_COLUMN, MOMENT_COLUMN} & set(found.signals):
+            remedy = f"has neither {ANGLE_COLUMN} [rad] nor {MOMENT_COLUMN} [N m] beside {LED_BY} [rad]"
             raise ParameterError(key="measured.file", value=table.file, remedy=remedy)
     except ParameterError as error:
         raise error if error.file else error.in_file(file) from None
-    angle, moment = (found.signals.get(name, np.empty(0)) for name in (ANGLE, MOMENT))
+    angle, moment = (found.signals.get(name, np.empty(0)) for name in (ANGLE_COLUMN, MOMENT_COLUMN))
     return MeasuredRun(found.times - found.start, led, angle, moment, table.source)
 
 

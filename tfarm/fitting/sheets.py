@@ -16,13 +16,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tfarm.arm.reading import decoded
 from tfarm.errors import MISSING, ParameterError
 from tfarm.files import read_file
 from tfarm.records import record
 
 Real = NDArray[np.float64]
 
-MOST_BYTES = 256 * 1024 * 1024  # of a record; an hour of two signals at 1 kHz as text has 150 MB
+MOST_RECORD_BYTES = 256 * 1024 * 1024  # of a record; an hour of two signals at 1 kHz as text has 150 MB
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +59,7 @@ def read_sheet(path: str | os.PathLike[str], key: str) -> Sheet:
     Raises ParameterError naming the line for a missing or doubled name, a row of another length, or what is no finite
     number; naming `key` where the file cannot be read.
     """
-    data = read_file(path, MOST_BYTES, key=key, what="a .csv file")
+    data = read_file(path, MOST_RECORD_BYTES, key=key, what="a .csv file")
     try:
         return sheet_of(data)
     except ParameterError as error:
@@ -67,29 +68,28 @@ def read_sheet(path: str | os.PathLike[str], key: str) -> Sheet:
 
 def sheet_of(data: bytes) -> Sheet:
     """The columns of a text file's bytes; errors name no file."""
+    text = decoded(data, "is not UTF-8 text; save the file as CSV in UTF-8")
     lines = [
         (number, line)
-        for number, line in enumerate(_decoded(data).splitlines(), start=1)
+        for number, line in enumerate(text.splitlines(), start=1)
         if line.strip() and not line.lstrip().startswith("#")
     ]
     if not lines:
         raise ParameterError(key="header", value=MISSING, remedy="the file is empty; begin with the names of columns")
     head = lines[0][1]
     separator = next((each for each in "\t;" if each in head), ",")
-    numbers, texts = [number for number, _ in lines[1:]], [line for _, line in lines[1:]]
     names, units = _header(_cells(head, separator))
-    rows = [_row(number, line, separator, len(names)) for number, line in zip(numbers, texts, strict=True)]
+    rows = []
+    for number, line in lines[1:]:
+        cells = _cells(line, separator)
+        if len(cells) != len(names):
+            remedy = f"{len(cells)} columns where the header names {len(names)}"
+            raise ParameterError(key=f"line {number}", value=line, remedy=remedy)
+        rows.append(cells if separator == "," else [cell.replace(",", ".") for cell in cells])
     if not rows:
         raise ParameterError(key="rows", value=0, remedy="a header and nothing below it")
-    return Sheet(names, units, _numbers(names, numbers, rows).T, tuple(numbers), digest_of(data))
-
-
-def _decoded(data: bytes) -> str:
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        bad, remedy = data[error.start : error.start + 1], "is not UTF-8 text; save the file as CSV in UTF-8"
-        raise ParameterError(key=f"byte {error.start}", value=bad, remedy=remedy) from None
+    numbers = tuple(number for number, _ in lines[1:])
+    return Sheet(names, units, _numbers(names, numbers, rows).T, numbers, digest_of(data))
 
 
 def _header(cells: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -109,16 +109,6 @@ def _header(cells: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 def _cells(line: str, separator: str) -> list[str]:
     return [cell.strip().strip('"') for cell in line.split(separator)]
-
-
-def _row(number: int, line: str, separator: str, wanted: int) -> list[str]:
-    cells = _cells(line, separator)
-    if separator != ",":
-        cells = [cell.replace(",", ".") for cell in cells]
-    if len(cells) != wanted:
-        remedy = f"{len(cells)} columns where the header names {wanted}"
-        raise ParameterError(key=f"line {number}", value=line, remedy=remedy)
-    return cells
 
 
 def _numbers(names: Sequence[str], lines: Sequence[int], rows: list[list[str]]) -> Real:

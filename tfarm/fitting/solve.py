@@ -23,16 +23,17 @@ from .start import Starts
 
 Real = NDArray[np.float64]
 
-EXPLAINED = 1e-6  # a sum of squares that noise alone exceeds so rarely is no noise: another start may do better
-WORSE = 4.0  # times its degrees of freedom: a best sum beyond is tried from strayed starts too
+NOISE_ALONE = 1e-6  # a sum of squares that noise alone exceeds so rarely is no noise: another start may do better
+MUCH_MISFIT = 4.0  # times its degrees of freedom: a best sum beyond is tried from strayed starts too
 STRAYED = 6  # starts beside the first ones, strayed from the best by
 SPREAD = 0.15  # of ln p
-SEED = 852780
-MOST = 60  # evaluations from one start
-FIRM, FIRM_SUM = 1e-7, 1e-9  # of the coordinates, of the sum: a step that changes less ends a search
-OPEN = 1.0  # of ln p: a combination with a larger deviation (a factor of e) is not determined by the data
+FIT_SEED = 852780  # of all that a fit draws: the number of the paper's article, any would do
+MOST_EVALUATIONS = 60  # evaluations from one start
+FIRM_POINT = 1e-7  # of the coordinates: a step that changes less ends a search
+FIRM_SUM = 1e-9  # of the sum, likewise
+OPEN_DEVIATION = 1.0  # of ln p: a combination with a larger deviation (a factor of e) is not determined by the data
 WEAK = 0.1  # of ln p: what is known so badly is looked at again
-SAME = 0.1  # of a sum of squares: less is no difference to speak of
+SAME_SUM = 0.1  # of a sum of squares: less is no difference to speak of
 EXCLUDED = 16.0  # of a sum of squares: noise alone makes up an effect of four deviations once in 15,000 fits
 RESCALED = 3  # times that a noise known up to a factor takes its factor from the residuals
 
@@ -60,21 +61,21 @@ class Solution:
         return self.residuals.size - self.point.size
 
 
-def solved(problem: Problem) -> Solution:
+def best_solution(problem: Problem) -> Solution:
     """The least sum of squares over all starts; those of noise alone end the search early."""
     found: list[Solution] = []
 
     def best_after(subject: Problem, start: Real) -> Solution:
-        found.append(_rescaled(settled(subject, start)))
+        found.append(_rescaled(nearest_minimum(subject, start)))
         return min(found, key=_misfit)
 
     for subject, start in Starts(problem):
         best = best_after(subject, start)
         if best.converged and is_explained(best):
             return replace(_nearest(best), starts=len(found))
-    rng = np.random.default_rng(SEED)
+    rng = np.random.default_rng(FIT_SEED)
     for _ in range(STRAYED):
-        if best.converged and best.chi_squared < WORSE * best.freedom:
+        if best.converged and best.chi_squared < MUCH_MISFIT * best.freedom:
             break
         strayed = best.point + SPREAD * rng.standard_normal(best.point.size)
         with suppress(ParameterError):  # no arm there
@@ -89,15 +90,15 @@ def _nearest(found: Solution) -> Solution:
     to be measured (the rotary inertia of E I): then too, if the data do not exclude the open part.
     """
     sizes, axes = principal_axes(found.jacobian)
-    for limit, most in ((OPEN, SAME), (WEAK, EXCLUDED)):
+    for limit, most in ((OPEN_DEVIATION, SAME_SUM), (WEAK, EXCLUDED)):
         some = axes[sizes < 1.0 / limit]
         if not some.size:
             continue
         start = found.point - some.T @ (some @ found.point)
-        back = settled(found.problem, start, {int(n): float(start[n]) for n in abs(some).argmax(axis=1)})
+        back = nearest_minimum(found.problem, start, {int(n): float(start[n]) for n in abs(some).argmax(axis=1)})
         back = replace(back, jacobian=found.problem.jacobian(back.point), converged=found.converged)
-        more = int((principal_axes(back.jacobian)[0] < 1.0 / OPEN).sum())
-        if back.chi_squared < found.chi_squared + most and more >= max(1, int((sizes < 1.0 / OPEN).sum())):
+        more = int((principal_axes(back.jacobian)[0] < 1.0 / OPEN_DEVIATION).sum())
+        if back.chi_squared < found.chi_squared + most and more >= max(1, int((sizes < 1.0 / OPEN_DEVIATION).sum())):
             return back
     return found
 
@@ -121,10 +122,10 @@ def is_explained(one: Solution) -> bool | None:
     """Whether noise alone gives such a sum often enough; None where its size was taken from the residuals."""
     if not all(each.noise.is_known for each in one.problem.responses):
         return None
-    return bool(chdtrc(max(one.freedom, 1), one.chi_squared) > EXPLAINED)
+    return bool(chdtrc(max(one.freedom, 1), one.chi_squared) > NOISE_ALONE)
 
 
-def settled(problem: Problem, start: Real, held: dict[int, float] | None = None) -> Solution:
+def nearest_minimum(problem: Problem, start: Real, held: dict[int, float] | None = None) -> Solution:
     """The nearest minimum from a start, some coordinates held at a value."""
     held = held or {}
     free = [n for n in range(start.size) if n not in held]
@@ -147,8 +148,8 @@ def settled(problem: Problem, start: Real, held: dict[int, float] | None = None)
 
     inside = problem.inside(point)[free]
     found = least_squares(
-        walled(residuals), inside, jac=jacobian, bounds=(low, high), x_scale="jac", xtol=FIRM, ftol=FIRM_SUM, gtol=None,
-        max_nfev=MOST,
+        walled(residuals), inside, jac=jacobian, bounds=(low, high), x_scale="jac",
+        xtol=FIRM_POINT, ftol=FIRM_SUM, gtol=None, max_nfev=MOST_EVALUATIONS,
     )  # fmt: skip
     full, slopes = whole(found.x), np.zeros((found.fun.size, start.size))
     slopes[:, free] = np.asarray(found.jac)
@@ -168,5 +169,5 @@ def _rescaled(found: Solution) -> Solution:
             share = found.residuals.size / max(found.freedom, 1)
             factor = math.sqrt(float(own @ own) / size * share) if not each.noise.is_known else 1.0
             responses.append(replace(each, noise=replace(each.noise, sigma=each.noise.sigma * max(factor, 1e-12))))
-        found = settled(replace(found.problem, responses=tuple(responses)), found.point)
+        found = nearest_minimum(replace(found.problem, responses=tuple(responses)), found.point)
     return found

@@ -36,9 +36,9 @@ from .recording import Recording
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Estimator = Literal["H1", "H2", "Hv"]
-Window = Literal["hann", "boxcar"]
+Taper = Literal["hann", "boxcar"]
 
-SEGMENTS = 15  # of a record whose segments are not given: 8 lengths, half overlapped
+USUAL_SEGMENTS = 15  # of a record whose segments are not given: 8 lengths, half overlapped
 LEAST_POWER = 1e-24  # of the largest line of the input: below it there are rounding errors alone
 
 
@@ -52,7 +52,7 @@ class Estimate:
 
     measured: Measured
     estimator: Estimator
-    window: Window
+    window: Taper
     segment: float
     segments: int
     overlap: float
@@ -86,18 +86,19 @@ def frequency_response(
     check_signal(input, "--input")
     names = columns or (output, input)
     y, x = recording.signal(names[0], "--output"), recording.signal(names[1], "--input")
-    kind, taper = _one_of("--estimator", estimator, Estimator), _one_of("--window", window, Window)
+    kind, taper = _one_of("--estimator", estimator, Estimator), _one_of("--window", window, Taper)
     size, step = _cut(recording, segment, (0.5 if taper == "hann" else 0.0) if overlap is None else overlap)
     w = np.hanning(size + 1)[:-1] if taper == "hann" else np.ones(size)
     kept, spectra = _moving(cross_spectra(x, y, w, step), names, recording)
     count = 1 + (recording.count - size) // step
     averages = independent_averages(w, step, count)
+    values, coherence = _estimated(kind, *spectra)
     measured = Measured(
         output=output,
         input=input,
         omega=np.asarray(2 * np.pi * kept / (size * recording.period), dtype=float),
-        values=_response(kind, *spectra),
-        coherence=_coherence(*spectra),
+        values=values,
+        coherence=coherence,
         averages=max(1, math.floor(averages)),
         source=recording.source,
         digest=recording.digest,
@@ -132,8 +133,18 @@ def _moving(
 
 def cross_spectra(x: Real, y: Real, w: Real, step: int) -> tuple[Real, Complex, Real]:
     """S_xx, S_xy and S_yy (lines,) of segments as long as w, begun `step` samples apart; up to a common factor."""
-    X, Y = (_transforms(each, w, step) for each in (x, y))
+    cuts = (sliding_window_view(each, w.size)[::step] for each in (x, y))
+    X, Y = (np.fft.rfft((cut - cut.mean(axis=1, keepdims=True)) * w, axis=1) for cut in cuts)
     return (abs(X) ** 2).mean(0), (X.conj() * Y).mean(0), (abs(Y) ** 2).mean(0)
+
+
+def _estimated(kind: Estimator, Sxx: Real, Sxy: Complex, Syy: Real) -> tuple[Complex, Real]:
+    """The response and the coherence (lines,)."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        phase = np.where(Sxy == 0, 1.0, Sxy / abs(Sxy))
+        sizes = {"H1": abs(Sxy) / Sxx, "H2": np.where(Sxy == 0, 0.0, Syy / abs(Sxy)), "Hv": np.sqrt(Syy / Sxx)}
+        coherence = np.where(Syy > 0, abs(Sxy) ** 2 / (Sxx * Syy), 0.0)
+    return np.asarray(sizes[kind] * phase, dtype=complex), np.clip(coherence, 0.0, 1.0)
 
 
 def independent_averages(w: Real, step: int, count: int) -> float:
@@ -146,24 +157,6 @@ def independent_averages(w: Real, step: int, count: int) -> float:
     return count / (1 + shared)
 
 
-def _transforms(x: Real, w: Real, step: int) -> Complex:
-    segments = sliding_window_view(x, w.size)[::step]
-    return np.asarray(np.fft.rfft((segments - segments.mean(axis=1, keepdims=True)) * w, axis=1))
-
-
-def _response(kind: Estimator, Sxx: Real, Sxy: Complex, Syy: Real) -> Complex:
-    with np.errstate(divide="ignore", invalid="ignore"):
-        phase = np.where(Sxy == 0, 1.0, Sxy / abs(Sxy))
-        sizes = {"H1": abs(Sxy) / Sxx, "H2": np.where(Sxy == 0, 0.0, Syy / abs(Sxy)), "Hv": np.sqrt(Syy / Sxx)}
-    return np.asarray(sizes[kind] * phase, dtype=complex)
-
-
-def _coherence(Sxx: Real, Sxy: Complex, Syy: Real) -> Real:
-    with np.errstate(divide="ignore", invalid="ignore"):
-        found = np.where(Syy > 0, abs(Sxy) ** 2 / (Sxx * Syy), 0.0)
-    return np.clip(found, 0.0, 1.0)
-
-
 def _cut(recording: Recording, segment: float | None, overlap: float) -> tuple[int, int]:
     """Samples of a segment, and from one to the next."""
     if not 0 <= overlap < 1:
@@ -171,7 +164,7 @@ def _cut(recording: Recording, segment: float | None, overlap: float) -> tuple[i
             key="--overlap", value=overlap, remedy="a share of a segment from 0 to below 1, such as 0.5"
         )
     whole = recording.count * recording.period
-    wanted = 2 * whole / (SEGMENTS + 1) if segment is None else segment
+    wanted = 2 * whole / (USUAL_SEGMENTS + 1) if segment is None else segment
     if not 8 * recording.period <= wanted <= whole / 2 * (1 + 1e-9):
         remedy = (
             f"seconds between {8 * recording.period:.4g} and {whole / 2:.4g}, half the record: one average says nothing"

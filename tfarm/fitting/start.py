@@ -26,10 +26,10 @@ from .model import Problem
 Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
 
-HELD = 0.5  # of ln p: the deviation that a start is held with, where peaks do not decide
-ROUNDS = 8  # of Newton's method on the frequencies
+START_DEVIATION = 0.5  # of ln p: the deviation that a start is held with, where peaks do not decide
+MATCH_ROUNDS = 8  # of Newton's method on the frequencies
 SHIFTS = (0.0, -0.15, 0.15, -0.3, 0.3)  # of ln w: of all the arm's peaks, before the first match
-SHARES = (1.0, 0.5, 0.2, 0.05)  # of a step: where a whole one leads to no arm
+STEP_SHARES = (1.0, 0.5, 0.2, 0.05)  # of a step: where a whole one leads to no arm
 CURVE = 150  # points of a response that its curve is followed at
 LOSS = 0.3  # of ln H: residuals beyond count less and less
 
@@ -61,10 +61,11 @@ class Starts:
 
     def _matched(self, point: Real, shift: float) -> Real:
         """The point where the arm's peaks and dips are those measured, matched anew in each round."""
-        for turn in range(ROUNDS):
+        for turn in range(MATCH_ROUNDS):
             rows, misfit = self._frequency_rows(point, shift * max(0.0, 1.0 - turn / 3))
-            held = np.eye(self._free) / HELD
-            matrix, right = np.vstack([rows, held / 10]), np.concatenate([misfit, -point[: self._free] / HELD / 10])
+            held = np.eye(self._free) / START_DEVIATION
+            away = -point[: self._free] / START_DEVIATION
+            matrix, right = np.vstack([rows, held / 10]), np.concatenate([misfit, away / 10])
             step = np.linalg.lstsq(matrix * 10, right * 10, rcond=None)[0]
             step *= min(1.0, 0.3 / max(abs(step).max(), 1e-12))
             point = self._stepped(point, step)
@@ -74,7 +75,7 @@ class Starts:
 
     def _stepped(self, point: Real, step: Real) -> Real:
         """The point a step further on, or as much of it as there are arms."""
-        for share in SHARES:
+        for share in STEP_SHARES:
             beyond = point.copy()
             beyond[: self._free] += share * step
             beyond = self.problem.inside(beyond)
@@ -107,7 +108,7 @@ class Starts:
 
         The problem with it has its sensors' gains by the sign that they have.
         """
-        whole = signed(self.problem, point)
+        whole = with_signs(self.problem, point)
         thin = thinned(whole, CURVE)
         low, high = thin.bounds
         point = thin.inside(self._with_gains(thin, point))
@@ -144,7 +145,7 @@ class Starts:
         return point
 
 
-def signed(problem: Problem, point: Real) -> Problem:
+def with_signs(problem: Problem, point: Real) -> Problem:
     """The problem with the sign of each sensor's gain as the data have it at a point: the start's is turned."""
     parameters = list(problem.parameters)
     for H, each in zip(problem.computed(point), problem.responses, strict=True):

@@ -13,20 +13,20 @@ from scipy.special import ndtri, stdtrit
 
 from tfarm.records import record
 
-from .parameters import FARTHEST, Parameter
-from .solve import OPEN, Solution, principal_axes, settled
+from .noise import CONFIDENCE
+from .parameters import FARTHEST_FROM_START, Parameter
+from .solve import OPEN_DEVIATION, Solution, nearest_minimum, principal_axes
 
 Real = NDArray[np.float64]
 
-Progress = Callable[[int, int, str], object]
+ToldInterval = Callable[[int, int, str], object]
 
-LEVEL = 0.95
 TAKES_PART = 0.1  # of a unit vector: a smaller component has no part in it
 ROUND = 0.02  # a power so near to 1 is written as 1
-CLOSE = 0.01  # of a deviation: where a profile has reached its level
+LEVEL_REACHED = 0.01  # of a deviation: where a profile has reached its level
 BETTER = 0.05  # of a sum of squares: a profile that falls by more has left the valley of the best
-SAME_END = 1e-6  # of ln p
-TRIES = 12
+SAME_END = 1e-6  # of ln p: the search has ended at its reach
+SECANT_STEPS = 12  # steps of the secant: three do but in a crooked valley
 REACHES = (0.5, 1.0, 2.0, 4.0, 6.0, 9.0)  # of ln p: where a number that does not matter is tried
 
 
@@ -63,14 +63,14 @@ class BetterError(Exception):
         self.found = found
 
 
-def sureness(found: Solution, *, profile: bool, progress: Progress | None = None) -> Sureness:
+def sureness(found: Solution, *, profile: bool, progress: ToldInterval | None = None) -> Sureness:
     """The intervals of a solution's numbers: by profiles, or by its covariance where they are not asked for.
 
     Along an open axis nothing changes, so one number of it is held while the others are profiled.  `progress` is told
     (done, total, key) before each.  Raises BetterError where a profile comes to a lower sum than the solution's.
     """
     sizes, axes = principal_axes(found.jacobian)
-    is_open = sizes < 1.0 / OPEN
+    is_open = sizes < 1.0 / OPEN_DEVIATION
     covariance = (axes[~is_open].T / sizes[~is_open] ** 2) @ axes[~is_open]
     unsure: list[bool] = np.any(abs(axes[is_open]) > TAKES_PART, axis=0).tolist()
     held = {int(abs(axis).argmax()): float(found.point[abs(axis).argmax()]) for axis in axes[is_open]}
@@ -109,7 +109,7 @@ def _half_known(one: Fitted) -> str:
 
 def _where_it_ends(one: Parameter, ends: Sequence[float], low: float, high: float) -> tuple[float | None, float | None]:
     """The ends of an interval, None where only the reach of the search ended it and no bound of the number."""
-    reach, limits = math.log(FARTHEST), (one.low, one.high)
+    reach, limits = math.log(FARTHEST_FROM_START), (one.low, one.high)
     if not one.by_logarithm or one.start < 0:
         return low, high
     first = None if ends[0] <= -reach + SAME_END and limits[0] <= 0 else low
@@ -148,7 +148,7 @@ def _one_sided(found: Solution, n: int, quantile: float) -> tuple[float, float |
 def _quantile(found: Solution) -> float:
     """Of the normal distribution, or Student's where the noise was taken from the residuals."""
     known = all(each.noise.is_known for each in found.problem.responses)
-    share = 0.5 + LEVEL / 2
+    share = 0.5 + CONFIDENCE / 2
     return float(ndtri(share) if known else stdtrit(max(found.freedom, 1), share))
 
 
@@ -164,15 +164,15 @@ def _end(found: Solution, n: int, way: int, deviation: float, quantile: float, h
     slope[n] = 1.0
     near, root_near = float(found.point[n]), 0.0
     at = near + way * quantile * deviation
-    for _ in range(TRIES):
+    for _ in range(SECANT_STEPS):
         at = float(np.clip(at, low, high))
         start = found.point + slope * (at - found.point[n])
-        there = settled(found.problem, start, held | {n: at})
+        there = nearest_minimum(found.problem, start, held | {n: at})
         growth = there.chi_squared - found.chi_squared
         if growth < -BETTER:
             raise BetterError(there)
         root = math.sqrt(max(growth, 0.0))
-        if abs(root - quantile) < CLOSE or (at in (low, high) and root < quantile):
+        if abs(root - quantile) < LEVEL_REACHED or (at in (low, high) and root < quantile):
             return at
         step = (quantile - root) * (at - near) / (root - root_near) if root != root_near else 2 * (at - near)
         near, root_near, at = at, root, at + float(np.clip(step, -3 * abs(at - near), 3 * abs(at - near)))

@@ -8,9 +8,9 @@ from tfarm.arm import MOMENT_GAIN
 from tfarm.columns import Column, Table
 from tfarm.digits import general, listed, plain, singly
 from tfarm.errors import ConvergenceError
-from tfarm.fitting.answers import in_words, known, parameters_table, resonances
+from tfarm.fitting.answers import fit_in_words, known, parameters_table, resonances
 from tfarm.fitting.fit import Fit
-from tfarm.fitting.possible import ARMS, Possible, interval, loop_on_all, possible
+from tfarm.fitting.possible import ARMS, Possible, extremes, loop_on_all, possible
 from tfarm.loop.regions import ranges_of
 from tfarm.plots.fitted import draw_fit
 from tfarm.plots.possible import draw_band, draw_share
@@ -36,7 +36,7 @@ RESONANCES = (
 
 def fit_section(fit: Fit, count: int = ARMS) -> Section:
     """What was measured, what explains it, how sure, and on how many arms of those that remain a loop holds."""
-    words = [typeset(f"{fit.verdict[0].upper()}{fit.verdict[1:]}: {in_words(fit)}. {LEVEL}")]
+    words = [typeset(f"{fit.verdict[0].upper()}{fit.verdict[1:]}: {fit_in_words(fit)}. {LEVEL}")]
     words += [typeset(f"{each[0].upper()}{each[1:]}.") for each in fit.not_determined]
     blocks: list[Picture | Table] = []
     if fit.responses:
@@ -115,4 +115,4 @@ def _rows(found: object) -> Iterator[tuple[str, str, tuple[float, float] | None]
         ("delay margin", "s", "delay"),
         ("disk margin", "", "disk"),
     )
-    return ((title, unit, interval(getattr(found, name))) for title, unit, name in names)
+    return ((title, unit, extremes(getattr(found, name))) for title, unit, name in names)

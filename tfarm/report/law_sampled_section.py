@@ -21,7 +21,7 @@ from tfarm.dsp.margins import DelayMargin, delay_margin
 from tfarm.dsp.results import drawn, residual_moment_rms
 from tfarm.dsp.slews import RECORD_LENGTH
 from tfarm.errors import ParameterError
-from tfarm.fitting.runs import Beside, beside, overshoot
+from tfarm.fitting.runs import Beside, beside_exact, overshoot
 from tfarm.plots.measured_runs import draw_beside
 from tfarm.plots.motion import draw_responses
 from tfarm.plots.style import safe
@@ -271,7 +271,8 @@ def _slewed(each: LawOnArm, run: Simulation) -> str:
 
 def _measured_blocks(named: Sequence[LawOnArm], chain: Chain) -> list[Picture | Table]:
     """Each measured run with the exact loop over it, and both in numbers; nothing where none was measured."""
-    found = {each.name: beside(each.arm, each.law, chain, each.measured) for each in named if each.measured is not None}
+    measured = [(each, each.measured) for each in named if each.measured is not None]
+    found = {each.name: beside_exact(each.arm, each.law, chain, run) for each, run in measured}
     if not found:
         return []
     sources = " ".join(f"{name}: {it.measured.source}." for name, it in found.items() if it.measured.source)
