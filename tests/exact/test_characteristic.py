@@ -14,7 +14,7 @@ from tests.spectrum.damped_roads import delta, newton_step, shot
 from tests.strategies import ENDS, some_arm, some_s
 from tfarm import HubFeedback
 from tfarm.exact.balls import point, precision
-from tfarm.exact.characteristic import OPEN, characteristic, gains_of, quick_characteristic, zeros_at_origin
+from tfarm.exact.characteristic import NO_GAINS, characteristic, gains_of, quick_characteristic, zeros_at_origin
 from tfarm.exact.coefficients import coefficients
 from tfarm.exact.wide_balls import characteristic_ball, characteristic_over, tangent
 
@@ -31,7 +31,7 @@ def number(ball):
     return mpmath.mpc(ball.real.mid().str(60, radius=False), ball.imag.mid().str(60, radius=False))
 
 
-def balls(k, s, gains=OPEN):
+def balls(k, s, gains=NO_GAINS):
     """D as mpmath numbers of 60 digits."""
     with precision(300), mpmath.workdps(60):
         return [number(characteristic_ball(k, point(complex(at)), gains)) for at in s]
@@ -48,7 +48,7 @@ def laws(case):
 
 
 def gains_under(k, law):
-    return gains_of(k, HubFeedback(**law)) if law else OPEN
+    return gains_of(k, HubFeedback(**law)) if law else NO_GAINS
 
 
 @pytest.mark.parametrize("case", thinned([(each,) for each in list(product(ENDS, repeat=3))[::6]], 5))
@@ -153,7 +153,7 @@ def test_zeros_at_the_origin_are_as_many_as_the_order_of_D_there(case) -> None:
     small = np.array([1e-3, 1e-4]) * tfarm.modes(arm, 1).natural_frequency[-1]
     laws = [(0, 0, 0)] if case[0] == "infinite" else [(0, 0, 0), (1, 0.2, 0), (0, 0.2, 0), (1, 0.2, 3)]
     for K1, K2, Kp in laws:
-        gains = gains_of(k, HubFeedback(K1=K1, K2=K2, Kp=Kp)) if any((K1, K2, Kp)) else OPEN
+        gains = gains_of(k, HubFeedback(K1=K1, K2=K2, Kp=Kp)) if any((K1, K2, Kp)) else NO_GAINS
         at = small * (1e-9 if K1 else 1.0)  # where K1 s outweighs the inertia
         value = characteristic(k, at.astype(complex), gains).value.real
         order = np.log10(value[0] / value[1])
@@ -165,7 +165,7 @@ def test_zeros_at_the_origin_are_divided_out() -> None:
     k = coefficients(arm)
     whole = characteristic(k, S)
     for kind in (characteristic, quick_characteristic):
-        less = kind(k, S, OPEN, 2)
+        less = kind(k, S, NO_GAINS, 2)
         np.testing.assert_allclose(less.value * S**2 * np.exp(less.scale - whole.scale), whole.value, rtol=1e-12)
         rate = whole.slope / whole.value - 2 / S
         np.testing.assert_allclose(less.slope / less.value, rate, rtol=1e-6, atol=1e-6 * abs(1 / S).min())

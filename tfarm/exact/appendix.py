@@ -44,7 +44,8 @@ class Appendix:
         self.kappa_G = mpf(link.shear_factor) * mpf(link.shear_modulus)
         self.EI = mpf(link.youngs_modulus) * mpf(link.section.second_moment)
         self.s, self.damper = s, 1 + mpf(link.damping) * s
-        self.ends = [_body(inertia, s) for inertia in (payload.mass, payload.inertia, arm.hub.inertia)]
+        inertias = (payload.mass, payload.inertia, arm.hub.inertia)  # of each row the weights of motion and force
+        self.ends = [(mpf(1), mpf(0)) if math.isinf(each) else (each * s**2, mpf(1)) for each in inertias]
         lambda_1, lambda_2 = self.wave_numbers(mpf(link.youngs_modulus) * self.damper)
         self.lambdas = (lambda_1, lambda_2, -lambda_1, -lambda_2)
         self.gammas = tuple(l - self.rho * s**2 / (self.kappa_G * l) for l in self.lambdas)
@@ -139,13 +140,20 @@ def response(arm: Arm, asked: str | Output, s: complex, digits: int, x: float | 
     if place is None or not 0.0 <= place <= arm.link.length:
         remedy = f"a point of the arm lies between 0 and {arm.link.length} m"
         raise ParameterError(key="x", value=x, remedy=remedy)
-    if _vanishes(arm, wanted, place):
+    held = {"W": math.isinf(arm.payload.mass), "Q": arm.payload.mass == 0, "M": arm.payload.inertia == 0}
+    at_tip = place == arm.link.length and held.get(wanted.quantity, False)
+    if at_tip or (place == 0 and wanted.quantity in ("Y", "Phi")):  # by an end condition: no digits would ever agree
         return mpf(0)
     is_real = _is_real(arm, wanted, s, place)
 
     def parts() -> list[Number]:
-        value = _beside(lambda at: Appendix(arm, at).value(wanted, mpf(place)), mpc(s))
-        value = value if is_real else value * mpc(s) ** wanted.power
+        at = mpc(s)
+        try:
+            value = Appendix(arm, at).value(wanted, mpf(place))
+        except ZeroDivisionError:
+            aside = at + (at if at else 1) * mpf(10) ** (-mp.dps // 8)
+            value = Appendix(arm, aside).value(wanted, mpf(place))
+        value = value if is_real else value * at**wanted.power
         return [value.real] if is_real else [value.real, value.imag]
 
     found = _proven(parts, digits, f"{wanted.name} at s = {s}")
@@ -208,31 +216,11 @@ def _proven(evaluate: Callable[[], list[Number]], digits: int, what: str) -> lis
     raise ConvergenceError(f"no {digits} digits of {what}: a pole, a zero, or no limit there", last, misses)
 
 
-def _beside(function: Callable[[Number], Number], s: Number) -> Number:
-    """function(s), or next to s where it is 0/0."""
-    try:
-        return function(s)
-    except ZeroDivisionError:
-        return function(s + (s if s else 1) * mpf(10) ** (-mp.dps // 8))
-
-
 def _determinant(a: list[list[Number]]) -> Number:
     """Laplace's expansion in 2x2 minors: mpmath's own calls a badly scaled matrix singular."""
     pairs = list(combinations(range(4), 2))
     upper, lower = ([row[i] * next_[j] - row[j] * next_[i] for i, j in pairs] for row, next_ in (a[:2], a[2:]))
     return sum(sign * m * n for sign, m, n in zip((1, -1, 1, 1, -1, 1), upper, reversed(lower), strict=True))
-
-
-def _body(inertia: float, s: Number) -> tuple[Number, Number]:
-    """The weights of motion and force in a body's row: (inertia s^2, 1), or (1, 0) for an infinite inertia."""
-    return (mpf(1), mpf(0)) if math.isinf(inertia) else (inertia * s**2, mpf(1))
-
-
-def _vanishes(arm: Arm, wanted: Output, x: float) -> bool:
-    """Whether an end condition makes the output zero: no digits would ever agree."""
-    held = {"W": math.isinf(arm.payload.mass), "Q": arm.payload.mass == 0, "M": arm.payload.inertia == 0}
-    at_tip = x == arm.link.length and held.get(wanted.quantity, False)
-    return at_tip or (x == 0 and wanted.quantity in ("Y", "Phi"))
 
 
 def _is_real(arm: Arm, wanted: Output, s: complex, x: float) -> bool:

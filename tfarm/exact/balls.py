@@ -48,30 +48,21 @@ def root(z: Ball) -> Ball:
 
 
 def transition(z_sum: Ball, z_product: Ball, x: Ball) -> tuple[Ball, Ball, Ball, Ball]:
-    """F0..F3 at x (0..1), by the two waves where they differ and by the matrix exponential where they may not."""
+    """F0..F3 at x (0..1), by the two waves where they differ and by the matrix exponential where they may not.
+
+    That is of F'''' = (z1 + z2) F'' - z1 z2 F as a first-order system, with F'''(0) = 1.
+    """
     spread = root(z_sum * z_sum / 4 - z_product)
     z1, z2 = z_sum / 2 + spread, z_sum / 2 - spread
     if (z1 - z2).contains(0) or z1.contains(0) or z2.contains(0):
-        return _transition_by_exponential(z_sum, z_product, x)
+        zero, one = flint.acb(0), flint.acb(x)
+        rows = [[zero, one, zero, zero], [zero, zero, one, zero], [zero, zero, zero, one]]
+        exponential = flint.acb_mat([*rows, [-z_product * x, zero, z_sum * x, zero]]).exp()
+        return exponential[0, 3], exponential[1, 3], exponential[2, 3], exponential[3, 3]
     t1, t2 = root(z1), root(z2)
     (h1, c1), (h2, c2) = (t1 * x).sinh_cosh(), (t2 * x).sinh_cosh()
     over = 1 / (z1 - z2)
     return (h1 / t1 - h2 / t2) * over, (c1 - c2) * over, (t1 * h1 - t2 * h2) * over, (z1 * c1 - z2 * c2) * over
-
-
-def _transition_by_exponential(z_sum: Ball, z_product: Ball, x: Ball) -> tuple[Ball, Ball, Ball, Ball]:
-    """F'''' = (z1 + z2) F'' - z1 z2 F as a first-order system, with F'''(0) = 1."""
-    zero, one = flint.acb(0), flint.acb(x)
-    system = flint.acb_mat(
-        [
-            [zero, one, zero, zero],
-            [zero, zero, one, zero],
-            [zero, zero, zero, one],
-            [-z_product * x, zero, z_sum * x, zero],
-        ]
-    )
-    exponential = system.exp()
-    return tuple(exponential[row, 3] for row in range(4))  # type: ignore[return-value]
 
 
 class State:

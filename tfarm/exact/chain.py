@@ -27,7 +27,7 @@ from .coefficients import Condition, Inertia, double_double
 from .elements import Body, Drive, Element, Mark, Offset, Place, Segment, Spring
 
 SEGMENT, OFFSET, SPRING, BODY, MARK = range(5)
-KIND, WIDTH = 8, 12  # where a row of the kernel says what it is, after the eight numbers of a segment (`vector`)
+ROW_KIND, ROW_WIDTH = 8, 12  # where a row of the kernel says what it is, after the numbers of a segment (`vector`)
 TO_W, TO_M, TO_Q = 9, 10, 11  # from the chain's units to the segment's own
 TIP, OF_ANGLE, OF_MOMENT = 0, 6, 10  # of the vector of ends: six numbers of the payload, A_0..A_3, B_0 and B_1
 
@@ -143,8 +143,8 @@ class Layout:
 
     @cached_property
     def rows(self) -> NDArray[np.float64]:
-        """The elements, which balls have no use for (elements, `WIDTH`)."""
-        return np.array([row_of(each) for each in self.elements]).reshape(-1, WIDTH)
+        """The elements, which balls have no use for (elements, `ROW_WIDTH`)."""
+        return np.array([row_of(each) for each in self.elements]).reshape(-1, ROW_WIDTH)
 
     @cached_property
     def ends(self) -> NDArray[np.float64]:
@@ -212,4 +212,4 @@ def row_of(element: Element) -> list[float]:
         case Mark():
             numbers = [float(element.number)]
     kind = {Offset: OFFSET, Spring: SPRING, Body: BODY, Mark: MARK}[type(element)]
-    return [*numbers, *[0.0] * (KIND - len(numbers)), kind, 0.0, 0.0, 0.0]
+    return [*numbers, *[0.0] * (ROW_KIND - len(numbers)), kind, 0.0, 0.0, 0.0]

@@ -17,14 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .axis import half_waves, real_functions
-from .chain import BODY, KIND, OF_ANGLE, OF_MOMENT, OFFSET, SEGMENT, SPRING, TO_M, TO_Q, TO_W, Layout
+from .chain import BODY, OF_ANGLE, OF_MOMENT, OFFSET, ROW_KIND, SEGMENT, SPRING, TO_M, TO_Q, TO_W, Layout
 from .closed_form import SERIES_RADIUS, transition_series
 from .compiled import compiled, inlined
 from .compound import across_rows, across_waves, end_plane, inside_body, inside_offset, inside_spring, transition_rows
 from .dispersion import dispersion
 from .vector import SIGMA, A, B, G
 
-FREE = 12  # where the vector of ends says how many motions the payload leaves the tip
+FREE_MOTIONS = 12  # where the vector of ends says how many motions the payload leaves the tip
 
 
 def counted(layout: Layout) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -46,20 +46,20 @@ def count_below(omega: float, rows: Any, ends: Any, plane: Any) -> int:
     S = -omega * omega
     p = end_plane(ends[0] + ends[1] * S, ends[2], ends[3] + ends[4] * S, ends[5])
     plane[0], plane[1], plane[2], plane[3], plane[4] = p
-    number, free = 0, int(ends[FREE])
+    number, free = 0, int(ends[FREE_MOTIONS])
     for i in range(len(rows)):
         row = rows[i]
-        if row[KIND] == SEGMENT:
+        if row[ROW_KIND] == SEGMENT:
             number = _joined(number, omega, row, plane, free)
             free = 2
-        elif row[KIND] == OFFSET:
+        elif row[ROW_KIND] == OFFSET:
             p = inside_offset(row[0], (plane[0], plane[1], plane[2], plane[3], plane[4]))
             plane[0], plane[1], plane[2], plane[3], plane[4] = p
-        elif row[KIND] == BODY:
+        elif row[ROW_KIND] == BODY:
             p = plane[0], plane[1], plane[2], plane[3], plane[4]
             p = inside_body(row[0] * S + row[2], row[1] * S + row[3], p)
             plane[0], plane[1], plane[2], plane[3], plane[4] = p
-        elif row[KIND] == SPRING:
+        elif row[ROW_KIND] == SPRING:
             p = inside_spring(row[0], row[1], (plane[0], plane[1], plane[2], plane[3], plane[4]))
             plane[0], plane[1], plane[2], plane[3], plane[4] = p
             number = _clamped(number, plane[0], 1)

@@ -5,7 +5,7 @@ Segments are crossed by their transition functions, entire in s^2/(1 + C s): no 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -84,10 +84,8 @@ class Sweep:
     def _inside(self, element: Element, p: Plane) -> Plane:
         match element:
             case Segment():
-                w, m, q = (self.exact(unit) for unit in element.units)
-                own = p[0] * w, p[1] * (w * m), p[2] * m, p[3] * q, p[4] * (m * q)
-                own = _across_rows(*self._transition(element), own)
-                return own[0] / w, own[1] / (w * m), own[2] / m, own[3] / q, own[4] / (m * q)
+                units = tuple(self.exact(unit) for unit in element.units)
+                return out_of_own(_across_rows(*self._transition(element), into_own(p, *units)), *units)
             case Offset():
                 return _inside_offset(self.exact(element.length), p)
             case Spring():
@@ -129,6 +127,16 @@ class Sweep:
             self.S * self.exact(body.mass) + self.exact(body.stiffness),
             self.S * self.exact(body.inertia) + self.exact(body.rotational_stiffness),
         )
+
+
+def into_own(p: Plane, w: Any, m: Any, q: Any) -> Plane:
+    """A plane in a segment's own units, which W, M and Q are multiplied by for it (`Segment.units`)."""
+    return p[0] * w, p[1] * (w * m), p[2] * m, p[3] * q, p[4] * (m * q)
+
+
+def out_of_own(p: Sequence[Any], w: Any, m: Any, q: Any) -> Plane:
+    """The plane in the chain's units again."""
+    return p[0] / w, p[1] / (w * m), p[2] / m, p[3] / q, p[4] / (m * q)
 
 
 def drive_of(drive: Drive, s: Any, theta: Any, M: Any, number: Callable[[Any], Any] = rational) -> Any:

@@ -23,12 +23,12 @@ from .sweep import fill_free
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 
-CIRCLE = np.exp(2j * np.pi * np.arange(16) / 16)
-NEAR = 0.3  # radius of a circle for a slope, of |s| over the phase of all waves: the 16th Taylor term is below 1e-17
-CLEAR = 0.1  # of the way to a -1/C
+SLOPE_CIRCLE = np.exp(2j * np.pi * np.arange(16) / 16)
+SLOPE_RADIUS = 0.3  # of that circle, of |s| over the phase of all waves: the 16th Taylor term is below 1e-17
+CLEAR_OF_SINGULAR = 0.1  # of the way to a -1/C: its radius at most
 SERIES_BITS = 512  # of the power series at s = 0, whose coefficients are sums of small differences
-NOTHING = 1e-80  # a coefficient below this share of the first is a zero that balls cannot know
-ORDER = 8  # of the power series: the drive begins at s^2 at most
+KNOWN_ZERO = 1e-80  # a coefficient below this share of the first is a zero that balls cannot know
+SERIES_ORDER = 8  # of the power series: the drive begins at s^2 at most
 
 
 class Reading(NamedTuple):
@@ -88,7 +88,11 @@ def reading_of(chain: Chain, wanted: Output, x: float) -> Reading:
     }
     theta = {"Y": -(chain.radius + share), "Phi": Fraction(-1), "theta": Fraction(1)}
     if wanted.quantity == "current":
-        return Reading(None, (0, 0, 0, 0), Fraction(1), wanted.power, False, _current_unit(chain), True)
+        if not chain.drive.per_ampere or not chain.drive.turns:
+            remedy = "needs a [motor] and another input than hub_angle, which says nothing of the current"
+            raise ParameterError(key="output", value="motor_current", remedy=remedy)
+        amperes = chain.EI / chain.length / chain.drive.per_ampere / chain.input_unit  # per torque without dimensions
+        return Reading(None, (0, 0, 0, 0), Fraction(1), wanted.power, False, amperes, True)
     place = None if wanted.quantity == "theta" else Place(share, wanted.side)
     if wanted.place == "root" and wanted.gauge:
         place = chain.gauge
@@ -97,14 +101,6 @@ def reading_of(chain: Chain, wanted: Output, x: float) -> Reading:
     state = weights.get(wanted.quantity, (0, 0, 0, 1)) if place else (0, 0, 0, 0)
     unit = _strain_unit(chain, place) if wanted.quantity == "strain" and place else unit_scale(wanted, chain)
     return Reading(place, state, theta.get(wanted.quantity, Fraction(0)), wanted.power, wanted.gauge, unit)
-
-
-def _current_unit(chain: Chain) -> Fraction:
-    """Current [A] per torque without dimensions and unit of the input."""
-    if not chain.drive.per_ampere or not chain.drive.turns:
-        remedy = "needs a [motor] and another input than hub_angle, which says nothing of the current"
-        raise ParameterError(key="output", value="motor_current", remedy=remedy)
-    return chain.EI / chain.length / chain.drive.per_ampere / chain.input_unit
 
 
 def _strain_unit(chain: Chain, place: Place) -> Fraction:
@@ -152,11 +148,11 @@ def free_slopes(chain: Chain, wanted: Sequence[Output], s: Complex, x: float) ->
     """The free response and its derivative at s (1-D), by Cauchy's integral on a circle that is right to rounding."""
     those = readings(chain, tuple(wanted), x)
     here = _free(those, s)
-    radius = NEAR * np.maximum(abs(s), 1e-150) / np.maximum(1.0, abs(here.scale))
+    radius = SLOPE_RADIUS * np.maximum(abs(s), 1e-150) / np.maximum(1.0, abs(here.scale))
     for C in {each.damping for each in chain.segments if each.damping}:
-        radius = np.minimum(radius, CLEAR * abs(s + 1.0 / C))
-    around = _free(those, (s[:, None] + radius[:, None] * CIRCLE).ravel())
-    factor = np.exp(around.scale.reshape(-1, CIRCLE.size) - here.scale[:, None]) / CIRCLE / radius[:, None]
+        radius = np.minimum(radius, CLEAR_OF_SINGULAR * abs(s + 1.0 / C))
+    around = _free(those, (s[:, None] + radius[:, None] * SLOPE_CIRCLE).ravel())
+    factor = np.exp(around.scale.reshape(-1, SLOPE_CIRCLE.size) - here.scale[:, None]) / SLOPE_CIRCLE / radius[:, None]
     drive = (around.drive.reshape(factor.shape) * factor).mean(axis=1)
     outputs = (around.outputs.reshape(-1, *factor.shape) * factor).mean(axis=2)
     return here, Free(drive, outputs, here.scale, here.lost)
@@ -237,7 +233,7 @@ def expansions(chain: Chain, wanted: Sequence[Output], x: float) -> list[tuple[f
     return [(each[0], each[1], each[2], each[3]) for each in series_at_zero(chain, wanted, x)]
 
 
-def series_at_zero(chain: Chain, wanted: Sequence[Output], x: float, terms: int = ORDER) -> list[list[float]]:
+def series_at_zero(chain: Chain, wanted: Sequence[Output], x: float, terms: int = SERIES_ORDER) -> list[list[float]]:
     """Coefficients from s^-2 on in each output's expansion at s = 0, `terms` less two of them at least."""
     with precision(SERIES_BITS):
         s = Jet([rational(0), rational(1), *[rational(0)] * (terms - 2)])
@@ -254,7 +250,7 @@ def series_at_zero(chain: Chain, wanted: Sequence[Output], x: float, terms: int 
 def order_at_zero(chain: Chain, wanted: Output | None, x: float = 0.0) -> int:
     """How often an output of the free response vanishes at s = 0; the drive itself for None."""
     with precision(SERIES_BITS):
-        s = Jet([rational(0), rational(1), *[rational(0)] * (ORDER - 2)])
+        s = Jet([rational(0), rational(1), *[rational(0)] * (SERIES_ORDER - 2)])
         state = ChainState(chain, s, slow=True)
         series = _cleared(state.input if wanted is None else state.numerator(wanted, x))
     return next(n for n, coefficient in enumerate(series.c) if coefficient != 0)
@@ -265,5 +261,5 @@ def _cleared(jet: Jet) -> Jet:
     sizes = [abs(rational(0) + c) for c in jet.c]
     largest = max(float(size.mid()) for size in sizes)
     return Jet(
-        [rational(0) if float(size.mid()) < NOTHING * largest else c for size, c in zip(sizes, jet.c, strict=True)]
+        [rational(0) if float(size.mid()) < KNOWN_ZERO * largest else c for size, c in zip(sizes, jet.c, strict=True)]
     )

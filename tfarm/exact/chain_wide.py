@@ -15,7 +15,7 @@ import flint
 
 from .balls import Ball, rational
 from .chain import Chain
-from .chain_balls import Sweep, drive_of
+from .chain_balls import Sweep, drive_of, into_own, out_of_own
 from .chain_values import readings
 from .compiled import plain
 from .compound import Plane, Row, across_waves, transition_rows
@@ -27,8 +27,8 @@ Waves = Callable[[Segment, Series, Series], tuple[tuple[Series, ...], tuple[Seri
 
 _across_waves, _transition_rows = plain(across_waves), plain(transition_rows)
 
-SLOW = 6.0  # |z1| + |z2| below which a segment is crossed by power series
-SERIES_TERMS = 40  # of them: of arguments up to twice that the tail is below 1e-60
+SLOW_WAVES = 6.0  # |z1| + |z2| below which a segment is crossed by power series
+WIDE_TERMS = 40  # of them: of arguments up to twice that the tail is below 1e-60
 
 
 class InseparableError(Exception):
@@ -45,8 +45,7 @@ class WideSweep(Sweep):
     def _inside(self, element: Element, p: Plane) -> Plane:
         if not isinstance(element, Segment) or self._is_slow(element):
             return super()._inside(element, p)
-        w, m, q = (rational(unit) for unit in element.units)
-        own = p[0] * w, p[1] * (w * m), p[2] * m, p[3] * q, p[4] * (m * q)
+        units = tuple(rational(unit) for unit in element.units)
         a, b, g = (rational(number) for number in element[:3])
         S, d = self.S, self.s * rational(element.damping) + 1
         pair = self._waves(element, S, d)
@@ -57,14 +56,13 @@ class WideSweep(Sweep):
         unit = gap * gap * d * S * g
         if unit[0].contains(0):
             raise InseparableError
-        own = _across_waves(*one[:5], *two[:5], S * g, d, S * (a / d - b), own)
+        inner = _across_waves(*one[:5], *two[:5], S * g, d, S * (a / d - b), into_own(p, *units))
         self.phase = self.phase + one[5] + two[5]
-        own = tuple(part / unit for part in own)
-        return own[0] / w, own[1] / (w * m), own[2] / m, own[3] / q, own[4] / (m * q)
+        return out_of_own([part / unit for part in inner], *units)
 
     def _is_slow(self, segment: Segment) -> bool:
         z_sum, z_product = self._sums(segment)
-        return bool(abs(z_sum[0]).mid() + 2 * abs(z_product[0]).mid().sqrt() < SLOW)
+        return bool(abs(z_sum[0]).mid() + 2 * abs(z_product[0]).mid().sqrt() < SLOW_WAVES)
 
     def _sums(self, segment: Segment) -> tuple[Series, Series]:
         a, b, g = (rational(number) for number in segment[:3])
@@ -85,15 +83,15 @@ class WideSweep(Sweep):
         q = _size(z_sum) + _size(z_product).sqrt()
         h, before, sums = 0 * z_sum + 1, 0 * z_sum, [0 * z_sum] * 4
         factorial = Fraction(1)
-        for n in range(SERIES_TERMS):
+        for n in range(WIDE_TERMS):
             factorial = factorial / max(1, (2 * n) * (2 * n - 1))  # 1/(2 n)!
             terms = [factorial]
             for shift in (1, 2, 3):
                 terms.append(terms[-1] / (2 * n + shift))
             sums = [total + h * rational(term) for total, term in zip(sums, reversed(terms), strict=True)]
             h, before = z_sum * h - z_product * before, h
-        tail = (SERIES_TERMS + 1) * q**SERIES_TERMS * rational(Fraction(2, math.factorial(2 * SERIES_TERMS)))
-        if not q < SERIES_TERMS**2:  # then each term is less than half of the one before
+        tail = (WIDE_TERMS + 1) * q**WIDE_TERMS * rational(Fraction(2, math.factorial(2 * WIDE_TERMS)))
+        if not q < WIDE_TERMS**2:  # then each term is less than half of the one before
             raise InseparableError
         ball = flint.acb(flint.arb(0, tail.upper()), flint.arb(0, tail.upper()))
         terms_kept = z_sum.prec

@@ -28,18 +28,18 @@ from .compiled import compiled, inlined, plain
 from .dispersion import quotient, reciprocal
 from .free import free_response
 from .jets import Jet
-from .outputs import OUTPUTS, Output, unit_scale
+from .outputs import OUTPUTS, unit_scale
 from .system import System
-from .vector import DAMPING, GAIN, HUB, HUB_FORCE, HUB_INERTIA
+from .vector import DAMPING, HUB_FORCE, HUB_INERTIA, HUB_REST, TORQUE_DIVISOR
 from .waves import free_ends
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
 
 Gains = tuple[Fraction, ...]  # of a law without dimensions, in the order of `GAINS`, exact
-OPEN: Gains = (Fraction(0),) * len(GAINS)
+NO_GAINS: Gains = (Fraction(0),) * len(GAINS)
 FED = tuple(OUTPUTS[gain.output] for gain in GAINS)
-STEP = 1e-6  # of |s|, or of the way to -1/C, for differences
+DIFFERENCE_STEP = 1e-6  # of |s|, or of the way to -1/C, for differences
 
 
 def unit_gains(k: System) -> Gains:
@@ -96,11 +96,14 @@ class LoopParts(NamedTuple):
     scale: Complex
 
 
-def characteristic(k: System, s: Complex, gains: Gains = OPEN, at_zero: int = 0) -> Analytic:
+def characteristic(k: System, s: Complex, gains: Gains = NO_GAINS, at_zero: int = 0) -> Analytic:
     """D(s)/s^at_zero and its derivative at s (1-D, complex), in float64."""
     if isinstance(k, Chain):
-        here, slopes = free_slopes(k, _fed_back(gains), s, 0.0)
-        value, slope = (part.drive + _weighted(k, gains, part.outputs) for part in (here, slopes))
+        used = [each for each, gain in zip(FED, gains, strict=True) if gain]
+        here, slopes = free_slopes(k, used, s, 0.0)
+        units = [float(gain / unit) for gain, unit in zip(gains, unit_gains(k), strict=True) if gain]  # outputs are SI
+        both = (here, slopes)
+        value, slope = (each.drive + np.tensordot(units, each.outputs, 1) if units else each.drive for each in both)
         return deflated(value, slope, here.scale, s, at_zero)
     free, at = free_response(k, s), Jet.variable(s, 1)
     fed_back = NUMERATORS(at, 1.0 / (1.0 + k.damping * at), free.theta, free.M)
@@ -117,7 +120,7 @@ def deflated(value: Complex, slope: Complex, scale: Complex, s: Complex, at_zero
     return Analytic(value, slope, scale)
 
 
-def quick_characteristic(k: System, s: Complex, gains: Gains = OPEN, at_zero: int = 0) -> Analytic:
+def quick_characteristic(k: System, s: Complex, gains: Gains = NO_GAINS, at_zero: int = 0) -> Analytic:
     """The same with slopes from differences, right to about 1e-8: thirty times as fast for a hundred points."""
     return quick_characteristics(k, s, np.array([[float(gain)] for gain in gains]), at_zero)
 
@@ -125,7 +128,14 @@ def quick_characteristic(k: System, s: Complex, gains: Gains = OPEN, at_zero: in
 def quick_characteristics(k: System, s: Complex, rows: Real, at_zero: int = 0) -> Analytic:
     """`quick_characteristic` with gains of their own at each point: rows (gains, n) or (gains, 1), dimensionless."""
     if isinstance(k, Chain):
-        return _quick(k, s, rows, at_zero)
+        s = np.asarray(s, dtype=complex)
+        h = difference_steps(k, s)
+        at = np.array([s, s + h, s - h])
+        parts = loop_parts(k, at)
+        values = parts.drive + (rows[:, None, :] * parts.numerators).sum(axis=0)
+        values = values / np.where(at == 0, 1e-100, at) ** at_zero
+        up, down = values[1:] * np.exp(parts.scale[1:] - parts.scale[0])
+        return Analytic(values[0], (up - down) / (2.0 * h), parts.scale[0])
     found = np.empty((3, s.size), complex)
     s, rows = np.ascontiguousarray(s, dtype=complex), np.ascontiguousarray(rows, dtype=float)
     fill_characteristics(s, k.kernel, rows, at_zero, found)
@@ -137,27 +147,10 @@ def float_units(k: System) -> Real:
     return np.array([[float(unit)] for unit in unit_gains(k)])
 
 
-def _fed_back(gains: Gains) -> tuple[Output, ...]:
-    """What gains other than 0 multiply."""
-    return tuple(each for each, gain in zip(FED, gains, strict=True) if gain)
-
-
-def _weighted(k: Chain, gains: Gains, outputs: Complex) -> Complex:
-    """gains . numerators of the outputs of `_fed_back`, which come in SI."""
-    units = [float(gain / unit) for gain, unit in zip(gains, unit_gains(k), strict=True) if gain]
-    return np.asarray(np.tensordot(units, outputs, 1)) if units else np.zeros(outputs.shape[1:], complex)
-
-
-def _quick(k: Chain, s: Complex, rows: Real, at_zero: int) -> Analytic:
-    """`quick_characteristics` of a chain: the slope from values at s +- h."""
-    s = np.asarray(s, dtype=complex)
-    near = np.min([np.ones(s.size), *(abs(1.0 - s / each) for each in k.singular)], axis=0)
-    h = STEP * np.maximum(abs(s) * near, 1e-300)
-    parts = loop_parts(k, np.array([s, s + h, s - h]))
-    values = parts.drive + (rows[:, None, :] * parts.numerators).sum(axis=0)
-    values = values / np.where((at := np.array([s, s + h, s - h])) == 0, 1e-100, at) ** at_zero
-    up, down = values[1:] * np.exp(parts.scale[1:] - parts.scale[0])
-    return Analytic(values[0], (up - down) / (2.0 * h), parts.scale[0])
+def difference_steps(k: System, s: Complex) -> Real:
+    """h [1/s] for a slope at s from values at s +- h: a share of |s|, or of the way to a -1/C."""
+    near = np.min([np.ones(s.shape), *(abs(1.0 - s / each) for each in k.singular)], axis=0)
+    return np.asarray(DIFFERENCE_STEP * np.maximum(abs(s) * near, 1e-300))
 
 
 @compiled
@@ -166,7 +159,7 @@ def fill_characteristics(s: Any, k: Any, rows: Any, at_zero: int, found: Any) ->
     values, scales = np.empty(3, np.complex128), np.empty(3, np.complex128)
     for i in range(s.size):
         law = i if rows.shape[1] > 1 else 0
-        h = STEP * max(abs(s[i]) * min(1.0, abs(1.0 + k[DAMPING] * s[i])), 1e-300)
+        h = DIFFERENCE_STEP * max(abs(s[i]) * min(1.0, abs(1.0 + k[DAMPING] * s[i])), 1e-300)
         for j in range(3):
             at = s[i] + h * (j - 3 * (j // 2))
             value, scales[j], fed_back = parts_at(at, k)
@@ -204,11 +197,11 @@ def fill_loop_parts(s: Any, k: Any, parts: Any) -> None:
 def parts_at(s: complex, k: Any) -> Any:
     """Drive, scale and the numerators at one s."""
     theta, M0, scale = free_ends(s, k)
-    drive = ((k[HUB] + k[HUB_INERTIA] * s * s) * theta - k[HUB_FORCE] * M0) / k[GAIN]
+    drive = ((k[HUB_REST] + k[HUB_INERTIA] * s * s) * theta - k[HUB_FORCE] * M0) / k[TORQUE_DIVISOR]
     return drive, scale, numerators(s, reciprocal(1.0 + k[DAMPING] * s), theta, M0)
 
 
-def zeros_at_origin(k: System, gains: Sequence[Fraction | float] = OPEN) -> int:
+def zeros_at_origin(k: System, gains: Sequence[Fraction | float] = NO_GAINS) -> int:
     """How often D vanishes at s = 0: twice where the whole arm turns freely, once where the hub's rate is fed back.
 
     Not where its angle is.  (A third time under the moment's gain J/(J - I_h) alone, where gauge and inertia cancel:

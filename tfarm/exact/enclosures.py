@@ -13,7 +13,7 @@ from .chain_values import ChainState
 from .outputs import Output
 from .system import System
 
-MOST_BITS = 1 << 18
+MOST_ENCLOSURE_BITS = 1 << 18  # of working precision: at a pole no number of them is enough
 
 
 def state_of(k: System, s: Ball) -> State | ChainState:
@@ -24,7 +24,7 @@ def state_of(k: System, s: Ball) -> State | ChainState:
 def enclose(k: System, wanted: Output, s: complex, *, bits: int, x: float = 0.0) -> Ball:
     """A ball around the output at s whose relative radius is below 2^-bits.
 
-    Raises CertificationError where no precision up to `MOST_BITS` gives one: at a pole, or at an exact zero.
+    Raises CertificationError where no precision up to `MOST_ENCLOSURE_BITS` gives one: at a pole, or at an exact zero.
     """
     for working in precisions(bits):
         with precision(working):
@@ -53,31 +53,22 @@ def slope(k: System, wanted: Output, s: complex, *, bits: int = 60, x: float = 0
 def decimals(k: System, wanted: Output, s: complex, digits: int, x: float = 0.0) -> tuple[str, str]:
     """Real and imaginary part to `digits` significant right digits each ("0" where it vanishes identically).
 
-    On the imaginary axis at C = 0, and for real s, one of the two parts is exactly zero.
+    By symmetry G is real for real s, and without losses a function of s^2: then one of the two parts is exactly zero.
     """
+    vanish = False, s.imag == 0  # of the real and of the imaginary part
+    if s.real == 0 != s.imag and k.is_real_on_axis:
+        vanish = wanted.power % 2 == 1, wanted.power % 2 == 0
     for working in precisions(4 * digits):
         with precision(working):
             state = state_of(k, point(s))
             if not state.determines(wanted, x):
                 continue
             value = state.value(wanted, x)
-            known_zero = _vanishing_parts(k, wanted, s)
-            texts = [
-                "0.0" if zero else _decimal(part, digits)
-                for zero, part in zip(known_zero, (value.real, value.imag), strict=True)
-            ]
+            parts = zip(vanish, (value.real, value.imag), strict=True)
+            texts = ["0.0" if is_zero else _decimal(part, digits) for is_zero, part in parts]
             if None not in texts:
                 return str(texts[0]), str(texts[1])
     raise CertificationError(f"no {digits} digits at s = {s:g} 1/s: it is a pole or a zero, or too close to one")
-
-
-def _vanishing_parts(k: System, wanted: Output, s: complex) -> tuple[bool, bool]:
-    """Whether the real and the imaginary part vanish by symmetry: G is real for real s, and without losses in s^2."""
-    if s.imag == 0:
-        return False, True
-    if s.real == 0 and k.is_real_on_axis:
-        return wanted.power % 2 == 1, wanted.power % 2 == 0
-    return False, False
 
 
 def _decimal(part: Ball, digits: int) -> str | None:
@@ -92,6 +83,6 @@ def _decimal(part: Ball, digits: int) -> str | None:
 def precisions(bits: int) -> Iterator[int]:
     """Working precisions worth trying for so many right bits, each twice the one before."""
     working = 2 * bits + 64
-    while working < MOST_BITS:
+    while working < MOST_ENCLOSURE_BITS:
         yield working
         working *= 2

@@ -26,7 +26,7 @@ from .closed_form import (
 )
 from .coefficients import Coefficients
 from .compiled import plain
-from .vector import HUB, TIP_MASS
+from .vector import HUB_REST, TIP_MASS
 from .waves import evaluate, separated
 
 Complex = NDArray[np.complexfloating[Any, Any]]
@@ -143,7 +143,7 @@ def free_root(k: Coefficients, S: Any, d: Any) -> tuple[Any, Any, Any]:
 
 def tip_condition(k: Coefficients, S: Any) -> Tip:
     """tip_mass, shear, tip_inertia and moment of the tip's conditions, as `closed_form.from_waves` takes them."""
-    ends = k.kernel[TIP_MASS:HUB]
+    ends = k.kernel[TIP_MASS:HUB_REST]
     return ends[0] + ends[1] * S, ends[2], ends[3] + ends[4] * S, ends[5]
 
 

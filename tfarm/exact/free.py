@@ -27,7 +27,7 @@ from .coefficients import Coefficients
 from .compiled import plain
 from .fields import Wave, tip_condition, waves
 from .jets import Jet
-from .vector import HUB
+from .vector import HUB_REST
 from .waves import PARALLEL
 
 Complex = NDArray[np.complexfloating[Any, Any]]
@@ -122,7 +122,7 @@ def _series(k: Coefficients, s: Jet) -> tuple[Jet, Jet, tuple[Jet, ...]]:
 
 def drive(k: Coefficients, S: Any, theta: Any, M0: Any) -> Any:
     """Torque of the free response (its hub angle where the hub is locked): the characteristic function."""
-    rest, inertia, force, gain = k.kernel[HUB:]
+    rest, inertia, force, gain = k.kernel[HUB_REST:]
     return ((rest + inertia * S) * theta - force * M0) / gain
 
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from tfarm.errors import ParameterError
 
 from .chain import Chain
-from .chain_balls import Sweep
+from .chain_balls import Sweep, into_own, out_of_own
 from .chain_values import Reading, laid_out
 from .closed_form import SERIES_RADIUS, even_functions, transition_series
 from .compiled import plain
@@ -223,7 +223,8 @@ class GradientSweep(Sweep):
             else:
                 f = self._beyond(each, f)
             if isinstance(each, Segment) and not self._slow[id(each)]:
-                scale = scale * _slower_scale(*self._waves[id(each)])
+                one, two = self._waves[id(each)]
+                scale = scale * np.where(one.t.real >= two.t.real, two.e, one.e)  # of the slower
         return found
 
     def _end(self, inertia: Any) -> tuple[Any, Any]:
@@ -235,25 +236,27 @@ class GradientSweep(Sweep):
     def _inside(self, element: Element, p: Plane) -> Plane:
         if not isinstance(element, Segment) or self._slow[id(element)]:
             return super()._inside(element, p)
-        w, m, q = element.units
-        own = p[0] * w, p[1] * (w * m), p[2] * m, p[3] * q, p[4] * (m * q)
         one, two, gS, d = self._separated(element)
-        v_sum = self.S * (element.a / d - element.b)
-        own = _across_waves(
+        v_sum, own = self.S * (element.a / d - element.b), into_own(p, *element.units)
+        inner = _across_waves(
             one.c, one.s, one.z, one.v, one.e, two.c, two.s, two.z, two.v, two.e, gS, d, v_sum, own
         )  # fmt: skip
         gap = one.z - two.z
         unit = 1.0 / (gS * d * gap * gap)
-        return own[0] * unit / w, own[1] * unit / (w * m), own[2] * unit / m, own[3] * unit / q, own[4] * unit / (m * q)
+        return out_of_own([part * unit for part in inner], *element.units)
 
     def _beyond(self, element: Element, f: Row) -> Row:
         if not isinstance(element, Segment) or self._slow[id(element)]:
             return super()._beyond(element, f)
         w, m, q = element.units
         one, two, gS, d = self._separated(element)
-        c1, s1, c2, s2 = _by_the_faster(one, two)
+        is_faster = one.t.real >= two.t.real  # c and s of both waves are taken by the scale of the faster
+        first = np.exp(np.where(is_faster, 0.0, one.t - two.t))
+        second = np.exp(np.where(is_faster, two.t - one.t, 0.0))
         own = f[0] / w, f[1], f[2] / m, f[3] / q
-        own = _row_across_waves(c1, s1, one.z, one.v, c2, s2, two.z, two.v, gS, d, own)
+        own = _row_across_waves(
+            one.c * first, one.s * first, one.z, one.v, two.c * second, two.s * second, two.z, two.v, gS, d, own
+        )
         unit = 1.0 / (gS * d * (one.z - two.z))
         return own[0] * unit * w, own[1] * unit, own[2] * unit * m, own[3] * unit * q
 
@@ -297,14 +300,3 @@ def _wave(z: Jet, bS: Jet) -> Wave:
     by_z = np.where(is_far, (c - s) / (2 * far), e * sinhc_slope(near))
     slope = z.c[1]
     return Wave(z, z - bS, Jet([c, s / 2 * slope]), Jet([s, by_z * slope]), e, t.c[0])
-
-
-def _by_the_faster(one: Wave, two: Wave) -> tuple[Jet, Jet, Jet, Jet]:
-    """c and s of both waves by the scale of the faster."""
-    gap = np.where(one.t.real >= two.t.real, two.t - one.t, 0.0)  # not 0 where it is the first
-    first, second = np.exp(np.where(one.t.real >= two.t.real, 0.0, one.t - two.t)), np.exp(gap)
-    return one.c * first, one.s * first, two.c * second, two.s * second
-
-
-def _slower_scale(one: Wave, two: Wave) -> Complex:
-    return np.where(one.t.real >= two.t.real, two.e, one.e)

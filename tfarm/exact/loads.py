@@ -20,7 +20,7 @@ from tfarm.errors import CertificationError, ParameterError
 
 from .balls import Ball, point, precision, rational
 from .chain import Chain
-from .chain_balls import Sweep
+from .chain_balls import Sweep, drive_of
 from .chain_values import Reading, reading_of
 from .compiled import plain
 from .compound import Plane, Row, met
@@ -29,8 +29,8 @@ from .enclosures import precisions
 from .outputs import Output
 
 _met = plain(met)
-KINDS = {"force": ("N", 3), "moment_pair": ("N m", 2)}  # unit, and which entry of (W, Psi, M, Q) jumps
-PATTERN = re.compile(r"(force|moment_pair)@([^,]+)(?:,([^,]+))?")
+LOAD_KINDS = {"force": ("N", 3), "moment_pair": ("N m", 2)}  # unit, and which entry of (W, Psi, M, Q) jumps
+LOAD_PATTERN = re.compile(r"(force|moment_pair)@([^,]+)(?:,([^,]+))?")
 
 
 class Load(NamedTuple):
@@ -45,7 +45,7 @@ class Load(NamedTuple):
     @property
     def unit(self) -> str:
         """N or N m."""
-        return KINDS[self.kind][0]
+        return LOAD_KINDS[self.kind][0]
 
 
 def is_load(text: str) -> bool:
@@ -55,7 +55,7 @@ def is_load(text: str) -> bool:
 
 def load_of(text: str, length: float) -> Load:
     """force@X or moment_pair@X1,X2, with X [m] from the clamp.  Raises ParameterError for anything else."""
-    found = PATTERN.fullmatch(text.replace(" ", ""))
+    found = LOAD_PATTERN.fullmatch(text.replace(" ", ""))
     remedy = "force@X or moment_pair@X1,X2, with X in m from the clamp, such as force@0.3"
     if not found or (found[1] == "force") == bool(found[3]):
         raise ParameterError(key="input", value=text, remedy=remedy)
@@ -90,7 +90,7 @@ def _value(chain: Chain, load: Load, wanted: Output, s: Ball, x: float) -> Ball 
         state = _Loaded(chain, s, Place(Fraction(share)), one.place)
         if state.balance.contains(0):
             return None
-        total += sign * state.read(one, KINDS[load.kind][1])
+        total += sign * state.read(one, LOAD_KINDS[load.kind][1])
     unit = (chain.length / chain.EI) * (chain.length if load.kind == "force" else 1)  # of the load, without dimensions
     return total * rational(one.unit * chain.input_unit * unit)
 
@@ -101,11 +101,9 @@ class _Loaded(Sweep):
     def __init__(self, chain: Chain, s: Ball, at: Place, read: Place | None) -> None:
         self.places = (at,) if read is None or read == at else (at, read)
         super().__init__(chain.at(self.places), s)
-        A, B = chain.drive.of_angle, chain.drive.of_moment
-        of_angle = ((s * rational(A[3]) + rational(A[2])) * s + rational(A[1])) * s + rational(A[0])
         zero, one = 0 * s, 1 + 0 * s
         self.f: Row = (one, zero, zero, zero)
-        self.g: Row = (zero, of_angle, -(s * rational(B[1]) + rational(B[0])), zero)
+        self.g: Row = (zero, drive_of(chain.drive, s, one, zero), drive_of(chain.drive, s, zero, one), zero)
         for each in reversed(self.layout.elements):
             if each == Mark(0):
                 break

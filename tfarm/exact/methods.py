@@ -26,7 +26,7 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 Method = Literal["closed-form", "balls", "appendix"]
 METHODS: tuple[Method, ...] = ("closed-form", "balls", "appendix")
 
-DIGITS = 17  # of the appendix: more than a float64 holds
+APPENDIX_DIGITS = 17  # of the appendix: more than a float64 holds
 
 
 def known_method(method: str) -> Method:
@@ -53,6 +53,6 @@ def slow_values(method: Method, arm: Arm, k: System, wanted: Sequence[Output], s
             raise ParameterError(key="output", value=each.name, remedy="the paper's appendix is not asked for it")
 
     def by_cramer(each: Output, at: complex) -> complex:
-        return complex(appendix.response(arm, each, at, DIGITS, x * arm.link.length))
+        return complex(appendix.response(arm, each, at, APPENDIX_DIGITS, x * arm.link.length))
 
     return np.array([[by_cramer(each, complex(at)) for at in s] for each in wanted])

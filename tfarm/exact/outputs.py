@@ -26,7 +26,7 @@ Place = Literal["root", "tip", "x"]
 Side = Literal["outer", "inner"]  # of a joint of two segments, or of what is attached there
 
 MOST_POWER = 4  # of s: rate, acceleration, jerk and its rate
-PLACES: Mapping[str, tuple[Place, ...]] = MappingProxyType({
+PLACES_OF: Mapping[str, tuple[Place, ...]] = MappingProxyType({
     "theta": ("root",),
     "M": ("root", "tip", "x"),
     "Q": ("root", "tip", "x"),
@@ -39,7 +39,7 @@ PLACES: Mapping[str, tuple[Place, ...]] = MappingProxyType({
     "current": ("root",),
 })  # fmt: skip
 _METRES, _RADIANS = dict.fromkeys(("W", "Y", "centre"), "m"), dict.fromkeys(("theta", "Phi", "Psi"), "rad")
-UNITS = MappingProxyType({**_METRES, **_RADIANS, "M": "N m", "Q": "N", "strain": "1", "current": "A"})
+QUANTITY_UNITS = MappingProxyType({**_METRES, **_RADIANS, "M": "N m", "Q": "N", "strain": "1", "current": "A"})
 
 
 class Units(Protocol):
@@ -82,8 +82,8 @@ class Output:
         if self.quantity not in get_args(Quantity):
             remedy = did_you_mean(str(self.quantity), get_args(Quantity))
             raise ParameterError(key="output.quantity", value=self.quantity, remedy=remedy)
-        if self.place not in PLACES[self.quantity]:
-            remedy = f"{self.quantity} is known at: {', '.join(PLACES[self.quantity])} ({self._elsewhere})"
+        if self.place not in PLACES_OF[self.quantity]:
+            remedy = f"{self.quantity} is known at: {', '.join(PLACES_OF[self.quantity])} ({self._elsewhere})"
             raise ParameterError(key="output.place", value=self.place, remedy=remedy)
         whole("output.power", self.power, 0, MOST_POWER, f"a power of s: a whole number from 0 to {MOST_POWER}")
         if not isinstance(self.gauge, bool) or (self.gauge and self.quantity not in ("M", "strain")):
@@ -115,7 +115,7 @@ class Output:
     @property
     def base(self) -> Output:
         """The same quantity without its power of s."""
-        return replace(self, power=0, unit=UNITS[self.quantity])
+        return replace(self, power=0, unit=QUANTITY_UNITS[self.quantity])
 
     def share(self, x: float) -> float:
         """Where it is, as a share of the length; x is that share for an output along the arm."""
@@ -148,9 +148,9 @@ class Output:
 
 def _unit(quantity: Quantity, power: int) -> str:
     """The SI unit of a quantity times s^power."""
-    if power and UNITS[quantity] == "1":
+    if power and QUANTITY_UNITS[quantity] == "1":
         return "1/s" if power == 1 else f"1/s^{power}"
-    return UNITS[quantity] + ("" if power == 0 else "/s" if power == 1 else f"/s^{power}")
+    return QUANTITY_UNITS[quantity] + ("" if power == 0 else "/s" if power == 1 else f"/s^{power}")
 
 
 OUTPUTS: Mapping[str, Output] = MappingProxyType({each.name: each for each in (

@@ -23,11 +23,11 @@ from .vector import DAMPING, SIGMA, A, B, G
 from .waves import PARALLEL, is_low, magnitude, wave_functions
 
 BLOCK = 32  # points a block: few, as single points fill one too; many, as each loop has its own beginning and end
-SQUARE, D, GS, Z1, V1, T1, DT1, Z2, V2, T2, DT2 = (BLOCK * j for j in range(11))
+S_SQUARED, D, GS, Z1, V1, T1, DT1, Z2, V2, T2, DT2 = (BLOCK * j for j in range(11))
 C1, S1, E1, C2, S2, E2 = (BLOCK * j for j in range(6))
 
-PLANE, ROW, NUMBERS, FUNCTIONS = (BLOCK * parts for parts in (5, 4, 11, 6))  # sizes of the flat buffers
-TINY = 1e-140  # |e^{-t}| below which a wave has no part in the other's
+PLANE_SIZE, ROW_SIZE, NUMBERS_SIZE, FUNCTIONS_SIZE = (BLOCK * parts for parts in (5, 4, 11, 6))  # of the flat buffers
+FADED = 1e-140  # |e^{-t}| below which a wave has no part in the other's
 
 
 class Kept(NamedTuple):
@@ -77,7 +77,7 @@ def _wave_numbers(points: Any, row: Any, numbers: Any) -> None:
     """`dispersion` at every point of a block."""
     for i in range(BLOCK):
         S, d, _, gS, z1, v1, t1, dt1, z2, v2, t2, dt2 = dispersion(points[i], row)
-        numbers[SQUARE + i], numbers[D + i], numbers[GS + i] = S, d, gS
+        numbers[S_SQUARED + i], numbers[D + i], numbers[GS + i] = S, d, gS
         numbers[Z1 + i], numbers[V1 + i], numbers[T1 + i], numbers[DT1 + i] = z1, v1, t1, dt1
         numbers[Z2 + i], numbers[V2 + i], numbers[T2 + i], numbers[DT2 + i] = z2, v2, t2, dt2
 
@@ -111,7 +111,7 @@ def _by_waves(row: Any, numbers: Any, functions: Any, plane: Any, inner: Any) ->
             times(plane[i], w), times(plane[BLOCK + i], wm), times(plane[2 * BLOCK + i], m),
             times(plane[3 * BLOCK + i], q), times(plane[4 * BLOCK + i], mq),
         )  # fmt: skip
-        S, d, gS = numbers[SQUARE + i], numbers[D + i], numbers[GS + i]
+        S, d, gS = numbers[S_SQUARED + i], numbers[D + i], numbers[GS + i]
         z1, z2 = numbers[Z1 + i], numbers[Z2 + i]
         v_sum = S * (times(reciprocal(d), row[A]) - row[B])
         p = across_waves(
@@ -189,10 +189,10 @@ def _fade(numbers: Any, functions: Any, faded: Any, scale: Any, low: Any) -> Non
         c1, s1, c2, s2 = functions[C1 + i], functions[S1 + i], functions[C2 + i], functions[S2 + i]
         e1, e2, t1, t2 = functions[E1 + i], functions[E2 + i], numbers[T1 + i], numbers[T2 + i]
         if t1.real >= t2.real:
-            ratio, left = e1 * reciprocal(e2) if magnitude(e2) > TINY else complex(0.0, 0.0), t2 + numbers[DT2 + i]
+            ratio, left = e1 * reciprocal(e2) if magnitude(e2) > FADED else complex(0.0, 0.0), t2 + numbers[DT2 + i]
             c2, s2 = c2 * ratio, s2 * ratio
         else:
-            ratio, left = e2 * reciprocal(e1) if magnitude(e1) > TINY else complex(0.0, 0.0), t1 + numbers[DT1 + i]
+            ratio, left = e2 * reciprocal(e1) if magnitude(e1) > FADED else complex(0.0, 0.0), t1 + numbers[DT1 + i]
             c1, s1 = c1 * ratio, s1 * ratio
         faded[i], faded[BLOCK + i], faded[2 * BLOCK + i], faded[3 * BLOCK + i] = c1, s1, c2, s2
         if not low[i]:

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .chain import KIND, MARK, OF_ANGLE, OF_MOMENT, OFFSET, SEGMENT, SPRING, TO_M
+from .chain import MARK, OF_ANGLE, OF_MOMENT, OFFSET, ROW_KIND, SEGMENT, SPRING, TO_M
 from .compiled import compiled, inlined
 from .compound import (
     beyond_body,
@@ -29,12 +29,12 @@ from .compound import (
     met,
 )
 from .dispersion import reciprocal
-from .pieces import BLOCK, FUNCTIONS, NUMBERS, PLANE, ROW, Kept, cross, cross_back, times
+from .pieces import BLOCK, FUNCTIONS_SIZE, NUMBERS_SIZE, PLANE_SIZE, ROW_SIZE, Kept, cross, cross_back, times
 from .waves import POLE, impedance, magnitude
 
 OVERFLOW, UNDERFLOW = 1e80, 1e-80  # a plane beyond is brought back to 1, by a power of two
 LN_2 = math.log(2.0)
-SMALL = 0.05  # an output below this share of its own terms has lost four bits: flagged
+SMALL_DIFFERENCE = 0.05  # an output below this share of its own terms has lost four bits: flagged
 
 
 class Work(NamedTuple):
@@ -60,22 +60,22 @@ def _work(rows: Any) -> Work:
     """Room for a chain."""
     marks = segments = 0
     for j in range(len(rows)):
-        marks += rows[j, KIND] == MARK
-        segments += rows[j, KIND] == SEGMENT
+        marks += rows[j, ROW_KIND] == MARK
+        segments += rows[j, ROW_KIND] == SEGMENT
     number = np.complex128
     kept = Kept(
         np.empty((segments, BLOCK), np.bool_),
-        np.empty((segments, NUMBERS), number),
-        np.empty((segments, FUNCTIONS), number),
-        np.empty((segments, ROW), number),
+        np.empty((segments, NUMBERS_SIZE), number),
+        np.empty((segments, FUNCTIONS_SIZE), number),
+        np.empty((segments, ROW_SIZE), number),
     )
     return Work(
-        np.empty((2, PLANE), number),
+        np.empty((2, PLANE_SIZE), number),
         np.empty(BLOCK, number),
         np.empty((len(rows), BLOCK), np.int64),
-        np.empty((marks, PLANE), number),
-        np.empty((2, ROW), number),
-        np.empty(ROW, number),
+        np.empty((marks, PLANE_SIZE), number),
+        np.empty((2, ROW_SIZE), number),
+        np.empty(ROW_SIZE, number),
         np.empty((marks, BLOCK), number),
         np.empty((marks, BLOCK), np.int64),
         kept,
@@ -90,11 +90,11 @@ def _sweep(points: Any, rows: Any, ends: Any, work: Work, lost: Any) -> None:
     scale[:], lost[:] = 0.0, False
     for j in range(len(rows)):
         row = rows[j]
-        if row[KIND] == SEGMENT:
+        if row[ROW_KIND] == SEGMENT:
             cross(points, row, plane, beyond, scale, lost, work.kept, number)
             plane[:] = beyond
             number += 1
-        elif row[KIND] == MARK:
+        elif row[ROW_KIND] == MARK:
             work.marked[int(row[0])] = plane
         else:
             _small(points, row, plane)
@@ -118,9 +118,9 @@ def _small(points: Any, row: Any, plane: Any) -> None:
     for i in range(BLOCK):
         s, S = points[i], points[i] * points[i]
         p = plane[i], plane[BLOCK + i], plane[2 * BLOCK + i], plane[3 * BLOCK + i], plane[4 * BLOCK + i]
-        if row[KIND] == OFFSET:
+        if row[ROW_KIND] == OFFSET:
             p = inside_offset(row[0], p)
-        elif row[KIND] == SPRING:
+        elif row[ROW_KIND] == SPRING:
             p = inside_spring(row[0] + row[2] * s, row[1] + 0.0 * s, p)
         else:
             p = inside_body(row[0] * S + row[2], row[1] * S + row[3], p)
@@ -161,11 +161,11 @@ def _go_back(points: Any, rows: Any, work: Work) -> None:
             return
         row = rows[j]
         shift -= work.powers[j]
-        if row[KIND] == SEGMENT:
+        if row[ROW_KIND] == SEGMENT:
             number -= 1
             cross_back(points, row, f, beyond, scale, work.faded, work.kept, number)
             f[:] = beyond
-        elif row[KIND] == MARK:
+        elif row[ROW_KIND] == MARK:
             left, mark = left - 1, int(row[0])
             work.scales[mark], work.shifts[mark] = scale, shift
             _meet(f, work.marked[mark])
@@ -181,9 +181,9 @@ def _small_back(points: Any, row: Any, f: Any) -> None:
     for i in range(BLOCK):
         s, S = points[i], points[i] * points[i]
         own = f[i], f[BLOCK + i], f[2 * BLOCK + i], f[3 * BLOCK + i]
-        if row[KIND] == OFFSET:
+        if row[ROW_KIND] == OFFSET:
             own = beyond_offset(row[0], own)
-        elif row[KIND] == SPRING:
+        elif row[ROW_KIND] == SPRING:
             own = beyond_spring(row[0] + row[2] * s, row[1] + 0.0 * s, own)
         else:
             own = beyond_body(row[0] * S + row[2], row[1] * S + row[3], own)
@@ -248,7 +248,7 @@ def _innermost(rows: Any) -> Any:
     """The row of the segment at the hub."""
     last = rows[0]
     for j in range(len(rows)):
-        if rows[j, KIND] == SEGMENT:
+        if rows[j, ROW_KIND] == SEGMENT:
             last = rows[j]
     return last
 
@@ -278,7 +278,7 @@ def _output(points: Any, want: Any, work: Work, value: Any, lost: Any) -> None:
             if scale[i] != 0.0 or shift[i]:
                 decay, turn = math.ldexp(math.exp(scale[i].real), shift[i]), scale[i].imag
                 at *= complex(decay * math.cos(turn), decay * math.sin(turn))
-            lost[i] = lost[i] or (of_theta != 0.0 and magnitude(value[i] + at) < SMALL * magnitude(value[i]))
+            lost[i] = lost[i] or (of_theta != 0.0 and magnitude(value[i] + at) < SMALL_DIFFERENCE * magnitude(value[i]))
             value[i] += at
     for _ in range(power):
         for i in range(BLOCK):

@@ -32,7 +32,11 @@ _FIELDS = {"Y": 0, "Phi": 1, "M": 2, "Q": 3}
 
 def kernel_table(k: System, wanted: Sequence[Output]) -> NDArray[np.float64]:
     """The outputs as `waves.evaluate` reads them: worth keeping between calls."""
-    return np.empty((0, 4)) if isinstance(k, Chain) else np.array([_row(k, each) for each in wanted])
+    if isinstance(k, Chain):
+        return np.empty((0, 4))
+    return np.array([
+        (_ENDS.get(each.quantity, 0), each.power, each.gauge, float(unit_scale(each, k))) for each in wanted
+    ])  # fmt: skip
 
 
 def evaluate_outputs(
@@ -64,10 +68,12 @@ def differentiate_outputs(k: System, wanted: Sequence[Output], s: Complex, x: fl
     if isinstance(k, Chain):
         return _of_chain(k, wanted, s, x)
     with np.errstate(under="ignore", invalid="ignore", divide="ignore"):
-        free = free_response(k, s)
+        free, at = free_response(k, s), Jet.variable(s, 1)
         for row, each in enumerate(wanted):
             if each.is_at_end:
-                values[row] = _ratio(k, each, Jet.variable(s, 1), free[_ENDS[each.quantity]], free.drive).c[1]
+                numerator = free[_ENDS[each.quantity]] * _power(at, each.power) * float(unit_scale(each, k))
+                ratio = numerator / free.drive
+                values[row] = (ratio / (1.0 + k.damping * at) if each.gauge else ratio).c[1]
     suspects = free.parallel | (s == 0) | _at_pole(free.drive, s)
     for row, each in enumerate(wanted):
         for i in np.nonzero(suspects | (not each.is_at_end))[0]:
@@ -140,10 +146,6 @@ def _of_chain(k: Chain, wanted: Sequence[Output], s: Complex, x: float) -> Compl
     return values
 
 
-def _row(k: Coefficients, wanted: Output) -> tuple[float, ...]:
-    return _ENDS.get(wanted.quantity, 0), wanted.power, wanted.gauge, float(unit_scale(wanted, k))
-
-
 def _along(k: Coefficients, wanted: Output, s: Complex, x: float) -> Complex:
     values = fields(k, s, x)[0][_FIELDS[wanted.quantity]] * float(unit_scale(wanted, k)) * s**wanted.power
     return values / (1.0 + k.damping * s) if wanted.gauge else values
@@ -155,11 +157,6 @@ def _power(s: Any, power: int) -> Any:
     for _ in range(power - 1):
         product = product * s
     return product
-
-
-def _ratio(k: Coefficients, wanted: Output, s: Jet, quantity: Jet, drive: Jet) -> Jet:
-    ratio = quantity * _power(s, wanted.power) * float(unit_scale(wanted, k)) / drive
-    return ratio / (1.0 + k.damping * s) if wanted.gauge else ratio
 
 
 def _at_pole(drive: Jet, s: Complex) -> NDArray[np.bool_]:
@@ -175,16 +172,15 @@ def _refuse_pole(k: System, wanted: Output, s: complex, x: float) -> None:
     if s == 0:
         if any(expansion_at_zero(k, wanted, x)[:2]):
             raise ParameterError(key="s", value=0, remedy="a pole: the arm turns as a rigid body there; choose s != 0")
-    elif _at_pole(_drive(k, np.array([s])), np.array([s]))[0]:
+        return
+    at = np.array([s])
+    if isinstance(k, Chain):
+        drive = Jet([part.drive for part in free_slopes(k, (), at, 0.0)])
+    else:
+        drive = free_response(k, at).drive
+    if _at_pole(drive, at)[0]:
         name = f"a natural frequency, {abs(s):.10g} rad/s" if s.real == 0 else f"an eigenvalue, {s:.10g} 1/s"
         raise ParameterError(key="s", value=s, remedy=f"a pole: {name}; the response is infinite there, move s")
-
-
-def _drive(k: System, s: Complex) -> Jet:
-    """The drive at s, and its slope."""
-    return (
-        Jet([part.drive for part in free_slopes(k, (), s, 0.0)]) if isinstance(k, Chain) else free_response(k, s).drive
-    )
 
 
 def _slope_with_care(k: System, wanted: Output, s: complex, x: float) -> complex:

@@ -6,4 +6,4 @@ what has inertia and what takes the force (see `Condition`); and by what the tor
 
 A, A_LOW, B, B_LOW, G, G_LOW, SIGMA, DAMPING = range(8)
 TIP_MASS, MASS_FORCE, TIP_INERTIA, TURN_FORCE = 8, 10, 11, 13  # rest + inertia s^2 begins at the first and the third
-HUB, HUB_INERTIA, HUB_FORCE, GAIN = range(14, 18)
+HUB_REST, HUB_INERTIA, HUB_FORCE, TORQUE_DIVISOR = range(14, 18)

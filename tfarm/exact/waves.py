@@ -24,9 +24,22 @@ import numpy as np
 from .closed_form import SERIES_RADIUS, Number, even_functions, from_transition, from_waves, transition_series
 from .compiled import compiled, inlined
 from .dispersion import dispersion, reciprocal
-from .vector import DAMPING, GAIN, HUB, HUB_FORCE, MASS_FORCE, SIGMA, TIP_INERTIA, TIP_MASS, TURN_FORCE, A, B, G
+from .vector import (
+    DAMPING,
+    HUB_FORCE,
+    HUB_REST,
+    MASS_FORCE,
+    SIGMA,
+    TIP_INERTIA,
+    TIP_MASS,
+    TORQUE_DIVISOR,
+    TURN_FORCE,
+    A,
+    B,
+    G,
+)
 
-BLOCK = 128  # points a block: its twenty work arrays stay in the first- and second-level cache
+WAVE_BLOCK = 128  # points a block: its twenty work arrays stay in the first- and second-level cache
 PARALLEL = 0.15  # |z_1 - z_2| below this share of |z_1| + |z_2|: flagged
 LIFT = 2.0**100  # W1 is held this much larger: it would underflow where s^2 W1 does not
 POLE = 1e-11  # torque below this share of its own terms: flagged, it may be a pole
@@ -53,8 +66,8 @@ def _end(k: Any, i: int, S: Number) -> Number:
 
 # Where the arrays of a block start in its flat buffers: at fixed distances, and never read and written in the same
 # loop, so that the compiler sees that nothing overlaps, and vectorises.
-_S, _D, _GS, _Z1, _V1, _T1, _DT1, _Z2, _V2, _T2, _DT2 = (BLOCK * j for j in range(11))
-_C1, _S1, _E1, _C2, _S2, _E2 = (BLOCK * j for j in range(6))
+_S, _D, _GS, _Z1, _V1, _T1, _DT1, _Z2, _V2, _T2, _DT2 = (WAVE_BLOCK * j for j in range(11))
+_C1, _S1, _E1, _C2, _S2, _E2 = (WAVE_BLOCK * j for j in range(6))
 
 
 @compiled
@@ -63,13 +76,13 @@ def evaluate(s: Any, k: Any, outputs: Any, values: Any, suspects: Any) -> None:
 
     outputs[o] = (which of theta, M0, Q0, W1, Y1; power of s; 1 to divide by 1 + C s; factor).
     """
-    points, chosen = np.empty(BLOCK, np.complex128), np.empty(BLOCK, np.int64)
-    numbers, functions = np.empty(11 * BLOCK, np.complex128), np.empty(6 * BLOCK, np.complex128)
-    states = np.empty(6 * BLOCK, np.complex128)
-    for first in range(0, s.size, BLOCK):
+    points, chosen = np.empty(WAVE_BLOCK, np.complex128), np.empty(WAVE_BLOCK, np.int64)
+    numbers, functions = np.empty(11 * WAVE_BLOCK, np.complex128), np.empty(6 * WAVE_BLOCK, np.complex128)
+    states = np.empty(6 * WAVE_BLOCK, np.complex128)
+    for first in range(0, s.size, WAVE_BLOCK):
         for low in (True, False):
             n = 0
-            for i in range(first, min(first + BLOCK, s.size)):
+            for i in range(first, min(first + WAVE_BLOCK, s.size)):
                 if is_low(s[i], k) == low:
                     chosen[n], points[n] = i, s[i]
                     n += 1
@@ -83,7 +96,7 @@ def evaluate(s: Any, k: Any, outputs: Any, values: Any, suspects: Any) -> None:
                 _all_wave_functions(numbers, functions)
                 _wave_states(numbers, functions, k, states)
             for o in range(len(outputs)):
-                start, power, gauge = BLOCK * int(outputs[o, 0]), outputs[o, 1], outputs[o, 2]
+                start, power, gauge = WAVE_BLOCK * int(outputs[o, 0]), outputs[o, 1], outputs[o, 2]
                 factor = outputs[o, 3] / LIFT if outputs[o, 0] == 3 else outputs[o, 3]
                 for i in range(n):
                     value = states[start + i]
@@ -95,7 +108,7 @@ def evaluate(s: Any, k: Any, outputs: Any, values: Any, suspects: Any) -> None:
                     for i in range(n):
                         values[o, chosen[i]] *= points[i]
             for i in range(n):
-                left = states[5 * BLOCK + i]
+                left = states[5 * WAVE_BLOCK + i]
                 suspects[chosen[i]] = not left.real > POLE * left.imag or (not low and _parallel(numbers, i))
 
 
@@ -122,7 +135,7 @@ def magnitude(z: complex) -> float:
 @compiled
 def _wave_numbers(points: Any, k: Any, numbers: Any) -> None:
     """`dispersion` at the first n points."""
-    for i in range(BLOCK):
+    for i in range(WAVE_BLOCK):
         S, d, _, gS, z1, v1, t1, dt1, z2, v2, t2, dt2 = dispersion(points[i], k)
         numbers[_S + i], numbers[_D + i], numbers[_GS + i] = S, d, gS
         numbers[_Z1 + i], numbers[_V1 + i], numbers[_T1 + i], numbers[_DT1 + i] = z1, v1, t1, dt1
@@ -132,7 +145,7 @@ def _wave_numbers(points: Any, k: Any, numbers: Any) -> None:
 @compiled
 def _all_wave_functions(numbers: Any, functions: Any) -> None:
     """The two complex exponentials a point: the only loop that calls a library."""
-    for i in range(BLOCK):
+    for i in range(WAVE_BLOCK):
         c1, s1, e1 = wave_functions(numbers[_Z1 + i], numbers[_T1 + i], numbers[_DT1 + i])
         c2, s2, e2 = wave_functions(numbers[_Z2 + i], numbers[_T2 + i], numbers[_DT2 + i])
         functions[_C1 + i], functions[_S1 + i], functions[_E1 + i] = c1, s1, e1
@@ -142,7 +155,7 @@ def _all_wave_functions(numbers: Any, functions: Any) -> None:
 @compiled
 def _wave_states(numbers: Any, functions: Any, k: Any, states: Any) -> None:
     """theta, M0, Q0, W1 and Y1 for a unit input, by the two waves."""
-    for i in range(BLOCK):
+    for i in range(WAVE_BLOCK):
         S = numbers[_S + i]
         theta, M0, Q0, W1 = from_waves(
             functions[_C1 + i], functions[_S1 + i], numbers[_Z1 + i], numbers[_V1 + i], functions[_E1 + i],
@@ -156,7 +169,7 @@ def _wave_states(numbers: Any, functions: Any, k: Any, states: Any) -> None:
 @compiled
 def _series_states(points: Any, k: Any, states: Any) -> None:
     """The same by the series of the transition functions, at low frequency."""
-    for i in range(BLOCK):
+    for i in range(WAVE_BLOCK):
         s = points[i]
         S, d = s * s, 1.0 + k[DAMPING] * s
         over_d = reciprocal(d)
@@ -175,14 +188,14 @@ def _store(
     i: int, states: Any, k: Any, S: complex, theta: complex, M0: complex, Q0: complex, W1: complex, Y1: complex
 ) -> None:
     """Divide the free response by its torque (hub angle where the hub is locked), and say what is left of that."""
-    turned, held = _end(k, HUB, S) * theta, k[HUB_FORCE] * M0
+    turned, held = _end(k, HUB_REST, S) * theta, k[HUB_FORCE] * M0
     u = turned - held
-    scale = k[GAIN] * reciprocal(u)
-    states[i], states[BLOCK + i], states[2 * BLOCK + i] = scale * theta, scale * M0, scale * Q0
-    states[3 * BLOCK + i], states[4 * BLOCK + i] = (LIFT * scale) * W1, scale * Y1
+    scale = k[TORQUE_DIVISOR] * reciprocal(u)
+    states[i], states[WAVE_BLOCK + i], states[2 * WAVE_BLOCK + i] = scale * theta, scale * M0, scale * Q0
+    states[3 * WAVE_BLOCK + i], states[4 * WAVE_BLOCK + i] = (LIFT * scale) * W1, scale * Y1
     waves = impedance(magnitude(S), k)  # with it, what u would be away from a pole
-    crossed = k[HUB] * magnitude(M0) / max(waves, 1.0) + k[HUB_FORCE] * magnitude(theta) * waves
-    states[5 * BLOCK + i] = complex(magnitude(u), magnitude(turned) + magnitude(held) + crossed)
+    crossed = k[HUB_REST] * magnitude(M0) / max(waves, 1.0) + k[HUB_FORCE] * magnitude(theta) * waves
+    states[5 * WAVE_BLOCK + i] = complex(magnitude(u), magnitude(turned) + magnitude(held) + crossed)
 
 
 @inlined

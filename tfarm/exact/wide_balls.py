@@ -21,7 +21,7 @@ from .balls import Ball, State, point, rational
 from .chain import Chain
 from .chain_values import ChainState
 from .chain_wide import swept
-from .characteristic import FED, NUMERATORS, OPEN, Gains, unit_gains
+from .characteristic import FED, NO_GAINS, NUMERATORS, Gains, unit_gains
 from .closed_form import from_waves
 from .coefficients import Coefficients, Condition
 from .compiled import plain
@@ -32,11 +32,11 @@ Series = Any  # flint.acb_series, which comes without types
 
 _separated = plain(from_waves)
 
-LONG = 0.3  # |z| below which a wave is not separated from the others
-TERMS = 4  # of the Taylor series
+LONG_WAVE = 0.3  # |z| below which a wave is not separated from the others
+TAYLOR_TERMS = 4  # of D over a piece of a contour, the last of them over the wide ball
 
 
-def characteristic_ball(k: System, s: Ball, gains: Gains = OPEN) -> Ball:
+def characteristic_ball(k: System, s: Ball, gains: Gains = NO_GAINS) -> Ball:
     """D(s) enclosed, at the working precision: for points, at any s."""
     if isinstance(k, Chain):
         chain = ChainState(k, s)
@@ -45,22 +45,22 @@ def characteristic_ball(k: System, s: Ball, gains: Gains = OPEN) -> Ball:
     return _closed(k, s, state.theta, state.M0, gains)
 
 
-def characteristic_over(k: System, s: Ball, gains: Gains = OPEN) -> Ball:
+def characteristic_over(k: System, s: Ball, gains: Gains = NO_GAINS) -> Ball:
     """D enclosed over the wide ball s, but for a factor that depends on its middle alone and is positive."""
     middle = s.mid()
-    here = _by_waves(k, middle, gains, None, LONG)
+    here = _by_waves(k, middle, gains, None, LONG_WAVE)
     if here is not None and s.real.is_exact() and s.imag.is_exact():
         return here[0][0] * flint.acb(0, here[1].imag).exp()
-    there = None if here is None else _by_waves(k, s, gains, here[1], LONG)
+    there = None if here is None else _by_waves(k, s, gains, here[1], LONG_WAVE)
     if here is None or there is None:
         return characteristic_ball(k, s, gains)
     away, value = s - middle, flint.acb(0)
-    for order in range(TERMS - 1, -1, -1):
-        value = value * away + (there if order == TERMS - 1 else here)[0][order]
+    for order in range(TAYLOR_TERMS - 1, -1, -1):
+        value = value * away + (there if order == TAYLOR_TERMS - 1 else here)[0][order]
     return value * flint.acb(0, here[1].imag).exp()
 
 
-def tangent(k: System, m: Ball, r: Ball, gains: Gains = OPEN) -> tuple[Ball, Ball, Ball] | None:
+def tangent(k: System, m: Ball, r: Ball, gains: Gains = NO_GAINS) -> tuple[Ball, Ball, Ball] | None:
     """D(m), D'(m) and D''/2 over the disc of radius r around m, apart from one factor; None where waves may be one."""
     here = _by_waves(k, m, gains, None, 0.0)
     disc = flint.acb(flint.arb(m.real.mid(), r), flint.arb(m.imag.mid(), r))
@@ -80,7 +80,7 @@ def _closed(k: Coefficients, s: Any, theta: Any, M0: Any, gains: Gains) -> Any:
 
 def _by_waves(k: System, at: Ball, gains: Gains, scale: Ball | None, shortest: float) -> tuple[Series, Ball] | None:
     """D e^{-scale} as a series around `at`, and scale (t1 + t2 there if none is given); None where waves may be one."""
-    s = flint.acb_series([at, 1], prec=TERMS)
+    s = flint.acb_series([at, 1], prec=TAYLOR_TERMS)
     if isinstance(k, Chain):
         return _by_segments(k, s, gains, scale, shortest)
     a, b, g, C = (rational(value) for value in (k.a, k.b, k.g, k.damping))

@@ -19,7 +19,7 @@ from tfarm.arm import INPUT_UNITS, Arm, must_be_arm
 from tfarm.arm.driving import cancelled
 from tfarm.arm.law import Law
 from tfarm.errors import ParameterError
-from tfarm.exact.characteristic import STEP, Analytic, LoopParts, deflated
+from tfarm.exact.characteristic import Analytic, LoopParts, deflated, difference_steps
 from tfarm.exact.system import System
 from tfarm.records import record
 from tfarm.response.signals import Signals
@@ -118,8 +118,7 @@ class LawLoop:
     def function(self, s: Complex) -> Analytic:
         """D/s^n, n = `zeros_at_origin`, with slopes from differences."""
         s = np.where(s == 0, NEAREST_TO_ORIGIN * first_frequency(self.arm), np.asarray(s, dtype=complex))
-        near = np.min([np.ones(s.shape), *(abs(1.0 - s / each) for each in self.k.singular)], axis=0)
-        h = STEP * np.maximum(abs(s) * near, 1e-300)
+        h = difference_steps(self.k, s)
         at = np.array([s, s + h, s - h])
         drive, fed_back, scale = self._parts(at)
         scale = scale - self.delay_of_waves * at

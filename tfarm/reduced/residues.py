@@ -21,7 +21,7 @@ from tfarm.exact.free import free_response
 from tfarm.exact.outputs import Output, unit_scale
 from tfarm.exact.system import System
 from tfarm.exact.values import evaluate_outputs, kernel_table
-from tfarm.exact.vector import GAIN, HUB
+from tfarm.exact.vector import HUB_REST, TORQUE_DIVISOR
 from tfarm.spectrum import Modes
 
 Real = NDArray[np.float64]
@@ -63,7 +63,7 @@ def end_residues(k: System, wanted: Sequence[Output], p: Complex, x: float = 0.0
         return _of_chain(k, wanted, p, x)
     with np.errstate(all="ignore"):
         free = free_response(k, p)
-        rest, inertia, force = k.kernel[HUB:GAIN]
+        rest, inertia, force = k.kernel[HUB_REST:TORQUE_DIVISOR]
         balance = rest + inertia * p * p  # balance theta = force M, and the larger side has lost digits
         heavy = abs(balance) > force
         theta = np.where(heavy, force * free.M.c[0] / np.where(heavy, balance, 1.0), free.theta.c[0])

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import Arm, Theory
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
-from tfarm.exact.characteristic import OPEN, Gains, quick_characteristic, zeros_at_origin
+from tfarm.exact.characteristic import NO_GAINS, Gains, quick_characteristic, zeros_at_origin
 from tfarm.exact.coefficients import Coefficients
 from tfarm.exact.system import System
 from tfarm.records import record
@@ -272,7 +272,7 @@ def _first_node(undamped: Modes, count: int, level: float) -> Node:
     return Node(share * level, polished(start, np.concatenate([single, node.zeros])))
 
 
-def member(k: System, gains: Gains = OPEN) -> Member:
+def member(k: System, gains: Gains = NO_GAINS) -> Member:
     """The characteristic function without its zeros at the origin, to be followed."""
     at_zero = zeros_at_origin(k, gains)
     singular = -1.0 / k.damping if k.damping else -np.inf

@@ -21,7 +21,7 @@ import numpy as np
 
 from tfarm.errors import CertificationError
 from tfarm.exact.balls import Ball, point, precision, rational
-from tfarm.exact.characteristic import OPEN, Gains
+from tfarm.exact.characteristic import NO_GAINS, Gains
 from tfarm.exact.system import System
 from tfarm.exact.wide_balls import characteristic_over, tangent
 
@@ -48,7 +48,7 @@ class Disc:
         return float(self.im) == 0
 
 
-def proven_count(k: System, box: Box, gains: Gains = OPEN) -> int:
+def proven_count(k: System, box: Box, gains: Gains = NO_GAINS) -> int:
     """How many zeros of D lie in a box symmetric about the real axis, with multiplicity, those at s = 0 included.
 
     Raises CertificationError where a zero is too near the contour, where it would take too many pieces, or -1/C is
@@ -90,7 +90,7 @@ def _turning(k: System, gains: Gains, a: Ball, b: Ball) -> Ball:
     return total
 
 
-def enclosed(k: System, near: complex, digits: int, gains: Gains = OPEN) -> Disc:
+def enclosed(k: System, near: complex, digits: int, gains: Gains = NO_GAINS) -> Disc:
     """A disc with one zero, its radius one unit in the last of `digits` significant digits of |s| or less.
 
     Raises CertificationError where no disc can be proven, around a double zero for instance.

@@ -15,7 +15,7 @@ from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exact.appendix import natural_frequency, roots_near
 from tfarm.exact.chain import Chain
 from tfarm.exact.coefficients import Coefficients
-from tfarm.exact.methods import DIGITS, Method, known_method
+from tfarm.exact.methods import APPENDIX_DIGITS, Method, known_method
 from tfarm.exact.system import System, shear_flexibility, system_of
 from tfarm.records import record
 
@@ -83,7 +83,7 @@ class Modes:
             flexible = [(float(lower) + float(upper)) / 2 for lower, upper in self.certify().brackets]
         elif self.theory == "timoshenko" and self.arm.is_uniform:
             flexible = [
-                float(natural_frequency(self.arm, float(omega), DIGITS))
+                float(natural_frequency(self.arm, float(omega), APPENDIX_DIGITS))
                 for omega in self.natural_frequency[self._rigid :]
             ]
         else:
