@@ -1,9 +1,9 @@
 """Do the tests of a room see a mistake?  python -m tests.mutants SIZE [SEED] [room ...]
 
 In each room SIZE places are drawn where an operator, a comparison or a number stands; one after the other is changed,
-in a copy of the project, and the room's own tests are run until one fails.  Survivors are printed, to be read: some
-change nothing that matters (a number of steps, a tolerance with room), the others want a test.  A change in `exact`
-costs the compilation of its kernels.
+in a copy of the project, and the room's own tests are run until one fails, those first that call the changed function.
+Survivors are printed, to be read: some change nothing that matters (a number of steps, a tolerance with room), the
+others want a test.  A change in `exact` costs the compilation of its kernels.
 """
 
 import ast
@@ -55,17 +55,20 @@ def mutant(path, number):
     return ast.unparse(tree), line, said
 
 
-def nearest_first(room, module):
-    """The room's files of tests, those named after the module before the others: a mistake is mostly seen there."""
-    files = sorted((ROOT / "tests" / room).rglob("test_*.py"))
-    return [str(file.relative_to(ROOT)) for file in sorted(files, key=lambda file: module not in file.stem)]
+def function_of(path, line):
+    """The innermost function that a line stands in: its file from the root and its first line, with its decorators."""
+    defined = [node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.FunctionDef)]
+    around = [node for node in defined if node.lineno <= line <= node.end_lineno]
+    inner = max(around, key=lambda node: node.lineno)
+    first = min(each.lineno for each in (inner, *inner.decorator_list))
+    return f"{path.parent.parent.name}/{path.parent.name}/{path.name}:{first}"
 
 
-def survives(copy, room, module):
-    """Whether the room's tests in the copy all pass."""
-    command = [sys.executable, "-m", "pytest", "-q", "-x", "-n", "0", "-p", "no:cacheprovider"]
-    command += nearest_first(room, module)
-    environment = os.environ | {"PYTHONPATH": str(copy), "OPENBLAS_NUM_THREADS": "1"}
+def tested(copy, room, **named):
+    """Whether the room's tests in the copy all pass; `named` are the variables of `tests.callers`."""
+    command = [sys.executable, "-m", "pytest", "-q", "-x", "-n", "0", "-p", "no:cacheprovider", "-p", "tests.callers"]
+    command.append(f"tests/{room}")
+    environment = os.environ | {"PYTHONPATH": str(copy), "OPENBLAS_NUM_THREADS": "1"} | named
     try:
         done = subprocess.run(command, cwd=copy, env=environment, capture_output=True, timeout=PATIENCE)
     except subprocess.TimeoutExpired:
@@ -73,20 +76,27 @@ def survives(copy, room, module):
     return done.returncode == 0
 
 
+def drawn(folder, size, rng):
+    """Places in the files of a room: pairs of a path and a number."""
+    every = [(path, n) for path in sorted(folder.glob("*.py")) for n in range(len(places(ast.parse(path.read_text()))))]
+    return rng.sample(every, min(size, len(every)))
+
+
 def survey(size, seed, rooms):
     """How many were killed in each room, and how many there were."""
     rng, tally = random.Random(seed), {}
     with tempfile.TemporaryDirectory() as folder:
-        copy = Path(folder) / "copy"
+        copy, calls = Path(folder) / "copy", str(Path(folder) / "calls.json")
         shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(".git", ".venv", "reports", ".mypy_cache"))
         for room in rooms:
-            files = sorted((copy / "tfarm" / room).glob("*.py"))
-            drawn = [(path, n) for path in files for n in range(len(places(ast.parse(path.read_text()))))]
-            chosen, killed = rng.sample(drawn, min(size, len(drawn))), 0
+            if not tested(copy, room, CALLS_TO=calls):
+                raise SystemExit(f"tests/{room} fail before anything is changed")
+            chosen, killed = drawn(copy / "tfarm" / room, size, rng), 0
             for path, number in chosen:
                 whole, (text, line, said) = path.read_text(), mutant(path, number)
+                called = function_of(path, line)
                 path.write_text(text)
-                alive = survives(copy, room, path.stem)
+                alive = tested(copy, room, CALLS_FROM=calls, CALLED=called)
                 path.write_text(whole)
                 killed += not alive
                 if alive:

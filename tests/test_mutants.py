@@ -2,7 +2,8 @@
 
 import ast
 
-from tests.mutants import change, mutant, places
+from tests.callers import order
+from tests.mutants import change, function_of, mutant, places
 
 
 def test_each_place_is_changed_once_and_said():
@@ -28,3 +29,13 @@ def test_a_mutant_of_a_file_is_that_file_but_for_one_line(tmp_path):
     path = tmp_path / "room.py"
     path.write_text("ONE = 1\n\n\ndef double(x):\n    return 2 * x\n")
     assert mutant(path, 0) == ("ONE = 1\n\ndef double(x):\n    return 2 / x", 5, "2 * x  ->  2 / x")
+
+
+def test_the_tests_that_call_the_changed_function_come_first_the_short_ones_before_the_long(tmp_path):
+    path = tmp_path / "tfarm" / "room" / "file.py"
+    path.parent.mkdir(parents=True)
+    path.write_text("def outer():\n    @twice\n    def inner():\n        return 1\n    return inner() + 1\n")
+    outer, inner = function_of(path, 5), function_of(path, 4)
+    assert (outer, inner) == ("tfarm/room/file.py:1", "tfarm/room/file.py:2")
+    tests = {"long": (2.0, [inner]), "short": (1.0, [outer, inner]), "shortest": (0.5, [outer]), "other": (0.1, [])}
+    assert sorted(tests, key=lambda each: order(*tests[each], inner)) == ["short", "long", "other", "shortest"]
