@@ -1,0 +1,99 @@
+"""Where curves of zeros want more points: circles, whose turns are known, corners and regions drawn by hand."""
+
+import numpy as np
+import pytest
+
+from tfarm.crossing.pieces import RegionPiece
+from tfarm.crossing.turning import loose, loose_columns
+
+
+def arc(points, radius=1.0, centre=5j):
+    """An eighth of a circle off the real axis: from piece to piece it turns by 45 degrees / (points - 1)."""
+    return centre + radius * np.exp(1j * np.linspace(0.1, 0.1 + np.pi / 4, points))[None, :]
+
+
+@pytest.mark.parametrize(("points", "wanted"), [(15, True), (18, True), (20, False), (40, False)])
+def test_a_circle_is_round_where_it_turns_by_less_than_two_and_a_half_degrees(points, wanted):
+    """45 / 18 = 2.5: 19 points are the limit.  A first and a last piece have a neighbour on one side only."""
+    assert loose(arc(points), 1.0, 1.0).tolist() == [wanted] * (points - 1)
+
+
+def test_turns_are_those_of_the_picture():
+    """Of what is drawn four times as wide as high, a steep part turns less and a flat part more."""
+    flat, steep = np.array([[1j, 1 + 1j, 2 + 1.02j]]), np.array([[1j, 2j, 0.02 + 3j]])
+    assert [loose(flat, 1.0, 1.0).all(), loose(steep, 1.0, 1.0).all()] == [False, False]  # both by 1.1 degrees
+    assert [loose(flat, 4.0, 1.0).all(), loose(steep, 4.0, 1.0).all()] == [True, False]
+    assert [loose(flat, 1.0, 4.0).all(), loose(steep, 1.0, 4.0).all()] == [False, True]
+    sizes = np.array([[4.0], [1.0]])
+    assert loose(np.r_[flat[:, :], steep], sizes, 1.0).tolist() == [True, True]
+    assert loose(np.r_[steep, flat], sizes, 1.0).tolist() == [False, False]
+
+
+def test_only_the_pieces_beside_a_corner_are_halved_and_only_while_they_are_seen():
+    corner = np.array([[0, 1, 2, 3, 3 + 1j, 3 + 2j, 3 + 3j]]) + 5j
+    assert loose(corner, 4.0, 4.0).tolist() == [False, False, True, True, False, False]
+    assert loose(corner, 501.0, 501.0).tolist() == [False] * 6  # each piece is 1/501 of the picture
+    assert loose(corner, 499.0, 499.0).tolist() == [False, False, True, True, False, False]
+    short = np.array([[5j, 1 + 5j, 1 + 5.001j]])
+    assert loose(short, 2.0, 2.0).tolist() == [True, False]
+
+
+def test_curves_that_stay_on_the_axis_or_end_want_nothing():
+    turning_back = np.array([[1.0, 2.0, 1.5, 3.0]], dtype=complex)
+    ended = np.array([[5j, 1 + 5j, np.nan, 2 + 7j, 1 + 6j]])
+    assert not loose(turning_back, 1.0, 1.0).any()
+    assert not loose(ended, 1.0, 1.0)[1:3].any()
+
+
+def test_two_zeros_that_part_on_the_axis_are_approached_where_they_part_and_nowhere_else():
+    """sqrt(gain): real and then a pair, at a right angle; only the piece in which it leaves the axis."""
+    gain = np.linspace(1.0, -1.0, 101) + 1e-3
+    pair = np.emath.sqrt(gain)[None, :]
+    (n,) = np.flatnonzero(np.diff(pair.imag[0] != 0))
+    assert pair[0, n].imag == 0 < pair[0, n + 1].imag
+    (found,) = np.flatnonzero(loose(pair, 1.0, 1.0))
+    assert found == n
+
+
+def piece(gains, low, high):
+    return RegionPiece(tuple(zip(gains, low, high, strict=True)), False, False)
+
+
+def wanted(part, across, drawn=lambda x, y: (x + 1j * y) / 10):
+    return loose_columns(np.array(across), [part], drawn).tolist()
+
+
+def test_a_regions_corner_halves_the_sides_beside_it():
+    """A roof over 1 ... 9 with its ridge at 4; the corners of its foot are at the frame's lower edge, unseen."""
+    across = [1.0, 4.0, 9.0]
+    roof = piece(across, [0.0, 0.0, 0.0], [0.0, 6.0, 0.0])
+    assert wanted(roof, across) == [2.5, 6.5]
+    short = piece(
+        across, [0.0, 0.0, 0.0], [0.0, 0.0, 6.0]
+    )  # and what is of no length turns nowhere: its corner is at 9
+    assert wanted(short, across) == [6.5]
+
+
+def test_corners_outside_the_picture_are_not_seen():
+    across = [1.0, 4.0, 9.0]
+    above = piece(across, [0.0, 0.0, 0.0], [0.0, 11.0, 0.0])
+    left = piece([-9.0, -4.0, -1.0], [2.0, 2.0, 2.0], [2.0, 8.0, 2.0])
+    assert wanted(above, across) == []
+    assert wanted(left, [-9.0, -4.0, -1.0]) == []
+
+
+def test_an_outline_that_turns_by_less_than_five_degrees_is_round():
+    """A parabola turns in its vertex by atan(0.4 h), h from column to column: 5 degrees are h = 0.219."""
+    for step, rough in ((0.25, True), (0.2, False)):
+        across = np.arange(2.0, 8.0 + step / 2, step)
+        part = piece(across, np.full(across.size, -1.0), 6.0 - 0.2 * (across - 5) ** 2)
+        halves = [each for each in wanted(part, across) if 4.5 < each < 5.5]
+        assert bool(halves) == rough
+
+
+def test_an_upright_side_is_approached_from_the_columns_beside_it():
+    """A box from 4 to 6 among columns 1, 4, 6, 9: its corners are on upright sides."""
+    box = piece([4.0, 6.0], [2.0, 2.0], [8.0, 8.0])
+    assert wanted(box, [1.0, 4.0, 6.0, 9.0]) == [2.5, 5.0, 7.5]
+    assert wanted(box, [4.0, 6.0]) == [5.0]
+    assert wanted(box, [1.0, 4.0, 6.0, 9.0], lambda x, y: x / 10 + 1j * y * 1e-4 + 0.5j) == [5.0]
