@@ -68,10 +68,8 @@ def test_a_regions_corner_halves_the_sides_beside_it():
     across = [1.0, 4.0, 9.0]
     roof = piece(across, [0.0, 0.0, 0.0], [0.0, 6.0, 0.0])
     assert wanted(roof, across) == [2.5, 6.5]
-    short = piece(
-        across, [0.0, 0.0, 0.0], [0.0, 0.0, 6.0]
-    )  # and what is of no length turns nowhere: its corner is at 9
-    assert wanted(short, across) == [6.5]
+    tip = piece([-1.0, 9.0], [-1.0, 3.0], [6.0, 3.0])  # its upper and lower side end in one point, named twice
+    assert wanted(tip, [-1.0, 9.0]) == [4.0]
 
 
 def test_corners_outside_the_picture_are_not_seen():
