@@ -11,7 +11,7 @@ from tests.shell import run
 from tfarm import HubFeedback, Law, ParameterError
 from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.law_map import law_map, unstable_below
-from tfarm.loop.law_stability import law_stability
+from tfarm.loop.law_stability import band_for, law_stability
 from tfarm.loop.regions import between
 
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
@@ -36,6 +36,16 @@ def test_counts_are_those_of_full_searches(vary, x, y):
     for i, j in np.random.default_rng(1).integers((8, 10), size=(4, 2)):
         law = LAW.having(vary[0], found.x[i]).having(vary[1], found.y[j])
         assert law_stability(LAB, law, found.band).unstable_roots == found.unstable[j, i], law
+
+
+@pytest.mark.parametrize("x", [(-1e6, 1.0), (-1.0, 2e6)])
+@pytest.mark.parametrize("y", [(-1e6, 1.0), (-1.0, 2e6)])
+def test_the_band_is_enough_for_each_corner(x, y):
+    """The more a filter amplifies, the farther up it is to be looked: the largest number once at each of four ends."""
+    vary = "hub_angle.num.0", "tip_acceleration.num.0"
+    found = law_map(LAB, LAW, vary, np.linspace(*x, 3), np.linspace(*y, 3))
+    corners = [LAW.having(vary[0], a).having(vary[1], b) for a in x for b in y]
+    assert found.band == max(band_for(LawLoop(LAB, law)) for law in corners)
 
 
 def test_over_gains_at_the_hub_it_is_their_map():

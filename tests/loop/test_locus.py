@@ -16,7 +16,7 @@ from tfarm.cli import main
 from tfarm.loop import reduced_locus as reduced_locus_room
 from tfarm.loop.lines import along
 from tfarm.loop.lines import crossings as line_crossings
-from tfarm.loop.locus import frame, locus
+from tfarm.loop.locus import frame, locus, rounded
 from tfarm.loop.plant import Loop
 from tfarm.loop.poles import poles_below
 from tfarm.loop.reduced_locus import reduced_locus
@@ -357,3 +357,18 @@ def test_the_command_prints_one_json_object(capsys, tmp_path):
         main(["locus", "sasaki2012", "--vary", "K1", "--from", "1", "--to", "1"])
     assert done.value.code == 2
     assert capsys.readouterr().err.count("\n") == 1
+
+
+@pytest.mark.parametrize(("arm", "vary", "start", "stop"), [(STOCKY, "K2", -5.0, 0.9), (LAB, "K1", 0.3, 3.0)])
+def test_each_branch_is_round_in_a_picture_of_its_own_and_of_all(arm, vary, start, stop):
+    """From 12 values: pieces longer than a five hundredth of the picture turn by at most 2.5 degrees."""
+    branches = rounded(locus(arm, HUB, vary, start, stop, points=12, branches=5)).branches
+    swinging = branches[(branches.imag > 0).all(axis=1)]
+    assert len(swinging) >= 3
+    for points, shown in (*((row, [row]) for row in swinging), (branches, swinging)):
+        wide, tall = max(points.real.max(), 0) - min(points.real.min(), 0), np.ptp(points.imag)
+        for row in shown:
+            across, up = np.diff(row.real) / wide, np.diff(row.imag) / tall
+            heading, seen = np.unwrap(np.arctan2(up, across)), np.hypot(across, up) > 2e-3
+            turn = abs(np.diff(heading))[seen[1:] | seen[:-1]]
+            assert turn.max(initial=0.0) <= math.radians(2.5)
