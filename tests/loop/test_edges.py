@@ -29,6 +29,7 @@ def test_an_axis_is_matplotlibs_own(axis):
 def test_a_grid_finds_its_own_axis():
     assert Axis.of(np.linspace(-1.0, 3.0, 41)) == Axis(-1.0, 3.0)
     assert Axis.of(np.geomspace(0.02, 3.0, 41)) == Axis(0.02, 3.0, 0.02)
+    assert Axis.of(np.array([-3.0, -1.0, -0.5, 0.0, 2.0, 6.0])) == Axis(-3.0, 6.0, 0.5)
 
 
 def test_what_is_seen_is_the_nearest_count():
