@@ -1,6 +1,7 @@
 """Any law on the exact arm: against gains at the hub, python-control, models closed otherwise, and theorems."""
 
 import json
+from dataclasses import replace
 from itertools import pairwise
 
 import control
@@ -88,8 +89,6 @@ def test_random_loops_have_as_many_unstable_poles_by_another_road():
 
 def test_delays_add_up_poles_as_the_lambert_function_says():
     """A rigid hub of great inertia: J s + K e^{-s tau} has its poles at W_n(-K tau/J)/tau."""
-    from dataclasses import replace
-
     from scipy.special import lambertw
 
     J = 1e6
@@ -118,6 +117,23 @@ def test_a_law_with_a_sign_is_known_beyond_the_band():
     washout = law_stability(BARE, Law({"hub_rate": ([0.3, 0.0], [1.0, 5.0])}))
     assert washout.verdict == "marginal"  # the hub drifts: two poles stay at 0
     assert (washout.poles.values == 0).sum() == 2
+
+
+def test_what_is_known_beyond_the_band_is_said_with_its_theorem():
+    """A passive law drives nothing whatever holds the hub; positive position feedback must be held against too."""
+    passive, ppf = ({"hub_angle": each} for each in (([2.0, 1.0], [0.01, 1.0]), ([-3.0], [1.0, 2.0, 5.0])))
+    for arm in (LAB, BARE):
+        held = replace(arm, hub=replace(arm.hub, stiffness=0.7))
+        assert "takes energy" in (tail := law_stability(held, Law(passive)).tail)
+        assert "statically" not in tail
+        assert "strictly negative imaginary and holds it statically" in law_stability(held, Law(ppf)).tail
+
+
+def test_what_is_taken_off_a_wide_box_is_the_time_of_both_waves():
+    """Far right the determinant grows like e^{s T}, T = L (sqrt(rhoA/kGA) + sqrt(rhoI/EI)): shear and bending."""
+    link = BARE.link
+    both = link.length * (np.sqrt(link.rhoA / link.kGA) + np.sqrt(link.rhoI / link.EI))
+    assert LawLoop(BARE, Law({"hub_rate": 0.1})).delay_of_waves == pytest.approx(both, rel=1e-12)
 
 
 def test_positive_position_feedback_needs_a_spring_that_is_stiffer():

@@ -223,6 +223,14 @@ def test_the_gap_to_the_reduced_locus_shrinks_with_its_order(law, vary, stop):
     assert gaps[2] < 1e-7
 
 
+@pytest.mark.parametrize(("branches", "order"), [(3, 20), (10, 22), (12, 26)])
+def test_unless_asked_otherwise_a_reduced_model_has_two_modes_beyond_the_last_branch(branches, order):
+    """Two poles a mode: those of the branches, one of them rigid, and two more; 20 at least."""
+    found = locus(PAPER, HubFeedback(), "K1", 0.0, 2.0, 3, branches)
+    assert order == max(20, 2 * (len(np.unique(found.mode)) + 2))
+    assert reduced_locus(found).order == order
+
+
 def test_reduced_poles_are_those_of_python_control():
     """Road: the same closed loop as matrices."""
     from tfarm.reduced import modal_model
