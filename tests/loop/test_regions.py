@@ -10,6 +10,7 @@ import tfarm
 from tests.loop.arms import window_arm
 from tests.loop.ritz_loop import RitzLoop
 from tests.loop.test_lines import held
+from tests.loop.test_lossless import RIGS
 from tests.shared import thinned
 from tfarm import Hub, HubFeedback
 from tfarm.errors import ParameterError
@@ -103,6 +104,18 @@ def test_at_no_damping_the_plane_is_cut_by_two_lines() -> None:
     np.testing.assert_array_equal(found.unstable == INFINITE, ~same)
     np.testing.assert_array_equal(found.stable, (K1 > 0)[None, :] & (K2 < 1)[:, None])
     assert found.boundary.size == 0
+
+
+@pytest.mark.parametrize("arm", [BARE, RIGS["r = 0.05"]], ids=["bare", "r = 0.05"])
+def test_on_the_lines_where_nothing_damps_each_point_has_the_count_and_verdict_of_its_loop(arm) -> None:
+    """K1 = 0 and K2 = 1: every pole may lie on the axis there, and none be unstable."""
+    K1, K2 = np.array([-0.3, 0.0, 0.3]), np.array([0.5, 1.0, 1.5])
+    found = region(arm, K1, K2)
+    assert (found.unstable[0, 1], found.unstable[1, 1], found.stable[0, 1]) == (0, 0, False)
+    for (j, i), count in np.ndenumerate(found.unstable):
+        there = stability(arm, HubFeedback(K1=float(K1[i]), K2=float(K2[j])))
+        assert count == (INFINITE if there.unstable_roots_infinite else there.unstable_roots)
+        assert found.stable[j, i] == (there.verdict == "stable")
 
 
 NO_DAMPING = [(BARE, -2.0), (held(0.0), -30.0), (BARE, 0.0), (held(0.0), 5.0), (BARE, 2.0)]

@@ -90,16 +90,20 @@ class Region:
 
     @property
     def stable(self) -> NDArray[np.bool_]:
-        """Where no pole is unstable, and the free hub angle has not two poles at 0 (K1 = Kp = 0)."""
+        """Where no pole is unstable, the free hub angle has not two poles at 0 (K1 = Kp = 0), and something damps."""
         drifts = (self.K1 == 0) & self.arm.has_rigid_mode & (self.Kp == 0)
-        return np.asarray((self.unstable == 0) & ~drifts)
+        swings = (self.K1 == 0) & self.arm.is_reactive
+        whole = (
+            np.equal(self.K2, self.arm.input_per_torque) & self.arm.is_told_by_lyapunov
+        )  # no moment is left at the hub
+        return np.asarray((self.unstable == 0) & ~(drifts | swings) & ~whole[:, None])
 
 
 def region(arm: Arm, K1: Real, K2: Real, Kp: float = 0.0) -> Region:
     """The map over the grid of K1 and K2 (1-D, ascending).
 
-    A grid line exactly on K1 = 0 or K2 = 1 at C = 0 is marginal and counts as unstable, and K1 = 0 is never stable
-    where the hub angle is free.  Raises ParameterError where there is no loop or the grid is empty.
+    A grid line exactly on K1 = 0 or K2 = 1 at C = 0 is not stable, though no pole need be right of the axis there, nor
+    is K1 = 0 where the hub angle is free.  Raises ParameterError where there is no loop or the grid is empty.
     """
     K1, K2 = ascending("K1", K1, MOST_GRID_GAINS), ascending("K2", K2, MOST_GRID_GAINS)
     Loop(arm, HubFeedback(K1=float(K1[-1]), K2=float(K2[-1]), Kp=Kp))
@@ -147,27 +151,34 @@ def _undamped_counts(arm: Arm, K1: Real, K2: Real, Kp: float) -> NDArray[np.int6
     """Unstable poles at C = 0: one count for each side of the static limit where they are finitely many."""
     static = crossing_at_zero(arm, along("K2", HubFeedback(K1=1.0, Kp=Kp)))
     side = np.zeros(K2.size, bool) if static is None else static.t < K2
-    unstable = np.full((K2.size, K1.size), INFINITE, dtype=np.int64)
-    whole = arm.input_per_torque  # the K2 that takes the whole moment off the hub: 1 where the input is torque
-    quadrants = ((np.nonzero(K1 > 0)[0], whole > K2), (np.nonzero(K1 < 0)[0], whole < K2))
-    for (columns, band), each in itertools.product(quadrants, (True, False)):
-        (rows,) = np.nonzero(band & (side == each))
+    unstable = np.zeros((K2.size, K1.size), dtype=np.int64)
+    of_K1, of_K2 = np.sign(K1), np.sign(K2 - arm.input_per_torque)  # at 1 N m a N m nothing of the moment is left
+    for of_column, of_row, each in itertools.product((-1, 0, 1), (-1, 0, 1), (True, False)):
+        (columns,), (rows,) = np.nonzero(of_K1 == of_column), np.nonzero((of_K2 == of_row) & (side == each))
         if rows.size and columns.size:
             law = HubFeedback(K1=float(K1[columns[columns.size // 2]]), K2=float(K2[rows[rows.size // 2]]), Kp=Kp)
-            unstable[np.ix_(rows, columns)] = stability(arm, law).unstable_roots
+            unstable[np.ix_(rows, columns)] = _counted(arm, law)
     return unstable
+
+
+def _counted(arm: Arm, law: HubFeedback) -> int:
+    """The unstable poles of one loop, or INFINITE."""
+    found = stability(arm, law)
+    return INFINITE if found.unstable_roots_infinite else found.unstable_roots
 
 
 def _lossless_counts(arm: Arm, K1: Real, K2: Real, Kp: float) -> NDArray[np.int64]:
     """The same where the gauge does not read the hub's moment: for K1 > 0 of the modes of `locked_edges`.
 
-    K1 < 0 mirrors the poles, so that infinitely many are unstable.
+    K1 < 0 mirrors the poles, so that infinitely many are unstable; at K1 = 0 each loop is counted by itself.
     """
     unstable = np.full((K2.size, K1.size), INFINITE, dtype=np.int64)
     law = HubFeedback(K1=default_gains(arm).K1, Kp=Kp)
     found = Crossings.of([*locked_edges(arm), *static_crossings(arm, along("K2", law))])
     (counts,) = counts_over(K2, [found], 0.0, np.array([stability(arm, law).unstable_roots]))
     unstable[:, K1 > 0] = counts[:, None]
+    if (K1 == 0).any():
+        unstable[:, K1 == 0] = [[_counted(arm, HubFeedback(K2=float(each), Kp=Kp))] for each in K2]
     return unstable
 
 

@@ -1,0 +1,65 @@
+"""Loci as they are drawn and written: whether they reach the end, in which unit, and to how many digits."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tfarm
+from tfarm import HubFeedback
+from tfarm.loop import loci as room
+from tfarm.loop.loci import loci, shown
+from tfarm.loop.locus import locus
+from tfarm.loop.reduced_locus import reduced_locus
+
+LAB = tfarm.load("sasaki2012-lab")
+HELD = replace(LAB, hub=replace(LAB.hub, stiffness=2.0))
+LAW = HubFeedback(K1=0.3, K2=0.3)
+
+
+@pytest.mark.parametrize("arm", [LAB, HELD], ids=["free", "held"])
+def test_the_first_frequency_is_the_lowest_that_swings(arm):
+    table = tfarm.modes(arm, 4).natural_frequency
+    found = loci(arm, LAW, "K2", 0.0, 0.5)
+    assert found.first == min(table[table > 0])
+    assert not found.is_cut
+    assert (found.name, found.exact.gain[0], found.exact.gain[-1]) == ("K2", 0.0, 0.5)
+
+
+def test_a_gain_has_its_unit():
+    assert [loci(LAB, LAW, vary, 0.0, 0.5).unit for vary in ("K1", "K2", "Kp")] == ["N m s/rad", "", "N m/rad"]
+
+
+@pytest.mark.parametrize("refused", [0, 1, 2, 3])
+def test_where_branches_cannot_be_followed_fewer_are_and_less_far(monkeypatch, refused):
+    """7, then 4, then to three quarters, then 2 to the half of the range."""
+    asked = []
+
+    def followed(*given):
+        asked.append(given[-1])
+        if len(asked) <= refused:
+            raise tfarm.ConvergenceError("cannot be told apart", 1.0, 1.0)
+        return locus(*given)
+
+    monkeypatch.setattr(room, "locus", followed)
+    found = loci(LAB, LAW, "K1", 0.2, 1.2)
+    assert asked == [7, 4, 4, 2][: refused + 1]
+    assert found.exact.gain[-1] == pytest.approx([1.2, 1.2, 0.95, 0.7][refused], rel=1e-15)
+    assert found.is_cut == (refused > 1)
+    assert found.reduced.worst == reduced_locus(found.exact).worst
+
+
+def test_what_cannot_be_followed_at_all_is_said(monkeypatch):
+    def refused(*_):
+        raise tfarm.ConvergenceError("cannot be told apart", 1.0, 1.0)
+
+    monkeypatch.setattr(room, "locus", refused)
+    with pytest.raises(tfarm.ConvergenceError, match="told apart"):
+        loci(LAB, LAW, "K1", 0.2, 1.2)
+
+
+def test_ten_digits_of_its_size_are_shown():
+    """A small real part beside a large frequency has the digits that |s| leaves it."""
+    pole = np.array([-0.123456789012345 + 98.7654321098765j, 0.0])
+    assert shown(pole) == pytest.approx([-0.12345679 + 98.76543211j, 0.0], rel=1e-15)
+    assert abs(shown(1e5 * pole) - 1e5 * shown(pole)).max() <= 1e-15 * 1e7
