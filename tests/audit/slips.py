@@ -23,7 +23,7 @@ FORMULAS = {
     for name, claim in CLAIMS.items()
     if not name.startswith("Table") and name not in NOT_FORMULAS and "order of" not in name
 }
-CACHES = (formulas.read, motion.solved_motion, energy.energy, appendix.dispersion, appendix.relation)
+CACHES = (formulas.parsed, motion.solved_motion, energy.energy_of, appendix.wave_determinant, appendix.relation)
 
 
 def flips(text):
@@ -37,7 +37,7 @@ SIGNED = [name for name, text in FORMULAS.items() if any(flips(text))]
 
 
 class Watched:
-    """The pattern by which `formulas.read` finds derivatives in a text, and the texts in which it has."""
+    """The pattern by which `formulas.parsed` finds derivatives in a text, and the texts in which it has."""
 
     def __init__(self, pattern):
         self.pattern, self.texts = pattern, set()

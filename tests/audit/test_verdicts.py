@@ -91,14 +91,13 @@ def test_typesetting_of_values(rows, name, formula):
     assert rows[name].corrected_tex == formula
 
 
-def test_json_has_the_keys_of_the_issue(audited, audit_file):
+def test_json_has_the_keys_of_the_issue(audit_file):
     """The answer is what the command has printed, in a process of its own."""
     answer = json.loads(to_json(audit.audit_answer()))
     assert json.loads(audit_file.with_suffix(".json").read_text(encoding="utf-8")) == answer
     assert "852780" in answer["paper"]
     keys = ["equation", "verdict", "printed", "corrected", "evidence", "residual_printed", "residual_corrected"]
     assert all(list(row) == keys for row in answer["rows"])
-    assert json.loads(audit.to_json(audited)) == answer["rows"]
 
 
 @pytest.mark.parametrize(("residual", "zero"), [("0", True), ("1.5e-49", True), ("1e-9", False), ("K*x", False)])

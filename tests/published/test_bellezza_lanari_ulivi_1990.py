@@ -15,7 +15,7 @@ import pytest
 from tests.published.chains import natural_frequencies
 from tfarm import Hub
 from tfarm.audit.literature import beam
-from tfarm.audit.published import ALL, agrees, rows
+from tfarm.audit.published import ALL, agrees, case_rows
 
 (SOURCE,) = (source for source in ALL if source.key == "bellezza-lanari-ulivi-1990")
 
@@ -48,7 +48,7 @@ def test_every_digit_is_a_root_s(case):
             assert agrees(float(root), printed)
             size = abs(mpmath.diff(lambda z: mpmath.det(conditions(z, J, r)), root)) * root
             assert abs(mpmath.det(conditions(root, J, r))) < 1e-25 * size
-    assert all(row.agrees for row in rows(SOURCE.key, case))
+    assert all(row.agrees for row in case_rows(SOURCE.key, case))
 
 
 def test_none_of_the_first_ten_is_left_out_and_each_is_exact():
@@ -67,6 +67,6 @@ def test_the_radius_is_felt_on_a_free_hub_and_not_on_a_locked_one():
     for case in SOURCE.cases:
         if case.arm.hub.radius:
             on_the_axis = replace(case.arm, hub=replace(case.arm.hub, radius=0.0))
-            assert abs(rows(SOURCE.key, replace(case, arm=on_the_axis))[0].difference) > 1e-3
+            assert abs(case_rows(SOURCE.key, replace(case, arm=on_the_axis))[0].difference) > 1e-3
     locked = [natural_frequencies(replace(beam(), hub=Hub(inertia=math.inf, radius=r)), 3) for r in (0.0, 0.5)]
     assert locked[0] == pytest.approx(locked[1], rel=1e-13)

@@ -14,7 +14,7 @@ import pytest
 from tests.published.chains import natural_frequencies
 from tfarm import Payload
 from tfarm.audit.literature import beam
-from tfarm.audit.published import ALL, agrees, rows
+from tfarm.audit.published import ALL, agrees, case_rows
 
 (SOURCE,) = (source for source in ALL if source.key == "bhat-wagner-1976")
 
@@ -55,7 +55,7 @@ def test_every_digit_is_a_root_s(case):
             assert agrees(float(root), printed)
             size = abs(mpmath.diff(lambda z: mpmath.det(conditions(z, m, e, j)), root)) * root
             assert abs(mpmath.det(conditions(root, m, e, j))) < 1e-25 * size
-    assert all(row.agrees for row in rows(SOURCE.key, case))
+    assert all(row.agrees for row in case_rows(SOURCE.key, case))
 
 
 def test_none_of_the_first_ten_is_left_out_and_each_is_exact():
@@ -76,5 +76,5 @@ def test_the_offset_is_felt():
     """With the centre on the tip every frequency is another: the digits tell an offset from none."""
     for case in SOURCE.cases:
         payload = replace(case.arm.payload, offset=0.0)
-        moved = rows(SOURCE.key, replace(case, arm=replace(case.arm, payload=payload)))
+        moved = case_rows(SOURCE.key, replace(case, arm=replace(case.arm, payload=payload)))
         assert min(abs(row.difference) for row in moved) > 1e-3

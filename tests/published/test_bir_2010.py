@@ -7,15 +7,15 @@ import mpmath
 import pytest
 
 from tfarm.audit.literature import SOURCES
-from tfarm.audit.published import agrees, computed, rows
+from tfarm.audit.published import agrees, case_rows, computed
 
 (SOURCE,) = (source for source in SOURCES if source.key == "bir-2010")
 BARE, LOADED = SOURCE.cases
 
 
 def test_the_first_and_both_with_a_tip_mass_agree() -> None:
-    assert [row.agrees for row in rows(SOURCE.key, BARE)] == [True, False, False]
-    assert all(row.agrees for row in rows(SOURCE.key, LOADED))
+    assert [row.agrees for row in case_rows(SOURCE.key, BARE)] == [True, False, False]
+    assert all(row.agrees for row in case_rows(SOURCE.key, LOADED))
 
 
 def test_the_length_is_rounded_and_the_second_frequency_twice() -> None:

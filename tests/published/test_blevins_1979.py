@@ -12,7 +12,7 @@ import pytest
 
 import tfarm
 from tfarm import Hub, Payload
-from tfarm.audit.literature import ENDS, SOURCES, beam
+from tfarm.audit.literature import END_CONDITIONS, SOURCES, beam
 from tfarm.audit.published import computed
 
 EPS = np.finfo(float).eps
@@ -110,6 +110,6 @@ def test_the_table_of_the_audit_is_this_one():
     assert {case.name.split(",")[0] for case in slender} == {"clamped-free", "clamped-pinned", "pinned-free"}
     for case in slender:  # what is left of shear and rotary inertia is far below the digits, and vanishes as (r/L)^2
         simple = computed(replace(case, theory="euler-bernoulli"))
-        coarse = computed(replace(case, arm=beam(slenderness=1e4, **ENDS[case.name.split(",")[0]])))
+        coarse = computed(replace(case, arm=beam(slenderness=1e4, **END_CONDITIONS[case.name.split(",")[0]])))
         assert (abs(computed(case) - simple) < 5e-9).all()
         assert (simple - coarse) * 1e-4 == pytest.approx(simple - computed(case), rel=1e-2, abs=1e-14)

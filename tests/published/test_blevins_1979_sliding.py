@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from tfarm import Hub, Payload
-from tfarm.audit.published import ALL, computed, rows
+from tfarm.audit.published import ALL, case_rows, computed
 
 (SOURCE,) = (source for source in ALL if source.key == "blevins-1979-sliding")
 PARTS = {
@@ -22,7 +22,7 @@ PARTS = {
 
 @pytest.mark.parametrize("case", SOURCE.cases, ids=lambda case: case.name)
 def test_every_printed_digit_is_right(case):
-    assert all(row.agrees for row in rows(SOURCE.key, case))
+    assert all(row.agrees for row in case_rows(SOURCE.key, case))
     with mpmath.workdps(30):
         for root in computed(case).tolist():
             assert root == pytest.approx(

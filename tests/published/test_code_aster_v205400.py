@@ -6,14 +6,14 @@ import pytest
 
 import tfarm
 from tfarm.audit.literature import SOURCES
-from tfarm.audit.published import computed, rows
+from tfarm.audit.published import case_rows, computed
 
 (SOURCE,) = (source for source in SOURCES if source.key == "code-aster-v2.05.400")
 
 
 def test_the_roots_of_tan_and_tanh() -> None:
     (case,) = SOURCE.cases
-    assert all(row.agrees for row in rows(SOURCE.key, case))
+    assert all(row.agrees for row in case_rows(SOURCE.key, case))
     for z in computed(case):
         exact = mpmath.findroot(lambda z: mpmath.tan(z) - mpmath.tanh(z), z)
         assert z == pytest.approx(float(exact), rel=1e-14)

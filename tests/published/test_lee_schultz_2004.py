@@ -10,7 +10,7 @@ import pytest
 from scipy.linalg import eigvals
 
 from tfarm.audit.literature import SOURCES
-from tfarm.audit.published import agrees, computed, rows
+from tfarm.audit.published import agrees, case_rows, computed
 
 (SOURCE,) = (source for source in SOURCES if source.key == "lee-schultz-2004")
 
@@ -35,7 +35,7 @@ def collocated(arm, n: int = 30, count: int = 3) -> np.ndarray:
 
 @pytest.mark.parametrize("case", SOURCE.cases, ids=lambda case: case.name)
 def test_every_printed_digit_is_right(case) -> None:
-    assert all(row.agrees for row in rows(SOURCE.key, case))
+    assert all(row.agrees for row in case_rows(SOURCE.key, case))
 
 
 @pytest.mark.parametrize(
@@ -53,4 +53,4 @@ def test_another_shear_factor_would_not_do() -> None:
         section = replace(case.arm.link.section, shear_factor=10 * 1.3 / (12 + 11 * 0.3))
         link = replace(case.arm.link, section=section)
         other = replace(case, arm=replace(case.arm, link=link))
-        assert not all(row.agrees for row in rows(SOURCE.key, other))
+        assert not all(row.agrees for row in case_rows(SOURCE.key, other))

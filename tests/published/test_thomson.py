@@ -6,7 +6,7 @@ import mpmath
 import pytest
 
 from tfarm.audit.literature import REDUCED, SOURCES
-from tfarm.audit.published import computed, rows
+from tfarm.audit.published import case_rows, computed
 
 (SOURCE,) = (source for source in SOURCES if source.key == "thomson-appendix-d")
 SIGN = {"clamped-free": 1, "clamped-clamped": -1}  # cos z + sign / cosh z = 0
@@ -14,7 +14,7 @@ SIGN = {"clamped-free": 1, "clamped-clamped": -1}  # cos z + sign / cosh z = 0
 
 @pytest.mark.parametrize("case", SOURCE.cases, ids=lambda case: f"{case.name} {case.quantity}")
 def test_every_printed_digit_is_right(case) -> None:
-    assert all(row.agrees for row in rows(SOURCE.key, case))
+    assert all(row.agrees for row in case_rows(SOURCE.key, case))
     for ours in computed(case):
         guess = math.sqrt(ours) if case.quantity == REDUCED else ours
         z = mpmath.findroot(lambda z: mpmath.cos(z) + SIGN[case.name] / mpmath.cosh(z), guess)

@@ -6,14 +6,14 @@ import mpmath
 import pytest
 
 from tfarm.audit.literature import SOURCES
-from tfarm.audit.published import agrees, computed, rows
+from tfarm.audit.published import agrees, case_rows, computed
 
 (SOURCE,) = (source for source in SOURCES if source.key == "vpcs-sdll15")
 (CASE,) = SOURCE.cases
 
 
 def test_all_but_the_first_agree_in_every_printed_digit() -> None:
-    assert [row.agrees for row in rows(SOURCE.key, CASE)] == [False, True, True, True]
+    assert [row.agrees for row in case_rows(SOURCE.key, CASE)] == [False, True, True, True]
 
 
 def test_the_first_is_rayleighs_estimate() -> None:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from tfarm.audit.literature import SOURCES, beam
-from tfarm.audit.published import agrees, computed, rows
+from tfarm.audit.published import agrees, case_rows, computed
 
 (SOURCE,) = (source for source in SOURCES if source.key == "wang-2017")
 PLAIN, *LOADED = SOURCE.cases
@@ -44,14 +44,14 @@ def roots(case, sign):
 
 
 def test_without_inertia_every_printed_digit_is_right() -> None:
-    assert all(row.agrees for row in rows(SOURCE.key, PLAIN))
+    assert all(row.agrees for row in case_rows(SOURCE.key, PLAIN))
     assert computed(PLAIN) == pytest.approx(roots(PLAIN, 1), rel=1e-12)
 
 
 @pytest.mark.parametrize("case", LOADED, ids=lambda case: case.name)
 def test_with_inertia_reversed_every_printed_digit_is_theirs(case) -> None:
     assert computed(case) == pytest.approx(roots(case, 1), rel=1e-12)
-    assert not any(row.agrees for row in rows(SOURCE.key, case))
+    assert not any(row.agrees for row in case_rows(SOURCE.key, case))
     assert all(agrees(value, printed) for value, printed in zip(roots(case, -1), case.printed, strict=True))
 
 

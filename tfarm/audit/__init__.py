@@ -9,12 +9,12 @@ What needs SymPy is loaded when it is asked for: a report's processes want this 
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from .rows import Claim, Row, is_zero
+from .rows import AuditRow, Claim, is_zero
 
 if TYPE_CHECKING:
-    from .paper import PAPER, audit, audit_answer, claims, records, to_json
+    from .paper import PAPER, audit, audit_answer, claims
 
-__all__ = ["PAPER", "Claim", "Row", "audit", "audit_answer", "claims", "is_zero", "records", "to_json"]
+__all__ = ["PAPER", "AuditRow", "Claim", "audit", "audit_answer", "claims", "is_zero"]
 
 
 def __getattr__(name: str) -> object:

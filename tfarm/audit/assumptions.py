@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import MOMENT_GAIN, Arm, HubFeedback, Section
+from tfarm.arm import MOMENT_GAIN, Arm, Section
 from tfarm.arm.checks import positive
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop.stability import stability
@@ -26,11 +26,11 @@ from tfarm.spectrum.scales import default_gains
 
 Real = NDArray[np.float64]
 
-COUNT = 4
+STUDIED_MODES = 4  # flexible modes, unless told
 AREA = 6.0e-4  # m^2, the paper's
 DEPTHS = (0.002, 0.003, 0.004, 0.006, 0.008, 0.010, 0.015, 0.020, 0.030, 0.040, 0.060)  # m, for that area
-INERTIAS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # kg m^2
-SAME = 1e-9  # relative: so near to the arm's own value a candidate is that value
+INERTIAS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # kg m^2, about the value assumed for the paper's hub
+OWN_VALUE = 1e-9  # relative: so near to the arm's own value a candidate is that value
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,20 +95,17 @@ def loop_verdicts(study: SectionStudy | HubStudy) -> tuple[LoopVerdict, ...] | N
     """
     if not all(has_hub_inertia(arm) for arm in study.arms):
         return None
-    law = default_gains(study.arm)
-    return tuple(_loop_verdict(arm, law) for arm in study.arms)
-
-
-def _loop_verdict(arm: Arm, law: HubFeedback) -> LoopVerdict:
-    try:
-        found = stability(arm, law)
-        windows = gain_windows(found, MOMENT_GAIN)
-    except ConvergenceError:
-        return LoopVerdict("undecided", None)
-    if windows.around is None:
-        return LoopVerdict(found.verdict, None)
-    top = windows.around[1]
-    return LoopVerdict(found.verdict, top, windows.end(top) == "edge")
+    law, verdicts = default_gains(study.arm), []
+    for arm in study.arms:
+        try:
+            found = stability(arm, law)
+            around = (windows := gain_windows(found, MOMENT_GAIN)).around
+        except ConvergenceError:
+            verdicts.append(LoopVerdict("undecided", None))
+            continue
+        is_edge = around is not None and windows.end(around[1]) == "edge"
+        verdicts.append(LoopVerdict(found.verdict, None if around is None else around[1], is_edge))
+    return tuple(verdicts)
 
 
 def own_depth(arm: Arm) -> float:
@@ -132,7 +129,7 @@ def candidate_inertias(arm: Arm) -> tuple[float, ...]:
         remedy = "a locked hub or a free pin has no inertia to vary; name the inertias to try, or study the section"
         raise ParameterError(key="hub.inertia", value=own, remedy=remedy)
     scale = 1.0
-    while not INERTIAS[0] * scale * (1 - SAME) <= own <= INERTIAS[-1] * scale * (1 + SAME):
+    while not INERTIAS[0] * scale * (1 - OWN_VALUE) <= own <= INERTIAS[-1] * scale * (1 + OWN_VALUE):
         scale *= 10.0 if own > INERTIAS[-1] * scale else 0.1
     return _with_own((inertia * scale for inertia in INERTIAS), own)
 
@@ -142,7 +139,7 @@ def has_hub_inertia(arm: Arm) -> bool:
     return 0.0 < arm.hub.inertia < math.inf
 
 
-def section_study(arm: Arm, depths: Sequence[float] | None = None, *, count: int = COUNT) -> SectionStudy:
+def section_study(arm: Arm, depths: Sequence[float] | None = None, *, count: int = STUDIED_MODES) -> SectionStudy:
     """The first `count` flexible frequencies over rectangles of the arm's area with these depths [m].
 
     Without depths those of `candidate_depths`.  The shear factor is the arm's own throughout.
@@ -166,11 +163,11 @@ def section_study(arm: Arm, depths: Sequence[float] | None = None, *, count: int
         second_moment=second_moment,
         natural_frequency=frequency,
         sensitivity=sensitivity,
-        is_own=abs(depth / own_depth(arm) - 1) < SAME,
+        is_own=abs(depth / own_depth(arm) - 1) < OWN_VALUE,
     )
 
 
-def hub_study(arm: Arm, inertias: Sequence[float] | None = None, *, count: int = COUNT) -> HubStudy:
+def hub_study(arm: Arm, inertias: Sequence[float] | None = None, *, count: int = STUDIED_MODES) -> HubStudy:
     """The first `count` flexible frequencies over hub inertias [kg m^2]; without them those of `candidate_inertias`.
 
     Raises ParameterError for an inertia that is not positive and finite.
@@ -189,7 +186,7 @@ def hub_study(arm: Arm, inertias: Sequence[float] | None = None, *, count: int =
         sensitivity=sensitivity,
         locked=_locked(arm, count),
         pinned=pinned[0],
-        is_own=abs(np.array(values) - arm.hub.inertia) < SAME * np.array(values),
+        is_own=abs(np.array(values) - arm.hub.inertia) < OWN_VALUE * np.array(values),
     )
 
 
@@ -211,4 +208,4 @@ def _frequencies(arms: Sequence[Arm], count: int, parameter: str) -> tuple[Real,
 
 def _with_own(candidates: Any, own: float) -> tuple[float, ...]:
     """The candidates and the arm's own value, ascending; one that is it, but for rounding, gives way."""
-    return tuple(sorted([*(value for value in candidates if abs(value / own - 1) >= SAME), own]))
+    return tuple(sorted([*(value for value in candidates if abs(value / own - 1) >= OWN_VALUE), own]))

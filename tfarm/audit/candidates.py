@@ -13,7 +13,6 @@ from tfarm.errors import ParameterError
 from tfarm.spectrum.scales import default_gains
 
 from .assumptions import (
-    COUNT,
     HubStudy,
     LoopVerdict,
     SectionStudy,
@@ -28,7 +27,7 @@ Study = SectionStudy | HubStudy
 HELD_SECTION = "area, shear factor and all else held: I = A depth^2/12, so one per cent of depth counts twice"
 HELD_HUB = "all else held"
 OWN = "#eaf1f8"  # on a page behind the row of the arm itself
-EDGE = "-"  # where no gain on the moment is stable
+NO_EDGE = "-"  # where no gain on the moment is stable
 
 
 def _tints(study: Study) -> list[str]:
@@ -36,17 +35,17 @@ def _tints(study: Study) -> list[str]:
 
 
 _size = partial(Column, digits=singly(plain, 4), printed=singly(general, 4), tint=_tints)
-SECTIONS = (
+SECTION_COLUMNS = (
     _size("depth_m", "depth", "m", of="depth"),
     _size("width_m", "width", "m", of="width"),
     _size("second_moment_m4", "I", "m⁴", of="second_moment", head="I [m^4]"),
 )
-HUBS = (_size("hub_inertia_kg_m2", "I_h", "kg m²", of="hub_inertia", head="I_h [kg m^2]"),)
+HUB_COLUMNS = (_size("hub_inertia_kg_m2", "I_h", "kg m²", of="hub_inertia", head="I_h [kg m^2]"),)
 
 
 def candidates(study: Study) -> Table:
     """A row a candidate: its size, frequencies [rad/s], sensitivities, and what becomes of the default loop."""
-    size, parameter = (HUBS, "I_h") if isinstance(study, HubStudy) else (SECTIONS, "I")
+    size, parameter = (HUB_COLUMNS, "I_h") if isinstance(study, HubStudy) else (SECTION_COLUMNS, "I")
     columns = (
         Column("is_own", head="", printed=lambda values: ["*" * own for own in values], on=ANSWER),
         Column("is", of=["this arm" if own else "" for own in study.is_own], tint=_tints, on=REPORT),
@@ -81,11 +80,11 @@ def loop_columns(study: Study, found: tuple[LoopVerdict, ...] | None) -> Iterato
     everywhere = (*ANSWER, *REPORT) if found else ANSWER
     words = [each.verdict for each in verdicts]
     yield Column("verdict", "verdict", of=words, head="loop", group=group, tint=_tints, on=everywhere)
-    shown = [EDGE if edge is None else general(edge, 6) for edge in edges]
+    shown = [NO_EDGE if edge is None else general(edge, 6) for edge in edges]
     yield Column("K2_below", of=edges, head=f"{MOMENT_GAIN} below", shown=shown, on=ANSWER)
     yield Column("K2_below_is_edge", of=[each.is_edge for each in verdicts], on=(JSON,))
     if found:
-        texts = [EDGE if each.K2_below is None else _edge(each.K2_below, each.is_edge) for each in found]
+        texts = [NO_EDGE if each.K2_below is None else _edge(each.K2_below, each.is_edge) for each in found]
         values = ["" if edge is None else edge for edge in edges]
         yield Column(
             "K2_below", f"stable below {MOMENT_GAIN}", of=values, shown=texts, group=group, tint=_tints, on=REPORT
@@ -97,7 +96,7 @@ def _edge(gain: float, is_edge: bool) -> str:
     return significant(gain, 6) if is_edge else f"{plain(gain, 6)}*"
 
 
-def assumptions_answer(arm: Arm, count: int = COUNT) -> dict[str, Any]:
+def assumptions_answer(arm: Arm, count: int) -> dict[str, Any]:
     """The answer of `tfarm assumptions --json`; "hub" is null where the hub has no inertia to choose.
 
     Raises ParameterError for a rig: what the paper leaves open are section and hub of one beam.

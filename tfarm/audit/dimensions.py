@@ -9,7 +9,7 @@ import sympy as sp
 from .formulas import Expression
 
 Dimension = tuple[Fraction, Fraction, Fraction]  # powers of kg, m, s
-NONE: Dimension = (Fraction(0), Fraction(0), Fraction(0))
+PURE_NUMBER: Dimension = (Fraction(0), Fraction(0), Fraction(0))
 BASE = {"kg": (1, 0, 0), "m": (0, 1, 0), "s": (0, 0, 1), "N": (1, 1, -2), "Pa": (1, -1, -2), "1": (0, 0, 0)}
 
 
@@ -17,9 +17,9 @@ class MismatchError(Exception):
     """Unlike things are added."""
 
 
-def unit(text: str) -> Dimension:
+def unit_dimension(text: str) -> Dimension:
     """The dimension of a unit such as "kg/m^3" or "N m s"."""
-    total = NONE
+    total = PURE_NUMBER
     over = 1
     for token in text.replace("/", " / ").split():
         if token == "/":
@@ -42,17 +42,17 @@ def dimension(f: Expression, units: dict[str, Dimension]) -> Dimension | None:
     if f.is_Symbol:
         return units[f.name]
     if f.is_number:
-        return None if f == 0 else NONE
+        return None if f == 0 else PURE_NUMBER
     if f.is_Add:
         return _like([dimension(each, units) for each in f.args])
     if f.is_Mul:
         return _product([dimension(each, units) for each in f.args])
     if f.is_Pow:
-        base = dimension(f.base, units) or NONE
+        base = dimension(f.base, units) or PURE_NUMBER
         power = Fraction(int(f.exp.p), int(f.exp.q))
         return (base[0] * power, base[1] * power, base[2] * power)
     if isinstance(f, sp.exp):
-        return _like([dimension(f.args[0], units), NONE])
+        return _like([dimension(f.args[0], units), PURE_NUMBER])
     if f.func.__name__ == "integral":  # over x
         inside = dimension(f.args[0], units)
         return None if inside is None else _plus(inside, *(Fraction(n) for n in BASE["m"]))
@@ -64,7 +64,7 @@ def _plus(a: Dimension, *b: Fraction) -> Dimension:
 
 
 def _product(factors: list[Dimension | None]) -> Dimension | None:
-    total = NONE
+    total = PURE_NUMBER
     for factor in factors:
         if factor is None:
             return None

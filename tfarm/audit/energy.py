@@ -10,8 +10,8 @@ from functools import cache
 
 import sympy as sp
 
-from .formulas import Expression, clauses, jet, read, shown, sides, symbol, symbols
-from .jets import d_dt, parts, unbalanced
+from .formulas import Expression, clauses, jet, parsed, remainder, sides, symbol, symbols
+from .jets import d_dt, integral_parts, unbalanced
 from .motion import solved_motion
 
 KINETIC = "rho*A*(y_t + x*theta_t)^2 + rho*I*(phi_t + theta_t)^2"
@@ -30,24 +30,24 @@ SUBSTITUTED = (
     f" + a2*theta_t*(E*I*phi_x(0,t) + u) + {STRAIN_RATE}"
 )
 SUBSTITUTED_PRINTED = SUBSTITUTED.replace("(phi_t + theta_t)", "(phi_t + theta_x)")
-POWER_PRINTED = "V_t = theta_t*(a2*u + (a3 - a1)*E*I*phi_x(t,0))"
-POWER = "V_t = theta_t*(a2*u + (a2 - a1)*E*I*phi_x(0,t)); a3 = a1"
-LAW_PRINTED = "u = -K1*theta_t - K2*E*I*phi_x(t,0); 0 < K1 < oo; 0 < K2 < oo"
-LAW = "u = -K1*theta_t - K2*E*I*phi_x(0,t); 0 < K1 < oo; -oo < K2 < 1"
+POWER_FLOW_PRINTED = "V_t = theta_t*(a2*u + (a3 - a1)*E*I*phi_x(t,0))"
+POWER_FLOW = "V_t = theta_t*(a2*u + (a2 - a1)*E*I*phi_x(0,t)); a3 = a1"
+CONTROL_LAW_PRINTED = "u = -K1*theta_t - K2*E*I*phi_x(t,0); 0 < K1 < oo; 0 < K2 < oo"
+CONTROL_LAW = "u = -K1*theta_t - K2*E*I*phi_x(0,t); 0 < K1 < oo; -oo < K2 < 1"
 DECAY_PRINTED = "V_t = -K*theta_t^2"
 DECAY = "V_t = -a2*K1*theta_t^2; a3 = a1; a1 = a2*(1 - K2)"
-DAMPED_PRINTED = "u = -K1*theta_t - K2*E*I*phi_x(0,t)"
-DAMPED = "u = -K1*theta_t - K2*E*I*(phi_x(0,t) + C*phi_xt(0,t))"
-VARIED = "V_t = -a2*K1*theta_t^2; a3 = a1; a1 = a2*(1 - K2)"
+DAMPED_LAW_PRINTED = "u = -K1*theta_t - K2*E*I*phi_x(0,t)"
+DAMPED_LAW = "u = -K1*theta_t - K2*E*I*(phi_x(0,t) + C*phi_xt(0,t))"
+VARIED_DECAY = "V_t = -a2*K1*theta_t^2; a3 = a1; a1 = a2*(1 - K2)"
 
 a1, a2, a3, u, theta_t = (*symbols("a1 a2 a3 u"), jet("theta", t=1))
-M0 = read("E*I*phi_x(0,t)")
+M0 = parsed("E*I*phi_x(0,t)")
 
 
-def rate(energy: Expression, damping: Expression = 0) -> Expression:
+def rate(energy_of: Expression, damping: Expression = 0) -> Expression:
     """dV/dt with the accelerations of (1)-(5); with damping, E phi_x becomes E (phi_x + C phi_xt) in them."""
     arm, tip, hub = (_damped(each, damping) for each in solved_motion())
-    inside, outside = parts(d_dt(energy))
+    inside, outside = integral_parts(d_dt(energy_of))
     outside = sp.expand(sp.expand(outside.subs(tip)).subs(hub))
     return sp.Function("integral")(sp.expand(inside.subs(arm))) + outside
 
@@ -64,7 +64,7 @@ def _damped(solved: dict[Expression, Expression], C: Expression) -> dict[Express
 
 
 @cache
-def energy(text: str) -> Expression:
+def energy_of(text: str) -> Expression:
     """V of a text."""
     return sides(text)[symbol("V")]
 
@@ -78,28 +78,28 @@ def claimed(text: str) -> tuple[Expression, dict[Expression, Expression]]:
 def is_total_energy(text: str) -> str:
     """(15): with all weights one, the torque's power is all that changes the arm's energy."""
     ones = dict.fromkeys((a1, a2, a3), 1)
-    return unbalanced(rate(energy(text).subs(ones)) - u * theta_t)
+    return unbalanced(rate(energy_of(text).subs(ones)) - u * theta_t)
 
 
 def is_derivative(text: str) -> str:
     """(16): against d/dt of (15) as printed, before any equation of motion."""
     value, _ = claimed(text)
-    return shown(*parts(d_dt(energy(V_PRINTED)) - value))
+    return remainder(*integral_parts(d_dt(energy_of(V_PRINTED)) - value))
 
 
 def is_substituted(text: str) -> str:
     """(17): (16) with the accelerations of (1)-(3)."""
     value, _ = claimed(text)
     arm, _, hub = solved_motion()
-    inside, outside = parts(claimed(RATE)[0])
-    there, beyond = parts(value)
-    return shown(inside.subs(arm) - there, outside.subs(hub) - beyond)
+    inside, outside = integral_parts(claimed(RATE)[0])
+    there, beyond = integral_parts(value)
+    return remainder(inside.subs(arm) - there, outside.subs(hub) - beyond)
 
 
 def is_power(text: str) -> str:
     """(18): against dV/dt of (15) with its payload, integrated by parts."""
     value, conditions = claimed(text)
-    return unbalanced((rate(energy(V)) - value).subs(conditions))
+    return unbalanced((rate(energy_of(V)) - value).subs(conditions))
 
 
 def with_law(value: Expression, text: str) -> Expression:
@@ -109,8 +109,8 @@ def with_law(value: Expression, text: str) -> Expression:
 
 def proven_gains(law: Expression) -> dict[str, Expression]:
     """The intervals of K1 and K2 for which some a1, a2 > 0 make the true dV/dt (a3 = a1) a negative square."""
-    M, slope = symbol("M(0)"), read("phi_x(0,t)")
-    power = sp.expand(claimed(POWER)[0].subs(u, law)).subs(slope, M / read("E*I"))
+    M, slope = symbol("M(0)"), parsed("phi_x(0,t)")
+    power = sp.expand(claimed(POWER_FLOW)[0].subs(u, law)).subs(slope, M / parsed("E*I"))
     weight = sp.solve(power.coeff(M), a1)[0] / a2  # a1/a2, which must be positive
     damping = -sp.expand(power.subs(M, 0)) / (a2 * theta_t**2)
     return {"K1": _positive(damping, symbol("K1")), "K2": _positive(weight, symbol("K2"))}
@@ -120,34 +120,32 @@ def _positive(f: Expression, gain: Expression) -> Expression:
     return sp.solveset(sp.simplify(f) > 0, gain, sp.S.Reals)
 
 
-def are_gains(text: str) -> str:
+def are_proven_gains(text: str) -> str:
     """(19): the gains that the text allows against those for which dV/dt <= 0 can be proven with its law."""
     proven, wrong = proven_gains(sides(text)[u]), []
     for clause in clauses(text)[1:]:
         low, name, high = clause.split(" < ")
-        allowed = sp.Interval.open(read(low), read(high))
+        allowed = sp.Interval.open(parsed(low), parsed(high))
         sets = {"allowed, not proven": allowed - proven[name], "proven, not allowed": proven[name] - allowed}
-        wrong += [f"{what}: {name} in {_interval(rest)}" for what, rest in sets.items() if rest is not sp.S.EmptySet]
+        for what, rest in ((what, rest) for what, rest in sets.items() if rest is not sp.S.EmptySet):
+            ends = "(" if rest.left_open else "[", ")" if rest.right_open else "]"
+            wrong.append(f"{what}: {name} in {ends[0]}{rest.start}, {rest.end}{ends[1]}")
     return "; ".join(wrong) or "0"
-
-
-def _interval(rest: Expression) -> str:
-    return f"{'(' if rest.left_open else '['}{rest.start}, {rest.end}{')' if rest.right_open else ']'}"
 
 
 def is_decay(text: str) -> str:
     """(20): (19) in the true dV/dt."""
     value, stated = claimed(text)
     weights = stated or claimed(DECAY)[1]
-    change = with_law(rate(energy(V)), LAW) - value
+    change = with_law(rate(energy_of(V)), CONTROL_LAW) - value
     return unbalanced(change.subs(a3, weights[a3]).subs(a1, weights[a1]))
 
 
 def is_damped_decay(text: str) -> str:
     """Section 3 with C > 0: dV/dt may be -a2 K1 theta_t^2 less what the material dissipates, no more."""
     weights = {a1: a2 * (1 - symbol("K2"))}
-    lost = read("-a2*K1*theta_t^2 - a1*C*integral(E*I*phi_xt^2)")
-    change = with_law(rate(energy(V).subs(a3, a1), symbol("C")), text) - lost
+    lost = parsed("-a2*K1*theta_t^2 - a1*C*integral(E*I*phi_xt^2)")
+    change = with_law(rate(energy_of(V).subs(a3, a1), symbol("C")), text) - lost
     return unbalanced(change.subs(weights))
 
 
@@ -156,6 +154,6 @@ def is_varied_decay(text: str) -> str:
     value, conditions = claimed(text)
     weight = conditions[a1]
     K2_t = conditions.get(jet("K2", t=1), jet("K2", t=1))
-    law_rate = with_law(rate(energy(V)).subs(a3, a1), LAW)
-    moving = sp.diff(energy(V).subs(a3, a1), a1) * sp.diff(weight, symbol("K2")) * K2_t
+    law_rate = with_law(rate(energy_of(V)).subs(a3, a1), CONTROL_LAW)
+    moving = sp.diff(energy_of(V).subs(a3, a1), a1) * sp.diff(weight, symbol("K2")) * K2_t
     return unbalanced((law_rate + moving - value).subs(a1, weight))

@@ -55,7 +55,7 @@ def jet_parts(s: Expression) -> tuple[str, int, int, str] | None:
 
 
 @cache
-def read(text: str) -> Expression:
+def parsed(text: str) -> Expression:
     """The SymPy expression of a text without = or ;."""
     names: dict[str, Expression] = dict(FUNCTIONS)
 
@@ -81,7 +81,7 @@ def clauses(text: str) -> list[str]:
 def sides(text: str) -> dict[Expression, Expression]:
     """Left and right side of each of a text's equations."""
     pairs = [clause.split(" = ") for clause in clauses(text) if " = " in clause]
-    return {read(left): read(right) for left, right in pairs}
+    return {parsed(left): parsed(right) for left, right in pairs}
 
 
 def difference(text: str) -> Expression:
@@ -90,7 +90,7 @@ def difference(text: str) -> Expression:
     return left - right
 
 
-def shown(*expressions: Expression) -> str:
+def remainder(*expressions: Expression) -> str:
     """What is left of expressions that should vanish: "0", or the rest, cut where it is long."""
     left = [each for each in map(sp.factor_terms, map(sp.expand, expressions)) if each != 0]
     if not left:

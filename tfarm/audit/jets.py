@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sympy as sp
 
-from .formulas import Expression, jet, jet_parts, shown, symbol
+from .formulas import Expression, jet, jet_parts, remainder, symbol
 
 x, L = symbol("x"), symbol("L")
 AT_TIP, AT_ROOT = "(L,t)", "(0,t)"
@@ -12,23 +12,23 @@ AT_TIP, AT_ROOT = "(L,t)", "(0,t)"
 
 def d_dx(f: Expression) -> Expression:
     """Total derivative by the running x; values at the ends do not move."""
-    moving = [(s, parts) for s in f.free_symbols if (parts := jet_parts(s)) and not parts[3]]
+    moving = [(s, integral_parts) for s in f.free_symbols if (integral_parts := jet_parts(s)) and not integral_parts[3]]
     return sp.diff(f, x) + sum(sp.diff(f, s) * jet(field, i + 1, j) for s, (field, i, j, _) in moving)
 
 
 def d_dt(f: Expression) -> Expression:
     """Total derivative by time, also of integrals and of values at the ends."""
-    inside, outside = parts(f)
+    inside, outside = integral_parts(f)
     rate = _d_dt(outside)
     return rate + sp.Function("integral")(_d_dt(inside)) if inside != 0 else rate
 
 
 def _d_dt(f: Expression) -> Expression:
-    moving = [(s, parts) for s in f.free_symbols if (parts := jet_parts(s)) and s.name != "a1"]
+    moving = [(s, integral_parts) for s in f.free_symbols if (integral_parts := jet_parts(s)) and s.name != "a1"]
     return sum((sp.diff(f, s) * jet(field, i, j + 1, at) for s, (field, i, j, at) in moving), sp.Integer(0))
 
 
-def parts(f: Expression) -> tuple[Expression, Expression]:
+def integral_parts(f: Expression) -> tuple[Expression, Expression]:
     """(g, h) of f = integral(g) + h."""
     f = sp.expand(f)
     integrals = [a for a in f.atoms(sp.Function) if a.func.__name__ == "integral"]
@@ -59,6 +59,6 @@ def unbalanced(f: Expression) -> str:
     Let the arm end at a running x.  f vanishes for every length if it does for length 0, and if its slope
     g + dh/dx vanishes: integration by parts, without having to guess what to integrate.
     """
-    inside, outside = parts(f)
+    inside, outside = integral_parts(f)
     outside = at_running_point(outside)
-    return shown(inside + d_dx(outside), at_root(outside))
+    return remainder(inside + d_dx(outside), at_root(outside))

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from tfarm.arm import Arm, Hub, Link, Payload, Section, Theory
 
 inf = math.inf
-FREQUENCY = "frequency [Hz]"
+CYCLIC = "frequency [Hz]"
 ANGULAR = "frequency [rad/s]"
 WAVE_NUMBER = "L (w^2 rhoA/EI)^(1/4)"
 REDUCED = "w L^2 (rhoA/EI)^(1/2)"
@@ -28,7 +28,7 @@ class Case:
     name: str
     arm: Arm
     theory: Theory
-    quantity: str  # FREQUENCY, ANGULAR, WAVE_NUMBER or REDUCED; w in rad/s
+    quantity: str  # CYCLIC, ANGULAR, WAVE_NUMBER or REDUCED; w in rad/s
     printed: tuple[str, ...]
     why: Mapping[int, str] = field(default_factory=dict)  # by mode, where the printed digits are not reached
 
@@ -53,7 +53,7 @@ def beam(*, slenderness: float = 100.0, root: float = inf, mass: float = 0.0, in
     return Arm(link=link, hub=Hub(inertia=root), payload=Payload(mass=mass, inertia=inertia))
 
 
-ENDS: dict[str, dict[str, float]] = {
+END_CONDITIONS: dict[str, dict[str, float]] = {
     "clamped-free": {},
     "clamped-sliding": {"inertia": inf},
     "clamped-pinned": {"mass": inf},
@@ -62,10 +62,57 @@ ENDS: dict[str, dict[str, float]] = {
 }
 
 
-def _nafems() -> Source:
-    section = Section.rectangle(width=2.0, depth=2.0)
-    link = Link.isotropic(length=10.0, density=8000.0, youngs_modulus=200e9, poissons_ratio=0.3, section=section)
-    return Source(
+def _roots(
+    ends: str, printed: tuple[str, ...], quantity: str = WAVE_NUMBER, why: Mapping[int, str] | None = None
+) -> Case:
+    arm = beam(**END_CONDITIONS[ends])
+    return Case(name=ends, arm=arm, theory="euler-bernoulli", quantity=quantity, printed=printed, why=why or {})
+
+
+def _slender(ends: str, printed: tuple[str, ...]) -> Case:
+    arm = beam(slenderness=SLENDER, **END_CONDITIONS[ends])
+    name = f"{ends}, L/r = {SLENDER:g}"
+    return Case(name=name, arm=arm, theory="timoshenko", quantity=WAVE_NUMBER, printed=printed)
+
+
+# By the ends of the beam.
+PINNED_ROOTS = ("3.92660231", "7.06858275", "10.21017612", "13.35176878", "16.49336143")
+BLEVINS_ROOTS = {
+    "clamped-free": ("1.87510407", "4.69409113", "7.85475744", "10.99554073", "14.13716839"),
+    "clamped-sliding": ("2.36502037", "5.49780392", "8.63937983", "11.78097245", "14.92256510"),
+    "clamped-pinned": PINNED_ROOTS,
+    "clamped-clamped": ("4.73004074", "7.85320462", "10.9956079", "14.1371655", "17.2787597"),
+    "pinned-free": PINNED_ROOTS,
+}
+BLEVINS_LAST_DIGIT = "one unit too much in the last digit: cos z cosh z = 1 between 10.99560783 and 10.99560784"
+# By h/L.
+LEE_SCHULTZ_ROOTS = {
+    0.002: ("4.72998", "7.85295", "10.9950"),
+    0.005: ("4.72963", "7.85163", "10.9917"),
+    0.01: ("4.72840", "7.84690", "10.9800"),
+    0.02: ("4.72350", "7.82817", "10.9341"),
+    0.05: ("4.68991", "7.70352", "10.6401"),
+    0.1: ("4.57955", "7.33122", "9.85611"),
+    0.2: ("4.24201", "6.41794", "8.28532"),
+}
+BIR_BLADE = Link.isotropic(
+    length=31.623, density=100.0, youngs_modulus=1e8, poissons_ratio=0.3,
+    section=Section.general(area=1.0, second_moment=1.0, shear_factor=5 / 6),
+)  # fmt: skip
+
+# By mass ratio m/(rhoA L) and inertia ratio I_c/(rhoA L^3) of each column.
+WANG_ROOTS = {
+    (1.0, 0.0): ("1.557298", "16.25009", "50.89584", "105.1983", "179.2320"),
+    (1.0, 0.1): ("1.70226", "23.17405", "63.1286", "122.5668", "201.6229"),
+    (1.0, 1.0): ("2.55044", "23.86031", "63.40190", "122.71062", "201.71107"),
+    (10.0, 1.0): ("0.6054297", "22.47413", "61.83822", "121.0850", "200.0480"),
+}
+WANG_SIGN = (
+    "printed with the sign of the tip inertia reversed: with -I_c for I_c their equation gives every printed digit"
+)
+
+SOURCES: tuple[Source, ...] = (
+    Source(
         key="nafems-fv5",
         citation="NAFEMS, Selected Benchmarks for Forced Vibration, R0016 (1993), test 5: deep simply supported beam, "
         "2 m x 2 m x 10 m, E = 200 GPa, nu = 0.3, 8000 kg/m^3; the bending modes",
@@ -74,9 +121,19 @@ def _nafems() -> Source:
         cases=(
             Case(
                 name="pinned-pinned",
-                arm=Arm(link=link, hub=Hub(inertia=0.0), payload=Payload(mass=inf)),
+                arm=Arm(
+                    link=Link.isotropic(
+                        length=10.0,
+                        density=8000.0,
+                        youngs_modulus=200e9,
+                        poissons_ratio=0.3,
+                        section=Section.rectangle(width=2.0, depth=2.0),
+                    ),
+                    hub=Hub(inertia=0.0),
+                    payload=Payload(mass=inf),
+                ),
                 theory="timoshenko",
-                quantity=FREQUENCY,
+                quantity=CYCLIC,
                 printed=("42.650", "148.15", "283.47"),
                 why={
                     1: "at odds with the other two targets: a shear factor that gave 42.650 Hz (0.8520) would give "
@@ -84,13 +141,8 @@ def _nafems() -> Source:
                 },
             ),
         ),
-    )
-
-
-def _code_aster_sdlv302() -> Source:
-    section = Section.rectangle(width=0.1, depth=0.2, shear_factor=5 / 6)
-    link = Link.isotropic(length=2.0, density=7800.0, youngs_modulus=2.1e11, poissons_ratio=0.3, section=section)
-    return Source(
+    ),
+    Source(
         key="code-aster-sdlv302",
         citation="code_aster, validation manual V2.04.302 (SDLV302), section 2: short simply supported beam, "
         "0.1 m x 0.2 m x 2 m, E = 210 GPa, nu = 0.3, 7800 kg/m^3, shear factor 5/6; after G. Robert, Samtech report "
@@ -99,92 +151,56 @@ def _code_aster_sdlv302() -> Source:
         cases=(
             Case(
                 name="pinned-pinned",
-                arm=Arm(link=link, hub=Hub(inertia=0.0), payload=Payload(mass=inf)),
+                arm=Arm(
+                    link=Link.isotropic(
+                        length=2.0,
+                        density=7800.0,
+                        youngs_modulus=2.1e11,
+                        poissons_ratio=0.3,
+                        section=Section.rectangle(width=0.1, depth=0.2, shear_factor=5 / 6),
+                    ),
+                    hub=Hub(inertia=0.0),
+                    payload=Payload(mass=inf),
+                ),
                 theory="timoshenko",
-                quantity=FREQUENCY,
+                quantity=CYCLIC,
                 printed=("115.7", "442.2", "931.6", "1534.0"),
                 why={4: "four figures are given, and 1534 is right to four: the zero behind the point is typesetting"},
             ),
         ),
-    )
-
-
-def _code_aster_v205400() -> Source:
-    printed = ("3.9266", "7.06858", "10.2102", "13.3518", "16.4934")
-    return Source(
+    ),
+    Source(
         key="code-aster-v2.05.400",
         citation="code_aster, validation manual V2.05.400, section 2.1, case 1: Euler-Bernoulli beam, pinned and free",
         reached="read in the manual",
-        cases=(_roots("pinned-free", printed),),
-    )
-
-
-def _blevins() -> Source:
-    pinned = ("3.92660231", "7.06858275", "10.21017612", "13.35176878", "16.49336143")
-    tables = {
-        "clamped-free": ("1.87510407", "4.69409113", "7.85475744", "10.99554073", "14.13716839"),
-        "clamped-sliding": ("2.36502037", "5.49780392", "8.63937983", "11.78097245", "14.92256510"),
-        "clamped-pinned": pinned,
-        "clamped-clamped": ("4.73004074", "7.85320462", "10.9956079", "14.1371655", "17.2787597"),
-        "pinned-free": pinned,
-    }
-    slender = ("clamped-free", "clamped-pinned", "pinned-free")
-    last_digit = "one unit too much in the last digit: cos z cosh z = 1 between 10.99560783 and 10.99560784"
-    return Source(
+        cases=(_roots("pinned-free", ("3.9266", "7.06858", "10.2102", "13.3518", "16.4934")),),
+    ),
+    Source(
         key="blevins-1979",
         citation="R. D. Blevins, Formulas for Natural Frequency and Mode Shape (1979), table 8-1: roots of the "
         "Euler-Bernoulli beam",
         reached="set down without a copy at hand; each digit confirmed by the transcendental equations",
         cases=(
             *(
-                _roots(ends, printed, why={3: last_digit} if ends == "clamped-clamped" else {})
-                for ends, printed in tables.items()
+                _roots(ends, printed, why={3: BLEVINS_LAST_DIGIT} if ends == "clamped-clamped" else {})
+                for ends, printed in BLEVINS_ROOTS.items()
             ),
-            *(_slender(ends, tables[ends][:3]) for ends in slender),
+            *(_slender(ends, BLEVINS_ROOTS[ends][:3]) for ends in ("clamped-free", "clamped-pinned", "pinned-free")),
         ),
-    )
-
-
-def _thomson() -> Source:
-    clamped, free = "clamped-clamped", "clamped-free"
-    return Source(
+    ),
+    Source(
         key="thomson-appendix-d",
         citation="W. T. Thomson, Theory of Vibration with Applications (2010), appendix D, p. 510: normal modes of "
         "uniform Euler-Bernoulli beams",
         reached="read in a scan of the page",
         cases=(
-            _roots(clamped, ("4.7300", "7.8532", "10.9956")),
-            _roots(clamped, ("22.3733", "61.6728", "120.9034"), REDUCED),
-            _roots(free, ("1.8751", "4.6941", "7.8548")),
-            _roots(free, ("3.5160", "22.0345", "61.6972"), REDUCED),
+            _roots("clamped-clamped", ("4.7300", "7.8532", "10.9956")),
+            _roots("clamped-clamped", ("22.3733", "61.6728", "120.9034"), REDUCED),
+            _roots("clamped-free", ("1.8751", "4.6941", "7.8548")),
+            _roots("clamped-free", ("3.5160", "22.0345", "61.6972"), REDUCED),
         ),
-    )
-
-
-def _roots(
-    ends: str, printed: tuple[str, ...], quantity: str = WAVE_NUMBER, why: Mapping[int, str] | None = None
-) -> Case:
-    arm = beam(**ENDS[ends])
-    return Case(name=ends, arm=arm, theory="euler-bernoulli", quantity=quantity, printed=printed, why=why or {})
-
-
-def _slender(ends: str, printed: tuple[str, ...]) -> Case:
-    arm = beam(slenderness=SLENDER, **ENDS[ends])
-    name = f"{ends}, L/r = {SLENDER:g}"
-    return Case(name=name, arm=arm, theory="timoshenko", quantity=WAVE_NUMBER, printed=printed)
-
-
-def _lee_schultz() -> Source:
-    columns = {
-        0.002: ("4.72998", "7.85295", "10.9950"),
-        0.005: ("4.72963", "7.85163", "10.9917"),
-        0.01: ("4.72840", "7.84690", "10.9800"),
-        0.02: ("4.72350", "7.82817", "10.9341"),
-        0.05: ("4.68991", "7.70352", "10.6401"),
-        0.1: ("4.57955", "7.33122", "9.85611"),
-        0.2: ("4.24201", "6.41794", "8.28532"),
-    }
-    return Source(
+    ),
+    Source(
         key="lee-schultz-2004",
         citation="J. Lee, W. W. Schultz, Eigenvalue analysis of Timoshenko beams and axisymmetric Mindlin plates by "
         "the pseudospectral method, Journal of Sound and Vibration 269 (2004) 609-621: clamped-clamped beams, "
@@ -193,20 +209,15 @@ def _lee_schultz() -> Source:
         cases=tuple(
             Case(
                 name=f"clamped-clamped, h/L = {ratio:g}",
-                arm=beam(slenderness=math.sqrt(12) / ratio, **ENDS["clamped-clamped"]),
+                arm=beam(slenderness=math.sqrt(12) / ratio, **END_CONDITIONS["clamped-clamped"]),
                 theory="timoshenko",
                 quantity=WAVE_NUMBER,
                 printed=printed,
             )
-            for ratio, printed in columns.items()
+            for ratio, printed in LEE_SCHULTZ_ROOTS.items()
         ),
-    )
-
-
-def _sdll15() -> Source:
-    section = Section.tube(outer_diameter=0.35, inner_diameter=0.32)
-    link = Link.isotropic(length=10.0, density=7800.0, youngs_modulus=2.1e11, poissons_ratio=0.3, section=section)
-    return Source(
+    ),
+    Source(
         key="vpcs-sdll15",
         citation="Société française des mécaniciens, Guide de validation des progiciels de calcul de structures "
         "(AFNOR 1990), sheet SDLL15/89, problem 1: Euler-Bernoulli tube of 350/320 mm and 10 m, E = 210 GPa, "
@@ -216,9 +227,19 @@ def _sdll15() -> Source:
         cases=(
             Case(
                 name="clamped, with a tip mass",
-                arm=Arm(link=link, hub=Hub(inertia=inf), payload=Payload(mass=1000.0)),
+                arm=Arm(
+                    link=Link.isotropic(
+                        length=10.0,
+                        density=7800.0,
+                        youngs_modulus=2.1e11,
+                        poissons_ratio=0.3,
+                        section=Section.tube(outer_diameter=0.35, inner_diameter=0.32),
+                    ),
+                    hub=Hub(inertia=inf),
+                    payload=Payload(mass=1000.0),
+                ),
                 theory="euler-bernoulli",
-                quantity=FREQUENCY,
+                quantity=CYCLIC,
                 printed=("1.65", "16.07", "50.02", "103.20"),
                 why={
                     1: "the sheet's first frequency is Rayleigh's estimate with 0.24 of the beam's mass, 1.6533 Hz; "
@@ -226,13 +247,8 @@ def _sdll15() -> Source:
                 },
             ),
         ),
-    )
-
-
-def _bir() -> Source:
-    section = Section.general(area=1.0, second_moment=1.0, shear_factor=5 / 6)
-    link = Link.isotropic(length=31.623, density=100.0, youngs_modulus=1e8, poissons_ratio=0.3, section=section)
-    return Source(
+    ),
+    Source(
         key="bir-2010",
         citation="G. S. Bir, Verification of BModes: rotary beam and tower modal analysis code, NREL/CP-500-47953 "
         "(2010), table 5, and AIAA 2009-1035, table 3a, at rest; analytical column, after Wright, Smith, Thresher and "
@@ -242,7 +258,7 @@ def _bir() -> Source:
         cases=(
             Case(
                 name="clamped-free",
-                arm=Arm(link=link, hub=Hub(inertia=inf)),
+                arm=Arm(link=BIR_BLADE, hub=Hub(inertia=inf)),
                 theory="euler-bernoulli",
                 quantity=ANGULAR,
                 printed=("3.516", "22.035", "61.697"),
@@ -253,27 +269,14 @@ def _bir() -> Source:
             ),
             Case(
                 name="clamped, with a tip mass",
-                arm=Arm(link=link, hub=Hub(inertia=inf), payload=Payload(mass=3162.3)),
+                arm=Arm(link=BIR_BLADE, hub=Hub(inertia=inf), payload=Payload(mass=3162.3)),
                 theory="euler-bernoulli",
                 quantity=ANGULAR,
                 printed=("1.557", "16.25"),
             ),
         ),
-    )
-
-
-def _wang() -> Source:
-    """Mass ratio m/(rhoA L) and inertia ratio I_c/(rhoA L^3) of each column."""
-    columns = {
-        (1.0, 0.0): ("1.557298", "16.25009", "50.89584", "105.1983", "179.2320"),
-        (1.0, 0.1): ("1.70226", "23.17405", "63.1286", "122.5668", "201.6229"),
-        (1.0, 1.0): ("2.55044", "23.86031", "63.40190", "122.71062", "201.71107"),
-        (10.0, 1.0): ("0.6054297", "22.47413", "61.83822", "121.0850", "200.0480"),
-    }
-    why = (
-        "printed with the sign of the tip inertia reversed: with -I_c for I_c their equation gives every printed digit"
-    )
-    return Source(
+    ),
+    Source(
         key="wang-2017",
         citation="B. Wang, Z. Wang, X. Zuo, Frequency equation of flexural vibrating cantilever beam considering the "
         "rotary inertial moment of an attached mass, Mathematical Problems in Engineering 2017, 1568019, table 1: "
@@ -287,21 +290,9 @@ def _wang() -> Source:
                 theory="euler-bernoulli",
                 quantity=REDUCED,
                 printed=printed,
-                why=dict.fromkeys(range(1, 6), why) if inertia else {},
+                why=dict.fromkeys(range(1, 6), WANG_SIGN) if inertia else {},
             )
-            for (mass, inertia), printed in columns.items()
+            for (mass, inertia), printed in WANG_ROOTS.items()
         ),
-    )
-
-
-SOURCES: tuple[Source, ...] = (
-    _nafems(),
-    _code_aster_sdlv302(),
-    _code_aster_v205400(),
-    _blevins(),
-    _thomson(),
-    _lee_schultz(),
-    _sdll15(),
-    _bir(),
-    _wang(),
+    ),
 )

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from tfarm.arm import Arm, load
 
 K1 = 0.3  # N m s/rad
-DIGITS = 30
-ORDER = 8  # polynomials a field
+ROOT_DIGITS = 30  # of a root, of which four are shown
+POLYNOMIALS = 8  # polynomials a field
 Matrix = NDArray[np.float64]
 
 
-def characteristic(arm: Arm, K2: float, s: Any) -> Any:
+def end_determinant(arm: Arm, K2: float, s: Any) -> Any:
     """Determinant of the ends' conditions, undamped, under (19), by exp(A(s) L) instead of the appendix."""
     link = arm.link
     EI, kGA = mpf(link.EI), mpf(link.kGA)
@@ -34,15 +34,15 @@ def characteristic(arm: Arm, K2: float, s: Any) -> Any:
 
 
 def growth(K2: float, near: complex) -> Any:
-    """The closed-loop root of the default arm near a point, to DIGITS digits."""
+    """The closed-loop root of the default arm near a point, to ROOT_DIGITS digits."""
     arm = load("sasaki2012")
-    with mpmath.workdps(2 * DIGITS):
-        return mpmath.findroot(lambda s: characteristic(arm, K2, s), mpc(near), tol=mpf(10) ** (-DIGITS))
+    with mpmath.workdps(2 * ROOT_DIGITS):
+        return mpmath.findroot(lambda s: end_determinant(arm, K2, s), mpc(near), tol=mpf(10) ** (-ROOT_DIGITS))
 
 
 def matrices(arm: Arm, hub: float) -> tuple[Matrix, Matrix]:
     """Mass and stiffness of the undamped arm on polynomials: y = x p(x), phi = x q(x), and theta last."""
-    link, n = arm.link, ORDER
+    link, n = arm.link, POLYNOMIALS
     nodes, weights = legendre.leggauss(2 * n)
     x, weights = (nodes + 1) / 2, weights / 2 * link.length
     values = legendre.legvander(2 * x - 1, n - 1)
@@ -91,7 +91,7 @@ def pumped_text() -> str:
     low, high, first, second = 0.1, 0.6, 0.027, 0.025
     constant = max(pumped(low, low, first, second), pumped(high, high, first, second))
     return (
-        f"Counterexample: default arm, K1 = {K1}, {ORDER} polynomials a field, continuous time: K2 = {low} for "
+        f"Counterexample: default arm, K1 = {K1}, {POLYNOMIALS} polynomials a field, continuous time: K2 = {low} for "
         f"{1e3 * first:.0f} ms and {high} for {1e3 * second:.0f} ms grows by {pumped(low, high, first, second):.3f} a "
         f"period, either gain alone by {constant:.6f}, which is the angle at rest."
     )

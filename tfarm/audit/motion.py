@@ -8,7 +8,7 @@ from functools import cache, partial
 
 import sympy as sp
 
-from .formulas import Expression, difference, jet, jet_parts, read, shown, symbol
+from .formulas import Expression, difference, jet, jet_parts, parsed, remainder, symbol
 from .jets import AT_ROOT, at_running_point, d_dt, d_dx, unbalanced
 from .rows import Claim
 
@@ -45,19 +45,19 @@ TRANSFORMED = {"y": "Y", "phi": "Phi", "theta": "Theta"}
 
 def euler(field: str) -> Expression:
     """Left side of the Euler-Lagrange equation of y or phi along the arm."""
-    l, rate, slope = read(DENSITY), jet(field, t=1), jet(field, x=1)
+    l, rate, slope = parsed(DENSITY), jet(field, t=1), jet(field, x=1)
     return d_dt(sp.diff(l, rate)) + d_dx(sp.diff(l, slope)) - sp.diff(l, jet(field))
 
 
 def along_arm(field: str, text: str) -> str:
     """(1), (2): against the Euler-Lagrange equation."""
-    return shown(euler(field) - difference(text))
+    return remainder(euler(field) - difference(text))
 
 
 def at_tip(field: str, text: str) -> str:
     """(4), (5): against the natural end condition, payload's inertia against the density's flux."""
-    natural = d_dt(sp.diff(read(PAYLOAD), jet(field, t=1))) - sp.diff(read(DENSITY), jet(field, x=1))
-    return shown(natural - at_running_point(difference(text)))
+    natural = d_dt(sp.diff(parsed(PAYLOAD), jet(field, t=1))) - sp.diff(parsed(DENSITY), jet(field, x=1))
+    return remainder(natural - at_running_point(difference(text)))
 
 
 def at_hub(text: str) -> str:
@@ -65,19 +65,19 @@ def at_hub(text: str) -> str:
     theta_t = jet("theta", t=1)
     accelerations = [jet("y", t=2), jet("phi", t=2)]
     solved = sp.solve([euler("y"), euler("phi")], accelerations)
-    held = {field: d_dt(sp.diff(read(PAYLOAD), jet(field, t=1))) for field in ("y", "phi")}
-    end = [held[field] - sp.diff(read(DENSITY), jet(field, x=1)) for field in ("y", "phi")]
-    arm = sp.expand(d_dt(sp.diff(read(DENSITY), theta_t)).subs(solved))
-    payload = sp.expand(d_dt(sp.diff(read(PAYLOAD), theta_t)).subs(sp.solve(end, accelerations)))
+    held = {field: d_dt(sp.diff(parsed(PAYLOAD), jet(field, t=1))) for field in ("y", "phi")}
+    end = [held[field] - sp.diff(parsed(DENSITY), jet(field, x=1)) for field in ("y", "phi")]
+    arm = sp.expand(d_dt(sp.diff(parsed(DENSITY), theta_t)).subs(solved))
+    payload = sp.expand(d_dt(sp.diff(parsed(PAYLOAD), theta_t)).subs(sp.solve(end, accelerations)))
     balance = symbol("I_h") * jet("theta", t=2) - symbol("u") + sp.Function("integral")(arm) + payload
     return unbalanced(balance - difference(text))
 
 
 def at_clamp(field: str, text: str) -> str:
     """(6), (7): what the clamp would do by its force (or moment) on what the condition leaves free."""
-    free, reaction = jet(field, t=1, at=AT_ROOT), -sp.diff(read(DENSITY), jet(field, x=1))
+    free, reaction = jet(field, t=1, at=AT_ROOT), -sp.diff(parsed(DENSITY), jet(field, x=1))
     solved = sp.solve(d_dt(difference(text)), free)
-    return shown(reaction * (solved[0] if solved else free))
+    return remainder(reaction * (solved[0] if solved else free))
 
 
 def transformed(f: Expression) -> Expression:
@@ -93,7 +93,7 @@ def transformed(f: Expression) -> Expression:
 
 def in_s(number: int, text: str) -> str:
     """(8)-(14): against the transform of (1)-(7)."""
-    return shown(transformed(difference(TIME[number - 7])) - difference(text))
+    return remainder(transformed(difference(TIME[number - 7])) - difference(text))
 
 
 def misplaced(text: str) -> str:
@@ -122,7 +122,7 @@ CHECKS |= {
 }
 
 HAMILTON = "Derived afresh by Hamilton's principle from w = y + x theta, psi = phi + theta (SymPy), at C = 0: "
-EVIDENCE = {
+MOTION_EVIDENCE = {
     1: HAMILTON + "the Euler-Lagrange equation of y.",
     2: HAMILTON + "the Euler-Lagrange equation of phi.",
     3: "Angular momentum of hub, arm and payload about the axis has u as its only source (SymPy, C = 0, any length). "
@@ -138,19 +138,24 @@ EVIDENCE = {
 }
 
 
-def claims() -> list[Claim]:
-    """The rows of (1)-(14), and of the order of arguments."""
-    found = [Claim(equation=f"({n})", printed=TIME[n], check=CHECKS[n], evidence=EVIDENCE[n]) for n in TIME]
-    for n, printed in LAPLACE_PRINTED.items():
-        evidence = EVIDENCE.get(n, f"Laplace transform of ({n - 7}), from rest, at C = 0 (SymPy).")
-        corrected = "" if LAPLACE[n] == printed else LAPLACE[n]
-        found.append(Claim(equation=f"({n})", printed=printed, corrected=corrected, check=CHECKS[n], evidence=evidence))
-    order = Claim(
+MOTION_CLAIMS = (  # (1)-(14), and the order of arguments
+    *(Claim(equation=f"({n})", printed=TIME[n], check=CHECKS[n], evidence=MOTION_EVIDENCE[n]) for n in TIME),
+    *(
+        Claim(
+            equation=f"({n})",
+            printed=printed,
+            corrected="" if LAPLACE[n] == printed else LAPLACE[n],
+            check=CHECKS[n],
+            evidence=MOTION_EVIDENCE.get(n, f"Laplace transform of ({n - 7}), from rest, at C = 0 (SymPy)."),
+        )
+        for n, printed in LAPLACE_PRINTED.items()
+    ),
+    Claim(
         equation="(3), (10), (18), (19): order of arguments",
         printed="phi_x(t,0); Phi_x(s,0); phi_x(t,0); phi_x(t,0)",
         corrected="phi_x(0,t); Phi_x(0,s); phi_x(0,t); phi_x(0,t)",
         check=misplaced,
         evidence="Counted: (4)-(7), (11)-(14) and (17) have the place first, these four the time. Taken literally, the "
         "root moment in (3) would be the moment at x = t and time 0. Notation only.",
-    )
-    return [*found, order]
+    ),
+)

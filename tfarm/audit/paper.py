@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable
 from functools import cache
 from typing import Any
 
 from tfarm.columns import Table
 
-from . import appendix_rows, energy_rows, motion, table, tuner
-from .rows import ROWS, Claim, Row
+from .appendix_rows import APPENDIX_CLAIMS, DAMPING_CLAIM
+from .energy_rows import ENERGY_CLAIMS
+from .motion import MOTION_CLAIMS
+from .rows import AUDIT_COLUMNS, AuditRow, Claim
+from .table import TABLE_CLAIMS
+from .tuner import TUNER_CLAIMS
 
 PAPER = (
     "Self-Tuning Vibration Control of a Rotational Flexible Timoshenko Arm Using Neural Networks, "
@@ -20,18 +22,11 @@ PAPER = (
 
 def claims() -> tuple[Claim, ...]:
     """Every claim, in the order of the paper."""
-    return (
-        *motion.claims(),
-        appendix_rows.damping(),
-        *energy_rows.claims(),
-        *tuner.claims(),
-        *table.claims(),
-        *appendix_rows.claims(),
-    )
+    return (*MOTION_CLAIMS, DAMPING_CLAIM, *ENERGY_CLAIMS, *TUNER_CLAIMS, *TABLE_CLAIMS, *APPENDIX_CLAIMS)
 
 
 @cache
-def audit() -> tuple[Row, ...]:
+def audit() -> tuple[AuditRow, ...]:
     """Check every equation, as printed and as corrected.
 
     Raises CertificationError if a correction does not pass its own check.
@@ -39,16 +34,6 @@ def audit() -> tuple[Row, ...]:
     return tuple(claim.row() for claim in claims())
 
 
-def records(rows: Iterable[Row]) -> list[dict[str, str]]:
-    """Rows as plain dictionaries, without the typeset formulas."""
-    return list(Table(columns=ROWS, record=list(rows)))
-
-
-def to_json(rows: Iterable[Row]) -> str:
-    """Rows as a JSON array."""
-    return json.dumps(records(rows), indent=2, ensure_ascii=False)
-
-
 def audit_answer() -> dict[str, Any]:
     """The answer of `tfarm audit --json`."""
-    return {"paper": PAPER, "rows": Table(columns=ROWS, record=audit())}
+    return {"paper": PAPER, "rows": Table(columns=AUDIT_COLUMNS, record=audit())}

@@ -18,14 +18,24 @@ from tfarm.digits import TEXTS, general, powers, significant, singly, worded
 from tfarm.errors import CertificationError
 from tfarm.spectrum import modes
 
-from .literature import ANGULAR, FREQUENCY, REDUCED, SOURCES, WAVE_NUMBER, Case, Source
+from .literature import ANGULAR, CYCLIC, REDUCED, SOURCES, WAVE_NUMBER, Case, Source
 from .published_rigs import RIG_SOURCES
 
-__all__ = ["SOURCES", "Case", "Row", "Source", "agrees", "computed", "rows", "validate", "validate_answer"]
+__all__ = [
+    "SOURCES",
+    "Case",
+    "PublishedRow",
+    "Source",
+    "agrees",
+    "case_rows",
+    "computed",
+    "validate",
+    "validate_answer",
+]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Row:
+class PublishedRow:
     """One printed number and ours; `difference` is ours/printed - 1, `why` empty where ours agrees."""
 
     source: str
@@ -45,7 +55,7 @@ def lettered(text: str) -> str:
 
 
 ALL = (*SOURCES, *RIG_SOURCES)
-ROWS = (
+PUBLISHED_COLUMNS = (
     Column("source", "source", on=(JSON, *REPORT)),
     Column("case", "case", digits=worded(lettered), printed=TEXTS, folds=True),
     Column("quantity", "quantity", digits=worded(lettered), printed=TEXTS, folds=True),
@@ -60,13 +70,13 @@ ROWS = (
 )  # fmt: skip
 
 
-def validate(sources: tuple[Source, ...] = ALL) -> tuple[Row, ...]:
+def validate(sources: tuple[Source, ...] = ALL) -> tuple[PublishedRow, ...]:
     """Every row of every source.
 
     Raises CertificationError naming the rows that differ beyond their printed digits without a reason, or that give
     a reason and agree.
     """
-    found = tuple(row for source in sources for case in source.cases for row in rows(source.key, case))
+    found = tuple(row for source in sources for case in source.cases for row in case_rows(source.key, case))
     wrong = [row for row in found if row.agrees == bool(row.why)]
     if wrong:
         texts = (
@@ -78,10 +88,10 @@ def validate(sources: tuple[Source, ...] = ALL) -> tuple[Row, ...]:
     return found
 
 
-def rows(key: str, case: Case) -> list[Row]:
+def case_rows(key: str, case: Case) -> list[PublishedRow]:
     """The rows of one column of a table."""
     return [
-        Row(
+        PublishedRow(
             source=key,
             case=case.name,
             quantity=case.quantity,
@@ -102,7 +112,7 @@ def computed(case: Case) -> NDArray[np.float64]:
     table = modes(case.arm, count, theory=case.theory)
     omega, hertz = table.natural_frequency[-count:], table.natural_frequency_hz[-count:]
     reduced = omega * link.length**2 * np.sqrt(link.rhoA / link.EI)
-    return {FREQUENCY: hertz, ANGULAR: omega, REDUCED: reduced, WAVE_NUMBER: np.sqrt(reduced)}[case.quantity]
+    return {CYCLIC: hertz, ANGULAR: omega, REDUCED: reduced, WAVE_NUMBER: np.sqrt(reduced)}[case.quantity]
 
 
 def agrees(ours: float, printed: str) -> bool:
@@ -120,7 +130,7 @@ def validate_answer() -> dict[str, Any]:
     found = validate()
     return {
         "sources": [{"key": s.key, "citation": s.citation, "reached": s.reached} for s in ALL],
-        "rows": Table(columns=ROWS, record=found),
+        "rows": Table(columns=PUBLISHED_COLUMNS, record=found),
         "agree": sum(row.agrees for row in found),
         "explained": sum(bool(row.why) for row in found),
     }

@@ -19,11 +19,11 @@ from tfarm.errors import CertificationError
 
 from .typesetting import tex
 
-NOISE = 1e-25  # relative: numbers are compared at 50 digits
+RESIDUAL_NOISE = 1e-25  # relative: numbers are compared at 50 digits
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Row:
+class AuditRow:
     """One equation as printed and as corrected, with what each leaves in the check that tells them apart."""
 
     equation: str
@@ -37,7 +37,7 @@ class Row:
     corrected_tex: str
 
 
-ROWS = (
+AUDIT_COLUMNS = (
     Column("equation", "equation", folds=True),
     Column("verdict", "verdict"),
     Column("printed", on=(JSON, FILES)),
@@ -51,7 +51,10 @@ ROWS = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Claim:
-    """What is said of an equation; `check` gives the residual of a text, "0" or a number below NOISE if it is right."""
+    """What is said of an equation.
+
+    `check` gives the residual of a text, "0" or a number below RESIDUAL_NOISE if it is right.
+    """
 
     equation: str
     printed: str
@@ -62,7 +65,7 @@ class Claim:
     measured: Callable[[], str] | None = None  # numbers that go with the evidence
     typeset: Callable[[str], str] = tex
 
-    def row(self) -> Row:
+    def row(self) -> AuditRow:
         """Run the check on both texts.  Raises CertificationError where the corrected one leaves a residual."""
         corrected = self.corrected or self.printed
         residual_printed = self.check(self.printed)
@@ -70,7 +73,7 @@ class Claim:
         if not is_zero(residual_corrected):
             raise CertificationError(f"{self.equation}, as corrected, leaves {residual_corrected}")
         numbers = "" if self.measured is None else self.measured()
-        return Row(
+        return AuditRow(
             equation=self.equation,
             verdict=self._verdict(residual_printed),
             printed=self.printed,
@@ -89,8 +92,8 @@ class Claim:
 
 
 def is_zero(residual: str) -> bool:
-    """Whether a residual says that nothing is left: "0", or a number below NOISE."""
+    """Whether a residual says that nothing is left: "0", or a number below RESIDUAL_NOISE."""
     try:
-        return abs(float(residual)) < NOISE
+        return abs(float(residual)) < RESIDUAL_NOISE
     except ValueError:
         return False

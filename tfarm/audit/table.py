@@ -6,15 +6,17 @@ import math
 from functools import partial
 
 from .appendix import LAMBDA
-from .dimensions import Dimension, mismatch, spelled, unit
-from .formulas import clauses, read
+from .dimensions import Dimension, mismatch, spelled, unit_dimension
+from .formulas import clauses, parsed
 from .motion import TIME
 from .rows import Claim
 from .typesetting import in_words
-from .units import NEEDED, UNITS, unlike
+from .units import NEEDED, PAPER_UNITS, unlike
 
-ALUMINIUM = (2550.0, 2900.0)  # kg/m^3: wrought alloys, from aluminium-lithium to those rich in copper and zinc
-E, G, A = 6.8944e10, 2.6517e10, 6.0e-4  # Pa, Pa, m^2, as printed
+ALUMINIUM_DENSITIES = (2550.0, 2900.0)  # kg/m^3: alloys from aluminium-lithium to those rich in copper and zinc
+PRINTED_E = 6.8944e10  # Pa, as printed
+PRINTED_G = 2.6517e10  # Pa
+PRINTED_A = 6.0e-4  # m^2
 OTHER_UNITS = "L: m; A: m^2; rho: kg/m^3; E: Pa; I_c: kg m^2; m: kg; kappa: 1; G: Pa"
 
 
@@ -22,28 +24,28 @@ def quantity(clause: str) -> tuple[str, float, Dimension]:
     """Name, value and dimension of a text such as "rho = 2766.7 kg/m^3"."""
     name, _, rest = clause.partition(" = ")
     value, _, of = rest.partition(" ")
-    return name, float(value), unit(of)
+    return name, float(value), unit_dimension(of)
 
 
 def is_aluminium(text: str) -> str:
     """rho: the relative distance from what aluminium alloys weigh, the material of E and G."""
     name, value, dimension = quantity(text)
-    if dimension != UNITS[name]:
+    if dimension != PAPER_UNITS[name]:
         return f"{name} in {spelled(dimension)}"
-    low, high = ALUMINIUM
+    low, high = ALUMINIUM_DENSITIES
     distance = max(1 - value / low, value / high - 1, 0.0)
     return f"{distance:.4f}" if distance else "0"
 
 
 def is_unit_of_damping(text: str) -> str:
     """C: the dimensions of 1 + C s."""
-    return mismatch(read("1 + C*s"), UNITS | {"C": unit(text.partition(": ")[2])})
+    return mismatch(parsed("1 + C*s"), PAPER_UNITS | {"C": unit_dimension(text.partition(": ")[2])})
 
 
 def are_units(text: str) -> str:
     """Every sum in (1), (2), (4), (5) and (A.2) with the units of the text."""
-    given = {name: unit(of) for name, of in (clause.split(": ") for clause in clauses(text))}
-    found = [unlike(formula, UNITS | given) for formula in (*(TIME[n] for n in (1, 2, 4, 5)), LAMBDA)]
+    given = {name: unit_dimension(of) for name, of in (clause.split(": ") for clause in clauses(text))}
+    found = [unlike(formula, PAPER_UNITS | given) for formula in (*(TIME[n] for n in (1, 2, 4, 5)), LAMBDA)]
     return "; ".join(each for each in found if each != "0") or "0"
 
 
@@ -52,7 +54,7 @@ def is_given(name: str, text: str) -> str:
     for clause in clauses(text):
         if clause.startswith(f"{name} = "):
             _, value, dimension = quantity(clause)
-            return "0" if value > 0 and dimension == unit(NEEDED[name]) else f"{name} in {spelled(dimension)}"
+            return "0" if value > 0 and dimension == unit_dimension(NEEDED[name]) else f"{name} in {spelled(dimension)}"
     return f"{name} has no value"
 
 
@@ -61,14 +63,10 @@ def is_section(text: str) -> str:
     given = is_given("I", text)
     if given != "0":
         return given
-    value, (width, depth) = quantity(clauses(text)[0])[1], _rectangle(clauses(text)[1])
-    off = max(abs(width * depth / A - 1), abs(width * depth**3 / 12 / value - 1))
+    value, sides = quantity(clauses(text)[0])[1], clauses(text)[1].removeprefix("rectangle ").split(" x ")
+    width, depth = (quantity(f"side = {side}")[1] for side in sides)
+    off = max(abs(width * depth / PRINTED_A - 1), abs(width * depth**3 / 12 / value - 1))
     return f"{off:.2g}" if off > 1e-12 else "0"  # doubles read from decimals
-
-
-def _rectangle(clause: str) -> tuple[float, float]:
-    width, _, depth = clause.removeprefix("rectangle ").partition(" x ")
-    return quantity(f"width = {width}")[1], quantity(f"depth = {depth}")[1]
 
 
 def density_in_numbers() -> str:
@@ -78,66 +76,58 @@ def density_in_numbers() -> str:
 
     printed, used = (modes(load(name), 3).natural_frequency[1:] for name in ("sasaki2012-as-printed", "sasaki2012"))
     ratios = ", ".join(f"{ratio:.1f}" for ratio in printed / used)
-    speeds = [math.sqrt(E / rho) / 1e3 for rho in (2.7667, 2766.7)]
+    speeds = [math.sqrt(PRINTED_E / rho) / 1e3 for rho in (2.7667, 2766.7)]
     return (
-        f"E/(2 G) - 1 = {E / (2 * G) - 1:.4f}, Poisson's ratio of aluminium. As printed, sound would run along the arm "
-        f"at {speeds[0]:.0f} km/s (mended: {speeds[1]:.2f}; diamond: about 18), and the first natural frequencies "
-        f"would be {ratios} times as high (hub inertia 0.1 kg m^2)."
+        f"E/(2 G) - 1 = {PRINTED_E / (2 * PRINTED_G) - 1:.4f}, Poisson's ratio of aluminium. As printed, sound would "
+        f"run along the arm at {speeds[0]:.0f} km/s (mended: {speeds[1]:.2f}; diamond: about 18), and the first "
+        f"natural frequencies would be {ratios} times as high (hub inertia 0.1 kg m^2)."
     )
 
 
-def claims() -> list[Claim]:
-    """The rows of Table 1."""
-    return [
-        Claim(
-            equation="Table 1 (rho)",
-            printed="rho = 2.7667 kg/m^3",
-            corrected="rho = 2766.7 kg/m^3",
-            check=is_aluminium,
-            typeset=in_words,
-            evidence="E and G are those of aluminium, whose alloys weigh 2550 to 2900 kg/m^3: the printed number is "
-            "right in g/cm^3. Residual: relative distance from that range.",
-            measured=density_in_numbers,
-        ),
-        Claim(
-            equation="Table 1 (C's unit)",
-            printed="C: kg/s",
-            corrected="C: s",
-            check=is_unit_of_damping,
-            typeset=in_words,
-            evidence="C enters as 1 + C s (A.2), so C s is a pure number (dimension checker).",
-        ),
-        Claim(
-            equation="Table 1 (other units)",
-            printed=OTHER_UNITS,
-            check=are_units,
-            typeset=in_words,
-            evidence="With these units every sum in (1), (2), (4), (5) and the mended (A.2) adds like to like "
-            "(dimension checker).",
-        ),
-        *_missing(),
-    ]
-
-
-def _missing() -> list[Claim]:
-    return [
-        Claim(
-            equation="Table 1 (I)",
-            printed="no value",
-            corrected="I = 1.8e-9 m^4; rectangle 0.1 m x 0.006 m",
-            check=is_section,
-            typeset=in_words,
-            evidence="(2), (3), (5), (A.2) and the a_ij need I.",
-            doubt="The area does not decide it: rectangles of 6e-4 m^2 and 2 to 60 mm depth have I from 2.0e-10 to "
-            "1.8e-7 m^4. The value is our assumption.",
-        ),
-        Claim(
-            equation="Table 1 (I_h)",
-            printed="no value",
-            corrected="I_h = 0.1 kg m^2",
-            check=partial(is_given, "I_h"),
-            typeset=in_words,
-            evidence="(3), (10) and a_41 to a_44 need I_h.",
-            doubt="Nothing in the paper decides it. The value is our assumption.",
-        ),
-    ]
+TABLE_CLAIMS = (  # Table 1
+    Claim(
+        equation="Table 1 (rho)",
+        printed="rho = 2.7667 kg/m^3",
+        corrected="rho = 2766.7 kg/m^3",
+        check=is_aluminium,
+        typeset=in_words,
+        evidence="E and G are those of aluminium, whose alloys weigh 2550 to 2900 kg/m^3: the printed number is "
+        "right in g/cm^3. Residual: relative distance from that range.",
+        measured=density_in_numbers,
+    ),
+    Claim(
+        equation="Table 1 (C's unit)",
+        printed="C: kg/s",
+        corrected="C: s",
+        check=is_unit_of_damping,
+        typeset=in_words,
+        evidence="C enters as 1 + C s (A.2), so C s is a pure number (dimension checker).",
+    ),
+    Claim(
+        equation="Table 1 (other units)",
+        printed=OTHER_UNITS,
+        check=are_units,
+        typeset=in_words,
+        evidence="With these units every sum in (1), (2), (4), (5) and the mended (A.2) adds like to like "
+        "(dimension checker).",
+    ),
+    Claim(
+        equation="Table 1 (I)",
+        printed="no value",
+        corrected="I = 1.8e-9 m^4; rectangle 0.1 m x 0.006 m",
+        check=is_section,
+        typeset=in_words,
+        evidence="(2), (3), (5), (A.2) and the a_ij need I.",
+        doubt="The area does not decide it: rectangles of 6e-4 m^2 and 2 to 60 mm depth have I from 2.0e-10 to "
+        "1.8e-7 m^4. The value is our assumption.",
+    ),
+    Claim(
+        equation="Table 1 (I_h)",
+        printed="no value",
+        corrected="I_h = 0.1 kg m^2",
+        check=partial(is_given, "I_h"),
+        typeset=in_words,
+        evidence="(3), (10) and a_41 to a_44 need I_h.",
+        doubt="Nothing in the paper decides it. The value is our assumption.",
+    ),
+)

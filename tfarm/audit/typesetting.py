@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import re
 
-GREEK = {"rho", "kappa", "theta", "phi", "lambda", "eta", "alpha", "Theta", "Phi", "Delta", "tau", "pi"}
-TOKEN = re.compile(
+GREEK_NAMES = {"rho", "kappa", "theta", "phi", "lambda", "eta", "alpha", "Theta", "Phi", "Delta", "tau", "pi"}
+FORMULA_TOKEN = re.compile(
     r"(?P<jet>\b(?:y|phi|theta|Y|Phi|Theta|V|K2)_x*t*(?!\w)(?:\([0Lxts], ?[0Lxts]\))?)"
     r"|(?P<name>[A-Za-z]\w*)|(?P<number>\d+(?:\.\d+)?(?:e[-+]?\d+)?)|(?P<power>\^(?:\w+|\((?=[^()]*\))[^()]*\)))"
     r"|(?P<other>[-+*/()=;<>,.|:]|\s+|.)"
 )
-OPENING = {"integral": r"\int_0^L\left[", "sqrt": r"\sqrt{", "exp": "e^{", "": r"\left("}
-CLOSING = {"integral": r"\right]dx", "sqrt": "}", "exp": "}", "": r"\right)"}
+OPENING_BRACKETS = {"integral": r"\int_0^L\left[", "sqrt": r"\sqrt{", "exp": "e^{", "": r"\left("}
+CLOSING_BRACKETS = {"integral": r"\right]dx", "sqrt": "}", "exp": "}", "": r"\right)"}
 SIGNS = {"*": r"\,", ";": r",\quad ", "oo": r"\infty", "pm": r"\pm", "<": "<"}
 
 
@@ -21,47 +21,40 @@ def tex(text: str) -> str:
     open_calls: list[str] = []
     call = ""
     text = text.replace("pm*", "pm ").replace("+ pm", "pm")
-    for match in TOKEN.finditer(text):
+    for match in FORMULA_TOKEN.finditer(text):
         kind, token = match.lastgroup, match.group()
-        if kind == "name" and token in OPENING:
+        if kind == "name" and token in OPENING_BRACKETS:
             call = token
         elif token == "(":
-            out.append(OPENING[call])
+            out.append(OPENING_BRACKETS[call])
             open_calls.append(call)
             call = ""
         elif token == ")" and open_calls:
-            out.append(CLOSING[open_calls.pop()])
-        elif kind == "jet" and text.startswith("^", match.end()):
-            out.append(rf"\left({_derivative(token)}\right)")
+            out.append(CLOSING_BRACKETS[open_calls.pop()])
+        elif kind == "jet":
+            is_raised = text.startswith("^", match.end())
+            out.append(rf"\left({_derivative(token)}\right)" if is_raised else _derivative(token))
+        elif kind == "power":
+            out.append(f"^{{{token[1:].strip('()')}}}")
         else:
-            out.append(_token(kind, token))
+            out.append(SIGNS[token] if token in SIGNS else _name(token) if kind == "name" else token)
     return "".join(out)
 
 
 def in_words(text: str) -> str:
     """The TeX of statements that are no formulas: "rho = 2766.7 kg/m^3", "C: s", or words."""
-    return r";\quad ".join(_statement(clause) for clause in text.split("; "))
-
-
-def _statement(clause: str) -> str:
-    name, sign, rest = clause.partition(" = ") if " = " in clause else clause.partition(": ")
-    if not sign:
-        name, _, rest = clause.partition(" ")
-        return rf"{_name(name)}\text{{ {rest}}}" if "_" in name else rf"\text{{{clause}}}"
-    number, _, unit = rest.partition(" ") if sign == " = " else ("", "", rest)
-    number = re.sub(r"e([-+]?\d+)", r"\\cdot 10^{\1}", number)
-    unit = unit.replace(" ", r"\,")
-    return rf"{_name(name)}{sign}{number}\ \mathrm{{{unit}}}" if unit else f"{_name(name)}{sign}{number}"
-
-
-def _token(kind: str | None, token: str) -> str:
-    if kind == "jet":
-        return _derivative(token)
-    if kind == "power":
-        return f"^{{{token[1:].strip('()')}}}"
-    if token in SIGNS:
-        return SIGNS[token]
-    return _name(token) if kind == "name" else token
+    found = []
+    for clause in text.split("; "):
+        name, sign, rest = clause.partition(" = ") if " = " in clause else clause.partition(": ")
+        if not sign:
+            name, _, rest = clause.partition(" ")
+            found.append(rf"{_name(name)}\text{{ {rest}}}" if "_" in name else rf"\text{{{clause}}}")
+            continue
+        number, _, unit = rest.partition(" ") if sign == " = " else ("", "", rest)
+        number = re.sub(r"e([-+]?\d+)", r"\\cdot 10^{\1}", number)
+        unit = unit.replace(" ", r"\,")
+        found.append(rf"{_name(name)}{sign}{number}\ \mathrm{{{unit}}}" if unit else f"{_name(name)}{sign}{number}")
+    return r";\quad ".join(found)
 
 
 def _derivative(token: str) -> str:
@@ -84,7 +77,7 @@ def _name(name: str) -> str:
     stem, index = (match[1], match[2] or match[3]) if match else (name, None)
     if stem == "Delta_k":
         stem = r"\Delta k"
-    elif stem in GREEK:
+    elif stem in GREEK_NAMES:
         stem = rf"\{stem}" if index else rf"\{stem} "
     elif len(stem) > 1:
         return rf"\mathrm{{{name}}}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .dimensions import Dimension, mismatch, unit
+from .dimensions import Dimension, mismatch, unit_dimension
 from .formulas import Expression, jet_parts, sides
 
 NEEDED = {
@@ -14,8 +14,8 @@ OTHERS = {
     "a3": "1", "lambda_1": "1/m", "lambda_2": "1/m", "lambda_": "1/m", "k1": "m s", "k2": "m s", "k3": "m s",
     "k4": "m s",
 }  # fmt: skip
-FIELDS = {"y": "m", "phi": "1", "theta": "1", "V": "N m", "Y": "m s", "Phi": "s", "Theta": "s"}
-UNITS: dict[str, Dimension] = {name: unit(text) for name, text in (NEEDED | OTHERS).items()}
+FIELD_UNITS = {"y": "m", "phi": "1", "theta": "1", "V": "N m", "Y": "m s", "Phi": "s", "Theta": "s"}
+PAPER_UNITS: dict[str, Dimension] = {name: unit_dimension(text) for name, text in (NEEDED | OTHERS).items()}
 
 
 def units_in(f: Expression, units: dict[str, Dimension]) -> dict[str, Dimension]:
@@ -25,16 +25,16 @@ def units_in(f: Expression, units: dict[str, Dimension]) -> dict[str, Dimension]
         parts = jet_parts(s)
         if parts and s.name not in units:
             field, i, j, _ = parts
-            kg, m, second = unit(FIELDS[field])
+            kg, m, second = unit_dimension(FIELD_UNITS[field])
             found[s.name] = (kg, m - i, second - j)
     return found
 
 
-def unlike(text: str, units: dict[str, Dimension] | None = None) -> str:
+def unlike(text: str, units: dict[str, Dimension]) -> str:
     """What does not add up in a text's equations: "0" if all sides and sums are of one dimension."""
     for left, right in sides(text).items():
         rest = left - right
-        found = mismatch(rest, units_in(rest, units or UNITS))
+        found = mismatch(rest, units_in(rest, units))
         if found != "0":
             return found
     return "0"

@@ -57,8 +57,8 @@ PUBLISHED = (
 class Evidence:
     """What the whole package shows for itself: the audit of the paper, and the tables of others."""
 
-    audit: tuple[audit.Row, ...]
-    published: tuple[published.Row, ...]
+    audit: tuple[audit.AuditRow, ...]
+    published: tuple[published.PublishedRow, ...]
 
 
 def gather() -> Evidence:
@@ -81,8 +81,8 @@ def kept_evidence(folder: Path) -> Evidence | None:
         read = json.loads(file.read_text(encoding="utf-8")) if file.stat().st_size <= LARGEST else {}
         if read["makers"] != makers():
             return None
-        rows = tuple(audit.Row(**row) for row in read["audit"])
-        return Evidence(audit=rows, published=tuple(published.Row(**row) for row in read["published"]))
+        rows = tuple(audit.AuditRow(**row) for row in read["audit"])
+        return Evidence(audit=rows, published=tuple(published.PublishedRow(**row) for row in read["published"]))
     except (OSError, ValueError, TypeError, KeyError, RecursionError):
         return None
 
@@ -150,7 +150,7 @@ def _short(evidence: Evidence, proofs: Sequence[Proof]) -> dict[str, Any]:
 # ------------------------------------------------------------ published tables
 
 
-def sources_table(rows: Sequence[published.Row]) -> Table:
+def sources_table(rows: Sequence[published.PublishedRow]) -> Table:
     """Where the numbers were printed, how they came here, and how many agree."""
     sources = [s for s in published.ALL if any(row.source == s.key for row in rows)]
     of = [[row for row in rows if row.source == source.key] for source in sources]
@@ -170,9 +170,9 @@ def sources_table(rows: Sequence[published.Row]) -> Table:
     )
 
 
-def differences_table(rows: Sequence[published.Row]) -> Table:
+def differences_table(rows: Sequence[published.PublishedRow]) -> Table:
     """The printed numbers that ours does not round to, a row a reason."""
-    groups: dict[tuple[str, str, str], list[published.Row]] = {}
+    groups: dict[tuple[str, str, str], list[published.PublishedRow]] = {}
     for row in rows:
         if not row.agrees:
             groups.setdefault((row.source, row.case, row.why), []).append(row)
@@ -191,7 +191,7 @@ def differences_table(rows: Sequence[published.Row]) -> Table:
     )
 
 
-def published_table(rows: Sequence[published.Row]) -> Table:
+def published_table(rows: Sequence[published.PublishedRow]) -> Table:
     """Every printed number beside ours."""
     return Table(
         stem="published",
@@ -199,11 +199,11 @@ def published_table(rows: Sequence[published.Row]) -> Table:
         caption="✓ agrees to the last printed digit, ≠ differs, for the reason given above. Difference: ours over "
         "printed, less one.",
         record=list(rows),
-        columns=published.ROWS,
+        columns=published.PUBLISHED_COLUMNS,
     )
 
 
-def _published_facts(rows: Sequence[published.Row]) -> tuple[Fact, ...]:
+def _published_facts(rows: Sequence[published.PublishedRow]) -> tuple[Fact, ...]:
     agree = sum(row.agrees for row in rows)
     return (
         Fact(

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 from markupsafe import Markup, escape
 
-from tfarm.audit import Row
-from tfarm.audit.rows import ROWS, is_zero
+from tfarm.audit import AuditRow
+from tfarm.audit.rows import AUDIT_COLUMNS, is_zero
 from tfarm.columns import Table
 from tfarm.digits import powers, unit
 from tfarm.report.trust_math import compared, formulas, lines, width
@@ -43,7 +43,7 @@ class Shown:
     evidence: Markup
 
 
-def shown(row: Row) -> Shown:
+def shown(row: AuditRow) -> Shown:
     """A row of the audit, typeset."""
     mark, words = VERDICTS[row.verdict]
     is_right = row.printed == row.corrected
@@ -79,15 +79,16 @@ def anchor(equation: str) -> str:
     return "eq-" + re.sub(r"[^a-z0-9]+", "-", equation.lower()).strip("-")
 
 
-def counts(rows: Sequence[Row]) -> dict[str, int]:
+def counts(rows: Sequence[AuditRow]) -> dict[str, int]:
     """How many rows have each verdict, in the order of VERDICTS."""
     found = Counter(row.verdict for row in rows)
     return {verdict: found[verdict] for verdict in VERDICTS}
 
 
-def audit_table(rows: Sequence[Row]) -> Table:
+def audit_table(rows: Sequence[AuditRow]) -> Table:
     """Every row in plain text, for the files."""
-    return Table(stem="audit", title="The paper, equation by equation", is_data=True, columns=ROWS, record=list(rows))
+    title = "The paper, equation by equation"
+    return Table(stem="audit", title=title, is_data=True, columns=AUDIT_COLUMNS, record=list(rows))
 
 
 def _left(residual: str) -> str:
