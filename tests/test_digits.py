@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from tfarm.digits import aligned, counted, fixed, listed, plain, scientific, significant, unit
+from tfarm.digits import aligned, fixed, how_many, listed, plain, scientific, significant, unit
 
 
 @pytest.mark.parametrize(
@@ -50,5 +50,5 @@ def test_powers_of_ten_and_units():
 
 
 def test_counts_and_lists_read_as_a_person_writes_them():
-    assert [counted(n, "pole") for n in (0, 1, 2, 0.5)] == ["no poles", "1 pole", "2 poles", "0.5 poles"]
+    assert [how_many(n, "pole") for n in (0, 1, 2, 0.5)] == ["no poles", "1 pole", "2 poles", "0.5 poles"]
     assert [listed(words) for words in (["a"], ["a", "b"], ["a", "b", "c"])] == ["a", "a and b", "a, b and c"]

@@ -86,7 +86,8 @@ def test_the_example_of_a_report_runs(
     """With two of its sections and no proof; a report with all of them is that of tests/report."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(making, "save_proof", lambda *_: None)
-    monkeypatch.setattr(making, "PIECES", [each for each in making.PIECES if each.name in ("the arm", "margins")])
+    pieces = [each for each in making.ARM_PIECES if each.name in ("the arm", "margins")]
+    monkeypatch.setattr(making, "ARM_PIECES", pieces)
     (line,) = (line for line in COMMANDS if line.startswith("tfarm report "))
     code, out, err = run(capsys, *shlex.split(line)[1:])
     assert (code, out.strip()) == (0, "pages/index.html")

@@ -19,7 +19,7 @@ from tfarm.dsp.simulate import Simulator
 from tfarm.dsp.verdict import analyse
 from tfarm.loop.locus import locus
 from tfarm.loop.regions import region
-from tfarm.records import LONGEST, record
+from tfarm.records import LONGEST_REPR, record
 from tfarm.reduced import modal_model
 
 LAB = tfarm.load("sasaki2012-lab")
@@ -73,7 +73,7 @@ def test_what_the_package_answers_is_frozen_compared_and_short(make) -> None:
     assert answer != 3
     for each in found:
         if not isinstance(each, np.ndarray | tfarm.Arm | Chain):  # what a user types is shown as it is typed
-            assert len(repr(each)) <= LONGEST + 40
+            assert len(repr(each)) <= LONGEST_REPR + 40
             assert "\n" not in repr(each)
 
 

@@ -15,7 +15,7 @@ from dataclasses import InitVar, dataclass, replace
 from operator import attrgetter
 from typing import Any
 
-from tfarm.digits import TEXTS, Digits
+from tfarm.digits import TEXTS, CellsOf
 from tfarm.errors import MISSING
 
 JSON, TERMINAL, FILES, PAGE = "json", "terminal", "files", "page"
@@ -37,10 +37,10 @@ class Column:
     title: str = ""
     unit: str = ""
     of: Any = None
-    digits: Digits = TEXTS
+    digits: CellsOf = TEXTS
     shown: Any = None
     head: str | None = None
-    printed: Digits | None = None
+    printed: CellsOf | None = None
     on: tuple[str, ...] = (*ANSWER, *REPORT)
     group: str = ""
     tint: Any = ()

@@ -8,25 +8,25 @@ from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import Any
 
-POWER = re.compile(r"(?<![\w.])(\d(?:\.\d+)?)e([-+]?\d{1,2})(?!\w|\.\d)")
+POWER_OF_TEN = re.compile(r"(?<![\w.])(\d(?:\.\d+)?)e([-+]?\d{1,2})(?!\w|\.\d)")
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-SMALLEST, LARGEST = 1e-3, 1e7  # outside, powers of ten read better
-SPARE = 2  # digits beyond its own that the largest number of a column may have for the sake of the smallest
-MOST_DECIMALS = 7
-Digits = Callable[[Sequence[Any]], Sequence[str]]  # the values of a column to its cells
+LEAST_PLAIN, MOST_PLAIN = 1e-3, 1e7  # outside, powers of ten read better
+SPARE_DIGITS = 2  # digits beyond its own that the largest number of a column may have for the sake of the smallest
+MOST_DECIMALS = 7  # of a column with one number of them: more are read as noughts
+CellsOf = Callable[[Sequence[Any]], Sequence[str]]  # the values of a column to its cells
 
 
-def singly(how: Callable[..., str], *digits: int) -> Digits:
+def singly(how: Callable[..., str], *digits: int) -> CellsOf:
     """Cells one by one: `how(value, *digits)` of each number; words stay as they are."""
     return lambda values: [value if isinstance(value, str) else how(value, *digits) for value in values]
 
 
-def lined(digits: int, least: int) -> Digits:
+def lined(digits: int, least: int) -> CellsOf:
     """Cells with one number of decimals, as `aligned` has them."""
     return partial(aligned, digits=digits, least=least)
 
 
-def worded(how: Callable[[str], str]) -> Digits:
+def worded(how: Callable[[str], str]) -> CellsOf:
     """Cells of texts, such as formulas in plain letters that a page sets in Greek ones."""
     return lambda values: [how(value) for value in values]
 
@@ -43,7 +43,7 @@ def significant(x: float, digits: int) -> str:
     """`x` with exactly that many significant digits, e.g. 71.505682 or 1.800 × 10⁻⁹."""
     if x == 0 or math.isinf(x):
         return _special(x)
-    if not SMALLEST <= abs(x) < LARGEST:
+    if not LEAST_PLAIN <= abs(x) < MOST_PLAIN:
         return _power_of_ten(f"{x:.{digits - 1}e}")
     decimals = max(0, digits - 1 - _exponent(x, digits))
     return _signed(f"{x:.{decimals}f}")
@@ -53,7 +53,7 @@ def plain(x: float, digits: int = 10) -> str:
     """`x` as a person types it: no trailing zeros, e.g. 2766.7 or 6.8944 × 10¹⁰."""
     if x == 0 or math.isinf(x):
         return _special(x)
-    if not SMALLEST <= abs(x) < LARGEST:
+    if not LEAST_PLAIN <= abs(x) < MOST_PLAIN:
         return _power_of_ten(_bare(f"{x:.{digits - 1}e}"))
     return _signed(_bare(f"{x:.{max(0, digits - 1 - _exponent(x, digits))}f}"))
 
@@ -70,7 +70,7 @@ def aligned(values: Iterable[float], digits: int, *, least: int = 6) -> tuple[st
         return tuple(_special(x) for x in column)
     top, bottom = _exponent(max(finite), digits), _exponent(min(finite), least)
     decimals = max(0, digits - 1 - top, least - 1 - bottom)
-    if top + 1 + decimals > digits + SPARE or decimals > MOST_DECIMALS or top > 7:
+    if top + 1 + decimals > digits + SPARE_DIGITS or decimals > MOST_DECIMALS or top > 7:
         return tuple(significant(x, digits) for x in column)
     return tuple(_special(x) if x == 0 or math.isinf(x) else _signed(f"{x:.{decimals}f}") for x in column)
 
@@ -80,7 +80,7 @@ def fixed(values: Iterable[float], decimals: int) -> tuple[str, ...]:
     return tuple(_signed(f"{x:.{decimals}f}") for x in values)
 
 
-def held(values: Iterable[float], digits: int) -> list[float]:
+def kept_digits(values: Iterable[float], digits: int) -> list[float]:
     """Numbers as a file has them whose last digits depend on the processor: rounded to so many significant digits."""
     return [float(f"{value:.{digits - 1}e}") for value in values]
 
@@ -98,7 +98,7 @@ def scientific(x: float, digits: int) -> str:
     return _special(x) if x == 0 or math.isinf(x) else _power_of_ten(f"{x:.{digits - 1}e}")
 
 
-def counted(count: float, what: str) -> str:
+def how_many(count: float, what: str) -> str:
     """How many of something: no poles, 1 pole, 2 poles."""
     return f"{plain(count) if count else 'no'} {what}{'s' * (count != 1)}"
 
@@ -110,7 +110,7 @@ def listed(words: Sequence[str]) -> str:
 
 def powers(text: str) -> str:
     """A text in which numbers as files have them are set: 1.8e-9 becomes 1.8 × 10⁻⁹."""
-    return POWER.sub(lambda number: f"{number[1]} × 10{str(int(number[2])).translate(SUPERSCRIPT)}", text)
+    return POWER_OF_TEN.sub(lambda number: f"{number[1]} × 10{str(int(number[2])).translate(SUPERSCRIPT)}", text)
 
 
 def unit(text: str) -> str:

@@ -78,8 +78,10 @@ def write_file(path: Path, content: bytes, *, key: str) -> None:
         number = _descriptor(path)
         if number is not None:
             _write_straight(os.dup(number), content)
-        elif path.exists() and not path.is_file():
-            _write_straight(_opened(path), content)
+        elif path.exists() and not path.is_file():  # a pipe without a reader, and a folder, raise OSError at once
+            handle = os.open(path, os.O_WRONLY | getattr(os, "O_NONBLOCK", 0))
+            os.set_blocking(handle, True)
+            _write_straight(handle, content)
         else:
             _replace(Path(os.path.realpath(path)), content)
     except BrokenPipeError:
@@ -109,13 +111,6 @@ def _descriptor(path: Path) -> int | None:
     if found:
         return int(found[1] or found[2])
     return {"/dev/stdout": 1, "/dev/stderr": 2}.get(name)
-
-
-def _opened(path: Path) -> int:
-    """A device or pipe opened for writing; a pipe without a reader, and a folder, raise OSError at once."""
-    handle = os.open(path, os.O_WRONLY | getattr(os, "O_NONBLOCK", 0))
-    os.set_blocking(handle, True)
-    return handle
 
 
 def _write_straight(handle: int, content: bytes) -> None:
@@ -208,6 +203,7 @@ def _reason(error: Exception) -> str:
 
 
 def _umask() -> int:
+    """The mode bits that new files go without; there is no way to read them but to set them."""
     mask = os.umask(0)
     os.umask(mask)
     return mask

@@ -16,7 +16,7 @@ class Term:
     meaning: str
 
 
-TERMS = (
+GLOSSARY_TERMS = (
     Term(
         "band",
         "the range of frequencies from 0 up to a printed one in which poles were counted or a margin was "
@@ -143,9 +143,9 @@ TERM = (
 def glossary(words: str | None = None) -> Table:
     """Every term with its meaning, or those whose name holds the words.  Raises ParameterError where there is none."""
     if words is None:
-        return Table(columns=TERM, record=TERMS)
-    found = tuple(each for each in TERMS if words.casefold() in each.name.casefold())
+        return Table(columns=TERM, record=GLOSSARY_TERMS)
+    found = tuple(each for each in GLOSSARY_TERMS if words.casefold() in each.name.casefold())
     if not found:
-        remedy = did_you_mean(words, [each.name for each in TERMS])
+        remedy = did_you_mean(words, [each.name for each in GLOSSARY_TERMS])
         raise ParameterError(key="term", value=words, remedy=remedy)
     return Table(columns=TERM, record=found)

@@ -13,9 +13,9 @@ import numpy as np
 
 _Class = TypeVar("_Class", bound=type[Any])
 
-FIRST = ("verdict", "word", "unstable", "worst_error")  # what was found stands before what it was found of
-LONGEST = 200  # characters of a repr: a line or two of a terminal
-FEW = 3  # numbers that are shown one by one
+SHOWN_FIRST = ("verdict", "word", "unstable", "worst_error")  # what was found stands before what it was found of
+LONGEST_REPR = 200  # characters of a repr: a line or two of a terminal
+SHOWN_SINGLY = 3  # numbers that are shown one by one
 
 
 def record(cls: _Class) -> _Class:
@@ -111,7 +111,7 @@ def _key(value: Any) -> Any:
 
 def _repr(self: Any) -> str:
     text = ", ".join(f"{name}={_shown(value)}" for name, value in _entries(self))
-    text = text if len(text) <= LONGEST else f"{text[: LONGEST - 4]} ..."
+    text = text if len(text) <= LONGEST_REPR else f"{text[: LONGEST_REPR - 4]} ..."
     return f"{type(self).__name__}({text})"
 
 
@@ -130,21 +130,21 @@ def _entries(self: Any) -> Iterator[tuple[str, Any]]:
 
 
 def _found(self: Any) -> list[str]:
-    """Those of `FIRST` that a record has, as a field or a property."""
-    return [name for name in FIRST if hasattr(type(self), name) or name in self.__dataclass_fields__]
+    """Those of `SHOWN_FIRST` that a record has, as a field or a property."""
+    return [name for name in SHOWN_FIRST if hasattr(type(self), name) or name in self.__dataclass_fields__]
 
 
 def _shown(value: Any) -> str:
     """An entry in a few characters: six digits of a number, a record's finding or name, an array's shape."""
     if isinstance(value, np.ndarray):
-        small = value.ndim == 1 and value.size <= FEW
+        small = value.ndim == 1 and value.size <= SHOWN_SINGLY
         return f"[{', '.join(map(_shown, value.tolist()))}]" if small else f"<array {value.shape}>"
     if isinstance(value, float | complex) and not isinstance(value, bool):
         return f"{value:.6g}"
     if isinstance(value, dict):
         return f"<{', '.join(map(str, value))}>"
     if isinstance(value, tuple | list):
-        shown = ", ".join(map(_shown, value)) if len(value) <= FEW else f"{len(value)} entries"
+        shown = ", ".join(map(_shown, value)) if len(value) <= SHOWN_SINGLY else f"{len(value)} entries"
         return f"({shown})"
     if is_dataclass(value) and not isinstance(value, type):
         return _named(value)

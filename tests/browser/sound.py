@@ -31,7 +31,7 @@ from tfarm.report.live import ASSETS, save_live, write_assets
 
 LAB = replace(tfarm.load("sasaki2012-lab"), name=NAME, assumptions=ARM.assumptions)
 LAW = tfarm.Law({"hub_angle": ([2.0, 8.0], [0.02, 1.0]), "hub_rate": 0.4}, name=TEXT)
-PIECES = making.PIECES
+PIECES = making.ARM_PIECES
 SCREENS = 8.0  # of 1400 x 900 pixels, after the answers
 NEWER = "Unknown pseudo-element or pseudo-class “::details-content”"  # which prints what is folded: CSS of 2024
 HIDDEN = """() => [...document.querySelectorAll("body *")].filter(e => {
@@ -53,7 +53,7 @@ def few(tmp_path_factory):
     few = [piece for piece in PIECES if piece.anchor in ("arm", "modes", "margins")]
     laws = [piece for piece in making.LAW_PIECES if piece.anchor in ("law", "margins")]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(making, "PIECES", tuple(few))
+        patch.setattr(making, "ARM_PIECES", tuple(few))
         patch.setattr(making, "LAW_PIECES", tuple(laws))
         patch.setattr(making, "save_proof", lambda *_: None)
         write([LAB], out, only=("modes", "margins"))
@@ -62,7 +62,7 @@ def few(tmp_path_factory):
         H = tfarm.transfer(LAB, "root_moment")(1j * omega)
         seen = tfarm.Measured(output="root_moment", input="hub_torque", omega=omega, values=H, sigma=abs(H))
         found = fit(LAB, [seen], free=["hub.inertia"], profile=False)
-        patch.setattr(making, "PIECES", tuple(piece for piece in PIECES if piece.anchor in ("fit", "arm")))
+        patch.setattr(making, "ARM_PIECES", tuple(piece for piece in PIECES if piece.anchor in ("fit", "arm")))
         _arm_page(Subject(replace(found.arm, name="fitted"), chain, (), found), out / "fitted")
     save_live(Subject(LAB, chain), out / NAME)
     write_assets(out / ASSETS, out / ASSETS)
@@ -75,7 +75,9 @@ def _arm_page(subject: Subject, folder: Path) -> None:
     """The full page on a subject, of the sections that there are."""
     folder.mkdir()
     sections = [
-        making.save_section(making._section(piece, subject), folder) for piece in making.PIECES if piece.is_for(subject)
+        making.save_section(making.section_or_why_not(piece, subject), folder)
+        for piece in making.ARM_PIECES
+        if piece.is_for(subject)
     ]
     writing._write_pages(subject, folder, sections, None, "", folder)
 

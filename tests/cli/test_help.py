@@ -11,7 +11,7 @@ import typer
 import tfarm
 from tests.shell import answer, run
 from tfarm.cli.running import app
-from tfarm.glossary import TERMS
+from tfarm.glossary import GLOSSARY_TERMS
 
 VERBS = typer.main.get_command(app).commands
 
@@ -19,7 +19,7 @@ VERBS = typer.main.get_command(app).commands
 def test_the_glossary_has_each_word_once_in_order(capsys):
     terms = answer(capsys, "glossary")["terms"]
     names = [each["term"] for each in terms]
-    assert names == [each.name for each in TERMS]
+    assert names == [each.name for each in GLOSSARY_TERMS]
     assert names == sorted(set(names), key=str.casefold)
     needed = {"proven", "enclosed", "winding number", "Lyapunov region", "certified", "band", "spill-over", "settled"}
     assert needed <= set(names)

@@ -9,7 +9,7 @@ from matplotlib.collections import QuadMesh
 
 import tfarm
 from tests.shell import answer, run
-from tfarm.comparing.answers import Quantity, comparison_answer, margins_table, modes_table, poles_table
+from tfarm.comparing.answers import ComparedQuantity, compared_answer, compared_margins, compared_modes, compared_poles
 from tfarm.dsp.law_verdict import analyse_law
 from tfarm.loop.answers import margins_answer
 from tfarm.plots.compared import draw_comparison
@@ -32,7 +32,7 @@ def test_four_times_as_stiff_is_twice_as_fast():
     """w goes with the root of E where G goes with it: every natural frequency by 100 %, to rounding."""
     link = replace(BARE.link, youngs_modulus=4 * BARE.link.youngs_modulus, shear_modulus=4 * BARE.link.shear_modulus)
     found = tfarm.compare([BARE, replace(BARE, link=link, name="stiff")], modes=5)
-    apart = [row["natural_frequency_rad_s_difference_percent"] for row in modes_table(found)]
+    apart = [row["natural_frequency_rad_s_difference_percent"] for row in compared_modes(found)]
     assert apart == pytest.approx([100.0] * 5, rel=1e-13)
     assert found.is_of_arms
 
@@ -40,7 +40,7 @@ def test_four_times_as_stiff_is_twice_as_fast():
 def test_twice_the_damping_is_twice_the_ratio():
     """To first order in C; the shear that C does not damp makes it less by a share of C w."""
     found = tfarm.compare([LAB, LAB.having(damping=2 * LAB.damping)], names=("C", "2 C"), modes=2)
-    first, second = (row["damping_ratio_difference_percent"] for row in modes_table(found))
+    first, second = (row["damping_ratio_difference_percent"] for row in compared_modes(found))
     assert first == pytest.approx(100.0, abs=0.1)
     assert second == pytest.approx(100.0, abs=0.5)
 
@@ -48,7 +48,7 @@ def test_twice_the_damping_is_twice_the_ratio():
 def test_an_arm_beside_itself_differs_in_nothing():
     found = tfarm.compare([LAB, LAB], LAW, modes=3)
     assert not found.is_of_arms
-    for table in (modes_table(found), poles_table(found), margins_table(found)):
+    for table in (compared_modes(found), compared_poles(found), compared_margins(found)):
         apart = [value for row in table for key, value in row.items() if key.endswith("difference_percent")]
         assert apart == [0.0] * len(apart)
         assert apart
@@ -58,7 +58,7 @@ def test_an_arm_beside_itself_differs_in_nothing():
 def test_each_side_is_what_it_is_alone():
     other = tfarm.HubFeedback(K1=2.0, K2=-0.2)
     found = tfarm.compare(LAB, [LAW, other], modes=3)
-    for side, law, loop in zip(found.sides, (LAW, other), comparison_answer(found)["loops"], strict=True):
+    for side, law, loop in zip(found.sides, (LAW, other), compared_answer(found)["loops"], strict=True):
         assert side.margins == tfarm.margins(LAB, law)
         assert {key: loop[key] for key in ("delay_margin_s", "disk_margin")} == {
             key: margins_answer(side.margins)[key] for key in ("delay_margin_s", "disk_margin")
@@ -66,7 +66,7 @@ def test_each_side_is_what_it_is_alone():
         assert side.sampled.is_stable == tfarm.sampled(LAB, law).verdict.is_stable
         alone = tfarm.closed_loop_poles(LAB, law, 6).values
         assert side.oscillating[:3] == pytest.approx(alone[alone.imag > 0][:3], rel=1e-12)
-    rows = {row["margin"]: row for row in margins_table(found)}
+    rows = {row["margin"]: row for row in compared_margins(found)}
     delays = [tfarm.margins(LAB, law).exact_delay for law in (LAW, other)]
     expected = 100 * (delays[1] / delays[0] - 1)
     assert rows["delay_margin_s"]["value_difference_percent"] == pytest.approx(expected, rel=1e-12)
@@ -86,7 +86,7 @@ def test_two_laws_are_called_by_their_files_and_an_unstable_loop_has_no_margins(
 
 def test_without_damping_phases_are_of_the_band_alone():
     """A delay of nothing ends an undamped loop: no phase is exact there, as `tfarm margins` has it."""
-    rows = {row["margin"]: row for row in margins_table(tfarm.compare([BARE, LAB], LAW, modes=1))}
+    rows = {row["margin"]: row for row in compared_margins(tfarm.compare([BARE, LAB], LAW, modes=1))}
     assert rows["phase_lag_deg"]["known_one"] == "in the band"
     assert (rows["delay_margin_s"]["known_one"], rows["delay_margin_s"]["value_one"]) == ("exact", 0.0)
     assert rows["phase_lag_deg"]["known_other"] == "exact"
@@ -114,7 +114,7 @@ def test_gains_as_a_law_in_z_are_the_same_loop_at_the_samples():
     found = tfarm.compare(LAB, [LAW, tfarm.Law({"hub_rate": 0.3, "root_moment": 0.3}, period=0.01)], modes=2)
     assert found.is_clocked
     assert [side.verdict for side in found.sides] == ["stable", "stable"]
-    for table in (poles_table(found), margins_table(found)):
+    for table in (compared_poles(found), compared_margins(found)):
         apart = [value for row in table for key, value in row.items() if key.endswith("difference_percent")]
         assert apart
         assert apart == pytest.approx([0.0] * len(apart), abs=1e-6)
@@ -138,7 +138,7 @@ def test_a_law_in_z_beside_gains_is_judged_at_the_clock_of_both():
     upper, right = draw_comparison(found).axes[:2]
     assert upper.get_xlim()[1] == pytest.approx(np.pi / 0.01, rel=1e-3)  # the last point of its grid
     assert right.get_xlabel() == "further delay [ms]"
-    answered = comparison_answer(found)
+    answered = compared_answer(found)
     assert answered["at_samples"]
     assert [loop["stable"] for loop in answered["loops"]] == [True, True]
 
@@ -163,7 +163,7 @@ def test_two_arms_are_printed_with_their_modes(capsys):
     [(1.0, 1.0 + 1e-15, 0.0), (2.0, 1.0, -50.0), (0.0, 1.0, None), (None, 1.0, None), (1.0, np.inf, None)],
 )
 def test_a_difference_is_a_number_or_none(one, other, shown):
-    assert Quantity("a", "", relative=1e-14).percent(one, other) == shown
+    assert ComparedQuantity("a", "", relative=1e-14).percent(one, other) == shown
 
 
 @pytest.mark.parametrize(

@@ -8,13 +8,13 @@ import pytest
 import tfarm
 from tests.hostile import LONG, TEXT, Read, check_drawing, check_page
 from tests.shell import run
-from tfarm.comparing.answers import comparison_answer
+from tfarm.comparing.answers import compared_answer
 from tfarm.dsp import Chain
 from tfarm.errors import one_line
 from tfarm.report.comparison_page import write_comparison
 from tfarm.report.given_laws import Subject
 from tfarm.report.writing import _write_pages
-from tfarm.tables.files import plain
+from tfarm.tables.files import json_value
 
 LAB = tfarm.load("sasaki2012-lab")
 HOSTILE = f"{TEXT} {LONG}"
@@ -34,7 +34,7 @@ def folder(compared, tmp_path_factory):
 
 
 def test_the_tables_hold_the_numbers_of_the_command(compared, folder):
-    answer = plain(comparison_answer(compared))
+    answer = json_value(compared_answer(compared))
     for name in ("modes", "poles", "margins"):
         with open(folder / "data" / f"compare-{name}.csv", encoding="utf-8", newline="") as file:
             rows = list(csv.DictReader(file))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import tfarm
-from tfarm.plots.frequency import broken, draw_bode, magnitude, magnitude_limits, phase
+from tfarm.plots.frequency import broken, draw_bode, draw_magnitude, draw_phase, magnitude_limits
 from tfarm.plots.style import blank, style
 from tfarm.response.frequency import bode, resonant_band
 
@@ -26,7 +26,7 @@ def line(ax, label):
 
 
 def test_the_curve_is_broken_at_every_infinity_and_runs_off_the_picture(data, ax):
-    magnitude(data, ax=ax)
+    draw_magnitude(data, ax=ax)
     x, y = line(ax, "flexible arm, exact").get_data()
     gaps = np.flatnonzero(np.isnan(x))
     assert gaps.size == data.infinite.size + data.vanishing.size
@@ -41,7 +41,7 @@ def test_the_curve_is_broken_at_every_infinity_and_runs_off_the_picture(data, ax
 
 
 def test_open_triangles_sit_on_the_edges(data, ax):
-    magnitude(data, ax=ax)
+    draw_magnitude(data, ax=ax)
     for label, roots, height in (("infinite", data.infinite, 1.0), ("zero", data.vanishing, 0.0)):
         marks = next(line for line in ax.get_lines() if str(line.get_label()).startswith(label))
         assert np.array_equal(marks.get_xdata(), roots)
@@ -50,7 +50,7 @@ def test_open_triangles_sit_on_the_edges(data, ax):
 
 
 def test_units_are_in_the_labels_and_hertz_above(data, ax):
-    magnitude(data, ax=ax)
+    draw_magnitude(data, ax=ax)
     assert "[N m/(N m)]" in ax.get_ylabel()
     assert "[rad/s]" in ax.get_xlabel()
     (hertz,) = ax.child_axes
@@ -68,7 +68,7 @@ def test_everything_finite_is_inside_the_picture():
 
 
 def test_the_phase_steps_at_every_root(data, ax):
-    phase(data, ax=ax)
+    draw_phase(data, ax=ax)
     assert "[deg]" in ax.get_ylabel()
     x, y = ax.get_lines()[-1].get_data()
     assert np.array_equal(y[~np.isnan(y)], data.phase)

@@ -13,10 +13,10 @@ from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.law_rounded import rounded as rounded_law
 from tfarm.loop.locus import locus, rounded
 from tfarm.loop.poles import poles_below
-from tfarm.plots.folded import draw_loci
+from tfarm.plots.folded import draw_folded_loci
 from tfarm.plots.laws import draw_law_locus
 from tfarm.plots.roots import draw_locus
-from tfarm.report.map import sampled_region
+from tfarm.report.map import sampled_part
 from tfarm.spectrum.scales import default_gains, rate_unit
 
 LAB, STOCKY = tfarm.load("sasaki2012-lab"), tfarm.load("stocky-steel")
@@ -70,7 +70,7 @@ def test_the_values_between_are_poles_too():
 
 def test_the_sampled_locus_is_round_too():
     loop = tfarm.sampled(LAB, default_gains(LAB), count=3).verdict.loop
-    figure = draw_loci(sampled_loci(loop, 25.0, (-0.5, 1.5)))
+    figure = draw_folded_loci(sampled_loci(loop, 25.0, (-0.5, 1.5)))
     figure.canvas.draw()
     for ax in figure.axes[1:]:
         told = [seen_turns(line)[0] for line in ax.lines if line.get_linewidth() == 1.4 and len(line.get_xdata()) > 1]
@@ -83,7 +83,7 @@ def test_the_outline_of_a_sampled_region_is_that_of_its_poles():
     beyond 5 degrees but where it is no longer than a pixel."""
     x = rate_axis(LAB)
     y = moment_axis(LAB, x)
-    plane = sampled_region(LAB, x, y, load_chain(LAB.name))
+    plane = sampled_part(LAB, x, y, load_chain(LAB.name))
     aside, checked = 0.004, 0
     for piece in pieces(plane.K1, plane.stable_intervals):
         K1, low, high = np.array(piece.points).T

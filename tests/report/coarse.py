@@ -7,15 +7,15 @@ from tfarm.loop import loci
 from tfarm.report import making, map, overlay
 
 COARSE = (
-    (map, "COLUMNS", 48),
-    (map, "ROWS", 40),
+    (map, "GRID_COLUMNS", 48),
+    (map, "GRID_ROWS", 40),
     (map, "SAMPLED_COLUMNS", 24),
-    (overlay, "COLUMNS", 8),
+    (overlay, "OVERLAY_COLUMNS", 8),
     (sampled_regions, "MOST_COLUMNS", 0),  # with the corners that so few have
-    (loci, "POINTS", 60),
-    (sampled_loci, "VALUES", 31),
-    (periods, "SHARES", (1.0, 5.0)),
-    (making, "WORKERS", 1),  # a second process would have its own grids
+    (loci, "LOCUS_POINTS", 60),
+    (sampled_loci, "LOCUS_VALUES", 31),
+    (periods, "PERIOD_SHARES", (1.0, 5.0)),
+    (making, "MOST_WORKERS", 1),  # a second process would have its own grids
 )
 
 

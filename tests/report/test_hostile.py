@@ -12,7 +12,7 @@ from tfarm.report import making, writing
 from tfarm.report.fit_section import fit_section
 from tfarm.report.given_laws import Subject
 from tfarm.report.live import save_live
-from tfarm.report.sections import Section, save_section
+from tfarm.report.sections import PageSection, save_section
 
 LAB = replace(tfarm.load("sasaki2012-lab"), name=NAME)
 OMEGA = np.geomspace(8.0, 300.0, 30)
@@ -42,9 +42,9 @@ def test_of_a_section_and_a_live_page_that_cannot_be_made(tmp_path, monkeypatch)
     monkeypatch.setattr("tfarm.report.live.live_data", fails)
     save_live(Subject(LAB, Chain()), tmp_path)
     check_page((tmp_path / "live.html").read_text(encoding="utf-8"), NAME, TEXT)
-    piece = replace(making.PIECES[1], make=fails)
-    section = making._section(piece, Subject(LAB, Chain()))
-    assert isinstance(section, Section)
+    piece = replace(making.ARM_PIECES[1], make=fails)
+    section = making.section_or_why_not(piece, Subject(LAB, Chain()))
+    assert isinstance(section, PageSection)
     saved = save_section(section, tmp_path)
     writing._write_pages(Subject(LAB, Chain()), tmp_path, [saved], None, "", tmp_path)
     check_page((tmp_path / "index.html").read_text(encoding="utf-8"), NAME, TEXT.partition(" & ")[0])

@@ -36,8 +36,8 @@ from tfarm.report.frame import signs
 from tfarm.report.locus_section import _more_damping, beyond_table
 from tfarm.report.loop_laws import NamedLaw, has_loop, laws, margins_of
 from tfarm.report.loop_section import map_section, margins_section
-from tfarm.report.map import draw_map, gain_map, map_data
-from tfarm.report.margins_table import NOTHING, margin_table, verdict_facts
+from tfarm.report.map import draw_map_of_arm, map_data, map_of_arm
+from tfarm.report.margins_table import NOT_STABLE, margin_table, verdict_facts
 from tfarm.spectrum.scales import PAPER_GAINS, default_gains, rate_unit
 from tfarm.tables.files import as_json
 
@@ -47,14 +47,14 @@ EPS = np.finfo(float).eps
 
 @pytest.fixture(scope="module")
 def lab():
-    return gain_map(LAB)
+    return map_of_arm(LAB)
 
 
 @pytest.fixture(scope="module")
 def section(lab):
     """The map of the lab's gains on its page."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(loop_section, "gain_map", lambda arm, chain: {(LAB, None): lab}[arm, chain])
+        patch.setattr(loop_section, "map_of_arm", lambda arm, chain: {(LAB, None): lab}[arm, chain])
         return map_section(LAB)
 
 
@@ -105,7 +105,7 @@ def test_no_part_of_the_edge_is_missing(lab):
         for row, column in np.argwhere(np.diff(lab.region.unstable, axis=axis)):
             if axis == 1 and lab.region.K1[column] < 0 < lab.region.K1[column + 1]:
                 continue  # the line K1 = 0 is drawn on its own
-            beside = across[column] + (0.5 / map.COLUMNS) * axis, up[row] + (0.5 / map.ROWS) * (1 - axis)
+            beside = across[column] + (0.5 / map.GRID_COLUMNS) * axis, up[row] + (0.5 / map.GRID_ROWS) * (1 - axis)
             assert np.hypot(*(edge - beside).T).min() < edges.SHORT_SEGMENT
 
 
@@ -114,14 +114,14 @@ def test_the_colours_are_the_counts_of_the_poles(lab, column):
     """On either side of the upper edge, by finding all poles in a box."""
     stable = lab.region.stable[:, column]
     top = int(np.flatnonzero(stable)[-1]) if stable.any() else 100
-    for row in (50, top, min(top + 3, map.ROWS - 1)):
+    for row in (50, top, min(top + 3, map.GRID_ROWS - 1)):
         law = HubFeedback(K1=float(lab.region.K1[column]), K2=float(lab.region.K2[row]))
         assert stability(LAB, law).unstable_roots == lab.region.unstable[row, column]
 
 
 def test_contours_reach_the_frame_and_words_overlap_nothing(lab):
     """A line of equal damping ends at the frame, at the stability boundary, or where it began."""
-    figure = draw_map(lab)
+    figure = draw_map_of_arm(lab)
     assert complaints(figure) == []
     assert (*lab.axes[0][[0, -1]], *lab.axes[1][[0, -1]]) == (lab.x.low, lab.x.high, lab.y.low, lab.y.high)
     lines = [line for line in figure.axes[0].lines if line.get_color() == BLUE and len(line.get_xdata()) > 20]
@@ -149,7 +149,9 @@ def test_the_data_behind_the_map_is_what_is_drawn(lab):
     at = grid[7 * lab.axes[0].size + 31]
     assert (at["K1_N_m_s_rad"], at["K2"]) == (lab.axes[0][31], lab.axes[1][7])
     assert at["unstable_poles"] == lab.counts[7, 31]
-    fresh = least_damping(LAB, many_laws(HubFeedback(), K1=lab.axes[0][31:32], K2=lab.axes[1][7:8]), loop_laws.MODES)
+    fresh = least_damping(
+        LAB, many_laws(HubFeedback(), K1=lab.axes[0][31:32], K2=lab.axes[1][7:8]), loop_laws.DESIGNED_MODES
+    )
     assert at["least_damping_ratio"] == pytest.approx(fresh[0], rel=1e-12, abs=0)
 
 
@@ -190,7 +192,7 @@ def test_the_verdict_comes_before_any_margin():
     wrong = NamedLaw("wrong", "wrong", HubFeedback(K1=0.3, K2=1.5))
     table = margin_table([wrong], [margins_of(PURE, wrong.law)], True)
     assert table.columns[2].values[0] == "unstable"
-    assert table.columns[2].values[3:] == [NOTHING] * 9
+    assert table.columns[2].values[3:] == [NOT_STABLE] * 9
 
 
 def test_margins_are_those_of_the_loop_room():
@@ -334,7 +336,7 @@ def test_the_sampled_edge_on_the_map_is_where_a_pole_meets_the_circle(lab):
 def test_the_star_holds_at_the_clock_of_its_page(lab, section):
     """The best gains of a page are those of its own chain, and stable there; a law that is not says so in its card."""
     assert [brief.is_stable for brief in lab.briefs] == [True, True]
-    labels = [text.get_text() for text in draw_map(lab).legends[0].get_texts()]
+    labels = [text.get_text() for text in draw_map_of_arm(lab).legends[0].get_texts()]
     assert any(label.startswith("best damping") and "stable when sampled every 10 ms" in label for label in labels)
     assert any("Sampled every 10 ms (tfarm's default period) these gains are stable" in w for w in section.words)
     facts = margins_section(LAB).facts

@@ -24,7 +24,7 @@ def test_the_tables_are_those_of_the_command(capsys):
 def test_the_page_says_how_it_is_made_again(tmp_path, capsys, monkeypatch):
     for kept in ("save_proof", "save_card"):  # which have their own tests
         monkeypatch.setattr(making, kept, lambda *_: None)
-    monkeypatch.setattr(making, "PIECES", [each for each in making.PIECES if each.name == "measured responses"])
+    monkeypatch.setattr(making, "ARM_PIECES", [each for each in making.ARM_PIECES if each.name == "measured responses"])
     given = ("report", "sasaki2012-lab", "--only", "bode", "--measured", GIVEN, "--out", str(tmp_path))
     code, out, _ = run(capsys, *given)
     assert code == 0

@@ -238,7 +238,7 @@ def test_a_free_pin_has_its_rate_loop(monkeypatch):
     section = margins_section(arm)
     assert section.facts[0].value == "STABLE"
     assert set(column(section.blocks[1], "gain").values) == {"K1", "Kp"}
-    pieces = [piece.name for piece in making.PIECES if piece.is_for(Subject(arm, Chain()))]
+    pieces = [piece.name for piece in making.ARM_PIECES if piece.is_for(Subject(arm, Chain()))]
     assert pieces[4:8] == ["no loop", "margins", "root loci", "Nyquist"]
 
 
@@ -305,4 +305,4 @@ def test_curves_that_fall_are_not_said_to_rise():
 @pytest.mark.parametrize(("hub", "words"), [(math.inf, "a hub that is locked"), (0.1, "the two values assumed")])
 def test_what_the_paper_leaves_open_is_what_the_arm_has(hub, words):
     arm = replace(tfarm.load("sasaki2012"), hub=tfarm.Hub(inertia=hub))
-    assert words in assumptions_section._opening(arm)
+    assert words in assumptions_section.opening(arm)

@@ -11,7 +11,7 @@ import pytest
 import tfarm
 from tfarm.arm import HubFeedback
 from tfarm.crossing import pieces
-from tfarm.digits import held, scientific
+from tfarm.digits import kept_digits, scientific
 from tfarm.dsp import Chain, Simulator, analyse, sampled_loop, sampled_verdict, scenario, stable_windows
 from tfarm.dsp.chain import Sampling
 from tfarm.dsp.loci import loci
@@ -19,26 +19,26 @@ from tfarm.dsp.slews import slews
 from tfarm.dsp.strip_chart import strip_chart
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import gain_windows
-from tfarm.plots.files import save
+from tfarm.plots.files import save_figure
 from tfarm.plots.strip import draw_strip_chart
-from tfarm.report.overlay import CUT, K2_RANGE, draw_overlay, overlay, overlay_table
+from tfarm.report.overlay import CUT_RANGE, K2_RANGE, draw_overlay, overlay_table, stable_regions
 from tfarm.report.sampled_modes import loci_table
 from tfarm.report.sampled_section import sampled_section
-from tfarm.report.sampled_words import Sampled, compared, cure, duration, interval, short_answer
-from tfarm.report.time_responses import HELD
+from tfarm.report.sampled_words import Sampled, against_continuous, cure, duration, interval_words, sampled_in_short
+from tfarm.report.time_responses import CURVE_DIGITS
 from tfarm.spectrum.scales import default_gains
 from tfarm.tables.files import as_csv, as_json
 
 LAB, PAPER = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 GAINS = HubFeedback(K1=0.3, K2=0.3)
-PLANE = cache(lambda: overlay(LAB, GAINS, Chain()))
+PLANE = cache(lambda: stable_regions(LAB, GAINS, Chain()))
 
 
 @pytest.fixture(scope="module")
 def section():
     """With the map of both regions that the tests of it have."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("tfarm.report.sampled_words.overlay", lambda *what: {(LAB, GAINS, Chain()): PLANE()}[what])
+        patch.setattr("tfarm.report.sampled_words.stable_regions", lambda *what: {(LAB, GAINS, Chain()): PLANE()}[what])
         return sampled_section(LAB)
 
 
@@ -59,10 +59,10 @@ def values_of(table):
 
 def test_the_picture_of_a_rig_is_as_high_as_its_own_gains(monkeypatch):
     """Driven by its motor's current, K2 balances a torque at 0.112 A/(N m), and not at 1."""
-    monkeypatch.setattr("tfarm.report.overlay.COLUMNS", 12)
-    monkeypatch.setattr("tfarm.report.overlay.DAMPINGS", ())
+    monkeypatch.setattr("tfarm.report.overlay.OVERLAY_COLUMNS", 12)
+    monkeypatch.setattr("tfarm.report.overlay.LITTLE_DAMPINGS", ())
     rig = tfarm.load("quanser-2dsfl")
-    data = overlay(rig, default_gains(rig), Chain())
+    data = stable_regions(rig, default_gains(rig), Chain())
     low, high = draw_overlay(data).axes[0].get_ylim()
     assert 0.112 < high < 0.2
     (sampled,) = data.sampled
@@ -98,12 +98,12 @@ def test_the_edges_at_the_default_gains_are_published_ones(section):
 
 
 def test_without_damping_the_layers_are_nested_at_the_gains_and_say_for_how_many_modes(monkeypatch):
-    monkeypatch.setattr("tfarm.report.overlay.COLUMNS", 16)
+    monkeypatch.setattr("tfarm.report.overlay.OVERLAY_COLUMNS", 16)
     monkeypatch.setattr("tfarm.dsp.regions.MOST_COLUMNS", 0)
-    data = overlay(PAPER, GAINS, Chain())
+    data = stable_regions(PAPER, GAINS, Chain())
     assert [layer.loop.plant.arm.damping for layer in data.sampled] == [1e-4, 1e-6, 0.0]
     assert data.sampled[-1].modes_used == 20
-    assert all(column == [(CUT[0], 1.0)] for column in data.continuous.stable_intervals)
+    assert all(column == [(CUT_RANGE[0], 1.0)] for column in data.continuous.stable_intervals)
     i = int(np.searchsorted(data.continuous.K1, 0.3))
     widths = [sum(b - a for a, b in layer.stable_intervals[i]) for layer in data.sampled]
     assert widths[0] > widths[1] > 1.1
@@ -150,7 +150,7 @@ def test_the_table_of_periods_is_each_period_by_itself(section):
 
 def test_at_zero_damping_the_verdict_names_its_modes_its_growth_and_the_cure():
     data = Sampled(PAPER, analyse(PAPER, GAINS), windows(PAPER), PLANE(), ())
-    words = " ".join((short_answer(data), compared(data), cure(data)))
+    words = " ".join((sampled_in_short(data), against_continuous(data), cure(data)))
     assert "Not strictly" in words
     assert "as far as its first 20 modes go" in words
     assert "Mode 13 grows by 8.62 × 10⁻⁹ a sample: it doubles in 9.3 days" in words  # ln 2/8.62e-9 * 10 ms
@@ -177,7 +177,7 @@ def test_times_are_said_in_the_unit_that_a_person_would_use(seconds, text):
     ],
 )
 def test_an_end_of_the_search_is_not_sold_as_a_proof(window, looked_at, text):
-    assert interval(window, looked_at) == text
+    assert interval_words(window, looked_at) == text
 
 
 # ------------------------------------------------------------ loci and time
@@ -200,9 +200,9 @@ def test_the_slew_is_the_simulators_own(section):
     for key, K2 in (("without", 0.0), ("with", 0.3)):
         expected = simulator.linear(HubFeedback(K1=0.3, K2=K2))
         for name, signal in (("torque", expected.torque), ("root_moment", expected.at_samples.root_moment)):
-            at_samples = np.isin(drawn["t_s"], held(expected.t, HELD))
+            at_samples = np.isin(drawn["t_s"], kept_digits(expected.t, CURVE_DIGITS))
             shown = np.array(drawn[f"{name}_{key}_N_m"])[at_samples]
-            half_a_digit = 0.5 * 10.0 ** (1 - HELD)  # of a number that begins with 1
+            half_a_digit = 0.5 * 10.0 ** (1 - CURVE_DIGITS)  # of a number that begins with 1
             assert abs(shown - signal).max() < half_a_digit * abs(signal).max()
 
 
@@ -224,17 +224,17 @@ def test_the_strip_chart_has_steps_delay_and_saturation():
 
 @pytest.mark.survey
 def test_the_same_bytes_twice(tmp_path, monkeypatch):
-    monkeypatch.setattr("tfarm.report.overlay.COLUMNS", 16)
+    monkeypatch.setattr("tfarm.report.overlay.OVERLAY_COLUMNS", 16)
     monkeypatch.setattr("tfarm.dsp.regions.MOST_COLUMNS", 0)
     loop = sampled_verdict(LAB, GAINS).loop
     for name in ("a", "b"):
         (tmp_path / name).mkdir()
-        data = overlay(LAB, GAINS, Chain())
+        data = stable_regions(LAB, GAINS, Chain())
         found = loci(loop, 20.0, (-0.5, 1.5))
         ideal = slews(LAB, GAINS, Chain(), 14)
         figures = (draw_overlay(data), draw_strip_chart(strip_chart(LAB, GAINS, ideal.without, 14)))
         for i, figure in enumerate(figures):
-            save(figure, tmp_path / name, str(i), formats=("svg",))
+            save_figure(figure, tmp_path / name, str(i), formats=("svg",))
         table = as_csv(overlay_table(data, "t")) + as_json(loci_table(found, "t"))
         (tmp_path / name / "t").write_text(table, encoding="utf-8")
     files = sorted(path.name for path in (tmp_path / "a").iterdir())
@@ -251,7 +251,7 @@ def test_an_arm_without_a_loop_gets_one_sentence(inertia):
 
 
 def test_a_held_tip_has_a_map_but_no_slew(monkeypatch):
-    monkeypatch.setattr("tfarm.report.overlay.COLUMNS", 8)
+    monkeypatch.setattr("tfarm.report.overlay.OVERLAY_COLUMNS", 8)
     monkeypatch.setattr("tfarm.dsp.regions.MOST_COLUMNS", 0)
     monkeypatch.setattr("tfarm.dsp.periods.PERIOD_SHARES", (1.0,))
     section = sampled_section(replace(LAB, payload=tfarm.Payload(mass=math.inf)))

@@ -17,9 +17,17 @@ from tfarm.dsp.law import growing_mode, mode_table
 from tfarm.dsp.periods import AtPeriod
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import gain_windows
-from tfarm.report.overlay import Overlay
+from tfarm.report.overlay import StableRegions
 from tfarm.report.sampled_section import grown_words
-from tfarm.report.sampled_words import Sampled, chain_words, compared, cure, damping_fact, short_answer, spans
+from tfarm.report.sampled_words import (
+    Sampled,
+    against_continuous,
+    chain_words,
+    cure,
+    damping_fact,
+    sampled_in_short,
+    spans,
+)
 from tfarm.spectrum.scales import default_gains
 
 ARMS = odd_arms()
@@ -47,7 +55,7 @@ def data_of(name, period=0.01):
         modes=SimpleNamespace(natural_frequency=tfarm.modes(arm, 1).natural_frequency[-1:]),
     )  # fmt: skip
     windows = gain_windows(stability(arm, gains), "K2")
-    return Sampled(arm, analysis, windows, Overlay(None, ()), ())
+    return Sampled(arm, analysis, windows, StableRegions(None, ()), ())
 
 
 def number(text):
@@ -58,7 +66,7 @@ def number(text):
 def test_room_that_sampling_adds_or_takes_is_where_the_poles_say_so(name):
     """Just inside what is added the continuous loop is unstable and the sampled one stable; the other way round too."""
     data = data_of(name)
-    words = compared(data)
+    words = against_continuous(data)
     for verb, direction, end in re.findall(r"(adds room|takes away K2) (up to|down to|above|below) ([−\d.]+)", words):
         edge, sampled = number(end), data.sampled_K2
         low, high = data.continuous.around
@@ -73,7 +81,7 @@ def test_room_that_sampling_adds_or_takes_is_where_the_poles_say_so(name):
 def test_yes_carries_its_margin_and_no_says_unstable(name):
     for period in (0.01, 0.0003):
         data = data_of(name, period)
-        words = short_answer(data)
+        words = sampled_in_short(data)
         stable = sampled_loop(data.arm, data.gains, data.chain, count=MODES).poles.is_stable
         assert words.startswith("Yes") == stable
         assert (f"bears {1.25e3 * period:.3g}" in words.replace("0.3750", "0.375")) == stable

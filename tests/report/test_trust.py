@@ -18,7 +18,7 @@ from tfarm.report import making, trust_proofs, write
 from tfarm.report.modes_section import modal_table
 from tfarm.report.trust import Evidence, sources_table, write_trust
 from tfarm.report.trust_audit import in_letters
-from tfarm.report.trust_proofs import digits_of, how_proven, prove, rounds_to, save_proof, written_proofs
+from tfarm.report.trust_proofs import how_proven, prove, rounds_to, save_proof, shared_digits, written_proofs
 from tfarm.report.trust_tables import boxes_tables
 from tfarm.response import accuracy
 from tfarm.response.accuracy import worst_error
@@ -74,7 +74,7 @@ def test_the_brackets_hold_what_mpmath_finds_in_the_paper_s_determinant(proof):
     assert len(proof.brackets) == len(texts) == 10
     for (lower, upper), text in zip(proof.brackets, texts, strict=True):
         assert Fraction(lower) <= Fraction(text) <= Fraction(upper)
-        assert text.startswith(digits_of((lower, upper), 20))
+        assert text.startswith(shared_digits((lower, upper), 20))
     assert proof.count == 11
     assert not proof.failure
 
@@ -88,7 +88,7 @@ def test_the_brackets_hold_what_mpmath_finds_in_the_paper_s_determinant(proof):
     ],
 )
 def test_twenty_digits_with_their_zeros(lower, text):
-    assert digits_of((lower, ""), 20) == text
+    assert shared_digits((lower, ""), 20) == text
 
 
 @pytest.mark.parametrize(
@@ -194,7 +194,7 @@ def test_plain_letters_of_the_audit_are_set():
 def test_what_is_not_proven_is_said(page, proof):
     assert "Not so for other" in page
     assert "not proven: a double frequency near 7 rad/s" in page
-    assert f"{digits_of(proof.brackets[0], 20)}…" in page
+    assert f"{shared_digits(proof.brackets[0], 20)}…" in page
 
 
 def test_published_numbers_stand_with_their_reasons_and_are_text(page):

@@ -6,8 +6,8 @@ from xml.etree import ElementTree
 import pytest
 
 from tfarm.audit import claims
-from tfarm.report.trust_audit import GREEK, anchor, in_letters
-from tfarm.report.trust_math import INDENT, WIDEST, compared, formulas, lines, width
+from tfarm.report.trust_audit import GREEK_LETTERS, anchor, in_letters
+from tfarm.report.trust_math import INDENT_TEX, WIDEST_LINE, compared_formulas, formula_lines, formulas, width
 
 CLAIMS = claims()
 TEXTS = [(claim, text) for claim in CLAIMS for text in (claim.printed, claim.corrected) if text]
@@ -29,13 +29,13 @@ def claim_of(equation):
 
 def pair(equation):
     claim = claim_of(equation)
-    return compared(claim.typeset(claim.printed), claim.typeset(claim.corrected))
+    return compared_formulas(claim.typeset(claim.printed), claim.typeset(claim.corrected))
 
 
 @pytest.mark.parametrize(("claim", "text"), TEXTS, ids=lambda it: getattr(it, "equation", ""))
 def test_every_greek_letter_of_the_plain_text_is_set(claim, text):
     shown = "".join(leaf.text for leaf in leaves(formulas(claim.typeset(text))))
-    for name, letter in GREEK.items():
+    for name, letter in GREEK_LETTERS.items():
         if name == "Delta" and claim.equation in WITH_DW:
             continue
         count = len(re.findall(rf"(?<![A-Za-z]){name}(?![A-Za-z])", text))
@@ -45,11 +45,11 @@ def test_every_greek_letter_of_the_plain_text_is_set(claim, text):
 @pytest.mark.parametrize(("claim", "text"), TEXTS, ids=lambda it: getattr(it, "equation", ""))
 def test_breaking_loses_nothing_and_lines_fit(claim, text):
     tex = claim.typeset(text)
-    broken = lines(tex)
+    broken = formula_lines(tex)
     bare = re.compile(r"[,;]?\\quad|\s")
-    assert bare.sub("", "".join(line.removeprefix(INDENT) for line in broken)) == bare.sub("", tex)
+    assert bare.sub("", "".join(line.removeprefix(INDENT_TEX) for line in broken)) == bare.sub("", tex)
     if claim.equation not in UNBREAKABLE:
-        assert max(width(line) for line in broken) <= WIDEST
+        assert max(width(line) for line in broken) <= WIDEST_LINE
     assert not re.search("xmlns|http|&#", "".join(formulas(tex)))
 
 
@@ -73,7 +73,7 @@ def test_what_differs_is_marked_and_nothing_else(equation, printed, corrected):
 
 def test_the_same_formula_has_no_marks():
     tex = claim_of("(15)").typeset(claim_of("(15)").printed)
-    assert [changed(side) for side in compared(tex, tex)] == [[], []]
+    assert [changed(side) for side in compared_formulas(tex, tex)] == [[], []]
 
 
 def test_a_determinant_has_bars_as_high_as_it():

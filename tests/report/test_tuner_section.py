@@ -16,7 +16,7 @@ from tfarm.digits import significant
 from tfarm.dsp import Chain
 from tfarm.dsp.curves import away
 from tfarm.errors import CertificationError
-from tfarm.plots.files import save
+from tfarm.plots.files import save_figure
 from tfarm.plots.learning import draw_cost_map, draw_curves
 from tfarm.report import tuner_section as tuner_section_room
 from tfarm.report.given_laws import Subject
@@ -149,7 +149,7 @@ def test_the_same_bytes_twice(small, tmp_path):
     for name in ("a", "b"):
         (tmp_path / name).mkdir()
         for i, draw in enumerate((draw_curves, draw_cost_map)):
-            save(draw(small[0]), tmp_path / name, str(i), formats=("svg", "png"))
+            save_figure(draw(small[0]), tmp_path / name, str(i), formats=("svg", "png"))
     for file in ("0.svg", "0.png", "1.svg", "1.png"):
         assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes()
 
@@ -192,7 +192,7 @@ def walked(small, tmp_path_factory):
     """The page of the tuner without its drawings, its section walked, and its folder."""
     folder = tmp_path_factory.mktemp("tuned")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("tfarm.report.sections.save", lambda *_, **__: None)
+        patch.setattr("tfarm.report.sections.save_figure", lambda *_, **__: None)
         saved = save_section(small[1], folder)
     _write_pages(Subject(LAB, Chain()), folder, [saved], ("tune",), "", folder)
     page = Walk((folder / "tune.html").read_text(encoding="utf-8"))

@@ -10,7 +10,7 @@ import tfarm
 from tests.odd_arms import odd_arms
 from tfarm.dsp import Chain, sampled_loop
 from tfarm.dsp.curves import away
-from tfarm.report.tuner_words import beside, drift_words, learning_words, shaping_words, short_answer
+from tfarm.report.tuner_words import beside_best, drift_words, learning_words, shaping_words, tuner_in_short
 from tfarm.report.words import typeset
 from tfarm.spectrum.scales import default_gains
 from tfarm.tuner.comparison import quantised_chain, tried_loops
@@ -50,11 +50,11 @@ def study(without=2.0, best=1.0, tuner=0.9, free=0.8, shaped=0.1, late=0.1, ends
 
 
 def test_less_is_lowered_by_another_share_and_more_is_not():
-    words = short_answer(study(without=2.0, best=1.0, tuner=0.9, free=0.8))
+    words = tuner_in_short(study(without=2.0, best=1.0, tuner=0.9, free=0.8))
     assert words.startswith("A little. A constant K2 of 0.300 already takes 50 % off")
     assert "lowers it by another 10 %, to 0.900" in words
     assert "the median is 20 % below that" in words
-    worse = short_answer(study(without=2.0, best=1.0, tuner=1.15, free=1.3))
+    worse = tuner_in_short(study(without=2.0, best=1.0, tuner=1.15, free=1.3))
     assert worse.startswith("No.")
     assert "raises it by 15 %, to 1.15" in worse
     assert "another" not in worse
@@ -62,12 +62,12 @@ def test_less_is_lowered_by_another_share_and_more_is_not():
 
 
 def test_a_constant_gain_that_does_nothing_is_not_said_to_take_0_percent_off():
-    words = short_answer(study(without=1.0, best=1.0, tuner=1.0, free=math.inf))
+    words = tuner_in_short(study(without=1.0, best=1.0, tuner=1.0, free=math.inf))
     assert "No constant K2 takes anything off" in words
     assert "leaves it as it is" in words
     assert "more than half of the seeds run away" in words
     assert "0 %" not in words
-    assert beside(1.0, 1.0) == "that of the best constant gain"
+    assert beside_best(1.0, 1.0) == "that of the best constant gain"
 
 
 def test_shaping_is_cheaper_only_where_it_is_and_nothing_arrives_0_ms_later():

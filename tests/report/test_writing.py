@@ -35,12 +35,12 @@ from tfarm.report.frame import first_sentence
 from tfarm.report.given_laws import GivenLaw, Subject
 from tfarm.report.page import index_page
 from tfarm.report.paper import is_from_paper, paper_section
-from tfarm.report.sections import Section
+from tfarm.report.sections import PageSection
 from tfarm.report.trust import Evidence, kept_evidence, write_trust
 from tfarm.report.trust_proofs import written_proofs
 from tfarm.spectrum.scales import default_gains
 
-ANCHORS = {piece.anchor for piece in making.PIECES}
+ANCHORS = {piece.anchor for piece in making.ARM_PIECES}
 HELD = replace(ARM, hub=tfarm.Hub(inertia=math.inf))  # no loop: its proofs are quick
 
 
@@ -86,7 +86,7 @@ def test_another_process_with_other_hashes_writes_the_same_bytes(pages, audit_ro
     coarsen(monkeypatch.setattr)
     made = tmp_path / "made"
     made.mkdir()
-    for i, piece in enumerate(making.PIECES):
+    for i, piece in enumerate(making.ARM_PIECES):
         if piece.anchor in ("margins-map", "bode-root-moment", "margins", "margins-nyquist"):
             making.make(Subject(ARM, Chain()), i, made)
     there = files_of(pages / NAME)
@@ -216,8 +216,8 @@ def test_every_cell_of_a_narrow_page_says_what_it_is(pages):
 
 
 def test_the_pages_of_an_arm_lead_to_each_other(tmp_path, monkeypatch):
-    piece = next(piece for piece in making.PIECES if piece.name == "the arm")
-    monkeypatch.setattr(making, "PIECES", (piece,))
+    piece = next(piece for piece in making.ARM_PIECES if piece.name == "the arm")
+    monkeypatch.setattr(making, "ARM_PIECES", (piece,))
     monkeypatch.setattr(making, "save_proof", lambda *_: None)
     write([replace(ARM, name="plain")], tmp_path, only=("modes", "bode"))
     assert "bode.html" in Links(tmp_path / "plain" / "modes.html").targets
@@ -382,7 +382,7 @@ def test_work_that_fails_leaves_nothing(tmp_path, monkeypatch):
         (folder / "half.svg").write_text("half")
         raise tfarm.ConvergenceError("stopped short", None, None)
 
-    monkeypatch.setattr(making, "PIECES", ())
+    monkeypatch.setattr(making, "ARM_PIECES", ())
     monkeypatch.setattr(making, "save_card", fail)
     with pytest.raises(tfarm.ConvergenceError):
         write([ARM], tmp_path / "new" / "out")
@@ -395,7 +395,7 @@ def test_work_that_fails_leaves_an_earlier_report_as_it_was(pages, tmp_path, mon
 
     before, out = files_of(pages), tmp_path / "out"
     shutil.copytree(pages, out)
-    monkeypatch.setattr(making, "PIECES", [piece for piece in making.PIECES if piece.name == "the arm"])
+    monkeypatch.setattr(making, "ARM_PIECES", [piece for piece in making.ARM_PIECES if piece.name == "the arm"])
     monkeypatch.setattr(making, "save_card", fail)
     with pytest.raises(tfarm.ConvergenceError):
         write([ARM], out, only=("modes",))
@@ -408,8 +408,8 @@ def test_work_that_fails_leaves_an_earlier_report_as_it_was(pages, tmp_path, mon
 @pytest.fixture
 def quick(monkeypatch):
     """Reports of one short section."""
-    piece = next(piece for piece in making.PIECES if piece.name == "the arm")
-    for pieces in ("PIECES", "LAW_PIECES"):
+    piece = next(piece for piece in making.ARM_PIECES if piece.name == "the arm")
+    for pieces in ("ARM_PIECES", "LAW_PIECES"):
         monkeypatch.setattr(making, pieces, (piece,))
     monkeypatch.setattr(making, "save_proof", lambda *_: None)
 
@@ -417,9 +417,9 @@ def quick(monkeypatch):
 def made_of(monkeypatch, arm, out, **options):
     """Which arms of a run were made, and what was said of the others."""
     made, told = [], []
-    section = making._section
+    section = making.section_or_why_not
     with monkeypatch.context() as patch:
-        patch.setattr(making, "_section", lambda piece, of: [made.append(of.arm.name), section(piece, of)][1])
+        patch.setattr(making, "section_or_why_not", lambda piece, of: [made.append(of.arm.name), section(piece, of)][1])
         write([arm], out, only=("modes",), notice=told.append, **options)
     return made, told
 
@@ -463,7 +463,7 @@ def test_what_changed_in_any_way_is_made_again(tmp_path, monkeypatch):
 @pytest.mark.usefixtures("quick")
 def test_a_page_that_leaves_a_section_out_is_tried_again(tmp_path, monkeypatch):
     error = tfarm.ConvergenceError("stopped short", None, None)
-    monkeypatch.setattr(making, "PIECES", (replace(making.PIECES[0], make=Unmakeable(error)),))
+    monkeypatch.setattr(making, "ARM_PIECES", (replace(making.ARM_PIECES[0], make=Unmakeable(error)),))
     for _ in range(2):
         made, told = made_of(monkeypatch, ARM, tmp_path)
         assert made == [NAME]
@@ -483,7 +483,7 @@ def test_the_folder_of_an_arm_is_small(pages):
 
 
 def test_progress_is_told_in_a_pipe_too(monkeypatch, capsys):
-    monkeypatch.setattr(cli_tables, "EVERY", 0.02)
+    monkeypatch.setattr(cli_tables, "PROGRESS_EVERY", 0.02)
     with cli_tables.progress() as advance:
         advance(3, 7, "a section")
         deadline = time.monotonic() + 30
@@ -510,9 +510,9 @@ def test_a_page_is_about_the_arms_own_file(tmp_path, monkeypatch, capsys):
 
     def section(arm, chain):
         seen.append((arm.name, chain))
-        return Section(anchor="sampled", title="The sampled loop")
+        return PageSection(anchor="sampled", title="The sampled loop")
 
-    monkeypatch.setattr(making, "PIECES", (making.Piece("s", "sampled", ("sampled",), section, is_sampled=True),))
+    monkeypatch.setattr(making, "ARM_PIECES", (making.Piece("s", "sampled", ("sampled",), section, is_sampled=True),))
     monkeypatch.setattr(making, "save_proof", lambda *_: None)
     file = tmp_path / "bench.toml"
     tables = "[sampling]\nperiod = 0.004\n[converters]\nmoment_bits = 12\nmoment_range = 5.0\n[slew]\ntravel = 0.7\n"
@@ -528,9 +528,9 @@ def test_a_page_is_about_the_arms_own_file(tmp_path, monkeypatch, capsys):
 
 def without_a_section(monkeypatch, error):
     """A report of two sections, the second of which meets that error."""
-    pieces = {piece.name: piece for piece in making.PIECES}
+    pieces = {piece.name: piece for piece in making.ARM_PIECES}
     broken = replace(pieces["root loci"], make=Unmakeable(error))
-    monkeypatch.setattr(making, "PIECES", (pieces["the arm"], broken))
+    monkeypatch.setattr(making, "ARM_PIECES", (pieces["the arm"], broken))
     monkeypatch.setattr(making, "save_proof", lambda *_: None)
 
 
@@ -579,10 +579,10 @@ def test_a_bug_of_ours_stays_loud(tmp_path, monkeypatch):
 
 def test_every_piece_knows_the_anchor_of_its_section(pages):
     ids = links_of(pages / NAME / "index.html").ids
-    assert [piece.anchor for piece in making.PIECES if piece.is_for(Subject(ARM, Chain()))] == [
+    assert [piece.anchor for piece in making.ARM_PIECES if piece.is_for(Subject(ARM, Chain()))] == [
         i for i in ids if i in ANCHORS
     ]
-    assert all(writing._answers(piece.anchor, page) for piece in making.PIECES for page in piece.questions)
+    assert all(writing.is_on_page(piece.anchor, page) for piece in making.ARM_PIECES for page in piece.questions)
 
 
 @pytest.mark.parametrize(
@@ -614,7 +614,7 @@ STRANGE_CARDS = (
 
 @pytest.mark.usefixtures("audited")
 def test_other_files_in_the_folder_are_kept_and_strange_cards_passed_over(tmp_path, monkeypatch):
-    monkeypatch.setattr(making, "PIECES", ())
+    monkeypatch.setattr(making, "ARM_PIECES", ())
     (tmp_path / NAME).mkdir()
     (tmp_path / NAME / "mine.txt").write_text("mine")
     for i, card in enumerate(STRANGE_CARDS):

@@ -8,7 +8,7 @@ import pytest
 import tfarm
 from tests.shell import run
 from tests.strategies import some_arm
-from tfarm.cli.methods import ALIKE
+from tfarm.cli.methods import METHODS_AGREE
 from tfarm.errors import ParameterError
 from tfarm.exact.methods import METHODS
 
@@ -22,7 +22,7 @@ def test_three_methods_give_one_number(preset):
     for output, x in (("root_moment", None), ("tip_displacement", None), ("moment", 0.3 * arm.link.length)):
         fast, *slow = (tfarm.transfer(arm, output, x=x, method=method)(S) for method in METHODS)
         for each in slow:
-            assert each == pytest.approx(fast, rel=ALIKE, abs=0)
+            assert each == pytest.approx(fast, rel=METHODS_AGREE, abs=0)
     table = tfarm.modes(arm, 5)
     for method in METHODS[1:]:
         assert table.frequencies(method) == pytest.approx(table.natural_frequency, rel=BRACKETS, abs=0)

@@ -13,8 +13,8 @@ import pytest
 from tfarm.columns import ANSWER, FILES, PAGE, REPORT, Column, Table
 from tfarm.digits import lined, significant, singly, worded
 from tfarm.errors import MISSING
-from tfarm.tables.files import as_csv, as_json, save, to_json
-from tfarm.tables.html import as_html, symbol
+from tfarm.tables.files import as_csv, as_json, save_table, to_json
+from tfarm.tables.html import as_html, with_symbols
 
 
 @dataclass
@@ -154,7 +154,7 @@ def test_two_columns_of_one_key_are_a_slip():
 
 
 def test_a_report_s_table_has_two_files(table, tmp_path):
-    assert save(table, tmp_path) == ("found.csv", "found.json")
+    assert save_table(table, tmp_path) == ("found.csv", "found.json")
     assert (tmp_path / "found.csv").read_text(encoding="utf-8") == as_csv(table)
     assert (tmp_path / "found.json").read_bytes().decode() == as_json(table)
 
@@ -170,4 +170,4 @@ def test_a_report_s_table_has_two_files(table, tmp_path):
     ],
 )
 def test_texts_of_files_have_their_powers_of_ten_set(text, shown):
-    assert symbol(text) == shown
+    assert with_symbols(text) == shown

@@ -10,7 +10,7 @@ import pytest
 
 from tfarm.columns import REPORT, Column, Table
 from tfarm.digits import general, singly
-from tfarm.tables.terminal import lines
+from tfarm.tables.terminal import table_lines
 
 COLUMNS = (
     Column("mode", "mode", of=["1", "2"]),
@@ -21,7 +21,7 @@ COLUMNS = (
 
 
 def printed(width, columns=COLUMNS, keys=1):
-    return lines(Table(columns=columns, keys=keys), width)
+    return table_lines(Table(columns=columns, keys=keys), width)
 
 
 def words(lines):

@@ -83,13 +83,13 @@ TheoryName = Annotated[
     str | None,
     typer.Option("--theory", help="timoshenko, shear, rayleigh or euler-bernoulli; the arm's own if not said"),
 ]
-Side = Annotated[
+SideName = Annotated[
     str | None, typer.Option("--side", help="outer (if not said) or inner side of a joint, for outputs along the arm")
 ]
 Json = Annotated[bool, typer.Option("--json", help="one JSON object on standard output")]
 MethodName = Annotated[str, typer.Option("--method", help="closed-form, balls, or appendix: the paper's determinant")]
 Compare = Annotated[bool, typer.Option("--compare", help="all three methods beside each other, and where they part")]
-Digits = Annotated[str | None, typer.Option("--digits", metavar="D", help="right digits, proven; strings above 15")]
+DigitCount = Annotated[str | None, typer.Option("--digits", metavar="D", help="right digits, proven; strings above 15")]
 
 
 def load_arm(name: str, theory: str | None = None) -> Arm:
@@ -131,10 +131,10 @@ def give(answer: dict[str, Any], json: bool, show: Callable[[dict[str, Any]], No
 
 def right_digits(text: str | None) -> int | None:
     """The --digits option as a number."""
-    return None if text is None else whole("--digits", text, 1, 1000)
+    return None if text is None else whole_number("--digits", text, 1, 1000)
 
 
-def whole(key: str, text: str, least: int, most: int) -> int:
+def whole_number(key: str, text: str, least: int, most: int) -> int:
     """A whole number in a range; it may be typed as 1e3."""
     remedy = f"a whole number from {least} to {most}"
     try:

@@ -4,31 +4,28 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from tfarm.cli.app import (
     ArmName,
     Compare,
-    Digits,
+    DigitCount,
     Json,
     MethodName,
-    Side,
+    SideName,
     TheoryName,
     app,
     give,
     load_arm,
     read_on,
     right_digits,
-    whole,
+    whole_number,
 )
-from tfarm.cli.inputs import GAIN_OPTIONS, LawFiles, Typed, laws_of, with_options
-from tfarm.cli.sampling import Delay, DspFile, Period, chain_of
+from tfarm.cli.inputs import GAIN_OPTIONS, LawFiles, Typed, asked_laws, with_options
+from tfarm.cli.sampling import Delay, DspFile, Period, asked_chain
 from tfarm.errors import MISSING, ParameterError, one_line
-
-if TYPE_CHECKING:
-    pass
 
 MOST_LISTED = 1000  # modes with nodes and sensitivities: their work grows with the square, to some 20 s
 
@@ -48,16 +45,16 @@ def presets(json: Json = False) -> None:
 def modes(
     arm: ArmName,
     count: Annotated[str, typer.Option("--count", metavar="N", help="flexible modes, 1 to 1000")] = "10",
-    digits: Digits = None,
+    digits: DigitCount = None,
     certify: Annotated[bool, typer.Option("--certify", help="prove each bracket, and that no mode is missing")] = False,
     method: MethodName = "closed-form",
     compare: Compare = False,
     json: Json = False,
 ) -> None:
     """Natural frequencies and modes, complete by construction."""
-    wanted, right = whole("--count", count, 1, MOST_LISTED), right_digits(digits)
+    wanted, right = whole_number("--count", count, 1, MOST_LISTED), right_digits(digits)
     subject = load_arm(arm)
-    from tfarm.cli.methods import alone, compared_modes, print_compared, slow_method
+    from tfarm.cli.methods import BESIDE_COMPARE, modes_by_methods, print_compared, refuse_beside, slow_method
     from tfarm.cli.tables import print_modes
     from tfarm.spectrum import modes as find_modes
     from tfarm.spectrum.answers import modes_answer
@@ -65,8 +62,8 @@ def modes(
     table = find_modes(subject, wanted)
     road = slow_method(method, len(table), right, compare)
     if compare:
-        alone({"--certify": certify or None})
-        give(compared_modes(table), json, print_compared)
+        refuse_beside({"--certify": certify or None}, BESIDE_COMPARE)
+        give(modes_by_methods(table), json, print_compared)
         return
     give(modes_answer(table, right, certify, road), json, print_modes)
 
@@ -81,14 +78,14 @@ def response(
     stop: Annotated[float, typer.Option("--to", help="highest frequency [rad/s]")] = 1000.0,
     points: Annotated[str, typer.Option("--points", help="how many, logarithmically spaced")] = "500",
     x: Annotated[float | None, typer.Option("--x", help="place on the arm [m], for outputs along it")] = None,
-    side: Side = None,
+    side: SideName = None,
     driven: Annotated[
         str | None,
         typer.Option(
             "--input", help="hub_torque, motor_voltage, motor_current, hub_angle, force@X or moment_pair@X1,X2"
         ),
     ] = None,
-    digits: Digits = None,
+    digits: DigitCount = None,
     method: MethodName = "closed-form",
     compare: Compare = False,
     csv: Annotated[Path | None, typer.Option("--csv", help="write a table to this file")] = None,
@@ -105,17 +102,17 @@ def response(
     if measured is not None:
         from tfarm.cli.overlaying import lay_over
 
-        _alone_with_measured(s=s, omega=omega, output=output, x=x, side=side, digits=digits)
-        lay_over(load_arm(arm), measured, csv, png, json)
+        others = {"--s": s, "--omega": omega, "--output": output, "--x": x, "--side": side, "--digits": digits}
+        lay_over(arm, measured, others, csv, png, json)
         return
     if output is None or png is not None:
         option = "--output" if output is None else "--measured"
         raise ParameterError(key=option, value=MISSING, remedy="say which response: --output root_moment, for one")
-    from tfarm.cli.inputs import driven_by, points_on
+    from tfarm.cli.inputs import asked_input, points_on
 
     right, at = right_digits(digits), points_on(s, omega, start, stop, points)
-    subject, driven = driven_by(load_arm(arm), driven)
-    from tfarm.cli.methods import alone, compared_responses, print_compared, slow_method
+    subject, driven = asked_input(load_arm(arm), driven)
+    from tfarm.cli.methods import BESIDE_COMPARE, print_compared, refuse_beside, responses_by_methods, slow_method
     from tfarm.cli.tables import print_found, say_written
     from tfarm.response import transfer
     from tfarm.response.answers import response_answer, response_table
@@ -125,21 +122,14 @@ def response(
     road = slow_method(method, at.size, right, compare)
     (wanted,) = read_on([output], side)
     if compare:
-        alone({"--csv": csv, "--input": driven})
-        give(compared_responses(subject, wanted, x, at), json, print_compared)
+        refuse_beside({"--csv": csv, "--input": driven}, BESIDE_COMPARE)
+        give(responses_by_methods(subject, wanted, x, at), json, print_compared)
         return
     answer = response_answer(transfer(subject, wanted, x=x, method=road, input=driven), at, right)
     if csv is not None:
         write_csv(response_table(answer), csv)
     if say_written(csv) or json:
         give(answer, json, (lambda found: show(response_table(found))) if csv is None else print_found)
-
-
-def _alone_with_measured(**options: object) -> None:
-    for name, value in options.items():
-        if value is not None:
-            remedy = "a measured response has its own outputs and frequencies; leave this out"
-            raise ParameterError(key=f"--{name}", value=value, remedy=remedy)
 
 
 @app.command()
@@ -174,8 +164,8 @@ def report(
 
     names = arms or tfarm.presets()
     subjects = [load_arm(name, theory) for name in names]
-    chains = [chain_of(dsp or name, period, delay_samples) for name in names]
-    laws = [laws_of(arm, name, gains, law or []) for arm, name in zip(subjects, names, strict=True)]
+    chains = [asked_chain(dsp or name, period, delay_samples) for name in names]
+    laws = [asked_laws(arm, name, gains, law or []) for arm, name in zip(subjects, names, strict=True)]
     from tfarm.cli.tables import progress
     from tfarm.fitting.reading import data_of
     from tfarm.report import write

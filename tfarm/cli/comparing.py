@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tfarm.cli.app import Json, TheoryName, app, give, load_arm, whole
-from tfarm.cli.inputs import GAIN_OPTIONS, Given, Png, Typed, law_of, with_options
-from tfarm.cli.sampling import Delay, DspFile, Period, chain_of
+from tfarm.cli.app import Json, TheoryName, app, give, load_arm, whole_number
+from tfarm.cli.inputs import GAIN_OPTIONS, Given, Png, Typed, asked_law, with_options
+from tfarm.cli.sampling import Delay, DspFile, Period, asked_chain
 from tfarm.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -40,16 +40,16 @@ def compare(
     gains: Typed,
 ) -> None:
     """Two arms, or two laws on one arm, beside each other: modes, poles, verdicts, margins; differences in per cent."""
-    count, files = whole("--modes", modes, 1, 30), law or []
+    count, files = whole_number("--modes", modes, 1, 30), law or []
     _check_number(arms, files)
     subjects = [load_arm(name, theory) for name in arms]
-    chain = chain_of(dsp or arms[0], period, delay_samples)
+    chain = asked_chain(dsp or arms[0], period, delay_samples)
     pairs = [(subjects[min(n, len(arms) - 1)], arms[min(n, len(arms) - 1)]) for n in (0, 1)]
     wanted = [None, None] if not files else files * (2 // len(files))
-    laws = [law_of(arm, Given(gains, file, name))[0] for (arm, name), file in zip(pairs, wanted, strict=True)]
+    laws = [asked_law(arm, Given(gains, file, name))[0] for (arm, name), file in zip(pairs, wanted, strict=True)]
     from tfarm.cli.tables import say_written
     from tfarm.comparing import compare as find
-    from tfarm.comparing.answers import comparison_answer
+    from tfarm.comparing.answers import compared_answer
 
     names = _names([arm.name for arm in subjects], files)
     found = find(subjects, laws, names=names, modes=count, output=output, chain=chain)
@@ -64,7 +64,7 @@ def compare(
 
         page = write_comparison(found, out)
     if say_written(png, page) or json:
-        give(comparison_answer(found), json, lambda answer: _print(found, answer))
+        give(compared_answer(found), json, lambda answer: _print(found, answer))
 
 
 def _check_number(arms: list[str], files: list[str]) -> None:
@@ -87,11 +87,11 @@ def _names(arms: list[str], files: list[str]) -> list[str]:
 
 def _print(found: Comparison, answer: dict[str, Any]) -> None:
     """The verdicts, then each table; of two laws on one arm its modes are the same, and left out."""
-    from tfarm.comparing.answers import verdict_words, windows_table
+    from tfarm.comparing.answers import compared_windows, side_words
     from tfarm.tables.terminal import show
 
     for side in found.sides:
-        print(verdict_words(side))
+        print(side_words(side))
     if found.is_of_arms:
         print("\nnatural frequencies and damping of the arms by themselves:")
         show(answer["modes"])
@@ -101,7 +101,7 @@ def _print(found: Comparison, answer: dict[str, Any]) -> None:
     show(answer["poles"])
     print()
     show(answer["margins"])
-    if (windows := windows_table(found)) is not None:
+    if (windows := compared_windows(found)) is not None:
         show(windows)
         print("* no limit was found up to there, and beyond none was looked for")
     print(answer["loops"][0]["sign_convention"])

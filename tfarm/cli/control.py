@@ -11,31 +11,35 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, TWO_GAINS
-from tfarm.cli.app import ArmName, Json, app, give, load_arm, plain_number, tell, whole
-from tfarm.cli.inputs import Given, HeldAngle, LawFile, Png, law_of, range_option, under_a_law, with_options
-from tfarm.cli.sampling import Delay, DspFile, Period, chain_of
+from tfarm.cli.app import ArmName, Json, app, give, load_arm, plain_number, tell, whole_number
+from tfarm.cli.inputs import Given, HeldAngle, LawFile, Png, asked_law, range_option, under_a_law, with_options
+from tfarm.cli.sampling import Delay, DspFile, Period, asked_chain
 from tfarm.errors import ParameterError
 
 if TYPE_CHECKING:
     from tfarm.arm import Arm
 
-POLES = "poles with Im s >= 0, 1 to 1000; if not given ten, or those below the shear cut-off where they are fewer"
+HELP_ON_COUNT = (
+    "poles with Im s >= 0, 1 to 1000; if not given ten, or those below the shear cut-off where they are fewer"
+)
 
-ALSO = "a further arm that the law has to serve: the objective is the worst of all; may be repeated"
-RANGE = "numbers that the arm may have, such as payload.mass=0.1,0.5; up to four: corners, and a search inside"
-OF_A_LAW = "twice: two numbers of a law and their ranges; gain, delay, SIGNAL, SIGNAL.num.N or SIGNAL.den.N"
+HELP_ON_ALSO = "a further arm that the law has to serve: the objective is the worst of all; may be repeated"
+HELP_ON_RANGE = "numbers that the arm may have, such as payload.mass=0.1,0.5; up to four: corners, and a search inside"
+HELP_ON_VARY = "twice: two numbers of a law and their ranges; gain, delay, SIGNAL, SIGNAL.num.N or SIGNAL.den.N"
 
-MAP = (
+HELP_ON_MAP = (
     f"How many poles are unstable over the plane of {' and '.join(PLANE)}, and the exact boundary; "
     "or over two numbers of a law."
 )
-OBJECTIVES = "damping, margin, residual or cost (of the tuner's trial); of another structure sensitivity or delay too"
-STRUCTURES = f"{TWO_GAINS}, PD, PD+notch, lead, PPF or strain-rate"
-USUAL = {  # of a map
+HELP_ON_OBJECTIVE = (
+    "damping, margin, residual or cost (of the tuner's trial); of another structure sensitivity or delay too"
+)
+HELP_ON_STRUCTURE = f"{TWO_GAINS}, PD, PD+notch, lead, PPF or strain-rate"
+USUAL_RANGES = {  # of a map
     RATE_GAIN: f"by default -1,3 on the paper's arm, -3.33 to 10 times the default {RATE_GAIN} on a rig",
     MOMENT_GAIN: "by default -2,2, times what one N m takes of the input of a rig",
 }
-RANGES = {name: range_option(name, f"range of {name}; {usual}") for name, usual in USUAL.items()}
+RANGES = {name: range_option(name, f"range of {name}; {usual}") for name, usual in USUAL_RANGES.items()}
 BOUNDS = {name: range_option(name, f"bounds of {name}") for name in PLANE}
 
 
@@ -43,15 +47,15 @@ BOUNDS = {name: range_option(name, f"bounds of {name}") for name in PLANE}
 @under_a_law
 def poles(
     arm: ArmName,
-    count: Annotated[str | None, typer.Option("--count", metavar="N", help=POLES)] = None,
+    count: Annotated[str | None, typer.Option("--count", metavar="N", help=HELP_ON_COUNT)] = None,
     certify: Annotated[bool, typer.Option("--certify", help="prove each, and that none is missing")] = False,
     json: Json = False,
     *,
     given: Given,
 ) -> None:
     """Closed-loop poles of the exact arm, complete in a printed box."""
-    number, subject = None if count is None else whole("--count", count, 1, 1000), load_arm(arm)
-    law, said = law_of(subject, given)
+    number, subject = None if count is None else whole_number("--count", count, 1, 1000), load_arm(arm)
+    law, said = asked_law(subject, given)
     from tfarm.cli.control_tables import print_poles
     from tfarm.loop.answers import poles_answer
     from tfarm.loop.closed import closed_loop_poles
@@ -65,7 +69,7 @@ def poles(
 def margins(arm: ArmName, json: Json = False, *, given: Given) -> None:
     """The verdict on a loop, the windows of each gain, and the margins of the exact loop function."""
     subject = load_arm(arm)
-    law, said = law_of(subject, given)
+    law, said = asked_law(subject, given)
     from tfarm.cli.control_tables import print_margins
     from tfarm.loop.answers import margins_answer
     from tfarm.loop.closed import margins as find_margins
@@ -84,8 +88,8 @@ def spill(
     given: Given,
 ) -> None:
     """Does a law drive a mode that its design model leaves out?  The exact loop beside models of 1, 2, 3 ... modes."""
-    number, subject = whole("--modes", modes, 1, 60), load_arm(arm)
-    law, said = law_of(subject, given)
+    number, subject = whole_number("--modes", modes, 1, 60), load_arm(arm)
+    law, said = asked_law(subject, given)
     from tfarm.arm.law import Law
     from tfarm.cli.control_tables import print_spill
     from tfarm.loop.spill import spill as find
@@ -95,7 +99,7 @@ def spill(
     give(spill_answer(found) | said, json, print_spill)
 
 
-@app.command("map", help=MAP)
+@app.command("map", help=HELP_ON_MAP)
 @with_options(RANGES, after="arm")
 def gain_map(
     arm: ArmName,
@@ -104,15 +108,15 @@ def gain_map(
     csv: Annotated[Path | None, typer.Option("--csv", help="write both numbers and the count to this file")] = None,
     png: Png = None,
     law: LawFile = None,
-    vary: Annotated[list[str] | None, typer.Option("--vary", metavar="NAME=LO,HI", help=OF_A_LAW)] = None,
+    vary: Annotated[list[str] | None, typer.Option("--vary", metavar="NAME=LO,HI", help=HELP_ON_VARY)] = None,
     json: Json = False,
     *,
     typed: dict[str, str | None],
 ) -> None:
     """The map over the plane of both gains, or over two numbers of a law."""
-    number, subject = whole("--points", points or "101", 2, 2000), load_arm(arm)
+    number, subject = whole_number("--points", points or "101", 2, 2000), load_arm(arm)
     if vary or law:
-        _law_map(subject, arm, law, vary or [], whole("--points", points or "60", 2, 400), csv, png, json)
+        _law_map(subject, arm, law, vary or [], whole_number("--points", points or "60", 2, 400), csv, png, json)
         return
     from tfarm.loop.regions import ranges_of
 
@@ -151,7 +155,7 @@ def _law_map(
         remedy = "twice, such as --vary hub_angle=0,10 --vary delay=0,0.02"
         raise ParameterError(key="--vary", value=vary, remedy=remedy)
     ranges = [_range_of("--vary", each) for each in vary]
-    typed = law_of(subject, Given({}, law, name))[0]
+    typed = asked_law(subject, Given({}, law, name))[0]
     from tfarm.arm.law import Law
     from tfarm.cli.control_tables import print_law_map, write_law_map
     from tfarm.cli.tables import say_written
@@ -183,24 +187,24 @@ def _range_of(option: str, text: str) -> tuple[str, tuple[float, float]]:
 @with_options(BOUNDS, after="structure")
 def design(
     arm: ArmName,
-    objective: Annotated[str, typer.Option("--objective", help=OBJECTIVES)] = "damping",
-    structure: Annotated[str, typer.Option("--structure", help=STRUCTURES)] = TWO_GAINS,
+    objective: Annotated[str, typer.Option("--objective", help=HELP_ON_OBJECTIVE)] = "damping",
+    structure: Annotated[str, typer.Option("--structure", help=HELP_ON_STRUCTURE)] = TWO_GAINS,
     kp: HeldAngle = 0.0,
     modes: Annotated[str, typer.Option("--modes", help="flexible modes in the band, 1 to 30")] = "2",
     continuous: Annotated[bool, typer.Option("--continuous", help="for the continuous loop, without a clock")] = False,
     period: Period = None,
     delay_samples: Delay = None,
     dsp: DspFile = None,
-    also: Annotated[list[str] | None, typer.Option("--also", metavar="ARM", help=ALSO)] = None,
-    over: Annotated[list[str] | None, typer.Option("--range", metavar="KEY=LO,HI", help=RANGE)] = None,
+    also: Annotated[list[str] | None, typer.Option("--also", metavar="ARM", help=HELP_ON_ALSO)] = None,
+    over: Annotated[list[str] | None, typer.Option("--range", metavar="KEY=LO,HI", help=HELP_ON_RANGE)] = None,
     save: Annotated[Path | None, typer.Option("--save", help="write the law to this TOML file, for --law")] = None,
     json: Json = False,
     *,
     typed: dict[str, str | None],
 ) -> None:
     """The law that serves an objective best in the sampled loop, at the file's period or else 10 ms."""
-    number, subject = whole("--modes", modes, 1, 30), load_arm(arm)
-    chain = chain_of(dsp or arm, period, delay_samples)
+    number, subject = whole_number("--modes", modes, 1, 30), load_arm(arm)
+    chain = asked_chain(dsp or arm, period, delay_samples)
     within: Any = {**_bounds_of(typed), ANGLE_GAIN: kp}
     ranges = dict(_range_of("--range", each) for each in over or [])
     from tfarm.arm.law import Law

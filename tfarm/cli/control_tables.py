@@ -30,7 +30,7 @@ def print_poles(answer: dict[str, Any]) -> None:
 
 
 def print_margins(found: Margins[Any], answer: dict[str, Any]) -> None:
-    """The verdict, then everything else."""
+    """The verdict, then everything else: of gains at the hub Lyapunov's argument, and how far each may go alone."""
     far = answer["verdict"] == "unstable" or answer["known_beyond_the_band"]
     reach = "" if far else f" up to {answer['band_rad_s']:.4g} rad/s, not known beyond"
     poles = found.stability.poles
@@ -43,22 +43,16 @@ def print_margins(found: Margins[Any], answer: dict[str, Any]) -> None:
     for warning in answer.get("warnings", ()):
         print(f"warning: {warning}")
     if found.windows:
-        _print_windows(found, answer)
+        print(f"Lyapunov: {answer['lyapunov']['reason']}")
+        show(Table(columns=WINDOW_COLUMNS, record=gain_rows(found)))
+        ranges = ((name, *each.looked_at) for name, each in found.windows.items())
+        spans = ", ".join(f"{name} ({low:.6g}, {high:.6g})" for name, low, high in ranges)
+        print(f"looked at: {spans}; * no limit was found up to there, and beyond none was looked for")
     elif answer["passivity"]["kind"]:
         print(answer["passivity"]["reason"])
     if answer["in_band"] is not None:
         _print_loop_margins(answer)
     print(answer["sign_convention"])
-
-
-def _print_windows(found: Margins[Any], answer: dict[str, Any]) -> None:
-    """What Lyapunov's argument says of gains at the hub, and how far each may go alone."""
-    print(f"Lyapunov: {answer['lyapunov']['reason']}")
-    show(Table(columns=WINDOW_COLUMNS, record=gain_rows(found)))
-    spans = ", ".join(
-        f"{name} ({each.looked_at[0]:.6g}, {each.looked_at[1]:.6g})" for name, each in found.windows.items()
-    )
-    print(f"looked at: {spans}; * no limit was found up to there, and beyond none was looked for")
 
 
 def _print_loop_margins(answer: dict[str, Any]) -> None:

@@ -15,16 +15,16 @@ from tfarm.errors import ParameterError
 if TYPE_CHECKING:
     from tfarm.fitting.fit import Fit
 
-DATA = "OUTPUT/INPUT=FILE, such as tip_acceleration/hub_angle=sweep.csv; again for each response"
-FREE = "what is free: keys of the arm's file, such as link.youngs_modulus, and gain, delay of each sensor"
-MODE = "N=FREQUENCY,RATIO of a ring-down, such as 1=2.52hz,0.006; deviations after ~: 1=2.52hz~0.01,0.006~0.001"
+HELP_ON_DATA = "OUTPUT/INPUT=FILE, such as tip_acceleration/hub_angle=sweep.csv; again for each response"
+HELP_ON_FREE = "what is free: keys of the arm's file, such as link.youngs_modulus, and gain, delay of each sensor"
+HELP_ON_MODE = "N=FREQUENCY,RATIO of a ring-down, such as 1=2.52hz,0.006; deviations after ~: 1=2.52hz~0.01,0.006~0.001"
 
 
 @app.command()
 def fit(
     arm: ArmName,
-    data: Annotated[list[str] | None, typer.Option("--data", metavar="OUTPUT/INPUT=FILE", help=DATA)] = None,
-    free: Annotated[str, typer.Option("--free", metavar="KEY,KEY", help=FREE)] = "",
+    data: Annotated[list[str] | None, typer.Option("--data", metavar="OUTPUT/INPUT=FILE", help=HELP_ON_DATA)] = None,
+    free: Annotated[str, typer.Option("--free", metavar="KEY,KEY", help=HELP_ON_FREE)] = "",
     start: Annotated[
         list[str] | None, typer.Option("--start", metavar="KEY=VALUE", help="where a number starts, if elsewhere")
     ] = None,
@@ -32,7 +32,7 @@ def fit(
     prior: Annotated[
         list[str] | None, typer.Option("--prior", metavar="KEY=MEAN,STD", help="what is known of it beforehand")
     ] = None,
-    mode: Annotated[list[str] | None, typer.Option("--mode", metavar="N=HZ,RATIO", help=MODE)] = None,
+    mode: Annotated[list[str] | None, typer.Option("--mode", metavar="N=HZ,RATIO", help=HELP_ON_MODE)] = None,
     covariance: Annotated[
         bool, typer.Option("--covariance", help="intervals by the covariance alone, without profiles")
     ] = False,

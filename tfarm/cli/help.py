@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -35,8 +35,9 @@ def glossary(
 ) -> None:
     """What the words mean that answers use in a sense of their own: proven, certified, band, window ..."""
     from tfarm.glossary import glossary as find
+    from tfarm.tables.terminal import show
 
-    give({"terms": find(words)}, json, _print_terms)
+    give({"terms": find(words)}, json, lambda answer: show(answer["terms"]))
 
 
 @app.command()
@@ -44,29 +45,18 @@ def completion(shell: Annotated[str, typer.Argument(metavar="SHELL", help="bash,
     """Print the script that completes tfarm's words in a shell: eval "$(tfarm completion bash)"."""
     if shell not in SHELLS:
         raise ParameterError(key="SHELL", value=shell, remedy=did_you_mean(shell, SHELLS))
-    verbs = _verbs()
-    print(_fish(verbs) if shell == "fish" else ZSH * (shell == "zsh") + _bash(verbs), end="")
-
-
-def _print_terms(answer: dict[str, Any]) -> None:
-    from tfarm.tables.terminal import show
-
-    show(answer["terms"])
-
-
-def _verbs() -> dict[str, tuple[list[str], bool]]:
-    """Of each verb its options, and whether it takes an arm."""
-    commands = vars(typer.main.get_command(app))["commands"]
-    return {
+    verbs = {
         name: (
             [option for each in command.params for option in each.opts if option.startswith("--")] + ["--help"],
             any(each.name in ("arm", "arms") for each in command.params),
         )
-        for name, command in sorted(commands.items())
+        for name, command in sorted(vars(typer.main.get_command(app))["commands"].items())
     }
+    print(_fish(verbs) if shell == "fish" else ZSH * (shell == "zsh") + _bash(verbs), end="")
 
 
 def _bash(verbs: dict[str, tuple[list[str], bool]]) -> str:
+    """A case a verb: of each its options, and whether it takes an arm."""
     from tfarm.arm import presets
 
     cases = [

@@ -15,7 +15,7 @@ import typer
 from numpy.typing import NDArray
 
 from tfarm.arm import FED_BACK, GAINS, LISTED, MOMENT_GAIN, RATE_GAIN, Gain
-from tfarm.cli.app import whole
+from tfarm.cli.app import whole_number
 from tfarm.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ class Given:
     arm: str = ""
 
 
-HELP = {  # of the gains that have a default of their own
+HELP_ON_GAINS = {  # of the gains that have a default of their own
     RATE_GAIN: "hub rate gain [N m s/rad, V s/rad or A s/rad]; by default 0.00642 J w1, the paper's 0.3 on its arm",
     MOMENT_GAIN: f"root moment gain, u = ... - {MOMENT_GAIN} E I phi'(0); 0.3 by default, 0 on a hub without inertia",
 }
@@ -51,7 +51,7 @@ Png = Annotated[Path | None, typer.Option("--png", help="draw it into this file"
 
 def gain_option(gain: Gain, kind: Any = float | None) -> Any:
     """The type of the option of a gain: a number, or None where it is not given."""
-    words = HELP.get(gain.name, f"{gain.output.replace('_', ' ')} gain [{gain.unit}]")
+    words = HELP_ON_GAINS.get(gain.name, f"{gain.output.replace('_', ' ')} gain [{gain.unit}]")
     return Annotated[kind, typer.Option(f"--{gain.name}", help=words)]
 
 
@@ -98,7 +98,7 @@ def under_a_law(command: Command) -> Command:
     return with_options({**GAIN_OPTIONS, "law": LawFile}, "arm", given)(command)
 
 
-MOST_POINTS = 1_000_000
+MOST_GRID = 1_000_000  # points of a response, as many lines of a table: more are a slip of the keyboard
 _Number = TypeVar("_Number", float, complex)
 
 
@@ -127,20 +127,20 @@ def points_on(s: str | None, omega: str | None, start: float, stop: float, point
         raise ParameterError(key="--omega", value=omega, remedy="give --s or --omega, not both")
     if s is not None:
         return s_values(s)
-    return grid(start, stop, points) if omega is None else omega_values(omega)
+    return s_grid(start, stop, points) if omega is None else omega_values(omega)
 
 
-def grid(start: float, stop: float, points: str) -> NDArray[np.complex128]:
+def s_grid(start: float, stop: float, points: str) -> NDArray[np.complex128]:
     """s = i omega for logarithmically spaced frequencies from start to stop [rad/s]."""
     if not 0 < start < math.inf:
         raise ParameterError(key="--from", value=start, remedy="a positive frequency in rad/s")
     if not start < stop < math.inf:
         raise ParameterError(key="--to", value=stop, remedy=f"a frequency above --from, {start:g} rad/s")
-    frequencies: NDArray[np.float64] = np.geomspace(start, stop, whole("--points", points, 2, MOST_POINTS))
+    frequencies: NDArray[np.float64] = np.geomspace(start, stop, whole_number("--points", points, 2, MOST_GRID))
     return s_on_axis(frequencies)
 
 
-def law_of(arm: Arm, given: Given) -> tuple[HubFeedback | Law, dict[str, Any]]:
+def asked_law(arm: Arm, given: Given) -> tuple[HubFeedback | Law, dict[str, Any]]:
     """The law of the command line: that of a file, of the arm's own [law] where no gain is typed, or gains at the hub.
 
     With it what the answer says of gains that were not given.
@@ -157,10 +157,10 @@ def law_of(arm: Arm, given: Given) -> tuple[HubFeedback | Law, dict[str, Any]]:
             raise ParameterError(key="--law", value=given.law, remedy="has no table [law]", file=None)
         return law, {}
     own = None if typed or not given.arm else load_law(given.arm)
-    return gains_of(arm, given) if own is None else (own, {})
+    return asked_gains(arm, given) if own is None else (own, {})
 
 
-def laws_of(arm: Arm, name: str, gains: Typed, files: Sequence[str]) -> tuple[GivenLaw, ...]:
+def asked_laws(arm: Arm, name: str, gains: Typed, files: Sequence[str]) -> tuple[GivenLaw, ...]:
     """The laws that a page is about: those of files, gains that are typed, the arm's own [law]; else none."""
     from tfarm.arm.law_tables import load_law
     from tfarm.fitting.runs import load_run
@@ -171,7 +171,7 @@ def laws_of(arm: Arm, name: str, gains: Typed, files: Sequence[str]) -> tuple[Gi
     wanted = [Given(gains, file, name) for file in files] or [Given(gains, None, name)]
     return tuple(
         GivenLaw(
-            law_of(arm, given)[0],
+            asked_law(arm, given)[0],
             file=Path(given.law).name if given.law else "",
             measured=load_run(given.law) if given.law else None,
         )
@@ -179,7 +179,7 @@ def laws_of(arm: Arm, name: str, gains: Typed, files: Sequence[str]) -> tuple[Gi
     )
 
 
-def gains_of(arm: Arm, given: Given) -> tuple[HubFeedback, dict[str, Any]]:
+def asked_gains(arm: Arm, given: Given) -> tuple[HubFeedback, dict[str, Any]]:
     """The gains at the hub of the command line, those not given being the arm's default, and what its answer says.
 
     `default_gains` names those that were not given and have one, `default_gains_in_words` says what they are and why.
@@ -191,7 +191,7 @@ def gains_of(arm: Arm, given: Given) -> tuple[HubFeedback, dict[str, Any]]:
     if given.law is not None:
         remedy = "this command knows gains at the hub; poles, margins, sampled and simulate take any law"
         raise ParameterError(key="--law", value=given.law, remedy=remedy)
-    missing = [name for name in HELP if given.gains.get(name) is None]
+    missing = [name for name in HELP_ON_GAINS if given.gains.get(name) is None]
     law = replace(default_gains(arm), **{name: value for name, value in given.gains.items() if value is not None})
     words = default_words(arm, missing) if missing else None
     return law, {"default_gains": missing, "default_gains_in_words": words}
@@ -207,7 +207,7 @@ def _number(key: str, text: str, kind: type[_Number], remedy: str) -> _Number:
     return value
 
 
-def driven_by(arm: Arm, name: str | None) -> tuple[Arm, str | None]:
+def asked_input(arm: Arm, name: str | None) -> tuple[Arm, str | None]:
     """The arm with another input at its hub, or with its own and the load on its link that is named."""
     if name is None or "@" in name:
         return arm, name

@@ -8,8 +8,8 @@ from typing import Annotated, Any
 import typer
 
 from tfarm.arm import NAMES
-from tfarm.cli.app import ArmName, Json, app, give, load_arm, whole
-from tfarm.cli.inputs import Given, Png, law_of, under_a_law
+from tfarm.cli.app import ArmName, Json, app, give, load_arm, whole_number
+from tfarm.cli.inputs import Given, Png, asked_law, under_a_law
 from tfarm.columns import Column, Table
 from tfarm.digits import singly
 
@@ -21,8 +21,8 @@ Vary = Annotated[
         "damping; of another law gain, delay, SIGNAL, SIGNAL.num.N or SIGNAL.den.N, too",
     ),
 ]
-POINTS = "values, equally spaced; 500, of another law than gains at the hub 100"
-BRANCHES = "branches, 1 to 200; of another law the flexible modes below the top of the box, up to 60"
+HELP_ON_POINTS = "values, equally spaced; 500, of another law than gains at the hub 100"
+HELP_ON_BRANCHES = "branches, 1 to 200; of another law the flexible modes below the top of the box, up to 60"
 
 
 @app.command()
@@ -32,8 +32,8 @@ def locus(
     vary: Vary,
     start: Annotated[float, typer.Option("--from", help="value at which the locus begins")],
     stop: Annotated[float, typer.Option("--to", help="value at which it ends")],
-    points: Annotated[str | None, typer.Option("--points", metavar="N", help=POINTS)] = None,
-    branches: Annotated[str, typer.Option("--branches", metavar="N", help=BRANCHES)] = "10",
+    points: Annotated[str | None, typer.Option("--points", metavar="N", help=HELP_ON_POINTS)] = None,
+    branches: Annotated[str, typer.Option("--branches", metavar="N", help=HELP_ON_BRANCHES)] = "10",
     png: Png = None,
     csv: Annotated[Path | None, typer.Option("--csv", help="write the branches to this file")] = None,
     json: Json = False,
@@ -41,15 +41,15 @@ def locus(
     given: Given,
 ) -> None:
     """Root locus of the exact arm along a gain or a parameter; crossings of the imaginary axis are solved for."""
-    number, count = whole("--points", points or "500", 2, 100_000), whole("--branches", branches, 1, 200)
+    number, count = whole_number("--points", points or "500", 2, 100_000), whole_number("--branches", branches, 1, 200)
     subject = load_arm(arm)
-    law, said = law_of(subject, given)
+    law, said = asked_law(subject, given)
     from tfarm.arm.law import Law
 
     if isinstance(law, Law):
         from tfarm.loop.law_locus import law_locus, law_locus_answer
 
-        number = whole("--points", points or "100", 2, 5000)
+        number = whole_number("--points", points or "100", 2, 5000)
         found = law_locus(subject, law, vary, start, stop, number, min(count, 60))
         answer, show = law_locus_answer(found), print_law_locus
         if png is not None:

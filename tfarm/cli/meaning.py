@@ -52,15 +52,11 @@ def check_verb(word: str, group: Any) -> None:
 
 def check_numbers(arguments: list[str]) -> None:
     """Raise ParameterError for an option's number in Python's own spelling, 5_0, or in other than ASCII digits."""
-    for option, text in _options(arguments):
-        if option not in PATHS and any(_is_odd(part) for part in text.split(",")):
-            raise ParameterError(key=option, value=text, remedy="write numbers as 50, 0.5 or 5e1")
-
-
-def _options(arguments: list[str]) -> list[tuple[str, str]]:
-    """Each option with the text behind it."""
     words = [word for argument in arguments for word in argument.split("=", 1 if argument.startswith("--") else 0)]
-    return [(word, text) for word, text in pairwise(words) if word.startswith("--")]
+    for option, text in pairwise(words):
+        takes_number = option.startswith("--") and option not in PATHS
+        if takes_number and any(_is_odd(part) for part in text.split(",")):
+            raise ParameterError(key=option, value=text, remedy="write numbers as 50, 0.5 or 5e1")
 
 
 def _is_odd(text: str) -> bool:

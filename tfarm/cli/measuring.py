@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from tfarm.cli.app import Json, app, give, tell, whole
+from tfarm.cli.app import Json, app, give, tell, whole_number
 from tfarm.errors import ParameterError
 
 RecordName = Annotated[str, typer.Argument(metavar="RECORD", help="CSV or .mat file: t [s] and signals")]
@@ -70,7 +70,7 @@ def ring(
     from tfarm.fitting.ringdown import MOST_RINGING
     from tfarm.fitting.ringdown import ring as find
 
-    count = whole("--modes", modes, 1, MOST_RINGING)
+    count = whole_number("--modes", modes, 1, MOST_RINGING)
     found = find(read_recording(record), signal, start=start, stop=stop, modes=count)
     give(ring_answer(found), json, _rung)
 

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from tfarm.spectrum import Modes
 
 MOST_SLOW = 2000  # points by balls or by the appendix, at some milliseconds each
-ALIKE = 1e-14  # relative: two roads differ in the last bits of their float64 numbers, as each is rounded
+METHODS_AGREE = 1e-14  # relative: some tens of roundings of a float64, by which each of two roads may be off
+BESIDE_COMPARE = "--compare prints a table of its own: ask for one of them"
 
 
 def slow_method(method: str, number: int, digits: int | None, compare: bool) -> Method:
@@ -38,16 +39,14 @@ def slow_method(method: str, number: int, digits: int | None, compare: bool) -> 
     return chosen
 
 
-def alone(others: dict[str, Any]) -> None:
-    """Raise ParameterError for an option beside --compare that it would leave unheard."""
+def refuse_beside(others: dict[str, Any], remedy: str) -> None:
+    """Raise ParameterError for an option that another one would leave unheard."""
     for key, value in others.items():
         if value is not None:
-            raise ParameterError(
-                key=key, value=value, remedy="--compare prints a table of its own: ask for one of them"
-            )
+            raise ParameterError(key=key, value=value, remedy=remedy)
 
 
-def compared_responses(arm: Arm, output: str | Output, x: float | None, s: NDArray[Any]) -> dict[str, Any]:
+def responses_by_methods(arm: Arm, output: str | Output, x: float | None, s: NDArray[Any]) -> dict[str, Any]:
     """One output at s by each method, and by what share of its size each differs from the closed form."""
     roads = {method: transfer(arm, output, x=x, method=method) for method in METHODS}
     found, G = {method: np.asarray(road(s)) for method, road in roads.items()}, roads["closed-form"]
@@ -56,7 +55,7 @@ def compared_responses(arm: Arm, output: str | Output, x: float | None, s: NDArr
     return answer | {"s": [[float(p.real), float(p.imag)] for p in s], "methods": values, **_differences(found)}
 
 
-def compared_modes(table: Modes) -> dict[str, Any]:
+def modes_by_methods(table: Modes) -> dict[str, Any]:
     """The frequencies by each method, and by what share each differs from the closed form."""
     found = {method: table.frequencies(method) for method in METHODS}
     answer = {"arm": table.arm.name, "theory": table.theory, "index": [int(index) for index in table.index]}
@@ -80,7 +79,7 @@ def print_compared(answer: dict[str, Any]) -> None:
         first = Column("index", "mode", of=answer["index"]), Column("", "rad/s", of=numbers, digits=singly(general, 15))
     else:
         points = [f"{complex(*at):.10g}" for at in answer["s"]]
-        pairs = ([part if abs(part) > ALIKE * math.hypot(*pair) else 0.0 for part in pair] for pair in numbers)
+        pairs = ([part if abs(part) > METHODS_AGREE * math.hypot(*pair) else 0.0 for part in pair] for pair in numbers)
         values = [f"{complex(*pair):.15g}" for pair in pairs]  # no part that is less than the rounding of the other
         first = Column("s", "s", "1/s", of=points), Column("", answer["output"], answer["unit"], of=values)
     apart = [
@@ -89,7 +88,7 @@ def print_compared(answer: dict[str, Any]) -> None:
     ]
     show(Table(columns=(*first, *apart)))
     largest = answer["largest_difference"]
-    if largest <= ALIKE:
+    if largest <= METHODS_AGREE:
         print(f"Float64, proven balls and the paper's own determinant agree to {largest:.1e}, their rounding.")
     else:
-        print(f"They part by up to {largest:.1e}: more than rounding ({ALIKE:.0e}); the balls are proven.")
+        print(f"They part by up to {largest:.1e}: more than rounding ({METHODS_AGREE:.0e}); the balls are proven.")

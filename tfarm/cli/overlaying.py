@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from tfarm.cli.app import give
+from tfarm.cli.app import give, load_arm
+from tfarm.cli.methods import refuse_beside
 from tfarm.cli.tables import say_written
 from tfarm.fitting.overlay import overlay
 from tfarm.fitting.overlay_answer import curves_table, overlay_answer, required_table
@@ -13,15 +14,16 @@ from tfarm.fitting.reading import data_of
 from tfarm.tables.files import write_csv
 from tfarm.tables.terminal import show
 
-if TYPE_CHECKING:
-    from tfarm.arm import Arm
-
-FEW = 12  # poles and zeros that are printed
+MOST_LISTED_ROOTS = 12  # poles, or zeros, in one line of a terminal; --json has them all
 
 
-def lay_over(arm: Arm, text: str, csv: Path | None, png: Path | None, json: bool) -> None:
-    """Both curves: mode by mode on the terminal or as JSON, point by point as a table, and as a picture."""
-    found = overlay(arm, data_of(text, "--measured"))
+def lay_over(arm: str, text: str, others: dict[str, Any], csv: Path | None, png: Path | None, json: bool) -> None:
+    """Both curves: mode by mode on the terminal or as JSON, point by point as a table, and as a picture.
+
+    Raises ParameterError for one of the `others`, options that would go unheard.
+    """
+    refuse_beside(others, "a measured response has its own outputs and frequencies; leave this out")
+    found = overlay(load_arm(arm), data_of(text, "--measured"))
     if csv is not None:
         write_csv(curves_table(found), csv)
     if png is not None:
@@ -55,6 +57,6 @@ def _print(answer: dict[str, Any]) -> None:
 
 def _listed(roots: list[list[float]]) -> str:
     """Those in the upper half-plane, the first of them."""
-    texts = [f"{re:.6g}{im:+.6g}i" if im else f"{re:.6g}" for re, im in roots[:FEW]]
-    rest = f" and {len(roots) - FEW} more" if len(roots) > FEW else ""
+    texts = [f"{re:.6g}{im:+.6g}i" if im else f"{re:.6g}" for re, im in roots[:MOST_LISTED_ROOTS]]
+    rest = f" and {len(roots) - MOST_LISTED_ROOTS} more" if len(roots) > MOST_LISTED_ROOTS else ""
     return ", ".join(texts) + rest if texts else "none"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tfarm.cli.app import ArmName, Json, app, give, load_arm
-from tfarm.cli.inputs import Given, Png, law_of, under_a_law
+from tfarm.cli.inputs import Given, Png, asked_law, under_a_law
 from tfarm.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def bode(
 def nyquist(arm: ArmName, png: Png = None, csv: Csv = None, json: Json = False, *, given: Given) -> None:
     """Nyquist plot of the exact loop: the turns around -1 counted, beside the poles found in a box."""
     subject = load_arm(arm)
-    law, said = law_of(subject, given)
+    law, said = asked_law(subject, given)
     from tfarm.cli.tables import say_written
     from tfarm.loop.answers import nyquist_answer, nyquist_table
     from tfarm.loop.closed import nyquist as find

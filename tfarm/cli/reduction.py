@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from tfarm.cli.app import ArmName, Json, Side, app, give, load_arm, plain_number, read_on, whole
+from tfarm.cli.app import ArmName, Json, SideName, app, give, load_arm, plain_number, read_on, whole_number
 from tfarm.errors import ParameterError
 
 
@@ -22,33 +22,29 @@ def reduce(
     band: Annotated[str, typer.Option("--band", metavar="LOW,HIGH", help="frequencies [rad/s]")] = "0.1,1000",
     method: Annotated[str | None, typer.Option("--method", help="modal or aaa; the better one if left out")] = None,
     x: Annotated[float | None, typer.Option("--x", help="place on the arm [m], for outputs along it")] = None,
-    side: Side = None,
+    side: SideName = None,
     mat: Annotated[Path | None, typer.Option("--mat", help="write a MATLAB file, and a script beside it")] = None,
     json: Json = False,
 ) -> None:
     """A state space of few states, with its worst error against the exact arm over a band."""
-    edges = _edges(band)
-    states = None if order is None else whole("--order", order, 0, 10**9)
+    try:
+        low, high = (plain_number(part) for part in band.split(","))
+    except ValueError:
+        remedy = "two frequencies in rad/s such as 0.1,1000"
+        raise ParameterError(key="--band", value=band, remedy=remedy) from None
+    states = None if order is None else whole_number("--order", order, 0, 10**9)
     subject = load_arm(arm)
     from tfarm.reduced import reduce as find
     from tfarm.reduced import reduced_answer, save_mat
 
     wanted = read_on([name.strip() for name in outputs.split(",")], side)
-    reduced = find(subject, wanted, order=states, error=error, method=method, band=edges, x=x)  # type: ignore[arg-type]
+    how: Any = {"order": states, "error": error, "method": method, "band": (low, high), "x": x}
+    reduced = find(subject, wanted, **how)
     written = () if mat is None else save_mat(reduced, mat, key="--mat")
     from tfarm.cli.tables import say_written
 
     say_written(*written)
     give(reduced_answer(reduced), json, _show)
-
-
-def _edges(text: str) -> tuple[float, float]:
-    try:
-        low, high = (plain_number(part) for part in text.split(","))
-    except ValueError:
-        remedy = "two frequencies in rad/s such as 0.1,1000"
-        raise ParameterError(key="--band", value=text, remedy=remedy) from None
-    return low, high
 
 
 def _show(answer: dict[str, Any]) -> None:

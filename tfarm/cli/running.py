@@ -51,7 +51,11 @@ def run(arguments: list[str]) -> int:
     except OSError as error:  # of standard output, or of a folder that compiled code is kept in
         discard(sys.stdout)
         code = _fail(_of_the_system(error), 2)
-    return _flushed(code)
+    try:  # what was printed before the error
+        sys.stdout.flush()
+    except OSError:
+        discard(sys.stdout)
+    return code
 
 
 def _call(arguments: list[str]) -> int:
@@ -79,15 +83,6 @@ def _mend_streams() -> None:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")
-
-
-def _flushed(code: int) -> int:
-    """The code, after what was printed before an error is out, or cannot be."""
-    try:
-        sys.stdout.flush()
-    except OSError:
-        discard(sys.stdout)
-    return code
 
 
 def _of_the_system(error: OSError) -> str:

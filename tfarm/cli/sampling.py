@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tfarm.arm import MOMENT_GAIN, RATE_GAIN, TAKEN_OFF
-from tfarm.cli.app import ArmName, Json, app, give, load_arm, whole
-from tfarm.cli.inputs import Given, law_of, under_a_law
+from tfarm.cli.app import ArmName, Json, app, give, load_arm, whole_number
+from tfarm.cli.inputs import Given, asked_law, under_a_law
 
 if TYPE_CHECKING:
     from tfarm.dsp import Chain
@@ -22,32 +22,32 @@ DspFile = Annotated[
     str | None,
     typer.Option("--dsp", help="TOML file with [sampling], [converters], [actuator], [slew]; else the arm's own file"),
 ]
-Modes = Annotated[
+ModeCount = Annotated[
     str | None, typer.Option("--modes", metavar="N", help="flexible modes; as many as it takes if not said")
 ]
-SAMPLED = f"""Is the loop u = -{TAKEN_OFF} stable when it is sampled?  Verdict, intervals, modes, margins.
+HELP_ON_SAMPLED = f"""Is the loop u = -{TAKEN_OFF} stable when it is sampled?  Verdict, intervals, modes, margins.
 
 A law of a file acts with its own period, which has to be that of the chain; one in s is made discrete by its rule.
 """
-TUNER = f"a tuner from `tfarm tune --save`: it sets {MOMENT_GAIN}, with its own {RATE_GAIN}"
+HELP_ON_CONTROLLER = f"a tuner from `tfarm tune --save`: it sets {MOMENT_GAIN}, with its own {RATE_GAIN}"
 
 
-@app.command(help=SAMPLED)
+@app.command(help=HELP_ON_SAMPLED)
 @under_a_law
 def sampled(
     arm: ArmName,
     period: Period = None,
     delay_samples: Delay = None,
     dsp: DspFile = None,
-    modes: Modes = None,
+    modes: ModeCount = None,
     json: Json = False,
     *,
     given: Given,
 ) -> None:
     """Verdict, intervals, modes and margins of the loop when it is sampled."""
-    count = None if modes is None else whole("--modes", modes, 1, 400)
-    subject, chain = load_arm(arm), chain_of(dsp or arm, period, delay_samples)
-    law, said = law_of(subject, given)
+    count = None if modes is None else whole_number("--modes", modes, 1, 400)
+    subject, chain = load_arm(arm), asked_chain(dsp or arm, period, delay_samples)
+    law, said = asked_law(subject, given)
     from tfarm.cli.sampling_tables import print_sampled, print_sampled_law
     from tfarm.dsp.closed import sampled as analysed
     from tfarm.dsp.law_verdict import LawAnalysis, law_answer
@@ -69,23 +69,23 @@ def simulate(
     period: Period = None,
     delay_samples: Delay = None,
     dsp: DspFile = None,
-    modes: Modes = None,
+    modes: ModeCount = None,
     between: Annotated[str, typer.Option("--between", metavar="N", help="records between two samples")] = "0",
     csv: Annotated[Path | None, typer.Option("--csv", help="write the signals to this file")] = None,
     mat: Annotated[Path | None, typer.Option("--mat", help="write the signals to this MATLAB file")] = None,
-    controller: Annotated[Path | None, typer.Option("--controller", help=TUNER)] = None,
+    controller: Annotated[Path | None, typer.Option("--controller", help=HELP_ON_CONTROLLER)] = None,
     json: Json = False,
     *,
     given: Given,
 ) -> None:
     """The sampled loop in time: hub angle, tip, root moment and torque, exact between the samples."""
-    count = None if modes is None else whole("--modes", modes, 1, 400)
-    records = whole("--between", between, 0, 1000)
-    subject, chain = load_arm(arm), chain_of(dsp or arm, period, delay_samples)
+    count = None if modes is None else whole_number("--modes", modes, 1, 400)
+    records = whole_number("--between", between, 0, 1000)
+    subject, chain = load_arm(arm), asked_chain(dsp or arm, period, delay_samples)
     from tfarm.dsp.results import simulated_answer
 
     if controller is None:
-        law, said = law_of(subject, given)
+        law, said = asked_law(subject, given)
         answer = said | simulated_answer(subject, law, chain, scenario, duration, count=count, between=records)
     else:
         from tfarm.tuner.saving import load_tuner
@@ -105,14 +105,14 @@ def _show(answer: dict[str, Any], csv: Path | None, mat: Path | None, json: bool
         sampling_tables.write_signals(answer, csv)
     if mat is not None:
         sampling_tables.write_mat(answer, mat)
-    sampling_tables.warn_if_stopped(answer)
+    sampling_tables.warn_of_runaway(answer)
     if say_written(csv, mat) or json:
         give(answer, json, sampling_tables.print_simulation)
         if not json and csv is None and mat is None:
             print("--json, --csv or --mat give the signals")
 
 
-def chain_of(source: str, period: float | None, delay_samples: float | None) -> Chain:
+def asked_chain(source: str, period: float | None, delay_samples: float | None) -> Chain:
     """The chain of a file, with what the command line says instead."""
     from dataclasses import replace
 

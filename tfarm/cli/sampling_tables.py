@@ -24,7 +24,10 @@ def print_sampled(answer: dict[str, Any]) -> None:
     print(answer["law"])
     shown, band = answer["shown"], answer["band_rad_s"]
     for name, held in (PLANE, PLANE[::-1]):
-        print(f"stable at this {held} for {name} in {_texts(shown[f'{name}_intervals'], band)}")
+        windows = shown[f"{name}_intervals"]
+        spans = " and ".join(f"({low['text']}, {high['text']})" for low, high in windows)
+        known = _held([edge for pair in windows for edge in pair], band) if windows else "no interval"
+        print(f"stable at this {held} for {name} in {spans}{known}")
     delay, damping = shown["delay_margin_samples"], shown["required_damping_s"]
     more = " or more" if answer["delay_margin_is_lower_bound"] else ""
     print(f"further delay it bears: {delay['text']} samples{more}{_held([delay], band)}")
@@ -71,7 +74,7 @@ def print_simulation(answer: dict[str, Any]) -> None:
         print(f"limit cycle, kept up by {cycle['kept_up_by']}: {size}")
 
 
-def warn_if_stopped(answer: dict[str, Any]) -> None:
+def warn_of_runaway(answer: dict[str, Any]) -> None:
     """A line on standard error where the loop ran away."""
     if answer["stopped_at_s"] is not None:
         what = f"mode {answer['growing_mode']}" if answer["growing_mode"] else "the hub"
@@ -109,12 +112,6 @@ def write_mat(answer: dict[str, Any], path: Path) -> None:
 def _present(answer: dict[str, Any]) -> list[Column]:
     units, columns = {"torque": answer["torque_unit"]}, (each for each in SIGNAL_COLUMNS if answer.get(each.key))
     return [replace(column, unit=units.get(column.key, column.unit)) for column in columns]
-
-
-def _texts(windows: list[list[dict[str, Any]]], band: float | None) -> str:
-    """Intervals in the digits that hold, and for which modes where that is not every one of the verdict's band."""
-    spans = " and ".join(f"({low['text']}, {high['text']})" for low, high in windows)
-    return f"{spans}{_held([edge for pair in windows for edge in pair], band)}" if windows else "no interval"
 
 
 def _held(figures: list[dict[str, Any]], band: float | None) -> str:

@@ -8,7 +8,7 @@ from typing import Annotated, Any, cast
 
 import typer
 
-from tfarm.cli.app import ArmName, Json, app, give, load_arm, whole
+from tfarm.cli.app import ArmName, Json, app, give, load_arm, whole_number
 
 
 @app.command()
@@ -24,7 +24,7 @@ def study(
     json: Json = False,
 ) -> None:
     """Studies of the tuner on all cores: learning curves, the map of (alpha_c, eta_c), a and b, inputs, rules."""
-    number, slews = whole("--seeds", seeds, 1, 10_000), whole("--trials", trials, 1, 1_000_000)
+    number, slews = whole_number("--seeds", seeds, 1, 10_000), whole_number("--trials", trials, 1, 1_000_000)
     subject = load_arm(arm)
     from tfarm.tuner import Learning
     from tfarm.tuner.studies import plans_of, run_study, study_answer

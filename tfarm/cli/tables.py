@@ -18,7 +18,7 @@ from tfarm.columns import Column, Table
 from tfarm.files import is_standard_output
 from tfarm.tables.terminal import show
 
-EVERY = 4.0  # seconds from one line of progress to the next
+PROGRESS_EVERY = 4.0  # seconds from one line of progress to the next: few lines in a log, and no long silence
 
 
 def presets_table(arms: list[Arm]) -> Table:
@@ -154,7 +154,7 @@ def _lines() -> Iterator[Callable[[int, int, str], None]]:
         state[0] = f"{done} of {total} done, last: {text}" if done else f"0 of {total} done"
 
     def speak() -> None:
-        while not over.wait(EVERY):
+        while not over.wait(PROGRESS_EVERY):
             tell(state[0])
 
     speaker = Thread(target=speak, daemon=True)

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from tfarm.cli.app import ArmName, Json, app, give, load_arm, say_when_compiling, whole
+from tfarm.cli.app import ArmName, Json, app, give, load_arm, say_when_compiling, whole_number
 
 
 @app.command()
@@ -26,7 +26,7 @@ def assumptions(
     json: Json = False,
 ) -> None:
     """What the assumed section and hub do: frequencies over the candidates, with exact sensitivities."""
-    wanted = whole("--count", count, 1, 100)
+    wanted = whole_number("--count", count, 1, 100)
     subject = load_arm(arm)
     from tfarm.audit.candidates import assumptions_answer
     from tfarm.cli.tables import print_assumptions

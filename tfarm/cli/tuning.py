@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN
-from tfarm.cli.app import ArmName, Json, app, give, load_arm, whole
-from tfarm.cli.inputs import HELP, Given, gains_of
-from tfarm.cli.sampling import Delay, DspFile, Period, chain_of
+from tfarm.cli.app import ArmName, Json, app, give, load_arm, whole_number
+from tfarm.cli.inputs import HELP_ON_GAINS, Given, asked_gains
+from tfarm.cli.sampling import Delay, DspFile, Period, asked_chain
 
 if TYPE_CHECKING:
     from tfarm.arm import Arm
 
-TRACKED = f"hub angle gain: the reference is tracked, {RATE_GAIN} damps that by 0.71 if not given"
+HELP_ON_ANGLE_GAIN = f"hub angle gain: the reference is tracked, {RATE_GAIN} damps that by 0.71 if not given"
 
 
 @app.command()
@@ -36,8 +36,8 @@ def tune(
     alpha: Annotated[float, typer.Option("--alpha", help="momentum, in [0, 1)")] = 0.6,
     a: Annotated[float, typer.Option("--a", help="weight of the root moment in the cost")] = 1.0,
     b: Annotated[float, typer.Option("--b", help="weight of the control signal in the cost")] = 2.6,
-    on_rate: Annotated[float | None, typer.Option(f"--{RATE_GAIN}", help=HELP[RATE_GAIN])] = None,
-    on_angle: Annotated[float, typer.Option(f"--{ANGLE_GAIN}", help=TRACKED)] = 0.0,
+    on_rate: Annotated[float | None, typer.Option(f"--{RATE_GAIN}", help=HELP_ON_GAINS[RATE_GAIN])] = None,
+    on_angle: Annotated[float, typer.Option(f"--{ANGLE_GAIN}", help=HELP_ON_ANGLE_GAIN)] = 0.0,
     duration: Annotated[float, typer.Option("--duration", help="of a trial [s]")] = 3.0,
     enough: Annotated[float, typer.Option("--enough", help="stop once the rms of x is below this [N m]")] = 0.0,
     hidden: Annotated[str, typer.Option("--hidden", metavar="N", help="hidden neurons")] = "6",
@@ -51,9 +51,9 @@ def tune(
     json: Json = False,
 ) -> None:
     """Train the network that sets the moment gain during a slew, and hold it against simpler remedies."""
-    numbers = whole("--trials", trials, 1, 1_000_000), whole("--seed", seed, 0, 2**53), whole("--modes", modes, 1, 48)
-    neurons = whole("--hidden", hidden, 1, 1000)
-    subject, chain = load_arm(arm), chain_of(dsp or arm, period, delay_samples)
+    slews, start = whole_number("--trials", trials, 1, 1_000_000), whole_number("--seed", seed, 0, 2**53)
+    count, neurons = whole_number("--modes", modes, 1, 48), whole_number("--hidden", hidden, 1, 1000)
+    subject, chain = load_arm(arm), asked_chain(dsp or arm, period, delay_samples)
     from tfarm import tuner
     from tfarm.tuner.tuning import outcomes_answer
 
@@ -65,7 +65,7 @@ def tune(
     )  # fmt: skip
     plan = tuner.Plan(
         cost=tuner.Cost(a=a, b=b), learning=learning, signals=cast("Any", signals), guard=cast("Any", guard),
-        trials=numbers[0], seed=numbers[1], count=numbers[2], duration=duration, hidden=neurons,
+        trials=slews, seed=start, count=count, duration=duration, hidden=neurons,
         seventh_input=seventh_input, **servo,
     )  # fmt: skip
     tuning = tuner.tune(subject, plan, chain)
@@ -83,7 +83,7 @@ def _servo(subject: Arm, on_rate: float | None, on_angle: float) -> tuple[dict[s
     from tfarm.tuner.trial import usual_rate_gain
 
     if on_rate is not None or on_angle == 0.0:
-        law, said = gains_of(subject, Given({RATE_GAIN: on_rate, MOMENT_GAIN: 0.0}))
+        law, said = asked_gains(subject, Given({RATE_GAIN: on_rate, MOMENT_GAIN: 0.0}))
         return {RATE_GAIN: law[RATE_GAIN], ANGLE_GAIN: on_angle}, said
     usual = usual_rate_gain(subject, on_angle)
     words = f"{RATE_GAIN} = {usual:.4g}, which damps the rigid arm under {ANGLE_GAIN} by 0.71 of critical"
@@ -96,6 +96,6 @@ def _show(answer: dict[str, Any], save: Path | None, json: bool) -> None:
     from tfarm.cli import tuning_tables
     from tfarm.cli.tables import say_written
 
-    tuning_tables.warn_if_stopped(answer)
+    tuning_tables.warn_of_divergence(answer)
     if say_written(save) or json:
         give(answer, json, tuning_tables.print_tuning)

@@ -10,7 +10,7 @@ from tfarm.columns import Column, Table
 from tfarm.digits import general, singly
 from tfarm.tables.terminal import show
 
-FOUR = singly(general, 4)
+FOUR = singly(general, 4)  # digits of a cost
 
 
 def print_tuning(answer: dict[str, Any]) -> None:
@@ -30,21 +30,16 @@ def print_tuning(answer: dict[str, Any]) -> None:
     print(f"gain: K from {min(K):.4g} to {max(K):.4g}")
     residual, without = answer["residual_moment_rms"], answer["residual_without"]
     print(f"residual root moment: {residual:.4g} N m rms, {residual / without:.3g} of that without moment feedback")
-    print(_tip_words(answer))
+    errors = [answer[f"tip_error{which}_m"] for which in ("", "_best_constant", "_without")]
+    tuned, constant, free = ("ran away" if each is None else f"{1e3 * each:.3g} mm" for each in errors)
+    name = ANGLE_GAIN
+    held = f"{name} = {answer[name]:g} holds the angle" if answer[name] else f"nothing holds the angle: --{name} does"
+    print(f"tip off its target at the end: {tuned}, {constant} with the best constant gain, {free} without ({held})")
     if "comparison" in answer:
         _print_comparison(answer["comparison"])
 
 
-def _tip_words(answer: dict[str, Any]) -> str:
-    """How far off its target the tip ends."""
-    errors = [answer[f"tip_error{which}_m"] for which in ("", "_best_constant", "_without")]
-    tuned, constant, without = ("ran away" if each is None else f"{1e3 * each:.3g} mm" for each in errors)
-    name = ANGLE_GAIN
-    held = f"{name} = {answer[name]:g} holds the angle" if answer[name] else f"nothing holds the angle: --{name} does"
-    return f"tip off its target at the end: {tuned}, {constant} with the best constant gain, {without} without ({held})"
-
-
-def warn_if_stopped(answer: dict[str, Any]) -> None:
+def warn_of_divergence(answer: dict[str, Any]) -> None:
     """A line on standard error where learning diverged."""
     if answer["stopped"] is not None:
         tell(f"{answer['stopped']}; the tuner is that of the trial before")

@@ -1,5 +1,5 @@
 """Two arms, or two laws on one arm, beside each other: modes, poles, verdicts, margins; differences in per cent."""
 
-from tfarm.comparing.comparison import Comparison, Side, compare
+from tfarm.comparing.comparison import ComparedSide, Comparison, compare
 
-__all__ = ["Comparison", "Side", "compare"]
+__all__ = ["ComparedSide", "Comparison", "compare"]

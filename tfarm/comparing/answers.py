@@ -14,16 +14,16 @@ from tfarm.loop.answers import MARGIN_COLUMNS, gain_rows, margins_answer, sizes_
 from tfarm.loop.margins import Margins
 from tfarm.spectrum.answers import EIGENVALUE_ERROR
 
-from .clocked import TITLES
-from .comparison import Comparison, Side
+from .clocked import CLOCKED_MARGINS
+from .comparison import ComparedSide, Comparison
 
-Values = Sequence[float | None]
-DIGITS = 8
-MARGIN = 1e-8  # of its size: what a margin may be off, which is found by search on the grid of the loop
+ValuesOfSide = Sequence[float | None]
+MOST_DIGITS_COMPARED = 8  # of a value in its column; fewer where fewer hold
+MARGIN_ERROR = 1e-8  # of its size: what a margin may be off, which is found by search on the grid of the loop
 
 
 @dataclass(frozen=True)
-class Quantity:
+class ComparedQuantity:
     """What stands in a column for each side: `key`, title, unit, and by how much a value may be off.
 
     That is the larger of `relative`, a share of it, and `absolute`: what two values differ by less is no difference.
@@ -46,11 +46,11 @@ class Quantity:
     def cell(self, value: float | None) -> str:
         """The value in the digits that hold, eight at most; "-" where there is none."""
         if value is None or math.isinf(value):
-            return "-" if value is None else general(value, DIGITS)
+            return "-" if value is None else general(value, MOST_DIGITS_COMPARED)
         error = max(self.relative * abs(value), self.absolute)
-        return within(value, error, DIGITS) if error else general(value, DIGITS)
+        return within(value, error, MOST_DIGITS_COMPARED) if error else general(value, MOST_DIGITS_COMPARED)
 
-    def columns(self, found: Comparison, one: Values, other: Values) -> list[Column]:
+    def columns(self, found: Comparison, one: ValuesOfSide, other: ValuesOfSide) -> list[Column]:
         """Of both sides, and the difference."""
         apart = [self.percent(*pair) for pair in zip(one, other, strict=True)]
         return [
@@ -59,47 +59,51 @@ class Quantity:
             Column(f"{self.key}_difference_percent", "difference", of=apart, digits=_percents),
         ]
 
-    def _cells(self, values: Values) -> list[str]:
+    def _cells(self, values: ValuesOfSide) -> list[str]:
         return [self.cell(value) for value in values]
 
 
-def _percents(values: Values) -> list[str]:
+def _percents(values: ValuesOfSide) -> list[str]:
     return ["-" if value is None else f"{value:+.3g} %" if value else "0 %" for value in values]
 
 
-def modes_table(found: Comparison) -> Table:
+def compared_modes(found: Comparison) -> Table:
     """A row a flexible mode: natural frequencies and damping ratios of both arms, and how they differ."""
     one, other = ([float(w) for w in side.modes.natural_frequency[side.modes.index > 0]] for side in found.sides)
     columns = (
         Column("mode", "mode", of=range(1, len(one) + 1)),
-        *Quantity("natural_frequency_rad_s", "w of ", "rad/s", relative=EIGENVALUE_ERROR).columns(found, one, other),
-        *Quantity("damping_ratio", "damping of ", absolute=EIGENVALUE_ERROR).columns(
+        *ComparedQuantity("natural_frequency_rad_s", "w of ", "rad/s", relative=EIGENVALUE_ERROR).columns(
+            found, one, other
+        ),
+        *ComparedQuantity("damping_ratio", "damping of ", absolute=EIGENVALUE_ERROR).columns(
             found, found.one.damping_ratio, found.other.damping_ratio
         ),
     )
     return Table(columns=columns)
 
 
-def poles_table(found: Comparison) -> Table:
+def compared_poles(found: Comparison) -> Table:
     """A row an oscillating closed-loop pole, in the order of Im s: the n-th of both, which need not be one mode."""
     pairs = list(zip(*(side.oscillating.tolist() for side in found.sides), strict=False))
     sizes = [[abs(pole) for pole in side] for side in zip(*pairs, strict=True)] or [[], []]
     ratios = [[-pole.real / abs(pole) + 0.0 for pole in side] for side in zip(*pairs, strict=True)] or [[], []]
     columns = (
         Column("number", "pole", of=range(1, len(pairs) + 1)),
-        *Quantity("size_rad_s", "|s| of ", "rad/s", relative=EIGENVALUE_ERROR).columns(found, *sizes),
-        *Quantity("damping_ratio", "damping of ", absolute=EIGENVALUE_ERROR).columns(found, *ratios),
+        *ComparedQuantity("size_rad_s", "|s| of ", "rad/s", relative=EIGENVALUE_ERROR).columns(found, *sizes),
+        *ComparedQuantity("damping_ratio", "damping of ", absolute=EIGENVALUE_ERROR).columns(found, *ratios),
     )
     return Table(columns=columns)
 
 
-def margins_table(found: Comparison) -> Table:
+def compared_margins(found: Comparison) -> Table:
     """A row a margin: what is exact where that is known, else what holds in the band, which `known` says.
 
     Of loops at their samples: between which factors on the law they are stable, and how much later it may act.
     """
     one, other = (_known(side) for side in found.sides)
-    names = TITLES if found.is_clocked else {column.key: (column.title, column.unit) for column in MARGIN_COLUMNS}
+    names = (
+        CLOCKED_MARGINS if found.is_clocked else {column.key: (column.title, column.unit) for column in MARGIN_COLUMNS}
+    )
     columns = (
         Column(
             "margin",
@@ -108,7 +112,9 @@ def margins_table(found: Comparison) -> Table:
             shown=[f"{title} [{unit}]" if unit else title for title, unit in names.values()],
         ),
         Column("unit", on=(JSON, FILES), of=[unit for _, unit in names.values()]),
-        *Quantity("value", "", relative=MARGIN).columns(found, [each for each, _ in one], [each for each, _ in other]),
+        *ComparedQuantity("value", "", relative=MARGIN_ERROR).columns(
+            found, [each for each, _ in one], [each for each, _ in other]
+        ),
         Column("known_one", f"known of {found.one.name}", of=[known for _, known in one]),
         Column(
             "known_other",
@@ -120,7 +126,7 @@ def margins_table(found: Comparison) -> Table:
     return Table(columns=columns)
 
 
-def windows_table(found: Comparison) -> Table | None:
+def compared_windows(found: Comparison) -> Table | None:
     """How far each gain may go alone in both; None where a law is not these gains, or a loop is unstable."""
     rows = [gain_rows(side.margins) if side.margins is not None else [] for side in found.sides]
     if not all(rows):
@@ -134,28 +140,28 @@ def windows_table(found: Comparison) -> Table | None:
     return Table(columns=columns)
 
 
-def comparison_answer(found: Comparison) -> dict[str, Any]:
+def compared_answer(found: Comparison) -> dict[str, Any]:
     """Names and verdicts, the tables, and of each side the whole answer of `tfarm margins`, or of `tfarm sampled`."""
     return {
         "of": "arms" if found.is_of_arms else "laws",
         "names": [side.name for side in found.sides],
         "verdicts": [side.verdict for side in found.sides],
         "sampled": [side.sampled.answer for side in found.sides],
-        "modes": modes_table(found),
-        "poles": poles_table(found),
-        "margins": margins_table(found),
+        "modes": compared_modes(found),
+        "poles": compared_poles(found),
+        "margins": compared_margins(found),
         "at_samples": found.is_clocked,
         "loops": [_loop(side) for side in found.sides],
     }
 
 
-def _loop(side: Side) -> dict[str, Any]:
+def _loop(side: ComparedSide) -> dict[str, Any]:
     if side.margins is not None:
         return margins_answer(side.margins)
     return {} if side.clocked is None else sampled_law_answer(side.clocked.analysis)
 
 
-def verdict_words(side: Side) -> str:
+def side_words(side: ComparedSide) -> str:
     """A line: both verdicts on one side, with what is known beyond the band, and its law."""
     if side.margins is None:
         return f"{side.name}: {side.verdict.upper()}; {side.sampled.at}: {side.sampled.sentence}"
@@ -165,7 +171,7 @@ def verdict_words(side: Side) -> str:
     return f"{side.name}: {verdict.verdict.upper()}{reach}; {side.sampled.at}: {side.sampled.sentence}"
 
 
-def _known(side: Side) -> list[tuple[float | None, str]]:
+def _known(side: ComparedSide) -> list[tuple[float | None, str]]:
     """Each margin with what is known of it; a phase that a delay takes away has no exact value."""
     if side.clocked is not None:
         return [(value, "-" if value is None else side.clocked.known) for value in side.clocked.margins.values()]

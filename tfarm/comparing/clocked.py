@@ -21,9 +21,9 @@ from tfarm.records import record
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
-GONE = 1e-3  # |z| of a pole that leaves this much of itself after a sample: of those nothing is compared
-REAL = 1e-12  # imaginary part of a real z: rounding
-TITLES = {"gain_factor_up": ("stable up to this factor on the law", ""),
+GONE_AFTER_SAMPLE = 1e-3  # |z| of a pole that leaves this much of itself after a sample: of those nothing is compared
+REAL_Z = 1e-12  # imaginary part of a real z: rounding
+CLOCKED_MARGINS = {"gain_factor_up": ("stable up to this factor on the law", ""),
           "gain_factor_down": ("and down to this one", ""), "delay_margin_s": ("delay margin", "s")}  # fmt: skip
 
 
@@ -52,8 +52,8 @@ class Clocked:
     def poles(self) -> Complex:
         """The poles s = ln(z)/T [1/s] with Im s >= 0, ascending in Im s, of all that outlives a sample."""
         z = self.analysis.loop.poles.z
-        z = np.where(abs(z.imag) <= REAL, z.real, z)
-        s = np.log(z[(abs(z) > GONE) & (z.imag >= 0)]) / self.period
+        z = np.where(abs(z.imag) <= REAL_Z, z.real, z)
+        s = np.log(z[(abs(z) > GONE_AFTER_SAMPLE) & (z.imag >= 0)]) / self.period
         return np.asarray(s[np.lexsort((s.real, s.imag))])
 
     @property
@@ -70,7 +70,7 @@ class Clocked:
         """By `TITLES`: between which factors on the law, and up to which further delay [s], the loop is stable."""
         low, high = self.analysis.gain_factors or (None, None)
         delay = self.analysis.delay_margin.samples * self.period if self.analysis.verdict.is_stable else None
-        return dict(zip(TITLES, (high, low, delay), strict=True))
+        return dict(zip(CLOCKED_MARGINS, (high, low, delay), strict=True))
 
     @cached_property
     def known(self) -> str:

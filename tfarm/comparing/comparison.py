@@ -35,23 +35,23 @@ from .clocked import Clocked, Reach, clocked
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
-MOST_MODES = 30
-LONGEST = 60  # characters of a name: of two in one legend
-SPARE = 6  # poles with Im s >= 0 beyond the modes: real ones, those of the hub, the motor and a law
-COLUMNS, ROWS = 80, 40  # of the plane of both gains; its edges upwards are exact
-NEXT = 1e-6  # of the largest rate gain: where the first column beyond 0 is, from which most regions begin
-ROOM = 1.5  # how far the plane reaches beyond the laws' own gains
-PLAIN = 40  # values along each axis of the plane of a factor and a delay
-MOST_FACTOR, LONGEST_DELAY = 4.0, 0.02  # where that plane ends: factor on the law, delay [s] where no law has more
-WAITS = 25  # further delays of which the plane of a loop at its samples consists
+MOST_COMPARED = 30  # flexible modes of a table that is read side by side
+LONGEST_SIDE_NAME = 60  # characters of a name: of two in one legend
+POLES_BEYOND_MODES = 6  # poles with Im s >= 0 beyond the modes: real ones, those of the hub, the motor and a law
+REGION_COLUMNS, REGION_ROWS = 80, 40  # of the plane of both gains; its edges upwards are exact
+FIRST_COLUMN = 1e-6  # of the largest rate gain: where the first column beyond 0 is, from which most regions begin
+BEYOND_LAWS = 1.5  # how far the plane reaches beyond the laws' own gains
+DELAY_PLANE_POINTS = 40  # values along each axis of the plane of a factor and a delay
+MOST_FACTOR, DELAY_SHOWN = 4.0, 0.02  # where that plane ends: factor on the law, delay [s] where no law has more
+FURTHER_DELAYS = 25  # further delays of which the plane of a loop at its samples consists
 LONGEST_WAIT, BORNE = 2.0, 1.2  # samples up to which these go, or this much beyond what either loop bears
 MOST_DELAYED = 10.0  # samples at most
-FAR = 0.05  # of the first mode: where the curve of a loop begins
+CURVE_FROM = 0.05  # of the first mode: where the curve of a loop begins
 
 
 @dataclass(frozen=True, kw_only=True)
 @record
-class Side:
+class ComparedSide:
     """One of the two: what it is called, its arm and law, the modes of the arm, and what the loop is worth.
 
     `damping_ratio` is that of each flexible mode of the arm by itself, None where a mode could not be followed; `poles`
@@ -95,7 +95,7 @@ class Side:
             omega = dense(self.margins.stability)
             L = np.asarray(self.margins.stability.loop.loop_function(1j * omega), dtype=np.complex128)
         flexible = self.modes.natural_frequency[self.modes.index > 0]
-        told = np.isfinite(L) & (L != 0) & (omega > FAR * flexible[0])
+        told = np.isfinite(L) & (L != 0) & (omega > CURVE_FROM * flexible[0])
         return omega[told], L[told]
 
 
@@ -104,12 +104,12 @@ class Side:
 class Comparison:
     """Two sides, the first the one that differences are from.  `output` is what the Bode plot of two arms shows."""
 
-    one: Side
-    other: Side
+    one: ComparedSide
+    other: ComparedSide
     output: str
 
     @property
-    def sides(self) -> tuple[Side, Side]:
+    def sides(self) -> tuple[ComparedSide, ComparedSide]:
         """Both."""
         return self.one, self.other
 
@@ -147,13 +147,13 @@ class Comparison:
         ranges = [ranges_of(side.arm) for side in self.sides]
         x, y = (
             between(
-                min([pair[n][0] for pair in ranges] + [ROOM * law[name] for law in laws]),
-                max([pair[n][1] for pair in ranges] + [ROOM * law[name] for law in laws]),
+                min([pair[n][0] for pair in ranges] + [BEYOND_LAWS * law[name] for law in laws]),
+                max([pair[n][1] for pair in ranges] + [BEYOND_LAWS * law[name] for law in laws]),
                 number,
             )
-            for n, (name, number) in enumerate(zip(PLANE, (COLUMNS, ROWS), strict=True))
+            for n, (name, number) in enumerate(zip(PLANE, (REGION_COLUMNS, REGION_ROWS), strict=True))
         )
-        x = np.union1d(x, [NEXT * x[-1]])
+        x = np.union1d(x, [FIRST_COLUMN * x[-1]])
         first, second = (region(side.arm, x, y, law[ANGLE_GAIN]) for side, law in zip(self.sides, laws, strict=True))
         return first, second
 
@@ -164,15 +164,15 @@ class Comparison:
         assert each[0] is not None
         assert each[1] is not None
         borne = [found.analysis.delay_margin.samples for found in each if found is not None]
-        samples = np.linspace(0.0, min(max(LONGEST_WAIT, BORNE * max(borne)), MOST_DELAYED), WAITS)
+        samples = np.linspace(0.0, min(max(LONGEST_WAIT, BORNE * max(borne)), MOST_DELAYED), FURTHER_DELAYS)
         return each[0].reach(samples), each[1].reach(samples)
 
     @cached_property
     def delays(self) -> tuple[LawMap, LawMap]:
         """The plane of a factor on each law and its whole delay [s]: for laws that are more than gains at the hub."""
         laws = [side.law if isinstance(side.law, Law) else Law.of_gains(side.law) for side in self.sides]
-        longest = max(LONGEST_DELAY, *(2 * law.delay for law in laws))
-        x, y = between(0.0, MOST_FACTOR, PLAIN), between(0.0, longest, PLAIN)
+        longest = max(DELAY_SHOWN, *(2 * law.delay for law in laws))
+        x, y = between(0.0, MOST_FACTOR, DELAY_PLANE_POINTS), between(0.0, longest, DELAY_PLANE_POINTS)
         first, second = (
             law_map(side.arm, law, ("gain", "delay"), x, y) for side, law in zip(self.sides, laws, strict=True)
         )
@@ -191,8 +191,8 @@ def compare(
     different inputs, and what `tfarm.margins`, or then `tfarm.sampled`, raises for either.
     """
     pairs = _pairs(arms, laws)
-    modes = whole("modes", modes, 1, MOST_MODES, f"a whole number from 1 to {MOST_MODES}")
-    called = tuple(one_line(name, LONGEST) for name in names) or _names(pairs)
+    modes = whole("modes", modes, 1, MOST_COMPARED, f"a whole number from 1 to {MOST_COMPARED}")
+    called = tuple(one_line(name, LONGEST_SIDE_NAME) for name in names) or _names(pairs)
     if len(called) != 2:
         raise ParameterError(key="names", value=list(called), remedy="two names")
     (first, _), (second, _) = pairs
@@ -223,16 +223,18 @@ def _pairs(arms: Arm | Sequence[Arm], laws: AnyLaw | Sequence[AnyLaw] | None) ->
 
 def _names(pairs: list[tuple[Arm, AnyLaw]]) -> tuple[str, ...]:
     """The arms' names where they differ, else the laws', else their numbers."""
-    arms = [one_line(arm.name, LONGEST) for arm, _ in pairs]
-    laws = [one_line(law.name, LONGEST) if isinstance(law, Law) else _gains(law) for _, law in pairs]
+    arms = [one_line(arm.name, LONGEST_SIDE_NAME) for arm, _ in pairs]
+    laws = [
+        one_line(law.name, LONGEST_SIDE_NAME)
+        if isinstance(law, Law)
+        else ", ".join(law.told(name, "{:.4g}".format) for name in PLANE)
+        for _, law in pairs
+    ]
     return tuple(next((names for names in (arms, laws) if names[0] != names[1]), ["first", "second"]))
 
 
-def _gains(law: HubFeedback) -> str:
-    return ", ".join(law.told(name, "{:.4g}".format) for name in PLANE)
-
-
-def _side(name: str, arm: Arm, law: AnyLaw, count: int, chain: Chain, is_clocked: bool) -> Side:
+def _side(name: str, arm: Arm, law: AnyLaw, count: int, chain: Chain, is_clocked: bool) -> ComparedSide:
+    """All that is compared of one arm under its law; a verdict or a damping that cannot be settled is left open."""
     found = modes_of(arm, count)
     ratio = dict.fromkeys(range(1, count + 1), 0.0 if arm.is_undamped else None)
     if not arm.is_undamped:
@@ -243,14 +245,14 @@ def _side(name: str, arm: Arm, law: AnyLaw, count: int, chain: Chain, is_clocked
         sampled = brief_of(verdict_on(arm, law, chain), chain)
     except ConvergenceError as error:
         sampled = SampledBrief(sampling=chain.sampling, is_stable=None, log_radius=None, sentence=f"undecided: {error}")
-    at = clocked(arm, law, chain) if is_clocked else None
-    return Side(
+    at, most = clocked(arm, law, chain) if is_clocked else None, count + POLES_BEYOND_MODES
+    return ComparedSide(
         name=name,
         arm=arm,
         law=law,
         modes=found,
         damping_ratio=tuple(ratio[n] for n in range(1, count + 1)),
-        poles=closed_loop_poles(arm, law, count + SPARE).values if at is None else at.poles[: count + SPARE],
+        poles=closed_loop_poles(arm, law, most).values if at is None else at.poles[:most],
         margins=margins_of(arm, law) if at is None else None,
         sampled=sampled,
         clocked=at,

@@ -14,18 +14,16 @@ from matplotlib.ticker import FuncFormatter
 from tfarm.arm import HubFeedback
 from tfarm.comparing import Comparison
 from tfarm.crossing import pieces
+from tfarm.crossing.pieces import Real, Window
 from tfarm.digits import plain
-from tfarm.loop.regions import Region
-from tfarm.response.frequency import Bode
 
-from .frequency import hertz_axis, magnitude_limits
+from .frequency import hertz_axis, magnitude_limits, wrapped_phase
 from .plane import outline
 from .style import BLUE, GREEN, GREY, INK, ORANGE, New, blank, headline, safe, style, taken, window
 from .words import name_axes
 
-COLOURS = (BLUE, ORANGE)
-DEEPEST = 1e-4  # of 1: how small a loop function is drawn
-HIGHEST = 1e3  # and how large
+SIDE_COLOURS = (BLUE, ORANGE)  # of the first side, and of the second
+LEAST_DRAWN, MOST_DRAWN = 1e-4, 1e3  # sizes of L, and factors on a law, that are drawn: so that what is near 1 shows
 
 
 def comparison(data: Comparison, *, ax: Sequence[Axes] | None = None) -> tuple[Axes, Axes, Axes]:
@@ -62,29 +60,23 @@ def draw_comparison(data: Comparison, new: New = blank) -> Figure:
 def _responses(data: Comparison, upper: Axes, lower: Axes) -> None:
     """The exact responses of both arms; roots on the axis run off the picture."""
     limits = np.array([magnitude_limits(each) for each in data.responses])
-    for each, side, colour in zip(data.responses, data.sides, COLOURS, strict=True):
-        _curve(each, upper, lower, colour, side.name)
+    for each, side, colour in zip(data.responses, data.sides, SIDE_COLOURS, strict=True):
+        upper.plot(each.omega, abs(each.value), color=colour, label=safe(side.name))
+        lower.plot(each.omega, each.phase, color=colour, lw=1.0)
     first = data.responses[0]
     upper.set_ylim(float(limits[:, 0].min()), float(limits[:, 1].max()))
     upper.set_ylabel(f"|{first.label} / {first.input_label}|  [{first.gain_unit}]")
     _finished(first.band, upper, lower)
 
 
-def _curve(each: Bode, upper: Axes, lower: Axes, colour: str, name: str) -> None:
-    upper.plot(each.omega, abs(each.value), color=colour, label=safe(name))
-    lower.plot(each.omega, each.phase, color=colour, lw=1.0)
-
-
 def _loops(data: Comparison, upper: Axes, lower: Axes) -> None:
     """|L| with the line 1, and its angle from -180 to 180 degrees, broken where it goes round."""
     ends = []
-    for side, colour in zip(data.sides, COLOURS, strict=True):
+    for side, colour in zip(data.sides, SIDE_COLOURS, strict=True):
         omega, L = side.loop_function
-        angle = np.degrees(np.angle(L))
-        jump = np.flatnonzero(abs(np.diff(angle)) > 180) + 1
         upper.plot(omega, abs(L), color=colour, label=safe(side.name))
-        lower.plot(np.insert(omega, jump, np.nan), np.insert(angle, jump, np.nan), color=colour, lw=1.0)
-        ends.append((omega[0], omega[-1], max(abs(L).min(), DEEPEST), min(abs(L).max(), HIGHEST)))
+        lower.plot(*wrapped_phase(omega, L), color=colour, lw=1.0)
+        ends.append((omega[0], omega[-1], max(abs(L).min(), LEAST_DRAWN), min(abs(L).max(), MOST_DRAWN)))
     low, high, least, most = zip(*ends, strict=True)
     upper.axhline(1.0, color=GREY, lw=0.9)
     upper.set_ylim(min(least) / 1.5, 1.5 * max(most))
@@ -117,11 +109,11 @@ def _map(data: Comparison, ax: Axes) -> None:
         return
     first, other = data.regions
     if first == other:
-        _region(first, GREEN, "stable", ax)
+        _region(first.axes[0], first.stable_intervals, GREEN, "stable", ax)
     else:
-        for found, side, colour in zip(data.regions, data.sides, COLOURS, strict=True):
-            _region(found, colour, f"{side.name}: stable", ax)
-    for side, colour in zip(data.sides, COLOURS, strict=True):
+        for found, side, colour in zip(data.regions, data.sides, SIDE_COLOURS, strict=True):
+            _region(found.axes[0], found.stable_intervals, colour, f"{side.name}: stable", ax)
+    for side, colour in zip(data.sides, SIDE_COLOURS, strict=True):
         if isinstance(side.law, HubFeedback):
             ax.plot(*side.law.point, "o", mfc=colour, mec="white", ms=7.5, zorder=7)
     across, up = first.axes
@@ -130,8 +122,9 @@ def _map(data: Comparison, ax: Axes) -> None:
     ax.legend(loc="upper left", bbox_to_anchor=(0.0, -0.1), borderaxespad=0.0)
 
 
-def _region(found: Region, colour: str, label: str, ax: Axes) -> None:
-    for piece in pieces(found.axes[0], found.stable_intervals):
+def _region(across: Real, stable: Sequence[Sequence[Window]], colour: str, label: str, ax: Axes) -> None:
+    """Where a loop is stable: an interval upwards, or several, at each value across."""
+    for piece in pieces(across, stable):
         x, low, high = np.array(piece.points).T
         ax.fill_between(x, low, high, facecolor=colour, alpha=0.22, lw=0, zorder=1)
         outline(piece, colour, 1.4, 3.0, ax)
@@ -141,17 +134,13 @@ def _region(found: Region, colour: str, label: str, ax: Axes) -> None:
 def _reaches(data: Comparison, ax: Axes) -> None:
     """Which factors keep each loop stable, as its law acts later and later."""
     highest = 1.0
-    for found, side, colour in zip(data.reaches, data.sides, COLOURS, strict=True):
+    for found, side, colour in zip(data.reaches, data.sides, SIDE_COLOURS, strict=True):
         ends = [end for column in found.stable_intervals for window in column for end in window if math.isfinite(end)]
         highest = max([highest, *ends])
-        for piece in pieces(1e3 * found.delay, found.stable_intervals):
-            x, low, high = np.array(piece.points).T
-            ax.fill_between(x, low, high, facecolor=colour, alpha=0.22, lw=0, zorder=1)
-            outline(piece, colour, 1.4, 3.0, ax)
-        ax.fill_between([], [], [], facecolor=colour, alpha=0.4, label=safe(f"{side.name}: stable"))
+        _region(1e3 * found.delay, found.stable_intervals, colour, f"{side.name}: stable", ax)
     ax.plot([0.0], [1.0], "o", mfc=INK, mec="white", ms=7.5, zorder=7, clip_on=False, label="the laws as they are")
     ax.set_xlim(0.0, 1e3 * data.reaches[0].delay[-1])
-    ax.set_ylim(0.0, min(1.15 * highest, HIGHEST))
+    ax.set_ylim(0.0, min(1.15 * highest, MOST_DRAWN))
     ax.axhline(1.0, color=INK, lw=0.6)
     ax.set_xlabel("further delay [ms]")
     ax.set_ylabel("factor on the law")
@@ -159,7 +148,7 @@ def _reaches(data: Comparison, ax: Axes) -> None:
 
 
 def _delays(data: Comparison, ax: Axes) -> None:
-    for found, side, colour in zip(data.delays, data.sides, COLOURS, strict=True):
+    for found, side, colour in zip(data.delays, data.sides, SIDE_COLOURS, strict=True):
         image = np.zeros((*found.stable.shape, 4))
         image[found.stable] = to_rgba(colour, 0.3)
         ax.pcolormesh(found.x, found.y, image, shading="nearest", rasterized=True)

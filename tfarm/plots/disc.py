@@ -16,18 +16,19 @@ from numpy.typing import NDArray
 from tfarm.digits import plain, significant
 from tfarm.loop.nyquist import Nyquist, compressed
 
-from .labels import FURTHER, UPON, Label
-from .style import BLUE, FAINT, GREY, ORANGE, Keys, New, alone, blank, headline, safe, style, window
+from .labels import OFFSET_UPON, OFFSETS_FURTHER, Label
+from .style import BLUE, FAINT, GREY, ORANGE, Keys, New, blank, headline, on_own_figure, safe, style, window
 from .words import gains_words
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 
-RINGS = (0.1, 0.3, 1.0, 3.0, 10.0)  # |L| of the rings
-NAMED = np.r_[56:360:17, 0:56:17]  # degrees on a ring where its size may stand, in the order in which they are tried
-RING, LAST, STEP = 1.04, 1.2, 0.03  # radius of the first arc at infinity, of the last at most, from one to the next
-BEYOND, OUTER = 1.12, 1.16  # radii of words beyond the rim: of its name, and of how many arcs turn alike
-ALIKE = math.radians(20.0)  # arcs whose ends are as near as that turn alike
-HALO: dict[str, Any] = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
+RING_SIZES = (0.1, 0.3, 1.0, 3.0, 10.0)  # |L| of the rings
+NAME_ANGLES = np.r_[56:360:17, 0:56:17]  # degrees on a ring where its size may stand, in the order of trial
+ARC_RADIUS, LAST_RADIUS, RADIUS_STEP = 1.04, 1.2, 0.03  # of the first arc at infinity, of the last, and between two
+RIM_NAME, ARC_COUNT = 1.12, 1.16  # radii of words beyond the rim: of its name, and of how many arcs turn alike
+ARCS_ALIKE = math.radians(20.0)  # arcs whose ends are as near as that turn alike
+ARROWS_AT = np.array([0.12, 0.4, 0.75])  # of the drawn length of the curve, arcs at infinity apart
+RING_HALO: dict[str, Any] = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
 
 
 def nyquist(data: Nyquist[Any], *, ax: Axes | None = None, name: str = "") -> Axes:
@@ -40,14 +41,20 @@ def nyquist(data: Nyquist[Any], *, ax: Axes | None = None, name: str = "") -> Ax
     with style():
         _disc(ax)
         _curve(data, ax)
-        _headings(name, data, ax)
+        verdict = data.verdict
+        led, told = safe(name), safe(gains_words(verdict.loop.law).removeprefix(f"{name}, "))
+        ax.set_title(
+            f"{led}{': ' * bool(name)}{verdict.verdict.upper()}\n{told}\n"
+            f"encirclements of −1: {data.encirclements:d};  unstable poles: {verdict.unstable_roots}",
+            fontsize=9.0, loc="center",
+        )  # fmt: skip
     return ax
 
 
 def draw_disc(data: Nyquist[Any], name: str = "", new: New = blank) -> Figure:
     """One disc, on a figure of its own."""
     title = f"{data.verdict.loop.arm.name}: the loop function L(iω)"
-    return alone(lambda own: nyquist(data, ax=own, name=name), (5.0, 5.8), title, _legend(), new)
+    return on_own_figure(lambda own: nyquist(data, ax=own, name=name), (5.0, 5.8), title, _legend(), new)
 
 
 def draw_nyquist(title: str, plots: Mapping[str, Nyquist]) -> Figure:
@@ -65,16 +72,16 @@ def draw_nyquist(title: str, plots: Mapping[str, Nyquist]) -> Figure:
 def _disc(ax: Axes) -> None:
     """Rings of equal |L|, the axes, the rim at infinity, and -1."""
     turn = np.exp(1j * np.linspace(0, 2 * math.pi, 361))
-    for size in (*RINGS, math.inf):
+    for size in (*RING_SIZES, math.inf):
         ring = turn * (1.0 if math.isinf(size) else size / (1 + size))
         ax.plot(ring.real, ring.imag, color=GREY if size in (1.0, math.inf) else FAINT, lw=0.7, zorder=0.6)
-        at = [(float(z.real), float(z.imag)) for z in ring[NAMED] * (BEYOND if math.isinf(size) else 1.0)]
+        at = [(float(z.real), float(z.imag)) for z in ring[NAME_ANGLES] * (RIM_NAME if math.isinf(size) else 1.0)]
         text = "|L| = ∞" if math.isinf(size) else plain(size)
-        ax.add_artist(Label(text, at, UPON, may_go=True, fontsize=7.5, color=GREY, bbox=HALO))
+        ax.add_artist(Label(text, at, OFFSET_UPON, may_go=True, fontsize=7.5, color=GREY, bbox=RING_HALO))
     ax.plot([-1, 1], [0, 0], color=FAINT, lw=0.7, zorder=0.5)
     ax.plot([0, 0], [-1, 1], color=FAINT, lw=0.7, zorder=0.5)
     ax.plot([-0.5], [0], "+", color=ORANGE, ms=11, mew=2.2, zorder=6)
-    minus_one = Label("−1", [(-0.5, 0.0)], FURTHER, fontsize=10.0, color=ORANGE, weight="bold")
+    minus_one = Label("−1", [(-0.5, 0.0)], OFFSETS_FURTHER, fontsize=10.0, color=ORANGE, weight="bold")
     minus_one.set_path_effects([withStroke(linewidth=2.0, foreground="white")])
     ax.add_artist(minus_one)
     ax.set_aspect("equal")
@@ -94,14 +101,16 @@ def _curve(data: Nyquist[Any], ax: Axes) -> None:
             ax.plot(z[piece].real, -z[piece].imag, color=BLUE, lw=0.6, alpha=0.55, zorder=2)
             continue
         angle = np.unwrap(np.angle(data.L[piece]))
-        alike.setdefault((round(angle[0] / ALIKE), round(angle[-1] / ALIKE)), []).append(piece)
-    step = min(STEP, (LAST - RING) / max(1, len(alike) - 1))
+        alike.setdefault((round(angle[0] / ARCS_ALIKE), round(angle[-1] / ARCS_ALIKE)), []).append(piece)
+    step = min(RADIUS_STEP, (LAST_RADIUS - ARC_RADIUS) / max(1, len(alike) - 1))
     for number, pieces in enumerate(alike.values()):
-        _arc(data, z, pieces, RING + step * number, ax)
-    for at in _arrows(data, z):
-        _arrow(z[at], ax)
-    ax.set_xlim(-LAST - STEP, LAST + STEP)
-    ax.set_ylim(-LAST - STEP, LAST + STEP)
+        _arc(data, z, pieces, ARC_RADIUS + step * number, ax)
+    (along,) = np.nonzero(~data.is_arc)
+    length = np.r_[0.0, np.cumsum(abs(np.diff(z[along])))]
+    for n in np.searchsorted(length, length[-1] * ARROWS_AT):
+        _arrow(z[along[max(0, n - 1) : n + 1]], ax)
+    ax.set_xlim(-LAST_RADIUS - RADIUS_STEP, LAST_RADIUS + RADIUS_STEP)
+    ax.set_ylim(-LAST_RADIUS - RADIUS_STEP, LAST_RADIUS + RADIUS_STEP)
 
 
 def _arc(data: Nyquist[Any], z: Complex, pieces: list[NDArray[np.int64]], radius: float, ax: Axes) -> None:
@@ -113,8 +122,8 @@ def _arc(data: Nyquist[Any], z: Complex, pieces: list[NDArray[np.int64]], radius
     ax.plot(ends.real, ends.imag, color=BLUE, lw=0.8, ls=(0, (3, 1.5)), zorder=3)
     _arrow(ring, ax)
     if len(pieces) > 1:
-        places = [(float(s.real), float(s.imag)) for s in OUTER * ring[10:-10:5] / radius]
-        ax.add_artist(Label(f"{len(pieces)} ×", places, UPON, fontsize=8.0, color=BLUE))
+        places = [(float(s.real), float(s.imag)) for s in ARC_COUNT * ring[10:-10:5] / radius]
+        ax.add_artist(Label(f"{len(pieces)} ×", places, OFFSET_UPON, fontsize=8.0, color=BLUE))
 
 
 def arc_on_ring(L: Complex, radius: float) -> Complex:
@@ -122,14 +131,6 @@ def arc_on_ring(L: Complex, radius: float) -> Complex:
     angle = np.unwrap(np.angle(L))
     fine = np.interp(np.linspace(0, 1, 61), np.linspace(0, 1, angle.size), angle)
     return np.asarray(radius * np.exp(1j * fine))
-
-
-def _arrows(data: Nyquist[Any], z: Complex) -> list[NDArray[np.int64]]:
-    """Short pieces of the curve to bear arrows: an eighth, two fifths and three quarters of its drawn length on."""
-    (along,) = np.nonzero(~data.is_arc)
-    length = np.r_[0.0, np.cumsum(abs(np.diff(z[along])))]
-    places = np.searchsorted(length, length[-1] * np.array([0.12, 0.4, 0.75]))
-    return [along[max(0, n - 1) : n + 1] for n in places]
 
 
 def _arrow(piece: Complex, ax: Axes) -> None:
@@ -141,17 +142,6 @@ def _arrow(piece: Complex, ax: Axes) -> None:
     ax.annotate(
         "", (stop.real + 0.012 * way.real, stop.imag + 0.012 * way.imag), (stop.real, stop.imag), zorder=4,
         arrowprops={"arrowstyle": "-|>", "color": BLUE, "lw": 0.8, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 9},
-    )  # fmt: skip
-
-
-def _headings(name: str, data: Nyquist[Any], ax: Axes) -> None:
-    """The verdict and the count above each disc."""
-    verdict = data.verdict
-    led, told = safe(name), safe(gains_words(verdict.loop.law).removeprefix(f"{name}, "))
-    ax.set_title(
-        f"{led}{': ' * bool(name)}{verdict.verdict.upper()}\n{told}\n"
-        f"encirclements of −1: {data.encirclements:d};  unstable poles: {verdict.unstable_roots}",
-        fontsize=9.0, loc="center",
     )  # fmt: skip
 
 

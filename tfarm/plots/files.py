@@ -19,13 +19,11 @@ METADATA: dict[str, dict[str, str | None]] = {
     "svg": {"Date": None, "Creator": "tfarm"},
     "png": {"Software": "tfarm"},
 }
-DOTS_PER_INCH = 160
+PICTURE_DOTS = 160  # an inch, of a PNG: lines of 0.6 points are more than a pixel wide
 DRAWN = 2  # decimals of a point (1/72 inch) in an SVG: a 60th of a pixel, where matplotlib writes six
 
 
-def save(
-    figure: Figure, folder: Path, stem: str, formats: tuple[str, ...] = ("svg", "png"), dpi: int = DOTS_PER_INCH
-) -> None:
+def save_figure(figure: Figure, folder: Path, stem: str, formats: tuple[str, ...], dpi: int = PICTURE_DOTS) -> None:
     """The figure as folder/stem.svg and .png, or as one of these."""
     with _laid_out(figure):
         for kind in formats:
@@ -50,12 +48,12 @@ def _shorter(svg: bytes) -> bytes:
     return re.sub(rb'(?<= d=")M[^"]*', path, re.sub(rb'<use xlink:href="[^"]*" x="[^"]*" y="[^"]*"', rounded, svg))
 
 
-def save_png(figure: Figure, path: Path, *, key: str = "--png") -> None:
-    """The figure as one PNG file, written beside and renamed.  Raises ParameterError, naming `key`, where it cannot."""
+def save_png(figure: Figure, path: Path) -> None:
+    """The figure as one PNG file, written beside and renamed.  Raises ParameterError, naming --png, where it cannot."""
     picture = io.BytesIO()
     with _laid_out(figure):
-        figure.savefig(picture, format="png", dpi=DOTS_PER_INCH, metadata=METADATA["png"])
-    write_file(path, picture.getvalue(), key=key)
+        figure.savefig(picture, format="png", dpi=PICTURE_DOTS, metadata=METADATA["png"])
+    write_file(path, picture.getvalue(), key="--png")
 
 
 @contextmanager
@@ -66,12 +64,7 @@ def _laid_out(figure: Figure) -> Iterator[None]:
         if (layout := figure.get_layout_engine()) is not None:
             layout.execute(figure)
             figure.set_layout_engine(None)
-        _settle(figure)
+        for ax in figure.axes:  # at ten digits: the layout's solver orders by address, so its last bit differs
+            left, bottom, width, height = (round(float(x), 10) for x in ax.get_position(original=True).bounds)
+            ax.set_position((left, bottom, width, height))
         yield
-
-
-def _settle(figure: Figure) -> None:
-    """Axes at ten digits: the layout's solver orders by address, so its last bit differs from run to run."""
-    for ax in figure.axes:
-        left, bottom, width, height = (round(float(x), 10) for x in ax.get_position(original=True).bounds)
-        ax.set_position((left, bottom, width, height))

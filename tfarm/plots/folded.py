@@ -17,18 +17,18 @@ from numpy.typing import NDArray
 from tfarm.digits import plain
 from tfarm.dsp.loci import DRAWN_RADIUS, RIM, Loci, Locus
 
-from .labels import BESIDE, Label
+from .labels import OFFSETS_BESIDE, Label
 from .style import BLUE, GREY, INK, ORANGE, blank, headline, style
 from .words import gains_words
 
 STRIPS = 2.0  # how many strips are shown at least
 ALIASED = "#eef0f3"
 NEAR_AXIS = 0.01  # 1/s: the real axis is linear up to here, logarithmic beyond
-SCALE = 0.9 / math.log(10)  # of its linear part: there is no corner where the two meet
-TICKS = (-100.0, -10.0, -1.0, -0.1, 0.0, 0.1, 1.0)
+LINEAR_PART = 0.9 / math.log(10)  # of its linear part: there is no corner where the two meet
+TICKS_ACROSS = (-100.0, -10.0, -1.0, -0.1, 0.0, 0.1, 1.0)  # 1/s, of them those within the picture
 
 
-def draw_loci(data: Loci) -> Figure:
+def draw_folded_loci(data: Loci) -> Figure:
     """The folded s-plane, then the z-plane for either gain."""
     with style():
         figure = blank(9.0, 5.4)
@@ -50,7 +50,7 @@ def folded(data: Loci, *, ax: Axes) -> None:
     above = hertz[hertz > half]
     top = STRIPS * half if not above.size else max(STRIPS * half, 1.12 * float(above.min()))
     shown = hertz < top
-    ax.set_xscale("symlog", linthresh=NEAR_AXIS, linscale=SCALE)
+    ax.set_xscale("symlog", linthresh=NEAR_AXIS, linscale=LINEAR_PART)
     ax.axhspan(half, top, color=ALIASED, zorder=0)
     for k in range(2, math.ceil(top / half)):
         ax.axhline(k * half, color="white", lw=1.2, zorder=0.5)
@@ -65,11 +65,11 @@ def folded(data: Loci, *, ax: Axes) -> None:
                 arrowprops={"arrowstyle": "->", "color": colour, "lw": 0.9, "linestyle": (0, (4, 3))},
             )  # fmt: skip
         ax.plot(pole.real, f, "o", mfc="white", mec=colour, mew=1.3, ms=6, zorder=5)
-        ax.add_artist(Label(f"mode {mode}", [(float(pole.real), float(f))], BESIDE, fontsize=8.5))
+        ax.add_artist(Label(f"mode {mode}", [(float(pole.real), float(f))], OFFSETS_BESIDE, fontsize=8.5))
     ax.axvline(0.0, color=INK, lw=0.9)
     ax.set_xlim(3.0 * min(*ends, -1.0), 3.0 * max(*ends, 0.1))
     ax.set_ylim(0.0, top)
-    ax.set_xticks([x for x in TICKS if ax.get_xlim()[0] < x < ax.get_xlim()[1]])
+    ax.set_xticks([x for x in TICKS_ACROSS if ax.get_xlim()[0] < x < ax.get_xlim()[1]])
     ax.xaxis.set_minor_locator(NullLocator())
     ax.xaxis.set_major_formatter(FuncFormatter(lambda x, _: plain(x, 3)))
     ax.set_xlabel("real part  [1/s]: decays | grows")

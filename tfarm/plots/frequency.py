@@ -12,13 +12,13 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MultipleLocator, NullFormatter
 
 from tfarm.digits import plain
-from tfarm.response.frequency import Bode, Real
+from tfarm.response.frequency import Bode, Complex, Real
 
 from .style import BLUE, FAINT, GREY, INK, ORANGE, New, blank, headline, style, taken, window
 
-HERTZ = 2 * math.pi
-STRIP = 0.085  # height of the strip of mode numbers above the magnitude, as a share of its axes
-NARROWEST = 0.019  # share of the width below which two mode numbers would touch
+RAD_PER_CYCLE = 2 * math.pi  # rad/s of 1 Hz
+NUMBER_STRIP = 0.085  # height of the strip of mode numbers above the magnitude, as a share of its axes: a line of them
+NUMBERS_APART = 0.019  # share of the width below which two mode numbers would touch: two digits of 8 points on 9 inches
 
 
 def bode(data: Bode, *, ax: Sequence[Axes] | None = None) -> tuple[Axes, Axes]:
@@ -31,8 +31,8 @@ def bode(data: Bode, *, ax: Sequence[Axes] | None = None) -> tuple[Axes, Axes]:
             upper, lower = draw_bode(data, window).axes
         else:
             upper, lower = taken(ax, 2)
-            magnitude(data, ax=upper)
-            phase(data, ax=lower)
+            draw_magnitude(data, ax=upper)
+            draw_phase(data, ax=lower)
     return upper, lower
 
 
@@ -52,11 +52,11 @@ def draw_card(data: Bode) -> Figure:
     with style():
         figure = blank(4.4, 2.5)
         ax = figure.subplots()
-        magnitude(data, ax=ax, is_small=True)
+        draw_magnitude(data, ax=ax, is_small=True)
     return figure
 
 
-def magnitude(data: Bode, *, ax: Axes, is_small: bool = False, label: str = "flexible arm, exact") -> None:
+def draw_magnitude(data: Bode, *, ax: Axes, is_small: bool = False, label: str = "flexible arm, exact") -> None:
     """|G| on log scales: rad/s below, Hz above; triangles where it is infinite or zero."""
     ax.set_xscale("log")
     ax.set_yscale("log")
@@ -78,12 +78,12 @@ def magnitude(data: Bode, *, ax: Axes, is_small: bool = False, label: str = "fle
         return
     ax.set_ylabel(f"|{data.label} / {data.input_label}|  [{data.gain_unit}]")
     _number_modes(data, ax)
-    hertz_axis(ax, 1.0 + STRIP)
+    hertz_axis(ax, 1.0 + NUMBER_STRIP)
     starts_low = abs(data.value[0]) < math.sqrt(low * high)
     ax.legend(loc="upper left" if starts_low else "lower left")
 
 
-def phase(data: Bode, *, ax: Axes) -> None:
+def draw_phase(data: Bode, *, ax: Axes) -> None:
     """The phase in degrees; at C = 0 it steps by 180 degrees at every root on the axis."""
     ax.set_xscale("log")
     ax.set_xlim(*data.band)
@@ -103,15 +103,22 @@ def hertz_axis(ax: Axes, height: float) -> None:
     """A second frequency axis in Hz, at that height above the axes."""
 
     def to_hertz(omega: Any) -> Any:
-        return omega / HERTZ
+        return omega / RAD_PER_CYCLE
 
     def from_hertz(frequency: Any) -> Any:
-        return frequency * HERTZ
+        return frequency * RAD_PER_CYCLE
 
     upper = ax.secondary_xaxis(height, functions=(to_hertz, from_hertz))
     upper.set_xlabel("frequency [Hz]", labelpad=5.0)
     upper.xaxis.set_major_formatter(FuncFormatter(lambda x, _: plain(x, 3)))
     upper.xaxis.set_minor_formatter(NullFormatter())
+
+
+def wrapped_phase(x: Real, values: Complex) -> tuple[Real, Real]:
+    """The angle [deg] between -180 and 180 of a curve over x, with a gap where it passes half a turn."""
+    angle = np.degrees(np.angle(values))
+    jump = np.flatnonzero(abs(np.diff(angle)) > 180) + 1
+    return np.insert(x, jump, np.nan), np.insert(angle, jump, np.nan)
 
 
 def broken(x: Real, y: Real, at: Real, limit: Real) -> tuple[Real, Real]:
@@ -157,11 +164,11 @@ def _number_modes(data: Bode, ax: Axes) -> None:
     last = -1.0
     for number, pole in enumerate(data.resonances, 1):
         place = (math.log(pole.imag) - low) / (high - low)
-        if place - last < NARROWEST:
+        if place - last < NUMBERS_APART:
             continue
         last = place
         ax.text(
-            pole.imag, 1.0 + 0.38 * STRIP, str(number), transform=ax.get_xaxis_transform(), ha="center",
+            pole.imag, 1.0 + 0.38 * NUMBER_STRIP, str(number), transform=ax.get_xaxis_transform(), ha="center",
             va="bottom", fontsize=8.0, color=GREY,
         )  # fmt: skip
         if pole.imag not in data.infinite:
@@ -174,5 +181,5 @@ def draw_compared(main: Bode, other: Bode, labels: tuple[str, str]) -> Figure:
         figure = blank(9.0, 5.0)
         ax = figure.subplots()
         ax.plot(other.omega, abs(other.value), color=ORANGE, lw=1.8, zorder=3, label=labels[1])
-        magnitude(main, ax=ax, label=labels[0])
+        draw_magnitude(main, ax=ax, label=labels[0])
     return figure

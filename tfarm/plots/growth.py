@@ -19,7 +19,7 @@ from .frequency import hertz_axis
 from .style import BLUE, GREY, INK, ORANGE, New, blank, headline, style, window
 from .words import gains_words
 
-BANDS = 12  # strips that are shaded one by one; above they are too narrow to tell
+SHADED_STRIPS = 12  # strips that are shaded one by one; above they are too narrow to tell
 SHADE = "#f3e6dc"
 
 
@@ -55,12 +55,15 @@ def growths(loop: SampledLoop, table: ModeTable, *, ax: Axes) -> None:
     smallest, down, up = _sizes(table)
     ax.set_yscale("symlog", linthresh=smallest, linscale=0.4)
     ax.set_ylim(-8 * down, 8 * up)
-    ax.set_yticks(_ticks(smallest, down, up))
+    first = round(math.log10(smallest))
+    step = max(2, math.ceil((math.log10(max(down, up)) - first) / 5))  # decades from one tick to the next
+    below, above = (range(first + step, math.floor(math.log10(8 * end)) + 1, step) for end in (down, up))
+    ax.set_yticks([*(-(10.0**n) for n in reversed(below)), 0.0, *(10.0**n for n in above)])
     if loop.chain.sampling.delay_samples == 0:
-        for band in range(1, BANDS, 2):
+        for band in range(1, SHADED_STRIPS, 2):
             ax.axvspan(band * math.pi / T, (band + 1) * math.pi / T, color=SHADE, lw=0, zorder=0.1)
-        if BANDS * math.pi / T < high:
-            ax.axvspan(BANDS * math.pi / T, high, facecolor=SHADE, alpha=0.5, lw=0, zorder=0.1)
+        if SHADED_STRIPS * math.pi / T < high:
+            ax.axvspan(SHADED_STRIPS * math.pi / T, high, facecolor=SHADE, alpha=0.5, lw=0, zorder=0.1)
     ax.axhline(0.0, color=INK, lw=0.9)
     ax.vlines(w, 0, table.log_radius, color=BLUE, lw=1.2, zorder=2)
     ax.plot(w, table.log_radius, "o", color=BLUE, ms=6, label="closed loop, exact", zorder=4)
@@ -85,14 +88,6 @@ def _sizes(table: ModeTable) -> tuple[float, float, float]:
         return 1e-12, 1e-11, 1e-11
     smallest = max(10.0 ** math.floor(math.log10(sizes.min())), 1e-13)
     return smallest, max(-float(every.min()), 10 * smallest), max(float(every.max()), 10 * smallest)
-
-
-def _ticks(smallest: float, down: float, up: float) -> list[float]:
-    """0 and powers of ten to either side, every so many decades."""
-    first = round(math.log10(smallest))
-    step = max(2, math.ceil((math.log10(max(down, up)) - first) / 5))
-    below, above = (range(first + step, math.floor(math.log10(8 * end)) + 1, step) for end in (down, up))
-    return sorted([*(-(10.0**n) for n in below), 0.0, *(10.0**n for n in above)])
 
 
 def _power(y: float, _: object = None) -> str:

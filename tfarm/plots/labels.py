@@ -18,14 +18,15 @@ from numpy.typing import NDArray
 from .style import FAINT, GREY, INK
 
 Real = NDArray[np.float64]
-Offset = tuple[float, float]  # points, from a place to the nearest corner, side or middle of the words
+LabelOffset = tuple[float, float]  # points, from a place to the nearest corner, side or middle of the words
 AWAY = (6.0, 11.0)  # points from a mark to its words
 SIDES, CORNERS = ((0, 1), (0, -1), (1, 0), (-1, 0)), ((1, 1), (-1, 1), (1, -1), (-1, -1))
-AROUND: tuple[Offset, ...] = tuple((r * x, r * y) for r in AWAY for x, y in (*SIDES, *CORNERS))
-BESIDE: tuple[Offset, ...] = tuple((r * x, r * y) for r in AWAY for x, y in (*SIDES[2:], *CORNERS, *SIDES[:2]))
-FURTHER: tuple[Offset, ...] = (*AROUND, *((r * x, r * y) for r in (17.0, 24.0) for x, y in (*SIDES, *CORNERS)))
-UPON: tuple[Offset, ...] = ((0.0, 0.0),)  # in the middle of the place itself, as on a contour
-CLEAR = 1.5  # pixels around words that nothing else comes into
+Offsets = tuple[LabelOffset, ...]
+OFFSETS_AROUND: Offsets = tuple((r * x, r * y) for r in AWAY for x, y in (*SIDES, *CORNERS))
+OFFSETS_BESIDE: Offsets = tuple((r * x, r * y) for r in AWAY for x, y in (*SIDES[2:], *CORNERS, *SIDES[:2]))
+OFFSETS_FURTHER: Offsets = (*OFFSETS_AROUND, *((r * x, r * y) for r in (17.0, 24.0) for x, y in (*SIDES, *CORNERS)))
+OFFSET_UPON: Offsets = ((0.0, 0.0),)  # in the middle of the place itself, as on a contour
+PADDING = 1.5  # pixels around words that nothing else comes into
 
 
 class Label(Annotation):
@@ -35,7 +36,7 @@ class Label(Annotation):
     """
 
     def __init__(
-        self, text: str, places: Sequence[tuple[float, float]], offsets: Sequence[Offset] = AROUND, *,
+        self, text: str, places: Sequence[tuple[float, float]], offsets: Sequence[LabelOffset] = OFFSETS_AROUND, *,
         own: Any = None, may_go: bool = False, fontsize: float = 8.0, color: str = INK, weight: str = "normal",
         bbox: Any = None,
     ) -> None:  # fmt: skip
@@ -52,7 +53,7 @@ class Label(Annotation):
         axes = self.axes
         assert isinstance(axes, Axes)
         curves, words = _curves(axes, self.own), _words(axes, self, renderer)
-        best: tuple[float, tuple[float, float], Offset] | None = None
+        best: tuple[float, tuple[float, float], LabelOffset] | None = None
         for place in self.places:
             for offset in self.offsets:
                 box = self._box(place, offset, renderer)
@@ -69,7 +70,7 @@ class Label(Annotation):
         self.box = box if self.get_visible() else None
         super().draw(renderer)
 
-    def _box(self, place: tuple[float, float], offset: Offset, renderer: Any) -> Bbox:
+    def _box(self, place: tuple[float, float], offset: LabelOffset, renderer: Any) -> Bbox:
         """Where the words would be [pixels]."""
         self.xy = place
         self.set_position(offset)
@@ -77,7 +78,7 @@ class Label(Annotation):
         self.set_horizontalalignment("left" if x > 0 else "right" if x < 0 else "center")
         self.set_verticalalignment("bottom" if y > 0 else "top" if y < 0 else "center")
         self.update_positions(renderer)
-        return Text.get_window_extent(self, renderer).padded(CLEAR)
+        return Text.get_window_extent(self, renderer).padded(PADDING)
 
 
 def _curves(axes: Axes, own: Any) -> list[tuple[Real, Real]]:

@@ -12,38 +12,38 @@ from tfarm.loop.law_map import LawMap
 from tfarm.loop.law_rounded import rounded
 from tfarm.loop.loci import shown
 
-from .labels import BESIDE, Label
+from .labels import OFFSETS_BESIDE, Label
 from .plane import colours, words_of_count
-from .roots import FIRST, OPEN
-from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, New, alone, blank, safe
+from .roots import CIRCLE_AT_FIRST, CROSS_AT_ZERO
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, on_own_figure, safe
 
-COLOURS = (BLUE, GREEN, PURPLE, "#7a5a00", GREY)  # of branches, in turn
-MARKED = 5  # values of the range that are marked along each branch
-FEWEST = 0.02  # of the picture: a count that holds in less of it has no name in the legend
+BRANCH_COLOURS = (BLUE, GREEN, PURPLE, "#7a5a00", GREY)  # of branches, in turn
+MARKED_VALUES = 5  # values of the range that are marked along each branch
+LEAST_NAMED = 0.02  # of the picture: a count that holds in less of it has no name in the legend
 
 
-def draw_law_locus(found: LawLocus, new: New = blank) -> Figure:
+def draw_law_locus(found: LawLocus) -> Figure:
     """The poles of a `LawLocus` with Im s >= 0, on a figure of its own."""
     title = f"{found.arm.name}: closed-loop poles of {found.law.name} along {found.vary}"
-    return alone(lambda ax: law_locus(found, ax=ax), (7.0, 5.6), title, new=new)
+    return on_own_figure(lambda ax: law_branches(found, ax=ax), (7.0, 5.6), title)
 
 
-def law_locus(found: LawLocus, *, ax: Axes) -> None:
+def law_branches(found: LawLocus, *, ax: Axes) -> None:
     """Branches [1/s]: a cross at the gain 0, else a circle, where one begins, dots, and diamonds on the axis."""
-    begin = OPEN if found.vary == "gain" and found.values[0] == 0 else FIRST
-    marked = np.linspace(found.values[0], found.values[-1], MARKED)
+    begin = CROSS_AT_ZERO if found.vary == "gain" and found.values[0] == 0 else CIRCLE_AT_FIRST
+    marked = np.linspace(found.values[0], found.values[-1], MARKED_VALUES)
     found = rounded(found)
     first, *rest = (int(abs(found.values - value).argmin()) for value in marked)
     ax.axvline(0.0, color=INK, lw=0.9, zorder=1)
     for number, branch in enumerate(shown(found.branches)):
-        colour = COLOURS[number % len(COLOURS)]
+        colour = BRANCH_COLOURS[number % len(BRANCH_COLOURS)]
         ax.plot(branch.real, branch.imag, color=colour, lw=1.4, zorder=2)
         ax.plot(branch.real[first], branch.imag[first], color=colour, zorder=4, **begin)
         ax.plot(branch.real[rest], branch.imag[rest], "o", color=colour, ms=3.2, zorder=4)
     for each in found.crossings:
         ax.plot([0], [each.omega], "D", ms=6, mfc=ORANGE, mec="white", mew=0.8, zorder=6)
         text = f"{plain(each.gain, 5)}, {significant(each.omega, 4)} rad/s"
-        ax.add_artist(Label(text, [(0.0, each.omega)], BESIDE, fontsize=7.5))
+        ax.add_artist(Label(text, [(0.0, each.omega)], OFFSETS_BESIDE, fontsize=7.5))
     begins, others = plain(float(found.values[first]), 3), [plain(float(found.values[n]), 3) for n in rest]
     ax.plot([], [], color=GREY, label=f"{safe(found.vary)} = {begins}", **begin)
     ax.plot([], [], "o", color=GREY, ms=3.2, label=f"{safe(found.vary)} = {', '.join(others)}")
@@ -53,18 +53,18 @@ def law_locus(found: LawLocus, *, ax: Axes) -> None:
     ax.set_ylabel("Im s [rad/s]")
 
 
-def draw_law_map(found: LawMap, new: New = blank) -> Figure:
+def draw_law_map(found: LawMap) -> Figure:
     """The plane of a `LawMap`, on a figure of its own."""
     title = f"{found.arm.name}: unstable poles below {significant(found.band, 5)} rad/s under {found.law.name}"
-    return alone(lambda ax: law_map(found, ax=ax), (7.0, 5.4), title, new=new)
+    return on_own_figure(lambda ax: law_counts(found, ax=ax), (7.0, 5.4), title)
 
 
-def law_map(found: LawMap, *, ax: Axes) -> None:
+def law_counts(found: LawMap, *, ax: Axes) -> None:
     """Colours for the number of unstable poles, black dots for the exact crossings along the second number."""
     image = colours(found.unstable)
     ax.pcolormesh(found.x, found.y, image, shading="nearest", rasterized=True, zorder=0.1)
     for count in np.unique(found.unstable):
-        if np.mean(there := found.unstable == count) > FEWEST:
+        if np.mean(there := found.unstable == count) > LEAST_NAMED:
             ax.fill_between([], [], [], color=image[there][0], label=words_of_count(int(count)))
     points = [(x, t) for x, each in zip(found.x, found.crossings, strict=False) for t in each.gain]
     if points:

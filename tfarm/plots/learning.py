@@ -18,22 +18,22 @@ from tfarm.tuner import Tuning
 from tfarm.tuner.overview import CostMap, Curves, TunerStudy
 
 from .regions import overlay
-from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, alone, blank, headline, style, window
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, blank, headline, on_own_figure, style, window
 
 Real = NDArray[np.float64]
 
-K_RANGE = (-0.25, 1.25)
+K_RANGE = (-0.25, 1.25)  # of the moment gain: all that a guard proves lies between 0 and 1
 GUARD = "#bfe3d6"
-TOP = 1.25  # of the cost without feedback: higher ones are drawn at the top edge
+MOST_COST = 1.25  # of the cost without feedback: higher ones are drawn at the top edge
 
 
 def tuned_gain(found: Tuning, *, ax: Axes | None = None) -> Axes:
     """A tuned gain over time (what `tfarm.tune` returns) in its guard, in the axes given or new ones; the axes."""
     if ax is None:
         title = f"{found.trial.arm.name}: the tuner's gain, and where it is proven stable"
-        return alone(lambda own: tuned_gain(found, ax=own), (7.0, 4.4), title, new=window).axes[0]
+        return on_own_figure(lambda own: tuned_gain(found, ax=own), (7.0, 4.4), title, new=window).axes[0]
     with style():
-        gain(found, ax=ax)
+        gain_over_time(found, ax=ax)
         ax.set_ylabel(f"gain on the root moment, {MOMENT_GAIN}  [-]")
     return ax
 
@@ -47,7 +47,7 @@ def draw_gain(data: TunerStudy, continuous: Region, sampled: Sequence[GainMap]) 
         left.get_legend().remove()
         left.set_title("", loc="right")
         path(data.tuning, ax=left)
-        gain(data.tuning, ax=right)
+        gain_over_time(data.tuning, ax=right)
         left.set_ylim(*K_RANGE)
         right.set_ylabel("")
         figure.legend(handles=right.get_legend_handles_labels()[0], loc="outside lower left", ncols=3)
@@ -66,7 +66,7 @@ def path(tuning: Tuning, *, ax: Axes) -> None:
             line.remove()
 
 
-def gain(tuning: Tuning, *, ax: Axes) -> None:
+def gain_over_time(tuning: Tuning, *, ax: Axes) -> None:
     """K over time."""
     guard, result, task = tuning.training.guard, tuning.training.result, tuning.trial.task
     ax.axhspan(guard.lo, guard.hi, color=GUARD, lw=0, zorder=0.5, label="guard: proven for any K(t) in it")
@@ -89,7 +89,7 @@ def draw_curves(data: TunerStudy) -> Figure:
             yardsticks(data.tuning, ax=ax)
             ax.set_title(curves.title, fontsize=9.5)
         axes[0].set_ylabel("cost of a trial")
-        axes[0].set_ylim(0.0, TOP * data.tuning.without.cost)
+        axes[0].set_ylim(0.0, MOST_COST * data.tuning.without.cost)
         figure.legend(handles=axes[0].get_legend_handles_labels()[0], loc="outside lower left", ncols=3)
         headline(figure, f"{data.arm.name}: learning, {len(data.curves[0].finished)} seeds")
     return figure

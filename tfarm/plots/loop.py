@@ -13,31 +13,30 @@ from tfarm.digits import significant
 from tfarm.loop.margins import Margins, dense
 from tfarm.spectrum.scales import first_frequency
 
-from .frequency import hertz_axis
-from .labels import BESIDE, Label
+from .frequency import hertz_axis, wrapped_phase
+from .labels import OFFSETS_BESIDE, Label
 from .style import BLUE, GREEN, GREY, ORANGE, PURPLE, blank, headline, style
 
 Real = NDArray[np.float64]
 
 MOST_NAMED = 6  # crossings that bear their number; of more the mark alone
-FAR = 1e3  # beyond all that is marked |L| is a pole or a zero on the axis, and leaves the picture
-BELOW = 20.0  # of the slowest thing that is to be seen: where the picture begins
-CLEAR = 3.0  # factors of |L| beyond 1 that the picture reaches at least, either way
+BEYOND_MARKED = 1e3  # beyond all that is marked |L| is a pole or a zero on the axis, and leaves the picture
+BELOW_SLOWEST = 20.0  # of the slowest thing that is to be seen: where the picture begins
+LEAST_REACH = 3.0  # factors of |L| beyond 1 that the picture reaches at least, either way
 
 
 def loop_data(found: Margins[Any]) -> tuple[Real, NDArray[np.complex128]]:
-    """Frequencies [rad/s] (n,) around every steep place of the loop, and L there, as far as that is finite."""
-    omega = dense(found.stability)
-    L = np.asarray(found.stability.loop.loop_function(1j * omega), dtype=np.complex128)
-    told = np.isfinite(L) & (L != 0) & (omega >= _lowest(found))
-    return omega[told], L[told]
+    """Frequencies [rad/s] (n,) around every steep place of the loop, and L there, as far as that is finite.
 
-
-def _lowest(found: Margins[Any]) -> float:
-    """Where the picture begins [rad/s]: below the first crossing and the first mode, and above what is all the same."""
+    They begin below the first crossing and the first mode: further down L is all the same.
+    """
     band = found.in_band
     crossed = [] if band is None else [w for w, _ in (*band.gain_crossovers, *band.phase_crossovers) if w > 0]
-    return min([first_frequency(found.stability.loop.arm), *crossed]) / BELOW
+    lowest = min([first_frequency(found.stability.loop.arm), *crossed]) / BELOW_SLOWEST
+    omega = dense(found.stability)
+    L = np.asarray(found.stability.loop.loop_function(1j * omega), dtype=np.complex128)
+    told = np.isfinite(L) & (L != 0) & (omega >= lowest)
+    return omega[told], L[told]
 
 
 def draw_loop(found: Margins[Any], name: str) -> Figure:
@@ -66,8 +65,8 @@ def _size(omega: Real, L: NDArray[np.complex128], found: Margins[Any], ax: Axes)
     ax.axhline(1.0, color=GREY, lw=0.9)
     margins = found.in_band
     crossed = [] if margins is None else [1 / factor for _, factor in margins.phase_crossovers]
-    low, high = min([1 / CLEAR, *crossed]), max([CLEAR, size[0], *crossed])
-    ax.set_ylim(max(size.min(), low / FAR) / 1.5, min(size.max(), high * FAR) * 1.5)
+    low, high = min([1 / LEAST_REACH, *crossed]), max([LEAST_REACH, size[0], *crossed])
+    ax.set_ylim(max(size.min(), low / BEYOND_MARKED) / 1.5, min(size.max(), high * BEYOND_MARKED) * 1.5)
     ax.set_ylabel("|L|")
     if margins is None:
         return
@@ -85,9 +84,7 @@ def _size(omega: Real, L: NDArray[np.complex128], found: Margins[Any], ax: Axes)
 
 def _phase(omega: Real, L: NDArray[np.complex128], found: Margins[Any], ax: Axes) -> None:
     """The angle of L in degrees, broken where it passes 180; at each |L| = 1 the phase margin with its sign."""
-    angle = np.degrees(np.angle(L))
-    jump = np.flatnonzero(abs(np.diff(angle)) > 180) + 1
-    ax.plot(np.insert(omega, jump, np.nan), np.insert(angle, jump, np.nan), color=BLUE)
+    ax.plot(*wrapped_phase(omega, L), color=BLUE)
     ax.set_ylim(-190, 190)
     ax.set_yticks([-180, -90, 0, 90, 180])
     for edge in (-180, 180):
@@ -118,4 +115,4 @@ def _crossed(crossings: tuple[tuple[float, float], ...], heights: list[float], l
 
 
 def _named(text: str, w: float, height: float, ax: Axes) -> None:
-    ax.add_artist(Label(text, [(w, height)], BESIDE, fontsize=7.5))
+    ax.add_artist(Label(text, [(w, height)], OFFSETS_BESIDE, fontsize=7.5))

@@ -12,8 +12,6 @@ from tfarm.fitting.runs import Beside
 
 from .style import BLUE, GREY, ORANGE, blank, headline, safe, style
 
-DEGREES = 180.0 / np.pi
-
 
 def draw_beside(title: str, each: Mapping[str, Beside]) -> Figure:
     """A column a law: hub angle above, root moment below where it was measured."""
@@ -22,10 +20,15 @@ def draw_beside(title: str, each: Mapping[str, Beside]) -> Figure:
         figure = blank(max(4.7 * len(each), 6.0), 6.0 if moment else 3.6)
         axes = figure.subplots(1 + moment, len(each), sharex="col", sharey="row", squeeze=False)
         for column, (name, found) in enumerate(each.items()):
-            _angle(found, axes[0, column])
+            measured, ax = found.measured, axes[0, column]
+            ax.plot(measured.t, np.degrees(measured.reference), color=GREY, lw=1.0, ls=(0, (4, 3)), label="reference")
+            if measured.hub_angle.size:
+                ax.plot(measured.t, np.degrees(measured.hub_angle), color=ORANGE, label="measured")
+            ax.plot(found.run.t, np.degrees(found.hub_angle), color=BLUE, lw=1.2, label="exact sampled loop")
+            ax.set_xlim(0.0, float(measured.t[-1]))
             if moment:
                 _moment(found, axes[1, column])
-            axes[0, column].set_title(safe(name), fontsize=9.5)
+            ax.set_title(safe(name), fontsize=9.5)
             axes[-1, column].set_xlabel("time  [s]")
         axes[0, 0].set_ylabel("hub angle  [deg]")
         if moment:
@@ -35,16 +38,8 @@ def draw_beside(title: str, each: Mapping[str, Beside]) -> Figure:
     return figure
 
 
-def _angle(found: Beside, ax: Axes) -> None:
-    measured = found.measured
-    ax.plot(measured.t, DEGREES * measured.reference, color=GREY, lw=1.0, ls=(0, (4, 3)), label="reference")
-    if measured.hub_angle.size:
-        ax.plot(measured.t, DEGREES * measured.hub_angle, color=ORANGE, label="measured")
-    ax.plot(found.run.t, DEGREES * found.hub_angle, color=BLUE, lw=1.2, label="exact sampled loop")
-    ax.set_xlim(0.0, float(measured.t[-1]))
-
-
 def _moment(found: Beside, ax: Axes) -> None:
+    """The root moment at the samples, over that measured where there is one."""
     if found.measured.root_moment.size:
         ax.plot(found.measured.t, found.measured.root_moment, color=ORANGE)
     ax.plot(found.run.t, found.run.at_samples.root_moment, color=BLUE, lw=1.2)

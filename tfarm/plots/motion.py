@@ -16,7 +16,7 @@ from tfarm.dsp.ringing import POINTS_A_PERIOD
 
 from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, New, blank, headline, style, taken, window
 
-COLOURS = (ORANGE, BLUE, GREEN, PURPLE)  # of several simulations; one alone is blue
+RUN_COLOURS = (ORANGE, BLUE, GREEN, PURPLE)  # of several simulations; one alone is blue
 
 Runs = Mapping[str, Simulation]
 
@@ -33,20 +33,14 @@ def slew(arm: Arm, runs: Simulation | Runs, *, ax: Sequence[Axes] | None = None)
             moment, tip, torque = draw_responses(arm, each, next(iter(each.values())).scenario.name, window).axes
         else:
             moment, tip, torque = taken(ax, 3)
-            root_moment(each, ax=moment)
-            tip_error(arm, each, ax=tip)
-            motor_torque(each, arm.input_unit, ax=torque)
+            moment_over_time(each, ax=moment)
+            tip_over_time(arm, each, ax=tip)
+            motor_over_time(each, arm.input_unit, ax=torque)
             torque.set_xlabel("time  [s]")
-        moment.set_title(_coarse_words(arm, each), loc="right", fontsize=8.0, color=GREY)
+        points, finer = min(curves.points_a_period(arm, run) for run in each.values())
+        coarse = f"{plain(points, 2)} points a period of the fastest mode seen; between={finer} gives {POINTS_A_PERIOD}"
+        moment.set_title(coarse if points < POINTS_A_PERIOD else "", loc="right", fontsize=8.0, color=GREY)
     return moment, tip, torque
-
-
-def _coarse_words(arm: Arm, each: Runs) -> str:
-    """What is said of records with less than 20 points in a period of the fastest mode that is seen."""
-    found = min(curves.points_a_period(arm, run) for run in each.values())
-    if found[0] >= POINTS_A_PERIOD:
-        return ""
-    return f"{plain(found[0], 2)} points a period of the fastest mode seen; between={found[1]} gives {POINTS_A_PERIOD}"
 
 
 def draw_responses(arm: Arm, each: Runs, what: str, new: New = blank) -> Figure:
@@ -67,7 +61,7 @@ def draw_curve(curve: Curve, ax: Axes, colour: str, label: str | None = None) ->
         ax.plot(curve.t, curve.low, color=colour, lw=1.3, label=label)
 
 
-def root_moment(each: Runs, *, ax: Axes) -> None:
+def moment_over_time(each: Runs, *, ax: Axes) -> None:
     """The moment at the root between and at the samples, and the rigid arm's."""
     first = next(iter(each.values()))
     t = first.scenario.t
@@ -79,7 +73,7 @@ def root_moment(each: Runs, *, ax: Axes) -> None:
     ax.set_ylabel("root moment  [N m]")
 
 
-def tip_error(arm: Arm, each: Runs, *, ax: Axes) -> None:
+def tip_over_time(arm: Arm, each: Runs, *, ax: Axes) -> None:
     """How far the tip is from where a rigid arm on its reference would have it, in mm."""
     for simulation, colour in zip(each.values(), _colours(each), strict=True):
         found = curves.tip_deviation(arm, simulation)
@@ -88,7 +82,7 @@ def tip_error(arm: Arm, each: Runs, *, ax: Axes) -> None:
     ax.set_ylabel("tip − reference  [mm]")
 
 
-def motor_torque(each: Runs, unit: str = "N m", *, ax: Axes) -> None:
+def motor_over_time(each: Runs, unit: str, *, ax: Axes) -> None:
     """What the motor holds from sample to sample, in the arm's unit; in volts where the chain has a motor constant."""
     first = next(iter(each.values()))
     in_volts = first.volts is not None
@@ -115,4 +109,4 @@ def _until(simulation: Simulation, ax: Axes) -> None:
 
 
 def _colours(each: Runs) -> list[str]:
-    return [BLUE] if len(each) == 1 else [COLOURS[i % len(COLOURS)] for i in range(len(each))]
+    return [BLUE] if len(each) == 1 else [RUN_COLOURS[i % len(RUN_COLOURS)] for i in range(len(each))]

@@ -17,29 +17,29 @@ from scipy import ndimage
 
 from tfarm.arm import MOMENT_GAIN, PLANE, Arm, HubFeedback
 from tfarm.crossing import RegionPiece, pieces
-from tfarm.digits import SUPERSCRIPT, counted, plain, significant
+from tfarm.digits import SUPERSCRIPT, how_many, plain, significant
 from tfarm.dsp import GainMap
 from tfarm.loop.edges import LINEAR_SCALE, Axis, edge, seen, stable_edge, static_edges
 from tfarm.loop.lossless import locked_edges
 from tfarm.loop.regions import INFINITE, Region
 from tfarm.spectrum import modes
 
-from .labels import AROUND, UPON, Label
-from .style import BLUE, GREY, INK, ORANGE, PURPLE, New, alone, blank, style, window
+from .labels import OFFSET_UPON, OFFSETS_AROUND, Label
+from .style import BLUE, GREY, INK, ORANGE, PURPLE, New, blank, on_own_figure, style, window
 from .words import LYAPUNOV, name_axes
 
 Real = NDArray[np.float64]
 
-STABLE, FEWEST, MOST, BOUNDLESS = "#dcefe6", "#fbeadd", "#eebd95", "#f3d9c6"
-STEPS, MOST_LEVELS = (1.0, 2.0, 5.0), 7  # of the contours
+STABLE_COLOUR, FEWEST_COLOUR, MOST_COLOUR, BOUNDLESS_COLOUR = "#dcefe6", "#fbeadd", "#eebd95", "#f3d9c6"
+CONTOUR_STEPS, MOST_CONTOURS = (1.0, 2.0, 5.0), 7  # of the contours
 LEAST_AREA = 0.004  # of the picture: smaller regions are not labelled
 LETTER = (0.01, 0.018)  # of the picture's width and height: what a letter takes, across and upright
 TALL = 2.5  # letters' widths: what a line takes across its letters, with room
-MARKS = 7  # frequencies written along the boundary
+MOST_MARKED = 7  # frequencies written along the boundary: with more they touch
 DIAMOND, STAR = "D", "*"  # of laws
 AT_RIGHT = tuple((-6.0, up) for up in (4.0, -4.0, 16.0, -16.0, 28.0))  # points, from where a line ends to its words
-HALO: dict[str, Any] = {"facecolor": "white", "edgecolor": "none", "pad": 0.4, "alpha": 0.75}  # of numbers
-TICKS_UP = (-50, -20, -10, -5, -2, -1, 0, 1, 2)
+NUMBER_HALO: dict[str, Any] = {"facecolor": "white", "edgecolor": "none", "pad": 0.4, "alpha": 0.75}  # of numbers
+TICKS_UP = (-50, -20, -10, -5, -2, -1, 0, 1, 2)  # where the axis is logarithmic downwards: matplotlib's own are too few
 
 
 def gain_map(found: Region, *, ax: Axes | None = None) -> Axes:
@@ -52,7 +52,7 @@ def gain_map(found: Region, *, ax: Axes | None = None) -> Axes:
     x, y = map(Axis.of, found.axes)
     with style():
         ground(found, x, y, ax)
-        boundary(found, edge(found, x, y), x, y, ax)
+        draw_boundary(found, edge(found, x, y), x, y, ax)
         count_labels(found, x, y, ax)
     return ax
 
@@ -60,29 +60,11 @@ def gain_map(found: Region, *, ax: Axes | None = None) -> Axes:
 def draw_map(found: Region, new: New = blank) -> Figure:
     """The plane, on a figure of its own."""
     title = f"{found.arm.name}: unstable poles over the plane of both gains"
-    return alone(lambda own: gain_map(found, ax=own), (7.0, 5.4), title, new=new)
+    return on_own_figure(lambda own: gain_map(found, ax=own), (7.0, 5.4), title, new=new)
 
 
 def ground(found: Region, x: Axis, y: Axis, ax: Axes) -> None:
     """Both axes, and the colours of the count."""
-    _scale(found.arm, x, y, ax)
-    ax.imshow(
-        colours(seen(found, x, y).unstable), extent=(0, 1, 0, 1), transform=ax.transAxes, origin="lower", aspect="auto",
-        interpolation="nearest", zorder=0.1,
-    )  # fmt: skip
-
-
-def colours(unstable: NDArray[np.int64]) -> Real:
-    """Green where stable, orange the stronger the more poles are unstable."""
-    share = np.clip((unstable - 1) / max(1, unstable.max() - 1), 0, 1)[..., None]
-    low, high = np.array(to_rgb(FEWEST)), np.array(to_rgb(MOST))
-    image = low + share * (high - low)
-    image[unstable == INFINITE] = to_rgb(BOUNDLESS)
-    image[unstable == 0] = to_rgb(STABLE)
-    return np.asarray(image)
-
-
-def _scale(arm: Arm, x: Axis, y: Axis, ax: Axes) -> None:
     for axis, setter, limits, name in (
         (x, ax.set_xscale, ax.set_xlim, ax.xaxis),
         (y, ax.set_yscale, ax.set_ylim, ax.yaxis),
@@ -93,14 +75,26 @@ def _scale(arm: Arm, x: Axis, y: Axis, ax: Axes) -> None:
             name.set_major_formatter(FuncFormatter(_tick))
             name.set_minor_formatter(NullFormatter())
         limits(axis.low, axis.high)
-    if not y.is_linear:
-        unit = arm.input_per_torque
-        if unit == 1.0:
-            ax.set_yticks([tick for tick in TICKS_UP if y.low <= tick <= y.high])
+    if not y.is_linear and found.arm.input_per_torque == 1.0:
+        ax.set_yticks([tick for tick in TICKS_UP if y.low <= tick <= y.high])
     ax.grid(False)
     stretched = "" if x.is_linear or x.low >= x.linear else f"; linear up to {plain(x.linear)}, logarithmic beyond"
-    name_axes(arm, ax)
+    name_axes(found.arm, ax)
     ax.set_xlabel(ax.get_xlabel() + stretched)
+    ax.imshow(
+        colours(seen(found, x, y).unstable), extent=(0, 1, 0, 1), transform=ax.transAxes, origin="lower", aspect="auto",
+        interpolation="nearest", zorder=0.1,
+    )  # fmt: skip
+
+
+def colours(unstable: NDArray[np.int64]) -> Real:
+    """Green where stable, orange the stronger the more poles are unstable."""
+    share = np.clip((unstable - 1) / max(1, unstable.max() - 1), 0, 1)[..., None]
+    low, high = np.array(to_rgb(FEWEST_COLOUR)), np.array(to_rgb(MOST_COLOUR))
+    image = low + share * (high - low)
+    image[unstable == INFINITE] = to_rgb(BOUNDLESS_COLOUR)
+    image[unstable == 0] = to_rgb(STABLE_COLOUR)
+    return np.asarray(image)
 
 
 def _tick(x: float, _: object = None) -> str:
@@ -125,7 +119,9 @@ def contours(across: Real, up: Real, damping: Real, ax: Axes) -> None:
             if not number:
                 places = [(float(x), float(y)) for x, y in piece[_along(len(piece))]]
                 text = f"{plain(100 * level, 3)} %"
-                ax.add_artist(Label(text, places, UPON, own=line, may_go=True, fontsize=8.0, color=BLUE, bbox=HALO))
+                ax.add_artist(
+                    Label(text, places, OFFSET_UPON, own=line, may_go=True, fontsize=8.0, color=BLUE, bbox=NUMBER_HALO)
+                )
     ax.plot([], [], color=BLUE, lw=0.9, label="least damping ratio of the first two modes")
 
 
@@ -140,13 +136,13 @@ def nice_levels(low: float, high: float) -> list[float]:
     if high <= 0:
         return []
     top = math.floor(math.log10(high))
-    steps = sorted(step * 10.0**power for power in range(top - 4, top + 1) for step in STEPS)
-    levels = [level for level in steps if max(low, 0.0) < level < high][-MOST_LEVELS:]
+    steps = sorted(step * 10.0**power for power in range(top - 4, top + 1) for step in CONTOUR_STEPS)
+    levels = [level for level in steps if max(low, 0.0) < level < high][-MOST_CONTOURS:]
     more = [1.5 * levels[-1]] if levels and 1.5 * levels[-1] < high else []
     return levels + more
 
 
-def boundary(found: Region, points: Real, x: Axis, y: Axis, ax: Axes) -> None:
+def draw_boundary(found: Region, points: Real, x: Axis, y: Axis, ax: Axes) -> None:
     """The exact edge (n, 3) with its frequencies; without damping an upright line and a level one."""
     if found.arm.is_reactive:
         _undamped_boundary(found, x, y, ax)
@@ -159,12 +155,18 @@ def boundary(found: Region, points: Real, x: Axis, y: Axis, ax: Axes) -> None:
         ax.plot([x.low, x.high], [level, level], color=INK, lw=1.6)
     for across, up, omega in _chosen(stable_edge(found, points, x, y), x, y):
         ax.plot([across], [up], "o", ms=4.0, mfc="white", mec=INK, mew=1.0, zorder=5)
-        ax.add_artist(Label(significant(omega, 3), [(across, up)], AROUND, may_go=True, fontsize=8.0, bbox=HALO))
+        ax.add_artist(
+            Label(significant(omega, 3), [(across, up)], OFFSETS_AROUND, may_go=True, fontsize=8.0, bbox=NUMBER_HALO)
+        )
     ax.plot([], [], "o", ms=4.0, mfc="white", mec=INK, mew=1.0, label="with ω in rad/s")
 
 
 def _undamped_boundary(found: Region, x: Axis, y: Axis, ax: Axes) -> None:
-    """Strong around what is stable, thin where only the number of unstable poles changes."""
+    """Strong around what is stable, thin where only the number of unstable poles changes.
+
+    That is at the edge of each mode of the locked hub, the first few with their frequency; of a uniform arm all these
+    edges are one line.
+    """
     label: str | None = "stability boundary, exact"
     _, up = found.axes
     cut = {float(up[0]): y.low, float(up[-1]): y.high}  # an end there is the map's and not the region's
@@ -174,7 +176,12 @@ def _undamped_boundary(found: Region, x: Axis, y: Axis, ax: Axes) -> None:
         ax.plot(*zip(*corners, strict=True), color=INK, lw=1.8, label=label)
         label = None
     if not found.arm.is_told_by_lyapunov:
-        _locked_lines(found, x, y, ax)
+        edges = sorted(locked_edges(found.arm).within(y.low, y.high), key=lambda each: each.at)
+        for number, each in enumerate(edges):
+            ax.plot([0, x.high], [each.t, each.t], color=INK, lw=0.5)
+            if number < MOST_MARKED:
+                text = f"{significant(each.at, 4)} rad/s, the hub at rest"
+                ax.add_artist(Label(text, [(x.high, each.t)], AT_RIGHT, may_go=True, fontsize=7.5))
         return
     whole = found.arm.input_per_torque
     if not y.low < whole < y.high:
@@ -186,17 +193,7 @@ def _undamped_boundary(found: Region, x: Axis, y: Axis, ax: Axes) -> None:
     ax.add_artist(Label(text, [(x.high, whole)], AT_RIGHT, fontsize=8.5))
 
 
-def _locked_lines(found: Region, x: Axis, y: Axis, ax: Axes) -> None:
-    """A thin line at the edge of each mode of the locked hub, the first few with their frequency."""
-    edges = sorted(locked_edges(found.arm).within(y.low, y.high), key=lambda each: each.at)
-    for each in edges:
-        ax.plot([0, x.high], [each.t, each.t], color=INK, lw=0.5)
-    for each in edges[:MARKS]:
-        text = f"{significant(each.at, 4)} rad/s, the hub at rest"
-        ax.add_artist(Label(text, [(x.high, each.t)], AT_RIGHT, may_go=True, fontsize=7.5))
-
-
-def sampled_region(plane: GainMap | None, ax: Axes) -> None:
+def draw_sampled(plane: GainMap | None, ax: Axes) -> None:
     """Where the sampled loop is stable: hatched, its edge exact.  Nothing where it could not be settled."""
     if plane is None:
         return
@@ -230,7 +227,7 @@ def _chosen(points: Real, x: Axis, y: Axis) -> Real:
     if not inside.size:
         return points[:0]
     chosen = [int(inside[0])]
-    while len(chosen) < MARKS:
+    while len(chosen) < MOST_MARKED:
         apart = np.hypot(*np.moveaxis(places[inside][:, None] - places[chosen], -1, 0)).min(axis=1)
         if apart.max() < 0.07:
             break
@@ -238,7 +235,7 @@ def _chosen(points: Real, x: Axis, y: Axis) -> Real:
     return np.asarray(points[chosen])
 
 
-def lyapunov(arm: Arm, x: Axis, y: Axis, ax: Axes) -> None:
+def draw_proven(arm: Arm, x: Axis, y: Axis, ax: Axes) -> None:
     """The quarter of the plane that is proven at C = 0; at C > 0 only the line without moment feedback is."""
     inset = 1.0 if not arm.is_undamped else 1.0 - 0.008 * (y.high - y.low)
     corner = 0.0 if not arm.is_undamped else 0.04 * x.linear
@@ -317,7 +314,7 @@ def words_of_count(count: int) -> str:
     """What a number of unstable poles means."""
     if count == 0:
         return "stable"
-    return "every flexible mode unstable" if count == INFINITE else counted(count, "unstable pole")
+    return "every flexible mode unstable" if count == INFINITE else how_many(count, "unstable pole")
 
 
 def law_mark(law: HubFeedback, marker: str, label: str, ax: Axes) -> None:

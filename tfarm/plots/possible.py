@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,24 +12,22 @@ from matplotlib.figure import Figure
 from tfarm.fitting.possible import Possible, response_band, share_stable
 
 from .regions import LABEL
-from .style import BLUE, New, blank, headline, style
+from .style import BLUE, blank, headline, style
 from .words import name_axes
 
-Bounds = tuple[float, float]
-
-FINE = 800  # points of a band of responses
-MESH = 60  # gains of each axis of a map
-BLUES = "Blues"
+POINTS_OF_BAND = 800  # of a band of responses, about one to a pixel: each is computed for every possible arm
+MAP_MESH = 60  # gains of each axis of a map, each pair counted for every possible arm
+SHARE_COLOURS = "Blues"  # of matplotlib: the more arms, the darker
 
 
-def draw_band(those: Possible, output: str, new: New = blank) -> Figure:
+def draw_band(those: Possible, output: str) -> Figure:
     """Magnitude of a response of the arm that fits best, in the band of all that the data leave possible."""
     omegas = [each.omega for each in those.fit.responses]
     low, high = min(w[0] for w in omegas), max(w[-1] for w in omegas)
-    omega = np.geomspace(low, high, FINE)
+    omega = np.geomspace(low, high, POINTS_OF_BAND)
     least, most, best = response_band(those, output, omega)
     with style():
-        figure = new(9.0, 4.6)
+        figure = blank(9.0, 4.6)
         ax = figure.subplots()
         label = f"all of {len(those.arms)} arms that the data leave possible"
         ax.fill_between(omega / 2 / math.pi, least, most, color=BLUE, alpha=0.3, lw=0, label=label)
@@ -39,11 +38,11 @@ def draw_band(those: Possible, output: str, new: New = blank) -> Figure:
     return figure
 
 
-def draw_share(those: Possible, ranges: tuple[Bounds, Bounds], new: New = blank) -> Figure:
-    """The share of the possible arms on which each pair of gains holds, without a clock."""
-    grid = [np.linspace(*ends, MESH) for ends in ranges]
+def draw_share(those: Possible, ranges: Sequence[tuple[float, float]]) -> Figure:
+    """The share of the possible arms on which each pair of gains holds, without a clock; `ranges` of both gains."""
+    grid = [np.linspace(*ends, MAP_MESH) for ends in ranges]
     with style():
-        figure = new(8.0, 5.0)
+        figure = blank(8.0, 5.0)
         share_map(those, *grid, ax=figure.subplots())
         headline(figure, f"{those.fit.before.name}: gains that hold on the arms that the data leave possible")
     return figure
@@ -52,7 +51,9 @@ def draw_share(those: Possible, ranges: tuple[Bounds, Bounds], new: New = blank)
 def share_map(those: Possible, across: np.ndarray, up: np.ndarray, *, ax: Axes) -> Axes:
     """The same on axes of your own."""
     share = share_stable(those, across, up)
-    picture = ax.pcolormesh(across, up, share, cmap=BLUES, vmin=0.0, vmax=1.0, shading="nearest", rasterized=True)
+    picture = ax.pcolormesh(
+        across, up, share, cmap=SHARE_COLOURS, vmin=0.0, vmax=1.0, shading="nearest", rasterized=True
+    )
     bar = ax.figure.colorbar(picture, ax=ax)
     bar.set_label("share of the arms that the gains hold")
     name_axes(those.fit.arm, ax, LABEL, "-")

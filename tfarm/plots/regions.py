@@ -21,7 +21,7 @@ from .style import BLUE, GREY, INK, ORANGE, headline, style, window
 from .words import LYAPUNOV, gains_words, name_axes
 
 SAND = "#f6dfcb"
-BLUES = ("#c9dcef", "#7fb0da", "#2f7cbc")  # lightest: most damping
+DAMPING_BLUES = ("#c9dcef", "#7fb0da", "#2f7cbc")  # lightest: most damping
 CONVENTION = "u = −{} dθ/dt − {} M;  a positive root moment M accelerates the hub".format(*PLANE)
 LABEL = "{name}, on the {output}  [{unit}]"
 
@@ -41,7 +41,7 @@ def overlay(continuous: Region, sampled: GainMap | Sequence[GainMap], *, ax: Axe
             return ax
         _scale(continuous, ax)
         keys: list[Artist] = [_fill(ax, continuous, SAND, ORANGE, "stable, continuous: every mode")]
-        colours = BLUES[1:2] if len(planes) == 1 else BLUES
+        colours = DAMPING_BLUES[1:2] if len(planes) == 1 else DAMPING_BLUES
         for plane, colour in zip(planes, colours, strict=True):
             keys.append(_fill(ax, plane, colour, BLUE, f"stable, sampled{sampled_label(continuous, plane)}"))
         if continuous.arm.is_uniform:  # of a rig the argument needs more: see `tfarm.loop.lyapunov`

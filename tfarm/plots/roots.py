@@ -12,25 +12,25 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from tfarm.digits import held, plain, significant
+from tfarm.digits import kept_digits, plain, significant
 from tfarm.loop.loci import GAPS_HELD, POLE_DIGITS, Loci, shown
 from tfarm.loop.locus import Locus, frame, rounded
 from tfarm.loop.reduced_locus import ReducedLocus
 from tfarm.loop.variation import OF_THE_LAW
 from tfarm.spectrum import modes
 
-from .labels import BESIDE, Label
-from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, Keys, New, alone, blank, headline, style, window
+from .labels import OFFSETS_BESIDE, Label
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, Keys, New, blank, headline, on_own_figure, style, window
 from .words import gains_words
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 ZOOMED = 4  # modes drawn on their own
-COLORS = (INK, BLUE, GREEN, PURPLE, "#7a5a00", GREY)  # by mode
-ROOM = 0.12  # around a branch, as a share of its extent
-OPEN: dict[str, Any] = {"ls": "none", "marker": "x", "ms": 6, "mew": 1.4}  # poles without the gain that varies
-FIRST: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 6, "mfc": "white", "mew": 1.2}  # with the first of it
+MODE_COLOURS = (INK, BLUE, GREEN, PURPLE, "#7a5a00", GREY)  # by mode
+ROOM_AROUND = 0.12  # around a branch, as a share of its extent
+CROSS_AT_ZERO: dict[str, Any] = {"ls": "none", "marker": "x", "ms": 6, "mew": 1.4}  # poles without what varies
+CIRCLE_AT_FIRST: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 6, "mfc": "white", "mew": 1.2}  # at the start
 QUARTERS = (0.25, 0.5, 0.75)  # of the way that the modes go, on average: where a value is marked along each branch
 
 
@@ -51,7 +51,7 @@ def locus(exact: Locus, *, reduced: ReducedLocus | None = None, ax: Axes | None 
 def draw_locus(exact: Locus, reduced: ReducedLocus | None = None, new: New = blank) -> Figure:
     """All branches in one panel, on a figure of its own."""
     title, fine = f"{exact.arm.name}: closed-loop poles as {_range(exact)}", rounded(exact)
-    return alone(lambda ax: _all(fine, exact, reduced, ax), (7.0, 5.6), title, _legend(fine, reduced), new)
+    return on_own_figure(lambda ax: _all(fine, exact, reduced, ax), (7.0, 5.6), title, _legend(fine, reduced), new)
 
 
 def _all(fine: Locus, exact: Locus, reduced: ReducedLocus | None, ax: Axes) -> None:
@@ -71,7 +71,7 @@ def zoomed(exact: Locus) -> list[int]:
 
 def color_of(exact: Locus, branch: int) -> str:
     """One colour a mode."""
-    return COLORS[int(exact.mode[branch]) % len(COLORS)]
+    return MODE_COLOURS[int(exact.mode[branch]) % len(MODE_COLOURS)]
 
 
 def draw_loci(data: Loci) -> Figure:
@@ -158,17 +158,17 @@ def _panel(
         if reduced is not None:
             _reduced_branch(exact, reduced, n, color, ax)
         (start,), dots = _at(fine, n, [begins]), _at(fine, n, others)
-        ax.plot(start.real, start.imag, color=color, zorder=4, **(OPEN if begins == 0 else FIRST))
+        ax.plot(start.real, start.imag, color=color, zorder=4, **(CROSS_AT_ZERO if begins == 0 else CIRCLE_AT_FIRST))
         ax.plot(dots.real, dots.imag, "o", color=color, ms=3.2, zorder=4)
     everything = len(numbers) == len(branches)
     for each in exact.crossings:
         if each.branch in numbers or (each.branch is None and everything):
-            omega = held([each.omega], POLE_DIGITS)[0]
+            omega = kept_digits([each.omega], POLE_DIGITS)[0]
             ax.plot([0], [omega], "D", ms=6, mfc=ORANGE, mec="white", mew=0.8, zorder=6)
             if each.branch not in named:
                 continue
             text = f"{exact.vary} = {plain(each.gain, 5)}\n{significant(each.omega, 4)} rad/s"
-            ax.add_artist(Label(text, [(0, omega)], BESIDE, fontsize=7.5))
+            ax.add_artist(Label(text, [(0, omega)], OFFSETS_BESIDE, fontsize=7.5))
 
 
 def _reduced_branch(exact: Locus, reduced: ReducedLocus, n: int, color: str, ax: Axes) -> None:
@@ -179,7 +179,7 @@ def _reduced_branch(exact: Locus, reduced: ReducedLocus, n: int, color: str, ax:
     curve, first = shown(reduced.branches[n][lives]), float(modes(exact.arm, 1).natural_frequency[-1])
     there = abs(exact.gain - reduced.gain[lives, None]).argmin(axis=1)  # the reduced one may have fewer values
     size = abs(shown(exact.branches[n, there]))
-    width = held(reduced.gap, GAPS_HELD)[n] * np.maximum(size, first)
+    width = kept_digits(reduced.gap, GAPS_HELD)[n] * np.maximum(size, first)
     along = np.gradient(curve)
     normal = 1j * along / np.where(along == 0, 1, abs(along))
     edge = np.r_[curve + width * normal, (curve - width * normal)[::-1]]
@@ -192,8 +192,8 @@ def _reduced_branch(exact: Locus, reduced: ReducedLocus, n: int, color: str, ax:
 def _frame(points: Complex, ax: Axes) -> None:
     """Limits with all of the branch, the axis and some room: nothing is cut off."""
     left, right, low, high = frame(points)
-    ax.set_xlim(left - ROOM * (right - left), right + 2 * ROOM * (right - left))
-    ax.set_ylim(low - ROOM * (high - low), high + ROOM * (high - low))
+    ax.set_xlim(left - ROOM_AROUND * (right - left), right + 2 * ROOM_AROUND * (right - left))
+    ax.set_ylim(low - ROOM_AROUND * (high - low), high + ROOM_AROUND * (high - low))
 
 
 def _legend(exact: Locus, reduced: ReducedLocus | None) -> Keys:
@@ -201,7 +201,8 @@ def _legend(exact: Locus, reduced: ReducedLocus | None) -> Keys:
     keys = {"exact": Line2D([], [], color=GREY, lw=2.6, alpha=0.4)}
     if reduced is not None:
         keys[f"python-control, order {reduced.order}"] = Line2D([], [], color=GREY, lw=0.9, ls=(0, (2, 1.5)))
-    keys[f"{exact.vary} = {plain(begins, 3)}"] = Line2D([], [], color=GREY, **(OPEN if begins == 0 else FIRST))
+    mark = CROSS_AT_ZERO if begins == 0 else CIRCLE_AT_FIRST
+    keys[f"{exact.vary} = {plain(begins, 3)}"] = Line2D([], [], color=GREY, **mark)
     keys[f"{exact.vary} = {', '.join(plain(value, 3) for value in others)}"] = Line2D(
         [], [], color=GREY, ls="none", marker="o", ms=3.2
     )

@@ -19,14 +19,14 @@ from tfarm.spectrum import Modes
 
 from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, New, blank, headline, style, window
 
-POINTS = 401
+SHAPE_POINTS = 401  # of a drawn mode: about one to a pixel of its picture
 ALONG, DISPLACEMENT = "distance from the hub, x [m]", "displacement w(x), largest = 1 [-]"
-HUB = 0.06  # width of the drawn hub, as a share of the length
+HUB_WIDTH = 0.06  # width of the drawn hub, as a share of the length
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 @record
-class Shape:
+class DrawnMode:
     """One mode as drawn: w(x) over its largest value, x and nodes in m."""
 
     number: int
@@ -37,16 +37,16 @@ class Shape:
     has_payload: bool
 
 
-def shapes_of(found: Modes, count: int) -> tuple[Shape, ...]:
+def shapes_of(found: Modes, count: int) -> tuple[DrawnMode, ...]:
     """The first flexible modes, each scaled to a largest displacement of one, the tip's side positive."""
-    x = np.linspace(0.0, found.arm.length, POINTS)
+    x = np.linspace(0.0, found.arm.length, SHAPE_POINTS)
     payload = found.arm.payload
     shapes = []
     for i, w in enumerate(found.shape(x)):
         if found.index[i] == 0 or found.index[i] > count:
             continue
         largest = float(abs(w).max())
-        shape = Shape(
+        shape = DrawnMode(
             number=int(found.index[i]),
             natural_frequency=float(found.natural_frequency[i]),
             x=x,
@@ -76,7 +76,7 @@ def modes(found: Modes, *, ax: Sequence[Axes] | None = None) -> tuple[Axes, ...]
     return each
 
 
-def draw_shapes(name: str, shapes: tuple[Shape, ...], new: New = blank) -> Figure:
+def draw_shapes(name: str, shapes: tuple[DrawnMode, ...], new: New = blank) -> Figure:
     """Small pictures, two in a row, one a mode."""
     with style():
         rows = math.ceil(len(shapes) / 2)
@@ -94,35 +94,29 @@ def draw_shapes(name: str, shapes: tuple[Shape, ...], new: New = blank) -> Figur
     return figure
 
 
-def draw_shape(shape: Shape, *, ax: Axes) -> None:
+def draw_shape(shape: DrawnMode, *, ax: Axes) -> None:
     """One mode: its line, the arm at rest, hub, payload, and the nodes with their places."""
     length = float(shape.x[-1])
     ax.axhline(0.0, color=GREY, lw=0.8)
     ax.plot(shape.x, shape.w, color=BLUE, lw=1.8)
-    ax.add_patch(Rectangle((-HUB * length, -0.25), HUB * length, 0.5, fc=GREY, ec="none", zorder=3))
+    ax.add_patch(Rectangle((-HUB_WIDTH * length, -0.25), HUB_WIDTH * length, 0.5, fc=GREY, ec="none", zorder=3))
     if shape.has_payload:
         ax.plot(length, shape.w[-1], "s", ms=8.0, mfc=GREY, mec="none", zorder=3)
     ax.plot(shape.nodes, np.zeros(len(shape.nodes)), "o", ms=5.5, mfc="white", mec=ORANGE, mew=1.3, zorder=4)
-    _place_names(shape, ax)
-    ax.set_xlim(-0.085 * length, 1.11 * length)
-    ax.set_ylim(-1.28, 1.28)
-    ax.set_yticks([-1, 0, 1])
-    w = significant(shape.natural_frequency, 7)
-    f = significant(shape.natural_frequency / (2 * math.pi), 7)
-    ax.set_title(f"Mode {shape.number}:  {w} rad/s  ({f} Hz)", fontsize=9.5)
-
-
-def _place_names(shape: Shape, ax: Axes) -> None:
-    """Where each node is [m]: at its right, on the side of the line that the curve leaves free."""
-    length = float(shape.x[-1])
     decimals = max(0, 3 - round(math.log10(length)))
-    for node in shape.nodes:
+    for node in shape.nodes:  # its place [m] at its right, on the side of the line that the curve leaves free
         slope = np.interp(node + 0.01 * length, shape.x, shape.w) - np.interp(node - 0.01 * length, shape.x, shape.w)
         if round(float(node), decimals) > 0:
             ax.annotate(
                 f"{node:.{decimals}f}", (node, 0.0), textcoords="offset points",
                 xytext=(4, -6 if slope > 0 else 6), va="top" if slope > 0 else "bottom", fontsize=7.5, color=ORANGE,
             )  # fmt: skip
+    ax.set_xlim(-0.085 * length, 1.11 * length)
+    ax.set_ylim(-1.28, 1.28)
+    ax.set_yticks([-1, 0, 1])
+    w = significant(shape.natural_frequency, 7)
+    f = significant(shape.natural_frequency / (2 * math.pi), 7)
+    ax.set_title(f"Mode {shape.number}:  {w} rad/s  ({f} Hz)", fontsize=9.5)
 
 
 def draw_differences(name: str, differences: Mapping[str, Real]) -> Figure:

@@ -14,10 +14,10 @@ from tfarm.digits import plain, unit
 
 from .style import BLUE, FAINT, GREY, INK, ORANGE, New, blank, style, window
 
-HUB = 0.055  # radius of the drawn hub, and half the payload's side, as shares of the length
-SEGMENTS = ("#cfe0ee", "#e3ecd5")  # colours of neighbours
-LOW, HIGH = -0.15, 0.16  # what is shown below and above the arm at least, as shares of its length
-LEFT, RIGHT = -0.2, 1.2
+HUB_RADIUS = 0.055  # radius of the drawn hub, and half the payload's side, as shares of the length
+SEGMENT_COLOURS = ("#cfe0ee", "#e3ecd5")  # colours of neighbours
+SHOWN_BELOW, SHOWN_ABOVE = -0.15, 0.16  # what is shown below and above the arm at least, as shares of its length
+SHOWN_LEFT, SHOWN_RIGHT = -0.2, 1.2  # and left of the hub and right of it, with room for the words at the tip
 
 
 def sketch(arm: Arm, *, ax: Axes | None = None) -> Axes:
@@ -27,7 +27,7 @@ def sketch(arm: Arm, *, ax: Axes | None = None) -> Axes:
             return draw_arm(arm, window).axes[0]
         ax.set_aspect("equal")
         ax.set_axis_off()
-        ax.set_xlim(LEFT, right_of(arm))
+        ax.set_xlim(SHOWN_LEFT, right_of(arm))
         ax.set_ylim(*heights(arm))
         _link(arm, ax)
         _hub(arm, ax)
@@ -39,20 +39,20 @@ def draw_arm(arm: Arm, new: New = blank) -> Figure:
     """The arm on a figure of its own, as high as it takes."""
     low, high = heights(arm)
     with style():
-        figure = new(9.0, 0.2 + 9.0 * (high - low) / (right_of(arm) - LEFT))
+        figure = new(9.0, 0.2 + 9.0 * (high - low) / (right_of(arm) - SHOWN_LEFT))
         sketch(arm, ax=figure.subplots())
     return figure
 
 
 def right_of(arm: Arm) -> float:
     """Where the picture ends, in lengths of the link: so far beyond the tip, or beyond a payload's centre."""
-    return RIGHT + arm.hub.radius / arm.length + max(0.0, arm.payload.offset) / arm.length
+    return SHOWN_RIGHT + arm.hub.radius / arm.length + max(0.0, arm.payload.offset) / arm.length
 
 
 def heights(arm: Arm) -> tuple[float, float]:
     """What is shown below and above the arm, as shares of its length."""
     half = depth_of(arm) / 2
-    return min(LOW, -half - 0.09), max(HIGH, half + 0.09)
+    return min(SHOWN_BELOW, -half - 0.09), max(SHOWN_ABOVE, half + 0.09)
 
 
 def depth_of(arm: Arm) -> float:
@@ -71,7 +71,7 @@ def _link(arm: Arm, ax: Axes) -> None:
     depth = depth_of(arm)
     ax.plot([-0.2, right_of(arm)], [0, 0], color=FAINT, lw=0.8, ls=(0, (6, 3, 1, 3)), zorder=0)
     root = start = arm.hub.radius / arm.length
-    for link, colour in zip(arm.links, cycle(SEGMENTS), strict=False):
+    for link, colour in zip(arm.links, cycle(SEGMENT_COLOURS), strict=False):
         share, high = (link.length / arm.length if arm.outer else 1.0), _depth(link) / arm.length
         ax.add_patch(Rectangle((start, -high / 2), share, high, fc=colour, ec=BLUE, lw=1.0, zorder=2))
         start += share
@@ -81,24 +81,19 @@ def _link(arm: Arm, ax: Axes) -> None:
         ax.plot([root], [0], "o", ms=7.0, mfc="white", mec=ORANGE, mew=1.4, zorder=5)
     for each in arm.attachments:
         ax.plot([root + each.x / arm.length], [0], "o", ms=5.0, color=INK, zorder=5)
-    below = -max(depth / 2, HUB) - 0.035
+    below = -max(depth / 2, HUB_RADIUS) - 0.035
     ax.annotate("", (root, below), (root + 1, below), arrowprops={"arrowstyle": "<->", "color": GREY, "lw": 0.8})
-    text = f"L = {plain(arm.length, 6)} m,  {_depths(arm)} (to scale)"
+    deepest = plain(depth * arm.length, 4)
+    depths = f"{len(arm.links)} segments, at most {deepest} m deep" if arm.outer else f"depth {deepest} m"
+    text = f"L = {plain(arm.length, 6)} m,  {depths} (to scale)"
     if root:
         text += f",  r = {plain(arm.hub.radius, 6)} m"
     ax.text(root + 0.5, below - 0.012, text, ha="center", va="top", fontsize=9.0, color=INK)
 
 
-def _depths(arm: Arm) -> str:
-    """The depth of the link, or how many segments it has."""
-    if not arm.outer:
-        return f"depth {plain(depth_of(arm) * arm.length, 4)} m"
-    return f"{len(arm.links)} segments, at most {plain(depth_of(arm) * arm.length, 4)} m deep"
-
-
 def _hub(arm: Arm, ax: Axes) -> None:
     inertia = arm.hub.inertia
-    ax.add_patch(Circle((0, 0), HUB, fc="white" if inertia == 0 else "#e9e9e9", ec=INK, lw=1.2, zorder=3))
+    ax.add_patch(Circle((0, 0), HUB_RADIUS, fc="white" if inertia == 0 else "#e9e9e9", ec=INK, lw=1.2, zorder=3))
     ax.plot(0, 0, "o", ms=3.5, color=INK, zorder=4)
     if arm.is_locked:
         text = "hub locked: driven by its angle"
@@ -124,7 +119,7 @@ def _payload(arm: Arm, ax: Axes) -> None:
             "tip cannot rotate" if math.isinf(inertia) else f"$I_c$ = {plain(inertia, 6)} {unit('kg m^2')}",
         )
         text = "payload  " + ",  ".join(words)
-        side = max(0.03, min(HUB, depth_of(arm) * 0.75))
+        side = max(0.03, min(HUB_RADIUS, depth_of(arm) * 0.75))
         tip = 1 + arm.hub.radius / arm.length
         at = tip + arm.payload.offset / arm.length
         if at != tip:

@@ -9,18 +9,18 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from tfarm.digits import counted, plain, significant
+from tfarm.digits import how_many, plain, significant
 from tfarm.dsp.curves import Curve, continuous, root_moment
 from tfarm.dsp.strip_chart import StripChart
 
-from .labels import FURTHER, Label
+from .labels import OFFSETS_FURTHER, Label
 from .motion import draw_curve, motor_words
 from .style import BLUE, FAINT, GREEN, GREY, INK, ORANGE, blank, headline, style
 
 Real = NDArray[np.float64]
 
-CLOSE = 14  # samples in the close-up
-MOST_LEVELS = 60  # of the ADC that are drawn: more would be a grey wall
+CLOSE_UP_SAMPLES = 14  # in which single steps of the ADC and the delay are seen
+MOST_ADC_LEVELS = 60  # of the ADC that are drawn: more would be a grey wall
 SATURATED = "#f6d9c2"
 
 
@@ -32,8 +32,8 @@ def draw_strip_chart(data: StripChart) -> Figure:
         window = close_up(data)
         for column, span in enumerate(((0.0, float(data.simulation.t[-1])), window)):
             is_close = column == 1
-            moment(data, is_close, ax=axes[0, column])
-            torque(data, is_close, ax=axes[1, column])
+            moment_strip(data, is_close, ax=axes[0, column])
+            torque_strip(data, is_close, ax=axes[1, column])
             axes[1, column].set_xlim(*span)
             axes[1, column].set_xlabel("time  [s]")
         _limits(data, window, axes[0, 1], axes[1, 1])
@@ -43,24 +43,21 @@ def draw_strip_chart(data: StripChart) -> Figure:
         axes[1, 0].set_ylabel(motor_words(data.arm.input_unit))
         axes[0, 1].set_title("close-up of the grey strip", fontsize=9.5)
         figure.legend(loc="outside lower left", ncols=3)
-        headline(figure, f"{data.arm.name}: the slew through {_chain_words(data)}")
+        bits, late = data.simulation.chain.converters.moment_bits, data.simulation.chain.sampling.delay_samples
+        most = f"{plain(data.limit, 3)} {data.arm.input_unit}"
+        chain = f"{bits} bits of ADC, {how_many(late, 'sample')} late, at most {most}"
+        headline(figure, f"{data.arm.name}: the slew through {chain}")
     return figure
-
-
-def _chain_words(data: StripChart) -> str:
-    c, delay = data.simulation.chain.converters, data.simulation.chain.sampling.delay_samples
-    most = f"{plain(data.limit, 3)} {data.arm.input_unit}"
-    return f"{c.moment_bits} bits of ADC, {counted(delay, 'sample')} late, at most {most}"
 
 
 def close_up(data: StripChart) -> tuple[float, float]:
     """A few samples at the end of the slew, where the torque leaves its limit."""
     T = data.simulation.scenario.period
     end = min(data.simulation.scenario.busy_until, float(data.simulation.t[-1]))
-    return end - 5 * T, end + (CLOSE - 5) * T
+    return end - 5 * T, end + (CLOSE_UP_SAMPLES - 5) * T
 
 
-def moment(data: StripChart, is_close: bool, *, ax: Axes) -> None:
+def moment_strip(data: StripChart, is_close: bool, *, ax: Axes) -> None:
     """What the arm has, and what the ADC makes of it."""
     s, step = data.simulation, significant(data.step, 3)
     hidden = "" if is_close else "_"
@@ -74,12 +71,13 @@ def moment(data: StripChart, is_close: bool, *, ax: Axes) -> None:
     ax.axhline(0.0, color=GREY, lw=0.6)
 
 
-def torque(data: StripChart, is_close: bool, *, ax: Axes) -> None:
+def torque_strip(data: StripChart, is_close: bool, *, ax: Axes) -> None:
     """What the controller asks at a sample, and what the motor gives later, at most its limit."""
     s, late = data.simulation, data.simulation.chain.sampling.delay_samples * data.simulation.scenario.period
     hidden = "" if is_close else "_"
-    for first, last in _runs(data.saturated):
-        ax.axvspan(s.t[first] + late, s.t[last] + late + s.scenario.period, color=SATURATED, lw=0)
+    turns = np.diff(np.r_[0, data.saturated.astype(int), 0])  # 1 where the motor comes to its limit, -1 after
+    for first, stop in zip(np.flatnonzero(turns == 1), np.flatnonzero(turns == -1), strict=True):
+        ax.axvspan(s.t[first] + late, s.t[stop - 1] + late + s.scenario.period, color=SATURATED, lw=0)
     ax.fill_between([], [], color=SATURATED, label=hidden + "saturated")
     ax.step(
         s.t, data.asked, where="post", color=GREY, lw=1.0, ls=(0, (4, 2)) if not is_close else "none",
@@ -95,13 +93,7 @@ def torque(data: StripChart, is_close: bool, *, ax: Axes) -> None:
             "", (s.t[k] + late, s.torque[k]), (s.t[k], s.torque[k]), zorder=6,
             arrowprops={"arrowstyle": "->", "color": INK, "lw": 1.2, "shrinkA": 0, "shrinkB": 0},
         )  # fmt: skip
-        ax.add_artist(Label("delay", [(s.t[k] + late / 2, float(s.torque[k]))], FURTHER, fontsize=10.0))
-
-
-def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First and last index of each run of True."""
-    edges = np.diff(np.r_[0, flags.astype(int), 0])
-    return list(zip(np.nonzero(edges == 1)[0].tolist(), (np.nonzero(edges == -1)[0] - 1).tolist(), strict=True))
+        ax.add_artist(Label("delay", [(s.t[k] + late / 2, float(s.torque[k]))], OFFSETS_FURTHER, fontsize=10.0))
 
 
 def _limits(data: StripChart, window: tuple[float, float], upper: Axes, lower: Axes) -> None:
@@ -111,7 +103,7 @@ def _limits(data: StripChart, window: tuple[float, float], upper: Axes, lower: A
     seen = y[(t >= window[0]) & (t <= window[1])]
     _fit(upper, seen)
     low, high = (math.floor(y / data.step) for y in upper.get_ylim())
-    for level in range(low + 1, high + 1) if high - low <= MOST_LEVELS else ():
+    for level in range(low + 1, high + 1) if high - low <= MOST_ADC_LEVELS else ():
         upper.axhline(level * data.step, color=FAINT, lw=0.7, zorder=0.8)
     upper.grid(False)
     at = (s.t >= window[0] - 2 * s.scenario.period) & (s.t <= window[1])

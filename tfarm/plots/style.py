@@ -53,7 +53,7 @@ STYLE = {
     "path.simplify": True,  # where a line strays less than a ninth of a pixel
 }
 
-WIDEST = 0.95  # of a figure's width: letters are a little wider or narrower in a file of other dots an inch
+WIDEST_LEGEND = 0.95  # of a figure's width: letters are a little wider or narrower in a file of other dots an inch
 Keys = tuple[list[Line2D], list[str]]  # of a legend
 New = Callable[[float, float], Figure]  # how a figure of that width and height [inches] is made
 
@@ -80,7 +80,7 @@ def window(width: float, height: float) -> Figure:
     return pyplot.figure(figsize=(width, height), layout="constrained")
 
 
-def alone(
+def on_own_figure(
     draw: Callable[[Axes], object], size: tuple[float, float], title: str, keys: Keys | None = None, new: New = blank
 ) -> Figure:
     """A picture in a figure of its own, of that size [inches], its axes the first; a legend of `keys` or labels."""
@@ -93,14 +93,14 @@ def alone(
     return figure
 
 
-def legend_below(figure: Figure, columns: int = 3) -> None:
-    """A legend of all labels below the axes, in as many columns, up to that number, as fit into the figure."""
-    for number in range(columns, 0, -1):
+def legend_below(figure: Figure) -> None:
+    """A legend of all labels below the axes, in as many columns, up to three, as fit into the figure."""
+    for number in (3, 2, 1):
         legend = figure.legend(
             loc="outside lower left", ncols=number, fontsize=8.2, handlelength=1.8, columnspacing=1.2
         )
         width = legend.get_window_extent(figure.canvas.get_renderer()).width  # type: ignore[attr-defined]
-        if number == 1 or width < WIDEST * figure.bbox.width:
+        if number == 1 or width < WIDEST_LEGEND * figure.bbox.width:
             return
         legend.remove()
 
@@ -123,10 +123,3 @@ def headline(figure: Figure, text: str) -> None:
 def safe(text: str) -> str:
     """A name that a person gave as a picture shows it: a dollar begins no formula."""
     return text.replace("$", r"\$")
-
-
-def figure_of(ax: Axes) -> Figure:
-    """The figure that an axes belongs to."""
-    figure = ax.get_figure()
-    assert isinstance(figure, Figure)
-    return figure

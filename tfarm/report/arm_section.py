@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import tfarm
 from tfarm.arm import Arm, implausible, input_words
 from tfarm.columns import Column, Table
 from tfarm.digits import plain, significant, singly, unit
 from tfarm.plots.sketch import draw_arm
-from tfarm.report.rig_tables import Row, derived_rows, given_rows
-from tfarm.report.sections import Fact, Picture, Section
+from tfarm.report.rig_tables import QuantityRow, derived_rows, given_rows
+from tfarm.report.sections import Fact, PageSection, Picture
 
-FIRST = 3  # natural frequencies among the headline numbers
+HEADLINE_MODES = 3  # natural frequencies among the headline numbers: what a model for control has
 MOST_POISSON = 0.5  # of an isotropic material; a larger E/2G - 1 is none's ratio
 BELOW_CUTOFF = "Below the shear cut-off one pair of the beam's waves decays along it, above it both pairs travel."
-GIVEN = (
+GIVEN_CAPTION = (
     "What the arm's file says, in SI units. An infinite hub inertia locks the hub, an infinite payload mass pins "
     "the tip, an infinite payload inertia keeps it from rotating."
 )
-RIG_GIVEN = (
+RIG_GIVEN_CAPTION = (
     "What the rig's file says, in SI units, from the hub outwards; parts that are not listed are not there: a clamp or "
     "joint is rigid then, the radius 0, the payload's centre at the tip."
 )
@@ -28,7 +27,7 @@ PARTS = (
     " So are the radius from the axis to the clamp and the payload's centre beyond the tip; dots are attachments, a "
     "ring is a clamp that yields."
 )
-THEORIES = {
+THEORY_WORDS = {
     "timoshenko": "Timoshenko's, with shear and rotary inertia",
     "shear": "the shear theory, without rotary inertia",
     "rayleigh": "Rayleigh's, without shear",
@@ -36,64 +35,46 @@ THEORIES = {
 }
 
 
-def arm_section(arm: Arm) -> Section:
-    """The first part of every page, with a sentence on values that look like a slip of units."""
+def arm_section(arm: Arm) -> PageSection:
+    """The first part of every page: slips of units, of a rig by which theory and through what its loops close."""
     odd = "; and on ".join(implausible(arm))
     words = [f"Check the units: every number on this page rests on {odd}."] * bool(odd)
-    return Section(
+    if not arm.is_uniform:
+        driven = "It is led through the hub's angle" if arm.is_locked else f"Its input is {input_words(arm)}"
+        theory = THEORY_WORDS[arm.theory]
+        words.append(f"The theory of its link is {theory}. {driven}; all loops on this page close through that.")
+    return PageSection(
         anchor="arm",
         title="The arm",
         facts=headline_numbers(arm),
-        words=words + _rig_words(arm) + ["This arm states no assumptions."] * (not arm.assumptions),
+        words=words + ["This arm states no assumptions."] * (not arm.assumptions),
         items=arm.assumptions,
         blocks=(_picture(arm), given_table(arm), derived_table(arm)),
     )
 
 
-def _rig_words(arm: Arm) -> list[str]:
-    """Of a rig: by which theory, and through what its loops close."""
-    if arm.is_uniform:
-        return []
-    driven = "It is led through the hub's angle" if arm.is_locked else f"Its input is {input_words(arm)}"
-    return [f"The theory of its link is {THEORIES[arm.theory]}. {driven}; all loops on this page close through that."]
-
-
 def headline_numbers(arm: Arm) -> tuple[Fact, ...]:
     """First natural frequencies (at C = 0), total inertia, slenderness, shear cut-off, damping."""
-    modes = tfarm.modes(arm, count=FIRST)
-    frequencies = tuple(
-        Fact(
-            label=f"natural frequency {number}",
-            value=significant(omega, 8),
-            unit="rad/s",
-            beside=f"{significant(omega / (2 * math.pi), 8)} Hz",
-        )
-        for number, omega in zip(modes.index, modes.natural_frequency, strict=True)
-        if number > 0
-    )
-    return *frequencies, *_other_numbers(arm)
-
-
-def _other_numbers(arm: Arm) -> Iterator[Fact]:
-    cutoff, C = arm.shear_cutoff, arm.damping
+    modes = tfarm.modes(arm, count=HEADLINE_MODES)
+    flexible = (pair for pair in zip(modes.index, modes.natural_frequency, strict=True) if pair[0] > 0)
+    frequencies = [(f"natural frequency {number}", omega, 8) for number, omega in flexible]
+    inertia, cutoff, C = significant(arm.total_inertia, 8), arm.shear_cutoff, arm.damping
     how = "" if arm.has_rigid_mode else "the arm cannot turn as a rigid body"
-    mass, link = arm.own_mass, arm.link
-    slenderness = link.slenderness if arm.is_uniform else arm.length / link.section.radius_of_gyration
-    yield Fact(label="total inertia J about the hub", value=significant(arm.total_inertia, 8), unit="kg m²", beside=how)
-    yield Fact(
-        label="slenderness L/√(I/A)",
-        value=significant(slenderness, 5),
-        beside=f"depth/length {significant(math.sqrt(12) / slenderness, 3)} as a rectangle",
-    )
-    yield Fact(
-        label="shear cut-off √(κGA/ρI)",
-        value=significant(cutoff, 8),
-        unit="rad/s",
-        beside=f"{significant(cutoff / (2 * math.pi), 6)} Hz",
-    )
-    yield Fact(label="mass of the link", value=significant(mass, 5), unit="kg")
+    slenderness = arm.link.slenderness if arm.is_uniform else arm.length / arm.link.section.radius_of_gyration
+    depth = f"depth/length {significant(math.sqrt(12) / slenderness, 3)} as a rectangle"
     lossless = "none: resonances are infinite" if arm.is_undamped else "none in the link: hub, clamp or joint lose"
-    yield Fact(label="damping C", value=plain(C), unit="s", beside="" if C else lossless)
+    *first, above = (
+        Fact(label=label, value=significant(w, 8), unit="rad/s", beside=f"{significant(w / (2 * math.pi), digits)} Hz")
+        for label, w, digits in (*frequencies, ("shear cut-off √(κGA/ρI)", cutoff, 6))
+    )
+    return (
+        *first,
+        Fact(label="total inertia J about the hub", value=inertia, unit="kg m²", beside=how),
+        Fact(label="slenderness L/√(I/A)", value=significant(slenderness, 5), beside=depth),
+        above,
+        Fact(label="mass of the link", value=significant(arm.own_mass, 5), unit="kg"),
+        Fact(label="damping C", value=plain(C), unit="s", beside="" if C else lossless),
+    )
 
 
 def _picture(arm: Arm) -> Picture:
@@ -123,7 +104,7 @@ def _drive(arm: Arm) -> str:
 
 def given_table(arm: Arm) -> Table:
     """The arm's file as a table."""
-    return _table("parameters", "Parameters", GIVEN if arm.is_uniform else RIG_GIVEN, given_rows(arm))
+    return _table("parameters", "Parameters", GIVEN_CAPTION if arm.is_uniform else RIG_GIVEN_CAPTION, given_rows(arm))
 
 
 def derived_table(arm: Arm) -> Table:
@@ -133,7 +114,7 @@ def derived_table(arm: Arm) -> Table:
     link, J = arm.link, arm.total_inertia
     ratio = ("Poisson's ratio of an isotropic material", "E/2G − 1", link.poissons_ratio, "")
     isotropic = [ratio] if -1 < link.poissons_ratio <= MOST_POISSON else []
-    rows: list[Row] = [
+    rows: list[QuantityRow] = [
         ("mass of the link", "ρAL", link.rhoA * link.length, "kg"),
         ("bending stiffness", "EI", link.EI, "N m^2"),
         ("shear stiffness", "κGA", link.kGA, "N"),
@@ -146,16 +127,10 @@ def derived_table(arm: Arm) -> Table:
     ]
     if arm.has_rigid_mode and not arm.is_locked:
         rows.insert(7, ("root moment per torque at rest", "−(J − I_h)/J", -(J - arm.hub.inertia) / J, "N m/(N m)"))
-    return _table(
-        "derived",
-        "What follows from them",
-        BELOW_CUTOFF,
-        rows,
-        digits=8,
-    )
+    return _table("derived", "What follows from them", BELOW_CUTOFF, rows, digits=8)
 
 
-def _table(stem: str, title: str, caption: str, rows: list[Row], digits: int = 10) -> Table:
+def _table(stem: str, title: str, caption: str, rows: list[QuantityRow], digits: int = 10) -> Table:
     quantity, symbol, value, units = zip(*rows, strict=True)
     return Table(
         stem=stem,

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from tfarm.audit.assumptions import HubStudy, SectionStudy, hub_study, section_study
+from tfarm.audit.candidates import Study
 from tfarm.columns import Column, Table
 from tfarm.digits import plain, significant
-from tfarm.plots.assumptions import COLORS, Study, draw_over
+from tfarm.plots.assumptions import CURVE_COLOURS, draw_over
 from tfarm.report.sections import Picture
 from tfarm.response.frequency import Real
 
-POINTS = 49  # of each curve
+CURVE_POINTS = 49  # of each curve: joined by lines they bend nowhere, on two logarithmic axes
 
 SECTION_PICTURE = (
     "First natural frequencies over the depth of a rectangle of this area, exact (C = 0), both axes logarithmic. The "
@@ -35,7 +36,7 @@ def section_picture(study: SectionStudy) -> Picture:
         stem="assumptions-depth",
         title="Natural frequencies over the depth of the section",
         caption=SECTION_PICTURE.format(equivalent=equivalent),
-        alt=f"Natural frequencies 1 to {len(COLORS)} over depth, {_way(curve)}; {words}",
+        alt=f"Natural frequencies 1 to {len(CURVE_COLOURS)} over depth, {_way(curve)}; {words}",
         figure=draw_over(curve, curve.depth, study, study.depth, "depth of the rectangle, in the plane of bending [m]"),
         data=_data("assumptions-depth-data", Column("depth_m", "depth", "m", of=curve.depth), curve),
     )
@@ -49,7 +50,7 @@ def hub_picture(study: HubStudy) -> Picture:
         stem="assumptions-inertia",
         title="Natural frequencies over the hub inertia",
         caption=HUB_PICTURE,
-        alt=f"Natural frequencies 1 to {len(COLORS)} over hub inertia, {_way(curve)}; {words}",
+        alt=f"Natural frequencies 1 to {len(CURVE_COLOURS)} over hub inertia, {_way(curve)}; {words}",
         figure=draw_over(curve, curve.hub_inertia, study, study.hub_inertia, "hub inertia [kg m²]"),
         data=_data("assumptions-inertia-data", inertia, curve),
     )
@@ -63,7 +64,7 @@ def _way(curve: Study) -> str:
 
 def _between(values: Real) -> list[float]:
     """The range of the candidates, evenly on a logarithmic axis."""
-    return [float(x) for x in np.geomspace(values.min(), values.max(), POINTS)]
+    return [float(x) for x in np.geomspace(values.min(), values.max(), CURVE_POINTS)]
 
 
 def _ends_in_words(study: Study, values: Real, of: str) -> str:

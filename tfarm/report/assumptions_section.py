@@ -12,16 +12,15 @@ from tfarm.audit.assumptions import (
     hub_study,
     section_study,
 )
-from tfarm.audit.candidates import candidates
+from tfarm.audit.candidates import Study, candidates
 from tfarm.columns import Column, Table
 from tfarm.digits import fixed, plain, significant
-from tfarm.plots.assumptions import Study
 from tfarm.report.assumptions_pictures import hub_picture, section_picture
 from tfarm.report.paper import is_from_paper
-from tfarm.report.sections import Picture, Section
+from tfarm.report.sections import PageSection, Picture
 from tfarm.response.frequency import Real
 
-FROM_PAPER = (
+PAPER_LEAVES_OPEN = (
     "The paper prints the area of the section, but neither its second moment I nor the hub inertia I_h. Every "
     "frequency in rad/s on this page rests on {assumed}: here is what other values would do."
 )
@@ -51,50 +50,39 @@ HUB_TABLE = (
     "The shaded row is this arm. Sensitivity: per cent of natural frequency for one per cent more of I_h, all else "
     "held, exact. The closer to zero, the less that frequency depends on the hub.{searched}"
 )
-SEARCHED = " *: no limit was found up to there; the search ends."
+SEARCH_ENDS = " *: no limit was found up to there; the search ends."
 
 
-def assumptions_section(arm: Arm) -> Section:
+def assumptions_section(arm: Arm) -> PageSection:
     """Frequencies over depth and over hub inertia, with sensitivities, each as a picture and as a table."""
+    title = "What the assumptions do"
     if not arm.is_uniform:
-        return Section(anchor="assumptions", title="What the assumptions do", words=(OF_ONE_BEAM,))
+        return PageSection(anchor="assumptions", title=title, words=(OF_ONE_BEAM,))
     section = section_study(arm)
-    words = [_opening(arm), _section_words(section)]
+    area, slope = plain(arm.link.section.area, 4), fixed(2 * section.sensitivity[section.is_own][0, :1], 3)[0]
+    words = [opening(arm), SECTION_WORDS.format(area=area, slope=slope, **_ends(section.depth, section))]
     blocks: list[Picture | Table] = [section_picture(section), section_table(section)]
     if has_hub_inertia(arm):
         hub = hub_study(arm)
-        words.append(_hub_words(hub))
+        limits = {"locked": significant(float(hub.locked[0]), 5), "pinned": significant(float(hub.pinned[0]), 5)}
+        slope = fixed(hub.sensitivity[hub.is_own][0, :1], 3)[0]
+        words.append(HUB_WORDS.format(slope=slope, **limits, **_ends(hub.hub_inertia, hub)))
         blocks += [hub_picture(hub), hub_table(hub)]
     else:
-        words.append(NO_HUB.format(what=_held_hub(arm)))
-    return Section(anchor="assumptions", title="What the assumptions do", words=words, blocks=blocks)
+        words.append(NO_HUB.format(what="locked" if arm.is_locked else "a free pin"))
+    return PageSection(anchor="assumptions", title=title, words=words, blocks=blocks)
 
 
 # ------------------------------------------------------------ words
 
 
-def _opening(arm: Arm) -> str:
+def opening(arm: Arm) -> str:
     """What was assumed, or what is asked."""
     if not is_from_paper(arm):
         return NOT_FROM_PAPER.format(hub=", and another hub" * has_hub_inertia(arm))
-    one = ONE_ASSUMED.format(what=_held_hub(arm))
-    return FROM_PAPER.format(assumed=TWO_ASSUMED if has_hub_inertia(arm) else one)
-
-
-def _held_hub(arm: Arm) -> str:
-    return "locked" if arm.is_locked else "a free pin"
-
-
-def _section_words(study: SectionStudy) -> str:
-    slope = fixed(2 * study.sensitivity[study.is_own][0, :1], 3)[0]
-    area = plain(study.arm.link.section.area, 4)
-    return SECTION_WORDS.format(area=area, slope=slope, **_ends(study.depth, study))
-
-
-def _hub_words(study: HubStudy) -> str:
-    slope = fixed(study.sensitivity[study.is_own][0, :1], 3)[0]
-    limits = {"locked": significant(float(study.locked[0]), 5), "pinned": significant(float(study.pinned[0]), 5)}
-    return HUB_WORDS.format(slope=slope, **limits, **_ends(study.hub_inertia, study))
+    if has_hub_inertia(arm):
+        return PAPER_LEAVES_OPEN.format(assumed=TWO_ASSUMED)
+    return PAPER_LEAVES_OPEN.format(assumed=ONE_ASSUMED.format(what="locked" if arm.is_locked else "a free pin"))
 
 
 def _ends(values: Real, study: Study) -> dict[str, str]:
@@ -129,4 +117,4 @@ def _table(stem: str, title: str, caption: str, study: Study) -> Table:
 
 def searched_words(edges: Column) -> str:
     """What a star means, where there is one."""
-    return SEARCHED if any("*" in cell for cell in edges.cells) else ""
+    return SEARCH_ENDS if any("*" in cell for cell in edges.cells) else ""

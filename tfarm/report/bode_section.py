@@ -8,38 +8,40 @@ import numpy as np
 
 from tfarm.arm import Arm
 from tfarm.columns import Column, Table
-from tfarm.digits import counted, lined, plain, scientific, significant, singly, unit
+from tfarm.digits import how_many, lined, plain, scientific, significant, singly, unit
 from tfarm.plots.frequency import draw_bode
-from tfarm.report.sections import Picture, Section
+from tfarm.report.sections import PageSection, Picture
 from tfarm.response.frequency import AXIS_SHARE, Bode, bode
 
-ROOTS = (
+ROOTS_CAPTION = (
     "Those below the real axis are their mirror images. A damping ratio of 100 % is a real root in the left "
     "half-plane, −100 % one in the right. Magnitude: at s = i Im s (real roots: at s = i |s|)."
 )
 
 
-def bode_section(arm: Arm, output: str) -> Section:
+def bode_section(arm: Arm, output: str) -> PageSection:
     """One output: picture, what it means, poles and zeros."""
     data = bode(arm, output)
     anchor, title = f"bode-{output.replace('_', '-')}", f"From {data.input_label} to {data.label}"
     if data.is_zero:
         words = (f"The {data.label} is zero at every frequency: this arm's tip is pinned.",)
-        return Section(anchor=anchor, title=title, words=words)
+        return PageSection(anchor=anchor, title=title, words=words)
     picture = Picture(
         stem=anchor,
         title=f"{data.input_label} to {data.label}: magnitude and phase".capitalize(),
         caption=f"{what_is_seen(data)} {what_it_means(data)}",
         alt=alt_text(data),
         figure=draw_bode(data),
-        data=response_table(data, f"{anchor}-data"),
+        data=bode_data(data, f"{anchor}-data"),
     )
     if not data.poles.size and not data.zeros.size:
-        return Section(anchor=anchor, title=title, words=(f"{completeness(data)} There are none.",), blocks=(picture,))
-    return Section(anchor=anchor, title=title, blocks=(picture, roots_table(data, f"{anchor}-roots")))
+        return PageSection(
+            anchor=anchor, title=title, words=(f"{completeness(data)} There are none.",), blocks=(picture,)
+        )
+    return PageSection(anchor=anchor, title=title, blocks=(picture, roots_table(data, f"{anchor}-roots")))
 
 
-ROUNDED = 1e-13  # of |s|: what rounding leaves of Re s where a zero of an elastic link lies on the axis
+ZERO_ON_AXIS = 1e-13  # of |s|: what rounding leaves of Re s where a zero of an elastic link lies on the axis
 
 
 def what_is_seen(data: Bode) -> str:
@@ -47,7 +49,7 @@ def what_is_seen(data: Bode) -> str:
     low, high = (plain(w, 5) for w in data.band)
     grid = f"The exact response at {data.omega.size} frequencies from {low} to {high} rad/s"
     if data.poles.size or data.zeros.size:
-        around = f"{counted(len(data.poles), 'pole')} and {counted(len(data.zeros), 'zero')}"
+        around = f"{how_many(len(data.poles), 'pole')} and {how_many(len(data.zeros), 'zero')}"
         grid += f", spaced geometrically around its {around}, so that no peak and no dip falls between two of them"
     grid += "."
     if data.infinite.size:
@@ -75,7 +77,7 @@ def what_it_means(data: Bode) -> str:
         count = int(np.sum(right.imag == 0) + 2 * np.sum(right.imag > 0))
         slowest = significant(float(abs(right).min()), 4)
         return (
-            f"{counted(count, 'zero')} in the right half-plane, the slowest at {slowest} rad/s: the phase turns by "
+            f"{how_many(count, 'zero')} in the right half-plane, the slowest at {slowest} rad/s: the phase turns by "
             f"{turned}, and a loop closed here cannot be much faster than the slowest of them."
         )
     if np.ptp(data.phase) < 181:
@@ -93,7 +95,7 @@ def alt_text(data: Bode) -> str:
     return f"Bode plot of {data.input_label} to {data.label}: {where}; it begins at {start}."
 
 
-def response_table(data: Bode, stem: str) -> Table:
+def bode_data(data: Bode, stem: str) -> Table:
     """The numbers of the picture."""
     of = data.gain_unit
     columns = (
@@ -112,13 +114,13 @@ def roots_table(data: Bode, stem: str) -> Table:
     roots = np.r_[data.poles, data.zeros]
     kinds = ["pole"] * data.poles.size + ["zero"] * data.zeros.size
     gains = np.r_[data.peaks, data.dips]
-    exact = data.arm.has_elastic_link & (abs(roots.real) < ROUNDED * abs(roots)) & (np.array(kinds) == "zero")
+    exact = data.arm.has_elastic_link & (abs(roots.real) < ZERO_ON_AXIS * abs(roots)) & (np.array(kinds) == "zero")
     real, hertz = np.where(exact, 0.0, roots.real + 0.0), roots.imag / (2 * math.pi)
     ratio = -100 * real / abs(roots) + 0.0
     return Table(
         stem=stem,
         title=f"Poles and zeros, {data.input_label} to {data.label}",
-        caption=f"{completeness(data)} {ROOTS}",
+        caption=f"{completeness(data)} {ROOTS_CAPTION}",
         columns=(
             Column("kind", "kind", of=kinds),
             Column("real_1_s", "Re s", "1/s", of=real, digits=lined(8, 4)),
@@ -133,16 +135,13 @@ def roots_table(data: Bode, stem: str) -> Table:
 def completeness(data: Bode) -> str:
     """What the list of roots holds, and how far it goes."""
     height = f"0 ≤ Im s < {significant(data.band[1], 6)} rad/s"
-    widths = [_width(each) for each in (data.pole_width, data.zero_width)]
+    widths = [
+        "" if math.isinf(left) else f"{plain(left, 5)} < Re s < {plain(right, 5)} 1/s"
+        for left, right in (data.pole_width, data.zero_width)
+    ]
     named = [f"{what} {each}" for what, each in zip(("poles", "zeros"), widths, strict=True) if each]
     width = widths[0] if widths[0] == widths[1] else ", ".join(named)
     known = "confirmed by the winding number around the box" if any(widths) else "counted"
     box = f"{height}, {width}, {known}" if width else f"{height}, {known}"
     rigid = "; rigid-body poles at s = 0 apart" * data.arm.has_rigid_mode
     return f"All poles and zeros that this output shows in {box}{rigid}."
-
-
-def _width(box: tuple[float, float]) -> str:
-    """The range of Re s in which roots are complete; empty where it has no end."""
-    left, right = box
-    return "" if math.isinf(left) else f"{plain(left, 5)} < Re s < {plain(right, 5)} 1/s"

@@ -12,7 +12,7 @@ from tfarm.digits import plain, significant
 from tfarm.spectrum import DampedModes, Modes, damped_modes, modes
 from tfarm.spectrum.answers import DAMPED_MODE_COLUMNS
 
-DAMPED = (
+DAMPED_CAPTION = (
     "Eigenvalues of the arm with its own damping, C = {C} s, each continued from the undamped mode of its number. "
     "Each is enclosed in a disc of 12 digits that holds exactly one. All {count} eigenvalues with {left} < Re s < "
     "{right} 1/s and |Im s| < {top} rad/s are listed (conjugates counted{rigid}): the argument principle in ball "
@@ -20,22 +20,22 @@ DAMPED = (
     "model, so lightly damped modes exist at ever higher frequency, and the slow real eigenvalues of overdamped "
     "bending modes accumulate at −1/C = {limit} 1/s."
 )
-NO_C = (
+NO_C_CAPTION = (
     "Eigenvalues of the rig with what its hub, clamp and joint lose (C = {C} in the link), each continued from the "
     "undamped mode of its number. Each is enclosed in a disc of 12 digits that holds exactly one. All {count} "
     "eigenvalues with {left} < Re s < {right} 1/s and |Im s| < {top} rad/s are listed (conjugates counted{rigid}): the "
     "argument principle in ball arithmetic counts those in this box. {outside}Beyond any such box there are more, at "
     "ever higher frequency."
 )
-LEFT_OUT = "Modes above {last} are not listed: their branches cannot be told apart. "
-OUTSIDE = (
+NOT_LISTED = "Modes above {last} are not listed: their branches cannot be told apart. "
+OUTSIDE_NOTE = (
     "Rows that are “outside” lie, with one eigenvalue or both, beyond the box: beside them others may exist that are "
     "not listed. "
 )
 
 
-PROVEN = 12  # digits
-PLACES = {True: "in the box", False: "outside"}
+PROVEN_DIGITS = 12  # of an eigenvalue: more than a page prints of any
+BOX_WORDS = {True: "in the box", False: "outside"}
 
 
 @lru_cache(maxsize=8)  # the arm's page and the page on trust speak of the same ones, and a proof takes seconds
@@ -45,7 +45,7 @@ def proven_damped_modes(arm: Arm, count: int) -> DampedModes:
     Raises CertificationError where that cannot be proven, ConvergenceError where they cannot be told apart.
     """
     found = damped_modes(modes(arm, count))
-    found.certify(PROVEN)
+    found.certify(PROVEN_DIGITS)
     return found
 
 
@@ -63,13 +63,20 @@ def damped_table(undamped: Modes) -> Table:
         rigid += f"; {significant(each, 6)} 1/s, of the motor's circuit, is one of no mode"
     words = {name: plain(round(x)) if abs(x) >= 100 else plain(x, 3) for name, x in edges.items()}
     inside = np.all(box.holds(damped.eigenvalues), axis=1)
-    left_out = LEFT_OUT.format(last=damped.index[-1]) if damped.left_out else ""
+    left_out = NOT_LISTED.format(last=damped.index[-1]) if damped.left_out else ""
     return Table(
         stem="damped-modes",
         title="Damped modes",
-        caption=(DAMPED if C else NO_C).format(
-            C=plain(C), count=damped.count, rigid=rigid, outside=("" if inside.all() else OUTSIDE) + left_out, **words
+        caption=(DAMPED_CAPTION if C else NO_C_CAPTION).format(
+            C=plain(C),
+            count=damped.count,
+            rigid=rigid,
+            outside=("" if inside.all() else OUTSIDE_NOTE) + left_out,
+            **words,
         ),
-        columns=(*DAMPED_MODE_COLUMNS, Column("complete", "list complete", of=[PLACES[bool(each)] for each in inside])),
+        columns=(
+            *DAMPED_MODE_COLUMNS,
+            Column("complete", "list complete", of=[BOX_WORDS[bool(each)] for each in inside]),
+        ),
         record=damped,
     )

@@ -16,38 +16,45 @@ from tfarm.plots.fitted import draw_fit
 from tfarm.plots.possible import draw_band, draw_share
 from tfarm.plots.words import gains_words
 from tfarm.report.loop_laws import has_loop
-from tfarm.report.sections import Picture, Section
+from tfarm.report.sections import PageSection, Picture
 from tfarm.report.words import typeset
 from tfarm.spectrum.scales import default_gains
 
-LEVEL = "The interval holds the true number in 95 of 100 measurements, if the arm is right and the noise is as said."
-MARGINS = (
+LEVEL_WORDS = (
+    "The interval holds the true number in 95 of 100 measurements, if the arm is right and the noise is as said."
+)
+FIT_MARGINS = (
     Column("margin", "of the loop", of=lambda row: row[0]),
     Column("unit", "unit", of=lambda row: row[1]),
     Column("lowest", "lowest", of=lambda row: row[2][0], digits=singly(general, 4)),
     Column("highest", "highest", of=lambda row: row[2][1], digits=singly(general, 4)),
 )
-RESONANCES = (
+FIT_RESONANCES = (
     Column("before_hz", "start", "Hz", of=lambda row: row[0], digits=singly(known, 6)),
     Column("after_hz", "fitted", "Hz", of=lambda row: row[1], digits=singly(known, 6)),
     Column("measured_hz", "measured", "Hz", of=lambda row: row[2], digits=singly(general, 6)),
 )
 
 
-def fit_section(fit: Fit, count: int = ARMS) -> Section:
+def fit_section(fit: Fit, count: int = ARMS) -> PageSection:
     """What was measured, what explains it, how sure, and on how many arms of those that remain a loop holds."""
-    words = [typeset(f"{fit.verdict[0].upper()}{fit.verdict[1:]}: {fit_in_words(fit)}. {LEVEL}")]
+    words = [typeset(f"{fit.verdict[0].upper()}{fit.verdict[1:]}: {fit_in_words(fit)}. {LEVEL_WORDS}")]
     words += [typeset(f"{each[0].upper()}{each[1:]}.") for each in fit.not_determined]
     blocks: list[Picture | Table] = []
     if fit.responses:
-        blocks.append(_overlay(fit))
+        names = listed([each.name for each in fit.responses])
+        caption = f"Points: {names} as measured. Blue: the fitted arm, exact; grey: the arm that the search began with."
+        blocks.append(Picture(
+            stem="fit-overlay", title="Measured over fitted", caption=caption,
+            alt=f"Measured and computed responses: {names}.", figure=draw_fit(fit),
+        ))  # fmt: skip
     blocks.append(parameters_table(fit))
     if rows := resonances(fit):
         caption = (
             "Peaks of the measured responses, and poles of the arm's: with a held hub where they are over its angle."
         )
         blocks.append(
-            Table(columns=RESONANCES, record=rows, stem="fit-resonances", title="Resonances", caption=caption)
+            Table(columns=FIT_RESONANCES, record=rows, stem="fit-resonances", title="Resonances", caption=caption)
         )
     try:
         those = possible(fit, count)
@@ -57,18 +64,7 @@ def fit_section(fit: Fit, count: int = ARMS) -> Section:
         said, more = _onwards(those)
         words += said
         blocks += more
-    return Section(anchor="fit", title="Fitted to measurements", words=words, blocks=blocks)
-
-
-def _overlay(fit: Fit) -> Picture:
-    names = listed([each.name for each in fit.responses])
-    return Picture(
-        stem="fit-overlay",
-        title="Measured over fitted",
-        caption=f"Points: {names} as measured. Blue: the fitted arm, exact; grey: the arm that the search began with.",
-        alt=f"Measured and computed responses: {names}.",
-        figure=draw_fit(fit),
-    )
+    return PageSection(anchor="fit", title="Fitted to measurements", words=words, blocks=blocks)
 
 
 def _onwards(those: Possible) -> tuple[list[str], list[Picture | Table]]:
@@ -102,7 +98,11 @@ def _onwards(those: Possible) -> tuple[list[str], list[Picture | Table]]:
             caption = f"Of {gains_words(law)} over the {found.stable} arms on which it holds."
             blocks.append(
                 Table(
-                    columns=MARGINS, record=rows, stem="fit-margins", title="Margins over these arms", caption=caption
+                    columns=FIT_MARGINS,
+                    record=rows,
+                    stem="fit-margins",
+                    title="Margins over these arms",
+                    caption=caption,
                 )
             )
     return words, blocks

@@ -10,22 +10,22 @@ from pathlib import Path
 from markupsafe import Markup
 
 from tfarm.arm import Arm
-from tfarm.glossary import TERMS, Term
+from tfarm.glossary import GLOSSARY_TERMS, Term
 from tfarm.report.loop_laws import has_rate_loop, sign_words
 from tfarm.report.page_names import QUESTIONS
-from tfarm.report.sections import Block, SavedSection, Section
-from tfarm.tables.html import symbol
+from tfarm.report.sections import SavedBlock, SavedSection
+from tfarm.tables.html import with_symbols
 
 SHORTEST = 40  # characters of an answer; one that is shorter takes the next sentence too
 ANSWERS = ("margins-map", "margins", "locus", "sampled", "tune", "fit", "law", "no-loop")  # whose first words answer
-VERDICTS = {"stable": "ok", "yes": "ok", "unstable": "corrected", "no": "corrected", "marginal": "undecided",
+BADGES = {"stable": "ok", "yes": "ok", "unstable": "corrected", "no": "corrected", "marginal": "undecided",
             "undecided": "undecided"}  # fmt: skip
 OPEN_PICTURES = 2  # of a section: those that answer its question; the rest is a click away
-FOLDED = ("assumptions",)  # sections whose pictures are for those who ask further
-TOLD = ("certified", "complete", "enclosed", "Lyapunov region", "proven", "settled", "small gain", "winding number",
+FOLDED_SECTIONS = ("assumptions",)  # sections whose pictures are for those who ask further
+PROMISES = ("certified", "complete", "enclosed", "Lyapunov region", "proven", "settled", "small gain", "winding number",
         "band", "window", "default gains")  # fmt: skip
 PLAIN_WORDS = ("band", "window")  # of these: too common in another sense to lead to their meaning wherever they stand
-EXPLAINED = re.compile(rf"\b(?:{'|'.join(name for name in TOLD if name not in PLAIN_WORDS)})\b", re.IGNORECASE)
+PROMISE = re.compile(rf"\b(?:{'|'.join(name for name in PROMISES if name not in PLAIN_WORDS)})\b", re.IGNORECASE)
 ABREAST = ("bode-root-moment", "bode-tip-displacement")  # sections of one picture each that stand beside each other
 
 
@@ -41,17 +41,19 @@ class Framed:
     answer: str
     words: Sequence[str]
     more_words: Sequence[str]
-    blocks: Sequence[Block]
-    more_blocks: Sequence[Block]
+    blocks: Sequence[SavedBlock]
+    more_blocks: Sequence[SavedBlock]
 
 
 def framed(saved: SavedSection) -> Framed:
     """What is seen at once of a section, and what is folded away."""
     section, pictures = saved.section, [block for block in saved.blocks if block.table is None]
-    shown = pictures[: 0 if section.anchor in FOLDED else OPEN_PICTURES]
+    shown = pictures[: 0 if section.anchor in FOLDED_SECTIONS else OPEN_PICTURES]
     return Framed(
         saved=saved,
-        badge=_badge(section),
+        badge=next(
+            ((word, BADGES[word]) for fact in section.facts if (word := fact.value.lower()) in BADGES), ("", "")
+        ),
         answer=first_sentence(section.words[0]) if section.anchor in ANSWERS and section.words else "",
         words=section.words[:1],
         more_words=section.words[1:],
@@ -60,7 +62,7 @@ def framed(saved: SavedSection) -> Framed:
     )
 
 
-def rows(sections: Sequence[Framed]) -> Sequence[Sequence[Framed]]:
+def section_rows(sections: Sequence[Framed]) -> Sequence[Sequence[Framed]]:
     """The sections in their order, those that stand beside each other in one row."""
     found: list[list[Framed]] = []
     for each in sections:
@@ -83,19 +85,12 @@ def explained(text: str) -> Markup:
         seen.add(word)
         return f'<a class="term" href="#{word_id(word)}">{found[0]}</a>'
 
-    return Markup(EXPLAINED.sub(linked, str(symbol(text))))
+    return Markup(PROMISE.sub(linked, str(with_symbols(text))))
 
 
 def word_id(name: str) -> str:
     """Where a word of the glossary stands on a page."""
     return f"word-{name.lower().replace(' ', '-')}"
-
-
-def _badge(section: Section) -> tuple[str, str]:
-    for fact in section.facts:
-        if fact.value.lower() in VERDICTS:
-            return fact.value.lower(), VERDICTS[fact.value.lower()]
-    return "", ""
 
 
 def first_sentence(text: str) -> str:
@@ -109,12 +104,12 @@ def signs(arm: Arm) -> str:
     return sign_words(arm) if has_rate_loop(arm) else ""
 
 
-def glossary() -> Sequence[Term]:
+def promises() -> Sequence[Term]:
     """The words of these pages that promise something."""
-    return [term for term in TERMS if term.name in TOLD]
+    return [term for term in GLOSSARY_TERMS if term.name in PROMISES]
 
 
-def beside(folder: Path, writing: Sequence[str], page: str) -> Sequence[tuple[str, str]]:
+def other_pages(folder: Path, writing: Sequence[str], page: str) -> Sequence[tuple[str, str]]:
     """(file, title) of the arm's other pages: those in its folder, and those written with this one."""
     names = {"index": "full report", **QUESTIONS}
     there = [name for name in names if name in writing or (folder / f"{name}.html").is_file()]

@@ -21,8 +21,8 @@ from tfarm.plots.words import gains_words
 from tfarm.records import record
 from tfarm.response.signals import Signals
 
-GAINS = "the gains given"
-LONGEST = 60  # characters of a law's name in a heading
+GIVEN_GAINS = "the gains given"
+LONGEST_LAW_NAME = 60  # characters of a law's name in a heading
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class GivenLaw:
     @property
     def given_name(self) -> str:
         """What it is called, or its gains with their values."""
-        return gains_words(self.law) if isinstance(self.law, HubFeedback) else one_line(self.law.name, LONGEST)
+        return gains_words(self.law) if isinstance(self.law, HubFeedback) else one_line(self.law.name, LONGEST_LAW_NAME)
 
 
 class Subject(NamedTuple):
@@ -96,7 +96,7 @@ def on_arm(arm: Arm, laws: Sequence[GivenLaw]) -> tuple[LawOnArm, ...]:
     found: list[LawOnArm] = []
     for number, given in enumerate(laws, 1):
         driven, law = through(arm, given.law)
-        name = GAINS if isinstance(law, HubFeedback) else one_line(law.name, LONGEST)
+        name = GIVEN_GAINS if isinstance(law, HubFeedback) else one_line(law.name, LONGEST_LAW_NAME)
         if name in {each.name for each in found}:
             name = f"{name} ({number})"
         found.append(LawOnArm(driven, law, given, name, f"law_{number}" if len(laws) > 1 else "law"))
@@ -117,6 +117,6 @@ def check_laws(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> None:
         discretised(each.law, chain.sampling.period)
 
 
-def in_s(laws: Sequence[LawOnArm]) -> tuple[LawOnArm, ...]:
+def continuous_laws(laws: Sequence[LawOnArm]) -> tuple[LawOnArm, ...]:
     """Those that act on the continuous loop."""
     return tuple(each for each in laws if not each.is_discrete)

@@ -7,9 +7,9 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-COMPARED = "compare"  # what is kept of a comparison
-COMPARISON = "compare.html"
-LARGEST = 1 << 20  # bytes of a file worth reading
+COMPARISON_KIND = "compare"  # what is kept of a comparison
+COMPARISON_PAGE = "compare.html"
+LARGEST_READ = 1 << 20  # bytes of a file worth reading
 
 T = TypeVar("T")
 
@@ -22,10 +22,10 @@ def keep(folder: Path, kind: str, content: Mapping[str, Any]) -> None:
 
 def kept_comparison(out: Path) -> tuple[str, tuple[str, ...]]:
     """The title of compare.html beside the reports, and the arms that it compares; ("", ()) where there is none."""
-    file = out / f"{COMPARED}.json"
+    file = out / f"{COMPARISON_KIND}.json"
     try:
-        read = json.loads(file.read_text(encoding="utf-8")) if file.stat().st_size <= LARGEST else {}
-        if read[f"tfarm_{COMPARED}"] == 1 and (out / COMPARISON).is_file():
+        read = json.loads(file.read_text(encoding="utf-8")) if file.stat().st_size <= LARGEST_READ else {}
+        if read[f"tfarm_{COMPARISON_KIND}"] == 1 and (out / COMPARISON_PAGE).is_file():
             return str(read["title"]), tuple(str(name) for name in read["arms"])
     except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
         pass
@@ -38,7 +38,7 @@ def kept(out: Path, kind: str, made_of: Callable[[dict[str, Any], Path], T | Non
     for folder in sorted((f for f in out.iterdir() if f.is_dir() and not f.name.startswith(".")), key=lambda f: f.name):
         file = folder / f"{kind}.json"
         try:
-            if file.stat().st_size > LARGEST:
+            if file.stat().st_size > LARGEST_READ:
                 continue
             read = json.loads(file.read_text(encoding="utf-8"))
             if read.pop(f"tfarm_{kind}") == 1 and read["name"] == folder.name:

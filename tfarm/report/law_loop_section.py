@@ -9,7 +9,7 @@ import numpy as np
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.columns import Column, Table
-from tfarm.digits import counted, lined, plain, significant, singly
+from tfarm.digits import how_many, lined, plain, significant, singly
 from tfarm.dsp import Chain
 from tfarm.errors import ParameterError
 from tfarm.loop.closed import closed_loop_poles
@@ -19,37 +19,37 @@ from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.law_stability import signs_of_loop
 from tfarm.loop.lyapunov import lyapunov
 from tfarm.loop.margins import Margins
-from tfarm.loop.nyquist import Nyquist
 from tfarm.loop.poles import Poles
 from tfarm.loop.spill import SPILL, Spill, spill
 from tfarm.plots.disc import draw_nyquist
 from tfarm.plots.loop import draw_loop, loop_data
-from tfarm.report.given_laws import GivenLaw, LawOnArm, in_s, on_arm
+from tfarm.report.given_laws import GivenLaw, LawOnArm, continuous_laws, on_arm
 from tfarm.report.margins_table import margin_table, window_table
-from tfarm.report.nyquist import Curve, count_table, curve_data
-from tfarm.report.sections import Fact, Picture, Section
+from tfarm.report.nyquist import RINGS_CAPTION, PlotOfLaw, count_table, curve_data
+from tfarm.report.sections import Fact, PageSection, Picture
 from tfarm.report.words import typeset, upper
 
-MODELS = 12  # flexible modes of the largest model that is put beside the exact loop
-CROSSINGS = (
+MOST_SPILLED = 12  # flexible modes of the largest model that is put beside the exact loop
+CROSSINGS_CAPTION = (
     "Every frequency up to the band where |L| = 1, with the phase margin there, above 0 for lag that the loop bears "
     "and below 0 for lead; and every one where L is real and below 0, with the factor on the whole law that puts a "
     "pole there."
 )
-BODE = (
+BODE_CAPTION = (
     "Diamonds: |L| = 1, with the phase margin there, green for lag and purple for lead. Dots: L is real and below 0, "
     "and the dashed line is the way to −1, with the factor on the whole law that goes it."
 )
-SPILLED = "What models of so many flexible modes say of the same law: how many poles are unstable, and the rightmost."
-NYQUIST = (
+SPILL_CAPTION = (
+    "What models of so many flexible modes say of the same law: how many poles are unstable, and the rightmost."
+)
+NYQUIST_OF_LAW = (
     "Every size of L(iω) from 0 to infinity is in the picture: a size r is drawn as r/(1 + r). The loop is stable "
     "where the curve turns around −1 counter-clockwise as often as L has poles right of the axis{own}."
 )
-POLES = (
+POLES_CAPTION = (
     "Poles with Im s ≥ 0, those below the real axis being their mirror images. All of the box {box} 1/s are here, by "
     "the winding number around it."
 )
-WINDING = "the winding number around the box"
 
 
 def margins_of_laws(laws: Sequence[LawOnArm]) -> list[Margins[Any]]:
@@ -60,9 +60,9 @@ def margins_of_laws(laws: Sequence[LawOnArm]) -> list[Margins[Any]]:
 # ------------------------------------------------------------ verdict and margins
 
 
-def law_margins_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> Section:
+def law_margins_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> PageSection:
     """The verdict on each law, what is known beyond its band, its margins and crossings, and what spills over."""
-    named = in_s(on_arm(arm, laws))
+    named = continuous_laws(on_arm(arm, laws))
     found = margins_of_laws(named)
     both = list(zip(named, found, strict=True))
     undamped = arm.is_told_by_lyapunov and all(isinstance(each.law, HubFeedback) for each in named)
@@ -80,14 +80,14 @@ def law_margins_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> Sec
     words = [text for each, it, far in zip(named, found, spilled, strict=True) for text in _words(each, it, far)]
     facts = [verdict_fact(*each) for each in both]
     title = "Is the loop stable, and by how much?"
-    return Section(anchor="margins", title=title, facts=facts, words=words, blocks=blocks)
+    return PageSection(anchor="margins", title=title, facts=facts, words=words, blocks=blocks)
 
 
 def verdict_fact(each: LawOnArm, found: Margins[Any]) -> Fact:
     """The verdict, large, how many poles are unstable, and whether more is known beyond the band."""
     it = found.stability
     count = (
-        "infinitely many unstable poles" if it.unstable_roots_infinite else counted(it.unstable_roots, "unstable pole")
+        "infinitely many unstable poles" if it.unstable_roots_infinite else how_many(it.unstable_roots, "unstable pole")
     )
     far = "" if it.is_known_beyond or it.verdict == "unstable" else ", not known beyond"
     up_to = f"up to {significant(it.band, 5)} rad/s{far}"
@@ -95,34 +95,29 @@ def verdict_fact(each: LawOnArm, found: Margins[Any]) -> Fact:
 
 
 def _words(each: LawOnArm, found: Margins[Any], spilled: Spill | str) -> Iterator[str]:
-    """The verdict and what is known beyond, what a theorem says of the law, and what spills over."""
-    it = found.stability
+    """The verdict and what is known beyond, what Lyapunov's argument or the law's sign adds, and what spills over."""
+    it, loop = found.stability, found.stability.loop
     free = it.poles.moving.size < it.poles.values.size
     apart = ", the one at 0 of a hub whose angle is not held apart" if free else ""
-    count = (
-        "infinitely many" if it.unstable_roots_infinite else "no" if not it.unstable_roots else str(it.unstable_roots)
-    )
+    few = str(it.unstable_roots or "no")
+    count = "infinitely many" if it.unstable_roots_infinite else few
     poles = f"{count} unstable pole{'s' * (count != '1')}"
+    if isinstance(loop, LawLoop):
+        signs = signs_of_loop(loop)
+        kind = f"it is {signs.kind}" if signs.kind else "no theorem on its sign helps"
+        theorem = f"Beside that, {kind}: {typeset(signs.reason)}."
+        theorem += "".join(f" Warning: {typeset(text)}." for text in loop.warnings)
+    else:
+        proof = lyapunov(loop.arm, loop.law)
+        theorem = f"Lyapunov: {'proven' if proof.proven else 'no proof'}, {typeset(proof.reason)}."
     yield (
         f"{upper(each.name)}: {it.verdict.upper()}, with {poles} up to {significant(it.band, 5)} rad/s{apart}; "
-        f"{typeset(it.tail)}. {_theorem(found)}"
+        f"{typeset(it.tail)}. {theorem}"
     )
     if isinstance(spilled, str):
         yield f"Models of few modes are not put beside {each.name}: {typeset(spilled)}."
     else:
         yield f"Spill-over of {each.name}: {typeset(spilled.in_words)}."
-
-
-def _theorem(found: Margins[Any]) -> str:
-    """What Lyapunov's argument says of gains, or the sign of any other law."""
-    loop = found.stability.loop
-    if isinstance(loop, LawLoop):
-        signs = signs_of_loop(loop)
-        kind = f"it is {signs.kind}" if signs.kind else "no theorem on its sign helps"
-        words = f"Beside that, {kind}: {typeset(signs.reason)}."
-        return words + "".join(f" Warning: {typeset(text)}." for text in loop.warnings)
-    proof = lyapunov(loop.arm, loop.law)
-    return f"Lyapunov: {'proven' if proof.proven else 'no proof'}, {typeset(proof.reason)}."
 
 
 def _bode_picture(each: LawOnArm, found: Margins[Any]) -> Picture:
@@ -137,7 +132,7 @@ def _bode_picture(each: LawOnArm, found: Margins[Any]) -> Picture:
     return Picture(
         stem=stem,
         title=f"The loop function of {each.name}",
-        caption=(BODE if found.in_band is not None else "Size and phase of L(iω).") + none,
+        caption=(BODE_CAPTION if found.in_band is not None else "Size and phase of L(iω).") + none,
         alt=f"Bode plot of the loop function of {each.name}, {found.stability.verdict}.",
         figure=draw_loop(found, each.name),
         data=Table(stem=f"{stem}-data", title=f"The loop function of {each.name}", is_data=True, columns=columns),
@@ -155,7 +150,7 @@ def crossings_table(each: LawOnArm, found: Margins[Any]) -> Table:
     return Table(
         stem=f"{each.key.replace('_', '-')}-crossings",
         title=f"Every crossing of {each.name}",
-        caption=CROSSINGS if rows else "Nowhere in the band is |L| = 1, or L real and below 0.",
+        caption=CROSSINGS_CAPTION if rows else "Nowhere in the band is |L| = 1, or L real and below 0.",
         columns=(
             Column("omega_rad_s", "frequency", "rad/s", of=omega, digits=singly(significant, 6)),
             Column("what", "what", of=what),
@@ -171,7 +166,7 @@ def crossings_table(each: LawOnArm, found: Margins[Any]) -> Table:
 def _spilled(each: LawOnArm) -> Spill | str:
     """The exact loop beside models of few modes, or why there is no model."""
     try:
-        return spill(each.arm, each.any_law, MODELS)
+        return spill(each.arm, each.any_law, MOST_SPILLED)
     except ParameterError as error:
         return str(error)
 
@@ -181,7 +176,7 @@ def spill_table(each: LawOnArm, found: Spill) -> Table:
     return Table(
         stem=f"{each.key.replace('_', '-')}-spill",
         title=f"Models of few modes under {each.name}",
-        caption=f"{SPILLED} {upper(typeset(found.in_words))}.",
+        caption=f"{SPILL_CAPTION} {upper(typeset(found.in_words))}.",
         columns=SPILL,
         record=found,
     )
@@ -190,65 +185,58 @@ def spill_table(each: LawOnArm, found: Spill) -> Table:
 # ------------------------------------------------------------ Nyquist
 
 
-def law_nyquist_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> Section:
-    """The loop function of each law on a contour that hides nothing, its turns counted."""
-    plots = [Curve(each, nyquist_under(each.arm, each.law)) for each in in_s(on_arm(arm, laws))]
-    pictures = [_disc(arm, plots[i : i + 2], 1 + i // 2) for i in range(0, len(plots), 2)]
+def law_nyquist_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> PageSection:
+    """The loop function of each law on a contour that hides nothing, two in a picture, its turns counted."""
+    plots = [PlotOfLaw(each, nyquist_under(each.arm, each.law)) for each in continuous_laws(on_arm(arm, laws))]
+    turns = {}  # of each law: turns counted, poles of its own, and the unstable poles that follow
+    for named, found in plots:
+        own = f", {how_many(found.unstable_open, 'unstable pole')} of its own" if found.unstable_open else ""
+        poles, around = (
+            how_many(found.verdict.unstable_roots, "unstable pole"),
+            how_many(abs(found.encirclements), "turn"),
+        )
+        turns[named.name] = f"{named.name}: {found.verdict.verdict}, {around} around −1{own}, {poles} of the loop."
+    blocks: list[Picture | Table] = []
+    for first in range(0, len(plots), 2):
+        pair = plots[first : first + 2]
+        stem, data = "nyquist" if first == 0 else f"nyquist-{1 + first // 2}", curve_data(pair)
+        blocks.append(Picture(
+            stem=stem, title="Nyquist plots of the exact loop function", caption=RINGS_CAPTION,
+            alt="; ".join(turns[plot.named.name] for plot in pair),
+            figure=draw_nyquist(arm.name, {plot.named.name: plot.data for plot in pair}),
+            data=Table(stem=f"{stem}-data", title=data.title, is_data=True, columns=data.columns),
+        ))  # fmt: skip
+    own = "" if any(plot.data.unstable_open for plot in plots) else ", which here is never"
     names = [f"{plot.named.name}: {plot.named.gains}" for plot in plots]
-    words = [upper(_turns(plot.named.name, plot.data)) for plot in plots]
-    words.append(NYQUIST.format(own=_own_poles([plot.data for plot in plots])))
-    title = "Nyquist: does the loop function turn around −1?"
-    blocks: list[Picture | Table] = [*pictures, count_table(plots, names)]
-    return Section(anchor="margins-nyquist", title=title, words=words, blocks=blocks)
-
-
-def _disc(arm: Arm, plots: list[Curve], number: int) -> Picture:
-    stem = "nyquist" if number == 1 else f"nyquist-{number}"
-    data = curve_data(plots)
-    return Picture(
-        stem=stem,
-        title="Nyquist plots of the exact loop function",
-        caption="Rings: sizes of L; −1 lies on the ring 1. Broad: ω > 0, arrows as ω rises; thin: its mirror image.",
-        alt="; ".join(_turns(plot.named.name, plot.data) for plot in plots),
-        figure=draw_nyquist(arm.name, {plot.named.name: plot.data for plot in plots}),
-        data=Table(stem=f"{stem}-data", title=data.title, is_data=True, columns=data.columns),
+    return PageSection(
+        anchor="margins-nyquist",
+        title="Nyquist: does the loop function turn around −1?",
+        words=[*map(upper, turns.values()), NYQUIST_OF_LAW.format(own=own)],
+        blocks=[*blocks, count_table(plots, names)],
     )
-
-
-def _turns(name: str, data: Nyquist[Any]) -> str:
-    """Turns counted, poles of the law's own, and the unstable poles that follow."""
-    own = f", {counted(data.unstable_open, 'unstable pole')} of its own" if data.unstable_open else ""
-    poles = counted(data.verdict.unstable_roots, "unstable pole")
-    turns = counted(abs(data.encirclements), "turn")
-    return f"{name}: {data.verdict.verdict}, {turns} around −1{own}, {poles} of the loop."
-
-
-def _own_poles(plots: Sequence[Nyquist[Any]]) -> str:
-    return "" if any(each.unstable_open for each in plots) else ", which here is never"
 
 
 # ------------------------------------------------------------ poles
 
 
-def law_poles_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> Section:
+def law_poles_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> PageSection:
     """The first closed-loop poles of each law, complete in a box."""
-    named = in_s(on_arm(arm, laws))
-    found = [closed_loop_poles(each.arm, each.law) for each in named]
-    words = [_rightmost(each, poles) for each, poles in zip(named, found, strict=True)]
-    blocks = [poles_table(each, poles) for each, poles in zip(named, found, strict=True)]
-    return Section(anchor="locus", title="Where are the poles?", words=words, blocks=blocks)
+    words, blocks = [], []
+    for each in continuous_laws(on_arm(arm, laws)):
+        poles = closed_loop_poles(each.arm, each.law)
+        moving = poles.moving
+        if moving.size:
+            furthest = moving[int(np.argmax(moving.real))]
+            beside = f" ± {significant(furthest.imag, 6)} i" if furthest.imag else ""
+            told = f"furthest right of these lies {significant(furthest.real, 6)}{beside} 1/s"
+        else:
+            told = "no pole but those at 0 lies in the box"
+        words.append(f"{upper(each.name)}: {told}.")
+        blocks.append(law_poles_table(each, poles))
+    return PageSection(anchor="locus", title="Where are the poles?", words=words, blocks=blocks)
 
 
-def _rightmost(each: LawOnArm, poles: Poles[Any]) -> str:
-    moving = poles.moving
-    if not moving.size:
-        return f"{upper(each.name)}: no pole but those at 0 lies in the box."
-    furthest = moving[int(np.argmax(moving.real))]
-    beside = f" ± {significant(furthest.imag, 6)} i" if furthest.imag else ""
-    return f"{upper(each.name)}: furthest right of these lies {significant(furthest.real, 6)}{beside} 1/s."
-
-
-def poles_table(each: LawOnArm, poles: Poles[Any]) -> Table:
+def law_poles_table(each: LawOnArm, poles: Poles[Any]) -> Table:
     """Poles with Im s >= 0, with their damping ratio."""
     values = poles.values
     left, right, _, top = poles.box
@@ -257,7 +245,7 @@ def poles_table(each: LawOnArm, poles: Poles[Any]) -> Table:
     return Table(
         stem=f"{each.key.replace('_', '-')}-poles",
         title=f"Closed-loop poles under {each.name}",
-        caption=POLES.format(box=box),
+        caption=POLES_CAPTION.format(box=box),
         columns=(
             Column("real_1_s", "Re s", "1/s", of=values.real, digits=lined(8, 4)),
             Column("imaginary_rad_s", "Im s", "rad/s", of=values.imag, digits=lined(8, 7)),

@@ -28,37 +28,36 @@ from tfarm.plots.style import safe
 from tfarm.records import record
 from tfarm.report.given_laws import GivenLaw, LawOnArm, on_arm
 from tfarm.report.sampled_words import in_ms, spans
-from tfarm.report.sections import Fact, Picture, Section
+from tfarm.report.sections import Fact, PageSection, Picture
 from tfarm.report.time_responses import clipped_words, resolution_words, responses_table
 from tfarm.report.words import typeset, upper
 
-SMALL = 0.05  # a sample: growth up to which damping is first order
-MORE = (0.0, 0.5, 1.0)  # samples of further delay that the verdict is asked for again
-LATER = (
+SMALL_GROWTH = 0.05  # a sample: growth up to which damping is first order
+MORE_DELAY = (0.5, 1.0)  # samples of further delay that the verdict is asked for again
+LATER_CAPTION = (
     "The exact loop with so much more delay between reading and acting. |z| is the largest of its poles{apart}; below "
     "1 the loop is stable. {held}"
 )
-APART = ", that at z = 1 of a hub that nothing holds apart"
-BESIDE = (
+APART_FROM_FREE = ", that at z = 1 of a hub that nothing holds apart"
+MEASURED_CAPTION = (
     "Grey: what the controller was led by. Orange: measured. Blue: the exact sampled loop, led by the same reference "
     "from rest, with the steps and limits of its chain; drawn from the first reference on. {sources} {assumed}"
 )
-ASSUMED = (
+ASSUMED_WORDS = (
     "The exact loop is linear but for that chain: no dry friction, which on a rig holds the hub off its reference at "
     "the end and at the beginning; the controller starts from rest, without what it had gathered before; nothing is "
     "fitted."
 )
-OVERSHOOT = (
+OVERSHOOT_CAPTION = (
     "Overshoot: how far the hub goes beyond the last reference, as a share of the whole step; below 0 it never gets "
     "there. Off at the end: hub angle less reference at the last sample. Apart: root mean square of computed less "
     "measured."
 )
-DEGREES = 180.0 / math.pi
 
 
 @dataclass(frozen=True)
 @record
-class Held:
+class LawAtClock:
     """What is said of a law at a clock: its verdict, in words where it is stable, and what further delay it bears.
 
     `margin` is None where nothing is proven: up to where it is right that would be of the first modes alone.
@@ -80,14 +79,15 @@ class Later:
     verdict: Verdict[Any]
 
 
-def law_sampled_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> Section:
+def law_sampled_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> PageSection:
     """Does each law hold at the chain's clock, how much later may it act, and what does it do in time?
 
     In time: runs that were measured under every law with the exact loop over them, else the slew.
     """
     named = on_arm(arm, laws)
     found = [held_by(each, chain) for each in named]
-    blocks: list[Picture | Table] = [delays_table([row for each in found for row in later(each, chain)], chain)]
+    rows = [row for each in found for row in verdicts_later(each, chain)]
+    blocks: list[Picture | Table] = [delays_table(rows, chain)]
     words = [chain_told(arm, chain), *(_answer(each) + cured(each, chain) for each in found)]
     if any(each.measured is not None for each in named):
         blocks += _measured_blocks(named, chain)
@@ -95,16 +95,19 @@ def law_sampled_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> Sec
         slew, said = _slew(arm, chain, named)
         blocks += slew
         words += said
-    return Section(
-        anchor="sampled",
-        title=f"The sampled loop: does it hold at {in_ms(chain)} ms?",
-        facts=[_fact(each) for each in found],
-        words=words,
-        blocks=blocks,
-    )
+    facts = [
+        Fact(
+            label=f"{it.each.name}: {it.each.gains}",
+            value=it.verdict.word.upper(),
+            beside=typeset(f"|z| = {plain(math.exp(it.verdict.log_radius), 10)}, {it.verdict.holds_for}"),
+        )
+        for it in found
+    ]
+    title = f"The sampled loop: does it hold at {in_ms(chain)} ms?"
+    return PageSection(anchor="sampled", title=title, facts=facts, words=words, blocks=blocks)
 
 
-def held_by(each: LawOnArm, chain: Chain) -> Held:
+def held_by(each: LawOnArm, chain: Chain) -> LawAtClock:
     """The verdict on a law, and the room that it leaves."""
     if isinstance(each.law, HubFeedback):
         analysis = analyse(each.arm, each.law, chain)
@@ -113,11 +116,11 @@ def held_by(each: LawOnArm, chain: Chain) -> Held:
             for name, shown in analysis.shown.items()
         ]
         words = f"Stable, the other held: {'; '.join(told)}."
-        return Held(each, analysis.verdict, words, analysis.delay_margin if analysis.verdict.is_settled else None)
+        return LawAtClock(each, analysis.verdict, words, analysis.delay_margin if analysis.verdict.is_settled else None)
     verdict = law_verdict(each.arm, each.law, chain)
     factors = [f"{plain(low, 5)} to {plain(high, 5)}" for low, high in stable_factors(verdict.loop)]
     words = f"Stable with the whole law times {' and '.join(factors)}." if factors else "No factor on it is stable."
-    return Held(each, verdict, words, delay_margin(verdict.loop) if verdict.is_settled else None)
+    return LawAtClock(each, verdict, words, delay_margin(verdict.loop) if verdict.is_settled else None)
 
 
 # ------------------------------------------------------------ verdict
@@ -140,16 +143,7 @@ def chain_told(arm: Arm, chain: Chain) -> str:
     return f"The chain: {', '.join(told)}.{steps}"
 
 
-def _fact(found: Held) -> Fact:
-    verdict = found.verdict
-    return Fact(
-        label=f"{found.each.name}: {found.each.gains}",
-        value=verdict.word.upper(),
-        beside=typeset(f"|z| = {plain(math.exp(verdict.log_radius), 10)}, {verdict.holds_for}"),
-    )
-
-
-def _answer(found: Held) -> str:
+def _answer(found: LawAtClock) -> str:
     """The verdict, the room for the gain and for delay."""
     bound, verdict = found.margin, found.verdict
     told = f"{upper(found.each.name)}: {typeset(verdict.sentence)}. {found.stable_for}"
@@ -159,7 +153,7 @@ def _answer(found: Held) -> str:
     return f"{told} It bears {'more than ' if bound.is_bound else ''}{significant(ms, 4)} ms of further delay."
 
 
-def cured(found: Held, chain: Chain) -> str:
+def cured(found: LawAtClock, chain: Chain) -> str:
     """What a little Kelvin-Voigt damping makes of an arm without any: twice what balances the growth to first order.
 
     A mode at w that grows by g a sample of T is balanced by C = 2 g/(T w^2).  Empty where that is no answer.
@@ -168,7 +162,7 @@ def cured(found: Held, chain: Chain) -> str:
     poles, plant = verdict.loop.poles, verdict.loop.plant
     worst = int(np.argmax(poles.log_radius))
     mode, growth = int(poles.mode[worst]), float(poles.log_radius[worst])
-    if not arm.has_elastic_link or mode == 0 or not 0 < growth < SMALL:
+    if not arm.has_elastic_link or mode == 0 or not 0 < growth < SMALL_GROWTH:
         return ""
     w = float(abs(plant.poles[plant.mode == mode]).max())
     C = float(f"{2 * 2 * growth / (chain.sampling.period * w * w):.1g}")
@@ -180,11 +174,11 @@ def cured(found: Held, chain: Chain) -> str:
     )
 
 
-def later(found: Held, chain: Chain) -> list[Later]:
+def verdicts_later(found: LawAtClock, chain: Chain) -> list[Later]:
     """The verdict on a law as it is, and with half a sample and a whole one of further delay."""
     each = found.each
     rows = [Later(each.name, 0.0, found.verdict)]
-    for more in MORE[1:]:
+    for more in MORE_DELAY:
         delay = chain.sampling.delay_samples + more
         if delay + each.any_law.delay / chain.sampling.period > MOST_DELAY:
             continue
@@ -201,7 +195,7 @@ def delays_table(rows: Sequence[Later], chain: Chain) -> Table:
     return Table(
         stem="sampled-delays",
         title="With more delay",
-        caption=LATER.format(apart=APART * free, held=typeset(" ".join(held))),
+        caption=LATER_CAPTION.format(apart=APART_FROM_FREE * free, held=typeset(" ".join(held))),
         columns=(
             Column("law", "law", of=[row.name for row in rows]),
             Column("further_delay_ms", "further delay", "ms", of=[1e3 * T * row.more for row in rows],
@@ -258,7 +252,7 @@ def _slewed(each: LawOnArm, run: Simulation) -> str:
         return f"{upper(each.name)}: runs away until the arm is folded up, at {significant(run.stopped.time, 3)} s."
     law = each.any_law
     led = [*law.references, *(name.partition(":")[2] for name in law.wanted)]
-    end = DEGREES * float(run.at_samples.hub_angle[-1] - run.scenario.hub_angle[-1])
+    end = math.degrees(run.at_samples.hub_angle[-1] - run.scenario.hub_angle[-1])
     what = f"led by {', '.join(dict.fromkeys(led))}" if led else "led by nothing but the feedforward"
     return (
         f"{upper(each.name)}, {what}: {significant(residual_moment_rms(run), 3)} N m rms left after the slew, the hub "
@@ -270,17 +264,16 @@ def _slewed(each: LawOnArm, run: Simulation) -> str:
 
 
 def _measured_blocks(named: Sequence[LawOnArm], chain: Chain) -> list[Picture | Table]:
-    """Each measured run with the exact loop over it, and both in numbers; nothing where none was measured."""
-    measured = [(each, each.measured) for each in named if each.measured is not None]
-    found = {each.name: beside_exact(each.arm, each.law, chain, run) for each, run in measured}
-    if not found:
-        return []
+    """Each measured run with the exact loop over it, and both in numbers."""
+    found = {
+        each.name: beside_exact(each.arm, each.law, chain, each.measured) for each in named if each.measured is not None
+    }
     sources = " ".join(f"{name}: {it.measured.source}." for name, it in found.items() if it.measured.source)
-    steps = ", ".join(f"{name} by {plain(DEGREES * it.measured.step, 3)} deg" for name, it in found.items())
+    steps = ", ".join(f"{name} by {plain(math.degrees(it.measured.step), 3)} deg" for name, it in found.items())
     picture = Picture(
         stem="sampled-measured",
         title="Measured on the rig, and computed",
-        caption=BESIDE.format(sources=sources, assumed=ASSUMED),
+        caption=MEASURED_CAPTION.format(sources=sources, assumed=ASSUMED_WORDS),
         alt=f"Hub angle and root moment over time, measured and computed: {steps}.",
         figure=draw_beside("Measured steps, and the exact sampled loop", found),
         data=beside_table({each.key: found[each.name] for each in named if each.name in found}),
@@ -294,17 +287,20 @@ def overshoot_table(found: Mapping[str, Beside]) -> Table:
     rows = [_both(it) for it in found.values()]
     titles = {"overshoot": ("overshoot", "%"), "end": ("off at the end", "deg"), "moment": ("largest |moment|", "N m")}
     columns = [Column("law", "law", of=list(found)),
-               Column("step_deg", "step", "deg", of=[DEGREES * it.measured.step for it in found.values()],
+               Column("step_deg", "step", "deg", of=[math.degrees(it.measured.step) for it in found.values()],
                       digits=singly(plain, 4))]  # fmt: skip
     for key, (title, unit) in titles.items():
         for place, which in enumerate(("measured", "computed")):
             values = [row[key][place] for row in rows]
             name = f"{key}_{which}_{unit.replace('%', 'percent').replace(' ', '_')}"
             columns.append(Column(name, which, unit, of=values, digits=singly(significant, 3), group=title))
-    apart = [DEGREES * it.difference_rms for it in found.values()]
+    apart = [math.degrees(it.difference_rms) for it in found.values()]
     columns.append(Column("apart_rms_deg", "apart, rms", "deg", of=apart, digits=singly(significant, 3)))
     return Table(
-        stem="sampled-overshoot", title="Measured and computed, in numbers", caption=OVERSHOOT, columns=tuple(columns)
+        stem="sampled-overshoot",
+        title="Measured and computed, in numbers",
+        caption=OVERSHOOT_CAPTION,
+        columns=tuple(columns),
     )
 
 
@@ -312,7 +308,7 @@ def _both(it: Beside) -> dict[str, tuple[float | str, float]]:
     """Overshoot [%], what the hub is off at the end [deg] and the largest moment [N m]: measured, computed."""
     measured, end, step = it.measured, float(it.measured.reference[-1]), it.measured.step
     over = [100 * overshoot(angle, step, end) for angle in (measured.hub_angle, it.hub_angle)]
-    off = [DEGREES * float(angle[-1] - end) for angle in (measured.hub_angle, it.hub_angle)]
+    off = [math.degrees(angle[-1] - end) for angle in (measured.hub_angle, it.hub_angle)]
     moment = measured.root_moment
     computed = float(abs(it.run.at_samples.root_moment).max())
     return {

@@ -16,38 +16,38 @@ from tfarm.dsp import Chain
 from tfarm.dsp.discretise import rule_in_words
 from tfarm.loop.answers import law_answer
 from tfarm.report.given_laws import GivenLaw, LawOnArm, on_arm
-from tfarm.report.sections import Section
+from tfarm.report.sections import PageSection
 from tfarm.report.words import typeset, upper
 from tfarm.response.signals import Signals
 
-OPEN, FILES_ALONE = "open", (FILES,)  # a column that nothing is led to
-POWERS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
-LEFT_OUT = (
+NOT_LED, FILES_ALONE = "open", (FILES,)  # a column that nothing is led to
+RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
+NOT_ON_PAGE = (
     f"This page is about what stands here, not about the default gains. The map of {' and '.join(PLANE)}, the loci "
     "along them and the gain tuner are of the paper's two gains and are left out; tfarm map --law FILE counts unstable "
     "poles over any two numbers of a law, tfarm locus --law FILE follows them along one."
 )
-IN_Z = (
+IN_Z_ALONE = (
     "A law in z acts at its samples alone: all that is said of {which} is said of the sampled loop, and there is no "
     "loop function of s, no margin and no pole without a clock."
 )
-CAPTION = (
+ENTRIES_CAPTION = (
     "As it was read, in the files with every digit: coefficients in descending powers of s, of z where the law is "
     "discrete. The input is the sum of the signals times these, with the sign that stands under “in the input”."
 )
 
 
-def law_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> Section:
+def law_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> PageSection:
     """Each law: what it reads and drives, its entries, and how it is sampled."""
     named = on_arm(arm, laws)
     words = [_words(each, chain) for each in named]
     discrete = [each for each in named if each.is_discrete]
     if discrete:
         which = "it" if len(named) == 1 else " and of ".join(each.name for each in discrete)
-        words.append(IN_Z.format(which=which))
+        words.append(IN_Z_ALONE.format(which=which))
     blocks = [entries_table(named), *(table for each in named for table in matrices_tables(each))]
     title = "The law" if len(named) == 1 else "The laws"
-    return Section(anchor="law", title=title, words=[*words, LEFT_OUT], blocks=blocks)
+    return PageSection(anchor="law", title=title, words=[*words, NOT_ON_PAGE], blocks=blocks)
 
 
 def _words(each: LawOnArm, chain: Chain) -> str:
@@ -84,34 +84,30 @@ def entries_table(laws: Sequence[LawOnArm]) -> Table:
     return Table(
         stem="law-entries",
         title="What each signal is multiplied by",
-        caption=CAPTION,
+        caption=ENTRIES_CAPTION,
         columns=columns,
     )
 
 
-Row = tuple[str, str, str, str, str, str, str, float | str, float | str]
+EntryRow = tuple[str, str, str, str, str, str, str, float | str, float | str]
 
 
-def _entries(each: LawOnArm) -> Iterator[Row]:
+def _entries(each: LawOnArm) -> Iterator[EntryRow]:
+    """Of each signal: numerator and denominator with every digit, their letter before them, or where matrices stand."""
     law, letter = each.any_law, "z" if each.is_discrete else "s"
     sign, period = "−" if law.sign < 0 else "+", "" if law.period is None else law.period
     for part in law.parts:
-        for name in part.signals:
-            if not name:
-                continue
+        num, den = "matrices, below", ""
+        if isinstance(part.block, Rational):
+            num, den = (
+                f"{letter}: {' '.join(repr(float(c)) for c in row)}" for row in (part.block.num, part.block.den)
+            )
+        for name in filter(None, part.signals):
             plain_name = name.removeprefix(REFERENCE)
             unit = Signals(each.arm, (plain_name,)).units[0]
             led = "less its reference" if name in law.references else "as it is"
             how = led if is_measured(name) else "its reference alone"
-            yield each.name, plain_name, unit, how, sign, *_fraction(part.block, letter), law.delay, period
-
-
-def _fraction(block: Rational | StateSpace, letter: str) -> tuple[str, str]:
-    """Numerator and denominator as coefficients with every digit, the letter before them; or where matrices stand."""
-    if isinstance(block, StateSpace):
-        return "matrices, below", ""
-    num, den = (f"{letter}: {' '.join(repr(float(c)) for c in part)}" for part in (block.num, block.den))
-    return num, den
+            yield each.name, plain_name, unit, how, sign, num, den, law.delay, period
 
 
 def written_polynomial(text: str) -> str:
@@ -126,7 +122,7 @@ def written_polynomial(text: str) -> str:
             continue
         size = plain(abs(value), 6)
         number = "" if size == "1" and power else f"{size} " if power else size
-        term = number + (letter + str(power).translate(POWERS) * (power > 1)) * (power > 0)
+        term = number + (letter + str(power).translate(RAISED) * (power > 1)) * (power > 0)
         terms.append(("− " if value < 0 else "+ ") + term)
     first, *others = terms or ["+ 0"]
     return " ".join([first.removeprefix("+ ").replace("− ", "−"), *others])
@@ -141,12 +137,14 @@ def matrices_tables(each: LawOnArm) -> list[Table]:
         A, B, C, D = part.block.matrices()
         n, whole = len(A), np.block([[A, B], [C, D]])
         step = "next " if each.is_discrete else "d/dt "
-        titles = [f"x{i}" for i in range(1, n + 1)] + [name or OPEN for name in part.signals]
+        titles = [f"x{i}" for i in range(1, n + 1)] + [name or NOT_LED for name in part.signals]
         keys = [f"x{i}" for i in range(1, n + 1)] + [f"{i}_{name or 'open'}" for i, name in enumerate(part.signals, 1)]
         columns = (
             Column("row", "", of=[*(f"{step}x{i}" for i in range(1, n + 1)), "input"]),
             *(
-                Column(key, title, of=whole[:, i], digits=singly(plain, 5), on=FILES_ALONE if title == OPEN else REPORT)
+                Column(
+                    key, title, of=whole[:, i], digits=singly(plain, 5), on=FILES_ALONE if title == NOT_LED else REPORT
+                )
                 for i, (key, title) in enumerate(zip(keys, titles, strict=True))
             ),
         )

@@ -13,14 +13,14 @@ from tfarm.digits import scientific
 from tfarm.errors import TfarmError
 from tfarm.loop.panels import PANEL_SAMPLES
 from tfarm.report.given_laws import Subject
-from tfarm.report.live_data import COLUMNS, live_data
+from tfarm.report.live_data import LIVE_COLUMNS, live_data
 from tfarm.report.loop_laws import has_loop, sign_words
 from tfarm.report.page import TEMPLATES, argument, is_preset, render
 
-PAGE, ASSETS = "live.html", "assets"
+LIVE_PAGE, ASSETS = "live.html", "assets"
 RUNTIME, SCRIPT = f"vega-{vl_convert.get_vega_version()}.js", "live.js"
 BUNDLED = "window.vegaEmbed = vegaEmbed;"
-SCRIPTS = tuple(f"live_{name}.js" for name in ("loop", "sampled", "locus", "sets", "player", "sensor", "page"))
+SCRIPT_PARTS = tuple(f"live_{name}.js" for name in ("loop", "sampled", "locus", "sets", "player", "sensor", "page"))
 
 
 def is_live(subject: Subject) -> bool:
@@ -34,7 +34,7 @@ def save_live(subject: Subject, folder: Path) -> None:
     Where its numbers cannot be made the page says why.
     """
     arm, chain, laws = subject.arm, subject.chain, subject.laws
-    title, out = f"{arm.name}: live loop", folder / PAGE
+    title, out = f"{arm.name}: live loop", folder / LIVE_PAGE
     given = [each.law for each in laws if isinstance(each.law, HubFeedback)]
     try:
         data = live_data(arm, chain, given[0] if given else None)
@@ -43,7 +43,7 @@ def save_live(subject: Subject, folder: Path) -> None:
         return
     data["command_name"] = argument(arm.name, is_preset(arm, chain))
     text = json.dumps(data, separators=(",", ":"), ensure_ascii=True, allow_nan=False).replace("<", "\\u003c")
-    page = render("live.html", title=title, data=data, text=text, sign=sign_words(arm), columns=COLUMNS,
+    page = render("live.html", title=title, data=data, text=text, sign=sign_words(arm), columns=LIVE_COLUMNS,
                   samples=PANEL_SAMPLES * len(data["low"]), error=scientific(data["error"], 1),
                   assets=f"../{ASSETS}", runtime=RUNTIME, script=SCRIPT)  # fmt: skip
     out.write_text(page, encoding="utf-8", newline="")
@@ -60,7 +60,7 @@ def write_assets(folder: Path, there: Path) -> None:
     from tfarm.report.live_charts import charts  # and Altair, which the processes that make pages do not need
 
     named = json.dumps(charts(), separators=(",", ":"), sort_keys=True)
-    scripts = "".join((TEMPLATES / name).read_text(encoding="utf-8") for name in SCRIPTS)
+    scripts = "".join((TEMPLATES / name).read_text(encoding="utf-8") for name in SCRIPT_PARTS)
     own = f"(() => {{\nconst LIVE_CHARTS = {named};\n{scripts}}})();\n"  # the runtime has names of its own
     (folder / SCRIPT).write_text(own, encoding="utf-8", newline="")
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from tfarm.arm import ANGLE_GAIN, GAINS, PLANE, Arm, HubFeedback, unit_of
 from tfarm.crossing import pieces
+from tfarm.digits import kept_digits
 from tfarm.dsp import Chain
 from tfarm.dsp import GainMap as SampledMap
 from tfarm.loop.edges import Axis, moment_axis, rate_axis
@@ -18,17 +19,17 @@ from tfarm.loop.frequencies import steep_places
 from tfarm.loop.lossless import stable_moments
 from tfarm.loop.panels import Panels, loop_panels
 from tfarm.loop.plant import Loop
-from tfarm.loop.regions import Region, region
+from tfarm.loop.regions import region
 from tfarm.loop.stability import loop_band, stability
 from tfarm.report.live_sampled import packed, sampled_numbers, slew_numbers
 from tfarm.report.live_sensor import sensor_numbers
-from tfarm.report.map import OUTSIDE, sampled_region
+from tfarm.report.map import BEYOND_PICTURE, sampled_part
 from tfarm.spectrum.scales import angle_unit, default_gains
 
-COLUMNS = 90  # values of the gain across at which the continuous region is cut
-STIFFEST = 0.1  # of J w1^2: the largest gain on the hub angle of the page
-SMALLEST = 1e-4  # of that: where its slider begins to be logarithmic
-DIGITS = 7  # of the edges of the map's regions: far more than a screen has
+LIVE_COLUMNS = 90  # values of the gain across at which the continuous region is cut
+ANGLE_RANGE = 0.1  # of J w1^2: the largest gain on the hub angle of the page
+ANGLE_LINEAR = 1e-4  # of that: where its slider begins to be logarithmic
+EDGE_DIGITS = 7  # of the edges of the map's regions: far more than a screen has
 
 
 def live_data(arm: Arm, chain: Chain, law: HubFeedback | None = None) -> dict[str, Any]:
@@ -37,18 +38,21 @@ def live_data(arm: Arm, chain: Chain, law: HubFeedback | None = None) -> dict[st
     Raises what `region` and `loop_panels` raise.
     """
     x = rate_axis(arm)
-    y, stiffest = moment_axis(arm, x), STIFFEST * angle_unit(arm)
+    y, stiffest = moment_axis(arm, x), ANGLE_RANGE * angle_unit(arm)
+    axes = {
+        name: {"low": axis.low, "high": axis.high, "linear": None if axis.is_linear else axis.linear}
+        for name, axis in zip(PLANE, (x, y), strict=True)
+    }
     reference = default_gains(arm)
     band, is_quiet = _band(arm, x, y, stiffest)
-    samples = loop_panels(arm, band)
-    continuous, sampled = _region(arm, x, y), sampled_region(arm, x, y, chain)
+    samples, across = loop_panels(arm, band), x.grid(LIVE_COLUMNS)
+    beyond = np.array([y.low - BEYOND_PICTURE, y.high + BEYOND_PICTURE])
+    continuous = region(arm, np.unique(np.r_[across[across > 0], x.high]), beyond)
+    sampled = sampled_part(arm, x, y, chain)
     return {
         "name": arm.name,
         "units": {gain.name: unit_of(gain.name, arm) for gain in GAINS},
-        "axes": {
-            **dict(zip(PLANE, map(_axis, (x, y)), strict=True)),
-            ANGLE_GAIN: {"low": 0.0, "high": stiffest, "linear": SMALLEST * stiffest},
-        },
+        "axes": {**axes, ANGLE_GAIN: {"low": 0.0, "high": stiffest, "linear": ANGLE_LINEAR * stiffest}},
         "start": {gain.name: (law or reference)[gain.name] for gain in GAINS},
         **_samples(samples),
         **_known(arm, band, is_quiet),
@@ -74,10 +78,6 @@ def _band(arm: Arm, x: Axis, y: Axis, stiffest: float) -> tuple[float, bool]:
     return max(bands), all(quiet)
 
 
-def _axis(axis: Axis) -> dict[str, Any]:
-    return {"low": axis.low, "high": axis.high, "linear": None if axis.is_linear else axis.linear}
-
-
 def _samples(panels: Panels) -> dict[str, Any]:
     """The samples as the bytes of doubles, by panel, part and point, and where they are."""
     return {
@@ -98,10 +98,11 @@ def _known(arm: Arm, band: float, is_quiet: bool) -> dict[str, Any]:
     beyond = "beyond the band |L| stays below one half at all gains of this page: no unstable pole there (small gain)"
     if arm.is_reactive and not arm.is_told_by_lyapunov:
         by_energy = "C = 0: none of the modes looked at is driven; no theorem tells the others"
+    moments = stable_moments(arm) if arm.is_reactive else (-math.inf, math.inf)
     return {
         "kind": kind,
         "beyond": beyond if kind == "quiet" else by_energy,
-        "moments": [_finite(each) for each in (stable_moments(arm) if arm.is_reactive else (-math.inf, math.inf))],
+        "moments": [None if math.isinf(end) else end for end in moments],  # JSON has no infinity
         "told": arm.has_elastic_link and arm.reads_hub_moment and not arm.input_lags,
         "hub_alone": arm.loses_at_hub_alone,
         "whole": arm.input_per_torque,
@@ -111,20 +112,15 @@ def _known(arm: Arm, band: float, is_quiet: bool) -> dict[str, Any]:
     }
 
 
-def _finite(value: float) -> float | None:
-    """The value, or None where it is infinite: JSON has no infinity."""
-    return value if math.isfinite(value) else None
-
-
-def _region(arm: Arm, x: Axis, y: Axis) -> Region:
-    across = x.grid(COLUMNS)
-    return region(arm, np.unique(np.r_[across[across > 0], x.high]), np.array([y.low - OUTSIDE, y.high + OUTSIDE]))
-
-
 def _areas(across: Any, intervals: Sequence[Sequence[tuple[float, float]]]) -> list[dict[str, float]]:
     """Rows across, low, high of the parts of a region, each part with its number."""
-    rows = [(number, *point) for number, piece in enumerate(pieces(across, intervals)) for point in piece.points]
-    return [{"part": n, PLANE[0]: _short(a), "low": _short(low), "high": _short(high)} for n, a, low, high in rows]
+    parts = enumerate(pieces(across, intervals))
+    keys = ("part", PLANE[0], "low", "high")
+    return [
+        dict(zip(keys, (number, *kept_digits(point, EDGE_DIGITS)), strict=True))
+        for number, piece in parts
+        for point in piece.points
+    ]
 
 
 def _sampled(plane: SampledMap, chain: Chain) -> dict[str, Any]:
@@ -137,7 +133,3 @@ def _sampled(plane: SampledMap, chain: Chain) -> dict[str, Any]:
         "intervals": plane.stable_intervals,
         "words": f"every {ms}" + ("" if C else f", of the first {plane.modes_used} modes"),
     }
-
-
-def _short(value: float) -> float:
-    return float(f"{value:.{DIGITS}g}")

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import base64
 import math
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -28,8 +27,8 @@ from tfarm.response import transfer
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 STATIONS = 24  # places along the arm at which its shape is drawn, besides the clamp
-BESIDE = 1e-9  # of a pole: where the ratio of two outputs is taken that both have it; the ratio is off by as much
-MOST_SAMPLES = 5000  # of a slew: 160 kB of references; a longer one is left to `tfarm simulate`
+OFF_A_POLE = 1e-9  # of a pole: where the ratio of two outputs is taken that both have it; the ratio is off by as much
+MOST_LIVE_SAMPLES = 5000  # of a slew: 160 kB of references; a longer one is left to `tfarm simulate`
 
 
 def packed(values: Any) -> str:
@@ -40,9 +39,13 @@ def packed(values: Any) -> str:
 
 
 def sampled_numbers(loop: SampledLoop) -> dict[str, Any]:
-    """The sampled loop with the modes that it has."""
-    numbers = _clock(loop.chain) | _plant(loop.pulse.plant)
-    return numbers | {"states": _rigid_states(loop), "modes": loop.plant.count}
+    """The sampled loop with the modes that it has; `states`: poles at z = 1 that the hub's own motion has.
+
+    These are 2, 1 where it is damped or driven through a motor, or 0.
+    """
+    twice, once = loop.plant.rigid[0]
+    states = {"states": 2 if twice else 1 if once else 0, "modes": loop.plant.count}
+    return _clock(loop.chain) | _plant(loop.pulse.plant) | states
 
 
 def slew_numbers(arm: Arm, chain: Chain, law: HubFeedback) -> dict[str, Any] | None:
@@ -50,17 +53,14 @@ def slew_numbers(arm: Arm, chain: Chain, law: HubFeedback) -> dict[str, Any] | N
     arm's shapes; None where there is no such slew."""
     try:
         task = scenario("slew", arm, chain, RECORD_LENGTH * chain.slew.rise_time)
-        if task.t.size > MOST_SAMPLES:
+        if task.t.size > MOST_LIVE_SAMPLES:
             return None
-        count = enough_modes(partial(_slewed, arm, chain, task, law)).modes
+        linear = ideal_chain(chain)
+        count = enough_modes(lambda number: Simulator(arm, linear, task, count=number).linear(law)).modes
         plant = Simulator(arm, chain, task, count=count).plant
         return _clock(chain) | _upper(plant) | _task(task, chain, arm) | {"modes": count} | _shapes(arm, plant)
     except TfarmError:
         return None
-
-
-def _slewed(arm: Arm, chain: Chain, task: Scenario, law: HubFeedback, count: int) -> Any:
-    return Simulator(arm, ideal_chain(chain), task, count=count).linear(law)
 
 
 def _clock(chain: Chain) -> dict[str, Any]:
@@ -101,12 +101,6 @@ def _kept(plant: Plant) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     return upper, np.where(plant.poles[upper].imag > 0, 2.0, 1.0)
 
 
-def _rigid_states(loop: SampledLoop) -> int:
-    """How many poles at z = 1 the hub's own motion has: 2, 1 where it is damped or driven through a motor, or 0."""
-    twice, once = loop.plant.rigid[0]
-    return 2 if twice else 1 if once else 0
-
-
 def _task(task: Scenario, chain: Chain, arm: Arm) -> dict[str, Any]:
     """References a sample, converters, and what a person is told of the slew."""
     rows = quantisers(chain).rows.tolist()
@@ -131,7 +125,7 @@ def _shapes(arm: Arm, plant: Plant) -> dict[str, Any]:
     The ratio of residues is that of the numerators, whatever drives the hub.
     """
     upper, _ = _kept(plant)
-    s = plant.poles[upper].astype(complex) * (1 + BESIDE)
+    s = plant.poles[upper].astype(complex) * (1 + OFF_A_POLE)
     x = np.linspace(0.0, arm.length, STATIONS + 1)
     ratios = []
     for place in x:

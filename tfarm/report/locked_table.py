@@ -15,13 +15,15 @@ from tfarm.errors import ConvergenceError
 from tfarm.spectrum import Modes, damped_modes
 from tfarm.spectrum.table import hub_locked
 
-FIRST = 6
-CAPTION = (
+LOCKED_MODES = 6  # rows: what is measured of a rig is hardly ever a higher mode
+LOCKED_CAPTION = (
     "Natural frequencies with the hub free to turn and with the hub held still, neither damped{damped}. What is "
     "measured on a rig after a slew lies mostly near the right column."
 )
-WITH = "; between them those of the free hub with what it loses at its own friction (and back-EMF), and nothing else"
-HELD = (
+WITH_LOSSES = (
+    "; between them those of the free hub with what it loses at its own friction (and back-EMF), and nothing else"
+)
+WHICH_IS_MEASURED = (
     "Which number is it that you measured? Once a slew is over dry friction holds the hub, and the link rings at the "
     "hub-locked frequencies: first {locked} rad/s ({locked_hz} Hz). The linear rig, whose hub swings along, rings at "
     "{free} rad/s ({free_hz} Hz){damped}. A peak near the former says that the hub stood still, one near the latter "
@@ -38,16 +40,11 @@ def locked_words(arm: Arm) -> list[str]:
     free, locked = tfarm.modes(arm, 1), hub_locked(tfarm.modes(arm, 1))
     omega, held = float(free.natural_frequency[-1]), float(locked.natural_frequency[-1])
     numbers = {"free": omega, "free_hz": omega / (2 * math.pi), "locked": held, "locked_hz": held / (2 * math.pi)}
-    return [HELD.format(damped=_first_damped(arm), **{name: significant(x, 5) for name, x in numbers.items()})]
-
-
-def _first_damped(arm: Arm) -> str:
-    """How the first mode of the free hub rings with the hub's own losses."""
-    found = _lossy(arm, 1)
-    if found is None:
-        return ""
-    s, ratio = complex(found[0][-1]), float(found[1][-1])
-    return SWINGS.format(omega=significant(s.imag, 5), ratio=significant(100 * ratio, 3)) if s.imag else CREEPS
+    damped = ""
+    if (lossy := _lossy(arm, 1)) is not None:  # how the first mode of the free hub rings with the hub's own losses
+        s, ratio = complex(lossy[0][-1]), significant(100 * float(lossy[1][-1]), 3)
+        damped = SWINGS.format(omega=significant(s.imag, 5), ratio=ratio) if s.imag else CREEPS
+    return [WHICH_IS_MEASURED.format(damped=damped, **{name: significant(x, 5) for name, x in numbers.items()})]
 
 
 def _lossy(arm: Arm, count: int) -> tuple[np.ndarray, np.ndarray] | None:
@@ -67,26 +64,22 @@ def _lossy(arm: Arm, count: int) -> tuple[np.ndarray, np.ndarray] | None:
 def locked_table(table: Modes) -> Table:
     """A row a mode: hub free, with its losses where it has any, and locked."""
     arm = table.arm
-    free = tfarm.modes(arm, FIRST, theory=table.theory)
+    free = tfarm.modes(arm, LOCKED_MODES, theory=table.theory)
     omega, locked = free.natural_frequency[free.index > 0], hub_locked(free)
     held = locked.natural_frequency[locked.index > 0]
-    columns = [Column("mode", "mode", of=range(1, FIRST + 1)), *_pair("hub_free", "hub free", omega)]
-    lossy = None if arm.is_locked else _lossy(arm, FIRST)
-    if lossy is not None and lossy[0].size == FIRST:
+    columns = [Column("mode", "mode", of=range(1, LOCKED_MODES + 1)), *_pair("hub_free", "hub free", omega)]
+    lossy = None if arm.is_locked else _lossy(arm, LOCKED_MODES)
+    if lossy is not None and lossy[0].size == LOCKED_MODES:
         s, ratio = lossy
         group = "hub free, with its own losses"
         columns += [
             Column("with_losses_rad_s", "Im s", "rad/s", of=s.imag, digits=lined(8, 7), group=group),
-            Column("with_losses_damping_percent", "damping ratio", "%", of=100 * ratio, digits=singly(_percent),
+            Column("with_losses_damping_percent", "damping ratio", "%", of=100 * ratio, digits=singly(significant, 4),
                    group=group),
         ]  # fmt: skip
     columns += _pair("hub_locked", "hub locked", held)
-    caption = CAPTION.format(damped=WITH if lossy is not None else "")
+    caption = LOCKED_CAPTION.format(damped=WITH_LOSSES if lossy is not None else "")
     return Table(stem="hub-locked", title="Hub free and hub locked", caption=caption, columns=tuple(columns))
-
-
-def _percent(ratio: float) -> str:
-    return significant(ratio, 4)
 
 
 def _pair(key: str, group: str, omega: np.ndarray) -> list[Column]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from tfarm.arm import MOMENT_GAIN, RATE_GAIN, Arm, HubFeedback, shown_unit, written_unit
 from tfarm.columns import Column, Table
-from tfarm.digits import counted, listed, plain, scientific, significant, singly
+from tfarm.digits import how_many, listed, plain, scientific, significant, singly
 from tfarm.errors import ConvergenceError
 from tfarm.loop.loci import Loci, loci
 from tfarm.loop.most_damped import most_damped
@@ -17,42 +17,51 @@ from tfarm.loop.stability import MARGIN_OF_ZERO, Stability, stability
 from tfarm.plots.roots import draw_loci
 from tfarm.report.locus_tables import crossing_table, gap_table, loci_data
 from tfarm.report.loop_laws import edge_of_K2, has_loop, margins_of
-from tfarm.report.sections import Picture, Section
+from tfarm.report.sections import PageSection, Picture
 from tfarm.response.frequency import Real
 from tfarm.spectrum.scales import default_gains, rate_unit
 
-BEYOND = (0.9, 1.0, 1.01, 1.1, 1.5)  # values of K2 whose exact poles are listed
+LISTED_MOMENT_GAINS = (0.9, 1.0, 1.01, 1.1, 1.5)  # values of K2 whose exact poles are listed
 AROUND_EDGE = (0.9, 1.1)  # times the edge, if that lies above all of them
-RANGE_OF_K2 = (-1.0, 1.6)
+RANGE_OF_K2 = (-1.0, 1.6)  # of the locus, times what balances a torque: both sides of 0, and beyond 1
 shortly = partial(plain, digits=4)  # how a gain is written in a sentence
 
-SEEN = (
+LOCUS_CAPTION = (
     "Broad lines: exact poles, followed along {name}. Dashed: python-control on a modal model of order {order}, its "
     "error band (at most {worst} of |s|) shaded where it is wider than the line. At the left all branches on one "
     "scale, at the right each mode on its own. Shown are Im s ≥ 0, and the lower half of a pair that meets on the real "
     "axis."
 )
-UNDAMPED = (
+BEYOND_UNDAMPED = (
     "Exact poles, each list complete in its box. At C = 0 and K2 = 1 the law cancels the root moment: the hub no "
     "longer feels the arm, and every mode with the hub at rest stays undamped. Any K2 above 1 makes every flexible "
     "mode unstable."
 )
-DAMPED = "Exact poles, each list complete in its box. {edge}"
-MORE = " From the first unstable row on, more K2 drives more modes."
+BEYOND_DAMPED = "Exact poles, each list complete in its box. {edge}"
+MORE_MODES = " From the first unstable row on, more K2 drives more modes."
 BACKWARDS = " At K1 = 0 a real pole is unstable from K2 = J/(J − I_h) = {K2} on: torque then turns the arm backwards."
 NOT_FOLLOWED = (
     "Along {name} the branches of this arm could not be followed: on the way poles come too near to each other, or to "
     "−1/C, to be told apart. No line is drawn rather than one that may jump; where the poles are at a few gains, each "
     "list complete, stands in the table."
 )
-CUT = " Beyond {name} = {end} the branches come too near to each other, or to −1/C, to be told apart: they end there."
-ENDED = (
+CUT_SHORT = (
+    " Beyond {name} = {end} the branches come too near to each other, or to −1/C, to be told apart: they end there."
+)
+BRANCH_ENDS = (
     " A branch ends at {name} = {gain}: there its pole comes to −1/C, where real poles accumulate, or cannot be told."
 )
-RATES = (0.0, 0.05, 0.2, 0.5, 1.0, 2.0)  # times J w1: values of K1 whose exact poles are listed where no locus is
+LISTED_RATE_GAINS = (
+    0.0,
+    0.05,
+    0.2,
+    0.5,
+    1.0,
+    2.0,
+)  # times J w1: values of K1 whose poles are listed for want of a locus
 
 
-def locus_section(arm: Arm) -> Section:
+def locus_section(arm: Arm) -> PageSection:
     """Where the poles go as each gain grows, and what K2 = 1 and beyond does."""
     words, blocks = [], list[Picture | Table]()
     held = default_gains(arm)
@@ -65,21 +74,17 @@ def locus_section(arm: Arm) -> Section:
             words.append(NOT_FOLLOWED.format(name=name))
             blocks += [rates_table(arm, held)] * (name == RATE_GAIN)
             continue
-        words.append(_locus_words(data))
+        size = scientific(data.reduced.worst, 2)
+        gap = f"python-control's locus of order {data.reduced.order} is within {size} of |s| of the exact one."
+        cut = CUT_SHORT.format(name=name, end=plain(float(data.exact.gain[-1]), 4)) if data.is_cut else ""
+        ended = "".join(BRANCH_ENDS.format(name=name, gain=significant(gain, 3)) for _, gain in data.exact.ends)
+        words.append(f"{_more_damping(data) if name == RATE_GAIN else _more_moment(data)}; {gap}{cut}{ended}")
         blocks += [_locus_picture(data), gap_table(data, f"locus-{name}-gap")]
         if data.exact.crossings:
             blocks.append(crossing_table(data, f"locus-{name}-crossings"))
     if has_loop(arm):
         blocks.append(beyond_table(arm, held))
-    return Section(anchor="locus", title="Where do the poles go?", words=words, blocks=blocks)
-
-
-def _locus_words(data: Loci) -> str:
-    size = scientific(data.reduced.worst, 2)
-    gap = f"python-control's locus of order {data.reduced.order} is within {size} of |s| of the exact one."
-    cut = CUT.format(name=data.name, end=plain(float(data.exact.gain[-1]), 4)) if data.is_cut else ""
-    ended = "".join(ENDED.format(name=data.name, gain=significant(gain, 3)) for _, gain in data.exact.ends)
-    return f"{_more_damping(data) if data.name == RATE_GAIN else _more_moment(data)}; {gap}{cut}{ended}"
+    return PageSection(anchor="locus", title="Where do the poles go?", words=words, blocks=blocks)
 
 
 def _more_damping(data: Loci) -> str:
@@ -122,8 +127,8 @@ def _locus_picture(data: Loci) -> Picture:
     return Picture(
         stem=f"locus-{name}",
         title=f"Closed-loop poles along {name}",
-        caption=SEEN.format(name=name, order=data.reduced.order, worst=scientific(data.reduced.worst, 2)),
-        alt=f"Root locus along {name}: {len(data.exact.branches)} branches, {counted(many, 'crossing')} of the "
+        caption=LOCUS_CAPTION.format(name=name, order=data.reduced.order, worst=scientific(data.reduced.worst, 2)),
+        alt=f"Root locus along {name}: {len(data.exact.branches)} branches, {how_many(many, 'crossing')} of the "
         f"imaginary axis; the reduced branches are within {scientific(data.reduced.worst, 2)} of |s|.",
         figure=draw_loci(data),
         data=loci_data(data, f"locus-{name}-data"),
@@ -133,8 +138,13 @@ def _locus_picture(data: Loci) -> Picture:
 def beyond_table(arm: Arm, held: HubFeedback) -> Table:
     """Verdict and poles of the exact loop for a few K2 around 1 and beyond."""
     edge, unit = edge_of_K2(arm, held) or 0.0, arm.input_per_torque
-    more = [float(f"{share * edge:.3g}") for share in AROUND_EDGE if edge > BEYOND[-1] * unit]
-    gains = np.array([*(share * unit for share in BEYOND), *(gain for gain in more if BEYOND[-1] * unit < gain)])
+    more = [float(f"{share * edge:.3g}") for share in AROUND_EDGE if edge > LISTED_MOMENT_GAINS[-1] * unit]
+    gains = np.array(
+        [
+            *(share * unit for share in LISTED_MOMENT_GAINS),
+            *(gain for gain in more if LISTED_MOMENT_GAINS[-1] * unit < gain),
+        ]
+    )
     on_edge = np.isclose(gains, edge, rtol=1e-9, atol=0.0) & (not arm.is_undamped)  # no list of poles ends there
     laws = [held.having(MOMENT_GAIN, float(gain)) for gain in gains]
     found = [None if on else _judged(arm, law) for law, on in zip(laws, on_edge, strict=True)]
@@ -145,7 +155,7 @@ def beyond_table(arm: Arm, held: HubFeedback) -> Table:
 
 def rates_table(arm: Arm, held: HubFeedback) -> Table:
     """Verdict and poles of the exact loop for a few rate gains."""
-    gains = np.array([float(f"{share * rate_unit(arm):.3g}") for share in RATES])
+    gains = np.array([float(f"{share * rate_unit(arm):.3g}") for share in LISTED_RATE_GAINS])
     found = [_judged(arm, held.having(RATE_GAIN, float(gain))) for gain in gains]
     title = f"Poles at a few {RATE_GAIN}, at {held.told(MOMENT_GAIN, shortly)}"
     caption = "Exact poles, each list complete in its box."
@@ -203,20 +213,16 @@ def _first_pairs(it: Stability | None) -> str:
 
 
 def _beyond_caption(arm: Arm, held: HubFeedback, found: Sequence[Stability | None]) -> str:
+    """Up to which K2 the loop stays stable, from the windows of the gains held, and what lies beyond."""
     J, hub = arm.total_inertia, arm.hub.inertia
     backwards = BACKWARDS.format(K2=significant(J / (J - hub), 5)) if arm.has_rigid_mode and arm.is_uniform else ""
     if arm.is_uniform and not arm.damping:
-        return UNDAMPED + backwards
+        return BEYOND_UNDAMPED + backwards
+    around, edge, words = margins_of(arm, held).windows[MOMENT_GAIN].around, edge_of_K2(arm, held), ""
+    if edge is not None:
+        words = f"At this K1 the loop is stable up to K2 = {plain(edge, 6)}."
+    elif around is not None:
+        words = f"At this K1 no K2 up to {plain(around[1], 6)} makes the loop unstable."
     counts = [it.unstable_roots for it in found if it is not None and it.unstable_roots]
-    more = MORE if len(counts) > 1 and counts[-1] > counts[0] and counts == sorted(counts) else ""
-    return DAMPED.format(edge=_edge_words(arm, held)) + more + backwards
-
-
-def _edge_words(arm: Arm, held: HubFeedback) -> str:
-    """Up to which K2 the loop stays stable, from the windows of the gains held."""
-    windows, edge = margins_of(arm, held).windows[MOMENT_GAIN], edge_of_K2(arm, held)
-    if windows.around is None:
-        return ""
-    if edge is None:
-        return f"At this K1 no K2 up to {plain(windows.around[1], 6)} makes the loop unstable."
-    return f"At this K1 the loop is stable up to K2 = {plain(edge, 6)}."
+    more = MORE_MODES if len(counts) > 1 and counts[-1] > counts[0] and counts == sorted(counts) else ""
+    return BEYOND_DAMPED.format(edge=words) + more + backwards

@@ -7,14 +7,14 @@ import math
 import numpy as np
 
 from tfarm.columns import Column, Table
-from tfarm.digits import held, scientific, significant, singly
+from tfarm.digits import kept_digits, scientific, significant, singly
 from tfarm.loop.loci import GAPS_HELD, POLE_DIGITS, Loci, shown
 
 
 def crossing_table(data: Loci, stem: str) -> Table:
     """Where the branches cross the imaginary axis."""
     found = list(data.exact.crossings)
-    gain, omega = (held([getattr(each, key) for each in found], POLE_DIGITS) for key in ("gain", "omega"))
+    gain, omega = (kept_digits([getattr(each, key) for each in found], POLE_DIGITS) for key in ("gain", "omega"))
     return Table(
         stem=stem,
         title=f"Crossings of the imaginary axis along {data.name}",
@@ -36,7 +36,7 @@ def crossing_table(data: Loci, stem: str) -> Table:
 
 def gap_table(data: Loci, stem: str) -> Table:
     """How far each reduced branch is from the exact one."""
-    gap, names = held(data.reduced.gap, GAPS_HELD), [f"mode {n}" if n else "rigid body" for n in data.exact.mode]
+    gap, names = kept_digits(data.reduced.gap, GAPS_HELD), [f"mode {n}" if n else "rigid body" for n in data.exact.mode]
     return Table(
         stem=stem,
         title=f"How far python-control's locus is from the exact one, along {data.name}",

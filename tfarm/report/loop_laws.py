@@ -17,13 +17,16 @@ from tfarm.plots.words import gains_words
 from tfarm.spectrum.scales import default_gains
 from tfarm.synthesis.design import Design, design
 
-MODES = 2  # flexible modes in the band of the damping that is drawn and designed for, as `tfarm design` has it
-SIGN = (
+DESIGNED_MODES = 2  # flexible modes in the band of the damping that is drawn and designed for, as `tfarm design` has it
+SIGN_WORDS = (
     f"Law: u = −{RATE_GAIN} dθ/dt − {MOMENT_GAIN} E I φ′(0) + r. Sign of {MOMENT_GAIN}: the strain gauge reads "
     f"E I φ′(0), positive where it accelerates the hub; {{rest}}. With the gauge reversed every "
     f"{MOMENT_GAIN} changes its sign."
 )
-AT_REST, HELD = "a torque u at rest gives −(J − I_h)/J u", "a torque u that lasts gives −u, as the tip holds the arm"
+TORQUE_AT_REST, TORQUE_HELD = (
+    "a torque u at rest gives −(J − I_h)/J u",
+    "a torque u that lasts gives −u, as the tip holds the arm",
+)
 NO_PLACE_FOR_K2 = (
     f"The hub of this arm has no inertia: {{gauge}}, so feeding it back by {MOMENT_GAIN} would be an algebraic loop. "
     f"There is no map of {' and '.join(PLANE)}; what {RATE_GAIN} does at {MOMENT_GAIN} = 0 is said below."
@@ -82,10 +85,10 @@ def why_no_loop(arm: Arm) -> str:
 def sign_words(arm: Arm) -> str:
     """The law, and the sign of its moment gain."""
     if arm.is_uniform:
-        return SIGN.format(rest=AT_REST if arm.has_rigid_mode else HELD)
+        return SIGN_WORDS.format(rest=TORQUE_AT_REST if arm.has_rigid_mode else TORQUE_HELD)
     share = significant(arm.gauged_inertia / arm.total_inertia, 5) if arm.has_rigid_mode else ""
-    rest = f"a static torque at the hub gives −{share} times as much" if share else HELD
-    return f"Here u is {input_words(arm)}. {SIGN.format(rest=rest)}"
+    rest = f"a static torque at the hub gives −{share} times as much" if share else TORQUE_HELD
+    return f"Here u is {input_words(arm)}. {SIGN_WORDS.format(rest=rest)}"
 
 
 def edge_of_K2(arm: Arm, law: HubFeedback) -> float | None:
@@ -101,14 +104,14 @@ def best(arm: Arm, chain: Chain) -> Design | None:
     if not has_loop(arm):
         return None
     try:
-        found = design(arm, modes=MODES, chain=chain)
+        found = design(arm, modes=DESIGNED_MODES, chain=chain)
     except ConvergenceError:
         return None
     return None if found.at_limit else found  # the gain at which the hub stands still is no law to draw
 
 
 @lru_cache(maxsize=64)
-def brief_of(arm: Arm, law: HubFeedback, chain: Chain) -> SampledBrief:
+def brief_on(arm: Arm, law: HubFeedback, chain: Chain) -> SampledBrief:
     """Whether gains hold when sampled, computed once for all sections."""
     return sampled_brief(arm, law, chain)
 

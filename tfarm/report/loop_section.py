@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, unit_of, written_unit
-from tfarm.digits import counted, plain, significant
+from tfarm.digits import how_many, plain, significant
 from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError
 from tfarm.loop.edges import DEEPEST_MOMENT_GAIN
@@ -14,31 +14,34 @@ from tfarm.loop.stability import stability
 from tfarm.loop.windows import Windows
 from tfarm.plots.disc import draw_nyquist
 from tfarm.report.loop_laws import (
-    MODES,
+    DESIGNED_MODES,
     NamedLaw,
-    brief_of,
+    brief_on,
     edge_of_K2,
     has_loop,
     laws,
     margins_of,
     why_no_loop,
 )
-from tfarm.report.map import GainMap, draw_map, gain_map, map_data
+from tfarm.report.map import MapOfArm, draw_map_of_arm, map_data, map_of_arm
 from tfarm.report.margins_table import margin_table, verdict_facts, verdict_words, window_table
-from tfarm.report.nyquist import COMPARED, Curve, count_table, curve_data
-from tfarm.report.sections import Picture, Section
+from tfarm.report.nyquist import RINGS_CAPTION, TO_COMPARE, PlotOfLaw, count_table, curve_data
+from tfarm.report.sections import PageSection, Picture
 from tfarm.report.words import typeset
 from tfarm.spectrum.scales import default_gains, default_words, rate_unit
 
 UNSTABLE_K2 = 1.5  # at least, of the law whose encirclements are counted for comparison
-BEYOND_EDGE = 1.2  # and at least so many times the K2 at which the loop loses its stability
+TIMES_THE_EDGE = 1.2  # and at least so many times the K2 at which the loop loses its stability
 
 MAP_SEEN = (
     "Green: every pole is in the left half-plane{apart}; orange: the number of unstable poles. The black edge and the "
     "counts are exact, of the arm itself and no reduced model{reach}. Blue: damping ratio of the least damped pole "
     "below {band} rad/s. {proof} K1 is scaled by J ω₁ = {unit}{held}."
 )
-APART, HELD = ", that of the hub angle at 0 apart", ", with J the inertia of what turns: hub, link and finite payload"
+APART_FROM_HUB, WITH_INERTIA = (
+    ", that of the hub angle at 0 apart",
+    ", with J the inertia of what turns: hub, link and finite payload",
+)
 ALL_MODES, UP_TO = ", with all its infinitely many modes", ", with every crossing up to {band} rad/s"
 PROOF = "The purple frame is what the Lyapunov argument proves at C = 0: K1 > 0 and K2 < 1, all of the stable region."
 NO_PROOF = (
@@ -54,12 +57,12 @@ OF_OTHER_GAUGE = (
     "The gauge does not read the moment on the hub, so Lyapunov's argument proves K2 = 0 alone; the edge is computed."
 )
 OF_LAG = "The voltage comes late through an inductance, so Lyapunov's argument proves nothing; the edge is computed."
-SAMPLED = (
+SAMPLED_SEEN = (
     " Hatched: what is stable when the loop is sampled every {clock}, its edge exact for the first {modes} modes; with "
     "that clock no gains outside the hatching hold, whatever the continuous loop promises."
 )
-NOT_SAMPLED = " Where the loop is stable when it is sampled every {clock} could not be settled and is not drawn."
-DEPTH = " For this map unstable windows below K2 = {deepest} were not looked for."
+SAMPLED_NOT_SEEN = " Where the loop is stable when it is sampled every {clock} could not be settled and is not drawn."
+DEPTH_WORDS = " For this map unstable windows below K2 = {deepest} were not looked for."
 NYQUIST_WORDS = (
     "Every size of L(iω) from 0 to infinity is in the picture: a size r is drawn as r/(1 + r), so nothing is cut off, "
     "and infinity is the outer rim. The loop is stable when the curve does not turn around −1. {poles}"
@@ -80,28 +83,28 @@ HELD_POLES = (
 NO_POLE = "L has no pole on the imaginary axis."
 
 
-def no_loop_section(arm: Arm) -> Section:
+def no_loop_section(arm: Arm) -> PageSection:
     """One sentence for an arm that has no loop."""
-    return Section(anchor="no-loop", title="The loop", words=(why_no_loop(arm),))
+    return PageSection(anchor="no-loop", title="The loop", words=(why_no_loop(arm),))
 
 
 # ------------------------------------------------------------ the map
 
 
-def map_section(arm: Arm, chain: Chain | None = None) -> Section:
+def map_section(arm: Arm, chain: Chain | None = None) -> PageSection:
     """How high may the gains go?  And how high when the loop is sampled by the chain's clock?"""
-    data = gain_map(arm, chain)
+    data = map_of_arm(arm, chain)
     picture = Picture(
         stem="map",
         title="The plane of both gains",
         caption=_map_caption(data),
         alt="Map of K1 and K2: the stable gains, and how many poles are unstable elsewhere; how far each gain may go "
         "is said above.",
-        figure=draw_map(data),
+        figure=draw_map_of_arm(data),
         data=map_data(data),
     )
     words = (_answer(arm), _best_words(data))
-    return Section(
+    return PageSection(
         anchor="margins-map", title="How high may the gains go?", words=[w for w in words if w], blocks=(picture,)
     )
 
@@ -146,7 +149,7 @@ def _crossing_there(windows: Windows, value: float) -> str:
     return f", where poles cross at {significant(crossing.at, 4)} rad/s"
 
 
-def _best_words(data: GainMap) -> str:
+def _best_words(data: MapOfArm) -> str:
     found = data.design
     if found is None:
         return ""
@@ -159,27 +162,32 @@ def _best_words(data: GainMap) -> str:
     sampled = f"{words[0].upper()}{words[1:]}" if brief.is_stable else f"But {words}"
     edge = f" That is no optimum: the dotted frame cuts the search off at {cut}, and there is more beyond." * bool(cut)
     return (
-        f"The best damping of the first {MODES} modes that the sampled loop holds within the dotted frame is "
+        f"The best damping of the first {DESIGNED_MODES} modes that the sampled loop holds within the dotted frame is "
         f"{significant(100 * found.value, 3)} % of critical, at {gains} (tfarm design), without a clock "
         f"{found.verdict.verdict}.{edge} {sampled}."
     )
 
 
-def _map_caption(data: GainMap) -> str:
+def _map_caption(data: MapOfArm) -> str:
     proof = proof_words(data.arm)
     unit = f"{plain(rate_unit(data.arm), 4)} {unit_of(RATE_GAIN, data.arm)}"
     reach = ALL_MODES if data.arm.is_told_by_lyapunov else UP_TO.format(band=significant(data.region.band, 5))
     free = data.arm.has_rigid_mode
     seen = MAP_SEEN.format(
-        band=significant(data.band, 5), proof=proof, unit=unit, reach=reach, apart=APART * free, held=HELD * (not free)
+        band=significant(data.band, 5),
+        proof=proof,
+        unit=unit,
+        reach=reach,
+        apart=APART_FROM_HUB * free,
+        held=WITH_INERTIA * (not free),
     )
-    sampled = NOT_SAMPLED if data.sampled is None else SAMPLED
+    sampled = SAMPLED_NOT_SEEN if data.sampled is None else SAMPLED_SEEN
     clock = f"{plain(1e3 * data.chain.sampling.period)} ms"
     modes = 0 if data.sampled is None else data.sampled.modes_used
     return (
         seen
         + sampled.format(clock=clock, modes=modes)
-        + DEPTH.format(deepest=plain(DEEPEST_MOMENT_GAIN * data.arm.input_per_torque, 4)) * (not data.is_undamped)
+        + DEPTH_WORDS.format(deepest=plain(DEEPEST_MOMENT_GAIN * data.arm.input_per_torque, 4)) * (not data.is_undamped)
     )
 
 
@@ -202,15 +210,15 @@ def proof_words(arm: Arm) -> str:
 # ------------------------------------------------------------ margins
 
 
-def margins_section(arm: Arm, chain: Chain | None = None) -> Section:
+def margins_section(arm: Arm, chain: Chain | None = None) -> PageSection:
     """The verdict on each law, continuous and at the chain's clock, then its margins."""
     chain = Chain() if chain is None else chain
     named = laws(arm, chain)
     found = [margins_of(arm, each.law) for each in named]
-    return Section(
+    return PageSection(
         anchor="margins",
         title="Is the loop stable, and by how much?",
-        facts=tuple(verdict_facts(named, found, [brief_of(arm, each.law, chain) for each in named])),
+        facts=tuple(verdict_facts(named, found, [brief_on(arm, each.law, chain) for each in named])),
         words=[verdict_words(*each) for each in zip(named, found, strict=True)],
         blocks=(margin_table(named, found, arm.is_told_by_lyapunov), window_table(named, found)),
     )
@@ -219,52 +227,48 @@ def margins_section(arm: Arm, chain: Chain | None = None) -> Section:
 # ------------------------------------------------------------ Nyquist
 
 
-def nyquist_section(arm: Arm, chain: Chain | None = None) -> Section:
+def nyquist_section(arm: Arm, chain: Chain | None = None) -> PageSection:
     """The loop function on a contour that hides nothing."""
     named = laws(arm, Chain() if chain is None else chain)
-    plots = [Curve(each, nyquist_of(margins_of(arm, each.law).stability)) for each in named]
-    counted = [*plots, *_to_compare(arm)]
+    plots = [PlotOfLaw(each, nyquist_of(margins_of(arm, each.law).stability)) for each in named]
+    every = [*plots, *_to_compare(arm)]
     picture = Picture(
         stem="nyquist",
         title="Nyquist plots of the exact loop function",
-        caption="Rings: sizes of L; −1 lies on the ring 1. Broad: ω > 0, arrows as ω rises; thin: its mirror image.",
+        caption=RINGS_CAPTION,
         alt="; ".join(
             f"{p.named.name}: {p.data.verdict.verdict}, {p.data.encirclements} encirclements of −1" for p in plots
         ),
         figure=draw_nyquist(arm.name, {plot.named.name: plot.data for plot in plots}),
         data=curve_data(plots),
     )  # fmt: skip
-    names = [f"{plot.named.name}: {plot.named.gains}" for plot in counted]
-    words = (_nyquist_answer(plots), NYQUIST_WORDS.format(poles=_poles_words(plots[0].data)))
+    names = [f"{plot.named.name}: {plot.named.gains}" for plot in every]
+    answer = "; ".join(
+        f"{named.name}: {p.verdict.verdict}, {how_many(abs(p.encirclements), 'turn')} around −1 and "
+        f"{how_many(p.verdict.unstable_roots, 'unstable pole')}"
+        for named, p in plots
+    )
+    words = (f"{answer.capitalize()}.", NYQUIST_WORDS.format(poles=_poles_words(plots[0].data)))
     title = "Nyquist: does the loop function turn around −1?"
-    return Section(anchor="margins-nyquist", title=title, words=words, blocks=(picture, count_table(counted, names)))
+    return PageSection(anchor="margins-nyquist", title=title, words=words, blocks=(picture, count_table(every, names)))
 
 
-def _to_compare(arm: Arm) -> list[Curve]:
+def _to_compare(arm: Arm) -> list[PlotOfLaw]:
     """An unstable law whose turns are counted too: K2 beyond its edge, on a free pin K1 < 0; none where neither counts.
 
     K1 is small there: without inertia at the hub a large K1 < 0 drives poles unstable at any frequency.
     """
     law = default_gains(arm)
-    beyond = float(f"{BEYOND_EDGE * (edge_of_K2(arm, law) or arm.input_per_torque):.3g}")
+    beyond = float(f"{TIMES_THE_EDGE * (edge_of_K2(arm, law) or arm.input_per_torque):.3g}")
     drives = (
         law.having(MOMENT_GAIN, max(UNSTABLE_K2 * arm.input_per_torque, beyond))
         if has_loop(arm)
         else law.having(RATE_GAIN, float(f"{-law[RATE_GAIN] / 10:.3g}"))
     )
     try:
-        return [Curve(NamedLaw(COMPARED, "unstable", drives), nyquist_of(stability(arm, drives)))]
+        return [PlotOfLaw(NamedLaw(TO_COMPARE, "unstable", drives), nyquist_of(stability(arm, drives)))]
     except ConvergenceError:
         return []
-
-
-def _nyquist_answer(plots: list[Curve]) -> str:
-    parts = [
-        f"{named.name}: {p.verdict.verdict}, {counted(abs(p.encirclements), 'turn')} around −1 and "
-        f"{counted(p.verdict.unstable_roots, 'unstable pole')}"
-        for named, p in plots
-    ]
-    return f"{'; '.join(parts).capitalize()}."
 
 
 def _poles_words(plot: Nyquist) -> str:

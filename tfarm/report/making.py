@@ -18,24 +18,24 @@ from tfarm.processes import may_start_processes, shared
 from tfarm.report.card import save_card
 from tfarm.report.given_laws import Subject
 from tfarm.report.live import is_live, save_live, write_assets
-from tfarm.report.pieces import LAW_PIECES, PIECES, Piece
-from tfarm.report.sections import SavedSection, Section, save_section
+from tfarm.report.pieces import ARM_PIECES, LAW_PIECES, Piece
+from tfarm.report.sections import PageSection, SavedSection, save_section
 from tfarm.report.trust import Evidence, gather
 from tfarm.report.trust_proofs import save_proof
-from tfarm.report.words import typeset
+from tfarm.report.words import typeset, upper
 
-Progress = Callable[[int, int, str], object]
+ReportProgress = Callable[[int, int, str], object]
 
-WORKERS = 2
-ENOUGH = 8  # pieces of work of one arm for which a second process, which takes a second or two to start, is worth it
-CARD, CARD_ALONE = "card", "card alone"  # with the proofs of the arm, and without
-LIVE = "live loop"
-FIRST = ("tune", "sampled", "locus", "modes", CARD)  # what takes longest, modes beside the proofs that they share
-Task = tuple[int, int | str]  # which arm, which piece (or its card and proof)
-Result = SavedSection | Evidence | None
+MOST_WORKERS = 2  # processes that share the pieces of a report: as many cores as a small machine has
+WORTH_A_PROCESS = 8  # pieces of one arm for which a second process, which takes a second or two to start, is worth it
+CARD_WORK, CARD_ALONE_WORK = "card", "card alone"  # with the proofs of the arm, and without
+LIVE_WORK = "live loop"
+LONGEST_FIRST = ("tune", "sampled", "locus", "modes", CARD_WORK)  # modes beside the proofs that they share
+PieceWork = tuple[int, int | str]  # which arm, which piece (or its card and proof)
+Made = SavedSection | Evidence | None
 
-EVIDENCE: Task = (-1, "why trust this")  # of no arm
-SCRIPTS: Task = (-1, "scripts of the live pages")
+EVIDENCE_WORK: PieceWork = (-1, "why trust this")  # of no arm
+SCRIPTS_WORK: PieceWork = (-1, "scripts of the live pages")
 
 
 def make_all(
@@ -44,22 +44,26 @@ def make_all(
     only: tuple[str, ...],
     with_evidence: bool,
     scripts: tuple[Path, Path] | None,
-    progress: Progress | None,
+    progress: ReportProgress | None,
 ) -> tuple[list[list[SavedSection]], Evidence | None]:
     """The sections of each arm's page, in the order of PIECES, and the evidence if that is asked for.
 
     `scripts`: the folder that the live pages' scripts are made in, and that which they are for (see `write_assets`).
     """
-    of_none = [EVIDENCE] * with_evidence + [SCRIPTS] * (scripts is not None)
-    tasks = [*of_none, *_tasks(subjects, only)]
-    done: dict[Task, Result] = {}
+    tasks = [EVIDENCE_WORK] * with_evidence + [SCRIPTS_WORK] * (scripts is not None)
+    for i, subject in enumerate(subjects):
+        suited = [(j, piece) for j, piece in enumerate(pieces_of(subject)) if piece.is_for(subject)]
+        tasks += [(i, j) for j, piece in suited if not only or set(only) & set(piece.questions)]
+        tasks += [(i, LIVE_WORK)] * (not only and is_live(subject))
+        tasks.append((i, CARD_ALONE_WORK if subject.laws and only else CARD_WORK))
+    done: dict[PieceWork, Made] = {}
     if progress is not None:
         progress(0, len(tasks), _name_of(subjects, tasks[0]) if tasks else "nothing to make")
 
-    def work(task: Task) -> Callable[[], Result]:
-        if task == EVIDENCE:
+    def work(task: PieceWork) -> Callable[[], Made]:
+        if task == EVIDENCE_WORK:
             return gather
-        if task == SCRIPTS and scripts is not None:
+        if task == SCRIPTS_WORK and scripts is not None:
             return partial(write_assets, *scripts)
         return partial(make, subjects[task[0]], task[1], folders[task[0]])
 
@@ -69,77 +73,65 @@ def make_all(
             progress(len(done), len(tasks), _name_of(subjects, task))
     places = range(len(subjects))
     sections = [[s for t in tasks if t[0] == i and isinstance(s := done[t], SavedSection)] for i in places]
-    evidence = done.get(EVIDENCE)
+    evidence = done.get(EVIDENCE_WORK)
     return sections, evidence if isinstance(evidence, Evidence) else None
 
 
-def _tasks(subjects: Sequence[Subject], only: tuple[str, ...]) -> Iterator[Task]:
-    """What is to be made of each arm."""
-    for i, subject in enumerate(subjects):
-        for j, piece in enumerate(pieces_of(subject)):
-            if piece.is_for(subject) and (not only or set(only) & set(piece.questions)):
-                yield i, j
-        if not only and is_live(subject):
-            yield i, LIVE
-        yield i, CARD_ALONE if subject.laws and only else CARD
-
-
 def _results(
-    subjects: Sequence[Subject], tasks: Sequence[Task], work: Callable[[Task], Callable[[], Result]]
-) -> Iterator[tuple[Task, Result]]:
-    """Each task with its result as it comes: here, or by two processes where there is work for them."""
-    if not tasks or (len(subjects) == 1 and len(tasks) < ENOUGH) or WORKERS == 1 or not may_start_processes():
+    subjects: Sequence[Subject], tasks: Sequence[PieceWork], work: Callable[[PieceWork], Callable[[], Made]]
+) -> Iterator[tuple[PieceWork, Made]]:
+    """Each task with its result as it comes: here, or by two processes where there is work for them.
+
+    Then the tasks of none are first, and of each arm what takes longest, so that no end is long.
+    """
+    is_little = len(subjects) == 1 and len(tasks) < WORTH_A_PROCESS
+    if not tasks or is_little or MOST_WORKERS == 1 or not may_start_processes():
         for task in tasks:
             yield task, work(task)()
         return
 
-    def submit(pool: Executor, task: Task) -> Future[Result]:
-        return pool.submit(work(task))
-
-    yield from shared(_by_arm(subjects, tasks), submit, WORKERS, [__name__])
-
-
-def _by_arm(subjects: Sequence[Subject], tasks: Sequence[Task]) -> list[list[Task]]:
-    """The tasks of each arm, and before them those of none; what takes longest first, so that no end is long."""
-
-    def place(task: Task) -> int:
+    def place(task: PieceWork) -> int:
         i, piece = task
         what = piece if isinstance(piece, str) else pieces_of(subjects[i])[piece].anchor
-        return FIRST.index(what) if what in FIRST else len(FIRST)
+        return LONGEST_FIRST.index(what) if what in LONGEST_FIRST else len(LONGEST_FIRST)
 
-    return [sorted(each, key=place) for _, each in groupby(sorted(tasks, key=itemgetter(0)), itemgetter(0))]
+    def submit(pool: Executor, task: PieceWork) -> Future[Made]:
+        return pool.submit(work(task))
+
+    by_arm = [sorted(each, key=place) for _, each in groupby(sorted(tasks, key=itemgetter(0)), itemgetter(0))]
+    yield from shared(by_arm, submit, MOST_WORKERS, [__name__])
 
 
-def make(subject: Subject, piece: int | str, folder: Path) -> Result:
-    if piece == LIVE:
+def make(subject: Subject, piece: int | str, folder: Path) -> Made:
+    """A section of an arm's page, or its card, proof or live page, saved in the arm's folder."""
+    if piece == LIVE_WORK:
         save_live(subject, folder)
         return None
     if isinstance(piece, str):
         save_card(subject.arm, folder, [each.given_name for each in subject.laws], subject.chain)
-        if piece == CARD:
+        if piece == CARD_WORK:
             save_proof(subject.arm, folder, subject.chain)
         return None
-    return save_section(_section(pieces_of(subject)[piece], subject), folder)
+    return save_section(section_or_why_not(pieces_of(subject)[piece], subject), folder)
 
 
 def pieces_of(subject: Subject) -> Sequence[Piece]:
     """The sections of a page on this subject, in their order."""
-    return LAW_PIECES if subject.laws else PIECES
+    return LAW_PIECES if subject.laws else ARM_PIECES
 
 
-def _section(piece: Piece, subject: Subject) -> Section:
+def section_or_why_not(piece: Piece, subject: Subject) -> PageSection:
     """The section, or in its place why tfarm could not make it of this arm; a bug of ours stays loud."""
     try:
         return piece.made(subject)
     except TfarmError as error:
-        title = f"{piece.name[0].upper()}{piece.name[1:]}"
         words = (f"This section could not be made for this arm: {typeset(str(error))}.",)
-        return Section(anchor=piece.anchor, title=title, words=words, failure=str(error))
+        return PageSection(anchor=piece.anchor, title=upper(piece.name), words=words, failure=str(error))
 
 
-def _name_of(subjects: Sequence[Subject], task: Task) -> str:
+def _name_of(subjects: Sequence[Subject], task: PieceWork) -> str:
     piece = task[1]
-    if task in (EVIDENCE, SCRIPTS):
+    if task in (EVIDENCE_WORK, SCRIPTS_WORK):
         return str(piece)
     subject = subjects[task[0]]
     return f"{subject.arm.name}: {piece if isinstance(piece, str) else pieces_of(subject)[piece].name}"

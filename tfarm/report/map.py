@@ -25,7 +25,7 @@ from tfarm.loop.regions import Region, region
 from tfarm.plots import plane
 from tfarm.plots.style import blank, headline, legend_below, style
 from tfarm.records import record
-from tfarm.report.loop_laws import MODES, NamedLaw, best, brief_of, laws
+from tfarm.report.loop_laws import DESIGNED_MODES, NamedLaw, best, brief_on, laws
 from tfarm.spectrum.scales import default_gains
 from tfarm.synthesis.design import Design
 
@@ -34,17 +34,17 @@ if TYPE_CHECKING:
 
 Real = NDArray[np.float64]
 
-COLUMNS, ROWS = 240, 200  # of the coloured grid
+GRID_COLUMNS, GRID_ROWS = 240, 200  # of the coloured grid
 MARKERS = {"default": plane.DIAMOND, "best": plane.STAR}
-SPARSE = 4  # every so many of them the damping is computed
+DAMPING_EVERY = 4  # every so many of them the damping is computed
 SAMPLED_COLUMNS = 120  # values of the gain across at which the sampled region is cut, besides its exact ends
-WIDE = 1.5  # times as wide as high the picture is, about
-OUTSIDE = 0.1  # of the gain up the plane, beyond the picture: an edge there is none of the region
+MAP_ASPECT = 1.5  # times as wide as high the picture is, about
+BEYOND_PICTURE = 0.1  # of the gain up the plane, beyond the picture: an edge there is none of the region
 
 
 @dataclass(frozen=True)
 @record
-class GainMap:
+class MapOfArm:
     """What the map shows.
 
     `region` is the exact count on the coloured grid, `edge` (n, 3) the exact boundary, both gains and w, within the
@@ -80,41 +80,43 @@ class GainMap:
     @property
     def band(self) -> float:
         """Below which [rad/s] the damping is the least."""
-        return band_of(self.arm, MODES)
+        return band_of(self.arm, DESIGNED_MODES)
 
 
-def gain_map(arm: Arm, chain: Chain | None = None) -> GainMap:
+def map_of_arm(arm: Arm, chain: Chain | None = None) -> MapOfArm:
     """The map of an arm, its ranges chosen by J w1 and by the windows that it has; without a chain at 10 ms."""
     chain = Chain() if chain is None else chain
     x = rate_axis(arm)
     y = moment_axis(arm, x)
-    found = region(arm, x.grid(COLUMNS), y.grid(ROWS))
-    half = SPARSE // 2
-    across, up = (np.r_[axis.low, each[half::SPARSE], axis.high] for axis, each in zip((x, y), found.axes, strict=True))
+    found = region(arm, x.grid(GRID_COLUMNS), y.grid(GRID_ROWS))
+    half = DAMPING_EVERY // 2
+    across, up = (
+        np.r_[axis.low, each[half::DAMPING_EVERY], axis.high] for axis, each in zip((x, y), found.axes, strict=True)
+    )
     points = np.reshape(np.meshgrid(across, up), (2, -1))
-    damping = least_damping(arm, laws_at(HubFeedback(), points), MODES).reshape(up.size, across.size)
+    damping = least_damping(arm, laws_at(HubFeedback(), points), DESIGNED_MODES).reshape(up.size, across.size)
     named = laws(arm, chain)
-    briefs = tuple(brief_of(arm, each.law, chain) for each in named)
-    sampled = sampled_region(arm, x, y, chain)
-    return GainMap(
+    briefs = tuple(brief_on(arm, each.law, chain) for each in named)
+    sampled = sampled_part(arm, x, y, chain)
+    return MapOfArm(
         arm, x, y, found, edge(found, x, y), (across, up), damping, named, best(arm, chain), chain, sampled, briefs
     )
 
 
 @lru_cache(maxsize=8)
-def sampled_region(arm: Arm, x: Axis, y: Axis, chain: Chain) -> SampledMap | None:
+def sampled_part(arm: Arm, x: Axis, y: Axis, chain: Chain) -> SampledMap | None:
     """Where in the picture the sampled loop is stable, with the modes of the verdict on the default gains."""
     try:
         loop = sampled_verdict(arm, default_gains(arm), chain).full
         across = x.grid(SAMPLED_COLUMNS)
         across = with_both_sides(across[across > 0], ends_of_K1(loop))
-        plane = sampled_map(loop, across[x.high > across], [y.low - OUTSIDE, y.high + OUTSIDE])
-        return rounded(plane, lambda across, up: np.asarray(WIDE * x.place(across) + 1j * y.place(up)))
+        plane = sampled_map(loop, across[x.high > across], [y.low - BEYOND_PICTURE, y.high + BEYOND_PICTURE])
+        return rounded(plane, lambda across, up: np.asarray(MAP_ASPECT * x.place(across) + 1j * y.place(up)))
     except ConvergenceError:
         return None
 
 
-def draw_map(data: GainMap) -> Figure:
+def draw_map_of_arm(data: MapOfArm) -> Figure:
     """Both gains: the count, its boundary, the damping, what sampling leaves, Lyapunov's frame, and the laws."""
     found, x, y = data.region, data.x, data.y
     with style():
@@ -122,10 +124,10 @@ def draw_map(data: GainMap) -> Figure:
         ax = figure.subplots()
         plane.ground(found, x, y, ax)
         plane.contours(*data.axes, np.where(data.counts == 0, data.damping, np.nan), ax)
-        plane.boundary(found, data.edge, x, y, ax)
-        plane.sampled_region(data.sampled, ax)
+        plane.draw_boundary(found, data.edge, x, y, ax)
+        plane.draw_sampled(data.sampled, ax)
         if data.arm.is_uniform:
-            plane.lyapunov(data.arm, x, y, ax)
+            plane.draw_proven(data.arm, x, y, ax)
         for law, brief in zip(data.laws, data.briefs, strict=True):
             plane.law_mark(law.law, MARKERS[law.key], f"{law.name}: {law.gains};\n{brief.short}", ax)
         if data.design is not None:
@@ -136,13 +138,20 @@ def draw_map(data: GainMap) -> Figure:
     return figure
 
 
-def map_data(data: GainMap) -> Table:
-    """The grid with counts and damping, the boundary with its frequencies, then the ends of the sampled intervals."""
+def map_data(data: MapOfArm) -> Table:
+    """The grid with counts and damping, the boundary with its frequencies, then the ends of the sampled intervals.
+
+    Ends that are cut by the picture are left out.
+    """
     grid = [each.ravel() for each in np.meshgrid(*data.axes)]
     edge = data.edge[~np.isnan(data.edge[:, 0])] if data.edge.size else data.edge
+    ends: list[tuple[float, float]] = []
+    if data.sampled is not None:
+        for K1, windows in zip(data.sampled.axes[0], data.sampled.stable_intervals, strict=True):
+            ends += [(float(K1), end) for window in windows for end in window if data.y.low <= end <= data.y.high]
+    sampled = np.array(ends).reshape(-1, 2)
     counts: list[float | int | str] = [math.inf if count < 0 else int(count) for count in data.counts.ravel()]
     none: list[float | int | str] = [""]
-    sampled = _sampled_ends(data)
     beyond = len(edge) + len(sampled)
     across, up = PLANE
     key = "_".join([across, *shown_unit(across, data.arm).replace("/", " ").split()])
@@ -156,12 +165,3 @@ def map_data(data: GainMap) -> Table:
         Column("omega_rad_s", "frequency", "rad/s", of=none * grid[0].size + edge[:, 2].tolist() + none * len(sampled)),
     )  # fmt: skip
     return Table(stem="map-data", title=f"The map of {' and '.join(PLANE)}", is_data=True, columns=columns)
-
-
-def _sampled_ends(data: GainMap) -> Real:
-    """Both gains (n, 2) at the ends of the sampled loop's stable intervals, those cut by the picture left out."""
-    if data.sampled is None:
-        return np.empty((0, 2))
-    columns = zip(data.sampled.axes[0], data.sampled.stable_intervals, strict=True)
-    ends = [(float(across), end) for across, column in columns for window in column for end in window]
-    return np.array([each for each in ends if data.y.low <= each[1] <= data.y.high]).reshape(-1, 2)

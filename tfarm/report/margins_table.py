@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN
 from tfarm.columns import Column, Table
-from tfarm.digits import counted, plain, significant, singly
+from tfarm.digits import how_many, plain, significant, singly
 from tfarm.dsp.brief import SampledBrief
 from tfarm.loop.answers import MARGIN_COLUMNS, NOT_STABLE, WINDOW_COLUMNS, gain_rows, sizes_of, unsettled
 from tfarm.loop.lyapunov import lyapunov
@@ -16,9 +16,9 @@ from tfarm.report.loop_laws import Named, NamedLaw
 from tfarm.report.sections import Fact
 from tfarm.report.words import typeset
 
-UNKNOWN = "not known"  # an exact margin, where nothing bounds L beyond the band
+NOT_KNOWN = "not known"  # an exact margin, where nothing bounds L beyond the band
 UNLIMITED = {"disk": 2.0, "peak_sensitivity": 1.0}  # sizes of a passive loop, at no frequency of its own; else inf
-CAPTION = (
+MARGINS_CAPTION = (
     "Exact: of the infinite-dimensional loop; not known where nothing bounds L beyond the band. "
     "In the band: as far as the poles were computed{undamped}. Gain margin: "
     "factors on the whole law between which the loop stays stable. Phase margin: where |L| = 1, the angle from −1 "
@@ -26,7 +26,7 @@ CAPTION = (
     "Delay: what may be lost at the worst frequency. Disk margin: gain and phase may be off together by "
     "(2 + αδ)/(2 − αδ), |δ| < 1."
 )
-UNDAMPED = (
+DELAY_UNDAMPED = (
     "; without damping (C = 0) any delay, however short, destabilises some mode far enough up, so the exact delay and "
     "disk margins are 0, and only a band gives them a size"
 )
@@ -34,17 +34,21 @@ CAPTION_OF_WINDOWS = (
     "The others held, each gain may move within its window before the first pole reaches the axis. Ends ±∞ are proven; "
     "an end with a star is no edge: up to there none was found, and beyond none was looked for."
 )
-TITLES = {"disk": "disk margin α"}
-QUANTITIES = ("gain margin, down", "gain margin, up", *(TITLES.get(each.of, each.title) for each in MARGIN_COLUMNS))
+MARGIN_TITLES = {"disk": "disk margin α"}
+QUANTITIES = (
+    "gain margin, down",
+    "gain margin, up",
+    *(MARGIN_TITLES.get(each.of, each.title) for each in MARGIN_COLUMNS),
+)
 
-Row = tuple[str, str, float | str, float | str, float | str]  # quantity, unit, exact, in the band, at
+MarginRow = tuple[str, str, float | str, float | str, float | str]  # quantity, unit, exact, in the band, at
 
 
 def verdict_facts(laws: Sequence[NamedLaw], found: Sequence[Margins], briefs: Sequence[SampledBrief]) -> Iterator[Fact]:
     """The verdict of each law on the continuous loop, large, and beside it what sampling makes of it."""
     for named, each, brief in zip(laws, found, briefs, strict=True):
         it = each.stability
-        number = counted(it.unstable_roots, "unstable pole")
+        number = how_many(it.unstable_roots, "unstable pole")
         count = "infinitely many unstable poles" if it.unstable_roots_infinite else number
         yield Fact(
             label=f"{named.name}: {named.gains}",
@@ -62,7 +66,7 @@ def verdict_words(named: NamedLaw, found: Margins) -> str:
     apart = ", the one at 0 that the hub angle leaves apart" if is_free else ""
     return (
         f"{named.name.capitalize()}, {named.gains}: {it.verdict.upper()}, with "
-        f"{counted(it.unstable_roots, 'unstable pole')} "
+        f"{how_many(it.unstable_roots, 'unstable pole')} "
         f"{_up_to(it.band)}{apart}; {typeset(it.tail)}. "
         f"Lyapunov: {proven}, {typeset(proof.reason)}."
     )
@@ -73,37 +77,32 @@ def _up_to(band: float) -> str:
 
 
 def margin_table(laws: Sequence[Named], found: Sequence[Margins], is_undamped: bool) -> Table:
-    """A row a quantity, the verdict first; for each law the exact value, that in the band, and where."""
-    rows = [list(_rows(each)) for each in found]
+    """A row a quantity, the verdict first; for each law the exact value, that in the band, and where.
+
+    The caption says what a phase margin below 0 means, for each law that has one.
+    """
+    rows, leads = [list(_rows(each)) for each in found], ""
     columns = [
         Column("quantity", "quantity", of=[row[0] for row in rows[0]]),
         Column("unit", "unit", of=[row[1] for row in rows[0]]),
     ]
-    for named, part in zip(laws, rows, strict=True):
-        group = f"{named.name}: {named.gains}"
+    number = singly(lambda value: plain(value, 6) if value.is_integer() else significant(value, 5))
+    for named, each, part in zip(laws, found, rows, strict=True):
+        group, band = f"{named.name}: {named.gains}", each.in_band
         for i, (key, title) in enumerate((("exact", "exact"), ("band", "in the band"), ("at_rad_s", "at rad/s")), 2):
-            values = [row[i] for row in part]
-            columns.append(Column(f"{named.key}_{key}", title, of=values, digits=singly(_number), group=group))
+            columns.append(Column(f"{named.key}_{key}", title, of=[row[i] for row in part], digits=number, group=group))
+        if band is not None and band.phase < 0:
+            lead = f"{significant(band.phase, 5)} deg at {significant(band.at['phase'], 5)} rad/s"
+            leads += f" {named.name.capitalize()}: {lead} is lead; not an instability."
     return Table(
         stem="margins",
         title="Verdict and margins",
-        caption=CAPTION.format(undamped=UNDAMPED if is_undamped else "") + _leads(laws, found),
+        caption=MARGINS_CAPTION.format(undamped=DELAY_UNDAMPED if is_undamped else "") + leads,
         columns=tuple(columns),
     )
 
 
-def _leads(laws: Sequence[Named], found: Sequence[Margins]) -> str:
-    """What a phase margin below 0 means, for each law that has one."""
-    bands = ((named, each.in_band) for named, each in zip(laws, found, strict=True))
-    texts = (
-        f" {named.name.capitalize()}: {significant(band.phase, 5)} deg at {significant(band.at['phase'], 5)} rad/s is "
-        "lead; not an instability."
-        for named, band in bands if band is not None and band.phase < 0
-    )  # fmt: skip
-    return "".join(texts)
-
-
-def _rows(found: Margins) -> Iterator[Row]:
+def _rows(found: Margins) -> Iterator[MarginRow]:
     """The verdict before any margin."""
     it, band = found.stability, found.in_band
     count = math.inf if it.unstable_roots_infinite else float(it.unstable_roots)
@@ -118,19 +117,9 @@ def _rows(found: Margins) -> Iterator[Row]:
     yield "gain margin, up", "factor", band.gain[1], "", ""
     for column, (exact, size) in zip(MARGIN_COLUMNS, sizes_of(found).values(), strict=True):
         assert size is not None
-        known = "" if column.unit == "deg" and not found.exact_delay else UNKNOWN if exact is None else exact
+        known = "" if column.unit == "deg" and not found.exact_delay else NOT_KNOWN if exact is None else exact
         where = "" if abs(size) == UNLIMITED.get(column.of, math.inf) else band.at[column.of]
-        yield TITLES.get(column.of, column.title), column.unit, known, size, where
-
-
-def _number(value: float) -> str:
-    return plain(value, 6) if value.is_integer() else significant(value, 5)
-
-
-def _open_ends(laws: Sequence[Named], found: Sequence[Margins]) -> str:
-    """A sentence for each law whose windows are those of a band."""
-    texts = ((law.name, unsettled(each)) for law, each in zip(laws, found, strict=True))
-    return "".join(f" {name.capitalize()}: {typeset(text)}." for name, text in texts if text)
+        yield MARGIN_TITLES.get(column.of, column.title), column.unit, known, size, where
 
 
 def window_table(laws: Sequence[Named], found: Sequence[Margins]) -> Table:
@@ -142,10 +131,12 @@ def window_table(laws: Sequence[Named], found: Sequence[Margins]) -> Table:
         if row.gain != MOMENT_GAIN or not each.stability.loop.arm.has_massless_hub
     ]
     names, verdicts, gains = zip(*rows, strict=True)
+    open_ends = ((law.name, unsettled(each)) for law, each in zip(laws, found, strict=True))  # windows of a band
+    more = "".join(f" {name.capitalize()}: {typeset(text)}." for name, text in open_ends if text)
     return Table(
         stem="windows",
         title="How far each gain may go alone",
-        caption=CAPTION_OF_WINDOWS + _open_ends(laws, found),
+        caption=CAPTION_OF_WINDOWS + more,
         columns=(Column("law", "law", of=names), Column("verdict", "verdict", of=verdicts), *WINDOW_COLUMNS),
         record=gains,
     )

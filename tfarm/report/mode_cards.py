@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from tfarm.digits import significant
-from tfarm.plots.shapes import Shape
+from tfarm.plots.shapes import DrawnMode
 from tfarm.response.frequency import Real
 
-WIDTH, HEIGHT, EDGE = 120.0, 60.0, 8.0  # of the drawing, in its own units
-SPARSE = 10  # of the points of a shape every so many are drawn: 41, half a unit from the true curve at most
+CARD_WIDTH, CARD_HEIGHT, CARD_EDGE = 120.0, 60.0, 8.0  # of the drawing, in its own units
+PATH_EVERY = 10  # of the points of a shape every so many are drawn: 41, half a unit from the true curve at most
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,20 +26,18 @@ class ModeCard:
     nodes: Sequence[float]
 
 
-def mode_cards(shapes: Sequence[Shape]) -> tuple[ModeCard, ...]:
-    """A card for each shape."""
-    return tuple(_card(shape) for shape in shapes)
+def mode_cards(shapes: Sequence[DrawnMode]) -> tuple[ModeCard, ...]:
+    """A card for each shape, upwards where w is positive, its largest displacement as high as the card."""
+    cards = []
+    for shape in shapes:
+        across = _across(shape.x, shape)[::PATH_EVERY]
+        up = (CARD_HEIGHT / 2 - (CARD_HEIGHT / 2 - CARD_EDGE / 2) * shape.w)[::PATH_EVERY]
+        points = " ".join(f"{x:.1f},{y:.2f}" for x, y in zip(across, up, strict=True))
+        hertz = significant(shape.natural_frequency / (2 * math.pi), 5)
+        nodes = tuple(round(float(x), 1) for x in _across(shape.nodes, shape))
+        cards.append(ModeCard(number=shape.number, hertz=hertz, path=f"M{points}", nodes=nodes))
+    return tuple(cards)
 
 
-def _card(shape: Shape) -> ModeCard:
-    """The shape, upwards where w is positive, its largest displacement as high as the card."""
-    across = _across(shape.x, shape)[::SPARSE]
-    up = (HEIGHT / 2 - (HEIGHT / 2 - EDGE / 2) * shape.w)[::SPARSE]
-    points = " ".join(f"{x:.1f},{y:.2f}" for x, y in zip(across, up, strict=True))
-    hertz = significant(shape.natural_frequency / (2 * math.pi), 5)
-    nodes = tuple(round(float(x), 1) for x in _across(shape.nodes, shape))
-    return ModeCard(number=shape.number, hertz=hertz, path=f"M{points}", nodes=nodes)
-
-
-def _across(x: Real, shape: Shape) -> Real:
-    return EDGE + (WIDTH - 2 * EDGE) * np.asarray(x) / shape.x[-1]
+def _across(x: Real, shape: DrawnMode) -> Real:
+    return CARD_EDGE + (CARD_WIDTH - 2 * CARD_EDGE) * np.asarray(x) / shape.x[-1]

@@ -13,19 +13,19 @@ from tfarm.arm import Arm, Theory
 from tfarm.columns import REPORT, Column, Table
 from tfarm.digits import fixed, lined, listed, significant
 from tfarm.errors import CertificationError, ConvergenceError
-from tfarm.plots.shapes import Shape, draw_differences, draw_shapes, shapes_of, theory_name
+from tfarm.plots.shapes import DrawnMode, draw_differences, draw_shapes, shapes_of, theory_name
 from tfarm.report.damped_table import damped_table
 from tfarm.report.locked_table import locked_table, locked_words
 from tfarm.report.mode_cards import mode_cards
-from tfarm.report.sections import Picture, Section
+from tfarm.report.sections import PageSection, Picture
 from tfarm.report.trust_proofs import how_proven
 from tfarm.response.frequency import Real
 from tfarm.spectrum import Modes, answers
 
-MODES, SHAPES = 10, 6
+TABLED_MODES, DRAWN_MODES = 10, 6  # as `tfarm modes` lists them; shapes in three rows of two
 SIMPLER: tuple[Theory, ...] = ("shear", "rayleigh", "euler-bernoulli")
 NEGLECTED = 5e-7  # a sensitivity that never exceeds this reads as zero
-WARM, COOL = (196, 80, 10), (0, 96, 168)
+RISE_COLOUR, FALL_COLOUR = (196, 80, 10), (0, 96, 168)  # red, green, blue: the orange and blue of the pictures
 
 COMPLETE = (
     "Free vibration of the undamped arm. The list is complete: the number of natural frequencies below any "
@@ -36,7 +36,7 @@ MODAL_TABLE = (
     "{rigid}Modes have unit modal mass and a positive {tip}: b² is how strongly a torque at the hub excites the mode "
     "and how well the hub angle sees it{hub}. {proof}"
 )
-LOCKED = "; the locked hub takes part in none"
+LOCKED_TAKES_NO_PART = "; the locked hub takes part in none"
 FREE_PIN = "; a free pin bears no moment, so that at the root is 0"
 NO_DAMPED_TABLE = "The damped modes of this arm could not be listed with a proof, and are left out: {why}."
 MODE_SHAPES = (
@@ -67,18 +67,26 @@ OF_RIGS = (
 )
 
 
-def modes_section(arm: Arm) -> Section:
+def modes_section(arm: Arm) -> PageSection:
     """Everything about free vibration: at C = 0, and the eigenvalues at the arm's own C."""
-    modes = tfarm.modes(arm, count=MODES)
-    exact = _flexible(modes if modes.theory == "timoshenko" else tfarm.modes(arm, count=MODES, theory="timoshenko"))
-    theories: dict[str, Real] = {t: _flexible(tfarm.modes(arm, count=MODES, theory=t)) for t in SIMPLER}
+    modes = tfarm.modes(arm, count=TABLED_MODES)
+    exact = _flexible(
+        modes if modes.theory == "timoshenko" else tfarm.modes(arm, count=TABLED_MODES, theory="timoshenko")
+    )
+    theories: dict[str, Real] = {t: _flexible(tfarm.modes(arm, count=TABLED_MODES, theory=t)) for t in SIMPLER}
     differences: dict[str, Real] = {theory: 100 * (simpler / exact - 1) for theory, simpler in theories.items()}
-    damped, missing = _damped(modes)
-    shapes = shapes_of(modes, SHAPES)
-    return Section(
+    damped: list[Table] = []
+    words = [COMPLETE]
+    if not arm.is_undamped:
+        try:
+            damped = [damped_table(modes)]
+        except (ConvergenceError, CertificationError) as error:
+            words.append(NO_DAMPED_TABLE.format(why=error))
+    shapes = shapes_of(modes, DRAWN_MODES)
+    return PageSection(
         anchor="modes",
         title="Modes",
-        words=(COMPLETE, *missing, *([] if arm.is_uniform else locked_words(arm))),
+        words=words if arm.is_uniform else [*words, *locked_words(arm)],
         blocks=(
             modal_table(modes),
             *([] if arm.is_uniform else [locked_table(modes)]),
@@ -92,16 +100,6 @@ def modes_section(arm: Arm) -> Section:
     )
 
 
-def _damped(modes: Modes) -> tuple[tuple[Table, ...], tuple[str, ...]]:
-    """The table of the damped modes, none at C = 0; or in its place a sentence why there is none."""
-    if modes.arm.is_undamped:
-        return (), ()
-    try:
-        return (damped_table(modes),), ()
-    except (ConvergenceError, CertificationError) as error:
-        return (), (NO_DAMPED_TABLE.format(why=error),)
-
-
 def _flexible(modes: Modes) -> Real:
     return modes.natural_frequency[modes.index > 0]
 
@@ -113,26 +111,23 @@ def modal_table(modes: Modes) -> Table:
     decimals = answers.SHAPE_DIGITS - 1 - math.floor(math.log10(modes.arm.length))
     at = [tuple(np.round(node, decimals).tolist()) for node in modes.nodes]
     rigid = "Row 0 is the arm turning as a rigid body. " if modes.arm.has_rigid_mode else ""
+    tip = "tip rotation" if math.isfinite(modes.arm.payload.inertia) else "hub angle"
+    tip = (
+        "tip displacement" if math.isfinite(modes.arm.payload.mass) else tip
+    )  # the first of its motions that it can make
     omega, hertz = (column.read(modes).cells for column in answers.MODE_COLUMNS[1:3])
     return Table(
         stem="modal-table",
         title="Modal table",
         caption=MODAL_TABLE.format(
             rigid=rigid,
-            tip=_positive(modes.arm),
-            hub=LOCKED if modes.arm.is_locked else FREE_PIN if modes.arm.has_massless_hub else "",
+            tip=tip,
+            hub=LOCKED_TAKES_NO_PART if modes.arm.is_locked else FREE_PIN if modes.arm.has_massless_hub else "",
             proof=how_proven(modes, omega, hertz),
         ),
         columns=(*answers.MODE_COLUMNS, Column("nodes_m", "nodes", "m", of=at, shown=nodes, on=REPORT)),
         record=modes,
     )
-
-
-def _positive(arm: Arm) -> str:
-    """What is positive in every mode: of the tip's motions the first that it can make."""
-    if math.isfinite(arm.payload.mass):
-        return "tip displacement"
-    return "tip rotation" if math.isfinite(arm.payload.inertia) else "hub angle"
 
 
 def places(nodes: Real, length: float) -> tuple[str, ...]:
@@ -142,7 +137,7 @@ def places(nodes: Real, length: float) -> tuple[str, ...]:
     return tuple(significant(float(x), 2) if x < near else fixed([float(x)], decimals)[0] for x in nodes)
 
 
-def _shapes(name: str, shapes: tuple[Shape, ...]) -> Picture:
+def _shapes(name: str, shapes: tuple[DrawnMode, ...]) -> Picture:
     counts = ", ".join(str(len(shape.nodes)) for shape in shapes)
     columns = [Column("x_m", "x", "m", of=shapes[0].x)]
     columns += [
@@ -185,13 +180,13 @@ def _key(theory: str) -> str:
 def _differences(name: str, differences: Mapping[str, Real]) -> Picture:
     shown = dict(reversed(list(differences.items())))
     words = ", ".join(f"{theory_name(theory)} {significant(float(v[-1]), 3)} %" for theory, v in shown.items())
-    columns = [Column("mode", "mode", of=range(1, MODES + 1))]
+    columns = [Column("mode", "mode", of=range(1, TABLED_MODES + 1))]
     columns += [Column(f"{_key(t)}_difference_percent", theory_name(t), "%", of=v) for t, v in shown.items()]
     return Picture(
         stem="theory-differences",
         title="How far the simpler theories are off",
         caption=DIFFERENCES,
-        alt=f"Differences from the Timoshenko theory by mode; at mode {MODES}: {words}.",
+        alt=f"Differences from the Timoshenko theory by mode; at mode {TABLED_MODES}: {words}.",
         figure=draw_differences(name, shown),
         data=Table(stem="theory-differences-data", title="Differences", is_data=True, columns=tuple(columns)),
     )
@@ -224,5 +219,5 @@ def sensitivity_table(modes: Modes) -> Table:
 def tint(x: float) -> str:
     """Orange for a rise, blue for a fall, full at 2 %/%; light enough for dark print."""
     strength = 0.45 * min(1.0, abs(x) / 2.0) ** 0.6
-    parts = (round(255 - strength * (255 - part)) for part in (WARM if x > 0 else COOL))
+    parts = (round(255 - strength * (255 - part)) for part in (RISE_COLOUR if x > 0 else FALL_COLOUR))
     return "#" + "".join(f"{part:02x}" for part in parts)

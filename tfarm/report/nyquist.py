@@ -12,25 +12,26 @@ from tfarm.digits import significant, singly
 from tfarm.loop.nyquist import Nyquist
 from tfarm.report.loop_laws import Named
 
-COUNTS = (
+COUNT_CAPTION = (
     "{open}, so each clockwise turn around −1 (counted negative) is one unstable "
     "closed-loop pole. The count in a box was made without Nyquist, by finding every pole; poles whose real part is "
     "less than 10⁻¹² of their size are not told apart from the axis there (undecided), though their turns around −1 "
     "are counted.{last}"
 )
-NO_OPEN, OPEN = "L has no pole right of the contour", "Beside the poles that a law itself has right of the contour"
-COMPARED = "to compare"
-COUNTED = " The last law is there to show that the count is not always 0."
+NO_OPEN, OWN_OPEN = "L has no pole right of the contour", "Beside the poles that a law itself has right of the contour"
+TO_COMPARE = "to compare"
+LAST_COUNTED = " The last law is there to show that the count is not always 0."
+RINGS_CAPTION = "Rings: sizes of L; −1 lies on the ring 1. Broad: ω > 0, arrows as ω rises; thin: its mirror image."
 
 
-class Curve(NamedTuple):
+class PlotOfLaw(NamedTuple):
     """One law's plot: its name, and the counted contour."""
 
     named: Named
     data: Nyquist[Any]
 
 
-def count_table(plots: Sequence[Curve], names: Sequence[str]) -> Table:
+def count_table(plots: Sequence[PlotOfLaw], names: Sequence[str]) -> Table:
     """Verdict, encirclements and unstable poles of each law."""
     verdicts = [plot.data.verdict for plot in plots]
     counts = np.array([[p.encirclements, p.expected, p.verdict.unstable_roots, p.on_axis] for _, p in plots])
@@ -41,9 +42,9 @@ def count_table(plots: Sequence[Curve], names: Sequence[str]) -> Table:
     return Table(
         stem="nyquist-count",
         title="Encirclements beside unstable poles",
-        caption=COUNTS.format(
-            open=NO_OPEN if not any(p.unstable_open for _, p in plots) else OPEN,
-            last=COUNTED if plots[-1].named.name == COMPARED and plots[-1].data.expected else "",
+        caption=COUNT_CAPTION.format(
+            open=NO_OPEN if not any(p.unstable_open for _, p in plots) else OWN_OPEN,
+            last=LAST_COUNTED if plots[-1].named.name == TO_COMPARE and plots[-1].data.expected else "",
         ),
         columns=(
             Column("law", "law", of=names),
@@ -63,7 +64,7 @@ def count_table(plots: Sequence[Curve], names: Sequence[str]) -> Table:
     )
 
 
-def curve_data(plots: Sequence[Curve]) -> Table:
+def curve_data(plots: Sequence[PlotOfLaw]) -> Table:
     """L on the contour of every law."""
     L, s = np.concatenate([plot.data.L for plot in plots]), np.concatenate([plot.data.s for plot in plots])
     law = [plot.named.key for plot in plots for _ in plot.data.s]

@@ -25,49 +25,47 @@ if TYPE_CHECKING:
     from tfarm.plots.style import Figure
 
 K2_RANGE = (-1.0, 1.5)  # of what balances a torque: 1 where the input is one, less where it is a motor's current
-CUT = (-1.02, 1.52)  # of the same: where intervals are cut, just outside the picture: no cut is seen as an edge
-COLUMNS = 72  # values of the gain across, and either side of upright edges
-DAMPINGS = (1e-4, 1e-6)  # s: what is drawn beside C = 0
-WIDE = 1.8  # times as wide as high the picture is, about
-BEYOND = 1.7  # of the largest stable gain across: how far the picture goes
-SAME = 1e-3  # ends as close as this are seen as one
-BELOW = 15.0  # of the gain itself
+CUT_RANGE = (-1.02, 1.52)  # of the same: where intervals are cut, just outside the picture: no cut is seen as an edge
+OVERLAY_COLUMNS = 72  # values of the gain across, and either side of upright edges
+LITTLE_DAMPINGS = (1e-4, 1e-6)  # s: what is drawn beside C = 0
+OVERLAY_ASPECT = 1.8  # times as wide as high the picture is, about
+BEYOND_STABLE = 1.7  # of the largest stable gain across: how far the picture goes
+SEEN_AS_ONE = 1e-3  # ends as close as this are seen as one
+BELOW_GAIN = 15.0  # so many times below the gain across of the law the picture begins, on its logarithmic axis
 
 
-class Overlay(NamedTuple):
+class StableRegions(NamedTuple):
     """Both regions of one arm.  `sampled` has the arm's own C; at C = 0 also what a little damping would give."""
 
     continuous: Region
     sampled: tuple[GainMap, ...]  # most damping first, so that each lies on the one before
 
 
-def overlay(arm: Arm, gains: HubFeedback, chain: Chain) -> Overlay:
+def stable_regions(arm: Arm, gains: HubFeedback, chain: Chain) -> StableRegions:
     """The regions around these gains.  Raises ParameterError where the arm has no loop."""
-    dampings = (arm.damping,) if arm.damping else (*DAMPINGS, 0.0)
+    dampings = (arm.damping,) if arm.damping else (*LITTLE_DAMPINGS, 0.0)
     loops = [sampled_verdict(arm.having(damping=C), gains, chain).full for C in dampings]
     ends = np.unique(np.concatenate([ends_of_K1(loop) for loop in loops]))
-    ends = ends[np.diff(ends, prepend=0.0) > SAME * ends]
+    ends = ends[np.diff(ends, prepend=0.0) > SEEN_AS_ONE * ends]
     own, _ = gains.point
-    span, cut = (arm.input_per_torque * np.array(ends) for ends in (K2_RANGE, CUT))
-    low, top = own / BELOW, _round_up(BEYOND * max([own, *ends]))
-    across = with_both_sides(np.geomspace(low, top, COLUMNS), ends)
+    span, cut = (arm.input_per_torque * np.array(ends) for ends in (K2_RANGE, CUT_RANGE))
+    low, furthest = own / BELOW_GAIN, BEYOND_STABLE * max([own, *ends])
+    power = 10.0 ** math.floor(math.log10(furthest))
+    top = next(step * power for step in (1.0, 2.0, 5.0, 10.0, 20.0) if step * power >= furthest)
+    across = with_both_sides(np.geomspace(low, top, OVERLAY_COLUMNS), ends)
     across = across[(low <= across) & (top >= across)]
 
     def drawn(across: Real, up: Real) -> Complex:
-        return np.asarray(WIDE * np.log(across / low) / np.log(top / low) + 1j * (up - span[0]) / np.ptp(span))
+        return np.asarray(
+            OVERLAY_ASPECT * np.log(across / low) / np.log(top / low) + 1j * (up - span[0]) / np.ptp(span)
+        )
 
     planes = [rounded(gain_map(loop, across, cut), drawn) for loop in loops]
     every = np.unique(np.concatenate([plane.axes[0] for plane in planes]))
-    return Overlay(region(arm, every, cut), tuple(with_more(plane, every) for plane in planes))
+    return StableRegions(region(arm, every, cut), tuple(with_more(plane, every) for plane in planes))
 
 
-def _round_up(x: float) -> float:
-    """The next of 1, 2, 5, 10, ..."""
-    power = 10.0 ** math.floor(math.log10(x))
-    return next(step * power for step in (1.0, 2.0, 5.0, 10.0, 20.0) if step * power >= x)
-
-
-def draw_overlay(data: Overlay) -> Figure:
+def draw_overlay(data: StableRegions) -> Figure:
     """The picture of this tool: a continuous region and a sampled one on the same axes."""
     with style():
         figure = blank(9.0, 5.4)
@@ -79,7 +77,7 @@ def draw_overlay(data: Overlay) -> Figure:
     return figure
 
 
-def overlay_table(data: Overlay, stem: str) -> Table:
+def overlay_table(data: StableRegions, stem: str) -> Table:
     """The numbers of the picture: at each value of the gain across the ends of the stable intervals of the other."""
     own = data.continuous.arm.damping
     each = {"continuous_K2_intervals": data.continuous.stable_intervals}

@@ -21,11 +21,11 @@ from tfarm.digits import listed
 from tfarm.dsp import Chain, load_chain
 from tfarm.dsp.writing import file_text
 from tfarm.errors import ParameterError
-from tfarm.report.frame import VERDICTS, explained, framed, glossary, rows, signs, word_id
+from tfarm.report.frame import BADGES, explained, framed, promises, section_rows, signs, word_id
 from tfarm.report.given_laws import Subject
 from tfarm.report.page_names import QUESTIONS as QUESTIONS
 from tfarm.report.sections import Fact, SavedSection
-from tfarm.tables.html import symbol
+from tfarm.tables.html import with_symbols
 
 TEMPLATES = Path(__file__).parent / "templates"
 
@@ -55,7 +55,7 @@ def _templates() -> Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.filters.update(symbol=symbol, explained=explained, word_id=word_id)
+    environment.filters.update(symbol=with_symbols, explained=explained, word_id=word_id)
     return environment
 
 
@@ -65,8 +65,8 @@ def arm_page(
     only: str | None,
     *,
     trust: str,
-    live: bool = False,
-    others: Sequence[tuple[str, str]] = (),
+    live: bool,
+    others: Sequence[tuple[str, str]],
 ) -> str:
     """The page of one arm, under its laws where they are given, with every section or with those of one question.
 
@@ -81,11 +81,11 @@ def arm_page(
         title=title,
         arm=arm,
         framed=shown,
-        rows=rows(shown),
+        rows=section_rows(shown),
         only=only,
         others=others,
         signs=signs(arm),
-        glossary=glossary(),
+        glossary=promises(),
         trust=trust,
         live=live,
         summary=summary(arm, [each.given_name for each in subject.laws]),
@@ -96,13 +96,13 @@ def arm_page(
 
 def index_page(cards: Sequence[Card], *, trust: str, compared: str = "") -> str:
     """The page that leads to all others; `compared` is the title of the comparison beside it, if there is one."""
-    return render("index.html", title="tfarm reports", cards=cards, trust=trust, compared=compared, looks=VERDICTS)
+    return render("index.html", title="tfarm reports", cards=cards, trust=trust, compared=compared, looks=BADGES)
 
 
 def foot(subject: Subject, only: str | None) -> dict[str, str]:
     """What a reader needs to make the page again: version, hash of the arm's file, command."""
     sha256 = hashlib.sha256(file_of(subject).encode()).hexdigest()
-    return {"sha256": sha256, "command": command(subject, only)}
+    return {"sha256": sha256, "command": command_of(subject, only)}
 
 
 def file_of(subject: Subject) -> str:
@@ -122,7 +122,7 @@ def own_law(subject: Subject) -> str | None:
         return None
 
 
-def command(subject: Subject, only: str | None) -> str:
+def command_of(subject: Subject, only: str | None) -> str:
     """The command that writes this page; an arm that is no preset is named by its file, as are laws beside it."""
     arm, chain, laws, *_ = subject
     law = own_law(subject)

@@ -13,7 +13,7 @@ from functools import partial
 from tfarm.arm import Arm
 from tfarm.columns import Column, Table
 from tfarm.digits import plain, unit
-from tfarm.report.sections import Section
+from tfarm.report.sections import PageSection
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,8 +40,8 @@ TABLE_1 = {
     "I": Printed(quantity="second moment of area", symbol="I", value=None, unit="", unit_here="m^4"),
     "I_h": Printed(quantity="hub inertia", symbol="I_h", value=None, unit="", unit_here="kg m^2"),
 }
-FROM_PAPER = ("length", "area", "E", "kappa", "G")  # equal in all these, an arm is the paper's
-ALUMINIUM = 1000.0  # the density is printed a thousand times too small
+EQUAL_IN_PAPER = ("length", "area", "E", "kappa", "G")  # equal in all these, an arm is the paper's
+DENSITY_MISPRINT = 1000.0  # the density is printed a thousand times too small
 
 
 def values_of(arm: Arm) -> dict[str, float]:
@@ -65,10 +65,10 @@ def values_of(arm: Arm) -> dict[str, float]:
 def is_from_paper(arm: Arm) -> bool:
     """Whether length, section and moduli are those of Table 1."""
     used = values_of(arm)
-    return all(math.isclose(used[key], TABLE_1[key].value or 0.0, rel_tol=1e-12) for key in FROM_PAPER)
+    return all(math.isclose(used[key], TABLE_1[key].value or 0.0, rel_tol=1e-12) for key in EQUAL_IN_PAPER)
 
 
-def paper_section(arm: Arm) -> Section:
+def paper_section(arm: Arm) -> PageSection:
     """Table 1 and its corrections."""
     used = values_of(arm)
     marked = partial(Column, tint=["#fff1de" if remark(key, used[key]) else "" for key in TABLE_1])
@@ -91,7 +91,7 @@ def paper_section(arm: Arm) -> Section:
         "The arm is that of “Self-Tuning Vibration Control of a Rotational Flexible Timoshenko Arm Using Neural "
         "Networks”, Advances in Acoustics and Vibration, 2012, article 852780.",
     )
-    return Section(anchor="paper", title="The paper's values, corrected", words=words, blocks=(table,))
+    return PageSection(anchor="paper", title="The paper's values, corrected", words=words, blocks=(table,))
 
 
 def remark(key: str, used: float) -> str:
@@ -100,7 +100,7 @@ def remark(key: str, used: float) -> str:
     if key == "density":
         if math.isclose(used, printed or 0.0):
             return "kept as printed, to show what the misprint does: aluminium has a thousand times as much"
-        if math.isclose(used, ALUMINIUM * (printed or 0.0)):
+        if math.isclose(used, DENSITY_MISPRINT * (printed or 0.0)):
             return "misprint: aluminium has a thousand times the printed density"
         return "another density than the printed one, itself a misprint (aluminium: 2766.7 kg/m³)"
     if key == "C":

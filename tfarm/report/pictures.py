@@ -7,15 +7,15 @@ from pathlib import Path
 import tfarm
 from tfarm.digits import plain
 from tfarm.dsp import load_chain
-from tfarm.plots.files import save
+from tfarm.plots.files import save_figure
 from tfarm.plots.frequency import draw_compared
 from tfarm.plots.shapes import draw_shapes, shapes_of
-from tfarm.report.overlay import draw_overlay, overlay
+from tfarm.report.overlay import draw_overlay, stable_regions
 from tfarm.response.frequency import bode, resonant_band
 from tfarm.spectrum.scales import default_gains
 
-DOTS_PER_INCH = 100
-SHOWN = 4
+README_DOTS = 100  # an inch, which GitHub shows at their own size
+README_MODES = 4  # shapes: two rows
 
 
 def readme_pictures(out: Path) -> tuple[Path, ...]:
@@ -29,9 +29,9 @@ def readme_pictures(out: Path) -> tuple[Path, ...]:
     main, other = (bode(arm, "root_moment", band) for arm in (undamped, lab))
     figures = {
         "bode-root-moment": draw_compared(main, other, labels),
-        "gains": draw_overlay(overlay(lab, default_gains(lab), load_chain(lab.name))),
-        "mode-shapes": draw_shapes(lab.name, shapes_of(tfarm.modes(lab, count=SHOWN), SHOWN)),
+        "gains": draw_overlay(stable_regions(lab, default_gains(lab), load_chain(lab.name))),
+        "mode-shapes": draw_shapes(lab.name, shapes_of(tfarm.modes(lab, count=README_MODES), README_MODES)),
     }
     for stem, figure in figures.items():
-        save(figure, out, stem, formats=("png",), dpi=DOTS_PER_INCH)
+        save_figure(figure, out, stem, formats=("png",), dpi=README_DOTS)
     return tuple(out / f"{stem}.png" for stem in figures)

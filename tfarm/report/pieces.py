@@ -11,7 +11,7 @@ from tfarm.report.arm_section import arm_section
 from tfarm.report.assumptions_section import assumptions_section
 from tfarm.report.bode_section import bode_section
 from tfarm.report.fit_section import fit_section
-from tfarm.report.given_laws import Subject, in_s, on_arm
+from tfarm.report.given_laws import Subject, continuous_laws, on_arm
 from tfarm.report.law_loop_section import law_margins_section, law_nyquist_section, law_poles_section
 from tfarm.report.law_sampled_section import law_sampled_section
 from tfarm.report.law_section import law_section
@@ -23,7 +23,7 @@ from tfarm.report.modes_section import modes_section
 from tfarm.report.page import QUESTIONS
 from tfarm.report.paper import is_from_paper, paper_section
 from tfarm.report.sampled_section import sampled_section
-from tfarm.report.sections import Section
+from tfarm.report.sections import PageSection
 from tfarm.report.tuner_section import tuner_section
 
 LOOP_PAGES = ("margins", "locus", "sampled", "tune")  # whose sections an arm without a loop has not
@@ -41,7 +41,7 @@ class Piece:
     name: str
     anchor: str
     questions: tuple[str, ...]  # the --only pages that have it; the full page has all
-    make: Callable[..., Section]
+    make: Callable[..., PageSection]
     suits: Callable[[Arm], bool] = lambda arm: True
     is_sampled: bool = False
     is_of_laws: bool = False
@@ -55,9 +55,9 @@ class Piece:
             return False
         if self.is_measured and not subject.measured:
             return False
-        return self.suits(subject.arm) and (not self.in_s or bool(in_s(on_arm(subject.arm, subject.laws))))
+        return self.suits(subject.arm) and (not self.in_s or bool(continuous_laws(on_arm(subject.arm, subject.laws))))
 
-    def made(self, subject: Subject) -> Section:
+    def made(self, subject: Subject) -> PageSection:
         """The section."""
         if self.is_of_fit:
             return self.make(subject.fit)
@@ -68,7 +68,7 @@ class Piece:
         return self.make(subject.arm, subject.chain) if self.is_sampled else self.make(subject.arm)
 
 
-PIECES = (
+ARM_PIECES = (
     Piece("the fit", "fit", (), fit_section, is_of_fit=True),
     Piece("map of the gains", "margins-map", ("margins",), map_section, has_loop, is_sampled=True),
     Piece("the arm", "arm", tuple(QUESTIONS), arm_section),
@@ -87,7 +87,7 @@ PIECES = (
     Piece("gain tuner", "tune", ("tune",), tuner_section, has_loop, is_sampled=True),
     Piece("assumptions", "assumptions", ("assumptions",), assumptions_section),
 )
-OF_THE_LOOP = {piece.name for piece in PIECES if set(piece.questions) & set(LOOP_PAGES) and piece.anchor != "arm"}
+OF_THE_LOOP = {piece.name for piece in ARM_PIECES if set(piece.questions) & set(LOOP_PAGES) and piece.anchor != "arm"}
 LAW_PIECES = (
     Piece("margins", "margins", ("margins",), law_margins_section, has_rate_loop, is_of_laws=True, in_s=True),
     Piece("sampled loop", "sampled", ("sampled",), law_sampled_section, has_rate_loop, is_of_laws=True),
@@ -95,5 +95,5 @@ LAW_PIECES = (
     Piece("Nyquist", "margins-nyquist", ("margins",), law_nyquist_section, has_rate_loop, is_of_laws=True, in_s=True),
     Piece("poles", "locus", ("locus",), law_poles_section, has_rate_loop, is_of_laws=True, in_s=True),
     Piece("no loop", "no-loop", LOOP_PAGES, no_loop_section, lambda arm: not has_rate_loop(arm)),
-    *(piece for piece in PIECES if piece.name not in OF_THE_LOOP),
+    *(piece for piece in ARM_PIECES if piece.name not in OF_THE_LOOP),
 )

@@ -7,17 +7,24 @@ from collections.abc import Iterator
 
 from tfarm.arm import MOMENT_GAIN, RATE_GAIN, Arm, Link, RotarySpring, unit_of
 
-Row = tuple[str, str, float, str]
+QuantityRow = tuple[str, str, float, str]
 
 
-def given_rows(arm: Arm) -> list[Row]:
+def given_rows(arm: Arm) -> list[QuantityRow]:
     """Every part that the rig has."""
     alone = not arm.outer
     rows = [row for i, link in enumerate(arm.links, 1) for row in _segment(link, "" if alone else f"segment {i}: ")]
-    rows += _hub(arm)
+    hub = arm.hub
+    rows.append(("hub inertia", "I_h", hub.inertia, "kg m^2"))
+    others: list[QuantityRow] = [
+        ("hub friction", "b", hub.friction, "N m s/rad"),
+        ("hub radius, from the axis to the clamp", "r", hub.radius, "m"),
+        ("spring from hub to ground", "", hub.stiffness, "N m/rad"),
+    ]
+    rows += [row for row in others if row[2]]
     rows += [*_spring(arm.clamp, "clamp"), *_spring(arm.joint, "joint at the axis"), *_motor(arm)]
     for i, each in enumerate(arm.attachments, 1):
-        parts: list[Row] = [
+        parts: list[QuantityRow] = [
             ("place from the clamp", "x", each.x, "m"),
             ("mass", "", each.mass, "kg"),
             ("inertia", "", each.inertia, "kg m^2"),
@@ -34,11 +41,11 @@ def given_rows(arm: Arm) -> list[Row]:
     return rows + [("payload's centre beyond the tip", "e", payload.offset, "m")] * bool(payload.offset)
 
 
-def _segment(link: Link, prefix: str) -> Iterator[Row]:
+def _segment(link: Link, prefix: str) -> Iterator[QuantityRow]:
     """The numbers of one segment."""
     section = link.section
     kappa = "shear factor, given" if section.shear_factor is not None else "shear factor, Cowper (1966)"
-    rows: list[Row] = [
+    rows: list[QuantityRow] = [
         ("length", "L", link.length, "m"),
         ("density", "ρ", link.density, "kg/m^3"),
         ("Young's modulus", "E", link.youngs_modulus, "Pa"),
@@ -53,24 +60,13 @@ def _segment(link: Link, prefix: str) -> Iterator[Row]:
         yield f"{prefix}{name}", symbol, value, unit
 
 
-def _hub(arm: Arm) -> Iterator[Row]:
-    hub = arm.hub
-    yield "hub inertia", "I_h", hub.inertia, "kg m^2"
-    others: list[Row] = [
-        ("hub friction", "b", hub.friction, "N m s/rad"),
-        ("hub radius, from the axis to the clamp", "r", hub.radius, "m"),
-        ("spring from hub to ground", "", hub.stiffness, "N m/rad"),
-    ]
-    yield from (row for row in others if row[2])
-
-
-def _spring(spring: RotarySpring, name: str) -> Iterator[Row]:
+def _spring(spring: RotarySpring, name: str) -> Iterator[QuantityRow]:
     if not spring.is_rigid:
         yield f"{name}: stiffness", "k", spring.stiffness, "N m/rad"
         yield f"{name}: damping, k (1 + c s)", "c", spring.damping, "s"
 
 
-def _motor(arm: Arm) -> Iterator[Row]:
+def _motor(arm: Arm) -> Iterator[QuantityRow]:
     motor = arm.motor
     if motor is None:
         return
@@ -84,10 +80,10 @@ def _motor(arm: Arm) -> Iterator[Row]:
     yield "motor: rotor friction, before the gear", "b_m", motor.rotor_friction, "N m s/rad"
 
 
-def derived_rows(arm: Arm) -> list[Row]:
+def derived_rows(arm: Arm) -> list[QuantityRow]:
     """What follows from the parts."""
     alone = not arm.outer
-    rows: list[Row] = []
+    rows: list[QuantityRow] = []
     for i, link in enumerate(arm.links, 1):
         prefix = "" if alone else f"segment {i}: "
         rows += [

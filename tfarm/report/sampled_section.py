@@ -8,13 +8,13 @@ import numpy as np
 
 from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, shown_unit
 from tfarm.columns import Column, Table
-from tfarm.digits import counted, plain, scientific, significant, singly
+from tfarm.digits import how_many, plain, scientific, significant, singly
 from tfarm.dsp import Chain, sampled_verdict
 from tfarm.dsp.loci import STRONGER, loci
 from tfarm.dsp.margins import around
 from tfarm.dsp.slews import Slews, slews
 from tfarm.dsp.strip_chart import StripChart, strip_chart
-from tfarm.plots.folded import draw_loci
+from tfarm.plots.folded import draw_folded_loci
 from tfarm.plots.growth import draw_modes
 from tfarm.plots.strip import draw_strip_chart
 from tfarm.report.loop_laws import has_loop, why_no_loop
@@ -22,17 +22,17 @@ from tfarm.report.overlay import draw_overlay, overlay_table
 from tfarm.report.sampled_modes import loci_table, mode_rows
 from tfarm.report.sampled_words import (
     Sampled,
+    against_continuous,
     chain_words,
-    compared,
     cure,
-    headline_facts,
     in_ms,
-    interval,
-    short_answer,
+    interval_words,
+    sampled_facts,
+    sampled_in_short,
+    sampled_study,
     spans,
-    study,
 )
-from tfarm.report.sections import Picture, Section
+from tfarm.report.sections import PageSection, Picture
 from tfarm.report.strip_words import example_words, strip_table
 from tfarm.report.time_responses import (
     draw_slews,
@@ -45,23 +45,28 @@ from tfarm.report.words import typeset
 
 PAST_HUB = 1.25  # times the rate gain at which sampling the hub alone would break it: how far its locus goes
 
-LOCUS_K2 = (-0.5, 1.5)
+LOCUS_K2 = (-0.5, 1.5)  # of its locus: what holds when sampled, and a little of what does not, to either side
 
 
-def sampled_section(arm: Arm, chain: Chain | None = None) -> Section:
+def sampled_section(arm: Arm, chain: Chain | None = None) -> PageSection:
     """The loop through the arm's own chain, under the default gains; one sentence for an arm without a loop."""
     chain = Chain() if chain is None else chain
     title = f"The sampled loop: does it still hold at {in_ms(chain)} ms?"
     if not has_loop(arm):
-        return Section(anchor="sampled", title=title, words=(why_no_loop(arm),))
-    data = study(arm, chain)
+        return PageSection(anchor="sampled", title=title, words=(why_no_loop(arm),))
+    data = sampled_study(arm, chain)
     blocks: list[Picture | Table] = [_overlay_picture(data), _periods_table(data), *_mode_blocks(data)]
-    words = [short_answer(data), chain_words(arm, chain), compared(data), cure(data)]
+    words = [sampled_in_short(data), chain_words(arm, chain), against_continuous(data), cure(data)]
     if arm.has_rigid_mode:
-        blocks += _time_blocks(data)
+        loop = data.analysis.verdict.loop
+        moved = slews(arm, data.gains, loop.chain, loop.plant.count)
+        blocks.append(_slew_picture(moved))
+        if moved.with_moment.stopped is None:
+            coarse = strip_chart(arm, data.gains, moved.with_moment, loop.plant.count)
+            blocks.append(_strip_picture(coarse, loop.chain))
     else:
         words.append("The tip of this arm is held, so there is no slew to show in time.")
-    return Section(anchor="sampled", title=title, words=words, facts=headline_facts(data), blocks=blocks)
+    return PageSection(anchor="sampled", title=title, words=words, facts=sampled_facts(data), blocks=blocks)
 
 
 def _overlay_picture(data: Sampled) -> Picture:
@@ -82,12 +87,11 @@ def _overlay_picture(data: Sampled) -> Picture:
             f"blue is what a controller that ignores its clock would wrongly trust. {layers}{proven}"
             "All edges are exact crossings of the axis or the unit circle. "
             f"The axis is logarithmic: {RATE_GAIN} = 0 lies beyond its left end at {low}{below}. "
-            f""
         ),
         alt=(
             f"Map of {' and '.join(PLANE)}: at {data.held} the continuous loop is stable for {MOMENT_GAIN} "
-            f"{interval(data.continuous.around, data.continuous.looked_at)}, the sampled one "
-            f"{interval(data.sampled_K2)}."
+            f"{interval_words(data.continuous.around, data.continuous.looked_at)}, the sampled one "
+            f"{interval_words(data.sampled_K2)}."
         ),
         figure=draw_overlay(regions),
         data=overlay_table(regions, "sampled-overlay-data"),
@@ -109,7 +113,6 @@ def _periods_table(data: Sampled) -> Table:
             f"The same gains, {' and '.join(data.gains.told(name, plain) for name in PLANE)}, at other sample periods; "
             f"the verdicts hold for the modes given ({held}). Growth is that of the pole that decides, per second: "
             "negative is stable. Where the gains are not stable, the intervals are those that would be. "
-            f""
         ),
         record=rows,
         columns=(
@@ -121,11 +124,6 @@ def _periods_table(data: Sampled) -> Table:
             *(_window_column(name, data) for name in PLANE),
         ),
     )
-
-
-def _hub_in_input(arm: Arm) -> float:
-    """What turns at the hub, in the unit of the input times s^2."""
-    return arm.hub_side_inertia * arm.input_per_torque
 
 
 def _window_column(name: str, data: Sampled) -> Column:
@@ -141,7 +139,8 @@ def _window_column(name: str, data: Sampled) -> Column:
 def _mode_blocks(data: Sampled) -> list[Picture | Table]:
     loop, table = data.analysis.verdict.loop, data.analysis.modes
     T = loop.chain.sampling.period
-    top = max(PAST_HUB * 2 * _hub_in_input(data.arm) / T, STRONGER * data.gains[RATE_GAIN])
+    turning = data.arm.hub_side_inertia * data.arm.input_per_torque  # at the hub, in the unit of the input times s^2
+    top = max(PAST_HUB * 2 * turning / T, STRONGER * data.gains[RATE_GAIN])
     found = loci(loop, top, LOCUS_K2)
     aliased = [int(i) for i, band in zip(table.index, table.band, strict=True) if band > 0]
     first = f"From mode {aliased[0]} on all are aliased. " if aliased else "No mode here is aliased. "
@@ -156,7 +155,7 @@ def _mode_blocks(data: Sampled) -> list[Picture | Table]:
             f"delay. What looks like lying on the circle is told apart by the next picture."
         ),
         alt=f"Root loci of the sampled loop in the folded s-plane and the z-plane; {len(aliased)} aliased modes.",
-        figure=draw_loci(found),
+        figure=draw_folded_loci(found),
         data=loci_table(found, "sampled-loci-data"),
     )
     grown = table.index[table.log_radius > 0]
@@ -185,15 +184,6 @@ def grown_words(grown: list[int]) -> str:
         return "none grows"
     number, named = ("one grows", "mode") if len(grown) == 1 else (f"{len(grown)} grow", "modes")
     return f"{number}: {named} {', '.join(map(str, grown))}"
-
-
-def _time_blocks(data: Sampled) -> list[Picture | Table]:
-    loop = data.analysis.verdict.loop
-    moved = slews(data.arm, data.gains, loop.chain, loop.plant.count)
-    if moved.with_moment.stopped is not None:
-        return [_slew_picture(moved)]
-    coarse = strip_chart(data.arm, data.gains, moved.with_moment, loop.plant.count)
-    return [_slew_picture(moved), _strip_picture(coarse, loop.chain)]
 
 
 def _slew_picture(moved: Slews) -> Picture:
@@ -228,7 +218,7 @@ def _strip_picture(coarse: StripChart, own: Chain) -> Picture:
         f"(shaded); the moment is read in steps of {significant(coarse.step, 3)} N m"
     )
     beyond = f", and lies beyond the ADC's range at {read} samples" if read else ""
-    late = f"{counted(delay, 'sample')} of delay"
+    late = f"{how_many(delay, 'sample')} of delay"
     return Picture(
         stem="sampled-strip",
         title="A coarse chain: ADC steps, delay, saturation",

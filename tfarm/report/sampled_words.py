@@ -10,22 +10,21 @@ from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, HubFeedback, unit_of
 from tfarm.digits import plain, scientific, significant
 from tfarm.dsp import Analysis, Verdict, analyse
 from tfarm.dsp.chain import Chain
-from tfarm.dsp.margins import around
+from tfarm.dsp.margins import Window, around
 from tfarm.dsp.periods import AtPeriod, at_periods
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import Windows, gain_windows
 from tfarm.records import record
-from tfarm.report.overlay import Overlay, overlay
+from tfarm.report.overlay import StableRegions, stable_regions
 from tfarm.report.sections import Fact
-from tfarm.report.words import typeset
+from tfarm.report.words import typeset, upper
 from tfarm.spectrum.scales import default_gains, default_words
 
-EVERYWHERE = (-math.inf, math.inf)
+EVERYWHERE = (-math.inf, math.inf)  # gains of any size: an interval that has no end but its own
 MOVED = 1e-4  # an end of a window that sampling moves by less is said to stay, in its own size
 DAY = 86400.0  # s
-SLOW = 60.0  # s: what takes longer to double is no growth that anyone would see
+SLOW_GROWTH = 60.0  # s: what takes longer to double is no growth that anyone would see
 ANYONE_HAS = 0.05  # % of critical damping: less than any real arm has
-Window = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -36,7 +35,7 @@ class Sampled:
     arm: Arm
     analysis: Analysis
     continuous: Windows
-    regions: Overlay
+    regions: StableRegions
     periods: tuple[AtPeriod, ...]
 
     @property
@@ -70,27 +69,31 @@ def in_ms(chain: Chain) -> str:
     return plain(1e3 * chain.sampling.period)
 
 
-def study(arm: Arm, chain: Chain) -> Sampled:
+def sampled_study(arm: Arm, chain: Chain) -> Sampled:
     """The numbers of the section.  Raises ParameterError for an arm without a loop."""
     gains = default_gains(arm)
     analysis = analyse(arm, gains, chain)
     windows = gain_windows(stability(arm, gains), MOMENT_GAIN)
-    return Sampled(arm, analysis, windows, overlay(arm, gains, chain), at_periods(arm, gains, chain))
+    return Sampled(arm, analysis, windows, stable_regions(arm, gains, chain), at_periods(arm, gains, chain))
 
 
 # ------------------------------------------------------------ words
 
 
-def short_answer(data: Sampled) -> str:
-    """Yes or no, by how much, for how many modes, and how fast."""
-    verdict = data.analysis.verdict
+def sampled_in_short(data: Sampled) -> str:
+    """Yes or no, by how much, for how many modes; the pole that decides, and in what time it doubles or halves."""
+    verdict, T = data.analysis.verdict, data.chain.sampling.period
     gains = " and ".join(data.gains.told(name, plain, data.arm) for name in PLANE)
     settled = f"with {_modes(verdict)}" if verdict.is_settled else f"as far as its {_modes(verdict)} go"
-    is_stable = verdict.is_stable
+    is_stable, growth = verdict.is_stable, verdict.log_radius
     margin = f" and bears {_delay(data)} more of delay" if is_stable else ""
     word = "stable" if is_stable else "marginal" if verdict.word == "marginal" else "unstable"
     lead = f"{_yes_or_no(data)}: sampled every {data.ms} ms with {gains}, the loop is {word}{margin}, {settled}."
-    return f"{lead} {_slowest(data)}"
+    what = upper(verdict.sentence.partition(": ")[2].partition(" (")[0])
+    if growth:
+        verb = "doubles" if growth > 0 else "halves"
+        what = f"{typeset(what)}: it {verb} in {duration(T * math.log(2) / abs(growth))}"
+    return f"{lead} {what}."
 
 
 def _yes_or_no(data: Sampled) -> str:
@@ -99,7 +102,7 @@ def _yes_or_no(data: Sampled) -> str:
     if verdict.is_stable:
         return "Yes"
     growth = verdict.log_radius
-    return "Not strictly" if growth * SLOW < data.chain.sampling.period * math.log(2) else "No"
+    return "Not strictly" if growth * SLOW_GROWTH < data.chain.sampling.period * math.log(2) else "No"
 
 
 def _delay(data: Sampled) -> str:
@@ -113,18 +116,6 @@ def _modes(verdict: Verdict) -> str:
     if verdict.band_rad_s is None:
         return f"first {verdict.modes_used} modes"
     return f"every mode below {scientific(verdict.band_rad_s, 2)} rad/s (not known beyond)"
-
-
-def _slowest(data: Sampled) -> str:
-    """The pole that decides, and in what time it changes by a factor of two."""
-    verdict, T = data.analysis.verdict, data.chain.sampling.period
-    growth = verdict.log_radius
-    what = verdict.sentence.partition(": ")[2].partition(" (")[0]
-    what = what[0].upper() + what[1:]
-    if growth == 0:
-        return f"{what}."
-    verb = "doubles" if growth > 0 else "halves"
-    return f"{typeset(what)}: it {verb} in {duration(T * math.log(2) / abs(growth))}."
 
 
 def chain_words(arm: Arm, chain: Chain) -> str:
@@ -154,21 +145,21 @@ def duration(seconds: float) -> str:
     return f"{significant(seconds, 2)} s"
 
 
-def compared(data: Sampled) -> str:
+def against_continuous(data: Sampled) -> str:
     """The continuous interval of the moment gain against the sampled one, end by end."""
     verdict, before, after = data.analysis.verdict, data.continuous.around, data.sampled_K2
     modes = "" if data.analysis.shown[MOMENT_GAIN].is_settled else f" (first {verdict.modes_used} modes)"
     both = (
-        f"the continuous loop is stable for {MOMENT_GAIN} {interval(before, data.continuous.looked_at)}; "
-        f"the sampled one {interval(after)}{modes}"
+        f"the continuous loop is stable for {MOMENT_GAIN} {interval_words(before, data.continuous.looked_at)}; "
+        f"the sampled one {interval_words(after)}{modes}"
     )
     told = f"At {data.held} {both}."
     if after is None:
         return told if before is None else f"{told} Sampling loses what holds without it."
     if before is None:
         return f"{told} Here it is the sampling that stabilises."
-    found = [*_lower_end(before, after, data.continuous.looked_at), *_upper_end(before, after)]
-    moved = " and ".join(found) if found else "moves neither end by a hundredth of a per cent"
+    found = _moved_ends(before, after, data.continuous.looked_at)
+    moved = " and ".join(found) or "moves neither end by a hundredth of a per cent"
     if not data.arm.is_uniform:
         return f"{told} Sampling {moved}."
     return (
@@ -177,25 +168,20 @@ def compared(data: Sampled) -> str:
     )
 
 
-def _lower_end(before: Window, after: Window, looked_at: Window) -> list[str]:
-    """What sampling does to the lower end of the moment gain."""
-    if abs(after[0] - before[0]) <= MOVED * abs(before[0]) or (before[0] == looked_at[0] and after[0] <= before[0]):
-        return []
-    if after[0] > before[0]:
-        below = f"takes away {MOMENT_GAIN} below {significant(after[0], 3)}"
-        return [f"takes away all negative {MOMENT_GAIN}" if after[0] == 0 else below]
-    return [f"adds room down to {significant(after[0], 3)}"]
+def _moved_ends(before: Window, after: Window, looked_at: Window) -> list[str]:
+    """What sampling does to both ends of the moment gain; a lower one below which nothing was looked at is no end."""
+    (low, high), (new_low, new_high), told = before, after, []
+    is_bound = low == looked_at[0] and new_low <= low
+    if abs(new_low - low) > MOVED * abs(low) and not is_bound:
+        gone = f"all negative {MOMENT_GAIN}" if new_low == 0 else f"{MOMENT_GAIN} below {significant(new_low, 3)}"
+        told.append(f"takes away {gone}" if new_low > low else f"adds room down to {significant(new_low, 3)}")
+    if abs(new_high - high) > MOVED * abs(high):
+        verb = "adds room up to" if new_high > high else f"takes away {MOMENT_GAIN} above"
+        told.append(f"{verb} {significant(new_high, 4)}")
+    return told
 
 
-def _upper_end(before: Window, after: Window) -> list[str]:
-    """And to the upper one, beside the continuous edge."""
-    if abs(after[1] - before[1]) <= MOVED * abs(before[1]):
-        return []
-    verb = "adds room up to" if after[1] > before[1] else f"takes away {MOMENT_GAIN} above"
-    return [f"{verb} {significant(after[1], 4)}"]
-
-
-def interval(window: Window | None, looked_at: Window = EVERYWHERE) -> str:
+def interval_words(window: Window | None, looked_at: Window = EVERYWHERE) -> str:
     """An interval of the moment gain in words; an end of what was looked at is no edge, and is said to be none."""
     if window is None:
         return f"for no {MOMENT_GAIN} around this one"
@@ -257,7 +243,7 @@ def _for_modes(data: Sampled) -> str:
     return "" if found.is_settled else f" for the first {found.modes} modes"
 
 
-def headline_facts(data: Sampled) -> tuple[Fact, ...]:
+def sampled_facts(data: Sampled) -> tuple[Fact, ...]:
     """The headline numbers."""
     analysis, gains = data.analysis, data.gains
     verdict, margin = analysis.verdict, analysis.delay_margin

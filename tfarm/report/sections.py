@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
 from tfarm.columns import Table
-from tfarm.plots.files import save
+from tfarm.plots.files import save_figure
 from tfarm.report.mode_cards import ModeCard
-from tfarm.tables.files import save as save_table
+from tfarm.tables.files import save_table
 from tfarm.tables.html import as_html
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ class Picture:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Section:
+class PageSection:
     """A part of a page.  `words` are paragraphs, `items` a list; `blocks` pictures and tables, `cards` of modes.
 
     `failure` says why the section could not be made, where the words say so in its place; empty otherwise.
@@ -68,7 +68,7 @@ class Section:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Block:
+class SavedBlock:
     """A picture or table as the page refers to it, its files saved."""
 
     stem: str
@@ -84,36 +84,29 @@ class Block:
 class SavedSection:
     """A section without its figures: what remains to be written are words."""
 
-    section: Section
-    blocks: tuple[Block, ...]
+    section: PageSection
+    blocks: tuple[SavedBlock, ...]
 
 
-def save_section(section: Section, folder: Path) -> SavedSection:
+def save_section(section: PageSection, folder: Path) -> SavedSection:
     """Every picture as pictures/*.svg, its numbers as data/*.csv; every table as data/*.csv and .json."""
     for name in (PICTURES, DATA):
         (folder / name).mkdir(exist_ok=True)
     blocks = tuple(_save(block, folder) for block in section.blocks)
-    words = Section(
-        anchor=section.anchor,
-        title=section.title,
-        words=section.words,
-        items=section.items,
-        facts=section.facts,
-        cards=section.cards,
-        failure=section.failure,
-    )
-    return SavedSection(section=words, blocks=blocks)
+    return SavedSection(section=replace(section, blocks=()), blocks=blocks)
 
 
-def _save(block: Picture | Table, folder: Path) -> Block:
+def _save(block: Picture | Table, folder: Path) -> SavedBlock:
     if isinstance(block, Table):
         table, files = as_html(block), _below(DATA, save_table(block, folder / DATA))
-        return Block(stem=block.stem, title=block.title, caption=block.caption, table=table, files=files)
-    save(block.figure, folder / PICTURES, block.stem, formats=("svg",))
+        return SavedBlock(stem=block.stem, title=block.title, caption=block.caption, table=table, files=files)
+    save_figure(block.figure, folder / PICTURES, block.stem, formats=("svg",))
     files = _below(PICTURES, [f"{block.stem}.svg"])
     if block.data is not None:
         files += _below(DATA, save_table(block.data, folder / DATA, kinds=("csv",)))
-    return Block(stem=block.stem, title=block.title, caption=block.caption, alt=block.alt, size=block.size, files=files)
+    return SavedBlock(
+        stem=block.stem, title=block.title, caption=block.caption, alt=block.alt, size=block.size, files=files
+    )
 
 
 def _below(folder: str, names: Sequence[str]) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from tfarm.arm import MOMENT_GAIN, Arm
 from tfarm.columns import Column, Table
-from tfarm.digits import held, plain, significant
+from tfarm.digits import kept_digits, plain, significant
 from tfarm.dsp import Simulation, curves
 from tfarm.dsp.results import residual_moment_rms, settling_time
 from tfarm.dsp.slews import Slews
@@ -19,7 +19,7 @@ from tfarm.plots.motion import draw_responses
 if TYPE_CHECKING:
     from tfarm.plots.style import Figure
 
-HELD = 7  # digits of a curve in its file: a hundredth of the width of a line is four
+CURVE_DIGITS = 7  # digits of a curve in its file: a hundredth of the width of a line is four
 UNTIL = 0.9  # of a record: what has settled after that may ring on
 
 
@@ -42,7 +42,12 @@ def what_slews_show(data: Slews) -> str:
     if gone:
         return f"The loop runs away until the arm is folded up: {' and '.join(gone)}.{clipped}"
     before, after = residual_moment_rms(data.without), residual_moment_rms(data.with_moment)
-    settled = [_settled(simulation) for simulation in (data.without, data.with_moment)]
+    settled = []
+    for run in (data.without, data.with_moment):
+        time = settling_time(run)
+        is_late = time > UNTIL * float(run.scenario.t[-1])  # inf, or so near the end that it tells nothing
+        stays = f"the moment stays within 5 % of its largest from {significant(time, 3)} s on"
+        settled.append("the moment does not settle within this record" if is_late else stays)
     each = f"Without moment feedback {settled[0]}, with it {settled[1]}"
     both = f"With moment feedback or without it {settled[0]}" if settled[0] == settled[1] else each
     ratio = "" if before == 0 or after == 0 else f", {significant(before / after, 3)} times as much without as with it"
@@ -58,13 +63,6 @@ def seen_words(data: Slews) -> str:
     if data.with_moment.chain.slew.reading == "total":
         return "the whole moment"
     return "the moment less the rigid arm's (dashed)"
-
-
-def _settled(simulation: Simulation) -> str:
-    time = settling_time(simulation)
-    if time > UNTIL * float(simulation.scenario.t[-1]):  # inf, or so near the end that it tells nothing
-        return "the moment does not settle within this record"
-    return f"the moment stays within 5 % of its largest from {significant(time, 3)} s on"
 
 
 def clipped_words(each: Mapping[str, Simulation]) -> str:
@@ -119,5 +117,5 @@ def responses_table(stem: str, title: str, arm: Arm, each: Mapping[str, Simulati
         columns.append(Column(name, given, arm.input_unit, of=curves.held(run, run.torque, t)))
         if run.gain is not None and np.ptp(run.gain):
             columns.append(Column(f"K_{key}", "gain", of=curves.held(run, run.gain, t)))
-    columns = [replace(each, of=held(map(float, each.values), HELD)) for each in columns]
+    columns = [replace(each, of=kept_digits(map(float, each.values), CURVE_DIGITS)) for each in columns]
     return Table(stem=stem, title=title, is_data=True, columns=tuple(columns))

@@ -20,32 +20,32 @@ from tfarm.arm import load, presets
 from tfarm.audit import published
 from tfarm.columns import Column, Table
 from tfarm.digits import scientific, significant, singly, worded
-from tfarm.report.kept import LARGEST, keep
+from tfarm.report.kept import LARGEST_READ, keep
 from tfarm.report.page import command_for_all, render
-from tfarm.report.sections import DATA, Fact, Section, save_section
-from tfarm.report.trust_audit import VERDICTS, audit_table, counts, shown
-from tfarm.report.trust_proofs import DIGITS, Proof, hash_of
+from tfarm.report.sections import DATA, Fact, PageSection, save_section
+from tfarm.report.trust_audit import VERDICT_MARKS, audit_table, shown_row, verdict_counts
+from tfarm.report.trust_proofs import BRACKET_DIGITS, ArmProof, hash_of
 from tfarm.report.trust_tables import accuracy_table, boxes_tables, counts_table, digits_table
 from tfarm.report.unchanged import PACKAGES, makers
 from tfarm.response.accuracy import BAND_POINTS
-from tfarm.tables.files import save as save_table
+from tfarm.tables.files import save_table
 
-FOLDER, KEPT = "trust", "evidence"
+TRUST_FOLDER, EVIDENCE_KIND = "trust", "evidence"
 
-PROOFS = (
+PROOFS_WORDS = (
     "Modes are counted before they are looked for: a chain of signs in the manner of Wittrick and Williams (1971) "
     "gives the number of natural frequencies below any frequency. Here both that count and the change of sign in each "
     "enclosure are decided in ball arithmetic (python-flint), where every number carries a rigorous bound of its "
     "error: what follows is a proof, not an estimate. Where the enclosures are as many as the count, none is missing."
 )
-ACCURACY = (
-    f"The plots are computed in double precision from a closed form without cancellation. At {BAND_POINTS} frequencies "
-    f"of each response, from a tenth of the first natural frequency to beyond the tenth, it was compared with ball "
-    "arithmetic at 30 proven digits. The error is counted in the change of G that a relative change of its argument "
-    "brings about, |G₆₄/G − 1| / (1 + |s G′/G|): near an undamped resonance no more can be asked of any number format. "
-    "One unit in the last place of a double is 2.2 × 10⁻¹⁶."
+ACCURACY_WORDS = (
+    f"The plots are computed in double precision from a closed form without cancellation. At {BAND_POINTS} "
+    "frequencies of each response, from a tenth of the first natural frequency to beyond the tenth, it was compared "
+    "with ball arithmetic at 30 proven digits. The error is counted in the change of G that a relative change of its "
+    "argument brings about, |G₆₄/G − 1| / (1 + |s G′/G|): near an undamped resonance no more can be asked of any "
+    "number format. One unit in the last place of a double is 2.2 × 10⁻¹⁶."
 )
-PUBLISHED = (
+PUBLISHED_WORDS = (
     "Natural frequencies of beams as others have printed them. Each beam is an arm here: a free pin is a hub without "
     "inertia, a clamp a locked hub, a support at the tip an infinite payload mass. Ours agrees with a printed number "
     "if it rounds to its last digit; where it does not, the reason stands beside it. A difference without a reason "
@@ -71,14 +71,14 @@ def gather() -> Evidence:
 
 def keep_evidence(evidence: Evidence, folder: Path) -> None:
     """evidence.json: for the next report of the same tfarm, which need not gather it again."""
-    keep(folder, KEPT, {"name": folder.name, "makers": makers(), **asdict(evidence)})
+    keep(folder, EVIDENCE_KIND, {"name": folder.name, "makers": makers(), **asdict(evidence)})
 
 
 def kept_evidence(folder: Path) -> Evidence | None:
     """What is in evidence.json; None where it is of another tfarm or other versions, or none of ours."""
     try:
-        file = folder / f"{KEPT}.json"
-        read = json.loads(file.read_text(encoding="utf-8")) if file.stat().st_size <= LARGEST else {}
+        file = folder / f"{EVIDENCE_KIND}.json"
+        read = json.loads(file.read_text(encoding="utf-8")) if file.stat().st_size <= LARGEST_READ else {}
         if read["makers"] != makers():
             return None
         rows = tuple(audit.AuditRow(**row) for row in read["audit"])
@@ -87,7 +87,7 @@ def kept_evidence(folder: Path) -> Evidence | None:
         return None
 
 
-def write_trust(evidence: Evidence, proofs: Sequence[Proof], folder: Path) -> None:
+def write_trust(evidence: Evidence, proofs: Sequence[ArmProof], folder: Path) -> None:
     """index.html and its tables, into a folder of their own."""
     folder.mkdir()
     sections = {s.anchor: save_section(s, folder) for s in _sections(evidence, proofs)}
@@ -98,8 +98,10 @@ def write_trust(evidence: Evidence, proofs: Sequence[Proof], folder: Path) -> No
         title="Why trust this",
         sections=sections,
         short=_short(evidence, proofs),
-        counts=[(*VERDICTS[verdict], verdict, number) for verdict, number in counts(evidence.audit).items()],
-        equations=[shown(row) for row in evidence.audit],
+        counts=[
+            (*VERDICT_MARKS[verdict], verdict, number) for verdict, number in verdict_counts(evidence.audit).items()
+        ],
+        equations=[shown_row(row) for row in evidence.audit],
         audit_files=files,
         paper=audit.PAPER,
         command=command_for_all([(proof.name, _is_preset(proof)) for proof in proofs]),
@@ -107,37 +109,45 @@ def write_trust(evidence: Evidence, proofs: Sequence[Proof], folder: Path) -> No
     (folder / "index.html").write_text(page, encoding="utf-8", newline="")
 
 
-def _sections(evidence: Evidence, proofs: Sequence[Proof]) -> list[Section]:
+def _sections(evidence: Evidence, proofs: Sequence[ArmProof]) -> list[PageSection]:
     rows = evidence.published
+    agree, of = sum(row.agrees for row in rows), len({row.source for row in rows})
+    facts = (
+        Fact(label="numbers compared", value=str(len(rows)), beside=f"from {of} sources"),
+        Fact(label="agree to the last printed digit", value=str(agree)),
+        Fact(label="differ, with the reason", value=str(len(rows) - agree)),
+    )
     return [
-        Section(
+        PageSection(
             anchor="proofs",
             title="Proofs",
-            words=(PROOFS,),
+            words=(PROOFS_WORDS,),
             blocks=(digits_table(proofs), counts_table(proofs), *boxes_tables(proofs)),
         ),
-        Section(anchor="accuracy", title="Measured accuracy", words=(ACCURACY,), blocks=(accuracy_table(proofs),)),
-        Section(
+        PageSection(
+            anchor="accuracy", title="Measured accuracy", words=(ACCURACY_WORDS,), blocks=(accuracy_table(proofs),)
+        ),
+        PageSection(
             anchor="published",
             title="Published numbers",
-            words=(PUBLISHED,),
-            facts=_published_facts(rows),
+            words=(PUBLISHED_WORDS,),
+            facts=facts,
             blocks=(sources_table(rows), differences_table(rows), published_table(rows)),
         ),
-        Section(anchor="again", title="Make it again", blocks=(inputs_table(proofs), versions_table())),
+        PageSection(anchor="again", title="Make it again", blocks=(inputs_table(proofs), versions_table())),
     ]
 
 
-def _short(evidence: Evidence, proofs: Sequence[Proof]) -> dict[str, Any]:
+def _short(evidence: Evidence, proofs: Sequence[ArmProof]) -> dict[str, Any]:
     """The numbers of the five sentences at the top."""
     proven = [proof for proof in proofs if not proof.failure]
     errors = [error for proof in proofs for _, error in proof.errors]
-    found = counts(evidence.audit)
+    found = verdict_counts(evidence.audit)
     return {
         "frequencies": sum(len(proof.brackets) for proof in proven),
         "arms": len(proven),
         "unproven": [proof.name for proof in proofs if proof.failure],
-        "digits": DIGITS,
+        "digits": BRACKET_DIGITS,
         "points": BAND_POINTS,
         "worst": scientific(max(errors), 2) if errors else "",
         "published": len(evidence.published),
@@ -203,21 +213,10 @@ def published_table(rows: Sequence[published.PublishedRow]) -> Table:
     )
 
 
-def _published_facts(rows: Sequence[published.PublishedRow]) -> tuple[Fact, ...]:
-    agree = sum(row.agrees for row in rows)
-    return (
-        Fact(
-            label="numbers compared", value=str(len(rows)), beside=f"from {len({row.source for row in rows})} sources"
-        ),
-        Fact(label="agree to the last printed digit", value=str(agree)),
-        Fact(label="differ, with the reason", value=str(len(rows) - agree)),
-    )
-
-
 # ------------------------------------------------------------ making it again
 
 
-def inputs_table(proofs: Sequence[Proof]) -> Table:
+def inputs_table(proofs: Sequence[ArmProof]) -> Table:
     """The hash of each arm's file."""
     names, hashes = [proof.name for proof in proofs], [proof.sha256 for proof in proofs]
     return Table(
@@ -247,6 +246,6 @@ def versions_table() -> Table:
     )
 
 
-def _is_preset(proof: Proof) -> bool:
+def _is_preset(proof: ArmProof) -> bool:
     """Whether the arm's file is, byte for byte, that of a preset."""
     return proof.name in presets() and hash_of(load(proof.name)) == proof.sha256

@@ -13,17 +13,17 @@ from tfarm.audit import AuditRow
 from tfarm.audit.rows import AUDIT_COLUMNS, is_zero
 from tfarm.columns import Table
 from tfarm.digits import powers, unit
-from tfarm.report.trust_math import compared, formulas, lines, width
+from tfarm.report.trust_math import compared_formulas, formula_lines, formulas, width
 
-VERDICTS = {"ok": ("✓", "right as printed"), "corrected": ("≠", "corrected"), "undecided": ("?", "undecided")}
-GREEK = dict(
+VERDICT_MARKS = {"ok": ("✓", "right as printed"), "corrected": ("≠", "corrected"), "undecided": ("?", "undecided")}
+GREEK_LETTERS = dict(
     zip(
         ("rho", "kappa", "theta", "phi", "psi", "lambda", "eta", "alpha", "nu", "Theta", "Phi", "Psi", "Delta"),
         "ρκθφψληανΘΦΨΔ",
         strict=True,
     )
 )
-BESIDE = 46  # characters of the widest line up to which two formulas stand side by side
+WIDEST_BESIDE = 46  # characters of the widest line up to which two formulas stand side by side
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,12 +43,12 @@ class Shown:
     evidence: Markup
 
 
-def shown(row: AuditRow) -> Shown:
+def shown_row(row: AuditRow) -> Shown:
     """A row of the audit, typeset."""
-    mark, words = VERDICTS[row.verdict]
+    mark, words = VERDICT_MARKS[row.verdict]
     is_right = row.printed == row.corrected
     texts = (row.printed_tex,) if is_right else (row.printed_tex, row.corrected_tex)
-    printed, corrected = (formulas(texts[0]), []) if is_right else compared(*texts)
+    printed, corrected = (formulas(texts[0]), []) if is_right else compared_formulas(*texts)
     return Shown(
         anchor=anchor(row.equation),
         equation=in_letters(row.equation),
@@ -57,7 +57,7 @@ def shown(row: AuditRow) -> Shown:
         words=words,
         printed=printed,
         corrected=corrected,
-        is_wide=is_right or max(width(line) for tex in texts for line in lines(tex)) > BESIDE,
+        is_wide=is_right or max(width(line) for tex in texts for line in formula_lines(tex)) > WIDEST_BESIDE,
         left_printed=_left(row.residual_printed),
         left_corrected=_left(row.residual_corrected),
         evidence=in_letters(row.evidence),
@@ -67,7 +67,9 @@ def shown(row: AuditRow) -> Shown:
 def in_letters(text: str) -> Markup:
     """The audit's plain text with Greek letters, subscripts and exponents: theta_t^2 becomes θ<sub>t</sub>²."""
     greek = re.sub(
-        rf"(?<![A-Za-z])({'|'.join(GREEK)})(?![A-Za-z])", lambda name: GREEK[name[1]], powers(unit(str(escape(text))))
+        rf"(?<![A-Za-z])({'|'.join(GREEK_LETTERS)})(?![A-Za-z])",
+        lambda name: GREEK_LETTERS[name[1]],
+        powers(unit(str(escape(text)))),
     )
     return Markup(
         re.sub(r"(?<![^\W\d_])([A-Za-zΑ-Ωα-ω])_([a-z]{1,2}|\d{1,2})(?![A-Za-z0-9])", r"\1<sub>\2</sub>", greek)
@@ -79,10 +81,10 @@ def anchor(equation: str) -> str:
     return "eq-" + re.sub(r"[^a-z0-9]+", "-", equation.lower()).strip("-")
 
 
-def counts(rows: Sequence[AuditRow]) -> dict[str, int]:
+def verdict_counts(rows: Sequence[AuditRow]) -> dict[str, int]:
     """How many rows have each verdict, in the order of VERDICTS."""
     found = Counter(row.verdict for row in rows)
-    return {verdict: found[verdict] for verdict in VERDICTS}
+    return {verdict: found[verdict] for verdict in VERDICT_MARKS}
 
 
 def audit_table(rows: Sequence[AuditRow]) -> Table:

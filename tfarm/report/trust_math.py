@@ -14,16 +14,16 @@ from xml.etree import ElementTree
 from latex2mathml.converter import convert
 from markupsafe import Markup
 
-Element = ElementTree.Element
+MathElement = ElementTree.Element
 
-BETWEEN = re.compile(r"([,;]\\quad)\s*")
+STATEMENT_END = re.compile(r"([,;]\\quad)\s*")
 OPENS, CLOSES = ("\\left", "\\begin", "{"), ("\\right", "\\end", "}")
-TOKEN = re.compile(r"\\left|\\right|\\begin|\\end|[{}]|[^\\{}]|\\[A-Za-z]+|\\.")
-SIGN = re.compile(r" [-+] ")
+TEX_TOKEN = re.compile(r"\\left|\\right|\\begin|\\end|[{}]|[^\\{}]|\\[A-Za-z]+|\\.")
+SUM_SIGN = re.compile(r" [-+] ")
 LEAVES = ("mi", "mo", "mn", "mtext")
-WIDEST = 92  # characters of a line, as `width` estimates them: what fits beside the margins of a desktop's page
-SHORT = 24  # statements up to that width share a line, as far as it goes
-INDENT = r"\qquad "
+WIDEST_LINE = 92  # characters of a line, as `width` estimates them: what fits beside the margins of a desktop's page
+SHORT_STATEMENT = 24  # statements up to that width share a line, as far as it goes
+INDENT_TEX = r"\qquad "
 
 
 def formulas(tex: str) -> list[Markup]:
@@ -31,10 +31,10 @@ def formulas(tex: str) -> list[Markup]:
     return [_text(line) for line in _set(tex)]
 
 
-def compared(printed: str, corrected: str) -> tuple[list[Markup], list[Markup]]:
+def compared_formulas(printed: str, corrected: str) -> tuple[list[Markup], list[Markup]]:
     """Both as MathML, a line each, the symbols in which they differ of the class "changed"."""
     both = _set(printed), _set(corrected)
-    left, right = ([leaf for line in lines for leaf in line.iter() if leaf.tag in LEAVES] for lines in both)
+    left, right = ([leaf for line in each for leaf in line.iter() if leaf.tag in LEAVES] for each in both)
     matcher = SequenceMatcher(a=[leaf.text for leaf in left], b=[leaf.text for leaf in right], autojunk=False)
     for what, i, j, k, m in matcher.get_opcodes():
         if what != "equal":
@@ -43,77 +43,72 @@ def compared(printed: str, corrected: str) -> tuple[list[Markup], list[Markup]]:
     return [_text(line) for line in both[0]], [_text(line) for line in both[1]]
 
 
-def lines(tex: str) -> list[str]:
+def formula_lines(tex: str) -> list[str]:
     """The TeX of each line: a statement, several short ones, or as many terms of a long one as fit."""
-    return [line for group in _groups(tex) for line in _broken(group)]
+    found = []
+    for group in _groups(tex):
+        line = ""
+        for term in _terms(group):
+            if line and width(line + term) > WIDEST_LINE:
+                found.append(line)
+                line = INDENT_TEX
+            line += term
+        found.append(line)
+    return found
 
 
 def width(tex: str) -> int:
     """About how many characters wide a line is set; the two halves of a fraction share their place."""
+
+    def wider(halves: re.Match[str]) -> str:
+        return "x" * max(width(halves[1]), width(halves[2]))
+
     text = re.sub(r"\\begin\{vmatrix\}.*?\\end\{vmatrix\}", "x" * 16, tex, flags=re.DOTALL)
-    text = re.sub(r"\\frac\{((?:[^{}]|\{[^{}]*\})*)\}\{((?:[^{}]|\{[^{}]*\})*)\}", _wider, text)
+    text = re.sub(r"\\frac\{((?:[^{}]|\{[^{}]*\})*)\}\{((?:[^{}]|\{[^{}]*\})*)\}", wider, text)
     text = re.sub(r"\\(?:mathrm|text|left|right|sqrt|,|quad|qquad)", "", text)
     text = re.sub(r"\\[A-Za-z]+ ?", "x", text)
     return len(re.sub(r"[{}^_]", "", text))
 
 
-def _wider(match: re.Match[str]) -> str:
-    return "x" * max(width(match[1]), width(match[2]))
-
-
 def _groups(tex: str) -> Iterator[str]:
     """Statements, neighbours that are short together."""
-    group = ""
-    for statement in BETWEEN.split(tex)[::2]:
-        fits = group and width(statement) <= SHORT and width(group + statement) <= 2 * SHORT
-        if group and not (fits and _last_is_short(group)):
+    group = last = ""
+    for statement in STATEMENT_END.split(tex)[::2]:
+        are_short = max(width(last), width(statement)) <= SHORT_STATEMENT
+        if group and not (are_short and width(group + statement) <= 2 * SHORT_STATEMENT):
             yield group
             group = ""
         group += rf",\quad {statement}" if group else statement
+        last = statement
     yield group
-
-
-def _last_is_short(group: str) -> bool:
-    return width(BETWEEN.split(group)[-1]) <= SHORT
-
-
-def _broken(statement: str) -> Iterator[str]:
-    line = ""
-    for term in _terms(statement):
-        if line and width(line + term) > WIDEST:
-            yield line
-            line = INDENT
-        line += term
-    yield line
 
 
 def _terms(statement: str) -> Iterator[str]:
     """The terms of a sum, each with its sign in front; what is in brackets stays together."""
     depth, start = 0, 0
-    for match in TOKEN.finditer(statement):
+    for match in TEX_TOKEN.finditer(statement):
         token, place = match.group(), match.start()
         depth += (token in OPENS) - (token in CLOSES)
-        if depth == 0 and place > start and SIGN.match(statement, place):
+        if depth == 0 and place > start and SUM_SIGN.match(statement, place):
             yield statement[start:place]
             start = place
     yield statement[start:]
 
 
-def _set(tex: str) -> list[Element]:
-    return [_mathml(line) for line in lines(tex)]
+def _set(tex: str) -> list[MathElement]:
+    """A formula a line, without the name space that a file of XML would need and a page of HTML does not."""
+    found = []
+    for line in formula_lines(tex):
+        upright = re.sub(r"\\mathrm\{(\w)\}", r"\\text{\1}", line.strip())  # a single letter would be slanted
+        root = ElementTree.fromstring(re.sub(r' xmlns="[^"]*"', "", convert(upright, display="block"), count=1))
+        if width(line) > WIDEST_LINE:
+            root.set("class", "long")
+        _mend(root)
+        found.append(root)
+    return found
 
 
-def _mathml(tex: str) -> Element:
-    """One formula, without the name space that a file of XML would need and a page of HTML does not."""
-    upright = re.sub(r"\\mathrm\{(\w)\}", r"\\text{\1}", tex.strip())  # a single letter would be slanted
-    root = ElementTree.fromstring(re.sub(r' xmlns="[^"]*"', "", convert(upright, display="block"), count=1))
-    if width(tex) > WIDEST:
-        root.set("class", "long")
-    _mend(root)
-    return root
-
-
-def _mend(root: Element) -> None:
+def _mend(root: MathElement) -> None:
     """Where the converter errs: plus-minus is an operator, infinity is none, a determinant's bars are as high as it."""
     for row in root.iter("mrow"):
         before = None
@@ -129,5 +124,5 @@ def _mend(root: Element) -> None:
             before = leaf
 
 
-def _text(line: Element) -> Markup:
+def _text(line: MathElement) -> Markup:
     return Markup(ElementTree.tostring(line, encoding="unicode"))

@@ -21,16 +21,19 @@ from tfarm.dsp.writing import file_text
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.loop.poles import Poles, closed_loop_poles
 from tfarm.plots.words import gains_words
-from tfarm.report.damped_table import PROVEN, proven_damped_modes
+from tfarm.report.damped_table import PROVEN_DIGITS, proven_damped_modes
 from tfarm.report.kept import keep, kept
 from tfarm.report.loop_laws import has_loop
 from tfarm.response.accuracy import BAND_POINTS, worst_error
 from tfarm.spectrum import DampedModes, Modes
 from tfarm.spectrum.scales import default_gains
 
-MODES, DIGITS = 10, 20
-OUTPUTS = ("root_moment", "tip_displacement")
-PLAIN = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹−", "-0123456789-")
+PROVEN_MODES, BRACKET_DIGITS = (
+    10,
+    20,
+)  # flexible modes of each arm, as its page lists them; five digits beyond a double's
+PROVEN_OUTPUTS = ("root_moment", "tip_displacement")
+PLAIN_DIGITS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹−", "-0123456789-")
 TWO_PI = Decimal("6.2831853071795864769252867665590057683943387987502")
 
 
@@ -48,7 +51,7 @@ class Boxed:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Proof:
+class ArmProof:
     """Of one arm: brackets (lower, upper) [rad/s] of its first flexible frequencies, the count that completes them.
 
     `count` frequencies lie below `below` [rad/s], a rigid-body mode included if `has_rigid_mode`.  `errors` has
@@ -60,7 +63,7 @@ class Proof:
     name: str
     sha256: str
     has_rigid_mode: bool
-    digits: int = DIGITS
+    digits: int = BRACKET_DIGITS
     brackets: tuple[tuple[str, str], ...] = ()
     count: int = 0
     below: str = ""
@@ -71,23 +74,25 @@ class Proof:
     boxes: tuple[Boxed, ...] = ()
 
 
-def prove(arm: Arm, chain: Chain | None = None) -> Proof:
+def prove(arm: Arm, chain: Chain | None = None) -> ArmProof:
     """Certify the first modes of the arm and measure its responses; what cannot be proven is said, not raised."""
-    modes = tfarm.modes(arm, count=MODES)
+    modes = tfarm.modes(arm, count=PROVEN_MODES)
     flexible = modes.natural_frequency[modes.index > 0]
     band = float(0.1 * flexible[0]), float(1.1 * flexible[-1])
     found: dict[str, Any] = {}
     try:
-        proof = modes.certify(DIGITS)
+        proof = modes.certify(BRACKET_DIGITS)
         found = {"brackets": proof.brackets, "count": proof.count, "below": proof.below}
     except CertificationError as error:
         found = {"failure": str(error)}
-    return Proof(
+    return ArmProof(
         name=arm.name,
         sha256=hash_of(arm, chain),
         has_rigid_mode=arm.has_rigid_mode,
         band=band,
-        errors=tuple((output, worst) for output in OUTPUTS if (worst := worst_error(arm, output, band)) is not None),
+        errors=tuple(
+            (output, worst) for output in PROVEN_OUTPUTS if (worst := worst_error(arm, output, band)) is not None
+        ),
         boxes=tuple(boxed(arm)),
         **found,
     )
@@ -97,7 +102,7 @@ def boxed(arm: Arm) -> Iterator[Boxed]:
     """Damped modes and the default loop's poles, each enclosed and counted; what cannot be proven is said."""
     boxes: list[tuple[str, Callable[[], DampedModes | Poles]]] = []
     if not arm.is_undamped:
-        boxes.append((f"damped modes, C = {arm.damping:g} s", lambda: proven_damped_modes(arm, MODES)))
+        boxes.append((f"damped modes, C = {arm.damping:g} s", lambda: proven_damped_modes(arm, PROVEN_MODES)))
     if has_loop(arm):
         law = default_gains(arm)
         boxes.append((f"closed loop, {gains_words(law, 6)}", lambda: _proven_poles(arm, law)))
@@ -110,8 +115,8 @@ def boxed(arm: Arm) -> Iterator[Boxed]:
 
 
 def _proven_poles(arm: Arm, law: HubFeedback) -> Poles:
-    poles = closed_loop_poles(arm, law, MODES)
-    poles.certify(PROVEN)
+    poles = closed_loop_poles(arm, law, PROVEN_MODES)
+    poles.certify(PROVEN_DIGITS)
     return poles
 
 
@@ -130,23 +135,23 @@ def save_proof(arm: Arm, folder: Path, chain: Chain | None = None) -> None:
     keep(folder, "proof", asdict(prove(arm, chain)))
 
 
-def written_proofs(out: Path) -> Sequence[Proof]:
+def written_proofs(out: Path) -> Sequence[ArmProof]:
     """The proofs of all arms in the folder of reports, by name; what is none of ours is passed over."""
     return kept(out, "proof", _proof)
 
 
-def _proof(read: dict[str, Any], _: Path) -> Proof:
+def _proof(read: dict[str, Any], _: Path) -> ArmProof:
     read["brackets"] = tuple((str(lower), str(upper)) for lower, upper in read["brackets"])
     read["band"] = float(read["band"][0]), float(read["band"][1])
     read["errors"] = tuple((str(output), float(error)) for output, error in read["errors"])
     read["boxes"] = tuple(Boxed(**each | {"box": _four(each["box"])}) for each in read["boxes"])
-    return Proof(**read)
+    return ArmProof(**read)
 
 
 # ------------------------------------------------------------ digits
 
 
-def digits_of(bracket: tuple[str, str], digits: int) -> str:
+def shared_digits(bracket: tuple[str, str], digits: int) -> str:
     """The leading digits that all numbers in a bracket of so many digits share: its lower end, with its zeros."""
     lower = Decimal(bracket[0])
     with localcontext(prec=digits + 5):
@@ -156,17 +161,18 @@ def digits_of(bracket: tuple[str, str], digits: int) -> str:
 def how_proven(modes: Modes, cells: Sequence[str], cells_hz: Sequence[str]) -> str:
     """Why every digit of these cells [rad/s] and [Hz] is right, or that this is not proven: a sentence or two."""
     try:
-        proof = modes.certify(DIGITS)
+        proof = modes.certify(BRACKET_DIGITS)
     except CertificationError as error:
         return f"The digits are those of double precision, not proven: {error}."
     rows = np.flatnonzero(modes.index > 0).tolist()
     pairs = [((cells[row], cells_hz[row]), bracket) for row, bracket in zip(rows, proof.brackets, strict=True)]
     if not all(rounds_to(w, bracket) and rounds_to(f, bracket, TWO_PI) for (w, f), bracket in pairs):
-        return f"The digits are those of double precision; in one of them rounding cannot be told at {DIGITS} digits."
+        untold = f"in one of them rounding cannot be told at {BRACKET_DIGITS} digits"
+        return f"The digits are those of double precision; {untold}."
     rigid = ", the rigid body included" if modes.arm.has_rigid_mode else ""
     return (
         "Every printed digit of the natural frequencies is proven: each lies between two numbers that round to it "
-        f"(bounds of {DIGITS} digits, ball arithmetic). So is the list: {proof.count} lie below "
+        f"(bounds of {BRACKET_DIGITS} digits, ball arithmetic). So is the list: {proof.count} lie below "
         f"{float(proof.below):.6g} rad/s{rigid}. The other columns come from double precision and show fewer digits "
         "than it holds."
     )
@@ -175,6 +181,6 @@ def how_proven(modes: Modes, cells: Sequence[str], cells_hz: Sequence[str]) -> s
 def rounds_to(cell: str, bracket: tuple[str, str], divisor: Decimal = Decimal(1)) -> bool:
     """Whether every number in the bracket, divided by the divisor, is rounded to what the cell shows."""
     mantissa, _, power = cell.partition(" × 10")
-    shown = Decimal(mantissa.translate(PLAIN)).scaleb(int(power.translate(PLAIN) or 0))
+    shown = Decimal(mantissa.translate(PLAIN_DIGITS)).scaleb(int(power.translate(PLAIN_DIGITS) or 0))
     with localcontext(prec=45):
         return all((Decimal(end) / divisor).quantize(shown) == shown for end in bracket)

@@ -6,14 +6,14 @@ from collections.abc import Sequence
 
 from tfarm.columns import Column, Table
 from tfarm.digits import scientific, significant, singly, worded
-from tfarm.report.damped_table import PROVEN
-from tfarm.report.trust_proofs import DIGITS, MODES, OUTPUTS, Proof, digits_of
+from tfarm.report.damped_table import PROVEN_DIGITS
+from tfarm.report.trust_proofs import BRACKET_DIGITS, PROVEN_MODES, PROVEN_OUTPUTS, ArmProof, shared_digits
 from tfarm.report.words import typeset
 
 UNPROVEN = "not proven"
 DIGITS_CAPTION = (
-    f"First {MODES} flexible modes at C = 0, angular frequency in rad/s. All {DIGITS} digits are proven; the dots "
-    "stand for those that follow (digits are cut off, not rounded)."
+    f"First {PROVEN_MODES} flexible modes at C = 0, angular frequency in rad/s. All {BRACKET_DIGITS} digits are "
+    "proven; the dots stand for those that follow (digits are cut off, not rounded)."
 )
 COUNTS_CAPTION = (
     "The count is made at one frequency between the last mode of the list and the next: as many as the flexible modes "
@@ -21,25 +21,28 @@ COUNTS_CAPTION = (
 )
 BOXES_CAPTION = (
     "Eigenvalues off the axis, s in 1/s, conjugates and those at 0 counted. Each is enclosed in a disc of "
-    f"{PROVEN} digits that holds exactly one (Rouché's theorem), and the argument principle, evaluated in ball "
+    f"{PROVEN_DIGITS} digits that holds exactly one (Rouché's theorem), and the argument principle, evaluated in ball "
     "arithmetic around the box, counts as many inside: none is missing there. With damping no box can hold all: "
     "lightly damped shear modes exist far above any, and slow real eigenvalues accumulate at -1/C."
 )
 
 
-def digits_table(proofs: Sequence[Proof]) -> Table:
+def digits_table(proofs: Sequence[ArmProof]) -> Table:
     """A row a mode, a column an arm: every digit that is proven."""
     dotted = worded(lambda text: f"{text}…" if text else UNPROVEN)
-    columns = [Column("mode", "mode", of=range(1, MODES + 1))]
+    columns = [Column("mode", "mode", of=range(1, PROVEN_MODES + 1))]
     for proof in proofs:
-        digits = [digits_of(bracket, proof.digits) for bracket in proof.brackets] or [""] * MODES
+        digits = [shared_digits(bracket, proof.digits) for bracket in proof.brackets] or [""] * PROVEN_MODES
         columns.append(Column(f"{proof.name}_rad_s", proof.name, "rad/s", of=digits, digits=dotted))
     return Table(
-        stem="digits", title=f"Natural frequencies, {DIGITS} digits", caption=DIGITS_CAPTION, columns=tuple(columns)
+        stem="digits",
+        title=f"Natural frequencies, {BRACKET_DIGITS} digits",
+        caption=DIGITS_CAPTION,
+        columns=tuple(columns),
     )
 
 
-def counts_table(proofs: Sequence[Proof]) -> Table:
+def counts_table(proofs: Sequence[ArmProof]) -> Table:
     """How many lie below where, and how many were enclosed."""
     return Table(
         stem="counts",
@@ -63,7 +66,7 @@ def counts_table(proofs: Sequence[Proof]) -> Table:
     )  # fmt: skip
 
 
-def boxes_tables(proofs: Sequence[Proof]) -> tuple[Table, ...]:
+def boxes_tables(proofs: Sequence[ArmProof]) -> tuple[Table, ...]:
     """Damped modes and closed-loop poles, a row a box; no table where there is none."""
     rows = [(proof.name, each) for proof in proofs for each in proof.boxes]
     if not rows:
@@ -86,13 +89,13 @@ def boxes_tables(proofs: Sequence[Proof]) -> tuple[Table, ...]:
     return (table,)
 
 
-def accuracy_table(proofs: Sequence[Proof]) -> Table:
+def accuracy_table(proofs: Sequence[ArmProof]) -> Table:
     """The worst error of each arm's two responses."""
     columns = [
         Column("arm", "arm", of=[proof.name for proof in proofs]),
         Column("band_rad_s", "from … to, rad/s", of=[" … ".join(significant(x, 4) for x in p.band) for p in proofs]),
     ]
-    for output in OUTPUTS:
+    for output in PROVEN_OUTPUTS:
         errors = [dict(proof.errors).get(output) for proof in proofs]
         cells = ["zero throughout" if error is None else scientific(error, 2) for error in errors]
         values = ["" if error is None else error for error in errors]

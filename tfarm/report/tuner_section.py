@@ -8,35 +8,35 @@ import numpy as np
 
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, Arm
 from tfarm.columns import Column, Table
-from tfarm.digits import counted, lined, plain, significant, worded
+from tfarm.digits import how_many, lined, plain, significant, worded
 from tfarm.dsp import Chain
 from tfarm.errors import CertificationError
 from tfarm.plots.learning import draw_cost_map, draw_curves, draw_gain
 from tfarm.plots.motion import draw_responses
 from tfarm.report.loop_laws import has_loop, why_no_loop
-from tfarm.report.overlay import overlay
-from tfarm.report.sections import Picture, Section
+from tfarm.report.overlay import stable_regions
+from tfarm.report.sections import PageSection, Picture
 from tfarm.report.time_responses import clipped_words, resolution_words, responses_table
 from tfarm.report.tuner_words import (
     bound_words,
     drift_words,
-    headline_facts,
     learning_words,
     servo_words,
     shaping_words,
-    short_answer,
+    tuner_facts,
+    tuner_in_short,
 )
 from tfarm.report.words import typeset, upper
 from tfarm.tuner.overview import COARSE, CURVE_SEEDS, MAP_SEEDS, MAP_TRIALS, NOMINAL, TunerStudy, tuner_study
 
-TITLE = "The gain tuner: does a self-tuning gain help?"
-UNDAMPED = (
+TUNER_TITLE = "The gain tuner: does a self-tuning gain help?"
+NOT_WITHOUT_DAMPING = (
     "This arm has no damping. When it is sampled its high modes then neither decay by themselves nor are they all "
     "damped by the loop, so no range of moving gains can be proven for all of them, and the tuner is not trained here. "
     "The page of sasaki2012-lab, the same arm as the paper's with a little damping, has the answer."
 )
 
-ELASTIC = (
+NOT_ON_ELASTIC = (
     "The link of this rig has no damping (C = 0), and what its hub, clamp or joint lose reaches high modes ever less. "
     "When it is sampled no range of moving gains can be proven for all of them, and the tuner is not trained here: "
     "give the link a measured damping, or see what tfarm tune makes of the first modes."
@@ -47,29 +47,29 @@ RUNS_AWAY = (
 )
 
 
-def tuner_section(arm: Arm, chain: Chain | None = None) -> Section:
+def tuner_section(arm: Arm, chain: Chain | None = None) -> PageSection:
     """The tuner with the paper's figures on a damped arm and its own chain; one sentence for any other."""
     reason = why_not(arm)
     if reason:
-        return Section(anchor="tune", title=TITLE, words=(reason,))
+        return PageSection(anchor="tune", title=TUNER_TITLE, words=(reason,))
     try:
         data = tuner_study(arm, Chain() if chain is None else chain)
     except CertificationError as error:
         words = f"No tuner here: no range of gains is proven stable for a gain that moves ({typeset(str(error))})."
-        return Section(anchor="tune", title=TITLE, words=(words,))
+        return PageSection(anchor="tune", title=TUNER_TITLE, words=(words,))
     if not math.isfinite(data.tuning.without.cost):
-        return Section(anchor="tune", title=TITLE, words=(RUNS_AWAY,))
+        return PageSection(anchor="tune", title=TUNER_TITLE, words=(RUNS_AWAY,))
     return section_of(data)
 
 
-def section_of(data: TunerStudy) -> Section:
+def section_of(data: TunerStudy) -> PageSection:
     """The section on numbers that are there already."""
-    return Section(
+    return PageSection(
         anchor="tune",
-        title=TITLE,
-        facts=headline_facts(data),
+        title=TUNER_TITLE,
+        facts=tuner_facts(data),
         words=(
-            short_answer(data),
+            tuner_in_short(data),
             drift_words(data),
             shaping_words(data),
             bound_words(data),
@@ -96,7 +96,7 @@ def why_not(arm: Arm) -> str:
         return "The tip of this arm is held: it makes no slew, and there is nothing for the tuner to learn from."
     if not arm.has_elastic_link:
         return ""
-    return UNDAMPED if arm.is_undamped else ELASTIC
+    return NOT_WITHOUT_DAMPING if arm.is_undamped else NOT_ON_ELASTIC
 
 
 # ------------------------------------------------------------ pictures
@@ -104,7 +104,7 @@ def why_not(arm: Arm) -> str:
 
 def _gain_picture(data: TunerStudy) -> Picture:
     tuning = data.tuning
-    plane = overlay(data.arm, tuning.constant, tuning.trial.loop.chain)
+    plane = stable_regions(data.arm, tuning.constant, tuning.trial.loop.chain)
     guard, K = tuning.training.guard, tuning.training.result.K
     rate = tuning.constant.told(RATE_GAIN, plain)
     return Picture(
@@ -149,25 +149,9 @@ def _slew_picture(data: TunerStudy) -> Picture:
 
 
 def _coarse_picture(data: TunerStudy) -> Picture:
-    return Picture(
-        stem="tune-dsp",
-        title="The same with the DSP's effects on",
-        caption=(
-            f"{_converter_words(data)} (the paper's Figures 8 and 9). {_residuals(data, 1)} Nothing regulates the hub "
-            f"angle (no {ANGLE_GAIN}), so what it loses to delay and steps it keeps."
-            f"{clipped_words(data.coarse)}{resolution_words(data.coarse.values())}"
-        ),
-        alt=f"The slew with converters and delay. {_residuals(data, 1)}",
-        figure=draw_responses(data.arm, data.coarse, "the slew, converters and one sample of delay"),
-        data=_signals(data, 1, "tune-dsp-data"),
-    )
-
-
-def _converter_words(data: TunerStudy) -> str:
-    """What stands between the controller and the arm in the second picture."""
+    """The slew, and what stands between the controller and the arm in it."""
     chain = next(iter(data.coarse.values())).chain
     c, delay = chain.converters, chain.sampling.delay_samples
-    late = f"{counted(delay, 'sample')} of delay"
     ranges = [
         f"{bits}-bit {name} over ±{plain(span, 3)} N m"
         for name, bits, span in (("ADC", c.moment_bits, c.moment_range), ("DAC", c.torque_bits, c.torque_range))
@@ -175,7 +159,19 @@ def _converter_words(data: TunerStudy) -> str:
     ]
     if c.hub_rate == "difference":
         ranges.append(f"a hub rate differenced from an encoder of {c.encoder_counts} counts")
-    return f"With {', '.join([*ranges, late])}"
+    ranges.append(f"{how_many(delay, 'sample')} of delay")
+    return Picture(
+        stem="tune-dsp",
+        title="The same with the DSP's effects on",
+        caption=(
+            f"With {', '.join(ranges)} (the paper's Figures 8 and 9). {_residuals(data, 1)} Nothing regulates the hub "
+            f"angle (no {ANGLE_GAIN}), so what it loses to delay and steps it keeps."
+            f"{clipped_words(data.coarse)}{resolution_words(data.coarse.values())}"
+        ),
+        alt=f"The slew with converters and delay. {_residuals(data, 1)}",
+        figure=draw_responses(data.arm, data.coarse, "the slew, converters and one sample of delay"),
+        data=_signals(data, 1, "tune-dsp-data"),
+    )
 
 
 def _residuals(data: TunerStudy, which: int) -> str:

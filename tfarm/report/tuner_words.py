@@ -8,43 +8,38 @@ from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN
 from tfarm.digits import significant
 from tfarm.dsp.curves import away
 from tfarm.report.sections import Fact
-from tfarm.report.words import typeset
+from tfarm.report.words import typeset, upper
 from tfarm.tuner.overview import Curves, TunerStudy
 from tfarm.tuner.tuning import tip_errors
 
-SERVO = (ANGLE_GAIN, RATE_GAIN)
-ROUNDED = 1e-10  # of the tip's travel: no slew ends nearer its target than rounding tells
-MORE = 3.0  # times as far off its target is more, and no coincidence
-SAME = 1e-4  # relative difference of two costs below which they are called the same
+SERVO_GAINS = (ANGLE_GAIN, RATE_GAIN)
+ON_TARGET = 1e-10  # of the tip's travel: no slew ends nearer its target than rounding tells
+MUCH_MORE = 3.0  # times as far off its target is more, and no coincidence
+SAME_COST = 1e-4  # relative difference of two costs below which they are called the same
 
 
-def short_answer(data: TunerStudy) -> str:
-    """How much the tuner gains over the best constant gain."""
+def tuner_in_short(data: TunerStudy) -> str:
+    """How much the tuner gains over the best constant gain, and what that does by itself."""
     tuning, final = data.tuning, data.curves[0].final
-    best, without = tuning.best_constant.cost, tuning.without.cost
+    constant, best, without = tuning.best_constant.gain, tuning.best_constant.cost, tuning.without.cost
     median, free = (_median(curves) for curves in data.curves[:2])
     below = int((final < best).sum())
     gain = 100 * (1 - median / best)
-    lead = "A little" if 100 * SAME < gain < 15 else "Yes" if gain >= 15 else "No"
-    again = "another " if best < (1 - SAME) * without else ""
+    lead = "A little" if 100 * SAME_COST < gain < 15 else "Yes" if gain >= 15 else "No"
+    by_itself, again = f"No constant {MOMENT_GAIN} takes anything off the cost of a slew", ""
+    costs = f"{significant(without, 3)} without it"
+    if best < (1 - SAME_COST) * without:
+        off, again = significant(100 * (1 - best / without), 2), "another "
+        by_itself = (
+            f"A constant {MOMENT_GAIN} of {significant(constant, 3)} already takes {off} % off the cost of a slew"
+        )
+        costs = f"{significant(without, 3)} without moment feedback, {significant(best, 3)} with it"
     verb = {"below": f"lowers it by {again}", "above": "raises it by "}.get(_side(median, best), "")
     moves = f"{verb}{significant(abs(gain), 2)} %, to" if verb else "leaves it as it is, at"
     return (
-        f"{lead}. {_constant_words(tuning.best_constant.gain, best, without)} a gain that tunes itself {moves} "
+        f"{lead}. {by_itself} ({costs}); a gain that tunes itself {moves} "
         f"{significant(median, 3)} in the median of {final.size} seeds. {below} of {final.size} seeds end below the "
-        f"best constant gain. Without the guard, and so without a proof, the median is {beside(free, best)}."
-    )
-
-
-def _constant_words(gain: float, best: float, without: float) -> str:
-    """What the best constant gain does by itself."""
-    if best >= (1 - SAME) * without:
-        nothing = f"No constant {MOMENT_GAIN} takes anything off the cost of a slew"
-        return f"{nothing} ({significant(without, 3)} without it);"
-    return (
-        f"A constant {MOMENT_GAIN} of {significant(gain, 3)} already takes "
-        f"{significant(100 * (1 - best / without), 2)} % off the cost of a slew "
-        f"({significant(without, 3)} without moment feedback, {significant(best, 3)} with it);"
+        f"best constant gain. Without the guard, and so without a proof, the median is {beside_best(free, best)}."
     )
 
 
@@ -54,12 +49,12 @@ def _median(curves: Curves) -> float:
 
 def _side(cost: float, yardstick: float) -> str:
     """Whether a cost is below or above another one, or the same."""
-    if abs(cost - yardstick) <= SAME * yardstick:
+    if abs(cost - yardstick) <= SAME_COST * yardstick:
         return "the same"
     return "below" if cost < yardstick else "above"
 
 
-def beside(cost: float, yardstick: float) -> str:
+def beside_best(cost: float, yardstick: float) -> str:
     """A cost beside that of the best constant gain, in words."""
     if not np.isfinite(cost):
         return "infinite: more than half of the seeds run away"
@@ -70,7 +65,7 @@ def beside(cost: float, yardstick: float) -> str:
 def drift_words(data: TunerStudy) -> str:
     """What the cost does not see: the angle that a moving gain leaves, as nothing regulates it."""
     tuned, constant = off_target(data)
-    more = "a gain that moves leaves more of it than a constant one" if tuned > MORE * constant else ""
+    more = "a gain that moves leaves more of it than a constant one" if tuned > MUCH_MORE * constant else ""
     less = "here a gain that moves leaves no more of it than a constant one" if tuned <= constant else ""
     what = more or less or "here a gain that moves leaves about as much of it as a constant one"
     return (
@@ -87,10 +82,10 @@ def servo_words(data: TunerStudy) -> str:
         return ""
     tuning, guard = data.servo, data.servo.training.guard
     law = tuning.plan.servo
-    gains = " and ".join(law.told(name, lambda gain: significant(gain, 3), data.arm) for name in SERVO)
+    gains = " and ".join(law.told(name, lambda gain: significant(gain, 3), data.arm) for name in SERVO_GAINS)
     off = tip_errors(tuning)["tip_error_m"]
     end = "runs away" if off is None else f"ends {significant(1e3 * abs(off), 2)} mm off its target"
-    if off is not None and abs(off) < ROUNDED * data.arm.reach * float(abs(tuning.trial.task.hub_angle).max()):
+    if off is not None and abs(off) < ON_TARGET * data.arm.reach * float(abs(tuning.trial.task.hub_angle).max()):
         end = "ends on its target"
     proven = "proven" if guard.is_proven else "of the first modes alone"
     costs = {
@@ -112,7 +107,7 @@ def off_target(data: TunerStudy) -> tuple[float, float]:
     runs = data.slews["with the tuner"], data.constant
     travel = data.arm.reach * float(abs(data.constant.scenario.hub_angle).max())
     tuned, constant = (abs(float(away(data.arm, each)[-1])) for each in runs)
-    return tuned * (tuned > ROUNDED * travel), constant * (constant > ROUNDED * travel)
+    return tuned * (tuned > ON_TARGET * travel), constant * (constant > ON_TARGET * travel)
 
 
 def shaping_words(data: TunerStudy) -> str:
@@ -148,28 +143,23 @@ def bound_words(data: TunerStudy) -> str:
 
 
 def learning_words(data: TunerStudy) -> str:
-    """What each rule does, and whether the paper's pair is the best."""
-    best = data.tuning.best_constant.cost
+    """What each rule does, what the guard costs and what it buys, and whether the paper's pair is the best."""
+    best, found = data.tuning.best_constant.cost, data.cost_map
     told = [
-        f"{curves.title[0].upper()}{curves.title[1:]}: {int((curves.final < best).sum())} of {curves.final.size} below "
+        f"{upper(curves.title)}: {int((curves.final < best).sum())} of {curves.final.size} below "
         f"the best constant gain, {_ends(curves)}"
         for curves in data.curves
     ]
-    found = data.cost_map
-    answer = "Yes" if found.is_papers_best else "No"
-    return (
-        f"Seed by seed. {'. '.join(told)}. {_price(data)}Is (0.6, 0.8) the best pair of momentum and learning rate? "
-        f"{answer}: {typeset(found.verdict.partition(': ')[2])}."
-    )
-
-
-def _price(data: TunerStudy) -> str:
-    """What the guard costs and what it buys."""
     guarded, free = (_median(curves) for curves in data.curves[:2])
     costs = {"below": "The guard costs part of the gain", "above": "The guard costs nothing here"}
     cost = costs.get(_side(free, guarded), "The guard changes nothing in the median")
-    guard = data.tuning.training.guard
-    return f"{cost}, and buys the proof. " if guard.is_proven else f"{cost}; its proof is of the first modes alone. "
+    is_proven = data.tuning.training.guard.is_proven
+    price = f"{cost}, and buys the proof." if is_proven else f"{cost}; its proof is of the first modes alone."
+    answer = "Yes" if found.is_papers_best else "No"
+    return (
+        f"Seed by seed. {'. '.join(told)}. {price} Is (0.6, 0.8) the best pair of momentum and learning rate? "
+        f"{answer}: {typeset(found.verdict.partition(': ')[2])}."
+    )
 
 
 def _ends(curves: Curves) -> str:
@@ -179,20 +169,19 @@ def _ends(curves: Curves) -> str:
     ]
     if not finite.size:
         return ", ".join(gone) or "none of a finite cost"
-    half = np.quantile(curves.final, 0.5, method="nearest")
-    low, middle, high = (significant(float(x), 3) for x in (finite.min(), half, finite.max()))
+    low, middle, high = (significant(float(x), 3) for x in (finite.min(), _median(curves), finite.max()))
     return ", ".join([*gone, f"median {middle}, from {low} to {high}"])
 
 
-def headline_facts(data: TunerStudy) -> tuple[Fact, ...]:
+def tuner_facts(data: TunerStudy) -> tuple[Fact, ...]:
     """The costs, from nothing to what is possible."""
     tuning, final = data.tuning, data.curves[0].final
-    median = float(np.quantile(final, 0.5, method="nearest"))
+    median = _median(data.curves[0])
     low, high = (float(np.quantile(final, q, method="nearest")) for q in (0.25, 0.75))
     gain = 100 * (1 - median / tuning.best_constant.cost)
     guard = tuning.training.guard
     off, off_constant = (significant(1e3 * x, 2) for x in off_target(data))
-    helps = f"by {significant(gain, 2)} %" if gain > 100 * SAME else "no"
+    helps = f"by {significant(gain, 2)} %" if gain > 100 * SAME_COST else "no"
     held = "proven stable" if guard.is_proven else f"proven for the first {guard.modes_used} modes"
     half = f"half between {significant(low, 4)} and {significant(high, 4)}"
     shaped = min((record.cost, kind) for kind, (_, record) in tuning.shaped.items())
@@ -203,11 +192,7 @@ def headline_facts(data: TunerStudy) -> tuple[Fact, ...]:
         Fact(label="does tuning beat a constant gain?", value=helps, beside=f"median of {final.size} seeds"),
         Fact(label="cost without moment feedback", value=significant(tuning.without.cost, 4)),
         Fact(label="best constant gain", value=significant(tuning.best_constant.cost, 4), beside=K),
-        Fact(
-            label="tuner",
-            value=significant(median, 4),
-            beside=half,
-        ),
+        Fact(label="tuner", value=significant(median, 4), beside=half),
         Fact(label="nothing is below", value=significant(tuning.bound.cost, 4), beside="linear-quadratic optimum"),
         Fact(label="input shaping instead", value=significant(shaped[0], 3), beside=how),
         Fact(label="tip off its target at the end", value=off, unit="mm", beside=f"constant gain: {off_constant} mm"),

@@ -20,9 +20,9 @@ from typing import Any
 import tfarm
 from tfarm.dsp.writing import file_text
 from tfarm.report.given_laws import Subject
-from tfarm.report.kept import LARGEST, keep
+from tfarm.report.kept import LARGEST_READ, keep
 
-KIND = "made"
+NOTES_KIND = "made"
 PACKAGES = (
     "numpy",
     "scipy",
@@ -66,15 +66,15 @@ def note_made(made: Path, folder: Path, pages: Iterable[str], key: str) -> None:
     """made.json in `made`: that its files are these pages, beside what is noted in the arm's `folder` of others."""
     files = {file.relative_to(made).as_posix(): _hash(file) for file in sorted(made.rglob("*")) if file.is_file()}
     notes = {**_notes(folder), **{page: {"key": key, "files": files} for page in pages}}
-    keep(made, KIND, {"name": folder.name, "pages": notes})
+    keep(made, NOTES_KIND, {"name": folder.name, "pages": notes})
 
 
 def _notes(folder: Path) -> dict[str, Any]:
     """What is noted of each page; of none where made.json is not there, or none of ours."""
-    file = folder / f"{KIND}.json"
+    file = folder / f"{NOTES_KIND}.json"
     try:
-        read = json.loads(file.read_text(encoding="utf-8")) if file.stat().st_size <= LARGEST else {}
-        notes = read["pages"] if read[f"tfarm_{KIND}"] == 1 else {}
+        read = json.loads(file.read_text(encoding="utf-8")) if file.stat().st_size <= LARGEST_READ else {}
+        notes = read["pages"] if read[f"tfarm_{NOTES_KIND}"] == 1 else {}
         return {page: {"key": note["key"], "files": dict(note["files"])} for page, note in notes.items()}
     except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
         return {}

@@ -10,14 +10,14 @@ TYPESET = {
     "theta_t^2": "(dθ/dt)²", "theta_t": "dθ/dt", "phi_xt(0)": "∂φ′(0)/∂t", "L(iw)": "L(iω)", "J w1": "J ω₁",
     "(alpha_c, eta_c)": "momentum and learning rate",
 }  # fmt: skip
-POWER, MINUS = re.compile(r"\d(?:\.\d+)?e[-+]\d+"), re.compile(r"(?<= )-(?=\w)")
+POWER_WRITTEN, MINUS_WRITTEN = re.compile(r"\d(?:\.\d+)?e[-+]\d+"), re.compile(r"(?<= )-(?=\w)")
 
 
 def typeset(text: str) -> str:
     """A sentence of the rooms below as a page shows it: Greek letters, powers of ten, and minus signs."""
     for plain_text, shown in TYPESET.items():
         text = text.replace(plain_text, shown)
-    return MINUS.sub("−", POWER.sub(lambda number: plain(float(number[0])), text))
+    return MINUS_WRITTEN.sub("−", POWER_WRITTEN.sub(lambda number: plain(float(number[0])), text))
 
 
 def upper(text: str) -> str:

@@ -15,33 +15,27 @@ from tfarm.files import temporary_folder
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
 from tfarm.report.card import written_cards
-from tfarm.report.frame import beside
+from tfarm.report.frame import other_pages
 from tfarm.report.given_laws import GivenLaw, Subject, check_laws
-from tfarm.report.kept import COMPARISON, kept_comparison
-from tfarm.report.live import ASSETS, PAGE, has_assets, is_live
-from tfarm.report.making import Progress, make_all
+from tfarm.report.kept import COMPARISON_PAGE, kept_comparison
+from tfarm.report.live import ASSETS, LIVE_PAGE, has_assets, is_live
+from tfarm.report.making import ReportProgress, make_all
 from tfarm.report.page import QUESTIONS, arm_page, file_of, index_page
 from tfarm.report.sections import SavedSection
-from tfarm.report.trust import FOLDER, kept_evidence, write_trust
+from tfarm.report.trust import TRUST_FOLDER, kept_evidence, write_trust
 from tfarm.report.trust_proofs import written_proofs
 from tfarm.report.unchanged import is_unchanged, key_of, note_made
 
 Notice = Callable[[str], object]
 
-OURS = (
-    "index.html",
-    "README.md",
-    "pictures",
-    "bench.json",
-    "trust",
-    "data",
-    "compare.html",
-    "compare.json",
-    ASSETS,
-)  # names that no arm's folder may have
+RESERVED_NAMES = (  # which no arm's folder may have
+    "index.html", "README.md", "pictures", "bench.json", "trust", "data", "compare.html", "compare.json", ASSETS,
+)  # fmt: skip
 
 
-TRUST = f"{FOLDER}/index.html"
+TRUST_PAGE = f"{TRUST_FOLDER}/index.html"
+LEFT_AS_IT_IS = "{name}: left as it is, for nothing that its page is made of has changed; --force makes it again"
+OF_EVERY_PAGE = ("arm", "law", "no-loop")  # anchors of sections that the page of every question has
 
 
 def write(
@@ -54,7 +48,7 @@ def write(
     measured: Sequence[Measured] = (),
     only: tuple[str, ...] | None = None,
     force: bool = False,
-    progress: Progress | None = None,
+    progress: ReportProgress | None = None,
     notice: Notice | None = None,
 ) -> Path:
     """Write the report of each arm to out/<name>/, out/trust/ and out/index.html; the page to open first.
@@ -73,7 +67,7 @@ def write(
     _check(arms, only)
     subjects = _subjects(arms, chains, laws, fits, measured)
     out = Path(out)
-    names = [arm.name for arm in arms] + [FOLDER, ASSETS] * (not only)
+    names = [arm.name for arm in arms] + [TRUST_FOLDER, ASSETS] * (not only)
     with _beside(out, names) as beside:
         told = _written(subjects, out, beside, only, force, progress)
     for text in told:
@@ -107,17 +101,17 @@ def _written(
     beside: Path,
     only: tuple[str, ...] | None,
     force: bool,
-    progress: Progress | None,
+    progress: ReportProgress | None,
 ) -> list[str]:
     """Make all pages in `beside`, move them to `out`, and the index last; what is to be said of them."""
-    trust = TRUST if not only or (out / TRUST).is_file() else ""
+    trust = TRUST_PAGE if not only or (out / TRUST_PAGE).is_file() else ""
     left = [not force and _is_left(each, out, only, trust) for each in subjects]
-    told = [_left(each.arm) for each, same in zip(subjects, left, strict=True) if same]
+    told = [LEFT_AS_IT_IS.format(name=each.arm.name) for each, same in zip(subjects, left, strict=True) if same]
     changed = [each for each, same in zip(subjects, left, strict=True) if not same]
     folders = [beside / str(i) for i in range(len(changed))]
     for folder in folders:
         folder.mkdir()
-    evidence = None if only or force else kept_evidence(out / FOLDER)
+    evidence = None if only or force else kept_evidence(out / TRUST_FOLDER)
     wants_scripts = not only and any(map(is_live, subjects)) and bool(changed or not has_assets(out / ASSETS))
     scripts = (beside / ASSETS, out / ASSETS) if wants_scripts else None
     sections, gathered = make_all(changed, folders, only or (), not only and evidence is None, scripts, progress)
@@ -132,8 +126,8 @@ def _written(
     for subject, folder in zip(changed, folders, strict=True):
         move_into(folder, out / subject.arm.name)
     if (evidence := gathered or evidence) is not None:
-        write_trust(evidence, written_proofs(out), beside / FOLDER)
-        move_into(beside / FOLDER, out / FOLDER)
+        write_trust(evidence, written_proofs(out), beside / TRUST_FOLDER)
+        move_into(beside / TRUST_FOLDER, out / TRUST_FOLDER)
     index = index_page(written_cards(out), trust=trust, compared=kept_comparison(out)[0])
     (beside / "index.html").write_text(index, encoding="utf-8", newline="")
     os.replace(beside / "index.html", out / "index.html")
@@ -157,7 +151,7 @@ def _check(arms: Sequence[Arm], only: tuple[str, ...] | None) -> None:
         if arm.name.casefold() in seen:
             remedy = "two arms of this name would share one folder; give one of them another name"
             raise ParameterError(key="name", value=arm.name, remedy=remedy)
-        if arm.name.casefold() in {name.casefold() for name in OURS}:
+        if arm.name.casefold() in {name.casefold() for name in RESERVED_NAMES}:
             remedy = "the folder of reports has a file of this name; give the arm another name"
             raise ParameterError(key="name", value=arm.name, remedy=remedy)
         seen.add(arm.name.casefold())
@@ -179,7 +173,9 @@ def _beside(out: Path, names: Sequence[str]) -> Iterator[Path]:
         remedy = why.format(error.strerror or error)
         raise ParameterError(key="out", value=str(out), remedy=remedy) from None
     finally:
-        _remove(made)
+        for folder in reversed(made):  # as far as nothing is in them
+            with suppress(OSError):
+                folder.rmdir()
 
 
 def _make_folders(folder: Path, made: list[Path]) -> None:
@@ -194,13 +190,6 @@ def _make_folders(folder: Path, made: list[Path]) -> None:
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
 
-def _remove(made: Sequence[Path]) -> None:
-    """Take back the folders that were made, last first, as far as nothing is in them."""
-    for folder in reversed(made):
-        with suppress(OSError):
-            folder.rmdir()
-
-
 def _failures(arm: Arm, parts: Sequence[SavedSection]) -> Iterator[str]:
     """A line for each section that could not be made."""
     for part in parts:
@@ -211,10 +200,6 @@ def _failures(arm: Arm, parts: Sequence[SavedSection]) -> Iterator[str]:
 def _pages(only: tuple[str, ...] | None) -> tuple[str, ...]:
     """The pages written of an arm, as made.json names them."""
     return only or ("index",)
-
-
-def _left(arm: Arm) -> str:
-    return f"{arm.name}: left as it is, for nothing that its page is made of has changed; --force makes it again"
 
 
 def _write_pages(
@@ -231,9 +216,9 @@ def _write_pages(
     """
     (folder / "arm.toml").write_text(file_of(subject), encoding="utf-8", newline="")
     for question in only or (None,):
-        wanted = [s for s in sections if question is None or _answers(s.section.anchor, question)]
-        live = (folder / PAGE).is_file()
-        others = [*beside(earlier, _pages(only), question or "index"), *_compared(earlier.parent, subject.arm)]
+        wanted = [each for each in sections if question is None or is_on_page(each.section.anchor, question)]
+        live = (folder / LIVE_PAGE).is_file()
+        others = [*other_pages(earlier, _pages(only), question or "index"), *_compared(earlier.parent, subject.arm)]
         page = arm_page(subject, wanted, question, trust=f"../{trust}" if trust else "", live=live, others=others)
         (folder / f"{question or 'index'}.html").write_text(page, encoding="utf-8", newline="")
 
@@ -241,7 +226,7 @@ def _write_pages(
 def _compared(out: Path, arm: Arm) -> list[tuple[str, str]]:
     """(file, title) of the comparison beside the reports, as an arm's page sees it, where it is one of this arm."""
     title, arms = kept_comparison(out)
-    return [(f"../{COMPARISON}", title)] if arm.name in arms else []
+    return [(f"../{COMPARISON_PAGE}", title)] if arm.name in arms else []
 
 
 def _leads(trust: str, out: Path, arm: Arm) -> str:
@@ -249,8 +234,9 @@ def _leads(trust: str, out: Path, arm: Arm) -> str:
     return "\n".join((trust, *(title for _, title in _compared(out, arm))))
 
 
-def _answers(anchor: str, question: str) -> bool:
-    return anchor in ("arm", "law", "no-loop") or anchor.startswith(question)
+def is_on_page(anchor: str, question: str) -> bool:
+    """Whether the page of one question has the section with this anchor."""
+    return anchor in OF_EVERY_PAGE or anchor.startswith(question)
 
 
 def move_into(made: Path, folder: Path) -> None:

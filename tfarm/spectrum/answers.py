@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tfarm.columns import ANSWER, JSON, REPORT, TERMINAL, Column, Table
-from tfarm.digits import aligned, general, held, lined, significant, singly, within
+from tfarm.digits import aligned, general, kept_digits, lined, significant, singly, within
 from tfarm.errors import MISSING
 from tfarm.exact.methods import Method
 
@@ -48,9 +48,9 @@ MODE_COLUMNS = (  # of `Modes`; a page adds the nodes, which it rounds to a shar
     Column("theories_rad_s", of=lambda modes: _by_row(compare_theories(modes)), on=(JSON,)),
     Column("sensitivity", of=lambda modes: _by_row(modes.sensitivity), on=(JSON,)),
     Column("hub_participation", "hub participation b", "1/√(kg m²)",
-           of=lambda modes: held(modes.hub_participation, SHAPE_DIGITS), digits=lined(7, 4), on=REPORT),
+           of=lambda modes: kept_digits(modes.hub_participation, SHAPE_DIGITS), digits=lined(7, 4), on=REPORT),
     Column("modal_moment", "modal moment", "N m/√(kg m²)",
-           of=lambda modes: held(modes.modal_moment + 0.0, SHAPE_DIGITS), digits=lined(7, 4), on=REPORT),
+           of=lambda modes: kept_digits(modes.modal_moment + 0.0, SHAPE_DIGITS), digits=lined(7, 4), on=REPORT),
 )  # fmt: skip
 
 

@@ -17,26 +17,26 @@ from tfarm.files import write_file
 
 def to_json(answer: Any) -> str:
     """One JSON object in ASCII, which every pipe takes; a table in it is a list of its rows.  NaN raises ValueError."""
-    return json.dumps(plain(answer), allow_nan=False)
+    return json.dumps(json_value(answer), allow_nan=False)
 
 
-def plain(value: Any) -> Any:
+def json_value(value: Any) -> Any:
     """A value as JSON has it: a table as its rows, a tuple as a list, an infinity as a text."""
     if isinstance(value, float):
         if math.isnan(value):
             raise ValueError("an answer or a table holds a NaN")
         return float(value) if not math.isinf(value) else "inf" if value > 0 else "-inf"
     if isinstance(value, dict):
-        return {key: plain(entry) for key, entry in value.items()}
+        return {key: json_value(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple | Table):
-        return [plain(entry) for entry in value]
+        return [json_value(entry) for entry in value]
     return value
 
 
 def as_json(table: Table) -> str:
     """{"table", "units", "rows": [{key: value}, ...]}, a line a row."""
     columns = table.on(FILES)
-    rows = zip(*(plain(column.values) for column in columns), strict=True)
+    rows = zip(*(json_value(column.values) for column in columns), strict=True)
     texts = (
         _dumped({column.key: value for column, value in zip(columns, row, strict=True) if value is not MISSING})
         for row in rows
@@ -65,7 +65,7 @@ def as_csv(table: Table, *, units: bool = False) -> str:
 def _csv_cell(value: Any) -> str:
     if value is MISSING or value is None:
         return ""
-    found = plain(value)
+    found = json_value(value)
     return " ".join(map(str, found)) if isinstance(found, list) else str(found)
 
 
@@ -77,7 +77,7 @@ def write_csv(table: Table, path: Path) -> None:
 RENDERERS = {"csv": as_csv, "json": as_json}
 
 
-def save(table: Table, folder: Path, kinds: Sequence[str] = tuple(RENDERERS)) -> tuple[str, ...]:
+def save_table(table: Table, folder: Path, kinds: Sequence[str] = tuple(RENDERERS)) -> tuple[str, ...]:
     """A report's table as CSV and JSON, or one of these: the names of the files."""
     for kind in kinds:
         (folder / f"{table.stem}.{kind}").write_text(RENDERERS[kind](table), encoding="utf-8", newline="")

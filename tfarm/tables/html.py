@@ -10,30 +10,27 @@ from markupsafe import Markup, escape
 from tfarm.columns import PAGE, Column, Table
 from tfarm.digits import powers, unit
 
-WIDE = 44  # characters of a text from which its cell is a wide one
+WIDE_CELL = 44  # characters of a text from which its cell is a wide one
 
 
 def as_html(table: Table) -> Markup:
-    """The table element, named by the table's title."""
+    """The table element, named by the table's title; shared headings, where there are any, over their columns."""
     columns = table.on(PAGE)
+    runs = [(name, len(list(run))) for name, run in itertools.groupby(column.group for column in columns)]
+    groups = Markup("")
+    if any(name for name, _ in runs):
+        headed, bare = (
+            Markup('<th colspan="{}" class="named" scope="colgroup">{}</th>'),
+            Markup('<td colspan="{}"></td>'),
+        )
+        cells = (headed.format(count, name) if name else bare.format(count) for name, count in runs)
+        groups = Markup('<tr class="group">{}</tr>\n').format(Markup("").join(cells))
     heads, *rows = (
         Markup("<tr>{}</tr>").format(Markup("").join(row)) for row in zip(*map(_column, columns), strict=True)
     )
     body = Markup("\n").join([Markup("<tbody>"), *rows, Markup("</tbody>")])
     shape = Markup('<table aria-label="{}">\n<thead>\n{}{}\n</thead>\n{}\n</table>')
-    return shape.format(table.title, _groups(columns), heads, body)
-
-
-def _groups(columns: list[Column]) -> Markup:
-    """Shared headings over as many columns as they have; nothing where there is none."""
-    runs = [(name, len(list(run))) for name, run in itertools.groupby(column.group for column in columns)]
-    if not any(name for name, _ in runs):
-        return Markup("")
-    headed = Markup('<th colspan="{}" class="named" scope="colgroup">{}</th>')
-    cells = (
-        headed.format(count, name) if name else Markup('<td colspan="{}"></td>').format(count) for name, count in runs
-    )
-    return Markup('<tr class="group">{}</tr>\n').format(Markup("").join(cells))
+    return shape.format(table.title, groups, heads, body)
 
 
 def _column(column: Column) -> list[Markup]:
@@ -42,7 +39,7 @@ def _column(column: Column) -> list[Markup]:
     of = Markup('<span class="unit">{}</span>').format(column.unit) if column.unit else ""
     tag, scope = ("th", Markup(' scope="col"')) if column.title else ("td", "")
     shape = Markup('<{0}{1} class="{2}{3}" data-key="{4}">{5}{6}</{0}>')
-    head = shape.format(tag, scope, text, tinted, column.key, symbol(column.title), of)
+    head = shape.format(tag, scope, text, tinted, column.key, with_symbols(column.title), of)
     styles = (
         Markup(' style="background:{}"').format(tint) if tint else "" for tint in column.tint or [""] * len(cells)
     )
@@ -51,13 +48,13 @@ def _column(column: Column) -> list[Markup]:
     return [
         head,
         *(
-            cell.format(text, " wide" * (len(words) > WIDE), tinted, label, style, symbol(words))
+            cell.format(text, " wide" * (len(words) > WIDE_CELL), tinted, label, style, with_symbols(words))
             for words, style in zip(cells, styles, strict=True)
         ),
     ]
 
 
-def symbol(text: str) -> Markup:
+def with_symbols(text: str) -> Markup:
     """A text with true subscripts and exponents: I_h becomes I<sub>h</sub>, m^2 becomes m², 1e-4 becomes 1 × 10⁻⁴."""
     plain = powers(unit(str(escape(text))))
     return Markup(re.sub(r"\b([A-Za-zθ])_([a-z0-9])\b", r"\1<sub>\2</sub>", plain))

@@ -17,8 +17,8 @@ from rich.cells import cell_len
 
 from tfarm.columns import TERMINAL, Column, Table
 
-GAP = 2  # spaces between two columns
-LEAST = 20  # characters to which a text may be folded
+COLUMN_GAP = 2  # spaces between two columns
+LEAST_FOLDED = 20  # characters to which a text may be folded
 
 
 @dataclass(frozen=True)
@@ -52,9 +52,9 @@ class Rows:
             return natural
         words = [max(map(len, title.split()), default=0) for title in self.titles]
         widths = [max(pair) for pair in zip(words, cells, strict=True)]
-        rest = width - _total([w for i, w in enumerate(widths) if i not in self.fold]) - GAP * len(self.fold)
+        rest = width - _total([w for i, w in enumerate(widths) if i not in self.fold]) - COLUMN_GAP * len(self.fold)
         for left, i in zip(range(len(self.fold), 0, -1), sorted(self.fold, key=lambda i: widths[i]), strict=True):
-            widths[i] = min(widths[i], max(rest // left, LEAST, words[i]))
+            widths[i] = min(widths[i], max(rest // left, LEAST_FOLDED, words[i]))
             rest -= widths[i]
         return widths
 
@@ -69,17 +69,17 @@ class Rows:
                 for i, text, left in zip(block, texts, to_left, strict=True)
                 for pad in [" " * (widths[i] - cell_len(text))]
             )
-            lines.append((" " * GAP).join(cells).rstrip())
+            lines.append((" " * COLUMN_GAP).join(cells).rstrip())
         return lines
 
 
 def show(table: Table) -> None:
     """Print it, in the width of the terminal or, in a pipe, in as many characters as it takes."""
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else sys.maxsize
-    print("\n".join(lines(table, width)))
+    print("\n".join(table_lines(table, width)))
 
 
-def lines(table: Table, width: int) -> list[str]:
+def table_lines(table: Table, width: int) -> list[str]:
     """The lines of the table, each in so many characters as far as its widest column allows."""
     columns = table.on(TERMINAL)
     cells = [column.printed(column.values) if column.printed else column.cells for column in columns]
@@ -110,4 +110,4 @@ def _blocks(widths: Sequence[int], width: int, keys: int) -> list[list[int]]:
 
 
 def _total(widths: Sequence[int]) -> int:
-    return sum(widths) + GAP * (len(widths) - 1)
+    return sum(widths) + COLUMN_GAP * (len(widths) - 1)
