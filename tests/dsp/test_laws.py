@@ -12,13 +12,13 @@ from tests.shell import answer, run
 from tfarm import HubFeedback, Law, ParameterError
 from tfarm.arm.blocks import Rational, StateSpace
 from tfarm.dsp import Chain, Converters, Sampling, sampled_loop
-from tfarm.dsp.band import band_of
-from tfarm.dsp.discretise import discretised, held, matched, tustin
+from tfarm.dsp.band import complete_band
+from tfarm.dsp.discretise import discretised, matched, tustin, zero_order_hold
 from tfarm.dsp.law_circle import LawCircle
 from tfarm.dsp.law_loop import sampled_law
 from tfarm.dsp.law_margins import crossing_factors
 from tfarm.dsp.law_verdict import law_verdict
-from tfarm.dsp.margins import whole
+from tfarm.dsp.margins import with_all_modes
 
 T = 0.01
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
@@ -52,7 +52,7 @@ def test_the_rules_are_those_of_python_control(name, rule):
     mine = {
         "tustin": lambda: tustin(block, T),
         "prewarped": lambda: tustin(block, T, warp),
-        "zoh": lambda: held(block, T),
+        "zoh": lambda: zero_order_hold(block, T),
         "matched": lambda: matched(block, T),
     }[rule]()
     method = {"tustin": "bilinear", "prewarped": "bilinear"}.get(rule, rule)
@@ -92,7 +92,7 @@ def test_several_signals_at_once_are_discretised_as_each_alone():
     both = Law.of_matrices(A, B, C, D, ["hub_angle", "root_moment"], rule="zoh")
     z = np.exp(1j * np.array([0.3, 2.0]))
     for column, values in enumerate(discretised(both, T).values(z)):
-        one = held(StateSpace(A, np.array(B)[:, [column]], C, np.array(D)[:, [column]]), T)
+        one = zero_order_hold(StateSpace(A, np.array(B)[:, [column]], C, np.array(D)[:, [column]]), T)
         np.testing.assert_allclose(values, one.numerators(z)[0] / one.denominator(z), rtol=1e-12)
 
 
@@ -226,7 +226,7 @@ def test_what_is_proven_of_random_laws_is_the_count_of_their_poles():
             continue
         arm, law, chain = case
         small = sampled_law(arm, law, chain, count=1)
-        band = band_of(whole(arm, small.chain, small.with_modes))
+        band = complete_band(with_all_modes(arm, small.chain, small.with_modes))
         proven = LawCircle(band.loop, band.kept, band.missing).outside()
         found.append(proven)
         assert proven in (None, (band.full.poles.log_radius > 0).sum())

@@ -6,7 +6,7 @@ import pytest
 import tfarm
 from tfarm.arm import Hub, HubFeedback
 from tfarm.dsp import Actuator, Chain, Converters, Sampling, closed_loop, plant, sampled_loop
-from tfarm.dsp.law import first_order_law, mode_table, root_locus
+from tfarm.dsp.law import first_order_law, mode_table, sampled_root_locus
 from tfarm.errors import ParameterError
 
 pytestmark = pytest.mark.kernels
@@ -120,12 +120,12 @@ def test_hub_damping_alone_damps(lossless):
 
 def test_the_locus_starts_at_the_open_loop_and_has_no_jumps(lab):
     loop = sampled_loop(lab, HubFeedback(K1=1e-9, K2=1.3), count=8)
-    locus = root_locus(loop, "K2", np.linspace(0.0, 1.3, 60))
+    locus = sampled_root_locus(loop, "K2", np.linspace(0.0, 1.3, 60))
     assert np.all(abs(np.diff(locus, axis=0)) < 0.2)
     flexible = loop.pulse.multipliers[loop.pulse.mode > 0]
     assert max(abs(locus[0, :, None] - flexible).min(axis=0)) < 1e-9
     assert max(np.log(abs(locus[-1]))) == pytest.approx(loop.poles.log_spectral_radius, rel=1e-9)
-    other = root_locus(loop, "K1", np.array([1e-9, 1e-3]))
+    other = sampled_root_locus(loop, "K1", np.array([1e-9, 1e-3]))
     np.testing.assert_allclose(np.sort_complex(other[0]), np.sort_complex(locus[-1]), atol=1e-12)
 
 

@@ -18,7 +18,7 @@ from tfarm.dsp import (
     required_damping,
     sampled_loop,
 )
-from tfarm.dsp.boundary import circle_grid, crossings
+from tfarm.dsp.boundary import circle_crossings, circle_grid
 from tfarm.dsp.margins import around, stable_windows
 from tfarm.dsp.regions import ENDS_AT, ends_of_K1
 from tfarm.dsp.verdict import sampled_answer, sampled_verdict
@@ -73,7 +73,7 @@ def test_between_crossings_the_counts_are_those_of_the_eigenvalues(name, delay):
     grid = circle_grid(loop)
     for gain, other in (("K2", 0.3), ("K2", 7.0), ("K1", 0.3), ("K1", -0.1)):
         law = HubFeedback(K1=other, K2=other)
-        found = crossings(grid, gain, law)
+        found = circle_crossings(grid, gain, law)
         middles = np.r_[found.gain[0] - 1, (found.gain[1:] + found.gain[:-1]) / 2, found.gain[-1] + 1]
         counts = [growing(replace(loop, gains=law.having(gain, m))) for m in middles]
         np.testing.assert_array_equal(np.diff(counts), found.change)
@@ -82,7 +82,7 @@ def test_between_crossings_the_counts_are_those_of_the_eigenvalues(name, delay):
 def test_a_long_delay_hides_no_crossing_between_two_points_of_the_grid(lab):
     """Sixty samples turn the loop's phase sixty times round the circle; a grid ten times coarser loses a pair."""
     loop = sampled_loop(lab, GAINS, Chain(sampling=Sampling(delay_samples=60.0)), count=6)
-    found = crossings(circle_grid(loop), "K1", HubFeedback(K2=0.3))
+    found = circle_crossings(circle_grid(loop), "K1", HubFeedback(K2=0.3))
     gaps = np.nonzero(np.diff(found.gain) > 1e-6)[0]
     middles = np.r_[found.gain[0] - 1, (found.gain[gaps + 1] + found.gain[gaps]) / 2, found.gain[-1] + 1]
     passed = np.r_[0, np.cumsum(found.change)][np.searchsorted(found.gain, middles)]
@@ -150,7 +150,7 @@ def test_the_required_damping_is_where_the_verdict_turns(lossless):
 def test_at_a_crossing_the_closed_loop_matrix_has_an_eigenvalue_at_its_angle(lab, gain):
     """Not only the gain of a crossing is right, but the place on the circle, too."""
     loop = sampled_loop(lab, GAINS, count=6)
-    found = crossings(circle_grid(loop), gain, GAINS)
+    found = circle_crossings(circle_grid(loop), gain, GAINS)
     assert found.gain.size > 3
     for value, angle in zip(found.gain.tolist(), found.at.tolist(), strict=True):
         eigenvalues = loop.having(**{gain: value}).eigenvalues

@@ -22,11 +22,11 @@ from tfarm.dsp import (
     stable_windows,
 )
 from tfarm.dsp import loop as loop_module
-from tfarm.dsp.band import band_of
+from tfarm.dsp.band import complete_band
 from tfarm.dsp.circle import Circle
 from tfarm.dsp.margins import most_modes, whole_loop
 from tfarm.dsp.shown import Edge, shown_windows
-from tfarm.dsp.verdict import settled
+from tfarm.dsp.verdict import settled_verdict
 from tfarm.errors import ConvergenceError
 from tfarm.spectrum import continuation, damped, modes
 from tfarm.spectrum.damped import damped_modes
@@ -101,7 +101,7 @@ def test_no_edge_asks_for_modes_that_a_sample_leaves_nothing_of(monkeypatch):
 def test_an_edge_has_the_digits_that_more_modes_leave():
     """Sixteen modes see the edge of K1 at 0.62; it is near 0.50, and both ends of what is shown are what it says."""
     gains, chain = HubFeedback(K1=0.1, K2=0.3), Chain(sampling=Sampling(period=9e-5))
-    loop, band = sampled_loop(LIGHT, gains, chain, count=16), band_of(whole_loop(LIGHT, gains, chain))
+    loop, band = sampled_loop(LIGHT, gains, chain, count=16), complete_band(whole_loop(LIGHT, gains, chain))
     assert stable_windows(loop, "K1")[0][1] > 0.6
     ((low, high),) = shown_windows(loop, band, "K1").figures
     assert low.text == "0"
@@ -124,8 +124,8 @@ def test_what_more_modes_change_is_not_shown():
 def test_the_band_holds_every_pole_that_the_continuation_finds_there():
     """Below its top and right of its line no other of twice as many modes."""
     loop = whole_loop(RINGING, HubFeedback(K1=0.3, K2=0.3), Chain())
-    band, found = band_of(loop), loop.plant.poles
-    line, zeros = -found.real[band_of(loop).kept].min(), damped_modes(modes(RINGING, 60)).eigenvalues.ravel()
+    band, found = complete_band(loop), loop.plant.poles
+    line, zeros = -found.real[complete_band(loop).kept].min(), damped_modes(modes(RINGING, 60)).eigenvalues.ravel()
     inside = zeros[(abs(zeros.imag) < band.top) & (zeros.real >= -line) & (zeros != 0)]
     assert inside.size == band.kept.sum() >= 20
     assert max(abs(found[band.kept] - zero).min() / abs(zero) for zero in inside) < 1e-9
@@ -135,7 +135,7 @@ def test_the_band_holds_every_pole_that_the_continuation_finds_there():
 def test_what_is_left_of_the_line_weighs_no_more_than_is_said(delay):
     """Pulse transfer functions of the band's poles, and those of sixty modes, on the circle."""
     gains, chain = HubFeedback(K1=0.3, K2=0.3), Chain(sampling=Sampling(delay_samples=delay))
-    band, many = band_of(whole_loop(RINGING, gains, chain)), sampled_loop(RINGING, gains, chain, count=60)
+    band, many = complete_band(whole_loop(RINGING, gains, chain)), sampled_loop(RINGING, gains, chain, count=60)
     circle = band.circle()
     z = np.exp(0.5j * (circle.low + circle.high))
     F = circle.characteristic(gains).middle / (1 - 1 / z)  # of K1, whose plant has a simple pole at z = 1
@@ -149,7 +149,7 @@ def test_the_count_does_not_depend_on_the_arcs_to_begin_with(lab, coarser, monke
     monkeypatch.setattr("tfarm.dsp.circle.ARCS", 64 // coarser)
     slightly = replace(lab, link=replace(lab.link, damping=1e-12))
     loop = sampled_loop(slightly, HubFeedback(K1=0.3, K2=0.3), count=14)
-    circle = band_of(loop).circle()
+    circle = complete_band(loop).circle()
     for K2 in (0.3, -0.05, 1.3):
         other = loop.having(K1=0.3, K2=K2)
         assert circle.count(other.gains) == (other.poles.log_radius > 0).sum()
@@ -163,7 +163,7 @@ def test_the_count_is_that_of_the_eigenvalues_outside_odd_ones_too(lab, K1, K2, 
     """An odd number of them: F begins or ends on the negative real axis, and its turn is none of whole turns."""
     loop = sampled_loop(lab, HubFeedback(K1=K1, K2=K2, Kp=Kp), Chain())
     outside = abs(np.linalg.eigvals(loop.reduced_matrix())) > 1 + 1e-9
-    assert band_of(loop).circle().count(loop.gains) == outside.sum()
+    assert complete_band(loop).circle().count(loop.gains) == outside.sum()
 
 
 @pytest.mark.parametrize("hub_rate", ["ideal", "difference"])
@@ -253,7 +253,7 @@ def test_only_a_count_on_the_circle_that_the_poles_agree_with_settles(lab, K2, c
     gains = HubFeedback(K1=0.3, K2=K2)
     there = int((abs(sampled_loop(lab, gains).eigenvalues) > 1).sum())
     count = {"as they are": there, "not": None, "otherwise": 0 if there else 1}[counted]
-    verdict = settled(whole_loop(lab, gains, Chain()), lambda band: count)
+    verdict = settled_verdict(whole_loop(lab, gains, Chain()), lambda band: count)
     assert verdict.is_settled is (counted == "as they are")
     assert verdict.is_stable is (there == 0)
 

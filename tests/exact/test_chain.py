@@ -20,7 +20,7 @@ from tests.transition import determinant, response
 from tfarm import Hub
 from tfarm.arm import THEORIES, Attachment, Motor, RotarySpring
 from tfarm.errors import ParameterError
-from tfarm.exact.chain import Chain
+from tfarm.exact.chain import ElementChain
 from tfarm.exact.chaining import chain_of
 from tfarm.exact.coefficients import Coefficients
 from tfarm.exact.outputs import OUTPUTS, Output
@@ -277,7 +277,7 @@ def test_what_is_zero_or_rigid_leaves_the_papers_arm():
     assert isinstance(system_of(same), Coefficients)
     assert system_of(same) == system_of(arm)
     more = {"motor": Motor(resistance=1.0, torque_constant=1.0), "attachments": (Attachment(x=0.1, mass=1.0),)}
-    assert all(isinstance(system_of(replace(arm, **{name: part})), Chain) for name, part in more.items())
+    assert all(isinstance(system_of(replace(arm, **{name: part})), ElementChain) for name, part in more.items())
 
 
 @pytest.mark.parametrize("seed", thinned(range(12), 4))

@@ -38,7 +38,7 @@ def test_the_balls_and_their_condition_are_those_of_the_transition_matrices():
         later = complex(response(arm, s * (1 + h), [at[0]])[at[0]])
         moved = complex(response(arm, s, [at[1]])[at[1]])
         value, condition = pair
-        assert balls.nearest(value) == pytest.approx(here, rel=1e-15)
+        assert balls.nearest_float(value) == pytest.approx(here, rel=1e-15)
         assert condition == pytest.approx((abs(later / here - 1) + abs(moved / here - 1)) / h, rel=1e-4)
 
 

@@ -13,7 +13,7 @@ from scipy.optimize import minimize_scalar
 import tfarm
 from tfarm.loop.law_locus import inside, law_locus
 from tfarm.loop.law_loop import LawLoop
-from tfarm.loop.law_rounded import rounded
+from tfarm.loop.law_rounded import rounded_law_locus
 
 LAB = tfarm.load("sasaki2012-lab")
 LAW = tfarm.Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0])}, delay=0.002)
@@ -21,7 +21,7 @@ LAW = tfarm.Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0])}, delay=0.002)
 
 @cache
 def drawn(start, stop, points):
-    return rounded(law_locus(LAB, LAW, "gain", start, stop, points, 1))
+    return rounded_law_locus(law_locus(LAB, LAW, "gain", start, stop, points, 1))
 
 
 def stationary(low, high, sign):

@@ -14,8 +14,7 @@ from tests.shared import thinned
 from tfarm import Hub, HubFeedback, ParameterError, Payload
 from tfarm.cli import main
 from tfarm.loop import reduced_locus as reduced_locus_room
-from tfarm.loop.lines import along
-from tfarm.loop.lines import crossings as line_crossings
+from tfarm.loop.lines import along, line_crossings
 from tfarm.loop.locus import frame, locus, rounded
 from tfarm.loop.plant import Loop
 from tfarm.loop.poles import poles_below

@@ -13,7 +13,7 @@ from tests.shared import thinned
 from tfarm import HubFeedback, Payload
 from tfarm.arm import Gauge
 from tfarm.loop.frequencies import band_of
-from tfarm.loop.lines import along, crossings
+from tfarm.loop.lines import along, line_crossings
 from tfarm.loop.lossless import locked_edges, stable_moments
 from tfarm.loop.lyapunov import lyapunov
 from tfarm.loop.margins import margins
@@ -72,7 +72,7 @@ def test_the_edges_are_all_crossings_along_K2(name):
     arm = RIGS[name]
     known = locked_edges(arm)
     band = band_of(arm, 12)
-    found = crossings(arm, along("K2", HubFeedback(K1=default_gains(arm).K1, Kp=0.1)), band)
+    found = line_crossings(arm, along("K2", HubFeedback(K1=default_gains(arm).K1, Kp=0.1)), band)
     ours = {float(w): (t, n) for t, w, n in known if w < band and abs(t) < 1e6}
     theirs = {float(w): (t, n) for t, w, n in found if abs(t) < 1e6 and w > 0}
     assert len(ours) == len(theirs) > 5

@@ -11,7 +11,7 @@ from tests.loop.rig_loops import RigLoop
 from tests.shared import thinned
 from tfarm import Hub
 from tfarm.arm import Motor
-from tfarm.loop.lines import along, crossings
+from tfarm.loop.lines import along, line_crossings
 from tfarm.loop.locus import locus
 from tfarm.loop.poles import poles_below
 from tfarm.loop.reduced_locus import reduced_locus
@@ -76,7 +76,7 @@ def test_crossings_along_a_scale_are_those_of_the_decomposition():
     found = locus(arm, law, "all", -2.0, 2.0, points=41, branches=5)
     moving = [(each.gain, each.omega) for each in found.crossings if each.omega > 0]
     band = abs(found.branches).max()
-    known = [(t, w) for t, w, _ in crossings(arm, found.variation.line, band) if -2 < t < 2 and w > 0]
+    known = [(t, w) for t, w, _ in line_crossings(arm, found.variation.line, band) if -2 < t < 2 and w > 0]
     assert len(moving) == len(known) > 0
     assert np.allclose(sorted(moving), sorted(known), rtol=1e-8)
 
@@ -89,5 +89,5 @@ def test_a_gain_that_takes_the_whole_friction_back_has_its_pole_at_0(points):
     (static,) = (each for each in found.crossings if each.omega == 0)
     assert static.gain == pytest.approx(-0.2, rel=1e-9)
     assert static.direction == "stable"
-    (known,) = (each for each in crossings(arm, along("K1", default_gains(arm)), 20.0) if each.at == 0)
+    (known,) = (each for each in line_crossings(arm, along("K1", default_gains(arm)), 20.0) if each.at == 0)
     assert known.t == pytest.approx(-0.2, rel=1e-15)

@@ -6,11 +6,11 @@ import pytest
 import tfarm
 from tfarm.crossing import pieces
 from tfarm.dsp import load_chain
-from tfarm.dsp.loci import loci as sampled_loci
+from tfarm.dsp.loci import sampled_loci
 from tfarm.loop.edges import moment_axis, rate_axis
 from tfarm.loop.law_locus import law_locus
 from tfarm.loop.law_loop import LawLoop
-from tfarm.loop.law_rounded import rounded as rounded_law
+from tfarm.loop.law_rounded import rounded_law_locus as rounded_law
 from tfarm.loop.locus import locus, rounded
 from tfarm.loop.poles import poles_below
 from tfarm.plots.folded import draw_folded_loci

@@ -14,7 +14,7 @@ from tfarm.crossing import pieces
 from tfarm.digits import kept_digits, scientific
 from tfarm.dsp import Chain, Simulator, analyse, sampled_loop, sampled_verdict, scenario, stable_windows
 from tfarm.dsp.chain import Sampling
-from tfarm.dsp.loci import loci
+from tfarm.dsp.loci import sampled_loci
 from tfarm.dsp.slews import slews
 from tfarm.dsp.strip_chart import strip_chart
 from tfarm.loop.stability import stability
@@ -185,7 +185,7 @@ def test_an_end_of_the_search_is_not_sold_as_a_proof(window, looked_at, text):
 
 def test_loci_are_the_poles_at_their_gains_and_aliased_modes_are_told_apart():
     loop = sampled_verdict(LAB, GAINS).loop
-    data = loci(loop, 20.0, (-0.5, 1.5))
+    data = sampled_loci(loop, 20.0, (-0.5, 1.5))
     for locus, i in itertools.product(data.by.values(), (0, 45, 90)):
         value = float(locus.values[i])
         z = loop.having(**{locus.gain: value}).poles.z
@@ -230,7 +230,7 @@ def test_the_same_bytes_twice(tmp_path, monkeypatch):
     for name in ("a", "b"):
         (tmp_path / name).mkdir()
         data = stable_regions(LAB, GAINS, Chain())
-        found = loci(loop, 20.0, (-0.5, 1.5))
+        found = sampled_loci(loop, 20.0, (-0.5, 1.5))
         ideal = slews(LAB, GAINS, Chain(), 14)
         figures = (draw_overlay(data), draw_strip_chart(strip_chart(LAB, GAINS, ideal.without, 14)))
         for i, figure in enumerate(figures):

@@ -48,7 +48,7 @@ def test_values_along_the_arm_agree_with_the_paper(arm: Arm, name: str) -> None:
 def test_derivative_is_the_limit_of_differences_with_many_digits(arm: Arm, name: str) -> None:
     G = tfarm.transfer(arm, name)
     for s in (0.3 + 57.1j, 10 + 700j, 3e-3 + 1e-3j, 2e4j):
-        expected = balls.nearest(enclosures.slope(coefficients(arm), OF_ONE_LINK[name], s))
+        expected = balls.nearest_float(enclosures.slope(coefficients(arm), OF_ONE_LINK[name], s))
         scale = abs(G(s) / s) + abs(expected)
         assert abs(G.derivative(s) - expected) <= 4000 * EPS * scale
 

@@ -50,12 +50,12 @@ def sampled(
     law, said = asked_law(subject, given)
     from tfarm.cli.sampling_tables import print_sampled, print_sampled_law
     from tfarm.dsp.closed import sampled as analysed
-    from tfarm.dsp.law_verdict import LawAnalysis, law_answer
+    from tfarm.dsp.law_verdict import LawAnalysis, sampled_law_answer
     from tfarm.dsp.verdict import sampled_answer
 
     found = analysed(subject, law, chain, count=count)
     if isinstance(found, LawAnalysis):
-        give(law_answer(found) | said, json, print_sampled_law)
+        give(sampled_law_answer(found) | said, json, print_sampled_law)
     else:
         give(sampled_answer(found) | said, json, print_sampled)
 

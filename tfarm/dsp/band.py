@@ -66,7 +66,7 @@ class Band(Generic[AnyLoop]):
         return Circle(self.loop, self.kept, self.missing)
 
 
-def band_of(loop: AnyLoop) -> Band[AnyLoop] | None:
+def complete_band(loop: AnyLoop) -> Band[AnyLoop] | None:
     """The highest band in which the loop's plant is complete; None where it cannot be shown to be.
 
     Not without damping, nor with analog hub damping, whose poles the model has to its own accuracy alone.

@@ -100,7 +100,7 @@ def geometric(edge: float, width: float) -> Real:
     return np.union1d(near, even[even < edge])
 
 
-def crossings(grid: CircleGrid, name: str, law: HubFeedback) -> Crossings:
+def circle_crossings(grid: CircleGrid, name: str, law: HubFeedback) -> Crossings:
     """Where poles cross the circle, at angles `at`, as one gain runs from minus to plus the largest of `most_gain`.
 
     The others are those of the law; exact to rounding.  At z = -1 f vanishes: so it falls where it is positive just

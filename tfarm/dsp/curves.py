@@ -34,7 +34,7 @@ MOST_RECORDS = 400_000  # of a simulation for a picture, some 30 MB
 
 @dataclass(frozen=True)
 @record
-class Curve:
+class TimeCurve:
     """A signal over time: a line where `low` is `high`, else the band between them from each `t` [s] to the next."""
 
     t: Real
@@ -42,12 +42,12 @@ class Curve:
     high: Real
     is_band: bool
 
-    def at(self, t: Real) -> Curve:
+    def at(self, t: Real) -> TimeCurve:
         """The same at other times, which its own begin with or hold, for a file with one column of time."""
         if self.t.size == t.size:
             return self
         k = np.clip(np.searchsorted(self.t, t * (1 + 1e-12), side="right") - 1, 0, self.t.size - 1)
-        return Curve(t, self.low[k], self.high[k], self.is_band)
+        return TimeCurve(t, self.low[k], self.high[k], self.is_band)
 
     def columns(self, key: str, title: str, unit: str) -> Sequence[Column]:
         """What is drawn, for the file: one column, or both edges of the band."""
@@ -90,17 +90,17 @@ def away(arm: Arm, simulation: Simulation) -> Real:
     return error
 
 
-def root_moment(simulation: Simulation) -> Curve:
+def root_moment(simulation: Simulation) -> TimeCurve:
     """The root moment [N m]."""
     return curve(*continuous(simulation, "root_moment"))
 
 
-def tip(simulation: Simulation) -> Curve:
+def tip(simulation: Simulation) -> TimeCurve:
     """The tip displacement [m]."""
     return curve(*continuous(simulation, "tip_displacement"))
 
 
-def tip_deviation(arm: Arm, simulation: Simulation) -> Curve:
+def tip_deviation(arm: Arm, simulation: Simulation) -> TimeCurve:
     """Tip displacement less where a rigid arm on its reference has it [m]."""
     t, displacement = continuous(simulation, "tip_displacement")
     return curve(t, displacement - arm.reach * reference_angle(simulation.scenario, t))
@@ -116,13 +116,13 @@ def reference_angle(task: Scenario, t: Real) -> Real:
     return angle
 
 
-def curve(t: Real, y: Real) -> Curve:
+def curve(t: Real, y: Real) -> TimeCurve:
     """A line where a page can show one, else a band."""
     if t.size <= MOST_LINE:
-        return Curve(t, y, y, False)
+        return TimeCurve(t, y, y, False)
     step = max(PERIODS * POINTS_A_PERIOD, math.ceil(t.size / BAND_PIECES))
     starts = np.arange(0, t.size, step)
-    return Curve(t[starts], np.minimum.reduceat(y, starts), np.maximum.reduceat(y, starts), True)
+    return TimeCurve(t[starts], np.minimum.reduceat(y, starts), np.maximum.reduceat(y, starts), True)
 
 
 def continuous(simulation: Simulation, signal: str) -> tuple[Real, Real]:
@@ -135,7 +135,7 @@ def continuous(simulation: Simulation, signal: str) -> tuple[Real, Real]:
     return t[order], y[order]
 
 
-def held(simulation: Simulation, values: Real, t: Real) -> Real:
+def held_at(simulation: Simulation, values: Real, t: Real) -> Real:
     """What is held from sample to sample, at the times t [s]."""
     k = np.floor(t / simulation.scenario.period * (1 + 1e-12)).astype(np.int64)
     return values[np.minimum(k, values.size - 1)]

@@ -87,7 +87,7 @@ def _in_z(part: Part, law: Law, period: float) -> LawBlock:
             raise ParameterError(key="rule", value=law.rule, remedy=remedy)
         return matched(block, period)
     if law.rule == "zoh":
-        return held(block, period)
+        return zero_order_hold(block, period)
     return tustin(block, period, law.prewarp)
 
 
@@ -106,7 +106,7 @@ def tustin(block: LawBlock, period: float, prewarp: float = 0.0) -> LawBlock:
     return StateSpace(within @ (unit + A / c), within @ B * (2 / c), C @ within, D + C @ within @ B / c)
 
 
-def held(block: LawBlock, period: float) -> StateSpace:
+def zero_order_hold(block: LawBlock, period: float) -> StateSpace:
     """What the block makes at the samples of signals that are held between them."""
     from scipy.linalg import expm
 

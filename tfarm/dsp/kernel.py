@@ -21,7 +21,7 @@ ENCODER, AMPLIFIER, DAC = 0, 1, 2
 
 
 @compiled
-def read(weights: Any, rates: Any, static: Any, amplitude: Any, rigid: Any, torque: float, out: Any) -> None:
+def read_outputs(weights: Any, rates: Any, static: Any, amplitude: Any, rigid: Any, torque: float, out: Any) -> None:
     """The outputs under the torque that acts now."""
     for o in range(weights.shape[0]):
         value = rates[o, 0] * rigid[0] + rates[o, 1] * rigid[1] + static[o] * torque
@@ -62,7 +62,7 @@ def advance(
         work[1] += abs(done)
         before = after
         if piece[s, 2] > 0.5 and row < fine.shape[0]:
-            read(weights, rates, static, amplitude, rigid, torque, fine[row])
+            read_outputs(weights, rates, static, amplitude, rigid, torque, fine[row])
             row += 1
 
 
@@ -154,7 +154,7 @@ def run(
     for k in range(n):
         acting = held[(k - delay - 1) % ring]
         extra = disturbance[k - 1] if k > 0 else 0.0
-        read(weights, rates, static, amplitude, rigid, acting + extra, record[k])
+        read_outputs(weights, rates, static, amplitude, rigid, acting + extra, record[k])
         if not abs(record[k, 2]) <= bound:
             return k
         clipped = saturated[k]
@@ -199,7 +199,7 @@ def run_law(
     for k in range(n):
         acting = held[(k - delay - 1) % ring]
         extra = disturbance[k - 1] if k > 0 else 0.0
-        read(weights, rates, static, amplitude, rigid, acting + extra, record[k])
+        read_outputs(weights, rates, static, amplitude, rigid, acting + extra, record[k])
         if not abs(record[k, 2]) <= bound:
             return k
         clipped = saturated[k]

@@ -129,15 +129,15 @@ def mode_table(loop: SampledLoop) -> ModeTable:
     )
 
 
-def root_locus(loop: SampledLoop, name: str, values: Real) -> Complex:
+def sampled_root_locus(loop: SampledLoop, name: str, values: Real) -> Complex:
     """Closed-loop poles (values, poles) as one gain takes these values, each column one continuous branch.
 
     The other gains are those of the loop.  Values are taken as they are: give them close enough to tell branches apart.
     """
-    return followed([loop.having(**{name: float(value)}).poles.z for value in values], values)
+    return followed_branches([loop.having(**{name: float(value)}).poles.z for value in values], values)
 
 
-def followed(poles: Sequence[Complex], values: Real) -> Complex:
+def followed_branches(poles: Sequence[Complex], values: Real) -> Complex:
     """The poles at each of the values, in any order, as branches (values, poles)."""
     rows: list[Complex] = []
     for number, z in enumerate(poles):

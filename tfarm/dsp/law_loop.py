@@ -25,7 +25,7 @@ from tfarm.dsp.chain import MOST_DELAY, Chain
 from tfarm.dsp.discretise import discretised
 from tfarm.dsp.law_plant import SensedPlant, is_analog, sensed_plant
 from tfarm.dsp.law_polynomials import VANISHED, polynomials
-from tfarm.dsp.loop import Poles, SampledLoop, polished, without_drift
+from tfarm.dsp.loop import SampledLoop, SampledPoles, polished_poles, without_drift
 from tfarm.dsp.plant import Branching, Plant
 from tfarm.dsp.sampling import PulseTransfer
 from tfarm.errors import ParameterError
@@ -205,12 +205,12 @@ class SampledLaw:
         return max(0, poles + min(n for n, _ in (whole, *fed_back)))
 
     @cached_property
-    def poles(self) -> Poles:
+    def poles(self) -> SampledPoles:
         """The closed-loop poles, polished, those that are at z = 1 for whatever numbers put there."""
-        found = polished(self.eigenvalues, self.pulse, self.characteristic)
+        found = polished_poles(self.eigenvalues, self.pulse, self.characteristic)
         there = np.zeros(found.z.size, np.bool_)
         there[np.argsort(abs(self.eigenvalues - 1), kind="stable")[: self.poles_at_one]] = True
-        return Poles(np.where(there, 1.0, found.z), np.where(there, 0.0, found.log_radius), found.mode)
+        return SampledPoles(np.where(there, 1.0, found.z), np.where(there, 0.0, found.log_radius), found.mode)
 
 
 AnyLoop = TypeVar("AnyLoop", bound=SampledLoop | SampledLaw, default=SampledLoop)  # hub gains, unless a law is said

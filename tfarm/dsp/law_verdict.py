@@ -14,8 +14,8 @@ from tfarm.dsp.discretise import described_law, rule_in_words
 from tfarm.dsp.law_circle import LawCircle
 from tfarm.dsp.law_loop import SampledLaw, sampled_law
 from tfarm.dsp.law_margins import stable_factors
-from tfarm.dsp.margins import DelayMargin, Window, around, delay_margin, whole
-from tfarm.dsp.verdict import MOST_ASKED, UNDAMPED_MODES, Verdict, settled, verdict_answer
+from tfarm.dsp.margins import DelayMargin, Window, around, delay_margin, with_all_modes
+from tfarm.dsp.verdict import MOST_ASKED, UNDAMPED_MODES, Verdict, settled_verdict, verdict_answer
 from tfarm.records import record
 
 
@@ -63,8 +63,8 @@ def law_verdict(arm: Arm, law: Law, chain: Chain | None = None, *, count: int | 
     if arm.has_elastic_link:
         return Verdict(sampled_law(arm, law, chain, count=UNDAMPED_MODES))
     small = sampled_law(arm, law, chain, count=1)
-    largest = whole(arm, small.chain, small.with_modes)
-    return settled(largest, lambda band: LawCircle(band.loop, band.kept, band.missing).outside())
+    largest = with_all_modes(arm, small.chain, small.with_modes)
+    return settled_verdict(largest, lambda band: LawCircle(band.loop, band.kept, band.missing).outside())
 
 
 def analyse_law(arm: Arm, law: Law, chain: Chain | None = None, *, count: int | None = None) -> LawAnalysis:
@@ -73,7 +73,7 @@ def analyse_law(arm: Arm, law: Law, chain: Chain | None = None, *, count: int | 
     return LawAnalysis(verdict, stable_factors(verdict.loop), delay_margin(verdict.loop))
 
 
-def law_answer(analysis: LawAnalysis) -> dict[str, Any]:
+def sampled_law_answer(analysis: LawAnalysis) -> dict[str, Any]:
     """The analysis as a dictionary of plain numbers, texts and lists."""
     verdict, loop = analysis.verdict, analysis.loop
     sampling, bound = loop.chain.sampling, analysis.delay_margin

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, HubFeedback
 from tfarm.crossing.turning import loose
-from tfarm.dsp.law import followed, origins
+from tfarm.dsp.law import followed_branches, origins
 from tfarm.dsp.loop import SampledLoop
 from tfarm.records import record
 
@@ -34,7 +34,7 @@ STRONGER = 10.0  # how many times its own rate gain the locus of that alone goes
 
 @dataclass(frozen=True)
 @record
-class Locus:
+class SampledLocus:
     """One gain's locus, the others those of `law`: `z` (values, branches), and the flexible mode of each branch.
 
     The mode is 0 for one that comes from the hub, a filter or the delay.
@@ -49,14 +49,14 @@ class Locus:
 
 @dataclass(frozen=True)
 @record
-class Loci:
+class SampledLoci:
     """Loci of the rate gain alone, and `by` each of both gains through those of the loop; `poles` [1/s] are the arm's
     own, one a flexible mode, `mode` their numbers.
     """
 
     loop: SampledLoop
-    alone: Locus
-    by: Mapping[str, Locus]
+    alone: SampledLocus
+    by: Mapping[str, SampledLocus]
     poles: Complex
     mode: NDArray[np.int64]
 
@@ -71,7 +71,7 @@ class Loci:
         return bool(at.size and self.poles[at[0]].imag > 2 * math.pi * self.half_rate)
 
 
-def loci(loop: SampledLoop, top: float, moments: tuple[float, float]) -> Loci:
+def sampled_loci(loop: SampledLoop, top: float, moments: tuple[float, float]) -> SampledLoci:
     """The loci of the rate gain from nearly 0 to `top` and of the moment gain over `moments`, the other as it is.
 
     Both begin below the gains of the loop.
@@ -86,10 +86,10 @@ def loci(loop: SampledLoop, top: float, moments: tuple[float, float]) -> Loci:
     small = np.geomspace(1e-3, STRONGER, LOCUS_VALUES) * own
     alone = _locus(loop.under(gains.having(MOMENT_GAIN, 0.0)), RATE_GAIN, small)
     by = {name: _locus(loop, name, each) for name, each in zip(PLANE, values, strict=True)}
-    return Loci(loop, alone, by, loop.pulse.poles[upper], loop.pulse.mode[upper])
+    return SampledLoci(loop, alone, by, loop.pulse.poles[upper], loop.pulse.mode[upper])
 
 
-def _locus(loop: SampledLoop, gain: str, values: Real) -> Locus:
+def _locus(loop: SampledLoop, gain: str, values: Real) -> SampledLocus:
     """The locus at these values, that of the loop, and those between at which a branch turns in its picture."""
 
     def poles(value: float) -> Complex:
@@ -101,7 +101,7 @@ def _locus(loop: SampledLoop, gain: str, values: Real) -> Locus:
     for _ in range(BRANCH_ROUNDS):
         known |= {value: poles(value) for value in wanted.tolist() if value not in known}
         values = np.array(sorted(known))
-        z = followed([known[value] for value in values.tolist()], values)
+        z = followed_branches([known[value] for value in values.tolist()], values)
         bent = loose(np.where((z.imag >= 0) & (abs(z) < DRAWN_RADIUS), z, np.nan).T, 2 * RIM, 2 * RIM)
         if not bent.any():
             break
@@ -109,4 +109,4 @@ def _locus(loop: SampledLoop, gain: str, values: Real) -> Locus:
     first = loop.having(**{gain: float(values[0])})
     origin = origins(first)
     mode = np.where(origin < 0, 0, loop.pulse.mode[origin])
-    return Locus(loop.gains, gain, values, z, mode[[abs(first.poles.z - start).argmin() for start in z[0]]])
+    return SampledLocus(loop.gains, gain, values, z, mode[[abs(first.poles.z - start).argmin() for start in z[0]]])

@@ -44,7 +44,7 @@ FADED_RADIUS = 0.2  # a pole nearer to z = 0 decides nothing and is not polished
 
 @dataclass(frozen=True)
 @record
-class Poles:
+class SampledPoles:
     """Closed-loop poles `z` and `log_radius` ln|z| of each, the z = 1 of a hub angle that nothing regulates left out.
 
     `mode` is the flexible mode of the open-loop pole that is nearest (0: none).
@@ -197,12 +197,12 @@ class SampledLoop:
         return np.linalg.eigvals(self.reduced_matrix()).astype(complex)
 
     @cached_property
-    def poles(self) -> Poles:
+    def poles(self) -> SampledPoles:
         """The closed-loop poles, polished."""
-        return polished(self.eigenvalues, self.pulse, self.characteristic)
+        return polished_poles(self.eigenvalues, self.pulse, self.characteristic)
 
 
-def polished(eigenvalues: Complex, pulse: PulseTransfer, characteristic: Characteristic) -> Poles:
+def polished_poles(eigenvalues: Complex, pulse: PulseTransfer, characteristic: Characteristic) -> SampledPoles:
     """Closed-loop poles from eigenvalues that are nearly right, each as an offset from its nearest open-loop pole."""
     z, open_loop = eigenvalues.copy(), pulse.multipliers
     base = abs(z[:, None] - open_loop).argmin(axis=1)
@@ -215,7 +215,7 @@ def polished(eigenvalues: Complex, pulse: PulseTransfer, characteristic: Charact
         own = pulse.poles[base[bright]].real * pulse.sampling.period
         log_radius[bright] = own + np.log1p(2 * ratio.real + abs(ratio) ** 2) / 2
         z[bright] = open_loop[base[bright]] + offset
-    return Poles(z, log_radius, pulse.mode[base])
+    return SampledPoles(z, log_radius, pulse.mode[base])
 
 
 def _offsets(z: Complex, base: Whole, open_loop: Complex, characteristic: Characteristic) -> Complex:

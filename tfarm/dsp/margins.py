@@ -12,12 +12,12 @@ from scipy.optimize import brentq
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.crossing import joined
-from tfarm.dsp.boundary import circle_grid, crossings
+from tfarm.dsp.boundary import circle_crossings, circle_grid
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.law_loop import AnyLoop, SampledLaw
-from tfarm.dsp.loop import SampledLoop, polished, sampled_loop
+from tfarm.dsp.loop import SampledLoop, polished_poles, sampled_loop
 from tfarm.dsp.plant import Branching
-from tfarm.dsp.sampling import FORGOTTEN, held
+from tfarm.dsp.sampling import FORGOTTEN, held_amplitude
 from tfarm.errors import ConvergenceError
 from tfarm.spectrum import modes_below
 from tfarm.spectrum.damped import COMPANY, LITTLE, Branches, all_damped_modes
@@ -55,7 +55,7 @@ def stable_windows(loop: SampledLoop, name: str) -> list[Window]:
     gain, and where it is zero the poles themselves confirm it.  A gap that rounding tears between crossings of one
     gain has no count of its own.
     """
-    found = crossings(circle_grid(loop), name, loop.gains)
+    found = circle_crossings(circle_grid(loop), name, loop.gains)
     edges, middles = np.r_[-math.inf, found.gain, math.inf], np.zeros(1)  # a gain inside each gap
     if found.gain.size:
         beyond = abs(found.gain).max() or 1.0  # no crossing lies beyond: any distance would do
@@ -87,7 +87,7 @@ def delay_margin(loop: AnySampled) -> DelayMargin:
     def grows(more: float) -> bool:
         later = loop.with_delay(now + more)
         near = later.eigenvalues[abs(later.eigenvalues) > 1 - CLEARLY]
-        return near.size > 0 and polished(near, later.pulse, later.characteristic).log_spectral_radius >= 0
+        return near.size > 0 and polished_poles(near, later.pulse, later.characteristic).log_spectral_radius >= 0
 
     if log_radius(0.0) >= 0:
         return DelayMargin(0.0, False)
@@ -103,7 +103,7 @@ def delay_margin(loop: AnySampled) -> DelayMargin:
 def _delay_step(loop: AnySampled) -> float:
     """A twelfth of the turn, in samples, of the fastest mode whose own damping the feedback could outweigh."""
     plant, T = loop.plant, loop.chain.sampling.period
-    reach = 4 * loop.push * abs(held(plant.poles, T))
+    reach = 4 * loop.push * abs(held_amplitude(plant.poles, T))
     risky = (reach > -plant.poles.real * T) & (plant.poles.imag > 0)
     fastest = (plant.poles.imag[risky] * T).max(initial=np.pi / 4)
     return float(min(0.05, 2 * np.pi / fastest / 12))
@@ -174,15 +174,15 @@ def most_modes(arm: Arm, chain: Chain) -> int:
 
 
 def whole_loop(arm: Arm, gains: HubFeedback, chain: Chain, branches: Branching = all_damped_modes) -> SampledLoop:
-    """The loop of a damped arm with every mode that outlives a sample and a few, or with the first 128: see `whole`."""
+    """The loop of a damped arm with every mode that outlives a sample and a few, or the first 128: `with_all_modes`."""
 
     def loop_of(count: int, branches: Branching) -> SampledLoop:
         return sampled_loop(arm, gains, chain, count=count, branches=branches)
 
-    return whole(arm, chain, loop_of, branches)
+    return with_all_modes(arm, chain, loop_of, branches)
 
 
-def whole(
+def with_all_modes(
     arm: Arm, chain: Chain, loop_of: Callable[[int, Branching], AnyLoop], branches: Branching = all_damped_modes
 ) -> AnyLoop:
     """The loop of a damped arm with as many modes as it takes, `loop_of` giving that with so many.

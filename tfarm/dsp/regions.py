@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tfarm.crossing import Crossings, counts_over, intervals, pieces
 from tfarm.crossing.turning import loose_columns
-from tfarm.dsp.boundary import circle_grid, crossings
+from tfarm.dsp.boundary import circle_crossings, circle_grid
 from tfarm.dsp.loop import SampledLoop
 from tfarm.dsp.margins import Window, stable_windows
 from tfarm.errors import ConvergenceError, ParameterError
@@ -71,8 +71,8 @@ def gain_map(loop: SampledLoop, K1: Sequence[float] | Real, K2: Sequence[float] 
     rows, columns = _ascending("K1", K1), _ascending("K2", K2)
     grid, start = circle_grid(loop), loop.having(K1=_off_the_edge(rows), K2=_off_the_edge(columns))
     first, there = start.gains, np.array([start.poles.unstable])
-    (at_start,) = counts_over(rows, [crossings(grid, "K1", first)], first.K1, there)
-    found = [crossings(grid, "K2", first.having("K1", float(gain))) for gain in rows]
+    (at_start,) = counts_over(rows, [circle_crossings(grid, "K1", first)], first.K1, there)
+    found = [circle_crossings(grid, "K2", first.having("K1", float(gain))) for gain in rows]
     unstable = counts_over(columns, found, first.K2, at_start)
     for i, j in ((0, 0), (-1, 0), (-1, -1)):
         corner = loop.having(K1=float(rows[i]), K2=float(columns[j]))
@@ -84,7 +84,7 @@ def gain_map(loop: SampledLoop, K1: Sequence[float] | Real, K2: Sequence[float] 
     return GainMap(loop, rows, columns, unstable, found)
 
 
-def rounded(plane: GainMap, drawn: Callable[[Real, Real], Complex]) -> GainMap:
+def rounded_map(plane: GainMap, drawn: Callable[[Real, Real], Complex]) -> GainMap:
     """The same region at more values of K1, until its outline has no corner in a picture that the region has not.
 
     `drawn` says where points of the plane are in the picture, 1 high.

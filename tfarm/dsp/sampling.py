@@ -69,13 +69,13 @@ class PulseTransfer:
     @cached_property
     def early(self) -> Complex:
         """What u_{k-d} adds to an amplitude within a sample."""
-        return held(self.poles, (1 - self.sampling.fraction) * self.sampling.period)
+        return held_amplitude(self.poles, (1 - self.sampling.fraction) * self.sampling.period)
 
     @cached_property
     def late(self) -> Complex:
         """What u_{k-d-1} adds, from before the switch."""
         T, f = self.sampling.period, self.sampling.fraction
-        return np.exp(self.poles * ((1 - f) * T)) * held(self.poles, f * T)
+        return np.exp(self.poles * ((1 - f) * T)) * held_amplitude(self.poles, f * T)
 
     @property
     def slopes_at_one(self) -> Real:
@@ -207,7 +207,7 @@ def pulse_transfer(
     return PulseTransfer(undelayed_plant(arm, Chain(sampling=clock), outputs, count), clock)
 
 
-def held(p: Complex, duration: float) -> Complex:
+def held_amplitude(p: Complex, duration: float) -> Complex:
     """(e^{p t} - 1)/p: the amplitude that a unit torque leaves after `duration` t [s]."""
     x = p * duration
     safe = np.where(x == 0, 1.0, x)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 from tfarm.arm import Arm, HubFeedback
-from tfarm.dsp.band import Band, band_of
+from tfarm.dsp.band import Band, complete_band
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.circle import Circle
 from tfarm.dsp.loop import SampledLoop, resized
@@ -189,7 +189,7 @@ def _most(loop: SampledLoop) -> int:
 
 def proof_of(loop: SampledLoop) -> Proof:
     """Whether a loop is stable with every mode of its band."""
-    band = band_of(loop)
+    band = complete_band(loop)
     if band is None:
         return None, 0.0
     count = band.circle().count(loop.gains)

@@ -18,7 +18,7 @@ from tfarm.dsp.chain import Chain
 from tfarm.dsp.converters import quantisers
 from tfarm.dsp.loop import check_loop
 from tfarm.dsp.plant import RECORDED, Plant, filtered, undelayed_plant
-from tfarm.dsp.sampling import held
+from tfarm.dsp.sampling import held_amplitude
 from tfarm.dsp.scenarios import Scenario
 from tfarm.errors import ParameterError
 from tfarm.records import record
@@ -197,7 +197,7 @@ class Simulator:
         for k in range(state.torque.size):
             acting = state.held[(k - d - 1) % ring]
             extra = disturbance[k - 1] if k else 0.0
-            kernel.read(weights, rates, static, state.amplitude, state.rigid, acting + extra, state.record[k])
+            kernel.read_outputs(weights, rates, static, state.amplitude, state.rigid, acting + extra, state.record[k])
             if not abs(state.record[k, 2]) <= self._bound:
                 return self._result(state, k, gain)
             u, K = rule(self._measurement(k, state, memory, single))
@@ -313,7 +313,7 @@ def _tables(plant: Plant, kept: NDArray[np.int64], chain: Chain, between: int) -
     starts = np.r_[0.0, ends[:-1]]
     piece = np.c_[ends - starts, starts >= f * T, np.isin(ends, records)].astype(float)
     turn = np.exp(p * piece[:, :1])
-    push = np.array([held(p, float(duration)) for duration in piece[:, 0]])
+    push = np.array([held_amplitude(p, float(duration)) for duration in piece[:, 0]])
     weights = np.ascontiguousarray(plant.residues[:, kept] * weight)
     row = plant.outputs.index("hub_angle", 3)
     hub = np.r_[plant.rigid[row], weights[row]].astype(complex)

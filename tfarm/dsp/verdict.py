@@ -10,7 +10,7 @@ from typing import Any, Generic
 from tfarm.arm import LISTED, MOMENT_GAIN, PLANE, RATE_GAIN, TAKEN_OFF, Arm, HubFeedback, driven, unit_of
 from tfarm.arm.checks import whole
 from tfarm.columns import Table
-from tfarm.dsp.band import Band, band_of
+from tfarm.dsp.band import Band, complete_band
 from tfarm.dsp.chain import Chain, Sampling
 from tfarm.dsp.law import SAMPLED_MODE_COLUMNS, ModeTable, growing_mode, mode_table
 from tfarm.dsp.law_loop import AnyLoop, SampledLaw
@@ -125,12 +125,12 @@ def sampled_verdict(arm: Arm, gains: HubFeedback, chain: Chain | None = None, *,
     if arm.has_elastic_link:
         return Verdict(sampled_loop(arm, gains, chain, count=UNDAMPED_MODES))
     check_loop(arm, gains)
-    return settled(whole_loop(arm, gains, chain), lambda band: band.circle().count(gains))
+    return settled_verdict(whole_loop(arm, gains, chain), lambda band: band.circle().count(gains))
 
 
-def settled(largest: AnyLoop, outside: Callable[[Band[AnyLoop]], int | None]) -> Verdict[AnyLoop]:
+def settled_verdict(largest: AnyLoop, outside: Callable[[Band[AnyLoop]], int | None]) -> Verdict[AnyLoop]:
     """The verdict on a damped arm by as few modes as it takes, from the loop with all: `outside` counts its poles."""
-    band = band_of(largest)
+    band = complete_band(largest)
     full = largest if band is None else band.full
     proven, radius = None if band is None else outside(band), full.poles.log_spectral_radius
     for loop in _growing(full):

@@ -17,11 +17,11 @@ from typing import Any
 import flint
 
 from .closed_form import fields_from_root, from_transition
-from .coefficients import Coefficients, Condition
-from .compiled import plain
+from .coefficients import Coefficients, EndCondition
+from .compiled import python_of
 from .outputs import Output, Quantity, unit_scale
 
-_algebra, _fields = plain(from_transition), plain(fields_from_root)
+_algebra, _fields = python_of(from_transition), python_of(fields_from_root)
 Ball = Any  # flint.acb or flint.arb, which come without types
 
 
@@ -76,21 +76,21 @@ class State:
         S, over_d = self.S, 1 / self.d
         self.z_sum = S * (self.b + self.a * over_d)
         self.z_product = S * (self.a * self.b * S + self.g) * over_d
-        mass, inertia = Condition.of(k.tip_mass), Condition.of(k.tip_inertia)
+        mass, inertia = EndCondition.of(k.tip_mass), EndCondition.of(k.tip_inertia)
         F0, F1, F2, F3 = transition(self.z_sum, self.z_product, flint.arb(1))
         self.theta, self.M0, self.Q0, self.W1, self.Y1 = _algebra(
             F0, F1, F2, F3, F2 - 1, S, over_d, self.a, self.b, self.g, self.sigma,
             self.end(mass), rational(mass.force), self.end(inertia), rational(inertia.force),
         )  # fmt: skip
 
-    def end(self, condition: Condition) -> Ball:
+    def end(self, condition: EndCondition) -> Ball:
         """rest + inertia s^2 of an end condition."""
         return rational(condition.rest) + rational(condition.inertia) * self.S
 
     @cached_property
     def input(self) -> Ball:
         """The torque behind this response, or the hub angle where the hub is locked: zero at a pole."""
-        hub = Condition.of(self.k.hub_inertia)
+        hub = EndCondition.of(self.k.hub_inertia)
         drive = self.end(hub) * self.theta - rational(hub.force) * self.M0
         return drive if hub.rest else drive / rational(hub.force)
 
@@ -123,6 +123,6 @@ class State:
         return output.constant(self.k, x) is not None or not self.input.contains(0)
 
 
-def nearest(ball: Ball) -> complex:
+def nearest_float(ball: Ball) -> complex:
     """The complex float at the middle of a ball."""
     return complex(float(ball.real.mid()), float(ball.imag.mid()))

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from tfarm.records import record
 
-from .coefficients import Condition, Inertia, double_double
+from .coefficients import EndCondition, Inertia, double_double
 from .elements import Body, Drive, Element, Mark, Offset, Place, Segment, Spring
 
 SEGMENT, OFFSET, SPRING, BODY, MARK = range(5)
@@ -34,7 +34,7 @@ TIP, OF_ANGLE, OF_MOMENT = 0, 6, 10  # of the vector of ends: six numbers of the
 
 @dataclass(frozen=True, kw_only=True)
 @record
-class Chain:
+class ElementChain:
     """A rig: its elements from the payload inwards, the conditions of both ends, and the units.
 
     `gauge` is where the moment that a law feeds back is read; `radius` and `offset` of hub and payload are shares of
@@ -115,7 +115,7 @@ class Chain:
         """The SI value of one unit of the input."""
         return self.drive.unit
 
-    def with_damping(self, share: float) -> Chain:
+    def with_damping(self, share: float) -> ElementChain:
         """The chain with so much of every damper: of C, of the dashpots, and of what the drive has in odd powers."""
         parts: list[Element] = [
             each._replace(damping=each.damping * share) if isinstance(each, Segment | Spring) else each
@@ -137,20 +137,20 @@ class Layout:
     `elements` run from the payload inwards.
     """
 
-    def __init__(self, chain: Chain, places: tuple[Place, ...]) -> None:
+    def __init__(self, chain: ElementChain, places: tuple[Place, ...]) -> None:
         self.chain, self.places = chain, places
         self.elements = _marked(chain.elements, places)
 
     @cached_property
     def rows(self) -> NDArray[np.float64]:
         """The elements, which balls have no use for (elements, `ROW_WIDTH`)."""
-        return np.array([row_of(each) for each in self.elements]).reshape(-1, ROW_WIDTH)
+        return np.array([kernel_row(each) for each in self.elements]).reshape(-1, ROW_WIDTH)
 
     @cached_property
     def ends(self) -> NDArray[np.float64]:
         """Payload and drive (12,)."""
         chain = self.chain
-        tip = [Condition.of(inertia) for inertia in (chain.tip_mass, chain.tip_inertia)]
+        tip = [EndCondition.of(inertia) for inertia in (chain.tip_mass, chain.tip_inertia)]
         numbers = [number for end in tip for number in (end.rest, end.inertia, end.force)]
         return np.array([*map(float, (*numbers, *chain.drive.of_angle, *chain.drive.of_moment))])
 
@@ -197,7 +197,7 @@ def _marked(elements: Sequence[Element], places: tuple[Place, ...]) -> tuple[Ele
     return (*result, *map(Mark, marks))
 
 
-def row_of(element: Element) -> list[float]:
+def kernel_row(element: Element) -> list[float]:
     """An element as a row of the kernel."""
     match element:
         case Segment():

@@ -27,8 +27,8 @@ from .vector import SIGMA, A, B, G
 FREE_MOTIONS = 12  # where the vector of ends says how many motions the payload leaves the tip
 
 
-def counted(layout: Layout) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Rows and ends of a layout without damping, for `count_below` and `bisect`."""
+def rows_to_count(layout: Layout) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Rows and ends of a layout without damping, for `chain_count` and `bisect`."""
     chain = layout.chain
     free = sum(not isinstance(end, float) for end in (chain.tip_mass, chain.tip_inertia))
     return layout.rows, np.r_[layout.ends, float(free)]
@@ -41,7 +41,7 @@ def _clamped(number: int, value: float, step: int) -> int:
 
 
 @compiled
-def count_below(omega: float, rows: Any, ends: Any, plane: Any) -> int:
+def chain_count(omega: float, rows: Any, ends: Any, plane: Any) -> int:
     """How many natural frequencies lie below omega [rad/s], the rigid-body mode included; `plane` (5,) is worked in."""
     S = -omega * omega
     p = end_plane(ends[0] + ends[1] * S, ends[2], ends[3] + ends[4] * S, ends[5])
@@ -104,11 +104,11 @@ def _joined(outside: int, omega: float, row: Any, plane: Any, free: int) -> int:
 
 
 @compiled
-def counts(omega: Any, rows: Any, ends: Any) -> Any:
-    """`count_below` at every omega (1-D)."""
+def chain_counts(omega: Any, rows: Any, ends: Any) -> Any:
+    """`chain_count` at every omega (1-D)."""
     found, plane = np.empty(omega.size, np.int64), np.empty(5)
     for i in range(omega.size):
-        found[i] = count_below(omega[i], rows, ends, plane)
+        found[i] = chain_count(omega[i], rows, ends, plane)
     return found
 
 
@@ -121,7 +121,7 @@ def bisect_chain(number: Any, rows: Any, ends: Any, low: Any, high: Any) -> None
             middle = 0.5 * (low[i] + high[i])
             if not (low[i] < middle and middle < high[i]):
                 break
-            if count_below(middle, rows, ends, plane) >= number[i]:
+            if chain_count(middle, rows, ends, plane) >= number[i]:
                 high[i] = middle
             else:
                 low[i] = middle

@@ -13,8 +13,8 @@ import flint
 
 from .balls import rational, transition
 from .chain import Layout
-from .coefficients import Condition, Inertia
-from .compiled import plain
+from .coefficients import EndCondition, Inertia
+from .compiled import python_of
 from .compound import (
     Plane,
     Row,
@@ -32,10 +32,18 @@ from .compound import (
 )
 from .elements import Body, Drive, Element, Mark, Offset, Segment, Spring
 
-_end_plane, _inside_offset, _inside_spring = plain(end_plane), plain(inside_offset), plain(inside_spring)
-_inside_body, _across_rows, _transition_rows = plain(inside_body), plain(across_rows), plain(transition_rows)
-_beyond_offset, _beyond_spring, _beyond_body = plain(beyond_offset), plain(beyond_spring), plain(beyond_body)
-_row_across, _met = plain(row_across), plain(met)
+_end_plane, _inside_offset, _inside_spring = python_of(end_plane), python_of(inside_offset), python_of(inside_spring)
+_inside_body, _across_rows, _transition_rows = (
+    python_of(inside_body),
+    python_of(across_rows),
+    python_of(transition_rows),
+)
+_beyond_offset, _beyond_spring, _beyond_body = (
+    python_of(beyond_offset),
+    python_of(beyond_spring),
+    python_of(beyond_body),
+)
+_row_across, _met = python_of(row_across), python_of(met)
 
 
 class Sweep:
@@ -78,7 +86,7 @@ class Sweep:
         return rational(number)
 
     def _end(self, inertia: Inertia) -> tuple[Any, Any]:
-        condition = Condition.of(inertia)
+        condition = EndCondition.of(inertia)
         return self.S * self.exact(condition.inertia) + self.exact(condition.rest), self.exact(condition.force)
 
     def _inside(self, element: Element, p: Plane) -> Plane:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from tfarm.errors import ParameterError
 
 from .balls import Ball, precision, rational
-from .chain import Chain, Layout
+from .chain import ElementChain, Layout
 from .chain_balls import Sweep
 from .elements import Place
 from .jets import Jet
@@ -69,7 +69,7 @@ class Readings:
         ], dtype=float).reshape(-1, 9)  # fmt: skip
 
 
-class Free(NamedTuple):
+class ChainFree(NamedTuple):
     """Drive (n,) and outputs (rows, n) of the free response times e^{-scale}, and where digits are lost."""
 
     drive: Complex
@@ -78,7 +78,7 @@ class Free(NamedTuple):
     lost: NDArray[np.bool_]
 
 
-def reading_of(chain: Chain, wanted: Output, x: float) -> Reading:
+def reading_of(chain: ElementChain, wanted: Output, x: float) -> Reading:
     """An output as weights; x is the share of the length for one along the link."""
     share = Fraction(wanted.share(x))
     weights: dict[str, tuple[Fraction | int, ...]] = {
@@ -103,7 +103,7 @@ def reading_of(chain: Chain, wanted: Output, x: float) -> Reading:
     return Reading(place, state, theta.get(wanted.quantity, Fraction(0)), wanted.power, wanted.gauge, unit)
 
 
-def _strain_unit(chain: Chain, place: Place) -> Fraction:
+def _strain_unit(chain: ElementChain, place: Place) -> Fraction:
     """Strain at the surface per moment without dimensions and unit of the input: half the depth over E I/L."""
     (segment,) = chain.at((place,)).read
     if segment.half_depth is None:
@@ -112,7 +112,7 @@ def _strain_unit(chain: Chain, place: Place) -> Fraction:
     return Fraction(segment.half_depth) / chain.length / segment.stiffness / chain.input_unit
 
 
-def readings(chain: Chain, wanted: tuple[Output, ...], x: float) -> Readings:
+def readings(chain: ElementChain, wanted: tuple[Output, ...], x: float) -> Readings:
     """The outputs of a chain, laid out: once for each chain."""
     key = wanted, x
     if key not in chain.kept:
@@ -121,19 +121,19 @@ def readings(chain: Chain, wanted: tuple[Output, ...], x: float) -> Readings:
     return found
 
 
-def laid_out(chain: Chain, wanted: Sequence[Output], shares: Sequence[float]) -> Readings:
+def laid_out(chain: ElementChain, wanted: Sequence[Output], shares: Sequence[float]) -> Readings:
     """Outputs of a chain, each with its own share of the length, laid out anew."""
     each = tuple(reading_of(chain, one, x) for one, x in zip(wanted, shares, strict=True))
     places = tuple(dict.fromkeys(one.place for one in each if one.place is not None))
     return Readings(chain.at(places), each)
 
 
-def free_outputs(chain: Chain, wanted: Sequence[Output], s: Complex, x: float) -> Free:
+def free_outputs(chain: ElementChain, wanted: Sequence[Output], s: Complex, x: float) -> ChainFree:
     """The free response at s (1-D): outputs in SI per unit of the input that the drive is."""
     return _free(readings(chain, tuple(wanted), x), s)
 
 
-def _free(those: Readings, s: Complex) -> Free:
+def _free(those: Readings, s: Complex) -> ChainFree:
     found, lost = np.empty((2 + len(those.each), s.size), complex), np.empty(s.size, bool)
     fill_free(np.ascontiguousarray(s, dtype=complex), those.layout.rows, those.layout.ends, those.table, found, lost)
     drive = those.layout.chain.drive
@@ -141,10 +141,10 @@ def _free(those: Readings, s: Complex) -> Free:
         if one.is_current:  # the row holds theta: what is left of the input after back-EMF turns the hub
             unit, back = float(one.unit) * s**one.power, float(drive.back_emf) * s
             found[2 + row] = (unit * found[0] - back * found[2 + row]) / (1.0 + float(drive.lag) * s)
-    return Free(found[0], found[2:], found[1], lost)
+    return ChainFree(found[0], found[2:], found[1], lost)
 
 
-def free_slopes(chain: Chain, wanted: Sequence[Output], s: Complex, x: float) -> tuple[Free, Free]:
+def free_slopes(chain: ElementChain, wanted: Sequence[Output], s: Complex, x: float) -> tuple[ChainFree, ChainFree]:
     """The free response and its derivative at s (1-D), by Cauchy's integral on a circle that is right to rounding."""
     those = readings(chain, tuple(wanted), x)
     here = _free(those, s)
@@ -155,10 +155,10 @@ def free_slopes(chain: Chain, wanted: Sequence[Output], s: Complex, x: float) ->
     factor = np.exp(around.scale.reshape(-1, SLOPE_CIRCLE.size) - here.scale[:, None]) / SLOPE_CIRCLE / radius[:, None]
     drive = (around.drive.reshape(factor.shape) * factor).mean(axis=1)
     outputs = (around.outputs.reshape(-1, *factor.shape) * factor).mean(axis=2)
-    return here, Free(drive, outputs, here.scale, here.lost)
+    return here, ChainFree(drive, outputs, here.scale, here.lost)
 
 
-def free_fields(chain: Chain, s: Complex, places: Sequence[Place]) -> tuple[NDArray[Any], NDArray[Any], Complex]:
+def free_fields(chain: ElementChain, s: Complex, places: Sequence[Place]) -> tuple[NDArray[Any], NDArray[Any], Complex]:
     """W, Psi, M, Q (4, s, places) and hub angle (s,) times e^{-scale}, and scale: dimensionless."""
     layout = chain.at(tuple(dict.fromkeys(places)))
     order = [layout.places.index(place) for place in places]
@@ -176,7 +176,7 @@ def free_fields(chain: Chain, s: Complex, places: Sequence[Place]) -> tuple[NDAr
 class ChainState:
     """The free response of a chain at one s in balls, as `balls.State` is of an arm."""
 
-    def __init__(self, chain: Chain, s: Any, *, slow: bool = False) -> None:
+    def __init__(self, chain: ElementChain, s: Any, *, slow: bool = False) -> None:
         self.chain, self.s, self._sweep = chain, s, SlowSweep if slow else Sweep
         self.input = self._sweep(chain.at(), s).input
 
@@ -228,12 +228,14 @@ class SlowSweep(Sweep):
         return tuple(sums)
 
 
-def expansions(chain: Chain, wanted: Sequence[Output], x: float) -> list[tuple[float, float, float, float]]:
+def expansions(chain: ElementChain, wanted: Sequence[Output], x: float) -> list[tuple[float, float, float, float]]:
     """Coefficients of s^-2, s^-1, 1 and s in each output's expansion at s = 0."""
     return [(each[0], each[1], each[2], each[3]) for each in series_at_zero(chain, wanted, x)]
 
 
-def series_at_zero(chain: Chain, wanted: Sequence[Output], x: float, terms: int = SERIES_ORDER) -> list[list[float]]:
+def series_at_zero(
+    chain: ElementChain, wanted: Sequence[Output], x: float, terms: int = SERIES_ORDER
+) -> list[list[float]]:
     """Coefficients from s^-2 on in each output's expansion at s = 0, `terms` less two of them at least."""
     with precision(SERIES_BITS):
         s = Jet([rational(0), rational(1), *[rational(0)] * (terms - 2)])
@@ -247,7 +249,7 @@ def series_at_zero(chain: Chain, wanted: Sequence[Output], x: float, terms: int 
     return found
 
 
-def order_at_zero(chain: Chain, wanted: Output | None, x: float = 0.0) -> int:
+def order_at_zero(chain: ElementChain, wanted: Output | None, x: float = 0.0) -> int:
     """How often an output of the free response vanishes at s = 0; the drive itself for None."""
     with precision(SERIES_BITS):
         s = Jet([rational(0), rational(1), *[rational(0)] * (SERIES_ORDER - 2)])

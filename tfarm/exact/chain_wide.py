@@ -14,10 +14,10 @@ from typing import Any
 import flint
 
 from .balls import Ball, rational
-from .chain import Chain
+from .chain import ElementChain
 from .chain_balls import Sweep, drive_of, into_own, out_of_own
 from .chain_values import readings
-from .compiled import plain
+from .compiled import python_of
 from .compound import Plane, Row, across_waves, transition_rows
 from .elements import Element, Segment
 from .outputs import Output
@@ -25,7 +25,7 @@ from .outputs import Output
 Series = Any  # flint.acb_series, which comes without types
 Waves = Callable[[Segment, Series, Series], tuple[tuple[Series, ...], tuple[Series, ...]] | None]
 
-_across_waves, _transition_rows = plain(across_waves), plain(transition_rows)
+_across_waves, _transition_rows = python_of(across_waves), python_of(transition_rows)
 
 SLOW_WAVES = 6.0  # |z1| + |z2| below which a segment is crossed by power series
 WIDE_TERMS = 40  # of them: of arguments up to twice that the tail is below 1e-60
@@ -108,7 +108,7 @@ def _size(series: Series) -> Ball:
 
 
 def swept(
-    chain: Chain, s: Series, wanted: Sequence[Output], waves: Waves
+    chain: ElementChain, s: Series, wanted: Sequence[Output], waves: Waves
 ) -> tuple[Series, list[Series], Series] | None:
     """Drive, outputs (SI, of the free response) and phase at the series s; None where waves cannot be told apart."""
     those = readings(chain, tuple(wanted), 0.0)

@@ -7,12 +7,12 @@ from fractions import Fraction
 
 from tfarm.arm import Arm, Attachment, Link, RotarySpring, Theory
 
-from .chain import Chain
+from .chain import ElementChain
 from .coefficients import scaled_inertia, stiffness_of, uniform
 from .elements import Body, Drive, Element, Offset, Place, Segment, Spring
 
 
-def chain_of(arm: Arm, theory: Theory | None = None) -> Chain:
+def chain_of(arm: Arm, theory: Theory | None = None) -> ElementChain:
     """The chain of an arm under its own theory, or another."""
     theory = theory or arm.theory
     unit_length, EI = sum((Fraction(link.length) for link in arm.links), Fraction(0)), stiffness_of(arm.link)
@@ -43,11 +43,11 @@ def chain_of(arm: Arm, theory: Theory | None = None) -> Chain:
     pieces += _springs(arm.clamp, rotation)
     pieces += [Offset(Fraction(arm.hub.radius) / unit_length)] if arm.hub.radius else []
     pieces += _springs(arm.joint, rotation)
-    return Chain(
+    return ElementChain(
         elements=tuple(pieces),
         tip_mass=scaled_inertia(arm.payload.mass, translation),
         tip_inertia=scaled_inertia(arm.payload.inertia, rotation),
-        drive=drive_of(arm, rotation),
+        drive=hub_drive(arm, rotation),
         radius=Fraction(arm.hub.radius) / unit_length,
         offset=Fraction(arm.payload.offset) / unit_length,
         gauge=Place(min(Fraction(arm.gauge.x) / unit_length, Fraction(1)), arm.gauge.side),
@@ -56,7 +56,7 @@ def chain_of(arm: Arm, theory: Theory | None = None) -> Chain:
     )
 
 
-def drive_of(arm: Arm, rotation: Fraction) -> Drive:
+def hub_drive(arm: Arm, rotation: Fraction) -> Drive:
     """The drive of an arm's input; `rotation` is L/EI."""
     hub, motor, none = arm.hub, arm.motor, Fraction(0)
     if arm.is_locked:

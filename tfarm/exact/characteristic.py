@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 
 from tfarm.arm import GAINS, HubFeedback
 
-from .chain import Chain
+from .chain import ElementChain
 from .chain_values import free_outputs, free_slopes
-from .compiled import compiled, inlined, plain
+from .compiled import compiled, inlined, python_of
 from .dispersion import quotient, reciprocal
 from .free import free_response
 from .jets import Jet
@@ -67,7 +67,7 @@ def numerators(s: Any, over_d: Any, theta: Any, M0: Any) -> Any:
     return theta, s * theta, M0 * over_d
 
 
-NUMERATORS = plain(numerators)
+NUMERATORS = python_of(numerators)
 
 
 def torque(gains: Iterable[Any], fed_back: Iterable[Any]) -> Any:
@@ -98,7 +98,7 @@ class LoopParts(NamedTuple):
 
 def characteristic(k: System, s: Complex, gains: Gains = NO_GAINS, at_zero: int = 0) -> Analytic:
     """D(s)/s^at_zero and its derivative at s (1-D, complex), in float64."""
-    if isinstance(k, Chain):
+    if isinstance(k, ElementChain):
         used = [each for each, gain in zip(FED, gains, strict=True) if gain]
         here, slopes = free_slopes(k, used, s, 0.0)
         units = [float(gain / unit) for gain, unit in zip(gains, unit_gains(k), strict=True) if gain]  # outputs are SI
@@ -127,7 +127,7 @@ def quick_characteristic(k: System, s: Complex, gains: Gains = NO_GAINS, at_zero
 
 def quick_characteristics(k: System, s: Complex, rows: Real, at_zero: int = 0) -> Analytic:
     """`quick_characteristic` with gains of their own at each point: rows (gains, n) or (gains, 1), dimensionless."""
-    if isinstance(k, Chain):
+    if isinstance(k, ElementChain):
         s = np.asarray(s, dtype=complex)
         h = difference_steps(k, s)
         at = np.array([s, s + h, s - h])
@@ -174,7 +174,7 @@ def fill_characteristics(s: Any, k: Any, rows: Any, at_zero: int, found: Any) ->
 
 def loop_parts(k: System, s: NDArray[Any]) -> LoopParts:
     """Drive, numerators and scale at s: what a law makes of them is linear, D = drive + torque(gains, numerators)."""
-    if isinstance(k, Chain):
+    if isinstance(k, ElementChain):
         free = free_outputs(k, FED, np.asarray(s, dtype=complex).ravel(), 0.0)
         numerators = free.outputs / float_units(k)
         return LoopParts(*(part.reshape(*part.shape[:-1], *s.shape) for part in (free.drive, numerators, free.scale)))

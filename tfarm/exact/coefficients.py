@@ -22,7 +22,7 @@ Inertia = Fraction | float  # a fraction, or math.inf
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Condition:
+class EndCondition:
     """An end condition  (rest + inertia s^2) motion + force_weight force = 0, scaled to stay near one.
 
     A finite dimensionless inertia n gives (0, n, 1)/(1 + n), an infinite one (1, 0, 0): motion = 0.
@@ -34,7 +34,7 @@ class Condition:
 
     @classmethod
     @lru_cache(maxsize=64)  # a proof asks for the same three at every step of its contour
-    def of(cls, inertia: Inertia) -> Condition:
+    def of(cls, inertia: Inertia) -> EndCondition:
         """The condition of a body of that dimensionless inertia (0..inf)."""
         if not isinstance(inertia, Fraction):
             return cls(rest=Fraction(1), inertia=Fraction(0), force=Fraction(0))
@@ -109,7 +109,7 @@ class Coefficients:
     def kernel(self) -> NDArray[np.float64]:
         """The vector that the compiled functions of `waves` read (see `vector`)."""
         split = [part for value in (self.a, self.b, self.g) for part in double_double(value)]
-        ends = [Condition.of(inertia) for inertia in (self.tip_mass, self.tip_inertia, self.hub_inertia)]
+        ends = [EndCondition.of(inertia) for inertia in (self.tip_mass, self.tip_inertia, self.hub_inertia)]
         numbers = [float(number) for end in ends for number in (end.rest, end.inertia, end.force)]
         gain = 1.0 if self.is_locked else float(ends[2].force)
         return np.array([*split, float(self.sigma), self.damping, *numbers, gain])

@@ -36,11 +36,11 @@ def inlined(function: _Function) -> _Function:
     return njit(error_model="numpy", forceinline=True)(function)
 
 
-def plain(function: Callable[..., Any]) -> Callable[..., Any]:
+def python_of(function: Callable[..., Any]) -> Callable[..., Any]:
     """The Python function behind a compiled one, with those it calls, for numbers that numba does not know."""
     python: Any = getattr(function, "py_func", function)
     called = {name: python.__globals__[name] for name in python.__code__.co_names if name in python.__globals__}
-    replaced = {name: plain(value) for name, value in called.items() if hasattr(value, "py_func")}
+    replaced = {name: python_of(value) for name, value in called.items() if hasattr(value, "py_func")}
     if not replaced:
         return python
     return FunctionType(python.__code__, python.__globals__ | replaced, python.__name__)

@@ -8,7 +8,7 @@ from fractions import Fraction
 from tfarm.errors import CertificationError
 
 from .balls import Ball, State, point, precision, rational
-from .chain import Chain
+from .chain import ElementChain
 from .chain_values import ChainState
 from .outputs import Output
 from .system import System
@@ -18,7 +18,7 @@ MOST_ENCLOSURE_BITS = 1 << 18  # of working precision: at a pole no number of th
 
 def state_of(k: System, s: Ball) -> State | ChainState:
     """The free response at s, to read outputs of."""
-    return ChainState(k, s) if isinstance(k, Chain) else State(k, s)
+    return ChainState(k, s) if isinstance(k, ElementChain) else State(k, s)
 
 
 def enclose(k: System, wanted: Output, s: complex, *, bits: int, x: float = 0.0) -> Ball:

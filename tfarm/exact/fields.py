@@ -25,18 +25,18 @@ from .closed_form import (
     transition_series,
 )
 from .coefficients import Coefficients
-from .compiled import plain
+from .compiled import python_of
 from .vector import HUB_REST, TIP_MASS
 from .waves import evaluate, separated
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 Tip = tuple[Any, float, Any, float]  # tip_mass, shear, tip_inertia, moment
 _ROOT = np.array([[0, 0, 0, 1.0], [1, 0, 0, 1.0], [2, 0, 0, 1.0]])  # theta, M0, Q0 as `evaluate` wants them
-_ends = plain(from_transition)
-_fields = plain(fields_from_root)
-_minors = plain(from_waves)
-_transition = plain(transition_series)
-_even = plain(even_functions)
+_ends = python_of(from_transition)
+_fields = python_of(fields_from_root)
+_minors = python_of(from_waves)
+_transition = python_of(transition_series)
+_even = python_of(even_functions)
 
 
 class Wave(NamedTuple):

@@ -24,15 +24,15 @@ from .closed_form import (
     transition_series,
 )
 from .coefficients import Coefficients
-from .compiled import plain
+from .compiled import python_of
 from .fields import Wave, tip_condition, waves
 from .jets import Jet
 from .vector import HUB_REST
 from .waves import PARALLEL
 
 Complex = NDArray[np.complexfloating[Any, Any]]
-_from_waves, _from_transition = plain(from_waves), plain(from_transition)
-_transition, _fields = plain(transition_series), plain(fields_from_root)
+_from_waves, _from_transition = python_of(from_waves), python_of(from_transition)
+_transition, _fields = python_of(transition_series), python_of(fields_from_root)
 
 
 class Free(NamedTuple):

@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 
 from tfarm.errors import ParameterError
 
-from .chain import Chain
+from .chain import ElementChain
 from .chain_balls import Sweep, into_own, out_of_own
 from .chain_values import Reading, laid_out
 from .closed_form import SERIES_RADIUS, even_functions, transition_series
-from .compiled import plain
+from .compiled import python_of
 from .compound import Plane, Row, across_waves, met, row_across_waves
 from .elements import Drive, Element, Mark, Segment
 from .free import sinhc_slope
@@ -34,21 +34,21 @@ from .outputs import Output
 Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
 
-_across_waves, _row_across_waves, _met = plain(across_waves), plain(row_across_waves), plain(met)
-_transition_series, _even_functions = plain(transition_series), plain(even_functions)
+_across_waves, _row_across_waves, _met = python_of(across_waves), python_of(row_across_waves), python_of(met)
+_transition_series, _even_functions = python_of(transition_series), python_of(even_functions)
 
 
 class Direction(NamedTuple):
     """A parameter a step below and a step above its value, as the chains of both, and what the two differ by."""
 
-    below: Chain
-    above: Chain
+    below: ElementChain
+    above: ElementChain
     shares_below: tuple[float, ...]  # where each output is then, as a share of the length
     shares_above: tuple[float, ...]
     width: float
 
 
-class Wave(NamedTuple):
+class JetWave(NamedTuple):
     """A pair of waves of a segment, as jets: z = t^2, v = z - b S, cosh t and sinh t/t times the scale e = e^{-t}.
 
     The scale is a constant: it has no slopes, so that it drops out of a ratio with those of the numbers it is in.
@@ -63,7 +63,7 @@ class Wave(NamedTuple):
 
 
 def response_gradients(
-    chain: Chain, wanted: Sequence[Output], shares: Sequence[float], directions: Sequence[Direction], s: Complex
+    chain: ElementChain, wanted: Sequence[Output], shares: Sequence[float], directions: Sequence[Direction], s: Complex
 ) -> tuple[Jet, list[Jet]]:
     """Drive and outputs (SI) of the free response at s (1-D), up to one factor that all of them share.
 
@@ -112,7 +112,7 @@ class _Ends(NamedTuple):
 
 
 def _with_slopes(
-    chain: Chain, wanted: Sequence[Output], shares: Sequence[float], directions: Sequence[Direction]
+    chain: ElementChain, wanted: Sequence[Output], shares: Sequence[float], directions: Sequence[Direction]
 ) -> Slopes:
     here = laid_out(chain, wanted, shares)
     below = [laid_out(each.below, wanted, each.shares_below) for each in directions]
@@ -187,7 +187,7 @@ class GradientSweep(Sweep):
     def __init__(self, layout: Any, s: Jet, slow: Sequence[bool]) -> None:
         segments = [each for each in layout.elements if isinstance(each, Segment)]
         self._slow = {id(each): is_slow for each, is_slow in zip(segments, slow, strict=True)}
-        self._waves: dict[int, tuple[Wave, Wave]] = {}
+        self._waves: dict[int, tuple[JetWave, JetWave]] = {}
         super().__init__(layout, s)
 
     def exact(self, number: Any) -> Any:
@@ -263,7 +263,7 @@ class GradientSweep(Sweep):
     def _functions(self, z_sum: Any, z_product: Any) -> tuple[Any, ...]:
         return tuple(_transition_series(z_sum, z_product)[:4])
 
-    def _separated(self, segment: Any) -> tuple[Wave, Wave, Jet, Jet]:
+    def _separated(self, segment: Any) -> tuple[JetWave, JetWave, Jet, Jet]:
         """Both waves of a segment, g S and d."""
         gS, d = self.S * segment.g, self.s * segment.damping + 1.0
         if id(segment) not in self._waves:
@@ -289,7 +289,7 @@ def _root(z: Jet) -> Jet:
     return Jet([root, z.c[1] / (2 * root)])
 
 
-def _wave(z: Jet, bS: Jet) -> Wave:
+def _wave(z: Jet, bS: Jet) -> JetWave:
     """A pair of waves by its z; the derivative of sinh t/t is (cosh t - sinh t/t)/(2 z), a series where z is small."""
     t = _root(z)
     e, is_far = np.exp(-t.c[0]), abs(z.c[0]) > 1.0
@@ -299,4 +299,4 @@ def _wave(z: Jet, bS: Jet) -> Wave:
     s = np.where(is_far, (1 - e * e) / (2 * np.where(is_far, t.c[0], 1.0)), e * s)
     by_z = np.where(is_far, (c - s) / (2 * far), e * sinhc_slope(near))
     slope = z.c[1]
-    return Wave(z, z - bS, Jet([c, s / 2 * slope]), Jet([s, by_z * slope]), e, t.c[0])
+    return JetWave(z, z - bS, Jet([c, s / 2 * slope]), Jet([s, by_z * slope]), e, t.c[0])

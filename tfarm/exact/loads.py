@@ -19,16 +19,16 @@ from typing import Any, NamedTuple
 from tfarm.errors import CertificationError, ParameterError
 
 from .balls import Ball, point, precision, rational
-from .chain import Chain
+from .chain import ElementChain
 from .chain_balls import Sweep, drive_of
 from .chain_values import Reading, reading_of
-from .compiled import plain
+from .compiled import python_of
 from .compound import Plane, Row, met
 from .elements import Body, Element, Mark, Offset, Place, Segment, Spring
 from .enclosures import precisions
 from .outputs import Output
 
-_met = plain(met)
+_met = python_of(met)
 LOAD_KINDS = {"force": ("N", 3), "moment_pair": ("N m", 2)}  # unit, and which entry of (W, Psi, M, Q) jumps
 LOAD_PATTERN = re.compile(r"(force|moment_pair)@([^,]+)(?:,([^,]+))?")
 
@@ -70,7 +70,7 @@ def load_of(text: str, length: float) -> Load:
     return Load(found[1], tuple(x / length for x in places))
 
 
-def loaded_value(chain: Chain, load: Load, wanted: Output, s: complex, x: float, bits: int = 60) -> Ball:
+def loaded_value(chain: ElementChain, load: Load, wanted: Output, s: complex, x: float, bits: int = 60) -> Ball:
     """The output per unit load at s, SI, to so many bits.  Raises CertificationError at a pole or an exact zero."""
     for working in precisions(bits):
         with precision(working):
@@ -80,7 +80,7 @@ def loaded_value(chain: Chain, load: Load, wanted: Output, s: complex, x: float,
     raise CertificationError(f"no {bits} bits at s = {s:g} 1/s: it is a pole or a zero, or too close to one")
 
 
-def _value(chain: Chain, load: Load, wanted: Output, s: Ball, x: float) -> Ball | None:
+def _value(chain: ElementChain, load: Load, wanted: Output, s: Ball, x: float) -> Ball | None:
     one = reading_of(chain, wanted, x)
     if one.is_current:
         raise ParameterError(key="output", value=wanted.name, remedy="is known for an input at the hub, not for a load")
@@ -98,7 +98,7 @@ def _value(chain: Chain, load: Load, wanted: Output, s: Ball, x: float) -> Ball 
 class _Loaded(Sweep):
     """The sweep with a mark at the load, and one at the place that is read, if it is on the link."""
 
-    def __init__(self, chain: Chain, s: Ball, at: Place, read: Place | None) -> None:
+    def __init__(self, chain: ElementChain, s: Ball, at: Place, read: Place | None) -> None:
         self.places = (at,) if read is None or read == at else (at, read)
         super().__init__(chain.at(self.places), s)
         zero, one = 0 * s, 1 + 0 * s

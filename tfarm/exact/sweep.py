@@ -200,7 +200,7 @@ def _meet(f: Any, plane: Any) -> None:
 
 
 @inlined
-def drive_of(s: complex, ends: Any, theta: complex, M: complex) -> complex:
+def drive_at(s: complex, ends: Any, theta: complex, M: complex) -> complex:
     """The input behind a response with that hub angle and moment on the hub."""
     A0, B0 = OF_ANGLE, OF_MOMENT
     of_angle = ends[A0] + s * (ends[A0 + 1] + s * (ends[A0 + 2] + s * ends[A0 + 3]))
@@ -257,7 +257,7 @@ def _innermost(rows: Any) -> Any:
 def _drive(points: Any, segment: Any, ends: Any, plane: Any, drive: Any, lost: Any) -> None:
     """The drive at every point of a block; digits are lost where it is small."""
     for i in range(BLOCK):
-        drive[i] = drive_of(points[i], ends, plane[i], plane[BLOCK + i])
+        drive[i] = drive_at(points[i], ends, plane[i], plane[BLOCK + i])
     for i in range(BLOCK):
         terms = _drive_terms(points[i], segment, ends, plane[i], plane[BLOCK + i])
         lost[i] = lost[i] or magnitude(drive[i]) < POLE * terms

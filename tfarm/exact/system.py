@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from tfarm.arm import Arm, Theory
 
-from .chain import Chain
+from .chain import ElementChain
 from .chaining import chain_of
 from .coefficients import Coefficients, coefficients
 from .outputs import Output
 
-System = Coefficients | Chain
+System = Coefficients | ElementChain
 
 
 def system_of(arm: Arm, theory: Theory | None = None, wanted: Sequence[Output] = ()) -> System:

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from tfarm.errors import ParameterError
 
-from .balls import nearest
-from .chain import Chain
+from .balls import nearest_float
+from .chain import ElementChain
 from .chain_values import expansions, free_outputs, free_slopes
 from .coefficients import Coefficients
 from .enclosures import decimals, enclose, slope
@@ -32,7 +32,7 @@ _FIELDS = {"Y": 0, "Phi": 1, "M": 2, "Q": 3}
 
 def kernel_table(k: System, wanted: Sequence[Output]) -> NDArray[np.float64]:
     """The outputs as `waves.evaluate` reads them: worth keeping between calls."""
-    if isinstance(k, Chain):
+    if isinstance(k, ElementChain):
         return np.empty((0, 4))
     return np.array([
         (_ENDS.get(each.quantity, 0), each.power, each.gauge, float(unit_scale(each, k))) for each in wanted
@@ -49,13 +49,13 @@ def evaluate_outputs(
     s = np.ascontiguousarray(s)
     values, suspects = np.empty((len(wanted), s.size), complex), np.empty(s.size, bool)
     with np.errstate(under="ignore", over="ignore", invalid="ignore", divide="ignore"):
-        if isinstance(k, Chain):
+        if isinstance(k, ElementChain):
             free = free_outputs(k, wanted, s, x)
             values, suspects = free.outputs / free.drive, free.lost
         else:
             evaluate(s, k.kernel, table, values, suspects)
         for row, each in enumerate(wanted):
-            if not (isinstance(k, Chain) or each.is_at_end):
+            if not (isinstance(k, ElementChain) or each.is_at_end):
                 values[row] = _along(k, each, s, each.share(x))
     for i in np.flatnonzero(suspects | ~np.isfinite(values).all(axis=0)):
         values[:, i] = [value_with_care(k, each, complex(s[i]), x) for each in wanted]
@@ -65,7 +65,7 @@ def evaluate_outputs(
 def differentiate_outputs(k: System, wanted: Sequence[Output], s: Complex, x: float = 0.0) -> Complex:
     """The derivatives of the outputs (rows) with respect to s, by power series at the ends and by balls along x."""
     values = np.empty((len(wanted), s.size), complex)
-    if isinstance(k, Chain):
+    if isinstance(k, ElementChain):
         return _of_chain(k, wanted, s, x)
     with np.errstate(under="ignore", invalid="ignore", divide="ignore"):
         free, at = free_response(k, s), Jet.variable(s, 1)
@@ -89,7 +89,7 @@ def value_with_care(k: System, wanted: Output, s: complex, x: float = 0.0) -> co
     _refuse_pole(k, wanted, s, x)
     if s == 0:
         return complex(expansion_at_zero(k, wanted, x)[2])
-    value = nearest(enclose(k, wanted, s, bits=PROVEN_BITS, x=x))
+    value = nearest_float(enclose(k, wanted, s, bits=PROVEN_BITS, x=x))
     if not np.isfinite(value):
         raise ParameterError(
             key="s", value=s, remedy=f"{wanted.name} is larger than any float64 there; choose another s"
@@ -110,7 +110,7 @@ def expansion_at_zero(k: System, wanted: Output, x: float = 0.0) -> tuple[float,
 
 def expansions_at_zero(k: System, wanted: Sequence[Output], x: float = 0.0) -> list[tuple[float, float, float, float]]:
     """The expansions at s = 0 of several outputs, from one free response."""
-    if isinstance(k, Chain):
+    if isinstance(k, ElementChain):
         return expansions(k, wanted, x)
     s = Jet.variable(0.0, 7)
     *state, drive = low_frequency(k, s)
@@ -136,7 +136,7 @@ def expansions_at_zero(k: System, wanted: Sequence[Output], x: float = 0.0) -> l
     return [expand(each) for each in wanted]
 
 
-def _of_chain(k: Chain, wanted: Sequence[Output], s: Complex, x: float) -> Complex:
+def _of_chain(k: ElementChain, wanted: Sequence[Output], s: Complex, x: float) -> Complex:
     """The derivatives of a chain's outputs: N'/D - N D'/D^2, by balls where digits are lost."""
     with np.errstate(all="ignore"):
         free, slopes = free_slopes(k, wanted, s, x)
@@ -174,7 +174,7 @@ def _refuse_pole(k: System, wanted: Output, s: complex, x: float) -> None:
             raise ParameterError(key="s", value=0, remedy="a pole: the arm turns as a rigid body there; choose s != 0")
         return
     at = np.array([s])
-    if isinstance(k, Chain):
+    if isinstance(k, ElementChain):
         drive = Jet([part.drive for part in free_slopes(k, (), at, 0.0)])
     else:
         drive = free_response(k, at).drive
@@ -187,4 +187,4 @@ def _slope_with_care(k: System, wanted: Output, s: complex, x: float) -> complex
     _refuse_pole(k, wanted, s, x)
     if s == 0:
         return complex(expansion_at_zero(k, wanted, x)[3])
-    return nearest(slope(k, wanted, s, x=x))
+    return nearest_float(slope(k, wanted, s, x=x))

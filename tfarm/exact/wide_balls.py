@@ -18,19 +18,19 @@ from typing import Any
 import flint
 
 from .balls import Ball, State, point, rational
-from .chain import Chain
+from .chain import ElementChain
 from .chain_values import ChainState
 from .chain_wide import swept
 from .characteristic import FED, NO_GAINS, NUMERATORS, Gains, unit_gains
 from .closed_form import from_waves
-from .coefficients import Coefficients, Condition
-from .compiled import plain
+from .coefficients import Coefficients, EndCondition
+from .compiled import python_of
 from .elements import Segment
 from .system import System
 
 Series = Any  # flint.acb_series, which comes without types
 
-_separated = plain(from_waves)
+_separated = python_of(from_waves)
 
 LONG_WAVE = 0.3  # |z| below which a wave is not separated from the others
 TAYLOR_TERMS = 4  # of D over a piece of a contour, the last of them over the wide ball
@@ -38,7 +38,7 @@ TAYLOR_TERMS = 4  # of D over a piece of a contour, the last of them over the wi
 
 def characteristic_ball(k: System, s: Ball, gains: Gains = NO_GAINS) -> Ball:
     """D(s) enclosed, at the working precision: for points, at any s."""
-    if isinstance(k, Chain):
+    if isinstance(k, ElementChain):
         chain = ChainState(k, s)
         return _law(k, gains, chain.input, [chain.numerator(each) for each in FED])
     state = State(k, s)
@@ -70,7 +70,7 @@ def tangent(k: System, m: Ball, r: Ball, gains: Gains = NO_GAINS) -> tuple[Ball,
 
 def _closed(k: Coefficients, s: Any, theta: Any, M0: Any, gains: Gains) -> Any:
     """D (see `characteristic`) of a response with that hub angle and root moment, for balls and for series."""
-    hub = Condition.of(k.hub_inertia)
+    hub = EndCondition.of(k.hub_inertia)
     drive = theta * (s * s * rational(hub.inertia) + rational(hub.rest)) - M0 * rational(hub.force)
     drive = drive if hub.rest else drive / rational(hub.force)
     for gain, part in zip(gains, NUMERATORS(s, 1 / (s * rational(k.damping) + 1), theta, M0), strict=True):
@@ -81,7 +81,7 @@ def _closed(k: Coefficients, s: Any, theta: Any, M0: Any, gains: Gains) -> Any:
 def _by_waves(k: System, at: Ball, gains: Gains, scale: Ball | None, shortest: float) -> tuple[Series, Ball] | None:
     """D e^{-scale} as a series around `at`, and scale (t1 + t2 there if none is given); None where waves may be one."""
     s = flint.acb_series([at, 1], prec=TAYLOR_TERMS)
-    if isinstance(k, Chain):
+    if isinstance(k, ElementChain):
         return _by_segments(k, s, gains, scale, shortest)
     a, b, g, C = (rational(value) for value in (k.a, k.b, k.g, k.damping))
     S, d = s * s, s * C + 1
@@ -89,7 +89,7 @@ def _by_waves(k: System, at: Ball, gains: Gains, scale: Ball | None, shortest: f
     if pair is None:
         return None
     one, two = pair
-    mass, inertia = Condition.of(k.tip_mass), Condition.of(k.tip_inertia)
+    mass, inertia = EndCondition.of(k.tip_mass), EndCondition.of(k.tip_inertia)
     ends = [S * rational(end.inertia) + rational(end.rest) for end in (mass, inertia)]
     theta, M0, _, _ = _separated(
         *one[:5], *two[:5], S * g, d, ends[0], rational(mass.force), ends[1], rational(inertia.force)
@@ -103,7 +103,9 @@ def _by_waves(k: System, at: Ball, gains: Gains, scale: Ball | None, shortest: f
     return _closed(k, s, theta, M0, gains) * (t - scale).exp() / unit, scale
 
 
-def _by_segments(k: Chain, s: Series, gains: Gains, scale: Ball | None, shortest: float) -> tuple[Series, Ball] | None:
+def _by_segments(
+    k: ElementChain, s: Series, gains: Gains, scale: Ball | None, shortest: float
+) -> tuple[Series, Ball] | None:
     """`_by_waves` of a chain."""
 
     def waves(each: Segment, S: Series, d: Series) -> tuple[tuple[Series, ...], tuple[Series, ...]] | None:
@@ -121,7 +123,7 @@ def _by_segments(k: Chain, s: Series, gains: Gains, scale: Ball | None, shortest
     return value * (t - scale).exp(), scale
 
 
-def _law(k: Chain, gains: Gains, drive: Any, outputs: Sequence[Any]) -> Any:
+def _law(k: ElementChain, gains: Gains, drive: Any, outputs: Sequence[Any]) -> Any:
     """drive + gains . numerators, from outputs in SI."""
     for gain, unit, part in zip(gains, unit_gains(k), outputs, strict=True):
         drive = drive + part * rational(gain / unit) if gain else drive

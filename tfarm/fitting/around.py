@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import INPUTS, Arm, Input
-from tfarm.exact.chain import Chain
+from tfarm.exact.chain import ElementChain
 from tfarm.exact.chaining import chain_of
 from tfarm.exact.gradients import Direction, response_gradients
 from tfarm.exact.jets import Jet
@@ -32,7 +32,7 @@ class Around:
 
     def __init__(self, arm: Arm, pairs: Sequence[tuple[Arm, ...]]) -> None:
         self.arm, self._pairs = arm, pairs
-        self._chains: dict[str, tuple[Chain, list[tuple[Chain, Chain]]]] = {}
+        self._chains: dict[str, tuple[ElementChain, list[tuple[ElementChain, ElementChain]]]] = {}
 
     def gradients(self, driven: str, names: tuple[str, ...], s: Complex) -> tuple[Jet, list[Jet]]:
         """Drive and signals at s, up to one factor, with their derivatives along the free numbers."""

@@ -19,7 +19,7 @@ from tfarm.arm import RATE_GAIN, Arm, HubFeedback
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
 from tfarm.spectrum import damped_modes, modes
-from tfarm.spectrum.continuation import Node, follow, through
+from tfarm.spectrum.continuation import Node, follow, through_nodes
 from tfarm.spectrum.correction import corrected
 from tfarm.spectrum.damped import COMPANY, single_zeros
 from tfarm.spectrum.scales import rate_unit
@@ -40,7 +40,7 @@ FARTHEST_RIGID = 0.02  # of the lowest flexible frequency: how far the rigid bod
 
 @dataclass(frozen=True)
 @record
-class Segment:
+class Stretch:
     """Nodes between which the pairs stay what they are, and the number of the branch of each zero, (n, 2)."""
 
     nodes: list[Node]
@@ -55,7 +55,7 @@ class Segment:
         guess = np.empty((values.size, *self.slots.shape), complex)
         for n in np.unique(which):
             low = max(0, min(int(n) + 1 - GUESSING_NODES // 2, at.size - GUESSING_NODES))
-            guess[which == n] = through(self.nodes[low : low + GUESSING_NODES], values[which == n])
+            guess[which == n] = through_nodes(self.nodes[low : low + GUESSING_NODES], values[which == n])
         return ordered(guess, self.pinned)
 
 
@@ -135,7 +135,7 @@ class Stage:
         return Node(self.stop, np.concatenate([np.zeros((1, 2), complex), found]))
 
 
-def followed(variation: Variation, start: float, stop: float, wanted: int) -> tuple[list[Segment], float]:
+def followed(variation: Variation, start: float, stop: float, wanted: int) -> tuple[list[Stretch], float]:
     """The segments of the locus from `start` to `stop` with its first `wanted` pairs, and the lowest frequency [rad/s].
 
     Raises ConvergenceError where branches cannot be told apart.
@@ -153,7 +153,7 @@ def followed(variation: Variation, start: float, stop: float, wanted: int) -> tu
     raise ConvergenceError(text, lost.best, lost.residual)
 
 
-def _followed(variation: Variation, start: float, stop: float, wanted: int, number: int) -> tuple[list[Segment], float]:
+def _followed(variation: Variation, start: float, stop: float, wanted: int, number: int) -> tuple[list[Stretch], float]:
     """The locus with so many modes in all: first from the open arm to the law at the start, all gains growing together.
 
     Without losses two modes may meet on that way and leave the imaginary axis as a quadruple: then around that, with a
@@ -172,7 +172,7 @@ def _followed(variation: Variation, start: float, stop: float, wanted: int, numb
             back = Stage(Variation(arm, law, RATE_GAIN), aside, law[RATE_GAIN], lowest)
             zeros = back.follow(zeros, wanted)[-1].zeros
     stage = Stage(variation, start, stop, lowest)
-    return segments(stage.follow(zeros, wanted), stage.at_zero == 1), lowest
+    return stretches(stage.follow(zeros, wanted), stage.at_zero == 1), lowest
 
 
 def open_pairs(arm: Arm, number: int, wanted: int) -> tuple[Complex, float]:
@@ -216,20 +216,20 @@ def _slow_zero(loop: Loop, pair: Complex) -> Complex:
     return np.array([-c / b, pair[1]], complex)
 
 
-def segments(nodes: list[Node], pinned: bool = False) -> list[Segment]:
+def stretches(nodes: list[Node], pinned: bool = False) -> list[Stretch]:
     """The nodes cut where zeros were paired anew, with the branches handed on from zero to zero."""
     slots = np.arange(nodes[0].zeros.size).reshape(-1, 2)
     fresh = slots.size
-    cut: list[Segment] = []
+    cut: list[Stretch] = []
     kept, pinned = [nodes[0]], pinned and nodes[0].zeros[0, 0] == 0
     for before, after in pairwise(nodes):
         if after.at == before.at:
-            cut.append(Segment(kept, slots, pinned))
+            cut.append(Stretch(kept, slots, pinned))
             still = pinned and after.zeros[0, 0] == 0
             slots = _handed_on(ordered(before.zeros, pinned), ordered(after.zeros, still), slots, fresh)
             fresh, kept, pinned = max(fresh, int(slots.max()) + 1), [], still
         kept.append(after)
-    return [*cut, Segment(kept, slots, pinned)]
+    return [*cut, Stretch(kept, slots, pinned)]
 
 
 def _handed_on(old: Complex, new: Complex, slots: NDArray[np.int64], fresh: int) -> NDArray[np.int64]:

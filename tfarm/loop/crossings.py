@@ -60,7 +60,7 @@ def crossing_answers(found: Iterable[BranchCrossing]) -> list[dict[str, Any]]:
     ]
 
 
-def crossings(variation: Variation, gain: Real, branches: Complex, lowest: float) -> tuple[BranchCrossing, ...]:
+def branch_crossings(variation: Variation, gain: Real, branches: Complex, lowest: float) -> tuple[BranchCrossing, ...]:
     """All changes of sign of Re s between neighbours of the sampled branches, in the order in which they come.
 
     Neighbours are on both sides of the axis, points on it left out; or one is on it at i w, and one real and off it.

@@ -12,8 +12,8 @@ from tfarm.errors import ConvergenceError
 from tfarm.response.frequency import AXIS_SHARE
 
 from .crossings import BranchCrossing
-from .lines import crossings as line_crossings
-from .poles import counted, poles_below
+from .lines import line_crossings
+from .poles import count_with_mirrors, poles_below
 from .variation import Complex, Real, Variation
 
 SAME_CROSSING = 1e-6  # of gain and frequency: two roads to one crossing
@@ -52,7 +52,7 @@ def _refuse_hidden(variation: Variation, gain: Real, branches: Complex, top: flo
         here = branches[:, n]
         right = (here.real > AXIS_SHARE * abs(here)) & (abs(here.imag) < top)
         poles = poles_below(variation.at(float(gain[n])), top, BOX_HEIGHTS)
-        if poles.unstable > counted(here[right]):
+        if poles.unstable > count_with_mirrors(here[right]):
             where = f"{variation.vary} = {gain[n]:.6g}"
             text = f"at {where} an unstable pole is on none of the branches that could be followed: use another range"
             raise ConvergenceError(text, poles.values, n)

@@ -29,7 +29,7 @@ from .answers import law_answer
 from .crossings import BranchCrossing, crossing_answers
 from .frequencies import band_of, grid
 from .law_loop import LawLoop
-from .law_map import along
+from .law_map import law_crossings
 from .law_poles import law_box, starting_points_of
 from .variation import ARM_PARAMETERS, must_be_way
 
@@ -251,7 +251,7 @@ def _others(family: Family, values: Real, known: list[BranchCrossing], band: flo
     parts = loop.signals.parts(1j * omega)
     found, span = [], float(ascending[-1] - ascending[0])
     way = 1 if values[-1] > values[0] else -1
-    for t, w, change in along(loop, family.vary, ascending, omega, parts, band):
+    for t, w, change in law_crossings(loop, family.vary, ascending, omega, parts, band):
         same = [
             abs(each.gain - t) <= SEEN_CROSSING * span and abs(each.omega - w) <= SEEN_CROSSING * band for each in known
         ]

@@ -94,14 +94,16 @@ def law_map(arm: Arm, law: Law, vary: tuple[str, str], x: Real, y: Real, band: f
         band = max(band_for(own.under(each)) for each in corners)
     omega = np.asarray(grid(own.arm, band))
     known = own.signals.parts(1j * omega)
-    columns = [along(own.under(law.having(vary[0], float(value))), vary[1], y, omega, known, band) for value in x]
+    columns = [
+        law_crossings(own.under(law.having(vary[0], float(value))), vary[1], y, omega, known, band) for value in x
+    ]
     gains, start = np.concatenate([y[:0], *(each.gain for each in columns)]), x.size // 2
     at = int(np.argmax(abs(y[:, None] - gains).min(axis=1))) if gains.size else y.size // 2  # farthest from a crossing
     row = law.having(vary[1], float(y[at]))
     if vary[0] == "delay":
         there = [unstable_below(own.under(row.having(vary[0], float(value))), band) for value in x]
     else:
-        across = along(own.under(row), vary[0], x, omega, known, band)
+        across = law_crossings(own.under(row), vary[0], x, omega, known, band)
         first = unstable_below(own.under(row.having(vary[0], float(x[start]))), band)
         (there,) = counts_over(x, [across], float(x[start]), np.array([first]))
     counts = counts_over(y, columns, float(y[at]), np.asarray(there))
@@ -117,7 +119,7 @@ def unstable_below(loop: LawLoop, band: float) -> int:
     return winding_number(loop.function, Box(0.0, right, -band, band), CONTOUR_POINTS)
 
 
-def along(loop: LawLoop, name: str, values: Real, omega: Real, known: LoopParts, band: float) -> Crossings:
+def law_crossings(loop: LawLoop, name: str, values: Real, omega: Real, known: LoopParts, band: float) -> Crossings:
     """The crossings of the axis along one number of a loop's law, between its first and last value.
 
     D = A + t B, 0 < t < 1; `known` are the parts of the loop's signals at `omega`.

@@ -32,7 +32,7 @@ MEETING_KNOWN = 1e-13  # of a value: so closely it is known where two meet
 ABSENT, ON_REAL_AXIS, IN_PAIR = 0, 1, 2  # what a branch is at a value
 
 
-def rounded(found: LawLocus) -> LawLocus:
+def rounded_law_locus(found: LawLocus) -> LawLocus:
     """The same locus with values between, until no branch turns by more than 5 degrees as it is drawn.
 
     Poles between are Newton's, from half way, or where two meet from either side.  A value at which one of them is not

@@ -55,15 +55,15 @@ def along(name: str, law: HubFeedback) -> Line:
     return Line(law.having(name, 0.0), NO_FEEDBACK.having(name, 1.0))
 
 
-def crossings(arm: Arm, line: Line, band: float) -> Crossings:
+def line_crossings(arm: Arm, line: Line, band: float) -> Crossings:
     """All crossings of the imaginary axis at frequencies `at` up to `band` [rad/s], ascending in t."""
     k, unit, found = system_of(arm), line.length, static_crossings(arm, line)
     if unit:
         unified = Line(line.base, NO_FEEDBACK.plus(line.direction, 1 / unit))
         omega = np.asarray(grid(arm, band))
-        N, P = parts(k, unified, 1j * omega)
+        N, P = line_parts(k, unified, 1j * omega)
         (before,), change = brackets((N * P.conj()).imag)
-        at, t = solved(lambda w: parts(k, unified, 1j * w), omega[before], omega[before + 1])
+        at, t = solved(lambda w: line_parts(k, unified, 1j * w), omega[before], omega[before + 1])
         if (
             arm.is_undamped and line.base == NO_FEEDBACK
         ):  # at its own frequencies there the poles of the arm without a law are
@@ -73,7 +73,7 @@ def crossings(arm: Arm, line: Line, band: float) -> Crossings:
     return Crossings.of(found)
 
 
-def parts(k: System, line: Line, s: NDArray[Any]) -> tuple[Complex, Complex]:
+def line_parts(k: System, line: Line, s: NDArray[Any]) -> tuple[Complex, Complex]:
     """N and P at s, up to one common positive factor."""
     drive, numerators, _ = loop_parts(k, s)
     base, way = (torque(map(float, gains_of(k, law)), numerators) for law in (line.base, line.direction))
@@ -95,7 +95,7 @@ def crossing_at_zero(arm: Arm, line: Line) -> Crossing | None:
     """
     if not arm.has_rigid_mode:
         small = 1e-7 * float(modes(arm, 1).natural_frequency[-1])
-        return through_origin(*parts(system_of(arm), line, small * np.array([1 + 0j, 0.5])))
+        return through_origin(*line_parts(system_of(arm), line, small * np.array([1 + 0j, 0.5])))
     base, way = line.base, line.direction
     if way.Kp:
         t = -base.Kp / way.Kp + 0.0

@@ -54,7 +54,7 @@ class Loci:
         return written_unit(self.exact.vary, self.exact.arm).strip()
 
 
-def shown(branches: Complex) -> Complex:
+def held_branches(branches: Complex) -> Complex:
     """Branches to the digits that hold on every processor: as shares of |s|, so that a small Re s keeps its place."""
     size = np.maximum(abs(branches), np.finfo(float).tiny)
     unit = 10.0 ** (np.floor(np.log10(size)) + 1 - POLE_DIGITS)

@@ -21,8 +21,8 @@ from tfarm.records import record
 from tfarm.spectrum.continuation import follow
 from tfarm.spectrum.correction import Member, corrected
 
-from .branches import MAY_PASS_ORIGIN, NOBODY, Segment, followed, ordered
-from .crossings import BranchCrossing, crossings
+from .branches import MAY_PASS_ORIGIN, NOBODY, Stretch, followed, ordered
+from .crossings import BranchCrossing, branch_crossings
 from .ended import with_others
 from .lines import static_crossings
 from .variation import Complex, Evaluator, Real, Variation, free_of_loss, member_of, must_be_way
@@ -129,7 +129,7 @@ def _traced(wanted: Variation, gain: Real, branches: int, rounds: int) -> Locus:
         order = np.argsort(way * np.r_[gain, more], kind="stable")
         gain, every = np.r_[gain, more][order], np.concatenate([every, added], axis=1)[:, order]
     rows = _rows(every, kept)
-    found = crossings(variation, gain, rows, lowest)
+    found = branch_crossings(variation, gain, rows, lowest)
     if np.isnan(every[: 2 * branches]).any():
         found = with_others(variation, gain, rows, found)
     return Locus(wanted.arm, wanted.law, wanted.vary, gain, rows, mode, found)
@@ -193,7 +193,7 @@ class _Polish:
             for each in static_crossings(variation.arm, variation.line):
                 self.static += math.isfinite(each.t) & (abs(self.gain - each.t) <= SAME_STATIC_GAIN * abs(each.t))
 
-    def curves(self, cut: list[Segment]) -> Complex:
+    def curves(self, cut: list[Stretch]) -> Complex:
         """The branches (slots, n); those which do not live all the way are left out."""
         number = max(int(each.slots.max()) for each in cut) + 1
         curves = np.full((number, self.gain.size), np.nan, complex)
@@ -209,7 +209,7 @@ class _Polish:
             curves[0] = 0.0
         return curves
 
-    def pairs(self, segment: Segment, which: NDArray[np.int64]) -> Complex:
+    def pairs(self, segment: Stretch, which: NDArray[np.int64]) -> Complex:
         """The pairs (values, n, 2) of a segment at the values of those numbers, polished."""
         guess = segment.guess(self.gain[which])
         origin = self._at_origin(guess, which, segment.pinned)
@@ -254,7 +254,7 @@ class _Polish:
         found[..., 1] = np.where(mirrored, found[..., 0].conj(), found[..., 1])
         return found, settled
 
-    def _stepped(self, segment: Segment, number: int, guess: Complex) -> Complex:
+    def _stepped(self, segment: Stretch, number: int, guess: Complex) -> Complex:
         """The pairs at one value, all corrected together, or followed there from the last node before it."""
         value = float(self.gain[number])
         found, stray = corrected(self._member(value), guess)

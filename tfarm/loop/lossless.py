@@ -30,7 +30,7 @@ from tfarm.exact.system import system_of
 from tfarm.spectrum import modes
 
 from .frequencies import MOST_BAND_MODES
-from .lines import along, parts
+from .lines import along, line_parts
 
 UNFELT_MOMENT = 1e-9  # a K2_n below this share of a whole moment is none: the hub feels nothing of that mode
 
@@ -45,7 +45,7 @@ def locked_edges(arm: Arm) -> Crossings:
     omega = modes(arm.having(hub_inertia=math.inf), MOST_BAND_MODES).natural_frequency
     hub = replace(arm.hub, inertia=0.0, friction=0.0, stiffness=0.0)
     pin = system_of(replace(arm, hub=hub, motor=None, input="hub_torque"))
-    drive, M = parts(pin, along("K2", HubFeedback()), 1j * omega)
+    drive, M = line_parts(pin, along("K2", HubFeedback()), 1j * omega)
     with np.errstate(divide="ignore", invalid="ignore"):  # a gauge where the mode has no moment: no K2 does anything
         K2 = -(drive * M.conj()).real / abs(M) ** 2 * arm.input_per_torque
     if (abs(K2) < UNFELT_MOMENT * arm.input_per_torque).any():

@@ -29,7 +29,7 @@ from tfarm.records import record
 
 from .frequencies import grid
 from .law_loop import LawLoop
-from .lines import NO_FEEDBACK, Line, crossings, static_crossings
+from .lines import NO_FEEDBACK, Line, line_crossings, static_crossings
 from .lossless import stable_moments
 from .plant import Loop
 from .poles import LEAST_SQUARABLE, AnyLoop
@@ -228,7 +228,7 @@ def gain_margin(loop: Loop, band: float) -> tuple[float, float]:
         factors = [end / law.K2 for end in stable_moments(arm) if law.K2 * end > 0 and math.isfinite(end)]
         factors += [each.t for each in static_crossings(arm, line)]
     else:
-        factors = crossings(arm, line, band).gain.tolist()
+        factors = line_crossings(arm, line, band).gain.tolist()
     return _nearest_to_one(factors)
 
 

@@ -23,7 +23,7 @@ from tfarm.spectrum import flexible_frequencies
 from .frequencies import band_of, grid
 from .law_loop import LawLoop
 from .plant import Loop
-from .poles import AnyLoop, counted
+from .poles import AnyLoop, count_with_mirrors
 from .stability import Stability
 
 Real = NDArray[np.float64]
@@ -63,13 +63,13 @@ class Nyquist(Generic[AnyLoop]):
         """Poles of the box that lie on the axis to working precision, apart from that at 0."""
         moving = self.verdict.poles.moving
         near = abs(moving.real) <= AXIS_SHARE * abs(moving)
-        return counted(moving[near])
+        return count_with_mirrors(moving[near])
 
     @property
     def clear(self) -> int:
         """Poles of the box that lie right of the axis by more than working precision: at C = 0 a theorem knows more."""
         moving = self.verdict.poles.moving
-        return counted(moving[moving.real > AXIS_SHARE * abs(moving)])
+        return count_with_mirrors(moving[moving.real > AXIS_SHARE * abs(moving)])
 
     @property
     def expected(self) -> int:

@@ -41,11 +41,11 @@ NEAR_RIGID = 0.01  # of its size: how far it may be from the rigid arm's
 LEAST_SQUARABLE = 1e-140  # 1/s: whose square is still a full double
 AnyLoop = TypeVar("AnyLoop", bound=Loop | LawLoop, default=Loop)  # hub gains, unless another law is said
 LEAST_REAL_PART = -0.5  # of L, so that 1 + L has no zero
-BEYOND_EDGE = (2.0, 5.0, 20.0)  # times the right edge of a box, where L is looked at again
+RIGHT_OF_EDGE = (2.0, 5.0, 20.0)  # times the right edge of a box, where L is looked at again
 SHRUNK_HEIGHTS = tuple(1 / factor for factor in TRIED_HEIGHTS)
 
 
-def counted(zeros: Complex) -> int:
+def count_with_mirrors(zeros: Complex) -> int:
     """How many zeros these with Im s >= 0 stand for, conjugates counted."""
     return int(np.where(zeros.imag > 0, 2, 1).sum())
 
@@ -75,19 +75,19 @@ class Poles(Generic[AnyLoop]):
         right = self.values.real > AXIS_SHARE * abs(self.values)
         loop = self.loop
         if isinstance(loop, LawLoop):  # of which no theorem on gains at the hub tells anything
-            return counted(self.values[right])
+            return count_with_mirrors(self.values[right])
         if loop.arm.is_undamped and loop.is_told_by_theorem and loop.takes_energy < 0:
             right |= (self.values.imag > 0) & (abs(self.values.real) <= AXIS_SHARE * abs(self.values))
         on_rate, on_moment = loop.law.point
         if loop.arm.is_reactive and not loop.is_told_by_theorem and on_rate > 0:
             driven = driven_modes(loop.arm, on_moment)
-            return max(counted(self.values[right]), 2 * int((driven.at < self.box.im_max).sum()))
-        return counted(self.values[right])
+            return max(count_with_mirrors(self.values[right]), 2 * int((driven.at < self.box.im_max).sum()))
+        return count_with_mirrors(self.values[right])
 
     @property
     def count(self) -> int:
         """How many poles the box holds, conjugates counted."""
-        return counted(self.values)
+        return count_with_mirrors(self.values)
 
     @property
     def moving(self) -> Complex:
@@ -175,7 +175,7 @@ def quiet_edge(loop: Loop | LawLoop, right: float, height: float, points: int, h
     """
     edge = 1j * np.linspace(0.0, height, points)
     while right < heights * height:
-        L = loop.loop_function(np.r_[right + edge, right * np.array(BEYOND_EDGE)])
+        L = loop.loop_function(np.r_[right + edge, right * np.array(RIGHT_OF_EDGE)])
         if L.real.min() > LEAST_REAL_PART:
             break
         right *= 1.7

@@ -26,7 +26,7 @@ from tfarm.records import record
 from tfarm.spectrum.scales import PAPER_GAINS, default_gains
 
 from .frequencies import grid
-from .lines import Complex, along, ascending, crossing_at_zero, crossings, static_crossings
+from .lines import Complex, along, ascending, crossing_at_zero, line_crossings, static_crossings
 from .lossless import locked_edges, stable_moments
 from .plant import Loop
 from .stability import loop_band, stability
@@ -117,7 +117,7 @@ def region(arm: Arm, K1: Real, K2: Real, Kp: float = 0.0) -> Region:
     omega = np.asarray(grid(arm, band))
     without = HubFeedback(K1=float(K1[-1]), Kp=Kp)
     last = np.array([stability(arm, without).unstable_roots])
-    (without_K2,) = counts_over(K1, [crossings(arm, along("K1", without), band)], float(K1[-1]), last)
+    (without_K2,) = counts_over(K1, [line_crossings(arm, along("K1", without), band)], float(K1[-1]), last)
     found = _crossings_along_K2(arm, K1, Kp, omega)
     unstable = counts_over(K2, found, 0.0, without_K2).T
     unstable = np.where(_drives_all(arm, K1, K2), INFINITE, unstable)

@@ -16,7 +16,7 @@ from tfarm.records import record
 from tfarm.spectrum import modes
 from tfarm.spectrum.scales import gain_unit, most_gain
 
-from .lines import along, crossings, static_crossings
+from .lines import along, line_crossings, static_crossings
 from .lossless import locked_edges, stable_moments
 from .plant import Loop
 from .stability import Stability, loop_band, stability
@@ -64,7 +64,7 @@ def gain_windows(verdict: Stability, name: str) -> Windows:
     else:
         ends = (Loop(loop.arm, law.having(name, end)) for end in (low, high))
         band = max(verdict.band, *(loop_band(end)[0] for end in ends))
-        found = crossings(loop.arm, along(name, law), band).within(low, high)
+        found = line_crossings(loop.arm, along(name, law), band).within(low, high)
     edges = [low, *np.unique(found.gain).tolist(), high]
     pairs = list(itertools.pairwise(edges))
     stable = [pair for pair, count in zip(pairs, _counts(verdict, name, pairs, found), strict=True) if count == 0]

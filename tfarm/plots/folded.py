@@ -15,7 +15,7 @@ from matplotlib.ticker import FuncFormatter, NullLocator
 from numpy.typing import NDArray
 
 from tfarm.digits import plain
-from tfarm.dsp.loci import DRAWN_RADIUS, RIM, Loci, Locus
+from tfarm.dsp.loci import DRAWN_RADIUS, RIM, SampledLoci, SampledLocus
 
 from .labels import OFFSETS_BESIDE, Label
 from .style import BLUE, GREY, INK, ORANGE, blank, headline, style
@@ -28,7 +28,7 @@ LINEAR_PART = 0.9 / math.log(10)  # of its linear part: there is no corner where
 TICKS_ACROSS = (-100.0, -10.0, -1.0, -0.1, 0.0, 0.1, 1.0)  # 1/s, of them those within the picture
 
 
-def draw_folded_loci(data: Loci) -> Figure:
+def draw_folded_loci(data: SampledLoci) -> Figure:
     """The folded s-plane, then the z-plane for either gain."""
     with style():
         figure = blank(9.0, 5.4)
@@ -43,7 +43,7 @@ def draw_folded_loci(data: Loci) -> Figure:
     return figure
 
 
-def folded(data: Loci, *, ax: Axes) -> None:
+def folded(data: SampledLoci, *, ax: Axes) -> None:
     """The s-plane up to the first aliased mode: strips, the arm's poles, their images, and the locus of one gain."""
     half = data.half_rate
     hertz = data.poles.imag / (2 * math.pi)
@@ -78,7 +78,7 @@ def folded(data: Loci, *, ax: Axes) -> None:
     ax.set_title(f"s = ln(z)/T, {data.alone.gain} alone, up to {plain(data.alone.values[-1], 3)}", fontsize=9.5)
 
 
-def _branches(data: Loci, modes: NDArray[np.int64], ax: Axes) -> list[float]:
+def _branches(data: SampledLoci, modes: NDArray[np.int64], ax: Axes) -> list[float]:
     """The locus of the gain that is alone, of these modes, in the lowest strip; real parts of what was drawn."""
     ends: list[float] = []
     for branch in np.nonzero(np.isin(data.alone.mode, modes))[0]:
@@ -94,7 +94,7 @@ def _branches(data: Loci, modes: NDArray[np.int64], ax: Axes) -> list[float]:
     return ends
 
 
-def z_plane(data: Loci, locus: Locus, *, ax: Axes) -> None:
+def z_plane(data: SampledLoci, locus: SampledLocus, *, ax: Axes) -> None:
     """The upper half of the z-plane with one gain's locus; open circles at its start, dots at the loop's gains."""
     angle = np.linspace(0.0, math.pi, 181)
     ax.fill_between(DRAWN_RADIUS * np.cos(angle), 0, DRAWN_RADIUS * np.sin(angle), color="#f7e9de", zorder=0)
@@ -124,5 +124,5 @@ def z_plane(data: Loci, locus: Locus, *, ax: Axes) -> None:
     ax.set_ylabel("Im z")
 
 
-def _colour(data: Loci, mode: int) -> str:
+def _colour(data: SampledLoci, mode: int) -> str:
     return ORANGE if data.is_aliased(mode) else BLUE

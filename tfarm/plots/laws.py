@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from tfarm.digits import plain, significant
 from tfarm.loop.law_locus import LawLocus
 from tfarm.loop.law_map import LawMap
-from tfarm.loop.law_rounded import rounded
-from tfarm.loop.loci import shown
+from tfarm.loop.law_rounded import rounded_law_locus
+from tfarm.loop.loci import held_branches
 
 from .labels import OFFSETS_BESIDE, Label
 from .plane import colours, words_of_count
@@ -32,10 +32,10 @@ def law_branches(found: LawLocus, *, ax: Axes) -> None:
     """Branches [1/s]: a cross at the gain 0, else a circle, where one begins, dots, and diamonds on the axis."""
     begin = CROSS_AT_ZERO if found.vary == "gain" and found.values[0] == 0 else CIRCLE_AT_FIRST
     marked = np.linspace(found.values[0], found.values[-1], MARKED_VALUES)
-    found = rounded(found)
+    found = rounded_law_locus(found)
     first, *rest = (int(abs(found.values - value).argmin()) for value in marked)
     ax.axvline(0.0, color=INK, lw=0.9, zorder=1)
-    for number, branch in enumerate(shown(found.branches)):
+    for number, branch in enumerate(held_branches(found.branches)):
         colour = BRANCH_COLOURS[number % len(BRANCH_COLOURS)]
         ax.plot(branch.real, branch.imag, color=colour, lw=1.4, zorder=2)
         ax.plot(branch.real[first], branch.imag[first], color=colour, zorder=4, **begin)

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from tfarm.arm import Arm
 from tfarm.digits import plain
 from tfarm.dsp import Simulation, curves
-from tfarm.dsp.curves import Curve
+from tfarm.dsp.curves import TimeCurve
 from tfarm.dsp.ringing import POINTS_A_PERIOD
 
 from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, New, blank, headline, style, taken, window
@@ -53,7 +53,7 @@ def draw_responses(arm: Arm, each: Runs, what: str, new: New = blank) -> Figure:
     return figure
 
 
-def draw_curve(curve: Curve, ax: Axes, colour: str, label: str | None = None) -> None:
+def draw_curve(curve: TimeCurve, ax: Axes, colour: str, label: str | None = None) -> None:
     """The line, or the band."""
     if curve.is_band:
         ax.fill_between(curve.t, curve.low, curve.high, color=colour, alpha=0.55, lw=0.8, label=label)

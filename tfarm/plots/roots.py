@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from tfarm.digits import kept_digits, plain, significant
-from tfarm.loop.loci import GAPS_HELD, POLE_DIGITS, Loci, shown
+from tfarm.loop.loci import GAPS_HELD, POLE_DIGITS, Loci, held_branches
 from tfarm.loop.locus import Locus, frame, rounded
 from tfarm.loop.reduced_locus import ReducedLocus
 from tfarm.loop.variation import OF_THE_LAW
@@ -57,7 +57,7 @@ def draw_locus(exact: Locus, reduced: ReducedLocus | None = None, new: New = bla
 def _all(fine: Locus, exact: Locus, reduced: ReducedLocus | None, ax: Axes) -> None:
     every = range(len(exact.branches))
     _panel(fine, exact, reduced, every, ax, named=[*every, None])
-    _frame(shown(fine.branches), ax)
+    _frame(held_branches(fine.branches), ax)
     ax.set_xlabel("Re s [1/s]")
     ax.set_ylabel("Im s [rad/s]")
 
@@ -83,7 +83,7 @@ def draw_loci(data: Loci) -> Figure:
         whole = figure.add_subplot(grid[:, :2])
         numbers = range(len(exact.branches))
         _panel(fine, exact, data.reduced, numbers, whole, named=sorted(set(numbers) - set(zoomed(exact))))
-        _frame(shown(fine.branches), whole)
+        _frame(held_branches(fine.branches), whole)
         whole.set_title("all of them", fontsize=9.0)
         whole.xaxis.set_major_locator(MaxNLocator(5))
         whole.set_xlabel("Re s [1/s]")
@@ -92,7 +92,7 @@ def draw_loci(data: Loci) -> Figure:
             ax = figure.add_subplot(grid[place // 2, 2 + place % 2])
             _panel(fine, exact, data.reduced, [n], ax, named=[n])
             ax.xaxis.set_major_locator(MaxNLocator(3))
-            branch = shown(fine.branches[n])
+            branch = held_branches(fine.branches[n])
             _frame(branch[branch.imag >= 0], ax)
             name = f"mode {exact.mode[n]}" if exact.mode[n] else "rigid body"
             ax.set_title(name, fontsize=9.0, color=color_of(exact, n))
@@ -138,7 +138,7 @@ def _best(exact: Locus) -> float | None:
 def _at(exact: Locus, branch: int, values: Sequence[float]) -> Complex:
     """Where a branch is at these values, on the line that is drawn."""
     way = 1.0 if exact.gain[-1] > exact.gain[0] else -1.0
-    return np.asarray(np.interp(way * np.asarray(values), way * exact.gain, shown(exact.branches[branch])))
+    return np.asarray(np.interp(way * np.asarray(values), way * exact.gain, held_branches(exact.branches[branch])))
 
 
 def _panel(
@@ -150,7 +150,7 @@ def _panel(
     `fine` is `exact` with the values between that a round line takes, `reduced` stands beside `exact`.  None names
     crossings that lie on no branch that is drawn.
     """
-    branches, (begins, others) = shown(fine.branches), _marked(fine)
+    branches, (begins, others) = held_branches(fine.branches), _marked(fine)
     ax.axvline(0, color=INK, lw=0.9, zorder=1)
     for n in numbers:
         color, s = color_of(fine, n), branches[n]
@@ -176,9 +176,9 @@ def _reduced_branch(exact: Locus, reduced: ReducedLocus, n: int, color: str, ax:
     lives = ~np.isnan(reduced.branches[n])
     if lives.sum() < 2:
         return
-    curve, first = shown(reduced.branches[n][lives]), float(modes(exact.arm, 1).natural_frequency[-1])
+    curve, first = held_branches(reduced.branches[n][lives]), float(modes(exact.arm, 1).natural_frequency[-1])
     there = abs(exact.gain - reduced.gain[lives, None]).argmin(axis=1)  # the reduced one may have fewer values
-    size = abs(shown(exact.branches[n, there]))
+    size = abs(held_branches(exact.branches[n, there]))
     width = kept_digits(reduced.gap, GAPS_HELD)[n] * np.maximum(size, first)
     along = np.gradient(curve)
     normal = 1j * along / np.where(along == 0, 1, abs(along))

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from tfarm.digits import how_many, plain, significant
-from tfarm.dsp.curves import Curve, continuous, root_moment
+from tfarm.dsp.curves import TimeCurve, continuous, root_moment
 from tfarm.dsp.strip_chart import StripChart
 
 from .labels import OFFSETS_FURTHER, Label
@@ -62,7 +62,7 @@ def moment_strip(data: StripChart, is_close: bool, *, ax: Axes) -> None:
     s, step = data.simulation, significant(data.step, 3)
     hidden = "" if is_close else "_"
     t, y = continuous(s, "root_moment")
-    drawn = Curve(t, y, y, False) if is_close else root_moment(s)
+    drawn = TimeCurve(t, y, y, False) if is_close else root_moment(s)
     draw_curve(drawn, ax, BLUE, hidden + "root moment of the arm")
     ax.step(
         s.t, data.read, where="post", color=ORANGE, lw=1.1,

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.errors import ConvergenceError
-from tfarm.exact.chain import Chain
+from tfarm.exact.chain import ElementChain
 from tfarm.exact.chain_values import free_slopes
 from tfarm.exact.free import free_response
 from tfarm.exact.outputs import Output, unit_scale
@@ -39,7 +39,7 @@ def undamped_residues(table: Modes, wanted: Sequence[Output], k: System, x: floa
     `x` is a share of the length.
     """
     omega = table.natural_frequency[table.index > 0]
-    if isinstance(k, Chain):
+    if isinstance(k, ElementChain):
         powers = np.array([[each.power] for each in wanted])
         return np.asarray((_of_chain(k, wanted, 1j * omega, x)[0] * 2j * omega / (1j * omega) ** powers).real)
     close = np.r_[False, np.diff(omega) < CLOSE_FREQUENCIES * omega[1:], False]
@@ -59,7 +59,7 @@ def undamped_residues(table: Modes, wanted: Sequence[Output], k: System, x: floa
 
 def end_residues(k: System, wanted: Sequence[Output], p: Complex, x: float = 0.0) -> tuple[Complex, NDArray[np.bool_]]:
     """Residues (outputs, p) of outputs at hub and tip at eigenvalues p, and where they are in doubt."""
-    if isinstance(k, Chain):
+    if isinstance(k, ElementChain):
         return _of_chain(k, wanted, p, x)
     with np.errstate(all="ignore"):
         free = free_response(k, p)
@@ -78,7 +78,7 @@ def end_residues(k: System, wanted: Sequence[Output], p: Complex, x: float = 0.0
     return residues, free.parallel | ~np.isfinite(residues).all(axis=0)
 
 
-def _of_chain(k: Chain, wanted: Sequence[Output], p: Complex, x: float) -> tuple[Complex, NDArray[np.bool_]]:
+def _of_chain(k: ElementChain, wanted: Sequence[Output], p: Complex, x: float) -> tuple[Complex, NDArray[np.bool_]]:
     """Residues of a chain's outputs anywhere on it, and where they are in doubt."""
     with np.errstate(all="ignore"):
         here, slopes = free_slopes(k, wanted, p, x)

@@ -8,7 +8,7 @@ import numpy as np
 
 from tfarm.columns import Column, Table
 from tfarm.digits import kept_digits, scientific, significant, singly
-from tfarm.loop.loci import GAPS_HELD, POLE_DIGITS, Loci, shown
+from tfarm.loop.loci import GAPS_HELD, POLE_DIGITS, Loci, held_branches
 
 
 def crossing_table(data: Loci, stem: str) -> Table:
@@ -54,7 +54,7 @@ def loci_data(data: Loci, stem: str) -> Table:
     """The exact and the reduced branches."""
     columns = [Column(data.name, data.name, data.unit, of=data.exact.gain)]
     for kind, branches in (("exact", data.exact.branches), ("reduced", data.reduced.branches)):
-        for n, row in enumerate(shown(branches)):
+        for n, row in enumerate(held_branches(branches)):
             re, im = (["" if np.isnan(x) else x for x in part.tolist()] for part in (row.real, row.imag))
             columns.append(Column(f"{kind}_{n}_re", f"{kind} branch {n}, Re s", "1/s", of=re))
             columns.append(Column(f"{kind}_{n}_im", f"{kind} branch {n}, Im s", "rad/s", of=im))

@@ -16,7 +16,7 @@ from tfarm.dsp import Chain, sampled_verdict
 from tfarm.dsp import GainMap as SampledMap
 from tfarm.dsp import gain_map as sampled_map
 from tfarm.dsp.brief import SampledBrief
-from tfarm.dsp.regions import ends_of_K1, rounded, with_both_sides
+from tfarm.dsp.regions import ends_of_K1, rounded_map, with_both_sides
 from tfarm.errors import ConvergenceError
 from tfarm.loop.damping import least_damping
 from tfarm.loop.edges import Axis, edge, moment_axis, rate_axis
@@ -111,7 +111,7 @@ def sampled_part(arm: Arm, x: Axis, y: Axis, chain: Chain) -> SampledMap | None:
         across = x.grid(SAMPLED_COLUMNS)
         across = with_both_sides(across[across > 0], ends_of_K1(loop))
         plane = sampled_map(loop, across[x.high > across], [y.low - BEYOND_PICTURE, y.high + BEYOND_PICTURE])
-        return rounded(plane, lambda across, up: np.asarray(MAP_ASPECT * x.place(across) + 1j * y.place(up)))
+        return rounded_map(plane, lambda across, up: np.asarray(MAP_ASPECT * x.place(across) + 1j * y.place(up)))
     except ConvergenceError:
         return None
 

@@ -16,7 +16,7 @@ from tfarm.columns import Column, Table
 from tfarm.digits import plain
 from tfarm.dsp import GainMap, gain_map, sampled_verdict
 from tfarm.dsp.chain import Chain
-from tfarm.dsp.regions import Complex, Real, ends_of_K1, rounded, with_both_sides, with_more
+from tfarm.dsp.regions import Complex, Real, ends_of_K1, rounded_map, with_both_sides, with_more
 from tfarm.loop.regions import Region, region
 from tfarm.plots import regions
 from tfarm.plots.style import blank, headline, style
@@ -60,7 +60,7 @@ def stable_regions(arm: Arm, gains: HubFeedback, chain: Chain) -> StableRegions:
             OVERLAY_ASPECT * np.log(across / low) / np.log(top / low) + 1j * (up - span[0]) / np.ptp(span)
         )
 
-    planes = [rounded(gain_map(loop, across, cut), drawn) for loop in loops]
+    planes = [rounded_map(gain_map(loop, across, cut), drawn) for loop in loops]
     every = np.unique(np.concatenate([plane.axes[0] for plane in planes]))
     return StableRegions(region(arm, every, cut), tuple(with_more(plane, every) for plane in planes))
 

@@ -6,7 +6,7 @@ from tfarm.arm import PLANE
 from tfarm.columns import Column, Table
 from tfarm.digits import plain
 from tfarm.dsp.law import SAMPLED_MODE_COLUMNS, ModeTable
-from tfarm.dsp.loci import Loci
+from tfarm.dsp.loci import SampledLoci
 from tfarm.dsp.loop import SampledLoop
 
 MODE_TABLE = (
@@ -29,7 +29,7 @@ def mode_rows(loop: SampledLoop, table: ModeTable, stem: str) -> Table:
     )
 
 
-def loci_table(data: Loci, stem: str) -> Table:
+def loci_table(data: SampledLoci, stem: str) -> Table:
     """Every pole of the three loci with Im z >= 0: a row a gain and a branch."""
     rows = []
     for name, locus in ((f"{data.alone.gain} alone", data.alone), *data.by.items()):

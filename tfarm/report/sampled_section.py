@@ -10,7 +10,7 @@ from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, shown_unit
 from tfarm.columns import Column, Table
 from tfarm.digits import how_many, plain, scientific, significant, singly
 from tfarm.dsp import Chain, sampled_verdict
-from tfarm.dsp.loci import STRONGER, loci
+from tfarm.dsp.loci import STRONGER, sampled_loci
 from tfarm.dsp.margins import around
 from tfarm.dsp.slews import Slews, slews
 from tfarm.dsp.strip_chart import StripChart, strip_chart
@@ -141,7 +141,7 @@ def _mode_blocks(data: Sampled) -> list[Picture | Table]:
     T = loop.chain.sampling.period
     turning = data.arm.hub_side_inertia * data.arm.input_per_torque  # at the hub, in the unit of the input times s^2
     top = max(PAST_HUB * 2 * turning / T, STRONGER * data.gains[RATE_GAIN])
-    found = loci(loop, top, LOCUS_K2)
+    found = sampled_loci(loop, top, LOCUS_K2)
     aliased = [int(i) for i, band in zip(table.index, table.band, strict=True) if band > 0]
     first = f"From mode {aliased[0]} on all are aliased. " if aliased else "No mode here is aliased. "
     picture = Picture(

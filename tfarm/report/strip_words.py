@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tfarm.columns import Column, Table
 from tfarm.dsp.chain import Chain
-from tfarm.dsp.curves import held, root_moment
+from tfarm.dsp.curves import held_at, root_moment
 from tfarm.dsp.strip_chart import StripChart
 
 
@@ -30,8 +30,8 @@ def strip_table(data: StripChart, stem: str) -> Table:
     columns = (
         Column("t_s", "time", "s", of=drawn.t),
         *drawn.columns("root_moment", "root moment", "N m"),
-        Column("read_moment_N_m", "as the ADC reads it", "N m", of=held(s, data.read, drawn.t)),
-        Column("torque_asked_N_m", "torque asked", "N m", of=held(s, data.asked, drawn.t)),
-        Column("torque_given_N_m", "torque given, after the delay", "N m", of=held(s, s.torque, drawn.t)),
+        Column("read_moment_N_m", "as the ADC reads it", "N m", of=held_at(s, data.read, drawn.t)),
+        Column("torque_asked_N_m", "torque asked", "N m", of=held_at(s, data.asked, drawn.t)),
+        Column("torque_given_N_m", "torque given, after the delay", "N m", of=held_at(s, s.torque, drawn.t)),
     )
     return Table(stem=stem, title="Strip chart", is_data=True, columns=columns)

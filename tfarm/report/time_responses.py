@@ -103,7 +103,7 @@ def responses_table(stem: str, title: str, arm: Arm, each: Mapping[str, Simulati
     found = [(key, curves.root_moment(run), curves.tip_deviation(arm, run), run) for key, run in each.items()]
     t = min((moment.t for _, moment, _, _ in found), key=len)
     task = found[0][3].scenario
-    rigid = curves.held(found[0][3], np.r_[task.rigid_moment[1:], task.rigid_moment[-1:]], t)
+    rigid = curves.held_at(found[0][3], np.r_[task.rigid_moment[1:], task.rigid_moment[-1:]], t)
     columns: list[Column] = [
         Column("t_s", "time", "s", of=t),
         Column("rigid_moment_N_m", "rigid arm", "N m", of=rigid),
@@ -114,8 +114,8 @@ def responses_table(stem: str, title: str, arm: Arm, each: Mapping[str, Simulati
         columns += tip.at(t).columns(f"tip_error_{key}", "tip less reference", "m")
         given = "torque" if arm.input_unit == "N m" else "input"
         name = f"{given}_{key}_{arm.input_unit.replace(' ', '_')}"
-        columns.append(Column(name, given, arm.input_unit, of=curves.held(run, run.torque, t)))
+        columns.append(Column(name, given, arm.input_unit, of=curves.held_at(run, run.torque, t)))
         if run.gain is not None and np.ptp(run.gain):
-            columns.append(Column(f"K_{key}", "gain", of=curves.held(run, run.gain, t)))
+            columns.append(Column(f"K_{key}", "gain", of=curves.held_at(run, run.gain, t)))
     columns = [replace(each, of=kept_digits(map(float, each.values), CURVE_DIGITS)) for each in columns]
     return Table(stem=stem, title=title, is_data=True, columns=tuple(columns))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm
-from tfarm.exact.chain import Chain
+from tfarm.exact.chain import ElementChain
 from tfarm.exact.chain_values import free_slopes, order_at_zero
 from tfarm.exact.chaining import chain_of
 from tfarm.exact.characteristic import Analytic, characteristic, deflated
@@ -63,7 +63,7 @@ def zeros_of(arm: Arm, wanted: Output, up_to: float, x: float) -> Roots:
     order, numerator = _numerator(k, wanted, x)
     at_zero = max(0, order + wanted.power - k.at_rest)
     neighbour = {("theta", "root"): math.inf, ("M", "root"): 0.0}.get((wanted.quantity, wanted.place))
-    neighbour = None if isinstance(k, Chain) and neighbour == 0.0 else neighbour
+    neighbour = None if isinstance(k, ElementChain) and neighbour == 0.0 else neighbour
     other = arm if neighbour is None else arm.having(hub_inertia=neighbour)
     if neighbour is not None and arm.is_undamped:
         return _on_axis(flexible_frequencies(other, up_to), at_zero, up_to)

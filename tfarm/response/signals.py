@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import FED_BACK, Arm
 from tfarm.errors import MISSING, ParameterError
-from tfarm.exact.chain import Chain
+from tfarm.exact.chain import ElementChain
 from tfarm.exact.chain_values import free_outputs, series_at_zero
 from tfarm.exact.chaining import chain_of
 from tfarm.exact.characteristic import LoopParts, float_units, loop_parts
@@ -74,7 +74,7 @@ class Signals:
     def parts(self, s: NDArray[Any]) -> LoopParts:
         """Drive (n,), numerators (signals, n) in SI per unit of the input, and scale, at s of any shape."""
         k, s = self.system, np.asarray(s, dtype=complex)
-        if not isinstance(k, Chain):
+        if not isinstance(k, ElementChain):
             found = loop_parts(k, s)
             rows = [FED_BACK.index(name) for name in self.names]
             units = float_units(k).reshape(-1, *[1] * s.ndim)
@@ -118,7 +118,7 @@ class Signals:
     @cached_property
     def _series(self) -> dict[int, Real]:
         """Power series at rest, coefficients from s^-2 on, of outputs relative to the hub."""
-        assert isinstance(self.system, Chain)
+        assert isinstance(self.system, ElementChain)
         found = {}
         for n, (wanted, share) in enumerate(zip(self.outputs, self.places, strict=True)):
             if wanted.quantity in ("Y", "Phi"):

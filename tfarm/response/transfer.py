@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from tfarm.arm import INPUT_UNITS, Arm, Input, must_be_arm
 from tfarm.errors import MISSING, ParameterError
-from tfarm.exact.balls import nearest
-from tfarm.exact.chain import Chain
+from tfarm.exact.balls import nearest_float
+from tfarm.exact.chain import ElementChain
 from tfarm.exact.chaining import chain_of
 from tfarm.exact.loads import is_load, load_of, loaded_value
 from tfarm.exact.methods import Method, known_method, slow_values
@@ -159,11 +159,11 @@ class TransferFunction:
         )
 
     def _values(self, s: Complex) -> Complex:
-        if self.load is not None and isinstance(self._k, Chain):
+        if self.load is not None and isinstance(self._k, ElementChain):
             of_load = np.empty((len(self.rows), s.size), complex)
             for row, each in enumerate(self.rows):
                 balls = (loaded_value(self._k, self.load, each, complex(at), self._share) for at in s)
-                of_load[row] = [nearest(ball) for ball in balls]
+                of_load[row] = [nearest_float(ball) for ball in balls]
             return of_load
         if self.method != "closed-form":
             return slow_values(self.method, self.arm, self._k, self.rows, s, self._share)

@@ -8,30 +8,30 @@ from typing import Any
 import flint
 
 from tfarm.exact.balls import rational
-from tfarm.exact.chain import Chain
+from tfarm.exact.chain import ElementChain
 from tfarm.exact.closed_form import from_waves
 from tfarm.exact.coefficients import Coefficients
-from tfarm.exact.compiled import plain
+from tfarm.exact.compiled import python_of
 from tfarm.exact.system import System
 
 from .chain_axis import ChainAxis
-from .counting import row_of, steps_of
+from .counting import end_row, steps_of
 from .half_waves import pinned_count, real_waves
 
 Ball = Any
-_minors = plain(from_waves)
+_minors = python_of(from_waves)
 
 MOST_AXIS_BITS = 40_000  # of working precision: a root that needs more is double
 
 
-class Axis:
+class ArmAxis:
     """The arm on the imaginary axis in real balls, at the working precision at which it is made."""
 
     def __init__(self, k: Coefficients) -> None:
         self._a, self._b, self._g = rational(k.a), rational(k.b), rational(k.g)
         rows, self._steps = steps_of(k)
         self._rows = [[rational(number) for number in row] for row in rows]
-        self._own = [rational(number) for number in row_of(k)]
+        self._own = [rational(number) for number in end_row(k)]
 
     def drive(self, omega: Ball) -> Ball:
         """D(i omega) times a positive factor."""
@@ -59,12 +59,12 @@ class Axis:
         return row[8] * M0 - (row[6] + row[7] * S) * theta  # the sign of g S is minus
 
 
-def axis_of(k: System) -> Axis | ChainAxis:
+def axis_of(k: System) -> ArmAxis | ChainAxis:
     """The system on the imaginary axis, at the working precision."""
-    return ChainAxis(k) if isinstance(k, Chain) else Axis(k)
+    return ChainAxis(k) if isinstance(k, ElementChain) else ArmAxis(k)
 
 
-def secant(axis: Axis | ChainAxis, omega: float, digits: int) -> Ball | None:
+def secant(axis: ArmAxis | ChainAxis, omega: float, digits: int) -> Ball | None:
     """The root next to omega by the secant method on midpoints; None if it does not settle close by."""
     before, now = flint.arb(omega), flint.arb(omega) * (1 + flint.arb(2) ** -50)
     value_before = axis.drive(before).mid()
@@ -82,7 +82,7 @@ def secant(axis: Axis | ChainAxis, omega: float, digits: int) -> Ball | None:
     return None
 
 
-def precisions(digits: int) -> Iterator[int]:
+def axis_precisions(digits: int) -> Iterator[int]:
     """Working precisions [bits] worth trying for so many digits, each twice the one before."""
     bits = int(3.33 * digits) + 80
     while bits < MOST_AXIS_BITS:

@@ -26,7 +26,7 @@ from tfarm.exact.balls import precision, rational
 from tfarm.exact.system import System
 from tfarm.records import record
 
-from .ball_axis import axis_of, precisions, secant
+from .ball_axis import axis_of, axis_precisions, secant
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +64,7 @@ def _bracket(k: System, omega: float, digits: int) -> tuple[Fraction, Fraction]:
     """Neighbouring decimals of so many digits with a proven sign change of D between them."""
     exponent = math.floor(math.log10(omega)) - digits + 1
     unit = Fraction(10) ** exponent
-    for bits in precisions(digits):
+    for bits in axis_precisions(digits):
         with precision(bits):
             axis = axis_of(k)
             root = secant(axis, omega, digits)

@@ -11,16 +11,16 @@ from typing import Any
 import flint
 
 from tfarm.exact.balls import rational
-from tfarm.exact.chain import Chain
+from tfarm.exact.chain import ElementChain
 from tfarm.exact.chain_balls import Sweep, drive_of
-from tfarm.exact.compiled import plain
+from tfarm.exact.compiled import python_of
 from tfarm.exact.compound import Plane, across_waves
 from tfarm.exact.elements import Element, Segment, Spring
 
 from .half_waves import pinned_count, real_waves
 
 Ball = Any
-_across_waves = plain(across_waves)
+_across_waves = python_of(across_waves)
 
 
 class UncertainError(Exception):
@@ -30,7 +30,7 @@ class UncertainError(Exception):
 class AxisSweep(Sweep):
     """The sweep at s = i omega, in real balls: `s` stands for 0, `S` for -omega^2.  It counts on its way."""
 
-    def __init__(self, chain: Chain, omega: Ball, counting: bool) -> None:
+    def __init__(self, chain: ElementChain, omega: Ball, counting: bool) -> None:
         self._omega, self._counting = omega, counting
         self.number = 0
         self._free = sum(not isinstance(end, float) for end in (chain.tip_mass, chain.tip_inertia))
@@ -97,7 +97,7 @@ class AxisSweep(Sweep):
 class ChainAxis:
     """A chain on the imaginary axis in real balls, at the working precision, as `ball_axis.Axis` is of an arm."""
 
-    def __init__(self, chain: Chain) -> None:
+    def __init__(self, chain: ElementChain) -> None:
         self._chain = chain.with_damping(0.0)
 
     def drive(self, omega: Ball) -> Ball:

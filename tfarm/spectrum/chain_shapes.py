@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.errors import ConvergenceError
-from tfarm.exact.chain import Chain
+from tfarm.exact.chain import ElementChain
 from tfarm.exact.chain_values import free_fields
 from tfarm.exact.elements import Body, Place, Segment
 
@@ -32,7 +32,7 @@ class ChainShapes:
     those of its outer side.  Raises ConvergenceError for a mode that the hub's axis cannot tell from another one.
     """
 
-    def __init__(self, chain: Chain, omega: Real) -> None:
+    def __init__(self, chain: ElementChain, omega: Real) -> None:
         self.chain, self.omega = chain, omega
         self._factor: Real = np.ones(omega.size)
         self._size = free_fields(chain, 1j * omega, ())[2].real  # a chain that is cut has other scales

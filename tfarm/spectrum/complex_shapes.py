@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.errors import ConvergenceError
-from tfarm.exact.balls import State, nearest, point, precision
-from tfarm.exact.chain import Chain
+from tfarm.exact.balls import State, nearest_float, point, precision
+from tfarm.exact.chain import ElementChain
 from tfarm.exact.chain_values import free_fields
 from tfarm.exact.characteristic import characteristic
-from tfarm.exact.coefficients import Condition
+from tfarm.exact.coefficients import EndCondition
 from tfarm.exact.elements import Place
 from tfarm.exact.free import free_response
 from tfarm.exact.system import System
@@ -28,12 +28,12 @@ def mode_field(k: System, s: complex, quantity: str, x: NDArray[np.float64]) -> 
     At an eigenvalue  D'(s) theta = a  (locked hub: D'(s) M0 = a),  a the mode's  2 s (mass) + (damping)  in the shape's
     own scale (reciprocity, differentiated); the shape is scaled to  a = 2 s, its tip moving up (turning, if pinned).
     """
-    if isinstance(k, Chain):
+    if isinstance(k, ElementChain):
         return _of_chain(k, s, quantity, x)
     at = np.array([s])
     free = free_response(k, at)
     theta, M0, slope = (complex(part) for part in (free.theta.c[0][0], free.M.c[0][0], characteristic(k, at).slope[0]))
-    hub = Condition.of(k.hub_inertia)
+    hub = EndCondition.of(k.hub_inertia)
     turning, force = float(hub.inertia) * s * s, float(hub.force)
     by_moment = k.is_locked or abs(turning) > force  # a heavy hub hardly turns: M0 keeps its digits
     if by_moment:
@@ -44,14 +44,14 @@ def mode_field(k: System, s: complex, quantity: str, x: NDArray[np.float64]) -> 
     with precision(128 + 8 * math.ceil(abs(np.real(free.scale[0])))):
         state = State(k, point(s))
         one = state.M0 if by_moment else state.theta
-        values = [nearest(_at(state, quantity, float(share)) / one) for share in x]
-        tip = nearest(_at(state, "W" if isinstance(k.tip_mass, Fraction) else "Psi", 1.0) / one)
+        values = [nearest_float(_at(state, quantity, float(share)) / one) for share in x]
+        tip = nearest_float(_at(state, "W" if isinstance(k.tip_mass, Fraction) else "Psi", 1.0) / one)
     unit = -unit if (unit * tip).real < 0 else unit
     shape: Complex = unit * np.array(values, dtype=complex)
     return shape
 
 
-def _of_chain(k: Chain, s: complex, quantity: str, x: NDArray[np.float64]) -> Complex:
+def _of_chain(k: ElementChain, s: complex, quantity: str, x: NDArray[np.float64]) -> Complex:
     """`mode_field` of a chain: the reciprocity is that of torque and hub angle, or of hub angle and moment if held."""
     at, places = np.array([s]), [Place(Fraction(float(share))) for share in (*x, 1.0)]
     fields, theta, scale = free_fields(k, at, [*places, Place(Fraction(0), "inner")])

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from tfarm.errors import ConvergenceError
 
 from .box import Complex, Function
-from .correction import Member, corrected, paired
+from .correction import Member, as_pairs, corrected
 
 Real = NDArray[np.float64]
 
@@ -122,12 +122,12 @@ def predicted(nodes: list[Node], at: float) -> Complex:
     """The pairs by polynomials through the last nodes, three at most, of what stays smooth."""
     guess = nodes[-1].zeros
     for number in range(2, min(3, len(nodes)) + 1):
-        longer = through(nodes[-number:], at)
+        longer = through_nodes(nodes[-number:], at)
         guess = np.where(np.isnan(longer), guess, longer)
     return guess
 
 
-def through(nodes: list[Node], at: float | Real) -> Complex:
+def through_nodes(nodes: list[Node], at: float | Real) -> Complex:
     """The pairs (*at.shape, n, 2) at other values of the parameter, by polynomials through all these nodes.
 
     Of mean and square of half the distance; of two real zeros far apart of each itself, of the slower the inverse.
@@ -140,7 +140,7 @@ def through(nodes: list[Node], at: float | Real) -> Complex:
     zeros = np.stack([node.zeros for node in nodes])
     mean, half = zeros.mean(2).real, (zeros[..., 0] - zeros[..., 1]) / 2
     square = (half * half).real
-    pairs = paired(weights @ mean, weights @ square)
+    pairs = as_pairs(weights @ mean, weights @ square)
     slow = zeros[..., 0].real
     far = ((square > 0.1 * mean**2) & (slow * slow[0] > 0)).all(0)
     inverse = weights @ np.where(far, 1 / np.where(far, slow, 1), 1)

@@ -39,13 +39,13 @@ class Member(NamedTuple):
 
 def corrected(member: Member, guess: Complex) -> tuple[Complex, NDArray[np.bool_]]:
     """The pairs of zeros next to the guess, and which of them did not settle there."""
-    zeros, beside = guess, nearest(guess)
+    zeros, beside = guess, neighbours_of(guess)
     for _ in range(12):
         zeros, moved = improved(member, zeros, beside)
         if not (np.isfinite(zeros) | np.isnan(guess)).all():
             break
         if (moved < SETTLED_CORRECTION).all():
-            gap, _ = _gaps(zeros, member, nearest(zeros))
+            gap, _ = _gaps(zeros, member, neighbours_of(zeros))
             met = (guess[:, 0].imag > 0) != (zeros[:, 0].imag > 0)  # around a meeting on the axis the mean is compared
             away = np.where(met[:, None], abs((guess - zeros).mean(1))[:, None], abs(guess - zeros))
             return zeros, np.asarray(np.any(~(away < BELIEVED_SHARE * gap) & ~np.isnan(guess), axis=1))
@@ -60,7 +60,7 @@ class Neighbours(NamedTuple):
     own_pair: NDArray[np.bool_]
 
 
-def nearest(zeros: Complex) -> Neighbours:
+def neighbours_of(zeros: Complex) -> Neighbours:
     """The zeros next to each of the pairs' zeros (n, 2), itself among them."""
     flat = zeros.ravel()
     number, each = min(NEIGHBOURS, flat.size), np.arange(flat.size)[:, None]
@@ -89,9 +89,9 @@ def _gaps(zeros: Complex, member: Member, beside: Neighbours) -> tuple[Real, Com
 def improved(member: Member, zeros: Complex, beside: Neighbours | None = None) -> tuple[Complex, Real]:
     """One correction of every pair, and how far each moved, as a share of its distance to the next zero.
 
-    `beside` are the `nearest` zeros, where they are known from before the first of a few corrections.
+    `beside` are the `neighbours_of` zeros, where they are known from before the first of a few corrections.
     """
-    beside = beside or nearest(zeros)
+    beside = beside or neighbours_of(zeros)
     gap, way = _gaps(zeros, member, beside)
     is_real = zeros.imag[:, 0] == 0
     value, slope, scale = _of_pairs(member.function, zeros, is_real)
@@ -150,10 +150,10 @@ def _together(zeros: Complex, value: Complex, slope: Complex) -> Complex:
     )  # most like +-1
     mean = (middle + half * (one + two) / 2).real
     square = ((half * (one - two) / 2) ** 2).real
-    return paired(np.array([mean]), np.array([square]))[0]
+    return as_pairs(np.array([mean]), np.array([square]))[0]
 
 
-def paired(mean: Real, square: Real) -> Complex:
+def as_pairs(mean: Real, square: Real) -> Complex:
     """mean +- sqrt(square), with Im > 0 or the slower first."""
     root = np.sqrt(abs(square))
     upper, away = mean + 1j * root, np.copysign(root, mean)

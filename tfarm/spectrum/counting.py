@@ -22,9 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.exact.axis import bisect, drives
-from tfarm.exact.chain import Chain
-from tfarm.exact.chain_axis import bisect_chain, counted, counts
-from tfarm.exact.coefficients import Coefficients, Condition
+from tfarm.exact.chain import ElementChain
+from tfarm.exact.chain_axis import bisect_chain, chain_counts, rows_to_count
+from tfarm.exact.coefficients import Coefficients, EndCondition
 from tfarm.exact.system import System
 from tfarm.exact.vector import DAMPING
 
@@ -32,12 +32,12 @@ from tfarm.exact.vector import DAMPING
 class ChainCounter:
     """N(omega) of a chain, as `Counter` is of an arm (see `tfarm.exact.chain_axis`)."""
 
-    def __init__(self, chain: Chain) -> None:
-        self._rows, self._ends = counted(chain.with_damping(0.0).at())
+    def __init__(self, chain: ElementChain) -> None:
+        self._rows, self._ends = rows_to_count(chain.with_damping(0.0).at())
 
     def __call__(self, omega: NDArray[np.float64]) -> NDArray[np.int64]:
         """The counts, in the shape of omega (1-D, rad/s, positive)."""
-        return counts(np.ascontiguousarray(omega, dtype=float), self._rows, self._ends)
+        return chain_counts(np.ascontiguousarray(omega, dtype=float), self._rows, self._ends)
 
     def first_reaching(self, number: NDArray[np.int64], below: float) -> NDArray[np.float64]:
         """The smallest floats [rad/s] with a count of `number` at least, by bisection of 0..below."""
@@ -48,7 +48,7 @@ class ChainCounter:
 
 def counter_of(k: System) -> Counter | ChainCounter:
     """The count of a system."""
-    return ChainCounter(k) if isinstance(k, Chain) else Counter(k)
+    return ChainCounter(k) if isinstance(k, ElementChain) else Counter(k)
 
 
 class Counter:
@@ -84,12 +84,12 @@ def steps_of(k: Coefficients) -> tuple[list[list[Fraction]], list[int]]:
         inertia = getattr(k, part)
         if inertia != getattr(arm, part):
             arm = replace(arm, **{part: inertia})
-            rows.append(row_of(arm))
+            rows.append(end_row(arm))
             steps.append(-1 if inertia == math.inf else 1)
     return rows, steps
 
 
-def row_of(k: Coefficients) -> list[Fraction]:
+def end_row(k: Coefficients) -> list[Fraction]:
     """The nine numbers of the arm's own end conditions: tip mass, tip inertia, hub."""
-    ends = (Condition.of(inertia) for inertia in (k.tip_mass, k.tip_inertia, k.hub_inertia))
+    ends = (EndCondition.of(inertia) for inertia in (k.tip_mass, k.tip_inertia, k.hub_inertia))
     return [number for end in ends for number in (end.rest, end.inertia, end.force)]

@@ -36,7 +36,7 @@ LITTLE = (2, *COMPANY)  # where many C are met and more modes than matter are fo
 MANY_MODES = 30  # of more one number in company is tried, as each step takes long
 BESIDE_DISC = 1e-12  # how far a listed eigenvalue may be from its disc, of its size (more beside its own partner)
 TOWARD_SINGULAR = 0.8  # how far towards -1/C, where real eigenvalues accumulate, a box may reach
-FIRST_STEP = 0.01  # the first step in C, over 1/w of the highest mode
+FIRST_STEP_IN_C = 0.01  # the first step in C, over 1/w of the highest mode
 
 
 @dataclass(frozen=True)
@@ -230,7 +230,7 @@ class Branches:
                 continue
             met = self._met.get(key) or [_first_node(undamped, wanted + company, C)]
             start = sorted((node for node in met if node.at <= C), key=lambda node: node.at)[-1]
-            first = C - start.at if len(met) > 1 else min(C, FIRST_STEP / abs(start.zeros[-1, 0]))
+            first = C - start.at if len(met) > 1 else min(C, FIRST_STEP_IN_C / abs(start.zeros[-1, 0]))
             try:
                 nodes = follow(lambda level: member(k.with_damping(level / C if C else 0.0)), start, C, first, wanted)
             except ConvergenceError as error:

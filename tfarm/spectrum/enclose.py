@@ -25,7 +25,7 @@ from tfarm.exact.characteristic import NO_GAINS, Gains
 from tfarm.exact.system import System
 from tfarm.exact.wide_balls import characteristic_over, tangent
 
-from .ball_axis import precisions
+from .ball_axis import axis_precisions
 from .box import Box
 
 SHORTEST_PIECE = 2.0**-26  # a piece of contour shorter than this share of it means a zero on it
@@ -95,7 +95,7 @@ def enclosed(k: System, near: complex, digits: int, gains: Gains = NO_GAINS) -> 
 
     Raises CertificationError where no disc can be proven, around a double zero for instance.
     """
-    for bits in precisions(digits):
+    for bits in axis_precisions(digits):
         with precision(bits):
             middle = _newton(k, gains, near, digits)
             if middle is None:

@@ -8,7 +8,7 @@ from tfarm.errors import ConvergenceError
 from tfarm.exact.balls import precision
 from tfarm.exact.system import System
 
-from .ball_axis import axis_of, precisions, secant
+from .ball_axis import axis_of, axis_precisions, secant
 
 
 def refine(k: System, omega: float, digits: int) -> str:
@@ -17,7 +17,7 @@ def refine(k: System, omega: float, digits: int) -> str:
     The sign of D(i w) is proven to change within a tenth of the last digit of the root that is printed.
     Raises ConvergenceError where it does not: for a double frequency, or a pair closer than float64 can tell.
     """
-    for bits in precisions(digits):
+    for bits in axis_precisions(digits):
         with precision(bits):
             axis = axis_of(k.with_damping(0.0))
             root = secant(axis, omega, digits)

@@ -16,13 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.exact.closed_form import SERIES_RADIUS, even_functions
-from tfarm.exact.coefficients import Coefficients, Condition
-from tfarm.exact.compiled import plain
+from tfarm.exact.coefficients import Coefficients, EndCondition
+from tfarm.exact.compiled import python_of
 from tfarm.exact.fields import Wave, free_root, from_root, tip_condition, waves
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
-_even = plain(even_functions)
+_even = python_of(even_functions)
 
 GAUSS_POINTS = 16  # a panel; exact for the products of waves once a panel holds a few radians
 DOUBLE = 4e-15  # relative gap under which two frequencies are one, with two modes
@@ -80,7 +80,7 @@ class Shapes:
     def theta(self) -> Real:
         """Hub angle of each mode; from the hub's own balance where its inertia leads, so that no digit is lost."""
         root = self(np.zeros(1))[..., 0]
-        hub = Condition.of(self.k.hub_inertia)
+        hub = EndCondition.of(self.k.hub_inertia)
         if self.k.is_locked:
             return np.zeros_like(self.omega)
         inertia, force = float(hub.inertia) * self._S, float(hub.force)
@@ -142,7 +142,7 @@ class Shapes:
         if not S.size:
             return np.empty((4, 0), complex)
         root, tip = self._basis(np.zeros(1))[..., 0], self._basis(np.ones(1))[..., 0]
-        hub = Condition.of(self.k.hub_inertia)
+        hub = EndCondition.of(self.k.hub_inertia)
         tip_mass, shear, tip_inertia, moment = tip_condition(self.k, S)
         drive = float(hub.rest) + float(hub.inertia) * S
         rows = np.array([

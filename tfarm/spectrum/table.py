@@ -13,7 +13,7 @@ from tfarm.arm import THEORIES, Arm, Theory, must_be_arm
 from tfarm.arm.checks import whole
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exact.appendix import natural_frequency, roots_near
-from tfarm.exact.chain import Chain
+from tfarm.exact.chain import ElementChain
 from tfarm.exact.coefficients import Coefficients
 from tfarm.exact.methods import APPENDIX_DIGITS, Method, known_method
 from tfarm.exact.system import System, shear_flexibility, system_of
@@ -179,7 +179,7 @@ class Modes:
     @cached_property
     def _shapes(self) -> Shapes | ChainShapes:
         k, flexible = self._k, self.natural_frequency[self._rigid :]
-        return ChainShapes(k, flexible) if isinstance(k, Chain) else Shapes(k, flexible)
+        return ChainShapes(k, flexible) if isinstance(k, ElementChain) else Shapes(k, flexible)
 
     def _field(self, which: int, x: NDArray[np.float64] | float) -> Real:
         share = np.asarray(x, dtype=float) / float(self._k.length)

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN, Arm
 from tfarm.dsp import SampledLoop, sampled_loop, stable_windows
 from tfarm.dsp.margins import around
-from tfarm.dsp.sampling import held
+from tfarm.dsp.sampling import held_amplitude
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError, did_you_mean
 from tfarm.records import record
 from tfarm.tuner.lyapunov import CommonLyapunov
@@ -189,7 +189,7 @@ def upper_modes_are_quiet(loop: SampledLoop, highest: float) -> bool:
     """Whether the upper half of the modes lose more in a sample by themselves than the feedback could give them."""
     plant, T = loop.plant, loop.chain.sampling.period
     fed_back = loop.under(loop.gains.having(MOMENT_GAIN, highest)).push
-    push = 2 * fed_back * abs(held(plant.poles, T))
+    push = 2 * fed_back * abs(held_amplitude(plant.poles, T))
     upper = (plant.mode > plant.count // 2) & (plant.poles.imag > 0)
     return bool((push[upper] < -plant.poles.real[upper] * T).all())
 
