@@ -13,7 +13,7 @@ from tfarm.fitting.data import Measured
 from tfarm.fitting.noise import noise_of
 from tfarm.fitting.overlay import overlay
 from tfarm.fitting.ratio import Ratio
-from tfarm.fitting.resonances import must_be_in_unit, paired
+from tfarm.fitting.resonances import matched_peaks, must_be_in_unit
 
 LAB = tfarm.load("sasaki2012-lab")
 TRUE = replace(LAB, link=replace(LAB.link, youngs_modulus=1.2 * LAB.link.youngs_modulus, damping=2e-4))
@@ -108,7 +108,7 @@ def test_peaks_a_third_off_and_missing_ones_are_no_other_unit():
 
 def test_pairs_are_in_order_and_of_least_cost():
     """By hand: 1.3 is nearer to 1 than leaving both costs; of 5 and 6 the nearer one; 40 has nobody."""
-    pairs, cost = paired(np.array([1.3, 5.0, 40.0]), np.array([1.0, 4.0, 6.0]), (0.5, 100.0))
+    pairs, cost = matched_peaks(np.array([1.3, 5.0, 40.0]), np.array([1.0, 4.0, 6.0]), (0.5, 100.0))
     assert pairs == [(0, 0), (1, 2)]
     assert cost == pytest.approx(np.log(1.3) + np.log(6 / 5) + 0.3 + 0.3)
 

@@ -8,7 +8,7 @@ import pytest
 
 import tfarm
 from tfarm.errors import ParameterError
-from tfarm.tuner import Plan, load_tuner, save, tune
+from tfarm.tuner import Plan, load_tuner, save_tuner, tune
 from tfarm.tuner.saving import to_text
 
 
@@ -19,7 +19,7 @@ def tuning():
 
 def test_there_and_back(tuning, tmp_path):
     saved = tuning.saved()
-    save(saved, tmp_path / "tuner.json")
+    save_tuner(saved, tmp_path / "tuner.json")
     again = load_tuner(tmp_path / "tuner.json")
     np.testing.assert_array_equal(again.network.weights, saved.network.weights)
     np.testing.assert_array_equal(again.network.scales, saved.network.scales)

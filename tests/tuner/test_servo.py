@@ -19,7 +19,7 @@ from tfarm.tuner import (
     find_guard,
     initial_network,
     load_tuner,
-    save,
+    save_tuner,
     simulated,
     slew_trial,
     tune,
@@ -139,7 +139,7 @@ def test_the_usual_rate_gain_damps_the_rigid_arm():
 
 
 def test_files_say_the_servo_and_old_ones_have_none(tuning, tmp_path):
-    save(tuning.saved(), tmp_path / "servo.json")
+    save_tuner(tuning.saved(), tmp_path / "servo.json")
     again = load_tuner(tmp_path / "servo.json")
     assert (again.Kp, to_text(again)) == (KP, to_text(tuning.saved()))
     content = json.loads((tmp_path / "servo.json").read_text())

@@ -17,7 +17,7 @@ AnyLaw = HubFeedback | Law
 CANCELLED = 1e-6  # of its size: a zero of the law so near to an unstable pole of it cancels that
 
 
-def through(arm: Arm, law: AnyLaw) -> tuple[Arm, AnyLaw]:
+def arm_and_law(arm: Arm, law: AnyLaw) -> tuple[Arm, AnyLaw]:
     """The arm with the input that the law drives, and the law as gains at the hub where it is no more than those.
 
     Raises ParameterError for what is no law.
@@ -36,7 +36,7 @@ def tracked(arm: Arm, law: AnyLaw) -> tuple[Arm, AnyLaw]:
 
     So a law that is no more than gains is taken for them where each of its signals is among its references.
     """
-    driven, plain = through(arm, law)
+    driven, plain = arm_and_law(arm, law)
     if isinstance(law, Law) and not set(law.signals) <= set(law.references):
         return driven, law
     return driven, plain

@@ -107,21 +107,24 @@ class Turning:
         return not any((*(link.damping for link in self.links), self.clamp.damping, self.joint.damping))
 
     @property
+    def _turning_friction(self) -> float:
+        """b + N^2 b_m [N m s/rad], of hub and rotor as the hub feels it."""
+        return self.hub.friction + (self.motor.gear_ratio**2 * self.motor.rotor_friction if self.motor else 0.0)
+
+    @property
     def rate_loss(self) -> float:
         """What the input must give for 1 rad/s: of N m for b + N^2 b_m, and of a voltage N Ke for the back-EMF too."""
         if self.motor is None:
             return self.hub.friction
-        N, loss = self.motor.gear_ratio, self.hub.friction + self.motor.gear_ratio**2 * self.motor.rotor_friction
-        back_emf = N * self.motor.back_emf_constant if self.input == "motor_voltage" else 0.0
-        return self.input_per_torque * loss + back_emf
+        back_emf = self.motor.gear_ratio * self.motor.back_emf_constant if self.input == "motor_voltage" else 0.0
+        return self.input_per_torque * self._turning_friction + back_emf
 
     @property
     def turned_inertia(self) -> float:
         """J in units of the input [N m s^2, A s^2 or V s^2]; with an inductance what friction adds through L_a/R."""
         lag = 0.0
         if self.motor is not None and self.input == "motor_voltage":
-            loss = self.hub.friction + self.motor.gear_ratio**2 * self.motor.rotor_friction
-            lag = self.motor.inductance / self.motor.resistance * loss
+            lag = self.motor.inductance / self.motor.resistance * self._turning_friction
         return self.input_per_torque * (self.total_inertia + lag)
 
     @property

@@ -69,12 +69,6 @@ def _roots(
     return Case(name=ends, arm=arm, theory="euler-bernoulli", quantity=quantity, printed=printed, why=why or {})
 
 
-def _slender(ends: str, printed: tuple[str, ...]) -> Case:
-    arm = beam(slenderness=SLENDER, **END_CONDITIONS[ends])
-    name = f"{ends}, L/r = {SLENDER:g}"
-    return Case(name=name, arm=arm, theory="timoshenko", quantity=WAVE_NUMBER, printed=printed)
-
-
 # By the ends of the beam.
 PINNED_ROOTS = ("3.92660231", "7.06858275", "10.21017612", "13.35176878", "16.49336143")
 BLEVINS_ROOTS = {
@@ -185,7 +179,16 @@ SOURCES: tuple[Source, ...] = (
                 _roots(ends, printed, why={3: BLEVINS_LAST_DIGIT} if ends == "clamped-clamped" else {})
                 for ends, printed in BLEVINS_ROOTS.items()
             ),
-            *(_slender(ends, BLEVINS_ROOTS[ends][:3]) for ends in ("clamped-free", "clamped-pinned", "pinned-free")),
+            *(
+                Case(
+                    name=f"{ends}, L/r = {SLENDER:g}",
+                    arm=beam(slenderness=SLENDER, **END_CONDITIONS[ends]),
+                    theory="timoshenko",
+                    quantity=WAVE_NUMBER,
+                    printed=BLEVINS_ROOTS[ends][:3],
+                )
+                for ends in ("clamped-free", "clamped-pinned", "pinned-free")
+            ),
         ),
     ),
     Source(

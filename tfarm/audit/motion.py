@@ -91,7 +91,7 @@ def transformed(f: Expression) -> Expression:
     return f.subs(images, simultaneous=True)
 
 
-def in_s(number: int, text: str) -> str:
+def is_transform(number: int, text: str) -> str:
     """(8)-(14): against the transform of (1)-(7)."""
     return remainder(transformed(difference(TIME[number - 7])) - difference(text))
 
@@ -110,7 +110,7 @@ def solved_motion() -> tuple[dict[Expression, Expression], ...]:
     return arm, tip, hub
 
 
-CHECKS: dict[int, Callable[[str], str]] = {number: partial(in_s, number) for number in LAPLACE}
+CHECKS: dict[int, Callable[[str], str]] = {number: partial(is_transform, number) for number in LAPLACE}
 CHECKS |= {
     1: partial(along_arm, "y"),
     2: partial(along_arm, "phi"),

@@ -13,7 +13,7 @@ from tfarm.arm import Attachment, Hub, Payload, RotarySpring
 from .literature import ANGULAR, SLENDER, WAVE_NUMBER, Case, Source, beam, inf
 
 LIGHT = 1e-9  # mass of a beam that has none, beside masses of 1
-FAR = 1e10  # lengths to a point about which an end turns that only slides: what is left of the turn goes with 1/FAR
+FAR_AXIS = 1e10  # lengths to a point about which an end turns that only slides: what is left goes with 1/FAR_AXIS
 
 
 # By the stiffness k L/EI of the root.
@@ -22,8 +22,8 @@ GHALI_BEAM = beam(slenderness=SLENDER)
 # An end that slides but does not turn is one that turns about a point far away.
 SLIDING_ROOTS = ("2.36502037", "5.49780392", "8.63937983", "11.78097245", "14.92256510")
 SLIDING_ARMS = {
-    "sliding-free, the clamp 1e10 L off the axis": replace(beam(), hub=Hub(inertia=0.0, radius=FAR)),
-    "clamped-sliding, the tip held 1e10 L beyond": replace(beam(), payload=Payload(mass=inf, offset=FAR)),
+    "sliding-free, the clamp 1e10 L off the axis": replace(beam(), hub=Hub(inertia=0.0, radius=FAR_AXIS)),
+    "clamped-sliding, the tip held 1e10 L beyond": replace(beam(), payload=Payload(mass=inf, offset=FAR_AXIS)),
 }
 # By mass m/(rhoA L) and half length e/L of each slender tip body, whose inertia is m e^2/3.
 BHAT_WAGNER_ROOTS = {

@@ -115,7 +115,7 @@ def response(
     from tfarm.cli.methods import BESIDE_COMPARE, print_compared, refuse_beside, responses_by_methods, slow_method
     from tfarm.cli.tables import print_found, say_written
     from tfarm.response import transfer
-    from tfarm.response.answers import response_answer, response_table
+    from tfarm.response.answers import points_table, response_answer
     from tfarm.tables.files import write_csv
     from tfarm.tables.terminal import show
 
@@ -127,9 +127,9 @@ def response(
         return
     answer = response_answer(transfer(subject, wanted, x=x, method=road, input=driven), at, right)
     if csv is not None:
-        write_csv(response_table(answer), csv)
+        write_csv(points_table(answer), csv)
     if say_written(csv) or json:
-        give(answer, json, (lambda found: show(response_table(found))) if csv is None else print_found)
+        give(answer, json, (lambda found: show(points_table(found))) if csv is None else print_found)
 
 
 @app.command()

@@ -74,7 +74,7 @@ def tune(
         rows = tuner.compare_controllers(tuning.trial, tuning.gain(), tuning.training.guard)
         answer["comparison"] = outcomes_answer(rows)
     if save is not None:
-        tuner.save(tuning.saved(), save)
+        tuner.save_tuner(tuning.saved(), save)
     _show(answer, save, json)
 
 

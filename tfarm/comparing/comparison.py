@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import ANGLE_GAIN, PLANE, Arm, HubFeedback, must_be_arm
 from tfarm.arm.checks import whole
-from tfarm.arm.driving import AnyLaw, through
+from tfarm.arm.driving import AnyLaw, arm_and_law
 from tfarm.arm.law import Law
 from tfarm.dsp import Chain
 from tfarm.dsp.brief import SampledBrief, brief_of
@@ -218,7 +218,7 @@ def _pairs(arms: Arm | Sequence[Arm], laws: AnyLaw | Sequence[AnyLaw] | None) ->
         raise ParameterError(key="compare", value=counts, remedy="give two arms, or one arm and two laws")
     pair = given if len(given) == 2 else given * 2
     each = [default_gains(arm) for arm in pair] if not some else some if len(some) == 2 else some * 2
-    return [through(arm, law) for arm, law in zip(pair, each, strict=True)]
+    return [arm_and_law(arm, law) for arm, law in zip(pair, each, strict=True)]
 
 
 def _names(pairs: list[tuple[Arm, AnyLaw]]) -> tuple[str, ...]:

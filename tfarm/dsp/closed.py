@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from tfarm.arm import Arm, HubFeedback
-from tfarm.arm.driving import AnyLaw, through
+from tfarm.arm.driving import AnyLaw, arm_and_law
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.law_verdict import LawAnalysis, analyse_law, law_verdict
 from tfarm.dsp.verdict import Analysis, Verdict, analyse, sampled_verdict
@@ -18,7 +18,7 @@ def sampled(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, count: int | N
     `count` is the number of flexible modes, as many as it takes if not given.  Raises ParameterError for a locked hub,
     an algebraic loop, an unknown signal, and a law in z whose period is not the chain's.
     """
-    arm, law = through(arm, law)
+    arm, law = arm_and_law(arm, law)
     if isinstance(law, HubFeedback):
         return analyse(arm, law, chain, count=count)
     return analyse_law(arm, law, chain, count=count)
@@ -26,5 +26,5 @@ def sampled(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, count: int | N
 
 def verdict_on(arm: Arm, law: AnyLaw, chain: Chain | None = None) -> Verdict[Any]:
     """The verdict alone.  Raises what `sampled` raises."""
-    arm, law = through(arm, law)
+    arm, law = arm_and_law(arm, law)
     return sampled_verdict(arm, law, chain) if isinstance(law, HubFeedback) else law_verdict(arm, law, chain)

@@ -158,7 +158,7 @@ class SampledLaw:
 
     def reduced_matrix(self) -> Real:
         """The closed-loop matrix without the pole z = 1 of a free hub angle, or of a hub that cannot drift."""
-        A, first = self.matrix(), 2 * self.pulse.kept()[0].size + self.pulse.kept()[1].size
+        A, first = self.matrix(), self.pulse.integrals_at
         if not self.plant.arm.has_rigid_mode:
             return np.delete(np.delete(A, [first, first + 1], 0), [first, first + 1], 1)
         if self.is_damped:  # its angle is the single integral

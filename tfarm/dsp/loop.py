@@ -177,7 +177,7 @@ class SampledLoop:
 
     def reduced_matrix(self) -> Real:
         """The closed-loop matrix without the pole z = 1 of a free hub angle, or of a hub that cannot drift."""
-        A, first = self.matrix(), 2 * self.pulse.kept()[0].size + self.pulse.kept()[1].size
+        A, first = self.matrix(), self.pulse.integrals_at
         rigid = self.plant.rigid[ANGLE_ROW]
         if not rigid.any():  # neither integral of the torque is felt
             return np.delete(np.delete(A, [first, first + 1], 0), [first, first + 1], 1)

@@ -135,6 +135,12 @@ class PulseTransfer:
 
     # ------------------------------------------------------------ state space
 
+    @property
+    def integrals_at(self) -> int:
+        """The place of the torque's two integrals among the states; behind them is the input of the sample before."""
+        upper, real = self.kept()
+        return int(2 * upper.size + real.size)
+
     def matrices(self) -> tuple[Real, Real, Real]:
         """A (n, n), B (n,), C (outputs, n) of x_{k+1} = A x_k + B u_k, y_k = C x_k, real.
 
@@ -142,7 +148,7 @@ class PulseTransfer:
         double integral and the integral of the torque, and u_{k-1} to u_{k-d-1}.
         """
         upper, real = self.kept()
-        n, d = 2 * upper.size + real.size + 2, self.sampling.whole_delay
+        n, d = self.integrals_at + 2, self.sampling.whole_delay
         A, B = np.zeros((n + d + 1, n + d + 1)), np.zeros(n + d + 1)
         C = np.zeros((len(self.plant.outputs), n + d + 1))
         first, second, last = 2 * np.arange(upper.size), 2 * np.arange(upper.size) + 1, n + d

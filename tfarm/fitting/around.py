@@ -17,7 +17,7 @@ from tfarm.exact.jets import Jet
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.response.signals import Signals
 
-from .parameters import DIFFERENCE_STEP
+from .parameters import COORDINATE_STEP
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 
@@ -47,7 +47,7 @@ class Around:
                 above,
                 Signals(a, names).places,
                 Signals(b, names).places,
-                DIFFERENCE_STEP * ((a != own) + (b != own)),
+                COORDINATE_STEP * ((a != own) + (b != own)),
             )
             for (below, above), (a, b) in zip(pairs, self._pairs, strict=True)
         ]

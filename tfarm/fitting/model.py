@@ -24,7 +24,7 @@ from tfarm.response.signals import Signals
 from .around import Around, drive_behind, under_drive
 from .data import Measured
 from .noise import Noise, noise_of
-from .parameters import DIFFERENCE_STEP, Parameter
+from .parameters import COORDINATE_STEP, Parameter
 from .reading import check_signal
 from .ringing import RingMode, ring_residuals
 
@@ -132,7 +132,7 @@ class Problem:
         own, pairs = self.family.at(base), []
         for each, x in zip(self.of_the_arm, point, strict=False):
             sides = []
-            for step in (-DIFFERENCE_STEP, DIFFERENCE_STEP):
+            for step in (-COORDINATE_STEP, COORDINATE_STEP):
                 try:
                     sides.append(self.family.at(base | {each.key: each.value(float(x) + step)}))
                 except ParameterError:

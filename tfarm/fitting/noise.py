@@ -16,7 +16,7 @@ Real = NDArray[np.float64]
 
 CONFIDENCE = 0.95  # of every interval of a fit: the usual one
 LEAST_SHARE = 1e-5  # of |H|: no measured response is better known than that, whatever its coherence says
-NEIGHBOURS = 2  # neighbours on each side that a value is compared with
+SCATTER_NEIGHBOURS = 2  # neighbours on each side that a value is compared with
 TYPICAL = 1.17741  # the median of |x + i y| of normal x and y of deviation 1: sqrt(2 ln 2)
 
 
@@ -62,12 +62,12 @@ def _scatter(values: NDArray[Any]) -> Real:
     It is LEAST_SHARE of the value at least.
     """
     n = values.size
-    if n < 2 * NEIGHBOURS + 1:
+    if n < 2 * SCATTER_NEIGHBOURS + 1:
         return np.maximum(abs(values), LEAST_SHARE * abs(values).max())
     # x_k less the parabola through x_(k-2), x_(k-1), x_(k+1), x_(k+2): weights -1/6, 2/3, 2/3, -1/6 of these
     weights = np.array([1 / 6, -2 / 3, 1.0, -2 / 3, 1 / 6])
     away = np.convolve(values, weights, mode="valid") / np.sqrt((weights**2).sum())
-    size, inside = abs(values), abs(values[NEIGHBOURS:-NEIGHBOURS])
+    size, inside = abs(values), abs(values[SCATTER_NEIGHBOURS:-SCATTER_NEIGHBOURS])
     relative = abs(away[inside > 0]) / inside[inside > 0]
     typical = float(np.median(relative)) / TYPICAL if relative.size else 1.0
     least = max(1e-3 * float(np.median(size)), 1e-6 * float(size.max()))  # which a value of 0 is taken for

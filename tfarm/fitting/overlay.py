@@ -25,8 +25,8 @@ from .ratio import Ratio, RatioRoots
 from .resonances import (
     PARTNERS_BEYOND,
     Resonance,
+    matched_peaks,
     must_be_in_unit,
-    paired,
     peaks_among,
     peaks_of,
     resonance_at,
@@ -140,7 +140,7 @@ def overlay(arm: Arm, measured: Measured) -> Overlay:
     places = peaks_of(measured, noise.sigma)
     own = peaks_among(roots.poles)
     own = own[own >= low / PARTNERS_BEYOND]
-    pairs, _ = paired(measured.omega[places], own, (low, high))
+    pairs, _ = matched_peaks(measured.omega[places], own, (low, high))
     if len(pairs) < max(places.size, int(((own >= low) & (own <= high)).sum())):
         check_unit(arm, measured)
     at = {j: int(places[i]) for i, j in pairs}

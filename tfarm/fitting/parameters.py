@@ -24,7 +24,8 @@ Real = NDArray[np.float64]
 SIGNED = ("offset",)  # numbers of an arm that may be negative
 UPPER_ENDS = {"gear_efficiency": 1.0, "poissons_ratio": 0.5}  # and those that end somewhere
 FARTHEST_FROM_START = 1e4  # times or a part of it: beyond, a search has lost its way, or the data say nothing
-DIFFERENCE_STEP = 2.0**-20  # of a derivative by differences: the rounding of a float over it is 1e-10, its square below
+AT_REACH = 1e-6  # of ln p: a search that comes so near to that has ended there
+COORDINATE_STEP = 2.0**-20  # of a derivative by differences: the rounding of a float over it is 1e-10, its square below
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,6 +64,17 @@ class Parameter:
         low = self.coordinate(self.low) if self.low > 0 else -math.inf
         high = self.coordinate(self.high) if self.high < math.inf else math.inf
         return max(low, -math.log(FARTHEST_FROM_START)), min(high, math.log(FARTHEST_FROM_START))
+
+    def known_ends(
+        self, coordinates: Sequence[float], values: tuple[float, float]
+    ) -> tuple[float | None, float | None]:
+        """Ends of an interval, None where only the reach of the search ended it and no bound of the number."""
+        reach, (first, last) = math.log(FARTHEST_FROM_START), coordinates
+        if not self.by_logarithm or self.start < 0:
+            return values
+        is_low = first > -reach + AT_REACH or self.low > 0
+        is_high = last < reach - AT_REACH or self.high < math.inf
+        return values[0] if is_low else None, values[1] if is_high else None
 
     def slope(self, coordinate: float) -> float:
         """d value/d coordinate."""

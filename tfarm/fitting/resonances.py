@@ -65,7 +65,7 @@ def peaks_of(data: Measured, sigma: Real) -> NDArray[np.intp]:
     return np.asarray(places[rise > CLEAR_OF_NOISE * sigma[places]])
 
 
-def paired(measured: Real, own: Real, band: tuple[float, float]) -> tuple[list[tuple[int, int]], float]:
+def matched_peaks(measured: Real, own: Real, band: tuple[float, float]) -> tuple[list[tuple[int, int]], float]:
     """Pairs of places in two ascending rows of frequencies, in order, with the least cost, and that cost.
 
     The cost of a pair is |ln w/w'|; one of a row that is left alone costs UNPAIRED, but an own one outside of the band.
@@ -111,10 +111,10 @@ def must_be_in_unit(data: Measured, sigma: Real, poles: Complex) -> None:
     if not peaks.size or not own.size:
         return
     band = float(data.omega[0]), float(data.omega[-1])
-    _, cost = paired(peaks, own, band)
+    _, cost = matched_peaks(peaks, own, band)
     lonely = bool((abs(np.log(peaks[:, None] / own)).min(axis=1) > PEAK_ALONE).all())
     for factor, words in ((1 / HERTZ, "are rad/s given as Hz?"), (HERTZ, "are Hz given as rad/s?")):
-        there, fitting = paired(peaks * factor, own, (band[0] * factor, band[1] * factor))
+        there, fitting = matched_peaks(peaks * factor, own, (band[0] * factor, band[1] * factor))
         better = cost - fitting > UNPAIRED if peaks.size >= PEAKS_THAT_TELL else lonely
         away = np.array([math.log(peaks[i] * factor / own[j]) for i, j in there])
         if better and away.size == peaks.size and abs(away.mean()) < CLOSE_IN_UNIT and np.ptp(away) < ALIKE_IN_UNIT:

@@ -13,12 +13,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
-from scipy.special import chdtrc
+from scipy.special import chdtrc, ndtri, stdtrit
 
 from tfarm.errors import ParameterError
 from tfarm.records import record
 
 from .model import Problem, walled
+from .noise import CONFIDENCE
 from .start import Starts
 
 Real = NDArray[np.float64]
@@ -60,6 +61,23 @@ class Solution:
         """Residuals less parameters."""
         return self.residuals.size - self.point.size
 
+    @property
+    def has_known_noise(self) -> bool:
+        """Whether the size of no noise was taken from the residuals."""
+        return all(each.noise.is_known for each in self.problem.responses)
+
+    @property
+    def misfit(self) -> float:
+        """Minus ln of the likelihood, but for a constant: with the noise, where that is from the residuals."""
+        sigmas = (each.noise.sigma for each in self.problem.responses)
+        return self.chi_squared / 2 + sum(2 * float(np.log(sigma[np.isfinite(sigma)]).sum()) for sigma in sigmas)
+
+    @property
+    def quantile(self) -> float:
+        """Deviations that an interval reaches to each side: of the normal distribution, or Student's."""
+        share = 0.5 + CONFIDENCE / 2
+        return float(ndtri(share) if self.has_known_noise else stdtrit(max(self.freedom, 1), share))
+
 
 def best_solution(problem: Problem) -> Solution:
     """The least sum of squares over all starts; those of noise alone end the search early."""
@@ -67,7 +85,7 @@ def best_solution(problem: Problem) -> Solution:
 
     def best_after(subject: Problem, start: Real) -> Solution:
         found.append(_rescaled(nearest_minimum(subject, start)))
-        return min(found, key=_misfit)
+        return min(found, key=lambda each: each.misfit)
 
     for subject, start in Starts(problem):
         best = best_after(subject, start)
@@ -110,17 +128,9 @@ def principal_axes(jacobian: Real) -> tuple[Real, Real]:
     return sizes, axes
 
 
-def _misfit(one: Solution) -> float:
-    """Minus the logarithm of the likelihood, but for a constant: with the noise, where that is from the residuals."""
-    spread = sum(
-        2 * float(np.log(each.noise.sigma[np.isfinite(each.noise.sigma)]).sum()) for each in one.problem.responses
-    )
-    return one.chi_squared / 2 + spread
-
-
 def is_explained(one: Solution) -> bool | None:
     """Whether noise alone gives such a sum often enough; None where its size was taken from the residuals."""
-    if not all(each.noise.is_known for each in one.problem.responses):
+    if not one.has_known_noise:
         return None
     return bool(chdtrc(max(one.freedom, 1), one.chi_squared) > NOISE_ALONE)
 
@@ -158,7 +168,7 @@ def nearest_minimum(problem: Problem, start: Real, held: dict[int, float] | None
 
 def _rescaled(found: Solution) -> Solution:
     """The solution with each noise that is known up to a factor multiplied by what its residuals say."""
-    if all(each.noise.is_known for each in found.problem.responses):
+    if found.has_known_noise:
         return found
     for _ in range(RESCALED):
         responses, first = [], 0

@@ -9,12 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
-from scipy.special import ndtri, stdtrit
 
 from tfarm.records import record
 
-from .noise import CONFIDENCE
-from .parameters import FARTHEST_FROM_START, Parameter
 from .solve import OPEN_DEVIATION, Solution, nearest_minimum, principal_axes
 
 Real = NDArray[np.float64]
@@ -25,7 +22,6 @@ TAKES_PART = 0.1  # of a unit vector: a smaller component has no part in it
 ROUND = 0.02  # a power so near to 1 is written as 1
 LEVEL_REACHED = 0.01  # of a deviation: where a profile has reached its level
 BETTER = 0.05  # of a sum of squares: a profile that falls by more has left the valley of the best
-SAME_END = 1e-6  # of ln p: the search has ended at its reach
 SECANT_STEPS = 12  # steps of the secant: three do but in a crooked valley
 REACHES = (0.5, 1.0, 2.0, 4.0, 6.0, 9.0)  # of ln p: where a number that does not matter is tried
 
@@ -44,6 +40,14 @@ class Fitted:
     high: float | None
     deviation: float | None
     identified: bool
+
+    @property
+    def half_known(self) -> str:
+        """What is known of a number whose interval has one end, in words; nothing of others."""
+        if (self.low is None) == (self.high is None):
+            return ""
+        side = f"at least {self.low:.4g}" if self.high is None else f"at most {self.high:.4g}"
+        return f"{self.key} is {side}: these data say no more"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,7 +78,7 @@ def sureness(found: Solution, *, profile: bool, progress: ToldInterval | None = 
     covariance = (axes[~is_open].T / sizes[~is_open] ** 2) @ axes[~is_open]
     unsure: list[bool] = np.any(abs(axes[is_open]) > TAKES_PART, axis=0).tolist()
     held = {int(abs(axis).argmax()): float(found.point[abs(axis).argmax()]) for axis in axes[is_open]}
-    quantile = _quantile(found)
+    quantile = found.quantile
     fitted, words = [], [_said(axis, [each.key for each in found.problem.parameters]) for axis in axes[is_open]]
     alone = {int(abs(axis).argmax()): n for n, axis in enumerate(axes[is_open]) if (abs(axis) > TAKES_PART).sum() == 1}
     for n, each in enumerate(found.problem.parameters):
@@ -88,7 +92,7 @@ def sureness(found: Solution, *, profile: bool, progress: ToldInterval | None = 
             if profile:
                 ends = [_end(found, n, way, deviation, quantile, held) for way in (-1, 1)]
             low, high = sorted(each.value(float(end)) for end in ends)
-            low, high = _where_it_ends(each, ends, low, high)
+            low, high = each.known_ends(ends, (low, high))
         elif n in alone and (side := _one_sided(found, n, quantile)) is not None:
             low, high = side
             words[alone[n]] = ""
@@ -98,23 +102,8 @@ def sureness(found: Solution, *, profile: bool, progress: ToldInterval | None = 
                 deviation=None if deviation is None else slope * deviation,
             )
         )  # fmt: skip
-    words += [_half_known(each) for each in fitted if (each.low is None) != (each.high is None)]
+    words += [each.half_known for each in fitted]
     return Sureness(parameters=tuple(fitted), not_determined=tuple(word for word in words if word))
-
-
-def _half_known(one: Fitted) -> str:
-    side = f"at least {one.low:.4g}" if one.high is None else f"at most {one.high:.4g}"
-    return f"{one.key} is {side}: these data say no more"
-
-
-def _where_it_ends(one: Parameter, ends: Sequence[float], low: float, high: float) -> tuple[float | None, float | None]:
-    """The ends of an interval, None where only the reach of the search ended it and no bound of the number."""
-    reach, limits = math.log(FARTHEST_FROM_START), (one.low, one.high)
-    if not one.by_logarithm or one.start < 0:
-        return low, high
-    first = None if ends[0] <= -reach + SAME_END and limits[0] <= 0 else low
-    last = None if ends[1] >= reach - SAME_END and limits[1] == math.inf else high
-    return first, last
 
 
 def _one_sided(found: Solution, n: int, quantile: float) -> tuple[float, float | None] | None:
@@ -143,13 +132,6 @@ def _one_sided(found: Solution, n: int, quantile: float) -> tuple[float, float |
         return None
     low, high = ends
     return 0.0 if low is None else each.value(low), None if high is None else each.value(high)
-
-
-def _quantile(found: Solution) -> float:
-    """Of the normal distribution, or Student's where the noise was taken from the residuals."""
-    known = all(each.noise.is_known for each in found.problem.responses)
-    share = 0.5 + CONFIDENCE / 2
-    return float(ndtri(share) if known else stdtrit(max(found.freedom, 1), share))
 
 
 def _end(found: Solution, n: int, way: int, deviation: float, quantile: float, held: dict[int, float]) -> float:

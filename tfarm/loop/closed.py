@@ -6,7 +6,7 @@ A law that is no more than these gains is taken for them.
 from __future__ import annotations
 
 from tfarm.arm import Arm, HubFeedback
-from tfarm.arm.driving import AnyLaw, through
+from tfarm.arm.driving import AnyLaw, arm_and_law
 
 from .law_loop import LawLoop
 from .law_poles import law_poles
@@ -25,7 +25,7 @@ def closed_loop_poles(arm: Arm, law: AnyLaw, count: int | None = None) -> Poles 
     Without a count the first ten, or so.  Raises ParameterError where there is no loop, ConvergenceError where the box
     cannot be completed.
     """
-    arm, law = through(arm, law)
+    arm, law = arm_and_law(arm, law)
     return poles_of_gains(arm, law, count) if isinstance(law, HubFeedback) else law_poles(arm, law, count)
 
 
@@ -35,7 +35,7 @@ def margins(arm: Arm, law: AnyLaw, band: float | None = None) -> Margins | Margi
     Raises ParameterError where there is no loop, ConvergenceError where poles cannot be counted, or where with damping
     one is on the axis to working precision.
     """
-    arm, law = through(arm, law)
+    arm, law = arm_and_law(arm, law)
     if isinstance(law, HubFeedback):
         return margins_of_gains(arm, law, band)
     verdict = law_stability(arm, law, band)
@@ -53,5 +53,5 @@ def nyquist(arm: Arm, law: AnyLaw) -> Nyquist | Nyquist[LawLoop]:
     Raises what the verdict raises, and ConvergenceError where the curve passes -1 so close that its turns cannot be
     counted, or where the two counts differ.
     """
-    arm, law = through(arm, law)
+    arm, law = arm_and_law(arm, law)
     return nyquist_of(stability(arm, law)) if isinstance(law, HubFeedback) else nyquist_of(law_stability(arm, law))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from tfarm.arm import Arm, HubFeedback
-from tfarm.arm.driving import AnyLaw, through
+from tfarm.arm.driving import AnyLaw, arm_and_law
 from tfarm.arm.law import Law
 from tfarm.dsp import Chain
 from tfarm.dsp.discretise import discretised
@@ -95,7 +95,7 @@ def on_arm(arm: Arm, laws: Sequence[GivenLaw]) -> tuple[LawOnArm, ...]:
     """Each law on the arm, under a name that no other has."""
     found: list[LawOnArm] = []
     for number, given in enumerate(laws, 1):
-        driven, law = through(arm, given.law)
+        driven, law = arm_and_law(arm, given.law)
         name = GIVEN_GAINS if isinstance(law, HubFeedback) else one_line(law.name, LONGEST_LAW_NAME)
         if name in {each.name for each in found}:
             name = f"{name} ({number})"

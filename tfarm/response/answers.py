@@ -36,7 +36,7 @@ def response_answer(G: TransferFunction, s: np.ndarray[Any, Any], digits: int | 
     return answer | {"s": [[float(p.real), float(p.imag)] for p in s], "value": value}
 
 
-def response_table(answer: dict[str, Any]) -> Table:
+def points_table(answer: dict[str, Any]) -> Table:
     """A row a point: s, and the output over the input."""
     output, unit, twelve = answer["output"], f"{answer['unit']} / {answer['input_unit']}", singly(general, 12)
     (re_s, im_s), (re, im) = (zip(*answer[name], strict=True) for name in ("s", "value"))

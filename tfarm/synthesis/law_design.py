@@ -69,8 +69,8 @@ class LawDesign:
 
 
 def law_design(
-    arm: Arm, objective: str, structure: str, *, on_angle: float = 0.0, modes: int = 2, chain: Chain | None = None,
-    progress: Tell | None = None, others: Sequence[NamedArm] = (),
+    arm: Arm, objective: str, structure: str, *, on_angle: float, modes: int, chain: Chain | None,
+    progress: Tell | None, others: Sequence[NamedArm],
 ) -> LawDesign:  # fmt: skip
     """The law of a structure that serves an objective best in the sampled loop; the gain `on_angle` holds that.
 

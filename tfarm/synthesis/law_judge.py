@@ -68,7 +68,7 @@ class LawJudge:
 
     def pieces(self, law: Law, slopes: Sequence[Slope]) -> Pieces:
         """What the score is the largest of, with its slopes: growth of poles, and the objective's own."""
-        acting = with_estimate(acting_law(self.arm, law, self.chain)[0], self.chain)
+        acting = self._acting(law)
         A, B, C, D = acting.matrices(self._signals)
         growth = []
         for share in (1.0, 1 / SEARCH_RESERVE, SEARCH_RESERVE):
@@ -98,7 +98,7 @@ class LawJudge:
         if self.objective not in ("margin", "sensitivity"):
             score = self.score(law)
             return score if self.objective in SLEWED else -score
-        acting = with_estimate(acting_law(self.arm, law, self.chain)[0], self.chain)
+        acting = self._acting(law)
         of: Callable[[Complex], Real] = disk_of if self.objective == "margin" else lambda L: np.asarray(abs(1 + L))
         angles = np.asarray(self._curve.places.imag, dtype=float)
         least = lowest_on_circle(lambda q: of(self._loop_function(acting, q)), angles)
@@ -112,6 +112,10 @@ class LawJudge:
             )
         except ConvergenceError:
             return False
+
+    def _acting(self, law: Law) -> Law:
+        """What the computer makes of a law in z, of the signals that it has."""
+        return with_estimate(acting_law(self.arm, law, self.chain)[0], self.chain)
 
     @property
     def _signals(self) -> tuple[str, ...]:
@@ -131,10 +135,7 @@ class LawJudge:
     @cached_property
     def _gone(self) -> list[int]:
         """States that are integrals of the input which the plant does not feel: a law holds the angle."""
-        first, felt = (
-            sum(each.size * n for each, n in zip(self.loop.pulse.kept(), (2, 1), strict=True)),
-            self.arm.has_rigid_mode,
-        )
+        first, felt = self.loop.pulse.integrals_at, self.arm.has_rigid_mode
         return [first, *([] if felt else [first + 1])] if self.loop.is_damped or not felt else []
 
     @cached_property
@@ -162,7 +163,7 @@ class LawJudge:
 
     @cached_property
     def _slew(self) -> LawSlew:
-        last = sum(each.size * n for each, n in zip(self.loop.pulse.kept(), (2, 1), strict=True)) + 2 - len(self._gone)
+        last = self.loop.pulse.integrals_at + 2 - len(self._gone)
         return LawSlew(self.arm, self.known, self.chain, self._held, self._signals, last, self._clock)
 
     def _loop_function(self, acting: Law, q: Real) -> Complex:

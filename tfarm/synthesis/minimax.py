@@ -28,8 +28,8 @@ GO_ON = 2  # of the points that it comes to, the second part begins at
 LENGTHS_TRIED = 25  # trials of a step's length
 TURNS_A_CHECK = 15  # turns after which a gain below LEAST_PROGRESS ends the first part
 LEAST_PROGRESS = 1e-4  # relative
-FIRST_STEP = 0.3  # of x: the largest part of the first step
-LONGEST_STEP = 2.0  # of any step
+FIRST_MOVE = 0.3  # of x: the largest part of the first step
+LONGEST_MOVE = 2.0  # of any step
 ARMIJO = 1e-4  # of the slope: the decrease that a step has to make
 WOLFE = 0.5  # of the slope that a step may leave
 TANGENT_STEPS = 40  # of the second part, at most
@@ -112,7 +112,7 @@ def descended(pieces: PiecesAt, start: Real, upper: Real) -> Real:
                 break
             before = value
         step = -inverse @ slope
-        step = step * min(1.0, (LONGEST_STEP if turn else FIRST_STEP) / max(float(abs(step).max()), 1e-300))
+        step = step * min(1.0, (LONGEST_MOVE if turn else FIRST_MOVE) / max(float(abs(step).max()), 1e-300))
         if not step @ slope < 0.0:
             break
         length, then, new = _weak_wolfe(priced, x, step, value, float(step @ slope))
@@ -138,7 +138,7 @@ def _weak_wolfe(
         then, new = priced(x + share * step)
         if not then <= value + ARMIJO * share * slope:
             high = share
-        elif new @ step < WOLFE * slope and share < LONGEST_STEP / abs(step).max():
+        elif new @ step < WOLFE * slope and share < LONGEST_MOVE / abs(step).max():
             low = share
         else:
             break

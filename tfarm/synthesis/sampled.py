@@ -182,18 +182,12 @@ class SampledJudge:
         more = len(start) - B.size
         return start, by_each, np.pad(B, (0, more)), np.pad(C[FED_BACK.index("root_moment")], (0, more))
 
-    @cached_property
-    def _keeps(self) -> int:
-        """The state that keeps the input of the sample before."""
-        upper, real = self.loop.pulse.kept()
-        return int(2 * upper.size + real.size + 2)
-
     def _run(self, task: Scenario, points: Real) -> tuple[Real, Real]:
         """Root moment and input at the samples of a slew, (samples, gains)."""
         start, by_each, drive, sense = self._with_angle
         (on_rate, on_moment), number = points, points.shape[1]
         A = start + on_rate[:, None, None] * by_each[0] + on_moment[:, None, None] * by_each[1]
-        kept = self._keeps
+        kept = self.loop.pulse.integrals_at + 2  # the input of the sample before
         x, (moment, u) = np.zeros((number, len(start), 1)), np.zeros((2, task.t.size, number))
         fixed = task.feedforward + self.loop.gains[ANGLE_GAIN] * task.hub_angle
         for k in range(task.t.size):

@@ -6,7 +6,7 @@ from tfarm.tuner.constants import BestConstant, best_constant
 from tfarm.tuner.controller import TunedGain, simulated
 from tfarm.tuner.guard import Guard, find_guard
 from tfarm.tuner.network import Network, initial_network
-from tfarm.tuner.saving import SavedTuner, load_tuner, save
+from tfarm.tuner.saving import SavedTuner, load_tuner, save_tuner
 from tfarm.tuner.shaping import extra_insensitive, shaped_trial, zero_vibration
 from tfarm.tuner.training import Learning, Stopped, Training, train
 from tfarm.tuner.trial import Cost, Record, Trial, residual_rms, slew_trial
@@ -34,7 +34,7 @@ __all__ = [
     "load_tuner",
     "lq_bound",
     "residual_rms",
-    "save",
+    "save_tuner",
     "shaped_trial",
     "simulated",
     "slew_trial",

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from tfarm.arm import HubFeedback
 from tfarm.dsp import Measurement, Simulation, Simulator
+from tfarm.dsp.chain import Reading
 from tfarm.tuner.network import Network
-from tfarm.tuner.trial import Cost, Reading, Record, Trial
+from tfarm.tuner.trial import Cost, Record, Trial
 
 Real = NDArray[np.float64]
 

@@ -12,13 +12,14 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from tfarm.dsp.chain import Reading
 from tfarm.errors import MISSING, ParameterError, TfarmError
 from tfarm.files import read_file, write_file
 from tfarm.records import record
 from tfarm.tuner.controller import TunedGain
 from tfarm.tuner.guard import GuardKind
 from tfarm.tuner.network import MOST_HIDDEN, Network
-from tfarm.tuner.trial import Cost, Reading
+from tfarm.tuner.trial import Cost
 
 FORMAT = "tfarm tuner 1"
 MOST_TUNER_BYTES = 4_000_000  # bytes of a tuner's file: more than a network of MOST_HIDDEN neurons takes
@@ -109,7 +110,7 @@ def weights_answer(network: Network) -> dict[str, list[float] | list[list[float]
     return {name: getattr(network, name).tolist() for name in ("scales", "W1", "w2")}
 
 
-def save(tuner: SavedTuner, path: Path) -> None:
+def save_tuner(tuner: SavedTuner, path: Path) -> None:
     """Write it beside, then rename."""
     write_file(path, to_text(tuner).encode(), key="--save")
 

@@ -45,9 +45,8 @@ class MovingGain:
     @cached_property
     def _row(self) -> int:
         """The state that keeps the torque of the sample before: there the drive is 1."""
-        upper, real = self.loop.pulse.kept()
         dropped = len(self.loop.matrix()) - len(self.open)
-        return 2 * upper.size + real.size + 2 - dropped
+        return self.loop.pulse.integrals_at + 2 - dropped
 
     @cached_property
     def sense(self) -> Real:

@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from tfarm.arm import Arm, HubFeedback
 from tfarm.arm.checks import not_negative, number, positive
 from tfarm.dsp import Chain, SampledLoop, Scenario, Simulator, sampled_loop, scenario
+from tfarm.dsp.chain import Reading
 from tfarm.dsp.results import rms_after
 from tfarm.dsp.scenarios import TRIAL_COST, TRIAL_DURATION
 from tfarm.dsp.simulate import FOLDED_UP
@@ -35,7 +36,7 @@ from tfarm.tuner import kernel
 from tfarm.tuner.network import Network
 
 Real = NDArray[np.float64]
-Reading = Literal["vibration", "total"]
+
 
 SILENT = Network(np.zeros((1, 6)), np.zeros(1), np.ones(6))  # for a guard that leaves no choice
 TRIAL_MODES = 6  # flexible modes of a trial, unless told
@@ -106,8 +107,7 @@ class Trial:
     def model(self) -> tuple[Real, ...]:
         """A^T, A, B and the rows that read the servo and the moment: s' = A s + B torque (see `kernel`)."""
         A = self.loop.having(Kp=0.0, K1=0.0, K2=0.0).matrix()
-        upper, real = self.loop.pulse.kept()
-        last = 2 * upper.size + real.size + 2  # where the torque of the sample before is kept: B is 1 there
+        last = self.loop.pulse.integrals_at + 2  # where the torque of the sample before is kept: B is 1 there
         servo = -self.loop.having(K2=0.0).matrix()[last]
         moment = -self.loop.having(Kp=0.0, K1=0.0, K2=1.0).matrix()[last]
         B = self.loop.pulse.matrices()[1]
@@ -162,12 +162,14 @@ class Trial:
 
     def with_network(self, network: Network, guard: Real) -> Record:
         """The trial with a network as it is."""
-        run = self.run(*network.W1.shape[::-1])
-        done = kernel.forward(
-            self.model, self.reference, self.numbers, network.scales, guard, network.weights, run,
-            self.work(network.scales.size),
-        )  # fmt: skip
+        run, _, done = self._forward(network, guard)
         return self.record(done, run)
+
+    def _forward(self, network: Network, guard: Real) -> tuple[Run, tuple[Real, ...], int]:
+        """What the trial fills, the room that it takes, and how many samples it makes."""
+        run, work = self.run(*network.W1.shape[::-1]), self.work(network.scales.size)
+        numbers, scales, weights = self.numbers, network.scales, network.weights
+        return run, work, kernel.forward(self.model, self.reference, numbers, scales, guard, weights, run, work)
 
     def with_constant(self, K: float) -> Record:
         """The trial with a constant gain: a guard that leaves no choice."""
@@ -178,9 +180,8 @@ class Trial:
 
         Raises ParameterError where the trial runs away: there is no cost then.
         """
-        run, work = self.run(*network.W1.shape[::-1]), self.work(network.scales.size)
-        weights, gradient = network.weights, np.zeros(network.weights.size)
-        done = kernel.forward(self.model, self.reference, self.numbers, network.scales, guard, weights, run, work)
+        (run, work, done), weights = self._forward(network, guard), network.weights
+        gradient = np.zeros(weights.size)
         if done < self.n:
             raise ParameterError(key="weights", value=done, remedy="the loop runs away at that sample; guard the gain")
         kernel.backward(self.model, self.numbers, network.scales, weights, run, work, gradient)
@@ -191,11 +192,9 @@ class Trial:
 
         x depends on K(k) by the plant's one-step sensitivity, e directly; all earlier signals are data.
         """
-        run, lag = self.run(*network.W1.shape[::-1]), int(self.numbers[kernel.LAG])
-        work, weights = self.work(network.scales.size), network.weights
-        kernel.forward(self.model, self.reference, self.numbers, network.scales, guard, weights, run, work)
+        (run, _, _), weights = self._forward(network, guard), network.weights
         gradient = np.zeros(weights.size)
-        x_next = float(run.signals[k + lag, kernel.X])
+        x_next = float(run.signals[k + int(self.numbers[kernel.LAG]), kernel.X])
         kernel.sample_gradient(k, self.numbers, self.reply, x_next, run, weights, gradient)
         return gradient
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from tfarm.arm import MOMENT_GAIN, Arm, HubFeedback
 from tfarm.dsp import Chain, Simulator, scenario
+from tfarm.dsp.chain import Reading
 from tfarm.dsp.results import ideal_chain, modes_for, rms_after, simulation_answer
 from tfarm.dsp.scenarios import TRIAL_DURATION, described
 from tfarm.errors import ParameterError
@@ -26,7 +27,6 @@ from tfarm.tuner.training import Learning, Training, train
 from tfarm.tuner.trial import (
     TRIAL_MODES,
     Cost,
-    Reading,
     Record,
     Trial,
     residual_rms,
