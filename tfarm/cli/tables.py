@@ -134,20 +134,13 @@ def say_written(*paths: Path | None) -> bool:
 @contextmanager
 def progress() -> Iterator[Callable[[int, int, str], None] | None]:
     """A progress bar on a terminal; in a pipe a line every few seconds, of what was done last."""
-    if not sys.stderr.isatty():
-        with _lines() as advance:
-            yield advance
+    if sys.stderr.isatty():
+        from rich.progress import Progress
+
+        with Progress(console=Console(stderr=True), transient=True) as bar:
+            task = bar.add_task("", total=None)
+            yield lambda done, total, text: bar.update(task, completed=done, total=total, description=text)
         return
-    from rich.progress import Progress
-
-    with Progress(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("", total=None)
-        yield lambda done, total, text: bar.update(task, completed=done, total=total, description=text)
-
-
-@contextmanager
-def _lines() -> Iterator[Callable[[int, int, str], None]]:
-    """A line on standard error every EVERY seconds that the work takes."""
     state, over = ["starting"], Event()
 
     def advance(done: int, total: int, text: str) -> None:

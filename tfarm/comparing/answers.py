@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tfarm.columns import FILES, JSON, Column, Table
-from tfarm.digits import general, within
+from tfarm.digits import general, singly, within
 from tfarm.dsp.law_verdict import sampled_law_answer
 from tfarm.loop.answers import MARGIN_COLUMNS, gain_rows, margins_answer, sizes_of
 from tfarm.loop.margins import Margins
@@ -56,15 +56,16 @@ class ComparedQuantity:
         return [
             Column(f"{self.key}_one", f"{self.title}{found.one.name}", self.unit, of=one, digits=self._cells),
             Column(f"{self.key}_other", f"{self.title}{found.other.name}", self.unit, of=other, digits=self._cells),
-            Column(f"{self.key}_difference_percent", "difference", of=apart, digits=_percents),
+            Column(f"{self.key}_difference_percent", "difference", of=apart, digits=singly(_percent)),
         ]
 
     def _cells(self, values: ValuesOfSide) -> list[str]:
         return [self.cell(value) for value in values]
 
 
-def _percents(values: ValuesOfSide) -> list[str]:
-    return ["-" if value is None else f"{value:+.3g} %" if value else "0 %" for value in values]
+def _percent(value: float | None) -> str:
+    """A difference; what is less than the error of both is none."""
+    return "-" if value is None else f"{value:+.3g} %" if value else "0 %"
 
 
 def compared_modes(found: Comparison) -> Table:

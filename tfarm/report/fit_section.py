@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 from tfarm.arm import MOMENT_GAIN
 from tfarm.columns import Column, Table
 from tfarm.digits import general, listed, plain, singly
@@ -28,6 +26,12 @@ FIT_MARGINS = (
     Column("unit", "unit", of=lambda row: row[1]),
     Column("lowest", "lowest", of=lambda row: row[2][0], digits=singly(general, 4)),
     Column("highest", "highest", of=lambda row: row[2][1], digits=singly(general, 4)),
+)
+SPANS_ON_ALL = (  # title, unit and name of what the loops on all arms have
+    (f"{MOMENT_GAIN} up to", "", "gain_up"),
+    ("phase margin", "deg", "phase"),
+    ("delay margin", "s", "delay"),
+    ("disk margin", "", "disk"),
 )
 FIT_RESONANCES = (
     Column("before_hz", "start", "Hz", of=lambda row: row[0], digits=singly(known, 6)),
@@ -71,8 +75,8 @@ def _onwards(those: Possible) -> tuple[list[str], list[Picture | Table]]:
     """The band of a response, the map with the share of arms, and the margins over all arms."""
     words: list[str] = []
     blocks: list[Picture | Table] = []
-    count = len(those.arms)
     if those.fit.responses:
+        count = len(those.arms)
         blocks.append(Picture(
             stem="fit-band", title="The arms that the data leave possible",
             caption=f"The magnitude of the root moment of {count} arms drawn about the best: all explain the data.",
@@ -81,38 +85,18 @@ def _onwards(those: Possible) -> tuple[list[str], list[Picture | Table]]:
     arm = those.fit.arm
     if has_loop(arm):
         law = default_gains(arm)
-        found = loop_on_all(those, law)
-        share = plain(100 * found.stable / found.of, 3)
-        words.append(
-            typeset(
-                f"With {gains_words(law)} the loop holds on {found.stable} of {found.of} of these arms ({share} %)."
-            )
-        )
+        found, gains = loop_on_all(those, law), gains_words(law)
+        share = f"{found.stable} of {found.of} of these arms ({plain(100 * found.stable / found.of, 3)} %)"
+        words.append(typeset(f"With {gains} the loop holds on {share}."))
         blocks.append(Picture(
             stem="fit-map", title="Gains on all of these arms",
             caption="Dark: the gains hold on every arm that the data leave possible; white: on none. Without a clock.",
             alt="Map of the share of arms on which gains hold.", figure=draw_share(those, ranges_of(arm)),
         ))  # fmt: skip
-        rows = [(name, unit, ends) for name, unit, ends in _rows(found) if ends is not None]
-        if rows:
-            caption = f"Of {gains_words(law)} over the {found.stable} arms on which it holds."
-            blocks.append(
-                Table(
-                    columns=FIT_MARGINS,
-                    record=rows,
-                    stem="fit-margins",
-                    title="Margins over these arms",
-                    caption=caption,
-                )
-            )
+        spans = ((title, unit, extremes(getattr(found, name))) for title, unit, name in SPANS_ON_ALL)
+        if rows := [row for row in spans if row[2] is not None]:
+            blocks.append(Table(
+                columns=FIT_MARGINS, record=rows, stem="fit-margins", title="Margins over these arms",
+                caption=f"Of {gains} over the {found.stable} arms on which it holds.",
+            ))  # fmt: skip
     return words, blocks
-
-
-def _rows(found: object) -> Iterator[tuple[str, str, tuple[float, float] | None]]:
-    names = (
-        (f"{MOMENT_GAIN} up to", "", "gain_up"),
-        ("phase margin", "deg", "phase"),
-        ("delay margin", "s", "delay"),
-        ("disk margin", "", "disk"),
-    )
-    return ((title, unit, extremes(getattr(found, name))) for title, unit, name in names)

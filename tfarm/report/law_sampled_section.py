@@ -284,7 +284,15 @@ def _measured_blocks(named: Sequence[LawOnArm], chain: Chain) -> list[Picture | 
 
 def overshoot_table(found: Mapping[str, Beside]) -> Table:
     """A row a law: overshoot, where it ends, and the greatest moment, measured and computed."""
-    rows = [_both(it) for it in found.values()]
+    rows: list[dict[str, list[float | str]]] = []
+    for it in found.values():
+        measured, end, angles = it.measured, float(it.measured.reference[-1]), (it.measured.hub_angle, it.hub_angle)
+        moment, computed = measured.root_moment, float(abs(it.run.at_samples.root_moment).max())
+        rows.append({
+            "overshoot": [100 * overshoot(angle, measured.step, end) for angle in angles],
+            "end": [math.degrees(angle[-1] - end) for angle in angles],
+            "moment": [float(abs(moment).max()) if moment.size else "", computed],
+        })  # fmt: skip
     titles = {"overshoot": ("overshoot", "%"), "end": ("off at the end", "deg"), "moment": ("largest |moment|", "N m")}
     columns = [Column("law", "law", of=list(found)),
                Column("step_deg", "step", "deg", of=[math.degrees(it.measured.step) for it in found.values()],
@@ -296,26 +304,8 @@ def overshoot_table(found: Mapping[str, Beside]) -> Table:
             columns.append(Column(name, which, unit, of=values, digits=singly(significant, 3), group=title))
     apart = [math.degrees(it.difference_rms) for it in found.values()]
     columns.append(Column("apart_rms_deg", "apart, rms", "deg", of=apart, digits=singly(significant, 3)))
-    return Table(
-        stem="sampled-overshoot",
-        title="Measured and computed, in numbers",
-        caption=OVERSHOOT_CAPTION,
-        columns=tuple(columns),
-    )
-
-
-def _both(it: Beside) -> dict[str, tuple[float | str, float]]:
-    """Overshoot [%], what the hub is off at the end [deg] and the largest moment [N m]: measured, computed."""
-    measured, end, step = it.measured, float(it.measured.reference[-1]), it.measured.step
-    over = [100 * overshoot(angle, step, end) for angle in (measured.hub_angle, it.hub_angle)]
-    off = [math.degrees(angle[-1] - end) for angle in (measured.hub_angle, it.hub_angle)]
-    moment = measured.root_moment
-    computed = float(abs(it.run.at_samples.root_moment).max())
-    return {
-        "overshoot": (over[0], over[1]),
-        "end": (off[0], off[1]),
-        "moment": (float(abs(moment).max()) if moment.size else "", computed),
-    }
+    title = "Measured and computed, in numbers"
+    return Table(stem="sampled-overshoot", title=title, caption=OVERSHOOT_CAPTION, columns=tuple(columns))
 
 
 def beside_table(found: Mapping[str, Beside]) -> Table:

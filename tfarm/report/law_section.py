@@ -81,12 +81,8 @@ def entries_table(laws: Sequence[LawOnArm]) -> Table:
         Column("delay_s", "delay", "s", of=delay, digits=singly(plain)),
         Column("period_s", "period", "s", of=period, digits=singly(plain)),
     )
-    return Table(
-        stem="law-entries",
-        title="What each signal is multiplied by",
-        caption=ENTRIES_CAPTION,
-        columns=columns,
-    )
+    title = "What each signal is multiplied by"
+    return Table(stem="law-entries", title=title, caption=ENTRIES_CAPTION, columns=columns)
 
 
 EntryRow = tuple[str, str, str, str, str, str, str, float | str, float | str]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from markupsafe import Markup
 
@@ -92,21 +92,19 @@ def save_section(section: PageSection, folder: Path) -> SavedSection:
     """Every picture as pictures/*.svg, its numbers as data/*.csv; every table as data/*.csv and .json."""
     for name in (PICTURES, DATA):
         (folder / name).mkdir(exist_ok=True)
-    blocks = tuple(_save(block, folder) for block in section.blocks)
-    return SavedSection(section=replace(section, blocks=()), blocks=blocks)
-
-
-def _save(block: Picture | Table, folder: Path) -> SavedBlock:
-    if isinstance(block, Table):
-        table, files = as_html(block), _below(DATA, save_table(block, folder / DATA))
-        return SavedBlock(stem=block.stem, title=block.title, caption=block.caption, table=table, files=files)
-    save_figure(block.figure, folder / PICTURES, block.stem, formats=("svg",))
-    files = _below(PICTURES, [f"{block.stem}.svg"])
-    if block.data is not None:
-        files += _below(DATA, save_table(block.data, folder / DATA, kinds=("csv",)))
-    return SavedBlock(
-        stem=block.stem, title=block.title, caption=block.caption, alt=block.alt, size=block.size, files=files
-    )
+    blocks = []
+    for block in section.blocks:
+        words: dict[str, Any] = {"stem": block.stem, "title": block.title, "caption": block.caption}
+        if isinstance(block, Table):
+            files = _below(DATA, save_table(block, folder / DATA))
+            blocks.append(SavedBlock(**words, table=as_html(block), files=files))
+            continue
+        save_figure(block.figure, folder / PICTURES, block.stem, formats=("svg",))
+        files = _below(PICTURES, [f"{block.stem}.svg"])
+        if block.data is not None:
+            files += _below(DATA, save_table(block.data, folder / DATA, kinds=("csv",)))
+        blocks.append(SavedBlock(**words, alt=block.alt, size=block.size, files=files))
+    return SavedSection(section=replace(section, blocks=()), blocks=tuple(blocks))
 
 
 def _below(folder: str, names: Sequence[str]) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ import hashlib
 import json
 import pickle
 import platform
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -57,9 +57,14 @@ def key_of(subject: Subject, trust: str) -> str:
 
 def is_unchanged(folder: Path, pages: Sequence[str], trust: str, subject: Subject) -> bool:
     """Whether all these pages in an arm's folder are made of the subject, and their files are as they were written."""
-    key = key_of(subject, trust)
-    notes = [_notes(folder).get(page) for page in pages]
-    return all(note is not None and note["key"] == key and _holds(folder, note["files"]) for note in notes)
+    key, noted = key_of(subject, trust), _notes(folder)
+    if any(page not in noted or noted[page]["key"] != key for page in pages):
+        return False
+    files = [each for page in pages for each in noted[page]["files"].items()]
+    try:
+        return all(_hash(folder / name) == digest for name, digest in files)
+    except (OSError, ValueError):
+        return False
 
 
 def note_made(made: Path, folder: Path, pages: Iterable[str], key: str) -> None:
@@ -78,13 +83,6 @@ def _notes(folder: Path) -> dict[str, Any]:
         return {page: {"key": note["key"], "files": dict(note["files"])} for page, note in notes.items()}
     except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
         return {}
-
-
-def _holds(folder: Path, files: Mapping[str, Any]) -> bool:
-    try:
-        return all(_hash(folder / name) == digest for name, digest in files.items())
-    except (OSError, ValueError):
-        return False
 
 
 def _hash(file: Path) -> str:

@@ -35,6 +35,7 @@ RESERVED_NAMES = (  # which no arm's folder may have
 
 TRUST_PAGE = f"{TRUST_FOLDER}/index.html"
 LEFT_AS_IT_IS = "{name}: left as it is, for nothing that its page is made of has changed; --force makes it again"
+LEFT_OUT_OF = "{name}: the page leaves out “{title}” and says why: {why}"
 OF_EVERY_PAGE = ("arm", "law", "no-loop")  # anchors of sections that the page of every question has
 
 
@@ -117,9 +118,9 @@ def _written(
     sections, gathered = make_all(changed, folders, only or (), not only and evidence is None, scripts, progress)
     for subject, folder, parts in zip(changed, folders, sections, strict=True):
         _write_pages(subject, folder, parts, only, trust, out / subject.arm.name)
-        failures = list(_failures(subject.arm, parts))
-        told += failures
-        done = () if failures else _pages(only)
+        failed = [part.section for part in parts if part.section.failure]
+        told += [LEFT_OUT_OF.format(name=subject.arm.name, title=each.title, why=each.failure) for each in failed]
+        done = () if failed else _pages(only)
         note_made(folder, out / subject.arm.name, done, key_of(subject, _leads(trust, out, subject.arm)))
     if wants_scripts:
         move_into(beside / ASSETS, out / ASSETS)
@@ -188,13 +189,6 @@ def _make_folders(folder: Path, made: list[Path]) -> None:
         raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR))
     if not os.access(folder, os.W_OK | os.X_OK):
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
-
-
-def _failures(arm: Arm, parts: Sequence[SavedSection]) -> Iterator[str]:
-    """A line for each section that could not be made."""
-    for part in parts:
-        if part.section.failure:
-            yield f"{arm.name}: the page leaves out “{part.section.title}” and says why: {part.section.failure}"
 
 
 def _pages(only: tuple[str, ...] | None) -> tuple[str, ...]:
