@@ -20,7 +20,7 @@ from tfarm.loop.margins import loop_margins
 from tfarm.loop.regions import region
 from tfarm.loop.residual import PERIOD_SAMPLES, RISE, TRAVEL, residual_moment
 from tfarm.loop.stability import stability
-from tfarm.synthesis.design import design
+from tfarm.synthesis.design import best_gains
 
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 BOUNDS = {"K1": (0.0, 20.0), "K2": (-2.0, 1.0)}
@@ -69,7 +69,7 @@ def test_what_an_unstable_loop_leaves_is_huge_but_finite() -> None:
 
 @pytest.fixture(scope="module")
 def damping():
-    return design(LAB, "damping", continuous=True, **BOUNDS)
+    return best_gains(LAB, "damping", continuous=True, **BOUNDS)
 
 
 def random_gains(arm, number):
@@ -89,7 +89,7 @@ def test_two_hundred_random_gains_damp_no_better(damping) -> None:
 
 
 def test_two_hundred_random_gains_leave_no_less(damping) -> None:
-    found = design(LAB, "residual", continuous=True, **BOUNDS)
+    found = best_gains(LAB, "residual", continuous=True, **BOUNDS)
     K1, K2 = random_gains(LAB, 200)
     assert residual_moment(LAB, many_laws(NO_FEEDBACK, K1=K1, K2=K2), 2).min() >= found.value * (1 - 1e-9)
     assert found.value < residual_moment(LAB, many_laws(damping.law), 2)[0]
@@ -97,7 +97,7 @@ def test_two_hundred_random_gains_leave_no_less(damping) -> None:
 
 @pytest.fixture(scope="module")
 def residual():
-    return design(LAB, "residual", continuous=True)
+    return best_gains(LAB, "residual", continuous=True)
 
 
 @pytest.mark.survey
@@ -110,7 +110,7 @@ def test_no_grid_leaves_less(residual) -> None:
 
 def test_without_damping_a_slew_ends_in_whole_periods() -> None:
     """K1 -> 0 leaves a hub of I_h/(1 - K2); of its mode at w then sin^2(w T/4) is left: nothing at w T = 4 pi n."""
-    found = design(BARE, "residual", modes=1, continuous=True)
+    found = best_gains(BARE, "residual", modes=1, continuous=True)
     hub = tfarm.Hub(inertia=BARE.hub.inertia / (1 - found.law.K2))
     periods = tfarm.modes(replace(BARE, hub=hub), 1).natural_frequency[-1] * RISE / (4 * np.pi)
     assert periods == pytest.approx(round(periods), abs=1e-6)
@@ -144,7 +144,7 @@ def test_the_flat_part_is_that_of_the_valley(name, request) -> None:
 def test_where_the_bounds_cut_the_search_off_is_no_optimum(damping) -> None:
     """More damping lies beyond the bounds named, and none beyond those that are not."""
     assert damping.at_bound == ("K1", "K2")
-    found = design(LAB, "damping", continuous=True)
+    found = best_gains(LAB, "damping", continuous=True)
     assert (found.widened, found.at_bound) == (("K2",), ())
     assert found.bounds["K2"][0] < found.law.K2 < -3.0
     K1, K2 = found.law.K1 * np.array([0.99, 1.01, 1.0, 1.0]), found.law.K2 + np.array([0.0, 0.0, -0.1, 0.1])
@@ -154,7 +154,7 @@ def test_where_the_bounds_cut_the_search_off_is_no_optimum(damping) -> None:
 @pytest.mark.parametrize("number", sized(8, 30))
 def test_random_gains_have_no_better_disk_margin(number) -> None:
     bounds = {"K1": (0.1, 20.0), "K2": (0.3, 1.0)}
-    found = design(LAB, "margin", continuous=True, **bounds)
+    found = best_gains(LAB, "margin", continuous=True, **bounds)
     rng, band = np.random.default_rng(6), band_of(LAB, 2)
     values = []
     for K1, K2 in zip(rng.uniform(0.1, 20.0, number), rng.uniform(0.3, 1.0, number), strict=True):
@@ -164,26 +164,26 @@ def test_random_gains_have_no_better_disk_margin(number) -> None:
 
 
 def test_gains_that_are_not_stable_never_win() -> None:
-    found = design(BARE, "residual", K1=(-1.0, 1.0), K2=(0.0, 3.0), continuous=True)
+    found = best_gains(BARE, "residual", K1=(-1.0, 1.0), K2=(0.0, 3.0), continuous=True)
     assert found.verdict.is_stable
     assert found.law.K1 > 0
     with pytest.raises(ConvergenceError, match="widen the bounds"):
-        design(BARE, "damping", K1=(0.1, 1.0), K2=(1.1, 3.0), continuous=True)
+        best_gains(BARE, "damping", K1=(0.1, 1.0), K2=(1.1, 3.0), continuous=True)
 
 
 @pytest.mark.parametrize("K1", [(1.0, 1.0), (2.0, 1.0), (float("nan"), 1.0), (0.0, float("inf"))])
 def test_empty_bounds_are_refused(K1) -> None:
     with pytest.raises(ParameterError, match="K1"):
-        design(LAB, "damping", K1=K1)
+        best_gains(LAB, "damping", K1=K1)
 
 
 def test_an_unknown_objective_is_refused() -> None:
     with pytest.raises(ParameterError, match="objective"):
-        design(LAB, "beauty")
+        best_gains(LAB, "beauty")
 
 
 @pytest.mark.parametrize("part", ["mass", "inertia"])
 def test_an_arm_that_cannot_turn_has_no_slew_to_leave_a_residual(part) -> None:
     held = replace(LAB, payload=tfarm.Payload(**{part: float("inf")}))
     with pytest.raises(ParameterError, match=rf"payload\.{part} = inf: .*no slew"):
-        design(held, "residual")
+        best_gains(held, "residual")

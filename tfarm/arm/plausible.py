@@ -13,8 +13,10 @@ from tfarm.arm.link import Link
 from tfarm.arm.records import Arm
 from tfarm.errors import shown
 
-SOFTEST, STIFFEST = 1e5, 2e12  # Pa; soft silicone has 3e5, diamond 1.2e12
-LIGHTEST, DENSEST = 25.0, 25_000.0  # kg/m^3; light foam has 30, osmium 22,600: in g/cm^3 everything is below 25
+SOFTEST = 1e5  # Pa; soft silicone has 3e5
+STIFFEST = 2e12  # Pa; diamond has 1.2e12
+LIGHTEST = 25.0  # kg/m^3; light foam has 30, and in g/cm^3 everything is below 25
+DENSEST = 25_000.0  # kg/m^3; osmium has 22,600
 LONGEST_ARM = 100.0  # m; the arm of the space station has 17
 MOST_DAMPED = 0.1  # damping ratio of the clamped link; rubber has about 0.05
 HEAVIEST = 1e5  # times the link's own mass or inertia

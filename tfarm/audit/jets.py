@@ -7,7 +7,8 @@ import sympy as sp
 from .formulas import Expression, jet, jet_parts, remainder, symbol
 
 x, L = symbol("x"), symbol("L")
-AT_TIP, AT_ROOT = "(L,t)", "(0,t)"
+AT_TIP = "(L,t)"  # places of a jet
+AT_ROOT = "(0,t)"
 
 
 def d_dx(f: Expression) -> Expression:

@@ -16,7 +16,8 @@ from .noise import CONFIDENCE
 from .ringdown import Ring
 from .spectra import Estimate
 
-SIX, NINE, WHOLE = singly(general, 6), singly(general, 9), singly(general, 17)
+SIX = singly(general, 6)  # digits of what was measured: its noise is in the fourth
+NINE = singly(general, 9)  # of the frequencies of its lines
 
 
 def measured_table(data: Measured) -> Table:

@@ -11,8 +11,7 @@ from tfarm.dsp import Chain
 from tfarm.errors import ParameterError
 from tfarm.synthesis import law_design as laws
 from tfarm.synthesis.arms import NamedArm, arm_box, arms_of
-from tfarm.synthesis.design import Design, Objective, gains_score_on
-from tfarm.synthesis.design import design as best_gains
+from tfarm.synthesis.design import Design, Objective, best_gains, gains_score_on
 from tfarm.synthesis.law_design import LawDesign, law_design
 from tfarm.synthesis.search import Bounds
 from tfarm.synthesis.worst_case import Tell, for_the_worst, same_input
@@ -26,7 +25,7 @@ def design(
     """The law of a structure that serves an objective best in the sampled loop of a chain (10 ms unless given).
 
     "K1-K2": gains of rate and moment within bounds, "damping", "margin", "residual" or "cost", of the sampled loop or
-    the `continuous` one (see `design.design`).  "PD", "PD+notch", "lead", "PPF" of the first `modes` modes and
+    the `continuous` one (see `best_gains`).  "PD", "PD+notch", "lead", "PPF" of the first `modes` modes and
     "strain-rate": a `tfarm.Law`, "damping", "margin", "sensitivity", "delay", "residual" or "cost" (see `law_judge`);
     `Kp` is chosen where it is 0, and `progress` is told how the search goes on.  What is recommended holds when
     sampled, with all gains a quarter larger or smaller, and without a clock.

@@ -94,7 +94,7 @@ class _Best(NamedTuple):
     score: float
 
 
-def design(
+def best_gains(
     arm: Arm, objective: Objective = "damping", *, K1: Bounds | None = None, K2: Bounds | None = None,
     Kp: float = 0.0, modes: int = 2, chain: Chain | None = None, continuous: bool = False,
     others: Sequence[NamedArm] = (),

@@ -38,8 +38,8 @@ LEAST_RADIUS = 1e-6  # of the box, where the search ends
 LARGEST_RADIUS = 2.0  # of any box
 FORETOLD_WELL = 0.75  # of what was foretold: from there on the box grows
 FORETOLD_BADLY = 0.25  # and below it shrinks
-RADIUS_GROWS = 2.0
-RADIUS_SHRINKS = 0.3
+RADIUS_GROWS = 2.0  # times
+RADIUS_SHRINKS = 0.3  # times
 GROWTH_KEPT = 0.05  # of the distance to g = 0 that a step leaves
 LEAST_GAIN = 1e-7  # relative: less is none
 

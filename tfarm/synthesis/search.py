@@ -29,6 +29,7 @@ GRID_ROUNDS = 10  # of the small grids
 GRID_SHRINKS = 0.5  # by so much they shrink where their centre is the best
 HALVED_AFTER = (4, 7)  # rounds after which the better half of the minima goes on
 FEWEST_MINIMA = 6  # minima that go on at least
+# of a small grid's 25 points from its centre, in steps of the grid before
 OFFSETS = np.array([(i, j) for i in (-1.0, -0.5, 0.0, 0.5, 1.0) for j in (-1.0, -0.5, 0.0, 0.5, 1.0)])
 TIE = 0.01  # weight of the damping ratio beside a disk margin: without a clock rate feedback alone has margin 2
 POLISHED = 3  # minima that the simplex starts from

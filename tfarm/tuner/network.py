@@ -20,7 +20,6 @@ from tfarm.tuner import kernel
 
 Real = NDArray[np.float64]
 
-NETWORK_INPUTS = ("u(t)", "u(t-1)", "e(t-1)", "e(t-2)", "x(t)", "x(t-1)", "K(t-1)")
 MOST_HIDDEN = 1000  # neurons; the paper has 6
 HALF_WIDTH = 0.5  # of the uniform distribution of the initial weights
 

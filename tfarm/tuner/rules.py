@@ -36,7 +36,7 @@ from .kernel import (
     trial_cost,
 )
 
-PLAIN_RULE, CLIPPED_RULE, BACKTRACKING_RULE = 0, 1, 2
+PLAIN_RULE, CLIPPED_RULE, BACKTRACKING_RULE = range(3)  # as compiled code tells them
 INPUT_ROWS = (1, 5, 6, 10, 0, 4, 7)  # of each input in the rows of `_derive`: x, u, e, K now, before, and before that
 
 
