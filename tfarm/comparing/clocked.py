@@ -4,22 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.arm.driving import AnyLaw
 from tfarm.arm.law import Law
+from tfarm.arrays import Complex, Real
 from tfarm.dsp import Chain
 from tfarm.dsp.law_margins import law_grid, stable_factors
 from tfarm.dsp.law_verdict import LawAnalysis, analyse_law
 from tfarm.dsp.margins import Window
 from tfarm.records import record
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 GONE_AFTER_SAMPLE = 1e-3  # |z| of a pole that leaves this much of itself after a sample: of those nothing is compared
 REAL_Z = 1e-12  # imaginary part of a real z: rounding

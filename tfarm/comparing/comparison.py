@@ -9,12 +9,12 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import ANGLE_GAIN, PLANE, Arm, HubFeedback, must_be_arm
 from tfarm.arm.checks import whole
 from tfarm.arm.driving import AnyLaw, arm_and_law
 from tfarm.arm.law import Law
+from tfarm.arrays import Complex, Real
 from tfarm.dsp import Chain
 from tfarm.dsp.brief import SampledBrief, brief_of
 from tfarm.dsp.closed import verdict_on
@@ -31,9 +31,6 @@ from tfarm.spectrum import modes as modes_of
 from tfarm.spectrum.scales import default_gains
 
 from .clocked import Clocked, Reach, clocked
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 MOST_COMPARED = 30  # flexible modes of a table that is read side by side
 LONGEST_SIDE_NAME = 60  # characters of a name: of two in one legend

@@ -13,14 +13,13 @@ from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
+from tfarm.arrays import Complex
 from tfarm.digits import plain, significant
 from tfarm.loop.nyquist import Nyquist, compressed
 
 from .labels import OFFSET_UPON, OFFSETS_FURTHER, Label
 from .style import BLUE, FAINT, GREY, ORANGE, Keys, New, blank, headline, on_own_figure, safe, style, window
 from .words import gains_words
-
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 RING_SIZES = (0.1, 0.3, 1.0, 3.0, 10.0)  # |L| of the rings
 NAME_ANGLES = np.r_[56:360:17, 0:56:17]  # degrees on a ring where its size may stand, in the order of trial

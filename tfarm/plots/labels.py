@@ -13,11 +13,11 @@ from matplotlib.axes import Axes
 from matplotlib.colors import same_color
 from matplotlib.text import Annotation, Text
 from matplotlib.transforms import Bbox
-from numpy.typing import NDArray
+
+from tfarm.arrays import Real
 
 from .style import FAINT, GREY, INK
 
-Real = NDArray[np.float64]
 LabelOffset = tuple[float, float]  # points, from a place to the nearest corner, side or middle of the words
 AWAY = (6.0, 11.0)  # points from a mark to its words
 SIDES, CORNERS = ((0, 1), (0, -1), (1, 0), (-1, 0)), ((1, 1), (-1, 1), (1, -1), (-1, -1))

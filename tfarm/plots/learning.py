@@ -8,7 +8,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
-from numpy.typing import NDArray
 
 from tfarm.arm import MOMENT_GAIN
 from tfarm.digits import plain, significant
@@ -19,8 +18,6 @@ from tfarm.tuner.overview import CostMap, Curves, TunerStudy
 
 from .regions import overlay
 from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, blank, headline, on_own_figure, style, window
-
-Real = NDArray[np.float64]
 
 K_RANGE = (-0.25, 1.25)  # of the moment gain: all that a guard proves lies between 0 and 1
 GUARD = "#bfe3d6"

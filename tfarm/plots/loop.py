@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from tfarm.arrays import Real
 from tfarm.digits import significant
 from tfarm.loop.margins import Margins, dense
 from tfarm.spectrum.scales import first_frequency
@@ -16,8 +17,6 @@ from tfarm.spectrum.scales import first_frequency
 from .frequency import hertz_axis, wrapped_phase
 from .labels import OFFSETS_BESIDE, Label
 from .style import BLUE, GREEN, GREY, ORANGE, PURPLE, blank, headline, style
-
-Real = NDArray[np.float64]
 
 MOST_NAMED = 6  # crossings that bear their number; of more the mark alone
 BEYOND_MARKED = 1e3  # beyond all that is marked |L| is a pole or a zero on the axis, and leaves the picture

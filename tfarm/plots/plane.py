@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from tfarm.arm import MOMENT_GAIN, PLANE, Arm, HubFeedback
+from tfarm.arrays import Real
 from tfarm.crossing import RegionPiece, pieces
 from tfarm.digits import SUPERSCRIPT, how_many, plain, significant
 from tfarm.dsp import GainMap
@@ -27,8 +28,6 @@ from tfarm.spectrum import modes
 from .labels import OFFSET_UPON, OFFSETS_AROUND, Label
 from .style import BLUE, GREY, INK, ORANGE, PURPLE, New, blank, on_own_figure, style, window
 from .words import LYAPUNOV, name_axes
-
-Real = NDArray[np.float64]
 
 STABLE_COLOUR, FEWEST_COLOUR, MOST_COLOUR, BOUNDLESS_COLOUR = "#dcefe6", "#fbeadd", "#eebd95", "#f3d9c6"
 CONTOUR_STEPS, MOST_CONTOURS = (1.0, 2.0, 5.0), 7  # of the contours

@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
+from tfarm.arrays import Complex
 from tfarm.digits import kept_digits, plain, significant
 from tfarm.loop.loci import GAPS_HELD, POLE_DIGITS, Loci, held_branches
 from tfarm.loop.locus import Locus, frame, rounded
@@ -22,9 +22,6 @@ from tfarm.spectrum import modes
 from .labels import OFFSETS_BESIDE, Label
 from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, Keys, New, blank, headline, on_own_figure, style, window
 from .words import gains_words
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 ZOOMED = 4  # modes drawn on their own
 MODE_COLOURS = (INK, BLUE, GREEN, PURPLE, "#7a5a00", GREY)  # by mode

@@ -7,8 +7,8 @@ import math
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from tfarm.arrays import Real
 from tfarm.digits import how_many, plain, significant
 from tfarm.dsp.curves import TimeCurve, continuous, root_moment
 from tfarm.dsp.strip_chart import StripChart
@@ -16,8 +16,6 @@ from tfarm.dsp.strip_chart import StripChart
 from .labels import OFFSETS_FURTHER, Label
 from .motion import draw_curve, motor_words
 from .style import BLUE, FAINT, GREEN, GREY, INK, ORANGE, blank, headline, style
-
-Real = NDArray[np.float64]
 
 CLOSE_UP_SAMPLES = 14  # in which single steps of the ADC and the delay are seen
 MOST_ADC_LEVELS = 60  # of the ADC that are drawn: more would be a grey wall

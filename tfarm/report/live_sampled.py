@@ -24,8 +24,6 @@ from tfarm.dsp.slews import RECORD_LENGTH
 from tfarm.errors import TfarmError
 from tfarm.response import transfer
 
-Complex = NDArray[np.complexfloating[Any, Any]]
-
 STATIONS = 24  # places along the arm at which its shape is drawn, besides the clamp
 OFF_A_POLE = 1e-9  # of a pole: where the ratio of two outputs is taken that both have it; the ratio is off by as much
 MOST_LIVE_SAMPLES = 5000  # of a slew: 160 kB of references; a longer one is left to `tfarm simulate`

@@ -5,15 +5,12 @@ from __future__ import annotations
 from typing import Any, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import Arm
 from tfarm.digits import kept_digits
 from tfarm.errors import TfarmError
 from tfarm.loop.positions import MOST_SENSOR_MISS, Positions, Sensor, positions
 from tfarm.spectrum import modes
-
-Real = NDArray[np.float64]
 
 SENSOR_PIECES = 16  # pieces of the arm between two positions
 SENSED_MODES = 6  # whose frequencies and zeros the chart of sensors has

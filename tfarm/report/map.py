@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import PLANE, Arm, HubFeedback, laws_at, shown_unit
+from tfarm.arrays import Real
 from tfarm.columns import Column, Table
 from tfarm.dsp import Chain, sampled_verdict
 from tfarm.dsp import GainMap as SampledMap
@@ -32,7 +33,6 @@ from tfarm.synthesis.design import Design
 if TYPE_CHECKING:
     from tfarm.plots.style import Figure
 
-Real = NDArray[np.float64]
 
 GRID_COLUMNS, GRID_ROWS = 240, 200  # of the coloured grid
 MARKERS = {"default": plane.DIAMOND, "best": plane.STAR}

@@ -1,0 +1,9 @@
+"""The arrays of every room, for readers and for mypy: real and complex numbers in double precision."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complexfloating[Any, Any]]
