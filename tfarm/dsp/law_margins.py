@@ -60,8 +60,12 @@ def crossing_factors(loop: SampledLaw) -> Crossings:
     step = np.nonzero((rises[1:] != rises[:-1]) & told[:-1])[0]
     q, factor = solved_on(grid, _split, step)
     A, B = loop.terms(np.array([-1.0 + 0j]), None, np.ones(1))
-    first, last = -1 if rises[told][0] else 1, 1 if rises[-1] else -1
-    ends = [(_at_one(loop), 0.0, first), (float(real_gain(A[0], B[0])), math.pi, last)]
+    ends = [(float(real_gain(A[0], B[0])), math.pi, 1 if rises[-1] else -1)]
+    (n, open_loop), fed_back = loop.near_one
+    lowest = min((order for order, _ in fed_back), default=n + 1)
+    if lowest == n:  # A and B go there as the same power of x = 1 - 1/z: a single pole may be at z = 1
+        at_one = sum(value for order, value in fed_back if order == lowest)
+        ends.append((float(real_gain(open_loop, at_one)), 0.0, -1 if rises[told][0] else 1))
     found = [*zip(factor, q, np.where(rises[step], 2, -2), strict=True), *ends]
     return Crossings.of(each for each in found if LEAST_LAW_FACTOR < each[0] < MOST_LAW_FACTOR)
 
@@ -70,14 +74,6 @@ def _split(terms: tuple[Any, Complex]) -> tuple[Complex, Complex]:
     """A and B times the offset of each point."""
     both = terms[1]
     return both[0], both[1]
-
-
-def _at_one(loop: SampledLaw) -> float:
-    """The factor that brings a single pole to z = 1, where both A and B go there as the same power of x; else inf."""
-    (n, A), fed_back = loop.near_one
-    lowest = min((order for order, _ in fed_back), default=n + 1)
-    B = sum(value for order, value in fed_back if order == lowest)
-    return float(real_gain(A, B)) if lowest == n else math.inf
 
 
 def stable_factors(loop: SampledLaw) -> list[Window]:

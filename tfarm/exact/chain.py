@@ -29,7 +29,7 @@ from .elements import Body, Drive, Element, Mark, Offset, Place, Segment, Spring
 SEGMENT, OFFSET, SPRING, BODY, MARK = range(5)
 ROW_KIND, ROW_WIDTH = 8, 12  # where a row of the kernel says what it is, after the numbers of a segment (`vector`)
 TO_W, TO_M, TO_Q = 9, 10, 11  # from the chain's units to the segment's own
-TIP, OF_ANGLE, OF_MOMENT = 0, 6, 10  # of the vector of ends: six numbers of the payload, A_0..A_3, B_0 and B_1
+OF_ANGLE, OF_MOMENT = 6, 10  # in the vector of ends: after six numbers of the payload A_0..A_3, then B_0 and B_1
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -99,17 +99,14 @@ def reading_of(chain: ElementChain, wanted: Output, x: float) -> Reading:
     if wanted.quantity == "centre":
         place = Place(Fraction(1), "payload")
     state = weights.get(wanted.quantity, (0, 0, 0, 1)) if place else (0, 0, 0, 0)
-    unit = _strain_unit(chain, place) if wanted.quantity == "strain" and place else unit_scale(wanted, chain)
+    unit = unit_scale(wanted, chain)
+    if wanted.quantity == "strain" and place:  # at the surface: half the depth over E I/L
+        (segment,) = chain.at((place,)).read
+        if segment.half_depth is None:
+            remedy = 'a "general" section does not say how deep it is: give rectangle, round or tube'
+            raise ParameterError(key="link.section.shape", value="general", remedy=remedy)
+        unit = Fraction(segment.half_depth) / chain.length / segment.stiffness / chain.input_unit
     return Reading(place, state, theta.get(wanted.quantity, Fraction(0)), wanted.power, wanted.gauge, unit)
-
-
-def _strain_unit(chain: ElementChain, place: Place) -> Fraction:
-    """Strain at the surface per moment without dimensions and unit of the input: half the depth over E I/L."""
-    (segment,) = chain.at((place,)).read
-    if segment.half_depth is None:
-        remedy = 'a "general" section does not say how deep it is: give rectangle, round or tube'
-        raise ParameterError(key="link.section.shape", value="general", remedy=remedy)
-    return Fraction(segment.half_depth) / chain.length / segment.stiffness / chain.input_unit
 
 
 def readings(chain: ElementChain, wanted: tuple[Output, ...], x: float) -> Readings:

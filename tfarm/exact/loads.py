@@ -27,6 +27,7 @@ from .compound import Plane, Row, met
 from .elements import Body, Element, Mark, Offset, Place, Segment, Spring
 from .enclosures import precisions
 from .outputs import Output
+from .values import PROVEN_BITS
 
 _met = python_of(met)
 LOAD_KINDS = {"force": ("N", 3), "moment_pair": ("N m", 2)}  # unit, and which entry of (W, Psi, M, Q) jumps
@@ -70,14 +71,14 @@ def load_of(text: str, length: float) -> Load:
     return Load(found[1], tuple(x / length for x in places))
 
 
-def loaded_value(chain: ElementChain, load: Load, wanted: Output, s: complex, x: float, bits: int = 60) -> Ball:
-    """The output per unit load at s, SI, to so many bits.  Raises CertificationError at a pole or an exact zero."""
-    for working in precisions(bits):
+def loaded_value(chain: ElementChain, load: Load, wanted: Output, s: complex, x: float) -> Ball:
+    """The output per unit load at s, SI, to `PROVEN_BITS`.  Raises CertificationError at a pole or an exact zero."""
+    for working in precisions(PROVEN_BITS):
         with precision(working):
             value = _value(chain, load, wanted, point(s), x)
-            if value is not None and (value.rel_accuracy_bits() >= bits or value.is_zero()):
+            if value is not None and (value.rel_accuracy_bits() >= PROVEN_BITS or value.is_zero()):
                 return value
-    raise CertificationError(f"no {bits} bits at s = {s:g} 1/s: it is a pole or a zero, or too close to one")
+    raise CertificationError(f"no {PROVEN_BITS} bits at s = {s:g} 1/s: it is a pole or a zero, or too close to one")
 
 
 def _value(chain: ElementChain, load: Load, wanted: Output, s: Ball, x: float) -> Ball | None:

@@ -13,7 +13,6 @@ from tfarm.errors import ParameterError
 from .balls import nearest_float
 from .chain import ElementChain
 from .chain_values import expansions, free_outputs, free_slopes
-from .coefficients import Coefficients
 from .enclosures import decimals, enclose, slope
 from .fields import fields, from_root
 from .free import free_response, low_frequency, low_frequency_tip
@@ -54,9 +53,10 @@ def evaluate_outputs(
             values, suspects = free.outputs / free.drive, free.lost
         else:
             evaluate(s, k.kernel, table, values, suspects)
-        for row, each in enumerate(wanted):
-            if not (isinstance(k, ElementChain) or each.is_at_end):
-                values[row] = _along(k, each, s, each.share(x))
+            for row, each in ((row, each) for row, each in enumerate(wanted) if not each.is_at_end):
+                field = fields(k, s, each.share(x))[0][_FIELDS[each.quantity]]
+                values[row] = field * float(unit_scale(each, k)) * s**each.power
+                values[row] /= 1.0 + k.damping * s if each.gauge else 1.0
     for i in np.flatnonzero(suspects | ~np.isfinite(values).all(axis=0)):
         values[:, i] = [value_with_care(k, each, complex(s[i]), x) for each in wanted]
     return values
@@ -144,11 +144,6 @@ def _of_chain(k: ElementChain, wanted: Sequence[Output], s: Complex, x: float) -
     for i in np.flatnonzero(free.lost | (s == 0) | ~np.isfinite(values).all(axis=0)):
         values[:, i] = [_slope_with_care(k, each, complex(s[i]), x) for each in wanted]
     return values
-
-
-def _along(k: Coefficients, wanted: Output, s: Complex, x: float) -> Complex:
-    values = fields(k, s, x)[0][_FIELDS[wanted.quantity]] * float(unit_scale(wanted, k)) * s**wanted.power
-    return values / (1.0 + k.damping * s) if wanted.gauge else values
 
 
 def _power(s: Any, power: int) -> Any:

@@ -216,7 +216,7 @@ def _slow_zero(loop: Loop, pair: Complex) -> Complex:
     return np.array([-c / b, pair[1]], complex)
 
 
-def stretches(nodes: list[Node], pinned: bool = False) -> list[Stretch]:
+def stretches(nodes: list[Node], pinned: bool) -> list[Stretch]:
     """The nodes cut where zeros were paired anew, with the branches handed on from zero to zero."""
     slots = np.arange(nodes[0].zeros.size).reshape(-1, 2)
     fresh = slots.size
@@ -243,7 +243,7 @@ def _handed_on(old: Complex, new: Complex, slots: NDArray[np.int64], fresh: int)
     return handed
 
 
-def ordered(zeros: Complex, pinned: bool = False) -> Complex:
+def ordered(zeros: Complex, pinned: bool) -> Complex:
     """The pairs with Im > 0 first, or the larger of two real ones: an order that holds while a pair stays one.
 
     `pinned`: the first pair keeps its order.

@@ -31,7 +31,14 @@ def with_others(
     """
     top = float(np.fmax.reduce(branches.imag, axis=0).min())
     if not variation.is_of_gains:
-        _refuse_hidden(variation, gain, branches, top)
+        for n in np.unique(np.linspace(0, gain.size - 1, LOOPS).round().astype(int)):
+            here = branches[:, n]
+            right = (here.real > AXIS_SHARE * abs(here)) & (abs(here.imag) < top)
+            poles = poles_below(variation.at(float(gain[n])), top, BOX_HEIGHTS)
+            if poles.unstable > count_with_mirrors(here[right]):
+                where = f"at {variation.vary} = {gain[n]:.6g}"
+                text = f"{where} an unstable pole is on none of the branches that could be followed: use another range"
+                raise ConvergenceError(text, poles.values, n)
         return found
     way, width = np.sign(gain[-1] - gain[0]), abs(gain[-1] - gain[0])
     ends = gain.min() + SAME_CROSSING * width, gain.max() - SAME_CROSSING * width
@@ -44,15 +51,3 @@ def with_others(
         )
     ]
     return tuple(sorted([*found, *more], key=lambda each: (way * each.gain, each.omega)))
-
-
-def _refuse_hidden(variation: Variation, gain: Real, branches: Complex, top: float) -> None:
-    """Raise ConvergenceError where at one of a few values more poles below `top` are unstable than branches are."""
-    for n in np.unique(np.linspace(0, gain.size - 1, LOOPS).round().astype(int)):
-        here = branches[:, n]
-        right = (here.real > AXIS_SHARE * abs(here)) & (abs(here.imag) < top)
-        poles = poles_below(variation.at(float(gain[n])), top, BOX_HEIGHTS)
-        if poles.unstable > count_with_mirrors(here[right]):
-            where = f"{variation.vary} = {gain[n]:.6g}"
-            text = f"at {where} an unstable pole is on none of the branches that could be followed: use another range"
-            raise ConvergenceError(text, poles.values, n)

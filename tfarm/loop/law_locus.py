@@ -219,8 +219,11 @@ def inside(poles: Complex, box: Box) -> NDArray[np.bool_]:
 
 
 def _crossings(family: Family, values: Real, branches: Complex, box: Box) -> tuple[BranchCrossing, ...]:
-    """Where branches change sides, solved for; along a linear number also those that no branch has."""
-    found = []
+    """Where branches change sides, solved for; along a linear number also those that no branch was seen to make.
+
+    The latter by D-decomposition, between the ends of the range.
+    """
+    found, sign = [], 1.0 if values[-1] > values[0] else -1.0
     for number, row in enumerate(branches):
         side = np.where(abs(row.real) <= NO_PART * abs(row), 0, np.sign(row.real))
         for n in np.flatnonzero(side[1:] * side[:-1] < 0):
@@ -228,8 +231,15 @@ def _crossings(family: Family, values: Real, branches: Complex, box: Box) -> tup
             way = "unstable" if side[n + 1] > 0 else "stable"
             found.append(BranchCrossing(gain=each[0], omega=each[1], branch=number, direction=way))
     if not family.is_of_arm and family.vary != "delay":
-        found += _others(family, values, found, box.im_max)
-    sign = 1.0 if values[-1] > values[0] else -1.0
+        loop, ascending, band, seen = family.at(float(values[0])), np.sort(values), box.im_max, tuple(found)
+        omega, span = np.asarray(grid(loop.arm, band)), float(ascending[-1] - ascending[0])
+        parts = loop.signals.parts(1j * omega)
+        for t, w, change in law_crossings(loop, family.vary, ascending, omega, parts, band):
+            near = [each for each in seen if abs(each.gain - t) <= SEEN_CROSSING * span]
+            is_seen = any(abs(each.omega - w) <= SEEN_CROSSING * band for each in near)
+            if NO_PART * span < t - ascending[0] < (1 - NO_PART) * span and not is_seen:
+                direction = "unstable" if sign * change > 0 else "stable"
+                found.append(BranchCrossing(gain=t, omega=w, branch=None, direction=direction))
     return tuple(sorted(found, key=lambda each: (sign * each.gain, each.omega)))
 
 
@@ -242,23 +252,6 @@ def _crossed(family: Family, values: Real, poles: Complex) -> tuple[float, float
 
     at = float(brentq(lambda value: pole(value).real, values[0], values[1], xtol=1e-13 * abs(values).max()))
     return at, abs(pole(at).imag)
-
-
-def _others(family: Family, values: Real, known: list[BranchCrossing], band: float) -> list[BranchCrossing]:
-    """Crossings solved for by D-decomposition that no branch was seen to make."""
-    loop, ascending = family.at(float(values[0])), np.sort(values)
-    omega = np.asarray(grid(loop.arm, band))
-    parts = loop.signals.parts(1j * omega)
-    found, span = [], float(ascending[-1] - ascending[0])
-    way = 1 if values[-1] > values[0] else -1
-    for t, w, change in law_crossings(loop, family.vary, ascending, omega, parts, band):
-        same = [
-            abs(each.gain - t) <= SEEN_CROSSING * span and abs(each.omega - w) <= SEEN_CROSSING * band for each in known
-        ]
-        if NO_PART * span < t - ascending[0] < (1 - NO_PART) * span and not any(same):
-            direction = "unstable" if way * change > 0 else "stable"
-            found.append(BranchCrossing(gain=t, omega=w, branch=None, direction=direction))
-    return found
 
 
 def law_locus_answer(found: LawLocus) -> dict[str, Any]:

@@ -8,7 +8,6 @@ they are: it changes the drive alone.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -68,26 +67,19 @@ def positions(arm: Arm, sensor: Sensor, x: Real, count: int) -> Positions:
     found = modes(arm, count)
     flexible = found.index > 0
     field = (found.shape if sensor == "displacement" else found.moment)(x)[flexible]
-    band = band_of(arm, count)
+    band, zeros = band_of(arm, count), []
     lines = [_Panels.of(arm, sensor, unit, band) for unit in (1j, 1.0 + 0j)]
-    return Positions(
-        sensor,
-        x,
-        band,
-        found.natural_frequency[flexible],
-        field / abs(field).max(axis=1, keepdims=True),
-        tuple(_zeros(transfer(arm, sensor, x=float(place)), lines) for place in x),
-    )
-
-
-def _zeros(G: TransferFunction, lines: Sequence[_Panels]) -> Complex:
-    """The zeros with Im s > 0, and the positive real ones, each once."""
-    found: list[complex] = []
-    for s in (s for line in lines for s in line.zeros(G)):
-        is_real = abs(s.imag) < SAME_SENSOR_ZERO * abs(s)
-        if (s.real > 0 if is_real else s.imag > 0) and all(abs(s - each) > SAME_SENSOR_ZERO * abs(s) for each in found):
-            found.append(complex(s.real, 0.0) if is_real else s)
-    return np.array(sorted(found, key=lambda s: (s.imag, s.real)), dtype=complex)
+    for place in x.tolist():
+        G = transfer(arm, sensor, x=place)
+        known: list[complex] = []
+        for s in (s for line in lines for s in line.zeros(G)):
+            is_real = abs(s.imag) < SAME_SENSOR_ZERO * abs(s)
+            is_new = all(abs(s - each) > SAME_SENSOR_ZERO * abs(s) for each in known)
+            if is_new and (s.real > 0 if is_real else s.imag > 0):
+                known.append(complex(s.real, 0.0) if is_real else s)
+        zeros.append(np.array(sorted(known, key=lambda s: (s.imag, s.real)), dtype=complex))
+    participation = field / abs(field).max(axis=1, keepdims=True)
+    return Positions(sensor, x, band, found.natural_frequency[flexible], participation, tuple(zeros))
 
 
 @dataclass(frozen=True)

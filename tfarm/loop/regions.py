@@ -120,7 +120,10 @@ def region(arm: Arm, K1: Real, K2: Real, Kp: float = 0.0) -> Region:
     (without_K2,) = counts_over(K1, [line_crossings(arm, along("K1", without), band)], float(K1[-1]), last)
     found = _crossings_along_K2(arm, K1, Kp, omega)
     unstable = counts_over(K2, found, 0.0, without_K2).T
-    unstable = np.where(_drives_all(arm, K1, K2), INFINITE, unstable)
+    if Loop(arm, HubFeedback()).is_told_by_theorem and arm.reads_hub_moment and arm.loses_at_hub_alone:
+        # of elastic links behind a hub that friction alone damps every mode is driven, and the band has but the first
+        taken = np.sign(1.0 - K2[:, None] / arm.input_per_torque) * np.sign(K1 + arm.rate_loss)
+        unstable = np.where(taken < 0, INFINITE, unstable)  # as `Loop.takes_energy` says
     return Region(arm, Kp, K1, K2, unstable, boundary(arm, omega, Kp), band, found)
 
 
@@ -129,17 +132,6 @@ def ranges_of(arm: Arm) -> tuple[tuple[float, float], tuple[float, float]]:
     K1 = 1.0 if arm.is_uniform else default_gains(arm).K1 / PAPER_GAINS.K1
     K2 = arm.input_per_torque
     return (-1.0 * K1, 3.0 * K1), (-2.0 * K2, 2.0 * K2)
-
-
-def _drives_all(arm: Arm, K1: Real, K2: Real) -> NDArray[np.bool_]:
-    """Where the law drives every mode of the link, of which the band has but the first: (len(K2), len(K1)).
-
-    Of elastic links behind a hub that friction alone damps, by the sign of (K1 + b)(1 - K2) (see `Loop.takes_energy`).
-    """
-    if not Loop(arm, HubFeedback()).is_told_by_theorem or not (arm.reads_hub_moment and arm.loses_at_hub_alone):
-        return np.zeros((K2.size, K1.size), bool)
-    taken = np.sign(1.0 - K2[:, None] / arm.input_per_torque) * np.sign(K1 + arm.rate_loss)
-    return np.asarray(taken < 0)
 
 
 def between(low: float, high: float, number: int) -> Real:

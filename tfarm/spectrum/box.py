@@ -33,6 +33,8 @@ SAME_BOX_ZERO = 0.1  # of its size: a zero found so near a known one is that one
 MOST_CUTS = 60  # cuts: then a box is a share of 2^-30 of the first, less than float64 can search
 REAL_SHARE = 1e-11  # of its size: a smaller imaginary part is rounding
 TRIED_HEIGHTS = (1.0, 1.0041, 1.0093, 1.0171, 1.0311, 1.0573, 1.113)  # of a box, where a zero lies on its edge
+NEWTON_STEPS = 60  # at most, of a start: those that have not settled by then are dropped
+SAME_POINT = 1e-9  # of its size: two starts that settle so near each other found one zero
 SHRINKING = 0.9  # of a move of Newton's: the next one, at a zero of order up to ten
 SPLIT = 0.4871  # where a box is cut: off the axes, on which zeros like to lie
 
@@ -112,14 +114,14 @@ def _phase(function: Function, points: Complex) -> tuple[NDArray[np.float64], Co
     return phase, rate
 
 
-def newton(function: Function, starts: Complex, steps: int = 60) -> Complex:
+def newton(function: Function, starts: Complex) -> Complex:
     """Newton's method from every start at once; the points that have settled, each zero once.
 
     A point that has settled goes on while its moves shrink: until they are what f is rounded by.
     """
     s = np.array(starts, dtype=complex)
     settled, moving, last = np.zeros(s.size, bool), np.arange(s.size), np.full(s.size, np.inf)
-    for _ in range(steps):
+    for _ in range(NEWTON_STEPS):
         at = function(s[moving])
         with np.errstate(all="ignore"):  # a start that runs away, or stands where f is flat, is dropped
             move = at.value / at.slope
@@ -138,11 +140,11 @@ def newton(function: Function, starts: Complex, steps: int = 60) -> Complex:
     return distinct(s[settled & np.isfinite(s)])
 
 
-def distinct(points: Complex, apart: float = 1e-9) -> Complex:
-    """The points, those nearer than `apart` of their size to an earlier one left out."""
+def distinct(points: Complex) -> Complex:
+    """The points, those next to an earlier one left out."""
     kept: list[complex] = []
     for point in points:
-        if all(abs(point - other) > apart * abs(point) for other in kept):
+        if all(abs(point - other) > SAME_POINT * abs(point) for other in kept):
             kept.append(complex(point))
     return np.array(kept, dtype=complex)
 

@@ -41,8 +41,21 @@ PARAMETERS = (*LINK, "hub_inertia", "payload_mass", "payload_inertia")  # of eve
 
 
 def arm_sensitivities(k: Coefficients, shapes: Shapes) -> dict[str, Real]:
-    """d ln w/d ln p of the uniform arm, by parameter, for each mode of `shapes`."""
-    energies = (_energies(k, shapes.part(block.start, block.stop)) for block in shapes.blocks())
+    """d ln w/d ln p of the uniform arm, by parameter, for each mode of `shapes`.
+
+    From energies of bending, shear, its cross term; of translation, rotation, payload's two and hub.
+    """
+    energies, sigma = [], float(k.sigma)
+    for block in shapes.blocks():
+        part = shapes.part(block.start, block.stop)
+        x, weight = part.quadrature()
+        W, Psi, M, Q = part(x)
+        tip, theta, square = part(np.ones(1))[..., 0], part.theta(), part.omega**2
+        potential = (M**2 @ weight, sigma * Q**2 @ weight, (Q * (Psi + sigma * Q)) @ weight)
+        kinetic = [float(k.g) * W**2 @ weight, float(k.a) * Psi**2 @ weight]
+        for held, motion in ((k.tip_mass, tip[0]), (k.tip_inertia, tip[1]), (k.hub_inertia, theta)):
+            kinetic.append(float(held) * motion**2 if math.isfinite(held) else np.zeros_like(theta))
+        energies.append((*(energy / square for energy in potential), *kinetic))
     *beam, mass, inertia, hub = map(np.concatenate, zip(*energies, strict=True))
     bodies = {"hub_inertia": -hub, "payload_mass": -mass, "payload_inertia": -inertia}
     return _halved(_of_link(*beam) | bodies)
@@ -84,20 +97,6 @@ def _of_link(bend: Real, shear: Real, slide: Real, move: Real, turn: Real) -> Do
         "area": shear - move,
         "second_moment": bend - turn,
     }
-
-
-def _energies(k: Coefficients, shapes: Shapes) -> tuple[Real, ...]:
-    """Energies of a uniform arm: bending, shear, its cross term; of translation, rotation, payload's two and hub."""
-    x, weight = shapes.quadrature()
-    W, Psi, M, Q = shapes(x)
-    tip, hub = shapes(np.ones(1))[..., 0], shapes.theta()
-    square = shapes.omega**2
-    sigma = float(k.sigma)
-    potential = (M**2 @ weight, sigma * Q**2 @ weight, (Q * (Psi + sigma * Q)) @ weight)
-    kinetic = [float(k.g) * W**2 @ weight, float(k.a) * Psi**2 @ weight]
-    for held, motion in ((k.tip_mass, tip[0]), (k.tip_inertia, tip[1]), (k.hub_inertia, hub)):
-        kinetic.append(float(held) * motion**2 if math.isfinite(held) else np.zeros_like(hub))
-    return *(energy / square for energy in potential), *kinetic
 
 
 # ------------------------------------------------------------ rigs
