@@ -1,6 +1,7 @@
 """tfarm tune, tfarm study and tfarm simulate --controller as a shell sees them."""
 
 import json
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -21,6 +22,8 @@ def test_tune_lab(capsys, tmp_path):
     assert result["best_constant_gain"] == pytest.approx(0.34, abs=0.005)
     assert result["cost_lq_bound"] == pytest.approx(0.256, abs=5e-4)
     assert result["cost_shaped"] == min(each["cost"] for each in result["shaped"].values()) < 0.03
+    late = {kind: each["arrives_later_by_s"] for kind, each in result["shaped"].items()}
+    assert late == pytest.approx(lateness(tfarm.load("sasaki2012-lab"), 0.01), abs=1e-12)
     assert len(result["cost"]) == result["trials"] == 60
     assert result["cost_lq_bound"] < result["cost_tuned"] < result["cost_best_constant"]
     assert result["residual_moment_rms"] < 0.4 * result["residual_without"]
@@ -34,6 +37,19 @@ def test_tune_lab(capsys, tmp_path):
     for key in ("residual_moment_rms", "residual_raw_moment_rms"):  # one name, one meaning
         assert simulated[key] == pytest.approx(result[key], rel=1e-9)
     assert result["residual_raw_moment_rms"] > 1.05 * result["residual_moment_rms"]
+
+
+def lateness(arm, period):
+    """Half a damped period of either mode of the exact loop in whole samples and one more; EI's are beside it."""
+    poles = tfarm.closed_loop_poles(arm, tfarm.HubFeedback(K1=0.3), 4).values
+    first, second = sorted(pole.imag for pole in poles if pole.imag > 0)[:2]
+    beside = math.acos(0.95 / 1.05) / math.pi
+
+    def samples(*frequencies):
+        return sum(math.floor(math.pi / (omega * period)) + 1 for omega in frequencies)
+
+    apart = [omega * factor for omega in (first, second) for factor in (1 - beside, 1 + beside)]
+    return {"ZV": period * samples(first, second), "EI": period * samples(*apart)}
 
 
 def test_without_a_guard_the_upper_end_is_inf_and_a_divergence_is_told(capsys):
@@ -57,6 +73,7 @@ def test_tables_for_people(capsys):
     assert "proven for any K(t)" in out
     _, out, _ = run(capsys, "study", "sasaki2012-lab", "inputs", "--seeds", "2", "--trials", "2", "--guard", "none")
     assert "below best constant" in out
+    assert out.split()[:2] == ["inputs", "median"]  # two plans differ by their inputs, and by nothing else
 
 
 def test_study_answer(capsys, tmp_path):

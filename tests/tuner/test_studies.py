@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 import tfarm
+from tfarm.dsp import Chain, Sampling
 from tfarm.errors import ParameterError
 from tfarm.tuner import Plan, studies, tune
 from tfarm.tuner.guard import find_guard
@@ -37,6 +38,16 @@ def test_a_study_on_the_ground_of_a_tuning_is_the_same_and_finds_no_guard_again(
     monkeypatch.setattr(studies, "find_guard", lambda *given: [asked.append(given[1]), find_guard(*given)][1])
     assert run_study(lab, plans, tuned=tuned) == alone
     assert asked == ["none"]
+
+
+def test_what_was_kept_of_one_chain_or_arm_is_not_taken_for_another(lab, tmp_path):
+    keep, plans = tmp_path / "study.jsonl", plans_of("curves", BASE, 1)
+    slow, heavy = Chain(sampling=Sampling(period=0.02)), replace(lab, payload=replace(lab.payload, mass=0.3))
+    asked = [(lab, None), (lab, slow), (heavy, None), (lab, Chain())]
+    results = [run_study(arm, plans, chain, keep=keep)[0] for arm, chain in asked]
+    assert len(keep.read_text().splitlines()) == 3  # no chain is the standard one
+    assert results[3] == results[0]
+    assert results[1] == run_study(lab, plans, slow)[0] != results[0] != results[2]
 
 
 def test_a_stopped_study_goes_on(lab, tmp_path):
