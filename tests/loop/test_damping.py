@@ -107,3 +107,20 @@ def test_modes_that_cannot_be_followed_are_sought_once_and_left_to_a_box(monkeyp
     boxed = poles_below(Loop(arm, law_of(laws[:, 0])), band_of(arm, 1)).moving
     own = found[0][0]
     np.testing.assert_allclose(np.sort_complex(own[~np.isnan(own)]), np.sort_complex(boxed), rtol=1e-8)
+
+
+def test_two_starts_that_end_in_one_pole_are_no_answer(monkeypatch) -> None:
+    """The first law's poles are then those of a box, and none is missing."""
+    laws = many_laws(HubFeedback(), K1=np.array([0.1, 0.4]), K2=np.array([0.3, -0.2]))
+    alone, next_to = band_poles(LAB, laws, 3), damping.exact_poles_next_to
+
+    def merged(arm, starts, laws):
+        polished, settled = next_to(arm, starts, laws)
+        polished[0, 1] = polished[0, 0]
+        return polished, settled
+
+    monkeypatch.setattr(damping, "exact_poles_next_to", merged)
+    found = band_poles(LAB, laws, 3)
+    for mine, theirs in zip(found, alone, strict=True):
+        mine, theirs = (np.sort_complex(each[~np.isnan(each)]) for each in (mine, theirs))
+        np.testing.assert_allclose(mine, theirs, rtol=1e-9)

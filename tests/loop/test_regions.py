@@ -17,9 +17,10 @@ from tfarm.errors import ParameterError
 from tfarm.loop.answers import map_answer
 from tfarm.loop.plant import Loop
 from tfarm.loop.poles import poles_below
-from tfarm.loop.regions import INFINITE, between, region
+from tfarm.loop.regions import INFINITE, between, ranges_of, region
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import gain_windows
+from tfarm.spectrum.scales import default_gains
 
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 
@@ -193,3 +194,12 @@ def test_without_damping_the_intervals_of_a_held_arm_end_where_it_falls_statical
         np.testing.assert_array_equal(inside, plane.unstable[1:-1, n] == 0)
     assert plane.stable_intervals[0] == []
     assert 0 < (plane.unstable[:, 1] == 0).sum() < 41
+
+
+def test_unless_asked_otherwise_a_map_is_around_the_papers_gains_in_the_rigs_own_units() -> None:
+    """The paper's 0.3 and 0 lie in -1 ... 3 and -2 ... 2; of a rig the first as its own K1, the second as its input."""
+    assert ranges_of(LAB) == ((-1.0, 3.0), (-2.0, 2.0))
+    rig = RIGS["r = 0.05"]
+    (left, right), (low, high) = ranges_of(rig)
+    assert (left, right) == pytest.approx((-default_gains(rig).K1 / 0.3, default_gains(rig).K1 / 0.1), rel=1e-15)
+    assert (low, high) == (-2.0 * rig.input_per_torque, 2.0 * rig.input_per_torque)
