@@ -50,6 +50,16 @@ def test_a_static_crossing_torn_by_rounding_hides_no_window(period):
         assert loop.having(K1=0.0374, K2=K2).poles.is_stable == is_stable
 
 
+def test_where_the_feedback_outweighs_no_fast_modes_damping_all_delays_are_looked_through(lab):
+    """A weak rate gain on a little damped arm, whose fastest mode turns more than 20 times in a sample: 20 samples are borne."""
+    arm = replace(lab, link=replace(lab.link, damping=1e-4))
+    loop = sampled_loop(arm, HubFeedback(K1=0.02), Chain(sampling=Sampling(period=0.02)), count=12)
+    assert loop.plant.poles.imag.max() * 0.02 > 2 * np.pi * 20
+    found = delay_margin(loop)
+    assert (found.samples, found.is_bound) == (20.0, True)
+    assert all(loop.with_delay(delay).poles.is_stable for delay in np.linspace(0.0, 20.0, 9))
+
+
 @pytest.mark.parametrize("gain", ["K1", "K2"])
 @pytest.mark.parametrize("name", ["sasaki2012", "sasaki2012-lab"])
 def test_an_edge_has_a_pole_on_the_circle_and_the_verdict_turns_there(name, gain):
