@@ -79,7 +79,24 @@ def test_plain_momentum_is_fragile(trial, guards):
     assert sum(lost) >= 6
     stopped = next(each.stopped for each in trained if each.stopped is not None)
     assert f"trial {stopped.trial + 1} at sample {stopped.sample}" in str(stopped)
+    assert all(is_cut_off(each, trial) for each in trained if each.stopped is not None)
     assert all(np.isfinite(each.network.weights).all() for each in trained)
+
+
+def is_cut_off(training, trial):
+    """Its last trial is the one that ran away, and its tuner that of the trial before."""
+    stopped = training.stopped
+    assert training.costs.size == stopped.trial + 1
+    assert np.isfinite(training.costs[:-1]).all()
+    assert training.costs[-1] == np.inf
+    assert 0 <= stopped.sample < trial.n
+    return bool(np.isfinite(training.network.weights).all())
+
+
+def test_learning_at_every_sample_that_runs_away_is_cut_off(trial, guards):
+    learning = Learning(mode="online", sensitivity="whole", rule="plain", eta=500.0, clip=50.0)
+    for seed in range(3):
+        assert is_cut_off(train(trial, initial_network(seed), guards["none"], learning, 20), trial)
 
 
 def test_one_step_online_learning_switches_the_feedback_off(trial, guards):
