@@ -55,5 +55,10 @@ def test_a_box_grows_where_a_zero_lies_on_its_edge():
     assert 10.0 < box.im_max < 10.1
     assert np.sort_complex(found) == pytest.approx(np.sort_complex(zeros), rel=1e-12)
     assert (found.imag == 0).sum() == 2
+    _, last = complete(  # on the edge of the first two, so that the last of three is taken
+        polynomial(*zeros, 2.0 + 11.0j, 2.0 - 11.0j),
+        lambda height: Box(-50.0, 10.0, -height, height), 10.0, np.array([0.1 + 0j]), factors=(1.0, 1.1, 1.2),
+    )  # fmt: skip
+    assert last.im_max == 12.0
     with pytest.raises(ConvergenceError, match="lies on the contour"):
         complete(polynomial(*zeros), lambda height: Box(-50.0, 10.0, -height, height), 10.0, zeros, factors=(1.0,))
