@@ -244,6 +244,20 @@ def test_poles_cross_the_circle_at_the_factors_that_are_named(law):
         assert after - before == change, factor
 
 
+@pytest.mark.parametrize(
+    ("entry", "factor", "change"),
+    [(-1.0, 2.0, 1), (([1.0], [1.0, -0.5]), 1.0, -1)],
+)
+def test_a_real_pole_crosses_at_rest_where_the_law_is_as_stiff_as_the_hubs_spring(entry, factor, change):
+    """2 N m/rad hold the hub: k + g C(0) = 0, and one pole passes z = 1, out or in."""
+    held = replace(LAB, hub=replace(LAB.hub, stiffness=2.0))
+    loop = sampled_law(held, Law({"hub_angle": entry}), Chain(), count=6)
+    (found,) = [each for each in crossing_factors(loop) if each.at == 0.0]
+    before, after = (int((loop.times(factor * k).poles.log_radius > 0).sum()) for k in (1 - 1e-7, 1 + 1e-7))
+    assert found.t == pytest.approx(factor, rel=1e-9)
+    assert found.change == after - before == change
+
+
 def test_between_crossings_the_count_is_what_they_say():
     """Random laws, integrators among them, at random factors."""
     rng = np.random.default_rng(77)
