@@ -23,8 +23,11 @@ LINEAR = 1  # the constant c, the last of the parameters
 EACH = 4  # parameters of a mode: sigma, w, a, b
 
 
-def least_squares(t: Real, y: Real, start: Real | None) -> Real | None:
-    """The parameters with the least sum of squares from a start on; None where that is no oscillation in the record."""
+def least_squares(t: Real, y: Real, start: Real | None) -> tuple[Real, Real, Real] | None:
+    """The parameters with the least sum of squares from a start on, their Jacobian (samples, parameters), residuals.
+
+    None where that is no oscillation in the record.
+    """
     from scipy.optimize import least_squares as minimised
 
     if start is None:
@@ -40,7 +43,10 @@ def least_squares(t: Real, y: Real, start: Real | None) -> Real | None:
     w, sigma = found.x[1:-LINEAR:EACH], found.x[:-LINEAR:EACH]
     period = t[1] - t[0]
     inside = (w > 0) & (w < np.pi / period) & (abs(sigma) < 2 / period)
-    return found.x if found.success and inside.all() else None
+    if not (found.success and inside.all()):
+        return None
+    values, J = model(found.x, t)
+    return found.x, J, y - values
 
 
 def model(x: Real, t: Real) -> tuple[Real, Real]:

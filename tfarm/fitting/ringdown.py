@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 
-from .decays import EACH, LINEAR, counted_from, covariance, least_squares, mode_energy, model, start_of, whiteness
+from .decays import EACH, LINEAR, counted_from, covariance, least_squares, mode_energy, start_of, whiteness
 from .noise import CONFIDENCE
 from .recording import Recording
 
@@ -138,7 +138,11 @@ def ring(
     many oscillations are not found.
     """
     t, y = _part(recording, name, start, stop, modes)
-    x, J, e = _fitted(t - t[0], y, modes)
+    found = least_squares(t - t[0], y, start_of(t - t[0], y, modes))
+    if found is None:
+        word = "oscillation" if modes == 1 else f"{modes} oscillations"
+        raise ConvergenceError(f"no {word} found in the decay: choose other times, or fewer modes", None, None)
+    x, J, e = found
     order = np.argsort(-mode_energy(x, t[-1] - t[0]), kind="stable")
     freedom = y.size - x.size
     white = whiteness(e) if e @ e > y.size * (RING_ROUNDING * abs(y).max()) ** 2 else 1.0
@@ -182,16 +186,6 @@ def _part(recording: Recording, name: str, start: float | None, stop: float | No
     return t[kept], y[kept]
 
 
-def _fitted(t: Real, y: Real, modes: int) -> tuple[Real, Real, Real]:
-    """The parameters, their Jacobian (samples, parameters) and the residuals, from a start of our own."""
-    x = least_squares(t, y, start_of(t, y, modes))
-    if x is None:
-        word = "oscillation" if modes == 1 else f"{modes} oscillations"
-        raise ConvergenceError(f"no {word} found in the decay: choose other times, or fewer modes", None, None)
-    values, J = model(x, t)
-    return x, J, y - values
-
-
 def _halves(t: Real, y: Real, x: Real, order: NDArray[np.intp]) -> tuple[Real, Real, Real]:
     """w by each half of the record, from the whole's parameters on, and the deviation of their difference.
 
@@ -205,11 +199,10 @@ def _halves(t: Real, y: Real, x: Real, order: NDArray[np.intp]) -> tuple[Real, R
         if found is None:
             pairs.append((x[1:-LINEAR:EACH], np.full(order.size, np.inf)))
             continue
-        values, J = model(found, t[part] - t[part][0])
-        e = y[part] - values
+        own, J, e = found
         C = covariance(J, e, e.size - x.size, is_white=whiteness(e) >= NOT_WHITE)
-        w, variance = found[1:-LINEAR:EACH], np.diag(C)[1:-LINEAR:EACH]
-        a, b, of_a, of_b = (x[k:-LINEAR:EACH] for x in (found, np.diag(C)) for k in (2, 3))
+        w, variance = own[1:-LINEAR:EACH], np.diag(C)[1:-LINEAR:EACH]
+        a, b, of_a, of_b = (each[k:-LINEAR:EACH] for each in (own, np.diag(C)) for k in (2, 3))
         pairs.append((w, np.where(a**2 + b**2 > AMPLITUDE_TOLD**2 * (of_a + of_b) / 2, variance, np.inf)))
     (early, one), (late, other) = pairs
     return early[order], late[order], np.sqrt(one + other)[order]

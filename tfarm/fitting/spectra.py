@@ -89,10 +89,9 @@ def frequency_response(
     kind, taper = _one_of("--estimator", estimator, Estimator), _one_of("--window", window, Taper)
     size, step = _cut(recording, segment, (0.5 if taper == "hann" else 0.0) if overlap is None else overlap)
     w = np.hanning(size + 1)[:-1] if taper == "hann" else np.ones(size)
-    kept, spectra = _moving(cross_spectra(x, y, w, step), names, recording)
+    kept, values, coherence = _estimated(kind, cross_spectra(x, y, w, step), names, recording)
     count = 1 + (recording.count - size) // step
     averages = independent_averages(w, step, count)
-    values, coherence = _estimated(kind, *spectra)
     measured = Measured(
         output=output,
         input=input,
@@ -115,22 +114,6 @@ def frequency_response(
     )
 
 
-def _moving(
-    spectra: tuple[Real, Complex, Real], names: tuple[str, str], recording: Recording
-) -> tuple[NDArray[np.intp], tuple[Real, Complex, Real]]:
-    """The lines that the input has power in, and their spectra; refused where a signal has none at all.
-
-    Without the line at 0 and the last one, at half the rate of sampling, which are real.
-    """
-    Sxx, Sxy, Syy = spectra
-    lines = np.arange(1, Sxx.size - 1)
-    kept = lines[Sxx[lines] > LEAST_POWER * Sxx.max()]
-    if not kept.size or not Syy.any():
-        still = names[1] if not kept.size else names[0]
-        raise ParameterError(key="record", value=still, remedy="does not move", file=recording.source)
-    return kept, (Sxx[kept], Sxy[kept], Syy[kept])
-
-
 def cross_spectra(x: Real, y: Real, w: Real, step: int) -> tuple[Real, Complex, Real]:
     """S_xx, S_xy and S_yy (lines,) of segments as long as w, begun `step` samples apart; up to a common factor."""
     cuts = (sliding_window_view(each, w.size)[::step] for each in (x, y))
@@ -138,13 +121,24 @@ def cross_spectra(x: Real, y: Real, w: Real, step: int) -> tuple[Real, Complex, 
     return (abs(X) ** 2).mean(0), (X.conj() * Y).mean(0), (abs(Y) ** 2).mean(0)
 
 
-def _estimated(kind: Estimator, Sxx: Real, Sxy: Complex, Syy: Real) -> tuple[Complex, Real]:
-    """The response and the coherence (lines,)."""
+def _estimated(
+    kind: Estimator, spectra: tuple[Real, Complex, Real], names: tuple[str, str], recording: Recording
+) -> tuple[NDArray[np.intp], Complex, Real]:
+    """The lines that the input has power in, the response and the coherence there; refused where a signal has none.
+
+    Without the line at 0 and the last one, at half the rate of sampling, which are real.
+    """
+    lines = np.arange(1, spectra[0].size - 1)
+    kept = lines[spectra[0][lines] > LEAST_POWER * spectra[0].max()]
+    if not kept.size or not spectra[2].any():
+        still = names[1] if not kept.size else names[0]
+        raise ParameterError(key="record", value=still, remedy="does not move", file=recording.source)
+    Sxx, Sxy, Syy = spectra[0][kept], spectra[1][kept], spectra[2][kept]
     with np.errstate(divide="ignore", invalid="ignore"):
         phase = np.where(Sxy == 0, 1.0, Sxy / abs(Sxy))
         sizes = {"H1": abs(Sxy) / Sxx, "H2": np.where(Sxy == 0, 0.0, Syy / abs(Sxy)), "Hv": np.sqrt(Syy / Sxx)}
         coherence = np.where(Syy > 0, abs(Sxy) ** 2 / (Sxx * Syy), 0.0)
-    return np.asarray(sizes[kind] * phase, dtype=complex), np.clip(coherence, 0.0, 1.0)
+    return kept, np.asarray(sizes[kind] * phase, dtype=complex), np.clip(coherence, 0.0, 1.0)
 
 
 def independent_averages(w: Real, step: int, count: int) -> float:
