@@ -29,7 +29,7 @@ from tfarm.records import record
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-MACHINE_EPS = float(np.finfo(float).eps)
+MACHINE_EPS = float(np.finfo(float).eps)  # of a float64, times the counts of operations beside it
 ARCS = 64  # of half the circle to begin with
 SHORTEST_ARC = 1e-13  # rad: no arc is cut further, as its ends are known to a few last bits
 PIECES_OF_ARC = 4  # into which one is cut that is too long

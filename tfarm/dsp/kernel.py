@@ -17,7 +17,7 @@ import numpy as np
 
 from tfarm.exact.compiled import compiled
 
-ENCODER, AMPLIFIER, DAC = 0, 1, 2
+ENCODER, AMPLIFIER, DAC = 0, 1, 2  # rows of the quantisers, and places in `saturated`
 
 
 @compiled

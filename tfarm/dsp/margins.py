@@ -91,22 +91,17 @@ def delay_margin(loop: AnySampled) -> DelayMargin:
 
     if log_radius(0.0) >= 0:
         return DelayMargin(0.0, False)
-    step = _delay_step(loop)
+    plant, T = loop.plant, loop.chain.sampling.period
+    reach = 4 * loop.push * abs(held_amplitude(plant.poles, T))
+    risky = (reach > -plant.poles.real * T) & (plant.poles.imag > 0)  # whose own damping the feedback could outweigh
+    fastest = (plant.poles.imag[risky] * T).max(initial=np.pi / 4)
+    step = float(min(0.05, 2 * np.pi / fastest / 12))  # samples: a twelfth of the turn of the fastest of them
     for i in range(1, MOST_STEPS + 1):
         if i * step > LONGEST_DELAY_SAMPLES:
             break
         if grows(i * step):
             return DelayMargin(float(brentq(log_radius, (i - 1) * step, i * step, xtol=1e-10)), False)
     return DelayMargin(min(MOST_STEPS * step, LONGEST_DELAY_SAMPLES), True)
-
-
-def _delay_step(loop: AnySampled) -> float:
-    """A twelfth of the turn, in samples, of the fastest mode whose own damping the feedback could outweigh."""
-    plant, T = loop.plant, loop.chain.sampling.period
-    reach = 4 * loop.push * abs(held_amplitude(plant.poles, T))
-    risky = (reach > -plant.poles.real * T) & (plant.poles.imag > 0)
-    fastest = (plant.poles.imag[risky] * T).max(initial=np.pi / 4)
-    return float(min(0.05, 2 * np.pi / fastest / 12))
 
 
 def required_damping(

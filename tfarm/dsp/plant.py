@@ -34,7 +34,7 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 
 Branching = Callable[[Modes], DampedModes]
 
-RECORDED = ("hub_angle", "hub_rate", "root_moment", "tip_displacement")
+RECORDED = ("hub_angle", "hub_rate", "root_moment", "tip_displacement")  # of a simulation, not filtered
 
 
 @dataclass(frozen=True)

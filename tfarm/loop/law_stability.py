@@ -50,7 +50,16 @@ def law_stability(arm: Arm, law: Law, band: float | None = None) -> Stability[La
     signs = signs_of_loop(loop)
     height, quiet = (band, False) if band is not None else _band(loop, signs)
     poles = law_poles_below(loop, height, LISTED_LEFT)
-    infinite, tail, known = _beyond(loop, signs, quiet, height)
+    infinite, known, first = False, True, np.array([1j * band_of(loop.arm, 1)])
+    if _holds(loop, signs):
+        more = " and holds it statically" if signs.kind == "negative imaginary" else ""
+        tail = f"{signs.reason}{more}: no mode, however high, is driven"
+    elif loop.arm.is_undamped and loop.law.delay and loop.law.polynomials(first)[0].any():
+        infinite, tail = True, DELAYED
+    elif quiet:
+        tail = f"beyond the band |L(iw)| < {QUIET:g} and falling: no unstable pole there (small gain)"
+    else:
+        known, tail = False, UNKNOWN_ABOVE.format(band=height)
     strict = signs.kind in ("strictly passive", "negative imaginary") and _holds(loop, signs)
     verdict = _verdict(poles, infinite, loop, strict)
     return Stability(loop, verdict, poles.unstable, infinite, poles.box.im_max, tail, poles, known)
@@ -71,19 +80,6 @@ def _holds(loop: LawLoop, signs: Signs) -> bool:
         return False
     spring = 0.0 if loop.arm.has_rigid_mode else loop.arm.hub.stiffness * loop.arm.input_per_torque
     return spring + signs.at_rest > 0
-
-
-def _beyond(loop: LawLoop, signs: Signs, quiet: bool, band: float) -> tuple[bool, str, bool]:
-    """Whether infinitely many poles are unstable, what is known beyond the band, and whether it is."""
-    if _holds(loop, signs):
-        more = " and holds it statically" if signs.kind == "negative imaginary" else ""
-        return False, f"{signs.reason}{more}: no mode, however high, is driven", True
-    late = loop.arm.is_undamped and loop.law.delay > 0
-    if late and loop.law.polynomials(np.array([1j * band_of(loop.arm, 1)]))[0].any():
-        return True, DELAYED, True
-    if quiet:
-        return False, f"beyond the band |L(iw)| < {QUIET:g} and falling: no unstable pole there (small gain)", True
-    return False, UNKNOWN_ABOVE.format(band=band), False
 
 
 def _verdict(poles: Poles[LawLoop], infinite: bool, loop: LawLoop, strict: bool) -> str:

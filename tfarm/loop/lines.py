@@ -28,7 +28,7 @@ from .plant import effective_inertia
 Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
 
-NO_FEEDBACK = HubFeedback()
+NO_FEEDBACK = HubFeedback()  # every gain 0
 SAME_FREQUENCY = 1e-12  # of a frequency: nearer than this are two numbers for one
 FINITE_LIMIT = 1.5  # times the gain at the farther of two small s: more at the nearer one is a gain without a limit
 

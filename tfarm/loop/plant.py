@@ -20,7 +20,7 @@ from tfarm.spectrum.scales import check_gains
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
-SMALLEST_NORMAL = float(np.finfo(float).tiny)
+SMALLEST_NORMAL = float(np.finfo(float).tiny)  # a smaller double has not all its digits
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,7 @@ LEAST_SQUARABLE = 1e-140  # 1/s: whose square is still a full double
 AnyLoop = TypeVar("AnyLoop", bound=Loop | LawLoop, default=Loop)  # hub gains, unless another law is said
 LEAST_REAL_PART = -0.5  # of L, so that 1 + L has no zero
 RIGHT_OF_EDGE = (2.0, 5.0, 20.0)  # times the right edge of a box, where L is looked at again
-SHRUNK_HEIGHTS = tuple(1 / factor for factor in TRIED_HEIGHTS)
+SHRUNK_HEIGHTS = tuple(1 / factor for factor in TRIED_HEIGHTS)  # of a box that may not reach above the shear cut-off
 
 
 def count_with_mirrors(zeros: Complex) -> int:
