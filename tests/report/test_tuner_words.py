@@ -27,12 +27,11 @@ def study(without=2.0, best=1.0, tuner=0.9, free=0.8, shaped=0.1, late=0.1, ends
         SimpleNamespace(final=np.full(5, cost), title="rule", diverged=0, died=0)
         for cost in (tuner, free, best)
     ]  # fmt: skip
-    slow = SimpleNamespace(task=SimpleNamespace(busy_until=1.0 + late))
     tuning = SimpleNamespace(
         without=SimpleNamespace(cost=without),
         best_constant=SimpleNamespace(cost=best, gain=0.3),
-        shaped={kind: (slow, SimpleNamespace(cost=shaped)) for kind in ("ZV", "EI")},
-        trial=SimpleNamespace(task=SimpleNamespace(busy_until=1.0)),
+        shaped_costs=dict.fromkeys(("ZV", "EI"), shaped),
+        shaped_delays=dict.fromkeys(("ZV", "EI"), late),
         training=SimpleNamespace(guard=SimpleNamespace(is_proven=is_proven, modes_used=20)),
     )
     runs = [

@@ -92,7 +92,7 @@ def servo_words(data: TunerStudy) -> str:
         "no moment feedback": tuning.without.cost,
         "the best constant gain": tuning.best_constant.cost,
         "the tuner": tuning.training.result.cost,
-        **{f"the shaper {kind}": record.cost for kind, (_, record) in tuning.shaped.items()},
+        **{f"the shaper {kind}": cost for kind, cost in tuning.shaped_costs.items()},
         "the bound": tuning.bound.cost,
     }
     told = ", ".join(f"{name} {significant(cost, 3)}" for name, cost in costs.items())
@@ -113,8 +113,7 @@ def off_target(data: TunerStudy) -> tuple[float, float]:
 def shaping_words(data: TunerStudy) -> str:
     """What input shaping does instead."""
     tuning, median = data.tuning, _median(data.curves[0])
-    costs = {kind: record.cost for kind, (_, record) in tuning.shaped.items()}
-    late = {kind: trial.task.busy_until - tuning.trial.task.busy_until for kind, (trial, _) in tuning.shaped.items()}
+    costs, late = tuning.shaped_costs, tuning.shaped_delays
     if not any(late.values()):
         return (
             "Input shaping, which one would try first, has nothing to do here: no mode of the loop lies below half the "
@@ -184,9 +183,8 @@ def tuner_facts(data: TunerStudy) -> tuple[Fact, ...]:
     helps = f"by {significant(gain, 2)} %" if gain > 100 * SAME_COST else "no"
     held = "proven stable" if guard.is_proven else f"proven for the first {guard.modes_used} modes"
     half = f"half between {significant(low, 4)} and {significant(high, 4)}"
-    shaped = min((record.cost, kind) for kind, (_, record) in tuning.shaped.items())
-    later = any(trial.task.busy_until > tuning.trial.task.busy_until for trial, _ in tuning.shaped.values())
-    how = f"{shaped[1]}, a later slew" if later else "no mode slow enough to shape"
+    shaped = min((cost, kind) for kind, cost in tuning.shaped_costs.items())
+    how = f"{shaped[1]}, a later slew" if any(tuning.shaped_delays.values()) else "no mode slow enough to shape"
     K = f"{MOMENT_GAIN} = {significant(tuning.best_constant.gain, 3)}"
     return (
         Fact(label="does tuning beat a constant gain?", value=helps, beside=f"median of {final.size} seeds"),

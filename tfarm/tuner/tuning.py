@@ -114,6 +114,17 @@ class Tuning:
         return self.saved().gain()
 
     @property
+    def shaped_costs(self) -> dict[str, float]:
+        """What the slew through each shaper costs."""
+        return {kind: record.cost for kind, (_, record) in self.shaped.items()}
+
+    @property
+    def shaped_delays(self) -> dict[str, float]:
+        """How much later [s] the slew through each shaper arrives."""
+        arrives = self.trial.task.busy_until
+        return {kind: trial.task.busy_until - arrives for kind, (trial, _) in self.shaped.items()}
+
+    @property
     def constant(self) -> HubFeedback:
         """The law with the best constant gain."""
         return self.trial.loop.gains.having(MOMENT_GAIN, self.best_constant.gain)
@@ -217,8 +228,7 @@ def _raw_residual(tuning: Tuning) -> float:
 
 def _shaped(tuning: Tuning) -> dict[str, Any]:
     """The better shaper's cost, and both; how much later they arrive."""
-    costs = {kind: record.cost for kind, (_, record) in tuning.shaped.items()}
-    late = {kind: trial.task.busy_until - tuning.trial.task.busy_until for kind, (trial, _) in tuning.shaped.items()}
+    costs, late = tuning.shaped_costs, tuning.shaped_delays
     note = "no moment feedback; judged by the shaped slew, which arrives later, so that cost_lq_bound does not bound it"
     return {
         "cost_shaped": min(costs.values()),
