@@ -8,7 +8,7 @@ import numpy as np
 
 import tfarm
 from tfarm import Arm, HubFeedback
-from tfarm.loop.margins import margins
+from tfarm.loop.margins import margins_of_gains
 from tfarm.loop.regions import Region, between, region
 from tfarm.reduced import relaxed_model
 
@@ -25,7 +25,7 @@ LAW = HubFeedback(K1=0.3, K2=0.3)
 def loop_rows() -> Iterator[Row]:
     """Margins, and a map of 200 x 200 gains, of the damped preset."""
     arm = tfarm.load("sasaki2012-lab")
-    seconds = interleaved({"tfarm": lambda: margins(arm, LAW)}, 9).median("tfarm")
+    seconds = interleaved({"tfarm": lambda: margins_of_gains(arm, LAW)}, 9).median("tfarm")
     yield Row(
         group=GROUP, what="tfarm: verdict, windows, margins", n=1, each="loop", seconds=seconds,
         target=Target(measured=1e3 * seconds, limit=100.0, unit="ms"),

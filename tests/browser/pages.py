@@ -21,7 +21,7 @@ import tfarm
 from tfarm.arm import Arm, HubFeedback
 from tfarm.dsp import Chain, load_chain, sampled_verdict
 from tfarm.dsp.results import simulated_answer
-from tfarm.loop.margins import LoopMargins, margins
+from tfarm.loop.margins import LoopMargins, margins_of_gains
 from tfarm.loop.regions import region
 from tfarm.loop.stability import stability
 from tfarm.report import write
@@ -172,7 +172,7 @@ def test_what_is_shown_at_ten_gains_is_what_tfarm_margins_prints(browser, folder
         for law in random_gains(data, GAINS):
             set_gains(page, law)
             here = shown(page)
-            found = margins(arm, law, data["band"])
+            found = margins_of_gains(arm, law, data["band"])
             assert here["verdict"].startswith("stable") == found.stability.is_stable, law
             if found.in_band is not None:
                 stable += 1

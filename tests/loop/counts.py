@@ -24,7 +24,7 @@ from tests.loop.arms import some_loop
 from tests.spectrum.damped_roads import newton_step
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
 from tfarm.exact.coefficients import coefficients
-from tfarm.loop.poles import closed_loop_poles
+from tfarm.loop.poles import poles_of_gains
 from tfarm.spectrum import modes_below
 from tfarm.spectrum.box import winding_number
 from tfarm.spectrum.damped import member
@@ -51,7 +51,7 @@ def judge(arm, law, count, *, balls=False) -> Verdict:
     """List the poles of one loop and count them again."""
     start = time.perf_counter()
     try:
-        poles = closed_loop_poles(arm, law, count)
+        poles = poles_of_gains(arm, law, count)
     except (ConvergenceError, ParameterError) as error:
         return Verdict("refused", str(error).splitlines()[0])
     spent = 1e3 * (time.perf_counter() - start)

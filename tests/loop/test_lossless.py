@@ -16,7 +16,7 @@ from tfarm.loop.frequencies import band_of
 from tfarm.loop.lines import along, line_crossings
 from tfarm.loop.lossless import locked_edges, stable_moments
 from tfarm.loop.lyapunov import lyapunov
-from tfarm.loop.margins import margins
+from tfarm.loop.margins import margins_of_gains
 from tfarm.loop.nyquist import nyquist_of
 from tfarm.loop.regions import INFINITE, region
 from tfarm.loop.stability import stability
@@ -102,7 +102,7 @@ def test_verdict_windows_and_map_follow_the_edges(name):
     law = default_gains(arm).having("K2", 0.0)
     low, high = stable_moments(arm)
     inside = law.having("K2", 0.999 * high)
-    found = margins(arm, inside)
+    found = margins_of_gains(arm, inside)
     assert found.stability.verdict == "stable"
     assert not found.stability.is_known_beyond
     assert (found.exact_delay, found.exact_disk, found.exact_peak) == (None, None, None)

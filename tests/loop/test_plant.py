@@ -10,7 +10,7 @@ import tfarm
 from tests.loop.arms import some_loop
 from tfarm import Hub, HubFeedback, ParameterError
 from tfarm.loop.plant import Loop, effective_inertia
-from tfarm.loop.poles import closed_loop_poles
+from tfarm.loop.poles import poles_of_gains
 
 ARM = tfarm.load("sasaki2012")
 
@@ -29,7 +29,7 @@ def test_where_there_is_no_loop(inertia: float, law, words: str) -> None:
 
 
 def test_a_pin_without_inertia_may_be_damped() -> None:
-    poles = closed_loop_poles(replace(ARM, hub=Hub(inertia=0.0)), HubFeedback(K1=0.3), 5)
+    poles = poles_of_gains(replace(ARM, hub=Hub(inertia=0.0)), HubFeedback(K1=0.3), 5)
     assert poles.unstable == 0
 
 
@@ -50,7 +50,7 @@ def test_slow_torque_turns_the_effective_inertia(K2: float) -> None:
     """The slow real pole tends to -K1/J_eff as K1 -> 0."""
     misses = []
     for K1 in (1e-2, 1e-3):
-        slow = closed_loop_poles(ARM, HubFeedback(K1=K1, K2=K2), 6).moving
+        slow = poles_of_gains(ARM, HubFeedback(K1=K1, K2=K2), 6).moving
         slow = slow[abs(slow).argmin()].real
         misses.append(abs(slow * effective_inertia(ARM, HubFeedback(K2=K2)) / -K1 - 1))
     assert misses[1] < 1e-3

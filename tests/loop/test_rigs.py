@@ -16,7 +16,7 @@ from tfarm import HubFeedback
 from tfarm.dsp import Chain, Sampling, sampled_verdict
 from tfarm.loop.frequencies import band_of
 from tfarm.loop.plant import Loop
-from tfarm.loop.poles import closed_loop_poles, poles_below
+from tfarm.loop.poles import poles_below, poles_of_gains
 from tfarm.loop.reduced_locus import reduced_locus
 from tfarm.loop.regions import INFINITE, region
 from tfarm.loop.stability import stability
@@ -53,7 +53,7 @@ def laws(arm):
 def test_poles_are_those_of_the_elements_and_no_others(name):
     """Six poles of each loop: as many of the elements in the box, each where it is listed, and as many unstable."""
     arm = RIGS[name]
-    found = [closed_loop_poles(arm, law, 6) for law in laws(arm)]
+    found = [poles_of_gains(arm, law, 6) for law in laws(arm)]
     corner = max(abs(complex(max(-poles.box.re_min, poles.box.re_max), poles.box.im_max)) for poles in found)
     model = RigLoop(arm, 1.05 * corner)
     for poles in found:

@@ -17,7 +17,7 @@ from tfarm.arm import HubFeedback
 from tfarm.dsp import Chain, Sampling, load_chain, sampled_verdict
 from tfarm.exact.characteristic import float_units, loop_parts
 from tfarm.exact.system import system_of
-from tfarm.loop.margins import margins
+from tfarm.loop.margins import margins_of_gains
 from tfarm.loop.panels import MOST_MISS, loop_panels
 from tfarm.loop.plant import Loop
 from tfarm.loop.stability import stability
@@ -82,7 +82,7 @@ def test_margins_are_the_librarys_to_the_printed_digits(case):
     arm, data, page = case
     compared = 0
     for law in some_gains(data, 1, 8):
-        found = margins(arm, law, data["band"])
+        found = margins_of_gains(arm, law, data["band"])
         told = page.verdict(law)
         assert told.startswith("stable") == found.stability.is_stable, law
         if found.in_band is None:

@@ -104,7 +104,7 @@ def estimate(angle: float, rate: float, memory: Any, filter_: Any) -> float:
 
 
 @compiled
-def measured(record: Any, rows: Any, saturated: Any, memory: Any, filter_: Any) -> Any:
+def converted(record: Any, rows: Any, saturated: Any, memory: Any, filter_: Any) -> Any:
     """Hub angle, hub rate and root moment as the controller has them, of the outputs of one sample."""
     angle = quantise(record[0], rows[ENCODER], saturated, ENCODER)
     moment = quantise(record[2], rows[AMPLIFIER], saturated, AMPLIFIER)
@@ -138,7 +138,7 @@ def law(gains: Any, K2: float, ideal: Any, angle: float, rate: float, moment: fl
 
 
 @compiled
-def run(
+def run_gains(
     tables: Any, amplitude: Any, rigid: Any, held: Any, delay: int, gains: Any, K2: Any, ideal: Any, disturbance: Any,
     impulse: float, rows: Any, filter_: Any, single: bool, bound: float, record: Any, torque: Any, fine: Any,
     saturated: Any, work: Any,
@@ -158,7 +158,7 @@ def run(
         if not abs(record[k, 2]) <= bound:
             return k
         clipped = saturated[k]
-        angle, rate, moment = measured(record[k], rows, clipped, memory, filter_)
+        angle, rate, moment = converted(record[k], rows, clipped, memory, filter_)
         u = quantise(law(gains, K2[k], ideal[k], angle, rate, moment, single), rows[DAC], clipped, DAC)
         held[k % ring] = torque[k] = u
         if k == 0:
@@ -187,7 +187,7 @@ def run_law(
     ideal: Any, disturbance: Any, impulse: float, rows: Any, filter_: Any, single: bool, bound: float, record: Any,
     torque: Any, fine: Any, saturated: Any, work: Any,
 ) -> int:  # fmt: skip
-    """As `run`, under x_{k+1} = A x + B y, u = r - C x - D y, whose signals are the outputs from number 7 on.
+    """As `run_gains`, under x_{k+1} = A x + B y, u = r - C x - D y, whose signals are the outputs from number 7 on.
 
     `kinds` (signals,) says through what each goes: 0 nothing, 1 the encoder, 2 the strain amplifier, 3 the rate
     estimate; `references` (n, columns) is taken off, and is all there is of columns beyond the signals (y = 0 there).
@@ -203,7 +203,7 @@ def run_law(
         if not abs(record[k, 2]) <= bound:
             return k
         clipped = saturated[k]
-        angle, rate, moment = measured(record[k], rows, clipped, memory, filter_)
+        angle, rate, moment = converted(record[k], rows, clipped, memory, filter_)
         for j in range(y.size):
             value = signal(kinds[j], record[k, 7 + j], angle, rate, moment) if j < kinds.size else 0.0
             y[j] = value - references[k, j]

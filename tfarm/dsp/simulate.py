@@ -149,7 +149,7 @@ class Simulator:
             raise ParameterError(key="K2", value=gain.shape, remedy=f"one finite gain a sample, {n} in all")
         state = self._start()
         c = self.chain.converters
-        done = kernel.run(
+        done = kernel.run_gains(
             self._tables, state.amplitude, state.rigid, state.held, self.chain.sampling.whole_delay,
             np.array([gains.Kp, gains.K1]), gain, self._ideal, self.scenario.disturbance, self.scenario.impulse,
             self._rows, self._filter, c.arithmetic == "float32", self._bound, state.record, state.torque, state.fine,

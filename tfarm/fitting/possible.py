@@ -15,7 +15,7 @@ from scipy.special import gammaincinv
 
 from tfarm.arm import MOMENT_GAIN, Arm, HubFeedback
 from tfarm.errors import ConvergenceError
-from tfarm.loop.margins import margins
+from tfarm.loop.margins import margins_of_gains
 from tfarm.loop.regions import region
 from tfarm.records import record
 from tfarm.response import transfer
@@ -80,7 +80,7 @@ class LoopOnAll:
 
 def loop_on_all(those: Possible, law: HubFeedback) -> LoopOnAll:
     """The verdict on each arm, and its margins where it holds: None of an arm where a margin is not."""
-    found = [margins(arm, law) for arm in those.arms]
+    found = [margins_of_gains(arm, law) for arm in those.arms]
     bands = [each.in_band for each in found if each.in_band is not None]
 
     def column(name: str) -> Real:

@@ -11,11 +11,9 @@ from tfarm.arm.driving import AnyLaw, arm_and_law
 from .law_loop import LawLoop
 from .law_poles import law_poles
 from .law_stability import is_quiet_above, law_stability
-from .margins import Margins, loop_margins
-from .margins import margins as margins_of_gains
+from .margins import Margins, loop_margins, margins_of_gains
 from .nyquist import Nyquist, nyquist_of
-from .poles import Poles
-from .poles import closed_loop_poles as poles_of_gains
+from .poles import Poles, poles_of_gains
 from .stability import stability
 
 

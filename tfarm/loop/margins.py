@@ -88,7 +88,7 @@ class Margins(Generic[AnyLoop]):
     exact_peak: float | None
 
 
-def margins(arm: Arm, law: HubFeedback, band: float | None = None) -> Margins:
+def margins_of_gains(arm: Arm, law: HubFeedback, band: float | None = None) -> Margins:
     """Verdict, windows of each gain, and margins of the loop.  Raises what `stability` raises."""
     verdict = stability(arm, law, band)
     windows = {name: gain_windows(verdict, name) for name in NAMES}

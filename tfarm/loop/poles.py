@@ -116,7 +116,7 @@ class Poles(Generic[AnyLoop]):
         return discs
 
 
-def closed_loop_poles(arm: Arm, law: HubFeedback, count: int | None = None) -> Poles:
+def poles_of_gains(arm: Arm, law: HubFeedback, count: int | None = None) -> Poles:
     """The first `count` closed-loop poles with Im >= 0, ascending in Im s, complete in the box of the record.
 
     Without a count the first ten (more, where more are real), or as many as lie below the shear cut-off where these are
