@@ -189,7 +189,7 @@ class Simulator:
     # ------------------------------------------------------------ inside
 
     def _stepped(self, rule: Callable[[Measurement], tuple[float, float]], gain: Real | None) -> Simulation:
-        """The loop of `kernel.run` in Python."""
+        """The loop of `kernel.run_gains` in Python."""
         state, memory = self._start(), np.zeros(3)
         d, ring, disturbance = self.chain.sampling.whole_delay, state.held.size, self.scenario.disturbance
         single = self.chain.converters.arithmetic == "float32"
