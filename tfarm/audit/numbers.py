@@ -12,7 +12,7 @@ from mpmath import mpf
 from .appendix import DETERMINANTS, ENTRIES, ENTRY_NAMES, determinants, waves_of
 from .formulas import sides, symbol, symbols
 
-BEAM_DIGITS = 50  # of both roads: between them a few are lost, and NOISE leaves as many
+BEAM_DIGITS = 50  # of both roads; RESIDUAL_NOISE leaves half of them to rounding
 BEAM_NAMES = ("rho", "A", "L", "E", "I", "kappa", "G", "C", "m", "I_c", "I_h", "s")
 BEAMS = (  # payload and damping, orders of one, so that no term hides; s on and off the axis
     (1.3, 0.7, 1.1, 2.9, 0.31, 0.83, 1.7, 0.013, 0.37, 0.053, 0.23, 0.9 + 2.3j),

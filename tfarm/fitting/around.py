@@ -21,7 +21,7 @@ from .parameters import COORDINATE_STEP
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 
-NUDGE = 1e-6  # of s: for a slope along it; the rounding of a float over it is 1e-10, and so is what the slope bends by
+NUDGE = 1e-6  # of s: for a slope along it by a difference, which is right to about as much
 
 
 class Around:

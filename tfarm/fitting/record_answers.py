@@ -16,7 +16,7 @@ from .noise import CONFIDENCE
 from .ringdown import Ring
 from .spectra import Estimate
 
-SIX = singly(general, 6)  # digits of what was measured: its noise is in the fourth
+SIX = singly(general, 6)  # digits of what was measured: more than its noise leaves
 NINE = singly(general, 9)  # of the frequencies of its lines
 
 

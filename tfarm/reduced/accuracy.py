@@ -27,8 +27,8 @@ FOUND_TO_WORST = 1.02  # times the worst that was found: tuned on random arms
 EXACT_ROUNDING = 1e-14  # what the exact values themselves may be off, in the same norm
 TERM_ROUNDING = 4 * float(np.finfo(float).eps)  # of a model's terms, which cancel where G is small, in their sum
 CLEAR_OF_POLES = 1e-12  # nearer to a pole nothing new happens, and nothing can be evaluated on it
-POLE_DISTANCES = 10.0 ** -np.arange(1, 8)  # of samples from a pole, as shares of its frequency: tuned on random arms
-SAMPLES_PER_DECADE = 60  # of the even grid: tuned on random arms
+POLE_DISTANCES = 10.0 ** -np.arange(1, 8)  # of samples from a pole, as shares of its frequency
+SAMPLES_PER_DECADE = 60  # of the even grid; peaks between are closed in on
 MOST_PEAKS = 12  # local maxima of the error that are closed in on, the highest first
 
 
