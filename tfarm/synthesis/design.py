@@ -114,19 +114,10 @@ def best_gains(
     if objective == "cost" and continuous:
         remedy = "the cost of the tuner's trial is one of samples: leave the continuous loop out"
         raise ParameterError(key="objective", value=objective, remedy=remedy)
-    unit, chain = arm.input_per_torque, Chain() if chain is None else chain
+    chain, held = Chain() if chain is None else chain, HubFeedback(Kp=Kp)
     arms = (NamedArm(arm.name, arm, {}), *others)
-    for each in arms:
-        Loop(each.arm, HubFeedback(K1=1.0, K2=0.0 if each.arm.has_massless_hub else 0.5 * unit, Kp=Kp))
+    start = _bounds_at_first(arms, K1, K2, held)
     free = {name: bounds is None for name, bounds in (("K1", K1), ("K2", K2))}
-    start = {
-        "K1": _checked("K1", K1 or (0.0, 2.0 * turning_inertia(arm) * band_of(arm, 1))),
-        "K2": _checked("K2", K2 or (-3.0 * unit, 1.0 * unit)),
-    }
-    for K1_end, K2_end in zip(start["K1"], start["K2"], strict=True):
-        for each in arms:
-            check_gains(each.arm, HubFeedback(K1=K1_end, K2=K2_end, Kp=Kp))
-    held = HubFeedback(Kp=Kp)
     judges = [_judges(each.arm, arm, chain, objective, held, modes, continuous) for each in arms]
     judge, bounds, best = _first_that_holds(map(Worst, in_step(judges)), arm, start, free, held)
     law = held.at(*best.gains)
@@ -145,6 +136,26 @@ def best_gains(
         loop="continuous" if continuous else "sampled", chain=chain, sampled=on_arms[0].sampled,
         arms=on_arms,
     )  # fmt: skip
+
+
+def _bounds_at_first(
+    arms: Sequence[NamedArm], K1: Bounds | None, K2: Bounds | None, held: HubFeedback
+) -> dict[str, Bounds]:
+    """The bounds of the gains, the usual ones of the first arm where none are given.
+
+    Raises ParameterError for what is no bounds, for an arm without a loop, and for gains too large for one.
+    """
+    arm, unit = arms[0].arm, arms[0].arm.input_per_torque
+    for each in arms:
+        Loop(each.arm, held.at(1.0, 0.0 if each.arm.has_massless_hub else 0.5 * unit))
+    bounds = {
+        "K1": _checked("K1", K1 or (0.0, 2.0 * turning_inertia(arm) * band_of(arm, 1))),
+        "K2": _checked("K2", K2 or (-3.0 * unit, 1.0 * unit)),
+    }
+    for across, up in zip(bounds["K1"], bounds["K2"], strict=True):
+        for each in arms:
+            check_gains(each.arm, held.at(across, up))
+    return bounds
 
 
 def _judges(
