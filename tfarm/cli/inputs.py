@@ -102,32 +102,20 @@ MOST_GRID = 1_000_000  # points of a response, as many lines of a table: more ar
 _Number = TypeVar("_Number", float, complex)
 
 
-def s_values(text: str) -> NDArray[np.complex128]:
-    """Complex numbers separated by commas: "0.3+57.1j,10j"."""
-    return np.array(
-        [_number("--s", part, complex, "write numbers in 1/s such as 0.3+57.1j,10j") for part in text.split(",")]
-    )
-
-
-def omega_values(text: str) -> NDArray[np.complex128]:
-    """s = i omega for frequencies in rad/s separated by commas."""
-    parts = text.split(",")
-    frequencies = [_number("--omega", part, float, "write frequencies in rad/s such as 1,10,100") for part in parts]
-    return s_on_axis(np.array(frequencies))
-
-
-def s_on_axis(omega: NDArray[np.float64]) -> NDArray[np.complex128]:
-    """i omega."""
-    return np.asarray(1j * omega, dtype=np.complex128)
-
-
 def points_on(s: str | None, omega: str | None, start: float, stop: float, points: str) -> NDArray[np.complex128]:
-    """The points s [1/s] of a response: those typed, s = i omega for frequencies typed, or a grid of them."""
+    """The points s [1/s] of a response: those typed, s = i omega for frequencies [rad/s] typed, or a grid of them.
+
+    Numbers are separated by commas: "0.3+57.1j,10j".
+    """
     if s is not None and omega is not None:
         raise ParameterError(key="--omega", value=omega, remedy="give --s or --omega, not both")
     if s is not None:
-        return s_values(s)
-    return s_grid(start, stop, points) if omega is None else omega_values(omega)
+        remedy = "write numbers in 1/s such as 0.3+57.1j,10j"
+        return np.array([_number("--s", part, complex, remedy) for part in s.split(",")])
+    if omega is None:
+        return s_grid(start, stop, points)
+    remedy = "write frequencies in rad/s such as 1,10,100"
+    return 1j * np.array([_number("--omega", part, float, remedy) for part in omega.split(",")])
 
 
 def s_grid(start: float, stop: float, points: str) -> NDArray[np.complex128]:
@@ -137,7 +125,7 @@ def s_grid(start: float, stop: float, points: str) -> NDArray[np.complex128]:
     if not start < stop < math.inf:
         raise ParameterError(key="--to", value=stop, remedy=f"a frequency above --from, {start:g} rad/s")
     frequencies: NDArray[np.float64] = np.geomspace(start, stop, whole_number("--points", points, 2, MOST_GRID))
-    return s_on_axis(frequencies)
+    return np.asarray(1j * frequencies, dtype=np.complex128)
 
 
 def asked_law(arm: Arm, given: Given) -> tuple[HubFeedback | Law, dict[str, Any]]:

@@ -143,6 +143,10 @@ def compared_windows(found: Comparison) -> Table | None:
 
 def compared_answer(found: Comparison) -> dict[str, Any]:
     """Names and verdicts, the tables, and of each side the whole answer of `tfarm margins`, or of `tfarm sampled`."""
+    loops: list[dict[str, Any]] = []
+    for side in found.sides:
+        at_samples = {} if side.clocked is None else sampled_law_answer(side.clocked.analysis)
+        loops.append(at_samples if side.margins is None else margins_answer(side.margins))
     return {
         "of": "arms" if found.is_of_arms else "laws",
         "names": [side.name for side in found.sides],
@@ -152,14 +156,8 @@ def compared_answer(found: Comparison) -> dict[str, Any]:
         "poles": compared_poles(found),
         "margins": compared_margins(found),
         "at_samples": found.is_clocked,
-        "loops": [_loop(side) for side in found.sides],
+        "loops": loops,
     }
-
-
-def _loop(side: ComparedSide) -> dict[str, Any]:
-    if side.margins is not None:
-        return margins_answer(side.margins)
-    return {} if side.clocked is None else sampled_law_answer(side.clocked.analysis)
 
 
 def side_words(side: ComparedSide) -> str:

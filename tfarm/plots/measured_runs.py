@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tfarm.fitting.runs import Beside
@@ -26,8 +25,11 @@ def draw_beside(title: str, each: Mapping[str, Beside]) -> Figure:
                 ax.plot(measured.t, np.degrees(measured.hub_angle), color=ORANGE, label="measured")
             ax.plot(found.run.t, np.degrees(found.hub_angle), color=BLUE, lw=1.2, label="exact sampled loop")
             ax.set_xlim(0.0, float(measured.t[-1]))
+            if moment and measured.root_moment.size:
+                axes[1, column].plot(measured.t, measured.root_moment, color=ORANGE)
             if moment:
-                _moment(found, axes[1, column])
+                axes[1, column].plot(found.run.t, found.run.at_samples.root_moment, color=BLUE, lw=1.2)
+                axes[1, column].axhline(0.0, color=GREY, lw=0.6)
             ax.set_title(safe(name), fontsize=9.5)
             axes[-1, column].set_xlabel("time  [s]")
         axes[0, 0].set_ylabel("hub angle  [deg]")
@@ -36,11 +38,3 @@ def draw_beside(title: str, each: Mapping[str, Beside]) -> Figure:
         figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower left", ncols=3)
         headline(figure, title)
     return figure
-
-
-def _moment(found: Beside, ax: Axes) -> None:
-    """The root moment at the samples, over that measured where there is one."""
-    if found.measured.root_moment.size:
-        ax.plot(found.measured.t, found.measured.root_moment, color=ORANGE)
-    ax.plot(found.run.t, found.run.at_samples.root_moment, color=BLUE, lw=1.2)
-    ax.axhline(0.0, color=GREY, lw=0.6)

@@ -116,18 +116,12 @@ def contours(across: Real, up: Real, damping: Real, ax: Axes) -> None:
         for number, piece in enumerate(longest):
             (line,) = ax.plot(piece[:, 0], piece[:, 1], color=BLUE, lw=0.9, zorder=2.5)
             if not number:
-                places = [(float(x), float(y)) for x, y in piece[_along(len(piece))]]
-                text = f"{plain(100 * level, 3)} %"
-                ax.add_artist(
-                    Label(text, places, OFFSET_UPON, own=line, may_go=True, fontsize=8.0, color=BLUE, bbox=NUMBER_HALO)
-                )
+                away = np.arange(len(piece)) - len(piece) // 2  # from its middle, then outwards to both sides
+                tried = piece[(len(piece) // 2 + away[np.argsort(abs(away), kind="stable")])[::3]]
+                places, text = [(float(x), float(y)) for x, y in tried], f"{plain(100 * level, 3)} %"
+                looks: dict[str, Any] = {"fontsize": 8.0, "color": BLUE, "bbox": NUMBER_HALO}
+                ax.add_artist(Label(text, places, OFFSET_UPON, own=line, may_go=True, **looks))
     ax.plot([], [], color=BLUE, lw=0.9, label="least damping ratio of the first two modes")
-
-
-def _along(number: int) -> NDArray[np.int64]:
-    """Numbers of points of a line, its middle first, then outwards to both sides."""
-    away = np.arange(number) - number // 2
-    return np.asarray(number // 2 + away[np.argsort(abs(away), kind="stable")])[::3]
 
 
 def nice_levels(low: float, high: float) -> list[float]:

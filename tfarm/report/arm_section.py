@@ -43,13 +43,15 @@ def arm_section(arm: Arm) -> PageSection:
         driven = "It is led through the hub's angle" if arm.is_locked else f"Its input is {input_words(arm)}"
         theory = THEORY_WORDS[arm.theory]
         words.append(f"The theory of its link is {theory}. {driven}; all loops on this page close through that.")
+    caption = GIVEN_CAPTION if arm.is_uniform else RIG_GIVEN_CAPTION
+    given = _table("parameters", "Parameters", caption, given_rows(arm))
     return PageSection(
         anchor="arm",
         title="The arm",
         facts=headline_numbers(arm),
         words=words + ["This arm states no assumptions."] * (not arm.assumptions),
         items=arm.assumptions,
-        blocks=(_picture(arm), given_table(arm), derived_table(arm)),
+        blocks=(_picture(arm), given, derived_table(arm)),
     )
 
 
@@ -78,33 +80,25 @@ def headline_numbers(arm: Arm) -> tuple[Fact, ...]:
 
 
 def _picture(arm: Arm) -> Picture:
+    """The arm to scale, and what moves it."""
+    drive = "The hub turns the link by the torque u (positive anticlockwise)."
+    if arm.is_locked:
+        drive = "The hub is locked: no torque turns it; it is led through the angle θ (positive anticlockwise)."
+    elif arm.input_per_torque != 1.0:
+        drive = f"The hub turns the link through its motor; the input u is {input_words(arm)}."
+    elif arm.has_massless_hub:
+        drive = "The torque u (positive anticlockwise) acts on the root of the link itself: the pin has no inertia."
     tip = "nothing"
     if arm.payload.mass or arm.payload.inertia:
         tip = "a pin" if math.isinf(arm.payload.mass) else "a payload"
     return Picture(
         stem="arm",
         title="The arm, its link to scale",
-        caption=f"{_drive(arm)} Hub and payload are symbols; the link's length and depth are to scale, which shows at "
+        caption=f"{drive} Hub and payload are symbols; the link's length and depth are to scale, which shows at "
         f"a glance whether shear can matter.{PARTS * (not arm.is_uniform)}",
         alt=f"Side view of the arm: hub at the left, a link {plain(arm.length, 6)} m long, {tip} at the tip.",
         figure=draw_arm(arm),
     )
-
-
-def _drive(arm: Arm) -> str:
-    """What moves the arm."""
-    if arm.is_locked:
-        return "The hub is locked: no torque turns it; it is led through the angle θ (positive anticlockwise)."
-    if arm.input_per_torque != 1.0:
-        return f"The hub turns the link through its motor; the input u is {input_words(arm)}."
-    if arm.has_massless_hub:
-        return "The torque u (positive anticlockwise) acts on the root of the link itself: the pin has no inertia."
-    return "The hub turns the link by the torque u (positive anticlockwise)."
-
-
-def given_table(arm: Arm) -> Table:
-    """The arm's file as a table."""
-    return _table("parameters", "Parameters", GIVEN_CAPTION if arm.is_uniform else RIG_GIVEN_CAPTION, given_rows(arm))
 
 
 def derived_table(arm: Arm) -> Table:

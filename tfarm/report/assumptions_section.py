@@ -6,8 +6,6 @@ import numpy as np
 
 from tfarm.arm import Arm
 from tfarm.audit.assumptions import (
-    HubStudy,
-    SectionStudy,
     has_hub_inertia,
     hub_study,
     section_study,
@@ -61,13 +59,14 @@ def assumptions_section(arm: Arm) -> PageSection:
     section = section_study(arm)
     area, slope = plain(arm.link.section.area, 4), fixed(2 * section.sensitivity[section.is_own][0, :1], 3)[0]
     words = [opening(arm), SECTION_WORDS.format(area=area, slope=slope, **_ends(section.depth, section))]
-    blocks: list[Picture | Table] = [section_picture(section), section_table(section)]
+    blocks: list[Picture | Table] = [section_picture(section)]
+    blocks.append(_table("assumptions-section", "Candidate sections: rectangles of this area", SECTION_TABLE, section))
     if has_hub_inertia(arm):
         hub = hub_study(arm)
         limits = {"locked": significant(float(hub.locked[0]), 5), "pinned": significant(float(hub.pinned[0]), 5)}
         slope = fixed(hub.sensitivity[hub.is_own][0, :1], 3)[0]
         words.append(HUB_WORDS.format(slope=slope, **limits, **_ends(hub.hub_inertia, hub)))
-        blocks += [hub_picture(hub), hub_table(hub)]
+        blocks += [hub_picture(hub), _table("assumptions-hub", "Candidate hub inertias", HUB_TABLE, hub)]
     else:
         words.append(NO_HUB.format(what="locked" if arm.is_locked else "a free pin"))
     return PageSection(anchor="assumptions", title=title, words=words, blocks=blocks)
@@ -97,16 +96,6 @@ def _ends(values: Real, study: Study) -> dict[str, str]:
 
 
 # ------------------------------------------------------------ tables
-
-
-def section_table(study: SectionStudy) -> Table:
-    """A row a candidate section."""
-    return _table("assumptions-section", "Candidate sections: rectangles of this area", SECTION_TABLE, study)
-
-
-def hub_table(study: HubStudy) -> Table:
-    """A row a hub inertia."""
-    return _table("assumptions-hub", "Candidate hub inertias", HUB_TABLE, study)
 
 
 def _table(stem: str, title: str, caption: str, study: Study) -> Table:

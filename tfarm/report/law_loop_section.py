@@ -52,32 +52,28 @@ POLES_CAPTION = (
 )
 
 
-def margins_of_laws(laws: Sequence[LawOnArm]) -> list[Margins[Any]]:
-    """Verdict and margins of each law in s."""
-    return [margins_under(each.arm, each.law) for each in laws]
-
-
 # ------------------------------------------------------------ verdict and margins
 
 
 def law_margins_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> PageSection:
     """The verdict on each law, what is known beyond its band, its margins and crossings, and what spills over."""
     named = continuous_laws(on_arm(arm, laws))
-    found = margins_of_laws(named)
+    found: list[Margins[Any]] = [margins_under(each.arm, each.law) for each in named]
     both = list(zip(named, found, strict=True))
     undamped = arm.is_told_by_lyapunov and all(isinstance(each.law, HubFeedback) for each in named)
-    blocks: list[Picture | Table] = []
-    for each, it in both:
-        blocks += [_bode_picture(each, it)]
+    blocks: list[Picture | Table] = [_bode_picture(*each) for each in both]
     if any(it.in_band is not None for it in found):
         blocks.append(margin_table(named, found, undamped))
     blocks += [crossings_table(each, it) for each, it in both if it.in_band is not None]
     gains = [(each, it) for each, it in both if it.windows]
     if gains:
         blocks.append(window_table([each for each, _ in gains], [it for _, it in gains]))
-    spilled = [_spilled(each) for each in named]
-    blocks += [spill_table(each, it) for each, it in zip(named, spilled, strict=True) if isinstance(it, Spill)]
-    words = [text for each, it, far in zip(named, found, spilled, strict=True) for text in _words(each, it, far)]
+    words: list[str] = []
+    for each, it in both:
+        spilled = _spilled(each)
+        words += _words(each, it, spilled)
+        if isinstance(spilled, Spill):
+            blocks.append(spill_table(each, spilled))
     facts = [verdict_fact(*each) for each in both]
     title = "Is the loop stable, and by how much?"
     return PageSection(anchor="margins", title=title, facts=facts, words=words, blocks=blocks)

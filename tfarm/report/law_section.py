@@ -38,9 +38,17 @@ ENTRIES_CAPTION = (
 
 
 def law_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> PageSection:
-    """Each law: what it reads and drives, its entries, and how it is sampled."""
-    named = on_arm(arm, laws)
-    words = [_words(each, chain) for each in named]
+    """Each law: what it reads and drives, its entries, how it is sampled, and what a person should know of it."""
+    named, ms, words = on_arm(arm, laws), plain(1e3 * chain.sampling.period), []
+    for each in named:
+        law, file = each.any_law, f" ({each.given.file})" * bool(each.given.file)
+        told = typeset(str(law_answer(law, each.arm)["sign_convention"]))
+        told = told.replace("C_i(s)", "C_i(z)") if law.is_discrete else told
+        enter = f" {', '.join(law.references)} enter{'s' * (len(law.references) == 1)} less what it should be."
+        led = enter * bool(law.references)
+        warned = "".join(f" Warning: {typeset(text)}." for text in cancelled(law))
+        rule = f"On the loop sampled every {ms} ms it is {rule_in_words(law)}."
+        words.append(f"{upper(each.name)}{file}, order {law.order}: {told}.{led} {rule}{warned}")
     discrete = [each for each in named if each.is_discrete]
     if discrete:
         which = "it" if len(named) == 1 else " and of ".join(each.name for each in discrete)
@@ -48,22 +56,6 @@ def law_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> PageSection
     blocks = [entries_table(named), *(table for each in named for table in matrices_tables(each))]
     title = "The law" if len(named) == 1 else "The laws"
     return PageSection(anchor="law", title=title, words=[*words, NOT_ON_PAGE], blocks=blocks)
-
-
-def _words(each: LawOnArm, chain: Chain) -> str:
-    """What it reads and drives, how it comes to samples, and what a person should know of it."""
-    law, T = each.any_law, chain.sampling.period
-    told = typeset(str(law_answer(law, each.arm)["sign_convention"]))
-    told = told.replace("C_i(s)", "C_i(z)") if law.is_discrete else told
-    led = f" {', '.join(law.references)} enter{'s' * (len(law.references) == 1)} less what it should be." * bool(
-        law.references
-    )
-    warned = "".join(f" Warning: {typeset(text)}." for text in cancelled(law))
-    file = f" ({each.given.file})" * bool(each.given.file)
-    return (
-        f"{upper(each.name)}{file}, order {law.order}: {told}.{led} On the loop sampled every {plain(1e3 * T)} ms it "
-        f"is {rule_in_words(law)}.{warned}"
-    )
 
 
 def entries_table(laws: Sequence[LawOnArm]) -> Table:

@@ -174,7 +174,9 @@ def _poles_table(
         columns=(
             Column(name, name, shown_unit(name, arm), of=gains, digits=singly(plain, 4)),
             Column("verdict", "verdict", of=lambda it: it.verdict if it else "on the axis, not decided"),
-            Column("unstable_poles", "unstable poles", of=_count),
+            Column("unstable_poles", "unstable poles",
+                   of=lambda it: ("infinitely many" if it.unstable_roots_infinite else it.unstable_roots)
+                   if it else "not decided"),
             Column("spectral_abscissa_1_s", "fastest growth", "1/s",
                    of=lambda it: it.poles.spectral_abscissa if it else "", shown=_growth),
             Column("first_pairs", "first pairs of poles, Re ± i Im [1/s]", of=_first_pairs),
@@ -197,12 +199,6 @@ def _judged(arm: Arm, law: HubFeedback) -> Stability | None:
         return stability(arm, law)
     except ConvergenceError:
         return None
-
-
-def _count(it: Stability | None) -> int | str:
-    if it is None:
-        return "not decided"
-    return "infinitely many" if it.unstable_roots_infinite else it.unstable_roots
 
 
 def _first_pairs(it: Stability | None) -> str:

@@ -69,11 +69,6 @@ def gather() -> Evidence:
     return Evidence(audit=audit.audit(), published=published.validate())
 
 
-def keep_evidence(evidence: Evidence, folder: Path) -> None:
-    """evidence.json: for the next report of the same tfarm, which need not gather it again."""
-    keep(folder, EVIDENCE_KIND, {"name": folder.name, "makers": makers(), **asdict(evidence)})
-
-
 def kept_evidence(folder: Path) -> Evidence | None:
     """What is in evidence.json; None where it is of another tfarm or other versions, or none of ours."""
     try:
@@ -92,7 +87,7 @@ def write_trust(evidence: Evidence, proofs: Sequence[ArmProof], folder: Path) ->
     folder.mkdir()
     sections = {s.anchor: save_section(s, folder) for s in _sections(evidence, proofs)}
     files = save_table(audit_table(evidence.audit), folder / DATA)
-    keep_evidence(evidence, folder)
+    keep(folder, EVIDENCE_KIND, {"name": folder.name, "makers": makers(), **asdict(evidence)})  # for the next report
     page = render(
         "trust.html",
         title="Why trust this",
