@@ -12,7 +12,7 @@ POWER_OF_TEN = re.compile(r"(?<![\w.])(\d(?:\.\d+)?)e([-+]?\d{1,2})(?!\w|\.\d)")
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 LEAST_PLAIN, MOST_PLAIN = 1e-3, 1e7  # outside, powers of ten read better
 SPARE_DIGITS = 2  # digits beyond its own that the largest number of a column may have for the sake of the smallest
-MOST_DECIMALS = 7  # of a column with one number of them: more are read as noughts
+MOST_DECIMALS = 7  # of a column with one number of them; where more are needed each number has digits of its own
 CellsOf = Callable[[Sequence[Any]], Sequence[str]]  # the values of a column to its cells
 
 

@@ -19,7 +19,7 @@ from tfarm.tuner.overview import CostMap, Curves, TunerStudy
 from .regions import overlay
 from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, blank, headline, on_own_figure, style, window
 
-K_RANGE = (-0.25, 1.25)  # of the moment gain: all that a guard proves lies between 0 and 1
+K_RANGE = (-0.25, 1.25)  # of the moment gain: from 0 to the continuous loop's bound, 1, and a quarter to either side
 GUARD = "#bfe3d6"
 MOST_COST = 1.25  # of the cost without feedback: higher ones are drawn at the top edge
 

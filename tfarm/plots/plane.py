@@ -38,7 +38,7 @@ MOST_MARKED = 7  # frequencies written along the boundary: with more they touch
 DIAMOND, STAR = "D", "*"  # of laws
 AT_RIGHT = tuple((-6.0, up) for up in (4.0, -4.0, 16.0, -16.0, 28.0))  # points, from where a line ends to its words
 NUMBER_HALO: dict[str, Any] = {"facecolor": "white", "edgecolor": "none", "pad": 0.4, "alpha": 0.75}  # of numbers
-TICKS_UP = (-50, -20, -10, -5, -2, -1, 0, 1, 2)  # where the axis is logarithmic downwards: matplotlib's own are too few
+TICKS_UP = (-50, -20, -10, -5, -2, -1, 0, 1, 2)  # moment gains on a logarithmic axis, of them those in the picture
 
 
 def gain_map(found: Region, *, ax: Axes | None = None) -> Axes:

@@ -12,7 +12,7 @@ from tfarm.plots.sketch import draw_arm
 from tfarm.report.rig_tables import QuantityRow, derived_rows, given_rows
 from tfarm.report.sections import Fact, PageSection, Picture
 
-HEADLINE_MODES = 3  # natural frequencies among the headline numbers: what a model for control has
+HEADLINE_MODES = 3  # natural frequencies among the headline numbers, the rigid body's 0 not shown
 MOST_POISSON = 0.5  # of an isotropic material; a larger E/2G - 1 is none's ratio
 BELOW_CUTOFF = "Below the shear cut-off one pair of the beam's waves decays along it, above it both pairs travel."
 GIVEN_CAPTION = (
@@ -57,25 +57,24 @@ def arm_section(arm: Arm) -> PageSection:
 
 def headline_numbers(arm: Arm) -> tuple[Fact, ...]:
     """First natural frequencies (at C = 0), total inertia, slenderness, shear cut-off, damping."""
+
+    def frequency(label: str, omega: float, digits: int) -> Fact:
+        hertz = significant(omega / (2 * math.pi), digits)
+        return Fact(label=label, value=significant(omega, 8), unit="rad/s", beside=f"{hertz} Hz")
+
     modes = tfarm.modes(arm, count=HEADLINE_MODES)
-    flexible = (pair for pair in zip(modes.index, modes.natural_frequency, strict=True) if pair[0] > 0)
-    frequencies = [(f"natural frequency {number}", omega, 8) for number, omega in flexible]
-    inertia, cutoff, C = significant(arm.total_inertia, 8), arm.shear_cutoff, arm.damping
-    how = "" if arm.has_rigid_mode else "the arm cannot turn as a rigid body"
+    inertia, how = significant(arm.total_inertia, 8), "the arm cannot turn as a rigid body" * (not arm.has_rigid_mode)
     slenderness = arm.link.slenderness if arm.is_uniform else arm.length / arm.link.section.radius_of_gyration
     depth = f"depth/length {significant(math.sqrt(12) / slenderness, 3)} as a rectangle"
     lossless = "none: resonances are infinite" if arm.is_undamped else "none in the link: hub, clamp or joint lose"
-    *first, above = (
-        Fact(label=label, value=significant(w, 8), unit="rad/s", beside=f"{significant(w / (2 * math.pi), digits)} Hz")
-        for label, w, digits in (*frequencies, ("shear cut-off √(κGA/ρI)", cutoff, 6))
-    )
+    numbered = zip(modes.index, modes.natural_frequency, strict=True)
     return (
-        *first,
+        *(frequency(f"natural frequency {number}", omega, 8) for number, omega in numbered if number > 0),
         Fact(label="total inertia J about the hub", value=inertia, unit="kg m²", beside=how),
         Fact(label="slenderness L/√(I/A)", value=significant(slenderness, 5), beside=depth),
-        above,
+        frequency("shear cut-off √(κGA/ρI)", arm.shear_cutoff, 6),
         Fact(label="mass of the link", value=significant(arm.own_mass, 5), unit="kg"),
-        Fact(label="damping C", value=plain(C), unit="s", beside="" if C else lossless),
+        Fact(label="damping C", value=plain(arm.damping), unit="s", beside="" if arm.damping else lossless),
     )
 
 

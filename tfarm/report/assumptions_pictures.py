@@ -12,7 +12,7 @@ from tfarm.plots.assumptions import CURVE_COLOURS, draw_over
 from tfarm.report.sections import Picture
 from tfarm.response.frequency import Real
 
-CURVE_POINTS = 49  # of each curve: joined by lines they bend nowhere, on two logarithmic axes
+CURVE_POINTS = 49  # of each curve, which bends slowly on two logarithmic axes
 
 SECTION_PICTURE = (
     "First natural frequencies over the depth of a rectangle of this area, exact (C = 0), both axes logarithmic. The "

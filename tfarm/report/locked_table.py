@@ -15,7 +15,7 @@ from tfarm.errors import ConvergenceError
 from tfarm.spectrum import Modes, damped_modes
 from tfarm.spectrum.table import hub_locked
 
-LOCKED_MODES = 6  # rows: what is measured of a rig is hardly ever a higher mode
+LOCKED_MODES = 6  # rows, of the modes that are measured on a rig
 LOCKED_CAPTION = (
     "Natural frequencies with the hub free to turn and with the hub held still, neither damped{damped}. What is "
     "measured on a rig after a slew lies mostly near the right column."

@@ -14,7 +14,7 @@ from tfarm.report.overlay import draw_overlay, stable_regions
 from tfarm.response.frequency import bode, resonant_band
 from tfarm.spectrum.scales import default_gains
 
-README_DOTS = 100  # an inch, which GitHub shows at their own size
+README_DOTS = 100  # an inch: pictures of a README are shown at their own size
 README_MODES = 4  # shapes: two rows
 
 
