@@ -115,6 +115,16 @@ def test_residues_and_shapes_of_a_damped_rig(drive):
         assert moments[n] / shapes[n] == pytest.approx(M / W, rel=1e-8)
 
 
+def test_the_tip_of_a_damped_rig_moves_upwards_wherever_its_shape_is_asked_for():
+    """Near the root, where modes have either sign, and along with the tip: Re w(1) > 0."""
+    damped = tfarm.damped_modes(tfarm.modes(rig(input="hub_torque"), 4))
+    along = damped.shape(np.array([0.1, 0.375, 0.7, 1.0]))
+    assert (along[..., -1].real > 0).all()
+    for n, x in enumerate((0.1, 0.375, 0.7)):
+        np.testing.assert_allclose(damped.shape(x), along[..., n], rtol=1e-12)
+    assert (along[..., :-1].real < 0).any()
+
+
 def test_a_spring_on_the_axis_holds_nothing():
     """There nothing moves: the rig turns freely, as without it; clamped off the axis it does not."""
     free = some_rig(np.random.default_rng(3), damped=False, segments=2)
