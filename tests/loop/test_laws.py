@@ -136,6 +136,22 @@ def test_what_is_taken_off_a_wide_box_is_the_time_of_both_waves():
     assert LawLoop(BARE, Law({"hub_rate": 0.1})).delay_of_waves == pytest.approx(both, rel=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("entry", "kind"),
+    [
+        ({"hub_angle": ([1.0, 1.0, 1.0], [1.0])}, "strictly passive"),
+        ({"hub_angle": ([-1.0, 1.0, 1.0], [1.0])}, ""),
+        ({"hub_angle": ([-0.001, 1.0, 1.0], [1.0])}, ""),
+        ({"hub_rate": ([1.0, 1.0], [1.0])}, "strictly passive"),
+        ({"hub_rate": ([-1.0, 1.0], [1.0])}, ""),
+        ({"hub_rate": ([1.0, 1.0, 1.0], [1.0])}, ""),
+    ],
+)
+def test_an_inertia_that_a_law_takes_off_the_hub_is_not_passive(entry, kind):
+    """C(s)/s = m s + 1 + 1/s has Re 1 on the axis for either sign of m, and Re m right of it, far out."""
+    assert signs_of(Law(entry)).kind == kind
+
+
 def test_positive_position_feedback_needs_a_spring_that_is_stiffer():
     """-C = 3/(s^2 + 2 s + 5) is strictly negative imaginary, C(0) = -0.6."""
     filters = ([-3.0], [1.0, 2.0, 5.0])
