@@ -1,4 +1,4 @@
-"""The arrays of every room, for readers and for mypy: real and complex numbers in double precision."""
+"""The arrays of every room, for readers and for mypy: real, complex and whole numbers in double precision."""
 
 from typing import Any
 
@@ -7,3 +7,4 @@ from numpy.typing import NDArray
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
+Whole = NDArray[np.int64]

@@ -13,14 +13,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from tfarm.arm.checks import number
+from tfarm.arrays import Complex, Real
 from tfarm.errors import ParameterError
 from tfarm.records import record
 
-Complex = NDArray[np.complexfloating[Any, Any]]
-Real = NDArray[np.float64]
 Matrices = tuple[Real, Real, Real, Real]
 
 LARGEST_COEFFICIENT = 1e150  # the square of one is still a double

@@ -14,17 +14,14 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm.blocks import LawBlock, Matrices, Rational, StateSpace, block_of
 from tfarm.arm.checks import not_negative, number, positive
 from tfarm.arm.feedback import GAINS, HubFeedback
 from tfarm.arm.records import INPUTS
+from tfarm.arrays import Complex
 from tfarm.errors import ParameterError, did_you_mean
 from tfarm.records import record
-
-Complex = NDArray[np.complexfloating[Any, Any]]
-Real = NDArray[np.float64]
 
 MOST_SIGNALS = 12  # of a law: more than any rig measures
 REFERENCE = "reference:"  # before the name of a signal: what that should be

@@ -17,14 +17,13 @@ from numpy.typing import NDArray
 
 from tfarm.arm import MOMENT_GAIN, Arm, Section
 from tfarm.arm.checks import positive
+from tfarm.arrays import Real
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import gain_windows
 from tfarm.records import record
 from tfarm.spectrum import modes
 from tfarm.spectrum.scales import default_gains
-
-Real = NDArray[np.float64]
 
 STUDIED_MODES = 4  # flexible modes, unless told
 AREA = 6.0e-4  # m^2, the paper's

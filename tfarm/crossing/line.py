@@ -13,16 +13,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tfarm.arrays import Complex, Real, Whole
 from tfarm.records import record
-
-Real = NDArray[np.float64]
-Whole = NDArray[np.int64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 LAST_BIT = 2.0**-53  # of a place, and of its bracket, which is narrower
 MOST_HALVINGS = 200  # a zero takes ten evaluations; three times 53 where no step but halving is believed

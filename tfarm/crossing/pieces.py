@@ -6,10 +6,8 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
+from tfarm.arrays import Real
 
-Real = NDArray[np.float64]
 Window = tuple[float, float]
 Slice = tuple[float, float, float]  # a value of the gain across, and an interval of the other there
 

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tfarm.arrays import Real, Whole
+
 from .line import Crossings
 
-Real = NDArray[np.float64]
-Whole = NDArray[np.int64]
 Window = tuple[float, float]
 
 

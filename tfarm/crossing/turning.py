@@ -8,15 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .pieces import RegionPiece
+from tfarm.arrays import Complex, Real
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
+from .pieces import RegionPiece
 
 STRETCH = 2.0  # how much wider than high, or higher than wide, a picture is at most: so much more a curve turns in it
 MOST_TURN = math.radians(5.0) / STRETCH  # from one piece of a curve to the next, where the picture is as high as wide

@@ -15,11 +15,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Generic
+from typing import Generic
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tfarm.arrays import Complex, Real
 from tfarm.dsp.circle import Circle
 from tfarm.dsp.law_loop import AnyLoop, SampledLaw
 from tfarm.dsp.loop import SampledLoop, resized
@@ -29,8 +30,6 @@ from tfarm.spectrum import modes
 from tfarm.spectrum.box import Box, winding_number
 from tfarm.spectrum.damped import TOWARD_SINGULAR, member
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 AnySampled = SampledLoop | SampledLaw
 
 DECAYED_EXPONENT = 30.0  # e^-30 = 1e-13 is left over a sample of the poles on the line

@@ -15,9 +15,9 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import GAINS, HubFeedback
+from tfarm.arrays import Complex, Real, Whole
 from tfarm.crossing import Crossings, solved
 from tfarm.dsp.law_loop import SampledLaw
 from tfarm.dsp.loop import ANGLE_ROW, SampledLoop
@@ -26,9 +26,6 @@ from tfarm.exact.outputs import OUTPUTS
 from tfarm.records import record
 from tfarm.spectrum.scales import most_gain
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
-Whole = NDArray[np.int64]
 Split = Callable[[tuple[Any, Complex]], tuple[Complex, Complex]]  # of a grid's terms into A and B of A + g B
 
 A_DECADE = 48  # grid points a decade of the distance to a pole

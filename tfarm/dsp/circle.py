@@ -22,12 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import HubFeedback
+from tfarm.arrays import Complex, Real
 from tfarm.dsp.law_loop import AnyLoop
 from tfarm.dsp.loop import ANGLE_ROW, RATE_ROW, SampledLoop
 from tfarm.records import record
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 MACHINE_EPS = float(np.finfo(float).eps)  # of a float64, times the counts of operations beside it
 ARCS = 64  # of half the circle to begin with

@@ -13,16 +13,15 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import Arm
+from tfarm.arrays import Real
 from tfarm.columns import Column
 from tfarm.dsp.ringing import POINTS_A_PERIOD, records_between
 from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.simulate import Simulation, Simulator
 from tfarm.records import record
 
-Real = NDArray[np.float64]
 AnySimulator = TypeVar("AnySimulator", bound=Simulator)
 
 LEAST_BETWEEN = 3  # records between two samples at least

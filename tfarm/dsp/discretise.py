@@ -21,10 +21,9 @@ from tfarm.arm import Arm
 from tfarm.arm.blocks import LawBlock, Rational, StateSpace
 from tfarm.arm.feedback import input_words
 from tfarm.arm.law import Law, Part
+from tfarm.arrays import Real
 from tfarm.errors import ParameterError
 from tfarm.response.signals import Signals
-
-Real = NDArray[np.float64]
 
 SAME_PERIOD = 1e-9  # relative: 1/100 s in two files may differ in its last digits
 

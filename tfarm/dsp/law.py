@@ -20,14 +20,12 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from tfarm.arm import HubFeedback
+from tfarm.arrays import Complex, Real
 from tfarm.columns import ANSWER, JSON, REPORT, Column
 from tfarm.digits import general, lined, scientific, singly
 from tfarm.dsp.loop import SampledLoop
 from tfarm.records import record
 from tfarm.spectrum import modes
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 FOLLOWING_STEPS = 24  # of the continuation from zero gain
 LISTED_DECAY = -20.0  # modes that lose more than this in ln|a| between two samples are not listed

@@ -15,12 +15,12 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from typing_extensions import TypeVar
 
 from tfarm.arm import Arm
 from tfarm.arm.blocks import Rational, StateSpace
 from tfarm.arm.law import Law, Part
+from tfarm.arrays import Complex, Real, Whole
 from tfarm.dsp.chain import MOST_DELAY, Chain
 from tfarm.dsp.discretise import discretised
 from tfarm.dsp.law_plant import SensedPlant, is_analog, sensed_plant
@@ -32,10 +32,6 @@ from tfarm.errors import ParameterError
 from tfarm.records import record
 from tfarm.reduced.sensed import closed
 from tfarm.spectrum.damped import all_damped_modes
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
-Whole = NDArray[np.int64]
 
 STATIC_ZERO = 1e-11  # of its terms: a static gain that is 0, summed over 400 modes
 

@@ -10,16 +10,13 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tfarm.arrays import Complex
 from tfarm.crossing import Crossings, joined
 from tfarm.dsp.boundary import NARROWEST_WIDTH, CircleGrid, circle_grid, geometric, real_gain, solved_on
 from tfarm.dsp.law_loop import SampledLaw
 from tfarm.dsp.law_polynomials import polynomials
 from tfarm.dsp.margins import SAME_EDGE, Window
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 LEAST_LAW_FACTOR = 1e-9  # that is looked at: with less a law is none
 MOST_LAW_FACTOR = 1e9  # with more its gain is beyond any number

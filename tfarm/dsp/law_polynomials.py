@@ -6,18 +6,14 @@ q~(w) = z^-n q(z) and p~_i(w) = z^-n p_i(z), n the order of the law, q its commo
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.polynomial.polynomial import polyval
-from numpy.typing import NDArray
 
 from tfarm.arm.blocks import LawBlock, Rational
 from tfarm.arm.law import Law
+from tfarm.arrays import Complex, Real
 from tfarm.records import record
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 VANISHED = 1e-12  # of its terms: what is left of a sum that should be 0, states of a law of order ten
 CHECKED = 64  # points of half the circle at which coefficients are held against the law's own values

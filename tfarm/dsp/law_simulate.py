@@ -11,10 +11,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import Arm
 from tfarm.arm.law import REFERENCE, Law
+from tfarm.arrays import Real
 from tfarm.dsp import kernel
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.law_loop import acting_law
@@ -23,8 +23,6 @@ from tfarm.dsp.plant import Plant
 from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.simulate import Simulation, Simulator
 from tfarm.errors import ParameterError, did_you_mean
-
-Real = NDArray[np.float64]
 
 SIGNAL_KINDS = {"hub_angle": 1, "root_moment": 2, "hub_rate": 3}  # through what one goes, as in `kernel.run_law`
 

@@ -9,19 +9,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, HubFeedback
+from tfarm.arrays import Complex, Real
 from tfarm.crossing.turning import loose
 from tfarm.dsp.law import followed_branches, origins
 from tfarm.dsp.loop import SampledLoop
 from tfarm.records import record
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 LOCUS_VALUES = 61  # of a gain along its locus, to begin with
 BRANCH_ROUNDS = 24  # of halving the steps where a branch bends, at most

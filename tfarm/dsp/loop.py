@@ -17,9 +17,9 @@ from functools import cached_property
 from typing import Any, Protocol, Self, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import FED_BACK, Arm, HubFeedback
+from tfarm.arrays import Complex, Real, Whole
 from tfarm.dsp.chain import Chain, Sampling
 from tfarm.dsp.plant import Branching, Plant, loop_plant, shorter_plant
 from tfarm.dsp.sampling import PulseTransfer
@@ -30,9 +30,6 @@ from tfarm.response import transfer
 from tfarm.spectrum.damped import all_damped_modes
 from tfarm.spectrum.scales import check_gains
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
-Whole = NDArray[np.int64]
 Characteristic = Callable[[Complex, Whole | None, Any], Complex]  # offset F at z = e^{pT} + offset, p of that number
 
 ANGLE_ROW, RATE_ROW = (FED_BACK.index(name) for name in ("hub_angle", "hub_rate"))  # rows of what is measured

@@ -13,13 +13,13 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from tfarm.arm import FED_BACK, Arm
+from tfarm.arrays import Complex, Real
 from tfarm.dsp.chain import Chain
 from tfarm.errors import ParameterError
 from tfarm.records import record
@@ -28,9 +28,6 @@ from tfarm.reduced.remainder import SLOW_POLES_FROM, slow_remainder
 from tfarm.response import transfer
 from tfarm.spectrum import DampedModes, Modes
 from tfarm.spectrum.damped import all_damped_modes
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 Branching = Callable[[Modes], DampedModes]
 

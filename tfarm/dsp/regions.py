@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tfarm.arrays import Complex, Real
 from tfarm.crossing import Crossings, counts_over, intervals, pieces
 from tfarm.crossing.turning import loose_columns
 from tfarm.dsp.boundary import circle_crossings, circle_grid
@@ -17,9 +17,6 @@ from tfarm.dsp.loop import SampledLoop
 from tfarm.dsp.margins import Window, stable_windows
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 MOST_GAINS = 4000  # of a map, along one gain
 ENDS_AT = (-0.9, 0.3, 0.9)  # K2 at which upright edges are looked for, of what balances a torque

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import LISTED, TAKEN_OFF, Arm, HubFeedback, driven, unit_of
 from tfarm.arm.driving import AnyLaw, tracked
+from tfarm.arrays import Real
 from tfarm.columns import Column
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.curves import resolved
@@ -20,8 +20,6 @@ from tfarm.dsp.enough import Enough, enough_modes
 from tfarm.dsp.law_simulate import LawSimulator
 from tfarm.dsp.scenarios import Scenario, described, scenario
 from tfarm.dsp.simulate import Simulation, Simulator, Trace
-
-Real = NDArray[np.float64]
 
 SETTLED_SHARE = 0.05  # of the largest root moment, within which a slew has settled
 CYCLE_LASTS = 0.7  # a limit cycle keeps at least this much of its amplitude over a quarter of the record

@@ -10,12 +10,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tfarm.arrays import Real
 from tfarm.dsp.plant import RECORDED
 from tfarm.dsp.simulate import Simulation, Simulator
-
-Real = NDArray[np.float64]
 
 POINTS_A_PERIOD = 20  # of a curve in each period of the fastest mode that is seen
 VISIBLE = 1 / 300  # of the height of a curve: a pixel of a picture

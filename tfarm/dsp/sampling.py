@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tfarm.arm import Arm
+from tfarm.arrays import Complex, Real
 from tfarm.dsp.chain import Chain, Sampling
 from tfarm.dsp.plant import Plant, undelayed_plant
 from tfarm.records import record
@@ -28,8 +29,6 @@ from tfarm.records import record
 if TYPE_CHECKING:
     import control
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 FORGOTTEN = 40.0  # e^-40 = 4e-18: such a pole has settled before the next sample
 

@@ -8,16 +8,14 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import Arm, must_turn
 from tfarm.arm.checks import number, positive
+from tfarm.arrays import Real
 from tfarm.dsp.chain import Chain
 from tfarm.errors import ParameterError, did_you_mean
 from tfarm.records import record
 from tfarm.spectrum.scales import turning_inertia
-
-Real = NDArray[np.float64]
 
 MOST_TASK_SAMPLES = 4_000_000  # of a record, a few hundred MB of signals
 STEP_TORQUE, IMPULSE, TIP_OFFSET = 0.1, 0.01, 0.01  # N m, N m s, m: what the scenarios of the paper's arm start with

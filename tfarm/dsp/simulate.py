@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import FED_BACK, Arm, HubFeedback
 from tfarm.arm.checks import whole
+from tfarm.arrays import Complex, Real
 from tfarm.dsp import kernel
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.converters import quantisers
@@ -22,9 +23,6 @@ from tfarm.dsp.sampling import held_amplitude
 from tfarm.dsp.scenarios import Scenario
 from tfarm.errors import ParameterError
 from tfarm.records import record
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 FOLDED_UP = 10.0  # rad: an arm bent by the moment EI/L times this is no arm any more, and the simulation stops
 MOST_BETWEEN = 1000  # records between two samples

@@ -9,13 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import MOMENT_GAIN, Arm, HubFeedback
+from tfarm.arrays import Real
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.curves import resolved
 from tfarm.dsp.scenarios import scenario
 from tfarm.dsp.simulate import Measurement, Simulation, Simulator
 from tfarm.records import record
-
-Real = NDArray[np.float64]
 
 COARSE_BITS = 6  # of the ADC: few, so that its steps are seen
 MOTOR_SHARE = 0.8  # of the torque that the ideal chain takes: what the motor gives at most

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tfarm.arrays import Complex
 from tfarm.errors import ParameterError
 
 from .balls import Ball, precision, rational
@@ -20,8 +21,6 @@ from .elements import Place
 from .jets import Jet
 from .outputs import Output, unit_scale
 from .sweep import fill_free
-
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 SLOPE_CIRCLE = np.exp(2j * np.pi * np.arange(16) / 16)
 SLOPE_RADIUS = 0.3  # of that circle, of |s| over the phase of all waves: the 16th Taylor term is below 1e-17

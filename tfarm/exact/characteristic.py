@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import GAINS, HubFeedback
+from tfarm.arrays import Complex, Real
 
 from .chain import ElementChain
 from .chain_values import free_outputs, free_slopes
@@ -32,9 +33,6 @@ from .outputs import OUTPUTS, unit_scale
 from .system import System
 from .vector import DAMPING, HUB_FORCE, HUB_INERTIA, HUB_REST, TORQUE_DIVISOR
 from .waves import free_ends
-
-Complex = NDArray[np.complexfloating[Any, Any]]
-Real = NDArray[np.float64]
 
 Gains = tuple[Fraction, ...]  # of a law without dimensions, in the order of `GAINS`, exact
 NO_GAINS: Gains = (Fraction(0),) * len(GAINS)

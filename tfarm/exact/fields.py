@@ -16,6 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tfarm.arrays import Complex
+
 from .closed_form import (
     SERIES_RADIUS,
     even_functions,
@@ -29,7 +31,6 @@ from .compiled import python_of
 from .vector import HUB_REST, TIP_MASS
 from .waves import evaluate, separated
 
-Complex = NDArray[np.complexfloating[Any, Any]]
 Tip = tuple[Any, float, Any, float]  # tip_mass, shear, tip_inertia, moment
 _ROOT = np.array([[0, 0, 0, 1.0], [1, 0, 0, 1.0], [2, 0, 0, 1.0]])  # theta, M0, Q0 as `evaluate` wants them
 _ends = python_of(from_transition)

@@ -14,6 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tfarm.arrays import Complex
+
 from .closed_form import (
     SERIES_RADIUS,
     fields_from_root,
@@ -30,7 +32,6 @@ from .jets import Jet
 from .vector import HUB_REST
 from .waves import PARALLEL
 
-Complex = NDArray[np.complexfloating[Any, Any]]
 _from_waves, _from_transition = python_of(from_waves), python_of(from_transition)
 _transition, _fields = python_of(transition_series), python_of(fields_from_root)
 

@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tfarm.arrays import Complex
 from tfarm.errors import ParameterError
 
 from .chain import ElementChain
@@ -30,9 +31,6 @@ from .elements import Drive, Element, Mark, Segment
 from .free import sinhc_slope
 from .jets import Jet
 from .outputs import Output
-
-Complex = NDArray[np.complexfloating[Any, Any]]
-Real = NDArray[np.float64]
 
 _across_waves, _row_across_waves, _met = python_of(across_waves), python_of(row_across_waves), python_of(met)
 _transition_series, _even_functions = python_of(transition_series), python_of(even_functions)

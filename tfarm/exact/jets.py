@@ -5,9 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 
 class Jet:

@@ -9,12 +9,12 @@ appendix      the paper's own 4x4 determinant and Cramer's rule with mpmath, at 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import Arm
+from tfarm.arrays import Complex
 from tfarm.errors import ParameterError, did_you_mean
 
 from . import appendix
@@ -22,7 +22,6 @@ from .outputs import Output
 from .system import System
 from .values import value_with_care
 
-Complex = NDArray[np.complexfloating[Any, Any]]
 Method = Literal["closed-form", "balls", "appendix"]
 METHODS: tuple[Method, ...] = ("closed-form", "balls", "appendix")
 

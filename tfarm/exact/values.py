@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tfarm.arrays import Complex
 from tfarm.errors import ParameterError
 
 from .balls import nearest_float
@@ -20,8 +21,6 @@ from .jets import Jet
 from .outputs import Output, unit_scale
 from .system import System
 from .waves import evaluate
-
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 AT_A_POLE = 4 * float(np.finfo(float).eps)  # nearer than this share of |s|, no digit of the answer can be right
 PROVEN_BITS = 60  # a little more than a float64 holds

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import Arm
 from tfarm.arm.writing import to_toml
+from tfarm.arrays import Real
 from tfarm.columns import Column, Table
 from tfarm.digits import general, listed, singly
 from tfarm.errors import ConvergenceError
@@ -25,8 +25,6 @@ from .noise import CONFIDENCE
 from .ratio import Ratio
 from .repeats import WIDER, repeats
 from .sure import Fitted
-
-Real = NDArray[np.float64]
 
 PEAK_REACH = 0.1  # of ln w, and the damping ratio: a peak farther from all of the arm's is not one of them
 BROADER = 2.0  # times the damping ratio: what a broad peak may lie off its pole

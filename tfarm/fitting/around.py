@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, cast
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import cast
 
 from tfarm.arm import INPUTS, Arm, Input
+from tfarm.arrays import Complex
 from tfarm.exact.chain import ElementChain
 from tfarm.exact.chaining import chain_of
 from tfarm.exact.gradients import Direction, response_gradients
@@ -18,8 +16,6 @@ from tfarm.exact.outputs import OUTPUTS
 from tfarm.response.signals import Signals
 
 from .parameters import COORDINATE_STEP
-
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 NUDGE = 1e-6  # of s: for a slope along it by a difference, which is right to about as much
 

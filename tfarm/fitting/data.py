@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tfarm.arrays import Complex, Real
 from tfarm.errors import ParameterError
 from tfarm.records import record
-
-Complex = NDArray[np.complexfloating[Any, Any]]
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,13 +6,10 @@ Parameters are sigma, w, a and b of each mode, and the constant c last (see `rin
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
+from tfarm.arrays import Complex, Real
 
 MOST_ROWS = 160  # of the Hankel matrix of the start; slower oscillations are looked for in means of so many samples
 FASTEST = 3.0  # the logarithm by which a pole of the start may grow during the record

@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tfarm.arrays import Complex, Real
 from tfarm.records import record
 from tfarm.response.signals import Signals
 
 from .around import NUDGE, Around, drive_behind, under_drive
 from .data import Measured
-
-Complex = NDArray[np.complexfloating[Any, Any]]
-Real = NDArray[np.float64]
 
 PEAK_PROMINENCE = 0.35  # of ln |H|: what stands out by a factor of 1.4 is a peak, if the noise is below a quarter
 NOISY = 4.0  # deviations of the noise

@@ -8,9 +8,9 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import Arm, must_be_arm
+from tfarm.arrays import Real
 from tfarm.errors import ParameterError
 from tfarm.records import record
 
@@ -20,8 +20,6 @@ from .parameters import Parameter, parameters
 from .ringing import RingMode
 from .solve import Solution, best_solution, is_explained, nearest_minimum
 from .sure import BetterError, Fitted, ToldInterval, sureness
-
-Real = NDArray[np.float64]
 
 MENDED = 4  # times that a profile may find a lower sum of squares than the search did
 

@@ -12,10 +12,10 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import INPUTS, Arm
 from tfarm.arm.keys import KeyedArms
+from tfarm.arrays import Complex, Real
 from tfarm.errors import ParameterError
 from tfarm.exact.jets import Jet
 from tfarm.exact.outputs import OUTPUTS
@@ -27,9 +27,6 @@ from .noise import Noise, noise_of
 from .parameters import COORDINATE_STEP, Parameter
 from .reading import check_signal
 from .ringing import RingMode, ring_residuals
-
-Complex = NDArray[np.complexfloating[Any, Any]]
-Real = NDArray[np.float64]
 
 WALL = 10.0  # times the largest residual of the first point: so high that no search goes on there
 INSIDE_BOUNDS = 1e-9  # of a coordinate: so far inside its bounds a search begins

@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tfarm.arrays import Real
 from tfarm.records import record
 
 from .data import Measured
-
-Real = NDArray[np.float64]
 
 CONFIDENCE = 0.95  # of every interval of a fit: the usual one
 LEAST_SHARE = 1e-5  # of |H|: no measured response is better known than that, whatever its coherence says

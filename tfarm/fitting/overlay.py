@@ -6,12 +6,11 @@ import math
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import Arm, must_be_arm
+from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 from tfarm.response.answers import HERTZ
@@ -31,9 +30,6 @@ from .resonances import (
     peaks_of,
     resonance_at,
 )
-
-Complex = NDArray[np.complexfloating[Any, Any]]
-Real = NDArray[np.float64]
 
 SAME_MODE = 0.1  # of its frequency: how near a pole of a damped arm is to that mode of the arm without damping
 LARGEST_FACTOR = 3.0  # the factor on a number beyond which it is no explanation

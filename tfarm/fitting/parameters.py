@@ -10,16 +10,11 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from tfarm.arm import Arm
 from tfarm.arm.keys import KeyedArms
 from tfarm.errors import ParameterError, did_you_mean
 from tfarm.records import record
 from tfarm.spectrum.scales import first_frequency
-
-Real = NDArray[np.float64]
 
 SIGNED = ("offset",)  # numbers of an arm that may be negative
 UPPER_ENDS = {"gear_efficiency": 1.0, "poissons_ratio": 0.5}  # and those that end somewhere

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import gammaincinv
 
 from tfarm.arm import MOMENT_GAIN, Arm, HubFeedback
+from tfarm.arrays import Real
 from tfarm.errors import ConvergenceError
 from tfarm.loop.margins import margins_of_gains
 from tfarm.loop.regions import region
@@ -22,8 +22,6 @@ from tfarm.response import transfer
 
 from .fit import Fit
 from .solve import FIT_SEED, OPEN_DEVIATION, principal_axes
-
-Real = NDArray[np.float64]
 
 ARMS = 40  # that a report draws
 DRAWS_KEPT = 0.999  # of the draws of a normal distribution: one whose sum of squares is larger is none of them

@@ -14,9 +14,9 @@ from functools import cached_property
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import INPUTS, Arm, Input
+from tfarm.arrays import Complex
 from tfarm.errors import ParameterError
 from tfarm.records import record
 from tfarm.response import TransferFunction, transfer
@@ -27,8 +27,6 @@ from tfarm.response.signals import Signals
 from .reading import check_signal
 
 SOMEWHERE = 0.37 + 0.73j  # 1/s: a response that is not 0 throughout is not 0 there
-
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -16,11 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import INPUTS
+from tfarm.arrays import Complex, Real
 from tfarm.errors import MISSING, ParameterError, did_you_mean
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.files import read_file
 
-from .data import Complex, Measured, Real
+from .data import Measured
 from .sheets import MOST_RECORD_BYTES, Sheet, digest_of, read_sheet
 
 if TYPE_CHECKING:

@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tfarm.arrays import Real
 from tfarm.errors import MISSING, ParameterError, did_you_mean
 from tfarm.files import read_mat
 from tfarm.records import record
 
 from .sheets import MOST_RECORD_BYTES, digest_of, read_sheet
-
-Real = NDArray[np.float64]
 
 TIMES = ("t", "time")  # what the column of times is called
 JITTER = 0.1  # of the period: a sample further off its place has been dropped or doubled, or the clock is uneven

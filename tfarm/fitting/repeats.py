@@ -11,14 +11,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tfarm.arrays import Real
 from tfarm.records import record
 
 from .fit import Fit
 from .solve import FIT_SEED, nearest_minimum
-
-Real = NDArray[np.float64]
 
 FEWEST_RECORDS = 3  # records of one response, for a scatter
 DRAWS = 40  # of records

@@ -13,19 +13,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tfarm.arrays import Complex, Real
 from tfarm.errors import ParameterError
 from tfarm.records import record
 from tfarm.response.answers import HERTZ
 
 from .data import Measured
-
-Complex = NDArray[np.complexfloating[Any, Any]]
-Real = NDArray[np.float64]
 
 PROMINENCE = math.log(2)  # a peak is twice what is around it
 CLEAR_OF_NOISE = 5.0  # deviations of the noise that it stands above

@@ -17,20 +17,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 
 from .decays import EACH, LINEAR, counted_from, covariance, least_squares, mode_energy, start_of, whiteness
 from .noise import CONFIDENCE
 from .recording import Recording
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 MOST_RINGING = 20  # of one decay
 NOT_WHITE = 1e-3  # probability below which residuals are called correlated

@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tfarm.arrays import Real
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 from tfarm.spectrum import modes
 
 from .around import NUDGE, Around
-
-Real = NDArray[np.float64]
 
 FREQUENCY_KNOWN = 2e-3  # of itself: what a decay says of it, where its deviation is not said
 RATIO_KNOWN = 0.1  # of itself, likewise

@@ -16,12 +16,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from tfarm.arm import Arm
 from tfarm.arm.driving import AnyLaw, tracked
 from tfarm.arm.reading import load_tables
+from tfarm.arrays import Real
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.results import modes_for, simulation_of
 from tfarm.dsp.scenarios import Scenario
@@ -30,8 +30,6 @@ from tfarm.errors import MISSING, ParameterError
 from tfarm.records import record
 
 from .recording import read_recording
-
-Real = NDArray[np.float64]
 
 LED_BY = "reference:hub_angle"  # columns of the record
 ANGLE_COLUMN = "hub_angle"

@@ -14,14 +14,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm.reading import decoded
+from tfarm.arrays import Real
 from tfarm.errors import MISSING, ParameterError
 from tfarm.files import read_file
 from tfarm.records import record
-
-Real = NDArray[np.float64]
 
 MOST_RECORD_BYTES = 256 * 1024 * 1024  # of a record; an hour of two signals at 1 kHz as text has 150 MB
 

@@ -11,18 +11,16 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.special import chdtrc, ndtri, stdtrit
 
+from tfarm.arrays import Real
 from tfarm.errors import ParameterError
 from tfarm.records import record
 
 from .model import Problem, walled
 from .noise import CONFIDENCE
 from .start import Starts
-
-Real = NDArray[np.float64]
 
 NOISE_ALONE = 1e-6  # a sum of squares that noise alone exceeds so rarely is no noise: another start may do better
 MUCH_MISFIT = 4.0  # times its degrees of freedom: a best sum beyond is tried from strayed starts too

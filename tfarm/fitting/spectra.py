@@ -26,6 +26,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from tfarm.arrays import Complex, Real
 from tfarm.errors import ParameterError, did_you_mean
 from tfarm.records import record
 
@@ -33,8 +34,6 @@ from .data import Measured
 from .reading import check_signal
 from .recording import Recording
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 Estimator = Literal["H1", "H2", "Hv"]
 Taper = Literal["hann", "boxcar"]
 

@@ -12,19 +12,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from tfarm.arrays import Complex, Real
 from tfarm.errors import ParameterError
 
 from .features import features_of, match, near_zeros
 from .model import Problem
-
-Complex = NDArray[np.complexfloating[Any, Any]]
-Real = NDArray[np.float64]
 
 START_DEVIATION = 0.5  # of ln p: the deviation that a start is held with, where peaks do not decide
 MATCH_ROUNDS = 8  # of Newton's method on the frequencies

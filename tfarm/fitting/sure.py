@@ -7,14 +7,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from tfarm.arrays import Real
 from tfarm.records import record
 
 from .solve import OPEN_DEVIATION, Solution, nearest_minimum, principal_axes
-
-Real = NDArray[np.float64]
 
 ToldInterval = Callable[[int, int, str], object]
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import RATE_GAIN, Arm, HubFeedback
+from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
 from tfarm.spectrum import damped_modes, modes
@@ -25,7 +26,7 @@ from tfarm.spectrum.damped import COMPANY, single_zeros
 from tfarm.spectrum.scales import rate_unit
 
 from .plant import Loop, effective_inertia
-from .variation import Complex, Real, Variation, member_of
+from .variation import Variation, member_of
 
 MAY_PASS_ORIGIN = 1e-6  # of the lowest flexible frequency: zeros closer to the origin may pass it
 FIRST_STEP_SHARE = 0.01  # the first step along a parameter, as a share of the way

@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 
 from tfarm.arm import GAINS
+from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import loop_parts, quick_characteristics, torque
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.response.frequency import AXIS_SHARE
 
-from .variation import Complex, Evaluator, Real, Variation
+from .variation import Evaluator, Variation
 
 AT_ORIGIN = 1e-9  # of the largest of its branch: a pole so near to 0 is there but for the last step of its correction
 NEAR_ZERO = 1e-50  # of the lowest frequency: where D is taken for its value at s = 0

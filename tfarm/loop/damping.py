@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm, law_of
+from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import dimensionless, quick_characteristics
 from tfarm.exact.system import system_of
@@ -24,8 +24,6 @@ from .frequencies import band_of
 from .plant import Loop
 from .poles import poles_below
 
-Complex = NDArray[np.complexfloating[Any, Any]]
-Real = NDArray[np.float64]
 Kind = Callable[[Complex, float], NDArray[np.bool_]]  # which poles below a top frequency are meant
 
 MODES_BEYOND_BAND = (5, 30)  # of the model; 30 where 5 do not do, and a box where these do not

@@ -13,12 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN, Arm
+from tfarm.arrays import Real
 from tfarm.spectrum.scales import default_gains, rate_unit
 
 from .lines import along, crossing_at_zero
 from .regions import Region, between, boundary, region
-
-Real = NDArray[np.float64]
 
 LOG_BASE = math.log(10.0)
 LINEAR_SCALE = 0.5  # decades that the linear part of an axis takes on each side of 0, as matplotlib's `linscale` has it

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError
 from tfarm.response.frequency import AXIS_SHARE
 
 from .crossings import BranchCrossing
 from .lines import line_crossings
 from .poles import count_with_mirrors, poles_below
-from .variation import Complex, Real, Variation
+from .variation import Variation
 
 SAME_CROSSING = 1e-6  # of gain and frequency: two roads to one crossing
 LOOPS = 12  # whose poles are counted along a parameter of the arm

@@ -14,12 +14,9 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import Arm
 from tfarm.spectrum import flexible_frequencies, modes
-
-Real = NDArray[np.float64]
 
 NEAREST_TO_STEEP, FARTHEST_FROM_STEEP = 1e-10, 0.06  # distances from a steep place, as shares of its frequency
 POINTS_BESIDE_STEEP = 14  # of a grid on either side of a steep place, one and a half a decade

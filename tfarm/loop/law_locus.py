@@ -21,6 +21,7 @@ from scipy.optimize import brentq, linear_sum_assignment
 from tfarm.arm import Arm
 from tfarm.arm.checks import whole
 from tfarm.arm.law import Law
+from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
 from tfarm.spectrum.box import Box, newton, zeros_in_box
@@ -32,9 +33,6 @@ from .law_loop import LawLoop
 from .law_map import law_crossings
 from .law_poles import law_box, starting_points_of
 from .variation import ARM_PARAMETERS, must_be_way
-
-Complex = NDArray[np.complexfloating[Any, Any]]
-Real = NDArray[np.float64]
 
 MOST_LAW_LOCUS_POINTS = 5000  # values: at each all poles of a box are found
 MOST_LAW_BRANCHES = 60  # flexible modes below the top of the box

@@ -18,15 +18,13 @@ from numpy.typing import NDArray
 from tfarm.arm import INPUT_UNITS, Arm, must_be_arm
 from tfarm.arm.driving import cancelled
 from tfarm.arm.law import Law
+from tfarm.arrays import Complex
 from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import Analytic, LoopParts, deflated, difference_steps
 from tfarm.exact.system import System
 from tfarm.records import record
 from tfarm.response.signals import Signals
 from tfarm.spectrum.scales import first_frequency
-
-Complex = NDArray[np.complexfloating[Any, Any]]
-Real = NDArray[np.float64]
 
 FAR_RIGHT = (1e5, 1e6, 1e7)  # of w1: how far right an improper law is looked at
 UNDISPERSED = 1e11  # of w1: where waves are no longer dispersed

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import Arm
 from tfarm.arm.law import Law
+from tfarm.arrays import Complex, Real
 from tfarm.crossing import Crossing, Crossings, brackets, counts_over, solved
 from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import LoopParts
@@ -28,9 +29,6 @@ from .law_loop import LawLoop
 from .law_poles import law_box
 from .law_stability import band_for
 from .lines import ascending, through_origin
-
-Complex = NDArray[np.complexfloating[Any, Any]]
-Real = NDArray[np.float64]
 
 MOST_MAP_VALUES = 400  # along one number: each column is a line of crossings of its own
 NEAR_ORIGIN = (1e-6, 5e-7)  # of the lowest frequency: where a real pole is looked for on its way through 0

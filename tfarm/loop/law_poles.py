@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import Arm
 from tfarm.arm.blocks import Matrices
 from tfarm.arm.checks import whole
 from tfarm.arm.law import Law
+from tfarm.arrays import Complex
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.reduced.sensed import closed, in_series, pade, sensed_model
 from tfarm.spectrum import modes_below
@@ -21,8 +20,6 @@ from tfarm.spectrum.damped import TOWARD_SINGULAR
 from .frequencies import band_of, steep_places
 from .law_loop import LawLoop
 from .poles import MOST_POLES, USUAL_POLES, Poles, first_poles, near_modes, quiet_edge
-
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 PADE = 8  # order of the approximation of a delay in the model that starts are taken from
 HEIGHTS_LEFT = 1.5  # heights that a box reaches left

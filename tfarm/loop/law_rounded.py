@@ -8,21 +8,18 @@ are integrals of s f'/f and s^2 f'/f around a circle with the two and no other z
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from tfarm.arrays import Complex, Real
 from tfarm.crossing.turning import loose
 from tfarm.errors import ConvergenceError
 from tfarm.spectrum.box import Box
 
 from .law_locus import Family, LawLocus, assigned, inside
 from .locus import frame
-
-Complex = NDArray[np.complexfloating[Any, Any]]
-Real = NDArray[np.float64]
 
 LAW_HALVING_ROUNDS = 18  # of halving at most where a branch bends, or two meet
 MEETING_HALVINGS = 7  # halvings of a step until two poles that meet in it are apart from the others

@@ -15,7 +15,6 @@ Else it is not known, and the verdict is that of the band.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import Arm
 from tfarm.arm.law import Law
@@ -27,8 +26,6 @@ from .law_poles import law_box, law_poles_below
 from .passivity import Signs, signs_of
 from .poles import Poles
 from .stability import LEAST_BAND_MODES, MARGIN_OF_ZERO, QUIET, Stability, is_felt, must_be_off_axis
-
-Real = NDArray[np.float64]
 
 UNKNOWN_ABOVE = "not known beyond {band:.4g} rad/s: neither small gain nor a theorem tells the modes there"
 DELAYED = "without any damping a delayed law drives infinitely many modes beyond the band"

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback
+from tfarm.arrays import Complex, Real
 from tfarm.crossing import Crossing, Crossings, brackets, solved
 from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import gains_of, loop_parts, torque
@@ -24,9 +25,6 @@ from tfarm.spectrum import flexible_frequencies, modes
 
 from .frequencies import grid
 from .plant import effective_inertia
-
-Complex = NDArray[np.complexfloating[Any, Any]]
-Real = NDArray[np.float64]
 
 NO_FEEDBACK = HubFeedback()  # every gain 0
 SAME_FREQUENCY = 1e-12  # of a frequency: nearer than this are two numbers for one

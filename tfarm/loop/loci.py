@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback, written_unit
+from tfarm.arrays import Complex
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
 from tfarm.spectrum import modes
 
 from .locus import Locus, locus
 from .reduced_locus import ReducedLocus, reduced_locus
-
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 LOCUS_POINTS = 300  # values of the gain
 LOCUS_TRIES = ((7, 1.0), (4, 1.0), (4, 0.75), (2, 0.5))  # branches, and how much of the range they are followed over

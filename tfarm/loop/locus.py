@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import NAMES, Arm, HubFeedback
 from tfarm.arm.checks import whole
+from tfarm.arrays import Complex, Real
 from tfarm.crossing.turning import loose
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
@@ -25,7 +26,7 @@ from .branches import MAY_PASS_ORIGIN, NOBODY, Stretch, followed, ordered
 from .crossings import BranchCrossing, branch_crossings
 from .ended import with_others
 from .lines import static_crossings
-from .variation import Complex, Evaluator, Real, Variation, free_of_loss, member_of, must_be_way
+from .variation import Evaluator, Variation, free_of_loss, member_of, must_be_way
 
 MOST_LOCUS_POINTS = 100_000  # values, those between that make it round among them
 MOST_BRANCHES = 200  # as many modes are followed

@@ -23,11 +23,11 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from tfarm.arm import FED_BACK, Arm, HubFeedback
 from tfarm.arm.checks import positive, whole
+from tfarm.arrays import Real
 from tfarm.errors import ParameterError
 from tfarm.records import record
 from tfarm.reduced import modal_model
@@ -35,7 +35,6 @@ from tfarm.response import transfer
 
 from .plant import Loop
 
-Real = NDArray[np.float64]
 Kind = Literal["dissipated", "conserved", "unproven"]
 
 MOST_ENERGY_POINTS = 100_000  # of time, each a step of the model

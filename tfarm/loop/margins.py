@@ -20,10 +20,10 @@ from dataclasses import dataclass
 from typing import Any, Generic
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from tfarm.arm import NAMES, Arm, HubFeedback
+from tfarm.arrays import Complex, Real
 from tfarm.crossing import brackets, solved, zeros_between
 from tfarm.records import record
 
@@ -36,8 +36,6 @@ from .poles import LEAST_SQUARABLE, AnyLoop
 from .stability import Stability, is_quiet, stability
 from .windows import Windows, gain_windows
 
-Complex = NDArray[np.complexfloating[Any, Any]]
-Real = NDArray[np.float64]
 MARGIN_DIGITS, PLACE_DIGITS = 9, 7  # of a margin, and of the frequency of a dip, which its depth hardly feels
 BOTTOM = 1e-6  # of the gap between grid points: a dip's bottom is flat, so its depth is right to the square of that
 LOWEST = 6  # local minima on the grid that are refined

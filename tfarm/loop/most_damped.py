@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from tfarm.arm import NAMES, many_laws
+from tfarm.arrays import Complex, Real
 from tfarm.records import record
 
 from .damping import exact_poles_next_to
 from .locus import Locus, locus
-from .variation import Complex, Real
 
 ROUND_POINTS = 17  # of each round between two neighbours, so that it is an eighth as wide as the one before
 NARROWEST_ROUND = 1e-7  # of the gain: where rounds end; a damping ratio, flat there, is known to 1e-14 of its curvature

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Generic
+from typing import Generic
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import ANGLE_GAIN, RATE_GAIN
+from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
 from tfarm.response.frequency import AXIS_SHARE
@@ -25,9 +26,6 @@ from .law_loop import LawLoop
 from .plant import Loop
 from .poles import AnyLoop, count_with_mirrors
 from .stability import Stability
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 INDENT_RADIUS = 0.05  # radius of a semicircle around a pole of L, in units of its residue: |L| is about 20 on it
 NEARER = 0.1  # of the way to the nearest closed-loop pole: no step past a pole of L leaves an unstable one out

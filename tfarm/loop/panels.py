@@ -14,21 +14,17 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import Arm
+from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exact.characteristic import float_units, loop_parts
 from tfarm.exact.system import system_of
 from tfarm.records import record
 
 from .frequencies import steep_places
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 PANEL_SAMPLES = 24  # of order 1/2 as the parts are, few more never help where a panel holds one mode
 STEEP_A_PANEL = 3  # steep places a panel: each mode has one of the own, the locked and the free hub

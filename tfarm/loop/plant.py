@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import GAINS, Arm, HubFeedback, must_be_arm
+from tfarm.arrays import Complex
 from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import Gains, gains_of, loop_parts, torque
 from tfarm.exact.system import System, system_of
@@ -18,8 +19,6 @@ from tfarm.spectrum.correction import Member
 from tfarm.spectrum.damped import member
 from tfarm.spectrum.scales import check_gains
 
-Complex = NDArray[np.complexfloating[Any, Any]]
-Real = NDArray[np.float64]
 SMALLEST_NORMAL = float(np.finfo(float).tiny)  # a smaller double has not all its digits
 
 

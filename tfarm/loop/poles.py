@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, Generic
+from typing import Generic
 
 import numpy as np
-from numpy.typing import NDArray
 from typing_extensions import TypeVar
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.arm.checks import whole
+from tfarm.arrays import Complex, Real
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
 from tfarm.exact.characteristic import zeros_at_origin
 from tfarm.records import record
@@ -28,9 +28,6 @@ from .frequencies import band_of, steep_places
 from .law_loop import LawLoop
 from .lossless import driven_modes
 from .plant import Loop, effective_inertia
-
-Complex = NDArray[np.complexfloating[Any, Any]]
-Real = NDArray[np.float64]
 
 MOST_POLES = 1000  # that may be asked for
 USUAL_POLES = 10  # poles listed where no count is asked for

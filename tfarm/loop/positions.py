@@ -9,13 +9,13 @@ they are: it changes the drive alone.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.polynomial import chebyshev
-from numpy.typing import NDArray
 
 from tfarm.arm import Arm, must_turn
+from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import loop_parts
 from tfarm.exact.system import system_of
@@ -25,8 +25,6 @@ from tfarm.records import record
 from tfarm.response import TransferFunction, transfer
 from tfarm.spectrum import modes
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 Sensor = Literal["displacement", "moment"]
 
 MOST_SENSOR_MISS = 1e-8  # of the numerator on a panel, between samples: zeros are shown to five digits

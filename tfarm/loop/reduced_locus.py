@@ -14,13 +14,14 @@ from scipy.optimize import linear_sum_assignment
 
 from tfarm.arm import FED_BACK, Arm, HubFeedback
 from tfarm.arm.blocks import Matrices
+from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 from tfarm.reduced import ModalModel, modal_model
 from tfarm.spectrum import modes
 
 from .locus import Locus
-from .variation import OF_THE_LAW, Complex, Real, Variation
+from .variation import OF_THE_LAW, Variation
 
 if TYPE_CHECKING:
     import control

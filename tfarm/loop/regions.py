@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback
+from tfarm.arrays import Complex, Real
 from tfarm.crossing import Crossings, brackets, counts_over, intervals, solved
 from tfarm.exact.characteristic import gains_of, loop_parts, torque
 from tfarm.exact.system import System, system_of
@@ -26,13 +27,12 @@ from tfarm.records import record
 from tfarm.spectrum.scales import PAPER_GAINS, default_gains
 
 from .frequencies import grid
-from .lines import Complex, along, ascending, crossing_at_zero, line_crossings, static_crossings
+from .lines import along, ascending, crossing_at_zero, line_crossings, static_crossings
 from .lossless import locked_edges, stable_moments
 from .plant import Loop
 from .stability import loop_band, stability
 from .windows import holds_undamped
 
-Real = NDArray[np.float64]
 Window = tuple[float, float]
 INFINITE = -1  # stands for infinitely many unstable poles
 MOST_GRID_GAINS = 2000  # of a map, along one gain

@@ -9,20 +9,15 @@ reference is made for the arm's own inertia and not for the effective one.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import FED_BACK, Arm, must_turn
+from tfarm.arrays import Complex, Real
 from tfarm.exact.characteristic import dimensionless, loop_parts, quick_characteristics
 from tfarm.exact.system import system_of
 from tfarm.spectrum.scales import first_frequency
 
 from .damping import band_and_real_poles, is_oscillating
-
-Complex = NDArray[np.complexfloating[Any, Any]]
-Real = NDArray[np.float64]
 
 RISE, TRAVEL = 1.0, 1.15  # the paper's slew: rise time [s] and tip travel [m]
 MOST_EXPONENT = 100.0  # e^100 = 3e43 is more than any stable loop leaves, and its square no overflow

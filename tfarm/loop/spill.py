@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from tfarm.arm import Arm
 from tfarm.arm.checks import whole
 from tfarm.arm.law import Law
+from tfarm.arrays import Complex
 from tfarm.columns import Column, Table
 from tfarm.digits import general, plain, singly
 from tfarm.errors import ParameterError
@@ -27,8 +28,6 @@ from .law_loop import LawLoop
 from .law_poles import poles_of_model
 from .law_stability import law_stability
 from .stability import Stability
-
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 MOST_SPILL_MODES = 60  # modes of a model
 USUAL_SPILL_MODES = 20  # up to which models are looked at where nothing else is asked for

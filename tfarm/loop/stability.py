@@ -16,12 +16,12 @@ A pole at 0 remains where Kp = 0, whatever K1 and K2: verdicts are apart from it
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Generic, NamedTuple
+from typing import Generic, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback
+from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
 from tfarm.spectrum import modes, modes_below
@@ -30,9 +30,6 @@ from .frequencies import MOST_BAND_MODES, band_of
 from .lossless import driven_modes, locked_edges
 from .plant import Loop
 from .poles import AnyLoop, Poles, poles_below
-
-Complex = NDArray[np.complexfloating[Any, Any]]
-Real = NDArray[np.float64]
 
 LEAST_BAND_MODES = 12  # flexible modes in the band at C = 0, and at least
 QUIET = 0.5  # |L| beyond the band, at C > 0

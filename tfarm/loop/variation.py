@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import LISTED, NAMES, RATE_GAIN, Arm, HubFeedback
+from tfarm.arrays import Complex, Real
 from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import Analytic, gains_of, quick_characteristics, zeros_at_origin
 from tfarm.exact.system import System, system_of
@@ -19,9 +19,6 @@ from tfarm.spectrum.correction import Member
 
 from .lines import NO_FEEDBACK, Line
 from .plant import Loop
-
-Complex = NDArray[np.complexfloating[Any, Any]]
-Real = NDArray[np.float64]
 
 OF_THE_LAW = {gain.name: gain.unit for gain in LISTED} | {"all": "1"}  # units, as of the arm's below
 ARM_PARAMETERS = {

@@ -6,10 +6,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
+from tfarm.arrays import Real
 from tfarm.audit.assumptions import HubStudy
 from tfarm.audit.candidates import Study
 from tfarm.digits import plain
-from tfarm.response.frequency import Real
 
 from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, blank, headline, style
 

@@ -12,9 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
 from tfarm.arm import HubFeedback
+from tfarm.arrays import Real
 from tfarm.comparing import Comparison
 from tfarm.crossing import pieces
-from tfarm.crossing.pieces import Real, Window
+from tfarm.crossing.pieces import Window
 from tfarm.digits import plain
 
 from .frequency import hertz_axis, magnitude_limits, wrapped_phase

@@ -11,8 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MultipleLocator, NullFormatter
 
+from tfarm.arrays import Complex, Real
 from tfarm.digits import plain
-from tfarm.response.frequency import Bode, Complex, Real
+from tfarm.response.frequency import Bode
 
 from .style import BLUE, FAINT, GREY, INK, ORANGE, New, blank, headline, style, taken, window
 
@@ -65,7 +66,7 @@ def draw_magnitude(data: Bode, *, ax: Axes, is_small: bool = False, label: str =
     low, high = ax.get_ylim()
     jumps = np.r_[data.infinite, data.vanishing]
     edges = np.r_[np.full(data.infinite.size, 10 * high), np.full(data.vanishing.size, low / 10)]
-    ax.plot(*broken(data.omega, abs(data.value), jumps, edges), color=BLUE, label=label)
+    ax.plot(*broken(data.omega, np.abs(data.value), jumps, edges), color=BLUE, label=label)
     if np.any(data.rigid):
         ax.plot(data.omega, abs(data.rigid), color=GREY, lw=1.0, ls=(0, (4, 3)), zorder=1.5, label="rigid arm")
     _mark_roots(data, ax)

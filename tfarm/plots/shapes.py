@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
+from tfarm.arrays import Real
 from tfarm.digits import plain, significant
 from tfarm.records import record
-from tfarm.response.frequency import Real
 from tfarm.spectrum import Modes
 
 from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, New, blank, headline, style, window

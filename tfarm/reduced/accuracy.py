@@ -8,20 +8,17 @@ closed in on.  What is printed is the largest value found, and a little more (`F
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm
+from tfarm.arrays import Complex, Real
 from tfarm.records import record
 from tfarm.response import TransferFunction, Wanted, transfer
 from tfarm.spectrum import modes, modes_below
 
 from .partial_fractions import PartialFractions
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 FOUND_TO_WORST = 1.02  # times the worst that was found: tuned on random arms
 EXACT_ROUNDING = 1e-14  # what the exact values themselves may be off, in the same norm

@@ -11,13 +11,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import FED_BACK, Arm
 from tfarm.arm.checks import whole
+from tfarm.arrays import Complex, Real
 from tfarm.errors import ParameterError
 from tfarm.exact.coefficients import Coefficients
 from tfarm.exact.outputs import OUTPUTS, Output
@@ -31,9 +30,6 @@ from .partial_fractions import PartialFractions
 from .remainder import slow_remainder
 from .residues import contour_residues, end_residues, undamped_residues
 
-Complex = NDArray[np.complexfloating[Any, Any]]
-
-Real = NDArray[np.float64]
 MOST_MODELLED = 1000  # of a model: its matrices of 2000 states take 32 MB
 MOST_PROPER = 2  # power of s: a mode's share r s^2/(s^2 + w^2) is bounded, and one of s^3 is not
 

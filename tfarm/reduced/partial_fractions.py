@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tfarm.arm import Arm
 from tfarm.arm.blocks import Matrices
+from tfarm.arrays import Complex, Real
 from tfarm.errors import ParameterError
 from tfarm.exact.outputs import Output
 from tfarm.records import record
@@ -17,8 +18,6 @@ from tfarm.records import record
 if TYPE_CHECKING:
     import control
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 TERMS_AT_ONCE = 1 << 18  # entries of (poles, s) held at a time
 

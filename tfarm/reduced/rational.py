@@ -20,6 +20,7 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm
+from tfarm.arrays import Real
 from tfarm.errors import ParameterError
 from tfarm.exact.values import expansions_at_zero
 from tfarm.response import TransferFunction, Wanted, transfer
@@ -28,8 +29,6 @@ from tfarm.spectrum import modes_below
 from .accuracy import distance, frequencies_around, norm
 from .modal import MOST_MODELLED, modal_model
 from .partial_fractions import PartialFractions
-
-Real = NDArray[np.float64]
 
 BEYOND_BAND = 1.02  # modes up to so much above the band's end are taken exactly: a pole nearer to the band would show
 REMAINDER_POINTS = 300  # of the band, denser towards its end, where poles above it show most

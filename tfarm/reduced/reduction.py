@@ -12,11 +12,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from tfarm.arm import Arm
 from tfarm.arm.blocks import Matrices
 from tfarm.arm.checks import whole
+from tfarm.arrays import Complex, Real
 from tfarm.errors import MISSING, ConvergenceError, ParameterError
 from tfarm.exact.outputs import Output
 from tfarm.records import record
@@ -25,14 +26,13 @@ from tfarm.spectrum import modes
 
 from .accuracy import EXACT_ROUNDING, Ruler
 from .modal import modal_model, relaxed_model, slow_model
-from .partial_fractions import Complex, PartialFractions
+from .partial_fractions import PartialFractions
 from .rational import modes_in, rational_model
 from .remainder import SLOW_PAIRS, SLOW_POLES_FROM
 
 if TYPE_CHECKING:
     import control
 
-Real = NDArray[np.float64]
 Reduction = Literal["modal", "aaa"]
 
 BAND = (0.1, 1000.0)  # rad/s, unless told

@@ -9,13 +9,10 @@ s > 0; at s = 0 nothing changes.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Complex = NDArray[np.complexfloating[Any, Any]]
-Real = NDArray[np.float64]
+from tfarm.arrays import Complex, Real
 
 CORNER_RATIOS = 1 + np.geomspace(0.02, 30.0, 14)  # c_j C, and below s C of the fit: tuned by hand on the lab arm
 SLOW_PAIRS = CORNER_RATIOS.size // 2  # the corners, two a pair

@@ -9,11 +9,11 @@ Meirovitch, Fundamentals of Vibrations, 2001, ch. 7) and Cauchy's integral aroun
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError
 from tfarm.exact.chain import ElementChain
 from tfarm.exact.chain_values import free_slopes
@@ -23,9 +23,6 @@ from tfarm.exact.system import System
 from tfarm.exact.values import evaluate_outputs, kernel_table
 from tfarm.exact.vector import HUB_REST, TORQUE_DIVISOR
 from tfarm.spectrum import Modes
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 CLOSE_FREQUENCIES = 1e-6  # relative gap under which two frequencies are told apart by their shapes alone
 UNIT_CIRCLE = np.exp(2j * np.pi * np.arange(32) / 32)  # of Cauchy's integral: a pole 4 radii off adds 4^-32 of its own

@@ -6,15 +6,13 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import Arm
 from tfarm.arm.blocks import Matrices, Rational
+from tfarm.arrays import Real
 from tfarm.errors import ParameterError
 from tfarm.reduced.modal import modal_model
 from tfarm.response.signals import Signals
-
-Real = NDArray[np.float64]
 
 ALGEBRAIC = 1e-9  # a feedthrough of the loop so near to -1 leaves its input undetermined
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from tfarm.arrays import Real
 from tfarm.audit.assumptions import HubStudy, SectionStudy, hub_study, section_study
 from tfarm.audit.candidates import Study
 from tfarm.columns import Column, Table
 from tfarm.digits import plain, significant
 from tfarm.plots.assumptions import CURVE_COLOURS, draw_over
 from tfarm.report.sections import Picture
-from tfarm.response.frequency import Real
 
 CURVE_POINTS = 49  # of each curve, which bends slowly on two logarithmic axes
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tfarm.arm import Arm
+from tfarm.arrays import Real
 from tfarm.audit.assumptions import (
     has_hub_inertia,
     hub_study,
@@ -16,7 +17,6 @@ from tfarm.digits import fixed, plain, significant
 from tfarm.report.assumptions_pictures import hub_picture, section_picture
 from tfarm.report.paper import is_from_paper
 from tfarm.report.sections import PageSection, Picture
-from tfarm.response.frequency import Real
 
 PAPER_LEAVES_OPEN = (
     "The paper prints the area of the section, but neither its second moment I nor the hub inertia I_h. Every "

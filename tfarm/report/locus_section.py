@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 
 from tfarm.arm import MOMENT_GAIN, RATE_GAIN, Arm, HubFeedback, shown_unit, written_unit
+from tfarm.arrays import Real
 from tfarm.columns import Column, Table
 from tfarm.digits import how_many, listed, plain, scientific, significant, singly
 from tfarm.errors import ConvergenceError
@@ -18,7 +19,6 @@ from tfarm.plots.roots import draw_loci
 from tfarm.report.locus_tables import crossing_table, gap_table, loci_data
 from tfarm.report.loop_laws import edge_of_K2, has_loop, margins_of
 from tfarm.report.sections import PageSection, Picture
-from tfarm.response.frequency import Real
 from tfarm.spectrum.scales import default_gains, rate_unit
 
 LISTED_MOMENT_GAINS = (0.9, 1.0, 1.01, 1.1, 1.5)  # values of K2 whose exact poles are listed

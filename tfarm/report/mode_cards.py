@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tfarm.arrays import Real
 from tfarm.digits import significant
 from tfarm.plots.shapes import DrawnMode
-from tfarm.response.frequency import Real
 
 CARD_WIDTH, CARD_HEIGHT, CARD_EDGE = 120.0, 60.0, 8.0  # of the drawing, in its own units
 PATH_EVERY = 10  # of the points of a shape every so many are drawn: 41, half a unit from the true curve at most

@@ -10,6 +10,7 @@ import numpy as np
 
 import tfarm
 from tfarm.arm import Arm, Theory
+from tfarm.arrays import Real
 from tfarm.columns import REPORT, Column, Table
 from tfarm.digits import fixed, lined, listed, significant
 from tfarm.errors import CertificationError, ConvergenceError
@@ -19,7 +20,6 @@ from tfarm.report.locked_table import locked_table, locked_words
 from tfarm.report.mode_cards import mode_cards
 from tfarm.report.sections import PageSection, Picture
 from tfarm.report.trust_proofs import how_proven
-from tfarm.response.frequency import Real
 from tfarm.spectrum import Modes, answers
 
 TABLED_MODES, DRAWN_MODES = 10, 6  # as `tfarm modes` lists them; shapes in three rows of two

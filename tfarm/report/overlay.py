@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from tfarm.arm import PLANE, Arm, HubFeedback, shown_unit
+from tfarm.arrays import Complex, Real
 from tfarm.columns import Column, Table
 from tfarm.digits import plain
 from tfarm.dsp import GainMap, gain_map, sampled_verdict
 from tfarm.dsp.chain import Chain
-from tfarm.dsp.regions import Complex, Real, ends_of_K1, rounded_map, with_both_sides, with_more
+from tfarm.dsp.regions import ends_of_K1, rounded_map, with_both_sides, with_more
 from tfarm.loop.regions import Region, region
 from tfarm.plots import regions
 from tfarm.plots.style import blank, headline, style

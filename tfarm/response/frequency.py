@@ -13,20 +13,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import INPUT_UNITS, Arm
+from tfarm.arrays import Complex, Real
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.records import record
 from tfarm.spectrum import modes
 
 from .transfer import TransferFunction, transfer
-
-Real = NDArray[np.floating[Any]]
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 RESONANCES_SHOWN = 10  # flexible modes in a band, unless told
 EVEN_PER_DECADE = 120  # points of the even grid
@@ -67,12 +64,12 @@ class Bode:
     @property
     def infinite(self) -> Real:
         """Frequencies [rad/s] where the response is truly infinite."""
-        return self.poles.imag[_on_axis(self.poles)]
+        return np.asarray(self.poles.imag[_on_axis(self.poles)], float)
 
     @property
     def vanishing(self) -> Real:
         """Frequencies [rad/s] where the response is truly zero."""
-        return self.zeros.imag[_on_axis(self.zeros)]
+        return np.asarray(self.zeros.imag[_on_axis(self.zeros)], float)
 
     @property
     def resonances(self) -> Complex:
@@ -206,7 +203,7 @@ def phase_of(omega: Real, value: Complex, poles: Complex, zeros: Complex, *, is_
         return phase - 360.0 * np.round((phase[0] - start) / 360.0)
     passed_poles = np.searchsorted(np.sort(poles.imag[_on_axis(poles)]), omega)
     passed_zeros = np.searchsorted(np.sort(zeros.imag[_on_axis(zeros)]), omega)
-    return start + 180.0 * (passed_zeros - passed_poles)
+    return np.asarray(start + 180.0 * (passed_zeros - passed_poles), float)
 
 
 def _on_axis(roots: Complex) -> NDArray[np.bool_]:

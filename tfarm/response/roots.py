@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm
+from tfarm.arrays import Complex
 from tfarm.exact.chain import ElementChain
 from tfarm.exact.chain_values import free_slopes, order_at_zero
 from tfarm.exact.chaining import chain_of
@@ -23,8 +23,6 @@ from tfarm.records import record
 from tfarm.spectrum import flexible_frequencies
 from tfarm.spectrum.box import REAL_SHARE, Box, Function, complete
 from tfarm.spectrum.damped import TOWARD_SINGULAR
-
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import FED_BACK, Arm
+from tfarm.arrays import Complex, Real
 from tfarm.errors import MISSING, ParameterError
 from tfarm.exact.chain import ElementChain
 from tfarm.exact.chain_values import free_outputs, series_at_zero
@@ -25,9 +26,6 @@ from tfarm.exact.system import System, system_of
 from tfarm.exact.values import expansions_at_zero
 from tfarm.records import record
 from tfarm.spectrum import modes
-
-Complex = NDArray[np.complexfloating[Any, Any]]
-Real = NDArray[np.float64]
 
 SERIES_BELOW = 3e-3  # of the slowest frequency: there as many digits are left as a series of REST_TERMS terms has
 REST_TERMS = 8  # of that series: the next is below 1e-20 of the first

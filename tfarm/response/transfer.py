@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tfarm.arm import INPUT_UNITS, Arm, Input, must_be_arm
+from tfarm.arrays import Complex
 from tfarm.errors import MISSING, ParameterError
 from tfarm.exact.balls import nearest_float
 from tfarm.exact.chain import ElementChain
@@ -33,7 +34,6 @@ from .roots import Roots, poles_of, zeros_of
 if TYPE_CHECKING:
     import control
 
-Complex = NDArray[np.complexfloating[Any, Any]]
 POINTS_AT_ONCE = 1 << 16  # points s at once: their values fill a megabyte an output, and few loops are begun
 LARGEST_S = 1e20  # 1/s: far beyond any arm, and the powers of s that are taken do not overflow
 

@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 
+from tfarm.arrays import Real
 from tfarm.columns import ANSWER, JSON, REPORT, TERMINAL, Column, Table
 from tfarm.digits import aligned, general, kept_digits, lined, significant, singly, within
 from tfarm.errors import MISSING
 from tfarm.exact.methods import Method
 
 from .damped import DampedModes, damped_modes
-from .table import Modes, Real, compare_theories, hub_locked
+from .table import Modes, compare_theories, hub_locked
 
 SHAPE_DIGITS = 10  # in a report's files, of what shapes are needed for: these differ by 1e-14 between processors
 EIGENVALUE_ERROR = 2e-14  # of its size: what a float64 may be off (tests: 1e-14 to 50 digits, 64 eps in closed form)

@@ -12,15 +12,14 @@ import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from itertools import count, pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tfarm.arrays import Complex
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import Analytic
-
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 LONGEST_TURN = 0.6  # rad: a longer step of the phase along the contour is halved
 FORESEEN = 1.0  # so is one over which ln f, phase or size, would change by more at the rate of either end

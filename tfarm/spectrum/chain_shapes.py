@@ -13,16 +13,14 @@ from fractions import Fraction
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tfarm.arrays import Real
 from tfarm.errors import ConvergenceError
 from tfarm.exact.chain import ElementChain
 from tfarm.exact.chain_values import free_fields
 from tfarm.exact.elements import Body, Place, Segment
 
 from .shapes import GAUSS_POINTS
-
-Real = NDArray[np.float64]
 
 
 class ChainShapes:

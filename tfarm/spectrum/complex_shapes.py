@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tfarm.arrays import Complex
 from tfarm.errors import ConvergenceError
 from tfarm.exact.balls import State, nearest_float, point, precision
 from tfarm.exact.chain import ElementChain
@@ -18,8 +19,6 @@ from tfarm.exact.coefficients import EndCondition
 from tfarm.exact.elements import Place
 from tfarm.exact.free import free_response
 from tfarm.exact.system import System
-
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 
 def mode_field(k: System, s: complex, quantity: str, x: NDArray[np.float64]) -> Complex:

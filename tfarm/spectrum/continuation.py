@@ -25,13 +25,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError
 
-from .box import Complex, Function
+from .box import Function
 from .correction import Member, as_pairs, corrected
-
-Real = NDArray[np.float64]
-
 
 Family = Callable[[float], Member]
 

@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .box import Complex, Function
+from tfarm.arrays import Complex, Real
 
-Real = NDArray[np.float64]
+from .box import Function
 
 NEIGHBOURS = 8  # zeros that repel each other: those further away move too little to matter
 ENDED_PLACE = 1e150  # where the tree has what has ended

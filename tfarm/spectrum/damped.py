@@ -15,20 +15,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm, Theory
+from tfarm.arrays import Complex, Real
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
 from tfarm.exact.characteristic import NO_GAINS, Gains, quick_characteristic, zeros_at_origin
 from tfarm.exact.coefficients import Coefficients
 from tfarm.exact.system import System
 from tfarm.records import record
 
-from .box import Box, Complex, Function, winding_number
+from .box import Box, Function, winding_number
 from .complex_shapes import mode_field
 from .continuation import Node, follow
 from .correction import Member, improved
 from .enclose import Disc, disjoint, enclosed, proven_count
 from .table import Modes, modes
-
-Real = NDArray[np.float64]
 
 COMPANY = (6, 11, 17, 29)  # modes followed beyond those wanted, lest the last be led astray: the next if that fails
 FEWER_MODES = (300, 150, 60, 20, 5, 1)  # that are tried where more are asked for, or not all can be followed

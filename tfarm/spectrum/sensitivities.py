@@ -24,16 +24,15 @@ from itertools import accumulate
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import Arm
+from tfarm.arrays import Real
 from tfarm.exact.coefficients import Coefficients
 from tfarm.exact.elements import Place, Segment
 
 from .chain_shapes import ChainShapes
 from .shapes import Shapes
 
-Real = NDArray[np.float64]
 Doubled = dict[str, Real]  # 2 d ln w/d ln p of each mode (modes,)
 
 LINK = ("length", "density", "youngs_modulus", "shear_modulus", "shear_factor", "area", "second_moment")

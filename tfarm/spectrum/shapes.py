@@ -13,15 +13,13 @@ from copy import copy
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tfarm.arrays import Complex, Real
 from tfarm.exact.closed_form import SERIES_RADIUS, even_functions
 from tfarm.exact.coefficients import Coefficients, EndCondition
 from tfarm.exact.compiled import python_of
 from tfarm.exact.fields import Wave, free_root, from_root, tip_condition, waves
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 _even = python_of(even_functions)
 
 GAUSS_POINTS = 16  # a panel; exact for the products of waves once a panel holds a few radians

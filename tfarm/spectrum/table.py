@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import THEORIES, Arm, Theory, must_be_arm
 from tfarm.arm.checks import whole
+from tfarm.arrays import Real
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exact.appendix import natural_frequency, roots_near
 from tfarm.exact.chain import ElementChain
@@ -25,8 +26,6 @@ from .precise import refine
 from .search import count_below, natural_frequencies
 from .sensitivities import arm_sensitivities, chain_sensitivities
 from .shapes import Shapes
-
-Real = NDArray[np.float64]
 
 MOST_TABLE_MODES = 10_000  # at a time
 

@@ -12,16 +12,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import Arm
 from tfarm.arm.keys import KeyedArms
 from tfarm.arm.records import ADJUSTABLE
+from tfarm.arrays import Real
 from tfarm.errors import ParameterError
 from tfarm.records import record
 from tfarm.synthesis.search import Bounds
 
-Real = NDArray[np.float64]
 MOST_RANGES = 4  # 16 corners: a search takes so many times as long
 MOST_ARMS = 8  # of a list, for the same reason
 DECADE = 10.0  # a range of numbers of one sign whose ends are further apart is one of logarithms

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import ANGLE_GAIN, Arm, HubFeedback, law_of, laws_at
+from tfarm.arrays import Real
 from tfarm.errors import ConvergenceError
 from tfarm.loop.damping import least_damping
 from tfarm.loop.frequencies import band_of, grid
@@ -21,8 +21,6 @@ from tfarm.loop.stability import stability
 from tfarm.records import record
 from tfarm.spectrum import modes as natural_modes
 from tfarm.synthesis.search import TIE, Bounds, Effort, GainAxis, Score
-
-Real = NDArray[np.float64]
 
 POINTS_A_BASIN = 6  # points of the grid in each basin of a residual
 

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback
+from tfarm.arrays import Real
 from tfarm.dsp import Chain
 from tfarm.dsp.brief import SampledBrief, sampled_brief
 from tfarm.errors import ConvergenceError, ParameterError
@@ -43,7 +44,6 @@ from tfarm.synthesis.search import (
 from tfarm.synthesis.together import Judge, OnArm, Worst, in_step, score_of, worst_value
 from tfarm.synthesis.worst_case import WITHOUT_BOX, WorstCase
 
-Real = NDArray[np.float64]
 Objective = Literal["damping", "margin", "residual", "cost"]
 LoopKind = Literal["sampled", "continuous"]
 

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import ANGLE_GAIN, TWO_GAINS, Arm
 from tfarm.arm.law import Law
+from tfarm.arrays import Real
 from tfarm.dsp import Chain, Verdict
 from tfarm.dsp.brief import brief_of
 from tfarm.dsp.law_loop import SampledLaw
@@ -33,8 +33,6 @@ from tfarm.synthesis.sampled import FEWEST_MODES
 from tfarm.synthesis.structures import STRUCTURES, Structure, usual_angle_gain
 from tfarm.synthesis.together import OnArm, in_step, worst_value
 from tfarm.synthesis.worst_case import WITHOUT_BOX, Tell, WorstCase
-
-Real = NDArray[np.float64]
 
 STARTS_EACH = 16  # points about the start, a coefficient
 START_WIDTH = 1.0  # of x: the deviation of these points

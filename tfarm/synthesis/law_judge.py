@@ -13,14 +13,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import Arm
 from tfarm.arm.blocks import Matrices, Rational
 from tfarm.arm.law import Law, Part
+from tfarm.arrays import Complex, Real
 from tfarm.dsp import Chain
 from tfarm.dsp.law_loop import SampledLaw, acting_law, sampled_law, with_estimate
 from tfarm.dsp.law_verdict import law_verdict
@@ -42,9 +41,6 @@ from tfarm.synthesis.sampled import (
     of_first_modes,
 )
 from tfarm.synthesis.structures import Slope
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 LAW_OBJECTIVES = ("damping", "margin", "sensitivity", "delay", "residual", "cost")
 GROWTH_OF_MODEL = 1e-6  # of |s|: an eigenvalue so little right of the axis may be the model's own, of modes left out

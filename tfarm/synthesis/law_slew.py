@@ -13,11 +13,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import Arm
 from tfarm.arm.blocks import Matrices
 from tfarm.arm.law import Law
+from tfarm.arrays import Real
 from tfarm.dsp import Chain, Scenario, scenario
 from tfarm.dsp.law_loop import acting_law
 from tfarm.dsp.law_simulate import references_of
@@ -28,8 +28,6 @@ from tfarm.spectrum.scales import first_frequency
 from tfarm.synthesis.law_slopes import Clock
 from tfarm.synthesis.sampled import SAMPLES_LEFT, slew_cost
 from tfarm.synthesis.structures import Slope
-
-Real = NDArray[np.float64]
 
 SLEWED = ("residual", "cost")  # the objectives of a slew
 

@@ -13,18 +13,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm.blocks import Matrices
+from tfarm.arrays import Complex
 from tfarm.records import record
 from tfarm.reduced.sensed import closed
 from tfarm.synthesis.structures import Slope
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 AT_NYQUIST = 1e-12  # of z = -1, where Tustin's s is infinite
 

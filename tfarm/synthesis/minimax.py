@@ -14,10 +14,9 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-Real = NDArray[np.float64]
+from tfarm.arrays import Real
 
 LOST = 1e3  # score where the g are not below 0, and more the larger they are
 PRICE = 100.0  # of a g above -WITHIN: tuned on the laws of all structures for the preset sasaki2012-lab

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm.law import Law
+from tfarm.arrays import Complex, Real
 from tfarm.records import record
 from tfarm.synthesis.law_slopes import Clock, changes
 from tfarm.synthesis.sampled import REAL_ANGLE
 from tfarm.synthesis.structures import Slope
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 Sloped = tuple[Real, Real]  # values (m,) and slopes (m, n)
 
 GROWTH_SEEN = -1.2  # a sample, or of |s|: poles that grow less, |z| < 0.3, are left out while others grow more

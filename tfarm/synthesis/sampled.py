@@ -21,13 +21,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from tfarm.arm import ANGLE_GAIN, FED_BACK, PLANE, Arm, HubFeedback, laws_at
+from tfarm.arrays import Complex, Real
 from tfarm.dsp import Chain, SampledLoop, Scenario, sampled_loop, sampled_verdict, scenario
 from tfarm.dsp.margins import most_modes
 from tfarm.dsp.sampling import PulseTransfer
@@ -38,9 +38,6 @@ from tfarm.loop.stability import stability
 from tfarm.records import record
 from tfarm.spectrum.scales import first_frequency
 from tfarm.synthesis.search import TIE, Bounds, Effort, GainAxis, Score
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
 
 RESERVE = 1.25  # the loop holds with all its gains larger or smaller by this factor: what a gauge or motor is off by
 SEARCH_RESERVE = 1.002 * RESERVE  # by as much in the search: the model's few modes have edges that are off by less

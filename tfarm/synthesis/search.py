@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from tfarm.arrays import Real
 from tfarm.records import record
 
-Real = NDArray[np.float64]
 Bounds = tuple[float, float]
 Score = Callable[[Real], Real]  # of points (2, n) of the plane of gains; what is least is best
 

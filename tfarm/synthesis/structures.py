@@ -22,10 +22,10 @@ from numpy.typing import NDArray
 
 from tfarm.arm import Arm
 from tfarm.arm.law import Law
+from tfarm.arrays import Real
 from tfarm.records import record
 from tfarm.spectrum import modes as natural_modes
 
-Real = NDArray[np.float64]
 Numbers = NDArray[Any]  # real, or complex for a derivative
 
 ANGLE_SPEED = 0.1  # of the first frequency, and rad a sample: how fast the angle answers unless it is said

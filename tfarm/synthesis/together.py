@@ -8,16 +8,15 @@ from itertools import zip_longest
 from typing import Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import HubFeedback
+from tfarm.arrays import Real
 from tfarm.dsp.brief import SampledBrief
 from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.stability import Stability
 from tfarm.records import record
 from tfarm.synthesis.search import Bounds, Effort, GainAxis, Score
 
-Real = NDArray[np.float64]
 _One = TypeVar("_One")
 
 LEAST_IS_BEST = ("residual", "cost", "sensitivity")  # of the objectives

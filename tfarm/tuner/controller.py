@@ -6,15 +6,13 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import HubFeedback
+from tfarm.arrays import Real
 from tfarm.dsp import Measurement, Simulation, Simulator
 from tfarm.dsp.chain import Reading
 from tfarm.tuner.network import Network
 from tfarm.tuner.trial import Cost, Record, Trial
-
-Real = NDArray[np.float64]
 
 
 @dataclass

@@ -25,9 +25,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN, Arm
+from tfarm.arrays import Real
 from tfarm.dsp import SampledLoop, sampled_loop, stable_windows
 from tfarm.dsp.margins import around
 from tfarm.dsp.sampling import held_amplitude
@@ -36,7 +36,6 @@ from tfarm.records import record
 from tfarm.tuner.lyapunov import CommonLyapunov
 from tfarm.tuner.sector import RADIUS_SHARE, MovingGain
 
-Real = NDArray[np.float64]
 GuardKind = Literal["time-varying", "frozen", "none"]
 GUARD_KINDS = ("time-varying", "frozen", "none")
 

@@ -14,12 +14,11 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, solve_discrete_are, solve_triangular
 
+from tfarm.arrays import Real
 from tfarm.records import record
 
-Real = NDArray[np.float64]
 IntegerMatrix = list[list[int]]
 
 SLACKS = (1e-3, 1e-5, 1e-7, 1e-9)  # how strictly the inequality is asked for, in balanced states

@@ -11,14 +11,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm.checks import whole
+from tfarm.arrays import Real
 from tfarm.errors import ParameterError
 from tfarm.records import record
 from tfarm.tuner import kernel
-
-Real = NDArray[np.float64]
 
 MOST_HIDDEN = 1000  # neurons; the paper has 6
 HALF_WIDTH = 0.5  # of the uniform distribution of the initial weights

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import Arm
+from tfarm.arrays import Real
 from tfarm.dsp import Chain, Simulation
 from tfarm.dsp.curves import resolved
 from tfarm.dsp.results import ideal_chain
@@ -23,8 +23,6 @@ from tfarm.tuner.guard import GuardKind
 from tfarm.tuner.studies import PAPER_PAIR, Finished, final_cost, learning_costs, map_verdict, plans_of, run_study
 from tfarm.tuner.training import Rule
 from tfarm.tuner.tuning import usual_plan
-
-Real = NDArray[np.float64]
 
 CURVE_SEEDS = 20  # of the learning curves
 MAP_SEEDS = 5  # of each point of the map of the rates

@@ -20,11 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import FED_BACK, MOMENT_GAIN
+from tfarm.arrays import Real
 from tfarm.dsp import SampledLoop
 from tfarm.records import record
 from tfarm.tuner.lyapunov import CommonLyapunov, common_lyapunov
-
-Real = NDArray[np.float64]
 
 RADIUS_SHARE = 0.99  # of the radius that the criterion allows: room for the modes left out, and for a strict proof
 POLE_WIDTHS = np.r_[-np.geomspace(100.0, 0.01, 30), 0.0, np.geomspace(0.01, 100.0, 30)]  # around a pole's angle

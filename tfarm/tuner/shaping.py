@@ -18,13 +18,12 @@ from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import MOMENT_GAIN
+from tfarm.arrays import Real
 from tfarm.dsp import SampledLoop, Scenario
 from tfarm.tuner.trial import Trial
 
-Real = NDArray[np.float64]
 Shaper = Literal["ZV", "EI"]
 
 SHAPED_MODES = 2  # which a slew excites most

@@ -20,10 +20,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import Arm
 from tfarm.arm.writing import to_toml
+from tfarm.arrays import Real
 from tfarm.columns import JSON, TERMINAL, Column, Table
 from tfarm.digits import general, singly
 from tfarm.dsp import Chain
@@ -38,7 +38,6 @@ from tfarm.tuner.trial import Trial, residual_rms
 from tfarm.tuner.tuning import Plan, Tuning, trial_of
 
 TellDone = Callable[[int, int], None]
-Real = NDArray[np.float64]
 
 ALPHAS = (0.0, 0.2, 0.4, 0.6, 0.8, 0.9)  # momentum factors of the map, about the paper's
 ETAS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)  # learning rates, likewise

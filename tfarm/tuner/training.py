@@ -18,9 +18,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm.checks import not_negative, positive, whole
+from tfarm.arrays import Real
 from tfarm.errors import ParameterError, did_you_mean
 from tfarm.records import record
 from tfarm.tuner import rules
@@ -29,7 +29,6 @@ from tfarm.tuner.kernel import BOUND
 from tfarm.tuner.network import Network
 from tfarm.tuner.trial import Record, Trial
 
-Real = NDArray[np.float64]
 Mode = Literal["trial", "online"]
 Rule = Literal["dynamic", "clipped", "plain"]
 Sensitivity = Literal["one-step", "whole"]

@@ -20,10 +20,10 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.arm.checks import not_negative, number, positive
+from tfarm.arrays import Real
 from tfarm.dsp import Chain, SampledLoop, Scenario, Simulator, sampled_loop, scenario
 from tfarm.dsp.chain import Reading
 from tfarm.dsp.results import rms_after
@@ -34,9 +34,6 @@ from tfarm.records import record
 from tfarm.spectrum.scales import default_gains
 from tfarm.tuner import kernel
 from tfarm.tuner.network import Network
-
-Real = NDArray[np.float64]
-
 
 SILENT = Network(np.zeros((1, 6)), np.zeros(1), np.ones(6))  # for a guard that leaves no choice
 TRIAL_MODES = 6  # flexible modes of a trial, unless told
