@@ -13,14 +13,18 @@ from collections.abc import Iterator
 import flint
 import mpmath
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 from tests.shared import once
 
-# Few examples, the same ones each time; `python -m tests.properties SIZE SEED` has others.
-settings.register_profile("reproducible", deadline=None, derandomize=True, database=None, max_examples=25)
+SLOW = [HealthCheck.too_slow]
+# Few examples, the same ones each time; `python -m tests.properties SIZE SEED` has others.  How long drawing them takes
+# says something about a busy machine, and nothing about tfarm.
+settings.register_profile(
+    "reproducible", deadline=None, derandomize=True, database=None, max_examples=25, suppress_health_check=SLOW
+)
 EXAMPLES = int(os.environ.get("EXAMPLES", "1000"))
-settings.register_profile("search", deadline=None, database=None, max_examples=EXAMPLES)
+settings.register_profile("search", deadline=None, database=None, max_examples=EXAMPLES, suppress_health_check=SLOW)
 settings.load_profile("reproducible")
 
 
