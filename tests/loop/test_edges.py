@@ -26,6 +26,11 @@ def test_an_axis_is_matplotlibs_own(axis):
     assert axis.place(x) == pytest.approx((theirs.transform(x) - low) / (high - low), abs=8 * EPS)
 
 
+@pytest.mark.parametrize("axis", [Axis(-0.1, 500.0, 0.1), Axis(-50.0, 2.0, 2.0), Axis(-4.0, 2.0)])
+def test_a_grid_is_even_as_seen(axis):
+    assert axis.place(axis.grid(40)) == pytest.approx((np.arange(40) + 0.5) / 40, abs=16 * EPS)
+
+
 def test_a_grid_finds_its_own_axis():
     assert Axis.of(np.linspace(-1.0, 3.0, 41)) == Axis(-1.0, 3.0)
     assert Axis.of(np.geomspace(0.02, 3.0, 41)) == Axis(0.02, 3.0, 0.02)
