@@ -198,13 +198,13 @@ def main():
     print(f"{len(points) - len(fair)} of them flagged (the kernel asks for balls there)")
     print(f"worst error {max(p.error for p in fair):.3g}; {len(above)} above {BOUND:g}")
     special = [point.error for point in run_near_singularity(count // 4, seed) if not point.flagged]
-    print(f"next to -1/C, at real s: worst error {max(special):.3g} over {len(special)} values")
+    print(f"next to -1/C, at real s: worst error {max(special, default=0.0):.3g} over {len(special)} values")
     for name, place in PLACES.items():
         errors = [point.error for point in run_at(place, count // 4, seed) if not point.flagged]
-        print(f"{name}: worst error {max(errors):.3g} over {len(errors)} values")
+        print(f"{name}: worst error {max(errors, default=0.0):.3g} over {len(errors)} values")
         special += errors
     for name in OF_ONE_LINK:
-        print(f"  {name:18s}{max(p.error for p in fair if p.name == name):.3g}")
+        print(f"  {name:18s}{max((p.error for p in fair if p.name == name), default=0.0):.3g}")
     for point in above[:20]:
         arm, s, x = point.where
         arm = replace(arm, name="worst")

@@ -159,10 +159,9 @@ def summary(name, points):
     """One line of a place: the worst error that is not flagged, how many are above the bound, and flagged."""
     fair = [point.error for point in points if not point.flagged]
     above = sum(not error <= BOUND for error in fair)
-    share = 100 * (1 - len(fair) / len(points))
-    return (
-        f"{name}: worst error {max(fair):.3g} over {len(fair)} values, {above} above {BOUND:g}; {share:.2g} % flagged"
-    )
+    share = 100 * (1 - len(fair) / len(points)) if points else 0.0
+    worst = max(fair, default=0.0)
+    return f"{name}: worst error {worst:.3g} over {len(fair)} values, {above} above {BOUND:g}; {share:.2g} % flagged"
 
 
 def main():

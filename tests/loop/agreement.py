@@ -84,7 +84,7 @@ def survey(number, seed=2012, arms=ARMS):
     rng, cases = np.random.default_rng(seed), []
     for n in range(arms):
         arm = some_free_arm(rng, damped=n % 3 != 0)
-        size = int(np.ceil(np.sqrt(number / arms)))
+        size = max(2, int(np.ceil(np.sqrt(number / arms))))  # a map has two values of either gain at least
         K1, K2, Kp = some_gains(rng, arm, size)
         found, model = region(arm, K1, K2, Kp), RitzLoop(arm, TERMS)
         for j, i in np.ndindex(size, size):
