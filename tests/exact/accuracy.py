@@ -209,7 +209,7 @@ def main():
         arm, s, x = point.where
         arm = replace(arm, name="worst")
         print(f"{point.error:.3g} {point.name} s={s!r} x={x!r}\n    {arm}")
-    return bool(above) or not max(special) <= BOUND
+    return bool(above) or not max(special, default=0.0) <= BOUND
 
 
 if __name__ == "__main__":
