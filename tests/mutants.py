@@ -64,7 +64,7 @@ def function_of(path, line):
     return f"{path.parent.parent.name}/{path.parent.name}/{path.name}:{first}"
 
 
-def tested(copy, room, **named):
+def all_pass(copy, room, **named):
     """Whether the room's tests in the copy all pass; `named` are the variables of `tests.callers`."""
     command = [sys.executable, "-m", "pytest", "-q", "-x", "-n", "0", "-p", "no:cacheprovider", "-p", "tests.callers"]
     command.append(f"tests/{room}")
@@ -89,14 +89,14 @@ def survey(size, seed, rooms):
         copy, calls = Path(folder) / "copy", str(Path(folder) / "calls.json")
         shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(".git", ".venv", "reports", ".mypy_cache"))
         for room in rooms:
-            if not tested(copy, room, CALLS_TO=calls):
+            if not all_pass(copy, room, CALLS_TO=calls):
                 raise SystemExit(f"tests/{room} fail before anything is changed")
             chosen, killed = drawn(copy / "tfarm" / room, size, rng), 0
             for path, number in chosen:
                 whole, (text, line, said) = path.read_text(), mutant(path, number)
                 called = function_of(path, line)
                 path.write_text(text)
-                alive = tested(copy, room, CALLS_FROM=calls, CALLED=called)
+                alive = all_pass(copy, room, CALLS_FROM=calls, CALLED=called)
                 path.write_text(whole)
                 killed += not alive
                 if alive:

@@ -22,11 +22,11 @@ DAMPING_CLAIM = Claim(  # C, which (1)-(14) lack
 
 def determinant_tex(text: str) -> str:
     """|a11 a12 / ...| as a determinant."""
-    rows = r"\begin{vmatrix}{}\end{vmatrix}".replace("{}", "{0}", 1)
 
     def between_bars(match: re.Match[str]) -> str:
         lines = match[1].split(" / ")
-        return rows.replace("{0}", r" \\ ".join(" & ".join(map(tex, line.split())) for line in lines))
+        rows = r" \\ ".join(" & ".join(map(tex, line.split())) for line in lines)
+        return rf"\begin{{vmatrix}}{rows}\end{{vmatrix}}"
 
     names = [clause.split(" = ", 1) for clause in text.split("; ")]
     return r",\quad ".join(f"{tex(name)} = {re.sub(r'[|](.*)[|]', between_bars, right)}" for name, right in names)

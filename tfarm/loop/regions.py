@@ -93,10 +93,8 @@ class Region:
         """Where no pole is unstable, the free hub angle has not two poles at 0 (K1 = Kp = 0), and something damps."""
         drifts = (self.K1 == 0) & self.arm.has_rigid_mode & (self.Kp == 0)
         swings = (self.K1 == 0) & self.arm.is_reactive
-        whole = (
-            np.equal(self.K2, self.arm.input_per_torque) & self.arm.is_told_by_lyapunov
-        )  # no moment is left at the hub
-        return np.asarray((self.unstable == 0) & ~(drifts | swings) & ~whole[:, None])
+        no_moment_is_left = np.equal(self.K2, self.arm.input_per_torque) & self.arm.is_told_by_lyapunov
+        return np.asarray((self.unstable == 0) & ~(drifts | swings) & ~no_moment_is_left[:, None])
 
 
 def region(arm: Arm, K1: Real, K2: Real, Kp: float = 0.0) -> Region:
