@@ -125,9 +125,9 @@ def fast(rng):
 def overdamped(rng):
     """Real s < 0 of a damped rig, up to nearly -1/C of one of its segments."""
     arm = some_rig(rng, damped=True)
-    if arm.singular_points and rng.random() < 0.5:
+    if (singular := chain_of(arm).singular) and rng.random() < 0.5:
         away = 10 ** rng.uniform(-4, -0.3) * rng.choice([-1, 1])
-        return arm, complex(rng.choice(arm.singular_points) * (1 + away))
+        return arm, complex(rng.choice(singular) * (1 + away))
     return arm, complex(-abs(some_point(rng, arm)))
 
 

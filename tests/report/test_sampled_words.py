@@ -48,7 +48,7 @@ def data_of(name, period=0.01):
         sentence="stable: the hub decays most slowly, by 0.1 a sample",
     )  # fmt: skip
     analysis = SimpleNamespace(
-        verdict=verdict, K1_windows=stable_windows(loop, "K1"), K2_windows=stable_windows(loop, "K2"),
+        verdict=verdict, K2_windows=stable_windows(loop, "K2"),
         shown={"K2": SimpleNamespace(is_settled=False)},
         delay_margin=SimpleNamespace(samples=1.25, is_bound=False), required_damping=0.0,
         damping=SimpleNamespace(is_settled=False, modes=MODES),

@@ -137,11 +137,6 @@ class Arm(Turning):
         return max(link.damping for link in self.links)
 
     @property
-    def singular_points(self) -> tuple[float, ...]:
-        """-1/C [1/s] of each damped segment, ascending, each once: there its bending stiffness vanishes."""
-        return tuple(sorted({-1.0 / link.damping for link in self.links if link.damping > 0.0}))
-
-    @property
     def is_undamped(self) -> bool:
         """Whether nothing dissipates: then every frequency is real, and theorems hold that do not otherwise."""
         springs, motor = (self.clamp.damping, self.joint.damping), self.motor

@@ -1,7 +1,7 @@
 """The sampled loop of the exact arm: hold, delay, converters, verdicts and simulations at 10 ms or any other period."""
 
 from tfarm.dsp.chain import Actuator, Chain, Converters, Sampling, Slew
-from tfarm.dsp.loop import SampledLoop, closed_loop, sampled_loop
+from tfarm.dsp.loop import SampledLoop, sampled_loop
 from tfarm.dsp.margins import delay_margin, required_damping, stable_windows
 from tfarm.dsp.reading import load_chain
 from tfarm.dsp.regions import GainMap, gain_map
@@ -26,7 +26,6 @@ __all__ = [
     "Slew",
     "Verdict",
     "analyse",
-    "closed_loop",
     "delay_margin",
     "gain_map",
     "load_chain",

@@ -127,16 +127,11 @@ def mode_table(loop: SampledLoop) -> ModeTable:
     )
 
 
-def sampled_root_locus(loop: SampledLoop, name: str, values: Real) -> Complex:
-    """Closed-loop poles (values, poles) as one gain takes these values, each column one continuous branch.
-
-    The other gains are those of the loop.  Values are taken as they are: give them close enough to tell branches apart.
-    """
-    return followed_branches([loop.having(**{name: float(value)}).poles.z for value in values], values)
-
-
 def followed_branches(poles: Sequence[Complex], values: Real) -> Complex:
-    """The poles at each of the values, in any order, as branches (values, poles)."""
+    """The poles at each of the values, in any order, as branches (values, poles): each column is continuous.
+
+    Values are taken as they are: give them close enough to tell branches apart.
+    """
     rows: list[Complex] = []
     for number, z in enumerate(poles):
         rows.append(z if not rows else z[_matched(_ahead(rows, values[max(0, number - 2) : number + 1]), z)])

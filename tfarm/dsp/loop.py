@@ -20,7 +20,7 @@ import numpy as np
 
 from tfarm.arm import FED_BACK, Arm, HubFeedback
 from tfarm.arrays import Complex, Real, Whole
-from tfarm.dsp.chain import Chain, Sampling
+from tfarm.dsp.chain import Chain
 from tfarm.dsp.plant import Branching, Plant, loop_plant, shorter_plant
 from tfarm.dsp.sampling import PulseTransfer
 from tfarm.errors import ConvergenceError, ParameterError
@@ -280,11 +280,3 @@ def check_loop(arm: Arm, gains: HubFeedback) -> None:
         )
         raise ParameterError(key="K2", value=gains.K2, remedy=remedy)
     check_gains(arm, gains)
-
-
-def closed_loop(
-    arm: Arm, K1: float, K2: float, Kp: float = 0.0, sampling: Sampling | None = None, *, count: int = 20
-) -> Real:
-    """The discrete closed-loop matrix of u = -Kp theta - K1 theta_t - K2 M with the hub angle: `SampledLoop.matrix`."""
-    chain = Chain(sampling=Sampling() if sampling is None else sampling)
-    return sampled_loop(arm, HubFeedback(K1=K1, K2=K2, Kp=Kp), chain, count=count).matrix()
