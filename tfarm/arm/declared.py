@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache
 from inspect import Parameter, signature
 from typing import Any, ClassVar, TypeVar, get_type_hints
 
-from pydantic import BaseModel, ConfigDict, create_model
+from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 
+from tfarm.errors import ParameterError, did_you_mean
+
+_Strict = TypeVar("_Strict", bound="StrictTable")
 _Table = TypeVar("_Table", bound="TomlTable")
 
 
-class TomlTable(BaseModel):
-    """A TOML table: no unknown keys, no conversions."""
+class StrictTable(BaseModel):
+    """What a file says: no unknown keys, no conversions."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class TomlTable(StrictTable):
+    """A TOML table of a record's numbers."""
+
     makes: ClassVar[Callable[..., Any]]
 
     def given(self) -> dict[str, Any]:
@@ -32,6 +40,23 @@ class TomlTable(BaseModel):
 def _parameters(makes: Callable[..., Any]) -> frozenset[str]:
     """The names of a constructor's parameters."""
     return frozenset(signature(makes).parameters)
+
+
+def validated(model: type[_Strict], table: Mapping[str, Any], place: str) -> _Strict:
+    """The table headed [place] of a file.
+
+    Raises ParameterError for one wrong key: a misspelt one comes before those that are then missing.
+    """
+    try:
+        return model.model_validate(table)
+    except ValidationError as error:
+        problem = min(error.errors(include_url=False), key=lambda problem: problem["type"] != "extra_forbidden")
+    word = str(problem["loc"][0])
+    if problem["type"] == "extra_forbidden":
+        remedy = f"unknown key; {did_you_mean(word, model.model_fields)}"
+    else:
+        remedy = f"wrong value; {problem['msg'][:1].lower()}{problem['msg'][1:]}"
+    raise ParameterError(key=f"{place}.{word}", value=problem["input"], remedy=remedy)
 
 
 def of(makes: Callable[..., Any]) -> Callable[[type[_Table]], type[_Table]]:

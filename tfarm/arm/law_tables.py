@@ -16,12 +16,12 @@ or `matrices = "file.mat"` with A, B, C, D and `signals = [...]`, a name for eac
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import Field
 
+from tfarm.arm.declared import StrictTable, validated
 from tfarm.arm.law import Law
 from tfarm.arm.reading import load_tables
 from tfarm.errors import MISSING, ParameterError, did_you_mean
@@ -31,11 +31,7 @@ LAW_TABLE = "law"  # the table's name
 MOST_MAT_BYTES = 16 * 1024 * 1024  # of a .mat file
 
 
-class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
-
-
-class LawTable(_Table):
+class LawTable(StrictTable):
     """[law], without the tables of its signals."""
 
     name: str = "law"
@@ -43,7 +39,7 @@ class LawTable(_Table):
     delay: float = 0.0
     period: float | None = None
     sign: int = -1
-    references: list[str] = []
+    references: list[str] = Field(default_factory=list)
     rule: str = "tustin"
     prewarp: float = 0.0
     matrices: str | None = None
@@ -52,7 +48,7 @@ class LawTable(_Table):
     scales: list[float] | None = None
 
 
-class SignalTable(_Table):
+class SignalTable(StrictTable):
     """[law.SIGNAL]: a gain, num and den, or zeros, poles and a gain."""
 
     gain: float | None = None
@@ -94,7 +90,7 @@ def law_of_table(table: Any, folder: Path) -> Law:
     if not isinstance(table, dict):
         raise ParameterError(key=LAW_TABLE, value=table, remedy="give a table, headed [law]")
     signals = {key: value for key, value in table.items() if isinstance(value, dict)}
-    head = _validated(LawTable, {key: value for key, value in table.items() if key not in signals}, LAW_TABLE)
+    head = validated(LawTable, {key: value for key, value in table.items() if key not in signals}, LAW_TABLE)
     common = {key: getattr(head, key) for key in ("name", "input", "delay", "period", "sign", "rule", "prewarp")}
     common["references"] = tuple(head.references)
     try:
@@ -109,7 +105,7 @@ def law_of_table(table: Any, folder: Path) -> Law:
             )
         entries = {}
         for name, values in signals.items():
-            given = _validated(SignalTable, values, f"{LAW_TABLE}.{name}")
+            given = validated(SignalTable, values, f"{LAW_TABLE}.{name}")
             entries[name if given.x is None else f"{name}@{given.x!r}"] = given.build(f"{LAW_TABLE}.{name}")
         return Law(entries, **common)
     except ParameterError as error:
@@ -145,16 +141,3 @@ def _of_file(head: LawTable, folder: Path, common: dict[str, Any]) -> Law:
             raise ParameterError(key="scales", value=head.scales, remedy="one number for each signal")
         B, D = B * head.scales, D * head.scales
     return Law.of_matrices(A, B, C, D, head.signals, **common)
-
-
-def _validated(model: type[Any], table: Mapping[str, Any], place: str) -> Any:
-    try:
-        return model.model_validate(table)
-    except ValidationError as error:
-        problem = min(error.errors(include_url=False), key=lambda problem: problem["type"] != "extra_forbidden")
-    key, word = ".".join(map(str, (place, *problem["loc"][:1]))), str(problem["loc"][0])
-    if problem["type"] == "extra_forbidden":
-        remedy = f"unknown key; {did_you_mean(word, model.model_fields)}"
-    else:
-        remedy = f"wrong value; {problem['msg'][:1].lower()}{problem['msg'][1:]}"
-    raise ParameterError(key=key, value=problem["input"], remedy=remedy)

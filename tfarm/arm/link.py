@@ -39,7 +39,9 @@ class Link:
         for name, meaning in MEANINGS.items():
             check = not_negative if name == "damping" else positive
             object.__setattr__(self, name, check(f"link.{name}", getattr(self, name), meaning))
-        self._check_slenderness()
+        if self.slenderness > SLENDEREST:
+            remedy = f"{self.slenderness:.3g} times the section's radius of gyration is no beam; check the units"
+            raise ParameterError(key="link.length", value=self.length, remedy=remedy)
         self._check_cowper()
 
     @classmethod
@@ -67,11 +69,6 @@ class Link:
             section=section,
             damping=damping,
         )
-
-    def _check_slenderness(self) -> None:
-        if self.slenderness > SLENDEREST:
-            remedy = f"{self.slenderness:.3g} times the section's radius of gyration is no beam; check the units"
-            raise ParameterError(key="link.length", value=self.length, remedy=remedy)
 
     def _check_cowper(self) -> None:
         """Cowper's factor holds for isotropic materials; the margins allow for a rounded G."""

@@ -224,7 +224,9 @@ class Arm(Turning):
                 remedy = f"which of the {len(arm.links)} segments is meant? write their [[link]] tables anew"
                 raise ParameterError(key=name, value=value, remedy=remedy)
             if name == "hub_inertia" and value == math.inf:
-                arm = arm._with_an_idle_hub()
+                idle = replace(arm.hub, friction=0.0, stiffness=0.0)
+                driven: Input = "hub_angle" if arm.input == "hub_angle" else "hub_torque"
+                arm = replace(arm, hub=idle, motor=None, input=driven)
             arm = replace(arm, **{room: replace(getattr(arm, room), **{number: value})})
         return arm
 
@@ -248,10 +250,6 @@ class Arm(Turning):
         """The same without what `rate_loss` counts: friction of hub and rotor, and back-EMF."""
         motor = self.motor and replace(self.motor, rotor_friction=0.0, back_emf_constant=0.0)
         return replace(self, hub=replace(self.hub, friction=0.0), motor=motor)
-
-    def _with_an_idle_hub(self) -> Arm:
-        hub = replace(self.hub, friction=0.0, stiffness=0.0)
-        return replace(self, hub=hub, motor=None, input="hub_angle" if self.input == "hub_angle" else "hub_torque")
 
 
 ADJUSTABLE = {  # numbers of an arm by name: the part and the field that hold them

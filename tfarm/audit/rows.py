@@ -75,7 +75,7 @@ class Claim:
         numbers = "" if self.measured is None else self.measured()
         return AuditRow(
             equation=self.equation,
-            verdict=self._verdict(residual_printed),
+            verdict="undecided" if self.doubt else "ok" if is_zero(residual_printed) else "corrected",
             printed=self.printed,
             corrected=corrected,
             evidence=" ".join(part for part in (self.evidence, self.doubt, numbers) if part),
@@ -84,11 +84,6 @@ class Claim:
             printed_tex=self.typeset(self.printed),
             corrected_tex=self.typeset(corrected),
         )
-
-    def _verdict(self, residual_printed: str) -> str:
-        if self.doubt:
-            return "undecided"
-        return "ok" if is_zero(residual_printed) else "corrected"
 
 
 def is_zero(residual: str) -> bool:

@@ -100,11 +100,6 @@ class Converters:
         """Whether a signal is rounded to steps anywhere."""
         return any(n is not None for n in (self.encoder_counts, self.moment_bits, self.torque_bits))
 
-    @property
-    def has_ranges(self) -> bool:
-        """Whether a signal can be clipped."""
-        return self.moment_range is not None or self.torque_range is not None
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Actuator:
@@ -174,7 +169,8 @@ class Chain:
     def is_linear(self) -> bool:
         """Whether nothing is rounded to steps and nothing can be clipped."""
         c = self.converters
-        return not c.is_quantised and not c.has_ranges and math.isinf(self.actuator.torque_limit)
+        clips = c.moment_range is not None or c.torque_range is not None or self.actuator.torque_limit < math.inf
+        return not c.is_quantised and not clips
 
 
 def _above_zero(key: str, record: object, meaning: str) -> float:

@@ -116,9 +116,7 @@ def undelayed_plant(
     return with_modes(model, chain, outputs, count)
 
 
-@lru_cache(maxsize=32)  # the simulations of one page ask for the same model some twenty times
-def _modelled(arm: Arm, names: tuple[str, ...], count: int, x: float | None) -> ModalModel:
-    return modal_model(arm, names, count, x)
+_modelled = lru_cache(maxsize=32)(modal_model)  # the simulations of one page ask for the same some twenty times
 
 
 def with_modes(model: ModalModel, chain: Chain, outputs: Sequence[str], count: int) -> Plant:

@@ -6,10 +6,8 @@ import os
 from collections.abc import Mapping
 from typing import Any
 
-from pydantic import ValidationError
-
 from tfarm.arm import declared
-from tfarm.arm.declared import TomlTable
+from tfarm.arm.declared import TomlTable, validated
 from tfarm.arm.reading import load_tables
 from tfarm.arm.tables import ArmTable
 from tfarm.dsp.chain import Actuator, Chain, Converters, Sampling, Slew
@@ -70,13 +68,4 @@ def chain_of_tables(tables: Mapping[str, Any]) -> Chain:
 def _record(name: str, table: object) -> Any:
     if not isinstance(table, dict):
         raise ParameterError(key=name, value=table, remedy=f"give a table, headed [{name}]")
-    try:
-        return CHAIN_TABLES[name].model_validate(table).build()
-    except ValidationError as error:
-        problem = min(error.errors(include_url=False), key=lambda problem: problem["type"] != "extra_forbidden")
-    key = ".".join(map(str, (name, *problem["loc"])))
-    if problem["type"] == "extra_forbidden":
-        remedy = f"unknown key; {did_you_mean(str(problem['loc'][-1]), CHAIN_TABLES[name].model_fields)}"
-    else:
-        remedy = f"wrong value; {problem['msg'][:1].lower()}{problem['msg'][1:]}"
-    raise ParameterError(key=key, value=problem["input"], remedy=remedy)
+    return validated(CHAIN_TABLES[name], table, name).build()

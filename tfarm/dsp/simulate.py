@@ -262,7 +262,8 @@ class Simulator:
     def _result(self, state: _State, done: int, gain: Real | None) -> Simulation:
         stopped = None
         if done < state.torque.size:
-            stopped = Stop(done * self.scenario.period, self._growing(state.amplitude))
+            of_root = np.nan_to_num(abs(self.plant.residues[2, self._kept] * state.amplitude), nan=np.inf)
+            stopped = Stop(done * self.scenario.period, int(self.plant.mode[self._kept][int(np.argmax(of_root))]))
         T, m = self.scenario.period, self.between
         between = None
         if m:
@@ -280,11 +281,6 @@ class Simulator:
             energy_error=None if stopped else self._energy_error(state),
             stopped=stopped,
         )
-
-    def _growing(self, amplitude: Complex) -> int:
-        """The mode that bends the root most."""
-        size = abs(self.plant.residues[2, self._kept] * amplitude)
-        return int(self.plant.mode[self._kept][int(np.argmax(np.nan_to_num(size, nan=np.inf)))])
 
 
 @dataclass(frozen=True)

@@ -181,14 +181,21 @@ class Problem:
         """(size,): real and imaginary parts of computed less measured over their deviations, then the priors."""
         away = [_parts((H - one.data.values) / one.noise.sigma, one) for H, one in self._pairs(self.computed(point))]
         rings = self.of_rings(point, Around(self.arm(point), ()))[0] if self.rings else np.empty(0)
-        return np.concatenate([*away, rings, self._priors(point)])
+        coordinates = zip(self.parameters, point.tolist(), strict=True)
+        priors = [(each.value(x) - each.prior[0]) / each.prior[1] for each, x in coordinates if each.prior is not None]
+        return np.concatenate([*away, rings, priors])
 
     def jacobian(self, point: Real) -> Real:
         """(size, parameters): the derivatives of the residuals."""
         here = self.around(point)
         rows = [_parts(dH / one.noise.sigma, one) for (_, dH), one in self._pairs(self.slopes(point, here))]
         rings = self.of_rings(point, here)[1]
-        return np.concatenate([*(row.T for row in rows), rings, self._priors_slopes(point)])
+        priors = [
+            row * each.slope(x) / each.prior[1]
+            for row, each, x in zip(np.eye(point.size), self.parameters, point.tolist(), strict=True)
+            if each.prior is not None
+        ]
+        return np.concatenate([*(row.T for row in rows), rings, np.reshape(priors, (-1, point.size))])
 
     def of_rings(self, point: Real, here: Around) -> tuple[Real, Real]:
         """Residuals (n,) of the decays, and their derivatives (n, parameters)."""
@@ -196,18 +203,6 @@ class Problem:
 
     def _pairs(self, each: Sequence[Any]) -> Any:
         return zip(each, self.responses, strict=True)
-
-    def _priors(self, point: Real) -> Real:
-        values = [(each, each.value(float(x))) for each, x in zip(self.parameters, point, strict=True)]
-        return np.array([(value - each.prior[0]) / each.prior[1] for each, value in values if each.prior is not None])
-
-    def _priors_slopes(self, point: Real) -> Real:
-        rows = [
-            np.eye(len(self.parameters))[n] * each.slope(float(point[n])) / each.prior[1]
-            for n, each in enumerate(self.parameters)
-            if each.prior is not None
-        ]
-        return np.array(rows).reshape(-1, len(self.parameters))
 
 
 def walled(residuals: Callable[[Real], Real]) -> Callable[[Real], Real]:

@@ -16,9 +16,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import ValidationError
 
 from tfarm.arm import Arm
+from tfarm.arm.declared import StrictTable
 from tfarm.arm.driving import AnyLaw, tracked
 from tfarm.arm.reading import load_tables
 from tfarm.arrays import Real
@@ -36,10 +37,8 @@ ANGLE_COLUMN = "hub_angle"
 MOMENT_COLUMN = "root_moment"
 
 
-class RunTable(BaseModel):
+class RunTable(StrictTable):
     """[measured]."""
-
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
     file: str
     source: str = ""

@@ -40,8 +40,7 @@ def law_poles(arm: Arm, law: Law, count: int | None = None) -> Poles[LawLoop]:
     while True:
         poles = law_poles_below(loop, band_of(loop.arm, number))
         if poles.values.size >= wanted:
-            real = int((poles.values.imag == 0).sum())
-            return first_poles(poles, wanted if count is not None else max(wanted, real))
+            return first_poles(poles, count)
         if 2 * number > MOST_LAW_BOX_MODES:
             if count is None:
                 return poles

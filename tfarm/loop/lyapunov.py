@@ -64,7 +64,7 @@ def lyapunov(arm: Arm, law: HubFeedback) -> Lyapunov:
 def _with_whole_moment(loop: Loop) -> Lyapunov:
     """V_t = -a2 K1 theta_t^2 - a1 C integral(E I phi_xt^2) with a1/a2 = 1 - K2."""
     law, C = loop.law, 0.0 if loop.arm.is_undamped else 1.0
-    weight, K1 = 1.0 - law.K2 / loop.arm.input_per_torque, law.K1 + loop.arm.rate_loss
+    weight, K1 = 1.0 - loop.moment_share, law.K1 + loop.arm.rate_loss
     if loop.arm.input_lags:
         return _unproven(loop, "the voltage reaches the hub through an inductance, late: V_t has a term of no sign")
     if weight == 0:

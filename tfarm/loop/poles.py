@@ -134,8 +134,7 @@ def poles_of_gains(arm: Arm, law: HubFeedback, count: int | None = None) -> Pole
         else:
             poles = poles_below(loop, height)
         if poles.values.size >= wanted:
-            real = int((poles.values.imag == 0).sum())
-            return first_poles(poles, wanted if count is not None else max(wanted, real))
+            return first_poles(poles, count)
         if number > MOST_BOX_MODES:
             text = f"only {poles.values.size} poles right of -1/C lie below {height:.4g} rad/s, not {count}"
             raise ConvergenceError(text, poles.values, count)
@@ -219,12 +218,16 @@ def near_modes(omega: Real, C: float) -> Complex:
     return (-decay - shift * omega + 1j * omega * np.sqrt(np.maximum(1 - (C * omega / 2) ** 2, 0.0))).ravel()
 
 
-def first_poles(poles: Poles[AnyLoop], count: int) -> Poles[AnyLoop]:
-    """The first so many poles, and a lower box that holds just these."""
-    values = poles.values
+def first_poles(poles: Poles[AnyLoop], count: int | None) -> Poles[AnyLoop]:
+    """The first so many poles, the usual ones and all real ones if no number is given, and a lower box of just these.
+
+    Raises ParameterError where a number that is given parts real poles.
+    """
+    values, real = poles.values, int((poles.values.imag == 0).sum())
+    count = max(USUAL_POLES, real) if count is None else count
     kept = values[:count]
     if count < values.size and values[count].imag == kept[-1].imag == 0:
-        raise ParameterError(key="count", value=count, remedy=f"more: {int((values.imag == 0).sum())} poles are real")
+        raise ParameterError(key="count", value=count, remedy=f"more: {real} poles are real")
     top = poles.box.im_max if count == values.size else float((kept[-1].imag + values[count].imag) / 2)
     left, right, _, _ = poles.box
     return Poles(poles.loop, kept, Box(left, right, -top, top))

@@ -172,14 +172,10 @@ class _Bench:
         if self.by_modes or not found:
             note = "" if self.by_modes else f"modal taken: AAA wants more than the {self.inside} modes in the band"
             found.append(self._measured(modal_model(self.arm, self.rows, pairs, self.x), "modal", note))
-            found += self._with_slow_poles(pairs - SLOW_PAIRS)
+            less = pairs - SLOW_PAIRS  # modes: slow poles stand for those left out where these are overdamped
+            if less >= 1 and self.arm.damping * modes(self.arm, less).natural_frequency[-1] >= SLOW_POLES_FROM:
+                found.append(self._measured(slow_model(self.arm, self.rows, less, self.x), "modal", ""))
         return min(found, key=lambda each: each.worst_error)
-
-    def _with_slow_poles(self, count: int) -> list[ReducedModel]:
-        """The model of so many modes and slow poles, where those that it leaves out are overdamped."""
-        if count < 1 or self.arm.damping * modes(self.arm, count).natural_frequency[-1] < SLOW_POLES_FROM:
-            return []
-        return [self._measured(slow_model(self.arm, self.rows, count, self.x), "modal", "")]
 
     def within(self, error: float) -> ReducedModel:
         """The smallest model whose measured error is within that one."""

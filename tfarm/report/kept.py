@@ -20,29 +20,27 @@ def keep(folder: Path, kind: str, content: Mapping[str, Any]) -> None:
     (folder / f"{kind}.json").write_text(text, encoding="utf-8", newline="")
 
 
-def kept_comparison(out: Path) -> tuple[str, tuple[str, ...]]:
-    """The title of compare.html beside the reports, and the arms that it compares; ("", ()) where there is none."""
-    file = out / f"{COMPARISON_KIND}.json"
+def kept_in(folder: Path, kind: str, made_of: Callable[[dict[str, Any]], T | None]) -> T | None:
+    """What `made_of` makes of a folder's kind.json; None where there is none, or none of ours."""
+    file = folder / f"{kind}.json"
     try:
         read = json.loads(file.read_text(encoding="utf-8")) if file.stat().st_size <= LARGEST_READ else {}
-        if read[f"tfarm_{COMPARISON_KIND}"] == 1 and (out / COMPARISON_PAGE).is_file():
-            return str(read["title"]), tuple(str(name) for name in read["arms"])
+        return made_of(read) if read.pop(f"tfarm_{kind}") == 1 else None
     except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
-        pass
-    return "", ()
+        return None
+
+
+def kept_comparison(out: Path) -> tuple[str, tuple[str, ...]]:
+    """The title of compare.html beside the reports, and the arms that it compares; ("", ()) where there is none."""
+    found = kept_in(out, COMPARISON_KIND, lambda read: (str(read["title"]), tuple(map(str, read["arms"]))))
+    return found if found is not None and (out / COMPARISON_PAGE).is_file() else ("", ())
 
 
 def kept(out: Path, kind: str, made_of: Callable[[dict[str, Any], Path], T | None]) -> list[T]:
     """What `made_of` makes of each folder's kind.json, by name; what is none of ours is passed over."""
-    found = []
-    for folder in sorted((f for f in out.iterdir() if f.is_dir() and not f.name.startswith(".")), key=lambda f: f.name):
-        file = folder / f"{kind}.json"
-        try:
-            if file.stat().st_size > LARGEST_READ:
-                continue
-            read = json.loads(file.read_text(encoding="utf-8"))
-            if read.pop(f"tfarm_{kind}") == 1 and read["name"] == folder.name:
-                found.append(made_of(read, folder))
-        except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
-            continue
-    return [each for each in found if each is not None]
+
+    def made(folder: Path) -> T | None:
+        return kept_in(folder, kind, lambda read: made_of(read, folder) if read["name"] == folder.name else None)
+
+    folders = sorted((f for f in out.iterdir() if f.is_dir() and not f.name.startswith(".")), key=lambda f: f.name)
+    return [each for each in map(made, folders) if each is not None]

@@ -6,7 +6,6 @@ arm (`trust_proofs.Proof`) is in its folder.  This module turns both into sectio
 
 from __future__ import annotations
 
-import json
 import platform
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -20,7 +19,7 @@ from tfarm.arm import load, presets
 from tfarm.audit import published
 from tfarm.columns import Column, Table
 from tfarm.digits import scientific, significant, singly, worded
-from tfarm.report.kept import LARGEST_READ, keep
+from tfarm.report.kept import keep, kept_in
 from tfarm.report.page import command_for_all, render
 from tfarm.report.sections import DATA, Fact, PageSection, save_section
 from tfarm.report.trust_audit import VERDICT_MARKS, audit_table, shown_row, verdict_counts
@@ -71,15 +70,14 @@ def gather() -> Evidence:
 
 def kept_evidence(folder: Path) -> Evidence | None:
     """What is in evidence.json; None where it is of another tfarm or other versions, or none of ours."""
-    try:
-        file = folder / f"{EVIDENCE_KIND}.json"
-        read = json.loads(file.read_text(encoding="utf-8")) if file.stat().st_size <= LARGEST_READ else {}
+
+    def evidence(read: dict[str, Any]) -> Evidence | None:
         if read["makers"] != makers():
             return None
         rows = tuple(audit.AuditRow(**row) for row in read["audit"])
         return Evidence(audit=rows, published=tuple(published.PublishedRow(**row) for row in read["published"]))
-    except (OSError, ValueError, TypeError, KeyError, RecursionError):
-        return None
+
+    return kept_in(folder, EVIDENCE_KIND, evidence)
 
 
 def write_trust(evidence: Evidence, proofs: Sequence[ArmProof], folder: Path) -> None:

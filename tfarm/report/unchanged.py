@@ -8,7 +8,6 @@ were and each of its files is as it was written.
 from __future__ import annotations
 
 import hashlib
-import json
 import pickle
 import platform
 from collections.abc import Iterable, Sequence
@@ -20,7 +19,7 @@ from typing import Any
 import tfarm
 from tfarm.dsp.writing import file_text
 from tfarm.report.given_laws import Subject
-from tfarm.report.kept import LARGEST_READ, keep
+from tfarm.report.kept import keep, kept_in
 
 NOTES_KIND = "made"
 PACKAGES = (
@@ -76,13 +75,11 @@ def note_made(made: Path, folder: Path, pages: Iterable[str], key: str) -> None:
 
 def _notes(folder: Path) -> dict[str, Any]:
     """What is noted of each page; of none where made.json is not there, or none of ours."""
-    file = folder / f"{NOTES_KIND}.json"
-    try:
-        read = json.loads(file.read_text(encoding="utf-8")) if file.stat().st_size <= LARGEST_READ else {}
-        notes = read["pages"] if read[f"tfarm_{NOTES_KIND}"] == 1 else {}
-        return {page: {"key": note["key"], "files": dict(note["files"])} for page, note in notes.items()}
-    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
-        return {}
+
+    def notes(read: dict[str, Any]) -> dict[str, Any]:
+        return {page: {"key": note["key"], "files": dict(note["files"])} for page, note in read["pages"].items()}
+
+    return kept_in(folder, NOTES_KIND, notes) or {}
 
 
 def _hash(file: Path) -> str:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -121,8 +121,3 @@ def arms_of(arm: Arm, also: Sequence[Arm], box: ArmBox | None) -> list[NamedArm]
     listed = [NamedArm(each.name, each, {}) for each in (arm, *also)]
     corners = [] if box is None else box.corners
     return [*listed, *(each for each in corners if each.arm != arm)]
-
-
-def arm_box(arm: Arm, ranges: Mapping[str, Bounds] | None) -> ArmBox | None:
-    """The box over an arm, or None where no range is given."""
-    return ArmBox(arm, {key: (float(low), float(high)) for key, (low, high) in ranges.items()}) if ranges else None

@@ -10,7 +10,7 @@ from tfarm.arm import TWO_GAINS, Arm
 from tfarm.dsp import Chain
 from tfarm.errors import ParameterError
 from tfarm.synthesis import law_design as laws
-from tfarm.synthesis.arms import NamedArm, arm_box, arms_of
+from tfarm.synthesis.arms import ArmBox, NamedArm, arms_of
 from tfarm.synthesis.design import Design, Objective, best_gains, gains_score_on
 from tfarm.synthesis.law_design import LawDesign, law_design
 from tfarm.synthesis.search import Bounds
@@ -36,7 +36,8 @@ def design(
     is named in `.arms`.  Raises ParameterError for what does not go together, ConvergenceError where nothing found
     holds.
     """
-    box = arm_box(arm, ranges)
+    ends = {key: (float(low), float(high)) for key, (low, high) in (ranges or {}).items()}
+    box = ArmBox(arm, ends) if ends else None
     arms, tell = arms_of(arm, also, box), progress or (lambda text: None)
     same_input(arms)
     if structure == TWO_GAINS:

@@ -28,7 +28,7 @@ from tfarm.loop.stability import Stability
 from tfarm.records import record
 from tfarm.synthesis.arms import NamedArm
 from tfarm.synthesis.law_judge import LAW_OBJECTIVES, LawJudge, law_judge
-from tfarm.synthesis.minimax import LOST, Pieces, ScoredPoint, joined_pieces, minimax
+from tfarm.synthesis.minimax import LOST, Pieces, ScoredPoint, minimax
 from tfarm.synthesis.sampled import FEWEST_MODES
 from tfarm.synthesis.structures import STRUCTURES, Structure, usual_angle_gain
 from tfarm.synthesis.together import OnArm, in_step, worst_value
@@ -154,7 +154,8 @@ def _best(judges: Sequence[LawJudge], form: Structure, tell: Tell) -> list[Score
     def pieces(x: Real) -> Pieces:
         try:
             law, slopes = form.law(x), form.slopes(x)
-            return joined_pieces([judge.pieces(law, slopes) for judge in judges])
+            parts = [judge.pieces(law, slopes) for judge in judges]
+            return Pieces(*(np.concatenate(each) for each in zip(*parts, strict=True)))
         except (ParameterError, np.linalg.LinAlgError):  # coefficients too large to be a law
             flat = np.zeros((1, x.size))
             return Pieces(np.zeros(1), flat, np.array([1e6]), flat)

@@ -50,7 +50,7 @@ class LawSlew:
 
     def pieces(self, objective: str, law: Law, acting: Law, slopes: Sequence[Slope]) -> tuple[Real, Real]:
         """Residual [N m] or cost of a law, (1,), and its slopes (1, n)."""
-        task = self._task(objective)
+        task = self._tasks[SLEWED.index(objective)]
         plain = acting_law(self.arm, law, self.chain)[0]
         references = references_of(plain, task)
         matrices = acting.matrices(self.signals)
@@ -69,9 +69,6 @@ class LawSlew:
             added = u
         value = slew_cost(task, self.chain, moment, u)
         return value, (a * off * d_moment + b * added * d_u).sum(axis=0)[None]
-
-    def _task(self, objective: str) -> Scenario:
-        return self._tasks[SLEWED.index(objective)]
 
     @cached_property
     def _tasks(self) -> tuple[Scenario, Scenario]:

@@ -70,11 +70,6 @@ PiecesAt = Callable[[Real], Pieces]
 ScoredPoint = tuple[float, Real]  # score and point
 
 
-def joined_pieces(parts: list[Pieces]) -> Pieces:
-    """The functions of all together."""
-    return Pieces(*(np.concatenate(each) for each in zip(*parts, strict=True)))
-
-
 def minimax(
     pieces: PiecesAt, starts: Sequence[Real], upper: Real, tell: Callable[[int, float], None]
 ) -> list[ScoredPoint]:

@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
+from tfarm.arm.declared import StrictTable
 from tfarm.dsp.chain import Reading
 from tfarm.errors import MISSING, ParameterError, TfarmError
 from tfarm.files import read_file, write_file
@@ -48,10 +49,8 @@ class SavedTuner:
         return TunedGain(self.network, guard, self.K1, self.signals, self.Kp)
 
 
-class TunerFile(BaseModel):
+class TunerFile(StrictTable):
     """The file."""
-
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
     format: Literal["tfarm tuner 1"]
     arm: Annotated[str, Field(max_length=80)]

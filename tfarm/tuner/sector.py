@@ -42,15 +42,11 @@ class MovingGain:
         return self.at(0.0)
 
     @cached_property
-    def _row(self) -> int:
-        """The state that keeps the torque of the sample before: there the drive is 1."""
-        dropped = len(self.loop.matrix()) - len(self.open)
-        return self.loop.pulse.integrals_at + 2 - dropped
-
-    @cached_property
     def sense(self) -> Real:
         """(n,): the moment read from the states."""
-        row: Real = (self.open - self.at(1.0))[self._row]
+        dropped = len(self.loop.matrix()) - len(self.open)
+        kept = self.loop.pulse.integrals_at + 2 - dropped  # the torque of the sample before: there the drive is 1
+        row: Real = (self.open - self.at(1.0))[kept]
         return row
 
     @cached_property
