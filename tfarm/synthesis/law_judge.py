@@ -30,7 +30,7 @@ from tfarm.reduced.sensed import sensed_model
 from tfarm.synthesis.law_slew import SLEWED, LawSlew
 from tfarm.synthesis.law_slopes import Clock, pole_slopes
 from tfarm.synthesis.minimax import Pieces
-from tfarm.synthesis.pieces import LoopCurve, damping_pieces, growth_pieces
+from tfarm.synthesis.pieces import LoopCurve, damping_pieces, directions, growth_pieces
 from tfarm.synthesis.sampled import (
     RESERVE,
     SEARCH_RESERVE,
@@ -75,10 +75,8 @@ class LawJudge:
             if share == 1.0:
                 poles, ways = z, moves
         asked = self.loop.asked.signals
-        s, moves = pole_slopes(self._continuous, law.matrices(asked), slopes, 1.0, asked, Clock(None))
-        size = np.maximum(abs(s), 1e-300)
-        turn = moves.real / size[:, None] - (s.real / size**3)[:, None] * (s.conj()[:, None] * moves).real
-        growth.append(growth_pieces(s.real / size - GROWTH_OF_MODEL, turn))
+        real, turn = directions(*pole_slopes(self._continuous, law.matrices(asked), slopes, 1.0, asked, Clock(None)))
+        growth.append(growth_pieces(real - GROWTH_OF_MODEL, turn))
         g, dg = (np.concatenate(each) for each in zip(*growth, strict=True))
         if g.max() >= 0.0:
             return Pieces(np.zeros(1), np.zeros((1, dg.shape[1])), g, dg)

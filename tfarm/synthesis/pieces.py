@@ -36,9 +36,13 @@ def damping_pieces(z: Complex, moves: Complex, counted: NDArray[np.bool_]) -> Sl
     z, moves = z[oscillating], moves[oscillating]
     if not z.size:
         return -np.ones(1), np.zeros((1, moves.shape[1]))
-    s, ds = np.log(z), moves / z[:, None]  # times the period
-    size = np.asarray(abs(s))
-    slopes = ds.real / size[:, None] - (s.real / size**3)[:, None] * (s.conj()[:, None] * ds).real
+    return directions(np.log(z), moves / z[:, None])  # both times the period
+
+
+def directions(s: Complex, moves: Complex) -> Sloped:
+    """Re s/|s| (n,) of poles [1/s], of an oscillating one -zeta, and its slopes (n, coefficients)."""
+    size = np.maximum(abs(s), 1e-300)
+    slopes = moves.real / size[:, None] - (s.real / size**3)[:, None] * (s.conj()[:, None] * moves).real
     return np.asarray(s.real / size), np.asarray(slopes)
 
 
