@@ -23,6 +23,7 @@ if TYPE_CHECKING:
         Gauge,
         Hub,
         HubFeedback,
+        Law,
         Link,
         Motor,
         Payload,
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
         load,
         presets,
     )
-    from tfarm.arm.law import Law
     from tfarm.comparing import compare
     from tfarm.dsp.closed import sampled
     from tfarm.dsp.results import simulate
@@ -107,7 +107,6 @@ _ROOMS = {  # where a name stands; what it is called there after a colon, if not
     "default_gains": "spectrum.scales",
     "map": "loop.regions:region",
     "margins": "loop.closed",
-    "Law": "arm.law",
     "Measured": "fitting.data",
     "fit": "fitting.fit",
     "modes": "spectrum",

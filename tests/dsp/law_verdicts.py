@@ -21,7 +21,7 @@ from scipy.linalg import expm
 
 from tests.loop.arms import some_loop
 from tests.loop.law_counts import SIGNALS
-from tfarm.arm.law import Law
+from tfarm.arm import Law
 from tfarm.dsp import Chain, Sampling, pulse_transfer, scenario
 from tfarm.dsp.law_simulate import LawSimulator
 from tfarm.dsp.law_verdict import law_verdict

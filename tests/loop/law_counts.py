@@ -18,7 +18,7 @@ import numpy as np
 
 import tfarm
 from tests.loop.arms import some_loop
-from tfarm.arm.law import Law
+from tfarm.arm import Law
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop.law_stability import law_stability
 from tfarm.response.signals import Signals

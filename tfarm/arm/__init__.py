@@ -1,5 +1,6 @@
 """What is analysed: the arm as frozen records, its TOML file and the presets."""
 
+from tfarm.arm.driving import AnyLaw, arm_and_law, cancelled, tracked
 from tfarm.arm.feedback import (
     ANGLE_GAIN,
     FED_BACK,
@@ -23,6 +24,7 @@ from tfarm.arm.feedback import (
     unit_of,
     written_unit,
 )
+from tfarm.arm.law import Law
 from tfarm.arm.link import Link
 from tfarm.arm.plausible import implausible
 from tfarm.arm.reading import load, presets
@@ -49,6 +51,7 @@ __all__ = [
     "TWO_GAINS",
     "WITH_ROTARY_INERTIA",
     "WITH_SHEAR",
+    "AnyLaw",
     "Arm",
     "Attachment",
     "Gain",
@@ -56,12 +59,15 @@ __all__ = [
     "Hub",
     "HubFeedback",
     "Input",
+    "Law",
     "Link",
     "Motor",
     "Payload",
     "RotarySpring",
     "Section",
     "Theory",
+    "arm_and_law",
+    "cancelled",
     "driven",
     "implausible",
     "input_words",
@@ -74,6 +80,7 @@ __all__ = [
     "presets",
     "shown_unit",
     "to_toml",
+    "tracked",
     "unit_of",
     "written_unit",
 ]

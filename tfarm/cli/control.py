@@ -90,7 +90,7 @@ def spill(
     """Does a law drive a mode that its design model leaves out?  The exact loop beside models of 1, 2, 3 ... modes."""
     number, subject = whole_number("--modes", modes, 1, 60), load_arm(arm)
     law, said = asked_law(subject, given)
-    from tfarm.arm.law import Law
+    from tfarm.arm import Law
     from tfarm.cli.control_tables import print_spill
     from tfarm.loop.spill import spill as find
     from tfarm.loop.spill import spill_answer
@@ -156,7 +156,7 @@ def _law_map(
         raise ParameterError(key="--vary", value=vary, remedy=remedy)
     ranges = [_range_of("--vary", each) for each in vary]
     typed = asked_law(subject, Given({}, law, name))[0]
-    from tfarm.arm.law import Law
+    from tfarm.arm import Law
     from tfarm.cli.control_tables import print_law_map, write_law_map
     from tfarm.cli.tables import say_written
     from tfarm.loop.law_map import law_map, law_map_answer
@@ -207,7 +207,7 @@ def design(
     chain = asked_chain(dsp or arm, period, delay_samples)
     within: Any = {**_bounds_of(typed), ANGLE_GAIN: kp}
     ranges = dict(_range_of("--range", each) for each in over or [])
-    from tfarm.arm.law import Law
+    from tfarm.arm import Law
     from tfarm.arm.law_writing import save_law
     from tfarm.cli.control_tables import print_design, print_law_design
     from tfarm.cli.tables import say_written

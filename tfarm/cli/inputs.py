@@ -19,8 +19,7 @@ from tfarm.cli.app import whole_number
 from tfarm.errors import ParameterError
 
 if TYPE_CHECKING:
-    from tfarm.arm import Arm, HubFeedback, Input
-    from tfarm.arm.law import Law
+    from tfarm.arm import Arm, HubFeedback, Input, Law
     from tfarm.report.given_laws import GivenLaw
 
 

@@ -44,7 +44,7 @@ def locus(
     number, count = whole_number("--points", points or "500", 2, 100_000), whole_number("--branches", branches, 1, 200)
     subject = load_arm(arm)
     law, said = asked_law(subject, given)
-    from tfarm.arm.law import Law
+    from tfarm.arm import Law
 
     if isinstance(law, Law):
         from tfarm.loop.law_locus import law_locus, law_locus_answer

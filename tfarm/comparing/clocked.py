@@ -7,9 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from tfarm.arm import Arm, HubFeedback
-from tfarm.arm.driving import AnyLaw
-from tfarm.arm.law import Law
+from tfarm.arm import AnyLaw, Arm, HubFeedback, Law
 from tfarm.arrays import Complex, Real
 from tfarm.dsp import Chain
 from tfarm.dsp.law_margins import law_grid, stable_factors

@@ -10,10 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from tfarm.arm import ANGLE_GAIN, PLANE, Arm, HubFeedback, must_be_arm
+from tfarm.arm import ANGLE_GAIN, PLANE, AnyLaw, Arm, HubFeedback, Law, arm_and_law, must_be_arm
 from tfarm.arm.checks import whole
-from tfarm.arm.driving import AnyLaw, arm_and_law
-from tfarm.arm.law import Law
 from tfarm.arrays import Complex, Real
 from tfarm.dsp import Chain
 from tfarm.dsp.brief import SampledBrief, brief_of

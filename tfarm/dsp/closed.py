@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from tfarm.arm import Arm, HubFeedback
-from tfarm.arm.driving import AnyLaw, arm_and_law
+from tfarm.arm import AnyLaw, Arm, HubFeedback, arm_and_law
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.law_verdict import LawAnalysis, analyse_law, law_verdict
 from tfarm.dsp.verdict import Analysis, Verdict, analyse, sampled_verdict

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial.polynomial import polyval
 
+from tfarm.arm import Law
 from tfarm.arm.blocks import LawBlock, Rational
-from tfarm.arm.law import Law
 from tfarm.arrays import Complex, Real
 from tfarm.records import record
 

@@ -5,10 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from tfarm.arm import Arm
+from tfarm.arm import Arm, Law, cancelled
 from tfarm.arm.checks import whole as whole_number
-from tfarm.arm.driving import cancelled
-from tfarm.arm.law import Law
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.discretise import described_law, rule_in_words
 from tfarm.dsp.law_circle import LawCircle

@@ -9,8 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from tfarm.arm import LISTED, TAKEN_OFF, Arm, HubFeedback, driven, unit_of
-from tfarm.arm.driving import AnyLaw, tracked
+from tfarm.arm import LISTED, TAKEN_OFF, AnyLaw, Arm, HubFeedback, driven, tracked, unit_of
 from tfarm.arrays import Real
 from tfarm.columns import Column
 from tfarm.dsp.chain import Chain

@@ -18,9 +18,8 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from tfarm.arm import Arm
+from tfarm.arm import AnyLaw, Arm, tracked
 from tfarm.arm.declared import StrictTable
-from tfarm.arm.driving import AnyLaw, tracked
 from tfarm.arm.reading import load_tables
 from tfarm.arrays import Real
 from tfarm.dsp.chain import Chain

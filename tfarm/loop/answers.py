@@ -6,8 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from tfarm.arm import ANGLE_GAIN, LISTED, PLANE, SPELT_OUT, Arm, HubFeedback, input_words, shown_unit, unit_of
-from tfarm.arm.law import Law
+from tfarm.arm import ANGLE_GAIN, LISTED, PLANE, SPELT_OUT, Arm, HubFeedback, Law, input_words, shown_unit, unit_of
 from tfarm.columns import JSON, REPORT, TERMINAL, Column, Table
 from tfarm.digits import general, plain, singly, within
 from tfarm.response.signals import Signals

@@ -5,8 +5,7 @@ A law that is no more than these gains is taken for them.
 
 from __future__ import annotations
 
-from tfarm.arm import Arm, HubFeedback
-from tfarm.arm.driving import AnyLaw, arm_and_law
+from tfarm.arm import AnyLaw, Arm, HubFeedback, arm_and_law
 
 from .law_loop import LawLoop
 from .law_poles import law_poles

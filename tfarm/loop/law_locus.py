@@ -18,9 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq, linear_sum_assignment
 
-from tfarm.arm import Arm
+from tfarm.arm import Arm, Law
 from tfarm.arm.checks import whole
-from tfarm.arm.law import Law
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError
 from tfarm.records import record

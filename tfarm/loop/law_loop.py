@@ -15,9 +15,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import INPUT_UNITS, Arm, must_be_arm
-from tfarm.arm.driving import cancelled
-from tfarm.arm.law import Law
+from tfarm.arm import INPUT_UNITS, Arm, Law, cancelled, must_be_arm
 from tfarm.arrays import Complex
 from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import Analytic, LoopParts, deflated, difference_steps

@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm
-from tfarm.arm.law import Law
+from tfarm.arm import Arm, Law
 from tfarm.arrays import Complex, Real
 from tfarm.crossing import Crossing, Crossings, brackets, counts_over, solved
 from tfarm.errors import ParameterError

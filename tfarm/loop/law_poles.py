@@ -6,10 +6,9 @@ from contextlib import suppress
 
 import numpy as np
 
-from tfarm.arm import Arm
+from tfarm.arm import Arm, Law
 from tfarm.arm.blocks import Matrices
 from tfarm.arm.checks import whole
-from tfarm.arm.law import Law
 from tfarm.arrays import Complex
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.reduced.sensed import closed, in_series, pade, sensed_model

@@ -16,8 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tfarm.arm import Arm
-from tfarm.arm.law import Law
+from tfarm.arm import Arm, Law
 from tfarm.spectrum import modes_below
 
 from .frequencies import MOST_BAND_MODES, band_of, grid

@@ -16,8 +16,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
+from tfarm.arm import Law
 from tfarm.arm.blocks import Rational
-from tfarm.arm.law import Law
 from tfarm.records import record
 
 if TYPE_CHECKING:

@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm
+from tfarm.arm import Arm, Law
 from tfarm.arm.checks import whole
-from tfarm.arm.law import Law
 from tfarm.arrays import Complex
 from tfarm.columns import Column, Table
 from tfarm.digits import general, plain, singly

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from matplotlib.axes import Axes
 
-from tfarm.arm import GAINS, LISTED, PLANE, Arm, HubFeedback, shown_unit
-from tfarm.arm.law import Law
+from tfarm.arm import GAINS, LISTED, PLANE, Arm, HubFeedback, Law, shown_unit
 from tfarm.digits import plain
 
 LYAPUNOV = "{} > 0, {} < 1".format(*PLANE)  # what the paper's argument proves at C = 0

@@ -6,9 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from tfarm.arm import Arm, HubFeedback
-from tfarm.arm.driving import AnyLaw, arm_and_law
-from tfarm.arm.law import Law
+from tfarm.arm import AnyLaw, Arm, HubFeedback, Law, arm_and_law
 from tfarm.dsp import Chain
 from tfarm.dsp.discretise import discretised
 from tfarm.dsp.loop import check_loop

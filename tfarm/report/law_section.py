@@ -6,9 +6,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from tfarm.arm import PLANE, Arm
+from tfarm.arm import PLANE, Arm, cancelled
 from tfarm.arm.blocks import Rational, StateSpace
-from tfarm.arm.driving import cancelled
 from tfarm.arm.law import REFERENCE, is_measured
 from tfarm.columns import FILES, REPORT, Column, Table
 from tfarm.digits import plain, singly

@@ -14,8 +14,7 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 import tfarm
-from tfarm.arm import Arm, HubFeedback, load, presets
-from tfarm.arm.law import Law
+from tfarm.arm import Arm, HubFeedback, Law, load, presets
 from tfarm.arm.law_writing import law_toml
 from tfarm.digits import listed
 from tfarm.dsp import Chain, load_chain

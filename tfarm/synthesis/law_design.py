@@ -12,8 +12,7 @@ from typing import cast
 
 import numpy as np
 
-from tfarm.arm import ANGLE_GAIN, TWO_GAINS, Arm
-from tfarm.arm.law import Law
+from tfarm.arm import ANGLE_GAIN, TWO_GAINS, Arm, Law
 from tfarm.arrays import Real
 from tfarm.dsp import Chain, Verdict
 from tfarm.dsp.brief import brief_of

@@ -14,9 +14,8 @@ from functools import cached_property
 
 import numpy as np
 
-from tfarm.arm import Arm
+from tfarm.arm import Arm, Law
 from tfarm.arm.blocks import Matrices
-from tfarm.arm.law import Law
 from tfarm.arrays import Real
 from tfarm.dsp import Chain, Scenario, scenario
 from tfarm.dsp.law_loop import acting_law

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm.law import Law
+from tfarm.arm import Law
 from tfarm.arrays import Complex, Real
 from tfarm.records import record
 from tfarm.synthesis.law_slopes import Clock, changes

@@ -20,8 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm
-from tfarm.arm.law import Law
+from tfarm.arm import Arm, Law
 from tfarm.arrays import Real
 from tfarm.records import record
 from tfarm.spectrum import modes as natural_modes
