@@ -23,9 +23,8 @@ from tfarm.loop.plant import Loop
 from tfarm.loop.stability import stability
 from tfarm.report.given_laws import Subject
 from tfarm.report.live import save_live
-from tfarm.report.live_data import live_data
+from tfarm.report.live_data import live_data, sensor_numbers
 from tfarm.report.live_sampled import slew_numbers
-from tfarm.report.live_sensor import sensor_numbers
 
 SIGNALS = ("hub_angle", "hub_rate", "root_moment", "tip_displacement")
 ARMS = ("sasaki2012-lab", "stocky-steel", "quanser-flexlink")
@@ -192,7 +191,7 @@ def test_where_zeros_of_sensors_cannot_be_told_the_page_says_why(case, monkeypat
     def fails(*_):
         raise tfarm.ConvergenceError("no polynomial follows", 0.0, 1.0)
 
-    monkeypatch.setattr("tfarm.report.live_sensor.positions", fails)
+    monkeypatch.setattr("tfarm.report.live_data.positions", fails)
     arm = tfarm.load("sasaki2012-lab")
     found = sensor_numbers(arm)
     assert found == {"sensor": None, "no_sensor": "no polynomial follows"}

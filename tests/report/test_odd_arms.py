@@ -22,7 +22,7 @@ from tfarm.loop import loci as loci_room
 from tfarm.loop.locus import locus
 from tfarm.loop.plant import Loop
 from tfarm.loop.poles import poles_below
-from tfarm.report import assumptions_pictures, assumptions_section, loop_laws, loop_section, making
+from tfarm.report import assumptions_section, loop_laws, loop_section, making
 from tfarm.report.arm_section import arm_section, derived_table
 from tfarm.report.bode_section import bode_section
 from tfarm.report.damped_table import damped_table
@@ -298,7 +298,7 @@ def test_a_K2_where_the_search_ended_has_a_star():
 
 def test_curves_that_fall_are_not_said_to_rise():
     """The fourth mode of the stubby arm falls at last with more depth: shear has taken over."""
-    ways = [assumptions_pictures._way(section_study(ARMS["stubby"], depths)) for depths in ([0.01, 0.02], [0.12, 0.17])]
+    ways = [assumptions_section._way(section_study(ARMS["stubby"], depths)) for depths in ([0.01, 0.02], [0.12, 0.17])]
     assert ways == ["all rising", "not all of them one way"]
 
 

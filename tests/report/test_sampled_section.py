@@ -22,8 +22,8 @@ from tfarm.loop.windows import gain_windows
 from tfarm.plots.files import save_figure
 from tfarm.plots.strip import draw_strip_chart
 from tfarm.report.overlay import CUT_RANGE, K2_RANGE, draw_overlay, overlay_table, stable_regions
-from tfarm.report.sampled_modes import loci_table
 from tfarm.report.sampled_section import sampled_section
+from tfarm.report.sampled_tables import loci_table
 from tfarm.report.sampled_words import Sampled, against_continuous, cure, duration, interval_words, sampled_in_short
 from tfarm.report.time_responses import CURVE_DIGITS
 from tfarm.spectrum.scales import default_gains

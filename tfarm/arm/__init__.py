@@ -1,6 +1,6 @@
 """What is analysed: the arm as frozen records, its TOML file and the presets."""
 
-from tfarm.arm.driving import AnyLaw, arm_and_law, cancelled, tracked
+from tfarm.arm.driving import AnyLaw, arm_and_law, as_law, cancelled, tracked
 from tfarm.arm.feedback import (
     ANGLE_GAIN,
     FED_BACK,
@@ -67,6 +67,7 @@ __all__ = [
     "Section",
     "Theory",
     "arm_and_law",
+    "as_law",
     "cancelled",
     "driven",
     "implausible",

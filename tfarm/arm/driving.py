@@ -17,6 +17,11 @@ AnyLaw = HubFeedback | Law
 CANCELLED = 1e-6  # of its size: a zero of the law so near to an unstable pole of it cancels that
 
 
+def as_law(law: AnyLaw) -> Law:
+    """The law as one of signals, gains at the hub too."""
+    return Law.of_gains(law) if isinstance(law, HubFeedback) else law
+
+
 def arm_and_law(arm: Arm, law: AnyLaw) -> tuple[Arm, AnyLaw]:
     """The arm with the input that the law drives, and the law as gains at the hub where it is no more than those.
 

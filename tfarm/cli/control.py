@@ -90,12 +90,12 @@ def spill(
     """Does a law drive a mode that its design model leaves out?  The exact loop beside models of 1, 2, 3 ... modes."""
     number, subject = whole_number("--modes", modes, 1, 60), load_arm(arm)
     law, said = asked_law(subject, given)
-    from tfarm.arm import Law
+    from tfarm.arm import as_law
     from tfarm.cli.control_tables import print_spill
     from tfarm.loop.spill import spill as find
     from tfarm.loop.spill import spill_answer
 
-    found = find(subject, law if isinstance(law, Law) else Law.of_gains(law), number)
+    found = find(subject, as_law(law), number)
     give(spill_answer(found) | said, json, print_spill)
 
 
@@ -156,15 +156,14 @@ def _law_map(
         raise ParameterError(key="--vary", value=vary, remedy=remedy)
     ranges = [_range_of("--vary", each) for each in vary]
     typed = asked_law(subject, Given({}, law, name))[0]
-    from tfarm.arm import Law
+    from tfarm.arm import as_law
     from tfarm.cli.control_tables import print_law_map, write_law_map
     from tfarm.cli.tables import say_written
     from tfarm.loop.law_map import law_map, law_map_answer
     from tfarm.loop.regions import between
 
-    any_law = typed if isinstance(typed, Law) else Law.of_gains(typed)
     x, y = (between(*limits, number) for _, limits in ranges)
-    found = law_map(subject, any_law, (ranges[0][0], ranges[1][0]), x, y)
+    found = law_map(subject, as_law(typed), (ranges[0][0], ranges[1][0]), x, y)
     answer = law_map_answer(found)
     if csv is not None:
         write_law_map(answer, csv)
@@ -207,7 +206,7 @@ def design(
     chain = asked_chain(dsp or arm, period, delay_samples)
     within: Any = {**_bounds_of(typed), ANGLE_GAIN: kp}
     ranges = dict(_range_of("--range", each) for each in over or [])
-    from tfarm.arm import Law
+    from tfarm.arm import as_law
     from tfarm.arm.law_writing import save_law
     from tfarm.cli.control_tables import print_design, print_law_design
     from tfarm.cli.tables import say_written
@@ -220,9 +219,8 @@ def design(
         continuous=continuous, progress=tell if sys.stderr.isatty() else None,
         also=[load_arm(name) for name in also or []], ranges=ranges,
     )  # fmt: skip
-    law = Law.of_gains(found.law) if isinstance(found, Design) else found.law
     if save is not None:
-        save_law(law, save)
+        save_law(as_law(found.law), save)
     if not (say_written(save) or json):
         return
     if isinstance(found, Design):

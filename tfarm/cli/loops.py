@@ -58,8 +58,8 @@ def locus(
 
             save_png(draw_law_locus(found), png)
     else:
+        from tfarm.loop.loci import locus_answer
         from tfarm.loop.locus import locus as find
-        from tfarm.loop.locus_answer import locus_answer
         from tfarm.loop.reduced_locus import reduced_locus
 
         exact = find(subject, law, vary, start, stop, number, count)

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from tfarm.arm import AnyLaw, Arm, HubFeedback, Law
+from tfarm.arm import AnyLaw, Arm, as_law
 from tfarm.arrays import Complex, Real
 from tfarm.dsp import Chain
 from tfarm.dsp.law_margins import law_grid, stable_factors
@@ -83,4 +83,4 @@ class Clocked:
 
 def clocked(arm: Arm, law: AnyLaw, chain: Chain) -> Clocked:
     """The law at the clock of a chain.  Raises what `tfarm.sampled` raises."""
-    return Clocked(analyse_law(arm, Law.of_gains(law) if isinstance(law, HubFeedback) else law, chain))
+    return Clocked(analyse_law(arm, as_law(law), chain))

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from tfarm.arm import ANGLE_GAIN, PLANE, AnyLaw, Arm, HubFeedback, Law, arm_and_law, must_be_arm
+from tfarm.arm import ANGLE_GAIN, PLANE, AnyLaw, Arm, HubFeedback, Law, arm_and_law, as_law, must_be_arm
 from tfarm.arm.checks import whole
 from tfarm.arrays import Complex, Real
 from tfarm.dsp import Chain
@@ -165,7 +165,7 @@ class Comparison:
     @cached_property
     def delays(self) -> tuple[LawMap, LawMap]:
         """The plane of a factor on each law and its whole delay [s]: for laws that are more than gains at the hub."""
-        laws = [side.law if isinstance(side.law, Law) else Law.of_gains(side.law) for side in self.sides]
+        laws = [as_law(side.law) for side in self.sides]
         longest = max(DELAY_SHOWN, *(2 * law.delay for law in laws))
         x, y = between(0.0, MOST_FACTOR, DELAY_PLANE_POINTS), between(0.0, longest, DELAY_PLANE_POINTS)
         first, second = (

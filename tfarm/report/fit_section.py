@@ -10,8 +10,7 @@ from tfarm.fitting.answers import fit_in_words, known, parameters_table, resonan
 from tfarm.fitting.fit import Fit
 from tfarm.fitting.possible import ARMS, Possible, extremes, loop_on_all, possible
 from tfarm.loop.regions import ranges_of
-from tfarm.plots.fitted import draw_fit
-from tfarm.plots.possible import draw_band, draw_share
+from tfarm.plots.fitted import draw_band, draw_fit, draw_share
 from tfarm.plots.words import gains_words
 from tfarm.report.loop_laws import has_loop
 from tfarm.report.sections import PageSection, Picture

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from tfarm.arm import AnyLaw, Arm, HubFeedback, Law, arm_and_law
+from tfarm.arm import AnyLaw, Arm, HubFeedback, Law, arm_and_law, as_law
 from tfarm.dsp import Chain
 from tfarm.dsp.discretise import discretised
 from tfarm.dsp.loop import check_loop
@@ -76,7 +76,7 @@ class LawOnArm:
     @property
     def any_law(self) -> Law:
         """The law as one of signals, gains at the hub too."""
-        return Law.of_gains(self.law) if isinstance(self.law, HubFeedback) else self.law
+        return as_law(self.law)
 
     @property
     def is_discrete(self) -> bool:

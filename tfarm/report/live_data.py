@@ -1,11 +1,14 @@
-"""What the live page of an arm's loop carries: exact samples, the map's regions, and what is known beyond the band."""
+"""What the live page of an arm's loop carries: exact samples, the map's regions, and what is known beyond the band.
+
+And of sensors along the arm, at many x what they see of each mode, and their zeros.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from itertools import product
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
@@ -14,22 +17,28 @@ from tfarm.crossing import pieces
 from tfarm.digits import kept_digits
 from tfarm.dsp import Chain
 from tfarm.dsp import GainMap as SampledMap
+from tfarm.errors import TfarmError
 from tfarm.loop.edges import Axis, moment_axis, rate_axis
 from tfarm.loop.frequencies import steep_places
 from tfarm.loop.lossless import stable_moments
 from tfarm.loop.panels import Panels, loop_panels
 from tfarm.loop.plant import Loop
+from tfarm.loop.positions import MOST_SENSOR_MISS, Positions, Sensor, positions
 from tfarm.loop.regions import region
 from tfarm.loop.stability import loop_band, stability
 from tfarm.report.live_sampled import packed, sampled_numbers, slew_numbers
-from tfarm.report.live_sensor import sensor_numbers
 from tfarm.report.map import BEYOND_PICTURE, sampled_part
+from tfarm.spectrum import modes
 from tfarm.spectrum.scales import angle_unit, default_gains
 
 LIVE_COLUMNS = 90  # values of the gain across at which the continuous region is cut
 ANGLE_RANGE = 0.1  # of J w1^2: the largest gain on the hub angle of the page
 ANGLE_LINEAR = 1e-4  # of that: where its slider begins to be logarithmic
 EDGE_DIGITS = 7  # of the edges of the map's regions: far more than a screen has
+SENSOR_PIECES = 16  # pieces of the arm between two positions
+SENSED_MODES = 6  # whose frequencies and zeros the chart of sensors has
+NOT_SENSED = 1e-9  # of a mode's largest: an end that no mode moves, or bends, by more has no sensor
+SENSOR_DIGITS = 6  # of what that chart draws and tells: far more than a screen has
 
 
 def live_data(arm: Arm, chain: Chain, law: HubFeedback | None = None) -> dict[str, Any]:
@@ -132,4 +141,39 @@ def _sampled(plane: SampledMap, chain: Chain) -> dict[str, Any]:
         PLANE[0]: plane.axes[0].tolist(),
         "intervals": plane.stable_intervals,
         "words": f"every {ms}" + ("" if C else f", of the first {plane.modes_used} modes"),
+    }
+
+
+# ------------------------------------------------------------ sensors along the arm
+
+
+def sensor_numbers(arm: Arm) -> dict[str, Any]:
+    """`sensor`: participation and zeros at every position, by the kind of sensor, without ends that sense nothing.
+
+    None where they cannot be had, and then `no_sensor` says why.
+    """
+    x, sensors = np.linspace(0.0, arm.length, SENSOR_PIECES + 1), {}
+    try:
+        found = modes(arm, SENSED_MODES)
+        for kind in get_args(Sensor):
+            size = abs((found.shape if kind == "displacement" else found.moment)(x)[found.index > 0])
+            places = x[(size > NOT_SENSED * size.max(axis=1, keepdims=True)).any(axis=0)]
+            sensors[kind] = _numbers(positions(arm, kind, places, SENSED_MODES))
+    except TfarmError as error:
+        return {"sensor": None, "no_sensor": str(error)}
+    return {"sensor": sensors}
+
+
+def _numbers(found: Positions) -> dict[str, Any]:
+    """The positions in a few digits; a part of a zero is 0 where that is all that is known of it."""
+    known = [
+        [[part if abs(part) > MOST_SENSOR_MISS * abs(s) else 0.0 for part in (s.real, s.imag)] for s in zeros]
+        for zeros in found.zeros
+    ]
+    return {
+        "x": kept_digits(found.x, SENSOR_DIGITS),
+        "band": found.band,
+        "modes": kept_digits(found.natural_frequency, SENSOR_DIGITS),
+        "participation": [kept_digits(column, SENSOR_DIGITS) for column in found.participation.T],
+        "zeros": [[kept_digits(zero, SENSOR_DIGITS) for zero in zeros] for zeros in known],
     }

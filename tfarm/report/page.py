@@ -14,15 +14,15 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 import tfarm
-from tfarm.arm import Arm, HubFeedback, Law, load, presets
+from tfarm.arm import Arm, as_law, load, presets
 from tfarm.arm.law_writing import law_toml
 from tfarm.digits import listed
 from tfarm.dsp import Chain, load_chain
 from tfarm.dsp.writing import file_text
 from tfarm.errors import ParameterError
 from tfarm.report.frame import BADGES, explained, framed, promises, section_rows, signs, word_id
+from tfarm.report.frame import QUESTIONS as QUESTIONS
 from tfarm.report.given_laws import Subject
-from tfarm.report.page_names import QUESTIONS as QUESTIONS
 from tfarm.report.sections import Fact, SavedSection
 from tfarm.tables.html import with_symbols
 
@@ -114,9 +114,8 @@ def own_law(subject: Subject) -> str | None:
     """The table [law] of the one law of a page; None where there are none or several, or that needs files beside it."""
     if len(subject.laws) != 1 or subject.laws[0].measured is not None:
         return None
-    law = subject.laws[0].law
     try:
-        return law_toml(Law.of_gains(law) if isinstance(law, HubFeedback) else law)
+        return law_toml(as_law(subject.laws[0].law))
     except ParameterError:
         return None
 

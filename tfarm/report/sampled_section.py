@@ -19,7 +19,7 @@ from tfarm.plots.growth import draw_modes
 from tfarm.plots.strip import draw_strip_chart
 from tfarm.report.loop_laws import has_loop, why_no_loop
 from tfarm.report.overlay import draw_overlay, overlay_table
-from tfarm.report.sampled_modes import loci_table, mode_rows
+from tfarm.report.sampled_tables import example_words, loci_table, mode_rows, strip_table
 from tfarm.report.sampled_words import (
     Sampled,
     against_continuous,
@@ -33,7 +33,6 @@ from tfarm.report.sampled_words import (
     spans,
 )
 from tfarm.report.sections import PageSection, Picture
-from tfarm.report.strip_words import example_words, strip_table
 from tfarm.report.time_responses import (
     draw_slews,
     resolution_words,

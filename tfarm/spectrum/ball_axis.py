@@ -1,25 +1,30 @@
-"""The undamped arm on the imaginary axis in real ball arithmetic: D(i w), the count, and a root finder."""
+"""An arm without damping on the imaginary axis in real ball arithmetic: D(i w), the count, and a root finder.
+
+The steps of a chain's count are those of `tfarm.exact.chain_axis`, each sign certain or not.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import flint
 
 from tfarm.exact.balls import rational
 from tfarm.exact.chain import ElementChain
+from tfarm.exact.chain_balls import Sweep, drive_of
 from tfarm.exact.closed_form import from_waves
 from tfarm.exact.coefficients import Coefficients
 from tfarm.exact.compiled import python_of
+from tfarm.exact.compound import Plane, across_waves
+from tfarm.exact.elements import Element, Segment, Spring
 from tfarm.exact.system import System
 
-from .chain_axis import ChainAxis
 from .counting import end_row, steps_of
 from .half_waves import pinned_count, real_waves
 
 Ball = Any
-_minors = python_of(from_waves)
+_minors, _across_waves = python_of(from_waves), python_of(across_waves)
 
 MOST_AXIS_BITS = 40_000  # of working precision: a root that needs more is double
 
@@ -57,6 +62,95 @@ class ArmAxis:
         tip = row[0] + row[1] * S, row[2], row[3] + row[4] * S, row[5]
         theta, M0, _, _ = _minors(*one, *two, self._g * S, flint.arb(1), *tip)
         return row[8] * M0 - (row[6] + row[7] * S) * theta  # the sign of g S is minus
+
+
+class UncertainError(Exception):
+    """A sign, or a number of half waves, that these balls do not determine."""
+
+
+class AxisSweep(Sweep):
+    """The sweep at s = i omega, in real balls: `s` stands for 0, `S` for -omega^2.  It counts on its way."""
+
+    def __init__(self, chain: ElementChain, omega: Ball, counting: bool) -> None:
+        self._omega, self._counting = omega, counting
+        self.number = 0
+        self._free = sum(not isinstance(end, float) for end in (chain.tip_mass, chain.tip_inertia))
+        super().__init__(chain.at(), flint.arb(0), -omega * omega)
+
+    @property
+    def drive(self) -> Ball:
+        """D(i omega)."""
+        drive = self.layout.chain.drive
+        return drive_of(drive, flint.arb(0), self.theta, self.M) + self.S * rational(drive.of_angle[2]) * self.theta
+
+    def _inside(self, element: Element, p: Plane) -> Plane:
+        if isinstance(element, Segment):
+            return self._joined(element, p)
+        p = super()._inside(element, p)
+        if isinstance(element, Spring):
+            self._step(p[0], 1)
+        return p
+
+    def _joined(self, element: Segment, p: Plane) -> Plane:
+        w, m, q = (rational(unit) for unit in element.units)
+        own = p[0] * w, p[1] * (w * m), p[2] * m, p[3] * q, p[4] * (m * q)
+        a, b, g = (rational(number) for number in element[:3])
+        (one, two), gS = real_waves(a, b, g, self.S), self.S * g
+        gap = one[2] - two[2]
+        unit = 1 / (gS * gap * gap)
+        inside = tuple(part * unit for part in _across_waves(*one, *two, gS, flint.arb(1), self.S * (a - b), own))
+        if self._counting:
+            zero = flint.arb(0)
+            held = (zero, zero, zero, zero, flint.arb(1))
+            r = [part * unit for part in _across_waves(*one, *two, gS, flint.arb(1), self.S * (a - b), held)]
+            self._count_segment([one[2], two[2]], own, inside, r)
+        self._free = 2
+        return inside[0] / w, inside[1] / (w * m), inside[2] / m, inside[3] / q, inside[4] / (m * q)
+
+    def _count_segment(self, z: Sequence[Ball], p: Plane, q: Plane, r: Sequence[Ball]) -> None:
+        outside, pinned = self.number, pinned_count(z)
+        if pinned is None:
+            raise UncertainError
+        self.number = pinned
+        self._step(r[1], -1)
+        self._step(-r[0], -1)
+        self.number += outside
+        if self._free == 2:
+            self._step(-r[0] * p[3] - r[3] * p[0], 1)
+        if self._free:
+            self._step(q[0], 1)
+
+    def _step(self, value: Ball, step: int) -> None:
+        """The count one step on, where the sign of the determinant asks for it."""
+        if not self._counting:
+            return
+        if not (value > 0 or value < 0):
+            raise UncertainError
+        self.number += step * ((self.number % 2 == 1) != bool(value < 0))
+
+    def released(self) -> int:
+        """The count with the hub let go, where it is not held."""
+        if self.layout.chain.drive.turns:
+            self._step(self.drive, 1)
+        return self.number
+
+
+class ChainAxis:
+    """A chain on the imaginary axis in real balls, at the working precision, as `ArmAxis` is of an arm."""
+
+    def __init__(self, chain: ElementChain) -> None:
+        self._chain = chain.with_damping(0.0)
+
+    def drive(self, omega: Ball) -> Ball:
+        """D(i omega) times a positive factor."""
+        return AxisSweep(self._chain, omega, counting=False).drive
+
+    def count(self, omega: Ball) -> int | None:
+        """N(omega), the rigid-body mode included; None if a sign or a half wave is not certain."""
+        try:
+            return AxisSweep(self._chain, omega, counting=True).released()
+        except UncertainError:
+            return None
 
 
 def axis_of(k: System) -> ArmAxis | ChainAxis:

@@ -1,13 +1,16 @@
-"""The numbers behind the pictures of the sampled loop's poles: a row a mode, and the poles along the loci."""
+"""The numbers behind the pictures of the sampled loop: a row a mode, the poles along the loci, and the strip chart."""
 
 from __future__ import annotations
 
 from tfarm.arm import PLANE
 from tfarm.columns import Column, Table
 from tfarm.digits import plain
+from tfarm.dsp.chain import Chain
+from tfarm.dsp.curves import held_at, root_moment
 from tfarm.dsp.law import SAMPLED_MODE_COLUMNS, ModeTable
 from tfarm.dsp.loci import SampledLoci
 from tfarm.dsp.loop import SampledLoop
+from tfarm.dsp.strip_chart import StripChart
 
 MODE_TABLE = (
     "ln|z| is what a mode gains (+) or loses (−) per sample: its size is multiplied by |z| every {ms} ms. Own damping "
@@ -42,3 +45,32 @@ def loci_table(data: SampledLoci, stem: str) -> Table:
         Column(*title, of=list(cells)) for title, cells in zip(titles.items(), zip(*rows, strict=True), strict=True)
     ]
     return Table(stem=stem, title="Poles of the sampled loop", is_data=True, columns=tuple(columns))
+
+
+def example_words(ideal: Chain, coarse: Chain) -> str:
+    """What of a coarse chain is an example, and what the arm's own file has."""
+    parts = (
+        ("ADC", ideal.converters.moment_bits is not None),
+        ("delay", ideal.sampling.delay_samples > 0),
+        ("motor limit", ideal.actuator.torque_limit == coarse.actuator.torque_limit),
+    )
+    own = [name for name, is_own in parts if is_own]
+    made_up = [name for name, is_own in parts if not is_own]
+    if not own:
+        return "An example, and nobody's hardware"
+    if not made_up:
+        return f"The arm's own {', '.join(own)}"
+    return f"The arm's own {' and '.join(own)}; {' and '.join(made_up)} an example"
+
+
+def strip_table(data: StripChart, stem: str) -> Table:
+    """The curve of the moment as it is drawn, and what is held from sample to sample at its times."""
+    s, drawn = data.simulation, root_moment(data.simulation)
+    columns = (
+        Column("t_s", "time", "s", of=drawn.t),
+        *drawn.columns("root_moment", "root moment", "N m"),
+        Column("read_moment_N_m", "as the ADC reads it", "N m", of=held_at(s, data.read, drawn.t)),
+        Column("torque_asked_N_m", "torque asked", "N m", of=held_at(s, data.asked, drawn.t)),
+        Column("torque_given_N_m", "torque given, after the delay", "N m", of=held_at(s, s.torque, drawn.t)),
+    )
+    return Table(stem=stem, title="Strip chart", is_data=True, columns=columns)
