@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from typing import Any, Generic
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from tfarm.arm import NAMES, Arm, HubFeedback
@@ -36,7 +37,11 @@ from .poles import LEAST_SQUARABLE, AnyLoop
 from .stability import Stability, is_quiet, stability
 from .windows import Windows, gain_windows
 
-MARGIN_DIGITS, PLACE_DIGITS = 9, 7  # of a margin, and of the frequency of a dip, which its depth hardly feels
+MARGIN_DIGITS, PLACE_DIGITS = 9, 7  # of a margin, at most, and of the frequency of a dip, which its depth hardly feels
+CROSSOVER_DIGITS = 12  # of what each crossover is listed with, at most: more than any table rounds to
+NEXT_DOUBLES = 2.0**-52 * np.arange(-16, 17, 4)  # on either side of a frequency, in shares of it: as L is rounded
+FARTHER = 8.0 ** np.arange(-16, -5)  # the same, until rounding does not decide any more on which side of the axis L is
+ABOVE_NOISE = 4.0  # times what neighbours differ by
 BOTTOM = 1e-6  # of the gap between grid points: a dip's bottom is flat, so its depth is right to the square of that
 LOWEST = 6  # local minima on the grid that are refined
 AT_POLE = 1e-9  # a factor on L so small belongs to a pole of L on the axis, where L changes its sign through infinity
@@ -111,31 +116,47 @@ def loop_margins(verdict: Stability[Any]) -> LoopMargins:
     loop, band = verdict.loop, verdict.band
     omega = dense(verdict)
     crossed = unit_crossings(loop, omega)
-    angle = np.degrees(np.angle(minus_loop(loop, crossed)))  # 0 where L = -1
+    apart = _spread(lambda w: minus_loop(loop, w), crossed)  # of size 1: what its angle moves by [rad]
+    angle = held(np.degrees(np.angle(minus_loop(loop, crossed))), np.degrees(apart), CROSSOVER_DIGITS)  # 0 where L = -1
+    delay = held(
+        np.radians(np.mod(angle, 360)) / np.where(crossed == 0, 1, crossed), apart / np.where(crossed == 0, 1, crossed)
+    )
     lag, lead = angle > 0, angle < 0
     least = {
         "phase": _least(angle, crossed),
         "phase_lag": _least(angle[lag], crossed[lag]),
         "phase_lead": _least(-angle[lead], crossed[lead]),
-        "delay": _least(np.radians(np.mod(angle, 360)) / np.where(crossed == 0, 1, crossed), crossed),
+        "delay": _least(delay, crossed),
+        "disk": lowest(lambda w: disk_at(loop, w), omega),
+        "peak_sensitivity": highest(lambda w: inverse_peak(loop, w, of=0), omega),
+        "peak_complementary": highest(lambda w: inverse_peak(loop, w, of=1), omega),
     }
-
-    least["disk"] = lowest(lambda w: disk_at(loop, w), omega)
-    dip, at_peak = lowest(lambda w: inverse_peak(loop, w, of=0), omega)
-    least["peak_sensitivity"] = max(1.0, 1.0 / dip), at_peak
-    dip, at_peak = lowest(lambda w: inverse_peak(loop, w, of=1), omega)
-    least["peak_complementary"] = 1.0 / dip if dip else math.inf, at_peak
-    values = {name: _held(value, MARGIN_DIGITS) for name, (value, _) in least.items()}
-    places = {name: _held(where, PLACE_DIGITS) for name, (_, where) in least.items()}
+    values = {name: float(f"{value:.{MARGIN_DIGITS}g}") for name, (value, _) in least.items()}
+    values["peak_sensitivity"] = max(1.0, values["peak_sensitivity"])
+    places = {name: float(f"{where:.{PLACE_DIGITS}g}") for name, (_, where) in least.items()}
     by_phase = phase_crossovers(loop, omega)
     gain = gain_margin(loop, band) if isinstance(loop, Loop) else _nearest_to_one([t for _, t in by_phase])
     by_gain = tuple(sorted(zip(crossed.tolist(), angle.tolist(), strict=True)))
     return LoopMargins(band=band, gain=gain, **values, at=places, gain_crossovers=by_gain, phase_crossovers=by_phase)
 
 
-def _held(value: float, digits: int) -> float:
-    """The value to the digits that hold: those after them are the rounding of L next to its poles."""
-    return float(f"{value:.{digits}g}")
+def held(values: Real, spread: Real, most: int = MARGIN_DIGITS) -> Real:
+    """The values (n,) to the digits that hold: those after them are the rounding of L next to its poles.
+
+    That is `most` of them, or fewer where a value moves by more among the next doubles, by its `spread` (n,).
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        known = np.log10(abs(values) / spread)
+    digits = np.clip(np.ceil(np.nan_to_num(known, nan=0.0)), 1, most).astype(int)
+    return np.array([float(f"{value:.{count}g}") for value, count in zip(values, digits, strict=True)])
+
+
+def _spread(f: Callable[[Real], Real | Complex], omega: Real) -> Real:
+    """How far f of frequencies (n,) moves among the doubles next to each: nearer than that it is not known."""
+    if not omega.size:
+        return np.empty(0)
+    near = np.multiply.outer(1 + NEXT_DOUBLES, omega)
+    return np.asarray(abs(f(near.ravel()).reshape(near.shape) - f(omega)).max(axis=0))
 
 
 def inverse_peak(loop: Loop | LawLoop, omega: Real, of: int) -> Real:
@@ -149,12 +170,41 @@ def phase_crossovers(loop: Loop | LawLoop, omega: Real) -> tuple[tuple[float, fl
     drive, fed_back = loop.parts(1j * omega)
     (before,), _ = brackets((drive * fed_back.conj()).imag)
     place, factor = solved(lambda w: loop.parts(1j * w), omega[before], omega[before + 1])
-    found = [(float(w), float(t)) for w, t in zip(place, factor, strict=True) if AT_POLE < t < 1 / AT_POLE]
-    drive, fed_back = loop.parts(1j * omega[0] * np.array([1.0, 0.5]))
-    low, lower = -drive / np.where(fed_back == 0, np.inf, fed_back)
+    crosses = (factor > AT_POLE) & (factor < 1 / AT_POLE) & ~_through_pole_or_zero(loop, place)
+    place, factor = place[crosses], factor[crosses]
+    factor = held(factor, _spread(lambda w: _factor(loop, w), place), CROSSOVER_DIGITS)
+    found = list(zip(place.tolist(), factor.tolist(), strict=True))
+    low, lower = _factor(loop, omega[0] * np.array([1.0, 0.5]))
     if low.real > AT_POLE and max(abs(low.imag), abs(low - lower)) < REST * low.real:
         found.append((0.0, float(low.real)))
     return tuple(sorted(found))
+
+
+def _through_pole_or_zero(loop: Loop | LawLoop, place: Real) -> NDArray[np.bool_]:
+    """Of frequencies (n,) at which L turns from one side of the real axis to the other, which do so at a pole or zero.
+
+    There its denominator or numerator turns round and not L.  They are looked at as near as rounding lets the sides be
+    told: next to a narrow resonance L keeps so close to the axis that the place itself is not known.
+    """
+
+    def h(parts: tuple[Complex, Complex]) -> Real:
+        return np.asarray((parts[0] * parts[1].conj()).imag)
+
+    noise = _spread(lambda w: h(loop.parts(1j * w)), place)
+    turned, unsure = np.ones((2, place.size), bool)
+    for share in FARTHER:
+        before, after = (loop.parts(1j * place * (1 + side * share)) for side in (-1, 1))
+        told = unsure & (h(before) * h(after) < 0) & (np.minimum(abs(h(before)), abs(h(after))) > ABOVE_NOISE * noise)
+        ways = [(each * other.conj()).real for each, other in zip(before, after, strict=True)]
+        turned = np.where(told, np.less(ways, 0.0).any(axis=0), turned)
+        unsure &= ~told
+    return turned
+
+
+def _factor(loop: Loop | LawLoop, omega: Real) -> Complex:
+    """-1/L at i omega, 0 where L is infinite or vanishes."""
+    drive, fed_back = loop.parts(1j * omega)
+    return np.asarray(-drive / np.where(fed_back == 0, np.inf, fed_back))
 
 
 def _nearest_to_one(factors: list[float]) -> tuple[float, float]:
@@ -221,10 +271,11 @@ def _rigid(loop: Loop) -> tuple[float, float, float]:
 
 def gain_margin(loop: Loop, band: float) -> tuple[float, float]:
     """The factors on all gains at once, below and above 1, at which a pole first reaches the axis."""
-    law, arm, line = loop.law, loop.arm, Line(NO_FEEDBACK, loop.law)
-    if arm.is_reactive:
-        factors = [end / law.K2 for end in stable_moments(arm) if law.K2 * end > 0 and math.isfinite(end)]
+    law, arm, free, line = loop.law, loop.arm, loop.freed.arm, Line(NO_FEEDBACK, loop.law)
+    if free.is_reactive:
+        factors = [end / law.K2 for end in stable_moments(free) if law.K2 * end > 0 and math.isfinite(end)]
         factors += [each.t for each in static_crossings(arm, line)]
+        factors += [-arm.rate_loss / law.K1] if law.K1 and arm.rate_loss else []  # there the hub loses nothing
     else:
         factors = line_crossings(arm, line, band).gain.tolist()
     return _nearest_to_one(factors)
@@ -259,7 +310,17 @@ def lowest(f: Callable[[Real], Real], omega: Real) -> tuple[float, float]:
         found = minimize_scalar(value, bounds=(0.0, 1.0), method="bounded", options={"xatol": BOTTOM})
         if found.fun < least:
             least, at = float(found.fun), low + float(found.x) * width
-    return least, at
+    (least,) = held(np.array([least]), _spread(f, np.array([at])))
+    return float(least), at
+
+
+def highest(inverse: Callable[[Real], Real], omega: Real) -> tuple[float, float]:
+    """The highest value of a function whose inverse is given, and where; infinity where that vanishes."""
+    dip, at = lowest(inverse, omega)
+    if not dip:
+        return math.inf, at
+    (peak,) = held(np.array([1.0 / dip]), _spread(lambda w: 1.0 / inverse(w), np.array([at])))
+    return float(peak), at
 
 
 def _least(values: Real, where: Real) -> tuple[float, float]:

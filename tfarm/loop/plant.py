@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import GAINS, Arm, HubFeedback, must_be_arm
+from tfarm.arm import GAINS, RATE_GAIN, Arm, HubFeedback, must_be_arm
 from tfarm.arrays import Complex
 from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import Gains, gains_of, loop_parts, torque
@@ -17,7 +17,7 @@ from tfarm.exact.system import System, system_of
 from tfarm.records import record
 from tfarm.spectrum.correction import Member
 from tfarm.spectrum.damped import member
-from tfarm.spectrum.scales import check_gains
+from tfarm.spectrum.scales import check_gains, most_gain
 
 SMALLEST_NORMAL = float(np.finfo(float).tiny)  # a smaller double has not all its digits
 
@@ -81,6 +81,18 @@ class Loop:
     def moment_share(self) -> float:
         """How much of the moment on the hub the law takes off it: K2, over the input that a torque of 1 N m takes."""
         return self.law.K2 / self.arm.input_per_torque
+
+    @cached_property
+    def freed(self) -> Loop:
+        """A loop with the same poles whose hub loses nothing, if only that hides a reactive arm: the law's K1 takes it.
+
+        Friction and back-EMF act as a rate gain does where the input acts at once.  Otherwise the loop itself.
+        """
+        arm, whole = self.arm.lossless_hub, self.at_hub[0]
+        is_loop = arm.hub_side_inertia > 0 and abs(whole) <= most_gain(arm, RATE_GAIN)
+        if not (self.arm.rate_loss and arm.is_reactive and is_loop):
+            return self
+        return Loop(arm, self.law.having(RATE_GAIN, whole))
 
     @property
     def is_told_by_theorem(self) -> bool:

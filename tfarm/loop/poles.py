@@ -70,9 +70,9 @@ class Poles(Generic[AnyLoop]):
         `driven_modes`).
         """
         right = self.values.real > AXIS_SHARE * abs(self.values)
-        loop = self.loop
-        if isinstance(loop, LawLoop):  # of which no theorem on gains at the hub tells anything
+        if isinstance(self.loop, LawLoop):  # of which no theorem on gains at the hub tells anything
             return count_with_mirrors(self.values[right])
+        loop = self.loop.freed
         if loop.arm.is_undamped and loop.is_told_by_theorem and loop.takes_energy < 0:
             right |= (self.values.imag > 0) & (abs(self.values.real) <= AXIS_SHARE * abs(self.values))
         on_rate, on_moment = loop.law.point
@@ -146,6 +146,8 @@ def poles_below(loop: Loop, height: float, factors: tuple[float, ...] = TRIED_HE
 
     Where a zero lies on the edge of the box the next of the `factors` on the height is tried.
     """
+    if loop.freed is not loop and loop.freed.is_lossless:  # with its poles at 0 and on the axis where they belong
+        return replace(poles_below(loop.freed, height, factors), loop=loop)
     at_zero = zeros_at_origin(loop.k, loop.gains)
     starts, known = starting_points(loop, 1.3 * height), slow_poles(loop, SLOW_SHARE * height)
     function = loop.member.function

@@ -71,20 +71,31 @@ class Region:
         return replace(self, K1=across, K2=up, unstable=unstable)
 
     @property
+    def freed(self) -> Arm:
+        """The arm without what its hub loses, if only that hides a reactive one (`Loop.freed`), else itself."""
+        return Loop(self.arm, self.held).freed.arm
+
+    @property
+    def upright(self) -> float:
+        """The K1 that takes from a `freed` arm what its hub loses."""
+        return 0.0 - self.arm.rate_loss
+
+    @property
     def stable_intervals(self) -> list[list[Window]]:
         """For each K1 the intervals of K2, cut to the map, in which nothing grows: the region with exact edges.
 
-        At C = 0 the same for every K1 > 0, by Lyapunov's theorem and the static balance, and none for others.
+        Of a `freed` arm the same for every K1 > `upright`, by Lyapunov's theorem and the static balance, and none for
+        others.
         """
-        low, high = float(self.K2[0]), float(self.K2[-1])
-        if self.arm.is_reactive:
+        low, high, arm = float(self.K2[0]), float(self.K2[-1]), self.freed
+        if arm.is_reactive:
             law = HubFeedback(K1=1.0, Kp=self.Kp)
-            static = [each.t for each in static_crossings(self.arm, along("K2", law))]
-            ends = {low, high, *stable_moments(self.arm), *static}
+            static = [each.t for each in static_crossings(arm, along("K2", law))]
+            ends = {low, high, *stable_moments(arm), *static}
             pairs = itertools.pairwise(sorted(end for end in ends if low <= end <= high))
-            loop = Loop(self.arm, law)
-            held = [pair for pair in pairs if holds_undamped(loop, law.having("K2", sum(pair) / 2))]
-            return [held if K1 > 0 else [] for K1 in self.K1]
+            loop = Loop(arm, law)
+            held = [pair for pair in pairs if holds_undamped(replace(loop, law=law.having("K2", sum(pair) / 2)))]
+            return [held if self.upright < K1 else [] for K1 in self.K1]
         first = self.unstable[0].tolist()
         return [intervals(found, low, high, low, count) for found, count in zip(self.crossings, first, strict=True)]
 
@@ -92,24 +103,26 @@ class Region:
     def stable(self) -> NDArray[np.bool_]:
         """Where no pole is unstable, the free hub angle has not two poles at 0 (K1 = Kp = 0), and something damps."""
         drifts = (self.K1 == 0) & self.arm.has_rigid_mode & (self.Kp == 0)
-        swings = (self.K1 == 0) & self.arm.is_reactive
-        no_moment_is_left = np.equal(self.K2, self.arm.input_per_torque) & self.arm.is_told_by_lyapunov
+        swings = (self.upright == self.K1) & self.freed.is_reactive
+        no_moment_is_left = np.equal(self.K2, self.arm.input_per_torque) & self.freed.is_told_by_lyapunov
         return np.asarray((self.unstable == 0) & ~(drifts | swings) & ~no_moment_is_left[:, None])
 
 
 def region(arm: Arm, K1: Real, K2: Real, Kp: float = 0.0) -> Region:
     """The map over the grid of K1 and K2 (1-D, ascending).
 
-    A grid line exactly on K1 = 0 or K2 = 1 at C = 0 is not stable, though no pole need be right of the axis there, nor
+    What a hub loses beside an arm without losses is added to K1, for which the theorems of such an arm then hold.  A
+    grid line exactly on K1 = 0 or K2 = 1 at C = 0 is not stable, though no pole need be right of the axis there, nor
     is K1 = 0 where the hub angle is free.  Raises ParameterError where there is no loop or the grid is empty.
     """
     K1, K2 = ascending("K1", K1, MOST_GRID_GAINS), ascending("K2", K2, MOST_GRID_GAINS)
-    Loop(arm, HubFeedback(K1=float(K1[-1]), K2=float(K2[-1]), Kp=Kp))
-    if arm.is_told_by_lyapunov:
-        return Region(arm, Kp, K1, K2, _undamped_counts(arm, K1, K2, Kp), np.empty((0, 3)), 0.0, [])
-    if arm.is_reactive:
-        band = float(locked_edges(arm).at.max())
-        return Region(arm, Kp, K1, K2, _lossless_counts(arm, K1, K2, Kp), np.empty((0, 3)), band, [])
+    free = Loop(arm, HubFeedback(K1=float(K1[-1]), K2=float(K2[-1]), Kp=Kp)).freed.arm
+    if free.is_told_by_lyapunov:
+        counts = _undamped_counts(free, K1 + arm.rate_loss, K2, Kp)
+        return Region(arm, Kp, K1, K2, counts, np.empty((0, 3)), 0.0, [])
+    if free.is_reactive:
+        counts, band = _lossless_counts(free, K1 + arm.rate_loss, K2, Kp), float(locked_edges(free).at.max())
+        return Region(arm, Kp, K1, K2, counts, np.empty((0, 3)), band, [])
     corners = [HubFeedback(K1=float(a), K2=float(b), Kp=Kp) for a in (K1[0], K1[-1]) for b in (K2[0], K2[-1])]
     band = max(loop_band(Loop(arm, law))[0] for law in corners)
     omega = np.asarray(grid(arm, band))
@@ -118,10 +131,6 @@ def region(arm: Arm, K1: Real, K2: Real, Kp: float = 0.0) -> Region:
     (without_K2,) = counts_over(K1, [line_crossings(arm, along("K1", without), band)], float(K1[-1]), last)
     found = _crossings_along_K2(arm, K1, Kp, omega)
     unstable = counts_over(K2, found, 0.0, without_K2).T
-    if Loop(arm, HubFeedback()).is_told_by_theorem and arm.reads_hub_moment and arm.loses_at_hub_alone:
-        # of elastic links behind a hub that friction alone damps every mode is driven, and the band has but the first
-        taken = np.sign(1.0 - K2[:, None] / arm.input_per_torque) * np.sign(K1 + arm.rate_loss)
-        unstable = np.where(taken < 0, INFINITE, unstable)  # as `Loop.takes_energy` says
     return Region(arm, Kp, K1, K2, unstable, boundary(arm, omega, Kp), band, found)
 
 

@@ -39,7 +39,8 @@ NOT_BOUNDED = (  # beyond the band: of a rig with a segment without damping, and
     "beyond the band not bounded: the small-gain condition would need more modes than are looked at",
 )
 NO_THEOREM = "beyond the band no theorem tells the modes where the gauge does not read the moment on the hub"
-MIRRORED = "C = 0 and K1 < 0: the poles are those of -K1 mirrored, infinitely many of them unstable"
+MIRRORED = "C = 0 and {rate} < 0: the poles are those of {opposite} mirrored, infinitely many of them unstable"
+RATES = ("K1", "-K1"), ("K1 + b, with what the hub loses,", "-(K1 + b)")  # of a hub without losses, and with them
 DRIVEN = "C = 0: every flexible mode beyond the band is unstable too, with a growth rate that tends to 0"
 UNFELT = 1e-9  # a hub participation below this share of an ordinary one is none
 
@@ -93,17 +94,17 @@ class Beyond(NamedTuple):
 
 
 def _verdict(poles: Poles, is_unstable: bool, loop: Loop) -> str:
-    moving, law = poles.moving, loop.law
+    moving, law, free = poles.moving, loop.law, loop.freed
     if is_unstable or bool((moving.real > MARGIN_OF_ZERO * abs(moving)).any()):
         return "unstable"
     at_zero = poles.values.size - moving.size
     if at_zero > 1 or (at_zero == 1 and law.K1 == 0):
         return "marginal"
-    if loop.is_lossless:
+    if free.is_lossless:
         return "marginal"
-    if loop.arm.is_reactive:
-        told = loop.is_told_by_theorem
-        return "marginal" if told and not is_felt(loop.arm, poles.box.im_max) else "stable"
+    if free.arm.is_reactive:
+        told = free.is_told_by_theorem
+        return "marginal" if told and not is_felt(free.arm, poles.box.im_max) else "stable"
     must_be_off_axis(moving)
     return "stable"
 
@@ -148,7 +149,7 @@ def _beyond(loop: Loop, quiet: bool) -> Beyond:
         if law.K1 == 0:
             return Beyond("C = 0 and K1 = 0: nothing takes or gives energy, modes beyond the band lie on the axis")
         return Beyond("C = 0 and K2 = 1: modes with the hub at rest stay undamped, in every band")
-    if arm.is_reactive:
+    if loop.freed.arm.is_reactive:
         return _beyond_lossless(loop)
     if quiet:
         return Beyond(f"beyond the band |L(iw)| < {QUIET:g} and falling: no unstable pole there (small gain)")
@@ -157,12 +158,13 @@ def _beyond(loop: Loop, quiet: bool) -> Beyond:
 
 def _beyond_lossless(loop: Loop) -> Beyond:
     """Without losses, where the gauge does not read the moment on the hub: by the modes of the locked hub."""
-    law = loop.law
+    arm, law = loop.freed.arm, loop.freed.law
+    rate, opposite = RATES[arm is not loop.arm]
     if not law.K1:
-        return Beyond(f"C = 0 and K1 = 0: nothing takes or gives energy; {NO_THEOREM}", is_known=False)
-    edges, driven = locked_edges(loop.arm), driven_modes(loop.arm, law.K2)
+        return Beyond(f"C = 0 and {rate} = 0: nothing takes or gives energy; {NO_THEOREM}", is_known=False)
+    edges, driven = locked_edges(arm), driven_modes(arm, law.K2)
     if law.K1 < 0:
-        return Beyond(MIRRORED, is_infinite=True, is_unstable=True)
+        return Beyond(MIRRORED.format(rate=rate, opposite=opposite), is_infinite=True, is_unstable=True)
     which = f"the first {len(edges)} modes of the locked hub, up to {edges.at.max():.4g} rad/s"
     if len(driven):
         words = f"C = 0: K2 is beyond the edge of {len(driven)} among {which}: two poles of each grow, ever more slowly"
@@ -173,7 +175,7 @@ def _beyond_lossless(loop: Loop) -> Beyond:
 def loop_band(loop: Loop) -> tuple[float, bool]:
     """The band [rad/s] in which poles are computed, and whether the loop is quiet beyond it (always False at C = 0)."""
     few = band_of(loop.arm, LEAST_BAND_MODES)
-    if loop.arm.is_reactive or (loop.is_told_by_theorem and (loop.arm.is_undamped or loop.takes_energy > 0)):
+    if loop.freed.arm.is_reactive or (loop.is_told_by_theorem and (loop.arm.is_undamped or loop.takes_energy > 0)):
         return few, False
     band = few
     while modes_below(loop.arm, band) <= MOST_BAND_MODES:

@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from tfarm.arm import MOMENT_GAIN, HubFeedback
+from tfarm.arm import MOMENT_GAIN
 from tfarm.crossing import Crossing, Crossings, counts_over
 from tfarm.records import record
 from tfarm.spectrum import modes
@@ -52,15 +52,15 @@ class Windows:
 
 def gain_windows(verdict: Stability, name: str) -> Windows:
     """The windows of the gain of that name through the loop whose verdict is given."""
-    loop, law = verdict.loop, verdict.loop.law
+    loop, law, free = verdict.loop, verdict.loop.law, verdict.loop.freed
     value = law[name]
     if name == "K2" and loop.arm.has_massless_hub:
         return Windows(name, None, (), (0.0, 0.0), Crossings.of([]))  # an algebraic loop but for K2 = 0
     low, high = looked_at(loop, name)
-    if loop.arm.is_reactive:
+    if free.arm.is_reactive:
         found, told = _undamped(loop, name).within(low, high), name != "K2" and law.K2 == 0
-        told = told or loop.arm.is_told_by_lyapunov  # every mode, by a theorem
-        band = math.inf if told else float(locked_edges(loop.arm).at.max())
+        told = told or free.arm.is_told_by_lyapunov  # every mode, by a theorem
+        band = math.inf if told else float(locked_edges(free.arm).at.max())
     else:
         ends = (Loop(loop.arm, law.having(name, end)) for end in (low, high))
         band = max(verdict.band, *(loop_band(end)[0] for end in ends))
@@ -87,18 +87,19 @@ def looked_at(loop: Loop, name: str) -> Interval:
 
 
 def _undamped(loop: Loop, name: str) -> Crossings:
-    """Without losses: every mode at once at K2 = 1 (or each at its own K2, see `lossless`) and at K1 = 0.
+    """Without losses: every mode at once at K2 = 1 (or each at its own K2, see `lossless`) and where K1 makes up for
+    what the hub loses, 0 or below.
 
     A real pole passes through 0 where stiffness or inertia vanishes.
     """
-    arm, K1 = loop.arm, loop.law.K1
-    found = static_crossings(arm, along(name, loop.law))
+    arm, K1, at = loop.freed.arm, loop.freed.law.K1, 0.0 - loop.arm.rate_loss
+    found = static_crossings(loop.arm, along(name, loop.law))
     if name == "K2" and arm.is_told_by_lyapunov:
         found.append(Crossing(arm.input_per_torque, math.inf, 1 if K1 > 0 else -1))
     elif name == "K2" and K1:
         found += [each._replace(change=each.change * int(math.copysign(1, K1))) for each in locked_edges(arm)]
-    if name == "K1" and not any(each.t == 0 for each in found):
-        found.append(Crossing(0.0, math.inf, -1 if _is_braked(loop) else 1))
+    if name == "K1" and not any(each.t == at for each in found):
+        found.append(Crossing(at, math.inf, -1 if _is_braked(loop.freed) else 1))
     return Crossings.of(found)
 
 
@@ -113,8 +114,9 @@ def reach_words(windows: Iterable[Windows]) -> str:
 def _counts(verdict: Stability, name: str, pairs: list[Interval], found: Crossings) -> list[int]:
     """Unstable poles in each window: counted in one, by the crossings in the others; at C = 0 whether there are any."""
     loop, value = verdict.loop, verdict.loop.law[name]
-    if loop.arm.is_reactive:
-        return [0 if holds_undamped(loop, loop.law.having(name, (low + high) / 2)) else 1 for low, high in pairs]
+    if loop.freed.arm.is_reactive:
+        laws = [loop.law.having(name, (low + high) / 2) for low, high in pairs]
+        return [0 if holds_undamped(Loop(loop.arm, law).freed) else 1 for law in laws]
     middles = np.array([(low + high) / 2 for low, high in pairs])
     if verdict.verdict != "marginal" and any(low < value < high for low, high in pairs):
         known = verdict.unstable_roots
@@ -134,16 +136,16 @@ def _is_braked(loop: Loop) -> bool:
     return low < loop.law.K2 < high
 
 
-def holds_undamped(loop: Loop, law: HubFeedback) -> bool:
+def holds_undamped(loop: Loop) -> bool:
     """Whether no pole is right of the axis without losses: K1 > 0, K2 < 1 (Lyapunov), and nothing falls statically.
 
     K2 is between `stable_moments` where the gauge does not read the hub's moment: no pole of the modes looked at then.
     """
-    low, high = stable_moments(loop.arm)
+    (low, high), law = stable_moments(loop.arm), loop.law
     if not (law.K1 > 0 and low < law.K2 < high):
         return False
     small = np.array([1e-9 * float(modes(loop.arm, 1).natural_frequency[-1])], dtype=complex)
-    return bool(law.Kp >= 0 or (1 + Loop(loop.arm, law).loop_function(small)[0]).real > 0)
+    return bool(law.Kp >= 0 or (1 + loop.loop_function(small)[0]).real > 0)
 
 
 def _with_proven_ends(loop: Loop, name: str, pair: Interval, limits: Interval) -> Interval:
@@ -153,11 +155,11 @@ def _with_proven_ends(loop: Loop, name: str, pair: Interval, limits: Interval) -
     Without losses no pole crosses at any K1 > 0 or Kp > 0, whatever the gauge reads (`lossless`).
     """
     low, high = pair
-    law = loop.law
-    if loop.arm.input_lags:
+    free, law = loop.freed.arm, loop.freed.law
+    if free.input_lags:
         return low, high  # a voltage reaches the hub late: it is not passive
     if name == "K2":
-        is_proven = loop.arm.is_told_by_lyapunov and law.K1 > 0 and law.Kp >= 0
+        is_proven = free.is_told_by_lyapunov and law.K1 > 0 and law.Kp >= 0
         return (-math.inf if is_proven and low == limits[0] else low), high
-    is_proven = _is_braked(loop) and (name == "K1" or law.K1 > 0) and (name == "Kp" or law.Kp >= 0)
+    is_proven = _is_braked(loop.freed) and (name == "K1" or law.K1 > 0) and (name == "Kp" or law.Kp >= 0)
     return low, (math.inf if is_proven and high == limits[1] else high)

@@ -137,7 +137,7 @@ def nice_levels(low: float, high: float) -> list[float]:
 
 def draw_boundary(found: Region, points: Real, x: Axis, y: Axis, ax: Axes) -> None:
     """The exact edge (n, 3) with its frequencies; without damping an upright line and a level one."""
-    if found.arm.is_reactive:
+    if found.freed.is_reactive:
         _undamped_boundary(found, x, y, ax)
         return
     ax.plot(points[:, 0], points[:, 1], color=INK, lw=1.6, label="poles on the axis at iω, exact")
@@ -164,14 +164,14 @@ def _undamped_boundary(found: Region, x: Axis, y: Axis, ax: Axes) -> None:
     _, up = found.axes
     cut = {float(up[0]): y.low, float(up[-1]): y.high}  # an end there is the map's and not the region's
     for low, high in found.stable_intervals[-1]:
-        side = [(0.0, cut.get(end, end)) for end in (low, high)]
+        side = [(found.upright, cut.get(end, end)) for end in (low, high)]
         corners = [(x.high, low)] * (low not in cut) + side + [(x.high, high)] * (high not in cut)
         ax.plot(*zip(*corners, strict=True), color=INK, lw=1.8, label=label)
         label = None
-    if not found.arm.is_told_by_lyapunov:
-        edges = sorted(locked_edges(found.arm).within(y.low, y.high), key=lambda each: each.at)
+    if not found.freed.is_told_by_lyapunov:
+        edges = sorted(locked_edges(found.freed).within(y.low, y.high), key=lambda each: each.at)
         for number, each in enumerate(edges):
-            ax.plot([0, x.high], [each.t, each.t], color=INK, lw=0.5)
+            ax.plot([found.upright, x.high], [each.t, each.t], color=INK, lw=0.5)
             if number < MOST_MARKED:
                 text = f"{significant(each.at, 4)} rad/s, the hub at rest"
                 ax.add_artist(Label(text, [(x.high, each.t)], AT_RIGHT, may_go=True, fontsize=7.5))
@@ -179,8 +179,8 @@ def _undamped_boundary(found: Region, x: Axis, y: Axis, ax: Axes) -> None:
     whole = found.arm.input_per_torque
     if not y.low < whole < y.high:
         return
-    ax.plot([0, 0], [whole, y.high], color=INK, lw=0.8)
-    ax.plot([x.low, 0], [whole, whole], color=INK, lw=0.8)
+    ax.plot([found.upright, found.upright], [whole, y.high], color=INK, lw=0.8)
+    ax.plot([x.low, found.upright], [whole, whole], color=INK, lw=0.8)
     omega = modes(found.arm.having(hub_inertia=math.inf), 3).natural_frequency
     text = f"on this line every mode with the hub at rest: {', '.join(significant(float(w), 4) for w in omega)} … rad/s"
     ax.add_artist(Label(text, [(x.high, whole)], AT_RIGHT, fontsize=8.5))
@@ -277,7 +277,7 @@ def _placed(clear: NDArray[np.bool_], words: str, short: str) -> tuple[int, int,
         sides = (TALL * LETTER[1] * rows, len(text) * LETTER[0] * columns)
         if turn:
             sides = (len(text) * LETTER[1] * rows, TALL * LETTER[0] * columns)
-        size = tuple(max(1, math.ceil(side)) for side in sides)
+        size = tuple(2 * math.ceil(max(0.0, side - 1) / 2) + 1 for side in sides)  # odd: about the words
         fits = np.argwhere(ndimage.minimum_filter(clear, size=size, mode="constant", cval=False))
         if fits.size:
             row, column = fits[np.argmin(((fits - middle) ** 2).sum(axis=1))].tolist()

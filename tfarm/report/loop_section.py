@@ -171,7 +171,7 @@ def _best_words(data: MapOfArm) -> str:
 def _map_caption(data: MapOfArm) -> str:
     proof = proof_words(data.arm)
     unit = f"{plain(rate_unit(data.arm), 4)} {unit_of(RATE_GAIN, data.arm)}"
-    reach = ALL_MODES if data.arm.is_told_by_lyapunov else UP_TO.format(band=significant(data.region.band, 5))
+    reach = ALL_MODES if data.region.freed.is_told_by_lyapunov else UP_TO.format(band=significant(data.region.band, 5))
     free = data.arm.has_rigid_mode
     seen = MAP_SEEN.format(
         band=significant(data.band, 5),

@@ -1,0 +1,67 @@
+"""What a hub loses beside an arm without losses is a rate gain: every mode turns where K1 makes up for it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tfarm
+from tests.loop.rig_loops import RigLoop
+from tfarm import Hub, HubFeedback
+from tfarm.arm import Motor
+from tfarm.loop.margins import margins_of_gains
+from tfarm.loop.regions import region
+from tfarm.loop.stability import stability
+
+ELASTIC = tfarm.load("sasaki2012")
+LOSS = 0.5  # N m s/rad
+ROOT = replace(ELASTIC, name="root", hub=Hub(inertia=ELASTIC.hub.inertia, friction=LOSS))
+CLAMP = replace(ROOT, name="clamp", hub=replace(ROOT.hub, radius=0.06))  # whose gauge reads another moment than the hub
+LAGGING = replace(
+    ROOT,
+    name="lagging",
+    input="motor_voltage",
+    motor=Motor(resistance=1.0, torque_constant=0.1, inductance=0.01, gear_ratio=10.0),
+)
+
+
+@pytest.mark.parametrize("arm", [ROOT, CLAMP], ids=lambda arm: arm.name)
+@pytest.mark.parametrize("K2", [-0.5, 0.3])
+def test_the_window_of_K1_ends_where_the_hub_loses_nothing(arm, K2):
+    """Not at ends torn by rounding: beside it elements have every mode of the first six right or left of the axis."""
+    assert margins_of_gains(arm, HubFeedback(K1=1.0, K2=K2)).windows["K1"].all == ((-LOSS, np.inf),)
+    omega = tfarm.modes(arm, 20).natural_frequency
+    loop = RigLoop(arm, omega[-1])
+    for K1, side in ((-1.02 * LOSS, 1), (-0.98 * LOSS, -1), (1.0, -1)):
+        s = loop.eigenvalues(HubFeedback(K1=K1, K2=K2))
+        assert (np.sign(s.real[(abs(s) > 1e-3) & (abs(s) < omega[6])]) == side).all()
+
+
+@pytest.mark.parametrize("arm", [ROOT, CLAMP], ids=lambda arm: arm.name)
+def test_where_nothing_is_lost_the_loop_is_marginal(arm):
+    assert stability(arm, HubFeedback(K1=-LOSS, K2=0.3)).verdict == "marginal"
+
+
+@pytest.mark.parametrize("arm", [ROOT, CLAMP, LAGGING], ids=lambda arm: arm.name)
+def test_the_map_is_what_the_verdict_says(arm):
+    """Of finitely many unstable poles too: behind an inductance friction damps the modes that no gain reaches."""
+    K1, K2 = np.array([-3.0, -0.7, -0.3, 0.5]), np.array([-0.5, 0.3, 1.2, 10.5, 14.0])
+    found = region(arm, K1, K2)
+    for row, b in enumerate(K2):
+        for column, a in enumerate(K1):
+            there, count = stability(arm, HubFeedback(K1=float(a), K2=float(b))), found.unstable[row, column]
+            assert bool(found.stable[row, column]) == there.is_stable
+            assert (count == -1) == there.unstable_roots_infinite
+            assert count in (-1, there.unstable_roots) or (
+                arm is CLAMP and count > there.unstable_roots
+            )  # of more modes
+
+
+def test_the_gain_margin_is_where_elements_turn():
+    """K1 < 0 that the friction outweighs: at b/|K1| every mode turns at once, before K2 does."""
+    law = HubFeedback(K1=-0.2, K2=0.1, Kp=0.5)
+    found = margins_of_gains(ROOT, law).in_band.gain
+    assert found[1] == pytest.approx(LOSS / 0.2, rel=1e-12)
+    loop = RigLoop(ROOT, tfarm.modes(ROOT, 12).natural_frequency[-1])
+    below, above = (loop.eigenvalues(HubFeedback(K1=-0.2 * t, K2=0.1 * t, Kp=0.5 * t)).real.max() for t in (2.49, 2.51))
+    assert below < 0 < above

@@ -1,0 +1,119 @@
+"""The same loop in other units of mass, length and time: no answer may compare a quantity with a plain number."""
+
+import numpy as np
+import pytest
+
+import tfarm
+from tests.loop.test_hub_losses import CLAMP
+from tests.rigs import some_rig
+from tests.shared import thinned
+from tests.similar import EITHER, TORQUE
+from tfarm import HubFeedback
+from tfarm.loop.margins import margins_of_gains
+from tfarm.loop.regions import region
+from tfarm.spectrum.scales import default_gains
+
+LAB, STOCKY, MOTOR = (tfarm.load(name) for name in ("sasaki2012-lab", "stocky-steel", "quanser-flexlink"))
+LEAD = {"hub_angle": ([3.0, 20.0], [0.002, 1.0]), "root_moment": ([0.2], [1e-4, 2e-2, 1.0])}  # num and den in s
+LOOPS = {
+    "lab": (LAB, HubFeedback(K1=0.3, K2=-0.6)),
+    "lab held": (LAB, HubFeedback(K1=0.3, K2=0.3, Kp=2.0)),
+    "stocky": (STOCKY, default_gains(STOCKY)),
+    "clamp": (CLAMP, HubFeedback(K1=0.2, K2=-0.3)),
+    "motor": (MOTOR, default_gains(MOTOR)),
+}
+POWERS = {"phase": 0, "phase_lag": 0, "phase_lead": 0, "delay": 1, "disk": 0, "peak_sensitivity": 0}
+POWERS |= {"peak_complementary": 0}
+
+
+def digits(*numbers):
+    """How many significant digits the shortest of them is written with."""
+    return min(len(repr(abs(each)).split("e")[0].replace(".", "").strip("0")) for each in numbers)
+
+
+def agree(here, there, unit=1.0):
+    """Whether two numbers are one, to the digits that the shorter is given with."""
+    shown = digits(here, there)
+    return here * unit == there or abs(here * unit - there) <= 3 * 10.0 ** (1 - shown) * abs(there)
+
+
+def must_agree(here, there, units):
+    """Margins (`LoopMargins`) of a loop and of the same in other units."""
+    for name, power in POWERS.items():
+        assert agree(getattr(here, name), getattr(there, name), units.time**power), name
+        assert here.at[name] == pytest.approx(there.at[name] * units.time, rel=1e-5), name
+    np.testing.assert_allclose(there.gain, here.gain, rtol=1e-7)
+    for pairs in ("gain_crossovers", "phase_crossovers"):
+        here_, there_ = (np.array(getattr(each, pairs)).reshape(-1, 2) for each in (here, there))
+        np.testing.assert_allclose(there_[:, 0] * units.time, here_[:, 0], rtol=1e-9)
+        assert all(agree(*pair) for pair in zip(here_[:, 1].tolist(), there_[:, 1].tolist(), strict=True))
+
+
+def must_be_one_loop(arm, law, units):
+    """Verdict, windows and margins of the loop and of the same in other units."""
+    other = units.arm(arm), units.law(arm, law)
+    here, there = margins_of_gains(arm, law), margins_of_gains(*other)
+    assert there.stability.verdict == here.stability.verdict
+    assert there.stability.unstable_roots == here.stability.unstable_roots
+    for name, windows in here.windows.items():
+        unit = units.law(arm, HubFeedback(**{name: 1.0}))[name]
+        np.testing.assert_allclose(there.windows[name].all, np.multiply(windows.all, unit), rtol=1e-5)
+    assert (there.in_band is None) == (here.in_band is None)
+    if here.in_band is not None:
+        must_agree(here.in_band, there.in_band, units)
+
+
+@pytest.mark.parametrize("units", EITHER.values(), ids=EITHER)
+@pytest.mark.parametrize("name", LOOPS)
+def test_a_loop_has_the_same_margins(name, units):
+    must_be_one_loop(*LOOPS[name], units)
+
+
+@pytest.mark.parametrize("seed", thinned(range(16), 4))
+def test_random_rigs_have_the_same_margins(seed):
+    """Where poles are too narrow for doubles too: fewer digits are given then, and no crossing that is a pole."""
+    rng = np.random.default_rng([41, seed])
+    rigs = (some_rig(rng) for _ in range(20))
+    arm = next(arm for arm in rigs if arm.input != "hub_angle" and not arm.is_locked)
+    unit = default_gains(arm)
+    law = HubFeedback(K1=unit.K1 * float(10 ** rng.uniform(-1, 3)), K2=unit.K2 * float(rng.uniform(-3, 3)))
+    must_be_one_loop(arm, law, EITHER["slow" if seed % 2 else "fast"])
+
+
+@pytest.mark.parametrize("units", EITHER.values(), ids=EITHER)
+@pytest.mark.parametrize("arm", [LAB, CLAMP], ids=lambda arm: arm.name)
+def test_a_map_has_the_same_counts(arm, units):
+    K1, K2 = np.linspace(-1.03, 2, 7), np.linspace(-2.04, 2, 8)
+    here = region(arm, K1, K2)
+    unit = units.law(arm, HubFeedback(K1=1.0, K2=1.0))
+    there = region(units.arm(arm), K1 * unit.K1, K2 * unit.K2)
+    np.testing.assert_array_equal(there.unstable, here.unstable)
+    np.testing.assert_allclose(there.boundary[:, 0], here.boundary[:, 0] * unit.K1, rtol=1e-6)
+
+
+@pytest.mark.parametrize("units", EITHER.values(), ids=EITHER)
+def test_a_law_with_dynamics_has_the_same_margins(units):
+    other, law = units.arm(LAB), units.law(LAB, LEAD)
+    here, there = tfarm.margins(LAB, tfarm.Law(LEAD)), tfarm.margins(other, law)
+    assert there.stability.verdict == here.stability.verdict == "stable"
+    must_agree(here.in_band, there.in_band, units)
+    here, there = tfarm.closed_loop_poles(LAB, tfarm.Law(LEAD), 14), tfarm.closed_loop_poles(other, law, 14)
+    np.testing.assert_allclose(there.values * units.time, here.values, rtol=1e-9)
+
+
+@pytest.mark.parametrize("units", EITHER.values(), ids=EITHER)
+@pytest.mark.parametrize(("vary", "ends"), [("K2", (-1.0, 1.5)), ("K1", (0.0, 40.0)), ("Kp", (0.0, 300.0))])
+def test_a_locus_has_the_same_branches(vary, ends, units):
+    law, other = HubFeedback(K1=0.3, K2=0.3), units.arm(LAB)
+    unit = units.law(LAB, HubFeedback(**{vary: 1.0}))[vary]
+    here = tfarm.locus(LAB, law, vary, *ends, points=12, branches=5)
+    there = tfarm.locus(other, units.law(LAB, law), vary, *(unit * end for end in ends), points=12, branches=5)
+    np.testing.assert_allclose(there.gain, here.gain * unit, rtol=1e-9)
+    np.testing.assert_allclose(there.branches * units.time, here.branches, rtol=1e-7, atol=1e-9)
+
+
+def test_the_units_are_those_of_mechanics():
+    """A torque's unit from those of mass, length and time; a moment's gain is a torque for a torque."""
+    units = EITHER["slow"]
+    assert units.of(TORQUE) == units.mass * units.length**2 / units.time**2
+    assert units.law(LAB, HubFeedback(K2=0.3)).K2 == 0.3
