@@ -18,10 +18,8 @@ LAW = HubFeedback(K1=0.3, K2=0.3)
 
 
 @pytest.mark.parametrize("arm", [LAB, HELD], ids=["free", "held"])
-def test_the_first_frequency_is_the_lowest_that_swings(arm):
-    table = tfarm.modes(arm, 4).natural_frequency
+def test_a_range_that_can_be_followed_is_not_cut(arm):
     found = loci(arm, LAW, "K2", 0.0, 0.5)
-    assert found.first == min(table[table > 0])
     assert not found.is_cut
     assert (found.name, found.exact.gain[0], found.exact.gain[-1]) == ("K2", 0.0, 0.5)
 

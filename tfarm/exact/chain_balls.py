@@ -6,6 +6,7 @@ Segments are crossed by their transition functions, entire in s^2/(1 + C s): no 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
@@ -44,6 +45,20 @@ _beyond_offset, _beyond_spring, _beyond_body = (
     python_of(beyond_body),
 )
 _row_across, _met = python_of(row_across), python_of(met)
+
+
+def summed(z_sum: Any, z_product: Any, count: int) -> list[Any]:
+    """F0..F3 at a segment's end by so many terms of their series in z1 + z2 and z1 z2: `Jet`s, or series of flint."""
+    h, before, sums = 0 * z_sum + 1, 0 * z_sum, [0 * z_sum] * 4
+    factorial = Fraction(1)
+    for n in range(count):
+        factorial = factorial / max(1, (2 * n) * (2 * n - 1))  # 1/(2 n)!
+        terms = [factorial]
+        for shift in (1, 2, 3):
+            terms.append(terms[-1] / (2 * n + shift))
+        sums = [total + h * rational(term) for total, term in zip(sums, reversed(terms), strict=True)]
+        h, before = z_sum * h - z_product * before, h
+    return sums
 
 
 class Sweep:

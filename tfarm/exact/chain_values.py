@@ -16,7 +16,7 @@ from tfarm.errors import ParameterError
 
 from .balls import Ball, precision, rational
 from .chain import ElementChain, Layout
-from .chain_balls import Sweep
+from .chain_balls import Sweep, summed
 from .elements import Place
 from .jets import Jet
 from .outputs import Output, unit_scale
@@ -212,16 +212,7 @@ class SlowSweep(Sweep):
 
     def _functions(self, z_sum: Any, z_product: Any) -> tuple[Any, ...]:
         """F0..F3 by their series in z1 + z2 and z1 z2, which begin with s^2 both."""
-        h, before, sums = Jet([rational(1), *[rational(0)] * (len(self.s.c) - 1)]), None, [0 * z_sum] * 4
-        factorial = Fraction(1)
-        for n in range(2 * len(self.s.c)):
-            factorial = factorial / max(1, (2 * n) * (2 * n - 1))  # 1/(2 n)!
-            terms = [factorial, *[Fraction(0)] * 3]
-            for shift in (1, 2, 3):
-                terms[shift] = terms[shift - 1] / (2 * n + shift)
-            sums = [total + h * rational(term) for total, term in zip(sums, reversed(terms), strict=True)]
-            h, before = z_sum * h - (z_product * before if before is not None else 0 * h), h
-        return tuple(sums)
+        return tuple(summed(z_sum, z_product, 2 * len(self.s.c)))
 
 
 def expansions(chain: ElementChain, wanted: Sequence[Output], x: float) -> list[tuple[float, float, float, float]]:

@@ -15,7 +15,7 @@ import flint
 
 from .balls import Ball, rational
 from .chain import ElementChain
-from .chain_balls import Sweep, drive_of, into_own, out_of_own
+from .chain_balls import Sweep, drive_of, into_own, out_of_own, summed
 from .chain_values import readings
 from .compiled import python_of
 from .compound import Plane, Row, across_waves, transition_rows
@@ -81,22 +81,13 @@ class WideSweep(Sweep):
         |z1 z2|^(1/2), and the terms left out below sum to less than twice the first of them.
         """
         q = _size(z_sum) + _size(z_product).sqrt()
-        h, before, sums = 0 * z_sum + 1, 0 * z_sum, [0 * z_sum] * 4
-        factorial = Fraction(1)
-        for n in range(WIDE_TERMS):
-            factorial = factorial / max(1, (2 * n) * (2 * n - 1))  # 1/(2 n)!
-            terms = [factorial]
-            for shift in (1, 2, 3):
-                terms.append(terms[-1] / (2 * n + shift))
-            sums = [total + h * rational(term) for total, term in zip(sums, reversed(terms), strict=True)]
-            h, before = z_sum * h - z_product * before, h
         tail = (WIDE_TERMS + 1) * q**WIDE_TERMS * rational(Fraction(2, math.factorial(2 * WIDE_TERMS)))
         if not q < WIDE_TERMS**2:  # then each term is less than half of the one before
             raise InseparableError
         ball = flint.acb(flint.arb(0, tail.upper()), flint.arb(0, tail.upper()))
         terms_kept = z_sum.prec
         rest = flint.acb_series([ball] * terms_kept, prec=terms_kept)
-        return tuple(total + rest for total in sums)
+        return tuple(total + rest for total in summed(z_sum, z_product, WIDE_TERMS))
 
 
 def _size(series: Series) -> Ball:

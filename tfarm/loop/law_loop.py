@@ -15,7 +15,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import INPUT_UNITS, Arm, Law, cancelled, must_be_arm
+from tfarm.arm import Arm, Law, cancelled, must_be_arm
 from tfarm.arrays import Complex
 from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import Analytic, LoopParts, deflated, difference_steps
@@ -65,16 +65,6 @@ class LawLoop:
     def k(self) -> System:
         """The exact system."""
         return self.signals.system
-
-    @property
-    def takes_energy(self) -> int:
-        """0: no theorem of the hub's two gains tells what becomes of a mode without losses."""
-        return 0
-
-    @property
-    def input_unit(self) -> str:
-        """The SI unit of what the law drives."""
-        return INPUT_UNITS[self.arm.input]
 
     def parts(self, s: NDArray[Any]) -> tuple[Complex, Complex]:
         """Denominator and numerator of L at s, up to one factor: finite at poles too."""

@@ -11,7 +11,6 @@ from tfarm.arm import NAMES, Arm, HubFeedback, unit_of, written_unit
 from tfarm.arrays import Complex
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
-from tfarm.spectrum import modes
 
 from .answers import law_answer
 from .crossings import crossing_answers
@@ -48,11 +47,6 @@ class Loci:
     def is_cut(self) -> bool:
         """Whether the branches could not be followed to the end of the range."""
         return float(self.exact.gain[-1]) != self.wanted
-
-    @property
-    def first(self) -> float:
-        """The first natural frequency [rad/s], of which a gap is a share where |s| is less."""
-        return float(modes(self.exact.arm, 1).natural_frequency[-1])
 
     @property
     def name(self) -> str:

@@ -5,12 +5,11 @@ The steps of a chain's count are those of `tfarm.exact.chain_axis`, each sign ce
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import Any
+from collections.abc import Iterable, Iterator, Sequence
 
 import flint
 
-from tfarm.exact.balls import rational
+from tfarm.exact.balls import Ball, rational
 from tfarm.exact.chain import ElementChain
 from tfarm.exact.chain_balls import Sweep, drive_of
 from tfarm.exact.closed_form import from_waves
@@ -21,12 +20,42 @@ from tfarm.exact.elements import Element, Segment, Spring
 from tfarm.exact.system import System
 
 from .counting import end_row, steps_of
-from .half_waves import pinned_count, real_waves
 
-Ball = Any
 _minors, _across_waves = python_of(from_waves), python_of(across_waves)
 
 MOST_AXIS_BITS = 40_000  # of working precision: a root that needs more is double
+
+
+def real_waves(a: Ball, b: Ball, g: Ball, S: Ball) -> tuple[tuple[Ball, ...], tuple[Ball, ...]]:
+    """c, sinh t / t, z, v and the scale of both waves at S = -omega^2; real, whether they decay or travel."""
+    half, product = S * (a + b) / 2, S * (a * b * S + g)
+    spread = (half * half - product).sqrt()
+    return _wave(half + spread, b * S), _wave(half - spread, b * S)
+
+
+def _wave(z: Ball, bS: Ball) -> tuple[Ball, ...]:
+    if z < 0:
+        k = (-z).sqrt()
+        sine, cosine = k.sin_cos()
+        return cosine, sine / k, z, z - bS, flint.arb(1)
+    t = z.sqrt()
+    e = (-t).exp()
+    square = e * e
+    return (1 + square) / 2, (1 - square) / (2 * t), z, z - bS, e
+
+
+def pinned_count(squares: Iterable[Ball]) -> int | None:
+    """The count for both ends pinned: half waves inside the length, and one above the cut-off; None if not certain."""
+    number, travelling = 0, 0
+    for z in squares:
+        if z < 0:
+            whole = ((-z).sqrt() / flint.arb.pi()).floor().unique_fmpz()
+            if whole is None:
+                return None
+            number, travelling = number + int(whole), travelling + 1
+        elif not z > 0:
+            return None
+    return number + (travelling == 2)
 
 
 class ArmAxis:
