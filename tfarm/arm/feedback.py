@@ -73,8 +73,7 @@ class HubFeedback:
 
     def __getitem__(self, name: str) -> float:
         """The gain of that name."""
-        value: float = getattr(self, name)
-        return value
+        return getattr(self, name)
 
     @property
     def by_name(self) -> dict[str, float]:

@@ -60,8 +60,7 @@ def poles(
     from tfarm.loop.answers import poles_answer
     from tfarm.loop.closed import closed_loop_poles
 
-    answer = poles_answer(closed_loop_poles(subject, law, number), certify)
-    give(answer | said, json, print_poles)
+    give(poles_answer(closed_loop_poles(subject, law, number), certify) | said, json, print_poles)
 
 
 @app.command()
@@ -95,8 +94,7 @@ def spill(
     from tfarm.loop.spill import spill as find
     from tfarm.loop.spill import spill_answer
 
-    found = find(subject, as_law(law), number)
-    give(spill_answer(found) | said, json, print_spill)
+    give(spill_answer(find(subject, as_law(law), number)) | said, json, print_spill)
 
 
 @app.command("map", help=HELP_ON_MAP)

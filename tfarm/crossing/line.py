@@ -63,8 +63,7 @@ class Crossings:
 
     def passed(self, gains: Real) -> Whole:
         """How many zeros have gone beyond the curve between -infinity and each of the gains, those at it too."""
-        total: Whole = np.r_[0, np.cumsum(self.change)][np.searchsorted(self.gain, gains, side="right")]
-        return total
+        return np.r_[0, np.cumsum(self.change)][np.searchsorted(self.gain, gains, side="right")]
 
 
 def brackets(h: Real) -> tuple[tuple[Whole, ...], Whole]:

@@ -26,8 +26,7 @@ def loose(curves: Complex, width: Real | float, height: Real | float) -> NDArray
 
     `width` and `height` are numbers, or columns (b, 1).  Where a curve is NaN, or stays on the real axis, it is not.
     """
-    drawn = curves.real / width + 1j * (curves.imag / height)
-    piece = np.diff(drawn, axis=1)
+    piece = np.diff(curves.real / width + 1j * (curves.imag / height), axis=1)
     size, is_real = abs(piece), curves.imag == 0
     with np.errstate(all="ignore"):
         turn = abs(np.angle(piece[:, 1:] / piece[:, :-1]))

@@ -118,8 +118,7 @@ def _left_of(loop: AnySampled, line: float, top: float) -> Real | None:
 
     def sizes(s: Complex) -> Real:
         damped = np.exp(s.real * remaining) / -np.expm1(s.real * T)
-        size: Real = abs(exact(s) * _filter_factors(loop, s) / s) * damped
-        return size
+        return abs(exact(s) * _filter_factors(loop, s) / s) * damped
 
     up = _integral(lambda w: sizes(-line + 1j * w), np.r_[0.0, _graded(line / 10, top)])
     away = _integral(lambda c: sizes(-c + 1j * top), line + np.r_[0.0, _graded(0.01 / remaining, 45.0 / remaining)])
@@ -137,8 +136,7 @@ def _integral(size: Callable[[Real], Real], ends: Real) -> Real | None:
     while ends.size < MOST_MIDPOINTS:
         values = size((ends[1:] + ends[:-1]) / 2) @ np.diff(ends)
         if before is not None and (abs(values - before) <= SURE * np.maximum(values, before)).all():
-            found: Real = np.maximum(values, before)
-            return found
+            return np.maximum(values, before)
         before, ends = values, np.sort(np.r_[ends, (ends[1:] + ends[:-1]) / 2])
     return None
 
@@ -161,5 +159,4 @@ def _of_the_filter(loop: AnySampled, line: float) -> Real:
     arm = loop.exact(np.array([-corner + 0j]))[:, 0]
     wrong = np.where(plant.residues[:, own] == 0, 0.0, abs(plant.residues[:, own] / corner - arm))
     left = sampling.period * corner
-    bound: Real = wrong * np.exp(-left * (1 - sampling.fraction)) * 2 / (1 + np.exp(-left))
-    return bound
+    return wrong * np.exp(-left * (1 - sampling.fraction)) * 2 / (1 + np.exp(-left))

@@ -85,8 +85,7 @@ def _heights(arm: Arm, run: Simulation) -> dict[str, float]:
 def away(arm: Arm, simulation: Simulation) -> Real:
     """Tip displacement less where a rigid arm on its reference has it [m], at the samples."""
     reference = arm.reach * simulation.scenario.hub_angle[: simulation.t.size]
-    error: Real = simulation.at_samples.tip_displacement - reference
-    return error
+    return simulation.at_samples.tip_displacement - reference
 
 
 def root_moment(simulation: Simulation) -> TimeCurve:
@@ -111,8 +110,7 @@ def reference_angle(task: Scenario, t: Real) -> Real:
     k = np.minimum(np.floor(t / T * (1 + 1e-12)).astype(np.int64), n - 1)
     slope = np.diff(np.r_[task.hub_rate, task.hub_rate[-1:]]) / T
     tau = t - k * T
-    angle: Real = task.hub_angle[k] + tau * (task.hub_rate[k] + slope[k] * tau / 2)
-    return angle
+    return task.hub_angle[k] + tau * (task.hub_rate[k] + slope[k] * tau / 2)
 
 
 def curve(t: Real, y: Real) -> TimeCurve:

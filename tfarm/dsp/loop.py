@@ -169,8 +169,7 @@ class SampledLoop:
             A, B, C = np.pad(A, (0, 2)), np.pad(B, (0, 2)), np.pad(C, ((0, 0), (0, 2)))
             A[n] = C[ANGLE_ROW]  # two states more: the angle and the rate of the sample before
             A[n + 1] = C[RATE_ROW] = (1 - a) / T * (C[ANGLE_ROW] - np.eye(n + 2)[n]) + a * np.eye(n + 2)[n + 1]
-        closed: Real = A - np.outer(B, np.array(self.gains.row) @ C)
-        return closed
+        return A - np.outer(B, np.array(self.gains.row) @ C)
 
     def reduced_matrix(self) -> Real:
         """The closed-loop matrix without the pole z = 1 of a free hub angle, or of a hub that cannot drift."""

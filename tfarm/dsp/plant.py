@@ -55,8 +55,7 @@ class Plant:
 
     def __call__(self, s: complex) -> Complex:
         """G_o(s) of every output at one s."""
-        value: Complex = self.rigid @ np.array([1 / s**2, 1 / s]) + self.static + self.residues @ (1 / (s - self.poles))
-        return value
+        return self.rigid @ np.array([1 / s**2, 1 / s]) + self.static + self.residues @ (1 / (s - self.poles))
 
     def rows(self, names: Sequence[str]) -> Plant:
         """The plant with these outputs alone, in this order."""
@@ -128,8 +127,7 @@ def with_modes(model: ModalModel, chain: Chain, outputs: Sequence[str], count: i
 
     def values(s: Complex) -> Complex:
         G = exact(s)
-        damped: Complex = G[:-1] / (1 + damping * G[-1])
-        return damped
+        return G[:-1] / (1 + damping * G[-1])
 
     plant, C = replace(plant, model=model), model.arm.damping
     if C * some.natural_frequency.max(initial=0.0) < SLOW_POLES_FROM:

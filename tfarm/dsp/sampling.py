@@ -81,8 +81,7 @@ class PulseTransfer:
         """dH/dz (outputs,) at z = 1, of the poles other than s = 0 and without the delay."""
         gap, late = 1 - self.multipliers[:-1], self.late[:-1]
         terms = late / gap + (self.early[:-1] + late) / gap**2
-        slope: Real = -(self.plant.residues @ terms).real - self.plant.static
-        return slope
+        return -(self.plant.residues @ terms).real - self.plant.static
 
     @property
     def ramps(self) -> tuple[float, float]:

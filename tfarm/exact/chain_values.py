@@ -113,8 +113,7 @@ def readings(chain: ElementChain, wanted: tuple[Output, ...], x: float) -> Readi
     key = wanted, x
     if key not in chain.kept:
         chain.kept[key] = laid_out(chain, wanted, [x] * len(wanted))
-    found: Readings = chain.kept[key]
-    return found
+    return chain.kept[key]
 
 
 def laid_out(chain: ElementChain, wanted: Sequence[Output], shares: Sequence[float]) -> Readings:

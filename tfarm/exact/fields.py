@@ -86,8 +86,7 @@ def fields(k: Coefficients, s: Complex, x: float) -> tuple[Complex, NDArray[np.b
 def from_root(k: Coefficients, S: Any, d: Any, root: Any, x: Any) -> tuple[Any, ...]:
     """Y, Phi, M, Q at x from the root's theta, M0, Q0 where |z| x^2 < `SERIES_RADIUS`; the shapes broadcast."""
     a, b, g, sigma = float(k.a), float(k.b), float(k.g), float(k.sigma)
-    fields: tuple[Any, ...] = _fields(x, *_functions(k, S, d, x), S, 1 / d, a, b, g, sigma, *root)
-    return fields
+    return _fields(x, *_functions(k, S, d, x), S, 1 / d, a, b, g, sigma, *root)
 
 
 def _functions(k: Coefficients, S: Any, d: Any, x: Any) -> tuple[Any, ...]:

@@ -122,8 +122,7 @@ def expansions_at_zero(k: System, wanted: Sequence[Output], x: float = 0.0) -> l
         if each.is_at_end:
             return state[_ENDS[each.quantity]]
         if at < 1:
-            along: Jet = from_root(k, s * s, 1.0 + k.damping * s, tuple(state[:3]), at)[_FIELDS[each.quantity]]
-            return along
+            return from_root(k, s * s, 1.0 + k.damping * s, tuple(state[:3]), at)[_FIELDS[each.quantity]]
         return state[_ENDS["Y"]] if each.quantity == "Y" else low_frequency_tip(k, s)[_FIELDS[each.quantity] - 1]
 
     def expand(each: Output) -> tuple[float, float, float, float]:
@@ -155,8 +154,7 @@ def _power(s: Any, power: int) -> Any:
 
 def _at_pole(drive: Jet, s: Complex) -> NDArray[np.bool_]:
     value, slope = drive.c
-    near: NDArray[np.bool_] = abs(value) < AT_A_POLE * abs(s) * abs(slope)  # both 0 where s^2 underflows: no pole there
-    return near
+    return abs(value) < AT_A_POLE * abs(s) * abs(slope)  # both 0 where s^2 underflows: no pole there
 
 
 def _refuse_pole(k: System, wanted: Output, s: complex, x: float) -> None:

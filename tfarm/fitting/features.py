@@ -63,8 +63,7 @@ def near_zeros(here: Around, data: Measured) -> list[tuple[Real, Real]]:
         curve = parts.drive if row is None else parts.numerators[row]
         w = grid[find_peaks(-(np.log(abs(curve)) + parts.scale.real))[0]]
         zero = _newton(signals, row, 1j * w)
-        kept = (abs(zero.real) < BROAD * w) & (abs(zero.imag / w - 1) < BROAD)
-        found.append(zero[kept])
+        found.append(zero[(abs(zero.real) < BROAD * w) & (abs(zero.imag / w - 1) < BROAD)])
     at = np.concatenate(found)
     drive, outputs = here.gradients(driven, names, np.concatenate([at, at * (1 + NUDGE)]))
     answers, first = [], 0

@@ -85,8 +85,7 @@ class Beside:
     @property
     def hub_angle(self) -> Real:
         """The computed hub angle [rad] at the samples, from the first reference on."""
-        found: Real = self.run.at_samples.hub_angle + self.measured.reference[0]
-        return found
+        return self.run.at_samples.hub_angle + self.measured.reference[0]
 
     @property
     def difference_rms(self) -> float:

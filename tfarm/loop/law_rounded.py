@@ -113,8 +113,7 @@ class _Gap:
     @property
     def is_open(self) -> bool:
         """Whether at both values there is a pole well inside the box that is no longer, or not yet, what it was."""
-        changed = self.kinds[:, 0] != self.kinds[:, 1]
-        sides = self.rows[changed].T
+        sides = self.rows[self.kinds[:, 0] != self.kinds[:, 1]].T
         return all(inside(side[np.isfinite(side)], self.box).any() for side in sides)
 
     def met(self) -> tuple[float, Complex] | None:

@@ -65,8 +65,7 @@ def gain_windows(verdict: Stability, name: str) -> Windows:
         ends = (Loop(loop.arm, law.having(name, end)) for end in (low, high))
         band = max(verdict.band, *(loop_band(end)[0] for end in ends))
         found = line_crossings(loop.arm, along(name, law), band).within(low, high)
-    edges = [low, *np.unique(found.gain).tolist(), high]
-    pairs = list(itertools.pairwise(edges))
+    pairs = list(itertools.pairwise([low, *np.unique(found.gain).tolist(), high]))
     stable = [pair for pair, count in zip(pairs, _counts(verdict, name, pairs, found), strict=True) if count == 0]
     stable = [_with_proven_ends(loop, name, pair, (low, high)) for pair in stable]
     at_edge = name == "Kp" and value == 0  # there the pole at 0 is, apart from which the verdict is

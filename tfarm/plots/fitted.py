@@ -90,8 +90,7 @@ def share_map(those: Possible, across: np.ndarray, up: np.ndarray, *, ax: Axes) 
     picture = ax.pcolormesh(
         across, up, share, cmap=SHARE_COLOURS, vmin=0.0, vmax=1.0, shading="nearest", rasterized=True
     )
-    bar = ax.figure.colorbar(picture, ax=ax)
-    bar.set_label("share of the arms that the gains hold")
+    ax.figure.colorbar(picture, ax=ax).set_label("share of the arms that the gains hold")
     name_axes(those.fit.arm, ax, LABEL, "-")
     ax.grid(False)
     return ax

@@ -52,8 +52,7 @@ def draw_card(data: Bode) -> Figure:
     """The magnitude alone, small, for the index."""
     with style():
         figure = blank(4.4, 2.5)
-        ax = figure.subplots()
-        draw_magnitude(data, ax=ax, is_small=True)
+        draw_magnitude(data, ax=figure.subplots(), is_small=True)
     return figure
 
 

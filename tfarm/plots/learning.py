@@ -119,8 +119,7 @@ def draw_cost_map(data: TunerStudy) -> Figure:
     """Median final cost over (alpha_c, eta_c), the paper's pair framed."""
     with style():
         figure = blank(9.0, 4.4)
-        ax = figure.subplots()
-        cost_map(data.cost_map, ax=ax)
+        cost_map(data.cost_map, ax=figure.subplots())
         headline(figure, f"{data.arm.name}: final cost over momentum and learning rate")
     return figure
 

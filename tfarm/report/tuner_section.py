@@ -196,8 +196,7 @@ def _curves_picture(data: TunerStudy) -> Picture:
             columns.append(Column(f"{curves.key}_{name}", name, of=curves.quantile(share)))
         for seed, costs in enumerate(curves.costs):
             columns.append(Column(f"{curves.key}_seed_{seed}", f"seed {seed}", of=costs))
-    trials = np.arange(1, data.curves[0].costs.shape[1] + 1)
-    first = Column("trial", "trial", of=trials)
+    first = Column("trial", "trial", of=np.arange(1, data.curves[0].costs.shape[1] + 1))
     return Picture(
         stem="tune-curves",
         title="Learning",

@@ -126,8 +126,7 @@ class TransferFunction:
     def __call__(self, s: ArrayLike) -> Any:
         """G(s) at a complex scalar or array."""
         points = _finite(s)
-        values = self._values(points.ravel()).reshape(len(self.outputs), *points.shape)
-        return self._shaped(values)
+        return self._shaped(self._values(points.ravel()).reshape(len(self.outputs), *points.shape))
 
     def derivative(self, s: ArrayLike) -> Any:
         """dG/ds at a complex scalar or array, by the same formulas carried as power series."""

@@ -46,8 +46,7 @@ class ChainShapes:
         self._forget()
 
     def __call__(self, x: Real) -> Real:
-        places = tuple(Place(Fraction(float(share))) for share in x)
-        return self.states(places)[0]
+        return self.states(tuple(Place(Fraction(float(share))) for share in x))[0]
 
     def part(self, first: int, last: int) -> ChainShapes:
         """The same with the modes first..last - 1 alone."""

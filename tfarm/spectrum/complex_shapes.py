@@ -46,8 +46,7 @@ def mode_field(k: System, s: complex, quantity: str, x: NDArray[np.float64]) -> 
         values = [nearest_float(_at(state, quantity, float(share)) / one) for share in x]
         tip = nearest_float(_at(state, "W" if isinstance(k.tip_mass, Fraction) else "Psi", 1.0) / one)
     unit = -unit if (unit * tip).real < 0 else unit
-    shape: Complex = unit * np.array(values, dtype=complex)
-    return shape
+    return unit * np.array(values, dtype=complex)
 
 
 def _of_chain(k: ElementChain, s: complex, quantity: str, x: NDArray[np.float64]) -> Complex:

@@ -94,8 +94,7 @@ def follow(
 def _jumped(here: Member, there: Member, before: Complex, after: Complex) -> NDArray[np.bool_]:
     """Which pairs of real zeros have stepped over the singular point, and so over infinitely many others."""
     real = (before.imag == 0).all(1) & (after.imag == 0).all(1) & (there.ends > 0)
-    jumped: NDArray[np.bool_] = real & ((before.real > here.singular).sum(1) != (after.real > there.singular).sum(1))
-    return jumped
+    return real & ((before.real > here.singular).sum(1) != (after.real > there.singular).sum(1))
 
 
 def _left(member: Member, zeros: Complex) -> Callable[[Complex], Complex] | None:

@@ -71,16 +71,14 @@ class DampedModes:
     @property
     def is_overdamped(self) -> NDArray[np.bool_]:
         """Which modes do not oscillate."""
-        overdamped: NDArray[np.bool_] = (self.eigenvalues[:, 0].imag == 0) & (self.index > 0)
-        return overdamped
+        return (self.eigenvalues[:, 0].imag == 0) & (self.index > 0)
 
     @cached_property
     def damping_ratio(self) -> Real:
         """-(p + q)/(2 sqrt(p q)) of both eigenvalues: -Re/|s| of a pair, above 1 if overdamped, 0 for a rigid body."""
         p, q = self.eigenvalues.T
         size = np.sqrt((p * q).real)
-        ratio: Real = np.divide(-(p + q).real / 2, size, out=np.zeros_like(size), where=size > 0)
-        return ratio
+        return np.divide(-(p + q).real / 2, size, out=np.zeros_like(size), where=size > 0)
 
     def certify(self, digits: int = 15) -> tuple[tuple[Disc, ...], ...]:
         """A disc around each eigenvalue of the flexible modes (one for a pair), and a proof that the box has no other.
@@ -321,8 +319,7 @@ def _heights(known: Complex, is_listed: NDArray[np.bool_], C: float) -> Real:
     stop = int(np.argmin(mine)) if not mine.all() else mine.size
     tops = np.r_[imag, imag[-1] * 1.05 if imag.size else 1.0 / C]
     bottoms = np.r_[0.0, imag]
-    between: Real = (0.5 * (bottoms + tops))[: stop + 1]
-    return between
+    return (0.5 * (bottoms + tops))[: stop + 1]
 
 
 def _box(height: float, known: Complex, C: float) -> Box:

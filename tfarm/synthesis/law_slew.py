@@ -52,8 +52,7 @@ class LawSlew:
         task = self._tasks[SLEWED.index(objective)]
         plain = acting_law(self.arm, law, self.chain)[0]
         references = references_of(plain, task)
-        matrices = acting.matrices(self.signals)
-        A = closed(self.held, matrices)
+        A = closed(self.held, acting.matrices(self.signals))
         driven = _filtered(plain.matrices(), references)
         x, moment, u = self._run(A, (task.feedforward + driven)[:, None])
         change = self._change(x[..., 0], dict(zip(plain.signals, references.T, strict=True)), slopes)

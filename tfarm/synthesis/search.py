@@ -92,8 +92,7 @@ def minima(values: Real, most: int) -> NDArray[np.int64]:
     rows, columns = values.shape
     around = [padded[1 + i : 1 + i + rows, 1 + j : 1 + j + columns] for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]
     least = np.isfinite(values) & (values <= np.min(around, axis=0))
-    places = np.argwhere(least)
-    return np.asarray(places[np.argsort(values[least], kind="stable")[:most]])
+    return np.asarray(np.argwhere(least)[np.argsort(values[least], kind="stable")[:most]])
 
 
 def refined(score: Score, axes: tuple[GainAxis, GainAxis], starts: Real, steps: Real) -> list[Found]:

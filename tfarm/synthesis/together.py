@@ -81,8 +81,7 @@ class Worst:
 
     def value(self, law: HubFeedback, score: float) -> float:
         """The objective of a law of that score, on the arm that has it."""
-        worst = max(self.judges, key=lambda judge: score_of(judge, law))
-        return worst.value(law, score)
+        return max(self.judges, key=lambda judge: score_of(judge, law)).value(law, score)
 
     def values(self, law: HubFeedback) -> list[float]:
         """The objective of a law on each arm."""

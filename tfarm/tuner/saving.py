@@ -82,8 +82,7 @@ class TunerFile(StrictTable):
             )
         network = Network(np.array(self.W1), np.array(self.w2), np.array(self.scales))
         cost = Cost(a=self.a, b=self.b)
-        servo = self.K1, self.signals, cost
-        return SavedTuner(network, self.guard_kind, lo, hi, *servo, self.arm, self.period, self.Kp)
+        return SavedTuner(network, self.guard_kind, lo, hi, self.K1, self.signals, cost, self.arm, self.period, self.Kp)
 
 
 def to_text(tuner: SavedTuner) -> str:

@@ -46,8 +46,7 @@ class MovingGain:
         """(n,): the moment read from the states."""
         dropped = len(self.loop.matrix()) - len(self.open)
         kept = self.loop.pulse.integrals_at + 2 - dropped  # the torque of the sample before: there the drive is 1
-        row: Real = (self.open - self.at(1.0))[kept]
-        return row
+        return (self.open - self.at(1.0))[kept]
 
     @cached_property
     def drive(self) -> Real:
