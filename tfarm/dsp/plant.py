@@ -115,7 +115,9 @@ def undelayed_plant(
     return with_modes(model, chain, outputs, count)
 
 
-_modelled = lru_cache(maxsize=32)(modal_model)  # the simulations of one page ask for the same some twenty times
+@lru_cache(maxsize=32)  # the simulations of one page ask for the same model some twenty times
+def _modelled(arm: Arm, names: tuple[str, ...], count: int, x: float | None) -> ModalModel:
+    return modal_model(arm, names, count, x)
 
 
 def with_modes(model: ModalModel, chain: Chain, outputs: Sequence[str], count: int) -> Plant:
