@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from enum import Enum
 from functools import partial
 from typing import Any, Final
@@ -68,6 +68,12 @@ def did_you_mean(word: str, choices: Iterable[str]) -> str:
     near = difflib.get_close_matches(word[:80], known, n=1) or begun
     hint = "did you mean " + " or ".join(f'"{choice}"' for choice in near) + "? " if near else ""
     return f"{hint}known are: {', '.join(known)}"
+
+
+def must_be_known(key: str, value: object, choices: Collection[str]) -> None:
+    """Refuse, by ParameterError, what is none of the choices."""
+    if value not in choices:
+        raise ParameterError(key=key, value=value, remedy=did_you_mean(str(value), choices))
 
 
 def one_line(text: str, longest: int) -> str:

@@ -10,7 +10,7 @@ from tfarm.arm.records import Arm
 from tfarm.arm.schema import arm_of_table
 from tfarm.arm.tables import ARM_TABLES
 from tfarm.arm.writing import to_toml
-from tfarm.errors import ParameterError, did_you_mean
+from tfarm.errors import ParameterError, must_be_known
 
 
 class KeyedArms:
@@ -25,8 +25,7 @@ class KeyedArms:
         self._table = tomllib.loads(to_toml(arm))
         known = list(_known(self._table))
         for key in keys:
-            if key not in known:
-                raise ParameterError(key=what, value=key, remedy=did_you_mean(key, known))
+            must_be_known(what, key, known)
         if repeated := {key for key in keys if keys.count(key) > 1}:
             raise ParameterError(key=what, value=min(repeated), remedy="is named twice; once is enough")
 

@@ -20,7 +20,7 @@ from tfarm.arm.checks import not_negative, number, positive
 from tfarm.arm.feedback import GAINS, HubFeedback
 from tfarm.arm.records import INPUTS
 from tfarm.arrays import Complex
-from tfarm.errors import ParameterError, did_you_mean
+from tfarm.errors import ParameterError, did_you_mean, must_be_known
 from tfarm.records import record
 
 MOST_SIGNALS = 12  # of a law: more than any rig measures
@@ -85,13 +85,11 @@ class Law:
             raise ParameterError(key="sign", value=self.sign, remedy="-1 (v = -C y, the default) or 1 (v = C y)")
         if self.input is not None and self.input not in INPUTS:
             raise ParameterError(key="input", value=self.input, remedy=did_you_mean(str(self.input), INPUTS))
-        if self.rule not in SAMPLING_RULES:
-            raise ParameterError(key="rule", value=self.rule, remedy=did_you_mean(str(self.rule), SAMPLING_RULES))
+        must_be_known("rule", self.rule, SAMPLING_RULES)
         if len(self.signals) > MOST_SIGNALS:
             raise ParameterError(key="signals", value=len(self.signals), remedy=f"at most {MOST_SIGNALS} signals")
         for each in self.references:
-            if each not in self.signals:
-                raise ParameterError(key="references", value=each, remedy=did_you_mean(str(each), self.signals))
+            must_be_known("references", each, self.signals)
         if self.period is not None and self.is_improper:
             remedy = "a discrete law needs no sample of the future: give num at most the degree of den"
             raise ParameterError(key="num", value=self.name, remedy=remedy)

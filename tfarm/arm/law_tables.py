@@ -24,7 +24,7 @@ from pydantic import Field
 from tfarm.arm.declared import StrictTable, validated
 from tfarm.arm.law import Law
 from tfarm.arm.reading import load_tables
-from tfarm.errors import MISSING, ParameterError, did_you_mean
+from tfarm.errors import MISSING, ParameterError, must_be_known
 from tfarm.files import read_mat
 
 LAW_TABLE = "law"  # the table's name
@@ -124,8 +124,7 @@ def _of_file(head: LawTable, folder: Path, common: dict[str, Any]) -> Law:
     holder, names = found, tuple(found)
     if head.system is not None:
         structs = [key for key, value in found.items() if getattr(getattr(value, "dtype", None), "names", None)]
-        if head.system not in structs:
-            raise ParameterError(key="system", value=head.system, remedy=did_you_mean(head.system, structs))
+        must_be_known("system", head.system, structs)
         holder = found[head.system][0, 0]
         names = holder.dtype.names
     missing = [name for name in "ABCD" if name not in names]

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from tfarm.cli.app import Json, app, give
-from tfarm.errors import ParameterError, did_you_mean
+from tfarm.errors import must_be_known
 
 SHELLS = ("bash", "zsh", "fish")
 BASH = """\
@@ -43,8 +43,7 @@ def glossary(
 @app.command()
 def completion(shell: Annotated[str, typer.Argument(metavar="SHELL", help="bash, zsh or fish")]) -> None:
     """Print the script that completes tfarm's words in a shell: eval "$(tfarm completion bash)"."""
-    if shell not in SHELLS:
-        raise ParameterError(key="SHELL", value=shell, remedy=did_you_mean(shell, SHELLS))
+    must_be_known("SHELL", shell, SHELLS)
     verbs = {
         name: (
             [option for each in command.params for option in each.opts if option.startswith("--")] + ["--help"],

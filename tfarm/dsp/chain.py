@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from tfarm.arm.checks import extended, not_negative, number, positive, whole
-from tfarm.errors import ParameterError, did_you_mean
+from tfarm.errors import ParameterError, must_be_known
 
 Reading = Literal["vibration", "total"]
 LEAST_BITS, MOST_BITS = 2, 32  # of a converter: of one bit there are no steps, of more than 32 no part
@@ -77,8 +77,8 @@ class Converters:
 
     def __post_init__(self) -> None:
         _whole("converters.encoder_counts", self.encoder_counts, 2, 2**31, "counts a revolution")
-        _choice("converters.hub_rate", self.hub_rate, ("ideal", "difference"))
-        _choice("converters.arithmetic", self.arithmetic, ("float64", "float32"))
+        must_be_known("converters.hub_rate", self.hub_rate, ("ideal", "difference"))
+        must_be_known("converters.arithmetic", self.arithmetic, ("float64", "float32"))
         meaning = "the corner of the rate filter is positive in rad/s, or inf for a plain difference"
         object.__setattr__(self, "rate_filter", _above_zero("converters.rate_filter", self, meaning))
         for signal in ("moment", "torque"):
@@ -145,7 +145,7 @@ class Slew:
             object.__setattr__(self, "travel", travel)
         meaning = "a rise time is a positive, finite number of seconds"
         object.__setattr__(self, "rise_time", positive("slew.rise_time", self.rise_time, meaning))
-        _choice("slew.reading", self.reading, ("vibration", "total"))
+        must_be_known("slew.reading", self.reading, ("vibration", "total"))
 
     def travel_of(self, reach: float) -> float:
         """Tip travel [m] of an arm whose tip is so far [m] from the axis."""
@@ -185,8 +185,3 @@ def _whole(key: str, value: object, least: int, most: int, what: str) -> None:
         return
     remedy = f"a whole number of {what} from {least} to {most}; leave it out for an ideal converter"
     whole(key, value, least, most, remedy)
-
-
-def _choice(key: str, value: object, choices: tuple[str, ...]) -> None:
-    if value not in choices:
-        raise ParameterError(key=key, value=value, remedy=did_you_mean(str(value), choices))

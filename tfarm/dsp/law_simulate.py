@@ -22,7 +22,7 @@ from tfarm.dsp.law_plant import sensed_plant
 from tfarm.dsp.plant import Plant
 from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.simulate import Simulation, Simulator
-from tfarm.errors import ParameterError, did_you_mean
+from tfarm.errors import must_be_known
 
 SIGNAL_KINDS = {"hub_angle": 1, "root_moment": 2, "hub_rate": 3}  # through what one goes, as in `kernel.run_law`
 
@@ -87,7 +87,6 @@ def references_of(law: Law, task: Scenario) -> Real:
         plain = name.removeprefix(REFERENCE)
         if name == plain and name not in law.references:
             continue
-        if plain not in known:
-            raise ParameterError(key="references", value=plain, remedy=did_you_mean(plain, known))
+        must_be_known("references", plain, known)
         found[:, column] = known[plain] if name == plain else -known[plain]
     return found

@@ -13,7 +13,7 @@ from tfarm.arm import Arm, must_turn
 from tfarm.arm.checks import number, positive
 from tfarm.arrays import Real
 from tfarm.dsp.chain import Chain
-from tfarm.errors import ParameterError, did_you_mean
+from tfarm.errors import ParameterError, must_be_known
 from tfarm.records import record
 from tfarm.spectrum.scales import turning_inertia
 
@@ -137,8 +137,7 @@ def described(task: Scenario, arm: Arm, chain: Chain) -> str:
 
 def scenario(name: str, arm: Arm, chain: Chain, duration: float) -> Scenario:
     """The scenario of that name with its usual size.  Raises ParameterError for an unknown one."""
-    if name not in SCENARIOS:
-        raise ParameterError(key="scenario", value=name, remedy=did_you_mean(name, SCENARIOS))
+    must_be_known("scenario", name, SCENARIOS)
     return SCENARIOS[name](arm, chain, duration)
 
 

@@ -14,7 +14,7 @@ from types import MappingProxyType
 from typing import Literal, Protocol, get_args
 
 from tfarm.arm.checks import whole
-from tfarm.errors import ParameterError, did_you_mean
+from tfarm.errors import ParameterError, did_you_mean, must_be_known
 
 from .coefficients import Coefficients
 
@@ -185,8 +185,7 @@ def output(wanted: str | Output) -> Output:
         return wanted
     if not isinstance(wanted, str):
         raise ParameterError(key="output", value=wanted, remedy="the name of an output, or an Output")
-    if wanted not in OUTPUTS:
-        raise ParameterError(key="output", value=wanted, remedy=did_you_mean(wanted, OUTPUTS))
+    must_be_known("output", wanted, OUTPUTS)
     return OUTPUTS[wanted]
 
 
@@ -196,8 +195,7 @@ def on_side(wanted: str | Output, side: Side) -> Output:
     One on the inner side has its own name.  Raises ParameterError for an output that is read at root or tip.
     """
     found = output(wanted)
-    if side not in get_args(Side):
-        raise ParameterError(key="side", value=side, remedy=did_you_mean(str(side), get_args(Side)))
+    must_be_known("side", side, get_args(Side))
     if found.place != "x":
         remedy = f"{found.name} is read at one place; take an output along the arm, such as moment with its x"
         raise ParameterError(key="side", value=side, remedy=remedy)

@@ -27,7 +27,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from tfarm.arrays import Complex, Real
-from tfarm.errors import ParameterError, did_you_mean
+from tfarm.errors import ParameterError, must_be_known
 from tfarm.records import record
 
 from .data import Measured
@@ -168,6 +168,5 @@ def _cut(recording: Recording, segment: float | None, overlap: float) -> tuple[i
 
 
 def _one_of(key: str, word: str, kind: Any) -> Any:
-    if word not in get_args(kind):
-        raise ParameterError(key=key, value=word, remedy=did_you_mean(word, get_args(kind)))
+    must_be_known(key, word, get_args(kind))
     return word

@@ -64,7 +64,7 @@ def live_data(arm: Arm, chain: Chain, law: HubFeedback | None = None) -> dict[st
         "axes": {**axes, ANGLE_GAIN: {"low": 0.0, "high": stiffest, "linear": ANGLE_LINEAR * stiffest}},
         "start": {gain.name: (law or reference)[gain.name] for gain in GAINS},
         **_samples(samples),
-        **_known(arm, band, is_quiet),
+        **_known(arm, is_quiet),
         "reference": {name: reference[name] for name in PLANE},
         "reference_count": stability(arm, reference, band).unstable_roots,
         "continuous": _areas(continuous.axes[0], continuous.stable_intervals),
@@ -100,7 +100,7 @@ def _samples(panels: Panels) -> dict[str, Any]:
     }
 
 
-def _known(arm: Arm, band: float, is_quiet: bool) -> dict[str, Any]:
+def _known(arm: Arm, is_quiet: bool) -> dict[str, Any]:
     """What a verdict on any gains rests on: theorems and bounds beyond the band, and the static balance."""
     kind = "reactive" if arm.is_reactive else "quiet" if is_quiet else "band"
     by_energy = "C = 0: every mode beyond the band is damped (Lyapunov), with a decay rate that tends to 0"

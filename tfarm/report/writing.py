@@ -10,7 +10,7 @@ from pathlib import Path
 
 from tfarm.arm import Arm
 from tfarm.dsp import Chain
-from tfarm.errors import ParameterError, did_you_mean
+from tfarm.errors import ParameterError, must_be_known
 from tfarm.files import temporary_folder
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
@@ -145,8 +145,7 @@ def _check(arms: Sequence[Arm], only: tuple[str, ...] | None) -> None:
     if not arms:
         raise ParameterError(key="arms", value=(), remedy="name at least one arm to report on")
     for question in only or ():
-        if question not in QUESTIONS:
-            raise ParameterError(key="only", value=question, remedy=did_you_mean(str(question), QUESTIONS))
+        must_be_known("only", question, QUESTIONS)
     seen: set[str] = set()
     for arm in arms:
         if arm.name.casefold() in seen:

@@ -31,7 +31,7 @@ from tfarm.arrays import Real
 from tfarm.dsp import SampledLoop, sampled_loop, stable_windows
 from tfarm.dsp.margins import around
 from tfarm.dsp.sampling import held_amplitude
-from tfarm.errors import CertificationError, ConvergenceError, ParameterError, did_you_mean
+from tfarm.errors import CertificationError, ConvergenceError, must_be_known
 from tfarm.records import record
 from tfarm.tuner.lyapunov import CommonLyapunov
 from tfarm.tuner.sector import RADIUS_SHARE, MovingGain
@@ -96,8 +96,7 @@ def find_guard(loop: SampledLoop, kind: GuardKind, best_constant: float) -> Guar
 
     Raises CertificationError where there is none, with the damping that would have one.
     """
-    if kind not in GUARD_KINDS:
-        raise ParameterError(key="guard", value=kind, remedy=did_you_mean(str(kind), GUARD_KINDS))
+    must_be_known("guard", kind, GUARD_KINDS)
     if kind == "none":
         return Guard("none", 0.0, math.inf, loop.plant.count, False)
     loops = list(_larger(loop))

@@ -21,7 +21,7 @@ import numpy as np
 
 from tfarm.arm.checks import not_negative, positive, whole
 from tfarm.arrays import Real
-from tfarm.errors import ParameterError, did_you_mean
+from tfarm.errors import ParameterError, must_be_known
 from tfarm.records import record
 from tfarm.tuner import rules
 from tfarm.tuner.guard import Guard
@@ -57,9 +57,7 @@ class Learning:
     def __post_init__(self) -> None:
         wanted = {"mode": ("trial", "online"), "rule": tuple(RULE_NUMBERS), "sensitivity": ("one-step", "whole")}
         for key, choices in wanted.items():
-            value = getattr(self, key)
-            if value not in choices:
-                raise ParameterError(key=key, value=value, remedy=did_you_mean(str(value), choices))
+            must_be_known(key, getattr(self, key), choices)
         self._check_rates()
         momentum = not_negative("alpha", self.alpha, "the momentum factor lies in [0, 1)")
         if not momentum < 1.0:

@@ -29,7 +29,7 @@ from tfarm.dsp.chain import Reading
 from tfarm.dsp.results import rms_after
 from tfarm.dsp.scenarios import TRIAL_COST, TRIAL_DURATION
 from tfarm.dsp.simulate import FOLDED_UP
-from tfarm.errors import ParameterError, did_you_mean
+from tfarm.errors import ParameterError, must_be_known
 from tfarm.records import record
 from tfarm.spectrum.scales import default_gains
 from tfarm.tuner import kernel
@@ -220,8 +220,7 @@ def slew_trial(
 
     Raises ParameterError for an arm that cannot turn, a hub without inertia, and numbers out of range.
     """
-    if signals not in ("vibration", "total"):
-        raise ParameterError(key="signals", value=signals, remedy=did_you_mean(str(signals), ("vibration", "total")))
+    must_be_known("signals", signals, ("vibration", "total"))
     Kp = not_negative("Kp", Kp, ANGLE_REMEDY)
     K1 = usual_rate_gain(known or arm, Kp) if K1 is None else K1
     rate_gain = number("K1", K1, "the hub rate gain is a finite number of N m s/rad")
