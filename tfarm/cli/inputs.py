@@ -117,12 +117,17 @@ def points_on(s: str | None, omega: str | None, start: float, stop: float, point
     return 1j * np.array([_number("--omega", part, float, remedy) for part in omega.split(",")])
 
 
-def s_grid(start: float, stop: float, points: str) -> NDArray[np.complex128]:
-    """s = i omega for logarithmically spaced frequencies from start to stop [rad/s]."""
+def must_be_band(start: float, stop: float) -> None:
+    """Refuse what are no two frequencies [rad/s], the lower first."""
     if not 0 < start < math.inf:
         raise ParameterError(key="--from", value=start, remedy="a positive frequency in rad/s")
     if not start < stop < math.inf:
         raise ParameterError(key="--to", value=stop, remedy=f"a frequency above --from, {start:g} rad/s")
+
+
+def s_grid(start: float, stop: float, points: str) -> NDArray[np.complex128]:
+    """s = i omega for logarithmically spaced frequencies from start to stop [rad/s]."""
+    must_be_band(start, stop)
     frequencies: NDArray[np.float64] = np.geomspace(start, stop, whole_number("--points", points, 2, MOST_GRID))
     return np.asarray(1j * frequencies, dtype=np.complex128)
 

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from tfarm.cli.app import ArmName, Json, app, give, load_arm
-from tfarm.cli.inputs import Given, Png, asked_law, under_a_law
-from tfarm.errors import ParameterError
+from tfarm.cli.inputs import Given, Png, asked_law, must_be_band, under_a_law
 
 if TYPE_CHECKING:
     from tfarm.arm import Arm
@@ -81,10 +79,7 @@ def _band(arm: Arm, start: float | None, stop: float | None) -> tuple[float, flo
 
     low, high = resonant_band(arm)
     low, high = low if start is None else start, high if stop is None else stop
-    if not 0 < low < math.inf:
-        raise ParameterError(key="--from", value=low, remedy="a positive frequency in rad/s")
-    if not low < high < math.inf:
-        raise ParameterError(key="--to", value=high, remedy=f"a frequency above --from, {low:g} rad/s")
+    must_be_band(low, high)
     return low, high
 
 
