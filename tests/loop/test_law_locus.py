@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import tfarm
+from tests.loop.arms import window_arm
 from tests.shell import run
 from tfarm import HubFeedback, Law, ParameterError
-from tfarm.loop.law_locus import assigned, law_locus
+from tfarm.loop.law_locus import assigned, inside, law_locus
 from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.law_poles import law_poles_below
 from tfarm.spectrum.box import Box
@@ -63,6 +64,26 @@ def test_poles_are_told_apart_or_it_is_said():
     assert not plain  # one more in the middle of the box
     pairs, plain = assigned(np.array([1 + 2j]), np.array([1 + 2.1j, 0 + 9.9j]), box)
     assert (pairs, plain) == ({0: 0}, True)  # it came in over the edge
+
+
+def test_a_pole_that_goes_out_and_comes_back_between_two_values_crosses_all_the_same():
+    """Stable at both, and no branch changes sides: the two crossings are those of the windows of K2."""
+    arm, law = window_arm(), Law({"hub_rate": 1.0, "root_moment": -13.0})
+    found = law_locus(arm, law, "root_moment", -14.0, -7.0, 2, 9)
+    assert (found.branches.real <= 0).all()
+    edges = tfarm.margins(arm, HubFeedback(K1=1.0, K2=-13.0)).windows["K2"].crossings
+    between = [(t, w) for t, w in zip(edges.gain, edges.at, strict=True) if -14 < t < -7]
+    assert [(each.gain, each.omega) for each in found.crossings] == [pytest.approx(each, rel=1e-9) for each in between]
+    assert [(each.direction, each.branch) for each in found.crossings] == [("unstable", None), ("stable", None)]
+    back = law_locus(arm, law, "root_moment", -7.0, -14.0, 2, 9).crossings
+    assert [each.direction for each in back] == ["unstable", "stable"]
+    assert back[0].gain == pytest.approx(found.crossings[1].gain, rel=1e-9)
+
+
+def test_well_inside_a_box_is_a_twentieth_of_its_shorter_measure_from_the_edges_where_poles_come_and_go():
+    box = Box(-10.0, 2.0, -4.0, 4.0)  # 12 wide, 4 high above the axis: 0.2
+    s = np.array([-9.79 + 1j, -9.81 + 1j, 1.79 + 1j, 1.81 + 1j, 0 + 3.79j, 0 + 3.81j, -3 + 0j])
+    np.testing.assert_array_equal(inside(s, box), [True, False, True, False, True, False, True])
 
 
 def test_the_command_follows_a_law(capsys, tmp_path):

@@ -145,3 +145,27 @@ def test_the_grid_has_points_closer_to_every_steep_place_than_its_width() -> Non
     for place in locked:
         assert np.isin(np.round(place, 9), np.round(np.asarray(steep_places(LAB, 5250.0)), 9))
         assert abs(omega - place).min() < LAB.link.damping * place**2
+
+
+@pytest.mark.parametrize("name", ["K1", "K2", "Kp"])
+@pytest.mark.parametrize("Kp", [0.0, 3.0])
+def test_along_a_longer_direction_the_same_crossing_is_at_less(name, Kp):
+    """Of the pole through the origin: the same law is reached at a third of the way, and as many poles have changed."""
+    arm = replace(tfarm.load("sasaki2012-lab"), hub=Hub(inertia=0.1, friction=0.4))
+    base = HubFeedback(K1=0.2, K2=0.1, Kp=Kp)
+    if name == "K2":
+        base = base.having("K1", -0.4)  # no rate is left, so that the inertia decides
+    line = along(name, base)
+    one = crossing_at_zero(arm, line)
+    three = crossing_at_zero(arm, Line(line.base, HubFeedback(**{name: 3.0})))
+    assert (one is None) == (three is None) == (Kp != 0.0 and name != "Kp")
+    if one is not None:
+        assert three.t == pytest.approx(one.t / 3, rel=1e-14)
+        assert three.change == one.change
+
+
+def test_a_grid_begins_at_a_millionth_of_the_first_steep_place():
+    arm = tfarm.load("sasaki2012-lab")
+    first = tfarm.modes(arm.having(hub_inertia=math.inf), 1).natural_frequency[-1]  # locked: the lowest of all
+    assert grid(arm, 1e3)[0] == pytest.approx(1e-6 * first, rel=1e-12)
+    assert grid(arm, 1e3)[-1] == pytest.approx(1e3, rel=1e-12)

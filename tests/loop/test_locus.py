@@ -14,9 +14,10 @@ from tests.shared import thinned
 from tfarm import Hub, HubFeedback, ParameterError, Payload
 from tfarm.cli import main
 from tfarm.loop import reduced_locus as reduced_locus_room
+from tfarm.loop.branches import rigid_pair
 from tfarm.loop.lines import along, line_crossings
-from tfarm.loop.locus import frame, locus, rounded
-from tfarm.loop.plant import Loop
+from tfarm.loop.locus import _gaps, frame, locus, rounded
+from tfarm.loop.plant import Loop, effective_inertia
 from tfarm.loop.poles import poles_below
 from tfarm.loop.reduced_locus import reduced_locus
 from tfarm.spectrum.damped import damped_modes
@@ -379,3 +380,39 @@ def test_each_branch_is_round_in_a_picture_of_its_own_and_of_all(arm, vary, star
             heading, seen = np.unwrap(np.arctan2(up, across)), np.hypot(across, up) > 2e-3
             turn = abs(np.diff(heading))[seen[1:] | seen[:-1]]
             assert turn.max(initial=0.0) <= math.radians(2.5)
+
+
+def test_gaps_are_the_distances_to_the_nearest_zero_of_another_pair():
+    """One by one; of a conjugate pair the upper zero counts, of a real pair each of the two, and both have theirs."""
+    rng = np.random.default_rng(7)
+    for _ in range(20):
+        upper = rng.uniform(-3, 0, (3, 4)) + 1j * rng.uniform(1, 5, (3, 4))
+        zeros = np.stack([upper, upper.conj()], axis=2)
+        zeros[:2, 1], zeros[1:, 3] = rng.uniform(-3, 0, (2, 2)), rng.uniform(-3, 0, (2, 2))
+        found = _gaps(zeros)
+        for value, pair in np.ndindex(3, 4):
+            others = [z for n in range(4) for z in zeros[value, n] if n != pair and z.imag >= 0]
+            own = zeros[value, pair]
+            expected = [min(abs(z - other) for other in others) for z in (own if own.imag.any() == 0 else own[[0, 0]])]
+            np.testing.assert_allclose(found[value, pair], expected, rtol=1e-14)
+
+
+@pytest.mark.parametrize("law", [HubFeedback(K1=0.3, K2=0.3), HubFeedback(K1=0.1, K2=-1.0, Kp=0.4)])
+def test_the_slope_of_the_reduced_loop_is_its_difference_quotient(law):
+    from tfarm.reduced import modal_model
+
+    model = modal_model(LAB, ["hub_angle", "hub_rate", "root_moment"], 4)
+    s, row = np.array([[-1.0 + 30j, 2.0 + 150j, -3.0 + 0.5j]]), np.array([[law.Kp, law.K1, law.K2]])
+    h = 1e-5 * abs(s)
+    ahead, behind = (reduced_locus_room._return_difference(model, row, s + way * h)[0] for way in (1, -1))
+    _, slope = reduced_locus_room._return_difference(model, row, s)
+    np.testing.assert_allclose(slope, (ahead - behind) / (2 * h), rtol=1e-7)
+
+
+@pytest.mark.parametrize("Kp", [0.0, 0.001, 4.0])
+def test_under_small_gains_the_rigid_zeros_are_those_of_its_quadratic(Kp):
+    """Both real or a pair, by the roots of the polynomial: J s^2 + K1 s + Kp, the inertia that the moment leaves."""
+    law = HubFeedback(K1=0.3, K2=0.2, Kp=Kp)
+    found = rigid_pair(Loop(LAB, law), np.zeros(0, complex))
+    expected = np.roots([effective_inertia(LAB, law), law.K1, law.Kp])
+    np.testing.assert_allclose(np.sort_complex(found), np.sort_complex(expected), rtol=1e-12)
