@@ -51,3 +51,10 @@ def test_the_period_is_that_of_the_arms_file(capsys, tmp_path):
     assert found["stable"] is True
     _, out, _ = run(capsys, "design", str(file), *bounds, "--period", "0.25e-3")
     assert "\nsampled every 0.25 ms, 0.5 samples late these gains are stable: mode" in out
+
+
+def test_in_short_it_is_the_verdict_and_the_clock_in_milliseconds():
+    lab = tfarm.load("sasaki2012-lab")
+    chain = Chain(sampling=Sampling(period=0.004))
+    told = [sampled_brief(lab, HubFeedback(K1=0.3, K2=K2), chain).short for K2 in (0.3, -4.0)]
+    assert told == ["stable when sampled every 4 ms", "UNSTABLE when sampled every 4 ms"]

@@ -108,6 +108,7 @@ BAD = [
     ("converters", {"torque_bits": 12}, "converters.torque_range = None: 12 bits of what"),
     ("converters", {"torque_range": -3.0}, "the range +-R of a converter"),
     ("converters", {"encoder_counts": 0}, "counts a revolution from 2"),
+    ("converters", {"encoder_counts": 2**31 + 1}, "counts a revolution from 2"),
     ("converters", {"encoder_counts": 1.5}, "converters.encoder_counts = 1.5"),
     ("converters", {"hub_rate": "guess"}, "converters.hub_rate = 'guess'"),
     ("converters", {"arithmetic": "float16"}, "'float32'"),
@@ -163,3 +164,7 @@ def test_an_arm_and_its_chain_are_one_file_that_loads_to_both(tmp_path):
     file.write_text(file_text(arm, chain), encoding="utf-8")
     assert (tfarm.load(file), load_chain(file)) == (arm, chain)
     assert file_text(arm, Chain()) == file_text(arm) == to_toml(arm)
+
+
+def test_an_encoder_may_count_as_far_as_32_bits_do():
+    assert Converters(encoder_counts=2**31).encoder_counts == 2**31

@@ -8,6 +8,7 @@ import pytest
 
 import tfarm
 from tests.dsp.law_verdicts import judge, some_case, stepped
+from tests.odd_arms import odd_arms
 from tests.shell import answer, run
 from tfarm import HubFeedback, Law, ParameterError
 from tfarm.arm.blocks import Rational, StateSpace
@@ -336,3 +337,20 @@ def test_the_command_says_which_rule_it_took(capsys, tmp_path):
     assert f"spectral radius {found['spectral_radius']:.12g}" in out
     typed = answer(capsys, "sampled", str(tmp_path / "arm.toml"), "--K1", "0.3", "--modes", "3")
     assert typed["K1"] == 0.3
+
+
+@pytest.mark.parametrize("arm", ["free", "damped", "held"])
+@pytest.mark.parametrize("law", ["lead", "integrator", "acceleration"])
+def test_next_to_z_1_the_loop_goes_as_the_powers_that_are_named(arm, law):
+    """whole/fed back at z = 1/(1 - x), x small, is what the lowest terms say: their error is of the order of x."""
+    arms = {"free": LAB, "damped": replace(LAB, hub=replace(LAB.hub, friction=0.3)), "held": odd_arms()["pinned"]}
+    entries = LAWS | {"integrator": Law({"hub_angle": ([1.0, 3.0], [1.0, 40.0, 0.0])})}
+    loop = sampled_law(arms[arm], entries[law], Chain(), count=6)
+    (n, whole), fed_back = loop.near_one
+    lowest = min(order for order, _ in fed_back)
+    named = sum(value for order, value in fed_back if order == lowest)
+    away = []
+    for x in (1e-3, 1e-4):
+        A, B = loop.terms(np.array([1 / (1 - x) + 0j]), None, np.ones(1))
+        away.append(abs(A[0] / B[0] / (whole * x**n / (named * x**lowest)) - 1))
+    assert away[1] < 0.2 * away[0] < 0.1

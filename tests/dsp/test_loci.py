@@ -9,7 +9,7 @@ import tfarm
 from tfarm import HubFeedback
 from tfarm.dsp import Chain, Sampling, sampled_loop
 from tfarm.dsp.chain import Slew
-from tfarm.dsp.loci import RIM, sampled_loci
+from tfarm.dsp.loci import RIM, STRONGER, sampled_loci
 from tfarm.dsp.shown import another
 from tfarm.dsp.slews import slews
 from tfarm.dsp.strip_chart import strip_chart
@@ -58,3 +58,10 @@ def test_a_strip_chart_lasts_twice_the_slew():
 @pytest.mark.parametrize(("count", "most", "other"), [(5, 40, 10), (20, 40, 40), (21, 40, 10), (1, 1, 1), (3, 5, 1)])
 def test_a_figure_is_compared_with_that_of_twice_or_half_the_modes(count, most, other):
     assert another(count, most) == other
+
+
+def test_the_locus_of_the_rate_gain_alone_begins_and_ends_about_the_loops_own(found):
+    """From next to nothing to several times K1, with the moment not fed back."""
+    assert found.alone.values[0] == pytest.approx(1e-3 * GAINS.K1)
+    assert found.alone.values[-1] == pytest.approx(STRONGER * GAINS.K1)
+    assert GAINS.K1 in found.alone.values

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import tfarm
+from tests.odd_arms import odd_arms
 from tfarm.arm import Hub, HubFeedback
 from tfarm.dsp import Actuator, Chain, Converters, Sampling, plant, sampled_loop
 from tfarm.dsp.law import first_order_law, followed_branches, mode_table
@@ -169,3 +170,14 @@ def test_a_loop_with_fewer_modes_is_cut_from_the_same_model(lab, hub_damping, mo
     assert made == []
     np.testing.assert_allclose(cut.with_modes(24)(z), larger(z), rtol=1e-9)
     assert made == [24]
+
+
+def test_a_hub_that_cannot_drift_has_the_poles_of_its_modes_alone():
+    """Its tip is pinned: the two integrals of the torque are felt by nothing, their poles at z = 1 are left out."""
+    loop = sampled_loop(odd_arms()["pinned"], HubFeedback(K1=0.0374, K2=0.3), count=6)
+    whole = np.linalg.eigvals(loop.matrix())
+    kept = np.linalg.eigvals(loop.reduced_matrix())
+    assert len(kept) == len(whole) - 2
+    left = sorted(whole, key=lambda z: abs(kept - z).min())[len(kept) :]
+    np.testing.assert_allclose(left, 1.0, atol=1e-6)
+    assert max(abs(kept - z).min() for z in sorted(whole, key=lambda z: abs(kept - z).min())[: len(kept)]) < 1e-6

@@ -227,3 +227,32 @@ def test_the_answer_is_plain_and_consistent(lab):
 def test_a_count_of_modes_is_checked(lab):
     with pytest.raises(ParameterError, match="1 to 400"):
         sampled_verdict(lab, GAINS, count=0)
+
+
+def test_no_mode_turns_by_more_than_a_twelfth_between_two_delays_that_are_looked_at(lab, monkeypatch):
+    """Of those whose damping the feedback could outweigh: here the second is the fastest, with three turns a sample."""
+    chain = Chain(sampling=Sampling(period=0.1))
+    loop = sampled_loop(lab.having(damping=1e-5), HubFeedback(K1=0.1, K2=0.1), chain, count=4)
+    looked_at, further = [], type(loop).with_delay
+
+    def with_delay(self, samples):
+        looked_at.append(samples)
+        return further(self, samples)
+
+    monkeypatch.setattr(type(loop), "with_delay", with_delay)
+    found = delay_margin(loop)
+    second = np.unique(loop.plant.poles.imag)[-3]
+    assert 200 < second < 210
+    assert found.samples > 0.3
+    assert np.diff(np.unique(looked_at)).max() * second * 0.1 <= 2 * np.pi / 12 * (1 + 1e-9)
+
+
+def test_windows_of_the_rate_gain_of_a_damped_hub_begin_where_its_losses_are_taken(lab):
+    """There the hub drifts, a pole at z = 1; below it runs away."""
+    arm = replace(lab, hub=replace(lab.hub, friction=0.02))
+    loop = sampled_loop(arm, GAINS, count=8)
+    ((low, high),) = stable_windows(loop, "K1")
+    assert low == pytest.approx(-0.02, rel=1e-6)
+    assert [loop.having(K1=K1).poles.is_stable for K1 in (-0.0201, -0.0199, 0.99 * high, 1.01 * high)] == [
+        False, True, True, False,
+    ]  # fmt: skip

@@ -1,14 +1,17 @@
 """A verdict that says "settled" is proven in its band: loops that eight and sixteen modes agree to call stable."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
+import tfarm
 from tests.dsp.hold import HoldModel
 from tests.dsp.settled import survey
 from tests.shared import thinned
-from tfarm.arm import Arm, Hub, HubFeedback, Link, Payload, Section
+from tfarm.arm import FED_BACK, Arm, Hub, HubFeedback, Link, Payload, Section
 from tfarm.dsp import (
     Chain,
     Converters,
@@ -29,7 +32,7 @@ from tfarm.dsp.shown import Edge, shown_windows
 from tfarm.dsp.verdict import settled_verdict
 from tfarm.errors import ConvergenceError
 from tfarm.spectrum import continuation, damped, modes
-from tfarm.spectrum.damped import damped_modes
+from tfarm.spectrum.damped import TOWARD_SINGULAR, damped_modes
 
 
 def arm_of(link, inertia, damping, **section):
@@ -271,3 +274,36 @@ def test_a_small_survey():
     counts = survey(1, seed=3)
     assert counts["false"] == 0
     assert counts["settled"] == 1
+
+
+def test_what_is_left_of_the_line_is_bounded_by_the_integrals_of_both_edges():
+    """Up the line and along the level one to where nothing outlives a sample, by SciPy's quadrature."""
+    lab = tfarm.load("sasaki2012-lab")
+    chain = Chain(sampling=Sampling(period=0.01, delay_samples=0.4, antialias_corner=200.0))
+    loop, line, top = sampled_loop(lab, HubFeedback(K1=0.3, K2=0.3), chain, count=8), 100.0, 120.0
+    T, remaining = 0.01, 0.01 * (1 - loop.chain.sampling.fraction)
+    G = tfarm.transfer(lab, "root_moment")
+    row = FED_BACK.index("root_moment")
+
+    def size(s):
+        filtered = G(s) * 200.0 / (s + 200.0) if loop.analog[row] else G(s)
+        return abs(filtered / s) * math.exp(s.real * remaining) / (1 - math.exp(s.real * T))
+
+    up, _ = quad(lambda w: size(complex(-line, w)), 0.0, top, limit=400)
+    away, _ = quad(lambda c: size(complex(-c, top)), line, line + 45.0 / remaining, limit=400)
+    found = band._left_of(loop, line, top)[row]
+    assert 1.0 <= found / ((up + away) * 2 / np.pi) <= 1 + 4 * band.SURE
+
+
+def test_where_all_oscillating_modes_are_held_the_band_goes_on_to_where_shear_waves_are():
+    """Much damping leaves four modes of bending; what oscillates above them dies within a sample."""
+    arm = tfarm.load("sasaki2012-lab").having(damping=1e-3)
+    loop = sampled_loop(arm, HubFeedback(K1=0.3, K2=0.3), count=4)
+    found, highest = complete_band(loop), loop.plant.poles.imag.max()
+    assert found.top > 100 * highest
+    others = sampled_loop(arm, HubFeedback(K1=0.3, K2=0.3), count=12).plant.poles
+    others = others[(others.imag > 1.01 * highest) & (others.imag < found.top)]
+    assert others.size
+    assert others.real.max() < -TOWARD_SINGULAR / arm.damping  # left of the line: they are gone within a sample
+    few = complete_band(sampled_loop(tfarm.load("sasaki2012-lab"), HubFeedback(K1=0.3, K2=0.3), count=8))
+    assert few.top == pytest.approx(1.02 * few.loop.plant.poles.imag.max(), rel=1e-12)  # the ninth is not far
