@@ -8,3 +8,5 @@ from numpy.typing import NDArray
 Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 Whole = NDArray[np.int64]
+
+LEAST_SIZE = 1e-300  # in place of a size of 0 that divides, or whose logarithm is taken: huge, but a number

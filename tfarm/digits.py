@@ -10,6 +10,7 @@ from typing import Any
 
 POWER_OF_TEN = re.compile(r"(?<![\w.])(\d(?:\.\d+)?)e([-+]?\d{1,2})(?!\w|\.\d)")
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+DOUBLE_DIGITS = 15  # that a decimal number keeps on its way through a double
 LEAST_PLAIN, MOST_PLAIN = 1e-3, 1e7  # outside, powers of ten read better
 SPARE_DIGITS = 2  # digits beyond its own that the largest number of a column may have for the sake of the smallest
 MOST_DECIMALS = 7  # of a column with one number of them; where more are needed each number has digits of its own

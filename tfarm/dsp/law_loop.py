@@ -20,7 +20,7 @@ from typing_extensions import TypeVar
 from tfarm.arm import Arm
 from tfarm.arm.blocks import Rational, StateSpace
 from tfarm.arm.law import Law, Part
-from tfarm.arrays import Complex, Real, Whole
+from tfarm.arrays import LEAST_SIZE, Complex, Real, Whole
 from tfarm.dsp.chain import MOST_DELAY, Chain
 from tfarm.dsp.discretise import discretised
 from tfarm.dsp.law_plant import SensedPlant, is_analog, sensed_plant
@@ -87,7 +87,7 @@ class SampledLaw:
         """What the law adds to each pole of the plant, at most, where the samples see it [1/s]."""
         seen = np.exp(1j * self.plant.poles.imag * self.chain.sampling.period)
         entries, whole = self.law.polynomials(seen)
-        return np.asarray(abs(entries * self.plant.residues).sum(axis=0) / np.maximum(abs(whole), 1e-300))
+        return np.asarray(abs(entries * self.plant.residues).sum(axis=0) / np.maximum(abs(whole), LEAST_SIZE))
 
     def signals(self, z: Complex, base: Whole | None, offset: Any) -> Complex:
         """Both `terms`, in rows."""

@@ -28,6 +28,7 @@ from tfarm.reduced.remainder import SLOW_POLES_FROM, slow_remainder
 from tfarm.response import transfer
 from tfarm.spectrum import DampedModes, Modes
 from tfarm.spectrum.damped import all_damped_modes
+from tfarm.spectrum.search import LISTS_KEPT
 
 Branching = Callable[[Modes], DampedModes]
 
@@ -115,7 +116,7 @@ def undelayed_plant(
     return with_modes(model, chain, outputs, count)
 
 
-@lru_cache(maxsize=32)  # the simulations of one page ask for the same model some twenty times
+@lru_cache(maxsize=LISTS_KEPT)  # the simulations of one page ask for the same model some twenty times
 def _modelled(arm: Arm, names: tuple[str, ...], count: int, x: float | None) -> ModalModel:
     return modal_model(arm, names, count, x)
 

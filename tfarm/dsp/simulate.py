@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import FED_BACK, Arm, HubFeedback
 from tfarm.arm.checks import whole
-from tfarm.arrays import Complex, Real
+from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.dsp import kernel
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.converters import quantisers
@@ -257,7 +257,7 @@ class Simulator:
         if not self.plant.arm.is_undamped or self.chain.actuator.hub_damping > 0:
             return None
         after, (work, moved) = self._energy(state.amplitude, state.rigid[1]), state.work
-        return float(abs(after - state.energy - work) / max(state.energy + moved, 1e-300))
+        return float(abs(after - state.energy - work) / max(state.energy + moved, LEAST_SIZE))
 
     def _result(self, state: _State, done: int, gain: Real | None) -> Simulation:
         stopped = None

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.special import gammaincinv
 
 from tfarm.arm import MOMENT_GAIN, Arm, HubFeedback
-from tfarm.arrays import Real
+from tfarm.arrays import LEAST_SIZE, Real
 from tfarm.errors import ConvergenceError
 from tfarm.loop.margins import margins_of_gains
 from tfarm.loop.regions import region
@@ -45,7 +45,7 @@ def possible(fit: Fit, count: int) -> Possible:
     """
     found, rng = fit.solution, np.random.default_rng(FIT_SEED)
     sizes, axes = principal_axes(found.jacobian)
-    spread = np.minimum(1.0 / np.maximum(sizes, 1e-300), OPEN_DEVIATION)
+    spread = np.minimum(1.0 / np.maximum(sizes, LEAST_SIZE), OPEN_DEVIATION)
     apart = 2.0 * float(gammaincinv(found.point.size / 2, DRAWS_KEPT))  # the quantile of chi squared
     most = found.chi_squared + apart + 2 * int((sizes < 1 / OPEN_DEVIATION).sum())
     kept: list[Real] = []

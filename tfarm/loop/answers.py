@@ -22,6 +22,7 @@ from .regions import INFINITE, Region
 from .windows import Interval, Windows, reach_words
 
 LAW_IN_WORDS = f"u = -{SPELT_OUT} + r"
+WINDOW_DIGITS, PAGE_WINDOW_DIGITS = 8, 5  # of the ends of a window, on a terminal and on a page
 POLE_COLUMNS = (  # of pairs Re s, Im s
     Column("re", "Re s", "1/s", of=lambda pole: within(pole[0], EIGENVALUE_ERROR * math.hypot(*pole), 12)),
     Column("im", "Im s", "rad/s", of=lambda pole: pole[1], digits=singly(general, 12)),
@@ -75,17 +76,17 @@ WINDOW_COLUMNS = (  # of `GainRow`; JSON has the gain's name before each key
     Column("looked_at", of=lambda row: list(row.windows.looked_at), on=(JSON,)),
     Column("band_rad_s", of=lambda row: row.windows.band, on=(JSON,)),
     Column("", "stable around it", on=(TERMINAL,),
-           of=lambda row: " ".join(row.spans(general, 8, row.windows.around)) or "-"),
+           of=lambda row: " ".join(row.spans(general, WINDOW_DIGITS, row.windows.around)) or "-"),
     Column("", "all stable windows", on=(TERMINAL,),
-           of=lambda row: " ".join(row.spans(general, 8, *row.windows.all)) or "none"),
+           of=lambda row: " ".join(row.spans(general, WINDOW_DIGITS, *row.windows.all)) or "none"),
     Column("stable_around_it", "stable around it", on=REPORT,
            of=lambda row: _joined(row.windows.around) if row.windows.around else NOT_STABLE,
-           shown=lambda row: " ".join(row.spans(plain, 5, row.windows.around)) or NOT_STABLE),
+           shown=lambda row: " ".join(row.spans(plain, PAGE_WINDOW_DIGITS, row.windows.around)) or NOT_STABLE),
     Column("stable_windows", "all stable windows", on=REPORT,
            of=lambda row: _joined(*row.windows.all) or "none",
-           shown=lambda row: ", ".join(row.spans(plain, 5, *row.windows.all)) or "none"),
+           shown=lambda row: ", ".join(row.spans(plain, PAGE_WINDOW_DIGITS, *row.windows.all)) or "none"),
     Column("looked_at", "looked at", on=REPORT, of=lambda row: _joined(row.windows.looked_at),
-           shown=lambda row: "({}, {})".format(*(plain(end, 5) for end in row.windows.looked_at))),
+           shown=lambda row: "({}, {})".format(*(plain(end, PAGE_WINDOW_DIGITS) for end in row.windows.looked_at))),
 )  # fmt: skip
 MARGIN_COLUMNS = (  # of `LoopMargins`, beside the factors of the gain
     Column("phase_margin_deg", "phase margin", "deg", of="phase"),

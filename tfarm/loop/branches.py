@@ -30,6 +30,7 @@ from .variation import Variation, member_of
 
 MAY_PASS_ORIGIN = 1e-6  # of the lowest flexible frequency: zeros closer to the origin may pass it
 FIRST_STEP_SHARE = 0.01  # the first step along a parameter, as a share of the way
+STEP_SHRINKS = 10  # times, where at its end the rigid body's zeros are not yet told from the others: time alone
 SOFT = 1e-6  # where the rigid body's zeros meet at s = 0, this share of the way is left out
 LEAST_STEP_SHARE = 1e-15  # share of the way at which they are no longer looked for on the other side
 SAME_ZERO = 1e-9  # of its size: a zero paired anew is known again so closely
@@ -37,6 +38,7 @@ NOBODY = -1  # the number of the branch of a zero that has ended
 ASIDE = 1e-3  # of J w1: a rate gain that keeps modes from meeting on the axis
 GUESSING_NODES = 4  # nodes through which a guess between two of them goes
 FARTHEST_RIGID = 0.02  # of the lowest flexible frequency: how far the rigid body's zeros may be there
+CANCELLED_INERTIA = 1e-9  # of the arm's: stands for an effective inertia that K2 has cancelled, to start from
 
 
 @dataclass(frozen=True)
@@ -124,7 +126,7 @@ class Stage:
                 found, stray = corrected(self._member(value), guess)
                 if not stray.any():
                     return Node(value, found)
-            share /= 10
+            share /= STEP_SHRINKS
         raise ConvergenceError("the rigid body's zeros cannot be told from the others at small gains", before, share)
 
     def _met(self, last: Node) -> Node:
@@ -203,7 +205,7 @@ def _alone(zeros: Sequence[float]) -> Complex:
 
 def rigid_pair(loop: Loop, _: Complex) -> Complex:
     """The zeros of J_eff s^2 + b s + c (`Loop.at_hub`): what the rigid body's become under small gains."""
-    J = effective_inertia(loop.arm, loop.law) or 1e-9 * loop.arm.total_inertia
+    J = effective_inertia(loop.arm, loop.law) or CANCELLED_INERTIA * loop.arm.total_inertia
     b, c = (each / J for each in loop.at_hub)
     root = np.sqrt(complex(b * b / 4 - c))
     far = -b / 2 - np.copysign(root.real, b) if root.real else -b / 2 + 1j * root.imag

@@ -26,6 +26,8 @@ CROSSING_STEP = 1e-5  # of a frequency, or of the distance of two gains, for dif
 CROSSING_STEPS = 30  # of Newton's method, at most: linear convergence at a double root leaves 1e-9
 ODD = np.array([OUTPUTS[gain.output].power % 2 == 1 for gain in GAINS])  # powers of s: imaginary on the axis
 CROSSING_HALVINGS = (0, 4, 12)  # of the distance of two points, before Newton's method is tried
+GAIN_KNOWN = 1e-17  # of the larger end of a bracket: a gain at which a pole is at 0 is known so closely, next to 0 too
+LEAST_RTOL = 4 * float(np.finfo(float).eps)  # that SciPy's brentq takes
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -177,4 +179,4 @@ def _through_origin(variation: Variation, gains: Real, lowest: float) -> float |
     if 0 in ends:
         return float(gains[ends.index(0)])
     low, high = float(gains.min()), float(gains.max())
-    return float(brentq(at_origin, low, high, xtol=1e-17 * max(-low, high), rtol=4 * float(np.finfo(float).eps)))
+    return float(brentq(at_origin, low, high, xtol=GAIN_KNOWN * max(-low, high), rtol=LEAST_RTOL))

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm, law_of
-from tfarm.arrays import Complex, Real
+from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import dimensionless, quick_characteristics
 from tfarm.exact.system import system_of
@@ -28,6 +28,12 @@ Kind = Callable[[Complex, float], NDArray[np.bool_]]  # which poles below a top 
 
 MODES_BEYOND_BAND = (5, 30)  # of the model; 30 where 5 do not do, and a box where these do not
 CORRECTIONS = 6  # of Newton's method: the start is right to a few digits, so the last ones change nothing
+LONGEST_CORRECTION = 0.1  # of |s|: a longer one would land anywhere, and more than WHOLE_CORRECTION in all is refused
+MODEL_REACH = 1.2  # of the top of the band: poles of the model up to there may be of exact ones below it
+NO_PART = 1e-9  # of a pole's size: a smaller real or imaginary part is rounding, as is a smaller distance of two
+NEAREST_POLE = 1e-9  # of the top of the band: nearer to 0 is what rounding makes of a pole there
+SAME_POLE = 1e-7  # of its size: so near to each other two starts found one pole, or two that rounding cannot tell apart
+MODELS_KEPT = 16  # asked for again and again: memory against time, of no effect on an answer
 LAST_CORRECTION = 1e-9  # of |s|: squared by the quadratic convergence, far below the last digit
 WHOLE_CORRECTION = 0.05  # of |s|: farther from its start a pole may be another's
 GAINS_AT_A_TIME = 4000  # memory, whatever the grid
@@ -66,7 +72,7 @@ def least_damping(arm: Arm, laws: Real, number: int) -> Real:
 
 def is_oscillating(s: Complex) -> NDArray[np.bool_]:
     """Whether poles lie above the real axis by more than rounding does it."""
-    return np.asarray(s.imag > 1e-9 * abs(s))
+    return np.asarray(s.imag > NO_PART * abs(s))
 
 
 def _oscillating(s: Complex, top: float) -> NDArray[np.bool_]:
@@ -75,7 +81,7 @@ def _oscillating(s: Complex, top: float) -> NDArray[np.bool_]:
 
 def _either(s: Complex, top: float) -> NDArray[np.bool_]:
     """Those, and real ones apart from 0 and from what rounding makes of it."""
-    real = (abs(s.imag) <= 1e-9 * abs(s)) & (abs(s) > 1e-9 * top) & (abs(s) < top)
+    real = (abs(s.imag) <= NO_PART * abs(s)) & (abs(s) > NEAREST_POLE * top) & (abs(s) < top)
     return _oscillating(s, top) | real
 
 
@@ -110,18 +116,18 @@ def _filled(poles: Complex, rows: NDArray[np.int64], found: Complex) -> Complex:
 def _corrected(kind: Kind, model: ModalModel, laws: Real, top: float) -> tuple[Complex, NDArray[np.bool_]]:
     """The exact poles next to those of a model, and for which laws all settled apart."""
     starts = np.linalg.eigvals(model.closed(laws.T)[0]).astype(complex)
-    wanted = kind(starts, 1.2 * top)
+    wanted = kind(starts, MODEL_REACH * top)
     order = np.argsort(~wanted, axis=1, kind="stable")[:, : max(1, int(wanted.sum(1).max()))]
     s = np.where(np.take_along_axis(wanted, order, 1), np.take_along_axis(starts, order, 1), np.nan)
     polished, settled = exact_poles_next_to(model.arm, s, laws)
     poles = np.where(kind(polished, top), polished, np.nan)
     apart = abs(poles[:, :, None] - poles[:, None, :]) / abs(poles[:, :, None])
     apart[:, np.arange(poles.shape[1]), np.arange(poles.shape[1])] = np.nan
-    is_twice = np.where(np.isnan(apart), 1.0, apart) < 1e-7
+    is_twice = np.where(np.isnan(apart), 1.0, apart) < SAME_POLE
     return poles, np.asarray(settled.all(1) & ~is_twice.any(axis=(1, 2)))
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=MODELS_KEPT)
 def _model(arm: Arm, count: int) -> ModalModel | ConvergenceError:
     """The model with so many modes, or why they cannot be followed to the arm's damping: asked for again and again."""
     try:
@@ -144,8 +150,9 @@ def exact_poles_next_to(arm: Arm, starts: Complex, laws: Real) -> tuple[Complex,
         at = quick_characteristics(k, s, laws[:, rows])
         with np.errstate(all="ignore"):  # a start that runs away has not settled
             move = at.value / at.slope
-        move = np.where(np.isfinite(move), move, 0.1 * s)
-        s = s - np.where(abs(move) > 0.1 * abs(s), move * (0.1 * abs(s) / np.maximum(abs(move), 1e-300)), move)
+        most = LONGEST_CORRECTION * abs(s)
+        move = np.where(np.isfinite(move), move, LONGEST_CORRECTION * s)
+        s = s - np.where(abs(move) > most, move * (most / np.maximum(abs(move), LEAST_SIZE)), move)
     polished, settled = np.full(starts.shape, np.nan, complex), np.ones(starts.shape, bool)
     polished[rows, columns] = s
     settled[rows, columns] = (abs(move) < LAST_CORRECTION * abs(s)) & (abs(s - begin) < WHOLE_CORRECTION * abs(s))

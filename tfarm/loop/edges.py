@@ -25,6 +25,9 @@ LINEAR_SHARE = LINEAR_SCALE / (1 - 1 / 10)  # what these are multiplied by there
 EVEN_GRID = 1e-9  # of its range: by less may the steps of an even grid differ
 LOWEST_MOMENT_GAIN, HIGHEST_MOMENT_GAIN = -4.0, 2.0  # of what balances a torque: the range that is shown
 DEEPEST_MOMENT_GAIN = -50.0  # and how deep unstable windows are looked for
+DEEP_ROWS = 400  # values between, at which they are looked for
+BELOW_DEEPEST = 1.4  # times the deepest of them: how deep the picture goes, so that it is seen to end
+HIGHEST_RATE_GAIN = 10  # J w1: with it the hub of a rigid arm slows down within 0.1/w1
 SHORT_SEGMENT = 0.008  # of the picture: longer pieces of the boundary are seen as straight, and are cut
 LONG_SEGMENT = 0.03  # of the picture: what is longer after all cuts is a jump through infinity, and is not drawn
 EDGE_ROUNDS = 30  # of cutting at most: 2^-30 of a step between frequencies is below what a picture shows
@@ -80,7 +83,7 @@ def rate_axis(arm: Arm) -> Axis:
     """The rate gain from just below 0 to 10 J w1, logarithmic from well below the default gain on."""
     unit = rate_unit(arm)
     linear = 10.0 ** math.floor(math.log10(default_gains(arm)[RATE_GAIN]))
-    return Axis(-linear, 10 * unit, linear)
+    return Axis(-linear, HIGHEST_RATE_GAIN * unit, linear)
 
 
 def moment_axis(arm: Arm, x: Axis) -> Axis:
@@ -91,11 +94,11 @@ def moment_axis(arm: Arm, x: Axis) -> Axis:
     if arm.is_undamped:
         return Axis(low, high)
     across = x.grid(SCAN)
-    deep = region(arm, across[across > 0], between(deepest, low, 400))
+    deep = region(arm, across[across > 0], between(deepest, low, DEEP_ROWS))
     rows = np.nonzero(~deep.stable.all(axis=1))[0]
     if not rows.size:
         return Axis(low, high)
-    return Axis(max(deepest, 1.4 * float(deep.axes[1][rows[0]])), high, high)
+    return Axis(max(deepest, BELOW_DEEPEST * float(deep.axes[1][rows[0]])), high, high)
 
 
 def edge(found: Region, x: Axis, y: Axis) -> Real:

@@ -17,14 +17,18 @@ import numpy as np
 
 from tfarm.arm import Arm
 from tfarm.spectrum import flexible_frequencies, modes
+from tfarm.spectrum.search import ARMS_KEPT
 
 NEAREST_TO_STEEP, FARTHEST_FROM_STEEP = 1e-10, 0.06  # distances from a steep place, as shares of its frequency
 POINTS_BESIDE_STEEP = 14  # of a grid on either side of a steep place, one and a half a decade
 POINTS_BETWEEN_STEEP = 24  # and between two of them
+STEEP_BEYOND = 1.05  # of the end of a grid: the points of steep places up to there reach below it
+SLOWEST = 1e-6  # of the first steep place: where a grid begins, as nothing bends there
+POINTS_BELOW_STEEP = 60  # from there to that place, ten a decade
 MOST_BAND_MODES = 150  # flexible: what is not settled within so many is left open
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=ARMS_KEPT)
 def steep_places(arm: Arm, up_to: float) -> Any:
     """Natural frequencies [rad/s] with the arm's own hub, with a locked one and with none, ascending; read-only."""
     pin = replace(arm, hub=replace(arm.hub, inertia=0.0, friction=0.0, stiffness=0.0), motor=None, input="hub_torque")
@@ -34,25 +38,25 @@ def steep_places(arm: Arm, up_to: float) -> Any:
     return places
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=ARMS_KEPT)
 def grid(arm: Arm, up_to: float) -> Any:
     """Frequencies [rad/s] from a millionth of the first natural one to `up_to`, dense at steep places; read-only."""
-    places = np.asarray(steep_places(arm, 1.05 * up_to))
-    lowest = 1e-6 * min(up_to, places[0] if places.size else up_to)
+    places = np.asarray(steep_places(arm, STEEP_BEYOND * up_to))
+    lowest = SLOWEST * min(up_to, places[0] if places.size else up_to)
     away = np.geomspace(NEAREST_TO_STEEP, FARTHEST_FROM_STEEP, POINTS_BESIDE_STEEP)
     close = (places[:, None] * (1 + np.r_[-away[::-1], away])).ravel()
     corners = np.r_[lowest, places[places < up_to], up_to]
     between = np.concatenate(
         [np.linspace(a, b, POINTS_BETWEEN_STEEP, endpoint=False) for a, b in itertools.pairwise(corners)]
     )
-    slow = np.geomspace(lowest, corners[1], 60)
+    slow = np.geomspace(lowest, corners[1], POINTS_BELOW_STEEP)
     omega = np.unique(np.concatenate([close, between, slow]))
     omega = np.append(omega[(omega >= lowest) & (omega < up_to)], up_to)
     omega.flags.writeable = False
     return omega
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=ARMS_KEPT)
 def band_of(arm: Arm, number: int) -> float:
     """A frequency [rad/s] half-way between two natural ones, with so many flexible modes below."""
     omega = modes(arm, number + 1).natural_frequency

@@ -27,6 +27,7 @@ from tfarm.spectrum.box import Box, newton, zeros_in_box
 
 from .answers import law_answer
 from .crossings import BranchCrossing, crossing_answers
+from .damping import NO_PART
 from .frequencies import band_of, grid
 from .law_loop import LawLoop
 from .law_map import law_crossings
@@ -40,7 +41,8 @@ AT_EDGE = 0.05  # of the box's height or width: poles so near to its edge come a
 STEP_HALVINGS = 3  # halvings of a step where poles are not plainly told apart; then a branch may end and another begin
 HEIGHTS = (1.0, 1.013, 1.031, 1.057, 0.985, 1.09)  # of the box, until no pole is on its edge at the first value
 SEEN_CROSSING = 1e-3  # of the range: a crossing of a branch so near to one that was solved for is that one
-NO_PART = 1e-9  # of a pole's size: a smaller real or imaginary part is rounding, as is a smaller distance of two
+CROSSING_KNOWN = 1e-13  # of the larger end of a step: the value at which a branch crosses, next to what doubles tell
+AT_END = 1e-9  # of the range: a crossing so near to an end is at the end, and not between
 
 
 @dataclass(frozen=True)
@@ -234,7 +236,7 @@ def _crossings(family: Family, values: Real, branches: Complex, box: Box) -> tup
         for t, w, change in law_crossings(loop, family.vary, ascending, omega, parts, band):
             near = [each for each in seen if abs(each.gain - t) <= SEEN_CROSSING * span]
             is_seen = any(abs(each.omega - w) <= SEEN_CROSSING * band for each in near)
-            if NO_PART * span < t - ascending[0] < (1 - NO_PART) * span and not is_seen:
+            if AT_END * span < t - ascending[0] < (1 - AT_END) * span and not is_seen:
                 direction = "unstable" if sign * change > 0 else "stable"
                 found.append(BranchCrossing(gain=t, omega=w, branch=None, direction=direction))
     return tuple(sorted(found, key=lambda each: (sign * each.gain, each.omega)))
@@ -247,7 +249,7 @@ def _crossed(family: Family, values: Real, poles: Complex) -> tuple[float, float
         share = (value - values[0]) / (values[1] - values[0])
         return family.pole_near(value, complex(poles[0] + share * (poles[1] - poles[0])))
 
-    at = float(brentq(lambda value: pole(value).real, values[0], values[1], xtol=1e-13 * abs(values).max()))
+    at = float(brentq(lambda value: pole(value).real, values[0], values[1], xtol=CROSSING_KNOWN * abs(values).max()))
     return at, abs(pole(at).imag)
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm, Law, cancelled, must_be_arm
-from tfarm.arrays import Complex
+from tfarm.arrays import LEAST_SIZE, Complex
 from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import Analytic, LoopParts, deflated, difference_steps
 from tfarm.exact.system import System
@@ -28,6 +28,9 @@ FAR_RIGHT = (1e5, 1e6, 1e7)  # of w1: how far right an improper law is looked at
 UNDISPERSED = 1e11  # of w1: where waves are no longer dispersed
 NEAREST_TO_ORIGIN = 1e-12  # of w1: where the function, its zeros at 0 divided out, is taken for its value at 0
 FALL_FACTOR = 0.5  # L must fall by this there, from one to the next
+ALMOST_ZERO = 1e-200  # 1/s: where it is seen whether a signal is fed back at all, also by a law that vanishes at rest
+GROWTH_READ_AT = (1e-6, 1e-9)  # 1/s: a polynomial grows there with the power of its lowest term
+NO_ORDER = 99  # of a zero at s = 0, of what is not fed back: above that of any part
 
 
 @dataclass(frozen=True)
@@ -81,7 +84,7 @@ class LawLoop:
         """How often D vanishes at s = 0, taken as the least of its terms."""
         integrators = int((self.law.poles == 0).sum())
         terms = [self.k.at_rest + integrators]
-        numerators, _ = self.law.polynomials(np.array([1e-200 + 0j]))
+        numerators, _ = self.law.polynomials(np.array([ALMOST_ZERO + 0j]))
         for row, order in enumerate(self.signals.orders):
             if abs(numerators[row, 0]) > 0:
                 terms.append(order + self._order_of(row))
@@ -92,12 +95,13 @@ class LawLoop:
 
         A part's own are told from the growth of its polynomial between two tiny arguments.
         """
-        name, orders, at = self.law.signals[row], [], np.array([1e-6, 1e-9], dtype=complex)
+        name, orders, at = self.law.signals[row], [], np.array(GROWTH_READ_AT, dtype=complex)
+        grows = np.log(GROWTH_READ_AT[0] / GROWTH_READ_AT[1])
         for n, part in enumerate(self.law.parts):
             if name in part.signals:
                 others = sum(int((each.block.poles == 0).sum()) for m, each in enumerate(self.law.parts) if m != n)
                 values = abs(part.block.numerators(at)[part.signals.index(name)])
-                own = max(0, round(float(np.log(values[0] / values[1]) / np.log(1e3)))) if values.all() else 99
+                own = max(0, round(float(np.log(values[0] / values[1]) / grows))) if values.all() else NO_ORDER
                 orders.append(others + own)
         return min(orders)
 
@@ -132,7 +136,7 @@ class LawLoop:
         late = s * self.law.delay
         shift = np.maximum(0.0, -late.real)  # left of the axis the delayed part is the larger one
         drive, fed_back = drive * whole * np.exp(-shift), fed_back * np.exp(-late - shift)
-        size = np.maximum(np.maximum(abs(drive), abs(fed_back)), 1e-300)
+        size = np.maximum(np.maximum(abs(drive), abs(fed_back)), LEAST_SIZE)
         return drive / size, fed_back / size, scale + shift + np.log(size)
 
     def _must_fall(self) -> None:

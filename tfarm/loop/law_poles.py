@@ -18,12 +18,26 @@ from tfarm.spectrum.damped import TOWARD_SINGULAR
 
 from .frequencies import band_of, steep_places
 from .law_loop import LawLoop
-from .poles import MOST_POLES, USUAL_POLES, Poles, first_poles, near_modes, quiet_edge
+from .poles import (
+    HEIGHTS_LEFT,
+    MOST_POLES,
+    RIGHT_FROM,
+    STARTS_REACH,
+    USUAL_POLES,
+    Poles,
+    first_poles,
+    near_modes,
+    quiet_edge,
+    real_starts,
+)
 
 PADE = 8  # order of the approximation of a delay in the model that starts are taken from
-HEIGHTS_LEFT = 1.5  # heights that a box reaches left
 LATE = 2.0  # of 1/delay: further left a delayed loop has ever more poles, and all of them are fast
-HEIGHTS_RIGHT = 1e8  # heights that a box reaches right
+BEYOND_OWN = 1.1  # times the rightmost pole of a law, where L is infinite: the nearest right edge that is tried
+LAW_RIGHT_POINTS = 60  # of half that edge, where Re L is looked at: more than under gains, as a law has its own poles
+FARTHER_OWN, NEARER_OWN, ASIDE_OWN = 1.01, 0.9, 0.1j  # of a law's pole: starts beside it, as on it D is infinite
+LEAST_START = 1e-100  # 1/s: zeros at 0 are divided out
+LAW_RIGHT = 1e8  # heights that a box reaches right under a law, at most: an improper one may have poles so far right
 MODES_ABOVE_BOX, MOST_MODEL_MODES = 4, 40  # modes of the model above the box, and at most
 MOST_LAW_BOX_MODES = 150  # flexible, below the highest box of a law that is searched for as many poles as are asked for
 
@@ -54,7 +68,7 @@ def law_poles_below(loop: LawLoop, height: float, late: float = LATE) -> Poles[L
 
     Left it reaches to -late/delay at most.
     """
-    at_zero, starts = loop.zeros_at_origin, starting_points_of(loop, 1.3 * height)
+    at_zero, starts = loop.zeros_at_origin, starting_points_of(loop, STARTS_REACH * height)
     found, box = complete(loop.function, lambda top: law_box(loop, top, late), height, starts)
     upper = found[found.imag >= 0]
     upper = upper[np.lexsort((upper.real, upper.imag))]
@@ -64,7 +78,8 @@ def law_poles_below(loop: LawLoop, height: float, late: float = LATE) -> Poles[L
 def law_box(loop: LawLoop, height: float, late: float = LATE) -> Box:
     """A box of that height, right of the law's poles and until |L| is small; left short of -1/C and -late/delay."""
     own, C = loop.law.poles, loop.arm.damping
-    right = quiet_edge(loop, 1.1 * max([0.1 * height, *own.real.tolist()]), height, 60, HEIGHTS_RIGHT)
+    right = BEYOND_OWN * max([RIGHT_FROM * height, *own.real.tolist()])
+    right = quiet_edge(loop, right, height, LAW_RIGHT_POINTS, LAW_RIGHT)
     clear = TOWARD_SINGULAR / C if C else np.inf
     left = min(HEIGHTS_LEFT * height, clear, late / loop.law.delay if loop.law.delay else np.inf)
     return Box(-float(left), right, -height, height)
@@ -74,14 +89,15 @@ def starting_points_of(loop: LawLoop, up_to: float) -> Complex:
     """Where Newton's method starts: the loop of a modal model, the arm's own frequencies, and the law's poles."""
     omega, C = np.asarray(steep_places(loop.arm, up_to)), loop.arm.damping
     near = near_modes(omega, C)
-    real = np.geomspace(up_to / 300, 1.4 * up_to, 25)
-    own, of_model = loop.law.poles, np.empty(0, complex)
+    real, own, of_model = real_starts(up_to), loop.law.poles, np.empty(0, complex)
     if not loop.law.is_improper:  # else it has no states
         count = min(modes_below(loop.arm, up_to) + MODES_ABOVE_BOX, MOST_MODEL_MODES)
         with suppress(ParameterError, ConvergenceError):  # the winding number says whether something is missing
             of_model = poles_of_model(loop, sensed_model(loop.arm, loop.law.signals, count))
-    starts = np.concatenate([near, near.conj(), real, -real, own * 1.01, own * 0.9 + 0.1j * abs(own), of_model])
-    return starts[abs(starts) > 1e-100]
+    starts = np.concatenate(
+        [near, near.conj(), real, -real, own * FARTHER_OWN, own * NEARER_OWN + ASIDE_OWN * abs(own), of_model]
+    )
+    return starts[abs(starts) > LEAST_START]
 
 
 def poles_of_model(loop: LawLoop, plant: Matrices) -> Complex:

@@ -26,6 +26,8 @@ MEETING_HALVINGS = 7  # halvings of a step until two poles that meet in it are a
 CLEAR_RADIUS = 1.5  # times as far as the two from the middle of a circle around them is any other pole
 CIRCLE_POINTS = 128  # of it: integrals err by CLEAR_RADIUS^(-CIRCLE_POINTS/2) at most by the trapezoidal rule, 1e-11
 MEETING_KNOWN = 1e-13  # of a value: so closely it is known where two meet
+WORTH_HALVING = 1.5  # shortest steps: a wider one is halved; between one and two, as steps are powers of two of them
+WHOLE_COUNT = 0.01  # how far an integral that counts zeros may be from their number: far more than it errs by
 ABSENT, ON_REAL_AXIS, IN_PAIR = 0, 1, 2  # what a branch is at a value
 
 
@@ -69,7 +71,7 @@ def _closed(family: Family, found: LawLocus) -> tuple[Real, Complex]:
         elif met is not None:
             values, rows = np.insert(values, n + 1, met[0]), np.insert(rows, n + 1, met[1], axis=1)
             n += 2
-        elif gap.is_open and gap.width > 1.5 * shortest and (half := gap.halved()) is not None:
+        elif gap.is_open and gap.width > WORTH_HALVING * shortest and (half := gap.halved()) is not None:
             values, rows = np.insert(values, n + 1, half[0]), _with(rows, n + 1, *half[1:])
         else:
             n += 1
@@ -200,6 +202,6 @@ def _pair_in(family: Family, value: float, middle: float, circle: Complex) -> tu
     at = family.at(value).function(middle + circle)
     weights = at.slope / at.value * circle / circle.size
     count, first, second = (float((weights * circle**power).sum().real) for power in (0, 1, 2))
-    if abs(count - 2) > 0.01:
+    if abs(count - 2) > WHOLE_COUNT:
         raise ConvergenceError(f"there are {count:.3g} poles near {middle:.6g}, not two", middle, count)
     return middle + first / 2, second / 2 - (first / 2) ** 2

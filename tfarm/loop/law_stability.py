@@ -14,6 +14,8 @@ Else it is not known, and the verdict is that of the band.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from tfarm.arm import Arm, Law
@@ -24,17 +26,25 @@ from .law_loop import LawLoop
 from .law_poles import law_box, law_poles_below
 from .passivity import Signs, signs_of
 from .poles import Poles
-from .stability import LEAST_BAND_MODES, MARGIN_OF_ZERO, QUIET, Stability, is_felt, must_be_off_axis
+from .stability import (
+    LEAST_BAND_MODES,
+    MARGIN_OF_ZERO,
+    QUIET,
+    QUIET_REACH,
+    WIDENED,
+    Stability,
+    is_felt,
+    must_be_off_axis,
+)
 
 UNKNOWN_ABOVE = "not known beyond {band:.4g} rad/s: neither small gain nor a theorem tells the modes there"
 DELAYED = "without any damping a delayed law drives infinitely many modes beyond the band"
 LISTED_LEFT = 0.5  # of 1/delay: poles are listed so far left, of ever more as |L| falls, to tell the unstable ones
-WIDENED = 1.6  # from one band that is tried to the next
-QUIET_REACH = 100.0  # bands up to which |L| is looked at: two decades of its fall
-QUIET_POINTS = 1600  # in them, 800 a decade
+LAW_QUIET_POINTS = 1600  # in the bands of QUIET_REACH, 800 a decade; a quarter of so many on the upper edge of the box
 BEYOND_LAW_POLES = 1.3  # of the fastest pole of the law that rings: a band reaches so far, if it can
 DULL = 0.7  # damping ratio from which on a pole of the law makes no peak
 SLOWEST_BAND = 3.0  # heights: as far above it are resonances looked at one by one
+NEAREST_TO_AXIS = 1e-4  # of a band: the upper edge of the box is looked at on the axis and from so near to it on
 
 
 def law_stability(arm: Arm, law: Law, band: float | None = None) -> Stability[LawLoop]:
@@ -121,10 +131,11 @@ def is_quiet_above(loop: LawLoop, band: float) -> bool:
     the upper edge of the box as far right as that reaches, and beyond |L| is smaller still.
     """
     near = np.asarray(grid(loop.arm, SLOWEST_BAND * band))
-    omega = np.unique(np.r_[near[near >= band], band * np.geomspace(1.0, QUIET_REACH, QUIET_POINTS)])
+    omega = np.unique(np.r_[near[near >= band], band * np.geomspace(1.0, QUIET_REACH, LAW_QUIET_POINTS)])
     size = abs(loop.loop_function(1j * omega))
-    if not size.max() < QUIET or size[omega > 10 * band].max() > size[omega <= 10 * band].max():
+    half = math.sqrt(QUIET_REACH)
+    if not size.max() < QUIET or size[omega > half * band].max() > size[omega <= half * band].max():
         return False
     right = law_box(loop, band).re_max
-    edge = np.r_[0.0, np.geomspace(1e-4 * band, right, QUIET_POINTS // 4)] + 1j * band
+    edge = np.r_[0.0, np.geomspace(NEAREST_TO_AXIS * band, right, LAW_QUIET_POINTS // 4)] + 1j * band
     return bool(abs(loop.loop_function(edge)).max() < QUIET)

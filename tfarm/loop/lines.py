@@ -29,6 +29,8 @@ from .plant import effective_inertia
 NO_FEEDBACK = HubFeedback()  # every gain 0
 SAME_FREQUENCY = 1e-12  # of a frequency: nearer than this are two numbers for one
 FINITE_LIMIT = 1.5  # times the gain at the farther of two small s: more at the nearer one is a gain without a limit
+JUST_BEYOND = 1.01  # of a band: natural frequencies up to there, as one may be at its end
+NEARLY_AT_REST = 1e-7  # of the lowest frequency: values there are those at s = 0 to as many digits
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +67,7 @@ def line_crossings(arm: Arm, line: Line, band: float) -> Crossings:
         if (
             arm.is_undamped and line.base == NO_FEEDBACK
         ):  # at its own frequencies there the poles of the arm without a law are
-            own = np.r_[np.inf, flexible_frequencies(arm, 1.01 * band)]
+            own = np.r_[np.inf, flexible_frequencies(arm, JUST_BEYOND * band)]
             t = np.where(abs(at[:, None] - own).min(axis=1) < SAME_FREQUENCY * at, 0.0, t)
         found += [Crossing(*each) for each in zip(t / unit, at, change, strict=True)]
     return Crossings.of(found)
@@ -92,7 +94,7 @@ def crossing_at_zero(arm: Arm, line: Line) -> Crossing | None:
     is 0.  Of an arm whose tip is held it passes where the static stiffness vanishes.
     """
     if not arm.has_rigid_mode:
-        small = 1e-7 * float(modes(arm, 1).natural_frequency[-1])
+        small = NEARLY_AT_REST * float(modes(arm, 1).natural_frequency[-1])
         return through_origin(*line_parts(system_of(arm), line, small * np.array([1 + 0j, 0.5])))
     base, way = line.base, line.direction
     if way.Kp:

@@ -30,9 +30,12 @@ from .variation import Evaluator, Variation, free_of_loss, member_of, must_be_wa
 
 MOST_LOCUS_POINTS = 100_000  # values, those between that make it round among them
 MOST_BRANCHES = 200  # as many modes are followed
+LEAST_WIDTH, LEAST_HEIGHT = 1e-12, 1e-9  # of a picture, of the size of its poles: less is rounding of one that stands
 FARTHEST_POLISH = 0.25  # how far a zero may be polished from its guess, in distances to the next branch
 POLISHED_TO = 1e-10  # of its size: one step more is taken where Newton's method still moves a zero by this
 POLISH_STEPS = 6  # of Newton's method from a guess right to some digits: what has not settled then is followed again
+FALLEN_TOGETHER = 1e-3  # of the distance of two guesses: zeros polished to less are one, found twice
+STEPS_ANEW = 8  # of what is followed again from a node, to begin with: the steps are adapted, so time alone
 HALVING_ROUNDS = 24  # of halving at most: where two branches meet their distance goes with the root of that of the gain
 SAME_STATIC_GAIN = 1e-12  # relative: a gain so near to that at which a pole passes through 0 has the pole there
 
@@ -151,8 +154,8 @@ def frame(branches: Complex) -> tuple[float, float, float, float]:
         return 0.0, 1.0, 0.0, 1.0
     left, right = min(float(points.real.min()), 0.0), max(float(points.real.max()), 0.0)
     low, high = float(points.imag.min()), float(points.imag.max())
-    wide = max(right - left, 1e-12 * float(abs(points).max())) or 1.0  # where no pole moves from 0
-    tall = max(high - low, 1e-9 * high) or wide  # where none of them swings
+    wide = max(right - left, LEAST_WIDTH * float(abs(points).max())) or 1.0  # where no pole moves from 0
+    tall = max(high - low, LEAST_HEIGHT * high) or wide  # where none of them swings
     return left, left + wide, low, low + tall
 
 
@@ -216,7 +219,7 @@ class _Polish:
         origin = self._at_origin(guess, which, segment.pinned)
         zeros, settled = self._newton(np.where(origin, 0.0, guess), which, origin)
         moved = abs(zeros - guess) > FARTHEST_POLISH * _gaps(zeros)
-        parted = abs(zeros[..., 0] - zeros[..., 1]) <= 1e-3 * abs(guess[..., 0] - guess[..., 1])
+        parted = abs(zeros[..., 0] - zeros[..., 1]) <= FALLEN_TOGETHER * abs(guess[..., 0] - guess[..., 1])
         changed = (zeros.imag > 0) != (guess.imag > 0)
         wrong = (((moved | changed) & ~origin).any(axis=2) | (parted & ~origin.all(axis=2))).any(axis=1)
         for n in np.nonzero(wrong | ~settled.all(axis=(1, 2)))[0]:
@@ -262,7 +265,8 @@ class _Polish:
         if stray.any():
             nodes = [node for node in segment.nodes if (value - node.at) * self.way >= 0]
             last = nodes[-1] if nodes else segment.nodes[0]
-            found = follow(self._member, last, value, (value - last.at) / 8, len(last.zeros))[-1].zeros[: len(guess)]
+            step = (value - last.at) / STEPS_ANEW
+            found = follow(self._member, last, value, step, len(last.zeros))[-1].zeros[: len(guess)]
         return ordered(found, segment.pinned)
 
     def _member(self, value: float) -> Member:

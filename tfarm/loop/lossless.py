@@ -28,6 +28,7 @@ from tfarm.crossing import Crossings
 from tfarm.errors import ConvergenceError
 from tfarm.exact.system import system_of
 from tfarm.spectrum import modes
+from tfarm.spectrum.search import ARMS_KEPT
 
 from .frequencies import MOST_BAND_MODES
 from .lines import along, line_parts
@@ -35,7 +36,7 @@ from .lines import along, line_parts
 UNFELT_MOMENT = 1e-9  # a K2_n below this share of a whole moment is none: the hub feels nothing of that mode
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=ARMS_KEPT)
 def locked_edges(arm: Arm) -> Crossings:
     """The K2_n of the first `MOST_BAND_MODES` modes of the locked hub, `at` their w_n [rad/s], `change` for K1 > 0.
 

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from tfarm.arm import NAMES, Arm, HubFeedback
-from tfarm.arrays import Complex, Real
+from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.crossing import brackets, solved, zeros_between
 from tfarm.records import record
 
@@ -162,7 +162,7 @@ def _spread(f: Callable[[Real], Real | Complex], omega: Real) -> Real:
 def inverse_peak(loop: Loop | LawLoop, omega: Real, of: int) -> Real:
     """|1 + L| at i omega, or |1 + 1/L| for `of` 1: the inverse of what S = 1/(1 + L) and T = L/(1 + L) peak at."""
     parts = loop.parts(1j * omega)
-    return np.asarray(abs(parts[0] + parts[1]) / np.maximum(abs(parts[of]), 1e-300))
+    return np.asarray(abs(parts[0] + parts[1]) / np.maximum(abs(parts[of]), LEAST_SIZE))
 
 
 def phase_crossovers(loop: Loop | LawLoop, omega: Real) -> tuple[tuple[float, float], ...]:
@@ -215,7 +215,7 @@ def _nearest_to_one(factors: list[float]) -> tuple[float, float]:
 def disk_at(loop: Loop | LawLoop, omega: Real) -> Real:
     """2 |(1 + L)/(1 - L)| at i omega."""
     drive, fed_back = loop.parts(1j * omega)
-    return np.asarray(2 * abs(drive + fed_back) / np.maximum(abs(drive - fed_back), 1e-300))
+    return np.asarray(2 * abs(drive + fed_back) / np.maximum(abs(drive - fed_back), LEAST_SIZE))
 
 
 def dense(verdict: Stability[Any]) -> Real:

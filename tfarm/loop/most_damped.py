@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tfarm.arm import NAMES, many_laws
-from tfarm.arrays import Complex, Real
+from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.records import record
 
 from .damping import exact_poles_next_to
@@ -51,7 +51,7 @@ def most_damped(found: Locus) -> MostDamped | None:
 
 def damping_ratios(s: Complex) -> Real:
     """-Re s/|s| of poles that swing; -inf of real ones."""
-    return np.where(s.imag > 0, -s.real / np.maximum(abs(s), 1e-300), -np.inf)
+    return np.where(s.imag > 0, -s.real / np.maximum(abs(s), LEAST_SIZE), -np.inf)
 
 
 def _between(found: Locus, gain: Real, branch: Complex) -> tuple[float, float]:

@@ -33,6 +33,9 @@ AROUND_LAW_POLE = np.linspace(-4.0, 4.0, 41)  # points around a pole of the law,
 SLOW_POINTS = 200  # points between that and the arm's own grid
 EDGE_POINTS = 750  # points along an edge of the box, to begin with
 ARC = np.linspace(-math.pi / 2, math.pi / 2, 41)  # rad, along a semicircle around a pole of L
+APPROACH = np.geomspace(1.05, 1e3, 40)  # radii of such an arc: points of the axis on either side, a dozen a decade
+RESIDUE_AT = 1e-6  # of a pole's frequency: so near to it L is the pole's share alone
+WIDEST_INDENT = 1e-3  # of the same: the radius of an arc at most, so that it reaches no neighbour
 FAST = 0.7  # radians: where the argument of 1 + L turns by more between neighbours of the contour it is halved
 LONGEST_PIECE = 0.02  # of the rim's radius: the longest straight piece of a drawn curve
 TURN_ROUNDS = 24  # of halving where it turns more
@@ -135,7 +138,7 @@ def upper_contour(loop: Loop | LawLoop, poles: Real, band: float, closed: Comple
             s, is_arc = np.r_[s, slow], np.r_[is_arc, np.zeros(slow.size, bool)]
         clear = abs(s - 1j * pole) > radius
         arc = 1j * pole + radius * np.exp(1j * (ARC[ARC >= 0] if pole == 0 else ARC))
-        approach = 1j * (pole + np.outer([-1.0, 1.0], radius * np.geomspace(1.05, 1e3, 40)).ravel())
+        approach = 1j * (pole + np.outer([-1.0, 1.0], radius * APPROACH).ravel())
         approach = approach[(approach.imag > 0) & (approach.imag < band)]
         s = np.r_[s[clear], arc, approach]
         is_arc = np.r_[is_arc[clear], np.ones(arc.size, bool), np.zeros(approach.size, bool)]
@@ -158,9 +161,9 @@ def smooth(loop: Loop | LawLoop, s: Complex, is_arc: NDArray[np.bool_]) -> tuple
 def indentation(loop: Loop | LawLoop, pole: float) -> float:
     """The radius at which |L| is about 20, and at most a thousandth of the pole's frequency (at 0: of the first)."""
     scale = pole or band_of(loop.arm, 1)
-    step = 1e-6 * scale
+    step = RESIDUE_AT * scale
     near = np.array([step + 0j if pole == 0 else 1j * (pole + step)])
-    return min(INDENT_RADIUS * float(abs(loop.loop_function(near)[0])) * step, 1e-3 * scale)
+    return min(INDENT_RADIUS * float(abs(loop.loop_function(near)[0])) * step, WIDEST_INDENT * scale)
 
 
 def turning(loop: Loop | LawLoop, path: Complex) -> float:

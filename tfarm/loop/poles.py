@@ -15,7 +15,8 @@ from typing_extensions import TypeVar
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.arm.checks import whole
-from tfarm.arrays import Complex, Real
+from tfarm.arrays import LEAST_SIZE, Complex, Real
+from tfarm.digits import DOUBLE_DIGITS
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
 from tfarm.exact.characteristic import zeros_at_origin
 from tfarm.records import record
@@ -39,6 +40,16 @@ LEAST_SQUARABLE = 1e-140  # 1/s: whose square is still a full double
 AnyLoop = TypeVar("AnyLoop", bound=Loop | LawLoop, default=Loop)  # hub gains, unless another law is said
 LEAST_REAL_PART = -0.5  # of L, so that 1 + L has no zero
 RIGHT_OF_EDGE = (2.0, 5.0, 20.0)  # times the right edge of a box, where L is looked at again
+HEIGHTS_LEFT = 1.5  # heights that a box reaches left: poles further left die out faster than any in it swings
+RIGHT_FROM = 0.1  # heights: the nearest right edge of a box that is tried
+RIGHT_GROWS = 1.7  # times, from one right edge that is tried to the next: of effect on the time alone
+RIGHT_POINTS = 40  # of half a right edge under gains, where Re L is looked at: no pole of L is nearer than RIGHT_FROM
+GAINS_RIGHT = 1e3  # heights that a box reaches right under gains, at most: there the search for its edge ends
+# Starts of Newton's method: the winding number says what they missed, so that they bear on the time alone.
+STARTS_REACH = 1.3  # heights of the box: modes of the arm up to there, as a law may draw their poles down into it
+DAMPED_BY_LAW = (0.0, 0.02, 0.3)  # of its frequency: how far left of a mode's own pole a law may have moved it
+REAL_STARTS, REAL_SPAN, REAL_REACH = 25, 300, 1.4  # on the real axis: so many, from height/300 to 1.4 heights
+SOME_INERTIA = 1e-12  # kg m^2, of a hub that has none: the rigid arm's polynomial keeps its degree
 SHRUNK_HEIGHTS = tuple(1 / factor for factor in TRIED_HEIGHTS)  # of a box that may not reach above the shear cut-off
 
 
@@ -96,7 +107,7 @@ class Poles(Generic[AnyLoop]):
         """The largest real part [1/s] in the box, apart from poles at 0."""
         return float(self.moving.real.max(initial=-np.inf))
 
-    def certify(self, digits: int = 15) -> tuple[Disc, ...]:
+    def certify(self, digits: int = DOUBLE_DIGITS) -> tuple[Disc, ...]:
         """A disc around each pole with Im >= 0 apart from 0, and a proof that the box has no other.
 
         Raises CertificationError where something cannot be proven.
@@ -149,7 +160,7 @@ def poles_below(loop: Loop, height: float, factors: tuple[float, ...] = TRIED_HE
     if loop.freed is not loop and loop.freed.is_lossless:  # with its poles at 0 and on the axis where they belong
         return replace(poles_below(loop.freed, height, factors), loop=loop)
     at_zero = zeros_at_origin(loop.k, loop.gains)
-    starts, known = starting_points(loop, 1.3 * height), slow_poles(loop, SLOW_SHARE * height)
+    starts, known = starting_points(loop, STARTS_REACH * height), slow_poles(loop, SLOW_SHARE * height)
     function = loop.member.function
     found, box = complete(function, lambda height: box_of(loop, height), height, starts, known, factors)
     # without losses the function is even in s: a simple zero is its own mirror image, its real part is rounding
@@ -162,7 +173,8 @@ def poles_below(loop: Loop, height: float, factors: tuple[float, ...] = TRIED_HE
 
 def box_of(loop: Loop, height: float) -> Box:
     """A box of that height which reaches far enough right for any unstable pole, and left short of -1/C."""
-    right, left, C = quiet_edge(loop, 0.1 * height, height, 40, 1e3), 1.5 * height, loop.arm.damping
+    right = quiet_edge(loop, RIGHT_FROM * height, height, RIGHT_POINTS, GAINS_RIGHT)
+    left, C = HEIGHTS_LEFT * height, loop.arm.damping
     return Box(-min(left, TOWARD_SINGULAR / C) if C else -left, right, -height, height)
 
 
@@ -176,7 +188,7 @@ def quiet_edge(loop: Loop | LawLoop, right: float, height: float, points: int, h
         L = loop.loop_function(np.r_[right + edge, right * np.array(RIGHT_OF_EDGE)])
         if L.real.min() > LEAST_REAL_PART:
             break
-        right *= 1.7
+        right *= RIGHT_GROWS
     return float(right)
 
 
@@ -191,7 +203,7 @@ def slow_poles(loop: Loop, below: float) -> Complex:
     if not loop.arm.has_rigid_mode or not (b or c):
         return np.empty(0, complex)
     J = effective_inertia(loop.arm, loop.law)
-    unit = max(abs(b), math.sqrt(abs(c)) * math.sqrt(abs(J)), 1e-300)  # b and sqrt(c J) alike
+    unit = max(abs(b), math.sqrt(abs(c)) * math.sqrt(abs(J)), LEAST_SIZE)  # b and sqrt(c J) alike
     with np.errstate(over="ignore"):
         roots = unit * np.roots([J, b / unit, c / unit / unit]).astype(complex)
     slow = roots[(roots != 0) & (abs(roots) <= below)]
@@ -206,16 +218,21 @@ def starting_points(loop: Loop, up_to: float) -> Complex:
     """Where Newton's method starts: the arm's own frequencies, those with the hub locked, and the rigid arm's poles."""
     arm, C = loop.arm, loop.arm.damping
     near = near_modes(np.asarray(steep_places(arm, up_to)), C)
-    J = arm.turned_inertia if arm.has_rigid_mode else arm.hub_side_inertia + 1e-12
+    J = arm.turned_inertia if arm.has_rigid_mode else arm.hub_side_inertia + SOME_INERTIA
     slow = np.roots([J, *loop.at_hub]).astype(complex)
     slow = slow[abs(slow) > LEAST_SQUARABLE]  # zeros at 0 are divided out
-    real = -np.geomspace(up_to / 300, 1.4 * up_to, 25)
-    return np.concatenate([near, near.conj(), slow, real, -real])
+    real = real_starts(up_to)
+    return np.concatenate([near, near.conj(), slow, -real, real])
+
+
+def real_starts(up_to: float) -> Real:
+    """Starts [1/s] on the real axis right of 0, for poles whose place nothing tells; mirrored, those left of it."""
+    return np.geomspace(up_to / REAL_SPAN, REAL_REACH * up_to, REAL_STARTS)
 
 
 def near_modes(omega: Real, C: float) -> Complex:
     """Starts [1/s] at and left of the poles of modes of those frequencies [rad/s] that bending alone damps."""
-    shift = np.array([0.0, 0.02, 0.3])[:, None]
+    shift = np.array(DAMPED_BY_LAW)[:, None]
     decay = C * omega**2 / 2
     return (-decay - shift * omega + 1j * omega * np.sqrt(np.maximum(1 - (C * omega / 2) ** 2, 0.0))).ravel()
 

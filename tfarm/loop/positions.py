@@ -31,6 +31,7 @@ MOST_SENSOR_MISS = 1e-8  # of the numerator on a panel, between samples: zeros a
 SERIES_END = 1e-13  # of the largest coefficient: a series ends where it is that
 BESIDE_LINE = 1.0  # of a panel's half width: how far from the axis zeros are looked for
 PAST_EDGE = 1e-7  # of a panel's half width: panels end at modes, where a sensor at a node has its zero
+BEHIND_ORIGIN = 1e-9  # of a panel's outer end: a zero at s = 0 may come out so far on the wrong side
 SAME_SENSOR_ZERO = 1e-5  # relative: a zero near both lines is found from both
 POWERS_AT_REST = {"displacement": 0, "moment": 2}  # powers of s that a sensor's numerator has at s = 0
 AS_SERIES = np.cos(np.outer(np.arange(PANEL_SAMPLES), np.arccos(CHEBYSHEV))) * 2 / PANEL_SAMPLES  # samples to a series
@@ -119,7 +120,7 @@ class _Panels:
             roots = np.asarray(chebyshev.chebroots(series[: last + 1]), dtype=complex)
             roots = roots[(abs(roots.real) <= 1 + PAST_EDGE) & (abs(roots.imag) <= BESIDE_LINE)]
             roots = (low + high) / 2 + (high - low) / 2 * roots
-            found += [self.unit * z for z in roots if z.real > -1e-9 * high]
+            found += [self.unit * z for z in roots if z.real > -BEHIND_ORIGIN * high]
         return found
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback
-from tfarm.arrays import Complex, Real
+from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.crossing import Crossings, brackets, counts_over, intervals, solved
 from tfarm.exact.characteristic import gains_of, loop_parts, torque
 from tfarm.exact.system import System, system_of
@@ -36,6 +36,7 @@ from .windows import holds_undamped
 Window = tuple[float, float]
 INFINITE = -1  # stands for infinitely many unstable poles
 MOST_GRID_GAINS = 2000  # of a map, along one gain
+SHOWN_K1, SHOWN_K2 = (-1.0, 3.0), (-2.0, 2.0)  # of a map, unless told: what the paper's arm is stable in, and around it
 
 
 @dataclass(frozen=True)
@@ -138,7 +139,8 @@ def ranges_of(arm: Arm) -> tuple[tuple[float, float], tuple[float, float]]:
     """The ranges of K1 and K2 that a map has unless others are asked for: of a rig, in its own units."""
     K1 = 1.0 if arm.is_uniform else default_gains(arm).K1 / PAPER_GAINS.K1
     K2 = arm.input_per_torque
-    return (-1.0 * K1, 3.0 * K1), (-2.0 * K2, 2.0 * K2)
+    (low, high), (lower, upper) = SHOWN_K1, SHOWN_K2
+    return (low * K1, high * K1), (lower * K2, upper * K2)
 
 
 def between(low: float, high: float, number: int) -> Real:
@@ -208,7 +210,7 @@ def _h(k: System, omega: Real, law: HubFeedback) -> Real:
     drive, numerators, _ = loop_parts(k, 1j * omega)
     along_K2 = torque(map(float, gains_of(k, HubFeedback(K2=1.0))), numerators)
     N = drive + torque(map(float, gains_of(k, law)), numerators)
-    return np.asarray((N * along_K2.conj()).imag / (abs(along_K2) * (abs(drive) + abs(numerators[0])) + 1e-300))
+    return np.asarray((N * along_K2.conj()).imag / (abs(along_K2) * (abs(drive) + abs(numerators[0])) + LEAST_SIZE))
 
 
 def boundary(arm: Arm, omega: Real, Kp: float = 0.0) -> Real:

@@ -33,6 +33,9 @@ from .poles import AnyLoop, Poles, poles_below
 
 LEAST_BAND_MODES = 12  # flexible modes in the band at C = 0, and at least
 QUIET = 0.5  # |L| beyond the band, at C > 0
+QUIET_REACH = 100.0  # bands up to which |L| is looked at: two decades of its fall
+QUIET_POINTS = 1200  # in them, 600 a decade
+WIDENED = 1.6  # times, from one band that is tried to the next
 MARGIN_OF_ZERO = 1e-11  # a real part below this share of |s| is none: the poles are right to a few eps
 NOT_BOUNDED = (  # beyond the band: of a rig with a segment without damping, and of others
     "beyond the band not bounded: with C = 0 in the link resonances are too narrow to be looked at",
@@ -181,8 +184,8 @@ def loop_band(loop: Loop) -> tuple[float, bool]:
     while modes_below(loop.arm, band) <= MOST_BAND_MODES:
         if _has_fallen(loop, band):
             return band, is_quiet(loop, band)
-        band *= 1.6
-    return max(few, band / 1.6), False
+        band *= WIDENED
+    return max(few, band / WIDENED), False
 
 
 def is_quiet(loop: Loop, band: float) -> bool:
@@ -195,7 +198,8 @@ def is_quiet(loop: Loop, band: float) -> bool:
 
 
 def _has_fallen(loop: Loop, band: float) -> bool:
-    """Whether |L| is so at 1200 points of these two decades."""
-    omega = band * np.geomspace(1.0, 100.0, 1200)
+    """Whether |L| is so at `QUIET_POINTS` points of these two decades."""
+    half = QUIET_POINTS // 2
+    omega = band * np.geomspace(1.0, QUIET_REACH, QUIET_POINTS)
     size = abs(loop.loop_function(1j * omega))
-    return bool(size.max() < QUIET and size[600:].max() <= size[:600].max())
+    return bool(size.max() < QUIET and size[half:].max() <= size[:half].max())

@@ -26,6 +26,8 @@ End = Literal["edge", "search bound", "no limit"]
 
 WINDOW_REACH, FARTHER_REACH = 20.0, {MOMENT_GAIN: 50.0}  # how far windows are looked for, times `gain_unit`
 BEYOND_STATIC = 2.0  # times J/(J - I_h), where K2 cancels the inertia: windows are looked for at least so far
+BEYOND_LAW = 10.0  # times the gain that there is: at least so far too
+STATIC_AT = 1e-9  # of the lowest frequency: L there is that of an arm at rest
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,7 @@ def gain_windows(verdict: Stability, name: str) -> Windows:
 def looked_at(loop: Loop, name: str) -> Interval:
     """The range of a gain that is searched, symmetric and well beyond what matters to the first mode."""
     arm, law = loop.arm, loop.law
-    reach = max(FARTHER_REACH.get(name, WINDOW_REACH) * gain_unit(arm, name), 10.0 * abs(law[name]))
+    reach = max(FARTHER_REACH.get(name, WINDOW_REACH) * gain_unit(arm, name), BEYOND_LAW * abs(law[name]))
     carried = arm.gauged_inertia
     if name == "K2" and 0 < carried < math.inf:
         reach = max(reach, BEYOND_STATIC * arm.turned_inertia / carried)
@@ -143,7 +145,7 @@ def holds_undamped(loop: Loop) -> bool:
     (low, high), law = stable_moments(loop.arm), loop.law
     if not (law.K1 > 0 and low < law.K2 < high):
         return False
-    small = np.array([1e-9 * float(modes(loop.arm, 1).natural_frequency[-1])], dtype=complex)
+    small = np.array([STATIC_AT * float(modes(loop.arm, 1).natural_frequency[-1])], dtype=complex)
     return bool(law.Kp >= 0 or (1 + loop.loop_function(small)[0]).real > 0)
 
 

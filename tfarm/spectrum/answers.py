@@ -11,7 +11,7 @@ import numpy as np
 
 from tfarm.arrays import Real
 from tfarm.columns import ANSWER, JSON, REPORT, TERMINAL, Column, Table
-from tfarm.digits import aligned, general, kept_digits, lined, significant, singly, within
+from tfarm.digits import DOUBLE_DIGITS, aligned, general, kept_digits, lined, significant, singly, within
 from tfarm.errors import MISSING
 from tfarm.exact.methods import Method
 
@@ -95,7 +95,7 @@ def modes_answer(
     }
     if digits is not None:
         answer["digits"] = digits
-    wanted = None if not certify else 15 if digits is None else digits
+    wanted = None if not certify else DOUBLE_DIGITS if digits is None else digits
     if wanted is not None:
         proof = modes.certify(wanted)
         rigid = [MISSING] * (len(modes) - len(proof.brackets))
@@ -119,13 +119,13 @@ def _undamped(modes: Modes, digits: int | None, method: Method) -> list[Column]:
     exact = modes.digits(digits) if digits is not None else []
     found = modes.frequencies(method)
     given = {
-        "natural_frequency_rad_s": exact if digits is not None and digits > 15 else found,
+        "natural_frequency_rad_s": exact if digits is not None and digits > DOUBLE_DIGITS else found,
         "natural_frequency_hz": found / (2 * math.pi),
     }
     columns = [replace(column, of=given.get(column.key, column.of)) for column in MODE_COLUMNS]
     held_still, rigid = hub_locked(modes), [MISSING] * int(np.sum(modes.index == 0))
     flexible = held_still.index > 0
-    if digits is not None and digits > 15:
+    if digits is not None and digits > DOUBLE_DIGITS:
         still: list[Any] = held_still.digits(digits)[-int(flexible.sum()) :]
     else:
         still = held_still.natural_frequency[flexible].tolist()

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arrays import Complex
+from tfarm.arrays import LEAST_SIZE, Complex
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import Analytic
 
@@ -128,7 +128,7 @@ def newton(function: Function, starts: Complex) -> Complex:
         settled[moving[~known]] = False
         moving, move = moving[known], move[known]
         limit = 0.3 * abs(s[moving])
-        move = np.where(abs(move) > limit, limit * (move / np.maximum(abs(move), 1e-300)), move)
+        move = np.where(abs(move) > limit, limit * (move / np.maximum(abs(move), LEAST_SIZE)), move)
         s[moving] -= move
         away, size = abs(move), abs(s[moving])
         settled[moving] = away < 1e-11 * size

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arrays import Complex, Real
+from tfarm.arrays import LEAST_SIZE, Complex, Real
 
 from .box import Function
 
@@ -79,7 +79,7 @@ def _gaps(zeros: Complex, member: Member, beside: Neighbours) -> tuple[Real, Com
     """Of each zero its distance to the nearest zero of another pair or to the singular point, and the way to each."""
     flat = zeros.ravel()
     way = flat[:, None] - flat[beside.which]
-    apart, from_origin = abs(way), np.maximum(2 * abs(flat), member.free + 1e-300)
+    apart, from_origin = abs(way), np.maximum(2 * abs(flat), member.free + LEAST_SIZE)
     apart[beside.own_pair | np.isnan(apart)] = np.inf
     gap = np.minimum(apart.min(1), np.minimum(from_origin, abs(flat - member.singular)))
     gap[np.isnan(gap)] = np.inf

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm, Theory
-from tfarm.arrays import Complex, Real
+from tfarm.arrays import LEAST_SIZE, Complex, Real
+from tfarm.digits import DOUBLE_DIGITS
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
 from tfarm.exact.characteristic import NO_GAINS, Gains, quick_characteristic, zeros_at_origin
 from tfarm.exact.coefficients import Coefficients
@@ -27,6 +28,7 @@ from .complex_shapes import mode_field
 from .continuation import Node, follow
 from .correction import Member, improved
 from .enclose import Disc, disjoint, enclosed, proven_count
+from .search import LISTS_KEPT
 from .table import Modes, modes
 
 COMPANY = (6, 11, 17, 29)  # modes followed beyond those wanted, lest the last be led astray: the next if that fails
@@ -80,7 +82,7 @@ class DampedModes:
         size = np.sqrt((p * q).real)
         return np.divide(-(p + q).real / 2, size, out=np.zeros_like(size), where=size > 0)
 
-    def certify(self, digits: int = 15) -> tuple[tuple[Disc, ...], ...]:
+    def certify(self, digits: int = DOUBLE_DIGITS) -> tuple[tuple[Disc, ...], ...]:
         """A disc around each eigenvalue of the flexible modes (one for a pair), and a proof that the box has no other.
 
         Raises CertificationError where something cannot be proven.
@@ -90,7 +92,7 @@ class DampedModes:
             wanted = pair[:1] if pair[0].imag > 0 else pair[np.isfinite(pair)]
             discs.append(tuple(enclosed(k, complex(zero), digits) for zero in wanted))
             for zero, disc in zip(wanted.tolist(), discs[-1], strict=True):
-                apart = max(abs(pair[0] - pair[-1]) if np.isfinite(pair[-1]) else abs(zero), 1e-300)
+                apart = max(abs(pair[0] - pair[-1]) if np.isfinite(pair[-1]) else abs(zero), LEAST_SIZE)
                 away = abs(complex(float(disc.re), float(disc.im)) - zero)
                 if away > float(disc.radius) + BESIDE_DISC * abs(zero) * max(1.0, abs(zero) / apart):
                     text = f"next to {zero:.12g} 1/s lies {disc.re} + {disc.im}i, not the eigenvalue listed"
@@ -180,7 +182,7 @@ def all_damped_modes(undamped: Modes, companies: tuple[int, ...] = COMPANY) -> D
     return found if found is not None and found.undamped == undamped else Branches(companies)(undamped)
 
 
-@lru_cache(maxsize=32)  # loops, plants and simulations of one page ask for the same modes some ninety times
+@lru_cache(maxsize=LISTS_KEPT)  # loops, plants and simulations of one page ask for the same modes some ninety times
 def _followed_once(arm: Arm, theory: Theory, count: int, companies: tuple[int, ...]) -> DampedModes:
     """All damped modes of an arm's own table of `count`."""
     return Branches(companies)(modes(arm, count, theory=theory))

@@ -15,6 +15,7 @@ import numpy as np
 from tfarm.arm import GAINS, Arm, HubFeedback, input_words, load, written_unit
 from tfarm.errors import ParameterError
 
+from .search import ARMS_KEPT
 from .table import modes
 
 PAPER_GAINS = HubFeedback(K1=0.3, K2=0.3)  # of the paper's arms
@@ -97,12 +98,12 @@ def first_frequency(arm: Arm) -> float:
     return _first_frequency(arm.elastic)
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=ARMS_KEPT)
 def _first_frequency(undamped: Arm) -> float:
     return float(modes(undamped, 1).natural_frequency[-1])
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=ARMS_KEPT)
 def _is_of_the_paper(arm: Arm) -> bool:
     """Whether link, hub and payload are those of one of the paper's presets."""
     papers = (load(name) for name in OF_THE_PAPER)

@@ -22,9 +22,11 @@ from .counting import ChainCounter, Counter, counter_of
 CLOSE_SHARE = 1e-3  # share of the mean spacing; further apart, rounding moves neither by more than a few last units
 PAIR_REACH = 4e-6  # relative width in which float64 surely has each of a close pair
 PAIR_BITS = 256  # of working precision, for a double frequency to its last float64 digit
+LISTS_KEPT = 32  # lists of modes, of arms asked for again and again: memory against time, of no effect on an answer
+ARMS_KEPT = 64  # arms whose single numbers are kept, likewise
 
 
-@lru_cache(maxsize=32)  # a table of sampled verdicts asks for the same undamped arm some twenty times
+@lru_cache(maxsize=LISTS_KEPT)  # a table of sampled verdicts asks for the same undamped arm some twenty times
 def natural_frequencies(k: System, first: int, last: int) -> NDArray[np.float64]:
     """The natural frequencies [rad/s] number first..last of the undamped arm, counted from 1, double ones twice.
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from tfarm.arrays import Complex, Real
+from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.exact.closed_form import SERIES_RADIUS, even_functions
 from tfarm.exact.coefficients import Coefficients, EndCondition
 from tfarm.exact.compiled import python_of
@@ -147,7 +147,7 @@ class Shapes:
             root[0], drive * root[1] - float(hub.force) * root[2],
             tip_mass * tip[0] + shear * tip[3], tip_inertia * tip[1] + moment * tip[2],
         ]).transpose(2, 0, 1)  # fmt: skip
-        columns = np.maximum(abs(rows / abs(rows).max(axis=2, keepdims=True)).max(axis=1), 1e-300)
+        columns = np.maximum(abs(rows / abs(rows).max(axis=2, keepdims=True)).max(axis=1), LEAST_SIZE)
         rows = rows / columns[:, None, :]
         rows = rows / abs(rows).max(axis=2, keepdims=True)
         _, _, right = np.linalg.svd(rows)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from tfarm.arm import THEORIES, Arm, Theory, must_be_arm
 from tfarm.arm.checks import whole
 from tfarm.arrays import Real
+from tfarm.digits import DOUBLE_DIGITS
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exact.appendix import natural_frequency, roots_near
 from tfarm.exact.chain import ElementChain
@@ -90,7 +91,7 @@ class Modes:
             raise ParameterError(key="method", value=method, remedy=remedy)
         return np.r_[[0.0] * self._rigid, flexible]
 
-    def certify(self, digits: int = 15) -> Certificate:
+    def certify(self, digits: int = DOUBLE_DIGITS) -> Certificate:
         """Proven brackets of the flexible frequencies to so many digits, and the proof that none is missing.
 
         Raises CertificationError where something cannot be proven, a double frequency for instance.

@@ -19,7 +19,7 @@ import numpy as np
 from tfarm.arm import Arm
 from tfarm.arm.blocks import Matrices, Rational
 from tfarm.arm.law import Law, Part
-from tfarm.arrays import Complex, Real
+from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.dsp import Chain
 from tfarm.dsp.law_loop import SampledLaw, acting_law, sampled_law, with_estimate
 from tfarm.dsp.law_verdict import law_verdict
@@ -70,7 +70,7 @@ class LawJudge:
         for share in (1.0, 1 / SEARCH_RESERVE, SEARCH_RESERVE):
             z, moves = pole_slopes(self._held, (A, B, share * C, share * D), slopes, share, self._signals, self._clock)
             growth.append(
-                growth_pieces(np.log(np.maximum(abs(z), 1e-300)), (moves / np.where(z == 0, 1.0, z)[:, None]).real)
+                growth_pieces(np.log(np.maximum(abs(z), LEAST_SIZE)), (moves / np.where(z == 0, 1.0, z)[:, None]).real)
             )
             if share == 1.0:
                 poles, ways = z, moves

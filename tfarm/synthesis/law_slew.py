@@ -16,7 +16,7 @@ import numpy as np
 
 from tfarm.arm import Arm, Law
 from tfarm.arm.blocks import Matrices
-from tfarm.arrays import Real
+from tfarm.arrays import LEAST_SIZE, Real
 from tfarm.dsp import Chain, Scenario, scenario
 from tfarm.dsp.law_loop import acting_law
 from tfarm.dsp.law_simulate import references_of
@@ -60,7 +60,7 @@ class LawSlew:
         if objective == "residual":
             after = task.t >= task.busy_until * (1 - 1e-12)
             value = np.sqrt((moment[after] ** 2).mean(axis=0))
-            return value, (moment[after] * d_moment[after]).mean(axis=0)[None] / np.maximum(value, 1e-300)
+            return value, (moment[after] * d_moment[after]).mean(axis=0)[None] / np.maximum(value, LEAST_SIZE)
         a, b = (weight * task.period for weight in TRIAL_COST)
         off, added = moment - task.rigid_moment[:, None], u - task.feedforward[:, None]
         if self.chain.slew.reading == "total":

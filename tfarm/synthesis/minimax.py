@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.optimize import linprog
 
-from tfarm.arrays import Real
+from tfarm.arrays import LEAST_SIZE, Real
 
 LOST = 1e3  # score where the g are not below 0, and more the larger they are
 PRICE = 100.0  # of a g above -WITHIN: tuned on the laws of all structures for the preset sasaki2012-lab
@@ -106,7 +106,7 @@ def descended(pieces: PiecesAt, start: Real, upper: Real) -> Real:
                 break
             before = value
         step = -inverse @ slope
-        step = step * min(1.0, (LONGEST_MOVE if turn else FIRST_MOVE) / max(float(abs(step).max()), 1e-300))
+        step = step * min(1.0, (LONGEST_MOVE if turn else FIRST_MOVE) / max(float(abs(step).max()), LEAST_SIZE))
         if not step @ slope < 0.0:
             break
         length, then, new = _weak_wolfe(priced, x, step, value, float(step @ slope))

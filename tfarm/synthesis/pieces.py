@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Law
-from tfarm.arrays import Complex, Real
+from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.records import record
 from tfarm.synthesis.law_slopes import Clock, changes
 from tfarm.synthesis.sampled import REAL_ANGLE
@@ -41,7 +41,7 @@ def damping_pieces(z: Complex, moves: Complex, counted: NDArray[np.bool_]) -> Sl
 
 def directions(s: Complex, moves: Complex) -> Sloped:
     """Re s/|s| (n,) of poles [1/s], of an oscillating one -zeta, and its slopes (n, coefficients)."""
-    size = np.maximum(abs(s), 1e-300)
+    size = np.maximum(abs(s), LEAST_SIZE)
     slopes = moves.real / size[:, None] - (s.real / size**3)[:, None] * (s.conj()[:, None] * moves).real
     return np.asarray(s.real / size), np.asarray(slopes)
 
@@ -72,7 +72,7 @@ class LoopCurve:
             slope = -(f[:, None] ** 2) * (apart.conj() / abs(apart))[:, None]
         else:
             across = 1.0 - L
-            f = -2 * abs(apart) / np.maximum(abs(across), 1e-300)
+            f = -2 * abs(apart) / np.maximum(abs(across), LEAST_SIZE)
             slope = f[:, None] * (1 / apart + 1 / across)[:, None]
         padded = np.r_[-np.inf, f, -np.inf]
         (peaks,) = np.nonzero((f >= padded[:-2]) & (f >= padded[2:]))
@@ -96,7 +96,7 @@ class LoopCurve:
     def _delay(self, L: Complex, slopes: Sequence[Slope]) -> Sloped:
         """-delay where |L| passes 1, between two points along straight lines."""
         q = self.places.imag
-        size, turn = np.log(np.maximum(abs(L), 1e-300)), np.mod(np.pi + np.unwrap(np.angle(L)), 2 * np.pi)
+        size, turn = np.log(np.maximum(abs(L), LEAST_SIZE)), np.mod(np.pi + np.unwrap(np.angle(L)), 2 * np.pi)
         (at,) = np.nonzero(size[1:] * size[:-1] <= 0)
         at = at[size[at] != size[at + 1]]
         n = len(slopes[0].num) if slopes else 0

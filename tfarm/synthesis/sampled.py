@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from tfarm.arm import ANGLE_GAIN, FED_BACK, PLANE, Arm, HubFeedback, laws_at
-from tfarm.arrays import Complex, Real
+from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.dsp import Chain, SampledLoop, Scenario, sampled_loop, sampled_verdict, scenario
 from tfarm.dsp.margins import most_modes
 from tfarm.dsp.sampling import PulseTransfer
@@ -286,4 +286,4 @@ def lowest_on_circle(values: Callable[[Real], Real], q: Real) -> float:
 
 def disk_of(L: Complex) -> Real:
     """2 |1 + L|/|1 - L|."""
-    return np.asarray(2 * abs(1 + L) / np.maximum(abs(1 - L), 1e-300))
+    return np.asarray(2 * abs(1 + L) / np.maximum(abs(1 - L), LEAST_SIZE))
