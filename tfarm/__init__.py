@@ -41,9 +41,8 @@ if TYPE_CHECKING:
     from tfarm.fitting.fit import fit
     from tfarm.fitting.overlay import overlay
     from tfarm.fitting.reading import read_measured
-    from tfarm.loop.closed import closed_loop_poles, margins, nyquist
-    from tfarm.loop.locus import locus
-    from tfarm.loop.regions import region as map
+    from tfarm.loop.closed import closed_loop_poles, locus, margins, nyquist
+    from tfarm.loop.closed import gain_map as map
     from tfarm.loop.spill import spill
     from tfarm.reduced import reduce
     from tfarm.response import bode, transfer
@@ -99,13 +98,13 @@ __all__ = [
 _ROOMS = {  # where a name stands; what it is called there after a colon, if not the same
     "bode": "response",
     "design": "synthesis.chosen",
-    "locus": "loop.locus",
+    "locus": "loop.closed",
     "nyquist": "loop.closed",
     "closed_loop_poles": "loop.closed",
     "compare": "comparing",
     "damped_modes": "spectrum",
     "default_gains": "spectrum.scales",
-    "map": "loop.regions:region",
+    "map": "loop.closed:gain_map",
     "margins": "loop.closed",
     "Measured": "fitting.data",
     "fit": "fitting.fit",

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 import tfarm
 from tests.plots.labels import complaints, drawn
 from tests.shared import thinned
+from tfarm import Law
 from tfarm.dsp import gain_map
 from tfarm.fitting.data import Measured
 from tfarm.loop.nyquist import compressed
@@ -131,6 +132,25 @@ def test_words_overlap_nothing_without_damping_or_torque(name):
     told = {name: complaints(each.get_figure()) for name, each in axes.items()}
     pyplot.close("all")
     assert told == {name: [] for name in axes}
+
+
+LEAD = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "tip_deflection": ([0.5], [0.02, 1.0])})
+
+
+@pytest.mark.parametrize("plot", ["locus", "gain_map"])
+def test_what_is_found_of_any_law_has_the_same_face(plot):
+    """In axes that are given there is what the picture of its own has, and no words overlap there."""
+    if plot == "locus":
+        found = tfarm.locus(LAB, LEAD, "gain", 0.0, 2.0, 20, 3)
+    else:
+        found = tfarm.map(LAB, np.linspace(0.1, 3.0, 8), np.linspace(0.0, 0.03, 9), law=LEAD, vary=("gain", "delay"))
+    own, given = getattr(tfarm.plots, plot)(found), axes_for(0)
+    assert getattr(tfarm.plots, plot)(found, ax=given) is given
+    for mine, theirs in zip(given.lines, own.lines, strict=True):
+        np.testing.assert_array_equal(mine.get_xydata(), theirs.get_xydata())
+    assert (own.get_xlabel(), own.get_ylabel()) == (given.get_xlabel(), given.get_ylabel())
+    assert complaints(own.get_figure()) == []
+    pyplot.close(own.get_figure())
 
 
 def test_words_that_do_overlap_are_told():

@@ -89,12 +89,11 @@ def spill(
     """Does a law drive a mode that its design model leaves out?  The exact loop beside models of 1, 2, 3 ... modes."""
     number, subject = whole_number("--modes", modes, 1, 60), load_arm(arm)
     law, said = asked_law(subject, given)
-    from tfarm.arm import as_law
     from tfarm.cli.control_tables import print_spill
     from tfarm.loop.spill import spill as find
     from tfarm.loop.spill import spill_answer
 
-    give(spill_answer(find(subject, as_law(law), number)) | said, json, print_spill)
+    give(spill_answer(find(subject, law, number)) | said, json, print_spill)
 
 
 @app.command("map", help=HELP_ON_MAP)
@@ -154,14 +153,13 @@ def _law_map(
         raise ParameterError(key="--vary", value=vary, remedy=remedy)
     ranges = [_range_of("--vary", each) for each in vary]
     typed = asked_law(subject, Given({}, law, name))[0]
-    from tfarm.arm import as_law
     from tfarm.cli.control_tables import print_law_map, write_law_map
     from tfarm.cli.tables import say_written
     from tfarm.loop.law_map import law_map, law_map_answer
     from tfarm.loop.regions import between
 
     x, y = (between(*limits, number) for _, limits in ranges)
-    found = law_map(subject, as_law(typed), (ranges[0][0], ranges[1][0]), x, y)
+    found = law_map(subject, typed, (ranges[0][0], ranges[1][0]), x, y)
     answer = law_map_answer(found)
     if csv is not None:
         write_law_map(answer, csv)

@@ -41,35 +41,27 @@ def locus(
     given: Given,
 ) -> None:
     """Root locus of the exact arm along a gain or a parameter; crossings of the imaginary axis are solved for."""
-    number, count = whole_number("--points", points or "500", 2, 100_000), whole_number("--branches", branches, 1, 200)
-    subject = load_arm(arm)
+    count, subject = whole_number("--branches", branches, 1, 200), load_arm(arm)
     law, said = asked_law(subject, given)
-    from tfarm.arm import Law
+    from tfarm.arm import HubFeedback
+    from tfarm.loop.closed import locus as find
+    from tfarm.loop.law_locus import LawLocus, law_locus_answer
+    from tfarm.loop.loci import locus_answer
+    from tfarm.loop.reduced_locus import reduced_locus
 
-    if isinstance(law, Law):
-        from tfarm.loop.law_locus import law_locus, law_locus_answer
-
-        number = whole_number("--points", points or "100", 2, 5000)
-        found = law_locus(subject, law, vary, start, stop, number, min(count, 60))
-        answer, show = law_locus_answer(found), print_law_locus
-        if png is not None:
-            from tfarm.plots.files import save_png
-            from tfarm.plots.laws import draw_law_locus
-
-            save_png(draw_law_locus(found), png)
+    most = (100_000, 200) if isinstance(law, HubFeedback) else (5000, 60)
+    number = None if points is None else whole_number("--points", points, 2, most[0])
+    found = find(subject, law, vary, start, stop, number, min(count, most[1]))
+    if isinstance(found, LawLocus):
+        reduced, answer, show = None, law_locus_answer(found), print_law_locus
     else:
-        from tfarm.loop.loci import locus_answer
-        from tfarm.loop.locus import locus as find
-        from tfarm.loop.reduced_locus import reduced_locus
+        reduced = reduced_locus(found)
+        answer, show = locus_answer(found, reduced) | said, print_locus
+    if png is not None:
+        from tfarm.plots.files import save_png
+        from tfarm.plots.laws import draw_locus_of
 
-        exact = find(subject, law, vary, start, stop, number, count)
-        reduced = reduced_locus(exact)
-        answer, show = locus_answer(exact, reduced) | said, print_locus
-        if png is not None:
-            from tfarm.plots.files import save_png
-            from tfarm.plots.roots import draw_locus
-
-            save_png(draw_locus(exact, reduced), png)
+        save_png(draw_locus_of(found, reduced), png)
     if csv is not None:
         from tfarm.tables.files import write_csv
 

@@ -15,6 +15,7 @@ from tfarm.arm.checks import whole
 from tfarm.arrays import Complex, Real
 from tfarm.dsp import Chain
 from tfarm.dsp.brief import SampledBrief, brief_of
+from tfarm.dsp.chain import chain_or_usual
 from tfarm.dsp.closed import verdict_on
 from tfarm.errors import ConvergenceError, ParameterError, one_line
 from tfarm.loop.closed import closed_loop_poles
@@ -196,7 +197,7 @@ def compare(
         raise ParameterError(key="input", value=second.input, remedy=remedy)
     is_clocked = any(isinstance(law, Law) and law.is_discrete for _, law in pairs)
     one, other = (
-        _side(name, arm, law, modes, chain or Chain(), is_clocked)
+        _side(name, arm, law, modes, chain_or_usual(chain), is_clocked)
         for name, (arm, law) in zip(called, pairs, strict=True)
     )
     return Comparison(one, other, output)

@@ -173,6 +173,16 @@ class Chain:
         return not c.is_quantised and not clips
 
 
+def chain_or_usual(chain: object) -> Chain:
+    """The chain, the usual one for None.  Raises ParameterError for what is none."""
+    if chain is None:
+        return Chain()
+    if isinstance(chain, Chain):
+        return chain
+    remedy = "give a tfarm.dsp.Chain, or what tfarm.dsp.load_chain reads; nothing for 10 ms and ideal converters"
+    raise ParameterError(key="chain", value=chain, remedy=remedy)
+
+
 def _above_zero(key: str, record: object, meaning: str) -> float:
     value = extended(key, getattr(record, key.split(".")[1]), meaning)
     if value == 0.0:

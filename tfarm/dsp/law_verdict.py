@@ -7,7 +7,7 @@ from typing import Any
 
 from tfarm.arm import Arm, Law, cancelled
 from tfarm.arm.checks import whole as whole_number
-from tfarm.dsp.chain import Chain
+from tfarm.dsp.chain import Chain, chain_or_usual
 from tfarm.dsp.discretise import described_law, rule_in_words
 from tfarm.dsp.law_circle import LawCircle
 from tfarm.dsp.law_loop import SampledLaw, sampled_law
@@ -53,7 +53,7 @@ def law_verdict(arm: Arm, law: Law, chain: Chain | None = None, *, count: int | 
 
     Raises ParameterError for what `sampled_law` refuses and a count outside 1..400.
     """
-    chain = Chain() if chain is None else chain
+    chain = chain_or_usual(chain)
     if count is not None:
         words = f"a whole number of flexible modes from 1 to {MOST_ASKED}"
         count = whole_number("modes", count, 1, MOST_ASKED, words)

@@ -20,7 +20,7 @@ import numpy as np
 
 from tfarm.arm import FED_BACK, Arm, HubFeedback
 from tfarm.arrays import Complex, Real, Whole
-from tfarm.dsp.chain import Chain
+from tfarm.dsp.chain import Chain, chain_or_usual
 from tfarm.dsp.plant import Branching, Plant, loop_plant, shorter_plant
 from tfarm.dsp.sampling import PulseTransfer
 from tfarm.errors import ConvergenceError, ParameterError
@@ -245,7 +245,7 @@ def sampled_loop(
 
     For one arm with many C: `branches` of its damped modes, that remember where they were.
     """
-    chain = Chain() if chain is None else chain
+    chain = chain_or_usual(chain)
     check_loop(arm, gains)
     return SampledLoop(loop_plant(arm, chain, count, branches), chain, gains)
 

@@ -12,7 +12,7 @@ import numpy as np
 from tfarm.arm import LISTED, TAKEN_OFF, AnyLaw, Arm, HubFeedback, driven, tracked, unit_of
 from tfarm.arrays import Real
 from tfarm.columns import Column
-from tfarm.dsp.chain import Chain
+from tfarm.dsp.chain import Chain, chain_or_usual
 from tfarm.dsp.curves import resolved
 from tfarm.dsp.discretise import described_law
 from tfarm.dsp.enough import Enough, enough_modes
@@ -217,7 +217,7 @@ def simulate(
     samples.  Raises ParameterError for a locked hub, an algebraic loop, an unknown signal, a law in z whose period is
     not the chain's, and for what `scenario` refuses.
     """
-    chain = Chain() if chain is None else chain
+    chain = chain_or_usual(chain)
     arm, law = tracked(arm, law)
     return _simulated(arm, law, chain, scenario(scenario_name, arm, chain, duration), count, between)[0]
 

@@ -11,7 +11,7 @@ from tfarm.arm import LISTED, MOMENT_GAIN, PLANE, TAKEN_OFF, Arm, HubFeedback, d
 from tfarm.arm.checks import whole
 from tfarm.columns import Table
 from tfarm.dsp.band import Band, complete_band
-from tfarm.dsp.chain import Chain, Sampling
+from tfarm.dsp.chain import Chain, Sampling, chain_or_usual
 from tfarm.dsp.law import SAMPLED_MODE_COLUMNS, ModeTable, growing_mode, mode_table
 from tfarm.dsp.law_loop import AnyLoop, SampledLaw
 from tfarm.dsp.loop import check_loop, resized, sampled_loop
@@ -118,7 +118,7 @@ def sampled_verdict(arm: Arm, gains: HubFeedback, chain: Chain | None = None, *,
     largest radius is that of the loop with every mode of the band.  Raises ParameterError for a locked hub, for I_h = 0
     with moment feedback (an algebraic loop), and a count outside 1..400.
     """
-    chain = Chain() if chain is None else chain
+    chain = chain_or_usual(chain)
     if count is not None:
         count = whole("modes", count, 1, MOST_ASKED, f"a whole number of flexible modes from 1 to {MOST_ASKED}")
         return Verdict(sampled_loop(arm, gains, chain, count=count))
@@ -185,7 +185,7 @@ class Analysis:
 
 def analyse(arm: Arm, gains: HubFeedback, chain: Chain | None = None, *, count: int | None = None) -> Analysis:
     """Verdict, stable intervals of both gains, modes one by one, delay margin, and the damping that makes it safe."""
-    chain = Chain() if chain is None else chain
+    chain = chain_or_usual(chain)
     verdict = sampled_verdict(arm, gains, chain, count=count)
     loop, band = verdict.loop, verdict.band
     without_loop = (MOMENT_GAIN,) if arm.has_massless_hub else ()

@@ -77,3 +77,10 @@ class Measured:
             if not self.coherence.any():
                 remedy = "0 everywhere: nothing was measured; leave it out"
                 raise ParameterError(key="coherence", value=0.0, remedy=remedy)
+
+
+def must_be_measured(measured: object) -> None:
+    """Raise ParameterError where a path or anything else stands in the place of a measured response."""
+    if not isinstance(measured, Measured):
+        remedy = "is no measured response; give what tfarm.read_measured returns, or a tfarm.Measured"
+        raise ParameterError(key="measured", value=measured, remedy=remedy)

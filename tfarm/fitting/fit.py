@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -14,7 +14,7 @@ from tfarm.arrays import Real
 from tfarm.errors import ParameterError
 from tfarm.records import record
 
-from .data import Measured
+from .data import Measured, must_be_measured
 from .model import SENSOR_DELAY, SENSOR_GAIN, Problem, problem
 from .parameters import Parameter, parameters
 from .ringing import RingMode
@@ -130,7 +130,9 @@ def fit(
 def _problem(arm: Arm, data: Any, free: Any, start: Any, bounds: Any, priors: Any, rings: Any) -> Problem:
     """What is searched for: the arm's numbers, then the sensors' own, one of a kind for each response."""
     must_be_arm(arm)
-    data = (data,) if isinstance(data, Measured) else tuple(data)
+    data = tuple(data) if isinstance(data, Iterable) and not isinstance(data, str) else (data,)
+    for each in data:
+        must_be_measured(each)
     if not data and not rings:
         raise ParameterError(key="data", value=0, remedy="give at least one measured response, or a decay (--mode)")
     keys = [str(key) for key in free if key not in (SENSOR_GAIN, SENSOR_DELAY)]

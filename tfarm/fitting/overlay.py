@@ -18,7 +18,7 @@ from tfarm.response.frequency import refined_grid
 from tfarm.spectrum import modes as modes_of
 from tfarm.spectrum import modes_below
 
-from .data import Measured
+from .data import Measured, must_be_measured
 from .noise import Noise, noise_of
 from .ratio import Ratio, RatioRoots
 from .resonances import (
@@ -130,6 +130,7 @@ def overlay(arm: Arm, measured: Measured) -> Overlay:
     unit than it says (see `must_be_in_unit`).
     """
     must_be_arm(arm)
+    must_be_measured(measured)
     ratio, noise = _ratio(arm, measured), noise_of(measured)
     low, high = float(measured.omega[0]), float(measured.omega[-1])
     roots = ratio.roots(PARTNERS_BEYOND * high)

@@ -5,15 +5,25 @@ A law that is no more than these gains is taken for them.
 
 from __future__ import annotations
 
-from tfarm.arm import AnyLaw, Arm, HubFeedback, arm_and_law
+from tfarm.arm import PLANE, AnyLaw, Arm, HubFeedback, Law, arm_and_law, as_law
+from tfarm.arrays import Real
+from tfarm.errors import ParameterError
 
+from .law_locus import LawLocus, law_locus
 from .law_loop import LawLoop
+from .law_map import LawMap, law_map
 from .law_poles import law_poles
 from .law_stability import is_quiet_above, law_stability
+from .locus import Locus
+from .locus import locus as locus_of_gains
 from .margins import Margins, loop_margins, margins_of_gains
 from .nyquist import Nyquist, nyquist_of
 from .poles import Poles, poles_of_gains
+from .regions import Region, region
 from .stability import stability
+from .variation import OF_THE_LAW
+
+LOCUS_VALUES, LAW_LOCUS_VALUES = 500, 100  # values of a locus unless so many are asked for: of gains, of any other law
 
 
 def closed_loop_poles(arm: Arm, law: AnyLaw, count: int | None = None) -> Poles | Poles[LawLoop]:
@@ -52,3 +62,44 @@ def nyquist(arm: Arm, law: AnyLaw) -> Nyquist | Nyquist[LawLoop]:
     """
     arm, law = arm_and_law(arm, law)
     return nyquist_of(stability(arm, law)) if isinstance(law, HubFeedback) else nyquist_of(law_stability(arm, law))
+
+
+def locus(
+    arm: Arm, law: AnyLaw, vary: str, start: float, stop: float, points: int | None = None, branches: int = 10
+) -> Locus | LawLocus:
+    """The closed-loop poles of the exact arm as one number goes from `start` to `stop`, at equally spaced values.
+
+    `vary` is a gain, "all" (a scale on the gains), payload_mass, payload_inertia, hub_inertia, length or damping.  Of a
+    `Law` it is also "gain" (a factor on it), "delay", a signal, "SIGNAL.num.N" or "SIGNAL.den.N": then the record is a
+    `LawLocus`, of the first `branches` (60 at most) flexible modes, with 100 values unless `points` says otherwise.
+    Raises ParameterError for what is no law, no loop or no range, ConvergenceError where branches cannot be told apart.
+    """
+    arm, plain = arm_and_law(arm, law)
+    if isinstance(plain, HubFeedback) and (isinstance(law, HubFeedback) or vary in OF_THE_LAW):
+        return locus_of_gains(arm, plain, vary, start, stop, LOCUS_VALUES if points is None else points, branches)
+    values = LAW_LOCUS_VALUES if points is None else points
+    return law_locus(arm, as_law(law), vary, start, stop, values, branches)
+
+
+def gain_map(
+    arm: Arm, K1: Real, K2: Real, Kp: float = 0.0, *, law: AnyLaw | None = None, vary: tuple[str, str] | None = None
+) -> Region | LawMap:
+    """How many poles are unstable over the plane of K1 and K2 (1-D, ascending), and its exact boundary.
+
+    Of a `law` `vary` names two numbers, as `tfarm.locus` does: the values are theirs then, first across and then up.
+    Raises ParameterError for what is no law, no loop or no range, ConvergenceError where poles cannot be counted.
+    """
+    if isinstance(K1, HubFeedback | Law):
+        raise ParameterError(key="K1", value=K1, remedy="a range of values; give the law as law=, its numbers as vary=")
+    if law is None:
+        if vary is not None:
+            raise ParameterError(key="law", value=None, remedy="give the HubFeedback or Law whose numbers vary names")
+        return region(arm, K1, K2, Kp)
+    arm, plain = arm_and_law(arm, law)
+    if Kp:
+        raise ParameterError(key="Kp", value=Kp, remedy="the law holds the angle: give Kp in it, or no law")
+    if isinstance(plain, HubFeedback) and vary in (None, PLANE):
+        return region(arm, K1, K2, plain.Kp)
+    if not isinstance(vary, tuple | list) or len(vary) != 2:
+        raise ParameterError(key="vary", value=vary, remedy='two numbers of the law, such as ("gain", "delay")')
+    return law_map(arm, law, (vary[0], vary[1]), K1, K2)

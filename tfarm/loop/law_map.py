@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, Law
+from tfarm.arm import AnyLaw, Arm, Law, as_law
 from tfarm.arrays import Complex, Real
 from tfarm.crossing import Crossing, Crossings, brackets, counts_over, solved
 from tfarm.errors import ParameterError
@@ -73,12 +73,13 @@ def law_map_answer(found: LawMap) -> dict[str, Any]:
     }
 
 
-def law_map(arm: Arm, law: Law, vary: tuple[str, str], x: Real, y: Real, band: float | None = None) -> LawMap:
+def law_map(arm: Arm, law: AnyLaw, vary: tuple[str, str], x: Real, y: Real, band: float | None = None) -> LawMap:
     """The map over two numbers of a law, x and y (1-D, ascending).
 
     Raises ParameterError for what is no number of the law, no loop or no range; ConvergenceError where poles cannot be
     counted.
     """
+    law = as_law(law)
     if vary[0] == vary[1]:
         raise ParameterError(key="vary", value=list(vary), remedy="two different numbers of the law")
     x, y = ascending(vary[0], x, MOST_MAP_VALUES), ascending(vary[1], y, MOST_MAP_VALUES)

@@ -60,7 +60,7 @@ def rounded_law_locus(found: LawLocus) -> LawLocus:
 
 def _closed(family: Family, found: LawLocus) -> tuple[Real, Complex]:
     """Values and branches with every meeting on the real axis among them that could be told apart."""
-    values, rows = found.values, found.branches
+    values, rows = found.values, found.branches.copy()  # a record cannot be written
     n, shortest = 0, abs(np.diff(values)).min() * 2.0**-MEETING_HALVINGS
     while n < values.size - 1:
         gap = _Gap(family, found.box, values[n : n + 2], rows[:, n : n + 2])

@@ -134,7 +134,10 @@ def through_origin(N: Complex, P: Complex) -> Crossing | None:
 
 def ascending(name: str, values: Any, most: int) -> Real:
     """The values (n,) of one number of a map.  Raises ParameterError for what is no ascending range of 2 to `most`."""
-    values = np.atleast_1d(np.asarray(values, dtype=float))
+    try:
+        values = np.atleast_1d(np.asarray(values, dtype=float))
+    except (TypeError, ValueError):  # no numbers
+        values = np.empty(0)
     if not (2 <= values.size <= most and np.isfinite(values).all() and (np.diff(values) > 0).all()):
         remedy = f"an ascending range of 2 to {most} values"
         raise ParameterError(key=name, value=f"{values.size} values", remedy=remedy)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm, Law
+from tfarm.arm import AnyLaw, Arm, arm_and_law, as_law
 from tfarm.arm.checks import whole
 from tfarm.arrays import Complex
 from tfarm.columns import Column, Table
@@ -99,12 +99,14 @@ class Spill:
         return f"{words}; models of {models} find nothing unstable, {end}"
 
 
-def spill(arm: Arm, law: Law, most: int = USUAL_SPILL_MODES) -> Spill:
+def spill(arm: Arm, law: AnyLaw, most: int = USUAL_SPILL_MODES) -> Spill:
     """The exact loop beside models of 1 to `most` flexible modes, their static remainder left out.
 
     The models are those that a law is designed on: bare modes.  A delay is in them as a Pade approximation.
-    Raises ParameterError where there is no loop, or none of finite order; ConvergenceError as `law_stability` does.
+    Raises ParameterError for what is no law, where there is no loop, or none of finite order; ConvergenceError as
+    `law_stability` does.
     """
+    (arm, _), law = arm_and_law(arm, law), as_law(law)
     most = whole("modes", most, 1, MOST_SPILL_MODES, f"a whole number of modes, 1 to {MOST_SPILL_MODES}")
     if law.is_improper:
         remedy = "differentiates, and has no states; add a fast pole to den"

@@ -1,4 +1,4 @@
-"""Pictures of any linear law: its locus along one number, and the plane of two of them."""
+"""Loci and maps of whatever law; pictures of any linear one: along one of its numbers, and over the plane of two."""
 
 from __future__ import annotations
 
@@ -7,25 +7,72 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tfarm.digits import plain, significant
+from tfarm.errors import ParameterError
 from tfarm.loop.law_locus import LawLocus
 from tfarm.loop.law_map import LawMap
 from tfarm.loop.law_rounded import rounded_law_locus
 from tfarm.loop.loci import held_branches
+from tfarm.loop.locus import Locus
+from tfarm.loop.reduced_locus import ReducedLocus
+from tfarm.loop.regions import Region
 
 from .labels import OFFSETS_BESIDE, Label
-from .plane import colours, words_of_count
-from .roots import CIRCLE_AT_FIRST, CROSS_AT_ZERO
-from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, on_own_figure, safe
+from .plane import colours, draw_map, gain_counts, words_of_count
+from .roots import CIRCLE_AT_FIRST, CROSS_AT_ZERO, draw_locus, gain_branches
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, New, blank, on_own_figure, safe, style, window
 
 BRANCH_COLOURS = (BLUE, GREEN, PURPLE, "#7a5a00", GREY)  # of branches, in turn
 MARKED_VALUES = 5  # values of the range that are marked along each branch
 LEAST_NAMED = 0.02  # of the picture: a count that holds in less of it has no name in the legend
 
 
-def draw_law_locus(found: LawLocus) -> Figure:
+def locus(exact: Locus | LawLocus, *, reduced: ReducedLocus | None = None, ax: Axes | None = None) -> Axes:
+    """Closed-loop poles as one number varies (what `tfarm.locus` returns), in the axes given or in new ones; the axes.
+
+    Broad lines: the branches [1/s], a colour a mode, with values between those of `exact` where they bend; a cross
+    where the gain is 0, an open circle at another beginning, dots at a few values, one of them that which damps the
+    first mode best, and a diamond where one crosses the axis.  Thin: those of `reduced` (`tfarm.loop.reduced_locus`),
+    which a locus of gains at the hub has; of another law it is not looked at.
+    """
+    if not isinstance(exact, Locus | LawLocus):
+        raise ParameterError(key="locus", value=exact, remedy="give what tfarm.locus returns")
+    if ax is None:
+        return draw_locus_of(exact, reduced, window).axes[0]
+    with style():
+        if isinstance(exact, Locus):
+            gain_branches(exact, reduced, ax=ax)
+        else:
+            law_branches(exact, ax=ax)
+    return ax
+
+
+def draw_locus_of(exact: Locus | LawLocus, reduced: ReducedLocus | None = None, new: New = blank) -> Figure:
+    """The locus, of gains or of any law, on a figure of its own."""
+    return draw_locus(exact, reduced, new) if isinstance(exact, Locus) else draw_law_locus(exact, new)
+
+
+def gain_map(found: Region | LawMap, *, ax: Axes | None = None) -> Axes:
+    """The plane of both gains, or of two numbers of a law (what `tfarm.map` returns), in the axes given or in new ones.
+
+    Colours for the number of unstable poles; a black line for the exact boundary with frequencies [rad/s] along it, of
+    a law dots where a pole is on the axis.  Returns the axes.
+    """
+    if not isinstance(found, Region | LawMap):
+        raise ParameterError(key="map", value=found, remedy="give what tfarm.map returns")
+    if ax is None:
+        return (draw_map(found, window) if isinstance(found, Region) else draw_law_map(found, window)).axes[0]
+    with style():
+        if isinstance(found, Region):
+            gain_counts(found, ax=ax)
+        else:
+            law_counts(found, ax=ax)
+    return ax
+
+
+def draw_law_locus(found: LawLocus, new: New = blank) -> Figure:
     """The poles of a `LawLocus` with Im s >= 0, on a figure of its own."""
     title = f"{found.arm.name}: closed-loop poles of {found.law.name} along {found.vary}"
-    return on_own_figure(lambda ax: law_branches(found, ax=ax), (7.0, 5.6), title)
+    return on_own_figure(lambda ax: law_branches(found, ax=ax), (7.0, 5.6), title, new=new)
 
 
 def law_branches(found: LawLocus, *, ax: Axes) -> None:
@@ -53,10 +100,10 @@ def law_branches(found: LawLocus, *, ax: Axes) -> None:
     ax.set_ylabel("Im s [rad/s]")
 
 
-def draw_law_map(found: LawMap) -> Figure:
+def draw_law_map(found: LawMap, new: New = blank) -> Figure:
     """The plane of a `LawMap`, on a figure of its own."""
     title = f"{found.arm.name}: unstable poles below {significant(found.band, 5)} rad/s under {found.law.name}"
-    return on_own_figure(lambda ax: law_counts(found, ax=ax), (7.0, 5.4), title)
+    return on_own_figure(lambda ax: law_counts(found, ax=ax), (7.0, 5.4), title, new=new)
 
 
 def law_counts(found: LawMap, *, ax: Axes) -> None:

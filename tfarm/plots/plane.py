@@ -26,7 +26,7 @@ from tfarm.loop.regions import INFINITE, Region
 from tfarm.spectrum import modes
 
 from .labels import OFFSET_UPON, OFFSETS_AROUND, Label
-from .style import BLUE, GREY, INK, ORANGE, PURPLE, New, blank, on_own_figure, style, window
+from .style import BLUE, GREY, INK, ORANGE, PURPLE, New, blank, on_own_figure
 from .words import LYAPUNOV, name_axes
 
 STABLE_COLOUR, FEWEST_COLOUR, MOST_COLOUR, BOUNDLESS_COLOUR = "#dcefe6", "#fbeadd", "#eebd95", "#f3d9c6"
@@ -41,25 +41,18 @@ NUMBER_HALO: dict[str, Any] = {"facecolor": "white", "edgecolor": "none", "pad":
 TICKS_UP = (-50, -20, -10, -5, -2, -1, 0, 1, 2)  # moment gains on a logarithmic axis, of them those in the picture
 
 
-def gain_map(found: Region, *, ax: Axes | None = None) -> Axes:
-    """The plane of both gains (what `tfarm.map` returns), in the axes given or in new ones; the axes.
-
-    Colours for the number of unstable poles, a black line for the exact boundary with frequencies [rad/s] along it.
-    """
-    if ax is None:
-        return draw_map(found, window).axes[0]
+def gain_counts(found: Region, *, ax: Axes) -> None:
+    """Colours for the number of unstable poles, a black line for the exact boundary, frequencies [rad/s] along it."""
     x, y = map(Axis.of, found.axes)
-    with style():
-        ground(found, x, y, ax)
-        draw_boundary(found, edge(found, x, y), x, y, ax)
-        count_labels(found, x, y, ax)
-    return ax
+    ground(found, x, y, ax)
+    draw_boundary(found, edge(found, x, y), x, y, ax)
+    count_labels(found, x, y, ax)
 
 
 def draw_map(found: Region, new: New = blank) -> Figure:
     """The plane, on a figure of its own."""
     title = f"{found.arm.name}: unstable poles over the plane of both gains"
-    return on_own_figure(lambda own: gain_map(found, ax=own), (7.0, 5.4), title, new=new)
+    return on_own_figure(lambda own: gain_counts(found, ax=own), (7.0, 5.4), title, new=new)
 
 
 def ground(found: Region, x: Axis, y: Axis, ax: Axes) -> None:

@@ -20,7 +20,7 @@ from tfarm.loop.variation import OF_THE_LAW
 from tfarm.spectrum import modes
 
 from .labels import OFFSETS_BESIDE, Label
-from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, Keys, New, blank, headline, on_own_figure, style, window
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, Keys, New, blank, headline, on_own_figure, style
 from .words import gains_words
 
 ZOOMED = 4  # modes drawn on their own
@@ -31,18 +31,9 @@ CIRCLE_AT_FIRST: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 6, "mfc": 
 QUARTERS = (0.25, 0.5, 0.75)  # of the way that the modes go, on average: where a value is marked along each branch
 
 
-def locus(exact: Locus, *, reduced: ReducedLocus | None = None, ax: Axes | None = None) -> Axes:
-    """Closed-loop poles as one number varies (what `tfarm.locus` returns), in the axes given or in new ones; the axes.
-
-    Broad lines: the branches [1/s], a colour a mode, with values between those of `exact` where they bend; a cross
-    where the gain is 0, an open circle at another beginning, dots at a few values, one of them that which damps the
-    first mode best, and a diamond where one crosses the axis.  Thin: those of `reduced` (`tfarm.loop.reduced_locus`).
-    """
-    if ax is None:
-        return draw_locus(exact, reduced, window).axes[0]
-    with style():
-        _all(rounded(exact), exact, reduced, ax)
-    return ax
+def gain_branches(exact: Locus, reduced: ReducedLocus | None, *, ax: Axes) -> None:
+    """The branches of a `Locus` and its crossings; thin beside them those of `reduced`."""
+    _all(rounded(exact), exact, reduced, ax)
 
 
 def draw_locus(exact: Locus, reduced: ReducedLocus | None = None, new: New = blank) -> Figure:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, cast
@@ -82,7 +82,7 @@ class TransferFunction:
         self.method = known_method(method)
         self.arm = arm
         self.is_single = isinstance(outputs, str | Output)
-        asked = (outputs,) if isinstance(outputs, str | Output) else tuple(outputs)
+        asked = tuple(outputs) if isinstance(outputs, Iterable) and not isinstance(outputs, str) else (outputs,)
         if not asked:
             raise ParameterError(key="outputs", value=outputs, remedy="name at least one output")
         self.rows: tuple[Output, ...] = tuple(output(each) for each in asked)

@@ -157,6 +157,8 @@ def damped_modes(undamped: Modes) -> DampedModes:
     Where branches cannot be told apart the record holds fewer modes than are asked for, and `left_out` says how many
     are missing.  Raises ConvergenceError where not even the first can be followed.
     """
+    if not isinstance(undamped, Modes):
+        raise ParameterError(key="modes", value=undamped, remedy="give what tfarm.modes returns")
     asked, lost = int(undamped.index.max()), None
     for count in sorted({asked, *FEWER_MODES}, reverse=True):
         if count > asked or (count > FEWER_MODES[0] and not undamped.arm.is_undamped):

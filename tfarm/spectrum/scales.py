@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from tfarm.arm import GAINS, Arm, HubFeedback, input_words, load, written_unit
+from tfarm.arm import GAINS, Arm, HubFeedback, input_words, load, must_be_arm, written_unit
 from tfarm.errors import ParameterError
 
 from .search import ARMS_KEPT
@@ -76,6 +76,7 @@ def default_gains(arm: Arm) -> HubFeedback:
     On the paper's arm that is K1 = 0.3 N m s/rad, and all its presets have that.  A hub without inertia has K2 = 0:
     more would be an algebraic loop.
     """
+    must_be_arm(arm)
     if _is_of_the_paper(arm):
         return PAPER_GAINS
     K1 = float(f"{RATE_SHARE * rate_unit(arm):.{DEFAULT_DIGITS}g}")

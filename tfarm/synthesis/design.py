@@ -20,6 +20,7 @@ from tfarm.arm import Arm, HubFeedback
 from tfarm.arrays import Real
 from tfarm.dsp import Chain
 from tfarm.dsp.brief import SampledBrief, sampled_brief
+from tfarm.dsp.chain import chain_or_usual
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop.frequencies import band_of
 from tfarm.loop.plant import Loop
@@ -114,7 +115,7 @@ def best_gains(
     if objective == "cost" and continuous:
         remedy = "the cost of the tuner's trial is one of samples: leave the continuous loop out"
         raise ParameterError(key="objective", value=objective, remedy=remedy)
-    chain, held = Chain() if chain is None else chain, HubFeedback(Kp=Kp)
+    chain, held = chain_or_usual(chain), HubFeedback(Kp=Kp)
     arms = (NamedArm(arm.name, arm, {}), *others)
     start = _bounds_at_first(arms, K1, K2, held)
     free = {name: bounds is None for name, bounds in (("K1", K1), ("K2", K2))}

@@ -16,6 +16,7 @@ from tfarm.arm import ANGLE_GAIN, TWO_GAINS, Arm, Law
 from tfarm.arrays import Real
 from tfarm.dsp import Chain, Verdict
 from tfarm.dsp.brief import brief_of
+from tfarm.dsp.chain import chain_or_usual
 from tfarm.dsp.law_loop import SampledLaw
 from tfarm.dsp.law_verdict import law_verdict
 from tfarm.dsp.margins import most_modes
@@ -82,7 +83,7 @@ def law_design(
         raise ParameterError(key="objective", value=objective, remedy=remedy)
     if not (0.0 <= on_angle < np.inf):
         raise ParameterError(key=ANGLE_GAIN, value=on_angle, remedy="the hub angle gain is zero (chosen) or positive")
-    chain, tell = Chain() if chain is None else chain, progress or (lambda text: None)
+    chain, tell = chain_or_usual(chain), progress or (lambda text: None)
     T = chain.sampling.period
     on_angle = on_angle or usual_angle_gain(arm, T)
     form = STRUCTURES[structure](arm, on_angle, modes, T)

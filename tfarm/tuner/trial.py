@@ -25,7 +25,7 @@ from tfarm.arm import Arm, HubFeedback
 from tfarm.arm.checks import not_negative, number, positive
 from tfarm.arrays import Real
 from tfarm.dsp import Chain, SampledLoop, Scenario, Simulator, sampled_loop, scenario
-from tfarm.dsp.chain import Reading
+from tfarm.dsp.chain import Reading, chain_or_usual
 from tfarm.dsp.results import rms_after
 from tfarm.dsp.scenarios import TRIAL_COST, TRIAL_DURATION
 from tfarm.dsp.simulate import FOLDED_UP
@@ -225,7 +225,7 @@ def slew_trial(
     K1 = usual_rate_gain(known or arm, Kp) if K1 is None else K1
     rate_gain = number("K1", K1, "the hub rate gain is a finite number of N m s/rad")
     length = positive("duration", duration, "a trial lasts a positive number of seconds")
-    chain = with_signals(Chain() if chain is None else chain, signals)
+    chain = with_signals(chain_or_usual(chain), signals)
     if length < chain.slew.rise_time:
         remedy = f"a trial lasts at least as long as its slew, {chain.slew.rise_time:g} s"
         raise ParameterError(key="duration", value=length, remedy=remedy)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tfarm.arm import MOMENT_GAIN, Arm, HubFeedback
+from tfarm.arm import MOMENT_GAIN, Arm, HubFeedback, must_be_arm
 from tfarm.dsp import Chain, Simulator, scenario
 from tfarm.dsp.chain import Reading
 from tfarm.dsp.results import ideal_chain, modes_for, rms_after, simulation_answer
@@ -148,6 +148,9 @@ def tune(arm: Arm, plan: Plan | None = None, chain: Chain | None = None) -> Tuni
 
     Raises ParameterError for what cannot be, and CertificationError where there is no guard.
     """
+    if not isinstance(plan, Plan | None):
+        raise ParameterError(key="plan", value=plan, remedy="give a tfarm.tuner.Plan, such as Plan(trials=50, K1=0.3)")
+    must_be_arm(arm)
     plan = usual_plan(arm) if plan is None else plan
     network = initial_network(plan.seed, hidden=plan.hidden, scales=plan.scales)
     trial = trial_of(arm, plan, chain)
