@@ -3,6 +3,7 @@
 from tfarm.arm.driving import AnyLaw, arm_and_law, as_law, cancelled, tracked
 from tfarm.arm.feedback import (
     ANGLE_GAIN,
+    AT_HUB,
     FED_BACK,
     GAINS,
     LISTED,
@@ -36,6 +37,7 @@ from tfarm.arm.writing import to_toml
 
 __all__ = [
     "ANGLE_GAIN",
+    "AT_HUB",
     "FED_BACK",
     "GAINS",
     "INPUTS",

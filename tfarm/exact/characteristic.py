@@ -20,24 +20,32 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import GAINS, HubFeedback
+from tfarm.arm import AT_HUB, FED_BACK, GAINS, Arm, HubFeedback
 from tfarm.arrays import Complex, Real
 
 from .chain import ElementChain
 from .chain_values import free_outputs, free_slopes
+from .chaining import chain_of
 from .compiled import compiled, inlined, python_of
 from .dispersion import quotient, reciprocal
 from .free import free_response
 from .jets import Jet
 from .outputs import OUTPUTS, unit_scale
-from .system import System
+from .system import System, system_of
 from .vector import DAMPING, HUB_FORCE, HUB_INERTIA, HUB_REST, TORQUE_DIVISOR
 from .waves import free_ends
 
 Gains = tuple[Fraction, ...]  # of a law without dimensions, in the order of `GAINS`, exact
 NO_GAINS: Gains = (Fraction(0),) * len(GAINS)
 FED = tuple(OUTPUTS[gain.output] for gain in GAINS)
+assert all(each.place != "x" for each in FED)  # a gain is on an output with a place of its own
+TURNING = ("theta", "W", "Psi", "centre")  # quantities that follow the hub's angle where the arm turns slowly
 DIFFERENCE_STEP = 1e-6  # of |s|, or of the way to -1/C, for differences
+
+
+def loop_system(arm: Arm) -> System:
+    """The exact system of an arm under a law: a chain where a gain is on what `numerators` has not."""
+    return system_of(arm) if FED_BACK == AT_HUB else chain_of(arm)
 
 
 def unit_gains(k: System) -> Gains:
@@ -202,8 +210,8 @@ def parts_at(s: complex, k: Any) -> Any:
 def zeros_at_origin(k: System, gains: Sequence[Fraction | float] = NO_GAINS) -> int:
     """How often D vanishes at s = 0: twice where the whole arm turns freely, once where the hub's rate is fed back.
 
-    Not where its angle is.  (A third time under the moment's gain J/(J - I_h) alone, where gauge and inertia cancel:
-    that zero is left in D.)
+    Not where its angle is, or what turns with it.  (A third time under the moment's gain J/(J - I_h) alone, where gauge
+    and inertia cancel: that zero is left in D.)
     """
-    used = [OUTPUTS[gain.output] for gain, value in zip(GAINS, gains, strict=True) if value]
-    return min(k.at_rest, *(each.power for each in used if each.quantity == "theta"), 2)
+    used = [each for each, value in zip(FED, gains, strict=True) if value]
+    return min(k.at_rest, *(each.power for each in used if each.quantity in TURNING), 2)

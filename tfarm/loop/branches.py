@@ -204,9 +204,9 @@ def _alone(zeros: Sequence[float]) -> Complex:
 
 
 def rigid_pair(loop: Loop, _: Complex) -> Complex:
-    """The zeros of J_eff s^2 + b s + c (`Loop.at_hub`): what the rigid body's become under small gains."""
+    """The zeros of J_eff s^2 + b s + c (`Loop.at_rest`): what the rigid body's become under small gains."""
     J = effective_inertia(loop.arm, loop.law) or CANCELLED_INERTIA * loop.arm.total_inertia
-    b, c = (each / J for each in loop.at_hub)
+    b, c = (each / J for each in loop.at_rest)
     root = np.sqrt(complex(b * b / 4 - c))
     far = -b / 2 - np.copysign(root.real, b) if root.real else -b / 2 + 1j * root.imag
     near = c / far if root.real else np.conj(far)
@@ -215,7 +215,7 @@ def rigid_pair(loop: Loop, _: Complex) -> Complex:
 
 def _slow_zero(loop: Loop, pair: Complex) -> Complex:
     """The pair with its zero at 0 moved to -c/b: where it goes while little holds the hub's angle."""
-    b, c = loop.at_hub
+    b, c = loop.at_rest
     return np.array([-c / b, pair[1]], complex)
 
 

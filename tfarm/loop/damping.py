@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from tfarm.arm import Arm, law_of
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.errors import ConvergenceError
-from tfarm.exact.characteristic import dimensionless, quick_characteristics
-from tfarm.exact.system import system_of
+from tfarm.exact.characteristic import dimensionless, loop_system, quick_characteristics
 from tfarm.reduced import ModalModel, tailed_model
 
 from .frequencies import band_of
@@ -141,7 +140,7 @@ def exact_poles_next_to(arm: Arm, starts: Complex, laws: Real) -> tuple[Complex,
 
     `laws` (gains, n) are those of `many_laws`.
     """
-    k = system_of(arm)
+    k = loop_system(arm)
     laws = dimensionless(k, laws)
     rows, columns = np.nonzero(~np.isnan(starts))
     s = starts[rows, columns]

@@ -19,12 +19,12 @@ from tfarm.arm import Arm, HubFeedback
 from tfarm.arrays import Complex, Real
 from tfarm.crossing import Crossing, Crossings, brackets, solved
 from tfarm.errors import ParameterError
-from tfarm.exact.characteristic import gains_of, loop_parts, torque
-from tfarm.exact.system import System, system_of
+from tfarm.exact.characteristic import gains_of, loop_parts, loop_system, torque
+from tfarm.exact.system import System
 from tfarm.spectrum import flexible_frequencies, modes
 
 from .frequencies import grid
-from .plant import effective_inertia
+from .plant import effective_inertia, slow_terms
 
 NO_FEEDBACK = HubFeedback()  # every gain 0
 SAME_FREQUENCY = 1e-12  # of a frequency: nearer than this are two numbers for one
@@ -57,7 +57,7 @@ def along(name: str, law: HubFeedback) -> Line:
 
 def line_crossings(arm: Arm, line: Line, band: float) -> Crossings:
     """All crossings of the imaginary axis at frequencies `at` up to `band` [rad/s], ascending in t."""
-    k, unit, found = system_of(arm), line.length, static_crossings(arm, line)
+    k, unit, found = loop_system(arm), line.length, static_crossings(arm, line)
     if unit:
         unified = Line(line.base, NO_FEEDBACK.plus(line.direction, 1 / unit))
         omega = np.asarray(grid(arm, band))
@@ -89,36 +89,35 @@ def static_crossings(arm: Arm, line: Line) -> list[Crossing]:
 def crossing_at_zero(arm: Arm, line: Line) -> Crossing | None:
     """A real pole through s = 0, if there is a t at which one passes.
 
-    Of an arm that turns freely  D/theta = Kp + K1 s + J s^2 + c s^3 + ...,  with J the effective inertia and the hub's
-    friction in K1: the lowest coefficient that does not vanish all along the line decides, and the pole passes where it
-    is 0.  Of an arm whose tip is held it passes where the static stiffness vanishes.
+    Of an arm that turns freely  D/theta = Kp + K1 s + J s^2 + c s^3 + ...,  with J the effective inertia, the hub's
+    friction in K1, and what other gains add to each (`slow_terms`): the lowest coefficient that does not vanish all
+    along the line decides, and the pole passes where it is 0.  Of an arm whose tip is held it passes where the static
+    stiffness vanishes.
     """
     if not arm.has_rigid_mode:
         small = NEARLY_AT_REST * float(modes(arm, 1).natural_frequency[-1])
-        return through_origin(*line_parts(system_of(arm), line, small * np.array([1 + 0j, 0.5])))
-    base, way = line.base, line.direction
-    if way.Kp:
-        t = -base.Kp / way.Kp + 0.0
-        return Crossing(t, 0.0, _sign(way.Kp) * _change_with_stiffness(arm, line.at(t)))
-    if base.Kp:
+        return through_origin(*line_parts(loop_system(arm), line, small * np.array([1 + 0j, 0.5])))
+    base, way = (slow_terms(arm, law).tolist() for law in (line.base, line.direction))
+    if way[0]:
+        t = -base[0] / way[0] + 0.0
+        return Crossing(t, 0.0, _sign(way[0]) * _change_with_stiffness(arm, line.at(t)))
+    if base[0]:
         return None
-    if way.K1:
-        t = -(base.K1 + arm.rate_loss) / way.K1 + 0.0
-        return Crossing(t, 0.0, -_sign(way.K1 * effective_inertia(arm, line.at(t))))
-    if base.K1 + arm.rate_loss or not way.K2:
+    if way[1]:
+        t = -(base[1] + arm.rate_loss) / way[1] + 0.0
+        return Crossing(t, 0.0, -_sign(way[1] * effective_inertia(arm, line.at(t))))
+    if base[1] + arm.rate_loss or not way[2]:  # where 0, below the rounding of the hub's own: no gain reaches so far
         return None
-    J, carried = arm.turned_inertia, arm.gauged_inertia
-    if not carried:  # below the rounding of the hub's own: no gain a loop takes reaches so far
-        return None
-    return Crossing((J / carried - base.K2) / way.K2, 0.0, _sign(way.K2))
+    return Crossing(-(arm.turned_inertia + base[2]) / way[2], 0.0, -_sign(way[2]))
 
 
 def _change_with_stiffness(arm: Arm, law: HubFeedback) -> int:
     """How many more poles are unstable above Kp = 0 than below: by K1 if not 0, else by J s^2 + c s^3, c ~ K2 C."""
-    if law.K1 + arm.rate_loss:
-        return -_sign(law.K1 + arm.rate_loss)
+    _, b, _, c = slow_terms(arm, law).tolist()
+    if b + arm.rate_loss:
+        return -_sign(b + arm.rate_loss)
     J = effective_inertia(arm, law)
-    oscillating = 2 if law.K2 * arm.damping * J > 0 else 0  # against one real pole on the other side
+    oscillating = 2 if c * J > 0 else 0  # against one real pole on the other side
     return _sign(J) * (oscillating - 1)
 
 

@@ -26,7 +26,7 @@ import numpy as np
 from tfarm.arm import Arm, HubFeedback
 from tfarm.crossing import Crossings
 from tfarm.errors import ConvergenceError
-from tfarm.exact.system import system_of
+from tfarm.exact.characteristic import loop_system
 from tfarm.spectrum import modes
 from tfarm.spectrum.search import ARMS_KEPT
 
@@ -45,7 +45,7 @@ def locked_edges(arm: Arm) -> Crossings:
     """
     omega = modes(arm.having(hub_inertia=math.inf), MOST_BAND_MODES).natural_frequency
     hub = replace(arm.hub, inertia=0.0, friction=0.0, stiffness=0.0)
-    pin = system_of(replace(arm, hub=hub, motor=None, input="hub_torque"))
+    pin = loop_system(replace(arm, hub=hub, motor=None, input="hub_torque"))
     drive, M = line_parts(pin, along("K2", HubFeedback()), 1j * omega)
     with np.errstate(divide="ignore", invalid="ignore"):  # a gauge where the mode has no moment: no K2 does anything
         K2 = -(drive * M.conj()).real / abs(M) ** 2 * arm.input_per_torque

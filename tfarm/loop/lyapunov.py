@@ -50,6 +50,9 @@ class Lyapunov:
 def lyapunov(arm: Arm, law: HubFeedback) -> Lyapunov:
     """What V proves of the law with a strain gauge as it is.  Raises ParameterError where there is no loop."""
     loop, C = Loop(arm, law), arm.damping
+    if not law.is_at_hub:
+        names = " and ".join(gain.name for gain in law.elsewhere)
+        return _unproven(loop, f"V knows hub angle, hub rate and root moment, and nothing of what {names} feeds back")
     if law.K2 and not arm.reads_hub_moment:
         return _unproven(loop, "the gauge does not read the moment on the hub (r > 0, or inertia at the clamp)")
     if C and law.K2:

@@ -32,7 +32,7 @@ from .frequencies import grid
 from .law_loop import LawLoop
 from .lines import NO_FEEDBACK, Line, line_crossings, static_crossings
 from .lossless import stable_moments
-from .plant import Loop
+from .plant import Loop, slow_terms
 from .poles import LEAST_SQUARABLE, AnyLoop
 from .stability import Stability, is_quiet, stability
 from .windows import Windows, gain_windows
@@ -106,7 +106,8 @@ def margins_of_gains(arm: Arm, law: HubFeedback, band: float | None = None) -> M
         return Margins(verdict, windows, found, 0.0, found.disk, found.peak_sensitivity)
     if arm.is_undamped or is_quiet(verdict.loop, verdict.band):
         return Margins(verdict, windows, found, found.delay, found.disk, found.peak_sensitivity)
-    if law.K2 == law.Kp == 0 and not arm.input_lags:  # rate feedback of a passive arm: L in the right half-plane
+    is_passive = law.is_at_hub and law.K2 == law.Kp == 0 and not arm.input_lags
+    if is_passive:  # rate feedback of a passive arm: L in the right half-plane
         return Margins(verdict, windows, found, None, found.disk, found.peak_sensitivity)
     return Margins(verdict, windows, found, None, None, None)
 
@@ -254,9 +255,9 @@ def rigid_crossings(loop: Loop | LawLoop) -> Real:
     """
     if not isinstance(loop, Loop) or loop.arm.rate_loss or not loop.arm.has_rigid_mode:
         return np.empty(0)
-    if not (loop.law.K1 or loop.law.Kp):
-        return np.empty(0)
     a, b, k = _rigid(loop)
+    if not (a or b):
+        return np.empty(0)
     unit = max(abs(a), math.sqrt(abs(b)))
     a, b = a / unit, b / unit / unit
     squares = np.roots([1 - k * k, -(2 * b * k + a * a), -b * b])
@@ -264,15 +265,16 @@ def rigid_crossings(loop: Loop | LawLoop) -> Real:
 
 
 def _rigid(loop: Loop) -> tuple[float, float, float]:
-    """K1/J [1/s], Kp/J [1/s^2] and K2 (J - I_h)/J."""
-    J, law = loop.arm.turned_inertia, loop.law
-    return law.K1 / J, law.Kp / J, law.K2 * loop.arm.gauged_inertia / J
+    """K1/J [1/s], Kp/J [1/s^2] and K2 (J - I_h)/J, with what other gains add (`slow_terms`)."""
+    c, b, inertia, _ = slow_terms(loop.arm, loop.law).tolist()
+    J = loop.arm.turned_inertia
+    return b / J, c / J, -inertia / J
 
 
 def gain_margin(loop: Loop, band: float) -> tuple[float, float]:
     """The factors on all gains at once, below and above 1, at which a pole first reaches the axis."""
     law, arm, free, line = loop.law, loop.arm, loop.freed.arm, Line(NO_FEEDBACK, loop.law)
-    if free.is_reactive:
+    if loop.freed.is_reactive:
         factors = [end / law.K2 for end in stable_moments(free) if law.K2 * end > 0 and math.isfinite(end)]
         factors += [each.t for each in static_crossings(arm, line)]
         factors += [-arm.rate_loss / law.K1] if law.K1 and arm.rate_loss else []  # there the hub loses nothing

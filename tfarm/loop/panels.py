@@ -17,11 +17,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tfarm.arm import Arm
+from tfarm.arm import AT_HUB, FED_BACK, Arm
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, ParameterError
-from tfarm.exact.characteristic import float_units, loop_parts
-from tfarm.exact.system import system_of
+from tfarm.exact.characteristic import float_units, loop_parts, loop_system
 from tfarm.records import record
 
 from .frequencies import steep_places
@@ -89,10 +88,10 @@ def _panel(arm: Arm, low: float, high: float) -> tuple[Complex, float]:
 
     Without losses they are real but for rounding, which is taken off: next to a resonance it would be a loss.
     """
-    middle, half, k = (low + high) / 2, (high - low) / 2, system_of(arm)
+    middle, half, k = (low + high) / 2, (high - low) / 2, loop_system(arm)
     s = 1j * (middle + half * np.r_[CHEBYSHEV, BETWEEN_SAMPLES])
     drive, numerators, scale = loop_parts(k, s)
-    theta, _, gauge = float_units(k) * numerators
+    theta, _, gauge = (float_units(k) * numerators)[[FED_BACK.index(output) for output in AT_HUB]]
     both = np.stack([drive / s ** _order(arm), theta, gauge / s**2]) * np.exp(scale - scale.real.max())
     both = both.real + 0j if arm.is_reactive else both
     size = abs(both).max()

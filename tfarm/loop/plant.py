@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import GAINS, RATE_GAIN, Arm, HubFeedback, must_be_arm
-from tfarm.arrays import Complex
+from tfarm.arrays import Complex, Real
 from tfarm.errors import ParameterError
-from tfarm.exact.characteristic import Gains, gains_of, loop_parts, torque
-from tfarm.exact.system import System, system_of
+from tfarm.exact.characteristic import Gains, gains_of, loop_parts, loop_system, torque
+from tfarm.exact.outputs import OUTPUTS
+from tfarm.exact.system import System
+from tfarm.exact.values import expansions_at_zero
 from tfarm.records import record
 from tfarm.spectrum.correction import Member
 from tfarm.spectrum.damped import member
@@ -56,7 +58,7 @@ class Loop:
     @cached_property
     def k(self) -> System:
         """The arm's dimensionless coefficients."""
-        return system_of(self.arm)
+        return loop_system(self.arm)
 
     @cached_property
     def gains(self) -> Gains:
@@ -68,14 +70,18 @@ class Loop:
         """At C = 0: 1 where the law damps every oscillating mode that the hub feels, -1 where it drives them all.
 
         0 where it does neither: K1 = 0 leaves no loss, K2 = 1 leaves the modes of the locked hub.  By Lyapunov's
-        argument it is the sign of K1 (1 - K2), whatever Kp, with K1 plus the hub's friction for K1 of a rig.
+        argument it is the sign of K1 (1 - K2), whatever Kp, with K1 plus the hub's friction for K1 of a rig.  It knows
+        nothing of a gain on any other output.
         """
+        if not self.law.is_at_hub:
+            return 0
         return int(np.sign(self.law.K1 + self.arm.rate_loss)) * int(np.sign(1.0 - self.moment_share))
 
     @property
-    def at_hub(self) -> tuple[float, float]:
+    def at_rest(self) -> tuple[float, float]:
         """b and c of  D/theta = J s^2 + b s + c + ...  of a turning arm: K1 with what the hub loses, and Kp."""
-        return self.law.K1 + self.arm.rate_loss, self.law.Kp
+        c, b, *_ = slow_terms(self.arm, self.law)
+        return b + self.arm.rate_loss, c
 
     @property
     def moment_share(self) -> float:
@@ -88,11 +94,16 @@ class Loop:
 
         Friction and back-EMF act as a rate gain does where the input acts at once.  Otherwise the loop itself.
         """
-        arm, whole = self.arm.lossless_hub, self.at_hub[0]
+        arm, whole = self.arm.lossless_hub, self.law[RATE_GAIN] + self.arm.rate_loss
         is_loop = arm.hub_side_inertia > 0 and abs(whole) <= most_gain(arm, RATE_GAIN)
         if not (self.arm.rate_loss and arm.is_reactive and is_loop):
             return self
         return Loop(arm, self.law.having(RATE_GAIN, whole))
+
+    @property
+    def is_reactive(self) -> bool:
+        """Whether on the axis all of D but the rate gain's part is real: without losses, by gains at the hub."""
+        return self.arm.is_reactive and self.law.is_at_hub
 
     @property
     def is_told_by_theorem(self) -> bool:
@@ -101,7 +112,7 @@ class Loop:
         What hub, clamp and joint lose only adds to K1 > 0.
         """
         acts_well = not self.arm.input_lags and (self.arm.reads_hub_moment or not self.law.K2)
-        return self.arm.has_elastic_link and (acts_well or not any(self.law.row))
+        return self.arm.has_elastic_link and self.law.is_at_hub and (acts_well or not any(self.law.row))
 
     @property
     def is_lossless(self) -> bool:
@@ -109,7 +120,7 @@ class Loop:
         K2 = 1 where a theorem tells."""
         if not self.arm.is_undamped:
             return False
-        is_even = not any(self.law.row) or (self.arm.is_reactive and not self.law.K1)
+        is_even = not any(self.law.row) or (self.is_reactive and not self.law.K1)
         return is_even or (self.is_told_by_theorem and not self.takes_energy)
 
     @property
@@ -136,6 +147,32 @@ def effective_inertia(arm: Arm, law: HubFeedback) -> float:
 
     In units of the input, and with what the root's gauge reads of the turning rig in the place of J - I_h.
     """
-    if arm.is_uniform:
+    if arm.is_uniform and law.is_at_hub:
         return arm.hub_inertia + (1.0 - law.K2) * arm.carried_inertia
-    return arm.turned_inertia - law.K2 * arm.gauged_inertia
+    return float(arm.turned_inertia + slow_terms(arm, law)[2])
+
+
+def slow_terms(arm: Arm, law: HubFeedback) -> Real:
+    """What a law adds to the coefficients of 1, s, s^2 and s^3 in D/theta of a turning arm (4,), in units of the input.
+
+    Of the hub's own outputs Kp, K1, -K2 (J - I_h) and K2 (J - I_h) C, of any other what its expansion at s = 0 says.
+    """
+    by_moment = law.K2 * arm.gauged_inertia
+    terms = np.array([law.Kp, law.K1, -by_moment, by_moment * arm.damping])
+    for gain in law.elsewhere:
+        terms += law[gain.name] * _beside_angle(arm, gain.output)
+    return terms
+
+
+@lru_cache(maxsize=64)
+def _beside_angle(arm: Arm, output: str) -> Real:
+    """Coefficients of 1, s, s^2 and s^3 in an output over the hub's angle, those known; 0 of an arm that is held."""
+    if not arm.has_rigid_mode:
+        return np.zeros(4)
+    below, above = expansions_at_zero(loop_system(arm), [OUTPUTS["hub_angle"], OUTPUTS[output]])
+    first = 0 if below[0] else 1  # a hub that loses something turns with s^-1
+    found, rest = np.zeros(4), np.array(above[first:])
+    for power in range(rest.size):
+        found[power] = rest[0] / below[first]
+        rest = rest[1:] - found[power] * np.array(below[first + 1 : first + rest.size])
+    return found

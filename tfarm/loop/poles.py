@@ -87,7 +87,7 @@ class Poles(Generic[AnyLoop]):
         if loop.arm.is_undamped and loop.is_told_by_theorem and loop.takes_energy < 0:
             right |= (self.values.imag > 0) & (abs(self.values.real) <= AXIS_SHARE * abs(self.values))
         on_rate, on_moment = loop.law.point
-        if loop.arm.is_reactive and not loop.is_told_by_theorem and on_rate > 0:
+        if loop.is_reactive and not loop.is_told_by_theorem and on_rate > 0:
             driven = driven_modes(loop.arm, on_moment)
             return max(count_with_mirrors(self.values[right]), 2 * int((driven.at < self.box.im_max).sum()))
         return count_with_mirrors(self.values[right])
@@ -195,11 +195,11 @@ def quiet_edge(loop: Loop | LawLoop, right: float, height: float, points: int, h
 def slow_poles(loop: Loop, below: float) -> Complex:
     """Poles [1/s] but 0 of the turning arm under small gains, of size up to `below`: zeros of J s^2 + b s + c.
 
-    J is the effective inertia, b and c are `Loop.at_hub`.  They are corrected on the characteristic function where
+    J is the effective inertia, b and c are `Loop.at_rest`.  They are corrected on the characteristic function where
     their squares are full doubles; smaller ones are right as they are, flexibility and damping adding terms of the
     order |s|/w1 and C |s|.
     """
-    b, c = loop.at_hub
+    b, c = loop.at_rest
     if not loop.arm.has_rigid_mode or not (b or c):
         return np.empty(0, complex)
     J = effective_inertia(loop.arm, loop.law)
@@ -219,7 +219,7 @@ def starting_points(loop: Loop, up_to: float) -> Complex:
     arm, C = loop.arm, loop.arm.damping
     near = near_modes(np.asarray(steep_places(arm, up_to)), C)
     J = arm.turned_inertia if arm.has_rigid_mode else arm.hub_side_inertia + SOME_INERTIA
-    slow = np.roots([J, *loop.at_hub]).astype(complex)
+    slow = np.roots([J, *loop.at_rest]).astype(complex)
     slow = slow[abs(slow) > LEAST_SQUARABLE]  # zeros at 0 are divided out
     real = real_starts(up_to)
     return np.concatenate([near, near.conj(), slow, -real, real])

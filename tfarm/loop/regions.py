@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from tfarm.arm import Arm, HubFeedback
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.crossing import Crossings, brackets, counts_over, intervals, solved
-from tfarm.exact.characteristic import gains_of, loop_parts, torque
-from tfarm.exact.system import System, system_of
+from tfarm.exact.characteristic import gains_of, loop_parts, loop_system, torque
+from tfarm.exact.system import System
 from tfarm.records import record
 from tfarm.spectrum.scales import PAPER_GAINS, default_gains
 
@@ -185,7 +185,7 @@ def _lossless_counts(arm: Arm, K1: Real, K2: Real, Kp: float) -> NDArray[np.int6
 
 def _crossings_along_K2(arm: Arm, K1: Real, Kp: float, omega: Real) -> list[Crossings]:
     """The crossings along K2 for each K1, all columns solved at once."""
-    k = system_of(arm)
+    k = loop_system(arm)
     laws = [HubFeedback(K1=float(each), Kp=Kp) for each in K1]
     rows = np.array([[float(gain) for gain in gains_of(k, law)] for law in laws]).T
     along_K2 = [float(gain) for gain in gains_of(k, HubFeedback(K2=1.0))]
@@ -215,7 +215,7 @@ def _h(k: System, omega: Real, law: HubFeedback) -> Real:
 
 def boundary(arm: Arm, omega: Real, Kp: float = 0.0) -> Real:
     """K1 and K2 with poles at +-i w, and w: (n, 3), in the order of omega."""
-    k = system_of(arm)
+    k = loop_system(arm)
     drive, numerators, _ = loop_parts(k, 1j * omega)
     laws = (HubFeedback(Kp=Kp), HubFeedback(K1=1.0), HubFeedback(K2=1.0))
     N, a, b = (torque(map(float, gains_of(k, law)), numerators) for law in laws)

@@ -13,8 +13,7 @@ import numpy as np
 
 from tfarm.arm import FED_BACK, Arm, must_turn
 from tfarm.arrays import Complex, Real
-from tfarm.exact.characteristic import dimensionless, loop_parts, quick_characteristics
-from tfarm.exact.system import system_of
+from tfarm.exact.characteristic import dimensionless, loop_parts, loop_system, quick_characteristics
 from tfarm.spectrum.scales import first_frequency
 
 from .damping import band_and_real_poles, is_oscillating
@@ -51,7 +50,7 @@ def _exp(z: Complex) -> Complex:
 
 def residues(arm: Arm, s: Complex, laws: Real) -> Complex:
     """Residues of root moment over r [N m s^-1 per N m] at closed-loop poles s, each of its own law (1-D)."""
-    k = system_of(arm)
+    k = loop_system(arm)
     rows = dimensionless(k, laws)
     moment = loop_parts(k, s).numerators[FED_BACK.index("root_moment")]
     return np.asarray(moment / quick_characteristics(k, s, rows).slope)

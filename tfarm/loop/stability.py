@@ -28,7 +28,7 @@ from tfarm.spectrum import modes, modes_below
 
 from .frequencies import MOST_BAND_MODES, band_of
 from .lossless import driven_modes, locked_edges
-from .plant import Loop
+from .plant import Loop, slow_terms
 from .poles import AnyLoop, Poles, poles_below
 
 LEAST_BAND_MODES = 12  # flexible modes in the band at C = 0, and at least
@@ -101,13 +101,15 @@ def _verdict(poles: Poles, is_unstable: bool, loop: Loop) -> str:
     if is_unstable or bool((moving.real > MARGIN_OF_ZERO * abs(moving)).any()):
         return "unstable"
     at_zero = poles.values.size - moving.size
-    if at_zero > 1 or (at_zero == 1 and law.K1 == 0):
+    if at_zero > 1 or (at_zero == 1 and not slow_terms(free.arm, law)[1]):
         return "marginal"
     if free.is_lossless:
         return "marginal"
-    if free.arm.is_reactive:
+    if free.is_reactive:
         told = free.is_told_by_theorem
         return "marginal" if told and not is_felt(free.arm, poles.box.im_max) else "stable"
+    if free.arm.is_reactive and (moving.real > -MARGIN_OF_ZERO * abs(moving)).any():
+        return "marginal"  # on the axis to working precision, and no theorem that tells on which side
     must_be_off_axis(moving)
     return "stable"
 
@@ -152,7 +154,7 @@ def _beyond(loop: Loop, quiet: bool) -> Beyond:
         if law.K1 == 0:
             return Beyond("C = 0 and K1 = 0: nothing takes or gives energy, modes beyond the band lie on the axis")
         return Beyond("C = 0 and K2 = 1: modes with the hub at rest stay undamped, in every band")
-    if loop.freed.arm.is_reactive:
+    if loop.freed.is_reactive:
         return _beyond_lossless(loop)
     if quiet:
         return Beyond(f"beyond the band |L(iw)| < {QUIET:g} and falling: no unstable pole there (small gain)")

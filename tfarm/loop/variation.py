@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from tfarm.arm import LISTED, NAMES, RATE_GAIN, Arm, HubFeedback
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ParameterError
-from tfarm.exact.characteristic import Analytic, gains_of, quick_characteristics, zeros_at_origin
-from tfarm.exact.system import System, system_of
+from tfarm.exact.characteristic import Analytic, gains_of, loop_system, quick_characteristics, zeros_at_origin
+from tfarm.exact.system import System
 from tfarm.records import record
 from tfarm.spectrum.correction import Member
 
@@ -68,7 +68,7 @@ class Variation:
         """The arm's system, and gains without dimensions (gains, 1), where the varied number has that value."""
         if self.is_of_gains:
             return self._k, self.laws(np.array([value]))
-        k = system_of(self.at(value).arm)
+        k = loop_system(self.at(value).arm)
         return k, np.array([[float(gain)] for gain in gains_of(k, self.beside.plus(self.law))])
 
     def singular(self, value: float) -> float:
@@ -84,7 +84,7 @@ class Variation:
 
     @cached_property
     def _k(self) -> System:
-        return system_of(self.arm)
+        return loop_system(self.arm)
 
     @cached_property
     def zeros_at_origin(self) -> int:

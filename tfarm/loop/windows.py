@@ -59,7 +59,7 @@ def gain_windows(verdict: Stability, name: str) -> Windows:
     if name == "K2" and loop.arm.has_massless_hub:
         return Windows(name, None, (), (0.0, 0.0), Crossings.of([]))  # an algebraic loop but for K2 = 0
     low, high = looked_at(loop, name)
-    if free.arm.is_reactive:
+    if _is_lossless_line(loop, name):
         found, told = _undamped(loop, name).within(low, high), name != "K2" and law.K2 == 0
         told = told or free.arm.is_told_by_lyapunov  # every mode, by a theorem
         band = math.inf if told else float(locked_edges(free.arm).at.max())
@@ -74,6 +74,11 @@ def gain_windows(verdict: Stability, name: str) -> Windows:
     inside = (pair for pair in stable if pair[0] < value < pair[1] or (at_edge and pair[0] == 0))
     around = next(inside, None) if verdict.is_stable else None
     return Windows(name, around, tuple(stable), (low, high), found, band)
+
+
+def _is_lossless_line(loop: Loop, name: str) -> bool:
+    """Whether theorems without losses tell the loop, whatever value the gain of that name takes."""
+    return loop.freed.arm.is_reactive and loop.law.having(name, 1.0).is_at_hub
 
 
 def looked_at(loop: Loop, name: str) -> Interval:
@@ -115,7 +120,7 @@ def reach_words(windows: Iterable[Windows]) -> str:
 def _counts(verdict: Stability, name: str, pairs: list[Interval], found: Crossings) -> list[int]:
     """Unstable poles in each window: counted in one, by the crossings in the others; at C = 0 whether there are any."""
     loop, value = verdict.loop, verdict.loop.law[name]
-    if loop.freed.arm.is_reactive:
+    if _is_lossless_line(loop, name):
         laws = [loop.law.having(name, (low + high) / 2) for low, high in pairs]
         return [0 if holds_undamped(Loop(loop.arm, law).freed) else 1 for law in laws]
     middles = np.array([(low + high) / 2 for low, high in pairs])
@@ -157,8 +162,8 @@ def _with_proven_ends(loop: Loop, name: str, pair: Interval, limits: Interval) -
     """
     low, high = pair
     free, law = loop.freed.arm, loop.freed.law
-    if free.input_lags:
-        return low, high  # a voltage reaches the hub late: it is not passive
+    if free.input_lags or not law.having(name, 1.0).is_at_hub:
+        return low, high  # a voltage reaches the hub late: it is not passive, nor is what is fed back from elsewhere
     if name == "K2":
         is_proven = free.is_told_by_lyapunov and law.K1 > 0 and law.Kp >= 0
         return (-math.inf if is_proven and low == limits[0] else low), high

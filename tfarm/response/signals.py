@@ -19,10 +19,10 @@ from tfarm.errors import MISSING, ParameterError
 from tfarm.exact.chain import ElementChain
 from tfarm.exact.chain_values import free_outputs, series_at_zero
 from tfarm.exact.chaining import chain_of
-from tfarm.exact.characteristic import LoopParts, float_units, loop_parts
+from tfarm.exact.characteristic import LoopParts, float_units, loop_parts, loop_system
 from tfarm.exact.outputs import Output
 from tfarm.exact.outputs import output as known_output
-from tfarm.exact.system import System, system_of
+from tfarm.exact.system import System
 from tfarm.exact.values import expansions_at_zero
 from tfarm.records import record
 from tfarm.spectrum import modes
@@ -67,7 +67,7 @@ class Signals:
     def system(self) -> System:
         """The exact system that they are read from: one link in closed form where they are those at its hub."""
         at_hub = set(self.names) <= set(FED_BACK)
-        return system_of(self.arm, wanted=self.outputs) if at_hub else chain_of(self.arm)
+        return loop_system(self.arm) if at_hub else chain_of(self.arm)
 
     def parts(self, s: NDArray[Any]) -> LoopParts:
         """Drive (n,), numerators (signals, n) in SI per unit of the input, and scale, at s of any shape."""

@@ -1,0 +1,83 @@
+"""The program with a fourth gain, made as CONTRIBUTING says: a row of GAINS and a field of HubFeedback.
+
+`python -m tests.fourth_gain` reads cases from standard input and answers on standard output, both JSON.  The row and
+the field are put into the source of `tfarm.arm.feedback` while it is imported; no file is changed.
+"""
+
+from __future__ import annotations
+
+import importlib.abc
+import importlib.machinery
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from types import CodeType
+from typing import Any
+
+OUTPUT = "tip_displacement"  # follows the hub's angle, feels every mode, and is not of the hub
+LAST_ROW, LAST_FIELD = 'Gain("K2", "root_moment", "1", "M"),\n', "    Kp: float = 0.0\n"
+ROW, FIELD = f'    Gain("K3", "{OUTPUT}", "N m/m", "w"),\n', "    K3: float = 0.0\n"
+
+
+class _Extended(importlib.machinery.SourceFileLoader):
+    def get_code(self, fullname: str) -> CodeType:
+        source = Path(self.path).read_text(encoding="utf-8")
+        assert source.count(LAST_ROW) == source.count(LAST_FIELD) == 1
+        source = source.replace(LAST_ROW, LAST_ROW + ROW).replace(LAST_FIELD, LAST_FIELD + FIELD)
+        return compile(source, self.path, "exec")
+
+
+class _Finder(importlib.abc.MetaPathFinder):
+    def find_spec(self, name: str, path: Any, target: Any = None) -> importlib.machinery.ModuleSpec | None:
+        found = importlib.machinery.PathFinder.find_spec(name, path) if name == "tfarm.arm.feedback" else None
+        if found is not None and found.origin is not None:
+            found.loader = _Extended(name, found.origin)
+        return found
+
+
+def answers_of(cases: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """What a program with the fourth gain answers, from a process of its own."""
+    command = [sys.executable, "-m", "tests.fourth_gain"]
+    done = subprocess.run(command, input=json.dumps(cases), capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    found: list[dict[str, Any]] = json.loads(done.stdout)
+    return found
+
+
+def _loop(arm: Any, law: Any) -> dict[str, Any]:
+    """Verdict, margins, windows and proof of a loop, and the end of a locus along the fourth gain."""
+    import tfarm
+    from tfarm.loop.locus import locus
+    from tfarm.loop.lyapunov import lyapunov
+
+    found = tfarm.margins(arm, law)
+    verdict, limits = found.stability, found.in_band
+    ended = locus(arm, law, "K3", 0.1 * law["K3"], law["K3"], points=5, branches=4)
+    return {
+        "verdict": verdict.verdict,
+        "unstable": verdict.unstable_roots,
+        "infinite": verdict.unstable_roots_infinite,
+        "tail": verdict.tail,
+        "known": verdict.is_known_beyond,
+        "poles": [[pole.real, pole.imag] for pole in verdict.poles.values[:6].tolist()],
+        "margins": limits and [*limits.gain, limits.phase, limits.disk],
+        "exact": [found.exact_delay, found.exact_disk],
+        "windows": {name: each.all for name, each in found.windows.items()},
+        "proven": lyapunov(arm, law).proven,
+        "ends": [[pole.real, pole.imag] for pole in ended.branches[:, -1].tolist()],
+    }
+
+
+def _answer(case: dict[str, Any]) -> dict[str, Any]:
+    import tfarm
+
+    arm = tfarm.load(case["arm"])
+    arm = replace(arm, hub=replace(arm.hub, friction=case["friction"]))
+    return _loop(arm, tfarm.HubFeedback(**case["gains"]))
+
+
+if __name__ == "__main__":
+    sys.meta_path.insert(0, _Finder())
+    print(json.dumps([_answer(case) for case in json.load(sys.stdin)]))
