@@ -14,14 +14,12 @@ from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.reduced.sensed import closed, in_series, pade, sensed_model
 from tfarm.spectrum import modes_below
 from tfarm.spectrum.box import Box, complete
-from tfarm.spectrum.damped import TOWARD_SINGULAR
+from tfarm.spectrum.damped import HEIGHTS_LEFT, RIGHT_OF_AXIS, TOWARD_SINGULAR
 
 from .frequencies import band_of, steep_places
 from .law_loop import LawLoop
 from .poles import (
-    HEIGHTS_LEFT,
     MOST_POLES,
-    RIGHT_FROM,
     STARTS_REACH,
     USUAL_POLES,
     Poles,
@@ -78,7 +76,7 @@ def law_poles_below(loop: LawLoop, height: float, late: float = LATE) -> Poles[L
 def law_box(loop: LawLoop, height: float, late: float = LATE) -> Box:
     """A box of that height, right of the law's poles and until |L| is small; left short of -1/C and -late/delay."""
     own, C = loop.law.poles, loop.arm.damping
-    right = BEYOND_OWN * max([RIGHT_FROM * height, *own.real.tolist()])
+    right = BEYOND_OWN * max([RIGHT_OF_AXIS * height, *own.real.tolist()])
     right = quiet_edge(loop, right, height, LAW_RIGHT_POINTS, LAW_RIGHT)
     clear = TOWARD_SINGULAR / C if C else np.inf
     left = min(HEIGHTS_LEFT * height, clear, late / loop.law.delay if loop.law.delay else np.inf)

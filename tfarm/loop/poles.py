@@ -22,7 +22,7 @@ from tfarm.exact.characteristic import zeros_at_origin
 from tfarm.records import record
 from tfarm.response.frequency import AXIS_SHARE
 from tfarm.spectrum.box import TRIED_HEIGHTS, Box, complete
-from tfarm.spectrum.damped import TOWARD_SINGULAR
+from tfarm.spectrum.damped import HEIGHTS_LEFT, RIGHT_OF_AXIS, TOWARD_SINGULAR
 from tfarm.spectrum.enclose import Disc, disjoint, enclosed, proven_count
 
 from .frequencies import band_of, steep_places
@@ -40,10 +40,8 @@ LEAST_SQUARABLE = 1e-140  # 1/s: whose square is still a full double
 AnyLoop = TypeVar("AnyLoop", bound=Loop | LawLoop, default=Loop)  # hub gains, unless another law is said
 LEAST_REAL_PART = -0.5  # of L, so that 1 + L has no zero
 RIGHT_OF_EDGE = (2.0, 5.0, 20.0)  # times the right edge of a box, where L is looked at again
-HEIGHTS_LEFT = 1.5  # heights that a box reaches left: poles further left die out faster than any in it swings
-RIGHT_FROM = 0.1  # heights: the nearest right edge of a box that is tried
 RIGHT_GROWS = 1.7  # times, from one right edge that is tried to the next: of effect on the time alone
-RIGHT_POINTS = 40  # of half a right edge under gains, where Re L is looked at: no pole of L is nearer than RIGHT_FROM
+RIGHT_POINTS = 40  # of half a right edge under gains, where Re L is looked at: far from any pole of L, it is smooth
 GAINS_RIGHT = 1e3  # heights that a box reaches right under gains, at most: there the search for its edge ends
 # Starts of Newton's method: the winding number says what they missed, so that they bear on the time alone.
 STARTS_REACH = 1.3  # heights of the box: modes of the arm up to there, as a law may draw their poles down into it
@@ -173,7 +171,7 @@ def poles_below(loop: Loop, height: float, factors: tuple[float, ...] = TRIED_HE
 
 def box_of(loop: Loop, height: float) -> Box:
     """A box of that height which reaches far enough right for any unstable pole, and left short of -1/C."""
-    right = quiet_edge(loop, RIGHT_FROM * height, height, RIGHT_POINTS, GAINS_RIGHT)
+    right = quiet_edge(loop, RIGHT_OF_AXIS * height, height, RIGHT_POINTS, GAINS_RIGHT)
     left, C = HEIGHTS_LEFT * height, loop.arm.damping
     return Box(-min(left, TOWARD_SINGULAR / C) if C else -left, right, -height, height)
 

@@ -16,7 +16,7 @@ from tfarm.errors import MISSING
 from tfarm.exact.methods import Method
 
 from .damped import DampedModes, damped_modes
-from .table import Modes, compare_theories, hub_locked
+from .table import FEWEST_LISTED, Modes, compare_theories, hub_locked
 
 SHAPE_DIGITS = 10  # in a report's files, of what shapes are needed for: these differ by 1e-14 between processors
 EIGENVALUE_ERROR = 2e-14  # of its size: what a float64 may be off (tests: 1e-14 to 50 digits, 64 eps in closed form)
@@ -129,7 +129,7 @@ def _undamped(modes: Modes, digits: int | None, method: Method) -> list[Column]:
         still: list[Any] = held_still.digits(digits)[-int(flexible.sum()) :]
     else:
         still = held_still.natural_frequency[flexible].tolist()
-    texts = ["-"] * len(rigid) + [each if isinstance(each, str) else general(each, 12) for each in still]
+    texts = ["-"] * len(rigid) + [each if isinstance(each, str) else general(each, FEWEST_LISTED) for each in still]
     on = (JSON,) if modes.arm.is_locked else ANSWER
     locked = Column("hub_locked_rad_s", "hub locked", "rad/s", of=[*rigid, *still], shown=texts, on=on)
     return [*columns[:3], locked, *columns[3:]]

@@ -24,6 +24,10 @@ from .counting import end_row, steps_of
 _minors, _across_waves = python_of(from_waves), python_of(across_waves)
 
 MOST_AXIS_BITS = 40_000  # of working precision: a root that needs more is double
+BITS_A_DIGIT, SPARE_BITS = 3.33, 80  # log2 10, rounded up; and beyond the digits asked for, for what cancels
+SECOND_START = 50  # bits to which the two first points of a secant are one: a few last units of a float64 apart
+CLOSE_BY = 36  # bits that a root must share with its start: of a simple root float64 has more
+AXIS_STEPS = 40  # of the secant, at most: each has 1.6 times the digits, so that a single root has thousands in twenty
 
 
 def real_waves(a: Ball, b: Ball, g: Ball, S: Ball) -> tuple[tuple[Ball, ...], tuple[Ball, ...]]:
@@ -189,10 +193,10 @@ def axis_of(k: System) -> ArmAxis | ChainAxis:
 
 def secant(axis: ArmAxis | ChainAxis, omega: float, digits: int) -> Ball | None:
     """The root next to omega by the secant method on midpoints; None if it does not settle close by."""
-    before, now = flint.arb(omega), flint.arb(omega) * (1 + flint.arb(2) ** -50)
+    before, now = flint.arb(omega), flint.arb(omega) * (1 + flint.arb(2) ** -SECOND_START)
     value_before = axis.drive(before).mid()
-    small, near = now * flint.arb(10) ** -(digits + 2), now * flint.arb(2) ** -36
-    for _ in range(40):
+    small, near = now * flint.arb(10) ** -(digits + 2), now * flint.arb(2) ** -CLOSE_BY
+    for _ in range(AXIS_STEPS):
         value = axis.drive(now).mid()
         if value == value_before:
             return now
@@ -207,7 +211,7 @@ def secant(axis: ArmAxis | ChainAxis, omega: float, digits: int) -> Ball | None:
 
 def axis_precisions(digits: int) -> Iterator[int]:
     """Working precisions [bits] worth trying for so many digits, each twice the one before."""
-    bits = int(3.33 * digits) + 80
+    bits = int(BITS_A_DIGIT * digits) + SPARE_BITS
     while bits < MOST_AXIS_BITS:
         yield bits
         bits *= 2

@@ -26,6 +26,7 @@ FORESEEN = 1.0  # so is one over which ln f, phase or size, would change by more
 NEAREST_TO_ZERO = 1e-13  # a contour cannot be resolved closer to a zero than this share of |s|
 NARROW_BOX = 1e-8  # of a box: in a wide one the part near s = 0 is resolved as finely as in one of this size
 MOST_CONTOUR_POINTS = 200_000  # of a contour
+FIRST_POINTS = 40  # of each edge of a contour, to begin with: those between are put in where they are needed
 MOST_CALLS = 30_000  # of the function in one search; the most that 300 random loops took is 4,100
 DEAD_ZONE = 1e-8  # nearer to s = 0 than this share of a box Newton's method is not believed: a zero there forces cuts
 SAME_BOX_ZERO = 0.1  # of its size: a zero found so near a known one is that one
@@ -33,9 +34,14 @@ MOST_CUTS = 60  # cuts: then a box is a share of 2^-30 of the first, less than f
 REAL_SHARE = 1e-11  # of its size: a smaller imaginary part is rounding
 TRIED_HEIGHTS = (1.0, 1.0041, 1.0093, 1.0171, 1.0311, 1.0573, 1.113)  # of a box, where a zero lies on its edge
 NEWTON_STEPS = 60  # at most, of a start: those that have not settled by then are dropped
+FARTHEST_MOVE = 0.3  # of |s|: no step of Newton's method is longer, lest a start leave its neighbourhood
+SETTLED_MOVE, LAST_MOVE = 1e-11, 1e-15  # of |s|: a start that moves less has settled; and will move no more
 SAME_POINT = 1e-9  # of its size: two starts that settle so near each other found one zero
 SHRINKING = 0.9  # of a move of Newton's: the next one, at a zero of order up to ten
 SPLIT = 0.4871  # where a box is cut: off the axes, on which zeros like to lie
+UNEVEN = 8  # ratio of two edges on one side of 0 from which on a box is cut at about their geometric mean
+OF_CORNER, OF_OPPOSITE = (0.8, 0.55), (0.2, 0.45)  # weights of each corner and of its opposite: eight starts of a box
+POINT_BOX = 1e-6  # of |s|: in a box so small one zero that is found is a multiple one, as often as it is counted
 
 
 Function = Callable[[Complex], Analytic]
@@ -71,12 +77,12 @@ class Box(NamedTuple):
 
 
 def _between(low: float, high: float) -> float:
-    if (low > 0 and high > 8 * low) or (high < 0 and low < 8 * high):
+    if (low > 0 and high > UNEVEN * low) or (high < 0 and low < UNEVEN * high):
         return math.copysign(abs(low) ** (1 - SPLIT) * abs(high) ** SPLIT, low)
     return low + SPLIT * (high - low)
 
 
-def winding_number(function: Function, box: Box, points: int = 40) -> int:
+def winding_number(function: Function, box: Box, points: int = FIRST_POINTS) -> int:
     """How many zeros lie in the box, each as often as its order.
 
     Raises ConvergenceError where a zero lies on the contour, to what float64 resolves.
@@ -127,12 +133,12 @@ def newton(function: Function, starts: Complex) -> Complex:
         known = np.isfinite(move)
         settled[moving[~known]] = False
         moving, move = moving[known], move[known]
-        limit = 0.3 * abs(s[moving])
+        limit = FARTHEST_MOVE * abs(s[moving])
         move = np.where(abs(move) > limit, limit * (move / np.maximum(abs(move), LEAST_SIZE)), move)
         s[moving] -= move
         away, size = abs(move), abs(s[moving])
-        settled[moving] = away < 1e-11 * size
-        ended = (away <= 1e-15 * size) | (settled[moving] & (away > SHRINKING * last[moving]))
+        settled[moving] = away < SETTLED_MOVE * size
+        ended = (away <= LAST_MOVE * size) | (settled[moving] & (away > SHRINKING * last[moving]))
         last[moving], moving = away, moving[~ended]
         if not moving.size:
             break
@@ -194,7 +200,7 @@ def _search(function: Function, box: Box, starts: Complex, known: Complex, depth
     if not expected:
         return np.empty(0, complex)
     grid = (
-        box.corners[:4, None] * np.array([0.8, 0.55]) + box.corners[[2, 3, 0, 1], None] * np.array([0.2, 0.45])
+        box.corners[:4, None] * np.array(OF_CORNER) + box.corners[[2, 3, 0, 1], None] * np.array(OF_OPPOSITE)
     ).ravel()
     found = newton(function, np.concatenate([starts[box.holds(starts)], grid]))
     width = max(box.re_max - box.re_min, box.im_max - box.im_min)
@@ -203,7 +209,7 @@ def _search(function: Function, box: Box, starts: Complex, known: Complex, depth
     found = np.concatenate([known[box.holds(known)], found[~again]])
     if found.size == expected:
         return found
-    if found.size == 1 and width < 1e-6 * abs(found[0]):
+    if found.size == 1 and width < POINT_BOX * abs(found[0]):
         return np.repeat(found, expected)
     if depth > MOST_CUTS:
         where = f"{box.re_min:.3g} < Re s < {box.re_max:.3g}, {box.im_min:.3g} < Im s < {box.im_max:.3g}"

@@ -28,6 +28,9 @@ from tfarm.records import record
 
 from .ball_axis import axis_of, axis_precisions, secant
 
+COUNTED_AT = tuple(Fraction(*share) for share in ((1, 2), (2, 5), (3, 5), (1, 7), (6, 7)))  # of a gap: tried in turn
+COUNTING_BITS = (128, 512, 4096)  # of working precision, tried there: a count is certain unless it is on a half wave
+
 
 @dataclass(frozen=True, slots=True)
 @record
@@ -84,9 +87,9 @@ def _bracket(k: System, omega: float, digits: int) -> tuple[Fraction, Fraction]:
 def _count_above(k: System, last: Fraction, above: float) -> tuple[int, str]:
     """A proven count somewhere between the last bracket and the next frequency, and where."""
     gap = Fraction(above) - last
-    for share in (Fraction(1, 2), Fraction(2, 5), Fraction(3, 5), Fraction(1, 7), Fraction(6, 7)):
+    for share in COUNTED_AT:
         point = Fraction(float(last + gap * share))
-        for bits in (128, 512, 4096):
+        for bits in COUNTING_BITS:
             with precision(bits):
                 count = axis_of(k).count(rational(point)) if point > last else None
                 if count is not None:

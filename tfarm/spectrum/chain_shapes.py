@@ -20,7 +20,7 @@ from tfarm.exact.chain import ElementChain
 from tfarm.exact.chain_values import free_fields
 from tfarm.exact.elements import Body, Place, Segment
 
-from .shapes import GAUSS_POINTS
+from .shapes import GAUSS_POINTS, NO_MOTION, PANEL_WAVES
 
 
 class ChainShapes:
@@ -41,7 +41,7 @@ class ChainShapes:
             worst = float(omega[~np.isfinite(self._factor)][0])
             raise ConvergenceError(f"the mode at {worst:.10g} rad/s has no shape of its own: a double one", worst, 0.0)
         tip, theta = self(np.ones(1))[..., 0], self.theta()
-        motion = np.where(abs(tip[0]) > 1e-9 * abs(tip[1]), tip[0], np.where(tip[1] != 0, tip[1], theta))
+        motion = np.where(abs(tip[0]) > NO_MOTION * abs(tip[1]), tip[0], np.where(tip[1] != 0, tip[1], theta))
         self._factor = self._factor * np.where(motion < 0, -1.0, 1.0)
         self._forget()
 
@@ -108,7 +108,7 @@ class ChainShapes:
         for each in self.chain.segments:
             S = self.omega.max(initial=0.0) ** 2
             waves = (float(each.g) * S) ** 0.25 + math.sqrt(S * float(each.a + each.b))
-            panels = 2 + math.ceil(waves / 4.0)
+            panels = 2 + math.ceil(waves / PANEL_WAVES)
             start = position - each.length
             shares = ((np.arange(panels)[:, None] + (nodes + 1) / 2) / panels).ravel()
             at = tuple(Place(start + each.length * Fraction(float(share))) for share in shares)

@@ -20,6 +20,9 @@ from tfarm.exact.elements import Place
 from tfarm.exact.free import free_response
 from tfarm.exact.system import System
 
+SHAPE_BITS = 128  # of working precision: twice what a float64 holds, and more for waves that cancel
+BITS_A_UNIT = 8  # of the exponent by which waves grow along the arm, 1.44 bits each: room for products of several
+
 
 def mode_field(k: System, s: complex, quantity: str, x: NDArray[np.float64]) -> Complex:
     """ "W", "Psi" or "M" (dimensionless lengths and moments) at the shares x, of unit modal mass in SI units.
@@ -40,7 +43,7 @@ def mode_field(k: System, s: complex, quantity: str, x: NDArray[np.float64]) -> 
     if theta == 0 or slope == 0:
         raise ConvergenceError(f"the hub does not feel the mode at {s:.6g} 1/s, or it is double", s, slope)
     unit = np.sqrt(2 * s / (theta * slope) * float(k.length / k.EI)) * (M0 if by_moment else theta)
-    with precision(128 + 8 * math.ceil(abs(np.real(free.scale[0])))):
+    with precision(SHAPE_BITS + BITS_A_UNIT * math.ceil(abs(np.real(free.scale[0])))):
         state = State(k, point(s))
         one = state.M0 if by_moment else state.theta
         values = [nearest_float(_at(state, quantity, float(share)) / one) for share in x]

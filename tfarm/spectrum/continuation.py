@@ -37,6 +37,14 @@ CLOSING_SHARE = 0.2  # two real zeros whose distance would shrink by more than t
 SMALLEST_STEP = 1e-10  # no step is smaller beside the way from the start
 STUCK = 1e-4  # a step this small beside the way so far ends a mode
 MOST_REFUSALS = 300  # steps; lists that arrive take up to 120 (tuned: survey tests.spectrum.damped)
+NODES_BACK = 3  # through which zeros are predicted: by parabolas, of what is smooth
+LONGER, SHORTER = 1.6, 2.5  # times: the step after one that went well, and instead of one that did not; time alone
+LAST_REST = 1e-9  # of the way that is left: a step that leaves less goes to the end
+SMALL_STEP = 1e-3  # of the way since a step was last measured anew: from there on zeros may have to be paired anew
+FAR_APART = 0.1  # of the square of their mean: half the distance of two real zeros, squared, that go each by itself
+NEXT_ZERO_AT = np.geomspace(1e-5, 0.3, 60)  # of a real zero: distances between which the next one is looked for
+NEXT_ZERO_KNOWN = 1e-14  # relative
+SAME_NEIGHBOUR = 1e-6  # of its distance: a zero of another pair so near to the next one is that one
 
 
 class Node(NamedTuple):
@@ -59,19 +67,19 @@ def follow(
     the others keep them company, and are dropped where they meet a zero that nobody follows.  Raises ConvergenceError,
     with the last node, where branches cannot be told apart.
     """
-    nodes, recent, step, refusals, anchor = [start], [*before, start][-3:], first, 0, start.at
+    nodes, recent, step, refusals, anchor = [start], [*before, start][-NODES_BACK:], first, 0, start.at
     here = family(start.at)
     while nodes[-1].at != stop:
         at = nodes[-1].at + step
-        if (stop - at) * np.sign(stop - start.at) <= 1e-9 * abs(stop - nodes[-1].at):
+        if (stop - at) * np.sign(stop - start.at) <= LAST_REST * abs(stop - nodes[-1].at):
             at = stop
         there = family(at)
         zeros, stray = corrected(there, predicted(recent, at))
         stray |= _jumped(here, there, nodes[-1].zeros, zeros)
         if not stray.any():
-            step, here = 1.6 * (at - nodes[-1].at), there
+            step, here = LONGER * (at - nodes[-1].at), there
             nodes.append(Node(at, zeros))
-            recent = [*recent[-2:], nodes[-1]]
+            recent = [*recent, nodes[-1]][-NODES_BACK:]
             if (left := _left(there, zeros)) is not None:
                 recent = [Node(node.at, left(node.zeros)) for node in recent]
                 nodes.append(recent[-1])
@@ -79,8 +87,8 @@ def follow(
         refusals += 1
         if refusals > MOST_REFUSALS:
             raise ConvergenceError(f"branches cannot be told apart beyond {nodes[-1].at:.6g}", nodes[-1], step)
-        step = (at - nodes[-1].at) / 2.5
-        close = abs(step) < 1e-3 * abs(at - anchor) or abs(step) < SMALLEST_STEP * abs(at - start.at)
+        step = (at - nodes[-1].at) / SHORTER
+        close = abs(step) < SMALL_STEP * abs(at - anchor) or abs(step) < SMALLEST_STEP * abs(at - start.at)
         if close and _exchange(family, recent, stray, at):
             nodes.append(recent[-1])
         elif stray[:wanted].any() and SMALLEST_STEP * abs(at - start.at) < abs(step) < STUCK * abs(at - anchor):
@@ -116,9 +124,9 @@ def _left(member: Member, zeros: Complex) -> Callable[[Complex], Complex] | None
 
 
 def predicted(nodes: list[Node], at: float) -> Complex:
-    """The pairs by polynomials through the last nodes, three at most, of what stays smooth."""
+    """The pairs by polynomials through the last nodes, `NODES_BACK` at most, of what stays smooth."""
     guess = nodes[-1].zeros
-    for number in range(2, min(3, len(nodes)) + 1):
+    for number in range(2, min(NODES_BACK, len(nodes)) + 1):
         longer = through_nodes(nodes[-number:], at)
         guess = np.where(np.isnan(longer), guess, longer)
     return guess
@@ -139,7 +147,7 @@ def through_nodes(nodes: list[Node], at: float | Real) -> Complex:
     square = (half * half).real
     pairs = as_pairs(weights @ mean, weights @ square)
     slow = zeros[..., 0].real
-    far = ((square > 0.1 * mean**2) & (slow * slow[0] > 0)).all(0)
+    far = ((square > FAR_APART * mean**2) & (slow * slow[0] > 0)).all(0)
     inverse = weights @ np.where(far, 1 / np.where(far, slow, 1), 1)
     apart = np.stack([1 / np.where(inverse == 0, 1, inverse), weights @ zeros[..., 1].real], -1)
     found = np.where(far[:, None], apart, pairs)
@@ -171,7 +179,7 @@ def _exchange(family: Family, nodes: list[Node], stray: NDArray[np.bool_], at: f
             continue
         m, n = np.unravel_index(np.nanargmin(abs(zeros - near)), zeros.shape)
         meeting = sorted(both, key=abs)
-        if m == i or abs(zeros[m, n] - near) > 1e-6 * abs(near - zero):
+        if m == i or abs(zeros[m, n] - near) > SAME_NEIGHBOUR * abs(near - zero):
             lone, zeros[i], changed = zeros[i, 1 - j], meeting, [i]
             if family(at).ends and lone != 0 and not np.isnan(lone):  # the one that is left goes on alone
                 zeros = np.concatenate([zeros, [[lone, np.nan]]])
@@ -180,7 +188,7 @@ def _exchange(family: Family, nodes: list[Node], stray: NDArray[np.bool_], at: f
         else:
             left = sorted([zeros[i, 1 - j], zeros[m, 1 - n]], key=lambda zero: (np.isnan(zero), abs(zero)))
             zeros[min(i, m)], zeros[max(i, m)], changed = left, meeting, [i, m]
-        for back in range(2, min(3, len(nodes)) + 1):
+        for back in range(2, min(NODES_BACK, len(nodes)) + 1):
             past = nodes[-back].zeros.copy()
             past[changed] = np.nan
             nodes[-back] = Node(nodes[-back].at, past)
@@ -206,11 +214,11 @@ def _next_zero(function: Function, zero: float) -> float:
         value, _, scale = function(s.astype(complex))
         return np.asarray((value * np.exp(1j * scale.imag)).real / (s - zero))
 
-    away = abs(zero) * np.geomspace(1e-5, 0.3, 60)
+    away = abs(zero) * NEXT_ZERO_AT
     found = []
     for side in (-1, 1):
         sign = np.sign(deflated(zero + side * away))
         for n in np.nonzero(sign[1:] != sign[:-1])[0][:1]:
             ends = zero + side * away[n], zero + side * away[n + 1]
-            found.append(brentq(lambda s: float(deflated(np.array([s]))[0]), *ends, rtol=1e-14))
+            found.append(brentq(lambda s: float(deflated(np.array([s]))[0]), *ends, rtol=NEXT_ZERO_KNOWN))
     return min(found, key=lambda s: abs(s - zero), default=np.inf)

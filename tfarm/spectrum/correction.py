@@ -22,6 +22,9 @@ ENDED_PLACE = 1e150  # where the tree has what has ended
 FEW_ZEROS = 64  # of so many all distances are found sooner than a tree is built
 BELIEVED_SHARE = 0.2  # how far a zero may land from its prediction, in distances to the next one
 SETTLED_CORRECTION = 1e-6  # a correction smaller than this share of that distance ends a step
+CORRECTING_STEPS = 12  # at most: what has not settled by then is followed in shorter steps
+SINGLY = 0.1  # of their distance: two zeros of a pair that move by less are corrected each by itself, else together
+NO_NEARER = 4 * float(np.finfo(float).eps)  # of its size: how well a zero is known at all
 
 
 class Member(NamedTuple):
@@ -40,7 +43,7 @@ class Member(NamedTuple):
 def corrected(member: Member, guess: Complex) -> tuple[Complex, NDArray[np.bool_]]:
     """The pairs of zeros next to the guess, and which of them did not settle there."""
     zeros, beside = guess, neighbours_of(guess)
-    for _ in range(12):
+    for _ in range(CORRECTING_STEPS):
         zeros, moved = improved(member, zeros, beside)
         if not (np.isfinite(zeros) | np.isnan(guess)).all():
             break
@@ -107,12 +110,12 @@ def improved(member: Member, zeros: Complex, beside: Neighbours | None = None) -
         new[:, 0] = np.where(is_real, new[:, 0].real, new[:, 0])
         apart = abs(zeros[:, 0] - zeros[:, 1])
         close = (apart < gap.min(1)) & (zeros[:, 0] != 0)
-        for i in np.nonzero(close & ~(abs(new - zeros).max(1) < 0.1 * apart))[0]:
+        for i in np.nonzero(close & ~(abs(new - zeros).max(1) < SINGLY * apart))[0]:
             twist = np.exp(scale[i, 1] - scale[i, 0])  # both values on the scale of the first
             new[i] = _together(zeros[i], value[i] * [1, twist], slope[i] * [1, twist])
         away = abs(new - zeros)
         away[ended] = 0.0
-        floor = 4 * np.finfo(float).eps * abs(zeros)  # nearer no zero is known
+        floor = NO_NEARER * abs(zeros)  # nearer no zero is known
         moved = np.where(away <= floor, 0.0, away / gap).max(1)  # no gap is left between two that have become one
     return new, moved
 

@@ -23,7 +23,7 @@ from tfarm.exact.coefficients import Coefficients
 from tfarm.exact.system import System
 from tfarm.records import record
 
-from .box import Box, Function, winding_number
+from .box import FIRST_POINTS, Box, Function, winding_number
 from .complex_shapes import mode_field
 from .continuation import Node, follow
 from .correction import Member, improved
@@ -37,7 +37,14 @@ LITTLE = (2, *COMPANY)  # where many C are met and more modes than matter are fo
 MANY_MODES = 30  # of more one number in company is tried, as each step takes long
 BESIDE_DISC = 1e-12  # how far a listed eigenvalue may be from its disc, of its size (more beside its own partner)
 TOWARD_SINGULAR = 0.8  # how far towards -1/C, where real eigenvalues accumulate, a box may reach
+LEFT_EDGES = (TOWARD_SINGULAR, 0.77, 0.74, 0.7)  # likewise: those that are tried, lest a zero lie on the edge
+HEIGHTS_LEFT = 1.5  # heights that a box reaches left: zeros further left die out faster than any in it swings
+RIGHT_OF_AXIS = 0.1  # heights that a box reaches right at least: its edge is clear of zeros on the axis
+ABOVE_LAST = 1.05  # times the last zero known: up to there a box may reach half-way
+POINTS_A_ZERO = 8  # of a contour, to begin with, for each zero that it should hold: time alone
 FIRST_STEP_IN_C = 0.01  # the first step in C, over 1/w of the highest mode
+FIRST_SHARE = 1e-3  # of all damping; of the lowest frequency, what a zero that friction makes may be: it is known there
+LAST_STEPS = 3  # of Newton's method from zeros right to SETTLED_CORRECTION: all digits, and once more
 
 
 @dataclass(frozen=True)
@@ -267,7 +274,7 @@ def _first_node(undamped: Modes, count: int, level: float) -> Node:
     node = Node(0.0, np.stack([1j * omega, -1j * omega], 1))
     if not alone:
         return node
-    share = min(1e-3, 1e-3 * abs(node.zeros[0, 0] / alone[0]))
+    share = min(FIRST_SHARE, FIRST_SHARE * abs(node.zeros[0, 0] / alone[0]))
     single = np.array([[zero, np.nan] for zero in single_zeros(undamped, share)], dtype=complex)
     start = member(undamped.system.with_damping(share))
     return Node(share * level, polished(start, np.concatenate([single, node.zeros])))
@@ -282,7 +289,7 @@ def member(k: System, gains: Gains = NO_GAINS) -> Member:
 
 def polished(last: Member, zeros: Complex) -> Complex:
     """Every zero to the last digits that float64 has of it."""
-    for _ in range(3):
+    for _ in range(LAST_STEPS):
         zeros, _ = improved(last, zeros)
     return zeros
 
@@ -300,7 +307,7 @@ def complete_box(f: Function, listed: Complex, others: Complex, C: float) -> tup
         middle = high if best is None and high == len(heights) - 1 else (low + high) // 2
         box = _box(float(heights[middle]), known, C)
         inside = int(box.holds(listed.ravel()).sum())
-        there = winding_number(f, box, points=40 + 8 * inside)
+        there = winding_number(f, box, points=FIRST_POINTS + POINTS_A_ZERO * inside)
         if there < inside:
             raise ConvergenceError(
                 f"{inside} eigenvalues listed in {tuple(box)}, but only {there} there", listed, there
@@ -321,16 +328,16 @@ def _heights(known: Complex, is_listed: NDArray[np.bool_], C: float) -> Real:
     order = np.argsort(imag)
     imag, mine = imag[order], mine[order]
     stop = int(np.argmin(mine)) if not mine.all() else mine.size
-    tops = np.r_[imag, imag[-1] * 1.05 if imag.size else 1.0 / C]
+    tops = np.r_[imag, imag[-1] * ABOVE_LAST if imag.size else 1.0 / C]
     bottoms = np.r_[0.0, imag]
     return (0.5 * (bottoms + tops))[: stop + 1]
 
 
 def _box(height: float, known: Complex, C: float) -> Box:
     """A box of that height, its left edge clear of -1/C and, of a few, the furthest from any known zero."""
-    reach = 1.5 * height
+    reach = HEIGHTS_LEFT * height
     if C and reach > TOWARD_SINGULAR / C:
-        edges = -np.array([TOWARD_SINGULAR, 0.77, 0.74, 0.7]) / C
+        edges = -np.array(LEFT_EDGES) / C
         room = [abs(known.real[abs(known.imag) < height] - edge).min(initial=np.inf) for edge in edges]
         reach = -float(edges[int(np.argmax(room))])
-    return Box(-reach, 0.1 * height, -height, height)
+    return Box(-reach, RIGHT_OF_AXIS * height, -height, height)

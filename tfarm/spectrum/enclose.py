@@ -32,6 +32,9 @@ SHORTEST_PIECE = 2.0**-26  # a piece of contour shorter than this share of it me
 MOST_PIECES = 6000  # of one side of a contour, some 10 s of CPU time; the longest of the presets' lists take 2,000
 CONTOUR_BITS = 96  # of working precision along a contour, whose angles alone are wanted
 STEP_GROWTH = 1.125  # of a step that went well; tuned: with 2 every second step went too far, and was half of the work
+FIRST_PIECE = 1 / 32  # of a side of the contour: the first piece, from which others are adapted; time alone
+BALL_STEPS = 40  # of Newton's method on middles of balls, at most: each doubles the digits
+DIGITS_BEYOND = 3  # digits to which it goes on beyond those of the disc: its middle is right to a part of the last
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +73,7 @@ def proven_count(k: System, box: Box, gains: Gains = NO_GAINS) -> int:
 
 def _turning(k: System, gains: Gains, a: Ball, b: Ball) -> Ball:
     """The change of arg D along the piece from a to b."""
-    total, start, step, pieces = flint.arb(0), 0.0, 1 / 32, 0
+    total, start, step, pieces = flint.arb(0), 0.0, FIRST_PIECE, 0
     here, value = a, characteristic_over(k, a, gains)
     while start < 1:
         end = min(start + step, 1.0)
@@ -112,14 +115,14 @@ def enclosed(k: System, near: complex, digits: int, gains: Gains = NO_GAINS) -> 
 def _newton(k: System, gains: Gains, near: complex, digits: int) -> Ball | None:
     """Newton's method on the middles of balls; real starts stay real."""
     s = point(near)
-    for _ in range(40):
+    for _ in range(BALL_STEPS):
         parts = tangent(k, s, flint.arb(0), gains)
         if parts is None or parts[1].contains(0):
             return None
         move = (parts[0] / parts[1]).mid()
         s = (s - move).mid()
         s = flint.acb(s.real) if near.imag == 0 else s
-        if abs(move) < abs(s) * rational(Fraction(1, 10 ** (digits + 3))):
+        if abs(move) < abs(s) * rational(Fraction(1, 10 ** (digits + DIGITS_BEYOND))):
             return s
     return None
 

@@ -22,6 +22,7 @@ from .counting import ChainCounter, Counter, counter_of
 CLOSE_SHARE = 1e-3  # share of the mean spacing; further apart, rounding moves neither by more than a few last units
 PAIR_REACH = 4e-6  # relative width in which float64 surely has each of a close pair
 PAIR_BITS = 256  # of working precision, for a double frequency to its last float64 digit
+HIGHEST_BOUND = 1e12  # times what a slender beam has: a count that has not got there by then never will
 LISTS_KEPT = 32  # lists of modes, of arms asked for again and again: memory against time, of no effect on an answer
 ARMS_KEPT = 64  # arms whose single numbers are kept, likewise
 
@@ -33,7 +34,7 @@ def natural_frequencies(k: System, first: int, last: int) -> NDArray[np.float64]
     Each is the point where the count steps from below its number to it, bisected to neighbouring floats: no
     start value, no sign change needed, so close and double roots are like any other.  Those close to a neighbour are
     bisected by the count in balls, or in float64 where a ball cannot tell.
-    Raises ConvergenceError if the count does not reach `last` (beyond 1e9 rad/s times the arm's own unit).
+    Raises ConvergenceError if the count does not reach `last` (up to `HIGHEST_BOUND`).
     """
     lowest = min(first, 1 + k.has_rigid_mode)  # not the rigid body at zero: bisection would run down all exponents
     number = np.arange(max(first - 1, lowest), last + 2)  # with both neighbours: one of them may be close
@@ -62,7 +63,7 @@ def count_below(k: System, omega: float) -> int:
 def _upper_bound(count: Counter | ChainCounter, k: System, last: int) -> float:
     """A frequency above the last one wanted: the Euler-Bernoulli estimate, doubled until the count says so."""
     omega = unit = ((last + 1) * math.pi) ** 2 / k.transit**2
-    while omega < 1e12 * unit:
+    while omega < HIGHEST_BOUND * unit:
         if count(np.array([omega]))[0] >= last:
             return omega
         omega *= 2.0

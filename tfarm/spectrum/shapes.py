@@ -23,9 +23,13 @@ from tfarm.exact.fields import Wave, free_root, from_root, tip_condition, waves
 _even = python_of(even_functions)
 
 GAUSS_POINTS = 16  # a panel; exact for the products of waves once a panel holds a few radians
+PANEL_WAVES = 4.0  # rad of the fastest wave in a panel: there 16 points integrate products of two to the last digit
+LEAST_PANELS = 4  # of a beam, however slow its waves: more than they need
 DOUBLE = 4e-15  # relative gap under which two frequencies are one, with two modes
 CLOSE_MODES = 1e-5  # relative gap under which rounding would leave two modes not quite orthogonal
 QUADRATURE_BLOCK = 2**17  # modes times points that are evaluated at once, each of 256 bytes: memory, whatever the count
+FIRST_BLOCK = 4  # modes, of which each next block has twice as many, as their panels differ: time alone
+NO_MOTION = 1e-9  # of another motion of the tip or hub: a smaller one is rounding, and has no sign
 
 
 class Shapes:
@@ -69,7 +73,7 @@ class Shapes:
         """Neighbouring modes, so few at a time that `quadrature` has `QUADRATURE_BLOCK` points for them in all."""
         first = 0
         while first < self.omega.size:
-            last = min(2 * first + 4, self.omega.size)
+            last = min(2 * first + FIRST_BLOCK, self.omega.size)
             while last > first + 1 and (last - first) * GAUSS_POINTS * self.part(first, last).panels > QUADRATURE_BLOCK:
                 last = (first + last) // 2
             yield slice(first, last)
@@ -89,7 +93,7 @@ class Shapes:
     def panels(self) -> int:
         """Panels of 0..1 that are short against every wave of these modes."""
         fastest = max((abs(wave.t).max(initial=0.0) for wave in (self._one, self._two)), default=0.0)
-        return 4 + math.ceil(fastest / 4.0)
+        return LEAST_PANELS + math.ceil(fastest / PANEL_WAVES)
 
     def quadrature(self) -> tuple[Real, Real]:
         """Gauss points and weights on 0..1 for products of these modes."""
@@ -166,7 +170,7 @@ class Shapes:
         self._orthogonalise()
         tip, theta = self(np.ones(1))[..., 0], self.theta()
         motion = np.where(
-            abs(tip[0]) > 1e-9 * abs(tip[1]), tip[0], np.where(abs(tip[1]) > 1e-9 * abs(theta), tip[1], theta)
+            abs(tip[0]) > NO_MOTION * abs(tip[1]), tip[0], np.where(abs(tip[1]) > NO_MOTION * abs(theta), tip[1], theta)
         )
         self._scale(np.where(motion < 0, -1.0, 1.0))
 

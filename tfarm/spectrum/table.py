@@ -29,6 +29,11 @@ from .sensitivities import arm_sensitivities, chain_sensitivities
 from .shapes import Shapes
 
 MOST_TABLE_MODES = 10_000  # at a time
+FEWEST_LISTED = 12  # digits of a frequency that is listed by itself
+NODE_POINTS, HALF_WAVES_BEYOND = 24, 3  # points a half wave, of so many more than the mode has, between which nodes lie
+NEAREST_NODE, FIRST_EVEN, END_POINTS = 1e-9, 0.9, 40  # so many points from there to nearly the first of these
+NO_DEFLECTION = 1e-13  # of the largest field of a mode: less is rounding
+NODE_STEPS = 6  # of Newton's method from a secant of that grid: doubling the digits from two on, more than doubles have
 
 
 @dataclass(frozen=True)
@@ -58,12 +63,12 @@ class Modes:
         return self.natural_frequency / (2 * math.pi)
 
     def digits(self, digits: int) -> list[str]:
-        """The frequencies [rad/s] with so many right digits (12 at least), as strings.
+        """The frequencies [rad/s] with so many right digits (`FEWEST_LISTED` at least), as strings.
 
         Under the Timoshenko theory each is also confirmed as a root of the paper's own Delta(s), by mpmath.
         Raises ConvergenceError where a digit cannot be told (a double frequency) or Delta has no root there.
         """
-        digits = max(digits, 12)
+        digits = max(digits, FEWEST_LISTED)
         flexible = [refine(self._k, float(omega), digits) for omega in self.natural_frequency[self._rigid :]]
         for text in flexible if self.theory == "timoshenko" and self.arm.is_uniform else ():
             if not roots_near(self.arm, text, digits - 1):
@@ -196,14 +201,16 @@ class Modes:
     def _nodes(self, mode: int) -> Real:
         """Interior zeros of W: bracketed on a grid finer than its waves, polished by Newton (W' = Psi + sigma Q)."""
         shape = self._shapes.part(mode, mode + 1)
-        ends = np.geomspace(1e-9, 0.9 / (24 * (mode + 3)), 40)  # a heavy hub or payload draws a node close to it
-        grid = np.r_[ends, np.linspace(0.0, 1.0, 24 * (mode + 3))[1:-1], 1.0 - ends[::-1]]
+        even = NODE_POINTS * (mode + HALF_WAVES_BEYOND)
+        ends = np.geomspace(NEAREST_NODE, FIRST_EVEN / even, END_POINTS)  # a heavy hub draws a node close to it
+        grid = np.r_[ends, np.linspace(0.0, 1.0, even)[1:-1], 1.0 - ends[::-1]]
         W, Psi, *_ = shape(grid)[:, 0]
-        W = np.where(abs(W) < 1e-13 * max(abs(W).max(), abs(Psi).max()), 0.0, W)  # a cut-off mode has W = 0 throughout
+        least = NO_DEFLECTION * max(abs(W).max(), abs(Psi).max())
+        W = np.where(abs(W) < least, 0.0, W)  # a cut-off mode has W = 0 throughout
         (start,) = np.nonzero(W[:-1] * W[1:] < 0)
         low, high = grid[start], grid[start + 1]
         x = low + (high - low) * W[start] / (W[start] - W[start + 1])
-        for _ in range(6 if x.size else 0):
+        for _ in range(NODE_STEPS if x.size else 0):
             W, Psi, _, Q = shape(x)[:, 0]
             x = np.clip(x - W / (Psi + shear_flexibility(self._k, x) * Q), low, high)
         return x
