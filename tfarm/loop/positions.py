@@ -49,7 +49,6 @@ class Positions:
     the imaginary and the positive real axis up to `band` [rad/s], with Im s >= 0.
     """
 
-    sensor: Sensor
     x: Real
     band: float
     natural_frequency: Real
@@ -78,7 +77,7 @@ def positions(arm: Arm, sensor: Sensor, x: Real, count: int) -> Positions:
                 known.append(complex(s.real, 0.0) if is_real else s)
         zeros.append(np.array(sorted(known, key=lambda s: (s.imag, s.real)), dtype=complex))
     participation = field / abs(field).max(axis=1, keepdims=True)
-    return Positions(sensor, x, band, found.natural_frequency[flexible], participation, tuple(zeros))
+    return Positions(x, band, found.natural_frequency[flexible], participation, tuple(zeros))
 
 
 @dataclass(frozen=True)

@@ -136,7 +136,7 @@ def learn_by_samples(
 
 
 @compiled
-def _derive(k: int, model: Any, numbers: Any, scales: Any, weights: Any, run: Any, S: Any, spare: Any, D: Any) -> None:
+def _derive(k: int, model: Any, scales: Any, weights: Any, run: Any, S: Any, spare: Any, D: Any) -> None:
     """Derivatives at sample k by every weight, forward: rows of D are those of x, u, e, K now and one, two samples ago.
 
     S (n, weights) is the state's; it is taken one sample on.
@@ -199,7 +199,7 @@ def learn_by_sensitivities(
                 copied(kept, weights)
                 return trial + 1, k
             act(k, model, reference, weights, guard, state, spare, run)
-            _derive(k, model, numbers, scales, weights, run, S, room, D)
+            _derive(k, model, scales, weights, run, S, room, D)
             for p in range(size):
                 gradient[p] = (
                     numbers[MOMENT_WEIGHT] * run[2][k, X] * D[X, p] + numbers[TORQUE_WEIGHT] * run[2][k, E] * D[E, p]
