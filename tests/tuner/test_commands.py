@@ -11,6 +11,7 @@ import tfarm
 from tests.shell import answer, run
 from tfarm.tuner import Plan, compare_controllers, shaped_trial, slew_trial, tune
 from tfarm.tuner.comparison import tried_loops
+from tfarm.tuner.guard import Guard
 
 
 def test_tune_lab(capsys, tmp_path):
@@ -146,6 +147,12 @@ def test_the_comparison_is_of_one_run():
     assert len(listed) == 9
     rows = compare_controllers(tuning.trial, tuning.gain(), tuning.training.guard, listed[:1] + listed[3:5])
     first = rows[0]
+    assert not first.proven  # the guard is of the frozen kind, though its middle is a proven sector of this loop
+    middle = Guard("time-varying", 0.3, 0.35, 6, True, (object(),))
+    assert [
+        compare_controllers(tuning.trial, tuning.gain(), each, listed[:1])[0].proven
+        for each in (middle, replace(middle, proofs=()), replace(middle, lo=0.0, hi=9.0))
+    ] == [True, False, False]
     assert first.without.cost == pytest.approx(tuning.without.cost, rel=1e-10)
     assert first.best_constant.cost == pytest.approx(tuning.best_constant.cost, rel=1e-10)
     assert first.tuner.cost == pytest.approx(tuning.training.result.cost, rel=1e-10)

@@ -257,3 +257,14 @@ def test_a_loop_that_no_damping_saves(lab):
 def test_guards_have_names(lab):
     with pytest.raises(ParameterError, match="time-varying, frozen, none"):
         find_guard(slew_trial(lab).loop, "moving", 0.3)
+
+
+def test_a_frozen_guard_leaves_a_hundredth_off_each_end_but_0(lab, monkeypatch):
+    """Of the part that holds in every model: below, too, where no gain at all does not hold."""
+    windows = iter([[(0.0, 0.7)], [(0.0, 0.6)], [(0.2, 0.7)], [(0.1, 0.6)]])
+    monkeypatch.setattr(guard, "constant_windows", lambda loop: next(windows))
+    loops = [sampled_loop(lab, HubFeedback(K1=0.3, K2=1.0), count=count) for count in (2, 3)]
+    from_zero, between = guard._frozen(loops, 0.3), guard._frozen(loops, 0.3)
+    share = 1 - RADIUS_SHARE
+    assert (from_zero.lo, from_zero.hi) == (0.0, pytest.approx(0.6 * (1 - share)))
+    assert (between.lo, between.hi) == (pytest.approx(0.2 + 0.4 * share), pytest.approx(0.6 - 0.4 * share))

@@ -1,6 +1,7 @@
 """The tuner with a servo: trials, gradients and the guard by second roads, and where the slew ends."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ import tfarm
 from tests.dsp.roads import aliased, aliased_loop
 from tests.shell import answer, run
 from tests.tuner.plain import PlainTrial, complex_step, plain_gain
-from tfarm.arm import HubFeedback
+from tfarm.arm import Hub, HubFeedback
 from tfarm.dsp import Chain, Converters, Sampling, Simulator, sampled_loop
 from tfarm.errors import ParameterError
 from tfarm.tuner import (
@@ -131,8 +132,11 @@ def as_trained(tuning):
 
 def test_the_usual_rate_gain_damps_the_rigid_arm():
     J = LAB.total_inertia
-    s = np.roots([J, usual_rate_gain(LAB, KP), KP])
-    assert (-s.real / abs(s)).min() == pytest.approx(np.sqrt(0.5), rel=1e-12)
+    for Kp in (KP, 0.05):
+        s = np.roots([J, usual_rate_gain(LAB, Kp), Kp])
+        assert (-s.real / abs(s)).min() == pytest.approx(np.sqrt(0.5), rel=1e-12)
+    rubbed = replace(LAB, hub=Hub(inertia=LAB.hub_inertia, friction=5.0))
+    assert usual_rate_gain(rubbed, KP) == 0.0  # what the hub loses is more than enough
     assert usual_rate_gain(LAB, 0.0) == tfarm.default_gains(LAB).K1
     with pytest.raises(ParameterError, match="Kp"):
         usual_rate_gain(LAB, -1.0)

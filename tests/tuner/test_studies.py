@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 import tfarm
@@ -9,6 +10,7 @@ from tfarm.dsp import Chain, Sampling
 from tfarm.errors import ParameterError
 from tfarm.tuner import Plan, studies, tune
 from tfarm.tuner.guard import find_guard
+from tfarm.tuner.overview import CostMap
 from tfarm.tuner.studies import PAPER_PAIR, map_verdict, plans_of, run_study, study_answer
 
 
@@ -92,3 +94,20 @@ def test_the_verdict_on_the_best_momentum_and_rate(lab):
     assert "the best of 2 points" in map_verdict([results, moved(0.1)])
     assert "rank 2 of 2; best (0.1, 0.8)" in map_verdict([results, moved(-0.5)])
     assert "beyond the paper's quartiles" in map_verdict([results, moved(-0.5)])
+
+
+def test_one_seed_is_a_study_too(lab):
+    """Each point has then one cost, and its quartiles are that."""
+    (one,) = run_study(lab, plans_of("curves", BASE, 1))
+    other = replace(one, plan=replace(BASE, learning=replace(BASE.learning, alpha=0.1)), cost=one.cost + 1.0)
+    assert "the best of 2 points" in map_verdict([[one], [other]])
+
+
+@pytest.mark.parametrize(("lowest", "is_best", "at_edge"), [((0, 1), True, False), ((1, 1), False, True)])
+def test_a_map_of_costs_knows_its_lowest_and_the_papers(lowest, is_best, at_edge):
+    alphas, etas = np.array([PAPER_PAIR[0], 0.9]), np.array([0.1, PAPER_PAIR[1], 3.0])
+    median = np.full((2, 3), 2.0)
+    median[lowest] = 1.0
+    found = CostMap(alphas, etas, median, "")
+    assert (found.papers, found.best) == ((0, 1), lowest)
+    assert (found.is_papers_best, found.best_at_edge) == (is_best, at_edge)
