@@ -1,6 +1,7 @@
 """The verbs that draw, and --png: the picture is a picture, and the numbers beside it are those of Python."""
 
 import csv
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from tests.shared import thinned
 from tests.shell import answer, run
 
 LAB = "sasaki2012-lab"
+BENCH = str(Path(__file__).parents[1] / "rigs" / "bench-rig.toml")
 LAW = """
 [law]
 delay = 0.002
@@ -53,6 +55,25 @@ def test_a_picture_is_written_and_said(words, law, tmp_path, capsys):
     pixels = image.imread(file)
     assert min(pixels.shape[:2]) > 600
     assert 0.002 < np.mean(pixels[..., :3].min(axis=-1) < 0.5) < 0.5  # ink on paper
+
+
+def test_bode_looks_along_the_arm_at_either_side_of_a_joint_and_from_another_input(capsys):
+    """Strain jumps at a joint of two segments: its two sides differ by one factor at all frequencies."""
+    rig = tfarm.load(BENCH)
+    joint, factors = rig.links[0].length, []
+    there = ("--output", "strain", "--x", str(joint), "--input", "hub_torque", "--to", "200")
+    for side in ("inner", "outer"):
+        found = answer(capsys, "bode", BENCH, *there, "--side", side)
+        assert (found["x"], found["input"]) == (joint, "hub_torque")
+        factors.append(np.array(found["value"]) @ [1, 1j])
+    assert found["output"] == "strain"
+    ratio = factors[0] / factors[1]
+    assert ratio == pytest.approx(np.full(ratio.size, ratio[0]), rel=1e-6)
+    assert abs(ratio[0] - 1) > 0.1
+    code, out, _ = run(capsys, "bode", LAB, "--output", "moment", "--x", "0.4", "--to", "300")
+    assert (code, out.splitlines()[0]) == (
+        0, "sasaki2012-lab: moment at x = 0.4 m / hub_torque [N m/(N m)], 2 to 300 rad/s"
+    )  # fmt: skip
 
 
 def test_bode_prints_what_the_record_holds(capsys, tmp_path):

@@ -82,14 +82,17 @@ def test_no_point_of_the_grid_is_a_root_on_the_axis():
 
 
 @pytest.mark.parametrize("arm", [UNDAMPED, STOCKY], ids=lambda arm: arm.name)
-@pytest.mark.parametrize("output", ["root_moment", "tip_displacement"])
-def test_the_counted_phase_is_the_limit_of_small_damping(arm, output):
+@pytest.mark.parametrize(
+    ("output", "x"),
+    [("root_moment", None), ("tip_displacement", None), ("hub_rate", None), ("moment", 0.4), ("velocity", 0.7)],
+)
+def test_the_counted_phase_is_the_limit_of_small_damping(arm, output, x):
     """A road the code does not take: G at s = epsilon + i omega, unwrapped on a grid that resolves epsilon."""
-    data = response(arm, output)
+    data = bode(arm, output, resonant_band(arm, 6), x=x and x * arm.length)
     epsilon = 1e-4 * data.band[0]
     shifted = [root - epsilon for root in (*data.poles, *data.zeros)]
     omega = refined_grid(data.band, np.array(shifted))
-    phase = np.degrees(np.unwrap(np.angle(tfarm.transfer(arm, output)(epsilon + 1j * omega))))
+    phase = np.degrees(np.unwrap(np.angle(tfarm.transfer(arm, output, x=data.x)(epsilon + 1j * omega))))
     phase -= 360 * round((phase[0] - data.phase[0]) / 360)
     away = np.array([min(abs(w - r) for r in (*data.infinite, *data.vanishing)) > 100 * epsilon for w in data.omega])
     limit = np.interp(data.omega[away], omega, phase)
@@ -100,6 +103,50 @@ def test_real_responses_have_a_phase_of_whole_half_turns():
     data = response(STOCKY, "tip_displacement")
     assert np.array_equal(data.phase % 180, np.zeros(data.phase.size))
     assert np.array_equal(np.sign(data.value.real), np.where(data.phase % 360 == 0, 1.0, -1.0))
+
+
+@pytest.mark.parametrize(
+    ("along", "x", "own"), [("moment", 0.0, "root_moment"), ("displacement", 1.0, "tip_displacement")]
+)
+def test_along_the_arm_it_begins_and_ends_as_at_root_and_tip(along, x, own):
+    """Other formulas: fields along the arm beside the closed form of its ends."""
+    arm = damped(1e-4)
+    mine, theirs = bode(arm, along, (2.0, 900.0), x=x * arm.length), bode(arm, own, (2.0, 900.0))
+    assert mine.poles == pytest.approx(theirs.poles, rel=1e-12)
+    assert mine.zeros == pytest.approx(theirs.zeros, rel=1e-9)
+    assert mine.dips == pytest.approx(theirs.dips, rel=1e-9)
+    assert (mine.phase[0], mine.phase[-1]) == pytest.approx((theirs.phase[0], theirs.phase[-1]), rel=1e-9)
+    assert (mine.gain_unit, mine.x, theirs.x) == (theirs.gain_unit, x * arm.length, None)
+    assert f"at x = {x:g} m" in mine.label
+
+
+def test_from_another_input_it_is_the_ratio_of_two_responses():
+    """From the hub's angle: the tip over that angle, its poles the frequencies of the locked hub."""
+    rig = tfarm.load("quanser-2dsfl")
+    data = bode(rig, "tip_acceleration", (1.0, 2000.0), input="hub_angle")
+    tip, hub = tfarm.transfer(rig, ["tip_acceleration", "hub_angle"])(1j * data.omega)
+    assert data.value == pytest.approx(tip / hub, rel=1e-9)
+    locked = tfarm.modes(rig.having(hub_inertia=math.inf), up_to=2000.0).natural_frequency
+    assert data.resonances.imag == pytest.approx(locked, rel=1e-3)
+    assert (data.gain_unit, data.input_label) == ("m/s^2/rad", "hub angle")
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        ({"output": "moment"}, "say where moment is meant"),
+        ({"output": "moment", "x": 7.0}, "between 0 and 1 m"),
+        ({"output": "root_moment", "x": 0.5}, "leave x out"),
+        ({"output": "root_moment", "input": "force@0.3"}, "known for an input at the hub"),
+        ({"output": "root_moment", "input": "motor_voltage"}, "there is no motor"),
+        ({"output": "root_moment", "band": 3}, "two frequencies in rad/s"),
+        ({"output": "root_moment", "band": (5.0, 1.0)}, "two frequencies in rad/s"),
+        ({"output": "root_moment", "band": ("low", "high")}, "two frequencies in rad/s"),
+    ],
+)
+def test_what_is_no_bode_plot_is_refused(asked, words):
+    with pytest.raises(tfarm.ParameterError, match=words):
+        bode(UNDAMPED, **asked)
 
 
 def test_a_pole_and_a_zero_that_coincide_cancel():

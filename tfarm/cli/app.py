@@ -86,6 +86,9 @@ TheoryName = Annotated[
 SideName = Annotated[
     str | None, typer.Option("--side", help="outer (if not said) or inner side of a joint, for outputs along the arm")
 ]
+Place = Annotated[float | None, typer.Option("--x", help="place on the arm [m], for outputs along it")]
+INPUT_WORDS = "hub_torque, motor_voltage, motor_current, hub_angle, force@X or moment_pair@X1,X2"
+InputName = Annotated[str | None, typer.Option("--input", help=INPUT_WORDS)]
 Json = Annotated[bool, typer.Option("--json", help="one JSON object on standard output")]
 MethodName = Annotated[str, typer.Option("--method", help="closed-form, balls, or appendix: the paper's determinant")]
 Compare = Annotated[bool, typer.Option("--compare", help="all three methods beside each other, and where they part")]

@@ -12,8 +12,10 @@ from tfarm.cli.app import (
     ArmName,
     Compare,
     DigitCount,
+    InputName,
     Json,
     MethodName,
+    Place,
     SideName,
     TheoryName,
     app,
@@ -77,14 +79,9 @@ def response(
     start: Annotated[float, typer.Option("--from", help="lowest frequency [rad/s]")] = 0.1,
     stop: Annotated[float, typer.Option("--to", help="highest frequency [rad/s]")] = 1000.0,
     points: Annotated[str, typer.Option("--points", help="how many, logarithmically spaced")] = "500",
-    x: Annotated[float | None, typer.Option("--x", help="place on the arm [m], for outputs along it")] = None,
+    x: Place = None,
     side: SideName = None,
-    driven: Annotated[
-        str | None,
-        typer.Option(
-            "--input", help="hub_torque, motor_voltage, motor_current, hub_angle, force@X or moment_pair@X1,X2"
-        ),
-    ] = None,
+    driven: InputName = None,
     digits: DigitCount = None,
     method: MethodName = "closed-form",
     compare: Compare = False,

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tfarm.cli.app import ArmName, Json, app, give, load_arm
-from tfarm.cli.inputs import Given, Png, asked_law, must_be_band, under_a_law
+from tfarm.cli.app import ArmName, InputName, Json, Place, SideName, app, give, load_arm, read_on
+from tfarm.cli.inputs import Given, Png, asked_input, asked_law, must_be_band, under_a_law
 
 if TYPE_CHECKING:
     from tfarm.arm import Arm
@@ -24,19 +24,22 @@ def bode(
     ] = "root_moment",
     start: Annotated[float | None, typer.Option("--from", help="lowest frequency [rad/s]")] = None,
     stop: Annotated[float | None, typer.Option("--to", help="highest; by default ten flexible modes are seen")] = None,
+    x: Place = None,
+    side: SideName = None,
+    driven: InputName = None,
     png: Png = None,
     csv: Csv = None,
     json: Json = False,
 ) -> None:
     """Bode plot of the exact response to the arm's input, with the poles and zeros that the output shows."""
-    subject = load_arm(arm)
-    band = _band(subject, start, stop)
+    subject, driven = asked_input(load_arm(arm), driven)
+    band, (wanted,) = _band(subject, start, stop), read_on([output], side)
     from tfarm.cli.tables import say_written
     from tfarm.response import bode as find
     from tfarm.response.answers import bode_answer, bode_table
     from tfarm.tables.files import write_csv
 
-    found = find(subject, output, band)
+    found = find(subject, wanted, band, x=x, input=driven)
     if csv is not None:
         write_csv(bode_table(found), csv)
     if png is not None:
@@ -88,7 +91,8 @@ def _print_bode(answer: dict[str, Any]) -> None:
     from tfarm.tables.terminal import show
 
     low, high = answer["band_rad_s"]
-    print(f"{answer['arm']}: {answer['output']} / {answer['input']} [{answer['unit']}], {low:g} to {high:g} rad/s")
+    at = f" at x = {answer['x']:g} m" if "x" in answer else ""
+    print(f"{answer['arm']}: {answer['output']}{at} / {answer['input']} [{answer['unit']}], {low:g} to {high:g} rad/s")
     for kind in ("poles", "zeros"):
         if len(answer[kind]):
             print(f"{kind}:")

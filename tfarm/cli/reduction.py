@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from tfarm.cli.app import ArmName, Json, SideName, app, give, load_arm, plain_number, read_on, whole_number
+from tfarm.cli.app import ArmName, Json, Place, SideName, app, give, load_arm, plain_number, read_on, whole_number
 from tfarm.errors import ParameterError
 
 
@@ -21,7 +21,7 @@ def reduce(
     error: Annotated[float | None, typer.Option("--error", help="or the largest error allowed, such as 1e-6")] = None,
     band: Annotated[str, typer.Option("--band", metavar="LOW,HIGH", help="frequencies [rad/s]")] = "0.1,1000",
     method: Annotated[str | None, typer.Option("--method", help="modal or aaa; the better one if left out")] = None,
-    x: Annotated[float | None, typer.Option("--x", help="place on the arm [m], for outputs along it")] = None,
+    x: Place = None,
     side: SideName = None,
     mat: Annotated[Path | None, typer.Option("--mat", help="write a MATLAB file, and a script beside it")] = None,
     json: Json = False,

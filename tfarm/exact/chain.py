@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,7 @@ from .coefficients import EndCondition, Inertia, double_double
 from .elements import Body, Drive, Element, Mark, Offset, Place, Segment, Spring
 
 SEGMENT, OFFSET, SPRING, BODY, MARK = range(5)
+AT_JOINT = 2.0**-50  # of the length: a place so near to a joint is at it, its share being a quotient of float64 numbers
 ROW_KIND, ROW_WIDTH = 8, 12  # where a row of the kernel says what it is, after the numbers of a segment (`vector`)
 TO_W, TO_M, TO_Q = 9, 10, 11  # from the chain's units to the segment's own
 OF_ANGLE, OF_MOMENT = 6, 10  # in the vector of ends: after six numbers of the payload A_0..A_3, then B_0 and B_1
@@ -139,7 +141,7 @@ class Layout:
 
     def __init__(self, chain: ElementChain, places: tuple[Place, ...]) -> None:
         self.chain, self.places = chain, places
-        self.elements = _marked(chain.elements, places)
+        self.elements = _marked(chain.elements, _at_joints(chain.elements, places))
 
     @cached_property
     def rows(self) -> NDArray[np.float64]:
@@ -165,6 +167,18 @@ class Layout:
         inner = [each for each in self.elements[at:] if isinstance(each, Segment)]
         is_outer = self.places[number].side != "inner"
         return (outer[-1] if outer else inner[0]) if is_outer else (inner[0] if inner else outer[-1])
+
+
+def _at_joints(elements: Sequence[Element], places: tuple[Place, ...]) -> tuple[Place, ...]:
+    """The places, one that rounding has moved off a joint, or off what is attached there, put back."""
+    lengths = [each.length for each in elements if isinstance(each, Segment)]
+    joints = list(accumulate(lengths, lambda position, length: position - length, initial=Fraction(1)))
+    ends = np.array([float(joint) for joint in joints])
+    found = []
+    for place in places:
+        near = int(abs(ends - float(place.share)).argmin())
+        found.append(place._replace(share=joints[near]) if abs(place.share - joints[near]) <= AT_JOINT else place)
+    return tuple(found)
 
 
 def _marked(elements: Sequence[Element], places: tuple[Place, ...]) -> tuple[Element, ...]:

@@ -82,6 +82,7 @@ def bode_answer(data: Bode) -> dict[str, Any]:
         "arm": data.arm.name,
         "input": "hub_angle" if data.arm.is_locked else data.arm.input,
         "output": data.output,
+        **({} if data.x is None else {"x": data.x}),
         "unit": data.gain_unit,
         "band_rad_s": list(data.band),
         **{key: Table(columns=ROOT_COLUMNS, record=list(zip(*pair, strict=True))) for key, pair in roots.items()},

@@ -12,14 +12,15 @@ less than 180 degrees from point to point, and unwrapping is safe.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import INPUT_UNITS, Arm
 from tfarm.arrays import Complex, Real
-from tfarm.exact.outputs import OUTPUTS
+from tfarm.errors import ParameterError
+from tfarm.exact.outputs import Output
 from tfarm.records import record
 from tfarm.spectrum import modes
 
@@ -40,11 +41,13 @@ class Bode:
 
     `poles` and `zeros` are those with Im s >= 0 that the output shows (every cancellation made), s = 0 apart, complete
     up to `band`[1] in the ranges `pole_width` and `zero_width` of Re s [1/s]; the grid holds none of those on the axis.
-    `rigid` is the response of the rigid arm.
+    `rigid` is the response of the rigid arm.  `row` is the output itself, `x` [m] its place, None where it has its own.
     """
 
     arm: Arm
     output: str
+    row: Output = field(repr=False)
+    x: float | None = None
     omega: Real
     value: Complex
     phase: Real
@@ -84,19 +87,19 @@ class Bode:
     @property
     def label(self) -> str:
         """The output in words."""
-        return OUTPUTS[self.output].label
+        return self.row.label if self.x is None else self.row.label.replace("at x", f"at x = {self.x:g} m")
 
     @property
     def gain_unit(self) -> str:
         """SI unit of the response, e.g. N m/(N m)."""
         given = "rad" if self.arm.is_locked else INPUT_UNITS[self.arm.input]
-        return f"{OUTPUTS[self.output].unit}/{f'({given})' if ' ' in given else given}"
+        return f"{self.row.unit}/{f'({given})' if ' ' in given else given}"
 
     @property
     def input_label(self) -> str:
         """The input in words."""
-        named = {"motor_voltage": "motor voltage", "motor_current": "motor current"}
-        return "hub angle" if self.arm.is_locked else named.get(self.arm.input, "torque")
+        given = "hub_angle" if self.arm.is_locked else self.arm.input
+        return "torque" if given == "hub_torque" else given.replace("_", " ")
 
 
 def resonant_band(arm: Arm, resonances: int = RESONANCES_SHOWN) -> tuple[float, float]:
@@ -109,16 +112,27 @@ def resonant_band(arm: Arm, resonances: int = RESONANCES_SHOWN) -> tuple[float, 
     return float(start), float(math.sqrt(natural_frequency[-2] * natural_frequency[-1]))
 
 
-def bode(arm: Arm, output: str, band: tuple[float, float] | None = None) -> Bode:
+def bode(
+    arm: Arm,
+    output: str | Output,
+    band: tuple[float, float] | None = None,
+    *,
+    x: float | None = None,
+    input: str | None = None,
+) -> Bode:
     """The exact frequency response of one output over a band [rad/s], refined at every pole and zero.
 
-    Without a band it holds the first ten flexible modes (`resonant_band`).  Raises ParameterError for an unknown
-    output.
+    `x` [m] is the place of an output along the arm, `input` another input at the hub than the arm's own, as
+    `tfarm.transfer` has them.  Without a band it holds the first ten flexible modes (`resonant_band`).  Raises
+    ParameterError for an unknown output, a place that is missing, not wanted or off the arm, a load on the link (its
+    zeros are not known), and what is no band.
     """
-    band = resonant_band(arm) if band is None else band
-    G = transfer(arm, output)
+    G = transfer(arm, output, x=x, input=input)
+    arm, (row,) = G.arm, G.rows
+    band = resonant_band(arm) if band is None else _known_band(band)
+    G.must_be_of_the_hub("a Bode plot, with its zeros,")
     if not np.any(G(1j * np.geomspace(*band, 3))):
-        return _no_motion(arm, output, band)
+        return _no_motion(arm, row, G.x, band)
     beyond = 1.3 * band[1]  # roots just above the band shape its edge
     all_poles, all_zeros = G.poles(up_to=beyond), G.zeros(up_to=beyond)
     poles, zeros = without_cancelled(_upper(all_poles.values), _upper(all_zeros.values))
@@ -129,7 +143,9 @@ def bode(arm: Arm, output: str, band: tuple[float, float] | None = None) -> Bode
     inside_poles, inside_zeros = poles[poles.imag < band[1]], zeros[zeros.imag < band[1]]
     return Bode(
         arm=arm,
-        output=output,
+        output=row.name,
+        row=row,
+        x=G.x,
         omega=omega,
         value=value,
         phase=phase_of(omega, value, inside_poles, inside_zeros, is_real=arm.is_undamped),
@@ -148,12 +164,23 @@ def _upper(roots: Complex) -> Complex:
     return roots[(roots.imag >= 0) & (roots != 0)]
 
 
-def _no_motion(arm: Arm, output: str, band: tuple[float, float]) -> Bode:
+def _known_band(band: tuple[float, float]) -> tuple[float, float]:
+    """The two ends of a band.  Raises ParameterError for what is none."""
+    try:
+        low, high = map(float, band)
+    except (TypeError, ValueError):
+        low = high = math.nan
+    if not 0 < low < high < math.inf:
+        raise ParameterError(key="band", value=band, remedy="two frequencies in rad/s, the lower first: (1.0, 1000.0)")
+    return low, high
+
+
+def _no_motion(arm: Arm, row: Output, x: float | None, band: tuple[float, float]) -> Bode:
     omega, none, real = np.array(band), np.empty(0, complex), np.empty(0)
     zero, everywhere = np.zeros(2, complex), (-math.inf, math.inf)
     return Bode(
-        arm=arm, output=output, omega=omega, value=zero, phase=zero.real, poles=none, zeros=none, rigid=zero,
-        peaks=real, dips=real, pole_width=everywhere, zero_width=everywhere,
+        arm=arm, output=row.name, row=row, x=x, omega=omega, value=zero, phase=zero.real, poles=none, zeros=none,
+        rigid=zero, peaks=real, dips=real, pole_width=everywhere, zero_width=everywhere,
     )  # fmt: skip
 
 
@@ -196,13 +223,18 @@ def _around(root: complex) -> Real:
 
 
 def phase_of(omega: Real, value: Complex, poles: Complex, zeros: Complex, *, is_real: bool) -> Real:
-    """Phase [degrees], continuous where the response is, beginning near 0 or -180."""
+    """Phase [degrees], continuous where the response is, beginning near 0 or -180, or at 90 or -90 of a rate.
+
+    `is_real`: at C = 0 a response is real, or imaginary where it is a rate's.
+    """
     start = 0.0 if value[0].real > 0 else -180.0
     if not is_real:
         phase = np.degrees(np.unwrap(np.angle(value)))
         return phase - 360.0 * np.round((phase[0] - start) / 360.0)
     passed_poles = np.searchsorted(np.sort(poles.imag[_on_axis(poles)]), omega)
     passed_zeros = np.searchsorted(np.sort(zeros.imag[_on_axis(zeros)]), omega)
+    if abs(value[0].imag) > abs(value[0].real):
+        start = 90.0 if value[0].imag > 0 else -90.0
     return np.asarray(start + 180.0 * (passed_zeros - passed_poles), float)
 
 

@@ -130,7 +130,7 @@ class TransferFunction:
 
     def derivative(self, s: ArrayLike) -> Any:
         """dG/ds at a complex scalar or array, by the same formulas carried as power series."""
-        self._must_be_of_the_hub("a derivative")
+        self.must_be_of_the_hub("a derivative")
         points = _finite(s)
         flat = differentiate_outputs(self._k, self.rows, points.ravel(), self._share)
         return self._shaped(flat.reshape(len(self.outputs), *points.shape))
@@ -142,7 +142,7 @@ class TransferFunction:
         """
         if not isinstance(digits, int) or not 1 <= digits <= 1000:
             raise ParameterError(key="digits", value=digits, remedy="a whole number of digits from 1 to 1000")
-        self._must_be_of_the_hub("digits")
+        self.must_be_of_the_hub("digits")
         point = complex(_finite(s))
         pairs = [digits_of(self._k, wanted, point, digits, self._share) for wanted in self.rows]
         return pairs[0] if self.is_single else pairs
@@ -182,7 +182,7 @@ class TransferFunction:
 
     @cached_property
     def _expansion(self) -> NDArray[np.float64]:
-        self._must_be_of_the_hub("an expansion at s = 0")
+        self.must_be_of_the_hub("an expansion at s = 0")
         return np.array([expansion_at_zero(self._k, wanted, self._share) for wanted in self.rows])
 
     @property
@@ -211,14 +211,15 @@ class TransferFunction:
 
         By a count for hub angle, hub rate and root moment at C = 0, else by the winding number around the box.
         """
-        self._must_be_of_the_hub("zeros")
+        self.must_be_of_the_hub("zeros")
         if not self.is_single:
             raise ParameterError(key="outputs", value=self.outputs, remedy="ask for the zeros of one output at a time")
         return zeros_of(self.arm, self.rows[0], _positive("up_to", up_to), self._share)
 
     # ------------------------------------------------------------ inside
 
-    def _must_be_of_the_hub(self, what: str) -> None:
+    def must_be_of_the_hub(self, what: str) -> None:
+        """Raise ParameterError where the input is a load on the link."""
         if self.load is not None:
             remedy = f"{what} is known for an input at the hub; ask for values G(s)"
             raise ParameterError(key="input", value=self._input, remedy=remedy)
