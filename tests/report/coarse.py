@@ -13,7 +13,7 @@ COARSE = (
     (overlay, "OVERLAY_COLUMNS", 8),
     (sampled_regions, "MOST_COLUMNS", 0),  # with the corners that so few have
     (loci, "LOCUS_POINTS", 60),
-    (sampled_loci, "LOCUS_VALUES", 31),
+    (sampled_loci, "SAMPLED_LOCUS_VALUES", 31),
     (periods, "PERIOD_SHARES", (1.0, 5.0)),
     (making, "MOST_WORKERS", 1),  # a second process would have its own grids
 )

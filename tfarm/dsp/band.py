@@ -34,6 +34,10 @@ AnySampled = SampledLoop | SampledLaw
 
 DECAYED_EXPONENT = 30.0  # e^-30 = 1e-13 is left over a sample of the poles on the line
 HIGHER = (2.0, 8.0, 32.0, 128.0, 512.0)  # times the last pole of the model: how far up no other is looked for
+ABOVE_MODEL = 1.02  # times the last pole of the model: the least height at which all of them are in the box
+FINER = 10  # times finer than the distance of the line from the axis: the first panel up that line
+NEAREST_LEFT, FARTHEST_LEFT = 0.01, 45.0  # of 1/remaining: panels along the top, until e^-45 = 3e-20 is left
+PANEL_ENDS = 40  # of panels, that are halved where quadratures differ: time alone
 SURE = 0.1  # by which two quadratures of an absolute value may differ; the larger counts, with as much again
 MOST_MIDPOINTS = 200_000  # of a quadrature: one that does not settle by then is not had
 
@@ -97,7 +101,7 @@ def _highest(loop: AnySampled, line: float) -> float | None:
             return False
 
     heights = np.r_[0.0, np.sort(poles.imag[poles.imag > 0])]
-    tops = np.r_[(heights[1:] + heights[:-1]) / 2, 1.02 * heights[-1] or line]
+    tops = np.r_[(heights[1:] + heights[:-1]) / 2, ABOVE_MODEL * heights[-1] or line]
     if is_complete(top := float(tops[-1])):
         for factor in HIGHER:
             if not is_complete(factor * tops[-1]):
@@ -120,14 +124,16 @@ def _left_of(loop: AnySampled, line: float, top: float) -> Real | None:
         damped = np.exp(s.real * remaining) / -np.expm1(s.real * T)
         return abs(exact(s) * _filter_factors(loop, s) / s) * damped
 
-    up = _integral(lambda w: sizes(-line + 1j * w), np.r_[0.0, _graded(line / 10, top)])
-    away = _integral(lambda c: sizes(-c + 1j * top), line + np.r_[0.0, _graded(0.01 / remaining, 45.0 / remaining)])
+    up = _integral(lambda w: sizes(-line + 1j * w), np.r_[0.0, _graded(line / FINER, top)])
+    away = _integral(
+        lambda c: sizes(-c + 1j * top), line + np.r_[0.0, _graded(NEAREST_LEFT / remaining, FARTHEST_LEFT / remaining)]
+    )
     return None if up is None or away is None else (up + away) * (2 / np.pi) * (1 + 2 * SURE)
 
 
 def _graded(first: float, last: float) -> Real:
     """Ends of panels from `first` to `last`, geometric."""
-    return np.geomspace(min(first, last / 2), last, 40)
+    return np.geomspace(min(first, last / 2), last, PANEL_ENDS)
 
 
 def _integral(size: Callable[[Real], Real], ends: Real) -> Real | None:

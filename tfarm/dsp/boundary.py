@@ -30,6 +30,9 @@ Split = Callable[[tuple[Any, Complex]], tuple[Complex, Complex]]  # of a grid's 
 
 A_DECADE = 48  # grid points a decade of the distance to a pole
 NARROWEST_WIDTH = 1e-17  # rad, of a pole: closer to it no angle is told from another
+WIDTH_SHARE = 1e-2  # of the distance of a pole from the circle: the grid begins so near to it
+BRIGHT = 1e-2  # poles and roots nearer to z = 0 leave nothing on the circle to resolve
+NO_EFFECT = 1e-12  # of what is there without a gain: what it adds, if less, is rounding of none
 COARSEST = 2000  # points of the uniform grid over the half circle
 NEAR_ONE = 1e-7  # where the values at z = 1 are read: they are even in q, so wrong by 1e-14
 
@@ -70,9 +73,9 @@ def circle_grid(loop: SampledLoop | SampledLaw) -> CircleGrid:
     """The grid that resolves every pole of the loop (its gains do not matter)."""
     pulse = loop.pulse
     angles = np.angle(pulse.multipliers)
-    width = np.maximum(abs(pulse.poles.real) * pulse.sampling.period * 1e-2, NARROWEST_WIDTH)
+    width = np.maximum(abs(pulse.poles.real) * pulse.sampling.period * WIDTH_SHARE, NARROWEST_WIDTH)
     felt = pulse.residues.any(axis=0) | (np.arange(angles.size) == angles.size - 1)
-    bases = np.nonzero((angles >= 0) & (abs(pulse.multipliers) > 1e-2) & felt)[0]
+    bases = np.nonzero((angles >= 0) & (abs(pulse.multipliers) > BRIGHT) & felt)[0]
     bases = bases[np.argsort(angles[bases], kind="stable")]
     seams = np.r_[0.0, (angles[bases][1:] + angles[bases][:-1]) / 2, np.pi]
     base, shift = [], []
@@ -152,4 +155,4 @@ def _at_one(grid: CircleGrid, line: _Line, is_above: bool) -> list[tuple[float, 
 
 def real_gain(A: complex, B: complex) -> float:
     """The real gain g of A + g B = 0 where A and B are real; inf where there is none."""
-    return -A.real / B.real if abs(B.real) > 1e-12 * abs(A.real) else np.inf
+    return -A.real / B.real if abs(B.real) > NO_EFFECT * abs(A.real) else np.inf

@@ -8,7 +8,7 @@ from typing import Any
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.dsp.chain import Chain, Sampling
-from tfarm.dsp.verdict import Verdict, sampled_verdict
+from tfarm.dsp.verdict import LARGEST_LOG, Verdict, sampled_verdict
 from tfarm.errors import ConvergenceError
 
 
@@ -48,7 +48,8 @@ class SampledBrief:
     @property
     def answer(self) -> dict[str, Any]:
         """The brief as a dictionary of plain numbers and texts."""
-        radius = None if self.log_radius is None else math.exp(self.log_radius) if self.log_radius < 700 else math.inf
+        size = self.log_radius
+        radius = None if size is None else math.exp(size) if size < LARGEST_LOG else math.inf
         return {
             "period_s": self.sampling.period,
             "period_is_default": self.sampling.period == Sampling().period,

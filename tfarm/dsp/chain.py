@@ -15,6 +15,7 @@ from tfarm.errors import ParameterError, must_be_known
 Reading = Literal["vibration", "total"]
 LEAST_BITS, MOST_BITS = 2, 32  # of a converter: of one bit there are no steps, of more than 32 no part
 MOST_DELAY = 100.0  # samples: each whole one is a state more
+TIME_ROUNDING = 1e-12  # of a time: so little before a sample it is at it, as its quotient with the period is rounded
 PAPER_ANGLE = 1.15  # rad, as tip travel over length: the paper moves the tip of its 1 m by 1.15 m
 
 

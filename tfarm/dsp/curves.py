@@ -17,6 +17,7 @@ import numpy as np
 from tfarm.arm import Arm
 from tfarm.arrays import Real
 from tfarm.columns import Column
+from tfarm.dsp.chain import TIME_ROUNDING
 from tfarm.dsp.ringing import POINTS_A_PERIOD, records_between
 from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.simulate import Simulation, Simulator
@@ -45,7 +46,7 @@ class TimeCurve:
         """The same at other times, which its own begin with or hold, for a file with one column of time."""
         if self.t.size == t.size:
             return self
-        k = np.clip(np.searchsorted(self.t, t * (1 + 1e-12), side="right") - 1, 0, self.t.size - 1)
+        k = np.clip(np.searchsorted(self.t, t * (1 + TIME_ROUNDING), side="right") - 1, 0, self.t.size - 1)
         return TimeCurve(t, self.low[k], self.high[k], self.is_band)
 
     def columns(self, key: str, title: str, unit: str) -> Sequence[Column]:
@@ -107,7 +108,7 @@ def tip_deviation(arm: Arm, simulation: Simulation) -> TimeCurve:
 def reference_angle(task: Scenario, t: Real) -> Real:
     """The reference angle [rad] between its samples, where its rate is linear in time."""
     T, n = task.period, task.hub_angle.size
-    k = np.minimum(np.floor(t / T * (1 + 1e-12)).astype(np.int64), n - 1)
+    k = np.minimum(np.floor(t / T * (1 + TIME_ROUNDING)).astype(np.int64), n - 1)
     slope = np.diff(np.r_[task.hub_rate, task.hub_rate[-1:]]) / T
     tau = t - k * T
     return task.hub_angle[k] + tau * (task.hub_rate[k] + slope[k] * tau / 2)
@@ -134,5 +135,5 @@ def continuous(simulation: Simulation, signal: str) -> tuple[Real, Real]:
 
 def held_at(simulation: Simulation, values: Real, t: Real) -> Real:
     """What is held from sample to sample, at the times t [s]."""
-    k = np.floor(t / simulation.scenario.period * (1 + 1e-12)).astype(np.int64)
+    k = np.floor(t / simulation.scenario.period * (1 + TIME_ROUNDING)).astype(np.int64)
     return values[np.minimum(k, values.size - 1)]

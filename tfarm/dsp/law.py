@@ -28,6 +28,8 @@ from tfarm.records import record
 from tfarm.spectrum import modes
 
 FOLLOWING_STEPS = 24  # of the continuation from zero gain
+FIRST_SCALE = 1e-6  # of the gains: there each pole is still at that of the plant
+LOOPS_KEPT = 4  # of which origins are asked for again: memory against time, of no effect on an answer
 LISTED_DECAY = -20.0  # modes that lose more than this in ln|a| between two samples are not listed
 
 
@@ -138,7 +140,7 @@ def followed_branches(poles: Sequence[Complex], values: Real) -> Complex:
     return np.array(rows)
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=LOOPS_KEPT)
 def origins(loop: SampledLoop) -> NDArray[np.int64]:
     """For each closed-loop pole the open-loop pole (its number in `PulseTransfer.poles`) that it comes from, or -1.
 
@@ -146,7 +148,7 @@ def origins(loop: SampledLoop) -> NDArray[np.int64]:
     """
     labels = np.nonzero(loop.pulse.poles != 0)[0]
     ahead, rows = loop.pulse.multipliers[labels], []
-    scales = np.r_[1e-6, np.arange(1, FOLLOWING_STEPS + 1) / FOLLOWING_STEPS, 1.0]
+    scales = np.r_[FIRST_SCALE, np.arange(1, FOLLOWING_STEPS + 1) / FOLLOWING_STEPS, 1.0]
     for number, scale in enumerate(scales[:-1]):
         z = replace(loop, gains=loop.gains.times(float(scale))).eigenvalues
         order = _matched(ahead, z)

@@ -26,7 +26,7 @@ from tfarm.dsp.discretise import discretised
 from tfarm.dsp.law_plant import SensedPlant, is_analog, sensed_plant
 from tfarm.dsp.law_polynomials import VANISHED, polynomials
 from tfarm.dsp.loop import SampledLoop, SampledPoles, polished_poles, without_drift
-from tfarm.dsp.plant import Branching, Plant
+from tfarm.dsp.plant import USUAL_MODES, Branching, Plant
 from tfarm.dsp.sampling import PulseTransfer
 from tfarm.errors import ParameterError
 from tfarm.records import record
@@ -213,7 +213,7 @@ AnyLoop = TypeVar("AnyLoop", bound=SampledLoop | SampledLaw, default=SampledLoop
 
 
 def sampled_law(
-    arm: Arm, law: Law, chain: Chain, *, count: int = 20, branches: Branching = all_damped_modes
+    arm: Arm, law: Law, chain: Chain, *, count: int = USUAL_MODES, branches: Branching = all_damped_modes
 ) -> SampledLaw:
     """The loop with `count` flexible modes.
 

@@ -13,7 +13,16 @@ import numpy as np
 
 from tfarm.arrays import Complex
 from tfarm.crossing import Crossings, joined
-from tfarm.dsp.boundary import NARROWEST_WIDTH, CircleGrid, circle_grid, geometric, real_gain, solved_on
+from tfarm.dsp.boundary import (
+    BRIGHT,
+    NARROWEST_WIDTH,
+    WIDTH_SHARE,
+    CircleGrid,
+    circle_grid,
+    geometric,
+    real_gain,
+    solved_on,
+)
 from tfarm.dsp.law_loop import SampledLaw
 from tfarm.dsp.law_polynomials import polynomials
 from tfarm.dsp.margins import SAME_EDGE, Window
@@ -21,7 +30,6 @@ from tfarm.dsp.margins import SAME_EDGE, Window
 LEAST_LAW_FACTOR = 1e-9  # that is looked at: with less a law is none
 MOST_LAW_FACTOR = 1e9  # with more its gain is beyond any number
 BLURRED = 1e-6  # rad: nearer to z = 1 a polynomial with two roots there is lost in rounding
-BRIGHT = 1e-2  # roots of the law nearer to z = 0 leave nothing on the circle to resolve
 
 
 def law_grid(loop: SampledLaw) -> CircleGrid:
@@ -32,7 +40,7 @@ def law_grid(loop: SampledLaw) -> CircleGrid:
     zeros = [np.roots(np.trim_zeros(each.coefficients, "f")) for each in entries]
     roots = np.concatenate([loop.law.poles, *zeros])
     for root in roots[(abs(roots) > BRIGHT) & (roots.imag >= 0)]:  # the upper of each pair
-        width, at = max(1e-2 * abs(1 - abs(root)), NARROWEST_WIDTH), abs(np.angle(root))
+        width, at = max(WIDTH_SHARE * abs(1 - abs(root)), NARROWEST_WIDTH), abs(np.angle(root))
         near = geometric(math.pi, width)
         q.append(np.r_[at - near, at + near])
     more = np.concatenate([np.empty(0), *q])

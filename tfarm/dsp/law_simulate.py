@@ -19,7 +19,7 @@ from tfarm.dsp import kernel
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.law_loop import acting_law
 from tfarm.dsp.law_plant import sensed_plant
-from tfarm.dsp.plant import Plant
+from tfarm.dsp.plant import USUAL_MODES, Plant
 from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.simulate import Simulation, Simulator
 from tfarm.errors import must_be_known
@@ -34,7 +34,7 @@ class LawSimulator(Simulator):
     """
 
     def __init__(
-        self, arm: Arm, law: Law, chain: Chain, scenario: Scenario, *, count: int = 20, between: int = 0
+        self, arm: Arm, law: Law, chain: Chain, scenario: Scenario, *, count: int = USUAL_MODES, between: int = 0
     ) -> None:
         self.law, late = acting_law(arm, law, chain)
         self._references = references_of(self.law, scenario)

@@ -20,13 +20,14 @@ from tfarm.dsp.law import followed_branches, origins
 from tfarm.dsp.loop import SampledLoop
 from tfarm.records import record
 
-LOCUS_VALUES = 61  # of a gain along its locus, to begin with
+SAMPLED_LOCUS_VALUES = 61  # of a gain along its locus, to begin with
 BRANCH_ROUNDS = 24  # of halving the steps where a branch bends, at most
 IMAGINARY_ROUNDING = 1e-12  # imaginary part of a real z: rounding
 RIM = 1.12  # radius up to which the z-plane is shown
 DRAWN_RADIUS = 1.2 * RIM  # and up to which a branch is drawn, so that its line runs out of the picture
 RATE_DECADES = 3  # of the rate gain
 STRONGER = 10.0  # how many times its own rate gain the locus of that alone goes
+WEAKEST = 1e-3  # of it, where that locus begins
 
 
 @dataclass(frozen=True)
@@ -75,12 +76,12 @@ def sampled_loci(loop: SampledLoop, top: float, moments: tuple[float, float]) ->
     """
     own, gains = loop.gains[RATE_GAIN], loop.gains
     values = (
-        np.geomspace(min(top / 10**RATE_DECADES, own / STRONGER), top, LOCUS_VALUES),
-        np.linspace(*moments, LOCUS_VALUES),
+        np.geomspace(min(top / 10**RATE_DECADES, own / STRONGER), top, SAMPLED_LOCUS_VALUES),
+        np.linspace(*moments, SAMPLED_LOCUS_VALUES),
     )
     upper = np.nonzero((loop.pulse.poles.imag > 0) & (loop.pulse.mode > 0))[0]
     upper = upper[np.argsort(loop.pulse.mode[upper])]
-    small = np.geomspace(1e-3, STRONGER, LOCUS_VALUES) * own
+    small = np.geomspace(WEAKEST, STRONGER, SAMPLED_LOCUS_VALUES) * own
     alone = _locus(loop.under(gains.having(MOMENT_GAIN, 0.0)), RATE_GAIN, small)
     by = {name: _locus(loop, name, each) for name, each in zip(PLANE, values, strict=True)}
     return SampledLoci(loop, alone, by, loop.pulse.poles[upper], loop.pulse.mode[upper])

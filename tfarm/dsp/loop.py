@@ -21,7 +21,7 @@ import numpy as np
 from tfarm.arm import FED_BACK, Arm, HubFeedback
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.dsp.chain import Chain, chain_or_usual
-from tfarm.dsp.plant import Branching, Plant, loop_plant, shorter_plant
+from tfarm.dsp.plant import USUAL_MODES, Branching, Plant, loop_plant, shorter_plant
 from tfarm.dsp.sampling import PulseTransfer
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exact.characteristic import torque
@@ -34,6 +34,11 @@ Characteristic = Callable[[Complex, Whole | None, Any], Complex]  # offset F at 
 
 ANGLE_ROW, RATE_ROW = (FED_BACK.index(name) for name in ("hub_angle", "hub_rate"))  # rows of what is measured
 NO_LAG = 1e-30  # stands for zero where a root sits on the filter's own pole, which it does where nothing is fed back
+SMALLEST_LOG = -745.0  # of the smallest double: stands for the logarithm of 0
+OFF_POLE = 1e-17  # stands for an offset of 0: next to 1 that is none
+FIRST_DIFFERENCE, LEAST_DIFFERENCE = 1e-4, 1e-18  # of an offset, and beyond: between the two first points of a secant
+OFFSET_STEPS = 8  # of the secant: from four digits on three are enough
+EIGENVALUE_ROUNDING, OFF_COURSE = 1e-9, 1e-3  # and of the offset: a root farther than both from its start has strayed
 LAST_STEP = 1e-12  # of the offset: the secant method's next step would be below its rounding
 UNMOVED = 1e-50  # an offset this small is a pole that the loop does not move
 FADED_RADIUS = 0.2  # a pole nearer to z = 0 decides nothing and is not polished
@@ -203,7 +208,7 @@ def polished_poles(eigenvalues: Complex, pulse: PulseTransfer, characteristic: C
     z, open_loop = eigenvalues.copy(), pulse.multipliers
     base = abs(z[:, None] - open_loop).argmin(axis=1)
     with np.errstate(divide="ignore"):
-        log_radius = np.maximum(np.log(abs(z)), -745.0)
+        log_radius = np.maximum(np.log(abs(z)), SMALLEST_LOG)
     bright = (abs(z) > FADED_RADIUS) & (abs(open_loop[base]) > FADED_RADIUS)
     if bright.any():
         offset = _offsets(z[bright], base[bright], open_loop[base[bright]], characteristic)
@@ -217,18 +222,18 @@ def polished_poles(eigenvalues: Complex, pulse: PulseTransfer, characteristic: C
 def _offsets(z: Complex, base: Whole, open_loop: Complex, characteristic: Characteristic) -> Complex:
     """Offsets of the roots from their open-loop poles, by the secant method where it does not stray."""
     start = z - open_loop
-    start = np.where(start == 0, 1e-17, start)
-    old = start * (1 + 1e-4) + 1e-18
+    start = np.where(start == 0, OFF_POLE, start)
+    old = start * (1 + FIRST_DIFFERENCE) + LEAST_DIFFERENCE
     new, f_old = start, characteristic(open_loop + old, base, old)
     with np.errstate(all="ignore"):  # a root that strays beyond any number is put back to its start below
-        for _ in range(8):
+        for _ in range(OFFSET_STEPS):
             f_new = characteristic(open_loop + new, base, new)
             slope = f_new - f_old
             step = np.where(slope == 0, 0.0, f_new * (new - old) / np.where(slope == 0, 1.0, slope))
             old, f_old, new = new, f_new, np.where(abs(new - step) < UNMOVED, UNMOVED, new - step)
             if not (abs(step) > LAST_STEP * abs(new)).any():
                 break
-    near = abs(new - start) <= 1e-9 + 1e-3 * abs(start)
+    near = abs(new - start) <= EIGENVALUE_ROUNDING + OFF_COURSE * abs(start)
     offset = np.where(near, new, start)
     return np.where(abs(offset) <= UNMOVED, 0.0, offset)
 
@@ -238,7 +243,7 @@ def sampled_loop(
     gains: HubFeedback,
     chain: Chain | None = None,
     *,
-    count: int = 20,
+    count: int = USUAL_MODES,
     branches: Branching = all_damped_modes,
 ) -> SampledLoop:
     """The loop with `count` flexible modes.  Raises ParameterError for a locked hub, and for I_h = 0 with K2 != 0.

@@ -28,6 +28,9 @@ AnySampled = SampledLoop | SampledLaw
 
 LONGEST_DELAY_SAMPLES = 20.0  # samples: the delay margin is looked for up to here
 MOST_STEPS = 2000  # of a scan of the delay
+LONGEST_SCAN_STEP, STEPS_A_TURN = 0.05, 12  # samples, and steps in a turn of the fastest mode that may be driven
+PUSH_ROOM = 4  # times what the feedback pushes a pole by to first order: what damps itself more than that is not driven
+DELAY_KNOWN = 1e-10  # samples: to so much a delay margin is solved for
 CLEARLY = 1e-6  # within the circle: an eigenvalue there is not polished, as even a double one is right to 1e-7
 KEPT_BEYOND = 2  # modes kept beyond the last one that outlives a sample
 MODES_BEYOND = 4  # those of a whole loop that do not outlive a sample
@@ -36,7 +39,10 @@ FEWER_SHARES = (0.85, 0.72, 0.61, 0.54)  # of these, tried in turn where two dam
 SURELY_OVERDAMPED = 2.5  # C w from which on a mode surely is: following it further costs a hundred times as much
 FAR_BEYOND = 5.0  # of critical in the first mode: all poles of bending lie left of any line, one mode shows it as well
 STRONGEST = 0.15  # of critical in the first mode: no stronger damping is looked at
+DAMPING_MODES = 40  # of the loop in which a required damping is looked for, where no number is said
 DAMPING_DECADES = 16  # down from there
+DAMPING_XTOL, DAMPING_RTOL, MADE_SURE = 1e-7, 4e-7, 1e-6  # relative: C is solved for to the first two, then raised
+NUDGES = (0.0, 1e-6, -1e-6)  # of C, tried in turn where two damped modes are one at it
 SAME_EDGE = 1e-9  # relative: next to z = 1 one static crossing is read several times, each with an error near 1e-12
 
 
@@ -92,20 +98,20 @@ def delay_margin(loop: AnySampled) -> DelayMargin:
     if log_radius(0.0) >= 0:
         return DelayMargin(0.0, False)
     plant, T = loop.plant, loop.chain.sampling.period
-    reach = 4 * loop.push * abs(held_amplitude(plant.poles, T))
+    reach = PUSH_ROOM * loop.push * abs(held_amplitude(plant.poles, T))
     risky = (reach > -plant.poles.real * T) & (plant.poles.imag > 0)  # whose own damping the feedback could outweigh
     fastest = (plant.poles.imag[risky] * T).max(initial=np.pi / 4)
-    step = float(min(0.05, 2 * np.pi / fastest / 12))  # samples: a twelfth of the turn of the fastest of them
+    step = float(min(LONGEST_SCAN_STEP, 2 * np.pi / fastest / STEPS_A_TURN))  # samples
     for i in range(1, MOST_STEPS + 1):
         if i * step > LONGEST_DELAY_SAMPLES:
             break
         if grows(i * step):
-            return DelayMargin(float(brentq(log_radius, (i - 1) * step, i * step, xtol=1e-10)), False)
+            return DelayMargin(float(brentq(log_radius, (i - 1) * step, i * step, xtol=DELAY_KNOWN)), False)
     return DelayMargin(min(MOST_STEPS * step, LONGEST_DELAY_SAMPLES), True)
 
 
 def required_damping(
-    arm: Arm, gains: HubFeedback, chain: Chain, *, count: int = 40, branches: Branching | None = None
+    arm: Arm, gains: HubFeedback, chain: Chain, *, count: int = DAMPING_MODES, branches: Branching | None = None
 ) -> float:
     """The smallest C [s] from which on these gains are stable on this arm (its own C is set aside).
 
@@ -126,7 +132,8 @@ def required_damping(
     for _ in range(DAMPING_DECADES):
         low = high / 10
         if log_radius(low) >= 0:  # a radius is nearly linear in C where C is small
-            return float(brentq(log_radius, low, high, xtol=1e-7 * low, rtol=4e-7)) * (1 + 1e-6)
+            C = float(brentq(log_radius, low, high, xtol=DAMPING_XTOL * low, rtol=DAMPING_RTOL))
+            return C * (1 + MADE_SURE)
         high = low
     return high
 
@@ -140,7 +147,7 @@ def log_radius_with(
     """
     outliving = min(alive(arm.having(damping=C), chain), modes_below(arm, SURELY_OVERDAMPED / C))
     count = min(count, KEPT_BEYOND + outliving)
-    for nudge in (0.0, 1e-6, -1e-6):
+    for nudge in NUDGES:
         try:
             loop = sampled_loop(arm.having(damping=C * (1 + nudge)), gains, chain, count=count, branches=branches)
         except ConvergenceError:

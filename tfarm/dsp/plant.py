@@ -33,6 +33,7 @@ from tfarm.spectrum.search import LISTS_KEPT
 Branching = Callable[[Modes], DampedModes]
 
 RECORDED = ("hub_angle", "hub_rate", "root_moment", "tip_displacement")  # of a simulation, not filtered
+USUAL_MODES = 20  # flexible, of a sampled loop or a simulation whose number is not said
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,8 @@ ENDS_AT = (-0.9, 0.3, 0.9)  # K2 at which upright edges are looked for, of what 
 MOST_COLUMNS = 400  # of K1 in a picture
 OUTLINE_ROUNDS = 12  # of halving where its outline bends
 BESIDE_EDGE = 1e-9  # relative: so far to either side of such an edge a region is cut
+TOLD_FROM_CIRCLE = 1e-9  # of ln|z|: a pole nearer to the circle may be counted on either side
+GOLDEN = 0.6180339887498949  # of a range: a place that no rounded number of a person or a grid falls on
 
 
 @dataclass(frozen=True)
@@ -73,7 +75,7 @@ def gain_map(loop: SampledLoop, K1: Sequence[float] | Real, K2: Sequence[float] 
     unstable = counts_over(columns, found, first.K2, at_start)
     for i, j in ((0, 0), (-1, 0), (-1, -1)):
         corner = loop.having(K1=float(rows[i]), K2=float(columns[j]))
-        is_told = abs(corner.poles.log_radius).min() >= 1e-9  # else on an edge, or too close to it
+        is_told = abs(corner.poles.log_radius).min() >= TOLD_FROM_CIRCLE  # else on an edge, or too close to it
         if is_told and (count := corner.poles.unstable) != unstable[i, j]:
             where = f"at K1 = {corner.gains.K1:g}, K2 = {corner.gains.K2:g}"
             message = f"{where} the crossings count {unstable[i, j]} growing poles, not {count}"
@@ -123,8 +125,7 @@ def with_both_sides(K1: Real, ends: Real) -> Real:
 
 def _off_the_edge(values: Real) -> float:
     """A gain inside the range that no rounded edge falls on."""
-    share = 0.6180339887498949
-    return float(values[0] + share * (values[-1] - values[0])) if values.size > 1 else float(values[0])
+    return float(values[0] + GOLDEN * (values[-1] - values[0])) if values.size > 1 else float(values[0])
 
 
 def _ascending(name: str, values: Sequence[float] | Real) -> Real:

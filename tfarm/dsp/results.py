@@ -12,7 +12,7 @@ import numpy as np
 from tfarm.arm import LISTED, TAKEN_OFF, AnyLaw, Arm, HubFeedback, driven, tracked, unit_of
 from tfarm.arrays import Real
 from tfarm.columns import Column
-from tfarm.dsp.chain import Chain, chain_or_usual
+from tfarm.dsp.chain import TIME_ROUNDING, Chain, chain_or_usual
 from tfarm.dsp.curves import resolved
 from tfarm.dsp.discretise import described_law
 from tfarm.dsp.enough import Enough, enough_modes
@@ -70,7 +70,7 @@ def residual_raw_moment_rms(simulation: Simulation) -> float:
 
 def rms_after(t: Real, signal: Real, start: float) -> float:
     """Root mean square of the samples of a signal from `start` [s] on; 0 where there is none."""
-    after = signal[t >= start * (1 - 1e-12)]
+    after = signal[t >= start * (1 - TIME_ROUNDING)]
     return float(np.sqrt(np.mean(after**2))) if after.size else 0.0
 
 

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from tfarm.arm import Arm
 from tfarm.arrays import Complex, Real
 from tfarm.dsp.chain import Chain, Sampling
-from tfarm.dsp.plant import Plant, undelayed_plant
+from tfarm.dsp.plant import USUAL_MODES, Plant, undelayed_plant
 from tfarm.records import record
 
 if TYPE_CHECKING:
@@ -201,7 +201,7 @@ class PulseTransfer:
 
 
 def pulse_transfer(
-    arm: Arm, outputs: tuple[str, ...] | list[str], sampling: Sampling | None = None, *, count: int = 20
+    arm: Arm, outputs: tuple[str, ...] | list[str], sampling: Sampling | None = None, *, count: int = USUAL_MODES
 ) -> PulseTransfer:
     """The sampled arm with `count` flexible modes: exact for its modal model, callable at z, `.state_space()`.
 

@@ -12,7 +12,7 @@ import numpy as np
 from tfarm.arm import Arm, must_turn
 from tfarm.arm.checks import number, positive
 from tfarm.arrays import Real
-from tfarm.dsp.chain import Chain
+from tfarm.dsp.chain import TIME_ROUNDING, Chain
 from tfarm.errors import ParameterError, must_be_known
 from tfarm.records import record
 from tfarm.spectrum.scales import turning_inertia
@@ -158,4 +158,4 @@ def _samples(duration: float, period: float) -> int:
     if length / period >= MOST_TASK_SAMPLES:
         remedy = f"at most {MOST_TASK_SAMPLES} samples of {period:g} s; a shorter one, or a longer period"
         raise ParameterError(key="duration", value=length, remedy=remedy)
-    return math.floor(length / period * (1 + 1e-12)) + 1
+    return math.floor(length / period * (1 + TIME_ROUNDING)) + 1

@@ -18,7 +18,7 @@ from tfarm.dsp import kernel
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.converters import quantisers
 from tfarm.dsp.loop import check_loop
-from tfarm.dsp.plant import RECORDED, Plant, filtered, undelayed_plant
+from tfarm.dsp.plant import RECORDED, USUAL_MODES, Plant, filtered, undelayed_plant
 from tfarm.dsp.sampling import held_amplitude
 from tfarm.dsp.scenarios import Scenario
 from tfarm.errors import ParameterError
@@ -119,7 +119,9 @@ class Simulator:
     `between` asks for so many records in each sample.  Raises ParameterError for a locked hub.
     """
 
-    def __init__(self, arm: Arm, chain: Chain, scenario: Scenario, *, count: int = 20, between: int = 0) -> None:
+    def __init__(
+        self, arm: Arm, chain: Chain, scenario: Scenario, *, count: int = USUAL_MODES, between: int = 0
+    ) -> None:
         remedy = f"a whole number of records between two samples, 0 to {MOST_BETWEEN}"
         between = whole("between", between, 0, MOST_BETWEEN, remedy)
         self.chain, self.scenario, self.between = chain, scenario, between
@@ -249,7 +251,7 @@ class Simulator:
 
     def _energy(self, amplitude: Complex, rate: float) -> float:
         """Of an undamped arm [J]: b^2 |a|^2/2 a mode, b^2 twice the residue of the hub rate, and the rigid arm's."""
-        row = self.plant.outputs.index("hub_rate", 3)
+        row = self.plant.outputs.index("hub_rate", len(FED_BACK))
         rigid = self.plant.rigid[row, 1] * rate**2 / 2
         return float(self.plant.residues[row, self._kept].real @ abs(amplitude) ** 2 + rigid)
 
@@ -309,7 +311,7 @@ def _tables(plant: Plant, kept: NDArray[np.int64], chain: Chain, between: int) -
     turn = np.exp(p * piece[:, :1])
     push = np.array([held_amplitude(p, float(duration)) for duration in piece[:, 0]])
     weights = np.ascontiguousarray(plant.residues[:, kept] * weight)
-    row = plant.outputs.index("hub_angle", 3)
+    row = plant.outputs.index("hub_angle", len(FED_BACK))
     hub = np.r_[plant.rigid[row], weights[row]].astype(complex)
     return turn, push, piece, weights, plant.rigid, plant.static, hub
 

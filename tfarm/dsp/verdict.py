@@ -20,6 +20,8 @@ from tfarm.dsp.shown import Figure, ShownWindows, shown_damping, shown_delay, sh
 from tfarm.records import record
 
 UNDAMPED_MODES = 20  # of an undamped arm, whose verdict is of the first modes alone
+FEWEST_COMPARED = 8  # modes of the first loop with fewer, twice as many in each next
+LARGEST_LOG = 700.0  # whose exponential is a double
 RADIUS_AGREES = 1e-4  # of ln of the spectral radius: how well fewer modes must have it
 RADIUS_NOISE = 1e-12  # and what it is known to at all
 MOST_ASKED = 400  # modes that may be asked for
@@ -107,7 +109,7 @@ def _change(log_radius: float) -> str:
     return (
         f"{abs(math.expm1(log_radius)):.3g}"
         if log_radius < 1
-        else f"a factor of {math.exp(min(log_radius, 700.0)):.3g}"
+        else f"a factor of {math.exp(min(log_radius, LARGEST_LOG)):.3g}"
     )
 
 
@@ -144,7 +146,7 @@ def settled_verdict(largest: AnyLoop, outside: Callable[[Band[AnyLoop]], int | N
 def _growing(full: AnyLoop) -> Iterator[AnyLoop]:
     """Loops of 8, 16, 32 ... modes, and the full one."""
     most = full.plant.count
-    number = min(8, most // 2)
+    number = min(FEWEST_COMPARED, most // 2)
     while 0 < number < most:
         yield resized(full, number)
         number *= 2

@@ -22,7 +22,7 @@ from tfarm.arm import AnyLaw, Arm, tracked
 from tfarm.arm.declared import StrictTable
 from tfarm.arm.reading import load_tables
 from tfarm.arrays import Real
-from tfarm.dsp.chain import Chain
+from tfarm.dsp.chain import TIME_ROUNDING, Chain
 from tfarm.dsp.results import modes_for, simulation_of
 from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.simulate import Simulation
@@ -62,7 +62,7 @@ class MeasuredRun:
 
         The reference is taken between its rows along straight lines.
         """
-        t = period * np.arange(int(self.t[-1] / period * (1 + 1e-12)) + 1)
+        t = period * np.arange(int(self.t[-1] / period * (1 + TIME_ROUNDING)) + 1)
         led, none = np.interp(t, self.t, self.reference) - self.reference[0], np.zeros(t.size)
         moving = np.flatnonzero(self.reference != self.reference[-1])
         until = float(self.t[moving[-1]]) if moving.size else 0.0

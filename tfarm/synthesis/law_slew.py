@@ -18,6 +18,7 @@ from tfarm.arm import Arm, Law
 from tfarm.arm.blocks import Matrices
 from tfarm.arrays import LEAST_SIZE, Real
 from tfarm.dsp import Chain, Scenario, scenario
+from tfarm.dsp.chain import TIME_ROUNDING
 from tfarm.dsp.law_loop import acting_law
 from tfarm.dsp.law_simulate import references_of
 from tfarm.dsp.scenarios import TRIAL_COST, TRIAL_DURATION
@@ -58,7 +59,7 @@ class LawSlew:
         change = self._change(x[..., 0], dict(zip(plain.signals, references.T, strict=True)), slopes)
         _, d_moment, d_u = self._run(A, change)
         if objective == "residual":
-            after = task.t >= task.busy_until * (1 - 1e-12)
+            after = task.t >= task.busy_until * (1 - TIME_ROUNDING)
             value = np.sqrt((moment[after] ** 2).mean(axis=0))
             return value, (moment[after] * d_moment[after]).mean(axis=0)[None] / np.maximum(value, LEAST_SIZE)
         a, b = (weight * task.period for weight in TRIAL_COST)

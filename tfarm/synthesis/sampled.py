@@ -29,6 +29,7 @@ from scipy.optimize import minimize_scalar
 from tfarm.arm import ANGLE_GAIN, FED_BACK, PLANE, Arm, HubFeedback, laws_at
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.dsp import Chain, SampledLoop, Scenario, sampled_loop, sampled_verdict, scenario
+from tfarm.dsp.chain import TIME_ROUNDING
 from tfarm.dsp.margins import most_modes
 from tfarm.dsp.sampling import PulseTransfer
 from tfarm.dsp.scenarios import TRIAL_COST, TRIAL_DURATION
@@ -204,7 +205,7 @@ class SampledJudge:
         """Root mean square of the root moment [N m] over a period of the first mode after the slew."""
         task = self._slew
         moment, _ = self._run(task, points)
-        return np.asarray(np.sqrt((moment[task.t >= task.busy_until * (1 - 1e-12)] ** 2).mean(axis=0)))
+        return np.asarray(np.sqrt((moment[task.t >= task.busy_until * (1 - TIME_ROUNDING)] ** 2).mean(axis=0)))
 
     def cost(self, points: Real) -> Real:
         """What the trial of the tuner costs with constant gains."""
