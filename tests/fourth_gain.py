@@ -70,12 +70,31 @@ def _loop(arm: Any, law: Any) -> dict[str, Any]:
     }
 
 
+def _sampled(arm: Any, law: Any) -> dict[str, Any]:
+    """The verdict on the sampled loop, its windows of the fourth gain, and what its modes gain a sample."""
+    from tfarm.dsp import sampled_loop, sampled_verdict
+    from tfarm.dsp.law import mode_table
+    from tfarm.dsp.margins import stable_windows
+
+    verdict = sampled_verdict(arm, law)
+    table = mode_table(sampled_loop(arm, law.having("K1", 0.0).having("K2", 0.0).times(1e-6), count=8))
+    return {
+        "sentence": verdict.sentence,
+        "outside": verdict.loop.poles.unstable,
+        "log_radius": verdict.log_radius,
+        "windows": stable_windows(verdict.full, "K3"),
+        "off": (table.first_order - table.log_radius + table.by_damping).tolist(),
+        "size": table.first_order.tolist(),
+    }
+
+
 def _answer(case: dict[str, Any]) -> dict[str, Any]:
     import tfarm
 
     arm = tfarm.load(case["arm"])
     arm = replace(arm, hub=replace(arm.hub, friction=case["friction"]))
-    return _loop(arm, tfarm.HubFeedback(**case["gains"]))
+    law = tfarm.HubFeedback(**case["gains"])
+    return {"loop": _loop(arm, law), "sampled": _sampled(arm, law)}
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ import pytest
 import tfarm
 from tests.fourth_gain import OUTPUT, answers_of
 from tfarm import Law
+from tfarm.dsp.law_verdict import law_verdict
 
 SIGNALS = {"K1": "hub_rate", "K2": "root_moment", "Kp": "hub_angle", "K3": OUTPUT}
 CASES: list[dict[str, Any]] = [
@@ -44,7 +45,7 @@ def law_of(case: dict[str, Any], **more: float) -> Law:
 
 @pytest.mark.parametrize("number", range(len(CASES)))
 def test_verdict_poles_and_margins_are_those_of_the_same_law_by_its_signals(number, answers) -> None:
-    case, found = CASES[number], answers[number]
+    case, found = CASES[number], answers[number]["loop"]
     known = tfarm.margins(arm_of(case), law_of(case))
     assert (found["verdict"], found["unstable"]) == (known.stability.verdict, known.stability.unstable_roots)
     assert not found["infinite"]
@@ -60,7 +61,7 @@ def test_verdict_poles_and_margins_are_those_of_the_same_law_by_its_signals(numb
 
 @pytest.mark.parametrize("number", range(len(CASES)))
 def test_no_theorem_on_the_hubs_gains_is_told_of_it(number, answers) -> None:
-    found = answers[number]
+    found = answers[number]["loop"]
     assert not found["proven"]
     assert "Lyapunov" not in found["tail"]
     if "lab" not in CASES[number]["arm"]:
@@ -72,7 +73,7 @@ def test_no_theorem_on_the_hubs_gains_is_told_of_it(number, answers) -> None:
 def test_its_windows_end_where_the_law_by_its_signals_loses_its_stability(number, answers) -> None:
     case = CASES[number]
     arm, edges = arm_of(case), 0
-    for low, high in answers[number]["windows"]["K3"]:
+    for low, high in answers[number]["loop"]["windows"]["K3"]:
         for end, way in ((low, 1), (high, -1)):
             if abs(end) < 10.0:  # an edge, and no end of the search
                 sides = (end + way * 0.01, end - way * 0.01)
@@ -80,3 +81,25 @@ def test_its_windows_end_where_the_law_by_its_signals_loses_its_stability(number
                 assert verdicts == [True, False]
                 edges += 1
     assert edges
+
+
+@pytest.mark.parametrize("number", range(len(CASES)))
+def test_the_sampled_loop_is_that_of_the_same_law_by_its_signals(number, answers) -> None:
+    case, found = CASES[number], answers[number]["sampled"]
+    arm = arm_of(case)
+    known = law_verdict(arm, law_of(case))
+    assert found["outside"] == known.loop.poles.unstable
+    assert found["sentence"].split(" (")[0] == known.sentence.split(" (")[0]
+    assert found["log_radius"] == pytest.approx(known.log_radius, rel=1e-9)
+    for window in found["windows"]:
+        for end, way in zip(window, (1, -1), strict=True):
+            sides = [law_verdict(arm, law_of(case, K3=end + side * way * 0.01)) for side in (1, -1)]
+            assert [each.is_stable for each in sides] == [True, False]
+    assert found["windows"] or not known.is_stable
+
+
+@pytest.mark.parametrize("number", range(len(CASES)))
+def test_to_first_order_it_moves_each_mode_of_the_sampled_loop_as_its_poles_move(number, answers) -> None:
+    found = answers[number]["sampled"]
+    size, off = np.array(found["size"])[:5], np.array(found["off"])[:5]  # of higher ones damping leaves no digits
+    assert (abs(off) < 1e-4 * abs(size) + 1e-6 * abs(size).max()).all()

@@ -51,6 +51,19 @@ def test_small_gains_follow_the_law(lossless, delay):
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.7, 1.0])
+def test_the_first_order_has_the_gain_on_the_angle_too(lossless, delay):
+    """It drives what the moment's gain damps: +b^2 sin(q/2) (Kp/w^2) sin((d + 1/2) q)."""
+    chain, modes = Chain(sampling=Sampling(delay_samples=delay)), tfarm.modes(lossless, 10)
+    w, b = modes.natural_frequency[1:], modes.hub_participation[1:]
+    table = mode_table(sampled_loop(lossless, HubFeedback(Kp=1e-4, K2=1e-6), chain, count=14))
+    q = w * T
+    by_hand = 1e-4 / w**2 - 1e-6 * 0.1
+    law = b**2 * np.sin(q / 2) * by_hand * np.sin((delay + 0.5) * q)
+    np.testing.assert_allclose(table.first_order[:10], law, rtol=1e-9, atol=1e-9 * abs(law).max())
+    assert np.all(abs(table.log_radius[:10] - law) <= 1e-3 * abs(law) + 1e-7 * abs(law).max())
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.7, 1.0])
 def test_finite_gains_follow_the_finite_gain_form(lossless, delay):
     """ln|z| = -Re[b^2 sin(q/2) (K1/w + i K2 I_h) e^{-i(d+1/2)q} / (1 + L0)], L0 the loop without that mode.
 

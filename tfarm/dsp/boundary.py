@@ -20,9 +20,8 @@ from tfarm.arm import GAINS, HubFeedback
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.crossing import Crossings, solved
 from tfarm.dsp.law_loop import SampledLaw
-from tfarm.dsp.loop import ANGLE_ROW, SampledLoop
+from tfarm.dsp.loop import ANGLE_ROW, SampledLoop, turning
 from tfarm.exact.characteristic import torque
-from tfarm.exact.outputs import OUTPUTS
 from tfarm.records import record
 from tfarm.spectrum.scales import most_gain
 
@@ -142,13 +141,18 @@ def solved_on(grid: CircleGrid, split: Split, step: Whole) -> tuple[Real, Real]:
 
 
 def _at_one(grid: CircleGrid, line: _Line, is_above: bool) -> list[tuple[float, float, int]]:
-    """The crossing at z = 1: at no gain on the rate where the arm can drift, else by a static balance."""
+    """The crossing at z = 1: where nothing holds the angle, at no gain on the rate of an arm that can drift, else by a
+    static balance."""
     loop, one = grid.loop, np.ones(1)
     rigid, change = loop.plant.rigid[ANGLE_ROW], -1 if is_above else 1
-    if line.others[ANGLE_ROW] != 0.0 and rigid.any():
+    turned = turning(loop.plant)
+    held = float(np.array(line.others) @ turned)
+    if turned[line.place]:
+        return [(-held / float(turned[line.place]) + 0.0, 0.0, change)]
+    if held:
         return []
     if rigid[0] != 0.0:
-        return [(0.0, 0.0, change)] if OUTPUTS[GAINS[line.place].output].quantity == "theta" else []
+        return [(0.0, 0.0, change)] if loop.plant.rigid[line.place].any() else []
     A, B = line.split((one, loop.signals(np.exp(np.array([1j * NEAR_ONE])), None, one)))
     return [(real_gain(A[0], B[0]), 0.0, change)]
 

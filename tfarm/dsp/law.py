@@ -4,8 +4,9 @@ To first order a mode of frequency w and hub participation b changes by, q = w T
 
     ln|z| per sample = -b^2 sin(q/2) [ (K1/w) cos((d + 1/2) q) + K2 I_h sin((d + 1/2) q) ]
 
-At d = 0 the hub rate damps from 0 to 1/(2T) [Hz] and destabilises from there to 1/T, and so on in bands; K2 > 0 never
-destabilises.  At finite gains the closed-loop pole itself says it: it is followed from zero gain.
+and by any other gain by Re[-K (z - z_p) H(z)/z_p] at the pole z_p of the mode, H what it multiplies.  At d = 0 the hub
+rate damps from 0 to 1/(2T) [Hz] and destabilises from there to 1/T, and so on in bands; K2 > 0 never destabilises.  At
+finite gains the closed-loop pole itself says it: it is followed from zero gain.
 """
 
 from __future__ import annotations
@@ -19,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from tfarm.arm import HubFeedback
-from tfarm.arrays import Complex, Real
+from tfarm.arm import GAINS, PLANE, HubFeedback
+from tfarm.arrays import Complex, Real, Whole
 from tfarm.columns import ANSWER, JSON, REPORT, Column
 from tfarm.digits import general, lined, scientific, singly
 from tfarm.dsp.loop import SampledLoop
@@ -66,9 +67,9 @@ class ModeTable:
     """A row a mode that outlives a sample.
 
     `log_radius`: ln|z| of the closed-loop pole that it becomes, the larger where its pair has become two real poles;
-    `first_order` is the formula's change of it, the sum of `by_rate` (K1) and `by_moment` (K2); `by_damping`: Re(p) T,
-    from the arm's own C (and analog hub damping).  `band`: 0 from 0 to 1/(2T) [Hz], and so on; `aliased`: where the
-    samples see the mode [rad/s].
+    `first_order` is the change of it to first order in all gains, the sum of `by_rate` (K1), `by_moment` (K2) and
+    `by_others` (Kp, and any more); `by_damping`: Re(p) T, from the arm's own C (and analog hub damping).  `band`: 0
+    from 0 to 1/(2T) [Hz], and so on; `aliased`: where the samples see the mode [rad/s].
     """
 
     index: NDArray[np.int64]
@@ -77,13 +78,14 @@ class ModeTable:
     aliased: Real
     by_rate: Real
     by_moment: Real
+    by_others: Real
     by_damping: Real
     log_radius: Real
 
     @property
     def first_order(self) -> Real:
-        """The formula: change of ln|z| per sample by both gains."""
-        return self.by_rate + self.by_moment
+        """Change of ln|z| per sample by all gains."""
+        return self.by_rate + self.by_moment + self.by_others
 
 
 def first_order_law(
@@ -95,6 +97,15 @@ def first_order_law(
     by_rate = common * gains.K1 / w * np.cos((delay + 0.5) * q)
     by_moment = common * gains.K2 * hub_inertia * np.sin((delay + 0.5) * q)
     return by_rate + 0.0, by_moment + 0.0  # -0.0 where a gain is 0
+
+
+def _by_others(loop: SampledLoop, poles: Whole) -> Real:
+    """What the gains outside the plane change of ln|z| at open-loop poles of these numbers: -K (z - z_p) H(z)/z_p."""
+    z = loop.pulse.multipliers[poles]
+    others = [0.0 if gain.name in PLANE else loop.gains[gain.name] for gain in GAINS]
+    if not any(others):
+        return np.zeros(z.size)
+    return np.asarray(-(others @ loop.signals(z, poles, np.zeros(z.size)) / z).real)
 
 
 def mode_table(loop: SampledLoop) -> ModeTable:
@@ -124,6 +135,7 @@ def mode_table(loop: SampledLoop) -> ModeTable:
         aliased=abs(w - turns * 2 * np.pi / T),
         by_rate=by_rate,
         by_moment=by_moment,
+        by_others=_by_others(loop, upper),
         by_damping=own[upper],
         log_radius=np.array(radii),
     )

@@ -23,10 +23,10 @@ from tfarm.arm.law import Law, Part
 from tfarm.arrays import LEAST_SIZE, Complex, Real, Whole
 from tfarm.dsp.chain import MOST_DELAY, Chain
 from tfarm.dsp.discretise import discretised
-from tfarm.dsp.law_plant import SensedPlant, is_analog, sensed_plant
+from tfarm.dsp.law_plant import SensedPlant, sensed_plant
 from tfarm.dsp.law_polynomials import VANISHED, polynomials
 from tfarm.dsp.loop import SampledLoop, SampledPoles, polished_poles, without_drift
-from tfarm.dsp.plant import USUAL_MODES, Branching, Plant
+from tfarm.dsp.plant import USUAL_MODES, Branching, Plant, is_analog
 from tfarm.dsp.sampling import PulseTransfer
 from tfarm.errors import ParameterError
 from tfarm.records import record

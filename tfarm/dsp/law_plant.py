@@ -1,8 +1,4 @@
-"""The analog plant before any law: outputs by name, those along the link with their place, through their filters.
-
-Which have the anti-alias filter of the chain: strain, moment and shear, current, accelerations and rates, as they leave
-analog amplifiers.  Angles and displacements do not, nor does the hub's rate where it is the difference of an encoder.
-"""
+"""The analog plant before any law: outputs by name, those along the link with their place, through their filters."""
 
 from __future__ import annotations
 
@@ -14,20 +10,10 @@ import numpy as np
 
 from tfarm.arm import Arm
 from tfarm.dsp.chain import Chain
-from tfarm.dsp.plant import Branching, Plant, undelayed_plant, with_filter, with_modes
-from tfarm.exact.outputs import Output
+from tfarm.dsp.plant import Branching, Plant, is_analog, undelayed_plant, with_filter, with_modes
 from tfarm.records import record
 from tfarm.response.signals import Signals
 from tfarm.spectrum.damped import all_damped_modes
-
-AMPLIFIED = ("M", "Q", "strain", "current")  # what a strain gauge, a load cell or a shunt reads
-
-
-def is_analog(wanted: Output, chain: Chain) -> bool:
-    """Whether a signal passes the analog anti-alias filter of a chain."""
-    if wanted.quantity == "theta" and wanted.power and chain.converters.hub_rate == "difference":
-        return False
-    return wanted.quantity in AMPLIFIED or wanted.power > 0
 
 
 @dataclass(frozen=True)

@@ -21,10 +21,11 @@ import numpy as np
 from tfarm.arm import FED_BACK, Arm, HubFeedback
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.dsp.chain import Chain, chain_or_usual
-from tfarm.dsp.plant import USUAL_MODES, Branching, Plant, loop_plant, shorter_plant
+from tfarm.dsp.plant import USUAL_MODES, Branching, Plant, is_analog, loop_plant, shorter_plant
 from tfarm.dsp.sampling import PulseTransfer
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exact.characteristic import torque
+from tfarm.exact.outputs import OUTPUTS
 from tfarm.records import record
 from tfarm.response import transfer
 from tfarm.spectrum.damped import all_damped_modes
@@ -70,6 +71,11 @@ class SampledPoles:
     def is_stable(self) -> bool:
         """Whether all lie inside the unit circle; nothing is rounded."""
         return self.log_spectral_radius < 0.0
+
+
+def turning(plant: Plant) -> Real:
+    """What each output is of an arm that has turned, but for a factor: 0 except of its angle and of displacements."""
+    return np.asarray(plant.rigid[:, 0 if plant.rigid[ANGLE_ROW, 0] else 1])
 
 
 def without_drift(A: Real, first: int, shift: Real) -> Real:
@@ -118,7 +124,8 @@ class SampledLoop:
     @property
     def has_free_angle(self) -> bool:
         """Whether the hub angle is a pole at z = 1 that nothing regulates."""
-        return self.gains.Kp == 0.0 and bool(self.plant.rigid[ANGLE_ROW].any())
+        turned = turning(self.plant)
+        return bool(turned[ANGLE_ROW]) and not np.array(self.gains.row)[turned != 0].any()
 
     @property
     def smoothing(self) -> float:
@@ -133,8 +140,7 @@ class SampledLoop:
     @property
     def analog(self) -> tuple[bool, ...]:
         """Of what is fed back, what passes the anti-alias filter."""
-        names = ("root_moment",) if self.differences else ("root_moment", "hub_rate")
-        return tuple(name in names for name in FED_BACK)
+        return tuple(is_analog(OUTPUTS[name], self.chain) for name in FED_BACK)
 
     @property
     def push(self) -> Real:

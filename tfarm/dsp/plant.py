@@ -22,6 +22,7 @@ from tfarm.arm import FED_BACK, Arm
 from tfarm.arrays import Complex, Real
 from tfarm.dsp.chain import Chain
 from tfarm.errors import ParameterError
+from tfarm.exact.outputs import OUTPUTS, Output
 from tfarm.records import record
 from tfarm.reduced import ModalModel, modal_model
 from tfarm.reduced.remainder import SLOW_POLES_FROM, slow_remainder
@@ -32,6 +33,7 @@ from tfarm.spectrum.search import LISTS_KEPT
 
 Branching = Callable[[Modes], DampedModes]
 
+AMPLIFIED = ("M", "Q", "strain", "current")  # what a strain gauge, a load cell or a shunt reads
 RECORDED = ("hub_angle", "hub_rate", "root_moment", "tip_displacement")  # of a simulation, not filtered
 USUAL_MODES = 20  # flexible, of a sampled loop or a simulation whose number is not said
 
@@ -146,13 +148,23 @@ def with_modes(model: ModalModel, chain: Chain, outputs: Sequence[str], count: i
     )
 
 
+def is_analog(wanted: Output, chain: Chain) -> bool:
+    """Whether an output passes the analog anti-alias filter of a chain.
+
+    Strain, moment and shear, current, accelerations and rates do, as they leave analog amplifiers.  Angles and
+    displacements do not, nor does the hub's rate where it is the difference of an encoder.
+    """
+    if wanted.quantity == "theta" and wanted.power and chain.converters.hub_rate == "difference":
+        return False
+    return wanted.quantity in AMPLIFIED or wanted.power > 0
+
+
 def filtered(plant: Plant, chain: Chain) -> Plant:
-    """The analog anti-alias filter on the strain gauge and, unless the encoder is differenced, on the hub rate."""
+    """The analog anti-alias filter on those of the first outputs, which are fed back, that pass one."""
     corner = chain.sampling.antialias_corner
     if math.isinf(corner):
         return plant
-    analog = ("root_moment",) if chain.converters.hub_rate == "difference" else ("root_moment", "hub_rate")
-    return with_filter(plant, [plant.outputs.index(name) for name in analog if name in plant.outputs], corner)
+    return with_filter(plant, [n for n, name in enumerate(FED_BACK) if is_analog(OUTPUTS[name], chain)], corner)
 
 
 def with_filter(plant: Plant, rows: Sequence[int], corner: float) -> Plant:

@@ -135,7 +135,7 @@ class Simulator:
     def plant_of(self, arm: Arm, count: int) -> Plant:
         """What is measured, through its filters, and then what is recorded."""
         plant = undelayed_plant(arm, self.chain, (*FED_BACK, *RECORDED), count)
-        return filtered(plant, self.chain)  # the first of each name: those that are recorded come later
+        return filtered(plant, self.chain)
 
     def linear(self, gains: HubFeedback, K2: Real | None = None) -> Simulation:
         """The law u = r + Kp (theta_ref - theta) + K1 (theta_t_ref - theta_t) - K2 x, compiled; `K2` (n,) may vary.
