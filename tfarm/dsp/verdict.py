@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic
 
-from tfarm.arm import LISTED, MOMENT_GAIN, PLANE, TAKEN_OFF, Arm, HubFeedback, driven, unit_of
+from tfarm.arm import LISTED, MOMENT_GAIN, PLANE, RATE_GAIN, TAKEN_OFF, Arm, HubFeedback, driven, unit_of
 from tfarm.arm.checks import whole
 from tfarm.columns import Table
 from tfarm.dsp.band import Band, complete_band
@@ -167,6 +167,11 @@ class Analysis:
     delay_margin: DelayMargin
     delay: Figure
     damping: Figure
+
+    @property
+    def K1_windows(self) -> list[Window]:
+        """The stable intervals of the gain on the hub rate."""
+        return self.shown[RATE_GAIN].windows
 
     @property
     def K2_windows(self) -> list[Window]:
