@@ -26,7 +26,13 @@ TERM_ROUNDING = 4 * float(np.finfo(float).eps)  # of a model's terms, which canc
 CLEAR_OF_POLES = 1e-12  # nearer to a pole nothing new happens, and nothing can be evaluated on it
 POLE_DISTANCES = 10.0 ** -np.arange(1, 8)  # of samples from a pole, as shares of its frequency
 SAMPLES_PER_DECADE = 60  # of the even grid; peaks between are closed in on
+LEAST_SAMPLES, EVEN_SAMPLES, BETWEEN_POLES = 200, 400, 24  # beside these, along the band, and between two poles
+DIP_POINTS = 8  # around each dip of |G| or |G'|
+POLES_BEYOND = 1.5  # times the end of a band: samples keep clear of poles up to there
+SLOPE_STEP, ON_A_POLE = 1e-3, 1e-6  # of the distance to a pole, or of w where w is nearer than that: for differences
 MOST_PEAKS = 12  # local maxima of the error that are closed in on, the highest first
+HIGH_PEAK = 0.2  # of the highest: lower ones between samples do not reach it
+PEAK_CLOSINGS, CLOSING_POINTS = 3, 17  # times that such a peak is closed in on, each to an eighth of its width
 
 
 @dataclass(frozen=True)
@@ -69,21 +75,21 @@ class Ruler:
         worst, at = errors.max(axis=1), self.w[errors.argmax(axis=1)]
         for row, error in enumerate(errors):
             low, high = self._brackets(error)
-            for _ in range(3):
-                inner = np.linspace(low, high, 17)
+            for _ in range(PEAK_CLOSINGS):
+                inner = np.linspace(low, high, CLOSING_POINTS)
                 found = self._error_at(model, inner, row)
                 top = found.argmax(axis=0)
                 columns = np.arange(low.size)
                 best = int(found.max(axis=0).argmax())
                 if found[top[best], best] > worst[row]:
                     worst[row], at[row] = found[top[best], best], inner[top[best], best]
-                low, high = inner[np.maximum(top - 1, 0), columns], inner[np.minimum(top + 1, 16), columns]
+                low, high = (inner[np.clip(top + way, 0, CLOSING_POINTS - 1), columns] for way in (-1, 1))
         return Accuracy(worst * FOUND_TO_WORST + EXACT_ROUNDING, at)
 
     def _brackets(self, error: Real) -> tuple[Real, Real]:
         """The samples on either side of each high local maximum."""
         padded = np.r_[-1.0, error, -1.0]
-        (peaks,) = np.nonzero((error >= padded[:-2]) & (error >= padded[2:]) & (error >= 0.2 * error.max()))
+        (peaks,) = np.nonzero((error >= padded[:-2]) & (error >= padded[2:]) & (error >= HIGH_PEAK * error.max()))
         peaks = peaks[np.argsort(-error[peaks])][:MOST_PEAKS]
         return self.w[np.maximum(peaks - 1, 0)], self.w[np.minimum(peaks + 1, self.w.size - 1)]
 
@@ -108,7 +114,7 @@ class Ruler:
             for size in abs(np.concatenate([self.G(1j * w), slopes]))
         ]
         where = np.unique(np.concatenate(dips))
-        return np.linspace(w[where - 1], w[where + 1], 8).ravel()
+        return np.linspace(w[where - 1], w[where + 1], DIP_POINTS).ravel()
 
     def _clear(self, w: Real) -> Real:
         return w[self._is_clear(w)]
@@ -126,7 +132,7 @@ def axis_slope(G: TransferFunction, w: Real, poles: Real) -> Complex:
     """dG/ds (outputs, w) at i w; along the arm by differences across the axis, short against the nearest frequency."""
     if all(each.is_at_end for each in G.rows):
         return np.atleast_2d(G.derivative(1j * w))
-    step = 1e-3 * np.maximum(np.minimum(distance(w, poles), w), 1e-6 * w)
+    step = SLOPE_STEP * np.maximum(np.minimum(distance(w, poles), w), ON_A_POLE * w)
     return (G(1j * w + step) - G(1j * w - step)) / (2 * step)
 
 
@@ -138,19 +144,19 @@ def distance(w: Real, poles: Real) -> Real:
 
 
 def frequencies_around(arm: Arm, high: float) -> Real:
-    """The flexible natural frequencies below 1.5 times `high`, and the next one."""
-    table = modes(arm, modes_below(arm, 1.5 * high) + 1)
+    """The flexible natural frequencies below `POLES_BEYOND` times `high`, and the next one."""
+    table = modes(arm, modes_below(arm, POLES_BEYOND * high) + 1)
     return table.natural_frequency[table.index > 0]
 
 
 def _samples(low: float, high: float, poles: Real) -> Real:
     """Frequencies even by themselves and in their logarithm, between neighbouring poles, and crowded around each."""
-    count = 200 + int(SAMPLES_PER_DECADE * np.log10(high / low))
+    count = LEAST_SAMPLES + int(SAMPLES_PER_DECADE * np.log10(high / low))
     crowd = np.concatenate([poles[:, None] * (1 - POLE_DISTANCES), poles[:, None] * (1 + POLE_DISTANCES)]).ravel()
     knots = np.r_[low, poles[(poles > low) & (poles < high)], high]
-    share = (1 - np.cos(np.linspace(0, np.pi, 26)[1:-1])) / 2
+    share = (1 - np.cos(np.linspace(0, np.pi, BETWEEN_POLES + 2)[1:-1])) / 2
     between = (knots[:-1, None] + np.diff(knots)[:, None] * share).ravel()
-    w = np.concatenate([np.geomspace(low, high, count), np.linspace(low, high, 400), crowd, between])
+    w = np.concatenate([np.geomspace(low, high, count), np.linspace(low, high, EVEN_SAMPLES), crowd, between])
     w = np.clip(np.unique(w), low, high)
     return np.unique(w)
 

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     import control
 
 MAT_HEADER = b"MATLAB 5.0 MAT-file, written by tfarm"  # SciPy's own has the date in it: same inputs, same bytes
+HEADER_TEXT = 116  # bytes that a MAT-file begins with and that nobody reads, before its version
 WRITTEN_BY = ": written by tfarm."  # ends the first line of every script
 MAT_POINTS = 1000  # of the exact response in the file, even in ln w
 
@@ -99,7 +100,7 @@ def save_mat(reduced: ReducedModel, path: Path, *, key: str = "path") -> tuple[P
     content = io.BytesIO()
     scipy.io.savemat(content, _contents(reduced), oned_as="row")  # type: ignore[arg-type]
     write_file(script, _script(reduced, path).encode(), key=key)
-    write_file(path, MAT_HEADER.ljust(116) + content.getvalue()[116:], key=key)
+    write_file(path, MAT_HEADER.ljust(HEADER_TEXT) + content.getvalue()[HEADER_TEXT:], key=key)
     return path, script
 
 

@@ -32,6 +32,7 @@ from .residues import contour_residues, end_residues, undamped_residues
 
 MOST_MODELLED = 1000  # of a model: its matrices of 2000 states take 32 MB
 MOST_PROPER = 2  # power of s: a mode's share r s^2/(s^2 + w^2) is bounded, and one of s^3 is not
+PULLED_APART = 1e-6  # of its size: what parts the two of a double pole
 
 
 class ModalModel(PartialFractions):
@@ -152,7 +153,7 @@ def tailed_model(arm: Arm, count: int) -> ModalModel:
         return model
     W2 = s**2 * (whole - fallen) / fallen
     rho, half = whole * W2, arm.damping * W2 / 2
-    root = complex(np.emath.sqrt(half**2 - W2)) or 1e-6 * half  # a double pole has no residues
+    root = complex(np.emath.sqrt(half**2 - W2)) or PULLED_APART * half  # a double pole has no residues
     p = -half + root * np.array([1.0, -1.0])
     moment = others[0] * W2 * (s**2 + W2) / s**2 if others else -arm.hub_inertia * W2 * rho
     if others:

@@ -32,6 +32,10 @@ from .partial_fractions import PartialFractions
 
 BEYOND_BAND = 1.02  # modes up to so much above the band's end are taken exactly: a pole nearer to the band would show
 REMAINDER_POINTS = 300  # of the band, denser towards its end, where poles above it show most
+REMAINDER_FROM = 0.01  # of the band's end: below, the point S = 0 says all there is to say
+BESIDE_POLE = 1e-9  # of its frequency: no sample is nearer to a pole of the arm
+INFINITE_BELOW = 1e-13  # of the numerator: an eigenvalue with a smaller denominator is infinite but for rounding
+SHARING_ROUNDS = 4  # in which pairs that AAA did not need are given to modes
 REAL_SQUARE = 1e-10  # relative; a pole whose imaginary part is below it is real
 PATIENCE = 3  # degrees without progress, after which rounding rules
 ERRORS_ALIKE = 5e-14  # errors below this are all alike
@@ -84,7 +88,7 @@ def rational_model(arm: Arm, outputs: Wanted, pairs: int, high: float, x: float 
     G = transfer(arm, (hub, *rows), x=x)
     frequencies = frequencies_around(arm, high)
     found: list[tuple[tuple[float, int], RationalModel]] = []
-    for _ in range(4):  # first with all the poles asked for, then with those that helped
+    for _ in range(SHARING_ROUNDS):  # first with all the poles asked for, then with those that helped
         inside = modal_model(arm, G.rows, exact, x)
         rest = _remainders(G, inside, high, frequencies)
         poles, shares, error = _best_poles(rest, pairs - exact)
@@ -98,8 +102,8 @@ def rational_model(arm: Arm, outputs: Wanted, pairs: int, high: float, x: float 
 def _remainders(G: TransferFunction, inside: PartialFractions, high: float, frequencies: Real) -> _Remainders:
     """Samples over the band.  Below high/100 the point S = 0 says all there is to say."""
     k, share = G.system, 0.0 if G.x is None else G.x / G.arm.length
-    w = high * np.sin(np.linspace(0.01, np.pi / 2, REMAINDER_POINTS))
-    w = w[distance(w, frequencies) > 1e-9 * w]
+    w = high * np.sin(np.linspace(REMAINDER_FROM, np.pi / 2, REMAINDER_POINTS))
+    w = w[distance(w, frequencies) > BESIDE_POLE * w]
     S, power = -(w**2), np.array([[each.power] for each in G.rows])
     bases = [each.base for each in G.rows]
     at_zero = np.array(expansions_at_zero(k, bases, share))
@@ -194,7 +198,7 @@ def _zeros_of_denominator(nodes: Real, weights: Real) -> NDArray[Any]:
     mass = np.eye(n + 1)
     mass[0, 0] = 0.0
     numerator, denominator = scipy.linalg.eigvals(arrow, mass, homogeneous_eigvals=True)
-    finite = abs(denominator) > 1e-13 * abs(numerator)
+    finite = abs(denominator) > INFINITE_BELOW * abs(numerator)
     return numerator[finite] / denominator[finite]
 
 

@@ -39,6 +39,8 @@ BAND = (0.1, 1000.0)  # rad/s, unless told
 MOST_STATES = 400  # states: where the search for a model within an error ends
 MOST_TAILS = 12  # pairs of poles above the band: more fit rounding
 LEAST_FALL = 0.5  # of the error, or more, goes with 2.25 times the modes, even where it falls as 1/n; less is its floor
+COUNTS_TRIED = 3  # numbers of modes from the one that a rough measure finds on, measured in full
+WIDEST_BAND = 1e12  # its ends' ratio: what is wider was mistyped
 POLE_IS_MODE = 1e-6  # relative gap within which a pole of the model is a mode of the arm
 
 
@@ -228,7 +230,7 @@ class _Bench:
         while good - bad > 1:
             middle = (good + bad) // 2
             good, bad = (middle, bad) if rough(middle) <= error else (good, middle)
-        for count in range(good, min(good + 3, most + 1)):
+        for count in range(good, min(good + COUNTS_TRIED, most + 1)):
             measured = self._measured(make(self.arm, self.rows, count, self.x), "modal", "")
             if measured.worst_error <= error:
                 return measured
@@ -269,7 +271,7 @@ def _band(band: Any) -> tuple[float, float]:
         low, high = (float(edge) for edge in band)
     except (TypeError, ValueError):
         raise ParameterError(key="band", value=band, remedy=remedy) from None
-    if not 0 < low < high < math.inf or high / low > 1e12:
+    if not 0 < low < high < math.inf or high / low > WIDEST_BAND:
         raise ParameterError(key="band", value=(low, high), remedy=remedy)
     return low, high
 

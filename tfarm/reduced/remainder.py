@@ -17,6 +17,7 @@ from tfarm.arrays import Complex, Real
 CORNER_RATIOS = 1 + np.geomspace(0.02, 30.0, 14)  # c_j C, and below s C of the fit: tuned by hand on the lab arm
 SLOW_PAIRS = CORNER_RATIOS.size // 2  # the corners, two a pair
 FITTED_AT = np.geomspace(0.02, 5.0, 60)  # s C at which they are fitted: tuned with CORNER_RATIOS
+ALIKE = 1e-12  # of the largest singular value: corners that differ by less share their weight
 SLOW_POLES_FROM = 1.2  # C w of the last mode from which on it serves; below, the modes left out still ring
 
 
@@ -27,5 +28,5 @@ def slow_remainder(C: float, missing: Callable[[Complex], Complex]) -> tuple[Rea
     """
     basis = 1 / (1 + FITTED_AT[:, None] / CORNER_RATIOS) - 1
     left = missing((FITTED_AT / C).astype(complex)).real
-    shares: Real = np.linalg.lstsq(basis, left.T, rcond=1e-12)[0].T.astype(float)
+    shares: Real = np.linalg.lstsq(basis, left.T, rcond=ALIKE)[0].T.astype(float)
     return CORNER_RATIOS / C, shares

@@ -26,6 +26,8 @@ from tfarm.spectrum import Modes
 
 CLOSE_FREQUENCIES = 1e-6  # relative gap under which two frequencies are told apart by their shapes alone
 UNIT_CIRCLE = np.exp(2j * np.pi * np.arange(32) / 32)  # of Cauchy's integral: a pole 4 radii off adds 4^-32 of its own
+POLES_AWAY = 4  # radii of its circle: how far off another pole is at least
+RADII_TRIED, RADIUS_FALLS = 9, 3  # circles after the first, each a third of the one before
 RADII_AGREE = 1e-11  # of the largest value on the circle: what two radii may differ by
 
 
@@ -90,13 +92,13 @@ def contour_residues(k: System, wanted: Sequence[Output], p: Complex, x: float) 
     Raises ConvergenceError where that never happens: two eigenvalues are one to the last digits.
     """
     apart = abs(p[:, None] - p) + np.where(np.eye(p.size, dtype=bool), np.inf, 0.0)
-    radius = np.minimum(apart.min(axis=1, initial=np.inf), abs(p)) / 4
+    radius = np.minimum(apart.min(axis=1, initial=np.inf), abs(p)) / POLES_AWAY
     for point in k.singular:
-        radius = np.minimum(radius, abs(p - point) / 4)
+        radius = np.minimum(radius, abs(p - point) / POLES_AWAY)
     residues, size = _around(k, wanted, p, radius, x)
     todo = np.arange(p.size)
-    for _ in range(9):
-        radius[todo] /= 3
+    for _ in range(RADII_TRIED):
+        radius[todo] /= RADIUS_FALLS
         again, smaller = _around(k, wanted, p[todo], radius[todo], x)
         right = (abs(again - residues[:, todo]) <= RADII_AGREE * np.maximum(size[:, todo], smaller)).all(axis=0)
         residues[:, todo[~right]], size[:, todo[~right]] = again[:, ~right], smaller[:, ~right]

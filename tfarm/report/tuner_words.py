@@ -10,6 +10,7 @@ from tfarm.dsp.curves import away
 from tfarm.report.sections import Fact
 from tfarm.report.words import typeset, upper
 from tfarm.tuner.overview import Curves, TunerStudy
+from tfarm.tuner.studies import QUARTILES
 from tfarm.tuner.tuning import tip_errors
 
 SERVO_GAINS = (ANGLE_GAIN, RATE_GAIN)
@@ -176,7 +177,7 @@ def tuner_facts(data: TunerStudy) -> tuple[Fact, ...]:
     """The costs, from nothing to what is possible."""
     tuning, final = data.tuning, data.curves[0].final
     median = _median(data.curves[0])
-    low, high = (float(np.quantile(final, q, method="nearest")) for q in (0.25, 0.75))
+    low, high = (float(np.quantile(final, q, method="nearest")) for q in QUARTILES)
     gain = 100 * (1 - median / tuning.best_constant.cost)
     guard = tuning.training.guard
     off, off_constant = (significant(1e3 * x, 2) for x in off_target(data))

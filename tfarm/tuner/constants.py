@@ -11,6 +11,8 @@ from tfarm.tuner.guard import constant_windows
 from tfarm.tuner.trial import Trial
 
 CONSTANT_GAINS = 200  # constant gains of a window that are tried, before the best are refined
+BEST_REFINED = 3  # of them
+GAIN_XTOL = 1e-9  # to so much they are refined: a cost is flat there, so that the last digits say nothing
 
 
 class BestConstant(NamedTuple):
@@ -31,12 +33,12 @@ def best_constant(trial: Trial) -> BestConstant:
         gains = np.linspace(low, high, CONSTANT_GAINS + 2)[1:-1]
         costs = np.array([trial.with_constant(float(K)).cost for K in gains])
         step = (high - low) / (CONSTANT_GAINS + 1)
-        for i in np.argsort(costs)[:3]:
+        for i in np.argsort(costs)[:BEST_REFINED]:
             done = minimize_scalar(
                 lambda K: trial.with_constant(float(K)).cost,
                 bounds=(max(float(gains[i]) - step, low), min(float(gains[i]) + step, high)),
                 method="bounded",
-                options={"xatol": 1e-9},
+                options={"xatol": GAIN_XTOL},
             )
             found.append(BestConstant(float(done.x), float(done.fun)))
     return min(found, key=lambda each: each.cost)

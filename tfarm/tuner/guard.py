@@ -44,9 +44,17 @@ MOST_GAIN = 10.0  # where the frozen interval has no upper end
 MIDDLE_GAINS = 60  # gains of a window that a sector is tried around
 NARROWEST_SECTOR = 1e-4  # a sector this narrow is none
 SECTORS_AGREE = 1e-3  # of the width: how little more modes may change it
+SECTOR_TRIES, SECTOR_SHRINKS = 6, 0.9  # widths for which a proof is tried, each so much narrower than the one before
+MIDDLE_HALVINGS = 12  # of the step between two middles: to a part of it that no guard tells
+TIMES_THE_MODES = (4, 3, 2)  # of the loop: how many a larger one has, the first of which modes can be told apart
 GUARD_MODES_UNDAMPED = 20  # of the larger loop that a guard is held against at C = 0
 MOST_GUARD_MODES = 48  # of that at C > 0
 REMEDY_DAMPINGS = np.geomspace(1e-12, 1e-2, 11)  # s, tried for the remedy
+
+
+def guard_array(kind: GuardKind, lo: float, hi: float) -> Real:
+    """A guard as `kernel.guarded` takes it: whether there is one, and its ends."""
+    return np.zeros(3) if kind == "none" else np.array([1.0, lo, hi])
 
 
 @dataclass(frozen=True)
@@ -73,7 +81,7 @@ class Guard:
     @property
     def array(self) -> Real:
         """As `kernel.guarded` takes it."""
-        return np.zeros(3) if self.kind == "none" else np.array([1.0, self.lo, self.hi])
+        return guard_array(self.kind, self.lo, self.hi)
 
     @property
     def sentence(self) -> str:
@@ -135,7 +143,7 @@ def _moving(loops: list[SampledLoop], best_constant: float) -> Guard | None:
     radii = [model.radius(m) for model in models]
     found = [(m - radius, m + radius) for radius in radii]
     share = RADIUS_SHARE
-    for _ in range(6):
+    for _ in range(SECTOR_TRIES):
         half = share * min(radii)
         lo, hi = max(0.0, m - half), m + half
         if half < NARROWEST_SECTOR:
@@ -144,7 +152,7 @@ def _moving(loops: list[SampledLoop], best_constant: float) -> Guard | None:
         if all(proofs):
             whole = tuple(proof for proof in proofs if proof is not None)
             return Guard("time-varying", lo, hi, loops[-1].plant.count, _settled(loops, found), whole)
-        share *= 0.9
+        share *= SECTOR_SHRINKS
     return None
 
 
@@ -161,7 +169,7 @@ def _middle(model: MovingGain, best_constant: float) -> float | None:
         return float(middles[int(np.argmin(beyond))])
     best = int(np.argmax(np.where(holds, radii, -1.0)))
     inner, outer = float(middles[best]), float(middles[min(best + 1, middles.size - 1)])
-    for _ in range(12):  # up to where the best constant gain just is inside
+    for _ in range(MIDDLE_HALVINGS):  # up to where the best constant gain just is inside
         m = (inner + outer) / 2
         radius = model.radius(m)
         if abs(best_constant - m) <= INSIDE * radius and radius >= radii[best]:
@@ -199,7 +207,7 @@ def _larger(loop: SampledLoop) -> Iterator[SampledLoop]:
     """
     yield loop
     arm, count = loop.plant.arm, loop.plant.count
-    wanted = (4 * count, 3 * count, 2 * count) if arm.damping else (GUARD_MODES_UNDAMPED,)
+    wanted = tuple(times * count for times in TIMES_THE_MODES) if arm.damping else (GUARD_MODES_UNDAMPED,)
     for number in (min(number, MOST_GUARD_MODES) for number in wanted):
         if number <= count:
             return

@@ -23,6 +23,7 @@ IntegerMatrix = list[list[int]]
 
 SLACKS = (1e-3, 1e-5, 1e-7, 1e-9)  # how strictly the inequality is asked for, in balanced states
 BITS_OF_P = 60  # bits that P is rounded to before the proof
+DOUBLINGS = 40  # of the number of samples that a sum over all of them has: 10^12, after which any mode has died down
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,7 @@ def common_lyapunov(middle: Real, drive: Real, sense: Real, low: Real, high: Rea
 def _sizes(A: Real, b: Real) -> Real:
     """How far each state goes after one push: the root of its sum of squares, by doubling."""
     total, power = np.outer(b, b), A
-    for _ in range(40):
+    for _ in range(DOUBLINGS):
         total, power = total + power @ total @ power.T, power @ power
     size: Real = np.sqrt(np.diag(total))
     return np.where(size > 0, size, 1.0)

@@ -19,6 +19,7 @@ from tfarm.records import record
 from tfarm.tuner import kernel
 
 MOST_HIDDEN = 1000  # neurons; the paper has 6
+PAPER_INPUTS, PAPER_HIDDEN = 6, 6  # of the paper's network; one input more, the gain before, where it is asked for
 HALF_WIDTH = 0.5  # of the uniform distribution of the initial weights
 
 
@@ -46,7 +47,8 @@ class Network:
 
     def _check_shapes(self) -> None:
         remedy = f"W1 is (hidden, 6 or 7), hidden from 1 to {MOST_HIDDEN}, with as many columns as scales"
-        if self.W1.ndim != 2 or self.W1.shape[1] not in (6, 7) or not 1 <= self.W1.shape[0] <= MOST_HIDDEN:
+        inputs = (PAPER_INPUTS, PAPER_INPUTS + 1)
+        if self.W1.ndim != 2 or self.W1.shape[1] not in inputs or not 1 <= self.W1.shape[0] <= MOST_HIDDEN:
             raise ParameterError(key="W1", value=self.W1.shape, remedy=remedy)
         if self.w2.shape != self.W1.shape[:1]:
             raise ParameterError(key="w2", value=self.w2.shape, remedy=f"one weight a hidden neuron, {len(self.W1)}")
@@ -77,10 +79,10 @@ class Network:
         return float(K), gradient
 
 
-def initial_network(seed: int, *, hidden: int = 6, scales: Real | None = None) -> Network:
+def initial_network(seed: int, *, hidden: int = PAPER_HIDDEN, scales: Real | None = None) -> Network:
     """Weights uniform in (-0.5, 0.5), by NumPy's PCG64 of that seed; `scales` (6 or 7) are 1 N m unless given."""
     seed = whole("seed", seed, 0, 2**63 - 1, "a seed is a whole number from 0 to 2^63 - 1")
     hidden = whole("hidden", hidden, 1, MOST_HIDDEN, f"a whole number of neurons from 1 to {MOST_HIDDEN}")
-    widths = np.ones(6) if scales is None else np.asarray(scales, dtype=float)
+    widths = np.ones(PAPER_INPUTS) if scales is None else np.asarray(scales, dtype=float)
     draw = np.random.default_rng(seed).uniform(-HALF_WIDTH, HALF_WIDTH, hidden * (widths.size + 1))
     return Network(draw[:-hidden].reshape(hidden, widths.size), draw[-hidden:], widths)

@@ -27,6 +27,9 @@ from tfarm.tuner.lyapunov import CommonLyapunov, common_lyapunov
 
 RADIUS_SHARE = 0.99  # of the radius that the criterion allows: room for the modes left out, and for a strict proof
 POLE_WIDTHS = np.r_[-np.geomspace(100.0, 0.01, 30), 0.0, np.geomspace(0.01, 100.0, 30)]  # around a pole's angle
+NARROWEST_PEAK = 1e-12  # of a pole next to the circle: its distance from it is known to no less
+EVEN_POINTS = 1001  # of half the circle, beside those around poles
+PEAK_ROUNDS, PEAKS_REFINED, PEAK_POINTS = 4, 5, 41  # rounds, highest points in each, points about them: 20 times finer
 
 
 @dataclass(frozen=True)
@@ -87,17 +90,17 @@ class MovingGain:
 
 def _peak(residues: NDArray[np.complexfloating], poles: NDArray[np.complexfloating]) -> float:
     """max over the unit circle of |sum of residues/(z - poles)|."""
-    angle, width = abs(np.angle(poles)), np.maximum(1 - abs(poles), 1e-12)
+    angle, width = abs(np.angle(poles)), np.maximum(1 - abs(poles), NARROWEST_PEAK)
     dense = (angle[:, None] + width[:, None] * POLE_WIDTHS).ravel()
-    theta = np.unique(np.clip(np.r_[np.linspace(0, np.pi, 1001), dense], 0, np.pi))
+    theta = np.unique(np.clip(np.r_[np.linspace(0, np.pi, EVEN_POINTS), dense], 0, np.pi))
 
     def size(theta: Real) -> Real:
         return np.asarray(abs((residues / (np.exp(1j * theta)[:, None] - poles)).sum(axis=1)))
 
     values = size(theta)
-    for _ in range(4):
-        best = np.argsort(values)[-5:]
+    for _ in range(PEAK_ROUNDS):
+        best = np.argsort(values)[-PEAKS_REFINED:]
         low, high = theta[np.maximum(best - 1, 0)], theta[np.minimum(best + 1, theta.size - 1)]
-        theta = np.unique((low[:, None] + (high - low)[:, None] * np.linspace(0, 1, 41)).ravel())
+        theta = np.unique((low[:, None] + (high - low)[:, None] * np.linspace(0, 1, PEAK_POINTS)).ravel())
         values = size(theta)
     return float(values.max())

@@ -22,17 +22,19 @@ import numpy as np
 from tfarm.arm import MOMENT_GAIN
 from tfarm.arrays import Real
 from tfarm.dsp import SampledLoop, Scenario
+from tfarm.dsp.chain import TIME_ROUNDING
 from tfarm.tuner.trial import Trial
 
 Shaper = Literal["ZV", "EI"]
 
 SHAPED_MODES = 2  # which a slew excites most
 TOLERATED = 0.05  # V: the share of the vibration that EI leaves at the mode itself, as its authors have it
+NEARLY_PI = 0.999  # of pi rad a sample: the fastest frequency beside a mode that a shaper can have
 
 
 def zero_vibration(z: complex) -> Real:
     """The impulses (n + 2,) of the shaper that is zero at z and its conjugate, 0 < arg z < pi."""
-    n = max(1, math.floor(math.pi / abs(np.angle(z)) * (1 + 1e-12)))
+    n = max(1, math.floor(math.pi / abs(np.angle(z)) * (1 + TIME_ROUNDING)))
     at = np.array([0, n, n + 1])
     powers = z ** (-at.astype(float))
     shares = np.linalg.solve(np.array([powers.real, powers.imag, np.ones(3)]), [0.0, 0.0, 1.0])
@@ -45,7 +47,7 @@ def extra_insensitive(z: complex) -> Real:
     """Two such shapers in a row, beside the frequency of z."""
     d = math.acos((1 - TOLERATED) / (1 + TOLERATED)) / math.pi
     turn = float(np.angle(z))
-    beside = [abs(z) * np.exp(1j * min(turn * factor, 0.999 * math.pi)) for factor in (1 - d, 1 + d)]
+    beside = [abs(z) * np.exp(1j * min(turn * factor, NEARLY_PI * math.pi)) for factor in (1 - d, 1 + d)]
     return np.convolve(zero_vibration(complex(beside[0])), zero_vibration(complex(beside[1])))
 
 

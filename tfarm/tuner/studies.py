@@ -42,6 +42,7 @@ TellDone = Callable[[int, int], None]
 ALPHAS = (0.0, 0.2, 0.4, 0.6, 0.8, 0.9)  # momentum factors of the map, about the paper's
 ETAS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)  # learning rates, likewise
 PAPER_PAIR = (0.6, 0.8)  # its momentum factor and learning rate
+QUARTILES = (0.25, 0.75)  # of the runs of one plan, between which their spread is said
 WEIGHT_PAIRS = ((1.0, 0.65), (1.0, 1.3), (1.0, 2.6), (1.0, 5.2), (1.0, 10.4), (0.25, 2.6), (4.0, 2.6))  # a, b
 STUDIED_RULES: tuple[tuple[Rule, Mode, Sensitivity], ...] = (
     ("dynamic", "trial", "one-step"),
@@ -241,9 +242,9 @@ PLAN_COLUMNS = (  # what the seeds of a group have in common
 )
 GROUP_COLUMNS = (  # of the runs of one plan, a run a seed
     _four("cost_median", "median", of=lambda group: final_cost(group, 0.5)),
-    Column("cost_quartiles", of=lambda group: [final_cost(group, 0.25), final_cost(group, 0.75)], on=(JSON,)),
-    _four("", "lower quartile", of=lambda group: final_cost(group, 0.25), on=(TERMINAL,)),
-    _four("", "upper quartile", of=lambda group: final_cost(group, 0.75), on=(TERMINAL,)),
+    Column("cost_quartiles", of=lambda group: [final_cost(group, share) for share in QUARTILES], on=(JSON,)),
+    _four("", "lower quartile", of=lambda group: final_cost(group, QUARTILES[0]), on=(TERMINAL,)),
+    _four("", "upper quartile", of=lambda group: final_cost(group, QUARTILES[1]), on=(TERMINAL,)),
     _four("cost_best", "best", of=lambda group: min(each.cost for each in group)),
     _four("cost_worst", "worst", of=lambda group: max(each.cost for each in group)),
     Column("below_best_constant", "below best constant", of=lambda group: _below(group),
@@ -276,7 +277,7 @@ def study_answer(study: str, results: list[Finished], seeds: int) -> dict[str, A
     answer: dict[str, Any] = {"study": study, "seeds": seeds, "groups": table}
     if study == "curves":
         costs = learning_costs(results, max(len(each.costs) for each in results))
-        low, middle, high = np.quantile(costs, [0.25, 0.5, 0.75], axis=0, method="nearest").tolist()
+        low, middle, high = np.quantile(costs, [QUARTILES[0], 0.5, QUARTILES[1]], axis=0, method="nearest").tolist()
         answer |= {"median": middle, "lower_quartile": low, "upper_quartile": high}
     if study == "map":
         answer["verdict"] = map_verdict(groups)
@@ -288,7 +289,7 @@ def map_verdict(groups: list[list[Finished]]) -> str:
     medians = np.array([final_cost(group, 0.5) for group in groups])
     at = [(group[0].plan.learning.alpha, group[0].plan.learning.eta) for group in groups]
     paper, best = at.index(PAPER_PAIR), int(np.argmin(medians))
-    spread = [final_cost(groups[paper], share) for share in (0.25, 0.75)]
+    spread = [final_cost(groups[paper], share) for share in QUARTILES]
     rank = int((medians < medians[paper]).sum()) + 1
     quartiles = ", ".join(f"{cost:.4g}" for cost in spread)
     start = f"(alpha_c, eta_c) = {PAPER_PAIR}: median cost {medians[paper]:.4g} (quartiles {quartiles})"

@@ -35,6 +35,7 @@ Sensitivity = Literal["one-step", "whole"]
 
 RULE_NUMBERS = {"dynamic": rules.BACKTRACKING_RULE, "clipped": rules.CLIPPED_RULE, "plain": rules.PLAIN_RULE}
 MOST_TRIALS = 1_000_000  # of a tuning: a bound on what a slip of the hand may ask for
+NO_GAIN = 1e-3  # of K: a network that gives less all along a trial has driven its gain to nothing
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,7 +115,7 @@ class Training:
     @property
     def died(self) -> bool:
         """Whether the gain was driven to nothing."""
-        return bool(self.result.K.max(initial=0.0) < 1e-3)
+        return bool(self.result.K.max(initial=0.0) < NO_GAIN)
 
 
 def train(trial: Trial, network: Network, guard: Guard, learning: Learning, trials: int) -> Training:

@@ -33,10 +33,11 @@ from tfarm.errors import ParameterError, must_be_known
 from tfarm.records import record
 from tfarm.spectrum.scales import default_gains
 from tfarm.tuner import kernel
-from tfarm.tuner.network import Network
+from tfarm.tuner.network import PAPER_INPUTS, Network
 
-SILENT = Network(np.zeros((1, 6)), np.zeros(1), np.ones(6))  # for a guard that leaves no choice
+SILENT = Network(np.zeros((1, PAPER_INPUTS)), np.zeros(1), np.ones(PAPER_INPUTS))  # for a guard that leaves no choice
 TRIAL_MODES = 6  # flexible modes of a trial, unless told
+LAST_SAMPLE = 1e-9  # of a duration of whole samples, that is taken off it: their number is counted with both ends
 ANGLE_REMEDY = "the hub angle gain is zero or positive, in N m/rad"
 
 
@@ -137,7 +138,7 @@ class Trial:
         """The same slew asked of another loop, whose controller knows the arm of this one."""
         here = slew_trial(
             arm, chain, K1=servo.K1, Kp=servo.Kp, cost=self.cost, signals=self.signals, known=self.arm,
-            duration=self.n * self.task.period * (1 - 1e-9), count=self.loop.plant.count,
+            duration=self.n * self.task.period * (1 - LAST_SAMPLE), count=self.loop.plant.count,
         )  # fmt: skip
         return replace(here, task=self.task)
 
@@ -146,11 +147,11 @@ class Trial:
         chain, task = chain or self.loop.chain, task or self.task
         return Simulator(self.arm, chain, task, count=self.loop.plant.count)
 
-    def run(self, inputs: int = 6, hidden: int = 1) -> Run:
+    def run(self, inputs: int = PAPER_INPUTS, hidden: int = 1) -> Run:
         """Empty arrays for a network of that size."""
         return Run(np.zeros((self.n, inputs)), np.zeros((self.n, hidden)), np.zeros((self.n, 5)))
 
-    def work(self, inputs: int = 6) -> tuple[Real, ...]:
+    def work(self, inputs: int = PAPER_INPUTS) -> tuple[Real, ...]:
         """Room for `kernel.forward` and `kernel.backward`."""
         size = self.model[2].size
         return np.zeros(size), np.zeros(size), np.zeros(inputs), np.zeros(5)

@@ -20,7 +20,7 @@ from tfarm.tuner.comparison import Outcomes
 from tfarm.tuner.constants import BestConstant, best_constant
 from tfarm.tuner.controller import TunedGain, tip_off
 from tfarm.tuner.guard import GuardKind, find_guard
-from tfarm.tuner.network import initial_network
+from tfarm.tuner.network import PAPER_HIDDEN, PAPER_INPUTS, initial_network
 from tfarm.tuner.saving import SavedTuner, weights_answer
 from tfarm.tuner.shaping import shaped_trial
 from tfarm.tuner.training import Learning, Training, train
@@ -61,7 +61,7 @@ class Plan:
     Kp: float = 0.0
     duration: float = TRIAL_DURATION
     count: int = TRIAL_MODES
-    hidden: int = 6
+    hidden: int = PAPER_HIDDEN
     seventh_input: bool = False
     scale: float = 1.0
 
@@ -81,7 +81,7 @@ class Plan:
     @property
     def scales(self) -> np.ndarray[Any, Any]:
         """The scales of the network's inputs."""
-        return np.r_[np.full(6, self.scale), np.ones(int(self.seventh_input))]
+        return np.r_[np.full(PAPER_INPUTS, self.scale), np.ones(int(self.seventh_input))]
 
 
 @dataclass(frozen=True)
