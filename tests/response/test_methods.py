@@ -8,12 +8,12 @@ import pytest
 import tfarm
 from tests.shell import run
 from tests.strategies import some_arm
-from tfarm.cli.methods import METHODS_AGREE
 from tfarm.errors import ParameterError
-from tfarm.exact.methods import METHODS
+from tfarm.exact.methods import METHODS, METHODS_AGREE
 
 S = np.array([0.3 + 57.1j, 57.1j, -3.0 + 400.0j, 2.0 + 0j])
-BRACKETS = 1e-14  # the middle of two neighbouring decimals of 15 digits
+EPS = np.finfo(float).eps
+FLOAT64 = 8 * EPS  # of a frequency polished in float64: a bracket of 15 digits is wider
 
 
 @pytest.mark.parametrize("preset", ["sasaki2012", "sasaki2012-lab", "stocky-steel"])
@@ -24,8 +24,9 @@ def test_three_methods_give_one_number(preset):
         for each in slow:
             assert each == pytest.approx(fast, rel=METHODS_AGREE, abs=0)
     table = tfarm.modes(arm, 5)
-    for method in METHODS[1:]:
-        assert table.frequencies(method) == pytest.approx(table.natural_frequency, rel=BRACKETS, abs=0)
+    balls, determinant = (table.frequencies(method) for method in METHODS[1:])
+    assert balls == pytest.approx(determinant, rel=EPS, abs=0)  # both are more than 15 digits, rounded once
+    assert table.natural_frequency == pytest.approx(balls, rel=FLOAT64, abs=0)
 
 
 def test_random_arms_too():
@@ -58,12 +59,55 @@ def test_commands_compare_and_take_a_method(capsys):
     code, out, _ = run(capsys, "modes", "sasaki2012", "--count", "3", "--compare", "--json")
     answer = json.loads(out)
     assert (code, list(answer["methods"])) == (0, list(METHODS))
-    assert answer["largest_difference"] < BRACKETS
+    assert answer["largest_difference"] < FLOAT64
+    assert answer["left_out"] == {}
     _, out, _ = run(capsys, "modes", "sasaki2012", "--count", "3", "--method", "appendix", "--json")
     assert json.loads(out)["method"] == "appendix"
     _, out, _ = run(capsys, "response", "sasaki2012", "--output", "shear", "--x", "0.3", "--omega", "1000", "--compare")
     assert "agree to" in out
     assert "+0j" in out.splitlines()[1]  # at C = 0 no rounding is printed as an imaginary part
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        "modes quanser-2dsfl --count 2",
+        "modes sasaki2012 --count 2 --theory shear",
+        "response quanser-2dsfl --output hub_rate --omega 10,100",
+        "response sasaki2012 --output tip_angle --omega 10,100",
+    ],
+)
+def test_where_the_appendix_does_not_apply_two_roads_are_left_and_it_is_said_why(asked, capsys):
+    code, out, _ = run(capsys, *asked.split(), "--compare")
+    assert code == 0
+    *_, agreed, why = out.splitlines()
+    assert agreed.startswith("Float64 and proven balls agree to ")
+    assert why.startswith("No appendix here: the paper's appendix is ")
+    assert "appendix" not in out.splitlines()[0]
+    found = json.loads(run(capsys, *asked.split(), "--compare", "--json")[1])
+    assert list(found["methods"]) == list(METHODS[:2])
+    assert list(found["differences"]) == ["balls"]
+    assert list(found["left_out"]) == ["appendix"]
+
+
+def test_python_has_the_roads_beside_each_other():
+    """What is printed is what each road says when it is asked alone."""
+    arm = tfarm.load("sasaki2012")
+    outputs = ["root_moment", "tip_displacement"]
+    found = tfarm.transfer(arm, outputs).by_methods(S)
+    for method in METHODS:
+        np.testing.assert_array_equal(found.values[method], tfarm.transfer(arm, outputs, method=method)(S))
+    apart = abs(found.values["appendix"] / found.values["closed-form"] - 1)
+    assert found.differences["appendix"] == pytest.approx(apart, abs=EPS)
+    assert found.largest_difference == max(each.max() for each in found.differences.values())
+    assert found.agree
+    rig = tfarm.modes(tfarm.load("quanser-2dsfl"), 2)
+    assert list(rig.by_methods().values) == ["closed-form", "balls"]
+    assert "one Timoshenko beam" in rig.by_methods().left_out["appendix"]
+    with pytest.raises(ParameterError, match="one Timoshenko beam"):
+        rig.frequencies("appendix")
+    with pytest.raises(ParameterError, match="input at the hub"):
+        tfarm.transfer(arm, "root_moment", input="force@0.3").by_methods(S)
 
 
 @pytest.mark.parametrize(

@@ -56,16 +56,16 @@ def modes(
     """Natural frequencies and modes, complete by construction."""
     wanted, right = whole_number("--count", count, 1, MOST_LISTED), right_digits(digits)
     subject = load_arm(arm)
-    from tfarm.cli.methods import BESIDE_COMPARE, modes_by_methods, print_compared, refuse_beside, slow_method
+    from tfarm.cli.methods import BESIDE_COMPARE, print_compared, refuse_beside, slow_method
     from tfarm.cli.tables import print_modes
     from tfarm.spectrum import modes as find_modes
-    from tfarm.spectrum.answers import modes_answer
+    from tfarm.spectrum.answers import modes_answer, modes_by_methods_answer
 
     table = find_modes(subject, wanted)
     road = slow_method(method, len(table), right, compare)
     if compare:
         refuse_beside({"--certify": certify or None}, BESIDE_COMPARE)
-        give(modes_by_methods(table), json, print_compared)
+        give(modes_by_methods_answer(table), json, print_compared)
         return
     give(modes_answer(table, right, certify, road), json, print_modes)
 
@@ -109,10 +109,10 @@ def response(
 
     right, at = right_digits(digits), points_on(s, omega, start, stop, points)
     subject, driven = asked_input(load_arm(arm), driven)
-    from tfarm.cli.methods import BESIDE_COMPARE, print_compared, refuse_beside, responses_by_methods, slow_method
+    from tfarm.cli.methods import BESIDE_COMPARE, print_compared, refuse_beside, slow_method
     from tfarm.cli.tables import print_found, say_written
     from tfarm.response import transfer
-    from tfarm.response.answers import points_table, response_answer
+    from tfarm.response.answers import by_methods_answer, points_table, response_answer
     from tfarm.tables.files import write_csv
     from tfarm.tables.terminal import show
 
@@ -120,7 +120,7 @@ def response(
     (wanted,) = read_on([output], side)
     if compare:
         refuse_beside({"--csv": csv, "--input": driven}, BESIDE_COMPARE)
-        give(responses_by_methods(subject, wanted, x, at), json, print_compared)
+        give(by_methods_answer(transfer(subject, wanted, x=x), at), json, print_compared)
         return
     answer = response_answer(transfer(subject, wanted, x=x, method=road, input=driven), at, right)
     if csv is not None:

@@ -8,14 +8,17 @@ appendix      the paper's own 4x4 determinant and Cramer's rule with mpmath, at 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Literal
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tfarm.arm import Arm
-from tfarm.arrays import Complex
+from tfarm.arm import Arm, Theory
+from tfarm.arrays import Complex, Real
 from tfarm.errors import ParameterError, did_you_mean
+from tfarm.records import record
 
 from . import appendix
 from .outputs import Output
@@ -26,6 +29,53 @@ Method = Literal["closed-form", "balls", "appendix"]
 METHODS: tuple[Method, ...] = ("closed-form", "balls", "appendix")
 
 APPENDIX_DIGITS = 17  # of the appendix: more than a float64 holds
+METHODS_AGREE = 1e-14  # relative: some tens of roundings of a float64, by which each of two roads may be off
+
+
+@dataclass(frozen=True)
+@record
+class Roads:
+    """The same numbers by each method that has them (`values`), and in words why another is left out (`left_out`)."""
+
+    values: dict[Method, NDArray[Any]]
+    left_out: dict[Method, str]
+
+    @property
+    def differences(self) -> dict[Method, Real]:
+        """How far each is from the closed form, as a share of that; of 1 where that is 0."""
+        fast = self.values["closed-form"]
+        size = np.where(fast == 0, 1.0, abs(fast))
+        return {name: np.asarray(abs(each - fast) / size) for name, each in self.values.items() if each is not fast}
+
+    @property
+    def largest_difference(self) -> float:
+        """The largest of these."""
+        return max(float(each.max(initial=0.0)) for each in self.differences.values())
+
+    @property
+    def agree(self) -> bool:
+        """Whether they differ by no more than their rounding."""
+        return self.largest_difference <= METHODS_AGREE
+
+
+def by_roads(value: Callable[[Method], NDArray[Any]], no_appendix: str) -> Roads:
+    """The values of each method, without the appendix where words say why it has none."""
+    left_out: dict[Method, str] = {"appendix": no_appendix} if no_appendix else {}
+    return Roads({method: np.asarray(value(method)) for method in METHODS if method not in left_out}, left_out)
+
+
+def roads_answer(found: Roads) -> dict[str, Any]:
+    """The values by method, complex ones as pairs, how far they part, and what is left out."""
+
+    def listed(values: NDArray[Any]) -> list[Any]:
+        return np.stack([values.real, values.imag], axis=-1).tolist() if np.iscomplexobj(values) else values.tolist()
+
+    return {
+        "methods": {name: listed(each) for name, each in found.values.items()},
+        "left_out": dict(found.left_out),
+        "differences": {name: each.tolist() for name, each in found.differences.items()},
+        "largest_difference": found.largest_difference,
+    }
 
 
 def known_method(method: str) -> Method:
@@ -33,6 +83,20 @@ def known_method(method: str) -> Method:
     if method not in METHODS:
         raise ParameterError(key="method", value=method, remedy=did_you_mean(method, METHODS))
     return method
+
+
+def why_no_appendix(arm: Arm, theory: Theory, wanted: Sequence[Output] = ()) -> str:
+    """Why the paper's appendix has no value of these outputs, or no frequencies; "" where it has."""
+    if theory != "timoshenko" or not arm.is_uniform:
+        return "the paper's appendix is of one Timoshenko beam on a hub"
+    others = [each.name for each in wanted if each.is_of_a_chain]
+    return f"the paper's appendix is not asked for {others[0]}" if others else ""
+
+
+def must_be_of_appendix(arm: Arm, theory: Theory, wanted: Sequence[Output] = ()) -> None:
+    """Raise ParameterError where the appendix has no answer."""
+    if words := why_no_appendix(arm, theory, wanted):
+        raise ParameterError(key="method", value="appendix", remedy=words)
 
 
 def slow_values(method: Method, arm: Arm, k: System, wanted: Sequence[Output], s: Complex, x: float) -> Complex:
@@ -43,13 +107,7 @@ def slow_values(method: Method, arm: Arm, k: System, wanted: Sequence[Output], s
     if method == "balls":
         return np.array([[value_with_care(k, each, complex(at), each.share(x)) for at in s] for each in wanted])
 
-    if not (arm.is_uniform and arm.theory == "timoshenko"):
-        remedy = "the paper's appendix is of one uniform Timoshenko link on a hub"
-        raise ParameterError(key="method", value=method, remedy=remedy)
-
-    for each in wanted:
-        if each.is_of_a_chain:
-            raise ParameterError(key="output", value=each.name, remedy="the paper's appendix is not asked for it")
+    must_be_of_appendix(arm, arm.theory, wanted)
 
     def by_cramer(each: Output, at: complex) -> complex:
         return complex(appendix.response(arm, each, at, APPENDIX_DIGITS, x * arm.link.length))

@@ -9,6 +9,7 @@ import numpy as np
 
 from tfarm.columns import Column, Table
 from tfarm.digits import general, singly, within
+from tfarm.exact.methods import roads_answer
 from tfarm.spectrum.answers import EIGENVALUE_ERROR
 
 from .frequency import Bode
@@ -34,6 +35,12 @@ def response_answer(G: TransferFunction, s: np.ndarray[Any, Any], digits: int | 
     if G.x is not None:
         answer["x"] = G.x
     return answer | {"s": [[float(p.real), float(p.imag)] for p in s], "value": value}
+
+
+def by_methods_answer(G: TransferFunction, s: np.ndarray[Any, Any]) -> dict[str, Any]:
+    """One output at s by each method, and by what share of its size each differs from the closed form."""
+    answer: dict[str, Any] = {"arm": G.arm.name, "output": G.outputs[0], "unit": G.units[0]}
+    return answer | {"s": [[float(p.real), float(p.imag)] for p in s], **roads_answer(G.by_methods(s))}
 
 
 def points_table(answer: dict[str, Any]) -> Table:

@@ -18,7 +18,7 @@ from tfarm.exact.balls import nearest_float
 from tfarm.exact.chain import ElementChain
 from tfarm.exact.chaining import chain_of
 from tfarm.exact.loads import is_load, load_of, loaded_value
-from tfarm.exact.methods import Method, known_method, slow_values
+from tfarm.exact.methods import Method, Roads, by_roads, known_method, slow_values, why_no_appendix
 from tfarm.exact.outputs import Output, output
 from tfarm.exact.system import System, system_of
 from tfarm.exact.values import (
@@ -127,6 +127,17 @@ class TransferFunction:
         """G(s) at a complex scalar or array."""
         points = _finite(s)
         return self._shaped(self._values(points.ravel()).reshape(len(self.outputs), *points.shape))
+
+    def by_methods(self, s: ArrayLike) -> Roads:
+        """G(s) at an array of s by every method that has it (`tfarm.exact.methods`), and how far these part."""
+        self.must_be_of_the_hub("a comparison of methods")
+        wanted = self.rows[0] if self.is_single else self.rows
+        points = np.atleast_1d(np.asarray(s))
+
+        def value(method: Method) -> Complex:
+            return np.asarray(transfer(self.arm, wanted, x=self.x, method=method)(points))
+
+        return by_roads(value, why_no_appendix(self.arm, self.arm.theory, self.rows))
 
     def derivative(self, s: ArrayLike) -> Any:
         """dG/ds at a complex scalar or array, by the same formulas carried as power series."""

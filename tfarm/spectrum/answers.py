@@ -13,7 +13,7 @@ from tfarm.arrays import Real
 from tfarm.columns import ANSWER, JSON, REPORT, TERMINAL, Column, Table
 from tfarm.digits import DOUBLE_DIGITS, aligned, general, kept_digits, lined, significant, singly, within
 from tfarm.errors import MISSING
-from tfarm.exact.methods import Method
+from tfarm.exact.methods import Method, roads_answer
 
 from .damped import DampedModes, damped_modes
 from .table import FEWEST_LISTED, Modes, compare_theories, hub_locked
@@ -73,6 +73,12 @@ DAMPED_MODE_COLUMNS = (  # of `DampedModes`, on a page; a command has them besid
     Column("eigenvalue_im", "Im s", "rad/s", of=lambda damped: damped.eigenvalues[:, 0].imag, shown=_imaginary),
     Column("damping_ratio", "damping ratio", "-", digits=singly(_ratio)),
 )
+
+
+def modes_by_methods_answer(modes: Modes) -> dict[str, Any]:
+    """The frequencies by each method, and by what share each differs from the closed form."""
+    answer = {"arm": modes.arm.name, "theory": modes.theory, "index": [int(index) for index in modes.index]}
+    return answer | roads_answer(modes.by_methods())
 
 
 def modes_answer(

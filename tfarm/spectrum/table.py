@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from fractions import Fraction
 from functools import cached_property
 
 import numpy as np
@@ -17,7 +18,15 @@ from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exact.appendix import natural_frequency, roots_near
 from tfarm.exact.chain import ElementChain
 from tfarm.exact.coefficients import Coefficients
-from tfarm.exact.methods import APPENDIX_DIGITS, Method, known_method
+from tfarm.exact.methods import (
+    APPENDIX_DIGITS,
+    Method,
+    Roads,
+    by_roads,
+    known_method,
+    must_be_of_appendix,
+    why_no_appendix,
+)
 from tfarm.exact.system import System, shear_flexibility, system_of
 from tfarm.records import record
 
@@ -28,6 +37,7 @@ from .search import count_below, natural_frequencies
 from .sensitivities import arm_sensitivities, chain_sensitivities
 from .shapes import Shapes
 
+BEYOND_DOUBLE = 20  # digits of a bracket: it is a ten-thousandth of a float64's rounding
 MOST_TABLE_MODES = 10_000  # at a time
 FEWEST_LISTED = 12  # digits of a frequency that is listed by itself
 NODE_POINTS, HALF_WAVES_BEYOND = 24, 3  # points a half wave, of so many more than the mode has, between which nodes lie
@@ -78,23 +88,30 @@ class Modes:
     def frequencies(self, method: Method = "closed-form") -> Real:
         """The frequencies [rad/s] by another road (`tfarm.exact.methods`), float64, one a mode.
 
-        "balls": the middle of each proven bracket, 15 digits; "appendix": the roots of the paper's Delta next to them.
+        "balls": the middle of each proven bracket, wide as the last of 20 digits, nothing beside a float64's rounding;
+        "appendix": the roots of the paper's Delta next to them.
         Raises ParameterError for the appendix of another theory, CertificationError where a bracket is not proven and
         ConvergenceError where Delta's root has no digits: both at a double frequency.
         """
         if known_method(method) == "closed-form":
             return self.natural_frequency
         if method == "balls":
-            flexible = [(float(lower) + float(upper)) / 2 for lower, upper in self.certify().brackets]
-        elif self.theory == "timoshenko" and self.arm.is_uniform:
+            brackets = self.certify(BEYOND_DOUBLE).brackets
+            flexible = [float((Fraction(lower) + Fraction(upper)) / 2) for lower, upper in brackets]
+        else:
+            must_be_of_appendix(self.arm, self.theory)
             flexible = [
                 float(natural_frequency(self.arm, float(omega), APPENDIX_DIGITS))
                 for omega in self.natural_frequency[self._rigid :]
             ]
-        else:
-            remedy = "the paper's appendix is of one Timoshenko beam on a hub"
-            raise ParameterError(key="method", value=method, remedy=remedy)
         return np.r_[[0.0] * self._rigid, flexible]
+
+    def by_methods(self) -> Roads:
+        """The frequencies [rad/s] by every method that has them, and how far these part.
+
+        Raises CertificationError or ConvergenceError as `frequencies` does.
+        """
+        return by_roads(self.frequencies, why_no_appendix(self.arm, self.theory))
 
     def certify(self, digits: int = DOUBLE_DIGITS) -> Certificate:
         """Proven brackets of the flexible frequencies to so many digits, and the proof that none is missing.
