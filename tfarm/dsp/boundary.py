@@ -33,6 +33,8 @@ WIDTH_SHARE = 1e-2  # of the distance of a pole from the circle: the grid begins
 BRIGHT = 1e-2  # poles and roots nearer to z = 0 leave nothing on the circle to resolve
 NO_EFFECT = 1e-12  # of what is there without a gain: what it adds, if less, is rounding of none
 COARSEST = 2000  # points of the uniform grid over the half circle
+STILL = 1e-8  # of the way from z = 1 to the nearest pole of an arm that something holds: nearer than that it stands
+# still, its rate is rounding, and a gain on it would have to be so many times too large to move a pole
 NEAR_ONE = 1e-7  # where the values at z = 1 are read: they are even in q, so wrong by 1e-14
 
 
@@ -85,7 +87,9 @@ def circle_grid(loop: SampledLoop | SampledLaw) -> CircleGrid:
             shift.append(s)
     grid = CircleGrid(loop, np.concatenate(base), np.concatenate(shift))
     order = np.lexsort((grid.shift, np.searchsorted(seams, grid.q, side="left"), grid.q))
-    inside = order[(grid.q[order] >= 0) & (grid.q[order] < np.pi)]
+    away = abs(1 - pulse.multipliers[bases])  # 0 of the last, the pole of an arm that drifts
+    lowest = 0.0 if loop.plant.rigid.any() else STILL * away[away > 0].min(initial=1.0)
+    inside = order[(grid.q[order] >= lowest) & (grid.q[order] < np.pi)]
     return CircleGrid(loop, grid.base[inside], grid.shift[inside])
 
 
