@@ -24,6 +24,7 @@ from tfarm.errors import ParameterError
 if sys.platform != "win32":
     import fcntl
 
+STANDARD_OUTPUT = "-"  # in the place of a path, as other programs have it; a file of that name is written as a/-
 PART, FOLDER = ".part", ".writing-"  # how the names of temporary files end, and those of temporary folders begin
 SUFFIX = "[a-z0-9_]{8}"  # what Python's tempfile puts in their middle or at their end
 
@@ -71,8 +72,8 @@ def read_mat(path: str | os.PathLike[str], most: int, *, key: str) -> tuple[dict
 def write_file(path: Path, content: bytes, *, key: str) -> None:
     """Write beside the path, then rename; symbolic links are followed, and a file that is replaced keeps its mode.
 
-    What is no regular file (a device, a pipe, /dev/stdout) is written straight to.  Raises ParameterError, naming
-    `key`, where that cannot be done, and BrokenPipeError where the reader of a pipe has left.
+    What is no regular file (a device, a pipe, /dev/stdout, or "-" for that) is written straight to.  Raises
+    ParameterError, naming `key`, where that cannot be done, and BrokenPipeError where the reader of a pipe has left.
     """
     try:
         number = _descriptor(path)
@@ -92,7 +93,7 @@ def write_file(path: Path, content: bytes, *, key: str) -> None:
 
 
 def is_standard_output(path: Path) -> bool:
-    """Whether a path such as /dev/stdout stands for this process's own standard output."""
+    """Whether a path such as /dev/stdout, or "-", stands for this process's own standard output."""
     return _descriptor(path) == 1
 
 
@@ -105,7 +106,9 @@ def temporary_folder(place: Path) -> Iterator[Path]:
 
 
 def _descriptor(path: Path) -> int | None:
-    """The number of the open file that a path such as /dev/stdout or /dev/fd/3 stands for."""
+    """The number of the open file that a path such as "-", /dev/stdout or /dev/fd/3 stands for."""
+    if str(path) == STANDARD_OUTPUT:
+        return 1
     name = os.path.abspath(path)
     found = re.fullmatch(r"/dev/fd/(\d{1,9})|/proc/self/fd/(\d{1,9})", name)
     if found:

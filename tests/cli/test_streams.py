@@ -78,6 +78,40 @@ def test_letters_that_a_terminal_does_not_have_are_escaped(encoding, tmp_path):
     assert json.loads(answer)["arm"] == name
 
 
+@pytest.mark.parametrize(
+    ("verb", "option"),
+    [
+        ("response sasaki2012 --output hub_rate --points 3", "--csv"),
+        ("bode sasaki2012-lab --to 50", "--png"),
+        ("simulate sasaki2012-lab --duration 0.05 --modes 2", "--mat"),
+        ("design sasaki2012-lab --continuous", "--save"),
+    ],
+)
+def test_a_dash_is_standard_output(verb, option, tmp_path):
+    """What stands there is what stands in a file of that option, and nothing else: no table, no file called "-"."""
+    code, out, err = shell(f"cd {tmp_path} && tfarm {verb} {option} -")
+    assert (code, err, list(tmp_path.iterdir())) == (0, "", [])
+    assert shell(f"tfarm {verb} {option} {tmp_path / 'file'}")[0] == 0
+    assert (tmp_path / "file").read_bytes() == out
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        ("map sasaki2012-lab --csv - --png -", "one thing at a time"),
+        ("map sasaki2012-lab --csv=- --json", "one thing at a time"),
+        ("report sasaki2012-lab --out -", "only --csv, --png, --mat, --save may go there"),
+        ("sampled sasaki2012-lab --dsp -", "only --csv, --png, --mat, --save may go there"),
+        ("reduce sasaki2012 --order 4 --mat -", "is no regular file"),
+    ],
+)
+def test_a_dash_that_cannot_be_standard_output_is_one_line(words, why, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, out, err = run(capsys, *words.split())
+    assert (code, out, err.count("\n"), list(tmp_path.iterdir())) == (2, "", 1, [])
+    assert why in err
+
+
 def test_an_interrupt_while_things_are_imported_is_one_line(tmp_path):
     """A module of the name of the first that the commands need, interrupted as it is read."""
     (tmp_path / "typer.py").write_text("raise KeyboardInterrupt\n")

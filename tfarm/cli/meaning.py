@@ -7,6 +7,7 @@ from typing import Any
 
 from tfarm.arm import GAINS
 from tfarm.errors import ParameterError, did_you_mean
+from tfarm.files import STANDARD_OUTPUT
 
 VERBS = {  # words of other tools
     "rlocus": "locus",
@@ -39,7 +40,8 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "--from": ("--start", "--wmin", "--min"),
     "--to": ("--stop", "--end", "--wmax", "--max"),
 }
-PATHS = ("--csv", "--png", "--mat", "--save", "--png", "--out", "--keep", "--dsp", "--controller")  # may be called 1_0
+STREAMED = ("--csv", "--png", "--mat", "--save")  # of files that may go to standard output instead, called "-"
+PATHS = (*STREAMED, "--out", "--keep", "--dsp", "--controller")  # may be called 1_0
 
 
 def check_verb(word: str, group: Any) -> None:
@@ -57,6 +59,19 @@ def check_numbers(arguments: list[str]) -> None:
         takes_number = option.startswith("--") and option not in PATHS
         if takes_number and any(_is_odd(part) for part in text.split(",")):
             raise ParameterError(key=option, value=text, remedy="write numbers as 50, 0.5 or 5e1")
+
+
+def check_streams(arguments: list[str]) -> None:
+    """Raise ParameterError for "-" in the place of a path that is no file to be written, or where two would mix."""
+    words = [word for argument in arguments for word in argument.split("=", 1 if argument.startswith("--") else 0)]
+    streamed = [option for option, text in pairwise(words) if text == STANDARD_OUTPUT and option in PATHS]
+    for option in streamed:
+        if option not in STREAMED:
+            remedy = f"- stands for standard output, and only {', '.join(STREAMED)} may go there: give a name"
+            raise ParameterError(key=option, value=STANDARD_OUTPUT, remedy=remedy)
+        if len(streamed) > 1 or "--json" in words:
+            remedy = "standard output takes one thing at a time: name a file, or leave the other out"
+            raise ParameterError(key=option, value=STANDARD_OUTPUT, remedy=remedy)
 
 
 def _is_odd(text: str) -> bool:

@@ -24,7 +24,7 @@ from tfarm.cli import (  # noqa: F401  each adds its verbs to the application
     tuning,
 )
 from tfarm.cli.app import app, discard, tell
-from tfarm.cli.meaning import check_numbers, check_verb, usage
+from tfarm.cli.meaning import check_numbers, check_streams, check_verb, usage
 from tfarm.errors import CertificationError, ConvergenceError, TfarmError
 
 
@@ -62,6 +62,7 @@ def _call(arguments: list[str]) -> int:
     command = typer.main.get_command(app)
     check_verb(arguments[0], command)
     check_numbers(arguments)
+    check_streams(arguments)
     try:  # not command.main, which takes a closed pipe for an error
         with command.make_context("tfarm", list(arguments)) as context:
             command.invoke(context)

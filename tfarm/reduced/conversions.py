@@ -16,7 +16,7 @@ import numpy as np
 import scipy.io
 
 from tfarm.errors import ParameterError
-from tfarm.files import write_file
+from tfarm.files import is_standard_output, write_file
 from tfarm.response import transfer
 
 from .accuracy import CLEAR_OF_POLES, distance, frequencies_around
@@ -92,7 +92,7 @@ def save_mat(reduced: ReducedModel, path: Path, *, key: str = "path") -> tuple[P
     Raises ParameterError, naming `key`, where they cannot be written, or a script of that name is another file's.
     """
     path = Path(path)
-    if os.path.exists(path) and not os.path.isfile(path):
+    if is_standard_output(path) or (os.path.exists(path) and not os.path.isfile(path)):
         raise ParameterError(key=key, value=str(path), remedy="is no regular file, and a script stands beside it")
     path = path if path.suffix == ".mat" else path.with_name(path.name + ".mat")
     script = path.with_name(f"load_{re.sub(r'[^A-Za-z0-9_]', '_', path.stem)}.m")
