@@ -13,7 +13,7 @@ import pytest
 import tfarm
 from tfarm import HubFeedback
 from tfarm.dsp import Chain
-from tfarm.dsp.regions import gain_map
+from tfarm.dsp.regions import sampled_map
 from tfarm.dsp.scenarios import slew
 from tfarm.dsp.simulate import Simulator
 from tfarm.dsp.verdict import analyse
@@ -26,8 +26,8 @@ LAB = tfarm.load("sasaki2012-lab")
 LAW = HubFeedback(K1=0.3, K2=0.3)
 
 
-def sampled_map():
-    return gain_map(analyse(LAB, LAW, count=4).verdict.loop, np.array([0.1, 0.3]), np.array([0.0, 0.5]))
+def small_map():
+    return sampled_map(analyse(LAB, LAW, count=4).verdict.loop, np.array([0.1, 0.3]), np.array([0.0, 0.5]))
 
 
 MAKERS = {
@@ -41,7 +41,7 @@ MAKERS = {
     "region": lambda: region(LAB, np.linspace(0.1, 1, 3), np.linspace(0, 0.5, 3)),
     "model": lambda: modal_model(LAB, ["root_moment"], 4),
     "sampled": lambda: analyse(LAB, LAW, count=4),
-    "sampled map": sampled_map,
+    "sampled map": small_map,
     "slew": lambda: Simulator(LAB, Chain(), slew(LAB, Chain(), 0.5), count=3).linear(LAW),
 }
 

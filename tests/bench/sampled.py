@@ -8,7 +8,7 @@ import numpy as np
 
 import tfarm
 from tfarm import HubFeedback
-from tfarm.dsp import Chain, Simulator, gain_map, sampled_verdict, scenario
+from tfarm.dsp import Chain, Simulator, sampled_map, sampled_verdict, scenario
 
 from .rows import Row, Target
 from .timing import interleaved, once
@@ -29,7 +29,7 @@ def sampled_rows() -> Iterator[Row]:
     )  # fmt: skip
     loop = sampled_verdict(arm, LAW).loop
     with once() as watch:
-        gain_map(loop, np.linspace(0.01, 5.0, POINTS), np.linspace(-0.5, 1.5, POINTS))
+        sampled_map(loop, np.linspace(0.01, 5.0, POINTS), np.linspace(-0.5, 1.5, POINTS))
     yield Row(
         group=GROUP, what="tfarm: sampled map of gains", n=POINTS**2, each="point", seconds=watch.seconds / POINTS**2,
         target=Target(measured=watch.seconds, limit=5.0, unit="s for all"),

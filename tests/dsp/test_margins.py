@@ -14,9 +14,9 @@ from tfarm.dsp import (
     Sampling,
     analyse,
     delay_margin,
-    gain_map,
     required_damping,
     sampled_loop,
+    sampled_map,
 )
 from tfarm.dsp.boundary import circle_crossings, circle_grid
 from tfarm.dsp.margins import around, stable_windows
@@ -105,7 +105,7 @@ def test_a_long_delay_hides_no_crossing_between_two_points_of_the_grid(lab):
 def test_the_map_counts_as_the_eigenvalues_do(name, hub_rate):
     chain = Chain(converters=Converters(hub_rate=hub_rate, rate_filter=300.0))
     loop = sampled_loop(tfarm.load(name), GAINS, chain, count=9)
-    plane = gain_map(loop, np.linspace(-2, 25, 28), np.linspace(-0.7, 2.1, 31))
+    plane = sampled_map(loop, np.linspace(-2, 25, 28), np.linspace(-0.7, 2.1, 31))
     rng = np.random.default_rng(5)
     for i, j in zip(rng.integers(28, size=60), rng.integers(31, size=60), strict=True):
         assert growing(loop.having(K1=float(plane.K1[i]), K2=float(plane.K2[j]))) == plane.unstable[i, j]
@@ -113,7 +113,7 @@ def test_the_map_counts_as_the_eigenvalues_do(name, hub_rate):
 
 def test_the_map_has_exact_edges(lab):
     loop = sampled_loop(lab, GAINS, count=11)
-    plane = gain_map(loop, [0.1, 0.3, 30.0], np.linspace(-0.5, 1.5, 5))
+    plane = sampled_map(loop, [0.1, 0.3, 30.0], np.linspace(-0.5, 1.5, 5))
     assert plane.stable_intervals[1] == [pytest.approx(stable_windows(loop, "K2")[0], rel=1e-12)]
     assert plane.stable_intervals[2] == []
     assert plane.unstable[1].tolist() == [2, 0, 0, 0, 2] or plane.unstable[1, 0] > 0
@@ -122,9 +122,9 @@ def test_the_map_has_exact_edges(lab):
 def test_the_map_wants_ascending_gains(lab):
     loop = sampled_loop(lab, GAINS, count=6)
     with pytest.raises(ParameterError, match="ascend"):
-        gain_map(loop, [0.3, 0.1], [0.0, 1.0])
+        sampled_map(loop, [0.3, 0.1], [0.0, 1.0])
     with pytest.raises(ParameterError, match="finite gains"):
-        gain_map(loop, [0.3, np.inf], [0.0, 1.0])
+        sampled_map(loop, [0.3, np.inf], [0.0, 1.0])
 
 
 @pytest.mark.parametrize("K2", [0.1, 0.3, 0.9])

@@ -14,7 +14,7 @@ import tfarm
 from tests.plots.labels import complaints, drawn
 from tests.shared import thinned
 from tfarm import Law
-from tfarm.dsp import gain_map
+from tfarm.dsp import sampled_map
 from tfarm.fitting.data import Measured
 from tfarm.loop.nyquist import compressed
 from tfarm.loop.reduced_locus import reduced_locus
@@ -51,7 +51,7 @@ def records():
         "measured": ([tfarm.overlay(LAB, sweep())], 3),
         "modes": ([tfarm.modes(LAB, count=3)], 3),
         "nyquist": ([tfarm.nyquist(LAB, LAW)], 0),
-        "overlay": ([plane, gain_map(analysis.verdict.loop, K1, K2)], 0),
+        "overlay": ([plane, sampled_map(analysis.verdict.loop, K1, K2)], 0),
         "sampled_modes": ([analysis], 0),
         "sketch": ([LAB], 0),
         "tuned_gain": ([tfarm.tune(LAB, Plan(trials=1))], 0),

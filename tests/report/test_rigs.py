@@ -9,7 +9,7 @@ from matplotlib.patches import Rectangle
 import tfarm
 from tfarm import plots
 from tfarm.arm import written_unit
-from tfarm.dsp.regions import gain_map
+from tfarm.dsp.regions import sampled_map
 from tfarm.plots.sketch import sketch
 from tfarm.plots.style import blank
 from tfarm.report.arm_section import arm_section
@@ -86,7 +86,7 @@ def test_no_line_of_energy_where_it_is_no_argument(name):
     arm = RIGS.get(name) or tfarm.load(name)
     law = tfarm.default_gains(arm)
     K1, K2 = law.K1 * np.geomspace(0.5, 2.0, 3), np.linspace(-1.0, 2.0, 4)
-    sampled = gain_map(tfarm.sampled(arm, law).verdict.loop, K1, K2)
+    sampled = sampled_map(tfarm.sampled(arm, law).verdict.loop, K1, K2)
     (ax,) = blank(6, 4).subplots(1, 1, squeeze=False).ravel()
     plots.overlay(tfarm.map(arm, K1, K2), sampled, ax=ax)
     words = " ".join(text.get_text() for text in ax.get_legend().get_texts())

@@ -1,6 +1,6 @@
 """What is analysed: the arm as frozen records, its TOML file and the presets."""
 
-from tfarm.arm.driving import AnyLaw, arm_and_law, as_law, cancelled, tracked
+from tfarm.arm.driving import AnyLaw, arm_and_law, as_law, cancelled, must_not_be_algebraic, tracked
 from tfarm.arm.feedback import (
     ANGLE_GAIN,
     AT_HUB,
@@ -79,6 +79,7 @@ __all__ = [
     "load",
     "many_laws",
     "must_be_arm",
+    "must_not_be_algebraic",
     "must_turn",
     "presets",
     "shown_unit",

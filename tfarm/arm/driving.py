@@ -47,6 +47,16 @@ def tracked(arm: Arm, law: AnyLaw) -> tuple[Arm, AnyLaw]:
     return driven, plain
 
 
+def must_not_be_algebraic(arm: Arm, key: str, value: object) -> None:
+    """Raise ParameterError where the hub has no inertia: its root moment, fed back, is the torque itself."""
+    if arm.has_massless_hub:
+        remedy = (
+            "with hub.inertia = 0 the root moment is -u itself, so that moment feedback is an algebraic loop; "
+            "give the hub an inertia, or feed no moment back (K2 = 0)"
+        )
+        raise ParameterError(key=key, value=value, remedy=remedy)
+
+
 def cancelled(law: Law) -> tuple[str, ...]:
     """Warnings: the law's own poles right of the axis, or outside the unit circle, that its own zeros cancel."""
     found = []

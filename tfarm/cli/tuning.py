@@ -57,7 +57,7 @@ def tune(
     from tfarm import tuner
     from tfarm.tuner.tuning import outcomes_answer
 
-    servo, said = _servo(subject, on_rate, on_angle)
+    servo, said = _servo_gains(subject, on_rate, on_angle)
 
     learning = tuner.Learning(
         mode=cast("Any", mode), rule=cast("Any", rule), sensitivity=cast("Any", sensitivity), eta=eta, alpha=alpha,
@@ -78,7 +78,7 @@ def tune(
     _show(answer, save, json)
 
 
-def _servo(subject: Arm, on_rate: float | None, on_angle: float) -> tuple[dict[str, Any], dict[str, Any]]:
+def _servo_gains(subject: Arm, on_rate: float | None, on_angle: float) -> tuple[dict[str, Any], dict[str, Any]]:
     """The gains of the servo, and what the answer says of a rate gain that was not given: it damps a held angle."""
     from tfarm.tuner.trial import usual_rate_gain
 

@@ -9,10 +9,10 @@ import numpy as np
 
 from tfarm.arm import AnyLaw, Arm, as_law
 from tfarm.arrays import Complex, Real
+from tfarm.crossing import Window
 from tfarm.dsp import Chain
 from tfarm.dsp.law_margins import law_grid, stable_factors
 from tfarm.dsp.law_verdict import LawAnalysis, analyse_law
-from tfarm.dsp.margins import Window
 from tfarm.records import record
 
 GONE_AFTER_SAMPLE = 1e-3  # |z| of a pole that leaves this much of itself after a sample: of those nothing is compared

@@ -5,12 +5,13 @@ The curve may be the imaginary axis or the unit circle; nothing here knows what 
 
 from tfarm.crossing.line import Crossing, Crossings, brackets, solved, zeros_between
 from tfarm.crossing.pieces import RegionPiece, pieces
-from tfarm.crossing.plane import counts_over, intervals, joined
+from tfarm.crossing.plane import Window, counts_over, intervals, joined
 
 __all__ = [
     "Crossing",
     "Crossings",
     "RegionPiece",
+    "Window",
     "brackets",
     "counts_over",
     "intervals",

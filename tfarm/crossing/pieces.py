@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 from tfarm.arrays import Real
 
-Window = tuple[float, float]
+from .plane import Window
+
 Slice = tuple[float, float, float]  # a value of the gain across, and an interval of the other there
 
 

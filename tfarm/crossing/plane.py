@@ -12,7 +12,7 @@ from tfarm.arrays import Real, Whole
 
 from .line import Crossings
 
-Window = tuple[float, float]
+Window = tuple[float, float]  # two values of a gain, the lower first
 
 
 def counts_over(gains: Real, columns: Sequence[Crossings], reference: float, there: NDArray[Any]) -> Whole:

@@ -4,7 +4,7 @@ from tfarm.dsp.chain import Actuator, Chain, Converters, Sampling, Slew
 from tfarm.dsp.loop import SampledLoop, sampled_loop
 from tfarm.dsp.margins import delay_margin, required_damping, stable_windows
 from tfarm.dsp.reading import load_chain
-from tfarm.dsp.regions import GainMap, gain_map
+from tfarm.dsp.regions import GainMap, sampled_map
 from tfarm.dsp.sampling import PulseTransfer, pulse_transfer
 from tfarm.dsp.scenarios import Scenario, scenario
 from tfarm.dsp.simulate import Measurement, Simulation, Simulator
@@ -27,11 +27,11 @@ __all__ = [
     "Verdict",
     "analyse",
     "delay_margin",
-    "gain_map",
     "load_chain",
     "pulse_transfer",
     "required_damping",
     "sampled_loop",
+    "sampled_map",
     "sampled_verdict",
     "scenario",
     "stable_windows",

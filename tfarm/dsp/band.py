@@ -22,15 +22,13 @@ from numpy.typing import NDArray
 
 from tfarm.arrays import Complex, Real
 from tfarm.dsp.circle import Circle
-from tfarm.dsp.law_loop import AnyLoop, SampledLaw
-from tfarm.dsp.loop import SampledLoop, resized
+from tfarm.dsp.law_loop import AnySampled, SampledKind
+from tfarm.dsp.loop import resized
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
 from tfarm.spectrum import modes
 from tfarm.spectrum.box import Box, winding_number
 from tfarm.spectrum.damped import TOWARD_SINGULAR, member
-
-AnySampled = SampledLoop | SampledLaw
 
 DECAYED_EXPONENT = 30.0  # e^-30 = 1e-13 is left over a sample of the poles on the line
 HIGHER = (2.0, 8.0, 32.0, 128.0, 512.0)  # times the last pole of the model: how far up no other is looked for
@@ -44,11 +42,11 @@ MOST_MIDPOINTS = 200_000  # of a quadrature: one that does not settle by then is
 
 @dataclass(frozen=True)
 @record
-class Band(Generic[AnyLoop]):
+class Band(Generic[SampledKind]):
     """The poles of a loop's plant in a band up to `top` [rad/s], `kept` (poles,), and the bound `missing` (outputs,) on
     what the others of that band add to the pulse transfer functions, on the whole unit circle."""
 
-    loop: AnyLoop
+    loop: SampledKind
     top: float
     kept: NDArray[np.bool_]
     missing: Real
@@ -60,16 +58,16 @@ class Band(Generic[AnyLoop]):
         return int(outside.min(initial=self.loop.plant.count + 1)) - 1
 
     @cached_property
-    def full(self) -> AnyLoop:
+    def full(self) -> SampledKind:
         """The loop with all of them, or with one where there is none."""
         return resized(self.loop, max(1, self.modes))
 
-    def circle(self) -> Circle[AnyLoop]:
+    def circle(self) -> Circle[SampledKind]:
         """The unit circle, on which poles outside are counted."""
         return Circle(self.loop, self.kept, self.missing)
 
 
-def complete_band(loop: AnyLoop) -> Band[AnyLoop] | None:
+def complete_band(loop: SampledKind) -> Band[SampledKind] | None:
     """The highest band in which the loop's plant is complete; None where it cannot be shown to be.
 
     Not without damping, nor with analog hub damping, whose poles the model has to its own accuracy alone.

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import HubFeedback
 from tfarm.arrays import Complex, Real
-from tfarm.dsp.law_loop import AnyLoop
+from tfarm.dsp.law_loop import SampledKind
 from tfarm.dsp.loop import ANGLE_ROW, RATE_ROW, SampledLoop
 from tfarm.records import record
 
@@ -88,7 +88,7 @@ class _Arcs:
 
 
 @dataclass
-class Circle(Generic[AnyLoop]):
+class Circle(Generic[SampledKind]):
     """The upper half of the unit circle in arcs, and on each what a loop's plant is there; its gains do not matter.
 
     `missing` (outputs,) bounds |x sum over poles left out|.  `low` and `high` [rad] are the ends of the arcs, `parts`
@@ -96,7 +96,7 @@ class Circle(Generic[AnyLoop]):
     arcs are cut as counts need it.
     """
 
-    loop: AnyLoop
+    loop: SampledKind
     kept: NDArray[np.bool_]
     missing: Real
     low: Real = field(init=False)

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from typing_extensions import TypeVar
 
-from tfarm.arm import Arm
+from tfarm.arm import Arm, must_not_be_algebraic
 from tfarm.arm.blocks import Rational, StateSpace
 from tfarm.arm.law import Law, Part
 from tfarm.arrays import LEAST_SIZE, Complex, Real, Whole
@@ -209,7 +209,8 @@ class SampledLaw:
         return SampledPoles(np.where(there, 1.0, found.z), np.where(there, 0.0, found.log_radius), found.mode)
 
 
-AnyLoop = TypeVar("AnyLoop", bound=SampledLoop | SampledLaw, default=SampledLoop)  # hub gains, unless a law is said
+AnySampled = SampledLoop | SampledLaw
+SampledKind = TypeVar("SampledKind", bound=AnySampled, default=SampledLoop)  # hub gains, unless a law is said
 
 
 def sampled_law(
@@ -232,9 +233,8 @@ def acting_law(arm: Arm, law: Law, chain: Chain) -> tuple[Law, Chain]:
     if samples > MOST_DELAY:
         remedy = f"with the chain's delay that is {samples:.4g} samples; at most {MOST_DELAY:g}"
         raise ParameterError(key="delay", value=law.delay, remedy=remedy)
-    if arm.has_massless_hub and "root_moment" in law.signals:
-        remedy = "with hub.inertia = 0 the root moment is -u itself: an algebraic loop; give the hub an inertia"
-        raise ParameterError(key="signals", value="root_moment", remedy=remedy)
+    if "root_moment" in law.signals:
+        must_not_be_algebraic(arm, "signals", "root_moment")
     late = replace(chain, sampling=replace(chain.sampling, delay_samples=samples))
     return discretised(law, T), late
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from tfarm.arrays import Complex
-from tfarm.crossing import Crossings, joined
+from tfarm.crossing import Crossings, Window, joined
 from tfarm.dsp.boundary import (
     BRIGHT,
     NARROWEST_WIDTH,
@@ -25,7 +25,7 @@ from tfarm.dsp.boundary import (
 )
 from tfarm.dsp.law_loop import SampledLaw
 from tfarm.dsp.law_polynomials import polynomials
-from tfarm.dsp.margins import SAME_EDGE, Window
+from tfarm.dsp.margins import SAME_EDGE
 
 LEAST_LAW_FACTOR = 1e-9  # that is looked at: with less a law is none
 MOST_LAW_FACTOR = 1e9  # with more its gain is beyond any number

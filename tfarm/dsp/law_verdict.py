@@ -7,12 +7,13 @@ from typing import Any
 
 from tfarm.arm import Arm, Law, cancelled
 from tfarm.arm.checks import whole as whole_number
+from tfarm.crossing import Window
 from tfarm.dsp.chain import Chain, chain_or_usual
 from tfarm.dsp.discretise import described_law, rule_in_words
 from tfarm.dsp.law_circle import LawCircle
 from tfarm.dsp.law_loop import SampledLaw, sampled_law
 from tfarm.dsp.law_margins import stable_factors
-from tfarm.dsp.margins import DelayMargin, Window, around, delay_margin, with_all_modes
+from tfarm.dsp.margins import DelayMargin, around, delay_margin, with_all_modes
 from tfarm.dsp.verdict import MOST_ASKED, UNDAMPED_MODES, Verdict, settled_verdict, verdict_answer
 from tfarm.records import record
 

@@ -18,12 +18,12 @@ from typing import Any, Protocol, Self, TypeVar
 
 import numpy as np
 
-from tfarm.arm import FED_BACK, Arm, HubFeedback
+from tfarm.arm import FED_BACK, Arm, HubFeedback, must_not_be_algebraic
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.dsp.chain import Chain, chain_or_usual
 from tfarm.dsp.plant import USUAL_MODES, Branching, Plant, is_analog, loop_plant, shorter_plant
 from tfarm.dsp.sampling import PulseTransfer
-from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import torque
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.records import record
@@ -283,10 +283,6 @@ def resized(loop: Sized, count: int) -> Sized:
 
 def check_loop(arm: Arm, gains: HubFeedback) -> None:
     """Refuse the loop that does not exist, I_h = 0 and K2 != 0, and a gain that is absurdly large for the arm."""
-    if arm.has_massless_hub and gains.K2 != 0.0:
-        remedy = (
-            "with hub.inertia = 0 the root moment is -u itself, so that moment feedback is an algebraic loop; "
-            "give the hub an inertia, or set K2 = 0"
-        )
-        raise ParameterError(key="K2", value=gains.K2, remedy=remedy)
+    if gains.K2:
+        must_not_be_algebraic(arm, "K2", gains.K2)
     check_gains(arm, gains)

@@ -11,10 +11,10 @@ import numpy as np
 from scipy.optimize import brentq
 
 from tfarm.arm import Arm, HubFeedback
-from tfarm.crossing import joined
+from tfarm.crossing import Window, joined
 from tfarm.dsp.boundary import circle_crossings, circle_grid
 from tfarm.dsp.chain import Chain
-from tfarm.dsp.law_loop import AnyLoop, SampledLaw
+from tfarm.dsp.law_loop import AnySampled, SampledKind
 from tfarm.dsp.loop import SampledLoop, polished_poles, sampled_loop
 from tfarm.dsp.plant import Branching
 from tfarm.dsp.sampling import FORGOTTEN, held_amplitude
@@ -22,9 +22,6 @@ from tfarm.errors import ConvergenceError
 from tfarm.spectrum import modes_below
 from tfarm.spectrum.damped import COMPANY, LITTLE, Branches, all_damped_modes
 from tfarm.spectrum.scales import first_frequency
-
-Window = tuple[float, float]
-AnySampled = SampledLoop | SampledLaw
 
 LONGEST_DELAY_SAMPLES = 20.0  # samples: the delay margin is looked for up to here
 MOST_STEPS = 2000  # of a scan of the delay
@@ -185,8 +182,8 @@ def whole_loop(arm: Arm, gains: HubFeedback, chain: Chain, branches: Branching =
 
 
 def with_all_modes(
-    arm: Arm, chain: Chain, loop_of: Callable[[int, Branching], AnyLoop], branches: Branching = all_damped_modes
-) -> AnyLoop:
+    arm: Arm, chain: Chain, loop_of: Callable[[int, Branching], SampledKind], branches: Branching = all_damped_modes
+) -> SampledKind:
     """The loop of a damped arm with as many modes as it takes, `loop_of` giving that with so many.
 
     With somewhat fewer where two damped modes cannot be told apart; with one where the first is far overdamped.

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arrays import Complex, Real
-from tfarm.crossing import Crossings, counts_over, intervals, pieces
+from tfarm.crossing import Crossings, Window, counts_over, intervals, pieces
 from tfarm.crossing.turning import loose_columns
 from tfarm.dsp.boundary import circle_crossings, circle_grid
 from tfarm.dsp.loop import SampledLoop
-from tfarm.dsp.margins import Window, stable_windows
+from tfarm.dsp.margins import stable_windows
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
 
@@ -61,7 +61,7 @@ class GainMap:
         ]
 
 
-def gain_map(loop: SampledLoop, K1: Sequence[float] | Real, K2: Sequence[float] | Real) -> GainMap:
+def sampled_map(loop: SampledLoop, K1: Sequence[float] | Real, K2: Sequence[float] | Real) -> GainMap:
     """The map over the grid K1 x K2 (both ascending), the other settings as those of the loop.
 
     From the exact crossings of every row (D-decomposition) and one count by eigenvalues; those at three corners must
@@ -101,7 +101,7 @@ def with_more(plane: GainMap, K1: Real) -> GainMap:
     fresh = np.setdiff1d(K1, plane.K1)
     if not fresh.size:
         return plane
-    more = gain_map(plane.loop, fresh, plane.K2)
+    more = sampled_map(plane.loop, fresh, plane.K2)
     both = np.r_[plane.K1, more.K1]
     order = np.argsort(both, kind="stable")
     found = plane.crossings + more.crossings

@@ -13,13 +13,13 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 from tfarm.arm import Arm, HubFeedback
+from tfarm.crossing import Window
 from tfarm.dsp.band import Band, complete_band
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.circle import Circle
 from tfarm.dsp.loop import SampledLoop, resized
 from tfarm.dsp.margins import (
     DelayMargin,
-    Window,
     delay_margin,
     log_radius_with,
     most_modes,

@@ -10,12 +10,13 @@ from typing import Any, Generic
 from tfarm.arm import LISTED, MOMENT_GAIN, PLANE, RATE_GAIN, TAKEN_OFF, Arm, HubFeedback, driven, unit_of
 from tfarm.arm.checks import whole
 from tfarm.columns import Table
+from tfarm.crossing import Window
 from tfarm.dsp.band import Band, complete_band
 from tfarm.dsp.chain import Chain, Sampling, chain_or_usual
 from tfarm.dsp.law import SAMPLED_MODE_COLUMNS, ModeTable, growing_mode, mode_table
-from tfarm.dsp.law_loop import AnyLoop, SampledLaw
+from tfarm.dsp.law_loop import SampledKind, SampledLaw
 from tfarm.dsp.loop import check_loop, resized, sampled_loop
-from tfarm.dsp.margins import DelayMargin, Window, around, whole_loop
+from tfarm.dsp.margins import DelayMargin, around, whole_loop
 from tfarm.dsp.shown import Figure, ShownWindows, shown_damping, shown_delay, shown_windows
 from tfarm.records import record
 
@@ -29,15 +30,15 @@ MOST_ASKED = 400  # modes that may be asked for
 
 @dataclass(frozen=True)
 @record
-class Verdict(Generic[AnyLoop]):
+class Verdict(Generic[SampledKind]):
     """Whether a sampled loop is stable, apart from z = 1 of a hub angle that nothing regulates.
 
     `band` is the part of the arm for which it is proven (`tfarm.dsp.band`); None where nothing is, as at C = 0: then
     the verdict holds for the first `modes_used` modes, those of `loop`, and high ones may grow by 1e-9 a sample.
     """
 
-    loop: AnyLoop
-    band: Band[AnyLoop] | None = None
+    loop: SampledKind
+    band: Band[SampledKind] | None = None
 
     @property
     def is_settled(self) -> bool:
@@ -68,7 +69,7 @@ class Verdict(Generic[AnyLoop]):
         return self.full.poles.log_spectral_radius
 
     @property
-    def full(self) -> AnyLoop:
+    def full(self) -> SampledKind:
         """The loop with every mode of the band, for other gains than these; that of the verdict where there is none."""
         return self.loop if self.band is None else self.band.full
 
@@ -130,7 +131,7 @@ def sampled_verdict(arm: Arm, gains: HubFeedback, chain: Chain | None = None, *,
     return settled_verdict(whole_loop(arm, gains, chain), lambda band: band.circle().count(gains))
 
 
-def settled_verdict(largest: AnyLoop, outside: Callable[[Band[AnyLoop]], int | None]) -> Verdict[AnyLoop]:
+def settled_verdict(largest: SampledKind, outside: Callable[[Band[SampledKind]], int | None]) -> Verdict[SampledKind]:
     """The verdict on a damped arm by as few modes as it takes, from the loop with all: `outside` counts its poles."""
     band = complete_band(largest)
     full = largest if band is None else band.full
@@ -143,7 +144,7 @@ def settled_verdict(largest: AnyLoop, outside: Callable[[Band[AnyLoop]], int | N
     return Verdict(loop, band if is_proven else None)
 
 
-def _growing(full: AnyLoop) -> Iterator[AnyLoop]:
+def _growing(full: SampledKind) -> Iterator[SampledKind]:
     """Loops of 8, 16, 32 ... modes, and the full one."""
     most = full.plant.count
     number = min(FEWEST_COMPARED, most // 2)

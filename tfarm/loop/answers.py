@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 from tfarm.arm import ANGLE_GAIN, LISTED, PLANE, SPELT_OUT, Arm, HubFeedback, Law, input_words, shown_unit, unit_of
 from tfarm.columns import JSON, REPORT, TERMINAL, Column, Table
+from tfarm.crossing import Window
 from tfarm.digits import general, plain, singly, within
 from tfarm.response.signals import Signals
 from tfarm.spectrum.answers import EIGENVALUE_ERROR
@@ -19,7 +20,7 @@ from .margins import Margins
 from .nyquist import Nyquist
 from .poles import Poles
 from .regions import INFINITE, Region
-from .windows import Interval, Windows, reach_words
+from .windows import Windows, reach_words
 
 LAW_IN_WORDS = f"u = -{SPELT_OUT} + r"
 WINDOW_DIGITS, PAGE_WINDOW_DIGITS = 8, 5  # of the ends of a window, on a terminal and on a page
@@ -42,7 +43,7 @@ class GainRow(NamedTuple):
     windows: Windows
     unit: str
 
-    def spans(self, how: Callable[[float, int], str], digits: int, *pairs: Interval | None) -> list[str]:
+    def spans(self, how: Callable[[float, int], str], digits: int, *pairs: Window | None) -> list[str]:
         """Intervals, with a star at each end that only bounds the search; those that there are."""
         ends = (
             [f"{how(end, digits)}{'*' * (self.windows.end(end) == 'search bound')}" for end in pair]
@@ -58,7 +59,7 @@ def gain_rows(found: Margins[Any]) -> list[GainRow]:
     return [GainRow(name, loop.law[name], windows, shown_unit(name, loop.arm)) for name, windows in rows]
 
 
-def _joined(*pairs: Interval) -> str:
+def _joined(*pairs: Window) -> str:
     """The ends with every digit, for files."""
     return " ".join(repr(float(end)) for pair in pairs for end in pair)
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import GAINS, RATE_GAIN, Arm, HubFeedback, must_be_arm
+from tfarm.arm import GAINS, RATE_GAIN, Arm, HubFeedback, must_be_arm, must_not_be_algebraic
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import Gains, gains_of, loop_parts, loop_system, torque
@@ -42,9 +42,8 @@ class Loop:
         if self.arm.is_locked:
             remedy = "a locked hub (inertia = inf) takes no torque: there is no loop; give the hub a finite inertia"
             raise ParameterError(key="hub.inertia", value=self.arm.hub_inertia, remedy=remedy)
-        if self.arm.has_massless_hub and self.law.K2:
-            remedy = "with hub.inertia = 0 the root moment is -u at once: an algebraic loop; use K2 = 0 or some inertia"
-            raise ParameterError(key="K2", value=self.law.K2, remedy=remedy)
+        if self.law.K2:
+            must_not_be_algebraic(self.arm, "K2", self.law.K2)
         if self.law.K2 and self.arm.is_undamped and not (self.arm.hub_side_inertia or self.arm.reads_hub_moment):
             remedy = "with hub.inertia = 0 and no damping K2 moves poles through infinity; use K2 = 0 or some inertia"
             raise ParameterError(key="K2", value=self.law.K2, remedy=remedy)

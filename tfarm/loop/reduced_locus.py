@@ -6,6 +6,7 @@ parameter of the arm, which python-control cannot vary, the poles of a reduced c
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -14,6 +15,7 @@ from scipy.optimize import linear_sum_assignment
 
 from tfarm.arm import FED_BACK, Arm, HubFeedback
 from tfarm.arm.blocks import Matrices
+from tfarm.arm.checks import whole
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.records import record
@@ -63,8 +65,10 @@ def reduced_locus(exact: Locus, order: int | None = None) -> ReducedLocus:
     least = int(exact.mode.max()) + rigid
     if order is None:
         order = max(LEAST_ORDER, 2 * (least + MODES_BEYOND_BRANCHES))
-    if isinstance(order, bool) or not isinstance(order, int) or order % 2 or order < 2 * least:
-        raise ParameterError(key="order", value=order, remedy=f"an even number from {2 * least}: two a mode")
+    remedy = f"an even number from {2 * least}: two a mode"
+    order = whole("order", order, 2 * least, math.inf, remedy)
+    if order % 2:
+        raise ParameterError(key="order", value=order, remedy=remedy)
     count = order // 2 - rigid
     if exact.vary in OF_THE_LAW:
         which = np.arange(exact.gain.size)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.arrays import LEAST_SIZE, Complex, Real
-from tfarm.crossing import Crossings, brackets, counts_over, intervals, solved
+from tfarm.crossing import Crossings, Window, brackets, counts_over, intervals, solved
 from tfarm.exact.characteristic import gains_of, loop_parts, loop_system, torque
 from tfarm.exact.system import System
 from tfarm.records import record
@@ -33,7 +33,6 @@ from .plant import Loop
 from .stability import loop_band, stability
 from .windows import holds_undamped
 
-Window = tuple[float, float]
 INFINITE = -1  # stands for infinitely many unstable poles
 MOST_GRID_GAINS = 2000  # of a map, along one gain
 SHOWN_K1, SHOWN_K2 = (-1.0, 3.0), (-2.0, 2.0)  # of a map, unless told: what the paper's arm is stable in, and around it

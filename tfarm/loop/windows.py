@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from tfarm.arm import MOMENT_GAIN
-from tfarm.crossing import Crossing, Crossings, counts_over
+from tfarm.crossing import Crossing, Crossings, Window, counts_over
 from tfarm.records import record
 from tfarm.spectrum import modes
 from tfarm.spectrum.scales import gain_unit, most_gain
@@ -21,7 +21,6 @@ from .lossless import locked_edges, stable_moments
 from .plant import Loop
 from .stability import Stability, loop_band, stability
 
-Interval = tuple[float, float]
 End = Literal["edge", "search bound", "no limit"]
 
 WINDOW_REACH, FARTHER_REACH = 20.0, {MOMENT_GAIN: 50.0}  # how far windows are looked for, times `gain_unit`
@@ -41,9 +40,9 @@ class Windows:
     """
 
     name: str
-    around: Interval | None
-    all: tuple[Interval, ...]
-    looked_at: Interval
+    around: Window | None
+    all: tuple[Window, ...]
+    looked_at: Window
     crossings: Crossings
     band: float = math.inf
 
@@ -81,7 +80,7 @@ def _is_lossless_line(loop: Loop, name: str) -> bool:
     return loop.freed.arm.is_reactive and loop.law.having(name, 1.0).is_at_hub
 
 
-def looked_at(loop: Loop, name: str) -> Interval:
+def looked_at(loop: Loop, name: str) -> Window:
     """The range of a gain that is searched, symmetric and well beyond what matters to the first mode."""
     arm, law = loop.arm, loop.law
     reach = max(FARTHER_REACH.get(name, WINDOW_REACH) * gain_unit(arm, name), BEYOND_LAW * abs(law[name]))
@@ -117,7 +116,7 @@ def reach_words(windows: Iterable[Windows]) -> str:
     return f"window ends are those of poles up to {max(bands):.4g} rad/s: beyond, some may cross at smaller gains"
 
 
-def _counts(verdict: Stability, name: str, pairs: list[Interval], found: Crossings) -> list[int]:
+def _counts(verdict: Stability, name: str, pairs: list[Window], found: Crossings) -> list[int]:
     """Unstable poles in each window: counted in one, by the crossings in the others; at C = 0 whether there are any."""
     loop, value = verdict.loop, verdict.loop.law[name]
     if _is_lossless_line(loop, name):
@@ -154,7 +153,7 @@ def holds_undamped(loop: Loop) -> bool:
     return bool(law.Kp >= 0 or (1 + loop.loop_function(small)[0]).real > 0)
 
 
-def _with_proven_ends(loop: Loop, name: str, pair: Interval, limits: Interval) -> Interval:
+def _with_proven_ends(loop: Loop, name: str, pair: Window, limits: Window) -> Window:
     """Ends at the edge of the search replaced by infinity where a theorem says that nothing changes beyond it.
 
     At C = 0 the Lyapunov argument holds for every K1 > 0, Kp >= 0, K2 < 1; at C > 0 for K2 = 0 (a passive hub).

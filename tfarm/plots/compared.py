@@ -14,8 +14,7 @@ from matplotlib.ticker import FuncFormatter
 from tfarm.arm import HubFeedback
 from tfarm.arrays import Real
 from tfarm.comparing import Comparison
-from tfarm.crossing import pieces
-from tfarm.crossing.pieces import Window
+from tfarm.crossing import Window, pieces
 from tfarm.digits import plain
 
 from .frequency import hertz_axis, magnitude_limits, wrapped_phase

@@ -29,7 +29,7 @@ LABEL = "{name}, on the {output}  [{unit}]"
 def overlay(continuous: Region, sampled: GainMap | Sequence[GainMap], *, ax: Axes | None = None) -> Axes:
     """Both regions of the two gains, in the axes given or in new ones; the axes.
 
-    `continuous` is what `tfarm.map` returns, `sampled` what `tfarm.dsp.gain_map` does: several, for arms with less and
+    `continuous` is what `tfarm.map` returns, `sampled` what `tfarm.dsp.sampled_map` does: several, for arms with ever
     less damping, lie on each other.  The point is the law of the sampled loop.
     """
     planes = [sampled] if isinstance(sampled, GainMap) else list(sampled)

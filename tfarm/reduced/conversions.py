@@ -6,7 +6,6 @@ The state space is the form to keep: its numbers are the poles and residues them
 from __future__ import annotations
 
 import io
-import math
 import os
 import re
 from pathlib import Path
@@ -15,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy.io
 
+from tfarm.arm.checks import positive
 from tfarm.errors import ParameterError
 from tfarm.files import is_standard_output, write_file
 from tfarm.response import transfer
@@ -71,8 +71,7 @@ def discrete(reduced: ReducedModel, period: float) -> control.StateSpace:
     """The model sampled every `period` seconds behind a zero-order hold, exactly (matrix exponential)."""
     import control
 
-    if isinstance(period, bool) or not isinstance(period, int | float) or not 0 < period < math.inf:
-        raise ParameterError(key="period", value=period, remedy="a positive time in seconds, such as 0.01")
+    period = positive("period", period, "a positive time in seconds, such as 0.01")
     return control.sample_system(reduced.state_space(), period, method="zoh")
 
 

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from tfarm.arm import Arm
 from tfarm.arm.blocks import Matrices
-from tfarm.arm.checks import whole
+from tfarm.arm.checks import positive, whole
 from tfarm.arrays import Complex, Real
 from tfarm.errors import MISSING, ConvergenceError, ParameterError
 from tfarm.exact.outputs import Output
@@ -277,9 +277,8 @@ def _band(band: Any) -> tuple[float, float]:
 
 
 def _error(error: Any) -> float:
-    if isinstance(error, bool) or not isinstance(error, int | float) or not 0 < error < math.inf:
-        raise ParameterError(key="error", value=error, remedy="a positive number, such as 1e-6")
-    if error < EXACT_ROUNDING:
+    asked = positive("error", error, "a positive number, such as 1e-6")
+    if asked < EXACT_ROUNDING:
         remedy = f"the exact values it is measured against are float64 numbers; ask for {EXACT_ROUNDING:g} or more"
         raise ParameterError(key="error", value=error, remedy=remedy)
-    return float(error)
+    return asked

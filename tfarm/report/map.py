@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from tfarm.arm import PLANE, Arm, HubFeedback, laws_at, shown_unit
 from tfarm.arrays import Real
 from tfarm.columns import Column, Table
-from tfarm.dsp import Chain, sampled_verdict
+from tfarm.dsp import Chain, sampled_map, sampled_verdict
 from tfarm.dsp import GainMap as SampledMap
-from tfarm.dsp import gain_map as sampled_map
 from tfarm.dsp.brief import SampledBrief
 from tfarm.dsp.regions import ends_of_K1, rounded_map, with_both_sides
 from tfarm.errors import ConvergenceError

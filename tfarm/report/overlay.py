@@ -15,7 +15,7 @@ from tfarm.arm import PLANE, Arm, HubFeedback, shown_unit
 from tfarm.arrays import Complex, Real
 from tfarm.columns import Column, Table
 from tfarm.digits import plain
-from tfarm.dsp import GainMap, gain_map, sampled_verdict
+from tfarm.dsp import GainMap, sampled_map, sampled_verdict
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.regions import ends_of_K1, rounded_map, with_both_sides, with_more
 from tfarm.loop.regions import Region, region
@@ -61,7 +61,7 @@ def stable_regions(arm: Arm, gains: HubFeedback, chain: Chain) -> StableRegions:
             OVERLAY_ASPECT * np.log(across / low) / np.log(top / low) + 1j * (up - span[0]) / np.ptp(span)
         )
 
-    planes = [rounded_map(gain_map(loop, across, cut), drawn) for loop in loops]
+    planes = [rounded_map(sampled_map(loop, across, cut), drawn) for loop in loops]
     every = np.unique(np.concatenate([plane.axes[0] for plane in planes]))
     return StableRegions(region(arm, every, cut), tuple(with_more(plane, every) for plane in planes))
 

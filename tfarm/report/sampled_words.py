@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, HubFeedback, unit_of
+from tfarm.crossing import Window
 from tfarm.digits import plain, scientific, significant
 from tfarm.dsp import Analysis, Verdict, analyse
 from tfarm.dsp.chain import Chain
-from tfarm.dsp.margins import Window, around
+from tfarm.dsp.margins import around
 from tfarm.dsp.periods import AtPeriod, at_periods
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import Windows, gain_windows

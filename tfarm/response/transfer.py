@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tfarm.arm import INPUT_UNITS, Arm, Input, must_be_arm
+from tfarm.arm.checks import number, positive, whole
 from tfarm.arrays import Complex
 from tfarm.errors import MISSING, ParameterError
 from tfarm.exact.balls import nearest_float
@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 
 POINTS_AT_ONCE = 1 << 16  # points s at once: their values fill a megabyte an output, and few loops are begun
 LARGEST_S = 1e20  # 1/s: far beyond any arm, and the powers of s that are taken do not overflow
+MOST_ASKED_DIGITS = 1000  # of a value
+A_FREQUENCY = "a positive, finite frequency in rad/s"
 
 
 Wanted = str | Output | Sequence[str | Output]  # one output or several
@@ -151,8 +153,8 @@ class TransferFunction:
 
         s and the arm's parameters are taken as the float64 numbers they are.  Raises CertificationError at a pole.
         """
-        if not isinstance(digits, int) or not 1 <= digits <= 1000:
-            raise ParameterError(key="digits", value=digits, remedy="a whole number of digits from 1 to 1000")
+        most = MOST_ASKED_DIGITS
+        digits = whole("digits", digits, 1, most, f"a whole number of digits from 1 to {most}")
         self.must_be_of_the_hub("digits")
         point = complex(_finite(s))
         pairs = [digits_of(self._k, wanted, point, digits, self._share) for wanted in self.rows]
@@ -215,7 +217,7 @@ class TransferFunction:
         At C = 0 they are +-i times the natural frequencies, complete by their count, and 0 twice for the
         rigid-body mode; at C > 0 complete by the winding number of the characteristic function around the box.
         """
-        return poles_of(self.arm, _positive("up_to", up_to))
+        return poles_of(self.arm, positive("up_to", up_to, A_FREQUENCY))
 
     def zeros(self, *, up_to: float) -> Roots:
         """The zeros of a single output with |Im s| <= up_to [rad/s], complete in the box of the record.
@@ -225,7 +227,7 @@ class TransferFunction:
         self.must_be_of_the_hub("zeros")
         if not self.is_single:
             raise ParameterError(key="outputs", value=self.outputs, remedy="ask for the zeros of one output at a time")
-        return zeros_of(self.arm, self.rows[0], _positive("up_to", up_to), self._share)
+        return zeros_of(self.arm, self.rows[0], positive("up_to", up_to, A_FREQUENCY), self._share)
 
     # ------------------------------------------------------------ inside
 
@@ -248,9 +250,11 @@ class TransferFunction:
             return None
         if x is None:
             raise ParameterError(key="x", value=MISSING, remedy=f"say where {along[0]} is meant, 0 to {length:g} m")
-        if isinstance(x, bool) or not isinstance(x, int | float) or not 0 <= x <= length:
-            raise ParameterError(key="x", value=x, remedy=f"a point of the arm lies between 0 and {length:g} m")
-        return float(x)
+        remedy = f"a point of the arm lies between 0 and {length:g} m"
+        place = number("x", x, remedy)
+        if not 0 <= place <= length:
+            raise ParameterError(key="x", value=x, remedy=remedy)
+        return place
 
 
 def _finite(s: ArrayLike) -> Complex:
@@ -263,9 +267,3 @@ def _finite(s: ArrayLike) -> Complex:
         bad = points.ravel()[abs(points.ravel()).argmax()]
         raise ParameterError(key="s", value=complex(bad), remedy=f"beyond any arm; at most {LARGEST_S:g} 1/s")
     return points
-
-
-def _positive(key: str, value: float) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < math.inf:
-        raise ParameterError(key=key, value=value, remedy="a positive, finite frequency in rad/s")
-    return float(value)

@@ -124,14 +124,14 @@ def _rate_gain(arm: Arm, Kp: float) -> float:
     return float(np.sqrt(2 * Kp * arm.turned_inertia))
 
 
-def _servo(Kp: float, c: Numbers) -> tuple[Entry, Entry]:
+def _servo_entries(Kp: float, c: Numbers) -> tuple[Entry, Entry]:
     """Kp on the angle, the first coefficient on its rate."""
     return Entry("hub_angle", Kp * ONE, ONE), Entry("hub_rate", c[:1], ONE)
 
 
 def _pd(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
     def entries(c: Numbers) -> tuple[Entry, ...]:
-        return _servo(Kp, c)
+        return _servo_entries(Kp, c)
 
     return Structure("PD", ("K1",), np.array([_rate_gain(arm, Kp)]), (True,), np.array([np.inf]), entries)
 
@@ -171,7 +171,7 @@ def _ppf(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
             own = np.array([1.0, 2 * zeta * w, w * w])
             num = np.polyadd(np.polymul(num, own), g * w * w * den)
             den = np.polymul(den, own)
-        return (*_servo(Kp, c), Entry("root_moment", num, den))
+        return (*_servo_entries(Kp, c), Entry("root_moment", num, den))
 
     names = ("K1", *(f"{each}_{n}" for n in range(1, modes + 1) for each in ("gain", "filter_rad_s", "filter_damping")))
     unit = 0.1 * arm.input_per_torque
@@ -185,7 +185,7 @@ def _strain_rate(arm: Arm, Kp: float, modes: int, period: float) -> Structure:
 
     def entries(c: Numbers) -> tuple[Entry, ...]:
         _, g, pole = c
-        return (*_servo(Kp, c), Entry("root_moment", np.array([g, 0.0]), np.array([1 / pole, 1.0])))
+        return (*_servo_entries(Kp, c), Entry("root_moment", np.array([g, 0.0]), np.array([1 / pole, 1.0])))
 
     start = np.array([_rate_gain(arm, Kp), 0.1 * arm.input_per_torque / first, 2 / period])
     most = np.array([np.inf, np.inf, 2 / period])

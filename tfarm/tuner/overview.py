@@ -139,11 +139,11 @@ def tuner_study(arm: Arm, chain: Chain) -> TunerStudy:
         curves=tuple(_curves(tuning, *each) for each in LEARNT),
         cost_map=_cost_map(tuning),
         rows=tuple(rows),
-        servo=_servo(arm, plan, ideal),
+        servo=_servo_tuning(arm, plan, ideal),
     )
 
 
-def _servo(arm: Arm, plan: Plan, chain: Chain) -> Tuning | None:
+def _servo_tuning(arm: Arm, plan: Plan, chain: Chain) -> Tuning | None:
     """The same tuning with an angle loop a twentieth as fast as the first mode, or slower where the clock is slow."""
     speed = min(SERVO_SPEED * first_frequency(arm), SERVO_TURN / chain.sampling.period)
     on_angle = float(f"{arm.turned_inertia * speed**2:.2g}")

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tfarm.arm import Arm, HubFeedback
+from tfarm.arm import Arm, HubFeedback, must_not_be_algebraic
 from tfarm.arm.checks import not_negative, number, positive
 from tfarm.arrays import Real
 from tfarm.dsp import Chain, SampledLoop, Scenario, Simulator, sampled_loop, scenario
@@ -230,9 +230,7 @@ def slew_trial(
     if length < chain.slew.rise_time:
         remedy = f"a trial lasts at least as long as its slew, {chain.slew.rise_time:g} s"
         raise ParameterError(key="duration", value=length, remedy=remedy)
-    if arm.has_massless_hub:
-        remedy = "the root moment of a hub without inertia is the torque itself, and feeding it back an algebraic loop"
-        raise ParameterError(key="hub.inertia", value=0.0, remedy=f"{remedy}; give the hub an inertia")
+    must_not_be_algebraic(arm, "hub.inertia", 0.0)
     loop = sampled_loop(arm, HubFeedback(K1=rate_gain, K2=1.0, Kp=Kp), chain, count=count)
     task = scenario("slew", arm if known is None else known, chain, length)
     return Trial(loop, task, Cost() if cost is None else cost, signals)
