@@ -57,7 +57,7 @@ def inside(value):
     elif dataclasses.is_dataclass(value):
         yield value
         for name, attribute in vars(type(value)).items():
-            if isinstance(attribute, cached_property) and getattr(value, name) is not value:  # a loop may be its own `freed`
+            if isinstance(attribute, cached_property) and getattr(value, name) is not value:  # as `Loop.freed` may be
                 yield from inside(getattr(value, name))
         yield from (found for each in dataclasses.fields(value) for found in inside(getattr(value, each.name)))
 

@@ -61,7 +61,7 @@ class Clocked:
 
     @property
     def margins(self) -> dict[str, float | None]:
-        """By `TITLES`: between which factors on the law, and up to which further delay [s], the loop is stable."""
+        """By `CLOCKED_MARGINS`: between which factors on the law, and up to what more delay [s], the loop is stable."""
         low, high = self.analysis.gain_factors or (None, None)
         delay = self.analysis.delay_margin.samples * self.period if self.analysis.verdict.is_stable else None
         return dict(zip(CLOCKED_MARGINS, (high, low, delay), strict=True))

@@ -1,7 +1,7 @@
 """Where the poles of the sampled loop go as a gain grows: three loci of one loop, each branch named after its mode.
 
-Branches are followed by `dsp.law.followed`, through as many values as it takes to be round; each is named after the
-mode that it comes from at zero gain.
+Branches are followed by `law.followed_branches`, through as many values as it takes to be round; each is named after
+the mode that it comes from at zero gain.
 """
 
 from __future__ import annotations

@@ -3,6 +3,10 @@
 The branches are followed from the modes of the open arm (`branches`), with few steps; between these they are guessed by
 cubics, and every zero at every value asked for is polished at once by Newton's method on the transcendental
 characteristic function.  A guess that moves too far, or lands on a neighbour, is followed again from the last node.
+
+Pairs of poles are followed because that is cheaper than to find all poles of a box at each value, and as sure: of 314
+random loci (`python -m tests.loop.loci 60 11` and `250 5`) none was refused, and no point was wrong.  Under any other
+law there are poles that continue from no mode, infinitely many with a delay; so its loci complete a box (`law_locus`).
 """
 
 from __future__ import annotations

@@ -61,9 +61,9 @@ def count_with_mirrors(zeros: Complex) -> int:
 class Poles(Generic[AnyLoop]):
     """Closed-loop poles [1/s] with Im >= 0, ascending in Im, those at 0 as often as they are: all there are in `box`.
 
-    A real pole stands once for each time, an oscillating one for its conjugate too.  `ends_at_shear_cutoff` says that
-    the box ends at sqrt(kappa G A/(rho I)), since no more poles lie below it: those above are of shear, and undamped
-    but for the little that bending takes.
+    A real pole is listed as often as its order, an oscillating one stands for its conjugate too.
+    `ends_at_shear_cutoff` says that the box ends at sqrt(kappa G A/(rho I)), since no more poles lie below it: those
+    above are of shear, and undamped but for the little that bending takes.
     """
 
     loop: AnyLoop

@@ -47,10 +47,10 @@ class MapOfArm:
     """What the map shows.
 
     `region` is the exact count on the coloured grid, `edge` (n, 3) the exact boundary, both gains and w, within the
-    picture with rows of nan where it leaves it; `damping` (rows, columns) the least damping ratio of the first `MODES`
-    modes at `axes`, every fourth value of each gain on the grid and the frame's; `design` the best gains for the
-    sampled loop.  `sampled` is where the loop is stable at the clock of `chain` too, None where that could not be
-    settled; `briefs` are the sampled verdicts on the laws.
+    picture with rows of nan where it leaves it; `damping` (rows, columns) the least damping ratio of the first
+    `DESIGNED_MODES` modes at `axes`, every fourth value of each gain on the grid and the frame's; `design` the best
+    gains for the sampled loop.  `sampled` is where the loop is stable at the clock of `chain` too, None where that
+    could not be settled; `briefs` are the sampled verdicts on the laws.
     """
 
     arm: Arm

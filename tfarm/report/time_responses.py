@@ -98,7 +98,7 @@ def responses_table(stem: str, title: str, arm: Arm, each: Mapping[str, Simulati
     """The curves of some simulations of one scenario as they are drawn: a row a point, or a piece of the bands.
 
     Torques and gains are those held at that time, the rigid arm's moment that of the sample after it.  Numbers have
-    HELD digits: a page's folder is no place for six thousand rows of eleven columns to the last bit.
+    `CURVE_DIGITS` digits: a page's folder is no place for six thousand rows of eleven columns to the last bit.
     """
     found = [(key, curves.root_moment(run), curves.tip_deviation(arm, run), run) for key, run in each.items()]
     t = min((moment.t for _, moment, _, _ in found), key=len)

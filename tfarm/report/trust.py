@@ -1,7 +1,7 @@
 """Why trust this: one page for all reports, with proofs, published numbers, the audit and how to make it all again.
 
 What takes seconds (the audit, the published tables) is `Evidence`, made by one piece of the work; what belongs to an
-arm (`trust_proofs.Proof`) is in its folder.  This module turns both into sections.
+arm (`trust_proofs.ArmProof`) is in its folder.  This module turns both into sections.
 """
 
 from __future__ import annotations

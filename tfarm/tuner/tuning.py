@@ -102,7 +102,7 @@ class Tuning:
     shaped: dict[str, tuple[Trial, Record]]
 
     def saved(self) -> SavedTuner:
-        """What `saving.save` writes."""
+        """What `saving.save_tuner` writes."""
         guard, plan, period = self.training.guard, self.plan, self.trial.task.period
         arm, network = self.trial.arm.name, self.training.network
         return SavedTuner(
