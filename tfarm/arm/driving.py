@@ -52,7 +52,7 @@ def must_not_be_algebraic(arm: Arm, key: str, value: object) -> None:
     if arm.has_massless_hub:
         remedy = (
             "with hub.inertia = 0 the root moment is -u itself, so that moment feedback is an algebraic loop; "
-            "give the hub an inertia, or feed no moment back (K2 = 0)"
+            "give the hub an inertia, or feed no moment back"
         )
         raise ParameterError(key=key, value=value, remedy=remedy)
 

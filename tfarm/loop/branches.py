@@ -38,7 +38,7 @@ NOBODY = -1  # the number of the branch of a zero that has ended
 ASIDE = 1e-3  # of J w1: a rate gain that keeps modes from meeting on the axis
 GUESSING_NODES = 4  # nodes through which a guess between two of them goes
 FARTHEST_RIGID = 0.02  # of the lowest flexible frequency: how far the rigid body's zeros may be there
-CANCELLED_INERTIA = 1e-9  # of the arm's: stands for an effective inertia that K2 has cancelled, to start from
+CANCELLED_INERTIA = 1e-9  # of the arm's: stands for an effective inertia cancelled by moment feedback, to start from
 
 
 @dataclass(frozen=True)

@@ -146,8 +146,8 @@ def map_data(data: MapOfArm) -> Table:
     edge = data.edge[~np.isnan(data.edge[:, 0])] if data.edge.size else data.edge
     ends: list[tuple[float, float]] = []
     if data.sampled is not None:
-        for K1, windows in zip(data.sampled.axes[0], data.sampled.stable_intervals, strict=True):
-            ends += [(float(K1), end) for window in windows for end in window if data.y.low <= end <= data.y.high]
+        for across, windows in zip(data.sampled.axes[0], data.sampled.stable_intervals, strict=True):
+            ends += [(float(across), end) for window in windows for end in window if data.y.low <= end <= data.y.high]
     sampled = np.array(ends).reshape(-1, 2)
     counts: list[float | int | str] = [math.inf if count < 0 else int(count) for count in data.counts.ravel()]
     none: list[float | int | str] = [""]
