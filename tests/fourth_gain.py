@@ -88,13 +88,31 @@ def _sampled(arm: Any, law: Any) -> dict[str, Any]:
     }
 
 
+def _simulated(arm: Any, law: Any) -> dict[str, Any]:
+    """The input and the tip of a slew, and what a controller that measures three signals says to the law."""
+    import tfarm
+    from tfarm.dsp.simulate import Measurement
+    from tfarm.errors import ParameterError
+
+    found = tfarm.simulate(arm, law, duration=1.0, count=4)
+    try:
+        refused = str(Measurement(0, *[0.0] * 9).asked(law, 0.3))
+    except ParameterError as error:
+        refused = str(error)
+    return {
+        "torque": found.torque.tolist(),
+        "tip": found.at_samples.tip_displacement.tolist(),
+        "refused": refused,
+    }
+
+
 def _answer(case: dict[str, Any]) -> dict[str, Any]:
     import tfarm
 
     arm = tfarm.load(case["arm"])
     arm = replace(arm, hub=replace(arm.hub, friction=case["friction"]))
     law = tfarm.HubFeedback(**case["gains"])
-    return {"loop": _loop(arm, law), "sampled": _sampled(arm, law)}
+    return {"loop": _loop(arm, law), "sampled": _sampled(arm, law), "simulated": _simulated(arm, law)}
 
 
 if __name__ == "__main__":

@@ -103,3 +103,22 @@ def test_to_first_order_it_moves_each_mode_of_the_sampled_loop_as_its_poles_move
     found = answers[number]["sampled"]
     size, off = np.array(found["size"])[:5], np.array(found["off"])[:5]  # of higher ones damping leaves no digits
     assert (abs(off) < 1e-4 * abs(size) + 1e-6 * abs(size).max()).all()
+
+
+@pytest.mark.parametrize("number", range(len(CASES)))
+def test_a_slew_under_it_is_that_of_the_same_law_by_its_signals_with_references_at_the_hub(number, answers) -> None:
+    case, found = CASES[number], answers[number]["simulated"]
+    law = law_of(case)
+    led = replace(law, references=tuple(name for name in law.signals if name != OUTPUT))
+    known = tfarm.simulate(arm_of(case), led, duration=1.0, count=4)
+    for ours, theirs in ((found["torque"], known.torque), (found["tip"], known.at_samples.tip_displacement)):
+        assert ours == pytest.approx(theirs, rel=0, abs=1e-10 * abs(theirs).max())
+    gains = {name: gain for name, gain in case["gains"].items() if name != "K3"}
+    without = tfarm.simulate(arm_of(case), tfarm.HubFeedback(**gains), duration=1.0, count=4)
+    assert abs(without.torque - known.torque).max() > 0.02 * abs(known.torque).max()
+
+
+def test_a_controller_of_three_signals_refuses_it(answers) -> None:
+    refused = answers[0]["simulated"]["refused"]
+    assert refused.startswith("K3")
+    assert "hub angle, hub rate and root moment alone" in refused

@@ -17,7 +17,7 @@ import numpy as np
 
 from tfarm.arm.blocks import LawBlock, Matrices, Rational, StateSpace, block_of
 from tfarm.arm.checks import not_negative, number, positive
-from tfarm.arm.feedback import GAINS, HubFeedback
+from tfarm.arm.feedback import AT_HUB, GAINS, HubFeedback
 from tfarm.arm.records import INPUTS
 from tfarm.arrays import Complex
 from tfarm.errors import ParameterError, did_you_mean, must_be_known
@@ -111,7 +111,7 @@ class Law:
     def of_gains(cls, law: HubFeedback) -> Law:
         """The hub's two or three gains as a law, on what their signals are off their references."""
         used = {gain.output: law[gain.name] for gain in GAINS if law[gain.name]} or {"hub_rate": 0.0}
-        return cls(used, name="gains at the hub", references=tuple(used))
+        return cls(used, name="gains at the hub", references=tuple(name for name in used if name in AT_HUB))
 
     @property
     def signals(self) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from tfarm.exact.compiled import compiled
+from tfarm.exact.compiled import compiled, inlined
 
 ENCODER, AMPLIFIER, DAC = 0, 1, 2  # rows of the quantisers, and places in `saturated`
 
@@ -121,36 +121,36 @@ def signal(kind: int, own: float, angle: float, rate: float, moment: float) -> f
     return rate if kind == 3 else own
 
 
-@compiled
-def law(gains: Any, K2: float, ideal: Any, angle: float, rate: float, moment: float, single: bool) -> float:
-    """u = r + Kp (theta_ref - theta) + K1 (theta_t_ref - theta_t) - K2 (M - M_rigid), in float64 or float32.
-
-    `gains` is Kp, K1; `ideal` is r, theta_ref, theta_t_ref, M_rigid.
-    """
+@inlined
+def law(k: int, gains: Any, ideal: Any, references: Any, measured: Any, single: bool) -> float:
+    """u = r + gains . (references - measured) at sample k, r the `ideal`; float64, or every step rounded to float32."""
     if single:
-        f = np.float32
-        by_angle = f(gains[0]) * (f(ideal[1]) - f(angle))
-        by_rate = f(gains[1]) * (f(ideal[2]) - f(rate))
-        by_moment = f(K2) * (f(moment) - f(ideal[3]))
-        return float(f(f(f(f(ideal[0]) + by_angle) + by_rate) - by_moment))
-    by_angle = gains[0] * (ideal[1] - angle)
-    return ideal[0] + by_angle + gains[1] * (ideal[2] - rate) - K2 * (moment - ideal[3])
+        rounded = np.float32(ideal[k])
+        for j in range(measured.size):
+            off = np.float32(references[k, j]) - np.float32(measured[j])
+            rounded = np.float32(rounded + np.float32(gains[k, j]) * off)
+        return float(rounded)
+    u = ideal[k]
+    for j in range(measured.size):
+        u += gains[k, j] * (references[k, j] - measured[j])
+    return u
 
 
 @compiled
 def run_gains(
-    tables: Any, amplitude: Any, rigid: Any, held: Any, delay: int, gains: Any, K2: Any, ideal: Any, disturbance: Any,
-    impulse: float, rows: Any, filter_: Any, single: bool, bound: float, record: Any, torque: Any, fine: Any,
-    saturated: Any, work: Any,
+    tables: Any, amplitude: Any, rigid: Any, held: Any, delay: int, gains: Any, references: Any, ideal: Any,
+    disturbance: Any, impulse: float, rows: Any, filter_: Any, single: bool, bound: float, record: Any, torque: Any,
+    fine: Any, saturated: Any, work: Any,
 ) -> int:  # fmt: skip
     """The linear law over all samples; returns how many were made before the root moment passed `bound`.
 
-    Outputs 0, 1, 2 are what is measured (hub angle, hub rate, root moment through their analog filters).  The hub is
-    struck by `impulse` [N m s] after the first sample.  `held` is a ring of the last delay + 2 torques.  `record`
-    (n, outputs), `torque` (n,), `fine` (n, records, outputs) and `saturated` (n, 3) are filled.
+    `gains` and `references` (n, measured) are of the first outputs, which are measured: hub angle, hub rate and root
+    moment through filters and converters, any more as they are.  The hub is struck by `impulse` [N m s] after the
+    first sample.  `held` is a ring of the last delay + 2 torques.  `record` (n, outputs), `torque` (n,), `fine`
+    (n, records, outputs) and `saturated` (n, 3) are filled.
     """
     weights, rates, static = tables[3], tables[4], tables[5]
-    n, ring, memory = torque.size, held.size, np.zeros(3)
+    n, ring, memory, measured = torque.size, held.size, np.zeros(3), np.zeros(gains.shape[1])
     for k in range(n):
         acting = held[(k - delay - 1) % ring]
         extra = disturbance[k - 1] if k > 0 else 0.0
@@ -158,8 +158,10 @@ def run_gains(
         if not abs(record[k, 2]) <= bound:
             return k
         clipped = saturated[k]
-        angle, rate, moment = converted(record[k], rows, clipped, memory, filter_)
-        u = quantise(law(gains, K2[k], ideal[k], angle, rate, moment, single), rows[DAC], clipped, DAC)
+        measured[0], measured[1], measured[2] = converted(record[k], rows, clipped, memory, filter_)
+        for j in range(3, measured.size):
+            measured[j] = record[k, j]
+        u = quantise(law(k, gains, ideal, references, measured, single), rows[DAC], clipped, DAC)
         held[k % ring] = torque[k] = u
         if k == 0:
             strike(amplitude, rigid, impulse)
@@ -187,14 +189,14 @@ def run_law(
     ideal: Any, disturbance: Any, impulse: float, rows: Any, filter_: Any, single: bool, bound: float, record: Any,
     torque: Any, fine: Any, saturated: Any, work: Any,
 ) -> int:  # fmt: skip
-    """As `run_gains`, under x_{k+1} = A x + B y, u = r - C x - D y, whose signals are the outputs from number 7 on.
+    """As `run_gains`, under x_{k+1} = A x + B y, u = r - C x - D y, whose signals are the last outputs.
 
     `kinds` (signals,) says through what each goes: 0 nothing, 1 the encoder, 2 the strain amplifier, 3 the rate
     estimate; `references` (n, columns) is taken off, and is all there is of columns beyond the signals (y = 0 there).
     """
     weights, rates, static = tables[3], tables[4], tables[5]
     A, B, C, D = matrices
-    n, ring, memory = torque.size, held.size, np.zeros(3)
+    n, ring, memory, first = torque.size, held.size, np.zeros(3), record.shape[1] - kinds.size
     x, after, y = np.zeros(A.shape[0]), np.zeros(A.shape[0]), np.zeros(B.shape[1])
     for k in range(n):
         acting = held[(k - delay - 1) % ring]
@@ -205,11 +207,11 @@ def run_law(
         clipped = saturated[k]
         angle, rate, moment = converted(record[k], rows, clipped, memory, filter_)
         for j in range(y.size):
-            value = signal(kinds[j], record[k, 7 + j], angle, rate, moment) if j < kinds.size else 0.0
+            value = signal(kinds[j], record[k, first + j], angle, rate, moment) if j < kinds.size else 0.0
             y[j] = value - references[k, j]
             if single:
                 y[j] = float(np.float32(float(np.float32(value)) - float(np.float32(references[k, j]))))
-        u = ideal[k, 0] - product(D[0], y, product(C[0], x, 0.0, single), single)
+        u = ideal[k] - product(D[0], y, product(C[0], x, 0.0, single), single)
         if single:
             u = float(np.float32(u))
         for i in range(x.size):

@@ -8,7 +8,6 @@ and the strain amplifier's range act on hub angle and root moment; other signals
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -66,8 +65,8 @@ class LawSimulator(Simulator):
             matrices = tuple(each.astype(np.float32).astype(float) for each in matrices)
         done = kernel.run_law(
             self._tables, state.amplitude, state.rigid, state.held, self.chain.sampling.whole_delay, matrices, kinds,
-            self._references, self._ideal, self.scenario.disturbance, self.scenario.impulse, self._rows, self._filter,
-            single, self._bound, state.record, state.torque, state.fine, state.saturated, state.work,
+            self._references, self.scenario.feedforward, self.scenario.disturbance, self.scenario.impulse, self._rows,
+            self._filter, single, self._bound, state.record, state.torque, state.fine, state.saturated, state.work,
         )  # fmt: skip
         return self._result(state, int(done), None)
 
@@ -77,11 +76,7 @@ def references_of(law: Law, task: Scenario) -> Real:
 
     Raises ParameterError for a signal whose reference a scenario does not have.
     """
-    known: dict[str, Any] = {
-        "hub_angle": task.hub_angle,
-        "hub_rate": task.hub_rate,
-        "root_moment": task.rigid_moment,
-    }
+    known = task.references
     found = np.zeros((task.feedforward.size, len(law.signals) + len(law.wanted)))
     for column, name in enumerate((*law.signals, *law.wanted)):
         plain = name.removeprefix(REFERENCE)

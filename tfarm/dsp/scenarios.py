@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tfarm.arm import Arm, must_turn
+from tfarm.arm import AT_HUB, FED_BACK, Arm, must_turn
 from tfarm.arm.checks import number, positive
 from tfarm.arrays import Real
 from tfarm.dsp.chain import TIME_ROUNDING, Chain
@@ -49,6 +49,17 @@ class Scenario:
     def t(self) -> Real:
         """The times of the samples [s]."""
         return np.arange(self.feedforward.size) * np.float64(self.period)
+
+    @property
+    def references(self) -> dict[str, Real]:
+        """What outputs should be, by name: hub angle [rad], hub rate [rad/s], root moment [N m]."""
+        return dict(zip(AT_HUB, (self.hub_angle, self.hub_rate, self.rigid_moment), strict=True))
+
+    @property
+    def wanted(self) -> Real:
+        """The references of all that gains are on (n, gains), in the order of `GAINS`: 0 of what has none."""
+        known, none = self.references, np.zeros(self.feedforward.size)
+        return np.stack([known.get(output, none) for output in FED_BACK], axis=1)
 
 
 def slew(arm: Arm, chain: Chain, duration: float) -> Scenario:

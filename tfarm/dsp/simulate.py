@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import FED_BACK, Arm, HubFeedback
+from tfarm.arm import AT_HUB, FED_BACK, MOMENT_GAIN, Arm, HubFeedback, many_laws
 from tfarm.arm.checks import whole
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.dsp import kernel
@@ -25,6 +25,7 @@ from tfarm.errors import ParameterError
 from tfarm.records import record
 
 FOLDED_UP = 10.0  # rad: an arm bent by the moment EI/L times this is no arm any more, and the simulation stops
+SHOWN = slice(len(FED_BACK), len(FED_BACK) + len(RECORDED))  # of the outputs those recorded, after the measured ones
 MOST_BETWEEN = 1000  # records between two samples
 
 
@@ -46,8 +47,19 @@ class Measurement(NamedTuple):
     rigid_moment: float
 
     def servo(self, law: HubFeedback) -> float:
-        """What a law asks of the input [N m] for the hub's angle and rate, as they are off what is wanted."""
+        """What a law asks of the input [N m] for the hub's angle and rate, as they are off what is wanted.
+
+        Raises ParameterError for a law with a gain on what is not measured here.
+        """
+        if not law.is_at_hub:
+            name = law.elsewhere[0].name
+            remedy = "a controller of samples has hub angle, hub rate and root moment alone; set it to 0"
+            raise ParameterError(key=name, value=law[name], remedy=remedy)
         return law.Kp * (self.angle_reference - self.hub_angle) + law.K1 * (self.rate_reference - self.hub_rate)
+
+    def asked(self, law: HubFeedback, moment_gain: float) -> float:
+        """u = r + Kp (theta_ref - theta) + K1 (theta_t_ref - theta_t) - K2 x, K2 being `moment_gain` at this sample."""
+        return self.feedforward + self.servo(law) - moment_gain * self.vibration
 
 
 Controller = Callable[[Measurement], float]
@@ -129,7 +141,7 @@ class Simulator:
         self._kept = np.nonzero(self.plant.poles.imag >= 0)[0]
         self._tables = _tables(self.plant, self._kept, chain, between)
         self._rows = quantisers(chain).rows
-        self._ideal = np.c_[scenario.feedforward, scenario.hub_angle, scenario.hub_rate, scenario.rigid_moment]
+        self._wanted = scenario.wanted
         self._bound = FOLDED_UP * arm.bending_scale
 
     def plant_of(self, arm: Arm, count: int) -> Plant:
@@ -138,7 +150,7 @@ class Simulator:
         return filtered(plant, self.chain)
 
     def linear(self, gains: HubFeedback, K2: Real | None = None) -> Simulation:
-        """The law u = r + Kp (theta_ref - theta) + K1 (theta_t_ref - theta_t) - K2 x, compiled; `K2` (n,) may vary.
+        """The law u = r + gains . (wanted - measured), compiled; `K2` (n,) may vary.  Nothing is wanted off the hub.
 
         Raises ParameterError for I_h = 0 with moment feedback, and for gains that are not one finite number a sample.
         """
@@ -147,11 +159,11 @@ class Simulator:
         gain = np.full(n, gains.K2) if K2 is None else np.array(K2, dtype=float)
         if gain.shape != (n,) or not np.isfinite(gain).all():
             raise ParameterError(key="K2", value=gain.shape, remedy=f"one finite gain a sample, {n} in all")
-        state = self._start()
-        c = self.chain.converters
+        state, c = self._start(), self.chain.converters
+        rows = np.ascontiguousarray(many_laws(gains, **{MOMENT_GAIN: gain}).T)
         done = kernel.run_gains(
             self._tables, state.amplitude, state.rigid, state.held, self.chain.sampling.whole_delay,
-            np.array([gains.Kp, gains.K1]), gain, self._ideal, self.scenario.disturbance, self.scenario.impulse,
+            rows, self._wanted, self.scenario.feedforward, self.scenario.disturbance, self.scenario.impulse,
             self._rows, self._filter, c.arithmetic == "float32", self._bound, state.record, state.torque, state.fine,
             state.saturated, state.work,
         )  # fmt: skip
@@ -167,7 +179,7 @@ class Simulator:
 
         def torque(m: Measurement) -> tuple[float, float]:
             K = float(gain(m))
-            return m.feedforward + m.servo(law) - K * m.vibration, K
+            return m.asked(law, K), K
 
         return self._stepped(torque, np.zeros(self.scenario.feedforward.size))
 
@@ -180,7 +192,7 @@ class Simulator:
 
     def modal(self) -> tuple[Complex, Complex]:
         """Poles (m,) [1/s] with Im p >= 0, and what each amplitude adds to hub angle, rate, moment and tip (4, m)."""
-        return self.plant.poles[self._kept], self._tables[3][3:7]
+        return self.plant.poles[self._kept], self._tables[3][SHOWN]
 
     def first_amplitudes(self) -> Complex:
         """The modal amplitudes (m,) after the sample at t = 0, once the hub was struck."""
@@ -220,7 +232,8 @@ class Simulator:
         angle = kernel.quantise(state.record[k, 0], self._rows[kernel.ENCODER], state.saturated[k], kernel.ENCODER)
         moment = kernel.quantise(state.record[k, 2], self._rows[kernel.AMPLIFIER], state.saturated[k], kernel.AMPLIFIER)
         rate = kernel.estimate(angle, state.record[k, 1], memory, self._filter)
-        forward, angle_wanted, rate_wanted, rigid = (float(value) for value in self._ideal[k])
+        forward = float(self.scenario.feedforward[k])
+        angle_wanted, rate_wanted, rigid = (float(value) for value in self._wanted[k, : len(AT_HUB)])
         values = [angle, rate, moment, moment - rigid, forward, angle_wanted, rate_wanted, rigid]
         if single:
             values = [float(np.float32(value)) for value in values]
@@ -251,7 +264,7 @@ class Simulator:
 
     def _energy(self, amplitude: Complex, rate: float) -> float:
         """Of an undamped arm [J]: b^2 |a|^2/2 a mode, b^2 twice the residue of the hub rate, and the rigid arm's."""
-        row = self.plant.outputs.index("hub_rate", len(FED_BACK))
+        row = self.plant.outputs.index("hub_rate", SHOWN.start)
         rigid = self.plant.rigid[row, 1] * rate**2 / 2
         return float(self.plant.residues[row, self._kept].real @ abs(amplitude) ** 2 + rigid)
 
@@ -276,7 +289,7 @@ class Simulator:
             chain=self.chain,
             at_samples=_trace(self.scenario.t[:done], state.record[:done]),
             between=between,
-            measured=state.record[:done, :3],
+            measured=state.record[:done, : len(AT_HUB)],
             torque=state.torque[:done],
             gain=None if gain is None else gain[:done],
             saturated_at=state.saturated[:done],
@@ -311,7 +324,7 @@ def _tables(plant: Plant, kept: NDArray[np.int64], chain: Chain, between: int) -
     turn = np.exp(p * piece[:, :1])
     push = np.array([held_amplitude(p, float(duration)) for duration in piece[:, 0]])
     weights = np.ascontiguousarray(plant.residues[:, kept] * weight)
-    row = plant.outputs.index("hub_angle", len(FED_BACK))
+    row = plant.outputs.index("hub_angle", SHOWN.start)
     hub = np.r_[plant.rigid[row], weights[row]].astype(complex)
     return turn, push, piece, weights, plant.rigid, plant.static, hub
 
@@ -329,5 +342,5 @@ def _released(plant: Plant, kept: NDArray[np.int64], offset: float) -> tuple[int
 
 
 def _trace(t: Real, record: Real) -> Trace:
-    """The recorded outputs, the last four columns."""
-    return Trace(t, *(np.ascontiguousarray(column) for column in record[:, 3:7].T))
+    """The recorded outputs."""
+    return Trace(t, *(np.ascontiguousarray(column) for column in record[:, SHOWN].T))

@@ -64,7 +64,7 @@ def strip_chart(arm: Arm, gains: HubFeedback, ideal: Simulation, modes: int) -> 
     read, asked = np.zeros(task.t.size), np.zeros(task.t.size)
 
     def controller(m: Measurement) -> float:
-        u = m.feedforward + m.servo(gains) - gains[MOMENT_GAIN] * m.vibration
+        u = m.asked(gains, gains[MOMENT_GAIN])
         read[m.k], asked[m.k] = m.root_moment, u
         return u
 

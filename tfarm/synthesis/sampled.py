@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from tfarm.arm import ANGLE_GAIN, FED_BACK, PLANE, Arm, HubFeedback, laws_at
+from tfarm.arm import FED_BACK, PLANE, Arm, HubFeedback, laws_at
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.dsp import Chain, SampledLoop, Scenario, sampled_loop, sampled_verdict, scenario
 from tfarm.dsp.chain import TIME_ROUNDING
@@ -185,12 +185,12 @@ class SampledJudge:
         start, by_each, drive, sense = self._with_angle
         (on_rate, on_moment), number = points, points.shape[1]
         A = start + on_rate[:, None, None] * by_each[0] + on_moment[:, None, None] * by_each[1]
+        laws, references = laws_at(self.loop.gains, points), task.wanted
         kept = self.loop.pulse.integrals_at + 2  # the input of the sample before
         x, (moment, u) = np.zeros((number, len(start), 1)), np.zeros((2, task.t.size, number))
-        fixed = task.feedforward + self.loop.gains[ANGLE_GAIN] * task.hub_angle
         for k in range(task.t.size):
             moment[k] = x[..., 0] @ sense
-            wanted = fixed[k] + on_rate * task.hub_rate[k] + on_moment * task.rigid_moment[k]
+            wanted = sum((row * each for row, each in zip(laws, references[k], strict=True)), start=task.feedforward[k])
             x = A @ x + drive[:, None] * wanted[:, None, None]
             u[k] = x[:, kept, 0]
         return moment, u
