@@ -68,7 +68,7 @@ def survey(size, seed):
     for number in range(1, size + 1):
         arm, law, vary, start, stop = some_locus(number, seed)
         try:
-            found = locus(arm, law, vary, start, stop, 60)
+            found = locus(arm, law, vary, start, stop, 60, 10)
             wrong = wrong_points(found)
         except ConvergenceError as error:
             told["refused"] += 1

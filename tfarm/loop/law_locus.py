@@ -64,9 +64,7 @@ class LawLocus:
     crossings: tuple[BranchCrossing, ...]
 
 
-def law_locus(
-    arm: Arm, law: Law, vary: str, start: float, stop: float, points: int = 200, branches: int = 8
-) -> LawLocus:
+def law_locus(arm: Arm, law: Law, vary: str, start: float, stop: float, points: int, branches: int) -> LawLocus:
     """The locus at `points` equally spaced values, in a box as high as the first `branches` flexible modes.
 
     Raises ParameterError for what is no number of the law or the arm, no loop or no range, ConvergenceError where the

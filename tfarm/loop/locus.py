@@ -84,9 +84,7 @@ class Locus:
         return tuple((int(row), float(self.gain[np.nonzero(lives[row])[0][-1]])) for row in rows if lives[row].any())
 
 
-def locus(
-    arm: Arm, law: HubFeedback, vary: str, start: float, stop: float, points: int = 500, branches: int = 10
-) -> Locus:
+def locus(arm: Arm, law: HubFeedback, vary: str, start: float, stop: float, points: int, branches: int) -> Locus:
     """The exact locus at `points` equally spaced values from `start` to `stop`, of the first `branches` branches.
 
     `vary` is a gain, "all" (a scale on the law) or a parameter of the arm: payload_mass, payload_inertia,

@@ -20,6 +20,7 @@ from tfarm.records import record
 from tfarm.spectrum.correction import Member
 from tfarm.spectrum.damped import member
 from tfarm.spectrum.scales import check_gains, most_gain
+from tfarm.spectrum.search import ARMS_KEPT
 
 SMALLEST_NORMAL = float(np.finfo(float).tiny)  # a smaller double has not all its digits
 
@@ -163,7 +164,7 @@ def slow_terms(arm: Arm, law: HubFeedback) -> Real:
     return terms
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=ARMS_KEPT)
 def _beside_angle(arm: Arm, output: str) -> Real:
     """Coefficients of 1, s, s^2 and s^3 in an output over the hub's angle, those known; 0 of an arm that is held."""
     if not arm.has_rigid_mode:
