@@ -33,6 +33,9 @@ def test_python_examples_run_one_after_the_other(
     assert (tmp_path / "bode.png").stat().st_size > 10_000
     out = capsys.readouterr().out
     assert "71.50568247" in out
+    shown = re.findall(r"# ((?:Simulation|Locus)\(finding='[^']*')", TEXT)
+    assert len(shown) == 2
+    assert all(each in out for each in shown)
     assert names["shapes"].shape == (11, 201)  # type: ignore[attr-defined]
 
 

@@ -17,6 +17,7 @@ from tfarm.dsp.regions import sampled_map
 from tfarm.dsp.scenarios import slew
 from tfarm.dsp.simulate import Simulator
 from tfarm.dsp.verdict import analyse
+from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.locus import locus
 from tfarm.loop.regions import region
 from tfarm.records import LONGEST_REPR, record
@@ -113,6 +114,55 @@ def test_the_verdict_stands_first() -> None:
     assert repr(tfarm.margins(LAB, LAW).stability).startswith("Stability(verdict='stable', ")
     assert repr(analyse(LAB, LAW, count=4)).startswith("Analysis(verdict='stable', ")
     assert repr(tfarm.closed_loop_poles(LAB, LAW, 5)).startswith("Poles(unstable=0, ")
+
+
+LEAD = tfarm.Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "deflection@0.3": 0.5}, delay=0.002)
+
+
+def test_what_was_found_stands_first_in_words() -> None:
+    """Each number in the words is counted here from the record's own arrays."""
+    plane = tfarm.map(LAB, np.linspace(0.1, 1, 3), np.linspace(0.5, 1.5, 4))
+    assert repr(plane).startswith(f"Region(finding='stable at {(plane.unstable == 0).sum()} of 12 points', ")
+    found = locus(LAB, LAW, "K2", 0.0, 2.0, 5, 4)
+    (_, window) = tfarm.margins(LAB, LAW).windows["K2"].around
+    assert repr(found).startswith(f"Locus(finding='a pole becomes unstable at K2 = {window:.6g}', ")
+    assert "no branch crosses" in repr(tfarm.locus(LAB, LEAD, "gain", 0.5, 0.6, 3, 2))
+    counts = tfarm.map(LAB, np.array([0.5, 40.0]), np.array([0.0, 0.03]), law=LEAD, vary=("gain", "delay"))
+    assert repr(counts).startswith(f"LawMap(finding='stable at {(counts.unstable == 0).sum()} of 4 points', ")
+    table = tfarm.modes(LAB, 3)
+    ends = "{:.6g} to {:.6g}".format(*table.natural_frequency[[1, 3]])
+    assert repr(table).startswith(f"Modes(finding='3 flexible, {ends} rad/s', ")
+    data = tfarm.bode(LAB, "root_moment", (1.0, 300.0))
+    assert repr(data).startswith(f"Bode(finding='{data.poles.size} poles and {data.zeros.size} zeros up to 300 rad/s'")
+
+
+def test_a_simulation_says_how_it_went() -> None:
+    run = MAKERS["slew"]()
+    largest = abs(run.at_samples.root_moment).max()
+    assert repr(run).startswith(f"Simulation(finding='ran to 0.5 s, root moment up to {largest:.4g} N m', ")
+    lost = tfarm.simulate(LAB, LAW.having("K2", 1.5), duration=2.0, count=4)
+    assert "finding='ran away, stopped at " in repr(lost)
+
+
+def test_a_law_is_shown_as_it_is_typed() -> None:
+    assert repr(LEAD) == "Law(hub_angle=([2, 1], [0.01, 1]), deflection@0.3=0.5, delay=0.002)"
+    assert repr(tfarm.Law({"hub_rate": 0.3}, name="servo")) == "Law(hub_rate=0.3, name='servo')"
+    A, row = -np.eye(2), np.ones((1, 2))
+    matrices = tfarm.Law.of_matrices(A, -A, row, 0 * row, ["hub_angle", "hub_rate"])
+    assert repr(matrices) == "Law(hub_angle, hub_rate=<2 states>)"
+    assert Texts(LEAD._repr_html_()).rows == [
+        ["hub_angle", "([2, 1], [0.01, 1])"],
+        ["deflection@0.3", "0.5"],
+        ["delay", "0.002"],
+    ]
+    assert "law=Law(hub_angle=([2, 1], [0.01, 1]), deflection@0.3=0.5, delay=0.002)" in repr(LawLoop(LAB, LEAD))
+
+
+def test_no_figure_is_cut() -> None:
+    """Digits that hold, not those of a double: an edge of a sampled loop in the repr of all that is said of it."""
+    found = tfarm.sampled(LAB, LAW)
+    assert f"delay='{found.delay.text}', damping='{found.damping.text}'" in repr(found)
+    assert "..." not in repr(found).replace("(...)", "")
 
 
 def test_every_record_with_arrays_is_one() -> None:

@@ -1,10 +1,13 @@
-"""What frozen records with arrays promise: arrays that cannot be written, an `==` that answers, a short repr, HTML."""
+"""What frozen records with arrays promise: arrays that cannot be written, an `==` that answers, a short repr, HTML.
+
+A repr begins with what was found: the entry of a record, or a property, that bears one of the names in `SHOWN_FIRST`.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import fields, is_dataclass
+from dataclasses import MISSING, Field, fields, is_dataclass
 from functools import cached_property
 from html import escape
 from typing import Any, TypeVar
@@ -13,8 +16,9 @@ import numpy as np
 
 _Class = TypeVar("_Class", bound=type[Any])
 
-SHOWN_FIRST = ("verdict", "word", "unstable", "worst_error")  # what was found stands before what it was found of
+SHOWN_FIRST = ("verdict", "word", "text", "finding", "unstable", "worst_error")  # what was found, before all else
 LONGEST_REPR = 200  # characters of a repr: a line or two of a terminal
+LONGEST_ENTRY, LONGEST_FINDING = 60, 100  # characters of an entry of it, and of what was found
 SHOWN_SINGLY = 3  # numbers that are shown one by one
 
 
@@ -22,8 +26,9 @@ def record(cls: _Class) -> _Class:
     """Decorates a class inside `@dataclass(frozen=True)`.
 
     Arrays in its fields (in tuples, lists and dictionaries too) and in its cached properties become read-only views;
-    two records of a class are equal where all their entries are, NaN to NaN; the repr is short, the verdict first, and
-    a notebook shows the same as a small table.
+    two records of a class are equal where all their entries are, NaN to NaN; the repr is short, the verdict first,
+    entries that are their defaults left out, and a notebook shows the same as a small table.  A class with a method
+    `as_typed` is shown by the pairs of names and texts that this gives, before its other entries.
     """
     after = cls.__dict__.get("__post_init__")
 
@@ -110,7 +115,7 @@ def _key(value: Any) -> Any:
 
 
 def _repr(self: Any) -> str:
-    text = ", ".join(f"{name}={_shown(value)}" for name, value in _entries(self))
+    text = ", ".join(f"{name}={shown}" for name, shown in _entries(self))
     text = text if len(text) <= LONGEST_REPR else f"{text[: LONGEST_REPR - 4]} ..."
     return f"{type(self).__name__}({text})"
 
@@ -118,15 +123,26 @@ def _repr(self: Any) -> str:
 def _repr_html(self: Any) -> str:
     """A row an entry, the finding first, for a notebook; whatever a name holds is text."""
     row = '<tr><th scope="row" style="text-align:left">{}</th><td style="text-align:left">{}</td></tr>'
-    rows = "".join(row.format(escape(name), escape(_shown(value))) for name, value in _entries(self))
+    rows = "".join(row.format(escape(name), escape(shown)) for name, shown in _entries(self))
     return f"<table><caption>{escape(type(self).__name__)}</caption><tbody>{rows}</tbody></table>"
 
 
-def _entries(self: Any) -> Iterator[tuple[str, Any]]:
-    """What is shown: the finding, then the fields."""
+def _entries(self: Any) -> Iterator[tuple[str, str]]:
+    """What is shown, as texts: the finding, what was typed, then the fields that are not their defaults."""
     found = _found(self)
-    for name in [*found, *(each.name for each in fields(self) if each.repr and each.name not in found)]:
-        yield name, getattr(self, name)
+    for name in found:
+        yield name, _shown(getattr(self, name), LONGEST_FINDING)
+    if hasattr(type(self), "as_typed"):
+        yield from self.as_typed()
+    for each in fields(self):
+        if each.repr and each.name not in found and not _is_default(self, each):
+            yield each.name, _shown(getattr(self, each.name))
+
+
+def _is_default(self: Any, entry: Field[Any]) -> bool:
+    """Whether an entry is what it is if nothing is said."""
+    default = entry.default if entry.default_factory is MISSING else entry.default_factory()
+    return default is not MISSING and _same(getattr(self, entry.name), default)
 
 
 def _found(self: Any) -> list[str]:
@@ -134,7 +150,7 @@ def _found(self: Any) -> list[str]:
     return [name for name in SHOWN_FIRST if hasattr(type(self), name) or name in self.__dataclass_fields__]
 
 
-def _shown(value: Any) -> str:
+def _shown(value: Any, longest: int = LONGEST_ENTRY) -> str:
     """An entry in a few characters: six digits of a number, a record's finding or name, an array's shape."""
     if isinstance(value, np.ndarray):
         small = value.ndim == 1 and value.size <= SHOWN_SINGLY
@@ -149,11 +165,12 @@ def _shown(value: Any) -> str:
     if is_dataclass(value) and not isinstance(value, type):
         return _named(value)
     text = repr(value)
-    return text if len(text) <= 60 else f"{text[:56]} ..."
+    return text if len(text) <= longest else f"{text[: longest - 4]} ..."
 
 
 def _named(value: Any) -> str:
     """A record inside another: its finding or its name, or all of it where that is short."""
-    known = _found(value) or [each.name for each in fields(value) if each.name == "name"]
+    names = [each for each in fields(value) if each.name == "name"]
+    known = _found(value) or [each.name for each in names if not _is_default(value, each)]
     text = _shown(getattr(value, known[0])) if known else repr(value)
     return text if len(text) <= 80 else f"{type(value).__name__}(...)"

@@ -9,7 +9,7 @@ simplest of them: a number on hub angle, hub rate and root moment.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -62,7 +62,7 @@ class Law:
     rule: str = "tustin"
     prewarp: float = 0.0
     name: str = "law"
-    parts: tuple[Part, ...] = ()
+    parts: tuple[Part, ...] = field(default=(), repr=False)
 
     def __post_init__(self) -> None:
         parts, periods = (self.parts, ()) if self.parts else _parts_of(self.entries)
@@ -112,6 +112,16 @@ class Law:
         """The hub's two or three gains as a law, on what their signals are off their references."""
         used = {gain.output: law[gain.name] for gain in GAINS if law[gain.name]} or {"hub_rate": 0.0}
         return cls(used, name="gains at the hub", references=tuple(name for name in used if name in AT_HUB))
+
+    def as_typed(self) -> Iterator[tuple[str, str]]:
+        """Each signal with what it is multiplied by, as a person types it; of matrices how many states they have."""
+        for part in self.parts:
+            block = part.block
+            if not isinstance(block, Rational):
+                yield ", ".join(part.signals), f"<{block.order} states>"
+            else:
+                num, den = (f"[{', '.join(f'{each:.6g}' for each in of)}]" for of in (block.num, block.den))
+                yield part.signals[0], num[1:-1] if len(block.num) == 1 and block.den == (1.0,) else f"({num}, {den})"
 
     @property
     def signals(self) -> tuple[str, ...]:

@@ -19,6 +19,7 @@ from tfarm.dsp.loop import SampledLoop, polished_poles, sampled_loop
 from tfarm.dsp.plant import Branching
 from tfarm.dsp.sampling import FORGOTTEN, held_amplitude
 from tfarm.errors import ConvergenceError
+from tfarm.records import record
 from tfarm.spectrum import modes_below
 from tfarm.spectrum.damped import COMPANY, LITTLE, Branches, all_damped_modes
 from tfarm.spectrum.scales import first_frequency
@@ -44,6 +45,7 @@ SAME_EDGE = 1e-9  # relative: next to z = 1 one static crossing is read several 
 
 
 @dataclass(frozen=True)
+@record
 class DelayMargin:
     """`samples` of further delay that the loop bears; `is_bound` where none up to there makes it unstable."""
 

@@ -39,6 +39,7 @@ Test = Callable[[float], Proof]
 
 
 @dataclass(frozen=True)
+@record
 class Figure:
     """A number with as many significant `digits` as hold: proven up to `band` [rad/s], or for the first `modes` modes.
 

@@ -53,6 +53,11 @@ class Roads:
         return max(float(each.max(initial=0.0)) for each in self.differences.values())
 
     @property
+    def finding(self) -> str:
+        """How far the roads part, in words."""
+        return f"{', '.join(self.values)} {'agree' if self.agree else 'part'} to {self.largest_difference:.1e}"
+
+    @property
     def agree(self) -> bool:
         """Whether they differ by no more than their rounding."""
         return self.largest_difference <= METHODS_AGREE

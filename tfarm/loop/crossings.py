@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -27,6 +27,7 @@ CROSSING_STEPS = 30  # of Newton's method, at most: linear convergence at a doub
 ODD = np.array([OUTPUTS[gain.output].power % 2 == 1 for gain in GAINS])  # powers of s: imaginary on the axis
 CROSSING_HALVINGS = (0, 4, 12)  # of the distance of two points, before Newton's method is tried
 GAIN_KNOWN = 1e-17  # of the larger end of a bracket: a gain at which a pole is at 0 is known so closely, next to 0 too
+CROSSINGS_TOLD = 3  # of a locus in words
 LEAST_RTOL = 4 * float(np.finfo(float).eps)  # that SciPy's brentq takes
 
 
@@ -47,6 +48,15 @@ class BranchCrossing:
     def frequency_hz(self) -> float:
         """omega in Hz."""
         return self.omega / (2 * math.pi)
+
+
+def in_words(vary: str, crossings: Sequence[BranchCrossing]) -> str:
+    """Where poles cross the imaginary axis as one number varies, the first `CROSSINGS_TOLD` of them."""
+    if not crossings:
+        return "no branch crosses the imaginary axis"
+    told = ", ".join(f"{each.direction} at {vary} = {each.gain:.6g}" for each in crossings[:CROSSINGS_TOLD])
+    more = len(crossings) - CROSSINGS_TOLD
+    return f"a pole becomes {told}{f' and {more} more' if more > 0 else ''}"
 
 
 def crossing_answers(found: Iterable[BranchCrossing]) -> list[dict[str, Any]]:

@@ -26,7 +26,7 @@ from tfarm.records import record
 from tfarm.spectrum.box import Box, newton, zeros_in_box
 
 from .answers import law_answer
-from .crossings import BranchCrossing, crossing_answers
+from .crossings import BranchCrossing, crossing_answers, in_words
 from .damping import NO_PART
 from .frequencies import band_of, grid
 from .law_loop import LawLoop
@@ -62,6 +62,11 @@ class LawLocus:
     branches: Complex
     box: Box
     crossings: tuple[BranchCrossing, ...]
+
+    @property
+    def finding(self) -> str:
+        """Where the imaginary axis is crossed, in words."""
+        return in_words(self.vary, self.crossings)
 
 
 def law_locus(arm: Arm, law: Law, vary: str, start: float, stop: float, points: int, branches: int) -> LawLocus:

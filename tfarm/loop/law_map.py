@@ -55,6 +55,11 @@ class LawMap:
     crossings: list[Crossings]
 
     @property
+    def finding(self) -> str:
+        """At how many points of the grid the loop is stable, in words."""
+        return f"stable at {int(self.stable.sum())} of {self.stable.size} points"
+
+    @property
     def stable(self) -> NDArray[np.bool_]:
         """Where no pole below the band is right of the axis."""
         return np.asarray(self.unstable == 0)

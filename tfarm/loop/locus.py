@@ -27,7 +27,7 @@ from tfarm.spectrum.continuation import follow
 from tfarm.spectrum.correction import Member, corrected
 
 from .branches import MAY_PASS_ORIGIN, NOBODY, Stretch, followed, ordered
-from .crossings import BranchCrossing, branch_crossings
+from .crossings import BranchCrossing, branch_crossings, in_words
 from .ended import with_others
 from .lines import static_crossings
 from .variation import Evaluator, Variation, free_of_loss, member_of, must_be_way
@@ -64,6 +64,11 @@ class Locus:
     branches: Complex
     mode: NDArray[np.int64]
     crossings: tuple[BranchCrossing, ...]
+
+    @property
+    def finding(self) -> str:
+        """Where the imaginary axis is crossed, in words."""
+        return in_words(self.vary, self.crossings)
 
     @property
     def variation(self) -> Variation:

@@ -57,6 +57,11 @@ class Region:
     crossings: list[Crossings]
 
     @property
+    def finding(self) -> str:
+        """At how many points of the grid the loop is stable, in words."""
+        return f"stable at {int(self.stable.sum())} of {self.stable.size} points"
+
+    @property
     def axes(self) -> tuple[Real, Real]:
         """The values of both gains: across the plane, and up it."""
         return self.K1, self.K2

@@ -60,6 +60,11 @@ class Bode:
     zero_width: tuple[float, float]
 
     @property
+    def finding(self) -> str:
+        """How many poles and zeros the output shows, and up to where, in words."""
+        return f"{self.poles.size} poles and {self.zeros.size} zeros up to {self.band[1]:.6g} rad/s"
+
+    @property
     def band(self) -> tuple[float, float]:
         """First and last frequency [rad/s]."""
         return float(self.omega[0]), float(self.omega[-1])

@@ -63,6 +63,14 @@ class Modes:
     _k: System = field(repr=False)
 
     @property
+    def finding(self) -> str:
+        """How many flexible modes there are, and from which frequency to which, in words."""
+        flexible = self.natural_frequency[self._rigid :]
+        if not flexible.size:
+            return "no flexible mode"
+        return f"{flexible.size} flexible, {flexible[0]:.6g} to {flexible[-1]:.6g} rad/s"
+
+    @property
     def system(self) -> System:
         """The arm's system under this theory, with its damping."""
         return system_of(self.arm, self.theory)

@@ -101,6 +101,12 @@ class Tuning:
     bound: Record
     shaped: dict[str, tuple[Trial, Record]]
 
+    @property
+    def finding(self) -> str:
+        """What the tuned slew costs, beside the best constant gain and none, in words."""
+        tuned, constant, without = self.training.result.cost, self.best_constant.cost, self.without.cost
+        return f"cost {tuned:.6g}; {constant:.6g} with the best constant gain, {without:.6g} without"
+
     def saved(self) -> SavedTuner:
         """What `saving.save_tuner` writes."""
         guard, plan, period = self.training.guard, self.plan, self.trial.task.period
