@@ -16,9 +16,12 @@ from pathlib import Path
 from types import CodeType
 from typing import Any
 
+import numpy as np
+
 OUTPUT = "tip_displacement"  # follows the hub's angle, feels every mode, and is not of the hub
 LAST_ROW, LAST_FIELD = 'Gain("K2", "root_moment", "1", "M"),\n', "    Kp: float = 0.0\n"
 ROW, FIELD = f'    Gain("K3", "{OUTPUT}", "N m/m", "w"),\n', "    K3: float = 0.0\n"
+AXES = np.array([-0.2, 0.1, 1.0]), np.array([-1.5, 0.4, 1.2])  # of a map
 
 
 class _Extended(importlib.machinery.SourceFileLoader):
@@ -108,11 +111,17 @@ def _simulated(arm: Any, law: Any) -> dict[str, Any]:
 
 def _answer(case: dict[str, Any]) -> dict[str, Any]:
     import tfarm
+    from tfarm.loop.regions import region
 
     arm = tfarm.load(case["arm"])
     arm = replace(arm, hub=replace(arm.hub, friction=case["friction"]))
     law = tfarm.HubFeedback(**case["gains"])
-    return {"loop": _loop(arm, law), "sampled": _sampled(arm, law), "simulated": _simulated(arm, law)}
+    return {
+        "loop": _loop(arm, law),
+        "map": region(arm, *AXES, law["Kp"]).unstable.tolist(),
+        "sampled": _sampled(arm, law),
+        "simulated": _simulated(arm, law),
+    }
 
 
 if __name__ == "__main__":

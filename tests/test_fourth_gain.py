@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.fourth_gain import OUTPUT, answers_of
+from tests.fourth_gain import AXES, OUTPUT, answers_of
 from tfarm import Law
 from tfarm.dsp.law_verdict import law_verdict
+from tfarm.loop.regions import region
 
 SIGNALS = {"K1": "hub_rate", "K2": "root_moment", "Kp": "hub_angle", "K3": OUTPUT}
 CASES: list[dict[str, Any]] = [
@@ -27,11 +28,12 @@ CASES: list[dict[str, Any]] = [
         ("sasaki2012-lab", 0.0, 0.0, -0.5),
     )
 ]
+WITHOUT_RATE = {"arm": "sasaki2012", "friction": 0.0, "gains": {"K3": 0.2}}
 
 
 @pytest.fixture(scope="module")
 def answers() -> list[dict[str, Any]]:
-    return answers_of(CASES)
+    return answers_of([*CASES, WITHOUT_RATE])
 
 
 def arm_of(case: dict[str, Any]) -> tfarm.Arm:
@@ -81,6 +83,24 @@ def test_its_windows_end_where_the_law_by_its_signals_loses_its_stability(number
                 assert verdicts == [True, False]
                 edges += 1
     assert edges
+
+
+def test_without_losses_it_stabilises_nothing_and_a_rate_gain_does_from_0_on(answers) -> None:
+    """D is even in s: every pole has its mirror image, and K1 alone has a part that is odd."""
+    found = answers[-1]["loop"]
+    assert found["verdict"] == "marginal"
+    assert found["windows"]["K3"] == found["windows"]["K2"] == found["windows"]["Kp"] == []
+    ((low, high),) = found["windows"]["K1"]
+    assert low == 0.0
+    for K1, is_stable in ((1e-3, True), (-1e-3, False), (0.5 * high, True)):
+        assert tfarm.margins(arm_of(WITHOUT_RATE), law_of(WITHOUT_RATE, K1=K1)).stability.is_stable is is_stable
+
+
+@pytest.mark.parametrize("number", range(len(CASES)))
+def test_the_map_without_it_is_that_of_the_program_without_it(number, answers) -> None:
+    """There an arm is a chain of one link, here a link in closed form."""
+    case = CASES[number]
+    assert answers[number]["map"] == region(arm_of(case), *AXES, case["gains"]["Kp"]).unstable.tolist()
 
 
 @pytest.mark.parametrize("number", range(len(CASES)))

@@ -10,8 +10,9 @@ from typing import Literal
 
 import numpy as np
 
-from tfarm.arm import MOMENT_GAIN
+from tfarm.arm import GAINS, MOMENT_GAIN, RATE_GAIN
 from tfarm.crossing import Crossing, Crossings, Window, counts_over
+from tfarm.exact.outputs import OUTPUTS
 from tfarm.records import record
 from tfarm.spectrum import modes
 from tfarm.spectrum.scales import gain_unit, most_gain
@@ -65,7 +66,7 @@ def gain_windows(verdict: Stability, name: str) -> Windows:
     else:
         ends = (Loop(loop.arm, law.having(name, end)) for end in (low, high))
         band = max(verdict.band, *(loop_band(end)[0] for end in ends))
-        found = line_crossings(loop.arm, along(name, law), band).within(low, high)
+        found = _as_mirrored(loop, name, line_crossings(loop.arm, along(name, law), band)).within(low, high)
     pairs = list(itertools.pairwise([low, *np.unique(found.gain).tolist(), high]))
     stable = [pair for pair, count in zip(pairs, _counts(verdict, name, pairs, found), strict=True) if count == 0]
     stable = [_with_proven_ends(loop, name, pair, (low, high)) for pair in stable]
@@ -78,6 +79,20 @@ def gain_windows(verdict: Stability, name: str) -> Windows:
 def _is_lossless_line(loop: Loop, name: str) -> bool:
     """Whether theorems without losses tell the loop, whatever value the gain of that name takes."""
     return loop.freed.arm.is_reactive and loop.law.having(name, 1.0).is_at_hub
+
+
+def _as_mirrored(loop: Loop, name: str, found: Crossings) -> Crossings:
+    """The crossings along a gain, rounding taken off where without losses D is even in s but for that gain's part.
+
+    Then poles are on the axis where an odd part vanishes with its gain, or by itself; an even part leaves every pole
+    its mirror image, and no value of its gain makes the loop stable.
+    """
+    odd = {gain.name for gain in GAINS if OUTPUTS[gain.output].power % 2}
+    if not loop.freed.arm.is_reactive or any(loop.freed.law[other] for other in odd - {name}):
+        return found
+    at = 0.0 - loop.arm.rate_loss if name == RATE_GAIN else 0.0
+    unit = gain_unit(loop.arm, name)
+    return Crossings.of(each._replace(t=at) for each in found if name in odd and abs(each.t - at) < unit)
 
 
 def looked_at(loop: Loop, name: str) -> Window:
