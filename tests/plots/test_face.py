@@ -153,6 +153,18 @@ def test_what_is_found_of_any_law_has_the_same_face(plot):
     pyplot.close(own.get_figure())
 
 
+@pytest.mark.parametrize("name", tfarm.plots.__all__)
+def test_what_is_no_record_of_it_is_refused_by_the_name_of_what_returns_one(name, records):
+    """The first and the last argument of each picture, one at a time; what is drawn beside is left alone."""
+    right, _ = records[name]
+    for place in {0, len(right) - 1}:
+        for wrong in (3, LAW, tfarm.transfer(LAB, "root_moment")):
+            given = [wrong if n == place else each for n, each in enumerate(right)]
+            with pytest.raises(tfarm.ParameterError, match=r"give (what )?tfarm\.\w+"):
+                getattr(tfarm.plots, name)(*given)
+    assert pyplot.get_fignums() == []
+
+
 def test_words_that_do_overlap_are_told():
     """Of which the tests above say that there are none."""
     figure = Figure(figsize=(4.0, 3.0))

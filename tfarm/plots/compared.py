@@ -19,7 +19,7 @@ from tfarm.digits import plain
 
 from .frequency import hertz_axis, magnitude_limits, wrapped_phase
 from .plane import outline
-from .style import BLUE, GREEN, GREY, INK, ORANGE, New, blank, headline, safe, style, taken, window
+from .style import BLUE, GREEN, GREY, INK, ORANGE, New, blank, headline, must_be, safe, style, taken, window
 from .words import name_axes
 
 SIDE_COLOURS = (BLUE, ORANGE)  # of the first side, and of the second
@@ -33,6 +33,7 @@ def comparison(data: Comparison, *, ax: Sequence[Axes] | None = None) -> tuple[A
     or, where a law is more than these gains, of a factor on each law and its delay, counted on a grid.  With a law in z
     all is of the loops at their samples, and the map has the exact factors over further delays.
     """
+    must_be(Comparison, data, "tfarm.compare returns")
     with style():
         if ax is None:
             upper, right, lower = draw_comparison(data, window).axes

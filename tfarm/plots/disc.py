@@ -18,7 +18,7 @@ from tfarm.digits import plain, significant
 from tfarm.loop.nyquist import Nyquist, compressed
 
 from .labels import OFFSET_UPON, OFFSETS_FURTHER, Label
-from .style import BLUE, FAINT, GREY, ORANGE, Keys, New, blank, headline, on_own_figure, safe, style, window
+from .style import BLUE, FAINT, GREY, ORANGE, Keys, New, blank, headline, must_be, on_own_figure, safe, style, window
 from .words import gains_words
 
 RING_SIZES = (0.1, 0.3, 1.0, 3.0, 10.0)  # |L| of the rings
@@ -35,6 +35,7 @@ def nyquist(data: Nyquist[Any], *, ax: Axes | None = None, name: str = "") -> Ax
 
     A size r of L is drawn as r/(1 + r): the rim is infinity, -1 lies half way.  `name`: what the law is called.
     """
+    must_be(Nyquist, data, "tfarm.nyquist returns")
     if ax is None:
         return draw_disc(data, name, window).axes[0]
     with style():

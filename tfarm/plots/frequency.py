@@ -15,7 +15,7 @@ from tfarm.arrays import Complex, Real
 from tfarm.digits import plain
 from tfarm.response.frequency import Bode
 
-from .style import BLUE, FAINT, GREY, INK, ORANGE, New, blank, headline, style, taken, window
+from .style import BLUE, FAINT, GREY, INK, ORANGE, New, blank, headline, must_be, style, taken, window
 
 RAD_PER_CYCLE = 2 * math.pi  # rad/s of 1 Hz
 NUMBER_STRIP = 0.085  # height of the strip of mode numbers above the magnitude, as a share of its axes: a line of them
@@ -27,6 +27,7 @@ def bode(data: Bode, *, ax: Sequence[Axes] | None = None) -> tuple[Axes, Axes]:
 
     Magnitudes in the response's SI units, phases in degrees; an infinite resonance is broken, a triangle at its place.
     """
+    must_be(Bode, data, "tfarm.bode returns")
     with style():
         if ax is None:
             upper, lower = draw_bode(data, window).axes

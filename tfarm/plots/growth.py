@@ -16,7 +16,7 @@ from tfarm.dsp.law import ModeTable
 from tfarm.dsp.loop import SampledLoop
 
 from .frequency import hertz_axis
-from .style import BLUE, GREY, INK, ORANGE, New, blank, headline, style, window
+from .style import BLUE, GREY, INK, ORANGE, New, blank, headline, must_be, style, window
 from .words import gains_words
 
 SHADED_STRIPS = 12  # strips that are shaded one by one; above they are too narrow to tell
@@ -28,6 +28,7 @@ def sampled_modes(found: Analysis, *, ax: Axes | None = None) -> Axes:
 
     The closed loop, and to first order what its gains and its own damping add; below 0 a mode decays.
     """
+    must_be(Analysis, found, "tfarm.sampled returns of gains at the hub")
     with style():
         if ax is None:
             return draw_modes(found.verdict.loop, found.modes, window).axes[0]

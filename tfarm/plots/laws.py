@@ -7,7 +7,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tfarm.digits import plain, significant
-from tfarm.errors import ParameterError
 from tfarm.loop.law_locus import LawLocus
 from tfarm.loop.law_map import LawMap
 from tfarm.loop.law_rounded import rounded_law_locus
@@ -19,7 +18,7 @@ from tfarm.loop.regions import Region
 from .labels import OFFSETS_BESIDE, Label
 from .plane import colours, draw_map, gain_counts, words_of_count
 from .roots import CIRCLE_AT_FIRST, CROSS_AT_ZERO, draw_locus, gain_branches
-from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, New, blank, on_own_figure, safe, style, window
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, New, blank, must_be, on_own_figure, safe, style, window
 
 BRANCH_COLOURS = (BLUE, GREEN, PURPLE, "#7a5a00", GREY)  # of branches, in turn
 MARKED_VALUES = 5  # values of the range that are marked along each branch
@@ -34,8 +33,7 @@ def locus(exact: Locus | LawLocus, *, reduced: ReducedLocus | None = None, ax: A
     first mode best, and a diamond where one crosses the axis.  Thin: those of `reduced` (`tfarm.loop.reduced_locus`),
     which a locus of gains at the hub has; of another law it is not looked at.
     """
-    if not isinstance(exact, Locus | LawLocus):
-        raise ParameterError(key="locus", value=exact, remedy="give what tfarm.locus returns")
+    must_be(Locus | LawLocus, exact, "tfarm.locus returns")
     if ax is None:
         return draw_locus_of(exact, reduced, window).axes[0]
     with style():
@@ -57,8 +55,7 @@ def gain_map(found: Region | LawMap, *, ax: Axes | None = None) -> Axes:
     Colours for the number of unstable poles; a black line for the exact boundary with frequencies [rad/s] along it, of
     a law dots where a pole is on the axis.  Returns the axes.
     """
-    if not isinstance(found, Region | LawMap):
-        raise ParameterError(key="map", value=found, remedy="give what tfarm.map returns")
+    must_be(Region | LawMap, found, "tfarm.map returns")
     if ax is None:
         return (draw_map(found, window) if isinstance(found, Region) else draw_law_map(found, window)).axes[0]
     with style():

@@ -17,7 +17,7 @@ from tfarm.tuner import Tuning
 from tfarm.tuner.overview import CostMap, Curves, TunerStudy
 
 from .regions import overlay
-from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, blank, headline, on_own_figure, style, window
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, blank, headline, must_be, on_own_figure, style, window
 
 K_RANGE = (-0.25, 1.25)  # of the moment gain: from 0 to the continuous loop's bound, 1, and a quarter to either side
 GUARD = "#bfe3d6"
@@ -26,6 +26,7 @@ MOST_COST = 1.25  # of the cost without feedback: higher ones are drawn at the t
 
 def tuned_gain(found: Tuning, *, ax: Axes | None = None) -> Axes:
     """A tuned gain over time (what `tfarm.tune` returns) in its guard, in the axes given or new ones; the axes."""
+    must_be(Tuning, found, "tfarm.tune returns")
     if ax is None:
         title = f"{found.trial.arm.name}: the tuner's gain, and where it is proven stable"
         return on_own_figure(lambda own: tuned_gain(found, ax=own), (7.0, 4.4), title, new=window).axes[0]

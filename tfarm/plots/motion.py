@@ -8,13 +8,13 @@ from dataclasses import replace
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tfarm.arm import Arm
+from tfarm.arm import Arm, must_be_arm
 from tfarm.digits import plain
 from tfarm.dsp import Simulation, curves
 from tfarm.dsp.curves import TimeCurve
 from tfarm.dsp.ringing import POINTS_A_PERIOD
 
-from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, New, blank, headline, style, taken, window
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, New, blank, headline, must_be, style, taken, window
 
 RUN_COLOURS = (ORANGE, BLUE, GREEN, PURPLE)  # of several simulations; one alone is blue
 
@@ -27,7 +27,10 @@ def slew(arm: Arm, runs: Simulation | Runs, *, ax: Sequence[Axes] | None = None)
     Root moment [N m], tip less a rigid arm's on its reference [mm], and the torque of the motor [N m], or its input.
     Above them it is said where records are too few for the fastest mode that is seen.
     """
-    each = {"": runs} if isinstance(runs, Simulation) else runs
+    must_be_arm(arm)
+    each = runs if isinstance(runs, Mapping) else {"": runs}
+    for run in each.values() or [None]:
+        must_be(Simulation, run, "tfarm.simulate returns")
     with style():
         if ax is None:
             moment, tip, torque = draw_responses(arm, each, next(iter(each.values())).scenario.name, window).axes

@@ -14,7 +14,7 @@ from tfarm.digits import plain
 from tfarm.fitting.overlay import Overlay
 
 from .frequency import RAD_PER_CYCLE, wrapped_phase
-from .style import BLUE, FAINT, GREY, INK, ORANGE, New, blank, headline, style, taken, window
+from .style import BLUE, FAINT, GREY, INK, ORANGE, New, blank, headline, must_be, style, taken, window
 
 SPAN = 1.25  # of the decades that are measured: an infinite peak of the exact curve runs off the picture
 
@@ -25,6 +25,7 @@ def measured(data: Overlay, *, ax: Sequence[Axes] | None = None) -> tuple[Axes, 
     Phases lie between -180 and 180 degrees, broken where they wrap: a sign that differs is half a turn.  Where no
     coherence is known the third axes show the noise as a share of the measured value.
     """
+    must_be(Overlay, data, "tfarm.overlay returns")
     with style():
         if ax is None:
             upper, middle, lower = draw_measured(data, window).axes

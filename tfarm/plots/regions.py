@@ -17,7 +17,7 @@ from tfarm.dsp import GainMap
 from tfarm.loop.regions import Region
 
 from .plane import outline
-from .style import BLUE, GREY, INK, ORANGE, headline, style, window
+from .style import BLUE, GREY, INK, ORANGE, headline, must_be, style, window
 from .words import LYAPUNOV, gains_words, name_axes
 
 SAND = "#f6dfcb"
@@ -32,7 +32,10 @@ def overlay(continuous: Region, sampled: GainMap | Sequence[GainMap], *, ax: Axe
     `continuous` is what `tfarm.map` returns, `sampled` what `tfarm.dsp.sampled_map` does: several, for arms with ever
     less damping, lie on each other.  The point is the law of the sampled loop.
     """
-    planes = [sampled] if isinstance(sampled, GainMap) else list(sampled)
+    must_be(Region, continuous, "tfarm.map returns of gains at the hub")
+    planes = list(sampled) if isinstance(sampled, Sequence) else [sampled]
+    for plane in planes:
+        must_be(GainMap, plane, "tfarm.dsp.sampled_map returns")
     with style():
         if ax is None:
             figure = window(9.0, 5.4)

@@ -17,7 +17,7 @@ from tfarm.digits import plain, significant
 from tfarm.records import record
 from tfarm.spectrum import Modes
 
-from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, New, blank, headline, style, window
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, New, blank, headline, must_be, style, window
 
 SHAPE_POINTS = 401  # of a drawn mode: about one to a pixel of its picture
 ALONG, DISPLACEMENT = "distance from the hub, x [m]", "displacement w(x), largest = 1 [-]"
@@ -64,6 +64,7 @@ def modes(found: Modes, *, ax: Sequence[Axes] | None = None) -> tuple[Axes, ...]
     Displacement along the arm [m], largest 1, with the places of the nodes [m].  Of more modes than axes the first are
     drawn.
     """
+    must_be(Modes, found, "tfarm.modes returns")
     shapes = shapes_of(found, int(found.index[-1]))
     with style():
         if ax is None:

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyArrowPatch, Polygon, Rectangle
 
-from tfarm.arm import Arm, Link
+from tfarm.arm import Arm, Link, must_be_arm
 from tfarm.digits import plain, unit
 
 from .style import BLUE, FAINT, GREY, INK, ORANGE, New, blank, style, window
@@ -22,6 +22,7 @@ SHOWN_LEFT, SHOWN_RIGHT = -0.2, 1.2  # and left of the hub and right of it, with
 
 def sketch(arm: Arm, *, ax: Axes | None = None) -> Axes:
     """Hub, link and payload from the side, lengths in shares of the link's, in the axes given or new ones; the axes."""
+    must_be_arm(arm)
     with style():
         if ax is None:
             return draw_arm(arm, window).axes[0]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from types import UnionType
 
 import matplotlib.style
 import numpy as np
@@ -63,6 +64,12 @@ def style() -> Iterator[None]:
     """The house style, whatever the user's own matplotlib settings are."""
     with matplotlib.style.context(["default", STYLE]):
         yield
+
+
+def must_be(kind: type | UnionType, value: object, wanted: str) -> None:
+    """Raise ParameterError for what is no record of that kind, saying which is `wanted`: "tfarm.bode returns"."""
+    if not isinstance(value, kind):
+        raise ParameterError(key="plot", value=value, remedy=f"give what {wanted}")
 
 
 def blank(width: float, height: float) -> Figure:
