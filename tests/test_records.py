@@ -158,6 +158,23 @@ def test_a_law_is_shown_as_it_is_typed() -> None:
     assert "law=Law(hub_angle=([2, 1], [0.01, 1]), deflection@0.3=0.5, delay=0.002)" in repr(LawLoop(LAB, LEAD))
 
 
+def test_a_measurement_says_how_well_it_is_explained() -> None:
+    """The arm's own response, a tenth too high everywhere: ln 1.1 off, at each of its poles in the band."""
+    omega = np.linspace(5.0, 250.0, 120)
+    values = 1.1 * tfarm.transfer(LAB, "root_moment")(1j * omega)
+    data = tfarm.Measured(output="root_moment", input="hub_torque", omega=omega, values=values)
+    within = (tfarm.modes(LAB, 4).natural_frequency[1:] < 250).sum()
+    begins = f"Overlay(finding='{within} of {within} poles measured, ln |measured/exact| {np.log(1.1):.2g} rms', "
+    assert repr(tfarm.overlay(LAB, data)).startswith(begins)
+    found = tfarm.fit(LAB, data, ["gain"], profile=False)
+    assert repr(found).startswith("Fit(verdict='fitted', finding='gain = 1.1; chi-squared ")
+
+
+def test_a_few_numbers_by_name_are_shown() -> None:
+    assert repr(Pair(np.zeros(1), {"Kp": 2.0, "K1": 0.25})) == "Pair(here=[0], there=<Kp=2, K1=0.25>)"
+    assert repr(Pair(np.zeros(1), dict.fromkeys("abcd", 1.0))) == "Pair(here=[0], there=<a, b, c, d>)"
+
+
 def test_no_figure_is_cut() -> None:
     """Digits that hold, not those of a double: an edge of a sampled loop in the repr of all that is said of it."""
     found = tfarm.sampled(LAB, LAW)

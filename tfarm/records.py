@@ -158,7 +158,8 @@ def _shown(value: Any, longest: int = LONGEST_ENTRY) -> str:
     if isinstance(value, float | complex) and not isinstance(value, bool):
         return f"{value:.6g}"
     if isinstance(value, dict):
-        return f"<{', '.join(map(str, value))}>"
+        numbers = 0 < len(value) <= SHOWN_SINGLY and all(isinstance(each, float) for each in value.values())
+        return f"<{', '.join(f'{key}={_shown(each)}' if numbers else str(key) for key, each in value.items())}>"
     if isinstance(value, tuple | list):
         shown = ", ".join(map(_shown, value)) if len(value) <= SHOWN_SINGLY else f"{len(value)} entries"
         return f"({shown})"

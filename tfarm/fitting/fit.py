@@ -44,6 +44,12 @@ class Fit:
     profiled: bool
 
     @property
+    def finding(self) -> str:
+        """The numbers, and how well they explain the data, in words."""
+        numbers = ", ".join(f"{each.key} = {each.value:.6g}" for each in self.parameters)
+        return f"{numbers}; chi-squared {self.chi_squared:.4g} of {self.freedom}"
+
+    @property
     def responses(self) -> tuple[Measured, ...]:
         """What was measured."""
         return tuple(each.data for each in self.solution.problem.responses)

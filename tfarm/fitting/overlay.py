@@ -90,6 +90,12 @@ class Overlay:
     unmatched: Real
 
     @property
+    def finding(self) -> str:
+        """How many poles of the arm were measured, and how far off it is, in words."""
+        seen = sum(each.peak is not None for each in self.beside)
+        return f"{seen} of {len(self.beside)} poles measured, ln |measured/exact| {self.rms_log_error:.2g} rms"
+
+    @property
     def rms_log_error(self) -> float:
         """The root mean square of ln |measured/exact|, over frequencies that stand out of the noise."""
         kept = (abs(self.measured.values) > self.noise.sigma) & np.isfinite(self.exact) & (self.exact != 0)
