@@ -37,6 +37,22 @@ def test_a_locus_of_any_law_ends_at_the_poles_of_its_loop():
     assert (abs(swing[:, None] - poles).min(axis=1) < 1e-9 * abs(swing)).all()
 
 
+def test_gains_at_the_hub_have_a_delay_and_a_factor_too():
+    """The pole that crosses at a delay is there with the phase margin's own delay."""
+    found = tfarm.locus(LAB, HubFeedback(K1=0.3, K2=0.3), "delay", 0.001, 0.03, 12, 3)
+    assert isinstance(found, LawLocus)
+    first = found.crossings[0]
+    assert (first.direction, first.gain) == (
+        "unstable", pytest.approx(tfarm.margins(LAB, HubFeedback(K1=0.3, K2=0.3)).in_band.delay, rel=1e-6)
+    )  # fmt: skip
+    scaled = tfarm.locus(LAB, HubFeedback(K1=0.3, K2=0.3), "gain", 0.5, 1.5, 5, 3)
+    poles = tfarm.closed_loop_poles(LAB, HubFeedback(K1=0.45, K2=0.45), 6).values
+    last = scaled.branches[np.isfinite(scaled.branches[:, -1]), -1]
+    swing = last[(last.imag > 0) & (last.imag < poles.imag.max())]
+    assert swing.size >= 2
+    assert (abs(swing[:, None] - poles).min(axis=1) < 1e-9 * abs(swing)).all()
+
+
 def test_a_map_of_any_law_counts_the_unstable_poles_of_its_loops():
     found = tfarm.map(LAB, ACROSS, UP, law=LAW, vary=("gain", "delay"))
     assert isinstance(found, LawMap)

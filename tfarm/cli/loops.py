@@ -18,11 +18,11 @@ Vary = Annotated[
     typer.Option(
         "--vary",
         help=f"{', '.join(NAMES)}, all (a scale on the three), payload_mass, payload_inertia, hub_inertia, length or "
-        "damping; of another law gain, delay, SIGNAL, SIGNAL.num.N or SIGNAL.den.N, too",
+        "damping; or gain (a factor on the law), delay, SIGNAL, SIGNAL.num.N or SIGNAL.den.N",
     ),
 ]
-HELP_ON_POINTS = "values, equally spaced; 500, of another law than gains at the hub 100"
-HELP_ON_BRANCHES = "branches, 1 to 200; of another law the flexible modes below the top of the box, up to 60"
+HELP_ON_POINTS = "values, equally spaced; 500, along a gain, delay or signal of a law 100"
+HELP_ON_BRANCHES = "branches, 1 to 200; along those the flexible modes below the top of the box, up to 60"
 
 
 @app.command()
@@ -53,7 +53,7 @@ def locus(
     number = None if points is None else whole_number("--points", points, 2, most[0])
     found = find(subject, law, vary, start, stop, number, min(count, most[1]))
     if isinstance(found, LawLocus):
-        reduced, answer, show = None, law_locus_answer(found), print_law_locus
+        reduced, answer, show = None, law_locus_answer(found) | said, print_law_locus
     else:
         reduced = reduced_locus(found)
         answer, show = locus_answer(found, reduced) | said, print_locus

@@ -5,7 +5,7 @@ A law that is no more than these gains is taken for them.
 
 from __future__ import annotations
 
-from tfarm.arm import PLANE, AnyLaw, Arm, HubFeedback, Law, arm_and_law, as_law
+from tfarm.arm import FED_BACK, PLANE, AnyLaw, Arm, HubFeedback, Law, arm_and_law, as_law
 from tfarm.arrays import Real
 from tfarm.errors import ParameterError
 
@@ -69,13 +69,15 @@ def locus(
 ) -> Locus | LawLocus:
     """The closed-loop poles of the exact arm as one number goes from `start` to `stop`, at equally spaced values.
 
-    `vary` is a gain, "all" (a scale on the gains), payload_mass, payload_inertia, hub_inertia, length or damping.  Of a
-    `Law` it is also "gain" (a factor on it), "delay", a signal, "SIGNAL.num.N" or "SIGNAL.den.N": then the record is a
-    `LawLocus`, of the first `branches` (60 at most) flexible modes, with 100 values unless `points` says otherwise.
+    `vary` is a gain, "all" (a scale on the gains), payload_mass, payload_inertia, hub_inertia, length or damping; of a
+    law of signals "gain" (a factor on it), "delay", a signal, "SIGNAL.num.N" or "SIGNAL.den.N", too.  Along these, and
+    of any `Law`, the record is a `LawLocus`, of the first `branches` (60 at most) flexible modes, with 100 values
+    unless `points` says otherwise.
     Raises ParameterError for what is no law, no loop or no range, ConvergenceError where branches cannot be told apart.
     """
     arm, plain = arm_and_law(arm, law)
-    if isinstance(plain, HubFeedback) and (isinstance(law, HubFeedback) or vary in OF_THE_LAW):
+    is_of_signals = isinstance(law, Law) or vary.partition(".")[0] in {"gain", "delay", *FED_BACK}
+    if isinstance(plain, HubFeedback) and (vary in OF_THE_LAW or not is_of_signals):
         return locus_of_gains(arm, plain, vary, start, stop, LOCUS_VALUES if points is None else points, branches)
     values = LAW_LOCUS_VALUES if points is None else points
     return law_locus(arm, as_law(law), vary, start, stop, values, branches)
