@@ -1,7 +1,7 @@
 """The vector of an arm that the compiled functions read (`Coefficients.kernel`): what stands where.
 
 a, b, g as two doubles each (see `coefficients`), sigma and C; then of payload mass, payload inertia and hub what rests,
-what has inertia and what takes the force (see `Condition`); and by what the torque of the free response is divided.
+what has inertia and what takes the force (see `EndCondition`); and by what the torque of the free response is divided.
 """
 
 A, A_LOW, B, B_LOW, G, G_LOW, SIGMA, DAMPING = range(8)

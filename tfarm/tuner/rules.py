@@ -38,6 +38,7 @@ from .kernel import (
 
 PLAIN_RULE, CLIPPED_RULE, BACKTRACKING_RULE = range(3)  # as compiled code tells them
 INPUT_ROWS = (1, 5, 6, 10, 0, 4, 7)  # of each input in the rows of `_derive`: x, u, e, K now, before, and before that
+SHARE_FALLS, SHARE_GROWS = 0.5, 1.2  # times: a step of learning halves at once, and is whole after four good trials
 
 
 @compiled
@@ -70,8 +71,8 @@ def learn_by_trials(
 
     Returns how many trials were made and the sample at which the last one passed the bound (-1: none did); `weights`
     are then those of the last trial that did not.  Under BACKTRACKING_RULE a trial that costs more than the last
-    accepted one is taken back, its step halved and the momentum set to zero; an accepted one lets the step grow by a
-    fifth, up to its full size.
+    accepted one is taken back, its step shortened and the momentum set to zero; an accepted one lets the step grow
+    again, up to its full size.
     """
     n, size = reference.shape[0], weights.size
     gradient, change, kept, slope = np.zeros(size), np.zeros(size), weights.copy(), np.zeros(size)
@@ -81,7 +82,7 @@ def learn_by_trials(
         cost = trial_cost(done, numbers, run[2]) if done == n else np.inf
         costs[trial] = cost
         if rule == BACKTRACKING_RULE and not cost <= best and best < np.inf:
-            share *= 0.5
+            share *= SHARE_FALLS
             copied(kept, weights)
             change.fill(0.0)
             _step(weights, change, slope, rates, momentum, share, longest)
@@ -95,7 +96,7 @@ def learn_by_trials(
         copied(weights, kept)
         if rule == BACKTRACKING_RULE:
             copied(gradient, slope)
-            share = min(1.0, 1.2 * share) if best < np.inf else 1.0
+            share = min(1.0, SHARE_GROWS * share) if best < np.inf else 1.0
             best = cost
         _step(weights, change, gradient, rates, momentum, share, longest)
     if rule == BACKTRACKING_RULE:
