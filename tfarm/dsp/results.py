@@ -17,7 +17,7 @@ from tfarm.dsp.curves import resolved
 from tfarm.dsp.discretise import described_law
 from tfarm.dsp.enough import Enough, enough_modes
 from tfarm.dsp.law_simulate import LawSimulator
-from tfarm.dsp.scenarios import Scenario, described, scenario
+from tfarm.dsp.scenarios import TRIAL_DURATION, Scenario, described, scenario
 from tfarm.dsp.simulate import Simulation, Simulator, Trace
 
 SETTLED_SHARE = 0.05  # of the largest root moment, within which a slew has settled
@@ -206,7 +206,7 @@ def simulate(
     law: AnyLaw,
     chain: Chain | None = None,
     scenario_name: str = "slew",
-    duration: float = 3.0,
+    duration: float = TRIAL_DURATION,
     *,
     count: int | None = None,
     between: int = 0,

@@ -20,7 +20,7 @@ from tfarm.spectrum.scales import turning_inertia
 MOST_TASK_SAMPLES = 4_000_000  # of a record, a few hundred MB of signals
 STEP_TORQUE, IMPULSE, TIP_OFFSET = 0.1, 0.01, 0.01  # N m, N m s, m: what the scenarios of the paper's arm start with
 TRIAL_COST = (1.0, 2.6)  # 1/(N m)^2 s: weights a and b of the paper's (23), of what vibrates and of what a law adds
-TRIAL_DURATION = 3.0  # s
+TRIAL_DURATION = 3.0  # s, of a trial or a simulation whose length is not said: three times the paper's slew
 PAPER_TORQUE = 3.0  # N m, of the slew of 1.15 m in 1 s of the preset sasaki2012
 
 
