@@ -9,6 +9,7 @@ from scipy.optimize import minimize_scalar
 
 import tfarm
 from tests.shared import thinned
+from tfarm.arm import Motor
 from tfarm.response.frequency import EVEN_PER_DECADE, bode, refined_grid, resonant_band, without_cancelled
 
 UNDAMPED = tfarm.load("sasaki2012")
@@ -176,3 +177,11 @@ def test_peaks_are_infinite_without_damping_and_dips_zero():
     assert np.isinf(data.peaks).all()
     assert not data.dips.any()
     assert np.array_equal(data.infinite, tfarm.modes(UNDAMPED, count=6).natural_frequency[1:])
+
+
+def test_behind_an_inductance_an_arm_without_losses_has_the_phase_of_its_values():
+    """Its poles are on the axis, but the torque comes late: no half turns."""
+    motor = Motor(resistance=1.0, torque_constant=0.1, back_emf_constant=0.0, inductance=0.02)
+    arm = replace(tfarm.load("sasaki2012"), motor=motor, input="motor_voltage")
+    data = tfarm.bode(arm, "root_moment", (1.0, 400.0))
+    np.testing.assert_allclose(np.exp(1j * np.radians(data.phase)), data.value / abs(data.value), atol=1e-9)

@@ -153,7 +153,7 @@ def bode(
         x=G.x,
         omega=omega,
         value=value,
-        phase=phase_of(omega, value, inside_poles, inside_zeros, is_real=arm.is_undamped),
+        phase=phase_of(omega, value, inside_poles, inside_zeros, is_real=arm.is_reactive),
         poles=inside_poles,
         zeros=inside_zeros,
         rigid=G.rigid_body / (1j * omega) ** 2 if G.rigid_body else np.full(omega.size, G.static + 0j),
@@ -230,7 +230,7 @@ def _around(root: complex) -> Real:
 def phase_of(omega: Real, value: Complex, poles: Complex, zeros: Complex, *, is_real: bool) -> Real:
     """Phase [degrees], continuous where the response is, beginning near 0 or -180, or at 90 or -90 of a rate.
 
-    `is_real`: at C = 0 a response is real, or imaginary where it is a rate's.
+    `is_real`: without losses or lag a response is real, or imaginary where it is a rate's.
     """
     start = 0.0 if value[0].real > 0 else -180.0
     if not is_real:
