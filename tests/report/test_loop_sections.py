@@ -303,6 +303,7 @@ def test_the_map_says_what_is_proven(coarse, section):
         ]
         assert frame.get_linestyle() == style
         assert ("not a proof here" in picture.caption) == (page is section)
+        assert ("were not looked for" in picture.caption) == (page is section)  # a theorem reaches however deep
 
 
 def test_the_sign_convention_is_the_pages_and_no_sections(coarse, monkeypatch):

@@ -184,11 +184,9 @@ def _map_caption(data: MapOfArm) -> str:
     sampled = SAMPLED_NOT_SEEN if data.sampled is None else SAMPLED_SEEN
     clock = f"{plain(1e3 * data.chain.sampling.period)} ms"
     modes = 0 if data.sampled is None else data.sampled.modes_used
-    return (
-        seen
-        + sampled.format(clock=clock, modes=modes)
-        + DEPTH_WORDS.format(deepest=plain(DEEPEST_MOMENT_GAIN * data.arm.input_per_torque, 4)) * (not data.is_undamped)
-    )
+    deepest = plain(DEEPEST_MOMENT_GAIN * data.arm.input_per_torque, 4)
+    depth = "" if data.region.freed.is_reactive else DEPTH_WORDS.format(deepest=deepest)  # by a theorem, however deep
+    return seen + sampled.format(clock=clock, modes=modes) + depth
 
 
 def proof_words(arm: Arm) -> str:
