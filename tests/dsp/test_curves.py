@@ -12,6 +12,7 @@ from tfarm.dsp.curves import (
     MOST_LINE,
     PERIODS,
     POINTS_A_PERIOD,
+    TimeCurve,
     curve,
     points_a_period,
     reference_angle,
@@ -83,3 +84,12 @@ def test_the_reference_between_the_samples_is_that_of_the_slew():
     a = 4 * 1.15  # rad/s^2: 1.15 rad in 1 s
     exact = np.where(t < 0.5, a * t**2 / 2, 1.15 - a * np.clip(1 - t, 0, None) ** 2 / 2)
     assert reference_angle(task, t) == pytest.approx(exact, abs=1e-12)
+
+
+def test_at_other_times_a_curve_holds_what_it_last_was():
+    own = TimeCurve(np.array([0.5, 1.0, 2.0]), np.array([5.0, 6.0, 7.0]), np.array([5.5, 6.5, 7.5]), True)
+    found = own.at(np.array([0.0, 0.5, 0.9, 1.0, 1.9, 9.0]))
+    np.testing.assert_array_equal(found.low, [5.0, 5.0, 5.0, 6.0, 6.0, 7.0])
+    np.testing.assert_array_equal(found.high, found.low + 0.5)
+    assert found.is_band
+    assert own.at(np.array([3.0, 4.0, 5.0])) is own  # as many are its own

@@ -307,3 +307,9 @@ def test_where_all_oscillating_modes_are_held_the_band_goes_on_to_where_shear_wa
     assert others.real.max() < -TOWARD_SINGULAR / arm.damping  # left of the line: they are gone within a sample
     few = complete_band(sampled_loop(tfarm.load("sasaki2012-lab"), HubFeedback(K1=0.3, K2=0.3), count=8))
     assert few.top == pytest.approx(1.02 * few.loop.plant.poles.imag.max(), rel=1e-12)  # the ninth is not far
+
+
+def test_what_is_told_from_zero_is_measured_by_the_other_end_of_a_window():
+    """By one where that is 0 or infinite."""
+    told = [shown._near_zero(other) for other in (-3.0, 0.0, math.inf, -math.inf)]
+    assert told == [3.0 * shown.TOLD_FROM_ZERO, *[shown.TOLD_FROM_ZERO] * 3]

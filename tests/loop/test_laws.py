@@ -18,7 +18,7 @@ from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.law_poles import law_poles, law_poles_below
 from tfarm.loop.law_stability import law_stability
 from tfarm.loop.margins import loop_margins
-from tfarm.loop.passivity import definite, is_hurwitz, polynomial, signs_of
+from tfarm.loop.passivity import definite, is_hurwitz, on_axis, polynomial, signs_of
 from tfarm.loop.stability import stability
 from tfarm.reduced.sensed import sensed_model
 from tfarm.response.signals import Signals
@@ -323,3 +323,22 @@ def test_a_loop_under_another_law_is_that_made_anew(entries):
     assert (mine.signals is first.signals) is (set(entries) == set(first.law.signals))
     assert mine.zeros_at_origin == anew.zeros_at_origin
     np.testing.assert_array_equal(mine.loop_function(s), anew.loop_function(s))
+
+
+def test_parts_on_the_axis_are_those_of_the_quotient_there():
+    """Real part, and imaginary part over w, of num/den at i w, times |den|^2: exact polynomials in w^2."""
+    rng = np.random.default_rng(12)
+    for _ in range(6):
+        num, den = rng.uniform(-2, 2, rng.integers(1, 5)), rng.uniform(-2, 2, rng.integers(2, 6))
+        real, imaginary = on_axis(polynomial(num), polynomial(den))
+        for w in (0.3, 1.7):
+            whole = np.polyval(num, 1j * w) * np.conj(np.polyval(den, 1j * w))
+            assert float(real.eval(w * w)) == pytest.approx(whole.real, rel=1e-12, abs=1e-13)
+            assert w * float(imaginary.eval(w * w)) == pytest.approx(whole.imag, rel=1e-12, abs=1e-13)
+
+
+def test_a_lead_on_the_rate_is_passive_until_its_delay_of_phase_is_more_than_a_quarter_turn():
+    """(s + a)/((s + b)(s + c)) has a real part above 0 on the axis where a < b + c, and not beyond."""
+    for a, is_passive in ((6.9, True), (7.1, False)):
+        real, _ = on_axis(polynomial([1.0, a]), polynomial([1.0, 7.0, 12.0]))
+        assert (definite(real) == "above") == is_passive
