@@ -7,9 +7,11 @@ import pytest
 
 import tfarm
 from tests.loop.rig_loops import RigLoop
+from tests.rigs import some_rig
 from tfarm import Hub, HubFeedback
 from tfarm.arm import Motor
 from tfarm.loop.margins import margins_of_gains
+from tfarm.loop.plant import Loop
 from tfarm.loop.regions import region
 from tfarm.loop.stability import stability
 
@@ -65,3 +67,19 @@ def test_the_gain_margin_is_where_elements_turn():
     loop = RigLoop(ROOT, tfarm.modes(ROOT, 12).natural_frequency[-1])
     below, above = (loop.eigenvalues(HubFeedback(K1=-0.2 * t, K2=0.1 * t, Kp=0.5 * t)).real.max() for t in (2.49, 2.51))
     assert below < 0 < above
+
+
+@pytest.mark.parametrize("seed", [261, 516])
+def test_of_a_hub_without_inertia_nothing_below_its_losses_is_called_stable(seed):
+    """Behind a clamp that yields a real pole passes through infinity where K1 takes what the hub loses."""
+    arm = some_rig(np.random.default_rng(seed))
+    assert arm.hub_side_inertia == 0 < arm.rate_loss
+    b, unit = arm.rate_loss, abs(tfarm.default_gains(arm).K1)
+    law = HubFeedback(K1=0.5 * unit, K2=0.3 * arm.input_per_torque)
+    assert all(low >= -b for low, _ in margins_of_gains(arm, law).windows["K1"].all)
+    found = region(arm, np.array([-b - 0.3 * unit, 0.5 * unit]), np.array([-1.3, 0.3]) * arm.input_per_torque)
+    assert not found.stable[:, 0].any()
+    s = tfarm.modes(arm, 12).natural_frequency[-1] * np.geomspace(1.0, 1e15, 61) + 0j
+    L = Loop(arm, law.having("K1", -3.0 * b)).loop_function(s)
+    if not arm.clamp.damping:  # or else that is lost in the clamp too
+        assert (1 + L).real.min() < 0 < (1 + L).real.max()  # it changes its sign: there is a real pole on the right

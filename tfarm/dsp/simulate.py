@@ -110,7 +110,7 @@ class Simulation:
     @property
     def finding(self) -> str:
         """How far it ran, the largest root moment on the way, and what was clipped, in words."""
-        end, moment = float(self.t[-1]), float(abs(self.at_samples.root_moment).max())
+        end, moment = float(self.t.max(initial=0.0)), float(abs(self.at_samples.root_moment).max(initial=0.0))
         clipped = [f"{name} clipped at {n} samples" for name, n in self.saturated.items() if n]
         ran = f"ran to {end:.6g} s" if self.stopped is None else f"ran away, stopped at {self.stopped.time:.6g} s"
         return ", ".join([ran, f"root moment up to {moment:.4g} N m", *clipped])

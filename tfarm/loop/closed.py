@@ -71,11 +71,13 @@ def locus(
 
     `vary` is a gain, "all" (a scale on the gains), payload_mass, payload_inertia, hub_inertia, length or damping; of a
     law of signals "gain" (a factor on it), "delay", a signal, "SIGNAL.num.N" or "SIGNAL.den.N", too.  Along these, and
-    of any `Law`, the record is a `LawLocus`, of the first `branches` (60 at most) flexible modes, with 100 values
-    unless `points` says otherwise.
+    of any other `Law` than gains at the hub, the record is a `LawLocus`, of the first `branches` (60 at most) flexible
+    modes, with 100 values unless `points` says otherwise.
     Raises ParameterError for what is no law, no loop or no range, ConvergenceError where branches cannot be told apart.
     """
     arm, plain = arm_and_law(arm, law)
+    if not isinstance(vary, str):
+        raise ParameterError(key="vary", value=vary, remedy=f"the name of what varies, such as {PLANE[1]} or length")
     is_of_signals = isinstance(law, Law) or vary.partition(".")[0] in {"gain", "delay", *FED_BACK}
     if isinstance(plain, HubFeedback) and (vary in OF_THE_LAW or not is_of_signals):
         return locus_of_gains(arm, plain, vary, start, stop, LOCUS_VALUES if points is None else points, branches)
@@ -88,7 +90,8 @@ def gain_map(
 ) -> Region | LawMap:
     """How many poles are unstable over the plane of K1 and K2 (1-D, ascending), and its exact boundary.
 
-    Of a `law` `vary` names two numbers, as `tfarm.locus` does: the values are theirs then, first across and then up.
+    Of a `law` `vary` names two of its numbers ("gain", "delay", a signal, "SIGNAL.num.N", "SIGNAL.den.N"): the values
+    are theirs then, first across and then up.
     Raises ParameterError for what is no law, no loop or no range, ConvergenceError where poles cannot be counted.
     """
     if isinstance(K1, HubFeedback | Law):
@@ -102,6 +105,6 @@ def gain_map(
         raise ParameterError(key="Kp", value=Kp, remedy="the law holds the angle: give Kp in it, or no law")
     if isinstance(plain, HubFeedback) and vary in (None, PLANE):
         return region(arm, K1, K2, plain.Kp)
-    if not isinstance(vary, tuple | list) or len(vary) != 2:
+    if not isinstance(vary, tuple | list) or len(vary) != 2 or not all(isinstance(each, str) for each in vary):
         raise ParameterError(key="vary", value=vary, remedy='two numbers of the law, such as ("gain", "delay")')
     return law_map(arm, law, (vary[0], vary[1]), K1, K2)

@@ -110,7 +110,8 @@ class Region:
         drifts = (self.K1 == 0) & self.arm.has_rigid_mode & (self.Kp == 0)
         swings = (self.upright == self.K1) & self.freed.is_reactive
         no_moment_is_left = np.equal(self.K2, self.arm.input_per_torque) & self.freed.is_told_by_lyapunov
-        return np.asarray((self.unstable == 0) & ~(drifts | swings) & ~no_moment_is_left[:, None])
+        untold = (self.upright >= self.K1) & (not self.arm.hub_side_inertia)  # a pole has passed through infinity
+        return np.asarray((self.unstable == 0) & ~(drifts | swings | untold) & ~no_moment_is_left[:, None])
 
 
 def region(arm: Arm, K1: Real, K2: Real, Kp: float = 0.0) -> Region:
@@ -136,6 +137,10 @@ def region(arm: Arm, K1: Real, K2: Real, Kp: float = 0.0) -> Region:
     (without_K2,) = counts_over(K1, [line_crossings(arm, along("K1", without), band)], float(K1[-1]), last)
     found = _crossings_along_K2(arm, K1, Kp, omega)
     unstable = counts_over(K2, found, 0.0, without_K2).T
+    if arm.loses_at_hub_alone and arm.reads_hub_moment and not arm.input_lags:
+        # a hub without inertia behind a spring, which is not `freed`: of elastic links every mode is driven
+        taken = np.sign(1.0 - K2[:, None] / arm.input_per_torque) * np.sign(K1 + arm.rate_loss)
+        unstable = np.where(taken < 0, INFINITE, unstable)  # as `Loop.takes_energy` says
     return Region(arm, Kp, K1, K2, unstable, boundary(arm, omega, Kp), band, found)
 
 

@@ -69,6 +69,11 @@ def gain_windows(verdict: Stability, name: str) -> Windows:
         found = _as_mirrored(loop, name, line_crossings(loop.arm, along(name, law), band)).within(low, high)
     pairs = list(itertools.pairwise([low, *np.unique(found.gain).tolist(), high]))
     stable = [pair for pair, count in zip(pairs, _counts(verdict, name, pairs, found), strict=True) if count == 0]
+    if (
+        name == RATE_GAIN and not loop.arm.hub_side_inertia
+    ):  # where nothing is lost a pole of such a hub passes infinity
+        least = 0.0 - loop.arm.rate_loss
+        stable = [(max(start, least), end) for start, end in stable if end > least]
     stable = [_with_proven_ends(loop, name, pair, (low, high)) for pair in stable]
     at_edge = name == "Kp" and value == 0  # there the pole at 0 is, apart from which the verdict is
     inside = (pair for pair in stable if pair[0] < value < pair[1] or (at_edge and pair[0] == 0))
