@@ -8,6 +8,7 @@ import pytest
 import tfarm
 from tests.loop.rig_loops import RigLoop
 from tests.rigs import some_rig
+from tests.shared import thinned
 from tfarm import Hub, HubFeedback
 from tfarm.arm import Motor
 from tfarm.loop.margins import margins_of_gains
@@ -28,7 +29,7 @@ LAGGING = replace(
 
 
 @pytest.mark.parametrize("arm", [ROOT, CLAMP], ids=lambda arm: arm.name)
-@pytest.mark.parametrize("K2", [-0.5, 0.3])
+@pytest.mark.parametrize("K2", thinned([-0.5, 0.3], 2))
 def test_the_window_of_K1_ends_where_the_hub_loses_nothing(arm, K2):
     """Not at ends torn by rounding: beside it elements have every mode of the first six right or left of the axis."""
     assert margins_of_gains(arm, HubFeedback(K1=1.0, K2=K2)).windows["K1"].all == ((-LOSS, np.inf),)
@@ -69,7 +70,7 @@ def test_the_gain_margin_is_where_elements_turn():
     assert below < 0 < above
 
 
-@pytest.mark.parametrize("seed", [261, 516])
+@pytest.mark.parametrize("seed", thinned([516, 261], 2))
 def test_of_a_hub_without_inertia_nothing_below_its_losses_is_called_stable(seed):
     """Behind a clamp that yields a real pole passes through infinity where K1 takes what the hub loses."""
     arm = some_rig(np.random.default_rng(seed))

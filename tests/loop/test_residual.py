@@ -6,6 +6,7 @@ from scipy.linalg import expm
 
 import tfarm
 from tests.loop.ritz_loop import RitzLoop
+from tests.shared import thinned
 from tfarm import HubFeedback
 from tfarm.arm import many_laws
 from tfarm.loop.residual import PERIOD_SAMPLES, RISE, TRAVEL, command, residual_moment
@@ -76,7 +77,7 @@ def played(gains, terms):
     return np.sqrt(np.mean(np.square(moments)))
 
 
-@pytest.mark.parametrize("gains", [HubFeedback(K1=0.3, K2=0.3), HubFeedback(K1=0.1, K2=-0.5, Kp=2.0)])
+@pytest.mark.parametrize("gains", thinned([HubFeedback(K1=0.1, K2=-0.5, Kp=2.0), HubFeedback(K1=0.3, K2=0.3)], 2))
 def test_what_is_left_is_what_another_model_leaves(gains):
     """The model's highest modes are not the arm's; as these have died down, the first twelve leave it all."""
     found = residual_moment(LAB, many_laws(gains, K1=np.array([gains.K1])), 12)
