@@ -141,7 +141,7 @@ def test_steps_and_ranges():
         converters=Converters(moment_bits=4, moment_range=8.0, torque_bits=3, torque_range=4.0),
         actuator=Actuator(torque_limit=2.5),
     )
-    rows = quantisers(chain).rows
+    rows = quantisers(chain)
     assert rows[AMPLIFIER].tolist() == [1.0, -8.0, 7.0]
     assert rows[DAC].tolist() == [1.0, -2.5, 2.5]
 

@@ -3,11 +3,13 @@
 from tfarm.dsp.chain import Actuator, Chain, Converters, Sampling, Slew
 from tfarm.dsp.loop import SampledLoop, sampled_loop
 from tfarm.dsp.margins import delay_margin, required_damping, stable_windows
+from tfarm.dsp.measurement import Measurement
 from tfarm.dsp.reading import load_chain
 from tfarm.dsp.regions import GainMap, sampled_map
 from tfarm.dsp.sampling import PulseTransfer, pulse_transfer
 from tfarm.dsp.scenarios import Scenario, scenario
-from tfarm.dsp.simulate import Measurement, Simulation, Simulator
+from tfarm.dsp.simulate import Simulator
+from tfarm.dsp.simulation import Simulation
 from tfarm.dsp.verdict import Analysis, Verdict, analyse, sampled_verdict
 
 __all__ = [

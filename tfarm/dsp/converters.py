@@ -7,29 +7,19 @@ them: -2^(b-1) .. 2^(b-1) - 1 steps of 2 R / 2^b.  An ideal converter has step 0
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tfarm.arrays import Real
 from tfarm.dsp.chain import Chain
-from tfarm.dsp.kernel import DAC
-from tfarm.records import record
+from tfarm.dsp.kernel import DAC, HIGHEST, LOWEST
 
 
-@dataclass(frozen=True)
-@record
-class Quantisers:
-    """`rows` (3, 3): step, lowest and highest value of the angle, the moment and the torque; step 0 is ideal.
+def quantisers(chain: Chain) -> Real:
+    """Step, lowest and highest value (3, 3) of a chain's encoder, strain amplifier and DAC, as `kernel` numbers them.
 
-    Their numbers are those of `kernel`: ENCODER, AMPLIFIER, DAC.
+    A step of 0 is ideal; the torque's range also respects the motor's limit.
     """
-
-    rows: NDArray[np.float64]
-
-
-def quantisers(chain: Chain) -> Quantisers:
-    """The steps and ranges of a chain; the torque's range also respects the motor's limit."""
     converters, limit = chain.converters, chain.actuator.torque_limit
     counts = converters.encoder_counts
     rows = np.array([
@@ -37,9 +27,9 @@ def quantisers(chain: Chain) -> Quantisers:
         _converter(converters.moment_bits, converters.moment_range),
         _converter(converters.torque_bits, converters.torque_range),
     ])  # fmt: skip
-    rows[DAC, 1] = max(rows[DAC, 1], -limit)
-    rows[DAC, 2] = min(rows[DAC, 2], limit)
-    return Quantisers(rows)
+    rows[DAC, LOWEST] = max(rows[DAC, LOWEST], -limit)
+    rows[DAC, HIGHEST] = min(rows[DAC, HIGHEST], limit)
+    return rows
 
 
 def _converter(bits: int | None, span: float | None) -> list[float]:

@@ -20,7 +20,8 @@ from tfarm.columns import Column
 from tfarm.dsp.chain import TIME_ROUNDING
 from tfarm.dsp.ringing import POINTS_A_PERIOD, records_between
 from tfarm.dsp.scenarios import Scenario
-from tfarm.dsp.simulate import Simulation, Simulator
+from tfarm.dsp.simulate import Simulator
+from tfarm.dsp.simulation import Simulation
 from tfarm.records import record
 
 AnySimulator = TypeVar("AnySimulator", bound=Simulator)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tfarm.dsp.simulate import Simulation, Trace
+from tfarm.dsp.simulation import Simulation, Trace
 from tfarm.errors import ConvergenceError
 
 MODE_COUNTS = (10, 20, 40)  # flexible modes; 80 would take a heavily damped arm 8 s of CPU time

@@ -1,30 +1,95 @@
 """The compiled heart of the simulation: exact steps of the modal amplitudes between the samples, and the linear law.
 
-All compiled functions stand in this one file, for numba's cache does not notice an edited callee elsewhere.  Arrays:
-
-    amplitude (m,) complex      one a pole with Im p > 0 or real, a' = p a + u
-    rigid (2,)                  double integral and integral of the torque
-    turn, push (segments, m)    e^{p dt}, (e^{p dt} - 1)/p of each piece of a sample between two switches or records
-    piece (segments, 3)         its duration, 1 where the new torque acts already, 1 where it ends at a record
-    weights (outputs, m)        outputs = Re(weights amplitude) + rates (outputs, 2) rigid + static (outputs,) torque
+All compiled functions stand in this one file, for numba's cache does not notice an edited callee elsewhere.  What they
+share goes by name in tuples that numba knows: a `Model` of the arm, the `State` that moves, the `Forcing` of a
+scenario and the `Electronics` of a chain.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from tfarm.arrays import Complex, Real
 from tfarm.exact.compiled import compiled, inlined
 
 ENCODER, AMPLIFIER, DAC = 0, 1, 2  # rows of the quantisers, and places in `saturated`
+DOUBLY, ONCE = 0, 1  # integrals of the torque in `rigid`, and what they add to an output in `rates`
+DURATION, IS_NEW, IS_RECORD = 0, 1, 2  # of a piece of a sample: how long [s], whether the new torque acts, whether seen
+DONE, MOVED = 0, 1  # of `work` [J]: done on the hub, and its size, what went to and fro
+STEP, LOWEST, HIGHEST = 0, 1, 2  # of a row of the quantisers
+ANGLE_BEFORE, RATE_BEFORE, BEGUN = 0, 1, 2  # what the estimate of the hub rate remembers
+YES = 0.5  # a number above it stands for true among floats
+
+
+class Model(NamedTuple):
+    """The arm between the samples: outputs = Re(weights amplitude) + rates rigid + static torque.
+
+    `turn`, `push` (pieces, m) are e^{p dt} and (e^{p dt} - 1)/p of each piece of a sample between two switches or
+    records, `piece` (pieces, 3) what it is; `weights` (outputs, m), `rates` (outputs, 2), `static` (outputs,); `hub`
+    (2 + m,) is the hub angle's row, rates first, without its static remainder.
+    """
+
+    turn: Complex
+    push: Complex
+    piece: Real
+    weights: Complex
+    rates: Real
+    static: Real
+    hub: Complex
+
+
+class State(NamedTuple):
+    """What changes while a simulation runs.
+
+    `amplitude` (m,) one a pole with Im p > 0 or real, a' = p a + u; `rigid` (2,) double integral and integral of the
+    torque; `held` a ring of the last delay + 2 torques; `work` (2,) [J].  Filled sample by sample: `record`
+    (n, outputs), `torque` (n,), `fine` (n, records, outputs) and `saturated` (n, 3).
+    """
+
+    amplitude: Complex
+    rigid: Real
+    held: Real
+    work: Real
+    record: Real
+    torque: Real
+    fine: Real
+    saturated: NDArray[np.bool_]
+
+
+class Forcing(NamedTuple):
+    """What a scenario does at each sample (n,): torque fed forward, torque from outside [N m], and once, after the
+    first, an impulse [N m s] on the hub."""
+
+    feedforward: Real
+    disturbance: Real
+    impulse: float
+
+
+class Electronics(NamedTuple):
+    """A chain as the kernels take it.
+
+    `quantisers` (3, 3): step, lowest and highest of encoder, amplifier and DAC; `is_differenced`, `pole` and `period`
+    [s] of the hub rate's estimate; `delay` whole samples; `is_single` where every step is rounded to float32; `bound`
+    [N m] of the root moment, beyond which a simulation stops.
+    """
+
+    quantisers: Real
+    is_differenced: bool
+    pole: float
+    period: float
+    delay: int
+    is_single: bool
+    bound: float
 
 
 @compiled
 def read_outputs(weights: Any, rates: Any, static: Any, amplitude: Any, rigid: Any, torque: float, out: Any) -> None:
     """The outputs under the torque that acts now."""
     for o in range(weights.shape[0]):
-        value = rates[o, 0] * rigid[0] + rates[o, 1] * rigid[1] + static[o] * torque
+        value = rates[o, DOUBLY] * rigid[DOUBLY] + rates[o, ONCE] * rigid[ONCE] + static[o] * torque
         for i in range(amplitude.size):
             value += weights[o, i].real * amplitude[i].real - weights[o, i].imag * amplitude[i].imag
         out[o] = value
@@ -35,33 +100,33 @@ def strike(amplitude: Any, rigid: Any, impulse: float) -> None:
     """An impulse of torque [N m s] on the hub: every amplitude jumps by it."""
     for i in range(amplitude.size):
         amplitude[i] += impulse
-    rigid[1] += impulse
+    rigid[ONCE] += impulse
 
 
 @compiled
 def advance(
-    tables: Any, amplitude: Any, rigid: Any, old: float, new: float, push_on: float, fine: Any, work: Any
-) -> None:
+    turn: Any, push: Any, piece: Any, weights: Any, rates: Any, static: Any, hub: Any, amplitude: Any, rigid: Any,
+    work: Any, fine: Any, old: float, new: float, push_on: float,
+) -> None:  # fmt: skip
     """One sample on: `old` torque up to the switch, `new` after it, `push_on` (a disturbance) throughout.
 
-    Fills a row of `fine` at each record; adds the work done on the hub [J] to work[0] and its size to work[1].
+    The first are those of a `Model`.  Fills a row of `fine` at each record, and adds to the work.
     """
-    turn, push, piece, weights, rates, static, hub = tables
     row = 0
     before = _angle(hub, amplitude, rigid)
     for s in range(piece.shape[0]):
-        torque = (new if piece[s, 1] > 0.5 else old) + push_on
-        dt = piece[s, 0]
+        torque = (new if piece[s, IS_NEW] > YES else old) + push_on
+        dt = piece[s, DURATION]
         for i in range(amplitude.size):
             amplitude[i] = turn[s, i] * amplitude[i] + push[s, i] * torque
-        rigid[0] += dt * rigid[1] + 0.5 * dt * dt * torque
-        rigid[1] += dt * torque
+        rigid[DOUBLY] += dt * rigid[ONCE] + 0.5 * dt * dt * torque
+        rigid[ONCE] += dt * torque
         after = _angle(hub, amplitude, rigid)
         done = torque * (after - before)
-        work[0] += done
-        work[1] += abs(done)
+        work[DONE] += done
+        work[MOVED] += abs(done)
         before = after
-        if piece[s, 2] > 0.5 and row < fine.shape[0]:
+        if piece[s, IS_RECORD] > YES and row < fine.shape[0]:
             read_outputs(weights, rates, static, amplitude, rigid, torque, fine[row])
             row += 1
 
@@ -69,7 +134,7 @@ def advance(
 @compiled
 def _angle(hub: Any, amplitude: Any, rigid: Any) -> float:
     """The hub angle of the modes at hand, without the static remainder."""
-    value = hub[0].real * rigid[0] + hub[1].real * rigid[1]
+    value = hub[DOUBLY].real * rigid[DOUBLY] + hub[ONCE].real * rigid[ONCE]
     for i in range(amplitude.size):
         value += hub[i + 2].real * amplitude[i].real - hub[i + 2].imag * amplitude[i].imag
     return value
@@ -78,7 +143,7 @@ def _angle(hub: Any, amplitude: Any, rigid: Any) -> float:
 @compiled
 def quantise(value: float, row: Any, saturated: Any, which: int) -> float:
     """`value` on the steps of a converter, clipped to its range; says so in `saturated` (3,) where it is clipped."""
-    step, low, high = row[0], row[1], row[2]
+    step, low, high = row[STEP], row[LOWEST], row[HIGHEST]
     if step > 0.0:
         value = np.rint(value / step) * step
     if value > high:
@@ -91,24 +156,23 @@ def quantise(value: float, row: Any, saturated: Any, which: int) -> float:
 
 
 @compiled
-def estimate(angle: float, rate: float, memory: Any, filter_: Any) -> float:
+def estimate(angle: float, rate: float, memory: Any, is_differenced: bool, pole: float, period: float) -> float:
     """The hub rate as the controller knows it: its own reading, or the filtered difference of the encoder."""
-    if filter_[0] < 0.5:
+    if not is_differenced:
         return rate
-    if memory[2] < 0.5:
-        memory[0], memory[2] = angle, 1.0
-    a = filter_[1]
-    memory[1] = a * memory[1] + (1.0 - a) * (angle - memory[0]) / filter_[2]
-    memory[0] = angle
-    return memory[1]
+    if memory[BEGUN] < YES:
+        memory[ANGLE_BEFORE], memory[BEGUN] = angle, 1.0
+    step = angle - memory[ANGLE_BEFORE]
+    memory[RATE_BEFORE] = pole * memory[RATE_BEFORE] + (1.0 - pole) * step / period
+    memory[ANGLE_BEFORE] = angle
+    return memory[RATE_BEFORE]
 
 
-@compiled
-def converted(record: Any, rows: Any, saturated: Any, memory: Any, filter_: Any) -> Any:
-    """Hub angle, hub rate and root moment as the controller has them, of the outputs of one sample."""
-    angle = quantise(record[0], rows[ENCODER], saturated, ENCODER)
-    moment = quantise(record[2], rows[AMPLIFIER], saturated, AMPLIFIER)
-    return angle, estimate(angle, record[1], memory, filter_), moment
+def converted(record: Any, saturated: Any, memory: Any, of: Any) -> Any:
+    """Hub angle, hub rate and root moment as the controller of that `Electronics` has them, of one sample's outputs."""
+    angle = quantise(record[0], of.quantisers[ENCODER], saturated, ENCODER)
+    moment = quantise(record[2], of.quantisers[AMPLIFIER], saturated, AMPLIFIER)
+    return angle, estimate(angle, record[1], memory, of.is_differenced, of.pole, of.period), moment
 
 
 @compiled
@@ -136,36 +200,48 @@ def law(k: int, gains: Any, ideal: Any, references: Any, measured: Any, single: 
     return u
 
 
+def before(k: int, model: Any, state: Any, forcing: Any, of: Any) -> bool:
+    """Read the outputs just before sample k; whether the arm is still an arm, its root moment within its bound."""
+    torque, rigid = state.held[(k - of.delay - 1) % state.held.size], state.rigid
+    torque += forcing.disturbance[k - 1] if k > 0 else 0.0
+    read_outputs(model.weights, model.rates, model.static, state.amplitude, rigid, torque, state.record[k])
+    return abs(state.record[k, 2]) <= of.bound
+
+
+def after(k: int, u: float, model: Any, state: Any, forcing: Any, of: Any) -> None:
+    """Ask for the torque u at sample k: it leaves the DAC, is held, and acts a delay later; one sample on."""
+    ring = state.held.size
+    old = state.held[(k - of.delay - 1) % ring]
+    state.held[k % ring] = state.torque[k] = quantise(u, of.quantisers[DAC], state.saturated[k], DAC)
+    if k == 0:
+        strike(state.amplitude, state.rigid, forcing.impulse)
+    advance(
+        model.turn, model.push, model.piece, model.weights, model.rates, model.static, model.hub,
+        state.amplitude, state.rigid, state.work, state.fine[k], old, state.held[(k - of.delay) % ring],
+        forcing.disturbance[k],
+    )  # fmt: skip
+
+
+_before, _converted, _after = inlined(before), inlined(converted), inlined(after)  # a loop in Python takes them as such
+
+
 @compiled
-def run_gains(
-    tables: Any, amplitude: Any, rigid: Any, held: Any, delay: int, gains: Any, references: Any, ideal: Any,
-    disturbance: Any, impulse: float, rows: Any, filter_: Any, single: bool, bound: float, record: Any, torque: Any,
-    fine: Any, saturated: Any, work: Any,
-) -> int:  # fmt: skip
-    """The linear law over all samples; returns how many were made before the root moment passed `bound`.
+def run_gains(model: Any, state: Any, forcing: Any, electronics: Any, gains: Any, references: Any) -> int:
+    """The linear law over all samples; returns how many were made before the root moment passed its bound.
 
     `gains` and `references` (n, measured) are of the first outputs, which are measured: hub angle, hub rate and root
-    moment through filters and converters, any more as they are.  The hub is struck by `impulse` [N m s] after the
-    first sample.  `held` is a ring of the last delay + 2 torques.  `record` (n, outputs), `torque` (n,), `fine`
-    (n, records, outputs) and `saturated` (n, 3) are filled.
+    moment through filters and converters, any more as they are.
     """
-    weights, rates, static = tables[3], tables[4], tables[5]
-    n, ring, memory, measured = torque.size, held.size, np.zeros(3), np.zeros(gains.shape[1])
+    n, memory, measured = state.torque.size, np.zeros(3), np.zeros(gains.shape[1])
     for k in range(n):
-        acting = held[(k - delay - 1) % ring]
-        extra = disturbance[k - 1] if k > 0 else 0.0
-        read_outputs(weights, rates, static, amplitude, rigid, acting + extra, record[k])
-        if not abs(record[k, 2]) <= bound:
+        if not _before(k, model, state, forcing, electronics):
             return k
-        clipped = saturated[k]
-        measured[0], measured[1], measured[2] = converted(record[k], rows, clipped, memory, filter_)
+        record = state.record[k]
+        measured[0], measured[1], measured[2] = _converted(record, state.saturated[k], memory, electronics)
         for j in range(3, measured.size):
-            measured[j] = record[k, j]
-        u = quantise(law(k, gains, ideal, references, measured, single), rows[DAC], clipped, DAC)
-        held[k % ring] = torque[k] = u
-        if k == 0:
-            strike(amplitude, rigid, impulse)
-        advance(tables, amplitude, rigid, acting, held[(k - delay) % ring], disturbance[k], fine[k], work)
+            measured[j] = record[j]
+        u = law(k, gains, forcing.feedforward, references, measured, electronics.is_single)
+        _after(k, u, model, state, forcing, electronics)
     return n
 
 
@@ -184,42 +260,30 @@ def product(row: Any, values: Any, start: float, single: bool) -> float:
 
 
 @compiled
-def run_law(
-    tables: Any, amplitude: Any, rigid: Any, held: Any, delay: int, matrices: Any, kinds: Any, references: Any,
-    ideal: Any, disturbance: Any, impulse: float, rows: Any, filter_: Any, single: bool, bound: float, record: Any,
-    torque: Any, fine: Any, saturated: Any, work: Any,
-) -> int:  # fmt: skip
+def run_law(model: Any, state: Any, forcing: Any, electronics: Any, matrices: Any, kinds: Any, references: Any) -> int:
     """As `run_gains`, under x_{k+1} = A x + B y, u = r - C x - D y, whose signals are the last outputs.
 
     `kinds` (signals,) says through what each goes: 0 nothing, 1 the encoder, 2 the strain amplifier, 3 the rate
     estimate; `references` (n, columns) is taken off, and is all there is of columns beyond the signals (y = 0 there).
     """
-    weights, rates, static = tables[3], tables[4], tables[5]
     A, B, C, D = matrices
-    n, ring, memory, first = torque.size, held.size, np.zeros(3), record.shape[1] - kinds.size
-    x, after, y = np.zeros(A.shape[0]), np.zeros(A.shape[0]), np.zeros(B.shape[1])
+    n, single, memory, first = state.torque.size, electronics.is_single, np.zeros(3), state.record.shape[1] - kinds.size
+    x, following, y = np.zeros(A.shape[0]), np.zeros(A.shape[0]), np.zeros(B.shape[1])
     for k in range(n):
-        acting = held[(k - delay - 1) % ring]
-        extra = disturbance[k - 1] if k > 0 else 0.0
-        read_outputs(weights, rates, static, amplitude, rigid, acting + extra, record[k])
-        if not abs(record[k, 2]) <= bound:
+        if not _before(k, model, state, forcing, electronics):
             return k
-        clipped = saturated[k]
-        angle, rate, moment = converted(record[k], rows, clipped, memory, filter_)
+        record = state.record[k]
+        angle, rate, moment = _converted(record, state.saturated[k], memory, electronics)
         for j in range(y.size):
-            value = signal(kinds[j], record[k, first + j], angle, rate, moment) if j < kinds.size else 0.0
+            value = signal(kinds[j], record[first + j], angle, rate, moment) if j < kinds.size else 0.0
             y[j] = value - references[k, j]
             if single:
                 y[j] = float(np.float32(float(np.float32(value)) - float(np.float32(references[k, j]))))
-        u = ideal[k] - product(D[0], y, product(C[0], x, 0.0, single), single)
+        u = forcing.feedforward[k] - product(D[0], y, product(C[0], x, 0.0, single), single)
         if single:
             u = float(np.float32(u))
         for i in range(x.size):
-            after[i] = product(B[i], y, product(A[i], x, 0.0, single), single)
-        x[:] = after
-        u = quantise(u, rows[DAC], clipped, DAC)
-        held[k % ring] = torque[k] = u
-        if k == 0:
-            strike(amplitude, rigid, impulse)
-        advance(tables, amplitude, rigid, acting, held[(k - delay) % ring], disturbance[k], fine[k], work)
+            following[i] = product(B[i], y, product(A[i], x, 0.0, single), single)
+        x[:] = following
+        _after(k, u, model, state, forcing, electronics)
     return n

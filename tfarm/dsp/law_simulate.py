@@ -20,7 +20,8 @@ from tfarm.dsp.law_loop import acting_law
 from tfarm.dsp.law_plant import sensed_plant
 from tfarm.dsp.plant import USUAL_MODES, Plant
 from tfarm.dsp.scenarios import Scenario
-from tfarm.dsp.simulate import Simulation, Simulator
+from tfarm.dsp.simulate import Simulator
+from tfarm.dsp.simulation import Simulation
 from tfarm.errors import must_be_known
 
 SIGNAL_KINDS = {"hub_angle": 1, "root_moment": 2, "hub_rate": 3}  # through what one goes, as in `kernel.run_law`
@@ -60,14 +61,9 @@ class LawSimulator(Simulator):
         state, law = self._start(), self.law
         matrices = tuple(np.ascontiguousarray(each) for each in law.matrices((*law.signals, *law.wanted)))
         kinds = np.array([SIGNAL_KINDS.get(name, 0) for name in law.signals])
-        single = self.chain.converters.arithmetic == "float32"
-        if single:
+        if self._electronics.is_single:
             matrices = tuple(each.astype(np.float32).astype(float) for each in matrices)
-        done = kernel.run_law(
-            self._tables, state.amplitude, state.rigid, state.held, self.chain.sampling.whole_delay, matrices, kinds,
-            self._references, self.scenario.feedforward, self.scenario.disturbance, self.scenario.impulse, self._rows,
-            self._filter, single, self._bound, state.record, state.torque, state.fine, state.saturated, state.work,
-        )  # fmt: skip
+        done = kernel.run_law(self._model, state, self._forcing, self._electronics, matrices, kinds, self._references)
         return self._result(state, int(done), None)
 
 

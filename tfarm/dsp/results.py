@@ -18,7 +18,8 @@ from tfarm.dsp.discretise import described_law
 from tfarm.dsp.enough import Enough, enough_modes
 from tfarm.dsp.law_simulate import LawSimulator
 from tfarm.dsp.scenarios import TRIAL_DURATION, Scenario, described, scenario
-from tfarm.dsp.simulate import Simulation, Simulator, Trace
+from tfarm.dsp.simulate import Simulator
+from tfarm.dsp.simulation import Simulation, Trace
 
 SETTLED_SHARE = 0.05  # of the largest root moment, within which a slew has settled
 CYCLE_LASTS = 0.7  # a limit cycle keeps at least this much of its amplitude over a quarter of the record

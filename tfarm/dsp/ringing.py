@@ -13,7 +13,8 @@ import numpy as np
 
 from tfarm.arrays import Real
 from tfarm.dsp.plant import RECORDED
-from tfarm.dsp.simulate import Simulation, Simulator
+from tfarm.dsp.simulate import Simulator
+from tfarm.dsp.simulation import Simulation
 
 POINTS_A_PERIOD = 20  # of a curve in each period of the fastest mode that is seen
 VISIBLE = 1 / 300  # of the height of a curve: a pixel of a picture

@@ -11,7 +11,8 @@ from tfarm.digits import plain
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.curves import resolved
 from tfarm.dsp.scenarios import scenario
-from tfarm.dsp.simulate import Simulation, Simulator
+from tfarm.dsp.simulate import Simulator
+from tfarm.dsp.simulation import Simulation
 from tfarm.records import record
 
 WITHOUT = f"without moment feedback, {MOMENT_GAIN} = 0"

@@ -12,8 +12,10 @@ from tfarm.arm import MOMENT_GAIN, Arm, HubFeedback
 from tfarm.arrays import Real
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.curves import resolved
+from tfarm.dsp.measurement import Measurement
 from tfarm.dsp.scenarios import scenario
-from tfarm.dsp.simulate import Measurement, Simulation, Simulator
+from tfarm.dsp.simulate import Simulator
+from tfarm.dsp.simulation import Simulation
 from tfarm.records import record
 
 COARSE_BITS = 6  # of the ADC: few, so that its steps are seen

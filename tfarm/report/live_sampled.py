@@ -101,7 +101,7 @@ def _kept(plant: Plant) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
 
 def _task(task: Scenario, chain: Chain, arm: Arm) -> dict[str, Any]:
     """References a sample, converters, and what a person is told of the slew."""
-    rows = quantisers(chain).rows.tolist()
+    rows = quantisers(chain).tolist()
     ideal = np.c_[task.feedforward, task.hub_angle, task.hub_rate, task.rigid_moment]
     return {
         "ideal": packed(ideal),
