@@ -25,6 +25,10 @@ DspFile = Annotated[
 ModeCount = Annotated[
     str | None, typer.Option("--modes", metavar="N", help="flexible modes; as many as it takes if not said")
 ]
+Outputs = Annotated[
+    list[str] | None,
+    typer.Option("--output", metavar="NAME", help="record this too, as tip_rotation or strain@0.05; once for each"),
+]
 HELP_ON_SAMPLED = f"""Is the loop u = -{TAKEN_OFF} stable when it is sampled?  Verdict, intervals, modes, margins.
 
 A law of a file acts with its own period, which has to be that of the chain; one in s is made discrete by its rule.
@@ -70,6 +74,7 @@ def simulate(
     delay_samples: Delay = None,
     dsp: DspFile = None,
     modes: ModeCount = None,
+    output: Outputs = None,
     between: Annotated[str, typer.Option("--between", metavar="N", help="records between two samples")] = "0",
     csv: Annotated[Path | None, typer.Option("--csv", help="write the signals to this file")] = None,
     mat: Annotated[Path | None, typer.Option("--mat", help="write the signals to this MATLAB file")] = None,
@@ -80,19 +85,19 @@ def simulate(
 ) -> None:
     """The sampled loop in time: hub angle, tip, root moment and torque, exact between the samples."""
     count = None if modes is None else whole_number("--modes", modes, 1, 400)
-    records = whole_number("--between", between, 0, 1000)
+    how: Any = {"count": count, "between": whole_number("--between", between, 0, 1000), "outputs": output or ()}
     subject, chain = load_arm(arm), asked_chain(dsp or arm, period, delay_samples)
     from tfarm.dsp.results import simulated_answer
 
     if controller is None:
         law, said = asked_law(subject, given)
-        answer = said | simulated_answer(subject, law, chain, scenario, duration, count=count, between=records)
+        answer = said | simulated_answer(subject, law, chain, scenario, duration, **how)
     else:
         from tfarm.tuner.saving import load_tuner
         from tfarm.tuner.tuning import controlled_answer
 
         saved = load_tuner(controller)
-        answer = controlled_answer(subject, saved, chain, scenario, duration, count=count, between=records)
+        answer = controlled_answer(subject, saved, chain, scenario, duration, **how)
     _show(answer, csv, mat, json)
 
 

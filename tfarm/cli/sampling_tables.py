@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ import numpy as np
 from tfarm.arm import PLANE
 from tfarm.cli.app import tell
 from tfarm.columns import Column, Table
-from tfarm.dsp.results import SIGNAL_COLUMNS
+from tfarm.dsp.results import AT_SAMPLES_COLUMNS, traced_columns
 from tfarm.files import write_file
 from tfarm.tables.files import write_csv
 from tfarm.tables.terminal import show
@@ -99,9 +100,9 @@ def write_mat(answer: dict[str, Any], path: Path) -> None:
     """The signals at the samples, and those between them, as a MATLAB file (level 5)."""
     from scipy.io import savemat
 
-    signals: dict[str, Any] = {column.key: np.array(answer[column.key]) for column in _present(answer)}
+    signals: dict[str, Any] = {_variable(each.key): np.array(answer[each.key]) for each in _present(answer)}
     if "between" in answer:
-        signals["between"] = {name: np.array(values) for name, values in answer["between"].items()}
+        signals["between"] = {_variable(name): np.array(values) for name, values in answer["between"].items()}
     data = io.BytesIO()
     savemat(data, signals, oned_as="column")  # type: ignore[arg-type]  # a stream will do
     content = data.getvalue()
@@ -109,9 +110,14 @@ def write_mat(answer: dict[str, Any], path: Path) -> None:
     write_file(path, header + content[116:], key="--mat")
 
 
+def _variable(name: str) -> str:
+    """A signal's name as MATLAB takes it: strain_0_05 of strain@0.05."""
+    return re.sub(r"\W", "_", name)
+
+
 def _present(answer: dict[str, Any]) -> list[Column]:
-    units, columns = {"torque": answer["torque_unit"]}, (each for each in SIGNAL_COLUMNS if answer.get(each.key))
-    return [replace(column, unit=units.get(column.key, column.unit)) for column in columns]
+    units, columns = {"torque": answer["torque_unit"]}, (*traced_columns(answer["outputs"]), *AT_SAMPLES_COLUMNS)
+    return [replace(each, unit=units.get(each.key, each.unit)) for each in columns if answer.get(each.key)]
 
 
 def _held(figures: list[dict[str, Any]], band: float | None) -> str:

@@ -128,8 +128,8 @@ def continuous(simulation: Simulation, signal: str) -> tuple[Real, Real]:
     """A signal at the samples and between them, in order of time."""
     at, between = simulation.at_samples, simulation.between
     if between is None:
-        return at.t, getattr(at, signal)
-    t, y = np.r_[at.t, between.t], np.r_[getattr(at, signal), getattr(between, signal)]
+        return at.t, at.signal(signal)
+    t, y = np.r_[at.t, between.t], np.r_[at.signal(signal), between.signal(signal)]
     order = np.argsort(t, kind="stable")
     return t[order], y[order]
 

@@ -32,22 +32,26 @@ class SensedPlant:
     @property
     def together(self) -> Plant:
         """All signals in the order of their names, through their analog filters."""
+        whole, corner = self.unfiltered, self.chain.sampling.antialias_corner
+        analog = [n for n, each in enumerate(self.read.outputs) if is_analog(each, self.chain)]
+        return whole if math.isinf(corner) or not analog else with_filter(whole, analog, corner)
+
+    @property
+    def unfiltered(self) -> Plant:
+        """All signals in the order of their names, as they are."""
         places = list(dict.fromkeys(self.read.places))
         first, rows = self.plants[0], []
         for wanted, place in zip(self.read.outputs, self.read.places, strict=True):
             plant = self.plants[places.index(place)]
             assert np.array_equal(plant.poles, first.poles)  # the poles are the arm's, wherever it is looked at
             rows.append((plant, plant.outputs.index(wanted.name)))
-        whole = replace(
+        return replace(
             first,
             outputs=self.read.names,
             residues=np.array([plant.residues[n] for plant, n in rows]),
             rigid=np.array([plant.rigid[n] for plant, n in rows]),
             static=np.array([plant.static[n] for plant, n in rows]),
         )
-        corner = self.chain.sampling.antialias_corner
-        analog = [n for n, each in enumerate(self.read.outputs) if is_analog(each, self.chain)]
-        return whole if math.isinf(corner) or not analog else with_filter(whole, analog, corner)
 
     def with_modes(self, count: int, branches: Branching = all_damped_modes) -> SensedPlant:
         """The same with another number of modes; no work where the models have as many."""

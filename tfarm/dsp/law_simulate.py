@@ -7,7 +7,7 @@ and the strain amplifier's range act on hub angle and root moment; other signals
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -34,27 +34,24 @@ class LawSimulator(Simulator):
     """
 
     def __init__(
-        self, arm: Arm, law: Law, chain: Chain, scenario: Scenario, *, count: int = USUAL_MODES, between: int = 0
+        self,
+        arm: Arm,
+        law: Law,
+        chain: Chain,
+        scenario: Scenario,
+        *,
+        count: int = USUAL_MODES,
+        between: int = 0,
+        outputs: Sequence[str] = (),
     ) -> None:
         self.law, late = acting_law(arm, law, chain)
         self._references = references_of(self.law, scenario)
-        super().__init__(arm, late, scenario, count=count, between=between)
+        super().__init__(arm, late, scenario, count=count, between=between, outputs=outputs)
 
     def plant_of(self, arm: Arm, count: int) -> Plant:
-        """What gains at the hub measure and what is recorded, and then the signals of the law through their filters."""
-        first = super().plant_of(arm, count)
-        more = sensed_plant(arm, self.chain, self.law.signals, count).together
-        residues = more.residues
-        assert np.array_equal(more.poles, first.poles[: more.poles.size])  # the arm's, whatever is read
-        if more.poles.size < first.poles.size:  # no signal of the law has the filter whose pole comes last
-            residues = np.c_[residues, np.zeros(len(residues))]
-        return replace(
-            first,
-            outputs=(*first.outputs, *more.outputs),
-            residues=np.r_[first.residues, residues],
-            rigid=np.r_[first.rigid, more.rigid],
-            static=np.r_[first.static, more.static],
-        )
+        """What gains at the hub measure, what is recorded, and then the signals of the law through their filters."""
+        read = sensed_plant(arm, self.chain, self.law.signals, count).together
+        return super().plant_of(arm, count).beside(read)
 
     def run(self) -> Simulation:
         """The law from rest over the scenario."""

@@ -68,6 +68,18 @@ class Plant:
             self, outputs=tuple(names), residues=self.residues[at], rigid=self.rigid[at], static=self.static[at]
         )
 
+    def beside(self, more: Plant) -> Plant:
+        """The plant with the outputs of another after its own, both of one arm; that may lack the filter's pole."""
+        assert np.array_equal(more.poles, self.poles[: more.poles.size])  # the arm's, whatever is read
+        lacking = self.poles.size - more.poles.size
+        return replace(
+            self,
+            outputs=(*self.outputs, *more.outputs),
+            residues=np.r_[self.residues, np.pad(more.residues, ((0, 0), (0, lacking)))],
+            rigid=np.r_[self.rigid, more.rigid],
+            static=np.r_[self.static, more.static],
+        )
+
     @property
     def count(self) -> int:
         """The last flexible mode in it."""
@@ -204,7 +216,21 @@ def _of_model(model: ModalModel) -> Plant:
 
 
 def _with_hub_damping(model: ModalModel, outputs: Sequence[str], damping: float) -> Plant:
-    """The poles and residues under the torque -damping theta_t of a model with the hub's rate last, by eigenvectors."""
+    """The poles and residues under the torque -damping theta_t of a model with the hub's rate last, by eigenvectors.
+
+    What decides the poles is taken from a model of that rate alone: so they are the same, to the last bit, wherever the
+    other outputs are read.
+    """
+    alone = _modelled(model.arm, ("hub_rate",), model.index.size, None)
+    singles = model.single_residues
+    model = replace(
+        model,
+        residues=np.r_[model.residues[:-1], alone.residues],
+        rigid=np.r_[model.rigid[:-1], alone.rigid],
+        static=np.r_[model.static[:-1], alone.static],
+        single_residues=None if singles is None else np.r_[singles[:-1], alone.single_residues],
+        participation=alone.participation,
+    )
     A, B, C, D = model.closed([0.0] * (len(model.outputs) - 1) + [damping])
     poles, right = np.linalg.eig(A)
     drive = np.linalg.solve(right, B.astype(complex))[:, 0]

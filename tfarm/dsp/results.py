@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -17,9 +17,11 @@ from tfarm.dsp.curves import resolved
 from tfarm.dsp.discretise import described_law
 from tfarm.dsp.enough import Enough, enough_modes
 from tfarm.dsp.law_simulate import LawSimulator
+from tfarm.dsp.plant import RECORDED
 from tfarm.dsp.scenarios import TRIAL_DURATION, Scenario, described, scenario
 from tfarm.dsp.simulate import Simulator
 from tfarm.dsp.simulation import Simulation, Trace
+from tfarm.exact.outputs import OUTPUTS
 
 SETTLED_SHARE = 0.05  # of the largest root moment, within which a slew has settled
 CYCLE_LASTS = 0.7  # a limit cycle keeps at least this much of its amplitude over a quarter of the record
@@ -28,12 +30,16 @@ FEWEST_TURNS = 1.0  # of the moment about its mean in a quarter of the record: f
 FEWEST_SAMPLES = 40  # samples without which a limit cycle cannot be told
 
 
-SIGNAL_COLUMNS = (  # of a simulation's answer: the first are those of a `Trace`, the others stand at the samples only
-    Column("t", "time", "s"),
-    Column("hub_angle", "hub angle", "rad"),
-    Column("hub_rate", "hub rate", "rad/s"),
-    Column("root_moment", "root moment", "N m"),
-    Column("tip_displacement", "tip displacement", "m"),
+def traced_columns(others: Iterable[str]) -> tuple[Column, ...]:
+    """The columns of a `Trace`: its times, what is always recorded, and what else was asked for."""
+    known = [(name, OUTPUTS[name.partition("@")[0]], name.partition("@")[2]) for name in (*RECORDED, *others)]
+    return (
+        Column("t", "time", "s"),
+        *(Column(name, f"{each.label}{at and f' = {at} m'}", each.unit) for name, each, at in known),
+    )
+
+
+AT_SAMPLES_COLUMNS = (  # of what an answer has at the samples only
     Column("torque", "torque", "N m"),  # or in the unit of another input, `torque_unit` of the answer
     Column("gain", "gain", "-"),
     Column("volts", "volts", "V"),
@@ -144,6 +150,7 @@ def simulation_answer(
         **_columns(simulation.at_samples),
         "torque": simulation.torque.tolist(),
         "torque_unit": arm.input_unit,
+        "outputs": dict(simulation.at_samples.units),
         "gain": [] if simulation.gain is None else simulation.gain.tolist(),
         "residual_moment_rms": residual_moment_rms(simulation),
         "residual_raw_moment_rms": residual_raw_moment_rms(simulation),
@@ -185,7 +192,7 @@ def _cycle_answer(cycle: LimitCycle) -> dict[str, Any]:
 
 
 def _columns(trace: Trace) -> dict[str, Sequence[float]]:
-    return {column.key: column.read(trace).values for column in SIGNAL_COLUMNS if hasattr(trace, column.key)}
+    return {"t": trace.t.tolist()} | {name: trace.signal(name).tolist() for name in trace.names}
 
 
 def ideal_chain(chain: Chain) -> Chain:
@@ -211,16 +218,18 @@ def simulate(
     *,
     count: int | None = None,
     between: int = 0,
+    outputs: Sequence[str] = (),
 ) -> Simulation:
     """The sampled loop in time, exact between the samples: a "slew", "step", "decay" or "impulse" of `duration` [s].
 
     With `count` flexible modes, or as many as the digits of the signals take, and `between` records between two
-    samples.  Raises ParameterError for a locked hub, an algebraic loop, an unknown signal, a law in z whose period is
-    not the chain's, and for what `scenario` refuses.
+    samples; `outputs` are recorded besides, as "tip_rotation" or "strain@0.05".  Raises ParameterError for a locked
+    hub, an algebraic loop, an unknown signal, a law in z whose period is not the chain's, and for what `scenario`
+    refuses.
     """
     chain = chain_or_usual(chain)
     arm, law = tracked(arm, law)
-    return _simulated(arm, law, chain, scenario(scenario_name, arm, chain, duration), count, between)[0]
+    return _simulated(arm, law, chain, scenario(scenario_name, arm, chain, duration), count, between, outputs)[0]
 
 
 def drawn(arm: Arm, law: AnyLaw, chain: Chain, scenario_name: str, duration: float) -> Simulation:
@@ -236,19 +245,28 @@ def drawn(arm: Arm, law: AnyLaw, chain: Chain, scenario_name: str, duration: flo
     return found
 
 
-def simulation_of(arm: Arm, law: AnyLaw, chain: Chain, task: Scenario, *, count: int, between: int = 0) -> Simulation:
+def simulation_of(
+    arm: Arm,
+    law: AnyLaw,
+    chain: Chain,
+    task: Scenario,
+    *,
+    count: int,
+    between: int = 0,
+    outputs: Sequence[str] = (),
+) -> Simulation:
     """A scenario simulated with `count` modes, gains at the hub following references in all that they feed back."""
     if isinstance(law, HubFeedback):
-        return Simulator(arm, chain, task, count=count, between=between).linear(law)
-    return LawSimulator(arm, law, chain, task, count=count, between=between).run()
+        return Simulator(arm, chain, task, count=count, between=between, outputs=outputs).linear(law)
+    return LawSimulator(arm, law, chain, task, count=count, between=between, outputs=outputs).run()
 
 
 def _simulated(
-    arm: Arm, law: AnyLaw, chain: Chain, task: Scenario, count: int | None, between: int
+    arm: Arm, law: AnyLaw, chain: Chain, task: Scenario, count: int | None, between: int, outputs: Sequence[str]
 ) -> tuple[Simulation, Enough]:
     """The simulation, and how many modes it took."""
-    used = modes_for(count, lambda n: simulation_of(arm, law, ideal_chain(chain), task, count=n))
-    return simulation_of(arm, law, chain, task, count=used.modes, between=between), used
+    used = modes_for(count, lambda n: simulation_of(arm, law, ideal_chain(chain), task, count=n, outputs=outputs))
+    return simulation_of(arm, law, chain, task, count=used.modes, between=between, outputs=outputs), used
 
 
 def simulated_answer(
@@ -260,6 +278,7 @@ def simulated_answer(
     *,
     count: int | None = None,
     between: int = 0,
+    outputs: Sequence[str] = (),
 ) -> dict[str, Any]:
     """Simulate a scenario by its name and say what came of it: with `count` modes, or as many as its digits take.
 
@@ -267,7 +286,7 @@ def simulated_answer(
     """
     arm, law = tracked(arm, law)
     task, cycle = scenario(name, arm, chain, duration), None
-    simulation, used = _simulated(arm, law, chain, task, count, between)
+    simulation, used = _simulated(arm, law, chain, task, count, between, outputs)
     if not chain.is_linear:
         cycle = limit_cycle(simulation, simulation_of(arm, law, ideal_chain(chain), task, count=used.modes))
     return simulation_answer(arm, law, simulation, cycle, used) | {"scenario_in_words": described(task, arm, chain)}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from copy import copy
 from typing import Self
 
@@ -16,6 +16,7 @@ from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.dsp import kernel
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.converters import quantisers
+from tfarm.dsp.law_plant import sensed_plant
 from tfarm.dsp.loop import check_loop
 from tfarm.dsp.measurement import Controller, Measurement
 from tfarm.dsp.plant import RECORDED, USUAL_MODES, Plant, filtered, undelayed_plant
@@ -32,15 +33,25 @@ MOST_BETWEEN = 1000  # records between two samples
 class Simulator:
     """An arm with `count` modes, a chain and a scenario, prepared once; each call simulates it from the start.
 
-    `between` asks for so many records in each sample.  Raises ParameterError for a locked hub.
+    `between` asks for so many records in each sample, `outputs` for more signals than those of `RECORDED`, by name,
+    those along the arm with their place [m]: "tip_rotation", "strain@0.05".  Raises ParameterError for a locked hub,
+    for an unknown output, and for one that grows with s without bound.
     """
 
     def __init__(
-        self, arm: Arm, chain: Chain, scenario: Scenario, *, count: int = USUAL_MODES, between: int = 0
+        self,
+        arm: Arm,
+        chain: Chain,
+        scenario: Scenario,
+        *,
+        count: int = USUAL_MODES,
+        between: int = 0,
+        outputs: Sequence[str] = (),
     ) -> None:
         remedy = f"a whole number of records between two samples, 0 to {MOST_BETWEEN}"
         between = whole("between", between, 0, MOST_BETWEEN, remedy)
         self.chain, self.scenario, self.between = chain, scenario, between
+        self.others = tuple(dict.fromkeys(name for name in outputs if name not in RECORDED))
         self.plant = self.plant_of(arm, count)
         self._kept = np.nonzero(self.plant.poles.imag >= 0)[0]
         self._model = _model(self.plant, self._kept, chain, between)
@@ -50,8 +61,10 @@ class Simulator:
 
     def plant_of(self, arm: Arm, count: int) -> Plant:
         """What is measured, through its filters, and then what is recorded."""
-        plant = undelayed_plant(arm, self.chain, (*FED_BACK, *RECORDED), count)
-        return filtered(plant, self.chain)
+        plant = filtered(undelayed_plant(arm, self.chain, (*FED_BACK, *RECORDED), count), self.chain)
+        if not self.others:
+            return plant
+        return plant.beside(sensed_plant(arm, self.chain, self.others, count).unfiltered)
 
     def linear(self, gains: HubFeedback, K2: Real | None = None) -> Simulation:
         """The law u = r + gains . (wanted - measured), compiled; `K2` (n,) may vary.  Nothing is wanted off the hub.
@@ -165,11 +178,11 @@ class Simulator:
         between = None
         if m:
             at = T * (np.arange(done)[:, None] + (np.arange(m) + 1) / (m + 1))
-            between = _trace(at.ravel(), state.fine[:done].reshape(done * m, -1))
+            between = self._trace(at.ravel(), state.fine[:done].reshape(done * m, -1))
         return Simulation(
             scenario=self.scenario,
             chain=self.chain,
-            at_samples=_trace(self.scenario.t[:done], state.record[:done]),
+            at_samples=self._trace(self.scenario.t[:done], state.record[:done]),
             between=between,
             measured=state.record[:done, : len(AT_HUB)],
             torque=state.torque[:done],
@@ -178,6 +191,11 @@ class Simulator:
             energy_error=None if stopped else self._energy_error(state),
             stopped=stopped,
         )
+
+    def _trace(self, t: Real, record: Real) -> Trace:
+        """The recorded outputs."""
+        angle, rate, moment, tip, *more = (np.ascontiguousarray(column) for column in record[:, SHOWN.start :].T)
+        return Trace(t, angle, rate, moment, tip, dict(zip(self.others, more, strict=False)))  # then a law's signals
 
 
 def _electronics(chain: Chain, bound: float) -> kernel.Electronics:
@@ -223,8 +241,3 @@ def _released(plant: Plant, kept: NDArray[np.int64], offset: float) -> tuple[int
     i = int(first[0])
     p, r = plant.poles[kept[i]], plant.residues[row, kept[i]]
     return i, complex(1j * offset * abs(p) ** 2 / (2 * p.imag) / (p * r))
-
-
-def _trace(t: Real, record: Real) -> Trace:
-    """The recorded outputs."""
-    return Trace(t, *(np.ascontiguousarray(column) for column in record[:, SHOWN].T))

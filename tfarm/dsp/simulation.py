@@ -2,27 +2,50 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arrays import Real
 from tfarm.dsp.chain import Chain
+from tfarm.dsp.plant import RECORDED
 from tfarm.dsp.scenarios import Scenario
+from tfarm.errors import must_be_known
+from tfarm.exact.outputs import OUTPUTS
 from tfarm.records import record
 
 
 @dataclass(frozen=True)
 @record
 class Trace:
-    """Signals, not filtered, at `t` [s]: hub angle [rad], hub rate [rad/s], root moment [N m], tip displacement [m]."""
+    """Signals, not filtered, at `t` [s]: hub angle [rad], hub rate [rad/s], root moment [N m], tip displacement [m].
+
+    `others` are those asked for besides, by name and in SI units.
+    """
 
     t: Real
     hub_angle: Real
     hub_rate: Real
     root_moment: Real
     tip_displacement: Real
+    others: dict[str, Real] = field(default_factory=dict)
+
+    def signal(self, name: str) -> Real:
+        """One of the signals by its name.  Raises ParameterError for one that was not asked for."""
+        must_be_known("output", name, self.names)
+        return self.others[name] if name in self.others else cast("Real", getattr(self, name))
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The SI units of what was asked for besides."""
+        return {name: OUTPUTS[name.partition("@")[0]].unit for name in self.others}
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The signals that it has."""
+        return (*RECORDED, *self.others)
 
 
 @dataclass(frozen=True)

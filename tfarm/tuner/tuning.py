@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any
 
@@ -261,6 +262,7 @@ def controlled_answer(
     *,
     count: int | None,
     between: int,
+    outputs: Sequence[str] = (),
 ) -> dict[str, Any]:
     """A scenario simulated with a saved tuner as the gain, as `tfarm.dsp.results.simulated_answer` says it.
 
@@ -269,8 +271,8 @@ def controlled_answer(
     chain = with_signals(chain, saved.signals)
     task = scenario(name, arm, chain, duration)
     ideal = ideal_chain(chain)
-    used = modes_for(count, lambda n: saved.gain().run(Simulator(arm, ideal, task, count=n)))
-    run = saved.gain().run(Simulator(arm, chain, task, count=used.modes, between=between))
+    used = modes_for(count, lambda n: saved.gain().run(Simulator(arm, ideal, task, count=n, outputs=outputs)))
+    run = saved.gain().run(Simulator(arm, chain, task, count=used.modes, between=between, outputs=outputs))
     answer = simulation_answer(arm, saved.gain().servo, run, None, used)
     controller = {
         "trained_on": saved.arm,

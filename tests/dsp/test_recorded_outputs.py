@@ -1,0 +1,142 @@
+"""What a simulation records besides its four signals: any output of the rig, by name, at the samples and between."""
+
+import csv
+import io
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.io import loadmat
+from scipy.linalg import expm
+
+import tfarm
+from tests.rigs import some_rig
+from tests.shell import answer, run
+from tfarm.arm import HubFeedback, Law, RotarySpring
+from tfarm.dsp import Actuator, Chain, Sampling, Simulator, scenario
+from tfarm.dsp.law_simulate import LawSimulator
+from tfarm.dsp.plant import RECORDED
+from tfarm.errors import ParameterError
+from tfarm.exact.outputs import OUTPUTS
+from tfarm.reduced import modal_model
+
+LAB = tfarm.load("sasaki2012-lab")
+GAINS = HubFeedback(K1=0.3, K2=0.3)
+OTHERS = ("tip_rotation", "tip_angle", "root_shear", "tip_acceleration")
+LATE = 0.4  # samples of delay
+SAME = 1e-11  # of the largest value: the same residues by two roads
+FITTED = 1e-7  # of a heavily damped arm: what its slow poles leave is shared out by a fit, which rounding moves
+
+
+def replayed(arm, names, run_, count, delay, period):
+    """The torques of a run held and given to the modal state space by the matrix exponential, read at each sample."""
+    model = modal_model(arm, names, count)
+    A, B, C, D = model.matrices()
+    n = len(A)
+
+    def step(x, u, t):
+        block = expm(np.block([[A, B], [np.zeros((1, n + 1))]]) * t)
+        return block[:n, :n] @ x + block[:n, n] * u
+
+    x, before, found = np.zeros(n), 0.0, []
+    for u in run_.torque:
+        found.append(C @ x + D[:, 0] * before)
+        x, before = step(step(x, before, delay * period), u, (1 - delay) * period), u
+    return np.array(found).T
+
+
+@pytest.mark.parametrize("arm", [LAB, tfarm.load("sasaki2012")])
+def test_they_are_those_of_the_modal_state_space(arm):
+    chain = Chain(sampling=Sampling(delay_samples=LATE))
+    task = scenario("slew", arm, chain, 0.3)
+    found = Simulator(arm, chain, task, count=4, outputs=OTHERS).linear(GAINS)
+    by_matrices = replayed(arm, OTHERS, found, 4, LATE, chain.sampling.period)
+    assert found.at_samples.names == (*RECORDED, *OTHERS)
+    for name, signal in zip(OTHERS, by_matrices, strict=True):
+        np.testing.assert_allclose(found.at_samples.signal(name), signal, atol=1e-9 * abs(signal).max())
+
+
+CHAINS = {
+    "plain": Chain(),
+    "filtered": Chain(sampling=Sampling(antialias_corner=200.0, delay_samples=1.3)),
+    "damped hub": Chain(actuator=Actuator(hub_damping=0.05)),
+}
+
+
+@pytest.mark.parametrize("kind", CHAINS)
+@pytest.mark.parametrize("law", [GAINS, Law({"hub_rate": 0.3, "moment@0.2": ([0.02], [1.0, -0.5])}, period=0.01)])
+@pytest.mark.parametrize("arm", [LAB, LAB.having(damping=0.01), replace(LAB, hub=replace(LAB.hub, radius=0.1))])
+def test_what_is_read_at_an_end_is_what_is_recorded_there(arm, law, kind):
+    """Along the arm the fields are another road than the closed forms at its ends; no filter changes what is shown."""
+    names = ("moment@0", f"displacement@{arm.length!r}", "tip_displacement", "tip_rotation")
+    found = tfarm.simulate(arm, law, CHAINS[kind], duration=0.5, count=6, between=2, outputs=names)
+    plain = tfarm.simulate(arm, law, CHAINS[kind], duration=0.5, count=6, between=2)
+    assert list(found.at_samples.others) == [name for name in names if name != "tip_displacement"]
+    for trace, before in ((found.at_samples, plain.at_samples), (found.between, plain.between)):
+        for one, other in ((names[0], "root_moment"), (names[1], "tip_displacement")):
+            off = abs(trace.signal(one) - trace.signal(other)).max()
+            assert off <= (FITTED if arm.damping > LAB.damping else SAME) * abs(trace.signal(other)).max()
+        for name in RECORDED:
+            assert np.array_equal(trace.signal(name), before.signal(name))
+
+
+def test_every_output_there_is_can_be_recorded_or_is_refused_in_a_line():
+    """What does not belong to a rig is named, nothing else is."""
+    rng, chain = np.random.default_rng(5), Chain()
+    rig = some_rig(rng, damped=True, segments=2, drive="hub_torque")
+    rig = replace(rig, clamp=RotarySpring(), joint=RotarySpring(), hub=replace(rig.hub, inertia=1.0))
+    task, refused = scenario("step", rig, chain, 0.05), []
+    for name, each in OUTPUTS.items():
+        asked = f"{name}@{0.4 * rig.length!r}" if each.place == "x" else name
+        try:
+            found = Simulator(rig, chain, task, count=3, outputs=[asked]).linear(HubFeedback(K1=0.1, K2=0.0))
+        except ParameterError as error:
+            refused.append((name, str(error)))
+            continue
+        assert np.isfinite(found.at_samples.signal(asked)).all()
+        assert found.at_samples.units == ({} if name in RECORDED else {asked: each.unit})
+    assert [name for name, _ in refused] == ["strain"]  # its section does not say how deep it is
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [("tip_rotatoin", 'did you mean "tip_rotation"'), ("moment", "moment@x"), ("moment@7", "lies between 0 and 1 m")],
+)
+def test_what_cannot_be_read_is_refused_by_both_simulators(name, why):
+    task = scenario("step", LAB, Chain(), 0.1)
+    for make in (Simulator, lambda *given, **how: LawSimulator(given[0], Law.of_gains(GAINS), *given[1:], **how)):
+        with pytest.raises(ParameterError, match=why):
+            make(LAB, Chain(), task, outputs=[name])
+
+
+def test_what_was_not_asked_for_is_named_with_what_there_is():
+    trace = tfarm.simulate(LAB, GAINS, duration=0.1, count=2, outputs=["tip_angle"]).at_samples
+    with pytest.raises(ParameterError, match=r"known are: hub_angle, .*tip_angle"):
+        trace.signal("tip_rotation")
+
+
+def test_the_modes_that_it_takes_are_those_of_every_signal(capsys):
+    """A shear force inside converges with fewer digits than the signals at the ends: more modes are taken, and said."""
+    words = ["simulate", "sasaki2012", "--duration", "0.2"]
+    plain, deep = (answer(capsys, *words, *more) for more in ([], ["--output", "shear@0.5"]))
+    assert plain["outputs"] == {}
+    assert deep["outputs"] == {"shear@0.5": "N"}
+    assert deep["modes_used"] > plain["modes_used"]
+    assert deep["modes_change"] > plain["modes_change"]
+    assert len(deep["shear@0.5"]) == len(deep["t"])
+
+
+def test_files_have_a_column_for_each(capsys, tmp_path):
+    shown = ["--output", "moment@0.25", "--output", "tip_angle"]
+    words = ["simulate", "sasaki2012-lab", "--duration", "0.1", "--modes", "2", "--between", "1", *shown]
+    assert run(capsys, *words, "--csv", str(tmp_path / "s.csv"), "--mat", str(tmp_path / "s.mat"))[0] == 0
+    told = answer(capsys, *words)
+    rows = list(csv.reader(io.StringIO((tmp_path / "s.csv").read_text())))
+    order = np.argsort([*told["t"], *told["between"]["t"]], kind="stable")
+    for name, unit in told["outputs"].items():
+        column = rows[0].index(f"{name} [{unit}]")
+        written = np.array([float(row[column]) for row in rows[1:]])
+        assert np.array_equal(written, np.array([*told[name], *told["between"][name]])[order])
+    in_matlab = loadmat(tmp_path / "s.mat")
+    np.testing.assert_array_equal(in_matlab["moment_0_25"].ravel(), told["moment@0.25"])
+    np.testing.assert_array_equal(in_matlab["between"]["tip_angle"][0, 0].ravel(), told["between"]["tip_angle"])
