@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tfarm.crossing import Crossings, brackets, counts_over, intervals, joined, solved, zeros_between
+from tfarm.crossing import Crossings, brackets, confirmed, counts_over, crossed, intervals, joined, zeros_between
 
 CURVES = {
     "axis": (lambda x: 1j * x, np.linspace(1e-3, 40.0, 4001), lambda s: s.real > 0),
@@ -22,9 +22,7 @@ def drawn(rng, curve):
 def crossings_of(curve, A, B):
     """Those of pairs between the ends of the grid, and those of single roots at the real points of the curve."""
     at, grid, _ = CURVES[curve]
-    values = A(at(grid)), B(at(grid))
-    (before,), change = brackets((values[0] * values[1].conj()).imag)
-    place, gain = solved(lambda x: (A(at(x)), B(at(x))), grid[before], grid[before + 1])
+    gain, place, change = crossed(grid, lambda x: (A(at(x)), B(at(x))))
     single = [0.0] if curve == "axis" else [1.0, -1.0]
     return place, Crossings.of(zip(gain, place, change, strict=True)), [-A(point) / B(point) for point in single]
 
@@ -68,6 +66,30 @@ def test_intervals_are_where_nothing_is_beyond():
     assert intervals(found, -3.0, 5.0, -2.0, 1) == []
     assert intervals(Crossings.of([(np.inf, 1.0, 2)]), -1.0, 1.0, 0.0, 0) == [(-1.0, 1.0)]
     assert joined([(0.0, 1.0), (1.0, 2.0), (3.0, 4.0)]) == [(0.0, 2.0), (3.0, 4.0)]
+
+
+@pytest.mark.parametrize(
+    ("A", "B", "ends", "crossings", "windows"),
+    [
+        ([1, 3, 3, 1], [1], (-np.inf, np.inf), [(8, 2), (-1, -1)], [(-1, 8)]),  # (s + 1)^3 + g
+        ([1, 3, 3, 1], [1], (0, np.inf), [(8, 2), (-1, -1)], [(0, 8)]),
+        ([1, 3, 3, 1], [1], (0, 5), [(8, 2), (-1, -1)], [(0, 5)]),
+        ([1, 1], [1, 2], (0, np.inf), [], [(0, np.inf)]),  # the root goes from -1 to -2
+        ([1, -3], [1, -2], (0, np.inf), [], []),
+        ([1, -1], [1], (0, np.inf), [(1, -1)], [(1, np.inf)]),
+        ([1, 3, 2, 0.5], [1, 0], (-np.inf, np.inf), [(-11 / 6, -2)], [(-11 / 6, np.inf)]),
+        ([1, 3, 2, 0], [1], (-np.inf, np.inf), [(6, 2), (0, -1)], [(0, 6)]),  # Routh: 0 < g < 6
+        ([1, 3, 3, 1], [1], (-np.inf, np.inf), [(8, 2), (-1, -1), (3, 1), (3 + 1e-12, -1)], [(-1, 8)]),  # torn
+    ],
+)
+def test_windows_are_those_of_routh_and_hurwitz(A, B, ends, crossings, windows):
+    """No count is given: the roots themselves say in which gap there is none beyond the axis."""
+    found = Crossings.of((gain, 1.0, change) for gain, change in crossings)
+
+    def is_stable(gain):
+        return bool((np.roots(np.polyadd(A, gain * np.array(B))).real < 0).all())
+
+    assert confirmed(found, *ends, is_stable) == [pytest.approx(each, rel=1e-15) for each in windows]
 
 
 HARD = (  # functions of x, each with one change of sign in (0, 3)

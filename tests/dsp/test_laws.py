@@ -17,7 +17,7 @@ from tfarm.dsp.band import complete_band
 from tfarm.dsp.discretise import discretised, matched, tustin, zero_order_hold
 from tfarm.dsp.law_circle import LawCircle
 from tfarm.dsp.law_loop import sampled_law
-from tfarm.dsp.law_margins import crossing_factors
+from tfarm.dsp.law_margins import crossing_factors, stable_factors
 from tfarm.dsp.law_verdict import law_verdict
 from tfarm.dsp.margins import with_all_modes
 
@@ -270,6 +270,26 @@ def test_between_crossings_the_count_is_what_they_say():
             passed = crossing_factors(loop).passed(factors)
             counts = np.array([(loop.times(float(g)).poles.log_radius > 0).sum() for g in factors])
             assert (counts - counts[0] == passed - passed[0]).all()
+
+
+@pytest.mark.parametrize(
+    ("entries", "factor"),
+    [({"hub_rate": 1.0}, 1.5), ({"hub_rate": 1.0}, 0.4), ({"hub_rate": 1.0, "root_moment": 0.3}, 1.1)],
+)
+def test_one_edge_alone_and_none_beyond_the_last_bound_windows_too(entries, factor):
+    """The factor at which the first pole crosses is made a small one, on either side of 1."""
+    first = crossing_factors(sampled_law(LAB, Law(entries), Chain(), count=6)).gain[0]
+    loop = sampled_law(LAB, Law(entries).times(first / factor), Chain(), count=6)
+    assert stable_factors(loop) == [(0.0, pytest.approx(factor, rel=1e-9))]
+    assert loop.poles.is_stable == (factor > 1)
+
+
+@pytest.mark.parametrize(("stiffness", "entry", "windows"), [(0.0, -1.0, []), (2.0, 1e-16, [(0.0, np.inf)])])
+def test_a_law_whose_factor_moves_no_pole_across_is_stable_or_not_for_all(stiffness, entry, windows):
+    arm = replace(LAB, hub=replace(LAB.hub, stiffness=stiffness))
+    loop = sampled_law(arm, Law({"hub_angle": entry}), Chain(), count=6)
+    assert stable_factors(loop) == windows
+    assert len(crossing_factors(loop)) == 0
 
 
 def test_margins_end_where_the_verdict_turns():

@@ -20,6 +20,8 @@ import numpy as np
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.records import record
 
+Parts = Callable[[Real], tuple[Complex, Complex]]  # A and B at places of a curve
+
 LAST_BIT = 2.0**-53  # of a place, and of its bracket, which is narrower
 MOST_HALVINGS = 200  # a zero takes ten evaluations; three times 53 where no step but halving is believed
 
@@ -118,7 +120,18 @@ def _parabolic(x: tuple[Real, Real, Real], f: tuple[Real, Real, Real]) -> Real:
     return np.where((phi**2 < xi) & ((1 - phi) ** 2 < 1 - xi) & np.isfinite(at), at, 0.5)
 
 
-def solved(parts: Callable[[Real], tuple[Complex, Complex]], low: Real, high: Real) -> tuple[Real, Real]:
+def crossed(places: Real, parts: Parts, known: tuple[Complex, Complex] | None = None) -> tuple[Real, Real, Whole]:
+    """Gain, place and change of the count (n,) of every crossing between neighbours of a grid of places, ascending.
+
+    `known` are A and B on the grid, where they need not be worked out.
+    """
+    A, B = parts(places) if known is None else known
+    (before,), change = brackets((A * B.conj()).imag)
+    at, gain = solved(parts, places[before], places[before + 1])
+    return gain, at, change
+
+
+def solved(parts: Parts, low: Real, high: Real) -> tuple[Real, Real]:
     """The place (n,) between `low` and `high` (n,) at which each bracket's gain is real, and that gain.
 
     `parts` gives A and B of every bracket at a place of each.

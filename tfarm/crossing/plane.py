@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from tfarm.arrays import Real, Whole
 from .line import Crossings
 
 Window = tuple[float, float]  # two values of a gain, the lower first
+SAME_EDGE = 1e-9  # relative: next to z = 1 one static crossing is read several times, each with an error near 1e-12
 
 
 def counts_over(gains: Real, columns: Sequence[Crossings], reference: float, there: NDArray[Any]) -> Whole:
@@ -29,6 +30,22 @@ def intervals(found: Crossings, low: float, high: float, reference: float, there
     ends = np.r_[low, np.unique(found.within(low, high).gain), high]
     (counts,) = counts_over((ends[1:] + ends[:-1]) / 2, [found], reference, np.array([there]))
     return joined([(float(a), float(b)) for a, b, n in zip(ends[:-1], ends[1:], counts, strict=True) if n == 0 < b - a])
+
+
+def confirmed(found: Crossings, low: float, high: float, is_stable: Callable[[float], bool]) -> list[Window]:
+    """The intervals between `low` and `high`, which may be infinite, in which nothing is beyond the curve.
+
+    Between two crossings the count is constant, and only where it is least it may be 0: there `is_stable` is asked at
+    one gain.  Gaps that rounding tears between crossings of one gain are none.
+    """
+    gains = found.within(low, high).gain
+    edges = np.r_[low, gains[np.r_[True, np.diff(gains) > SAME_EDGE * abs(gains[1:])][: gains.size]], high]
+    farthest = abs(edges[np.isfinite(edges)]).max(initial=0.0) or 1.0  # nothing crosses beyond: any distance would do
+    inner = np.clip(edges, -2 * farthest, 2 * farthest)
+    middles = (inner[1:] + inner[:-1]) / 2
+    counts = found.passed(middles)  # the same up to a constant
+    stable = [i for i in np.flatnonzero(counts == counts.min()) if is_stable(float(middles[i]))]
+    return joined([(float(edges[i]), float(edges[i + 1])) for i in stable])
 
 
 def joined(windows: list[Window]) -> list[Window]:

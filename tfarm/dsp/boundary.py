@@ -18,7 +18,7 @@ import numpy as np
 
 from tfarm.arm import GAINS, HubFeedback
 from tfarm.arrays import Complex, Real, Whole
-from tfarm.crossing import Crossings, solved
+from tfarm.crossing import Crossing, Crossings, brackets, solved
 from tfarm.dsp.law_loop import SampledLaw
 from tfarm.dsp.loop import ANGLE_ROW, SampledLoop, turning
 from tfarm.exact.characteristic import torque
@@ -69,6 +69,11 @@ class CircleGrid:
         offset = pulse.multipliers[base] * np.expm1(-decay + 1j * shift)
         return offset, self.loop.signals(np.exp(1j * (self.angles[base] + shift)), base, offset)
 
+    def above(self, angle: float) -> CircleGrid:
+        """The points at greater angles alone."""
+        beyond = self.q > angle
+        return CircleGrid(self.loop, self.base[beyond], self.shift[beyond])
+
 
 def circle_grid(loop: SampledLoop | SampledLaw) -> CircleGrid:
     """The grid that resolves every pole of the loop (its gains do not matter)."""
@@ -106,21 +111,12 @@ def geometric(edge: float, width: float) -> Real:
 def circle_crossings(grid: CircleGrid, name: str, law: HubFeedback) -> Crossings:
     """Where poles cross the circle, at angles `at`, as one gain runs from minus to plus the largest of `most_gain`.
 
-    The others are those of the law; exact to rounding.  At z = -1 f vanishes: so it falls where it is positive just
-    before.
+    The others are those of the law; exact to rounding.
     """
     line = _Line([gain.name for gain in GAINS].index(name), law.having(name, 0.0).row)
-    A, B = line.split(grid.terms)
-    rises = (A * B.conj()).imag >= 0
-    step = np.nonzero(rises[1:] != rises[:-1])[0]
-    q, gain = solved_on(grid, line.split, step)
-    one = np.ones(1)
-    A, B = line.split((one, grid.loop.signals(np.array([-1.0 + 0j]), None, one)))
-    last = real_gain(A[0], B[0]), math.pi, 1 if rises[-1] else -1
+    found, first = crossed_on(grid, line.split)
     most = most_gain(grid.loop.plant.arm, name)
-    ends = [last, *_at_one(grid, line, bool(rises[0]))]
-    found = [*zip(gain, q, np.where(rises[step], 2, -2), strict=True), *ends]
-    return Crossings.of(each for each in found if abs(each[0]) <= most)
+    return Crossings.of(each for each in [*found, *_at_one(grid, line, first)] if abs(each.t) <= most)
 
 
 class _Line(NamedTuple):
@@ -135,32 +131,43 @@ class _Line(NamedTuple):
         return offset + torque(self.others, signals), signals[self.place]
 
 
-def solved_on(grid: CircleGrid, split: Split, step: Whole) -> tuple[Real, Real]:
-    """Angle and gain of the crossing in each step, by the angle from the nearer pole, down to its last bit."""
+def crossed_on(grid: CircleGrid, split: Split) -> tuple[list[Crossing], int]:
+    """The crossings at angles 0 < q <= pi, and by how much one at z = 1 changes the count.
+
+    Each is solved for by its angle from the nearer pole, down to its last bit.  At z = 1 and z = -1, where a single
+    pole crosses, h = Im(A conj B) vanishes: so it falls towards the end where it is positive just before.
+    """
+    A, B = split(grid.terms)
+    h = (A * B.conj()).imag
+    (step,), change = brackets(h)
     base = np.where(abs(grid.shift[step]) < abs(grid.shift[step + 1]), grid.base[step], grid.base[step + 1])
     low = np.where(base == grid.base[step], grid.shift[step], grid.q[step] - grid.angles[base])
     high = np.where(base == grid.base[step + 1], grid.shift[step + 1], grid.q[step + 1] - grid.angles[base])
     shift, gain = solved(lambda shift: split(grid.at(base, shift)), low, high)
-    return grid.angles[base] + shift, gain
+    found = [Crossing(*each) for each in zip(gain, grid.angles[base] + shift, change, strict=True)]
+    one = np.ones(1)
+    A, B = split((one, grid.loop.signals(np.array([-1.0 + 0j]), None, one)))
+    found.append(Crossing(real_gain(A[0], B[0]), math.pi, 1 if h[-1] >= 0 else -1))
+    return found, -1 if h[0] >= 0 else 1
 
 
-def _at_one(grid: CircleGrid, line: _Line, is_above: bool) -> list[tuple[float, float, int]]:
+def _at_one(grid: CircleGrid, line: _Line, change: int) -> list[Crossing]:
     """The crossing at z = 1: where nothing holds the angle, at no gain on the rate of an arm that can drift, else by a
     static balance."""
     loop, one = grid.loop, np.ones(1)
-    rigid, change = loop.plant.rigid[ANGLE_ROW], -1 if is_above else 1
+    rigid = loop.plant.rigid[ANGLE_ROW]
     turned = turning(loop.plant)
     held = float(np.array(line.others) @ turned)
     if turned[line.place]:
-        return [(-held / float(turned[line.place]) + 0.0, 0.0, change)]
+        return [Crossing(-held / float(turned[line.place]) + 0.0, 0.0, change)]
     if held:
         return []
     if rigid[0] != 0.0:
-        return [(0.0, 0.0, change)] if loop.plant.rigid[line.place].any() else []
+        return [Crossing(0.0, 0.0, change)] if loop.plant.rigid[line.place].any() else []
     A, B = line.split((one, loop.signals(np.exp(np.array([1j * NEAR_ONE])), None, one)))
-    return [(real_gain(A[0], B[0]), 0.0, change)]
+    return [Crossing(real_gain(A[0], B[0]), 0.0, change)]
 
 
 def real_gain(A: complex, B: complex) -> float:
     """The real gain g of A + g B = 0 where A and B are real; inf where there is none."""
-    return -A.real / B.real if abs(B.real) > NO_EFFECT * abs(A.real) else np.inf
+    return float(-A.real / B.real) if abs(B.real) > NO_EFFECT * abs(A.real) else math.inf

@@ -12,20 +12,19 @@ from typing import Any
 import numpy as np
 
 from tfarm.arrays import Complex
-from tfarm.crossing import Crossings, Window, joined
+from tfarm.crossing import Crossing, Crossings, Window, confirmed
 from tfarm.dsp.boundary import (
     BRIGHT,
     NARROWEST_WIDTH,
     WIDTH_SHARE,
     CircleGrid,
     circle_grid,
+    crossed_on,
     geometric,
     real_gain,
-    solved_on,
 )
 from tfarm.dsp.law_loop import SampledLaw
 from tfarm.dsp.law_polynomials import polynomials
-from tfarm.dsp.margins import SAME_EDGE
 
 LEAST_LAW_FACTOR = 1e-9  # that is looked at: with less a law is none
 MOST_LAW_FACTOR = 1e9  # with more its gain is beyond any number
@@ -58,21 +57,16 @@ def crossing_factors(loop: SampledLaw) -> Crossings:
     A polynomial of the law that vanishes at z = 1 is known to an absolute error alone next to it.
     """
     grid = law_grid(loop)
-    A, B = _split(grid.terms)
     whole, entries = polynomials(loop.law)
-    has_root_at_one = any(each.coefficients.any() and each.at_one(1)[0] for each in (whole, *entries))
-    rises, told = (A * B.conj()).imag >= 0, grid.q > (BLURRED if has_root_at_one else 0.0)
-    step = np.nonzero((rises[1:] != rises[:-1]) & told[:-1])[0]
-    q, factor = solved_on(grid, _split, step)
-    A, B = loop.terms(np.array([-1.0 + 0j]), None, np.ones(1))
-    ends = [(float(real_gain(A[0], B[0])), math.pi, 1 if rises[-1] else -1)]
+    if any(each.coefficients.any() and each.at_one(1)[0] for each in (whole, *entries)):
+        grid = grid.above(BLURRED)
+    found, first = crossed_on(grid, _split)
     (n, open_loop), fed_back = loop.near_one
     lowest = min((order for order, _ in fed_back), default=n + 1)
     if lowest == n:  # A and B go there as the same power of x = 1 - 1/z: a single pole may be at z = 1
         at_one = sum(value for order, value in fed_back if order == lowest)
-        ends.append((float(real_gain(open_loop, at_one)), 0.0, -1 if rises[told][0] else 1))
-    found = [*zip(factor, q, np.where(rises[step], 2, -2), strict=True), *ends]
-    return Crossings.of(each for each in found if LEAST_LAW_FACTOR < each[0] < MOST_LAW_FACTOR)
+        found.append(Crossing(real_gain(open_loop, at_one), 0.0, first))
+    return Crossings.of(each for each in found if LEAST_LAW_FACTOR < each.t < MOST_LAW_FACTOR)
 
 
 def _split(terms: tuple[Any, Complex]) -> tuple[Complex, Complex]:
@@ -82,13 +76,5 @@ def _split(terms: tuple[Any, Complex]) -> tuple[Complex, Complex]:
 
 
 def stable_factors(loop: SampledLaw) -> list[Window]:
-    """Every open interval of positive factors on the law in which the loop is stable.
-
-    Where the count between crossings says so the poles themselves confirm it.
-    """
-    found = crossing_factors(loop)
-    edges = np.unique(np.r_[0.0, found.gain, math.inf])
-    edges = edges[np.r_[True, ~(np.diff(edges) <= SAME_EDGE * edges[1:])]]
-    middles = np.r_[(edges[1:-1] + edges[:-2]) / 2, 2 * max(edges[-2], 1.0)]
-    stable = [i for i, middle in enumerate(middles) if loop.times(float(middle)).poles.is_stable]
-    return joined([(float(edges[i]), float(edges[i + 1])) for i in stable])
+    """Every open interval of positive factors on the law in which the loop is stable, as its poles confirm."""
+    return confirmed(crossing_factors(loop), 0.0, math.inf, lambda factor: loop.times(factor).poles.is_stable)

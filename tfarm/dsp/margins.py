@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from tfarm.arm import Arm, HubFeedback
-from tfarm.crossing import Window, joined
+from tfarm.crossing import Window, confirmed
 from tfarm.dsp.boundary import circle_crossings, circle_grid
 from tfarm.dsp.chain import Chain
 from tfarm.dsp.law_loop import AnySampled, SampledKind
@@ -41,7 +41,6 @@ DAMPING_MODES = 40  # of the loop in which a required damping is looked for, whe
 DAMPING_DECADES = 16  # down from there
 DAMPING_XTOL, DAMPING_RTOL, MADE_SURE = 1e-7, 4e-7, 1e-6  # relative: C is solved for to the first two, then raised
 NUDGES = (0.0, 1e-6, -1e-6)  # of C, tried in turn where two damped modes are one at it
-SAME_EDGE = 1e-9  # relative: next to z = 1 one static crossing is read several times, each with an error near 1e-12
 
 
 @dataclass(frozen=True)
@@ -54,24 +53,9 @@ class DelayMargin:
 
 
 def stable_windows(loop: SampledLoop, name: str) -> list[Window]:
-    """Every open interval of one gain in which the loop is stable, the other gains as they are.
-
-    Between two crossings of the unit circle the count of unstable poles is constant: it follows from the count at one
-    gain, and where it is zero the poles themselves confirm it.  A gap that rounding tears between crossings of one
-    gain has no count of its own.
-    """
+    """Every open interval of one gain in which the loop is stable, the others as they are, as its poles confirm."""
     found = circle_crossings(circle_grid(loop), name, loop.gains)
-    edges, middles = np.r_[-math.inf, found.gain, math.inf], np.zeros(1)  # a gain inside each gap
-    if found.gain.size:
-        beyond = abs(found.gain).max() or 1.0  # no crossing lies beyond: any distance would do
-        between = (found.gain[1:] + found.gain[:-1]) / 2
-        middles = np.r_[found.gain[0] - beyond, between, found.gain[-1] + beyond]
-    totals = found.passed(middles)
-    is_gap = np.r_[True, np.diff(found.gain) > SAME_EDGE * abs(found.gain[1:]), True][: totals.size]
-    lowest = is_gap & (totals == totals[is_gap].min())  # the same up to a constant: only its minima can be zero
-    gaps = [int(i) for i in np.nonzero(lowest)[0] if edges[i] < edges[i + 1]]
-    stable = [i for i in gaps if loop.having(**{name: float(middles[i])}).poles.is_stable]
-    return joined([(float(edges[i]), float(edges[i + 1])) for i in stable])
+    return confirmed(found, -math.inf, math.inf, lambda gain: loop.having(**{name: gain}).poles.is_stable)
 
 
 def around(windows: list[Window], gain: float) -> Window | None:

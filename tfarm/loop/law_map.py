@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import AnyLaw, Arm, Law, as_law
 from tfarm.arrays import Complex, Real
-from tfarm.crossing import Crossing, Crossings, brackets, counts_over, solved
+from tfarm.crossing import Crossing, Crossings, counts_over, crossed
 from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import LoopParts
 from tfarm.records import record
@@ -130,25 +130,21 @@ def law_crossings(loop: LawLoop, name: str, values: Real, omega: Real, known: Lo
     low, span = float(values[0]), float(values[-1] - values[0])
     first, last = (loop.under(loop.law.having(name, float(end))) for end in (values[0], values[-1]))
 
-    def ends(s: Complex, of_rig: LoopParts) -> tuple[Complex, Complex]:
-        return first.characteristic(s, of_rig), last.characteristic(s, of_rig)
+    def parts(s: Complex, of_rig: LoopParts | None = None) -> tuple[Complex, Complex]:
+        of_rig = first.signals.parts(s) if of_rig is None else of_rig
+        A = first.characteristic(s, of_rig)
+        return A, last.characteristic(s, of_rig) - A
 
-    def parts(w: Real) -> tuple[Complex, Complex]:
-        s: Complex = 1j * w
-        A, end = ends(s, first.signals.parts(s))
-        return A, end - A
-
-    A, end = ends(1j * omega, known)
-    (before,), ways = brackets((A * (end - A).conj()).imag)
-    place, t = solved(parts, omega[before], omega[before + 1])
-    found = [Crossing(low + span * t, w, n) for t, w, n in zip(t, place, ways, strict=True)]
+    t, at, change = crossed(omega, lambda w: parts(1j * w), parts(1j * omega, known))
+    found = [Crossing(*each) for each in zip(low + span * t, at, change, strict=True)]
     slow = np.r_[float(omega[0]) * np.array(NEAR_ORIGIN), first_frequency(loop.arm) * np.array(ORDER_READ_AT)] + 0j
-    A, end = ends(slow, first.signals.parts(slow))
-    rest = through_origin(A[:2], (end - A)[:2])
+    A, B = parts(slow)
+    rest = through_origin(A[:2], B[:2])
     if rest is not None and 0 < rest.t < 1:
-        zero, half = abs((A + rest.t * (end - A))[2:])
-        change = rest.change if zero < SIMPLE * half else _change_at(loop, name, low, span, rest.t, found, band)
-        found.append(Crossing(low + span * rest.t, 0.0, change))
+        zero, half = abs((A + rest.t * B)[2:])
+        is_single = zero < SIMPLE * half
+        more = rest.change if is_single else _change_at(loop, name, low, span, rest.t, found, band)
+        found.append(Crossing(low + span * rest.t, 0.0, more))
     return Crossings.of(found)
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.arrays import Complex, Real
-from tfarm.crossing import Crossing, Crossings, brackets, solved
+from tfarm.crossing import Crossing, Crossings, crossed
 from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import gains_of, loop_parts, loop_system, torque
 from tfarm.exact.system import System
@@ -60,13 +60,8 @@ def line_crossings(arm: Arm, line: Line, band: float) -> Crossings:
     k, unit, found = loop_system(arm), line.length, static_crossings(arm, line)
     if unit:
         unified = Line(line.base, NO_FEEDBACK.plus(line.direction, 1 / unit))
-        omega = np.asarray(grid(arm, band))
-        N, P = line_parts(k, unified, 1j * omega)
-        (before,), change = brackets((N * P.conj()).imag)
-        at, t = solved(lambda w: line_parts(k, unified, 1j * w), omega[before], omega[before + 1])
-        if (
-            arm.is_undamped and line.base == NO_FEEDBACK
-        ):  # at its own frequencies there the poles of the arm without a law are
+        t, at, change = crossed(np.asarray(grid(arm, band)), lambda w: line_parts(k, unified, 1j * w))
+        if arm.is_undamped and line.base == NO_FEEDBACK:  # at t = 0 poles are at the arm's own frequencies
             own = np.r_[np.inf, flexible_frequencies(arm, JUST_BEYOND * band)]
             t = np.where(abs(at[:, None] - own).min(axis=1) < SAME_FREQUENCY * at, 0.0, t)
         found += [Crossing(*each) for each in zip(t / unit, at, change, strict=True)]

@@ -25,7 +25,7 @@ from scipy.optimize import minimize_scalar
 
 from tfarm.arm import NAMES, Arm, HubFeedback
 from tfarm.arrays import LEAST_SIZE, Complex, Real
-from tfarm.crossing import brackets, solved, zeros_between
+from tfarm.crossing import brackets, crossed, zeros_between
 from tfarm.records import record
 
 from .frequencies import grid
@@ -168,9 +168,7 @@ def inverse_peak(loop: Loop | LawLoop, omega: Real, of: int) -> Real:
 
 def phase_crossovers(loop: Loop | LawLoop, omega: Real) -> tuple[tuple[float, float], ...]:
     """Frequencies [rad/s] with L real and below 0, and the factor -1/L; at rest too where L is finite there."""
-    drive, fed_back = loop.parts(1j * omega)
-    (before,), _ = brackets((drive * fed_back.conj()).imag)
-    place, factor = solved(lambda w: loop.parts(1j * w), omega[before], omega[before + 1])
+    factor, place, _ = crossed(omega, lambda w: loop.parts(1j * w))
     crosses = (factor > AT_POLE) & (factor < 1 / AT_POLE) & ~_through_pole_or_zero(loop, place)
     place, factor = place[crosses], factor[crosses]
     factor = held(factor, _spread(lambda w: _factor(loop, w), place), CROSSOVER_DIGITS)
