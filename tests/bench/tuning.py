@@ -64,13 +64,14 @@ def numpy_training(trial: Trial, network: Network, guard: Guard, trials: int, et
 
 def numpy_gradient(trial: Trial, network: Network, guard: Guard):
     """Forward, then back through time, with six inputs and a guard."""
-    _, A, B, servo, moment = trial.model
-    a, b, T = trial.numbers[:3]
+    model, (a, b, T, _, _) = trial.model, trial.numbers
+    A, B, servo, moment = model.A, model.B, model.servo, model.moment
+    at_samples = np.transpose(trial.reference)
     W1, w2, span = network.W1 / network.scales, network.w2, guard.hi - guard.lo
     n, state, past = trial.n, np.zeros(B.size), np.zeros(3)
     kept, before = [], np.zeros(3)  # u, e, x of the sample before, and of that before it
     for k in range(n):
-        wanted, counted, rest, rigid = trial.reference[k]
+        wanted, counted, rest, rigid = at_samples[k]
         x, u = moment @ state - rigid, counted + wanted - servo @ state
         row = np.array([u, before[0], before[1], past[1], x, before[2]])
         hidden = 1 / (1 + np.exp(-W1 @ row))
@@ -96,5 +97,5 @@ def numpy_gradient(trial: Trial, network: Network, guard: Guard):
 
 def _gradient_error(trial: Trial, network: Network, guard: Guard) -> float:
     plain = PlainTrial(trial.arm)
-    right = complex_step(lambda w: plain.cost(w, 6, network.scales, guard.array), network.weights)
-    return float(abs(trial.gradient(network, guard.array)[1] - right).max() / abs(right).max())
+    right = complex_step(lambda w: plain.cost(w, 6, network.scales, guard.limits), network.weights)
+    return float(abs(trial.gradient(network, guard.limits)[1] - right).max() / abs(right).max())

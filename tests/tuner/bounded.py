@@ -41,7 +41,7 @@ def moment_bound(trial, guard):
     proof, loop = guard.proofs[0], MovingGain(trial.loop)
     push = np.linalg.norm(proof.root.T @ loop.drive)
     reading = np.linalg.norm(np.linalg.solve(proof.root, loop.sense))
-    servo, counted, rest, rigid = trial.reference.T
+    servo, counted, rest, rigid = trial.reference
     steady = counted + rest + servo
     torque = np.maximum(abs(steady + guard.lo * rigid), abs(steady + guard.hi * rigid))
     bound, size = [0.0], 0.0

@@ -60,7 +60,7 @@ def plain_gain(row, weights, hidden, scales, guard):
     W1, w2 = weights[: hidden * m].reshape(hidden, m), weights[hidden * m :]
     z = w2 @ (1 / (1 + np.exp(-W1 @ (row[:m] / scales))))
     kappa = np.log(1 + np.exp(z))
-    return kappa if guard[0] == 0 else guard[1] + (guard[2] - guard[1]) * (1 - np.exp(-kappa))
+    return kappa if np.isinf(guard.hi) else guard.lo + (guard.hi - guard.lo) * (1 - np.exp(-kappa))
 
 
 def complex_step(f, weights, step=1e-30):

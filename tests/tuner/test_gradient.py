@@ -10,10 +10,11 @@ from tests.shared import thinned
 from tests.tuner.plain import PlainTrial, complex_step, plain_gain
 from tfarm.dsp import Chain, Converters, Sampling
 from tfarm.tuner import initial_network, rules, slew_trial
+from tfarm.tuner.kernel import Limits
 
 pytestmark = pytest.mark.kernels
 
-NONE, SECTOR = np.zeros(3), np.array([1.0, 0.3, 0.64])
+NONE, SECTOR = Limits(0.0, np.inf), Limits(0.3, 0.64)
 
 
 @pytest.fixture(scope="module")
@@ -51,10 +52,9 @@ def test_reverse_and_forward_accumulation_agree(lab, chain, inputs, hidden):
     trial, network = slew_trial(lab, chain), some_network(1, inputs, hidden)
     cost, gradient = trial.gradient(network, SECTOR)
     total, costs = np.zeros(gradient.size), np.zeros(1)
-    rules.learn_by_sensitivities(
-        trial.model, trial.reference, trial.numbers, network.scales, SECTOR, network.weights, np.zeros(gradient.size),
-        0.0, np.inf, 0.0, costs, trial.run(inputs, hidden), trial.work(inputs), total,
-    )  # fmt: skip
+    still = rules.Steps(np.zeros(gradient.size), 0.0, np.inf, 0.0)
+    setting, room = trial.setting(network, SECTOR), trial.room(network)
+    rules.learn_by_sensitivities(setting, still, network.weights, costs, *room, total)
     assert costs[0] == cost
     np.testing.assert_allclose(total, gradient, atol=1e-12 * abs(gradient).max())
 

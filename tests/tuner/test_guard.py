@@ -240,8 +240,7 @@ def test_without_damping_a_proof_is_of_the_first_modes_and_no_proof_of_the_loop(
 def test_no_guard(lab):
     guard = find_guard(slew_trial(lab).loop, "none", 0.3)
     assert not guard.is_proven
-    assert guard.hi == np.inf
-    assert not guard.array.any()
+    assert guard.limits == (0.0, np.inf)
 
 
 def test_an_empty_guard_names_the_damping_that_would_have_one():

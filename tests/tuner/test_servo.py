@@ -25,13 +25,14 @@ from tfarm.tuner import (
     slew_trial,
     tune,
 )
+from tfarm.tuner.kernel import Limits
 from tfarm.tuner.saving import to_text
 from tfarm.tuner.sector import RADIUS_SHARE, MovingGain
 from tfarm.tuner.trial import usual_rate_gain
 
 LAB = tfarm.load("sasaki2012-lab")
 KP, K1 = 10.0, 3.6
-SECTOR = np.array([1.0, 0.05, 0.6])
+SECTOR = Limits(0.05, 0.6)
 
 
 def moving(count=6):

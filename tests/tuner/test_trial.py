@@ -13,8 +13,9 @@ from tfarm.arm import HubFeedback
 from tfarm.dsp import Chain, Converters, Sampling, Simulator, pulse_transfer
 from tfarm.errors import ParameterError
 from tfarm.tuner import Cost, TunedGain, best_constant, initial_network, lq_bound, residual_rms, simulated, slew_trial
+from tfarm.tuner.kernel import Limits
 
-NONE, SECTOR = np.zeros(3), np.array([1.0, 0.3, 0.64])
+NONE, SECTOR = Limits(0.0, np.inf), Limits(0.3, 0.64)
 
 
 @pytest.fixture(scope="module")
@@ -130,7 +131,7 @@ def test_no_gain_passes_the_bound(lab):
     for _ in range(50):
         network = initial_network(int(rng.integers(1e6)))
         network = network.with_weights(network.weights * rng.uniform(0, 20))
-        assert trial.with_network(network, np.array([1.0, 0.0, 1.1])).cost > bound
+        assert trial.with_network(network, Limits(0.0, 1.1)).cost > bound
 
 
 # ---------------------------------------------------------------- what is refused, and what runs away

@@ -11,15 +11,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from tfarm.tuner.kernel import MOMENT_WEIGHT, PERIOD, TORQUE_WEIGHT
 from tfarm.tuner.trial import Record, Trial
 
 
 def lq_bound(trial: Trial) -> Record:
     """The optimal trial; its K is zero, for it is no moment feedback, and its u is e."""
-    _, A, B, _, c = trial.model
-    rest, rigid = trial.reference[:, 2], trial.reference[:, 3]
-    a, b, T = (trial.numbers[i] for i in (MOMENT_WEIGHT, TORQUE_WEIGHT, PERIOD))
+    A, B, c = trial.model.A, trial.model.B, trial.model.moment
+    rest, rigid = trial.reference.rest, trial.reference.rigid
+    a, b, T = trial.numbers.a, trial.numbers.b, trial.numbers.T
     n, size = trial.n, B.size
     gains, offsets = np.zeros((n, size)), np.zeros(n)
     P, q = np.zeros((size, size)), np.zeros(size)

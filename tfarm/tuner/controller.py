@@ -8,9 +8,9 @@ from functools import cached_property
 import numpy as np
 
 from tfarm.arm import HubFeedback
-from tfarm.arrays import Real
 from tfarm.dsp import Measurement, Simulation, Simulator
 from tfarm.dsp.chain import Reading
+from tfarm.tuner.kernel import Limits
 from tfarm.tuner.network import Network
 from tfarm.tuner.trial import Cost, Record, Trial
 
@@ -20,7 +20,7 @@ class TunedGain:
     """K for each measurement; it remembers u, e, x and K of the two samples before, and forgets them at sample 0."""
 
     network: Network
-    guard: Real
+    guard: Limits
     K1: float
     signals: Reading
     Kp: float = 0.0

@@ -27,12 +27,12 @@ from typing import Literal
 import numpy as np
 
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN, Arm
-from tfarm.arrays import Real
 from tfarm.dsp import SampledLoop, sampled_loop, stable_windows
 from tfarm.dsp.margins import around
 from tfarm.dsp.sampling import held_amplitude
 from tfarm.errors import CertificationError, ConvergenceError, must_be_known
 from tfarm.records import record
+from tfarm.tuner.kernel import Limits
 from tfarm.tuner.lyapunov import CommonLyapunov
 from tfarm.tuner.sector import RADIUS_SHARE, MovingGain
 
@@ -50,11 +50,6 @@ TIMES_THE_MODES = (4, 3, 2)  # of the loop: how many a larger one has, the first
 GUARD_MODES_UNDAMPED = 20  # of the larger loop that a guard is held against at C = 0
 MOST_GUARD_MODES = 48  # of that at C > 0
 REMEDY_DAMPINGS = np.geomspace(1e-12, 1e-2, 11)  # s, tried for the remedy
-
-
-def guard_array(kind: GuardKind, lo: float, hi: float) -> Real:
-    """A guard as `kernel.guarded` takes it: whether there is one, and its ends."""
-    return np.zeros(3) if kind == "none" else np.array([1.0, lo, hi])
 
 
 @dataclass(frozen=True)
@@ -79,9 +74,9 @@ class Guard:
         return bool(self.proofs) and self.is_settled
 
     @property
-    def array(self) -> Real:
+    def limits(self) -> Limits:
         """As `kernel.guarded` takes it."""
-        return guard_array(self.kind, self.lo, self.hi)
+        return Limits(self.lo, self.hi)
 
     @property
     def sentence(self) -> str:

@@ -1,25 +1,85 @@
-"""The compiled heart of the tuner: a trial forward, and its cost's gradient backward.  Arrays:
+"""The compiled heart of the tuner: a trial forward, and its cost's gradient backward.
 
-    model       A^T, A (n, n), B (n,), servo (n,), moment (n,): s' = A s + B torque; servo.s by angle and rate
-    reference   (N, 4): what servo.s should be, torque counted in u, torque not counted in it, rigid arm's moment
-    numbers     a, b, T, bound, lag: the cost's weights, the period, the largest |moment|, samples until x answers
-    guard       1 with lo and hi, or 0
-    weights     W1 (h, m) row by row, then w2 (h,)
-    run         inputs (N, m), hidden (N, h), signals (N, 5): x, u, e, K, dK/dz
-
+N samples, n states, m inputs of the network and h hidden neurons; its weights are W1 (h, m) row by row, then w2 (h,).
 With u = (torque counted) + (what servo.s should be) - servo.s and e = u - K x the torque is e + (torque not counted).
 """
 
 from __future__ import annotations
 
-from math import exp, log1p
-from typing import Any
+from math import exp, inf, log1p
+from typing import NamedTuple
 
-from tfarm.exact.compiled import compiled
+from tfarm.arrays import Real
+from tfarm.exact.compiled import compiled, inlined
 
-X, U, E, GAIN_USED, SLOPE = range(5)  # columns of the signals
-TURNED_ROWS, ADVANCE_ROWS, DRIVE_ROW, SERVO_ROW, MOMENT_ROW = range(5)  # A^T, A, B and the rows of the model
-MOMENT_WEIGHT, TORQUE_WEIGHT, PERIOD, BOUND, LAG = range(5)  # of the numbers
+U_NOW, U_BEFORE, E_BEFORE, E_TWO_BEFORE, X_NOW, X_BEFORE, K_BEFORE = range(7)  # the inputs; the last only if asked for
+
+
+class Limits(NamedTuple):
+    """The ends of the guard that a gain is kept between; 0 and inf without one."""
+
+    lo: float
+    hi: float
+
+
+class Model(NamedTuple):
+    """s' = A s + B torque from sample to sample; servo.s reads angle and rate by their gains, moment.s the moment."""
+
+    turned: Real  # A^T (n, n)
+    A: Real  # (n, n)
+    B: Real  # (n,)
+    servo: Real  # (n,)
+    moment: Real  # (n,)
+
+
+class Reference(NamedTuple):
+    """At each sample (N,): what servo.s should be, torque counted in u, torque not counted, the rigid arm's moment."""
+
+    servo: Real
+    counted: Real
+    rest: Real
+    rigid: Real
+
+
+class Numbers(NamedTuple):
+    """Weights `a` and `b` of the cost, period `T` [s], the largest |moment| [N m], samples until x answers a torque."""
+
+    a: float
+    b: float
+    T: float
+    bound: float
+    lag: int
+
+
+class Setting(NamedTuple):
+    """All that stays while the weights are learnt; `scales` (m,) divide the network's inputs."""
+
+    model: Model
+    reference: Reference
+    numbers: Numbers
+    scales: Real
+    limits: Limits
+
+
+class Run(NamedTuple):
+    """What a trial fills, a row a sample: the network's inputs (N, m) and hidden neurons (N, h), signals (N,) [N m],
+    gain K and its slope dK/dz by the output neuron's sum."""
+
+    inputs: Real
+    hidden: Real
+    x: Real
+    u: Real
+    e: Real
+    K: Real
+    slope: Real
+
+
+class Work(NamedTuple):
+    """Room for one sample: `state` and `spare` (n,), `by_input` (m,)."""
+
+    state: Real
+    spare: Real
+    by_input: Real
 
 
 @compiled
@@ -32,20 +92,20 @@ def logistic(z: float) -> float:
 
 
 @compiled
-def guarded(z: float, guard: Any) -> tuple[float, float]:
+def guarded(z: float, limits: Limits) -> tuple[float, float]:
     """The gain and its derivative for the output neuron's sum z.
 
     kappa = ln(1 + e^z) without a guard; lo + (hi - lo)(1 - e^-kappa) with one.
     """
     s = logistic(z)
-    if guard[0] < 0.5:
+    if limits.hi == inf:
         return max(z, 0.0) + log1p(exp(-abs(z))), s
-    span = guard[2] - guard[1]
-    return min(max(guard[1] + span * s, guard[1]), guard[2]), span * s * logistic(-z)
+    span = limits.hi - limits.lo
+    return min(max(limits.lo + span * s, limits.lo), limits.hi), span * s * logistic(-z)
 
 
 @compiled
-def network_gain(weights: Any, inputs: Any, hidden: Any, guard: Any) -> tuple[float, float]:
+def network_gain(weights: Real, inputs: Real, hidden: Real, limits: Limits) -> tuple[float, float]:
     """The network's gain and its derivative by the output neuron's sum; fills `hidden`."""
     m, h = inputs.size, hidden.size
     z = 0.0
@@ -55,11 +115,11 @@ def network_gain(weights: Any, inputs: Any, hidden: Any, guard: Any) -> tuple[fl
             net += weights[j * m + i] * inputs[i]
         hidden[j] = logistic(net)
         z += weights[h * m + j] * hidden[j]
-    return guarded(z, guard)
+    return guarded(z, limits)
 
 
 @compiled
-def gain_gradient(weights: Any, inputs: Any, hidden: Any, by_sum: float, out: Any) -> None:
+def gain_gradient(weights: Real, inputs: Real, hidden: Real, by_sum: float, out: Real) -> None:
     """Adds by_sum times the derivative of the output neuron's sum by every weight to `out`."""
     m, h = inputs.size, hidden.size
     for j in range(h):
@@ -70,14 +130,14 @@ def gain_gradient(weights: Any, inputs: Any, hidden: Any, by_sum: float, out: An
 
 
 @compiled
-def copied(source: Any, target: Any) -> None:
+def copied(source: Real, target: Real) -> None:
     """target = source, element by element: an assignment of arrays takes numba seconds to compile, and a loop none."""
     for i in range(target.size):
         target[i] = source[i]
 
 
 @compiled
-def turn(rows: Any, vector: Any, out: Any) -> None:
+def turn(rows: Real, vector: Real, out: Real) -> None:
     """out = rows^T vector, in the order of memory."""
     out.fill(0.0)
     for j in range(vector.size):
@@ -88,110 +148,104 @@ def turn(rows: Any, vector: Any, out: Any) -> None:
 
 
 @compiled
-def dot(a: Any, b: Any) -> float:
+def dot(a: Real, b: Real) -> float:
     total = 0.0
     for i in range(a.size):
         total += a[i] * b[i]
     return total
 
 
-@compiled
-def sense(k: int, model: Any, reference: Any, numbers: Any, scales: Any, state: Any, run: Any) -> bool:
+@inlined
+def sense(k: int, setting: Setting, run: Run, work: Work) -> bool:
     """Reads x and u at sample k and fills the network's inputs there; False where the moment passes the bound."""
-    inputs, _, signals = run
-    moment = dot(model[MOMENT_ROW], state)
-    if not abs(moment) <= numbers[BOUND]:
+    model, reference, scales, inputs = setting.model, setting.reference, setting.scales, run.inputs[k]
+    moment = dot(model.moment, work.state)
+    if not abs(moment) <= setting.numbers.bound:
         return False
-    signals[k, X] = moment - reference[k, 3]
-    signals[k, U] = reference[k, 1] + reference[k, 0] - dot(model[SERVO_ROW], state)
-    inputs[k].fill(0.0)
-    inputs[k, 0], inputs[k, 4] = signals[k, U], signals[k, X]
+    run.x[k] = moment - reference.rigid[k]
+    run.u[k] = reference.counted[k] + reference.servo[k] - dot(model.servo, work.state)
+    inputs.fill(0.0)
+    inputs[U_NOW], inputs[X_NOW] = run.u[k], run.x[k]
     if k >= 1:
-        inputs[k, 1], inputs[k, 2], inputs[k, 5] = signals[k - 1, U], signals[k - 1, E], signals[k - 1, X]
-        if inputs.shape[1] > 6:
-            inputs[k, 6] = signals[k - 1, GAIN_USED]
+        inputs[U_BEFORE], inputs[E_BEFORE], inputs[X_BEFORE] = run.u[k - 1], run.e[k - 1], run.x[k - 1]
+        if inputs.size > K_BEFORE:
+            inputs[K_BEFORE] = run.K[k - 1]
     if k >= 2:
-        inputs[k, 3] = signals[k - 2, E]
-    for i in range(inputs.shape[1]):
-        inputs[k, i] /= scales[i]
+        inputs[E_TWO_BEFORE] = run.e[k - 2]
+    for i in range(inputs.size):
+        inputs[i] /= scales[i]
     return True
 
 
-@compiled
-def act(k: int, model: Any, reference: Any, weights: Any, guard: Any, state: Any, spare: Any, run: Any) -> None:
+@inlined
+def act(k: int, setting: Setting, weights: Real, run: Run, work: Work) -> None:
     """The gain, e and the torque at sample k; then one sample on."""
-    inputs, hidden, signals = run
-    K, slope = network_gain(weights, inputs[k], hidden[k], guard)
-    signals[k, GAIN_USED], signals[k, SLOPE] = K, slope
-    signals[k, E] = signals[k, U] - K * signals[k, X]
-    torque = signals[k, E] + reference[k, 2]
-    turn(model[TURNED_ROWS], state, spare)
+    model, state, spare = setting.model, work.state, work.spare
+    run.K[k], run.slope[k] = network_gain(weights, run.inputs[k], run.hidden[k], setting.limits)
+    run.e[k] = run.u[k] - run.K[k] * run.x[k]
+    torque = run.e[k] + setting.reference.rest[k]
+    turn(model.turned, state, spare)
     for i in range(state.size):
-        state[i] = spare[i] + model[DRIVE_ROW][i] * torque
+        state[i] = spare[i] + model.B[i] * torque
 
 
 @compiled
-def trial_cost(done: int, numbers: Any, signals: Any) -> float:
+def trial_cost(done: int, numbers: Numbers, run: Run) -> float:
     """T times the sum of a x^2/2 + b e^2/2 over the first `done` samples."""
     total = 0.0
     for k in range(done):
-        total += 0.5 * numbers[MOMENT_WEIGHT] * signals[k, X] ** 2 + 0.5 * numbers[TORQUE_WEIGHT] * signals[k, E] ** 2
-    return total * numbers[PERIOD]
+        total += 0.5 * numbers.a * run.x[k] ** 2 + 0.5 * numbers.b * run.e[k] ** 2
+    return total * numbers.T
 
 
 @compiled
-def forward(
-    model: Any, reference: Any, numbers: Any, scales: Any, guard: Any, weights: Any, run: Any, work: Any
-) -> int:
+def forward(setting: Setting, weights: Real, run: Run, work: Work) -> int:
     """One trial with fixed weights; fills `run`, returns how many samples were made before the bound was passed."""
-    state, spare = work[0], work[1]
-    state.fill(0.0)
-    n = reference.shape[0]
+    work.state.fill(0.0)
+    n = run.x.size
     for k in range(n):
-        if not sense(k, model, reference, numbers, scales, state, run):
+        if not sense(k, setting, run, work):
             return k
-        act(k, model, reference, weights, guard, state, spare, run)
+        act(k, setting, weights, run, work)
     return n
 
 
 @compiled
-def backward(model: Any, numbers: Any, scales: Any, weights: Any, run: Any, work: Any, gradient: Any) -> None:
+def backward(setting: Setting, weights: Real, run: Run, work: Work, gradient: Real) -> None:
     """The gradient of the cost of the trial in `run`, through network, plant and time (reverse accumulation).
 
-    `back` is the derivative by the state of the next sample; `late` what the inputs of later samples owe to e (of this
-    sample and the one before), u, x and K.
+    `back` is the derivative by the state of the next sample, `late_e`, `late_u`, `late_x`, `late_K` what the inputs of
+    later samples owe to e, u, x and K of this one, `later_e` to e of the sample before.
     """
-    inputs, hidden, signals = run
-    n, m, h = inputs.shape[0], inputs.shape[1], hidden.shape[1]
-    back, spare, by_input, late = work[0], work[1], work[2], work[3]
-    a, b, T = numbers[MOMENT_WEIGHT], numbers[TORQUE_WEIGHT], numbers[PERIOD]
+    model, scales, (a, b, T, _, _) = setting.model, setting.scales, setting.numbers
+    (n, m), h = run.inputs.shape, run.hidden.shape[1]
+    back, spare, by_input = work
+    late_e = later_e = late_u = late_x = late_K = 0.0
     gradient.fill(0.0)
     back.fill(0.0)
-    late.fill(0.0)
     for k in range(n - 1, -1, -1):
-        by_e = T * b * signals[k, E] + dot(model[DRIVE_ROW], back) + late[0]
-        by_sum = (late[4] - signals[k, X] * by_e) * signals[k, SLOPE]
-        gain_gradient(weights, inputs[k], hidden[k], by_sum, gradient)
+        by_e = T * b * run.e[k] + dot(model.B, back) + late_e
+        by_sum = (late_K - run.x[k] * by_e) * run.slope[k]
+        gain_gradient(weights, run.inputs[k], run.hidden[k], by_sum, gradient)
         by_input.fill(0.0)
         for j in range(h):
-            by_net = by_sum * weights[h * m + j] * hidden[k, j] * (1.0 - hidden[k, j])
+            by_net = by_sum * weights[h * m + j] * run.hidden[k, j] * (1.0 - run.hidden[k, j])
             for i in range(m):
                 by_input[i] += by_net * weights[j * m + i] / scales[i]
-        by_u = by_e + by_input[0] + late[2]
-        by_x = T * a * signals[k, X] - signals[k, GAIN_USED] * by_e + by_input[4] + late[3]
-        turn(model[ADVANCE_ROWS], back, spare)
+        by_u = by_e + by_input[U_NOW] + late_u
+        by_x = T * a * run.x[k] - run.K[k] * by_e + by_input[X_NOW] + late_x
+        turn(model.A, back, spare)
         for i in range(back.size):
-            back[i] = spare[i] + model[MOMENT_ROW][i] * by_x - model[SERVO_ROW][i] * by_u
-        late[0], late[1] = late[1] + by_input[2], by_input[3]
-        late[2], late[3] = by_input[1], by_input[5]
-        late[4] = by_input[6] if m > 6 else 0.0
+            back[i] = spare[i] + model.moment[i] * by_x - model.servo[i] * by_u
+        late_e, later_e = later_e + by_input[E_BEFORE], by_input[E_TWO_BEFORE]
+        late_u, late_x = by_input[U_BEFORE], by_input[X_BEFORE]
+        late_K = by_input[K_BEFORE] if m > K_BEFORE else 0.0
 
 
 @compiled
-def sample_gradient(k: int, numbers: Any, reply: float, x_next: float, run: Any, weights: Any, out: Any) -> None:
+def sample_gradient(k: int, numbers: Numbers, reply: float, x_next: float, run: Run, weights: Real, out: Real) -> None:
     """Gradient of a x_next^2/2 + b e^2/2 by the weights that made K at sample k; x_next answers to the torque by
     `reply`."""
-    inputs, hidden, signals = run
-    by_gain = -signals[k, X] * (numbers[MOMENT_WEIGHT] * x_next * reply + numbers[TORQUE_WEIGHT] * signals[k, E])
+    by_gain = -run.x[k] * (numbers.a * x_next * reply + numbers.b * run.e[k])
     out.fill(0.0)
-    gain_gradient(weights, inputs[k], hidden[k], by_gain * signals[k, SLOPE], out)
+    gain_gradient(weights, run.inputs[k], run.hidden[k], by_gain * run.slope[k], out)

@@ -66,11 +66,11 @@ class Network:
         first = self.W1.size
         return Network(weights[:first].reshape(self.W1.shape), weights[first:], self.scales)
 
-    def gain(self, signals: Real, guard: Real) -> float:
+    def gain(self, signals: Real, guard: kernel.Limits) -> float:
         """K for one row of inputs [N m], before they are scaled; `guard` as in `kernel.guarded`."""
         return self.gain_and_gradient(signals, guard)[0]
 
-    def gain_and_gradient(self, signals: Real, guard: Real) -> tuple[float, Real]:
+    def gain_and_gradient(self, signals: Real, guard: kernel.Limits) -> tuple[float, Real]:
         """K, and dK/dw by every weight as `weights` lists them."""
         weights, hidden, inputs = self.weights, np.zeros(self.w2.size), np.asarray(signals, dtype=float) / self.scales
         K, slope = kernel.network_gain(weights, inputs, hidden, guard)

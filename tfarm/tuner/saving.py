@@ -18,7 +18,8 @@ from tfarm.errors import MISSING, ParameterError, TfarmError
 from tfarm.files import read_file, write_file
 from tfarm.records import record
 from tfarm.tuner.controller import TunedGain
-from tfarm.tuner.guard import GuardKind, guard_array
+from tfarm.tuner.guard import GuardKind
+from tfarm.tuner.kernel import Limits
 from tfarm.tuner.network import MOST_HIDDEN, Network
 from tfarm.tuner.trial import Cost
 
@@ -45,7 +46,7 @@ class SavedTuner:
 
     def gain(self) -> TunedGain:
         """The controller."""
-        return TunedGain(self.network, guard_array(self.guard_kind, self.lo, self.hi), self.K1, self.signals, self.Kp)
+        return TunedGain(self.network, Limits(self.lo, self.hi), self.K1, self.signals, self.Kp)
 
 
 class TunerFile(StrictTable):

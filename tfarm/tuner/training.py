@@ -25,7 +25,6 @@ from tfarm.errors import ParameterError, must_be_known
 from tfarm.records import record
 from tfarm.tuner import rules
 from tfarm.tuner.guard import Guard
-from tfarm.tuner.kernel import BOUND
 from tfarm.tuner.network import Network
 from tfarm.tuner.trial import Record, Trial
 
@@ -127,8 +126,8 @@ def train(trial: Trial, network: Network, guard: Guard, learning: Learning, tria
     weights, costs = network.weights, np.zeros(trials)
     made, sample = _learn(trial, network, guard, learning, weights, costs)
     learnt = network.with_weights(weights)
-    result = trial.with_network(learnt, guard.array)
-    stopped = Stopped(made - 1, int(sample), float(trial.numbers[BOUND])) if sample >= 0 else None
+    result = trial.with_network(learnt, guard.limits)
+    stopped = Stopped(made - 1, int(sample), trial.numbers.bound) if sample >= 0 else None
     return Training(learnt, guard, costs[:made], result, stopped, made < trials and stopped is None)
 
 
@@ -136,20 +135,12 @@ def _learn(
     trial: Trial, network: Network, guard: Guard, learning: Learning, weights: Real, costs: Real
 ) -> tuple[int, int]:
     """The compiled loop of the mode; changes `weights`, fills `costs`."""
-    rates = learning.rates(weights.size)
-    run, work = trial.run(*network.W1.shape[::-1]), trial.work(network.scales.size)
     longest = math.inf if learning.rule == "plain" else float(learning.clip)
-    common = (trial.model, trial.reference, trial.numbers, network.scales, guard.array, weights, rates)
-    if learning.mode == "online" and learning.sensitivity == "whole":
-        total = np.zeros(weights.size)
-        return rules.learn_by_sensitivities(
-            *common, float(learning.alpha), longest, float(learning.enough), costs, run, work, total
-        )
-    if learning.mode == "online":
-        return rules.learn_by_samples(
-            *common, float(learning.alpha), trial.reply, longest, float(learning.enough), costs, run, work
-        )
-    rule = RULE_NUMBERS[learning.rule]
-    return rules.learn_by_trials(
-        *common, float(learning.alpha), rule, longest, float(learning.enough), costs, run, work
-    )
+    steps = rules.Steps(learning.rates(weights.size), float(learning.alpha), longest, float(learning.enough))
+    setting = trial.setting(network, guard.limits)
+    common = (setting, steps, weights, costs, *trial.room(network))
+    if learning.mode == "trial":
+        return rules.learn_by_trials(*common, RULE_NUMBERS[learning.rule])
+    if learning.sensitivity == "whole":
+        return rules.learn_by_sensitivities(*common, np.zeros(weights.size))
+    return rules.learn_by_samples(*common, trial.reply)

@@ -17,7 +17,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
@@ -70,14 +69,6 @@ class Record:
     stopped: int | None
 
 
-class Run(NamedTuple):
-    """The arrays that a trial fills (see `kernel`)."""
-
-    inputs: Real
-    hidden: Real
-    signals: Real
-
-
 @dataclass(frozen=True)
 @record
 class Trial:
@@ -102,37 +93,39 @@ class Trial:
         return self.task.feedforward.size
 
     @cached_property
-    def model(self) -> tuple[Real, ...]:
-        """A^T, A, B and the rows that read the servo and the moment: s' = A s + B torque (see `kernel`)."""
+    def model(self) -> kernel.Model:
+        """The loop from sample to sample, open at the torque, and the rows that read the servo and the moment."""
         A = self.loop.having(Kp=0.0, K1=0.0, K2=0.0).matrix()
         last = self.loop.pulse.integrals_at + 2  # where the torque of the sample before is kept: B is 1 there
         servo = -self.loop.having(K2=0.0).matrix()[last]
         moment = -self.loop.having(Kp=0.0, K1=0.0, K2=1.0).matrix()[last]
         B = self.loop.pulse.matrices()[1]
         drive = np.r_[B, np.zeros(len(A) - len(B))]
-        return tuple(np.ascontiguousarray(each) for each in (A.T, A, drive, servo, moment))
+        return kernel.Model(*(np.ascontiguousarray(each) for each in (A.T, A, drive, servo, moment)))
 
     @cached_property
-    def reference(self) -> Real:
-        """What is wanted at each sample (see `kernel`)."""
-        task, none = self.task, np.zeros(self.n)
+    def reference(self) -> kernel.Reference:
+        """What is wanted at each sample."""
+        task, gains, none = self.task, self.loop.gains, np.zeros(self.n)
         counted, rest = (task.feedforward, none) if self.signals == "total" else (none, task.feedforward)
-        gains = self.loop.gains
-        servo = gains.Kp * task.hub_angle + gains.K1 * task.hub_rate
-        return np.ascontiguousarray(np.c_[servo, counted, rest, task.rigid_moment])
+        return kernel.Reference(gains.Kp * task.hub_angle + gains.K1 * task.hub_rate, counted, rest, task.rigid_moment)
 
     @cached_property
-    def numbers(self) -> Real:
-        """a, b, T, the largest moment, and after how many samples x answers a torque."""
+    def numbers(self) -> kernel.Numbers:
+        """The cost's weights, the period, the largest moment, and after how many samples x answers a torque."""
         sampling = self.loop.chain.sampling
-        bound, lag = FOLDED_UP * self.arm.bending_scale, 1 + sampling.whole_delay
-        return np.array([self.cost.a, self.cost.b, sampling.period, bound, float(lag)])
+        bound = float(FOLDED_UP * self.arm.bending_scale)
+        return kernel.Numbers(self.cost.a, self.cost.b, sampling.period, bound, 1 + sampling.whole_delay)
+
+    def setting(self, network: Network, guard: kernel.Limits) -> kernel.Setting:
+        """All that the compiled loops take beside weights."""
+        return kernel.Setting(self.model, self.reference, self.numbers, network.scales, guard)
 
     @cached_property
     def reply(self) -> float:
         """dx/d(torque) at the first sample that feels it: the one-step sensitivity of the plant."""
-        _, A, B, _, moment = self.model
-        return float(moment @ np.linalg.matrix_power(A, int(self.numbers[kernel.LAG]) - 1) @ B)
+        model = self.model
+        return float(model.moment @ np.linalg.matrix_power(model.A, self.numbers.lag - 1) @ model.B)
 
     def asked_of(self, arm: Arm, chain: Chain, servo: HubFeedback) -> Trial:
         """The same slew asked of another loop, whose controller knows the arm of this one."""
@@ -147,33 +140,33 @@ class Trial:
         chain, task = chain or self.loop.chain, task or self.task
         return Simulator(self.arm, chain, task, count=self.loop.plant.count)
 
-    def run(self, inputs: int = PAPER_INPUTS, hidden: int = 1) -> Run:
-        """Empty arrays for a network of that size."""
-        return Run(np.zeros((self.n, inputs)), np.zeros((self.n, hidden)), np.zeros((self.n, 5)))
-
-    def work(self, inputs: int = PAPER_INPUTS) -> tuple[Real, ...]:
-        """Room for `kernel.forward` and `kernel.backward`."""
-        size = self.model[2].size
-        return np.zeros(size), np.zeros(size), np.zeros(inputs), np.zeros(5)
+    def room(self, network: Network) -> tuple[kernel.Run, kernel.Work]:
+        """What a trial with that network fills, and the room that it takes, empty."""
+        (hidden, inputs), n, states = network.W1.shape, self.n, self.model.B.size
+        signals = (np.zeros(n) for _ in range(5))
+        run = kernel.Run(np.zeros((n, inputs)), np.zeros((n, hidden)), *signals)
+        return run, kernel.Work(np.zeros(states), np.zeros(states), np.zeros(inputs))
 
     # ------------------------------------------------------------ one trial
 
-    def with_network(self, network: Network, guard: Real) -> Record:
-        """The trial with a network as it is."""
+    def with_network(self, network: Network, guard: kernel.Limits) -> Record:
+        """The trial with a network as it is; where it was stopped it costs inf."""
         run, _, done = self._forward(network, guard)
-        return self.record(done, run)
+        x, u, e, K = (signal[:done].copy() for signal in (run.x, run.u, run.e, run.K))
+        if done < self.n:
+            return Record(self.task.t[:done], x, u, e, K, np.inf, int(done))
+        return Record(self.task.t, x, u, e, K, float(kernel.trial_cost(done, self.numbers, run)), None)
 
-    def _forward(self, network: Network, guard: Real) -> tuple[Run, tuple[Real, ...], int]:
+    def _forward(self, network: Network, guard: kernel.Limits) -> tuple[kernel.Run, kernel.Work, int]:
         """What the trial fills, the room that it takes, and how many samples it makes."""
-        run, work = self.run(*network.W1.shape[::-1]), self.work(network.scales.size)
-        numbers, scales, weights = self.numbers, network.scales, network.weights
-        return run, work, kernel.forward(self.model, self.reference, numbers, scales, guard, weights, run, work)
+        run, work = self.room(network)
+        return run, work, kernel.forward(self.setting(network, guard), network.weights, run, work)
 
     def with_constant(self, K: float) -> Record:
         """The trial with a constant gain: a guard that leaves no choice."""
-        return self.with_network(SILENT, np.array([1.0, K, K]))
+        return self.with_network(SILENT, kernel.Limits(K, K))
 
-    def gradient(self, network: Network, guard: Real) -> tuple[float, Real]:
+    def gradient(self, network: Network, guard: kernel.Limits) -> tuple[float, Real]:
         """The cost of the trial and its derivative by every weight, exact: back through network, plant and time.
 
         Raises ParameterError where the trial runs away: there is no cost then.
@@ -182,26 +175,18 @@ class Trial:
         gradient = np.zeros(weights.size)
         if done < self.n:
             raise ParameterError(key="weights", value=done, remedy="the loop runs away at that sample; guard the gain")
-        kernel.backward(self.model, self.numbers, network.scales, weights, run, work, gradient)
-        return float(kernel.trial_cost(done, self.numbers, run.signals)), gradient
+        kernel.backward(self.setting(network, guard), weights, run, work, gradient)
+        return float(kernel.trial_cost(done, self.numbers, run)), gradient
 
-    def sample_gradient(self, network: Network, guard: Real, k: int) -> Real:
+    def sample_gradient(self, network: Network, guard: kernel.Limits, k: int) -> Real:
         """The delta rule's gradient: of a x^2/2 at the first sample that feels the torque of sample k, plus b e^2/2.
 
         x depends on K(k) by the plant's one-step sensitivity, e directly; all earlier signals are data.
         """
-        (run, _, _), weights = self._forward(network, guard), network.weights
+        (run, _, _), weights, numbers = self._forward(network, guard), network.weights, self.numbers
         gradient = np.zeros(weights.size)
-        x_next = float(run.signals[k + int(self.numbers[kernel.LAG]), kernel.X])
-        kernel.sample_gradient(k, self.numbers, self.reply, x_next, run, weights, gradient)
+        kernel.sample_gradient(k, numbers, self.reply, float(run.x[k + numbers.lag]), run, weights, gradient)
         return gradient
-
-    def record(self, done: int, run: Run) -> Record:
-        """What the arrays hold, as a record; a run that was stopped costs inf."""
-        x, u, e, K = (run.signals[:done, i].copy() for i in (kernel.X, kernel.U, kernel.E, kernel.GAIN_USED))
-        whole = done == self.n
-        cost = float(kernel.trial_cost(done, self.numbers, run.signals)) if whole else np.inf
-        return Record(self.task.t[:done], x, u, e, K, cost, None if whole else int(done))
 
 
 def slew_trial(
