@@ -26,14 +26,14 @@ def compiled(function: _Function) -> _Function:
     """The function compiled by numba (nopython, IEEE arithmetic, NumPy's rules for division)."""
     try:
         with _cache_folder():
-            return njit(cache=True, error_model="numpy", nogil=True)(function)
+            return njit(cache=True, error_model="numpy", nogil=True, no_cfunc_wrapper=True)(function)
     except (RuntimeError, OSError):  # no folder for the cache can be written
-        return njit(error_model="numpy", nogil=True)(function)
+        return njit(error_model="numpy", nogil=True, no_cfunc_wrapper=True)(function)
 
 
 def inlined(function: _Function) -> _Function:
     """The same for a small formula, melted into its callers: a loop with a call in it does not vectorise."""
-    return njit(error_model="numpy", forceinline=True)(function)
+    return njit(error_model="numpy", forceinline=True, no_cfunc_wrapper=True)(function)
 
 
 def python_of(function: Callable[..., Any]) -> Callable[..., Any]:
