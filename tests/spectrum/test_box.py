@@ -6,7 +6,7 @@ import pytest
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import Analytic
 from tfarm.spectrum import box as room
-from tfarm.spectrum.box import Box, complete, newton, winding_number, zeros_in_box
+from tfarm.spectrum.box import Box, complete, distinct, newton, winding_number, zeros_in_box
 
 
 def polynomial(*zeros, flat=0.0):
@@ -62,3 +62,84 @@ def test_a_box_grows_where_a_zero_lies_on_its_edge():
     assert last.im_max == 12.0
     with pytest.raises(ConvergenceError, match="lies on the contour"):
         complete(polynomial(*zeros), lambda height: Box(-50.0, 10.0, -height, height), 10.0, zeros, factors=(1.0,))
+
+
+EPS = 2.0**-52
+
+
+@pytest.mark.parametrize("size", [1e-9, 1.0, 1e9])
+def test_a_zero_has_all_its_digits_whatever_its_size(size):
+    """What ends the steps is a share of |s|, so units of time do not matter: not the zeros, nor how many calls."""
+    zeros, calls = np.array([1.0 + 2.0j, 1.0 - 2.0j, -0.37]), []
+
+    def function(s):
+        calls.append(s.size)
+        at = polynomial(*zeros)(s / size)
+        return Analytic(at.value, at.slope / size, at.scale)
+
+    found = newton(function, size * zeros * (1 + 0.01j))
+    np.testing.assert_allclose(found / size, zeros, rtol=4 * EPS)
+    assert len(calls) < 9
+
+
+def test_no_step_is_longer_than_a_share_of_where_it_starts():
+    """A start far from all zeros of a flat function would be thrown across the plane."""
+    asked = []
+
+    def function(s):
+        asked.append(s.copy())
+        return Analytic(s**0 + 0j, s**0 * 1e-9 + 0j, s * 0.0)
+
+    newton(function, np.array([1.0 + 0j]))
+    places = np.ravel(asked)
+    np.testing.assert_allclose(places[1:] / places[:-1], 0.7, rtol=1e-12)
+
+
+def test_points_side_by_side_are_one():
+    """The first of them is kept; how near is measured by their size."""
+    points = np.array([1e6, 2.0, 1e6 + 1e-4, 2.0 + 1e-4, 0.0, 0.0, 2.0 + 1e-10j])
+    np.testing.assert_array_equal(distinct(points), [1e6, 2.0, 2.0 + 1e-4, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("box", "low", "high"),
+    [
+        (Box(-1.0, 3.0, -1.0, 1.0), 0.8, 1.0), (Box(-1.0, 1.0, -1.0, 3.0), 0.8, 1.0),  # near the middle
+        (Box(1e-6, 1.0, 0.0, 0.1), 5e-4, 2e-3), (Box(-1.0, -1e-6, 0.0, 0.1), -2e-3, -5e-4),  # in the middle of decades
+        (Box(0.0, 0.1, 1.0, 7.0), 3.8, 4.0), (Box(0.0, 0.1, -7.0, -1.0), -4.2, -3.9),
+    ],
+)  # fmt: skip
+def test_halves_meet_across_the_longer_side_and_make_up_the_box(box, low, high):
+    one, two = box.halves()
+    (cut,) = {*one, *two} - {*box}
+    assert low < cut < high
+    assert (one.re_min, one.im_min, two.re_max, two.im_max) == (box.re_min, box.im_min, box.re_max, box.im_max)
+    wide = box.re_max - box.re_min > box.im_max - box.im_min
+    assert (one.re_max, two.re_min) == ((cut, cut) if wide else (box.re_max, box.re_min))
+    assert (one.im_max, two.im_min) == ((box.im_max, box.im_min) if wide else (cut, cut))
+
+
+def test_a_zero_of_high_order_is_there_as_often():
+    found = zeros_in_box(polynomial(1.3, 1.3, 1.3, -0.7), Box(-1.0, 2.0, -1.0, 1.0), np.empty(0, complex))
+    assert np.sort(found.real) == pytest.approx([-0.7, 1.3, 1.3, 1.3], rel=1e-4)
+
+
+def test_a_known_zero_is_taken_as_it_is_and_once():
+    """Near 0 Newton's method is not believed: what is found beside a known one is that one, and others are kept."""
+    tiny, zeros = 3e-10, np.array([2.0 + 3.0j, 2.0 - 3.0j, -1.0])
+    function, box = polynomial(*zeros, tiny), Box(-5.0, 5.0, -4.0, 4.0)
+    rough = np.array([tiny * 1.01], dtype=complex)
+    found = zeros_in_box(function, box, zeros * 1.01, rough)
+    assert np.sort_complex(found) == pytest.approx(np.sort_complex([*zeros, rough[0]]), rel=1e-12)
+    known = np.array([-1.0 + 0j, 7.0])  # of which one lies in the box, and is a zero that would be found anyway
+    found = zeros_in_box(polynomial(*zeros, 7.0), box, zeros * 1.01, known)
+    assert np.sort_complex(found) == pytest.approx(np.sort_complex(zeros), rel=1e-12)
+
+
+def test_what_lies_inside_is_inside_of_all_four_edges():
+    box = Box(-1.0, 2.0, -3.0, 4.0)
+    points = np.array([0.0, -1.1, 2.1, -3.1j, 4.1j, 1.9 + 3.9j, -0.9 - 2.9j])
+    np.testing.assert_array_equal(box.holds(points), [True, False, False, False, False, True, True])
+    assert not box.holds(box.corners).any()
+    np.testing.assert_array_equal(box.corners[[0, 2]], [-1 - 3j, 2 + 4j])
+    np.testing.assert_array_equal(np.diff(box.corners), [3, 7j, -3, -7j])  # counter-clockwise

@@ -61,8 +61,8 @@ class ChainShapes:
         self.__dict__.pop("_moving", None)
 
     def theta(self) -> Real:
-        """Hub angle of each mode."""
-        return self.states(())[1]
+        """Hub angle of each mode, 0 of a hub that is held."""
+        return self.states(())[1] if self.chain.drive.turns else np.zeros(self.omega.size)
 
     def masses(self) -> Real:
         """The modal masses."""

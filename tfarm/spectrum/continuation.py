@@ -141,7 +141,7 @@ def through_nodes(nodes: list[Node], at: float | Real) -> Complex:
     """
     value = np.asarray(at)
     ratios = ([(value - b.at) / (a.at - b.at) for b in nodes if b is not a] for a in nodes)
-    weights = np.array([np.prod(np.array(each), axis=0) for each in ratios]).T
+    weights = np.stack([np.prod(np.array(each), axis=0) for each in ratios], axis=-1)
     zeros = np.stack([node.zeros for node in nodes])
     mean, half = zeros.mean(2).real, (zeros[..., 0] - zeros[..., 1]) / 2
     square = (half * half).real
@@ -183,7 +183,7 @@ def _exchange(family: Family, nodes: list[Node], stray: NDArray[np.bool_], at: f
             lone, zeros[i], changed = zeros[i, 1 - j], meeting, [i]
             if family(at).ends and lone != 0 and not np.isnan(lone):  # the one that is left goes on alone
                 zeros = np.concatenate([zeros, [[lone, np.nan]]])
-                unknown = np.full((1, 2), np.nan + 0j)
+                unknown = np.full((1, 2), np.nan, complex)
                 nodes[:-1] = [Node(node.at, np.concatenate([node.zeros, unknown])) for node in nodes[:-1]]
         else:
             left = sorted([zeros[i, 1 - j], zeros[m, 1 - n]], key=lambda zero: (np.isnan(zero), abs(zero)))
@@ -220,5 +220,6 @@ def _next_zero(function: Function, zero: float) -> float:
         sign = np.sign(deflated(zero + side * away))
         for n in np.nonzero(sign[1:] != sign[:-1])[0][:1]:
             ends = zero + side * away[n], zero + side * away[n + 1]
-            found.append(brentq(lambda s: float(deflated(np.array([s]))[0]), *ends, rtol=NEXT_ZERO_KNOWN))
+            known = NEXT_ZERO_KNOWN * abs(zero)  # SciPy's own is 2e-12 1/s, too much beside a slow rig's zeros
+            found.append(brentq(lambda s: float(deflated(np.array([s]))[0]), *ends, xtol=known, rtol=NEXT_ZERO_KNOWN))
     return min(found, key=lambda s: abs(s - zero), default=np.inf)

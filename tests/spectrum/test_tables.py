@@ -1,0 +1,153 @@
+"""The modal table in other words: its rows and columns, the same numbers by other roads, and what it says of itself."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tfarm
+from tfarm.columns import JSON, TERMINAL
+from tfarm.errors import MISSING, ParameterError
+from tfarm.spectrum.answers import DAMPED_MODE_COLUMNS, modes_answer, modes_by_methods_answer
+from tfarm.spectrum.table import compare_theories, hub_locked, modes_below
+
+EPS = 2.0**-52
+LAB, STEEL = tfarm.load("sasaki2012-lab"), tfarm.load("stocky-steel")
+PINNED = replace(STEEL, hub=tfarm.Hub(inertia=0.0), payload=tfarm.Payload(mass=math.inf))
+ORDER = [  # of a command's columns; a damped arm has what stands between brackets
+    "index", "natural_frequency_rad_s", "natural_frequency_hz", "eigenvalue", "damping_ratio",
+    "hub_locked_rad_s", "hub_participation", "modal_moment",
+]  # fmt: skip
+
+
+def keys(answer, output):
+    return [each.key for each in answer["modes"].columns if output in each.on]
+
+
+@pytest.mark.parametrize("arm", [LAB, STEEL])
+def test_columns_stand_in_one_order_and_each_once(arm):
+    """Frequencies, then what damping makes of them, then the locked hub's, then shapes."""
+    answer = modes_answer(tfarm.modes(arm, 3), None)
+    damped = not arm.is_undamped
+    expected = [key for key in ORDER if damped or key not in ("eigenvalue", "damping_ratio")]
+    assert keys(answer, TERMINAL) == expected + ["nodes_m"] * (not damped)
+    found = keys(answer, JSON)
+    assert len(found) == len(set(found))
+    assert [key for key in found if key in expected] == expected
+    assert set(found) - set(expected) == {"nodes_m", "theories_rad_s", "sensitivity"} | (
+        {"eigenvalues"} if damped else set()
+    )
+
+
+@pytest.mark.parametrize("arm", [LAB, STEEL, PINNED, LAB.having(hub_inertia=math.inf)])
+def test_every_row_is_of_its_mode(arm):
+    """The column of the locked hub too: beside a rigid body stands nothing, beside flexible mode n number n."""
+    table = tfarm.modes(arm, 3)
+    answer = modes_answer(table, None)
+    columns = {each.key: each.of for each in answer["modes"].columns if JSON in each.on}
+    still = hub_locked(table).natural_frequency[-3:].tolist()
+    assert columns["hub_locked_rad_s"] == [MISSING] * arm.has_rigid_mode + still
+    np.testing.assert_array_equal(columns["natural_frequency_hz"], table.natural_frequency_hz)
+    np.testing.assert_allclose(2 * math.pi * table.natural_frequency_hz, table.natural_frequency, rtol=4 * EPS)
+    (locked,) = (each for each in answer["modes"].columns if each.key == "hub_locked_rad_s")
+    assert (TERMINAL in locked.on) == (not arm.is_locked)
+    assert (answer["hub_locked_note"] is None) == arm.is_locked
+    assert answer["count"] == 3
+
+
+@pytest.mark.parametrize("digits", [14, 15, 16, 30])
+def test_digits_beyond_a_double_are_strings_of_them(digits):
+    """Of both columns, the hub's free and locked, and each within a last unit of the float64."""
+    table = tfarm.modes(STEEL, 3)
+    answer = modes_answer(table, digits, certify=True)
+    columns = {each.key: each.of for each in answer["modes"].columns if JSON in each.on}
+    assert answer["digits"] == digits
+    for key, values in (
+        ("natural_frequency_rad_s", table.natural_frequency),
+        ("hub_locked_rad_s", hub_locked(table).natural_frequency),
+    ):
+        own = list(columns[key])[-3:]
+        assert all(isinstance(each, str) == (digits > 15) for each in own)
+        np.testing.assert_allclose([float(each) for each in own], values[-3:], rtol=4 * EPS)
+        assert digits <= 15 or all(len(each.replace(".", "")) == digits for each in own)
+    for lower, upper, omega in zip(
+        columns["lower_rad_s"], columns["upper_rad_s"], table.natural_frequency, strict=True
+    ):
+        assert lower is MISSING if omega == 0 else float(lower) * (1 - 2 * EPS) <= omega <= float(upper) * (1 + 2 * EPS)
+    assert answer["proof"]["count"] == len(table)
+
+
+def test_a_page_says_im_s_or_the_second_real_eigenvalue():
+    """And of a damping ratio three digits at least, however small."""
+    damped = tfarm.damped_modes(tfarm.modes(LAB.having(damping=1e-3), 8))
+    assert 0 < damped.is_overdamped.sum() < 8
+    shown = {each.key: each for each in DAMPED_MODE_COLUMNS}
+    for text, pair, over in zip(
+        shown["eigenvalue_im"].shown(damped), damped.eigenvalues, damped.is_overdamped, strict=True
+    ):
+        number = text.rpartition(" ")[2].replace("−", "-")
+        assert text.startswith("overdamped, and ") == bool(over)
+        assert float(number) == pytest.approx(pair[1].real if over else pair[0].imag, rel=1e-6)
+    texts = shown["damping_ratio"].digits([0.0, 1.23456e-4, 0.9999e-3, 1e-3, 0.0123456, 1.5])
+    assert list(texts) == ["0", "1.235 × 10⁻⁴", "9.999 × 10⁻⁴", "0.00100", "0.01235", "1.50000"]
+
+
+def test_a_table_says_how_many_and_from_where_to_where():
+    table = tfarm.modes(STEEL, 4)
+    first, last = table.natural_frequency[[1, 4]]
+    assert table.finding == f"4 flexible, {first:.6g} to {last:.6g} rad/s"
+    pinned = tfarm.modes(PINNED, 4)
+    assert pinned.finding.startswith("4 flexible, ")
+    assert (len(table), len(pinned)) == (4 + STEEL.has_rigid_mode, 4 + PINNED.has_rigid_mode)
+
+
+def test_every_road_to_the_frequencies_ends_at_them():
+    """Balls and the appendix; the table of all methods says by how little they part."""
+    table = tfarm.modes(STEEL, 4)
+    for method in ("closed-form", "balls", "appendix"):
+        found = table.frequencies(method)
+        assert found[0] == 0
+        np.testing.assert_allclose(found, table.natural_frequency, rtol=4 * EPS)
+    texts = table.digits(20)
+    assert texts[0] == "0.0"
+    np.testing.assert_allclose([float(text) for text in texts], table.frequencies("balls"), rtol=EPS)
+    assert all(len(text.replace(".", "")) == 20 for text in texts[1:])
+    answer = modes_by_methods_answer(table)
+    assert answer["index"] == [0, 1, 2, 3, 4]
+    assert list(table.by_methods().values) == ["closed-form", "balls", "appendix"]
+
+
+def test_theories_are_matched_by_number():
+    """Each as its own table; the one that the table is of is the table's."""
+    table = tfarm.modes(STEEL, 3, theory="shear")
+    by_theory = compare_theories(table)
+    assert list(by_theory) == ["timoshenko", "shear", "rayleigh", "euler-bernoulli"]
+    for theory, omega in by_theory.items():
+        np.testing.assert_array_equal(omega, tfarm.modes(STEEL, 3, theory=theory).natural_frequency)
+
+
+def test_as_many_modes_as_lie_below():
+    """Of a rigid body nothing is counted; exactly at a frequency it is not below."""
+    for arm in (STEEL, PINNED, LAB):
+        omega = tfarm.modes(arm, 4).natural_frequency[-4:]
+        for number, point in enumerate(np.sqrt(omega[1:] * omega[:-1]), start=1):
+            assert modes_below(arm, float(point)) == number
+            np.testing.assert_array_equal(
+                tfarm.modes(arm, up_to=float(point)).natural_frequency[-number:], omega[:number]
+            )
+    with pytest.raises(ParameterError, match="no flexible mode lies below it"):
+        tfarm.modes(LAB, up_to=0.5 * float(tfarm.modes(LAB, 1).natural_frequency[-1]))
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({}, "either a count of modes or a frequency"), ({"count": 2, "up_to": 3.0}, "either a count of modes or a"),
+        ({"count": 0}, "from 1 to 10000"), ({"count": 10_001}, "at most 10000"), ({"up_to": 0.0}, "positive, finite"),
+        ({"up_to": math.inf}, "positive, finite"),
+    ],
+)  # fmt: skip
+def test_what_is_asked_for_makes_sense(given, words):
+    with pytest.raises(ParameterError, match=words):
+        tfarm.modes(LAB, **given)
