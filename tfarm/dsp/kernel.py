@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from tfarm.arrays import Complex, Real
 from tfarm.exact.compiled import compiled, inlined
 
+ANGLE, RATE, MOMENT = 0, 1, 2  # of the outputs, which begin with what is fed back (`tfarm.arm.FED_BACK`)
 ENCODER, AMPLIFIER, DAC = 0, 1, 2  # rows of the quantisers, and places in `saturated`
 DOUBLY, ONCE = 0, 1  # integrals of the torque in `rigid`, and what they add to an output in `rates`
 DURATION, IS_NEW, IS_RECORD = 0, 1, 2  # of a piece of a sample: how long [s], whether the new torque acts, whether seen
@@ -170,9 +171,9 @@ def estimate(angle: float, rate: float, memory: Any, is_differenced: bool, pole:
 
 def converted(record: Any, saturated: Any, memory: Any, of: Any) -> Any:
     """Hub angle, hub rate and root moment as the controller of that `Electronics` has them, of one sample's outputs."""
-    angle = quantise(record[0], of.quantisers[ENCODER], saturated, ENCODER)
-    moment = quantise(record[2], of.quantisers[AMPLIFIER], saturated, AMPLIFIER)
-    return angle, estimate(angle, record[1], memory, of.is_differenced, of.pole, of.period), moment
+    angle = quantise(record[ANGLE], of.quantisers[ENCODER], saturated, ENCODER)
+    moment = quantise(record[MOMENT], of.quantisers[AMPLIFIER], saturated, AMPLIFIER)
+    return angle, estimate(angle, record[RATE], memory, of.is_differenced, of.pole, of.period), moment
 
 
 @compiled
@@ -205,7 +206,7 @@ def before(k: int, model: Any, state: Any, forcing: Any, of: Any) -> bool:
     torque, rigid = state.held[(k - of.delay - 1) % state.held.size], state.rigid
     torque += forcing.disturbance[k - 1] if k > 0 else 0.0
     read_outputs(model.weights, model.rates, model.static, state.amplitude, rigid, torque, state.record[k])
-    return abs(state.record[k, 2]) <= of.bound
+    return abs(state.record[k, MOMENT]) <= of.bound
 
 
 def after(k: int, u: float, model: Any, state: Any, forcing: Any, of: Any) -> None:
@@ -237,7 +238,7 @@ def run_gains(model: Any, state: Any, forcing: Any, electronics: Any, gains: Any
         if not _before(k, model, state, forcing, electronics):
             return k
         record = state.record[k]
-        measured[0], measured[1], measured[2] = _converted(record, state.saturated[k], memory, electronics)
+        measured[ANGLE], measured[RATE], measured[MOMENT] = _converted(record, state.saturated[k], memory, electronics)
         for j in range(3, measured.size):
             measured[j] = record[j]
         u = law(k, gains, forcing.feedforward, references, measured, electronics.is_single)

@@ -172,7 +172,7 @@ class Simulator:
     def _result(self, state: kernel.State, done: int, gain: Real | None) -> Simulation:
         stopped = None
         if done < state.torque.size:
-            of_root = np.nan_to_num(abs(self.plant.residues[2, self._kept] * state.amplitude), nan=np.inf)
+            of_root = np.nan_to_num(abs(self.plant.residues[kernel.MOMENT, self._kept] * state.amplitude), nan=np.inf)
             stopped = Stop(done * self.scenario.period, int(self.plant.mode[self._kept][int(np.argmax(of_root))]))
         T, m = self.scenario.period, self.between
         between = None

@@ -14,10 +14,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .closed_form import SERIES_RADIUS, even_functions, from_transition, from_waves, transition_series
+from .closed_form import (
+    SERIES_RADIUS,
+    even_functions,
+    from_transition,
+    from_waves,
+    hub_condition,
+    tip_conditions,
+    transition_series,
+)
 from .compiled import compiled, inlined
 from .dispersion import dispersion
-from .vector import SIGMA, A, B, G
+from .vector import DAMPING, SIGMA, A, B, G
 
 
 def drives(
@@ -30,7 +38,7 @@ def drives(
     """
     values, pinned = np.empty((len(ends), omega.size)), np.empty(omega.size, np.int64)
     undamped = kernel.copy()
-    undamped[7] = 0.0
+    undamped[DAMPING] = 0.0
     _drives(np.ascontiguousarray(omega, dtype=float), undamped, ends, values, pinned)
     return values, pinned
 
@@ -47,21 +55,19 @@ def _drives(omega: Any, k: Any, ends: Any, values: Any, pinned: Any) -> None:
             F0, F1, F2, F3, F2_less_1, _ = transition_series(z1 + z2, z1 * z2)
             for row in range(len(ends)):
                 e = ends[row]
+                tip = tip_conditions(e, S)
                 theta, M0, _, _, _ = from_transition(
-                    F0, F1, F2, F3, F2_less_1, S, 1.0, k[A], k[B], k[G], k[SIGMA],
-                    e[0] + e[1] * S, e[2], e[3] + e[4] * S, e[5],
-                )  # fmt: skip
-                values[row, i] = (e[6] + e[7] * S) * theta - e[8] * M0
+                    F0, F1, F2, F3, F2_less_1, S, 1.0, k[A], k[B], k[G], k[SIGMA], *tip
+                )
+                values[row, i] = hub_condition(e, S, theta, M0)
         else:
             c1, s1, e1 = real_functions(z1, t1, dt1)
             c2, s2, e2 = real_functions(z2, t2, dt2)
             for row in range(len(ends)):
                 e = ends[row]
-                theta, M0, _, _ = from_waves(
-                    c1, s1, z1, v1.real, e1, c2, s2, z2, v2.real, e2, gS.real, 1.0,
-                    e[0] + e[1] * S, e[2], e[3] + e[4] * S, e[5],
-                )  # fmt: skip
-                values[row, i] = ((e[6] + e[7] * S) * theta - e[8] * M0) / (gS.real * (z1 - z2) ** 2)
+                tip = tip_conditions(e, S)
+                theta, M0, _, _ = from_waves(c1, s1, z1, v1.real, e1, c2, s2, z2, v2.real, e2, gS.real, 1.0, *tip)
+                values[row, i] = hub_condition(e, S, theta, M0) / (gS.real * (z1 - z2) ** 2)
 
 
 @compiled

@@ -28,6 +28,9 @@ from .coefficients import EndCondition, Inertia, double_double
 from .elements import Body, Drive, Element, Mark, Offset, Place, Segment, Spring
 
 SEGMENT, OFFSET, SPRING, BODY, MARK = range(5)
+LENGTH, NUMBER = 0, 0  # of an offset's row of the kernel, and of a mark's
+STIFFNESS, COMPLIANCE, LOSS = range(3)  # of a spring's row, the last the stiffness times the damping
+MASS, INERTIA, GROUND, TURNING_GROUND = range(4)  # of a body's row, in the order of `Body`
 AT_JOINT = 2.0**-50  # of the length: a place so near to a joint is at it, its share being a quotient of float64 numbers
 ROW_KIND, ROW_WIDTH = 8, 12  # where a row of the kernel says what it is, after the numbers of a segment (`vector`)
 TO_W, TO_M, TO_Q = 9, 10, 11  # from the chain's units to the segment's own

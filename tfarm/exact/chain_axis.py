@@ -17,8 +17,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .axis import half_waves, real_functions
-from .chain import BODY, OF_ANGLE, OF_MOMENT, OFFSET, ROW_KIND, SEGMENT, SPRING, TO_M, TO_Q, TO_W, Layout
-from .closed_form import SERIES_RADIUS, transition_series
+from .chain import (
+    BODY,
+    COMPLIANCE,
+    GROUND,
+    INERTIA,
+    LENGTH,
+    MASS,
+    OF_ANGLE,
+    OF_MOMENT,
+    OFFSET,
+    ROW_KIND,
+    SEGMENT,
+    SPRING,
+    STIFFNESS,
+    TO_M,
+    TO_Q,
+    TO_W,
+    TURNING_GROUND,
+    Layout,
+)
+from .closed_form import SERIES_RADIUS, tip_conditions, transition_series
 from .compiled import compiled, inlined
 from .compound import across_rows, across_waves, end_plane, inside_body, inside_offset, inside_spring, transition_rows
 from .dispersion import dispersion
@@ -44,8 +63,7 @@ def _clamped(number: int, value: float, step: int) -> int:
 def chain_count(omega: float, rows: Any, ends: Any, plane: Any) -> int:
     """How many natural frequencies lie below omega [rad/s], the rigid-body mode included; `plane` (5,) is worked in."""
     S = -omega * omega
-    p = end_plane(ends[0] + ends[1] * S, ends[2], ends[3] + ends[4] * S, ends[5])
-    plane[0], plane[1], plane[2], plane[3], plane[4] = p
+    plane[0], plane[1], plane[2], plane[3], plane[4] = end_plane(*tip_conditions(ends, S))
     number, free = 0, int(ends[FREE_MOTIONS])
     for i in range(len(rows)):
         row = rows[i]
@@ -53,14 +71,14 @@ def chain_count(omega: float, rows: Any, ends: Any, plane: Any) -> int:
             number = _joined(number, omega, row, plane, free)
             free = 2
         elif row[ROW_KIND] == OFFSET:
-            p = inside_offset(row[0], (plane[0], plane[1], plane[2], plane[3], plane[4]))
+            p = inside_offset(row[LENGTH], (plane[0], plane[1], plane[2], plane[3], plane[4]))
             plane[0], plane[1], plane[2], plane[3], plane[4] = p
         elif row[ROW_KIND] == BODY:
             p = plane[0], plane[1], plane[2], plane[3], plane[4]
-            p = inside_body(row[0] * S + row[2], row[1] * S + row[3], p)
+            p = inside_body(row[MASS] * S + row[GROUND], row[INERTIA] * S + row[TURNING_GROUND], p)
             plane[0], plane[1], plane[2], plane[3], plane[4] = p
         elif row[ROW_KIND] == SPRING:
-            p = inside_spring(row[0], row[1], (plane[0], plane[1], plane[2], plane[3], plane[4]))
+            p = inside_spring(row[STIFFNESS], row[COMPLIANCE], (plane[0], plane[1], plane[2], plane[3], plane[4]))
             plane[0], plane[1], plane[2], plane[3], plane[4] = p
             number = _clamped(number, plane[0], 1)
     if ends[OF_MOMENT] == 0.0:

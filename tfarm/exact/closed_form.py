@@ -29,6 +29,21 @@ INVERSE_FACTORIAL = np.array([1.0 / math.factorial(n) for n in range(2 * SERIES_
 
 
 @inlined
+def tip_conditions(ends: Any, S: Number) -> tuple[Number, Number, Number, Number]:
+    """tip_mass, shear, tip_inertia and moment of the tip's conditions at S = s^2, of the numbers of its ends.
+
+    Rest, inertia and force of the mass come first and those of the inertia next (see `coefficients.EndCondition`).
+    """
+    return ends[0] + ends[1] * S, ends[2], ends[3] + ends[4] * S, ends[5]
+
+
+@inlined
+def hub_condition(ends: Any, S: Number, theta: Number, M0: Number) -> Number:
+    """(inertia s^2 + rest) theta - force M0: what vanishes at a natural frequency, of the three numbers after those."""
+    return (ends[6] + ends[7] * S) * theta - ends[8] * M0
+
+
+@inlined
 def from_waves(
     c1: Number,
     s1: Number,

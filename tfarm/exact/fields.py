@@ -24,6 +24,7 @@ from .closed_form import (
     fields_from_root,
     from_transition,
     from_waves,
+    tip_conditions,
     transition_series,
 )
 from .coefficients import Coefficients
@@ -38,6 +39,7 @@ _fields = python_of(fields_from_root)
 _minors = python_of(from_waves)
 _transition = python_of(transition_series)
 _even = python_of(even_functions)
+_tip_conditions = python_of(tip_conditions)
 
 
 class Wave(NamedTuple):
@@ -143,8 +145,7 @@ def free_root(k: Coefficients, S: Any, d: Any) -> tuple[Any, Any, Any]:
 
 def tip_condition(k: Coefficients, S: Any) -> Tip:
     """tip_mass, shear, tip_inertia and moment of the tip's conditions, as `closed_form.from_waves` takes them."""
-    ends = k.kernel[TIP_MASS:HUB_REST]
-    return ends[0] + ends[1] * S, ends[2], ends[3] + ends[4] * S, ends[5]
+    return _tip_conditions(k.kernel[TIP_MASS:HUB_REST], S)
 
 
 def _from_waves(

@@ -16,7 +16,26 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .chain import MARK, OF_ANGLE, OF_MOMENT, OFFSET, ROW_KIND, SEGMENT, SPRING, TO_M
+from .chain import (
+    COMPLIANCE,
+    GROUND,
+    INERTIA,
+    LENGTH,
+    LOSS,
+    MARK,
+    MASS,
+    NUMBER,
+    OF_ANGLE,
+    OF_MOMENT,
+    OFFSET,
+    ROW_KIND,
+    SEGMENT,
+    SPRING,
+    STIFFNESS,
+    TO_M,
+    TURNING_GROUND,
+)
+from .closed_form import tip_conditions
 from .compiled import compiled, inlined
 from .compound import (
     beyond_body,
@@ -95,7 +114,7 @@ def _sweep(points: Any, rows: Any, ends: Any, work: Work, lost: Any) -> None:
             plane[:] = beyond
             number += 1
         elif row[ROW_KIND] == MARK:
-            work.marked[int(row[0])] = plane
+            work.marked[int(row[NUMBER])] = plane
         else:
             _small(points, row, plane)
         _brought_back(plane, 5, work.powers[j])
@@ -108,7 +127,8 @@ def _begin(points: Any, ends: Any, plane: Any) -> None:
     """The plane at the payload."""
     for i in range(BLOCK):
         S = points[i] * points[i]
-        p = end_plane(ends[0] + ends[1] * S, ends[2] + 0.0 * S, ends[3] + ends[4] * S, ends[5] + 0.0 * S)
+        mass, shear, inertia, moment = tip_conditions(ends, S)
+        p = end_plane(mass, shear + 0.0 * S, inertia, moment + 0.0 * S)
         plane[i], plane[BLOCK + i], plane[2 * BLOCK + i], plane[3 * BLOCK + i], plane[4 * BLOCK + i] = p
 
 
@@ -119,11 +139,11 @@ def _small(points: Any, row: Any, plane: Any) -> None:
         s, S = points[i], points[i] * points[i]
         p = plane[i], plane[BLOCK + i], plane[2 * BLOCK + i], plane[3 * BLOCK + i], plane[4 * BLOCK + i]
         if row[ROW_KIND] == OFFSET:
-            p = inside_offset(row[0], p)
+            p = inside_offset(row[LENGTH], p)
         elif row[ROW_KIND] == SPRING:
-            p = inside_spring(row[0] + row[2] * s, row[1] + 0.0 * s, p)
+            p = inside_spring(row[STIFFNESS] + row[LOSS] * s, row[COMPLIANCE] + 0.0 * s, p)
         else:
-            p = inside_body(row[0] * S + row[2], row[1] * S + row[3], p)
+            p = inside_body(row[MASS] * S + row[GROUND], row[INERTIA] * S + row[TURNING_GROUND], p)
         plane[i], plane[BLOCK + i], plane[2 * BLOCK + i], plane[3 * BLOCK + i], plane[4 * BLOCK + i] = p
 
 
@@ -166,7 +186,7 @@ def _go_back(points: Any, rows: Any, work: Work) -> None:
             cross_back(points, row, f, beyond, scale, work.faded, work.kept, number)
             f[:] = beyond
         elif row[ROW_KIND] == MARK:
-            left, mark = left - 1, int(row[0])
+            left, mark = left - 1, int(row[NUMBER])
             work.scales[mark], work.shifts[mark] = scale, shift
             _meet(f, work.marked[mark])
         else:
@@ -182,11 +202,11 @@ def _small_back(points: Any, row: Any, f: Any) -> None:
         s, S = points[i], points[i] * points[i]
         own = f[i], f[BLOCK + i], f[2 * BLOCK + i], f[3 * BLOCK + i]
         if row[ROW_KIND] == OFFSET:
-            own = beyond_offset(row[0], own)
+            own = beyond_offset(row[LENGTH], own)
         elif row[ROW_KIND] == SPRING:
-            own = beyond_spring(row[0] + row[2] * s, row[1] + 0.0 * s, own)
+            own = beyond_spring(row[STIFFNESS] + row[LOSS] * s, row[COMPLIANCE] + 0.0 * s, own)
         else:
-            own = beyond_body(row[0] * S + row[2], row[1] * S + row[3], own)
+            own = beyond_body(row[MASS] * S + row[GROUND], row[INERTIA] * S + row[TURNING_GROUND], own)
         f[i], f[BLOCK + i], f[2 * BLOCK + i], f[3 * BLOCK + i] = own
 
 

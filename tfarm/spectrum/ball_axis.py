@@ -12,7 +12,7 @@ import flint
 from tfarm.exact.balls import Ball, rational
 from tfarm.exact.chain import ElementChain
 from tfarm.exact.chain_balls import Sweep, drive_of
-from tfarm.exact.closed_form import from_waves
+from tfarm.exact.closed_form import from_waves, hub_condition, tip_conditions
 from tfarm.exact.coefficients import Coefficients
 from tfarm.exact.compiled import python_of
 from tfarm.exact.compound import Plane, across_waves
@@ -22,6 +22,7 @@ from tfarm.exact.system import System
 from .counting import end_row, steps_of
 
 _minors, _across_waves = python_of(from_waves), python_of(across_waves)
+_tip_conditions, _hub_condition = python_of(tip_conditions), python_of(hub_condition)
 
 MOST_AXIS_BITS = 40_000  # of working precision: a root that needs more is double
 BITS_A_DIGIT, SPARE_BITS = 3.33, 80  # log2 10, rounded up; and beyond the digits asked for, for what cancels
@@ -92,9 +93,8 @@ class ArmAxis:
 
     def _drive(self, waves: tuple[Ball, tuple[tuple[Ball, ...], ...]], row: list[Ball]) -> Ball:
         S, (one, two) = waves
-        tip = row[0] + row[1] * S, row[2], row[3] + row[4] * S, row[5]
-        theta, M0, _, _ = _minors(*one, *two, self._g * S, flint.arb(1), *tip)
-        return row[8] * M0 - (row[6] + row[7] * S) * theta  # the sign of g S is minus
+        theta, M0, _, _ = _minors(*one, *two, self._g * S, flint.arb(1), *_tip_conditions(row, S))
+        return -_hub_condition(row, S, theta, M0)  # the sign of g S is minus
 
 
 class UncertainError(Exception):
