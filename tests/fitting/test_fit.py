@@ -124,6 +124,27 @@ def test_noise_by_its_coherence_and_by_its_scatter():
     assert known.sigma == pytest.approx(sigma * abs(values), rel=1e-12)
 
 
+def test_a_value_of_0_beside_a_coherence_says_nothing():
+    """A line that was lost on the way, 0 with the coherence of its neighbours: the fit is that without it."""
+    omega = OMEGA[::4]
+    values = tfarm.transfer(LAB.having(hub_inertia=1.1 * LAB.hub_inertia), "root_moment")(1j * omega)
+    lost = np.arange(omega.size) == 12
+    one = {"output": "root_moment", "input": "hub_torque", "averages": 10}
+    found = [
+        fit(
+            LAB,
+            [tfarm.Measured(omega=w, values=H, coherence=np.full(w.size, 0.99), **one)],
+            ["hub.inertia"],
+            profile=False,
+        )
+        for w, H in ((omega, np.where(lost, 0.0, values)), (omega[~lost], values[~lost]))
+    ]
+    assert found[0].freedom == found[1].freedom
+    for each in found:
+        assert each.parameters[0].value == pytest.approx(1.1 * LAB.hub_inertia, rel=1e-6)
+        assert each.parameters[0].deviation == pytest.approx(found[1].parameters[0].deviation, rel=1e-6)
+
+
 def test_noise_that_is_not_said_comes_from_the_residuals():
     data = [
         tfarm.Measured(output=e.output, input=e.input, omega=e.omega, values=e.values)

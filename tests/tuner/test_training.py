@@ -137,6 +137,19 @@ def test_learning_stops_at_the_preset_error(trial, guards):
     np.testing.assert_array_equal(at_once.network.weights, initial_network(0).weights)
 
 
+@pytest.mark.parametrize("how", [{}, {"mode": "online"}, {"mode": "online", "sensitivity": "whole"}])
+def test_the_preset_error_is_reached_in_the_last_trial_too(trial, guards, how):
+    """After as many trials as were allowed, one or several; and not after fewer that all stayed above."""
+    eta, guard = 1e-9, guards["frozen"]  # so that all trials are alike
+    rms = np.sqrt(np.mean(trial.with_network(initial_network(0), guard.limits).x ** 2))
+    enough, too_little = (Learning(eta=eta, enough=share * rms, **how) for share in (1.001, 0.999))
+    assert train(trial, initial_network(0), guard, enough, 1).reached
+    first_of_many = train(trial, initial_network(0), guard, enough, 3)
+    assert (first_of_many.reached, first_of_many.costs.size) == (True, 1)
+    never = train(trial, initial_network(0), guard, too_little, 2)
+    assert (never.reached, never.costs.size, never.stopped) == (False, 2, None)
+
+
 @pytest.mark.parametrize("learning", [Learning(), Learning(mode="online"), Learning(rule="plain")])
 def test_the_same_seed_gives_the_same_bits(trial, guards, learning):
     first, second = (train(trial, initial_network(9), guards["frozen"], learning, 20) for _ in range(2))

@@ -48,7 +48,7 @@ def noise_of(data: Measured) -> Noise:
         with np.errstate(divide="ignore"):
             share = np.sqrt((1.0 - g) / (2.0 * (data.averages or 1) * g))
         sigma = np.asarray(size * np.maximum(share, LEAST_SHARE), dtype=float)
-        sigma[g == 0] = np.inf
+        sigma[(g == 0) | (size == 0)] = np.inf  # a share of nothing says nothing
         known = data.averages is not None
         road = f"coherence of {data.averages} averages" if known else "coherence, up to a factor"
         return Noise(sigma=sigma, is_known=known, road=road)

@@ -124,10 +124,10 @@ def resonance_at(data: Measured, sigma: Real, place: int) -> Resonance | None:
     """The pole and residue of the peak at a place; None where its lines do not tell them."""
     from scipy.optimize import least_squares
 
-    kept, x = _around(data, place), None
-    omega, values, weight = data.omega[kept], data.values[kept], 1 / np.clip(sigma[kept], 1e-300, 1e300)
+    kept = _around(data, place)
+    omega, values, weight = data.omega[kept], data.values[kept], 1 / sigma[kept]
     background = min(BACKGROUND, 2 * omega.size - 6)
-    if background < 1 or not np.isfinite(weight).all():
+    if background < 1:
         return None
     s, w = 1j * omega, float(data.omega[place])
 

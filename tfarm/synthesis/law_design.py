@@ -6,7 +6,7 @@ them.  It is run from the best of many starts about the sensible one, and once m
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import cast
 
@@ -19,8 +19,6 @@ from tfarm.dsp.brief import brief_of
 from tfarm.dsp.chain import chain_or_usual
 from tfarm.dsp.law_loop import SampledLaw
 from tfarm.dsp.law_verdict import law_verdict
-from tfarm.dsp.margins import most_modes
-from tfarm.dsp.verdict import UNDAMPED_MODES
 from tfarm.errors import ConvergenceError, ParameterError, did_you_mean
 from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.law_stability import law_stability
@@ -29,7 +27,7 @@ from tfarm.records import record
 from tfarm.synthesis.arms import NamedArm
 from tfarm.synthesis.law_judge import LAW_OBJECTIVES, LawJudge, law_judge
 from tfarm.synthesis.minimax import LOST, Pieces, ScoredPoint, minimax
-from tfarm.synthesis.sampled import FEWEST_MODES
+from tfarm.synthesis.sampled import mode_counts
 from tfarm.synthesis.structures import STRUCTURES, Structure, usual_angle_gain
 from tfarm.synthesis.together import OnArm, in_step, worst_value
 from tfarm.synthesis.worst_case import WITHOUT_BOX, Tell, WorstCase
@@ -89,7 +87,7 @@ def law_design(
     form = STRUCTURES[structure](arm, on_angle, modes, T)
     arms = (NamedArm(arm.name, arm, {}), *others)
     nearest = (np.inf, form.law(form.origin))
-    for counts in in_step([_counts(each.arm, chain, modes) for each in arms]):
+    for counts in in_step([mode_counts(each.arm, chain, modes) for each in arms]):
         judges = [
             law_judge(each.arm, chain, form.law(form.origin), objective, modes, count, arm)
             for each, count in zip(arms, counts, strict=True)
@@ -130,22 +128,9 @@ def _why_none(arms: Sequence[NamedArm], structure: str, law: Law, chain: Chain) 
 
 def law_score_on(found: LawDesign, arm: Arm) -> float:
     """What a design minimised, on another arm; `LOST` and more where the loop does not hold."""
-    count, known = next(_counts(arm, found.chain, found.modes)), found.verdict.loop.arm
+    count, known = next(mode_counts(arm, found.chain, found.modes)), found.verdict.loop.arm
     judge = law_judge(arm, found.chain, found.law, found.objective, found.modes, count, known)
     return judge.score(found.law)
-
-
-def _counts(arm: Arm, chain: Chain, modes: int) -> Iterator[int]:
-    """Flexible modes of the first model, and of larger ones where its best laws do not hold."""
-    if arm.has_elastic_link:
-        yield UNDAMPED_MODES
-        return
-    most = most_modes(arm, chain)
-    count = min(most, max(FEWEST_MODES, modes + FEWEST_MODES // 2))
-    while count < most:
-        yield count
-        count *= 2
-    yield most
 
 
 def _best(judges: Sequence[LawJudge], form: Structure, tell: Tell) -> list[ScoredPoint]:

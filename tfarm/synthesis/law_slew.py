@@ -17,16 +17,15 @@ import numpy as np
 from tfarm.arm import Arm, Law
 from tfarm.arm.blocks import Matrices
 from tfarm.arrays import LEAST_SIZE, Real
-from tfarm.dsp import Chain, Scenario, scenario
+from tfarm.dsp import Chain, Scenario
 from tfarm.dsp.chain import TIME_ROUNDING
 from tfarm.dsp.law_loop import acting_law
 from tfarm.dsp.law_simulate import references_of
-from tfarm.dsp.scenarios import TRIAL_COST, TRIAL_DURATION
+from tfarm.dsp.scenarios import TRIAL_COST
 from tfarm.records import record
 from tfarm.reduced.sensed import closed
-from tfarm.spectrum.scales import first_frequency
 from tfarm.synthesis.law_slopes import Clock
-from tfarm.synthesis.sampled import SAMPLES_LEFT, slew_cost
+from tfarm.synthesis.sampled import slew_and_after, slew_cost, slew_errors, trial_slew
 from tfarm.synthesis.structures import Slope
 
 SLEWED = ("residual", "cost")  # the objectives of a slew
@@ -62,21 +61,14 @@ class LawSlew:
             after = task.t >= task.busy_until * (1 - TIME_ROUNDING)
             value = np.sqrt((moment[after] ** 2).mean(axis=0))
             return value, (moment[after] * d_moment[after]).mean(axis=0)[None] / np.maximum(value, LEAST_SIZE)
-        a, b = (weight * task.period for weight in TRIAL_COST)
-        off, added = moment - task.rigid_moment[:, None], u - task.feedforward[:, None]
-        if self.chain.slew.reading == "total":
-            added = u
+        (a, b), (off, added) = (weight * task.period for weight in TRIAL_COST), slew_errors(task, self.chain, moment, u)
         value = slew_cost(task, self.chain, moment, u)
         return value, (a * off * d_moment + b * added * d_u).sum(axis=0)[None]
 
     @cached_property
     def _tasks(self) -> tuple[Scenario, Scenario]:
         """The slew with what follows it, and that of the tuner's trials."""
-        rise, T = self.chain.slew.rise_time, self.chain.sampling.period
-        left = max(2 * np.pi / first_frequency(self.arm), SAMPLES_LEFT * T)
-        lengths = (rise + left, max(rise, TRIAL_DURATION))
-        first, second = (scenario("slew", self.known, self.chain, length) for length in lengths)
-        return first, second
+        return slew_and_after(self.arm, self.known, self.chain), trial_slew(self.known, self.chain)
 
     def _run(self, A: Real, inputs: Real) -> tuple[Real, Real, Real]:
         """States (samples, states, n), root moment and input (samples, n), for inputs (samples, n) from rest."""

@@ -165,11 +165,6 @@ class SampledJudge:
 
     # ------------------------------------------------------------ residual
 
-    def _task(self, lasting: float) -> Scenario:
-        """The slew, and what follows it for so long [s]."""
-        chain = self.loop.chain
-        return scenario("slew", self.known, chain, chain.slew.rise_time + lasting)
-
     @cached_property
     def _with_angle(self) -> tuple[Real, Real, Real, Real]:
         """Closed-loop matrices with the hub angle: without both gains, what 1 of each adds; input, root moment."""
@@ -197,9 +192,7 @@ class SampledJudge:
 
     @cached_property
     def _slew(self) -> Scenario:
-        """The slew, and a period of the first mode."""
-        period = 2 * np.pi / first_frequency(self.loop.plant.arm)
-        return self._task(max(period, SAMPLES_LEFT * self.loop.chain.sampling.period))
+        return slew_and_after(self.loop.plant.arm, self.known, self.loop.chain)
 
     def residual(self, points: Real) -> Real:
         """Root mean square of the root moment [N m] over a period of the first mode after the slew."""
@@ -210,15 +203,30 @@ class SampledJudge:
     def cost(self, points: Real) -> Real:
         """What the trial of the tuner costs with constant gains."""
         chain = self.loop.chain
-        task = self._task(max(0.0, TRIAL_DURATION - chain.slew.rise_time))
+        task = trial_slew(self.known, chain)
         return slew_cost(task, chain, *self._run(task, points))
+
+
+def slew_and_after(arm: Arm, known: Arm, chain: Chain) -> Scenario:
+    """The slew made for the arm `known`, and a period of the first mode of the one that moves."""
+    left = max(2 * np.pi / first_frequency(arm), SAMPLES_LEFT * chain.sampling.period)
+    return scenario("slew", known, chain, chain.slew.rise_time + left)
+
+
+def trial_slew(known: Arm, chain: Chain) -> Scenario:
+    """The slew of the tuner's trials, made for the arm `known`."""
+    return scenario("slew", known, chain, max(chain.slew.rise_time, TRIAL_DURATION))
 
 
 def slew_cost(task: Scenario, chain: Chain, moment: Real, u: Real) -> Real:
     """T sum of (a x^2 + b e^2)/2 of a slew whose root moment and input are (samples, n)."""
-    a, b = TRIAL_COST
-    x, added = moment - task.rigid_moment[:, None], u - (chain.slew.reading == "vibration") * task.feedforward[:, None]
-    return np.asarray(task.period * (a * x**2 + b * added**2).sum(axis=0) / 2)
+    (a, b), (x, e) = TRIAL_COST, slew_errors(task, chain, moment, u)
+    return np.asarray(task.period * (a * x**2 + b * e**2).sum(axis=0) / 2)
+
+
+def slew_errors(task: Scenario, chain: Chain, moment: Real, u: Real) -> tuple[Real, Real]:
+    """x and e of the tuner's cost, from root moment and input (samples, n) at the samples of a slew."""
+    return moment - task.rigid_moment[:, None], u - (chain.slew.reading == "vibration") * task.feedforward[:, None]
 
 
 def sampled_judges(
@@ -229,13 +237,21 @@ def sampled_judges(
     `known`, if not the arm itself, is the one that slews are made for.
     """
     law = held.at(1.0, 0.5 * arm.input_per_torque)
-    most = UNDAMPED_MODES if arm.has_elastic_link else most_modes(arm, chain)
-    count = most if arm.has_elastic_link else min(most, max(FEWEST_MODES, modes + FEWEST_MODES // 2))
-    while True:
+    for count in mode_counts(arm, chain, modes):
         yield SampledJudge(sampled_loop(arm, law, chain, count=count), objective, modes, known or arm)
-        if count >= most:
-            return
-        count = min(2 * count, most)
+
+
+def mode_counts(arm: Arm, chain: Chain, modes: int) -> Iterator[int]:
+    """Flexible modes of the first model, and of larger ones where what is best there does not hold."""
+    if arm.has_elastic_link:
+        yield UNDAMPED_MODES
+        return
+    most = most_modes(arm, chain)
+    count = min(most, max(FEWEST_MODES, modes + FEWEST_MODES // 2))
+    while count < most:
+        yield count
+        count *= 2
+    yield most
 
 
 def higher_poles(pulse: PulseTransfer, modes: int) -> list[complex]:

@@ -8,6 +8,7 @@ the arm that it was trained on, whatever arm moves.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -21,7 +22,7 @@ from tfarm.tuner.constants import best_constant
 from tfarm.tuner.controller import TunedGain, judged, tip_off
 from tfarm.tuner.guard import Guard
 from tfarm.tuner.sector import MovingGain
-from tfarm.tuner.shaping import shaped, shaper
+from tfarm.tuner.shaping import SHAPERS, Shaper, shaped_trial
 from tfarm.tuner.trial import Record, Trial, residual_rms
 
 ADDED_MASSES = (0.06, 0.15, 0.3)  # of the arm's mass, for one without payload: 0.1, 0.25 and 0.5 kg on the paper's
@@ -127,24 +128,26 @@ def compare_controllers(
     """A row a condition; `trial` is the one that the tuner was trained on, `nominal` its best constant gain."""
     nominal = best_constant(trial).gain if nominal is None else nominal
     wanted = tried_loops(trial.arm, trial.loop.chain) if listed is None else listed
-    return [_row(trial, gain, guard, nominal, each) for each in wanted]
+    late = {kind: shaped_trial(trial, kind).task for kind in SHAPERS}
+    return [_row(trial, gain, guard, nominal, late, each) for each in wanted]
 
 
-def _row(trial: Trial, gain: TunedGain, guard: Guard, nominal: float, condition: NamedLoop) -> Outcomes:
+def _row(
+    trial: Trial, gain: TunedGain, guard: Guard, nominal: float, late: Mapping[Shaper, Scenario], condition: NamedLoop
+) -> Outcomes:
+    """What each controller makes of a condition; `late` are the slews through the shapers."""
     here = trial.asked_of(condition.arm, condition.chain, gain.servo)
     own = best_constant(here)
-    shapers = {kind: shaped(trial.task, shaper(trial.loop, kind)) for kind in ("ZV", "EI")}
-    bound = lq_bound(here)
     return Outcomes(
         condition=condition.name,
         without=_constant(here, here.task, 0.0),
         best_constant=_constant(here, here.task, nominal),
         own_constant=_constant(here, here.task, own.gain),
         own_gain=own.gain,
-        ZV=_constant(here, shapers["ZV"], 0.0),
-        EI=_constant(here, shapers["EI"], 0.0),
+        ZV=_constant(here, late["ZV"], 0.0),
+        EI=_constant(here, late["EI"], 0.0),
         tuner=_played(gain.run(here.simulator()), here),
-        bound=_outcome(bound, here.task),
+        bound=_outcome(lq_bound(here), here.task),
         proven=guard.is_proven and _proven(here, guard),
     )
 

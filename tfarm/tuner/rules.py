@@ -24,6 +24,7 @@ from .kernel import (
     trial_cost,
 )
 
+NEVER, ENOUGH = -1, -2  # in place of the sample where a trial was stopped: none was, or x had become small enough
 PLAIN_RULE, CLIPPED_RULE, BACKTRACKING_RULE = range(3)  # as compiled code tells them
 X, U, E, K = range(4)  # rows of the derivatives that `_derive` carries, of the signals now
 BEFORE = 4  # rows further are those of the sample before, and as many further again those of the one before that
@@ -69,10 +70,10 @@ def learn_by_trials(
 ) -> tuple[int, int]:
     """Learning after each trial; fills `costs`, changes `weights`.
 
-    Returns how many trials were made and the sample at which the last one passed the bound (-1: none did); `weights`
-    are then those of the last trial that did not.  Under BACKTRACKING_RULE a trial that costs more than the last
-    accepted one is taken back, its step shortened and the momentum set to zero; an accepted one lets the step grow
-    again, up to its full size.
+    Returns how many trials were made and the sample at which the last one passed the bound, NEVER or ENOUGH; where it
+    passed it, `weights` are those of the last trial that did not.  Under BACKTRACKING_RULE a trial that costs more than
+    the last accepted one is taken back, its step shortened and the momentum set to zero; an accepted one lets the step
+    grow again, up to its full size.
     """
     n, size = run.x.size, weights.size
     gradient, change, kept, slope = np.zeros(size), np.zeros(size), weights.copy(), np.zeros(size)
@@ -87,11 +88,11 @@ def learn_by_trials(
             change.fill(0.0)
             _step(weights, change, slope, steps, share)
             continue
-        if done < n or not isfinite(cost):
+        if not isfinite(cost):
             copied(kept, weights)
             return trial + 1, done
         if _rms(run.x) < steps.enough:
-            return trial + 1, -1
+            return trial + 1, ENOUGH
         backward(setting, weights, run, work, gradient)
         copied(weights, kept)
         if rule == BACKTRACKING_RULE:
@@ -101,7 +102,7 @@ def learn_by_trials(
         _step(weights, change, gradient, steps, share)
     if rule == BACKTRACKING_RULE:
         copied(kept, weights)
-    return costs.size, -1
+    return costs.size, NEVER
 
 
 @compiled
@@ -131,8 +132,8 @@ def learn_by_samples(
             act(k, setting, weights, run, work)
         costs[trial] = trial_cost(n, numbers, run)
         if _rms(run.x) < steps.enough:
-            return trial + 1, -1
-    return costs.size, -1
+            return trial + 1, ENOUGH
+    return costs.size, NEVER
 
 
 @inlined
@@ -204,5 +205,5 @@ def learn_by_sensitivities(
             _step(weights, change, gradient, steps, 1.0)
         costs[trial] = trial_cost(n, setting.numbers, run)
         if _rms(run.x) < steps.enough:
-            return trial + 1, -1
-    return costs.size, -1
+            return trial + 1, ENOUGH
+    return costs.size, NEVER

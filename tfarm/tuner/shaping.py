@@ -26,6 +26,7 @@ from tfarm.dsp.chain import TIME_ROUNDING
 from tfarm.tuner.trial import Trial
 
 Shaper = Literal["ZV", "EI"]
+SHAPERS: tuple[Shaper, ...] = ("ZV", "EI")
 
 SHAPED_MODES = 2  # which a slew excites most
 TOLERATED = 0.05  # V: the share of the vibration that EI leaves at the mode itself, as its authors have it

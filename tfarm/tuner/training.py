@@ -128,7 +128,7 @@ def train(trial: Trial, network: Network, guard: Guard, learning: Learning, tria
     learnt = network.with_weights(weights)
     result = trial.with_network(learnt, guard.limits)
     stopped = Stopped(made - 1, int(sample), trial.numbers.bound) if sample >= 0 else None
-    return Training(learnt, guard, costs[:made], result, stopped, made < trials and stopped is None)
+    return Training(learnt, guard, costs[:made], result, stopped, sample == rules.ENOUGH)
 
 
 def _learn(

@@ -23,7 +23,7 @@ from tfarm.tuner.controller import TunedGain, tip_off
 from tfarm.tuner.guard import GuardKind, find_guard
 from tfarm.tuner.network import PAPER_HIDDEN, PAPER_INPUTS, initial_network
 from tfarm.tuner.saving import SavedTuner, weights_answer
-from tfarm.tuner.shaping import shaped_trial
+from tfarm.tuner.shaping import SHAPERS, shaped_trial
 from tfarm.tuner.training import Learning, Training, train
 from tfarm.tuner.trial import (
     TRIAL_MODES,
@@ -164,7 +164,7 @@ def tune(arm: Arm, plan: Plan | None = None, chain: Chain | None = None) -> Tuni
     best = best_constant(trial)
     guard = find_guard(trial.loop, plan.guard, best.gain)
     training = train(trial, network, guard, plan.learning, plan.trials)
-    shaped = {kind: shaped_trial(trial, kind) for kind in ("ZV", "EI")}
+    shaped = {kind: shaped_trial(trial, kind) for kind in SHAPERS}
     return Tuning(
         trial=trial,
         plan=plan,
