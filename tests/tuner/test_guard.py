@@ -165,9 +165,10 @@ def test_a_planted_unstable_end_is_not_proven(loop):
     assert not replace(proof, high=loop.at(0.31), P=-alone).is_proven()
 
 
-def test_an_unstable_middle_has_no_lyapunov_function_and_says_so_quietly():
+@pytest.mark.parametrize("fastest", [1.0, 1.2])
+def test_a_middle_that_is_not_stable_has_no_lyapunov_function_and_says_so_quietly(fastest):
     """No overflow on the way: warnings are errors here."""
-    A, b = np.diag([1.5, 0.3]), np.ones(2)
+    A, b = np.diag([fastest, 0.3]), np.ones(2)
     assert common_lyapunov(A, b, b, A, A) is None
 
 
@@ -215,6 +216,14 @@ def test_modes_are_quiet_where_they_lose_more_than_the_feedback_could_give():
     edge = (0.05 / hold / 2 - 0.5 * 0.01) / 0.02
     assert upper_modes_are_quiet(loop, 0.999 * edge)
     assert not upper_modes_are_quiet(loop, 1.001 * edge)
+
+
+def test_the_larger_model_says_whether_the_modes_left_out_are_quiet(lab):
+    """Mode 2 of two is driven by a gain of 1, those above mode 12 are not."""
+    few, many = (sampled_loop(lab, HubFeedback(K1=0.3, K2=1.0), count=count) for count in (2, 24))
+    assert not upper_modes_are_quiet(few, 1.0)
+    assert guard._settled([few, many], [(0.0, 1.0)] * 2)
+    assert not guard._settled([many, few], [(0.0, 1.0)] * 2)
 
 
 def test_the_frozen_guard_is_stable_inside_and_not_beyond(lab):

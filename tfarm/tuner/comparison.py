@@ -7,7 +7,6 @@ the arm that it was trained on, whatever arm moves.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -23,7 +22,7 @@ from tfarm.tuner.controller import TunedGain, judged, tip_off
 from tfarm.tuner.guard import Guard
 from tfarm.tuner.sector import MovingGain
 from tfarm.tuner.shaping import SHAPERS, Shaper, shaped_trial
-from tfarm.tuner.trial import Record, Trial, residual_rms
+from tfarm.tuner.trial import Trial, residual_rms
 
 ADDED_MASSES = (0.06, 0.15, 0.3)  # of the arm's mass, for one without payload: 0.1, 0.25 and 0.5 kg on the paper's
 PAYLOAD_SHARES = (0.5, 1.5, 2.0)  # of the payload, for one that has one
@@ -137,7 +136,7 @@ def _row(
 ) -> Outcomes:
     """What each controller makes of a condition; `late` are the slews through the shapers."""
     here = trial.asked_of(condition.arm, condition.chain, gain.servo)
-    own = best_constant(here)
+    own, bound = best_constant(here), lq_bound(here)
     return Outcomes(
         condition=condition.name,
         without=_constant(here, here.task, 0.0),
@@ -147,7 +146,7 @@ def _row(
         ZV=_constant(here, late["ZV"], 0.0),
         EI=_constant(here, late["EI"], 0.0),
         tuner=_played(gain.run(here.simulator()), here),
-        bound=_outcome(lq_bound(here), here.task),
+        bound=Outcome(bound.cost, residual_rms(bound, here.task.busy_until), None),
         proven=guard.is_proven and _proven(here, guard),
     )
 
@@ -167,11 +166,5 @@ def _constant(trial: Trial, task: Scenario, K: float) -> Outcome:
 
 
 def _played(run: Simulation, trial: Trial) -> Outcome:
-    outcome = _outcome(judged(run, trial.cost, trial.signals), run.scenario)
-    return outcome if math.isinf(outcome.cost) else outcome._replace(tip_error=tip_off(run, trial))
-
-
-def _outcome(record: Record, task: Scenario) -> Outcome:
-    if record.stopped is not None or not math.isfinite(record.cost):
-        return Outcome(math.inf, math.inf, None)
-    return Outcome(record.cost, residual_rms(record, task.busy_until), None)
+    record = judged(run, trial.cost, trial.signals)
+    return Outcome(record.cost, residual_rms(record, run.scenario.busy_until), tip_off(run, trial))
