@@ -56,6 +56,15 @@ def test_crossings_are_where_a_delay_takes_the_phase_margin():
     assert first.omega == pytest.approx(margin.at["delay"], rel=1e-5)
 
 
+def test_a_pole_that_leaves_at_the_right_as_a_filter_turns_over_is_named():
+    """1/(T s + 1) has its pole at -1/T: it goes through infinity at T = 0, where the locus runs from T < 0 to T > 0."""
+    found = law_locus(LAB, LAW, "hub_angle.den.0", -0.02, 0.03, 9, 3)
+    (far,) = [each for each in found.crossings if np.isinf(each.omega)]
+    assert (far.gain, far.branch, far.direction) == (0.0, None, "stable")
+    back = law_locus(LAB, LAW, "hub_angle.den.0", 0.03, -0.02, 9, 3)
+    assert "unstable" in [each.direction for each in back.crossings if np.isinf(each.omega)]
+
+
 def test_poles_are_told_apart_or_it_is_said():
     box = Box(-10.0, 10.0, -10.0, 10.0)
     pairs, plain = assigned(np.array([1 + 2j, -3 + 4j]), np.array([-3 + 4.1j, 1.05 + 2j]), box)

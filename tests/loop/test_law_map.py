@@ -12,6 +12,7 @@ from tfarm import HubFeedback, Law, ParameterError
 from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.law_map import law_map, unstable_below
 from tfarm.loop.law_stability import band_for, law_stability
+from tfarm.loop.lines import through_infinity
 from tfarm.loop.regions import between
 
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
@@ -46,6 +47,29 @@ def test_the_band_is_enough_for_each_corner(x, y):
     found = law_map(LAB, LAW, vary, np.linspace(*x, 3), np.linspace(*y, 3))
     corners = [LAW.having(vary[0], a).having(vary[1], b) for a in x for b in y]
     assert found.band == max(band_for(LawLoop(LAB, law)) for law in corners)
+
+
+@pytest.mark.parametrize("vary", [("hub_angle.den.0", "gain"), ("gain", "hub_angle.den.0")])
+def test_where_a_filter_turns_over_a_pole_has_passed_infinity(vary):
+    """With T < 0 in T s + 1 a pole is unstable that no crossing of the axis brought there."""
+    ranges = {"hub_angle.den.0": [-0.1, -0.03, -0.01, 0.01, 0.03], "gain": [-1.0, 1.0, 5.0, 20.0]}
+    x, y = (np.array(ranges[each]) for each in vary)
+    found = law_map(LAB, LAW, vary, x, y)
+    for i, j in np.ndindex(x.size, y.size):
+        loop = LawLoop(LAB, LAW.having(vary[0], x[i]).having(vary[1], y[j]))
+        assert unstable_below(loop, found.band) == found.unstable[j, i]
+
+
+def test_the_gain_that_takes_up_all_waves_of_an_arm_without_a_hub_brings_a_pole_to_infinity():
+    """At C = 0 a hub without inertia feels the impedance of an endless beam far right: I sqrt(E rho)."""
+    arm = BARE.having(hub_inertia=0.0)
+    far = np.array([1e6, 1e7, 1e8], complex) * tfarm.modes(arm, 1).natural_frequency[1]
+    drive, (rate,), _ = LawLoop(arm, Law({"hub_rate": 1.0})).signals.parts(far)
+    impedance = arm.link.section.second_moment * np.sqrt(arm.link.youngs_modulus * arm.link.density)
+    found = through_infinity(drive, rate)
+    assert (found.at, found.change) == (np.inf, -1)  # right of the axis at smaller gains alone, farther right
+    assert found.t == pytest.approx(-impedance, rel=1e-8)
+    assert through_infinity(drive * far, rate) is None
 
 
 def test_over_gains_at_the_hub_it_is_their_map():

@@ -35,8 +35,9 @@ LEAST_RTOL = 4 * float(np.finfo(float).eps)  # that SciPy's brentq takes
 class BranchCrossing:
     """One branch of a locus crosses the imaginary axis at s = i `omega` [rad/s], where what varies is `gain`.
 
-    `branch` is its number in the locus, None for a pole on none of them, or between two points; `direction` is
-    "unstable" where the real part becomes positive as the locus runs, and "stable" where it becomes negative.
+    `omega` is 0 or infinite where a real pole goes through the origin or through infinity.  `branch` is its number in
+    the locus, None for a pole on none of them, or between two points; `direction` is "unstable" where the real part
+    becomes positive as the locus runs, and "stable" where it becomes negative.
     """
 
     gain: float

@@ -27,10 +27,12 @@ from .frequencies import grid
 from .law_loop import LawLoop
 from .law_poles import law_box
 from .law_stability import band_for
-from .lines import ascending, through_origin
+from .lines import ascending, through_infinity, through_origin
 
 MOST_MAP_VALUES = 400  # along one number: each column is a line of crossings of its own
 NEAR_ORIGIN = (1e-6, 5e-7)  # of the lowest frequency: where a real pole is looked for on its way through 0
+FAR_RIGHT = (1e5, 1e6, 1e7)  # of w1: where one is looked for on its way through infinity
+SAME_VALUE = 1e-9  # of the range: values nearer to each other are one
 ORDER_READ_AT = (2e-3, 1e-3)  # of w1: where the order of a zero at s = 0 is read off
 SIMPLE = 3.0  # ratio of values at the first and the second: 2 of a simple zero, 4 of a double one
 BESIDE_MEETING = 1e-3  # of the range: how far from such a place its counts are taken
@@ -125,7 +127,8 @@ def unstable_below(loop: LawLoop, band: float) -> int:
 def law_crossings(loop: LawLoop, name: str, values: Real, omega: Real, known: LoopParts, band: float) -> Crossings:
     """The crossings of the axis along one number of a loop's law, between its first and last value.
 
-    D = A + t B, 0 < t < 1; `known` are the parts of the loop's signals at `omega`.
+    D = A + t B, 0 < t < 1; `known` are the parts of the loop's signals at `omega`.  Where the leading coefficient of a
+    denominator changes its sign a real pole passes through infinity.
     """
     low, span = float(values[0]), float(values[-1] - values[0])
     first, last = (loop.under(loop.law.having(name, float(end))) for end in (values[0], values[-1]))
@@ -145,13 +148,20 @@ def law_crossings(loop: LawLoop, name: str, values: Real, omega: Real, known: Lo
         is_single = zero < SIMPLE * half
         more = rest.change if is_single else _change_at(loop, name, low, span, rest.t, found, band)
         found.append(Crossing(low + span * rest.t, 0.0, more))
+    if name.endswith(".den.0") and low < 0 < low + span:
+        with np.errstate(over="ignore", invalid="ignore"):  # a law of high order is beyond any number there
+            far = through_infinity(*parts(first_frequency(loop.arm) * np.array(FAR_RIGHT) + 0j))
+        found += [] if far is None else [far._replace(t=0.0)]
     return Crossings.of(found)
 
 
 def _change_at(loop: LawLoop, name: str, low: float, span: float, t: float, others: list[Crossing], band: float) -> int:
-    """By how much the count grows at t where two poles meet at s = 0, from counts on either side."""
+    """By how much the count grows at t where two poles meet at s = 0, from counts on either side.
+
+    Without losses every mode may be on the axis at that value: what these crossings change is not counted again.
+    """
     at = low + span * t
-    away = [abs(each.t - at) for each in others if each.t != at]
-    step = min([BESIDE_MEETING * span, *(each / 2 for each in away)])
+    away = [(abs(each.t - at), each.change) for each in others]
+    step = min([BESIDE_MEETING * span, *(each / 2 for each, _ in away if each > SAME_VALUE * span)])
     below, above = (unstable_below(loop.under(loop.law.having(name, at + side * step)), band) for side in (-1, 1))
-    return above - below
+    return above - below - sum(change for each, change in away if each < step)

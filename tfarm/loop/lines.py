@@ -9,6 +9,7 @@ K2 = 1; `windows` knows that case, and `lossless` that of other gauges.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,6 +30,7 @@ from .plant import effective_inertia, slow_terms
 NO_FEEDBACK = HubFeedback()  # every gain 0
 SAME_FREQUENCY = 1e-12  # of a frequency: nearer than this are two numbers for one
 FINITE_LIMIT = 1.5  # times the gain at the farther of two small s: more at the nearer one is a gain without a limit
+STILL_GROWS = 0.75  # of the step before: by more, of places ever farther right, a gain without a limit grows
 JUST_BEYOND = 1.01  # of a band: natural frequencies up to there, as one may be at its end
 NEARLY_AT_REST = 1e-7  # of the lowest frequency: values there are those at s = 0 to as many digits
 
@@ -124,6 +126,20 @@ def through_origin(N: Complex, P: Complex) -> Crossing | None:
     if not abs(near) < FINITE_LIMIT * abs(far):
         return None
     return Crossing(float(2 * near - far), 0.0, 1 if far > near else -1)
+
+
+def through_infinity(N: Complex, P: Complex) -> Crossing | None:
+    """A real pole through infinity, from N and P at three real s far right, each so many times the one before.
+
+    None where t has no limit there.
+    """
+    if not P.all():
+        return None
+    first, second, third = -(N / P).real
+    before, last = second - first, third - second
+    if not abs(last) < STILL_GROWS * abs(before):
+        return None
+    return Crossing(float(third + last * last / (before - last)), math.inf, 1 if before < 0 else -1)
 
 
 def ascending(name: str, values: Any, most: int) -> Real:
