@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import MISSING, Field, fields, is_dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from html import escape
 from typing import Any, TypeVar
 
@@ -19,6 +19,7 @@ _Class = TypeVar("_Class", bound=type[Any])
 SHOWN_FIRST = ("verdict", "word", "text", "finding", "unstable", "worst_error")  # what was found, before all else
 LONGEST_REPR = 200  # characters of a repr: a line or two of a terminal
 LONGEST_ENTRY, LONGEST_FINDING = 60, 100  # characters of an entry of it, and of what was found
+PLAIN = (float, int, str, bool, type(None))  # kinds that hold no array: most entries of most records
 SHOWN_SINGLY = 3  # numbers that are shown one by one
 
 
@@ -35,10 +36,12 @@ def record(cls: _Class) -> _Class:
     def after_init(self: Any) -> None:
         if after is not None:
             after(self)
-        for each in fields(self):
-            held = read_only(value := getattr(self, each.name))
-            if held is not value:
-                object.__setattr__(self, each.name, held)
+        kind: Any = type(self)
+        for name in _names_of(kind):
+            if type(value := getattr(self, name)) in PLAIN:
+                continue
+            if (held := read_only(value)) is not value:
+                object.__setattr__(self, name, held)
 
     for value in vars(cls).values():
         if isinstance(value, cached_property):
@@ -53,6 +56,11 @@ def record(cls: _Class) -> _Class:
     for name, method in methods.items():
         setattr(cls, name, method)
     return cls
+
+
+@cache
+def _names_of(cls: type[Any]) -> tuple[str, ...]:
+    return tuple(each.name for each in fields(cls))
 
 
 def read_only(value: Any) -> Any:

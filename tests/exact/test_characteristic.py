@@ -14,13 +14,25 @@ from tests.spectrum.damped_roads import delta, newton_step, shot
 from tests.strategies import ENDS, some_arm, some_s
 from tfarm import HubFeedback
 from tfarm.exact.balls import point, precision
-from tfarm.exact.characteristic import NO_GAINS, characteristic, gains_of, quick_characteristic, zeros_at_origin
+from tfarm.exact.characteristic import (
+    NO_GAINS,
+    as_column,
+    characteristic,
+    gains_of,
+    quick_characteristics,
+    zeros_at_origin,
+)
 from tfarm.exact.coefficients import coefficients
 from tfarm.exact.wide_balls import characteristic_ball, characteristic_over, tangent
 
 EPS = np.finfo(float).eps
 LAW = {"Kp": 2.0, "K1": 0.3, "K2": 0.4}
 S = np.array([1.0, 1j, -3 + 40j, 2 + 900j, -2e3 + 5e3j, 1e-3j, -5e4])
+
+
+def quick_characteristic(k, s, gains=NO_GAINS, at_zero=0):
+    """With slopes from differences."""
+    return quick_characteristics(k, s, as_column(gains), at_zero)
 
 
 def arm_at(case, seed=5, damping=1e-5):

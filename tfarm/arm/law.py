@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -123,7 +124,7 @@ class Law:
                 num, den = (f"[{', '.join(f'{each:.6g}' for each in of)}]" for of in (block.num, block.den))
                 yield part.signals[0], num[1:-1] if len(block.num) == 1 and block.den == (1.0,) else f"({num}, {den})"
 
-    @property
+    @cached_property
     def signals(self) -> tuple[str, ...]:
         """The signals that are fed back, each once."""
         return tuple(dict.fromkeys(name for part in self.parts for name in part.signals if is_measured(name)))

@@ -145,6 +145,10 @@ class PulseTransfer:
         States: real and imaginary part of the amplitude of each pole with Im p > 0, the amplitude of each real one, the
         double integral and the integral of the torque, and u_{k-1} to u_{k-d-1}.
         """
+        return self._matrices
+
+    @cached_property
+    def _matrices(self) -> tuple[Real, Real, Real]:
         upper, real = self.kept()
         n, d = self.integrals_at + 2, self.sampling.whole_delay
         A, B = np.zeros((n + d + 1, n + d + 1)), np.zeros(n + d + 1)

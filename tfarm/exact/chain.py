@@ -58,10 +58,10 @@ class ElementChain:
 
     @cached_property
     def kept(self) -> dict[Any, Any]:
-        """What is laid out of it once (`chain_values.readings`), with the chain and gone with it."""
+        """What is laid out or worked out of it once (`chain_values.readings`), with the chain and gone with it."""
         return {}
 
-    @property
+    @cached_property
     def segments(self) -> tuple[Segment, ...]:
         """The uniform pieces, from the outermost inwards."""
         return tuple(each for each in self.elements if isinstance(each, Segment))
@@ -99,7 +99,7 @@ class ElementChain:
             return 0
         return 1 if self.drive.friction or self.drive.back_emf else 2
 
-    @property
+    @cached_property
     def singular(self) -> tuple[float, ...]:
         """-1/C [1/s] of each damped segment, ascending: there eigenvalues accumulate."""
         return tuple(sorted({-1.0 / each.damping for each in self.segments if each.damping}))

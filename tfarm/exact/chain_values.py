@@ -27,6 +27,7 @@ SLOPE_RADIUS = 0.3  # of that circle, of |s| over the phase of all waves: the 16
 CLEAR_OF_SINGULAR = 0.1  # of the way to a -1/C: its radius at most
 SERIES_BITS = 512  # of the power series at s = 0, whose coefficients are sums of small differences
 KNOWN_ZERO = 1e-80  # a coefficient below this share of the first is a zero that balls cannot know
+LAYOUTS_KEPT = 256  # of one chain: more places than a page looks at
 SERIES_ORDER = 8  # of the power series: the drive begins at s^2 at most
 
 
@@ -112,6 +113,8 @@ def readings(chain: ElementChain, wanted: tuple[Output, ...], x: float) -> Readi
     """The outputs of a chain, laid out: once for each chain."""
     key = wanted, x
     if key not in chain.kept:
+        if len(chain.kept) >= LAYOUTS_KEPT:
+            chain.kept.clear()
         chain.kept[key] = laid_out(chain, wanted, [x] * len(wanted))
     return chain.kept[key]
 

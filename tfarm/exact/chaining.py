@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
+from functools import lru_cache
 
 from tfarm.arm import Arm, Attachment, Link, RotarySpring, Theory
 
 from .chain import ElementChain
-from .coefficients import scaled_inertia, stiffness_of, uniform
+from .coefficients import SYSTEMS_KEPT, scaled_inertia, stiffness_of, uniform
 from .elements import Body, Drive, Element, Offset, Place, Segment, Spring
 
 
+@lru_cache(maxsize=SYSTEMS_KEPT)
 def chain_of(arm: Arm, theory: Theory | None = None) -> ElementChain:
     """The chain of an arm under its own theory, or another."""
     theory = theory or arm.theory

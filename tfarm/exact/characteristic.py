@@ -15,13 +15,14 @@ from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from functools import reduce
 from operator import add
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import AT_HUB, FED_BACK, GAINS, Arm, HubFeedback
 from tfarm.arrays import Complex, Real
+from tfarm.records import read_only
 
 from .chain import ElementChain
 from .chain_values import free_outputs, free_slopes
@@ -49,8 +50,10 @@ def loop_system(arm: Arm) -> System:
 
 
 def unit_gains(k: System) -> Gains:
-    """What a gain of one SI unit is without dimensions."""
-    return tuple(unit_scale(OUTPUTS[gain.output], k) for gain in GAINS)
+    """What a gain of one SI unit is without dimensions: worked out once for each system."""
+    if "unit gains" not in k.kept:
+        k.kept["unit gains"] = tuple(unit_scale(OUTPUTS[gain.output], k) for gain in GAINS)
+    return cast("Gains", k.kept["unit gains"])
 
 
 def gains_of(k: System, law: HubFeedback) -> Gains:
@@ -126,13 +129,16 @@ def deflated(value: Complex, slope: Complex, scale: Complex, s: Complex, at_zero
     return Analytic(value, slope, scale)
 
 
-def quick_characteristic(k: System, s: Complex, gains: Gains = NO_GAINS, at_zero: int = 0) -> Analytic:
-    """The same with slopes from differences, right to about 1e-8: thirty times as fast for a hundred points."""
-    return quick_characteristics(k, s, np.array([[float(gain)] for gain in gains]), at_zero)
+def as_column(gains: Gains) -> Real:
+    """Gains without dimensions as the one row of them that all points have (gains, 1)."""
+    return np.array([[float(gain)] for gain in gains])
 
 
 def quick_characteristics(k: System, s: Complex, rows: Real, at_zero: int = 0) -> Analytic:
-    """`quick_characteristic` with gains of their own at each point: rows (gains, n) or (gains, 1), dimensionless."""
+    """`characteristic` with slopes from differences, right to about 1e-8: thirty times as fast for a hundred points.
+
+    With gains of their own at each point, rows (gains, n), or one `as_column` (gains, 1), dimensionless.
+    """
     if isinstance(k, ElementChain):
         s = np.asarray(s, dtype=complex)
         h = difference_steps(k, s)
@@ -150,7 +156,9 @@ def quick_characteristics(k: System, s: Complex, rows: Real, at_zero: int = 0) -
 
 def float_units(k: System) -> Real:
     """`unit_gains` as a column of doubles: SI outputs per numerator without dimensions."""
-    return np.array([[float(unit)] for unit in unit_gains(k)])
+    if "float units" not in k.kept:
+        k.kept["float units"] = read_only(np.array([[float(unit)] for unit in unit_gains(k)]))
+    return cast("Real", k.kept["float units"])
 
 
 def difference_steps(k: System, s: Complex) -> Real:

@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from tfarm.errors import ParameterError
 from tfarm.records import record
 
 Inertia = Fraction | float  # a fraction, or math.inf
+SYSTEMS_KEPT = 64  # arms whose exact numbers are kept: one page asks for those of one arm some thousand times
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,6 +108,11 @@ class Coefficients:
         return replace(self, damping=self.damping * share)
 
     @cached_property
+    def kept(self) -> dict[Any, Any]:
+        """What is worked out of it once (`characteristic.unit_gains`), with it and gone with it."""
+        return {}
+
+    @cached_property
     def kernel(self) -> NDArray[np.float64]:
         """The vector that the compiled functions of `waves` read (see `vector`)."""
         split = [part for value in (self.a, self.b, self.g) for part in double_double(value)]
@@ -121,6 +128,7 @@ def double_double(value: Fraction) -> tuple[float, float]:
     return high, float(value - Fraction(high))
 
 
+@lru_cache(maxsize=SYSTEMS_KEPT)
 def coefficients(arm: Arm, theory: Theory = "timoshenko") -> Coefficients:
     """The coefficients of the arm under one of `THEORIES`.
 

@@ -125,10 +125,12 @@ def _left(member: Member, zeros: Complex) -> Callable[[Complex], Complex] | None
 
 def predicted(nodes: list[Node], at: float) -> Complex:
     """The pairs by polynomials through the last nodes, `NODES_BACK` at most, of what stays smooth."""
-    guess = nodes[-1].zeros
-    for number in range(2, min(NODES_BACK, len(nodes)) + 1):
-        longer = through_nodes(nodes[-number:], at)
-        guess = np.where(np.isnan(longer), guess, longer)
+    guess = np.full_like(nodes[-1].zeros, np.nan)
+    for number in range(min(NODES_BACK, len(nodes)), 0, -1):  # a shorter one where the longer says nothing
+        shorter = through_nodes(nodes[-number:], at) if number > 1 else nodes[-1].zeros
+        guess = np.where(np.isnan(guess), shorter, guess)
+        if not np.isnan(guess).any():
+            break
     return guess
 
 
@@ -145,18 +147,22 @@ def through_nodes(nodes: list[Node], at: float | Real) -> Complex:
     zeros = np.stack([node.zeros for node in nodes])
     mean, half = zeros.mean(2).real, (zeros[..., 0] - zeros[..., 1]) / 2
     square = (half * half).real
-    pairs = as_pairs(weights @ mean, weights @ square)
+    found = as_pairs(weights @ mean, weights @ square)
     slow = zeros[..., 0].real
     far = ((square > FAR_APART * mean**2) & (slow * slow[0] > 0)).all(0)
-    inverse = weights @ np.where(far, 1 / np.where(far, slow, 1), 1)
-    apart = np.stack([1 / np.where(inverse == 0, 1, inverse), weights @ zeros[..., 1].real], -1)
-    found = np.where(far[:, None], apart, pairs)
     pinned: NDArray[np.bool_] = np.all(zeros[..., 0] == 0, axis=0)
-    beside = 2 * (weights @ mean)
-    found = np.where(pinned[:, None], np.stack([0 * beside, beside], -1), found)
     alone: NDArray[np.bool_] = np.all(np.isnan(zeros[..., 1]), axis=0)
-    nothing = np.full_like(beside, np.nan)
-    return np.where(alone[:, None], np.stack([weights @ zeros[..., 0].real, nothing], -1), found)
+    if far.any():
+        inverse = weights @ np.where(far, 1 / np.where(far, slow, 1), 1)
+        apart = np.stack([1 / np.where(inverse == 0, 1, inverse), weights @ zeros[..., 1].real], -1)
+        found = np.where(far[:, None], apart, found)
+    if pinned.any():
+        beside = 2 * (weights @ mean)
+        found = np.where(pinned[:, None], np.stack([0 * beside, beside], -1), found)
+    if alone.any():
+        single = weights @ zeros[..., 0].real
+        found = np.where(alone[:, None], np.stack([single, np.full_like(single, np.nan)], -1), found)
+    return found
 
 
 def _exchange(family: Family, nodes: list[Node], stray: NDArray[np.bool_], at: float) -> bool:

@@ -107,12 +107,13 @@ def improved(member: Member, zeros: Complex, beside: Neighbours | None = None) -
         repulsion = (1 / way).sum(1).reshape(zeros.shape)
         new = zeros - step / (1 - step * repulsion)
         new[:, 1] = np.where(is_real, new[:, 1].real, new[:, 0].conj())
-        new[:, 0] = np.where(is_real, new[:, 0].real, new[:, 0])
+        new[is_real, 0] = new[is_real, 0].real
         apart = abs(zeros[:, 0] - zeros[:, 1])
         close = (apart < gap.min(1)) & (zeros[:, 0] != 0)
-        for i in np.nonzero(close & ~(abs(new - zeros).max(1) < SINGLY * apart))[0]:
-            twist = np.exp(scale[i, 1] - scale[i, 0])  # both values on the scale of the first
-            new[i] = _together(zeros[i], value[i] * [1, twist], slope[i] * [1, twist])
+        if close.any():
+            for i in np.nonzero(close & ~(abs(new - zeros).max(1) < SINGLY * apart))[0]:
+                twist = np.exp(scale[i, 1] - scale[i, 0])  # both values on the scale of the first
+                new[i] = _together(zeros[i], value[i] * [1, twist], slope[i] * [1, twist])
         away = abs(new - zeros)
         away[ended] = 0.0
         floor = NO_NEARER * abs(zeros)  # nearer no zero is known

@@ -18,7 +18,7 @@ from tfarm.arm import Arm, Theory
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.digits import DOUBLE_DIGITS
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError
-from tfarm.exact.characteristic import NO_GAINS, Gains, quick_characteristic, zeros_at_origin
+from tfarm.exact.characteristic import NO_GAINS, Gains, as_column, quick_characteristics, zeros_at_origin
 from tfarm.exact.coefficients import Coefficients
 from tfarm.exact.system import System
 from tfarm.records import record
@@ -282,9 +282,9 @@ def _first_node(undamped: Modes, count: int, level: float) -> Node:
 
 def member(k: System, gains: Gains = NO_GAINS) -> Member:
     """The characteristic function without its zeros at the origin, to be followed."""
-    at_zero = zeros_at_origin(k, gains)
+    at_zero, rows = zeros_at_origin(k, gains), as_column(gains)
     singular = -1.0 / k.damping if k.damping else -np.inf
-    return Member(lambda s: quick_characteristic(k, s, gains, at_zero), singular)
+    return Member(lambda s: quick_characteristics(k, s, rows, at_zero), singular)
 
 
 def polished(last: Member, zeros: Complex) -> Complex:

@@ -25,6 +25,7 @@ DEFAULT_DIGITS = 3  # of a default K1, so that it can be read and typed
 OF_THE_PAPER = ("sasaki2012", "sasaki2012-lab", "sasaki2012-as-printed")  # presets
 
 
+@lru_cache(maxsize=ARMS_KEPT)  # each loop of a search looks whether its gains are possible
 def turning_inertia(arm: Arm) -> float:
     """J, the arm's inertia about the hub, without the parts that are infinite: these do not turn.
 
@@ -94,14 +95,10 @@ def default_words(arm: Arm, names: Iterable[str] = ("K1", "K2")) -> str:
     return " and ".join(words[name] for name in names) + driven
 
 
+@lru_cache(maxsize=ARMS_KEPT)
 def first_frequency(arm: Arm) -> float:
     """w1 [rad/s], the lowest flexible frequency of the undamped arm."""
-    return _first_frequency(arm.elastic)
-
-
-@lru_cache(maxsize=ARMS_KEPT)
-def _first_frequency(undamped: Arm) -> float:
-    return float(modes(undamped, 1).natural_frequency[-1])
+    return float(modes(arm.elastic, 1).natural_frequency[-1])
 
 
 @lru_cache(maxsize=ARMS_KEPT)
