@@ -11,6 +11,7 @@ import pytest
 import tfarm
 from tests.shared import thinned
 from tests.shell import heard, run
+from tfarm.cli import main
 from tfarm.cli.app import say_when_compiling
 
 TFARM = f"{sys.executable} -m tfarm"
@@ -78,20 +79,37 @@ def test_letters_that_a_terminal_does_not_have_are_escaped(encoding, tmp_path):
     assert json.loads(answer)["arm"] == name
 
 
-@pytest.mark.parametrize(
-    ("verb", "option"),
-    [
-        ("response sasaki2012 --output hub_rate --points 3", "--csv"),
-        ("bode sasaki2012-lab --to 50", "--png"),
-        ("simulate sasaki2012-lab --duration 0.05 --modes 2", "--mat"),
-        ("design sasaki2012-lab --continuous", "--save"),
-    ],
-)
-def test_a_dash_is_standard_output(verb, option, tmp_path):
-    """What stands there is what stands in a file of that option, and nothing else: no table, no file called "-"."""
+DASHED = [
+    ("response sasaki2012 --output hub_rate --points 3", "--csv"),
+    ("bode sasaki2012-lab --to 50", "--png"),
+    ("simulate sasaki2012-lab --duration 0.05 --modes 2", "--mat"),
+    ("design sasaki2012-lab --continuous", "--save"),
+]
+
+
+@pytest.mark.parametrize(("verb", "option"), DASHED)
+def test_a_dash_is_standard_output(verb, option, capfdbinary, tmp_path, monkeypatch):
+    """What stands there is what stands in a file of that option, and nothing else: no table, no file called "-".
+
+    In this process, whose standard output is caught as the file number 1 that it is.
+    """
+    monkeypatch.chdir(tmp_path)
+    for where in ("-", "file"):
+        with pytest.raises(SystemExit) as stop:
+            main([*verb.split(), option, where])
+        assert not stop.value.code
+        if where == "-":
+            out, err = capfdbinary.readouterr()
+            assert (heard(err.decode()), list(tmp_path.iterdir())) == ("", [])
+    assert (tmp_path / "file").read_bytes() == out
+
+
+def test_a_dash_is_the_standard_output_of_a_shell(capfdbinary, tmp_path):
+    verb, option = DASHED[0]
     code, out, err = shell(f"cd {tmp_path} && tfarm {verb} {option} -")
     assert (code, err, list(tmp_path.iterdir())) == (0, "", [])
-    assert shell(f"tfarm {verb} {option} {tmp_path / 'file'}")[0] == 0
+    with pytest.raises(SystemExit):
+        main([*verb.split(), option, str(tmp_path / "file")])
     assert (tmp_path / "file").read_bytes() == out
 
 
