@@ -7,6 +7,7 @@ import pytest
 
 from tests.spectrum.test_continuation import with_zeros
 from tfarm.arrays import LEAST_SIZE
+from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import Analytic
 from tfarm.spectrum.continuation import Node, _exchange, _jumped, _next_zero, follow, predicted, through_nodes
 from tfarm.spectrum.correction import Member, _gaps, _together, corrected, improved, neighbours_of
@@ -166,6 +167,49 @@ def test_two_pairs_exchange_partners_where_one_of_each_meet():
     before, after = next((one, two) for one, two in pairwise(nodes) if one.at == two.at)
     assert 0.2 < after.at < 0.25
     np.testing.assert_allclose(np.sort(after.zeros.ravel()), np.sort(before.zeros.ravel()), rtol=1e-12)
+
+
+@pytest.mark.parametrize("unit", [1e9, 1e-9, -1.0])
+def test_the_way_does_not_depend_on_the_unit_of_the_parameter_nor_on_where_it_is_0(unit):
+    """Where zeros are paired anew and where one ends: the same steps, from 3 units on, and the same zeros."""
+
+    def exact(C):
+        meeting = 2 * np.sqrt(complex(0.25 - C))
+        return np.array([-1.0, -5 + meeting, -5 - meeting, -30.0, 3 - 20 * C, 30.0])
+
+    def family(C):
+        return Member(with_zeros(exact(C)), -8.0, 1e-3, 0.05)
+
+    start = exact(0.0).reshape(3, 2)
+    plain = follow(family, Node(0.0, start), 0.6, 0.01, 3)
+    other = follow(lambda at: family(at / unit - 3), Node(3 * unit, start), 3.6 * unit, 0.01 * unit, 3)
+    assert np.isnan(plain[-1].zeros).any()
+    assert len(other) == len(plain)
+    np.testing.assert_allclose(
+        [node.at / unit - 3 for node in other], [node.at for node in plain], rtol=1e-6, atol=1e-12
+    )
+    np.testing.assert_allclose(other[-1].zeros, plain[-1].zeros, rtol=1e-9)
+
+
+def test_a_way_that_leads_nowhere_is_given_up(monkeypatch):
+    """With the last node in hand, after so many steps that did not go well, each shorter than the one before."""
+
+    def exact(C):
+        upper = np.array([-0.1 + 1j * (1 + 3 * (C > 0.37)), -0.1 + 12j])
+        return np.stack([upper, upper.conj()], 1)
+
+    asked = []
+
+    def family(C):
+        asked.append(C)
+        return Member(with_zeros(exact(C)))
+
+    monkeypatch.setattr("tfarm.spectrum.continuation.MOST_REFUSALS", 7)
+    with pytest.raises(ConvergenceError, match=r"cannot be told apart beyond 0\.3") as told:
+        follow(family, Node(0.0, exact(0.0)), 1.0, 0.01, 2)
+    assert 0.3 < told.value.best.at < 0.37
+    assert sum(C > 0.37 for C in asked) <= 8
+    np.testing.assert_allclose(told.value.best.zeros, exact(0.0), rtol=1e-9)
 
 
 def test_zeros_that_part_are_not_paired():

@@ -117,6 +117,11 @@ class Family:
             return LawLoop(self.arm.having(**{self.vary: value}), self.law)
         return self._first.under(self.law.having(self.vary, value))
 
+    @property
+    def own(self) -> LawLoop:
+        """The loop of the law as it is given: what varies may be a factor on it."""
+        return self._first.under(self.law)
+
     @cached_property
     def _first(self) -> LawLoop:
         """The loop where the way begins, of whose rig the others are."""
@@ -225,7 +230,7 @@ def _crossings(family: Family, values: Real, branches: Complex, box: Box) -> tup
 
     The latter by D-decomposition, between the ends of the range.
     """
-    found, sign = [], 1.0 if values[-1] > values[0] else -1.0
+    found, sign = [], float(np.sign(values[-1] - values[0]))
     for number, row in enumerate(branches):
         side = np.where(abs(row.real) <= NO_PART * abs(row), 0, np.sign(row.real))
         for n in np.flatnonzero(side[1:] * side[:-1] < 0):
@@ -233,7 +238,7 @@ def _crossings(family: Family, values: Real, branches: Complex, box: Box) -> tup
             way = "unstable" if side[n + 1] > 0 else "stable"
             found.append(BranchCrossing(gain=each[0], omega=each[1], branch=number, direction=way))
     if not family.is_of_arm and family.vary != "delay":
-        loop, ascending, band, seen = family.at(float(values[0])), np.sort(values), box.im_max, tuple(found)
+        loop, ascending, band, seen = family.own, np.sort(values), box.im_max, tuple(found)
         omega, span = np.asarray(grid(loop.arm, band)), float(ascending[-1] - ascending[0])
         parts = loop.signals.parts(1j * omega)
         for t, w, change in law_crossings(loop, family.vary, ascending, omega, parts, band):

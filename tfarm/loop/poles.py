@@ -198,7 +198,7 @@ def slow_poles(loop: Loop, below: float) -> Complex:
     order |s|/w1 and C |s|.
     """
     b, c = loop.at_rest
-    if not loop.arm.has_rigid_mode or not (b or c):
+    if not loop.arm.has_rigid_mode:
         return np.empty(0, complex)
     J = effective_inertia(loop.arm, loop.law)
     unit = max(abs(b), math.sqrt(abs(c)) * math.sqrt(abs(J)), LEAST_SIZE)  # b and sqrt(c J) alike

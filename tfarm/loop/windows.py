@@ -141,7 +141,7 @@ def _counts(verdict: Stability, name: str, pairs: list[Window], found: Crossings
     loop, value = verdict.loop, verdict.loop.law[name]
     if _is_lossless_line(loop, name):
         laws = [loop.law.having(name, (low + high) / 2) for low, high in pairs]
-        return [0 if holds_undamped(Loop(loop.arm, law).freed) else 1 for law in laws]
+        return [int(not holds_undamped(Loop(loop.arm, law).freed)) for law in laws]
     middles = np.array([(low + high) / 2 for low, high in pairs])
     if verdict.verdict != "marginal" and any(low < value < high for low, high in pairs):
         known = verdict.unstable_roots

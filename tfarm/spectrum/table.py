@@ -126,7 +126,8 @@ class Modes:
 
         Raises CertificationError where something cannot be proven, a double frequency for instance.
         """
-        above = float(natural_frequencies(self._k, len(self) + 1, len(self) + 1)[0])
+        beyond = len(self) + 1
+        above = float(natural_frequencies(self._k, beyond, beyond)[0])
         return certify(self._k, self.natural_frequency[self._rigid :], above, digits, int(self._rigid))
 
     def __len__(self) -> int:

@@ -1,0 +1,196 @@
+"""Where searches for poles start, how far they reach, and what lists are cut to: against closed forms."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tfarm
+from tests.loop.test_lossless import RIGS as REACTIVE
+from tfarm import HubFeedback, Law, Payload
+from tfarm.errors import ParameterError
+from tfarm.loop.law_loop import LawLoop
+from tfarm.loop.lossless import locked_edges
+from tfarm.loop.plant import Loop
+from tfarm.loop.poles import (
+    Poles,
+    count_with_mirrors,
+    first_poles,
+    near_modes,
+    poles_below,
+    quiet_edge,
+    real_starts,
+    slow_poles,
+)
+from tfarm.loop.stability import stability
+from tfarm.loop.windows import gain_windows, looked_at
+from tfarm.spectrum.box import Box
+from tfarm.spectrum.scales import angle_unit, rate_unit
+
+LAB, BARE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))
+
+
+# ------------------------------------------------------------ starts
+
+
+def test_starts_beside_a_mode_are_where_bending_alone_takes_it_and_left_of_that():
+    """s^2 + C w^2 s + w^2 = 0 first; a mode that no longer swings starts at its mean on the real axis."""
+    omega, C = np.array([1.0, 7.0, 30.0]), 0.1
+    starts = near_modes(omega, C).reshape(-1, 3)
+    for n, w in enumerate(omega):
+        roots = np.roots([1.0, C * w**2, w**2])
+        assert starts[0, n] == pytest.approx(roots[np.argmax(roots.imag)] if C * w < 2 else roots.mean(), rel=1e-12)
+    assert len(starts) > 1
+    np.testing.assert_array_equal(starts.imag, np.broadcast_to(starts[0].imag, starts.shape))
+    shares = (starts[0] - starts).real / omega
+    assert (np.diff(shares[:, 0]) > 0).all()
+    np.testing.assert_allclose(shares, np.broadcast_to(shares[:, :1], shares.shape), rtol=1e-12)
+    np.testing.assert_array_equal(near_modes(omega, 0.0).reshape(-1, 3)[0], 1j * omega)
+
+
+def test_real_starts_are_even_in_decades_and_reach_beyond_the_box():
+    starts = real_starts(60.0)
+    assert starts[0] < 60.0 / 100
+    assert starts[-1] > 60.0
+    np.testing.assert_allclose(starts[1:] / starts[:-1], starts[1] / starts[0], rtol=1e-12)
+    assert starts[1] / starts[0] < 1.5
+
+
+@pytest.mark.parametrize("K1", [0.3, -30.0])
+def test_a_box_reaches_right_to_where_no_pole_can_be(K1):
+    """From the first edge that is tried on: on the one that is taken Re L > -1/2, on the one before it was not."""
+    loop, height, first = Loop(LAB, HubFeedback(K1=K1)), 300.0, 30.0
+    right = quiet_edge(loop, first, height, 40, 1e3)
+    edge = 1j * np.linspace(0.0, height, 400)
+    assert loop.loop_function(right + edge).real.min() > -0.6
+    if right > first:
+        before = right / 1.7
+        near = np.r_[before + edge, before * np.array([2.0, 5.0, 20.0])]
+        assert loop.loop_function(near).real.min() <= -0.45
+    poles = poles_below(loop, height).values
+    assert (poles.real < right).all()
+    assert (right > first) == (poles.real.max() > first)
+
+
+def test_slow_poles_are_of_an_arm_that_turns():
+    """One that is held at its tip has none, however small the gains."""
+    law = HubFeedback(K1=1e-9, Kp=1e-12)
+    expected = np.roots([LAB.total_inertia, 1e-9, 1e-12])
+    found = slow_poles(Loop(LAB, law), 1e-3)
+    np.testing.assert_allclose(np.sort_complex(found), np.sort_complex(expected), rtol=1e-5)
+    assert slow_poles(Loop(LAB, HubFeedback(K2=0.3)), 1e-3).size == 0
+    assert slow_poles(Loop(replace(LAB, payload=Payload(mass=math.inf)), law), 1e-3).size == 0
+
+
+# ------------------------------------------------------------ lists
+
+
+def listed(*values):
+    box = Box(-50.0, 10.0, -60.0, 60.0)
+    return Poles(Loop(LAB, HubFeedback(K1=0.3)), np.array(values, complex), box)
+
+
+def test_a_shorter_list_has_a_lower_box_between_its_last_pole_and_the_next():
+    poles = listed(-3.0, -1.0, -2 + 4j, -1 + 10j, -1 + 40j)
+    for count, top in ((2, 2.0), (3, 7.0), (4, 25.0), (5, 60.0)):
+        some = first_poles(poles, count)
+        np.testing.assert_array_equal(some.values, poles.values[:count])
+        assert some.box == Box(-50.0, 10.0, -top, top)
+        assert some.box.holds(some.values).all()
+        assert not some.box.holds(poles.values[count:]).any()
+    with pytest.raises(ParameterError, match="2 poles are real"):
+        first_poles(poles, 1)
+    assert count_with_mirrors(poles.values) == poles.count == 8
+
+
+def test_without_a_number_ten_are_listed_and_every_real_one():
+    swinging = [-1 + 1j * n for n in range(1, 16)]
+    assert first_poles(listed(*swinging), None).values.size == 10
+    assert first_poles(listed(-1.0, -2.0, *swinging), None).values.size == 10
+    assert first_poles(listed(*(-1.0 - n for n in range(12)), *swinging), None).values.size == 12
+
+
+def test_the_rightmost_pole_is_not_one_at_0():
+    poles = listed(0.0, 0.0, -3.0, -1 + 10j)
+    assert poles.spectral_abscissa == -1.0
+    np.testing.assert_array_equal(poles.moving, [-3.0, -1 + 10j])
+    assert (poles.unstable, listed(2.0, 3 + 1j, -1 + 2j).unstable) == (0, 3)
+
+
+@pytest.mark.parametrize("name", REACTIVE)
+def test_of_a_rig_without_losses_each_driven_mode_of_the_box_is_two_unstable_poles(name):
+    """However near to the axis: as many as there are K2_n between 0 and the law's, of modes below the box's top."""
+    arm = REACTIVE[name]
+    edges = locked_edges(arm)
+    K2 = 1.5 * float(max(edges.gain[:3], key=abs))
+    law = HubFeedback(K1=1e-3 * rate_unit(arm), K2=K2)
+    poles = poles_below(Loop(arm, law), 1.3 * float(edges.at[3]))
+    driven = (np.sign(edges.gain) == np.sign(K2)) & (abs(edges.gain) < abs(K2)) & (edges.at < poles.box.im_max)
+    assert poles.unstable == 2 * driven.sum() > 0
+
+
+# ------------------------------------------------------------ how far windows are looked for
+
+
+@pytest.mark.parametrize("arm", [LAB, STOCKY], ids=lambda arm: arm.name)
+def test_windows_are_looked_for_well_beyond_what_matters_to_the_first_mode(arm):
+    """20 J w1 of a rate, 20 J w1^2 of an angle; 50 of a moment, or where twice the inertia is taken off."""
+    loop = Loop(arm, HubFeedback(K1=1e-3 * rate_unit(arm), K2=0.3))
+    assert looked_at(loop, "K1") == pytest.approx((-20 * rate_unit(arm), 20 * rate_unit(arm)), rel=1e-12)
+    assert looked_at(loop, "Kp") == pytest.approx((-20 * angle_unit(arm), 20 * angle_unit(arm)), rel=1e-12)
+    most = max(50.0, 2 * arm.total_inertia / arm.carried_inertia)
+    assert looked_at(loop, "K2") == pytest.approx((-most, most), rel=1e-12)
+    far = Loop(arm, HubFeedback(K1=5 * rate_unit(arm), K2=-9.0))
+    assert looked_at(far, "K1")[1] == pytest.approx(50 * rate_unit(arm), rel=1e-12)
+    assert looked_at(far, "K2")[1] == pytest.approx(max(most, 90.0), rel=1e-12)
+    assert looked_at(Loop(arm, HubFeedback(K1=5e8 * rate_unit(arm))), "K1")[1] == 1e9 * rate_unit(arm)
+
+
+def test_a_heavy_hub_has_its_window_of_the_moment_looked_for_farther():
+    """Where K2 = J/(J - I_h) cancels the inertia, 500 here."""
+    heavy = LAB.having(hub_inertia=499 * LAB.carried_inertia)
+    loop = Loop(heavy, HubFeedback(K1=0.3))
+    assert looked_at(loop, "K2")[1] == pytest.approx(1000.0, rel=1e-9)
+    assert looked_at(loop, "K1")[1] == pytest.approx(20 * rate_unit(heavy), rel=1e-12)
+
+
+def test_a_hub_without_inertia_has_no_window_of_the_moment():
+    pin = LAB.having(hub_inertia=0.0)
+    found = gain_windows(stability(pin, HubFeedback(K1=0.3)), "K2")
+    assert (found.around, found.all, found.looked_at, len(found.crossings)) == (None, (), (0.0, 0.0), 0)
+
+
+# ------------------------------------------------------------ the function of a law
+
+
+LEAD = {"hub_angle": ([0.7, 3.0, 20.0], [0.002, 0.3, 1.0]), "root_moment": ([0.2], [1e-4, 2e-2, 1.0])}
+LAWS = {
+    "lead": Law(LEAD),
+    "late": Law(LEAD, delay=0.004),
+    "integral": Law({"hub_angle": ([1.0, 5.0], [1.0, 0.0]), "hub_rate": 0.4}),
+}
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_the_slope_of_the_function_is_its_difference_quotient(name):
+    """Of higher order and wider: by the values of the function alone, its zeros at 0 divided out."""
+    loop = LawLoop(LAB, LAWS[name])
+    for s in (0.3 + 2j, -5 + 40j, 2.0 + 0j, 1e-3 + 1e-2j):
+        h = 1e-3 * abs(s)
+        at = loop.function(s + h * np.array([0, -2, -1, 1, 2]))
+        values = at.value * np.exp(at.scale - at.scale[0])
+        difference = (values[1] - 8 * values[2] + 8 * values[3] - values[4]) / (12 * h)
+        assert difference == pytest.approx(at.slope[0], rel=1e-6)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_two_laws_have_one_factor_of_the_rig(name):
+    """D of one over D of the other, of laws with one denominator, is the quotient of 1 + L."""
+    one, s = LawLoop(LAB, LAWS[name]), np.array([0.3 + 2j, -5 + 40j, 2.0 + 0j])
+    half = {signal: ([0.5 * n for n in num], den) for signal, (num, den) in LEAD.items()}
+    other = one.under(Law(half, delay=0.001)) if name != "integral" else one.under(LAWS[name].having("gain", 0.5))
+    of_rig = one.signals.parts(s)
+    ratio = one.characteristic(s, of_rig) / other.characteristic(s, of_rig)
+    expected = (1 + one.loop_function(s)) / (1 + other.loop_function(s))
+    np.testing.assert_allclose(ratio, expected, rtol=1e-10)
