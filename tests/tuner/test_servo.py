@@ -20,6 +20,7 @@ from tfarm.tuner import (
     find_guard,
     initial_network,
     load_tuner,
+    overview,
     save_tuner,
     simulated,
     slew_trial,
@@ -141,6 +142,16 @@ def test_the_usual_rate_gain_damps_the_rigid_arm():
     assert usual_rate_gain(LAB, 0.0) == tfarm.default_gains(LAB).K1
     with pytest.raises(ParameterError, match="Kp"):
         usual_rate_gain(LAB, -1.0)
+
+
+def test_the_servo_of_a_study_is_slow_beside_the_first_mode_and_the_clock(monkeypatch):
+    """sqrt(Kp/J), to two digits of Kp: a twentieth of the first frequency, or 0.03 rad a sample where that is less."""
+    monkeypatch.setattr(overview, "tune", lambda arm, plan, chain: plan)
+    first = tfarm.modes(LAB, 1).natural_frequency[-1]
+    for period, speed in ((0.002, first / 20), (0.02, 0.03 / 0.02)):
+        plan = overview._servo_tuning(LAB, Plan(), Chain(sampling=Sampling(period=period)))
+        assert np.sqrt(plan.Kp / LAB.total_inertia) == pytest.approx(speed, rel=0.03)
+        assert usual_rate_gain(LAB, plan.Kp) == plan.K1
 
 
 def test_files_say_the_servo_and_old_ones_have_none(tuning, tmp_path):

@@ -65,7 +65,8 @@ def test_shaping_keeps_the_slew():
         late = shaped_trial(trial, kind).task
         assert late.hub_angle[-1] == pytest.approx(trial.task.hub_angle[-1], rel=1e-12)
         assert late.hub_rate[-1] == pytest.approx(0, abs=1e-12)
-        assert late.busy_until > trial.task.busy_until
+        ends = [task.t[np.flatnonzero(abs(task.feedforward) > 1e-12)[-1]] for task in (trial.task, late)]
+        assert late.busy_until - trial.task.busy_until == pytest.approx(ends[1] - ends[0], rel=1e-9)
         assert late.feedforward.sum() == pytest.approx(0, abs=1e-10)
 
 

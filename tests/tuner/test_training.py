@@ -99,6 +99,17 @@ def test_learning_at_every_sample_that_runs_away_is_cut_off(trial, guards):
         assert is_cut_off(train(trial, initial_network(seed), guards["none"], learning, 20), trial)
 
 
+@pytest.mark.parametrize("how", [{"mode": "trial"}, {"mode": "online"}, {"mode": "online", "sensitivity": "whole"}])
+def test_a_gain_that_no_loop_bears_is_cut_off_in_the_first_trial(trial, guards, how):
+    network = initial_network(0)
+    wild = network.with_weights(np.r_[network.W1.ravel(), np.full(network.w2.size, 20.0)])
+    training = train(trial, wild, guards["none"], Learning(eta=1e-9, **how), 20)
+    assert is_cut_off(training, trial)
+    assert training.stopped.trial == 0
+    assert training.stopped.sample == trial.with_network(wild, guards["none"].limits).stopped
+    np.testing.assert_array_equal(training.network.weights, wild.weights)
+
+
 def test_one_step_online_learning_switches_the_feedback_off(trial, guards):
     """The moment answers a torque at first with the wrong sign: one step ahead, less gain always looks better."""
     assert trial.reply < 0
