@@ -234,6 +234,14 @@ def test_the_larger_model_says_whether_the_modes_left_out_are_quiet(lab):
     assert not guard._settled([many, few], [(0.0, 1.0)] * 2)
 
 
+@pytest.mark.parametrize("before", [(0.1, 0.6 - 6e-4), (0.1, 0.6 + 6e-4), (0.1 - 6e-4, 0.6), (0.1 + 6e-4, 0.6)])
+def test_a_guard_that_more_modes_change_by_a_thousandth_of_its_width_is_not_settled(lab, before):
+    loops = [sampled_loop(lab, HubFeedback(K1=0.3, K2=1.0), count=count) for count in (2, 24)]
+    assert not guard._settled(loops, [before, (0.1, 0.6)])
+    nearer = tuple(end + 0.5 * (was - end) for was, end in zip(before, (0.1, 0.6), strict=True))
+    assert guard._settled(loops, [nearer, (0.1, 0.6)])
+
+
 def test_the_frozen_guard_is_stable_inside_and_not_beyond(lab):
     loop = slew_trial(lab).loop
     guard = find_guard(loop, "frozen", 0.336)

@@ -181,7 +181,7 @@ def _settled(loops: list[SampledLoop], found: list[tuple[float, float]]) -> bool
     """
     if loops[0].plant.arm.is_undamped or len(found) < 2:
         return False
-    (low, high), (before_low, before_high) = found[-1], found[-2]
+    (before_low, before_high), (low, high) = found
     agree = max(abs(low - before_low), abs(high - before_high)) <= SECTORS_AGREE * (high - low)
     return agree and upper_modes_are_quiet(loops[-1], high)
 
