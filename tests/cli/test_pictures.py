@@ -90,6 +90,7 @@ def test_bode_prints_what_the_record_holds(capsys, tmp_path):
     code, _, _ = run(capsys, "bode", "sasaki2012", "--to", "300", "--csv", str(tmp_path / "bode.csv"))
     header, *rows = csv.reader((tmp_path / "bode.csv").read_text().splitlines())
     assert (code, header[0], float(rows[-1][0])) == (0, "omega_rad_s [rad/s]", 300.0)
+    assert header[2:5] == [f"{key} [N m/(N m)]" for key in ("real", "imaginary", "magnitude")]
 
 
 @pytest.mark.parametrize(("K2", "unstable"), [("0.3", 0), ("1.5", 2)])

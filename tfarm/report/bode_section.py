@@ -7,10 +7,10 @@ import math
 import numpy as np
 
 from tfarm.arm import Arm
-from tfarm.columns import Column, Table
-from tfarm.digits import how_many, lined, plain, scientific, significant, singly, unit
+from tfarm.digits import how_many, plain, significant
 from tfarm.plots.frequency import draw_bode
 from tfarm.report.sections import PageSection, Picture
+from tfarm.response.answers import bode_table, roots_table
 from tfarm.response.frequency import AXIS_SHARE, Bode, bode
 
 ROOTS_CAPTION = (
@@ -32,16 +32,15 @@ def bode_section(arm: Arm, output: str) -> PageSection:
         caption=f"{what_is_seen(data)} {what_it_means(data)}",
         alt=alt_text(data),
         figure=draw_bode(data),
-        data=bode_data(data, f"{anchor}-data"),
+        data=bode_table(data, f"{anchor}-data"),
     )
     if not data.poles.size and not data.zeros.size:
         return PageSection(
             anchor=anchor, title=title, words=(f"{completeness(data)} There are none.",), blocks=(picture,)
         )
-    return PageSection(anchor=anchor, title=title, blocks=(picture, roots_table(data, f"{anchor}-roots")))
-
-
-ZERO_ON_AXIS = 1e-13  # of |s|: what rounding leaves of Re s where a zero of an elastic link lies on the axis
+    caption = f"{completeness(data)} {ROOTS_CAPTION}"
+    roots = roots_table(data, "pole", "zero", stem=f"{anchor}-roots", caption=caption)
+    return PageSection(anchor=anchor, title=title, blocks=(picture, roots))
 
 
 def what_is_seen(data: Bode) -> str:
@@ -93,43 +92,6 @@ def alt_text(data: Bode) -> str:
     where = f"{peaks} at {places} rad/s{more}" if data.resonances.size else "no peaks"
     start = f"{significant(float(abs(data.value[0])), 3)} {data.gain_unit}"
     return f"Bode plot of {data.input_label} to {data.label}: {where}; it begins at {start}."
-
-
-def bode_data(data: Bode, stem: str) -> Table:
-    """The numbers of the picture."""
-    of = data.gain_unit
-    columns = (
-        Column("omega_rad_s", "angular frequency", "rad/s", of=data.omega),
-        Column("frequency_hz", "frequency", "Hz", of=data.omega / (2 * math.pi)),
-        Column("real", "real part", of, of=data.value.real),
-        Column("imaginary", "imaginary part", of, of=data.value.imag),
-        Column("magnitude", "magnitude", of, of=abs(data.value)),
-        Column("phase_deg", "phase", "deg", of=data.phase),
-    )
-    return Table(stem=stem, title=f"{data.input_label} to {data.label}", is_data=True, columns=columns)
-
-
-def roots_table(data: Bode, stem: str) -> Table:
-    """Poles, then zeros, of the upper half-plane."""
-    roots = np.r_[data.poles, data.zeros]
-    kinds = ["pole"] * data.poles.size + ["zero"] * data.zeros.size
-    gains = np.r_[data.peaks, data.dips]
-    exact = data.arm.has_elastic_link & (abs(roots.real) < ZERO_ON_AXIS * abs(roots)) & (np.array(kinds) == "zero")
-    real, hertz = np.where(exact, 0.0, roots.real + 0.0), roots.imag / (2 * math.pi)
-    ratio = -100 * real / abs(roots) + 0.0
-    return Table(
-        stem=stem,
-        title=f"Poles and zeros, {data.input_label} to {data.label}",
-        caption=f"{completeness(data)} {ROOTS_CAPTION}",
-        columns=(
-            Column("kind", "kind", of=kinds),
-            Column("real_1_s", "Re s", "1/s", of=real, digits=lined(8, 4)),
-            Column("imaginary_rad_s", "Im s", "rad/s", of=roots.imag, digits=lined(8, 7)),
-            Column("frequency_hz", "Im s/2π", "Hz", of=hertz, digits=lined(8, 7)),
-            Column("damping_percent", "damping ratio", "%", of=ratio, digits=lined(5, 3)),
-            Column("magnitude", "magnitude there", unit(data.gain_unit), of=gains, digits=singly(scientific, 4)),
-        ),
-    )
 
 
 def completeness(data: Bode) -> str:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Literal
 
 import numpy as np
 
-from tfarm.columns import Column, Table
-from tfarm.digits import general, singly, within
+from tfarm.columns import ANSWER, REPORT, Column, Table
+from tfarm.digits import general, lined, scientific, singly, unit, within
 from tfarm.exact.methods import roads_answer
 from tfarm.spectrum.answers import EIGENVALUE_ERROR
 
@@ -16,6 +17,7 @@ from .frequency import Bode
 from .transfer import TransferFunction
 
 HERTZ = 2 * math.pi  # rad/s
+ZERO_ON_AXIS = 1e-13  # of |s|: what rounding leaves of Re s where a zero of an elastic link lies on the axis
 
 
 def response_answer(G: TransferFunction, s: np.ndarray[Any, Any], digits: int | None) -> dict[str, Any]:
@@ -57,26 +59,49 @@ def points_table(answer: dict[str, Any]) -> Table:
     )
 
 
-ROOT_COLUMNS = (  # of (s, |G| at i Im s, or of a real root at i |s|)
-    Column(
-        "re",
-        "Re s",
-        "1/s",
-        of=lambda row: float(row[0].real),
-        shown=lambda row: within(float(row[0].real), EIGENVALUE_ERROR * abs(row[0]), 10),
-    ),
-    Column("im", "Im s", "rad/s", of=lambda row: float(row[0].imag), digits=singly(general, 10)),
-    Column("frequency_hz", "Im s/2 pi", "Hz", of=lambda row: float(row[0].imag) / HERTZ, digits=singly(general, 8)),
-    Column("magnitude", "|G| there", of=lambda row: float(row[1]), digits=singly(general, 6)),
-)
-BODE_COLUMNS = (  # of `Bode`
-    Column("omega_rad_s", "angular frequency", "rad/s", of="omega"),
-    Column("frequency_hz", "frequency", "Hz", of=lambda data: data.omega / HERTZ),
-    Column("real", "real part", of=lambda data: data.value.real),
-    Column("imaginary", "imaginary part", of=lambda data: data.value.imag),
-    Column("magnitude", "magnitude", of=lambda data: abs(data.value)),
-    Column("phase_deg", "phase", "deg", of="phase"),
-)
+@dataclass(frozen=True, slots=True)
+class Root:
+    """A pole or zero of a Bode plot: s [1/s], and |G| at i Im s, of a real one at i |s|.
+
+    A zero of an elastic link `is_on_axis` where rounding alone is left of Re s.
+    """
+
+    kind: Literal["pole", "zero"]
+    s: complex
+    magnitude: float
+    is_on_axis: bool
+
+    @property
+    def real(self) -> float:
+        """Re s [1/s] as a page has it."""
+        return 0.0 if self.is_on_axis else self.s.real + 0.0
+
+
+def roots_table(data: Bode, *kinds: str, stem: str = "", caption: str = "") -> Table:
+    """A row a pole or zero of the upper half-plane, of these kinds."""
+    elastic = data.arm.has_elastic_link
+    poles = (Root("pole", s, size, False) for s, size in zip(data.poles.tolist(), data.peaks.tolist(), strict=True))
+    zeros = (
+        Root("zero", s, size, elastic and abs(s.real) < ZERO_ON_AXIS * abs(s))
+        for s, size in zip(data.zeros.tolist(), data.dips.tolist(), strict=True)
+    )
+    columns = (  # of `Root`
+        Column("kind", "kind", on=REPORT),
+        Column("re", "Re s", "1/s", of="s.real", on=ANSWER,
+               shown=lambda root: within(root.s.real, EIGENVALUE_ERROR * abs(root.s), 10)),
+        Column("im", "Im s", "rad/s", of="s.imag", digits=singly(general, 10), on=ANSWER),
+        Column("real_1_s", "Re s", "1/s", of="real", digits=lined(8, 4), on=REPORT),
+        Column("imaginary_rad_s", "Im s", "rad/s", of="s.imag", digits=lined(8, 7), on=REPORT),
+        Column("frequency_hz", "Im s/2π", "Hz", of=lambda root: root.s.imag / HERTZ, digits=lined(8, 7),
+               head="Im s/2 pi [Hz]", printed=singly(general, 8)),
+        Column("damping_percent", "damping ratio", "%", of=lambda root: -100 * root.real / abs(root.s) + 0.0,
+               digits=lined(5, 3), on=REPORT),
+        Column("magnitude", "magnitude there", unit(data.gain_unit), digits=singly(scientific, 4),
+               head="|G| there", printed=singly(general, 6)),
+    )  # fmt: skip
+    record = [root for root in (*poles, *zeros) if root.kind in kinds]
+    title = f"Poles and zeros, {data.input_label} to {data.label}"
+    return Table(stem=stem, title=title, caption=caption, columns=columns, record=record)
 
 
 def bode_answer(data: Bode) -> dict[str, Any]:
@@ -84,7 +109,6 @@ def bode_answer(data: Bode) -> dict[str, Any]:
 
     They are complete up to the band's end in Im s, and in Re s between the two numbers beside each.
     """
-    roots = {"poles": (data.poles, data.peaks), "zeros": (data.zeros, data.dips)}
     return {
         "arm": data.arm.name,
         "input": "hub_angle" if data.arm.is_locked else data.arm.input,
@@ -92,7 +116,8 @@ def bode_answer(data: Bode) -> dict[str, Any]:
         **({} if data.x is None else {"x": data.x}),
         "unit": data.gain_unit,
         "band_rad_s": list(data.band),
-        **{key: Table(columns=ROOT_COLUMNS, record=list(zip(*pair, strict=True))) for key, pair in roots.items()},
+        "poles": roots_table(data, "pole"),
+        "zeros": roots_table(data, "zero"),
         "poles_between_re_1_s": list(data.pole_width),
         "zeros_between_re_1_s": list(data.zero_width),
         "omega_rad_s": data.omega.tolist(),
@@ -101,6 +126,15 @@ def bode_answer(data: Bode) -> dict[str, Any]:
     }
 
 
-def bode_table(data: Bode) -> Table:
-    """The curve of a Bode plot, a row a frequency."""
-    return Table(columns=BODE_COLUMNS, record=data)
+def bode_table(data: Bode, stem: str = "") -> Table:
+    """The curve of a Bode plot, a row a frequency: the numbers of its picture."""
+    of = data.gain_unit
+    columns = (
+        Column("omega_rad_s", "angular frequency", "rad/s", of="omega"),
+        Column("frequency_hz", "frequency", "Hz", of=data.omega / HERTZ),
+        Column("real", "real part", of, of="value.real"),
+        Column("imaginary", "imaginary part", of, of="value.imag"),
+        Column("magnitude", "magnitude", of, of=abs(data.value)),
+        Column("phase_deg", "phase", "deg", of="phase"),
+    )
+    return Table(stem=stem, title=f"{data.input_label} to {data.label}", is_data=True, columns=columns, record=data)
