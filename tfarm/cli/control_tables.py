@@ -18,7 +18,7 @@ from tfarm.tables.terminal import heading, show
 
 def print_poles(answer: dict[str, Any]) -> None:
     """A row a pole, then the box."""
-    show(Table(columns=POLE_COLUMNS, record=answer["poles"]))
+    show(Table(columns=POLE_COLUMNS, record=[complex(*pole) for pole in answer["poles"]]))
     left, right, _, top = answer["box"]
     proven = "proven" if "discs" in answer else "by winding number"
     print(f"all poles with {left:.6g} < Re s < {right:.6g} and |Im s| < {top:.6g} ({proven}),")

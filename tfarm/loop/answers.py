@@ -3,36 +3,39 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from tfarm.arm import ANGLE_GAIN, LISTED, PLANE, SPELT_OUT, Arm, HubFeedback, Law, input_words, shown_unit, unit_of
 from tfarm.columns import JSON, REPORT, TERMINAL, Column, Table
 from tfarm.crossing import Window
-from tfarm.digits import general, plain, singly, within
+from tfarm.digits import general, lined, plain, significant, singly, within
 from tfarm.response.signals import Signals
 from tfarm.spectrum.answers import EIGENVALUE_ERROR
 
 from .law_loop import LawLoop
 from .law_stability import signs_of_loop
 from .lyapunov import lyapunov
-from .margins import Margins
+from .margins import LoopMargins, Margins
 from .nyquist import Nyquist
 from .poles import Poles
 from .regions import INFINITE, Region
 from .windows import Windows, reach_words
 
 LAW_IN_WORDS = f"u = -{SPELT_OUT} + r"
+HERTZ = 2 * math.pi  # rad/s
 WINDOW_DIGITS, PAGE_WINDOW_DIGITS = 8, 5  # of the ends of a window, on a terminal and on a page
-POLE_COLUMNS = (  # of pairs Re s, Im s
-    Column("re", "Re s", "1/s", of=lambda pole: within(pole[0], EIGENVALUE_ERROR * math.hypot(*pole), 12)),
-    Column("im", "Im s", "rad/s", of=lambda pole: pole[1], digits=singly(general, 12)),
-    Column(
-        "ratio",
-        "damping ratio",
-        of=lambda pole: within(-pole[0] / math.hypot(*pole), EIGENVALUE_ERROR, 6) if pole[1] else "-",
-    ),
-)
+POLE_COLUMNS = (  # of complex poles [1/s]
+    Column("re", "Re s", "1/s", of=lambda pole: within(pole.real, EIGENVALUE_ERROR * abs(pole), 12), on=(TERMINAL,)),
+    Column("im", "Im s", "rad/s", of="imag", digits=singly(general, 12), on=(TERMINAL,)),
+    Column("ratio", "damping ratio", on=(TERMINAL,),
+           of=lambda pole: within(-pole.real / abs(pole), EIGENVALUE_ERROR, 6) if pole.imag else "-"),
+    Column("real_1_s", "Re s", "1/s", of="real", digits=lined(8, 4), on=REPORT),
+    Column("imaginary_rad_s", "Im s", "rad/s", of="imag", digits=lined(8, 7), on=REPORT),
+    Column("frequency_hz", "Im s/2π", "Hz", of=lambda pole: pole.imag / HERTZ, digits=lined(8, 7), on=REPORT),
+    Column("damping_percent", "damping ratio", "%", digits=singly(significant, 4), on=REPORT,
+           of=lambda pole: -100 * pole.real / abs(pole) + 0.0 if pole else ""),
+)  # fmt: skip
 
 
 class GainRow(NamedTuple):
@@ -98,15 +101,30 @@ MARGIN_COLUMNS = (  # of `LoopMargins`, beside the factors of the gain
     Column("peak_sensitivity", "peak sensitivity", of="peak_sensitivity"),
     Column("peak_complementary_sensitivity", "peak complementary sensitivity", of="peak_complementary"),
 )
-_AT = Column("omega_rad_s", "frequency", "rad/s", of=lambda row: row[0], digits=singly(general, 7))
-GAIN_CROSSOVERS = (  # of pairs: where |L| = 1, and the phase margin there
-    _AT,
-    Column("phase_margin_deg", "phase margin", "deg", of=lambda row: row[1], digits=singly(general, 6)),
+
+
+class Crossover(NamedTuple):
+    """Where |L| = 1, with the phase margin there [deg], or where L < 0, with the factor on L that puts a pole there."""
+
+    omega_rad_s: float
+    phase_margin_deg: float | str = ""
+    factor: float | str = ""
+
+
+def crossovers(found: LoopMargins) -> tuple[list[Crossover], list[Crossover]]:
+    """Those with |L| = 1 and those with L < 0, ascending."""
+    return [Crossover(*pair) for pair in found.gain_crossovers], [
+        Crossover(w, "", t) for w, t in found.phase_crossovers
+    ]
+
+
+_AT = Column("omega_rad_s", "frequency", "rad/s", digits=singly(significant, 6), printed=singly(general, 7))
+_MARGIN, _FACTOR = (
+    Column(key, title, unit, digits=singly(significant, 5), printed=singly(general, 6))
+    for key, title, unit in (("phase_margin_deg", "phase margin", "deg"), ("factor", "factor on L", ""))
 )
-PHASE_CROSSOVERS = (  # of pairs: where L < 0, and the factor that puts a pole there
-    _AT,
-    Column("factor", "factor on L", of=lambda row: row[1], digits=singly(general, 6)),
-)
+_WHAT = Column("what", "what", of=lambda each: "|L| = 1" if each.factor == "" else "L < 0")
+GAIN_CROSSOVERS, PHASE_CROSSOVERS, CROSSOVERS = (_AT, _MARGIN), (_AT, _FACTOR), (_AT, _WHAT, _MARGIN, _FACTOR)
 
 
 def sign_of(arm: Arm) -> str:
@@ -166,8 +184,12 @@ def margins_answer(found: Margins | Margins[LawLoop]) -> dict[str, Any]:
     """The verdict first; margins are null unless the loop is stable."""
     verdict = found.stability
     limits, sizes = found.in_band, sizes_of(found)
-    in_band = None
+    in_band = by_gain = by_phase = None
     if limits is not None:
+        by_gain, by_phase = (
+            Table(columns=columns, record=each)
+            for columns, each in zip((GAIN_CROSSOVERS, PHASE_CROSSOVERS), crossovers(limits), strict=True)
+        )
         in_band = {"band_rad_s": limits.band, **{key: size for key, (_, size) in sizes.items()}, "at_rad_s": limits.at}
     return {
         "arm": verdict.loop.arm.name,
@@ -187,8 +209,8 @@ def margins_answer(found: Margins | Margins[LawLoop]) -> dict[str, Any]:
         if limits is None
         else {name: limits.at[name] for name in ("phase", "phase_lag", "phase_lead")},
         "in_band": in_band,
-        "gain_crossovers": None if limits is None else Table(columns=GAIN_CROSSOVERS, record=limits.gain_crossovers),
-        "phase_crossovers": None if limits is None else Table(columns=PHASE_CROSSOVERS, record=limits.phase_crossovers),
+        "gain_crossovers": by_gain,
+        "phase_crossovers": by_phase,
     }
 
 
@@ -223,11 +245,11 @@ def sizes_of(found: Margins[Any]) -> dict[str, tuple[float | None, float | None]
     return {column.key: (exact.get(column.of, sizes[column.of]), sizes[column.of]) for column in MARGIN_COLUMNS}
 
 
-NYQUIST_COLUMNS = (  # of `Nyquist`
-    Column("re_s", "Re s", "1/s", of=lambda found: found.s.real),
-    Column("im_s", "Im s", "rad/s", of=lambda found: found.s.imag),
-    Column("re_L", "Re L", of=lambda found: found.L.real),
-    Column("im_L", "Im L", of=lambda found: found.L.imag),
+CONTOUR_COLUMNS = (  # of pairs s, L on the contour of a `Nyquist`
+    Column("re_s", "Re s", "1/s", of=lambda pair: pair[0].real),
+    Column("im_s", "Im s", "rad/s", of=lambda pair: pair[0].imag),
+    Column("re_L", "Re L", of=lambda pair: pair[1].real),
+    Column("im_L", "Im L", of=lambda pair: pair[1].imag),
 )
 
 
@@ -250,9 +272,14 @@ def nyquist_answer(found: Nyquist[Any]) -> dict[str, Any]:
     }
 
 
-def nyquist_table(found: Nyquist[Any]) -> Table:
-    """L on the contour, a row a point."""
-    return Table(columns=NYQUIST_COLUMNS, record=found)
+def nyquist_table(*found: Nyquist[Any], stem: str = "", laws: Sequence[str] = ()) -> Table:
+    """L on the contour, a row a point; of several loops, the law of each before it."""
+    pairs = [list(zip(each.s.tolist(), each.L.tolist(), strict=True)) for each in found]
+    named = [name for name, points in zip(laws, pairs, strict=False) for _ in points]
+    first = (Column("law", "law", of=named),) if laws else ()
+    points = [pair for each in pairs for pair in each]
+    title = "The loop function on the contour"
+    return Table(stem=stem, title=title, columns=(*first, *CONTOUR_COLUMNS), record=points)
 
 
 def map_answer(found: Region) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -9,9 +10,10 @@ import numpy as np
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.columns import Column, Table
-from tfarm.digits import how_many, lined, plain, significant, singly
+from tfarm.digits import how_many, plain, significant
 from tfarm.dsp import Chain
 from tfarm.errors import ParameterError
+from tfarm.loop.answers import CROSSOVERS, POLE_COLUMNS, crossovers
 from tfarm.loop.closed import closed_loop_poles
 from tfarm.loop.closed import margins as margins_under
 from tfarm.loop.closed import nyquist as nyquist_under
@@ -137,22 +139,14 @@ def _bode_picture(each: LawOnArm, found: Margins[Any]) -> Picture:
 
 def crossings_table(each: LawOnArm, found: Margins[Any]) -> Table:
     """Every crossing of |L| = 1 and of L < 0 in the band, ascending."""
-    band = found.in_band
-    assert band is not None
-    rows: list[tuple[float, str, float | str, float | str]] = [(w, "|L| = 1", it, "") for w, it in band.gain_crossovers]
-    rows += [(w, "L < 0", "", factor) for w, factor in band.phase_crossovers]
-    rows.sort(key=lambda row: row[0])
-    omega, what, margin, factor = ([row[i] for row in rows] for i in range(4))
+    assert found.in_band is not None
+    rows = sorted(itertools.chain(*crossovers(found.in_band)), key=lambda row: row.omega_rad_s)
     return Table(
         stem=f"{each.key.replace('_', '-')}-crossings",
         title=f"Every crossing of {each.name}",
         caption=CROSSINGS_CAPTION if rows else "Nowhere in the band is |L| = 1, or L real and below 0.",
-        columns=(
-            Column("omega_rad_s", "frequency", "rad/s", of=omega, digits=singly(significant, 6)),
-            Column("what", "what", of=what),
-            Column("phase_margin_deg", "phase margin", "deg", of=margin, digits=singly(significant, 5)),
-            Column("factor", "factor on L", of=factor, digits=singly(significant, 5)),
-        ),
+        columns=CROSSOVERS,
+        record=rows,
     )
 
 
@@ -195,12 +189,12 @@ def law_nyquist_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> Pag
     blocks: list[Picture | Table] = []
     for first in range(0, len(plots), 2):
         pair = plots[first : first + 2]
-        stem, data = "nyquist" if first == 0 else f"nyquist-{1 + first // 2}", curve_data(pair)
+        stem = "nyquist" if first == 0 else f"nyquist-{1 + first // 2}"
         blocks.append(Picture(
             stem=stem, title="Nyquist plots of the exact loop function", caption=RINGS_CAPTION,
             alt="; ".join(turns[plot.named.name] for plot in pair),
             figure=draw_nyquist(arm.name, {plot.named.name: plot.data for plot in pair}),
-            data=Table(stem=f"{stem}-data", title=data.title, is_data=True, columns=data.columns),
+            data=curve_data(pair, f"{stem}-data"),
         ))  # fmt: skip
     own = "" if any(plot.data.unstable_open for plot in plots) else ", which here is never"
     names = [f"{plot.named.name}: {plot.named.gains}" for plot in plots]
@@ -234,18 +228,12 @@ def law_poles_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> PageS
 
 def law_poles_table(each: LawOnArm, poles: Poles[Any]) -> Table:
     """Poles with Im s >= 0, with their damping ratio."""
-    values = poles.values
     left, right, _, top = poles.box
     box = f"{plain(left, 5)} < Re s < {plain(right, 5)} and |Im s| < {plain(top, 6)}"
-    ratio = [float(-100 * p.real / abs(p)) + 0.0 if p else "" for p in values]
     return Table(
         stem=f"{each.key.replace('_', '-')}-poles",
         title=f"Closed-loop poles under {each.name}",
         caption=POLES_CAPTION.format(box=box),
-        columns=(
-            Column("real_1_s", "Re s", "1/s", of=values.real, digits=lined(8, 4)),
-            Column("imaginary_rad_s", "Im s", "rad/s", of=values.imag, digits=lined(8, 7)),
-            Column("frequency_hz", "Im s/2π", "Hz", of=values.imag / (2 * np.pi), digits=lined(8, 7)),
-            Column("damping_percent", "damping ratio", "%", of=ratio, digits=singly(significant, 4)),
-        ),
+        columns=POLE_COLUMNS,
+        record=poles.values.tolist(),
     )

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, NamedTuple
-
-import numpy as np
 
 from tfarm.columns import Column, Table
 from tfarm.digits import significant, singly
+from tfarm.loop.answers import nyquist_table
 from tfarm.loop.nyquist import Nyquist
 from tfarm.report.loop_laws import Named
 
@@ -33,12 +33,11 @@ class PlotOfLaw(NamedTuple):
 
 def count_table(plots: Sequence[PlotOfLaw], names: Sequence[str]) -> Table:
     """Verdict, encirclements and unstable poles of each law."""
-    verdicts = [plot.data.verdict for plot in plots]
-    counts = np.array([[p.encirclements, p.expected, p.verdict.unstable_roots, p.on_axis] for _, p in plots])
-    bands = np.array([verdict.band for verdict in verdicts])
-    words = [f"{it.verdict}{', infinitely many in all' * it.unstable_roots_infinite}" for it in verdicts]
-    titles = ("turns around −1", "by Nyquist", "in a box", "undecided")
-    keys = ("encirclements", "unstable_by_nyquist", "unstable_in_box", "on_axis_in_box")
+    whole = partial(Column, digits=singly(lambda n: str(n).replace("-", "−")))
+    unstable = partial(whole, group="unstable poles")
+    words = [
+        f"{it.verdict}{', infinitely many in all' * it.unstable_roots_infinite}" for it in (p.verdict for _, p in plots)
+    ]
     return Table(
         stem="nyquist-count",
         title="Encirclements beside unstable poles",
@@ -49,34 +48,16 @@ def count_table(plots: Sequence[PlotOfLaw], names: Sequence[str]) -> Table:
         columns=(
             Column("law", "law", of=names),
             Column("verdict", "verdict", of=words),
-            *(
-                Column(
-                    key,
-                    title,
-                    of=column,
-                    digits=singly(lambda n: str(n).replace("-", "−")),
-                    group="" if key == "encirclements" else "unstable poles",
-                )
-                for key, title, column in zip(keys, titles, counts.T, strict=True)
-            ),
-            Column("band_rad_s", "up to", "rad/s", of=bands, digits=singly(significant, 6)),
+            whole("encirclements", "turns around −1", of="data.encirclements"),
+            unstable("unstable_by_nyquist", "by Nyquist", of="data.expected"),
+            unstable("unstable_in_box", "in a box", of="data.verdict.unstable_roots"),
+            unstable("on_axis_in_box", "undecided", of="data.on_axis"),
+            Column("band_rad_s", "up to", "rad/s", of="data.verdict.band", digits=singly(significant, 6)),
         ),
+        record=list(plots),
     )
 
 
-def curve_data(plots: Sequence[PlotOfLaw]) -> Table:
+def curve_data(plots: Sequence[PlotOfLaw], stem: str = "nyquist-data") -> Table:
     """L on the contour of every law."""
-    L, s = np.concatenate([plot.data.L for plot in plots]), np.concatenate([plot.data.s for plot in plots])
-    law = [plot.named.key for plot in plots for _ in plot.data.s]
-    return Table(
-        stem="nyquist-data",
-        title="The loop function on the contour",
-        is_data=True,
-        columns=(
-            Column("law", "law", of=law),
-            Column("re_s", "Re s", "1/s", of=s.real),
-            Column("im_s", "Im s", "rad/s", of=s.imag),
-            Column("re_L", "Re L", of=L.real),
-            Column("im_L", "Im L", of=L.imag),
-        ),
-    )
+    return nyquist_table(*(plot.data for plot in plots), stem=stem, laws=[plot.named.key for plot in plots])
