@@ -37,7 +37,7 @@ from tfarm.report.locus_section import _more_damping, beyond_table
 from tfarm.report.loop_laws import NamedLaw, has_loop, laws, margins_of
 from tfarm.report.loop_section import map_section, margins_section
 from tfarm.report.map import draw_map_of_arm, map_data, map_of_arm
-from tfarm.report.margins_table import NOT_STABLE, margin_table, verdict_facts
+from tfarm.report.margins_table import NOT_STABLE, margin_table, verdict_fact
 from tfarm.spectrum.scales import PAPER_GAINS, default_gains, rate_unit
 from tfarm.tables.files import as_json
 
@@ -345,7 +345,7 @@ def test_the_star_holds_at_the_clock_of_its_page(lab, section):
     assert all(fact.beside.endswith("; stable when sampled every 0.2 ms") for fact in margins_section(LAB, quick).facts)
     assert laws(LAB, quick)[1].law.K1 > laws(LAB, Chain())[1].law.K1
     lost = NamedLaw("best without a clock", "best", HubFeedback(K1=26.0, K2=-3.0))
-    (fact,) = verdict_facts([lost], [margins_of(LAB, lost.law)], [sampled_brief(LAB, lost.law, Chain())])
+    fact = verdict_fact(lost, margins_of(LAB, lost.law), f"; {sampled_brief(LAB, lost.law, Chain()).short}")
     assert fact.beside.endswith("UNSTABLE when sampled every 10 ms")
     assert set(map_data(lab).columns[0].values) == {"grid", "boundary", "sampled boundary"}
 

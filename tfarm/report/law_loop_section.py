@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -17,18 +17,16 @@ from tfarm.loop.answers import CROSSOVERS, POLE_COLUMNS, crossovers
 from tfarm.loop.closed import closed_loop_poles
 from tfarm.loop.closed import margins as margins_under
 from tfarm.loop.closed import nyquist as nyquist_under
-from tfarm.loop.law_loop import LawLoop
-from tfarm.loop.law_stability import signs_of_loop
-from tfarm.loop.lyapunov import lyapunov
 from tfarm.loop.margins import Margins
 from tfarm.loop.poles import Poles
 from tfarm.loop.spill import SPILL, Spill, spill
+from tfarm.loop.stability import Stability
 from tfarm.plots.disc import draw_nyquist
 from tfarm.plots.loop import draw_loop, loop_data
 from tfarm.report.given_laws import GivenLaw, LawOnArm, continuous_laws, on_arm
-from tfarm.report.margins_table import margin_table, window_table
+from tfarm.report.margins_table import margin_table, verdict_fact, verdict_words, window_table
 from tfarm.report.nyquist import RINGS_CAPTION, PlotOfLaw, count_table, curve_data
-from tfarm.report.sections import Fact, PageSection, Picture
+from tfarm.report.sections import PageSection, Picture
 from tfarm.report.words import typeset, upper
 
 MOST_SPILLED = 12  # flexible modes of the largest model that is put beside the exact loop
@@ -73,49 +71,20 @@ def law_margins_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> Pag
     words: list[str] = []
     for each, it in both:
         spilled = _spilled(each)
-        words += _words(each, it, spilled)
+        words.append(verdict_words(upper(each.name), it))
         if isinstance(spilled, Spill):
+            words.append(f"Spill-over of {each.name}: {typeset(spilled.in_words)}.")
             blocks.append(spill_table(each, spilled))
-    facts = [verdict_fact(*each) for each in both]
+        else:
+            words.append(f"Models of few modes are not put beside {each.name}: {typeset(spilled)}.")
+    facts = [verdict_fact(each, it, _far(it.stability)) for each, it in both]
     title = "Is the loop stable, and by how much?"
     return PageSection(anchor="margins", title=title, facts=facts, words=words, blocks=blocks)
 
 
-def verdict_fact(each: LawOnArm, found: Margins[Any]) -> Fact:
-    """The verdict, large, how many poles are unstable, and whether more is known beyond the band."""
-    it = found.stability
-    count = (
-        "infinitely many unstable poles" if it.unstable_roots_infinite else how_many(it.unstable_roots, "unstable pole")
-    )
-    far = "" if it.is_known_beyond or it.verdict == "unstable" else ", not known beyond"
-    up_to = f"up to {significant(it.band, 5)} rad/s{far}"
-    return Fact(label=f"{each.name}: {each.gains}", value=it.verdict.upper(), beside=f"{count}, {up_to}")
-
-
-def _words(each: LawOnArm, found: Margins[Any], spilled: Spill | str) -> Iterator[str]:
-    """The verdict and what is known beyond, what Lyapunov's argument or the law's sign adds, and what spills over."""
-    it, loop = found.stability, found.stability.loop
-    free = it.poles.moving.size < it.poles.values.size
-    apart = ", the one at 0 of a hub whose angle is not held apart" if free else ""
-    few = str(it.unstable_roots or "no")
-    count = "infinitely many" if it.unstable_roots_infinite else few
-    poles = f"{count} unstable pole{'s' * (count != '1')}"
-    if isinstance(loop, LawLoop):
-        signs = signs_of_loop(loop)
-        kind = f"it is {signs.kind}" if signs.kind else "no theorem on its sign helps"
-        theorem = f"Beside that, {kind}: {typeset(signs.reason)}."
-        theorem += "".join(f" Warning: {typeset(text)}." for text in loop.warnings)
-    else:
-        proof = lyapunov(loop.arm, loop.law)
-        theorem = f"Lyapunov: {'proven' if proof.proven else 'no proof'}, {typeset(proof.reason)}."
-    yield (
-        f"{upper(each.name)}: {it.verdict.upper()}, with {poles} up to {significant(it.band, 5)} rad/s{apart}; "
-        f"{typeset(it.tail)}. {theorem}"
-    )
-    if isinstance(spilled, str):
-        yield f"Models of few modes are not put beside {each.name}: {typeset(spilled)}."
-    else:
-        yield f"Spill-over of {each.name}: {typeset(spilled.in_words)}."
+def _far(it: Stability[Any]) -> str:
+    """Said beside a verdict that holds in the band alone."""
+    return "" if it.is_known_beyond or it.verdict == "unstable" else ", not known beyond"
 
 
 def _bode_picture(each: LawOnArm, found: Margins[Any]) -> Picture:

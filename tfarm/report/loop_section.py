@@ -24,7 +24,7 @@ from tfarm.report.loop_laws import (
     why_no_loop,
 )
 from tfarm.report.map import MapOfArm, draw_map_of_arm, map_data, map_of_arm
-from tfarm.report.margins_table import margin_table, verdict_facts, verdict_words, window_table
+from tfarm.report.margins_table import margin_table, verdict_fact, verdict_words, window_table
 from tfarm.report.nyquist import RINGS_CAPTION, TO_COMPARE, PlotOfLaw, count_table, curve_data
 from tfarm.report.sections import PageSection, Picture
 from tfarm.report.words import typeset
@@ -213,11 +213,12 @@ def margins_section(arm: Arm, chain: Chain | None = None) -> PageSection:
     chain = Chain() if chain is None else chain
     named = laws(arm, chain)
     found = [margins_of(arm, each.law) for each in named]
+    both = list(zip(named, found, strict=True))
     return PageSection(
         anchor="margins",
         title="Is the loop stable, and by how much?",
-        facts=tuple(verdict_facts(named, found, [brief_on(arm, each.law, chain) for each in named])),
-        words=[verdict_words(*each) for each in zip(named, found, strict=True)],
+        facts=[verdict_fact(each, it, f"; {brief_on(arm, each.law, chain).short}") for each, it in both],
+        words=[verdict_words(f"{each.name.capitalize()}, {each.gains}", it) for each, it in both],
         blocks=(margin_table(named, found, arm.is_told_by_lyapunov), window_table(named, found)),
     )
 

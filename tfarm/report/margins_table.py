@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import Any
 
-from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN
+from tfarm.arm import MOMENT_GAIN
 from tfarm.columns import Column, Table
 from tfarm.digits import how_many, plain, significant, singly
-from tfarm.dsp.brief import SampledBrief
 from tfarm.loop.answers import MARGIN_COLUMNS, NOT_STABLE, WINDOW_COLUMNS, gain_rows, sizes_of, unsettled
+from tfarm.loop.law_loop import LawLoop
+from tfarm.loop.law_stability import signs_of_loop
 from tfarm.loop.lyapunov import lyapunov
 from tfarm.loop.margins import Margins
-from tfarm.report.loop_laws import Named, NamedLaw
+from tfarm.report.loop_laws import Named
 from tfarm.report.sections import Fact
 from tfarm.report.words import typeset
 
@@ -44,36 +46,30 @@ QUANTITIES = (
 MarginRow = tuple[str, str, float | str, float | str, float | str]  # quantity, unit, exact, in the band, at
 
 
-def verdict_facts(laws: Sequence[NamedLaw], found: Sequence[Margins], briefs: Sequence[SampledBrief]) -> Iterator[Fact]:
-    """The verdict of each law on the continuous loop, large, and beside it what sampling makes of it."""
-    for named, each, brief in zip(laws, found, briefs, strict=True):
-        it = each.stability
-        number = how_many(it.unstable_roots, "unstable pole")
-        count = "infinitely many unstable poles" if it.unstable_roots_infinite else number
-        yield Fact(
-            label=f"{named.name}: {named.gains}",
-            value=it.verdict.upper(),
-            beside=f"{count}, {_up_to(it.band)}; {brief.short}",
-        )
-
-
-def verdict_words(named: NamedLaw, found: Margins) -> str:
-    """The verdict, what is known beyond the band, and what Lyapunov says."""
+def verdict_fact(named: Named, found: Margins[Any], more: str) -> Fact:
+    """The verdict, large, how many poles are unstable up to where, and what more is to be said beside it."""
     it = found.stability
-    proof = lyapunov(it.loop.arm, named.law)
-    proven = "proven" if proof.proven else "no proof"
-    is_free = it.loop.arm.has_rigid_mode and not named.law[ANGLE_GAIN]
-    apart = ", the one at 0 that the hub angle leaves apart" if is_free else ""
-    return (
-        f"{named.name.capitalize()}, {named.gains}: {it.verdict.upper()}, with "
-        f"{how_many(it.unstable_roots, 'unstable pole')} "
-        f"{_up_to(it.band)}{apart}; {typeset(it.tail)}. "
-        f"Lyapunov: {proven}, {typeset(proof.reason)}."
-    )
+    number = how_many(it.unstable_roots, "unstable pole")
+    count = "infinitely many unstable poles" if it.unstable_roots_infinite else number
+    beside = f"{count}, up to {significant(it.band, 5)} rad/s{more}"
+    return Fact(label=f"{named.name}: {named.gains}", value=it.verdict.upper(), beside=beside)
 
 
-def _up_to(band: float) -> str:
-    return f"up to {significant(band, 5)} rad/s"
+def verdict_words(name: str, found: Margins[Any]) -> str:
+    """The verdict on the law of that name, what is known beyond the band, and what Lyapunov or the law's sign adds."""
+    it, loop = found.stability, found.stability.loop
+    free = it.poles.moving.size < it.poles.values.size
+    apart = ", the one at 0 that the hub angle leaves apart" if free else ""
+    if isinstance(loop, LawLoop):
+        signs = signs_of_loop(loop)
+        kind = f"it is {signs.kind}" if signs.kind else "no theorem on its sign helps"
+        theorem = f"Beside that, {kind}: {typeset(signs.reason)}."
+        theorem += "".join(f" Warning: {typeset(text)}." for text in loop.warnings)
+    else:
+        proof = lyapunov(loop.arm, loop.law)
+        theorem = f"Lyapunov: {'proven' if proof.proven else 'no proof'}, {typeset(proof.reason)}."
+    poles = f"{how_many(it.unstable_roots, 'unstable pole')} up to {significant(it.band, 5)} rad/s"
+    return f"{name}: {it.verdict.upper()}, with {poles}{apart}; {typeset(it.tail)}. {theorem}"
 
 
 def margin_table(laws: Sequence[Named], found: Sequence[Margins], is_undamped: bool) -> Table:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -59,32 +58,26 @@ def points_table(answer: dict[str, Any]) -> Table:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class Root:
+class Root(NamedTuple):
     """A pole or zero of a Bode plot: s [1/s], and |G| at i Im s, of a real one at i |s|.
 
-    A zero of an elastic link `is_on_axis` where rounding alone is left of Re s.
+    `real` is Re s as a page has it: 0 of a zero of an elastic link where rounding alone is left of it.
     """
 
-    kind: Literal["pole", "zero"]
+    kind: str
     s: complex
     magnitude: float
-    is_on_axis: bool
-
-    @property
-    def real(self) -> float:
-        """Re s [1/s] as a page has it."""
-        return 0.0 if self.is_on_axis else self.s.real + 0.0
+    real: float
 
 
 def roots_table(data: Bode, *kinds: str, stem: str = "", caption: str = "") -> Table:
     """A row a pole or zero of the upper half-plane, of these kinds."""
-    elastic = data.arm.has_elastic_link
-    poles = (Root("pole", s, size, False) for s, size in zip(data.poles.tolist(), data.peaks.tolist(), strict=True))
-    zeros = (
-        Root("zero", s, size, elastic and abs(s.real) < ZERO_ON_AXIS * abs(s))
-        for s, size in zip(data.zeros.tolist(), data.dips.tolist(), strict=True)
-    )
+    elastic, rows = data.arm.has_elastic_link, []
+    roots = {"pole": (data.poles, data.peaks), "zero": (data.zeros, data.dips)}
+    for kind in kinds:
+        for s, size in zip(*(each.tolist() for each in roots[kind]), strict=True):
+            on_axis = kind == "zero" and elastic and abs(s.real) < ZERO_ON_AXIS * abs(s)
+            rows.append(Root(kind, s, size, 0.0 if on_axis else s.real + 0.0))
     columns = (  # of `Root`
         Column("kind", "kind", on=REPORT),
         Column("re", "Re s", "1/s", of="s.real", on=ANSWER,
@@ -99,9 +92,8 @@ def roots_table(data: Bode, *kinds: str, stem: str = "", caption: str = "") -> T
         Column("magnitude", "magnitude there", unit(data.gain_unit), digits=singly(scientific, 4),
                head="|G| there", printed=singly(general, 6)),
     )  # fmt: skip
-    record = [root for root in (*poles, *zeros) if root.kind in kinds]
     title = f"Poles and zeros, {data.input_label} to {data.label}"
-    return Table(stem=stem, title=title, caption=caption, columns=columns, record=record)
+    return Table(stem=stem, title=title, caption=caption, columns=columns, record=rows)
 
 
 def bode_answer(data: Bode) -> dict[str, Any]:
