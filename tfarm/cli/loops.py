@@ -44,19 +44,20 @@ def locus(
     count, subject = whole_number("--branches", branches, 1, 200), load_arm(arm)
     law, said = asked_law(subject, given)
     from tfarm.arm import HubFeedback
+    from tfarm.cli.tables import say_written
     from tfarm.loop.closed import locus as find
     from tfarm.loop.law_locus import LawLocus, law_locus_answer
-    from tfarm.loop.loci import locus_answer
+    from tfarm.loop.loci import branch_columns, locus_answer
     from tfarm.loop.reduced_locus import reduced_locus
 
     most = (100_000, 200) if isinstance(law, HubFeedback) else (5000, 60)
     number = None if points is None else whole_number("--points", points, 2, most[0])
     found = find(subject, law, vary, start, stop, number, min(count, most[1]))
     if isinstance(found, LawLocus):
-        reduced, answer, show = None, law_locus_answer(found) | said, print_law_locus
+        reduced, answer = None, law_locus_answer(found)
     else:
         reduced = reduced_locus(found)
-        answer, show = locus_answer(found, reduced) | said, print_locus
+        answer = locus_answer(found, reduced)
     if png is not None:
         from tfarm.plots.files import save_png
         from tfarm.plots.laws import draw_locus_of
@@ -65,58 +66,37 @@ def locus(
     if csv is not None:
         from tfarm.tables.files import write_csv
 
-        write_csv(branches_table(answer), csv)
-    from tfarm.cli.tables import say_written
-
+        first = Column(answer["vary"], unit=answer["unit"], of=answer["gain"])
+        write_csv(Table(columns=(first, *branch_columns(found.branches, "{part}_{n}"))), csv)
     if say_written(csv, png) or json:
-        give(answer, json, show)
-
-
-def branches_table(answer: dict[str, Any]) -> Table:
-    """A row a gain, two columns a branch."""
-    columns = [Column(answer["vary"], unit=answer["unit"], of=answer["gain"])]
-    for n, branch in enumerate(answer["branches"]):
-        re, im = zip(*(point or ("", "") for point in branch), strict=True)
-        columns += [Column(f"re_{n}", unit="1/s", of=re), Column(f"im_{n}", unit="1/s", of=im)]
-    return Table(columns=tuple(columns))
+        give(answer | said, json, print_locus)
 
 
 def print_locus(answer: dict[str, Any]) -> None:
-    """A row a branch, then the crossings."""
+    """A row a branch, then the crossings; of gains how far the reduced branches are, of any other law the box."""
     from tfarm.tables.terminal import show
 
     first, last, name, branches = answer["gain"][0], answer["gain"][-1], answer["vary"], answer["branches"]
-    columns = (
+    of_gains = "gap_by_branch" in answer
+    none = "ended" if of_gains else "-"
+    columns = [
         Column("branch", "branch", of=range(len(branches))),
-        Column("mode", "mode", of=answer["mode"]),
-        Column("first", f"s [1/s] at {name} = {first:g}", of=[_complex(branch[0]) for branch in branches]),
-        Column("last", f"at {name} = {last:g}", of=[_complex(branch[-1]) for branch in branches]),
-        Column("gap", "gap to reduced", of=answer["gap_by_branch"], digits=singly("{:.1e}".format)),
-    )
-    show(Table(columns=columns))
+        Column("mode", "mode", of=answer.get("mode")),
+        Column("first", f"s [1/s] at {name} = {first:g}", of=[_complex(branch[0], none) for branch in branches]),
+        Column("last", f"at {name} = {last:g}", of=[_complex(branch[-1], none) for branch in branches]),
+        Column("gap", "gap to reduced", of=answer.get("gap_by_branch"), digits=singly("{:.1e}".format)),
+    ]
+    show(Table(columns=tuple(column for column in columns if column.of is not None)))
     _print_crossings(answer)
-    for each in answer["ends"]:
+    for each in answer.get("ends", ()):
         print(f"branch {each['branch']} is followed to {name} = {each['gain']:.10g}: then it comes to -1/C, or is lost")
-    print(
-        f"largest gap to python-control on a model of order {answer['reduced_order']}: {answer['gap_to_reduced']:.1e}"
-    )
-    print(answer["sign_convention"])
-
-
-def print_law_locus(answer: dict[str, Any]) -> None:
-    """A row a branch, then the crossings and the box."""
-    from tfarm.tables.terminal import show
-
-    first, last, name, branches = answer["gain"][0], answer["gain"][-1], answer["vary"], answer["branches"]
-    columns = (
-        Column("branch", "branch", of=range(len(branches))),
-        Column("first", f"s [1/s] at {name} = {first:g}", of=[_complex(branch[0], "-") for branch in branches]),
-        Column("last", f"at {name} = {last:g}", of=[_complex(branch[-1], "-") for branch in branches]),
-    )
-    show(Table(columns=columns))
-    _print_crossings(answer)
-    left, right, _, top = answer["box"]
-    print(f"all poles with {left:.6g} < Re s < {right:.6g} and |Im s| < {top:.6g}, complete at each value; - : outside")
+    if of_gains:
+        gap, order = answer["gap_to_reduced"], answer["reduced_order"]
+        print(f"largest gap to python-control on a model of order {order}: {gap:.1e}")
+    else:
+        left, right, _, top = answer["box"]
+        box = f"{left:.6g} < Re s < {right:.6g} and |Im s| < {top:.6g}"
+        print(f"all poles with {box}, complete at each value; - : outside")
     print(answer["sign_convention"])
 
 
@@ -132,7 +112,7 @@ def _print_crossings(answer: dict[str, Any]) -> None:
         print("no branch crosses the imaginary axis")
 
 
-def _complex(point: list[float] | None, none: str = "ended") -> str:
+def _complex(point: list[float] | None, none: str) -> str:
     if point is None:
         return none
     re, im = point

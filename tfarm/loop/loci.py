@@ -9,6 +9,7 @@ import numpy as np
 
 from tfarm.arm import NAMES, Arm, HubFeedback, unit_of, written_unit
 from tfarm.arrays import Complex
+from tfarm.columns import Column
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
 
@@ -64,6 +65,15 @@ def held_branches(branches: Complex) -> Complex:
     size = np.maximum(abs(branches), np.finfo(float).tiny)
     unit = 10.0 ** (np.floor(np.log10(size)) + 1 - POLE_DIGITS)
     return np.round(branches.real / unit) * unit + 1j * (np.round(branches.imag / unit) * unit)
+
+
+def branch_columns(branches: Complex, key: str, title: str = "") -> list[Column]:
+    """Two columns a branch, Re s and Im s, empty where it is not followed; key and title name branch `n` and `part`."""
+    return [
+        Column(key.format(n=n, part=part[:2].lower()), title.format(n=n, part=part), "1/s",
+               of=["" if np.isnan(x) else x for x in values.tolist()])
+        for n, row in enumerate(branches) for part, values in (("Re s", row.real), ("Im s", row.imag))
+    ]  # fmt: skip
 
 
 def loci(arm: Arm, law: HubFeedback, vary: str, start: float, stop: float) -> Loci:

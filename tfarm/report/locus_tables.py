@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from tfarm.columns import Column, Table
 from tfarm.digits import kept_digits, scientific, significant, singly
-from tfarm.loop.loci import GAPS_HELD, POLE_DIGITS, Loci, held_branches
+from tfarm.loop.loci import GAPS_HELD, POLE_DIGITS, Loci, branch_columns, held_branches
 
 
 def crossing_table(data: Loci, stem: str) -> Table:
@@ -52,10 +50,11 @@ def gap_table(data: Loci, stem: str) -> Table:
 
 def loci_data(data: Loci, stem: str) -> Table:
     """The exact and the reduced branches."""
-    columns = [Column(data.name, data.name, data.unit, of=data.exact.gain)]
-    for kind, branches in (("exact", data.exact.branches), ("reduced", data.reduced.branches)):
-        for n, row in enumerate(held_branches(branches)):
-            re, im = (["" if np.isnan(x) else x for x in part.tolist()] for part in (row.real, row.imag))
-            columns.append(Column(f"{kind}_{n}_re", f"{kind} branch {n}, Re s", "1/s", of=re))
-            columns.append(Column(f"{kind}_{n}_im", f"{kind} branch {n}, Im s", "rad/s", of=im))
-    return Table(stem=stem, title=f"Loci along {data.name}", is_data=True, columns=tuple(columns))
+    first = Column(data.name, data.name, data.unit, of=data.exact.gain)
+    exact, reduced = held_branches(data.exact.branches), held_branches(data.reduced.branches)
+    columns = (
+        first,
+        *branch_columns(exact, "exact_{n}_{part}", "exact branch {n}, {part}"),
+        *branch_columns(reduced, "reduced_{n}_{part}", "reduced branch {n}, {part}"),
+    )
+    return Table(stem=stem, title=f"Loci along {data.name}", columns=columns)
