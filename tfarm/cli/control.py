@@ -119,20 +119,20 @@ def gain_map(
 
     usual, given = ranges_of(subject), _bounds_of(typed)
     x, y = (given[name] or known for name, known in zip(PLANE, usual, strict=True))
-    from tfarm.cli.control_tables import print_map, write_map
-    from tfarm.loop.answers import map_answer
+    from tfarm.cli.control_tables import print_map
+    from tfarm.cli.tables import say_written
+    from tfarm.loop.answers import map_answer, plane_table
     from tfarm.loop.regions import between, region
+    from tfarm.tables.files import write_csv
 
     found = region(subject, between(*x, number), between(*y, number), kp)
     if csv is not None:
-        write_map(map_answer(found), csv)
+        write_csv(plane_table(PLANE, *found.axes, found.unstable), csv)
     if png is not None:
         from tfarm.plots.files import save_png
         from tfarm.plots.plane import draw_map
 
         save_png(draw_map(found), png)
-    from tfarm.cli.tables import say_written
-
     if say_written(csv, png) or json:
         give(map_answer(found), json, print_map)
 
@@ -153,23 +153,25 @@ def _law_map(
         raise ParameterError(key="--vary", value=vary, remedy=remedy)
     ranges = [_range_of("--vary", each) for each in vary]
     typed = asked_law(subject, Given({}, law, name))[0]
-    from tfarm.cli.control_tables import print_law_map, write_law_map
+    from tfarm.cli.control_tables import print_law_map
     from tfarm.cli.tables import say_written
+    from tfarm.loop.answers import plane_table
     from tfarm.loop.law_map import law_map, law_map_answer
     from tfarm.loop.regions import between
+    from tfarm.tables.files import write_csv
 
     x, y = (between(*limits, number) for _, limits in ranges)
     found = law_map(subject, typed, (ranges[0][0], ranges[1][0]), x, y)
-    answer = law_map_answer(found)
     if csv is not None:
-        write_law_map(answer, csv)
+        names = [name.replace(".", "_").replace("@", "_at_") for name in found.vary]
+        write_csv(plane_table(names, found.x, found.y, found.unstable), csv)
     if png is not None:
         from tfarm.plots.files import save_png
         from tfarm.plots.laws import draw_law_map
 
         save_png(draw_law_map(found), png)
     if say_written(csv, png) or json:
-        give(answer, json, print_law_map)
+        give(law_map_answer(found), json, print_law_map)
 
 
 def _range_of(option: str, text: str) -> tuple[str, tuple[float, float]]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 from tfarm.arm import ANGLE_GAIN, NAMES, PLANE
@@ -12,7 +11,6 @@ from tfarm.columns import Column, Table
 from tfarm.digits import general, singly
 from tfarm.loop.answers import MARGIN_COLUMNS, POLE_COLUMNS, WINDOW_COLUMNS, gain_rows
 from tfarm.loop.margins import Margins
-from tfarm.tables.files import write_csv
 from tfarm.tables.terminal import heading, show
 
 
@@ -121,18 +119,6 @@ def print_law_map(answer: dict[str, Any]) -> None:
     _print_plane(answer, "x", "y", (first, second))
 
 
-def write_law_map(answer: dict[str, Any], path: Path) -> None:
-    """Both numbers of the law and the number of unstable poles, one row a point."""
-    _write_plane(answer, "x", "y", [name.replace(".", "_").replace("@", "_at_") for name in answer["vary"]], path)
-
-
-def _write_plane(answer: dict[str, Any], x: str, y: str, names: Sequence[str], path: Path) -> None:
-    counts = [count for row in answer["unstable_roots"] for count in row]
-    across, up = answer[x] * len(answer[y]), [value for value in answer[y] for _ in answer[x]]
-    columns = (Column(names[0], of=across), Column(names[1], of=up), Column("unstable_roots", of=counts))
-    write_csv(Table(columns=columns), path)
-
-
 def print_design(answer: dict[str, Any]) -> None:
     """The gains and what they reach."""
     loop = f"the {answer['designed_for']} loop, {answer['modes']} modes in the band"
@@ -191,8 +177,3 @@ def print_law_design(answer: dict[str, Any]) -> None:
     print(f"without a clock it is {answer['verdict']}{beyond}; --save FILE keeps it for --law FILE")
     _print_arms(answer)
     print(answer["sign_convention"])
-
-
-def write_map(answer: dict[str, Any], path: Path) -> None:
-    """Both gains and the number of unstable poles, one row a point."""
-    _write_plane(answer, *PLANE, PLANE, path)

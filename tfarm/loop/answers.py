@@ -6,7 +6,10 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from tfarm.arm import ANGLE_GAIN, LISTED, PLANE, SPELT_OUT, Arm, HubFeedback, Law, input_words, shown_unit, unit_of
+from tfarm.arrays import Real, Whole
 from tfarm.columns import JSON, REPORT, TERMINAL, Column, Table
 from tfarm.crossing import Window
 from tfarm.digits import general, lined, plain, significant, singly, within
@@ -280,6 +283,16 @@ def nyquist_table(*found: Nyquist[Any], stem: str = "", laws: Sequence[str] = ()
     points = [pair for each in pairs for pair in each]
     title = "The loop function on the contour"
     return Table(stem=stem, title=title, columns=(*first, *CONTOUR_COLUMNS), record=points)
+
+
+def plane_table(names: Sequence[str], x: Real, y: Real, unstable: Whole) -> Table:
+    """A row a point of the plane of two numbers: both, and the count of unstable poles there."""
+    across, up = np.meshgrid(x, y)
+    columns = (
+        *(Column(name, of=values.ravel()) for name, values in zip(names, (across, up), strict=True)),
+        Column("unstable_roots", of=["inf" if count == INFINITE else int(count) for count in unstable.ravel()]),
+    )
+    return Table(columns=columns)
 
 
 def map_answer(found: Region) -> dict[str, Any]:
