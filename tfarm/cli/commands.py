@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -23,12 +22,19 @@ from tfarm.cli.app import (
     load_arm,
     read_on,
     right_digits,
+    tell,
     whole_number,
 )
 from tfarm.cli.inputs import GAIN_OPTIONS, LawFiles, Typed, asked_laws, with_options
 from tfarm.cli.sampling import Delay, DspFile, Period, asked_chain
-from tfarm.errors import MISSING, ParameterError, one_line
+from tfarm.errors import MISSING, ParameterError
 
+if TYPE_CHECKING:
+    from tfarm.arm import Arm
+
+LaidOver = Annotated[
+    str | None, typer.Option("--measured", metavar="OUTPUT/INPUT=FILE", help="lay a measured response over it")
+]
 MOST_LISTED = 1000  # modes with nodes and sensitivities: their work grows with the square, to some 20 s
 
 
@@ -86,9 +92,7 @@ def response(
     method: MethodName = "closed-form",
     compare: Compare = False,
     csv: Annotated[Path | None, typer.Option("--csv", help="write a table to this file")] = None,
-    measured: Annotated[
-        str | None, typer.Option("--measured", metavar="OUTPUT/INPUT=FILE", help="lay a measured response over it")
-    ] = None,
+    measured: LaidOver = None,
     png: Annotated[Path | None, typer.Option("--png", help="with --measured: write the picture to this file")] = None,
     json: Json = False,
 ) -> None:
@@ -102,27 +106,38 @@ def response(
         others = {"--s": s, "--omega": omega, "--output": output, "--x": x, "--side": side, "--digits": digits}
         lay_over(arm, measured, others, csv, png, json)
         return
-    if output is None or png is not None:
-        option = "--output" if output is None else "--measured"
-        raise ParameterError(key=option, value=MISSING, remedy="say which response: --output root_moment, for one")
+    (wanted,) = read_on([_asked_output(output, png)], side)
     from tfarm.cli.inputs import asked_input, points_on
+    from tfarm.cli.methods import BESIDE_COMPARE, print_compared, refuse_beside, slow_method
+    from tfarm.response import transfer
+    from tfarm.response.answers import by_methods_answer, response_answer
 
     right, at = right_digits(digits), points_on(s, omega, start, stop, points)
     subject, driven = asked_input(load_arm(arm), driven)
-    from tfarm.cli.methods import BESIDE_COMPARE, print_compared, refuse_beside, slow_method
-    from tfarm.cli.tables import print_found, say_written
-    from tfarm.response import transfer
-    from tfarm.response.answers import by_methods_answer, points_table, response_answer
-    from tfarm.tables.files import write_csv
-    from tfarm.tables.terminal import show
-
     road = slow_method(method, at.size, right, compare)
-    (wanted,) = read_on([output], side)
     if compare:
         refuse_beside({"--csv": csv, "--input": driven}, BESIDE_COMPARE)
         give(by_methods_answer(transfer(subject, wanted, x=x), at), json, print_compared)
-        return
-    answer = response_answer(transfer(subject, wanted, x=x, method=road, input=driven), at, right)
+    else:
+        G = transfer(subject, wanted, x=x, method=road, input=driven)
+        _give_points(response_answer(G, at, right), csv, json)
+
+
+def _asked_output(output: str | None, png: Path | None) -> str:
+    """What is looked at.  Raises ParameterError where it is not said, and for a picture of nothing measured."""
+    if output is None or png is not None:
+        option = "--output" if output is None else "--measured"
+        raise ParameterError(key=option, value=MISSING, remedy="say which response: --output root_moment, for one")
+    return output
+
+
+def _give_points(answer: dict[str, Any], csv: Path | None, json: bool) -> None:
+    """A response as a table in a file or on the terminal, or as JSON."""
+    from tfarm.cli.tables import print_found, say_written
+    from tfarm.response.answers import points_table
+    from tfarm.tables.files import write_csv
+    from tfarm.tables.terminal import show
+
     if csv is not None:
         write_csv(points_table(answer), csv)
     if say_written(csv) or json:
@@ -163,25 +178,20 @@ def report(
     subjects = [load_arm(name, theory) for name in names]
     chains = [asked_chain(dsp or name, period, delay_samples) for name in names]
     laws = [asked_laws(arm, name, gains, law or []) for arm, name in zip(subjects, names, strict=True)]
+    pages = None if only is None else (only,)
+    print(_written(subjects, out, measured or [], chains=chains, laws=laws, only=pages, force=force))
+
+
+def _written(subjects: list[Arm], out: Path, measured: list[str], **asked: Any) -> Path:
+    """The page written, with the responses as they are typed; what is left out is said on standard error at the end."""
     from tfarm.cli.tables import progress
     from tfarm.fitting.reading import data_of
     from tfarm.report import write
 
-    responses = [data_of(text, "--measured") for text in measured or []]
+    responses = [data_of(text, "--measured") for text in measured]
     left_out: list[str] = []
     with progress() as advance:
-        pages = None if only is None else (only,)
-        page = write(
-            subjects,
-            out,
-            chains=chains,
-            laws=laws,
-            measured=responses,
-            only=pages,
-            force=force,
-            progress=advance,
-            notice=left_out.append,
-        )
+        page = write(subjects, out, measured=responses, progress=advance, notice=left_out.append, **asked)
     for text in left_out:
-        print(f"tfarm: {one_line(text, 1000)}", file=sys.stderr)
-    print(page)
+        tell(text)
+    return page

@@ -206,11 +206,10 @@ def design(
     ranges = dict(_range_of("--range", each) for each in over or [])
     from tfarm.arm import as_law
     from tfarm.arm.law_writing import save_law
-    from tfarm.cli.control_tables import print_design, print_law_design
+    from tfarm.cli.control_tables import print_design
     from tfarm.cli.tables import say_written
-    from tfarm.synthesis.answers import design_answer, law_design_answer
+    from tfarm.synthesis.answers import design_answer
     from tfarm.synthesis.chosen import design as find_law
-    from tfarm.synthesis.design import Design
 
     found = find_law(
         subject, objective, structure=structure, **within, modes=number, chain=chain,
@@ -219,12 +218,8 @@ def design(
     )  # fmt: skip
     if save is not None:
         save_law(as_law(found.law), save)
-    if not (say_written(save) or json):
-        return
-    if isinstance(found, Design):
+    if say_written(save) or json:
         give(design_answer(found), json, print_design)
-    else:
-        give(law_design_answer(found), json, print_law_design)
 
 
 def _bounds_of(typed: dict[str, str | None]) -> dict[str, tuple[float, float] | None]:

@@ -120,7 +120,13 @@ def print_law_map(answer: dict[str, Any]) -> None:
 
 
 def print_design(answer: dict[str, Any]) -> None:
-    """The gains and what they reach."""
+    """The law and what it reaches, then a row an arm."""
+    (_print_coefficients if "coefficients" in answer else _print_gains)(answer)
+    _print_arms(answer)
+    print(answer["sign_convention"])
+
+
+def _print_gains(answer: dict[str, Any]) -> None:
     loop = f"the {answer['designed_for']} loop, {answer['modes']} modes in the band"
     print(f"{answer['arm']}, objective {answer['objective']} of {loop}: {answer['verdict']} without a clock")
     units = {name: "" if unit == "1" else f" {unit}" for name, unit in answer["gain_units"].items()}
@@ -141,8 +147,6 @@ def print_design(answer: dict[str, Any]) -> None:
     if cut:
         ends = [f"{name} = {answer[name]:.6g} of {_pair(answer['bounds'][name])}" for name in cut]
         print(f"no optimum: {' and '.join(ends)} is where the search was cut off; it may get better beyond")
-    _print_arms(answer)
-    print(answer["sign_convention"])
 
 
 def _print_arms(answer: dict[str, Any]) -> None:
@@ -161,8 +165,7 @@ def _print_arms(answer: dict[str, Any]) -> None:
     print(f"{answer['value']:.6g} is {answer['worst_case_in_words']}; {answer['worst_arm']} is the worst")
 
 
-def print_law_design(answer: dict[str, Any]) -> None:
-    """The coefficients and what they reach."""
+def _print_coefficients(answer: dict[str, Any]) -> None:
     told = f"{answer['structure']}, objective {answer['objective']} of the sampled loop, {answer['modes']} modes"
     print(f"{answer['arm']}, {told}: {answer['value']:.6g}")
     columns = (
@@ -175,5 +178,3 @@ def print_law_design(answer: dict[str, Any]) -> None:
     print(answer["sampled"]["in_words"].replace("these gains are", "it is", 1))
     beyond = "" if answer["known_beyond_the_band"] else f" up to {answer['band_rad_s']:.4g} rad/s, not known beyond"
     print(f"without a clock it is {answer['verdict']}{beyond}; --save FILE keeps it for --law FILE")
-    _print_arms(answer)
-    print(answer["sign_convention"])

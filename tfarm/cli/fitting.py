@@ -13,6 +13,7 @@ from tfarm.cli.app import ArmName, Json, app, give, load_arm, tell
 from tfarm.errors import ParameterError
 
 if TYPE_CHECKING:
+    from tfarm.arm import Arm
     from tfarm.fitting.fit import Fit
 
 HELP_ON_DATA = "OUTPUT/INPUT=FILE, such as tip_acceleration/hub_angle=sweep.csv; again for each response"
@@ -45,33 +46,39 @@ def fit(
     json: Json = False,
 ) -> None:
     """The numbers of an arm that explain what was measured of it, with intervals, and what is left open."""
-    subject = load_arm(arm)
-    from tfarm.cli.tables import progress, say_written
+    from tfarm.cli.tables import say_written
     from tfarm.fitting.answers import fit_answer, save_fit
-    from tfarm.fitting.fit import fit as find
-    from tfarm.fitting.overlay import check_unit
-    from tfarm.fitting.reading import data_of
-    from tfarm.fitting.ringing import mode_of
 
-    measured = [data_of(text) for text in data or []]
-    for each in measured:
-        check_unit(subject, each)
-    with progress() as advance:
-        found = find(
-            subject, measured, [key.strip() for key in free.split(",") if key.strip()],
-            start={key: value for key, (value,) in _numbers("--start", start or [], 1)},
-            bounds=dict(_numbers("--bounds", bounds or [], 2)), priors=dict(_numbers("--prior", prior or [], 2)),
-            rings=[mode_of(text) for text in mode or []], profile=not covariance, progress=advance,
-        )  # fmt: skip
+    found = _fitted(
+        load_arm(arm), data or [], free, mode or [], profile=not covariance,
+        start={key: value for key, (value,) in _numbers("--start", start or [], 1)},
+        bounds=dict(_numbers("--bounds", bounds or [], 2)), priors=dict(_numbers("--prior", prior or [], 2)),
+    )  # fmt: skip
     if save is not None:
         save_fit(found, save)
     if png is not None:
         _draw(found, png)
     page = _report(found, out) if report else None
-    if say_written(*(path for path in (save, png, page) if path is not None)) or json:
+    if say_written(save, png, page) or json:
         give(fit_answer(found), json, lambda answer: _print(found, answer))
     if not found.converged:
         raise typer.Exit(3)
+
+
+def _fitted(subject: Arm, data: list[str], free: str, modes: list[str], **known: Any) -> Fit:
+    """The fit to responses and ring-downs as they are typed, with what is `known` of the numbers that are free."""
+    from tfarm.cli.tables import progress
+    from tfarm.fitting.fit import fit as find
+    from tfarm.fitting.overlay import check_unit
+    from tfarm.fitting.reading import data_of
+    from tfarm.fitting.ringing import mode_of
+
+    measured = [data_of(text) for text in data]
+    for each in measured:
+        check_unit(subject, each)
+    keys = [key.strip() for key in free.split(",") if key.strip()]
+    with progress() as advance:
+        return find(subject, measured, keys, rings=[mode_of(text) for text in modes], progress=advance, **known)
 
 
 def _numbers(option: str, texts: Iterable[str], count: int) -> Iterable[tuple[str, Any]]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import wraps
 from inspect import Parameter, signature
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar, cast
 
 import numpy as np
@@ -64,17 +65,24 @@ HeldAngle = gain_option(GAINS[FED_BACK.index("hub_angle")], float)  # of command
 
 
 def with_options(
-    options: Mapping[str, Any], after: str, gathered: Callable[[dict[str, Any], Mapping[str, Any]], Any] | None = None
+    options: Mapping[str, Any],
+    after: str,
+    gathered: Callable[[dict[str, Any], Mapping[str, Any]], Any] | None = None,
+    defaults: Mapping[str, Any] = MappingProxyType({}),
 ) -> Callable[[Command], Command]:
-    """A command with these options, None where not given, after the argument of that name, instead of its last one.
+    """A command with these options after the argument of that name, instead of its last argument.
 
-    The last one is what they are by name, or what `gathered` makes of that and of the other arguments.
+    The last one is what they are by name, or what `gathered` makes of that and of the other arguments.  An option that
+    is not given has its default, or is None.
     """
 
     def decorated(command: Command) -> Command:
         own = signature(command, eval_str=True)
         *kept, last = (each.replace(kind=Parameter.KEYWORD_ONLY) for each in own.parameters.values())
-        added = [Parameter(name, Parameter.KEYWORD_ONLY, default=None, annotation=options[name]) for name in options]
+        added = [
+            Parameter(name, Parameter.KEYWORD_ONLY, default=defaults.get(name), annotation=options[name])
+            for name in options
+        ]
         place = 1 + [each.name for each in kept].index(after)
 
         @wraps(command)

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from tfarm.arm import NAMES
+from tfarm.arrays import Complex
 from tfarm.cli.app import ArmName, Json, app, give, load_arm, whole_number
 from tfarm.cli.inputs import Given, Png, asked_law, under_a_law
 from tfarm.columns import Column, Table
@@ -47,7 +48,7 @@ def locus(
     from tfarm.cli.tables import say_written
     from tfarm.loop.closed import locus as find
     from tfarm.loop.law_locus import LawLocus, law_locus_answer
-    from tfarm.loop.loci import branch_columns, locus_answer
+    from tfarm.loop.loci import locus_answer
     from tfarm.loop.reduced_locus import reduced_locus
 
     most = (100_000, 200) if isinstance(law, HubFeedback) else (5000, 60)
@@ -66,10 +67,17 @@ def locus(
     if csv is not None:
         from tfarm.tables.files import write_csv
 
-        first = Column(answer["vary"], unit=answer["unit"], of=answer["gain"])
-        write_csv(Table(columns=(first, *branch_columns(found.branches, "{part}_{n}"))), csv)
+        write_csv(branches_table(answer, found.branches), csv)
     if say_written(csv, png) or json:
         give(answer | said, json, print_locus)
+
+
+def branches_table(answer: dict[str, Any], branches: Complex) -> Table:
+    """A row a gain, two columns a branch."""
+    from tfarm.loop.loci import branch_columns
+
+    first = Column(answer["vary"], unit=answer["unit"], of=answer["gain"])
+    return Table(columns=(first, *branch_columns(branches, "{part}_{n}")))
 
 
 def print_locus(answer: dict[str, Any]) -> None:

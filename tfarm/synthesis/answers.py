@@ -11,45 +11,38 @@ from tfarm.synthesis.design import Design
 from tfarm.synthesis.law_design import LawDesign
 
 
-def design_answer(found: Design) -> dict[str, Any]:
-    """The gains, what they reach, both verdicts, and how flat the optimum is."""
-    law, bounds = found.law, found.bounds
+def design_answer(found: Design | LawDesign) -> dict[str, Any]:
+    """The law and what it reaches, both verdicts; of gains how flat the optimum is, of another law its coefficients."""
+    verdict, arm = found.verdict, found.verdict.loop.arm
+    if isinstance(found, Design):
+        own: dict[str, Any] = {
+            "structure": TWO_GAINS,
+            "designed_for": found.loop,
+            "bounds": {name: list(pair) for name, pair in found.bounds.items()},
+            "at_bound": list(found.at_bound),
+            "widened": list(found.widened),
+            "flat_K1": list(found.flat_K1),
+            "flat_K2": list(found.flat_K2),
+            "sampled": found.sampled.answer,
+        }
+    else:
+        own = {
+            "structure": found.structure,
+            "designed_for": "sampled",
+            "coefficients": found.coefficients,
+            "known_beyond_the_band": verdict.is_known_beyond,
+            "band_rad_s": verdict.band,
+            "sampled": brief_of(found.sampled, found.chain).answer,
+        }
     return {
-        "arm": found.verdict.loop.arm.name,
+        "arm": arm.name,
         "objective": found.objective,
-        "structure": TWO_GAINS,
-        "designed_for": found.loop,
-        **law_answer(law, found.verdict.loop.arm),
+        **law_answer(found.law, arm),
         "value": found.value,
-        "verdict": found.verdict.verdict,
+        "verdict": verdict.verdict,
         "modes": found.modes,
-        "bounds": {name: list(pair) for name, pair in bounds.items()},
-        "at_bound": list(found.at_bound),
         "at_limit": list(found.at_limit),
-        "widened": list(found.widened),
-        "flat_K1": list(found.flat_K1),
-        "flat_K2": list(found.flat_K2),
-        "sampled": found.sampled.answer,
-        **arms_answer(found),
-    }
-
-
-def law_design_answer(found: LawDesign) -> dict[str, Any]:
-    """The law and its coefficients, what it reaches, and both verdicts."""
-    return {
-        "arm": found.verdict.loop.arm.name,
-        "objective": found.objective,
-        "structure": found.structure,
-        "designed_for": "sampled",
-        **law_answer(found.law, found.verdict.loop.arm),
-        "coefficients": found.coefficients,
-        "at_limit": list(found.at_limit),
-        "value": found.value,
-        "verdict": found.verdict.verdict,
-        "known_beyond_the_band": found.verdict.is_known_beyond,
-        "band_rad_s": found.verdict.band,
-        "modes": found.modes,
-        "sampled": brief_of(found.sampled, found.chain).answer,
+        **own,
         **arms_answer(found),
     }
 
