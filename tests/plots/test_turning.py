@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import tfarm
+from tfarm.comparing.regions import sampled_region
 from tfarm.crossing import pieces
 from tfarm.dsp import load_chain
 from tfarm.dsp.loci import sampled_loci
@@ -16,7 +17,6 @@ from tfarm.loop.poles import poles_below
 from tfarm.plots.folded import draw_folded_loci
 from tfarm.plots.laws import draw_law_locus
 from tfarm.plots.roots import draw_locus
-from tfarm.report.map import sampled_part
 from tfarm.spectrum.scales import default_gains, rate_unit
 
 LAB, STOCKY = tfarm.load("sasaki2012-lab"), tfarm.load("stocky-steel")
@@ -83,7 +83,7 @@ def test_the_outline_of_a_sampled_region_is_that_of_its_poles():
     beyond 5 degrees but where it is no longer than a pixel."""
     x = rate_axis(LAB)
     y = moment_axis(LAB, x)
-    plane = sampled_part(LAB, x, y, load_chain(LAB.name))
+    plane = sampled_region(LAB, x, y, load_chain(LAB.name))
     aside, checked = 0.004, 0
     for piece in pieces(plane.K1, plane.stable_intervals):
         K1, low, high = np.array(piece.points).T

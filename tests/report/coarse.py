@@ -1,16 +1,17 @@
 """Pages on coarse grids, for tests of words, links and bytes: where a boundary lies has tests of its own."""
 
+from tfarm.comparing import regions
 from tfarm.dsp import loci as sampled_loci
 from tfarm.dsp import periods
 from tfarm.dsp import regions as sampled_regions
 from tfarm.loop import loci
-from tfarm.report import making, map, overlay
+from tfarm.report import making, map
 
 COARSE = (
     (map, "GRID_COLUMNS", 48),
     (map, "GRID_ROWS", 40),
-    (map, "SAMPLED_COLUMNS", 24),
-    (overlay, "OVERLAY_COLUMNS", 8),
+    (regions, "SAMPLED_COLUMNS", 24),
+    (regions, "OVERLAY_COLUMNS", 8),
     (sampled_regions, "MOST_COLUMNS", 0),  # with the corners that so few have
     (loci, "LOCUS_POINTS", 60),
     (sampled_loci, "SAMPLED_LOCUS_VALUES", 31),

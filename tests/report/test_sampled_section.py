@@ -10,6 +10,7 @@ import pytest
 
 import tfarm
 from tfarm.arm import HubFeedback
+from tfarm.comparing.regions import CUT_RANGE, K2_RANGE, stable_regions
 from tfarm.crossing import pieces
 from tfarm.digits import kept_digits, scientific
 from tfarm.dsp import Chain, Simulator, analyse, sampled_loop, sampled_verdict, scenario, stable_windows
@@ -21,7 +22,7 @@ from tfarm.loop.stability import stability
 from tfarm.loop.windows import gain_windows
 from tfarm.plots.files import save_figure
 from tfarm.plots.strip import draw_strip_chart
-from tfarm.report.overlay import CUT_RANGE, K2_RANGE, draw_overlay, overlay_table, stable_regions
+from tfarm.report.overlay import draw_overlay, overlay_table
 from tfarm.report.sampled_section import sampled_section
 from tfarm.report.sampled_tables import loci_table
 from tfarm.report.sampled_words import Sampled, against_continuous, cure, duration, interval_words, sampled_in_short
@@ -59,8 +60,8 @@ def values_of(table):
 
 def test_the_picture_of_a_rig_is_as_high_as_its_own_gains(monkeypatch):
     """Driven by its motor's current, K2 balances a torque at 0.112 A/(N m), and not at 1."""
-    monkeypatch.setattr("tfarm.report.overlay.OVERLAY_COLUMNS", 12)
-    monkeypatch.setattr("tfarm.report.overlay.LITTLE_DAMPINGS", ())
+    monkeypatch.setattr("tfarm.comparing.regions.OVERLAY_COLUMNS", 12)
+    monkeypatch.setattr("tfarm.comparing.regions.LITTLE_DAMPINGS", ())
     rig = tfarm.load("quanser-2dsfl")
     data = stable_regions(rig, default_gains(rig), Chain())
     low, high = draw_overlay(data).axes[0].get_ylim()
@@ -98,7 +99,7 @@ def test_the_edges_at_the_default_gains_are_published_ones(section):
 
 
 def test_without_damping_the_layers_are_nested_at_the_gains_and_say_for_how_many_modes(monkeypatch):
-    monkeypatch.setattr("tfarm.report.overlay.OVERLAY_COLUMNS", 16)
+    monkeypatch.setattr("tfarm.comparing.regions.OVERLAY_COLUMNS", 16)
     monkeypatch.setattr("tfarm.dsp.regions.MOST_COLUMNS", 0)
     data = stable_regions(PAPER, GAINS, Chain())
     assert [layer.loop.plant.arm.damping for layer in data.sampled] == [1e-4, 1e-6, 0.0]
@@ -224,7 +225,7 @@ def test_the_strip_chart_has_steps_delay_and_saturation():
 
 @pytest.mark.survey
 def test_the_same_bytes_twice(tmp_path, monkeypatch):
-    monkeypatch.setattr("tfarm.report.overlay.OVERLAY_COLUMNS", 16)
+    monkeypatch.setattr("tfarm.comparing.regions.OVERLAY_COLUMNS", 16)
     monkeypatch.setattr("tfarm.dsp.regions.MOST_COLUMNS", 0)
     loop = sampled_verdict(LAB, GAINS).loop
     for name in ("a", "b"):
@@ -251,7 +252,7 @@ def test_an_arm_without_a_loop_gets_one_sentence(inertia):
 
 
 def test_a_held_tip_has_a_map_but_no_slew(monkeypatch):
-    monkeypatch.setattr("tfarm.report.overlay.OVERLAY_COLUMNS", 8)
+    monkeypatch.setattr("tfarm.comparing.regions.OVERLAY_COLUMNS", 8)
     monkeypatch.setattr("tfarm.dsp.regions.MOST_COLUMNS", 0)
     monkeypatch.setattr("tfarm.dsp.periods.PERIOD_SHARES", (1.0,))
     section = sampled_section(replace(LAB, payload=tfarm.Payload(mass=math.inf)))

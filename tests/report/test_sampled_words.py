@@ -11,13 +11,13 @@ import pytest
 import tfarm
 from tests.odd_arms import odd_arms
 from tests.shared import thinned
+from tfarm.comparing.regions import StableRegions
 from tfarm.dsp import Chain, Sampling, sampled_loop, stable_windows
 from tfarm.dsp.chain import Converters
 from tfarm.dsp.law import growing_mode, mode_table
 from tfarm.dsp.periods import AtPeriod
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import gain_windows
-from tfarm.report.overlay import StableRegions
 from tfarm.report.sampled_section import grown_words
 from tfarm.report.sampled_words import (
     Sampled,

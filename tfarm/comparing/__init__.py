@@ -1,4 +1,4 @@
-"""Two arms, or two laws on one arm, beside each other: modes, poles, verdicts, margins; differences in per cent."""
+"""Two arms, or two laws on one arm, beside each other, in per cent; one loop beside itself when it is sampled."""
 
 from tfarm.comparing.comparison import ComparedSide, Comparison, compare
 

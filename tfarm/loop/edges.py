@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN, Arm
 from tfarm.arrays import Real
+from tfarm.spectrum import modes
 from tfarm.spectrum.scales import default_gains, rate_unit
+from tfarm.spectrum.table import hub_locked
 
 from .lines import along, crossing_at_zero
 from .regions import Region, between, boundary, region
@@ -156,6 +158,11 @@ def seen(found: Region, x: Axis, y: Axis) -> Region:
     across, up = (axis.grid(values.size) for axis, values in zip((x, y), found.axes, strict=True))
     columns, rows = (np.searchsorted(_middles(old), new) for old, new in zip(found.axes, (across, up), strict=True))
     return found.on(across, up, found.unstable[np.ix_(rows, columns)])
+
+
+def resting_frequencies(found: Region, count: int) -> Real:
+    """The first frequencies [rad/s] with the hub at rest, which the edge along the gain across is made of."""
+    return hub_locked(modes(found.arm, count)).natural_frequency
 
 
 def static_edges(found: Region) -> tuple[float | None, float | None]:

@@ -27,6 +27,7 @@ from tfarm.arm import NAMES, Arm, HubFeedback
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.crossing import brackets, crossed, zeros_between
 from tfarm.records import record
+from tfarm.spectrum.scales import first_frequency
 
 from .frequencies import grid
 from .law_loop import LawLoop
@@ -41,6 +42,7 @@ MARGIN_DIGITS, PLACE_DIGITS = 9, 7  # of a margin, at most, and of the frequency
 CROSSOVER_DIGITS = 12  # of what each crossover is listed with, at most: more than any table rounds to
 NEXT_DOUBLES = 2.0**-52 * np.arange(-16, 17, 4)  # on either side of a frequency, in shares of it: as L is rounded
 FARTHER = 8.0 ** np.arange(-16, -5)  # the same, until rounding does not decide any more on which side of the axis L is
+BELOW_SLOWEST = 20.0  # of the slowest thing that is to be seen: where the curve of L begins
 ABOVE_NOISE = 4.0  # times what neighbours differ by
 BOTTOM = 1e-6  # of the gap between grid points: a dip's bottom is flat, so its depth is right to the square of that
 LOWEST = 6  # local minima on the grid that are refined
@@ -232,6 +234,20 @@ def dense(verdict: Stability[Any]) -> Real:
     slow = np.outer(rigid_crossings(verdict.loop), [0.5, 2.0]).ravel()
     more = np.concatenate([close[close < omega[-1]], slow[slow < omega[0]]])
     return np.unique(np.concatenate([omega, more[more > LEAST_SQUARABLE]]))
+
+
+def loop_curve(found: Margins[Any]) -> tuple[Real, NDArray[np.complex128]]:
+    """Frequencies [rad/s] (n,) around every steep place of the loop, and L there, as far as that is finite.
+
+    They begin below the first crossing and the first mode: further down L is all the same.
+    """
+    band = found.in_band
+    crossed = [] if band is None else [w for w, _ in (*band.gain_crossovers, *band.phase_crossovers) if w > 0]
+    lowest = min([first_frequency(found.stability.loop.arm), *crossed]) / BELOW_SLOWEST
+    omega = dense(found.stability)
+    L = np.asarray(found.stability.loop.loop_function(1j * omega), dtype=np.complex128)
+    told = np.isfinite(L) & (L != 0) & (omega >= lowest)
+    return omega[told], L[told]
 
 
 def minus_loop(loop: Loop | LawLoop, omega: Real) -> Complex:

@@ -23,11 +23,12 @@ from tfarm.loop.frequencies import band_of, steep_places
 from tfarm.loop.panels import BETWEEN_SAMPLES, CHEBYSHEV, PANEL_SAMPLES
 from tfarm.records import record
 from tfarm.response import TransferFunction, transfer
-from tfarm.spectrum import modes
+from tfarm.spectrum import Modes, modes
 
 Sensor = Literal["displacement", "moment"]
 
 MOST_SENSOR_MISS = 1e-8  # of the numerator on a panel, between samples: zeros are shown to five digits
+NOT_SENSED = 1e-9  # of a mode's largest: what reads no more of any mode is no sensor
 SERIES_END = 1e-13  # of the largest coefficient: a series ends where it is that
 BESIDE_LINE = 1.0  # of a panel's half width: how far from the axis zeros are looked for
 PAST_EDGE = 1e-7  # of a panel's half width: panels end at modes, where a sensor at a node has its zero
@@ -55,6 +56,26 @@ class Positions:
     participation: Real
     zeros: tuple[Complex, ...]
 
+    @property
+    def known_zeros(self) -> tuple[Complex, ...]:
+        """The same, a part of a zero 0 where that is all that is known of it."""
+        parts = ((s, MOST_SENSOR_MISS * abs(s)) for s in self.zeros)
+        return tuple(
+            np.where(abs(s.real) > least, s.real, 0.0) + 1j * np.where(abs(s.imag) > least, s.imag, 0.0)
+            for s, least in parts
+        )
+
+
+def sensed_places(arm: Arm, sensor: Sensor, x: Real, count: int) -> Real:
+    """Those of the places x [m] at which a sensor sees any of the first modes: not an end that none moves, or bends."""
+    size = _fields(modes(arm, count), sensor, x)
+    return np.asarray(x[(abs(size) > NOT_SENSED * abs(size).max(axis=1, keepdims=True)).any(axis=0)])
+
+
+def _fields(found: Modes, sensor: Sensor, x: Real) -> Real:
+    """What a sensor at each x reads of each flexible mode (modes, n)."""
+    return np.asarray((found.shape if sensor == "displacement" else found.moment)(x)[found.index > 0])
+
 
 def positions(arm: Arm, sensor: Sensor, x: Real, count: int) -> Positions:
     """Participation of the first `count` modes, and the zeros below the next, from hub input to a sensor at each x [m].
@@ -63,8 +84,7 @@ def positions(arm: Arm, sensor: Sensor, x: Real, count: int) -> Positions:
     """
     must_turn(arm)
     found = modes(arm, count)
-    flexible = found.index > 0
-    field = (found.shape if sensor == "displacement" else found.moment)(x)[flexible]
+    field = _fields(found, sensor, x)
     band, zeros = band_of(arm, count), []
     lines = [_Panels.of(arm, sensor, unit, band) for unit in (1j, 1.0 + 0j)]
     for place in x.tolist():
@@ -77,7 +97,7 @@ def positions(arm: Arm, sensor: Sensor, x: Real, count: int) -> Positions:
                 known.append(complex(s.real, 0.0) if is_real else s)
         zeros.append(np.array(sorted(known, key=lambda s: (s.imag, s.real)), dtype=complex))
     participation = field / abs(field).max(axis=1, keepdims=True)
-    return Positions(x, band, found.natural_frequency[flexible], participation, tuple(zeros))
+    return Positions(x, band, found.natural_frequency[found.index > 0], participation, tuple(zeros))
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,9 @@ A pole at 0 remains where Kp = 0, whatever K1 and K2: verdicts are apart from it
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import product
 from typing import Generic, NamedTuple
 
 import numpy as np
@@ -188,6 +190,16 @@ def loop_band(loop: Loop) -> tuple[float, bool]:
             return band, is_quiet(loop, band)
         band *= WIDENED
     return max(few, band / WIDENED), False
+
+
+def band_of_gains(arm: Arm, ranges: Mapping[str, tuple[float, float]]) -> tuple[float, bool]:
+    """A band [rad/s] for all gains in these ranges, and whether all their loops are quiet beyond it.
+
+    |L| is convex in the gains, so that it is largest at a corner of their box.
+    """
+    corners = [HubFeedback(**dict(zip(ranges, each, strict=True))) for each in product(*ranges.values())]
+    bands, quiet = zip(*(loop_band(Loop(arm, law)) for law in corners), strict=True)
+    return max(bands), all(quiet)
 
 
 def is_quiet(loop: Loop, band: float) -> bool:

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from tfarm.arrays import Real
 from tfarm.digits import significant
-from tfarm.loop.margins import Margins, dense
-from tfarm.spectrum.scales import first_frequency
+from tfarm.loop.margins import Margins, loop_curve
 
 from .frequency import hertz_axis, wrapped_phase
 from .labels import OFFSETS_BESIDE, Label
@@ -20,27 +19,12 @@ from .style import BLUE, GREEN, GREY, ORANGE, PURPLE, blank, headline, style
 
 MOST_NAMED = 6  # crossings that bear their number; of more the mark alone
 BEYOND_MARKED = 1e3  # beyond all that is marked |L| is a pole or a zero on the axis, and leaves the picture
-BELOW_SLOWEST = 20.0  # of the slowest thing that is to be seen: where the picture begins
 LEAST_REACH = 3.0  # factors of |L| beyond 1 that the picture reaches at least, either way
-
-
-def loop_data(found: Margins[Any]) -> tuple[Real, NDArray[np.complex128]]:
-    """Frequencies [rad/s] (n,) around every steep place of the loop, and L there, as far as that is finite.
-
-    They begin below the first crossing and the first mode: further down L is all the same.
-    """
-    band = found.in_band
-    crossed = [] if band is None else [w for w, _ in (*band.gain_crossovers, *band.phase_crossovers) if w > 0]
-    lowest = min([first_frequency(found.stability.loop.arm), *crossed]) / BELOW_SLOWEST
-    omega = dense(found.stability)
-    L = np.asarray(found.stability.loop.loop_function(1j * omega), dtype=np.complex128)
-    told = np.isfinite(L) & (L != 0) & (omega >= lowest)
-    return omega[told], L[told]
 
 
 def draw_loop(found: Margins[Any], name: str) -> Figure:
     """|L| above the phase from -180 to 180 deg; |L| = 1 and L < 0 marked where they are crossed."""
-    omega, L = loop_data(found)
+    omega, L = loop_curve(found)
     with style():
         figure = blank(9.0, 5.8)
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[1.5, 1.0])

@@ -20,10 +20,9 @@ from tfarm.arrays import Real
 from tfarm.crossing import RegionPiece, pieces
 from tfarm.digits import SUPERSCRIPT, how_many, plain, significant
 from tfarm.dsp import GainMap
-from tfarm.loop.edges import LINEAR_SCALE, Axis, edge, seen, stable_edge, static_edges
+from tfarm.loop.edges import LINEAR_SCALE, Axis, edge, resting_frequencies, seen, stable_edge, static_edges
 from tfarm.loop.lossless import locked_edges
 from tfarm.loop.regions import INFINITE, Region
-from tfarm.spectrum import modes
 
 from .labels import OFFSET_UPON, OFFSETS_AROUND, Label
 from .style import BLUE, GREY, INK, ORANGE, PURPLE, New, blank, on_own_figure
@@ -34,6 +33,7 @@ CONTOUR_STEPS, MOST_CONTOURS = (1.0, 2.0, 5.0), 7  # of the contours
 LEAST_AREA = 0.004  # of the picture: smaller regions are not labelled
 LETTER = (0.01, 0.018)  # of the picture's width and height: what a letter takes, across and upright
 TALL = 2.5  # letters' widths: what a line takes across its letters, with room
+RESTING_NAMED = 3  # frequencies of the hub at rest that stand beside their common edge
 MOST_MARKED = 7  # frequencies written along the boundary: with more they touch
 DIAMOND, STAR = "D", "*"  # of laws
 AT_RIGHT = tuple((-6.0, up) for up in (4.0, -4.0, 16.0, -16.0, 28.0))  # points, from where a line ends to its words
@@ -174,8 +174,8 @@ def _undamped_boundary(found: Region, x: Axis, y: Axis, ax: Axes) -> None:
         return
     ax.plot([found.upright, found.upright], [whole, y.high], color=INK, lw=0.8)
     ax.plot([x.low, found.upright], [whole, whole], color=INK, lw=0.8)
-    omega = modes(found.arm.having(hub_inertia=math.inf), 3).natural_frequency
-    text = f"on this line every mode with the hub at rest: {', '.join(significant(float(w), 4) for w in omega)} … rad/s"
+    omega = ", ".join(significant(float(w), 4) for w in resting_frequencies(found, RESTING_NAMED))
+    text = f"on this line every mode with the hub at rest: {omega} … rad/s"
     ax.add_artist(Label(text, [(x.high, whole)], AT_RIGHT, fontsize=8.5))
 
 

@@ -17,12 +17,12 @@ from tfarm.loop.answers import CROSSOVERS, POLE_COLUMNS, crossovers
 from tfarm.loop.closed import closed_loop_poles
 from tfarm.loop.closed import margins as margins_under
 from tfarm.loop.closed import nyquist as nyquist_under
-from tfarm.loop.margins import Margins
+from tfarm.loop.margins import Margins, loop_curve
 from tfarm.loop.poles import Poles
 from tfarm.loop.spill import SPILL, Spill, spill
 from tfarm.loop.stability import Stability
 from tfarm.plots.disc import draw_nyquist
-from tfarm.plots.loop import draw_loop, loop_data
+from tfarm.plots.loop import draw_loop
 from tfarm.report.given_laws import GivenLaw, LawOnArm, continuous_laws, on_arm
 from tfarm.report.margins_table import margin_table, verdict_fact, verdict_words, window_table
 from tfarm.report.nyquist import RINGS_CAPTION, PlotOfLaw, count_table, curve_data
@@ -88,7 +88,7 @@ def _far(it: Stability[Any]) -> str:
 
 
 def _bode_picture(each: LawOnArm, found: Margins[Any]) -> Picture:
-    omega, L = loop_data(found)
+    omega, L = loop_curve(found)
     stem = f"{each.key.replace('_', '-')}-bode"
     none = "" if found.in_band is not None else " No margin is marked: the loop is not stable, and has none."
     columns = (

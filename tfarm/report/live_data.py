@@ -7,28 +7,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import product
 from typing import Any, get_args
 
 import numpy as np
 
 from tfarm.arm import ANGLE_GAIN, GAINS, PLANE, Arm, HubFeedback, unit_of
+from tfarm.comparing.regions import BEYOND_PICTURE, sampled_region
 from tfarm.crossing import pieces
 from tfarm.digits import kept_digits
 from tfarm.dsp import Chain
 from tfarm.dsp import GainMap as SampledMap
 from tfarm.errors import TfarmError
-from tfarm.loop.edges import Axis, moment_axis, rate_axis
+from tfarm.loop.edges import moment_axis, rate_axis
 from tfarm.loop.frequencies import steep_places
 from tfarm.loop.lossless import stable_moments
 from tfarm.loop.panels import Panels, loop_panels
-from tfarm.loop.plant import Loop
-from tfarm.loop.positions import MOST_SENSOR_MISS, Positions, Sensor, positions
+from tfarm.loop.positions import Positions, Sensor, positions, sensed_places
 from tfarm.loop.regions import region
-from tfarm.loop.stability import loop_band, stability
+from tfarm.loop.stability import band_of_gains, stability
 from tfarm.report.live_sampled import packed, sampled_numbers, slew_numbers
-from tfarm.report.map import BEYOND_PICTURE, sampled_part
-from tfarm.spectrum import modes
 from tfarm.spectrum.scales import angle_unit, default_gains
 
 LIVE_COLUMNS = 90  # values of the gain across at which the continuous region is cut
@@ -37,7 +34,6 @@ ANGLE_LINEAR = 1e-4  # of that: where its slider begins to be logarithmic
 EDGE_DIGITS = 7  # of the edges of the map's regions: far more than a screen has
 SENSOR_PIECES = 16  # pieces of the arm between two positions
 SENSED_MODES = 6  # whose frequencies and zeros the chart of sensors has
-NOT_SENSED = 1e-9  # of a mode's largest: an end that no mode moves, or bends, by more has no sensor
 SENSOR_DIGITS = 6  # of what that chart draws and tells: far more than a screen has
 
 
@@ -48,20 +44,20 @@ def live_data(arm: Arm, chain: Chain, law: HubFeedback | None = None) -> dict[st
     """
     x = rate_axis(arm)
     y, stiffest = moment_axis(arm, x), ANGLE_RANGE * angle_unit(arm)
-    axes = {
+    axes: dict[str, dict[str, Any]] = {
         name: {"low": axis.low, "high": axis.high, "linear": None if axis.is_linear else axis.linear}
         for name, axis in zip(PLANE, (x, y), strict=True)
-    }
+    } | {ANGLE_GAIN: {"low": 0.0, "high": stiffest, "linear": ANGLE_LINEAR * stiffest}}
     reference = default_gains(arm)
-    band, is_quiet = _band(arm, x, y, stiffest)
+    band, is_quiet = band_of_gains(arm, {name: (each["low"], each["high"]) for name, each in axes.items()})
     samples, across = loop_panels(arm, band), x.grid(LIVE_COLUMNS)
     beyond = np.array([y.low - BEYOND_PICTURE, y.high + BEYOND_PICTURE])
     continuous = region(arm, np.unique(np.r_[across[across > 0], x.high]), beyond)
-    sampled = sampled_part(arm, x, y, chain)
+    sampled = sampled_region(arm, x, y, chain)
     return {
         "name": arm.name,
         "units": {gain.name: unit_of(gain.name, arm) for gain in GAINS},
-        "axes": {**axes, ANGLE_GAIN: {"low": 0.0, "high": stiffest, "linear": ANGLE_LINEAR * stiffest}},
+        "axes": axes,
         "start": {gain.name: (law or reference)[gain.name] for gain in GAINS},
         **_samples(samples),
         **_known(arm, is_quiet),
@@ -74,17 +70,6 @@ def live_data(arm: Arm, chain: Chain, law: HubFeedback | None = None) -> dict[st
         **sensor_numbers(arm),
         "lyapunov": arm.is_uniform,
     }
-
-
-def _band(arm: Arm, x: Axis, y: Axis, stiffest: float) -> tuple[float, bool]:
-    """A band [rad/s] for all gains of the page, and whether all their loops are quiet beyond it.
-
-    |L| is convex in the gains, so that it is largest at a corner of their box.
-    """
-    names, ends = (*PLANE, ANGLE_GAIN), ((x.low, x.high), (y.low, y.high), (0.0, stiffest))
-    corners = [HubFeedback(**dict(zip(names, each, strict=True))) for each in product(*ends)]
-    bands, quiet = zip(*(loop_band(Loop(arm, law)) for law in corners), strict=True)
-    return max(bands), all(quiet)
 
 
 def _samples(panels: Panels) -> dict[str, Any]:
@@ -154,10 +139,8 @@ def sensor_numbers(arm: Arm) -> dict[str, Any]:
     """
     x, sensors = np.linspace(0.0, arm.length, SENSOR_PIECES + 1), {}
     try:
-        found = modes(arm, SENSED_MODES)
         for kind in get_args(Sensor):
-            size = abs((found.shape if kind == "displacement" else found.moment)(x)[found.index > 0])
-            places = x[(size > NOT_SENSED * size.max(axis=1, keepdims=True)).any(axis=0)]
+            places = sensed_places(arm, kind, x, SENSED_MODES)
             sensors[kind] = _numbers(positions(arm, kind, places, SENSED_MODES))
     except TfarmError as error:
         return {"sensor": None, "no_sensor": str(error)}
@@ -165,15 +148,12 @@ def sensor_numbers(arm: Arm) -> dict[str, Any]:
 
 
 def _numbers(found: Positions) -> dict[str, Any]:
-    """The positions in a few digits; a part of a zero is 0 where that is all that is known of it."""
-    known = [
-        [[part if abs(part) > MOST_SENSOR_MISS * abs(s) else 0.0 for part in (s.real, s.imag)] for s in zeros]
-        for zeros in found.zeros
-    ]
+    """The positions in a few digits."""
+    zeros = [np.c_[each.real, each.imag].tolist() for each in found.known_zeros]
     return {
         "x": kept_digits(found.x, SENSOR_DIGITS),
         "band": found.band,
         "modes": kept_digits(found.natural_frequency, SENSOR_DIGITS),
         "participation": [kept_digits(column, SENSOR_DIGITS) for column in found.participation.T],
-        "zeros": [[kept_digits(zero, SENSOR_DIGITS) for zero in zeros] for zeros in known],
+        "zeros": [[kept_digits(zero, SENSOR_DIGITS) for zero in each] for each in zeros],
     }

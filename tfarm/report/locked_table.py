@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
@@ -11,8 +10,8 @@ import tfarm
 from tfarm.arm import Arm
 from tfarm.columns import Column, Table
 from tfarm.digits import lined, significant, singly
-from tfarm.errors import ConvergenceError
-from tfarm.spectrum import Modes, damped_modes
+from tfarm.spectrum import Modes
+from tfarm.spectrum.damped import damped_at_hub
 from tfarm.spectrum.table import hub_locked
 
 LOCKED_MODES = 6  # rows, of the modes that are measured on a rig
@@ -41,24 +40,10 @@ def locked_words(arm: Arm) -> list[str]:
     omega, held = float(free.natural_frequency[-1]), float(locked.natural_frequency[-1])
     numbers = {"free": omega, "free_hz": omega / (2 * math.pi), "locked": held, "locked_hz": held / (2 * math.pi)}
     damped = ""
-    if (lossy := _lossy(arm, 1)) is not None:  # how the first mode of the free hub rings with the hub's own losses
-        s, ratio = complex(lossy[0][-1]), significant(100 * float(lossy[1][-1]), 3)
+    if (lossy := damped_at_hub(arm, 1)) is not None:  # how the first mode of the free hub rings with its own losses
+        s, ratio = complex(lossy.eigenvalues[-1, 0]), significant(100 * float(lossy.damping_ratio[-1]), 3)
         damped = SWINGS.format(omega=significant(s.imag, 5), ratio=ratio) if s.imag else CREEPS
     return [WHICH_IS_MEASURED.format(damped=damped, **{name: significant(x, 5) for name, x in numbers.items()})]
-
-
-def _lossy(arm: Arm, count: int) -> tuple[np.ndarray, np.ndarray] | None:
-    """Eigenvalues and damping ratios of the flexible modes with the hub's own losses alone; None without any."""
-    clamp, joint = replace(arm.clamp, damping=0.0), replace(arm.joint, damping=0.0)
-    hub_alone = replace(arm.elastic, clamp=clamp, joint=joint)
-    if hub_alone.is_undamped:
-        return None
-    try:
-        found = damped_modes(tfarm.modes(hub_alone, count))
-    except ConvergenceError:
-        return None
-    flexible = found.index > 0
-    return found.eigenvalues[flexible, 0], found.damping_ratio[flexible]
 
 
 def locked_table(table: Modes) -> Table:
@@ -68,9 +53,10 @@ def locked_table(table: Modes) -> Table:
     omega, locked = free.natural_frequency[free.index > 0], hub_locked(free)
     held = locked.natural_frequency[locked.index > 0]
     columns = [Column("mode", "mode", of=range(1, LOCKED_MODES + 1)), *_pair("hub_free", "hub free", omega)]
-    lossy = None if arm.is_locked else _lossy(arm, LOCKED_MODES)
-    if lossy is not None and lossy[0].size == LOCKED_MODES:
-        s, ratio = lossy
+    lossy = None if arm.is_locked else damped_at_hub(arm, LOCKED_MODES)
+    if lossy is not None and not lossy.left_out:
+        flexible = lossy.index > 0
+        s, ratio = lossy.eigenvalues[flexible, 0], lossy.damping_ratio[flexible]
         group = "hub free, with its own losses"
         columns += [
             Column("with_losses_rad_s", "Im s", "rad/s", of=s.imag, digits=lined(8, 7), group=group),

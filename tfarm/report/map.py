@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 from tfarm.arm import PLANE, Arm, HubFeedback, laws_at, shown_unit
 from tfarm.arrays import Real
 from tfarm.columns import Column, Table
-from tfarm.dsp import Chain, sampled_map, sampled_verdict
+from tfarm.comparing.regions import sampled_region
+from tfarm.dsp import Chain
 from tfarm.dsp import GainMap as SampledMap
 from tfarm.dsp.brief import SampledBrief
-from tfarm.dsp.regions import ends_of_K1, rounded_map, with_both_sides
-from tfarm.errors import ConvergenceError
 from tfarm.loop.damping import least_damping
 from tfarm.loop.edges import Axis, edge, moment_axis, rate_axis
 from tfarm.loop.frequencies import band_of
@@ -26,7 +25,6 @@ from tfarm.plots import plane
 from tfarm.plots.style import blank, headline, legend_below, style
 from tfarm.records import record
 from tfarm.report.loop_laws import DESIGNED_MODES, NamedLaw, best, brief_on, laws
-from tfarm.spectrum.scales import default_gains
 from tfarm.synthesis.design import Design
 
 if TYPE_CHECKING:
@@ -36,9 +34,6 @@ if TYPE_CHECKING:
 GRID_COLUMNS, GRID_ROWS = 240, 200  # of the coloured grid
 MARKERS = {"default": plane.DIAMOND, "best": plane.STAR}
 DAMPING_EVERY = 4  # every so many of them the damping is computed
-SAMPLED_COLUMNS = 120  # values of the gain across at which the sampled region is cut, besides its exact ends
-MAP_ASPECT = 1.5  # times as wide as high the picture is, about
-BEYOND_PICTURE = 0.1  # of the gain up the plane, beyond the picture: an edge there is none of the region
 
 
 @dataclass(frozen=True)
@@ -96,23 +91,10 @@ def map_of_arm(arm: Arm, chain: Chain | None = None) -> MapOfArm:
     damping = least_damping(arm, laws_at(HubFeedback(), points), DESIGNED_MODES).reshape(up.size, across.size)
     named = laws(arm, chain)
     briefs = tuple(brief_on(arm, each.law, chain) for each in named)
-    sampled = sampled_part(arm, x, y, chain)
+    sampled = sampled_region(arm, x, y, chain)
     return MapOfArm(
         arm, x, y, found, edge(found, x, y), (across, up), damping, named, best(arm, chain), chain, sampled, briefs
     )
-
-
-@lru_cache(maxsize=8)
-def sampled_part(arm: Arm, x: Axis, y: Axis, chain: Chain) -> SampledMap | None:
-    """Where in the picture the sampled loop is stable, with the modes of the verdict on the default gains."""
-    try:
-        loop = sampled_verdict(arm, default_gains(arm), chain).full
-        across = x.grid(SAMPLED_COLUMNS)
-        across = with_both_sides(across[across > 0], ends_of_K1(loop))
-        plane = sampled_map(loop, across[x.high > across], [y.low - BEYOND_PICTURE, y.high + BEYOND_PICTURE])
-        return rounded_map(plane, lambda across, up: np.asarray(MAP_ASPECT * x.place(across) + 1j * y.place(up)))
-    except ConvergenceError:
-        return None
 
 
 def draw_map_of_arm(data: MapOfArm) -> Figure:

@@ -1,69 +1,18 @@
-"""The plane of both gains twice on the same axes: where the continuous loop is stable, and where the sampled one is.
-
-Each region is a list of intervals of one gain at each value of the other, with exact edges (D-decomposition in `loop`
-and in `dsp`); nothing is read off a raster.
-"""
+"""The plane of both gains twice on the same axes: where the continuous loop is stable, and where the sampled one is."""
 
 from __future__ import annotations
 
-import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from tfarm.arm import PLANE, Arm, HubFeedback, shown_unit
-from tfarm.arrays import Complex, Real
+from tfarm.arm import PLANE, shown_unit
 from tfarm.columns import Column, Table
+from tfarm.comparing.regions import K2_RANGE, StableRegions
 from tfarm.digits import plain
-from tfarm.dsp import GainMap, sampled_map, sampled_verdict
-from tfarm.dsp.chain import Chain
-from tfarm.dsp.regions import ends_of_K1, rounded_map, with_both_sides, with_more
-from tfarm.loop.regions import Region, region
 from tfarm.plots import regions
 from tfarm.plots.style import blank, headline, style
 
 if TYPE_CHECKING:
     from tfarm.plots.style import Figure
-
-K2_RANGE = (-1.0, 1.5)  # of what balances a torque: 1 where the input is one, less where it is a motor's current
-CUT_RANGE = (-1.02, 1.52)  # of the same: where intervals are cut, just outside the picture: no cut is seen as an edge
-OVERLAY_COLUMNS = 72  # values of the gain across, and either side of upright edges
-LITTLE_DAMPINGS = (1e-4, 1e-6)  # s: what is drawn beside C = 0
-OVERLAY_ASPECT = 1.8  # times as wide as high the picture is, about
-BEYOND_STABLE = 1.7  # of the largest stable gain across: how far the picture goes
-SEEN_AS_ONE = 1e-3  # ends as close as this are seen as one
-BELOW_GAIN = 15.0  # so many times below the gain across of the law the picture begins, on its logarithmic axis
-
-
-class StableRegions(NamedTuple):
-    """Both regions of one arm.  `sampled` has the arm's own C; at C = 0 also what a little damping would give."""
-
-    continuous: Region
-    sampled: tuple[GainMap, ...]  # most damping first, so that each lies on the one before
-
-
-def stable_regions(arm: Arm, gains: HubFeedback, chain: Chain) -> StableRegions:
-    """The regions around these gains.  Raises ParameterError where the arm has no loop."""
-    dampings = (arm.damping,) if arm.damping else (*LITTLE_DAMPINGS, 0.0)
-    loops = [sampled_verdict(arm.having(damping=C), gains, chain).full for C in dampings]
-    ends = np.unique(np.concatenate([ends_of_K1(loop) for loop in loops]))
-    ends = ends[np.diff(ends, prepend=0.0) > SEEN_AS_ONE * ends]
-    own, _ = gains.point
-    span, cut = (arm.input_per_torque * np.array(ends) for ends in (K2_RANGE, CUT_RANGE))
-    low, furthest = own / BELOW_GAIN, BEYOND_STABLE * max([own, *ends])
-    power = 10.0 ** math.floor(math.log10(furthest))
-    top = next(step * power for step in (1.0, 2.0, 5.0, 10.0, 20.0) if step * power >= furthest)
-    across = with_both_sides(np.geomspace(low, top, OVERLAY_COLUMNS), ends)
-    across = across[(low <= across) & (top >= across)]
-
-    def drawn(across: Real, up: Real) -> Complex:
-        return np.asarray(
-            OVERLAY_ASPECT * np.log(across / low) / np.log(top / low) + 1j * (up - span[0]) / np.ptp(span)
-        )
-
-    planes = [rounded_map(sampled_map(loop, across, cut), drawn) for loop in loops]
-    every = np.unique(np.concatenate([plane.axes[0] for plane in planes]))
-    return StableRegions(region(arm, every, cut), tuple(with_more(plane, every) for plane in planes))
 
 
 def draw_overlay(data: StableRegions) -> Figure:

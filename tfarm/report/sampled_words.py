@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, HubFeedback, unit_of
+from tfarm.comparing.regions import StableRegions, stable_regions
 from tfarm.crossing import Window
 from tfarm.digits import plain, scientific, significant
 from tfarm.dsp import Analysis, Verdict, analyse
@@ -16,7 +17,6 @@ from tfarm.dsp.periods import AtPeriod, at_periods
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import Windows, gain_windows
 from tfarm.records import record
-from tfarm.report.overlay import StableRegions, stable_regions
 from tfarm.report.sections import Fact
 from tfarm.report.words import typeset, upper
 from tfarm.spectrum.scales import default_gains, default_words

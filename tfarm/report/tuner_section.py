@@ -8,13 +8,13 @@ import numpy as np
 
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, Arm
 from tfarm.columns import Column, Table
+from tfarm.comparing.regions import stable_regions
 from tfarm.digits import how_many, lined, plain, significant, worded
 from tfarm.dsp import Chain
 from tfarm.errors import CertificationError
 from tfarm.plots.learning import draw_cost_map, draw_curves, draw_gain
 from tfarm.plots.motion import draw_responses
 from tfarm.report.loop_laws import has_loop, why_no_loop
-from tfarm.report.overlay import stable_regions
 from tfarm.report.sections import PageSection, Picture
 from tfarm.report.time_responses import clipped_words, resolution_words, responses_table
 from tfarm.report.tuner_words import (

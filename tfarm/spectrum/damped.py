@@ -181,6 +181,21 @@ def damped_modes(undamped: Modes) -> DampedModes:
     raise lost
 
 
+def damped_at_hub(arm: Arm, count: int) -> DampedModes | None:
+    """The first `count` flexible modes with what the hub itself loses, and nothing else: neither links nor clamp.
+
+    None where it loses nothing, or they cannot be followed.
+    """
+    clamp, joint = replace(arm.clamp, damping=0.0), replace(arm.joint, damping=0.0)
+    hub_alone = replace(arm.elastic, clamp=clamp, joint=joint)
+    if hub_alone.is_undamped:
+        return None
+    try:
+        return damped_modes(modes(hub_alone, count))
+    except ConvergenceError:
+        return None
+
+
 def all_damped_modes(undamped: Modes, companies: tuple[int, ...] = COMPANY) -> DampedModes:
     """All of the modes with the arm's own C, followed with so many more beside them: the next number if one fails.
 
