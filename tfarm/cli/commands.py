@@ -133,15 +133,12 @@ def _asked_output(output: str | None, png: Path | None) -> str:
 
 def _give_points(answer: dict[str, Any], csv: Path | None, json: bool) -> None:
     """A response as a table in a file or on the terminal, or as JSON."""
-    from tfarm.cli.tables import print_found, say_written
+    from tfarm.cli.tables import hand_out, print_found
     from tfarm.response.answers import points_table
-    from tfarm.tables.files import write_csv
     from tfarm.tables.terminal import show
 
-    if csv is not None:
-        write_csv(points_table(answer), csv)
-    if say_written(csv) or json:
-        give(answer, json, (lambda found: show(points_table(found))) if csv is None else print_found)
+    printed = print_found if csv is not None else lambda found: show(points_table(found))
+    hand_out(lambda: answer, printed, json, csv=csv, table=lambda: points_table(answer))
 
 
 @app.command()

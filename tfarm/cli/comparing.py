@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tfarm.cli.app import Json, TheoryName, app, give, load_arm, whole_number
+from tfarm.cli.app import Json, TheoryName, app, load_arm, whole_number
 from tfarm.cli.inputs import GAIN_OPTIONS, Given, Png, Typed, asked_law, with_options
 from tfarm.cli.sampling import Delay, DspFile, Period, asked_chain
 from tfarm.errors import ParameterError
@@ -47,24 +48,18 @@ def compare(
     pairs = [(subjects[min(n, len(arms) - 1)], arms[min(n, len(arms) - 1)]) for n in (0, 1)]
     wanted = [None, None] if not files else files * (2 // len(files))
     laws = [asked_law(arm, Given(gains, file, name))[0] for (arm, name), file in zip(pairs, wanted, strict=True)]
-    from tfarm.cli.tables import say_written
+    from tfarm.cli.tables import hand_out
     from tfarm.comparing import compare as find
     from tfarm.comparing.answers import compared_answer
 
     names = _names([arm.name for arm in subjects], files)
     found = find(subjects, laws, names=names, modes=count, output=output, chain=chain)
-    if png is not None:
-        from tfarm.plots.compared import draw_comparison
-        from tfarm.plots.files import save_png
-
-        save_png(draw_comparison(found), png)
     page = None
     if out is not None:
         from tfarm.report.comparison_page import write_comparison
 
         page = write_comparison(found, out)
-    if say_written(png, page) or json:
-        give(compared_answer(found), json, lambda answer: _print(found, answer))
+    hand_out(lambda: compared_answer(found), partial(_print, found), json, png=png, picture=(found,), also=(page,))
 
 
 def _check_number(arms: list[str], files: list[str]) -> None:

@@ -120,21 +120,15 @@ def gain_map(
     usual, given = ranges_of(subject), _bounds_of(typed)
     x, y = (given[name] or known for name, known in zip(PLANE, usual, strict=True))
     from tfarm.cli.control_tables import print_map
-    from tfarm.cli.tables import say_written
+    from tfarm.cli.tables import hand_out
     from tfarm.loop.answers import map_answer, plane_table
     from tfarm.loop.regions import between, region
-    from tfarm.tables.files import write_csv
 
     found = region(subject, between(*x, number), between(*y, number), kp)
-    if csv is not None:
-        write_csv(plane_table(PLANE, *found.axes, found.unstable), csv)
-    if png is not None:
-        from tfarm.plots.files import save_png
-        from tfarm.plots.plane import draw_map
-
-        save_png(draw_map(found), png)
-    if say_written(csv, png) or json:
-        give(map_answer(found), json, print_map)
+    hand_out(
+        lambda: map_answer(found), print_map, json,
+        csv=csv, table=lambda: plane_table(PLANE, *found.axes, found.unstable), png=png, picture=(found,),
+    )  # fmt: skip
 
 
 def _law_map(
@@ -154,24 +148,18 @@ def _law_map(
     ranges = [_range_of("--vary", each) for each in vary]
     typed = asked_law(subject, Given({}, law, name))[0]
     from tfarm.cli.control_tables import print_law_map
-    from tfarm.cli.tables import say_written
+    from tfarm.cli.tables import hand_out
     from tfarm.loop.answers import plane_table
     from tfarm.loop.law_map import law_map, law_map_answer
     from tfarm.loop.regions import between
-    from tfarm.tables.files import write_csv
 
     x, y = (between(*limits, number) for _, limits in ranges)
     found = law_map(subject, typed, (ranges[0][0], ranges[1][0]), x, y)
-    if csv is not None:
-        names = [name.replace(".", "_").replace("@", "_at_") for name in found.vary]
-        write_csv(plane_table(names, found.x, found.y, found.unstable), csv)
-    if png is not None:
-        from tfarm.plots.files import save_png
-        from tfarm.plots.laws import draw_law_map
-
-        save_png(draw_law_map(found), png)
-    if say_written(csv, png) or json:
-        give(law_map_answer(found), json, print_law_map)
+    names = [name.replace(".", "_").replace("@", "_at_") for name in found.vary]
+    hand_out(
+        lambda: law_map_answer(found), print_law_map, json,
+        csv=csv, table=lambda: plane_table(names, found.x, found.y, found.unstable), png=png, picture=(found,),
+    )  # fmt: skip
 
 
 def _range_of(option: str, text: str) -> tuple[str, tuple[float, float]]:
@@ -207,7 +195,7 @@ def design(
     from tfarm.arm import as_law
     from tfarm.arm.law_writing import save_law
     from tfarm.cli.control_tables import print_design
-    from tfarm.cli.tables import say_written
+    from tfarm.cli.tables import hand_out
     from tfarm.synthesis.answers import design_answer
     from tfarm.synthesis.chosen import design as find_law
 
@@ -218,8 +206,7 @@ def design(
     )  # fmt: skip
     if save is not None:
         save_law(as_law(found.law), save)
-    if say_written(save) or json:
-        give(design_answer(found), json, print_design)
+    hand_out(lambda: design_answer(found), print_design, json, also=(save,))
 
 
 def _bounds_of(typed: dict[str, str | None]) -> dict[str, tuple[float, float] | None]:

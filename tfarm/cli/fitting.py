@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tfarm.cli.app import ArmName, Json, app, give, load_arm, tell
+from tfarm.cli.app import ArmName, Json, app, load_arm, tell
 from tfarm.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ def fit(
     json: Json = False,
 ) -> None:
     """The numbers of an arm that explain what was measured of it, with intervals, and what is left open."""
-    from tfarm.cli.tables import say_written
+    from tfarm.cli.tables import hand_out
     from tfarm.fitting.answers import fit_answer, save_fit
 
     found = _fitted(
@@ -56,11 +57,8 @@ def fit(
     )  # fmt: skip
     if save is not None:
         save_fit(found, save)
-    if png is not None:
-        _draw(found, png)
     page = _report(found, out) if report else None
-    if say_written(save, png, page) or json:
-        give(fit_answer(found), json, lambda answer: _print(found, answer))
+    hand_out(lambda: fit_answer(found), partial(_print, found), json, png=png, picture=(found,), also=(save, page))
     if not found.converged:
         raise typer.Exit(3)
 
@@ -93,13 +91,6 @@ def _numbers(option: str, texts: Iterable[str], count: int) -> Iterable[tuple[st
             form = "KEY=" + ",".join(["NUMBER"] * count)
             raise ParameterError(key=option, value=text, remedy=f"write {form}, in SI units")
         yield key.strip(), values
-
-
-def _draw(found: Fit, png: Path) -> None:
-    from tfarm.plots.files import save_png
-    from tfarm.plots.fitted import draw_fit
-
-    save_png(draw_fit(found), png)
 
 
 def _report(found: Fit, out: Path) -> Path:

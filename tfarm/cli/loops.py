@@ -9,7 +9,7 @@ import typer
 
 from tfarm.arm import NAMES
 from tfarm.arrays import Complex
-from tfarm.cli.app import ArmName, Json, app, give, load_arm, whole_number
+from tfarm.cli.app import ArmName, Json, app, load_arm, whole_number
 from tfarm.cli.inputs import Given, Png, asked_law, under_a_law
 from tfarm.columns import Column, Table
 from tfarm.digits import singly
@@ -45,7 +45,7 @@ def locus(
     count, subject = whole_number("--branches", branches, 1, 200), load_arm(arm)
     law, said = asked_law(subject, given)
     from tfarm.arm import HubFeedback
-    from tfarm.cli.tables import say_written
+    from tfarm.cli.tables import hand_out
     from tfarm.loop.closed import locus as find
     from tfarm.loop.law_locus import LawLocus, law_locus_answer
     from tfarm.loop.loci import locus_answer
@@ -59,17 +59,10 @@ def locus(
     else:
         reduced = reduced_locus(found)
         answer = locus_answer(found, reduced)
-    if png is not None:
-        from tfarm.plots.files import save_png
-        from tfarm.plots.laws import draw_locus_of
-
-        save_png(draw_locus_of(found, reduced), png)
-    if csv is not None:
-        from tfarm.tables.files import write_csv
-
-        write_csv(branches_table(answer, found.branches), csv)
-    if say_written(csv, png) or json:
-        give(answer | said, json, print_locus)
+    hand_out(
+        lambda: answer | said, print_locus, json,
+        csv=csv, table=lambda: branches_table(answer, found.branches), png=png, picture=(found, reduced),
+    )  # fmt: skip
 
 
 def branches_table(answer: dict[str, Any], branches: Complex) -> Table:

@@ -5,13 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from tfarm.cli.app import give, load_arm
+from tfarm.cli.app import load_arm
 from tfarm.cli.methods import refuse_beside
-from tfarm.cli.tables import say_written
+from tfarm.cli.tables import hand_out
 from tfarm.fitting.overlay import overlay
 from tfarm.fitting.overlay_answer import curves_table, overlay_answer, required_table
 from tfarm.fitting.reading import data_of
-from tfarm.tables.files import write_csv
 from tfarm.tables.terminal import show
 
 MOST_LISTED_ROOTS = 12  # poles, or zeros, in one line of a terminal; --json has them all
@@ -24,15 +23,10 @@ def lay_over(arm: str, text: str, others: dict[str, Any], csv: Path | None, png:
     """
     refuse_beside(others, "a measured response has its own outputs and frequencies; leave this out")
     found = overlay(load_arm(arm), data_of(text, "--measured"))
-    if csv is not None:
-        write_csv(curves_table(found), csv)
-    if png is not None:
-        from tfarm.plots.files import save_png
-        from tfarm.plots.overlaid import draw_measured
-
-        save_png(draw_measured(found), png)
-    if say_written(csv, png) or json:
-        give(overlay_answer(found), json, _print)
+    hand_out(
+        lambda: overlay_answer(found), _print, json,
+        csv=csv, table=lambda: curves_table(found), png=png, picture=(found,),
+    )  # fmt: skip
 
 
 def _print(answer: dict[str, Any]) -> None:

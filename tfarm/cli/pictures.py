@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tfarm.cli.app import ArmName, InputName, Json, Place, SideName, app, give, load_arm, read_on
+from tfarm.cli.app import ArmName, InputName, Json, Place, SideName, app, load_arm, read_on
 from tfarm.cli.inputs import Given, Png, asked_input, asked_law, must_be_band, under_a_law
 
 if TYPE_CHECKING:
@@ -34,21 +34,15 @@ def bode(
     """Bode plot of the exact response to the arm's input, with the poles and zeros that the output shows."""
     subject, driven = asked_input(load_arm(arm), driven)
     band, (wanted,) = _band(subject, start, stop), read_on([output], side)
-    from tfarm.cli.tables import say_written
+    from tfarm.cli.tables import hand_out
     from tfarm.response import bode as find
     from tfarm.response.answers import bode_answer, bode_table
-    from tfarm.tables.files import write_csv
 
     found = find(subject, wanted, band, x=x, input=driven)
-    if csv is not None:
-        write_csv(bode_table(found), csv)
-    if png is not None:
-        from tfarm.plots.files import save_png
-        from tfarm.plots.frequency import draw_bode
-
-        save_png(draw_bode(found), png)
-    if say_written(csv, png) or json:
-        give(bode_answer(found), json, _print_bode)
+    hand_out(
+        lambda: bode_answer(found), _print_bode, json,
+        csv=csv, table=lambda: bode_table(found), png=png, picture=(found,),
+    )  # fmt: skip
 
 
 @app.command()
@@ -57,21 +51,15 @@ def nyquist(arm: ArmName, png: Png = None, csv: Csv = None, json: Json = False, 
     """Nyquist plot of the exact loop: the turns around -1 counted, beside the poles found in a box."""
     subject = load_arm(arm)
     law, said = asked_law(subject, given)
-    from tfarm.cli.tables import say_written
+    from tfarm.cli.tables import hand_out
     from tfarm.loop.answers import nyquist_answer, nyquist_table
     from tfarm.loop.closed import nyquist as find
-    from tfarm.tables.files import write_csv
 
     found = find(subject, law)
-    if csv is not None:
-        write_csv(nyquist_table(found), csv)
-    if png is not None:
-        from tfarm.plots.disc import draw_disc
-        from tfarm.plots.files import save_png
-
-        save_png(draw_disc(found), png)
-    if say_written(csv, png) or json:
-        give(nyquist_answer(found) | said, json, _print_nyquist)
+    hand_out(
+        lambda: nyquist_answer(found) | said, _print_nyquist, json,
+        csv=csv, table=lambda: nyquist_table(found), png=png, picture=(found,),
+    )  # fmt: skip
 
 
 def _band(arm: Arm, start: float | None, stop: float | None) -> tuple[float, float] | None:

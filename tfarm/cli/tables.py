@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import groupby
 from pathlib import Path
@@ -13,9 +13,10 @@ from typing import Any
 from rich.console import Console
 
 from tfarm.arm import MOMENT_GAIN, Arm
-from tfarm.cli.app import tell
+from tfarm.cli.app import give, tell
 from tfarm.columns import Column, Table
 from tfarm.files import is_standard_output
+from tfarm.tables.files import write_csv
 from tfarm.tables.terminal import show
 
 PROGRESS_EVERY = 4.0  # seconds from one line of progress to the next: few lines in a log, and no long silence
@@ -119,6 +120,33 @@ def print_found(answer: dict[str, Any]) -> None:
     what = f"largest |{answer['output']} / {answer['input']}| {sizes[largest]:.6g}"
     unit = f"{answer['unit']} / {answer['input_unit']}"
     print(f"{answer['arm']}: {len(sizes)} points, {what} {unit} at s = {re:.10g}{im:+.10g}i 1/s")
+
+
+def hand_out(
+    answer: Callable[[], dict[str, Any]],
+    printed: Callable[[dict[str, Any]], None],
+    json: bool,
+    *,
+    csv: Path | None = None,
+    table: Callable[[], Table] | None = None,
+    png: Path | None = None,
+    picture: Sequence[object] = (),
+    also: Sequence[Path | None] = (),
+) -> None:
+    """What was found: its table and its picture to the files asked for, then the answer, as JSON or `printed`.
+
+    `picture` is the record that is drawn, with what stands beside it; `also` are files that are written already.
+    Nothing is printed where standard output holds one of them.
+    """
+    if csv is not None and table is not None:
+        write_csv(table(), csv)
+    if png is not None:
+        from tfarm.plots.drawn import drawn
+        from tfarm.plots.files import save_png
+
+        save_png(drawn(*picture), png)
+    if say_written(csv, png, *also) or json:
+        give(answer(), json, printed)
 
 
 def say_written(*paths: Path | None) -> bool:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN
-from tfarm.cli.app import ArmName, Json, app, give, load_arm, whole_number
+from tfarm.cli.app import ArmName, Json, app, load_arm, whole_number
 from tfarm.cli.inputs import HELP_ON_GAINS, Given, asked_gains, with_options
 from tfarm.cli.sampling import Delay, DspFile, Period, asked_chain
 
@@ -118,8 +118,7 @@ def _servo_gains(subject: Arm, on_rate: float | None, on_angle: float) -> tuple[
 def _show(answer: dict[str, Any], save: Path | None, json: bool) -> None:
     """The answer as JSON or as a summary; that a run has stopped is said either way."""
     from tfarm.cli import tuning_tables
-    from tfarm.cli.tables import say_written
+    from tfarm.cli.tables import hand_out
 
     tuning_tables.warn_of_divergence(answer)
-    if say_written(save) or json:
-        give(answer, json, tuning_tables.print_tuning)
+    hand_out(lambda: answer, tuning_tables.print_tuning, json, also=(save,))
