@@ -77,8 +77,8 @@ class Column:
 class Table:
     """The columns of a record, read; a sequence of its rows as JSON has them.
 
-    `stem` names its files, `title` stands above, `caption` says what is to be seen and what it means; `is_data`: the
-    numbers of a picture, for files alone.  The first `keys` columns say which row it is.
+    `stem` names its files, `title` stands above, `caption` says what is to be seen and what it means.  The first
+    `keys` columns say which row it is.
     """
 
     columns: tuple[Column, ...]
@@ -86,7 +86,6 @@ class Table:
     stem: str = ""
     title: str = ""
     caption: str = ""
-    is_data: bool = False
     keys: int = 1
 
     def __post_init__(self, record: Any) -> None:

@@ -178,4 +178,4 @@ def _data(stem: str, values: Column, curve: Study) -> Table:
         Column(f"mode_{i}_rad_s", f"mode {i}", "rad/s", of=omega)
         for i, omega in enumerate(curve.natural_frequency.T, 1)
     ]
-    return Table(stem=stem, title="Natural frequencies", is_data=True, columns=(values, *columns))
+    return Table(stem=stem, title="Natural frequencies", columns=(values, *columns))

@@ -102,7 +102,7 @@ def _bode_picture(each: LawOnArm, found: Margins[Any]) -> Picture:
         caption=(BODE_CAPTION if found.in_band is not None else "Size and phase of L(iω).") + none,
         alt=f"Bode plot of the loop function of {each.name}, {found.stability.verdict}.",
         figure=draw_loop(found, each.name),
-        data=Table(stem=f"{stem}-data", title=f"The loop function of {each.name}", is_data=True, columns=columns),
+        data=Table(stem=f"{stem}-data", title=f"The loop function of {each.name}", columns=columns),
     )
 
 

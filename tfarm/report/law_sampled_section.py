@@ -324,4 +324,4 @@ def beside_table(found: Mapping[str, Beside]) -> Table:
             if values.size:
                 columns.append(Column(f"{name}_measured_{key}_{unit}", name, of=np.interp(t, measured.t, values)))
             columns.append(Column(f"{name}_computed_{key}_{unit}", name, of=computed[: t.size]))
-    return Table(stem="sampled-measured-data", title="Measured and computed", is_data=True, columns=tuple(columns))
+    return Table(stem="sampled-measured-data", title="Measured and computed", columns=tuple(columns))

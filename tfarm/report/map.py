@@ -145,4 +145,4 @@ def map_data(data: MapOfArm) -> Table:
         Column("least_damping_ratio", "least damping ratio", of=[*data.damping.ravel().tolist(), *none * beyond]),
         Column("omega_rad_s", "frequency", "rad/s", of=none * grid[0].size + edge[:, 2].tolist() + none * len(sampled)),
     )  # fmt: skip
-    return Table(stem="map-data", title=f"The map of {' and '.join(PLANE)}", is_data=True, columns=columns)
+    return Table(stem="map-data", title=f"The map of {' and '.join(PLANE)}", columns=columns)

@@ -32,7 +32,7 @@ def measured_section(arm: Arm, measured: Sequence[Measured]) -> PageSection:
         found = overlay(arm, one)
         answer, name = overlay_answer(found), found.measured.name
         label = f"-{number}" if len(measured) > 1 else ""
-        curves = replace(curves_table(found), stem=f"measured{label}-data", title=name, is_data=True)
+        curves = replace(curves_table(found), stem=f"measured{label}-data", title=name)
         blocks.append(Picture(
             stem=f"measured{label}", title=name, caption=CURVES_CAPTION,
             alt=f"Measured and exact response {name}.", figure=draw_measured(found), data=curves,

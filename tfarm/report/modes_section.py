@@ -149,7 +149,7 @@ def _shapes(name: str, shapes: tuple[DrawnMode, ...]) -> Picture:
         caption=MODE_SHAPES,
         alt=f"Mode shapes of the arm, modes 1 to {len(shapes)}; they have {counts} nodes between hub and tip.",
         figure=draw_shapes(name, shapes),
-        data=Table(stem="mode-shapes-data", title="Mode shapes", is_data=True, columns=tuple(columns)),
+        data=Table(stem="mode-shapes-data", title="Mode shapes", columns=tuple(columns)),
     )
 
 
@@ -188,7 +188,7 @@ def _differences(name: str, differences: Mapping[str, Real]) -> Picture:
         caption=DIFFERENCES,
         alt=f"Differences from the Timoshenko theory by mode; at mode {TABLED_MODES}: {words}.",
         figure=draw_differences(name, shown),
-        data=Table(stem="theory-differences-data", title="Differences", is_data=True, columns=tuple(columns)),
+        data=Table(stem="theory-differences-data", title="Differences", columns=tuple(columns)),
     )
 
 

@@ -41,4 +41,4 @@ def overlay_table(data: StableRegions, stem: str) -> Table:
     across, up = PLANE
     values = Column(across, across, shown_unit(across, data.continuous.arm), of=data.continuous.axes[0])
     title = f"Stable intervals of {up}, continuous and sampled"
-    return Table(stem=stem, title=title, is_data=True, columns=(values, *columns))
+    return Table(stem=stem, title=title, columns=(values, *columns))

@@ -172,7 +172,7 @@ def _mode_blocks(data: Sampled) -> list[Picture | Table]:
         ),
         alt=f"Growth per sample of {table.index.size} modes over their frequency; {said}.",
         figure=draw_modes(loop, table),
-        data=replace(rows, stem="sampled-growth-data", is_data=True),
+        data=replace(rows, stem="sampled-growth-data"),
     )
     return [picture, chart, rows]
 

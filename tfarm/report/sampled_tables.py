@@ -44,7 +44,7 @@ def loci_table(data: SampledLoci, stem: str) -> Table:
     columns = [
         Column(*title, of=list(cells)) for title, cells in zip(titles.items(), zip(*rows, strict=True), strict=True)
     ]
-    return Table(stem=stem, title="Poles of the sampled loop", is_data=True, columns=tuple(columns))
+    return Table(stem=stem, title="Poles of the sampled loop", columns=tuple(columns))
 
 
 def example_words(ideal: Chain, coarse: Chain) -> str:
@@ -73,4 +73,4 @@ def strip_table(data: StripChart, stem: str) -> Table:
         Column("torque_asked_N_m", "torque asked", "N m", of=held_at(s, data.asked, drawn.t)),
         Column("torque_given_N_m", "torque given, after the delay", "N m", of=held_at(s, s.torque, drawn.t)),
     )
-    return Table(stem=stem, title="Strip chart", is_data=True, columns=columns)
+    return Table(stem=stem, title="Strip chart", columns=columns)

@@ -118,4 +118,4 @@ def responses_table(stem: str, title: str, arm: Arm, each: Mapping[str, Simulati
         if run.gain is not None and np.ptp(run.gain):
             columns.append(Column(f"K_{key}", "gain", of=curves.held_at(run, run.gain, t)))
     columns = [replace(each, of=kept_digits(map(float, each.values), CURVE_DIGITS)) for each in columns]
-    return Table(stem=stem, title=title, is_data=True, columns=tuple(columns))
+    return Table(stem=stem, title=title, columns=tuple(columns))

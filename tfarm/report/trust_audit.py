@@ -90,7 +90,7 @@ def verdict_counts(rows: Sequence[AuditRow]) -> dict[str, int]:
 def audit_table(rows: Sequence[AuditRow]) -> Table:
     """Every row in plain text, for the files."""
     title = "The paper, equation by equation"
-    return Table(stem="audit", title=title, is_data=True, columns=AUDIT_COLUMNS, record=list(rows))
+    return Table(stem="audit", title=title, columns=AUDIT_COLUMNS, record=list(rows))
 
 
 def _left(residual: str) -> str:

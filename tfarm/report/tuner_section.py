@@ -123,7 +123,6 @@ def _gain_picture(data: TunerStudy) -> Picture:
         data=Table(
             stem="tune-gain-data",
             title="The tuner's gain",
-            is_data=True,
             columns=(
                 Column("t_s", "time", "s", of=tuning.training.result.t),
                 Column("K", "gain", of=K),
@@ -207,7 +206,7 @@ def _curves_picture(data: TunerStudy) -> Picture:
         ),
         alt=f"Learning curves of {CURVE_SEEDS} seeds for two rules, beside the best constant gain and the bound.",
         figure=draw_curves(data),
-        data=Table(stem="tune-curves-data", title="Learning curves", is_data=True, columns=(first, *columns)),
+        data=Table(stem="tune-curves-data", title="Learning curves", columns=(first, *columns)),
     )
 
 
@@ -229,7 +228,7 @@ def _map_picture(data: TunerStudy) -> Picture:
         ),
         alt=f"Map of the final cost over momentum and learning rate. {upper(typeset(found.verdict))}.",
         figure=draw_cost_map(data),
-        data=Table(stem="tune-map-data", title="Final cost", is_data=True, columns=columns),
+        data=Table(stem="tune-map-data", title="Final cost", columns=columns),
     )
 
 

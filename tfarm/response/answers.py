@@ -129,4 +129,4 @@ def bode_table(data: Bode, stem: str = "") -> Table:
         Column("magnitude", "magnitude", of, of=abs(data.value)),
         Column("phase_deg", "phase", "deg", of="phase"),
     )
-    return Table(stem=stem, title=f"{data.input_label} to {data.label}", is_data=True, columns=columns, record=data)
+    return Table(stem=stem, title=f"{data.input_label} to {data.label}", columns=columns, record=data)
