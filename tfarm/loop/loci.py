@@ -71,7 +71,7 @@ def branch_columns(branches: Complex, key: str, title: str = "") -> list[Column]
     """Two columns a branch, Re s and Im s, empty where it is not followed; key and title name branch `n` and `part`."""
     return [
         Column(key.format(n=n, part=part[:2].lower()), title.format(n=n, part=part), "1/s",
-               of=["" if np.isnan(x) else x for x in values.tolist()])
+               of=["" if np.isnan(s) else x for s, x in zip(row, values.tolist(), strict=True)])
         for n, row in enumerate(branches) for part, values in (("Re s", row.real), ("Im s", row.imag))
     ]  # fmt: skip
 
