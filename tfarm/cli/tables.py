@@ -145,7 +145,7 @@ def hand_out(
         from tfarm.plots.files import save_png
 
         save_png(drawn(*picture), png)
-    if say_written(csv, png, *also) or json:
+    if say_written(*also, csv, png) or json:
         give(answer(), json, printed)
 
 
