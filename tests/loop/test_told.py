@@ -1,0 +1,173 @@
+"""What answers and words say of a loop is what its records hold; axes and edges of the map in the arm's own units."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.interpolate import BarycentricInterpolator
+
+import tfarm
+from tests.loop.arms import window_arm
+from tests.similar import EITHER
+from tfarm import HubFeedback, Law
+from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.loop.answers import nyquist_answer, nyquist_table, poles_answer
+from tfarm.loop.branches import open_pairs
+from tfarm.loop.crossings import BranchCrossing, in_words
+from tfarm.loop.edges import Axis, moment_axis, rate_axis, stable_edge
+from tfarm.loop.law_map import law_map
+from tfarm.loop.locus import frame
+from tfarm.loop.panels import CHEBYSHEV, loop_panels
+from tfarm.loop.plant import Loop
+from tfarm.loop.stability import stability
+from tfarm.spectrum.scales import rate_unit
+
+LAB, BARE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))
+LAWS = {"stable": HubFeedback(K1=0.3, K2=0.3), "unstable": HubFeedback(K1=0.3, K2=1.5)}
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_an_answer_of_nyquist_s_criterion_is_its_record(name):
+    """Turns, poles by both roads and every point of the contour, as numbers without a sign of j."""
+    found = tfarm.nyquist(LAB, LAWS[name])
+    answer, table = nyquist_answer(found), nyquist_table(found)
+    assert answer["unstable_by_nyquist"] == answer["unstable_roots"] == -answer["encirclements"]
+    assert (answer["unstable_roots"] == 0) == (name != "unstable") == (answer["verdict"] == "stable")
+    np.testing.assert_array_equal(np.array(answer["s"]) @ [1, 1j], found.s)
+    np.testing.assert_array_equal(np.array(answer["L"]) @ [1, 1j], found.L)
+    rows = np.array([[row[key] for key in ("re_s", "im_s", "re_L", "im_L")] for row in table])
+    np.testing.assert_array_equal(rows @ [1, 1j, 0, 0], found.s)
+    np.testing.assert_array_equal(rows @ [0, 0, 1, 1j], found.L)
+    np.testing.assert_allclose(found.L[5::100], Loop(LAB, LAWS[name]).loop_function(found.s[5::100]), rtol=1e-12)
+
+
+def test_an_answer_of_poles_is_its_record():
+    found = tfarm.closed_loop_poles(STOCKY, tfarm.default_gains(STOCKY), 2)
+    answer = poles_answer(found, certify=True)
+    np.testing.assert_array_equal(np.array(answer["poles"]) @ [1, 1j], found.values)
+    assert answer["box"] == list(found.box)
+    assert answer["unstable"] == found.unstable
+    assert len(answer["discs"]) == np.count_nonzero(found.values)
+    for disc, pole in zip(answer["discs"], found.moving, strict=True):
+        assert abs(complex(float(disc["re"]), float(disc["im"])) - pole) <= 1e-12 * abs(pole)
+
+
+def test_words_tell_three_crossings_and_count_the_others():
+    each = [
+        BranchCrossing(gain=0.5 * n, omega=2 * math.pi * n, branch=n, direction=d)
+        for n, d in enumerate(("stable", "unstable") * 3)
+    ]
+    assert in_words("K2", []) == "no branch crosses the imaginary axis"
+    assert in_words("K2", each[:1]) == "a pole becomes stable at K2 = 0"
+    assert in_words("K2", each[:3]) == "a pole becomes stable at K2 = 0, unstable at K2 = 0.5, stable at K2 = 1"
+    assert in_words("K2", each) == in_words("K2", each[:3]) + " and 3 more"
+    assert each[3].frequency_hz == pytest.approx(3.0, rel=1e-15)
+
+
+# ------------------------------------------------------------ the map
+
+
+@pytest.mark.parametrize("arm", [LAB, STOCKY], ids=lambda arm: arm.name)
+def test_the_rate_axis_is_linear_up_to_the_power_of_ten_below_the_default_gain(arm):
+    axis, K1 = rate_axis(arm), tfarm.default_gains(arm).K1
+    assert axis.linear <= K1 < 10 * axis.linear
+    assert math.log10(axis.linear) == pytest.approx(round(math.log10(axis.linear)), abs=1e-12)
+    assert (axis.low, axis.high) == (-axis.linear, pytest.approx(10 * rate_unit(arm), rel=1e-12))
+
+
+def test_the_moment_axis_holds_the_default_range_and_all_that_is_unstable_below():
+    """-4 to 2 where nothing below is unstable; else the picture shows the end of what is, in between logarithmic."""
+    for arm in (BARE, LAB):
+        assert moment_axis(arm, rate_axis(arm)) == Axis(-4.0, 2.0)
+    arm, x = window_arm(), Axis(0.99, 1.01)  # unstable down to about -41 at K1 = 1
+    assert moment_axis(arm, x) == Axis(-50.0, 2.0, 2.0)
+    assert not tfarm.map(arm, x.grid(3), np.linspace(-42.0, -4.0, 40)).stable.all()
+
+
+@pytest.mark.parametrize("units", EITHER.values(), ids=EITHER)
+def test_the_moment_axis_is_of_no_unit(units):
+    """With the rate axis in the same units."""
+    arm, x = window_arm(), Axis(0.5, 1.5)
+    low, high = (units.law(arm, HubFeedback(K1=each)).K1 for each in (x.low, x.high))
+    here, there = moment_axis(arm, x), moment_axis(units.arm(arm), Axis(low, high))
+    assert (there.low, there.high) == (pytest.approx(here.low, rel=1e-9), here.high)
+
+
+def test_the_stable_edge_is_the_boundary_with_stable_points_on_one_side():
+    """Of points of the D-decomposition those where the count of the map is 0 above or below, but not both."""
+    x, y = Axis(0.02, 3.0, 0.02), Axis(-4.0, 2.0)
+    plane = tfarm.map(LAB, x.grid(60), y.grid(90))
+    points = stable_edge(plane, plane.boundary, x, y)
+    assert 3 < len(points) < len(plane.boundary)
+    assert ((points[:, 0] > 0) & (points[:, 0] <= 3.0) & (points[:, 1] >= -4.0) & (points[:, 1] <= 2.0)).all()
+    half = 3 * 6.0 / 90  # rows on either side
+    told = 0
+    for K1, K2, _ in points[:: max(1, len(points) // 6)]:
+        sides = [stability(LAB, HubFeedback(K1=K1, K2=K2 + way * half)).is_stable for way in (-1, 1)]
+        told += sides[0] != sides[1]
+    assert told >= 5
+    blank = np.full((2, 3), np.nan)
+    assert stable_edge(plane, blank, x, y).size == 0
+
+
+@pytest.mark.parametrize(("x", "y", "key"), [([1.0, 0.5], [1.0, 2.0], "hub_rate"), ([1.0, 2.0], [1.0, 1.0], "gain")])
+def test_values_of_a_map_that_do_not_ascend_are_refused_by_their_name(x, y, key):
+    with pytest.raises(ParameterError) as told:
+        law_map(LAB, Law({"hub_rate": 0.3, "root_moment": 0.3}), ("hub_rate", "gain"), np.array(x), np.array(y))
+    assert told.value.key == key
+
+
+def test_a_picture_of_no_poles_is_the_unit_square():
+    assert frame(np.full((2, 3), np.nan, complex)) == (0.0, 1.0, 0.0, 1.0)
+    assert frame(np.array([[-2 + 1j, 0.5 + 4j]])) == (-2.0, 0.5, 1.0, 4.0)
+    assert frame(np.array([[-2 + 1j, -1 + 4j]])) == (-2.0, 0.0, 1.0, 4.0)
+    assert frame(np.array([[2 + 1j, 1 + 4j]])) == (0.0, 2.0, 1.0, 4.0)
+
+
+def test_what_a_locus_of_a_damped_rig_begins_with():
+    """0 and about -b/J of the hub's friction, then the modes in their order, each of them a zero of the open arm."""
+    arm = tfarm.load("quanser-2dsfl")
+    zeros, lowest = open_pairs(arm, 4, 3)
+    damped = tfarm.damped_modes(tfarm.modes(arm, 4))
+    np.testing.assert_array_equal(zeros, damped.eigenvalues)
+    assert zeros[0, 0] == 0
+    assert zeros[0, 1].imag == 0 > zeros[0, 1].real
+    assert lowest == damped.natural_frequency[1]
+    assert open_pairs(BARE, 4, 3)[0].tolist() == [[1j * w, -1j * w] for w in tfarm.modes(BARE, 4).natural_frequency[1:]]
+
+
+# ------------------------------------------------------------ panels
+
+
+def test_a_panel_that_its_polynomials_miss_is_halved(monkeypatch):
+    """Until they do not; the panels still meet, and the first is on both sides of 0."""
+    monkeypatch.setattr("tfarm.loop.panels.STEEP_A_PANEL", 200)  # all in one panel, to begin with
+    band = 8192.0
+    halved = loop_panels(LAB, band)
+    assert halved.error <= 1e-11
+    assert len(halved.low) > 2
+    assert (halved.low[0], halved.high[-1]) == (-halved.high[0], band)
+    np.testing.assert_array_equal(halved.low[1:], halved.high[:-1])
+    widths = np.r_[halved.high[0], np.diff(halved.high)]
+    np.testing.assert_array_equal(np.log2(widths) % 1, 0.0)
+    monkeypatch.setattr("tfarm.loop.panels.MOST_PANELS", 3)
+    with pytest.raises(ConvergenceError, match="do not follow"):
+        loop_panels(LAB, band)
+
+
+@pytest.mark.parametrize("arm", [LAB, BARE], ids=lambda arm: arm.name)
+def test_between_its_samples_a_panel_is_the_loop_function_too(arm):
+    """By SciPy's interpolation through them; from 0 to the band without a gap, the first panel on both sides of 0."""
+    found, law, band = loop_panels(arm, 400.0), HubFeedback(K1=0.3, K2=-0.7, Kp=2.0), 400.0
+    assert (found.low[0], found.high[-1]) == (-found.high[0], band)
+    np.testing.assert_array_equal(found.low[1:], found.high[:-1])
+    assert found.error <= 1e-11
+    inside = np.array([-0.93, -0.31, 0.07, 0.55, 0.99])
+    for low, high, values in zip(found.low, found.high, np.moveaxis(found.values, 1, 0), strict=True):
+        assert abs(values).max() == pytest.approx(1.0, rel=1e-15)
+        order = np.argsort(CHEBYSHEV)
+        d, theta, m = (BarycentricInterpolator(CHEBYSHEV[order], part[order])(inside) for part in values)
+        s = 1j * ((low + high) / 2 + (high - low) / 2 * inside)
+        fed_back = (law.Kp + law.K1 * s) * theta + law.K2 * m * s**2
+        whole = Loop(arm, law).loop_function(s)
+        np.testing.assert_allclose(fed_back / (d * s**found.order), whole, rtol=1e-6 * (1 + abs(whole).max()))
