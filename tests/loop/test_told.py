@@ -1,6 +1,7 @@
 """What answers and words say of a loop is what its records hold; axes and edges of the map in the arm's own units."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,10 +16,15 @@ from tfarm.loop.answers import nyquist_answer, nyquist_table, poles_answer
 from tfarm.loop.branches import open_pairs
 from tfarm.loop.crossings import BranchCrossing, in_words
 from tfarm.loop.edges import Axis, moment_axis, rate_axis, stable_edge
+from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.law_map import law_map
 from tfarm.loop.locus import frame
+from tfarm.loop.lyapunov import lyapunov
+from tfarm.loop.margins import _nearest_to_one
+from tfarm.loop.nyquist import poles_on_axis
 from tfarm.loop.panels import CHEBYSHEV, loop_panels
-from tfarm.loop.plant import Loop
+from tfarm.loop.plant import Loop, effective_inertia
+from tfarm.loop.poles import slow_poles
 from tfarm.loop.stability import stability
 from tfarm.spectrum.scales import rate_unit
 
@@ -171,3 +177,60 @@ def test_between_its_samples_a_panel_is_the_loop_function_too(arm):
         fed_back = (law.Kp + law.K1 * s) * theta + law.K2 * m * s**2
         whole = Loop(arm, law).loop_function(s)
         np.testing.assert_allclose(fed_back / (d * s**found.order), whole, rtol=1e-6 * (1 + abs(whole).max()))
+
+
+# ------------------------------------------------------------ what theorems and lists take for granted
+
+
+def test_slow_poles_are_zeros_of_the_whole_characteristic_function():
+    """Not of the rigid arm's alone, from which they start: to the last digits a step of Newton's method is none."""
+    law = HubFeedback(K1=1e-4 * rate_unit(LAB), K2=0.3, Kp=3e-9 * rate_unit(LAB))
+    loop = Loop(LAB, law)
+    found = slow_poles(loop, 1.0)
+    assert found.size == 2
+    at = loop.member.function(found)
+    assert (abs(at.value / at.slope) <= 1e-13 * abs(found)).all()
+    rigid = np.roots([effective_inertia(LAB, law), *loop.at_rest])
+    assert 1e-9 < max(min(abs(each / other - 1) for other in rigid) for each in found) < 1e-2
+
+
+def test_a_contour_passes_the_poles_of_a_law_on_the_axis_below_its_band():
+    """Where it rings without damping, and its integrator if the rig has no zero there."""
+    slow, fast = ([1.0, 0.0, w**2] for w in (30.0, 900.0))
+    loop = LawLoop(LAB, Law({"hub_rate": ([1.0], slow), "root_moment": ([1.0], fast)}))
+    np.testing.assert_allclose(poles_on_axis(loop, 400.0), [0.0, 30.0], rtol=1e-9)
+    np.testing.assert_allclose(poles_on_axis(loop, 1000.0), [0.0, 30.0, 900.0], rtol=1e-9)
+    np.testing.assert_allclose(poles_on_axis(loop, 10.0), [0.0])
+    bare = LawLoop(BARE, Law({"root_moment": ([1.0], slow)}))  # finite at rest, where the arm turns
+    omega = tfarm.modes(BARE, 3).natural_frequency[1:]
+    expected = np.sort([30.0, *omega[omega < 400.0]])
+    np.testing.assert_allclose(poles_on_axis(bare, 400.0), expected, rtol=1e-9)
+
+
+def test_lyapunov_counts_what_the_hub_loses_to_the_rate_gain():
+    """K1 may be below 0 by less than the friction: not by more, and at just as much nothing is lost."""
+    arm = replace(BARE, hub=replace(BARE.hub, friction=0.25))
+    for K1, proven in ((-0.2, True), (-0.3, False), (0.1, True)):
+        found = lyapunov(arm, HubFeedback(K1=K1, K2=0.3))
+        assert found.proven == proven
+        assert proven or "feeds energy in" in found.reason
+        assert found.a1_over_a2 == (pytest.approx(0.7, rel=1e-15) if proven else None)
+
+
+def test_the_gain_margin_is_the_nearest_factor_on_either_side_of_one():
+    assert _nearest_to_one([0.2, 0.9, 1.3, 5.0]) == (0.9, 1.3)
+    assert _nearest_to_one([-3.0, 0.5]) == (0.5, math.inf)
+    assert _nearest_to_one([1.5, 2.5]) == (0.0, 1.5)
+    assert _nearest_to_one([]) == (0.0, math.inf)
+
+
+def test_resonators_in_one_fraction_are_passed_as_they_are_in_several():
+    """The roots of their product are off the axis by rounding; turns and poles found still agree."""
+    slow, fast = ([1.0, 0.0, w**2] for w in (30.0, 200.0))
+    den = np.polymul(slow, fast)
+    num = np.polyadd(0.3 * den, [0.5, 0.0, 0.0, 0.0])
+    law = Law({"hub_rate": (num.tolist(), den.tolist())})
+    assert law.poles.real.any()
+    found = tfarm.nyquist(LAB, law)
+    np.testing.assert_allclose(found.poles, [0.0, 30.0, 200.0], rtol=1e-9)
+    assert (found.unstable_open, found.expected) == (0, found.verdict.unstable_roots)

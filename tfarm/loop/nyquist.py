@@ -91,7 +91,7 @@ def nyquist_of(verdict: Stability[AnyLoop]) -> Nyquist[AnyLoop]:
     across, down = np.linspace(1j * band, corner, EDGE_POINTS), np.linspace(corner, corner.real, EDGE_POINTS)
     turned = turning(loop, np.r_[s, across[1:], down[1:]])
     own = loop.law.poles if isinstance(loop, LawLoop) else np.empty(0, complex)
-    inside = int(((own.real > 0) & (abs(own.imag) < band)).sum())
+    inside = int(((own.real > AXIS_SHARE * abs(own)) & (abs(own.imag) < band)).sum())
     plot = Nyquist(s, loop.loop_function(s), is_arc, poles, round(turned / math.pi), verdict, inside)
     found = min(plot.clear, verdict.unstable_roots)
     if not found <= plot.expected <= found + plot.on_axis:
@@ -111,7 +111,8 @@ def poles_on_axis(loop: Loop | LawLoop, band: float) -> Real:
     flexible = np.asarray(flexible_frequencies(arm, band)) if arm.is_undamped else np.empty(0)
     if isinstance(loop, LawLoop):
         own = loop.law.poles
-        ringing = own.imag[(own.real == 0) & (own.imag > 0) & (own.imag < band)]
+        on_axis = abs(own.real) <= AXIS_SHARE * abs(own)  # of a product of resonators roots are off it by rounding
+        ringing = own.imag[on_axis & (own.imag > 0) & (own.imag < band)]
         integrators = loop.k.at_rest + int((own == 0).sum())
         return np.unique(np.r_[[0.0] * (integrators > loop.zeros_at_origin), flexible, ringing])
     zero = [0.0] if arm.has_rigid_mode and (loop.law[RATE_GAIN] or loop.law[ANGLE_GAIN]) else []
