@@ -111,9 +111,9 @@ clean: ## remove everything that was generated
 	@find tfarm tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # pip alone would byte-compile on one core, with every package's own tests and with what is never imported again: itself
-# and what mypy has as machine code.  Meanwhile six commands compile the numerical kernels, which numba then keeps on
-# disk: two at a time that need different ones.  The rigs' are half of it, and without it a report's two processes would
-# each compile them.
+# and what mypy has as machine code.  Meanwhile seven commands compile the numerical kernels, which numba then keeps on
+# disk: two at a time that need different ones.  A rig under a law is half of it, and without it a report's two
+# processes would each compile those, as tests would the two ways to learn within a trial.
 NOT_COMPILED := /tests?/|/(pip|setuptools|pkg_resources|mypy|mypyc)/|/pygments/(lexers|styles)/
 $(INSTALLED): pyproject.toml requirements.lock
 	$(if $(shell $(PYTHON) -c 'import sys; print("yes" * (sys.version_info >= (3, 11)))' 2>/dev/null),,$(error \
@@ -125,9 +125,10 @@ $(INSTALLED): pyproject.toml requirements.lock
 	@{ $(BIN)/tfarm modes sasaki2012 --count 1 > /dev/null && { \
 		$(BIN)/python -m compileall -q -x '$(NOT_COMPILED)' .venv/lib tfarm tests || true; } && \
 		$(BIN)/tfarm poles sasaki2012-lab > /dev/null && $(BIN)/tfarm simulate sasaki2012-lab > /dev/null; } & \
-		$(BIN)/tfarm response quanser-flexlink --output root_moment --s 1j > /dev/null && \
-		$(BIN)/tfarm response sasaki2012 --output root_moment --s 1j > /dev/null && \
-		$(BIN)/tfarm tune sasaki2012-lab --trials 1 > /dev/null && wait $$!
+		$(BIN)/tfarm simulate $(RIG)/rig.toml --law $(RIG)/lqg.toml --duration 0.1 > /dev/null && \
+		$(BIN)/tfarm tune sasaki2012-lab --trials 1 > /dev/null && \
+		$(BIN)/tfarm tune sasaki2012-lab --trials 1 --mode online > /dev/null && \
+		$(BIN)/tfarm tune sasaki2012-lab --trials 1 --mode online --sensitivity whole > /dev/null && wait $$!
 
 $(BENCH_INSTALLED): $(INSTALLED)
 	@$(PIP) -e '.[bench]'

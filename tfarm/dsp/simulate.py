@@ -225,8 +225,8 @@ def _model(plant: Plant, kept: NDArray[np.int64], chain: Chain, between: int) ->
         push=np.array([held_amplitude(p, float(each)) for each in durations]),
         piece=np.c_[durations, starts >= f * T, np.isin(ends, records)].astype(float),
         weights=weights,
-        rates=plant.rigid,
-        static=plant.static,
+        rates=np.array(plant.rigid),  # in one layout: the compiled loop is compiled anew for each
+        static=np.array(plant.static),
         hub=np.r_[plant.rigid[row], weights[row]].astype(complex),
     )
 
