@@ -14,9 +14,11 @@ from tests.rigs import some_rig
 from tests.shell import answer, run
 from tfarm.arm import HubFeedback, Law, RotarySpring
 from tfarm.dsp import Actuator, Chain, Sampling, Simulator, scenario
+from tfarm.dsp.law_loop import sampled_law
 from tfarm.dsp.law_simulate import LawSimulator
-from tfarm.dsp.plant import RECORDED
-from tfarm.errors import ParameterError
+from tfarm.dsp.loop import sampled_loop
+from tfarm.dsp.plant import RECORDED, undelayed_plant
+from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.reduced import modal_model
 
@@ -140,3 +142,28 @@ def test_files_have_a_column_for_each(capsys, tmp_path):
     in_matlab = loadmat(tmp_path / "s.mat")
     np.testing.assert_array_equal(in_matlab["moment_0_25"].ravel(), told["moment@0.25"])
     np.testing.assert_array_equal(in_matlab["between"]["tip_angle"][0, 0].ravel(), told["between"]["tip_angle"])
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.02])  # with friction the hub's rate does not feel the rigid body
+@pytest.mark.parametrize("law", [GAINS, Law({"hub_rate": 0.3, "moment@0.2": ([0.02], [1.0, -0.5])}, period=0.01)])
+def test_a_hub_that_its_actuator_damps_is_a_hub_with_that_friction(law, friction):
+    """Twenty modes leave 1e-9 of the signals; what is read along the arm has the poles of what is read at the hub."""
+    names = ("tip_rotation", "moment@0.3")
+    by_actuator = Chain(actuator=Actuator(hub_damping=0.05))
+    rig, rubbed = (replace(LAB, hub=replace(LAB.hub, friction=each)) for each in (friction, friction + 0.05))
+    sampled = sampled_law if isinstance(law, Law) else sampled_loop
+    one, other = sampled(rig, law, by_actuator, count=20), sampled(rubbed, law, Chain(), count=20)
+    assert one.poles.log_spectral_radius == pytest.approx(other.poles.log_spectral_radius, rel=1e-9)
+    one = tfarm.simulate(rig, law, by_actuator, "impulse", 0.3, count=20, outputs=names).at_samples
+    other = tfarm.simulate(rubbed, law, Chain(), "impulse", 0.3, count=20, outputs=names).at_samples
+    for name in one.names:
+        np.testing.assert_allclose(one.signal(name), other.signal(name), atol=1e-7 * abs(other.signal(name)).max())
+
+
+def test_a_damping_that_few_modes_would_make_drive_the_hub_is_refused():
+    """Friction far above the modes at hand leaves a negative remainder of the hub's rate: no verdict is made of it."""
+    rig = replace(LAB, hub=replace(LAB.hub, inertia=1e-4, friction=0.1))
+    assert undelayed_plant(rig, Chain(), ["hub_rate"], 6).static[0] < 0
+    assert tfarm.sampled(rig, GAINS, Chain(actuator=Actuator(hub_damping=0.05)), count=6).verdict.is_stable
+    with pytest.raises(ConvergenceError, match=r"ask for more modes, or give it as hub\.friction"):
+        tfarm.sampled(rig, GAINS, Chain(actuator=Actuator(hub_damping=20.0)), count=6)

@@ -10,7 +10,7 @@ import numpy as np
 
 from tfarm.arm import Arm
 from tfarm.dsp.chain import Chain
-from tfarm.dsp.plant import Branching, Plant, is_analog, undelayed_plant, with_filter, with_modes
+from tfarm.dsp.plant import AT_DAMPED_HUB, Branching, Plant, is_analog, undelayed_plant, with_filter, with_modes
 from tfarm.records import record
 from tfarm.response.signals import Signals
 from tfarm.spectrum.damped import all_damped_modes
@@ -59,7 +59,7 @@ class SensedPlant:
             return sensed_plant(self.read.arm, self.chain, self.read.names, count, branches)
         damped = self.chain.actuator.hub_damping > 0
         shorter = [
-            with_modes(each.model, self.chain, each.model.outputs[: -1 if damped else None], count)
+            with_modes(each.model, self.chain, each.model.outputs[: -len(AT_DAMPED_HUB) if damped else None], count)
             for each in self.plants
         ]
         return replace(self, plants=tuple(shorter))

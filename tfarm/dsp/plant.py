@@ -21,7 +21,7 @@ from scipy.optimize import linear_sum_assignment
 from tfarm.arm import FED_BACK, Arm
 from tfarm.arrays import Complex, Real
 from tfarm.dsp.chain import Chain
-from tfarm.errors import ParameterError
+from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exact.outputs import OUTPUTS, Output
 from tfarm.records import record
 from tfarm.reduced import ModalModel, modal_model
@@ -34,6 +34,7 @@ from tfarm.spectrum.search import LISTS_KEPT
 Branching = Callable[[Modes], DampedModes]
 
 AMPLIFIED = ("M", "Q", "strain", "current")  # what a strain gauge, a load cell or a shunt reads
+AT_DAMPED_HUB = ("hub_angle", "hub_rate")  # read where a chain damps the hub: the angle brings the rigid body's states
 RECORDED = ("hub_angle", "hub_rate", "root_moment", "tip_displacement")  # of a simulation, not filtered
 USUAL_MODES = 20  # flexible, of a sampled loop or a simulation whose number is not said
 
@@ -123,21 +124,42 @@ def undelayed_plant(
     if damping > 0 and arm.input_lags:
         remedy = "acts on the hub at once, and the input behind an inductance late: give it as hub.friction of the rig"
         raise ParameterError(key="actuator.hub_damping", value=damping, remedy=remedy)
-    names = (*outputs, "hub_rate") if damping > 0 else tuple(outputs)
-    if branches is all_damped_modes:
-        model = _modelled(arm, names, count, x)
-    else:
-        model = modal_model(arm, names, count, x, branches=branches)
+    model = _modelled(arm, tuple(outputs), count, x, branches)
+    if damping > 0:
+        model = _beside(model, _modelled(arm, AT_DAMPED_HUB, count, None, branches))
     return with_modes(model, chain, outputs, count)
 
 
+def _modelled(arm: Arm, names: tuple[str, ...], count: int, x: float | None, branches: Branching) -> ModalModel:
+    if branches is all_damped_modes:
+        return _modelled_once(arm, names, count, x)
+    return modal_model(arm, names, count, x, branches=branches)
+
+
 @lru_cache(maxsize=LISTS_KEPT)  # the simulations of one page ask for the same model some twenty times
-def _modelled(arm: Arm, names: tuple[str, ...], count: int, x: float | None) -> ModalModel:
+def _modelled_once(arm: Arm, names: tuple[str, ...], count: int, x: float | None) -> ModalModel:
     return modal_model(arm, names, count, x)
 
 
+def _beside(model: ModalModel, hub: ModalModel) -> ModalModel:
+    """A model with the outputs of another, of the same arm and modes, after its own.
+
+    What scales the states comes from that other, so that they are the same to the last bit wherever the first is read.
+    """
+    singles, of_hub = model.single_residues, hub.single_residues
+    return replace(
+        model,
+        rows=(*model.rows, *hub.rows),
+        residues=np.r_[model.residues, hub.residues],
+        rigid=np.r_[model.rigid, hub.rigid],
+        static=np.r_[model.static, hub.static],
+        single_residues=None if singles is None or of_hub is None else np.r_[singles, of_hub],
+        participation=hub.participation,
+    )
+
+
 def with_modes(model: ModalModel, chain: Chain, outputs: Sequence[str], count: int) -> Plant:
-    """The plant with the first `count` modes of a model, whose last output is the hub's rate where this is damped."""
+    """The plant with the first `count` modes of a model, the last outputs AT_DAMPED_HUB where it is damped."""
     damping = chain.actuator.hub_damping * model.arm.input_per_torque
     some = model if count == model.index.size else model.first(count)
     plant = _with_hub_damping(some, outputs, damping) if damping > 0 else _of_model(some)
@@ -216,21 +238,16 @@ def _of_model(model: ModalModel) -> Plant:
 
 
 def _with_hub_damping(model: ModalModel, outputs: Sequence[str], damping: float) -> Plant:
-    """The poles and residues under the torque -damping theta_t of a model with the hub's rate last, by eigenvectors.
+    """The poles and residues under the torque -damping theta_t of a model with AT_DAMPED_HUB last, by eigenvectors.
 
-    What decides the poles is taken from a model of that rate alone: so they are the same, to the last bit, wherever the
-    other outputs are read.
+    Raises ConvergenceError where the static remainder of the hub's rate would turn the damping's sign.
     """
-    alone = _modelled(model.arm, ("hub_rate",), model.index.size, None)
-    singles = model.single_residues
-    model = replace(
-        model,
-        residues=np.r_[model.residues[:-1], alone.residues],
-        rigid=np.r_[model.rigid[:-1], alone.rigid],
-        static=np.r_[model.static[:-1], alone.static],
-        single_residues=None if singles is None else np.r_[singles[:-1], alone.single_residues],
-        participation=alone.participation,
-    )
+    if damping * model.static[-1] <= -1.0:
+        why = (
+            f"what {model.index.size} modes leave of the hub's rate would be unstable under actuator.hub_damping: "
+            "ask for more modes, or give it as hub.friction of the rig"
+        )
+        raise ConvergenceError(why, model.index.size, damping * float(model.static[-1]))
     A, B, C, D = model.closed([0.0] * (len(model.outputs) - 1) + [damping])
     poles, right = np.linalg.eig(A)
     drive = np.linalg.solve(right, B.astype(complex))[:, 0]
