@@ -24,7 +24,6 @@ from .fit import Fit
 from .noise import CONFIDENCE
 from .ratio import Ratio
 from .repeats import WIDER, repeats
-from .sure import Fitted
 
 PEAK_REACH = 0.1  # of ln w, and the damping ratio: a peak farther from all of the arm's is not one of them
 BROADER = 2.0  # times the damping ratio: what a broad peak may lie off its pole
@@ -75,7 +74,18 @@ def fit_answer(fit: Fit) -> dict[str, Any]:
         "arm_name": fit.before.name,
         "converged": fit.converged,
         "verdict": fit.verdict,
-        "parameters": {each.key: _parameter(fit, each) for each in fit.parameters},
+        "parameters": {
+            one.key: {
+                "value": one.value,
+                "low": one.low,
+                "high": one.high,
+                "std": one.deviation,
+                "identified": one.identified,
+                "unit": number_unit(one.key),
+                "start": free.start,
+            }
+            for one, free in zip(fit.parameters, fit.solution.problem.parameters, strict=True)
+        },
         "level": CONFIDENCE,
         "not_determined": list(fit.not_determined),
         "frequencies_hz": {key: [row[n] for row in rows] for n, key in enumerate(("before", "after", "measured"))},
@@ -91,19 +101,6 @@ def fit_answer(fit: Fit) -> dict[str, Any]:
         "starts": fit.solution.starts,
         "in_words": fit_in_words(fit),
         "arm": tomllib.loads(to_toml(fit.arm)),
-    }
-
-
-def _parameter(fit: Fit, one: Fitted) -> dict[str, Any]:
-    start = next(each.start for each in fit.solution.problem.parameters if each.key == one.key)
-    return {
-        "value": one.value,
-        "low": one.low,
-        "high": one.high,
-        "std": one.deviation,
-        "identified": one.identified,
-        "unit": number_unit(one.key),
-        "start": start,
     }
 
 

@@ -124,23 +124,16 @@ def train(trial: Trial, network: Network, guard: Guard, learning: Learning, tria
     """
     trials = whole("trials", trials, 1, MOST_TRIALS, f"a whole number of trials from 1 to {MOST_TRIALS}")
     weights, costs = network.weights, np.zeros(trials)
-    made, sample = _learn(trial, network, guard, learning, weights, costs)
+    longest = math.inf if learning.rule == "plain" else float(learning.clip)
+    steps = rules.Steps(learning.rates(weights.size), float(learning.alpha), longest, float(learning.enough))
+    common = (trial.setting(network, guard.limits), steps, weights, costs, *trial.room(network))
+    if learning.mode == "trial":
+        made, sample = rules.learn_by_trials(*common, RULE_NUMBERS[learning.rule])
+    elif learning.sensitivity == "whole":
+        made, sample = rules.learn_by_sensitivities(*common, np.zeros(weights.size))
+    else:
+        made, sample = rules.learn_by_samples(*common, trial.reply)
     learnt = network.with_weights(weights)
     result = trial.with_network(learnt, guard.limits)
     stopped = Stopped(made - 1, int(sample), trial.numbers.bound) if sample >= 0 else None
     return Training(learnt, guard, costs[:made], result, stopped, sample == rules.ENOUGH)
-
-
-def _learn(
-    trial: Trial, network: Network, guard: Guard, learning: Learning, weights: Real, costs: Real
-) -> tuple[int, int]:
-    """The compiled loop of the mode; changes `weights`, fills `costs`."""
-    longest = math.inf if learning.rule == "plain" else float(learning.clip)
-    steps = rules.Steps(learning.rates(weights.size), float(learning.alpha), longest, float(learning.enough))
-    setting = trial.setting(network, guard.limits)
-    common = (setting, steps, weights, costs, *trial.room(network))
-    if learning.mode == "trial":
-        return rules.learn_by_trials(*common, RULE_NUMBERS[learning.rule])
-    if learning.sensitivity == "whole":
-        return rules.learn_by_sensitivities(*common, np.zeros(weights.size))
-    return rules.learn_by_samples(*common, trial.reply)
