@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import tfarm
-from tfarm.loop.positions import positions
+from tfarm.loop.positions import Positions, positions, sensed_places
 
 
 @pytest.mark.parametrize(("sensor", "share"), [("displacement", 0.6), ("moment", 0.3)])
@@ -56,6 +56,20 @@ def test_participation_is_the_shape_over_its_largest():
     w = modes.shape(x)[1:]
     assert found.participation == pytest.approx(w / abs(w).max(axis=1)[:, None])
     assert found.natural_frequency == pytest.approx(modes.natural_frequency[1:])
+
+
+def test_of_a_zero_what_is_no_more_than_its_error_is_left_out():
+    zeros = np.array([3.0 + 4e-9j, 1e-9 + 5j, -2.0 + 2j])
+    found = Positions(np.array([0.5]), 10.0, np.ones(1), np.ones((1, 1)), (zeros, zeros[:0]))
+    assert [each.tolist() for each in found.known_zeros] == [[3.0, 5j, -2.0 + 2j], []]
+
+
+def test_an_end_that_no_mode_moves_is_no_place_for_a_sensor():
+    """The clamp of a hub without radius does not move, nor does the tip without payload bend."""
+    arm = tfarm.load("sasaki2012").having(payload_mass=0.0, payload_inertia=0.0)
+    x = np.linspace(0.0, arm.length, 5)
+    assert sensed_places(arm, "displacement", x, 3).tolist() == x[1:].tolist()
+    assert sensed_places(arm, "moment", x, 3).tolist() == x[:-1].tolist()
 
 
 def test_an_arm_that_cannot_turn_has_no_such_zeros():
