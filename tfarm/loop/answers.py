@@ -13,6 +13,7 @@ from tfarm.arrays import Real, Whole
 from tfarm.columns import JSON, REPORT, TERMINAL, Column, Table
 from tfarm.crossing import Window
 from tfarm.digits import general, lined, plain, significant, singly, within
+from tfarm.response.answers import HERTZ
 from tfarm.response.signals import Signals
 from tfarm.spectrum.answers import EIGENVALUE_ERROR
 
@@ -26,7 +27,6 @@ from .regions import INFINITE, Region
 from .windows import Windows, reach_words
 
 LAW_IN_WORDS = f"u = -{SPELT_OUT} + r"
-HERTZ = 2 * math.pi  # rad/s
 WINDOW_DIGITS, PAGE_WINDOW_DIGITS = 8, 5  # of the ends of a window, on a terminal and on a page
 POLE_COLUMNS = (  # of complex poles [1/s]
     Column("re", "Re s", "1/s", of=lambda pole: within(pole.real, EIGENVALUE_ERROR * abs(pole), 12), on=(TERMINAL,)),
