@@ -58,6 +58,32 @@ def test_gains_at_the_hub_are_a_law_and_come_back(gains):
     assert Law({"tip_acceleration": 0.3}).gains is None
 
 
+def test_each_number_of_a_law_is_what_its_name_gives_back():
+    law = Law(
+        {
+            "hub_angle": ([2.0, 1.0], [0.01, 1.0, 0.0]),
+            "hub_rate": 0.3,
+            "strain@0.05": ([4.0], [0.1, 2.0]),
+            "root_moment": 0,
+        }
+    )
+    assert law.numbers == {
+        "gain": 1.0, "hub_angle.gain": 1.0, "hub_angle.num.0": 2.0, "hub_angle.num.1": 1.0, "hub_angle.den.0": 0.01,
+        "hub_angle.den.1": 1.0, "hub_rate": 0.3, "strain@0.05.num.0": 4.0, "strain@0.05.den.0": 0.1,
+        "strain@0.05.den.1": 2.0,
+    }  # fmt: skip
+    s = np.array([0.3 + 5j, 40j])
+    for name, value in law.numbers.items():
+        np.testing.assert_array_equal(law.having(name, value).values(s), law.values(s))
+        halved = law.having(name, value / 2).values(s)
+        assert (halved != law.values(s)).any()
+    assert Law({"hub_angle": ([2.0, 1.0], [1.0])}).numbers.keys() == {
+        "gain", "hub_angle.gain", "hub_angle.num.0", "hub_angle.num.1"
+    }  # fmt: skip
+    both = Law.of_matrices([[-1.0]], [[1.0, 2.0]], [[1.0]], [[0.0, 0.0]], ["hub_angle", "hub_rate"])
+    assert both.numbers == {"gain": 1.0}
+
+
 def test_one_number_of_a_law_changes_and_nothing_else():
     law = Law({"hub_angle": ([1.0, 2.0], [1.0, 3.0]), "hub_rate": 0.5})
     assert law.having("hub_angle.num.1", 7.0).parts[0].block.num == (1.0, 7.0)

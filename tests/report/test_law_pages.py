@@ -131,7 +131,8 @@ def test_the_loop_function_of_an_unstable_loop_has_no_margins(given):
     law = Law({"hub_angle": -5.0, "hub_rate": ([1.0], [0.01, 1.0])}, name="backwards")
     section = law_margins_section(LAB, Chain(), (GivenLaw(law),))
     assert section.facts[0].value == "UNSTABLE"
-    assert {block.stem for block in section.blocks} == {"law-bode", "law-spill"}
+    assert {block.stem for block in section.blocks} == {"law-bode", "law-spill", "windows"}
+    assert set(table(section, "windows")["stable_around_it"]) == {"none: not stable"}
 
 
 def test_every_entry_is_in_the_table_with_every_digit(given):

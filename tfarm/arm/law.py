@@ -167,6 +167,27 @@ class Law:
         numbers = self.values(np.zeros(1, complex))[:, 0].real
         return HubFeedback(**{known[name]: float(each) for name, each in zip(self.signals, numbers, strict=True)})
 
+    @property
+    def numbers(self) -> dict[str, float]:
+        """Each number in which the loop is linear, by the name that `having` knows it by; those that are 0 left out.
+
+        That is "gain", a factor on everything, and of each signal with a block of its own what it is multiplied by:
+        the gain itself, or the coefficients of its polynomials and, of more than one, a factor, "hub_angle.gain".
+        """
+        found = {"gain": 1.0}
+        for part in self.parts:
+            (name, *others), block = part.signals, part.block
+            if others or not is_measured(name):
+                continue
+            if isinstance(block, StateSpace) or np.count_nonzero(block.num) > 1:
+                found[f"{name}.gain"] = 1.0
+            if isinstance(block, Rational) and len(block.num) == len(block.den) == 1:
+                found[name] = block.num[0] / block.den[0]
+            elif isinstance(block, Rational):
+                polynomials = {"num": block.num, "den": block.den if block.order else ()}
+                found |= {f"{name}.{of}.{n}": each for of, row in polynomials.items() for n, each in enumerate(row)}
+        return {name: value for name, value in found.items() if value}
+
     # ------------------------------------------------------------ values
 
     def polynomials(self, s: Complex) -> tuple[Complex, Complex]:

@@ -11,6 +11,7 @@ from tfarm.columns import Column, Table
 from tfarm.digits import general, singly
 from tfarm.loop.answers import MARGIN_COLUMNS, POLE_COLUMNS, WINDOW_COLUMNS, gain_rows
 from tfarm.loop.margins import Margins
+from tfarm.loop.windows import BEYOND_LAW
 from tfarm.tables.terminal import heading, show
 
 
@@ -32,7 +33,8 @@ def print_margins(found: Margins[Any], answer: dict[str, Any]) -> None:
     far = answer["verdict"] == "unstable" or answer["known_beyond_the_band"]
     reach = "" if far else f" up to {answer['band_rad_s']:.4g} rad/s, not known beyond"
     poles = found.stability.poles
-    why = f"that {ANGLE_GAIN} = 0 leaves" if found.windows else "of a hub whose angle is not held"
+    is_of_gains = "lyapunov" in answer
+    why = f"that {ANGLE_GAIN} = 0 leaves" if is_of_gains else "of a hub whose angle is not held"
     apart = f" (apart from the pole at 0 {why})" if poles.moving.size < poles.values.size else ""
     print(f"{answer['arm']}: {answer['verdict'].upper()}{reach}{apart}")
     more = " (infinitely many in all)" if answer["unstable_roots_infinite"] else ""
@@ -40,14 +42,18 @@ def print_margins(found: Margins[Any], answer: dict[str, Any]) -> None:
     print(answer["beyond_the_band"])
     for warning in answer.get("warnings", ()):
         print(f"warning: {warning}")
-    if found.windows:
+    ends = "no limit was found up to there, and beyond none was looked for"
+    if is_of_gains:
         print(f"Lyapunov: {answer['lyapunov']['reason']}")
         show(Table(columns=WINDOW_COLUMNS, record=gain_rows(found)))
         ranges = ((name, *each.looked_at) for name, each in found.windows.items())
         spans = ", ".join(f"{name} ({low:.6g}, {high:.6g})" for name, low, high in ranges)
-        print(f"looked at: {spans}; * no limit was found up to there, and beyond none was looked for")
+        print(f"looked at: {spans}; * {ends}")
     elif answer["passivity"]["kind"]:
         print(answer["passivity"]["reason"])
+    if found.windows and not is_of_gains:
+        show(answer["windows"])
+        print(f"each looked at up to {BEYOND_LAW:g} times its size, of either sign; * {ends}")
     if answer["in_band"] is not None:
         _print_loop_margins(answer)
     print(answer["sign_convention"])

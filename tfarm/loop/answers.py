@@ -10,7 +10,7 @@ import numpy as np
 
 from tfarm.arm import ANGLE_GAIN, LISTED, PLANE, SPELT_OUT, Arm, HubFeedback, Law, input_words, shown_unit, unit_of
 from tfarm.arrays import Real, Whole
-from tfarm.columns import JSON, REPORT, TERMINAL, Column, Table
+from tfarm.columns import ANSWER, JSON, REPORT, TERMINAL, Column, Table
 from tfarm.crossing import Window
 from tfarm.digits import general, lined, plain, significant, singly, within
 from tfarm.response.answers import HERTZ
@@ -42,7 +42,7 @@ POLE_COLUMNS = (  # of complex poles [1/s]
 
 
 class GainRow(NamedTuple):
-    """One gain of a loop, and how far it may go alone."""
+    """One gain of a loop, or number of its law, and how far it may go alone."""
 
     gain: str
     value: float
@@ -60,8 +60,10 @@ class GainRow(NamedTuple):
 
 
 def gain_rows(found: Margins[Any]) -> list[GainRow]:
-    """The gains of a loop."""
+    """The gains of a loop, or the numbers of its law."""
     loop, rows = found.stability.loop, found.windows.items()
+    if isinstance(loop, LawLoop):
+        return [GainRow(name, loop.law.numbers[name], windows, "") for name, windows in rows]
     return [GainRow(name, loop.law[name], windows, shown_unit(name, loop.arm)) for name, windows in rows]
 
 
@@ -95,6 +97,11 @@ WINDOW_COLUMNS = (  # of `GainRow`; JSON has the gain's name before each key
     Column("looked_at", "looked at", on=REPORT, of=lambda row: _joined(row.windows.looked_at),
            shown=lambda row: "({}, {})".format(*(plain(end, PAGE_WINDOW_DIGITS) for end in row.windows.looked_at))),
 )  # fmt: skip
+LAW_WINDOW_COLUMNS = (  # of `GainRow`, for the numbers of a law
+    Column("number", "number of the law", of="gain", on=ANSWER),
+    Column("value", "value", printed=singly(general, 6), on=ANSWER),
+    *(column for column in WINDOW_COLUMNS if column.key not in ("gain", "value")),
+)
 MARGIN_COLUMNS = (  # of `LoopMargins`, beside the factors of the gain
     Column("phase_margin_deg", "phase margin", "deg", of="phase"),
     Column("phase_lag_deg", "phase lag", "deg", of="phase_lag"),
@@ -222,7 +229,12 @@ def _known_of(found: Margins | Margins[LawLoop]) -> dict[str, Any]:
     if isinstance(found.stability.loop, LawLoop):
         loop = found.stability.loop
         signs = signs_of_loop(loop)
-        return {"passivity": {"kind": signs.kind, "reason": signs.reason}, "warnings": list(loop.warnings)}
+        return {
+            "passivity": {"kind": signs.kind, "reason": signs.reason},
+            "warnings": list(loop.warnings),
+            "windows": Table(columns=LAW_WINDOW_COLUMNS, record=gain_rows(found)),
+            "windows_note": unsettled(found) or None,
+        }
     proof = lyapunov(found.stability.loop.arm, found.stability.loop.law)
     rows = gain_rows(found)
     windows = Table(columns=WINDOW_COLUMNS, record=rows)
@@ -234,8 +246,12 @@ def _known_of(found: Margins | Margins[LawLoop]) -> dict[str, Any]:
 
 
 def unsettled(found: Margins[Any]) -> str:
-    """What the windows leave open where nothing is known beyond the band, in words; else empty."""
-    return "" if found.stability.is_known_beyond else reach_words(found.windows.values())
+    """What the windows leave open where nothing is known beyond the band, in words; else empty.
+
+    A theorem on the sign of a law, or small gain, tells nothing of the law with another number in it.
+    """
+    is_of_law = isinstance(found.stability.loop, LawLoop)
+    return reach_words(found.windows.values()) if is_of_law or not found.stability.is_known_beyond else ""
 
 
 def sizes_of(found: Margins[Any]) -> dict[str, tuple[float | None, float | None]]:

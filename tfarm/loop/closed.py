@@ -14,6 +14,7 @@ from .law_loop import LawLoop
 from .law_map import LawMap, law_map
 from .law_poles import law_poles
 from .law_stability import is_quiet_above, law_stability
+from .law_windows import law_windows
 from .locus import Locus
 from .locus import locus as locus_of_gains
 from .margins import Margins, loop_margins, margins_of_gains
@@ -37,7 +38,7 @@ def closed_loop_poles(arm: Arm, law: AnyLaw, count: int | None = None) -> Poles 
 
 
 def margins(arm: Arm, law: AnyLaw, band: float | None = None) -> Margins | Margins[LawLoop]:
-    """Verdict first, then the margins of the loop; of gains at the hub the stable windows of each too.
+    """Verdict first, then the stable windows of each gain, or of each number of a law, and the margins of the loop.
 
     Raises ParameterError where there is no loop, ConvergenceError where poles cannot be counted, or where with damping
     one is on the axis to working precision.
@@ -46,12 +47,13 @@ def margins(arm: Arm, law: AnyLaw, band: float | None = None) -> Margins | Margi
     if isinstance(law, HubFeedback):
         return margins_of_gains(arm, law, band)
     verdict = law_stability(arm, law, band)
+    windows = law_windows(verdict)
     if not verdict.is_stable:
-        return Margins(verdict, {}, None, None, None, None)
+        return Margins(verdict, windows, None, None, None, None)
     found = loop_margins(verdict)
     if arm.least_damping and is_quiet_above(verdict.loop, verdict.band):
-        return Margins(verdict, {}, found, found.delay, found.disk, found.peak_sensitivity)
-    return Margins(verdict, {}, found, None, None, None)
+        return Margins(verdict, windows, found, found.delay, found.disk, found.peak_sensitivity)
+    return Margins(verdict, windows, found, None, None, None)
 
 
 def nyquist(arm: Arm, law: AnyLaw) -> Nyquist | Nyquist[LawLoop]:

@@ -33,6 +33,7 @@ MOST_MAP_VALUES = 400  # along one number: each column is a line of crossings of
 NEAR_ORIGIN = (1e-6, 5e-7)  # of the lowest frequency: where a real pole is looked for on its way through 0
 FAR_RIGHT = (1e5, 1e6, 1e7)  # of w1: where one is looked for on its way through infinity
 SAME_VALUE = 1e-9  # of the range: values nearer to each other are one
+ROUNDED = 4 * float(np.finfo(float).eps)  # of the range: a value so small is 0
 ORDER_READ_AT = (2e-3, 1e-3)  # of w1: where the order of a zero at s = 0 is read off
 SIMPLE = 3.0  # ratio of values at the first and the second: 2 of a simple zero, 4 of a double one
 BESIDE_MEETING = 1e-3  # of the range: how far from such a place its counts are taken
@@ -152,7 +153,7 @@ def law_crossings(loop: LawLoop, name: str, values: Real, omega: Real, known: Lo
         with np.errstate(over="ignore", invalid="ignore"):  # a law of high order is beyond any number there
             far = through_infinity(*parts(first_frequency(loop.arm) * np.array(FAR_RIGHT) + 0j))
         found += [] if far is None else [far._replace(t=0.0)]
-    return Crossings.of(found)
+    return Crossings.of(each._replace(t=0.0) if abs(each.t) <= ROUNDED * span else each for each in found)
 
 
 def _change_at(loop: LawLoop, name: str, low: float, span: float, t: float, others: list[Crossing], band: float) -> int:

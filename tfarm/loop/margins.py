@@ -80,9 +80,11 @@ class LoopMargins:
 @dataclass(frozen=True)
 @record
 class Margins(Generic[AnyLoop]):
-    """The verdict first.  `in_band` are the margins up to its band; `exact_delay`, `exact_disk` and `exact_peak` those
-    of the whole infinite-dimensional loop.  All four are None unless the loop is stable, and each exact one where at
-    C > 0 nothing bounds |L| beyond the band (the hub's inertia does, where it has some): not known then.
+    """The verdict first.  `windows` are those of each gain, or number of a law, by its name.
+
+    `in_band` are the margins up to the verdict's band; `exact_delay`, `exact_disk` and `exact_peak` those of the whole
+    infinite-dimensional loop.  All four are None unless the loop is stable, and each exact one where at C > 0 nothing
+    bounds |L| beyond the band (the hub's inertia does, where it has some): not known then.
     """
 
     stability: Stability[AnyLoop]

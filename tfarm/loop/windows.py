@@ -33,7 +33,8 @@ STATIC_AT = 1e-9  # of the lowest frequency: L there is that of an arm at rest
 @dataclass(frozen=True)
 @record
 class Windows:
-    """Stable windows of one gain: that around the point (None if it is not stable) and all in `looked_at`.
+    """Stable windows of one gain, or one number of a law: that around the point (None if it is not stable) and all in
+    `looked_at`.
 
     What an end of a window means says `end`: poles on the axis there ("edge"), an end of `looked_at`, up to which no
     limit was found and beyond which none was looked for ("search bound"), or infinity, which is a theorem ("no limit").

@@ -33,8 +33,9 @@ DELAY_UNDAMPED = (
     "disk margins are 0, and only a band gives them a size"
 )
 CAPTION_OF_WINDOWS = (
-    "The others held, each gain may move within its window before the first pole reaches the axis. Ends ±∞ are proven; "
-    "an end with a star is no edge: up to there none was found, and beyond none was looked for."
+    "The others held, each gain, or number of a law, may move within its window before the first pole reaches the "
+    "axis. Ends ±∞ are proven; an end with a star is no edge: up to there none was found, and beyond none was looked "
+    "for."
 )
 MARGIN_TITLES = {"disk": "disk margin α"}
 QUANTITIES = (

@@ -1,0 +1,91 @@
+"""How far each number of a law may go alone: against windows of gains, verdicts beside each end, and closed forms."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tfarm
+from tests.shell import run
+from tfarm import HubFeedback, Law
+from tfarm.loop.law_stability import law_stability
+from tfarm.loop.law_windows import law_windows
+
+LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
+LAW = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "tip_acceleration": ([0.05], [0.02, 1.0])}, delay=0.002)
+GAINS = HubFeedback(K1=0.3, K2=0.3, Kp=2.0)
+BESIDE, BESIDE_ZERO = 1e-7, 1e-3  # of a window: so far from its end a verdict is asked for; there a pole may be far out
+
+
+def test_of_gains_at_the_hub_they_are_the_windows_of_these():
+    """By the kernels of those, and along ranges of theirs: each end that is an edge of both."""
+    mine, theirs = law_windows(law_stability(LAB, Law.of_gains(GAINS))), tfarm.margins(LAB, GAINS).windows
+    edges = 0
+    for name, gain in (("hub_angle", "Kp"), ("hub_rate", "K1"), ("root_moment", "K2")):
+        for end, other in zip(mine[name].around, theirs[gain].around, strict=True):
+            if mine[name].end(end) == "edge":
+                assert end == pytest.approx(other, rel=1e-9, abs=1e-14)
+                edges += 1
+            else:
+                assert not theirs[gain].around[0] <= end <= theirs[gain].around[1] or abs(end) == 10 * GAINS[gain]
+    assert edges >= 3
+
+
+@pytest.mark.parametrize("law", [LAW, LAW.having("gain", 7.0)], ids=["stable", "unstable"])
+def test_verdicts_turn_at_each_end(law):
+    found = law_windows(law_stability(LAB, law))
+    assert found.keys() == law.numbers.keys()
+    edges = 0
+    for name, each in found.items():
+        for low, high in each.all:
+            for end, side in ((low, 1), (high, -1)):
+                inward = side * (BESIDE if end else BESIDE_ZERO) * (high - low)
+                assert law_stability(LAB, law.having(name, end + inward)).is_stable
+                if each.end(end) == "edge":
+                    edges += 1
+                    assert not law_stability(LAB, law.having(name, end - inward)).is_stable
+        is_inside = any(low < law.numbers[name] < high for low, high in each.all)
+        assert is_inside == (each.around is not None) == (law is LAW)
+    assert edges >= 8
+
+
+def test_a_spring_is_outweighed_by_a_law_as_stiff():
+    """2 N m/rad hold the hub: k + C(0) = 0, whatever else there is; and a filter turns over at T = 0."""
+    held = replace(LAB, hub=replace(LAB.hub, stiffness=2.0, friction=0.5))
+    found = law_windows(law_stability(held, Law({"hub_angle": ([0.5], [0.01, 0.25])})))
+    assert found["hub_angle.num.0"].around[0] == pytest.approx(-2.0 * 0.25, rel=1e-9)
+    assert found["gain"].around[0] == pytest.approx(-1.0, rel=1e-9)
+    assert found["hub_angle.den.0"].around[0] == 0.0
+
+
+def test_the_factor_on_the_law_is_its_gain_margin():
+    found = tfarm.margins(LAB, LAW)
+    assert found.windows["gain"].around == pytest.approx(found.in_band.gain, rel=1e-9)
+
+
+def test_where_poles_stay_on_the_axis_there_are_none():
+    assert tfarm.margins(BARE, LAW.having("delay", 0.0)).windows == {}
+    marginal = law_stability(LAB, Law({"tip_acceleration": 0.01, "root_moment": 0.1}))  # nothing holds angle or rate
+    assert marginal.verdict == "marginal"
+    assert law_windows(marginal) == {}
+
+
+def test_the_command_has_them(capsys, tmp_path):
+    text = "[law]\ndelay = 0.002\n[law.hub_angle]\nnum = [2.0, 1.0]\nden = [0.01, 1.0]\n"
+    (tmp_path / "law.toml").write_text(text)
+    law = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0])}, delay=0.002)
+    found = tfarm.margins(LAB, law).windows
+    words = ("margins", "sasaki2012-lab", "--law", str(tmp_path / "law.toml"))
+    code, out, err = run(capsys, *words, "--json")
+    assert (code, err) == (0, "")
+    answer = json.loads(out)
+    assert {row["number"]: row["interval"] for row in answer["windows"]} == {
+        name: list(each.around) for name, each in found.items()
+    }
+    assert {row["number"]: row["value"] for row in answer["windows"]} == law.numbers
+    assert answer["windows_note"].startswith("window ends are those of poles up to")
+    out = run(capsys, *words)[1]
+    assert f"(0, {found['hub_angle.den.0'].around[1]:.8g}*)" in out
+    assert out.count(answer["windows_note"]) == 1
+    assert np.isfinite(found["gain"].band)

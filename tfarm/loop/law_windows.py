@@ -1,0 +1,42 @@
+"""Stable windows of each number of a law, the others held: from the crossings along it and the count where it is.
+
+The characteristic function is linear in any one of them (`law_map`); a delay has its margin instead.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tfarm.crossing import intervals
+
+from .frequencies import grid
+from .law_loop import LawLoop
+from .law_map import law_crossings
+from .law_stability import band_for
+from .stability import Stability
+from .windows import BEYOND_LAW, Windows
+
+
+def law_windows(verdict: Stability[LawLoop]) -> dict[str, Windows]:
+    """The windows of each of `Law.numbers` between ten times what it is and minus that.  Raises what `law_map` raises.
+
+    None where a pole is on the axis for whatever numbers, and of an arm with elastic links, all of whose modes meet on
+    it.  All are of poles up to one band: as high as both ends of each range ask for, or that of a verdict beyond which
+    nothing is known.
+    """
+    loop, numbers = verdict.loop, verdict.loop.law.numbers
+    if verdict.verdict == "marginal" or loop.arm.has_elastic_link:
+        return {}
+    ranges = {name: (-BEYOND_LAW * abs(value), BEYOND_LAW * abs(value)) for name, value in numbers.items()}
+    band = verdict.band
+    if verdict.is_known_beyond:
+        ends = (loop.law.having(name, end) for name, pair in ranges.items() for end in pair)
+        band = max(band, *(band_for(loop.under(law)) for law in ends))
+    omega = np.asarray(grid(loop.arm, band))
+    known, windows = loop.signals.parts(1j * omega), {}
+    for name, (low, high) in ranges.items():
+        found, value = law_crossings(loop, name, np.array([low, high]), omega, known, band), numbers[name]
+        stable = intervals(found, low, high, value, verdict.unstable_roots)
+        around = next((pair for pair in stable if pair[0] < value < pair[1]), None) if verdict.is_stable else None
+        windows[name] = Windows(name, around, tuple(stable), (low, high), found.within(low, high), band)
+    return windows
