@@ -33,6 +33,14 @@ def test_a_study_is_its_tunings(lab):
     assert curve["median"][0] == sorted(each.costs[0] for each in results)[1]
 
 
+def test_learning_curves_have_their_median_and_quartiles(lab):
+    """Of five seeds the second, third and fourth; a run that ended early counts as inf from there on."""
+    (one,) = run_study(lab, plans_of("curves", replace(BASE, trials=1, guard="none"), 1))
+    five = [replace(one, costs=[cost, cost + 10.0]) for cost in (5.0, 1.0, 4.0, 2.0)]
+    curve = study_answer("curves", [*five, replace(one, costs=[3.0])], 5)
+    assert [curve[key] for key in ("lower_quartile", "median", "upper_quartile")] == [[2, 12], [3, 14], [4, 15]]
+
+
 def test_a_study_on_the_ground_of_a_tuning_is_the_same_and_finds_no_guard_again(lab, monkeypatch):
     plans = [*plans_of("curves", BASE, 2), *plans_of("curves", replace(BASE, guard="none"), 1)]
     alone, tuned, asked = run_study(lab, plans), tune(lab, BASE), []

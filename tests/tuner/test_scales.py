@@ -1,0 +1,53 @@
+"""What the tuner takes from the arm: ranges of converters, units of its cost, the arms it is tried on, its shapers."""
+
+import math
+
+import pytest
+
+import tfarm
+from tests.odd_arms import odd_arms
+from tfarm.dsp import Chain, sampled_loop
+from tfarm.spectrum.scales import default_gains
+from tfarm.tuner.comparison import quantised_chain, tried_loops
+from tfarm.tuner.overview import plan_of
+from tfarm.tuner.shaping import shaper
+
+ARMS = odd_arms()
+TURNING = [name for name, arm in ARMS.items() if arm.has_rigid_mode and arm.hub.inertia]
+
+
+@pytest.mark.parametrize("name", TURNING)
+def test_a_shaper_of_one_impulse_is_an_arm_without_a_mode_below_half_the_sample_rate(name):
+    """What the sentence about shaping rests on, by the poles of the loop itself."""
+    arm, chain = ARMS[name], Chain()
+    loop = sampled_loop(arm, default_gains(arm), chain, count=3)
+    seen = ((loop.plant.poles.imag > 0) & (loop.plant.poles.imag < math.pi / chain.sampling.period)).any()
+    assert (shaper(loop, "ZV").size == 1) == (not seen)
+
+
+@pytest.mark.parametrize("name", TURNING)
+def test_the_scales_of_the_tuner_are_the_arms_own(name):
+    """Ranges hold the slew's own torque, rigid moment and some more; payloads and dampings are shares of the arm's."""
+    arm, chain = ARMS[name], Chain()
+    torque = arm.total_inertia * chain.slew.acceleration(arm.link.length)
+    converters, plan = quantised_chain(arm, chain).converters, plan_of(arm, chain)
+    assert 2 * torque < converters.torque_range < 5 * torque
+    assert torque < converters.moment_range < 10 * torque
+    assert 2 < torque / plan.scale < 4.5  # one digit of a third: the paper's 3 N m over its 1 N m
+    assert (plan.cost.a * plan.scale**2, plan.cost.b * plan.scale**2) == pytest.approx((1.0, 2.6))
+    conditioned = {each.name: each.arm for each in tried_loops(arm, chain)}
+    loads = [each.payload.mass for key, each in conditioned.items() if key.startswith("payload")]
+    assert max(loads) <= 2 * (arm.payload.mass or arm.link.rhoA * arm.link.length)
+    shares = sorted(e.link.damping / arm.link.damping for key, e in conditioned.items() if key.startswith("C ="))
+    assert shares == pytest.approx([0.0, 0.1, 10.0])
+
+
+def test_the_papers_arm_keeps_the_papers():
+    lab = tfarm.load("sasaki2012-lab")
+    names = [each.name for each in tried_loops(lab, Chain())]
+    assert names[4:] == [
+        "payload 0.1 kg", "payload 0.25 kg", "payload 0.5 kg", "hub -20%", "hub +20%", "C = 0 s", "C = 1e-05 s",
+        "C = 0.001 s",
+    ]  # fmt: skip
+    converters = quantised_chain(lab, Chain()).converters
+    assert (converters.moment_range, converters.torque_range, plan_of(lab, Chain()).scale) == (20.0, 10.0, 1.0)
