@@ -382,7 +382,12 @@ def test_work_that_fails_leaves_nothing(tmp_path, monkeypatch):
         (folder / "half.svg").write_text("half")
         raise tfarm.ConvergenceError("stopped short", None, None)
 
+    def scripts(folder, _):
+        folder.mkdir()
+        (folder / "half.js").write_text("half")
+
     monkeypatch.setattr(making, "ARM_PIECES", ())
+    monkeypatch.setattr(making, "write_assets", scripts)
     monkeypatch.setattr(making, "save_card", fail)
     with pytest.raises(tfarm.ConvergenceError):
         write([ARM], tmp_path / "new" / "out")
