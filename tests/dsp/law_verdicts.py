@@ -1,10 +1,10 @@
 """Verdicts on random laws in z, by two other roads:  python -m tests.dsp.law_verdicts 500 [seed]
 
 Random arms (as in `tests.loop.arms`), periods of 0.02 to 1.5 over the first frequency, delays of up to three samples,
-one to three signals with ratios of polynomials in z, of order 8 in all at most, some of their poles outside the circle
-or at z = 1.  The verdict is held against the eigenvalues of a modal model of 40 modes, discretised with matrix
-exponentials and closed by hand, where its largest |ln z| is beyond 1e-9; and against a simulation of 20,000 samples
-after an impulse where that is beyond 1e-3.
+some with an anti-alias filter and some with a hub that the actuator damps; one to three signals with ratios of
+polynomials in z, of order 8 in all at most, some of their poles outside the circle or at z = 1.  The verdict is held
+against the eigenvalues of a modal model of 40 modes, discretised with matrix exponentials and closed by hand, where its
+largest |ln z| is beyond 1e-9; and against a simulation of 20,000 samples after an impulse where that is beyond 1e-3.
 """
 
 import os
@@ -22,9 +22,10 @@ from scipy.linalg import expm
 from tests.loop.arms import some_loop
 from tests.loop.law_counts import SIGNALS
 from tfarm.arm import Law
-from tfarm.dsp import Chain, Sampling, pulse_transfer, scenario
+from tfarm.dsp import Actuator, Chain, Sampling, pulse_transfer, scenario
 from tfarm.dsp.law_simulate import LawSimulator
 from tfarm.dsp.law_verdict import law_verdict
+from tfarm.dsp.plant import is_analog
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.reduced.sensed import sensed_model
 from tfarm.response.signals import Signals
@@ -42,7 +43,13 @@ def some_case(rng):
     period = float(10 ** rng.uniform(-1.7, 0.2)) / first_frequency(arm)
     delay = float(rng.choice([0.0, 0.0, 1.0, rng.uniform(0, 3)]))
     chain = Chain(sampling=Sampling(period=period, delay_samples=delay))
-    law = some_law(rng, arm, chain)
+    law, w1, analog = some_law(rng, arm, chain), first_frequency(arm), np.random.default_rng(rng.integers(2**32))
+    if analog.random() < 0.3:
+        corner = float(10 ** analog.uniform(-0.5, 1.5)) * w1
+        chain = replace(chain, sampling=replace(chain.sampling, antialias_corner=corner))
+    if analog.random() < 0.3 and arm.has_rigid_mode and not arm.has_massless_hub:
+        damping = float(10 ** analog.uniform(-3, 0)) * arm.total_inertia * w1
+        chain = replace(chain, actuator=Actuator(hub_damping=damping))
     return None if law is None else (arm, law, chain)
 
 
@@ -89,9 +96,25 @@ def roots(rng, count):
     return found
 
 
+def read_analog(arm, law, chain, count):
+    """A, B, C, D to what is sampled: the actuator's damping as friction of the hub, the anti-alias filter as states."""
+    damping, corner = chain.actuator.hub_damping, chain.sampling.antialias_corner
+    if damping:
+        arm = replace(arm, hub=replace(arm.hub, friction=arm.hub.friction + damping))
+    A, B, C, D = sensed_model(arm, law.signals, count)
+    rows = [n for n, each in enumerate(Signals(arm, law.signals).outputs) if is_analog(each, chain)]
+    if np.isinf(corner) or not rows:
+        return A, B, C, D
+    n, m = len(A), len(rows)
+    whole = np.block([[A, np.zeros((n, m))], [corner * C[rows], -corner * np.eye(m)]])
+    seen, through = np.hstack([C, np.zeros((len(C), m))]), D.copy()
+    seen[rows], through[rows] = np.eye(n + m)[n:], 0.0
+    return whole, np.vstack([B, corner * D[rows]]), seen, through
+
+
 def stepped(arm, law, chain, count=MODES):
     """The closed loop's matrix of a modal model: matrix exponentials, held inputs and the law's states."""
-    A, B, C, D = sensed_model(arm, law.signals, count)
+    A, B, C, D = read_analog(arm, law, chain, count)
     T, d = chain.sampling.period, chain.sampling.whole_delay
     f = chain.sampling.fraction
     n = len(A)
@@ -176,7 +199,15 @@ def main(size, seed):
         simulated += asked
         found[word.split(":")[0]] += 1
         if word.startswith(("wrong", "refused")):
-            print(number, case[0].damping, case[1].signals, case[2].sampling, word, flush=True)
+            print(
+                number,
+                case[0].damping,
+                case[1].signals,
+                case[2].sampling,
+                case[2].actuator.hub_damping,
+                word,
+                flush=True,
+            )
     print(dict(found), f"{simulated} simulated, {time.perf_counter() - start:.0f} s", flush=True)
     return found
 
