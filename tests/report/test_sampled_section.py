@@ -10,7 +10,7 @@ import pytest
 
 import tfarm
 from tfarm.arm import HubFeedback
-from tfarm.comparing.regions import CUT_RANGE, K2_RANGE, stable_regions
+from tfarm.comparing.regions import CUT_RANGE, K2_RANGE, regions_table, stable_regions
 from tfarm.crossing import pieces
 from tfarm.digits import kept_digits, scientific
 from tfarm.dsp import Chain, Simulator, analyse, sampled_loop, sampled_verdict, scenario, stable_windows
@@ -21,8 +21,8 @@ from tfarm.dsp.strip_chart import strip_chart
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import gain_windows
 from tfarm.plots.files import save_figure
+from tfarm.plots.regions import draw_overlay
 from tfarm.plots.strip import draw_strip_chart
-from tfarm.report.overlay import draw_overlay, overlay_table
 from tfarm.report.sampled_section import sampled_section
 from tfarm.report.sampled_tables import loci_table
 from tfarm.report.sampled_words import Sampled, against_continuous, cure, duration, interval_words, sampled_in_short
@@ -236,7 +236,7 @@ def test_the_same_bytes_twice(tmp_path, monkeypatch):
         figures = (draw_overlay(data), draw_strip_chart(strip_chart(LAB, GAINS, ideal.without, 14)))
         for i, figure in enumerate(figures):
             save_figure(figure, tmp_path / name, str(i), formats=("svg",))
-        table = as_csv(overlay_table(data, "t")) + as_json(loci_table(found, "t"))
+        table = as_csv(regions_table(data, "t")) + as_json(loci_table(found, "t"))
         (tmp_path / name / "t").write_text(table, encoding="utf-8")
     files = sorted(path.name for path in (tmp_path / "a").iterdir())
     assert files == ["0.svg", "1.svg", "t"]

@@ -12,8 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tfarm.arm import Arm, HubFeedback
+from tfarm.arm import PLANE, Arm, HubFeedback, shown_unit
 from tfarm.arrays import Complex, Real
+from tfarm.columns import Column, Table
 from tfarm.dsp import Chain, GainMap, sampled_map, sampled_verdict
 from tfarm.dsp.regions import ends_of_K1, rounded_map, with_both_sides, with_more
 from tfarm.errors import ConvergenceError
@@ -63,6 +64,23 @@ def stable_regions(arm: Arm, gains: HubFeedback, chain: Chain) -> StableRegions:
     planes = [rounded_map(sampled_map(loop, across, cut), drawn) for loop in loops]
     every = np.unique(np.concatenate([plane.axes[0] for plane in planes]))
     return StableRegions(region(arm, every, cut), tuple(with_more(plane, every) for plane in planes))
+
+
+def regions_table(data: StableRegions, stem: str) -> Table:
+    """The numbers of the picture: at each value of the gain across the ends of the stable intervals of the other."""
+    own = data.continuous.arm.damping
+    each = {"continuous_K2_intervals": data.continuous.stable_intervals}
+    for plane in data.sampled:
+        C = plane.loop.plant.arm.damping
+        each["sampled_K2_intervals" if own == C else f"sampled_at_C_{C:g}_s"] = plane.stable_intervals
+    columns = [
+        Column(key, key, of=[tuple(float(end) for window in column for end in window) for column in intervals])
+        for key, intervals in each.items()
+    ]
+    across, up = PLANE
+    values = Column(across, across, shown_unit(across, data.continuous.arm), of=data.continuous.axes[0])
+    title = f"Stable intervals of {up}, continuous and sampled"
+    return Table(stem=stem, title=title, columns=(values, *columns))
 
 
 @lru_cache(maxsize=8)

@@ -7,17 +7,19 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from tfarm.arm import PLANE
+from tfarm.comparing.regions import K2_RANGE, StableRegions
 from tfarm.crossing import pieces
 from tfarm.digits import plain, scientific
 from tfarm.dsp import GainMap
 from tfarm.loop.regions import Region
 
 from .plane import outline
-from .style import BLUE, GREY, INK, ORANGE, headline, must_be, style, window
+from .style import BLUE, GREY, INK, ORANGE, blank, headline, must_be, style, window
 from .words import LYAPUNOV, gains_words, name_axes
 
 SAND = "#f6dfcb"
@@ -58,6 +60,18 @@ def overlay(continuous: Region, sampled: GainMap | Sequence[GainMap], *, ax: Axe
         handles = [*keys, point]
         ax.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.0, -0.13), ncols=2, borderaxespad=0.0)
     return ax
+
+
+def draw_overlay(data: StableRegions) -> Figure:
+    """The picture of this tool: a continuous region and a sampled one on the same axes."""
+    with style():
+        figure = blank(9.0, 5.4)
+        unit = data.continuous.arm.input_per_torque
+        overlay(*data, ax=figure.subplots()).set_ylim(*(unit * end for end in K2_RANGE))
+        ms = plain(1e3 * data.sampled[0].loop.chain.sampling.period)
+        name = data.continuous.arm.name
+        headline(figure, f"{name}: gains that keep the loop stable, continuous and sampled every {ms} ms")
+    return figure
 
 
 def _scale(continuous: Region, ax: Axes) -> None:

@@ -10,8 +10,8 @@ from tfarm.digits import plain
 from tfarm.dsp import load_chain
 from tfarm.plots.files import save_figure
 from tfarm.plots.frequency import draw_compared
+from tfarm.plots.regions import draw_overlay
 from tfarm.plots.shapes import draw_shapes, shapes_of
-from tfarm.report.overlay import draw_overlay
 from tfarm.response.frequency import bode, resonant_band
 from tfarm.spectrum.scales import default_gains
 

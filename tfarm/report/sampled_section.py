@@ -8,6 +8,7 @@ import numpy as np
 
 from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, shown_unit
 from tfarm.columns import Column, Table
+from tfarm.comparing.regions import regions_table
 from tfarm.digits import how_many, plain, scientific, significant, singly
 from tfarm.dsp import Chain, sampled_verdict
 from tfarm.dsp.loci import STRONGER, sampled_loci
@@ -16,9 +17,9 @@ from tfarm.dsp.slews import Slews, slews
 from tfarm.dsp.strip_chart import StripChart, strip_chart
 from tfarm.plots.folded import draw_folded_loci
 from tfarm.plots.growth import draw_modes
+from tfarm.plots.regions import draw_overlay
 from tfarm.plots.strip import draw_strip_chart
 from tfarm.report.loop_laws import has_loop, why_no_loop
-from tfarm.report.overlay import draw_overlay, overlay_table
 from tfarm.report.sampled_tables import example_words, loci_table, mode_rows, strip_table
 from tfarm.report.sampled_words import (
     Sampled,
@@ -93,7 +94,7 @@ def _overlay_picture(data: Sampled) -> Picture:
             f"{interval_words(data.sampled_K2)}."
         ),
         figure=draw_overlay(regions),
-        data=overlay_table(regions, "sampled-overlay-data"),
+        data=regions_table(regions, "sampled-overlay-data"),
     )
 
 
