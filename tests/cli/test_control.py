@@ -61,6 +61,17 @@ def test_infinities_are_strings_and_what_has_no_margin_is_null(capsys) -> None:
     assert [driven[key] for key in ("K1_interval", "K2_interval", "delay_margin_s", "disk_margin")] == [None] * 4
 
 
+def test_what_a_passive_loop_has_at_every_frequency_is_at_none(capsys):
+    """With K2 = 0 the undamped hub is passive: no law of its kind has a smaller peak, and no frequency is named."""
+    _, out, _ = run(capsys, "margins", "sasaki2012", "--K2", "0")
+    rows = {
+        line.strip()[:16].strip(): line.split()[-3:] for line in out.splitlines() if "margin" in line or "peak" in line
+    }
+    assert rows["disk margin"] == ["2", "2", "-"]
+    assert rows["peak sensitivity"] == ["1", "1", "-"]
+    assert rows["phase margin [de"][-1] != "-"
+
+
 def test_the_map_counts_unstable_poles_over_its_grid(capsys, tmp_path) -> None:
     found = answer(capsys, "map", "sasaki2012", "--points", "4", "--K1", "-1,1", "--K2", "0,2")
     assert found["K1"] == [-0.75, -0.25, 0.25, 0.75]

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
 from tfarm.arm import ANGLE_GAIN, NAMES, PLANE
 from tfarm.columns import Column, Table
 from tfarm.digits import general, singly
-from tfarm.loop.answers import MARGIN_COLUMNS, POLE_COLUMNS, WINDOW_COLUMNS, gain_rows
+from tfarm.loop.answers import POLE_COLUMNS, WINDOW_COLUMNS, gain_rows, margin_rows
 from tfarm.loop.margins import Margins
 from tfarm.loop.windows import BEYOND_LAW
 from tfarm.tables.terminal import heading, show
@@ -55,25 +54,18 @@ def print_margins(found: Margins[Any], answer: dict[str, Any]) -> None:
         show(answer["windows"])
         print(f"each looked at up to {BEYOND_LAW:g} times its size, of either sign; * {ends}")
     if answer["in_band"] is not None:
-        _print_loop_margins(answer)
+        _print_loop_margins(found, answer)
     print(answer["sign_convention"])
 
 
-def _print_loop_margins(answer: dict[str, Any]) -> None:
-    band = answer["in_band"]
-    hidden = not answer["delay_margin_s"]  # what a delay takes away has no exact phase
-    sizes = ["not known" if (size := answer[each.key]) is None else f"{size:.6g}" for each in MARGIN_COLUMNS]
-    exact = ["" if hidden and each.unit == "deg" else size for each, size in zip(MARGIN_COLUMNS, sizes, strict=True)]
-    at = ["-" if math.isinf(band[each.key]) else f"{band['at_rad_s'][each.of]:.6g}" for each in MARGIN_COLUMNS]
+def _print_loop_margins(found: Margins[Any], answer: dict[str, Any]) -> None:
+    assert found.in_band is not None
+    rows, band, six = list(margin_rows(found, found.in_band)), answer["in_band"], singly(general, 6)
     columns = (
-        Column("margin", "margin", of=["gain (factors)", *map(heading, MARGIN_COLUMNS)]),
-        Column("exact", "exact", of=[_pair(answer["gain_margin"]), *exact]),
-        Column(
-            "band",
-            f"up to {band['band_rad_s']:.6g} rad/s",
-            of=["", *(f"{band[each.key]:.6g}" for each in MARGIN_COLUMNS)],
-        ),
-        Column("at", "at", "rad/s", of=["", *at]),
+        Column("margin", "margin", of=["gain (factors)", *(heading(row.column) for row in rows)]),
+        Column("exact", "exact", of=[_pair(answer["gain_margin"]), *(row.exact for row in rows)], digits=six),
+        Column("band", f"up to {band['band_rad_s']:.6g} rad/s", of=["", *(row.in_band for row in rows)], digits=six),
+        Column("at", "at", "rad/s", of=["", *("-" if row.at == "" else row.at for row in rows)], digits=six),
     )
     show(Table(columns=columns))
     for key, empty in (("gain_crossovers", "|L| = 1"), ("phase_crossovers", "L < 0")):

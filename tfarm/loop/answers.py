@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -73,6 +73,8 @@ def _joined(*pairs: Window) -> str:
 
 
 NOT_STABLE = "none: not stable"
+NOT_KNOWN = "not known"  # an exact margin, where nothing bounds L beyond the band
+UNLIMITED = {"disk": 2.0, "peak_sensitivity": 1.0}  # sizes of a passive loop, at no frequency of its own; else inf
 WINDOW_COLUMNS = (  # of `GainRow`; JSON has the gain's name before each key
     Column("gain", "gain", on=(TERMINAL, *REPORT)),
     Column("unit", "unit", on=REPORT),
@@ -262,6 +264,26 @@ def sizes_of(found: Margins[Any]) -> dict[str, tuple[float | None, float | None]
         exact["peak_complementary"] = found.exact_peak
     sizes = {column.of: None if limits is None else getattr(limits, column.of) for column in MARGIN_COLUMNS}
     return {column.key: (exact.get(column.of, sizes[column.of]), sizes[column.of]) for column in MARGIN_COLUMNS}
+
+
+class MarginRow(NamedTuple):
+    """One of `MARGIN_COLUMNS` of a loop: exact, in the band, and at which frequency [rad/s] there; else words."""
+
+    column: Column
+    exact: float | str
+    in_band: float
+    at: float | str
+
+
+def margin_rows(found: Margins[Any], limits: LoopMargins) -> Iterator[MarginRow]:
+    """A row a margin: not known where nothing bounds L, no exact phase where any delay destabilises."""
+    for column, (exact, size) in zip(MARGIN_COLUMNS, sizes_of(found).values(), strict=True):
+        assert size is not None
+        hidden = column.unit == "deg" and not found.exact_delay
+        known = "" if hidden else NOT_KNOWN if exact is None else exact
+        yield MarginRow(
+            column, known, size, "" if abs(size) == UNLIMITED.get(column.of, math.inf) else limits.at[column.of]
+        )
 
 
 CONTOUR_COLUMNS = (  # of pairs s, L on the contour of a `Nyquist`

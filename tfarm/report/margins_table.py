@@ -9,7 +9,7 @@ from typing import Any
 from tfarm.arm import MOMENT_GAIN
 from tfarm.columns import Column, Table
 from tfarm.digits import how_many, plain, significant, singly
-from tfarm.loop.answers import MARGIN_COLUMNS, NOT_STABLE, WINDOW_COLUMNS, gain_rows, sizes_of, unsettled
+from tfarm.loop.answers import MARGIN_COLUMNS, NOT_STABLE, WINDOW_COLUMNS, gain_rows, margin_rows, unsettled
 from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.law_stability import signs_of_loop
 from tfarm.loop.lyapunov import lyapunov
@@ -18,8 +18,6 @@ from tfarm.report.loop_laws import Named
 from tfarm.report.sections import Fact
 from tfarm.report.words import typeset
 
-NOT_KNOWN = "not known"  # an exact margin, where nothing bounds L beyond the band
-UNLIMITED = {"disk": 2.0, "peak_sensitivity": 1.0}  # sizes of a passive loop, at no frequency of its own; else inf
 MARGINS_CAPTION = (
     "Exact: of the infinite-dimensional loop; not known where nothing bounds L beyond the band. "
     "In the band: as far as the poles were computed{undamped}. Gain margin: "
@@ -112,11 +110,8 @@ def _rows(found: Margins) -> Iterator[MarginRow]:
         return
     yield "gain margin, down", "factor", band.gain[0], "", ""
     yield "gain margin, up", "factor", band.gain[1], "", ""
-    for column, (exact, size) in zip(MARGIN_COLUMNS, sizes_of(found).values(), strict=True):
-        assert size is not None
-        known = "" if column.unit == "deg" and not found.exact_delay else NOT_KNOWN if exact is None else exact
-        where = "" if abs(size) == UNLIMITED.get(column.of, math.inf) else band.at[column.of]
-        yield MARGIN_TITLES.get(column.of, column.title), column.unit, known, size, where
+    for name, row in zip(QUANTITIES[2:], margin_rows(found, band), strict=True):
+        yield name, row.column.unit, row.exact, row.in_band, row.at
 
 
 def window_table(laws: Sequence[Named], found: Sequence[Margins]) -> Table:
