@@ -18,7 +18,9 @@ from tfarm.loop.law_rounded import _with
 from tfarm.loop.nyquist import upper_contour
 from tfarm.loop.passivity import definite, polynomial, signs_of
 from tfarm.loop.plant import Loop
+from tfarm.loop.stability import stability
 from tfarm.loop.variation import Variation, free_of_loss
+from tfarm.loop.windows import gain_windows
 from tfarm.spectrum.continuation import Node
 
 LAB, MOTOR = tfarm.load("sasaki2012-lab"), tfarm.load("quanser-flexlink")
@@ -114,6 +116,18 @@ def test_crossings_of_branches_are_those_of_d_decomposition(arm, law, vary, star
         assert theirs.direction == mine.direction
     gains = [each.gain for each in without]
     assert gains == sorted(gains, reverse=turned)
+
+
+def test_where_no_branch_swings_crossings_of_others_are_told_up_to_the_first_mode():
+    """Of a rig whose first three branches are real at some gain: those of the windows of that gain."""
+    law = tfarm.default_gains(MOTOR)
+    found = tfarm.locus(MOTOR, law, "K2", -20.0, 10.0, branches=3, points=40)
+    assert (np.nanmax(found.branches.imag, axis=0) == 0).any()
+    first = tfarm.modes(MOTOR, 1).natural_frequency[-1]
+    edges = gain_windows(stability(MOTOR, law), "K2").crossings
+    expected = [(t, w) for t, w in zip(edges.gain, edges.at, strict=True) if -20 < t < 10 and w < first]
+    assert [(each.gain, each.omega) for each in found.crossings] == [pytest.approx(each, rel=1e-9) for each in expected]
+    assert len(expected) == 1
 
 
 def test_the_room_of_a_pole_ends_at_its_own_mirror_image():

@@ -11,6 +11,7 @@ import numpy as np
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError
 from tfarm.response.frequency import AXIS_SHARE
+from tfarm.spectrum.scales import first_frequency
 
 from .crossings import BranchCrossing
 from .lines import line_crossings
@@ -27,10 +28,11 @@ def with_others(
 ) -> tuple[BranchCrossing, ...]:
     """The crossings found on the branches, and those of poles on none, up to the frequency of the highest branch.
 
+    Where at some value none of them swings, up to the first flexible frequency.
     Raises ConvergenceError where a parameter of the arm varies and at one of a few values more poles are unstable than
     branches are.
     """
-    top = float(np.fmax.reduce(branches.imag, axis=0).min())
+    top = float(np.fmax.reduce(branches.imag, axis=0).min()) or first_frequency(variation.at(float(gain[0])).arm)
     if not variation.is_of_gains:
         for n in np.unique(np.linspace(0, gain.size - 1, LOOPS).round().astype(int)):
             here = branches[:, n]
