@@ -89,6 +89,19 @@ def test_a_branch_stays_with_its_zero_where_pairs_exchange_theirs():
     np.testing.assert_array_equal(third.slots, [[0, NOBODY], [2, 1], [4, 5], [6, 7]])
 
 
+def test_of_a_pair_that_meets_on_the_axis_both_are_listed_and_mirror_images_where_they_ring():
+    """To the last digit, and each a zero of the loop."""
+    found = tfarm.locus(LAB, HubFeedback(K1=0.3, Kp=0.5), "K1", 0.05, 4.0, points=30, branches=4)
+    lower = np.argwhere(found.branches.imag < 0)
+    assert lower.size
+    assert (found.branches.imag[np.unique(lower[:, 0])] == 0).any()
+    for row, column in lower:
+        pole = found.branches[row, column]
+        assert pole.conjugate() in found.branches[:, column]
+        at = Loop(LAB, found.law.having("K1", float(found.gain[column]))).member.function(np.array([pole]))
+        assert abs(at.value / at.slope)[0] < 1e-12 * abs(pole)
+
+
 # ------------------------------------------------------------ crossings
 
 

@@ -164,7 +164,7 @@ def _followed(variation: Variation, start: float, stop: float, wanted: int, numb
     """
     arm, law = variation.at(start).arm, variation.at(start).law
     zeros, lowest = open_pairs(arm, number, wanted)
-    wanted += len(single_zeros(modes(arm, 1), 1.0))  # which stand before the flexible modes
+    wanted += len(single_zeros(modes(arm, 1)))  # which stand before the flexible modes
     if any(law.row):
         try:
             zeros = Stage(Variation(arm, law, "all"), 0.0, 1.0, lowest).follow(zeros, wanted)[-1].zeros
@@ -189,7 +189,7 @@ def open_pairs(arm: Arm, number: int, wanted: int) -> tuple[Complex, float]:
     omega = table.natural_frequency[table.index > 0]
     zeros, lowest = np.stack([1j * omega, -1j * omega], axis=1), float(omega[0])
     if arm.is_undamped:
-        return np.concatenate([_alone(single_zeros(table, 1.0)), zeros]), lowest
+        return np.concatenate([_alone(single_zeros(table)), zeros]), lowest
     if not arm.is_uniform:
         found = damped_modes(modes(arm, number))
         turning = found.eigenvalues[(found.index == 0) & (found.eigenvalues[:, 1] != 0)]

@@ -199,7 +199,7 @@ def _poles_and_residues(
             powers = np.array([[each.power] for each in wanted])
             upper = undamped_residues(table, wanted, k, share) * s**powers / (2 * s)
             return p, np.stack([upper, upper.conj()], axis=2), *none
-        single = np.array(single_zeros(table, 1.0))  # of the motor's circuit
+        single = np.array(single_zeros(table))  # of the motor's circuit
     else:
         damped = branches(table)
         p, single = damped.eigenvalues[table.index > 0], damped.single

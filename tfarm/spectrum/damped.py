@@ -227,7 +227,7 @@ class Branches:
     def __call__(self, undamped: Modes) -> DampedModes:
         """The modes with the C of this table's arm.  Raises ConvergenceError as `all_damped_modes` does."""
         k = undamped.system
-        flexible, alone = int((undamped.index > 0).sum()), len(single_zeros(undamped, 1.0))
+        flexible, alone = int((undamped.index > 0).sum()), len(single_zeros(undamped))
         zeros = self._followed(undamped, flexible + alone)
         listed, company = zeros[: flexible + alone], zeros[flexible + alone :]
         box, count = complete_box(member(k).function, listed, company, k.damping)
@@ -271,8 +271,8 @@ def level_of(k: System) -> float:
     return 0.0 if k.is_undamped else k.damping or 1.0
 
 
-def single_zeros(undamped: Modes, share: float) -> list[float]:
-    """Real eigenvalues [1/s] that no flexible mode goes over into, under little of the damping: -b/J, and -R/L_a."""
+def single_zeros(undamped: Modes, share: float = 1.0) -> list[float]:
+    """Real eigenvalues [1/s] that no flexible mode goes over into, under a share of the damping: -b/J, and -R/L_a."""
     k = undamped.system
     if isinstance(k, Coefficients):
         return []
@@ -283,7 +283,7 @@ def single_zeros(undamped: Modes, share: float) -> list[float]:
 
 def _first_node(undamped: Modes, count: int, level: float) -> Node:
     """Where the way begins: at no damping, or at so little that what friction makes of the zeros at 0 is apart."""
-    alone = single_zeros(undamped, 1.0)
+    alone = single_zeros(undamped)
     more = modes(undamped.arm, count - len(alone), theory=undamped.theory)
     omega = more.natural_frequency[more.index > 0]
     node = Node(0.0, np.stack([1j * omega, -1j * omega], 1))
