@@ -32,7 +32,6 @@ from .lines import ascending, through_infinity, through_origin
 MOST_MAP_VALUES = 400  # along one number: each column is a line of crossings of its own
 NEAR_ORIGIN = (1e-6, 5e-7)  # of the lowest frequency: where a real pole is looked for on its way through 0
 FAR_RIGHT = (1e5, 1e6, 1e7)  # of w1: where one is looked for on its way through infinity
-SAME_VALUE = 1e-9  # of the range: values nearer to each other are one
 ROUNDED = 4 * float(np.finfo(float).eps)  # of the range: a value so small is 0
 ORDER_READ_AT = (2e-3, 1e-3)  # of w1: where the order of a zero at s = 0 is read off
 SIMPLE = 3.0  # ratio of values at the first and the second: 2 of a simple zero, 4 of a double one
@@ -159,10 +158,10 @@ def law_crossings(loop: LawLoop, name: str, values: Real, omega: Real, known: Lo
 def _change_at(loop: LawLoop, name: str, low: float, span: float, t: float, others: list[Crossing], band: float) -> int:
     """By how much the count grows at t where two poles meet at s = 0, from counts on either side.
 
-    Without losses every mode may be on the axis at that value: what these crossings change is not counted again.
+    Without losses modes may cross at that value, but for rounding: it is no place to count at, and is refused.
     """
     at = low + span * t
-    away = [(abs(each.t - at), each.change) for each in others]
-    step = min([BESIDE_MEETING * span, *(each / 2 for each, _ in away if each > SAME_VALUE * span)])
+    away = [abs(each.t - at) for each in others if each.t != at]
+    step = min([BESIDE_MEETING * span, *(each / 2 for each in away)])
     below, above = (unstable_below(loop.under(loop.law.having(name, at + side * step)), band) for side in (-1, 1))
-    return above - below - sum(change for each, change in away if each < step)
+    return above - below
