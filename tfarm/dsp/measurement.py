@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from tfarm.arm import HubFeedback
+from tfarm.arm import ANGLE_GAIN, RATE_GAIN, HubFeedback
 from tfarm.errors import ParameterError
 
 
@@ -35,10 +35,11 @@ class Measurement(NamedTuple):
             name = law.elsewhere[0].name
             remedy = "a controller of samples has hub angle, hub rate and root moment alone; set it to 0"
             raise ParameterError(key=name, value=law[name], remedy=remedy)
-        return law.Kp * (self.angle_reference - self.hub_angle) + law.K1 * (self.rate_reference - self.hub_rate)
+        angle_off, rate_off = self.angle_reference - self.hub_angle, self.rate_reference - self.hub_rate
+        return law[ANGLE_GAIN] * angle_off + law[RATE_GAIN] * rate_off
 
     def asked(self, law: HubFeedback, moment_gain: float) -> float:
-        """u = r + Kp (theta_ref - theta) + K1 (theta_t_ref - theta_t) - K2 x, K2 being `moment_gain` at this sample."""
+        """What is fed forward, what the servo asks, less `moment_gain`, the gain at this sample, times the vibration."""
         return self.feedforward + self.servo(law) - moment_gain * self.vibration
 
 
