@@ -39,7 +39,7 @@ class Measurement(NamedTuple):
         return law[ANGLE_GAIN] * angle_off + law[RATE_GAIN] * rate_off
 
     def asked(self, law: HubFeedback, moment_gain: float) -> float:
-        """What is fed forward, what the servo asks, less `moment_gain`, the gain at this sample, times the vibration."""
+        """What is fed forward and what the servo asks, less the gain at this sample times the vibration."""
         return self.feedforward + self.servo(law) - moment_gain * self.vibration
 
 

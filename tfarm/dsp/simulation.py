@@ -61,10 +61,11 @@ class Stop:
 class Simulation:
     """A simulated loop: `at_samples` just before each update, `between` the records asked for between the samples.
 
-    `torque` [N m] is what leaves the DAC at each sample, `gain` that on the root moment there (None where a controller does not
-    say), `measured` (n, 3) what the analog filters pass of hub angle, hub rate and root moment.  `saturated_at` (n, 3)
-    says at which samples the encoder, the strain amplifier and the torque were clipped.  `energy_error` is |energy
-    gained - work done| over the energy that went to and fro, for an arm without damping; None with damping.
+    `torque` [N m] is what leaves the DAC at each sample, `gain` that on the root moment there (None where a controller
+    does not say), `measured` (n, 3) what the analog filters pass of hub angle, hub rate and root moment.
+    `saturated_at` (n, 3) says at which samples the encoder, the strain amplifier and the torque were clipped.
+    `energy_error` is |energy gained - work done| over the energy that went to and fro, for an arm without damping; None
+    with damping.
     """
 
     scenario: Scenario
