@@ -12,6 +12,7 @@ from tests.loop.arms import window_arm
 from tests.similar import EITHER
 from tfarm import HubFeedback, Law
 from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.loop import panels
 from tfarm.loop.answers import nyquist_answer, nyquist_table, poles_answer
 from tfarm.loop.branches import open_pairs
 from tfarm.loop.crossings import BranchCrossing, in_words
@@ -146,17 +147,25 @@ def test_what_a_locus_of_a_damped_rig_begins_with():
 
 
 def test_a_panel_that_its_polynomials_miss_is_halved(monkeypatch):
-    """Until they do not; the panels still meet, and the first is on both sides of 0."""
-    monkeypatch.setattr("tfarm.loop.panels.STEEP_A_PANEL", 200)  # all in one panel, to begin with
-    band = 8192.0
+    """Until they do not; the panels still meet, the first on both sides of 0, and each is a half, a quarter, ..."""
+    band, wide = 1024.0, np.r_[0.0, loop_panels(LAB, 1024.0).high]
+    panel = panels._panel
+
+    def missing(arm, low, high):
+        values, error = panel(arm, low, high)
+        return values, error if high - low < 70.0 else 1.0
+
+    monkeypatch.setattr(panels, "_panel", missing)
     halved = loop_panels(LAB, band)
     assert halved.error <= 1e-11
-    assert len(halved.low) > 2
     assert (halved.low[0], halved.high[-1]) == (-halved.high[0], band)
     np.testing.assert_array_equal(halved.low[1:], halved.high[:-1])
-    widths = np.r_[halved.high[0], np.diff(halved.high)]
-    np.testing.assert_array_equal(np.log2(widths) % 1, 0.0)
-    monkeypatch.setattr("tfarm.loop.panels.MOST_PANELS", 3)
+    edges = np.r_[0.0, halved.high]
+    powers = np.log2(np.diff(wide)[np.searchsorted(wide, edges[1:] - 1e-9) - 1] / np.diff(edges))
+    np.testing.assert_allclose(powers, np.round(powers), atol=1e-9)
+    assert (np.diff(edges) < 70.0).all()
+    assert (np.histogram(halved.high - 1e-9, wide)[0] > 1).sum() > 2
+    monkeypatch.setattr(panels, "MOST_PANELS", 3)
     with pytest.raises(ConvergenceError, match="do not follow"):
         loop_panels(LAB, band)
 
