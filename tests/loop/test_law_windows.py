@@ -8,7 +8,9 @@ import pytest
 
 import tfarm
 from tests.shell import run
-from tfarm import HubFeedback, Law
+from tfarm import ConvergenceError, HubFeedback, Law
+from tfarm.loop import law_windows as law_windows_module
+from tfarm.loop.answers import unsettled
 from tfarm.loop.law_stability import law_stability
 from tfarm.loop.law_windows import law_windows
 
@@ -69,6 +71,20 @@ def test_where_poles_stay_on_the_axis_there_are_none():
     marginal = law_stability(LAB, Law({"tip_acceleration": 0.01, "root_moment": 0.1}))  # nothing holds angle or rate
     assert marginal.verdict == "marginal"
     assert law_windows(marginal) == {}
+
+
+def test_a_number_whose_poles_cannot_be_counted_is_named(monkeypatch):
+    crossings = law_windows_module.law_crossings
+
+    def lost(loop, name, *others):
+        if name == "hub_angle.num.1":
+            raise ConvergenceError("a zero lies on the contour", 0.0, 0.0)
+        return crossings(loop, name, *others)
+
+    monkeypatch.setattr(law_windows_module, "law_crossings", lost)
+    found = tfarm.margins(LAB, LAW)
+    assert LAW.numbers.keys() - found.windows.keys() == {"hub_angle.num.1"}
+    assert unsettled(found).endswith("of hub_angle.num.1 poles could not be counted")
 
 
 def test_the_command_has_them(capsys, tmp_path):

@@ -252,8 +252,11 @@ def unsettled(found: Margins[Any]) -> str:
 
     A theorem on the sign of a law, or small gain, tells nothing of the law with another number in it.
     """
-    is_of_law = isinstance(found.stability.loop, LawLoop)
-    return reach_words(found.windows.values()) if is_of_law or not found.stability.is_known_beyond else ""
+    loop, words = found.stability.loop, reach_words(found.windows.values())
+    if not isinstance(loop, LawLoop):
+        return "" if found.stability.is_known_beyond else words
+    uncounted = [name for name in loop.law.numbers if found.windows and name not in found.windows]
+    return words + (f"; of {', '.join(uncounted)} poles could not be counted" if uncounted else "")
 
 
 def sizes_of(found: Margins[Any]) -> dict[str, tuple[float | None, float | None]]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from tfarm.crossing import intervals
+from tfarm.errors import ConvergenceError
 
 from .frequencies import grid
 from .law_loop import LawLoop
@@ -18,11 +19,11 @@ from .windows import BEYOND_LAW, Windows
 
 
 def law_windows(verdict: Stability[LawLoop]) -> dict[str, Windows]:
-    """The windows of each of `Law.numbers` between ten times what it is and minus that.  Raises what `law_map` raises.
+    """The windows of each of `Law.numbers` between ten times what it is and minus that.
 
-    None where a pole is on the axis for whatever numbers, and of an arm with elastic links, all of whose modes meet on
-    it.  All are of poles up to one band: as high as both ends of each range ask for, or that of a verdict beyond which
-    nothing is known.
+    None where a pole is on the axis for whatever numbers, of an arm with elastic links, all of whose modes meet on it,
+    and of a number along which poles meet at s = 0 and cannot be counted.  All are of poles up to one band: as high as
+    both ends of each range ask for, or that of a verdict beyond which nothing is known.
     """
     loop, numbers = verdict.loop, verdict.loop.law.numbers
     if verdict.verdict == "marginal" or loop.arm.has_elastic_link:
@@ -35,7 +36,10 @@ def law_windows(verdict: Stability[LawLoop]) -> dict[str, Windows]:
     omega = np.asarray(grid(loop.arm, band))
     known, windows = loop.signals.parts(1j * omega), {}
     for name, (low, high) in ranges.items():
-        found, value = law_crossings(loop, name, np.array([low, high]), omega, known, band), numbers[name]
+        try:
+            found, value = law_crossings(loop, name, np.array([low, high]), omega, known, band), numbers[name]
+        except ConvergenceError:  # `answers.unsettled` names it
+            continue
         stable = intervals(found, low, high, value, verdict.unstable_roots)
         around = next((pair for pair in stable if pair[0] < value < pair[1]), None) if verdict.is_stable else None
         windows[name] = Windows(name, around, tuple(stable), (low, high), found.within(low, high), band)
