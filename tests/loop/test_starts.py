@@ -161,6 +161,18 @@ def test_a_hub_without_inertia_has_no_window_of_the_moment():
     assert (found.around, found.all, found.looked_at, len(found.crossings)) == (None, (), (0.0, 0.0), 0)
 
 
+@pytest.mark.parametrize("friction", [0.0, 0.02])
+def test_a_hub_without_inertia_is_stable_from_where_it_loses_something_on(friction):
+    """The law is in its window, whose lower end is where K1 takes back what the hub loses: a pole passes infinity."""
+    pin = replace(LAB, hub=replace(LAB.hub, inertia=0.0, friction=friction))
+    for K1 in (0.3, -0.5 * friction) if friction else (0.3,):
+        verdict = stability(pin, HubFeedback(K1=K1))
+        assert verdict.is_stable
+        low, high = gain_windows(verdict, "K1").around
+        assert low == pytest.approx(-friction, abs=1e-12)
+        assert low < K1 < high
+
+
 # ------------------------------------------------------------ the function of a law
 
 
