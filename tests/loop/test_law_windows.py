@@ -73,6 +73,15 @@ def test_where_poles_stay_on_the_axis_there_are_none():
     assert law_windows(marginal) == {}
 
 
+@pytest.mark.parametrize("delay", [1e-3, 0.02])
+def test_a_law_that_differentiates_may_be_late(delay):
+    """PD with a delay is that with a filter as fast as none: the same verdict, and poles as near."""
+    plain, filtered = (Law({"hub_angle": ([0.3, 2.0], den)}, delay=delay) for den in ([1.0], [1e-9, 1.0]))
+    mine, theirs = (law_stability(LAB, law, 500.0) for law in (plain, filtered))
+    assert mine.verdict == theirs.verdict
+    np.testing.assert_allclose(mine.poles.values, theirs.poles.values, rtol=1e-5)
+
+
 def test_a_number_whose_poles_cannot_be_counted_is_named(monkeypatch):
     crossings = law_windows_module.law_crossings
 

@@ -143,9 +143,11 @@ class LawLoop:
         """Refuse a law that asks for more than the rig gives at once: then its loop is algebraic."""
         if not self.law.is_improper:
             return
-        far = first_frequency(self.arm) * np.array(FAR_RIGHT)
+        far = first_frequency(self.arm) * np.array(FAR_RIGHT) + 0j
+        drive, numerators, _ = self.signals.parts(far)
+        entries, whole = self.law.polynomials(far)
         with np.errstate(all="ignore"):
-            size = abs(self.loop_function(far.astype(complex)) * np.exp(far * self.law.delay))
+            size = abs((entries * numerators).sum(axis=0) / (drive * whole))  # L without its delay
         if not (np.isfinite(size).all() and (size[1:] < FALL_FACTOR * size[:-1]).all()):
             worst = next(p for p in self.law.parts if p.block.excess > 0)
             remedy = (
