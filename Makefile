@@ -28,6 +28,7 @@ SURVEYS := \
 	loop.agreement \
 	loop.loci \
 	loop.law_counts \
+	loop.number_windows \
 	synthesis.designs \
 	synthesis.held_designs \
 	loop.nyquist_counts \

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import tfarm
+from tests.loop import number_windows
 from tests.shell import run
 from tfarm import ConvergenceError, HubFeedback, Law
 from tfarm.loop import law_windows as law_windows_module
@@ -114,3 +115,10 @@ def test_the_command_has_them(capsys, tmp_path):
     assert f"(0, {found['hub_angle.den.0'].around[1]:.8g}*)" in out
     assert out.count(answer["windows_note"]) == 1
     assert np.isfinite(found["gain"].band)
+
+
+def test_random_laws_agree_with_their_verdicts():
+    """A small case of the survey (`make survey SURVEYS=loop.number_windows`)."""
+    found = number_windows.main(6, 5)
+    assert found["wrong"] == 0
+    assert found["right"] >= 5

@@ -342,3 +342,13 @@ def test_a_lead_on_the_rate_is_passive_until_its_delay_of_phase_is_more_than_a_q
     for a, is_passive in ((6.9, True), (7.1, False)):
         real, _ = on_axis(polynomial([1.0, a]), polynomial([1.0, 7.0, 12.0]))
         assert (definite(real) == "above") == is_passive
+
+
+@pytest.mark.parametrize("rest", [1e-4, 1e-7, 1e-9, -1e-7, -1e-9])
+def test_however_slow_a_law_s_corner_is_its_slow_pole_is_on_its_own_side(rest):
+    """s + rest on the angle and 0.3 s on top: the pole at rest is at -rest/1.3, never taken for one at 0 itself."""
+    law = Law({"hub_angle": ([1.0, rest], [0.1, 1.0]), "hub_rate": 0.3})
+    found = law_stability(tfarm.load("sasaki2012-lab"), law)
+    slowest = found.poles.values[abs(found.poles.values).argmin()]
+    assert slowest == pytest.approx(-rest / 1.3, rel=1e-3)
+    assert (found.verdict, found.unstable_roots) == (("stable", 0) if rest > 0 else ("unstable", 1))

@@ -24,6 +24,7 @@ Matrices = tuple[Real, Real, Real, Real]
 
 LARGEST_COEFFICIENT = 1e150  # the square of one is still a double
 MOST_DEGREE = 60  # of one part: beyond it a polynomial of doubles says little
+GROWTH_READ_AT = (1e-6, 1e-9)  # 1/s: the numerator of a state space grows there with the power of its lowest term
 REAL_PAIR = 1e-9  # of its size: how far a root may be from the conjugate of another
 
 
@@ -79,6 +80,11 @@ class Rational:
     def numerators(self, s: Complex) -> Complex:
         """num(s) (1, n)."""
         return np.asarray(np.polyval(np.array(self.num), s))[None]
+
+    def zeros_at_origin(self, signal: int) -> int | None:
+        """How often the numerator of its one signal vanishes at 0; None where it is 0 everywhere."""
+        assert signal == 0
+        return next((n for n, each in enumerate(reversed(self.num)) if each), None)
 
     def times(self, factor: float) -> Rational:
         """Itself times a number."""
@@ -160,6 +166,16 @@ class StateSpace:
             bordered[:, :n, n], bordered[:, n, n] = self.B[:, j], self.D[0, j]
             found[j] = np.linalg.det(bordered).reshape(np.shape(s))
         return found
+
+    def zeros_at_origin(self, signal: int) -> int | None:
+        """How often the numerator of a signal vanishes at 0, told from its growth between two tiny arguments.
+
+        None where it is 0 at one of them.
+        """
+        first, second = abs(self.numerators(np.array(GROWTH_READ_AT, dtype=complex))[signal])
+        if not (first and second):
+            return None
+        return max(0, round(math.log(first / second) / math.log(GROWTH_READ_AT[0] / GROWTH_READ_AT[1])))
 
     def times(self, factor: float) -> StateSpace:
         """Itself times a number."""

@@ -29,7 +29,6 @@ UNDISPERSED = 1e11  # of w1: where waves are no longer dispersed
 NEAREST_TO_ORIGIN = 1e-12  # of w1: where the function, its zeros at 0 divided out, is taken for its value at 0
 FALL_FACTOR = 0.5  # L must fall by this there, from one to the next
 ALMOST_ZERO = 1e-200  # 1/s: where it is seen whether a signal is fed back at all, also by a law that vanishes at rest
-GROWTH_READ_AT = (1e-6, 1e-9)  # 1/s: a polynomial grows there with the power of its lowest term
 NO_ORDER = 99  # of a zero at s = 0, of what is not fed back: above that of any part
 
 
@@ -91,18 +90,13 @@ class LawLoop:
         return min(terms)
 
     def _order_of(self, row: int) -> int:
-        """How often p_i vanishes at s = 0: those zeros of its parts, and integrators of the others.
-
-        A part's own are told from the growth of its polynomial between two tiny arguments.
-        """
-        name, orders, at = self.law.signals[row], [], np.array(GROWTH_READ_AT, dtype=complex)
-        grows = np.log(GROWTH_READ_AT[0] / GROWTH_READ_AT[1])
+        """How often p_i vanishes at s = 0: those zeros of its parts, and integrators of the others."""
+        name, orders = self.law.signals[row], []
         for n, part in enumerate(self.law.parts):
             if name in part.signals:
                 others = sum(int((each.block.poles == 0).sum()) for m, each in enumerate(self.law.parts) if m != n)
-                values = abs(part.block.numerators(at)[part.signals.index(name)])
-                own = max(0, round(float(np.log(values[0] / values[1]) / grows))) if values.all() else NO_ORDER
-                orders.append(others + own)
+                own = part.block.zeros_at_origin(part.signals.index(name))
+                orders.append(NO_ORDER if own is None else others + own)
         return min(orders)
 
     def function(self, s: Complex) -> Analytic:
