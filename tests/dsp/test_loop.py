@@ -194,3 +194,14 @@ def test_a_hub_that_cannot_drift_has_the_poles_of_its_modes_alone():
     left = sorted(whole, key=lambda z: abs(kept - z).min())[len(kept) :]
     np.testing.assert_allclose(left, 1.0, atol=1e-6)
     assert max(abs(kept - z).min() for z in sorted(whole, key=lambda z: abs(kept - z).min())[: len(kept)]) < 1e-6
+
+
+@pytest.mark.parametrize("period", [0.003, 0.01, 0.04])
+def test_each_mode_is_seen_where_its_samples_turn(lossless, period):
+    """cos(w T) is all that samples know of a mode: it is seen at arccos of it over T, folded as its band says."""
+    table = mode_table(sampled_loop(lossless, HubFeedback(K1=0.1), Chain(sampling=Sampling(period=period)), count=8))
+    turned = table.natural_frequency * period
+    np.testing.assert_allclose(table.aliased, np.arccos(np.cos(turned)) / period, rtol=1e-6)
+    folded = np.where(table.band % 2 == 0, table.aliased * period, np.pi - table.aliased * period)
+    np.testing.assert_allclose(turned, table.band * np.pi + folded, rtol=1e-9)
+    assert table.band.max() > 1

@@ -30,7 +30,7 @@ from tfarm.dsp.results import (
     settling_time,
     simulated_answer,
 )
-from tfarm.dsp.scenarios import SCENARIOS
+from tfarm.dsp.scenarios import SCENARIOS, described
 from tfarm.errors import ParameterError
 from tfarm.reduced import modal_model
 
@@ -384,3 +384,33 @@ def test_the_change_of_a_trace_is_relative_to_each_signal_and_of_the_samples_tha
     assert change(other, trace) == pytest.approx(0.03, rel=1e-12)
     shorter = type(trace)(trace.t[:-7], *(trace.signal(name)[:-7] for name in trace.names))
     assert change(shorter, trace) == change(trace, shorter) == 0.0
+
+
+def test_what_an_ideal_chain_leaves_decides_while_signals_are_clipped(lab):
+    """A steady ringing that is clipped: kept up where the ideal loop grows, if not beyond bounds, and not where it has
+    died down to no less than half of it; an ideal loop that has died down further tells it either way."""
+    chain = Chain(actuator=Actuator(torque_limit=3.0))
+    run = simulator(lab, "impulse", 4.0, chain).linear(GAINS)
+
+    def ringing(size, growth, clipped=False):
+        signals = replace(run.at_samples, root_moment=size * np.exp(growth * run.t) * np.sin(30 * run.t))
+        return replace(run, at_samples=signals, saturated_at=np.full_like(run.saturated_at, clipped))
+
+    steady = ringing(1.0, 0.0, clipped=True)
+    assert limit_cycle(steady, ringing(1.0, 0.5)).kept_up_by == "saturation"
+    assert limit_cycle(steady, ringing(1.0, -0.1)) is None
+    assert limit_cycle(steady, ringing(1.0, -1.0)) is not None
+    assert limit_cycle(steady, ringing(1.0, 0.0)) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("slew", "a slew: the tip moves 1.15 m in 1 s"),
+        ("step", "a step of "),
+        ("decay", "the first mode released with the tip at 0.01 m"),
+        ("impulse", "an impulse of "),
+    ],
+)
+def test_a_scenario_is_said_in_words(lab, name, words):
+    assert described(scenario(name, lab, Chain(), 1.0), lab, Chain()).startswith(words)

@@ -26,6 +26,7 @@ from tfarm.exact.outputs import OUTPUTS
 SETTLED_SHARE = 0.05  # of the largest root moment, within which a slew has settled
 CYCLE_LASTS = 0.7  # a limit cycle keeps at least this much of its amplitude over a quarter of the record
 BEYOND_IDEAL = 2.0  # and is this much larger than what an ideal chain leaves at that time
+GROWS = 1.02  # in a quarter of the record, of an ideal loop that runs away: less may be how samples fall on its peaks
 FEWEST_TURNS = 1.0  # of the moment about its mean in a quarter of the record: fewer are a drift and no vibration
 FEWEST_SAMPLES = 40  # samples without which a limit cycle cannot be told
 
@@ -105,7 +106,7 @@ def limit_cycle(simulation: Simulation, ideal: Simulation) -> LimitCycle | None:
     is_clipped = bool(simulation.saturated_at[last].any())
     if size == 0.0 or size < CYCLE_LASTS * earlier or (is_clipped and earlier < CYCLE_LASTS * size):
         return None
-    runs_away = ideal.stopped is not None or _left(ideal, last) > _left(ideal, before)
+    runs_away = ideal.stopped is not None or _left(ideal, last) > GROWS * _left(ideal, before)
     if not (is_clipped and runs_away) and size <= BEYOND_IDEAL * _left(ideal, last):
         return None
     about = moment[last] - moment[last].mean()
