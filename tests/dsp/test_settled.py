@@ -32,7 +32,8 @@ from tfarm.dsp.shown import Edge, shown_windows
 from tfarm.dsp.verdict import settled_verdict
 from tfarm.errors import ConvergenceError
 from tfarm.spectrum import continuation, damped, modes
-from tfarm.spectrum.damped import TOWARD_SINGULAR, damped_modes
+from tfarm.spectrum.complete_box import TOWARD_SINGULAR
+from tfarm.spectrum.damped import damped_modes
 
 
 def arm_of(link, inertia, damping, **section):

@@ -111,3 +111,11 @@ def test_the_command_writes_what_the_map_says(capsys, tmp_path):
     )
     assert (tmp_path / "m.csv").read_text().splitlines()[0] == "gain,delay,unstable_roots"
     assert run(capsys, "map", "sasaki2012-lab", "--law", str(tmp_path / "law.toml"), "--vary", "gain=0,9")[0] == 2
+
+
+def test_a_map_around_a_law_s_own_resonance_counts_as_the_verdict_does():
+    """Two zeros close to each other turn the phase once around between two points of a contour of even steps."""
+    law = Law({"hub_angle": 1.0, "hub_rate": 0.3, "tip_deflection": ([-100.0], [1.0, 2 * 0.02 * 39.487, 39.487**2])})
+    lab, values = tfarm.load("sasaki2012-lab"), np.linspace(0.9, 1.1, 3)
+    assert law_stability(lab, law).is_stable
+    assert law_map(lab, law, ("hub_angle", "tip_deflection.num.0"), values, values).stable.all()

@@ -11,9 +11,10 @@ from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import Analytic
 from tfarm.spectrum import box as box_module
 from tfarm.spectrum.box import Box, winding_number, zeros_in_box
+from tfarm.spectrum.complete_box import complete_box
 from tfarm.spectrum.continuation import Node, follow, predicted
 from tfarm.spectrum.correction import Member, improved
-from tfarm.spectrum.damped import complete_box, damped_modes, member
+from tfarm.spectrum.damped import damped_modes, member
 
 
 def with_zeros(zeros, turning=0.0):

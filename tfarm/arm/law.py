@@ -172,12 +172,13 @@ class Law:
         """Each number in which the loop is linear, by the name that `having` knows it by; those that are 0 left out.
 
         That is "gain", a factor on everything, and of each signal with a block of its own what it is multiplied by:
-        the gain itself, or the coefficients of its polynomials and, of more than one, a factor, "hub_angle.gain".
+        the gain itself, or the coefficients of its polynomials and, of more than one, a factor, "hub_angle.gain".  Of a
+        signal in several parts no number has a name of its own.
         """
-        found = {"gain": 1.0}
+        found, read = {"gain": 1.0}, [name for part in self.parts for name in part.signals]
         for part in self.parts:
             (name, *others), block = part.signals, part.block
-            if others or not is_measured(name):
+            if others or not is_measured(name) or read.count(name) > 1:
                 continue
             if isinstance(block, StateSpace) or np.count_nonzero(block.num) > 1:
                 found[f"{name}.gain"] = 1.0

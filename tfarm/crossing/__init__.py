@@ -3,7 +3,7 @@
 The curve may be the imaginary axis or the unit circle; nothing here knows what A and B are.
 """
 
-from tfarm.crossing.line import Crossing, Crossings, Parts, brackets, crossed, solved, zeros_between
+from tfarm.crossing.line import Crossing, Crossings, Parts, brackets, crossed, solved, with_dips, zeros_between
 from tfarm.crossing.pieces import RegionPiece, pieces
 from tfarm.crossing.plane import Window, confirmed, counts_over, intervals, joined
 
@@ -21,5 +21,6 @@ __all__ = [
     "joined",
     "pieces",
     "solved",
+    "with_dips",
     "zeros_between",
 ]

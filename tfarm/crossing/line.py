@@ -17,12 +17,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tfarm.arrays import Complex, Real, Whole
+from tfarm.arrays import LEAST_SIZE, Complex, Real, Whole
 from tfarm.records import record
 
 Parts = Callable[[Real], tuple[Complex, Complex]]  # A and B at places of a curve
 
 LAST_BIT = 2.0**-53  # of a place, and of its bracket, which is narrower
+DIP_STEPS = 14  # of a golden section: a thousandth of two steps of the grid is left
+GOLDEN = (5.0**0.5 - 1.0) / 2.0
+ROUNDED = 1e-11  # of |A| |B|: a part beside the real one that may be rounding
 MOST_HALVINGS = 200  # a zero takes ten evaluations; three times 53 where no step but halving is believed
 
 
@@ -129,6 +132,36 @@ def crossed(places: Real, parts: Parts, known: tuple[Complex, Complex] | None = 
     (before,), change = brackets((A * B.conj()).imag)
     at, gain = solved(parts, places[before], places[before + 1])
     return gain, at, change
+
+
+def with_dips(places: Real, parts: Parts, known: tuple[Complex, Complex]) -> tuple[Real, tuple[Complex, Complex]]:
+    """A grid of places, and A and B on it, and places in every dip of |h| between neighbours that goes through 0.
+
+    Two crossings lie there, as close together as a resonance makes them, and h has one sign at all points around.
+    Each dip is searched by golden section, all at once.
+    """
+    h = _share(*known)
+    size, inner = abs(h), np.arange(1, h.size - 1)
+    is_dip = (size[inner] <= size[inner - 1]) & (size[inner] <= size[inner + 1]) & (size[inner] > ROUNDED)
+    at = inner[is_dip & (h[inner] * h[inner - 1] > 0) & (h[inner] * h[inner + 1] > 0)]
+    low, high, sign = places[at - 1], places[at + 1], np.sign(h[at])
+    found: list[Real] = []
+    for _ in range(DIP_STEPS if at.size else 0):
+        left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
+        ends = np.split(np.tile(sign, 2) * _share(*parts(np.r_[left, right])), 2)
+        found += [left[ends[0] < -ROUNDED], right[ends[1] < -ROUNDED]]
+        is_left = ends[0] < ends[1]
+        low, high = np.where(is_left, low, left), np.where(is_left, right, high)
+    more = np.concatenate([places[:0], *found])
+    if not more.size:
+        return places, known
+    both = np.unique(np.r_[places, more])
+    return both, parts(both)
+
+
+def _share(A: Complex, B: Complex) -> Real:
+    """h over the size that it can have, -1 to 1."""
+    return np.asarray((A * B.conj()).imag / np.maximum(abs(A) * abs(B), LEAST_SIZE))
 
 
 def solved(parts: Parts, low: Real, high: Real) -> tuple[Real, Real]:

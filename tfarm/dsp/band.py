@@ -28,7 +28,8 @@ from tfarm.errors import ConvergenceError
 from tfarm.records import record
 from tfarm.spectrum import modes
 from tfarm.spectrum.box import Box, winding_number
-from tfarm.spectrum.damped import TOWARD_SINGULAR, member
+from tfarm.spectrum.complete_box import TOWARD_SINGULAR
+from tfarm.spectrum.damped import member
 
 DECAYED_EXPONENT = 30.0  # e^-30 = 1e-13 is left over a sample of the poles on the line
 HIGHER = (2.0, 8.0, 32.0, 128.0, 512.0)  # times the last pole of the model: how far up no other is looked for

@@ -247,6 +247,9 @@ def _known_of(found: Margins | Margins[LawLoop]) -> dict[str, Any]:
     }
 
 
+NO_WINDOWS = "no windows of the law's numbers: of a rig with a link without damping all modes meet on the axis"
+
+
 def unsettled(found: Margins[Any]) -> str:
     """What the windows leave open where nothing is known beyond the band, in words; else empty.
 
@@ -255,6 +258,8 @@ def unsettled(found: Margins[Any]) -> str:
     loop, words = found.stability.loop, reach_words(found.windows.values())
     if not isinstance(loop, LawLoop):
         return "" if found.stability.is_known_beyond else words
+    if not found.windows and loop.arm.has_elastic_link:
+        return NO_WINDOWS
     uncounted = [name for name in loop.law.numbers if found.windows and name not in found.windows]
     return words + (f"; of {', '.join(uncounted)} poles could not be counted" if uncounted else "")
 

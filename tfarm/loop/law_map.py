@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import AnyLaw, Arm, Law, as_law
 from tfarm.arrays import Complex, Real
-from tfarm.crossing import Crossing, Crossings, counts_over, crossed
+from tfarm.crossing import Crossing, Crossings, counts_over, crossed, with_dips
 from tfarm.errors import ParameterError
 from tfarm.exact.characteristic import LoopParts
 from tfarm.records import record
@@ -25,9 +25,10 @@ from tfarm.spectrum.scales import first_frequency
 from .answers import law_answer
 from .frequencies import grid
 from .law_loop import LawLoop
-from .law_poles import law_box
-from .law_stability import band_for
+from .law_poles import law_box, law_poles_below
+from .law_stability import LISTED_LEFT, band_for
 from .lines import ascending, through_infinity, through_origin
+from .stability import MARGIN_OF_ZERO, must_be_off_axis
 
 MOST_MAP_VALUES = 400  # along one number: each column is a line of crossings of its own
 NEAR_ORIGIN = (1e-6, 5e-7)  # of the lowest frequency: where a real pole is looked for on its way through 0
@@ -116,10 +117,15 @@ def law_map(arm: Arm, law: AnyLaw, vary: tuple[str, str], x: Real, y: Real, band
 
 
 def unstable_below(loop: LawLoop, band: float) -> int:
-    """Poles right of the axis with |Im s| < band, by the winding number around that half of the box alone.
+    """Poles right of the axis with |Im s| < band: found one by one and counted, where the rig is damped.
 
-    Raises ConvergenceError where one is on the axis, to working precision.
+    Else by the winding number around that half of the box alone.  Raises ConvergenceError where one is on the axis, to
+    working precision.
     """
+    if loop.arm.least_damping:
+        found = law_poles_below(loop, band, LISTED_LEFT)
+        must_be_off_axis(found.moving[found.moving.real <= MARGIN_OF_ZERO * abs(found.moving)])
+        return found.unstable
     right = law_box(loop, band).re_max
     return winding_number(loop.function, Box(0.0, right, -band, band), CONTOUR_POINTS)
 
@@ -138,7 +144,10 @@ def law_crossings(loop: LawLoop, name: str, values: Real, omega: Real, known: Lo
         A = first.characteristic(s, of_rig)
         return A, last.characteristic(s, of_rig) - A
 
-    t, at, change = crossed(omega, lambda w: parts(1j * w), parts(1j * omega, known))
+    places, on_axis = omega, parts(1j * omega, known)
+    if loop.arm.least_damping:  # else modes may lie on the axis whatever the law, and h is rounding there
+        places, on_axis = with_dips(omega, lambda w: parts(1j * w), on_axis)
+    t, at, change = crossed(places, lambda w: parts(1j * w), on_axis)
     found = [Crossing(*each) for each in zip(low + span * t, at, change, strict=True)]
     slow = np.r_[float(omega[0]) * np.array(NEAR_ORIGIN), first_frequency(loop.arm) * np.array(ORDER_READ_AT)] + 0j
     A, B = parts(slow)

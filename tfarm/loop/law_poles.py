@@ -14,7 +14,7 @@ from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.reduced.sensed import closed, in_series, pade, sensed_model
 from tfarm.spectrum import modes_below
 from tfarm.spectrum.box import Box, complete
-from tfarm.spectrum.damped import HEIGHTS_LEFT, RIGHT_OF_AXIS, TOWARD_SINGULAR
+from tfarm.spectrum.complete_box import HEIGHTS_LEFT, RIGHT_OF_AXIS, TOWARD_SINGULAR
 
 from .frequencies import band_of, steep_places
 from .law_loop import LawLoop

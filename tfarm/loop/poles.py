@@ -22,7 +22,7 @@ from tfarm.exact.characteristic import zeros_at_origin
 from tfarm.records import record
 from tfarm.response.frequency import AXIS_SHARE
 from tfarm.spectrum.box import TRIED_HEIGHTS, Box, complete
-from tfarm.spectrum.damped import HEIGHTS_LEFT, RIGHT_OF_AXIS, TOWARD_SINGULAR
+from tfarm.spectrum.complete_box import HEIGHTS_LEFT, RIGHT_OF_AXIS, TOWARD_SINGULAR
 from tfarm.spectrum.enclose import Disc, disjoint, enclosed, proven_count
 
 from .frequencies import band_of, steep_places

@@ -22,7 +22,7 @@ from tfarm.exact.system import System, system_of
 from tfarm.records import record
 from tfarm.spectrum import flexible_frequencies
 from tfarm.spectrum.box import REAL_SHARE, Box, Function, complete
-from tfarm.spectrum.damped import TOWARD_SINGULAR
+from tfarm.spectrum.complete_box import TOWARD_SINGULAR
 
 
 @dataclass(frozen=True, slots=True)
