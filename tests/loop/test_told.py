@@ -13,7 +13,7 @@ from tests.similar import EITHER
 from tfarm import HubFeedback, Law
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop import panels
-from tfarm.loop.answers import nyquist_answer, nyquist_table, poles_answer
+from tfarm.loop.answers import poles_answer
 from tfarm.loop.branches import open_pairs
 from tfarm.loop.crossings import BranchCrossing, in_words
 from tfarm.loop.edges import Axis, moment_axis, rate_axis, stable_edge
@@ -22,7 +22,7 @@ from tfarm.loop.law_map import law_map
 from tfarm.loop.locus import frame
 from tfarm.loop.lyapunov import lyapunov
 from tfarm.loop.margins import _nearest_to_one
-from tfarm.loop.nyquist import poles_on_axis
+from tfarm.loop.nyquist import nyquist_answer, nyquist_table, poles_on_axis
 from tfarm.loop.panels import CHEBYSHEV, loop_panels
 from tfarm.loop.plant import Loop, effective_inertia
 from tfarm.loop.poles import slow_poles

@@ -21,7 +21,6 @@ from .law_loop import LawLoop
 from .law_stability import signs_of_loop
 from .lyapunov import lyapunov
 from .margins import LoopMargins, Margins
-from .nyquist import Nyquist
 from .poles import Poles
 from .regions import INFINITE, Region
 from .windows import Windows, reach_words
@@ -292,43 +291,6 @@ def margin_rows(found: Margins[Any], limits: LoopMargins) -> Iterator[MarginRow]
         yield MarginRow(
             column, known, size, "" if abs(size) == UNLIMITED.get(column.of, math.inf) else limits.at[column.of]
         )
-
-
-CONTOUR_COLUMNS = (  # of pairs s, L on the contour of a `Nyquist`
-    Column("re_s", "Re s", "1/s", of=lambda pair: pair[0].real),
-    Column("im_s", "Im s", "rad/s", of=lambda pair: pair[0].imag),
-    Column("re_L", "Re L", of=lambda pair: pair[1].real),
-    Column("im_L", "Im L", of=lambda pair: pair[1].imag),
-)
-
-
-def nyquist_answer(found: Nyquist[Any]) -> dict[str, Any]:
-    """The verdict, the turns around -1 beside the unstable poles found in a box, and L on the contour for Im s >= 0."""
-    verdict = found.verdict
-    return {
-        "arm": verdict.loop.arm.name,
-        **law_answer(verdict.loop.law, verdict.loop.arm),
-        "verdict": verdict.verdict,
-        "encirclements": found.encirclements,
-        "unstable_open": found.unstable_open,
-        "unstable_by_nyquist": found.expected,
-        "unstable_roots": verdict.unstable_roots,
-        "on_axis": found.on_axis,
-        "band_rad_s": verdict.band,
-        "beyond_the_band": verdict.tail,
-        "s": [[s.real, s.imag] for s in found.s.tolist()],
-        "L": [[L.real, L.imag] for L in found.L.tolist()],
-    }
-
-
-def nyquist_table(*found: Nyquist[Any], stem: str = "", laws: Sequence[str] = ()) -> Table:
-    """L on the contour, a row a point; of several loops, the law of each before it."""
-    pairs = [list(zip(each.s.tolist(), each.L.tolist(), strict=True)) for each in found]
-    named = [name for name, points in zip(laws, pairs, strict=False) for _ in points]
-    first = (Column("law", "law", of=named),) if laws else ()
-    points = [pair for each in pairs for pair in each]
-    title = "The loop function on the contour"
-    return Table(stem=stem, title=title, columns=(*first, *CONTOUR_COLUMNS), record=points)
 
 
 def plane_table(names: Sequence[str], x: Real, y: Real, unstable: Whole) -> Table:

@@ -8,19 +8,22 @@ are counted, not read off: clockwise ones are closed-loop poles inside the conto
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Generic
+from typing import Any, Generic
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import ANGLE_GAIN, RATE_GAIN
 from tfarm.arrays import Complex, Real
+from tfarm.columns import Column, Table
 from tfarm.errors import ConvergenceError
 from tfarm.records import record
 from tfarm.response.frequency import AXIS_SHARE
 from tfarm.spectrum import flexible_frequencies
 
+from .answers import law_answer
 from .frequencies import band_of, grid
 from .law_loop import LawLoop
 from .plant import Loop
@@ -188,3 +191,40 @@ def compressed(L: Complex) -> Complex:
     size = abs(L)
     inside = np.where(np.isinf(size), 1.0, L)
     return np.asarray(np.where(np.isinf(size), 1.0, inside / (1 + abs(inside))))
+
+
+CONTOUR_COLUMNS = (  # of pairs s, L on the contour of a `Nyquist`
+    Column("re_s", "Re s", "1/s", of=lambda pair: pair[0].real),
+    Column("im_s", "Im s", "rad/s", of=lambda pair: pair[0].imag),
+    Column("re_L", "Re L", of=lambda pair: pair[1].real),
+    Column("im_L", "Im L", of=lambda pair: pair[1].imag),
+)
+
+
+def nyquist_answer(found: Nyquist[Any]) -> dict[str, Any]:
+    """The verdict, the turns around -1 beside the unstable poles found in a box, and L on the contour for Im s >= 0."""
+    verdict = found.verdict
+    return {
+        "arm": verdict.loop.arm.name,
+        **law_answer(verdict.loop.law, verdict.loop.arm),
+        "verdict": verdict.verdict,
+        "encirclements": found.encirclements,
+        "unstable_open": found.unstable_open,
+        "unstable_by_nyquist": found.expected,
+        "unstable_roots": verdict.unstable_roots,
+        "on_axis": found.on_axis,
+        "band_rad_s": verdict.band,
+        "beyond_the_band": verdict.tail,
+        "s": [[s.real, s.imag] for s in found.s.tolist()],
+        "L": [[L.real, L.imag] for L in found.L.tolist()],
+    }
+
+
+def nyquist_table(*found: Nyquist[Any], stem: str = "", laws: Sequence[str] = ()) -> Table:
+    """L on the contour, a row a point; of several loops, the law of each before it."""
+    pairs = [list(zip(each.s.tolist(), each.L.tolist(), strict=True)) for each in found]
+    named = [name for name, points in zip(laws, pairs, strict=False) for _ in points]
+    first = (Column("law", "law", of=named),) if laws else ()
+    points = [pair for each in pairs for pair in each]
+    title = "The loop function on the contour"
+    return Table(stem=stem, title=title, columns=(*first, *CONTOUR_COLUMNS), record=points)

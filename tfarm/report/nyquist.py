@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 
 from tfarm.columns import Column, Table
 from tfarm.digits import significant, singly
-from tfarm.loop.answers import nyquist_table
-from tfarm.loop.nyquist import Nyquist
+from tfarm.loop.nyquist import Nyquist, nyquist_table
 from tfarm.report.loop_laws import Named
 
 COUNT_CAPTION = (
