@@ -1,5 +1,6 @@
 """What holds for every test."""
 
+import gc
 import os
 
 # One thread of BLAS for each worker, set before NumPy is loaded: on matrices of a hundred rows a second one only spins.
@@ -26,6 +27,12 @@ settings.register_profile(
 EXAMPLES = int(os.environ.get("EXAMPLES", "1000"))
 settings.register_profile("search", deadline=None, database=None, max_examples=EXAMPLES, suppress_health_check=SLOW)
 settings.load_profile("reproducible")
+
+
+def pytest_collection_finish() -> None:
+    """Modules and tests are there to the end: the collector need not go through them again and again."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(autouse=True)

@@ -112,11 +112,9 @@ def odd_options(rng, options):
 
 def options_of_the_verbs():
     """Of each verb but those that take minutes by their purpose: its options, and whether each is a flag."""
-    import typer
+    from tfarm.cli.running import whole_command
 
-    from tfarm.cli.running import app
-
-    verbs = typer.main.get_command(app).commands
+    verbs = whole_command().commands
     return {
         name: [
             (param.opts[0], bool(getattr(param, "is_flag", False))) for param in verb.params if param.opts[0][:1] == "-"

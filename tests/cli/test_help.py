@@ -6,14 +6,13 @@ import subprocess
 import sys
 
 import pytest
-import typer
 
 import tfarm
 from tests.shell import answer, run
-from tfarm.cli.running import app
+from tfarm.cli.running import whole_command
 from tfarm.glossary import GLOSSARY_TERMS
 
-VERBS = typer.main.get_command(app).commands
+VERBS = whole_command().commands
 
 
 def test_the_glossary_has_each_word_once_in_order(capsys):

@@ -3,14 +3,13 @@
 from dataclasses import replace
 
 import pytest
-import typer
 
 import tfarm
 from tests.shared import thinned
 from tests.shell import answer, run
 from tfarm.arm.reading import PRESETS
 from tfarm.arm.writing import to_toml
-from tfarm.cli import running
+from tfarm.cli.running import whole_command
 
 VERBS = {  # those that take an arm, as short as they go
     "modes": ("--count", "2"),
@@ -47,7 +46,7 @@ def slender(tmp_path_factory):
 
 
 def test_every_command_that_takes_an_arm_has_the_option():
-    commands = typer.main.get_command(running.app).commands
+    commands = whole_command().commands
     takes_arm = {name for name, each in commands.items() if any(p.name in ("arm", "arms") for p in each.params)}
     assert takes_arm == set(VERBS) | UNASKED
     for name in takes_arm:

@@ -61,6 +61,12 @@ app = Verbs(
 )
 
 
+@cache  # some 35 ms, which a process with several commands need not spend on each
+def whole_command() -> Any:
+    """The command of all verbs as Click has it; asked for once all rooms of verbs are loaded."""
+    return typer.main.get_command(app)
+
+
 def _say_version(asked: bool) -> None:
     if asked:
         from tfarm import __version__

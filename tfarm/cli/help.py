@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from tfarm.cli.app import Json, app, give
+from tfarm.cli.app import Json, app, give, whole_command
 from tfarm.errors import must_be_known
 
 SHELLS = ("bash", "zsh", "fish")
@@ -49,7 +49,7 @@ def completion(shell: Annotated[str, typer.Argument(metavar="SHELL", help="bash,
             [option for each in command.params for option in each.opts if option.startswith("--")] + ["--help"],
             any(each.name in ("arm", "arms") for each in command.params),
         )
-        for name, command in sorted(vars(typer.main.get_command(app))["commands"].items())
+        for name, command in sorted(whole_command().commands.items())
     }
     print(_fish(verbs) if shell == "fish" else ZSH * (shell == "zsh") + _bash(verbs), end="")
 

@@ -23,7 +23,7 @@ from tfarm.cli import (  # noqa: F401  each adds its verbs to the application
     trust,
     tuning,
 )
-from tfarm.cli.app import app, discard, tell
+from tfarm.cli.app import discard, tell, whole_command
 from tfarm.cli.meaning import check_numbers, check_streams, check_verb, usage
 from tfarm.errors import CertificationError, ConvergenceError, TfarmError
 
@@ -59,7 +59,7 @@ def run(arguments: list[str]) -> int:
 
 
 def _call(arguments: list[str]) -> int:
-    command = typer.main.get_command(app)
+    command = whole_command()
     check_verb(arguments[0], command)
     check_numbers(arguments)
     check_streams(arguments)
