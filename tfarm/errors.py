@@ -64,10 +64,16 @@ class CertificationError(TfarmError):
 def did_you_mean(word: str, choices: Iterable[str]) -> str:
     """The remedy for a misspelt word: the nearest choice, or those that begin with it, if any, and all of them."""
     known = list(choices)
-    begun = [choice for choice in known if word and choice.startswith(word)][:3]
-    near = difflib.get_close_matches(word[:80], known, n=1) or begun
+    near = close_to(word, known)
     hint = "did you mean " + " or ".join(f'"{choice}"' for choice in near) + "? " if near else ""
     return f"{hint}known are: {', '.join(known)}"
+
+
+def close_to(word: str, choices: Iterable[str]) -> list[str]:
+    """What may be meant by a misspelt word: the nearest choice, else up to three that begin with it; empty if none."""
+    known = list(choices)
+    begun = [choice for choice in known if word and choice.startswith(word)][:3]
+    return difflib.get_close_matches(word[:80], known, n=1) or begun
 
 
 def must_be_known(key: str, value: object, choices: Collection[str]) -> None:

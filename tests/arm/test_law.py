@@ -165,6 +165,10 @@ def test_a_mat_file_holds_matrices_or_a_structure_of_them(tmp_path):
     [
         ("law = 3", "give a table, headed [law]"),
         ("[law]\ndelya = 0.1", 'did you mean "delay"'),
+        (
+            "[law]\nhub_angle = 2.5",
+            "law.hub_angle = 2.5: a signal has a table of its own: [law.hub_angle] with gain = 2.5",
+        ),
         ("[law]\n[law.hub_rate]\ngian = 1.0", 'did you mean "gain"'),
         ("[law]\n[law.hub_rate]\nden = [1.0]", "law.hub_rate.num is missing"),
         ("[law]\n[law.hub_rate]\nx = 0.1", "law.hub_rate.gain is missing"),

@@ -24,7 +24,7 @@ from pydantic import Field
 from tfarm.arm.declared import StrictTable, validated
 from tfarm.arm.law import Law
 from tfarm.arm.reading import load_tables
-from tfarm.errors import MISSING, ParameterError, must_be_known
+from tfarm.errors import MISSING, ParameterError, close_to, must_be_known
 from tfarm.files import read_mat
 
 LAW_TABLE = "law"  # the table's name
@@ -90,6 +90,7 @@ def law_of_table(table: Any, folder: Path) -> Law:
     if not isinstance(table, dict):
         raise ParameterError(key=LAW_TABLE, value=table, remedy="give a table, headed [law]")
     signals = {key: value for key, value in table.items() if isinstance(value, dict)}
+    _no_bare_gain({key: value for key, value in table.items() if key not in LawTable.model_fields})
     head = validated(LawTable, {key: value for key, value in table.items() if key not in signals}, LAW_TABLE)
     common = {key: getattr(head, key) for key in ("name", "input", "delay", "period", "sign", "rule", "prewarp")}
     common["references"] = tuple(head.references)
@@ -111,6 +112,14 @@ def law_of_table(table: Any, folder: Path) -> Law:
     except ParameterError as error:
         key = error.key if error.key.startswith(LAW_TABLE) else f"{LAW_TABLE}.{error.key}"
         raise ParameterError(key=key, value=error.value, remedy=error.remedy) from None
+
+
+def _no_bare_gain(others: dict[str, Any]) -> None:
+    """Raise ParameterError for a number where a signal's table is meant: hub_angle = 2.0, and no misspelt delay."""
+    for key, value in others.items():
+        if type(value) in (int, float) and not close_to(key, LawTable.model_fields):
+            remedy = f"a signal has a table of its own: [{LAW_TABLE}.{key}] with gain = {value:g}"
+            raise ParameterError(key=f"{LAW_TABLE}.{key}", value=value, remedy=remedy)
 
 
 def _of_file(head: LawTable, folder: Path, common: dict[str, Any]) -> Law:

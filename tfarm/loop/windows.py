@@ -134,7 +134,7 @@ def reach_words(windows: Iterable[Windows]) -> str:
     bands = [each.band for each in windows if math.isfinite(each.band)]
     if not bands:
         return ""
-    return f"window ends are those of poles up to {max(bands):.4g} rad/s: beyond, some may cross at smaller gains"
+    return f"window ends are those of poles up to {max(bands):.4g} rad/s: beyond, some may cross inside them"
 
 
 def _counts(verdict: Stability, name: str, pairs: list[Window], found: Crossings) -> list[int]:
