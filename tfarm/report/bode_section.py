@@ -10,6 +10,7 @@ from tfarm.arm import Arm
 from tfarm.digits import how_many, plain, significant
 from tfarm.plots.frequency import draw_bode
 from tfarm.report.sections import PageSection, Picture
+from tfarm.report.words import upper
 from tfarm.response.answers import bode_table, roots_table
 from tfarm.response.frequency import AXIS_SHARE, Bode, bode
 
@@ -28,7 +29,7 @@ def bode_section(arm: Arm, output: str) -> PageSection:
         return PageSection(anchor=anchor, title=title, words=words)
     picture = Picture(
         stem=anchor,
-        title=f"{data.input_label} to {data.label}: magnitude and phase".capitalize(),
+        title=upper(f"{data.input_label} to {data.label}: magnitude and phase"),
         caption=f"{what_is_seen(data)} {what_it_means(data)}",
         alt=alt_text(data),
         figure=draw_bode(data),

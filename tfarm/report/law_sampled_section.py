@@ -88,7 +88,7 @@ def law_sampled_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> Pag
     found = [held_by(each, chain) for each in named]
     rows = [row for each in found for row in verdicts_later(each, chain)]
     blocks: list[Picture | Table] = [delays_table(rows, chain)]
-    words = [chain_told(arm, chain), *(_answer(each) + cured(each, chain) for each in found)]
+    words = [*(_answer(each) + cured(each, chain) for each in found), chain_told(arm, chain)]
     if any(each.measured is not None for each in named):
         blocks += _measured_blocks(named, chain)
     if arm.has_rigid_mode and any(each.measured is None for each in named):

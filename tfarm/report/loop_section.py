@@ -27,7 +27,7 @@ from tfarm.report.map import MapOfArm, draw_map_of_arm, map_data, map_of_arm
 from tfarm.report.margins_table import margin_table, verdict_fact, verdict_words, window_table
 from tfarm.report.nyquist import RINGS_CAPTION, TO_COMPARE, PlotOfLaw, count_table, curve_data
 from tfarm.report.sections import PageSection, Picture
-from tfarm.report.words import typeset
+from tfarm.report.words import typeset, upper
 from tfarm.spectrum.scales import default_gains, default_words, rate_unit
 
 UNSTABLE_K2 = 1.5  # at least, of the law whose encirclements are counted for comparison
@@ -218,7 +218,7 @@ def margins_section(arm: Arm, chain: Chain | None = None) -> PageSection:
         anchor="margins",
         title="Is the loop stable, and by how much?",
         facts=[verdict_fact(each, it, f"; {brief_on(arm, each.law, chain).short}") for each, it in both],
-        words=[verdict_words(f"{each.name.capitalize()}, {each.gains}", it) for each, it in both],
+        words=[verdict_words(f"{upper(each.name)}, {each.gains}", it) for each, it in both],
         blocks=(margin_table(named, found, arm.is_told_by_lyapunov), window_table(named, found)),
     )
 
@@ -247,7 +247,7 @@ def nyquist_section(arm: Arm, chain: Chain | None = None) -> PageSection:
         f"{how_many(p.verdict.unstable_roots, 'unstable pole')}"
         for named, p in plots
     )
-    words = (f"{answer.capitalize()}.", NYQUIST_WORDS.format(poles=_poles_words(plots[0].data)))
+    words = (f"{upper(answer)}.", NYQUIST_WORDS.format(poles=_poles_words(plots[0].data)))
     title = "Nyquist: does the loop function turn around −1?"
     return PageSection(anchor="margins-nyquist", title=title, words=words, blocks=(picture, count_table(every, names)))
 

@@ -16,7 +16,7 @@ from tfarm.loop.lyapunov import lyapunov
 from tfarm.loop.margins import Margins
 from tfarm.report.loop_laws import Named
 from tfarm.report.sections import Fact
-from tfarm.report.words import typeset
+from tfarm.report.words import typeset, upper
 
 MARGINS_CAPTION = (
     "Exact: of the infinite-dimensional loop; not known where nothing bounds L beyond the band. "
@@ -88,7 +88,7 @@ def margin_table(laws: Sequence[Named], found: Sequence[Margins], is_undamped: b
             columns.append(Column(f"{named.key}_{key}", title, of=[row[i] for row in part], digits=number, group=group))
         if band is not None and band.phase < 0:
             lead = f"{significant(band.phase, 5)} deg at {significant(band.at['phase'], 5)} rad/s"
-            leads += f" {named.name.capitalize()}: {lead} is lead; not an instability."
+            leads += f" {upper(named.name)}: {lead} is lead; not an instability."
     return Table(
         stem="margins",
         title="Verdict and margins",
@@ -124,7 +124,7 @@ def window_table(laws: Sequence[Named], found: Sequence[Margins]) -> Table:
     ]
     names, verdicts, gains = zip(*rows, strict=True)
     open_ends = ((law.name, unsettled(each)) for law, each in zip(laws, found, strict=True))  # windows of a band
-    more = "".join(f" {name.capitalize()}: {typeset(text)}." for name, text in open_ends if text)
+    more = "".join(f" {upper(name)}: {typeset(text)}." for name, text in open_ends if text)
     return Table(
         stem="windows",
         title="How far each gain may go alone",
