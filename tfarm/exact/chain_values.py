@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,6 +28,7 @@ CLEAR_OF_SINGULAR = 0.1  # of the way to a -1/C: its radius at most
 SERIES_BITS = 512  # of the power series at s = 0, whose coefficients are sums of small differences
 KNOWN_ZERO = 1e-80  # a coefficient below this share of the first is a zero that balls cannot know
 LAYOUTS_KEPT = 256  # of one chain: more places than a page looks at
+SERIES_KEPT = 512  # expansions at s = 0 of rigs and outputs: more than a report of six rigs asks for
 SERIES_ORDER = 8  # of the power series: the drive begins at s^2 at most
 
 
@@ -226,24 +227,39 @@ def series_at_zero(
     chain: ElementChain, wanted: Sequence[Output], x: float, terms: int = SERIES_ORDER
 ) -> list[list[float]]:
     """Coefficients from s^-2 on in each output's expansion at s = 0, `terms` less two of them at least."""
+    return [list(_series_at_zero(chain, each, x, terms)) for each in wanted]
+
+
+@lru_cache(SERIES_KEPT)  # loops, models and pages ask for the same few of a rig again and again
+def _series_at_zero(chain: ElementChain, output: Output, x: float, terms: int) -> tuple[float, ...]:
+    """The same of one output."""
+    state, drive = _slow(chain, terms)
+    order = _leading(drive)
     with precision(SERIES_BITS):
-        s = Jet([rational(0), rational(1), *[rational(0)] * (terms - 2)])
-        state = ChainState(chain, s, slow=True)
-        drive = _cleared(state.input)
-        order = next(n for n, coefficient in enumerate(drive.c) if coefficient != 0)
-        found = []
-        for each in wanted:
-            quotient = Jet(_cleared(state.numerator(each, x)).c[: terms - order]) / drive.shifted(order)
-            found.append([0.0] * (2 - order) + [float(c.mid()) if hasattr(c, "mid") else float(c) for c in quotient.c])
-    return found
+        quotient = Jet(_cleared(state.numerator(output, x)).c[: terms - order]) / drive.shifted(order)
+        return (*[0.0] * (2 - order), *(float(c.mid()) if hasattr(c, "mid") else float(c) for c in quotient.c))
 
 
 def order_at_zero(chain: ElementChain, wanted: Output | None, x: float = 0.0) -> int:
     """How often an output of the free response vanishes at s = 0; the drive itself for None."""
+    state, drive = _slow(chain, SERIES_ORDER)
+    if wanted is None:
+        return _leading(drive)
     with precision(SERIES_BITS):
-        s = Jet([rational(0), rational(1), *[rational(0)] * (SERIES_ORDER - 2)])
+        return _leading(_cleared(state.numerator(wanted, x)))
+
+
+@lru_cache(SERIES_KEPT)
+def _slow(chain: ElementChain, terms: int) -> tuple[ChainState, Jet]:
+    """The free response as power series in s at 0, and the drive's, exact zeros told from rounding."""
+    with precision(SERIES_BITS):
+        s = Jet([rational(0), rational(1), *[rational(0)] * (terms - 2)])
         state = ChainState(chain, s, slow=True)
-        series = _cleared(state.input if wanted is None else state.numerator(wanted, x))
+        return state, _cleared(state.input)
+
+
+def _leading(series: Jet) -> int:
+    """The number of the first coefficient that is not 0."""
     return next(n for n, coefficient in enumerate(series.c) if coefficient != 0)
 
 
