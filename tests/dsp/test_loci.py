@@ -55,6 +55,18 @@ def test_a_strip_chart_lasts_twice_the_slew():
     assert chart.read.size * period == pytest.approx(1.6, abs=1.5 * period)
 
 
+def test_a_strip_chart_reads_and_drives_in_the_steps_and_limits_that_it_says():
+    """What is read are whole numbers of steps, each of them seen; the motor gives what was asked, cut at its limit."""
+    ideal = slews(LAB, GAINS, Chain(), 6)
+    chart = strip_chart(LAB, GAINS, ideal.with_moment, 6)
+    steps = np.unique(np.round(chart.read / chart.step, 9))
+    np.testing.assert_array_equal(steps, np.round(steps))
+    assert np.diff(steps).min() == 1
+    assert abs(chart.read - chart.simulation.at_samples.root_moment).max() <= 0.5 * chart.step * (1 + 1e-9)
+    assert chart.saturated.any()
+    assert abs(chart.simulation.torque).max() == pytest.approx(chart.limit)
+
+
 @pytest.mark.parametrize(("count", "most", "other"), [(5, 40, 10), (20, 40, 40), (21, 40, 10), (1, 1, 1), (3, 5, 1)])
 def test_a_figure_is_compared_with_that_of_twice_or_half_the_modes(count, most, other):
     assert another(count, most) == other
