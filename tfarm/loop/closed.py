@@ -21,7 +21,7 @@ from .margins import Margins, loop_margins, margins_of_gains
 from .nyquist import Nyquist, nyquist_of
 from .poles import Poles, poles_of_gains
 from .regions import Region, region
-from .stability import stability
+from .stability import Stability, stability
 from .variation import OF_THE_LAW
 
 LOCUS_VALUES, LAW_LOCUS_VALUES = 500, 100  # values of a locus unless so many are asked for: of gains, of any other law
@@ -54,6 +54,12 @@ def margins(arm: Arm, law: AnyLaw, band: float | None = None) -> Margins | Margi
     if arm.least_damping and is_quiet_above(verdict.loop, verdict.band):
         return Margins(verdict, windows, found, found.delay, found.disk, found.peak_sensitivity)
     return Margins(verdict, windows, found, None, None, None)
+
+
+def verdict_on(arm: Arm, law: AnyLaw) -> Stability | Stability[LawLoop]:
+    """The verdict alone.  Raises what `margins` raises."""
+    arm, law = arm_and_law(arm, law)
+    return stability(arm, law) if isinstance(law, HubFeedback) else law_stability(arm, law)
 
 
 def nyquist(arm: Arm, law: AnyLaw) -> Nyquist | Nyquist[LawLoop]:

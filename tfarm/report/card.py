@@ -6,30 +6,35 @@ So the index names every arm that has been reported on in that folder, whichever
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from tfarm.arm import PLANE, Arm
 from tfarm.digits import plain
 from tfarm.dsp import Chain
+from tfarm.dsp.closed import verdict_on
 from tfarm.errors import TfarmError
+from tfarm.loop.closed import verdict_on as continuous_verdict
 from tfarm.plots.files import save_figure
 from tfarm.plots.frequency import draw_card
 from tfarm.plots.words import gains_words
 from tfarm.report.arm_section import headline_numbers
+from tfarm.report.given_laws import GivenLaw, LawOnArm, on_arm
 from tfarm.report.kept import keep, kept
 from tfarm.report.loop_laws import brief_on, has_loop, margins_of
 from tfarm.report.page import QUESTIONS, Card, summary
+from tfarm.report.sampled_words import in_ms
 from tfarm.report.sections import PICTURES, Fact
 from tfarm.response.frequency import bode
 from tfarm.spectrum.scales import default_gains
 
 FACTS = 4  # of the headline numbers
-INDEX_COLUMNS = ("gains", "verdict", *PLANE, "sampled")  # columns of the index's table of arms
+INDEX_COLUMNS = ("law", "verdict", *PLANE, "sampled")  # columns of the index's table of arms
 PAGES = {"index": "full report", "live": "live loop", **QUESTIONS}
 
 
-def save_card(arm: Arm, folder: Path, laws: Sequence[str], chain: Chain) -> None:
+def save_card(arm: Arm, folder: Path, laws: Sequence[GivenLaw], chain: Chain) -> None:
     """pictures/card.svg and card.json; a picture that cannot be made is left out, as its section on the page is."""
     try:
         (folder / PICTURES).mkdir(exist_ok=True)
@@ -39,13 +44,20 @@ def save_card(arm: Arm, folder: Path, laws: Sequence[str], chain: Chain) -> None
     else:
         picture = "card.svg"
     facts = [[f.label, f.value, f.unit, f.beside] for f in headline_numbers(arm)[:FACTS]]
-    loop = index_cells(arm, chain)
-    what = {"name": arm.name, "summary": summary(arm, laws), "facts": facts, "picture": picture, "loop": loop}
+    loops = [law_cells(each, chain) for each in on_arm(arm, laws)] if laws else [default_cells(arm, chain)]
+    told = summary(arm, [each.given_name for each in laws])
+    what = {
+        "name": arm.name,
+        "summary": told,
+        "facts": facts,
+        "picture": picture,
+        "loops": [row for row in loops if row],
+    }
     keep(folder, "card", what)
 
 
-def index_cells(arm: Arm, chain: Chain) -> dict[str, str]:
-    """The loop of the default gains, in cells of the table of arms by COMPARED; empty where there is no loop."""
+def default_cells(arm: Arm, chain: Chain) -> dict[str, str]:
+    """The loop of the default gains, in cells of the table of arms by INDEX_COLUMNS; empty where it has no verdict."""
     if not has_loop(arm):
         return {}
     law = default_gains(arm)
@@ -53,12 +65,24 @@ def index_cells(arm: Arm, chain: Chain) -> dict[str, str]:
         found, sampled = margins_of(arm, law), brief_on(arm, law, chain)
     except TfarmError:
         return {}
-    cells = {"gains": gains_words(law), "verdict": found.stability.verdict}
+    cells = {"law": gains_words(law), "verdict": found.stability.verdict}
     for name in PLANE:  # from where to where the gain may move; a star at an end where no limit was found
         windows = found.windows[name]
         ends = (plain(end, 5) + "*" * (windows.end(end) == "search bound") for end in windows.around or ())
         cells[name] = " … ".join(ends) or "none"
     return cells | {"sampled": sampled.short}
+
+
+def law_cells(each: LawOnArm, chain: Chain) -> dict[str, str]:
+    """The loop of a law that the page is about; a verdict that cannot be given is left out, as it is on the page."""
+    cells = {"law": each.given.given_name}
+    with suppress(TfarmError):
+        if not each.is_discrete:
+            cells["verdict"] = continuous_verdict(each.arm, each.law).verdict
+    with suppress(TfarmError):
+        word = verdict_on(each.arm, each.law, chain).word
+        cells["sampled"] = f"{word.upper() if word == 'unstable' else word} when sampled every {in_ms(chain)} ms"
+    return cells
 
 
 def written_cards(out: Path) -> Sequence[Card]:
@@ -71,6 +95,6 @@ def _card(read: dict[str, Any], folder: Path) -> Card | None:
     pages = tuple((f"{page}.html", title) for page, title in PAGES.items() if (folder / f"{page}.html").is_file())
     facts = [Fact(label=str(a), value=str(b), unit=str(c), beside=str(d)) for a, b, c, d in read["facts"]]
     picture = "pictures/card.svg" if read.get("picture", "card.svg") else ""
-    loop = {key: str(read.get("loop", {}).get(key, "")) for key in INDEX_COLUMNS}
-    card = Card(name=folder.name, summary=str(read["summary"]), facts=facts, pages=pages, picture=picture, loop=loop)
+    loops = [{key: str(row.get(key, "")) for key in INDEX_COLUMNS} for row in read.get("loops") or [{}]]
+    card = Card(name=folder.name, summary=str(read["summary"]), facts=facts, pages=pages, picture=picture, loops=loops)
     return card if pages else None

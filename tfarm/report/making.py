@@ -108,7 +108,7 @@ def make(subject: Subject, piece: int | str, folder: Path) -> Made:
         save_live(subject, folder)
         return None
     if isinstance(piece, str):
-        save_card(subject.arm, folder, [each.given_name for each in subject.laws], subject.chain)
+        save_card(subject.arm, folder, subject.laws, subject.chain)
         if piece == CARD_WORK:
             save_proof(subject.arm, folder, subject.chain)
         return None

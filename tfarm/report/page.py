@@ -33,7 +33,8 @@ TEMPLATES = Path(__file__).parent / "templates"
 class Card:
     """An arm on the index: its folder's name, a few numbers, its pages and whether there is a picture.
 
-    `loop` are the cells of the default gains in the table of arms, all "" where there is no loop.
+    `loops` are rows of cells in the table of arms, one a law that its page is about, else of the default gains; all ""
+    where there is no loop.
     """
 
     name: str
@@ -41,7 +42,7 @@ class Card:
     facts: Sequence[Fact]
     pages: Sequence[tuple[str, str]]
     picture: str
-    loop: Mapping[str, str]
+    loops: Sequence[Mapping[str, str]]
 
 
 @cache
