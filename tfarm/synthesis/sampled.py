@@ -81,14 +81,13 @@ class SampledJudge:
         number = points.shape[1]
         values = np.full(number, np.inf)
         for i in range(0, number, GAINS_AT_ONCE):
-            part = points[:, i : i + GAINS_AT_ONCE]
-            z = np.linalg.eigvals(self._matrices(part, 1.0))
-            good = abs(z).max(axis=1) < 1.0
-            for share in (SEARCH_RESERVE, 1 / SEARCH_RESERVE):
-                more = np.linalg.eigvals(self._matrices(part[:, good], share))
-                good[good] = abs(more).max(axis=1) < 1.0
-            if good.any():
-                values[i : i + GAINS_AT_ONCE][good] = self._scores(part[:, good], z[good])
+            part, places = points[:, i : i + GAINS_AT_ONCE], np.arange(i, min(i + GAINS_AT_ONCE, number))
+            for share in (SEARCH_RESERVE, 1 / SEARCH_RESERVE, 1.0):  # most of those that do not hold fail the first
+                z = np.linalg.eigvals(self._matrices(part, share))
+                good = abs(z).max(axis=1) < 1.0
+                part, places, z = part[:, good], places[good], z[good]
+            if places.size:
+                values[places] = self._scores(part, np.asarray(z, dtype=complex))
         return values
 
     def holds(self, law: HubFeedback) -> bool:
@@ -182,11 +181,12 @@ class SampledJudge:
         A = start + on_rate[:, None, None] * by_each[0] + on_moment[:, None, None] * by_each[1]
         laws, references = laws_at(self.loop.gains, points), task.wanted
         kept = self.loop.pulse.integrals_at + 2  # the input of the sample before
+        feedforward = task.feedforward[:, None]
+        wanted = sum((row * each[:, None] for row, each in zip(laws, references.T, strict=True)), start=feedforward)
         x, (moment, u) = np.zeros((number, len(start), 1)), np.zeros((2, task.t.size, number))
-        for k in range(task.t.size):
+        for k, push in enumerate(wanted):
             moment[k] = x[..., 0] @ sense
-            wanted = sum((row * each for row, each in zip(laws, references[k], strict=True)), start=task.feedforward[k])
-            x = A @ x + drive[:, None] * wanted[:, None, None]
+            x = A @ x + drive[:, None] * push[:, None, None]
             u[k] = x[:, kept, 0]
         return moment, u
 

@@ -69,11 +69,11 @@ class Worst:
     def landscape(self, axes: tuple[GainAxis, GainAxis], effort: Effort) -> tuple[Real, Score]:
         """The largest scores over the grid, inf where one arm is not stable, and the score to refine with."""
         values, scores = zip(*(judge.landscape(axes, effort) for judge in self.judges), strict=True)
-        return np.max(values, axis=0), lambda points: np.max([score(points) for score in scores], axis=0)
+        return np.max(values, axis=0), lambda points: _largest(scores, points)
 
     def score(self, points: Real) -> Real:
         """What is minimised: the largest score."""
-        return np.asarray(np.max([judge.score(points) for judge in self.judges], axis=0))
+        return _largest([judge.score for judge in self.judges], points)
 
     def holds(self, law: HubFeedback) -> bool:
         """Whether the loop of every arm is stable by the verdict of its kind."""
@@ -86,6 +86,17 @@ class Worst:
     def values(self, law: HubFeedback) -> list[float]:
         """The objective of a law on each arm."""
         return [judge.value(law, score_of(judge, law)) for judge in self.judges]
+
+
+def _largest(scores: Sequence[Score], points: Real) -> Real:
+    """The largest score at points (2, n); where one arm's loop does not hold, the next arms are not asked."""
+    first, *others = scores
+    found = first(points)
+    for score in others:
+        held = np.isfinite(found)
+        if held.any():
+            found[held] = np.maximum(found[held], score(points[:, held]))
+    return found
 
 
 def score_of(judge: Judge, law: HubFeedback) -> float:
