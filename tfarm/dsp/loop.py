@@ -103,8 +103,10 @@ class SampledLoop:
         return self.under(replace(self.gains, **gains))
 
     def under(self, gains: HubFeedback) -> SampledLoop:
-        """The same loop under another law."""
-        return replace(self, gains=gains)
+        """The same loop under another law; the pulse transfer functions, which know no law, are shared."""
+        other = replace(self, gains=gains)
+        vars(other)["pulse"] = self.pulse
+        return other
 
     def with_delay(self, samples: float) -> SampledLoop:
         """The same loop with another computational delay."""

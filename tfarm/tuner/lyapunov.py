@@ -11,15 +11,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from scipy.linalg import LinAlgError, solve_discrete_are, solve_triangular
 
 from tfarm.arrays import Real
+from tfarm.exact.whole import as_integers, falls, is_positive_definite
 from tfarm.records import record
-
-IntegerMatrix = list[list[int]]
 
 SLACKS = (1e-3, 1e-5, 1e-7, 1e-9)  # how strictly the inequality is asked for, in balanced states
 BITS_OF_P = 60  # bits that P is rounded to before the proof
@@ -57,7 +55,7 @@ class CommonLyapunov:
         scaled = self.P * units * units[:, None]
         P, _ = as_integers(np.round(np.ldexp(scaled / abs(scaled).max(), BITS_OF_P)))
         ends = (A * units / units[:, None] for A in (self.low, self.high))
-        return is_positive_definite(P) and all(_falls(P, A) for A in ends)
+        return is_positive_definite(P) and all(falls(P, A) for A in ends)
 
 
 def common_lyapunov(middle: Real, drive: Real, sense: Real, low: Real, high: Real) -> CommonLyapunov | None:
@@ -92,42 +90,3 @@ def _sizes(A: Real, b: Real) -> Real:
         total, power = total + power @ total @ power.T, power @ power
     size: Real = np.sqrt(np.diag(total))
     return np.where(size > 0, size, 1.0)
-
-
-# ---------------------------------------------------------------- whole numbers
-
-
-def as_integers(matrix: Real) -> tuple[IntegerMatrix, int]:
-    """The whole numbers N and the shift k with matrix = N / 2^k, exactly."""
-    pairs = [[float(value).as_integer_ratio() for value in row] for row in matrix]
-    shift = max(bottom.bit_length() - 1 for row in pairs for _, bottom in row)
-    return [[top << (shift - bottom.bit_length() + 1) for top, bottom in row] for row in pairs], shift
-
-
-def is_positive_definite(matrix: IntegerMatrix) -> bool:
-    """Whether a symmetric matrix of whole numbers has only positive leading minors (Bareiss' elimination)."""
-    M, before = [list(row) for row in matrix], 1
-    n = len(M)
-    for k in range(n):
-        pivot = M[k][k]
-        if pivot <= 0:
-            return False
-        for i in range(k + 1, n):
-            row, factor = M[i], M[k][i]
-            for j in range(i, n):
-                row[j] = (pivot * row[j] - factor * M[k][j]) // before
-        before = pivot
-    return True
-
-
-def _falls(P: IntegerMatrix, A: Real) -> bool:
-    """Whether P - A^T P A > 0."""
-    N, shift = as_integers(A)
-    columns: Any = list(zip(*N, strict=True))
-    PN = [[sum(p * a for p, a in zip(row, column, strict=True)) for column in columns] for row in P]
-    across: Any = list(zip(*PN, strict=True))
-    scaled = [
-        [(P[i][j] << 2 * shift) - sum(a * p for a, p in zip(columns[i], across[j], strict=True)) for j in range(len(P))]
-        for i in range(len(P))
-    ]
-    return is_positive_definite(scaled)
