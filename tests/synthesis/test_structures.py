@@ -70,7 +70,10 @@ def test_the_delay_is_what_the_loop_bears():
 
 @pytest.fixture(scope="module")
 def found():
-    return design(LAB, "damping", structure="strain-rate")
+    """From two starts of six: what is found has to hold, and to be better than any start."""
+    with pytest.MonkeyPatch.context() as fewer:
+        fewer.setattr(law_design, "MOST_SEARCHES", 2)
+        return design(LAB, "damping", structure="strain-rate")
 
 
 def test_what_is_found_holds_and_has_the_radius_of_another_model(found):
@@ -89,7 +92,8 @@ def test_it_damps_better_than_where_the_search_began(found):
     assert all(-judge.score(form.law(rng.standard_normal(3))) <= found.value for _ in range(200))
 
 
-def test_a_design_is_saved_and_read_back(capsys, tmp_path):
+def test_a_design_is_saved_and_read_back(capsys, monkeypatch, tmp_path):
+    monkeypatch.setattr(law_design, "MOST_SEARCHES", 1)  # any law that holds will do
     file = tmp_path / "lead.toml"
     found = answer(capsys, "design", "sasaki2012-lab", "--structure", "lead", "--save", str(file))
     law = load_law(file)
