@@ -14,7 +14,7 @@ from tfarm.spectrum.box import Box, winding_number, zeros_in_box
 from tfarm.spectrum.complete_box import complete_box
 from tfarm.spectrum.continuation import Node, follow, predicted
 from tfarm.spectrum.correction import Member, improved
-from tfarm.spectrum.damped import damped_modes, member
+from tfarm.spectrum.damped import COMPANY, all_damped_modes, damped_modes, member
 
 
 def with_zeros(zeros, turning=0.0):
@@ -276,3 +276,19 @@ def test_a_listed_zero_that_is_none_is_told() -> None:
     function = with_zeros(conjugates(-0.01 + 1j, -0.01 + 3j))
     with pytest.raises(ConvergenceError, match="only"):
         complete_box(function, conjugates(-0.01 + 1j, -0.01 + 2j, -0.01 + 3j), np.empty((0, 2), complex), 0.0)
+
+
+def test_what_cannot_be_followed_is_not_sought_twice(monkeypatch):
+    """An answer asks for the same modes again and again, and giving up takes longest."""
+    sought = []
+
+    def lose(*args):
+        sought.append(args[2])
+        raise ConvergenceError("lost", args[1], 0.0)
+
+    monkeypatch.setattr("tfarm.spectrum.damped.follow", lose)
+    undamped = tfarm.modes(tfarm.load("sasaki2012-lab").having(damping=1.2345e-3), 4)
+    for _ in range(3):
+        with pytest.raises(ConvergenceError, match="lost"):
+            all_damped_modes(undamped)
+    assert len(sought) == len(COMPANY)

@@ -198,13 +198,18 @@ def all_damped_modes(undamped: Modes, companies: tuple[int, ...] = COMPANY) -> D
     """
     count = int(undamped.index.max(initial=0))
     found = _followed_once(undamped.arm, undamped.theory, count, companies) if count else None
+    if isinstance(found, ConvergenceError):
+        raise found.with_traceback(None)  # else the frames of every search for it stay
     return found if found is not None and found.undamped == undamped else Branches(companies)(undamped)
 
 
 @lru_cache(maxsize=LISTS_KEPT)  # loops, plants and simulations of one page ask for the same modes some ninety times
-def _followed_once(arm: Arm, theory: Theory, count: int, companies: tuple[int, ...]) -> DampedModes:
-    """All damped modes of an arm's own table of `count`."""
-    return Branches(companies)(modes(arm, count, theory=theory))
+def _followed_once(arm: Arm, theory: Theory, count: int, companies: tuple[int, ...]) -> DampedModes | ConvergenceError:
+    """All damped modes of an arm's own table of `count`, or why they cannot be followed: that takes longest."""
+    try:
+        return Branches(companies)(modes(arm, count, theory=theory))
+    except ConvergenceError as error:
+        return error.with_traceback(None)
 
 
 class Branches:
