@@ -69,7 +69,7 @@ def error(G, s, exact):
     return (abs(values[there] / exact[there] - 1) / (1 + condition)).max()
 
 
-@pytest.mark.parametrize(("drive", "s"), thinned(product(INPUTS, [130j, -4 + 900j, -60 + 0j, 1e-3j]), 3))
+@pytest.mark.parametrize(("drive", "s"), thinned(product(INPUTS, [130j, -4 + 900j, -60 + 0j, 1e-3j]), 5))
 def test_every_output_of_a_rig_with_everything(drive, s):
     arm = rig(input=drive)
     assert error(transfer_of(arm, 0.625), s, oracle(arm, s, 0.625)) < LOST
@@ -91,7 +91,7 @@ def test_no_current_is_known_without_a_motor_that_drives(arm):
         tfarm.transfer(arm, "motor_current")(1j)
 
 
-@pytest.mark.parametrize("seed", thinned(range(16), 2))
+@pytest.mark.parametrize("seed", thinned(range(16), 4))
 def test_every_output_of_random_rigs(seed):
     rng = np.random.default_rng([1, seed])
     arm = some_rig(rng)
@@ -119,7 +119,7 @@ def test_both_sides_of_a_joint_with_a_mass_on_it(side):
     assert error(tfarm.transfer(arm, wanted, x=0.25), s, exact.values()) < LOST
 
 
-@pytest.mark.parametrize(("drive", "s"), thinned(product(INPUTS, [250j, -4 + 900j]), 3))
+@pytest.mark.parametrize(("drive", "s"), thinned(product(INPUTS, [250j, -4 + 900j]), 5))
 def test_thirty_digits_by_balls(drive, s):
     arm = rig(input=drive)
     exact = oracle(arm, s, 0.625, 60)
@@ -156,7 +156,7 @@ def test_digits_of_elastic_links_with_another_loss(loss):
         assert (mpmath.mpf(im) != 0) == (exact.imag != 0)
 
 
-@pytest.mark.parametrize("seed", thinned(range(8), 2))
+@pytest.mark.parametrize("seed", thinned(range(8), 4))
 def test_derivatives_are_differences_of_the_oracle(seed):
     """Cauchy's integral has the error of a value over the circle's radius, |s| over the phase of all waves."""
     rng = np.random.default_rng([2, seed])
@@ -187,7 +187,7 @@ AT_REST = {
 }
 
 
-@pytest.mark.parametrize("name", thinned(AT_REST, 4))
+@pytest.mark.parametrize("name", thinned(AT_REST, 5))
 def test_the_expansion_at_rest(name):
     """From values at +-h and +-ih: powers s^-2 and s^0 stay in the mean of a pair, s^-1 and s in its difference."""
     arm = AT_REST[name]
@@ -215,8 +215,7 @@ def test_the_expansion_at_rest(name):
     assert (abs(found - exact) <= 1e-13 * abs(exact) + 1e-17 * sizes).all()
 
 
-@pytest.mark.parametrize("pieces", [2, 3, 7, 64])
-@pytest.mark.parametrize("name", ["sasaki2012", "stocky-steel"])
+@pytest.mark.parametrize(("name", "pieces"), thinned(product(["sasaki2012", "stocky-steel"], [2, 64, 3, 7]), 3))
 def test_an_arm_cut_into_equal_pieces(name, pieces):
     """Frequencies as of the uncut one, which is not solved as a chain; responses with its damping too."""
     arm = tfarm.load(name)
@@ -280,7 +279,7 @@ def test_what_is_zero_or_rigid_leaves_the_papers_arm():
     assert all(isinstance(system_of(replace(arm, **{name: part})), ElementChain) for name, part in more.items())
 
 
-@pytest.mark.parametrize("seed", thinned(range(12), 4))
+@pytest.mark.parametrize("seed", thinned(range(12), 6))
 def test_the_papers_arm_as_a_chain(seed):
     """One segment, solved as chains are: the closed form's frequencies, responses and expansions at rest."""
     rng = np.random.default_rng([3, seed])
@@ -304,7 +303,7 @@ def test_the_papers_arm_as_a_chain(seed):
 @pytest.mark.parametrize("theory", THEORIES)
 def test_the_frequencies_of_every_theory_are_sign_changes_of_the_determinant(theory):
     arm = replace(lossless(rig()), theory=theory)
-    for omega in tfarm.modes(arm, 8).natural_frequency:
+    for omega in tfarm.modes(arm, 3).natural_frequency:
         low, high = (determinant(arm, 1j * omega * (1 + shift)) for shift in (-1e-14, 1e-14))
         assert low.imag == high.imag == 0
         assert low.real * high.real < 0

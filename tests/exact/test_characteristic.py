@@ -68,9 +68,9 @@ def test_D_is_the_determinant_of_the_shot_arm_but_for_a_constant(case) -> None:
     arm = arm_at(case)
     k = coefficients(arm)
     for law in laws(case):
-        ours = balls(k, S, gains_under(k, law))
+        ours = balls(k, S[::2], gains_under(k, law))
         with mpmath.workdps(40):
-            ratio = [shot(arm, s, **law) / value for s, value in zip(S, ours, strict=True)]
+            ratio = [shot(arm, s, **law) / value for s, value in zip(S[::2], ours, strict=True)]
             assert max(abs(r / ratio[0] - 1) for r in ratio) < 1e-30
 
 

@@ -31,7 +31,7 @@ def inputs(arm):
     yield f"moment_pair@{low!r},{high!r}", ("moment_pair", low, high)
 
 
-@pytest.mark.parametrize(("arm", "s"), thinned([(arm, s) for arm in (BENCH, FLEX) for s in S], 2))
+@pytest.mark.parametrize(("arm", "s"), thinned([(arm, s) for arm in (BENCH, FLEX) for s in S], 4))
 def test_every_output_of_a_load(arm, s):
     for text, load in inputs(arm):
         for name, (theirs, shares) in READ.items():

@@ -10,6 +10,7 @@ from tests.shell import run
 from tfarm import HubFeedback, Law, ParameterError
 from tfarm.loop.law_locus import LawLocus
 from tfarm.loop.law_map import LawMap
+from tfarm.loop.law_stability import law_stability
 from tfarm.loop.locus import Locus, locus
 from tfarm.loop.regions import Region
 
@@ -58,7 +59,7 @@ def test_a_map_of_any_law_counts_the_unstable_poles_of_its_loops():
     assert isinstance(found, LawMap)
     for i, j in ((0, 0), (1, 2), (2, 1)):
         law = LAW.having("gain", ACROSS[i]).having("delay", UP[j])
-        assert tfarm.margins(LAB, law, found.band).stability.unstable_roots == found.unstable[j, i]
+        assert law_stability(LAB, law, found.band).unstable_roots == found.unstable[j, i]
     assert len(np.unique(found.unstable)) > 1
 
 

@@ -48,7 +48,7 @@ def test_where_nothing_is_lost_the_loop_is_marginal(arm):
 @pytest.mark.parametrize("arm", [ROOT, CLAMP, LAGGING], ids=lambda arm: arm.name)
 def test_the_map_is_what_the_verdict_says(arm):
     """Of finitely many unstable poles too: behind an inductance friction damps the modes that no gain reaches."""
-    K1, K2 = np.array([-3.0, -0.7, -0.3, 0.5]), np.array([-0.5, 0.3, 1.2, 10.5, 14.0])
+    K1, K2 = np.array([-0.7, -0.3, 0.5]), np.array([0.3, 1.2, 10.5, 14.0])
     found = region(arm, K1, K2)
     for row, b in enumerate(K2):
         for column, a in enumerate(K1):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.shared import thinned
+from tests.shared import remembered, thinned
 from tests.shell import run
 from tfarm import HubFeedback, Law, ParameterError
 from tfarm.loop.law_loop import LawLoop
@@ -17,6 +17,14 @@ from tfarm.loop.regions import between
 
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 LAW = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "tip_acceleration": ([0.05], [0.02, 1.0])}, delay=0.002)
+
+
+CORNERS = [  # the first is neither the first point of both ranges nor the last
+    ((-1.0, 2e6), (-1e6, 1.0)),
+    ((-1e6, 1.0), (-1.0, 2e6)),
+    ((-1e6, 1.0), (-1e6, 1.0)),
+    ((-1.0, 2e6), (-1.0, 2e6)),
+]
 
 
 @pytest.mark.parametrize(
@@ -39,12 +47,11 @@ def test_counts_are_those_of_full_searches(vary, x, y):
         assert law_stability(LAB, law, found.band).unstable_roots == found.unstable[j, i], law
 
 
-@pytest.mark.parametrize("x", [(-1e6, 1.0), (-1.0, 2e6)])
-@pytest.mark.parametrize("y", [(-1e6, 1.0), (-1.0, 2e6)])
+@pytest.mark.parametrize(("x", "y"), thinned(CORNERS, 4))
 def test_the_band_is_enough_for_each_corner(x, y):
     """The more a filter amplifies, the farther up it is to be looked: the largest number once at each of four ends."""
     vary = "hub_angle.num.0", "tip_acceleration.num.0"
-    found = law_map(LAB, LAW, vary, np.linspace(*x, 3), np.linspace(*y, 3))
+    found = law_map(LAB, LAW, vary, np.array(x), np.array(y))
     corners = [LAW.having(vary[0], a).having(vary[1], b) for a in x for b in y]
     assert found.band == max(band_for(LawLoop(LAB, law)) for law in corners)
 
@@ -52,7 +59,7 @@ def test_the_band_is_enough_for_each_corner(x, y):
 @pytest.mark.parametrize("vary", [("hub_angle.den.0", "gain"), ("gain", "hub_angle.den.0")])
 def test_where_a_filter_turns_over_a_pole_has_passed_infinity(vary):
     """With T < 0 in T s + 1 a pole is unstable that no crossing of the axis brought there."""
-    ranges = {"hub_angle.den.0": [-0.1, -0.03, -0.01, 0.01, 0.03], "gain": [-1.0, 1.0, 5.0, 20.0]}
+    ranges = {"hub_angle.den.0": [-0.1, -0.01, 0.03], "gain": [-1.0, 1.0, 20.0]}
     x, y = (np.array(ranges[each]) for each in vary)
     found = law_map(LAB, LAW, vary, x, y)
     for i, j in np.ndindex(x.size, y.size):
@@ -97,14 +104,15 @@ def test_what_is_no_pair_of_numbers_is_refused(vary, key):
     assert error.value.key == key
 
 
-def test_the_command_writes_what_the_map_says(capsys, tmp_path):
+def test_the_command_writes_what_the_map_says(capsys, tmp_path, monkeypatch):
+    monkeypatch.setattr("tfarm.loop.law_map.law_map", remembered(law_map))  # two commands ask for the same
     text = "[law]\ndelay = 0.002\n[law.hub_angle]\nnum = [2.0, 1.0]\nden = [0.01, 1.0]\n"
     (tmp_path / "law.toml").write_text(text)
-    ranges = ("--vary", "gain=0,9", "--vary", "delay=0,0.03", "--points", "5")
+    ranges = ("--vary", "gain=0,9", "--vary", "delay=0,0.03", "--points", "3")
     code, out, err = run(capsys, "map", "sasaki2012-lab", "--law", str(tmp_path / "law.toml"), *ranges, "--json")
     assert (code, err) == (0, "")
     law = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0])}, delay=0.002)
-    found = law_map(LAB, law, ("gain", "delay"), between(0, 9, 5), between(0, 0.03, 5))
+    found = law_map(LAB, law, ("gain", "delay"), between(0, 9, 3), between(0, 0.03, 3))
     assert json.loads(out)["unstable_roots"] == found.unstable.tolist()
     code, out, _ = run(
         capsys, "map", "sasaki2012-lab", "--law", str(tmp_path / "law.toml"), *ranges, "--csv", str(tmp_path / "m.csv")

@@ -11,6 +11,7 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 import tfarm
+from tests.shared import thinned
 from tfarm.loop.law_locus import inside, law_locus
 from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.law_rounded import rounded_law_locus
@@ -36,11 +37,14 @@ def stationary(low, high, sign):
 
 @pytest.mark.parametrize(
     ("start", "stop", "points", "low", "high", "sign"),
-    [
-        (1.0, 8.0, 8, -60.0, -12.0, 1),  # two real poles part as a pair
-        (8.0, 1.0, 8, -60.0, -12.0, 1),  # the other way round
-        (0.0, 60.0, 24, -2.0, -0.6, -1),  # a pair from s = 0 becomes two real poles, all in the first steps
-    ],
+    thinned(
+        [
+            (1.0, 8.0, 8, -60.0, -12.0, 1),  # two real poles part as a pair
+            (8.0, 1.0, 8, -60.0, -12.0, 1),  # the other way round
+            (0.0, 60.0, 24, -2.0, -0.6, -1),  # a pair from s = 0 becomes two real poles, all in the first steps
+        ],
+        2,
+    ),
     ids=["part", "meet", "from rest"],
 )
 def test_branches_reach_the_point_where_they_meet(start, stop, points, low, high, sign):

@@ -82,7 +82,7 @@ def test_the_edges_are_all_crossings_along_K2(name):
         assert n == m
 
 
-@pytest.mark.parametrize("name", thinned(RIGS, 4))
+@pytest.mark.parametrize("name", thinned(RIGS, 5))
 def test_a_pole_of_the_elements_crosses_at_each_edge(name):
     """Half a per cent to either side of K2_n, at two K1, it is as far from the axis near i w_n, on the right beyond."""
     arm = RIGS[name]

@@ -91,7 +91,7 @@ def test_random_loops_counted_again() -> None:
 
 
 def test_poles_are_proven_in_balls() -> None:
-    poles = poles_of_gains(LAB, HubFeedback(K1=0.3, K2=0.5, Kp=2.0), 4)
+    poles = poles_of_gains(LAB, HubFeedback(K1=0.3, K2=0.5, Kp=2.0), 2)
     discs = poles.certify(25)
     for disc, pole in zip(discs, poles.moving, strict=True):
         assert abs(complex(float(disc.re), float(disc.im)) / pole - 1) < 1e-13
@@ -196,11 +196,11 @@ def test_a_list_without_a_count_ends_at_the_shear_cut_off_where_fewer_than_ten_l
 def test_a_count_goes_on_into_shear_where_bending_is_overdamped() -> None:
     """With psi' = 0 as good as held: shear waves in a free tip's arm, pi c/L apart, c^2 = kappa G/rho."""
     arm = with_damping(ARM, 0.05)
-    poles = poles_of_gains(arm, LAW, 12)
+    poles = poles_of_gains(arm, LAW, 9)
     link = arm.link
     apart = math.pi / link.length * math.sqrt(link.shear_factor * link.shear_modulus / link.density)
-    np.testing.assert_allclose(np.diff(poles.values.imag[-8:]), apart, rtol=1e-3)
-    assert poles.values.size == 12
+    np.testing.assert_allclose(np.diff(poles.values.imag[-5:]), apart, rtol=1e-3)
+    assert poles.values.size == 9
 
 
 @pytest.mark.parametrize("K2", [0.0, -3.0])

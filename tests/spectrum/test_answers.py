@@ -5,13 +5,13 @@ from dataclasses import replace
 import pytest
 
 import tfarm
+from tests.shared import thinned
 from tfarm.columns import JSON, TERMINAL
 from tfarm.errors import MISSING
 from tfarm.spectrum.answers import modes_answer
 
 LAB, RIG = tfarm.load("sasaki2012-lab"), tfarm.load("quanser-2dsfl")
 RUBBED = replace(LAB, name="rubbed", hub=replace(LAB.hub, friction=0.4))
-LOST = RIG.having(damping=0.02)  # so much damping that its last modes are followed no more
 
 
 def column(answer, key, output=JSON):
@@ -19,7 +19,7 @@ def column(answer, key, output=JSON):
     return found.of
 
 
-@pytest.mark.parametrize(("arm", "count"), [(LAB, 4), (LAB.having(damping=1e-3), 8), (RUBBED, 4)])
+@pytest.mark.parametrize(("arm", "count"), thinned([(LAB.having(damping=1e-3), 8), (LAB, 4), (RUBBED, 4)], 2))
 def test_each_disc_is_in_the_row_of_its_eigenvalue(arm, count):
     answer = modes_answer(tfarm.modes(arm, count), 15, certify=True)
     single, double, discs = (column(answer, key) for key in ("eigenvalue", "eigenvalues", "discs"))
@@ -38,9 +38,10 @@ def test_each_disc_is_in_the_row_of_its_eigenvalue(arm, count):
     assert compared >= count - 3
 
 
-def test_modes_that_are_not_followed_have_their_rows():
+def test_modes_that_are_not_followed_have_their_rows(monkeypatch):
     """They keep their frequency; nothing is said of their damping."""
-    modes = tfarm.modes(LOST, 4)
+    monkeypatch.setattr("tfarm.spectrum.damped.FEWER_MODES", (2, 1))  # as if of more branches were lost
+    modes = tfarm.modes(RIG, 4)
     followed = len(tfarm.damped_modes(modes).index)
     assert followed < len(modes)
     answer = modes_answer(modes, None)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import tfarm
+from tests.shared import sized
 from tfarm import Arm, CertificationError, Hub, Payload
 from tfarm.exact import appendix
 from tfarm.exact.coefficients import coefficients
@@ -108,9 +109,10 @@ def random_arm(generator: np.random.Generator) -> Arm:
     return Arm(link=link, hub=hub, payload=Payload(mass=inertia(beam), inertia=inertia(0.01 * beam * length**2)))
 
 
-def test_random_arms_are_certified_and_agree_with_the_count() -> None:
+@pytest.mark.parametrize("number", sized(38, 150))
+def test_random_arms_are_certified_and_agree_with_the_count(number: int) -> None:
     generator = np.random.default_rng(20261121)
-    for _ in range(150):
+    for _ in range(number):
         arm = random_arm(generator)
         modes = tfarm.modes(arm, 20)
         proof = modes.certify(17)

@@ -79,7 +79,7 @@ def test_sixty_modes_of_the_lab_arm() -> None:
 # ------------------------------------------------------------ other solutions
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", thinned(range(6), 3))
 def test_a_galerkin_model_has_the_low_modes(seed: int) -> None:
     rng = np.random.default_rng(seed)
     arm = some_arm(rng, damping=0.0, slenderness=(5, 100))
@@ -98,8 +98,8 @@ def test_the_papers_determinant_vanishes_there(overdamping: float) -> None:
         ("some", "zero", "infinite"),
     ):
         arm = some_arm(rng, case, damping=0.0, slenderness=(8, 80))
-        arm = with_damping(arm, 2 * overdamping / float(tfarm.modes(arm, 5).natural_frequency[-1]))
-        damped = listed(arm, 5)
+        arm = with_damping(arm, 2 * overdamping / float(tfarm.modes(arm, 3).natural_frequency[-1]))
+        damped = listed(arm, 3)
         steps = [newton_step(arm, zero) for zero in pairs(damped).ravel()]
         assert max(steps) < 1e-14, (case, steps)
 
@@ -111,7 +111,7 @@ ENDS = [(math.inf, 0.0, 0.0), (0.0, 0.0, 0.0), (0.7, 0.5, 2.0), (2.0, math.inf, 
 WITHOUT_SHEAR = [(theory, *ends) for theory in ("euler-bernoulli", "rayleigh") for ends in ENDS]
 
 
-@pytest.mark.parametrize(("theory", "hub", "mass", "inertia"), thinned(WITHOUT_SHEAR, 3))
+@pytest.mark.parametrize(("theory", "hub", "mass", "inertia"), thinned(WITHOUT_SHEAR, 5))
 def test_without_shear_damping_is_proportional(theory, hub, mass, inertia) -> None:
     """All the stiffness is damped, and no inertia is: s^2 + w^2 (1 + C s) = 0 whatever the ends carry."""
     rigid = damped_arm(0.0, hub=hub, mass=mass, inertia=inertia)
@@ -129,7 +129,7 @@ def test_without_shear_damping_is_proportional(theory, hub, mass, inertia) -> No
 WAVES = list(product(("timoshenko", "shear", "rayleigh", "euler-bernoulli"), (5.0, 30.0)))
 
 
-@pytest.mark.parametrize(("theory", "slenderness"), thinned(WAVES, 4))
+@pytest.mark.parametrize(("theory", "slenderness"), thinned(WAVES, 8))
 def test_sine_waves_between_two_pins(theory: str, slenderness: float) -> None:
     """Every eigenvalue listed is a root of a wave's polynomial, and every root in the box is listed."""
     link = damped_arm(0.0, slenderness=slenderness).link
@@ -149,21 +149,21 @@ def test_slow_and_fast_zeros_of_overdamped_sine_waves() -> None:
     """Slow ones lie left of -1/C and tend to it; each pair is of one wave, in shear where its fast zero met a third."""
     C = 3e-3
     arm = pinned(damped_arm(C, slenderness=200.0).link)
-    damped = listed(arm, 12)
+    damped = listed(arm, 8)
     overdamped = damped.is_overdamped
     np.testing.assert_array_equal(damped.index[overdamped], [4, 5, 6])
     slow, fast = damped.eigenvalues[overdamped].real.T
     assert (slow < -1 / C).all()
     assert (np.diff(slow) > 0).all()
     assert (fast < slow).all()
-    for wave, pair in zip(sine_waves(arm, 12)[0], damped.eigenvalues, strict=True):
+    for wave, pair in zip(sine_waves(arm, 8)[0], damped.eigenvalues, strict=True):
         assert nearest_apart(pair, wave).max() < 1e-9
 
 
 # ------------------------------------------------------------ perturbation, symmetry, continuity
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", thinned(range(5), 3))
 def test_little_damping_takes_the_bending_share_of_the_energy(seed: int) -> None:
     """Re s = -C w^2 d ln w/d ln E to first order (G held), Im s = w: the error falls with C^2."""
     arm = some_arm(np.random.default_rng(seed), damping=0.0, slenderness=(5, 40))
@@ -188,7 +188,7 @@ def test_no_damping_leaves_the_modes_on_the_axis() -> None:
     assert damped.count == 2 * 8 + 2
 
 
-@pytest.mark.parametrize("seed", thinned(range(8), 3))
+@pytest.mark.parametrize("seed", thinned(range(8), 4))
 def test_pairs_are_conjugate_or_real_and_all_decay(seed: int) -> None:
     arm = some_arm(np.random.default_rng(seed), damping=float(10 ** np.random.default_rng(seed).uniform(-7, -3)))
     damped = listed(arm, 15)
@@ -284,7 +284,7 @@ def test_residues_are_products_of_shapes(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("hub", "mass"), thinned([(0.3, 0.4), (0.0, 0.4), (math.inf, 0.0), (math.inf, 0.4), (0.5, math.inf)], 2)
+    ("hub", "mass"), thinned([(0.3, 0.4), (0.0, 0.4), (math.inf, 0.0), (math.inf, 0.4), (0.5, math.inf)], 4)
 )
 def test_shapes_tend_to_the_undamped_ones(hub: float, mass: float) -> None:
     arm = damped_arm(1e-12, hub=hub, mass=mass, inertia=0.2, slenderness=20.0)
@@ -307,13 +307,13 @@ def test_shapes_are_conjugate_and_of_the_shape_of_x() -> None:
 
 
 def test_modes_that_cannot_be_followed_are_counted_in_the_record(monkeypatch) -> None:
-    """As the command line answers: the first four of six, each as if four had been asked for, and proven."""
-    monkeypatch.setattr("tfarm.spectrum.damped.FEWER_MODES", (4, 2))
-    undamped = tfarm.modes(tfarm.load("sasaki2012-lab"), 6)
-    few, four = damped_modes(undamped), damped_modes(tfarm.modes(undamped.arm, 4))
-    assert (few.left_out, four.left_out) == (2, 0)
-    np.testing.assert_array_equal(few.eigenvalues, four.eigenvalues)
-    assert len(few.certify()) == 4
+    """As the command line answers: the first two of four, each as if two had been asked for, and proven."""
+    monkeypatch.setattr("tfarm.spectrum.damped.FEWER_MODES", (2, 1))
+    undamped = tfarm.modes(tfarm.load("sasaki2012-lab"), 4)
+    few, two = damped_modes(undamped), damped_modes(tfarm.modes(undamped.arm, 2))
+    assert (few.left_out, two.left_out) == (2, 0)
+    np.testing.assert_array_equal(few.eigenvalues, two.eigenvalues)
+    assert len(few.certify()) == 2
 
 
 # ------------------------------------------------------------ many dampings of one arm
@@ -324,7 +324,7 @@ def test_branches_go_on_from_where_they_were(monkeypatch) -> None:
     from tfarm.spectrum import damped as module
 
     arm, begun, follow = tfarm.load("sasaki2012-lab"), [], module.follow
-    table = [tfarm.modes(with_damping(arm, C), 9) for C in (4e-4, 1e-5, 3e-4, 3.00001e-4, 1e-3, 4e-4)]
+    table = [tfarm.modes(with_damping(arm, C), 4) for C in (4e-4, 1e-5, 3e-4, 3.00001e-4, 1e-3, 4e-4)]
     fresh = [all_damped_modes(each).eigenvalues for each in table]
     monkeypatch.setattr(module, "follow", lambda *args: begun.append(args[1].at) or follow(*args))
     branches = Branches()

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.shared import thinned
+from tests.shared import sized, thinned
 from tests.spectrum.damped import pairs
 from tests.spectrum.damped_roads import delta, newton_root, newton_step, pinned, ritz_eigenvalues, sine_waves
 from tests.spectrum.test_damped import damped_arm, listed
@@ -142,8 +142,9 @@ def test_rouches_theorem_is_right_about_discs_of_any_size() -> None:
 # ------------------------------------------------------------ counts
 
 
+@pytest.mark.parametrize("boxes", sized(1, 2))
 @pytest.mark.parametrize("theory", thinned(["timoshenko", "shear", "euler-bernoulli"], 3))
-def test_counts_of_sine_waves_are_those_of_the_closed_form(theory: str) -> None:
+def test_counts_of_sine_waves_are_those_of_the_closed_form(theory: str, boxes: int) -> None:
     rng = np.random.default_rng(31)
     link = damped_arm(0.0, slenderness=15.0).link
     first = tfarm.modes(pinned(link), 1).natural_frequency[-1]
@@ -151,7 +152,7 @@ def test_counts_of_sine_waves_are_those_of_the_closed_form(theory: str) -> None:
         arm = pinned(replace(link, damping=Cw / float(first)))
         k = coefficients(arm, theory)
         exact = np.concatenate([part.ravel() for part in sine_waves(arm, 200, theory)])
-        for _ in range(2):
+        for _ in range(boxes):
             height = float(first * 10 ** rng.uniform(-0.5, 1.2))
             reach = height * float(rng.uniform(0.05, 1.5))
             box = box_of(height, min(reach, 0.9 * float(first) / Cw) if Cw else reach)
@@ -159,13 +160,14 @@ def test_counts_of_sine_waves_are_those_of_the_closed_form(theory: str) -> None:
             assert proven_count(k, box) == inside, (Cw, box)
 
 
+@pytest.mark.parametrize("boxes", sized(1, 2))
 @pytest.mark.parametrize(("hub", "mass"), thinned([(0.0, 0.4), (math.inf, 0.0), (0.5, math.inf)], 3))
-def test_counts_are_those_of_a_galerkin_model(hub: float, mass: float) -> None:
+def test_counts_are_those_of_a_galerkin_model(hub: float, mass: float, boxes: int) -> None:
     rng = np.random.default_rng(32)
     arm = damped_arm(4e-5, hub=hub, mass=mass, inertia=0.2, slenderness=12.0)
     k = coefficients(arm)
     theirs = ritz_eigenvalues(arm, 48)
-    for _ in range(2):
+    for _ in range(boxes):
         height = float(10 ** rng.uniform(2.5, 4.2))
         box = Box(-min(0.9 / 4e-5, height * float(rng.uniform(0.2, 3))), height * 0.3, -height, height)
         assert proven_count(k, box) == box.holds(theirs).sum() + zeros_at_origin(k)
@@ -202,7 +204,7 @@ def test_a_loop_has_as_many_unstable_poles_as_the_papers_matrix(K1: float, K2: f
     """Undamped: K2 > 1 and K1 < 0 destabilise (a strip beside the axis is left out)."""
     arm = tfarm.load("sasaki2012")
     k = coefficients(arm)
-    box = Box(0.5, 100.0, -700.0, 700.0)
+    box = Box(0.5, 100.0, -100.0, 100.0)
     assert turns_of_ratio(arm, box, K1=K1, K2=K2) == unstable
     assert proven_count(k, box, gains_of(k, HubFeedback(K1=K1, K2=K2))) == unstable
 
@@ -219,11 +221,10 @@ def one_line(error) -> str:
 
 def test_a_box_through_a_zero_is_refused() -> None:
     k = coefficients(LAB)
-    zero = pairs(listed(LAB, 3))[1, 0]
+    zero = pairs(listed(LAB, 3))[0, 0]
     for box in (
         Box(-50.0, 30.0, -zero.imag, zero.imag),
-        Box(float(zero.real), 30.0, -300.0, 300.0),
-        Box(-50.0, float(zero.real), -300.0, 300.0),
+        Box(float(zero.real), 30.0, -150.0, 150.0),
         Box(-50.0, 0.0, -300.0, 300.0),  # through the origin's double zero
     ):
         with pytest.raises(CertificationError) as refused:
@@ -262,7 +263,7 @@ def test_a_forged_list_is_refused(name: str) -> None:
 
 @pytest.mark.parametrize("change", [1])
 def test_a_wrong_count_or_box_is_refused(change: int) -> None:
-    damped = listed(LAB, 4)
+    damped = listed(LAB, 3)
     with pytest.raises(CertificationError, match="are there"):
         replace(damped, count=damped.count + change).certify()
     lower = Box(damped.box.re_min, damped.box.re_max, damped.box.im_min * 0.6, damped.box.im_max * 0.6)

@@ -14,6 +14,7 @@ from tfarm.dsp.chain import Sampling
 from tfarm.dsp.loop import sampled_loop
 from tfarm.dsp.verdict import sampled_verdict
 from tfarm.errors import ParameterError
+from tfarm.loop.stability import stability
 from tfarm.spectrum.scales import (
     DEFAULT_DIGITS,
     OF_THE_PAPER,
@@ -115,7 +116,7 @@ def test_a_hub_without_inertia_has_no_moment_gain(capsys, tmp_path):
     file.write_text(tfarm.arm.to_toml(pin), encoding="utf-8")
     found = answer(capsys, "margins", str(file))
     assert (found["K1"], found["K2"]) == (default_gains(pin).K1, 0.0)
-    assert tfarm.margins(pin, HubFeedback(K1=found["K1"])).stability.verdict == found["verdict"]
+    assert stability(pin, HubFeedback(K1=found["K1"])).verdict == found["verdict"]
 
 
 VERBS = [
