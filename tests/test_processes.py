@@ -1,8 +1,6 @@
 """Two processes at the lists of work: each keeps to one while there is work on it, and none waits at the end."""
 
 import os
-import subprocess
-import sys
 from concurrent.futures import Executor, Future
 
 import pytest
@@ -75,11 +73,3 @@ def test_new_processes_have_one_thread_of_blas_unless_the_user_chose(monkeypatch
         with one_thread_each():
             assert os.environ[BLAS] == inside
         assert os.environ.get(BLAS) == chosen
-
-
-def test_a_process_that_makes_pages_loads_neither_sympy_nor_altair_nor_statistics():
-    """Each takes a second, or half of one: the audit alone wants the first, the pages' shared scripts the next."""
-    heavy = ("sympy", "altair", "scipy.stats", "scipy.signal", "control")
-    code = f"import sys, tfarm.report.writing; print([name for name in {heavy} if name in sys.modules])"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"

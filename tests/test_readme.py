@@ -86,10 +86,12 @@ def test_shell_examples_run(
 def test_the_example_of_a_report_runs(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """With two of its sections and no proof; a report with all of them is that of tests/report."""
+    """With two of its sections, no proof, no live page and empty scripts; the whole is the report of tests/report."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(making, "save_proof", lambda *_: None)
-    pieces = [each for each in making.ARM_PIECES if each.name in ("the arm", "margins")]
+    for dear in ("save_proof", "save_live"):
+        monkeypatch.setattr(making, dear, lambda *_: None)
+    monkeypatch.setattr(making, "write_assets", lambda folder, _: (folder.mkdir(), (folder / "live.js").touch()))
+    pieces = [each for each in making.ARM_PIECES if each.name in ("the arm", "root moment")]
     monkeypatch.setattr(making, "ARM_PIECES", pieces)
     (line,) = (line for line in COMMANDS if line.startswith("tfarm report "))
     code, out, err = run(capsys, *shlex.split(line)[1:])

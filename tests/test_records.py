@@ -177,7 +177,7 @@ def test_a_few_numbers_by_name_are_shown() -> None:
 
 def test_no_figure_is_cut() -> None:
     """Digits that hold, not those of a double: an edge of a sampled loop in the repr of all that is said of it."""
-    found = tfarm.sampled(LAB, LAW)
+    found = analyse(LAB, LAW, count=4)
     assert f"delay='{found.delay.text}', damping='{found.damping.text}'" in repr(found)
     assert "..." not in repr(found).replace("(...)", "")
 

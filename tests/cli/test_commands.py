@@ -208,7 +208,9 @@ def test_commands_that_print_json_load_nothing_heavy(arguments: list[str]) -> No
     assert done.stderr.strip() == "[]"
 
 
-def test_a_reader_that_leaves_early_is_no_error() -> None:
+@pytest.mark.survey
+def test_a_reader_that_leaves_after_a_line_is_no_error() -> None:
+    """One that leaves before the first is in test_streams."""
     command = (
         f"{sys.executable} -c 'from tfarm.cli import main; main()' response sasaki2012 --output hub_rate | head -n 1"
     )

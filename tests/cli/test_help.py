@@ -76,5 +76,5 @@ def test_an_unknown_shell_is_one_line(capsys):
 def test_the_version_is_said_by_every_way_in(capsys):
     assert run(capsys, "--version") == (0, f"tfarm {tfarm.__version__}\n", "")
     done = subprocess.run([sys.executable, "-m", "tfarm", "--version"], capture_output=True, text=True, check=True)
-    assert done.stdout == f"tfarm {tfarm.__version__}\n"
+    assert (done.stdout, done.stderr) == (f"tfarm {tfarm.__version__}\n", "")
     assert "--version" in run(capsys, "--help")[1]

@@ -10,9 +10,9 @@ from tests.cli import fuzz
 
 
 def test_odd_files_and_options_end_in_one_line():
-    """Files that are read, files that are not, and an odd option; the whole survey is `make survey`."""
-    found = fuzz.survey(4, 4)
-    assert [each.wrong for each in found] == [""] * 5
+    """A file that is read, one that is not, and an odd option; the whole survey is `make survey`."""
+    found = fuzz.survey(2, 4)
+    assert [each.wrong for each in found] == [""] * 3
     assert {each.code for each in found} >= {0, 2}
 
 

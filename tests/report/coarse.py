@@ -5,7 +5,7 @@ from tfarm.dsp import loci as sampled_loci
 from tfarm.dsp import periods
 from tfarm.dsp import regions as sampled_regions
 from tfarm.loop import loci
-from tfarm.report import making, map
+from tfarm.report import assumptions_section, card, making, map
 
 COARSE = (
     (map, "GRID_COLUMNS", 48),
@@ -16,6 +16,7 @@ COARSE = (
     (loci, "LOCUS_POINTS", 60),
     (sampled_loci, "SAMPLED_LOCUS_VALUES", 31),
     (periods, "PERIOD_SHARES", (1.0, 5.0)),
+    (assumptions_section, "CURVE_POINTS", 9),
     (making, "MOST_WORKERS", 1),  # a second process would have its own grids
 )
 
@@ -24,3 +25,10 @@ def coarsen(put=setattr):
     """Put the coarse grids in place, for good or, with a MonkeyPatch's setattr, until it is undone."""
     for room, name, value in COARSE:
         put(room, name, value)
+
+
+def plain_cards(put):
+    """Cards of the index with an empty picture, for tests that are not about it: a response and a drawing each."""
+    put(card, "bode", lambda *_: None)
+    put(card, "draw_card", lambda _: None)
+    put(card, "save_figure", lambda _, folder, stem, formats: (folder / f"{stem}.svg").write_text("<svg/>"))

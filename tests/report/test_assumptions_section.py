@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import tfarm
+from tests.report.coarse import coarsen
 from tfarm.audit.assumptions import hub_study, section_study
 from tfarm.report.assumptions_section import assumptions_section
 
@@ -58,7 +59,8 @@ def test_the_pictures_run_over_all_candidates_and_through_the_arm(section):
 
 
 @pytest.mark.parametrize(("inertia", "word"), [(math.inf, "locked"), (0.0, "a free pin")])
-def test_a_hub_without_an_inertia_is_said_openly(inertia, word):
+def test_a_hub_without_an_inertia_is_said_openly(inertia, word, monkeypatch):
+    coarsen(monkeypatch.setattr)
     arm = replace(tfarm.load("stocky-steel"), hub=tfarm.Hub(inertia=inertia))
     section = assumptions_section(arm)
     assert section.words[-1] == f"The hub of this arm is {word}, so there is no inertia to choose."

@@ -3,6 +3,7 @@
 import json
 import math
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import control
@@ -11,6 +12,7 @@ import pytest
 
 import tfarm
 from tests.hostile import check_page
+from tests.report.coarse import plain_cards
 from tests.shared import sized
 from tests.shell import answer, run
 from tfarm import HubFeedback, Law, ParameterError
@@ -20,6 +22,7 @@ from tfarm.dsp.law_loop import sampled_law
 from tfarm.dsp.law_verdict import law_verdict
 from tfarm.errors import one_line
 from tfarm.fitting.runs import beside_exact, load_run, overshoot
+from tfarm.loop import closed
 from tfarm.report import law_sampled_section as in_time
 from tfarm.report import making, writing
 from tfarm.report.given_laws import GivenLaw, Subject, on_arm
@@ -70,7 +73,8 @@ def table(section, stem):
 # ------------------------------------------------------------ numbers
 
 
-def test_margins_on_the_page_are_those_of_the_command(capsys, file, given):
+def test_margins_on_the_page_are_those_of_the_command(capsys, file, given, monkeypatch):
+    monkeypatch.setattr(closed, "law_windows", cache(closed.law_windows))  # of the same loop both times
     section, found = law_margins_section(LAB, Chain(), given), answer(capsys, "margins", LAB.name, "--law", str(file))
     shown = table(section, "margins")
     exact = dict(zip(shown["quantity"], shown["law_exact"], strict=True))
@@ -151,6 +155,7 @@ def test_every_entry_is_in_the_table_with_every_digit(given):
 
 
 def test_a_page_is_about_its_law_and_its_file_says_it_again(file, tmp_path, monkeypatch, capsys):
+    plain_cards(monkeypatch.setattr)
     few = [piece for piece in making.LAW_PIECES if piece.anchor == "law"]
     monkeypatch.setattr(making, "LAW_PIECES", few)
     code, out, err = run(

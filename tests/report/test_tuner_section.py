@@ -4,6 +4,7 @@ import math
 import pickle
 import re
 from dataclasses import replace
+from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
@@ -25,14 +26,24 @@ from tfarm.report.tuner_section import section_of, tuner_section
 from tfarm.report.writing import _write_pages
 from tfarm.tuner import Learning, Plan, initial_network, train, tried_loops, tune
 from tfarm.tuner import overview as study_module
+from tfarm.tuner import tuning as tuning_room
 from tfarm.tuner.overview import NOMINAL, CostMap, tuner_study
 
 LAB = tfarm.load("sasaki2012-lab")
 SEEDS = 3
 
 
+@pytest.fixture(scope="module", autouse=True)
+def each_loop_once():
+    """The guard and the best constant gain of a loop, which every tuning asks for, are found once."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ("find_guard", "best_constant"):
+            patch.setattr(tuning_room, name, cache(getattr(tuning_room, name)))
+        yield
+
+
 @pytest.fixture(scope="module")
-def small(tmp_path_factory):
+def small(each_loop_once, tmp_path_factory):
     """The section and its numbers with few seeds, few trials and the first four conditions."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(study_module, "CURVE_SEEDS", SEEDS)

@@ -19,7 +19,7 @@ import pytest
 
 import tfarm
 from tests.hostile import LONG, NAME, PRINTED, check_drawing, check_page
-from tests.report.coarse import coarsen
+from tests.report.coarse import coarsen, plain_cards
 from tests.report.full import ARM
 from tests.shell import run
 from tfarm import processes
@@ -42,6 +42,7 @@ from tfarm.spectrum.scales import default_gains
 
 ANCHORS = {piece.anchor for piece in making.ARM_PIECES}
 HELD = replace(ARM, hub=tfarm.Hub(inertia=math.inf))  # no loop: its proofs are quick
+validated = cache(lambda: tuple(validate()))  # as this process has it
 
 
 def files_of(folder):
@@ -96,7 +97,7 @@ def test_another_process_with_other_hashes_writes_the_same_bytes(pages, audit_ro
         files_of(made)
     )
     assert {name: there[name] == content for name, content in files_of(made).items() if there[name] != content} == {}
-    write_trust(Evidence(audit=audit_rows, published=validate()), written_proofs(pages), tmp_path / "trust")
+    write_trust(Evidence(audit=audit_rows, published=validated()), written_proofs(pages), tmp_path / "trust")
     assert files_of(tmp_path / "trust") == files_of(pages / "trust")
     index = index_page(written_cards(pages), trust="trust/index.html")
     assert (pages / "index.html").read_text(encoding="utf-8") == index
@@ -219,6 +220,7 @@ def test_the_pages_of_an_arm_lead_to_each_other(tmp_path, monkeypatch):
     piece = next(piece for piece in making.ARM_PIECES if piece.name == "the arm")
     monkeypatch.setattr(making, "ARM_PIECES", (piece,))
     monkeypatch.setattr(making, "save_proof", lambda *_: None)
+    plain_cards(monkeypatch.setattr)
     write([replace(ARM, name="plain")], tmp_path, only=("modes", "bode"))
     assert "bode.html" in Links(tmp_path / "plain" / "modes.html").targets
     assert "modes.html" in Links(tmp_path / "plain" / "bode.html").targets
@@ -417,6 +419,7 @@ def quick(monkeypatch):
     for pieces in ("ARM_PIECES", "LAW_PIECES"):
         monkeypatch.setattr(making, pieces, (piece,))
     monkeypatch.setattr(making, "save_proof", lambda *_: None)
+    plain_cards(monkeypatch.setattr)
 
 
 def made_of(monkeypatch, arm, out, **options):
@@ -476,7 +479,7 @@ def test_a_page_that_leaves_a_section_out_is_tried_again(tmp_path, monkeypatch):
 
 
 def test_the_evidence_is_kept_for_the_same_tfarm_only(pages, audit_rows, monkeypatch):
-    assert kept_evidence(pages / "trust") == Evidence(audit=tuple(audit_rows), published=tuple(validate()))
+    assert kept_evidence(pages / "trust") == Evidence(audit=tuple(audit_rows), published=validated())
     monkeypatch.setattr(trust, "makers", lambda: "another tfarm")
     assert kept_evidence(pages / "trust") is None
     assert kept_evidence(pages / NAME) is None
@@ -519,6 +522,7 @@ def test_a_page_is_about_the_arms_own_file(tmp_path, monkeypatch, capsys):
 
     monkeypatch.setattr(making, "ARM_PIECES", (making.Piece("s", "sampled", ("sampled",), section, is_sampled=True),))
     monkeypatch.setattr(making, "save_proof", lambda *_: None)
+    plain_cards(monkeypatch.setattr)
     file = tmp_path / "bench.toml"
     tables = "[sampling]\nperiod = 0.004\n[converters]\nmoment_bits = 12\nmoment_range = 5.0\n[slew]\ntravel = 0.7\n"
     file.write_text(to_toml(ARM) + tables, encoding="utf-8")
@@ -537,6 +541,7 @@ def without_a_section(monkeypatch, error):
     broken = replace(pieces["root loci"], make=Unmakeable(error))
     monkeypatch.setattr(making, "ARM_PIECES", (pieces["the arm"], broken))
     monkeypatch.setattr(making, "save_proof", lambda *_: None)
+    plain_cards(monkeypatch.setattr)
 
 
 @pytest.mark.parametrize(
@@ -650,7 +655,8 @@ def test_a_plain_script_starts_no_processes(monkeypatch):
 # ------------------------------------------------------------ odd arms, the README
 
 
-def test_an_arm_that_cannot_turn_nor_move_its_tip_is_reported_on_too(tmp_path):
+def test_an_arm_that_cannot_turn_nor_move_its_tip_is_reported_on_too(tmp_path, monkeypatch):
+    plain_cards(monkeypatch.setattr)
     arm = replace(
         ARM,
         name="held",
@@ -666,7 +672,8 @@ def test_an_arm_that_cannot_turn_nor_move_its_tip_is_reported_on_too(tmp_path):
     assert "states no assumptions" in text
 
 
-def test_the_pictures_of_the_readme(tmp_path):
+def test_the_pictures_of_the_readme(tmp_path, monkeypatch):
+    coarsen(monkeypatch.setattr)
     paths = readme_pictures(tmp_path)
     assert [path.name for path in paths] == ["bode-root-moment.png", "gains.png", "mode-shapes.png"]
     kept = Path(__file__).parents[2] / "reports" / "pictures"

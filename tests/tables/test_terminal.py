@@ -71,14 +71,16 @@ def test_a_heading_has_the_unit_and_cells_the_digits_of_a_terminal():
     ]
 
 
-WITH_ROWS = """
+BOTH = """
 import pickle, sys
 from tfarm.audit import paper
 with open(sys.argv.pop(), "rb") as file:
     rows = pickle.load(file)
 paper.audit = lambda: rows
-from tfarm.cli import main
-main()
+from tfarm.cli.running import run
+for words in (["modes", "sasaki2012-lab", "--count", "3"], ["audit"]):
+    assert run(words) == 0
+    print("----")
 """
 
 
@@ -101,10 +103,9 @@ def in_a_terminal(*arguments):
 
 def test_modes_and_audit_answer_within_80_columns(audit_file):
     """All digits of all frequencies, in rad/s and Hz, and all verdicts; the same as in a pipe."""
-    text = in_a_terminal("-m", "tfarm", "modes", "sasaki2012-lab", "--count", "3")
+    text, rows, _ = in_a_terminal("-c", BOTH, str(audit_file)).split("----\n")
     assert max(map(len, re.findall(r"^ .*$", text, flags=re.MULTILINE))) <= 80
     for number in ("71.5056824669", "11.3804828", "-0.25564562 + 71.50522553i", "0.00357518", "1332.3"):
         assert number in text
-    text = in_a_terminal("-c", WITH_ROWS, "audit", str(audit_file))
-    assert "…" not in text
-    assert len(re.findall(r"^ *\S.*  (confirmed|corrected|contradictory|\w+)", text, flags=re.MULTILINE)) >= 23
+    assert "…" not in rows
+    assert len(re.findall(r"^ *\S.*  (confirmed|corrected|contradictory|\w+)", rows, flags=re.MULTILINE)) >= 23
