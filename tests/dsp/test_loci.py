@@ -48,6 +48,15 @@ def test_each_point_of_a_locus_is_a_pole_of_its_loop(found):
     assert [found.is_aliased(mode) for mode in (1, 2, 3)] == [bool(hertz[mode] > 50.0) for mode in (1, 2, 3)]
 
 
+def test_a_branch_is_named_after_the_mode_whose_pole_it_leaves(found):
+    """With next to no gain, which moves a pole by less than 1e-4, both branches of a mode lie at e^{pT} of its pair."""
+    eigenvalues = tfarm.damped_modes(tfarm.modes(LAB, 6)).eigenvalues
+    start, mode = found.alone.z[0], found.alone.mode
+    for number, pair in zip(range(1, 7), eigenvalues[-6:], strict=True):
+        mine = np.sort_complex(start[mode == number])
+        np.testing.assert_allclose(mine, np.sort_complex(np.exp(pair * 0.01)), rtol=0, atol=1e-4)
+
+
 def test_a_strip_chart_lasts_twice_the_slew():
     ideal = slews(LAB, GAINS, Chain(slew=Slew(rise_time=0.8)), 6)
     chart = strip_chart(LAB, GAINS, ideal.with_moment, 6)
