@@ -8,6 +8,7 @@ number of K only (as least squares without normal equations: Higham 2002, chapte
 
 import math
 from dataclasses import dataclass
+from functools import cache, cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -74,7 +75,12 @@ class Model:
     by_angle: dict  # of each of the four the column of a held angle, else of zeros
     pieces: tuple  # (link, left, right) from the clamp to the tip
 
-    def reading(self, x, kind):
+    @cached_property
+    def reading(self):
+        """`_reading`, each worked out once: it is the same at every s."""
+        return cache(self._reading)
+
+    def _reading(self, x, kind):
         """The row over all motions of "w", "w'", "psi" or "psi'" at x [m] from the clamp (on the outer element)."""
         n = max(i for i, (_, left, _) in enumerate(self.pieces) if left <= x or i == 0)
         _, left, right = self.pieces[n]

@@ -15,6 +15,7 @@ from tests.shared import thinned
 from tests.shell import answer, run
 from tfarm.arm.keys import KeyedArms
 from tfarm.errors import ParameterError
+from tfarm.fitting import solve
 from tfarm.fitting.answers import resonances
 from tfarm.fitting.fit import fit
 from tfarm.fitting.noise import noise_of
@@ -77,7 +78,7 @@ def test_of_a_product_only_the_product_is_known():
     assert product == pytest.approx(LAB.link.youngs_modulus * LAB.link.section.second_moment, rel=1e-3)
 
 
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", thinned([0, 1], 2))  # E and the density; E and I, as in the test before
 def test_planted_pairs_are_told_apart(seed):
     assert judged_pair(seed) == "right"
 
@@ -157,8 +158,9 @@ def test_noise_that_is_not_said_comes_from_the_residuals():
     assert abs(found.arm.link.youngs_modulus / LAB.link.youngs_modulus - 1) < 2e-3
 
 
-def test_an_arm_that_is_wrong_is_not_said_to_explain_anything():
+def test_an_arm_that_is_wrong_is_not_said_to_explain_anything(monkeypatch):
     """The data are those of an arm with a clamp that yields; with a rigid one the fit ends, and says so."""
+    monkeypatch.setattr(solve, "STRAYED", 1)  # no start makes a clamp yield
     soft = tfarm.Arm(link=LAB.link, hub=LAB.hub, clamp=tfarm.RotarySpring(stiffness=300.0), name="soft")
     found = fit(LAB, measured(soft, PAIRS[:1], omega=OMEGA[::3]), free=["link.youngs_modulus"], profile=False)
     assert found.is_explained is False
@@ -182,7 +184,7 @@ def test_resonances_before_and_after_are_the_arms_own():
 
 def test_the_command_and_its_file(tmp_path, capsys):
     path = tmp_path / "sweep.csv"
-    (one,) = measured(pairs=PAIRS[:1])
+    (one,) = measured(pairs=PAIRS[:1], omega=OMEGA[::2])
     rows = (f"{w / 2 / math.pi!r},{v.real!r},{v.imag!r},{d!r}" for w, v, d in
             zip(one.omega.tolist(), one.values.tolist(), one.sigma.tolist(), strict=True))  # fmt: skip
     path.write_text("\n".join(["hz,re,im,sigma", *rows]))
@@ -265,10 +267,11 @@ def test_young_s_modulus_takes_the_shear_modulus_along():
     assert KeyedArms(rig, list(both)).at(both).link.shear_modulus == rig.link.shear_modulus
 
 
-def test_a_step_to_no_arm_is_a_wall():
+def test_a_step_to_no_arm_is_a_wall(monkeypatch):
     """An attachment beside the tip that would pass it where the link grows shorter: the search ends at an arm."""
+    monkeypatch.setattr(solve, "STRAYED", 1)  # the search that comes to the wall is the first of those that strayed
     rig = tfarm.load("tests/rigs/bench-rig.toml")
-    omega = np.geomspace(20, 600, 30)
+    omega = np.geomspace(20, 600, 20)
     H = tfarm.transfer(rig, "tip_acceleration")(1j * omega)
     sigma = 0.01 * abs(H)
     data = tfarm.Measured(output="tip_acceleration", input="hub_torque", omega=omega, values=H, sigma=sigma)

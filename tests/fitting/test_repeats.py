@@ -25,7 +25,7 @@ def test_the_scatter_between_records(scatter):
     shares = np.array([-1.2, 0.7, 0.1, 1.4, -0.6, -1.1, 0.9, -0.2])
     moduli = LAB.link.youngs_modulus * (1 + scatter * shares)
     found = fit(LAB, records(moduli), free=["link.youngs_modulus"], profile=False)
-    told = repeats(found, draws=25)
+    told = repeats(found, draws=12)
     assert told.keys == ("link.youngs_modulus",)
     assert told.each[:, 0] == pytest.approx(moduli, rel=5e-3 if scatter else 2e-3)
     (times,) = told.times_wider
