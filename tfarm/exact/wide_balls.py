@@ -13,7 +13,8 @@ wave with itself lose by cancelling, at any precision.  Where a wave is long or 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from fractions import Fraction
+from typing import Any, NamedTuple, cast
 
 import flint
 
@@ -47,11 +48,11 @@ def characteristic_ball(k: System, s: Ball, gains: Gains = NO_GAINS) -> Ball:
 
 def characteristic_over(k: System, s: Ball, gains: Gains = NO_GAINS) -> Ball:
     """D enclosed over the wide ball s, but for a factor that depends on its middle alone and is positive."""
-    middle = s.mid()
-    here = _by_waves(k, middle, gains, None, LONG_WAVE)
-    if here is not None and s.real.is_exact() and s.imag.is_exact():
+    middle, is_point = s.mid(), s.real.is_exact() and s.imag.is_exact()
+    here = _by_waves(k, middle, gains, None, LONG_WAVE, 1 if is_point else TAYLOR_TERMS - 1)
+    if here is not None and is_point:
         return here[0][0] * flint.acb(0, here[1].imag).exp()
-    there = None if here is None else _by_waves(k, s, gains, here[1], LONG_WAVE)
+    there = None if here is None else _by_waves(k, s, gains, here[1], LONG_WAVE, TAYLOR_TERMS)
     if here is None or there is None:
         return characteristic_ball(k, s, gains)
     away, value = s - middle, flint.acb(0)
@@ -62,38 +63,73 @@ def characteristic_over(k: System, s: Ball, gains: Gains = NO_GAINS) -> Ball:
 
 def tangent(k: System, m: Ball, r: Ball, gains: Gains = NO_GAINS) -> tuple[Ball, Ball, Ball] | None:
     """D(m), D'(m) and D''/2 over the disc of radius r around m, apart from one factor; None where waves may be one."""
-    here = _by_waves(k, m, gains, None, 0.0)
+    here = _by_waves(k, m, gains, None, 0.0, 2)
     disc = flint.acb(flint.arb(m.real.mid(), r), flint.arb(m.imag.mid(), r))
-    there = None if here is None else _by_waves(k, disc, gains, here[1], 0.0)
+    there = None if here is None else _by_waves(k, disc, gains, here[1], 0.0, 3)
     return None if here is None or there is None else (here[0][0], here[0][1], there[0][2])
+
+
+class End(NamedTuple):
+    """An end condition (see `EndCondition`) in balls."""
+
+    rest: Ball
+    inertia: Ball
+    force: Ball
+
+
+class Numbers(NamedTuple):
+    """The numbers of a uniform arm in balls of one working precision."""
+
+    a: Ball
+    b: Ball
+    g: Ball
+    C: Ball
+    mass: End
+    inertia: End
+    hub: End
+
+
+def _numbers(k: Coefficients) -> Numbers:
+    """Those at the working precision, made once: a contour asks for them some thousand times."""
+    key = "balls", flint.ctx.prec
+    if key not in k.kept:
+        ends = [EndCondition.of(inertia) for inertia in (k.tip_mass, k.tip_inertia, k.hub_inertia)]
+        balls = [End(*(rational(number) for number in (each.rest, each.inertia, each.force))) for each in ends]
+        k.kept[key] = Numbers(*(rational(number) for number in (k.a, k.b, k.g, k.damping)), *balls)
+    return cast("Numbers", k.kept[key])
 
 
 def _closed(k: Coefficients, s: Any, theta: Any, M0: Any, gains: Gains) -> Any:
     """D (see `characteristic`) of a response with that hub angle and root moment, for balls and for series."""
-    hub = EndCondition.of(k.hub_inertia)
-    drive = theta * (s * s * rational(hub.inertia) + rational(hub.rest)) - M0 * rational(hub.force)
-    drive = drive if hub.rest else drive / rational(hub.force)
-    for gain, part in zip(gains, NUMERATORS(s, 1 / (s * rational(k.damping) + 1), theta, M0), strict=True):
+    numbers = _numbers(k)
+    hub = numbers.hub
+    drive = theta * (s * s * hub.inertia + hub.rest) - M0 * hub.force
+    drive = drive / hub.force if isinstance(k.hub_inertia, Fraction) else drive
+    if not any(gains):
+        return drive
+    for gain, part in zip(gains, NUMERATORS(s, 1 / (s * numbers.C + 1), theta, M0), strict=True):
         drive = drive + part * rational(gain) if gain else drive
     return drive
 
 
-def _by_waves(k: System, at: Ball, gains: Gains, scale: Ball | None, shortest: float) -> tuple[Series, Ball] | None:
-    """D e^{-scale} as a series around `at`, and scale (t1 + t2 there if none is given); None where waves may be one."""
-    s = flint.acb_series([at, 1], prec=TAYLOR_TERMS)
+def _by_waves(
+    k: System, at: Ball, gains: Gains, scale: Ball | None, shortest: float, terms: int
+) -> tuple[Series, Ball] | None:
+    """D e^{-scale} as a series of so many terms around `at`, and scale: t1 + t2 there if none is given.
+
+    None where waves may be one.
+    """
+    s = flint.acb_series([at, 1], prec=terms)
     if isinstance(k, ElementChain):
         return _by_segments(k, s, gains, scale, shortest)
-    a, b, g, C = (rational(value) for value in (k.a, k.b, k.g, k.damping))
+    a, b, g, C, mass, inertia, _ = _numbers(k)
     S, d = s * s, s * C + 1
     pair = _waves(a, b, g, S, d, shortest)
     if pair is None:
         return None
     one, two = pair
-    mass, inertia = EndCondition.of(k.tip_mass), EndCondition.of(k.tip_inertia)
-    ends = [S * rational(end.inertia) + rational(end.rest) for end in (mass, inertia)]
-    theta, M0, _, _ = _separated(
-        *one[:5], *two[:5], S * g, d, ends[0], rational(mass.force), ends[1], rational(inertia.force)
-    )
+    ends = [S * end.inertia + end.rest for end in (mass, inertia)]
+    theta, M0, _, _ = _separated(*one[:5], *two[:5], S * g, d, ends[0], mass.force, ends[1], inertia.force)
     t = one[5] + two[5]
     scale = t[0] if scale is None else scale
     gap = one[2] - two[2]
