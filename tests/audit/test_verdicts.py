@@ -5,6 +5,7 @@ import json
 import pytest
 from matplotlib.mathtext import MathTextParser
 
+from tests.shared import thinned
 from tfarm import audit
 from tfarm.tables.files import to_json
 
@@ -67,12 +68,13 @@ def test_typesetting_by_example(rows):
     )
 
 
-def test_matplotlib_can_draw_them_but_for_the_determinants(rows):
-    parser = MathTextParser("path")
-    for row in rows.values():
-        if row.equation != "Delta, Delta k_i":
-            widths = [parser.parse(f"${tex}$")[0] for tex in (row.printed_tex, row.corrected_tex)]
-            assert min(widths) > 0
+DRAWN = [name for name in VERDICTS if name != "Delta, Delta k_i"]
+
+
+@pytest.mark.parametrize("name", thinned(DRAWN, 3))
+def test_matplotlib_can_draw_them_but_for_the_determinants(rows, name):
+    for tex in {rows[name].printed_tex, rows[name].corrected_tex}:
+        assert MathTextParser("path").parse(f"${tex}$")[0] > 0
 
 
 def test_a_square_of_a_derivative_has_brackets(rows):
@@ -101,8 +103,11 @@ def test_json_has_the_keys_of_the_issue(audit_file):
     assert all(list(row) == keys for row in answer["rows"])
 
 
-# Half of the time of an audit; each check has its planted slips, in tests/audit/test_planted_slips.py.
-LONG = ("(1)-(14): damping C", "(19)", "Table 1 (rho)", "(A.2)", "appendix as a whole")
+# Most of the time of an audit; each check has its planted slips, in tests/audit/test_planted_slips.py.
+LONG = (
+    "(1)-(14): damping C", "(15)", "(18)", "(18)-(20): damping C > 0", "(18)-(20): constant gains, varied by the tuner",
+    "(19)", "Table 1 (rho)", "(A.1)", "(A.2)", "Delta, Delta k_i", "appendix as a whole",
+)  # fmt: skip
 
 
 @pytest.mark.parametrize(
