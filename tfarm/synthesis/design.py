@@ -127,7 +127,7 @@ def best_gains(
         for each, value in zip(arms, judge.values(law), strict=True)
     )
     ends = _ends(arm, bounds, best)
-    flat = [_flat(judge.score, best, axis, bounds[name]) for axis, name in enumerate(bounds)]
+    flat = _flat(judge.score, best, bounds)
     return Design(
         objective=objective, law=law, value=worst_value(objective, [each.value for each in on_arms]),
         verdict=cast("Stability", on_arms[0].verdict), bounds=bounds,
@@ -239,7 +239,7 @@ def _best(judge: Judge, arm: Arm, bounds: dict[str, Bounds], held: HubFeedback) 
     steps = 1 / np.array(effort[:2])
     found = sorted(refined(score, axes, starts, steps), key=lambda each: each.score)
     size = SIMPLEX_SIZE * float(steps.min())
-    found = [by_simplex(score, axes, each, size) for each in found[:POLISHED]] + found[POLISHED:]
+    found = by_simplex(score, axes, found[:POLISHED], size) + found[POLISHED:]
     grid_best = [Found(start, float(values[row, column])) for start, (column, row) in zip(starts, places, strict=True)]
     for each in sorted([*found, *grid_best], key=lambda each: each.score):
         across, up = (float(axis.gain(share)) for axis, share in zip(axes, each.shares, strict=True))
@@ -255,28 +255,32 @@ def _checked(name: str, bounds: Bounds) -> Bounds:
     return low, high
 
 
-def _flat(score: Score, best: _Best, axis: int, bounds: Bounds) -> Bounds:
-    """Between which values of one gain the score stays within `FLAT_WITHIN` of the best, the other held.
+def _flat(score: Score, best: _Best, bounds: dict[str, Bounds]) -> list[Bounds]:
+    """Between which values of each gain the score stays within `FLAT_WITHIN` of the best, the other held.
 
-    Walked outwards in steps that grow by three tenths, then halved: narrow valleys are seen as well as wide ones.
+    Walked outwards in steps that grow by three tenths, then halved: narrow valleys are seen as well as wide ones.  All
+    four ways at once.
     """
-    limit, centre = best.score + FLAT_WITHIN * abs(best.score), best.gains[axis]
+    limit, centre = best.score + FLAT_WITHIN * abs(best.score), np.array(best.gains)
+    along = np.repeat(np.arange(centre.size), 2)  # of each way, which gain changes
+    limits = np.array([end for ends in bounds.values() for end in ends])
 
-    def good(values: Real) -> NDArray[np.bool_]:
-        points = np.array([np.full(values.size, gain) for gain in best.gains])
-        points[axis] = values
-        return np.asarray(score(points) <= limit)
+    def good(way: Real, which: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Of steps (k, n) along some of the ways."""
+        points = np.repeat(centre[:, None], way.size, axis=1).reshape(-1, *way.shape)
+        points[along[which], np.arange(which.size)] += way
+        return np.asarray(score(points.reshape(centre.size, -1)) <= limit).reshape(way.shape)
 
-    ends = []
-    for bound in bounds:
-        way = np.geomspace(1e-9, 1.0, 80) * (bound - centre)
-        (bad,) = np.nonzero(~good(centre + way * (1 - AXIS_END)))
-        if not bad.size:
-            ends.append(bound)
-            continue
-        low, high = (way[bad[0] - 1] if bad[0] else 0.0), way[bad[0]]
+    steps = np.geomspace(1e-9, 1.0, 80) * (limits - centre[along])[:, None]
+    bad = ~good(steps * (1 - AXIS_END), np.arange(along.size))
+    (cut,) = np.nonzero(bad.any(axis=1))
+    if cut.size:
+        first = bad[cut].argmax(axis=1)
+        low, high = np.where(first > 0, steps[cut, first - 1], 0.0), steps[cut, first]
         for _ in range(INTERVAL_HALVINGS):
             middle = (low + high) / 2
-            low, high = (middle, high) if good(np.array([centre + middle]))[0] else (low, middle)
-        ends.append(centre + float(low))
-    return ends[0], ends[1]
+            holds = good(middle[:, None], cut)[:, 0]
+            low, high = np.where(holds, middle, low), np.where(holds, high, middle)
+        limits[cut] = centre[along[cut]] + low
+    K1_low, K1_high, K2_low, K2_high = limits.tolist()
+    return [(K1_low, K1_high), (K2_low, K2_high)]

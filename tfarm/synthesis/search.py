@@ -9,16 +9,16 @@ of 5 x 5 around it, all minima at once; the best are polished by the downhill si
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
 
 from tfarm.arrays import Real
 from tfarm.records import record
+from tfarm.synthesis.simplex import downhill
 
 Bounds = tuple[float, float]
 Score = Callable[[Real], Real]  # of points (2, n) of the plane of gains; what is least is best
@@ -33,6 +33,7 @@ FEWEST_MINIMA = 6  # minima that go on at least
 OFFSETS = np.array([(i, j) for i in (-1.0, -0.5, 0.0, 0.5, 1.0) for j in (-1.0, -0.5, 0.0, 0.5, 1.0)])
 TIE = 0.01  # weight of the damping ratio beside a disk margin: without a clock rate feedback alone has margin 2
 POLISHED = 3  # minima that the simplex starts from
+SIMPLEX_VALUES = 120  # values of each simplex, at most
 
 
 class Effort(NamedTuple):
@@ -113,16 +114,16 @@ def refined(score: Score, axes: tuple[GainAxis, GainAxis], starts: Real, steps: 
     return [Found(*each) for each in zip(at, best.tolist(), strict=True)]
 
 
-def by_simplex(score: Score, axes: tuple[GainAxis, GainAxis], found: Found, size: float) -> Found:
-    """The minimum by the downhill simplex, from a triangle of this size in shares."""
+def by_simplex(score: Score, axes: tuple[GainAxis, GainAxis], found: Sequence[Found], size: float) -> list[Found]:
+    """The minima by the downhill simplex, each from a triangle of this size in shares."""
 
-    def of_shares(x: Any) -> float:
-        inside = np.clip(x, AXIS_END, 1 - AXIS_END)
-        gains = np.array([axis.gain(inside[i : i + 1]) for i, axis in enumerate(axes)])
-        value = float(score(gains)[0])
-        return value + abs(value) * float(abs(x - inside).sum())
+    def of_shares(points: Real) -> Real:
+        inside = np.clip(points, AXIS_END, 1 - AXIS_END)
+        values = score(np.array([axis.gain(inside[:, i]) for i, axis in enumerate(axes)]))
+        with np.errstate(invalid="ignore"):  # inf is no number to compare with: such a corner is drawn in
+            return np.asarray(values + abs(values) * abs(points - inside).sum(axis=1))
 
-    simplex = found.shares + size * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
-    options: Any = {"initial_simplex": simplex, "xatol": 1e-3 * size, "fatol": 0.0, "maxfev": 120}
-    done = minimize(of_shares, found.shares, method="Nelder-Mead", options=options)
-    return min(found, Found(np.clip(done.x, AXIS_END, 1 - AXIS_END), float(done.fun)), key=lambda each: each.score)
+    corners = size * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    ended = downhill(of_shares, [each.shares + corners for each in found], 1e-3 * size, SIMPLEX_VALUES)
+    least = [Found(np.clip(end.corners[0], AXIS_END, 1 - AXIS_END), float(end.values.min())) for end in ended]
+    return [min(pair, key=lambda each: each.score) for pair in zip(found, least, strict=True)]
