@@ -94,21 +94,26 @@ def test_a_number_is_named_as_in_the_file_or_as_of_a_locus():
     assert ArmBox(LAB, {"payload.mass": (0.1, 0.5)}).at(np.array([0.5])).arm.payload.mass == pytest.approx(0.3)
 
 
+NARROW = ("sasaki2012-lab", "--K1", "0.1,2", "--K2=-0.1,0.1")
+
+
 def test_the_answer_names_every_arm(capsys, monkeypatch):
     monkeypatch.setattr(arms, "ARMS_TRIED", 4)  # inside: whether one is worse is not asked here
-    given = ("--K1", "0.1,2", "--K2=-0.1,0.1", "--modes", "1", "--range", "hub.friction=0.0,0.2")
-    code, out, err = run(capsys, "design", "sasaki2012-lab", *given)
+    code, out, err = run(capsys, "design", *NARROW, "--modes", "1", "--range", "payload.mass=0.0,0.2")
     assert (code, err) == (0, "")
-    assert "hub.friction = 0.2" in out
+    assert "payload.mass = 0.2" in out
     assert "no proof over the box" in out
 
 
-def test_of_one_arm_the_answer_says_as_much(capsys):
-    found = answer(capsys, "design", "sasaki2012-lab", "--K1", "0.1,2", "--K2=-0.1,0.1")
+def test_of_one_arm_the_answer_says_as_much_and_keeps_the_bounds_given(capsys):
+    found = answer(capsys, "design", *NARROW)
     (own,) = found["arms"]
     assert (own["name"], own["value"]) == ("sasaki2012-lab", found["value"])
     assert own["sampled"] == found["sampled"]
     assert (found["worst_arm"], found["arms_tried_inside"], found["worst_case_in_words"]) == ("sasaki2012-lab", 0, "")
+    assert (found["designed_for"], found["widened"], found["at_limit"]) == ("sampled", [], [])
+    assert "K1" in found["at_bound"]
+    assert found["bounds"] == {"K1": [0.1, 2.0], "K2": [-0.1, 0.1]}
 
 
 @pytest.mark.parametrize(
