@@ -67,8 +67,8 @@ QUICK = {  # each verb, as short as it goes
     "margins": [],
     "map": ["--points", "5"],
     "locus": ["--vary", "K2", "--from", "0", "--to", "0.001", "--points", "3", "--branches", "2"],
-    "sampled": ["--modes", "4"],
     "simulate": ["--duration", "0.05", "--modes", "2", "--scenario", "step"],
+    "sampled": ["--modes", "4"],
     "reduce": ["--outputs", "hub_rate", "--order", "8"],
 }
 

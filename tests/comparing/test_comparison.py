@@ -8,8 +8,11 @@ from matplotlib import image
 from matplotlib.collections import QuadMesh
 
 import tfarm
+from tests.shared import sized
 from tests.shell import answer, run
+from tfarm.comparing import comparison
 from tfarm.comparing.answers import ComparedQuantity, compared_answer, compared_margins, compared_modes, compared_poles
+from tfarm.dsp import sampled_verdict
 from tfarm.dsp.law_verdict import analyse_law
 from tfarm.loop.answers import margins_answer
 from tfarm.plots.compared import draw_comparison
@@ -63,7 +66,7 @@ def test_each_side_is_what_it_is_alone():
         assert {key: loop[key] for key in ("delay_margin_s", "disk_margin")} == {
             key: margins_answer(side.margins)[key] for key in ("delay_margin_s", "disk_margin")
         }
-        assert side.sampled.is_stable == tfarm.sampled(LAB, law).verdict.is_stable
+        assert side.sampled.is_stable == sampled_verdict(LAB, law).is_stable
         alone = tfarm.closed_loop_poles(LAB, law, 6).values
         assert side.oscillating[:3] == pytest.approx(alone[alone.imag > 0][:3], rel=1e-12)
     rows = {row["margin"]: row for row in compared_margins(found)}
@@ -92,8 +95,10 @@ def test_without_damping_phases_are_of_the_band_alone():
     assert rows["phase_lag_deg"]["known_other"] == "exact"
 
 
-def test_a_law_of_other_signals_is_mapped_over_factor_and_delay():
+@pytest.mark.parametrize("points", sized(20, comparison.DELAY_PLANE_POINTS))
+def test_a_law_of_other_signals_is_mapped_over_factor_and_delay(points, monkeypatch):
     """The delay where each loop ends at its own gain is its delay margin."""
+    monkeypatch.setattr(comparison, "DELAY_PLANE_POINTS", points)
     late = tfarm.Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0])}, delay=0.002)
     found = tfarm.compare(LAB, [LAW, late], modes=1)
     assert found.regions is None

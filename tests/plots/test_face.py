@@ -42,7 +42,7 @@ def no_figure_left_open():
 def records():
     """By the name of the plot: what it takes, and how many axes it draws in (0: one that is no sequence)."""
     K1, K2 = np.linspace(0.05, 2.0, 40), np.linspace(-1.0, 1.5, 41)
-    plane, analysis = tfarm.map(LAB, K1, K2), tfarm.sampled(LAB, LAW)
+    plane, analysis = tfarm.map(LAB, K1, K2), tfarm.sampled(LAB, LAW, count=8)
     return {
         "comparison": ([tfarm.compare([LAB, LAB.having(hub_inertia=0.2)], modes=2)], 3),
         "bode": ([tfarm.bode(LAB, "root_moment", (1.0, 300.0))], 2),
@@ -141,7 +141,7 @@ LEAD = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "tip_deflection": ([0.5], [0
 def test_what_is_found_of_any_law_has_the_same_face(plot):
     """In axes that are given there is what the picture of its own has, and no words overlap there."""
     if plot == "locus":
-        found = tfarm.locus(LAB, LEAD, "gain", 0.0, 2.0, 20, 3)
+        found = tfarm.locus(LAB, LEAD, "gain", 0.0, 2.0, 10, 3)
     else:
         found = tfarm.map(LAB, np.linspace(0.1, 3.0, 8), np.linspace(0.0, 0.03, 9), law=LEAD, vary=("gain", "delay"))
     own, given = getattr(tfarm.plots, plot)(found), axes_for(0)

@@ -6,7 +6,7 @@ import pytest
 import tfarm
 from tfarm.comparing.regions import sampled_region
 from tfarm.crossing import pieces
-from tfarm.dsp import load_chain
+from tfarm.dsp import load_chain, sampled_loop
 from tfarm.dsp.loci import sampled_loci
 from tfarm.loop.edges import moment_axis, rate_axis
 from tfarm.loop.law_locus import law_locus
@@ -69,7 +69,7 @@ def test_the_values_between_are_poles_too():
 
 
 def test_the_sampled_locus_is_round_too():
-    loop = tfarm.sampled(LAB, default_gains(LAB), count=3).verdict.loop
+    loop = sampled_loop(LAB, default_gains(LAB), count=3)
     figure = draw_folded_loci(sampled_loci(loop, 25.0, (-0.5, 1.5)))
     figure.canvas.draw()
     for ax in figure.axes[1:]:

@@ -33,6 +33,7 @@ from tfarm.tables.files import as_csv, as_json
 LAB, PAPER = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 GAINS = HubFeedback(K1=0.3, K2=0.3)
 PLANE = cache(lambda: stable_regions(LAB, GAINS, Chain()))
+analysed = cache(analyse)
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +41,7 @@ def section():
     """With the map of both regions that the tests of it have."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("tfarm.report.sampled_words.stable_regions", lambda *what: {(LAB, GAINS, Chain()): PLANE()}[what])
+        patch.setattr("tfarm.report.sampled_words.analyse", analysed)
         return sampled_section(LAB)
 
 
@@ -60,7 +62,7 @@ def values_of(table):
 
 def test_the_picture_of_a_rig_is_as_high_as_its_own_gains(monkeypatch):
     """Driven by its motor's current, K2 balances a torque at 0.112 A/(N m), and not at 1."""
-    monkeypatch.setattr("tfarm.comparing.regions.OVERLAY_COLUMNS", 12)
+    monkeypatch.setattr("tfarm.comparing.regions.OVERLAY_COLUMNS", 6)
     monkeypatch.setattr("tfarm.comparing.regions.LITTLE_DAMPINGS", ())
     rig = tfarm.load("quanser-2dsfl")
     data = stable_regions(rig, default_gains(rig), Chain())
@@ -99,7 +101,7 @@ def test_the_edges_at_the_default_gains_are_published_ones(section):
 
 
 def test_without_damping_the_layers_are_nested_at_the_gains_and_say_for_how_many_modes(monkeypatch):
-    monkeypatch.setattr("tfarm.comparing.regions.OVERLAY_COLUMNS", 16)
+    monkeypatch.setattr("tfarm.comparing.regions.OVERLAY_COLUMNS", 8)
     monkeypatch.setattr("tfarm.dsp.regions.MOST_COLUMNS", 0)
     data = stable_regions(PAPER, GAINS, Chain())
     assert [layer.loop.plant.arm.damping for layer in data.sampled] == [1e-4, 1e-6, 0.0]
@@ -128,7 +130,7 @@ def test_a_region_is_cut_into_pieces_that_cover_it_exactly():
 
 
 def test_facts_words_and_tables_are_the_analysis(section):
-    analysis = analyse(LAB, GAINS)
+    analysis = analysed(LAB, GAINS, Chain())
     facts = {fact.label: (fact.value, fact.beside) for fact in section.facts}
     band = scientific(analysis.verdict.band_rad_s, 2)
     told = f"by 1.28 samples of delay, every mode below {band} rad/s (not known beyond)"
@@ -225,7 +227,7 @@ def test_the_strip_chart_has_steps_delay_and_saturation():
 
 @pytest.mark.survey
 def test_the_same_bytes_twice(tmp_path, monkeypatch):
-    monkeypatch.setattr("tfarm.comparing.regions.OVERLAY_COLUMNS", 16)
+    monkeypatch.setattr("tfarm.comparing.regions.OVERLAY_COLUMNS", 8)
     monkeypatch.setattr("tfarm.dsp.regions.MOST_COLUMNS", 0)
     loop = sampled_verdict(LAB, GAINS).loop
     for name in ("a", "b"):
