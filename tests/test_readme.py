@@ -9,9 +9,11 @@ from pathlib import Path
 
 import pytest
 from matplotlib import pyplot
+from typer.exceptions import TyperException
 
 import tfarm
 from tests.shell import heard, run
+from tfarm.cli.running import whole_command
 from tfarm.report import making
 
 ROOT = Path(__file__).parent.parent
@@ -53,12 +55,26 @@ def by_a_shell(line: str, folder: Path) -> tuple[int, str, str]:
     return done.returncode, done.stdout, heard(done.stderr)
 
 
-DEAR = ("PD+notch", "--digits 30 --certify", "--count 12 --certify", "tfarm compare ")  # seconds, and told elsewhere
+DEAR = (  # half a second to several, and told elsewhere in nearly the same words
+    "PD+notch", "--digits 30 --certify", "--count 12 --certify", "tfarm compare ", "tfarm bode ", "tfarm locus ",
+    "tfarm spill ", "tfarm sampled ", "tfarm assumptions ", "--objective damping",
+)  # fmt: skip
 QUICK = [
     pytest.param(line, marks=pytest.mark.survey) if any(word in line for word in DEAR) else line
     for line in COMMANDS
     if not line.startswith("tfarm report ")
 ]
+
+
+@pytest.mark.parametrize("line", COMMANDS)
+def test_shell_examples_are_understood(line: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Verb, options and their values, of those too that only `make survey` runs."""
+    monkeypatch.chdir(tmp_path)
+    verb, *words = shlex.split(line)[1:]
+    command = whole_command().commands[verb]
+    command.make_context(verb, list(words))
+    with pytest.raises(TyperException, match="no-such-option"):
+        command.make_context(verb, [*words, "--no-such-option"])
 
 
 @pytest.mark.parametrize("line", QUICK)
