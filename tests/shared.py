@@ -5,6 +5,8 @@ import os
 
 import pytest
 
+import tfarm
+
 
 def once(factory, name, make):
     """The file `name`, which make(file) wrote in this process or in another; those that come meanwhile wait for it.
@@ -47,3 +49,11 @@ def remembered(function):
         return answers[key]
 
     return again
+
+
+def remember(monkeypatch, module, name):
+    """For one test `remembered` stands in the place of a module's function, where several commands ask for the same."""
+    getattr(
+        tfarm, name, None
+    )  # which tfarm keeps once it was asked for: the function, not what stands in its place here
+    monkeypatch.setattr(module, name, remembered(getattr(module, name)))

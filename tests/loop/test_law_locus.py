@@ -7,7 +7,7 @@ import pytest
 
 import tfarm
 from tests.loop.arms import window_arm
-from tests.shared import remembered
+from tests.shared import remember
 from tests.shell import run
 from tfarm import HubFeedback, Law, ParameterError
 from tfarm.loop import closed
@@ -98,7 +98,7 @@ def test_well_inside_a_box_is_a_twentieth_of_its_shorter_measure_from_the_edges_
 
 
 def test_the_command_follows_a_law(capsys, tmp_path, monkeypatch):
-    monkeypatch.setattr("tfarm.loop.closed.locus", remembered(closed.locus))  # two commands ask for the same
+    remember(monkeypatch, closed, "locus")  # two commands ask for the same
     text = "[law]\ndelay = 0.002\n[law.hub_angle]\nnum = [2.0, 1.0]\nden = [0.01, 1.0]\n"
     (tmp_path / "law.toml").write_text(text)
     way = ("--vary", "gain", "--from", "1", "--to", "9", "--points", "3", "--branches", "1")

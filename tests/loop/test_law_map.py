@@ -1,12 +1,13 @@
 """Maps over two numbers of a law: against full counts at single points, gains at the hub, and the command."""
 
 import json
+from importlib import import_module
 
 import numpy as np
 import pytest
 
 import tfarm
-from tests.shared import remembered, thinned
+from tests.shared import remember, thinned
 from tests.shell import run
 from tfarm import HubFeedback, Law, ParameterError
 from tfarm.loop.law_loop import LawLoop
@@ -105,7 +106,7 @@ def test_what_is_no_pair_of_numbers_is_refused(vary, key):
 
 
 def test_the_command_writes_what_the_map_says(capsys, tmp_path, monkeypatch):
-    monkeypatch.setattr("tfarm.loop.law_map.law_map", remembered(law_map))  # two commands ask for the same
+    remember(monkeypatch, import_module("tfarm.loop.law_map"), "law_map")  # two commands ask for the same
     text = "[law]\ndelay = 0.002\n[law.hub_angle]\nnum = [2.0, 1.0]\nden = [0.01, 1.0]\n"
     (tmp_path / "law.toml").write_text(text)
     ranges = ("--vary", "gain=0,9", "--vary", "delay=0,0.03", "--points", "3")

@@ -8,7 +8,7 @@ import pytest
 
 import tfarm
 from tests.loop import number_windows
-from tests.shared import remembered, thinned
+from tests.shared import remember, thinned
 from tests.shell import run
 from tfarm import ConvergenceError, HubFeedback, Law
 from tfarm.arm.blocks import Rational
@@ -103,7 +103,7 @@ def test_a_number_whose_poles_cannot_be_counted_is_named(monkeypatch):
 
 
 def test_the_command_has_them(capsys, tmp_path, monkeypatch):
-    monkeypatch.setattr("tfarm.loop.closed.margins", remembered(closed.margins))  # two commands ask for the same
+    remember(monkeypatch, closed, "margins")  # two commands ask for the same
     text = "[law]\ndelay = 0.002\n[law.hub_angle]\nnum = [2.0, 1.0]\nden = [0.01, 1.0]\n"
     (tmp_path / "law.toml").write_text(text)
     law = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0])}, delay=0.002)

@@ -11,7 +11,7 @@ import pytest
 import tfarm
 from tests.loop.arms import some_loop
 from tests.loop.law_counts import judge, some_delay, some_law
-from tests.shared import remembered, sized, thinned
+from tests.shared import remember, sized, thinned
 from tests.shell import run
 from tfarm import HubFeedback, Law, ParameterError
 from tfarm.loop import closed
@@ -216,7 +216,7 @@ def test_an_unstable_cancellation_in_the_law_is_said():
 
 
 def test_commands_take_a_law_from_a_file_or_the_arm_s_own(capsys, tmp_path, monkeypatch):
-    monkeypatch.setattr("tfarm.loop.closed.margins", remembered(closed.margins))  # three commands ask for the same
+    remember(monkeypatch, closed, "margins")  # three commands ask for the same
     text = "[law]\nname = 'PD'\ndelay = 0.002\n[law.hub_angle]\nnum = [2.0, 1.0]\nden = [0.01, 1.0]\n"
     (tmp_path / "law.toml").write_text(text)
     (tmp_path / "arm.toml").write_text(tfarm.arm.to_toml(LAB) + "\n" + text)
