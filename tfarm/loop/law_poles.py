@@ -77,7 +77,7 @@ def law_box(loop: LawLoop, height: float, late: float = LATE) -> Box:
     """A box of that height, right of the law's poles and until |L| is small; left short of -1/C and -late/delay."""
     own, C = loop.law.poles, loop.arm.damping
     right = BEYOND_OWN * max([RIGHT_OF_AXIS * height, *own.real.tolist()])
-    right = quiet_edge(loop, right, height, LAW_RIGHT_POINTS, LAW_RIGHT)
+    right = quiet_edge(loop, right, height, LAW_RIGHT_POINTS, LAW_RIGHT, float(abs(own).max(initial=0.0)))
     clear = TOWARD_SINGULAR / C if C else np.inf
     left = min(HEIGHTS_LEFT * height, clear, late / loop.law.delay if loop.law.delay else np.inf)
     return Box(-float(left), right, -height, height)

@@ -40,6 +40,8 @@ LEAST_SQUARABLE = 1e-140  # 1/s: whose square is still a full double
 AnyLoop = TypeVar("AnyLoop", bound=Loop | LawLoop, default=Loop)  # hub gains, unless another law is said
 LEAST_REAL_PART = -0.5  # of L, so that 1 + L has no zero
 RIGHT_OF_EDGE = (2.0, 5.0, 20.0)  # times the right edge of a box, where L is looked at again
+FAR_RIGHT, BEYOND_CORNER = 1e5, 10.0  # times that edge, and a law's fastest corner: so far a real pole is looked for
+FAR_POINTS = 41  # of the real axis up to there, on which 1 + L is smooth
 RIGHT_GROWS = 1.7  # times, from one right edge that is tried to the next: of effect on the time alone
 RIGHT_POINTS = 40  # of half a right edge under gains, where Re L is looked at: far from any pole of L, it is smooth
 GAINS_RIGHT = 1e3  # heights that a box reaches right under gains, at most: there the search for its edge ends
@@ -176,10 +178,14 @@ def box_of(loop: Loop, height: float) -> Box:
     return Box(-min(left, TOWARD_SINGULAR / C) if C else -left, right, -height, height)
 
 
-def quiet_edge(loop: Loop | LawLoop, right: float, height: float, points: int, heights: float) -> float:
+def quiet_edge(
+    loop: Loop | LawLoop, right: float, height: float, points: int, heights: float, corner: float = 0.0
+) -> float:
     """The right edge [1/s] of a box of that height, from `right` on: where 1 + L has no zero, or after so many heights.
 
-    That is where Re L > -1/2, on the edge and at a few places beyond; L > 0 may be large, as on a hub without inertia.
+    That is where Re L > -1/2, on the edge and at a few places beyond; L > 0 may be large, as on a hub without inertia,
+    and 1 + L keeps its sign on the real axis for five decades more, and beyond the `corner` [1/s] of a law: a hub of
+    little inertia meets it only there.
     """
     edge = 1j * np.linspace(0.0, height, points)
     while right < heights * height:
@@ -187,7 +193,10 @@ def quiet_edge(loop: Loop | LawLoop, right: float, height: float, points: int, h
         if L.real.min() > LEAST_REAL_PART:
             break
         right *= RIGHT_GROWS
-    return float(right)
+    far = np.geomspace(right, max(FAR_RIGHT * right, BEYOND_CORNER * corner), FAR_POINTS)
+    held = loop.loop_function(far.astype(complex)).real > -1
+    (turns,) = np.nonzero(held[1:] != held[:-1])
+    return float(far[turns[-1] + 1] if turns.size else right)
 
 
 def slow_poles(loop: Loop, below: float) -> Complex:
