@@ -220,10 +220,10 @@ def test_random_laws_have_the_verdict_of_models_and_of_simulations(number):
     assert words.count("right") >= 2
 
 
-@pytest.mark.parametrize("number", sized(2, 4))
-def test_what_is_proven_of_random_laws_is_the_count_of_their_poles(number):
+@pytest.mark.parametrize(("number", "seed"), [(2, 3), pytest.param(4, 6, marks=pytest.mark.survey)])
+def test_what_is_proven_of_random_laws_is_the_count_of_their_poles(number, seed):
     """By discs around the circle, against the polished eigenvalues of the loop with every mode of the band."""
-    rng, found = np.random.default_rng(6), []
+    rng, found = np.random.default_rng(seed), []
     while len(found) < number:
         case = some_case(rng)
         if case is None or not case[0].least_damping or case[2].actuator.hub_damping:

@@ -279,7 +279,7 @@ def test_a_simulation_takes_the_modes_that_its_digits_need_or_says_what_it_is_of
     for task, duration in (("slew", 1.5), ("impulse", 0.5)):
         enough = simulated_answer(lab, GAINS, Chain(), task, duration)
         assert (enough["modes_used"], enough["modes_change"] < 1e-4) == (20, True)
-        fine = simulator(lab, task, duration, count=40).linear(GAINS).at_samples
+        fine = simulator(lab, task, duration, count=30).linear(GAINS).at_samples
         off = abs(enough["root_moment"] - fine.root_moment).max() / abs(fine.root_moment).max()
         assert 0 < off < max(enough["modes_change"], ROUNDED)
     sudden = simulated_answer(lossless, GAINS, Chain(), "impulse", 0.5)

@@ -77,8 +77,10 @@ def played(gains, terms):
     return np.sqrt(np.mean(np.square(moments)))
 
 
-@pytest.mark.parametrize("gains", thinned([HubFeedback(K1=0.1, K2=-0.5, Kp=2.0), HubFeedback(K1=0.3, K2=0.3)], 2))
-def test_what_is_left_is_what_another_model_leaves(gains):
-    """The model's highest modes are not the arm's; as these have died down, the first twelve leave it all."""
-    found = residual_moment(LAB, many_laws(gains, K1=np.array([gains.K1])), 12)
+@pytest.mark.parametrize(
+    ("gains", "modes"), thinned([(HubFeedback(K1=0.1, K2=-0.5, Kp=2.0), 10), (HubFeedback(K1=0.3, K2=0.3), 12)], 2)
+)
+def test_what_is_left_is_what_another_model_leaves(gains, modes):
+    """The model's highest modes are not the arm's; as these have died down, the first ten or twelve leave it all."""
+    found = residual_moment(LAB, many_laws(gains, K1=np.array([gains.K1])), modes)
     assert found == pytest.approx([played(gains, 16)], rel=1e-5)

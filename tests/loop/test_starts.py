@@ -8,6 +8,7 @@ import pytest
 
 import tfarm
 from tests.loop.test_lossless import RIGS as REACTIVE
+from tests.shared import thinned
 from tfarm import HubFeedback, Law, Payload
 from tfarm.errors import ParameterError
 from tfarm.loop.law_loop import LawLoop
@@ -118,7 +119,7 @@ def test_the_rightmost_pole_is_not_one_at_0():
     assert (poles.unstable, listed(2.0, 3 + 1j, -1 + 2j).unstable) == (0, 3)
 
 
-@pytest.mark.parametrize("name", REACTIVE)
+@pytest.mark.parametrize("name", thinned(REACTIVE, 2))
 def test_of_a_rig_without_losses_each_driven_mode_of_the_box_is_two_unstable_poles(name):
     """However near to the axis: as many as there are K2_n between 0 and the law's, of modes below the box's top."""
     arm = REACTIVE[name]

@@ -57,16 +57,16 @@ def test_random_arms_are_proven_complete() -> None:
     assert [v.reason for v in verdicts if v.outcome != "right"] == []
 
 
-@pytest.mark.parametrize(
-    ("C", "slenderness"),
-    thinned([(1e-2, 500.0), (1e-6, 500.0), (1e-12, 500.0), (1e-12, 5.0), (1e-6, 5.0), (1e-2, 5.0)], 3),
-)
-def test_extreme_ends(C: float, slenderness: float) -> None:
-    for hub, mass, inertia in EXTREMES:
-        arm = damped_arm(C, hub=hub, mass=mass, inertia=inertia, slenderness=slenderness)
-        for count in (1, 8):
-            verdict = judge(arm, count, certify=False, model=slenderness < 100)
-            assert verdict.outcome == "right", (hub, mass, inertia, count, verdict.reason)
+DAMPINGS = [(1e-2, 500.0), (1e-6, 500.0), (1e-12, 500.0), (1e-12, 5.0), (1e-6, 5.0), (1e-2, 5.0)]
+
+
+@pytest.mark.parametrize(("damping", "ends"), thinned(product(DAMPINGS, EXTREMES), 5))
+def test_extreme_ends(damping: tuple[float, float], ends: tuple[float, float, float]) -> None:
+    (C, slenderness), (hub, mass, inertia) = damping, ends
+    arm = damped_arm(C, hub=hub, mass=mass, inertia=inertia, slenderness=slenderness)
+    for count in (1, 8):
+        verdict = judge(arm, count, certify=False, model=slenderness < 100)
+        assert verdict.outcome == "right", (count, verdict.reason)
 
 
 @pytest.mark.survey
@@ -98,8 +98,8 @@ def test_the_papers_determinant_vanishes_there(overdamping: float) -> None:
         ("some", "zero", "infinite"),
     ):
         arm = some_arm(rng, case, damping=0.0, slenderness=(8, 80))
-        arm = with_damping(arm, 2 * overdamping / float(tfarm.modes(arm, 3).natural_frequency[-1]))
-        damped = listed(arm, 3)
+        arm = with_damping(arm, 2 * overdamping / float(tfarm.modes(arm, 5).natural_frequency[-1]))
+        damped = listed(arm, 5)
         steps = [newton_step(arm, zero) for zero in pairs(damped).ravel()]
         assert max(steps) < 1e-14, (case, steps)
 
@@ -188,7 +188,7 @@ def test_no_damping_leaves_the_modes_on_the_axis() -> None:
     assert damped.count == 2 * 8 + 2
 
 
-@pytest.mark.parametrize("seed", thinned(range(8), 4))
+@pytest.mark.parametrize("seed", thinned(range(8), 3))
 def test_pairs_are_conjugate_or_real_and_all_decay(seed: int) -> None:
     arm = some_arm(np.random.default_rng(seed), damping=float(10 ** np.random.default_rng(seed).uniform(-7, -3)))
     damped = listed(arm, 15)

@@ -55,7 +55,7 @@ def test_finite_elements_converge_at_twice_their_degree(name: str, degree: int) 
 def test_legendre_ritz_comes_from_above_and_never_turns_back(name: str) -> None:
     """Rayleigh and Ritz: every model is an upper bound, and more terms never raise it."""
     subject = ARMS[name]
-    omega = np.array([Ritz(subject, terms).natural_frequencies(COUNT) for terms in range(4, 30)])
+    omega = np.array([Ritz(subject, terms).natural_frequencies(COUNT) for terms in range(4, 31, 2)])
     rounding = 64 * EPS * (exact(subject) / exact(subject)[0]) ** 2
     assert (omega >= exact(subject) * (1 - rounding)).all()
     assert (np.diff(omega, axis=0) <= rounding * omega[1:]).all()
@@ -69,7 +69,7 @@ def test_legendre_ritz_converges_as_the_legendre_series_of_its_waves(name: str) 
     """
     subject, count = ARMS[name], 8
     link, omega = subject.link, exact(ARMS[name], 8)
-    terms = np.arange(8, 40)
+    terms = np.arange(8, 28)
     error = np.array([Ritz(subject, int(n)).natural_frequencies(count) for n in terms]) / omega - 1
     for mode in (5, 7):
         k = max(np.roots([1, 0, -_half(link, omega[mode]), 0, _product(link, omega[mode])]).imag)
