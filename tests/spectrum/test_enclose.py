@@ -225,6 +225,7 @@ def test_a_box_through_a_zero_is_refused() -> None:
     for box in (
         Box(-50.0, 30.0, -zero.imag, zero.imag),
         Box(float(zero.real), 30.0, -150.0, 150.0),
+        Box(-50.0, float(zero.real), -150.0, 150.0),
         Box(-50.0, 0.0, -300.0, 300.0),  # through the origin's double zero
     ):
         with pytest.raises(CertificationError) as refused:
