@@ -122,8 +122,9 @@ def by_turns(values, poles, law, band, slow):
 
 def by_nyquist(arm, law, band):
     """Turns of the exact loop function, from the public transfer functions, and of two models of light damping."""
-    omega, slow = tfarm.modes(arm, up_to=band).natural_frequency[1:], SLOWEST * first_frequency(arm)
-    near = np.r_[-arm.damping * omega**2 / 2 + 1j * omega, law.poles]
+    slow = SLOWEST * first_frequency(arm)
+    own = tfarm.damped_modes(tfarm.modes(arm, up_to=band)).eigenvalues.ravel()  # shear rings on where bending does not
+    near = np.r_[own, law.poles]
     counts = [by_turns([exact(arm, law)], near, law, band, slow)]
     if arm.damping * tfarm.modes(arm, MODELS[-1]).natural_frequency[-1] < 1:
         (coarse, _), (fine, p) = (returned(arm, law, count) for count in MODELS)
