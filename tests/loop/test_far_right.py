@@ -61,3 +61,13 @@ def test_a_rate_gain_beyond_the_links_impedance_drives_a_pin_without_inertia(as_
     assert far.size == number
     for s in far:
         assert (K1 + 1e-3 / s) * complex(rate(complex(s))).real == pytest.approx(-1, rel=1e-9)
+
+
+@pytest.mark.parametrize("corner", [1e9, 1e100])
+def test_where_powers_of_s_are_no_doubles_nothing_is_warned_of_and_nothing_is_far(corner):
+    """A gain on the rate through a corner so fast is that gain alone."""
+    law = Law({"hub_rate": ((0.1 * corner,), (1.0, corner)), "hub_angle": 0.1})
+    found, alone = law_stability(LAB, law), law_stability(LAB, Law({"hub_rate": 0.1, "hub_angle": 0.1}))
+    assert far_poles(found).size == 0
+    assert found.verdict == alone.verdict == "stable"
+    np.testing.assert_allclose(found.poles.values[:4], alone.poles.values[:4], rtol=1e-6)
