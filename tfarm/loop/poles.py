@@ -195,8 +195,8 @@ def quiet_edge(
         right *= RIGHT_GROWS
     far = np.geomspace(right, max(FAR_RIGHT * right, BEYOND_CORNER * corner), FAR_POINTS)
     with np.errstate(all="ignore"):  # so far right powers of s may be no doubles: there nothing is told
-        L = loop.loop_function(far.astype(complex)).real
-    far, held = far[np.isfinite(L)], L[np.isfinite(L)] > -1
+        real_part = loop.loop_function(far.astype(complex)).real
+    far, held = far[np.isfinite(real_part)], real_part[np.isfinite(real_part)] > -1
     (turns,) = np.nonzero(held[1:] != held[:-1])
     return float(far[turns[-1] + 1] if turns.size else right)
 
