@@ -184,6 +184,16 @@ def test_roots_with_more_digits_than_a_float():
     assert appendix.roots_near(arm, float(text), 20) == 0
 
 
+def test_a_root_is_the_frequency_that_balls_prove():
+    """Two solutions: the secant method on the 4x4 determinant, and the closed form enclosed to 30 digits."""
+    arm = tfarm.load("sasaki2012")
+    table = tfarm.modes(arm, 4)
+    for omega, digits in zip(table.natural_frequency[1:], table.digits(30)[1:], strict=True):
+        with mpmath.workdps(35):
+            found = appendix.natural_frequency(arm, float(omega), 30)
+            assert abs(found / mpmath.mpf(digits) - 1) < mpmath.mpf(10) ** -29
+
+
 def test_the_mode_at_the_cut_off_is_a_root():
     """The mode W = 0, Psi = const of a pinned-pinned arm at its cut-off is a root of the 4x4 determinant as well."""
     arm = powers_of_two(hub=0.0, mass=math.inf, inertia=0.0)

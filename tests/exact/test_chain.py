@@ -21,8 +21,10 @@ from tfarm import Hub
 from tfarm.arm import THEORIES, Attachment, Motor, RotarySpring
 from tfarm.errors import ParameterError
 from tfarm.exact.chain import ElementChain
+from tfarm.exact.chain_values import free_fields
 from tfarm.exact.chaining import chain_of
 from tfarm.exact.coefficients import Coefficients
+from tfarm.exact.elements import Place
 from tfarm.exact.outputs import OUTPUTS, Output
 from tfarm.exact.system import system_of
 from tfarm.exact.values import evaluate_outputs, expansions_at_zero, kernel_table
@@ -169,6 +171,30 @@ def test_derivatives_are_differences_of_the_oracle(seed):
         sizes = abs(exact) + abs(np.array([complex(value) for value in right])) / abs(s)
     found = transfer_of(arm, x).derivative(s)
     assert (abs(found - exact) <= 1e-12 * sizes + 1e-40).all()
+
+
+def test_derivatives_where_many_waves_stand_along_the_rig():
+    """High up the circle must shrink with the phase of the waves, or its 16 points no longer tell the slope."""
+    arm, s = rig(), 40 + 6e4j
+    h = 2.0**-60 * abs(s)
+    with mpmath.workdps(80):
+        right, left = (oracle(arm, mpmath.mpc(s) + sign * h, 0.4, 80) for sign in (1, -1))
+        exact = np.array([complex((a - b) / (2 * h)) for a, b in zip(right, left, strict=True)])
+    assert abs(transfer_of(arm, 0.4).derivative(s) / exact - 1).max() < 1e-9
+
+
+def test_fields_along_a_rig():
+    """W, Psi, M and Q at places against transition matrices: ratios of each, free of units; a joint has two sides."""
+    arm, s = rig(), 5 + 300j
+    shares = [Fraction(1, 8), Fraction(1, 3), Fraction(3, 4), Fraction(1)]
+    fields, theta, _ = free_fields(system_of(arm), np.array([s]), [Place(each) for each in shares])
+    names = ("displacement", "rotation", "moment", "shear")
+    wanted = [(name, point_of(arm, each)) for name in names for each in shares]
+    found = response(arm, s, [*wanted, "hub_angle"], 40)
+    exact = np.array([complex(found[each]) for each in wanted]).reshape(4, 4)
+    inside = slice(0, 3)  # at the tip moment and shear are what the payload takes
+    assert fields[:, 0, inside] / fields[:, 0, :1] == pytest.approx(exact[:, inside] / exact[:, :1], rel=1e-11)
+    assert fields[1, 0] / theta[0] == pytest.approx(exact[1] / complex(found["hub_angle"]), rel=1e-11)
 
 
 def free_rig(**changes):

@@ -19,6 +19,7 @@ from tfarm.exact.characteristic import (
     as_column,
     characteristic,
     gains_of,
+    loop_system,
     quick_characteristics,
     zeros_at_origin,
 )
@@ -111,6 +112,29 @@ def test_slopes_are_derivatives_of_the_values() -> None:
                 wanted = complex((up - down) / (2 * mpmath.mpf(h) * middle))
                 assert ours.slope[n] / ours.value[n] == pytest.approx(wanted, rel=1e-11)
                 assert quick.slope[n] / quick.value[n] == pytest.approx(wanted, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", ["sasaki2012-lab", "tests/rigs/bench-rig.toml"])
+@pytest.mark.parametrize("at_zero", [0, 1, 2])
+def test_the_quick_function_is_the_other_without_its_zeros_at_rest(name, at_zero) -> None:
+    """Values to rounding and slopes to what differences give: of one link and of a chain."""
+    k, s = loop_system(tfarm.load(name)), np.array([1e-3j, 2.0, -3 + 40j, 2 + 900j, -80 + 5e3j])
+    gains = gains_of(k, HubFeedback(K1=0.3, K2=0.4))
+    exact, quick = characteristic(k, s, gains, at_zero), quick_characteristic(k, s, gains, at_zero)
+    ratio = quick.value * np.exp(quick.scale - exact.scale) / exact.value
+    assert abs(ratio - 1).max() < 1e-9
+    assert quick.slope / quick.value == pytest.approx(exact.slope / exact.value, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", ["sasaki2012-lab", "tests/rigs/bench-rig.toml"])
+def test_with_its_zero_at_rest_divided_out_the_function_is_its_limit_there(name) -> None:
+    """(K1 + what the hub loses) theta, not 0: else a box would hold a pole at rest twice."""
+    k = loop_system(tfarm.load(name))
+    gains, rest = gains_of(k, HubFeedback(K1=0.3, K2=0.4)), np.array([0j, 1e-9])
+    assert zeros_at_origin(k, gains) == 1
+    for at in (characteristic(k, rest, gains, 1), quick_characteristic(k, rest, gains, 1)):
+        assert at.value[0] == pytest.approx(at.value[1], rel=1e-8)
+        assert at.value[0] != 0
 
 
 @pytest.mark.parametrize("law", [{"Kp": 2.0}, {"K1": 0.3}, {"K2": 0.4}, {"K2": -3.0}, LAW], ids=str)

@@ -41,6 +41,7 @@ NO_GAINS: Gains = (Fraction(0),) * len(GAINS)
 FED = tuple(OUTPUTS[gain.output] for gain in GAINS)
 assert all(each.place != "x" for each in FED)  # a gain is on an output with a place of its own
 TURNING = ("theta", "W", "Psi", "centre")  # quantities that follow the hub's angle where the arm turns slowly
+NEXT_TO_REST = 1e-60  # 1/s, for s = 0: there D over a power of s is its limit to the last digit, and no power is 0
 DIFFERENCE_STEP = 1e-6  # of |s|, or of the way to -1/C, for differences
 
 
@@ -107,6 +108,7 @@ class LoopParts(NamedTuple):
 
 def characteristic(k: System, s: Complex, gains: Gains = NO_GAINS, at_zero: int = 0) -> Analytic:
     """D(s)/s^at_zero and its derivative at s (1-D, complex), in float64."""
+    s = off_rest(s) if at_zero else s
     if isinstance(k, ElementChain):
         used = [each for each, gain in zip(FED, gains, strict=True) if gain]
         here, slopes = free_slopes(k, used, s, 0.0)
@@ -120,10 +122,14 @@ def characteristic(k: System, s: Complex, gains: Gains = NO_GAINS, at_zero: int 
     return deflated(value, slope, free.scale, s, at_zero)
 
 
+def off_rest(s: Complex) -> Complex:
+    """s, and next to 0 for 0: where D is divided by a power of s."""
+    return np.where(s == 0, NEXT_TO_REST, s)
+
+
 def deflated(value: Complex, slope: Complex, scale: Complex, s: Complex, at_zero: int) -> Analytic:
-    """D/s^at_zero from D and its slope."""
+    """D/s^at_zero from D and its slope at s, which is not 0."""
     if at_zero:
-        s = np.where(s == 0, 1e-100, s)
         value = value / s**at_zero
         slope = slope / s**at_zero - at_zero * value / s
     return Analytic(value, slope, scale)
@@ -140,12 +146,11 @@ def quick_characteristics(k: System, s: Complex, rows: Real, at_zero: int = 0) -
     With gains of their own at each point, rows (gains, n), or one `as_column` (gains, 1), dimensionless.
     """
     if isinstance(k, ElementChain):
-        s = np.asarray(s, dtype=complex)
+        s = off_rest(np.asarray(s, dtype=complex))
         h = difference_steps(k, s)
         at = np.array([s, s + h, s - h])
         parts = loop_parts(k, at)
-        values = parts.drive + (rows[:, None, :] * parts.numerators).sum(axis=0)
-        values = values / np.where(at == 0, 1e-100, at) ** at_zero
+        values = (parts.drive + (rows[:, None, :] * parts.numerators).sum(axis=0)) / at**at_zero
         up, down = values[1:] * np.exp(parts.scale[1:] - parts.scale[0])
         return Analytic(values[0], (up - down) / (2.0 * h), parts.scale[0])
     found = np.empty((3, s.size), complex)
@@ -173,14 +178,15 @@ def fill_characteristics(s: Any, k: Any, rows: Any, at_zero: int, found: Any) ->
     values, scales = np.empty(3, np.complex128), np.empty(3, np.complex128)
     for i in range(s.size):
         law = i if rows.shape[1] > 1 else 0
-        h = DIFFERENCE_STEP * max(abs(s[i]) * min(1.0, abs(1.0 + k[DAMPING] * s[i])), 1e-300)
+        here = s[i] if s[i] != 0.0 or at_zero == 0 else complex(NEXT_TO_REST, 0.0)
+        h = DIFFERENCE_STEP * max(abs(here) * min(1.0, abs(1.0 + k[DAMPING] * here)), 1e-300)
         for j in range(3):
-            at = s[i] + h * (j - 3 * (j // 2))
+            at = here + h * (j - 3 * (j // 2))
             value, scales[j], fed_back = parts_at(at, k)
             for row, part in enumerate(fed_back):
                 value += rows[row, law] * part
             for _ in range(at_zero):
-                value = quotient(value, at if at != 0.0 else complex(1e-100, 0.0))
+                value = quotient(value, at)
             values[j] = value
         up, down = values[1] * np.exp(scales[1] - scales[0]), values[2] * np.exp(scales[2] - scales[0])
         found[0, i], found[1, i], found[2, i] = values[0], (up - down) / (2.0 * h), scales[0]

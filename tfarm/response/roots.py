@@ -13,7 +13,7 @@ from tfarm.arrays import Complex
 from tfarm.exact.chain import ElementChain
 from tfarm.exact.chain_values import free_slopes, order_at_zero
 from tfarm.exact.chaining import chain_of
-from tfarm.exact.characteristic import Analytic, characteristic, deflated
+from tfarm.exact.characteristic import Analytic, characteristic, deflated, off_rest
 from tfarm.exact.coefficients import Coefficients
 from tfarm.exact.free import free_response, low_frequency, low_frequency_tip, tip_response
 from tfarm.exact.jets import Jet
@@ -105,6 +105,7 @@ def _numerator(k: System, wanted: Output, x: float) -> tuple[int, Function]:
     order = order_at_zero(k, base, x)
 
     def function(s: Complex) -> Analytic:
+        s = off_rest(s)
         here, slopes = free_slopes(k, [base], s, x)
         return deflated(here.outputs[0], slopes.outputs[0], here.scale, s, order)
 
@@ -121,10 +122,10 @@ def _of_one_link(k: Coefficients, quantity: str, *, at_tip: bool) -> tuple[int, 
     order = next(n for n, coefficient in enumerate(series.c) if coefficient != 0)
 
     def function(s: Complex) -> Analytic:
+        s = off_rest(s)
         free = tip_response(k, s) if at_tip else free_response(k, s)
         value, slope = getattr(free, quantity).c
-        s = np.where(s == 0, 1e-300, s)
-        return Analytic(value / s**order, (slope - order * value / s) / s**order, free.scale)
+        return deflated(value, slope, free.scale, s, order)
 
     return order, function
 
