@@ -18,7 +18,7 @@ from tfarm.columns import Column, Table
 from tfarm.dsp import Chain, GainMap, sampled_map, sampled_verdict
 from tfarm.dsp.regions import ends_of_K1, rounded_map, with_both_sides, with_more
 from tfarm.errors import ConvergenceError
-from tfarm.loop.edges import Axis
+from tfarm.loop.edges import Axis, rate_columns
 from tfarm.loop.regions import Region, region
 from tfarm.spectrum.scales import default_gains
 
@@ -47,6 +47,7 @@ def stable_regions(arm: Arm, gains: HubFeedback, chain: Chain) -> StableRegions:
     dampings = (arm.damping,) if arm.damping else (*LITTLE_DAMPINGS, 0.0)
     loops = [sampled_verdict(arm.having(damping=C), gains, chain).full for C in dampings]
     ends = np.unique(np.concatenate([ends_of_K1(loop) for loop in loops]))
+    ends = ends[ends > 0]
     ends = ends[np.diff(ends, prepend=0.0) > SEEN_AS_ONE * ends]
     own, _ = gains.point
     span, cut = (arm.input_per_torque * np.array(ends) for ends in (K2_RANGE, CUT_RANGE))
@@ -88,9 +89,9 @@ def sampled_region(arm: Arm, x: Axis, y: Axis, chain: Chain) -> GainMap | None:
     """Where in the picture the sampled loop is stable, with the modes of the verdict on the default gains."""
     try:
         loop = sampled_verdict(arm, default_gains(arm), chain).full
-        across = x.grid(SAMPLED_COLUMNS)
-        across = with_both_sides(across[across > 0], ends_of_K1(loop))
-        plane = sampled_map(loop, across[x.high > across], [y.low - BEYOND_PICTURE, y.high + BEYOND_PICTURE])
+        across = with_both_sides(rate_columns(arm, x, SAMPLED_COLUMNS), ends_of_K1(loop))
+        across = across[(x.low <= across) & (x.high > across)]
+        plane = sampled_map(loop, across, [y.low - BEYOND_PICTURE, y.high + BEYOND_PICTURE])
         return rounded_map(plane, lambda across, up: np.asarray(MAP_ASPECT * x.place(across) + 1j * y.place(up)))
     except ConvergenceError:
         return None

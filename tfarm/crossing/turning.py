@@ -19,6 +19,8 @@ from .pieces import RegionPiece
 STRETCH = 2.0  # how much wider than high, or higher than wide, a picture is at most: so much more a curve turns in it
 MOST_TURN = math.radians(5.0) / STRETCH  # from one piece of a curve to the next, where the picture is as high as wide
 PIXEL = 2e-3  # of the picture, a pixel: the corners of what is no longer nobody sees
+ASIDE = 0.45  # of the way from one column to the next: half way may be the very edge that both were laid around
+TOLD_APART = 1e-11  # of a gain: columns nearer to each other are in the rounding of where a region ends
 
 
 def loose(curves: Complex, width: Real | float, height: Real | float) -> NDArray[np.bool_]:
@@ -67,9 +69,8 @@ def _corners(outline: Complex) -> list[tuple[int, int, int]]:
 
 
 def _halves(across: Real, here: float, other: float) -> list[float]:
-    """Half way between two columns; of a side that is upright, half way to the columns beside it."""
-    if here != other:
-        return [(here + other) / 2]
+    """Nearly half way between two columns; of a side that is upright, to the columns beside it."""
     n = int(np.searchsorted(across, here))
     beside = [float(across[k]) for k in (n - 1, n + 1) if 0 <= k < across.size]
-    return [(here + each) / 2 for each in beside]
+    ends = [each for each in beside if abs(each - here) > TOLD_APART * abs(here)] if here == other else [other]
+    return [min(here, each) + ASIDE * abs(each - here) for each in ends]

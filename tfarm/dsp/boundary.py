@@ -35,7 +35,6 @@ NO_EFFECT = 1e-12  # of what is there without a gain: what it adds, if less, is 
 COARSEST = 2000  # points of the uniform grid over the half circle
 STILL = 1e-8  # of the way from z = 1 to the nearest pole of an arm that something holds: nearer than that it stands
 # still, its rate is rounding, and a gain on it would have to be so many times too large to move a pole
-NEAR_ONE = 1e-7  # where the values at z = 1 are read: they are even in q, so wrong by 1e-14
 
 
 @dataclass(frozen=True)
@@ -154,17 +153,16 @@ def crossed_on(grid: CircleGrid, split: Split) -> tuple[list[Crossing], int]:
 def _at_one(grid: CircleGrid, line: _Line, change: int) -> list[Crossing]:
     """The crossing at z = 1: where nothing holds the angle, at no gain on the rate of an arm that can drift, else by a
     static balance."""
-    loop, one = grid.loop, np.ones(1)
-    rigid = loop.plant.rigid[ANGLE_ROW]
-    turned = turning(loop.plant)
+    plant = grid.loop.plant
+    rigid, turned = plant.rigid[ANGLE_ROW], turning(plant)
     held = float(np.array(line.others) @ turned)
     if turned[line.place]:
         return [Crossing(-held / float(turned[line.place]) + 0.0, 0.0, change)]
     if held:
         return []
     if rigid[0] != 0.0:
-        return [Crossing(0.0, 0.0, change)] if loop.plant.rigid[line.place].any() else []
-    A, B = line.split((one, loop.signals(np.exp(np.array([1j * NEAR_ONE])), None, one)))
+        return [Crossing(0.0, 0.0, change)] if plant.rigid[line.place].any() else []
+    A, B = line.split((np.ones(1), plant.at_rest[:, None] + 0j))
     return [Crossing(real_gain(A[0], B[0]), 0.0, change)]
 
 

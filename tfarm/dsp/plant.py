@@ -82,6 +82,11 @@ class Plant:
         )
 
     @property
+    def at_rest(self) -> Real:
+        """G_o(0) of every output that does not turn with the arm (outputs,), and H_o(1) at any period: a held input."""
+        return np.asarray(self.static - (self.residues / self.poles).sum(axis=1).real)
+
+    @property
     def count(self) -> int:
         """The last flexible mode in it."""
         return int(self.mode.max(initial=0))

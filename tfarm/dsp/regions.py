@@ -112,10 +112,10 @@ def with_more(plane: GainMap, K1: Real) -> GainMap:
 
 
 def ends_of_K1(loop: SampledLoop) -> Real:
-    """Where stable intervals of K1 > 0 end, at a few K2: there the region has upright edges."""
+    """Where stable intervals of K1 end, but at 0, at a few K2: there the region has upright edges."""
     unit = loop.plant.arm.input_per_torque
     found = [window for K2 in ENDS_AT for window in stable_windows(loop.having(K2=unit * K2), "K1")]
-    return np.array(sorted({end for window in found for end in window if math.isfinite(end) and end > 0}))
+    return np.array(sorted({end for window in found for end in window if math.isfinite(end) and end}))
 
 
 def with_both_sides(K1: Real, ends: Real) -> Real:

@@ -88,6 +88,15 @@ def rate_axis(arm: Arm) -> Axis:
     return Axis(-linear, HIGHEST_RATE_GAIN * unit, linear)
 
 
+def rate_columns(arm: Arm, x: Axis, number: int) -> Real:
+    """Of so many rate gains, evenly spaced as seen, those at which an arm may be stable.
+
+    A free hub whose gain takes more than it loses runs away: 1 + L is below 0 next to s = 0, and above it far right.
+    """
+    across, least = x.grid(number), -arm.rate_loss
+    return across[across > least] if arm.has_rigid_mode else across[across != least]
+
+
 def moment_axis(arm: Arm, x: Axis) -> Axis:
     """The moment gain from -4 to 2, or as deep as unstable windows go, times what one N m takes of a rig's input."""
     low, high, deepest = (

@@ -18,7 +18,7 @@ from tfarm.digits import kept_digits
 from tfarm.dsp import Chain
 from tfarm.dsp import GainMap as SampledMap
 from tfarm.errors import TfarmError
-from tfarm.loop.edges import moment_axis, rate_axis
+from tfarm.loop.edges import moment_axis, rate_axis, rate_columns
 from tfarm.loop.frequencies import steep_places
 from tfarm.loop.lossless import stable_moments
 from tfarm.loop.panels import Panels, loop_panels
@@ -50,9 +50,9 @@ def live_data(arm: Arm, chain: Chain, law: HubFeedback | None = None) -> dict[st
     } | {ANGLE_GAIN: {"low": 0.0, "high": stiffest, "linear": ANGLE_LINEAR * stiffest}}
     reference = default_gains(arm)
     band, is_quiet = band_of_gains(arm, {name: (each["low"], each["high"]) for name, each in axes.items()})
-    samples, across = loop_panels(arm, band), x.grid(LIVE_COLUMNS)
+    samples, across = loop_panels(arm, band), rate_columns(arm, x, LIVE_COLUMNS)
     beyond = np.array([y.low - BEYOND_PICTURE, y.high + BEYOND_PICTURE])
-    continuous = region(arm, np.unique(np.r_[across[across > 0], x.high]), beyond)
+    continuous = region(arm, np.unique(np.r_[across, x.high]), beyond)
     sampled = sampled_region(arm, x, y, chain)
     return {
         "name": arm.name,

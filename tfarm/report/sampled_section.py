@@ -71,7 +71,6 @@ def sampled_section(arm: Arm, chain: Chain | None = None) -> PageSection:
 
 def _overlay_picture(data: Sampled) -> Picture:
     regions = data.regions
-    below = f", and nothing is stable at {RATE_GAIN} < 0" if data.arm.has_rigid_mode else ""
     low = plain(float(regions.continuous.axes[0][0]), 2)
     layers = (
         "Nested blues: C = 0 (for the first modes only), and what the same arm would do with a little damping. "
@@ -86,7 +85,7 @@ def _overlay_picture(data: Sampled) -> Picture:
             "Sand: where the continuous loop is stable, with every mode. Blue: where the sampled one is. Sand without "
             f"blue is what a controller that ignores its clock would wrongly trust. {layers}{proven}"
             "All edges are exact crossings of the axis or the unit circle. "
-            f"The axis is logarithmic: {RATE_GAIN} = 0 lies beyond its left end at {low}{below}. "
+            f"The axis is logarithmic: {RATE_GAIN} = 0 lies beyond its left end at {low}{beyond_words(data.arm)}. "
         ),
         alt=(
             f"Map of {' and '.join(PLANE)}: at {data.held} the continuous loop is stable for {MOMENT_GAIN} "
@@ -96,6 +95,14 @@ def _overlay_picture(data: Sampled) -> Picture:
         figure=draw_overlay(regions),
         data=regions_table(regions, "sampled-overlay-data"),
     )
+
+
+def beyond_words(arm: Arm) -> str:
+    """From which rate gain down a free hub runs away, whatever the other gain; a sampled one too."""
+    if not arm.has_rigid_mode:
+        return ""
+    least = f"−{plain(arm.rate_loss, 5)}, which takes what the hub loses" if arm.rate_loss else "0"
+    return f", and nothing is stable at {RATE_GAIN} < {least}"
 
 
 def _periods_table(data: Sampled) -> Table:
