@@ -1,5 +1,7 @@
 """Poles of the sampled loop: published figures, the first-order law, the finite-gain form, rates by difference."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,7 @@ import tfarm
 from tests.odd_arms import odd_arms
 from tfarm.arm import Hub, HubFeedback
 from tfarm.dsp import Actuator, Chain, Converters, Sampling, plant, sampled_loop
-from tfarm.dsp.law import first_order_law, followed_branches, mode_table
+from tfarm.dsp.law import followed_branches, mode_table
 from tfarm.errors import ParameterError
 
 pytestmark = pytest.mark.kernels
@@ -142,17 +144,70 @@ def test_the_locus_starts_at_the_open_loop_and_has_no_jumps(lab):
     assert max(np.log(abs(locus[-1]))) == pytest.approx(loop.poles.log_spectral_radius, rel=1e-9)
 
 
+SIZE = 1e-4  # of a gain: the difference over both signs is right to its square, and to the rounding of ln|z| over it
+
+
+def added(loop, by):
+    """What a gain of that name alone adds to ln|z| of each listed mode, by the loop's own poles at a tiny gain."""
+    less, more = (loop.under(HubFeedback(**{by: sign * SIZE * loop.gains[by]})).poles for sign in (-1, 1))
+
+    def largest(poles, n):
+        return poles.log_radius[poles.mode == n].max()
+
+    return np.array([(largest(more, n) - largest(less, n)) / (2 * SIZE) for n in mode_table(loop).index])
+
+
+CHAINS = {
+    "as it is": Chain(),
+    "late": Chain(sampling=Sampling(delay_samples=1.3)),
+    "filtered": Chain(sampling=Sampling(antialias_corner=200.0)),
+    "differences": Chain(converters=Converters(hub_rate="difference", rate_filter=200.0)),
+    "damped hub": Chain(actuator=Actuator(hub_damping=0.3)),
+}
+
+
+@pytest.mark.parametrize("name", CHAINS)
+@pytest.mark.parametrize("arm", ["sasaki2012-lab", "quanser-flexlink"])
+def test_to_first_order_a_gain_adds_what_the_poles_say_at_a_tiny_one(arm, name):
+    """Through delay, filter, difference and a lag of the motor; an arm's own damping is taken for what it is."""
+    arm, chain = tfarm.load(arm), CHAINS[name]
+    if arm.input_lags and chain.actuator.hub_damping:
+        chain = replace(chain, actuator=replace(chain.actuator, hub_damping=0.0))
+    loop = sampled_loop(arm, HubFeedback(K1=0.02, K2=0.3), chain, count=5)
+    table = mode_table(loop)
+    assert table.index.size >= 4
+    for by, found in (("K1", table.by_rate), ("K2", table.by_moment)):
+        assert found == pytest.approx(added(loop, by), rel=1e-4, abs=1e-14 / SIZE)
+
+
 def test_bands_of_the_law():
-    """K1 damps below 50 Hz and destabilises from 50 to 100 Hz; K2 > 0 never destabilises."""
-    w = 2 * np.pi * np.array([10.0, 49.0, 51.0, 99.0, 101.0])
-    by_rate, by_moment = first_order_law(w, np.ones(5), 0.1, HubFeedback(K1=1.0, K2=1.0), T, 0.0)
-    np.testing.assert_array_equal(np.sign(by_rate), [-1, -1, 1, 1, -1])
-    assert np.all(by_moment <= 0)
+    """C = 0, read as it is: -b^2 sin(q/2) [K1/w cos(q/2) + K2 I_h sin(q/2)].  K1 damps below 50 Hz and destabilises
+    from 50 to 100 Hz, and so on; K2 > 0 never destabilises.  With a delay neither is so."""
+    arm = tfarm.load("sasaki2012")
+    loop = sampled_loop(arm, HubFeedback(K1=0.3, K2=0.2), count=12)
+    table, modal = mode_table(loop), tfarm.modes(arm, 12)
+    b, q = modal.hub_participation[1:], table.natural_frequency * T
+    by_hand = -(b**2) * np.sin(q / 2) * np.array(
+        [0.3 / table.natural_frequency * np.cos(q / 2), 0.2 * arm.hub.inertia * np.sin(q / 2)]
+    )  # fmt: skip
+    np.testing.assert_allclose([table.by_rate, table.by_moment], by_hand, rtol=1e-9)
+    assert table.rate_alternates
+    assert table.driven_by_moment == []
+    assert set(table.band % 2) == {0, 1}
+    late = mode_table(sampled_loop(arm, loop.gains, CHAINS["late"], count=12))
+    assert not late.rate_alternates
+    assert late.driven_by_moment == [int(n) for n in late.index[late.by_moment > 0]] != []
+
+
+def test_on_a_spring_moment_feedback_drives_the_mode_that_the_spring_makes(lab):
+    """I_h theta'' = u + M - k theta: below sqrt(k/I_h) the moment is with the angle, and late it drives."""
+    arm = replace(lab, hub=replace(lab.hub, stiffness=3.0), link=replace(lab.link, damping=0.0))
+    table = mode_table(sampled_loop(arm, HubFeedback(K1=0.001, K2=0.3), count=6))
+    assert table.natural_frequency[0] < np.sqrt(3.0 / lab.hub.inertia) < table.natural_frequency[1]
+    assert table.driven_by_moment == [1]
 
 
 def test_a_locked_hub_has_no_loop_and_a_free_pin_none_by_moment(lab):
-    from dataclasses import replace
-
     locked = replace(lab, hub=Hub(inertia=np.inf))
     with pytest.raises(ParameterError, match="no loop"):
         sampled_loop(locked, HubFeedback(K1=0.3, K2=0.3))

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import re
 from dataclasses import replace
 from functools import cache
 
@@ -15,6 +16,7 @@ from tfarm.crossing import pieces
 from tfarm.digits import kept_digits, scientific
 from tfarm.dsp import Chain, Simulator, analyse, sampled_loop, sampled_verdict, scenario, stable_windows
 from tfarm.dsp.chain import Sampling
+from tfarm.dsp.law import mode_table
 from tfarm.dsp.loci import sampled_loci
 from tfarm.dsp.slews import slews
 from tfarm.dsp.strip_chart import strip_chart
@@ -23,7 +25,8 @@ from tfarm.loop.windows import gain_windows
 from tfarm.plots.files import save_figure
 from tfarm.plots.regions import draw_overlay
 from tfarm.plots.strip import draw_strip_chart
-from tfarm.report.sampled_section import sampled_section
+from tfarm.report.loop_laws import sign_words, what_holds
+from tfarm.report.sampled_section import first_order_words, sampled_section
 from tfarm.report.sampled_tables import loci_table
 from tfarm.report.sampled_words import Sampled, against_continuous, cure, duration, interval_words, sampled_in_short
 from tfarm.report.time_responses import CURVE_DIGITS
@@ -261,3 +264,33 @@ def test_a_held_tip_has_a_map_but_no_slew(monkeypatch):
     assert "no slew" in section.words[-1]
     assert "sampled-overlay" in blocks_of(section)
     assert "sampled-slew" not in blocks_of(section)
+
+
+# ------------------------------------------------------------ rigs that springs hold
+
+SPRUNG = replace(LAB, name="sprung", hub=replace(LAB.hub, stiffness=3.0))
+
+
+def test_words_on_modes_are_what_their_table_says():
+    """A spring's mode is driven by K2 > 0; late, bands do not alternate, and nothing is said to be shaded."""
+    plain, late = Chain(), Chain(sampling=Sampling(delay_samples=1.3))
+    for arm, chain, shaded in ((PAPER, plain, True), (SPRUNG, plain, True), (PAPER, late, False)):
+        table = mode_table(sampled_loop(arm, HubFeedback(K1=1e-3, K2=0.3), chain, count=6))
+        words = first_order_words(table)
+        assert ("Shaded" in words) == shaded == table.rate_alternates
+        driven = [int(n) for n, by in zip(table.index, table.by_moment, strict=True) if by > 0]
+        named = f"drives mode{'s' * (len(driven) > 1)} {', '.join(map(str, driven))}" if driven else "damps every mode"
+        assert words.endswith(f"Root moment feedback {named} to first order. ")
+    assert "moment" not in first_order_words(mode_table(sampled_loop(PAPER, HubFeedback(K1=1e-3), count=6)))
+
+
+def test_an_arm_on_springs_is_not_said_to_be_held_at_its_tip():
+    """Its gauge reads nothing of a torque that lasts; with the tip pinned, too, 3EI/L beside the spring's stiffness."""
+    assert what_holds(SPRUNG) == "Springs hold this arm"
+    assert "a torque that lasts gives 0." in sign_words(SPRUNG)
+    both = replace(SPRUNG, payload=replace(LAB.payload, mass=np.inf))
+    assert what_holds(both) == "The tip of this arm is held"
+    EI, kGA, L = LAB.link.EI, LAB.link.kGA, LAB.link.length
+    stiffness = 1 / (L / (3 * EI) + 1 / (kGA * L))
+    share = re.search(r"gives (−?-?[0-9.]+) times", sign_words(both))[1].replace("−", "-")
+    assert float(share) == pytest.approx(-stiffness / (3.0 + stiffness), abs=6e-6)

@@ -1,12 +1,13 @@
 """What sampling does to each mode, to first order in the gains, and what it really does at finite gains.
 
-To first order a mode of frequency w and hub participation b changes by, q = w T, delay d samples (any fraction),
+To first order a gain K adds Re[-K (z - z_p) H(z)/z_p] to ln|z| per sample of the mode with the open-loop pole z_p, H
+what the gain multiplies, through filters, differences and delay.  Of an undamped arm whose rate and root moment are
+read without any that is, w its frequency, b its hub participation, q = w T and delay d samples (any fraction),
 
-    ln|z| per sample = -b^2 sin(q/2) [ (K1/w) cos((d + 1/2) q) + K2 I_h sin((d + 1/2) q) ]
+    -b^2 sin(q/2) (K1/w) cos((d + 1/2) q)   and   -b^2 sin(q/2) K2 I_h sin((d + 1/2) q):
 
-and by any other gain by Re[-K (z - z_p) H(z)/z_p] at the pole z_p of the mode, H what it multiplies.  At d = 0 the hub
-rate damps from 0 to 1/(2T) [Hz] and destabilises from there to 1/T, and so on in bands; K2 > 0 never destabilises.  At
-finite gains the closed-loop pole itself says it: it is followed from zero gain.
+at d = 0 the hub rate damps from 0 to 1/(2T) [Hz] and destabilises from there to 1/T, and so on in bands, and K2 > 0
+never destabilises.  At finite gains the closed-loop pole itself says it: it is followed from zero gain.
 """
 
 from __future__ import annotations
@@ -14,13 +15,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from tfarm.arm import GAINS, PLANE, HubFeedback
+from tfarm.arm import GAINS, MOMENT_GAIN, RATE_GAIN
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.columns import ANSWER, JSON, REPORT, Column
 from tfarm.digits import general, lined, scientific, singly
@@ -87,25 +87,22 @@ class ModeTable:
         """Change of ln|z| per sample by all gains."""
         return self.by_rate + self.by_moment + self.by_others
 
+    @property
+    def rate_alternates(self) -> bool:
+        """Whether to first order the rate gain drives the modes of every other band, from the second on; no other."""
+        return bool(((self.by_rate > 0) == (self.band % 2 == 1))[self.by_rate != 0].all())
 
-def first_order_law(
-    w: Any, b: Any, hub_inertia: Any, gains: HubFeedback, period: float, delay: float
-) -> tuple[Any, Any]:
-    """The two terms of the formula, by K1 and by K2, for modes of frequency w [rad/s] and hub participation b."""
-    q = w * period
-    common = -(b**2) * np.sin(q / 2)
-    by_rate = common * gains.K1 / w * np.cos((delay + 0.5) * q)
-    by_moment = common * gains.K2 * hub_inertia * np.sin((delay + 0.5) * q)
-    return by_rate + 0.0, by_moment + 0.0  # -0.0 where a gain is 0
+    @property
+    def driven_by_moment(self) -> list[int]:
+        """The modes that the moment gain drives, to first order."""
+        return [int(each) for each in self.index[self.by_moment > 0]]
 
 
-def _by_others(loop: SampledLoop, poles: Whole) -> Real:
-    """What the gains outside the plane change of ln|z| at open-loop poles of these numbers: -K (z - z_p) H(z)/z_p."""
+def first_order(loop: SampledLoop, poles: Whole) -> Real:
+    """What each gain alone changes of ln|z| (gains, poles) at open-loop poles of these numbers, to first order."""
     z = loop.pulse.multipliers[poles]
-    others = [0.0 if gain.name in PLANE else loop.gains[gain.name] for gain in GAINS]
-    if not any(others):
-        return np.zeros(z.size)
-    return np.asarray(-(others @ loop.signals(z, poles, np.zeros(z.size)) / z).real)
+    signals = loop.signals(z, poles, np.zeros(z.size))
+    return np.asarray(-(np.array(loop.gains.row)[:, None] * signals / z).real) + 0.0  # -0.0 where a gain is 0
 
 
 def mode_table(loop: SampledLoop) -> ModeTable:
@@ -115,15 +112,9 @@ def mode_table(loop: SampledLoop) -> ModeTable:
     upper = np.nonzero((pulse.poles.imag > 0) & (pulse.mode > 0) & (own > LISTED_DECAY))[0]
     upper = upper[np.argsort(pulse.mode[upper])]
     index = pulse.mode[upper]
-    table = modes(pulse.plant.arm, max(1, int(index.max(initial=1))))
-    flexible = np.searchsorted(table.index, index)
-    w, b = table.natural_frequency[flexible], table.hub_participation[flexible]
-    T, arm = pulse.sampling.period, pulse.plant.arm
-    gains, inertia = loop.gains, np.asarray(arm.hub_inertia)
-    if not arm.is_uniform:  # of each mode what its gauge moment stands for
-        gains = gains.times(1.0 / arm.input_per_torque)
-        inertia = np.divide(-table.modal_moment[flexible], w**2 * b, out=np.zeros_like(b), where=b != 0)
-    by_rate, by_moment = first_order_law(w, b, inertia, gains, T, pulse.sampling.delay_samples)
+    table, T = modes(pulse.plant.arm, max(1, int(index.max(initial=1)))), pulse.sampling.period
+    w = table.natural_frequency[np.searchsorted(table.index, index)]
+    by = dict(zip((gain.name for gain in GAINS), first_order(loop, upper), strict=True))
     turns, origin = np.round(w * T / (2 * np.pi)), origins(loop)
     # what comes from a mode's pole or its conjugate: two radii where both have become real
     conjugate = abs(pulse.poles - pulse.poles[upper].conj()[:, None]).argmin(axis=1)
@@ -133,9 +124,9 @@ def mode_table(loop: SampledLoop) -> ModeTable:
         natural_frequency=w,
         band=np.floor(w * T / np.pi).astype(np.int64),
         aliased=abs(w - turns * 2 * np.pi / T),
-        by_rate=by_rate,
-        by_moment=by_moment,
-        by_others=_by_others(loop, upper),
+        by_rate=by.pop(RATE_GAIN),
+        by_moment=by.pop(MOMENT_GAIN),
+        by_others=sum(by.values()),
         by_damping=own[upper],
         log_radius=np.array(radii),
     )

@@ -48,7 +48,7 @@ def draw_modes(loop: SampledLoop, table: ModeTable, new: New = blank) -> Figure:
 
 
 def growths(loop: SampledLoop, table: ModeTable, *, ax: Axes) -> None:
-    """The chart; shaded where the rate gain destabilises to first order."""
+    """The chart; where bands alternate, those shaded in which the rate gain destabilises to first order."""
     w, T = table.natural_frequency, loop.chain.sampling.period
     low, high = 0.7 * float(w[0]), 1.25 * float(w[-1])
     ax.set_xscale("log")
@@ -60,7 +60,7 @@ def growths(loop: SampledLoop, table: ModeTable, *, ax: Axes) -> None:
     step = max(2, math.ceil((math.log10(max(down, up)) - first) / 5))  # decades from one tick to the next
     below, above = (range(first + step, math.floor(math.log10(8 * end)) + 1, step) for end in (down, up))
     ax.set_yticks([*(-(10.0**n) for n in reversed(below)), 0.0, *(10.0**n for n in above)])
-    if loop.chain.sampling.delay_samples == 0:
+    if table.rate_alternates:
         for band in range(1, SHADED_STRIPS, 2):
             ax.axvspan(band * math.pi / T, (band + 1) * math.pi / T, color=SHADE, lw=0, zorder=0.1)
         if SHADED_STRIPS * math.pi / T < high:

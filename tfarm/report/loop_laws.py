@@ -8,12 +8,13 @@ from functools import lru_cache
 from typing import Protocol
 
 from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, HubFeedback, input_words
-from tfarm.digits import significant
+from tfarm.digits import plain, significant
 from tfarm.dsp import Chain
 from tfarm.dsp.brief import SampledBrief, sampled_brief
 from tfarm.errors import ConvergenceError
 from tfarm.loop.margins import Margins, margins_of_gains
 from tfarm.plots.words import gains_words
+from tfarm.response import transfer
 from tfarm.spectrum.scales import default_gains
 from tfarm.synthesis.design import Design, best_gains
 
@@ -23,10 +24,7 @@ SIGN_WORDS = (
     f"E I φ′(0), positive where it accelerates the hub; {{rest}}. With the gauge reversed every "
     f"{MOMENT_GAIN} changes its sign."
 )
-TORQUE_AT_REST, TORQUE_HELD = (
-    "a torque u at rest gives −(J − I_h)/J u",
-    "a torque u that lasts gives −u, as the tip holds the arm",
-)
+TORQUE_AT_REST = "a torque u at rest gives −(J − I_h)/J u"
 NO_PLACE_FOR_K2 = (
     f"The hub of this arm has no inertia: {{gauge}}, so feeding it back by {MOMENT_GAIN} would be an algebraic loop. "
     f"There is no map of {' and '.join(PLANE)}; what {RATE_GAIN} does at {MOMENT_GAIN} = 0 is said below."
@@ -84,11 +82,23 @@ def why_no_loop(arm: Arm) -> str:
 
 def sign_words(arm: Arm) -> str:
     """The law, and the sign of its moment gain."""
-    if arm.is_uniform:
-        return SIGN_WORDS.format(rest=TORQUE_AT_REST if arm.has_rigid_mode else TORQUE_HELD)
-    share = significant(arm.gauged_inertia / arm.total_inertia, 5) if arm.has_rigid_mode else ""
-    rest = f"a static torque at the hub gives −{share} times as much" if share else TORQUE_HELD
-    return f"Here u is {input_words(arm)}. {SIGN_WORDS.format(rest=rest)}"
+    if arm.is_uniform and arm.has_rigid_mode:
+        return SIGN_WORDS.format(rest=TORQUE_AT_REST)
+    if arm.has_rigid_mode:
+        share = significant(arm.gauged_inertia / arm.total_inertia, 5)
+        rest = f"a torque that turns the whole arm gives −{share} times as much"
+    else:
+        static = transfer(arm, "root_moment").static * arm.input_per_torque
+        rest = (
+            f"a torque that lasts gives {plain(static, 5)} times as much" if static else "a torque that lasts gives 0"
+        )
+    driven = "" if arm.is_uniform else f"Here u is {input_words(arm)}. "
+    return driven + SIGN_WORDS.format(rest=rest)
+
+
+def what_holds(arm: Arm) -> str:
+    """Why an arm without a rigid mode makes no slew."""
+    return "The tip of this arm is held" if math.isinf(arm.payload.mass) else "Springs hold this arm"
 
 
 def edge_of_K2(arm: Arm, law: HubFeedback) -> float | None:

@@ -11,6 +11,7 @@ from tfarm.columns import Column, Table
 from tfarm.comparing.regions import regions_table
 from tfarm.digits import how_many, plain, scientific, significant, singly
 from tfarm.dsp import Chain, sampled_verdict
+from tfarm.dsp.law import ModeTable
 from tfarm.dsp.loci import STRONGER, sampled_loci
 from tfarm.dsp.margins import around
 from tfarm.dsp.slews import Slews, slews
@@ -19,7 +20,7 @@ from tfarm.plots.folded import draw_folded_loci
 from tfarm.plots.growth import draw_modes
 from tfarm.plots.regions import draw_overlay
 from tfarm.plots.strip import draw_strip_chart
-from tfarm.report.loop_laws import has_loop, why_no_loop
+from tfarm.report.loop_laws import has_loop, what_holds, why_no_loop
 from tfarm.report.sampled_tables import example_words, loci_table, mode_rows, strip_table
 from tfarm.report.sampled_words import (
     Sampled,
@@ -65,7 +66,7 @@ def sampled_section(arm: Arm, chain: Chain | None = None) -> PageSection:
             coarse = strip_chart(arm, data.gains, moved.with_moment, loop.plant.count)
             blocks.append(_strip_picture(coarse, loop.chain))
     else:
-        words.append("The tip of this arm is held, so there is no slew to show in time.")
+        words.append(f"{what_holds(arm)}, so there is no slew to show in time.")
     return PageSection(anchor="sampled", title=title, words=words, facts=sampled_facts(data), blocks=blocks)
 
 
@@ -172,10 +173,8 @@ def _mode_blocks(data: Sampled) -> list[Picture | Table]:
         stem="sampled-growth",
         title="What each mode gains or loses a sample",
         caption=(
-            "Upwards is growth, downwards decay, both on logarithmic scales. Shaded are the bands in which hub rate "
-            "feedback destabilises, as the samples see a rate of the wrong sign there; above the narrowest one shown "
-            f"they alternate too closely to draw. Root moment feedback with {MOMENT_GAIN} > 0 damps in every band to "
-            "first order; where a filled dot lies far from that, another mode in the loop decides. "
+            f"Upwards is growth, downwards decay, both on logarithmic scales. {first_order_words(table)}Where a filled "
+            "dot lies far from what is added to first order, another mode in the loop decides. "
             f"Of {table.index.size} modes, {said}."
         ),
         alt=f"Growth per sample of {table.index.size} modes over their frequency; {said}.",
@@ -185,12 +184,30 @@ def _mode_blocks(data: Sampled) -> list[Picture | Table]:
     return [picture, chart, rows]
 
 
+def first_order_words(table: ModeTable) -> str:
+    """What the rate gain does in each band where that alternates, and which modes the moment gain drives."""
+    shaded = (
+        "Shaded are the bands in which hub rate feedback destabilises, as the samples see a rate of the wrong sign "
+        "there; above the narrowest one shown they alternate too closely to draw. "
+    )
+    words = shaded if table.rate_alternates and table.by_rate.any() else ""
+    if not table.by_moment.any():
+        return words
+    driven = table.driven_by_moment
+    effect = f"drives {named_modes(driven)}" if driven else "damps every mode"
+    return f"{words}Root moment feedback {effect} to first order. "
+
+
 def grown_words(grown: list[int]) -> str:
     """Which modes grow, as the end of "Of 20 modes ..."."""
     if not grown:
         return "none grows"
-    number, named = ("one grows", "mode") if len(grown) == 1 else (f"{len(grown)} grow", "modes")
-    return f"{number}: {named} {', '.join(map(str, grown))}"
+    return f"{'one grows' if len(grown) == 1 else f'{len(grown)} grow'}: {named_modes(grown)}"
+
+
+def named_modes(numbers: list[int]) -> str:
+    """Modes by their numbers: mode 1, modes 2, 5."""
+    return f"mode{'s' * (len(numbers) > 1)} {', '.join(map(str, numbers))}"
 
 
 def _slew_picture(moved: Slews) -> Picture:

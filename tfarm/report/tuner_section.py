@@ -14,7 +14,7 @@ from tfarm.dsp import Chain
 from tfarm.errors import CertificationError
 from tfarm.plots.learning import draw_cost_map, draw_curves, draw_gain
 from tfarm.plots.motion import draw_responses
-from tfarm.report.loop_laws import has_loop, why_no_loop
+from tfarm.report.loop_laws import has_loop, what_holds, why_no_loop
 from tfarm.report.sections import PageSection, Picture
 from tfarm.report.time_responses import clipped_words, resolution_words, responses_table
 from tfarm.report.tuner_words import (
@@ -93,7 +93,7 @@ def why_not(arm: Arm) -> str:
     if not has_loop(arm):
         return why_no_loop(arm)
     if not arm.has_rigid_mode:
-        return "The tip of this arm is held: it makes no slew, and there is nothing for the tuner to learn from."
+        return f"{what_holds(arm)}: it makes no slew, and there is nothing for the tuner to learn from."
     if not arm.has_elastic_link:
         return ""
     return NOT_WITHOUT_DAMPING if arm.is_undamped else NOT_ON_ELASTIC
