@@ -8,13 +8,15 @@ from itertools import pairwise
 import control
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import tfarm
-from tests.loop.arms import window_arm
+from tests.loop.arms import window_arm, with_damping
 from tests.loop.test_lines import held
 from tests.loop.test_stability import exceptional
 from tests.odd_arms import odd_arms
 from tests.shared import thinned
+from tests.transition import response as transition
 from tfarm import Arm, Hub, HubFeedback
 from tfarm.loop.answers import margins_answer
 from tfarm.loop.frequencies import grid
@@ -162,6 +164,35 @@ def test_what_nothing_bounds_beyond_the_band_is_not_called_exact() -> None:
     assert np.mod(np.angle(-L), 2 * np.pi) == pytest.approx([0.75 * np.pi] * 2, abs=0.2)
     assert 0.75 * np.pi / (0.5 * omega) < 0.5 * found.in_band.delay
     assert (found.exact_delay, found.exact_disk, found.exact_peak) == (None, 2.0, 1.0)
+
+
+def test_resonances_too_narrow_for_any_grid_bound_the_exact_delay_margin() -> None:
+    """With C = 1e-10 s modes 13 to 19 of the paper's arm ring through |L| = 1; by the product of 4x4 matrices."""
+    arm = with_damping(BARE, 1e-10)
+
+    def minus_L(omega: float) -> complex:
+        rate, moment = (complex(each) for each in transition(arm, 1j * omega, ("hub_rate", "root_moment"), 20).values())
+        return -(LAW.K1 * rate + LAW.K2 * moment)
+
+    borne = []
+    for omega in tfarm.modes(arm, 22).natural_frequency[10:]:
+        for flank in (0.97, 1.03):
+            if abs(minus_L(omega)) > 1:
+                crossing = brentq(lambda w: abs(minus_L(w)) - 1, *sorted((omega, flank * omega)), xtol=1e-12 * omega)
+                borne.append(np.angle(minus_L(crossing)) % (2 * math.pi) / crossing)
+    found = margins(arm, LAW)
+    assert found.exact_delay == found.in_band.delay == pytest.approx(min(borne), rel=1e-6)
+
+
+@pytest.mark.parametrize(("C", "K2"), [(1e-10, 0.3), (1e-10, -1.0), (1e-9, -1.0)])
+def test_no_resonance_beyond_a_band_that_is_called_quiet_is_loud(C, K2) -> None:
+    arm = with_damping(BARE, C)
+    found = margins(arm, HubFeedback(K1=0.3, K2=K2))
+    omega = tfarm.modes(arm, 200).natural_frequency
+    beyond = 1j * omega[omega > found.stability.band]
+    rate, moment = tfarm.transfer(arm, ["hub_rate", "root_moment"])(beyond)
+    assert found.stability.is_known_beyond
+    assert abs(0.3 * rate + K2 * moment).max() < 0.5
 
 
 def test_the_delay_margin_of_the_lab_arm_is_about_17_ms() -> None:

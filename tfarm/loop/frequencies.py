@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from tfarm.arm import Arm
-from tfarm.spectrum import flexible_frequencies, modes
+from tfarm.spectrum import flexible_frequencies, modes, modes_below
 from tfarm.spectrum.search import ARMS_KEPT
 
 NEAREST_TO_STEEP, FARTHEST_FROM_STEEP = 1e-10, 0.06  # distances from a steep place, as shares of its frequency
@@ -25,6 +25,8 @@ POINTS_BETWEEN_STEEP = 24  # and between two of them
 STEEP_BEYOND = 1.05  # of the end of a grid: the points of steep places up to there reach below it
 SLOWEST = 1e-6  # of the first steep place: where a grid begins, as nothing bends there
 POINTS_BELOW_STEEP = 60  # from there to that place, ten a decade
+QUIET_REACH = 100.0  # bands up to which |L| is looked at beyond a band: two decades of its fall
+MOST_RESONANCES = 2000  # looked at in them: 20 ms
 MOST_BAND_MODES = 150  # flexible: what is not settled within so many is left open
 
 
@@ -61,3 +63,20 @@ def band_of(arm: Arm, number: int) -> float:
     """A frequency [rad/s] half-way between two natural ones, with so many flexible modes below."""
     omega = modes(arm, number + 1).natural_frequency
     return float((omega[-1] + omega[-2]) / 2)
+
+
+@lru_cache(maxsize=ARMS_KEPT)
+def quiet_places(arm: Arm, band: float, points: int) -> Any:
+    """Frequencies [rad/s] in two decades from a band on, where a damped loop is seen to be quiet or not; read-only.
+
+    So many at equal ratios, and the natural ones, the first `MOST_RESONANCES`, up to where bending is overdamped, 2/C
+    of the segment with the least C: a resonance narrower than their spacing would stand between them.
+    """
+    places = band * np.geomspace(1.0, QUIET_REACH, points)
+    if arm.least_damping:
+        first, last = (modes_below(arm, min(end, 2 / arm.least_damping)) for end in (band, QUIET_REACH * band))
+        many = min(last - first, MOST_RESONANCES)
+        if many:
+            places = np.unique(np.r_[places, modes(arm, first + many).natural_frequency[-many:]])
+    places.flags.writeable = False
+    return places

@@ -21,7 +21,7 @@ import numpy as np
 from tfarm.arm import Arm, Law
 from tfarm.spectrum import modes_below
 
-from .frequencies import MOST_BAND_MODES, band_of, grid
+from .frequencies import MOST_BAND_MODES, QUIET_REACH, band_of, grid, quiet_places
 from .law_loop import LawLoop
 from .law_poles import law_box, law_poles_below
 from .passivity import Signs, signs_of
@@ -30,7 +30,6 @@ from .stability import (
     LEAST_BAND_MODES,
     MARGIN_OF_ZERO,
     QUIET,
-    QUIET_REACH,
     WIDENED,
     Stability,
     is_felt,
@@ -127,11 +126,11 @@ def band_for(loop: LawLoop) -> float:
 def is_quiet_above(loop: LawLoop, band: float) -> bool:
     """Whether 1 + L has no zero with Im s > band right of the axis, by |L| < 1/2 on the edges of that region.
 
-    On the axis two decades are looked at, where |L| falls, with every natural frequency up to three times the band; on
-    the upper edge of the box as far right as that reaches, and beyond |L| is smaller still.
+    On the axis two decades are looked at, where |L| falls, with every natural frequency; on the upper edge of the box
+    as far right as that reaches, and beyond |L| is smaller still.
     """
     near = np.asarray(grid(loop.arm, SLOWEST_BAND * band))
-    omega = np.unique(np.r_[near[near >= band], band * np.geomspace(1.0, QUIET_REACH, LAW_QUIET_POINTS)])
+    omega = np.unique(np.r_[near[near >= band], quiet_places(loop.arm, band, LAW_QUIET_POINTS)])
     size = abs(loop.loop_function(1j * omega))
     half = math.sqrt(QUIET_REACH)
     if not size.max() < QUIET or size[omega > half * band].max() > size[omega <= half * band].max():

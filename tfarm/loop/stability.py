@@ -15,6 +15,7 @@ A pole at 0 remains where Kp = 0, whatever K1 and K2: verdicts are apart from it
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
@@ -28,14 +29,13 @@ from tfarm.errors import ConvergenceError
 from tfarm.records import record
 from tfarm.spectrum import modes, modes_below
 
-from .frequencies import MOST_BAND_MODES, band_of
+from .frequencies import MOST_BAND_MODES, QUIET_REACH, band_of, quiet_places
 from .lossless import driven_modes, locked_edges
 from .plant import Loop, slow_terms
 from .poles import AnyLoop, Poles, poles_below
 
 LEAST_BAND_MODES = 12  # flexible modes in the band at C = 0, and at least
 QUIET = 0.5  # |L| beyond the band, at C > 0
-QUIET_REACH = 100.0  # bands up to which |L| is looked at: two decades of its fall
 QUIET_POINTS = 1200  # in them, 600 a decade
 WIDENED = 1.6  # times, from one band that is tried to the next
 MARGIN_OF_ZERO = 1e-11  # a real part below this share of |s| is none: the poles are right to a few eps
@@ -212,8 +212,7 @@ def is_quiet(loop: Loop, band: float) -> bool:
 
 
 def _has_fallen(loop: Loop, band: float) -> bool:
-    """Whether |L| is so at `QUIET_POINTS` points of these two decades."""
-    half = QUIET_POINTS // 2
-    omega = band * np.geomspace(1.0, QUIET_REACH, QUIET_POINTS)
+    """Whether |L| is so at `QUIET_POINTS` points of these two decades, and at the resonances between them."""
+    omega, half = np.asarray(quiet_places(loop.arm, band, QUIET_POINTS)), math.sqrt(QUIET_REACH) * band
     size = abs(loop.loop_function(1j * omega))
-    return bool(size.max() < QUIET and size[half:].max() <= size[:half].max())
+    return bool(size.max() < QUIET and size[omega > half].max() <= size[omega <= half].max())
