@@ -109,6 +109,27 @@ def _simulated(arm: Any, law: Any) -> dict[str, Any]:
     }
 
 
+def _map(arm: Any, law: Any) -> list[list[int]] | str:
+    """The plane of K1 and K2 with the fourth gain held, or why there is none."""
+    import tfarm
+    from tfarm.errors import ConvergenceError
+
+    try:
+        return tfarm.map(arm, *AXES, law=law).unstable.tolist()  # type: ignore[no-any-return]
+    except ConvergenceError as error:
+        return str(error)
+
+
+def _of_the_arm(arm: Any) -> dict[str, Any]:
+    """What no law has a part in: the poles of a transfer function, and a damped shape."""
+    import tfarm
+
+    poles = tfarm.transfer(arm, "root_moment").poles(up_to=300.0).values
+    x = np.linspace(0.0, 1.0, 3)
+    shape = tfarm.damped_modes(tfarm.modes(arm, 2)).shape(x)
+    return {"poles": [[each.real, each.imag] for each in poles], "shape": abs(np.asarray(shape)).tolist()}
+
+
 def _answer(case: dict[str, Any]) -> dict[str, Any]:
     import tfarm
     from tfarm.loop.regions import region
@@ -118,7 +139,9 @@ def _answer(case: dict[str, Any]) -> dict[str, Any]:
     law = tfarm.HubFeedback(**case["gains"])
     return {
         "loop": _loop(arm, law),
-        "map": region(arm, *AXES, law["Kp"]).unstable.tolist(),
+        "map": region(arm, *AXES, tfarm.HubFeedback(Kp=law["Kp"])).unstable.tolist(),
+        "map_of_law": _map(arm, law),
+        "without_law": _of_the_arm(arm),
         "sampled": _sampled(arm, law),
         "simulated": _simulated(arm, law),
     }

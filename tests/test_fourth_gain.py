@@ -108,7 +108,28 @@ def test_without_losses_it_stabilises_nothing_and_a_rate_gain_does_from_0_on() -
 def test_the_map_without_it_is_that_of_the_program_without_it(number) -> None:
     """There an arm is a chain of one link, here a link in closed form."""
     case = CASES[number]
-    assert answered(number)["map"] == region(arm_of(case), *AXES, case["gains"]["Kp"]).unstable.tolist()
+    assert (
+        answered(number)["map"]
+        == region(arm_of(case), *AXES, tfarm.HubFeedback(Kp=case["gains"]["Kp"])).unstable.tolist()
+    )
+
+
+@pytest.mark.parametrize("number", THINNED)
+def test_the_map_that_holds_it_is_that_of_the_same_law_by_its_signals(number) -> None:
+    case = CASES[number]
+    plane = "hub_rate", "root_moment"
+    assert (
+        answered(number)["map_of_law"] == tfarm.map(arm_of(case), *AXES, law=law_of(case), vary=plane).unstable.tolist()
+    )
+
+
+@pytest.mark.parametrize("number", THINNED)
+def test_what_no_law_has_a_part_in_is_that_of_the_program_without_it(number) -> None:
+    arm, found = arm_of(CASES[number]), answered(number)["without_law"]
+    known = tfarm.transfer(arm, "root_moment").poles(up_to=300.0).values
+    assert np.array(found["poles"]) @ [1, 1j] == pytest.approx(known, rel=1e-12)
+    shape = tfarm.damped_modes(tfarm.modes(arm, 2)).shape(np.linspace(0.0, 1.0, 3))
+    assert np.array(found["shape"]) == pytest.approx(abs(np.asarray(shape)), rel=1e-9, abs=1e-12)
 
 
 @pytest.mark.parametrize("number", THINNED)

@@ -267,7 +267,7 @@ def test_the_region_of_a_hub_that_is_held_is_the_librarys(browser, folder, name)
         areas, Kp = page.evaluate("[live.now.areas, live.now.law.Kp]")
         assert {row["what"] for row in areas} == {"stable, continuous"}
         columns = sorted({row["K1"] for row in areas})[3 :: len(areas) // 5]
-        known = region(arm, np.array(columns), np.array([axes["K2"]["low"], axes["K2"]["high"]]), Kp)
+        known = region(arm, np.array(columns), np.array([axes["K2"]["low"], axes["K2"]["high"]]), HubFeedback(Kp=Kp))
         for gain, intervals in zip(columns, known.stable_intervals, strict=True):
             here = [(row["low"], row["high"]) for row in areas if row["K1"] == gain]
             cut = [(max(row[0], axes["K2"]["low"]), row[1]) for row in here]

@@ -84,6 +84,21 @@ def test_the_map_counts_unstable_poles_over_its_grid(capsys, tmp_path) -> None:
     assert len(rows) == 10
 
 
+@pytest.mark.parametrize("typed", [("--K1", "-1,3"), ("--K2", "-2,2"), ("--Kp", "3")])
+def test_a_map_of_a_law_has_no_ranges_of_gains(capsys, tmp_path, typed) -> None:
+    """They were passed over without a word."""
+    law = tmp_path / "law.toml"
+    law.write_text("[law.hub_rate]\ngain = 0.3\n[law.root_moment]\ngain = 0.3\n")
+    plane = ("--vary", "hub_rate=-1,3", "--vary", "root_moment=-2,2", "--points", "3")
+    code, out, err = run(capsys, "map", "sasaki2012-lab", "--law", str(law), *plane, *typed)
+    assert (code, out) == (2, "")
+    assert err.startswith(f"tfarm: {typed[0]} = ")
+    assert "--vary NAME=LO,HI" in err
+    code, out, err = run(capsys, "map", "sasaki2012", "--law", str(law), *plane[:-1], "7")
+    assert (code, out) == (3, "")
+    assert "give the link a little damping" in err
+
+
 def test_design_prints_gains_value_and_verdict(capsys) -> None:
     found = answer(capsys, "design", "sasaki2012", "--K1", "0,2", "--K2", "0,1", "--modes", "1")
     assert {"K1", "K2", "Kp", "value", "verdict"} <= set(found)

@@ -10,6 +10,7 @@ from matplotlib import image
 import tfarm
 from tests.shared import thinned
 from tests.shell import answer, run
+from tfarm.plots.frequency import draw_bode
 
 LAB = "sasaki2012-lab"
 BENCH = str(Path(__file__).parents[1] / "rigs" / "bench-rig.toml")
@@ -91,6 +92,17 @@ def test_bode_prints_what_the_record_holds(capsys, tmp_path):
     header, *rows = csv.reader((tmp_path / "bode.csv").read_text().splitlines())
     assert (code, header[0], float(rows[-1][0])) == (0, "omega_rad_s [rad/s]", 300.0)
     assert header[2:5] == [f"{key} [N m/(N m)]" for key in ("real", "imaginary", "magnitude")]
+
+
+def test_bode_says_that_an_output_is_zero_and_draws_that(capsys, tmp_path):
+    """Nothing is beyond the free tip to shear it: G is 0, which has no logarithm."""
+    there = ("bode", LAB, "--output", "shear", "--x", "1", "--to", "300")
+    code, out, err = run(capsys, *there, "--png", str(tmp_path / "zero.png"))
+    assert (code, out.splitlines()[1:], err) == (0, ["zero at every frequency"], f"written: {tmp_path / 'zero.png'}\n")
+    found = tfarm.bode(tfarm.load(LAB), "shear", (1.0, 300.0), x=1.0)
+    assert found.is_zero
+    figure = draw_bode(found)
+    assert [each.get_text() for each in figure.axes[0].texts] == ["zero at every frequency"]
 
 
 @pytest.mark.parametrize(("K2", "unstable"), [("0.3", 0), ("1.5", 2)])

@@ -36,7 +36,7 @@ def model_counts(arm, K1, K2, Kp, terms):
 @pytest.mark.parametrize("Kp", thinned([0.0, 3.0, -0.5], 2))
 def test_counts_of_the_lab_arm_are_those_of_an_independent_model(Kp) -> None:
     K1, K2 = between(-1, 3, 5), between(-2, 2.5, 6)
-    found = region(LAB, K1, K2, Kp)
+    found = region(LAB, K1, K2, HubFeedback(Kp=Kp))
     there = model_counts(LAB, K1, K2, Kp, 10)
     low = np.array([
         [poles_below(Loop(LAB, HubFeedback(K1=float(a), K2=float(b), Kp=Kp)), found.band).unstable for a in K1]
@@ -50,7 +50,7 @@ def test_counts_of_the_lab_arm_are_those_of_an_independent_model(Kp) -> None:
 def test_counts_of_a_held_arm_step_where_its_stiffness_vanishes(Kp) -> None:
     """At K1 < 0 the real pole goes the other way there than at K1 > 0."""
     K1, K2 = between(-6, 6, 5), between(-2, 3, 9)
-    found = region(held(1e-3), K1, K2, Kp)
+    found = region(held(1e-3), K1, K2, HubFeedback(Kp=Kp))
     np.testing.assert_array_equal(found.unstable, model_counts(held(1e-3), K1, K2, Kp, 10))
 
 
@@ -125,7 +125,7 @@ NO_DAMPING = [(BARE, -2.0), (held(0.0), -30.0), (BARE, 0.0), (held(0.0), 5.0), (
 @pytest.mark.parametrize(("arm", "Kp"), thinned(NO_DAMPING, 3))
 def test_at_no_damping_finite_counts_are_those_of_a_verdict_at_each_point(arm, Kp) -> None:
     K1, K2 = between(-5, 5, 4), between(-2, 5, 5)
-    found = region(arm, K1, K2, Kp)
+    found = region(arm, K1, K2, HubFeedback(Kp=Kp))
     for (j, i), count in np.ndenumerate(found.unstable):
         there = stability(arm, HubFeedback(K1=float(K1[i]), K2=float(K2[j]), Kp=Kp))
         assert count == (INFINITE if there.unstable_roots_infinite else there.unstable_roots)
@@ -188,7 +188,7 @@ def test_without_damping_the_intervals_of_a_held_arm_end_where_it_falls_statical
     """An angle pushed away by less than the arm's own stiffness: the map's counts tell the same, point by point."""
     held = BARE.having(payload_mass=math.inf)
     assert held.is_undamped
-    plane = region(held, np.array([-0.3, 0.3]), np.linspace(-2.5, 1.9, 41), -150.0)
+    plane = region(held, np.array([-0.3, 0.3]), np.linspace(-2.5, 1.9, 41), HubFeedback(Kp=-150.0))
     for n, column in enumerate(plane.stable_intervals):
         inside = [any(low < K2 < high for low, high in column) for K2 in plane.K2[1:-1]]
         np.testing.assert_array_equal(inside, plane.unstable[1:-1, n] == 0)

@@ -8,6 +8,7 @@ where it accelerates the hub; a static torque u gives it the value -(J - I_h)/J 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 
@@ -44,7 +45,7 @@ ANGLE_GAIN, RATE_GAIN, MOMENT_GAIN = (ON[output] for output in AT_HUB)
 PLANE = (RATE_GAIN, MOMENT_GAIN)  # the gains of the paper's own law: across and up the map of a loop
 TWO_GAINS = "-".join(PLANE)  # the structure of a law that is these, beside PD, lead, ...
 TAKEN_OFF = " - ".join(f"{gain.name} {gain.letter}" for gain in GAINS)  # off the input of the arm, by the law
-SPELT_OUT = TAKEN_OFF.replace(" M", " E I phi'(0)")
+SPELT_OUT = re.sub(r"\bM(?= |$)", "E I phi'(0)", TAKEN_OFF)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

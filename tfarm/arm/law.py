@@ -110,7 +110,7 @@ class Law:
 
     @classmethod
     def of_gains(cls, law: HubFeedback) -> Law:
-        """The hub's two or three gains as a law, on what their signals are off their references."""
+        """The hub's gains as a law, on what their signals are off their references."""
         used = {gain.output: law[gain.name] for gain in GAINS if law[gain.name]} or {"hub_rate": 0.0}
         return cls(used, name="gains at the hub", references=tuple(name for name in used if name in AT_HUB))
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, TWO_GAINS
+from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, TWO_GAINS, HubFeedback
 from tfarm.cli.app import ArmName, Json, app, give, load_arm, plain_number, tell, whole_number
 from tfarm.cli.inputs import Given, HeldAngle, LawFile, Png, asked_law, range_option, under_a_law, with_options
 from tfarm.cli.sampling import Delay, DspFile, Period, asked_chain
@@ -113,6 +113,7 @@ def gain_map(
     """The map over the plane of both gains, or over two numbers of a law."""
     number, subject = whole_number("--points", points or "101", 2, 2000), load_arm(arm)
     if vary or law:
+        _must_be_none_of(typed | {ANGLE_GAIN: kp or None})
         _law_map(subject, arm, law, vary or [], whole_number("--points", points or "60", 2, 400), csv, png, json)
         return
     from tfarm.loop.regions import ranges_of
@@ -124,11 +125,19 @@ def gain_map(
     from tfarm.loop.answers import map_answer, plane_table
     from tfarm.loop.regions import between, region
 
-    found = region(subject, between(*x, number), between(*y, number), kp)
+    found = region(subject, between(*x, number), between(*y, number), HubFeedback(**{ANGLE_GAIN: kp}))
     hand_out(
         lambda: map_answer(found), print_map, json,
         csv=csv, table=lambda: plane_table(PLANE, *found.axes, found.unstable), png=png, picture=(found,),
     )  # fmt: skip
+
+
+def _must_be_none_of(typed: dict[str, Any]) -> None:
+    """Refuse ranges of gains beside a law, which has numbers of its own."""
+    for name, value in typed.items():
+        if value is not None:
+            remedy = "leave it out: of a law the map is over two of its own numbers, --vary NAME=LO,HI twice"
+            raise ParameterError(key=f"--{name}", value=value, remedy=remedy)
 
 
 def _law_map(

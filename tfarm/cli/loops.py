@@ -18,7 +18,7 @@ Vary = Annotated[
     str,
     typer.Option(
         "--vary",
-        help=f"{', '.join(NAMES)}, all (a scale on the three), payload_mass, payload_inertia, hub_inertia, length or "
+        help=f"{', '.join(NAMES)}, all (a scale on all of them), payload_mass, payload_inertia, hub_inertia, length or "
         "damping; or gain (a factor on the law), delay, SIGNAL, SIGNAL.num.N or SIGNAL.den.N",
     ),
 ]

@@ -81,6 +81,9 @@ def _print_bode(answer: dict[str, Any]) -> None:
     low, high = answer["band_rad_s"]
     at = f" at x = {answer['x']:g} m" if "x" in answer else ""
     print(f"{answer['arm']}: {answer['output']}{at} / {answer['input']} [{answer['unit']}], {low:g} to {high:g} rad/s")
+    if not any(map(any, answer["value"])):
+        print("zero at every frequency")
+        return
     for kind in ("poles", "zeros"):
         if len(answer[kind]):
             print(f"{kind}:")

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from tfarm.arm import ANGLE_GAIN, PLANE, AnyLaw, Arm, HubFeedback, Law, arm_and_law, as_law, must_be_arm
+from tfarm.arm import PLANE, AnyLaw, Arm, HubFeedback, Law, arm_and_law, as_law, must_be_arm
 from tfarm.arm.checks import whole
 from tfarm.arrays import Complex, Real
 from tfarm.dsp import Chain
@@ -150,7 +150,7 @@ class Comparison:
             for n, (name, number) in enumerate(zip(PLANE, (REGION_COLUMNS, REGION_ROWS), strict=True))
         )
         x = np.union1d(x, [FIRST_COLUMN * x[-1]])
-        first, second = (region(side.arm, x, y, law[ANGLE_GAIN]) for side, law in zip(self.sides, laws, strict=True))
+        first, second = (region(side.arm, x, y, law) for side, law in zip(self.sides, laws, strict=True))
         return first, second
 
     @cached_property

@@ -57,6 +57,12 @@ def unit_gains(k: System) -> Gains:
     return cast("Gains", k.kept["unit gains"])
 
 
+def at_hub(gains: Gains) -> Gains:
+    """Those on the hub's own outputs, which are all that one link is asked for: a law of others is on a chain."""
+    assert not any(gains[len(AT_HUB) :])
+    return gains[: len(AT_HUB)]
+
+
 def gains_of(k: System, law: HubFeedback) -> Gains:
     """The gains of a law without dimensions."""
     return tuple(Fraction(gain) * unit for gain, unit in zip(law.row, unit_gains(k), strict=True))
@@ -118,7 +124,7 @@ def characteristic(k: System, s: Complex, gains: Gains = NO_GAINS, at_zero: int 
         return deflated(value, slope, here.scale, s, at_zero)
     free, at = free_response(k, s), Jet.variable(s, 1)
     fed_back = NUMERATORS(at, 1.0 / (1.0 + k.damping * at), free.theta, free.M)
-    value, slope = (free.drive + torque([float(gain) for gain in gains], fed_back)).c
+    value, slope = (free.drive + torque([float(gain) for gain in at_hub(gains)], fed_back)).c
     return deflated(value, slope, free.scale, s, at_zero)
 
 

@@ -95,7 +95,11 @@ def why_no_appendix(arm: Arm, theory: Theory, wanted: Sequence[Output] = ()) -> 
     if theory != "timoshenko" or not arm.is_uniform:
         return "the paper's appendix is of one Timoshenko beam on a hub"
     others = [each.name for each in wanted if each.is_of_a_chain]
-    return f"the paper's appendix is not asked for {others[0]}" if others else ""
+    return (
+        f"the paper's appendix has no {others[0]}: it is an output of rigs, worked out by closed form and balls"
+        if others
+        else ""
+    )
 
 
 def must_be_of_appendix(arm: Arm, theory: Theory, wanted: Sequence[Output] = ()) -> None:

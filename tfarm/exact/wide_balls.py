@@ -22,7 +22,7 @@ from .balls import Ball, State, point, rational
 from .chain import ElementChain
 from .chain_values import ChainState
 from .chain_wide import swept
-from .characteristic import FED, NO_GAINS, NUMERATORS, Gains, unit_gains
+from .characteristic import FED, NO_GAINS, NUMERATORS, Gains, at_hub, unit_gains
 from .closed_form import from_waves
 from .coefficients import Coefficients, EndCondition
 from .compiled import python_of
@@ -107,7 +107,7 @@ def _closed(k: Coefficients, s: Any, theta: Any, M0: Any, gains: Gains) -> Any:
     drive = drive / hub.force if isinstance(k.hub_inertia, Fraction) else drive
     if not any(gains):
         return drive
-    for gain, part in zip(gains, NUMERATORS(s, 1 / (s * numbers.C + 1), theta, M0), strict=True):
+    for gain, part in zip(at_hub(gains), NUMERATORS(s, 1 / (s * numbers.C + 1), theta, M0), strict=True):
         drive = drive + part * rational(gain) if gain else drive
     return drive
 

@@ -5,7 +5,7 @@ A law that is no more than these gains is taken for them.
 
 from __future__ import annotations
 
-from tfarm.arm import FED_BACK, PLANE, AnyLaw, Arm, HubFeedback, Law, arm_and_law, as_law
+from tfarm.arm import AT_HUB, FED_BACK, PLANE, AnyLaw, Arm, HubFeedback, Law, arm_and_law, as_law
 from tfarm.arrays import Real
 from tfarm.errors import ParameterError
 
@@ -107,12 +107,14 @@ def gain_map(
     if law is None:
         if vary is not None:
             raise ParameterError(key="law", value=None, remedy="give the HubFeedback or Law whose numbers vary names")
-        return region(arm, K1, K2, Kp)
+        return region(arm, K1, K2, HubFeedback(Kp=Kp))
     arm, plain = arm_and_law(arm, law)
     if Kp:
         raise ParameterError(key="Kp", value=Kp, remedy="the law holds the angle: give Kp in it, or no law")
     if isinstance(plain, HubFeedback) and vary in (None, PLANE):
-        return region(arm, K1, K2, plain.Kp)
+        if plain.is_at_hub:
+            return region(arm, K1, K2, plain)
+        law, vary = as_law(plain.at(1.0, 1.0)), (AT_HUB[1], AT_HUB[2])  # of signals: no theorem tells its plane
     if not isinstance(vary, tuple | list) or len(vary) != 2 or not all(isinstance(each, str) for each in vary):
         raise ParameterError(key="vary", value=vary, remedy='two numbers of the law, such as ("gain", "delay")')
     return law_map(arm, law, (vary[0], vary[1]), K1, K2)

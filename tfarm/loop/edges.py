@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN, Arm
+from tfarm.arm import MOMENT_GAIN, RATE_GAIN, Arm
 from tfarm.arrays import Real
 from tfarm.spectrum import modes
 from tfarm.spectrum.scales import default_gains, rate_unit
@@ -124,7 +124,7 @@ def edge(found: Region, x: Axis, y: Axis) -> Real:
             break
         middle = np.sqrt(points[coarse, 2] * points[coarse + 1, 2])
         middle = middle[(middle > points[coarse, 2]) & (middle < points[coarse + 1, 2])]
-        points = np.concatenate([points, boundary(found.arm, middle, found.held[ANGLE_GAIN])])
+        points = np.concatenate([points, boundary(found.arm, middle, found.held)])
         points = points[np.unique(points[:, 2], return_index=True)[1]]
     length, is_seen = _segments(points, x, y)
     kept = is_seen & (length < LONG_SEGMENT)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tfarm.arm import AnyLaw, Arm, Law, as_law
 from tfarm.arrays import Complex, Real
 from tfarm.crossing import Crossing, Crossings, counts_over, crossed, with_dips
-from tfarm.errors import ParameterError
+from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exact.characteristic import LoopParts
 from tfarm.records import record
 from tfarm.spectrum.box import Box, winding_number
@@ -172,5 +172,13 @@ def _change_at(loop: LawLoop, name: str, low: float, span: float, t: float, othe
     at = low + span * t
     away = [abs(each.t - at) for each in others if each.t != at]
     step = min([BESIDE_MEETING * span, *(each / 2 for each in away)])
-    below, above = (unstable_below(loop.under(loop.law.having(name, at + side * step)), band) for side in (-1, 1))
+    beside = [loop.under(loop.law.having(name, at + side * step)) for side in (-1, 1)]
+    try:
+        below, above = (unstable_below(each, band) for each in beside)
+    except ConvergenceError as error:
+        why = (
+            f"at {name} = {at:.6g} two poles meet at s = 0, and beside it others are on the axis, where nothing is "
+            "damped: they cannot be counted; give the link a little damping, or a range without that value"
+        )
+        raise ConvergenceError(why, error.best, error.residual) from error
     return above - below

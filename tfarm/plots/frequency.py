@@ -78,6 +78,8 @@ def draw_magnitude(data: Bode, *, ax: Axes, is_small: bool = False, label: str =
         ax.set_ylabel(f"|{data.label}| [{data.gain_unit}]", fontsize=8.5)
         return
     ax.set_ylabel(f"|{data.label} / {data.input_label}|  [{data.gain_unit}]")
+    if data.is_zero:
+        ax.text(0.5, 0.5, "zero at every frequency", ha="center", va="center", transform=ax.transAxes)
     _number_modes(data, ax)
     hertz_axis(ax, 1.0 + NUMBER_STRIP)
     starts_low = abs(data.value[0]) < math.sqrt(low * high)
@@ -137,6 +139,8 @@ def magnitude_limits(data: Bode) -> tuple[float, float]:
     if roots.size:
         away = abs(data.omega[:, None] / roots - 1).min(axis=1) > 0.004
         size = size[away] if away.any() else size
+    if data.is_zero:
+        return 0.1, 10.0
     seen = np.r_[size[size > 0], abs(data.rigid[:1][data.rigid[:1] != 0])]
     low, high = math.log10(seen.min()), math.log10(seen.max())
     margin = max(0.25, 0.06 * (high - low))

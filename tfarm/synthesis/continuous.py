@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from tfarm.arm import ANGLE_GAIN, Arm, HubFeedback, law_of, laws_at
+from tfarm.arm import Arm, HubFeedback, law_of, laws_at
 from tfarm.arrays import Real
 from tfarm.errors import ConvergenceError
 from tfarm.loop.damping import least_damping
@@ -57,7 +57,7 @@ class ContinuousJudge:
     def landscape(self, axes: tuple[GainAxis, GainAxis], effort: Effort) -> tuple[Real, Score]:
         """Scores over the grid, rows upwards, inf where not stable; and the score where its nearest point is stable."""
         gains = [axis.gain(axis.middles(number)) for axis, number in zip(axes, effort[:2], strict=True)]
-        stable = region(self.arm, gains[0], gains[1], self.held[ANGLE_GAIN]).stable
+        stable = region(self.arm, gains[0], gains[1], self.held).stable
         grid = np.array(np.meshgrid(*gains))
         values = np.full(stable.shape, np.inf)
         if stable.any():
