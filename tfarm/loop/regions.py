@@ -36,6 +36,7 @@ from .windows import holds_undamped
 
 INFINITE = -1  # stands for infinitely many unstable poles
 MOST_GRID_GAINS = 2000  # of a map, along one gain
+ROUNDED = 4 * float(np.finfo(float).eps)  # of a range: a gain so small is 0, and on the line K1 = 0 is not beside it
 ONLY_THE_PLANE = HubFeedback()
 SHOWN_K1, SHOWN_K2 = (-1.0, 3.0), (-2.0, 2.0)  # of a map, unless told: what the paper's arm is stable in, and around it
 
@@ -157,7 +158,8 @@ def ranges_of(arm: Arm) -> tuple[tuple[float, float], tuple[float, float]]:
 
 def between(low: float, high: float, number: int) -> Real:
     """So many gains from low to high, the middles of equal parts: none of them on a line K1 = 0 unless by chance."""
-    return np.asarray(low + (high - low) * (np.arange(number) + 0.5) / number)
+    values = low + (high - low) * (np.arange(number) + 0.5) / number
+    return np.where(abs(values) <= ROUNDED * (high - low), 0.0, values)
 
 
 def _undamped_counts(arm: Arm, K1: Real, K2: Real, held: HubFeedback) -> NDArray[np.int64]:
