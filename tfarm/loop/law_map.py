@@ -170,6 +170,7 @@ def _change_at(loop: LawLoop, name: str, low: float, span: float, t: float, othe
     Without losses modes may cross at that value, but for rounding: it is no place to count at, and is refused.
     """
     at = low + span * t
+    at = 0.0 if abs(at) <= ROUNDED * span else at
     away = [abs(each.t - at) for each in others if each.t != at]
     step = min([BESIDE_MEETING * span, *(each / 2 for each in away)])
     beside = [loop.under(loop.law.having(name, at + side * step)) for side in (-1, 1)]
