@@ -38,7 +38,7 @@ MATERIALS = {  # density [kg/m^3], Young's modulus [Pa], Poisson's ratio
 }
 WRITE = (
     "import sys; from pathlib import Path; import tfarm; from tfarm.report import write; "
-    "from tfarm.report.page import QUESTIONS; "
+    "from tfarm.report.pieces import QUESTIONS; "
     "write([tfarm.load(sys.argv[1])], Path(sys.argv[2]), only=tuple(QUESTIONS), notice=print)"
 )
 LONGEST = 1800.0  # s that one arm may take, on a machine that others use too

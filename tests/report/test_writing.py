@@ -10,7 +10,7 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote
@@ -35,6 +35,7 @@ from tfarm.report.frame import first_sentence
 from tfarm.report.given_laws import GivenLaw, Subject
 from tfarm.report.page import index_page
 from tfarm.report.paper import is_from_paper, paper_section
+from tfarm.report.pieces import QUESTIONS
 from tfarm.report.sections import PageSection
 from tfarm.report.trust import Evidence, kept_evidence, write_trust
 from tfarm.report.trust_proofs import written_proofs
@@ -520,7 +521,7 @@ def test_a_page_is_about_the_arms_own_file(tmp_path, monkeypatch, capsys):
         seen.append((arm.name, chain))
         return PageSection(anchor="sampled", title="The sampled loop")
 
-    monkeypatch.setattr(making, "ARM_PIECES", (making.Piece("s", "sampled", ("sampled",), section, is_sampled=True),))
+    monkeypatch.setattr(making, "ARM_PIECES", (making.Piece("s", "sampled", section, is_sampled=True),))
     monkeypatch.setattr(making, "save_proof", lambda *_: None)
     plain_cards(monkeypatch.setattr)
     file = tmp_path / "bench.toml"
@@ -592,7 +593,48 @@ def test_every_piece_knows_the_anchor_of_its_section(pages):
     assert [piece.anchor for piece in making.ARM_PIECES if piece.is_for(Subject(ARM, Chain()))] == [
         i for i in ids if i in ANCHORS
     ]
-    assert all(writing.is_on_page(piece.anchor, page) for piece in making.ARM_PIECES for page in piece.questions)
+
+
+PAGES = {  # asked for alone, in their order: their sections of an arm's own loop, and of given laws
+    "bode": (("arm", "bode-root-moment", "bode-tip-displacement", "bode-measured"),) * 2,
+    "modes": (("arm", "modes"),) * 2,
+    "margins": (
+        ("margins-map", "arm", "no-loop", "margins", "margins-nyquist"),
+        ("margins", "law", "margins-nyquist", "no-loop", "arm"),
+    ),
+    "locus": (("arm", "no-loop", "locus"), ("law", "locus", "no-loop", "arm")),
+    "sampled": (("arm", "no-loop", "sampled"), ("sampled", "law", "no-loop", "arm")),
+    "tune": (("arm", "no-loop", "tune"), ("law", "no-loop", "arm")),
+    "assumptions": (("arm", "assumptions"),) * 2,
+}
+
+
+def test_each_page_asked_for_alone_has_its_sections():
+    assert list(QUESTIONS) == list(PAGES)
+    found = {
+        page: tuple(
+            tuple(each.anchor for each in those if each.is_on(page)) for those in (making.ARM_PIECES, making.LAW_PIECES)
+        )
+        for page in PAGES
+    }
+    assert found == PAGES
+
+
+def test_a_page_has_the_same_sections_whatever_is_written_with_it(tmp_path, monkeypatch):
+    """Of an arm without a loop: what says so stands on the pages of the loop, and on no other."""
+    kept = tuple(replace(each, make=partial(bare, each.anchor)) for each in making.ARM_PIECES)
+    monkeypatch.setattr(making, "ARM_PIECES", kept)
+    monkeypatch.setattr(making, "save_proof", lambda *_: None)
+    plain_cards(monkeypatch.setattr)
+    for only in (("modes",), ("locus",), ("modes", "locus")):
+        write([HELD], tmp_path, only=only, force=True)
+        ids = {page: [i for i in Links(tmp_path / HELD.name / f"{page}.html").ids if i in ANCHORS] for page in only}
+        assert ids == {page: {"modes": ["arm", "modes"], "locus": ["arm", "no-loop"]}[page] for page in only}
+
+
+def bare(anchor, *_):
+    """A section that says nothing."""
+    return PageSection(anchor=anchor, title=anchor)
 
 
 @pytest.mark.parametrize(

@@ -12,18 +12,10 @@ from markupsafe import Markup
 from tfarm.arm import Arm
 from tfarm.glossary import GLOSSARY_TERMS, Term
 from tfarm.report.loop_laws import has_rate_loop, sign_words
+from tfarm.report.pieces import QUESTIONS
 from tfarm.report.sections import SavedBlock, SavedSection
 from tfarm.tables.html import with_symbols
 
-QUESTIONS = {  # the pages that may be asked for alone, by the name of `--only`
-    "bode": "Bode plots",
-    "modes": "Modes",
-    "margins": "Gains and margins",
-    "locus": "Root loci",
-    "sampled": "The sampled loop",
-    "tune": "The gain tuner",
-    "assumptions": "What the assumptions do",
-}
 SHORTEST = 40  # characters of an answer; one that is shorter takes the next sentence too
 ANSWERS = ("margins-map", "margins", "locus", "sampled", "tune", "fit", "law", "no-loop")  # whose first words answer
 BADGES = {"stable": "ok", "yes": "ok", "unstable": "corrected", "no": "corrected", "marginal": "undecided",

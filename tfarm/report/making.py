@@ -53,7 +53,7 @@ def make_all(
     tasks = [EVIDENCE_WORK] * with_evidence + [SCRIPTS_WORK] * (scripts is not None)
     for i, subject in enumerate(subjects):
         suited = [(j, piece) for j, piece in enumerate(pieces_of(subject)) if piece.is_for(subject)]
-        tasks += [(i, j) for j, piece in suited if not only or set(only) & set(piece.questions)]
+        tasks += [(i, j) for j, piece in suited if not only or any(map(piece.is_on, only))]
         tasks += [(i, LIVE_WORK)] * (not only and is_live(subject))
         tasks.append((i, CARD_ALONE_WORK if subject.laws and only else CARD_WORK))
     done: dict[PieceWork, Made] = {}

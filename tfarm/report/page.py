@@ -21,8 +21,8 @@ from tfarm.dsp import Chain, load_chain
 from tfarm.dsp.writing import file_text
 from tfarm.errors import ParameterError
 from tfarm.report.frame import BADGES, explained, framed, promises, section_rows, signs, word_id
-from tfarm.report.frame import QUESTIONS as QUESTIONS
 from tfarm.report.given_laws import Subject
+from tfarm.report.pieces import QUESTIONS
 from tfarm.report.sections import Fact, SavedSection
 from tfarm.tables.html import with_symbols
 

@@ -20,18 +20,18 @@ from tfarm.report.loop_laws import has_loop, has_rate_loop
 from tfarm.report.loop_section import map_section, margins_section, no_loop_section, nyquist_section
 from tfarm.report.measured_section import measured_section
 from tfarm.report.modes_section import modes_section
-from tfarm.report.page import QUESTIONS
 from tfarm.report.paper import is_from_paper, paper_section
 from tfarm.report.sampled_section import sampled_section
 from tfarm.report.sections import PageSection
 from tfarm.report.tuner_section import tuner_section
 
-LOOP_PAGES = ("margins", "locus", "sampled", "tune")  # whose sections an arm without a loop has not
-
 
 @dataclass(frozen=True, slots=True)
 class Piece:
     """One section of one arm's page: a name for the progress bar, the section's anchor, and how to make it.
+
+    The page that `report --only` asks for is called by the first word of its sections' anchors; its `title` stands with
+    one of them, and `is_also_on` says which other pages of that kind have a section.  The full page has all.
 
     `make` takes the arm, for a section that says what the loop does when sampled (`is_sampled`) its chain, for one of
     given laws (`is_of_laws`) chain and laws, for one of a fit (`is_of_fit`) that alone, for one of measured responses
@@ -40,14 +40,24 @@ class Piece:
 
     name: str
     anchor: str
-    questions: tuple[str, ...]  # the --only pages that have it; the full page has all
     make: Callable[..., PageSection]
     suits: Callable[[Arm], bool] = lambda arm: True
+    title: str = ""
+    is_also_on: Callable[[str], bool] = lambda page: False
     is_sampled: bool = False
     is_of_laws: bool = False
     in_s: bool = False
     is_of_fit: bool = False
     is_measured: bool = False
+
+    @property
+    def page(self) -> str:
+        """The page that has it when it is asked for alone."""
+        return self.anchor.partition("-")[0]
+
+    def is_on(self, page: str) -> bool:
+        """Whether that page, asked for alone, has the section."""
+        return page == self.page or self.is_also_on(page)
 
     def is_for(self, subject: Subject) -> bool:
         """Whether a page on this subject has the section."""
@@ -68,32 +78,39 @@ class Piece:
         return self.make(subject.arm, subject.chain) if self.is_sampled else self.make(subject.arm)
 
 
+def is_of_the_loop(page: str) -> bool:
+    """Whether the page is one that an arm without a loop has nothing on, but that it has none."""
+    return any(piece.page == page and piece.suits in (has_loop, has_rate_loop) for piece in ARM_PIECES)
+
+
 ARM_PIECES = (
-    Piece("the fit", "fit", (), fit_section, is_of_fit=True),
-    Piece("map of the gains", "margins-map", ("margins",), map_section, has_loop, is_sampled=True),
-    Piece("the arm", "arm", tuple(QUESTIONS), arm_section),
-    Piece("the paper's values", "paper", (), paper_section, is_from_paper),
-    Piece("root moment", "bode-root-moment", ("bode",), partial(bode_section, output="root_moment")),
-    Piece("tip displacement", "bode-tip-displacement", ("bode",), partial(bode_section, output="tip_displacement")),
-    Piece("measured responses", "bode-measured", ("bode",), measured_section, is_measured=True),
-    Piece("modes", "modes", ("modes",), modes_section),
-    Piece(
-        "no loop", "no-loop", ("margins", "locus", "sampled", "tune"), no_loop_section, lambda arm: not has_loop(arm)
-    ),
-    Piece("margins", "margins", ("margins",), margins_section, has_rate_loop, is_sampled=True),
-    Piece("root loci", "locus", ("locus",), locus_section, has_rate_loop),
-    Piece("Nyquist", "margins-nyquist", ("margins",), nyquist_section, has_rate_loop, is_sampled=True),
-    Piece("sampled loop", "sampled", ("sampled",), sampled_section, has_loop, is_sampled=True),
-    Piece("gain tuner", "tune", ("tune",), tuner_section, has_loop, is_sampled=True),
-    Piece("assumptions", "assumptions", ("assumptions",), assumptions_section),
+    Piece("the fit", "fit", fit_section, is_of_fit=True),
+    Piece("map of the gains", "margins-map", map_section, has_loop, is_sampled=True),
+    Piece("the arm", "arm", arm_section, is_also_on=lambda page: True),
+    Piece("the paper's values", "paper", paper_section, is_from_paper),
+    Piece("root moment", "bode-root-moment", partial(bode_section, output="root_moment"), title="Bode plots"),
+    Piece("tip displacement", "bode-tip-displacement", partial(bode_section, output="tip_displacement")),
+    Piece("measured responses", "bode-measured", measured_section, is_measured=True),
+    Piece("modes", "modes", modes_section, title="Modes"),
+    Piece("no loop", "no-loop", no_loop_section, lambda arm: not has_loop(arm), is_also_on=is_of_the_loop),
+    Piece("margins", "margins", margins_section, has_rate_loop, "Gains and margins", is_sampled=True),
+    Piece("root loci", "locus", locus_section, has_rate_loop, "Root loci"),
+    Piece("Nyquist", "margins-nyquist", nyquist_section, has_rate_loop, is_sampled=True),
+    Piece("sampled loop", "sampled", sampled_section, has_loop, "The sampled loop", is_sampled=True),
+    Piece("gain tuner", "tune", tuner_section, has_loop, "The gain tuner", is_sampled=True),
+    Piece("assumptions", "assumptions", assumptions_section, title="What the assumptions do"),
 )
-OF_THE_LOOP = {piece.name for piece in ARM_PIECES if set(piece.questions) & set(LOOP_PAGES) and piece.anchor != "arm"}
+QUESTIONS = {piece.page: piece.title for piece in ARM_PIECES if piece.title}  # pages that may be asked for alone
 LAW_PIECES = (
-    Piece("margins", "margins", ("margins",), law_margins_section, has_rate_loop, is_of_laws=True, in_s=True),
-    Piece("sampled loop", "sampled", ("sampled",), law_sampled_section, has_rate_loop, is_of_laws=True),
-    Piece("the law", "law", LOOP_PAGES, law_section, has_rate_loop, is_of_laws=True),
-    Piece("Nyquist", "margins-nyquist", ("margins",), law_nyquist_section, has_rate_loop, is_of_laws=True, in_s=True),
-    Piece("poles", "locus", ("locus",), law_poles_section, has_rate_loop, is_of_laws=True, in_s=True),
-    Piece("no loop", "no-loop", LOOP_PAGES, no_loop_section, lambda arm: not has_rate_loop(arm)),
-    *(piece for piece in ARM_PIECES if piece.name not in OF_THE_LOOP),
+    Piece("margins", "margins", law_margins_section, has_rate_loop, is_of_laws=True, in_s=True),
+    Piece("sampled loop", "sampled", law_sampled_section, has_rate_loop, is_of_laws=True),
+    Piece("the law", "law", law_section, has_rate_loop, is_also_on=is_of_the_loop, is_of_laws=True),
+    Piece("Nyquist", "margins-nyquist", law_nyquist_section, has_rate_loop, is_of_laws=True, in_s=True),
+    Piece("poles", "locus", law_poles_section, has_rate_loop, is_of_laws=True, in_s=True),
+    Piece("no loop", "no-loop", no_loop_section, lambda arm: not has_rate_loop(arm), is_also_on=is_of_the_loop),
+    *(
+        piece
+        for piece in ARM_PIECES
+        if not is_of_the_loop(piece.page) and piece.is_also_on is not is_of_the_loop  # which laws have their own of
+    ),
 )

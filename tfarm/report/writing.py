@@ -19,8 +19,9 @@ from tfarm.report.frame import other_pages
 from tfarm.report.given_laws import GivenLaw, Subject, check_laws
 from tfarm.report.kept import COMPARISON_PAGE, kept_comparison
 from tfarm.report.live import ASSETS, LIVE_PAGE, has_assets, is_live
-from tfarm.report.making import ReportProgress, make_all
-from tfarm.report.page import QUESTIONS, arm_page, file_of, index_page
+from tfarm.report.making import ReportProgress, make_all, pieces_of
+from tfarm.report.page import arm_page, file_of, index_page
+from tfarm.report.pieces import QUESTIONS
 from tfarm.report.sections import SavedSection
 from tfarm.report.trust import TRUST_FOLDER, kept_evidence, write_trust
 from tfarm.report.trust_proofs import written_proofs
@@ -36,7 +37,6 @@ RESERVED_NAMES = (  # which no arm's folder may have
 TRUST_PAGE = f"{TRUST_FOLDER}/index.html"
 LEFT_AS_IT_IS = "{name}: left as it is, for nothing that its page is made of has changed; --force makes it again"
 LEFT_OUT_OF = "{name}: the page leaves out “{title}” and says why: {why}"
-OF_EVERY_PAGE = ("arm", "law", "no-loop")  # anchors of sections that the page of every question has
 
 
 def write(
@@ -209,7 +209,8 @@ def _write_pages(
     """
     (folder / "arm.toml").write_text(file_of(subject), encoding="utf-8", newline="")
     for question in only or (None,):
-        wanted = [each for each in sections if question is None or is_on_page(each.section.anchor, question)]
+        anchors = {piece.anchor for piece in pieces_of(subject) if question and piece.is_on(question)}
+        wanted = [each for each in sections if question is None or each.section.anchor in anchors]
         live = (folder / LIVE_PAGE).is_file()
         others = [*other_pages(earlier, _pages(only), question or "index"), *_compared(earlier.parent, subject.arm)]
         page = arm_page(subject, wanted, question, trust=f"../{trust}" if trust else "", live=live, others=others)
@@ -225,11 +226,6 @@ def _compared(out: Path, arm: Arm) -> list[tuple[str, str]]:
 def _leads(trust: str, out: Path, arm: Arm) -> str:
     """The pages that an arm's page leads to besides its own."""
     return "\n".join((trust, *(title for _, title in _compared(out, arm))))
-
-
-def is_on_page(anchor: str, question: str) -> bool:
-    """Whether the page of one question has the section with this anchor."""
-    return anchor in OF_EVERY_PAGE or anchor.startswith(question)
 
 
 def move_into(made: Path, folder: Path) -> None:
