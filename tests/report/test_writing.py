@@ -12,6 +12,7 @@ import time
 from dataclasses import replace
 from functools import cache, partial
 from html.parser import HTMLParser
+from operator import attrgetter
 from pathlib import Path
 from urllib.parse import unquote
 
@@ -29,7 +30,7 @@ from tfarm.cli import tables as cli_tables
 from tfarm.digits import plain
 from tfarm.dsp import Chain, load_chain
 from tfarm.report import card as card_room
-from tfarm.report import making, readme_pictures, trust, unchanged, write, writing
+from tfarm.report import frame, making, readme_pictures, trust, unchanged, write, writing
 from tfarm.report.card import written_cards
 from tfarm.report.frame import first_sentence
 from tfarm.report.given_laws import GivenLaw, Subject
@@ -618,6 +619,15 @@ def test_each_page_asked_for_alone_has_its_sections():
         for page in PAGES
     }
     assert found == PAGES
+
+
+def test_sections_that_answer_and_those_that_are_begun_first():
+    """What lasts seconds is begun before all else; the card, which shares proofs with the modes, right after these."""
+    answers = {"margins-map", "margins", "locus", "sampled", "tune", "fit", "law", "no-loop"}
+    assert answers == frame.ANSWERS
+    slow = sorted((each for each in making.ARM_PIECES if each.seconds), key=attrgetter("seconds"), reverse=True)
+    assert [each.anchor for each in slow] == ["tune", "sampled", "locus", "modes"]
+    assert 0 < making.CARD_SECONDS < slow[-1].seconds
 
 
 def test_a_page_has_the_same_sections_whatever_is_written_with_it(tmp_path, monkeypatch):

@@ -12,12 +12,12 @@ from markupsafe import Markup
 from tfarm.arm import Arm
 from tfarm.glossary import GLOSSARY_TERMS, Term
 from tfarm.report.loop_laws import has_rate_loop, sign_words
-from tfarm.report.pieces import QUESTIONS
+from tfarm.report.pieces import ARM_PIECES, LAW_PIECES, QUESTIONS
 from tfarm.report.sections import SavedBlock, SavedSection
 from tfarm.tables.html import with_symbols
 
 SHORTEST = 40  # characters of an answer; one that is shorter takes the next sentence too
-ANSWERS = ("margins-map", "margins", "locus", "sampled", "tune", "fit", "law", "no-loop")  # whose first words answer
+ANSWERS = {piece.anchor for piece in (*ARM_PIECES, *LAW_PIECES) if piece.is_answer}
 BADGES = {"stable": "ok", "yes": "ok", "unstable": "corrected", "no": "corrected", "marginal": "undecided",
             "undecided": "undecided"}  # fmt: skip
 OPEN_PICTURES = 2  # of a section: those that answer its question; the rest is a click away

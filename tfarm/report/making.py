@@ -30,7 +30,7 @@ MOST_WORKERS = 2  # processes that share the pieces of a report: as many cores a
 WORTH_A_PROCESS = 8  # pieces of one arm for which a second process, which takes a second or two to start, is worth it
 CARD_WORK, CARD_ALONE_WORK = "card", "card alone"  # with the proofs of the arm, and without
 LIVE_WORK = "live loop"
-LONGEST_FIRST = ("tune", "sampled", "locus", "modes", CARD_WORK)  # modes beside the proofs that they share
+CARD_SECONDS = 0.9  # less than the modes, beside which the proofs are begun that share them
 PieceWork = tuple[int, int | str]  # which arm, which piece (or its card and proof)
 Made = SavedSection | Evidence | None
 
@@ -90,15 +90,16 @@ def _results(
             yield task, work(task)()
         return
 
-    def place(task: PieceWork) -> int:
+    def seconds(task: PieceWork) -> float:
         i, piece = task
-        what = piece if isinstance(piece, str) else pieces_of(subjects[i])[piece].anchor
-        return LONGEST_FIRST.index(what) if what in LONGEST_FIRST else len(LONGEST_FIRST)
+        return CARD_SECONDS * (piece == CARD_WORK) if isinstance(piece, str) else pieces_of(subjects[i])[piece].seconds
 
     def submit(pool: Executor, task: PieceWork) -> Future[Made]:
         return pool.submit(work(task))
 
-    by_arm = [sorted(each, key=place) for _, each in groupby(sorted(tasks, key=itemgetter(0)), itemgetter(0))]
+    by_arm = [
+        sorted(each, key=seconds, reverse=True) for _, each in groupby(sorted(tasks, key=itemgetter(0)), itemgetter(0))
+    ]
     yield from shared(by_arm, submit, MOST_WORKERS, [__name__])
 
 

@@ -31,7 +31,9 @@ class Piece:
     """One section of one arm's page: a name for the progress bar, the section's anchor, and how to make it.
 
     The page that `report --only` asks for is called by the first word of its sections' anchors; its `title` stands with
-    one of them, and `is_also_on` says which other pages of that kind have a section.  The full page has all.
+    one of them, and `is_also_on` says which other pages of that kind have a section.  The full page has all, and at
+    its top the first words of those that are an answer (`is_answer`).  `seconds` is about how long a section takes to
+    make, where that is long: the longest are begun first.
 
     `make` takes the arm, for a section that says what the loop does when sampled (`is_sampled`) its chain, for one of
     given laws (`is_of_laws`) chain and laws, for one of a fit (`is_of_fit`) that alone, for one of measured responses
@@ -44,6 +46,8 @@ class Piece:
     suits: Callable[[Arm], bool] = lambda arm: True
     title: str = ""
     is_also_on: Callable[[str], bool] = lambda page: False
+    is_answer: bool = False
+    seconds: float = 0.0
     is_sampled: bool = False
     is_of_laws: bool = False
     in_s: bool = False
@@ -78,36 +82,39 @@ class Piece:
         return self.make(subject.arm, subject.chain) if self.is_sampled else self.make(subject.arm)
 
 
+Answer = partial(Piece, is_answer=True)
+
+
 def is_of_the_loop(page: str) -> bool:
     """Whether the page is one that an arm without a loop has nothing on, but that it has none."""
     return any(piece.page == page and piece.suits in (has_loop, has_rate_loop) for piece in ARM_PIECES)
 
 
 ARM_PIECES = (
-    Piece("the fit", "fit", fit_section, is_of_fit=True),
-    Piece("map of the gains", "margins-map", map_section, has_loop, is_sampled=True),
+    Answer("the fit", "fit", fit_section, is_of_fit=True),
+    Answer("map of the gains", "margins-map", map_section, has_loop, is_sampled=True),
     Piece("the arm", "arm", arm_section, is_also_on=lambda page: True),
     Piece("the paper's values", "paper", paper_section, is_from_paper),
     Piece("root moment", "bode-root-moment", partial(bode_section, output="root_moment"), title="Bode plots"),
     Piece("tip displacement", "bode-tip-displacement", partial(bode_section, output="tip_displacement")),
     Piece("measured responses", "bode-measured", measured_section, is_measured=True),
-    Piece("modes", "modes", modes_section, title="Modes"),
-    Piece("no loop", "no-loop", no_loop_section, lambda arm: not has_loop(arm), is_also_on=is_of_the_loop),
-    Piece("margins", "margins", margins_section, has_rate_loop, "Gains and margins", is_sampled=True),
-    Piece("root loci", "locus", locus_section, has_rate_loop, "Root loci"),
+    Piece("modes", "modes", modes_section, title="Modes", seconds=1.0),
+    Answer("no loop", "no-loop", no_loop_section, lambda arm: not has_loop(arm), is_also_on=is_of_the_loop),
+    Answer("margins", "margins", margins_section, has_rate_loop, "Gains and margins", is_sampled=True),
+    Answer("root loci", "locus", locus_section, has_rate_loop, "Root loci", seconds=2.0),
     Piece("Nyquist", "margins-nyquist", nyquist_section, has_rate_loop, is_sampled=True),
-    Piece("sampled loop", "sampled", sampled_section, has_loop, "The sampled loop", is_sampled=True),
-    Piece("gain tuner", "tune", tuner_section, has_loop, "The gain tuner", is_sampled=True),
+    Answer("sampled loop", "sampled", sampled_section, has_loop, "The sampled loop", seconds=8.0, is_sampled=True),
+    Answer("gain tuner", "tune", tuner_section, has_loop, "The gain tuner", seconds=10.0, is_sampled=True),
     Piece("assumptions", "assumptions", assumptions_section, title="What the assumptions do"),
 )
 QUESTIONS = {piece.page: piece.title for piece in ARM_PIECES if piece.title}  # pages that may be asked for alone
 LAW_PIECES = (
-    Piece("margins", "margins", law_margins_section, has_rate_loop, is_of_laws=True, in_s=True),
-    Piece("sampled loop", "sampled", law_sampled_section, has_rate_loop, is_of_laws=True),
-    Piece("the law", "law", law_section, has_rate_loop, is_also_on=is_of_the_loop, is_of_laws=True),
+    Answer("margins", "margins", law_margins_section, has_rate_loop, is_of_laws=True, in_s=True),
+    Answer("sampled loop", "sampled", law_sampled_section, has_rate_loop, seconds=8.0, is_of_laws=True),
+    Answer("the law", "law", law_section, has_rate_loop, is_also_on=is_of_the_loop, is_of_laws=True),
     Piece("Nyquist", "margins-nyquist", law_nyquist_section, has_rate_loop, is_of_laws=True, in_s=True),
-    Piece("poles", "locus", law_poles_section, has_rate_loop, is_of_laws=True, in_s=True),
-    Piece("no loop", "no-loop", no_loop_section, lambda arm: not has_rate_loop(arm), is_also_on=is_of_the_loop),
+    Answer("poles", "locus", law_poles_section, has_rate_loop, seconds=2.0, is_of_laws=True, in_s=True),
+    Answer("no loop", "no-loop", no_loop_section, lambda arm: not has_rate_loop(arm), is_also_on=is_of_the_loop),
     *(
         piece
         for piece in ARM_PIECES
