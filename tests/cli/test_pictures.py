@@ -10,6 +10,7 @@ from matplotlib import image
 import tfarm
 from tests.shared import thinned
 from tests.shell import answer, run
+from tfarm.cli.tables import hand_out
 from tfarm.plots.frequency import draw_bode
 
 LAB = "sasaki2012-lab"
@@ -56,6 +57,13 @@ def test_a_picture_is_written_and_said(words, law, tmp_path, capsys):
     pixels = image.imread(file)
     assert min(pixels.shape[:2]) > 600
     assert 0.002 < np.mean(pixels[..., :3].min(axis=-1) < 0.5) < 0.5  # ink on paper
+
+
+def test_what_has_no_picture_is_no_empty_file(tmp_path):
+    """A bug of ours, so it is loud."""
+    with pytest.raises(TypeError, match="Modes has no picture"):
+        hand_out(dict, print, True, png=tmp_path / "none.png", picture=(tfarm.modes(tfarm.load(LAB), 2),))
+    assert not list(tmp_path.iterdir())
 
 
 def test_bode_looks_along_the_arm_at_either_side_of_a_joint_and_from_another_input(capsys):

@@ -141,10 +141,10 @@ def hand_out(
     if csv is not None and table is not None:
         write_csv(table(), csv)
     if png is not None:
-        from tfarm.plots.drawn import drawn
+        from tfarm.plots.drawn import picture_of
         from tfarm.plots.files import save_png
 
-        save_png(drawn(*picture), png)
+        save_png(picture_of(*picture), png)
     if say_written(*also, csv, png) or json:
         give(answer(), json, printed)
 

@@ -17,6 +17,7 @@ from tfarm.comparing import Comparison
 from tfarm.crossing import Window, pieces
 from tfarm.digits import plain
 
+from .drawn import drawn
 from .frequency import hertz_axis, magnitude_limits, wrapped_phase
 from .plane import outline
 from .style import BLUE, GREEN, GREY, INK, ORANGE, New, blank, headline, must_be, safe, style, taken, window
@@ -47,6 +48,7 @@ def comparison(data: Comparison, *, ax: Sequence[Axes] | None = None) -> tuple[A
     return upper, lower, right
 
 
+@drawn.register
 def draw_comparison(data: Comparison, new: New = blank) -> Figure:
     """The three on a figure of their own."""
     with style():

@@ -17,6 +17,7 @@ from tfarm.arrays import Complex
 from tfarm.digits import plain, significant
 from tfarm.loop.nyquist import Nyquist, compressed
 
+from .drawn import drawn
 from .labels import OFFSET_UPON, OFFSETS_FURTHER, Label
 from .style import BLUE, FAINT, GREY, ORANGE, Keys, New, blank, headline, must_be, on_own_figure, safe, style, window
 from .words import gains_words
@@ -51,6 +52,7 @@ def nyquist(data: Nyquist[Any], *, ax: Axes | None = None, name: str = "") -> Ax
     return ax
 
 
+@drawn.register(Nyquist)
 def draw_disc(data: Nyquist[Any], name: str = "", new: New = blank) -> Figure:
     """One disc, on a figure of its own."""
     title = f"{data.verdict.loop.arm.name}: the loop function L(iω)"

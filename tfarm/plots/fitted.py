@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from tfarm.fitting.fit import Fit
 from tfarm.fitting.possible import Possible, response_band, share_stable
 
+from .drawn import drawn
 from .regions import LABEL
 from .style import BLUE, GREY, ORANGE, blank, headline, style
 from .words import name_axes
@@ -22,6 +23,7 @@ MAP_MESH = 60  # gains of each axis of a map, each pair counted for every possib
 SHARE_COLOURS = "Blues"  # of matplotlib: the more arms, the darker
 
 
+@drawn.register
 def draw_fit(fit: Fit) -> Figure:
     """Each measured response with the arm's before and after: magnitude over phase, a column a response.
 

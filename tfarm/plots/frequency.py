@@ -15,6 +15,7 @@ from tfarm.arrays import Complex, Real
 from tfarm.digits import plain
 from tfarm.response.frequency import Bode
 
+from .drawn import drawn
 from .style import BLUE, FAINT, GREY, INK, ORANGE, New, blank, headline, must_be, style, taken, window
 
 RAD_PER_CYCLE = 2 * math.pi  # rad/s of 1 Hz
@@ -38,6 +39,7 @@ def bode(data: Bode, *, ax: Sequence[Axes] | None = None) -> tuple[Axes, Axes]:
     return upper, lower
 
 
+@drawn.register
 def draw_bode(data: Bode, new: New = blank) -> Figure:
     """Magnitude over phase of one response, on a figure of its own."""
     with style():

@@ -15,6 +15,7 @@ from tfarm.loop.locus import Locus
 from tfarm.loop.reduced_locus import ReducedLocus
 from tfarm.loop.regions import Region
 
+from .drawn import drawn
 from .labels import OFFSETS_BESIDE, Label
 from .plane import colours, draw_map, gain_counts, words_of_count
 from .roots import CIRCLE_AT_FIRST, CROSS_AT_ZERO, draw_locus, gain_branches
@@ -44,6 +45,7 @@ def locus(exact: Locus | LawLocus, *, reduced: ReducedLocus | None = None, ax: A
     return ax
 
 
+@drawn.register
 def draw_locus_of(exact: Locus | LawLocus, reduced: ReducedLocus | None = None, new: New = blank) -> Figure:
     """The locus, of gains or of any law, on a figure of its own."""
     return draw_locus(exact, reduced, new) if isinstance(exact, Locus) else draw_law_locus(exact, new)
@@ -57,13 +59,19 @@ def gain_map(found: Region | LawMap, *, ax: Axes | None = None) -> Axes:
     """
     must_be(Region | LawMap, found, "tfarm.map returns")
     if ax is None:
-        return (draw_map(found, window) if isinstance(found, Region) else draw_law_map(found, window)).axes[0]
+        return draw_map_of(found, window).axes[0]
     with style():
         if isinstance(found, Region):
             gain_counts(found, ax=ax)
         else:
             law_counts(found, ax=ax)
     return ax
+
+
+@drawn.register
+def draw_map_of(found: Region | LawMap, new: New = blank) -> Figure:
+    """The plane, of gains or of two numbers of any law, on a figure of its own."""
+    return draw_map(found, new) if isinstance(found, Region) else draw_law_map(found, new)
 
 
 def draw_law_locus(found: LawLocus, new: New = blank) -> Figure:

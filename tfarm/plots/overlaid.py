@@ -13,6 +13,7 @@ from matplotlib.ticker import FuncFormatter, MultipleLocator, NullFormatter
 from tfarm.digits import plain
 from tfarm.fitting.overlay import Overlay
 
+from .drawn import drawn
 from .frequency import RAD_PER_CYCLE, wrapped_phase
 from .style import BLUE, FAINT, GREY, INK, ORANGE, New, blank, headline, must_be, style, taken, window
 
@@ -46,6 +47,7 @@ def measured(data: Overlay, *, ax: Sequence[Axes] | None = None) -> tuple[Axes, 
     return upper, middle, lower
 
 
+@drawn.register
 def draw_measured(data: Overlay, new: New = blank) -> Figure:
     """The three on a figure of their own."""
     with style():
