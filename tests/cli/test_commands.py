@@ -205,7 +205,7 @@ def test_commands_that_print_json_load_nothing_heavy(arguments: list[str]) -> No
         f"print([name for name in {HEAVY!r} if name in sys.modules], file=sys.stderr)"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=os.environ, check=True)
-    assert done.stderr.strip() == "[]"
+    assert done.stderr.splitlines()[-1] == "[]"  # before it perhaps that kernels are compiled
 
 
 @pytest.mark.survey

@@ -8,6 +8,7 @@ import pytest
 
 import tfarm
 from tfarm import HubFeedback, Law
+from tfarm.errors import ConvergenceError
 from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.law_stability import law_stability
 from tfarm.loop.stability import stability
@@ -71,3 +72,14 @@ def test_where_powers_of_s_are_no_doubles_nothing_is_warned_of_and_nothing_is_fa
     assert far_poles(found).size == 0
     assert found.verdict == alone.verdict == "stable"
     np.testing.assert_allclose(found.poles.values[:4], alone.poles.values[:4], rtol=1e-6)
+
+
+@pytest.mark.parametrize(("lead", "verdict"), [(-4e-14, None), (-4e-9, "unstable"), (0.0, "stable")])
+def test_a_pole_of_the_law_beyond_all_boxes_is_named(lead, verdict):
+    """A den that begins next to 0: one pole at 1/lead, where waves and powers of s are no doubles."""
+    law = Law({"hub_rate": ((0.5,), (lead, 1.0, 1e3) if lead else (1.0, 1e3))})
+    if verdict is None:
+        with pytest.raises(ConvergenceError, match=r"pole at 2\.5e\+13"):
+            law_stability(LAB, law)
+    else:
+        assert law_stability(LAB, law).verdict == verdict

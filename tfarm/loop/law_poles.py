@@ -15,9 +15,10 @@ from tfarm.reduced.sensed import closed, in_series, pade, sensed_model
 from tfarm.spectrum import modes_below
 from tfarm.spectrum.box import Box, complete
 from tfarm.spectrum.complete_box import HEIGHTS_LEFT, RIGHT_OF_AXIS, TOWARD_SINGULAR
+from tfarm.spectrum.scales import first_frequency
 
 from .frequencies import band_of, steep_places
-from .law_loop import LawLoop
+from .law_loop import UNDISPERSED, LawLoop
 from .poles import (
     MOST_POLES,
     STARTS_REACH,
@@ -76,6 +77,10 @@ def law_poles_below(loop: LawLoop, height: float, late: float = LATE) -> Poles[L
 def law_box(loop: LawLoop, height: float, late: float = LATE) -> Box:
     """A box of that height, right of the law's poles and until |L| is small; left short of -1/C and -late/delay."""
     own, C = loop.law.poles, loop.arm.damping
+    if own.real.max(initial=0.0) > UNDISPERSED * first_frequency(loop.arm):
+        fastest = complex(own[own.real.argmax()])
+        why = f"the law has a pole at {fastest:.3g} 1/s, farther right than a box reaches: its den begins next to 0"
+        raise ConvergenceError(f"{why}; begin it with 0, which is another law, or a larger number", fastest, height)
     right = BEYOND_OWN * max([RIGHT_OF_AXIS * height, *own.real.tolist()])
     right = quiet_edge(loop, right, height, LAW_RIGHT_POINTS, LAW_RIGHT, float(abs(own).max(initial=0.0)))
     clear = TOWARD_SINGULAR / C if C else np.inf
