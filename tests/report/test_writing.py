@@ -611,7 +611,7 @@ PAGES = {  # asked for alone, in their order: their sections of an arm's own loo
 
 
 def test_each_page_asked_for_alone_has_its_sections():
-    assert list(QUESTIONS) == list(PAGES)
+    assert [page for page in QUESTIONS if page in PAGES] == list(PAGES)  # and others that came later
     found = {
         page: tuple(
             tuple(each.anchor for each in those if each.is_on(page)) for those in (making.ARM_PIECES, making.LAW_PIECES)
