@@ -10,9 +10,10 @@ from tests.chain_elements import reached
 from tests.loop.rig_loops import RigLoop
 from tests.shared import thinned
 from tfarm import Hub
-from tfarm.arm import Motor
+from tfarm.arm import Attachment, Motor
 from tfarm.loop.lines import along, line_crossings
 from tfarm.loop.locus import locus
+from tfarm.loop.plant import Loop
 from tfarm.loop.poles import poles_below
 from tfarm.loop.reduced_locus import reduced_locus
 from tfarm.spectrum.scales import default_gains
@@ -91,3 +92,26 @@ def test_a_gain_that_takes_the_whole_friction_back_has_its_pole_at_0(points):
     assert static.direction == "stable"
     (known,) = (each for each in line_crossings(arm, along("K1", default_gains(arm)), 20.0) if each.at == 0)
     assert known.t == pytest.approx(-0.2, rel=1e-15)
+
+
+@pytest.mark.parametrize(("start", "stop"), [(-1.0, 1.6), (1.6, -1.0)])
+def test_at_the_gain_at_which_a_pole_passes_through_0_it_is_0_and_the_others_are_there(start, stop):
+    """K2 = 1 on a rig that a spring holds, one of the values: a zero that is 0 has no digits to be followed by.
+
+    Road: all poles in a box, a little to either side of it.
+    """
+    lab = LAB
+    rig = replace(
+        lab, attachments=(Attachment(x=0.7, mass=0.1, stiffness=200.0),), payload=replace(lab.payload, mass=0.5)
+    )
+    law = tfarm.default_gains(rig)
+    found = tfarm.locus(rig, law, "K2", start, stop, points=300, branches=4)
+    (n,) = np.flatnonzero(abs(found.gain - 1.0) < 1e-12)
+    here = found.branches[:, n]
+    assert (here == 0).sum() == 1
+    step = 1e-7
+    sides = [poles_below(Loop(rig, law.having("K2", 1.0 + side * step)), 200.0).values for side in (-1, 1)]
+    for pole in here[here != 0]:
+        middle = np.mean([side[abs(side - pole).argmin()] for side in sides])
+        assert pole == pytest.approx(middle, rel=1e-6)
+    assert [each.gain for each in found.crossings if each.omega == 0] == [pytest.approx(1.0, rel=1e-12)]

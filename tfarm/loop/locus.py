@@ -41,6 +41,7 @@ POLISH_STEPS = 6  # of Newton's method from a guess right to some digits: what h
 FALLEN_TOGETHER = 1e-3  # of the distance of two guesses: zeros polished to less are one, found twice
 STEPS_ANEW = 8  # of what is followed again from a node, to begin with: the steps are adapted, so time alone
 HALVING_ROUNDS = 24  # of halving at most: where two branches meet their distance goes with the root of that of the gain
+BESIDE_STATIC = 1e-9  # of the range: so far before such a gain zeros are followed, as one that is 0 has no digits
 SAME_STATIC_GAIN = 1e-12  # relative: a gain so near to that at which a pole passes through 0 has the pole there
 
 
@@ -270,11 +271,24 @@ class _Polish:
         value = float(self.gain[number])
         found, stray = corrected(self._member(value), guess)
         if stray.any():
-            nodes = [node for node in segment.nodes if (value - node.at) * self.way >= 0]
+            stop = value - self.static[number] * BESIDE_STATIC * float(self.gain[-1] - self.gain[0])
+            nodes = [node for node in segment.nodes if (stop - node.at) * self.way >= 0]
             last = nodes[-1] if nodes else segment.nodes[0]
-            step = (value - last.at) / STEPS_ANEW
-            found = follow(self._member, last, value, step, len(last.zeros))[-1].zeros[: len(guess)]
+            step = (stop - last.at) / STEPS_ANEW
+            found = follow(self._member, last, stop, step, len(last.zeros))[-1].zeros[: len(guess)]
+            found = found if stop == value else self._at_rest(found, number)
         return ordered(found, segment.pinned)
+
+    def _at_rest(self, beside: Complex, number: int) -> Complex:
+        """The pairs at a value at which the smallest zero is 0, from those just before it."""
+        least = abs(beside) == np.nanmin(abs(beside))
+        zeros, settled = self._newton(np.where(least, 0.0, beside)[None], np.array([number]), least[None])
+        if not settled.all():
+            value = float(self.gain[number])
+            raise ConvergenceError(
+                f"at {value:.6g}, where a pole passes through 0, the others are lost", zeros[0], value
+            )
+        return zeros[0]
 
     def _member(self, value: float) -> Member:
         return member_of(self.variation, value, self.at_zero, self.free)
