@@ -522,7 +522,7 @@ def test_a_page_is_about_the_arms_own_file(tmp_path, monkeypatch, capsys):
         seen.append((arm.name, chain))
         return PageSection(anchor="sampled", title="The sampled loop")
 
-    monkeypatch.setattr(making, "ARM_PIECES", (making.Piece("s", "sampled", section, is_sampled=True),))
+    monkeypatch.setattr(making, "ARM_PIECES", (making.Piece("s", "sampled", section, of=("arm", "chain")),))
     monkeypatch.setattr(making, "save_proof", lambda *_: None)
     plain_cards(monkeypatch.setattr)
     file = tmp_path / "bench.toml"

@@ -35,9 +35,8 @@ class Piece:
     its top the first words of those that are an answer (`is_answer`).  `seconds` is about how long a section takes to
     make, where that is long: the longest are begun first.
 
-    `make` takes the arm, for a section that says what the loop does when sampled (`is_sampled`) its chain, for one of
-    given laws (`is_of_laws`) chain and laws, for one of a fit (`is_of_fit`) that alone, for one of measured responses
-    (`is_measured`) these too; `in_s`: only where one of the laws acts without a clock.
+    `make` takes these parts of the page's subject (`of`), and a page where one is missing has no such section; `in_s`:
+    only where one of the laws acts without a clock.
     """
 
     name: str
@@ -48,11 +47,8 @@ class Piece:
     is_also_on: Callable[[str], bool] = lambda page: False
     is_answer: bool = False
     seconds: float = 0.0
-    is_sampled: bool = False
-    is_of_laws: bool = False
+    of: tuple[str, ...] = ("arm",)
     in_s: bool = False
-    is_of_fit: bool = False
-    is_measured: bool = False
 
     @property
     def page(self) -> str:
@@ -65,24 +61,17 @@ class Piece:
 
     def is_for(self, subject: Subject) -> bool:
         """Whether a page on this subject has the section."""
-        if self.is_of_fit and subject.fit is None:
+        if not self.suits(subject.arm) or not all(getattr(subject, part) for part in self.of):
             return False
-        if self.is_measured and not subject.measured:
-            return False
-        return self.suits(subject.arm) and (not self.in_s or bool(continuous_laws(on_arm(subject.arm, subject.laws))))
+        return not self.in_s or bool(continuous_laws(on_arm(subject.arm, subject.laws)))
 
     def made(self, subject: Subject) -> PageSection:
         """The section."""
-        if self.is_of_fit:
-            return self.make(subject.fit)
-        if self.is_measured:
-            return self.make(subject.arm, subject.measured)
-        if self.is_of_laws:
-            return self.make(subject.arm, subject.chain, subject.laws)
-        return self.make(subject.arm, subject.chain) if self.is_sampled else self.make(subject.arm)
+        return self.make(*(getattr(subject, part) for part in self.of))
 
 
 Answer = partial(Piece, is_answer=True)
+SAMPLED, LAWS = ("arm", "chain"), ("arm", "chain", "laws")  # of what sections are that say what a clock does, or laws
 
 
 def is_of_the_loop(page: str) -> bool:
@@ -91,29 +80,29 @@ def is_of_the_loop(page: str) -> bool:
 
 
 ARM_PIECES = (
-    Answer("the fit", "fit", fit_section, is_of_fit=True),
-    Answer("map of the gains", "margins-map", map_section, has_loop, is_sampled=True),
+    Answer("the fit", "fit", fit_section, of=("fit",)),
+    Answer("map of the gains", "margins-map", map_section, has_loop, of=SAMPLED),
     Piece("the arm", "arm", arm_section, is_also_on=lambda page: True),
     Piece("the paper's values", "paper", paper_section, is_from_paper),
     Piece("root moment", "bode-root-moment", partial(bode_section, output="root_moment"), title="Bode plots"),
     Piece("tip displacement", "bode-tip-displacement", partial(bode_section, output="tip_displacement")),
-    Piece("measured responses", "bode-measured", measured_section, is_measured=True),
+    Piece("measured responses", "bode-measured", measured_section, of=("arm", "measured")),
     Piece("modes", "modes", modes_section, title="Modes", seconds=1.0),
     Answer("no loop", "no-loop", no_loop_section, lambda arm: not has_loop(arm), is_also_on=is_of_the_loop),
-    Answer("margins", "margins", margins_section, has_rate_loop, "Gains and margins", is_sampled=True),
+    Answer("margins", "margins", margins_section, has_rate_loop, "Gains and margins", of=SAMPLED),
     Answer("root loci", "locus", locus_section, has_rate_loop, "Root loci", seconds=2.0),
-    Piece("Nyquist", "margins-nyquist", nyquist_section, has_rate_loop, is_sampled=True),
-    Answer("sampled loop", "sampled", sampled_section, has_loop, "The sampled loop", seconds=8.0, is_sampled=True),
-    Answer("gain tuner", "tune", tuner_section, has_loop, "The gain tuner", seconds=10.0, is_sampled=True),
+    Piece("Nyquist", "margins-nyquist", nyquist_section, has_rate_loop, of=SAMPLED),
+    Answer("sampled loop", "sampled", sampled_section, has_loop, "The sampled loop", seconds=8.0, of=SAMPLED),
+    Answer("gain tuner", "tune", tuner_section, has_loop, "The gain tuner", seconds=10.0, of=SAMPLED),
     Piece("assumptions", "assumptions", assumptions_section, title="What the assumptions do"),
 )
 QUESTIONS = {piece.page: piece.title for piece in ARM_PIECES if piece.title}  # pages that may be asked for alone
 LAW_PIECES = (
-    Answer("margins", "margins", law_margins_section, has_rate_loop, is_of_laws=True, in_s=True),
-    Answer("sampled loop", "sampled", law_sampled_section, has_rate_loop, seconds=8.0, is_of_laws=True),
-    Answer("the law", "law", law_section, has_rate_loop, is_also_on=is_of_the_loop, is_of_laws=True),
-    Piece("Nyquist", "margins-nyquist", law_nyquist_section, has_rate_loop, is_of_laws=True, in_s=True),
-    Answer("poles", "locus", law_poles_section, has_rate_loop, seconds=2.0, is_of_laws=True, in_s=True),
+    Answer("margins", "margins", law_margins_section, has_rate_loop, of=LAWS, in_s=True),
+    Answer("sampled loop", "sampled", law_sampled_section, has_rate_loop, seconds=8.0, of=LAWS),
+    Answer("the law", "law", law_section, has_rate_loop, is_also_on=is_of_the_loop, of=LAWS),
+    Piece("Nyquist", "margins-nyquist", law_nyquist_section, has_rate_loop, of=LAWS, in_s=True),
+    Answer("poles", "locus", law_poles_section, has_rate_loop, seconds=2.0, of=LAWS, in_s=True),
     Answer("no loop", "no-loop", no_loop_section, lambda arm: not has_rate_loop(arm), is_also_on=is_of_the_loop),
     *(
         piece
