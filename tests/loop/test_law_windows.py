@@ -8,9 +8,10 @@ import pytest
 
 import tfarm
 from tests.loop import number_windows
+from tests.loop.arms import with_damping
 from tests.shared import remember, thinned
 from tests.shell import run
-from tfarm import ConvergenceError, HubFeedback, Law
+from tfarm import ConvergenceError, HubFeedback, Law, RotarySpring
 from tfarm.arm.blocks import Rational
 from tfarm.arm.law import Part
 from tfarm.loop import closed
@@ -162,3 +163,20 @@ def test_no_number_of_a_signal_in_two_parts_has_a_window():
 
 def test_of_a_link_without_damping_it_is_said_why_there_are_none():
     assert "without damping" in unsettled(tfarm.margins(BARE, Law({"hub_rate": ([0.3], [0.01, 1.0])})))
+
+
+@pytest.mark.parametrize("damping", [3e-8, 1e-7])
+def test_next_to_zero_windows_are_not_cut_by_rounding(damping) -> None:
+    """An integrator with a denominator as good as 0: the phase of what it feeds back is real to 1e-7 far up the axis.
+
+    With the digits of the whole range the boundary was crossed at random there; poles are counted at values between.
+    """
+    stocky = tfarm.load("stocky-steel")
+    hub = replace(stocky.hub, friction=0.3)
+    arm = replace(with_damping(stocky, damping), hub=hub, joint=RotarySpring(stiffness=1.0))
+    law = Law({"hub_angle": ([0.03, 0.07], [1.0, 0.0])})
+    found = law_windows(law_stability(arm, law))["hub_angle.den.0"]
+    probes = [*np.geomspace(1e-8, 5.0, 8), *((low + high) / 2 for low, high in found.all)]
+    for value in probes:
+        count = law_stability(arm, law.having("hub_angle.den.0", float(value)), band=found.band).unstable_roots
+        assert any(low < value < high for low, high in found.all) == (count == 0)

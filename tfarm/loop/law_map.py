@@ -7,6 +7,7 @@ count of unstable poles gives all the others.  In a delay it is not: that runs a
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -34,6 +35,8 @@ MOST_MAP_VALUES = 400  # along one number: each column is a line of crossings of
 NEAR_ORIGIN = (1e-6, 5e-7)  # of the lowest frequency: where a real pole is looked for on its way through 0
 FAR_RIGHT = (1e5, 1e6, 1e7)  # of w1: where one is looked for on its way through infinity
 ROUNDED = 4 * float(np.finfo(float).eps)  # of the range: a value so small is 0
+NEXT_TO_ZERO = 1e-6  # of the range: so near to 0 crossings are looked for again, with the digits of that width
+CLOSER_LOOKS = 3  # at most: down to 1e-18 of the range, below which a number is none
 ORDER_READ_AT = (2e-3, 1e-3)  # of w1: where the order of a zero at s = 0 is read off
 SIMPLE = 3.0  # ratio of values at the first and the second: 2 of a simple zero, 4 of a double one
 BESIDE_MEETING = 1e-3  # of the range: how far from such a place its counts are taken
@@ -133,9 +136,29 @@ def unstable_below(loop: LawLoop, band: float) -> int:
 def law_crossings(loop: LawLoop, name: str, values: Real, omega: Real, known: LoopParts, band: float) -> Crossings:
     """The crossings of the axis along one number of a loop's law, between its first and last value.
 
-    D = A + t B, 0 < t < 1; `known` are the parts of the loop's signals at `omega`.  Where the leading coefficient of a
-    denominator changes its sign a real pole passes through infinity.
+    `known` are the parts of the loop's signals at `omega`.  Where the leading coefficient of a denominator changes its
+    sign a real pole passes through infinity.  Next to 0 a value has lost the digits of the range, and far up the axis,
+    where the number is as good as 0 at all points, even the signs are rounding: there a narrower range is looked at.
     """
+    found = list(_crossings_in(loop, name, values, omega, known, band))
+    for _ in range(CLOSER_LOOKS):
+        near = NEXT_TO_ZERO * float(values[-1] - values[0])
+        values = np.array([max(values[0], -near), min(values[-1], near)])
+        if not any(each.t and _is_next_to_zero(each, values) for each in found):
+            break
+        closer = _crossings_in(loop, name, values, omega, known, band)
+        found = [each for each in found if not _is_next_to_zero(each, values)]
+        found += [each for each in closer if _is_next_to_zero(each, values)]
+    return Crossings.of(found)
+
+
+def _is_next_to_zero(crossing: Crossing, values: Real) -> bool:
+    """Whether it lies between these values, and is of a pair of poles, neither at s = 0 nor at infinity."""
+    return bool(0 < crossing.at < math.inf and values[0] < crossing.t < values[-1])
+
+
+def _crossings_in(loop: LawLoop, name: str, values: Real, omega: Real, known: LoopParts, band: float) -> Crossings:
+    """The same with the digits of the range: D = A + t B, 0 < t < 1 along it."""
     low, span = float(values[0]), float(values[-1] - values[0])
     first, last = (loop.under(loop.law.having(name, float(end))) for end in (values[0], values[-1]))
 
