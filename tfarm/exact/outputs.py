@@ -1,8 +1,9 @@
 """What can be asked of the arm: one row an output, and nothing else to edit for a power of s or another place.
 
 A new quantity is told here where it is read, in what unit and whether of chains alone, and `reading_of` in
-`chain_values` what it is of a state.  An output is a power of s times one quantity of the exact solution, at the hub, at the tip or at a point x of the
-arm.  Signs as in the paper: root moment E I phi'(0), shear force kappa G A (w' - psi).
+`chain_values` what it is of a state.  An output is a power of s times one quantity of the exact solution, at the hub,
+at the tip or at a point x of the arm.  Signs as in the paper: root moment E I phi'(0), shear force
+kappa G A (w' - psi).
 """
 
 from __future__ import annotations
