@@ -8,6 +8,7 @@ import pytest
 import scipy.io
 
 from tfarm import HubFeedback, Law, ParameterError
+from tfarm.arm.blocks import Rational
 from tfarm.arm.law_tables import load_law
 
 S = np.array([0.3j, 2 + 3j, -1.5 + 40j])
@@ -187,3 +188,11 @@ def test_what_a_file_says_wrongly_is_refused_in_a_line_with_its_name(tmp_path, t
     assert words in str(error.value)
     assert "law.toml" in str(error.value)
     assert "\n" not in str(error.value)
+
+
+def test_states_are_balanced_without_a_warning_however_far_apart_the_coefficients() -> None:
+    """Scales of 2^63 and more are no whole numbers: SciPy warned of a cast."""
+    s = 3e20j
+    A, B, C, D = Rational((1.0,), (1.0, 1.0, 1e40)).matrices()
+    value = (C @ np.linalg.solve(s * np.eye(2) - A, B) + D)[0, 0]
+    assert value == pytest.approx(1 / (s**2 + s + 1e40), rel=1e-12)

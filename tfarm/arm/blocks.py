@@ -228,7 +228,8 @@ def balanced(A: Real, B: Real, C: Real, D: Real) -> Matrices:
         return A, B, C, D
     from scipy.linalg import matrix_balance
 
-    balanced_A, (scale, _) = matrix_balance(A, permute=False, separate=True)
+    with np.errstate(invalid="ignore"):  # SciPy casts the scales to a permutation's whole numbers too, unused here
+        balanced_A, (scale, _) = matrix_balance(A, permute=False, separate=True)
     return np.asarray(balanced_A), B / scale[:, None], C * scale, D
 
 
