@@ -69,6 +69,11 @@ class Region:
         """The values of both gains: across the plane, and up it."""
         return self.K1, self.K2
 
+    @property
+    def Kp(self) -> float:
+        """The gain on the hub angle that it holds."""
+        return self.held.Kp
+
     def on(self, across: Real, up: Real, unstable: NDArray[np.int64]) -> Region:
         """The same plane, with counts on another grid."""
         return replace(self, K1=across, K2=up, unstable=unstable)
@@ -105,7 +110,7 @@ class Region:
     @property
     def stable(self) -> NDArray[np.bool_]:
         """Where no pole is unstable, the free hub angle has not two poles at 0 (K1 = Kp = 0), and something damps."""
-        drifts = (self.K1 == 0) & self.arm.has_rigid_mode & (not self.held.Kp)
+        drifts = (self.K1 == 0) & self.arm.has_rigid_mode & (self.Kp == 0)
         swings = (self.upright == self.K1) & self.freed.is_reactive
         no_moment_is_left = np.equal(self.K2, self.arm.input_per_torque) & self.freed.is_told_by_lyapunov
         untold = (self.upright >= self.K1) & (not self.arm.hub_side_inertia)  # a pole has passed through infinity
