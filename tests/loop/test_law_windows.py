@@ -11,12 +11,13 @@ from tests.loop import number_windows
 from tests.loop.arms import with_damping
 from tests.shared import remember, thinned
 from tests.shell import run
-from tfarm import ConvergenceError, HubFeedback, Law, RotarySpring
+from tfarm import ConvergenceError, Hub, HubFeedback, Law, Link, Payload, RotarySpring, Section
 from tfarm.arm.blocks import Rational
 from tfarm.arm.law import Part
 from tfarm.loop import closed
 from tfarm.loop import law_windows as law_windows_module
 from tfarm.loop.answers import unsettled
+from tfarm.loop.law_map import law_map
 from tfarm.loop.law_stability import law_stability
 from tfarm.loop.law_windows import law_windows
 
@@ -180,3 +181,35 @@ def test_next_to_zero_windows_are_not_cut_by_rounding(damping) -> None:
     for value in probes:
         count = law_stability(arm, law.having("hub_angle.den.0", float(value)), band=found.band).unstable_roots
         assert any(low < value < high for low, high in found.all) == (count == 0)
+
+
+LIFTED = Law({"tip_acceleration": ([186.865, -1.0989e6], [1.0, -109.42, 3334.17])})
+
+
+def test_counts_are_not_carried_through_0_of_a_leading_coefficient_below_a_band_that_does_not_tell_all_there() -> None:
+    """Next to 0 high modes are driven, and poles come to a lower band from above: the window was wrong."""
+    link = Link(
+        length=2.238607336473004, density=1931.0641728978835, youngs_modulus=166452388184.08365,
+        shear_modulus=74861078511.42296, damping=9.118666378147337e-06,
+        section=Section.rectangle(width=0.032839846319312284, depth=0.05793951713075085),
+    )  # fmt: skip
+    arm = replace(LAB, link=link, hub=Hub(inertia=0.00083), payload=Payload(mass=0.27))
+    found = law_windows(law_stability(arm, LIFTED))["tip_acceleration.den.0"]
+    for value in (-9.0, -7.7, -7.4, -7.0, -6.4, -6.2, -1.0):
+        is_inside = any(low < value < high for low, high in found.all)
+        assert is_inside == (law_stability(arm, LIFTED.having("tip_acceleration.den.0", value)).unstable_roots == 0)
+    assert [pair[0] for pair in found.all] == [-10.0]
+    x, y = np.array([-9.0, -7.0, -0.1, 0.1, 1.0]), np.array([1.0, 1.1])
+    plane = law_map(arm, LIFTED, ("gain", "tip_acceleration.den.0"), y, x)
+    counts = [
+        law_stability(arm, LIFTED.having("tip_acceleration.den.0", each), plane.band).unstable_roots for each in x
+    ]
+    assert plane.unstable[:, 0].tolist() == counts
+
+
+def test_a_leading_coefficient_without_which_there_is_no_loop_keeps_its_sign() -> None:
+    """A lead on the hub's rate: without its lag it would answer the torque at once."""
+    law = Law({"hub_rate": ([0.02, 0.3], [0.01, 1.0]), "hub_angle": 1.0})
+    found = law_windows(law_stability(LAB, law))["hub_rate.den.0"]
+    assert found.looked_at == (0.001, 0.1)
+    assert all(0.001 <= low < high <= 0.1 for low, high in found.all)

@@ -27,10 +27,11 @@ from .answers import law_answer
 from .frequencies import grid
 from .law_loop import LawLoop
 from .law_poles import law_box, law_poles_below
-from .law_stability import LISTED_LEFT, band_for
+from .law_stability import LISTED_LEFT, band_for, is_told_without
 from .lines import ascending, through_infinity, through_origin
 from .stability import MARGIN_OF_ZERO, must_be_off_axis
 
+LEADING = ".den.0"  # how the name of a leading coefficient ends
 MOST_MAP_VALUES = 400  # along one number: each column is a line of crossings of its own
 NEAR_ORIGIN = (1e-6, 5e-7)  # of the lowest frequency: where a real pole is looked for on its way through 0
 FAR_RIGHT = (1e5, 1e6, 1e7)  # of w1: where one is looked for on its way through infinity
@@ -94,12 +95,17 @@ def law_map(arm: Arm, law: AnyLaw, vary: tuple[str, str], x: Real, y: Real, band
     if vary[0] == vary[1]:
         raise ParameterError(key="vary", value=list(vary), remedy="two different numbers of the law")
     x, y = ascending(vary[0], x, MOST_MAP_VALUES), ascending(vary[1], y, MOST_MAP_VALUES)
-    if vary[1] == "delay":
+    own = LawLoop(arm, law)
+    is_counted = vary[0] == "delay" or _turns_over(own, vary[0], x)
+    if vary[1] == "delay" or (not is_counted and _turns_over(own, vary[1], y)):
         turned = law_map(arm, law, (vary[1], vary[0]), y, x, band)
         return LawMap(turned.arm, law, vary, x, y, turned.unstable.T.copy(), turned.band, [])
-    own = LawLoop(arm, law)
     if band is None:
-        corners = [law.having(vary[0], a).having(vary[1], b) for a in (x[0], x[-1]) for b in (y[0], y[-1])]
+        first, second = (
+            (each[0], each[-1]) if _turns_over(own, name, each) else asked_at(name, (each[0], each[-1]))
+            for name, each in zip(vary, (x, y), strict=True)
+        )
+        corners = [law.having(vary[0], a).having(vary[1], b) for a in first for b in second]
         band = max(band_for(own.under(each)) for each in corners)
     omega = np.asarray(grid(own.arm, band))
     known = own.signals.parts(1j * omega)
@@ -109,14 +115,25 @@ def law_map(arm: Arm, law: AnyLaw, vary: tuple[str, str], x: Real, y: Real, band
     gains, start = np.concatenate([y[:0], *(each.gain for each in columns)]), x.size // 2
     at = int(np.argmax(abs(y[:, None] - gains).min(axis=1))) if gains.size else y.size // 2  # farthest from a crossing
     row = law.having(vary[1], float(y[at]))
-    if vary[0] == "delay":
+    if is_counted:
         there = [unstable_below(own.under(row.having(vary[0], float(value))), band) for value in x]
     else:
         across = law_crossings(own.under(row), vary[0], x, omega, known, band)
-        first = unstable_below(own.under(row.having(vary[0], float(x[start]))), band)
-        (there,) = counts_over(x, [across], float(x[start]), np.array([first]))
+        begin = unstable_below(own.under(row.having(vary[0], float(x[start]))), band)
+        (there,) = counts_over(x, [across], float(x[start]), np.array([begin]))
     counts = counts_over(y, columns, float(y[at]), np.asarray(there))
     return LawMap(own.arm, law, vary, x, y, counts.T.copy(), band, columns)
+
+
+def asked_at(name: str, limits: tuple[float, float]) -> tuple[float, ...]:
+    """At which values of a number a band has to tell all: its ends, and of a leading coefficient 0 between them."""
+    low, high = limits
+    return (low, 0.0, high) if name.endswith(LEADING) and low < 0 < high else limits
+
+
+def _turns_over(loop: LawLoop, name: str, values: Real) -> bool:
+    """Whether a leading coefficient passes through 0 between these values, where without it high modes are driven."""
+    return name.endswith(LEADING) and bool(values[0] < 0 < values[-1]) and not is_told_without(loop, name)
 
 
 def unstable_below(loop: LawLoop, band: float) -> int:
@@ -180,7 +197,7 @@ def _crossings_in(loop: LawLoop, name: str, values: Real, omega: Real, known: Lo
         is_single = zero < SIMPLE * half
         more = rest.change if is_single else _change_at(loop, name, low, span, rest.t, found, band)
         found.append(Crossing(low + span * rest.t, 0.0, more))
-    if name.endswith(".den.0") and low < 0 < low + span:
+    if name.endswith(LEADING) and low < 0 < low + span:
         with np.errstate(over="ignore", invalid="ignore"):  # a law of high order is beyond any number there
             far = through_infinity(*parts(first_frequency(loop.arm) * np.array(FAR_RIGHT) + 0j))
         found += [] if far is None else [far._replace(t=0.0)]

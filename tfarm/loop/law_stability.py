@@ -19,6 +19,7 @@ import math
 import numpy as np
 
 from tfarm.arm import Arm, Law
+from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.spectrum import modes_below
 
 from .frequencies import MOST_BAND_MODES, QUIET_REACH, band_of, grid, quiet_places
@@ -121,6 +122,20 @@ def _band(loop: LawLoop, signs: Signs) -> tuple[float, bool]:
 def band_for(loop: LawLoop) -> float:
     """The band [rad/s] in which the poles of a loop are counted."""
     return _band(loop, signs_of_loop(loop))[0]
+
+
+def is_told_without(loop: LawLoop, name: str) -> bool:
+    """Whether poles beyond some band are told, of this law or any nearer to it, once a leading coefficient is 0.
+
+    Else high modes are driven on the way there, and their poles come to a band from above: counts in it cannot be
+    carried from one side of 0 to the other.
+    """
+    try:
+        without = loop.under(loop.law.having(name, 0.0))
+        signs = signs_of_loop(without)
+        return _holds(without, signs) or _band(without, signs)[1]
+    except (ParameterError, ConvergenceError):
+        return False
 
 
 def is_quiet_above(loop: LawLoop, band: float) -> bool:
