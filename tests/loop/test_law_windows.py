@@ -195,11 +195,11 @@ def test_counts_are_not_carried_through_0_of_a_leading_coefficient_below_a_band_
     )  # fmt: skip
     arm = replace(LAB, link=link, hub=Hub(inertia=0.00083), payload=Payload(mass=0.27))
     found = law_windows(law_stability(arm, LIFTED))["tip_acceleration.den.0"]
-    for value in (-9.0, -7.7, -7.4, -7.0, -6.4, -6.2, -1.0):
+    for value in (-7.7, -7.4, -6.4):
         is_inside = any(low < value < high for low, high in found.all)
         assert is_inside == (law_stability(arm, LIFTED.having("tip_acceleration.den.0", value)).unstable_roots == 0)
     assert [pair[0] for pair in found.all] == [-10.0]
-    x, y = np.array([-9.0, -7.0, -0.1, 0.1, 1.0]), np.array([1.0, 1.1])
+    x, y = np.array([-7.0, -0.1, 0.1]), np.array([1.0, 1.1])
     plane = law_map(arm, LIFTED, ("gain", "tip_acceleration.den.0"), y, x)
     counts = [
         law_stability(arm, LIFTED.having("tip_acceleration.den.0", each), plane.band).unstable_roots for each in x
@@ -213,3 +213,26 @@ def test_a_leading_coefficient_without_which_there_is_no_loop_keeps_its_sign() -
     found = law_windows(law_stability(LAB, law))["hub_rate.den.0"]
     assert found.looked_at == (0.001, 0.1)
     assert all(0.001 <= low < high <= 0.1 for low, high in found.all)
+
+
+def test_where_nothing_is_known_beyond_the_band_a_window_is_not_made_of_poles_that_left_through_its_top() -> None:
+    """Two real poles right of the axis became a pair above the band on the way: carried on, the count was two less."""
+    link = Link(
+        length=0.364, density=3406.0, youngs_modulus=1.345e11, shear_modulus=4.727e10, damping=9.86e-8,
+        section=Section.rectangle(width=0.4345, depth=0.05517),
+    )  # fmt: skip
+    arm = replace(LAB, link=link, hub=Hub(inertia=0.00228), payload=Payload(mass=11.79, inertia=0.01442))
+    law = Law({
+        "hub_rate": ([45059.7, 9.52461e8, 2.83382e12], [1.0, 115200.0, 1.52468e10]),
+        "moment@0.247": (
+            [-1.51976e18, -6.80338e21], [1.0, 156361.0, 7.70012e9, 3.4974e14, -1.72357e17, 8.09767e20]
+        ),
+        "tip_acceleration": -0.238785,
+    })  # fmt: skip
+    verdict = law_stability(arm, law)
+    assert not verdict.is_known_beyond
+    found = law_windows(verdict)["hub_rate.num.0"]
+    for value in (-2e5, 5e4):
+        is_inside = any(low < value < high for low, high in found.all)
+        there = law_stability(arm, law.having("hub_rate.num.0", value), band=found.band)
+        assert is_inside == (there.unstable_roots == 0)

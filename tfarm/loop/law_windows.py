@@ -5,14 +5,16 @@ The characteristic function is linear in any one of them (`law_map`); a delay ha
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
-from tfarm.crossing import intervals
+from tfarm.crossing import Crossings, Window, counts_over, intervals, joined
 from tfarm.errors import ConvergenceError
 
 from .frequencies import grid
 from .law_loop import LawLoop
-from .law_map import LEADING, asked_at, law_crossings
+from .law_map import LEADING, asked_at, law_crossings, unstable_below
 from .law_stability import band_for, is_told_without
 from .stability import Stability
 from .windows import BEYOND_LAW, Windows
@@ -36,14 +38,37 @@ def law_windows(verdict: Stability[LawLoop]) -> dict[str, Windows]:
     omega = np.asarray(grid(loop.arm, band))
     known, windows = loop.signals.parts(1j * omega), {}
     for name, (low, high) in ranges.items():
+        value = numbers[name]
         try:
-            found, value = law_crossings(loop, name, np.array([low, high]), omega, known, band), numbers[name]
+            found = law_crossings(loop, name, np.array([low, high]), omega, known, band)
+            stable = _stable(verdict, name, (low, high), found, band)
         except ConvergenceError:  # `answers.unsettled` names it
             continue
-        stable = intervals(found, low, high, value, verdict.unstable_roots)
         around = next((pair for pair in stable if pair[0] < value < pair[1]), None) if verdict.is_stable else None
         windows[name] = Windows(name, around, tuple(stable), (low, high), found.within(low, high), band)
     return windows
+
+
+def _stable(
+    verdict: Stability[LawLoop], name: str, limits: tuple[float, float], found: Crossings, band: float
+) -> list[Window]:
+    """The windows, from the verdict's count; where nothing is known beyond the band each is counted if need be.
+
+    Then a pair of poles may leave the band through its top, or come from there, and the count at an end tells of it.
+    """
+    loop, value = verdict.loop, verdict.loop.law.numbers[name]
+    count = np.array([verdict.unstable_roots])
+
+    def unstable_at(at: float) -> int:
+        return unstable_below(loop.under(loop.law.having(name, at)), band)
+
+    if not verdict.is_known_beyond:
+        (carried,) = counts_over(np.array(limits), [found], value, count)
+        if carried.tolist() != [unstable_at(end) for end in limits]:
+            edges = [limits[0], *found.within(*limits).gain.tolist(), limits[1]]
+            pairs = [pair for pair in itertools.pairwise(edges) if pair[0] < pair[1]]
+            return joined([pair for pair in pairs if not unstable_at((pair[0] + pair[1]) / 2)])
+    return intervals(found, *limits, value, verdict.unstable_roots)
 
 
 def _range(loop: LawLoop, name: str, value: float) -> tuple[float, float]:
