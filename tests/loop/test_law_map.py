@@ -9,7 +9,7 @@ import pytest
 import tfarm
 from tests.shared import remember, sized, thinned
 from tests.shell import run
-from tfarm import HubFeedback, Law, ParameterError
+from tfarm import ConvergenceError, HubFeedback, Law, ParameterError
 from tfarm.loop.law_loop import LawLoop
 from tfarm.loop.law_map import law_map, unstable_below
 from tfarm.loop.law_stability import band_for, law_stability
@@ -45,7 +45,9 @@ def test_counts_are_those_of_full_searches(vary, x, y, points):
 @pytest.mark.parametrize("y", [(-1e6, 1.0), (-1.0, 1e6)])
 def test_the_band_is_enough_for_each_corner(x, y, monkeypatch):
     """The more a filter amplifies, the farther up it is to be looked: the largest number once at each of four ends."""
-    monkeypatch.setattr(import_module("tfarm.loop.law_map"), "unstable_below", lambda *_: 0)  # a count takes longest
+    module = import_module("tfarm.loop.law_map")
+    monkeypatch.setattr(module, "unstable_below", lambda *_: 0)  # a count takes longest
+    monkeypatch.setattr(module, "_must_hold_at_corners", lambda *_: None)
     vary = "hub_angle.num.0", "tip_acceleration.num.0"
     found = law_map(LAB, LAW, vary, np.array(x), np.array(y))
     corners = [LAW.having(vary[0], a).having(vary[1], b) for a in x for b in y]
@@ -123,3 +125,18 @@ def test_a_map_around_a_law_s_own_resonance_counts_as_the_verdict_does():
     lab, values = tfarm.load("sasaki2012-lab"), np.linspace(0.9, 1.1, 3)
     assert law_stability(lab, law).is_stable
     assert law_map(lab, law, ("hub_angle", "tip_deflection.num.0"), values, values).stable.all()
+
+
+def test_a_map_whose_counts_do_not_hold_at_its_corners_is_refused(monkeypatch):
+    """As if a pair had come into the band through its top, on the way to the last corner."""
+    module = import_module("tfarm.loop.law_map")
+    counted = module.unstable_below
+
+    def other(loop, band):
+        numbers = loop.law.numbers  # a factor is multiplied into them
+        is_last = numbers["hub_angle.num.0"] == 20 * 2.0 and numbers["hub_angle.den.1"] == 3.0
+        return counted(loop, band) + 2 * is_last
+
+    monkeypatch.setattr(module, "unstable_below", other)
+    with pytest.raises(ConvergenceError, match=r"at gain = 20, hub_angle.den.1 = 3 .* ask for a smaller range"):
+        law_map(LAB, LAW, ("gain", "hub_angle.den.1"), np.array([1.0, 5.0, 20.0]), np.array([0.5, 1.0, 3.0]))

@@ -122,7 +122,25 @@ def law_map(arm: Arm, law: AnyLaw, vary: tuple[str, str], x: Real, y: Real, band
         begin = unstable_below(own.under(row.having(vary[0], float(x[start]))), band)
         (there,) = counts_over(x, [across], float(x[start]), np.array([begin]))
     counts = counts_over(y, columns, float(y[at]), np.asarray(there))
-    return LawMap(own.arm, law, vary, x, y, counts.T.copy(), band, columns)
+    found = LawMap(own.arm, law, vary, x, y, counts.T.copy(), band, columns)
+    _must_hold_at_corners(own, found)
+    return found
+
+
+def _must_hold_at_corners(loop: LawLoop, found: LawMap) -> None:
+    """Refuse a map by ConvergenceError where poles came into the band or left it through its top, on the way."""
+    for i, j in ((0, 0), (0, -1), (-1, 0), (-1, -1)):
+        at = (float(found.x[i]), float(found.y[j]))
+        law = found.law.having(found.vary[0], at[0]).having(found.vary[1], at[1])
+        try:
+            count = unstable_below(loop.under(law), found.band)
+        except ConvergenceError:  # a pole on the axis to working precision, which is on either side
+            continue
+        if count != found.unstable[j, i]:
+            where = ", ".join(f"{name} = {value:.6g}" for name, value in zip(found.vary, at, strict=True))
+            why = f"at {where} {count} poles below {found.band:.4g} rad/s are unstable, not {found.unstable[j, i]}"
+            remedy = "on the way there some passed the band's top: ask for a smaller range"
+            raise ConvergenceError(f"{why}; {remedy}", found, abs(count - int(found.unstable[j, i])))
 
 
 def asked_at(name: str, limits: tuple[float, float]) -> tuple[float, ...]:
