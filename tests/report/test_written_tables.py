@@ -1,0 +1,108 @@
+"""The tables of written pages: their CSV and JSON are one, and their numbers those of the API."""
+
+import csv
+import json
+
+import pytest
+
+import tfarm
+from tests.hostile import NAME
+from tests.report.full import ARM
+from tfarm.report.paper import is_from_paper, paper_section
+
+
+def tables(pages, stem):
+    """The rows of a table's CSV and JSON file."""
+    with open(pages / NAME / "data" / f"{stem}.csv", encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    return rows, json.loads((pages / NAME / "data" / f"{stem}.json").read_text(encoding="utf-8"))["rows"]
+
+
+def from_csv(text):
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+def test_csv_and_json_hold_the_same_numbers(pages):
+    stems = {p.stem for p in (pages / NAME / "data").glob("*.json")}
+    assert len(stems) >= 10
+    for stem in stems:
+        rows, records = tables(pages, stem)
+        assert len(rows) == len(records) > 0
+        for row, record in zip(rows, records, strict=True):
+            assert list(row) == list(record)
+            for key, value in record.items():
+                if isinstance(value, list):
+                    assert [float(part) for part in row[key].split()] == value
+                else:
+                    assert from_csv(row[key]) == (from_csv(value) if isinstance(value, str) else value)
+    for file in (pages / NAME / "data").iterdir():
+        assert "nan" not in file.read_text(encoding="utf-8").lower()
+
+
+def test_the_modal_table_is_the_api_to_the_digits_that_hold_everywhere(pages):
+    """Frequencies to the last bit; what shapes are needed for to ten digits, as on every processor."""
+    _, records = tables(pages, "modal-table")
+    modes = tfarm.modes(ARM, count=10)
+    assert [r["index"] for r in records] == list(range(11))
+    assert [r["natural_frequency_rad_s"] for r in records] == modes.natural_frequency.tolist()
+    assert [r["natural_frequency_hz"] for r in records] == modes.natural_frequency_hz.tolist()
+    for key in ("hub_participation", "modal_moment"):
+        assert [r[key] for r in records] == pytest.approx(getattr(modes, key), rel=5.1e-10, abs=0)
+    for record, nodes in zip(records, modes.nodes, strict=True):
+        assert record["nodes_m"] == pytest.approx(nodes, rel=0, abs=1e-9 * ARM.link.length)
+
+
+def test_the_theories_and_sensitivities_are_the_api_too(pages):
+    _, records = tables(pages, "theories")
+    for theory in ("shear", "rayleigh", "euler-bernoulli"):
+        key = theory.replace("-", "_")
+        omega = tfarm.modes(ARM, count=10, theory=theory).natural_frequency[1:]
+        assert [r[f"{key}_rad_s"] for r in records] == omega.tolist()
+        percent = [100 * (r[f"{key}_rad_s"] / r["timoshenko_rad_s"] - 1) for r in records]
+        assert [r[f"{key}_difference_percent"] for r in records] == pytest.approx(percent, rel=1e-12)
+    _, records = tables(pages, "sensitivities")
+    sensitivity = tfarm.modes(ARM, count=10).sensitivity
+    named = {r["parameter"].replace("'", "").replace(" ", "_").lower(): r for r in records}
+    assert set(named) == set(sensitivity)
+    for name, record in named.items():
+        assert [record[f"mode_{i}"] for i in range(1, 11)] == pytest.approx(sensitivity[name][1:], rel=0, abs=5.1e-10)
+
+
+def test_the_responses_are_the_api_too(pages):
+    for output in ("root_moment", "tip_displacement"):
+        file = pages / NAME / "data" / f"bode-{output.replace('_', '-')}-data.csv"
+        records = list(csv.DictReader(file.read_text(encoding="utf-8").splitlines()))
+        s = [1j * float(r["omega_rad_s"]) for r in records]
+        values = tfarm.transfer(ARM, output)(s)
+        assert [float(r["real"]) for r in records] == values.real.tolist()
+        assert [float(r["imaginary"]) for r in records] == values.imag.tolist()
+    _, roots = tables(pages, "bode-root-moment-roots")
+    assert {r["magnitude"] for r in roots if r["kind"] == "pole"} == {"inf"}
+
+
+def test_parameters_that_change_nothing_are_left_out_with_a_word():
+    from tfarm.report.modes_section import sensitivity_table
+
+    table = sensitivity_table(tfarm.modes(tfarm.load("sasaki2012"), count=3))
+    assert not any("payload" in name for name in table.columns[0].values)
+    assert (
+        "Left out, as one per cent more of it changes no frequency here: payload mass and payload inertia."
+        in table.caption
+    )
+
+
+def test_the_paper_is_corrected_where_the_arm_is_its_own():
+    assert not is_from_paper(ARM)
+    for name, density in (("sasaki2012", "2766.7 kg/m³"), ("sasaki2012-as-printed", "2.7667 kg/m³")):
+        arm = tfarm.load(name)
+        assert is_from_paper(arm)
+        (table,) = paper_section(arm).blocks
+        rows = list(zip(*(column.values for column in table.columns), strict=True))
+        (row,) = (row for row in rows if row[1] == "ρ")
+        assert row[2:4] == ("2.7667 kg/m³", density)
+        assert row[4]
+        assert [row[4] for row in rows if row[1] in ("I", "I_h")] == ["needed, but not in the paper: an assumption"] * 2
+        assert next(row for row in rows if row[1] == "C")[2:4] == ("0 kg/s", "0 s")
