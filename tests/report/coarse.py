@@ -5,7 +5,7 @@ from tfarm.dsp import loci as sampled_loci
 from tfarm.dsp import periods
 from tfarm.dsp import regions as sampled_regions
 from tfarm.loop import loci
-from tfarm.report import assumptions_section, card, making, map
+from tfarm.report import assumptions_section, card, live_data, making, map
 
 COARSE = (
     (map, "GRID_COLUMNS", 48),
@@ -18,6 +18,8 @@ COARSE = (
     (periods, "PERIOD_SHARES", (1.0, 5.0)),
     (assumptions_section, "CURVE_POINTS", 9),
     (making, "MOST_WORKERS", 1),  # a second process would have its own grids
+    (map, "sampled_region", regions.sampled_region.__wrapped__),  # what is kept of it is of other grids
+    (live_data, "sampled_region", regions.sampled_region.__wrapped__),
 )
 
 
