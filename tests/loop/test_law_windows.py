@@ -186,19 +186,28 @@ def test_next_to_zero_windows_are_not_cut_by_rounding(damping) -> None:
 LIFTED = Law({"tip_acceleration": ([186.865, -1.0989e6], [1.0, -109.42, 3334.17])})
 
 
-def test_counts_are_not_carried_through_0_of_a_leading_coefficient_below_a_band_that_does_not_tell_all_there() -> None:
-    """Next to 0 high modes are driven, and poles come to a lower band from above: the window was wrong."""
+def lifted_arm():
     link = Link(
         length=2.238607336473004, density=1931.0641728978835, youngs_modulus=166452388184.08365,
         shear_modulus=74861078511.42296, damping=9.118666378147337e-06,
         section=Section.rectangle(width=0.032839846319312284, depth=0.05793951713075085),
     )  # fmt: skip
-    arm = replace(LAB, link=link, hub=Hub(inertia=0.00083), payload=Payload(mass=0.27))
+    return replace(LAB, link=link, hub=Hub(inertia=0.00083), payload=Payload(mass=0.27))
+
+
+def test_counts_are_not_carried_through_0_of_a_leading_coefficient_below_a_band_that_does_not_tell_all_there() -> None:
+    """Next to 0 high modes are driven, and poles come to a lower band from above: the window was wrong."""
+    arm = lifted_arm()
     found = law_windows(law_stability(arm, LIFTED))["tip_acceleration.den.0"]
     for value in (-7.7, -7.4, -6.4):
         is_inside = any(low < value < high for low, high in found.all)
         assert is_inside == (law_stability(arm, LIFTED.having("tip_acceleration.den.0", value)).unstable_roots == 0)
     assert [pair[0] for pair in found.all] == [-10.0]
+
+
+@pytest.mark.survey
+def test_a_map_through_0_of_a_leading_coefficient_has_the_counts_of_verdicts() -> None:
+    arm = lifted_arm()
     x, y = np.array([-7.0, -0.1, 0.1]), np.array([1.0, 1.1])
     plane = law_map(arm, LIFTED, ("gain", "tip_acceleration.den.0"), y, x)
     counts = [
@@ -215,6 +224,7 @@ def test_a_leading_coefficient_without_which_there_is_no_loop_keeps_its_sign() -
     assert all(0.001 <= low < high <= 0.1 for low, high in found.all)
 
 
+@pytest.mark.survey
 def test_where_nothing_is_known_beyond_the_band_a_window_is_not_made_of_poles_that_left_through_its_top() -> None:
     """Two real poles right of the axis became a pair above the band on the way: carried on, the count was two less."""
     link = Link(
