@@ -136,15 +136,15 @@ def test_at_no_damping_finite_counts_are_those_of_a_verdict_at_each_point(arm, K
 
 def test_the_middle_of_a_range_around_0_is_0_and_not_next_to_it() -> None:
     """There at C = 0 nothing is stable, a rounding above it everything is."""
-    for low, high, number in ((-1.0, 3.0, 6), (-2.1, 2.1, 7), (-0.3, 0.1, 10), (-6.3, 6.3, 5)):
+    for low, high, number in ((-1.0, 3.0, 6), (-0.7, 2.1, 6), (-0.1, 0.7, 12), (-6.3, 6.3, 5)):
         gains = between(low, high, number)
         assert np.diff(gains) == pytest.approx((high - low) / number, rel=1e-12)
         assert abs(gains[gains != 0]).min() > 0.01 * (high - low) / number
-    columns = between(-0.7, 0.7, 7)
+    columns = between(-2.1, 0.7, 6)
     found = region(BARE, columns, np.array([0.0, 0.5]))
-    assert columns[3] == 0
-    assert not found.stable[:, :4].any()
-    assert found.stable[:, 4:].all()
+    assert columns[4] == 0
+    assert not found.stable[:, :5].any()
+    assert found.stable[:, 5:].all()
 
 
 def test_a_range_of_k1_that_ends_at_zero_counts_as_one_that_goes_beyond() -> None:

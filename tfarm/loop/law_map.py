@@ -2,7 +2,8 @@
 
 In any one coefficient of a law, of its numerators or denominators, and in a factor on it, D is linear: D = A + g B.  So
 each column of the map has its crossings of the imaginary axis solved for, as along a gain (`tfarm.crossing`), and one
-count of unstable poles gives all the others.  In a delay it is not: that runs across the columns, each counted.
+count of unstable poles gives all the others.  In a delay it is not: that runs across the columns, each counted.  So
+does a leading coefficient through 0 where no band tells all there: poles come to any band from above.
 """
 
 from __future__ import annotations
@@ -28,14 +29,13 @@ from .frequencies import grid
 from .law_loop import LawLoop
 from .law_poles import law_box, law_poles_below
 from .law_stability import LISTED_LEFT, band_for, is_told_without
-from .lines import ascending, through_infinity, through_origin
+from .lines import ROUNDED, ascending, through_infinity, through_origin
 from .stability import MARGIN_OF_ZERO, must_be_off_axis
 
 LEADING = ".den.0"  # how the name of a leading coefficient ends
 MOST_MAP_VALUES = 400  # along one number: each column is a line of crossings of its own
 NEAR_ORIGIN = (1e-6, 5e-7)  # of the lowest frequency: where a real pole is looked for on its way through 0
 FAR_RIGHT = (1e5, 1e6, 1e7)  # of w1: where one is looked for on its way through infinity
-ROUNDED = 4 * float(np.finfo(float).eps)  # of the range: a value so small is 0
 NEXT_TO_ZERO = 1e-6  # of the range: so near to 0 crossings are looked for again, with the digits of that width
 CLOSER_LOOKS = 3  # at most: down to 1e-18 of the range, below which a number is none
 ORDER_READ_AT = (2e-3, 1e-3)  # of w1: where the order of a zero at s = 0 is read off

@@ -32,6 +32,7 @@ SAME_FREQUENCY = 1e-12  # of a frequency: nearer than this are two numbers for o
 FINITE_LIMIT = 1.5  # times the gain at the farther of two small s: more at the nearer one is a gain without a limit
 STILL_GROWS = 0.75  # of the step before: by more, of places ever farther right, a gain without a limit grows
 JUST_BEYOND = 1.01  # of a band: natural frequencies up to there, as one may be at its end
+ROUNDED = 4 * float(np.finfo(float).eps)  # of a range: a gain so small is 0, and not beside a line on which it is
 NEARLY_AT_REST = 1e-7  # of the lowest frequency: values there are those at s = 0 to as many digits
 
 

@@ -28,7 +28,7 @@ from tfarm.records import record
 from tfarm.spectrum.scales import PAPER_GAINS, default_gains
 
 from .frequencies import grid
-from .lines import along, ascending, crossing_at_zero, line_crossings, static_crossings
+from .lines import NO_FEEDBACK, ROUNDED, along, ascending, crossing_at_zero, line_crossings, static_crossings
 from .lossless import locked_edges, stable_moments
 from .plant import Loop
 from .stability import loop_band, stability
@@ -36,8 +36,6 @@ from .windows import holds_undamped
 
 INFINITE = -1  # stands for infinitely many unstable poles
 MOST_GRID_GAINS = 2000  # of a map, along one gain
-ROUNDED = 4 * float(np.finfo(float).eps)  # of a range: a gain so small is 0, and on the line K1 = 0 is not beside it
-ONLY_THE_PLANE = HubFeedback()
 SHOWN_K1, SHOWN_K2 = (-1.0, 3.0), (-2.0, 2.0)  # of a map, unless told: what the paper's arm is stable in, and around it
 
 
@@ -117,7 +115,7 @@ class Region:
         return np.asarray((self.unstable == 0) & ~(drifts | swings | untold) & ~no_moment_is_left[:, None])
 
 
-def region(arm: Arm, K1: Real, K2: Real, held: HubFeedback = ONLY_THE_PLANE) -> Region:
+def region(arm: Arm, K1: Real, K2: Real, held: HubFeedback = NO_FEEDBACK) -> Region:
     """The map over the grid of K1 and K2 (1-D, ascending), the other gains as in `held`, all on the hub's own outputs.
 
     What a hub loses beside an arm without losses is added to K1, for which the theorems of such an arm then hold.  A
