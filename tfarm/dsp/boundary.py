@@ -133,14 +133,13 @@ class _Line(NamedTuple):
 def crossed_on(grid: CircleGrid, split: Split) -> tuple[list[Crossing], int]:
     """The crossings at angles 0 < q <= pi, and by how much one at z = 1 changes the count.
 
-    Each is solved for by its angle from the nearer pole, down to its last bit.  At z = 1 and z = -1, where a single
+    Each is solved for by its angle from a pole next to it, down to its last bit.  At z = 1 and z = -1, where a single
     pole crosses, h = Im(A conj B) vanishes: so it falls towards the end where it is positive just before.
     """
     A, B = split(grid.terms)
     h = (A * B.conj()).imag
     (step,), change = brackets(h)
-    base = np.where(abs(grid.shift[step]) < abs(grid.shift[step + 1]), grid.base[step], grid.base[step + 1])
-    low = np.where(base == grid.base[step], grid.shift[step], grid.q[step] - grid.angles[base])
+    base, low = grid.base[step], grid.shift[step]  # where the next point has another pole, both are as far away
     high = np.where(base == grid.base[step + 1], grid.shift[step + 1], grid.q[step + 1] - grid.angles[base])
     shift, gain = solved(lambda shift: split(grid.at(base, shift)), low, high)
     found = [Crossing(*each) for each in zip(gain, grid.angles[base] + shift, change, strict=True)]

@@ -170,11 +170,11 @@ class Circle(Generic[SampledKind]):
         held = Discs(sums.middle, sums.radius + self.missing[row]) + late.times(at_rest)
         total = power(x, order) * held
         push = arcs.turned(0).times((1 - f) * T) + late.times(f * T)
-        if once:
-            total = total + (power(x, order - 1) * push * late).times(once)
-        if twice:
+        if twice:  # then there is no 1/s beside it: of an arm that turns freely nothing at the hub is lost
             ramp = arcs.turned(0).times(pulse.ramps[0]) + late.times(pulse.ramps[1])
             total = total + ((push * late).times(T) + x * ramp).times(twice) * late
+        elif once:
+            total = total + (push * late).times(once)
         return total * arcs.turned(pulse.sampling.whole_delay)
 
     # ------------------------------------------------------------ arcs

@@ -1,0 +1,89 @@
+"""What a band leaves out, the filter's own error, and how high it reaches; edges shown without a band, grids."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tfarm
+from tfarm.arm import FED_BACK, Hub, HubFeedback, Law
+from tfarm.dsp import Chain, Sampling, band, sampled_loop, sampled_map
+from tfarm.dsp.band import HIGHER, complete_band
+from tfarm.dsp.boundary import COARSEST, circle_grid
+from tfarm.dsp.law_loop import sampled_law
+from tfarm.dsp.law_margins import crossing_factors
+from tfarm.dsp.shown import shown_delay
+from tfarm.dsp.verdict import Verdict
+from tfarm.reduced import modal_model
+
+LAB = tfarm.load("sasaki2012-lab")
+GAINS = HubFeedback(K1=0.3, K2=0.3)
+
+
+@pytest.mark.parametrize("delay", [0.0, 1.3])
+def test_the_filters_own_pole_errs_by_what_the_model_is_off_at_its_corner(delay):
+    """Next to the arm's own, e^{pT} of p = -wc has the residue wc G(-wc): what another G makes of H, all round."""
+    corner, T = 200.0, 0.01
+    loop = sampled_loop(LAB, GAINS, Chain(sampling=Sampling(delay_samples=delay, antialias_corner=corner)), count=2)
+    s = np.array([-corner + 0j])
+    model, exact = modal_model(LAB, FED_BACK, 2)(s)[:, 0], tfarm.transfer(LAB, list(FED_BACK))(s)[:, 0]
+    z = np.exp(1j * np.linspace(0, np.pi, 2001))
+    late = math.exp(-corner * T * (1 - delay % 1))
+    most = max(abs((1 - 1 / z) * late / (z - math.exp(-corner * T))))
+    found = band._of_the_filter(loop, 1000.0)
+    np.testing.assert_allclose(found, [0.0, *abs(model - exact)[1:] * most], rtol=1e-6, atol=1e-15)
+    assert found[2] > 1e-12
+    assert not band._of_the_filter(loop, 150.0).any()  # its pole is left of the line, with those that are left out
+
+
+def test_the_top_of_a_band_is_so_many_times_the_last_pole_of_the_model():
+    loop = sampled_loop(LAB.having(damping=1e-3), GAINS, count=4)
+    shares = complete_band(loop).top / loop.plant.poles.imag.max() / band.ABOVE_MODEL
+    assert min(abs(shares / factor - 1) for factor in HIGHER) < 1e-12
+
+
+def test_a_map_of_one_point_is_the_count_of_its_poles():
+    loop = sampled_loop(LAB, GAINS, count=4)
+    for K1, K2 in ((0.3, 0.3), (-0.3, 0.3), (0.3, 1.5)):
+        outside = int((abs(loop.having(K1=K1, K2=K2).eigenvalues) > 1).sum())
+        assert sampled_map(loop, [K1], [K2]).unstable.tolist() == [[outside]]
+
+
+def test_no_gap_of_the_grid_on_the_circle_is_twice_as_wide_as_of_the_uniform_one():
+    """However far the poles are from each other, and from z = -1; between the points of two poles the grids meet."""
+    for count in (1, 5):
+        q = circle_grid(sampled_loop(LAB, GAINS, count=count)).q
+        assert np.diff(q).max() < 2 * math.pi / COARSEST
+
+
+def test_without_a_band_a_delay_margin_has_the_digits_that_twice_the_modes_leave():
+    """Less than one sample of it: both ends of what is shown are on their sides of the edge with sixteen modes too."""
+    loop = sampled_loop(LAB, replace(GAINS, K2=1.1), Chain(sampling=Sampling(delay_samples=0.5)), count=4)
+    margin, figure = shown_delay(loop, None)
+    assert 0 < margin.samples < 1
+    assert (figure.is_settled, figure.modes) == (False, 4)
+    assert figure.digits >= 2
+    half, many = 0.5 * 10.0 ** (math.floor(math.log10(margin.samples)) - figure.digits + 1), loop.with_modes(16)
+    radii = [abs(many.with_delay(0.5 + float(figure.text) + side * half).eigenvalues).max() for side in (-1, 1)]
+    assert radii[0] < 1 < radii[1]
+
+
+def test_a_hub_that_its_rate_gain_drives_away_grows_by_a_factor():
+    """Of an arm as good as a hub alone z = 1 - K1 T/J: slowly in per cent of 1, beyond e by a factor."""
+    arm = replace(LAB, hub=Hub(inertia=1e4))
+    for radius, words in ((4.0, "a factor of 4 "), (2.6, "1.6 "), (-4.0, "a factor of 4 ")):
+        gain = (1 - radius) * arm.total_inertia / 0.01
+        sentence = Verdict(sampled_loop(arm, HubFeedback(K1=gain), count=1)).sentence
+        assert f"unstable: the hub grows by {words}a sample" in sentence.replace(".00", "")
+
+
+def test_a_law_without_zeros_at_rest_is_seen_to_cross_however_slowly():
+    """(J + g T/2) theta'' + (b - g) theta' + 1e-10 J g/b theta, fed back T/2 late: on the axis at g = b."""
+    friction, T = 0.3, 0.01
+    arm = replace(LAB, hub=replace(LAB.hub, friction=friction))
+    law = Law({"hub_rate": -1.0, "hub_angle": 1e-10 * arm.total_inertia / friction})
+    (found,) = [each for each in crossing_factors(sampled_law(arm, law, Chain(), count=2)) if each.at < 1e-3]
+    assert found.t == pytest.approx(friction, rel=1e-6)
+    assert found.at == pytest.approx(1e-5 * T / math.sqrt(1 + friction * T / 2 / arm.total_inertia), rel=1e-6)
+    assert found.change == 2
