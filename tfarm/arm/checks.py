@@ -7,6 +7,7 @@ would be right.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 from numbers import Integral, Real
 
 from tfarm.errors import ParameterError
@@ -68,6 +69,15 @@ def extended(key: str, value: object, meaning: str) -> float:
     """Zero, a positive number, or inf."""
     x = number(key, value, meaning)
     return x if x == math.inf else not_negative(key, x, meaning)
+
+
+def check_fields(
+    record: object, kind: str, check: Callable[[str, object, str], float], meanings: Mapping[str, str]
+) -> None:
+    """Each of these fields of a frozen record as one of the checks above leaves it, under the key `kind.field`."""
+    for name, meaning in meanings.items():
+        key = f"{kind}.{name}" if kind else name
+        object.__setattr__(record, name, check(key, getattr(record, name), meaning))
 
 
 def _too_far(key: str, value: object) -> ParameterError:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from tfarm.arm.blocks import LawBlock, Matrices, Rational, StateSpace, block_of
-from tfarm.arm.checks import not_negative, number, positive
+from tfarm.arm.checks import check_fields, not_negative, number, positive
 from tfarm.arm.feedback import AT_HUB, GAINS, HubFeedback
 from tfarm.arm.records import INPUTS
 from tfarm.arrays import Complex
@@ -69,7 +69,8 @@ class Law:
         parts, periods = (self.parts, ()) if self.parts else _parts_of(self.entries)
         object.__setattr__(self, "parts", parts)
         object.__setattr__(self, "entries", {})
-        object.__setattr__(self, "delay", not_negative("delay", self.delay, "a delay in s, 0 or more"))
+        meanings = {"delay": "a delay in s, 0 or more", "prewarp": "a frequency in rad/s, or 0"}
+        check_fields(self, "", not_negative, meanings)
         known = {float(each) for each in periods}
         if self.period is not None:
             known.add(positive("period", self.period, "a sample period in s; leave it out for a continuous law"))
@@ -78,7 +79,6 @@ class Law:
             raise ParameterError(key="period", value=sorted(known), remedy=remedy)
         object.__setattr__(self, "period", known.pop() if known else None)
         object.__setattr__(self, "references", tuple(self.references))
-        object.__setattr__(self, "prewarp", not_negative("prewarp", self.prewarp, "a frequency in rad/s, or 0"))
         self._check()
 
     def _check(self) -> None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tfarm.arm.checks import not_negative, number, positive
+from tfarm.arm.checks import check_fields, not_negative, number, positive
 from tfarm.arm.sections import Section
 from tfarm.errors import ParameterError
 
@@ -17,8 +17,8 @@ MEANINGS = {
     "density": "a density is a positive, finite number in kg/m^3",
     "youngs_modulus": "Young's modulus is a positive, finite number in Pa",
     "shear_modulus": "a shear modulus is a positive, finite number in Pa",
-    "damping": "damping C is zero or a positive time in seconds, as in E (1 + C s)",
 }
+DAMPING = "damping C is zero or a positive time in seconds, as in E (1 + C s)"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,9 +36,8 @@ class Link:
     damping: float = 0.0
 
     def __post_init__(self) -> None:
-        for name, meaning in MEANINGS.items():
-            check = not_negative if name == "damping" else positive
-            object.__setattr__(self, name, check(f"link.{name}", getattr(self, name), meaning))
+        check_fields(self, "link", positive, MEANINGS)
+        check_fields(self, "link", not_negative, {"damping": DAMPING})
         if self.slenderness > SLENDEREST:
             remedy = f"{self.slenderness:.3g} times the section's radius of gyration is no beam; check the units"
             raise ParameterError(key="link.length", value=self.length, remedy=remedy)

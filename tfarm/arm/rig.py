@@ -10,7 +10,7 @@ import math
 from dataclasses import MISSING, dataclass, fields
 from typing import Any, Literal, cast
 
-from tfarm.arm.checks import extended, not_negative, positive, signed
+from tfarm.arm.checks import check_fields, extended, not_negative, positive, signed
 from tfarm.errors import ParameterError
 
 
@@ -31,12 +31,6 @@ def brief_repr(record: Any, always: int) -> str:
     return f"{type(record).__name__}({shown})"
 
 
-def _finite(record: Any, kind: str, meanings: dict[str, str]) -> None:
-    """Zero or a positive, finite number in each of these fields; raises ParameterError under `kind.field`."""
-    for name, meaning in meanings.items():
-        object.__setattr__(record, name, not_negative(f"{kind}.{name}", getattr(record, name), meaning))
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hub:
     """The hub: `inertia` I_h [kg m^2] (inf locks it, 0 leaves a free pin), viscous `friction` b [N m s/rad].
@@ -50,14 +44,14 @@ class Hub:
     stiffness: float = 0.0
 
     def __post_init__(self) -> None:
-        meaning = "a hub inertia is zero (free pin), positive in kg m^2, or inf (locked)"
-        object.__setattr__(self, "inertia", extended("hub.inertia", self.inertia, meaning))
+        inertia = "a hub inertia is zero (free pin), positive in kg m^2, or inf (locked)"
+        check_fields(self, "hub", extended, {"inertia": inertia})
         meanings = {
             "friction": "a hub friction is zero or a positive, finite number in N m s/rad",
             "radius": "a hub radius, from the axis to the clamp, is zero or a positive, finite number of metres",
             "stiffness": "a spring from hub to ground is zero or positive, finite, in N m/rad (inertia = inf locks)",
         }
-        _finite(self, "hub", meanings)
+        check_fields(self, "hub", not_negative, meanings)
         for name in ("friction", "stiffness"):
             if math.isinf(self.inertia) and getattr(self, name) > 0.0:
                 remedy = f"does nothing: with inertia = inf the hub cannot turn; leave out the {name}, or the inf"
@@ -76,11 +70,11 @@ class RotarySpring:
 
     def __post_init__(self) -> None:
         meaning = "the stiffness of a clamp or joint is positive in N m/rad, or inf (rigid)"
-        stiffness = extended("spring.stiffness", self.stiffness, meaning)
-        if stiffness == 0.0:
-            raise ParameterError(key="spring.stiffness", value=stiffness, remedy=meaning)
-        object.__setattr__(self, "stiffness", stiffness)
-        _finite(self, "spring", {"damping": "damping c is zero or a positive time in seconds, as in k (1 + c s)"})
+        check_fields(self, "spring", extended, {"stiffness": meaning})
+        if self.stiffness == 0.0:
+            raise ParameterError(key="spring.stiffness", value=self.stiffness, remedy=meaning)
+        damping = "damping c is zero or a positive time in seconds, as in k (1 + c s)"
+        check_fields(self, "spring", not_negative, {"damping": damping})
         if self.damping > 0.0 and self.is_rigid:
             remedy = "nothing yields that could be damped: give a finite stiffness in N m/rad, or leave the damping out"
             raise ParameterError(key="spring.damping", value=self.damping, remedy=remedy)
@@ -116,8 +110,7 @@ class Motor:
             "gear_ratio": "a gear ratio, motor turns per hub turn, is a positive, finite number",
             "gear_efficiency": "an efficiency is above 0, up to 1 (75 % is entered as 0.75)",
         }
-        for name, meaning in meanings.items():
-            object.__setattr__(self, name, positive(f"motor.{name}", getattr(self, name), meaning))
+        check_fields(self, "motor", positive, meanings)
         if self.gear_efficiency > 1.0:
             remedy = meanings["gear_efficiency"]
             raise ParameterError(key="motor.gear_efficiency", value=self.gear_efficiency, remedy=remedy)
@@ -130,7 +123,7 @@ class Motor:
             "rotor_inertia": "a rotor inertia is zero or a positive, finite number in kg m^2, before the gear",
             "rotor_friction": "a rotor friction is zero or a positive, finite number in N m s/rad, before the gear",
         }
-        _finite(self, "motor", others)
+        check_fields(self, "motor", not_negative, others)
 
     @property
     def reflected_inertia(self) -> float:
@@ -159,7 +152,7 @@ class Attachment:
             "stiffness": "an attached spring to ground is zero or positive, finite, in N/m",
             "rotational_stiffness": "an attached rotary spring to ground is zero or positive, finite, in N m/rad",
         }
-        _finite(self, "attachment", meanings)
+        check_fields(self, "attachment", not_negative, meanings)
         if not (self.mass or self.inertia or self.is_held):
             remedy = "there is nothing in it: give a mass, an inertia, a stiffness or a rotational_stiffness"
             raise ParameterError(key="attachment.x", value=self.x, remedy=remedy)
@@ -181,7 +174,8 @@ class Gauge:
     side: Literal["outer", "inner"] = "outer"
 
     def __post_init__(self) -> None:
-        _finite(self, "gauge", {"x": "a gauge's place is zero or a positive number of metres from the clamp"})
+        meaning = "a gauge's place is zero or a positive number of metres from the clamp"
+        check_fields(self, "gauge", not_negative, {"x": meaning})
         if self.side not in ("outer", "inner"):
             raise ParameterError(key="gauge.side", value=self.side, remedy='"outer" or "inner"')
 
@@ -198,12 +192,13 @@ class Payload:
     offset: float = 0.0
 
     def __post_init__(self) -> None:
-        meaning = "a payload mass is zero, positive in kg, or inf (tip pinned)"
-        object.__setattr__(self, "mass", extended("payload.mass", self.mass, meaning))
-        meaning = "a payload inertia is zero, positive in kg m^2, or inf (tip cannot rotate)"
-        object.__setattr__(self, "inertia", extended("payload.inertia", self.inertia, meaning))
-        meaning = "a payload's offset is a finite number of metres beyond the tip, negative before it"
-        object.__setattr__(self, "offset", signed("payload.offset", self.offset, meaning))
+        meanings = {
+            "mass": "a payload mass is zero, positive in kg, or inf (tip pinned)",
+            "inertia": "a payload inertia is zero, positive in kg m^2, or inf (tip cannot rotate)",
+        }
+        check_fields(self, "payload", extended, meanings)
+        offset = "a payload's offset is a finite number of metres beyond the tip, negative before it"
+        check_fields(self, "payload", signed, {"offset": offset})
 
     def __repr__(self) -> str:
         return brief_repr(self, always=2)

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from tfarm.arm.checks import positive
+from tfarm.arm.checks import check_fields, positive
 from tfarm.errors import MISSING, ParameterError, did_you_mean
 
 KEY = "link.section"  # before the names of its numbers in messages
@@ -87,9 +87,11 @@ class Section:
     dimensions: tuple[tuple[str, float], ...] = ()
 
     def __post_init__(self) -> None:
-        for name, unit in (("area", "m^2"), ("second_moment", "m^4")):
-            meaning = f"a section has a positive, finite {name.replace('_', ' ')} in {unit}"
-            object.__setattr__(self, name, positive(f"{KEY}.{name}", getattr(self, name), meaning))
+        meanings = {
+            "area": "a section has a positive, finite area in m^2",
+            "second_moment": "a section has a positive, finite second moment in m^4",
+        }
+        check_fields(self, KEY, positive, meanings)
         if self.shear_factor is not None:
             meaning = "a shear factor multiplies G A: above 0, up to 1 (a form factor of 6/5 is entered as 5/6)"
             kappa = positive(f"{KEY}.shear_factor", self.shear_factor, meaning)

@@ -21,7 +21,7 @@ from functools import cached_property
 import numpy as np
 
 from tfarm.arm import Arm, HubFeedback, must_not_be_algebraic
-from tfarm.arm.checks import not_negative, number, positive
+from tfarm.arm.checks import check_fields, not_negative, number, positive
 from tfarm.arrays import Real
 from tfarm.dsp import Chain, SampledLoop, Scenario, Simulator, sampled_loop, scenario
 from tfarm.dsp.chain import Reading, chain_or_usual
@@ -48,9 +48,8 @@ class Cost:
     b: float = TRIAL_COST[1]
 
     def __post_init__(self) -> None:
-        for name in ("a", "b"):
-            meaning = f"the weighting coefficient {name} is zero or positive"
-            object.__setattr__(self, name, not_negative(name, getattr(self, name), meaning))
+        meanings = {name: f"the weighting coefficient {name} is zero or positive" for name in ("a", "b")}
+        check_fields(self, "", not_negative, meanings)
         if self.a == 0.0 == self.b:
             raise ParameterError(key="a", value=self.a, remedy="a and b are both zero: a cost of nothing")
 
