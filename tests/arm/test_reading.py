@@ -1,5 +1,6 @@
 import math
 import os
+import re
 import time
 from contextlib import suppress
 from pathlib import Path
@@ -9,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tfarm.arm import Arm, Hub, Link, Payload, Section, load, presets, to_toml
+from tfarm.arm.law_tables import load_law
 from tfarm.arm.reading import MOST_ARM_BYTES
 from tfarm.errors import ParameterError
 
@@ -268,6 +270,8 @@ def test_a_misspelt_preset():
     text = refusal("saski2012")
     assert text.startswith("arm = 'saski2012': no such preset: did you mean \"sasaki2012\"?")
     assert all(name in text for name in presets())
+    with pytest.raises(ParameterError, match=re.escape(text)):
+        load_law("saski2012")
 
 
 @pytest.mark.parametrize("name", ["", "  ", "a\0b.toml", None, 3])

@@ -33,23 +33,25 @@ def presets() -> tuple[str, ...]:
 
 def load(name_or_path: str | os.PathLike[str]) -> Arm:
     """The arm of a preset's name or of a TOML file's path."""
-    name = _text_of(name_or_path)
-    if not isinstance(name_or_path, os.PathLike) and name in presets():
-        return _arm_of(PRESETS.joinpath(f"{name}.toml").read_bytes(), f"{name}.toml")
-    is_path = isinstance(name_or_path, os.PathLike) or name.endswith(".toml") or {"/", "\\", os.sep} & set(name)
-    if not is_path and not os.path.lexists(name):
-        remedy = f"no such preset: {did_you_mean(name, presets())}; or give the path of a .toml file"
-        raise ParameterError(key="arm", value=name, remedy=remedy)
-    return _arm_of(_read(name), name)
+    from tfarm.arm.schema import arm_of_table  # here, because pydantic takes a while to import
+
+    table, file = load_tables(name_or_path)
+    try:
+        return arm_of_table(table)
+    except ParameterError as error:
+        raise error.in_file(file) from None
 
 
 def load_tables(name_or_path: str | os.PathLike[str]) -> tuple[dict[str, Any], str]:
     """The parsed TOML behind a preset's name or a path, and the file's name: for rooms with tables of their own."""
-    name = _text_of(name_or_path)
-    if not isinstance(name_or_path, os.PathLike) and name in presets():
+    name, is_named = _text_of(name_or_path), isinstance(name_or_path, str)
+    if is_named and name in presets():
         data, name = PRESETS.joinpath(f"{name}.toml").read_bytes(), f"{name}.toml"
+    elif is_named and not ({"/", "\\", os.sep} & set(name) or name.endswith(".toml") or os.path.lexists(name)):
+        remedy = f"no such preset: {did_you_mean(name, presets())}; or give the path of a .toml file"
+        raise ParameterError(key="arm", value=name, remedy=remedy)
     else:
-        data = _read(name)
+        data = read_file(name, MOST_ARM_BYTES, key="arm", what="a .toml file")
     try:
         return _table_of(data), name
     except ParameterError as error:
@@ -62,19 +64,6 @@ def _text_of(name_or_path: object) -> str:
         remedy = f"give a preset ({', '.join(presets())}) or a path"
         raise ParameterError(key="arm", value=name, remedy=remedy)
     return name
-
-
-def _read(path: str) -> bytes:
-    return read_file(path, MOST_ARM_BYTES, key="arm", what="a .toml file")
-
-
-def _arm_of(data: bytes, file: str) -> Arm:
-    from tfarm.arm.schema import arm_of_table  # here, because pydantic takes a while to import
-
-    try:
-        return arm_of_table(_table_of(data))
-    except ParameterError as error:
-        raise error.in_file(file) from None
 
 
 def decoded(data: bytes, remedy: str) -> str:
