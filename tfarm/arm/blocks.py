@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import Any
 
 import numpy as np
@@ -264,10 +264,7 @@ def _of_roots(name: str, roots: ArrayLike) -> Real:
         raise ParameterError(key=name, value=[f"{each:g}" for each in found], remedy=remedy)
     pairs = [np.array([1.0, -2 * each.real, abs(each) ** 2]) for each in upper]
     alone = [np.array([1.0, -each.real]) for each in found[found.imag == 0]]
-    product = np.ones(1)
-    for factor in [*pairs, *alone]:
-        product = np.convolve(product, factor)
-    return product
+    return reduce(np.convolve, [*pairs, *alone], np.ones(1))
 
 
 def _matrix(name: str, values: ArrayLike) -> Real:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
+from copy import deepcopy
 from typing import Any
 
 from tfarm.arm.records import Arm
@@ -31,7 +32,7 @@ class KeyedArms:
 
     def at(self, values: Mapping[str, float]) -> Arm:
         """The arm with those numbers in their places.  Raises ParameterError where it is none."""
-        table = _copy(self._table)
+        table = deepcopy(self._table)
         for key, value in values.items():
             here, name = _table_of(table, key)
             place = key.removesuffix(name)
@@ -76,9 +77,3 @@ def _table_of(table: dict[str, Any], key: str) -> tuple[dict[str, Any], str]:
     for place in places:
         here = here[int(place) - 1] if isinstance(here, list) else here.setdefault(place, {})
     return here, name
-
-
-def _copy(table: Any) -> Any:
-    if isinstance(table, dict):
-        return {key: _copy(value) for key, value in table.items()}
-    return [_copy(value) for value in table] if isinstance(table, list) else table

@@ -18,7 +18,7 @@ import numpy as np
 
 from tfarm.arm.blocks import LawBlock, Matrices, Rational, StateSpace, block_of
 from tfarm.arm.checks import check_fields, not_negative, number, positive
-from tfarm.arm.feedback import AT_HUB, GAINS, HubFeedback
+from tfarm.arm.feedback import AT_HUB, GAINS, ON, HubFeedback
 from tfarm.arm.records import INPUTS
 from tfarm.arrays import Complex
 from tfarm.errors import ParameterError, did_you_mean, must_be_known
@@ -84,8 +84,8 @@ class Law:
     def _check(self) -> None:
         if isinstance(self.sign, bool) or self.sign not in (-1, 1):
             raise ParameterError(key="sign", value=self.sign, remedy="-1 (v = -C y, the default) or 1 (v = C y)")
-        if self.input is not None and self.input not in INPUTS:
-            raise ParameterError(key="input", value=self.input, remedy=did_you_mean(str(self.input), INPUTS))
+        if self.input is not None:
+            must_be_known("input", self.input, INPUTS)
         must_be_known("rule", self.rule, SAMPLING_RULES)
         if len(self.signals) > MOST_SIGNALS:
             raise ParameterError(key="signals", value=len(self.signals), remedy=f"at most {MOST_SIGNALS} signals")
@@ -158,14 +158,12 @@ class Law:
     @property
     def gains(self) -> HubFeedback | None:
         """The law as gains at the hub, where it is no more than that; None where it is."""
-        known = {gain.output: gain.name for gain in GAINS}
         plain = all(isinstance(part.block, Rational) and not part.block.order for part in self.parts)
-        if self.delay or self.is_discrete or not plain or not set(self.signals) <= set(known):
-            return None
-        if self.is_improper:
+        more = self.delay or self.is_discrete or self.is_improper or not plain
+        if more or not set(self.signals) <= set(ON):
             return None
         numbers = self.values(np.zeros(1, complex))[:, 0].real
-        return HubFeedback(**{known[name]: float(each) for name, each in zip(self.signals, numbers, strict=True)})
+        return HubFeedback(**{ON[name]: float(each) for name, each in zip(self.signals, numbers, strict=True)})
 
     @property
     def numbers(self) -> dict[str, float]:

@@ -75,15 +75,14 @@ class Arm(Turning):
 
     def _check_places(self) -> None:
         """Attachments on the link, those at the tip exactly there; no pin on the axis, which stands anyway."""
-        for i, attachment in enumerate(self.attachments, 1):
-            if attachment.x > self.length * (1 + LENGTH_ROUNDING):
+        end = self.length * (1 + LENGTH_ROUNDING)
+        places = [(f"attachment.{i}", each.x, end) for i, each in enumerate(self.attachments, 1)]
+        for part, x, most in [*places, ("gauge", self.gauge.x, self.length)]:
+            if x > most:
                 remedy = f"is beyond the tip; x counts from the clamp, up to the link's length of {self.length!r} m"
-                raise ParameterError(key=f"attachment.{i}.x", value=attachment.x, remedy=remedy)
+                raise ParameterError(key=f"{part}.x", value=x, remedy=remedy)
         on_it = tuple(each if each.x <= self.length else replace(each, x=self.length) for each in self.attachments)
         object.__setattr__(self, "attachments", on_it)
-        if self.gauge.x > self.length:
-            remedy = f"is beyond the tip; x counts from the clamp, up to the link's length of {self.length!r} m"
-            raise ParameterError(key="gauge.x", value=self.gauge.x, remedy=remedy)
         if math.isinf(self.payload.mass) and abs(self.centre_distance) < 1e-9 * (self.hub.radius + self.length):
             remedy = "puts the pinned centre of mass on the axis, which stands anyway; give a finite payload.mass"
             raise ParameterError(key="payload.offset", value=self.payload.offset, remedy=remedy)
