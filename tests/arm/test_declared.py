@@ -50,6 +50,21 @@ def test_types_are_strict_and_other_keys_are_refused(table, kind):
     assert [problem["type"] for problem in refused.value.errors()] == [kind]
 
 
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ({}, "spring.stiffness is missing: [spring] is nothing without it"),
+        (3, "spring = 3: give a table, headed [spring]"),
+        ({"stiffness": "2"}, "spring.stiffness = '2': wrong value; input should be a valid number"),
+        ({"stifness": 2.0}, 'spring.stifness = 2.0: unknown key; did you mean "stiffness"?'),
+    ],
+)
+def test_one_wrong_key_is_named_in_a_line(table, words):
+    with pytest.raises(ParameterError) as refused:
+        declared.validated(SpringTable, table, "spring")
+    assert str(refused.value).startswith(words)
+
+
 def test_what_a_file_may_say_is_what_it_was_before_records_declared_it():
     """The keys are a contract with every file there is."""
     assert {name: set(table.model_fields) for name, table in (ARM_TABLES | SHAPE_TABLES).items() if name} == {

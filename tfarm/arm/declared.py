@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import cache
 from inspect import Parameter, signature
 from typing import Any, ClassVar, TypeVar, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 
-from tfarm.errors import ParameterError, did_you_mean
+from tfarm.errors import MISSING, ParameterError, did_you_mean
 
 _Strict = TypeVar("_Strict", bound="StrictTable")
 _Table = TypeVar("_Table", bound="TomlTable")
@@ -42,21 +42,26 @@ def _parameters(makes: Callable[..., Any]) -> frozenset[str]:
     return frozenset(signature(makes).parameters)
 
 
-def validated(model: type[_Strict], table: Mapping[str, Any], place: str) -> _Strict:
+def validated(model: type[_Strict], table: object, place: str) -> _Strict:
     """The table headed [place] of a file.
 
-    Raises ParameterError for one wrong key: a misspelt one comes before those that are then missing.
+    Raises ParameterError for what is no table, or one wrong key: a misspelt one comes before those that are then
+    missing.
     """
+    if not isinstance(table, dict):
+        raise ParameterError(key=place, value=table, remedy=f"give a table, headed [{place}]")
     try:
         return model.model_validate(table)
     except ValidationError as error:
         problem = min(error.errors(include_url=False), key=lambda problem: problem["type"] != "extra_forbidden")
-    word = str(problem["loc"][0])
+    word, value = str(problem["loc"][0]), problem["input"]
     if problem["type"] == "extra_forbidden":
         remedy = f"unknown key; {did_you_mean(word, model.model_fields)}"
+    elif problem["type"] == "missing":
+        value, remedy = MISSING, f"[{place}] is nothing without it"
     else:
         remedy = f"wrong value; {problem['msg'][:1].lower()}{problem['msg'][1:]}"
-    raise ParameterError(key=f"{place}.{word}", value=problem["input"], remedy=remedy)
+    raise ParameterError(key=f"{place}.{word}", value=value, remedy=remedy)
 
 
 def of(makes: Callable[..., Any]) -> Callable[[type[_Table]], type[_Table]]:

@@ -62,10 +62,5 @@ def chain_of_tables(tables: Mapping[str, Any]) -> Chain:
     if unknown:
         remedy = f"unknown table; {did_you_mean(unknown[0], CHAIN_TABLES)}"
         raise ParameterError(key=unknown[0], value=tables[unknown[0]], remedy=remedy)
-    return Chain(**{name: _record(name, tables[name]) for name in CHAIN_TABLES if name in tables})
-
-
-def _record(name: str, table: object) -> Any:
-    if not isinstance(table, dict):
-        raise ParameterError(key=name, value=table, remedy=f"give a table, headed [{name}]")
-    return validated(CHAIN_TABLES[name], table, name).build()
+    given = {name: table for name, table in CHAIN_TABLES.items() if name in tables}
+    return Chain(**{name: validated(table, tables[name], name).build() for name, table in given.items()})

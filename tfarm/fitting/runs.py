@@ -13,20 +13,18 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from pydantic import ValidationError
 
 from tfarm.arm import AnyLaw, Arm, tracked
-from tfarm.arm.declared import StrictTable
+from tfarm.arm.declared import StrictTable, validated
 from tfarm.arm.reading import load_tables
 from tfarm.arrays import Real
 from tfarm.dsp.chain import TIME_ROUNDING, Chain
 from tfarm.dsp.results import modes_for, simulation_of
 from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.simulation import Simulation
-from tfarm.errors import MISSING, ParameterError
+from tfarm.errors import ParameterError
 from tfarm.records import record
 
 from .recording import read_recording
@@ -122,7 +120,7 @@ def load_run(name_or_path: str | os.PathLike[str]) -> MeasuredRun | None:
     if "measured" not in tables:
         return None
     try:
-        table = _validated(tables["measured"])
+        table = validated(RunTable, tables["measured"], "measured")
         found = read_recording(Path(file).parent / table.file)
         led = found.signal(LED_BY, "measured.file")
         if not {ANGLE_COLUMN, MOMENT_COLUMN} & set(found.signals):
@@ -132,15 +130,3 @@ def load_run(name_or_path: str | os.PathLike[str]) -> MeasuredRun | None:
         raise error if error.file else error.in_file(file) from None
     angle, moment = (found.signals.get(name, np.empty(0)) for name in (ANGLE_COLUMN, MOMENT_COLUMN))
     return MeasuredRun(found.times - found.start, led, angle, moment, table.source)
-
-
-def _validated(table: Any) -> RunTable:
-    if not isinstance(table, dict):
-        raise ParameterError(key="measured", value=table, remedy="give a table, headed [measured]")
-    try:
-        return RunTable.model_validate(table)
-    except ValidationError as error:
-        problem = error.errors(include_url=False)[0]
-    key = ".".join(map(str, ("measured", *problem["loc"])))
-    value = MISSING if problem["type"] == "missing" else problem["input"]
-    raise ParameterError(key=key, value=value, remedy="file (a .csv) and source, both texts")
