@@ -37,12 +37,10 @@ class Measured:
     digest: str = ""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "omega", np.atleast_1d(np.asarray(self.omega, dtype=float)))
-        object.__setattr__(self, "values", np.atleast_1d(np.asarray(self.values, dtype=complex)))
-        for name in ("sigma", "coherence"):
+        for name, kind in {"omega": float, "values": complex, "sigma": float, "coherence": float}.items():
             given = getattr(self, name)
             if given is not None:
-                object.__setattr__(self, name, np.atleast_1d(np.asarray(given, dtype=float)))
+                object.__setattr__(self, name, np.atleast_1d(np.asarray(given, dtype=kind)))
         self._check()
 
     @property

@@ -10,6 +10,7 @@ from tfarm.arrays import Complex, Real
 from tfarm.records import record
 from tfarm.response.signals import Signals
 
+from .aligned import aligned
 from .around import NUDGE, Around, drive_behind, under_drive
 from .data import Measured
 
@@ -93,23 +94,7 @@ def _newton(signals: Signals, row: int | None, s: Complex) -> Complex:
 def match(measured: Real, own: Real) -> list[tuple[int, int]]:
     """Pairs of places in two ascending rows, in order, with the least sum of squared gaps.
 
-    To skip one costs UNMATCHED_PEAK^2; of the arm's own, those that nothing was measured at cost nothing.  By dynamic
-    programming over both rows.
+    To skip one costs UNMATCHED_PEAK^2; of the arm's own, those that nothing was measured at cost nothing.
     """
-    n, m = measured.size, own.size
-    cost = np.zeros((n + 1, m + 1))
-    cost[1:, 0] = UNMATCHED_PEAK**2 * np.arange(1, n + 1)
-    for i in range(1, n + 1):
-        for j in range(1, m + 1):
-            gap = (measured[i - 1] - own[j - 1]) ** 2
-            cost[i, j] = min(cost[i - 1, j - 1] + gap, cost[i - 1, j] + UNMATCHED_PEAK**2, cost[i, j - 1])
-    pairs, i, j = [], n, m
-    while i and j:
-        if cost[i, j] == cost[i, j - 1]:
-            j -= 1
-        elif cost[i, j] == cost[i - 1, j] + UNMATCHED_PEAK**2:
-            i -= 1
-        else:
-            i, j = i - 1, j - 1
-            pairs.append((i, j))
-    return pairs[::-1]
+    gaps = (measured[:, None] - own) ** 2
+    return aligned(gaps, UNMATCHED_PEAK**2, np.zeros(own.size))[0]

@@ -22,6 +22,7 @@ from tfarm.errors import ParameterError
 from tfarm.records import record
 from tfarm.response.answers import HERTZ
 
+from .aligned import aligned
 from .data import Measured
 
 PROMINENCE = math.log(2)  # a peak is twice what is around it
@@ -67,29 +68,8 @@ def matched_peaks(measured: Real, own: Real, band: tuple[float, float]) -> tuple
 
     The cost of a pair is |ln w/w'|; one of a row that is left alone costs UNPAIRED, but an own one outside of the band.
     """
-    x, y = np.log(measured), np.log(own)
     alone = np.where((own >= band[0]) & (own <= band[1]), UNPAIRED, 0.0)
-    cost = np.zeros((x.size + 1, y.size + 1))
-    cost[1:, 0] = UNPAIRED * np.arange(1, x.size + 1)
-    cost[0, 1:] = np.cumsum(alone)
-    ways = np.zeros(cost.shape, dtype=int)
-    ways[1:, 0], ways[0, 1:] = 1, 2
-    for i in range(1, x.size + 1):
-        for j in range(1, y.size + 1):
-            choices = (
-                cost[i - 1, j - 1] + abs(x[i - 1] - y[j - 1]),
-                cost[i - 1, j] + UNPAIRED,
-                cost[i, j - 1] + alone[j - 1],
-            )
-            ways[i, j] = int(np.argmin(choices))
-            cost[i, j] = choices[ways[i, j]]
-    pairs, i, j = [], x.size, y.size
-    while i or j:
-        way = ways[i, j]
-        if way == 0:
-            pairs.append((i - 1, j - 1))
-        i, j = i - (way != 2), j - (way != 1)
-    return pairs[::-1], float(cost[-1, -1])
+    return aligned(abs(np.log(measured)[:, None] - np.log(own)), UNPAIRED, alone)
 
 
 def peaks_among(poles: Complex) -> Real:
@@ -179,19 +159,13 @@ def _half_width(data: Measured, place: int) -> float:
 
 def _around(data: Measured, place: int) -> slice:
     """The lines from dip to dip around a peak, and no farther than some of its widths, but three to each side."""
-    size, reach = abs(data.values), WIDTHS * _half_width(data, place)
-    low, high = place, place
-    lowest = size[place]
-    while low > 0 and (size[low - 1] < 2 * lowest) and (data.omega[place] - data.omega[low] < reach or place - low < 3):
-        low -= 1
-        lowest = min(lowest, size[low])
-    lowest = size[place]
-    last = data.omega.size - 1
-    while (
-        high < last
-        and size[high + 1] < 2 * lowest
-        and (data.omega[high] - data.omega[place] < reach or high - place < 3)
-    ):
-        high += 1
-        lowest = min(lowest, size[high])
-    return slice(low, high + 1)
+    size, away, reach = abs(data.values), abs(data.omega - data.omega[place]), WIDTHS * _half_width(data, place)
+
+    def end(way: int) -> int:
+        at, lowest = place, size[place]
+        while 0 <= at + way < size.size and size[at + way] < 2 * lowest and (away[at] < reach or abs(at - place) < 3):
+            at += way
+            lowest = min(lowest, size[at])
+        return at
+
+    return slice(end(-1), end(1) + 1)
