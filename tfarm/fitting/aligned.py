@@ -1,4 +1,4 @@
-"""Pairs of places in two ascending rows, by dynamic programming over both: which measured peak is which of the arm's."""
+"""Which measured peak is which of the arm's: pairs of places in two ascending rows, by dynamic programming."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from tfarm.arrays import Real
 def aligned(gaps: Real, measured_alone: float, own_alone: Real) -> tuple[list[tuple[int, int]], float]:
     """Pairs of places in both rows, in order, of the least cost in sum, and that cost.
 
-    A pair costs its entry of `gaps` (measured, own); one that is left alone `measured_alone`, or its `own_alone` (own,).
+    A pair costs its entry of `gaps` (measured, own); one left alone `measured_alone`, or its own of `own_alone` (own,).
     """
     n, m = gaps.shape
     cost, ways = np.zeros((n + 1, m + 1)), np.zeros((n + 1, m + 1), dtype=int)

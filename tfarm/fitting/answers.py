@@ -21,6 +21,7 @@ from .around import Around
 from .data import Measured
 from .features import PEAKS_BEYOND, features_of, match, near_zeros
 from .fit import Fit
+from .model import Response
 from .noise import CONFIDENCE
 from .ratio import Ratio
 from .repeats import WIDER, repeats
@@ -95,7 +96,7 @@ def fit_answer(fit: Fit) -> dict[str, Any]:
         "explained": fit.is_explained,
         "unexplained_peaks_hz": [peak for _, after, peak in rows if after is None],
         "responses": [
-            _response(each, rows) for each, rows in zip(fit.solution.problem.responses, fit.parts, strict=True)
+            _response(each, rows) for each, rows in zip(fit.solution.problem.responses, fit.solution.parts, strict=True)
         ],
         "records": _records(fit),
         "starts": fit.solution.starts,
@@ -104,7 +105,7 @@ def fit_answer(fit: Fit) -> dict[str, Any]:
     }
 
 
-def _response(one: Any, residuals: Any) -> dict[str, Any]:
+def _response(one: Response, residuals: Real) -> dict[str, Any]:
     return {
         "name": one.data.name,
         "source": one.data.source,

@@ -10,17 +10,18 @@ from typing import Any
 import numpy as np
 
 from tfarm.arm import Arm, must_be_arm
-from tfarm.arrays import Real
 from tfarm.errors import ParameterError
 from tfarm.records import record
 
 from .data import Measured, must_be_measured
-from .model import SENSOR_DELAY, SENSOR_GAIN, Problem, problem
+from .model import Problem, Response, check_signals
+from .noise import noise_of
 from .parameters import Parameter, parameters
 from .ringing import RingMode
 from .solve import Solution, best_solution, is_explained, nearest_minimum
 from .sure import BetterError, Fitted, ToldInterval, sureness
 
+SENSOR_GAIN, SENSOR_DELAY = "gain", "delay"  # of a sensor, as `Response` has them: free beside the arm's numbers
 MENDED = 4  # times that a profile may find a lower sum of squares than the search did
 
 
@@ -53,12 +54,6 @@ class Fit:
     def responses(self) -> tuple[Measured, ...]:
         """What was measured."""
         return tuple(each.data for each in self.solution.problem.responses)
-
-    @cached_property
-    def parts(self) -> tuple[Real, ...]:
-        """The residuals of each response, over their deviations."""
-        sizes = [2 * int(np.isfinite(each.noise.sigma).sum()) for each in self.solution.problem.responses]
-        return tuple(np.split(self.solution.residuals, np.cumsum(sizes))[: len(sizes)])
 
     @cached_property
     def rms_log_error(self) -> float | None:
@@ -113,19 +108,19 @@ def fit(
     found = best_solution(subject)
     for _ in range(MENDED):
         try:
-            sure = sureness(found, profile=profile, progress=progress)
+            fitted, unknown = sureness(found, profile=profile, progress=progress)
             break
         except BetterError as better:
             found = replace(nearest_minimum(better.found.problem, better.found.point), starts=found.starts)
     else:  # one valley after another: no end of it
         found = replace(found, converged=False)
-        sure = sureness(found, profile=False)
+        fitted, unknown = sureness(found, profile=False)
     return Fit(
         arm=replace(found.problem.arm(found.point), name=f"{arm.name}-fitted"),
         before=replace(subject.arm(np.zeros(len(subject.parameters))), name=arm.name),
         converged=found.converged,
-        parameters=sure.parameters,
-        not_determined=sure.not_determined,
+        parameters=fitted,
+        not_determined=unknown,
         chi_squared=found.chi_squared,
         freedom=found.freedom,
         solution=found,
@@ -143,19 +138,25 @@ def _problem(arm: Arm, data: Any, free: Any, start: Any, bounds: Any, priors: An
         raise ParameterError(key="data", value=0, remedy="give at least one measured response, or a decay (--mode)")
     keys = [str(key) for key in free if key not in (SENSOR_GAIN, SENSOR_DELAY)]
     family, numbers = parameters(arm, keys, start=start or {}, bounds=bounds or {}, priors=priors or {})
-    sensors = {}
-    for kind in (each for each in (SENSOR_GAIN, SENSOR_DELAY) if each in free):
-        names = [kind if len(data) == 1 else f"{kind}:{n}" for n in range(1, len(data) + 1)]
-        is_gain = kind == SENSOR_GAIN
-        sizes = [1.0 if is_gain else 1.0 / float(each.omega[-1]) for each in data]
-        sensors[kind] = [
-            Parameter(key=name, start=float(is_gain), low=-np.inf, high=np.inf, by_logarithm=is_gain, size=size)
-            for name, size in zip(names, sizes, strict=True)
-        ]
-    subject = problem(arm, data, family, numbers, sensors, rings)
+    check_signals(arm, data)
+    own, responses = [*numbers], []
+    for n, each in enumerate(data, start=1):
+        places = {}
+        for kind in (kind for kind in (SENSOR_GAIN, SENSOR_DELAY) if kind in free):
+            places[kind] = len(own)
+            own.append(_of_sensor(kind, kind if len(data) == 1 else f"{kind}:{n}", each))
+        responses.append(Response(each, noise_of(each), **places))
+    subject = Problem(family, tuple(own), tuple(responses), tuple(rings))
     if not subject.parameters:
         raise ParameterError(key="free", value="nothing", remedy="name what is free, such as link.youngs_modulus")
     if subject.size < len(subject.parameters):
         remedy = f"{subject.size} numbers were measured; leave some out"
         raise ParameterError(key="free", value=len(subject.parameters), remedy=remedy)
     return subject
+
+
+def _of_sensor(kind: str, key: str, data: Measured) -> Parameter:
+    """The gain of a response's sensor, by its logarithm, or its delay, in the time that the highest frequency takes."""
+    is_gain = kind == SENSOR_GAIN
+    size = 1.0 if is_gain else 1.0 / float(data.omega[-1])
+    return Parameter(key=key, start=float(is_gain), low=-np.inf, high=np.inf, by_logarithm=is_gain, size=size)

@@ -6,7 +6,7 @@ a sensor's gain and delay:  H = gain e^{-i w tau} N_out/N_in,  with the drive fo
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -23,15 +23,13 @@ from tfarm.response.signals import Signals
 
 from .around import Around, drive_behind, under_drive
 from .data import Measured
-from .noise import Noise, noise_of
+from .noise import Noise
 from .parameters import COORDINATE_STEP, Parameter
 from .reading import check_signal
 from .ringing import RingMode, ring_residuals
 
 WALL = 10.0  # times the largest residual of the first point: so high that no search goes on there
 INSIDE_BOUNDS = 1e-9  # of a coordinate: so far inside its bounds a search begins
-SENSOR_GAIN = "gain"  # of a sensor: free beside the numbers of the arm
-SENSOR_DELAY = "delay"  # likewise
 
 
 @dataclass(frozen=True)
@@ -42,6 +40,11 @@ class Response:
     noise: Noise
     gain: int | None = None  # place in the vector of what is searched for
     delay: int | None = None
+
+    @property
+    def size(self) -> int:
+        """How many real residuals it has: two a frequency at which something was measured."""
+        return 2 * int(np.isfinite(self.noise.sigma).sum())
 
 
 @dataclass(frozen=True)
@@ -58,12 +61,9 @@ class Problem:
         """Responses that are computed together, by their frequencies and by what drives the arm."""
         found: dict[tuple[bytes, str], list[int]] = {}
         for number, each in enumerate(self.responses):
-            found.setdefault((each.data.omega.tobytes(), self.driven(each.data.input)), []).append(number)
+            driven = drive_behind(self.family.arm, each.data.input)
+            found.setdefault((each.data.omega.tobytes(), driven), []).append(number)
         return found
-
-    def driven(self, name: str) -> str:
-        """What drives the arm where that is the input of a response."""
-        return drive_behind(self.family.arm, name)
 
     @cached_property
     def of_the_arm(self) -> tuple[Parameter, ...]:
@@ -86,16 +86,15 @@ class Problem:
         """How many real residuals there are: two a frequency, one or two a decay, one a prior."""
         priors = sum(each.prior is not None for each in self.parameters)
         rings = sum(1 + (each.ratio is not None) for each in self.rings)
-        return sum(2 * int(np.isfinite(each.noise.sigma).sum()) for each in self.responses) + rings + priors
+        return sum(each.size for each in self.responses) + rings + priors
 
-    def values(self, point: Real) -> dict[str, float]:
-        """The numbers at a point of the search, by key."""
-        return {each.key: each.value(float(x)) for each, x in zip(self.parameters, point, strict=True)}
+    def numbers(self, point: Real) -> dict[str, float]:
+        """The arm's numbers at a point of the search, by key."""
+        return {each.key: each.value(float(x)) for each, x in zip(self.of_the_arm, point, strict=False)}
 
     def arm(self, point: Real) -> Arm:
         """The arm at a point."""
-        values = {each.key: each.value(float(x)) for each, x in zip(self.of_the_arm, point, strict=False)}
-        return self.family.at(values)
+        return self.family.at(self.numbers(point))
 
     # ------------------------------------------------------------ responses
 
@@ -124,9 +123,8 @@ class Problem:
 
     def around(self, point: Real) -> Around:
         """The arm at a point, and those a step away along each of its own numbers."""
-        here = self.values(point)
-        base = {key: here[key] for key in self.family.keys}
-        own, pairs = self.family.at(base), []
+        base, pairs = self.numbers(point), []
+        own = self.family.at(base)
         for each, x in zip(self.of_the_arm, point, strict=False):
             sides = []
             for step in (-COORDINATE_STEP, COORDINATE_STEP):
@@ -156,7 +154,7 @@ class Problem:
     def _over_and_under(self, n: int, names: tuple[str, ...], drive: Any, numerators: Any) -> tuple[Any, Any]:
         """Numerator and denominator of a response: jets or arrays."""
         one = self.responses[n].data
-        if one.output == self.driven(one.input):  # the input over a signal
+        if one.output == drive_behind(self.family.arm, one.input):  # the input over a signal
             return drive, numerators[names.index(one.input)]
         return numerators[names.index(one.output)], numerators[names.index(one.input)] if one.input in names else drive
 
@@ -179,8 +177,9 @@ class Problem:
 
     def residuals(self, point: Real) -> Real:
         """(size,): real and imaginary parts of computed less measured over their deviations, then the priors."""
-        away = [_parts((H - one.data.values) / one.noise.sigma, one) for H, one in self._pairs(self.computed(point))]
-        rings = self.of_rings(point, Around(self.arm(point), ()))[0] if self.rings else np.empty(0)
+        pairs = zip(self.computed(point), self.responses, strict=True)
+        away = [_parts((H - one.data.values) / one.noise.sigma, one) for H, one in pairs]
+        rings = ring_residuals(Around(self.arm(point), ()), self.rings, point.size)[0] if self.rings else np.empty(0)
         coordinates = zip(self.parameters, point.tolist(), strict=True)
         priors = [(each.value(x) - each.prior[0]) / each.prior[1] for each, x in coordinates if each.prior is not None]
         return np.concatenate([*away, rings, priors])
@@ -188,21 +187,15 @@ class Problem:
     def jacobian(self, point: Real) -> Real:
         """(size, parameters): the derivatives of the residuals."""
         here = self.around(point)
-        rows = [_parts(dH / one.noise.sigma, one) for (_, dH), one in self._pairs(self.slopes(point, here))]
-        rings = self.of_rings(point, here)[1]
+        pairs = zip(self.slopes(point, here), self.responses, strict=True)
+        rows = [_parts(dH / one.noise.sigma, one) for (_, dH), one in pairs]
+        rings = ring_residuals(here, self.rings, point.size)[1]
         priors = [
             row * each.slope(x) / each.prior[1]
             for row, each, x in zip(np.eye(point.size), self.parameters, point.tolist(), strict=True)
             if each.prior is not None
         ]
         return np.concatenate([*(row.T for row in rows), rings, np.reshape(priors, (-1, point.size))])
-
-    def of_rings(self, point: Real, here: Around) -> tuple[Real, Real]:
-        """Residuals (n,) of the decays, and their derivatives (n, parameters)."""
-        return ring_residuals(here, self.rings, point.size)
-
-    def _pairs(self, each: Sequence[Any]) -> Any:
-        return zip(each, self.responses, strict=True)
 
 
 def walled(residuals: Callable[[Real], Real]) -> Callable[[Real], Real]:
@@ -227,28 +220,6 @@ def _parts(values: Complex, one: Response) -> Real:
     """Real and imaginary parts, one behind the other, of what was measured."""
     kept = values[..., np.isfinite(one.noise.sigma)]
     return np.concatenate([kept.real, kept.imag], axis=-1)
-
-
-def problem(
-    arm: Arm,
-    data: Sequence[Measured],
-    family: KeyedArms,
-    numbers: Sequence[Parameter],
-    sensors: Mapping[str, Any],
-    rings: Sequence[RingMode],
-) -> Problem:
-    """The problem of an arm's free numbers and its sensors'."""
-    check_signals(arm, data)
-    responses = []
-    own = [*numbers]
-    for number, each in enumerate(data):
-        places: dict[str, int] = {}
-        for kind in (SENSOR_GAIN, SENSOR_DELAY):
-            if kind in sensors:
-                places[kind] = len(own)
-                own.append(sensors[kind][number])
-        responses.append(Response(each, noise_of(each), places.get(SENSOR_GAIN), places.get(SENSOR_DELAY)))
-    return Problem(family, tuple(own), tuple(responses), tuple(rings))
 
 
 def check_signals(arm: Arm, data: Sequence[Measured]) -> None:

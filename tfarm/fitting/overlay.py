@@ -110,20 +110,19 @@ class Overlay:
         exp(ln(measured/exact)/S) with S = d ln w/d ln p: exact for a power law, as of Young's modulus or the density,
         else to first order.  Without those beyond LARGEST_FACTOR, or of a number that hardly moves the mode.
         """
-        numbers = [each.mode for each in self.beside if each.mode is not None and each.frequency_ratio is not None]
-        if not numbers:
+        every = ((each.mode, each.frequency_ratio) for each in self.beside)
+        told = [(mode, ratio) for mode, ratio in every if mode is not None and ratio is not None]
+        if not told:
             return {}
-        table = modes_of(self.ratio.driven, max(numbers))
+        table = modes_of(self.ratio.driven, max(mode for mode, _ in told))
         found: dict[str, dict[int, float]] = {}
         for name, slopes in table.sensitivity.items():
             factors = {}
-            for each in self.beside:
-                if each.mode is None or each.frequency_ratio is None:
-                    continue
-                slope = float(slopes[np.flatnonzero(table.index == each.mode)[0]])
-                exponent = math.log(each.frequency_ratio) / slope if abs(slope) > LEAST_SENSITIVITY else math.inf
+            for mode, ratio in told:
+                slope = float(slopes[np.flatnonzero(table.index == mode)[0]])
+                exponent = math.log(ratio) / slope if abs(slope) > LEAST_SENSITIVITY else math.inf
                 if abs(exponent) <= math.log(LARGEST_FACTOR):
-                    factors[each.mode] = math.exp(exponent)
+                    factors[mode] = math.exp(exponent)
             if factors:
                 found[name] = factors
         return found

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -53,6 +54,12 @@ class Solution:
     def chi_squared(self) -> float:
         """The sum of squared residuals."""
         return float(self.residuals @ self.residuals)
+
+    @cached_property
+    def parts(self) -> tuple[Real, ...]:
+        """The residuals of each response, over their deviations."""
+        sizes = [each.size for each in self.problem.responses]
+        return tuple(np.split(self.residuals, np.cumsum(sizes))[: len(sizes)])
 
     @property
     def freedom(self) -> int:
@@ -169,13 +176,9 @@ def _rescaled(found: Solution) -> Solution:
     if found.has_known_noise:
         return found
     for _ in range(RESCALED):
-        responses, first = [], 0
-        for each in found.problem.responses:
-            size = 2 * int(np.isfinite(each.noise.sigma).sum())
-            own = found.residuals[first : first + size]
-            first += size
-            share = found.residuals.size / max(found.freedom, 1)
-            factor = math.sqrt(float(own @ own) / size * share) if not each.noise.is_known else 1.0
+        responses, share = [], found.residuals.size / max(found.freedom, 1)
+        for each, own in zip(found.problem.responses, found.parts, strict=True):
+            factor = 1.0 if each.noise.is_known else math.sqrt(float(own @ own) / own.size * share)
             responses.append(replace(each, noise=replace(each.noise, sigma=each.noise.sigma * max(factor, 1e-12))))
         found = nearest_minimum(replace(found.problem, responses=tuple(responses)), found.point)
     return found

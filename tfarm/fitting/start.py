@@ -21,6 +21,7 @@ from tfarm.errors import ParameterError
 
 from .features import features_of, match, near_zeros
 from .model import Problem
+from .ringing import ring_residuals
 
 START_DEVIATION = 0.5  # of ln p: the deviation that a start is held with, where peaks do not decide
 MATCH_ROUNDS = 8  # of Newton's method on the frequencies
@@ -90,7 +91,7 @@ class Starts:
                 rows.append(np.array([slopes[:, j] for _, j in pairs]).reshape(-1, self._free))
                 misfit.append(np.array([np.log(measured[i] / w[j]) for i, j in pairs]))
         if self.problem.rings:
-            decays, slopes = self.problem.of_rings(point, here)
+            decays, slopes = ring_residuals(here, self.problem.rings, point.size)
             shares = np.array([each.frequency_deviation / each.frequency for each in self.problem.rings])
             first = np.cumsum([0, *(1 + (each.ratio is not None) for each in self.problem.rings)])[:-1]
             rows.append(slopes[first, : self._free] * shares[:, None])

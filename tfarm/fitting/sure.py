@@ -48,15 +48,6 @@ class Fitted:
         return f"{self.key} is {side}: these data say no more"
 
 
-@dataclass(frozen=True, kw_only=True)
-@record
-class Sureness:
-    """The fitted numbers, and what is not determined, in words."""
-
-    parameters: tuple[Fitted, ...]
-    not_determined: tuple[str, ...]
-
-
 class BetterError(Exception):
     """A profile has come to a lower sum of squares than the best: carries where."""
 
@@ -65,9 +56,12 @@ class BetterError(Exception):
         self.found = found
 
 
-def sureness(found: Solution, *, profile: bool, progress: ToldInterval | None = None) -> Sureness:
-    """The intervals of a solution's numbers: by profiles, or by its covariance where they are not asked for.
+def sureness(
+    found: Solution, *, profile: bool, progress: ToldInterval | None = None
+) -> tuple[tuple[Fitted, ...], tuple[str, ...]]:
+    """A solution's numbers with their intervals, and what is not determined, in words.
 
+    The intervals are by profiles, or by the covariance where these are not asked for.
     Along an open axis nothing changes, so one number of it is held while the others are profiled.  `progress` is told
     (done, total, key) before each.  Raises BetterError where a profile comes to a lower sum than the solution's.
     """
@@ -101,7 +95,7 @@ def sureness(found: Solution, *, profile: bool, progress: ToldInterval | None = 
             )
         )  # fmt: skip
     words += [each.half_known for each in fitted]
-    return Sureness(parameters=tuple(fitted), not_determined=tuple(word for word in words if word))
+    return tuple(fitted), tuple(word for word in words if word)
 
 
 def _one_sided(found: Solution, n: int, quantile: float) -> tuple[float, float | None] | None:
