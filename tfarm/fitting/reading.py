@@ -140,16 +140,11 @@ def _frequencies(sheet: Sheet) -> Real:
         said = sheet.units[sheet.names.index(name)]
         raise ParameterError(key=f"unit of {name}", value=said, remedy=f"{name} is in {unit}")
     frequency = sheet[name]
-    wrong = np.flatnonzero(~(frequency > 0))
-    if wrong.size:
-        key, bad = f"line {sheet.lines[wrong[0]]}, {name}", float(frequency[wrong[0]])
-        raise ParameterError(key=key, value=bad, remedy="a frequency is positive; leave the row out")
-    back = np.flatnonzero(np.diff(frequency) <= 0)
-    if back.size:
-        at = int(back[0]) + 1
-        again = bool(np.any(frequency[:at] == frequency[at]))
-        remedy = "is there twice; average its rows" if again else "is below the one before; sort the rows"
-        raise ParameterError(key=f"line {sheet.lines[at]}, {name}", value=float(frequency[at]), remedy=remedy)
+    sheet.refuse(name, ~(frequency > 0), "a frequency is positive; leave the row out")
+    back = np.r_[False, np.diff(frequency) <= 0]
+    at = int(back.argmax())
+    again = bool(np.any(frequency[:at] == frequency[at]))
+    sheet.refuse(name, back, "is there twice; average its rows" if again else "is below the one before; sort the rows")
     return frequency * scale
 
 
@@ -164,10 +159,8 @@ def _values(sheet: Sheet) -> Complex:
         if "deg" in sheet:
             raise ParameterError(key="header", value="deg", remedy="re and im say it all; leave deg out")
         return np.asarray(first + 1j * second)
-    if given[0][0] == "abs" and (first < 0).any():
-        at = int(np.flatnonzero(first < 0)[0])
-        remedy = "a magnitude is not negative; is it db?"
-        raise ParameterError(key=f"line {sheet.lines[at]}, abs", value=float(first[at]), remedy=remedy)
+    if given[0][0] == "abs":
+        sheet.refuse("abs", first < 0, "a magnitude is not negative; is it db?")
     with np.errstate(over="ignore"):
         size = first if given[0][0] == "abs" else 10.0 ** (first / 20)
     return np.asarray(size * np.exp(1j * np.radians(second)))
@@ -178,10 +171,8 @@ def _averages(sheet: Sheet) -> int | None:
     if "averages" not in sheet:
         return None
     found = sheet["averages"]
-    wrong = np.flatnonzero((found != found[0]) | (found < 1) | (found != np.round(found)))
-    if wrong.size:
-        remedy = "a whole number of averages, the same in every row"
-        raise ParameterError(key=f"line {sheet.lines[wrong[0]]}, averages", value=float(found[wrong[0]]), remedy=remedy)
+    wrong = (found != found[0]) | (found < 1) | (found != np.round(found))
+    sheet.refuse("averages", wrong, "a whole number of averages, the same in every row")
     return int(found[0])
 
 

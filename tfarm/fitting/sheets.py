@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tfarm.arm.reading import decoded
 from tfarm.arrays import Real
@@ -44,6 +45,12 @@ class Sheet:
 
     def __contains__(self, name: str) -> bool:
         return name in self.names
+
+    def refuse(self, name: str, wrong: NDArray[np.bool_], remedy: str) -> None:
+        """Raise ParameterError for the first row (rows,) in which a column is wrong, naming its line."""
+        if wrong.any():
+            at = int(wrong.argmax())
+            raise ParameterError(key=f"line {self.lines[at]}, {name}", value=float(self[name][at]), remedy=remedy)
 
 
 def digest_of(data: bytes) -> str:
