@@ -36,6 +36,7 @@ COMMANDS = {  # what each is asked, as short as its keys allow; {law} is a file 
     "design": ("design", ARM, "--objective", "damping"),
     "reduce": ("reduce", ARM, "--outputs", "root_moment", "--order", "6"),
     "sampled": ("sampled", ARM, *GAINS, "--modes", "4"),
+    "sampled, a law": ("sampled", ARM, "--law", "{law}", "--modes", "4"),
     "simulate": ("simulate", ARM, "--scenario", "slew", "--modes", "4"),
     "tune": ("tune", ARM, "--trials", "2"),
     "validate": ("validate",),

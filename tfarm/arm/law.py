@@ -173,19 +173,32 @@ class Law:
         the gain itself, or the coefficients of its polynomials and, of more than one, a factor, "hub_angle.gain".  Of a
         signal in several parts no number has a name of its own.
         """
-        found, read = {"gain": 1.0}, [name for part in self.parts for name in part.signals]
-        for part in self.parts:
-            (name, *others), block = part.signals, part.block
-            if others or not is_measured(name) or read.count(name) > 1:
-                continue
-            if isinstance(block, StateSpace) or np.count_nonzero(block.num) > 1:
-                found[f"{name}.gain"] = 1.0
-            if isinstance(block, Rational) and len(block.num) == len(block.den) == 1:
-                found[name] = block.num[0] / block.den[0]
-            elif isinstance(block, Rational):
+        found = {"gain": 1.0}
+        for key, (place, value) in self.part_gains.items():
+            (name,), block = self.parts[place].signals, self.parts[place].block
+            if key == name or isinstance(block, StateSpace) or np.count_nonzero(block.num) > 1:
+                found[key] = value
+            if isinstance(block, Rational) and key != name:
                 polynomials = {"num": block.num, "den": block.den if block.order else ()}
                 found |= {f"{name}.{of}.{n}": each for of, row in polynomials.items() for n, each in enumerate(row)}
         return {name: value for name, value in found.items() if value}
+
+    @property
+    def part_gains(self) -> dict[str, tuple[int, float]]:
+        """Each part that one signal has to itself: its place among `parts`, and its gain, by the name `having` knows.
+
+        That is of a plain gain the signal's, "hub_angle"; else 1, a factor, "hub_angle.gain".
+        """
+        found, read = {}, [name for part in self.parts for name in part.signals]
+        for place, part in enumerate(self.parts):
+            (name, *others), block = part.signals, part.block
+            if others or not is_measured(name) or read.count(name) > 1:
+                continue
+            if isinstance(block, Rational) and len(block.num) == len(block.den) == 1:
+                found[name] = place, block.num[0] / block.den[0]
+            else:
+                found[f"{name}.gain"] = place, 1.0
+        return found
 
     # ------------------------------------------------------------ values
 
@@ -194,17 +207,21 @@ class Law:
 
         With the sign of u = -sum: positive is what feeds back against a signal.
         """
+        numerators, whole = self.shares(s)
+        return numerators.sum(axis=0), whole
+
+    def shares(self, s: Complex) -> tuple[Complex, Complex]:
+        """Of each part what it multiplies the signals by, (parts, signals, n), and the denominator: `polynomials`."""
         s = np.asarray(s, dtype=complex)
         dens = [part.block.denominator(s) for part in self.parts]
-        whole = np.prod(dens, axis=0)
         row = {name: n for n, name in enumerate(self.signals)}
-        numerators = np.zeros((len(row), *s.shape), complex)
+        numerators = np.zeros((len(self.parts), len(row), *s.shape), complex)
         for n, part in enumerate(self.parts):
             others = np.prod([den for m, den in enumerate(dens) if m != n], axis=0) * -self.sign
             for name, value in zip(part.signals, part.block.numerators(s), strict=True):
                 if name in row:
-                    numerators[row[name]] += value * others
-        return numerators, np.asarray(whole)
+                    numerators[n, row[name]] += value * others
+        return numerators, np.asarray(np.prod(dens, axis=0))
 
     def values(self, s: Complex) -> Complex:
         """C_i (signals, n) at s, or z, without the delay; infinite or nan at its poles."""
@@ -236,7 +253,12 @@ class Law:
 
     def times(self, factor: float) -> Law:
         """Every part times a number."""
-        return replace(self, parts=tuple(Part(part.signals, part.block.times(factor)) for part in self.parts))
+        return self.weighted([factor] * len(self.parts))
+
+    def weighted(self, factors: Sequence[float]) -> Law:
+        """Each part times a number of its own."""
+        pairs = zip(self.parts, factors, strict=True)
+        return replace(self, parts=tuple(Part(part.signals, part.block.times(factor)) for part, factor in pairs))
 
     def having(self, key: str, value: float) -> Law:
         """The law with another value of one number.

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from tfarm.arm import PLANE
+from tfarm.arm import LISTED
 from tfarm.cli.app import tell
 from tfarm.columns import Column, Table
 from tfarm.dsp.results import AT_SAMPLES_COLUMNS, traced_columns
@@ -24,11 +24,11 @@ def print_sampled(answer: dict[str, Any]) -> None:
     show(answer["modes"])
     print(answer["law"])
     shown, band = answer["shown"], answer["band_rad_s"]
-    for name, held in (PLANE, PLANE[::-1]):
-        windows = shown[f"{name}_intervals"]
+    for gain in LISTED:
+        windows = shown[f"{gain.name}_intervals"]
         spans = " and ".join(f"({low['text']}, {high['text']})" for low, high in windows)
         known = _held([edge for pair in windows for edge in pair], band) if windows else "no interval"
-        print(f"stable at this {held} for {name} in {spans}{known}")
+        print(f"stable, the other gains held, for {gain.name} in {spans}{known}")
     delay, damping = shown["delay_margin_samples"], shown["required_damping_s"]
     more = " or more" if answer["delay_margin_is_lower_bound"] else ""
     print(f"further delay it bears: {delay['text']} samples{more}{_held([delay], band)}")
@@ -53,6 +53,7 @@ def print_sampled_law(answer: dict[str, Any]) -> None:
         print(f"further delay it bears: {answer['delay_margin_samples']:.4g} samples{more}, {seconds}")
     elif not answer["stable_gain_factors"]:
         print("stable with no factor on the law")
+    show(answer["windows"])
     print(f"{answer['arm']}: {answer['verdict_in_words']}; spectral radius {answer['spectral_radius']:.12g}")
 
 

@@ -54,9 +54,9 @@ class Clocked:
     def loop_function(self) -> tuple[Real, Complex]:
         """Frequencies [rad/s] (n,) up to half the sample rate, and L(e^{iwT}) there."""
         grid = law_grid(self.analysis.loop)
-        whole, fed_back = grid.terms[1]
+        whole, *fed_back = grid.terms[1]
         with np.errstate(all="ignore"):
-            L = np.asarray(fed_back / whole, dtype=np.complex128)
+            L = np.asarray(sum(fed_back) / whole, dtype=np.complex128)
         return grid.q / self.period, L
 
     @property

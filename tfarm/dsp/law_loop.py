@@ -9,7 +9,7 @@ than the plant has.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -61,7 +61,11 @@ class SampledLaw:
 
     def times(self, factor: float) -> SampledLaw:
         """The same loop with a factor on the whole law."""
-        return replace(self, law=self.law.times(factor), asked=self.asked.times(factor))
+        return self.weighted([factor] * len(self.law.parts))
+
+    def weighted(self, factors: Sequence[float]) -> SampledLaw:
+        """The same loop with a factor on each part of the law."""
+        return replace(self, law=self.law.weighted(factors), asked=self.asked.weighted(factors))
 
     def with_delay(self, samples: float) -> SampledLaw:
         """The same loop with another delay in all."""
@@ -90,8 +94,9 @@ class SampledLaw:
         return np.asarray(abs(entries * self.plant.residues).sum(axis=0) / np.maximum(abs(whole), LEAST_SIZE))
 
     def signals(self, z: Complex, base: Whole | None, offset: Any) -> Complex:
-        """Both `terms`, in rows."""
-        return np.array(self.terms(z, base, offset))
+        """Both `terms`, in rows: q, then each part of the law."""
+        open_loop, fed_back = self.terms(z, base, offset)
+        return np.vstack([open_loop, fed_back])
 
     @property
     def slowest(self) -> str:
@@ -108,12 +113,15 @@ class SampledLaw:
     def characteristic(self, z: Complex, base: Whole | None, offset: Any) -> Complex:
         """offset F(z)."""
         open_loop, fed_back = self.terms(z, base, offset)
-        return np.asarray(open_loop + fed_back)
+        return np.asarray(open_loop + fed_back.sum(axis=0))
 
     def terms(self, z: Complex, base: Whole | None, offset: Any) -> tuple[Complex, Complex]:
-        """offset q and offset times the sum of p_i H_i at z = e^{pT} + offset (n,), p the pole number `base`."""
-        entries, whole = self.law.polynomials(z)
-        return offset * whole, (entries * self.pulse.scaled(z, base, offset)).sum(axis=0)
+        """offset q (n,) and, of each part of the law, offset times its sum of p_i H_i (parts, n).
+
+        At z = e^{pT} + offset (n,), p the pole number `base`.
+        """
+        shares, whole = self.law.shares(z)
+        return offset * whole, (shares * self.pulse.scaled(z, base, offset)).sum(axis=1)
 
     def __call__(self, z: Complex) -> Complex:
         """F(z) at an array of z."""
@@ -171,13 +179,15 @@ class SampledLaw:
         """The closed-loop poles, not polished."""
         return np.linalg.eigvals(self.reduced_matrix()).astype(complex)
 
-    @cached_property
-    def near_one(self) -> tuple[tuple[int, float], list[tuple[int, float]]]:
-        """q, and p_i H_i of each signal that is fed back, as (n, c) of c x^n where x = 1 - 1/z is small."""
-        plant, T, most = self.plant, self.chain.sampling.period, self.law.order
+    def near_one(self, law: Law) -> tuple[tuple[int, float], list[tuple[int, float]]]:
+        """q, and p_i H_i of each signal that is fed back, as (n, c) of c x^n where x = 1 - 1/z is small.
+
+        Of this loop's law, or one of the same signals.
+        """
+        plant, T, most = self.plant, self.chain.sampling.period, law.order
         at_rest = plant.static - (plant.residues / plant.poles).real.sum(axis=1)
         size = abs(plant.static) + abs(plant.residues / plant.poles).sum(axis=1)
-        whole, entries = polynomials(self.law)
+        whole, entries = polynomials(law)
         slopes, found = self.pulse.slopes_at_one, []
         for row, entry in enumerate(entries):
             if entry.coefficients.any():
@@ -197,7 +207,7 @@ class SampledLaw:
         x^N F, N the poles of the plant there, vanishes at x = 1 - 1/z = 0 as often as all of its terms do.
         """
         poles = 0 if not self.plant.arm.has_rigid_mode else (1 if self.is_damped else 2) - self.has_free_angle
-        whole, fed_back = self.near_one
+        whole, fed_back = self.near_one(self.law)
         return max(0, poles + min(n for n, _ in (whole, *fed_back)))
 
     @cached_property

@@ -1,12 +1,14 @@
-"""By which factor on a whole law a pole of its sampled loop comes to the unit circle, and how much delay it bears.
+"""By which factor on a whole law, or on one of its parts, a pole of its sampled loop comes to the unit circle.
 
 On z = e^{iq} the loop is A + g B, A = q(z), B = sum of p_i(z) H_i(z), g the factor: `tfarm.crossing` on the circle.
-The grid is that of the plant's poles (`boundary`), with points around each pole and zero of the law.
+With a factor on one part the others are in A.  The grid is that of the plant's poles (`boundary`), with points around
+each pole and zero of the law.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -52,29 +54,63 @@ def law_grid(loop: SampledLaw) -> CircleGrid:
 
 
 def crossing_factors(loop: SampledLaw) -> Crossings:
-    """The positive factors on the law at which poles are on the circle, `at` which angle [rad a sample].
+    """The positive factors on the law at which poles are on the circle, `at` which angle [rad a sample]."""
+    found = part_crossings(known_grid(loop), range(len(loop.law.parts)))
+    return Crossings.of(each for each in found if each.t > LEAST_LAW_FACTOR)
 
-    A polynomial of the law that vanishes at z = 1 is known to an absolute error alone next to it.
-    """
-    grid = law_grid(loop)
+
+def known_grid(loop: SampledLaw) -> CircleGrid:
+    """`law_grid`, but for what is next to z = 1 where a polynomial of the law vanishes: an absolute error blurs it."""
     whole, entries = polynomials(loop.law)
-    if any(each.coefficients.any() and each.at_one(1)[0] for each in (whole, *entries)):
-        grid = grid.above(BLURRED)
-    found, first = crossed_on(grid, _split)
-    (n, open_loop), fed_back = loop.near_one
-    lowest = min((order for order, _ in fed_back), default=n + 1)
-    if lowest == n:  # A and B go there as the same power of x = 1 - 1/z: a single pole may be at z = 1
-        at_one = sum(value for order, value in fed_back if order == lowest)
-        found.append(Crossing(real_gain(open_loop, at_one), 0.0, first))
-    return Crossings.of(each for each in found if LEAST_LAW_FACTOR < each.t < MOST_LAW_FACTOR)
+    blurs = any(each.coefficients.any() and each.at_one(1)[0] for each in (whole, *entries))
+    return law_grid(loop).above(BLURRED) if blurs else law_grid(loop)
 
 
-def _split(terms: tuple[Any, Complex]) -> tuple[Complex, Complex]:
-    """A and B times the offset of each point."""
-    both = terms[1]
-    return both[0], both[1]
+def part_crossings(grid: CircleGrid, varied: Sequence[int]) -> Crossings:
+    """Where poles are on the circle as one factor, of either sign, grows on some parts of the law, the others held."""
+    loop = grid.loop
+    assert isinstance(loop, SampledLaw)
+    places = range(len(loop.law.parts))
+    held = [0, *(1 + place for place in places if place not in varied)]
+    moved = [1 + place for place in varied]
+
+    def split(terms: tuple[Any, Complex]) -> tuple[Complex, Complex]:
+        """A and B times the offset of each point, of its rows: q, then each part."""
+        return terms[1][held].sum(axis=0), terms[1][moved].sum(axis=0)
+
+    found, first = crossed_on(grid, split)
+    others, alone = (
+        loop.near_one(loop.law.weighted([float((place in varied) == is_varied) for place in places]))
+        for is_varied in (False, True)
+    )
+    lowest, at_one = _lowest([others[0], *others[1]])
+    least, moving = _lowest(alone[1])
+    if least <= lowest:  # A and B go there as the same power of x = 1 - 1/z, or A as a higher one: it is there at 0
+        found.append(Crossing(real_gain(at_one, moving) if least == lowest else 0.0, 0.0, first))
+    return Crossings.of(each for each in found if abs(each.t) < MOST_LAW_FACTOR)
+
+
+def _lowest(terms: Sequence[tuple[int, float]]) -> tuple[float, float]:
+    """The lowest power of x in a sum of c x^n, and its coefficient."""
+    lowest = min((order for order, _ in terms), default=math.inf)
+    return lowest, sum(value for order, value in terms if order == lowest)
 
 
 def stable_factors(loop: SampledLaw) -> list[Window]:
     """Every open interval of positive factors on the law in which the loop is stable, as its poles confirm."""
     return confirmed(crossing_factors(loop), 0.0, math.inf, lambda factor: loop.times(factor).poles.is_stable)
+
+
+def stable_numbers(loop: SampledLaw) -> dict[str, list[Window]]:
+    """Every open interval of each of `Law.part_gains`, the others held, in which the loop is stable, by its name."""
+    grid, places, found = known_grid(loop), range(len(loop.law.parts)), {}
+    for name, (part, value) in loop.asked.part_gains.items():
+        if not value:
+            continue
+
+        def holds(factor: float, part: int = part) -> bool:
+            return loop.weighted([factor if place == part else 1.0 for place in places]).poles.is_stable
+
+        windows = confirmed(part_crossings(grid, [part]), -math.inf, math.inf, holds)
+        found[name] = sorted(min((value * low, value * high), (value * high, value * low)) for low, high in windows)
+    return found

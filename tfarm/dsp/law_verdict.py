@@ -2,20 +2,61 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import Any, NamedTuple
 
 from tfarm.arm import Arm, Law, cancelled
 from tfarm.arm.checks import whole as whole_number
+from tfarm.columns import JSON, REPORT, TERMINAL, Column, Table
 from tfarm.crossing import Window
+from tfarm.digits import general, plain, singly
 from tfarm.dsp.chain import Chain, chain_or_usual
 from tfarm.dsp.discretise import described_law, rule_in_words
 from tfarm.dsp.law_circle import LawCircle
 from tfarm.dsp.law_loop import SampledLaw, sampled_law
-from tfarm.dsp.law_margins import stable_factors
+from tfarm.dsp.law_margins import stable_factors, stable_numbers
 from tfarm.dsp.margins import DelayMargin, around, delay_margin, with_all_modes
 from tfarm.dsp.verdict import MOST_ASKED, UNDAMPED_MODES, Verdict, settled_verdict, verdict_answer
 from tfarm.records import record
+
+WINDOW_DIGITS = 6  # of the ends of a window, where a person reads
+
+
+class SampledNumber(NamedTuple):
+    """One number of a law, the gain of a part or a factor on it, and how far it may go alone at the samples."""
+
+    number: str
+    value: float
+    windows: list[Window]
+
+    @property
+    def interval(self) -> Window | None:
+        """The window that its value lies in."""
+        return around(self.windows, self.value)
+
+    def spans(self, how: Callable[[float, int], str]) -> str:
+        """Its windows, each end in six digits."""
+        return " ".join(f"({how(low, WINDOW_DIGITS)}, {how(high, WINDOW_DIGITS)})" for low, high in self.windows)
+
+
+SAMPLED_NUMBER_COLUMNS = (  # of `SampledNumber`
+    Column("number", "number of the law"),
+    Column("value", "value", printed=singly(general, 6), digits=singly(plain, 5)),
+    Column("interval", of=lambda row: row.interval and list(row.interval), on=(JSON,)),
+    Column("windows", of=lambda row: [list(window) for window in row.windows], on=(JSON,)),
+    Column("", "stable, the others held", of=lambda row: row.spans(general) or "none", on=(TERMINAL,)),
+    Column("stable_windows", "stable, the others held", on=REPORT,
+           of=lambda row: " ".join(repr(end) for window in row.windows for end in window) or "none",
+           shown=lambda row: row.spans(plain) or "none"),
+)  # fmt: skip
+
+
+def sampled_numbers(loop: SampledLaw) -> list[SampledNumber]:
+    """How far the gain of each part of the law may go, the others held."""
+    values, windows = loop.asked.part_gains, stable_numbers(loop)
+    return [SampledNumber(name, values[name][1], each) for name, each in windows.items()]
 
 
 @dataclass(frozen=True)
@@ -37,6 +78,11 @@ class LawAnalysis:
     def gain_factors(self) -> Window | None:
         """The interval around 1 in which a factor on the law may lie; None where the loop is not stable."""
         return around(self.factors, 1.0)
+
+    @cached_property
+    def numbers(self) -> list[SampledNumber]:
+        """How far the gain of each part of the law may go, the others held."""
+        return sampled_numbers(self.loop)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -85,6 +131,7 @@ def sampled_law_answer(analysis: LawAnalysis) -> dict[str, Any]:
         "free_hub_angle": loop.has_free_angle,
         "stable_gain_factors": [list(window) for window in analysis.factors],
         "gain_factors": None if analysis.gain_factors is None else list(analysis.gain_factors),
+        "windows": Table(columns=SAMPLED_NUMBER_COLUMNS, record=analysis.numbers),
         "delay_margin_samples": bound.samples,
         "delay_margin_s": bound.samples * sampling.period,
         "delay_margin_is_lower_bound": bound.is_bound,

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic
 
-from tfarm.arm import LISTED, MOMENT_GAIN, PLANE, RATE_GAIN, TAKEN_OFF, Arm, HubFeedback, driven, unit_of
+from tfarm.arm import ANGLE_GAIN, LISTED, MOMENT_GAIN, RATE_GAIN, TAKEN_OFF, Arm, HubFeedback, driven, unit_of
 from tfarm.arm.checks import whole
 from tfarm.columns import Table
 from tfarm.crossing import Window
@@ -159,7 +159,7 @@ def _growing(full: SampledKind) -> Iterator[SampledKind]:
 class Analysis:
     """Everything that is said of a sampled loop at its gains, with how far each edge is proven.
 
-    `shown` has the stable intervals of both gains of the plane, by name.
+    `shown` has the stable intervals of each gain, the others held, by name.
     """
 
     verdict: Verdict
@@ -179,6 +179,13 @@ class Analysis:
         """The stable intervals of the gain on the root moment."""
         return self.shown[MOMENT_GAIN].windows
 
+    def interval(self, name: str) -> Window | None:
+        """The stable interval around a gain; one on the angle that is 0, where nothing holds that, is its end."""
+        value, windows = self.verdict.loop.gains[name], self.shown[name].windows
+        if name == ANGLE_GAIN and value == 0.0 and self.verdict.is_stable:
+            return next((window for window in windows if window[0] <= 0.0 < window[1]), None)
+        return around(windows, value)
+
     @property
     def required_damping(self) -> float:
         """The damping C [s] from which on the gains are stable."""
@@ -192,14 +199,17 @@ class Analysis:
 
 
 def analyse(arm: Arm, gains: HubFeedback, chain: Chain | None = None, *, count: int | None = None) -> Analysis:
-    """Verdict, stable intervals of both gains, modes one by one, delay margin, and the damping that makes it safe."""
+    """Verdict, stable intervals of each gain, modes one by one, delay margin, and the damping that makes it safe."""
     chain = chain_or_usual(chain)
     verdict = sampled_verdict(arm, gains, chain, count=count)
     loop, band = verdict.loop, verdict.band
     without_loop = (MOMENT_GAIN,) if arm.has_massless_hub else ()
     return Analysis(
         verdict,
-        {name: ShownWindows([], []) if name in without_loop else shown_windows(loop, band, name) for name in PLANE},
+        {
+            gain.name: ShownWindows([], []) if gain.name in without_loop else shown_windows(loop, band, gain.name)
+            for gain in LISTED
+        },
         mode_table(loop),
         *shown_delay(loop, band),
         shown_damping(arm, gains, chain, count=count or UNDAMPED_MODES),
@@ -234,7 +244,7 @@ def sampled_answer(analysis: Analysis) -> dict[str, Any]:
         "gain_units": {gain.name: unit_of(gain.name, arm) for gain in LISTED},
         **gains.by_name,
         **verdict_answer(verdict, sampling),
-        **{f"{name}_interval": (it := around(each.windows, gains[name])) and list(it) for name, each in shown},
+        **{f"{name}_interval": (it := analysis.interval(name)) and list(it) for name, _ in shown},
         **{f"{name}_intervals": [list(window) for window in each.windows] for name, each in shown},
         "first_unstable_mode": analysis.first_unstable_mode,
         "delay_margin_samples": analysis.delay_margin.samples,

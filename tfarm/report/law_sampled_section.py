@@ -16,7 +16,7 @@ from tfarm.dsp import Chain, Simulation, Verdict, analyse
 from tfarm.dsp.chain import MOST_DELAY
 from tfarm.dsp.closed import verdict_on
 from tfarm.dsp.law_margins import stable_factors
-from tfarm.dsp.law_verdict import law_verdict
+from tfarm.dsp.law_verdict import SAMPLED_NUMBER_COLUMNS, SampledNumber, law_verdict, sampled_numbers
 from tfarm.dsp.margins import DelayMargin, delay_margin
 from tfarm.dsp.results import drawn, residual_moment_rms
 from tfarm.dsp.slews import RECORD_LENGTH
@@ -37,6 +37,10 @@ MORE_DELAY = (0.5, 1.0)  # samples of further delay that the verdict is asked fo
 LATER_CAPTION = (
     "The exact loop with so much more delay between reading and acting. |z| is the largest of its poles{apart}; below "
     "1 the loop is stable. {held}"
+)
+NUMBERS_CAPTION = (
+    "The gain of each part of a law alone, as it is sampled; a name that ends in “gain” is a factor on that part. "
+    "Edges are where a pole of the exact sampled loop is on the unit circle: {modes}."
 )
 APART_FROM_FREE = ", that at z = 1 of a hub that nothing holds apart"
 MEASURED_CAPTION = (
@@ -61,12 +65,14 @@ class LawAtClock:
     """What is said of a law at a clock: its verdict, in words where it is stable, and what further delay it bears.
 
     `margin` is None where nothing is proven: up to where it is right that would be of the first modes alone.
+    `numbers` are those of a law other than gains at the hub, each with its stable windows.
     """
 
     each: LawOnArm
     verdict: Verdict[Any]
     stable_for: str
     margin: DelayMargin | None
+    numbers: Sequence[SampledNumber] = ()
 
 
 @dataclass(frozen=True)
@@ -87,7 +93,7 @@ def law_sampled_section(arm: Arm, chain: Chain, laws: Sequence[GivenLaw]) -> Pag
     named = on_arm(arm, laws)
     found = [held_by(each, chain) for each in named]
     rows = [row for each in found for row in verdicts_later(each, chain)]
-    blocks: list[Picture | Table] = [delays_table(rows, chain)]
+    blocks: list[Picture | Table] = [delays_table(rows, chain), *numbers_tables(found)]
     words = [*(_answer(each) + cured(each, chain) for each in found), chain_told(arm, chain)]
     if any(each.measured is not None for each in named):
         blocks += _measured_blocks(named, chain)
@@ -112,15 +118,16 @@ def held_by(each: LawOnArm, chain: Chain) -> LawAtClock:
     if isinstance(each.law, HubFeedback):
         analysis = analyse(each.arm, each.law, chain)
         told = [
-            f"{name} {spans(shown.windows, each.law[name])}{written_unit(name, each.arm)}"
+            f"{name} {spans(shown.windows, each.law[name], analysis.interval(name))}{written_unit(name, each.arm)}"
             for name, shown in analysis.shown.items()
         ]
-        words = f"Stable, the other held: {'; '.join(told)}."
+        words = f"Stable, the others held: {'; '.join(told)}."
         return LawAtClock(each, analysis.verdict, words, analysis.delay_margin if analysis.verdict.is_settled else None)
     verdict = law_verdict(each.arm, each.law, chain)
     factors = [f"{plain(low, 5)} to {plain(high, 5)}" for low, high in stable_factors(verdict.loop)]
     words = f"Stable with the whole law times {' and '.join(factors)}." if factors else "No factor on it is stable."
-    return LawAtClock(each, verdict, words, delay_margin(verdict.loop) if verdict.is_settled else None)
+    margin = delay_margin(verdict.loop) if verdict.is_settled else None
+    return LawAtClock(each, verdict, words, margin, sampled_numbers(verdict.loop))
 
 
 # ------------------------------------------------------------ verdict
@@ -209,6 +216,24 @@ def delays_table(rows: Sequence[Later], chain: Chain) -> Table:
             Column("modes_used", "modes", of=[row.verdict.modes_used for row in rows]),
         ),
     )  # fmt: skip
+
+
+def numbers_tables(found: Sequence[LawAtClock]) -> list[Table]:
+    """A row a number of a law, with the windows in which the sampled loop is stable; none of gains at the hub."""
+    told = [(it, number) for it in found for number in it.numbers]
+    if not told:
+        return []
+    modes = ", ".join(dict.fromkeys(f"{it.each.name} with {it.verdict.modes_used} flexible modes" for it, _ in told))
+    return [
+        Table(
+            stem="sampled-numbers",
+            title="How far each number of a law may go",
+            caption=NUMBERS_CAPTION.format(modes=modes),
+            record=[number for _, number in told],
+            columns=(Column("law", "law", of=[it.each.name for it, _ in told]), *SAMPLED_NUMBER_COLUMNS),
+            keys=2,
+        )
+    ]
 
 
 # ------------------------------------------------------------ in time

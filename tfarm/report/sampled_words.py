@@ -286,9 +286,9 @@ def damping_fact(data: Sampled) -> Fact:
     return Fact(label=label, value=scientific(needed, 2), unit="s", beside=held.strip())
 
 
-def spans(windows: Sequence[Window], gain: float) -> str:
+def spans(windows: Sequence[Window], gain: float, here: Window | None = None) -> str:
     """The interval around a gain in a few digits, or the others where there is none around it."""
-    here = around(list(windows), gain)
+    here = here or around(list(windows), gain)
     if here is not None:
         return span(here)
     others = " or ".join(span(window) for window in windows)

@@ -1,0 +1,110 @@
+"""How far each number of a law may go at the samples: against gains at the hub, eigenvalues, and Jury's conditions."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tfarm
+from tests.dsp.law_verdicts import some_case
+from tests.dsp.test_laws import CHAINS, LAB, LAWS, T
+from tests.shell import answer, run
+from tfarm import HubFeedback, Law
+from tfarm.arm.law_tables import load_law
+from tfarm.dsp import Chain, analyse, sampled_loop, stable_windows
+from tfarm.dsp.law_loop import sampled_law
+from tfarm.dsp.law_margins import known_grid, part_crossings, stable_numbers
+
+NAMES = {"hub_angle": "Kp", "hub_rate": "K1", "root_moment": "K2"}
+
+
+@pytest.mark.parametrize("chain", CHAINS.values(), ids=CHAINS)
+@pytest.mark.parametrize("gains", [HubFeedback(K1=0.3, K2=0.3), HubFeedback(K1=14.7, K2=-0.26, Kp=20.0)])
+def test_gains_at_the_hub_have_the_same_windows_as_a_law(chain, gains):
+    mine = stable_numbers(sampled_law(LAB, Law.of_gains(gains), chain, count=10))
+    theirs = sampled_loop(LAB, gains, chain, count=10)
+    assert set(mine) == {output for output, name in NAMES.items() if gains[name]}
+    for output, windows in mine.items():
+        expected = stable_windows(theirs, NAMES[output])
+        assert len(windows) == len(expected)
+        np.testing.assert_allclose(windows, expected, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+def test_a_number_is_in_a_window_where_all_eigenvalues_are_inside_the_circle(law):
+    """At random factors of either sign on one part; near an edge eigenvalues tell nothing."""
+    rng, told = np.random.default_rng(5), set()
+    loop = sampled_law(LAB, law, Chain(), count=6)
+    for name, windows in stable_numbers(loop).items():
+        part, value = loop.asked.part_gains[name]
+        for factor in (*-(10 ** rng.uniform(-3, 2, 4)), *10 ** rng.uniform(-3, 2, 8)):
+            weights = [factor if place == part else 1.0 for place in range(len(loop.law.parts))]
+            radius = abs(np.linalg.eigvals(loop.weighted(weights).reduced_matrix())).max()
+            inside = any(low < factor * value < high for low, high in windows)
+            assert abs(radius - 1) < 1e-6 or inside == (radius < 1), (name, factor)
+            told.add(inside)
+    assert told == {True, False}
+
+
+def test_between_crossings_along_one_part_the_count_is_what_they_say():
+    """Random laws, integrators and unstable ones among them, at random factors of either sign."""
+    rng, compared = np.random.default_rng(77), 0
+    for _ in range(6):
+        case = some_case(rng)
+        loop = case and sampled_law(*case, count=6)
+        for part in range(len(loop.law.parts) if loop else 0):
+            factors = np.r_[1.0, -(10 ** rng.uniform(-4, 3, 3)), 10 ** rng.uniform(-4, 3, 3)]
+            places = range(len(loop.law.parts))
+            loops = [loop.weighted([float(g) if place == part else 1.0 for place in places]) for g in factors]
+            passed = part_crossings(known_grid(loop), [part]).passed(factors)
+            counts = np.array([(each.poles.log_radius > 0).sum() for each in loops])
+            assert (counts - counts[0] == passed - passed[0]).all(), part
+            compared += 1
+    assert compared > 5
+
+
+def test_of_a_stiff_arm_angle_and_rate_gain_reach_as_far_as_jury_says():
+    """z^2 - 2z + 1 + Kp T^2 (z + 1)/2J + K1 T (z - 1)/J: Kp > 0, K1 > Kp T/2 and K1 < 2J/T."""
+    stiff = LAB.having(length=0.1)
+    gains = HubFeedback(K1=0.4 * stiff.turned_inertia / T, Kp=1.0)
+    loop = sampled_loop(stiff, gains, Chain(), count=1)
+    np.testing.assert_allclose(stable_windows(loop, "Kp"), [(0.0, 2 * gains.K1 / T)], rtol=1e-2)
+    np.testing.assert_allclose(stable_windows(loop, "K1"), [(T / 2, 2 * stiff.turned_inertia / T)], rtol=1e-2)
+
+
+def test_an_angle_gain_that_is_0_lies_at_the_edge_of_its_interval():
+    """Apart from z = 1 of the free angle the loop is stable there, and from there on the angle is held."""
+    found = analyse(LAB, HubFeedback(K1=14.7, K2=-0.26), Chain(), count=6)
+    low, high = found.interval("Kp")
+    assert (low, found.verdict.is_stable) == (0.0, True)
+    held = (replace(found.verdict.loop, gains=HubFeedback(K1=14.7, K2=-0.26, Kp=Kp)) for Kp in (1e-3, high * 0.999))
+    assert all(each.poles.is_stable for each in held)
+    driven = replace(found, verdict=replace(found.verdict, loop=found.verdict.loop.having(K1=-0.1), band=None))
+    assert driven.interval("Kp") is None  # whatever its windows
+
+
+def test_only_a_part_that_one_signal_has_to_itself_has_a_name():
+    both = Law.of_matrices([[0.5]], [[1.0, 1.0]], [[1.0]], [[0.1, 0.2]], ["hub_rate", "root_moment"], period=T)
+    assert both.part_gains == {}
+    law = LAWS["in z"]
+    assert law.part_gains == {"hub_angle.gain": (0, 1.0), "root_moment.gain": (1, 1.0)}
+    assert LAWS["lead"].part_gains == {"hub_angle.gain": (0, 1.0), "root_moment": (1, 0.1)}
+    for name, (part, value) in law.part_gains.items():
+        twice = law.weighted([2.0 if place == part else 1.0 for place in range(2)])
+        z = np.array([0.3 + 0.4j])
+        np.testing.assert_allclose(twice.values(z), law.having(name, 2 * value).values(z), rtol=1e-14)
+
+
+def test_the_command_lists_each_number_with_its_windows(capsys, tmp_path):
+    path = tmp_path / "law.toml"
+    path.write_text("[law.hub_angle]\nnum = [2.0, 1.0]\nden = [0.01, 1.0]\n[law.hub_rate]\ngain = 1.0\n")
+    rows = answer(capsys, "sampled", "sasaki2012-lab", "--law", str(path))["windows"]
+    assert [row["number"] for row in rows] == ["hub_angle.gain", "hub_rate"]
+    found = tfarm.sampled(LAB, load_law(path))
+    for row, number in zip(rows, found.numbers, strict=True):
+        low, high = number.interval
+        assert row["interval"] == [low, high if math.isfinite(high) else "inf"]
+    code, printed, _ = run(capsys, "sampled", "sasaki2012-lab", "--law", str(path))
+    assert code == 0
+    assert f"({low:.6g}, {high:.6g})" in printed
