@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -12,15 +13,23 @@ from tests.dsp.test_laws import CHAINS, LAB, LAWS, T
 from tests.shell import answer, run
 from tfarm import HubFeedback, Law
 from tfarm.arm.law_tables import load_law
-from tfarm.dsp import Chain, analyse, sampled_loop, stable_windows
+from tfarm.dsp import Chain, Sampling, analyse, sampled_loop, stable_windows
 from tfarm.dsp.law_loop import sampled_law
 from tfarm.dsp.law_margins import known_grid, part_crossings, stable_numbers
 
 NAMES = {"hub_angle": "Kp", "hub_rate": "K1", "root_moment": "K2"}
 
 
-@pytest.mark.parametrize("chain", CHAINS.values(), ids=CHAINS)
-@pytest.mark.parametrize("gains", [HubFeedback(K1=0.3, K2=0.3), HubFeedback(K1=14.7, K2=-0.26, Kp=20.0)])
+SLOW = Chain(sampling=Sampling(period=0.05, delay_samples=0.3))
+
+
+@pytest.mark.parametrize(
+    ("chain", "gains"),
+    [
+        *product(CHAINS.values(), [HubFeedback(K1=0.3, K2=0.3), HubFeedback(K1=14.7, K2=-0.26, Kp=20.0)]),
+        (SLOW, HubFeedback(K1=0.7, K2=-0.23, Kp=0.015)),  # K2 has two windows, and its factor is negative in both
+    ],
+)
 def test_gains_at_the_hub_have_the_same_windows_as_a_law(chain, gains):
     mine = stable_numbers(sampled_law(LAB, Law.of_gains(gains), chain, count=10))
     theirs = sampled_loop(LAB, gains, chain, count=10)
