@@ -49,12 +49,14 @@ class LawSlew:
 
     def pieces(self, objective: str, law: Law, acting: Law, slopes: Sequence[Slope]) -> tuple[Real, Real]:
         """Residual [N m] or cost of a law, (1,), and its slopes (1, n)."""
+        from scipy.signal import dlsim  # here, because it takes half a second to load
+
         task = self._tasks[SLEWED.index(objective)]
         plain = acting_law(self.arm, law, self.chain)[0]
         references = references_of(plain, task)
         A = closed(self.held, acting.matrices(self.signals))
-        driven = _filtered(plain.matrices(), references)
-        x, moment, u = self._run(A, (task.feedforward + driven)[:, None])
+        _, driven, *_ = dlsim((*plain.matrices(), 1.0), references)  # 1: counted in samples
+        x, moment, u = self._run(A, task.feedforward[:, None] + driven)
         change = self._change(x[..., 0], dict(zip(plain.signals, references.T, strict=True)), slopes)
         _, d_moment, d_u = self._run(A, change)
         if objective == "residual":
@@ -102,13 +104,3 @@ class LawSlew:
 
         a, T = self.clock.estimate or 0.0, self.chain.sampling.period
         return np.asarray(lfilter([(1 - a) / T, -(1 - a) / T], [1.0, -a], angle))
-
-
-def _filtered(law: Matrices, signals: Real) -> Real:
-    """What a law in z makes of signals (samples, columns)."""
-    A, B, C, D = law
-    x, out = np.zeros(len(A)), np.zeros(len(signals))
-    for k, row in enumerate(signals):
-        out[k] = (C @ x + D @ row)[0]
-        x = A @ x + B @ row
-    return out

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tfarm.arm.blocks import Matrices
-from tfarm.arrays import Complex, Real
+from tfarm.arrays import Complex
 from tfarm.records import record
 from tfarm.reduced.sensed import closed
 from tfarm.synthesis.structures import Slope
@@ -50,7 +50,8 @@ def changes(slopes: Sequence[Slope], signals: Sequence[str], z: Complex, clock: 
         whole = np.polyval(entry.den, s)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             C = np.polyval(entry.num, s) / whole
-            moved = (_values(num, s) - C * _values(den, s)) / whole
+            d_num, d_den = (np.polyval(rows.T[..., None], s) for rows in (num, den))  # (coefficients, n)
+            moved = (d_num - C * d_den) / whole
         moved = np.where(np.isfinite(moved), moved, 0.0)
         if entry.signal in signals:
             found[list(signals).index(entry.signal)] += moved
@@ -59,14 +60,6 @@ def changes(slopes: Sequence[Slope], signals: Sequence[str], z: Complex, clock: 
             assert clock.estimate is not None
             a = clock.estimate
             found[list(signals).index("hub_angle")] += moved * ((1 - a) / clock.period * (z - 1) / (z - a))
-    return found
-
-
-def _values(polynomials: Real, s: Complex) -> Complex:
-    """Polynomials (m, degrees), descending, at s (n,): (m, n), by Horner's rule."""
-    found = np.zeros((len(polynomials), s.size), complex)
-    for coefficients in polynomials.T:
-        found = found * s + coefficients[:, None]
     return found
 
 

@@ -11,6 +11,7 @@ more than the minimum of its own valley, if that: several starts are for the res
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from operator import itemgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -81,13 +82,9 @@ def minimax(
     for n, start in enumerate(starts, 1):
         then = descended(pieces, start, upper)
         found += [(pieces(x).score, x) for x in (start, then)]
-        tell(n, min(found, key=_first)[0])
-    found += [along_tangents(pieces, x, upper) for _, x in sorted(found, key=_first)[:GO_ON]]
-    return sorted(found, key=_first)
-
-
-def _first(found: ScoredPoint) -> float:
-    return found[0]
+        tell(n, min(found, key=itemgetter(0))[0])
+    found += [along_tangents(pieces, x, upper) for _, x in sorted(found, key=itemgetter(0))[:GO_ON]]
+    return sorted(found, key=itemgetter(0))
 
 
 def descended(pieces: PiecesAt, start: Real, upper: Real) -> Real:
